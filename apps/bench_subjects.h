@@ -12,7 +12,8 @@ struct BenchSubject {
   bool in_all = true;
 };
 
-/// In the order in which "all" runs them. Import first: it measures in processes of its own, which must start before any thread does.
+/// In the order in which "all" runs them. Import first: it measures in processes of its own, which must start before
+/// any thread does.
 inline constexpr std::array kBenchSubjects{
     BenchSubject{"import", "DICOM to a volume"},
     BenchSubject{"bone", "resampling and surface"},
@@ -26,7 +27,9 @@ inline constexpr std::array kBenchSubjects{
     BenchSubject{"slices", "bone from thick slices, against exact bodies"},
     BenchSubject{"registration", "a second scan onto the first, against known motions and SimpleITK"},
     BenchSubject{"tutoring", "a hand that leads another: bad networks, playback, a flood; not part of all", false},
-    BenchSubject{"network", "what the servo feels of listeners that are flooded, and of all that is listed; not part of all", false},
+    BenchSubject{"network",
+                 "what the servo feels of listeners that are flooded, and of all that is listed; not part of all",
+                 false},
     BenchSubject{"geometry", "distances, voxels, tetrahedra, curves, masks, skins"},
 };
 

@@ -1,4 +1,5 @@
-// Flags of the nerve monitor's console: declared once, for 'osteo console', which passes them on, and for osteo-console.
+// Flags of the nerve monitor's console: declared once, for 'osteo console', which passes them on, and for
+// osteo-console.
 #pragma once
 #include <string>
 
@@ -14,16 +15,20 @@ struct ConsoleFlags {
   double scale = 0;
   std::string state_file, code;
   static void describe(ConsoleFlags& p, auto& visit) {
-    visit({"sound", "the loudest channel, and a tone when activity begins, on the machine's sound card where there is one"}, p.sound);
-    visit(
-        {"code",
-         "that a rehearsal with --stream igtl:PORT/stimulator shows: the stimulator is set from here, by S and T and in the panel (empty: "
-         "the console only listens)"},
-        p.code);
+    visit({"sound",
+           "the loudest channel, and a tone when activity begins, on the machine's sound card where there is one"},
+          p.sound);
+    visit({"code",
+           "that a rehearsal with --stream igtl:PORT/stimulator shows: the stimulator is set from here, by S and T and "
+           "in the panel (empty: "
+           "the console only listens)"},
+          p.code);
     visit({"width", "of the window; no more than the screen has", "pixels", 480, 8192}, p.width);
     visit({"height", "of the window; no more than the screen has", "pixels", 320, 8192}, p.height);
     visit({"scale", "of text and panels (0: by the monitor); Ctrl + and Ctrl - in the window", "", 0, 4}, p.scale);
-    visit({"state_file", "what the window shows is written there as JSON after each picture, for tests (empty: nowhere)"}, p.state_file);
+    visit(
+        {"state_file", "what the window shows is written there as JSON after each picture, for tests (empty: nowhere)"},
+        p.state_file);
   }
 };
 

@@ -13,10 +13,11 @@ struct MaskNodes {
 /// What the stage that makes bone.vdb takes. Error(usage) for a pipeline without a mask.
 [[nodiscard]] inline MaskNodes mask_nodes(const Pipeline& pipeline) {
   const auto makes_bone = [](const PipelineNode& n) {
-    return n.stage == "resample" && n.inputs.contains("mask") && !n.inputs.at("mask").node.empty() && n.inputs.contains("image");
+    return n.stage == "resample" && n.inputs.contains("mask") && !n.inputs.at("mask").node.empty() &&
+           n.inputs.contains("image");
   };
-  auto bone =
-      std::find_if(pipeline.nodes.begin(), pipeline.nodes.end(), [&](const PipelineNode& n) { return n.id == "bone" && makes_bone(n); });
+  auto bone = std::find_if(pipeline.nodes.begin(), pipeline.nodes.end(),
+                           [&](const PipelineNode& n) { return n.id == "bone" && makes_bone(n); });
   if (bone == pipeline.nodes.end()) bone = std::find_if(pipeline.nodes.begin(), pipeline.nodes.end(), makes_bone);
   if (bone == pipeline.nodes.end()) {
     throw Error(ExitCode::usage, "the pipeline of this case has no mask that could be edited",

@@ -4,14 +4,15 @@
 #include <string>
 
 #include "osteo/core/base/json_document.h"
-#include "osteo/session/scene/session_folder.h"
 #include "osteo/network/tutor/playback.h"
+#include "osteo/session/scene/session_folder.h"
 
 namespace osteo {
 
 /// Words for session.json: mode, who drills, pace.
 inline std::string guided_words(const PlaybackParams& p) {
-  return "led by a recorded session: " + std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(p.mode)]) + ", " +
+  return "led by a recorded session: " +
+         std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(p.mode)]) + ", " +
          (expert_drills(p) ? "the recorded burr drills" : "the learner's burr drills") + ", time goes " +
          (by_clock(p) ? "by the clock" : "along the way");
 }
@@ -19,21 +20,23 @@ inline std::string guided_words(const PlaybackParams& p) {
 /// The scene when the lesson begins.
 inline World world_of_lesson(const SessionFolder& lesson, double from_s, const Case& the_case, const Anatomy& anatomy,
                              const Context& context) {
-  return from_s > 0 ? world_at(lesson, from_s, the_case, anatomy, context) : world_at_begin(lesson, the_case, anatomy, context);
+  return from_s > 0 ? world_at(lesson, from_s, the_case, anatomy, context)
+                    : world_at_begin(lesson, the_case, anatomy, context);
 }
 
 inline std::string facts_words(const GuidedFacts& f) {
   const auto n = [](double x) { return format_number(std::round(x * 1000) / 1000); };
-  return "hand beside the recorded one: RMS " + n(f.rms_mm) + " mm, 95 % within " + n(f.p95_mm) + " mm, at most " + n(f.most_mm) +
-         " mm; led with at most " + n(f.most_pull_n) + " N; work of the guide on the hand " + n(f.work_mj) + " mJ, at most " +
-         n(f.most_work_mj) + " mJ";
+  return "hand beside the recorded one: RMS " + n(f.rms_mm) + " mm, 95 % within " + n(f.p95_mm) + " mm, at most " +
+         n(f.most_mm) + " mm; led with at most " + n(f.most_pull_n) + " N; work of the guide on the hand " +
+         n(f.work_mj) + " mJ, at most " + n(f.most_work_mj) + " mJ";
 }
 
 inline Json guided_json(const PlaybackParams& params, const GuidedFacts& f, const Playback& playback) {
   PlaybackParams copy = params;
   Json j{{"osteotome_playback", 1}, {"words", guided_words(params)}};
   j["params"] = Json::object();
-  for (const FieldRef& field : fields_of<PlaybackParams>(copy)) j["params"][std::string(field.doc.name)] = field.to_text();
+  for (const FieldRef& field : fields_of<PlaybackParams>(copy))
+    j["params"][std::string(field.doc.name)] = field.to_text();
   j["expert_drills"] = expert_drills(params);
   j["by_clock"] = by_clock(params);
   j["led_to_the_end"] = !playback.given_up;
@@ -49,8 +52,9 @@ inline Json guided_json(const PlaybackParams& params, const GuidedFacts& f, cons
   j["guided_s"] = f.guided_s;
   j["force_capped_s"] = f.capped_s;
   if (params.mode == PlaybackMode::fading)
-    j["fading"] = {
-        {"strength", playback.fading.strength()}, {"trials", playback.fading.trials()}, {"last_error_mm", playback.fading.last_error_mm()}};
+    j["fading"] = {{"strength", playback.fading.strength()},
+                   {"trials", playback.fading.trials()},
+                   {"last_error_mm", playback.fading.last_error_mm()}};
   return j;
 }
 

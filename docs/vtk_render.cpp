@@ -13,9 +13,9 @@
 
 #include <iostream>
 
-#include "osteo/core/base/error.h"
 #include "osteo/app/stages/registry.h"
 #include "osteo/app/vtk/pipeline.h"
+#include "osteo/core/base/error.h"
 
 int main(int argc, char** argv) try {
   if (argc < 3) throw osteo::Error(osteo::ExitCode::usage, "vtk_render PIPELINE.json CT [PICTURE.png]");

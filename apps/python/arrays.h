@@ -26,9 +26,11 @@ std::shared_ptr<const T[]> borrowed(const py::array& array) {
           }};
 }
 
-/// Memory of ours, of values of type T, as a numpy array of this type that keeps it alive. No copy. Not to be written, unless `writable`.
+/// Memory of ours, of values of type T, as a numpy array of this type that keeps it alive. No copy. Not to be written,
+/// unless `writable`.
 template <class T, class Owner>
-py::array view_as(const py::dtype& type, Owner owner, const T* data, std::vector<py::ssize_t> shape, bool writable = false) {
+py::array view_as(const py::dtype& type, Owner owner, const T* data, std::vector<py::ssize_t> shape,
+                  bool writable = false) {
   const py::capsule keep(new Owner(std::move(owner)), [](void* p) { delete static_cast<Owner*>(p); });
   // Strides are ours: pybind11 before 2.12 reads the size of an item where numpy 2 has something else.
   std::vector<py::ssize_t> strides(shape.size());

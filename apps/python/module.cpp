@@ -1,14 +1,15 @@
-// The Python module osteo._osteo: values and stages. Everything that is made from declarations is made in osteo/__init__.py.
+// The Python module osteo._osteo: values and stages. Everything that is made from declarations is made in
+// osteo/__init__.py.
 #include <algorithm>
 #include <cmath>
 #include <mutex>
 #include <optional>
 
 #include "arrays.h"
+#include "osteo/app/stages/registry.h"
 #include "osteo/geometry/grid/dense.h"
 #include "osteo/imaging/pipeline/formats.h"
 #include "osteo/imaging/pipeline/pipeline.h"
-#include "osteo/app/stages/registry.h"
 
 namespace osteo::python {
 namespace {
@@ -21,7 +22,8 @@ V volume_of(const py::array& array, std::array<double, 3> spacing_mm, std::array
   if (!py::isinstance<py::array_t<T>>(array) || array.ndim() != 3 || !(array.flags() & py::array::c_style) ||
       !(array.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_)) {
     const std::string name = py::str(py::dtype::of<T>());
-    throw Error(ExitCode::usage, "voxels must be an aligned, C-contiguous array of " + name + " with three axes (z, y, x)",
+    throw Error(ExitCode::usage,
+                "voxels must be an aligned, C-contiguous array of " + name + " with three axes (z, y, x)",
                 "numpy.ascontiguousarray(voxels, dtype='" + name + "') makes one");
   }
   V v;
@@ -62,7 +64,8 @@ template <class T, class V>
 py::class_<V> volume(py::module_& m, const char* name, const char* doc) {
   py::class_<V> c(m, name, doc);
   c.def(py::init(&volume_of<T, V>), py::arg("voxels"), py::arg("spacing_mm") = std::array<double, 3>{1, 1, 1},
-        py::arg("origin_mm") = std::array<double, 3>{0, 0, 0}, py::arg("direction") = Rows{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}});
+        py::arg("origin_mm") = std::array<double, 3>{0, 0, 0},
+        py::arg("direction") = Rows{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}});
   c.def_property_readonly(
       "voxels",
       [](const V& v) {
@@ -76,7 +79,8 @@ py::class_<V> volume(py::module_& m, const char* name, const char* doc) {
 // Rows of three from numpy. Copied: a mesh owns its points.
 template <class T>
 std::vector<std::array<T, 3>> rows_of(const py::array& array, const char* what) {
-  if (!py::isinstance<py::array_t<T>>(array) || array.ndim() != 2 || array.shape(1) != 3 || !(array.flags() & py::array::c_style)) {
+  if (!py::isinstance<py::array_t<T>>(array) || array.ndim() != 2 || array.shape(1) != 3 ||
+      !(array.flags() & py::array::c_style)) {
     const std::string name = py::str(py::dtype::of<T>());
     throw Error(ExitCode::usage, std::string(what) + " must be a C-contiguous array of " + name + ", (n, 3)",
                 "numpy.ascontiguousarray(" + std::string(what) + ", dtype='" + name + "') makes one");
@@ -91,9 +95,10 @@ std::shared_ptr<TriMesh> mesh_of(const py::array& points_mm, const py::array& tr
   mesh->triangles = rows_of<std::uint32_t>(triangles, "triangles");
   if (!normals.is_none()) mesh->normals = rows_of<float>(normals.cast<py::array>(), "normals");
   if (!mesh->normals.empty() && mesh->normals.size() != mesh->points_mm.size())
-    throw Error(ExitCode::usage,
-                std::to_string(mesh->normals.size()) + " normals for " + std::to_string(mesh->points_mm.size()) + " points",
-                "give one for each, or none");
+    throw Error(
+        ExitCode::usage,
+        std::to_string(mesh->normals.size()) + " normals for " + std::to_string(mesh->points_mm.size()) + " points",
+        "give one for each, or none");
   for (std::size_t i = 0; i < mesh->points_mm.size(); ++i) {
     for (const float x : mesh->points_mm[i])
       if (!std::isfinite(x)) throw Error(ExitCode::usage, "point " + std::to_string(i) + " is not finite");
@@ -109,13 +114,14 @@ std::shared_ptr<TriMesh> mesh_of(const py::array& points_mm, const py::array& tr
 
 Volume<float> dense_of(const SparseGrid& g, std::array<int, 3> lo, std::optional<std::array<int, 3>> shape) {
   const py::gil_scoped_release free;
-  const std::array<int, 3> n = shape ? std::array<int, 3>{(*shape)[2], (*shape)[1], (*shape)[0]}
-                                     : std::array<int, 3>{g.frame.dims[0] - lo[2], g.frame.dims[1] - lo[1], g.frame.dims[2] - lo[0]};
+  const std::array<int, 3> n =
+      shape ? std::array<int, 3>{(*shape)[2], (*shape)[1], (*shape)[0]}
+            : std::array<int, 3>{g.frame.dims[0] - lo[2], g.frame.dims[1] - lo[1], g.frame.dims[2] - lo[0]};
   return to_dense(g, {lo[2], lo[1], lo[0]}, n);
 }
 
-SparseGrid grid_of(const py::array& voxels, std::array<double, 3> spacing_mm, std::array<double, 3> origin_mm, Rows direction,
-                   double background, const std::string& name) {
+SparseGrid grid_of(const py::array& voxels, std::array<double, 3> spacing_mm, std::array<double, 3> origin_mm,
+                   Rows direction, double background, const std::string& name) {
   const auto v = volume_of<float, Volume<float>>(voxels, spacing_mm, origin_mm, direction);
   const py::gil_scoped_release free;
   return to_sparse(v, name, background);
@@ -221,13 +227,14 @@ namespace {
 
 py::object load(const std::string& path, const std::string& kind) {
   std::vector<DataKind> accepted;
-  for (const DataKind k :
-       {DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::tets, DataKind::picture, DataKind::document}) {
+  for (const DataKind k : {DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::tets,
+                           DataKind::picture, DataKind::document}) {
     // A file of voxels does not say which of the two it is.
     if (kind.empty() ? k != DataKind::labels : kind == kind_name(k)) accepted.push_back(k);
   }
   if (accepted.empty())
-    throw Error(ExitCode::usage, "there is no kind '" + kind + "'", "one of image, labels, grid, surface, tets, picture, document");
+    throw Error(ExitCode::usage, "there is no kind '" + kind + "'",
+                "one of image, labels, grid, surface, tets, picture, document");
   Data data;
   {
     const py::gil_scoped_release free;
@@ -250,7 +257,8 @@ void save(const py::object& value, const std::string& path) {
     picture.rgb.assign(first, first + rgb.size());
     data = std::move(picture);
   } else {
-    static const Port any{"value", {DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::tets}, "", false};
+    static const Port any{
+        "value", {DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::tets}, "", false};
     if (py::isinstance<py::str>(value) || value.is_none())
       throw Error(ExitCode::usage, "there is nothing to save in " + std::string(py::repr(value)));
     data = data_of(value, any);
@@ -268,7 +276,8 @@ py::list declarations() {
     for (const Port& p : from) {
       py::list kinds;
       for (const DataKind k : p.kinds) kinds.append(std::string(kind_name(k)));
-      out.append(py::dict(py::arg("name") = p.name, py::arg("kinds") = kinds, py::arg("help") = p.help, py::arg("optional") = p.optional));
+      out.append(py::dict(py::arg("name") = p.name, py::arg("kinds") = kinds, py::arg("help") = p.help,
+                          py::arg("optional") = p.optional));
     }
     return out;
   };
@@ -281,23 +290,27 @@ py::list declarations() {
       if (const auto* c = std::get_if<FieldRef::Choice>(&f.target))
         for (const auto& n : c->names) choices.append(std::string(n));
       fields.append(py::dict(py::arg("name") = std::string(f.doc.name), py::arg("help") = std::string(f.doc.help),
-                             py::arg("unit") = std::string(f.doc.unit), py::arg("lo") = f.doc.lo, py::arg("hi") = f.doc.hi,
-                             py::arg("kind") = std::string(f.kind()), py::arg("choices") = choices, py::arg("default") = value_of(f)));
+                             py::arg("unit") = std::string(f.doc.unit), py::arg("lo") = f.doc.lo,
+                             py::arg("hi") = f.doc.hi, py::arg("kind") = std::string(f.kind()),
+                             py::arg("choices") = choices, py::arg("default") = value_of(f)));
     }
-    all.append(py::dict(py::arg("name") = info.name, py::arg("synopsis") = info.synopsis, py::arg("description") = info.description,
-                        py::arg("inputs") = ports(info.inputs), py::arg("outputs") = ports(info.outputs), py::arg("fields") = fields));
+    all.append(py::dict(py::arg("name") = info.name, py::arg("synopsis") = info.synopsis,
+                        py::arg("description") = info.description, py::arg("inputs") = ports(info.inputs),
+                        py::arg("outputs") = ports(info.outputs), py::arg("fields") = fields));
   }
   return all;
 }
 
 /// Outputs in the order of their ports, the report, warnings.
-py::tuple run(const std::string& name, const py::sequence& inputs, const py::dict& params, int threads, std::uint64_t seed) {
+py::tuple run(const std::string& name, const py::sequence& inputs, const py::dict& params, int threads,
+              std::uint64_t seed) {
   static const Registry registry = osteo_stages();
   const auto stage = registry.make(name);
   const auto fields = stage->fields();
   for (const auto& [key, value] : params) {
     const std::string wanted = py::str(key);
-    const auto field = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == wanted; });
+    const auto field =
+        std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == wanted; });
     if (field == fields.end()) throw Error(ExitCode::usage, "stage '" + name + "' has no parameter '" + wanted + "'");
     set_value(*field, value);
   }
@@ -312,7 +325,8 @@ py::tuple run(const std::string& name, const py::sequence& inputs, const py::dic
     warnings.emplace_back(text);
   });
   std::vector<Data> in;
-  for (std::size_t i = 0; i < stage->info().inputs.size(); ++i) in.push_back(data_of(inputs[i], stage->info().inputs[i]));
+  for (std::size_t i = 0; i < stage->info().inputs.size(); ++i)
+    in.push_back(data_of(inputs[i], stage->info().inputs[i]));
   std::vector<Data> out;
   {
     const py::gil_scoped_release free;
@@ -334,19 +348,24 @@ PYBIND11_MODULE(_osteo, m) {
   // numpy first: without it nothing here can be used.
   py::module_::import("numpy");
   volume<std::int16_t, osteo::Image>(
-      m, "Image", "CT in Hounsfield units. Shares the memory of the array it is made of, which must not change afterwards");
+      m, "Image",
+      "CT in Hounsfield units. Shares the memory of the array it is made of, which must not change afterwards");
   volume<std::uint8_t, osteo::Labels>(
-      m, "Labels", "Label map, 0 is background. Shares the memory of the array it is made of, which must not change afterwards");
+      m, "Labels",
+      "Label map, 0 is background. Shares the memory of the array it is made of, which must not change afterwards");
 
-  volume<float, osteo::Volume<float>>(
-      m, "Field", "Densities, or other numbers, in a box. Shares the memory of the array it is made of, which must not change afterwards");
+  volume<float, osteo::Volume<float>>(m, "Field",
+                                      "Densities, or other numbers, in a box. Shares the memory of the array it is "
+                                      "made of, which must not change afterwards");
 
   py::class_<osteo::SparseGrid> grid(m, "Grid", "Sparse grid: what differs from its background is stored");
   grid.def(py::init(&grid_of), py::arg("voxels"), py::arg("spacing_mm") = std::array<double, 3>{1, 1, 1},
-           py::arg("origin_mm") = std::array<double, 3>{0, 0, 0}, py::arg("direction") = Rows{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
-           py::arg("background") = 0.0, py::arg("name") = "density", "Of float32 voxels (z, y, x)");
+           py::arg("origin_mm") = std::array<double, 3>{0, 0, 0},
+           py::arg("direction") = Rows{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, py::arg("background") = 0.0,
+           py::arg("name") = "density", "Of float32 voxels (z, y, x)");
   grid.def("dense", &dense_of, py::arg("lo") = std::array<int, 3>{0, 0, 0}, py::arg("shape") = py::none(),
-           "The box of voxels from lo on, both (z, y, x), as a Field; without a shape up to the end of the grid. What is not stored is "
+           "The box of voxels from lo on, both (z, y, x), as a Field; without a shape up to the end of the grid. What "
+           "is not stored is "
            "background");
   frame_members(grid);
   grid.def_property_readonly("name", [](const osteo::SparseGrid& g) { return g.name; });
@@ -357,27 +376,27 @@ PYBIND11_MODULE(_osteo, m) {
   py::class_<osteo::TriMesh, Mesh>(m, "Surface", "Triangles in LPS millimetres")
       .def(py::init(&mesh_of), py::arg("points_mm"), py::arg("triangles"), py::arg("normals") = py::none(),
            "Of float32 points and uint32 triangles, counter-clockwise seen from outside; copied")
-      .def_property_readonly(
-          "points_mm",
-          [](const Mesh& s) {
-            return view<float>(s, reinterpret_cast<const float*>(s->points_mm.data()), {static_cast<py::ssize_t>(s->points_mm.size()), 3});
-          })
-      .def_property_readonly(
-          "normals",
-          [](const Mesh& s) {
-            return view<float>(s, reinterpret_cast<const float*>(s->normals.data()), {static_cast<py::ssize_t>(s->normals.size()), 3});
-          })
+      .def_property_readonly("points_mm",
+                             [](const Mesh& s) {
+                               return view<float>(s, reinterpret_cast<const float*>(s->points_mm.data()),
+                                                  {static_cast<py::ssize_t>(s->points_mm.size()), 3});
+                             })
+      .def_property_readonly("normals",
+                             [](const Mesh& s) {
+                               return view<float>(s, reinterpret_cast<const float*>(s->normals.data()),
+                                                  {static_cast<py::ssize_t>(s->normals.size()), 3});
+                             })
       .def_property_readonly("triangles", [](const Mesh& s) {
         return view<std::uint32_t>(s, reinterpret_cast<const std::uint32_t*>(s->triangles.data()),
                                    {static_cast<py::ssize_t>(s->triangles.size()), 3});
       });
   using Tetrahedra = std::shared_ptr<osteo::TetMesh>;
   py::class_<osteo::TetMesh, Tetrahedra>(m, "Tets", "Tetrahedra in LPS millimetres")
-      .def_property_readonly(
-          "points_mm",
-          [](const Tetrahedra& t) {
-            return view<float>(t, reinterpret_cast<const float*>(t->points_mm.data()), {static_cast<py::ssize_t>(t->points_mm.size()), 3});
-          })
+      .def_property_readonly("points_mm",
+                             [](const Tetrahedra& t) {
+                               return view<float>(t, reinterpret_cast<const float*>(t->points_mm.data()),
+                                                  {static_cast<py::ssize_t>(t->points_mm.size()), 3});
+                             })
       .def_property_readonly("tets", [](const Tetrahedra& t) {
         return view<std::uint32_t>(t, reinterpret_cast<const std::uint32_t*>(t->tets.data()),
                                    {static_cast<py::ssize_t>(t->tets.size()), 4});
@@ -394,7 +413,8 @@ PYBIND11_MODULE(_osteo, m) {
   m.def("run", &run);
 
   // An error as the programs know it: message, exit code, advice.
-  static const py::object error = py::reinterpret_borrow<py::object>(PyErr_NewException("osteo.Error", PyExc_RuntimeError, nullptr));
+  static const py::object error =
+      py::reinterpret_borrow<py::object>(PyErr_NewException("osteo.Error", PyExc_RuntimeError, nullptr));
   m.attr("Error") = error;
   py::register_exception_translator([](std::exception_ptr p) {
     try {

@@ -8,13 +8,13 @@
 #include <mutex>
 
 #include "arrays.h"
+#include "osteo/imaging/pipeline/pipeline.h"
+#include "osteo/session/recording/haptic_settings.h"
+#include "osteo/session/recording/script_file.h"
+#include "osteo/session/scene/session_folder.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/bone/world_mesh.h"
 #include "osteo/simulation/haptics/stroke_goal.h"
-#include "osteo/imaging/pipeline/pipeline.h"
-#include "osteo/session/scene/session_folder.h"
-#include "osteo/session/recording/haptic_settings.h"
-#include "osteo/session/recording/script_file.h"
 
 namespace osteo::python {
 namespace {
@@ -67,22 +67,28 @@ void require_goals(const HandGoal* goals, std::size_t n, std::size_t hands) {
   for (std::size_t i = 0; i < n * hands; ++i) {
     const HandGoal& g = goals[i];
     const auto wrong = [&](const std::string& what, const std::string& advice) {
-      refuse("goal " + std::to_string(i / hands) + (hands > 1 ? " of hand " + std::to_string(i % hands) : "") + ": " + what, advice);
+      refuse("goal " + std::to_string(i / hands) + (hands > 1 ? " of hand " + std::to_string(i % hands) : "") + ": " +
+                 what,
+             advice);
     };
     if (!std::isfinite(g.position_mm.x) || !std::isfinite(g.position_mm.y) || !std::isfinite(g.position_mm.z))
       wrong("its position is not finite", "give LPS millimetres");
     const double length = std::hypot(g.axis[0], g.axis[1], g.axis[2]);
-    if (!(std::abs(length - 1) < 1e-3)) wrong("its axis is not of length 1", "the axis points from the tip to the handle");
-    if (g.tool >= tools) wrong("there is no tool " + std::to_string(g.tool), "osteo.tools names them all, by their numbers");
+    if (!(std::abs(length - 1) < 1e-3))
+      wrong("its axis is not of length 1", "the axis points from the tip to the handle");
+    if (g.tool >= tools)
+      wrong("there is no tool " + std::to_string(g.tool), "osteo.tools names them all, by their numbers");
   }
 }
 
 class Stepped {
  public:
-  Stepped(const py::object& from, bool spring, std::size_t hands, const std::string& contact, const py::object& settings,
-          const std::string& out, const std::string& resume, double rate_hz, bool surface, int threads)
+  Stepped(const py::object& from, bool spring, std::size_t hands, const std::string& contact,
+          const py::object& settings, const std::string& out, const std::string& resume, double rate_hz, bool surface,
+          int threads)
       : hands_(hands), rate_hz_(rate_hz) {
-    if (hands < 1 || hands > kMostHands) refuse("hands must be 1 to " + std::to_string(kMostHands) + ", not " + std::to_string(hands));
+    if (hands < 1 || hands > kMostHands)
+      refuse("hands must be 1 to " + std::to_string(kMostHands) + ", not " + std::to_string(hands));
     if (!(rate_hz >= 100 && rate_hz <= 5000)) refuse("rate_hz must be 100 to 5000 Hz");
     context_.threads = threads;
     context_.on_log([this](LogLevel level, std::string_view text) {
@@ -94,12 +100,14 @@ class Stepped {
     options.rate_hz = rate_hz;
     options.follow = {.surface = surface};
     HapticSetup& haptics = options.haptics;
-    FieldRef{{"contact", ""}, FieldRef::Choice{reinterpret_cast<int*>(&haptics.params.contact.method), EnumNames<ContactMethod>::values}}
+    FieldRef{{"contact", ""},
+             FieldRef::Choice{reinterpret_cast<int*>(&haptics.params.contact.method), EnumNames<ContactMethod>::values}}
         .from_text(contact, "contact");
     haptics.device = GivenHand::traits_of(spring);
     haptics.more_devices.assign(hands - 1, haptics.device);
     const bool by_name = py::isinstance<py::dict>(settings);
-    const std::string file = settings.is_none() || by_name ? "" : std::string(py::str(py::module_::import("os").attr("fspath")(settings)));
+    const std::string file =
+        settings.is_none() || by_name ? "" : std::string(py::str(py::module_::import("os").attr("fspath")(settings)));
     const bool of_grid = py::isinstance<SparseGrid>(from);
     const std::string folder = of_grid ? "" : std::string(py::str(py::module_::import("os").attr("fspath")(from)));
     if (of_grid && (!out.empty() || !resume.empty()))
@@ -110,8 +118,10 @@ class Stepped {
       auto fields = fields_of<HapticsParams>(haptics.params);
       for (const auto& [key, value] : settings.cast<py::dict>()) {
         const std::string name = py::str(key);
-        const auto f = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& r) { return r.doc.name == name; });
-        if (f == fields.end()) refuse("there is no setting '" + name + "'", "'osteo rehearse CASE --show-settings' lists them");
+        const auto f =
+            std::find_if(fields.begin(), fields.end(), [&](const FieldRef& r) { return r.doc.name == name; });
+        if (f == fields.end())
+          refuse("there is no setting '" + name + "'", "'osteo rehearse CASE --show-settings' lists them");
         set_value(*f, value);
       }
     };
@@ -136,8 +146,10 @@ class Stepped {
     options.anatomy = anatomy_of(*the_case, haptics, context_);
     anatomy_ = options.anatomy;
     World world = resume.empty() ? world_of(*the_case, options.anatomy)
-                                 : world_at_end(open_session_folder(resume, the_case->folder), *the_case, options.anatomy, context_);
-    if (std::filesystem::exists(the_case->folder / "tissue.vtu") || std::filesystem::exists(the_case->folder / "tissue"))
+                                 : world_at_end(open_session_folder(resume, the_case->folder), *the_case,
+                                                options.anatomy, context_);
+    if (std::filesystem::exists(the_case->folder / "tissue.vtu") ||
+        std::filesystem::exists(the_case->folder / "tissue"))
       context_.warn("the case's soft tissue is left out: only 'osteo rehearse' moves it");
     if (!out.empty()) {
       session_ = create_session_folder(out, the_case->folder, resume);
@@ -171,7 +183,8 @@ class Stepped {
         rehearsal_->step_elsewhere({timed.data() + begin, next - begin});
         ++done_;
         if (reader_->ticks.pop({ticks.data() + i * hands_, hands_}) != hands_)
-          throw Error(ExitCode::resources, "tick " + std::to_string(done_.load() - 1) + " changed more voxels than are kept",
+          throw Error(ExitCode::resources,
+                      "tick " + std::to_string(done_.load() - 1) + " changed more voxels than are kept",
                       "use larger voxels");
         while (reader_->changes.pop(scratch_) > 0) {
         }
@@ -201,7 +214,8 @@ class Stepped {
     const py::gil_scoped_release free;
     SparseGrid grid;
     rehearsal_->look([&](const World& w, SceneReaders&) {
-      if (body >= w.bodies().size()) refuse("there is no piece " + std::to_string(body) + " among " + std::to_string(w.bodies().size()));
+      if (body >= w.bodies().size())
+        refuse("there is no piece " + std::to_string(body) + " among " + std::to_string(w.bodies().size()));
       grid = to_sparse(w.bodies()[body].body->bone, "density");
     });
     return grid;
@@ -237,8 +251,8 @@ class Stepped {
     const RehearsalSummary& s = *summary_;
     py::list notes;
     for (const ActionNote& a : s.notes)
-      notes.append(py::dict(py::arg("tick") = a.tick, py::arg("action") = std::string(name_of(a.kind)), py::arg("done") = a.done,
-                            py::arg("why") = a.why, py::arg("times") = a.times));
+      notes.append(py::dict(py::arg("tick") = a.tick, py::arg("action") = std::string(name_of(a.kind)),
+                            py::arg("done") = a.done, py::arg("why") = a.why, py::arg("times") = a.times));
     return py::dict(py::arg("ticks") = s.ticks, py::arg("removed_mm3") = s.removed_mm3,
                     py::arg("sawn_mm3") = s.sawn_mm3, py::arg("crumbs_mm3") = s.crumbs_mm3,
                     py::arg("bone_hash") = s.bone_hash, py::arg("surface_hash") = s.surface_hash,
@@ -283,7 +297,8 @@ class Stepped {
     if (given.is_none()) return {};
     const py::array array = given.cast<py::array>();
     if (!array.dtype().equal(action_dtype()) || array.ndim() != 1 || !(array.flags() & py::array::c_style))
-      refuse("actions must be a C-contiguous array of osteo.action_dtype with one axis", "those of osteo.load_script() are");
+      refuse("actions must be a C-contiguous array of osteo.action_dtype with one axis",
+             "those of osteo.load_script() are");
     const auto* const first = static_cast<const SceneAction*>(array.data());
     std::vector<SceneAction> all(first, first + array.shape(0));
     std::uint64_t before = done_;
@@ -293,10 +308,11 @@ class Stepped {
       a.unused = 0;
       const ActionRow* const row = find_row(a.kind);
       if (row == nullptr || row->by_servo)
-        refuse(which + " is of kind " + std::to_string(a.kind) + ", which cannot be asked for", "see docs/reference/actions.md");
+        refuse(which + " is of kind " + std::to_string(a.kind) + ", which cannot be asked for",
+               "see docs/reference/actions.md");
       if (a.tick < before || a.tick >= done_ + n)
-        refuse(which + " is at tick " + std::to_string(a.tick) + ", not among ticks " + std::to_string(done_.load()) + " to " +
-                   std::to_string(done_ + n) + " of this call, or before the one before it",
+        refuse(which + " is at tick " + std::to_string(a.tick) + ", not among ticks " + std::to_string(done_.load()) +
+                   " to " + std::to_string(done_ + n) + " of this call, or before the one before it",
                "ticks count from the beginning of the rehearsal, and rise");
       if (!std::all_of(a.values.begin(), a.values.end(), [](double v) { return std::isfinite(v); }))
         refuse(which + " has a value that is not finite");
@@ -339,15 +355,16 @@ py::tuple script(const std::string& path, double rate_hz) {
   const HandGoal* const data = owner->data();
   std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(n)};
   if (hands > 1) shape.push_back(static_cast<py::ssize_t>(hands));
-  return py::make_tuple(view_as(goal_dtype(), std::move(owner), data, std::move(shape)), records(action_dtype(), actions_of(s, rate_hz)));
+  return py::make_tuple(view_as(goal_dtype(), std::move(owner), data, std::move(shape)),
+                        records(action_dtype(), actions_of(s, rate_hz)));
 }
 
 }  // namespace
 
 void add_rehearsal(py::module_& m) {
   py::class_<Stepped>(m, "Stepped")
-      .def(py::init<const py::object&, bool, std::size_t, const std::string&, const py::object&, const std::string&, const std::string&,
-                    double, bool, int>())
+      .def(py::init<const py::object&, bool, std::size_t, const std::string&, const py::object&, const std::string&,
+                    const std::string&, double, bool, int>())
       .def("run", &Stepped::run)
       .def("bone", &Stepped::bone)
       .def("surface", &Stepped::surface)

@@ -52,7 +52,8 @@ std::vector<Column> columns_of(const RecordTable& table) {
     if (together == std::end(kTogether)) {
       columns.push_back({std::string(f.name), format_of(f.type), f.offset});
     } else {
-      columns.push_back({std::string(together->name), "(" + std::to_string(together->n) + ",)" + format_of(f.type), f.offset});
+      columns.push_back(
+          {std::string(together->name), "(" + std::to_string(together->n) + ",)" + format_of(f.type), f.offset});
       i += together->n - 1;
     }
   }
@@ -68,7 +69,8 @@ py::dtype dtype_of(std::vector<Column> columns, std::size_t bytes) {
     formats.append(c.format);
     offsets.append(c.offset);
   }
-  const py::dict spec(py::arg("names") = names, py::arg("formats") = formats, py::arg("offsets") = offsets, py::arg("itemsize") = bytes);
+  const py::dict spec(py::arg("names") = names, py::arg("formats") = formats, py::arg("offsets") = offsets,
+                      py::arg("itemsize") = bytes);
   return py::module_::import("numpy").attr("dtype")(spec);
 }
 
@@ -83,12 +85,14 @@ py::dict header_of(const SessionOutline& s) {
   for (const std::string& t : s.tools) tools.append(t);
   py::dict actions;
   for (const auto& row : action_table()) actions[py::int_(static_cast<unsigned>(row.kind))] = std::string(row.name);
-  return py::dict(py::arg("program_version") = h.program_version, py::arg("bone_hash") = h.bone_hash, py::arg("rate_hz") = h.rate_hz,
-                  py::arg("kernels") = py::dict(py::arg("burrs") = h.kernels.burrs, py::arg("contact") = h.kernels.contact,
-                                                py::arg("scene") = h.kernels.scene),
-                  py::arg("hands") = h.haptics.hands(), py::arg("dust") = h.dust, py::arg("settings") = settings,
-                  py::arg("structures") = h.haptics.structures, py::arg("fields") = fields, py::arg("tools") = tools,
-                  py::arg("actions") = actions, py::arg("not_replayable") = s.not_replayable);
+  return py::dict(
+      py::arg("program_version") = h.program_version, py::arg("bone_hash") = h.bone_hash,
+      py::arg("rate_hz") = h.rate_hz,
+      py::arg("kernels") = py::dict(py::arg("burrs") = h.kernels.burrs, py::arg("contact") = h.kernels.contact,
+                                    py::arg("scene") = h.kernels.scene),
+      py::arg("hands") = h.haptics.hands(), py::arg("dust") = h.dust, py::arg("settings") = settings,
+      py::arg("structures") = h.haptics.structures, py::arg("fields") = fields, py::arg("tools") = tools,
+      py::arg("actions") = actions, py::arg("not_replayable") = s.not_replayable);
 }
 
 py::dict session(const std::string& path, bool keep_damaged) {

@@ -14,8 +14,8 @@ void bench_removal(const Context& context);       ///< what is removed against w
 void bench_operation(const Context& context);     ///< scenes that are operated on: latency, split, plates, regions
 void bench_tissue(const Context& context);        ///< finite elements, the fast model, its calibration
 void bench_network(const Context& context);       ///< listeners of a session that is told to the network, flooded
-void bench_tutoring(const Context& context);      ///< a hand that leads another, over a bad network and from a recording
-void bench_slices(const Context& context);        ///< bone from thick slices
+void bench_tutoring(const Context& context);  ///< a hand that leads another, over a bad network and from a recording
+void bench_slices(const Context& context);    ///< bone from thick slices
 void bench_registration(const Context& context);  ///< a second scan onto the first
 void bench_import(const Context& context);        ///< DICOM to a volume
 

@@ -1,5 +1,5 @@
-// Speed against error of the approximate methods, beside their peers in the same run. Prints Markdown for docs/accuracy.md.
-// usage: osteo_bench [threads]
+// Speed against error of the approximate methods, beside their peers in the same run. Prints Markdown for
+// docs/accuracy.md. usage: osteo_bench [threads]
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
 #include <openvdb/tools/VolumeToMesh.h>
@@ -19,15 +19,15 @@
 
 #include "ball.h"
 #include "bench.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/threshold.h"
+#include "osteo/imaging/io/vtk_data.h"
 #include "osteo/simulation/bone/dust.h"
 #include "osteo/simulation/bone/live_surface.h"
 #include "osteo/simulation/bone/pieces.h"
 #include "osteo/simulation/bone/saw.h"
 #include "osteo/simulation/bone/thickness.h"
-#include "osteo/geometry/grid/resample.h"
-#include "osteo/imaging/image/phantom.h"
-#include "osteo/imaging/image/threshold.h"
-#include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo {
 namespace {
@@ -73,7 +73,8 @@ std::vector<Vec3> points_of(vtkPolyData* m) {
 
 void bench_resample(const Context& context) {
   std::printf(
-      "## Resampling: a ball of radius 20.3 mm, threshold half-way\n\n| CT voxels mm | method | voxels mm | ms | volume error %% | "
+      "## Resampling: a ball of radius 20.3 mm, threshold half-way\n\n| CT voxels mm | method | voxels mm | ms | "
+      "volume error %% | "
       "boundary off, mean mm | p99 mm |\n|---|---|---|---|---|---|---|\n");
   const double exact = 4.0 / 3 * M_PI * std::pow(kRadius, 3);
   for (const double z : {1.0, 2.0}) {
@@ -102,7 +103,8 @@ void bench_resample(const Context& context) {
         reslice->Update();
         auto* const p = static_cast<const float*>(reslice->GetOutput()->GetScalarPointer());
         volume = 0;
-        for (vtkIdType i = 0; i < reslice->GetOutput()->GetNumberOfPoints(); ++i) volume += p[i] >= 0.5F ? h * h * h : 0;
+        for (vtkIdType i = 0; i < reslice->GetOutput()->GetNumberOfPoints(); ++i)
+          volume += p[i] >= 0.5F ? h * h * h : 0;
         vtkNew<vtkFlyingEdges3D> edges;
         edges->SetInputData(reslice->GetOutput());
         edges->SetValue(0, 0.5);
@@ -110,8 +112,8 @@ void bench_resample(const Context& context) {
         surface = edges->GetOutput();
       });
       const Off po = off_the_ball(points_of(surface));
-      std::printf("| 1x1x%g | mask, VTK cubic reslice | %g | %.1f | %+.3f | %.4f | %.4f |\n", z, h, 1000 * ps, 100 * (volume / exact - 1),
-                  po.mean, po.p99);
+      std::printf("| 1x1x%g | mask, VTK cubic reslice | %g | %.1f | %+.3f | %.4f | %.4f |\n", z, h, 1000 * ps,
+                  100 * (volume / exact - 1), po.mean, po.p99);
     }
   }
 }
@@ -146,10 +148,14 @@ void bench_surface(const Context& context) {
     }
     return grid;
   };
-  std::printf("\n## Surface: a head at 0.5 mm (%zu bricks) for speed, the ball at 0.5 mm for error\n\n", head.brick_count());
-  std::printf("| method | head s | triangles M | head closed, manifold | ball off, mean mm | p99 mm |\n|---|---|---|---|---|---|\n");
+  std::printf("\n## Surface: a head at 0.5 mm (%zu bricks) for speed, the ball at 0.5 mm for error\n\n",
+              head.brick_count());
+  std::printf(
+      "| method | head s | triangles M | head closed, manifold | ball off, mean mm | p99 mm "
+      "|\n|---|---|---|---|---|---|\n");
   const auto row = [&](const char* name, double s, std::size_t triangles, const char* closed, Off o) {
-    std::printf("| %s | %.2f | %.2f | %s | %.4f | %.4f |\n", name, s, static_cast<double>(triangles) / 1e6, closed, o.mean, o.p99);
+    std::printf("| %s | %.2f | %.2f | %s | %.4f | %.4f |\n", name, s, static_cast<double>(triangles) / 1e6, closed,
+                o.mean, o.p99);
     std::fflush(stdout);
   };
   const auto closed = [](const TriMesh& m) {
@@ -163,9 +169,11 @@ void bench_surface(const Context& context) {
   Context one = context;
   one.threads = 1;
   double s = seconds([&] { nets = surface_nets(head, 0.5F, one); });
-  row("surface nets, 1 thread", s, nets.mesh.triangles.size(), closed(nets.mesh), off_the_ball(points_of(surface_nets(small).mesh)));
+  row("surface nets, 1 thread", s, nets.mesh.triangles.size(), closed(nets.mesh),
+      off_the_ball(points_of(surface_nets(small).mesh)));
   const double rebuild = s = seconds([&] { nets = surface_nets(head, 0.5F, context); });
-  row("surface nets", s, nets.mesh.triangles.size(), closed(nets.mesh), off_the_ball(points_of(surface_nets(small).mesh)));
+  row("surface nets", s, nets.mesh.triangles.size(), closed(nets.mesh),
+      off_the_ball(points_of(surface_nets(small).mesh)));
   BoneSurface voxels;
   s = seconds([&] { voxels = voxel_surface(head, 0.5F, context); });
   row("voxel triangulation (thesis)", s, voxels.mesh.triangles.size(), closed(voxels.mesh),
@@ -231,7 +239,8 @@ void bench_surface(const Context& context) {
     }
     std::sort(times.begin(), times.end());
     std::printf(
-        "\nA 4 mm burr's worth of changed voxels to new triangles, one thread%s: p50 %.2f ms, p99 %.2f ms (a rebuild of all: %.0f ms).\n",
+        "\nA 4 mm burr's worth of changed voxels to new triangles, one thread%s: p50 %.2f ms, p99 %.2f ms (a rebuild "
+        "of all: %.0f ms).\n",
         shaded ? ", with normals to light by" : "", 1000 * times[200], 1000 * times[395], 1000 * rebuild);
   }
 }
@@ -245,7 +254,8 @@ void bench_pieces(const Context& context) {
   r.spacing_mm = 0.5;
   const BrickGrid whole = to_bricks(resample_bone(phantom.ct, threshold(phantom.ct, t), r, context).density);
   const auto& n = whole.frame().dims;
-  std::printf("## Pieces: phantom head at 0.5 mm, %zu bricks\n\n| what | ms | result |\n|---|---|---|\n", whole.brick_count());
+  std::printf("## Pieces: phantom head at 0.5 mm, %zu bricks\n\n| what | ms | result |\n|---|---|---|\n",
+              whole.brick_count());
   std::unique_ptr<LiveComponents> live;
   BrickGrid bone = whole;
   const double all = seconds([&] { live = std::make_unique<LiveComponents>(bone); }, 1);
@@ -270,22 +280,27 @@ void bench_pieces(const Context& context) {
     updates.push_back(seconds([&] { static_cast<void>(live->update()); }, 1));
   }
   std::sort(updates.begin(), updates.end());
-  std::printf("| after a bite of a 6 mm burr | %.2f (p50), %.2f (p99) | %zu parts |\n", 1000 * updates[150], 1000 * updates[297],
-              live->update().size());
+  std::printf("| after a bite of a 6 mm burr | %.2f (p50), %.2f (p99) | %zu parts |\n", 1000 * updates[150],
+              1000 * updates[297], live->update().size());
   bone = BrickGrid(whole);
   std::vector<VoxelKey> changed;
   double removed = 0;
-  const double saw = seconds([&] { removed = apply_saw(bone, {whole.frame().centre_mm(), {0, 0.3, 1}, {1, 0, 0}, 1}, changed); }, 1);
+  const double saw = seconds(
+      [&] {
+        removed = apply_saw(bone, {whole.frame().centre_mm(), {0, 0.3, 1}, {1, 0, 0}, 1}, changed);
+      },
+      1);
   std::printf("| saw through the whole head | %.1f | %zu voxels, %.0f mm3 |\n", 1000 * saw, changed.size(), removed);
   live = std::make_unique<LiveComponents>(whole);
   LiveComponents cut(bone);
   for (const VoxelKey v : changed) cut.mark(v);
   const double relabel = seconds([&] { static_cast<void>(cut.update()); }, 1);
-  std::printf("| the parts after it, from its voxels alone | %.1f | %zu parts |\n", 1000 * relabel, cut.update().size());
+  std::printf("| the parts after it, from its voxels alone | %.1f | %zu parts |\n", 1000 * relabel,
+              cut.update().size());
   Split split;
   const double apart = seconds([&] { split = split_bone(bone, 50); }, 1);
-  std::printf("| pieces with bone of their own, from nothing | %.1f | %zu pieces, %llu crumbs |\n", 1000 * apart, split.pieces.size(),
-              static_cast<unsigned long long>(split.crumbs));
+  std::printf("| pieces with bone of their own, from nothing | %.1f | %zu pieces, %llu crumbs |\n", 1000 * apart,
+              split.pieces.size(), static_cast<unsigned long long>(split.crumbs));
   std::vector<std::uint8_t> mask(whole.frame().voxel_count());
   std::size_t at = 0;
   for (int k = 0; k < n[2]; ++k)
@@ -293,10 +308,12 @@ void bench_pieces(const Context& context) {
       for (int i = 0; i < n[0]; ++i) mask[at++] = bone.at(i, j, k) >= 0.5F ? 1 : 0;
   std::size_t parts = 0;
   const double flood = seconds([&] { parts = connected_components(mask, n, 1, Connectivity::face).voxels.size(); }, 1);
-  std::printf("| flood fill of the dense volume (the thesis' way, by runs) | %.1f | %zu parts |\n", 1000 * flood, parts);
+  std::printf("| flood fill of the dense volume (the thesis' way, by runs) | %.1f | %zu parts |\n", 1000 * flood,
+              parts);
 
   std::printf(
-      "\n## Thickness: spherical shells, radius 8 mm, voxels 0.4 mm\n\n| shell mm | mean error mm | worst mm | us |\n|---|---|---|---|\n");
+      "\n## Thickness: spherical shells, radius 8 mm, voxels 0.4 mm\n\n| shell mm | mean error mm | worst mm | us "
+      "|\n|---|---|---|---|\n");
   for (const double thick : {0.8, 1.5, 4.0}) {
     Frame f;
     f.dims = {72, 72, 72};
@@ -309,8 +326,8 @@ void bench_pieces(const Context& context) {
       const Ijk c = g.coordinate(v);
       int in = 0;
       for (int s = 0; s < 64; ++s) {
-        const double d =
-            length(f.world_from_index({c.i + ((s & 3) - 1.5) / 4, c.j + ((s >> 2 & 3) - 1.5) / 4, c.k + ((s >> 4) - 1.5) / 4}));
+        const double d = length(f.world_from_index(
+            {c.i + ((s & 3) - 1.5) / 4, c.j + ((s >> 2 & 3) - 1.5) / 4, c.k + ((s >> 4) - 1.5) / 4}));
         in += d > 8 && d < 8 + thick ? 1 : 0;
       }
       g.set(v, static_cast<float>(in) / 64);
@@ -344,16 +361,17 @@ void bench_dust() {
   Dust dust(bone);
   std::mt19937 random(6);
   std::printf(
-      "## Dust: cells of 0.5 mm in a bowl\n\n| cells that hold dust | awake cells (of awake bricks) | ms a step | ns an awake cell | made "
+      "## Dust: cells of 0.5 mm in a bowl\n\n| cells that hold dust | awake cells (of awake bricks) | ms a step | ns "
+      "an awake cell | made "
       "less all there is, mm3 "
       "|\n|---|---|---|---|---|\n");
   for (const int wanted : {20000, 100000, 400000, 1000000}) {
     std::size_t holding = 0;
     while (true) {
       for (int n = 0; n < wanted / 8; ++n)
-        dust.add(
-            bone.find(60 + static_cast<int>(random() % 72), 20 + static_cast<int>(random() % 60), 60 + static_cast<int>(random() % 72)),
-            0.02);
+        dust.add(bone.find(60 + static_cast<int>(random() % 72), 20 + static_cast<int>(random() % 60),
+                           60 + static_cast<int>(random() % 72)),
+                 0.02);
       for (int s = 0; s < 5; ++s) dust.step();
       holding = 0;
       dust.visit([&](Vec3, double) { ++holding; });

@@ -5,11 +5,11 @@
 #include "bench_geometry.h"
 #include "bench_geometry_peers.h"
 #include "osteo/core/base/simd.h"
+#include "osteo/geometry/distance/binary_distance.h"
 #include "osteo/geometry/distance/live_distance.h"
 #include "osteo/geometry/distance/mask_distance.h"
 #include "osteo/geometry/distance/swept_distance.h"
 #include "osteo/geometry/distance/thesis_distance.h"
-#include "osteo/geometry/distance/binary_distance.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo::bench {
@@ -65,14 +65,17 @@ void distance_tables(const Context& context, const fs::path& folder) {
   Context one = context;
   one.threads = 1;
   std::printf(
-      "### Distance maps of the inside\n\nVoxels inside and their six neighbours (the thesis' set, section 6.3.4), isotropic, the longest "
+      "### Distance maps of the inside\n\nVoxels inside and their six neighbours (the thesis' set, section 6.3.4), "
+      "isotropic, the longest "
       "extent divided by "
-      "the resolution. CPU seconds on one thread, surface in to map out; ours with tree, voxels and sign included, the peers' with the "
+      "the resolution. CPU seconds on one thread, surface in to map out; ours with tree, voxels and sign included, the "
+      "peers' with the "
       "list of points given "
       "and, but for VTK's, without sign. Instruction set: %s.\n\n",
       simd_name(simd()).data());
   std::printf(
-      "| surface | resolution | voxels | ours | ours, 2 threads (wall) | thesis as printed | thesis corrected | breadth first | Embree + "
+      "| surface | resolution | voxels | ours | ours, 2 threads (wall) | thesis as printed | thesis corrected | "
+      "breadth first | Embree + "
       "hint | CGAL AABB | thesis corrected / ours | Embree / ours | CGAL / ours | published 2006 |\n");
   std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   const std::map<std::string, std::array<double, 4>> published{{"bunny", {0.736, 6.107, 29.033, 82.341}},
@@ -108,9 +111,10 @@ void distance_tables(const Context& context, const fs::path& folder) {
       const double embree = cpu([&] { (void)by_embree(s.soup, points); }, 1);
       const double cgal = cpu([&] { (void)by_cgal(s.soup, points); }, 1);
       const auto known = published.find(s.name);
-      std::printf("| %s | %d | %zu | %.4f | %.4f | %.3f | %.3f | %.3f | %.3f | %.3f | %.0f | %.0f | %.0f | %s |\n", s.name.c_str(),
-                  resolution, points.size(), ours, ours2, printed, corrected, breadth, embree, cgal, corrected / ours, embree / ours,
-                  cgal / ours, known == published.end() ? "" : format_number(known->second[r]).c_str());
+      std::printf("| %s | %d | %zu | %.4f | %.4f | %.3f | %.3f | %.3f | %.3f | %.3f | %.0f | %.0f | %.0f | %s |\n",
+                  s.name.c_str(), resolution, points.size(), ours, ours2, printed, corrected, breadth, embree, cgal,
+                  corrected / ours, embree / ours, cgal / ours,
+                  known == published.end() ? "" : format_number(known->second[r]).c_str());
       std::fflush(stdout);
     }
   }
@@ -130,20 +134,24 @@ void distance_tables(const Context& context, const fs::path& folder) {
   for (std::size_t i = 0; i < points.size(); i += points.size() / 500) {
     double d = 1e300;
     for (const auto& t : s.soup.triangles) {
-      d = std::min(d, closest_on_triangle(points[i], s.soup.points_mm[t[0]], s.soup.points_mm[t[1]], s.soup.points_mm[t[2]]).distance_mm);
+      d = std::min(
+          d, closest_on_triangle(points[i], s.soup.points_mm[t[0]], s.soup.points_mm[t[1]], s.soup.points_mm[t[2]])
+                 .distance_mm);
     }
     reference_off = std::max(reference_off, std::abs(d - truth[i]) / h);
   }
   std::printf(
-      "\n### Time against error: %s at 195\n\nError in voxels against the nearest of all triangles in double precision (brute force on 500 "
+      "\n### Time against error: %s at 195\n\nError in voxels against the nearest of all triangles in double precision "
+      "(brute force on 500 "
       "points differs from the reference by at most %.1e).\n\n",
       s.name.c_str(), reference_off);
-  std::printf("| method | CPU s | of ours | error max | rms | off by > 0.001 voxel | sign |\n|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "| method | CPU s | of ours | error max | rms | off by > 0.001 voxel | sign |\n|---|---|---|---|---|---|---|\n");
   double ours_s = 0;
   const auto row = [&](const std::string& name, double seconds, const std::vector<double>& d, const char* sign) {
     const Error e = error_of(d, truth, h);
-    std::printf("| %s | %.3f | %.2f | %.1e | %.1e | %.2g %% | %s |\n", name.c_str(), seconds, seconds / ours_s, e.max, e.rms, 100 * e.wrong,
-                sign);
+    std::printf("| %s | %.3f | %.2f | %.1e | %.1e | %.2g %% | %s |\n", name.c_str(), seconds, seconds / ours_s, e.max,
+                e.rms, 100 * e.wrong, sign);
     std::fflush(stdout);
   };
   DistanceMap map;
@@ -174,9 +182,11 @@ void distance_tables(const Context& context, const fs::path& folder) {
     for (std::size_t i = 0; i < v.size(); ++i) whole[i * step] = v[i];
     return whole;
   };
-  t = cpu([&] { d = by_vtk_locator(s.soup, sample); }, 1) * static_cast<double>(points.size()) / static_cast<double>(sample.size());
+  t = cpu([&] { d = by_vtk_locator(s.soup, sample); }, 1) * static_cast<double>(points.size()) /
+      static_cast<double>(sample.size());
   row("vtkStaticCellLocator (from 20,000 points)", t, spread(d), "none");
-  t = cpu([&] { d = by_vtk_implicit(s.soup, sample); }, 1) * static_cast<double>(points.size()) / static_cast<double>(sample.size());
+  t = cpu([&] { d = by_vtk_implicit(s.soup, sample); }, 1) * static_cast<double>(points.size()) /
+      static_cast<double>(sample.size());
   row("vtkImplicitPolyDataDistance (from 20,000 points)", t, spread(d), "normals");
   std::vector<float> dense;
   const auto from_dense = [&] {
@@ -184,7 +194,8 @@ void distance_tables(const Context& context, const fs::path& folder) {
     for (int k = 0; k < f.dims[2]; ++k) {
       for (int j = 0; j < f.dims[1]; ++j) {
         for (int i = 0; i < f.dims[0]; ++i) {
-          if (bits.at(i, j, k)) v.push_back(static_cast<double>(dense[(static_cast<std::size_t>(k) * f.dims[1] + j) * f.dims[0] + i]) * h);
+          if (bits.at(i, j, k))
+            v.push_back(static_cast<double>(dense[(static_cast<std::size_t>(k) * f.dims[1] + j) * f.dims[0] + i]) * h);
         }
       }
     }
@@ -219,18 +230,24 @@ void distance_tables(const Context& context, const fs::path& folder) {
   write_raw(folder / "p.f64", xyz);
   for (const Line& l : python_peers(folder, "points")) {
     std::vector<double> v(fs::file_size(l.file) / 8);
-    std::ifstream(l.file, std::ios::binary).read(reinterpret_cast<char*>(v.data()), static_cast<std::streamsize>(v.size() * 8));
+    std::ifstream(l.file, std::ios::binary)
+        .read(reinterpret_cast<char*>(v.data()), static_cast<std::streamsize>(v.size() * 8));
     const std::size_t every = (points.size() + v.size() - 1) / v.size();
     std::vector<double> all_values(points.size(), std::numeric_limits<double>::quiet_NaN());
     for (std::size_t i = 0; i < v.size() && i * every < all_values.size(); ++i) all_values[i * every] = v[i];
-    row(l.name, l.seconds, all_values, l.name.find("libigl") == 0 ? "normals" : l.name.find("Open3D") == 0 ? "parity" : "none");
+    row(l.name, l.seconds, all_values,
+        l.name.find("libigl") == 0   ? "normals"
+        : l.name.find("Open3D") == 0 ? "parity"
+                                     : "none");
   }
 
   std::printf(
-      "\n### Whole box and narrow band (3 voxels inside, 2 outside) at 195\n\nCPU seconds, one thread. Wrong signs: against the winding "
+      "\n### Whole box and narrow band (3 voxels inside, 2 outside) at 195\n\nCPU seconds, one thread. Wrong signs: "
+      "against the winding "
       "number, of voxels in the band.\n\n");
   std::printf(
-      "| surface | ours, box | swept, box | swept / ours | ours, band | OpenVDB, band | OpenVDB / ours | OpenVDB max error (voxels) | "
+      "| surface | ours, box | swept, box | swept / ours | ours, band | OpenVDB, band | OpenVDB / ours | OpenVDB max "
+      "error (voxels) | "
       "OpenVDB wrong signs | ours wrong signs |\n|---|---|---|---|---|---|---|---|---|---|\n");
   for (const Subject& each : all) {
     const Frame g = frame_around(each.soup, 195, 2);
@@ -238,7 +255,11 @@ void distance_tables(const Context& context, const fs::path& folder) {
     const double sweep = cpu([&] { (void)swept_distance_mm(each.soup, g); }, 1);
     DistanceMap band;
     const double hh = g.spacing_mm.x;
-    const double ours_band = cpu([&] { band = DistanceMapper(each.soup, g, one).map({DistanceRegion::band, 3 * hh, 2 * hh}, one); }, 5);
+    const double ours_band = cpu(
+        [&] {
+          band = DistanceMapper(each.soup, g, one).map({DistanceRegion::band, 3 * hh, 2 * hh}, one);
+        },
+        5);
     const double vdb = cpu([&] { dense = by_openvdb(each.soup, g, 3, 2); });
     double worst = 0;
     std::uint64_t wrong = 0, own_wrong = 0, n = 0;
@@ -259,15 +280,18 @@ void distance_tables(const Context& context, const fs::path& folder) {
         }
       }
     }
-    std::printf("| %s | %.3f | %.2f | %.0f | %.4f | %.3f | %.1f | %.2g | %llu | %llu of %llu tried |\n", each.name.c_str(), box, sweep,
-                sweep / box, ours_band, vdb, vdb / ours_band, worst, static_cast<unsigned long long>(wrong),
-                static_cast<unsigned long long>(own_wrong), static_cast<unsigned long long>(n / 997));
+    std::printf("| %s | %.3f | %.2f | %.0f | %.4f | %.3f | %.1f | %.2g | %llu | %llu of %llu tried |\n",
+                each.name.c_str(), box, sweep, sweep / box, ours_band, vdb, vdb / ours_band, worst,
+                static_cast<unsigned long long>(wrong), static_cast<unsigned long long>(own_wrong),
+                static_cast<unsigned long long>(n / 997));
     std::fflush(stdout);
   }
 
   std::printf(
-      "\n### The thesis' spatial coherence (Figures 54 to 56): %s at 135\n\nCPU seconds of the distances alone.\n\n| TREE_ASCEND_N | depth "
-      "first, as printed | depth first, corrected | breadth first, as printed | breadth first, corrected |\n|---|---|---|---|---|\n",
+      "\n### The thesis' spatial coherence (Figures 54 to 56): %s at 135\n\nCPU seconds of the distances alone.\n\n| "
+      "TREE_ASCEND_N | depth "
+      "first, as printed | depth first, corrected | breadth first, as printed | breadth first, corrected "
+      "|\n|---|---|---|---|---|\n",
       all.size() > 2 ? all[2].name.c_str() : all[0].name.c_str());
   const Subject& happy = all.size() > 2 ? all[2] : all[0];
   const Frame hf = frame_around(happy.soup, 135, 2);
@@ -290,8 +314,8 @@ void mask_table(const Context& context, const fs::path& folder) {
   std::vector<std::uint8_t> mask(f.voxel_count(), 0);
   std::mt19937 random(1);
   for (int b = 0; b < 60; ++b) {  // sixty balls
-    const int cx = static_cast<int>(random() % 512), cy = static_cast<int>(random() % 512), cz = static_cast<int>(random() % 300),
-              r = 10 + static_cast<int>(random() % 40);
+    const int cx = static_cast<int>(random() % 512), cy = static_cast<int>(random() % 512),
+              cz = static_cast<int>(random() % 300), r = 10 + static_cast<int>(random() % 40);
     for (int k = std::max(0, cz - r); k < std::min(300, cz + r); ++k) {
       for (int j = std::max(0, cy - r); j < std::min(512, cy + r); ++j) {
         for (int i = std::max(0, cx - r); i < std::min(512, cx + r); ++i) {
@@ -302,7 +326,8 @@ void mask_table(const Context& context, const fs::path& folder) {
     }
   }
   std::printf(
-      "\n### Euclidean distance of a mask, 512 x 512 x 300, anisotropic\n\nWall seconds. Ours gives squared distances to the mask; the "
+      "\n### Euclidean distance of a mask, 512 x 512 x 300, anisotropic\n\nWall seconds. Ours gives squared distances "
+      "to the mask; the "
       "stage's sparse map of a 3 mm band holds both sides.\n\n| method | s |\n|---|---|\n");
   std::vector<float> d2;
   for (const int threads : {1, 2}) {
@@ -333,8 +358,9 @@ void mask_table(const Context& context, const fs::path& folder) {
     double worst = 0;
     for (std::size_t i = 0; i < theirs.size(); ++i)
       worst = std::max(worst, std::abs(std::sqrt(static_cast<double>(d2[i])) - static_cast<double>(theirs[i])));
-    std::printf("\nOurs and edt differ by at most %.1e mm. The sparse band takes %.0f MB, a dense float volume %.0f MB.\n", worst,
-                static_cast<double>(sparse.memory_bytes) / 1e6, static_cast<double>(mask.size()) * 4 / 1e6);
+    std::printf(
+        "\nOurs and edt differ by at most %.1e mm. The sparse band takes %.0f MB, a dense float volume %.0f MB.\n",
+        worst, static_cast<double>(sparse.memory_bytes) / 1e6, static_cast<double>(mask.size()) * 4 / 1e6);
   }
 }
 
@@ -353,7 +379,8 @@ void live_table() {
   for (int k = 0; k < 160; ++k)
     for (int j = 0; j < 160; ++j)
       for (int i = 0; i < 160; ++i)
-        bone.set(bone.find(i, j, k), static_cast<float>(std::clamp(0.5 + (30 - length(at(i, j, k) - centre)) / 0.5, 0.0, 1.0)));
+        bone.set(bone.find(i, j, k),
+                 static_cast<float>(std::clamp(0.5 + (30 - length(at(i, j, k) - centre)) / 0.5, 0.0, 1.0)));
   std::vector<SurfacePatch> patches(bone.brick_count());
   const auto triangles_of = [&](std::uint32_t b) {
     std::vector<std::array<Vec3, 3>> list;
@@ -390,7 +417,8 @@ void live_table() {
     std::uint64_t touched = 0, removed_count = 0, added_count = 0;
     for (int step = 0; step < 120; ++step) {
       // 0.1 mm a step, along the surface and slowly in.
-      const Vec3 tip = centre + normalized(Vec3{std::cos(step * 0.0033), std::sin(step * 0.0033), 0.1}) * (31.2 - step * 0.01);
+      const Vec3 tip =
+          centre + normalized(Vec3{std::cos(step * 0.0033), std::sin(step * 0.0033), 0.1}) * (31.2 - step * 0.01);
       const auto low = [&](double x) { return std::max(0, static_cast<int>((x - 2) / 0.5)); };
       std::vector<std::uint8_t> dirty(bone.brick_count(), 0);
       for (int k = low(tip.z); k < low(tip.z) + 9; ++k)
@@ -402,8 +430,9 @@ void live_table() {
             if (left >= drilled.value(key)) continue;
             drilled.set(key, left);
             for (int c = 0; c < 8; ++c) {
-              const std::uint32_t b = drilled.find_brick((i + ((c & 1) != 0 ? 2 : -2)) >> 3, (j + ((c & 2) != 0 ? 2 : -2)) >> 3,
-                                                         (k + ((c & 4) != 0 ? 2 : -2)) >> 3);
+              const std::uint32_t b =
+                  drilled.find_brick((i + ((c & 1) != 0 ? 2 : -2)) >> 3, (j + ((c & 2) != 0 ? 2 : -2)) >> 3,
+                                     (k + ((c & 4) != 0 ? 2 : -2)) >> 3);
               if (b != BrickGrid::kNone) dirty[b] = 1;
             }
           }
@@ -438,7 +467,8 @@ void live_table() {
       const auto begin = std::chrono::steady_clock::now();
       const std::uint32_t first = live->update(removed, added, inside_now);
       ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
-      for (std::size_t i = 0; i < place.size(); ++i) own_ids[place[i].first][place[i].second] = first + static_cast<std::uint32_t>(i);
+      for (std::size_t i = 0; i < place.size(); ++i)
+        own_ids[place[i].first][place[i].second] = first + static_cast<std::uint32_t>(i);
       touched += live->touched();
       removed_count += removed.size();
       added_count += added.size();
@@ -447,12 +477,15 @@ void live_table() {
     std::sort(ms.begin(), ms.end());
     if (reach == 1.5) {
       std::printf(
-          "\n### The map follows the drill\n\nA ball of bone, 160^3 voxels of 0.5 mm; a 3 mm burr moves 0.1 mm a step. One thread.\n\n| "
-          "band | whole map s | update median ms | p95 ms | max ms | voxels measured a step | triangles taken / added a step "
+          "\n### The map follows the drill\n\nA ball of bone, 160^3 voxels of 0.5 mm; a 3 mm burr moves 0.1 mm a step. "
+          "One thread.\n\n| "
+          "band | whole map s | update median ms | p95 ms | max ms | voxels measured a step | triangles taken / added "
+          "a step "
           "|\n|---|---|---|---|---|---|---|\n");
     }
-    std::printf("| %.1f mm | %.2f | %.3f | %.3f | %.3f | %llu | %llu / %llu |\n", reach, whole, ms[ms.size() / 2], ms[ms.size() * 95 / 100],
-                ms.back(), static_cast<unsigned long long>(touched / ms.size()), static_cast<unsigned long long>(removed_count / ms.size()),
+    std::printf("| %.1f mm | %.2f | %.3f | %.3f | %.3f | %llu | %llu / %llu |\n", reach, whole, ms[ms.size() / 2],
+                ms[ms.size() * 95 / 100], ms.back(), static_cast<unsigned long long>(touched / ms.size()),
+                static_cast<unsigned long long>(removed_count / ms.size()),
                 static_cast<unsigned long long>(added_count / ms.size()));
   }
 }

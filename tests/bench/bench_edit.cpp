@@ -34,13 +34,16 @@ Image head(std::array<int, 3> dims) {
                        z = (2.0 * static_cast<double>(k) / dims[2] - 1) / 0.95;
           const double r = std::sqrt(x * x + y * y + z * z);
           double hu = r > 1 ? -1000 : r > 0.93 ? 60 : r > 0.91 || (r < 0.88 && r > 0.86) ? 1100 : r > 0.86 ? 450 : 40;
-          if (r > 0.86 && r < 0.93 && std::sin(i * 0.5) * std::sin(j * 0.5) * std::sin(static_cast<double>(k) * 0.5) > 0.7) hu = -600;
+          if (r > 0.86 && r < 0.93 &&
+              std::sin(i * 0.5) * std::sin(j * 0.5) * std::sin(static_cast<double>(k) * 0.5) > 0.7)
+            hu = -600;
           double noise = -2;
           for (int n = 0; n < 4; ++n) {
             state = state * 1664525U + 1013904223U;
             noise += static_cast<double>(state >> 8) / (1 << 24);
           }
-          v[static_cast<std::ptrdiff_t>(ct.offset(i, j, static_cast<int>(k)))] = static_cast<std::int16_t>(hu + 43 * noise);
+          v[static_cast<std::ptrdiff_t>(ct.offset(i, j, static_cast<int>(k)))] =
+              static_cast<std::int16_t>(hu + 43 * noise);
         }
       }
     }
@@ -72,15 +75,16 @@ int main(int argc, char** argv) {
     std::optional<BonePlan> plan;
     const std::size_t before = d.history_bytes();
     if (changes_bone(o) && !std::holds_alternative<BrushEdit>(o)) {
-      const double beside = timed([&] { plan = d.plan({o}); }), commit = timed([&] { done = d.commit(std::move(*plan)); });
+      const double beside = timed([&] { plan = d.plan({o}); }),
+                   commit = timed([&] { done = d.commit(std::move(*plan)); });
       std::printf("%-22s%8.1f ms beside, %6.1f ms in the window", name, beside, commit);
     } else {
       std::printf("%-22s                    %6.1f ms in the window", name, timed([&] { done = d.apply(o); }));
     }
     const double bytes = static_cast<double>(d.history_bytes() - before);
     const double back = timed([&] { d.undo(); }), again = timed([&] { d.redo(); });
-    std::printf(", undo %6.1f, redo %6.1f ms, history %8.1f kB, %.0f mm3 added, %.0f removed\n", back, again, bytes / 1e3, done.added_mm3,
-                done.removed_mm3);
+    std::printf(", undo %6.1f, redo %6.1f ms, history %8.1f kB, %.0f mm3 added, %.0f removed\n", back, again,
+                bytes / 1e3, done.added_mm3, done.removed_mm3);
   };
   step("threshold", ThresholdEdit{350, 32767});
   step("threshold, noisy", ThresholdEdit{60, 32767});
@@ -117,13 +121,13 @@ int main(int argc, char** argv) {
     const double bone = timed([&] { made_preview = make_preview(request); });
     request.live = ThresholdEdit{350, 32767};
     const double live = timed([&] { made_preview = make_preview(request); });
-    std::printf("3D of %7zu coarse voxels, beside  %6.1f ms, of a live threshold %6.1f ms, %zu triangles\n", most, bone, live,
-                made_preview.bone.triangles.size());
+    std::printf("3D of %7zu coarse voxels, beside  %6.1f ms, of a live threshold %6.1f ms, %zu triangles\n", most, bone,
+                live, made_preview.bone.triangles.size());
   }
   std::string text;
   std::printf("what is saved                       %6.1f ms\n", timed([&] { text = edits_text(recipe_of(d)); }));
-  std::printf("history %.1f MB in %zu steps, peak memory %.0f MB\n", static_cast<double>(d.history_bytes()) / 1e6, d.steps(),
-              peak_memory_mb());
+  std::printf("history %.1f MB in %zu steps, peak memory %.0f MB\n", static_cast<double>(d.history_bytes()) / 1e6,
+              d.steps(), peak_memory_mb());
   while (d.undo()) {
   }
   std::printf("undone to the start: %s\n", d.hash() == d.start_hash() ? "the start" : "NOT the start");

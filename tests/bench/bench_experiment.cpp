@@ -1,15 +1,15 @@
-// Time of an alignment of 1000 x 1000 with its path, on one core, beside the plain recurrence. Writes the curves for peers.
-// usage: experiment_bench [FOLDER]; then tests/bench/experiment_peers.py FOLDER
+// Time of an alignment of 1000 x 1000 with its path, on one core, beside the plain recurrence. Writes the curves for
+// peers. usage: experiment_bench [FOLDER]; then tests/bench/experiment_peers.py FOLDER
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 
-#include "osteo/core/base/simd.h"
 #include "osteo/assessment/experiment/participant.h"
 #include "osteo/assessment/experiment/recall.h"
 #include "osteo/assessment/experiment/trial.h"
+#include "osteo/core/base/simd.h"
 
 using namespace osteo;
 using namespace osteo::experiment;
@@ -30,7 +30,8 @@ int main(int argc, char** argv) {
   Protocol p;
   p.participants = {"P01"};
   SimulatedParticipant person({}, 5);
-  std::printf("instructions: %s\ntrial  score  by      ms      plain ms  same\n", std::string(simd_name(simd())).c_str());
+  std::printf("instructions: %s\ntrial  score  by      ms      plain ms  same\n",
+              std::string(simd_name(simd())).c_str());
   static constexpr const char* kBy[] = {"band", "matrix"};
   const auto trials = trials_of(p, 0);
   for (const std::size_t n : {std::size_t{0}, std::size_t{5}, std::size_t{8}, std::size_t{40}, std::size_t{71}}) {
@@ -47,8 +48,9 @@ int main(int argc, char** argv) {
     Aligner whole({}, 1);
     const double whole_ms = best_ms(100, [&] { (void)whole.align(target, applied); });
     const Alignment& a = aligner.align(target, applied);
-    std::printf("%5zu  %.3f  %-6s  %.3f   %.2f      %s   whole matrix %.3f ms\n", n + 1, r.score, kBy[static_cast<int>(a.by)], fast_ms,
-                plain_ms, a.cost_n == plain.cost_n && a.path.size() == plain.path.size() ? "yes" : "NO", whole_ms);
+    std::printf("%5zu  %.3f  %-6s  %.3f   %.2f      %s   whole matrix %.3f ms\n", n + 1, r.score,
+                kBy[static_cast<int>(a.by)], fast_ms, plain_ms,
+                a.cost_n == plain.cost_n && a.path.size() == plain.path.size() ? "yes" : "NO", whole_ms);
     if (argc > 1) {
       std::filesystem::create_directories(argv[1]);
       std::ofstream out(std::filesystem::path(argv[1]) / ("trial-" + std::to_string(n + 1) + ".csv"));

@@ -30,10 +30,12 @@ void tet_tables(const Context& context) {
                                                                {"dragon", {0.083, 0.772, 3.57, 6.042}}};
   // What memory allows: writing as many bytes, once.
   std::printf(
-      "\n### Voxels to five tetrahedra each (the thesis' Table 2)\n\nSeconds on one thread, surface in to mesh out, conforming; writing "
+      "\n### Voxels to five tetrahedra each (the thesis' Table 2)\n\nSeconds on one thread, surface in to mesh out, "
+      "conforming; writing "
       "the result's bytes once, for comparison.\n\n");
   std::printf(
-      "| surface | resolution | tets | voxels | tets | together | 2 threads | fill of as many bytes | published 2006 | published / ours "
+      "| surface | resolution | tets | voxels | tets | together | 2 threads | fill of as many bytes | published 2006 | "
+      "published / ours "
       "|\n|---|---|---|---|---|---|---|---|---|---|\n");
   for (const Subject& s : all) {
     for (std::size_t r = 0; r < 4; ++r) {
@@ -56,17 +58,21 @@ void tet_tables(const Context& context) {
           },
           7);
       const auto known = published.find(s.name);
-      std::printf("| %s | %d | %zu | %.4f | %.4f | %.4f | %.4f | %.4f | %s | %s |\n", s.name.c_str(), resolution, m.tets.size(), voxels,
-                  tets, voxels + tets, both, fill, known == published.end() ? "" : format_number(known->second[r]).c_str(),
-                  known == published.end() ? "" : std::to_string(std::lround(known->second[r] / (voxels + tets))).c_str());
+      std::printf(
+          "| %s | %d | %zu | %.4f | %.4f | %.4f | %.4f | %.4f | %s | %s |\n", s.name.c_str(), resolution, m.tets.size(),
+          voxels, tets, voxels + tets, both, fill,
+          known == published.end() ? "" : format_number(known->second[r]).c_str(),
+          known == published.end() ? "" : std::to_string(std::lround(known->second[r] / (voxels + tets))).c_str());
       std::fflush(stdout);
     }
   }
   std::printf(
-      "\n### Tetrahedra of the four methods that follow the surface\n\nOne thread. Distances between boundary and surface in %% of the "
+      "\n### Tetrahedra of the four methods that follow the surface\n\nOne thread. Distances between boundary and "
+      "surface in %% of the "
       "longest extent.\n\n");
   std::printf(
-      "| surface | method | CPU s | tets | tets/s | dihedral min | max | aspect min | inverted | conforming | mean distance | max distance "
+      "| surface | method | CPU s | tets | tets/s | dihedral min | max | aspect min | inverted | conforming | mean "
+      "distance | max distance "
       "|\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const Subject& s : all) {
     const Frame f = frame_around(s.soup, 38, 0);
@@ -83,10 +89,11 @@ void tet_tables(const Context& context) {
       const TetQuality q = tet_quality(m);
       const SurfaceComparison c = compare_surfaces(soup_of(boundary_of(m)), s.soup);
       const double extent = 38 * h;
-      std::printf("| %s | %s | %.3f | %zu | %.3g | %.2f | %.2f | %.3f | %llu | %s | %.3f | %.3f |\n", s.name.c_str(), name, seconds,
-                  m.tets.size(), static_cast<double>(m.tets.size()) / seconds, q.min_dihedral_deg, q.max_dihedral_deg, q.min_aspect,
-                  static_cast<unsigned long long>(q.inverted), q.conforming() ? "yes" : "no",
-                  100 * std::max(c.a_to_b.mean_mm, c.b_to_a.mean_mm) / extent, 100 * c.hausdorff_mm() / extent);
+      std::printf("| %s | %s | %.3f | %zu | %.3g | %.2f | %.2f | %.3f | %llu | %s | %.3f | %.3f |\n", s.name.c_str(),
+                  name, seconds, m.tets.size(), static_cast<double>(m.tets.size()) / seconds, q.min_dihedral_deg,
+                  q.max_dihedral_deg, q.min_aspect, static_cast<unsigned long long>(q.inverted),
+                  q.conforming() ? "yes" : "no", 100 * std::max(c.a_to_b.mean_mm, c.b_to_a.mean_mm) / extent,
+                  100 * c.hausdorff_mm() / extent);
       std::fflush(stdout);
     };
     row("grid-conforming, stencils only", [&] { return stuffed_tets(s.soup, {h, 0}, one); });
@@ -100,16 +107,19 @@ void tet_tables(const Context& context) {
 
 void curve_table() {
   std::printf(
-      "\n### Nearest point of a curve\n\n20,000 positions along a curve that approaches itself, as a hand would move. Microseconds a "
+      "\n### Nearest point of a curve\n\n20,000 positions along a curve that approaches itself, as a hand would move. "
+      "Microseconds a "
       "question; build in seconds; off track: not on the stretch that the exact penalised minimum is on.\n\n");
   std::printf(
-      "| points | ours mean | p99.9 | build | ours, penalty, mean | p99.9 | thesis on nanoflann (N = 100), penalty, mean | p99.9 | its off "
+      "| points | ours mean | p99.9 | build | ours, penalty, mean | p99.9 | thesis on nanoflann (N = 100), penalty, "
+      "mean | p99.9 | its off "
       "track | ratio of means |\n|---|---|---|---|---|---|---|---|---|---|\n");
   for (const int n : {2000, 20000, 200000, 2000000}) {
     std::vector<Vec3> points;
     for (int i = 0; i < n; ++i) {
       const double t = 40.0 * i / n;
-      points.push_back({20 * std::cos(t) * (1 + 0.02 * std::sin(9 * t)), 20 * std::sin(t) * (1 + 0.02 * std::sin(7 * t)), 0.1 * t});
+      points.push_back(
+          {20 * std::cos(t) * (1 + 0.02 * std::sin(9 * t)), 20 * std::sin(t) * (1 + 0.02 * std::sin(7 * t)), 0.1 * t});
     }
     std::mt19937 random(5);
     std::normal_distribution<double> noise(0, 1);
@@ -152,8 +162,9 @@ void curve_table() {
       arc = c.arc_mm;
       if (std::abs(arc - arcs[at++]) > 30) ++off;
     });
-    std::printf("| %d | %.2f | %.2f | %.4f | %.2f | %.2f | %.1f | %.1f | %d of 20000 | %.0f |\n", n, plain.first, plain.second, build,
-                held.first, held.second, theirs.first, theirs.second, off, theirs.first / held.first);
+    std::printf("| %d | %.2f | %.2f | %.4f | %.2f | %.2f | %.1f | %.1f | %d of 20000 | %.0f |\n", n, plain.first,
+                plain.second, build, held.first, held.second, theirs.first, theirs.second, off,
+                theirs.first / held.first);
     std::fflush(stdout);
   }
 }
@@ -162,10 +173,12 @@ void skin_table(const Context& context) {
   const auto all = subjects();
   const Subject& s = all[0];
   std::printf(
-      "\n### Skinning: %s (%zu points) on grid tetrahedra\n\nError of the moved points against the true map, in cubes; one thread.\n\n",
+      "\n### Skinning: %s (%zu points) on grid tetrahedra\n\nError of the moved points against the true map, in cubes; "
+      "one thread.\n\n",
       s.name.c_str(), s.soup.points_mm.size());
   std::printf(
-      "| resolution | tets | method | bind ms | move ms | stretch rms | max | shear rms | bend 60 degrees rms | max | rotation rms | max "
+      "| resolution | tets | method | bind ms | move ms | stretch rms | max | shear rms | bend 60 degrees rms | max | "
+      "rotation rms | max "
       "|\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   const TriMesh surface = mesh_of(s.soup);
   Context one = context;
@@ -184,8 +197,10 @@ void skin_table(const Context& context) {
       return centre + Vec3{c * q.x - n * q.y, n * q.x + c * q.y, q.z};
     };
     const auto bend = [&](Vec3 p) {  // the height becomes an arc of 60 degrees
-      const double angle = (p.y - centre.y) / height * std::numbers::pi / 3, radius = height / (std::numbers::pi / 3) + (p.x - centre.x);
-      return Vec3{centre.x + radius * std::cos(angle) - height / (std::numbers::pi / 3), centre.y + radius * std::sin(angle), p.z};
+      const double angle = (p.y - centre.y) / height * std::numbers::pi / 3,
+                   radius = height / (std::numbers::pi / 3) + (p.x - centre.x);
+      return Vec3{centre.x + radius * std::cos(angle) - height / (std::numbers::pi / 3),
+                  centre.y + radius * std::sin(angle), p.z};
     };
     for (const SkinMethod method : {SkinMethod::embedded, SkinMethod::frames}) {
       const double bind = cpu([&] { Skin skin(surface, rest, {method, 5}, one); }, 3);
@@ -208,9 +223,9 @@ void skin_table(const Context& context) {
         return std::pair{std::sqrt(sum / static_cast<double>(out.size())), worst};
       };
       const auto a = errors(stretch), b = errors(shear), c = errors(bend), r = errors(rotate);
-      std::printf("| %d | %zu | %s | %.1f | %.3f | %.2g | %.2g | %.2g | %.2g | %.2g | %.2g | %.2g |\n", resolution, rest.tets.size(),
-                  method == SkinMethod::embedded ? "embedded" : "frames (thesis)", bind * 1e3, move * 1e3, a.first, a.second, b.first,
-                  c.first, c.second, r.first, r.second);
+      std::printf("| %d | %zu | %s | %.1f | %.3f | %.2g | %.2g | %.2g | %.2g | %.2g | %.2g | %.2g |\n", resolution,
+                  rest.tets.size(), method == SkinMethod::embedded ? "embedded" : "frames (thesis)", bind * 1e3,
+                  move * 1e3, a.first, a.second, b.first, c.first, c.second, r.first, r.second);
       std::fflush(stdout);
     }
   }
@@ -219,7 +234,8 @@ void skin_table(const Context& context) {
 }  // namespace bench
 
 void bench_geometry(const Context& context) {
-  const std::filesystem::path folder = std::filesystem::temp_directory_path() / ("osteo-bench-" + std::to_string(::getpid()));
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("osteo-bench-" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
   std::printf("## Geometry\n\n");
   bench::curve_table();

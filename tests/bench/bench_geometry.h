@@ -26,8 +26,11 @@ inline double cpu_seconds() {
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
   rusage ended{};
   getrusage(RUSAGE_CHILDREN, &ended);
-  const auto seconds = [](const timeval& v) { return static_cast<double>(v.tv_sec) + 1e-6 * static_cast<double>(v.tv_usec); };
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec) + seconds(ended.ru_utime) + seconds(ended.ru_stime);
+  const auto seconds = [](const timeval& v) {
+    return static_cast<double>(v.tv_sec) + 1e-6 * static_cast<double>(v.tv_usec);
+  };
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec) + seconds(ended.ru_utime) +
+         seconds(ended.ru_stime);
 }
 inline double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -64,8 +67,9 @@ struct Subject {
 inline std::vector<Subject> subjects() {
   std::vector<Subject> all;
   const fs::path folder = fs::path(OSTEO_SHARED_DATA) / "meshes";
-  for (const auto& [name, file] : {std::pair{"bunny", "bunny_capped_69664_morris.obj"}, std::pair{"gear", "gear_tetgen_542.obj"},
-                                   std::pair{"happy", "happy_vrip_res4_15536.ply"}, std::pair{"dragon", "dragon_vrip_res3_47794.ply"}}) {
+  for (const auto& [name, file] :
+       {std::pair{"bunny", "bunny_capped_69664_morris.obj"}, std::pair{"gear", "gear_tetgen_542.obj"},
+        std::pair{"happy", "happy_vrip_res4_15536.ply"}, std::pair{"dragon", "dragon_vrip_res3_47794.ply"}}) {
     if (fs::exists(folder / file)) all.push_back({name, soup_of(*load_surface(folder / file))});
   }
   if (all.empty()) {
@@ -94,7 +98,8 @@ inline std::vector<Line> python_peers(const fs::path& folder, const char* what) 
   const fs::path bin = fs::read_symlink("/proc/self/exe", ec).parent_path();
   const fs::path python = bin.parent_path().parent_path() / "peers" / "bin" / "python3";
   if (!fs::exists(python)) return lines;
-  const std::string command = python.string() + " " OSTEO_BENCH_FOLDER "/peers.py " + folder.string() + " " + what + " 2>/dev/null";
+  const std::string command =
+      python.string() + " " OSTEO_BENCH_FOLDER "/peers.py " + folder.string() + " " + what + " 2>/dev/null";
   FILE* const pipe = ::popen(command.c_str(), "r");
   char buffer[1024];
   while (pipe != nullptr && std::fgets(buffer, sizeof buffer, pipe) != nullptr) {

@@ -96,10 +96,10 @@ std::vector<double> by_embree(const TriangleSoup& soup, std::span<const Vec3> po
   const RTCScene scene = rtcNewScene(device);
   rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
   const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* const v =
-      static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, soup.points_mm.size()));
-  auto* const t =
-      static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, soup.triangles.size()));
+  auto* const v = static_cast<float*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, soup.points_mm.size()));
+  auto* const t = static_cast<std::uint32_t*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, soup.triangles.size()));
   for (std::size_t i = 0; i < soup.points_mm.size(); ++i) {
     for (std::size_t a = 0; a < 3; ++a) v[3 * i + a] = static_cast<float>(soup.points_mm[i][a]);
   }
@@ -135,7 +135,9 @@ std::vector<double> by_cgal(const TriangleSoup& soup, std::span<const Vec3> poin
   using Iterator = std::vector<K::Triangle_3>::const_iterator;
   using Tree = CGAL::AABB_tree<CGAL::AABB_traits<K, CGAL::AABB_triangle_primitive<K, Iterator>>>;
   std::vector<K::Triangle_3> triangles;
-  const auto p = [&](std::uint32_t i) { return K::Point_3(soup.points_mm[i].x, soup.points_mm[i].y, soup.points_mm[i].z); };
+  const auto p = [&](std::uint32_t i) {
+    return K::Point_3(soup.points_mm[i].x, soup.points_mm[i].y, soup.points_mm[i].z);
+  };
   for (const auto& t : soup.triangles) {
     if (!K::Triangle_3(p(t[0]), p(t[1]), p(t[2])).is_degenerate()) triangles.emplace_back(p(t[0]), p(t[1]), p(t[2]));
   }
@@ -180,7 +182,8 @@ std::vector<double> by_vtk_implicit(const TriangleSoup& soup, std::span<const Ve
   return d;
 }
 
-std::vector<float> by_openvdb(const TriangleSoup& soup, const Frame& frame, double inside_voxels, double outside_voxels) {
+std::vector<float> by_openvdb(const TriangleSoup& soup, const Frame& frame, double inside_voxels,
+                              double outside_voxels) {
   openvdb::initialize();
   std::vector<openvdb::Vec3s> points;
   std::vector<openvdb::Vec3I> triangles;
@@ -191,14 +194,16 @@ std::vector<float> by_openvdb(const TriangleSoup& soup, const Frame& frame, doub
   for (const auto& t : soup.triangles) triangles.emplace_back(t[0], t[1], t[2]);
   openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> mesh(points, triangles);
   const auto inside = inside_voxels < 0 ? std::numeric_limits<float>::max() : static_cast<float>(inside_voxels);
-  const auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(mesh, *openvdb::math::Transform::createLinearTransform(1.0),
-                                                                     static_cast<float>(outside_voxels), inside);
+  const auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
+      mesh, *openvdb::math::Transform::createLinearTransform(1.0), static_cast<float>(outside_voxels), inside);
   std::vector<float> d(frame.voxel_count(), std::numeric_limits<float>::quiet_NaN());
   for (auto v = grid->cbeginValueOn(); v; ++v) {
     const auto box = v.getBoundingBox();
     for (auto c = box.begin(); c; ++c) {
       const auto at = *c;
-      if (at.x() < 0 || at.y() < 0 || at.z() < 0 || at.x() >= frame.dims[0] || at.y() >= frame.dims[1] || at.z() >= frame.dims[2]) continue;
+      if (at.x() < 0 || at.y() < 0 || at.z() < 0 || at.x() >= frame.dims[0] || at.y() >= frame.dims[1] ||
+          at.z() >= frame.dims[2])
+        continue;
       d[(static_cast<std::size_t>(at.z()) * frame.dims[1] + at.y()) * frame.dims[0] + at.x()] = *v;
     }
   }
@@ -217,7 +222,8 @@ struct NearestNeighbours::Impl {
       return false;
     }
   } adaptor{&points};
-  using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Adaptor>, Adaptor, 3, std::uint32_t>;
+  using Tree =
+      nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Adaptor>, Adaptor, 3, std::uint32_t>;
   std::unique_ptr<Tree> tree;
 };
 

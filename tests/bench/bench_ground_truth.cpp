@@ -1,9 +1,10 @@
-// Haptic renderers against solids of which everything is known: the tables of docs/ground-truth.md, and the files beside them.
+// Haptic renderers against solids of which everything is known: the tables of docs/ground-truth.md, and the files
+// beside them.
 #include <cstdio>
 
 #include "bench.h"
-#include "osteo/core/base/error.h"
 #include "osteo/assessment/ground_truth/experiments.h"
+#include "osteo/core/base/error.h"
 #include "osteo/imaging/io/surface_io.h"
 
 namespace osteo {

@@ -16,13 +16,13 @@
 #include "bench.h"
 #include "duck.h"
 #include "osteo/core/base/simd.h"
+#include "osteo/core/rt/loop.h"
 #include "osteo/geometry/grid/resample.h"
-#include "osteo/simulation/haptics/fields.h"
-#include "osteo/simulation/haptics/servo.h"
 #include "osteo/imaging/image/threshold.h"
 #include "osteo/imaging/io/volume_io.h"
-#include "osteo/core/rt/loop.h"
 #include "osteo/session/recording/recorder.h"
+#include "osteo/simulation/haptics/fields.h"
+#include "osteo/simulation/haptics/servo.h"
 #include "slab.h"
 #include "solid.h"
 #include "stability.h"
@@ -30,7 +30,8 @@
 namespace osteo {
 namespace {
 
-const ContactMethod kMethods[] = {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy};
+const ContactMethod kMethods[] = {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap,
+                                  ContactMethod::proxy};
 const char* name_of(ContactMethod m) {
   return EnumNames<ContactMethod>::values[static_cast<std::size_t>(m)].data();
 }
@@ -50,19 +51,22 @@ struct Spread {
   }
 };
 
-// --- contact models against the truth ----------------------------------------------------------------------------------------------
+// --- contact models against the truth
+// ----------------------------------------------------------------------------------------------
 
 /// A surface by its signed distance (negative inside), exact near it, and a cube of it around `centre`.
 struct Body {
   const char* name;
   std::function<double(Vec3)> distance;
   Vec3 centre;
-  std::function<Vec3(std::mt19937&)> place;  ///< of a burr's centre at a given clearance 0: a point of the surface to press on
+  std::function<Vec3(std::mt19937&)>
+      place;  ///< of a burr's centre at a given clearance 0: a point of the surface to press on
 };
 
 Vec3 slope_of(const std::function<double(Vec3)>& f, Vec3 x) {
   const double e = 1e-4;
-  return {(f(x + Vec3{e, 0, 0}) - f(x - Vec3{e, 0, 0})) / (2 * e), (f(x + Vec3{0, e, 0}) - f(x - Vec3{0, e, 0})) / (2 * e),
+  return {(f(x + Vec3{e, 0, 0}) - f(x - Vec3{e, 0, 0})) / (2 * e),
+          (f(x + Vec3{0, e, 0}) - f(x - Vec3{0, e, 0})) / (2 * e),
           (f(x + Vec3{0, 0, e}) - f(x - Vec3{0, 0, e})) / (2 * e)};
 }
 
@@ -71,7 +75,8 @@ BrickGrid voxels_of(const Body& body, double h) {
       h, 9, [&](Vec3 p) { return body.distance(p + body.centre) < 0; }, body.centre, 8);
 }
 
-/// Volume of the body in a ball and the push of its surface, by 64^3 points of the ball and 20,000 of its surface: within 0.2 %.
+/// Volume of the body in a ball and the push of its surface, by 64^3 points of the ball and 20,000 of its surface:
+/// within 0.2 %.
 struct Truth {
   double volume = 0;
   Vec3 normal;
@@ -99,11 +104,14 @@ Truth truth_of(const Body& body, Vec3 x, double r) {
 
 void bench_contact() {
   std::printf(
-      "### Contact models against the truth\n\nA 4 mm ball pressed 0.1 to 1.2 mm deep into a body known in closed form, 200 places; "
+      "### Contact models against the truth\n\nA 4 mm ball pressed 0.1 to 1.2 mm deep into a body known in closed "
+      "form, 200 places; "
       "stiffness 4 N/mm. The truth "
-      "for rays, volume and overlap: the law of the depth of a flat cut of the exact volume, along the exact push; for the proxy: the law "
+      "for rays, volume and overlap: the law of the depth of a flat cut of the exact volume, along the exact push; for "
+      "the proxy: the law "
       "of the exact "
-      "distance of the ball from the surface.\n\n| body | voxels mm | method | mean force N | mean error N | p99 error N | direction off, "
+      "distance of the ball from the surface.\n\n| body | voxels mm | method | mean force N | mean error N | p99 error "
+      "N | direction off, "
       "degrees | us p50 | us p99 "
       "|\n|---|---|---|---|---|---|---|---|---|\n");
   const double s3 = std::sin(M_PI / 6), c3 = std::cos(M_PI / 6);
@@ -161,12 +169,14 @@ void bench_contact() {
       const Vec3 exact{static_cast<double>(static_cast<float>(x.x)), static_cast<double>(static_cast<float>(x.y)),
                        static_cast<double>(static_cast<float>(x.z))};
       poses.push_back({exact, away, truth_of(body, exact, r), 0, {}});
-      // Distance by the nearest point found from the signed distance; for the wedge's outside near the edge the edge itself is nearest.
+      // Distance by the nearest point found from the signed distance; for the wedge's outside near the edge the edge
+      // itself is nearest.
       double sd = body.distance(exact);
       Vec3 out = normalized(slope_of(body.distance, exact));
       if (std::strcmp(body.name, "wedge of 60 degrees") == 0) {
         const Vec3 q{exact.x, 0, exact.z - 1 / s3};
-        const bool edge = q.z > 0 && std::abs(q.x) * c3 < q.z * s3 * 1.0 + 1e-9 && std::abs(q.x) < q.z * std::tan(M_PI / 3);
+        const bool edge =
+            q.z > 0 && std::abs(q.x) * c3 < q.z * s3 * 1.0 + 1e-9 && std::abs(q.x) < q.z * std::tan(M_PI / 3);
         if (edge) {
           sd = length(q);
           out = normalized(q);
@@ -193,7 +203,8 @@ void bench_contact() {
           for (const Pose& p : poses) {
             auto model = method == ContactMethod::proxy && round == 0 ? make_contact_model(params, h) : nullptr;
             static std::unique_ptr<ContactModel> kept;
-            if (round == 0 && &p == &poses.front() && method != ContactMethod::proxy) kept = make_contact_model(params, h);
+            if (round == 0 && &p == &poses.front() && method != ContactMethod::proxy)
+              kept = make_contact_model(params, h);
             if (method == ContactMethod::proxy && model == nullptr) break;
             ContactModel& m = model ? *model : *kept;
             DeviceSample s;
@@ -212,16 +223,18 @@ void bench_contact() {
             const ContactResult c = m.contact(bone, s);
             us.add(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * 1e6);
             if (round > 0) continue;
-            const Vec3 truth = method == ContactMethod::proxy ? p.out * params.force_n(std::max(0.0, r - p.clearance))
-                                                              : p.truth.normal * params.force_n(cap_depth_mm(p.truth.volume, r));
+            const Vec3 truth = method == ContactMethod::proxy
+                                   ? p.out * params.force_n(std::max(0.0, r - p.clearance))
+                                   : p.truth.normal * params.force_n(cap_depth_mm(p.truth.volume, r));
             error.add(length(c.force_n - truth));
             force.add(length(truth));
             if (length(c.force_n) > 0.05)
-              direction.add(std::acos(std::clamp(dot(normalized(c.force_n), normalized(truth)), -1.0, 1.0)) * 180 / M_PI);
+              direction.add(std::acos(std::clamp(dot(normalized(c.force_n), normalized(truth)), -1.0, 1.0)) * 180 /
+                            M_PI);
           }
         }
-        std::printf("| %s | %g | %s | %.2f | %.3f | %.3f | %.2f | %.1f | %.1f |\n", body.name, h, name_of(method), force.mean(),
-                    error.mean(), error.at(0.99), direction.mean(), us.at(0.5), us.at(0.99));
+        std::printf("| %s | %g | %s | %.2f | %.3f | %.3f | %.2f | %.1f | %.1f |\n", body.name, h, name_of(method),
+                    force.mean(), error.mean(), error.at(0.99), direction.mean(), us.at(0.5), us.at(0.99));
         std::fflush(stdout);
       }
     }
@@ -252,7 +265,8 @@ BrickGrid head(double h, const Context& context, std::string& name) {
 
 void bench_kernel(const Context& context) {
   std::printf(
-      "### A whole tick\n\nHead and shaft, drag, vibration, removal, guard, distance map: everything between a pose and a record. A 6 mm "
+      "### A whole tick\n\nHead and shaft, drag, vibration, removal, guard, distance map: everything between a pose "
+      "and a record. A 6 mm "
       "burr drills for 20 s of "
       "ticks.\n\n| bone | voxels mm | method | us p50 | p99 | p99.9 | voxels in the burr, mean | voxels a ms "
       "|\n|---|---|---|---|---|---|---|---|\n");
@@ -285,7 +299,8 @@ void bench_kernel(const Context& context) {
           const double s = t * 1e-3;
           HandGoal goal;
           const Vec3 turn{0, 4 * std::sin(5 * s), 4 * std::cos(5 * s)};
-          goal.position_mm = real ? place + turn + Vec3{-1 - 0.3 * s, 0, 0} : place + Vec3{turn.y, turn.z, -1 - 0.3 * s};
+          goal.position_mm =
+              real ? place + turn + Vec3{-1 - 0.3 * s, 0, 0} : place + Vec3{turn.y, turn.z, -1 - 0.3 * s};
           goal.axis = {0.6F, 0, 0.8F};
           goal.pedal = 255;
           goal.tool = 5;
@@ -298,14 +313,15 @@ void bench_kernel(const Context& context) {
         }
         // What exact coverage stands for: every voxel under the burr, each tick.
         const double under = burr_library()[5].head().volume_mm3() / (h * h * h);
-        std::printf("| %s | %g | %s | %.1f | %.1f | %.1f | %.0f | %.0f |\n", bone_name.c_str(), h, name_of(method), us.at(0.5), us.at(0.99),
-                    us.at(0.999), voxels.mean(), under / us.at(0.5) * 1000);
+        std::printf("| %s | %g | %s | %.1f | %.1f | %.1f | %.0f | %.0f |\n", bone_name.c_str(), h, name_of(method),
+                    us.at(0.5), us.at(0.99), us.at(0.999), voxels.mean(), under / us.at(0.5) * 1000);
         std::fflush(stdout);
       }
     }
   }
   std::printf(
-      "\nVectors: %s. One overlap of a 6 mm burr buried to its middle, deepest case:\n\n| voxels mm | us | voxels under it | of them a ms "
+      "\nVectors: %s. One overlap of a 6 mm burr buried to its middle, deepest case:\n\n| voxels mm | us | voxels "
+      "under it | of them a ms "
       "|\n|---|---|---|---|\n",
       simd_name(simd()).data());
   for (const double h : {1.0, 0.5, 0.25, 0.2}) {
@@ -324,7 +340,8 @@ void bench_kernel(const Context& context) {
 
 void bench_removal_rate() {
   std::printf(
-      "\n### Removal is a property of the burr\n\nThe same hand, 2 s on flat bone: volume removed over that at 0.5 mm and 1 kHz.\n\n| "
+      "\n### Removal is a property of the burr\n\nThe same hand, 2 s on flat bone: volume removed over that at 0.5 mm "
+      "and 1 kHz.\n\n| "
       "method | burr | 0.25 mm | "
       "0.35 mm | 1 mm | 500 Hz | 2 kHz | 5 kHz | removed mm3 |\n|---|---|---|---|---|---|---|---|---|\n");
   for (const ContactMethod method : kMethods) {
@@ -333,20 +350,22 @@ void bench_removal_rate() {
       const double reference = drill(0.5, 1000);
       std::printf("| %s | %s | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.1f |\n", name_of(method),
                   burr_library()[static_cast<std::size_t>(tool)].name().c_str(), drill(0.25, 1000) / reference,
-                  drill(0.35, 1000) / reference, drill(1, 1000) / reference, drill(0.5, 500) / reference, drill(0.5, 2000) / reference,
-                  drill(0.5, 5000) / reference, reference);
+                  drill(0.35, 1000) / reference, drill(1, 1000) / reference, drill(0.5, 500) / reference,
+                  drill(0.5, 2000) / reference, drill(0.5, 5000) / reference, reference);
       std::fflush(stdout);
     }
   }
 }
 
-// --- god-object --------------------------------------------------------------------------------------------------------------------
+// --- god-object
+// --------------------------------------------------------------------------------------------------------------------
 
 template <class Field>
 void duck_row(const char* what, const Field& field, double megabytes, double friction, double scale = 1) {
   const auto recording = test::duck_recording(friction);
   GodObject proxy;
-  GodObjectParams p{.friction = friction, .static_friction = friction, .feature_mm = 2 * scale, .tolerance_mm = 1e-5 * scale};
+  GodObjectParams p{
+      .friction = friction, .static_friction = friction, .feature_mm = 2 * scale, .tolerance_mm = 1e-5 * scale};
   proxy.place(recording.front().surface_mm * scale);
   Spread error, us;
   int lost = 0;
@@ -359,18 +378,21 @@ void duck_row(const char* what, const Field& field, double megabytes, double fri
     if (n++ >= 100) error.add(length((a.proxy_mm - device) * (test::kDuckStiffness / scale) - tick.force_n));
     lost += a.contact ? 0 : 1;
   }
-  std::printf("| %s | %.1f | %.1f | %.5f | %.5f | %.4f | %d | %.2f | %.2f |\n", what, megabytes, friction, error.mean(), error.at(0.95),
-              error.at(1), lost, us.at(0.5), us.at(0.999));
+  std::printf("| %s | %.1f | %.1f | %.5f | %.5f | %.4f | %d | %.2f | %.2f |\n", what, megabytes, friction, error.mean(),
+              error.at(0.95), error.at(1), lost, us.at(0.5), us.at(0.999));
   std::fflush(stdout);
 }
 
 void bench_god_object() {
   std::printf(
-      "\n### God-object on a closed smooth shape\n\nA recorded probe (20 s, normal force 1.2 +- 0.8 N, 0.5 N/mm) played through the "
+      "\n### God-object on a closed smooth shape\n\nA recorded probe (20 s, normal force 1.2 +- 0.8 N, 0.5 N/mm) "
+      "played through the "
       "renderer: mean of |true - "
-      "rendered| force. Published for CHAI3D 3.3 on the same shape, flat or shaded, from 168 to 140,624 triangles: 0.011 to 0.52 N at 0.7 "
+      "rendered| force. Published for CHAI3D 3.3 on the same shape, flat or shaded, from 168 to 140,624 triangles: "
+      "0.011 to 0.52 N at 0.7 "
       "to 4 us, up to 22.6 N "
-      "worst with friction, all contacts lost in metres.\n\n| field | MB | friction | mean N | p95 N | worst N | lost | us p50 | us p99.9 "
+      "worst with friction, all contacts lost in metres.\n\n| field | MB | friction | mean N | p95 N | worst N | lost "
+      "| us p50 | us p99.9 "
       "|\n|---|---|---|---|---|---|---|---|---|\n");
   for (const int n : {32, 64, 128}) {
     Frame f;
@@ -382,47 +404,59 @@ void bench_god_object() {
     std::size_t at = 0;
     for (int k = 0; k < n; ++k)
       for (int j = 0; j < n; ++j)
-        for (int i = 0; i < n; ++i) v[at++] = static_cast<float>(test::duck(f.world_from_index({double(i), double(j), double(k)})));
+        for (int i = 0; i < n; ++i)
+          v[at++] = static_cast<float>(test::duck(f.world_from_index({double(i), double(j), double(k)})));
     const CubicField field(f, std::move(v));
     const std::string what = "cubic grid " + std::to_string(n) + "^3";
-    for (const double friction : {0.0, 0.3}) duck_row(what.c_str(), field, static_cast<double>(field.memory_bytes()) / 1e6, friction);
+    for (const double friction : {0.0, 0.3})
+      duck_row(what.c_str(), field, static_cast<double>(field.memory_bytes()) / 1e6, friction);
   }
   for (const auto& [rings, sectors] : {std::pair{22, 22}, {54, 54}, {180, 180}}) {
     for (const bool shading : {false, true}) {
       const MeshField field(test::duck_mesh(rings, sectors), shading);
-      const std::string what = std::to_string(2 * (rings - 1) * sectors) + " triangles" + (shading ? ", shaded" : ", flat");
-      for (const double friction : {0.0, 0.3}) duck_row(what.c_str(), field, 2 * (rings - 1) * sectors * 240e-6, friction);
+      const std::string what =
+          std::to_string(2 * (rings - 1) * sectors) + " triangles" + (shading ? ", shaded" : ", flat");
+      for (const double friction : {0.0, 0.3})
+        duck_row(what.c_str(), field, 2 * (rings - 1) * sectors * 240e-6, friction);
     }
   }
   for (const double scale : {1e-3, 1e3}) {
     const MeshField field(test::duck_mesh(180, 180, scale), true);
-    duck_row(scale < 1 ? "64440 triangles in metres" : "64440 triangles in micrometres", field, 64440 * 240e-6, 0.3, scale);
+    duck_row(scale < 1 ? "64440 triangles in metres" : "64440 triangles in micrometres", field, 64440 * 240e-6, 0.3,
+             scale);
   }
 }
 
-// --- stability -----------------------------------------------------------------------------------------------------------------------
+// --- stability
+// -----------------------------------------------------------------------------------------------------------------------
 
 void bench_stability() {
   std::printf(
-      "\n### Stability\n\nA device of 0.1 kg pushed against a wall of 2 N/mm (2 kN/m) by 1 N. Stable: slower than 2 mm/s after 2.5 s. "
+      "\n### Stability\n\nA device of 0.1 kg pushed against a wall of 2 N/mm (2 kN/m) by 1 N. Stable: slower than 2 "
+      "mm/s after 2.5 s. "
       "Gained: the most that the wall "
-      "had given beyond what it had taken.\n\n| device | bare wall | mm/s at the end | gained mJ | guarded | stiffness in use N/mm | mm/s "
+      "had given beyond what it had taken.\n\n| device | bare wall | mm/s at the end | gained mJ | guarded | stiffness "
+      "in use N/mm | mm/s "
       "at the end | gained mJ "
       "|\n|---|---|---|---|---|---|---|---|\n");
   for (const auto& c : test::kStabilityCases) {
     const auto bare = test::push_against_wall(c, 2, false), guarded = test::push_against_wall(c, 2, true);
-    std::printf("| %s | %s | %.1f | %.3f | %s | %.2f | %.3f | %.4f |\n", c.name, bare.stable ? "stable" : "**not**", bare.fastest_mm_s,
-                bare.gained_mj, guarded.stable ? "stable" : "**not**", guarded.stiffness_n_per_mm, guarded.fastest_mm_s, guarded.gained_mj);
+    std::printf("| %s | %s | %.1f | %.3f | %s | %.2f | %.3f | %.4f |\n", c.name, bare.stable ? "stable" : "**not**",
+                bare.fastest_mm_s, bare.gained_mj, guarded.stable ? "stable" : "**not**", guarded.stiffness_n_per_mm,
+                guarded.fastest_mm_s, guarded.gained_mj);
   }
 }
 
-// --- real time -----------------------------------------------------------------------------------------------------------------------
+// --- real time
+// -----------------------------------------------------------------------------------------------------------------------
 
 void bench_real_time() {
   std::printf(
-      "\n### Ticks by the clock\n\nThe servo with recorder on flat bone at 0.5 mm, a 6 mm burr by overlap, 10 s each; loaded: four threads "
+      "\n### Ticks by the clock\n\nThe servo with recorder on flat bone at 0.5 mm, a 6 mm burr by overlap, 10 s each; "
+      "loaded: four threads "
       "that compute "
-      "without pause.\n\n| Hz | load | work p50 us | p99.9 | max | late p50 us | p99 | p99.9 | max | missed by work | by the machine |\n"
+      "without pause.\n\n| Hz | load | work p50 us | p99.9 | max | late p50 us | p99 | p99.9 | max | missed by work | "
+      "by the machine |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|\n");
   bool granted = false;
   for (const double hz : {1000.0, 5000.0}) {
@@ -442,10 +476,12 @@ void bench_real_time() {
       Strokes script;
       script.tool = 5;
       script.axis = {0.6, 0, 0.8};
-      for (int i = 0; i <= 100; ++i) script.waypoints.push_back({0.1 * i, {4 * std::sin(i), 4 * std::cos(i), 3 - 0.04 * i}, true});
+      for (int i = 0; i <= 100; ++i)
+        script.waypoints.push_back({0.1 * i, {4 * std::sin(i), 4 * std::cos(i), 3 - 0.04 * i}, true});
       ScriptedDevice device(script, hz);
       Stream stream;
-      const auto path = std::filesystem::temp_directory_path() / ("osteo-bench-session-" + std::to_string(::getpid()) + ".oss");
+      const auto path =
+          std::filesystem::temp_directory_path() / ("osteo-bench-session-" + std::to_string(::getpid()) + ".oss");
       std::filesystem::remove(path);
       Recorder recorder(stream.add_reader(), path, {});
       Servo servo(renderer, device, stream, hz);
@@ -459,21 +495,24 @@ void bench_real_time() {
       std::filesystem::remove(path);
       const LoopStats& s = loop.stats();
       granted = s.realtime_granted;
-      std::printf("| %g | %s | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %llu | %llu |\n", hz, loaded ? "loaded" : "idle",
-                  s.work.quantile_us(0.5), s.work.quantile_us(0.999), s.work.max_us(), s.lateness.quantile_us(0.5),
-                  s.lateness.quantile_us(0.99), s.lateness.quantile_us(0.999), s.lateness.max_us(),
-                  static_cast<unsigned long long>(s.missed_by_work), static_cast<unsigned long long>(s.missed_by_machine));
+      std::printf("| %g | %s | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %llu | %llu |\n", hz,
+                  loaded ? "loaded" : "idle", s.work.quantile_us(0.5), s.work.quantile_us(0.999), s.work.max_us(),
+                  s.lateness.quantile_us(0.5), s.lateness.quantile_us(0.99), s.lateness.quantile_us(0.999),
+                  s.lateness.max_us(), static_cast<unsigned long long>(s.missed_by_work),
+                  static_cast<unsigned long long>(s.missed_by_machine));
       std::fflush(stdout);
     }
   }
   std::printf(
-      "\nReal-time priority was %s.\n\n### Handing a record over\n\n128 bytes and 8 changed voxels into the ring of a reader that writes "
+      "\nReal-time priority was %s.\n\n### Handing a record over\n\n128 bytes and 8 changed voxels into the ring of a "
+      "reader that writes "
       "and syncs them, 5 kHz for 20 s.\n\n"
       "| ns p50 | p99 | p99.9 | max | dropped |\n|---|---|---|---|---|\n",
       granted ? "granted" : "refused");
   Stream stream;
   auto& reader = stream.add_reader();
-  const auto path = std::filesystem::temp_directory_path() / ("osteo-bench-session-" + std::to_string(::getpid()) + ".oss");
+  const auto path =
+      std::filesystem::temp_directory_path() / ("osteo-bench-session-" + std::to_string(::getpid()) + ".oss");
   std::filesystem::remove(path);
   Recorder recorder(reader, path, {});
   recorder.start();
@@ -497,11 +536,12 @@ void bench_real_time() {
               static_cast<unsigned long long>(reader.dropped.load()));
 }
 
-// Each hand presses a 4 mm burr on its own place and moves it in circles; or all but the first hold a sucker. All columns in turn, so that
-// a busy machine slows them alike.
+// Each hand presses a 4 mm burr on its own place and moves it in circles; or all but the first hold a sucker. All
+// columns in turn, so that a busy machine slows them alike.
 void bench_hands() {
   std::printf(
-      "### Hands\n\nA tick of the servo's renderer with 1, 2 and 4 hands, each at its own place on a slab; 4,000 ticks each, in turns.\n\n"
+      "### Hands\n\nA tick of the servo's renderer with 1, 2 and 4 hands, each at its own place on a slab; 4,000 ticks "
+      "each, in turns.\n\n"
       "| voxels mm | hands | us p50 | us p99 | times one hand |\n|---|---|---|---|---|\n");
   struct Run {
     std::size_t hands;
@@ -526,8 +566,8 @@ void bench_hands() {
         std::array<DeviceSample, kMostHands> samples;
         for (std::size_t n = 0; n < r.hands; ++n) {
           const double a = t / 150.0;
-          samples[n].position_mm =
-              to_floats(Vec3{(n % 2 == 0 ? -8 : 8) + 3 * std::cos(a), (n < 2 ? -8 : 8) + 3 * std::sin(a), 1.5 - 1e-4 * t});
+          samples[n].position_mm = to_floats(
+              Vec3{(n % 2 == 0 ? -8 : 8) + 3 * std::cos(a), (n < 2 ? -8 : 8) + 3 * std::sin(a), 1.5 - 1e-4 * t});
           samples[n].axis = to_floats(normalized(Vec3{0.3, 0, 1}));
           samples[n].pedal = 255;
           samples[n].tool = r.suckers && n > 0 ? sucker : 3;
@@ -539,8 +579,8 @@ void bench_hands() {
     }
     const double one = runs[0].us.at(0.5);
     for (Run& r : runs)
-      std::printf("| %g | %zu%s | %.1f | %.1f | %.2f |\n", h, r.hands, r.suckers ? ", one with a sucker" : "", r.us.at(0.5), r.us.at(0.99),
-                  r.us.at(0.5) / one);
+      std::printf("| %g | %zu%s | %.1f | %.1f | %.2f |\n", h, r.hands, r.suckers ? ", one with a sucker" : "",
+                  r.us.at(0.5), r.us.at(0.99), r.us.at(0.5) / one);
   }
 }
 
@@ -568,8 +608,11 @@ void bench_haptics_hands(const Context&) {
 void bench_haptics_fuzz(const Context&) {
   const char* const wish = std::getenv("OSTEO_FUZZ_TICKS");
   const auto ticks = static_cast<std::uint64_t>(wish != nullptr ? std::atof(wish) : 1e6);
-  std::printf("### Fuzz\n\n| method | ticks | not finite | over the limit | over the rate | removed mm3 |\n|---|---|---|---|---|---|\n");
-  for (const ContactMethod method : {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
+  std::printf(
+      "### Fuzz\n\n| method | ticks | not finite | over the limit | over the rate | removed mm3 "
+      "|\n|---|---|---|---|---|---|\n");
+  for (const ContactMethod method :
+       {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
     // Most for the default method; the others share the rest.
     const std::uint64_t n = method == ContactMethod::overlap ? ticks * 7 / 10 : ticks / 10;
     std::mt19937_64 random(42);
@@ -586,7 +629,11 @@ void bench_haptics_fuzz(const Context&) {
       if (t % 2'000'000 == 0) {
         const double a = 0.7 + 0.1 * static_cast<double>(t / 2'000'000 % 5);
         bone = voxels_of(
-            {"fuzz", [a](Vec3 p) { return (std::sin(a * p.x) + std::sin(1.3 * a * p.y) + std::sin(0.9 * p.z) - 0.2) * 0.6; }, {}, {}}, 0.5);
+            {"fuzz",
+             [a](Vec3 p) { return (std::sin(a * p.x) + std::sin(1.3 * a * p.y) + std::sin(0.9 * p.z) - 0.2) * 0.6; },
+             {},
+             {}},
+            0.5);
         renderer = std::make_unique<HapticRenderer>(setup, bone, Anatomy{}, 1e-3);
         last = {};
       }
@@ -612,8 +659,8 @@ void bench_haptics_fuzz(const Context&) {
       removed += static_cast<double>(step.record.removed_mm3);
     }
     std::printf("| %s | %llu | %llu | %llu | %llu | %.0f |\n", name_of(method), static_cast<unsigned long long>(n),
-                static_cast<unsigned long long>(bad), static_cast<unsigned long long>(over), static_cast<unsigned long long>(steep),
-                removed);
+                static_cast<unsigned long long>(bad), static_cast<unsigned long long>(over),
+                static_cast<unsigned long long>(steep), removed);
     std::fflush(stdout);
   }
 }

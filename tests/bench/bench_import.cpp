@@ -1,5 +1,5 @@
-// DICOM series to a volume: time, memory and where the voxels end up, beside the readers of the field. Every measurement is a process
-// of its own, so that peak memory is its own.
+// DICOM series to a volume: time, memory and where the voxels end up, beside the readers of the field. Every
+// measurement is a process of its own, so that peak memory is its own.
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <gdcmFileChangeTransferSyntax.h>
@@ -59,7 +59,9 @@ Cost measure(int runs, const std::function<bool()>& work) {
     rusage use{};
     ::wait4(child, &status, 0, &use);
     const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+    const auto seconds = [](const timeval& t) {
+      return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    };
     best.ok = best.ok && WIFEXITED(status) && WEXITSTATUS(status) == 0;
     best.wall_s = std::min(best.wall_s, wall);
     best.cpu_s = std::min(best.cpu_s, seconds(use.ru_utime) + seconds(use.ru_stime));
@@ -217,7 +219,9 @@ void positions() {
     worst = std::max(worst, error);
     mean += error / static_cast<double>(placed.slices.size());
   }
-  std::printf("\n## Where the slices of a tilted, uneven head end up\n\n| reader | worst mm | mean mm | says |\n|---|---|---|---|\n");
+  std::printf(
+      "\n## Where the slices of a tilted, uneven head end up\n\n| reader | worst mm | mean mm | says "
+      "|\n|---|---|---|---|\n");
   std::printf("| osteo import | %.4f | %.4f | TILTED, GAPS_UNEVEN, PADDING_TAG |\n", placed.verdict.position_error_mm,
               placed.verdict.position_error_mm);
   std::printf("| vtk-dicom | %.1f | %.1f | nothing (error code %lu) |\n", worst, mean, reader->GetErrorCode());
@@ -235,7 +239,9 @@ void bench_import(const Context& context) {
   const fs::path plain = folder.path() / "plain";
   const bool itk = python_has("SimpleITK");
   make_series(plain, 300);
-  std::printf("# DICOM import\n\n300 slices of 512x512 to a volume, headers, sorting and HU included (DCMTK and GDCM: pixels only).\n\n");
+  std::printf(
+      "# DICOM import\n\n300 slices of 512x512 to a volume, headers, sorting and HU included (DCMTK and GDCM: pixels "
+      "only).\n\n");
   std::printf("| encoding | reader | wall s | CPU s | peak MB |\n|---|---|---|---|---|\n");
   struct Encoding {
     const char* name;
@@ -293,7 +299,8 @@ void bench_import(const Context& context) {
     d.putAndInsertString(DCM_ImagePositionPatient, p.c_str());
   });
   std::printf(
-      "\n600 slices of 512x512, 0.5 mm apart (315 MB), to sparse bone of 0.5 mm.\n\n| what | who | wall s | CPU s | peak MB "
+      "\n600 slices of 512x512, 0.5 mm apart (315 MB), to sparse bone of 0.5 mm.\n\n| what | who | wall s | CPU s | "
+      "peak MB "
       "|\n|---|---|---|---|---|\n");
   row("sparse bone", "osteo import-bone", measure(2, [&] {
         ImportBoneParams p;
@@ -313,7 +320,9 @@ void bench_import(const Context& context) {
       fs::create_hard_link(some[static_cast<std::size_t>(i) % some.size()], to);
     }
   }
-  std::printf("\n10,000 mixed files, headers read and grouped.\n\n| what | who | wall s | CPU s | peak MB |\n|---|---|---|---|---|\n");
+  std::printf(
+      "\n10,000 mixed files, headers read and grouped.\n\n| what | who | wall s | CPU s | peak MB "
+      "|\n|---|---|---|---|---|\n");
   row("scan", "osteo import --list", measure(2, [&] { return scan_dicom(many).files == 10000; }));
   positions();
 }

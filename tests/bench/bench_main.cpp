@@ -18,14 +18,17 @@ constexpr Run kGeometry = nullptr;  // needs CGAL, TetGen, Embree and nanoflann
 #endif
 
 constexpr std::array<Run, kBenchSubjects.size()> kRuns{
-    bench_import,       bench_bone,    bench_haptics, bench_operation,    bench_tissue,   bench_haptics_fuzz, bench_haptics_hands,
-    bench_ground_truth, bench_removal, bench_slices,  bench_registration, bench_tutoring, bench_network,      kGeometry};
+    bench_import,       bench_bone,          bench_haptics,      bench_operation, bench_tissue,
+    bench_haptics_fuzz, bench_haptics_hands, bench_ground_truth, bench_removal,   bench_slices,
+    bench_registration, bench_tutoring,      bench_network,      kGeometry};
 // The order of the table.
-static_assert(kBenchSubjects[0].name == "import" && kBenchSubjects[1].name == "bone" && kBenchSubjects[2].name == "haptics" &&
-              kBenchSubjects[3].name == "operation" && kBenchSubjects[4].name == "tissue" && kBenchSubjects[5].name == "haptics-fuzz" &&
+static_assert(kBenchSubjects[0].name == "import" && kBenchSubjects[1].name == "bone" &&
+              kBenchSubjects[2].name == "haptics" && kBenchSubjects[3].name == "operation" &&
+              kBenchSubjects[4].name == "tissue" && kBenchSubjects[5].name == "haptics-fuzz" &&
               kBenchSubjects[6].name == "haptics-hands" && kBenchSubjects[7].name == "ground-truth" &&
-              kBenchSubjects[8].name == "removal" && kBenchSubjects[9].name == "slices" && kBenchSubjects[10].name == "registration" &&
-              kBenchSubjects[11].name == "tutoring" && kBenchSubjects[12].name == "network" && kBenchSubjects[13].name == "geometry");
+              kBenchSubjects[8].name == "removal" && kBenchSubjects[9].name == "slices" &&
+              kBenchSubjects[10].name == "registration" && kBenchSubjects[11].name == "tutoring" &&
+              kBenchSubjects[12].name == "network" && kBenchSubjects[13].name == "geometry");
 
 int run(const std::string& wanted, const Context& context) {
   bool known = wanted == "all";
@@ -40,8 +43,10 @@ int run(const std::string& wanted, const Context& context) {
     if (kRuns[i] != nullptr) {
       kRuns[i](context);
     } else if (wanted == s.name) {
-      std::fprintf(stderr, "osteo_bench: %s needs a build with CGAL and TetGen, and the packages libembree-dev and libnanoflann-dev\n",
-                   wanted.c_str());
+      std::fprintf(
+          stderr,
+          "osteo_bench: %s needs a build with CGAL and TetGen, and the packages libembree-dev and libnanoflann-dev\n",
+          wanted.c_str());
       return 2;
     }
   }

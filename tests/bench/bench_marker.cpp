@@ -52,7 +52,8 @@ std::vector<Light> lights() {
 
 void places() {
   constexpr int kPoses = 24;
-  std::printf("size      light               distance  tip RMS  p95 mm  across  along  angle RMS  p95 deg  lost  CPU ms\n");
+  std::printf(
+      "size      light               distance  tip RMS  p95 mm  across  along  angle RMS  p95 deg  lost  CPU ms\n");
   for (const auto& [w, h] : {std::pair{640, 480}, {1280, 720}}) {
     const CameraModel camera = test::webcam(w, h);
     for (const Light& light : lights()) {
@@ -63,8 +64,9 @@ void places() {
         int lost = 0;
         PenTracker tracker(camera, 1);
         for (int i = 0; i < kPoses; ++i) {
-          const RigidTransform pose = pen_pose(distance, 53.0 * i, 30 * std::sin(1.9 * i), 25 * std::cos(2.3 * i),
-                                               {0.12 * distance * std::sin(2.9 * i), 0.06 * distance * std::cos(3.7 * i), 0});
+          const RigidTransform pose =
+              pen_pose(distance, 53.0 * i, 30 * std::sin(1.9 * i), 25 * std::cos(2.3 * i),
+                       {0.12 * distance * std::sin(2.9 * i), 0.06 * distance * std::cos(3.7 * i), 0});
           const GrayPicture picture = renderer.picture(pose, light.look);
           tracker.forget();
           const double begin = now_ms();
@@ -79,11 +81,13 @@ void places() {
           tip.push_back(length(off));
           along.push_back(depth);
           across.push_back(length(off - normalized(truth) * depth));
-          angle.push_back(std::acos(std::min(1.0, dot(s.camera_from_body.rotation.column[2], pose.rotation.column[2]))) * 180 /
-                          std::numbers::pi);
+          angle.push_back(
+              std::acos(std::min(1.0, dot(s.camera_from_body.rotation.column[2], pose.rotation.column[2]))) * 180 /
+              std::numbers::pi);
         }
-        std::printf("%4dx%-4d %-19s %5.0f mm  %6.2f %7.2f %7.2f %6.2f %8.2f %9.2f %5.0f%% %6.1f\n", w, h, light.name, distance, rms(tip),
-                    quantile(tip, 0.95), rms(across), rms(along), rms(angle), quantile(angle, 0.95), 100.0 * lost / kPoses, cpu / kPoses);
+        std::printf("%4dx%-4d %-19s %5.0f mm  %6.2f %7.2f %7.2f %6.2f %8.2f %9.2f %5.0f%% %6.1f\n", w, h, light.name,
+                    distance, rms(tip), quantile(tip, 0.95), rms(across), rms(along), rms(angle), quantile(angle, 0.95),
+                    100.0 * lost / kPoses, cpu / kPoses);
         std::fflush(stdout);
       }
     }
@@ -118,8 +122,8 @@ RigidTransform hand_at(double t) {
   const double on = t < 4 ? 1 : 0, w = 2 * std::numbers::pi;
   const double fade = on * std::min(1.0, (4 - t) / 0.5);
   const Vec3 off = Vec3{8 * std::sin(w * 1.2 * t), 3 * std::sin(w * 0.7 * t), 4 * std::sin(w * 2 * t)} * fade;
-  return pen_pose(380, 25 + 6 * fade * std::sin(w * 0.9 * t), 12 + 5 * fade * std::sin(w * 1.1 * t), 15 + 4 * fade * std::cos(w * 0.8 * t),
-                  off);
+  return pen_pose(380, 25 + 6 * fade * std::sin(w * 0.9 * t), 12 + 5 * fade * std::sin(w * 1.1 * t),
+                  15 + 4 * fade * std::cos(w * 0.8 * t), off);
 }
 
 struct Recorded {
@@ -160,8 +164,8 @@ void report(const char* name, const std::vector<std::pair<double, Vec3>>& shown)
   for (const auto& [t, p] : shown) {
     if (t > 4.7) rest.push_back(length(p - middle));
   }
-  std::printf("  %-42s delay %4.0f ms  error while moving %5.2f mm (p95 %5.2f)  jitter at rest %5.3f mm\n", name, delay_ms(motion),
-              rms(moving), quantile(moving, 0.95), rms(rest));
+  std::printf("  %-42s delay %4.0f ms  error while moving %5.2f mm (p95 %5.2f)  jitter at rest %5.3f mm\n", name,
+              delay_ms(motion), rms(moving), quantile(moving, 0.95), rms(rest));
 }
 
 void motion() {
@@ -196,8 +200,8 @@ void motion() {
       return shown;
     };
     Vec3 raw;
-    report("as seen",
-           shown_by([&](const Recorded& r) { raw = r.sight.camera_from_body(PenBody::kUsualTipMm); }, [&](double) { return raw; }));
+    report("as seen", shown_by([&](const Recorded& r) { raw = r.sight.camera_from_body(PenBody::kUsualTipMm); },
+                               [&](double) { return raw; }));
     for (const auto& [hz, beta] : {std::pair{1.0, 0.05}, {2.0, 0.2}}) {
       OneEuro euro(hz, beta);
       double last = 0;
@@ -216,10 +220,11 @@ void motion() {
       params.rest_share = rest;
       PenFilter filter(PenBody::kUsualTipMm, params);
       char name[64];
-      std::snprintf(name, sizeof name, "Kalman, %.0e mm2/s3, %g at rest%s", q, rest,
-                    q == PenFilterParams{}.acceleration_mm2_s3 && rest == PenFilterParams{}.rest_share ? " (used)" : "");
-      report(name,
-             shown_by([&](const Recorded& r) { filter.add(r.time_s, r.sight); }, [&](double t) { return filter.motion().tip_at(t); }));
+      std::snprintf(
+          name, sizeof name, "Kalman, %.0e mm2/s3, %g at rest%s", q, rest,
+          q == PenFilterParams{}.acceleration_mm2_s3 && rest == PenFilterParams{}.rest_share ? " (used)" : "");
+      report(name, shown_by([&](const Recorded& r) { filter.add(r.time_s, r.sight); },
+                            [&](double t) { return filter.motion().tip_at(t); }));
     }
     std::fflush(stdout);
   }
@@ -241,8 +246,10 @@ void write(const std::filesystem::path& folder) {
   constexpr double k = std::numbers::pi / 180;
   for (int i = 0; i < 14; ++i) {
     RigidTransform p = rotation_about({}, {1, 0, 0}, 35 * k * std::sin(1.3 * i + 0.5)) *
-                       rotation_about({}, {0, 1, 0}, 35 * k * std::cos(2.1 * i)) * rotation_about({}, {0, 0, 1}, (90 + 12.0 * (i % 5)) * k);
-    p.shift_mm = Vec3{70 * std::sin(2.6 * i), 45 * std::cos(1.9 * i), 480 + 30.0 * (i % 4)} - p.rotation * Vec3{87.5, 122.5, 0};
+                       rotation_about({}, {0, 1, 0}, 35 * k * std::cos(2.1 * i)) *
+                       rotation_about({}, {0, 0, 1}, (90 + 12.0 * (i % 5)) * k);
+    p.shift_mm =
+        Vec3{70 * std::sin(2.6 * i), 45 * std::cos(1.9 * i), 480 + 30.0 * (i % 4)} - p.rotation * Vec3{87.5, 122.5, 0};
     std::snprintf(name, sizeof name, "%04d.pgm", i);
     save(plate.picture(p, look), folder / "plate" / name);
   }

@@ -1,4 +1,5 @@
-// What a session costs that is told to the network, and what the servo feels of who floods its listeners. Tables of docs/network.md.
+// What a session costs that is told to the network, and what the servo feels of who floods its listeners. Tables of
+// docs/network.md.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -9,8 +10,8 @@
 #include "ear.h"
 #include "flood.h"
 #include "osteo/core/base/error.h"
-#include "osteo/session/recording/script.h"
 #include "osteo/network/wire/rehearsal_stream.h"
+#include "osteo/session/recording/script.h"
 
 namespace osteo {
 namespace {
@@ -73,10 +74,12 @@ bool row(Listed listed, double seconds) {
   std::vector<bench::Bytes> kinds;
   for (int i = 0; i < 64; ++i) {
     bench::Bytes b(i % 4 == 3 ? 1200 : 200);
-    for (std::size_t k = 0; k < b.size(); ++k) b[k] = static_cast<std::uint8_t>(k * 31 + static_cast<std::size_t>(i) * 7);
+    for (std::size_t k = 0; k < b.size(); ++k)
+      b[k] = static_cast<std::uint8_t>(k * 31 + static_cast<std::size_t>(i) * 7);
     b[0] = 1;
     b[1] = static_cast<std::uint8_t>(1 + i % 6);  // bodies of forged pairings and settings, and none
-    kinds.push_back(listed == Listed::igtl && i % 4 != 2 ? igtl_message(i % 4 == 1 ? "TRANSFORM" : kStimulatorType, "x", 0, b) : b);
+    kinds.push_back(
+        listed == Listed::igtl && i % 4 != 2 ? igtl_message(i % 4 == 1 ? "TRANSFORM" : kStimulatorType, "x", 0, b) : b);
   }
   std::optional<bench::Crowd> crowd;
   std::optional<bench::Flood> flood;
@@ -91,12 +94,16 @@ bool row(Listed listed, double seconds) {
   crowd.reset();
   flood.reset();
   const RehearsalSummary sum = r.stop();
-  const std::uint64_t refused = stream ? stream->door()->counts().refused : 0, set = stream ? stream->door()->counts().settings : 0;
-  const char* const names[] = {"nothing listed", "heat, monitor, network", "OpenIGTLink flooded", "Cerebus' sender flooded", "LSL flooded"};
-  std::printf("| %s | %.0f | %.0f, %.0f, %.0f | %.2f, %.1f | %.1f MB | %.1f MB | %llu | %llu |\n", names[static_cast<int>(listed)],
-              static_cast<double>(sent) / seconds, sum.loop->lateness.quantile_us(0.5), sum.loop->lateness.quantile_us(0.99),
-              sum.loop->lateness.quantile_us(0.999), sum.loop->work.quantile_us(0.5), sum.loop->work.quantile_us(0.999), grown,
-              static_cast<double>(taken) / 1e6, static_cast<unsigned long long>(refused), static_cast<unsigned long long>(set));
+  const std::uint64_t refused = stream ? stream->door()->counts().refused : 0,
+                      set = stream ? stream->door()->counts().settings : 0;
+  const char* const names[] = {"nothing listed", "heat, monitor, network", "OpenIGTLink flooded",
+                               "Cerebus' sender flooded", "LSL flooded"};
+  std::printf("| %s | %.0f | %.0f, %.0f, %.0f | %.2f, %.1f | %.1f MB | %.1f MB | %llu | %llu |\n",
+              names[static_cast<int>(listed)], static_cast<double>(sent) / seconds, sum.loop->lateness.quantile_us(0.5),
+              sum.loop->lateness.quantile_us(0.99), sum.loop->lateness.quantile_us(0.999),
+              sum.loop->work.quantile_us(0.5), sum.loop->work.quantile_us(0.999), grown,
+              static_cast<double>(taken) / 1e6, static_cast<unsigned long long>(refused),
+              static_cast<unsigned long long>(set));
   std::fflush(stdout);
   return true;
 }
@@ -105,8 +112,10 @@ bool row(Listed listed, double seconds) {
 
 void bench_network(const Context&) {
   std::printf(
-      "\n## Who listens to the network, flooded\n\nDrilling towards the facial nerve, ten seconds by the clock each, in turns.\n\n"
-      "| listed | packets/s | servo late p50, p99, p99.9 us | work p50, p99.9 us | memory | taken in | refused | settings |\n"
+      "\n## Who listens to the network, flooded\n\nDrilling towards the facial nerve, ten seconds by the clock each, "
+      "in turns.\n\n"
+      "| listed | packets/s | servo late p50, p99, p99.9 us | work p50, p99.9 us | memory | taken in | refused | "
+      "settings |\n"
       "|---|---|---|---|---|---|---|---|\n");
   bool lsl = true;
   for (int round = 0; round < 3; ++round) {

@@ -10,12 +10,12 @@
 #include <thread>
 
 #include "bench.h"
-#include "osteo/simulation/bone/plate_fit.h"
+#include "osteo/core/rt/loop.h"
 #include "osteo/geometry/grid/resample.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/threshold.h"
-#include "osteo/core/rt/loop.h"
 #include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/bone/plate_fit.h"
 
 namespace osteo {
 namespace {
@@ -44,10 +44,13 @@ BrickGrid head(double spacing_mm, const Context& context) {
 // By the clock: from the moment a tick's removal is in the stream to the moment its triangles are made.
 void latency(const BrickGrid& bone, const Context& context) {
   std::printf(
-      "## From bone removed to triangles ready: by the clock, 1 kHz, head at 0.5 mm, the follower's thread beside the servo's\n\n"
-      "| burr | followed | p50 ms | p99 ms | p99.9 ms | worst ms | ticks that removed bone |\n|---|---|---|---|---|---|---|\n");
+      "## From bone removed to triangles ready: by the clock, 1 kHz, head at 0.5 mm, the follower's thread beside the "
+      "servo's\n\n"
+      "| burr | followed | p50 ms | p99 ms | p99.9 ms | worst ms | ticks that removed bone "
+      "|\n|---|---|---|---|---|---|---|\n");
   for (const int diameter : {4, 6}) {
-    for (const ReaderList parts : {ReaderList{true, false, false}, ReaderList{true, true, false}, ReaderList{true, true, true}}) {
+    for (const ReaderList parts :
+         {ReaderList{true, false, false}, ReaderList{true, true, false}, ReaderList{true, true, true}}) {
       const int tool = burr_index(BurrKind::cutting, diameter);
       ScriptedDevice device(make_default_script(World(BrickGrid(bone)), true, tool, 12), 1000);
       HapticSetup setup;
@@ -76,15 +79,16 @@ void latency(const BrickGrid& bone, const Context& context) {
         const std::int64_t now = monotonic_ns();
         for (std::uint64_t t = seen; t < seen + n; ++t) {
           TickRecord r;
-          if (watch.ticks.pop({&r, 1}) == 1 && r.voxels_changed > 0) waits.push_back(static_cast<double>(now - published[t].load()) / 1e6);
+          if (watch.ticks.pop({&r, 1}) == 1 && r.voxels_changed > 0)
+            waits.push_back(static_cast<double>(now - published[t].load()) / 1e6);
         }
         seen += n;
         if (n == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
       }
       loop.join();
-      std::printf("| %d mm | surface%s%s | %.2f | %.2f | %.2f | %.2f | %zu |\n", diameter, parts.pieces ? ", pieces" : "",
-                  parts.dust ? ", dust" : "", quantile(waits, 0.5), quantile(waits, 0.99), quantile(waits, 0.999), quantile(waits, 1),
-                  waits.size());
+      std::printf("| %d mm | surface%s%s | %.2f | %.2f | %.2f | %.2f | %zu |\n", diameter,
+                  parts.pieces ? ", pieces" : "", parts.dust ? ", dust" : "", quantile(waits, 0.5),
+                  quantile(waits, 0.99), quantile(waits, 0.999), quantile(waits, 1), waits.size());
     }
   }
   std::printf("\n");
@@ -92,7 +96,9 @@ void latency(const BrickGrid& bone, const Context& context) {
 
 // What it takes from "take it apart" to bodies that are drilled on their own.
 void pieces(const BrickGrid& bone, const Context& context) {
-  std::printf("## A head sawn and taken apart: stages of the live split\n\n| step | ms by the clock | ms of processors |\n|---|---|---|\n");
+  std::printf(
+      "## A head sawn and taken apart: stages of the live split\n\n| step | ms by the clock | ms of processors "
+      "|\n|---|---|---|\n");
   World world{BrickGrid(bone)};
   SceneReaders readers(world, {true, true, false}, 1000, context);
   HapticSetup setup;
@@ -107,7 +113,8 @@ void pieces(const BrickGrid& bone, const Context& context) {
     const std::string name(name_of(static_cast<ActionKind>(a.kind)));
     const double acted = processor_ms() - cpu;
     std::printf("| %s: bone%s | %.1f | %.1f |\n", name.c_str(),
-                a.is(ActionKind::split) ? (" of " + std::to_string(world.bodies().size()) + " bodies").c_str() : "", ms_since(t), acted);
+                a.is(ActionKind::split) ? (" of " + std::to_string(world.bodies().size()) + " bodies").c_str() : "",
+                ms_since(t), acted);
     t = monotonic_ns();
     cpu = processor_ms();
     readers.surface->scene_changed(world, e);
@@ -116,12 +123,13 @@ void pieces(const BrickGrid& bone, const Context& context) {
     t = monotonic_ns();
     cpu = processor_ms();
     HapticScene next = HapticScene::of(world, renderer.setup(), &scene);
-    std::printf("| %s: what the servo keeps (side by side with the surfaces) | %.1f | %.1f |\n", name.c_str(), ms_since(t),
-                processor_ms() - cpu);
+    std::printf("| %s: what the servo keeps (side by side with the surfaces) | %.1f | %.1f |\n", name.c_str(),
+                ms_since(t), processor_ms() - cpu);
     scene = std::move(next);
   }
   std::printf(
-      "\nThe same by the clock, from the hold (nothing is removed) to the tick where the new bodies are touched:\n\n| action | ms, five "
+      "\nThe same by the clock, from the hold (nothing is removed) to the tick where the new bodies are touched:\n\n| "
+      "action | ms, five "
       "runs |\n|---|---|\n");
   std::map<std::string, std::vector<std::uint64_t>> held;
   for (int run = 0; run < 5; ++run) {
@@ -132,7 +140,8 @@ void pieces(const BrickGrid& bone, const Context& context) {
     o.haptics.device = SpringHand::traits();
     o.actions = {SceneAction::saw(cut), SceneAction::split(50), SceneAction::plain(ActionKind::undo)};
     for (std::size_t i = 0; i < o.actions.size(); ++i) o.actions[i].tick = 500 + 700 * i;
-    o.session_file = std::filesystem::temp_directory_path() / ("osteo-bench-split-" + std::to_string(::getpid()) + ".oss");
+    o.session_file =
+        std::filesystem::temp_directory_path() / ("osteo-bench-split-" + std::to_string(::getpid()) + ".oss");
     std::filesystem::remove(o.session_file);
     Rehearsal r(World(BrickGrid(bone)), std::make_unique<ScriptedDevice>(script, 1000), o, context);
     r.start();
@@ -157,7 +166,8 @@ void pieces(const BrickGrid& bone, const Context& context) {
 
 void plates(const BrickGrid& bone) {
   std::printf(
-      "## Plates: contact by samples traced through live bone, on the head\n\n| plate | samples | us 0.1 mm into bone, samples in it | us "
+      "## Plates: contact by samples traced through live bone, on the head\n\n| plate | samples | us 0.1 mm into bone, "
+      "samples in it | us "
       "0.5 mm "
       "into bone, samples in it |\n|---|---|---|---|\n");
   World world{BrickGrid(bone)};

@@ -1,5 +1,5 @@
-// What a picture of bone costs, by level, beside a plain VTK viewer of the same triangles; not a test. Prints what docs/accuracy.md holds.
-// usage: picture_bench CASE [--pictures FOLDER] [--size WxH] [--rounds N]
+// What a picture of bone costs, by level, beside a plain VTK viewer of the same triangles; not a test. Prints what
+// docs/accuracy.md holds. usage: picture_bench CASE [--pictures FOLDER] [--size WxH] [--rounds N]
 #include <sys/resource.h>
 
 #include <vtkActor.h>
@@ -25,14 +25,14 @@
 #include <thread>
 #include <vector>
 
-#include "osteo/simulation/bone/world.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/offscreen.h"
+#include "osteo/display/view/world_view.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/imaging/io/vtk_data.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/session_folder.h"
-#include "osteo/display/view/actors.h"
-#include "osteo/display/view/offscreen.h"
-#include "osteo/display/view/world_view.h"
+#include "osteo/simulation/bone/world.h"
 
 using namespace osteo;
 
@@ -41,7 +41,9 @@ namespace {
 double cpu_ms() {
   rusage u{};
   getrusage(RUSAGE_SELF, &u);
-  const auto ms = [](const timeval& t) { return 1e3 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_usec); };
+  const auto ms = [](const timeval& t) {
+    return 1e3 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_usec);
+  };
   return ms(u.ru_utime) + ms(u.ru_stime);
 }
 double wall_ms() {
@@ -59,8 +61,8 @@ struct Viewer {
   Viewer(std::string n, int w, int h) : name(std::move(n)), window(w, h) { window.window()->AddRenderer(renderer); }
 };
 
-// What a fifteenth of a second of drilling costs before it can be drawn: triangles, normals, colours, chunks. A 4 mm burr that moves over
-// the surface by 0.5 mm a picture and takes half a millimetre.
+// What a fifteenth of a second of drilling costs before it can be drawn: triangles, normals, colours, chunks. A 4 mm
+// burr that moves over the surface by 0.5 mm a picture and takes half a millimetre.
 void drill(const World& world, Vec3 centre, Vec3 eye, int rounds) {
   BrickGrid bone = world.bodies().front().body->bone;
   LiveSurface surface(bone, {});
@@ -100,7 +102,8 @@ void drill(const World& world, Vec3 centre, Vec3 eye, int rounds) {
   double before = cpu_ms();
   view.refresh(surface);
   std::printf(
-      "an edit's triangles, normals, colours and chunks: CPU ms %.1f (most %.1f); four times a second beside it %.1f; at rest once %.1f\n",
+      "an edit's triangles, normals, colours and chunks: CPU ms %.1f (most %.1f); four times a second beside it %.1f; "
+      "at rest once %.1f\n",
       ms[ms.size() / 2], ms.back(), settle_ms[settle_ms.size() / 2], cpu_ms() - before);
 }
 
@@ -109,7 +112,8 @@ void drill(const World& world, Vec3 centre, Vec3 eye, int rounds) {
 int main(int argc, char** argv) {
   if (argc < 2)
     return std::printf(
-               "usage: picture_bench CASE [--pictures FOLDER] [--size WxH] [--rounds N] [--plain]      --plain: the plain viewer alone\n"),
+               "usage: picture_bench CASE [--pictures FOLDER] [--size WxH] [--rounds N] [--plain]      --plain: the "
+               "plain viewer alone\n"),
            2;
   std::string pictures;
   int width = 1040, height = 1000, rounds = 15;
@@ -202,8 +206,8 @@ int main(int argc, char** argv) {
     set_depth(v.renderer, level.style);
     v.triangles = v.world->drawn_triangles();
   }
-  // A lens of 16 mm before the eye, as an operating microscope has, focused on the middle of the picture: as at rest, and without
-  // occlusion, which goes by passes of the renderer's own.
+  // A lens of 16 mm before the eye, as an operating microscope has, focused on the middle of the picture: as at rest,
+  // and without occlusion, which goes by passes of the renderer's own.
   if (!plain) {
     Viewer& v = add("at rest: VTK's depth of field", width, height);
     set_up_scene(v.renderer);
@@ -238,8 +242,8 @@ int main(int argc, char** argv) {
   for (const auto& v : viewers) {
     std::sort(v->wall.begin(), v->wall.end());
     std::sort(v->cpu.begin(), v->cpu.end());
-    std::printf("%-40s %9.3f %9.1f %9.1f %9.1f\n", v->name.c_str(), static_cast<double>(v->triangles) / 1e6, v->wall.front(),
-                v->wall[v->wall.size() / 2], v->cpu[v->cpu.size() / 2]);
+    std::printf("%-40s %9.3f %9.1f %9.1f %9.1f\n", v->name.c_str(), static_cast<double>(v->triangles) / 1e6,
+                v->wall.front(), v->wall[v->wall.size() / 2], v->cpu[v->cpu.size() / 2]);
     if (!pictures.empty()) {
       v->window.make_current();
       look_at(v->renderer, (lo + hi) * 0.5, radius, eye);

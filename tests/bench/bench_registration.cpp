@@ -54,9 +54,11 @@ void row(const char* name, const char* who, double error, const Registration* r,
 
 void bench_registration(const Context& context) {
   std::printf(
-      "## Registration\n\nPhantom head of 1 mm, noise 20 HU; the second scan on other voxels, noise 30. Target: mean over places within 60 "
+      "## Registration\n\nPhantom head of 1 mm, noise 20 HU; the second scan on other voxels, noise 30. Target: mean "
+      "over places within 60 "
       "mm of the "
-      "head's middle.\n\n| second scan | method | target off, mean mm | there and back mm | edges: median, 90 %% mm | s "
+      "head's middle.\n\n| second scan | method | target off, mean mm | there and back mm | edges: median, 90 %% mm | "
+      "s "
       "|\n|---|---|---|---|---|---|\n");
   PhantomParams p;
   p.noise_hu = 0;
@@ -65,12 +67,20 @@ void bench_registration(const Context& context) {
   const Vec3 ear{58, 12, -20};
   const Pair pairs[] = {
       {"turned 5, moved 10", {.second_from_first = motion({1, 2, -1}, 5, {6, -5, 6}), .spacing_mm = {0.9, 0.9, 1}}},
-      {"turned 30, moved 50", {.second_from_first = motion({1, 2, -1}, 30, {40, -25, 15}), .spacing_mm = {0.9, 0.9, 1}}},
+      {"turned 30, moved 50",
+       {.second_from_first = motion({1, 2, -1}, 30, {40, -25, 15}), .spacing_mm = {0.9, 0.9, 1}}},
       {"turned 20, 2 mm slices, 12 mm drilled",
-       {.second_from_first = motion({0, 1, 3}, -20, {-30, 10, 38}), .spacing_mm = {0.8, 0.8, 2}, .cavity_mm = ear, .cavity_radius_mm = 12}},
+       {.second_from_first = motion({0, 1, 3}, -20, {-30, 10, 38}),
+        .spacing_mm = {0.8, 0.8, 2},
+        .cavity_mm = ear,
+        .cavity_radius_mm = 12}},
       {"turned 15, 5 mm slices", {.second_from_first = motion({1, 1, 0}, 15, {5, 8, 30}), .spacing_mm = {0.7, 0.7, 5}}},
-      {"MR, turned 5, moved 10", {.second_from_first = motion({1, 1, 0}, 5, {5, 8, -3}), .spacing_mm = {1, 1, 1.5}, .air = 30}, true},
-      {"MR, turned 25, moved 50", {.second_from_first = motion({-1, 1, 1}, 25, {20, 30, -34}), .spacing_mm = {1, 1, 2}, .air = 30}, true},
+      {"MR, turned 5, moved 10",
+       {.second_from_first = motion({1, 1, 0}, 5, {5, 8, -3}), .spacing_mm = {1, 1, 1.5}, .air = 30},
+       true},
+      {"MR, turned 25, moved 50",
+       {.second_from_first = motion({-1, 1, 1}, 25, {20, 30, -34}), .spacing_mm = {1, 1, 2}, .air = 30},
+       true},
       {"MR, turned 10, 4 mm slices",
        {.second_from_first = motion({1, 1, 0}, 10, {5, 8, 10}), .spacing_mm = {0.9, 0.9, 4}, .air = 30},
        true},
@@ -95,11 +105,13 @@ void bench_registration(const Context& context) {
     const std::string command = std::string(OSTEO_SOURCE) + "/build/peers/bin/python3 " + OSTEO_SOURCE +
                                 "/tests/bench/peers_registration.py " + folder.path().string() + " '" + pair.name + "'";
     std::fflush(stdout);
-    if (std::system(command.c_str()) != 0) std::printf("| %s | SimpleITK: not at hand in build/peers | | | | |\n", pair.name);
+    if (std::system(command.c_str()) != 0)
+      std::printf("| %s | SimpleITK: not at hand in build/peers | | | | |\n", pair.name);
   }
   const auto data = std::filesystem::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom";
   if (std::filesystem::exists(data)) {
-    const Image straight = import_ct(data / "S21570" / "S2030", {}).image, tilted = import_ct(data / "S21610" / "S2010", {}).image;
+    const Image straight = import_ct(data / "S21570" / "S2030", {}).image,
+                tilted = import_ct(data / "S21610" / "S2010", {}).image;
     std::printf("\nThe real skull phantom, straight at 1 mm and tilted at 2.4 mm:\n\n");
     for (const RegisterMethod method : {RegisterMethod::mutual, RegisterMethod::surface}) {
       RegisterParams rp;
@@ -107,10 +119,11 @@ void bench_registration(const Context& context) {
       const auto begin = std::chrono::steady_clock::now();
       const Registration r = register_scans(straight, tilted, rp, context);
       std::printf(
-          "- %s: there and back %.3f mm, edges %.2f and %.2f mm, bone's surfaces %.3f mean, %.3f p95, boundary shifted %.3f, shape %.3f, "
+          "- %s: there and back %.3f mm, edges %.2f and %.2f mm, bone's surfaces %.3f mean, %.3f p95, boundary shifted "
+          "%.3f, shape %.3f, "
           "%.1f s\n",
-          method == RegisterMethod::mutual ? "mutual" : "surface", r.inverse_mm, r.residual.median_mm, r.residual.p90_mm, r.surface_mean_mm,
-          r.surface_p95_mm, r.boundary_shift_mm, r.surface_shape_mm,
+          method == RegisterMethod::mutual ? "mutual" : "surface", r.inverse_mm, r.residual.median_mm,
+          r.residual.p90_mm, r.surface_mean_mm, r.surface_p95_mm, r.boundary_shift_mm, r.surface_shape_mm,
           std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     }
   }

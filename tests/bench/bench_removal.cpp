@@ -11,7 +11,8 @@ namespace {
 using test::Face;
 using test::Path;
 
-constexpr ContactMethod kMethods[] = {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays};
+constexpr ContactMethod kMethods[] = {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume,
+                                      ContactMethod::rays};
 constexpr double kVoxels[] = {0.2, 0.35, 0.5, 0.6, 0.9};
 const Face kFaces[] = {{{0, 0, 1}, 0.11}, {normalized({0.03, -0.02, 1}), 0.23}};
 
@@ -39,7 +40,8 @@ void take_time(Path& path, double swept_mm3) {
   for (std::size_t l = 1; l < path.legs.size(); ++l) way += length(path.legs[l].to_mm - path.legs[l - 1].to_mm);
   const Burr& burr = burr_library()[static_cast<std::size_t>(path.tool)];
   for (std::size_t l = 1; l < path.legs.size(); ++l)
-    path.legs[l].mm_per_s = way * (burr.shape == BurrShape::taper ? 0.012 : 0.03) * burr.rate_mm3_per_s_per_n / swept_mm3;
+    path.legs[l].mm_per_s =
+        way * (burr.shape == BurrShape::taper ? 0.012 : 0.03) * burr.rate_mm3_per_s_per_n / swept_mm3;
 }
 double ratio(int tool, int passes, const Face& face, double h, ContactMethod method, double hz) {
   Path path = path_of(tool, passes);
@@ -55,13 +57,15 @@ double ratio(int tool, int passes, const Face& face, double h, ContactMethod met
 void bench_removal(const Context&) {
   const char* const ways[] = {"resting", "a groove", "two side by side"};
   std::printf(
-      "### Removed over swept, by method and voxel\n\n2 mm ball and 4 mm cylinder, on faces off the voxels' borders, 250 Hz, time enough: "
+      "### Removed over swept, by method and voxel\n\n2 mm ball and 4 mm cylinder, on faces off the voxels' borders, "
+      "250 Hz, time enough: "
       "least to most.\n\n| method | path |");
   for (const double h : kVoxels) std::printf(" %g mm |", h);
   std::printf("\n|---|---|---|---|---|---|---|\n");
   for (const ContactMethod method : kMethods) {
     for (int passes = 0; passes < 3; ++passes) {
-      std::printf("| %s | %s |", EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)].data(), ways[passes]);
+      std::printf("| %s | %s |", EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)].data(),
+                  ways[passes]);
       for (const double h : kVoxels) {
         Range range;
         for (const int tool : {1, 17}) range.add(ratio(tool, passes, kFaces[tool % 3 == 1 ? 0 : 1], h, method, 250));
@@ -77,21 +81,26 @@ void bench_removal(const Context&) {
   for (const int tool : {0, 1, 3, 6, 10, 14, 17, 20, 28, 31, 34}) {
     for (int passes = 0; passes < 2; ++passes) {
       std::printf("| %s | %s |", burr_library()[static_cast<std::size_t>(tool)].name().c_str(), ways[passes]);
-      for (const double h : kVoxels) std::printf(" %.3f |", ratio(tool, passes, kFaces[0], h, ContactMethod::overlap, 250));
+      for (const double h : kVoxels)
+        std::printf(" %.3f |", ratio(tool, passes, kFaces[0], h, ContactMethod::overlap, 250));
       std::printf("\n");
       std::fflush(stdout);
     }
   }
   std::printf(
-      "\n### By rate of the servo, and where the hand is too fast\n\nA 4 mm ball in 0.5 mm voxels by overlap; the fast groove at 40 mm/s, "
-      "once and 100 times.\n\n| Hz | resting | a groove | two side by side | fast, once | fast, 100 times |\n|---|---|---|---|---|---|\n");
+      "\n### By rate of the servo, and where the hand is too fast\n\nA 4 mm ball in 0.5 mm voxels by overlap; the fast "
+      "groove at 40 mm/s, "
+      "once and 100 times.\n\n| Hz | resting | a groove | two side by side | fast, once | fast, 100 times "
+      "|\n|---|---|---|---|---|---|\n");
   for (const double hz : {500.0, 1000.0, 2000.0, 5000.0}) {
     std::printf("| %g |", hz);
-    for (int passes = 0; passes < 3; ++passes) std::printf(" %.3f |", ratio(3, passes, kFaces[0], 0.5, ContactMethod::overlap, hz));
+    for (int passes = 0; passes < 3; ++passes)
+      std::printf(" %.3f |", ratio(3, passes, kFaces[0], 0.5, ContactMethod::overlap, hz));
     for (const int times : {1, 100}) {
       Path path = test::groove(3, 0.46, 40, 1, 0);
       const double swept = test::swept_mm3(path, kFaces[0]);
-      for (int n = 1; n < times; ++n) path.legs.push_back({path.legs[1].to_mm + Vec3{n % 2 == 1 ? -4.06 : 0, 0, 0}, 40});
+      for (int n = 1; n < times; ++n)
+        path.legs.push_back({path.legs[1].to_mm + Vec3{n % 2 == 1 ? -4.06 : 0, 0, 0}, 40});
       auto bone = test::block(0.5, kFaces[0]);
       std::printf(" %.3f |", test::removed_mm3(path, bone, ContactMethod::overlap, hz) / swept);
     }

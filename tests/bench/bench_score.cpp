@@ -36,7 +36,8 @@ int main(int argc, char** argv) {
     setup.hardness = false;
     const Anatomy anatomy = anatomy_of(the_case, setup, {});
     const World begin = world_at_begin(folder, the_case, anatomy, {});
-    std::cout << "reading the case, distances to structures: " << cpu_s(CLOCK_PROCESS_CPUTIME_ID) - t << " s of all threads\n";
+    std::cout << "reading the case, distances to structures: " << cpu_s(CLOCK_PROCESS_CPUTIME_ID) - t
+              << " s of all threads\n";
     const SessionReader session(folder.stream(), Damage::keep);
     const Procedure procedure = load_procedure(argv[2]);
     const double rate_hz = session.header().rate_hz;
@@ -72,15 +73,17 @@ int main(int argc, char** argv) {
       t = cpu_s(CLOCK_PROCESS_CPUTIME_ID);
       const Product product(begin, end, *anatomy.structures, procedure, std::move(removed), one_thread);
       std::size_t measured = 0;
-      for (const ScaleItem& item : procedure.items) measured += product.evaluate(item, keeper.approach(), {}).measured ? 1 : 0;
+      for (const ScaleItem& item : procedure.items)
+        measured += product.evaluate(item, keeper.approach(), {}).measured ? 1 : 0;
       measured += product.regions().size();
       least_product = std::min(least_product, cpu_s(CLOCK_PROCESS_CPUTIME_ID) - t);
-      std::cout << "round " << round + 1 << ": " << measured << " items and regions measured on cubes of " << product.spacing_mm()
-                << " mm\n";
+      std::cout << "round " << round + 1 << ": " << measured << " items and regions measured on cubes of "
+                << product.spacing_mm() << " mm\n";
     }
     const auto share = [&](double s) { return 100 * s / length_s; };
     std::cout << "the session: " << length_s << " s\n"
-              << "all metrics, frame by frame: " << least_keeper << " s, " << share(least_keeper) << " % of a core while it ran\n"
+              << "all metrics, frame by frame: " << least_keeper << " s, " << share(least_keeper)
+              << " % of a core while it ran\n"
               << "the same with frames made and the file read: " << least_all << " s, " << share(least_all) << " %\n"
               << "hints: " << least_hints << " s, " << share(least_hints) << " %\n"
               << "end product: " << least_product << " s\n";

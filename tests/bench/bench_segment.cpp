@@ -27,12 +27,14 @@ double now() {
 double cpu() {
   rusage u{};
   getrusage(RUSAGE_SELF, &u);
-  return static_cast<double>(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * static_cast<double>(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
+  return static_cast<double>(u.ru_utime.tv_sec + u.ru_stime.tv_sec) +
+         1e-6 * static_cast<double>(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
 }
 
 void tubes() {
   std::printf(
-      "| tube | diameter mm | CT | mean mm | worst mm | radius mean mm | confidence | CPU s |\n|---|---|---|---|---|---|---|---|\n");
+      "| tube | diameter mm | CT | mean mm | worst mm | radius mean mm | confidence | CPU s "
+      "|\n|---|---|---|---|---|---|---|---|\n");
   const char* const names[] = {"straight", "helix", "genu"};
   for (int shape = 0; shape < 3; ++shape) {
     for (const double d : {0.6, 1.0, 1.5, 2.0, 3.0}) {
@@ -44,7 +46,8 @@ void tubes() {
         if (kind == 3) s.oblique = true;
         if (kind == 4) s.spacing_mm = {0.3, 0.3, 0.3};
         if (kind == 5) s.cellular = true, s.spacing_mm = {0.5, 0.5, 1}, s.oblique = true;
-        const char* const ct_names[] = {"cortical", "cellular", "0.5x0.5x1", "oblique", "0.3", "cellular, 0.5x0.5x1, oblique"};
+        const char* const ct_names[] = {"cortical", "cellular", "0.5x0.5x1",
+                                        "oblique",  "0.3",      "cellular, 0.5x0.5x1, oblique"};
         const Image ct = make_tube_ct(line, s);
         const std::size_t n = line.points.size();
         std::vector<Vec3> points{line.points[3], line.points[n - 4]};
@@ -54,8 +57,8 @@ void tubes() {
           const Tube t = trace_tube(ct, points, {});
           Line part{{line.points.begin() + 3, line.points.end() - 3}, line.radius_mm};
           const LineError e = line_error(t, part);
-          std::printf("| %s | %.1f | %s | %.3f | %.2f | %.2f | %.2f | %.1f |\n", names[shape], d, ct_names[kind], e.mean_mm, e.worst_mm,
-                      t.radius_mean_mm, t.confidence, cpu() - c);
+          std::printf("| %s | %.1f | %s | %.3f | %.2f | %.2f | %.2f | %.1f |\n", names[shape], d, ct_names[kind],
+                      e.mean_mm, e.worst_mm, t.radius_mean_mm, t.confidence, cpu() - c);
         } catch (const Error& e) {
           std::printf("| %s | %.1f | %s | %s |\n", names[shape], d, ct_names[kind], e.what());
         }
@@ -101,10 +104,12 @@ void nerves(int first, int last, double spacing, double slice, double noise) {
       if (region == PhantomRegion::temporal) {
         const auto m = head.facial_nerve_marks();
         tasks.push_back({"facial", part_of(head.facial_nerve(), m.fundus_mm, m.foramen_mm), {0, 0.13, 0.5, 1}});
-        tasks.push_back({"facial, from the genu", part_of(head.facial_nerve(), m.geniculate_mm, m.foramen_mm), {0, 0.42, 1}});
+        tasks.push_back(
+            {"facial, from the genu", part_of(head.facial_nerve(), m.geniculate_mm, m.foramen_mm), {0, 0.42, 1}});
         tasks.push_back({"facial, mastoid part", part_of(head.facial_nerve(), m.second_genu_mm, m.foramen_mm), {0, 1}});
         tasks.push_back({"chorda, in bone", part_of(head.chorda_tympani(), 1, 6.5), {0, 0.5, 1}, 0.6});
-        tasks.push_back({"chorda", part_of(head.chorda_tympani(), 1, 20), {0, 0.14, 0.28, 0.42, 0.58, 0.72, 0.86, 1}, 0.6});
+        tasks.push_back(
+            {"chorda", part_of(head.chorda_tympani(), 1, 20), {0, 0.14, 0.28, 0.42, 0.58, 0.72, 0.86, 1}, 0.6});
       } else {
         tasks.push_back({"alveolar", part_of(head.alveolar_nerve(), 2, 1000), {0, 0.5, 1}});
       }
@@ -124,8 +129,9 @@ void nerves(int first, int last, double spacing, double slice, double noise) {
             std::snprintf(text, sizeof text, "%.1f-%.1f ", u[0], u[1]);
             unsure += text;
           }
-          std::printf("| %d | %s | %.1f | %.3f | %.2f | %.2f | %.2f | %.2f | %s | %.1f |\n", who, t.name, tube.length_mm, e.mean_mm,
-                      e.worst_mm, tube.radius_mean_mm, t.line.radius_mm, tube.confidence, unsure.c_str(), cpu() - c0);
+          std::printf("| %d | %s | %.1f | %.3f | %.2f | %.2f | %.2f | %.2f | %s | %.1f |\n", who, t.name,
+                      tube.length_mm, e.mean_mm, e.worst_mm, tube.radius_mean_mm, t.line.radius_mm, tube.confidence,
+                      unsure.c_str(), cpu() - c0);
         } catch (const Error& e) {
           std::printf("| %d | %s | %s |\n", who, t.name, e.what());
         }
@@ -171,8 +177,8 @@ void ears(int first, int last, double spacing, double slice, double noise, doubl
       }
       const std::vector<std::uint8_t> truth = ear_truth(phantom.labels, head, f.what);
       const Overlap o = overlap(found.labels, static_cast<std::uint8_t>(1 + static_cast<int>(f.what)), truth);
-      std::printf("| %d | %s | %.3f | %.2f | %.2f | %.2f | %.0f | %.0f | %s\n", who, name, o.dice, o.mean_mm, o.p95_mm, f.quality,
-                  f.volume_mm3, o.true_mm3, f.why.c_str());
+      std::printf("| %d | %s | %.3f | %.2f | %.2f | %.2f | %.0f | %.0f | %s\n", who, name, o.dice, o.mean_mm, o.p95_mm,
+                  f.quality, f.volume_mm3, o.true_mm3, f.why.c_str());
       std::fflush(stdout);
       sum.dice += o.dice, sum.mean += o.mean_mm, sum.p95 += o.p95_mm, ++sum.n;
       sum.worst = std::min(sum.worst, o.dice);
@@ -186,8 +192,9 @@ void ears(int first, int last, double spacing, double slice, double noise, doubl
     const Sum& m = sums[static_cast<std::size_t>(s)];
     if (m.n + m.missing == 0) continue;
     const double n = std::max(1, m.n);
-    std::printf("| %s | %.3f | %.3f | %.2f | %.2f | %.2f | %d |\n", EnumNames<EarStructure>::values[static_cast<std::size_t>(s)].data(),
-                m.dice / n, m.worst, m.mean / n, m.p95 / n, m.worst95, m.missing);
+    std::printf("| %s | %.3f | %.3f | %.2f | %.2f | %.2f | %d |\n",
+                EnumNames<EarStructure>::values[static_cast<std::size_t>(s)].data(), m.dice / n, m.worst, m.mean / n,
+                m.p95 / n, m.worst95, m.missing);
   }
   std::printf("CPU %.1f s an ear\n", seconds / (last - first + 1));
 }
@@ -206,7 +213,8 @@ int main(int argc, char** argv) {
     ears(static_cast<int>(arg(2, 6)), static_cast<int>(arg(3, 15)), arg(4, 0.5), arg(5, 0), arg(6, 30), arg(7, 1));
   } else {
     std::fprintf(stderr,
-                 "osteo_bench_segment ears [FIRST LAST SPACING SLICE NOISE SCALE] | tubes | nerves [FIRST LAST SPACING SLICE NOISE]\n");
+                 "osteo_bench_segment ears [FIRST LAST SPACING SLICE NOISE SCALE] | tubes | nerves [FIRST LAST SPACING "
+                 "SLICE NOISE]\n");
     return 2;
   }
   rusage u{};

@@ -10,9 +10,9 @@
 #include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/geometry/grid/resample.h"
 #include "osteo/geometry/grid/sampler.h"
+#include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/threshold.h"
-#include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo {
 namespace {
@@ -27,7 +27,8 @@ struct Body {
   Vec3 normal{};
 };
 
-// Like a scanner: pixels of 0.7 mm in slices as thick as they lie apart, 1000 HU in 0, point spread of 0.4 mm in the slice, noise of 20 HU.
+// Like a scanner: pixels of 0.7 mm in slices as thick as they lie apart, 1000 HU in 0, point spread of 0.4 mm in the
+// slice, noise of 20 HU.
 Image scan(const Depth& depth, double slice_mm) {
   Frame f;
   f.spacing_mm = {0.7, 0.7, slice_mm};
@@ -40,7 +41,8 @@ Image scan(const Depth& depth, double slice_mm) {
   std::vector<Vec3> offsets;
   const int layers = std::max(4, static_cast<int>(std::lround(slice_mm / 0.1)));
   for (int n = 0; n < 12 * layers; ++n)
-    offsets.push_back({spread(random) + pixel(random), spread(random) + pixel(random), ((n % layers + 0.5) / layers - 0.5) * slice_mm});
+    offsets.push_back({spread(random) + pixel(random), spread(random) + pixel(random),
+                       ((n % layers + 0.5) / layers - 0.5) * slice_mm});
   std::size_t at = 0;
   for (int k = 0; k < f.dims[2]; ++k)
     for (int j = 0; j < f.dims[1]; ++j)
@@ -90,7 +92,8 @@ std::vector<Body> bodies() {
       const Vec3 n = normalized({std::sin(a), 0.15, std::cos(a)});
       static std::vector<std::string> names(6);
       std::string& name = names[(wall > 1 ? 3 : 0) + (degrees < 45 ? 0 : degrees < 75 ? 1 : 2)];
-      name = "wall of " + std::to_string(static_cast<int>(wall)) + ", " + std::to_string(static_cast<int>(degrees)) + " degrees";
+      name = "wall of " + std::to_string(static_cast<int>(wall)) + ", " + std::to_string(static_cast<int>(degrees)) +
+             " degrees";
       all.push_back({name.c_str(), [n, wall](Vec3 p) { return 0.5 * wall - std::abs(dot(p, n) - 0.3); }, wall, n});
     }
   return all;
@@ -118,8 +121,8 @@ Result measure(const Body& body, double slice_mm, Between between, const Context
   std::vector<double> off;
   double square = 0, area = 0;
   for (const auto& tri : mesh.triangles) {
-    const Vec3 a = from_floats(mesh.points_mm[tri[0]]), b = from_floats(mesh.points_mm[tri[1]]), c = from_floats(mesh.points_mm[tri[2]]),
-               m = (a + b + c) / 3;
+    const Vec3 a = from_floats(mesh.points_mm[tri[0]]), b = from_floats(mesh.points_mm[tri[1]]),
+               c = from_floats(mesh.points_mm[tri[2]]), m = (a + b + c) / 3;
     if (!inner(m)) continue;
     off.push_back(std::abs(body.depth(m)));
     const Vec3 n = cross(b - a, c - a);
@@ -217,7 +220,8 @@ void measure_phantom(double slice_mm, const Context& context) {
 
 void bench_slices(const Context& context) {
   std::printf(
-      "## Bone from thick slices\n\n| body | slices mm | between | volume %% | off, mean mm | p95 mm | normals off, RMS degrees | wall "
+      "## Bone from thick slices\n\n| body | slices mm | between | volume %% | off, mean mm | p95 mm | normals off, "
+      "RMS degrees | wall "
       "broken %% "
       "| ms |\n|---|---|---|---|---|---|---|---|---|\n");
   for (const Body& body : bodies())
@@ -231,8 +235,8 @@ void bench_slices(const Context& context) {
           continue;
         }
         std::printf("| %s | %g | %s | %+.2f | %.3f | %.3f | %.1f | ", body.name, slice,
-                    std::string(EnumNames<Between>::values[static_cast<std::size_t>(between)]).c_str(), r.volume_percent, r.mean, r.p95,
-                    r.normals);
+                    std::string(EnumNames<Between>::values[static_cast<std::size_t>(between)]).c_str(),
+                    r.volume_percent, r.mean, r.p95, r.normals);
         if (body.wall_mm > 0) std::printf("%.1f", r.broken_percent);
         std::printf(" | %.0f |\n", r.ms);
       }

@@ -43,8 +43,9 @@ Search cma_es(const Objective& f, const Eigen::VectorXd& start, double sigma, in
   Eigen::VectorXd w(mu);
   for (int i = 0; i < mu; ++i) w[i] = std::log(mu + 0.5) - std::log(i + 1);
   w /= w.sum();
-  const double mueff = 1 / w.squaredNorm(), cc = (4 + mueff / n) / (n + 4 + 2 * mueff / n), cs = (mueff + 2) / (n + mueff + 5),
-               c1 = 2 / ((n + 1.3) * (n + 1.3) + mueff), cmu = std::min(1 - c1, 2 * (mueff - 2 + 1 / mueff) / ((n + 2) * (n + 2) + mueff)),
+  const double mueff = 1 / w.squaredNorm(), cc = (4 + mueff / n) / (n + 4 + 2 * mueff / n),
+               cs = (mueff + 2) / (n + mueff + 5), c1 = 2 / ((n + 1.3) * (n + 1.3) + mueff),
+               cmu = std::min(1 - c1, 2 * (mueff - 2 + 1 / mueff) / ((n + 2) * (n + 2) + mueff)),
                damps = 1 + 2 * std::max(0.0, std::sqrt((mueff - 1) / (n + 1)) - 1) + cs,
                chi = std::sqrt(n) * (1 - 1.0 / (4 * n) + 1.0 / (21 * n * n));
   Eigen::VectorXd mean = start, ps = Eigen::VectorXd::Zero(n), pc = ps;
@@ -69,13 +70,15 @@ Search cma_es(const Objective& f, const Eigen::VectorXd& start, double sigma, in
     Eigen::VectorXd y = Eigen::VectorXd::Zero(n);
     for (int i = 0; i < mu; ++i) y += w[i] * tried[static_cast<std::size_t>(i)].second;
     mean += sigma * y;
-    const Eigen::VectorXd whitened = eigen.eigenvectors() * d.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose() * y;
+    const Eigen::VectorXd whitened =
+        eigen.eigenvectors() * d.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose() * y;
     ps = (1 - cs) * ps + std::sqrt(cs * (2 - cs) * mueff) * whitened;
     const bool h = ps.norm() / std::sqrt(1 - std::pow(1 - cs, 2.0 * (generation + 1))) < (1.4 + 2.0 / (n + 1)) * chi;
     pc = (1 - cc) * pc + (h ? std::sqrt(cc * (2 - cc) * mueff) : 0) * y;
     c = (1 - c1 - cmu) * c + c1 * (pc * pc.transpose() + (h ? 0 : cc * (2 - cc)) * c);
     for (int i = 0; i < mu; ++i)
-      c += cmu * w[i] * tried[static_cast<std::size_t>(i)].second * tried[static_cast<std::size_t>(i)].second.transpose();
+      c += cmu * w[i] * tried[static_cast<std::size_t>(i)].second *
+           tried[static_cast<std::size_t>(i)].second.transpose();
     sigma *= std::exp(cs / damps * (ps.norm() / chi - 1));
   }
   s.seconds = now_s() - begin;
@@ -159,8 +162,11 @@ void gear_calibration(const Context& context) {
   for (const int n : {16, 24}) {
     const Body body = make_gear(n);
     const auto loads = gear_loads(body, 222);
-    std::printf("### Gear, %zu points, %zu tetrahedra, E 100 kPa, nu 0.45, 222 N\n\n", body.b.points.size(), body.b.tets.size());
-    std::printf("| load | T10 s | truth RMS mm | T4 off T10 | closed form off linear T4 | off T10 |\n|---|---|---|---|---|---|\n");
+    std::printf("### Gear, %zu points, %zu tetrahedra, E 100 kPa, nu 0.45, 222 N\n\n", body.b.points.size(),
+                body.b.tets.size());
+    std::printf(
+        "| load | T10 s | truth RMS mm | T4 off T10 | closed form off linear T4 | off T10 "
+        "|\n|---|---|---|---|---|---|\n");
     std::vector<CalibrationCase> cases;
     double mean_t4 = 0, mean_t10 = 0;
     for (const auto& [name, load] : loads) {
@@ -169,8 +175,8 @@ void gear_calibration(const Context& context) {
       TissueModel model = TissueModel::of_voxels(body.b.points, body.b.tets, std::span(&m, 1));
       const double a = nrms_of(model, body, load, t4.x), b = nrms_of(model, body, load, t10.x);
       const CalibrationError fe = calibration_error(body.b.points, t4.x, t10.x);
-      std::printf("| %s | %.1f%s | %.2f | %.3f | %.3f | %.3f |\n", name.c_str(), t10.seconds, t10.converged ? "" : " (not at rest)",
-                  fe.truth_rms_mm, fe.nrms, a, b);
+      std::printf("| %s | %.1f%s | %.2f | %.3f | %.3f | %.3f |\n", name.c_str(), t10.seconds,
+                  t10.converged ? "" : " (not at rest)", fe.truth_rms_mm, fe.nrms, a, b);
       mean_t4 += a / 4;
       mean_t10 += b / 4;
       cases.push_back({load, t10.x});
@@ -182,11 +188,14 @@ void gear_calibration(const Context& context) {
     TissueModel model = TissueModel::of_voxels(body.b.points, body.b.tets, std::span(&m, 1));
     const Calibration c = calibrate(model, {cases.data(), 1}, {}, context);
     std::printf(
-        "Four factors fitted to load A: %d equilibrium solves, %.2f s; factors %.3f %.3f %.4f %.3f (axis, diagonal, face, volume), "
-        "uncertain by %.2f %.2f %.2f %.2f (log, for 1 %%); NRMS on A %.3f (closed form %.3f), on B %.3f, C %.3f, D %.3f.\n\n",
-        c.solves, c.seconds, std::exp(c.log_factors[0]), std::exp(c.log_factors[1]), std::exp(c.log_factors[2]), std::exp(c.log_factors[3]),
-        c.uncertainty[1], c.uncertainty[2], c.uncertainty[3], c.uncertainty[4], c.after[0].nrms, c.before[0].nrms,
-        nrms_of(model, body, loads[1].second, cases[1].truth_mm), nrms_of(model, body, loads[2].second, cases[2].truth_mm),
+        "Four factors fitted to load A: %d equilibrium solves, %.2f s; factors %.3f %.3f %.4f %.3f (axis, diagonal, "
+        "face, volume), "
+        "uncertain by %.2f %.2f %.2f %.2f (log, for 1 %%); NRMS on A %.3f (closed form %.3f), on B %.3f, C %.3f, D "
+        "%.3f.\n\n",
+        c.solves, c.seconds, std::exp(c.log_factors[0]), std::exp(c.log_factors[1]), std::exp(c.log_factors[2]),
+        std::exp(c.log_factors[3]), c.uncertainty[1], c.uncertainty[2], c.uncertainty[3], c.uncertainty[4],
+        c.after[0].nrms, c.before[0].nrms, nrms_of(model, body, loads[1].second, cases[1].truth_mm),
+        nrms_of(model, body, loads[2].second, cases[2].truth_mm),
         nrms_of(model, body, loads[3].second, cases[3].truth_mm));
     std::mt19937 random(7);
     std::uniform_real_distribution<double> u(-1, 1);
@@ -207,7 +216,8 @@ void gear_calibration(const Context& context) {
       t4_mean += calibration_error(body.b.points, t4.x, t10.x).nrms / 10;
       ++counted;
     }
-    std::printf("Ten other random loads: mean NRMS %.3f, worst %.3f; linear-tetrahedra finite elements %.3f.\n\n", mean, worst, t4_mean);
+    std::printf("Ten other random loads: mean NRMS %.3f, worst %.3f; linear-tetrahedra finite elements %.3f.\n\n", mean,
+                worst, t4_mean);
 
     // The same four factors by search.
     TissueModel searched = TissueModel::of_voxels(body.b.points, body.b.tets, std::span(&m, 1));
@@ -225,7 +235,8 @@ void gear_calibration(const Context& context) {
     const double goal = c.after[0].nrms;
     const Search cma = cma_es(f, start, 0.5, 800, goal), annealed = annealing(f, start, 2, 1500, goal);
     std::printf(
-        "| way | solves | solves to within 1 %% of the fit | NRMS on A | s |\n|---|---|---|---|---|\n| Levenberg-Marquardt, implicit "
+        "| way | solves | solves to within 1 %% of the fit | NRMS on A | s |\n|---|---|---|---|---|\n| "
+        "Levenberg-Marquardt, implicit "
         "Jacobian | %d | | %.4f | %.2f |\n",
         c.solves, goal, c.seconds);
     for (const auto& [name, s] : {std::pair{"CMA-ES", cma}, {"annealing after 100 random starts", annealed}})
@@ -237,7 +248,8 @@ void gear_calibration(const Context& context) {
 
 void incompressible() {
   std::printf(
-      "### Poisson's ratio near a half: cube of 8 x 8 x 8 voxels, base held, load on top\n\n| nu | T4 off T10 | closed form off T10 | "
+      "### Poisson's ratio near a half: cube of 8 x 8 x 8 voxels, base held, load on top\n\n| nu | T4 off T10 | closed "
+      "form off T10 | "
       "ratio |\n|---|---|---|---|\n");
   Body body{test::block(8, 8, 8, 25), {}};
   for (std::uint32_t p = 0; p < body.b.points.size(); ++p) {
@@ -277,7 +289,8 @@ void two_materials(const Context& context) {
   const Material guess{0.2, 0.499};
   const TissueModel uniform = TissueModel::of_voxels(body.b.points, body.b.tets, std::span(&guess, 1));
   std::vector<CalibrationCase> cases{{load, truth.x}};
-  for (const auto& [at, f] : {std::pair{Vec3{30, 170, 200}, Vec3{-4, -3, -2}}, {Vec3{100, 200, 70}, Vec3{0, -25, 10}}}) {
+  for (const auto& [at, f] :
+       {std::pair{Vec3{30, 170, 200}, Vec3{-4, -3, -2}}, {Vec3{100, 200, 70}, Vec3{0, -25, 10}}}) {
     TissueLoad l;
     l.fixed = body.fixed;
     patch(body, at, 60, f, l);
@@ -311,9 +324,10 @@ void two_materials(const Context& context) {
     bool shared;
     std::size_t loads;
   };
-  for (const Row& row : {Row{"homogeneous", {1, 1, 1}, true, 1}, Row{"map of 5 x 5 x 5", {5, 5, 5}, true, 1},
-                         Row{"map of 5 x 5 x 9", {5, 5, 9}, true, 1}, Row{"map of 9 x 9 x 9", {9, 9, 9}, true, 1},
-                         Row{"map of 5 x 5 x 9", {5, 5, 9}, true, 3}, Row{"a map of 5 x 5 x 5 for each class", {5, 5, 5}, false, 1}}) {
+  for (const Row& row :
+       {Row{"homogeneous", {1, 1, 1}, true, 1}, Row{"map of 5 x 5 x 5", {5, 5, 5}, true, 1},
+        Row{"map of 5 x 5 x 9", {5, 5, 9}, true, 1}, Row{"map of 9 x 9 x 9", {9, 9, 9}, true, 1},
+        Row{"map of 5 x 5 x 9", {5, 5, 9}, true, 3}, Row{"a map of 5 x 5 x 5 for each class", {5, 5, 5}, false, 1}}) {
     TissueModel model = uniform;
     CalibrateOptions o;
     o.grid = row.grid;
@@ -321,8 +335,8 @@ void two_materials(const Context& context) {
     if (row.grid[0] > 1) o.pull = 0.01;
     const Calibration c = calibrate(model, std::span(cases.data(), row.loads), o, context);
     const auto [low, high] = learnt(model);
-    std::printf("| %s | %zu | %d | %d | %.1f | %.4f | %.3f | %.0f, %.0f | %.1f |\n", row.name, row.loads, c.parameters, c.solves, c.seconds,
-                c.after[0].nrms, nrms_of(model, body, other, unseen.x), low, high, low / high);
+    std::printf("| %s | %zu | %d | %d | %.1f | %.4f | %.3f | %.0f, %.0f | %.1f |\n", row.name, row.loads, c.parameters,
+                c.solves, c.seconds, c.after[0].nrms, nrms_of(model, body, other, unseen.x), low, high, low / high);
     std::fflush(stdout);
   }
   std::printf("\n");

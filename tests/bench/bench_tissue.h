@@ -36,7 +36,8 @@ struct Truth {
   bool converged = false;
 };
 
-inline Truth solve_fem(const Body& body, const std::vector<Material>& materials, ElasticLaw law, TetOrder order, const TissueLoad& load) {
+inline Truth solve_fem(const Body& body, const std::vector<Material>& materials, ElasticLaw law, TetOrder order,
+                       const TissueLoad& load) {
   const double begin = now_s();
   const FemBody fem(body.b.points, body.b.tets, materials, law, order);
   EquilibriumSolver solver(fem, fem.rest(), fem.with_middles(body.fixed));
@@ -54,8 +55,9 @@ inline double nrms_of(TissueModel& model, const Body& body, const TissueLoad& lo
   return r.converged ? calibration_error(model.rest(), r.points_mm, truth).nrms : NAN;
 }
 
-/// bench_tissue_fem.cpp: finite elements against analytic answers. bench_tissue_time.cpp: steps in time, resolution, skins.
-/// bench_tissue_pressed.cpp: long steps under a tool. bench_tissue_measured.cpp: calibration from measured surfaces.
+/// bench_tissue_fem.cpp: finite elements against analytic answers. bench_tissue_time.cpp: steps in time, resolution,
+/// skins. bench_tissue_pressed.cpp: long steps under a tool. bench_tissue_measured.cpp: calibration from measured
+/// surfaces.
 void tissue_elements();
 void tissue_time();
 void tissue_pressed();

@@ -42,7 +42,8 @@ TissueLoad pushed(const Body& body, const std::vector<Push>& pushes) {
       const std::array<std::uint32_t, 3> f{of[t[0]], of[t[1]], of[t[2]]};
       bool in = true;
       for (const std::uint32_t p : f)
-        for (std::size_t a = 0; a < 3; ++a) in = in && body.b.points[p][a] > push.lo[a] - 1e-6 && body.b.points[p][a] < push.hi[a] + 1e-6;
+        for (std::size_t a = 0; a < 3; ++a)
+          in = in && body.b.points[p][a] > push.lo[a] - 1e-6 && body.b.points[p][a] < push.hi[a] + 1e-6;
       if (!in) continue;
       const Vec3 a = body.b.points[f[0]];
       faces.push_back({f, length(cross(body.b.points[f[1]] - a, body.b.points[f[2]] - a)) / 2});
@@ -59,7 +60,8 @@ std::vector<Vec3> carried(const Body& fine, std::span<const Vec3> x, int n, cons
   std::map<std::array<int, 3>, std::uint32_t> at;
   for (std::uint32_t p = 0; p < fine.b.points.size(); ++p) {
     const Vec3 q = fine.b.points[p] / h;
-    at[{static_cast<int>(std::lround(q.x)), static_cast<int>(std::lround(q.y)), static_cast<int>(std::lround(q.z))}] = p;
+    at[{static_cast<int>(std::lround(q.x)), static_cast<int>(std::lround(q.y)), static_cast<int>(std::lround(q.z))}] =
+        p;
   }
   std::vector<Vec3> moved;
   for (const Vec3& p : coarse.b.points) {
@@ -103,7 +105,8 @@ void tissue_measured(const Context& context) {
     for (const std::uint32_t p : t) z += fine.b.points[p].z / 4;
     materials.push_back({z < kEdge / 2 ? 1.0 : 0.05, 0.499});
   }
-  // Pressed on top, where the soft half gives way, and pushed at the stiff half; two more; and one that is never fitted.
+  // Pressed on top, where the soft half gives way, and pushed at the stiff half; two more; and one that is never
+  // fitted.
   const std::vector<std::vector<Push>> pushes{
       {{{50, 50, 200}, {150, 150, 200}, {40, 0, -60}}, {{200, 50, 50}, {200, 150, 100}, {300, 0, 0}}},
       {{{0, 150, 200}, {50, 200, 200}, {-15, -15, -10}}, {{50, 0, 50}, {150, 0, 100}, {0, -300, 50}}},
@@ -135,15 +138,18 @@ void tissue_measured(const Context& context) {
     group.push_back(c.nodes != 2 ? -1 : std::max(a, b) < 0.49 * kEdge ? 0 : std::min(a, b) > 0.51 * kEdge ? 1 : -1);
   }
   std::printf(
-      "### From measured surfaces: the cube, 1000 kPa below, 50 kPa above, guessed 200, not told of halves\n\nTruth: t10, %zu tetrahedra, "
+      "### From measured surfaces: the cube, 1000 kPa below, 50 kPa above, guessed 200, not told of halves\n\nTruth: "
+      "t10, %zu tetrahedra, "
       "%.0f s; "
       "RMS movement %.2f, %.2f, %.2f, %.2f mm. Noise in %% of the RMS movement of each load.\n\n",
       fine.b.tets.size(), now_s() - began, rms_move(fine, truth[0]), rms_move(fine, truth[1]), rms_move(fine, truth[2]),
       rms_move(fine, truth[3]));
   std::printf(
-      "| seen | loads | map | noise %% | stray %% | noise found, mm (put in) | rejected %% | stiff half, kPa (95 %%) | soft half, kPa (95 "
+      "| seen | loads | map | noise %% | stray %% | noise found, mm (put in) | rejected %% | stiff half, kPa (95 %%) | "
+      "soft half, kPa (95 "
       "%%) | contrast (20) "
-      "| NRMS | NRMS on a load not seen | settled | solves | s (told) |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "| NRMS | NRMS on a load not seen | settled | solves | s (told) "
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   const Vec3 from = normalized({1, -1.2, 0.8});
   struct Row {
     const char* seen;
@@ -214,17 +220,18 @@ void tissue_measured(const Context& context) {
       counted += 1;
     }
     const MeasuredView& v = c.views[0];
-    std::printf("| %s | %zu | %d x %d x %d | %.0f | %.0f | ", row.seen, row.loads, row.grid[0], row.grid[1], row.grid[2], row.noise,
-                row.stray);
+    std::printf("| %s | %zu | %d x %d x %d | %.0f | %.0f | ", row.seen, row.loads, row.grid[0], row.grid[1],
+                row.grid[2], row.noise, row.stray);
     if (v.drawn > 0) {
       std::printf("%.2f (%.2f) | %.1f | %.0f (%.0f to %.0f) | %.0f (%.0f to %.0f)", v.noise_mm, noise[0],
-                  100.0 * static_cast<double>(v.rejected) / static_cast<double>(v.drawn), kpa(0, 0), kpa(0, -1.96), kpa(0, 1.96), kpa(1, 0),
-                  kpa(1, -1.96), kpa(1, 1.96));
+                  100.0 * static_cast<double>(v.rejected) / static_cast<double>(v.drawn), kpa(0, 0), kpa(0, -1.96),
+                  kpa(0, 1.96), kpa(1, 0), kpa(1, -1.96), kpa(1, 1.96));
     } else {
       std::printf("| | %.0f | %.0f", kpa(0, 0), kpa(1, 0));
     }
-    std::printf(" | %.1f | %.3f | %.3f | %.2f | %d | %.0f (%.0f) |\n", kpa(0, 0) / kpa(1, 0), nrms_of(model, body, loads[0], field[0]),
-                nrms_of(model, body, loads[3], field[3]), counted > 0 ? settled / counted : 0, c.fit.solves, c.fit.seconds, c.estimate_s);
+    std::printf(" | %.1f | %.3f | %.3f | %.2f | %d | %.0f (%.0f) |\n", kpa(0, 0) / kpa(1, 0),
+                nrms_of(model, body, loads[0], field[0]), nrms_of(model, body, loads[3], field[3]),
+                counted > 0 ? settled / counted : 0, c.fit.solves, c.fit.seconds, c.estimate_s);
     std::fflush(stdout);
   }
   std::printf("\n");

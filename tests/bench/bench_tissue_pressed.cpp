@@ -87,7 +87,8 @@ void tissue_pressed() {
       if (b.points[p].z < 0.1) fixed.push_back(p);
     }
     const auto with = [&](int iterations) {
-      return TissueDynamics<float>(model, fixed, {.damping_per_s = 150, .factorised_step_s = kUpdateS, .iterations = iterations});
+      return TissueDynamics<float>(model, fixed,
+                                   {.damping_per_s = 150, .factorised_step_s = kUpdateS, .iterations = iterations});
     };
     auto converged = with(40);
     const Course exact = press(b, converged, 1);
@@ -98,14 +99,14 @@ void tissue_pressed() {
       const double factor_s = processor_s() - begin;
       const double mb = static_cast<double>(body.factor_bytes()) / 1e6;
       const Course c = press(b, body, 1);
-      std::printf("| %zu | %g | factorised, %d | %.2f, %.2f | %.3f (%.1f %%) | %.2f, %.1f |\n", b.tets.size(), s.nu, iterations, c.ms,
-                  c.worst_ms, most_off(c, exact), 100 * force_off(c, exact), factor_s, mb);
+      std::printf("| %zu | %g | factorised, %d | %.2f, %.2f | %.3f (%.1f %%) | %.2f, %.1f |\n", b.tets.size(), s.nu,
+                  iterations, c.ms, c.worst_ms, most_off(c, exact), 100 * force_off(c, exact), factor_s, mb);
     }
     TissueDynamics<float> stepped(model, fixed, {.damping_per_s = 150, .step_share = 0.75});
     const int steps = static_cast<int>(std::lround(kUpdateS / stepped.step_s()));
     const Course c = press(b, stepped, steps);
-    std::printf("| %zu | %g | explicit, %d steps | %.2f, %.2f | %.3f (%.1f %%) | |\n", b.tets.size(), s.nu, steps, c.ms, c.worst_ms,
-                most_off(c, exact), 100 * force_off(c, exact));
+    std::printf("| %zu | %g | explicit, %d steps | %.2f, %.2f | %.3f (%.1f %%) | |\n", b.tets.size(), s.nu, steps, c.ms,
+                c.worst_ms, most_off(c, exact), 100 * force_off(c, exact));
     std::fflush(stdout);
   }
   std::printf("\n");

@@ -14,28 +14,33 @@
 namespace osteo::bench {
 namespace {
 
-// One Gauss-Seidel pass over edges and tetrahedra (M. Macklin et al., XPBD, 2016), in single precision, as its open implementations do it.
+// One Gauss-Seidel pass over edges and tetrahedra (M. Macklin et al., XPBD, 2016), in single precision, as its open
+// implementations do it.
 class Xpbd {
  public:
   Xpbd(const test::Block& b, const TissueModel& model, double dt) {
     for (const Vec3& p : b.points) x_.push_back(to_floats(p));
     std::vector<double> mass(b.points.size());
     for (const auto& t : b.tets) {
-      const double v = dot(b.points[t[1]] - b.points[t[0]], cross(b.points[t[2]] - b.points[t[0]], b.points[t[3]] - b.points[t[0]])) / 6;
+      const double v = dot(b.points[t[1]] - b.points[t[0]],
+                           cross(b.points[t[2]] - b.points[t[0]], b.points[t[3]] - b.points[t[0]])) /
+                       6;
       for (const std::uint32_t p : t) mass[p] += v * 1e-9 / 4;
       tets_.push_back({t, static_cast<float>(v), static_cast<float>(1 / (0.05 * v * dt * dt) * 1e-6)});
     }
     for (const double m : mass) w_.push_back(static_cast<float>(1 / m));
     for (const auto& c : model.constraints()) {
       if (c.nodes == 2)
-        edges_.push_back(
-            {{c.node[0], c.node[1]}, static_cast<float>(c.rest), static_cast<float>(c.rest * c.rest / (c.stiffness * dt * dt))});
+        edges_.push_back({{c.node[0], c.node[1]},
+                          static_cast<float>(c.rest),
+                          static_cast<float>(c.rest * c.rest / (c.stiffness * dt * dt))});
     }
   }
   void iterate() {
     for (Edge& e : edges_) {
       auto &p = x_[e.node[0]], &q = x_[e.node[1]];
-      const float d[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]}, l = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+      const float d[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]},
+                  l = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
       const float s = -(l - e.rest) / (w_[e.node[0]] + w_[e.node[1]] + e.compliance) / l;
       for (std::size_t a = 0; a < 3; ++a) {
         p[a] -= w_[e.node[0]] * s * d[a];
@@ -45,12 +50,14 @@ class Xpbd {
     for (Tet& t : tets_) {
       const auto v = [&](int i) { return from_floats(x_[t.node[static_cast<std::size_t>(i)]]); };
       const Vec3 d1 = v(1) - v(0), d2 = v(2) - v(0), d3 = v(3) - v(0);
-      const Vec3 g[4] = {(cross(d2, d3) + cross(d3, d1) + cross(d1, d2)) / -6, cross(d2, d3) / 6, cross(d3, d1) / 6, cross(d1, d2) / 6};
+      const Vec3 g[4] = {(cross(d2, d3) + cross(d3, d1) + cross(d1, d2)) / -6, cross(d2, d3) / 6, cross(d3, d1) / 6,
+                         cross(d1, d2) / 6};
       double sum = static_cast<double>(t.compliance);
       for (std::size_t i = 0; i < 4; ++i) sum += static_cast<double>(w_[t.node[i]]) * dot(g[i], g[i]);
       const double s = -(dot(d1, cross(d2, d3)) / 6 - static_cast<double>(t.rest)) / sum;
       for (std::size_t i = 0; i < 4; ++i)
-        for (std::size_t a = 0; a < 3; ++a) x_[t.node[i]][a] += static_cast<float>(s * static_cast<double>(w_[t.node[i]]) * g[i][a]);
+        for (std::size_t a = 0; a < 3; ++a)
+          x_[t.node[i]][a] += static_cast<float>(s * static_cast<double>(w_[t.node[i]]) * g[i][a]);
     }
   }
   [[nodiscard]] float first() const { return x_[0][0]; }
@@ -70,8 +77,8 @@ class Xpbd {
   std::vector<Tet> tets_;
 };
 
-// The thesis' own structure (section 5.4.1): each point gathers the forces of its edges, faces and tetrahedra, normalising as it goes; in
-// single precision. Its forces as printed are not gradients, so here the right ones.
+// The thesis' own structure (section 5.4.1): each point gathers the forces of its edges, faces and tetrahedra,
+// normalising as it goes; in single precision. Its forces as printed are not gradients, so here the right ones.
 class Gathered {
  public:
   Gathered(const test::Block& b, const TissueModel& model) {
@@ -79,8 +86,12 @@ class Gathered {
     f_.resize(x_.size());
     of_.resize(x_.size());
     for (const auto& c : model.constraints()) {
-      for (std::uint32_t n = 0; n < c.nodes; ++n) of_[c.node[n]].push_back({static_cast<std::uint32_t>(all_.size()), n});
-      all_.push_back({{c.node[0], c.node[1], c.node[2], c.node[3]}, c.nodes, static_cast<float>(c.rest), static_cast<float>(c.stiffness)});
+      for (std::uint32_t n = 0; n < c.nodes; ++n)
+        of_[c.node[n]].push_back({static_cast<std::uint32_t>(all_.size()), n});
+      all_.push_back({{c.node[0], c.node[1], c.node[2], c.node[3]},
+                      c.nodes,
+                      static_cast<float>(c.rest),
+                      static_cast<float>(c.stiffness)});
     }
   }
   void step() {
@@ -133,13 +144,16 @@ class Gathered {
   std::vector<std::array<float, 3>> x_;
   std::vector<V> f_;
   std::vector<Constraint> all_;
-  std::vector<std::vector<std::array<std::uint32_t, 2>>> of_;  // of each point: constraints, and which of their nodes it is
+  std::vector<std::vector<std::array<std::uint32_t, 2>>>
+      of_;  // of each point: constraints, and which of their nodes it is
 };
 
 void throughput() {
   std::printf(
-      "### Steps in time, one core (%s), cubes of voxels\n\n| tetrahedra | certified step ms | closed form, float: tets/ms | steps/s | "
-      "double | thesis' constraints (edges, faces, tetrahedra) in the same loops | thesis' structure (points gather) | one pass of XPBD "
+      "### Steps in time, one core (%s), cubes of voxels\n\n| tetrahedra | certified step ms | closed form, float: "
+      "tets/ms | steps/s | "
+      "double | thesis' constraints (edges, faces, tetrahedra) in the same loops | thesis' structure (points gather) | "
+      "one pass of XPBD "
       "|\n|---|---|---|---|---|---|---|---|\n",
       simd_name(simd()).data());
   for (const int n : {14, 22, 40}) {
@@ -164,13 +178,14 @@ void throughput() {
     };
     const double own = rate([&] { quick.step(); });
     std::printf("| %zu | %.3f | %.0f | %.0f | %.0f | %.0f | %.0f | %.0f |\n", b.tets.size(), 1000 * quick.step_s(), own,
-                own * 1000 / static_cast<double>(b.tets.size()), rate([&] { exact.step(); }), rate([&] { thesis.step(); }),
-                rate([&] { gathered.step(); }), rate([&] { xpbd.iterate(); }));
+                own * 1000 / static_cast<double>(b.tets.size()), rate([&] { exact.step(); }),
+                rate([&] { thesis.step(); }), rate([&] { gathered.step(); }), rate([&] { xpbd.iterate(); }));
   }
   std::printf("\n");
 }
 
-// A post, plucked: where it is after a tenth of a second, by steps of many lengths, against explicit ones of a fiftieth of the limit.
+// A post, plucked: where it is after a tenth of a second, by steps of many lengths, against explicit ones of a fiftieth
+// of the limit.
 void time_steps() {
   const auto b = test::block(6, 6, 12, 5);
   std::vector<std::uint32_t> fixed;
@@ -184,7 +199,8 @@ void time_steps() {
     TissueModel model = TissueModel::of_voxels(b.points, b.tets, std::span(&m, 1), false);
     constexpr double kEnd = 0.1;
     const auto explicit_run = [&](double share, double least) {
-      TissueDynamics<double> d(model, fixed, {.density_kg_m3 = 1000, .damping_per_s = 10, .step_share = share, .least_step_s = least});
+      TissueDynamics<double> d(
+          model, fixed, {.density_kg_m3 = 1000, .damping_per_s = 10, .step_share = share, .least_step_s = least});
       d.set_load(load);
       const double begin = now_s();
       d.step(static_cast<int>(std::lround(kEnd / d.step_s())));
@@ -199,8 +215,8 @@ void time_steps() {
     for (const double share : {0.25, 0.5, 0.9}) {
       const auto [x, h, s, heavier] = explicit_run(share, 0);
       certified = h;
-      std::printf("| explicit, %.2f of the limit | %.4f | %.2g | %.2f | |\n", share, 1000 * h, calibration_error(b.points, x, truth).nrms,
-                  s / kEnd);
+      std::printf("| explicit, %.2f of the limit | %.4f | %.2g | %.2f | |\n", share, 1000 * h,
+                  calibration_error(b.points, x, truth).nrms, s / kEnd);
     }
     for (const double times : {2.0, 4.0}) {
       const auto [x, h, s, heavier] = explicit_run(0.9, times * certified);
@@ -209,13 +225,15 @@ void time_steps() {
     }
     for (const double ms : {0.25, 1.0, 4.0, 10.0}) {
       for (const int iterations : {1, 30}) {
-        ImplicitDynamics d(model, fixed, {.density_kg_m3 = 1000, .damping_per_s = 10, .step_s = ms / 1000, .iterations = iterations});
+        ImplicitDynamics d(model, fixed,
+                           {.density_kg_m3 = 1000, .damping_per_s = 10, .step_s = ms / 1000, .iterations = iterations});
         d.set_load(load);
         const double begin = now_s();
         const int steps = static_cast<int>(std::lround(kEnd / d.step_s()));
         d.step(steps);
-        std::printf("| implicit, %s | %.4f | %.2g | %.2f | %.1f iterations a step |\n", iterations == 1 ? "one iteration" : "to its end",
-                    ms, calibration_error(b.points, d.positions_mm(), truth).nrms, (now_s() - begin) / kEnd,
+        std::printf("| implicit, %s | %.4f | %.2g | %.2f | %.1f iterations a step |\n",
+                    iterations == 1 ? "one iteration" : "to its end", ms,
+                    calibration_error(b.points, d.positions_mm(), truth).nrms, (now_s() - begin) / kEnd,
                     static_cast<double>(d.counts().iterations) / steps);
         std::fflush(stdout);
       }
@@ -224,7 +242,8 @@ void time_steps() {
   }
 }
 
-// A cube held at its base, pushed and pressed on its whole top: its points on a grid of 4, against quadratic elements on one of 16.
+// A cube held at its base, pushed and pressed on its whole top: its points on a grid of 4, against quadratic elements
+// on one of 16.
 void resolution() {
   struct Found {
     std::vector<Vec3> x;
@@ -247,7 +266,8 @@ void resolution() {
       EquilibriumSolver solver(model, model.rest(), load);
       r = solver.solve(model, model.rest(), load.forces_n, {1e-8, 60, 1});
     } else {
-      const FemBody body(cube.b.points, cube.b.tets, {m}, ElasticLaw::neo_hooke, kind == 1 ? TetOrder::t4 : TetOrder::t10);
+      const FemBody body(cube.b.points, cube.b.tets, {m}, ElasticLaw::neo_hooke,
+                         kind == 1 ? TetOrder::t4 : TetOrder::t10);
       const TissueLoad all = body.on_all_points(load);
       EquilibriumSolver solver(body, body.rest(), all);
       r = solver.solve(body, body.rest(), all.forces_n, {1e-8, 60, 2});
@@ -278,7 +298,8 @@ void resolution() {
   };
   const auto exact = in_order(16, truth);
   std::printf(
-      "### Resolution: a cube under shear and pressure on its top, nu 0.45, off quadratic elements of 1/16 (%.0f s)\n\n| voxels along | "
+      "### Resolution: a cube under shear and pressure on its top, nu 0.45, off quadratic elements of 1/16 (%.0f "
+      "s)\n\n| voxels along | "
       "tetrahedra | closed form | s | t4 | s | t10 | s |\n|---|---|---|---|---|---|---|---|\n",
       truth.seconds);
   for (const int n : {4, 8, 12, 16}) {
@@ -311,8 +332,8 @@ void skins() {
   for (int j = 0; j < kUp; ++j) {
     for (int i = 0; i < kAround; ++i) {
       const double a = 2 * 3.14159265 * i / kAround, u = 3.14159265 * (j + 0.5) / kUp;
-      surface.points_mm.push_back(
-          to_floats(Vec3{35 + 33 * std::sin(u) * std::cos(a), 35 + 33 * std::sin(u) * std::sin(a), 35 + 33 * std::cos(u)}));
+      surface.points_mm.push_back(to_floats(
+          Vec3{35 + 33 * std::sin(u) * std::cos(a), 35 + 33 * std::sin(u) * std::sin(a), 35 + 33 * std::cos(u)}));
     }
   }
   for (std::uint32_t j = 0; j + 1 < kUp; ++j) {

@@ -1,28 +1,30 @@
-// Simulated trainees of drawn skill, each scored against sessions of simulated experts and novices: what docs/trainee.md holds. Not a test.
+// Simulated trainees of drawn skill, each scored against sessions of simulated experts and novices: what
+// docs/trainee.md holds. Not a test.
 //   build/release/bin/trainee_bench CASE PROCEDURE FOLDER RUNS PEOPLE ALONE
-// RUNS sessions with every skill drawn by itself (Latin hypercube), PEOPLE people in each of two groups with two sessions each, and of each
-// of kAlone ALONE sessions in which it alone goes through its range, the rest an expert's. Writes FOLDER/runs.json, people.json,
-// alone.json: skills, metrics, items and the trainee's own truth; tests/bench/trainee_table.py makes the tables. What is there already is
-// not done again.
+// RUNS sessions with every skill drawn by itself (Latin hypercube), PEOPLE people in each of two groups with two
+// sessions each, and of each of kAlone ALONE sessions in which it alone goes through its range, the rest an expert's.
+// Writes FOLDER/runs.json, people.json, alone.json: skills, metrics, items and the trainee's own truth;
+// tests/bench/trainee_table.py makes the tables. What is there already is not done again.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <mutex>
 
-#include "osteo/core/base/files.h"
-#include "osteo/core/base/parallel.h"
 #include "osteo/assessment/evidence/score.h"
-#include "osteo/core/statistics/basics.h"
 #include "osteo/assessment/trainee/group.h"
 #include "osteo/assessment/trainee/simulate.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/parallel.h"
+#include "osteo/core/statistics/basics.h"
 
 using namespace osteo;
 
 namespace {
 
-constexpr std::pair<const char*, double TraineeSkill::*> kAlone[] = {
-    {"undercut", &TraineeSkill::undercut}, {"force_control", &TraineeSkill::force_control}, {"region", &TraineeSkill::region}};
+constexpr std::pair<const char*, double TraineeSkill::*> kAlone[] = {{"undercut", &TraineeSkill::undercut},
+                                                                     {"force_control", &TraineeSkill::force_control},
+                                                                     {"region", &TraineeSkill::region}};
 
 struct Job {
   fs::path folder;
@@ -39,15 +41,16 @@ void drill(const TraineeScene& scene, const Job& job) {
   o.seed = job.seed;
   o.most_s = 150;
   o.plan.radius_mm = 3.5;
-  (void)simulate_trainee(scene, world_of(scene.the_case, scene.anatomy), o, create_session_folder(job.folder, scene.the_case.folder, {}));
+  (void)simulate_trainee(scene, world_of(scene.the_case, scene.anatomy), o,
+                         create_session_folder(job.folder, scene.the_case.folder, {}));
 }
 
 Json scored(const TraineeScene& scene, const Job& job, const Reference& reference) {
   const fs::path kept = job.folder / "scored.json";
   if (!fs::exists(kept)) {
     const SessionReader session(job.folder / "stream.oss");
-    const Score score = score_session(session, world_of(scene.the_case, scene.anatomy), scene.anatomy.structures.get(), &scene.procedure,
-                                      &reference, job.name);
+    const Score score = score_session(session, world_of(scene.the_case, scene.anatomy), scene.anatomy.structures.get(),
+                                      &scene.procedure, &reference, job.name);
     write_file(kept, score_json(score, false).dump());
   }
   return Json::parse(read_text(kept)).value();
@@ -121,11 +124,12 @@ int main(int argc, char** argv) {
     Reference reference;
     for (std::size_t n = 0; n < reference_jobs.size(); ++n)
       reference.sessions.push_back(read_reference(
-          SessionReader(reference_jobs[n].folder / "stream.oss"), world_of(scene.the_case, scene.anatomy), scene.anatomy.structures.get(),
+          SessionReader(reference_jobs[n].folder / "stream.oss"), world_of(scene.the_case, scene.anatomy),
+          scene.anatomy.structures.get(),
           {reference_jobs[n].name, reference_jobs[n].name,
            n < static_cast<std::size_t>(kReferenceExperts) ? ReferenceGroup::expert : ReferenceGroup::novice}));
-    for (const auto& [jobs, file] :
-         {std::pair{run_jobs, "runs.json"}, std::pair{people_jobs, "people.json"}, std::pair{alone_jobs, "alone.json"}}) {
+    for (const auto& [jobs, file] : {std::pair{run_jobs, "runs.json"}, std::pair{people_jobs, "people.json"},
+                                     std::pair{alone_jobs, "alone.json"}}) {
       std::vector<Json> scores(jobs.size());
       const auto& these = jobs;
       parallel_for(these.size(), 1, 0, [&](std::size_t from, std::size_t to) {

@@ -1,4 +1,5 @@
-// Live tutoring and playback: how near hands stay, energy, what a bad network and a flood cost. Tables of docs/tutoring.md.
+// Live tutoring and playback: how near hands stay, energy, what a bad network and a flood cost. Tables of
+// docs/tutoring.md.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -10,9 +11,9 @@
 #include "bench.h"
 #include "flood.h"
 #include "osteo/core/base/files.h"
-#include "osteo/session/recording/script.h"
 #include "osteo/network/tutor/live_run.h"
 #include "osteo/network/tutor/playback.h"
+#include "osteo/session/recording/script.h"
 #include "tutor/live_pair.h"
 
 namespace osteo {
@@ -66,7 +67,8 @@ void live_row(double rtt_ms, double loss, bool two_way) {
   for (int t = 0; t < ticks; ++t) {
     const double at = t * 1e-3;
     pair.host_hand_.device().set_hand(
-        {}, {-6 * std::cos(2 * M_PI * at / 2.4), 2 * std::sin(2 * M_PI * at / 3.1), at < 0.3 ? 9.0 - 15 * at : 4.6}, 0.6);
+        {}, {-6 * std::cos(2 * M_PI * at / 2.4), 2 * std::sin(2 * M_PI * at / 3.1), at < 0.3 ? 9.0 - 15 * at : 4.6},
+        0.6);
     place += (pair.guest_hand_.device().position_mm() - place) * 0.01;
     pair.guest_hand_.device().set_hand({}, place, 0.1);
     pair.step();
@@ -76,7 +78,8 @@ void live_row(double rtt_ms, double loss, bool two_way) {
     guest.step(pair.guest_hand_.device().position_mm(), pair.host_shown_->shown());
   }
   const double seconds = ticks * 1e-3;
-  const auto bytes_out = static_cast<double>(pair.to_guest_.bytes) / seconds, bytes_in = static_cast<double>(pair.to_host_.bytes) / seconds;
+  const auto bytes_out = static_cast<double>(pair.to_guest_.bytes) / seconds,
+             bytes_in = static_cast<double>(pair.to_host_.bytes) / seconds;
   pair.settle();
   const bool same = pair.operation_->world().hash() == pair.copy_->bone_hash();
   // A push of 2 N for 0.1 s in free air: what is left of the motion after five seconds.
@@ -89,15 +92,16 @@ void live_row(double rtt_ms, double loss, bool two_way) {
     if (t > 2100 && t < 4000) early = std::max(early, pushed.kinetic_mj());
     if (t > 7000) late = std::max(late, pushed.kinetic_mj());
   }
-  std::printf("| %.0f | %.0f %% | %s | %.2f | %.2f | %.2f | %.1f, %.1f | %.1f | %.0f %% | %.0f, %.0f | %s |\n", rtt_ms, 100 * loss,
-              two_way ? "both" : "one", quantile(apart, 0.5), quantile(apart, 0.95), quantile(apart, 1), host.work_mj + guest.work_mj,
-              host.most_mj + guest.most_mj, host.braked_mj + guest.braked_mj, early > 0 ? 100 * late / early : 0.0, bytes_out / 1000,
-              bytes_in / 1000, same ? "same" : "DIFFERS");
+  std::printf("| %.0f | %.0f %% | %s | %.2f | %.2f | %.2f | %.1f, %.1f | %.1f | %.0f %% | %.0f, %.0f | %s |\n", rtt_ms,
+              100 * loss, two_way ? "both" : "one", quantile(apart, 0.5), quantile(apart, 0.95), quantile(apart, 1),
+              host.work_mj + guest.work_mj, host.most_mj + guest.most_mj, host.braked_mj + guest.braked_mj,
+              early > 0 ? 100 * late / early : 0.0, bytes_out / 1000, bytes_in / 1000, same ? "same" : "DIFFERS");
   std::fflush(stdout);
 }
 
 // The groove of the unit test in `seconds`, played back.
-void playback_row(const std::filesystem::path& folder, double seconds, double stiffness, PlaybackMode mode, Pace pace, double leash_mm) {
+void playback_row(const std::filesystem::path& folder, double seconds, double stiffness, PlaybackMode mode, Pace pace,
+                  double leash_mm) {
   Script s;
   s.tool = burr_index(BurrKind::cutting, 4);
   for (const auto& [t, at, on] : std::initializer_list<std::tuple<double, Vec3, bool>>{{0, {-6, 0, 8}, true},
@@ -119,23 +123,26 @@ void playback_row(const std::filesystem::path& folder, double seconds, double st
   params.mode = mode;
   params.pace = pace;
   params.leash_mm = leash_mm;
-  auto playback = std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(SessionReader(expert), 0, 0)), params);
+  auto playback =
+      std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(SessionReader(expert), 0, 0)), params);
   RehearsalOptions l;
   l.follow.surface = false;
   l.session_file = led;
   playback->patience_s = 20;
-  auto devices = playback_devices(
-      std::make_unique<FollowingHand>(stiffness, from_floats(playback->lesson->hands.front().front().position_mm), playback), playback,
-      l.haptics);
+  auto devices =
+      playback_devices(std::make_unique<FollowingHand>(
+                           stiffness, from_floats(playback->lesson->hands.front().front().position_mm), playback),
+                       playback, l.haptics);
   l.actions = playback_actions(*playback);
   const RehearsalSummary sum = Rehearsal(World(test::bar(0.5, 0.3)), std::move(devices), l, {}).run_to_end({});
   const GuidedFacts f = measure_guided(SessionReader(led), playback->begun);
   double way = 0;
   for (std::size_t i = 1; i < s.waypoints.size(); ++i) way += length(s.waypoints[i].at_mm - s.waypoints[i - 1].at_mm);
-  std::printf("| %.1f s (%.0f mm/s) | %.0f N/m | %s, %s %.1f mm | %.2f | %.2f | %.2f | %.1f s | %.2f N | %.1f mJ |\n", seconds,
-              way / seconds, stiffness, std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(mode)]).c_str(),
-              pace == Pace::clock ? "clock" : "way, leash", pace == Pace::clock ? 0 : leash_mm, f.rms_mm, f.p95_mm, f.most_mm,
-              static_cast<double>(sum.ticks - playback->begun) / 1000, f.most_pull_n, f.most_work_mj);
+  std::printf("| %.1f s (%.0f mm/s) | %.0f N/m | %s, %s %.1f mm | %.2f | %.2f | %.2f | %.1f s | %.2f N | %.1f mJ |\n",
+              seconds, way / seconds, stiffness,
+              std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(mode)]).c_str(),
+              pace == Pace::clock ? "clock" : "way, leash", pace == Pace::clock ? 0 : leash_mm, f.rms_mm, f.p95_mm,
+              f.most_mm, static_cast<double>(sum.ticks - playback->begun) / 1000, f.most_pull_n, f.most_work_mj);
   std::fflush(stdout);
 }
 
@@ -169,8 +176,9 @@ void flood_row(double packets_a_s, double seconds) {
   const std::uint64_t sent = flood ? flood->sent() : 0;
   flood.reset();
   const RehearsalSummary sum = r.stop();
-  std::printf("| %.0f | %.0f | %.0f, %.0f, %.0f | %.0f, %.0f | %+.1f MB | %llu |\n", packets_a_s, static_cast<double>(sent) / seconds,
-              sum.loop->lateness.quantile_us(0.5), sum.loop->lateness.quantile_us(0.99), sum.loop->lateness.quantile_us(0.999),
+  std::printf("| %.0f | %.0f | %.0f, %.0f, %.0f | %.0f, %.0f | %+.1f MB | %llu |\n", packets_a_s,
+              static_cast<double>(sent) / seconds, sum.loop->lateness.quantile_us(0.5),
+              sum.loop->lateness.quantile_us(0.99), sum.loop->lateness.quantile_us(0.999),
               sum.loop->work.quantile_us(0.5), sum.loop->work.quantile_us(0.999), bench::resident_mb() - before,
               static_cast<unsigned long long>(host.refused()));
   std::fflush(stdout);
@@ -191,11 +199,14 @@ void off_is_free() {
       if (led) op.act(action_of(far_guide(0, 1, a.traits(), 1, 3)));
       const auto begin = std::chrono::steady_clock::now();
       for (int t = 0; t < 2000; ++t) op.step(0);
-      best[led] = std::min(best[led], std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count() / 2000);
+      best[led] =
+          std::min(best[led],
+                   std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count() / 2000);
     }
   }
   std::printf(
-      "\nA tick of two hands: %.2f us with nobody led, %.2f us where one leads the other (%.3f of it); GuideLaw is %zu bytes a hand.\n",
+      "\nA tick of two hands: %.2f us with nobody led, %.2f us where one leads the other (%.3f of it); GuideLaw is %zu "
+      "bytes a hand.\n",
       best[0], best[1], best[1] / best[0], sizeof(GuideLaw));
 }
 
@@ -203,7 +214,8 @@ void off_is_free() {
 
 void bench_tutoring(const Context&) {
   std::printf(
-      "\n## Live tutoring\n\nJitter each way a fifth of the RTT, 1 %% duplicates. Work of the pulls on both hands (at the end, most), what "
+      "\n## Live tutoring\n\nJitter each way a fifth of the RTT, 1 %% duplicates. Work of the pulls on both hands (at "
+      "the end, most), what "
       "their "
       "brakes took; left: kinetic energy 5 s after a push.\n\n"
       "| RTT ms | lost | led | apart p50 mm | p95 | most | work mJ | braked mJ | left | kB/s out, in | bone |\n"
@@ -226,7 +238,8 @@ void bench_tutoring(const Context&) {
     }
   }
   std::printf(
-      "\n## A flood\n\n| packets/s asked | sent | servo late p50, p99, p99.9 us | work p50, p99.9 us | memory | refused "
+      "\n## A flood\n\n| packets/s asked | sent | servo late p50, p99, p99.9 us | work p50, p99.9 us | memory | "
+      "refused "
       "|\n|---|---|---|---|---|---|\n");
   for (int round = 0; round < 2; ++round) {
     for (const double rate : {0.0, 100'000.0}) flood_row(rate, 10);

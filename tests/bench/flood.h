@@ -24,7 +24,8 @@ inline double resident_mb() {
   return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
-// Packets as fast as asked to a port of this machine: of random bytes, forged pairings, real ones once more, of another key.
+// Packets as fast as asked to a port of this machine: of random bytes, forged pairings, real ones once more, of another
+// key.
 class Flood {
  public:
   Flood(int port, double packets_a_s, const std::vector<Bytes>& kinds) {
@@ -36,14 +37,16 @@ class Flood {
       to.sin_port = htons(static_cast<std::uint16_t>(port));
       const auto begin = std::chrono::steady_clock::now();
       while (!stop_) {
-        const double due = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * packets_a_s;
+        const double due =
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * packets_a_s;
         if (static_cast<double>(sent_) >= due) {
           std::this_thread::sleep_for(std::chrono::microseconds(200));
           continue;
         }
         for (int i = 0; i < 20; ++i) {
           const Bytes& b = kinds[sent_++ % kinds.size()];
-          static_cast<void>(::sendto(fd, b.data(), b.size(), MSG_DONTWAIT, reinterpret_cast<const sockaddr*>(&to), sizeof to));
+          static_cast<void>(
+              ::sendto(fd, b.data(), b.size(), MSG_DONTWAIT, reinterpret_cast<const sockaddr*>(&to), sizeof to));
         }
       }
       ::close(fd);
@@ -82,7 +85,8 @@ class Crowd {
       std::vector<std::uint8_t> ignored(1 << 16);
       const auto begin = std::chrono::steady_clock::now();
       while (!stop_) {
-        const double due = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * messages_a_s;
+        const double due =
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * messages_a_s;
         if (static_cast<double>(sent_) >= due) {
           std::this_thread::sleep_for(std::chrono::microseconds(200));
           continue;

@@ -1,4 +1,5 @@
-// OpenIGTLink as it comes over a connection, in pieces: whatever a tracker or a server says. The first byte tells how long the pieces are.
+// OpenIGTLink as it comes over a connection, in pieces: whatever a tracker or a server says. The first byte tells how
+// long the pieces are.
 #include <algorithm>
 #include <cstdint>
 #include <span>

@@ -7,7 +7,8 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    static_cast<void>(osteo::parse_pipeline({reinterpret_cast<const char*>(data), size}, {{"source", "x"}, {"case", "y"}}));
+    static_cast<void>(
+        osteo::parse_pipeline({reinterpret_cast<const char*>(data), size}, {{"source", "x"}, {"case", "y"}}));
   } catch (const osteo::Error&) {
   }
   return 0;

@@ -1,4 +1,5 @@
-// The stimulator's door, and the console's end of it: bodies of messages, the first byte of each says whose and how long.
+// The stimulator's door, and the console's end of it: bodies of messages, the first byte of each says whose and how
+// long.
 #include <algorithm>
 #include <cstdint>
 #include <memory>

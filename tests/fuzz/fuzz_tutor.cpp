@@ -13,7 +13,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (const auto p = decode_hand(all)) static_cast<void>(encode(*p));
   if (const auto p = decode_log(all)) static_cast<void>(encode(*p));
   if (const auto p = decode_blob(all)) static_cast<void>(encode(*p));
-  // A host and a guest cost more than a packet: for one first byte in eight. Packets come one after another, each behind its length.
+  // A host and a guest cost more than a packet: for one first byte in eight. Packets come one after another, each
+  // behind its length.
   if (size == 0 || data[0] % 8 != 0) return 0;
   static const auto far = std::make_shared<FarDevice>();
   LiveHost host("K7MX2QPA", Bytes(2500, 7), 2, far);

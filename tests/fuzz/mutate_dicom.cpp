@@ -1,5 +1,5 @@
-// Flipped, cut and spliced copies of DICOM files through scan, placement and decoding: none may crash, hang or eat memory.
-// usage: mutate_dicom COUNT [SEED] [FOLDER...]   exits 1 and names file and seed when one does
+// Flipped, cut and spliced copies of DICOM files through scan, placement and decoding: none may crash, hang or eat
+// memory. usage: mutate_dicom COUNT [SEED] [FOLDER...]   exits 1 and names file and seed when one does
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -54,7 +54,9 @@ std::vector<fs::path> inputs(const std::vector<std::string>& folders, const fs::
 void mutate(std::vector<char>& bytes, std::mt19937_64& random) {
   const auto pick = [&](std::size_t n) { return n == 0 ? 0 : static_cast<std::size_t>(random() % n); };
   // Headers are where the parsers are; half of the changes go there.
-  const auto place = [&] { return random() % 2 == 0 ? pick(std::min<std::size_t>(bytes.size(), 4000)) : pick(bytes.size()); };
+  const auto place = [&] {
+    return random() % 2 == 0 ? pick(std::min<std::size_t>(bytes.size(), 4000)) : pick(bytes.size());
+  };
   switch (random() % 5) {
     case 0:
       for (std::size_t n = 1 + pick(20); n > 0; --n) bytes[place()] ^= static_cast<char>(1 << pick(8));
@@ -71,7 +73,8 @@ void mutate(std::vector<char>& bytes, std::mt19937_64& random) {
       break;
     }
     default: {  // lengths and numbers at their limits
-      static constexpr std::uint32_t kLimits[] = {0, 1, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFE, 0xFFFFFFFF, 0xFFFF, 0x10000};
+      static constexpr std::uint32_t kLimits[] = {0,          1,          0x7FFFFFFF, 0x80000000,
+                                                  0xFFFFFFFE, 0xFFFFFFFF, 0xFFFF,     0x10000};
       for (std::size_t n = 1 + pick(4); n > 0; --n) {
         const std::size_t at = place();
         const std::uint32_t v = kLimits[pick(8)];
@@ -122,8 +125,8 @@ int main(int argc, char** argv) {
   const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
   std::vector<std::string> folders(argv + std::min(argc, 3), argv + argc);
   if (folders.empty()) {
-    for (const char* f : {"dicom_hard_files", "dicom_transfer_syntaxes", "dicom_hard_geometry", "dicom_ct_skull_phantom/S21570/S4010",
-                          "dicom_ct_head_tilt_gaps"}) {
+    for (const char* f : {"dicom_hard_files", "dicom_transfer_syntaxes", "dicom_hard_geometry",
+                          "dicom_ct_skull_phantom/S21570/S4010", "dicom_ct_head_tilt_gaps"}) {
       folders.push_back(std::string(OSTEO_SHARED_DATA) + "/" + f);
     }
   }
@@ -151,7 +154,8 @@ int main(int argc, char** argv) {
         mutate(bytes, random);
         std::ofstream(copy, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
         std::ofstream(mark) << n << ' ' << original.string();
-        // Processor time, not the clock's: other programs may have the machine. The alarm is for a wait that never ends.
+        // Processor time, not the clock's: other programs may have the machine. The alarm is for a wait that never
+        // ends.
         ::alarm(600);
         const double start = processor_seconds();
         try {

@@ -1,6 +1,6 @@
-// Kills a recording program again and again in the middle of its writing, and looks for every record that it had been told was written; in
-// turns by the writer alone and by the recorder with its threads.
-// usage: kill_sessions KILLS FOLDER
+// Kills a recording program again and again in the middle of its writing, and looks for every record that it had been
+// told was written; in turns by the writer alone and by the recorder with its threads. usage: kill_sessions KILLS
+// FOLDER
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -39,7 +39,8 @@ std::vector<osteo::TickRecord> some_ticks(std::uint64_t first, std::size_t n) {
     const std::size_t n = 1 + random() % 400;
     for (osteo::TickRecord& t : some_ticks(tick, n)) {
       t.voxels_changed = static_cast<std::uint32_t>(random() % 8);
-      std::vector<osteo::VoxelChange> changes(t.voxels_changed, {static_cast<osteo::VoxelKey>(random() % 100000), 0.5F});
+      std::vector<osteo::VoxelChange> changes(t.voxels_changed,
+                                              {static_cast<osteo::VoxelKey>(random() % 100000), 0.5F});
       while (reader.ticks.room() < 1 || !reader.changes.push(changes)) std::this_thread::yield();
       reader.ticks.push(t);
     }
@@ -76,9 +77,11 @@ int main(int argc, char** argv) {
   const std::filesystem::path folder = argc > 2 ? argv[2] : "kill-sessions";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
-  auto* const written =
-      new (::mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0)) std::atomic<std::uint64_t>(0);
-  { const osteo::SessionWriter once(folder / "once.oss", {}); }  // makes the plates that a header tells of, so that children need not
+  auto* const written = new (::mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0))
+      std::atomic<std::uint64_t>(0);
+  {
+    const osteo::SessionWriter once(folder / "once.oss", {});
+  }  // makes the plates that a header tells of, so that children need not
   std::mt19937 random(11);
   std::uint64_t acknowledged = 0, recovered = 0;
   int torn = 0;

@@ -62,8 +62,8 @@ struct Times {
     const auto at = [](const std::vector<double>& v, double share) {
       return v[static_cast<std::size_t>(share * static_cast<double>(v.size() - 1))];
     };
-    std::printf("%s: median %.2f s, p95 %.2f s; of that its own %.2f s, %.2f s\n", what, at(wall_s, 0.5), at(wall_s, 0.95), at(own_s, 0.5),
-                at(own_s, 0.95));
+    std::printf("%s: median %.2f s, p95 %.2f s; of that its own %.2f s, %.2f s\n", what, at(wall_s, 0.5),
+                at(wall_s, 0.95), at(own_s, 0.5), at(own_s, 0.95));
   }
 };
 

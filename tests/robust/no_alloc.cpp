@@ -1,4 +1,5 @@
-// The servo neither allocates nor locks: every way to do so is counted while a tick runs. The first case proves that the counting works.
+// The servo neither allocates nor locks: every way to do so is counted while a tick runs. The first case proves that
+// the counting works.
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <pthread.h>
@@ -50,12 +51,14 @@ void free(void* p) {
 }
 int pthread_mutex_lock(pthread_mutex_t* m) {
   offence();
-  static int (*const real)(pthread_mutex_t*) = reinterpret_cast<int (*)(pthread_mutex_t*)>(::dlsym(RTLD_NEXT, "pthread_mutex_lock"));
+  static int (*const real)(pthread_mutex_t*) =
+      reinterpret_cast<int (*)(pthread_mutex_t*)>(::dlsym(RTLD_NEXT, "pthread_mutex_lock"));
   return real(m);
 }
 int pthread_cond_wait(pthread_cond_t* c, pthread_mutex_t* m) {
   offence();
-  static auto* const real = reinterpret_cast<int (*)(pthread_cond_t*, pthread_mutex_t*)>(::dlsym(RTLD_NEXT, "pthread_cond_wait"));
+  static auto* const real =
+      reinterpret_cast<int (*)(pthread_cond_t*, pthread_mutex_t*)>(::dlsym(RTLD_NEXT, "pthread_cond_wait"));
   return real(c, m);
 }
 }
@@ -98,7 +101,8 @@ TEST(Servo, NeitherAllocatesNorLocks) {
 #ifdef OSTEO_NOT_COUNTED
   GTEST_SKIP() << "sanitizers have an allocator of their own";
 #endif
-  for (const ContactMethod method : {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy}) {
+  for (const ContactMethod method :
+       {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy}) {
     auto bone = test::slab(0.5);
     HapticSetup setup;
     setup.params.contact.method = method;
@@ -112,7 +116,8 @@ TEST(Servo, NeitherAllocatesNorLocks) {
     auto& reader = stream.add_reader(1 << 15, 1 << 22);
     Strokes script;
     script.axis = {0.6, 0, 0.8};
-    for (int i = 0; i <= 40; ++i) script.waypoints.push_back({0.1 * i, {4 * std::sin(i), 4 * std::cos(i), 4 - 0.2 * i}, i % 5 != 0});
+    for (int i = 0; i <= 40; ++i)
+      script.waypoints.push_back({0.1 * i, {4 * std::sin(i), 4 * std::cos(i), 4 - 0.2 * i}, i % 5 != 0});
     std::vector<std::unique_ptr<ScriptedDevice>> devices;
     std::vector<Device*> hands;
     for (const int tool : {3, instrument_index("sucker 8 Fr"), 10, instrument_index("probe 1 mm")}) {
@@ -124,8 +129,8 @@ TEST(Servo, NeitherAllocatesNorLocks) {
     // Settings change and a scene is handed over in between.
     HapticsParams softer = setup.params;
     softer.contact.stiffness_n_per_mm = 1;
-    const Handover handover{SceneAction::setting(static_cast<std::uint32_t>(setting_number("stiffness_n_per_mm")), 1), nullptr, false,
-                            &softer};
+    const Handover handover{SceneAction::setting(static_cast<std::uint32_t>(setting_number("stiffness_n_per_mm")), 1),
+                            nullptr, false, &softer};
     offences = 0;
     watched = true;
     while (servo.step(0)) {

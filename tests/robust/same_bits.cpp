@@ -1,17 +1,17 @@
-// Prints hashes of what the servo computes and of what it starts from, in full precision. check_same_bits.py runs it as other machines
-// would.
+// Prints hashes of what the servo computes and of what it starts from, in full precision. check_same_bits.py runs it as
+// other machines would.
 #include <cmath>
 #include <cstdio>
 
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/simd.h"
-#include "osteo/simulation/bone/plates.h"
 #include "osteo/geometry/distance/distance_map.h"
+#include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/geometry/mesh/soup.h"
+#include "osteo/simulation/bone/plates.h"
 #include "osteo/simulation/haptics/fields.h"
 #include "osteo/simulation/haptics/servo.h"
 #include "osteo/simulation/haptics/vibration.h"
-#include "osteo/geometry/mesh/bone_surface.h"
-#include "osteo/geometry/mesh/soup.h"
 #include "osteo/simulation/tissue/dynamics.h"
 #include "slab.h"
 #include "tissue/block.h"
@@ -57,19 +57,23 @@ void tools() {
         sum.add(shaft_cut_depth(tool)(share * burr.shaft().volume_mm3(), cosine));
       }
     }
-    const BurrSamples inside = sample_head(burr.head(), burr.falloff_mm3_per_s_per_n_per_rad / burr.rate_mm3_per_s_per_n);
-    const BurrSurface surface = sample_head_surface(burr.head(), burr.falloff_mm3_per_s_per_n_per_rad / burr.rate_mm3_per_s_per_n, 500);
+    const BurrSamples inside =
+        sample_head(burr.head(), burr.falloff_mm3_per_s_per_n_per_rad / burr.rate_mm3_per_s_per_n);
+    const BurrSurface surface =
+        sample_head_surface(burr.head(), burr.falloff_mm3_per_s_per_n_per_rad / burr.rate_mm3_per_s_per_n, 500);
     sum.add(inside.offset_mm), sum.add(inside.inward), sum.add(inside.efficiency), sum.add(inside.sample_volume_mm3);
     sum.add(surface.offset_mm), sum.add(surface.inward), sum.add(surface.efficiency);
   }
-  for (const PlateModel& p : plate_library()) sum.add(p.mesh.points_mm), sum.add(p.mesh.normals), sum.add(p.moving.points_mm);
+  for (const PlateModel& p : plate_library())
+    sum.add(p.mesh.points_mm), sum.add(p.mesh.normals), sum.add(p.moving.points_mm);
   sum.print("tools");
 }
 
 void vibration_and_turns() {
   Sum sum;
   Vibration vibration(default_vibration());
-  for (int n = 0; n < 20'000; ++n) sum.add(vibration.step(n % 3 == 0 ? BurrKind::diamond : BurrKind::cutting, 0.001 * n, 1e-3));
+  for (int n = 0; n < 20'000; ++n)
+    sum.add(vibration.step(n % 3 == 0 ? BurrKind::diamond : BurrKind::cutting, 0.001 * n, 1e-3));
   for (int n = -500; n < 500; ++n) sum.add(rotation_about({1, 2, 3}, normalized(Vec3{1, 0.1 * n, 2}), 0.013 * n));
   sum.print("vibration-and-turns");
 }
@@ -121,7 +125,8 @@ void servo(ContactMethod method, int tool) {
   Strokes script;
   script.tool = tool;
   script.axis = {0.6, 0, 0.8};
-  for (int i = 0; i <= 30; ++i) script.waypoints.push_back({0.1 * i, {0.3 * (i % 7) - 1, 0.4 * (i % 5) - 1, 4 - 0.2 * i}, i % 5 != 0});
+  for (int i = 0; i <= 30; ++i)
+    script.waypoints.push_back({0.1 * i, {0.3 * (i % 7) - 1, 0.4 * (i % 5) - 1, 4 - 0.2 * i}, i % 5 != 0});
   ScriptedDevice device(script, 1000);
   Servo loop(renderer, device, stream, 1000);
   while (loop.step(0)) {
@@ -140,8 +145,9 @@ void servo(ContactMethod method, int tool) {
     sum.add(change.density);
     ++changes;
   }
-  sum.print("servo-" + std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)]) + "-tool-" + std::to_string(tool) +
-            "-" + std::to_string(ticks) + "-ticks-" + std::to_string(changes) + "-changes-" + bone.hash());
+  sum.print("servo-" + std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)]) + "-tool-" +
+            std::to_string(tool) + "-" + std::to_string(ticks) + "-ticks-" + std::to_string(changes) + "-changes-" +
+            bone.hash());
 }
 
 }  // namespace
@@ -155,7 +161,8 @@ int main() {
   vibration_and_turns();
   distances();
   tissue();
-  for (const ContactMethod m : {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy}) {
+  for (const ContactMethod m :
+       {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy}) {
     servo(m, burr_index(BurrKind::cutting, 4));
     servo(m, burr_index(BurrKind::diamond, 3, BurrShape::taper));
   }

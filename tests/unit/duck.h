@@ -1,5 +1,5 @@
-// A smooth closed shape with everything known: surface, normals, and a recording of a probe moving over it with a known force. It stands
-// for the scanned duck of D. Morris 2006, chapter 7.
+// A smooth closed shape with everything known: surface, normals, and a recording of a probe moving over it with a known
+// force. It stands for the scanned duck of D. Morris 2006, chapter 7.
 #pragma once
 #include <cmath>
 #include <vector>
@@ -22,7 +22,8 @@ inline double duck(Vec3 x) {
 }
 inline Vec3 duck_normal(Vec3 x) {
   const double e = 1e-5;
-  return normalized({duck(x + Vec3{e, 0, 0}) - duck(x - Vec3{e, 0, 0}), duck(x + Vec3{0, e, 0}) - duck(x - Vec3{0, e, 0}),
+  return normalized({duck(x + Vec3{e, 0, 0}) - duck(x - Vec3{e, 0, 0}),
+                     duck(x + Vec3{0, e, 0}) - duck(x - Vec3{0, e, 0}),
                      duck(x + Vec3{0, 0, e}) - duck(x - Vec3{0, 0, e})});
 }
 
@@ -50,15 +51,16 @@ inline TriangleSoup duck_mesh(int rings, int sectors, double scale = 1, Vec3 off
   return m;
 }
 
-/// What a stiff probe would have recorded: it runs over the duck with a normal force of 1.2 +- 0.8 N and Coulomb friction; the device lies
-/// where a spring of k = 0.5 N/mm explains the force (chapter 7's method).
+/// What a stiff probe would have recorded: it runs over the duck with a normal force of 1.2 +- 0.8 N and Coulomb
+/// friction; the device lies where a spring of k = 0.5 N/mm explains the force (chapter 7's method).
 struct DuckTick {
   Vec3 surface_mm, device_mm, force_n;
 };
 inline constexpr double kDuckStiffness = 0.5;
 inline std::vector<DuckTick> duck_recording(double friction, double seconds = 20, double rate_hz = 1000) {
   const auto place = [](double s) {
-    const double t = M_PI / 2 + 0.9 * std::sin(0.83 * s) + 0.15 * std::sin(2.9 * s), p = 0.9 * s + 0.4 * std::sin(1.7 * s);
+    const double t = M_PI / 2 + 0.9 * std::sin(0.83 * s) + 0.15 * std::sin(2.9 * s),
+                 p = 0.9 * s + 0.4 * std::sin(1.7 * s);
     const Vec3 d{std::sin(t) * std::cos(p), std::sin(t) * std::sin(p), std::cos(t)};
     return d * duck_radius(d);
   };

@@ -56,12 +56,14 @@ inline void random_action(EditDocument& d, std::mt19937& random, bool history = 
   const Frame& f = d.ct().frame;
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
   const auto point = [&] {
-    return f.world_from_index({below(f.dims[0] * 10) / 10.0, below(f.dims[1] * 10) / 10.0, below(f.dims[2] * 10) / 10.0});
+    return f.world_from_index(
+        {below(f.dims[0] * 10) / 10.0, below(f.dims[1] * 10) / 10.0, below(f.dims[2] * 10) / 10.0});
   };
   const auto any_structure = [&] {
     return d.structures().empty()
                ? 0
-               : static_cast<int>(d.structures()[static_cast<std::size_t>(below(static_cast<int>(d.structures().size())))].is.value);
+               : static_cast<int>(
+                     d.structures()[static_cast<std::size_t>(below(static_cast<int>(d.structures().size())))].is.value);
   };
   const int what = below(100);
   if (history && what < 15) {
@@ -94,7 +96,8 @@ inline void random_action(EditDocument& d, std::mt19937& random, bool history = 
                                below(2) == 0 ? StructureRole::at_risk : StructureRole::landmark});
   } else if (what < 94) {
     if (const int value = any_structure(); value > 0)
-      d.apply(ChangeStructureEdit{value, "renamed " + std::to_string(random()), {below(256), 2, 3}, StructureRole::at_risk});
+      d.apply(ChangeStructureEdit{
+          value, "renamed " + std::to_string(random()), {below(256), 2, 3}, StructureRole::at_risk});
   } else if (what < 96) {
     if (const int value = any_structure(); value > 0) d.apply(DeleteStructureEdit{value});
   } else if (const int value = any_structure(); value > 0) {

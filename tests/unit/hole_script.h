@@ -4,8 +4,8 @@
 
 namespace osteo::test {
 
-/// Holes from above in what has its upper face at z = 4: one each second from 0.2 to 0.6 s of it, 4 mm apart from `first_x` on, six in a
-/// row at most, down to `deep_z`.
+/// Holes from above in what has its upper face at z = 4: one each second from 0.2 to 0.6 s of it, 4 mm apart from
+/// `first_x` on, six in a row at most, down to `deep_z`.
 inline Script holes(int count, double first_x, double deep_z) {
   Script s;
   s.axis = {0, 0.3, 0.95};

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <string>
 
-#include "osteo/imaging/io/surface_io.h"
 #include "osteo/geometry/mesh/soup.h"
+#include "osteo/imaging/io/surface_io.h"
 
 namespace osteo::test {
 
@@ -15,13 +15,16 @@ namespace osteo::test {
 inline TriangleSoup sphere(double radius, int levels, Vec3 centre = {}) {
   const double g = std::numbers::phi;
   TriangleSoup s;
-  s.points_mm = {{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0}, {0, -1, g}, {0, 1, g}, {0, -1, -g}, {0, 1, -g}, {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}};
-  s.triangles = {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
-                 {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8}, {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+  s.points_mm = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+                 {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
+  s.triangles = {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+                 {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+                 {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
   for (int l = 0; l < levels; ++l) {
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middle;
     const auto mid = [&](std::uint32_t a, std::uint32_t b) {
-      const auto [it, made] = middle.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<std::uint32_t>(s.points_mm.size()));
+      const auto [it, made] =
+          middle.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<std::uint32_t>(s.points_mm.size()));
       if (made) s.points_mm.push_back((s.points_mm[a] + s.points_mm[b]) * 0.5);
       return it->second;
     };
@@ -40,8 +43,10 @@ inline TriangleSoup sphere(double radius, int levels, Vec3 centre = {}) {
 /// An axis-aligned box of 12 triangles facing out.
 inline TriangleSoup box(Vec3 lo, Vec3 hi) {
   TriangleSoup s;
-  for (int c = 0; c < 8; ++c) s.points_mm.push_back({(c & 1) != 0 ? hi.x : lo.x, (c & 2) != 0 ? hi.y : lo.y, (c & 4) != 0 ? hi.z : lo.z});
-  s.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  for (int c = 0; c < 8; ++c)
+    s.points_mm.push_back({(c & 1) != 0 ? hi.x : lo.x, (c & 2) != 0 ? hi.y : lo.y, (c & 4) != 0 ? hi.z : lo.z});
+  s.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                 {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   return s;
 }
 

@@ -28,7 +28,8 @@ inline void expect_same_world(const Image& a, const Image& b) {
     for (int j = 0; j < a.frame.dims[1]; ++j)
       for (int i = 0; i < a.frame.dims[0]; ++i) {
         const Vec3 x = b.frame.index_from_world(a.frame.world_from_index({double(i), double(j), double(k)}));
-        const int p = static_cast<int>(std::lround(x.x)), q = static_cast<int>(std::lround(x.y)), r = static_cast<int>(std::lround(x.z));
+        const int p = static_cast<int>(std::lround(x.x)), q = static_cast<int>(std::lround(x.y)),
+                  r = static_cast<int>(std::lround(x.z));
         ASSERT_NEAR(length(x - Vec3{double(p), double(q), double(r)}), 0, 2e-3);
         ASSERT_TRUE(p >= 0 && q >= 0 && r >= 0 && p < b.frame.dims[0] && q < b.frame.dims[1] && r < b.frame.dims[2]);
         ASSERT_EQ(a.at(i, j, k), b.at(p, q, r));

@@ -31,7 +31,8 @@ class OtherWriter {
     auto& described = j["records"]["tick"]["fields"];
     described = nlohmann::ordered_json::array();
     for (const RecordField& f : fields_)
-      described.push_back({{"name", f.name}, {"type", name_of(f.type)}, {"role", f.role == FieldRole::input ? "input" : "result"}});
+      described.push_back(
+          {{"name", f.name}, {"type", name_of(f.type)}, {"role", f.role == FieldRole::input ? "input" : "result"}});
     if (change) change(j);
     frame(kHeaderFrame, 0, 0, j.dump());
   }
@@ -67,9 +68,12 @@ class OtherWriter {
     frame(type, first, end, std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
   }
   void finish(const SessionEnd& e) {
-    const nlohmann::ordered_json j{
-        {"ticks", e.ticks},         {"bone_hash", e.bone_hash},  {"surface_hash", e.surface_hash}, {"removed_mm3", e.removed_mm3},
-        {"dust_hash", e.dust_hash}, {"ticks_lost", e.ticks_lost}};
+    const nlohmann::ordered_json j{{"ticks", e.ticks},
+                                   {"bone_hash", e.bone_hash},
+                                   {"surface_hash", e.surface_hash},
+                                   {"removed_mm3", e.removed_mm3},
+                                   {"dust_hash", e.dust_hash},
+                                   {"ticks_lost", e.ticks_lost}};
     frame(kEndFrame, e.ticks, e.ticks, j.dump());
   }
 
@@ -101,7 +105,8 @@ inline std::vector<RecordField> tick_fields() {
 }
 inline std::vector<RecordField> with_pulse(FieldRole role = FieldRole::result) {
   auto fields = tick_fields();
-  fields.insert(fields.begin() + 5, {"pulse_bpm", FieldType::f32, offsetof(OtherTick, pulse_bpm), "1/min", "of the patient", role});
+  fields.insert(fields.begin() + 5,
+                {"pulse_bpm", FieldType::f32, offsetof(OtherTick, pulse_bpm), "1/min", "of the patient", role});
   return fields;
 }
 inline std::vector<RecordField> without(std::string_view name) {

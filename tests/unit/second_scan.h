@@ -19,7 +19,8 @@ struct SecondScan {
   double cavity_radius_mm = 0;
 };
 
-/// What an MR might make of the phantom's tissues: bone and air dark, marrow and soft tissue bright, and a coil's shading over all.
+/// What an MR might make of the phantom's tissues: bone and air dark, marrow and soft tissue bright, and a coil's
+/// shading over all.
 inline Image as_mr(const Labels& tissues) {
   const auto v = make_voxels<std::int16_t>(tissues.frame.voxel_count());
   std::size_t at = 0;
@@ -29,7 +30,8 @@ inline Image as_mr(const Labels& tissues) {
         const auto t = static_cast<Tissue>(tissues.voxels[at]);
         double value = 600;
         if (is_bone(t)) value = t == Tissue::diploe || t == Tissue::jaw_marrow ? 350 : 60;
-        if (t == Tissue::air || t == Tissue::air_cells || t == Tissue::ear_canal || t == Tissue::tympanic_cavity) value = 30;
+        if (t == Tissue::air || t == Tissue::air_cells || t == Tissue::ear_canal || t == Tissue::tympanic_cavity)
+          value = 30;
         if (t == Tissue::sigmoid_sinus || t == Tissue::carotid) value = 150;
         const Vec3 p = tissues.frame.world_from_index({double(i), double(j), double(k)});
         v[at] = static_cast<std::int16_t>(std::lround(value * (1 + 0.2 * std::sin((p.x + 2 * p.y) / 90))));
@@ -37,14 +39,14 @@ inline Image as_mr(const Labels& tissues) {
   return {tissues.frame, v};
 }
 
-/// `clean` has no noise: the second scan shall have noise of its own. Upright voxels that hold all of it; a voxel is the mean over its
-/// height.
+/// `clean` has no noise: the second scan shall have noise of its own. Upright voxels that hold all of it; a voxel is
+/// the mean over its height.
 inline Image scanned_again(const Image& clean, const SecondScan& s) {
   const Frame& from = clean.frame;
   Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
   for (int c = 0; c < 8; ++c) {
-    const Vec3 p = s.second_from_first(
-        from.world_from_index({(c & 1) * (from.dims[0] - 1.0), (c >> 1 & 1) * (from.dims[1] - 1.0), (c >> 2) * (from.dims[2] - 1.0)}));
+    const Vec3 p = s.second_from_first(from.world_from_index(
+        {(c & 1) * (from.dims[0] - 1.0), (c >> 1 & 1) * (from.dims[1] - 1.0), (c >> 2) * (from.dims[2] - 1.0)}));
     for (std::size_t a = 0; a < 3; ++a) {
       lo[a] = std::min(lo[a], p[a]);
       hi[a] = std::max(hi[a], p[a]);
@@ -79,7 +81,8 @@ inline Image scanned_again(const Image& clean, const SecondScan& s) {
 }
 
 /// How far `found` puts places within `reach_mm` of a centre from where they are: mean over 27 of them.
-inline double target_error_mm(const RigidTransform& truth, const RigidTransform& found, Vec3 centre_mm, double reach_mm) {
+inline double target_error_mm(const RigidTransform& truth, const RigidTransform& found, Vec3 centre_mm,
+                              double reach_mm) {
   double sum = 0;
   for (int c = 0; c < 27; ++c) {
     const Vec3 p = centre_mm + Vec3{c % 3 - 1.0, c / 3 % 3 - 1.0, c / 9 - 1.0} * reach_mm;

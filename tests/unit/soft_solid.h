@@ -6,8 +6,8 @@
 
 namespace osteo::test {
 
-/// All voxels of a frame (cubes; dimensions in whole bricks): bone where `depth_mm` of their centre is positive, a half at 0, in between by
-/// the share of a voxel.
+/// All voxels of a frame (cubes; dimensions in whole bricks): bone where `depth_mm` of their centre is positive, a half
+/// at 0, in between by the share of a voxel.
 template <class Depth>
 BrickGrid soft_solid(const Frame& f, Depth&& depth_mm) {
   std::vector<Ijk> bricks;

@@ -10,8 +10,8 @@
 
 namespace osteo::test {
 
-/// A cube of voxels of edge `h` around `centre`, at least `half_mm` to each side; each voxel's density is the share of `per_edge`^3 points
-/// in it for which inside(point - centre) holds.
+/// A cube of voxels of edge `h` around `centre`, at least `half_mm` to each side; each voxel's density is the share of
+/// `per_edge`^3 points in it for which inside(point - centre) holds.
 template <class Inside>
 BrickGrid solid(double h, double half_mm, Inside inside, Vec3 centre = {}, int per_edge = 4) {
   Frame f;
@@ -31,8 +31,11 @@ BrickGrid solid(double h, double half_mm, Inside inside, Vec3 centre = {}, int p
       for (int i = 0; i < n; ++i) {
         int in = 0;
         for (int s = 0; s < points; ++s) {
-          const auto at = [&](int voxel, int point) { return lo + (voxel + (point - 0.5 * (per_edge - 1)) / per_edge) * h; };
-          in += inside(Vec3{at(i, s % per_edge), at(j, s / per_edge % per_edge), at(k, s / per_edge / per_edge)}) ? 1 : 0;
+          const auto at = [&](int voxel, int point) {
+            return lo + (voxel + (point - 0.5 * (per_edge - 1)) / per_edge) * h;
+          };
+          in +=
+              inside(Vec3{at(i, s % per_edge), at(j, s / per_edge % per_edge), at(k, s / per_edge / per_edge)}) ? 1 : 0;
         }
         g.set(g.find(i, j, k), static_cast<float>(in) / static_cast<float>(points));
       }

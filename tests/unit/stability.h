@@ -15,7 +15,8 @@ struct StabilityCase {
   double tick_s;
 };
 
-/// Rows as in the literature's own variables: damping b, Coulomb friction fc, tick T, delay, encoder, late ticks; mass 0.1 kg.
+/// Rows as in the literature's own variables: damping b, Coulomb friction fc, tick T, delay, encoder, late ticks; mass
+/// 0.1 kg.
 inline const StabilityCase kStabilityCases[] = {
     {"b 0.5, T 1 ms", {.damping_n_s_per_m = 0.5}, 1e-3},
     {"b 1, T 1 ms", {.damping_n_s_per_m = 1}, 1e-3},
@@ -40,12 +41,14 @@ struct StabilityResult {
   double stiffness_n_per_mm = 0;  ///< in use
   double fastest_mm_s = 0;        ///< in the last half second
   double deepest_mm = 0;
-  double gained_mj = 0;           ///< most that the wall had given beyond what it had taken, at any time
+  double gained_mj = 0;  ///< most that the wall had given beyond what it had taken, at any time
 };
 
-/// A hand pushes a device with 1 N against a wall from 3 mm away, for 3 s. Stable: slower than 2 mm/s at the end, by the criterion of the
-/// published table. With `guarded`, the stiffness is limited and the guard stands between wall and device; without, the wall is bare.
-inline StabilityResult push_against_wall(const StabilityCase& c, double stiffness_n_per_mm, bool guarded, double push_n = 1) {
+/// A hand pushes a device with 1 N against a wall from 3 mm away, for 3 s. Stable: slower than 2 mm/s at the end, by
+/// the criterion of the published table. With `guarded`, the stiffness is limited and the guard stands between wall and
+/// device; without, the wall is bare.
+inline StabilityResult push_against_wall(const StabilityCase& c, double stiffness_n_per_mm, bool guarded,
+                                         double push_n = 1) {
   SimulatedDevice device(c.device, {0, 0, 3});
   device.set_hand({0, 0, -push_n});
   GuardParams params;
@@ -53,7 +56,9 @@ inline StabilityResult push_against_wall(const StabilityCase& c, double stiffnes
   Guard guard(params, device.traits());
   StabilityResult r;
   r.stiffness_n_per_mm =
-      guarded ? std::min(stiffness_n_per_mm, safe_stiffness_n_per_mm(device.traits(), params.contact_damping_n_s_per_m, c.tick_s)) : stiffness_n_per_mm;
+      guarded ? std::min(stiffness_n_per_mm,
+                         safe_stiffness_n_per_mm(device.traits(), params.contact_damping_n_s_per_m, c.tick_s))
+              : stiffness_n_per_mm;
   Vec3 force{};
   const auto ticks = static_cast<std::uint64_t>(3 / c.tick_s);
   for (std::uint64_t t = 0; t < ticks; ++t) {
@@ -61,7 +66,8 @@ inline StabilityResult push_against_wall(const StabilityCase& c, double stiffnes
     const double depth = -static_cast<double>(sample.position_mm[2]);
     const Vec3 push = depth > 0 ? Vec3{0, 0, r.stiffness_n_per_mm * depth} : Vec3{};
     if (guarded) {
-      const Vec3 x{static_cast<double>(sample.position_mm[0]), static_cast<double>(sample.position_mm[1]), static_cast<double>(sample.position_mm[2])};
+      const Vec3 x{static_cast<double>(sample.position_mm[0]), static_cast<double>(sample.position_mm[1]),
+                   static_cast<double>(sample.position_mm[2])};
       force = guard.limit({x, push, depth > 0 ? Vec3{0, 0, 1} : Vec3{}, {}, 0, false}, c.tick_s).force_n;
     } else {
       force = push;

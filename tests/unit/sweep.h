@@ -16,7 +16,8 @@ struct Face {
   double at_mm = 0;
 };
 
-/// A block of bone of 16 x 18 x 8 mm, x from -8, y from -6, its face near z = 0; densities exact; the face must not stand steep.
+/// A block of bone of 16 x 18 x 8 mm, x from -8, y from -6, its face near z = 0; densities exact; the face must not
+/// stand steep.
 inline BrickGrid block(double h, const Face& face) {
   Frame f;
   f.dims = {static_cast<int>(16 / h), static_cast<int>(18 / h), static_cast<int>(8 / h)};
@@ -111,7 +112,8 @@ inline double swept_mm3(const Path& path, const Face& face, int points = 200000)
   // The lowest part of an oblique face within the box.
   double top = -1e9;
   for (const double x : {lo.x, hi.x})
-    for (const double y : {lo.y, hi.y}) top = std::max(top, (face.at_mm - face.normal.x * x - face.normal.y * y) / face.normal.z);
+    for (const double y : {lo.y, hi.y})
+      top = std::max(top, (face.at_mm - face.normal.x * x - face.normal.y * y) / face.normal.z);
   hi.z = std::min(hi.z, top);
   if (poses.empty() || !(hi.z > lo.z)) return 0;
   int inside = 0;

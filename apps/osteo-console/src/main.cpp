@@ -3,9 +3,9 @@
 #include <mutex>
 
 #include "console_flags.h"
-#include "osteo/core/base/error.h"
 #include "osteo/app/cli/command.h"
 #include "osteo/app/window/console_window.h"
+#include "osteo/core/base/error.h"
 #include "osteo/network/wire/remote_monitor.h"
 
 namespace osteo {
@@ -26,7 +26,8 @@ struct ConsoleWindowCommand {
     if (server.port == 0) throw Error(ExitCode::usage, "'" + io.arguments[0] + "' names no port", "PORT or HOST:PORT");
     const std::string code = tidy_code(p.code);
     if (!p.code.empty() && code.empty())
-      throw Error(ExitCode::usage, "this is no code", "eight letters and digits, as the rehearsal shows them: K7MX-2QPA");
+      throw Error(ExitCode::usage, "this is no code",
+                  "eight letters and digits, as the rehearsal shows them: K7MX-2QPA");
     ShellOptions shown;
     shown.width = p.width;
     shown.height = p.height;
@@ -57,12 +58,14 @@ struct ConsoleWindowCommand {
       return desk;
     };
     options.facts = [&] {
-      return ConsoleFacts{remote.connected(), remote.ended(), remote.samples(), remote.lost(), remote.events(), remote.trouble()};
+      return ConsoleFacts{remote.connected(), remote.ended(),  remote.samples(),
+                          remote.lost(),      remote.events(), remote.trouble()};
     };
     options.stop = [&] { return io.context.cancelled(); };
     run_console_window(shell, options);
     if (!io.common.quiet)
-      io.err << remote.samples() << " samples, " << remote.lost() << " lost on the way, " << remote.events() << " events" << std::endl;
+      io.err << remote.samples() << " samples, " << remote.lost() << " lost on the way, " << remote.events()
+             << " events" << std::endl;
     if (shell.gl_errors() > 0)
       throw Error(ExitCode::failed, std::to_string(shell.gl_errors()) + " OpenGL errors were seen",
                   "please report this with the name of the graphics card");

@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "built_in_pipelines.h"
 #include "mask_nodes.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -10,7 +11,6 @@
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/hand_over.h"
 #include "osteo/session/scene/recipe.h"
-#include "built_in_pipelines.h"
 
 namespace osteo {
 namespace {
@@ -70,25 +70,29 @@ class InMemory {
 
 fs::path found(const std::optional<fs::path>& path, const std::string& what, const std::string& advice) {
   if (path) return *path;
-  throw Error(ExitCode::no_input, what + " is not known here, or was moved or changed: a case does not hold its name", advice);
+  throw Error(ExitCode::no_input, what + " is not known here, or was moved or changed: a case does not hold its name",
+              advice);
 }
 
 }  // namespace
 
-EditedScan open_edited_scan(const fs::path& folder, const std::string& scan, const Registry& registry, const Context& context) {
+EditedScan open_edited_scan(const fs::path& folder, const std::string& scan, const Registry& registry,
+                            const Context& context) {
   static_cast<void>(load_case(folder));  // finishes an interrupted change; whole and unchanged
   const std::optional<Recipe> recipe = read_recipe(folder);
   if (!recipe)
     throw Error(ExitCode::usage, "'" + folder.string() + "' was made by an earlier version",
                 "run 'osteo prepare SCAN -o CASE --fresh' with its flags");
   if (!recipe->lost.empty()) {
-    throw Error(ExitCode::no_input,
-                "the case was made with a value of '" + *recipe->lost.begin() + "' that names the scan and is not known here",
-                "run 'osteo prepare SCAN -o CASE' with it again");
+    throw Error(
+        ExitCode::no_input,
+        "the case was made with a value of '" + *recipe->lost.begin() + "' that names the scan and is not known here",
+        "run 'osteo prepare SCAN -o CASE' with it again");
   }
   EditedScan result;
   if (scan.empty()) {
-    result.scan = found(recall_file(recipe->source_hash), "the scan of '" + folder.string() + "'", "give it: osteo edit CASE --scan SCAN");
+    result.scan = found(recall_file(recipe->source_hash), "the scan of '" + folder.string() + "'",
+                        "give it: osteo edit CASE --scan SCAN");
   } else {
     require_readable(scan);
     if (hash_path(scan) != recipe->source_hash)
@@ -98,8 +102,8 @@ EditedScan open_edited_scan(const fs::path& folder, const std::string& scan, con
   }
   std::string text(kTemporalBonePipeline);
   if (!recipe->pipeline_hash.empty())
-    text = read_text(
-        found(pipeline_file(folder, recipe->pipeline_hash), "the pipeline file of the case", "prepare the case again, with --pipeline"));
+    text = read_text(found(pipeline_file(folder, recipe->pipeline_hash), "the pipeline file of the case",
+                           "prepare the case again, with --pipeline"));
   std::map<std::string, std::string> settings = recipe->settings;
   settings.erase("names");
   settings["source"] = result.scan.string();
@@ -121,7 +125,8 @@ EditedScan open_edited_scan(const fs::path& folder, const std::string& scan, con
       // As the case holds them, before any correction.
       file = folder / (output_exists(folder / kGivenStructures) ? kGivenStructures : "structures.seg.nrrd");
       if (!output_exists(file))
-        throw Error(ExitCode::no_input, "the structures of the case are not known here", "prepare the case again, with --structures");
+        throw Error(ExitCode::no_input, "the structures of the case are not known here",
+                    "prepare the case again, with --structures");
     }
     const DataKind wanted[] = {DataKind::labels};
     result.structures = name_structures(std::get<Labels>(load_data(file, wanted, context)), names, &result.ct, context);

@@ -11,27 +11,30 @@
 #include "edit_flags.h"
 #include "edited_scan.h"
 #include "licence.h"
-#include "osteo/core/base/error.h"
-#include "osteo/core/base/files.h"
 #include "osteo/app/cli/command.h"
 #include "osteo/app/stages/registry.h"
 #include "osteo/app/window/edit_window.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
 
 extern char** environ;
 
 namespace osteo {
 namespace {
 
-// Writes corrections into the case as anyone else does, by 'osteo prepare', beside the window. What it has in memory goes with it.
+// Writes corrections into the case as anyone else does, by 'osteo prepare', beside the window. What it has in memory
+// goes with it.
 class Saver {
  public:
-  Saver(fs::path case_folder, fs::path scan, int threads) : case_(std::move(case_folder)), scan_(std::move(scan)), threads_(threads) {}
+  Saver(fs::path case_folder, fs::path scan, int threads)
+      : case_(std::move(case_folder)), scan_(std::move(scan)), threads_(threads) {}
 
   void begin(const std::string& edits) {
     running_ = std::async(std::launch::async, [this, edits] { return save(edits); });
   }
   std::optional<EditSaved> ended() {
-    if (!running_.valid() || running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
+    if (!running_.valid() || running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+      return std::nullopt;
     return running_.get();
   }
 
@@ -42,12 +45,14 @@ class Saver {
       const fs::path file = folder.path() / "edits.json", said = folder.path() / "said";
       write_file(file, edits);
       const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "osteo";
-      std::vector<std::string> args{program.string(), "prepare", scan_.string(), "-o", case_.string(), "--edits", file.string(), "--quiet"};
+      std::vector<std::string> args{program.string(), "prepare", scan_.string(), "-o",
+                                    case_.string(),   "--edits", file.string(),  "--quiet"};
       if (threads_ != 0) args.push_back("--threads=" + std::to_string(threads_));
       const int code = run(args, said);
       if (code == 0) {
         std::string written;
-        for (const char* const name : {"edits.json", "bone.vdb", "hu.vdb", "surface.ply", "preview.png", "structures.seg.nrrd"}) {
+        for (const char* const name :
+             {"edits.json", "bone.vdb", "hu.vdb", "surface.ply", "preview.png", "structures.seg.nrrd"}) {
           if (output_exists(case_ / name)) written += (written.empty() ? "" : ", ") + std::string(name);
         }
         return {true, "saved into the case: " + written};
@@ -106,8 +111,9 @@ struct EditWindowCommand {
     if (edits) apply_edits(document, *edits, io.context);
     io.end_progress();
     if (!io.common.quiet) {
-      io.err << "open: " << document.ct().frame.dims[0] << " x " << document.ct().frame.dims[1] << " x " << document.ct().frame.dims[2]
-             << " voxels" << (edits ? ", " + std::to_string(edits->operations.size()) + " earlier corrections" : std::string())
+      io.err << "open: " << document.ct().frame.dims[0] << " x " << document.ct().frame.dims[1] << " x "
+             << document.ct().frame.dims[2] << " voxels"
+             << (edits ? ", " + std::to_string(edits->operations.size()) + " earlier corrections" : std::string())
              << std::endl;
     }
     EditWindowOptions options;

@@ -1,11 +1,11 @@
 // osteo-experiment: the window of force-skill training. 'osteo experiment force-skill' opens it.
 #include <iostream>
 
+#include "osteo/app/cli/command.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/param.h"
-#include "osteo/app/cli/command.h"
-#include "osteo/simulation/devices/devices.h"
 #include "osteo/core/rt/loop.h"
+#include "osteo/simulation/devices/devices.h"
 #include "run_screen.h"
 
 namespace osteo {
@@ -54,9 +54,9 @@ bool is_space_mouse(const HidInfo& info) {
 std::unique_ptr<Device> open_device(ExperimentDevice kind, const PressedForce& pressed) {
   if (kind == ExperimentDevice::woodenhaptics) {
     const auto wanted = [](const HidInfo& i) { return model_of(i.vendor, i.product) == DeviceModel::woodenhaptics; };
-    return std::make_unique<WoodenHapticsDevice>(open_first(wanted, 0), WoodenHapticsGeometry{},
-                                                 WorkspaceMap(Vec3{}, Mat3{{Vec3{0, 0, -1}, Vec3{-1, 0, 0}, Vec3{0, 1, 0}}}, 1), 0,
-                                                 nullptr);
+    return std::make_unique<WoodenHapticsDevice>(
+        open_first(wanted, 0), WoodenHapticsGeometry{},
+        WorkspaceMap(Vec3{}, Mat3{{Vec3{0, 0, -1}, Vec3{-1, 0, 0}, Vec3{0, 1, 0}}}, 1), 0, nullptr);
   }
   if (kind == ExperimentDevice::spacemouse)
     return std::make_unique<SpaceMouseDevice>(open_first(is_space_mouse, 0), HandGoal{},
@@ -74,27 +74,30 @@ struct ExperimentWindowCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"participant", "whose trials, by code"}, p.participant);
-    visit({"device", "what the hand holds; by mouse and keys the force is set on an axis, not felt, and the data say so"}, p.device);
+    visit(
+        {"device", "what the hand holds; by mouse and keys the force is set on an axis, not felt, and the data say so"},
+        p.device);
     visit({"retention", "on another day: every stimulus once, without aid"}, p.retention);
     visit({"width", "of the window", "px", 640, 7680}, p.width);
     visit({"height", "of the window", "px", 480, 4320}, p.height);
     visit({"state_file", "writes here what it shows, for tests"}, p.state_file);
   }
   static cli::CommandInfo info() {
-    return {
-        "experiment",
-        "force-skill training at the device",
-        "What 'osteo experiment force-skill' opens. The space bar begins each run; Escape leaves, and the trial under way is done again "
-        "the next time.",
-        {{"folder", "of the experiment: with protocol.json"}},
-        "osteo-experiment FOLDER --participant P01"};
+    return {"experiment",
+            "force-skill training at the device",
+            "What 'osteo experiment force-skill' opens. The space bar begins each run; Escape leaves, and the trial "
+            "under way is done again "
+            "the next time.",
+            {{"folder", "of the experiment: with protocol.json"}},
+            "osteo-experiment FOLDER --participant P01"};
   }
 
   static int run(const Params& p, cli::Invocation& io) {
     const std::filesystem::path folder = io.arguments[0];
     const Protocol protocol = read_protocol(folder);
     const std::size_t who = participant_number(protocol, p.participant);
-    if (protocol.simulated) throw Error(ExitCode::usage, "this experiment's participants are programs", "give another folder for people");
+    if (protocol.simulated)
+      throw Error(ExitCode::usage, "this experiment's participants are programs", "give another folder for people");
     PressedForce pressed;
     const std::unique_ptr<Device> device = open_device(p.device, pressed);
     const bool by_hand = p.device == ExperimentDevice::mouse || p.device == ExperimentDevice::keys;
@@ -102,7 +105,8 @@ struct ExperimentWindowCommand {
                         : p.device == ExperimentDevice::keys ? Mover::keys
                                                              : Mover::device;
     ForceSkillDesk desk(folder, protocol, who, p.retention, mover,
-                        std::string(EnumNames<ExperimentDevice>::values[static_cast<std::size_t>(p.device)]), device->traits());
+                        std::string(EnumNames<ExperimentDevice>::values[static_cast<std::size_t>(p.device)]),
+                        device->traits());
     Vec3 force;
     std::uint64_t tick = 0;
     const double dt = 1 / protocol.rate_hz;
@@ -146,7 +150,8 @@ int main(int argc, char** argv) {
   osteo::cli::Program program;
   program.about = "osteo-experiment: force-skill training at a haptic device";
   program.licence =
-      "Osteotome's own sources: Apache-2.0. This binary links what osteo-rehearse links, copyleft libraries too where that does: 'osteo "
+      "Osteotome's own sources: Apache-2.0. This binary links what osteo-rehearse links, copyleft libraries too where "
+      "that does: 'osteo "
       "--version' says which.\n"
       "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.";
   program.add<osteo::ExperimentWindowCommand>();

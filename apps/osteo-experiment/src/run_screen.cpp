@@ -8,8 +8,8 @@
 #include <cstdio>
 #include <fstream>
 
-#include "osteo/core/base/json_document.h"
 #include "osteo/app/window/window_shell.h"
+#include "osteo/core/base/json_document.h"
 
 namespace osteo {
 namespace {
@@ -30,7 +30,8 @@ void draw(const sheet::Drawing& d) {
     if (const auto* const path = std::get_if<sheet::Drawing::Path>(&mark)) {
       std::vector<ImVec2> points;
       for (const auto& p : path->points) points.emplace_back(static_cast<float>(p[0]), static_cast<float>(p[1]));
-      if (path->fill) list->AddConvexPolyFilled(points.data(), static_cast<int>(points.size()), colour(*path->fill, path->opacity));
+      if (path->fill)
+        list->AddConvexPolyFilled(points.data(), static_cast<int>(points.size()), colour(*path->fill, path->opacity));
       if (path->stroke)
         list->AddPolyline(points.data(), static_cast<int>(points.size()), colour(*path->stroke, path->opacity), 0,
                           static_cast<float>(path->width));
@@ -38,7 +39,8 @@ void draw(const sheet::Drawing& d) {
       const auto size = static_cast<float>(text->size);
       const float wide = ImGui::GetFont()->CalcTextSizeA(size, 1e9F, 0, text->text.c_str()).x;
       const float x = static_cast<float>(text->x) - (text->align < 0 ? 0 : text->align == 0 ? wide / 2 : wide);
-      list->AddText(ImGui::GetFont(), size, {x, static_cast<float>(text->y) - size}, colour(text->colour), text->text.c_str());
+      list->AddText(ImGui::GetFont(), size, {x, static_cast<float>(text->y) - size}, colour(text->colour),
+                    text->text.c_str());
     }
   }
 }
@@ -49,7 +51,8 @@ void draw_page(const std::string& title, const std::string& words, float width, 
   list->AddRectFilled({0, 0}, {width, height}, IM_COL32(250, 250, 252, 255));
   const float big = 1.6F * em, wrap = std::min(0.8F * width, 42 * em), x = (width - wrap) / 2;
   list->AddText(ImGui::GetFont(), big, {x, 0.34F * height}, IM_COL32(28, 33, 41, 255), title.c_str(), nullptr, wrap);
-  list->AddText(ImGui::GetFont(), em, {x, 0.34F * height + 2 * big}, IM_COL32(28, 33, 41, 255), words.c_str(), nullptr, wrap);
+  list->AddText(ImGui::GetFont(), em, {x, 0.34F * height + 2 * big}, IM_COL32(28, 33, 41, 255), words.c_str(), nullptr,
+                wrap);
 }
 
 // By mouse and keys the force is a place on this axis. Down is harder, as one presses down.
@@ -95,7 +98,8 @@ void draw_feedback(const experiment::ForceSkillDesk& desk, float width, float he
     list->AddText(ImVec2(from.x - 0.5F * size.x, from.y + 0.3F * letter), ink, text.c_str());
   }
   const float line = std::max(2.0F, height / 400);
-  for (const auto& [values, colour] : {std::pair{&target, IM_COL32(38, 99, 200, 255)}, std::pair{&applied, IM_COL32(40, 150, 70, 255)}}) {
+  for (const auto& [values, colour] :
+       {std::pair{&target, IM_COL32(38, 99, 200, 255)}, std::pair{&applied, IM_COL32(40, 150, 70, 255)}}) {
     std::vector<ImVec2> points;
     for (std::size_t i = 0; i < values->size(); i += std::max<std::size_t>(1, values->size() / 600))
       points.push_back(at(static_cast<double>(i) / static_cast<double>(values->size() - 1), (*values)[i]));
@@ -140,7 +144,8 @@ int run_experiment_window(experiment::ForceSkillDesk& desk, PressedForce& presse
     const bool running = desk.page() == DeskPage::training || desk.page() == DeskPage::test;
     if (options.by_hand) {
       const float top = 0.2F * height, bottom = 0.85F * height, y = ImGui::GetIO().MousePos.y;
-      const float mouse = std::isfinite(y) ? std::clamp((y - top) / (bottom - top), 0.0F, 1.0F) * static_cast<float>(most_n) : 0;
+      const float mouse =
+          std::isfinite(y) ? std::clamp((y - top) / (bottom - top), 0.0F, 1.0F) * static_cast<float>(most_n) : 0;
       pressed.n.store(!running ? 0 : options.keys ? by_keys : mouse, std::memory_order_relaxed);
     }
     if (running) {
@@ -149,8 +154,8 @@ int run_experiment_window(experiment::ForceSkillDesk& desk, PressedForce& presse
     } else {
       auto [title, words] = desk.words();
       if (desk.page() == DeskPage::pause) {
-        const double left =
-            60 * desk.protocol().break_min - std::chrono::duration<double>(std::chrono::steady_clock::now() - paused).count();
+        const double left = 60 * desk.protocol().break_min -
+                            std::chrono::duration<double>(std::chrono::steady_clock::now() - paused).count();
         char line[64];
         const int s = static_cast<int>(std::max(0.0, std::ceil(left)));
         std::snprintf(line, sizeof line, " %d:%02d are left.", s / 60, s % 60);
@@ -162,7 +167,8 @@ int run_experiment_window(experiment::ForceSkillDesk& desk, PressedForce& presse
     shell.show_page();
     ++pictures;
     if (!options.state_file.empty()) {
-      static constexpr const char* kPages[] = {"before_training", "training", "feedback", "before_test", "test", "pause", "done"};
+      static constexpr const char* kPages[] = {"before_training", "training", "feedback", "before_test", "test",
+                                               "pause",           "done"};
       const experiment::TaskView v = desk.view();
       Json j{{"page", kPages[static_cast<std::size_t>(desk.page())]},
              {"done", desk.done()},

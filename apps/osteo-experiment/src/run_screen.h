@@ -2,8 +2,8 @@
 #pragma once
 #include <filesystem>
 
-#include "osteo/core/base/context.h"
 #include "osteo/assessment/experiment/desk.h"
+#include "osteo/core/base/context.h"
 
 namespace osteo {
 
@@ -20,6 +20,7 @@ struct PressedForce {
 };
 
 /// Until it is closed. Returns how many OpenGL errors were seen.
-int run_experiment_window(experiment::ForceSkillDesk& desk, PressedForce& pressed, const RunScreenOptions& options, const Context& context);
+int run_experiment_window(experiment::ForceSkillDesk& desk, PressedForce& pressed, const RunScreenOptions& options,
+                          const Context& context);
 
 }  // namespace osteo

@@ -22,10 +22,11 @@ Hands::Hands(const WindowFlags& flags) : hand_(flags.device), dust_(flags.dust) 
     if (hand_ == Hand::automatic && f.readable && (mouse || f.model == DeviceModel::woodenhaptics))
       found_ = std::max(found_, mouse ? 1 : 2);
     if (f.readable && (f.model == DeviceModel::pedal_infinity || f.model == DeviceModel::pedal_pcsensor))
-      pedal_ =
-          std::make_unique<FootPedal>(f.model, open_first([m = f.model](const HidInfo& i) { return model_of(i.vendor, i.product) == m; }));
+      pedal_ = std::make_unique<FootPedal>(
+          f.model, open_first([m = f.model](const HidInfo& i) { return model_of(i.vendor, i.product) == m; }));
   }
-  if (hand_ == Hand::automatic) hand_ = found_ == 2 ? Hand::woodenhaptics : found_ == 1 ? Hand::spacemouse : Hand::mouse;
+  if (hand_ == Hand::automatic)
+    hand_ = found_ == 2 ? Hand::woodenhaptics : found_ == 1 ? Hand::spacemouse : Hand::mouse;
   second_ = flags.second_device == SecondDevice::spacemouse      ? Hand::spacemouse
             : flags.second_device == SecondDevice::woodenhaptics ? Hand::woodenhaptics
                                                                  : Hand::mouse;
@@ -34,7 +35,8 @@ Hands::Hands(const WindowFlags& flags) : hand_(flags.device), dust_(flags.dust) 
   if (hand_ == Hand::marker) look_for_pen(flags);
   if (hand_ == Hand::igtl) tracker_ = std::make_shared<TrackedLink>(tracker_address(flags.tracker));
   // One that moves no hand moves the camera.
-  if (puck && hand_ != Hand::spacemouse && second_ != Hand::spacemouse) puck_ = std::make_unique<CameraPuck>(open_first(is_space_mouse));
+  if (puck && hand_ != Hand::spacemouse && second_ != Hand::spacemouse)
+    puck_ = std::make_unique<CameraPuck>(open_first(is_space_mouse));
 }
 
 CameraDevices Hands::camera(Device* first, bool lend) const {
@@ -70,7 +72,8 @@ std::vector<std::unique_ptr<Device>> Hands::make(const HandGoal& start, Vec3 nea
 
 std::string Hands::name() const {
   return std::string(EnumNames<Hand>::values[static_cast<std::size_t>(hand_)]) +
-         (second_ != Hand::mouse ? ", " + std::string(EnumNames<Hand>::values[static_cast<std::size_t>(second_)]) : "") +
+         (second_ != Hand::mouse ? ", " + std::string(EnumNames<Hand>::values[static_cast<std::size_t>(second_)])
+                                 : "") +
          (pedal_ ? " and pedal" : "") + (puck_ ? "; camera: spacemouse" : "");
 }
 
@@ -90,28 +93,32 @@ void Hands::look_for_pen(const WindowFlags& flags) {
   const Pen pen = flags.pen.empty() ? Pen{} : load_pen(flags.pen);
   camera_place_ = flags.camera_place;
   hand_scale_ = flags.hand_scale;
-  link_ =
-      std::make_shared<PenLink>([from = flags.video, c = camera_] { return open_pictures(from, c.width, c.height, c.fps); }, camera_, pen);
+  link_ = std::make_shared<PenLink>(
+      [from = flags.video, c = camera_] { return open_pictures(from, c.width, c.height, c.fps); }, camera_, pen);
 }
 
 std::unique_ptr<Device> Hands::make_one(Hand kind, std::size_t number, const HandGoal& start, Vec3 near_mm) const {
   const int before = number > 0 && hand_ == kind ? 1 : 0;
-  // The user looks at the patient's left side, as the window does: away from the user is to the right, right is to the back.
+  // The user looks at the patient's left side, as the window does: away from the user is to the right, right is to the
+  // back.
   if (kind == Hand::spacemouse) {
     return std::make_unique<SpaceMouseDevice>(open_first(is_space_mouse, before), start,
-                                              Mat3{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, pedal_.get(), number);
+                                              Mat3{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, pedal_.get(),
+                                              number);
   }
   if (kind == Hand::marker) {
     const Mat3 scene_from_desk{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, desk = desk_from_camera(camera_place_);
-    const Mat3 scene_from_camera{{scene_from_desk * desk.column[0], scene_from_desk * desk.column[1], scene_from_desk * desk.column[2]}};
+    const Mat3 scene_from_camera{
+        {scene_from_desk * desk.column[0], scene_from_desk * desk.column[1], scene_from_desk * desk.column[2]}};
     return std::make_unique<MarkerDevice>(link_, camera_, start, scene_from_camera, hand_scale_, pedal_.get(), number);
   }
   if (kind == Hand::igtl) return std::make_unique<TrackedHand>(tracker_, start, pedal_.get(), number);
   if (kind == Hand::woodenhaptics) {
     const auto wanted = [](const HidInfo& i) { return model_of(i.vendor, i.product) == DeviceModel::woodenhaptics; };
-    return std::make_unique<WoodenHapticsDevice>(open_first(wanted, before), geometry_,
-                                                 WorkspaceMap(near_mm, Mat3{{Vec3{-1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, 1}}}, 1),
-                                                 start.tool, pedal_.get(), number);
+    return std::make_unique<WoodenHapticsDevice>(
+        open_first(wanted, before), geometry_,
+        WorkspaceMap(near_mm, Mat3{{Vec3{-1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, 1}}}, 1), start.tool, pedal_.get(),
+        number);
   }
   return std::make_unique<MouseDevice>(start);
 }

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "osteo/simulation/devices/devices.h"
-#include "osteo/simulation/marker/device.h"
 #include "osteo/app/window/rehearsal_window.h"
 #include "osteo/network/wire/tracked_hand.h"
+#include "osteo/simulation/devices/devices.h"
+#include "osteo/simulation/marker/device.h"
 #include "window_flags.h"
 
 namespace osteo {
@@ -19,8 +19,8 @@ class Hands {
   explicit Hands(const WindowFlags& flags);
   /// What there is for the camera. `first`: the drill's device, where one runs.
   [[nodiscard]] CameraDevices camera(Device* first, bool lend) const;
-  /// `start`: where the drill's hand waits. `near_mm`: where an arm's tool is when it is first heard of; its reach is small. The second
-  /// hand waits beside the first; moved by keys it is there for dust alone.
+  /// `start`: where the drill's hand waits. `near_mm`: where an arm's tool is when it is first heard of; its reach is
+  /// small. The second hand waits beside the first; moved by keys it is there for dust alone.
   [[nodiscard]] std::vector<std::unique_ptr<Device>> make(const HandGoal& start, Vec3 near_mm) const;
   [[nodiscard]] std::string name() const;
 
@@ -30,12 +30,13 @@ class Hands {
   [[nodiscard]] std::optional<std::uint32_t> switches(bool attended) const;
 
  private:
-  // One camera for all sessions: it takes a second to open. What is wrong with the files is an error now; a camera that is not there is
-  // waited for, and the window says so.
+  // One camera for all sessions: it takes a second to open. What is wrong with the files is an error now; a camera that
+  // is not there is waited for, and the window says so.
   void look_for_pen(const WindowFlags& flags);
 
   // Two devices of a kind: the first of them is the first hand's.
-  [[nodiscard]] std::unique_ptr<Device> make_one(Hand kind, std::size_t number, const HandGoal& start, Vec3 near_mm) const;
+  [[nodiscard]] std::unique_ptr<Device> make_one(Hand kind, std::size_t number, const HandGoal& start,
+                                                 Vec3 near_mm) const;
 
   Hand hand_, second_ = Hand::mouse;
   bool dust_;

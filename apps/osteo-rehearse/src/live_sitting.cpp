@@ -19,9 +19,11 @@ LiveSitting::LiveSitting(const WindowFlags& flags)
       join_(flags.join),
       role_(flags.role == Attend::trainee ? JoinRole::trainee : JoinRole::watcher),
       port_(flags.port) {
-  if (hosts_ && joins()) throw Error(ExitCode::usage, "--tutor and --join exclude each other", "one runs the session, the others join it");
+  if (hosts_ && joins())
+    throw Error(ExitCode::usage, "--tutor and --join exclude each other", "one runs the session, the others join it");
   if (two_way_ && !hosts_) throw Error(ExitCode::usage, "--two-way has no effect without --tutor", "leave it out");
-  if (!flags.code.empty() && !joins()) throw Error(ExitCode::usage, "--code has no effect without --join", "leave it out");
+  if (!flags.code.empty() && !joins())
+    throw Error(ExitCode::usage, "--code has no effect without --join", "leave it out");
   const auto refuse = [&](bool given, const char* flag) {
     if (given && (hosts_ || joins()))
       throw Error(ExitCode::usage, std::string(flag) + " does not go with --tutor and --join", "leave one of them out");
@@ -29,14 +31,17 @@ LiveSitting::LiveSitting(const WindowFlags& flags)
   refuse(!flags.playback.empty(), "--playback");
   refuse(flags.second_device != SecondDevice::keys, "--second-device");
   if (!flags.resume.empty() && joins())
-    throw Error(ExitCode::usage, "--resume does not go with --join", "the session is the host's; leave one of them out");
+    throw Error(ExitCode::usage, "--resume does not go with --join",
+                "the session is the host's; leave one of them out");
   if (flags.dust && (hosts_ || joins()))
-    throw Error(ExitCode::usage, "--dust does not go with --tutor and --join", "its second hand would be a third; leave it out");
+    throw Error(ExitCode::usage, "--dust does not go with --tutor and --join",
+                "its second hand would be a third; leave it out");
   if (flags.monitor && joins()) throw Error(ExitCode::usage, "--monitor does not go with --join", "the host has it");
   if (hosts_) code_ = make_pairing_code();
   if (!joins()) return;
   code_ = tidy_code(flags.code);
-  if (code_.empty()) throw Error(ExitCode::usage, "this is no code", "eight letters and digits, as the host shows them: K7MX-2QPA");
+  if (code_.empty())
+    throw Error(ExitCode::usage, "this is no code", "eight letters and digits, as the host shows them: K7MX-2QPA");
   static_cast<void>(udp_peer(join_));
 }
 
@@ -46,7 +51,8 @@ void LiveSitting::add_hand(std::vector<std::unique_ptr<Device>>& devices, Rehear
   far_->pull(pulls_);
   devices.push_back(std::make_unique<FarHand>(far_));
   std::erase_if(options.actions, [](const SceneAction& a) { return a.is(ActionKind::guide); });
-  if (two_way_) options.actions.push_back(action_of(far_guide(0, 1, devices.front()->traits(), kPullNPerMm, kMostPullN)));
+  if (two_way_)
+    options.actions.push_back(action_of(far_guide(0, 1, devices.front()->traits(), kPullNPerMm, kMostPullN)));
 }
 
 void LiveSitting::open(Rehearsal& rehearsal, const SessionHeader& header, const SessionFolder& session) {
@@ -104,8 +110,8 @@ TutorNow LiveSitting::now(const Rehearsal* rehearsal) const {
   if (hosts_ && host_ && net_) {
     n.title = two_way_ ? "You teach; hands pull each other" : "You teach; the trainee's hand is led by yours";
     const bool bracket = listen_.find(':') != std::string::npos;
-    n.invitation =
-        "osteo rehearse CASE --join " + (bracket ? "[" + listen_ + "]" : listen_) + ":" + std::to_string(net_->port()) + "\ncode " + code_;
+    n.invitation = "osteo rehearse CASE --join " + (bracket ? "[" + listen_ + "]" : listen_) + ":" +
+                   std::to_string(net_->port()) + "\ncode " + code_;
     n.hands = {"you", "trainee"};
     n.leads = two_way_;
     n.guiding = pulls_;
@@ -113,11 +119,12 @@ TutorNow LiveSitting::now(const Rehearsal* rehearsal) const {
     int watchers = 0;
     for (const PeerStatus& s : host_->status(steady_us())) {
       const std::string who = s.role == JoinRole::trainee ? "trainee" : "watcher " + std::to_string(++watchers);
-      n.links.push_back(
-          {who, s.heard, s.rtt_ms, s.offset_ms, s.drift_ppm, s.lost, static_cast<double>(s.behind_ticks) / 1000, s.bone_differs_since > 0});
+      n.links.push_back({who, s.heard, s.rtt_ms, s.offset_ms, s.drift_ppm, s.lost,
+                         static_cast<double>(s.behind_ticks) / 1000, s.bone_differs_since > 0});
     }
     if (host_->tries_left() == 0) n.trouble = "three wrong codes: nobody else can join this session";
-    if (host_->lost()) n.trouble = "this machine does not keep up, or half an hour has passed: the others get no more of this session";
+    if (host_->lost())
+      n.trouble = "this machine does not keep up, or half an hour has passed: the others get no more of this session";
     const TickRecord far = rehearsal != nullptr ? rehearsal->latest(1) : TickRecord{};
     if (far.tick != 0 && far.device.age_ms < 255)
       n.apart_mm = length(from_floats(far.device.position_mm) - from_floats(rehearsal->latest(0).device.position_mm));
@@ -129,9 +136,10 @@ TutorNow LiveSitting::now(const Rehearsal* rehearsal) const {
     const SeatStatus s = seat_->status();
     const bool trainee = role_ == JoinRole::trainee;
     n.title = trainee ? "You learn; the instructor's hand leads yours" : "You watch";
-    n.hands = trainee ? std::vector<std::string>{"you", "instructor"} : std::vector<std::string>{"instructor", "trainee"};
-    n.links.push_back({"instructor", s.state == JoinState::joined && seat_->silent_s() < 0.5, s.rtt_ms, s.offset_ms, s.drift_ppm, s.lost,
-                       static_cast<double>(s.behind_ticks) / 1000, s.bone_differs_since > 0});
+    n.hands =
+        trainee ? std::vector<std::string>{"you", "instructor"} : std::vector<std::string>{"instructor", "trainee"};
+    n.links.push_back({"instructor", s.state == JoinState::joined && seat_->silent_s() < 0.5, s.rtt_ms, s.offset_ms,
+                       s.drift_ppm, s.lost, static_cast<double>(s.behind_ticks) / 1000, s.bone_differs_since > 0});
     n.leads = trainee;
     n.guiding = pulls_;
     n.pull = trainee ? s.strength : 0;

@@ -4,14 +4,15 @@
 #include <optional>
 #include <string>
 
+#include "osteo/app/window/tutor_now.h"
 #include "osteo/network/tutor/live_past.h"
 #include "osteo/network/tutor/live_seat.h"
-#include "osteo/app/window/tutor_now.h"
 #include "window_flags.h"
 
 namespace osteo {
 
-/// One for all sessions of a case, on one port and with one code. All functions but now() and guide() from one thread at a time.
+/// One for all sessions of a case, on one port and with one code. All functions but now() and guide() from one thread
+/// at a time.
 class LiveSitting {
  public:
   /// Errors: usage, where flags have no effect on each other; a code that is none.
@@ -21,8 +22,8 @@ class LiveSitting {
   [[nodiscard]] bool hosts() const { return hosts_; }
   /// The trainee's hand, behind the only one there is; and the pull to it, where asked.
   void add_hand(std::vector<std::unique_ptr<Device>>& devices, RehearsalOptions& options);
-  /// Before the rehearsal starts. `header` as it will be recorded. Where what `session` goes on from cannot be sent nobody can join, and
-  /// now() says why.
+  /// Before the rehearsal starts. `header` as it will be recorded. Where what `session` goes on from cannot be sent
+  /// nobody can join, and now() says why.
   void open(Rehearsal& rehearsal, const SessionHeader& header, const SessionFolder& session);
   /// When it has stopped, before it goes: those who are there get the rest, within two seconds.
   void close(std::uint64_t ticks);
@@ -33,8 +34,8 @@ class LiveSitting {
   [[nodiscard]] std::string words() const { return joined_words(role_); }
   /// What the session is, and what it goes on from; asks on first use.
   [[nodiscard]] std::pair<SessionHeader, Bytes> wait(const Context& context);
-  std::shared_ptr<Rehearsal> begin(const SessionHeader& header, World world, const RehearsalOptions& options, std::unique_ptr<Device> own,
-                                   const Context& context);
+  std::shared_ptr<Rehearsal> begin(const SessionHeader& header, World world, const RehearsalOptions& options,
+                                   std::unique_ptr<Device> own, const Context& context);
   /// Before the rehearsal is stopped.
   void leave();
 

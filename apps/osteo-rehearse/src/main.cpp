@@ -1,19 +1,19 @@
 // The window of 'osteo rehearse', a program of its own.
 #include <iostream>
 
-#include "osteo/core/base/error.h"
-#include "osteo/core/base/files.h"
-#include "osteo/simulation/bone/burr.h"
 #include "osteo/app/cli/command.h"
-#include "osteo/assessment/evidence/procedure.h"
-#include "osteo/geometry/grid/grid_io.h"
-#include "osteo/imaging/io/volume_io.h"
-#include "osteo/session/scene/approval.h"
-#include "osteo/session/recording/session_reader.h"
-#include "osteo/display/view/live_cut.h"
 #include "osteo/app/window/code_page.h"
 #include "osteo/app/window/rehearsal_window.h"
 #include "osteo/app/window/start_page.h"
+#include "osteo/assessment/evidence/procedure.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/display/view/live_cut.h"
+#include "osteo/geometry/grid/grid_io.h"
+#include "osteo/imaging/io/volume_io.h"
+#include "osteo/session/recording/session_reader.h"
+#include "osteo/session/scene/approval.h"
+#include "osteo/simulation/bone/burr.h"
 #include "sitting.h"
 #include "window_flags.h"
 
@@ -31,16 +31,18 @@ struct OpenCase {
   std::string hash;
   std::vector<PlannedRegion> regions;  // of the procedure, where one was given
 };
-std::unique_ptr<OpenCase> open_case(const fs::path& folder, const WindowFlags& flags, const std::optional<Procedure>& procedure,
-                                    const Context& context) {
+std::unique_ptr<OpenCase> open_case(const fs::path& folder, const WindowFlags& flags,
+                                    const std::optional<Procedure>& procedure, const Context& context) {
   auto open = std::make_unique<OpenCase>();
   open->files = load_case(folder);
   open->approval = approval_of(open->files.folder);
   if (flags.require_approved) require_approval(open->approval, open->files.folder);
   if (const auto it = open->files.files.find("hu"); it != open->files.files.end()) open->hu = load_grid(it->second);
-  if (const auto it = open->files.files.find("verdict"); it != open->files.files.end()) open->scan = read_verdict(read_text(it->second));
+  if (const auto it = open->files.files.find("verdict"); it != open->files.files.end())
+    open->scan = read_verdict(read_text(it->second));
   open->hash = hash_path(open->files.folder / "manifest.json");
-  if (const auto it = open->files.files.find("region"); it != open->files.files.end()) open->bone.push_back(load_grid(it->second));
+  if (const auto it = open->files.files.find("region"); it != open->files.files.end())
+    open->bone.push_back(load_grid(it->second));
   open->bone.push_back(open->files.bone);
   if (procedure) {
     for (const ProcedureRegion& r : procedure->regions)
@@ -76,13 +78,13 @@ struct WindowCommand {
   using Params = WindowFlags;
   static void describe(Params& p, auto& visit) { WindowFlags::describe(p, visit); }
   static cli::CommandInfo info() {
-    return {
-        "rehearse",
-        "drill the bone of a case in a window",
-        "What 'osteo rehearse CASE' opens; without a case, a page to choose one on. Exit code 8 when ticks were not recorded, since the "
-        "disk did not keep up.",
-        {{"case", "a folder made by prepare", true}},
-        "osteo-rehearse CASE"};
+    return {"rehearse",
+            "drill the bone of a case in a window",
+            "What 'osteo rehearse CASE' opens; without a case, a page to choose one on. Exit code 8 when ticks were "
+            "not recorded, since the "
+            "disk did not keep up.",
+            {{"case", "a folder made by prepare", true}},
+            "osteo-rehearse CASE"};
   }
 
   // What was given beats what the person chose last.
@@ -92,7 +94,8 @@ struct WindowCommand {
     if (given("volume")) values.volume = p.volume;
     if (given("alarms")) values.alarms = p.alarms;
     if (given("full_screen")) values.full_screen = p.full_screen;
-    if (p.layout != StartLayout::last) values.layout = EnumNames<StartLayout>::values[static_cast<std::size_t>(p.layout)];
+    if (p.layout != StartLayout::last)
+      values.layout = EnumNames<StartLayout>::values[static_cast<std::size_t>(p.layout)];
     return values;
   }
   // What was changed in the window since `before` is the person's choice from now on.
@@ -118,8 +121,8 @@ struct WindowCommand {
   }
 
   // One case, from its first session to the last. `left`: how the person left it.
-  static bool sit(const Params& p, const OpenCase& open, const Procedure* procedure, WindowShell& shell, PersonSettings& person,
-                  cli::Invocation& io, WindowEnd& left) {
+  static bool sit(const Params& p, const OpenCase& open, const Procedure* procedure, WindowShell& shell,
+                  PersonSettings& person, cli::Invocation& io, WindowEnd& left) {
     WindowOptions window;
     window.tool = burr_index(p.burr, p.diameter_mm, p.shape);
     window.from_case = p.resume.empty();
@@ -209,7 +212,8 @@ struct WindowCommand {
     const PersonValues before = person.values;
     const bool from_command_line = !io.arguments.empty();
     // What is no case at all is said without a window.
-    if (from_command_line && !fs::exists(fs::path(io.arguments[0]) / "manifest.json")) static_cast<void>(load_case(io.arguments[0]));
+    if (from_command_line && !fs::exists(fs::path(io.arguments[0]) / "manifest.json"))
+      static_cast<void>(load_case(io.arguments[0]));
 
     ShellOptions shown;
     shown.width = p.width;
@@ -241,8 +245,9 @@ struct WindowCommand {
       WindowEnd left;
       try {
         std::unique_ptr<OpenCase> open;
-        shell.while_working("the case is opened", io.context,
-                            [&](const Context& context) { open = open_case(choice->case_folder, p, procedure, context); });
+        shell.while_working("the case is opened", io.context, [&](const Context& context) {
+          open = open_case(choice->case_folder, p, procedure, context);
+        });
         person.opened(open->files.folder);
         sat = true;
         lost_ticks = sit(flags, *open, procedure ? &*procedure : nullptr, shell, person, io, left) || lost_ticks;
@@ -265,9 +270,11 @@ struct WindowCommand {
     keep(before, person.values, kept);
     person.values = kept;
     if (const std::string not_kept = person.save(); !not_kept.empty()) io.context.warn(not_kept);
-    if (io.context.cancelled()) throw Error(ExitCode::cancelled, sat ? "ended from outside; the session is saved" : "ended from outside");
+    if (io.context.cancelled())
+      throw Error(ExitCode::cancelled, sat ? "ended from outside; the session is saved" : "ended from outside");
     if (shell.gl_errors() > 0)
-      throw Error(ExitCode::failed, std::to_string(shell.gl_errors()) + " OpenGL errors were seen; the session is saved",
+      throw Error(ExitCode::failed,
+                  std::to_string(shell.gl_errors()) + " OpenGL errors were seen; the session is saved",
                   "please report this with the name of the graphics card");
     return static_cast<int>(lost_ticks ? ExitCode::partial : ExitCode::ok);
   }

@@ -19,12 +19,14 @@ std::unique_ptr<Rehearsal> PastSession::stage(const Case& the_case, RehearsalOpt
                                               const Context& context) const {
   World world = world_at_begin(folder_, the_case, options.anatomy, context);
   if (world.hash() != SessionReader(folder_.stream(), Damage::keep).header().bone_hash)
-    throw Error(ExitCode::corrupt, "the session '" + folder_.folder.string() + "' was recorded on another bone than its case holds now",
+    throw Error(ExitCode::corrupt,
+                "the session '" + folder_.folder.string() + "' was recorded on another bone than its case holds now",
                 "give the case it was recorded on, unchanged");
   options.session_file.clear();
   options.soft = nullptr;
   options.follow = {true, true, false, false};
-  const HandGoal rest{from_floats(to_floats(view.eye * 300)), to_floats(view.axis), 0, static_cast<std::uint8_t>(view.tool)};
+  const HandGoal rest{from_floats(to_floats(view.eye * 300)), to_floats(view.axis), 0,
+                      static_cast<std::uint8_t>(view.tool)};
   auto hand = std::make_unique<MouseDevice>(rest);
   options.haptics.device = hand->traits();
   options.haptics.more_devices.clear();
@@ -40,13 +42,15 @@ SessionFacts PastSession::facts(const Anatomy& anatomy) const {
   f.past = true;
   f.folder = folder_.folder;
   f.rate_hz = session.header().rate_hz;
-  f.seconds = static_cast<double>(outline.tick_records) / static_cast<double>(1 + session.header().haptics.more_devices.size()) / f.rate_hz;
+  f.seconds = static_cast<double>(outline.tick_records) /
+              static_cast<double>(1 + session.header().haptics.more_devices.size()) / f.rate_hz;
   f.has_structures = anatomy.structures != nullptr;
   if (!outline.end) f.warnings.push_back("the session was cut short: it is shown as far as it goes");
   for (const std::string& line : losses(outline)) f.warnings.push_back(line);
   if (!folder_.guided.empty()) f.warnings.push_back("guided: " + folder_.guided);
   if (const std::string words = simulated_words(session); !words.empty()) f.warnings.push_back(words);
-  const auto summary = std::filesystem::exists(folder_.summary()) ? Json::parse(read_text(folder_.summary())) : std::nullopt;
+  const auto summary =
+      std::filesystem::exists(folder_.summary()) ? Json::parse(read_text(folder_.summary())) : std::nullopt;
   if (!summary) {
     f.warnings.push_back("it was left without a summary: what was removed stands among the findings");
     return f;
@@ -62,14 +66,16 @@ SessionFacts PastSession::facts(const Anatomy& anatomy) const {
   if (const Json* const plates = summary->find("plates")) {
     for (const Json& p : plates->items()) {
       const Json* const name = p.find("plate");
-      if (name != nullptr && name->text() != nullptr) f.plates.push_back(format_number(number(p, "number")) + ": " + *name->text());
+      if (name != nullptr && name->text() != nullptr)
+        f.plates.push_back(format_number(number(p, "number")) + ": " + *name->text());
     }
   }
   if (const Json* const structures = summary->find("structures")) {
     for (const Json& s : structures->items()) {
       const Json* const name = s.find("name");
       if (name != nullptr && name->text() != nullptr)
-        f.structures.push_back({*name->text(), number(s, "least_clearance_mm"), number(s, "touched_s"), number(s, "injured_s")});
+        f.structures.push_back(
+            {*name->text(), number(s, "least_clearance_mm"), number(s, "touched_s"), number(s, "injured_s")});
     }
   }
   if (const Json* const cuts = summary->find("structures_cut")) {

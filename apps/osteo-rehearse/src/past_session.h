@@ -1,7 +1,7 @@
 // A session that is over, to be looked at again: nothing is written into it.
 #pragma once
-#include "osteo/session/scene/session_folder.h"
 #include "osteo/app/window/rehearsal_window.h"
+#include "osteo/session/scene/session_folder.h"
 
 namespace osteo {
 
@@ -11,8 +11,8 @@ class PastSession {
   PastSession(const std::filesystem::path& folder, const std::filesystem::path& case_folder);
 
   [[nodiscard]] const SessionFolder& folder() const { return folder_; }
-  /// What runs behind the page: a hand at rest in the bone as it was at the beginning, recorded nowhere. Errors: as world_at_begin; corrupt
-  /// where the session was recorded on another bone.
+  /// What runs behind the page: a hand at rest in the bone as it was at the beginning, recorded nowhere. Errors: as
+  /// world_at_begin; corrupt where the session was recorded on another bone.
   [[nodiscard]] std::unique_ptr<Rehearsal> stage(const Case& the_case, RehearsalOptions options, const HandView& view,
                                                  const Context& context) const;
   /// From its stream, and from its summary where it was saved with one.

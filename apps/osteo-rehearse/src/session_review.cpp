@@ -22,8 +22,8 @@ ReviewFinding::Weight weight_of(FindingSeverity severity) {
 
 }  // namespace
 
-SessionReview review_of(const SessionFolder& folder, const Case& the_case, const Anatomy& anatomy, const Procedure* procedure,
-                        const Context& context) {
+SessionReview review_of(const SessionFolder& folder, const Case& the_case, const Anatomy& anatomy,
+                        const Procedure* procedure, const Context& context) {
   const SessionReader session(folder.stream(), Damage::keep);
   World begin = world_at_begin(folder, the_case, anatomy, context);
   SessionReview review;
@@ -31,7 +31,8 @@ SessionReview review_of(const SessionFolder& folder, const Case& the_case, const
   TimelineKeeper keeper({session.header().rate_hz, anatomy.structures.get(), procedure});
   ScoreDetail detail;
   detail.frame = [&](const EvidenceFrame& f) { keeper.frame(f); };
-  const Score score = score_session(session, begin.copy(), anatomy.structures.get(), procedure, nullptr, {}, context.sub(0, 0.6), &detail);
+  const Score score = score_session(session, begin.copy(), anatomy.structures.get(), procedure, nullptr, {},
+                                    context.sub(0, 0.6), &detail);
   tell_notes(session, keeper);
   const Findings findings = findings_of(score, anatomy.structures.get(), procedure);
   review.summary = findings.summary;

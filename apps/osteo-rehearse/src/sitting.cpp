@@ -10,10 +10,10 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/simulation/bone/plates.h"
 #include "osteo/imaging/pipeline/pipeline.h"
-#include "osteo/session/scene/free_ways.h"
 #include "osteo/session/recording/session_reader.h"
+#include "osteo/session/scene/free_ways.h"
+#include "osteo/simulation/bone/plates.h"
 #include "playback_words.h"
 
 namespace osteo {
@@ -113,7 +113,8 @@ HandGoal Sitting::begin(bool from_case, const HandView& view) {
   if (lesson_) return begin_led();
   if (live_.joins()) return begin_joined(view);
   World world = world_at_begin(session, case_, options_.anatomy, io_.context);
-  const HandPose pose = FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
+  const HandPose pose =
+      FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
   const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
   auto devices = hands_.make(start, near_the_bone(world, start));
   if (live_.hosts()) live_.add_hand(devices, options_);
@@ -134,17 +135,19 @@ void Sitting::save() {
 TutorNow Sitting::tutor() const {
   if (!playback_) return live_.now(rehearsal_.get());
   TutorNow n;
-  n.title = "Lesson: " + std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(playback_params_.mode)]) + ", " +
-            format_number(std::round(10 * playback_->seconds.load()) / 10) + " of " +
+  n.title = "Lesson: " + std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(playback_params_.mode)]) +
+            ", " + format_number(std::round(10 * playback_->seconds.load()) / 10) + " of " +
             format_number(std::round(10 * lesson_->seconds()) / 10) + " s";
   n.hands = {"you"};
-  for (std::size_t h = 0; h < lesson_->hands.size(); ++h) n.hands.push_back(h == 0 ? "recorded" : "recorded " + std::to_string(h + 1));
+  for (std::size_t h = 0; h < lesson_->hands.size(); ++h)
+    n.hands.push_back(h == 0 ? "recorded" : "recorded " + std::to_string(h + 1));
   n.ghosts = true;
   n.leads = leads(playback_params_);
   n.guiding = playback_->on;
   n.pull = playback_->pulled;
   if (rehearsal_)
-    n.apart_mm = length(from_floats(rehearsal_->latest(0).device.position_mm) - from_floats(rehearsal_->latest(1).device.position_mm));
+    n.apart_mm = length(from_floats(rehearsal_->latest(0).device.position_mm) -
+                        from_floats(rehearsal_->latest(1).device.position_mm));
   return n;
 }
 
@@ -162,7 +165,8 @@ std::vector<Vec3> Sitting::way() const {
 }
 
 void Sitting::learn(const WindowFlags& flags) {
-  if (!flags.resume.empty()) throw Error(ExitCode::usage, "--resume has no effect with --playback", "a lesson begins with its own bone");
+  if (!flags.resume.empty())
+    throw Error(ExitCode::usage, "--resume has no effect with --playback", "a lesson begins with its own bone");
   std::vector<FieldRef> fields = fields_of<PlaybackParams>(playback_params_);
   double to_s = 0;
   fields.push_back({{"from_s", "", "s", 0, 1e6}, &lesson_from_s_});
@@ -171,9 +175,11 @@ void Sitting::learn(const WindowFlags& flags) {
     const std::size_t comma = std::min(flags.playback_as.find(',', at), flags.playback_as.size());
     const std::string one = flags.playback_as.substr(at, comma - at);
     const std::size_t equals = one.find('=');
-    const auto field = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == one.substr(0, equals); });
+    const auto field = std::find_if(fields.begin(), fields.end(),
+                                    [&](const FieldRef& f) { return f.doc.name == one.substr(0, equals); });
     if (equals == std::string::npos || field == fields.end())
-      throw Error(ExitCode::usage, "--playback-as: '" + one + "' is no flag of 'osteo playback'", "mode=guide,pace=way");
+      throw Error(ExitCode::usage, "--playback-as: '" + one + "' is no flag of 'osteo playback'",
+                  "mode=guide,pace=way");
     field->from_text(one.substr(equals + 1), "--playback-as");
     at = comma + 1;
   }
@@ -211,7 +217,8 @@ HandGoal Sitting::begin_joined(const HandView& view) {
   if (options_.haptics.structures != header.haptics.structures)
     throw Error(ExitCode::usage, "the host's case has other structures at risk", "both need the same case, unchanged");
   World world = world_of_past(past, case_, options_.anatomy);
-  const HandPose pose = FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
+  const HandPose pose =
+      FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
   const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
   std::unique_ptr<Device> own;
   if (live_.has_hand()) own = std::move(hands_.make(start, near_the_bone(world, start)).front());
@@ -312,7 +319,8 @@ void Sitting::save_now() {
             << " gaps, since the disk did not keep up; session: " << session_.folder.string() << std::endl;
   }
   if (!io_.common.quiet)
-    io_.err << "session: " << session_.folder.string() << "  (" << s.ticks << " ticks, " << s.removed_mm3 << " mm3)" << std::endl;
+    io_.err << "session: " << session_.folder.string() << "  (" << s.ticks << " ticks, " << s.removed_mm3 << " mm3)"
+            << std::endl;
 }
 
 void Sitting::leave_sound() {
@@ -343,7 +351,8 @@ void Sitting::begin_monitor() {
   sound_.mix_in(&monitor_->sound());
   if (monitor_->wiring().channels.empty())
     io_.context.warn(
-        "the case lists none of the nerves that the monitor knows: it hears nothing (--structures and --names of 'osteo prepare')");
+        "the case lists none of the nerves that the monitor knows: it hears nothing (--structures and --names of "
+        "'osteo prepare')");
 }
 
 SessionFacts Sitting::facts_of(const RehearsalSummary& s) const {
@@ -368,7 +377,8 @@ SessionFacts Sitting::facts_of(const RehearsalSummary& s) const {
     if (map != nullptr) f.add_cut(map->name_of(e.cut.structure), e.cut.mm3);
   }
   f.warnings = s.warnings;
-  if (!s.gaps.empty()) f.warnings.push_back("NOT RECORDED: " + std::to_string(s.ticks_not_recorded) + " ticks: the disk did not keep up");
+  if (!s.gaps.empty())
+    f.warnings.push_back("NOT RECORDED: " + std::to_string(s.ticks_not_recorded) + " ticks: the disk did not keep up");
   return f;
 }
 

@@ -10,12 +10,12 @@
 #include "hands.h"
 #include "live_sitting.h"
 #include "osteo/app/cli/command.h"
+#include "osteo/app/window/monitor_desk.h"
 #include "osteo/assessment/evidence/procedure.h"
+#include "osteo/network/tutor/playback.h"
+#include "osteo/network/wire/rehearsal_stream.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"
-#include "osteo/network/tutor/playback.h"
-#include "osteo/app/window/monitor_desk.h"
-#include "osteo/network/wire/rehearsal_stream.h"
 #include "past_session.h"
 #include "session_review.h"
 
@@ -24,13 +24,16 @@ namespace osteo {
 // One session after another on a case. Between them, and after whatever throws, none runs.
 class Sitting {
  public:
-  /// `procedure`: what the session is scored by; null: no items are judged. It, the case and `io` must outlive the sitting.
-  Sitting(const WindowFlags& flags, const Case& the_case, const Procedure* procedure, const PersonValues& person, cli::Invocation& io);
+  /// `procedure`: what the session is scored by; null: no items are judged. It, the case and `io` must outlive the
+  /// sitting.
+  Sitting(const WindowFlags& flags, const Case& the_case, const Procedure* procedure, const PersonValues& person,
+          cli::Invocation& io);
   ~Sitting();
   Sitting(const Sitting&) = delete;
   Sitting& operator=(const Sitting&) = delete;
 
-  /// While this lives and `on`, it is saved when the program is ended by exit(), as Xlib does when the display goes away.
+  /// While this lives and `on`, it is saved when the program is ended by exit(), as Xlib does when the display goes
+  /// away.
   void save_at_exit(bool on);
 
   // Begun and saved in threads of their own; whoever ends the program meanwhile waits.
@@ -49,17 +52,23 @@ class Sitting {
   /// Of the session that was saved last.
   [[nodiscard]] const SessionFacts& facts() const { return facts_; }
   /// As the session that runs, or ran last, began with it.
-  [[nodiscard]] World at_begin(const Context& context) const { return world_at_begin(session_, case_, options_.anatomy, context); }
+  [[nodiscard]] World at_begin(const Context& context) const {
+    return world_at_begin(session_, case_, options_.anatomy, context);
+  }
   /// Of the session that was saved last.
   [[nodiscard]] SessionReview review(const Context& context) const {
     return review_of(session_, case_, options_.anatomy, procedure_, context);
   }
   /// For pictures. What is looked at again stays as it is.
-  [[nodiscard]] std::filesystem::path folder() const { return past_ ? std::filesystem::current_path() : session_.folder; }
+  [[nodiscard]] std::filesystem::path folder() const {
+    return past_ ? std::filesystem::current_path() : session_.folder;
+  }
   [[nodiscard]] SoundOut& sound() { return sound_; }
   [[nodiscard]] MonitorDesk* monitor() const { return monitor_.get(); }
   [[nodiscard]] std::string device() const { return hands_.name(); }
-  [[nodiscard]] CameraDevices camera(bool lend) const { return hands_.camera(rehearsal_ ? &rehearsal_->device() : nullptr, lend); }
+  [[nodiscard]] CameraDevices camera(bool lend) const {
+    return hands_.camera(rehearsal_ ? &rehearsal_->device() : nullptr, lend);
+  }
   void tune(const HandTuning& tuning) const { Hands::tune(rehearsal_ ? &rehearsal_->device() : nullptr, tuning); }
   [[nodiscard]] std::optional<std::uint32_t> switches(bool attended) const { return hands_.switches(attended); }
   /// Of any session so far, ticks were not recorded.
@@ -69,8 +78,8 @@ class Sitting {
   // What a recorded session teaches; its settings are this one's.
   void learn(const WindowFlags& flags);
 
-  // The lesson from its beginning, with its own bone. A mouse cannot be led: where nothing but the way is to be felt the tool follows by
-  // itself.
+  // The lesson from its beginning, with its own bone. A mouse cannot be led: where nothing but the way is to be felt
+  // the tool follows by itself.
   HandGoal begin_led();
 
   // A session that runs elsewhere, on a copy of its bone.

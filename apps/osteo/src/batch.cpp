@@ -10,15 +10,15 @@
 #include <thread>
 
 #include "batch_command.h"
+#include "built_in_pipelines.h"
 #include "case_pipeline.h"
 #include "commands/prepare.h"
-#include "program.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/imaging/pipeline/pipeline.h"
-#include "built_in_pipelines.h"
+#include "program.h"
 
 namespace osteo {
 namespace {
@@ -82,8 +82,9 @@ Json counts_json(const BatchResult& r, const fs::path& out) {
 std::string counts_words(const BatchResult& r) {
   std::string text = std::to_string(r.done) + " of " + std::to_string(r.cases) + " cases done";
   for (const auto& [count, words] :
-       {std::pair{r.untouched, "known from before"}, std::pair{r.refused, "refused for their input"}, std::pair{r.failed, "failed"},
-        std::pair{r.resources, "out of memory or time"}, std::pair{r.waiting, "waiting"}}) {
+       {std::pair{r.untouched, "known from before"}, std::pair{r.refused, "refused for their input"},
+        std::pair{r.failed, "failed"}, std::pair{r.resources, "out of memory or time"},
+        std::pair{r.waiting, "waiting"}}) {
     if (count > 0) text += ", " + std::to_string(count) + " " + words;
   }
   return text;
@@ -128,11 +129,13 @@ void check_case_settings(const std::string& text, const std::map<std::string, st
   validate(pipeline, registry);
 }
 
-int make_case(std::vector<std::string> arguments, const std::map<std::string, std::string>& settings, const fs::path& folder) {
+int make_case(std::vector<std::string> arguments, const std::map<std::string, std::string>& settings,
+              const fs::path& folder) {
   PrepareCommand::Params prepare;
   const auto fields = case_fields(prepare);
   for (const auto& [name, value] : settings) {
-    const auto field = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == name; });
+    const auto field =
+        std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == name; });
     if (field != fields.end())
       arguments.push_back(field->flag() + "=" + value);
     else
@@ -148,20 +151,26 @@ int make_case(std::vector<std::string> arguments, const std::map<std::string, st
 }
 
 cli::CommandInfo BatchCommand::info() {
-  return {
-      "batch",
-      "many scans become many cases",
-      "The table is CSV: its first line names the columns, 'source' (of the scan; from the table's folder on), 'case' (a code, which "
-      "becomes "
-      "the name of the case) and any flag or variable of prepare, such as lower or structures; an empty field is not given. --set "
-      "NAME=VALUE is for all cases. Each case is made by 'osteo prepare' in a process of its own, with bounds on memory and time; one that "
-      "fails never stops the others. Run again, the same line goes on where it was: what is done is not touched, what was interrupted is "
-      "begun anew, what ended for memory, time or a signal is tried again, and so is a case whose row, pipeline or source has changed. "
-      "OUT/report.html shows all cases, report.json and report.csv say the same; the cases are in OUT/cases. Exit code 0: all are done; 8: "
-      "some are refused or failed; 9: some ended for memory or time, or the disk is full. Names of scans are in none of it.",
-      {{"table", "a .csv file"}},
-      "osteo batch TABLE.csv -o OUT",
-      true};
+  return {"batch",
+          "many scans become many cases",
+          "The table is CSV: its first line names the columns, 'source' (of the scan; from the table's folder on), "
+          "'case' (a code, which "
+          "becomes "
+          "the name of the case) and any flag or variable of prepare, such as lower or structures; an empty field is "
+          "not given. --set "
+          "NAME=VALUE is for all cases. Each case is made by 'osteo prepare' in a process of its own, with bounds on "
+          "memory and time; one that "
+          "fails never stops the others. Run again, the same line goes on where it was: what is done is not touched, "
+          "what was interrupted is "
+          "begun anew, what ended for memory, time or a signal is tried again, and so is a case whose row, pipeline or "
+          "source has changed. "
+          "OUT/report.html shows all cases, report.json and report.csv say the same; the cases are in OUT/cases. Exit "
+          "code 0: all are done; 8: "
+          "some are refused or failed; 9: some ended for memory or time, or the disk is full. Names of scans are in "
+          "none of it.",
+          {{"table", "a .csv file"}},
+          "osteo batch TABLE.csv -o OUT",
+          true};
 }
 
 int BatchCommand::run(const Params& p, cli::Invocation& io) {
@@ -197,7 +206,8 @@ int BatchCommand::run(const Params& p, cli::Invocation& io) {
     if (!output_exists(out / "batch.json")) throw Error(ExitCode::no_input, "'" + p.out + "' is no batch");
     const BatchResult result = write_batch_report(table, out);
     if (io.common.json) io.out << counts_json(result, p.out).dump(2) << '\n';
-    if (!io.common.quiet) io.err << counts_words(result) << "\n  " << (fs::path(p.out) / "report.html").string() << '\n';
+    if (!io.common.quiet)
+      io.err << counts_words(result) << "\n  " << (fs::path(p.out) / "report.html").string() << '\n';
     return exit_code_of(result);
   }
 
@@ -245,9 +255,10 @@ int BatchCommand::run(const Params& p, cli::Invocation& io) {
     return make_case(std::move(a), with_common(row.settings), folder);
   };
   if (!io.common.quiet) {
-    io.err << table.size() << " cases, " << options.jobs << " at a time with " << threads << (threads == 1 ? " thread" : " threads")
-           << " each; bounds of a case: " << (p.memory_mb > 0 ? format_number(p.memory_mb) + " MB" : "no memory bound") << ", "
-           << (p.minutes > 0 ? format_number(p.minutes) + " min" : "no time bound") << '\n';
+    io.err << table.size() << " cases, " << options.jobs << " at a time with " << threads
+           << (threads == 1 ? " thread" : " threads")
+           << " each; bounds of a case: " << (p.memory_mb > 0 ? format_number(p.memory_mb) + " MB" : "no memory bound")
+           << ", " << (p.minutes > 0 ? format_number(p.minutes) + " min" : "no time bound") << '\n';
   }
   const BatchResult result = run_batch(table, options, work, io.context);
   io.end_progress();
@@ -257,7 +268,8 @@ int BatchCommand::run(const Params& p, cli::Invocation& io) {
     if (options.only.empty()) io.err << "  " << (fs::path(p.out) / "report.html").string() << '\n';
   }
   if (!result.stopped.empty())
-    throw Error(ExitCode::resources, "stopped before the end: " + result.stopped, "the same line again goes on from here");
+    throw Error(ExitCode::resources, "stopped before the end: " + result.stopped,
+                "the same line again goes on from here");
   return exit_code_of(result);
 }
 

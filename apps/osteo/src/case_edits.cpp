@@ -49,7 +49,8 @@ void add_edits(Pipeline& pipeline, const CaseEdits& edits, const fs::path& folde
   const MaskNodes at = mask_nodes(pipeline);
   const auto own = threshold_of(edits.recipe);
   if (own && threshold_asked) {
-    throw Error(ExitCode::usage, "the threshold has no say: the case was edited by hand from " + format_number(*own) + " HU on",
+    throw Error(ExitCode::usage,
+                "the threshold has no say: the case was edited by hand from " + format_number(*own) + " HU on",
                 "change it in 'osteo edit', or --no-edits to drop what was done by hand");
   }
   // Whoever took the mask takes the corrected one.
@@ -67,9 +68,10 @@ void add_edits(Pipeline& pipeline, const CaseEdits& edits, const fs::path& folde
   node.inputs["mask"] = at.mask;
   node.inputs["edits"].file = edits.file;
   node.outputs["edits"] = folder / "edits.json";
-  bool structures = std::any_of(edits.recipe.operations.begin(), edits.recipe.operations.end(), [](const EditOperation& o) {
-    return std::holds_alternative<AddStructureEdit>(o) || std::holds_alternative<ChangeStructureEdit>(o);
-  });
+  bool structures =
+      std::any_of(edits.recipe.operations.begin(), edits.recipe.operations.end(), [](const EditOperation& o) {
+        return std::holds_alternative<AddStructureEdit>(o) || std::holds_alternative<ChangeStructureEdit>(o);
+      });
   for (PipelineNode& n : pipeline.nodes) {
     if (n.id != "structures") continue;
     structures = true;

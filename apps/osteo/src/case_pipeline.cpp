@@ -21,7 +21,9 @@ void pass_threshold_on(Pipeline& pipeline) {
     const auto mask = bone.inputs.find("mask");
     if (bone.stage != "resample" || mask == bone.inputs.end() || bone.params.contains("lower")) continue;
     for (const PipelineNode& n : pipeline.nodes) {
-      if (n.id != mask_before_edits(pipeline, mask->second.node) || n.stage != "threshold" || !n.params.contains("lower")) continue;
+      if (n.id != mask_before_edits(pipeline, mask->second.node) || n.stage != "threshold" ||
+          !n.params.contains("lower"))
+        continue;
       const auto preset = n.params.find("preset");
       if (preset == n.params.end() || preset->second == "fixed") bone.params["lower"] = n.params.at("lower");
     }
@@ -42,7 +44,8 @@ Pipeline up_to(const Pipeline& pipeline, const std::vector<std::string>& ids) {
     }
   }
   Pipeline part = pipeline;
-  std::erase_if(part.nodes, [&](const PipelineNode& n) { return std::find(wanted.begin(), wanted.end(), n.id) == wanted.end(); });
+  std::erase_if(part.nodes,
+                [&](const PipelineNode& n) { return std::find(wanted.begin(), wanted.end(), n.id) == wanted.end(); });
   for (PipelineNode& n : part.nodes) n.outputs.clear();
   return part;
 }
@@ -74,8 +77,9 @@ std::string flags_of(const Recipe& recipe) {
   return all.empty() ? " nothing" : all;
 }
 
-Pipeline case_pipeline(const std::string& text, const Recipe& recipe, const fs::path& source, const fs::path& structures, bool as_held,
-                       const fs::path& folder, const std::optional<CaseEdits>& edits, bool threshold_asked) {
+Pipeline case_pipeline(const std::string& text, const Recipe& recipe, const fs::path& source,
+                       const fs::path& structures, bool as_held, const fs::path& folder,
+                       const std::optional<CaseEdits>& edits, bool threshold_asked) {
   std::map<std::string, std::string> settings = recipe.settings;
   settings.erase("names");
   settings["source"] = source.string();
@@ -85,7 +89,8 @@ Pipeline case_pipeline(const std::string& text, const Recipe& recipe, const fs::
     PipelineNode node;
     node.id = node.stage = "structures";
     node.inputs["labels"].file = structures;
-    const bool has_ct = std::any_of(pipeline.nodes.begin(), pipeline.nodes.end(), [](const PipelineNode& n) { return n.id == "ct"; });
+    const bool has_ct =
+        std::any_of(pipeline.nodes.begin(), pipeline.nodes.end(), [](const PipelineNode& n) { return n.id == "ct"; });
     if (has_ct) node.inputs["image"].node = "ct";
     const auto names = recipe.settings.find("names");
     if (names != recipe.settings.end() && !as_held) {
@@ -164,8 +169,9 @@ CaseReport report_on(const fs::path& folder, const std::string& asked_for, const
   } catch (const Error& e) {
     io.end_progress();
     if (e.code() == ExitCode::cancelled) throw;
-    throw Error(e.code(), std::string("the case is whole, but its report is not written: ") + e.what(),
-                e.advice().empty() ? "'osteo report " + folder.string() + "' writes it; --no-report does without" : e.advice());
+    throw Error(
+        e.code(), std::string("the case is whole, but its report is not written: ") + e.what(),
+        e.advice().empty() ? "'osteo report " + folder.string() + "' writes it; --no-report does without" : e.advice());
   }
 }
 

@@ -13,16 +13,17 @@
 namespace osteo {
 
 cli::CommandInfo ConsoleCommand::info() {
-  return {
-      "console",
-      "the nerve monitor's console, over the network",
-      "A window that shows the nerve monitor of a rehearsal elsewhere, which streams by OpenIGTLink (--stream igtl:PORT, or osteo stream): "
-      "sweep of the channels, answers to pulses, events, gain of each channel, freeze, sound and alarm. It only listens, but for the "
-      "stimulator, where it is "
-      "given the code of a rehearsal that lets it. It looks for the "
-      "server until it is there, and again when it went.",
-      {{"server", "PORT, for this machine, or HOST:PORT"}},
-      "osteo console 18944"};
+  return {"console",
+          "the nerve monitor's console, over the network",
+          "A window that shows the nerve monitor of a rehearsal elsewhere, which streams by OpenIGTLink (--stream "
+          "igtl:PORT, or osteo stream): "
+          "sweep of the channels, answers to pulses, events, gain of each channel, freeze, sound and alarm. It only "
+          "listens, but for the "
+          "stimulator, where it is "
+          "given the code of a rehearsal that lets it. It looks for the "
+          "server until it is there, and again when it went.",
+          {{"server", "PORT, for this machine, or HOST:PORT"}},
+          "osteo console 18944"};
 }
 
 int ConsoleCommand::run(const Params& p, cli::Invocation& io) {

@@ -19,8 +19,10 @@ namespace osteo {
 cli::CommandInfo ConvertCommand::info() {
   return {"convert",
           "one file format to another",
-          "Volumes, label maps, surfaces, sparse grids and pictures, by suffix. A label map as .dcm becomes a DICOM segmentation, a "
-          "surface as .dcm an encapsulated STL: with --source they belong to that patient and study, without they name nobody. "
+          "Volumes, label maps, surfaces, sparse grids and pictures, by suffix. A label map as .dcm becomes a DICOM "
+          "segmentation, a "
+          "surface as .dcm an encapsulated STL: with --source they belong to that patient and study, without they name "
+          "nobody. "
           "A label map as .seg.nrrd is read by 3D Slicer with its names.",
           {{"input", "file to read"}, {"output", "file to write"}},
           "osteo convert mask.nrrd mask.dcm --source DICOM_FOLDER"};
@@ -28,10 +30,12 @@ cli::CommandInfo ConvertCommand::info() {
 
 int ConvertCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path from = io.arguments[0], to = io.arguments[1];
-  static constexpr std::array kAny{DataKind::labels, DataKind::image, DataKind::grid, DataKind::surface, DataKind::tets, DataKind::picture};
+  static constexpr std::array kAny{DataKind::labels,  DataKind::image, DataKind::grid,
+                                   DataKind::surface, DataKind::tets,  DataKind::picture};
   require_readable(from);
   if (output_exists(to) && !io.common.force) {
-    throw Error(ExitCode::cannot_write, "'" + to.string() + "' exists already", "give another name, or --force to replace it");
+    throw Error(ExitCode::cannot_write, "'" + to.string() + "' exists already",
+                "give another name, or --force to replace it");
   }
   Data data = load_data(from, kAny, io.context);
   // A mask may be stored wider than a byte; what is wanted says how to read it.
@@ -47,11 +51,13 @@ int ConvertCommand::run(const Params& p, cli::Invocation& io) {
     const DicomScan scan = scan_dicom(p.source, {}, io.context);
     const DicomObjectOptions options{&choose_series(scan, p.series, p.source), p.description};
     if (const auto* labels = std::get_if<Labels>(&data)) {
-      p.onto_source ? save_segmentation_on_source(*labels, to, options, io.context) : save_segmentation(*labels, to, options, io.context);
+      p.onto_source ? save_segmentation_on_source(*labels, to, options, io.context)
+                    : save_segmentation(*labels, to, options, io.context);
     } else if (const auto* surface = std::get_if<Surface>(&data)) {
       save_encapsulated_stl(**surface, to, options, io.context);
     } else {
-      throw Error(ExitCode::usage, "a " + std::string(kind_name(kind_of(data))) + " cannot be written as one DICOM file");
+      throw Error(ExitCode::usage,
+                  "a " + std::string(kind_name(kind_of(data))) + " cannot be written as one DICOM file");
     }
   }
   io.end_progress();
@@ -63,7 +69,8 @@ int ConvertCommand::run(const Params& p, cli::Invocation& io) {
 cli::CommandInfo BenchCommand::info() {
   return {"bench",
           "speed against error, beside the peers, in one run",
-          "Prints the tables of docs/accuracy.md. Runs osteo_bench, which is built by 'cmake --build build/release --target osteo_bench'.",
+          "Prints the tables of docs/accuracy.md. Runs osteo_bench, which is built by 'cmake --build build/release "
+          "--target osteo_bench'.",
           {{"subject", bench_subject_names(), true}},
           "osteo bench import"};
 }
@@ -74,7 +81,8 @@ int BenchCommand::run(const Params&, cli::Invocation& io) {
   if (ec || !fs::exists(program)) {
     throw Error(ExitCode::no_input, "osteo_bench is not built", "cmake --build build/release --target osteo_bench");
   }
-  const std::string subject = io.arguments.empty() ? "all" : io.arguments[0], threads = std::to_string(io.context.threads);
+  const std::string subject = io.arguments.empty() ? "all" : io.arguments[0],
+                    threads = std::to_string(io.context.threads);
   io.end_progress();
   ::execl(program.c_str(), "osteo_bench", subject.c_str(), threads.c_str(), static_cast<char*>(nullptr));
   throw Error(ExitCode::failed, "osteo_bench cannot be started");

@@ -14,33 +14,38 @@ std::map<std::string, std::size_t> told_refusals(const DeidentifyReport& report,
   std::map<std::string, std::string> first;
   for (const NotDeidentified& r : report.refused)
     if (why[r.why]++ == 0) first[r.why] = r.file.filename().string();
-  for (const auto& [reason, n] : why) io.err << n << " objects left out: " << reason << ", the first: " << first[reason] << '\n';
+  for (const auto& [reason, n] : why)
+    io.err << n << " objects left out: " << reason << ", the first: " << first[reason] << '\n';
   return why;
 }
 
 cli::CommandInfo DeidentifyCommand::info() {
-  return {
-      "deidentify",
-      "copies of DICOM objects without what identifies a person",
-      "Basic Application Level Confidentiality Profile of PS3.15 Annex E (2026c), without options: dates, names, numbers, descriptions and "
-      "private attributes go, UIDs are replaced so that a study stays one study. Pixels are not changed: a face can be made from a scan of "
-      "a head. What may have words in its pixels, and what is no scan or segmentation, is left out (exit code 8). The originals stay as "
-      "they are.",
-      {{"source", "a file or a folder"}},
-      "osteo deidentify CT -o OUT"};
+  return {"deidentify",
+          "copies of DICOM objects without what identifies a person",
+          "Basic Application Level Confidentiality Profile of PS3.15 Annex E (2026c), without options: dates, names, "
+          "numbers, descriptions and "
+          "private attributes go, UIDs are replaced so that a study stays one study. Pixels are not changed: a face "
+          "can be made from a scan of "
+          "a head. What may have words in its pixels, and what is no scan or segmentation, is left out (exit code 8). "
+          "The originals stay as "
+          "they are.",
+          {{"source", "a file or a folder"}},
+          "osteo deidentify CT -o OUT"};
 }
 
 int DeidentifyCommand::run(const Params& p, cli::Invocation& io) {
   if (p.out.empty()) throw Error(ExitCode::usage, "no folder is named for the result", "-o OUT");
   const auto unused = [&](const fs::path& folder) {
     if (output_exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
-      throw Error(ExitCode::cannot_write, "'" + folder.string() + "' exists already", "another folder: nothing is replaced");
+      throw Error(ExitCode::cannot_write, "'" + folder.string() + "' exists already",
+                  "another folder: nothing is replaced");
   };
   unused(p.out);
   if (!p.map.empty()) {
     if (output_exists(p.map))
       throw Error(ExitCode::cannot_write, "'" + p.map + "' exists already", "another name: a map is never replaced");
-    const fs::path inside = fs::absolute(p.map).lexically_normal().lexically_relative(fs::absolute(p.out).lexically_normal());
+    const fs::path inside =
+        fs::absolute(p.map).lexically_normal().lexically_relative(fs::absolute(p.out).lexically_normal());
     if (!inside.empty() && *inside.begin() != "..")
       throw Error(ExitCode::usage, "the map would lie in the folder that leaves", "--map where only you can read");
   }

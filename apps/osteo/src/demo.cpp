@@ -19,7 +19,8 @@ namespace osteo {
 cli::CommandInfo DemoCommand::info() {
   return {"demo",
           "the whole way once: CT, case, drilled session, pictures",
-          "With no CT given it makes one (a phantom head, as DICOM). Then prepare, a headless rehearsal by the clock, and a replay that "
+          "With no CT given it makes one (a phantom head, as DICOM). Then prepare, a headless rehearsal by the clock, "
+          "and a replay that "
           "must come out the same.",
           {{"source", "DICOM folder or volume file", true}},
           "osteo demo"};
@@ -36,14 +37,15 @@ int DemoCommand::run(const Params& p, cli::Invocation& io) {
   };
   // Without a terminal there is no bar: a line for each new activity and each 20 % says what is going on.
   if (::isatty(2) == 0 && !io.common.quiet && io.common.progress == cli::ProgressStyle::automatic) {
-    io.context.on_progress([&err = io.err, activity = std::string(), fifths = 0](double fraction, std::string_view what) mutable {
-      const int now = static_cast<int>(fraction * 5);
-      if (what.empty() || (what == activity && now <= fifths)) return;
-      if (what != activity) fifths = 0;
-      activity = what;
-      fifths = std::max(fifths, now);
-      err << "   " << static_cast<int>(fraction * 100) << " %  " << activity << std::endl;
-    });
+    io.context.on_progress(
+        [&err = io.err, activity = std::string(), fifths = 0](double fraction, std::string_view what) mutable {
+          const int now = static_cast<int>(fraction * 5);
+          if (what.empty() || (what == activity && now <= fifths)) return;
+          if (what != activity) fifths = 0;
+          activity = what;
+          fifths = std::max(fifths, now);
+          err << "   " << static_cast<int>(fraction * 100) << " %  " << activity << std::endl;
+        });
   }
   if (phantom && !fs::exists(source)) {
     say("making a CT of a phantom head: " + source.string());
@@ -86,8 +88,8 @@ int DemoCommand::run(const Params& p, cli::Invocation& io) {
   say("replaying the session");
   io.arguments = {session.string()};
   const int code = ReplayCommand::run({}, io);
-  say("done; look at\n   " + (out / "case/preview.png").string() + "\n   " + (session / "before.png").string() + "\n   " +
-      (session / "after.png").string() + "\nand drill yourself:  ./osteo rehearse " + prepare.out);
+  say("done; look at\n   " + (out / "case/preview.png").string() + "\n   " + (session / "before.png").string() +
+      "\n   " + (session / "after.png").string() + "\nand drill yourself:  ./osteo rehearse " + prepare.out);
   return code;
 }
 

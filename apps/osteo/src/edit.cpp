@@ -14,14 +14,16 @@
 namespace osteo {
 
 cli::CommandInfo EditCommand::info() {
-  return {
-      "edit",
-      "correct the bone and the structures of a case by hand",
-      "Opens a window with three slices and the bone in 3D: threshold, pieces, box, filling, smoothing, brush and eraser, structures, with "
-      "undo. Saving writes edits.json into the case, which holds what was done and no voxel of the scan, and makes the case's bone anew "
-      "from it; prepare keeps it from then on. With --apply the same without a window, from a file. The scan is never changed.",
-      {{"case", "a folder made by prepare"}},
-      "osteo edit CASE"};
+  return {"edit",
+          "correct the bone and the structures of a case by hand",
+          "Opens a window with three slices and the bone in 3D: threshold, pieces, box, filling, smoothing, brush and "
+          "eraser, structures, with "
+          "undo. Saving writes edits.json into the case, which holds what was done and no voxel of the scan, and makes "
+          "the case's bone anew "
+          "from it; prepare keeps it from then on. With --apply the same without a window, from a file. The scan is "
+          "never changed.",
+          {{"case", "a folder made by prepare"}},
+          "osteo edit CASE"};
 }
 
 int EditCommand::run(const Params& p, cli::Invocation& io) {
@@ -32,7 +34,8 @@ int EditCommand::run(const Params& p, cli::Invocation& io) {
   }
   if (!p.apply.empty()) {
     for (const char* const name : {"width", "height", "state_file"}) {
-      if (io.given.contains(name)) throw Error(ExitCode::usage, "--apply opens no window, so --" + std::string(name) + " does nothing");
+      if (io.given.contains(name))
+        throw Error(ExitCode::usage, "--apply opens no window, so --" + std::string(name) + " does nothing");
     }
     // As prepare does it, with one thing changed.
     PrepareCommand::Params prepare;

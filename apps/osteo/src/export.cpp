@@ -2,25 +2,28 @@
 #include <ostream>
 
 #include "commands/export.h"
+#include "osteo/app/cli/report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/app/cli/report.h"
-#include "osteo/session/scene/session_folder.h"
 #include "osteo/session/recording/export.h"
 #include "osteo/session/recording/session_reader.h"
+#include "osteo/session/scene/session_folder.h"
 
 namespace osteo {
 
 cli::CommandInfo ExportCommand::info() {
-  return {
-      "export",
-      "a session for other programs: CSV, HDF5 or MCAP",
-      "By the ending: .csv for spreadsheets (actions and notes in files of their own, out-actions.csv and out-notes.csv), .h5 for MATLAB, "
-      "Python and R (columns under /ticks, /actions, /gaps, /notes), .mcap for Foxglove and ROS tools. One row a tick: pose, force, "
-      "torque, removal, flags, how late the machine was; notes are where the camera was, marks, choices. Of a damaged session all that is "
-      "whole is written, and the exit code is 4.",
-      {{"session", "a session folder, or a stream (.oss) by itself"}, {"output", "file that ends in .csv, .h5 or .mcap"}},
-      "osteo export SESSION ticks.csv"};
+  return {"export",
+          "a session for other programs: CSV, HDF5 or MCAP",
+          "By the ending: .csv for spreadsheets (actions and notes in files of their own, out-actions.csv and "
+          "out-notes.csv), .h5 for MATLAB, "
+          "Python and R (columns under /ticks, /actions, /gaps, /notes), .mcap for Foxglove and ROS tools. One row a "
+          "tick: pose, force, "
+          "torque, removal, flags, how late the machine was; notes are where the camera was, marks, choices. Of a "
+          "damaged session all that is "
+          "whole is written, and the exit code is 4.",
+          {{"session", "a session folder, or a stream (.oss) by itself"},
+           {"output", "file that ends in .csv, .h5 or .mcap"}},
+          "osteo export SESSION ticks.csv"};
 }
 
 int ExportCommand::run(const Params&, cli::Invocation& io) {

@@ -4,10 +4,10 @@
 #include <ostream>
 
 #include "commands/ground_truth.h"
+#include "osteo/assessment/ground_truth/experiments.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/assessment/ground_truth/experiments.h"
 #include "osteo/imaging/io/surface_io.h"
 
 namespace osteo {
@@ -15,9 +15,11 @@ namespace osteo {
 cli::CommandInfo GroundTruthCommand::info() {
   return {"ground-truth",
           "haptic renderers against solids of which surface, normal and force are known",
-          "Plays generated trajectories of a probe over analytic solids through our renderers, through those of 2006 (voxels, a proxy with "
+          "Plays generated trajectories of a probe over analytic solids through our renderers, through those of 2006 "
+          "(voxels, a proxy with "
           "a friction "
-          "cone), and with --program through anyone's, and writes tables, plots and a leaderboard. Without --experiment: all that "
+          "cone), and with --program through anyone's, and writes tables, plots and a leaderboard. Without "
+          "--experiment: all that "
           "docs/ground-truth.md "
           "describes, in minutes. Same seed, same numbers, to the bit; times are kept apart, in costs.md.",
           {},
@@ -26,7 +28,8 @@ cli::CommandInfo GroundTruthCommand::info() {
 
 int GroundTruthCommand::run(const Params& p, cli::Invocation& io) {
   if (p.out.empty()) throw Error(ExitCode::usage, "ground-truth needs a folder for what it writes", "-o FOLDER");
-  if (p.trajectory.empty() != p.surface.empty()) throw Error(ExitCode::usage, "--trajectory and --surface belong together");
+  if (p.trajectory.empty() != p.surface.empty())
+    throw Error(ExitCode::usage, "--trajectory and --surface belong together");
   if (p.trajectory.empty() && (io.given.count("columns") != 0 || io.given.count("stiffness_n_per_mm") != 0))
     throw Error(ExitCode::usage, "--columns and --stiffness-n-per-mm have no effect without --trajectory");
   if (!p.trajectory.empty() && (!p.experiment.empty() || !p.bone.empty() || io.given.count("share") != 0))
@@ -56,13 +59,15 @@ int GroundTruthCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   if (io.common.json) {
     Json bars = Json::list();
-    for (const truth::Bar& b : r.bars) bars.push_back({{"what", b.what}, {"limit", b.limit}, {"measured", b.measured}, {"held", b.held}});
+    for (const truth::Bar& b : r.bars)
+      bars.push_back({{"what", b.what}, {"limit", b.limit}, {"measured", b.measured}, {"held", b.held}});
     io.out << Json{{"folder", p.out}, {"seed", io.common.seed}, {"seconds", took}, {"bars", bars}}.dump(2) << '\n';
     return 0;
   }
   for (const truth::Bar& b : r.bars)
     io.out << (b.held ? "held    " : "missed  ") << b.what << ": " << b.measured << " (" << b.limit << ")\n";
-  if (!io.common.quiet) io.err << p.out << "/leaderboard.html, " << r.tables.size() << " tables in " << static_cast<int>(took) << " s\n";
+  if (!io.common.quiet)
+    io.err << p.out << "/leaderboard.html, " << r.tables.size() << " tables in " << static_cast<int>(took) << " s\n";
   return 0;
 }
 

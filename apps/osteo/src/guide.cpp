@@ -27,26 +27,30 @@ std::string histogram_svg(const Image& ct, const BoneGuide& g) {
   const double most = std::max(2.0, *std::max_element(bins.begin(), bins.end()));
   const auto x = [](double hu) { return 40 + (hu - kFrom) / 5; };
   std::ostringstream svg;
-  svg << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"920\" height=\"430\" font-family=\"sans-serif\" font-size=\"12\">\n"
+  svg << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"920\" height=\"430\" font-family=\"sans-serif\" "
+         "font-size=\"12\">\n"
       << "<rect width=\"920\" height=\"430\" fill=\"white\"/>\n<g fill=\"#889\">\n";
   for (std::size_t i = 0; i < bins.size(); ++i) {
     const double h = bins[i] < 1 ? 0 : kHeight * std::log1p(bins[i]) / std::log1p(most);
-    svg << "<rect x=\"" << x(kFrom + kStep * static_cast<int>(i)) << "\" y=\"" << kTop + kHeight - h << "\" width=\"4\" height=\"" << h
-        << "\"/>\n";
+    svg << "<rect x=\"" << x(kFrom + kStep * static_cast<int>(i)) << "\" y=\"" << kTop + kHeight - h
+        << "\" width=\"4\" height=\"" << h << "\"/>\n";
   }
   svg << "</g>\n";
   for (int hu = -1000; hu <= kTo; hu += 500)
-    svg << "<text x=\"" << x(hu) << "\" y=\"" << kTop + kHeight + 18 << "\" text-anchor=\"middle\">" << hu << "</text>\n";
-  svg << "<text x=\"460\" y=\"" << kTop + kHeight + 40 << "\" text-anchor=\"middle\">HU; voxels on a logarithmic scale</text>\n";
+    svg << "<text x=\"" << x(hu) << "\" y=\"" << kTop + kHeight + 18 << "\" text-anchor=\"middle\">" << hu
+        << "</text>\n";
+  svg << "<text x=\"460\" y=\"" << kTop + kHeight + 40
+      << "\" text-anchor=\"middle\">HU; voxels on a logarithmic scale</text>\n";
   const auto mark = [&](double hu, const std::string& what, const char* colour, int line) {
-    svg << "<line x1=\"" << x(hu) << "\" x2=\"" << x(hu) << "\" y1=\"" << 18 + 14 * line << "\" y2=\"" << kTop + kHeight << "\" stroke=\""
-        << colour << "\"/>\n<text x=\"" << x(hu) + 3 << "\" y=\"" << 26 + 14 * line << "\" fill=\"" << colour << "\">" << what << ' '
-        << std::lround(hu) << "</text>\n";
+    svg << "<line x1=\"" << x(hu) << "\" x2=\"" << x(hu) << "\" y1=\"" << 18 + 14 * line << "\" y2=\"" << kTop + kHeight
+        << "\" stroke=\"" << colour << "\"/>\n<text x=\"" << x(hu) + 3 << "\" y=\"" << 26 + 14 * line << "\" fill=\""
+        << colour << "\">" << what << ' ' << std::lround(hu) << "</text>\n";
   };
   mark(g.soft_tissue_hu, "soft tissue", "#b40", 0);
   mark(g.dense_bone_hu, "dense bone", "#b40", 0);
   for (std::size_t n = 0; n < g.presets.size(); ++n)
-    mark(g.presets[n].lower_hu, std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(g.presets[n].preset)]), "#06c",
+    mark(g.presets[n].lower_hu,
+         std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(g.presets[n].preset)]), "#06c",
          static_cast<int>(g.presets.size() - n));
   svg << "</svg>\n";
   return svg.str();
@@ -57,8 +61,10 @@ std::string histogram_svg(const Image& ct, const BoneGuide& g) {
 cli::CommandInfo GuideCommand::info() {
   return {"guide",
           "which bone threshold suits a scan",
-          "Finds soft tissue and dense bone in the values and proposes a threshold for thick bone (cortical), for the walls of air cells "
-          "(cellular) and for thin plates (thin), with the volume of bone each gives and how much that depends on the exact number.",
+          "Finds soft tissue and dense bone in the values and proposes a threshold for thick bone (cortical), for the "
+          "walls of air cells "
+          "(cellular) and for thin plates (thin), with the volume of bone each gives and how much that depends on the "
+          "exact number.",
           {{"source", "DICOM folder or zip, or a volume file"}},
           "osteo guide DICOM_FOLDER"};
 }
@@ -67,7 +73,8 @@ int GuideCommand::run(const Params& p, cli::Invocation& io) {
   if (!p.picture.empty() && fs::path(p.picture).extension() != ".svg")
     throw Error(ExitCode::usage, "--picture '" + p.picture + "': the histogram is written as .svg");
   if (!p.picture.empty() && output_exists(p.picture) && !io.common.force)
-    throw Error(ExitCode::cannot_write, "'" + p.picture + "' exists already", "give another name, or --force to replace it");
+    throw Error(ExitCode::cannot_write, "'" + p.picture + "' exists already",
+                "give another name, or --force to replace it");
   ImportParams import;
   import.series = p.series;
   import.hu_offset = p.hu_offset;
@@ -80,14 +87,16 @@ int GuideCommand::run(const Params& p, cli::Invocation& io) {
            {"confidence", g.confidence},         {"doubt", g.doubt},       {"presets", Json::object()}};
     for (const PresetGuide& each : g.presets) {
       j["presets"][std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(each.preset)])] = {
-          {"lower_hu", each.lower_hu}, {"volume_mm3", each.volume_mm3}, {"change_percent_per_50_hu", each.change_percent}};
+          {"lower_hu", each.lower_hu},
+          {"volume_mm3", each.volume_mm3},
+          {"change_percent_per_50_hu", each.change_percent}};
     }
     io.out << j.dump(2) << '\n';
     return 0;
   }
   const auto r = [](double v) { return std::lround(v); };
-  io.out << "soft tissue " << r(g.soft_tissue_hu) << " HU (noise " << r(g.noise_hu) << "), dense bone " << r(g.dense_bone_hu)
-         << " HU; confidence " << std::round(g.confidence * 100) / 100
+  io.out << "soft tissue " << r(g.soft_tissue_hu) << " HU (noise " << r(g.noise_hu) << "), dense bone "
+         << r(g.dense_bone_hu) << " HU; confidence " << std::round(g.confidence * 100) / 100
          << (g.confidence > 0.7   ? " (good)"
              : g.confidence > 0.4 ? " (look at the mask)"
              : g.doubt.empty()    ? " (poor: decide by eye)"
@@ -99,12 +108,14 @@ int GuideCommand::run(const Params& p, cli::Invocation& io) {
     const PresetGuide& each = g.presets[n];
     char line[160];
     std::snprintf(line, sizeof line, "%-10s %-9.0f %-11.1f %-18s %s\n",
-                  std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(each.preset)]).c_str(), each.lower_hu,
-                  each.volume_mm3 / 1000, (std::to_string(r(each.change_percent)) + " %").c_str(), kFor[n]);
+                  std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(each.preset)]).c_str(),
+                  each.lower_hu, each.volume_mm3 / 1000, (std::to_string(r(each.change_percent)) + " %").c_str(),
+                  kFor[n]);
     io.out << line;
   }
   if (!g.doubt.empty()) return 0;
-  io.out << "\nosteo prepare " << io.arguments[0] << " -o CASE --preset cellular" << (p.series.empty() ? "" : " --series " + p.series)
+  io.out << "\nosteo prepare " << io.arguments[0] << " -o CASE --preset cellular"
+         << (p.series.empty() ? "" : " --series " + p.series)
          << (p.hu_offset == 0 ? "" : " --hu-offset " + format_number(p.hu_offset)) << '\n';
   return 0;
 }

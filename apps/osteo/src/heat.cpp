@@ -3,26 +3,28 @@
 #include <filesystem>
 
 #include "commands/heat.h"
+#include "osteo/assessment/review/heat_sheet.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
-#include "osteo/assessment/review/heat_sheet.h"
+#include "osteo/session/recording/session_reader.h"
 #include "osteo/session/scene/heat_reader.h"
 #include "osteo/session/scene/session_folder.h"
-#include "osteo/session/recording/session_reader.h"
 
 namespace osteo {
 
 cli::CommandInfo HeatCommand::info() {
-  return {
-      "heat",
-      "how warm a session made bone and structures at risk",
-      "Runs the session again and computes the heat of its burrs: conduction in bone, water that cools, the dose at each structure. The "
-      "share of a burr's work that becomes heat in bone is known within a factor of ten at best, and temperatures follow it in "
-      "proportion: nothing clinical follows from them (docs/heat.md). Exit code 8 when ticks are missing: heat is computed up to "
-      "there.",
-      {{"session", "a session folder"}},
-      "osteo heat SESSION"};
+  return {"heat",
+          "how warm a session made bone and structures at risk",
+          "Runs the session again and computes the heat of its burrs: conduction in bone, water that cools, the dose "
+          "at each structure. The "
+          "share of a burr's work that becomes heat in bone is known within a factor of ten at best, and temperatures "
+          "follow it in "
+          "proportion: nothing clinical follows from them (docs/heat.md). Exit code 8 when ticks are missing: heat is "
+          "computed up to "
+          "there.",
+          {{"session", "a session folder"}},
+          "osteo heat SESSION"};
 }
 
 int HeatCommand::run(const Params& p, cli::Invocation& io) {
@@ -56,9 +58,14 @@ int HeatCommand::run(const Params& p, cli::Invocation& io) {
   const auto tenths = [](double x) { return std::round(x * 10) / 10; };
   const auto minutes = [](double x) { return x < 1000 ? std::round(x * 100) / 100 : std::round(x); };
   const HeatLedger l = heat.ledger();
-  Json j{
-      {"hottest_c", tenths(heat.hottest_c())}, {"added_j", l.added_j},      {"chips_j", l.chips_j},      {"cooled_j", l.cooled_j},
-      {"forgotten_j", l.forgotten_j},          {"left_j", heat.stored_j()}, {"ticks", r.ticks_repeated}, {"same_as_recorded", r.identical}};
+  Json j{{"hottest_c", tenths(heat.hottest_c())},
+         {"added_j", l.added_j},
+         {"chips_j", l.chips_j},
+         {"cooled_j", l.cooled_j},
+         {"forgotten_j", l.forgotten_j},
+         {"left_j", heat.stored_j()},
+         {"ticks", r.ticks_repeated},
+         {"same_as_recorded", r.identical}};
   j["structures"] = Json::list();
   for (const auto& [value, s] : heat.structures()) {
     j["structures"].push_back({{"structure", anatomy.structures->name_of(value)},
@@ -70,13 +77,16 @@ int HeatCommand::run(const Params& p, cli::Invocation& io) {
   }
   if (io.common.json) io.out << j.dump(2) << '\n';
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
-  if (!r.identical) io.err << "session: it did not come out as it was recorded (" << r.difference << "): neither may its heat\n";
+  if (!r.identical)
+    io.err << "session: it did not come out as it was recorded (" << r.difference << "): neither may its heat\n";
   if (!io.common.quiet && !io.common.json) {
     for (const std::string& line : told(heat, anatomy.structures.get())) io.out << line << '\n';
-    io.out << "by assumption: " << format_number(p.cutting_share) << " of a cutting burr's work, " << format_number(p.diamond_w_per_n)
-           << " W per N of a diamond burr\n";
+    io.out << "by assumption: " << format_number(p.cutting_share) << " of a cutting burr's work, "
+           << format_number(p.diamond_w_per_n) << " W per N of a diamond burr\n";
   }
-  return static_cast<int>(!outline.gaps.empty() ? ExitCode::partial : outline.damaged() ? ExitCode::corrupt : ExitCode::ok);
+  return static_cast<int>(!outline.gaps.empty() ? ExitCode::partial
+                          : outline.damaged()   ? ExitCode::corrupt
+                                                : ExitCode::ok);
 }
 
 }  // namespace osteo

@@ -8,18 +8,18 @@
 #include "commands/info.h"
 #include "commands/list.h"
 #include "commands/series.h"
+#include "osteo/assessment/case_report/case_report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/assessment/case_report/case_report.h"
+#include "osteo/geometry/grid/brick_grid.h"
+#include "osteo/geometry/tets/quality.h"
 #include "osteo/imaging/dicom/import.h"
 #include "osteo/imaging/dicom/scan.h"
-#include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/imaging/image/planes.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/imaging/pipeline/formats.h"
 #include "osteo/session/scene/approval.h"
-#include "osteo/geometry/tets/quality.h"
 
 namespace osteo {
 namespace {
@@ -60,7 +60,8 @@ void describe_data(Json& j, const Data& data) {
     std::array<std::uint64_t, 256> count{};
     for (const auto v : labels->span()) ++count[v];
     for (std::size_t v = 1; v < count.size(); ++v) {
-      if (count[v] > 0) j["volume_mm3"][std::to_string(v)] = static_cast<double>(count[v]) * labels->frame.voxel_volume_mm3();
+      if (count[v] > 0)
+        j["volume_mm3"][std::to_string(v)] = static_cast<double>(count[v]) * labels->frame.voxel_volume_mm3();
     }
   } else if (const auto* grid = std::get_if<SparseGrid>(&data)) {
     j["name"] = grid->name;
@@ -127,8 +128,11 @@ void print_plain(std::ostream& out, const Json& j, const std::string& indent = "
 }  // namespace
 
 cli::CommandInfo ListCommand::info() {
-  return {
-      "list", "the stages with their inputs and outputs", "One line a stage, or with --json their whole declarations.", {}, "osteo list"};
+  return {"list",
+          "the stages with their inputs and outputs",
+          "One line a stage, or with --json their whole declarations.",
+          {},
+          "osteo list"};
 }
 
 int ListCommand::run(const Params&, cli::Invocation& io) {
@@ -143,8 +147,8 @@ int ListCommand::run(const Params&, cli::Invocation& io) {
     if (io.common.json) {
       all.push_back({{"name", name}, {"version", stage->info().version}, {"synopsis", stage->info().synopsis}});
     } else {
-      io.out << name << std::string(12 - std::min<std::size_t>(11, name.size()), ' ') << (in.empty() ? "-" : in) << " -> " << out
-             << "\n            " << stage->info().synopsis << '\n';
+      io.out << name << std::string(12 - std::min<std::size_t>(11, name.size()), ' ') << (in.empty() ? "-" : in)
+             << " -> " << out << "\n            " << stage->info().synopsis << '\n';
     }
   }
   if (io.common.json) io.out << all.dump(2) << '\n';
@@ -154,7 +158,8 @@ int ListCommand::run(const Params&, cli::Invocation& io) {
 cli::CommandInfo InfoCommand::info() {
   return {"info",
           "facts on any file that can be read",
-          "Kind, frame, range of values, volume, closedness: whatever applies. Of a case what a person wants to know, approval included; "
+          "Kind, frame, range of values, volume, closedness: whatever applies. Of a case what a person wants to know, "
+          "approval included; "
           "--json prints "
           "its manifest. Another folder is taken for DICOM.",
           {{"file", "volume, grid, surface, picture, or DICOM folder"}},
@@ -168,14 +173,17 @@ int InfoCommand::run(const Params&, cli::Invocation& io) {
   Json j;
   if (fs::is_directory(path)) {
     const auto manifest = Json::parse(read_text(path / "manifest.json"));
-    if (!manifest) throw Error(ExitCode::corrupt, "'" + (path / "manifest.json").string() + "' is damaged", "run 'osteo prepare' again");
+    if (!manifest)
+      throw Error(ExitCode::corrupt, "'" + (path / "manifest.json").string() + "' is damaged",
+                  "run 'osteo prepare' again");
     j = *manifest;
     j["code"] = case_code(path);
     j["approval"] = approval_json(approval_of(path));
     if (!io.common.json) {
       auto rows = case_facts(path);
       if (const auto recipe = read_recipe(path)) rows.emplace_back("Asked for", flags_of(*recipe).substr(1));
-      for (const auto& [name, value] : rows) io.out << name << std::string(name.size() < 20 ? 20 - name.size() : 1, ' ') << value << '\n';
+      for (const auto& [name, value] : rows)
+        io.out << name << std::string(name.size() < 20 ? 20 - name.size() : 1, ' ') << value << '\n';
       return 0;
     }
   } else {
@@ -196,8 +204,10 @@ int InfoCommand::run(const Params&, cli::Invocation& io) {
 cli::CommandInfo SeriesCommand::info() {
   return {"series",
           "the DICOM series of a folder and what each is",
-          "Also as 'osteo import --list'. The one marked * is taken when none is asked for. The scan says what belongs together: a letter "
-          "for the patient, a number for the study, a letter for the frame of reference. Of several scans one must be asked for.",
+          "Also as 'osteo import --list'. The one marked * is taken when none is asked for. The scan says what belongs "
+          "together: a letter "
+          "for the patient, a number for the study, a letter for the frame of reference. Of several scans one must be "
+          "asked for.",
           {{"folder", "folder with DICOM files at any depth"}},
           "osteo series DICOM_FOLDER"};
 }
@@ -206,7 +216,8 @@ namespace {
 
 // The middle slices of all series; of what is no volume there is none, and it says so.
 void write_thumbnails(const DicomScan& scan, const fs::path& source, const fs::path& folder, cli::Invocation& io) {
-  if (fs::exists(folder) && !fs::is_directory(folder)) throw Error(ExitCode::cannot_write, "'" + folder.string() + "' is no folder");
+  if (fs::exists(folder) && !fs::is_directory(folder))
+    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' is no folder");
   fs::create_directories(folder);
   std::map<std::string, int> times;
   for (const DicomSeries& s : scan.series) {
@@ -222,7 +233,8 @@ void write_thumbnails(const DicomScan& scan, const fs::path& source, const fs::p
       const Image image = import_ct(source, p, quiet).image;
       // Soft tissue of a CT; of anything else all but its rarest values.
       std::vector<std::int16_t> some;
-      for (std::size_t i = 0; i < image.frame.voxel_count(); i += std::max<std::size_t>(1, image.frame.voxel_count() / 100000))
+      for (std::size_t i = 0; i < image.frame.voxel_count();
+           i += std::max<std::size_t>(1, image.frame.voxel_count() / 100000))
         some.push_back(image.voxels[i]);
       std::sort(some.begin(), some.end());
       const bool ct = s.modality == "CT";
@@ -274,16 +286,19 @@ int SeriesCommand::run(const Params& p, cli::Invocation& io) {
       j["series"].push_back(std::move(e));
     }
     j["set_aside"] = Json::list();
-    for (const FileSetAside& f : scan.set_aside) j["set_aside"].push_back({{"file", f.file}, {"code", f.code}, {"why", f.why}});
+    for (const FileSetAside& f : scan.set_aside)
+      j["set_aside"].push_back({{"file", f.file}, {"code", f.code}, {"why", f.why}});
     io.out << j.dump(2) << '\n';
     return 0;
   }
-  io.out << "  scan  series  images  size       pixel mm  gap mm    what                          kernel    description\n";
+  io.out
+      << "  scan  series  images  size       pixel mm  gap mm    what                          kernel    description\n";
   for (const DicomSeries& s : scan.series) {
     char line[320];
     const std::string size = std::to_string(s.columns) + "x" + std::to_string(s.rows);
-    std::snprintf(line, sizeof line, "%c %-5s %-7d %-7d %-10s %-9.4g %-9.4g %-29s %-9s %s\n", s.recommended ? '*' : ' ', s.scan.c_str(),
-                  s.number, s.images, size.c_str(), s.pixel_mm, s.gap_mm, s.what.c_str(), s.kernel.c_str(), s.description.c_str());
+    std::snprintf(line, sizeof line, "%c %-5s %-7d %-7d %-10s %-9.4g %-9.4g %-29s %-9s %s\n", s.recommended ? '*' : ' ',
+                  s.scan.c_str(), s.number, s.images, size.c_str(), s.pixel_mm, s.gap_mm, s.what.c_str(),
+                  s.kernel.c_str(), s.description.c_str());
     io.out << line;
   }
   for (const DicomSeries& s : scan.series) {
@@ -301,7 +316,8 @@ int SeriesCommand::run(const Params& p, cli::Invocation& io) {
   for (std::size_t i = 0; i < std::min(kShown, scan.set_aside.size()); ++i) {
     io.out << "  " << scan.set_aside[i].file << ": " << scan.set_aside[i].why << '\n';
   }
-  if (scan.set_aside.size() > kShown) io.out << "  and " << scan.set_aside.size() - kShown << " more (--json lists them all)\n";
+  if (scan.set_aside.size() > kShown)
+    io.out << "  and " << scan.set_aside.size() - kShown << " more (--json lists them all)\n";
   return 0;
 }
 

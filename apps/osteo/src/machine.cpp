@@ -16,9 +16,9 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/simd.h"
-#include "osteo/simulation/devices/devices.h"
 #include "osteo/core/rt/loop.h"
 #include "osteo/display/view/offscreen.h"
+#include "osteo/simulation/devices/devices.h"
 #include "pacs_commands.h"
 #include "server_doctor.h"
 
@@ -33,8 +33,8 @@ std::string hex4(unsigned v) {
 
 std::string text_of(const SpaceMouseState& s) {
   char text[160];
-  std::snprintf(text, sizeof text, "move %+.2f %+.2f %+.2f  turn %+.2f %+.2f %+.2f  buttons %u", s.move[0], s.move[1], s.move[2], s.turn[0],
-                s.turn[1], s.turn[2], s.buttons);
+  std::snprintf(text, sizeof text, "move %+.2f %+.2f %+.2f  turn %+.2f %+.2f %+.2f  buttons %u", s.move[0], s.move[1],
+                s.move[2], s.turn[0], s.turn[1], s.turn[2], s.buttons);
   return text;
 }
 
@@ -60,7 +60,9 @@ class Watcher {
   }
 
  private:
-  static std::string unknown(std::span<const std::byte> report) { return "not understood, " + std::to_string(report.size()) + " bytes"; }
+  static std::string unknown(std::span<const std::byte> report) {
+    return "not understood, " + std::to_string(report.size()) + " bytes";
+  }
   DeviceModel model_;
   std::string name_;
   SpaceMouseState mouse_;
@@ -91,7 +93,8 @@ std::string opengl_here() {
     const std::string all = std::string(window.window()->ReportCapabilities()).substr(0, 4096);
     const auto line = [&](const std::string& key) {
       const auto at = all.find(key);
-      return at == std::string::npos ? std::string() : all.substr(at + key.size(), all.find('\n', at) - at - key.size());
+      return at == std::string::npos ? std::string()
+                                     : all.substr(at + key.size(), all.find('\n', at) - at - key.size());
     };
     return line("OpenGL renderer string:  ") + ", " + line("OpenGL version string:  ");
   } catch (const Error&) {
@@ -100,13 +103,13 @@ std::string opengl_here() {
 }
 
 cli::CommandInfo DevicesCommand::info() {
-  return {
-      "devices",
-      "haptic devices, 3D mice and pedals that are plugged in",
-      "Known are WoodenHaptics and Polhem arms, 3Dconnexion SpaceMice, Infinity and PCsensor foot pedals. With --watch their reports are "
-      "shown as they are understood.",
-      {},
-      "osteo devices --watch 5"};
+  return {"devices",
+          "haptic devices, 3D mice and pedals that are plugged in",
+          "Known are WoodenHaptics and Polhem arms, 3Dconnexion SpaceMice, Infinity and PCsensor foot pedals. With "
+          "--watch their reports are "
+          "shown as they are understood.",
+          {},
+          "osteo devices --watch 5"};
 }
 
 int DevicesCommand::run(const Params& p, cli::Invocation& io) {
@@ -130,12 +133,13 @@ int DevicesCommand::run(const Params& p, cli::Invocation& io) {
                  {"readable", f.readable}});
     if (!f.readable) j.back()["why"] = f.why;
     if (!io.common.json) {
-      io.out << name_of(f.model) << "  " << f.info.path << "  " << hex4(f.info.vendor) << ":" << hex4(f.info.product) << "  " << f.info.name
-             << (f.readable ? "" : "  (" + f.why + ")") << '\n';
+      io.out << name_of(f.model) << "  " << f.info.path << "  " << hex4(f.info.vendor) << ":" << hex4(f.info.product)
+             << "  " << f.info.name << (f.readable ? "" : "  (" + f.why + ")") << '\n';
     }
   }
   if (io.common.json) io.out << j.dump(2) << '\n';
-  if (found.empty() && !io.common.json) io.out << "none of the devices known here is plugged in, or this process may not see it\n";
+  if (found.empty() && !io.common.json)
+    io.out << "none of the devices known here is plugged in, or this process may not see it\n";
   if (p.watch > 0) {
     std::mutex mutex;  // a line at a time
     std::vector<std::thread> threads;
@@ -172,10 +176,14 @@ int DevicesCommand::run(const Params& p, cli::Invocation& io) {
 cli::CommandInfo DoctorCommand::info() {
   return {"doctor",
           "what this machine can do for a rehearsal or as a server, and what to change",
-          "Real-time priority, memory lock, lateness of a loop as the servo runs it, devices, OpenGL, audio. Exit code 0 also when "
-          "something is missing: the advice says what. With --server what 'osteo receive', 'osteo watch' and 'osteo batch' need, a line "
-          "each: memory, clock, folders and room in them, title, port, TLS and login files, counters, rules, pictures, systemd's units, "
-          "Slurm. What is not named is not looked at. 'good', 'none' (not there, not needed), 'care' (works, but), 'bad' (will not work): "
+          "Real-time priority, memory lock, lateness of a loop as the servo runs it, devices, OpenGL, audio. Exit code "
+          "0 also when "
+          "something is missing: the advice says what. With --server what 'osteo receive', 'osteo watch' and 'osteo "
+          "batch' need, a line "
+          "each: memory, clock, folders and room in them, title, port, TLS and login files, counters, rules, pictures, "
+          "systemd's units, "
+          "Slurm. What is not named is not looked at. 'good', 'none' (not there, not needed), 'care' (works, but), "
+          "'bad' (will not work): "
           "with a 'bad' the exit code is 7. To be run as the user of the services.",
           {},
           "osteo doctor --seconds 10"};
@@ -186,7 +194,8 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
   if (p.no_report) throw Error(ExitCode::usage, "--no-report is for --server", "osteo doctor --server ...");
   for (const std::string* const given :
        {&p.inbox, &p.cases, &p.rules, &p.metrics, &p.login, &p.allow, &p.tls_ca, &p.tls_certificate, &p.tls_key})
-    if (!given->empty()) throw Error(ExitCode::usage, "'" + *given + "' is looked at with --server alone", "osteo doctor --server ...");
+    if (!given->empty())
+      throw Error(ExitCode::usage, "'" + *given + "' is looked at with --server alone", "osteo doctor --server ...");
   Json j;
   std::vector<std::string> advice;
   utsname u{};
@@ -214,29 +223,35 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
   j["realtime_priority"] = s.realtime_granted;
   if (!s.realtime_granted) {
     j["realtime_refusal"] = s.realtime_refusal;
-    advice.push_back("give your user 'rtprio 80' in /etc/security/limits.conf and log in again: forces stutter without real-time priority");
+    advice.push_back(
+        "give your user 'rtprio 80' in /etc/security/limits.conf and log in again: forces stutter without real-time "
+        "priority");
   }
   j["memory_locked"] = s.memory_locked;
-  if (!s.memory_locked) advice.push_back("give your user 'memlock unlimited' in /etc/security/limits.conf: paging makes ticks late");
+  if (!s.memory_locked)
+    advice.push_back("give your user 'memlock unlimited' in /etc/security/limits.conf: paging makes ticks late");
   j["processor_sleep_held_off"] = s.idle_states_off;
   if (!s.idle_states_off)
-    advice.push_back("let your user write /dev/cpu_dma_latency (a udev rule): waking from deep sleep costs up to 0.1 ms");
+    advice.push_back(
+        "let your user write /dev/cpu_dma_latency (a udev rule): waking from deep sleep costs up to 0.1 ms");
   j["loop"] = {{"rate_hz", p.rate_hz},
                {"ticks", s.ticks},
                {"lateness", quantiles(s.lateness)},
                {"missed_by_work", s.missed_by_work},
                {"missed_by_machine", s.missed_by_machine}};
   if (s.lateness.quantile_us(0.99) > 350)
-    advice.push_back("a hundredth of the ticks is later than 0.35 ms: close other programs, or take a machine that is not shared");
+    advice.push_back(
+        "a hundredth of the ticks is later than 0.35 ms: close other programs, or take a machine that is not shared");
   if (s.missed_by_machine > 0 && !realtime_kernel)
-    advice.push_back("ticks were lost to the machine: on a machine of your own, the package linux-image-rt-amd64 helps");
+    advice.push_back(
+        "ticks were lost to the machine: on a machine of your own, the package linux-image-rt-amd64 helps");
 
   j["devices"] = Json::list();
   for (const FoundDevice& f : find_devices()) {
     j["devices"].push_back(std::string(name_of(f.model)) + " " + f.info.path + (f.readable ? "" : " (" + f.why + ")"));
     if (!f.readable)
-      advice.push_back("allow " + f.info.path + " for your user: KERNEL==\"hidraw*\", ATTRS{idVendor}==\"" + hex4(f.info.vendor) +
-                       "\", TAG+=\"uaccess\" in /etc/udev/rules.d/70-osteotome.rules");
+      advice.push_back("allow " + f.info.path + " for your user: KERNEL==\"hidraw*\", ATTRS{idVendor}==\"" +
+                       hex4(f.info.vendor) + "\", TAG+=\"uaccess\" in /etc/udev/rules.d/70-osteotome.rules");
   }
   std::string opengl = opengl_here();
   if (opengl.empty()) {
@@ -246,7 +261,8 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
     advice.push_back("OpenGL is drawn by the processor: a graphics card makes the picture smooth");
   }
   j["opengl"] = opengl;
-  const bool display = std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr, audio = fs::exists("/dev/snd");
+  const bool display = std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr,
+             audio = fs::exists("/dev/snd");
   j["display"] = display;
   j["audio"] = audio;
   if (!audio) advice.push_back("there is no sound device");
@@ -258,15 +274,15 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
   }
   const auto yes = [](bool v) { return v ? "yes" : "NO"; };
   Json& late = j["loop"]["lateness"];
-  io.out << processor() << ", " << j["cores"] << " cores, " << u.sysname << " " << u.release << (realtime_kernel ? " (real-time)" : "")
-         << ", vectors: " << simd_name(simd()) << '\n'
-         << "real-time priority  " << yes(s.realtime_granted) << (s.realtime_refusal.empty() ? "" : "  (" + s.realtime_refusal + ")")
-         << '\n'
+  io.out << processor() << ", " << j["cores"] << " cores, " << u.sysname << " " << u.release
+         << (realtime_kernel ? " (real-time)" : "") << ", vectors: " << simd_name(simd()) << '\n'
+         << "real-time priority  " << yes(s.realtime_granted)
+         << (s.realtime_refusal.empty() ? "" : "  (" + s.realtime_refusal + ")") << '\n'
          << "memory locked       " << yes(s.memory_locked) << '\n'
          << "deep sleep held off " << yes(s.idle_states_off) << '\n'
-         << "loop at " << format_number(p.rate_hz) << " Hz    wake-up late p50 " << late["p50_us"] << ", p99 " << late["p99_us"]
-         << ", p99.9 " << late["p99_9_us"] << ", max " << late["max_us"] << " us over " << s.ticks << " ticks; periods missed by work "
-         << s.missed_by_work << ", by the machine " << s.missed_by_machine << '\n'
+         << "loop at " << format_number(p.rate_hz) << " Hz    wake-up late p50 " << late["p50_us"] << ", p99 "
+         << late["p99_us"] << ", p99.9 " << late["p99_9_us"] << ", max " << late["max_us"] << " us over " << s.ticks
+         << " ticks; periods missed by work " << s.missed_by_work << ", by the machine " << s.missed_by_machine << '\n'
          << "devices             " << (j["devices"].empty() ? "none" : "") << '\n';
   for (const Json& d : j["devices"].items()) io.out << "  " << *d.text() << '\n';
   io.out << "OpenGL              " << opengl << '\n'

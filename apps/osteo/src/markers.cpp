@@ -10,10 +10,10 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/rt/loop.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/simulation/marker/device.h"
 #include "osteo/simulation/marker/sheet.h"
-#include "osteo/core/rt/loop.h"
 
 namespace osteo {
 namespace {
@@ -27,8 +27,10 @@ void refuse_to_replace(const fs::path& path, const cli::Invocation& io) {
     throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists already", "--force replaces it");
 }
 
-// From a camera as long as `seconds`, or until interrupted; from files all there are. `each` returns false when it has enough.
-void look_at_all(const std::string& from, const CameraModel& wish, double seconds, cli::Invocation& io, const auto& each) {
+// From a camera as long as `seconds`, or until interrupted; from files all there are. `each` returns false when it has
+// enough.
+void look_at_all(const std::string& from, const CameraModel& wish, double seconds, cli::Invocation& io,
+                 const auto& each) {
   const auto source = open_pictures(from, wish.width, wish.height, wish.fps);
   const std::int64_t begin = monotonic_ns();
   GrayPicture picture;
@@ -54,8 +56,10 @@ void look_at_all(const std::string& from, const CameraModel& wish, double second
 cli::CommandInfo MarkersCommand::info() {
   return {"markers",
           "pages to print: markers for a pen that becomes the drill, and a plate to calibrate a camera by",
-          "A PDF of two pages, of true size when printed at 100 %; each is drawn, looked at as a camera would, and refused unless all its "
-          "markers are read where they are to be. Or .png: one page (--page). docs/marker.md says how to fold, glue and calibrate.",
+          "A PDF of two pages, of true size when printed at 100 %; each is drawn, looked at as a camera would, and "
+          "refused unless all its "
+          "markers are read where they are to be. Or .png: one page (--page). docs/marker.md says how to fold, glue "
+          "and calibrate.",
           {{"output", "a .pdf, or a .png of one page"}},
           "osteo markers markers.pdf --paper letter"};
 }
@@ -65,7 +69,8 @@ int MarkersCommand::run(const Params& p, cli::Invocation& io) {
   const std::string kind = out.extension().string();
   if (kind != ".pdf" && kind != ".png")
     throw Error(ExitCode::usage, "'" + out.string() + "' is neither a .pdf nor a .png", "name it markers.pdf");
-  if (kind == ".pdf" && io.given.contains("page")) throw Error(ExitCode::usage, "--page has no effect with a .pdf", "it holds both pages");
+  if (kind == ".pdf" && io.given.contains("page"))
+    throw Error(ExitCode::usage, "--page has no effect with a .pdf", "it holds both pages");
   refuse_to_replace(out, io);
   const std::string pdf = marker_pages_pdf(p.paper, p.pen);  // with its check
   if (kind == ".pdf") {
@@ -87,9 +92,12 @@ int MarkersCommand::run(const Params& p, cli::Invocation& io) {
 cli::CommandInfo CalibrateCameraCommand::info() {
   return {"calibrate-camera",
           "the lens of a webcam, from pictures of the printed plate",
-          "Takes pictures of the plate of 'osteo markers' from a camera (for --seconds), a video or a folder, keeps those that differ, and "
-          "finds focal length, centre and distortion. Refused when fewer than 10 views differ, when the corners lie more than a pixel "
-          "(RMS) from where the lens would show them, or when the plate was hardly ever tilted, since the focal length stays open then. A "
+          "Takes pictures of the plate of 'osteo markers' from a camera (for --seconds), a video or a folder, keeps "
+          "those that differ, and "
+          "finds focal length, centre and distortion. Refused when fewer than 10 views differ, when the corners lie "
+          "more than a pixel "
+          "(RMS) from where the lens would show them, or when the plate was hardly ever tilted, since the focal length "
+          "stays open then. A "
           "camera that mirrors its pictures is found out and noted.",
           {{"source", "/dev/video0, a video, or a folder of pictures"}},
           "osteo calibrate-camera /dev/video0 -o camera.json"};
@@ -105,7 +113,8 @@ int CalibrateCameraCommand::run(const Params& p, cli::Invocation& io) {
   look_at_all(io.arguments[0], wish, p.seconds, io, [&](const GrayPicture& picture, double, std::uint64_t) {
     if (calibration.add(picture) == CameraCalibration::Look::taken && !io.common.quiet && !io.common.json) {
       io.end_progress();
-      io.err << "view " << calibration.views() << " of at least " << CameraCalibration::kLeastViews << " taken: move the plate\n";
+      io.err << "view " << calibration.views() << " of at least " << CameraCalibration::kLeastViews
+             << " taken: move the plate\n";
     }
     return calibration.views() < CameraCalibration::kMostViews;
   });
@@ -124,22 +133,24 @@ int CalibrateCameraCommand::run(const Params& p, cli::Invocation& io) {
            << '\n';
   }
   if (!io.common.quiet) {
-    io.err << r.camera.width << " x " << r.camera.height << ", " << r.camera.views << " views of " << calibration.pictures()
-           << " pictures: corners " << rounded(r.camera.rms_px, 100) << " pixels off (RMS; worst view " << rounded(r.worst_view_px, 100)
-           << "), focal length " << rounded(r.camera.fx, 1) << " pixels to " << rounded(100 * r.focal_spread, 100) << " %"
+    io.err << r.camera.width << " x " << r.camera.height << ", " << r.camera.views << " views of "
+           << calibration.pictures() << " pictures: corners " << rounded(r.camera.rms_px, 100)
+           << " pixels off (RMS; worst view " << rounded(r.worst_view_px, 100) << "), focal length "
+           << rounded(r.camera.fx, 1) << " pixels to " << rounded(100 * r.focal_spread, 100) << " %"
            << (r.camera.mirrored ? "; its pictures are mirrored" : "") << ": " << p.out << '\n';
   }
   return 0;
 }
 
 cli::CommandInfo CalibratePenCommand::info() {
-  return {
-      "calibrate-pen",
-      "where the tip of a pen with markers is, by turning the pen on it",
-      "Put the tip into a small dent, lean the pen by 30 degrees to all sides and turn it, its markers towards the camera. Refused when "
-      "it was seen in fewer than 20 pictures, leant by less than 20 degrees, or when the tip wandered by more than 2 mm (RMS).",
-      {{"source", "/dev/video0, a video, or a folder of pictures"}},
-      "osteo calibrate-pen /dev/video0 --camera camera.json -o pen.json"};
+  return {"calibrate-pen",
+          "where the tip of a pen with markers is, by turning the pen on it",
+          "Put the tip into a small dent, lean the pen by 30 degrees to all sides and turn it, its markers towards the "
+          "camera. Refused when "
+          "it was seen in fewer than 20 pictures, leant by less than 20 degrees, or when the tip wandered by more than "
+          "2 mm (RMS).",
+          {{"source", "/dev/video0, a video, or a folder of pictures"}},
+          "osteo calibrate-pen /dev/video0 --camera camera.json -o pen.json"};
 }
 
 int CalibratePenCommand::run(const Params& p, cli::Invocation& io) {
@@ -162,41 +173,48 @@ int CalibratePenCommand::run(const Params& p, cli::Invocation& io) {
     return true;
   });
   if (poses.empty())
-    throw Error(ExitCode::failed, "no marker of pen " + std::to_string(p.pen) + " was seen in " + std::to_string(pictures) + " pictures",
-                other  ? "another pen was: name it with --pen"
-                : dark ? "the pictures are too dark"
-                       : "is it the print of 'osteo markers', glued as the page says, and is this the camera of that file?");
+    throw Error(
+        ExitCode::failed,
+        "no marker of pen " + std::to_string(p.pen) + " was seen in " + std::to_string(pictures) + " pictures",
+        other  ? "another pen was: name it with --pen"
+        : dark ? "the pictures are too dark"
+               : "is it the print of 'osteo markers', glued as the page says, and is this the camera of that file?");
   const PivotFit fit = fit_pivot(poses);
   pen.tip_mm = fit.tip_mm;
   pen.rms_mm = fit.rms_mm;
-  const double lean_deg = std::atan2(std::hypot(fit.tip_mm.x, fit.tip_mm.y), -fit.tip_mm.z) * 180 / 3.14159265358979323846;
+  const double lean_deg =
+      std::atan2(std::hypot(fit.tip_mm.x, fit.tip_mm.y), -fit.tip_mm.z) * 180 / 3.14159265358979323846;
   if (lean_deg > 8)
     io.context.warn("the tip lies " + rounded(lean_deg, 1) +
                     " degrees beside the axis of the prism: the drill will lean by that; glue it straight");
   write_file(p.out, pen_json(pen));
   io.end_progress();
   if (io.common.json)
-    io.out << Json{{"poses", fit.poses},       {"left_out", fit.left_out},
-                   {"rms_mm", fit.rms_mm},     {"worst_mm", fit.worst_mm},
-                   {"tilt_deg", fit.tilt_deg}, {"tip_mm", std::vector<double>{fit.tip_mm.x, fit.tip_mm.y, fit.tip_mm.z}}}
+    io.out << Json{{"poses", fit.poses},
+                   {"left_out", fit.left_out},
+                   {"rms_mm", fit.rms_mm},
+                   {"worst_mm", fit.worst_mm},
+                   {"tilt_deg", fit.tilt_deg},
+                   {"tip_mm", std::vector<double>{fit.tip_mm.x, fit.tip_mm.y, fit.tip_mm.z}}}
                   .dump(2)
            << '\n';
   if (!io.common.quiet)
-    io.err << "tip " << rounded(length(fit.tip_mm), 10) << " mm from the middle of the prism, by " << fit.poses << " of " << pictures
-           << " pictures: it wandered by " << rounded(fit.rms_mm, 100) << " mm (RMS; most " << rounded(fit.worst_mm, 100) << "): " << p.out
-           << '\n';
+    io.err << "tip " << rounded(length(fit.tip_mm), 10) << " mm from the middle of the prism, by " << fit.poses
+           << " of " << pictures << " pictures: it wandered by " << rounded(fit.rms_mm, 100) << " mm (RMS; most "
+           << rounded(fit.worst_mm, 100) << "): " << p.out << '\n';
   return 0;
 }
 
 cli::CommandInfo TrackPenCommand::info() {
-  return {
-      "track-pen",
-      "try a camera and a pen: where the tip is, picture by picture",
-      "A table as CSV on standard output: time, whether the pen is seen, the tip as seen and as smoothed (mm from the lens: right, down, "
-      "ahead), direction of the handle, error of the corners. At the end how many pictures were lost and why. The same code that moves "
-      "the drill in the window.",
-      {{"source", "/dev/video0, a video, or a folder of pictures"}},
-      "osteo track-pen /dev/video0 --camera camera.json --pen pen.json > tip.csv"};
+  return {"track-pen",
+          "try a camera and a pen: where the tip is, picture by picture",
+          "A table as CSV on standard output: time, whether the pen is seen, the tip as seen and as smoothed (mm from "
+          "the lens: right, down, "
+          "ahead), direction of the handle, error of the corners. At the end how many pictures were lost and why. The "
+          "same code that moves "
+          "the drill in the window.",
+          {{"source", "/dev/video0, a video, or a folder of pictures"}},
+          "osteo track-pen /dev/video0 --camera camera.json --pen pen.json > tip.csv"};
 }
 
 int TrackPenCommand::run(const Params& p, cli::Invocation& io) {
@@ -211,7 +229,8 @@ int TrackPenCommand::run(const Params& p, cli::Invocation& io) {
   double sum_px2 = 0;
   Json rows = Json::list();
   if (!io.common.json)
-    io.out << "time_s,state,markers,rms_px,tip_x_mm,tip_y_mm,tip_z_mm,smooth_x_mm,smooth_y_mm,smooth_z_mm,axis_x,axis_y,axis_z\n";
+    io.out << "time_s,state,markers,rms_px,tip_x_mm,tip_y_mm,tip_z_mm,smooth_x_mm,smooth_y_mm,smooth_z_mm,axis_x,axis_"
+              "y,axis_z\n";
   look_at_all(io.arguments[0], camera, p.seconds, io, [&](const GrayPicture& picture, double time_s, std::uint64_t) {
     const PenSight s = tracker.look(picture);
     ++pictures;
@@ -219,13 +238,16 @@ int TrackPenCommand::run(const Params& p, cli::Invocation& io) {
     dark += s.dark ? 1 : 0;
     mirrored = mirrored || (s.state == PenSight::State::seen && s.mirrored != camera.mirrored);
     char line[320];
-    int n = std::snprintf(line, sizeof line, "%.4f,%s,%d", time_s, kStates[static_cast<std::size_t>(s.state)], s.markers);
+    int n =
+        std::snprintf(line, sizeof line, "%.4f,%s,%d", time_s, kStates[static_cast<std::size_t>(s.state)], s.markers);
     if (s.state == PenSight::State::seen) {
       sum_px2 += s.rms_px * s.rms_px;
       filter.add(time_s, s);
-      const Vec3 raw = s.camera_from_body(pen.tip_mm), smooth = filter.motion().tip_mm, axis = filter.motion().rotation.column[2];
-      std::snprintf(line + n, sizeof line - static_cast<std::size_t>(n), ",%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f", s.rms_px,
-                    raw.x, raw.y, raw.z, smooth.x, smooth.y, smooth.z, axis.x, axis.y, axis.z);
+      const Vec3 raw = s.camera_from_body(pen.tip_mm), smooth = filter.motion().tip_mm,
+                 axis = filter.motion().rotation.column[2];
+      std::snprintf(line + n, sizeof line - static_cast<std::size_t>(n),
+                    ",%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f", s.rms_px, raw.x, raw.y, raw.z, smooth.x,
+                    smooth.y, smooth.z, axis.x, axis.y, axis.z);
     } else {
       std::snprintf(line + n, sizeof line - static_cast<std::size_t>(n), ",,,,,,,,,,");
     }
@@ -235,14 +257,17 @@ int TrackPenCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   const int seen = count[0];
   if (io.common.json)
-    io.out << Json{{"pictures", pictures},  {"seen", seen},         {"nothing", count[1]},
-                   {"ambiguous", count[2]}, {"doubled", count[3]},  {"unlike", count[4]},
-                   {"dark", dark},          {"mirrored", mirrored}, {"rms_px", seen > 0 ? std::sqrt(sum_px2 / seen) : 0.0}}
-                  .dump(2)
-           << '\n';
-  if (mirrored) io.context.warn("the pictures are mirrored otherwise than when the camera was calibrated; they were turned back");
+    io.out
+        << Json{{"pictures", pictures},  {"seen", seen},         {"nothing", count[1]},
+                {"ambiguous", count[2]}, {"doubled", count[3]},  {"unlike", count[4]},
+                {"dark", dark},          {"mirrored", mirrored}, {"rms_px", seen > 0 ? std::sqrt(sum_px2 / seen) : 0.0}}
+               .dump(2)
+        << '\n';
+  if (mirrored)
+    io.context.warn("the pictures are mirrored otherwise than when the camera was calibrated; they were turned back");
   if (p.pen.empty())
-    io.context.warn("no --pen: its tip is taken to be 100 mm below the middle of the prism; 'osteo calibrate-pen' finds it");
+    io.context.warn(
+        "no --pen: its tip is taken to be 100 mm below the middle of the prism; 'osteo calibrate-pen' finds it");
   if (!io.common.quiet)
     io.err << "seen in " << seen << " of " << pictures << " pictures"
            << (count[2] > 0 ? "; too little of it in " + std::to_string(count[2]) : "")
@@ -250,7 +275,8 @@ int TrackPenCommand::run(const Params& p, cli::Invocation& io) {
            << (count[4] > 0 ? "; markers that are not this pen in " + std::to_string(count[4]) : "")
            << (dark > 0 ? "; too dark in " + std::to_string(dark) : "") << '\n';
   if (seen == 0)
-    throw Error(ExitCode::failed, "pen " + std::to_string(pen.pen) + " was not seen in any of " + std::to_string(pictures) + " pictures",
+    throw Error(ExitCode::failed,
+                "pen " + std::to_string(pen.pen) + " was not seen in any of " + std::to_string(pictures) + " pictures",
                 "more light, nearer, its markers towards the camera; docs/marker.md");
   return 0;
 }

@@ -7,23 +7,26 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/simulation/nerve/blackrock.h"
 #include "osteo/session/scene/monitor_reader.h"
 #include "osteo/session/scene/session_folder.h"
+#include "osteo/simulation/nerve/blackrock.h"
 #include "osteo/simulation/sound/wav.h"
 
 namespace osteo {
 
 cli::CommandInfo MonitorCommand::info() {
-  return {
-      "monitor",
-      "what a nerve monitor would have shown of a session, as files",
-      "Runs the session again with a model of the nerves that its case lists: monitor.ns5 (30 kHz, all channels) and monitor.nev "
-      "(spikes, stimuli) as Blackrock's recorders write them, events.csv, one channel as channel.wav, and the setup. The same to the bit "
-      "as it was live. With --stimulator-ma a what-if: the tip of a hand's tool stimulates all the time it touches. Illustrative, not "
-      "clinical: docs/monitor.md tells every constant and its source. Exit code 8 when ticks are missing: it goes up to there.",
-      {{"session", "a session folder"}},
-      "osteo monitor SESSION -o out"};
+  return {"monitor",
+          "what a nerve monitor would have shown of a session, as files",
+          "Runs the session again with a model of the nerves that its case lists: monitor.ns5 (30 kHz, all channels) "
+          "and monitor.nev "
+          "(spikes, stimuli) as Blackrock's recorders write them, events.csv, one channel as channel.wav, and the "
+          "setup. The same to the bit "
+          "as it was live. With --stimulator-ma a what-if: the tip of a hand's tool stimulates all the time it "
+          "touches. Illustrative, not "
+          "clinical: docs/monitor.md tells every constant and its source. Exit code 8 when ticks are missing: it goes "
+          "up to there.",
+          {{"session", "a session folder"}},
+          "osteo monitor SESSION -o out"};
 }
 
 namespace {
@@ -43,9 +46,9 @@ class EventTable final : public MonitorSink {
     out_ << format_number(static_cast<double>(e.sample) / MonitorSetup::kRateHz) << ',' << name_of(e.kind) << ','
          << (e.channel < 0 ? "" : quoted(wiring_.channels[static_cast<std::size_t>(e.channel)].electrode.name)) << ','
          << (e.nerve < 0 ? "" : quoted(wiring_.courses[static_cast<std::size_t>(e.nerve)].name)) << ','
-         << number(e.seconds > 0, 1000 * e.seconds) << ',' << number(e.uv > 0, e.uv) << ',' << number(e.ms > 0, e.ms) << ','
-         << number(e.ma > 0 || e.kind == MonitorEventKind::stimulator, e.ma) << ',' << name_of(e.cause) << ',' << number(cause, e.integrity)
-         << ',' << number(cause, e.to_distal_mm) << '\n';
+         << number(e.seconds > 0, 1000 * e.seconds) << ',' << number(e.uv > 0, e.uv) << ',' << number(e.ms > 0, e.ms)
+         << ',' << number(e.ma > 0 || e.kind == MonitorEventKind::stimulator, e.ma) << ',' << name_of(e.cause) << ','
+         << number(cause, e.integrity) << ',' << number(cause, e.to_distal_mm) << '\n';
   }
   void close() {
     out_.close();
@@ -75,7 +78,8 @@ void write_channel(const fs::path& ns5, std::size_t channel, std::size_t channel
     const std::size_t frames = static_cast<std::size_t>(in.gcount()) / 2 / channels;
     constexpr double kFullScaleUv = 1000;
     for (std::size_t f = 0; f < frames; ++f)
-      samples.push_back(static_cast<float>(block[f * channels + channel] * MonitorSetup::kMicrovoltsPerBit / kFullScaleUv));
+      samples.push_back(
+          static_cast<float>(block[f * channels + channel] * MonitorSetup::kMicrovoltsPerBit / kFullScaleUv));
     return frames > 0;
   });
 }
@@ -91,13 +95,15 @@ int MonitorCommand::run(const Params& p, cli::Invocation& io) {
   };
   for (const char* const name : {"pulses_per_s", "width_ms", "hand", "search"}) refuse(name, p.stimulator_ma <= 0);
   const auto may_replace = [&](const fs::path& old) {
-    if (!io.common.force) throw Error(ExitCode::cannot_write, "'" + old.string() + "' exists already", "--force replaces it");
+    if (!io.common.force)
+      throw Error(ExitCode::cannot_write, "'" + old.string() + "' exists already", "--force replaces it");
     static const std::set<std::string> ours{"monitor.ns5", "monitor.nev", "events.csv", "channel.wav", "monitor.json"};
     for (const auto& entry : fs::directory_iterator(old)) {
       if (!ours.contains(entry.path().filename().string()))
-        throw Error(ExitCode::cannot_write,
-                    "'" + old.string() + "' holds '" + entry.path().filename().string() + "', which is not of a monitor",
-                    "name another folder");
+        throw Error(
+            ExitCode::cannot_write,
+            "'" + old.string() + "' holds '" + entry.path().filename().string() + "', which is not of a monitor",
+            "name another folder");
     }
   };
   const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
@@ -135,11 +141,13 @@ int MonitorCommand::run(const Params& p, cli::Invocation& io) {
   }
   std::size_t unreadable = 0;
   if (p.stimulator_ma > 0) {
-    monitor.stimulate_at(0, {static_cast<std::uint32_t>(p.hand), p.stimulator_ma, p.pulses_per_s, p.width_ms, p.search});
+    monitor.stimulate_at(0,
+                         {static_cast<std::uint32_t>(p.hand), p.stimulator_ma, p.pulses_per_s, p.width_ms, p.search});
   } else {
     for (const auto& [tick, setting] : stimulator_notes(session, unreadable)) monitor.stimulate_at(tick, setting);
   }
-  if (unreadable > 0) io.context.warn(std::to_string(unreadable) + " settings of the stimulator cannot be read: left out");
+  if (unreadable > 0)
+    io.context.warn(std::to_string(unreadable) + " settings of the stimulator cannot be read: left out");
 
   Json j;
   ReplayResult r;
@@ -179,20 +187,24 @@ int MonitorCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   if (io.common.json) io.out << j.dump(2) << '\n';
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
-  if (!r.identical) io.err << "session: it did not come out as it was recorded (" << r.difference << "): neither may its monitor\n";
+  if (!r.identical)
+    io.err << "session: it did not come out as it was recorded (" << r.difference << "): neither may its monitor\n";
   if (!io.common.quiet) {
     const auto count = [&](const char* kind) {
       const Json* const n = j.find("events")->find(kind);
       return n == nullptr ? std::string("0") : n->dump();
     };
-    io.err << count("burst") << " bursts, " << count("train") << " trains, " << count("stimulus") << " stimuli, " << count("response")
-           << " of them answered: " << p.out << '\n';
+    io.err << count("burst") << " bursts, " << count("train") << " trains, " << count("stimulus") << " stimuli, "
+           << count("response") << " of them answered: " << p.out << '\n';
     for (const Json& n : j.find("nerves")->items())
-      io.err << *n.find("nerve")->text() << ": " << std::lround(100 * n.find("least_integrity")->number().value_or(0)) << " % whole\n";
+      io.err << *n.find("nerve")->text() << ": " << std::lround(100 * n.find("least_integrity")->number().value_or(0))
+             << " % whole\n";
     for (const std::string& name : wiring.left_out) io.err << "not in the case, so not heard: " << name << '\n';
     io.err << "illustrative, not clinical (docs/monitor.md)\n";
   }
-  return static_cast<int>(!outline.gaps.empty() ? ExitCode::partial : outline.damaged() ? ExitCode::corrupt : ExitCode::ok);
+  return static_cast<int>(!outline.gaps.empty() ? ExitCode::partial
+                          : outline.damaged()   ? ExitCode::corrupt
+                                                : ExitCode::ok);
 }
 
 }  // namespace osteo

@@ -8,32 +8,35 @@
 #include <random>
 
 #include "commands/movie.h"
+#include "osteo/assessment/movie/movie_file.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/assessment/movie/movie_file.h"
 #include "osteo/session/scene/session_folder.h"
 
 namespace osteo {
 
 cli::CommandInfo MovieCommand::info() {
-  return {
-      "movie",
-      "a session as a movie that browsers play",
-      "As the window drew it: bone, tools, dust, structures at risk, from where the surgeon looked or from one place. .mp4 (H.264) or "
-      ".webm "
-      "(VP9), no sound. With --blind for raters: nothing is written into the picture or the file that tells who, when, which case or how "
-      "good, and where the output is a folder the file gets a random name. What the picture itself shows stays. Of a damaged session what "
-      "is there is shown, and the exit code is 4.",
-      {{"session", "a session folder"}, {"output", "file that ends in .mp4 or .webm; with --blind also a folder"}},
-      "osteo movie SESSION out.mp4 --speed 4 --skip-idle"};
+  return {"movie",
+          "a session as a movie that browsers play",
+          "As the window drew it: bone, tools, dust, structures at risk, from where the surgeon looked or from one "
+          "place. .mp4 (H.264) or "
+          ".webm "
+          "(VP9), no sound. With --blind for raters: nothing is written into the picture or the file that tells who, "
+          "when, which case or how "
+          "good, and where the output is a folder the file gets a random name. What the picture itself shows stays. Of "
+          "a damaged session what "
+          "is there is shown, and the exit code is 4.",
+          {{"session", "a session folder"}, {"output", "file that ends in .mp4 or .webm; with --blind also a folder"}},
+          "osteo movie SESSION out.mp4 --speed 4 --skip-idle"};
 }
 
 namespace {
 
 void parse_size(const std::string& text, int& width, int& height) {
   int used = 0;
-  if (std::sscanf(text.c_str(), "%5dx%5d%n", &width, &height, &used) != 2 || static_cast<std::size_t>(used) != text.size())
+  if (std::sscanf(text.c_str(), "%5dx%5d%n", &width, &height, &used) != 2 ||
+      static_cast<std::size_t>(used) != text.size())
     throw Error(ExitCode::usage, "--size: '" + text + "' is no size", "write it as 1280x720");
 }
 
@@ -73,8 +76,9 @@ int MovieCommand::run(const Params& p, cli::Invocation& io) {
     out /= code + ".mp4";
   }
   if (out.extension() != ".mp4" && out.extension() != ".webm")
-    throw Error(ExitCode::usage, "'" + io.arguments[1] + "' is no movie that can be written",
-                p.blind ? "name a file .mp4 or .webm, or a folder that is there" : "name the output NAME.mp4 or NAME.webm");
+    throw Error(
+        ExitCode::usage, "'" + io.arguments[1] + "' is no movie that can be written",
+        p.blind ? "name a file .mp4 or .webm, or a folder that is there" : "name the output NAME.mp4 or NAME.webm");
   if (output_exists(out) && !io.common.force)
     throw Error(ExitCode::cannot_write, "'" + out.string() + "' exists already", "--force replaces it");
   const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
@@ -84,9 +88,11 @@ int MovieCommand::run(const Params& p, cli::Invocation& io) {
   const Anatomy anatomy = anatomy_of(the_case, setup, io.context);
   const World begin = world_at_begin(folder, the_case, anatomy, io.context);
   MovieFacts facts;
-  write_atomically(out, [&](const fs::path& temporary) { facts = make_movie(session, begin, anatomy, o, temporary, io.context); });
+  write_atomically(
+      out, [&](const fs::path& temporary) { facts = make_movie(session, begin, anatomy, o, temporary, io.context); });
   io.end_progress();
-  if (p.blind && code.empty()) facts.words.emplace_back("the file's name is yours: see that it does not tell who or how good");
+  if (p.blind && code.empty())
+    facts.words.emplace_back("the file's name is yours: see that it does not tell who or how good");
   if (io.common.json) {
     Json j{{"frames", facts.frames},
            {"seconds", facts.seconds},
@@ -102,8 +108,8 @@ int MovieCommand::run(const Params& p, cli::Invocation& io) {
   for (const std::string& line : losses(session.outline())) io.err << "session: " << line << '\n';
   for (const std::string& word : facts.words) io.err << "movie: " << word << '\n';
   if (!io.common.quiet) {
-    io.err << out.string() << ": " << facts.frames << " frames, " << seconds(facts.seconds) << " for " << seconds(facts.shown_s)
-           << " of the session";
+    io.err << out.string() << ": " << facts.frames << " frames, " << seconds(facts.seconds) << " for "
+           << seconds(facts.shown_s) << " of the session";
     if (o.skip_idle) io.err << ", " << seconds(facts.left_out_s) << " idle left out";
     io.err << ", by " << facts.encoder << '\n';
   }

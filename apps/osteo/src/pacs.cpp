@@ -28,7 +28,8 @@ Door door_of(const PeerOrWebFlags& p, const cli::Invocation& io) {
     if (!p.dicomweb_login.empty() || !p.dicomweb_ca.empty())
       throw Error(ExitCode::usage, "a login or certificates for which server?", "--dicomweb URL");
     if (p.peer.empty())
-      throw Error(ExitCode::usage, "no node is named", "--peer TITLE@HOST:PORT, like ORTHANC@127.0.0.1:4242, or --dicomweb URL");
+      throw Error(ExitCode::usage, "no node is named",
+                  "--peer TITLE@HOST:PORT, like ORTHANC@127.0.0.1:4242, or --dicomweb URL");
     door.node = parse_peer(p.peer);
     door.node->own_ae = checked_ae(p.ae);
     door.node->timeout_s = p.timeout_s;
@@ -38,7 +39,8 @@ Door door_of(const PeerOrWebFlags& p, const cli::Invocation& io) {
   }
   for (const char* const flag : {"peer", "ae", "tls_ca", "tls_certificate", "tls_key"})
     if (io.given.contains(flag))
-      throw Error(ExitCode::usage, "a DICOM node and a DICOMweb server at once", "--dicomweb has a login and certificates of its own");
+      throw Error(ExitCode::usage, "a DICOM node and a DICOMweb server at once",
+                  "--dicomweb has a login and certificates of its own");
   door.web.emplace();
   door.web->url = p.dicomweb;
   door.web->ca = p.dicomweb_ca;
@@ -75,27 +77,31 @@ std::vector<std::string> titles(const std::string& text) {
 }  // namespace
 
 cli::CommandInfo SendCommand::info() {
-  return {
-      "send",
-      "objects to a PACS, by C-STORE or STOW-RS",
-      "Sends a DICOM file, or all DICOM files of a folder, as they are: what was converted by to-slicer, save-series or a report leaves "
-      "only by this command, to a DICOM node (--peer) or a DICOMweb server (--dicomweb). Every answer of the node is judged, and the node "
-      "is then asked which of the objects it has. Nothing is taken out "
-      "without --deidentify: what names a person in the files is sent with them. Exit code 8 when some were refused or are not found "
-      "afterwards.",
-      {{"source", "a file or a folder"}},
-      "osteo send CASE.seg.dcm --peer ORTHANC@127.0.0.1:4242 --dry-run"};
+  return {"send",
+          "objects to a PACS, by C-STORE or STOW-RS",
+          "Sends a DICOM file, or all DICOM files of a folder, as they are: what was converted by to-slicer, "
+          "save-series or a report leaves "
+          "only by this command, to a DICOM node (--peer) or a DICOMweb server (--dicomweb). Every answer of the node "
+          "is judged, and the node "
+          "is then asked which of the objects it has. Nothing is taken out "
+          "without --deidentify: what names a person in the files is sent with them. Exit code 8 when some were "
+          "refused or are not found "
+          "afterwards.",
+          {{"source", "a file or a folder"}},
+          "osteo send CASE.seg.dcm --peer ORTHANC@127.0.0.1:4242 --dry-run"};
 }
 
 int SendCommand::run(const Params& p, cli::Invocation& io) {
   const Door to = door_of(p, io);
-  if (!p.key.empty() && !p.deidentify) throw Error(ExitCode::usage, "--key is for --deidentify", "add it, or leave the key out");
+  if (!p.key.empty() && !p.deidentify)
+    throw Error(ExitCode::usage, "--key is for --deidentify", "add it, or leave the key out");
   DicomObjects all = list_objects({io.arguments[0]}, io.context.sub(0, p.dry_run && !p.deidentify ? 1 : 0.05));
   std::optional<TemporaryFolder> copies;
   std::size_t left_out = 0;
   if (p.deidentify) {
     copies.emplace();
-    const DeidentifyReport made = deidentify_objects(all.objects, copies->path(), {p.key}, io.context.sub(0.05, p.dry_run ? 1 : 0.1));
+    const DeidentifyReport made =
+        deidentify_objects(all.objects, copies->path(), {p.key}, io.context.sub(0.05, p.dry_run ? 1 : 0.1));
     io.end_progress();
     left_out = made.refused.size();
     told_refusals(made, io);
@@ -115,23 +121,30 @@ int SendCommand::run(const Params& p, cli::Invocation& io) {
   for (const auto& [kind, n] : kinds) listed.push_back({{"kind", kind}, {"objects", n.first}, {"bytes", n.second}});
   if (!io.common.quiet && !all.set_aside.empty()) {
     io.end_progress();
-    io.err << all.set_aside.size() << " files are no DICOM objects and are left out, the first: " << all.set_aside[0].filename().string()
+    io.err << all.set_aside.size()
+           << " files are no DICOM objects and are left out, the first: " << all.set_aside[0].filename().string()
            << '\n';
   }
   if (p.dry_run) {
     io.end_progress();
     if (io.common.json) {
-      io.out << Json{{"dry_run", true}, {"peer", to.name}, {"kinds", listed}, {"set_aside", all.set_aside.size()}, {"left_out", left_out}}
+      io.out << Json{{"dry_run", true},
+                     {"peer", to.name},
+                     {"kinds", listed},
+                     {"set_aside", all.set_aside.size()},
+                     {"left_out", left_out}}
                     .dump(2)
              << '\n';
     } else {
       io.out << "would send to " << to.name << (to.node ? " as " + to.node->own_ae : "") << ":\n";
-      for (const auto& [kind, n] : kinds) io.out << "  " << n.first << " x " << kind << ", " << megabytes(n.second) << '\n';
+      for (const auto& [kind, n] : kinds)
+        io.out << "  " << n.first << " x " << kind << ", " << megabytes(n.second) << '\n';
     }
     return static_cast<int>(left_out == 0 ? ExitCode::ok : ExitCode::partial);
   }
   const Context rest = io.context.sub(0.1, 1);
-  const SendReport report = to.web ? send_objects(*to.web, all.objects, p.check, rest) : send_objects(*to.node, all.objects, p.check, rest);
+  const SendReport report =
+      to.web ? send_objects(*to.web, all.objects, p.check, rest) : send_objects(*to.node, all.objects, p.check, rest);
   io.end_progress();
   Json problems = Json::list();
   std::map<std::string, std::pair<int, std::string>> why;
@@ -157,33 +170,38 @@ int SendCommand::run(const Params& p, cli::Invocation& io) {
            << '\n';
   }
   if (!io.common.quiet) {
-    io.err << report.accepted() << " of " << report.objects.size() << " objects accepted by " << to.name << " (" << megabytes(bytes) << ")";
+    io.err << report.accepted() << " of " << report.objects.size() << " objects accepted by " << to.name << " ("
+           << megabytes(bytes) << ")";
     io.err << (report.not_checked.empty() ? ", " + std::to_string(report.safe()) + " found there afterwards"
                                           : "; not asked afterwards: " + report.not_checked)
            << '\n';
   }
-  for (const auto& [problem, n] : why) io.err << n.first << " objects: " << problem << ", the first: " << n.second << '\n';
+  for (const auto& [problem, n] : why)
+    io.err << n.first << " objects: " << problem << ", the first: " << n.second << '\n';
   return static_cast<int>(report.safe() == report.objects.size() && left_out == 0 ? ExitCode::ok : ExitCode::partial);
 }
 
 cli::CommandInfo FetchCommand::info() {
-  return {
-      "fetch",
-      "a series from a PACS, by C-FIND and C-GET, or QIDO-RS and WADO-RS",
-      "Without --out it lists the series that match (number, modality, images, description, UID); with it, the one that matches is fetched "
-      "as it is, bit for bit, into a folder that appears whole or not at all. Names of patients are not shown. A node that "
-      "gives nothing by C-GET can be made to send to 'osteo receive'.",
-      {},
-      "osteo fetch --peer ORTHANC@127.0.0.1:4242 --accession 4711 --modality CT"};
+  return {"fetch",
+          "a series from a PACS, by C-FIND and C-GET, or QIDO-RS and WADO-RS",
+          "Without --out it lists the series that match (number, modality, images, description, UID); with it, the one "
+          "that matches is fetched "
+          "as it is, bit for bit, into a folder that appears whole or not at all. Names of patients are not shown. A "
+          "node that "
+          "gives nothing by C-GET can be made to send to 'osteo receive'.",
+          {},
+          "osteo fetch --peer ORTHANC@127.0.0.1:4242 --accession 4711 --modality CT"};
 }
 
 int FetchCommand::run(const Params& p, cli::Invocation& io) {
   const Door from = door_of(p, io);
   if (!p.out.empty() && output_exists(p.out) && !(fs::is_directory(p.out) && fs::is_empty(p.out)))
-    throw Error(ExitCode::cannot_write, "'" + p.out + "' exists already", "another folder: what was fetched is never replaced");
+    throw Error(ExitCode::cannot_write, "'" + p.out + "' exists already",
+                "another folder: what was fetched is never replaced");
   const bool by_number = !p.series.empty() && p.series.find('.') == std::string::npos;
   const SeriesKeys keys{p.study, by_number ? "" : p.series, p.accession, p.patient_id, p.date, p.modality};
-  std::vector<RemoteSeries> found = from.web ? find_series(*from.web, keys, io.context) : find_series(*from.node, keys, io.context);
+  std::vector<RemoteSeries> found =
+      from.web ? find_series(*from.web, keys, io.context) : find_series(*from.node, keys, io.context);
   for (RemoteSeries& s : found) {
     s.modality = shown(s.modality);
     s.description = shown(s.description);
@@ -199,8 +217,8 @@ int FetchCommand::run(const Params& p, cli::Invocation& io) {
                       {"modality", s.modality},
                       {"images", s.images},
                       {"description", s.description}});
-    lines += "  " + std::to_string(s.number) + "  " + s.modality + "  " + (s.images < 0 ? "?" : std::to_string(s.images)) + " images  " +
-             s.description + "  " + s.series + "\n";
+    lines += "  " + std::to_string(s.number) + "  " + s.modality + "  " +
+             (s.images < 0 ? "?" : std::to_string(s.images)) + " images  " + s.description + "  " + s.series + "\n";
   }
   io.end_progress();
   if (p.out.empty()) {
@@ -224,7 +242,12 @@ int FetchCommand::run(const Params& p, cli::Invocation& io) {
       });
   io.end_progress();
   if (io.common.json)
-    io.out << Json{{"folder", p.out}, {"images", report.images}, {"bytes", report.bytes}, {"modality", found[0].modality}}.dump(2) << '\n';
+    io.out << Json{{"folder", p.out},
+                   {"images", report.images},
+                   {"bytes", report.bytes},
+                   {"modality", found[0].modality}}
+                  .dump(2)
+           << '\n';
   if (!io.common.quiet) io.err << report.images << " objects, " << megabytes(report.bytes) << ": " << p.out << '\n';
   return 0;
 }
@@ -233,10 +256,14 @@ cli::CommandInfo ReceiveCommand::info() {
   return {
       "receive",
       "a DICOM node that takes what a PACS or scanner sends into a folder",
-      "Answers C-ECHO and C-STORE on this machine alone unless --bind says otherwise, until it is stopped. Objects are kept as they come, "
-      "each in a folder of its study and series whose names are hashes; none is ever written over. A series is closed when nothing "
-      "of it has come for --quiet-s: a line on standard output tells its folder (with --json a JSON line), and a file CLOSED lies in it; "
-      "slices that come later open it again. Each association has a process of its own with limits, so that no peer can harm another. "
+      "Answers C-ECHO and C-STORE on this machine alone unless --bind says otherwise, until it is stopped. Objects are "
+      "kept as they come, "
+      "each in a folder of its study and series whose names are hashes; none is ever written over. A series is closed "
+      "when nothing "
+      "of it has come for --quiet-s: a line on standard output tells its folder (with --json a JSON line), and a file "
+      "CLOSED lies in it; "
+      "slices that come later open it again. Each association has a process of its own with limits, so that no peer "
+      "can harm another. "
       "Without --tls-ca nothing is encrypted: then put it behind a tunnel, or keep it on one machine with the PACS.",
       {{"folder", "where to; made when it is missing"}},
       "osteo receive INBOX --allow ORTHANC"};
@@ -272,7 +299,8 @@ int ReceiveCommand::run(const Params& p, cli::Invocation& io) {
     else
       io.out << s.folder.string() << std::endl;
     if (!io.common.quiet)
-      io.err << "a series of " << s.objects << " objects, " << megabytes(s.bytes) << ": " << s.folder.string() << std::endl;
+      io.err << "a series of " << s.objects << " objects, " << megabytes(s.bytes) << ": " << s.folder.string()
+             << std::endl;
   };
   ReceiveCounters last;
   events.counters = [&](const ReceiveCounters& c) {
@@ -283,7 +311,8 @@ int ReceiveCommand::run(const Params& p, cli::Invocation& io) {
   };
   receive_objects(io.arguments[0], o, events, io.context);
   if (!io.common.quiet)
-    io.err << "stopped: " << last.stored << " objects stored, " << last.again << " were there already, " << last.refused << " refused\n";
+    io.err << "stopped: " << last.stored << " objects stored, " << last.again << " were there already, " << last.refused
+           << " refused\n";
   return 0;
 }
 

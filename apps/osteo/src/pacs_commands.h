@@ -14,7 +14,8 @@ namespace osteo {
 struct TlsFlags {
   std::string tls_ca, tls_certificate, tls_key;
   static void describe(TlsFlags& p, auto& visit) {
-    visit({"tls_ca", "speak TLS, and trust certificates that these have signed (PEM; empty: nothing is encrypted)"}, p.tls_ca);
+    visit({"tls_ca", "speak TLS, and trust certificates that these have signed (PEM; empty: nothing is encrypted)"},
+          p.tls_ca);
     visit({"tls_certificate", "our own certificate (PEM)"}, p.tls_certificate);
     visit({"tls_key", "its key, in a file that only we may read (PEM, without a password)"}, p.tls_key);
   }
@@ -38,8 +39,10 @@ struct PeerOrWebFlags : PeerFlags {
   std::string dicomweb, dicomweb_login, dicomweb_ca;
   static void describe(PeerOrWebFlags& p, auto& visit) {
     PeerFlags::describe(p, visit);
-    visit({"dicomweb", "in place of --peer: root of a DICOMweb server, like https://pacs.example/dicom-web"}, p.dicomweb);
-    visit({"dicomweb_login", "file, mode 600, with USER:PASSWORD (empty: OSTEO_DICOMWEB_LOGIN of the environment, or none)"},
+    visit({"dicomweb", "in place of --peer: root of a DICOMweb server, like https://pacs.example/dicom-web"},
+          p.dicomweb);
+    visit({"dicomweb_login",
+           "file, mode 600, with USER:PASSWORD (empty: OSTEO_DICOMWEB_LOGIN of the environment, or none)"},
           p.dicomweb_login);
     visit({"dicomweb_ca", "certificates to trust for it (PEM; empty: those of the system)"}, p.dicomweb_ca);
   }
@@ -56,7 +59,8 @@ struct SendCommand {
     PeerOrWebFlags::describe(p, visit);
     visit({"dry_run", "say what would leave, and speak to nobody"}, p.dry_run);
     visit({"check", "ask afterwards which of the objects the node has (--no-check: believe its answers)"}, p.check);
-    visit({"deidentify", "send copies as 'osteo deidentify' makes them; what it leaves out does not leave"}, p.deidentify);
+    visit({"deidentify", "send copies as 'osteo deidentify' makes them; what it leaves out does not leave"},
+          p.deidentify);
     visit({"key", "with --deidentify: as there"}, p.key);
   }
   static cli::CommandInfo info();
@@ -72,7 +76,10 @@ struct DeidentifyCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder for the result, which must not be there (also -o)"}, p.out);
-    visit({"key", "file of 32 bytes or more, mode 600: the same key gives the same codes and UIDs (empty: a new one, forgotten)"}, p.key);
+    visit({"key",
+           "file of 32 bytes or more, mode 600: the same key gives the same codes and UIDs (empty: a new one, "
+           "forgotten)"},
+          p.key);
     visit({"map", "file, mode 600, that leads from codes and new UIDs back to the originals (empty: none)"}, p.map);
   }
   static cli::CommandInfo info();
@@ -105,7 +112,8 @@ struct ReceiveCommand {
     int port = 11112;
     bool anybody = false;
     int associations = 20;
-    double object_gb = 2, folder_gb = 100, keep_free_gb = 1, memory_mb = 256, timeout_s = 30, association_s = 3600, quiet_s = 30;
+    double object_gb = 2, folder_gb = 100, keep_free_gb = 1, memory_mb = 256, timeout_s = 30, association_s = 3600,
+           quiet_s = 30;
   };
   static void describe(Params& p, auto& visit) {
     visit({"ae", "our title: who calls another is refused"}, p.ae);
@@ -143,16 +151,22 @@ struct WatchCommand {
   static void describe(Params& p, auto& visit) {
     visit({"rules", "file that says which series go through which pipeline, like pipelines/rules.json"}, p.rules);
     visit({"out", "folder for cases and journal, made when it is not there (also -o)"}, p.out);
-    visit({"quiet_s", "a series is taken when none of its files has come or changed for so long", "s", 0.1, 86400}, p.quiet_s);
+    visit({"quiet_s", "a series is taken when none of its files has come or changed for so long", "s", 0.1, 86400},
+          p.quiet_s);
     visit({"poll_s", "between looks into the folder", "s", 0.1, 3600}, p.poll_s);
     visit({"jobs", "cases at a time", "", 1, 1024}, p.jobs);
-    visit({"memory_mb", "memory that a case may have; one that needs more is ended (0: no bound)", "MB", 0, 10000000}, p.memory_mb);
-    visit({"minutes", "time that a case may take; one that needs longer is ended (0: no bound)", "min", 0, 100000}, p.minutes);
+    visit({"memory_mb", "memory that a case may have; one that needs more is ended (0: no bound)", "MB", 0, 10000000},
+          p.memory_mb);
+    visit({"minutes", "time that a case may take; one that needs longer is ended (0: no bound)", "min", 0, 100000},
+          p.minutes);
     visit({"retries", "further tries of a case that ended for memory, time or a signal", "", 0, 100}, p.retries);
     visit({"keep_free_mb", "begin no case with less free on the disk of the cases", "MB", 0, 1e9}, p.keep_free_mb);
-    visit({"orthanc", "address of an Orthanc whose series are copied into the folder, like https://orthanc.example:8042 (empty: none)"},
+    visit({"orthanc",
+           "address of an Orthanc whose series are copied into the folder, like https://orthanc.example:8042 (empty: "
+           "none)"},
           p.orthanc);
-    visit({"orthanc_login", "file, mode 600, with USER:PASSWORD (empty: OSTEO_ORTHANC_LOGIN of the environment, or none)"},
+    visit({"orthanc_login",
+           "file, mode 600, with USER:PASSWORD (empty: OSTEO_ORTHANC_LOGIN of the environment, or none)"},
           p.orthanc_login);
     visit({"orthanc_ca", "certificates to trust (PEM; empty: those of the system)"}, p.orthanc_ca);
     visit({"timeout_s", "for the connection to it, and for less than 1000 bytes a second", "s", 1, 3600}, p.timeout_s);
@@ -178,7 +192,9 @@ struct DoctorCommand {
   static void describe(Params& p, auto& visit) {
     visit({"seconds", "for which the loop's lateness is measured", "s", 0.1, 600}, p.seconds);
     visit({"rate_hz", "of that loop", "Hz", 100, 10000}, p.rate_hz);
-    visit({"server", "look at what receive, watch and batch need instead; the flags that follow are theirs, and are for this alone"},
+    visit({"server",
+           "look at what receive, watch and batch need instead; the flags that follow are theirs, and are for this "
+           "alone"},
           p.server);
     visit({"inbox", "folder of receive (empty: none is looked at)"}, p.inbox);
     visit({"cases", "folder of watch's cases (empty: none)"}, p.cases);

@@ -2,35 +2,36 @@
 #include <ostream>
 
 #include "commands/plan.h"
+#include "osteo/app/cli/report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/simulation/bone/world_mesh.h"
-#include "osteo/app/cli/report.h"
+#include "osteo/display/view/world_view.h"
 #include "osteo/imaging/io/surface_io.h"
+#include "osteo/session/recording/session_reader.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/plan.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"
-#include "osteo/session/recording/session_reader.h"
-#include "osteo/display/view/world_view.h"
+#include "osteo/simulation/bone/world_mesh.h"
 
 namespace osteo {
 
 cli::CommandInfo PlanCommand::info() {
-  return {
-      "plan",
-      "where a session left pieces and plates: transforms, STL, gaps between plate and bone",
-      "Writes plan.json, an STL of each piece and plate where it is, and for each plate how far bone lies below its underside; a picture "
-      "too. With --at-s as it was at that time.",
-      {{"session", "a session folder"}},
-      "osteo plan SESSION -o plan"};
+  return {"plan",
+          "where a session left pieces and plates: transforms, STL, gaps between plate and bone",
+          "Writes plan.json, an STL of each piece and plate where it is, and for each plate how far bone lies below "
+          "its underside; a picture "
+          "too. With --at-s as it was at that time.",
+          {{"session", "a session folder"}},
+          "osteo plan SESSION -o plan"};
 }
 
 int PlanCommand::run(const Params& p, cli::Invocation& io) {
   const SessionFolder session = open_session_folder(io.arguments[0], p.case_folder);
   const Case the_case = load_case(session.case_folder);
-  const World world = p.at_s < 0 ? world_at_end(session, the_case, {}, io.context) : world_at(session, p.at_s, the_case, {}, io.context);
+  const World world = p.at_s < 0 ? world_at_end(session, the_case, {}, io.context)
+                                 : world_at(session, p.at_s, the_case, {}, io.context);
   const fs::path folder = p.out.empty() ? session.folder / "plan" : fs::path(p.out);
   SceneReaders readers(world, {}, 1000, io.context);
   Vec3 lo{1e9, 1e9, 1e9}, hi = lo * -1;
@@ -50,8 +51,9 @@ int PlanCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   if (io.common.json) io.out << text;
   if (!io.common.quiet)
-    io.err << world.bodies().size() << (world.bodies().size() == 1 ? " piece and " : " pieces and ") << world.fixtures().size()
-           << (world.fixtures().size() == 1 ? " plate: " : " plates: ") << folder.string() << '\n';
+    io.err << world.bodies().size() << (world.bodies().size() == 1 ? " piece and " : " pieces and ")
+           << world.fixtures().size() << (world.fixtures().size() == 1 ? " plate: " : " plates: ") << folder.string()
+           << '\n';
   return 0;
 }
 

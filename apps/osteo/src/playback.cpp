@@ -11,11 +11,11 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/simulation/bone/instrument.h"
+#include "osteo/network/tutor/playback.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"
-#include "osteo/network/tutor/playback.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "playback_words.h"
 #include "window_program.h"
 
@@ -29,7 +29,8 @@ std::vector<Lesson> lessons_of(const std::string& list, const std::string& bone_
     if (const std::string name = list.substr(at, comma - at); !name.empty()) {
       const SessionReader session(open_session_folder(name).stream());
       if (session.header().bone_hash != bone_hash)
-        throw Error(ExitCode::usage, "'" + name + "' of --experts was recorded on another bone", "give sessions of the same case");
+        throw Error(ExitCode::usage, "'" + name + "' of --experts was recorded on another bone",
+                    "give sessions of the same case");
       all.push_back(read_lesson(session, 0, 0));
     }
     at = comma + 1;
@@ -43,10 +44,11 @@ int open_window(const PlaybackCommand::Params& p, const SessionFolder& lesson, c
   std::string as = "from_s=" + format_number(p.from_s) + ",to_s=" + format_number(p.to_s);
   const auto given = fields_of<PlaybackParams>(mine), defaults = fields_of<PlaybackParams>(usual);
   for (std::size_t i = 0; i < given.size(); ++i) {
-    if (given[i].to_text() != defaults[i].to_text()) as += "," + std::string(given[i].doc.name) + "=" + given[i].to_text();
+    if (given[i].to_text() != defaults[i].to_text())
+      as += "," + std::string(given[i].doc.name) + "=" + given[i].to_text();
   }
-  std::vector<std::string> args{window_program("osteo-rehearse", "use --headless"), lesson.case_folder.string(), "--playback=" + lesson.folder.string(),
-                                "--playback-as=" + as};
+  std::vector<std::string> args{window_program("osteo-rehearse", "use --headless"), lesson.case_folder.string(),
+                                "--playback=" + lesson.folder.string(), "--playback-as=" + as};
   if (!p.out.empty()) args.push_back("--out=" + p.out);
   if (!p.state_file.empty()) args.push_back("--state-file=" + p.state_file);
   args.push_back("--device=" + std::string(EnumNames<Hand>::values[static_cast<std::size_t>(p.device)]));
@@ -62,15 +64,18 @@ double simulated_stiffness(const std::string& hand) {
   char* end = nullptr;
   const double n_per_m = std::strtod(hand.c_str() + kind.size(), &end);
   if (end == hand.c_str() + kind.size() || *end != '\0' || !(n_per_m >= 1 && n_per_m <= 5000))
-    throw Error(ExitCode::usage, "--hand: '" + hand.substr(kind.size()) + "' is no stiffness from 1 to 5000 N/m", advice);
+    throw Error(ExitCode::usage, "--hand: '" + hand.substr(kind.size()) + "' is no stiffness from 1 to 5000 N/m",
+                advice);
   return n_per_m;
 }
 
 cli::CommandInfo PlaybackCommand::info() {
   return {"playback",
           "a recorded session led along: the expert's movements and forces in your hand",
-          "The hand of the session is one more hand of a new session, and leads yours: by a spring and a damper, and in 'show' with the "
-          "forces that it felt. Bone is drilled by the recorded hand, and comes out as it was recorded to the bit, or by yours (--drills). "
+          "The hand of the session is one more hand of a new session, and leads yours: by a spring and a damper, and "
+          "in 'show' with the "
+          "forces that it felt. Bone is drilled by the recorded hand, and comes out as it was recorded to the bit, or "
+          "by yours (--drills). "
           "What is recorded says that it was guided; scores never mix it with unaided sessions. docs/tutoring.md.",
           {{"session", "the expert's, a session folder"}},
           "osteo playback SESSION --mode guide --pace way"};
@@ -80,7 +85,8 @@ int PlaybackCommand::run(const Params& p, cli::Invocation& io) {
   for (const char* const name : {"device", "state_file"}) {
     if (p.headless && io.given.contains(name))
       throw Error(ExitCode::usage,
-                  "--" + std::string(name == std::string("device") ? "device" : "state-file") + " has no effect with --headless",
+                  "--" + std::string(name == std::string("device") ? "device" : "state-file") +
+                      " has no effect with --headless",
                   "leave it out");
   }
   if (!p.headless && io.given.contains("hand"))
@@ -109,13 +115,14 @@ int PlaybackCommand::run(const Params& p, cli::Invocation& io) {
   playback->patience_s = 20;
   RehearsalOptions options;
   options.rate_hz = lesson->rate_hz;
-  auto devices =
-      playback_devices(std::make_unique<FollowingHand>(stiffness, from_floats(first.position_mm), playback), playback, options.haptics);
+  auto devices = playback_devices(std::make_unique<FollowingHand>(stiffness, from_floats(first.position_mm), playback),
+                                  playback, options.haptics);
   options.actions = playback_actions(*playback);
   const Case the_case = load_case(lesson_folder.case_folder);
   options.anatomy = anatomy_of(the_case, options.haptics, io.context);
   World world = world_of_lesson(lesson_folder, p.from_s, the_case, options.anatomy, io.context);
-  // It begins with the lesson's scene: the case's, that of the session which the lesson goes on from, or that of a time within the lesson.
+  // It begins with the lesson's scene: the case's, that of the session which the lesson goes on from, or that of a time
+  // within the lesson.
   const fs::path before = p.from_s > 0 ? lesson_folder.folder : lesson_folder.resumed_from;
   const double at_s = p.from_s > 0 ? p.from_s : lesson_folder.resumed_at_s;
   const SessionFolder session = create_session_folder(p.out, the_case.folder, before, guided_words(params), at_s);
@@ -135,12 +142,14 @@ int PlaybackCommand::run(const Params& p, cli::Invocation& io) {
   if (!io.common.quiet) {
     io.err << guided_words(params) << '\n' << facts_words(facts) << '\n';
     if (expert_drills(params))
-      io.err << (same_bone ? "bone at the end is the recorded one, to the bit\n" : "bone at the end is not that of the session's end\n");
+      io.err << (same_bone ? "bone at the end is the recorded one, to the bit\n"
+                           : "bone at the end is not that of the session's end\n");
     io.err << "session: " << session.folder.string() << '\n';
   }
   // Told even when quiet: the exit code is about it.
   if (playback->given_up)
-    io.err << "NOT LED TO THE END: the hand did not come on after " << format_number(playback->seconds + p.from_s) << " s of the session\n";
+    io.err << "NOT LED TO THE END: the hand did not come on after " << format_number(playback->seconds + p.from_s)
+           << " s of the session\n";
   return static_cast<int>(playback->given_up ? ExitCode::partial : ExitCode::ok);
 }
 

@@ -7,21 +7,21 @@
 #include <thread>
 
 #include "commands/rehearse.h"
+#include "osteo/app/cli/report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/simulation/bone/world_mesh.h"
-#include "osteo/app/cli/report.h"
+#include "osteo/display/view/world_view.h"
 #include "osteo/imaging/io/surface_io.h"
+#include "osteo/network/wire/rehearsal_stream.h"
+#include "osteo/network/wire/tracked_hand.h"
+#include "osteo/session/recording/haptic_settings.h"
+#include "osteo/session/recording/script_file.h"
 #include "osteo/session/scene/approval.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"
-#include "osteo/session/recording/haptic_settings.h"
-#include "osteo/session/recording/script_file.h"
-#include "osteo/display/view/world_view.h"
-#include "osteo/network/wire/rehearsal_stream.h"
-#include "osteo/network/wire/tracked_hand.h"
+#include "osteo/simulation/bone/world_mesh.h"
 #include "window_program.h"
 
 namespace osteo {
@@ -42,11 +42,14 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
 cli::CommandInfo RehearseCommand::info() {
   return {"rehearse",
           "drill the bone of a case, in a window or by script",
-          "Opens the window: the bone beside three cuts, a drill moved by the mouse. With --headless a scripted hand drives the same "
+          "Opens the window: the bone beside three cuts, a drill moved by the mouse. With --headless a scripted hand "
+          "drives the same "
           "servo, and the session, "
-          "pictures from before and after, and a summary are written. Exit code 8 when ticks were not recorded, since the disk did not "
+          "pictures from before and after, and a summary are written. Exit code 8 when ticks were not recorded, since "
+          "the disk did not "
           "keep up, "
-          "or actions of the script were refused: the summary lists them. Dense bone resists the burr more, by the HU that the case keeps "
+          "or actions of the script were refused: the summary lists them. Dense bone resists the burr more, by the HU "
+          "that the case keeps "
           "(\"hardness\": false in --settings turns that off).",
           {{"case", "a folder made by prepare; without one the window opens with a page to choose on", true}},
           "osteo rehearse CASE --headless --seconds 20 -o SESSION"};
@@ -63,22 +66,29 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
   };
   if (!p.script.empty()) {
     for (const char* const name : {"burr", "diameter_mm", "shape"})
-      refuse(name, "beside --script: a script names its own burr", "change \"burr\" in '" + p.script + "', or leave the flag out");
-    for (const char* const name : {"side", "seconds"}) refuse(name, "beside --script", "it belongs to the built-in strokes; leave it out");
+      refuse(name, "beside --script: a script names its own burr",
+             "change \"burr\" in '" + p.script + "', or leave the flag out");
+    for (const char* const name : {"side", "seconds"})
+      refuse(name, "beside --script", "it belongs to the built-in strokes; leave it out");
   }
   if (!p.headless) {
-    for (const char* const name : {"script", "side", "seconds", "fast"}) refuse(name, "in the window", "add --headless, or leave it out");
+    for (const char* const name : {"script", "side", "seconds", "fast"})
+      refuse(name, "in the window", "add --headless, or leave it out");
   } else {
     const bool tracked = p.device == Hand::igtl;
-    if (tracked && p.fast) throw Error(ExitCode::usage, "--fast has no effect with --device igtl: a hand has its own time", "leave it out");
+    if (tracked && p.fast)
+      throw Error(ExitCode::usage, "--fast has no effect with --device igtl: a hand has its own time", "leave it out");
     if (!p.stream.empty() && p.fast)
-      throw Error(ExitCode::usage, "--stream has no effect with --fast", "leave --fast out, or 'osteo stream' the session afterwards");
-    for (const char* const name : {"playback", "playback_as", "review", "tutor", "listen", "port", "two_way", "join", "code", "role", "arm",
-                                   "camera", "pen", "video", "camera_place", "hand_scale", "second_device", "second_instrument"})
+      throw Error(ExitCode::usage, "--stream has no effect with --fast",
+                  "leave --fast out, or 'osteo stream' the session afterwards");
+    for (const char* const name :
+         {"playback", "playback_as", "review", "tutor", "listen", "port", "two_way", "join", "code", "role", "arm",
+          "camera", "pen", "video", "camera_place", "hand_scale", "second_device", "second_instrument"})
       refuse(name, "with --headless", "a script's hand moves the burr; leave it out");
     if (!tracked) refuse("device", "with --headless", "a script's hand moves the burr, or igtl; leave it out");
-    for (const char* const name : {"quality", "width", "height", "scale", "layout", "full_screen", "end_page", "state_file", "scan",
-                                   "sound", "volume", "alarms", "monitor", "stereo", "stereo_base", "experiment"})
+    for (const char* const name :
+         {"quality", "width", "height", "scale", "layout", "full_screen", "end_page", "state_file", "scan", "sound",
+          "volume", "alarms", "monitor", "stereo", "stereo_base", "experiment"})
       refuse(name, "with --headless", "there is no window; leave it out");
     if (p.stream.empty()) refuse("monitor_setup", "with --headless and without --stream", "leave it out");
   }
@@ -93,7 +103,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   if (!p.show_settings) refuse_what_is_ignored(p, io);
   const int tool = burr_index(p.burr, p.diameter_mm, p.shape);
   if (io.arguments.empty() && (p.show_settings || p.headless || !p.resume.empty() || !p.out.empty()))
-    throw Error(ExitCode::usage, "osteo rehearse takes <case>", "only the window can be opened without: one is chosen there");
+    throw Error(ExitCode::usage, "osteo rehearse takes <case>",
+                "only the window can be opened without: one is chosen there");
   if (p.show_settings) {
     HapticSetup setup;
     setup.params.contact.method = p.contact;
@@ -112,7 +123,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   apply_haptic_settings(the_case.folder, p.settings, options.haptics);
   options.anatomy = anatomy_of(the_case, options.haptics, io.context);
   World world = p.resume.empty() ? world_of(the_case, options.anatomy)
-                                 : world_at_end(open_session_folder(p.resume, the_case.folder), the_case, options.anatomy, io.context);
+                                 : world_at_end(open_session_folder(p.resume, the_case.folder), the_case,
+                                                options.anatomy, io.context);
   const Script script = p.script.empty() ? make_default_script(world, p.side == Side::left, tool, p.seconds)
                                          : load_script(p.script, planned_cuts_of(the_case.folder));
   const std::vector<std::string> doubts = doubts_about(script, world, p.dust);
@@ -142,7 +154,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   std::shared_ptr<TrackedLink> tracker;
   if (tracked) {
     tracker = std::make_shared<TrackedLink>(tracker_address(p.tracker));
-    const HandGoal start{script.waypoints.front().at_mm, to_floats(script.axis), 0, static_cast<std::uint8_t>(script.tool)};
+    const HandGoal start{script.waypoints.front().at_mm, to_floats(script.axis), 0,
+                         static_cast<std::uint8_t>(script.tool)};
     devices.front() = std::make_unique<TrackedHand>(tracker, start, nullptr);
   }
   const std::vector<StreamTarget> targets = stream_targets(p.stream);
@@ -170,7 +183,9 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   if (script.camera) {
     const Vec3 eye_mm = view.centre_mm + view.eye * (view.radius_mm / 0.24);
     const auto triple = [](Vec3 v) { return Json{v.x, v.y, v.z}; };
-    rehearsal.note("camera", Json{{"eye_mm", triple(eye_mm)}, {"target_mm", triple(view.centre_mm)}, {"view_angle_deg", 30}}.dump());
+    rehearsal.note(
+        "camera",
+        Json{{"eye_mm", triple(eye_mm)}, {"target_mm", triple(view.centre_mm)}, {"view_angle_deg", 30}}.dump());
   }
   RehearsalSummary s;
   if (p.fast) {
@@ -200,20 +215,22 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
         for (const std::string& line : stream->feed().told()) io.err << line << '\n';
       }
     }
-    if (tracker && !io.common.quiet) io.err << "tracker: " << tracker->poses() << " poses, " << tracker->refused() << " refused\n";
+    if (tracker && !io.common.quiet)
+      io.err << "tracker: " << tracker->poses() << " poses, " << tracker->refused() << " refused\n";
     s.interrupted = interrupted;
   }
   for (const std::string& w : s.warnings) io.context.warn(w);
   s.warnings.insert(s.warnings.begin(), doubts.begin(), doubts.end());
   // Before what takes time and may be interrupted or find the disk full.
-  const std::string summary =
-      write_summary(session, s, p.rate_hz, instrument_library()[static_cast<std::size_t>(script.tool)].name, options.anatomy);
+  const std::string summary = write_summary(
+      session, s, p.rate_hz, instrument_library()[static_cast<std::size_t>(script.tool)].name, options.anatomy);
   io.end_progress();
   // Told even when quiet: the exit code is about them.
   for (const ActionNote& n : s.notes) {
     if (n.done && io.common.quiet) continue;
-    io.err << (n.done ? "done otherwise" : "NOT DONE") << " at " << format_number(static_cast<double>(n.tick) / p.rate_hz)
-           << " s: " << name_of(n.kind) << ": " << n.why << (n.times > 1 ? " (" + std::to_string(n.times) + " times)" : "") << '\n';
+    io.err << (n.done ? "done otherwise" : "NOT DONE") << " at "
+           << format_number(static_cast<double>(n.tick) / p.rate_hz) << " s: " << name_of(n.kind) << ": " << n.why
+           << (n.times > 1 ? " (" + std::to_string(n.times) + " times)" : "") << '\n';
   }
   for (const StructureCutEvent& e : s.structure_cuts) {
     if (options.anatomy.structures)
@@ -225,9 +242,11 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
            << " s: not finite, or beyond all reach\n";
   if (!s.gaps.empty())
     io.err << "NOT RECORDED: " << s.ticks_not_recorded << " ticks in " << s.gaps.size()
-           << " gaps, since the disk did not keep up; what bone became is recorded, and a replay repeats what comes before the first\n";
+           << " gaps, since the disk did not keep up; what bone became is recorded, and a replay repeats what comes "
+              "before the first\n";
   if (s.interrupted) {  // closed all the same; what takes time is left out
-    if (!io.common.quiet) io.err << "stopped after " << s.ticks << " ticks; session: " << folder.string() << "  (summary.json)\n";
+    if (!io.common.quiet)
+      io.err << "stopped after " << s.ticks << " ticks; session: " << folder.string() << "  (summary.json)\n";
     io.context.check_cancelled();
   }
   TriMesh after;
@@ -237,9 +256,11 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   if (!io.common.quiet) {
     io.err << "case: " << approval.words() << '\n' << told_hardness(options.anatomy) << '\n';
-    io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
+    io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10)
+           << " mm3\n";
     for (const SoftTissue::Facts& f : s.tissue)
-      io.err << "soft tissue '" << f.name << "': " << format_number(std::round(f.cut_off_mm3 * 10) / 10) << " mm3 cut off\n";
+      io.err << "soft tissue '" << f.name << "': " << format_number(std::round(f.cut_off_mm3 * 10) / 10)
+             << " mm3 cut off\n";
     rehearsal.look([&](const World&, SceneReaders& readers) {
       if (!readers.heat) return;
       for (const std::string& line : told(*readers.heat, rehearsal.structures())) io.err << line << '\n';
@@ -249,13 +270,14 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
              << " ticks, since the machine did not keep up; they caught up from the bone itself\n";
     if (s.loop) {
       const LoopStats& l = *s.loop;
-      io.err << "servo: work p50 " << std::lround(l.work.quantile_us(0.5)) << " us, p99.9 " << std::lround(l.work.quantile_us(0.999))
-             << " us; wake-up late p99 " << std::lround(l.lateness.quantile_us(0.99)) << " us; periods missed by our work "
-             << l.missed_by_work << ", by the machine " << l.missed_by_machine << "; real-time priority "
+      io.err << "servo: work p50 " << std::lround(l.work.quantile_us(0.5)) << " us, p99.9 "
+             << std::lround(l.work.quantile_us(0.999)) << " us; wake-up late p99 "
+             << std::lround(l.lateness.quantile_us(0.99)) << " us; periods missed by our work " << l.missed_by_work
+             << ", by the machine " << l.missed_by_machine << "; real-time priority "
              << (l.realtime_granted ? "granted" : "refused (" + l.realtime_refusal + ")") << '\n';
     }
-    io.err << "session: " << folder.string() << "  (before.png, after.png, surface.ply, summary.json)\n  again: osteo replay "
-           << folder.string() << '\n';
+    io.err << "session: " << folder.string()
+           << "  (before.png, after.png, surface.ply, summary.json)\n  again: osteo replay " << folder.string() << '\n';
   }
   if (io.common.json) io.out << summary;
   return static_cast<int>(s.refused() || !s.gaps.empty() ? ExitCode::partial : ExitCode::ok);

@@ -3,31 +3,32 @@
 #include <ostream>
 
 #include "commands/replay.h"
+#include "osteo/app/cli/report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/simulation/bone/world_mesh.h"
-#include "osteo/app/cli/report.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/imaging/io/surface_io.h"
+#include "osteo/session/recording/session_reader.h"
+#include "osteo/session/recording/simulated.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"
-#include "osteo/session/recording/session_reader.h"
-#include "osteo/session/recording/simulated.h"
+#include "osteo/simulation/bone/world_mesh.h"
 
 namespace osteo {
 
 cli::CommandInfo ReplayCommand::info() {
-  return {
-      "replay",
-      "run a session again and prove that it comes out the same",
-      "Feeds the recorded poses to the same servo on the case's bone and compares every tick, the bone and the surface bit for bit; "
-      "also applies the recorded "
-      "voxel changes and compares that. Exit code 7 when anything differs, 8 when ticks were not recorded (what comes before is repeated, "
-      "the rest taken from the recorded changes), 4 when the file is damaged.",
-      {{"session", "a session folder"}},
-      "osteo replay SESSION"};
+  return {"replay",
+          "run a session again and prove that it comes out the same",
+          "Feeds the recorded poses to the same servo on the case's bone and compares every tick, the bone and the "
+          "surface bit for bit; "
+          "also applies the recorded "
+          "voxel changes and compares that. Exit code 7 when anything differs, 8 when ticks were not recorded (what "
+          "comes before is repeated, "
+          "the rest taken from the recorded changes), 4 when the file is damaged.",
+          {{"session", "a session folder"}},
+          "osteo replay SESSION"};
 }
 
 int ReplayCommand::run(const Params& p, cli::Invocation& io) {
@@ -55,20 +56,23 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
          {"bone_hash", r.bone_hash}, {"surface_hash", r.surface_hash},
          {"dust_hash", r.dust_hash}, {"removed_mm3", r.removed_mm3},
          {"seconds", r.seconds}};
-  if (anatomy.structures) j["structures"] = Json::parse(structures_json(r.structures, *anatomy.structures, outline.header.rate_hz)).value();
+  if (anatomy.structures)
+    j["structures"] = Json::parse(structures_json(r.structures, *anatomy.structures, outline.header.rate_hz)).value();
   if (!folder.approval.empty()) j["approval"] = folder.approval;
   if (!r.difference.empty()) j["difference"] = r.difference;
   if (r.difference_since_s) j["same_until_s"] = *r.difference_since_s;
   if (io.common.json) io.out << j.dump(2) << '\n';
   // Losses are told even when quiet: they are no talk.
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
-  if (const std::string words = simulated_words(session); !words.empty() && !io.common.quiet) io.err << "session: " << words << '\n';
+  if (const std::string words = simulated_words(session); !words.empty() && !io.common.quiet)
+    io.err << "session: " << words << '\n';
   for (const std::string& line : outline.newer) io.err << "session: of a later version, left out: " << line << '\n';
   if (!folder.approval.empty() && !io.common.quiet) io.err << "case, when it was recorded: " << folder.approval << '\n';
   const bool whole = outline.gaps.empty();
   if (!whole) {
     io.err << "only the first " << r.ticks_repeated << " of " << r.ticks << " ticks could be run again; "
-           << (outline.bone_known_until() ? "bone behind the first loss is not known" : "behind them the recorded changes give the bone")
+           << (outline.bone_known_until() ? "bone behind the first loss is not known"
+                                          : "behind them the recorded changes give the bone")
            << '\n';
   }
   if (!io.common.quiet) {

@@ -1,6 +1,7 @@
 // report, approve: a case that a person can look at and stand for.
 #include <ostream>
 
+#include "built_in_pipelines.h"
 #include "case_pipeline.h"
 #include "commands/approve.h"
 #include "commands/report.h"
@@ -11,16 +12,17 @@
 #include "osteo/session/scene/approval.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/hand_over.h"
-#include "built_in_pipelines.h"
 
 namespace osteo {
 namespace {
 
 // The pipeline of the case up to its mask, where the scan and all that it was asked for are at hand.
-std::optional<Pipeline> pipeline_at_hand(const fs::path& folder, const std::optional<Recipe>& recipe, const std::string& given) {
+std::optional<Pipeline> pipeline_at_hand(const fs::path& folder, const std::optional<Recipe>& recipe,
+                                         const std::string& given) {
   if (!recipe) {
     if (!given.empty())
-      throw Error(ExitCode::usage, "'" + folder.string() + "' was made by an earlier version and does not know its scan",
+      throw Error(ExitCode::usage,
+                  "'" + folder.string() + "' was made by an earlier version and does not know its scan",
                   "make it anew, with prepare");
     return std::nullopt;
   }
@@ -28,7 +30,8 @@ std::optional<Pipeline> pipeline_at_hand(const fs::path& folder, const std::opti
   if (!given.empty()) {
     require_readable(given);
     if (hash_path(given) != recipe->source_hash)
-      throw Error(ExitCode::corrupt, "'" + given + "' is not the scan that '" + folder.string() + "' was made from, or was changed since");
+      throw Error(ExitCode::corrupt,
+                  "'" + given + "' is not the scan that '" + folder.string() + "' was made from, or was changed since");
     scan = given;
   } else if (const auto known = recall_file(recipe->source_hash)) {
     scan = *known;
@@ -45,10 +48,10 @@ std::optional<Pipeline> pipeline_at_hand(const fs::path& folder, const std::opti
   return case_pipeline(text, *recipe, scan, {}, false, folder, edits_of_case(folder, std::nullopt, same, notes), false);
 }
 
-CaseReport make_report(const fs::path& folder, const std::optional<Recipe>& recipe, const std::optional<Pipeline>& pipeline,
-                       cli::Invocation& io) {
-  return report_on(folder, recipe ? flags_of(*recipe) : " (made by an earlier version, which did not keep its flags)", pipeline,
-                   std::nullopt, io);
+CaseReport make_report(const fs::path& folder, const std::optional<Recipe>& recipe,
+                       const std::optional<Pipeline>& pipeline, cli::Invocation& io) {
+  return report_on(folder, recipe ? flags_of(*recipe) : " (made by an earlier version, which did not keep its flags)",
+                   pipeline, std::nullopt, io);
 }
 
 CaseReport make_report(const fs::path& folder, cli::Invocation& io) {
@@ -63,43 +66,51 @@ struct CaseSeries {
 };
 CaseSeries series_of(const fs::path& folder, const std::optional<Pipeline>& pipeline, cli::Invocation& io) {
   if (!pipeline)
-    throw Error(ExitCode::no_input, "the scan of '" + folder.string() + "' is not at hand, whose patient and study the object belongs to",
+    throw Error(ExitCode::no_input,
+                "the scan of '" + folder.string() + "' is not at hand, whose patient and study the object belongs to",
                 "--scan DICOM_FOLDER");
   for (const PipelineNode& n : pipeline->nodes) {
     const auto source = n.inputs.find("source");
-    if ((n.stage != "import" && n.stage != "import-bone") || source == n.inputs.end() || source->second.file.empty()) continue;
+    if ((n.stage != "import" && n.stage != "import-bone") || source == n.inputs.end() || source->second.file.empty())
+      continue;
     const auto wanted = n.params.find("series");
     CaseSeries s;
     s.scan = scan_dicom(source->second.file, {}, io.context.sub(0, 0.1));
     s.series = &choose_series(s.scan, wanted == n.params.end() ? "" : wanted->second, source->second.file.string());
     return s;
   }
-  throw Error(ExitCode::usage, "'" + folder.string() + "' was not made from a DICOM series: there is no study that its report belongs to");
+  throw Error(ExitCode::usage, "'" + folder.string() +
+                                   "' was not made from a DICOM series: there is no study that its report belongs to");
 }
 
 }  // namespace
 
 cli::CommandInfo ReportCommand::info() {
-  return {
-      "report",
-      "the report of a case, to look at, print and sign",
-      "Writes CASE.report.html and CASE.report.pdf beside the case, as prepare does: two pages with the scan's facts, cuts with the bone's "
-      "outline, the bone from six sides, what was taken off, what the scan can resolve, structures and a line to sign. Its cuts are "
-      "pictures of the "
-      "patient, so it is not in the case. Without the scan the pictures of an earlier report of the same state are kept, or left out, and "
-      "it says so. --dicom writes the PDF as a DICOM object too, of the patient and study of the scan, which is looked at for it: "
-      "'osteo send' brings it to a PACS.",
-      {{"case", "a folder made by prepare"}},
-      "osteo report CASE"};
+  return {"report",
+          "the report of a case, to look at, print and sign",
+          "Writes CASE.report.html and CASE.report.pdf beside the case, as prepare does: two pages with the scan's "
+          "facts, cuts with the bone's "
+          "outline, the bone from six sides, what was taken off, what the scan can resolve, structures and a line to "
+          "sign. Its cuts are "
+          "pictures of the "
+          "patient, so it is not in the case. Without the scan the pictures of an earlier report of the same state are "
+          "kept, or left out, and "
+          "it says so. --dicom writes the PDF as a DICOM object too, of the patient and study of the scan, which is "
+          "looked at for it: "
+          "'osteo send' brings it to a PACS.",
+          {{"case", "a folder made by prepare"}},
+          "osteo report CASE"};
 }
 
 int ReportCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0], object = p.dicom;
   if (!object.empty()) {
     if (object.extension() != ".dcm")
-      throw Error(ExitCode::usage, "'" + p.dicom + "' does not end in .dcm", "--dicom " + report_file(folder, ".dcm").string());
+      throw Error(ExitCode::usage, "'" + p.dicom + "' does not end in .dcm",
+                  "--dicom " + report_file(folder, ".dcm").string());
     if (output_exists(object) && !io.common.force)
-      throw Error(ExitCode::cannot_write, "'" + p.dicom + "' exists already", "give another name, or --force to replace it");
+      throw Error(ExitCode::cannot_write, "'" + p.dicom + "' exists already",
+                  "give another name, or --force to replace it");
   }
   const auto recipe = read_recipe(folder);
   const auto pipeline = pipeline_at_hand(folder, recipe, p.scan);
@@ -113,8 +124,9 @@ int ReportCommand::run(const Params& p, cli::Invocation& io) {
     if (!io.common.quiet) io.err << "  " << p.dicom << " (names the patient)\n";
   }
   if (io.common.json) {
-    Json said{{"html", report.html.string()}, {"pdf", report.pdf.string()}, {"unchanged", report.unchanged},
-              {"left_out", report.left_out},  {"code", case_code(folder)},  {"approval", approval_json(approval_of(folder))}};
+    Json said{{"html", report.html.string()},  {"pdf", report.pdf.string()},
+              {"unchanged", report.unchanged}, {"left_out", report.left_out},
+              {"code", case_code(folder)},     {"approval", approval_json(approval_of(folder))}};
     if (of) said["dicom"] = p.dicom;
     io.out << said.dump(2) << '\n';
   }
@@ -124,9 +136,11 @@ int ReportCommand::run(const Params& p, cli::Invocation& io) {
 cli::CommandInfo ApproveCommand::info() {
   return {"approve",
           "say that a person has looked at a case and stands for it",
-          "Writes the name, today's date and the note into the case, bound to the content of its files and to the report: any later change "
+          "Writes the name, today's date and the note into the case, bound to the content of its files and to the "
+          "report: any later change "
           "ends it. Shown by "
-          "'osteo info CASE', in the report, in the rehearsal's window and in each session. The name is kept as it is given: it is the "
+          "'osteo info CASE', in the report, in the rehearsal's window and in each session. The name is kept as it is "
+          "given: it is the "
           "only one in a "
           "case. 'osteo rehearse --require-approved' refuses a case without.",
           {{"case", "a folder made by prepare"}},
@@ -136,7 +150,8 @@ cli::CommandInfo ApproveCommand::info() {
 int ApproveCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0];
   if (p.withdraw && (!p.by.empty() || !p.note.empty()))
-    throw Error(ExitCode::usage, "--withdraw takes the approval back: --by and --note do nothing beside it", "leave them out");
+    throw Error(ExitCode::usage, "--withdraw takes the approval back: --by and --note do nothing beside it",
+                "leave them out");
   // A case whose files are not what its manifest says is not to be approved.
   static_cast<void>(load_case(folder));
   if (p.withdraw) {
@@ -145,11 +160,13 @@ int ApproveCommand::run(const Params& p, cli::Invocation& io) {
   } else {
     // Looked at must have been the case as it is.
     if (output_exists(report_file(folder, ".html")) && !report_shows(folder)) {
-      throw Error(ExitCode::failed, "the report of '" + folder.string() + "' shows the case as it was before its last change",
+      throw Error(ExitCode::failed,
+                  "the report of '" + folder.string() + "' shows the case as it was before its last change",
                   "make it again with 'osteo report " + folder.string() + "', look at it, then approve");
     }
     if (output_exists(report_file(folder, ".html")) && make_report(folder, io).says_other) {
-      throw Error(ExitCode::failed, "the report of '" + folder.string() + "' was of another version of the program, and is made again",
+      throw Error(ExitCode::failed,
+                  "the report of '" + folder.string() + "' was of another version of the program, and is made again",
                   "look at it, then approve");
     }
     approve(folder, p.by, p.note);

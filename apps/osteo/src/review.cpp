@@ -10,17 +10,19 @@
 namespace osteo {
 
 cli::CommandInfo ReviewCommand::info() {
-  return {
-      "review",
-      "a session as a page to read and to print: what was found, where it is seen, how it went over time",
-      "Writes review.html (one page that asks nothing of any network), review.pdf and review.json into a folder: findings in words with "
-      "pictures of what proves them, what was removed seen and unseen, a timeline to look through, force by distance, a view in 3D, and "
-      "with "
-      "--reference or --earlier how it stands beside other sessions. Figures are those of 'osteo score'. Of a damaged session what is "
-      "there "
-      "is shown, and the exit code is 4.",
-      {{"session", "a session folder"}},
-      "osteo review SESSION -o review --procedure pipelines/procedures/mastoidectomy.json"};
+  return {"review",
+          "a session as a page to read and to print: what was found, where it is seen, how it went over time",
+          "Writes review.html (one page that asks nothing of any network), review.pdf and review.json into a folder: "
+          "findings in words with "
+          "pictures of what proves them, what was removed seen and unseen, a timeline to look through, force by "
+          "distance, a view in 3D, and "
+          "with "
+          "--reference or --earlier how it stands beside other sessions. Figures are those of 'osteo score'. Of a "
+          "damaged session what is "
+          "there "
+          "is shown, and the exit code is 4.",
+          {{"session", "a session folder"}},
+          "osteo review SESSION -o review --procedure pipelines/procedures/mastoidectomy.json"};
 }
 
 int ReviewCommand::run(const Params& p, cli::Invocation& io) {

@@ -3,22 +3,23 @@
 
 #include "commands/docs.h"
 #include "commands/run.h"
-#include "program.h"
+#include "osteo/app/cli/report.h"
+#include "osteo/app/vtk/pipeline.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/app/cli/report.h"
 #include "osteo/imaging/pipeline/engine.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/session/recording/script_file.h"
-#include "osteo/app/vtk/pipeline.h"
+#include "program.h"
 
 namespace osteo {
 
 cli::CommandInfo RunCommand::info() {
   return {"run",
           "run a pipeline file",
-          "Variables of the file are set with --set NAME=VALUE, a parameter of one stage with --set ID.PARAMETER=VALUE. The whole graph is "
+          "Variables of the file are set with --set NAME=VALUE, a parameter of one stage with --set "
+          "ID.PARAMETER=VALUE. The whole graph is "
           "checked before anything is read.",
           {{"pipeline", "a .json file"}},
           "osteo run pipelines/temporal-bone.json --set source=CT_FOLDER --set case=CASE",
@@ -51,15 +52,16 @@ int RunCommand::run(const Params& p, cli::Invocation& io) {
     for (const auto& n : pipeline.nodes) {
       io.out << n.id << " (" << n.stage << ")\n";
       for (const auto& [port, in] : n.inputs)
-        io.out << "  " << port << " <- " << (in.node.empty() ? in.file.string() : in.node + (in.port.empty() ? "" : "." + in.port)) << '\n';
+        io.out << "  " << port << " <- "
+               << (in.node.empty() ? in.file.string() : in.node + (in.port.empty() ? "" : "." + in.port)) << '\n';
       for (const auto& [name, value] : n.params) io.out << "  " << name << " = " << value << '\n';
       for (const auto& [port, path] : n.outputs)
         io.out << "  " << port << " -> " << path.string() << (output_exists(path) ? " (exists)" : "") << '\n';
     }
     return 0;
   }
-  const auto results = run_pipeline(std::move(pipeline), io.registry, {.overwrite = io.common.force, .reuse = p.reuse}, io.context,
-                                    p.engine == RunEngine::vtk ? vtk_engine(io.registry) : MakeEngine());
+  const auto results = run_pipeline(std::move(pipeline), io.registry, {.overwrite = io.common.force, .reuse = p.reuse},
+                                    io.context, p.engine == RunEngine::vtk ? vtk_engine(io.registry) : MakeEngine());
   io.end_progress();
   cli::print_results(results, io);
   return 0;
@@ -78,8 +80,10 @@ namespace {
 // The table of actions, for who reads session files.
 std::string actions_page() {
   std::string page =
-      "<!-- Made by `osteo docs`; a test fails when it is stale. -->\n\n# Actions\n\nWhat is done to a scene besides drilling, as session "
-      "files hold it. Numbers 0xffffffff mean none.\n\n| kind | name | what it does | names | values, from the first on "
+      "<!-- Made by `osteo docs`; a test fails when it is stale. -->\n\n# Actions\n\nWhat is done to a scene besides "
+      "drilling, as session "
+      "files hold it. Numbers 0xffffffff mean none.\n\n| kind | name | what it does | names | values, from the first "
+      "on "
       "|\n|---|---|---|---|---|\n";
   for (const ActionRow& row : action_table()) {
     std::string names, values;
@@ -91,16 +95,19 @@ std::string actions_page() {
     add("item", row.item);
     add("hand", row.hand);
     for (const ActionValue& v : row.values)
-      values += (values.empty() ? "" : ", ") + std::string(v.name) + (v.unit == "1" ? "" : " (" + std::string(v.unit) + ")");
-    page += "| " + std::to_string(static_cast<std::uint32_t>(row.kind)) + " | " + std::string(row.name) + " | " + std::string(row.help) +
-            " | " + names + " | " + values + " |\n";
+      values +=
+          (values.empty() ? "" : ", ") + std::string(v.name) + (v.unit == "1" ? "" : " (" + std::string(v.unit) + ")");
+    page += "| " + std::to_string(static_cast<std::uint32_t>(row.kind)) + " | " + std::string(row.name) + " | " +
+            std::string(row.help) + " | " + names + " | " + values + " |\n";
   }
   page +=
-      "\n| name | changes the world | and what is touched | after a hold | ends a hold | the last of several counts | moves dust |\n"
+      "\n| name | changes the world | and what is touched | after a hold | ends a hold | the last of several counts | "
+      "moves dust |\n"
       "|---|---|---|---|---|---|---|\n";
   for (const ActionRow& row : action_table()) {
     page += "| " + std::string(row.name);
-    for (const bool is : {row.changes_world, row.changes_touch, row.reads_bone, row.ends_hold, row.last_counts, row.moves_dust})
+    for (const bool is :
+         {row.changes_world, row.changes_touch, row.reads_bone, row.ends_hold, row.last_counts, row.moves_dust})
       page += is ? " | yes" : " | ";
     page += " |\n";
   }
@@ -112,13 +119,15 @@ std::string actions_page() {
 int DocsCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0];
   if (p.shared) {
-    if (p.check) throw Error(ExitCode::usage, "--check is for the reference pages, not for --shared", "leave one of them out");
+    if (p.check)
+      throw Error(ExitCode::usage, "--check is for the reference pages, not for --shared", "leave one of them out");
     for (const auto& [name, content] : cli::shared_files(make_osteo_program())) {
       const fs::path path = folder / name;
       make_output_folder(path.parent_path());
       write_file(path, content);
       if (!content.starts_with("#!")) continue;
-      fs::permissions(path, fs::perms::owner_exec | fs::perms::group_exec | fs::perms::others_exec, fs::perm_options::add);
+      fs::permissions(path, fs::perms::owner_exec | fs::perms::group_exec | fs::perms::others_exec,
+                      fs::perm_options::add);
     }
     return 0;
   }
@@ -142,7 +151,8 @@ int DocsCommand::run(const Params& p, cli::Invocation& io) {
     ++stale;
   }
   if (p.check && stale > 0)
-    throw Error(ExitCode::failed, std::to_string(stale) + " reference pages are stale", "run: osteo docs " + folder.string());
+    throw Error(ExitCode::failed, std::to_string(stale) + " reference pages are stale",
+                "run: osteo docs " + folder.string());
   return 0;
 }
 

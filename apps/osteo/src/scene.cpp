@@ -3,25 +3,26 @@
 #include <ostream>
 
 #include "commands/scene.h"
+#include "osteo/app/cli/report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/simulation/bone/live_components.h"
-#include "osteo/simulation/bone/world_mesh.h"
-#include "osteo/app/cli/report.h"
 #include "osteo/geometry/grid/grid_io.h"
+#include "osteo/session/recording/haptic_settings.h"
+#include "osteo/session/recording/script_file.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"
-#include "osteo/session/recording/haptic_settings.h"
-#include "osteo/session/recording/script_file.h"
+#include "osteo/simulation/bone/live_components.h"
+#include "osteo/simulation/bone/world_mesh.h"
 
 namespace osteo {
 
 cli::CommandInfo SceneCommand::info() {
   return {"scene",
           "what a rehearsal of a case will build, and what each part costs",
-          "Memory and time to make of every part that the case and the settings list, and the time of a tick while drilling. What is not "
+          "Memory and time to make of every part that the case and the settings list, and the time of a tick while "
+          "drilling. What is not "
           "listed is not "
           "built and costs nothing.",
           {{"case", "a folder made by prepare"}},
@@ -65,14 +66,14 @@ class SceneCosts {
   void print(std::ostream& out) const {
     for (const Part& part : parts_) {
       char line[160];
-      std::snprintf(line, sizeof line, "%-50s %8.2f MB  made in %5.2f s  %s\n", part.name.c_str(), part.memory_mb, part.made_in_s,
-                    part.thread.c_str());
+      std::snprintf(line, sizeof line, "%-50s %8.2f MB  made in %5.2f s  %s\n", part.name.c_str(), part.memory_mb,
+                    part.made_in_s, part.thread.c_str());
       out << line;
     }
     for (const std::string& line : tissue_lines_) out << line << '\n';
     out << "together " << format_number(rounded(megabytes_, 10)) << " MB; a tick while drilling takes "
-        << format_number(ticks_.quantile_us(0.5)) << " us, p99 " << format_number(ticks_.quantile_us(0.99)) << " us, p99.9 "
-        << format_number(ticks_.quantile_us(0.999)) << " us\n"
+        << format_number(ticks_.quantile_us(0.5)) << " us, p99 " << format_number(ticks_.quantile_us(0.99))
+        << " us, p99.9 " << format_number(ticks_.quantile_us(0.999)) << " us\n"
         << told_hardness(anatomy_) << '\n'
         << "threads: servo (real time), recorder, follower (surface, pieces), window\n";
   }
@@ -93,7 +94,8 @@ class SceneCosts {
     parts_.push_back({name, thread, rounded(static_cast<double>(bytes) / 1e6, 100), rounded(made_in_s, 100)});
     const Part& p = parts_.back();
     megabytes_ += p.memory_mb;
-    j_["parts"].push_back({{"part", p.name}, {"memory_mb", p.memory_mb}, {"made_in_s", p.made_in_s}, {"kept_up_to_date_by", p.thread}});
+    j_["parts"].push_back(
+        {{"part", p.name}, {"memory_mb", p.memory_mb}, {"made_in_s", p.made_in_s}, {"kept_up_to_date_by", p.thread}});
   }
   // Of all bodies together: a case with a finer region has two.
   [[nodiscard]] std::size_t over_bodies(const auto& bytes) const {
@@ -112,7 +114,8 @@ class SceneCosts {
   void build_anatomy() {
     timed("hardness and structures at risk", "nobody: they do not change", [&] {
       anatomy_ = anatomy_of(case_, setup_, context_);
-      return (anatomy_.hardness ? anatomy_.hardness->memory_bytes() : 0) + (anatomy_.structures ? anatomy_.structures->memory_bytes() : 0);
+      return (anatomy_.hardness ? anatomy_.hardness->memory_bytes() : 0) +
+             (anatomy_.structures ? anatomy_.structures->memory_bytes() : 0);
     });
     j_["hardness"] = Json::parse(hardness_json(anatomy_)).value();
   }
@@ -120,12 +123,14 @@ class SceneCosts {
   // What is kept true to the bone while it is drilled.
   void build_what_follows() {
     if (setup_.params.effects.fail_safe)
-      timed("distance map", "servo", [&] { return over_bodies([](const BrickGrid& b) { return DepthMap(b).memory_bytes(); }); });
+      timed("distance map", "servo",
+            [&] { return over_bodies([](const BrickGrid& b) { return DepthMap(b).memory_bytes(); }); });
     timed("surface", "follower", [&] {
       return over_bodies([&](const BrickGrid& bone) {
         const LiveSurface surface(bone, context_);
         std::size_t bytes = 0;
-        for (std::uint32_t b = 0; b < bone.brick_count(); ++b) bytes += sizeof(SurfacePatch) + surface.patch(b).memory_bytes();
+        for (std::uint32_t b = 0; b < bone.brick_count(); ++b)
+          bytes += sizeof(SurfacePatch) + surface.patch(b).memory_bytes();
         return bytes;
       });
     });
@@ -155,7 +160,9 @@ class SceneCosts {
       for (int n = 0; n < kUpdates; ++n) update();
       return static_cast<double>(monotonic_ns() - from) / 1e6 / kUpdates;
     };
-    const auto at_rest = [&](std::size_t n) { return SoftTool{soft->body(n).points_mm().front(), {0, 0, 1}, 0, false}; };
+    const auto at_rest = [&](std::size_t n) {
+      return SoftTool{soft->body(n).points_mm().front(), {0, 0, 1}, 0, false};
+    };
     Json bodies = Json::list();
     std::vector<double> alone(soft->size());
     for (std::size_t n = 0; n < soft->size(); ++n) {
@@ -177,17 +184,20 @@ class SceneCosts {
     double least = 1;
     for (std::size_t n = 0; n < facts.size(); ++n) {
       least = std::min(least, facts[n].of_real_time);
-      tissue_lines_.push_back("soft tissue '" + facts[n].name + "': " + percent(alone[n]) + " of real time" +
-                              (facts.size() > 1 ? ", " + percent(facts[n].of_real_time) + " while all of it moves" : std::string()));
+      tissue_lines_.push_back(
+          "soft tissue '" + facts[n].name + "': " + percent(alone[n]) + " of real time" +
+          (facts.size() > 1 ? ", " + percent(facts[n].of_real_time) + " while all of it moves" : std::string()));
     }
-    j_["soft_tissue"] = {{"update_ms", ms}, {"updates_per_s", SoftBody::kUpdatesPerS}, {"of_real_time", least}, {"bodies", bodies}};
+    j_["soft_tissue"] = {
+        {"update_ms", ms}, {"updates_per_s", SoftBody::kUpdatesPerS}, {"of_real_time", least}, {"bodies", bodies}};
     if (ms > 1000 / SoftBody::kUpdatesPerS)
       context_.warn("an update of soft tissue takes " + format_number(rounded(ms, 10)) + " ms of the " +
                     format_number(1000 / SoftBody::kUpdatesPerS) + " it has");
   }
 
   void build_renderer() {
-    const std::string_view method = EnumNames<ContactMethod>::values[static_cast<std::size_t>(setup_.params.contact.method)];
+    const std::string_view method =
+        EnumNames<ContactMethod>::values[static_cast<std::size_t>(setup_.params.contact.method)];
     timed("haptic renderer: " + std::string(method), "servo", [&] {
       renderer_ = std::make_unique<HapticRenderer>(setup_, anatomy_, 1e-3);
       touched_ = HapticScene::of(*world_, renderer_->setup());
@@ -208,10 +218,11 @@ class SceneCosts {
     if (small.empty()) return;
     j_["burrs_too_small"] = small;
     const double least_mm = 2 * kLeastRadiusVoxels * voxel_mm;
-    context_.warn("balls and cylinders of less than " + format_number(std::ceil(least_mm * 10 - 1e-6) / 10) + " mm, tapers of less than " +
-                  format_number(std::ceil(2 * least_mm * 10 - 1e-6) / 10) + " mm, are small for voxels of " +
-                  format_number(rounded(voxel_mm, 1000)) +
-                  " mm: force and its direction are coarse; prepare with a smaller --spacing, or a finer region of interest");
+    context_.warn(
+        "balls and cylinders of less than " + format_number(std::ceil(least_mm * 10 - 1e-6) / 10) +
+        " mm, tapers of less than " + format_number(std::ceil(2 * least_mm * 10 - 1e-6) / 10) +
+        " mm, are small for voxels of " + format_number(rounded(voxel_mm, 1000)) +
+        " mm: force and its direction are coarse; prepare with a smaller --spacing, or a finer region of interest");
   }
 
   // A few seconds of drilling, without a clock.
@@ -225,7 +236,9 @@ class SceneCosts {
       ticks_.add(monotonic_ns() - begin);
       force = from_floats(record.force_n);
     }
-    j_["tick_us"] = {{"p50_us", ticks_.quantile_us(0.5)}, {"p99_us", ticks_.quantile_us(0.99)}, {"p99_9_us", ticks_.quantile_us(0.999)}};
+    j_["tick_us"] = {{"p50_us", ticks_.quantile_us(0.5)},
+                     {"p99_us", ticks_.quantile_us(0.99)},
+                     {"p99_9_us", ticks_.quantile_us(0.999)}};
   }
 
   const Case& case_;

@@ -5,20 +5,23 @@
 #include <ostream>
 
 #include "commands/score.h"
+#include "osteo/assessment/scoring/heat_score.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/assessment/scoring/heat_score.h"
-#include "osteo/session/scene/session_folder.h"
 #include "osteo/session/recording/simulated.h"
+#include "osteo/session/scene/session_folder.h"
 
 namespace osteo {
 
 cli::CommandInfo ScoreCommand::info() {
   return {"score",
           "a session as figures: what was seen, how hard was pressed near what, what is left",
-          "One line a metric on standard output, or all of it with the moments it comes from as JSON. What cannot be measured says why. "
-          "With --procedure also the items of its scale, each with value, threshold and margin; with --reference compared with sessions of "
-          "others on the same case. Thresholds are starting values, not fitted to rated sessions (docs/evidence.md says what may not be "
+          "One line a metric on standard output, or all of it with the moments it comes from as JSON. What cannot be "
+          "measured says why. "
+          "With --procedure also the items of its scale, each with value, threshold and margin; with --reference "
+          "compared with sessions of "
+          "others on the same case. Thresholds are starting values, not fitted to rated sessions (docs/evidence.md "
+          "says what may not be "
           "concluded). Of a damaged session what is there is scored, and the exit code is 4.",
           {{"session", "a session folder"}},
           "osteo score SESSION --procedure pipelines/procedures/mastoidectomy.json"};
@@ -33,12 +36,14 @@ Reference load_sessions(const fs::path& folder, const SessionFolder& mine, const
   for (std::size_t n = 0; n < list.size(); ++n) {
     const SessionFolder other = open_session_folder(folder / list[n].session, mine.case_folder);
     if (!other.guided.empty())
-      throw Error(ExitCode::usage, "session '" + list[n].session + "' of the reference is no work of its own: " + other.guided,
+      throw Error(ExitCode::usage,
+                  "session '" + list[n].session + "' of the reference is no work of its own: " + other.guided,
                   "a reference is of unaided sessions: leave it out of reference.json");
     const SessionReader session(other.stream(), Damage::keep);
     World begin = world_at_begin(other, the_case, anatomy, context);
     if (begin.hash() != bone_hash || session.header().bone_hash != bone_hash)
-      throw Error(ExitCode::usage, "session '" + list[n].session + "' of the reference was recorded on another bone than this one",
+      throw Error(ExitCode::usage,
+                  "session '" + list[n].session + "' of the reference was recorded on another bone than this one",
                   "a reference is of one case: leave it out of reference.json");
     context.progress(static_cast<double>(n) / static_cast<double>(list.size()), "reading the reference");
     reference.sessions.push_back(read_reference(session, std::move(begin), anatomy.structures.get(), list[n]));
@@ -56,8 +61,10 @@ void add_heat(const SessionReader& session, World begin, const Anatomy& anatomy,
   const ReplayResult again = replay(session, std::move(begin), anatomy, context, readers);
   for (Measured& m : heat_values(heat, anatomy.structures.get())) score.values.push_back(std::move(m));
   if (!again.identical)
-    score.words.push_back("run again it did not come out as it was recorded (" + again.difference + "): neither may its heat");
-  if (again.ticks_repeated < again.ticks) score.words.push_back("heat is known only up to where the first ticks are missing");
+    score.words.push_back("run again it did not come out as it was recorded (" + again.difference +
+                          "): neither may its heat");
+  if (again.ticks_repeated < again.ticks)
+    score.words.push_back("heat is known only up to where the first ticks are missing");
 }
 
 }  // namespace
@@ -93,15 +100,19 @@ int ScoreCommand::run(const Params& p, cli::Invocation& io) {
   if (p.heat) again = begin.copy();
   std::optional<Reference> reference;
   if (!p.reference.empty())
-    reference = load_sessions(p.reference, folder, the_case, anatomy, session.header().bone_hash, io.context.sub(0, 0.5));
-  Score score =
-      score_session(session, std::move(begin), anatomy.structures.get(), procedure ? &*procedure : nullptr,
-                    reference ? &*reference : nullptr, p.subject, io.context.sub(p.reference.empty() ? 0 : 0.5, p.heat ? 0.6 : 1));
+    reference =
+        load_sessions(p.reference, folder, the_case, anatomy, session.header().bone_hash, io.context.sub(0, 0.5));
+  Score score = score_session(session, std::move(begin), anatomy.structures.get(), procedure ? &*procedure : nullptr,
+                              reference ? &*reference : nullptr, p.subject,
+                              io.context.sub(p.reference.empty() ? 0 : 0.5, p.heat ? 0.6 : 1));
   if (again) add_heat(session, std::move(*again), anatomy, score, io.context.sub(0.6, 1));
   if (session.header().haptics.structures != setup.structures)
-    score.words.push_back("the case's structures are not those that the session watched: they are measured as the case has them now");
-  if (!folder.guided.empty()) score.words.push_back("guided: " + folder.guided + "; not to be compared with unaided sessions");
-  if (std::string words = simulated_words(session); !words.empty()) score.words.insert(score.words.begin(), std::move(words));
+    score.words.push_back(
+        "the case's structures are not those that the session watched: they are measured as the case has them now");
+  if (!folder.guided.empty())
+    score.words.push_back("guided: " + folder.guided + "; not to be compared with unaided sessions");
+  if (std::string words = simulated_words(session); !words.empty())
+    score.words.insert(score.words.begin(), std::move(words));
   io.end_progress();
   if (!p.csv.empty()) write_file(p.csv, score_csv(score, folder.folder.filename().string()));
   if (io.common.json) {

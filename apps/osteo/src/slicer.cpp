@@ -3,6 +3,7 @@
 #include <cmath>
 #include <ostream>
 
+#include "built_in_pipelines.h"
 #include "case_edits.h"
 #include "commands/hand_over.h"
 #include "commands/prepare.h"
@@ -16,7 +17,6 @@
 #include "osteo/imaging/io/volume_io.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/hand_over.h"
-#include "built_in_pipelines.h"
 
 namespace osteo {
 namespace {
@@ -30,7 +30,8 @@ CasePipeline pipeline_of(const fs::path& folder, const std::string& named_source
                 "make one with: osteo prepare CT -o " + folder.string());
   }
   if (!recipe->lost.empty())
-    throw Error(ExitCode::no_input, "a setting of the case names its scan and is not known here: " + *recipe->lost.begin(),
+    throw Error(ExitCode::no_input,
+                "a setting of the case names its scan and is not known here: " + *recipe->lost.begin(),
                 "run this on the machine where the case was made, or 'osteo prepare' with all flags first");
   CasePipeline made{std::string(kTemporalBonePipeline), recipe->settings};
   if (!recipe->pipeline_hash.empty()) {
@@ -44,7 +45,8 @@ CasePipeline pipeline_of(const fs::path& folder, const std::string& named_source
   if (!named_source.empty()) {
     require_readable(source);
     if (hash_path(source) != recipe->source_hash)
-      throw Error(ExitCode::corrupt, "'" + named_source + "' is another scan than that of the case, or was changed since");
+      throw Error(ExitCode::corrupt,
+                  "'" + named_source + "' is another scan than that of the case, or was changed since");
     remember(recipe->source_hash, fs::absolute(source).string());
   } else if (const auto known = recall_file(recipe->source_hash)) {
     source = *known;
@@ -59,7 +61,8 @@ CasePipeline pipeline_of(const fs::path& folder, const std::string& named_source
 }
 
 // As the case has them now: with what was corrected by hand in 'osteo edit'.
-CaseImages images_now(const CasePipeline& pipeline, const fs::path& folder, std::optional<CaseEdits>& edits, const cli::Invocation& io) {
+CaseImages images_now(const CasePipeline& pipeline, const fs::path& folder, std::optional<CaseEdits>& edits,
+                      const cli::Invocation& io) {
   CaseImages images = images_of_case(pipeline, folder, io.registry, io.context);
   Recipe recipe = *read_recipe(folder);
   std::vector<std::string> notes;
@@ -90,8 +93,8 @@ void print_changes(const TakenBack& back, std::ostream& out) {
                        : c.was.empty()   ? c.name + " (new)"
                        : c.name == c.was ? c.name
                                          : c.name + " (was " + c.was + ")";
-    std::snprintf(line, sizeof line, "%-28s %12s %12s %12s %12s\n", name.c_str(), mm3(c.before_mm3).c_str(), mm3(c.after_mm3).c_str(),
-                  mm3(c.added_mm3).c_str(), mm3(c.removed_mm3).c_str());
+    std::snprintf(line, sizeof line, "%-28s %12s %12s %12s %12s\n", name.c_str(), mm3(c.before_mm3).c_str(),
+                  mm3(c.after_mm3).c_str(), mm3(c.added_mm3).c_str(), mm3(c.removed_mm3).c_str());
     out << line;
   }
 }
@@ -111,14 +114,15 @@ Json changes_json(const TakenBack& back) {
 }  // namespace
 
 cli::CommandInfo HandOverCommand::info() {
-  return {
-      "hand-over",
-      "a case's CT, bone and structures as files for 3D Slicer",
-      "Writes ct.nrrd, bone.seg.nrrd and structures.seg.nrrd (with names and colours) into a new folder. Edit them in 3D Slicer, save them "
-      "there under the same names, and 'osteo take-back' makes the case from them. Names of the patient are in none of them, but the CT "
-      "of a head shows a face.",
-      {{"case", "a prepared case"}, {"folder", "new folder for the files"}},
-      "osteo hand-over CASE FOLDER"};
+  return {"hand-over",
+          "a case's CT, bone and structures as files for 3D Slicer",
+          "Writes ct.nrrd, bone.seg.nrrd and structures.seg.nrrd (with names and colours) into a new folder. Edit them "
+          "in 3D Slicer, save them "
+          "there under the same names, and 'osteo take-back' makes the case from them. Names of the patient are in "
+          "none of them, but the CT "
+          "of a head shows a face.",
+          {{"case", "a prepared case"}, {"folder", "new folder for the files"}},
+          "osteo hand-over CASE FOLDER"};
 }
 
 int HandOverCommand::run(const Params& p, cli::Invocation& io) {
@@ -131,12 +135,14 @@ int HandOverCommand::run(const Params& p, cli::Invocation& io) {
   hand_over(images, folder);
   io.end_progress();
   if (io.common.quiet) return 0;
-  io.err << (folder / "ct.nrrd").string() << "  (anonymous, but shows the face)\n" << (folder / "bone.seg.nrrd").string() << '\n';
+  io.err << (folder / "ct.nrrd").string() << "  (anonymous, but shows the face)\n"
+         << (folder / "bone.seg.nrrd").string() << '\n';
   if (images.structures)
-    io.err << (folder / "structures.seg.nrrd").string() << "  (" << images.structures->structures.size() << " structures)\n";
-  io.err
-      << "  in 3D Slicer: drag the folder onto the window, edit in Segment Editor, save all into the same folder\n  then: osteo take-back "
-      << io.arguments[0] << ' ' << folder.string() << '\n';
+    io.err << (folder / "structures.seg.nrrd").string() << "  (" << images.structures->structures.size()
+           << " structures)\n";
+  io.err << "  in 3D Slicer: drag the folder onto the window, edit in Segment Editor, save all into the same folder\n  "
+            "then: osteo take-back "
+         << io.arguments[0] << ' ' << folder.string() << '\n';
   return 0;
 }
 
@@ -144,8 +150,10 @@ cli::CommandInfo TakeBackCommand::info() {
   return {
       "take-back",
       "bone and structures that were edited in 3D Slicer, into their case",
-      "Reads each .seg.nrrd of the folder, checks that it is of the scan of the case (by a mark that Slicer keeps in the segments, else "
-      "by the CT beside them, and by where it lies), says what changed, and makes the case anew from it. What belongs to another scan is "
+      "Reads each .seg.nrrd of the folder, checks that it is of the scan of the case (by a mark that Slicer keeps in "
+      "the segments, else "
+      "by the CT beside them, and by where it lies), says what changed, and makes the case anew from it. What belongs "
+      "to another scan is "
       "refused. --check only looks. Corrected bone stays with the case until 'osteo prepare -o CASE --no-pipeline'.",
       {{"case", "the case that was handed over"}, {"folder", "the folder of 'osteo hand-over', or one .seg.nrrd"}},
       "osteo take-back CASE FOLDER"};
@@ -164,7 +172,8 @@ int TakeBackCommand::run(const Params& p, cli::Invocation& io) {
     print_changes(back, io.out);
   }
   if (!back.bone && !io.common.quiet) io.err << "no bone came back: it stays as it is\n";
-  if (!back.structures && images.structures && !io.common.quiet) io.err << "no structures came back: they stay as they are\n";
+  if (!back.structures && images.structures && !io.common.quiet)
+    io.err << "no structures came back: they stay as they are\n";
   if (!back.bone_changed && !back.structures_changed) {
     if (!io.common.quiet) io.err << "nothing changed; the case stays as it is\n";
     return 0;
@@ -178,7 +187,8 @@ int TakeBackCommand::run(const Params& p, cli::Invocation& io) {
   again.given.insert("out");
   again.common.json = false;
   if (edits) {
-    // What was corrected here is in what came back, or stays in what did not: done again on top of it, it would count twice.
+    // What was corrected here is in what came back, or stays in what did not: done again on top of it, it would count
+    // twice.
     if (!back.bone_changed) back.bone = images.bone;
     back.bone_changed = true;
     if (!back.structures_changed && images.structures) {

@@ -7,18 +7,21 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/rt/loop.h"
+#include "osteo/network/wire/rehearsal_stream.h"
 #include "osteo/session/scene/monitor_reader.h"
 #include "osteo/session/scene/session_folder.h"
-#include "osteo/network/wire/rehearsal_stream.h"
 
 namespace osteo {
 
 cli::CommandInfo StreamCommand::info() {
   return {"stream",
           "a finished session over the network, as it went",
-          "Runs the session again, by the clock, and tells whoever listens: tools, camera, forces and the signal of a nerve monitor "
-          "(OpenIGTLink, Cerebus packets, Lab Streaming Layer). Listens on this machine alone unless --to names an address. No date, name "
-          "or file leaves: docs/network.md says what does. Exit code 8 when messages were dropped, since a listener did not keep up, or "
+          "Runs the session again, by the clock, and tells whoever listens: tools, camera, forces and the signal of a "
+          "nerve monitor "
+          "(OpenIGTLink, Cerebus packets, Lab Streaming Layer). Listens on this machine alone unless --to names an "
+          "address. No date, name "
+          "or file leaves: docs/network.md says what does. Exit code 8 when messages were dropped, since a listener "
+          "did not keep up, or "
           "ticks of the session are missing.",
           {{"session", "a session folder"}},
           "osteo stream SESSION --to igtl:18944"};
@@ -37,7 +40,8 @@ class HeldToClock final : public Reader {
       first_ = record.tick;
       begin_ns_ = monotonic_ns();
     }
-    const auto due_ns = begin_ns_ + static_cast<std::int64_t>(static_cast<double>(record.tick - first_) / rate_hz_ * 1e9);
+    const auto due_ns =
+        begin_ns_ + static_cast<std::int64_t>(static_cast<double>(record.tick - first_) / rate_hz_ * 1e9);
     const std::int64_t early_ns = due_ns - monotonic_ns();
     late_ms = std::max(late_ms, -static_cast<double>(early_ns) / 1e6);
     if (early_ns < 1000000) return;
@@ -82,7 +86,8 @@ int StreamCommand::run(const Params& p, cli::Invocation& io) {
   if (targets.empty()) throw Error(ExitCode::usage, "--to names no place to stream to", "igtl:18944");
   for (const StreamTarget& t : targets) {
     if (t.stimulator)
-      throw Error(ExitCode::usage, "nothing can be stimulated in a session that is over", "leave /stimulator out; 'osteo rehearse' has it");
+      throw Error(ExitCode::usage, "nothing can be stimulated in a session that is over",
+                  "leave /stimulator out; 'osteo rehearse' has it");
   }
   const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
   const SessionReader session(folder.stream(), Damage::keep);
@@ -97,16 +102,20 @@ int StreamCommand::run(const Params& p, cli::Invocation& io) {
                         anatomy.structures.get(), outline.header.rate_hz);
   std::size_t unreadable = 0;
   for (const auto& [tick, setting] : stimulator_notes(session, unreadable)) monitor.stimulate_at(tick, setting);
-  if (unreadable > 0) io.context.warn(std::to_string(unreadable) + " settings of the stimulator cannot be read: left out");
+  if (unreadable > 0)
+    io.context.warn(std::to_string(unreadable) + " settings of the stimulator cannot be read: left out");
   StreamFeed feed(targets, outline.header.rate_hz, 1 + outline.header.haptics.more_devices.size(), &monitor);
   monitor.add_sink(feed);
   World world = world_at_begin(folder, the_case, anatomy, io.context);
   if (!io.common.quiet) {
     for (const std::string& line : feed.told()) io.err << line << '\n';
-    if (monitor.wiring().channels.empty()) io.err << "the case lists none of the nerves that the monitor knows: no signal\n";
-    if (p.listeners > 0) io.err << "waiting for " << p.listeners << (p.listeners == 1 ? " listener" : " listeners") << std::endl;
+    if (monitor.wiring().channels.empty())
+      io.err << "the case lists none of the nerves that the monitor knows: no signal\n";
+    if (p.listeners > 0)
+      io.err << "waiting for " << p.listeners << (p.listeners == 1 ? " listener" : " listeners") << std::endl;
   }
-  if (p.listeners > 0 && !feed.wait_for(static_cast<std::size_t>(p.listeners), p.wait_s, [&] { return io.context.cancelled(); })) {
+  if (p.listeners > 0 &&
+      !feed.wait_for(static_cast<std::size_t>(p.listeners), p.wait_s, [&] { return io.context.cancelled(); })) {
     io.context.check_cancelled();
     throw Error(ExitCode::failed, "nobody has come to listen", "--listeners 0 does not wait; --wait-s waits longer");
   }
@@ -132,8 +141,8 @@ int StreamCommand::run(const Params& p, cli::Invocation& io) {
            << '\n';
   if (!io.common.quiet) {
     for (const std::string& line : feed.told()) io.err << line << '\n';
-    io.err << c.samples << " samples of " << monitor.wiring().channels.size() << " channels, " << c.tools << " poses, " << c.events
-           << " events; at most " << std::lround(pace.late_ms) << " ms late\n";
+    io.err << c.samples << " samples of " << monitor.wiring().channels.size() << " channels, " << c.tools << " poses, "
+           << c.events << " events; at most " << std::lround(pace.late_ms) << " ms late\n";
   }
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
   if (!r.identical) io.err << "session: it did not come out as it was recorded (" << r.difference << ")\n";

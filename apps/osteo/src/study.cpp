@@ -4,13 +4,13 @@
 #include <set>
 
 #include "commands/study.h"
+#include "osteo/assessment/study/analysis.h"
+#include "osteo/assessment/study/study.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/report/sheet.h"
-#include "osteo/assessment/study/analysis.h"
-#include "osteo/assessment/study/study.h"
 #include "study_demo.h"
 
 namespace osteo {
@@ -54,7 +54,8 @@ void need_known(const cli::Invocation& io, const std::string& action) {
   }
   if (!flags_of_actions().contains(action)) {
     const std::string near = nearest_name(action, actions);
-    throw Error(ExitCode::usage, "'" + action + "' is nothing that a study can do: new, add, order, form, rate, analyse or demo",
+    throw Error(ExitCode::usage,
+                "'" + action + "' is nothing that a study can do: new, add, order, form, rate, analyse or demo",
                 near.empty() ? "" : "did you mean '" + near + "'?");
   }
   for (const std::string& flag : io.given) {
@@ -71,7 +72,8 @@ void need_known(const cli::Invocation& io, const std::string& action) {
 }
 
 void write_new(const fs::path& path, const std::string& content, bool force) {
-  if (output_exists(path) && !force) throw Error(ExitCode::cannot_write, "'" + path.string() + "' is there already", "--force replaces it");
+  if (output_exists(path) && !force)
+    throw Error(ExitCode::cannot_write, "'" + path.string() + "' is there already", "--force replaces it");
   write_file(path, content);
 }
 
@@ -81,11 +83,16 @@ cli::CommandInfo StudyCommand::info() {
   return {
       "study",
       "a study: people by code, order of cases, sessions, ratings, analysis",
-      "Keeps a study as a folder of plain files. 'new' makes it; 'add' takes a participant (--group), or with a file (JSON or a CSV row) "
-      "the metrics of a session; 'order' draws who does which case when; 'form' writes a page to rate sessions with, in any browser and "
-      "without a network; 'rate' takes what it saved; 'analyse' writes what the study shows: agreement of raters, differences of groups "
-      "with effect sizes and intervals, correlation of metrics with ratings, ROC, pass marks and power, as JSON, HTML and PDF. What "
-      "there is too little for is not computed, and the report says why. 'demo' makes a whole study by simulated trainees, labelled so, "
+      "Keeps a study as a folder of plain files. 'new' makes it; 'add' takes a participant (--group), or with a file "
+      "(JSON or a CSV row) "
+      "the metrics of a session; 'order' draws who does which case when; 'form' writes a page to rate sessions with, "
+      "in any browser and "
+      "without a network; 'rate' takes what it saved; 'analyse' writes what the study shows: agreement of raters, "
+      "differences of groups "
+      "with effect sizes and intervals, correlation of metrics with ratings, ROC, pass marks and power, as JSON, HTML "
+      "and PDF. What "
+      "there is too little for is not computed, and the report says why. 'demo' makes a whole study by simulated "
+      "trainees, labelled so, "
       "with "
       "blinded movies and forms for raters (--no-movies leaves the movies out, as does a build without them); "
       "stopped and begun again it goes on where it was. Random choices follow the study's own seed, given to 'new'. "
@@ -100,15 +107,18 @@ int StudyCommand::run(const Params& p, cli::Invocation& io) {
   const std::string action = io.arguments[0];
   need_known(io, action);
   if (action == "demo") {
-    if (io.arguments.size() > 1 && !p.out.empty()) throw Error(ExitCode::usage, "the demo's folder is given twice", "leave -o out");
-    if (io.arguments.size() < 2 && p.out.empty()) throw Error(ExitCode::usage, "the demo needs a folder", "osteo study demo -o FOLDER");
+    if (io.arguments.size() > 1 && !p.out.empty())
+      throw Error(ExitCode::usage, "the demo's folder is given twice", "leave -o out");
+    if (io.arguments.size() < 2 && p.out.empty())
+      throw Error(ExitCode::usage, "the demo needs a folder", "osteo study demo -o FOLDER");
     return run_study_demo(io.arguments.size() > 1 ? io.arguments[1] : p.out, p.resamples, p.level, !p.no_movies, io);
   }
   if (io.arguments.size() < 2)
     throw Error(ExitCode::usage, "'study " + action + "' needs the study's folder", "osteo study " + action + " STUDY");
   const fs::path folder = io.arguments[1];
   if (io.given.contains("seed") && action != "new")
-    throw Error(ExitCode::usage, "--seed does nothing here: the study has its own", "it is in " + (folder / "study.json").string());
+    throw Error(ExitCode::usage, "--seed does nothing here: the study has its own",
+                "it is in " + (folder / "study.json").string());
   std::vector<std::string> notes;
   Json done{{"action", action}};
   std::string said;
@@ -129,7 +139,8 @@ int StudyCommand::run(const Params& p, cli::Invocation& io) {
   } else if (action == "add" && io.arguments.size() < 3) {
     for (const char* const flag : {"case_name", "attempt"}) {
       if (io.given.contains(flag))
-        throw Error(ExitCode::usage, "a session needs the file of its metrics", "osteo study add STUDY metrics.json ...");
+        throw Error(ExitCode::usage, "a session needs the file of its metrics",
+                    "osteo study add STUDY metrics.json ...");
     }
     const std::string code = study::add_participant(folder, p.participant, p.group);
     done["participant"] = code;
@@ -138,10 +149,12 @@ int StudyCommand::run(const Params& p, cli::Invocation& io) {
     if (io.given.contains("group")) throw Error(ExitCode::usage, "--group is of a participant, not of a session");
     // What score --json says of a session that another hand led.
     if (const auto metrics = Json::parse(read_text(io.arguments[2])); metrics && metrics->find("guided") != nullptr)
-      throw Error(ExitCode::usage, "'" + io.arguments[2] + "' is of a guided session", "a study compares sessions that nobody guided");
+      throw Error(ExitCode::usage, "'" + io.arguments[2] + "' is of a guided session",
+                  "a study compares sessions that nobody guided");
     const std::string blind = study::add_session(folder, p.participant, p.case_name, p.attempt, io.arguments[2], notes);
     done["blind"] = blind;
-    said = "raters know the session as " + blind + ": its movie goes to " + (folder / "movies" / (blind + ".mp4")).string();
+    said = "raters know the session as " + blind + ": its movie goes to " +
+           (folder / "movies" / (blind + ".mp4")).string();
   } else if (action == "order") {
     const std::size_t added = study::make_order(folder);
     done["added"] = added;
@@ -154,7 +167,8 @@ int StudyCommand::run(const Params& p, cli::Invocation& io) {
     done["form"] = file.string();
     said = "open " + file.string() + " in a browser";
   } else if (action == "rate") {
-    const study::RaterSheet sheet = study::read_ratings(read_text(io.arguments[2]), io.arguments[2], study::read_study(folder), notes);
+    const study::RaterSheet sheet =
+        study::read_ratings(read_text(io.arguments[2]), io.arguments[2], study::read_study(folder), notes);
     make_output_folder(folder / "ratings");
     write_new(folder / "ratings" / (sheet.rater + ".json"), read_text(io.arguments[2]), io.common.force);
     done["rater"] = sheet.rater;
@@ -163,7 +177,8 @@ int StudyCommand::run(const Params& p, cli::Invocation& io) {
     const study::Study study = study::read_study(folder);
     const study::Analysis analysis = study::analyse(study, {p.level, p.resamples, names_in(p.given)});
     const std::string base = p.out.empty() ? (folder / "report").string() : p.out;
-    // The report follows from the folder; one that is there is replaced, as that of a case is, unless it was put elsewhere.
+    // The report follows from the folder; one that is there is replaced, as that of a case is, unless it was put
+    // elsewhere.
     const bool replace = p.out.empty() || io.common.force;
     for (const char* const suffix : {".json", ".html", ".pdf"}) {
       if (!replace && output_exists(base + suffix))

@@ -5,22 +5,22 @@
 #include <mutex>
 #include <ostream>
 
-#include "commands/prepare.h"
 #include "built_in_pipelines.h"
-#include "osteo/core/base/error.h"
-#include "osteo/core/base/files.h"
-#include "osteo/core/base/json_document.h"
-#include "osteo/core/base/parallel.h"
+#include "commands/prepare.h"
 #include "osteo/assessment/evidence/score.h"
-#include "osteo/imaging/image/crop.h"
-#include "osteo/imaging/image/phantom.h"
-#include "osteo/imaging/io/volume_io.h"
-#include "osteo/core/report/sheet.h"
-#include "osteo/core/statistics/basics.h"
 #include "osteo/assessment/study/analysis.h"
 #include "osteo/assessment/study/study.h"
 #include "osteo/assessment/trainee/group.h"
 #include "osteo/assessment/trainee/simulate.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/core/base/parallel.h"
+#include "osteo/core/report/sheet.h"
+#include "osteo/core/statistics/basics.h"
+#include "osteo/imaging/image/crop.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/io/volume_io.h"
 #include "study_demo.h"
 
 #ifdef OSTEO_WITH_MOVIE
@@ -88,8 +88,8 @@ Json metrics_of(const Score& score) {
       excess += *m.value;
       has_excess = true;
     }
-    for (const char* const kept : {"seen_share", "hidden_mm3", "force_p95_n", "region_per_voxel", "region_thesis", "burr_choice_share",
-                                   "camera_moves", "path_mm", "duration_s", "items_passed"}) {
+    for (const char* const kept : {"seen_share", "hidden_mm3", "force_p95_n", "region_per_voxel", "region_thesis",
+                                   "burr_choice_share", "camera_moves", "path_mm", "duration_s", "items_passed"}) {
       if (name == kept && m.of.empty()) all[name] = *m.value;
     }
   }
@@ -98,7 +98,8 @@ Json metrics_of(const Score& score) {
 }
 
 #ifdef OSTEO_WITH_MOVIE
-// Small and short, so that all of them take a minute or two. One speed for everybody: how long a session took stays to be seen.
+// Small and short, so that all of them take a minute or two. One speed for everybody: how long a session took stays to
+// be seen.
 MovieOptions for_raters() {
   MovieOptions o;
   o.width = 320;
@@ -111,8 +112,8 @@ MovieOptions for_raters() {
 }
 #endif
 
-// movies/BLIND.mp4 of every session, made in the first rater's order: the files' own times tell neither people nor groups. Those that are
-// there are kept. What could not be made is told in `notes`.
+// movies/BLIND.mp4 of every session, made in the first rater's order: the files' own times tell neither people nor
+// groups. Those that are there are kept. What could not be made is told in `notes`.
 std::size_t make_movies([[maybe_unused]] const fs::path& folder, [[maybe_unused]] const study::Study& rated,
                         [[maybe_unused]] const std::string& rater, [[maybe_unused]] const TraineeScene& scene,
                         [[maybe_unused]] cli::Invocation& io, std::vector<std::string>& notes) {
@@ -125,16 +126,19 @@ std::size_t make_movies([[maybe_unused]] const fs::path& folder, [[maybe_unused]
     io.context.check_cancelled();
     io.context.progress(0.85 + 0.11 * static_cast<double>(n) / static_cast<double>(order.size()),
                         "movie " + std::to_string(n + 1) + " of " + std::to_string(order.size()));
-    const auto which = std::find_if(rated.sessions.begin(), rated.sessions.end(), [&](const auto& s) { return s.blind == order[n]; });
+    const auto which =
+        std::find_if(rated.sessions.begin(), rated.sessions.end(), [&](const auto& s) { return s.blind == order[n]; });
     const fs::path session = folder / "sessions" / (which->participant + "-" + std::to_string(which->attempt));
     try {
       write_atomically(file, [&](const fs::path& temporary) {
-        make_movie(SessionReader(session / "stream.oss"), world_of(scene.the_case, scene.anatomy), scene.anatomy, for_raters(), temporary);
+        make_movie(SessionReader(session / "stream.oss"), world_of(scene.the_case, scene.anatomy), scene.anatomy,
+                   for_raters(), temporary);
       });
     } catch (const Error& e) {
       // A computer without OpenGL or without room for movies still gets its study.
       if (e.code() == ExitCode::cancelled) throw;
-      notes.push_back("no more movies after " + std::to_string(n) + " of " + std::to_string(order.size()) + ": " + e.what());
+      notes.push_back("no more movies after " + std::to_string(n) + " of " + std::to_string(order.size()) + ": " +
+                      e.what());
       return n;
     }
   }
@@ -153,9 +157,11 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
   const auto seed = static_cast<std::uint64_t>(io.common.seed);
   if (output_exists(folder) && !fs::is_empty(folder)) {
     if (!fs::exists(folder / "study.json") || !study::read_study(folder).plan.simulated)
-      throw Error(ExitCode::cannot_write, "'" + name + "' holds something that is no simulated study", "give another folder");
+      throw Error(ExitCode::cannot_write, "'" + name + "' holds something that is no simulated study",
+                  "give another folder");
     if (study::read_study(folder).plan.seed != seed)
-      throw Error(ExitCode::usage, "the study in '" + name + "' was begun with another --seed", "give that seed, or another folder");
+      throw Error(ExitCode::usage, "the study in '" + name + "' was begun with another --seed",
+                  "give that seed, or another folder");
   } else {
     make_output_folder(folder.parent_path().empty() ? fs::path(".") : folder.parent_path());
     study::Plan plan;
@@ -186,7 +192,8 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
     const std::string code = "SIM" + std::to_string(101 + n).substr(1);
     const auto known = [&](const study::Participant& p) { return p.code == code; };
     if (std::none_of(before.participants.begin(), before.participants.end(), known))
-      study::add_participant(folder, code, std::string(EnumNames<TraineeGroup>::values[static_cast<std::size_t>(group)]));
+      study::add_participant(folder, code,
+                             std::string(EnumNames<TraineeGroup>::values[static_cast<std::size_t>(group)]));
     for (int attempt = 1; attempt <= kAttempts; ++attempt)
       jobs.push_back({code + "-" + std::to_string(attempt), code, attempt, group,
                       person_skill(group, seed * 1000 + static_cast<std::uint64_t>(n)),
@@ -194,8 +201,8 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
   }
   study::make_order(folder);
 
-  const TraineeScene scene =
-      trainee_scene(folder / "case", parse_procedure(kMastoidWindow, "mastoid-window.json"), io.context.sub(0.04, 0.06));
+  const TraineeScene scene = trainee_scene(folder / "case", parse_procedure(kMastoidWindow, "mastoid-window.json"),
+                                           io.context.sub(0.04, 0.06));
   make_output_folder(folder / "sessions");
   const auto place = [&](const Job& j) { return folder / "sessions" / j.name; };
   std::mutex mutex;
@@ -221,10 +228,11 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
       fresh += there ? 0 : 1;
       const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - drilling).count();
       // Scores, ratings and the report take about a third as long again.
-      const double left = fresh == 0 ? 0 : took / static_cast<double>(fresh) * static_cast<double>(jobs.size() - done) * 1.4;
-      io.context.progress(
-          0.06 + 0.64 * static_cast<double>(done) / static_cast<double>(jobs.size()),
-          "session " + std::to_string(done) + " of " + std::to_string(jobs.size()) + (fresh > 0 ? ", " + time_left(left) : ""));
+      const double left =
+          fresh == 0 ? 0 : took / static_cast<double>(fresh) * static_cast<double>(jobs.size() - done) * 1.4;
+      io.context.progress(0.06 + 0.64 * static_cast<double>(done) / static_cast<double>(jobs.size()),
+                          "session " + std::to_string(done) + " of " + std::to_string(jobs.size()) +
+                              (fresh > 0 ? ", " + time_left(left) : ""));
     }
   });
 
@@ -235,13 +243,16 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
     if (!j.participant.empty()) continue;
     const ReferenceSession which{"../sessions/" + j.name, j.name,
                                  j.group == TraineeGroup::expert ? ReferenceGroup::expert : ReferenceGroup::novice};
-    reference.sessions.push_back(read_reference(SessionReader(place(j) / "stream.oss"), world_of(scene.the_case, scene.anatomy),
-                                                scene.anatomy.structures.get(), which));
-    list.push_back(
-        {{"session", which.session}, {"subject", which.subject}, {"group", j.group == TraineeGroup::expert ? "expert" : "novice"}});
+    reference.sessions.push_back(read_reference(SessionReader(place(j) / "stream.oss"),
+                                                world_of(scene.the_case, scene.anatomy), scene.anatomy.structures.get(),
+                                                which));
+    list.push_back({{"session", which.session},
+                    {"subject", which.subject},
+                    {"group", j.group == TraineeGroup::expert ? "expert" : "novice"}});
   }
   make_output_folder(folder / "reference");
-  write_file(folder / "reference" / "reference.json", Json{{"osteotome_reference", 1}, {"sessions", list}}.dump(2) + "\n");
+  write_file(folder / "reference" / "reference.json",
+             Json{{"osteotome_reference", 1}, {"sessions", list}}.dump(2) + "\n");
 
   std::vector<std::string> notes;
   for (std::size_t i = 0; i < jobs.size(); ++i) {
@@ -269,15 +280,20 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
     const double severe = 0.3 * random.normal();
     Json rows = Json::list();
     for (const study::Session& s : rated.sessions) {
-      const auto job =
-          std::find_if(jobs.begin(), jobs.end(), [&](const Job& j) { return j.participant == s.participant && j.attempt == s.attempt; });
+      const auto job = std::find_if(jobs.begin(), jobs.end(), [&](const Job& j) {
+        return j.participant == s.participant && j.attempt == s.attempt;
+      });
       if (job == jobs.end()) continue;
-      const double value = std::clamp(std::round(0.2 + 5.2 * overall(job->skill) - severe + 0.5 * random.normal()), 1.0, 5.0);
+      const double value =
+          std::clamp(std::round(0.2 + 5.2 * overall(job->skill) - severe + 0.5 * random.normal()), 1.0, 5.0);
       rows.push_back({{"session", s.blind}, {"item", "overall"}, {"value", static_cast<int>(value)}});
     }
     write_file(folder / "forms" / (rater + ".html"), study::form_html(rated, rater));
-    write_file(folder / "ratings" / (rater + ".json"),
-               Json{{"osteotome_ratings", 1}, {"study", study::study_id(rated.plan)}, {"rater", rater}, {"ratings", rows}}.dump(2) + "\n");
+    write_file(
+        folder / "ratings" / (rater + ".json"),
+        Json{{"osteotome_ratings", 1}, {"study", study::study_id(rated.plan)}, {"rater", rater}, {"ratings", rows}}
+                .dump(2) +
+            "\n");
   }
   std::vector<std::string> said;
   const std::size_t shown = movies ? make_movies(folder, rated, "SIMULATED-1", scene, io, said) : 0;
@@ -295,7 +311,8 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
     for (const std::string& word : said) io.err << word << '\n';
     if (shown > 0)
       io.err << "raters get the folders 'forms' and 'movies' (" << shown
-             << " blinded movies, 15 times as fast; --no-movies leaves them out); everything else here is the key, and not for them\n";
+             << " blinded movies, 15 times as fast; --no-movies leaves them out); everything else here is the key, and "
+                "not for them\n";
     io.err << "It shows that the chain works, and nothing about people.\n";
   }
   return 0;

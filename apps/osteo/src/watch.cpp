@@ -7,12 +7,12 @@
 #include <ostream>
 
 #include "batch_command.h"
+#include "built_in_pipelines.h"
+#include "osteo/app/stages/registry.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/hospital/pacs/orthanc.h"
 #include "osteo/imaging/pipeline/pipeline.h"
-#include "osteo/app/stages/registry.h"
 #include "pacs_commands.h"
-#include "built_in_pipelines.h"
 
 namespace osteo {
 namespace {
@@ -50,20 +50,27 @@ cli::CommandInfo WatchCommand::info() {
   return {
       "watch",
       "scans that come into a folder become cases, by rules",
-      "Looks into FOLDER (that of 'osteo receive', or any other) and below it. When none of a series' files has come or changed for "
-      "--quiet-s, the first rule that matches it decides: its pipeline is run by 'osteo prepare' in a process of its own, with bounds on "
-      "memory and time. What was done is in OUT/records, by the objects it was done with, so that the same line started again, also after "
+      "Looks into FOLDER (that of 'osteo receive', or any other) and below it. When none of a series' files has come "
+      "or changed for "
+      "--quiet-s, the first rule that matches it decides: its pipeline is run by 'osteo prepare' in a process of its "
+      "own, with bounds on "
+      "memory and time. What was done is in OUT/records, by the objects it was done with, so that the same line "
+      "started again, also after "
       "a "
-      "power cut, goes on where it was, and the same objects never run twice. Slices that come late run their series again, into "
-      "OUT/cases/CODE-2: no case is ever replaced. Objects made by this program, and what is no CT or MR image, never run. CODE is a hash; "
-      "no name is in records or on standard output. With --orthanc, series that an Orthanc calls stable are copied into FOLDER first. A "
+      "power cut, goes on where it was, and the same objects never run twice. Slices that come late run their series "
+      "again, into "
+      "OUT/cases/CODE-2: no case is ever replaced. Objects made by this program, and what is no CT or MR image, never "
+      "run. CODE is a hash; "
+      "no name is in records or on standard output. With --orthanc, series that an Orthanc calls stable are copied "
+      "into FOLDER first. A "
       "case that was refused or failed is tried again when more of its series comes.",
       {{"folder", "where scans come in; nothing in it is changed (with --orthanc: where its series are copied to)"}},
       "osteo watch INBOX --rules pipelines/rules.json -o CASES"};
 }
 
 int WatchCommand::run(const Params& p, cli::Invocation& io) {
-  if (p.rules.empty()) throw Error(ExitCode::usage, "by which rules?", "--rules FILE; pipelines/rules.json is one to begin with");
+  if (p.rules.empty())
+    throw Error(ExitCode::usage, "by which rules?", "--rules FILE; pipelines/rules.json is one to begin with");
   if (p.out.empty()) throw Error(ExitCode::usage, "where to? osteo watch " + io.arguments[0] + " -o CASES");
   const std::vector<SeriesRule> rules = checked_rules(p.rules);
   WatchOptions o;
@@ -122,14 +129,16 @@ int WatchCommand::run(const Params& p, cli::Invocation& io) {
              << std::endl;
     else if (e.what == "done")
       io.out << e.folder.string() << std::endl;
-    if (!io.common.quiet || e.what == "unreadable" || e.what == "refused" || e.what == "failed" || e.what == "resources")
-      io.err << (e.series.empty() ? "" : e.series + ": ") << e.what << (e.rule.empty() ? "" : " by rule '" + e.rule + "'")
-             << (e.why.empty() ? "" : ": " + e.why) << std::endl;
+    if (!io.common.quiet || e.what == "unreadable" || e.what == "refused" || e.what == "failed" ||
+        e.what == "resources")
+      io.err << (e.series.empty() ? "" : e.series + ": ") << e.what
+             << (e.rule.empty() ? "" : " by rule '" + e.rule + "'") << (e.why.empty() ? "" : ": " + e.why) << std::endl;
     if (!p.metrics.empty()) write_file(p.metrics, metrics_text(c));
   };
   const WatchCounters c = watch_folder(rules, o, work, tell, io.context);
   if (!p.metrics.empty()) write_file(p.metrics, metrics_text(c));
-  if (!io.common.quiet) io.err << c.done << " cases made, " << c.bad << " not, " << c.unmatched << " series without a rule\n";
+  if (!io.common.quiet)
+    io.err << c.done << " cases made, " << c.bad << " not, " << c.unmatched << " series without a rule\n";
   return static_cast<int>(p.once && c.bad > 0 ? ExitCode::partial : ExitCode::ok);
 }
 

@@ -15,5 +15,6 @@ int main() {
   const double mm3 = static_cast<double>(inside.count()) * inside.frame.voxel_volume_mm3();
   const auto tets = osteo::grid_tets(inside).tets.size();
   std::printf("%.6f mm away, %.2f mm3, %zu tetrahedra\n", away_mm, mm3, tets);
-  return std::abs(away_mm - 24 / std::sqrt(3.0)) < 1e-12 && std::abs(mm3 - 36) < 0.5 && tets == 5 * inside.count() ? 0 : 1;
+  return std::abs(away_mm - 24 / std::sqrt(3.0)) < 1e-12 && std::abs(mm3 - 36) < 0.5 && tets == 5 * inside.count() ? 0
+                                                                                                                   : 1;
 }

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/imaging/dicom/import.h"
 #include "osteo/geometry/grid/resample.h"
+#include "osteo/imaging/dicom/import.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/threshold.h"
 #include "osteo/imaging/io/volume_io.h"
@@ -14,5 +14,6 @@ int main() {
   const osteo::Labels bone = osteo::threshold(ct.image, {.lower = 300});
   const osteo::ResampledBone cubes = osteo::resample_bone(ct.image, bone, {.spacing_mm = 1});
   std::printf("%.0f mm3 of bone before, %.0f after\n", cubes.volume_before_mm3, cubes.volume_after_mm3);
-  return cubes.volume_before_mm3 > 1000 && std::abs(cubes.volume_after_mm3 / cubes.volume_before_mm3 - 1) < 0.01 ? 0 : 1;
+  return cubes.volume_before_mm3 > 1000 && std::abs(cubes.volume_after_mm3 / cubes.volume_before_mm3 - 1) < 0.01 ? 0
+                                                                                                                 : 1;
 }

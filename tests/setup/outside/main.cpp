@@ -12,6 +12,7 @@ int main() {
   osteo::save_surface(mesh, "tetrahedron.ply");
   const osteo::Surface back = osteo::load_surface("tetrahedron.ply");
   const double volume = osteo::enclosed_volume_mm3(*back);
-  std::printf("%zu triangles, watertight: %s, %.3f mm3\n", back->triangles.size(), osteo::check(*back).watertight() ? "yes" : "no", volume);
+  std::printf("%zu triangles, watertight: %s, %.3f mm3\n", back->triangles.size(),
+              osteo::check(*back).watertight() ? "yes" : "no", volume);
   return std::abs(volume - 36) < 1e-6 ? 0 : 1;
 }

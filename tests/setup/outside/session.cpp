@@ -16,7 +16,8 @@ int main() {
   options.haptics.device = osteo::SpringHand::traits();
   options.session_file = "outside.oss";  // one that is there is never overwritten
   std::filesystem::remove(options.session_file);
-  osteo::Rehearsal rehearsal(osteo::World(std::move(bone)), std::make_unique<osteo::ScriptedDevice>(script, options.rate_hz), options, {});
+  osteo::Rehearsal rehearsal(osteo::World(std::move(bone)),
+                             std::make_unique<osteo::ScriptedDevice>(script, options.rate_hz), options, {});
   const osteo::RehearsalSummary done = rehearsal.run_to_end({});
   const osteo::Session session = osteo::read_session("outside.oss");
   const std::size_t ticks = session.tick_records;

@@ -63,7 +63,8 @@ TEST(Folders, AreAskedBeforeTheWorkAndJustBeforeTheExchange) {
   put(folder / "theirs", "x");
   bool worked = false;
   EXPECT_THROW(write_folder_atomically(
-                   folder, [](const fs::path&) { throw Error(ExitCode::cannot_write, "no"); }, [&](const auto&) { worked = true; }),
+                   folder, [](const fs::path&) { throw Error(ExitCode::cannot_write, "no"); },
+                   [&](const auto&) { worked = true; }),
                Error);
   EXPECT_FALSE(worked);
   // A file that comes while the work is done is seen too.
@@ -84,20 +85,23 @@ TEST(Folders, CurrentFolderRootAndFilesAreNotReplaced) {
   fs::current_path(inner);
   const auto fill = [](const auto& t) { put(t / "x", "x"); };
   for (const char* path : {".", "..", "./", "../inner", "/", "../inner/."}) {
-    EXPECT_NE(message_of([&] { write_folder_atomically(path, kAny, fill); }, ExitCode::cannot_write).find("the folder you are in"),
+    EXPECT_NE(message_of([&] { write_folder_atomically(path, kAny, fill); }, ExitCode::cannot_write)
+                  .find("the folder you are in"),
               std::string::npos)
         << path;
   }
   fs::current_path(before);
   put(at.path() / "file", "mine");
-  EXPECT_NE(
-      message_of([&] { write_folder_atomically(at.path() / "file", kAny, fill); }, ExitCode::cannot_write).find("is a file, not a folder"),
-      std::string::npos);
+  EXPECT_NE(message_of([&] { write_folder_atomically(at.path() / "file", kAny, fill); }, ExitCode::cannot_write)
+                .find("is a file, not a folder"),
+            std::string::npos);
   EXPECT_EQ(read_text(at.path() / "file"), "mine");
-  EXPECT_NE(message_of([&] { write_atomically(inner, [](const auto&) {}); }, ExitCode::cannot_write).find("is a folder, not a file"),
+  EXPECT_NE(message_of([&] { write_atomically(inner, [](const auto&) {}); }, ExitCode::cannot_write)
+                .find("is a folder, not a file"),
             std::string::npos);
   ASSERT_EQ(::mkfifo((at.path() / "pipe").c_str(), 0600), 0);
-  EXPECT_NE(message_of([&] { write_file(at.path() / "pipe", "x"); }, ExitCode::cannot_write).find("device or pipe"), std::string::npos);
+  EXPECT_NE(message_of([&] { write_file(at.path() / "pipe", "x"); }, ExitCode::cannot_write).find("device or pipe"),
+            std::string::npos);
 }
 
 TEST(Folders, LinkStaysAndWhatItLeadsToIsReplaced) {
@@ -111,7 +115,8 @@ TEST(Folders, LinkStaysAndWhatItLeadsToIsReplaced) {
   EXPECT_TRUE(fs::is_symlink(link));
   EXPECT_TRUE(fs::exists(real / "new"));
   EXPECT_FALSE(fs::exists(real / "old"));
-  EXPECT_NE(message_of([&] { write_folder_atomically(lost, kAny, [](const auto&) {}); }, ExitCode::cannot_write).find("leads nowhere"),
+  EXPECT_NE(message_of([&] { write_folder_atomically(lost, kAny, [](const auto&) {}); }, ExitCode::cannot_write)
+                .find("leads nowhere"),
             std::string::npos);
   EXPECT_TRUE(output_exists(lost));
 }

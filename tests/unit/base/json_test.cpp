@@ -27,7 +27,8 @@ std::string refusal(const std::string& text) {
 TEST(Json, EveryValueKnowsItsLine) {
   // Numbers end with the character behind them: that may be the end of the line.
   const JsonFile file(
-      "{ // a comment\n \"a\": 1\n,\"b\": [2,\n 3\n ],\n\n \"c\": { \"d\": \"x\", /* and\n another */ \"e\": -4.5e2\n} ,\"f\": "
+      "{ // a comment\n \"a\": 1\n,\"b\": [2,\n 3\n ],\n\n \"c\": { \"d\": \"x\", /* and\n another */ \"e\": -4.5e2\n} "
+      ",\"f\": "
       "true,\"g\":null}",
       "f.json");
   const JsonValue& r = file.root();
@@ -101,7 +102,8 @@ TEST(Json, FieldsAreReadStrictly) {
     return "read";
   };
   Part p;
-  EXPECT_EQ(read(R"("at_mm": [1, -2.5, 3e1], "pieces": [4, 0], "colour": "green", "drill": false, "piece": 7)", p), "read");
+  EXPECT_EQ(read(R"("at_mm": [1, -2.5, 3e1], "pieces": [4, 0], "colour": "green", "drill": false, "piece": 7)", p),
+            "read");
   EXPECT_EQ(p.at_mm, (std::array<double, 3>{1, -2.5, 30}));
   EXPECT_EQ(p.pieces, (std::vector<int>{4, 0}));
   EXPECT_EQ(p.colour, Colour::green);
@@ -143,14 +145,16 @@ TEST(Json, FieldsAreReadStrictly) {
 TEST(Json, SchemaOfAFieldSaysWhatReadingChecks) {
   Part p;
   const auto fields = fields_of<Part>(p);
-  EXPECT_EQ(field_schema(fields[0]).dump(), R"({"type":"number","minimum":0.1,"maximum":2.0,"default":0.5,"description":"how wide [mm]"})");
+  EXPECT_EQ(field_schema(fields[0]).dump(),
+            R"({"type":"number","minimum":0.1,"maximum":2.0,"default":0.5,"description":"how wide [mm]"})");
   EXPECT_EQ(field_schema(fields[4]).dump(),
             R"({"type":"array","items":{"type":"number"},"minItems":3,"maxItems":3,"description":"where [mm]"})");
   EXPECT_EQ(field_schema(fields[6]).dump(), R"({"enum":["red","green"],"default":"red","description":"of it"})");
 }
 
 TEST(JsonFile, ReadsSingleValuesWithTheirPlace) {
-  const JsonFile file("{\"format\": 1,\n\"n\": 7,\n\"x\": 0.5,\n\"t\": \"word\",\n\"l\": [1, 2]}", "f.json", ExitCode::corrupt);
+  const JsonFile file("{\"format\": 1,\n\"n\": 7,\n\"x\": 0.5,\n\"t\": \"word\",\n\"l\": [1, 2]}", "f.json",
+                      ExitCode::corrupt);
   file.require_format("format");
   const auto at = [&](const char* key) -> const JsonValue& { return file.need(file.root(), "", key); };
   EXPECT_TRUE(at("n").whole);
@@ -224,7 +228,8 @@ TEST(JsonDocument, NumbersAndTextsAreWrittenAsTheLibraryWritesThem) {
   EXPECT_EQ(Json(std::uint64_t{18446744073709551615U}).dump(), "18446744073709551615");
   EXPECT_EQ(Json(std::int64_t{-9223372036854775807}).dump(), "-9223372036854775807");
   for (const char* text : {"", "plain", "a\tb\n\"\\", "\x01\x7f", "\u00e9\u20ac", "\xff broken \xc3"})
-    EXPECT_EQ(Json(text).dump(), ordered_json(text).dump(-1, ' ', false, ordered_json::error_handler_t::replace)) << text;
+    EXPECT_EQ(Json(text).dump(), ordered_json(text).dump(-1, ' ', false, ordered_json::error_handler_t::replace))
+        << text;
 }
 
 }  // namespace

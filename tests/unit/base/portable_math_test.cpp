@@ -23,7 +23,8 @@ double worst(double lo, double hi, Ours ours, Theirs theirs, bool relative = fal
   for (int n = 0; n < 400'000; ++n) {
     double x = even(random);
     if (n % 2 == 1) x *= std::pow(10, decades(random));
-    const long double truth = theirs(static_cast<long double>(x)), off = std::abs(static_cast<long double>(ours(x)) - truth);
+    const long double truth = theirs(static_cast<long double>(x)),
+                      off = std::abs(static_cast<long double>(ours(x)) - truth);
     most = std::max(most, relative ? off / std::abs(truth) : off);
   }
   return static_cast<double>(most);
@@ -71,13 +72,15 @@ TEST(PortableMath, IsAsExactAsItSays) {
   }
   for (const double range : {1.0, 1e-6, 1e9, 1e300})
     EXPECT_LT(worst(
-                  -range, range, [](double x) { return portable::cbrt(x); }, [](long double x) { return std::cbrt(x); }, true),
+                  -range, range, [](double x) { return portable::cbrt(x); }, [](long double x) { return std::cbrt(x); },
+                  true),
               5e-16)
         << range;
   for (const double range : {1e-3, 1.0, 30.0, 700.0})
-    EXPECT_LT(worst(
-                  -range, range, [](double x) { return portable::exp(x); }, [](long double x) { return std::exp(x); }, true),
-              4e-16)
+    EXPECT_LT(
+        worst(
+            -range, range, [](double x) { return portable::exp(x); }, [](long double x) { return std::exp(x); }, true),
+        4e-16)
         << range;
   EXPECT_LT(worst(
                 0.3, 3, [](double x) { return portable::log(x); }, [](long double x) { return std::log(x); }),
@@ -121,7 +124,8 @@ TEST(PortableMath, SpecialPlaces) {
   EXPECT_EQ(portable::hypot(3, 4), 5);
   for (const double x : {inf, -inf, std::nan("")}) {
     EXPECT_FALSE(std::isfinite(sin_cos(x).sin) || std::isfinite(sin_cos(x).cos) || std::isfinite(sin_cos_turns(x).sin));
-    EXPECT_FALSE(std::isfinite(portable::atan2(x, 1)) || std::isfinite(portable::acos(x)) || std::isfinite(portable::cbrt(x)));
+    EXPECT_FALSE(std::isfinite(portable::atan2(x, 1)) || std::isfinite(portable::acos(x)) ||
+                 std::isfinite(portable::cbrt(x)));
   }
   EXPECT_TRUE(std::isnan(portable::acos(1.0000001)));
   EXPECT_EQ(portable::exp(0), 1);
@@ -148,9 +152,9 @@ TEST(PortableMath, BitsAreTheSameEverywhere) {
     state = state * 6364136223846793005U + 1442695040888963407U;
     const double u = static_cast<double>(state >> 11) * 0x1p-52 - 1;  // [-1, 1)
     const SinCos a = sin_cos(20 * u), b = sin_cos_turns(u);
-    for (const double v :
-         {a.sin, a.cos, b.sin, b.cos, portable::acos(u), portable::asin(u), portable::atan2(u, 0.3), portable::hypot(u, 0.7),
-          portable::cbrt(u), portable::exp(9 * u), portable::log(1.5 + u), portable::pow(1.5 + u, 1.7)})
+    for (const double v : {a.sin, a.cos, b.sin, b.cos, portable::acos(u), portable::asin(u), portable::atan2(u, 0.3),
+                           portable::hypot(u, 0.7), portable::cbrt(u), portable::exp(9 * u), portable::log(1.5 + u),
+                           portable::pow(1.5 + u, 1.7)})
       add(v);
   }
   EXPECT_EQ(sum, 6375800630601067770U);

@@ -32,11 +32,13 @@ std::string what_is_wrong(const std::string& table) {
 
 TEST(BatchTable, RowsAreCasesAndPathsAreFromItsFolder) {
   const std::vector<std::string> known{"lower", "structures"}, paths{"structures"};
-  const auto rows = read_batch_table("case,source,lower,structures,mask.fill_mm3\nA-1,ct/a,400,labels.nrrd,\n\"b_2\",/abs/b.nrrd,,,5\n",
-                                     "/data/t.csv", known, paths);
+  const auto rows = read_batch_table(
+      "case,source,lower,structures,mask.fill_mm3\nA-1,ct/a,400,labels.nrrd,\n\"b_2\",/abs/b.nrrd,,,5\n", "/data/t.csv",
+      known, paths);
   ASSERT_EQ(rows.size(), 2U);
   EXPECT_EQ(rows[0].source, "/data/ct/a");
-  EXPECT_EQ(rows[0].settings, (std::map<std::string, std::string>{{"lower", "400"}, {"structures", "/data/labels.nrrd"}}));
+  EXPECT_EQ(rows[0].settings,
+            (std::map<std::string, std::string>{{"lower", "400"}, {"structures", "/data/labels.nrrd"}}));
   EXPECT_EQ(rows[1].code, "b_2");
   EXPECT_EQ(rows[1].source, "/abs/b.nrrd");
   EXPECT_EQ(rows[1].settings, (std::map<std::string, std::string>{{"mask.fill_mm3", "5"}}));
@@ -45,13 +47,16 @@ TEST(BatchTable, RowsAreCasesAndPathsAreFromItsFolder) {
 TEST(BatchTable, WhatIsWrongIsToldWithItsLine) {
   EXPECT_NE(what_is_wrong("case\nA\n").find("line 1: there is no column 'source'"), std::string::npos);
   EXPECT_NE(what_is_wrong("case,source,lowr\nA,a,1\n").find("did you mean 'lower'?"), std::string::npos);
-  EXPECT_NE(what_is_wrong("case,source\nA,a\nB,b\na,c\n").find("line 4: the case 'a' is there already, in line 2"), std::string::npos);
+  EXPECT_NE(what_is_wrong("case,source\nA,a\nB,b\na,c\n").find("line 4: the case 'a' is there already, in line 2"),
+            std::string::npos);
   EXPECT_NE(what_is_wrong("case,source\nA,a\n\nB,\n").find("line 4: the case 'B' has no source"), std::string::npos);
   EXPECT_NE(what_is_wrong("case,source\n").find("there are no cases"), std::string::npos);
   EXPECT_NE(what_is_wrong("").find("there is no column"), std::string::npos);
   EXPECT_NE(what_is_wrong("case,source\nA,\"a\n").find("a quote is not closed"), std::string::npos);
   for (const char* code : {"..", ".", "../x", "a/b", "a\\b", "/etc", "-o", "_x", "a b", "a.b", "", "a\xc3\xa4", "'"})
-    EXPECT_NE(what_is_wrong("case,source\n" + std::string(code) + ",a\n").find("is no code of a case"), std::string::npos) << code;
+    EXPECT_NE(what_is_wrong("case,source\n" + std::string(code) + ",a\n").find("is no code of a case"),
+              std::string::npos)
+        << code;
   EXPECT_NE(what_is_wrong("case,source\n" + std::string(65, 'a') + ",a\n").find("is no code"), std::string::npos);
   EXPECT_EQ(what_is_wrong("case,source\n" + std::string(64, 'a') + ",a\n"), "");
 }
@@ -223,18 +228,19 @@ TEST_F(BatchRun, OneBadCaseStopsNoOther) {
   BatchOptions options;
   options.jobs = 2;
   options.retries = 1;
-  const BatchResult r = run(rows, work([](const std::string& code, int) {
-                              if (code == "refused") {
-                                std::cout << R"({"error": {"exit_code": 4, "message": "'/x/y.dcm' is torn", "advice": "send it again"},
+  const BatchResult r =
+      run(rows, work([](const std::string& code, int) {
+            if (code == "refused") {
+              std::cout << R"({"error": {"exit_code": 4, "message": "'/x/y.dcm' is torn", "advice": "send it again"},
                                     "verdict": {"status": "refused", "findings": [{"code": "GAPS"}, {"code": "GAPS"}]}})";
-                                return 4;
-                              }
-                              if (code == "broken") return 7;
-                              if (code == "crash") ::raise(SIGKILL);
-                              std::cout << R"({"stages": [{"report": {"mask_volume_mm3": 12.5}}, {"report": {"triangles": 40}}]})";
-                              return 0;
-                            }),
-                            options);
+              return 4;
+            }
+            if (code == "broken") return 7;
+            if (code == "crash") ::raise(SIGKILL);
+            std::cout << R"({"stages": [{"report": {"mask_volume_mm3": 12.5}}, {"report": {"triangles": 40}}]})";
+            return 0;
+          }),
+          options);
   EXPECT_EQ(r.cases, 5U);
   EXPECT_EQ(r.done, 2U);
   EXPECT_EQ(r.refused, 1U);
@@ -249,7 +255,8 @@ TEST_F(BatchRun, OneBadCaseStopsNoOther) {
   EXPECT_EQ(tries_of("crash"), 2);
   EXPECT_NE(record("crash").why.find("ended by signal 9"), std::string::npos);
   // The report says the same three times, and nothing of where the scans are.
-  const std::string page = read_text(out_ / "report.html"), csv = read_text(out_ / "report.csv"), json = read_text(out_ / "report.json");
+  const std::string page = read_text(out_ / "report.html"), csv = read_text(out_ / "report.csv"),
+                    json = read_text(out_ / "report.json");
   EXPECT_NE(page.find("Batch: 2 of 5 cases done"), std::string::npos);
   EXPECT_NE(csv.find("refused,refused,4,refused,GAPS,"), std::string::npos);
   const Json parsed = Json::parse(json).value();
@@ -266,7 +273,9 @@ TEST_F(BatchRun, ADiskWithoutRoomIsNoFaultOfTheCase) {
   bool full = true;
   const auto disk = work([&full](const std::string& code, int) {
     if (!full || code == "last") return 0;
-    if (code == "told") std::cout << R"({"error": {"exit_code": 6, "message": "cannot write 'x': No space left on device", "advice": ""}})";
+    if (code == "told")
+      std::cout
+          << R"({"error": {"exit_code": 6, "message": "cannot write 'x': No space left on device", "advice": ""}})";
     if (code == "short")
       std::cout
           << R"({"error": {"exit_code": 6, "message": "cannot write 'x': the file is incomplete", "advice": "free some space, or write to another disk"}})";

@@ -133,7 +133,8 @@ TEST(Dust, OutOfReachItIsCounted) {
   EXPECT_EQ(dust.awake_bricks(), 0u);
 }
 
-// A radius is no reason to walk cells that hold nothing: what is reached is the same as far as dust lies, whatever the radius.
+// A radius is no reason to walk cells that hold nothing: what is reached is the same as far as dust lies, whatever the
+// radius.
 TEST(Dust, ARadiusBeyondAllBoundsCostsNoMoreThanTheDustThatLies) {
   const auto bone = bowl();
   const auto heap = [&] {

@@ -13,8 +13,8 @@
 namespace osteo {
 namespace {
 
-// Uses of each directed edge over all patches, kept up to date patch by patch: closed, oriented and edge-manifold means that each is used
-// once, and its reverse once.
+// Uses of each directed edge over all patches, kept up to date patch by patch: closed, oriented and edge-manifold means
+// that each is used once, and its reverse once.
 class Edges {
  public:
   void take_in(const SurfacePatch& patch, int sign) {
@@ -34,7 +34,9 @@ class Edges {
     bool operator==(const Key&) const = default;
   };
   struct Hash {
-    std::size_t operator()(const Key& k) const { return k.a * 0x9e3779b97f4a7c15ULL ^ (k.b * 0xc2b2ae3d27d4eb4fULL >> 7); }
+    std::size_t operator()(const Key& k) const {
+      return k.a * 0x9e3779b97f4a7c15ULL ^ (k.b * 0xc2b2ae3d27d4eb4fULL >> 7);
+    }
   };
   void change(std::uint64_t a, std::uint64_t b, int sign) {
     // Both directions in one entry.
@@ -77,7 +79,9 @@ TEST(LiveSurface, ClosedManifoldAndEqualToARebuildAfterEveryEdit) {
     const int i = near(), j = near(), k = near();
     const VoxelKey v = e % 64 == 63 ? static_cast<VoxelKey>(random() % (8 * 512)) : bone.find(i, j, k);
     const auto pick = random() % 8;
-    bone.set(v, kValues[lean == 0 ? pick : lean == 1 ? std::max<std::uint32_t>(pick, 3) : std::min<std::uint32_t>(pick, 5)]);
+    bone.set(v, kValues[lean == 0   ? pick
+                        : lean == 1 ? std::max<std::uint32_t>(pick, 3)
+                                    : std::min<std::uint32_t>(pick, 5)]);
     live.mark(v);
     for (const std::uint32_t b : live.update()) {
       edges.take_in(before[b], -1);

@@ -4,11 +4,11 @@
 #include <numbers>
 
 #include "bar.h"
-#include "osteo/simulation/bone/pieces.h"
 #include "osteo/core/data/rigid_transform.h"
-#include "osteo/simulation/bone/saw.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/geometry/mesh/mesh_info.h"
+#include "osteo/simulation/bone/pieces.h"
+#include "osteo/simulation/bone/saw.h"
 
 namespace osteo {
 namespace {
@@ -32,7 +32,8 @@ TEST(Saw, RemovesTheKerfAndPartsTheBone) {
       EXPECT_NEAR(split.pieces[0].solid.centre_mm.x, -15 + 15.9 / 2, 0.15);
       EXPECT_NEAR(split.pieces[1].solid.centre_mm.x, 15 - 11.9 / 2, 0.15);
       // Nothing is lost.
-      EXPECT_NEAR(split.pieces[0].volume_mm3() + split.pieces[1].volume_mm3() + split.crumbs_mm3, bone.sum() * h * h * h, 1e-3);
+      EXPECT_NEAR(split.pieces[0].volume_mm3() + split.pieces[1].volume_mm3() + split.crumbs_mm3,
+                  bone.sum() * h * h * h, 1e-3);
       // Two closed surfaces.
       for (const Piece& p : split.pieces) EXPECT_TRUE(is_closed(soup_of(surface_nets(p.bone).mesh)));
     }

@@ -1,5 +1,5 @@
-// Normals to light by, against the true ones of bodies whose CT is noisy and sliced, of cuts and edges; and local updates against a
-// rebuild.
+// Normals to light by, against the true ones of bodies whose CT is noisy and sliced, of cuts and edges; and local
+// updates against a rebuild.
 #include "osteo/simulation/bone/shading.h"
 
 #include <gtest/gtest.h>
@@ -45,11 +45,13 @@ template <class F>
 void fill(BrickGrid& bone, F&& density) {
   for (std::uint32_t v = 0; v < bone.brick_count() * 512; ++v) {
     const Ijk c = bone.coordinate(v);
-    bone.set(v, static_cast<float>(std::clamp(density(bone.frame().world_from_index({double(c.i), double(c.j), double(c.k)})), 0.0, 1.0)));
+    bone.set(v, static_cast<float>(std::clamp(
+                    density(bone.frame().world_from_index({double(c.i), double(c.j), double(c.k)})), 0.0, 1.0)));
   }
 }
 
-// As it comes out of a scanner: 0.6 mm pixels, slices, a point spread of 0.4 mm, noise of 20 HU, 1000 HU of bone; bone from 450 to 550 HU.
+// As it comes out of a scanner: 0.6 mm pixels, slices, a point spread of 0.4 mm, noise of 20 HU, 1000 HU of bone; bone
+// from 450 to 550 HU.
 void scan(BrickGrid& bone, const Solid& body, double slice_mm) {
   const double pixel = 0.6, half = bone.frame().dims[0] * bone.frame().spacing_mm.x / 2 + 2;
   const int n = static_cast<int>(2 * half / pixel), slices = static_cast<int>(2 * half / slice_mm);
@@ -62,7 +64,9 @@ void scan(BrickGrid& bone, const Solid& body, double slice_mm) {
       for (int i = 0; i < n; ++i) {
         double sum = 0;
         for (int s = 0; s < 5; ++s)
-          sum += blurred(body.distance_mm({-half + i * pixel, -half + j * pixel, -half + (k + (s - 2) * 0.2) * slice_mm})) / 5;
+          sum += blurred(
+                     body.distance_mm({-half + i * pixel, -half + j * pixel, -half + (k + (s - 2) * 0.2) * slice_mm})) /
+                 5;
         ct[(static_cast<std::size_t>(k) * n + j) * n + i] = 1000 * sum + noise(random);
       }
   fill(bone, [&](Vec3 p) {
@@ -84,7 +88,8 @@ struct Angles {
 };
 // Of the surface's normals to the true ones, in degrees, where `counts`.
 Angles errors(
-    const LiveSurface& surface, const Solid& body, const std::function<bool(Vec3)>& counts = [](Vec3) { return true; }) {
+    const LiveSurface& surface, const Solid& body,
+    const std::function<bool(Vec3)>& counts = [](Vec3) { return true; }) {
   std::vector<double> all;
   double sum = 0;
   for (std::uint32_t b = 0; b < surface.bone().brick_count(); ++b) {
@@ -126,16 +131,18 @@ bool inner(Vec3 p) {
 }
 
 TEST(ShadingField, NoTerracesOnWhatAScannerSees) {
-  for (const auto& [name, body] :
-       {std::pair<const char*, const Solid*>{"ball", &kBall}, {"ellipsoid", &kEllipsoid}, {"plane", &kPlane}, {"cylinder", &kCylinder}}) {
+  for (const auto& [name, body] : {std::pair<const char*, const Solid*>{"ball", &kBall},
+                                   {"ellipsoid", &kEllipsoid},
+                                   {"plane", &kPlane},
+                                   {"cylinder", &kCylinder}}) {
     for (const double slice : {1.0, 2.0}) {
       BrickGrid bone = grid_of(0.5, 18);
       scan(bone, *body, slice);
       const bool clipped = body == &kPlane || body == &kCylinder;
       const auto counts = [&](Vec3 p) { return !clipped || inner(p); };
       const Angles before = errors(LiveSurface(bone, {}), *body, counts), after = errors(shaded(bone), *body, counts);
-      std::printf("  %-10s %.0f mm slices: %5.2f degrees RMS, p95 %5.2f; shaded %5.2f, %5.2f  (%zu points)\n", name, slice, before.rms,
-                  before.p95, after.rms, after.p95, after.points);
+      std::printf("  %-10s %.0f mm slices: %5.2f degrees RMS, p95 %5.2f; shaded %5.2f, %5.2f  (%zu points)\n", name,
+                  slice, before.rms, before.p95, after.rms, after.p95, after.points);
       // At 2 mm what is left is the slices themselves: the wide kernel alone has 2.0 on the cylinder.
       EXPECT_LT(after.rms, slice == 1 ? 1 : 2.4) << name;
       EXPECT_LT(after.rms, before.rms / 6) << name;
@@ -149,8 +156,12 @@ TEST(ShadingField, CutsEdgesAndThinWallsStayWhatTheyAre) {
     const Solid cut{[](Vec3 p) { return std::max(p.z - 0.13, 2 - length(p - Vec3{0.2, 0.1, 0.6})); }};
     BrickGrid bone = grid_of(h, 8);
     fill(bone, [&](Vec3 p) { return 0.5 - cut.distance_mm(p) / h; });
-    const auto in_cut = [&](Vec3 p) { return p.z < 0.13 - 0.75 && length(p - Vec3{0.2, 0.1, 0.6}) < 2 + h && std::abs(p.z) < 4; };
-    const auto on_top = [&](Vec3 p) { return std::abs(p.z - 0.13) < h && std::hypot(p.x, p.y) > 4 && std::hypot(p.x, p.y) < 6; };
+    const auto in_cut = [&](Vec3 p) {
+      return p.z < 0.13 - 0.75 && length(p - Vec3{0.2, 0.1, 0.6}) < 2 + h && std::abs(p.z) < 4;
+    };
+    const auto on_top = [&](Vec3 p) {
+      return std::abs(p.z - 0.13) < h && std::hypot(p.x, p.y) > 4 && std::hypot(p.x, p.y) < 6;
+    };
     const LiveSurface surface = shaded(bone);
     const Angles cavity = errors(surface, cut, in_cut), top = errors(surface, cut, on_top);
     const auto rim = [&](Vec3 p) {
@@ -158,20 +169,24 @@ TEST(ShadingField, CutsEdgesAndThinWallsStayWhatTheyAre) {
              std::hypot(p.x - 0.2, p.y - 0.1) < 1.96 + 2 * h + 1;
     };
     const Angles at_rim = errors(surface, cut, rim);
-    std::printf("  burr 4 mm, %.1f mm voxels: cavity %.2f degrees RMS (%zu points), from 2 voxels off its rim on %.2f, face %.2f\n", h,
-                cavity.rms, cavity.points, at_rim.rms, top.rms);
+    std::printf(
+        "  burr 4 mm, %.1f mm voxels: cavity %.2f degrees RMS (%zu points), from 2 voxels off its rim on %.2f, face "
+        "%.2f\n",
+        h, cavity.rms, cavity.points, at_rim.rms, top.rms);
     EXPECT_GT(cavity.points, 50U);
     EXPECT_LT(cavity.rms, 3);
     EXPECT_LT(top.rms, 1);
     EXPECT_LT(at_rim.rms, 5);
   }
-  // Edges of 90 and 60 degrees: a millimetre from the edge the faces are flat again, and at the edge the light turns within it.
+  // Edges of 90 and 60 degrees: a millimetre from the edge the faces are flat again, and at the edge the light turns
+  // within it.
   for (const double angle : {90.0, 60.0}) {
     const double half = angle / 2 / 57.29578;
     // A wedge whose edge is the z axis turned a little; its faces look to +y and -y.
     const Solid wedge{[=](Vec3 p) {
       const Vec3 q{p.x + 3 + 0.1 * p.z, p.y + 0.07, p.z};
-      return std::max(dot(q, Vec3{-std::sin(half), std::cos(half), 0}), dot(q, Vec3{-std::sin(half), -std::cos(half), 0}));
+      return std::max(dot(q, Vec3{-std::sin(half), std::cos(half), 0}),
+                      dot(q, Vec3{-std::sin(half), -std::cos(half), 0}));
     }};
     BrickGrid bone = grid_of(0.5, 8);
     fill(bone, [&](Vec3 p) { return 0.5 - wedge.distance_mm(p) / 0.5; });
@@ -210,7 +225,9 @@ TEST(ShadingField, LocalUpdatesEqualARebuildToTheBit) {
       const Vec3 centre = Vec3{double(random() % 20) - 10, double(random() % 20) - 10, double(random() % 20) - 10} * h;
       for (std::uint32_t v = 0; v < bone.brick_count() * 512; ++v) {
         const Ijk c = bone.coordinate(v);
-        if (bone.value(v) == 0 || length(bone.frame().world_from_index({double(c.i), double(c.j), double(c.k)}) - centre) > 3 * h) continue;
+        if (bone.value(v) == 0 ||
+            length(bone.frame().world_from_index({double(c.i), double(c.j), double(c.k)}) - centre) > 3 * h)
+          continue;
         bone.set(v, bone.value(v) * 0.3F);
         live.mark(v);
       }
@@ -266,7 +283,8 @@ TEST(ShadingField, EqualVerticesOfNeighboursAreLitAlike) {
       const auto [it, fresh] = seen.try_emplace(v.key, v.normal);
       if (fresh) continue;
       ++shared;
-      for (std::size_t x = 0; x < 3; ++x) worst = std::max(worst, std::abs(double(it->second[x]) - double(v.normal[x])));
+      for (std::size_t x = 0; x < 3; ++x)
+        worst = std::max(worst, std::abs(double(it->second[x]) - double(v.normal[x])));
     }
   }
   EXPECT_GT(shared, 1000U);

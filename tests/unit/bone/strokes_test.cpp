@@ -79,7 +79,8 @@ TEST(Strokes, AreTakenBackBetweenAllElseInEveryOrderToTheBit) {
   EXPECT_GT(undone, 2000u);
 }
 
-// The servo takes up a move later than the world was moved: what it drilled meanwhile comes before the move, as the stream says.
+// The servo takes up a move later than the world was moved: what it drilled meanwhile comes before the move, as the
+// stream says.
 TEST(Strokes, TheStreamTellsWhatCameFirst) {
   std::mt19937 random(1);
   World live(test::bar(1, 0));

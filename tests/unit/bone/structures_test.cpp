@@ -83,7 +83,8 @@ TEST(StructureMap, DistanceIsThatOfTheFaceBelowAVoxel) {
     double mean, rms, most;  // allowed, in label voxels
   };
   const Shape shapes[] = {
-      {"flat, along the voxels", [](Vec3 p, Vec3) { return p.z; }, 0.14, 0.14, 0.14},  // 0.13: where the labels' border lies
+      {"flat, along the voxels", [](Vec3 p, Vec3) { return p.z; }, 0.14, 0.14,
+       0.14},  // 0.13: where the labels' border lies
       {"flat, tilted", [](Vec3 p, Vec3 a) { return dot(p, a); }, 0.03, 0.12, 0.4},
       {"ball 3 mm", [](Vec3 p, Vec3) { return length(p) - 3; }, 0.05, 0.1, 0.4},
       {"ball 1 mm", [](Vec3 p, Vec3) { return length(p) - 1; }, 0.09, 0.13, 0.4},
@@ -107,14 +108,15 @@ TEST(StructureMap, DistanceIsThatOfTheFaceBelowAVoxel) {
     EXPECT_LT(std::abs(beside.mean()), shape.mean) << shape.name;
     EXPECT_LT(beside.rms(), shape.rms) << shape.name;
     EXPECT_LT(beside.most, shape.most) << shape.name;
-    std::printf("%-28s outside: mean %+.3f rms %.3f most %.3f   inside: mean %+.3f most %.3f of a label voxel\n", shape.name, beside.mean(),
-                beside.rms(), beside.most, inside.mean(), inside.most);
+    std::printf("%-28s outside: mean %+.3f rms %.3f most %.3f   inside: mean %+.3f most %.3f of a label voxel\n",
+                shape.name, beside.mean(), beside.rms(), beside.most, inside.mean(), inside.most);
     // In the middle of a thin structure the lattice rounds the ridge of distances off.
     EXPECT_LT(inside.most, 1.2) << shape.name;
   }
 }
 
-// Against another way to measure: to the nearest face between a voxel of the structure and one that is not, by trying all.
+// Against another way to measure: to the nearest face between a voxel of the structure and one that is not, by trying
+// all.
 TEST(StructureMap, AgreesWithTheNearestOfAllVoxelFaces) {
   Frame frame = cube_around_zero(4, 0.25);
   frame.spacing_mm = {0.25, 0.2, 0.4};

@@ -55,7 +55,8 @@ TEST(Water, StandsAsHighAsTheVolumeOfACapSays) {
     if (std::abs(p.x - 0.25) < 0.3 && std::abs(p.z - 0.25) < 0.3) depth += full * kCell;
   });
   ASSERT_GT(least_most.size(), 3u);
-  for (const auto& [layer, share] : least_most) EXPECT_LT(share.second - share.first, 0.01) << "not level in layer " << layer;
+  for (const auto& [layer, share] : least_most)
+    EXPECT_LT(share.second - share.first, 0.01) << "not level in layer " << layer;
   EXPECT_GT(in_pool, 140);
   EXPECT_NEAR(depth, cap_depth_mm(in_pool, kRadius), 0.15);
 }
@@ -153,8 +154,8 @@ TEST(Water, AFilmStaysDriesAndLeavesItsDust) {
 
 TEST(Water, FallsAndDustToWhereGravityPoints) {
   const auto bone = test::slab(0.5);
-  for (const Vec3 down :
-       {down_of(Posture::supine, 25), down_of(Posture::sitting, 0), down_of(Posture::right_side, -10), normalized({0.3, -0.5, 0.8})}) {
+  for (const Vec3 down : {down_of(Posture::supine, 25), down_of(Posture::sitting, 0), down_of(Posture::right_side, -10),
+                          normalized({0.3, -0.5, 0.8})}) {
     // Away from the bone.
     const Vec3 far = bone.frame().world_from_index({40, 40, 60}) + Vec3{0, 0, 8};
     Dust dust(bone, {.gravity = down});
@@ -196,7 +197,8 @@ TEST(Water, OfAPatientThatLiesSo) {
       const Vec3 down = down_of(p, turned);
       const PostureNow now = posture_of(down);
       EXPECT_LE(std::abs(now.head_turned_deg), 90.01);
-      EXPECT_NEAR(length(down_of(now.posture, now.head_turned_deg) - down), 0, 1e-9) << static_cast<int>(p) << " " << turned;
+      EXPECT_NEAR(length(down_of(now.posture, now.head_turned_deg) - down), 0, 1e-9)
+          << static_cast<int>(p) << " " << turned;
     }
   }
   EXPECT_NEAR(length(down_of(Posture::supine, 90) - down_of(Posture::left_side, 0)), 0, 1e-12);

@@ -12,10 +12,10 @@
 
 #include "bar.h"
 #include "osteo/core/base/error.h"
+#include "osteo/geometry/mesh/mesh_info.h"
 #include "osteo/simulation/bone/live_surface.h"
 #include "osteo/simulation/bone/plate_fit.h"
 #include "osteo/simulation/bone/plates.h"
-#include "osteo/geometry/mesh/mesh_info.h"
 
 namespace osteo {
 
@@ -63,15 +63,16 @@ TEST(World, SawSplitMoveAndBackToTheBit) {
   EXPECT_FALSE(w.act(SceneAction::plain(ActionKind::undo)).done);
 }
 
-// Where nobody else holds the body that is given back to, it is gone as soon as the first voxel is: its memory is overwritten here to see
-// whether anything still reads it (as the address sanitizer sees it too).
+// Where nobody else holds the body that is given back to, it is gone as soon as the first voxel is: its memory is
+// overwritten here to see whether anything still reads it (as the address sanitizer sees it too).
 TEST(World, UndoReadsNothingThatItGaveBack) {
   World w(bar(0.25, 0.4));
   const std::string whole = w.hash();
   ASSERT_TRUE(w.act(SceneAction::saw(kMiddle)).done);
   ASSERT_TRUE(w.act(SceneAction::split(1)).done);
   mallopt(M_PERTURB, 0x5a);
-  const bool both = w.act(SceneAction::plain(ActionKind::undo)).done && w.act(SceneAction::plain(ActionKind::undo)).done;
+  const bool both =
+      w.act(SceneAction::plain(ActionKind::undo)).done && w.act(SceneAction::plain(ActionKind::undo)).done;
   mallopt(M_PERTURB, 0);
   EXPECT_TRUE(both);
   EXPECT_EQ(w.hash(), whole);
@@ -119,12 +120,14 @@ TEST(World, ActionsCopyOnlyTheBricksThatTheyChangeAndNeverWriteOldOnes) {
   EXPECT_EQ(w.bodies()[0].body->bone.hash(), was);
 }
 
-// The servo and others read the bone that is there by plain loads meanwhile: even a value that was there already may not be written again.
+// The servo and others read the bone that is there by plain loads meanwhile: even a value that was there already may
+// not be written again.
 TEST(World, ActionsWriteNothingWhereOthersRead) {
   World w(bar(0.25, 0.4));
   const auto old = w.bodies()[0].body;  // keeps the block that all its bricks were made in
   const float* const first = old->bone.values_of_brick(0);
-  const float* const end = old->bone.values_of_brick(static_cast<std::uint32_t>(old->bone.brick_count()) - 1) + BrickGrid::kVoxels;
+  const float* const end =
+      old->bone.values_of_brick(static_cast<std::uint32_t>(old->bone.brick_count()) - 1) + BrickGrid::kVoxels;
   ASSERT_EQ(end - first, static_cast<std::ptrdiff_t>(old->bone.brick_count() * BrickGrid::kVoxels));
   const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
   const std::uintptr_t from = (reinterpret_cast<std::uintptr_t>(first) + page - 1) / page * page;
@@ -152,7 +155,8 @@ TEST(World, MovesOfDifferentPiecesAreTakenBackOneByOne) {
   ASSERT_EQ(w.bodies().size(), 3u);
   const auto shift = [&](std::uint32_t id) { return w.find(id)->world_from_body.shift_mm.y; };
   const auto drag = [&](std::uint32_t id, double from, double to) {
-    for (int s = 0; s <= 4; ++s) ASSERT_TRUE(w.act(SceneAction::move(id, {{}, {0, from + (to - from) * s / 4, 0}})).done);
+    for (int s = 0; s <= 4; ++s)
+      ASSERT_TRUE(w.act(SceneAction::move(id, {{}, {0, from + (to - from) * s / 4, 0}})).done);
   };
   const auto undo = [&] { return w.act(SceneAction::plain(ActionKind::undo)).done; };
   drag(1, 0, 10);
@@ -285,7 +289,8 @@ TEST(World, LabelsAndSurfaceOfAPieceEqualNewOnes) {
       EXPECT_GT(copied, 0);
       const LiveComponents piece_labels(piece, labels, e.made[0].origin), again(piece);
       ASSERT_EQ(piece_labels.components().size(), again.components().size());
-      for (VoxelKey v = 0; v < piece.brick_count() * 512; ++v) ASSERT_EQ(piece_labels.component_of(v), again.component_of(v));
+      for (VoxelKey v = 0; v < piece.brick_count() * 512; ++v)
+        ASSERT_EQ(piece_labels.component_of(v), again.component_of(v));
       LiveSurface piece_surface(piece, surface, e.made[0].origin);
       EXPECT_EQ(surface_hash(piece_surface.joined().mesh), surface_of(piece));
       EXPECT_TRUE(lit_as_if_new(piece_surface));
@@ -338,10 +343,10 @@ TEST(World, RefusesWhatMakesNoSense) {
   mirrored.rotation.column[0] = {-1, 0, 0};
   SceneAction nan = SceneAction::open(1, NAN), unknown = SceneAction::plain(ActionKind::undo);
   unknown.kind = 77;
-  for (const SceneAction& a :
-       {SceneAction::move(5, {}), SceneAction::move(0, mirrored), SceneAction::attach(99, {}, 0), SceneAction::attach(0, {}, 0, 0),
-        SceneAction::attach(0, {}, 0, 9), SceneAction::detach(3), SceneAction::saw({{500, 0, 0}, {1, 0, 0}}),
-        SceneAction::saw({{0, 0, 0}, {0, 0, 0}}), SceneAction::split(1), nan, unknown}) {
+  for (const SceneAction& a : {SceneAction::move(5, {}), SceneAction::move(0, mirrored), SceneAction::attach(99, {}, 0),
+                               SceneAction::attach(0, {}, 0, 0), SceneAction::attach(0, {}, 0, 9),
+                               SceneAction::detach(3), SceneAction::saw({{500, 0, 0}, {1, 0, 0}}),
+                               SceneAction::saw({{0, 0, 0}, {0, 0, 0}}), SceneAction::split(1), nan, unknown}) {
     const auto e = w.act(a);
     EXPECT_FALSE(e.done) << a.kind;
     EXPECT_FALSE(e.message.empty());
@@ -431,7 +436,8 @@ TEST(Plates, AreClosedAndOfTheirSize) {
   }
 }
 
-// Against planes: how far below each point of a plate the bone's flat face is, level and tilted, also sunk in; and whose it is.
+// Against planes: how far below each point of a plate the bone's flat face is, level and tilted, also sunk in; and
+// whose it is.
 TEST(Plates, GapsToAFlatFace) {
   for (const double h : {0.25, 0.5}) {
     World w(bar(h, 0.3));
@@ -448,7 +454,8 @@ TEST(Plates, GapsToAFlatFace) {
           // Where the screw's line meets the plane z = 4.
           const double exact = (p.z - 4) / std::cos(tilt);
           const Vec3 foot = p - pose.rotation.column[2] * exact;
-          if (std::abs(foot.y) > 4.5 || std::abs(foot.x) > 14 || std::abs(foot.x - 1) < 1.2 || exact < -0.9) continue;  // edges, the cut
+          if (std::abs(foot.y) > 4.5 || std::abs(foot.x) > 14 || std::abs(foot.x - 1) < 1.2 || exact < -0.9)
+            continue;  // edges, the cut
           if (g.body == SceneAction::kNobody) {
             ++none;
             continue;
@@ -467,7 +474,8 @@ TEST(Plates, GapsToAFlatFace) {
     const auto both = bodies_under(w, plate, {{}, {1, 0, 4.3}});
     EXPECT_EQ(both.size(), 2u);
     EXPECT_EQ(bodies_under(w, plate, {{}, {1, 0, 8}}).size(), 0u);
-    const auto one = bodies_under(w, plate_library()[static_cast<std::size_t>(plate_index("midface-4"))], {{}, {-11, 0, 4.3}});
+    const auto one =
+        bodies_under(w, plate_library()[static_cast<std::size_t>(plate_index("midface-4"))], {{}, {-11, 0, 4.3}});
     EXPECT_EQ(one.size(), 1u);
   }
 }
@@ -506,7 +514,8 @@ TEST(World, ARegionOfInterestTakesThePlaceOfTheCoarseBone) {
     }
     return "taken";
   };
-  // A coarse voxel is 0.5 mm: whole ones and a hundredth off are taken, two hundredths and more are not, along each axis and either way.
+  // A coarse voxel is 0.5 mm: whole ones and a hundredth off are taken, two hundredths and more are not, along each
+  // axis and either way.
   for (std::size_t a = 0; a < 3; ++a) {
     for (const double share : {-0.4, -0.02, 0.02, 0.1, 0.4, 0.5}) {
       World bad(BrickGrid(coarse), nullptr);

@@ -79,8 +79,8 @@ TEST(CameraTrial, NearIsNotThere) {
 // A simulated person reaches what can be reached, the same each time; a worse hand takes longer.
 TEST(CameraTrial, TheSimulatedPersonGetsThere) {
   const auto targets = camera_targets(start(), 40, 1);
-  for (const CameraMode mode :
-       {CameraMode::mouse, CameraMode::point, CameraMode::device, CameraMode::six, CameraMode::rate, CameraMode::bookmarks}) {
+  for (const CameraMode mode : {CameraMode::mouse, CameraMode::point, CameraMode::device, CameraMode::six,
+                                CameraMode::rate, CameraMode::bookmarks}) {
     const auto results = simulate_trial(mode, start(), targets, {}, 3);
     const TrialSummary s = summary_of(results);
     EXPECT_EQ(s.targets, 40U);
@@ -93,7 +93,8 @@ TEST(CameraTrial, TheSimulatedPersonGetsThere) {
     worse.noise = 0.3;
     worse.crosstalk = 0.3;
     worse.reaction_s = 0.5;
-    EXPECT_GT(summary_of(simulate_trial(mode, start(), targets, worse, 3)).median_s, s.median_s) << static_cast<int>(mode);
+    EXPECT_GT(summary_of(simulate_trial(mode, start(), targets, worse, 3)).median_s, s.median_s)
+        << static_cast<int>(mode);
   }
   SimulatedPerson nobody;
   nobody.most_s = 0.5;

@@ -73,7 +73,8 @@ TEST(Stereo, EveryPieceOfThePictureIsCoveredOnce) {
         }
       }
     }
-    for (int row = 0; row < 9; ++row) EXPECT_EQ(eye[static_cast<std::size_t>(row)], (row + first) % 2) << first << ' ' << row;
+    for (int row = 0; row < 9; ++row)
+      EXPECT_EQ(eye[static_cast<std::size_t>(row)], (row + first) % 2) << first << ' ' << row;
   }
 }
 

@@ -9,8 +9,8 @@
 #include <numbers>
 #include <regex>
 
-#include "osteo/core/base/files.h"
 #include "osteo/assessment/case_report/case_report.h"
+#include "osteo/core/base/files.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 #include "pictures.h"
 #include "words.h"
@@ -59,7 +59,9 @@ TEST(Structures, LengthAlongABentTube) {
   const auto tube = [](Vec3 p) {
     const Vec3 c{15, 10, 6};
     const double dx = p.x - c.x, dy = p.y - c.y, dz = p.z - c.z;
-    const double ring = dy >= 0 ? std::hypot(std::hypot(dx, dy) - 12, dz) : dy >= -5 ? std::hypot(std::abs(dx) - 12, dz) : 1e9;
+    const double ring = dy >= 0    ? std::hypot(std::hypot(dx, dy) - 12, dz)
+                        : dy >= -5 ? std::hypot(std::abs(dx) - 12, dz)
+                                   : 1e9;
     return ring < 0.7 ? 6 : 0;
   };
   Labels l = draw({120, 120, 50}, 0.25, tube);
@@ -141,12 +143,14 @@ TEST(CaseCode, IsShortSpeakableAndOfTheScan) {
     return case_code(at.path());
   };
   const std::string one = code("0123456789abcdef");
-  EXPECT_TRUE(
-      std::regex_match(one, std::regex("([bdfghjklmnprstvz][aiou]){2}[bdfghjklmnprstvz]-([bdfghjklmnprstvz][aiou]){2}[bdfghjklmnprstvz]")))
+  EXPECT_TRUE(std::regex_match(
+      one,
+      std::regex("([bdfghjklmnprstvz][aiou]){2}[bdfghjklmnprstvz]-([bdfghjklmnprstvz][aiou]){2}[bdfghjklmnprstvz]")))
       << one;
   EXPECT_EQ(one, code("0123456789abcdef"));
   EXPECT_NE(one, code("0123456789abcdee"));
-  std::ofstream(at.path() / "manifest.json") << R"({"osteotome_case": 1, "files": {"bone": {"file": "b", "hash": "77"}}})";
+  std::ofstream(at.path() / "manifest.json")
+      << R"({"osteotome_case": 1, "files": {"bone": {"file": "b", "hash": "77"}}})";
   EXPECT_FALSE(case_code(at.path()).empty());  // an old case: by its bone
 }
 
@@ -175,12 +179,18 @@ TEST(Words, TheBandIsGoodOnlyWhereNothingIsLeftToLookAt) {
   EXPECT_EQ(band(R"("outside_body_left_mm3": 400.0)", good), "Good");  // a nose, teeth
   EXPECT_EQ(band(R"("outside_body_left_mm3": 120000.0)", good), "Look");
   const std::string finding = R"({"code": "SLICE_BLANK", "severity": "warning", "message": "a slice shows nothing"})";
-  EXPECT_EQ(band("", R"({"status": "repaired", "source": "DICOM", "set_aside": [], "geometry": {"resampled": false}, "findings": [)" +
-                         finding + "]}"),
-            "Look");
-  EXPECT_EQ(band("", R"({"status": "repaired", "source": "DICOM", "set_aside": [], "geometry": {"resampled": true}, "findings": [)" +
-                         finding + "]}"),
-            "Repaired");
+  EXPECT_EQ(
+      band(
+          "",
+          R"({"status": "repaired", "source": "DICOM", "set_aside": [], "geometry": {"resampled": false}, "findings": [)" +
+              finding + "]}"),
+      "Look");
+  EXPECT_EQ(
+      band(
+          "",
+          R"({"status": "repaired", "source": "DICOM", "set_aside": [], "geometry": {"resampled": true}, "findings": [)" +
+              finding + "]}"),
+      "Repaired");
 }
 
 TEST(Words, ResolutionGoesByTheCoarsestEdge) {
@@ -199,7 +209,8 @@ TEST(Words, ResolutionGoesByTheCoarsestEdge) {
 TEST(Words, ResolutionIsThatOfTheSlicesNotOfTheVoxelsMadeOfThem) {
   const TemporaryFolder at;
   std::ofstream(at.path() / "manifest.json") << R"({"osteotome_case": 1})";
-  std::ofstream(at.path() / "import.json") << R"({"status": "repaired", "source": "DICOM", "series": {"thickness_mm": 4},
+  std::ofstream(at.path() / "import.json")
+      << R"({"status": "repaired", "source": "DICOM", "series": {"thickness_mm": 4},
     "geometry": {"gap_max_mm": 7, "resampled": true}, "output": {"spacing_mm": [0.5, 0.5, 0.5]}})";
   const CaseFacts facts(at.path());
   const sheet::Table t = resolution_table(facts);

@@ -135,8 +135,10 @@ TEST(Cgal, LeavesCavitiesEmptyAndFillsBodiesInBodies) {
   CgalMeshOptions o;
   o.cell_mm = 1.5;
   o.optimise = false;
-  const double large = enclosed_volume_mm3(mesh_of(test::sphere(6, 3))), small = enclosed_volume_mm3(mesh_of(test::sphere(3, 3)));
-  EXPECT_NEAR(volume_mm3(tets_by_cgal(test::joined(test::sphere(6, 3), test::turned(test::sphere(3, 3))), o)), large - small, 0.05 * large);
+  const double large = enclosed_volume_mm3(mesh_of(test::sphere(6, 3))),
+               small = enclosed_volume_mm3(mesh_of(test::sphere(3, 3)));
+  EXPECT_NEAR(volume_mm3(tets_by_cgal(test::joined(test::sphere(6, 3), test::turned(test::sphere(3, 3))), o)),
+              large - small, 0.05 * large);
   EXPECT_NEAR(volume_mm3(tets_by_cgal(test::joined(test::sphere(6, 3), test::sphere(3, 3)), o)), large, 0.05 * large);
   o.cell_mm = 1e-20;
   try {
@@ -163,7 +165,9 @@ TEST(Cgal, SaysWhatItCannotMesh) {
   std::string told;
   Context context;
   context.on_log([&](LogLevel level, std::string_view message) { told += level == LogLevel::warning ? message : ""; });
-  EXPECT_THROW(static_cast<void>(tets_by_cgal(test::joined(test::sphere(10, 3), test::sphere(10, 3, {20, 0, 0})), brief, context)), Error);
+  EXPECT_THROW(static_cast<void>(
+                   tets_by_cgal(test::joined(test::sphere(10, 3), test::sphere(10, 3, {20, 0, 0})), brief, context)),
+               Error);
   EXPECT_NE(told.find("touches itself at 1 points"), std::string::npos) << told;
 }
 

@@ -1,16 +1,17 @@
-// The command line around toy commands: flags, exit codes, what goes to standard output; and the rules that all of osteo's own keep.
+// The command line around toy commands: flags, exit codes, what goes to standard output; and the rules that all of
+// osteo's own keep.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "osteo/core/base/error.h"
-#include "osteo/core/base/files.h"
 #include "osteo/app/cli/command.h"
 #include "osteo/app/cli/report.h"
-#include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/app/stages/registry.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/pipeline/pipeline.h"
 
 namespace osteo {
 namespace {
@@ -29,13 +30,16 @@ struct FailStage {
             .synopsis = "fails",
             .description = "Fails.",
             .inputs = {},
-            .outputs = {{"document", {DataKind::document}, "nothing"}, {"verdict", {DataKind::document}, "why", true, ".verdict.json"}},
+            .outputs = {{"document", {DataKind::document}, "nothing"},
+                        {"verdict", {DataKind::document}, "why", true, ".verdict.json"}},
             .references = {},
             .example = "osteo fail x.json"};
   }
   static std::vector<Data> run(const Params& p, std::span<const Data>, const Context&) {
-    if (p.how == "verdict") throw ErrorWithDocument(Error(ExitCode::corrupt, "not taken", "look"), "verdict", {R"({"status": "refused"})"});
-    if (p.how == "permission") throw fs::filesystem_error("status", "/nowhere/x", std::make_error_code(std::errc::permission_denied));
+    if (p.how == "verdict")
+      throw ErrorWithDocument(Error(ExitCode::corrupt, "not taken", "look"), "verdict", {R"({"status": "refused"})"});
+    if (p.how == "permission")
+      throw fs::filesystem_error("status", "/nowhere/x", std::make_error_code(std::errc::permission_denied));
     if (p.how == "memory") throw std::bad_alloc();
     if (p.how == "defect") throw std::logic_error("odd");
     return {Document{"{}"}, Document{"{}"}};
@@ -55,8 +59,9 @@ struct EchoCommand {
   }
   static cli::CommandInfo info() { return {"echo", "says", "Says.", {{"what", "to say", true}}, "osteo echo", true}; }
   static int run(const Params& p, cli::Invocation& io) {
-    nlohmann::json j{{"text", p.text},         {"on", p.on}, {"size", p.size}, {"given", io.given}, {"arguments", io.arguments},
-                     {"seed", io.context.seed}};
+    nlohmann::json j{
+        {"text", p.text},         {"on", p.on}, {"size", p.size}, {"given", io.given}, {"arguments", io.arguments},
+        {"seed", io.context.seed}};
     for (const auto& [k, v] : io.settings) j["settings"][k] = v;
     io.out << j.dump();
     return 0;
@@ -110,15 +115,15 @@ TEST(Cli, FlagsReachTheCommandAndItKnowsWhichWereGiven) {
 }
 
 TEST(Cli, MistakesAreUsageAndNameTheRightWord) {
-  for (const auto& [args, text] :
-       std::vector<std::pair<std::vector<std::string>, std::string>>{{{"echo", "--sise", "1"}, "did you mean --size?"},
-                                                                     {{"echo", "--size", "9"}, "between 0 mm and 5 mm"},
-                                                                     {{"echo", "--size"}, "needs a value"},
-                                                                     {{"echo", "--no-size"}, "no flag --no-size"},
-                                                                     {{"echo", "a", "b"}, "takes [what]"},
-                                                                     {{"ecko"}, "did you mean 'echo'?"},
-                                                                     {{"fail"}, "takes <document.out> (1 name), but none was given"},
-                                                                     {{"fail", "a", "b"}, "(1 name), but 2 were given"}}) {
+  for (const auto& [args, text] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"echo", "--sise", "1"}, "did you mean --size?"},
+           {{"echo", "--size", "9"}, "between 0 mm and 5 mm"},
+           {{"echo", "--size"}, "needs a value"},
+           {{"echo", "--no-size"}, "no flag --no-size"},
+           {{"echo", "a", "b"}, "takes [what]"},
+           {{"ecko"}, "did you mean 'echo'?"},
+           {{"fail"}, "takes <document.out> (1 name), but none was given"},
+           {{"fail", "a", "b"}, "(1 name), but 2 were given"}}) {
     const Said said = run(args);
     EXPECT_EQ(said.code, 2) << text;
     EXPECT_NE(said.err.find(text), std::string::npos) << said.err;
@@ -167,7 +172,8 @@ TEST(Cli, FactsAreForPeople) {
   EXPECT_EQ(cli::fact_text("distance_mm", 0.0), (P{"distance", "0 mm"}));
   EXPECT_EQ(cli::fact_text("change_percent_per_50_hu", 4.26637), (P{"50 HU either way change bone by", "4.3 %"}));
   EXPECT_EQ(cli::fact_text("hu_min", std::int64_t{-1024}), (P{"lowest value", "-1024 HU"}));
-  EXPECT_EQ(cli::fact_text("marching_cubes_distance_max_voxels", 0.17), (P{"marching cubes distance", "0.17 voxels, the most"}));
+  EXPECT_EQ(cli::fact_text("marching_cubes_distance_max_voxels", 0.17),
+            (P{"marching cubes distance", "0.17 voxels, the most"}));
   EXPECT_EQ(cli::fact_text("facial nerve mm3", 12.5), (P{"facial nerve", "12.5 mm3"}));
   EXPECT_EQ(cli::fact_text("pieces", std::int64_t{36}), (P{"pieces", "36"}));
   EXPECT_EQ(cli::fact_text("watertight", true), (P{"watertight", "yes"}));
@@ -198,7 +204,8 @@ TEST(AllStages, SeedOfTheCommandLineIsTheSeedOfTheResult) {
   std::vector<std::string> hashes;
   for (const char* seed : {"1", "2"}) {
     const fs::path out = at.path() / (std::string(seed) + ".nrrd");
-    std::vector<std::string> args{"osteo", "phantom", out.string(), "--region", "temporal", "--spacing-mm", "4", "--seed", seed, "--quiet"};
+    std::vector<std::string> args{"osteo",        "phantom", out.string(), "--region", "temporal",
+                                  "--spacing-mm", "4",       "--seed",     seed,       "--quiet"};
     std::vector<char*> argv;
     for (auto& a : args) argv.push_back(a.data());
     std::ostringstream said, err;

@@ -45,7 +45,8 @@ TEST(Frame, WhatIsNoFrameIsRefused) {
   EXPECT_EQ(with([](Frame& f) { f.spacing_mm.x = std::numeric_limits<double>::quiet_NaN(); }), ExitCode::corrupt);
   EXPECT_EQ(with([](Frame& f) { f.origin_mm.z = std::numeric_limits<double>::infinity(); }), ExitCode::corrupt);
   EXPECT_EQ(with([](Frame& f) { f.direction.column[0] = {1, 0.1, 0}; }), ExitCode::corrupt);
-  EXPECT_EQ(with([](Frame& f) { f.direction.column[0] = f.direction.column[0] * -1; }), ExitCode::ok);  // left-handed may be
+  EXPECT_EQ(with([](Frame& f) { f.direction.column[0] = f.direction.column[0] * -1; }),
+            ExitCode::ok);  // left-handed may be
 }
 
 TEST(Frame, SamePlaceLooksAtCornersNotAtNumbers) {
@@ -74,7 +75,8 @@ TEST(Volume, SampleIsLinearAndHoldsTheBorder) {
   Frame f;
   f.dims = {2, 2, 2};
   auto v = make_voxels<std::int16_t>(8);
-  for (int n = 0; n < 8; ++n) v[static_cast<std::size_t>(n)] = static_cast<std::int16_t>(100 * (n & 1) + 10 * ((n >> 1) & 1) + (n >> 2));
+  for (int n = 0; n < 8; ++n)
+    v[static_cast<std::size_t>(n)] = static_cast<std::int16_t>(100 * (n & 1) + 10 * ((n >> 1) & 1) + (n >> 2));
   const Image image{f, v};
   EXPECT_EQ(image.at(1, 1, 1), 111);
   EXPECT_NEAR(sample_linear(image, {0.25, 0.5, 0.75}), 25 + 5 + 0.75, 1e-9);
@@ -125,7 +127,8 @@ TEST(TriMesh, FlawsAreCounted) {
 TEST(TetMesh, BoundaryIsClosedFacesOutAndHoldsTheVolume) {
   TetMesh m;
   // Two tetrahedra over a common face, and a point that nothing uses.
-  for (const auto& p : {std::array<float, 3>{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {9, 9, 9}, {0, 0, 1}, {0, 0, -1}}) m.points_mm.push_back(p);
+  for (const auto& p : {std::array<float, 3>{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {9, 9, 9}, {0, 0, 1}, {0, 0, -1}})
+    m.points_mm.push_back(p);
   m.tets.push_back({0, 1, 2, 4});
   m.tets.push_back({0, 2, 1, 5});
   EXPECT_NEAR(volume_mm3(m), 2.0 / 6, 1e-12);

@@ -11,9 +11,9 @@
 #include <thread>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/rt/loop.h"
 #include "osteo/simulation/devices/devices.h"
 #include "osteo/simulation/haptics/servo.h"
-#include "osteo/core/rt/loop.h"
 #include "slab.h"
 #include "virtual_arm.h"
 
@@ -52,7 +52,8 @@ TEST(Reports, WirelessSpaceMouseCarriesAllSix) {
 TEST(Reports, ShortOnesAndGarbageAreRefused) {
   SpaceMouseState s;
   s.move[0] = 0.25;
-  for (const auto& bad : {bytes({}), bytes({1}), bytes({1, 2, 3, 4, 5, 6}), bytes({2, 0}), bytes({3}), bytes({0x99, 1, 2, 3, 4, 5, 6})}) {
+  for (const auto& bad :
+       {bytes({}), bytes({1}), bytes({1, 2, 3, 4, 5, 6}), bytes({2, 0}), bytes({3}), bytes({0x99, 1, 2, 3, 4, 5, 6})}) {
     EXPECT_FALSE(decode_space_mouse(bad, s));
   }
   EXPECT_EQ(s.move[0], 0.25);
@@ -144,7 +145,9 @@ TEST(Extrapolation, FollowsThePlaneThenFades) {
   p.normal = {0, 0, 1};
   p.stiffness_n_per_mm = 2;
   p.time_ns = 1'000'000'000;
-  const auto at = [&](double z, double ms) { return extrapolate(p, {0, 0, z}, p.time_ns + static_cast<std::int64_t>(ms * 1e6)).z; };
+  const auto at = [&](double z, double ms) {
+    return extrapolate(p, {0, 0, z}, p.time_ns + static_cast<std::int64_t>(ms * 1e6)).z;
+  };
   EXPECT_DOUBLE_EQ(at(0, 1), 1);
   EXPECT_DOUBLE_EQ(at(-0.1, 1), 1.2);
   EXPECT_DOUBLE_EQ(at(0.2, 1), 0.6);
@@ -156,7 +159,8 @@ TEST(Extrapolation, FollowsThePlaneThenFades) {
   EXPECT_EQ(length(extrapolate(p, {NAN, 0, 0}, p.time_ns)), 1);
 }
 
-// Whatever the servo left there and wherever the arm says it is: a finite force within bounds, and so are the motors' currents.
+// Whatever the servo left there and wherever the arm says it is: a finite force within bounds, and so are the motors'
+// currents.
 TEST(Extrapolation, AnyBitsGiveAFiniteForceAndCurrents) {
   std::mt19937_64 random(17);
   std::uniform_real_distribution<double> u(-3, 3);
@@ -170,7 +174,8 @@ TEST(Extrapolation, AnyBitsGiveAFiniteForceAndCurrents) {
     p.position_mm = {one(), one(), one()};
     p.stiffness_n_per_mm = one();
     p.time_ns = 1 + static_cast<std::int64_t>(random() % 2'000'000'000);
-    const Vec3 f = extrapolate(p, {one(), one(), one()}, static_cast<std::int64_t>(random() % 2'000'000'000), one(), one());
+    const Vec3 f =
+        extrapolate(p, {one(), one(), one()}, static_cast<std::int64_t>(random() % 2'000'000'000), one(), one());
     ASSERT_TRUE(std::isfinite(length(f))) << n;
     ASSERT_FALSE(length(f) > (2 * length(p.force_n) + 0.5) * (1 + 1e-12)) << n;
     for (const double ma : arm.currents_ma({one(), one(), one()}, random() % 2 == 0 ? f : Vec3{one(), one(), one()})) {
@@ -181,9 +186,9 @@ TEST(Extrapolation, AnyBitsGiveAFiniteForceAndCurrents) {
 
 TEST(Recording, IsReadAndRefusedWithTheLine) {
   const auto path = std::filesystem::temp_directory_path() / ("osteo-hid-" + std::to_string(::getpid()));
-  std::ofstream(path)
-      << "# comment\nD: 0\nR: 3 05 01 09\nN: 3Dconnexion SpaceNavigator\nI: 3 046d c626\nE: 000000.000010 7 01 5e 01 00 00 00 00\n"
-         "E: 000000.008010 3 03 01 00\n";
+  std::ofstream(path) << "# comment\nD: 0\nR: 3 05 01 09\nN: 3Dconnexion SpaceNavigator\nI: 3 046d c626\nE: "
+                         "000000.000010 7 01 5e 01 00 00 00 00\n"
+                         "E: 000000.008010 3 03 01 00\n";
   const auto r = load_hid_recording(path);
   EXPECT_EQ(r.info.name, "3Dconnexion SpaceNavigator");
   EXPECT_EQ(model_of(r.info.vendor, r.info.product), DeviceModel::space_mouse);
@@ -261,8 +266,8 @@ TEST(ClosedLoop, AVirtualArmRestsOnBone) {
   EXPECT_LT(fastest, 0.3) << "mm in 4 ms: it shakes";
 }
 
-// The camera has the hand: the drill rests where it is, the motors too, and the arm's own motion is told. Then it is the drill's again,
-// without a jump.
+// The camera has the hand: the drill rests where it is, the motors too, and the arm's own motion is told. Then it is
+// the drill's again, without a jump.
 TEST(Lending, AnArmRestsAndTellsOfItsHand) {
   const WoodenHapticsGeometry geometry;
   test::VirtualArm arm(geometry, {0, 0, 8});
@@ -391,7 +396,8 @@ TEST(Tuning, ACapMovesByTheScaleAndNotAtAllWithTheClutch) {
   PluggedEnd end;
   SpaceMouseDevice hand(end.opener(), HandGoal{}, Mat3{}, nullptr);
   // Full deflection to the right, and button 2.
-  ASSERT_TRUE(end.says({1, 350 & 255, 350 >> 8, 0, 0, 0, 0}, [&] { return hand.motion().push && hand.motion().push->x > 0.99; }));
+  ASSERT_TRUE(end.says({1, 350 & 255, 350 >> 8, 0, 0, 0, 0},
+                       [&] { return hand.motion().push && hand.motion().push->x > 0.99; }));
   ASSERT_TRUE(end.says({3, 2}, [&] { return hand.read(0, 1e-3, {}).buttons == 2; }));
   // The spring hand behind it has caught up after a second.
   const auto mm_per_s = [&](const HandTuning& t) {
@@ -503,8 +509,8 @@ TEST(ClosedLoop, MotorsRestWhenTheServoFallsSilent) {
   EXPECT_TRUE(l.wait_for([&] { return length(l.arm.force_n()) < 1e-6; }, 2000));
 }
 
-// Two arms, each with a link and a thread of its own, in one servo; what their hands did, run again, gives the same bits. One is pulled out
-// on the way.
+// Two arms, each with a link and a thread of its own, in one servo; what their hands did, run again, gives the same
+// bits. One is pulled out on the way.
 TEST(ClosedLoop, TwoArmsAreTwoHands) {
   const WoodenHapticsGeometry geometry;
   test::VirtualArm left(geometry, {-6, 0, 8}), right(geometry, {6, 0, 8});
@@ -514,7 +520,9 @@ TEST(ClosedLoop, TwoArmsAreTwoHands) {
   std::vector<Device*> hands;
   for (int h = 0; h < 2; ++h) {
     const WorkspaceMap map({h == 0 ? -6.0 : 6.0, 0, 8}, Mat3{}, 1);
-    hands.push_back(devices.emplace_back(std::make_unique<WoodenHapticsDevice>(arms[h]->opener(), geometry, map, tools[h], nullptr)).get());
+    hands.push_back(
+        devices.emplace_back(std::make_unique<WoodenHapticsDevice>(arms[h]->opener(), geometry, map, tools[h], nullptr))
+            .get());
   }
   HapticSetup setup;
   setup.device = hands[0]->traits();

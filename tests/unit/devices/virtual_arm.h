@@ -1,5 +1,5 @@
-// A WoodenHaptics arm that exists as equations, at the other end of a socket: reports encoders, takes currents, has mass, damping, a hand
-// on it and the firmware's watchdog.
+// A WoodenHaptics arm that exists as equations, at the other end of a socket: reports encoders, takes currents, has
+// mass, damping, a hand on it and the firmware's watchdog.
 #pragma once
 #include <sys/socket.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
-// Scanners of which no scan is at hand, made from the phantom with published models of what sets them apart: the verdict says what the
-// values are, and no threshold is proposed with confidence that misses the bone.
+// Scanners of which no scan is at hand, made from the phantom with published models of what sets them apart: the
+// verdict says what the values are, and no threshold is proposed with confidence that misses the bone.
 #include <cmath>
 #include <random>
 
@@ -36,7 +36,8 @@ double radius_share(const Frame& f, std::size_t at) {
   const double x = static_cast<double>(at % static_cast<std::size_t>(f.dims[0])) - 0.5 * (f.dims[0] - 1),
                y = static_cast<double>(at / static_cast<std::size_t>(f.dims[0]) % static_cast<std::size_t>(f.dims[1])) -
                    0.5 * (f.dims[1] - 1);
-  return std::hypot(x * f.spacing_mm.x, y * f.spacing_mm.y) / (0.5 * std::min(f.dims[0] * f.spacing_mm.x, f.dims[1] * f.spacing_mm.y));
+  return std::hypot(x * f.spacing_mm.x, y * f.spacing_mm.y) /
+         (0.5 * std::min(f.dims[0] * f.spacing_mm.x, f.dims[1] * f.spacing_mm.y));
 }
 
 struct ConeBeam {
@@ -46,9 +47,10 @@ struct ConeBeam {
   double noise = 60;
 };
 
-// Cupping and scatter: R. Schulze et al., Artefacts in CBCT: a review, Dentomaxillofac. Radiol. 40, 2011. The edge of the field: A.
-// Katsumata et al., Effects of image artifacts on gray-value density in limited-volume cone-beam CT, Oral Surg. 104, 2007. Greys that are
-// no HU: R. Pauwels et al., CBCT-based bone quality assessment: are our expectations realistic?, Dentomaxillofac. Radiol. 44, 2015.
+// Cupping and scatter: R. Schulze et al., Artefacts in CBCT: a review, Dentomaxillofac. Radiol. 40, 2011. The edge of
+// the field: A. Katsumata et al., Effects of image artifacts on gray-value density in limited-volume cone-beam CT, Oral
+// Surg. 104, 2007. Greys that are no HU: R. Pauwels et al., CBCT-based bone quality assessment: are our expectations
+// realistic?, Dentomaxillofac. Radiol. 44, 2015.
 Image cone_beam(const Image& ct, const ConeBeam& c) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0, c.noise);
@@ -64,7 +66,8 @@ Image cone_beam(const Image& ct, const ConeBeam& c) {
 double bone_mm3(const Phantom& p, bool in_cylinder) {
   double n = 0;
   for (std::size_t i = 0; i < p.labels.frame.voxel_count(); ++i) {
-    if (is_bone(static_cast<Tissue>(p.labels.voxels[i])) && (!in_cylinder || radius_share(p.labels.frame, i) <= 1)) n += 1;
+    if (is_bone(static_cast<Tissue>(p.labels.voxels[i])) && (!in_cylinder || radius_share(p.labels.frame, i) <= 1))
+      n += 1;
   }
   return n * p.labels.frame.voxel_volume_mm3();
 }
@@ -89,8 +92,9 @@ void expect_sensible(const Image& image, double truth_mm3) {
   }
   const double off = g.presets[0].volume_mm3 / truth_mm3 - 1;
   if (std::abs(off) > 0.25) {
-    EXPECT_LE(g.confidence, 0.5) << "bone is " << 100 * off << " % off at " << g.presets[0].lower_hu << " HU, tissue at "
-                                 << g.soft_tissue_hu << ", noise " << g.noise_hu << ", dense bone " << g.dense_bone_hu;
+    EXPECT_LE(g.confidence, 0.5) << "bone is " << 100 * off << " % off at " << g.presets[0].lower_hu
+                                 << " HU, tissue at " << g.soft_tissue_hu << ", noise " << g.noise_hu << ", dense bone "
+                                 << g.dense_bone_hu;
   }
   ::testing::Test::RecordProperty("off_percent", static_cast<int>(100 * off));
   std::printf("  cortical %g HU, bone %+.0f %%, confidence %.2f\n", g.presets[0].lower_hu, 100 * off, g.confidence);
@@ -99,12 +103,14 @@ void expect_sensible(const Image& image, double truth_mm3) {
 TEST(Artefacts, ConeBeamOfTheJaws) {
   const Phantom head = phantom(PhantomRegion::head, 2);
   const double truth = bone_mm3(head, true);
-  for (const auto& c : {ConeBeam{}, ConeBeam{.gain = 0.8, .offset = 150}, ConeBeam{.gain = 1.3, .offset = -250, .cupping = 0.25},
-                        ConeBeam{.gain = 0.6, .offset = 400, .cupping = 0.2, .rim = 300, .noise = 100}}) {
+  for (const auto& c :
+       {ConeBeam{}, ConeBeam{.gain = 0.8, .offset = 150}, ConeBeam{.gain = 1.3, .offset = -250, .cupping = 0.25},
+        ConeBeam{.gain = 0.6, .offset = 400, .cupping = 0.2, .rim = 300, .noise = 100}}) {
     SCOPED_TRACE(std::to_string(c.gain) + " " + std::to_string(c.offset));
     const Image grey = cone_beam(head.ct, c);
     const Verdict v = judged(grey);
-    // Greys at 0.8 times HU, with soft tissue where HU have it, cannot be told from a noisy CT's: then the threshold has to be right.
+    // Greys at 0.8 times HU, with soft tissue where HU have it, cannot be told from a noisy CT's: then the threshold
+    // has to be right.
     const bool far_off = c.gain != 1 && c.gain != 0.8;
     if (far_off) {
       EXPECT_FALSE(v.values.plausible);
@@ -120,8 +126,8 @@ TEST(Artefacts, ConeBeamOfTheJaws) {
 TEST(Artefacts, ConeBeamOfTheTemporalBone) {
   const Phantom ear = phantom(PhantomRegion::temporal, 0.8);
   const double truth = bone_mm3(ear, true);
-  for (const auto& c :
-       {ConeBeam{.noise = 90}, ConeBeam{.gain = 0.7, .offset = 300, .noise = 90}, ConeBeam{.gain = 1.2, .offset = -300, .noise = 60}}) {
+  for (const auto& c : {ConeBeam{.noise = 90}, ConeBeam{.gain = 0.7, .offset = 300, .noise = 90},
+                        ConeBeam{.gain = 1.2, .offset = -300, .noise = 60}}) {
     SCOPED_TRACE(std::to_string(c.gain) + " " + std::to_string(c.offset));
     const Image grey = cone_beam(ear.ct, c);
     const Verdict v = judged(grey);
@@ -132,8 +138,9 @@ TEST(Artefacts, ConeBeamOfTheTemporalBone) {
   }
 }
 
-// Noise of a sharp kernel grows with frequency (S. Riederer et al., The noise power spectrum in computed X-ray tomography, Phys. Med. Biol.
-// 23, 1978); photon counting resolves a fifth of a millimetre with it (T. Flohr et al., Photon-counting CT review, Phys. Medica 79, 2020).
+// Noise of a sharp kernel grows with frequency (S. Riederer et al., The noise power spectrum in computed X-ray
+// tomography, Phys. Med. Biol. 23, 1978); photon counting resolves a fifth of a millimetre with it (T. Flohr et al.,
+// Photon-counting CT review, Phys. Medica 79, 2020).
 Image sharp(const Image& ct, double sigma) {
   std::mt19937 random(4);
   std::normal_distribution<double> noise(0, 1);
@@ -177,7 +184,8 @@ TEST(Artefacts, PhotonCountingWithASharpKernel) {
 // Signed pixels with nothing added, an unmeasured corner, kernels FC..: the bone kernel is recommended.
 TEST(Artefacts, CanonKernelsAndCorners) {
   const Phantom ear = phantom(PhantomRegion::temporal, 1.5);
-  const Image image = with(ear.ct, [&](std::size_t at, double hu) { return radius_share(ear.ct.frame, at) > 1.2 ? -2048 : hu; });
+  const Image image =
+      with(ear.ct, [&](std::size_t at, double hu) { return radius_share(ear.ct.frame, at) > 1.2 ? -2048 : hu; });
   const fs::path folder = test::scratch("canon") / "series";
   save_dicom_series(image, folder);
   Series s("canon-series", test::files_in(folder));

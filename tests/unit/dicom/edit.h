@@ -52,7 +52,8 @@ inline const std::vector<fs::path>& straight_series() {
       std::vector<std::pair<double, fs::path>> sorted;
       for (const auto& f : files_in(real)) {
         DcmFileFormat file;
-        if (file.loadFile(f.c_str(), EXS_Unknown, EGL_noChange, 64).bad() || !file.getDataset()->tagExists(DCM_Rows)) continue;
+        if (file.loadFile(f.c_str(), EXS_Unknown, EGL_noChange, 64).bad() || !file.getDataset()->tagExists(DCM_Rows))
+          continue;
         sorted.emplace_back(position_of(*file.getDataset()).z, f);
       }
       std::sort(sorted.begin(), sorted.end());

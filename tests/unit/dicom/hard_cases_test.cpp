@@ -125,7 +125,8 @@ TEST(HardCase, C05_OneThinTiltedSliceMissing) {
   expect_every_slice_in_its_place(r.image, s.folder);
 }
 
-// From a twentieth of a degree on they are resampled upright and it is told; below, nothing moves by as much as anyone could see.
+// From a twentieth of a degree on they are resampled upright and it is told; below, nothing moves by as much as anyone
+// could see.
 TEST(HardCase, C05_TheLeastTiltThatIsTold) {
   constexpr double kPerDegree = 3.14159265358979 / 180;
   Series leaning("c05-least", slices(0, 12)), straight("c05-less", slices(0, 12));
@@ -461,9 +462,11 @@ TEST(HardCase, C20_EveryTransferSyntax) {
       sum += d;
     }
     const std::string name = f.filename().string();
-    const bool baseline = name.find("JPEGProcess1T") != std::string::npos || name.find("JPEGProcess2") != std::string::npos ||
-                          name.find("JPEGProcess6") != std::string::npos || name.find("JPEGProcess10") != std::string::npos;
-    if (baseline || name.find("JPEGLSLossy") != std::string::npos || name.find("JPEG2000Transfer") != std::string::npos) {
+    const bool baseline =
+        name.find("JPEGProcess1T") != std::string::npos || name.find("JPEGProcess2") != std::string::npos ||
+        name.find("JPEGProcess6") != std::string::npos || name.find("JPEGProcess10") != std::string::npos;
+    if (baseline || name.find("JPEGLSLossy") != std::string::npos ||
+        name.find("JPEG2000Transfer") != std::string::npos) {
       ++lossy;
       EXPECT_LE(worst, baseline ? 200 : name.find("LSLossy") != std::string::npos ? 1 : 5);
       EXPECT_LT(sum / static_cast<double>(wanted.size()), 20);
@@ -509,8 +512,8 @@ TEST(HardCase, C21_EnhancedMultiFrame) {
     d.findAndGetOFString(DCM_RescaleIntercept, intercept);
     put(*group, DCM_RescaleIntercept, intercept.c_str());
     put(*group, DCM_RescaleSlope, "1");
-    for (const auto& tag :
-         {DCM_ImagePositionPatient, DCM_ImageOrientationPatient, DCM_PixelSpacing, DCM_RescaleIntercept, DCM_RescaleSlope}) {
+    for (const auto& tag : {DCM_ImagePositionPatient, DCM_ImageOrientationPatient, DCM_PixelSpacing,
+                            DCM_RescaleIntercept, DCM_RescaleSlope}) {
       d.findAndDeleteElement(tag);
     }
     put(d, DCM_NumberOfFrames, std::to_string(count));
@@ -565,7 +568,9 @@ TEST(HardCase, C23_PaddingIsAir) {
     d.putAndInsertUint16(DCM_HighBit, 15);
     put(d, DCM_RescaleIntercept, "-1024");
     d.findAndDeleteElement(DCM_PixelPaddingValue);
-    ASSERT_TRUE(d.putAndInsertSint16(DcmTag(DCM_PixelPaddingValue, EVR_SS), static_cast<Sint16>(i % 2 == 0 ? -2000 : -32768)).good());
+    ASSERT_TRUE(
+        d.putAndInsertSint16(DcmTag(DCM_PixelPaddingValue, EVR_SS), static_cast<Sint16>(i % 2 == 0 ? -2000 : -32768))
+            .good());
   });
   const Imported r = load(s.folder);
   EXPECT_EQ(r.verdict.values.padding_source, "tag and found");
@@ -596,8 +601,8 @@ TEST(HardCase, C24_WithoutPreambleAndMeta) {
 }
 
 // Each pixel stored anew as word(HU), with the tags that say how.
-void store_as(Series& s, const std::function<Uint16(int hu, std::size_t at)>& word, int bits_stored, int high_bit, bool is_signed,
-              int intercept) {
+void store_as(Series& s, const std::function<Uint16(int hu, std::size_t at)>& word, int bits_stored, int high_bit,
+              bool is_signed, int intercept) {
   s.edit_all([&](DcmDataset& d, int) {
     const Uint16* read = nullptr;
     unsigned long count = 0;
@@ -645,10 +650,13 @@ TEST(HardCase, C25_SignedPixelsWithoutTheirSignExtended) {
   for (const int padding : {-2000, -3024}) {
     store_as(
         padded,
-        [&](int hu, std::size_t i) { return static_cast<Uint16>(i < 5000 ? (padding == -2000 ? padding & 0xFFF : padding) : low(hu)); }, 12,
-        11, true, 0);
+        [&](int hu, std::size_t i) {
+          return static_cast<Uint16>(i < 5000 ? (padding == -2000 ? padding & 0xFFF : padding) : low(hu));
+        },
+        12, 11, true, 0);
     padded.edit_all([&](DcmDataset& d, int) {
-      d.putAndInsertSint16(DcmTag(DCM_PixelPaddingValue, EVR_SS), static_cast<Sint16>(padding == -2000 ? padding & 0xFFF : padding));
+      d.putAndInsertSint16(DcmTag(DCM_PixelPaddingValue, EVR_SS),
+                           static_cast<Sint16>(padding == -2000 ? padding & 0xFFF : padding));
     });
     const Imported p = load(padded.folder);
     EXPECT_TRUE(p.verdict.has(code::padding_tag)) << padding;
@@ -673,8 +681,9 @@ TEST(HardCase, C26_OtherBitsAroundThoseOfThePixel) {
   const Imported wanted = load(plain.folder);
   // Garbage above HighBit.
   store_as(
-      above, [&](int hu, std::size_t i) { return static_cast<Uint16>(word(hu) | ((i * 2654435761U >> 7 & 15U) << 12)); }, 12, 11, false,
-      -1024);
+      above,
+      [&](int hu, std::size_t i) { return static_cast<Uint16>(word(hu) | ((i * 2654435761U >> 7 & 15U) << 12)); }, 12,
+      11, false, -1024);
   const Imported cleared = load(above.folder);
   EXPECT_TRUE(cleared.verdict.has(code::bits_foreign));
   expect_same_voxels(wanted.image, cleared.image);
@@ -690,7 +699,10 @@ TEST(HardCase, C26_OtherBitsAroundThoseOfThePixel) {
   expect_same_voxels(wanted.image, guessed.image);
   // A BitsStored that metal exceeds, with edges as blurred as a scanner's: 5600 and not 1504.
   store_as(
-      metal, [&](int hu, std::size_t i) { return static_cast<Uint16>(std::max(word(hu), 5600 - 200 * std::abs(int(i % columns) - 20))); },
+      metal,
+      [&](int hu, std::size_t i) {
+        return static_cast<Uint16>(std::max(word(hu), 5600 - 200 * std::abs(int(i % columns) - 20)));
+      },
       12, 11, false, -1024);
   const Imported kept = load(metal.folder);
   EXPECT_TRUE(kept.verdict.has(code::bits_stored_wrong));
@@ -714,7 +726,8 @@ void of_another(DcmDataset& d, const DcmTagKey& tag, const char* value) {
   put(d, DCM_SOPInstanceUID, std::string(uid.c_str()) + ".7");
 }
 
-// Two patients, studies or frames of reference, each under its own series UID or under one: never one of them without a word.
+// Two patients, studies or frames of reference, each under its own series UID or under one: never one of them without a
+// word.
 TEST(HardCase, C27_ScansThatDoNotBelongTogether) {
   for (const bool one_series : {false, true}) {
     for (const auto& [tag, value, said, scans] :
@@ -742,7 +755,8 @@ TEST(HardCase, C27_ScansThatDoNotBelongTogether) {
       first.series = scans.first;
       const Verdict v = load(s.folder, first).verdict;
       EXPECT_EQ(v.has(code::several_scans), one_series);
-      EXPECT_EQ(std::count_if(v.set_aside.begin(), v.set_aside.end(), [](const auto& f) { return f.code == code::several_scans; }),
+      EXPECT_EQ(std::count_if(v.set_aside.begin(), v.set_aside.end(),
+                              [](const auto& f) { return f.code == code::several_scans; }),
                 one_series ? 12 : 0);
     }
   }
@@ -772,7 +786,8 @@ TEST(HardCase, C27_OneScanThatLooksLikeSeveral) {
   EXPECT_EQ(r.verdict.slices.size(), 20u);
 }
 
-// Unsigned pixels that lack their intercept: everything 1024 HU too high, bone from fat on. Refused, with the offset that mends it.
+// Unsigned pixels that lack their intercept: everything 1024 HU too high, bone from fat on. Refused, with the offset
+// that mends it.
 TEST(HardCase, C28_WithoutTheOffset) {
   for (const bool thorough : {true, false}) {
     PhantomParams p;
@@ -826,7 +841,8 @@ TEST(HardCase, C29_ProjectionsAndSlabs) {
   ImportParams any;
   any.any_modality = true;
   EXPECT_TRUE(load(by_type->folder, any).verdict.has(code::projection));
-  refusal(made("c29-name", [](DcmDataset& d) { put(d, DCM_SeriesDescription, "AX Thin MIP_10mm"); })->folder, code::projection);
+  refusal(made("c29-name", [](DcmDataset& d) { put(d, DCM_SeriesDescription, "AX Thin MIP_10mm"); })->folder,
+          code::projection);
   EXPECT_FALSE(load(made("c29-other", [](DcmDataset& d) { put(d, DCM_SeriesDescription, "Mipham temporal"); })->folder)
                    .verdict.has(code::projection));
   const auto by_far = made("c29-slab", [](DcmDataset& d) { put(d, DCM_SliceThickness, "10"); });
@@ -880,7 +896,8 @@ TEST(HardCase, C32_OneShiftedSliceIsNoTilt) {
   const Verdict v = load(s.folder).verdict;
   EXPECT_FALSE(v.has(code::tilted));
   EXPECT_EQ(v.tilt_deg, 0);
-  const auto it = std::find_if(v.findings.begin(), v.findings.end(), [](const auto& f) { return f.code == code::shifted_sideways; });
+  const auto it = std::find_if(v.findings.begin(), v.findings.end(),
+                               [](const auto& f) { return f.code == code::shifted_sideways; });
   ASSERT_NE(it, v.findings.end());
   EXPECT_NE(it->message.find("one slice ('019') is shifted sideways by 9 mm"), std::string::npos) << it->message;
   // The table moved half-way: a step, and no tilt either.

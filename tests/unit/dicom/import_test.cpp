@@ -67,7 +67,8 @@ TEST(RealDicom, StraightPhantomSeriesIsTakenVoxelForVoxel) {
 TEST(Dicom, DecodingInParallelGivesTheSameVoxels) {
   const auto folder = data("dicom_transfer_syntaxes");
   if (!fs::exists(folder)) GTEST_SKIP() << "no " << folder;
-  for (const char* kind : {"JPEG2000LosslessOnly", "JPEGLSLossless", "JPEGProcess14SV1", "JPEGProcess2_4", "RLELossless"}) {
+  for (const char* kind :
+       {"JPEG2000LosslessOnly", "JPEGLSLossless", "JPEGProcess14SV1", "JPEGProcess2_4", "RLELossless"}) {
     SCOPED_TRACE(kind);
     fs::path file;
     for (const auto& f : test::files_in(folder)) {
@@ -152,8 +153,8 @@ TEST(Verdict, ComesBackFromItsJson) {
   EXPECT_EQ(back.findings[1].code, code::slices_missing);
   EXPECT_EQ(back.findings[1].severity, Severity::warning);
   EXPECT_EQ(back.findings[1].files, (std::vector<std::string>{"a", "b"}));
-  for (const char* bad :
-       {"", "{", "[]", "{}", "{\"osteotome_verdict\":2}", "{\"osteotome_verdict\":1,\"status\":\"good\",\"findings\":[1]}"}) {
+  for (const char* bad : {"", "{", "[]", "{}", "{\"osteotome_verdict\":2}",
+                          "{\"osteotome_verdict\":1,\"status\":\"good\",\"findings\":[1]}"}) {
     EXPECT_THROW(static_cast<void>(read_verdict(bad)), Error) << bad;
   }
 }

@@ -1,4 +1,5 @@
-// Series that hold more than one scan, and values that are no Hounsfield units by what their header says (42 to 71 of docs/hard-cases.md).
+// Series that hold more than one scan, and values that are no Hounsfield units by what their header says (42 to 71 of
+// docs/hard-cases.md).
 #include <cmath>
 
 #include "edit.h"
@@ -73,7 +74,8 @@ void expect_two_stacks(const fs::path& folder, std::size_t first, std::size_t se
   const Imported one = load(folder), two = load(folder, 2);
   EXPECT_EQ(one.verdict.slices.size(), first);
   EXPECT_EQ(two.verdict.slices.size(), second);
-  EXPECT_NE(message_of(one.verdict, code::several_stacks).find(said), std::string::npos) << message_of(one.verdict, code::several_stacks);
+  EXPECT_NE(message_of(one.verdict, code::several_stacks).find(said), std::string::npos)
+      << message_of(one.verdict, code::several_stacks);
   for (const Imported* r : {&one, &two}) {
     const bool of_b = r->verdict.slices.front().file.starts_with("b");
     for (const SliceRecord& s : r->verdict.slices) EXPECT_EQ(s.file.starts_with("b"), of_b) << s.file;
@@ -170,7 +172,8 @@ TEST(MixedSeries, C58_NumbersThatAreNoValues) {
 
   Series numbers("c64", slices(0, 12));
   numbers.edit_all([](DcmDataset& d, int) {
-    for (const DcmTagKey& tag : {DCM_BitsStored, DCM_HighBit, DCM_PixelRepresentation, DCM_PixelData}) d.findAndDeleteElement(tag);
+    for (const DcmTagKey& tag : {DCM_BitsStored, DCM_HighBit, DCM_PixelRepresentation, DCM_PixelData})
+      d.findAndDeleteElement(tag);
     d.putAndInsertUint16(DCM_BitsAllocated, 32);
     const std::vector<Float32> pixels(512 * 512, 40.0F);
     d.putAndInsertFloat32Array(DCM_FloatPixelData, pixels.data(), pixels.size());
@@ -262,7 +265,8 @@ TEST(MixedSeries, C28_ThePictureOfARefusal) {
     double slope = 1, intercept = 0;
     d.findAndGetFloat64(DCM_RescaleSlope, slope);
     d.findAndGetFloat64(DCM_RescaleIntercept, intercept);
-    for (int i = 0; i < 512 * 512; ++i) pixels[i] = static_cast<Uint16>(std::max(0.0, pixels[i] * slope + intercept + 1024));
+    for (int i = 0; i < 512 * 512; ++i)
+      pixels[i] = static_cast<Uint16>(std::max(0.0, pixels[i] * slope + intercept + 1024));
     put(d, DCM_RescaleIntercept, "0");
     put(d, DCM_RescaleSlope, "1");
   });

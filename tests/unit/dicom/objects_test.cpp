@@ -86,8 +86,10 @@ TEST(Objects, TagsOfTheSourceThatDicomDoesNotAllow) {
     said.clear();
     const fs::path file = out / (on_source ? "source.dcm" : "stack.dcm");
     const DicomObjectOptions options{&scan.series[0], "Bone"};
-    on_source ? save_segmentation_on_source(bone, file, options, context) : save_segmentation(bone, file, options, context);
-    for (const char* name : {"StudyDate", "StudyTime", "PatientBirthDate", "PatientSex", "StudyInstanceUID", "FrameOfReferenceUID"})
+    on_source ? save_segmentation_on_source(bone, file, options, context)
+              : save_segmentation(bone, file, options, context);
+    for (const char* name :
+         {"StudyDate", "StudyTime", "PatientBirthDate", "PatientSex", "StudyInstanceUID", "FrameOfReferenceUID"})
       EXPECT_NE(said.find(name), std::string::npos) << said;
     EXPECT_EQ(said.find("a8f3c9e177"), std::string::npos) << "values are not shown";
     expect_same_mask(bone, load_segmentation(file));
@@ -169,7 +171,8 @@ std::vector<Uint8> run_length(const std::vector<Uint8>& bytes) {
   for (std::size_t at = 0; at < bytes.size(); at += 128) {
     const std::size_t n = std::min<std::size_t>(128, bytes.size() - at);
     out.push_back(static_cast<Uint8>(n - 1));
-    out.insert(out.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at), bytes.begin() + static_cast<std::ptrdiff_t>(at + n));
+    out.insert(out.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at),
+               bytes.begin() + static_cast<std::ptrdiff_t>(at + n));
   }
   if (out.size() % 2 != 0) out.push_back(0);
   return out;

@@ -44,7 +44,8 @@ struct Reference {
       const Uint16* pixels = nullptr;
       if (d.findAndGetUint16Array(DCM_PixelData, pixels).bad()) continue;
       for (int i = 0; i < rows * columns; ++i) {
-        s.hu.push_back(s.slope * (is_signed ? static_cast<std::int16_t>(pixels[i]) : static_cast<int>(pixels[i])) + s.intercept);
+        s.hu.push_back(s.slope * (is_signed ? static_cast<std::int16_t>(pixels[i]) : static_cast<int>(pixels[i])) +
+                       s.intercept);
       }
       slices.push_back(std::move(s));
     }
@@ -79,13 +80,15 @@ struct Reference {
   }
 };
 
-// The volume against the reference at random voxels. One HU is rounding; a place wrong by 0.01 mm shows at bone's edges.
+// The volume against the reference at random voxels. One HU is rounding; a place wrong by 0.01 mm shows at bone's
+// edges.
 inline void expect_every_slice_in_its_place(const Image& image, const fs::path& folder) {
   const Reference reference(folder);
   std::mt19937 random(7);
   int compared = 0, bone = 0;
   for (int n = 0; n < 60000; ++n) {
-    const int i = static_cast<int>(random() % image.frame.dims[0]), j = static_cast<int>(random() % image.frame.dims[1]),
+    const int i = static_cast<int>(random() % image.frame.dims[0]),
+              j = static_cast<int>(random() % image.frame.dims[1]),
               k = static_cast<int>(random() % image.frame.dims[2]);
     const double wanted = reference.at(image.frame.world_from_index({double(i), double(j), double(k)}));
     if (std::isnan(wanted)) continue;

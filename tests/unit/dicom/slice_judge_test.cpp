@@ -21,8 +21,8 @@ using test::Series;
 
 using Slices = std::vector<std::vector<std::int16_t>>;
 
-constexpr std::array kJudged{code::slice_blank, code::slice_part_missing, code::slice_values_step, code::slice_mirrored, code::slice_order,
-                             code::concatenation_incomplete};
+constexpr std::array kJudged{code::slice_blank,    code::slice_part_missing, code::slice_values_step,
+                             code::slice_mirrored, code::slice_order,        code::concatenation_incomplete};
 
 std::vector<std::string> judged(const Verdict& v) {
   std::vector<std::string> found;
@@ -46,7 +46,8 @@ Image phantom(PhantomRegion region, double spacing_mm) {
   return make_phantom(p).ct;
 }
 Image with(const Image& image, const std::function<void(Slices&)>& fault) {
-  const std::size_t area = static_cast<std::size_t>(image.frame.dims[0]) * static_cast<std::size_t>(image.frame.dims[1]);
+  const std::size_t area =
+      static_cast<std::size_t>(image.frame.dims[0]) * static_cast<std::size_t>(image.frame.dims[1]);
   Slices slices;
   for (int k = 0; k < image.frame.dims[2]; ++k) {
     const std::int16_t* const p = image.voxels.get() + static_cast<std::size_t>(k) * area;
@@ -80,7 +81,8 @@ void turn_over(std::vector<std::int16_t>& slice, bool up_and_down) {
   const int nx = ear().frame.dims[0], ny = ear().frame.dims[1];
   for (int j = 0; j < ny; ++j) {
     if (!up_and_down) std::reverse(slice.begin() + j * nx, slice.begin() + (j + 1) * nx);
-    if (up_and_down && j < ny / 2) std::swap_ranges(slice.begin() + j * nx, slice.begin() + (j + 1) * nx, slice.begin() + (ny - 1 - j) * nx);
+    if (up_and_down && j < ny / 2)
+      std::swap_ranges(slice.begin() + j * nx, slice.begin() + (j + 1) * nx, slice.begin() + (ny - 1 - j) * nx);
   }
 }
 
@@ -99,8 +101,12 @@ struct Fault {
 const std::size_t kAt = 27;
 std::vector<Fault> faults() {
   const auto last = static_cast<std::size_t>(ear().frame.dims[2] - 1);
-  const auto each = [](std::size_t begin, std::size_t end, const std::function<void(std::vector<std::int16_t>&)>& change) {
-    return [=](Slices& s) { std::for_each(s.begin() + static_cast<std::ptrdiff_t>(begin), s.begin() + static_cast<std::ptrdiff_t>(end), change); };
+  const auto each = [](std::size_t begin, std::size_t end,
+                       const std::function<void(std::vector<std::int16_t>&)>& change) {
+    return [=](Slices& s) {
+      std::for_each(s.begin() + static_cast<std::ptrdiff_t>(begin), s.begin() + static_cast<std::ptrdiff_t>(end),
+                    change);
+    };
   };
   const auto blank = [](auto& s) { std::fill(s.begin(), s.end(), std::int16_t{-1024}); };
   const auto add = [](int hu) {
@@ -111,8 +117,12 @@ std::vector<Fault> faults() {
   const auto slope = [](auto& s) {
     for (auto& v : s) v = static_cast<std::int16_t>((v + 1024) * 1.1 - 1024);
   };
-  const auto half = [](auto& s) { std::fill(s.begin() + static_cast<std::ptrdiff_t>(s.size() / 2), s.end(), std::int16_t{-1024}); };
-  const auto upper_rows = [](auto& s) { std::fill(s.begin(), s.begin() + static_cast<std::ptrdiff_t>(s.size() / 3), std::int16_t{-1024}); };
+  const auto half = [](auto& s) {
+    std::fill(s.begin() + static_cast<std::ptrdiff_t>(s.size() / 2), s.end(), std::int16_t{-1024});
+  };
+  const auto upper_rows = [](auto& s) {
+    std::fill(s.begin(), s.begin() + static_cast<std::ptrdiff_t>(s.size() / 3), std::int16_t{-1024});
+  };
   const auto left_columns = [](auto& s) {
     const int nx = ear().frame.dims[0];
     for (std::size_t i = 0; i < s.size(); ++i)
@@ -212,7 +222,8 @@ TEST(SliceJudge, NamesTheFiles) {
   const Verdict v = import_ct(folder, {}).verdict;
   const auto files = test::files_in(folder);
   EXPECT_EQ(finding(v, code::slice_blank).files, std::vector<std::string>{files[20].filename().string()});
-  EXPECT_EQ(finding(v, code::slice_order).files, (std::vector<std::string>{files[30].filename().string(), files[31].filename().string()}));
+  EXPECT_EQ(finding(v, code::slice_order).files,
+            (std::vector<std::string>{files[30].filename().string(), files[31].filename().string()}));
   EXPECT_EQ(v.status(), "repaired");
   const DicomScan scan = scan_dicom(folder);
   DicomSlabs slabs(scan.series.at(0), {}, 2);
@@ -266,7 +277,8 @@ TEST(VerdictCodes, TableAndPageAgree) {
   std::vector<std::string> rows;
   std::ifstream page(fs::path(OSTEO_SOURCE) / "docs" / "verdict.md");
   for (std::string line; std::getline(page, line);) {
-    if (line.starts_with("| `") && line.find_first_of("abcdefghijklmnopqrstuvwxyz") > line.find('`', 3)) rows.push_back(line);
+    if (line.starts_with("| `") && line.find_first_of("abcdefghijklmnopqrstuvwxyz") > line.find('`', 3))
+      rows.push_back(line);
   }
   std::vector<std::string> wanted;
   for (const VerdictCode& c : verdict_codes()) wanted.push_back(table_row(c));
@@ -280,7 +292,9 @@ TEST(VerdictCodes, TableAndPageAgree) {
   int codes = 0;
   for (std::size_t at = text.find(" = \""); at != std::string::npos; at = text.find(" = \"", at + 1)) {
     const std::string code = text.substr(at + 4, text.find('"', at + 4) - at - 4);
-    if (code.empty() || code.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") != std::string::npos || code == "DICOM") continue;
+    if (code.empty() || code.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") != std::string::npos ||
+        code == "DICOM")
+      continue;
     EXPECT_NE(find_verdict_code(code), nullptr) << code;
     ++codes;
   }

@@ -133,14 +133,15 @@ TEST(SparseSegmentation, AbsentFramesAreEmptyLayers) {
   using Layers = std::vector<std::pair<int, std::uint8_t>>;
   for (const bool oblique : {false, true}) {
     for (const double pitch : {0.5, 1.0 / 3}) {
-      for (const Layers& layers : {Layers{{10, 1}, {13, 1}, {19, 1}},                      // distances with a common part
-                                   Layers{{10, 1}, {12, 1}, {17, 1}},                      // and without
-                                   Layers{{0, 1}, {23, 1}}, Layers{{7, 1}},                // the ends, one alone
-                                   Layers{{3, 1}, {4, 1}, {5, 1}, {9, 1}},                 // neighbours and a hole
-                                   Layers{{2, 1}, {8, 2}, {14, 1}, {20, 3}, {22, 2}}}) {  // several segments, none in all
+      for (const Layers& layers :
+           {Layers{{10, 1}, {13, 1}, {19, 1}},                     // distances with a common part
+            Layers{{10, 1}, {12, 1}, {17, 1}},                     // and without
+            Layers{{0, 1}, {23, 1}}, Layers{{7, 1}},               // the ends, one alone
+            Layers{{3, 1}, {4, 1}, {5, 1}, {9, 1}},                // neighbours and a hole
+            Layers{{2, 1}, {8, 2}, {14, 1}, {20, 3}, {22, 2}}}) {  // several segments, none in all
         for (const bool shuffled : {false, true}) {
-          SCOPED_TRACE(std::to_string(layers.size()) + " of pitch " + std::to_string(pitch) + (shuffled ? ", shuffled" : "") +
-                       (oblique ? ", oblique" : ""));
+          SCOPED_TRACE(std::to_string(layers.size()) + " of pitch " + std::to_string(pitch) +
+                       (shuffled ? ", shuffled" : "") + (oblique ? ", oblique" : ""));
           const Labels truth = painted(stack(pitch, oblique), layers);
           save_segmentation(truth, out / "a.dcm");
           if (shuffled) shuffle_frames(out / "a.dcm");
@@ -163,7 +164,8 @@ TEST(SparseSegmentation, SaysWhatItsVolumeDependsOn) {
 
 TEST(SparseSegmentation, WithoutAStatedDistanceThicknessDecides) {
   const fs::path file = scratch("sparse-unstated") / "a.dcm";
-  const Labels close = painted(stack(0.5), {{10, 1}, {11, 1}, {14, 1}}), even = painted(stack(0.5), {{10, 1}, {13, 1}, {19, 1}}),
+  const Labels close = painted(stack(0.5), {{10, 1}, {11, 1}, {14, 1}}),
+               even = painted(stack(0.5), {{10, 1}, {13, 1}, {19, 1}}),
                odd = painted(stack(0.5), {{10, 1}, {12, 1}, {17, 1}});
   for (const Labels* const l : {&close, &odd}) {
     save_segmentation(*l, file);

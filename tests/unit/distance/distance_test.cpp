@@ -24,7 +24,8 @@ double brute_force(const TriangleSoup& s, Vec3 p) {
   return d;
 }
 
-// An independent point-triangle distance: long double, by the regions of C. Ericson, Real-Time Collision Detection, section 5.1.5.
+// An independent point-triangle distance: long double, by the regions of C. Ericson, Real-Time Collision Detection,
+// section 5.1.5.
 long double reference(Vec3 pp, Vec3 aa, Vec3 bb, Vec3 cc) {
   using L = long double;
   struct V {
@@ -81,8 +82,8 @@ Worst compare(const DistanceMap& map, const TriangleSoup& soup, const TriangleSo
       if (expected > 1e-6 * voxel && (d < 0) != (std::abs(winding_number(truth, p)) > 0.5)) ++w.wrong_sign;
       // The triangle named is a nearest one.
       const auto& t = soup.triangles[map.triangle[b * 512 + v]];
-      EXPECT_NEAR(closest_on_triangle(p, soup.points_mm[t[0]], soup.points_mm[t[1]], soup.points_mm[t[2]]).distance_mm, expected,
-                  1e-9 * voxel);
+      EXPECT_NEAR(closest_on_triangle(p, soup.points_mm[t[0]], soup.points_mm[t[1]], soup.points_mm[t[2]]).distance_mm,
+                  expected, 1e-9 * voxel);
       ++w.compared;
     }
   }
@@ -173,7 +174,8 @@ TEST(DistanceMap, IsExactAndSignedOnHardCases) {
   for (std::size_t i = 0; i < ball.triangles.size(); i += 10)
     reversed.triangles.push_back({ball.triangles[i][0], ball.triangles[i][2], ball.triangles[i][1]});
   TriangleSoup flipped = ball;
-  for (std::size_t i = 0; i < ball.triangles.size(); i += 5) std::swap(flipped.triangles[i][0], flipped.triangles[i][1]);
+  for (std::size_t i = 0; i < ball.triangles.size(); i += 5)
+    std::swap(flipped.triangles[i][0], flipped.triangles[i][1]);
   TriangleSoup needles = ball;
   for (std::size_t i = 0; i < 200; ++i) {
     const auto t = ball.triangles[i];
@@ -204,7 +206,8 @@ TEST(DistanceMap, IsExactAndSignedOnHardCases) {
       {"two bodies that intersect", joined(ball, sphere(8, 3, {9, 1, 0})), joined(ball, sphere(8, 3, {9, 1, 0}))},
       {"cavity", joined(ball, turned(sphere(6, 2))), joined(ball, turned(sphere(6, 2)))},
       {"nested shells, both out", joined(ball, sphere(6, 2)), joined(ball, sphere(6, 2))},
-      {"touching boxes", joined(box({0, 0, 0}, {5, 10, 10}), box({5, 0, 0}, {10, 10, 10})), box({0, 0, 0}, {10, 10, 10})},
+      {"touching boxes", joined(box({0, 0, 0}, {5, 10, 10}), box({5, 0, 0}, {10, 10, 10})),
+       box({0, 0, 0}, {10, 10, 10})},
       {"boxes that share an edge", joined(box({0, 0, 0}, {5, 5, 10}), box({5, 5, 0}, {10, 10, 10})),
        joined(box({0, 0, 0}, {5, 5, 10}), box({5, 5, 0}, {10, 10, 10}))},
       {"far away", moved(ball, 1, {1e6, -1e6, 1e6}), moved(ball, 1, {1e6, -1e6, 1e6})},
@@ -241,7 +244,8 @@ TEST(DistanceMap, BandAndInteriorAreTheBoxesRestricted) {
   const TriangleSoup s = joined(sphere(10, 3), sphere(4, 2, {18, 3, 1}));
   const Frame f = frame_around(s, 60, 5);
   const DistanceMapper mapper(s, f);
-  const DistanceMap all = mapper.map(), band = mapper.map({DistanceRegion::band, 1.7, 2.3}), in = mapper.map({DistanceRegion::interior});
+  const DistanceMap all = mapper.map(), band = mapper.map({DistanceRegion::band, 1.7, 2.3}),
+                    in = mapper.map({DistanceRegion::interior});
   std::uint64_t near = 0, inside = 0;
   for (std::size_t b = 0; b < all.bricks.size(); ++b) {
     for (int v = 0; v < 512; ++v) {
@@ -365,7 +369,8 @@ TEST(VoxelsInside, MillionsOfTrianglesInBoundedMemory) {
   double expected = 0;
   for (int k = 0; k < f.dims[2]; ++k) {
     for (int j = 0; j < f.dims[1]; ++j) {
-      for (int i = 0; i < f.dims[0]; ++i) expected += length(f.world_from_index({double(i), double(j), double(k)})) < 9.9995;
+      for (int i = 0; i < f.dims[0]; ++i)
+        expected += length(f.world_from_index({double(i), double(j), double(k)})) < 9.9995;
     }
   }
   EXPECT_NEAR(static_cast<double>(bits.count()), expected, 40);

@@ -14,11 +14,14 @@ TEST(LiveDistance, EqualsARebuildAfterEveryEdit) {
   TriangleSoup s = test::sphere(10, 4);
   const Frame f = frame_around_mm(s, 0.5, 8);
   const double reach = 2.5;
-  const InsideAt inside = [&](int i, int j, int k) { return length(f.world_from_index({double(i), double(j), double(k)})) < 10; };
+  const InsideAt inside = [&](int i, int j, int k) {
+    return length(f.world_from_index({double(i), double(j), double(k)})) < 10;
+  };
   LiveDistance live(s, f, reach, inside);
   std::vector<std::array<Vec3, 3>> all;
   std::vector<std::uint8_t> alive;
-  for (const auto& t : s.triangles) all.push_back({s.points_mm[t[0]], s.points_mm[t[1]], s.points_mm[t[2]]}), alive.push_back(1);
+  for (const auto& t : s.triangles)
+    all.push_back({s.points_mm[t[0]], s.points_mm[t[1]], s.points_mm[t[2]]}), alive.push_back(1);
   std::mt19937 random(6);
   for (int step = 0; step < 8; ++step) {
     // A dent: triangles in a ball move inward; the last steps only take away.

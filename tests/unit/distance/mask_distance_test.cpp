@@ -33,7 +33,8 @@ TEST(MaskDistance, EqualsBruteForceAndNamesTheNearest) {
           for (int z = 0; z < 11; ++z) {
             for (int y = 0; y < 14; ++y) {
               for (int x = 0; x < 19; ++x) {
-                const double d = std::sqrt(std::pow(0.7 * (x - i), 2) + std::pow(1.1 * (y - j), 2) + std::pow(1.9 * (z - k), 2));
+                const double d =
+                    std::sqrt(std::pow(0.7 * (x - i), 2) + std::pow(1.1 * (y - j), 2) + std::pow(1.9 * (z - k), 2));
                 if (!in(x, y, z)) {
                   to_out = std::min(to_out, d);
                 } else {

@@ -58,13 +58,15 @@ TEST(Solid, OverlapsCountOnce) {
 
 TEST(Solid, ThinOverlapsAreNotCountedTwice) {
   // What overlaps is small beside the surface: three bars that cross, a needle through a plate, balls that just meet.
-  const TriangleSoup bars = joined(joined(box({-20, -2, -2}, {20, 2, 2}), box({-2, -20, -2}, {2, 20, 2})), box({-2, -2, -20}, {2, 2, 20}));
+  const TriangleSoup bars =
+      joined(joined(box({-20, -2, -2}, {20, 2, 2}), box({-2, -20, -2}, {2, 20, 2})), box({-2, -2, -20}, {2, 2, 20}));
   EXPECT_NEAR(inside_volume_mm3(bars), 3 * 640 - 2 * 64, 1);
   EXPECT_NEAR(inside_volume_mm3(turned(bars)), 3 * 640 - 2 * 64, 15);  // all of it counted in voxels
   const TriangleSoup plate = joined(box({0, 0, 0}, {40, 40, 1}), box({19.7, 19.7, -30}, {20.2, 20.2, 30}));
   EXPECT_NEAR(inside_volume_mm3(plate), 1600 + 15 - 0.25, 0.25);  // the overlap is two voxels wide
   const double ball = inside_volume_mm3(sphere(10, 4)), cap = std::numbers::pi / 3 * 0.25 * 0.25 * (30 - 0.25);
-  EXPECT_NEAR(inside_volume_mm3(joined(sphere(10, 4), sphere(10, 4, {19.5, 0, 0}))), 2 * ball - 2 * cap, 0.05 * cap + 0.5);
+  EXPECT_NEAR(inside_volume_mm3(joined(sphere(10, 4), sphere(10, 4, {19.5, 0, 0}))), 2 * ball - 2 * cap,
+              0.05 * cap + 0.5);
   // And a body of many triangles without overlap is exact, however much surface it has.
   TriangleSoup comb;
   for (int i = 0; i < 60; ++i) comb = joined(comb, box({i * 1.0, 0, 0}, {i + 0.43, 60, 60}));

@@ -1,4 +1,5 @@
-// The hierarchy of turns against the sum over all triangles: values within their bound, decisions equal also next to one half.
+// The hierarchy of turns against the sum over all triangles: values within their bound, decisions equal also next to
+// one half.
 #include "turns_tree.h"
 
 #include <gtest/gtest.h>
@@ -119,8 +120,8 @@ TEST(TurnsTree, CrossesWhatEachOfItsTrianglesCrosses) {
   std::uniform_real_distribution<double> u(-12, 12);
   for (int i = 0; i < 400; ++i) {
     // Also through corners and along edges.
-    const Vec3 p =
-        i % 2 == 0 ? Vec3{u(random), u(random), u(random)} : s.points_mm[static_cast<std::size_t>(i)] + Vec3{i % 4 == 1 ? 1.0 : 0.0, 0, 0};
+    const Vec3 p = i % 2 == 0 ? Vec3{u(random), u(random), u(random)}
+                              : s.points_mm[static_cast<std::size_t>(i)] + Vec3{i % 4 == 1 ? 1.0 : 0.0, 0, 0};
     int expected = 0;
     for (const TurnsTree& t : single) expected += t.crossings_before(p);
     ASSERT_EQ(tree.crossings_before(p), expected);
@@ -136,7 +137,8 @@ TEST(TurnsTree, OfNothing) {
 }
 
 TEST(SignedDistance, OfSoupsAsTheWindingNumber) {
-  for (const TriangleSoup& s : {loose(900, 6), loose(500, 0.5), without(sphere(10, 4), 40), without(sphere(10, 4), 3)}) {
+  for (const TriangleSoup& s :
+       {loose(900, 6), loose(500, 0.5), without(sphere(10, 4), 40), without(sphere(10, 4), 3)}) {
     const SignedDistance d(s);
     EXPECT_FALSE(d.closed());
     const TriangleSoup truth = ordered(s).soup;

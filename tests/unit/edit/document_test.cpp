@@ -174,7 +174,8 @@ TEST(EditDocument, FillsWhatIsEnclosedAndNotLarger) {
 
 // The same by the definition: all weights, voxel by voxel.
 TEST(EditDocument, SmoothingIsTheWeightedMajorityAndStaysWithinItsLimit) {
-  for (const auto& [spacing, radius] : {std::pair{Vec3{0.5, 0.5, 0.5}, 0.5}, {Vec3{0.5, 0.5, 1.25}, 1.3}, {Vec3{0.4, 0.6, 2}, 1.3}}) {
+  for (const auto& [spacing, radius] :
+       {std::pair{Vec3{0.5, 0.5, 0.5}, 0.5}, {Vec3{0.5, 0.5, 1.25}, 1.3}, {Vec3{0.4, 0.6, 2}, 1.3}}) {
     Image ct = walnut({131, 37, 23});
     ct.frame.spacing_mm = spacing;
     EditDocument d(ct, start_of(ct, 300));
@@ -198,7 +199,8 @@ TEST(EditDocument, SmoothingIsTheWeightedMajorityAndStaysWithinItsLimit) {
           for (int dk = -n[2]; dk <= n[2]; ++dk) {
             for (int dj = -n[1]; dj <= n[1]; ++dj) {
               for (int di = -n[0]; di <= n[0]; ++di) {
-                const bool in = before.at(std::clamp(i + di, 0, 130), std::clamp(j + dj, 0, 36), std::clamp(k + dk, 0, 22));
+                const bool in =
+                    before.at(std::clamp(i + di, 0, 130), std::clamp(j + dj, 0, 36), std::clamp(k + dk, 0, 22));
                 sum += in ? std::round(weight[0][static_cast<std::size_t>(di + n[0])]) *
                                 std::round(weight[1][static_cast<std::size_t>(dj + n[1])]) *
                                 std::round(weight[2][static_cast<std::size_t>(dk + n[2])])
@@ -470,7 +472,8 @@ TEST(EditFuzz, UndoToTheStartIsTheStart) {
   apply_edits(again, parse_edits(file, "edits.json"));
   EXPECT_EQ(again.hash(), last);
   if (wanted != nullptr)
-    std::printf("%d actions, %zu steps, history %.1f MB\n", actions, steps, static_cast<double>(d.history_bytes()) / 1e6);
+    std::printf("%d actions, %zu steps, history %.1f MB\n", actions, steps,
+                static_cast<double>(d.history_bytes()) / 1e6);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// The cavity by words of bits against distance transforms and a flood, cell by cell; bone on a lattice over the seam of a region.
+// The cavity by words of bits against distance transforms and a flood, cell by cell; bone on a lattice over the seam of
+// a region.
 #include "cavity.h"
 
 #include <gtest/gtest.h>
@@ -60,7 +61,8 @@ Bytes by_distances(const Bytes& solid, const Bytes& gone, const Bytes& closed, c
   const auto to_solid = squared_distance_mm2(solid, f, 1), to_gone = squared_distance_mm2(gone, f, 1);
   const auto fits = [&](std::size_t c) { return to_solid[c] >= static_cast<float>(room * room * (1 - 1e-6)); };
   const auto at_face = [&](std::size_t c) {
-    const auto nx = static_cast<std::size_t>(f.dims[0]), ny = static_cast<std::size_t>(f.dims[1]), nz = static_cast<std::size_t>(f.dims[2]);
+    const auto nx = static_cast<std::size_t>(f.dims[0]), ny = static_cast<std::size_t>(f.dims[1]),
+               nz = static_cast<std::size_t>(f.dims[2]);
     const std::size_t i = c % nx, j = c / nx % ny, k = c / (nx * ny);
     return i == 0 || j == 0 || k == 0 || i == nx - 1 || j == ny - 1 || k == nz - 1;
   };
@@ -83,7 +85,8 @@ Bytes by_distances(const Bytes& solid, const Bytes& gone, const Bytes& closed, c
   const auto beside_outside = squared_distance_mm2(outside, f, 1);
   seeds.clear();
   for (std::size_t c = 0; c < n; ++c) {
-    if (gone[c] != 0 && (at_face(c) || beside_outside[c] <= static_cast<float>(h * h * 1.001)) && enter_inside(c)) seeds.push_back(c);
+    if (gone[c] != 0 && (at_face(c) || beside_outside[c] <= static_cast<float>(h * h * 1.001)) && enter_inside(c))
+      seeds.push_back(c);
   }
   flood(f, seeds, enter_inside);
   const auto swept = squared_distance_mm2(inside, f, 1);
@@ -113,8 +116,10 @@ TEST(Cavity, IsThatOfDistancesAndAFloodCellByCell) {
         double r;
       };
       std::vector<Ball> pores, holes;
-      for (int p = 0; p < 60; ++p) pores.push_back({{u(random) * 70, u(random) * 34, 4 + u(random) * 24}, 1.5 + 4 * u(random)});
-      for (int p = 0; p < 5; ++p) holes.push_back({{u(random) * 70, u(random) * 34, 6 + u(random) * 20}, 3 + 4 * u(random)});
+      for (int p = 0; p < 60; ++p)
+        pores.push_back({{u(random) * 70, u(random) * 34, 4 + u(random) * 24}, 1.5 + 4 * u(random)});
+      for (int p = 0; p < 5; ++p)
+        holes.push_back({{u(random) * 70, u(random) * 34, 6 + u(random) * 20}, 3 + 4 * u(random)});
       for (std::size_t c = 0; c < n; ++c) {
         const Vec3 x{double(c % 70), double(c / 70 % 34), double(c / (70 * 34))};
         const auto in = [&](const std::vector<Ball>& balls) {

@@ -8,8 +8,8 @@ namespace osteo {
 namespace {
 
 const StructureMap& sinus() {
-  static const StructureMap map =
-      test::structure_map([](Vec3 p) -> std::uint8_t { return length(p) < 2 ? 1 : 0; }, {{1, "sigmoid sinus", {}}}, 0.5, 24);
+  static const StructureMap map = test::structure_map([](Vec3 p) -> std::uint8_t { return length(p) < 2 ? 1 : 0; },
+                                                      {{1, "sigmoid sinus", {}}}, 0.5, 24);
   return map;
 }
 Score plain() {
@@ -27,8 +27,9 @@ Procedure procedure(const std::string& rest) {
 
 TEST(Findings, UnseenBoneIsToldWithWhatItLayNear) {
   Score s = plain();
-  s.values.insert(s.values.end(), {measured("seen_share", 0.9), measured("hidden_mm3", 31.2),
-                                   measured("hidden_near_mm3", 9.1, "sigmoid sinus"), measured("hidden_near_mm3", 20, "antrum")});
+  s.values.insert(s.values.end(),
+                  {measured("seen_share", 0.9), measured("hidden_mm3", 31.2),
+                   measured("hidden_near_mm3", 9.1, "sigmoid sinus"), measured("hidden_near_mm3", 20, "antrum")});
   // Three voxels far off, two near the sinus.
   VoxelKey n = 0;
   for (const Vec3 p : {Vec3{9, 9, 9}, Vec3{9, 9, 8}, Vec3{9, 8, 9}, Vec3{3, 0, 0}, Vec3{3, 0.5, 0}})
@@ -49,9 +50,10 @@ TEST(Findings, UnseenBoneIsToldWithWhatItLayNear) {
 
 TEST(Findings, SeenWellIsGood) {
   Score s = plain();
-  s.values.insert(s.values.end(),
-                  {measured("seen_share", 0.999), measured("hidden_mm3", 0.8), measured("hidden_near_mm3", 0.0, "sigmoid sinus")});
-  EXPECT_EQ(findings_of(s, nullptr, nullptr).find("hidden")->text, "0.8 mm³ of bone (less than 1 %) was removed unseen.");
+  s.values.insert(s.values.end(), {measured("seen_share", 0.999), measured("hidden_mm3", 0.8),
+                                   measured("hidden_near_mm3", 0.0, "sigmoid sinus")});
+  EXPECT_EQ(findings_of(s, nullptr, nullptr).find("hidden")->text,
+            "0.8 mm³ of bone (less than 1 %) was removed unseen.");
   EXPECT_EQ(findings_of(s, nullptr, nullptr).find("hidden")->severity, FindingSeverity::good);
   s.values[3] = measured("seen_share", 1);
   s.values[4] = measured("hidden_mm3", 0);
@@ -63,10 +65,12 @@ TEST(Findings, InjuriesComeFirstAndTouchesAreNoInjuries) {
   s.values.insert(s.values.end(),
                   {measured("seen_share", 0.5), measured("hidden_mm3", 400), measured("touches", 3, "sigmoid sinus"),
                    measured("touched_s", 0.62, "sigmoid sinus"), measured("injured_s", 0.41, "sigmoid sinus"),
-                   measured("clearance_mm", -0.3, "sigmoid sinus"), measured("touches", 2, "dura"), measured("touched_s", 0.1, "dura"),
-                   measured("injured_s", 0, "dura"), measured("touches", 0, "labyrinth"), measured("touched_s", 0, "labyrinth"),
+                   measured("clearance_mm", -0.3, "sigmoid sinus"), measured("touches", 2, "dura"),
+                   measured("touched_s", 0.1, "dura"), measured("injured_s", 0, "dura"),
+                   measured("touches", 0, "labyrinth"), measured("touched_s", 0, "labyrinth"),
                    measured("injured_s", 0, "labyrinth"), measured("clearance_mm", 0.34, "labyrinth")});
-  for (const double t : {8.0, 20.0}) s.moments.push_back({t, {t, 0, 0}, "reached by a turning burr", "sigmoid sinus", -0.1, 0});
+  for (const double t : {8.0, 20.0})
+    s.moments.push_back({t, {t, 0, 0}, "reached by a turning burr", "sigmoid sinus", -0.1, 0});
   const Findings f = findings_of(s, nullptr, nullptr);
   EXPECT_EQ(f.list.front().id, "injury-sigmoid-sinus");
   EXPECT_EQ(f.list.front().text, "A turning burr reached the sigmoid sinus twice, for 0.41 s in all.");
@@ -103,9 +107,11 @@ TEST(Findings, ASawIsCalledASaw) {
 
 TEST(Findings, ItemsSayWhatWasAsked) {
   const Procedure p = procedure(
-      ", \"items\": [ {\"name\": \"sinus intact\", \"kind\": \"not_violated\", \"structure\": \"sigmoid sinus\"}, {\"name\": \"sinus "
+      ", \"items\": [ {\"name\": \"sinus intact\", \"kind\": \"not_violated\", \"structure\": \"sigmoid sinus\"}, "
+      "{\"name\": \"sinus "
       "shown\", "
-      "\"kind\": \"exposed\", \"structure\": \"sigmoid sinus\", \"threshold\": 0.4}, {\"name\": \"two pieces\", \"kind\": \"pieces\"} ]");
+      "\"kind\": \"exposed\", \"structure\": \"sigmoid sinus\", \"threshold\": 0.4}, {\"name\": \"two pieces\", "
+      "\"kind\": \"pieces\"} ]");
   Score s = plain();
   s.procedure = p.name;
   Product::Result violated, shown, pieces;
@@ -144,16 +150,19 @@ TEST(Findings, ItemsSayWhatWasAsked) {
 
 TEST(Findings, ForceWaterAndTime) {
   Score s = plain();
-  s.values.insert(s.values.end(),
-                  {measured("excess_force_ns", 1.25, "sigmoid sinus"), measured("force_above_band_share", 0.31, "sigmoid sinus"),
-                   measured("speed_above_band_share", 0.12, "sigmoid sinus"), measured("irrigation_share", 0), measured("idle_s", 300),
-                   measured("lost_s", 2.5), measured("force_peak_n", 3.21)});
+  s.values.insert(
+      s.values.end(),
+      {measured("excess_force_ns", 1.25, "sigmoid sinus"), measured("force_above_band_share", 0.31, "sigmoid sinus"),
+       measured("speed_above_band_share", 0.12, "sigmoid sinus"), measured("irrigation_share", 0),
+       measured("idle_s", 300), measured("lost_s", 2.5), measured("force_peak_n", 3.21)});
   s.moments.push_back({4, {1, 1, 1}, "pressed too hard near it", "sigmoid sinus", 1.7, 1});
   const Findings f = findings_of(s, nullptr, nullptr);
-  EXPECT_EQ(f.find("force-sigmoid-sinus")->text,
-            "Near the sigmoid sinus the burr pressed harder than the 1 N that the procedure allows there: 1.7 N was seen.");
+  EXPECT_EQ(
+      f.find("force-sigmoid-sinus")->text,
+      "Near the sigmoid sinus the burr pressed harder than the 1 N that the procedure allows there: 1.7 N was seen.");
   EXPECT_EQ(f.find("force-band-sigmoid-sinus")->text,
-            "31 % of the drilling near the sigmoid sinus was pressed harder than nine in ten moments of the reference's experts.");
+            "31 % of the drilling near the sigmoid sinus was pressed harder than nine in ten moments of the "
+            "reference's experts.");
   EXPECT_EQ(f.find("speed-band-sigmoid-sinus"), nullptr);  // 12 % is about what chance gives
   EXPECT_EQ(f.find("water")->text, "No water was used while drilling.");
   EXPECT_EQ(f.find("idle")->text, "For 5 min (41 %) neither hand moved.");

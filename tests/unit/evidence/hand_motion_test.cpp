@@ -9,8 +9,8 @@
 #include <numbers>
 #include <random>
 
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/assessment/evidence/timeline.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "scene.h"
 
 namespace osteo {

@@ -25,21 +25,26 @@ std::string error_of(const std::string& hint) {
 TEST(Hints, FileIsReadStrictly) {
   EXPECT_GE(usual_hints().size(), 5U);
   EXPECT_EQ(error_of(R"({"id": "a", "kind": "dry", "words": "w", "for_s": 3})"), "");
-  EXPECT_NE(error_of(R"({"id": "a", "kind": "dry", "words": "w", "within_mm": 3})").find("'h.json' line 2"), std::string::npos);
-  EXPECT_NE(error_of(R"({"id": "a", "kind": "unseen", "words": "w", "limit": 3})").find("'limit' says nothing"), std::string::npos);
+  EXPECT_NE(error_of(R"({"id": "a", "kind": "dry", "words": "w", "within_mm": 3})").find("'h.json' line 2"),
+            std::string::npos);
+  EXPECT_NE(error_of(R"({"id": "a", "kind": "unseen", "words": "w", "limit": 3})").find("'limit' says nothing"),
+            std::string::npos);
   EXPECT_NE(error_of(R"({"id": "a", "kind": "force", "words": "w"})").find("needs a 'limit'"), std::string::npos);
-  EXPECT_NE(error_of(R"({"id": "a", "kind": "dry", "words": "near the {structure}"})").find("{structure}"), std::string::npos);
+  EXPECT_NE(error_of(R"({"id": "a", "kind": "dry", "words": "near the {structure}"})").find("{structure}"),
+            std::string::npos);
   EXPECT_NE(error_of(R"({"id": "a", "kind": "wet", "words": "w"})"), "");
   EXPECT_NE(error_of(R"({"id": "a", "kind": "dry", "words": "w", "colour": 1})"), "");
   EXPECT_NE(error_of(R"({"id": "a", "kind": "dry"})").find("words"), std::string::npos);
-  EXPECT_NE(error_of(R"({"id": "a", "kind": "dry", "words": "w"}, {"id": "a", "kind": "dry", "words": "w"})").find("another"),
-            std::string::npos);
+  EXPECT_NE(
+      error_of(R"({"id": "a", "kind": "dry", "words": "w"}, {"id": "a", "kind": "dry", "words": "w"})").find("another"),
+      std::string::npos);
   EXPECT_NE(error_of(R"({"id": "a", "kind": "dry", "words": "w", "quiet_s": 0})"), "");
 }
 
 const StructureMap& rod() {
-  static const StructureMap map = test::structure_map(
-      [](Vec3 p) -> std::uint8_t { return std::hypot(p.x, p.z) < 1 && std::abs(p.y) < 8 ? 4 : 0; }, {{4, "rod", {}}}, 0.5, 20);
+  static const StructureMap map =
+      test::structure_map([](Vec3 p) -> std::uint8_t { return std::hypot(p.x, p.z) < 1 && std::abs(p.y) < 8 ? 4 : 0; },
+                          {{4, "rod", {}}}, 0.5, 20);
   return map;
 }
 HintRule rule(HintKind kind, double limit, double for_s, double quiet_s) {
@@ -104,7 +109,8 @@ TEST(Hints, OfSeveralThatHoldOneIsSaidAtATime) {
   HintRule elsewhere = rule(HintKind::cutting_burr, 0, 0.1, 60);
   elsewhere.structure = "no such structure";
   Sequence run{
-      HintWatch({other, rule(HintKind::cutting_burr, 0, 0.1, 60), rule(HintKind::unseen, 0, 0.1, 60), elsewhere}, 1000, &rod(), false)};
+      HintWatch({other, rule(HintKind::cutting_burr, 0, 0.1, 60), rule(HintKind::unseen, 0, 0.1, 60), elsewhere}, 1000,
+                &rod(), false)};
   run.watch.seen(false);
   run.go(30, drilling(1, 0.5));
   ASSERT_EQ(run.said.size(), 3U);

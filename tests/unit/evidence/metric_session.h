@@ -6,8 +6,8 @@
 #include <numbers>
 #include <vector>
 
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/session/recording/session_file.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "scene.h"
 
 namespace osteo::test {

@@ -5,9 +5,9 @@
 
 #include <filesystem>
 
+#include "osteo/assessment/evidence/score.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/assessment/evidence/score.h"
 
 namespace osteo {
 namespace {
@@ -23,8 +23,9 @@ std::string wrong(const std::string& json) {
 }
 
 std::string with(const std::string& rest) {
-  return "{ \"osteotome_procedure\": 1, \"name\": \"n\",\n\"structures\": [ {\"name\": \"nerve\", \"role\": \"never_touch\"} ],\n" + rest +
-         " }";
+  return "{ \"osteotome_procedure\": 1, \"name\": \"n\",\n\"structures\": [ {\"name\": \"nerve\", \"role\": "
+         "\"never_touch\"} ],\n" +
+         rest + " }";
 }
 
 TEST(Procedures, ThoseOfTheProjectAreRead) {
@@ -43,31 +44,41 @@ TEST(Procedures, ThoseOfTheProjectAreRead) {
 }
 
 TEST(Procedures, ErrorsNameFileItemAndLine) {
-  const std::string unknown = wrong(with("\"items\": [\n{\"name\": \"a\", \"kind\": \"exposed\", \"structure\": \"nerv\"} ]"));
+  const std::string unknown =
+      wrong(with("\"items\": [\n{\"name\": \"a\", \"kind\": \"exposed\", \"structure\": \"nerv\"} ]"));
   EXPECT_NE(unknown.find("'p.json' line 4"), std::string::npos) << unknown;
   EXPECT_NE(unknown.find("item 1 ('a')"), std::string::npos) << unknown;
   EXPECT_NE(unknown.find("did you mean 'nerve'?"), std::string::npos) << unknown;
-  const std::string idle =
-      wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"not_violated\", \"structure\": \"nerve\",\n\"cover_mm\": 1} ]"));
+  const std::string idle = wrong(
+      with("\"items\": [ {\"name\": \"a\", \"kind\": \"not_violated\", \"structure\": \"nerve\",\n\"cover_mm\": 1} ]"));
   EXPECT_NE(idle.find("line 4"), std::string::npos) << idle;
   EXPECT_NE(idle.find("'cover_mm' says nothing for an item of kind 'not_violated'"), std::string::npos) << idle;
-  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"exposed\"} ]")).find("'structure' is missing"), std::string::npos);
-  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"shown\", \"structure\": \"nerve\"} ]")).find("exposed"),
-            std::string::npos);
-  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"pieces\"}, {\"name\": \"a\", \"kind\": \"fixed\"} ]"))
-                .find("two of this name"),
+  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"exposed\"} ]")).find("'structure' is missing"),
             std::string::npos);
   EXPECT_NE(
-      wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"no_hole\", \"structure\": \"nerve\", \"threshold\": -1} ]")).find("threshold"),
+      wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"shown\", \"structure\": \"nerve\"} ]")).find("exposed"),
       std::string::npos);
-  EXPECT_NE(wrong(with("\"steps\": [ {\"name\": \"s\", \"items\": [\"b\"]} ]")).find("'b' is no item"), std::string::npos);
-  EXPECT_NE(wrong(with("\"force_limits\": [ {\"structure\": \"nerve\", \"within_mm\": 1} ]")).find("most_n"), std::string::npos);
-  EXPECT_NE(wrong(with("\"regions\": [ {\"name\": \"r\", \"kind\": \"target\", \"structure\": \"bone\"} ]")).find("'bone' is not among"),
+  EXPECT_NE(
+      wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"pieces\"}, {\"name\": \"a\", \"kind\": \"fixed\"} ]"))
+          .find("two of this name"),
+      std::string::npos);
+  EXPECT_NE(
+      wrong(
+          with("\"items\": [ {\"name\": \"a\", \"kind\": \"no_hole\", \"structure\": \"nerve\", \"threshold\": -1} ]"))
+          .find("threshold"),
+      std::string::npos);
+  EXPECT_NE(wrong(with("\"steps\": [ {\"name\": \"s\", \"items\": [\"b\"]} ]")).find("'b' is no item"),
+            std::string::npos);
+  EXPECT_NE(wrong(with("\"force_limits\": [ {\"structure\": \"nerve\", \"within_mm\": 1} ]")).find("most_n"),
+            std::string::npos);
+  EXPECT_NE(wrong(with("\"regions\": [ {\"name\": \"r\", \"kind\": \"target\", \"structure\": \"bone\"} ]"))
+                .find("'bone' is not among"),
             std::string::npos);
   EXPECT_NE(wrong("{ \"name\": \"n\" }").find("osteotome_procedure"), std::string::npos);
   EXPECT_NE(wrong(with("\"item\": []")).find("item"), std::string::npos);
-  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"m\", \"kind\": \"margin\", \"curve_mm\": [[0,0,0]]} ]")).find("two points"),
-            std::string::npos);
+  EXPECT_NE(
+      wrong(with("\"items\": [ {\"name\": \"m\", \"kind\": \"margin\", \"curve_mm\": [[0,0,0]]} ]")).find("two points"),
+      std::string::npos);
 }
 
 TEST(Metrics, TheTableInTheDocsIsTheirDeclaration) {

@@ -31,8 +31,8 @@ std::uint8_t structure_at(Vec3 p) {
 }
 
 TEST(ProductLattice, LabelsAreThoseOfEachCellAskedByItself) {
-  const StructureMap map =
-      test::structure_map(structure_at, {{1, "ball", {}}, {2, "other", {}}, {3, "tube", {}}, {4, "shell", {}}}, 0.5, 30);
+  const StructureMap map = test::structure_map(
+      structure_at, {{1, "ball", {}}, {2, "other", {}}, {3, "tube", {}}, {4, "shell", {}}}, 0.5, 30);
   for (const double turn : {0.0, 0.3}) {
     const Frame f = lattice({59, 63, 57}, 0.45, turn);
     const auto labels = label_cells(f, map, std::vector<CellBlock>(map.values().size(), {{0, 0, 0}, f.dims}), {});
@@ -62,8 +62,8 @@ TEST(ProductLattice, DistancesInAPartAreThoseOfAll) {
     const Frame f = lattice({60, 44, 38}, h, 0);
     BitMask cavity(f.dims);
     for (int n = 0; n < 40; ++n)
-      cavity.set((10 + random() % 9) * 44 + 12 + random() % 7, 20 + static_cast<int>(random() % 5), 26 + static_cast<int>(random() % 9),
-                 true);
+      cavity.set((10 + random() % 9) * 44 + 12 + random() % 7, 20 + static_cast<int>(random() % 5),
+                 26 + static_cast<int>(random() % 9), true);
     std::vector<float> all = squared_distance_mm2(cavity.bytes(), f, 1);
     for (float& d : all) d = std::sqrt(d);
     // A part that does not hold the cavity itself, and reaches beyond the lattice.

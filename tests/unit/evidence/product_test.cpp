@@ -26,9 +26,11 @@ Procedure procedure(const std::string& items) {
   return parse_procedure(
       "{ \"osteotome_procedure\": 1, \"name\": \"t\", \"structures\": [ {\"name\": \"ball\""
       ", \"role\": \"expose\"},"
-      "{\"name\": \"tube\", \"role\": \"keep\"} ], \"regions\": [ {\"name\": \"shell\", \"kind\": \"target\", \"structure\": \"ball\", "
+      "{\"name\": \"tube\", \"role\": \"keep\"} ], \"regions\": [ {\"name\": \"shell\", \"kind\": \"target\", "
+      "\"structure\": \"ball\", "
       "\"within_mm\": 2},"
-      "{\"name\": \"about the tube\", \"kind\": \"forbidden\", \"structure\": \"tube\", \"within_mm\": 1} ], \"items\": [" +
+      "{\"name\": \"about the tube\", \"kind\": \"forbidden\", \"structure\": \"tube\", \"within_mm\": 1} ], "
+      "\"items\": [" +
           items + "] }",
       "t.json");
 }
@@ -37,7 +39,8 @@ using test::shaft;
 test::Drilled drilled(const std::function<double(Vec3)>& kept) {
   return test::drilled(block, kept, 0.5, 34);
 }
-Product::Result judge(const test::Drilled& c, const Procedure& p, Vec3 approach = {0, 0, 1}, const std::vector<std::string>& injured = {}) {
+Product::Result judge(const test::Drilled& c, const Procedure& p, Vec3 approach = {0, 0, 1},
+                      const std::vector<std::string>& injured = {}) {
   const Product product(c.before, c.after, structures(), p, c.removed);
   return product.evaluate(p.items.front(), approach, injured);
 }
@@ -46,7 +49,8 @@ Product::Result judge(const test::Drilled& c, const Procedure& p, Vec3 approach 
 TEST(Product, ExposedIsTheCapThatTheFloorComesNearTo) {
   for (const double cover : {1.0, 1.5}) {
     const Procedure p = procedure(
-        "{\"name\": \"shown\", \"kind\": \"exposed\", \"structure\": \"ball\", \"towards\": [0, 0, 1], \"within_deg\": 90, \"cover_mm\": " +
+        "{\"name\": \"shown\", \"kind\": \"exposed\", \"structure\": \"ball\", \"towards\": [0, 0, 1], \"within_deg\": "
+        "90, \"cover_mm\": " +
         std::to_string(cover) + "}");
     const auto r = judge(drilled(shaft(3.5, 6)), p);
     ASSERT_TRUE(r.measured);
@@ -87,10 +91,14 @@ TEST(Product, AHoleIsAsLargeAsTheBareCap) {
 
 TEST(Product, AWallIsAsThickAsItIs) {
   const Procedure p = procedure(
-      "{\"name\": \"thin\", \"kind\": \"thinned\", \"structure\": \"tube\", \"towards\": [1, 0, 0], \"within_deg\": 20, \"threshold\": "
+      "{\"name\": \"thin\", \"kind\": \"thinned\", \"structure\": \"tube\", \"towards\": [1, 0, 0], \"within_deg\": "
+      "20, \"threshold\": "
       "2.5, \"most\": 20}");
   // A trench beside the tube, its face at x = -5: 1.8 mm off.
-  const auto r = judge(drilled([](Vec3 q) { return std::max({-5 - q.x, q.x + 3.5, -2.5 - q.z, std::abs(q.y) - 9}); }), p);
+  const auto r = judge(drilled([](Vec3 q) {
+                         return std::max({-5 - q.x, q.x + 3.5, -2.5 - q.z, std::abs(q.y) - 9});
+                       }),
+                       p);
   ASSERT_TRUE(r.measured);
   EXPECT_NEAR(r.value, 1.85, 0.3);
   EXPECT_TRUE(r.pass);
@@ -98,7 +106,8 @@ TEST(Product, AWallIsAsThickAsItIs) {
 }
 
 TEST(Product, FollowedIsTheShareOfTheTubesLength) {
-  const Procedure p = procedure("{\"name\": \"followed\", \"kind\": \"followed\", \"structure\": \"tube\", \"cover_mm\": 1.5}");
+  const Procedure p =
+      procedure("{\"name\": \"followed\", \"kind\": \"followed\", \"structure\": \"tube\", \"cover_mm\": 1.5}");
   // A trench above it for y < 0: half of its way.
   const auto r = judge(drilled([](Vec3 q) { return std::max({2 - q.z, std::abs(q.x + 8) - 2.5, q.y, -10 - q.y}); }), p);
   ASSERT_TRUE(r.measured);
@@ -106,7 +115,8 @@ TEST(Product, FollowedIsTheShareOfTheTubesLength) {
 }
 
 TEST(Product, UnderARoofNothingIsSeen) {
-  const Procedure p = procedure("{\"name\": \"open\", \"kind\": \"no_overhang\", \"structure\": \"ball\", \"within_mm\": 3}");
+  const Procedure p =
+      procedure("{\"name\": \"open\", \"kind\": \"no_overhang\", \"structure\": \"ball\", \"within_mm\": 3}");
   EXPECT_GT(judge(drilled(shaft(3.5, 6)), p).value, 0.95);
   // A shaft beside, and from it a chamber under the roof.
   const auto under = [](Vec3 q) {
@@ -121,10 +131,12 @@ TEST(Product, UnderARoofNothingIsSeen) {
 }
 
 TEST(Product, ASharpAngleLeavesNoRoomForABall) {
-  const Procedure p =
-      procedure("{\"name\": \"sharp\", \"kind\": \"sharp_angle\", \"structure\": \"ball\", \"second\": \"tube\", \"within_mm\": 5}");
+  const Procedure p = procedure(
+      "{\"name\": \"sharp\", \"kind\": \"sharp_angle\", \"structure\": \"ball\", \"second\": \"tube\", \"within_mm\": "
+      "5}");
   const auto full = judge(drilled([](Vec3) { return 1e3; }), p);
-  const auto thin = judge(drilled([](Vec3 q) { return std::max(std::abs(q.z) > 6 ? 1.0 : -1.0, 1.5 - std::abs(q.y)); }), p);
+  const auto thin =
+      judge(drilled([](Vec3 q) { return std::max(std::abs(q.z) > 6 ? 1.0 : -1.0, 1.5 - std::abs(q.y)); }), p);
   EXPECT_GT(full.value, 3);
   EXPECT_FALSE(full.pass);
   EXPECT_NEAR(thin.value, 1.5, 0.4);  // a wall of 3 mm
@@ -133,8 +145,8 @@ TEST(Product, ASharpAngleLeavesNoRoomForABall) {
 
 TEST(Product, AMarginIsReachedAndNotPassed) {
   const auto with = [](double y) {
-    return procedure("{\"name\": \"rim\", \"kind\": \"margin\", \"curve_mm\": [[-1, " + std::to_string(y) + ", 7], [1, " +
-                     std::to_string(y) + ", 7]]}");
+    return procedure("{\"name\": \"rim\", \"kind\": \"margin\", \"curve_mm\": [[-1, " + std::to_string(y) +
+                     ", 7], [1, " + std::to_string(y) + ", 7]]}");
   };
   const test::Drilled c = drilled(shaft(3.5, 6));
   EXPECT_TRUE(judge(c, with(6.5)).pass);
@@ -168,7 +180,8 @@ TEST(Product, ABubbleThatNobodyReachedIsNoCavity) {
 
 TEST(Product, WhatTheCaseLacksIsNotJudged) {
   const Procedure p = parse_procedure(
-      "{ \"osteotome_procedure\": 1, \"name\": \"t\", \"structures\": [ {\"name\": \"ball\", \"role\": \"expose\"}, {\"name\": \"gone\", "
+      "{ \"osteotome_procedure\": 1, \"name\": \"t\", \"structures\": [ {\"name\": \"ball\", \"role\": \"expose\"}, "
+      "{\"name\": \"gone\", "
       "\"role\": \"keep\"} ],"
       "\"items\": [ {\"name\": \"a\", \"kind\": \"no_hole\", \"structure\": \"gone\"} ] }",
       "t.json");

@@ -38,7 +38,8 @@ double quantile_of(std::vector<double> v, double q) {
   return v[std::min(at, v.size() - 1)];
 }
 
-// The max-min formula: at step i the largest over s <= i of the least over t >= i of the quantile of all values in s..t.
+// The max-min formula: at step i the largest over s <= i of the least over t >= i of the quantile of all values in
+// s..t.
 TEST(Isotonic, QuantilesAreThoseOfTheMaxMinFormula) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> u(0, 1);
@@ -117,7 +118,8 @@ TEST(Strokes, StillHandsAndCirclesHaveNone) {
   EXPECT_EQ(pauses.finish().size(), 3U);
 }
 
-// Minimum-jerk reaches of a second and 20 mm to and fro: their smoothness is known (evidence of the functions: statistics/movement_test).
+// Minimum-jerk reaches of a second and 20 mm to and fro: their smoothness is known (evidence of the functions:
+// statistics/movement_test).
 std::vector<Stroke> reaches(double rate_hz, double tremor_mm, double noise_mm) {
   StrokeFinder finder;
   std::mt19937 random(1);
@@ -145,8 +147,8 @@ TEST(Strokes, SmoothnessIsThatOfTheirSpeed) {
   ASSERT_GE(noisy.size(), 9U);
   EXPECT_NEAR(noisy[3].sparc, -1.4058, 0.03);
   ASSERT_GE(shaking.size(), 5U);
-  const auto longest =
-      std::max_element(shaking.begin(), shaking.end(), [](const Stroke& a, const Stroke& b) { return a.length_mm < b.length_mm; });
+  const auto longest = std::max_element(shaking.begin(), shaking.end(),
+                                        [](const Stroke& a, const Stroke& b) { return a.length_mm < b.length_mm; });
   EXPECT_LT(longest->sparc, -1.6);
   EXPECT_LT(longest->log_dimensionless_jerk, -7);
   // Shorter than 100 ms: none.

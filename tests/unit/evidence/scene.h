@@ -3,18 +3,19 @@
 #include <functional>
 #include <memory>
 
-#include "osteo/simulation/bone/structure_map.h"
-#include "osteo/simulation/bone/world.h"
 #include "osteo/assessment/evidence/score.h"
 #include "osteo/assessment/evidence/visibility.h"
 #include "osteo/geometry/grid/brick_places.h"
+#include "osteo/simulation/bone/structure_map.h"
+#include "osteo/simulation/bone/world.h"
 #include "soft_solid.h"
 
 namespace osteo::test {
 
-// Bone where `inside` is positive (mm from the face, as a signed distance), voxels of h, in a cube of `size_mm` around the origin; `shift`
-// moves the lattice, not the bone.
-inline World solid_world(const std::function<double(Vec3)>& inside, double h, double size_mm, Vec3 shift = {}, double turn = 0) {
+// Bone where `inside` is positive (mm from the face, as a signed distance), voxels of h, in a cube of `size_mm` around
+// the origin; `shift` moves the lattice, not the bone.
+inline World solid_world(const std::function<double(Vec3)>& inside, double h, double size_mm, Vec3 shift = {},
+                         double turn = 0) {
   Frame f;
   const int n = static_cast<int>(std::ceil(size_mm / h / 8)) * 8;
   f.dims = {n, n, n};
@@ -25,8 +26,8 @@ inline World solid_world(const std::function<double(Vec3)>& inside, double h, do
 }
 
 // `value_of` says which structure a point lies in.
-inline StructureMap structure_map(const std::function<std::uint8_t(Vec3)>& value_of, std::vector<Structure> structures, double h,
-                                  double size_mm) {
+inline StructureMap structure_map(const std::function<std::uint8_t(Vec3)>& value_of, std::vector<Structure> structures,
+                                  double h, double size_mm) {
   Labels l;
   const int n = static_cast<int>(std::ceil(size_mm / h));
   l.frame.dims = {n, n, n};
@@ -48,14 +49,15 @@ struct Drilled {
   std::vector<RemovedVoxel> removed;
 };
 // `bone`, `kept`: as depths in mm; what is left is bone that is kept. Lattice as in solid_world().
-inline Drilled drilled(const std::function<double(Vec3)>& bone, const std::function<double(Vec3)>& kept, double h, double size_mm,
-                       Vec3 shift = {}, double turn = 0) {
+inline Drilled drilled(const std::function<double(Vec3)>& bone, const std::function<double(Vec3)>& kept, double h,
+                       double size_mm, Vec3 shift = {}, double turn = 0) {
   Drilled c{solid_world(bone, h, size_mm, shift, turn),
             solid_world([&](Vec3 p) { return std::min(bone(p), kept(p)); }, h, size_mm, shift, turn),
             {}};
   const BrickGrid &a = c.before.bodies().front().body->bone, &b = c.after.bodies().front().body->bone;
   for (VoxelKey v = 0; v < a.brick_count() * BrickGrid::kVoxels; ++v) {
-    if (a.value(v) >= kSolid && b.value(v) < kSolid) c.removed.push_back({place_of_voxel_mm(a, v), static_cast<float>(h * h * h)});
+    if (a.value(v) >= kSolid && b.value(v) < kSolid)
+      c.removed.push_back({place_of_voxel_mm(a, v), static_cast<float>(h * h * h)});
   }
   return c;
 }

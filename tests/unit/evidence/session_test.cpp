@@ -4,14 +4,14 @@
 #include <filesystem>
 
 #include "hole_script.h"
-#include "osteo/core/base/error.h"
-#include "osteo/core/base/files.h"
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/assessment/evidence/findings.h"
 #include "osteo/assessment/evidence/score.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/assessment/scoring/score_reader.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
 #include "osteo/session/recording/apply.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "scene.h"
 #include "scratch.h"
 
@@ -24,7 +24,8 @@ double slab(Vec3 p) {
 }
 const std::shared_ptr<const StructureMap>& rod() {
   static const auto map = std::make_shared<const StructureMap>(test::structure_map(
-      [](Vec3 p) -> std::uint8_t { return std::hypot(p.x, p.z - 1) < 1 && std::abs(p.y) < 8 ? 1 : 0; }, {{1, "rod", {}}}, 0.4, 24));
+      [](Vec3 p) -> std::uint8_t { return std::hypot(p.x, p.z - 1) < 1 && std::abs(p.y) < 8 ? 1 : 0; },
+      {{1, "rod", {}}}, 0.4, 24));
   return map;
 }
 World block() {
@@ -42,13 +43,15 @@ RehearsalOptions options(const std::filesystem::path& file) {
   o.haptics.structures = rod()->hash();
   return o;
 }
-const char* const kCamera = "{\"eye_mm\":[0,-20,200],\"target_mm\":[0,0,4],\"up\":[0,1,0],\"view_angle_deg\":30,\"pixels_per_mm\":10}";
+const char* const kCamera =
+    "{\"eye_mm\":[0,-20,200],\"target_mm\":[0,0,4],\"up\":[0,1,0],\"view_angle_deg\":30,\"pixels_per_mm\":10}";
 const char* const kProcedure =
     "{ \"osteotome_procedure\": 1, \"name\": \"t\", \"structures\": [ {\"name\": \"rod\", \"role\": \"keep\"} ],"
     "\"force_limits\": [ {\"structure\": \"rod\", \"within_mm\": 8, \"most_n\": 0.01} ],"
     "\"instruments\": [ {\"structure\": \"rod\", \"within_mm\": 8, \"diamond_only\": true} ],"
     "\"regions\": [ {\"name\": \"r\", \"kind\": \"target\", \"structure\": \"rod\", \"within_mm\": 4} ],"
-    "\"items\": [ {\"name\": \"whole\", \"kind\": \"not_violated\", \"structure\": \"rod\"}, {\"name\": \"one\", \"kind\": \"pieces\", "
+    "\"items\": [ {\"name\": \"whole\", \"kind\": \"not_violated\", \"structure\": \"rod\"}, {\"name\": \"one\", "
+    "\"kind\": \"pieces\", "
     "\"threshold\": 1, \"most\": 1} ],"
     "\"steps\": [ {\"name\": \"all\", \"items\": [\"whole\", \"one\"]} ] }";
 
@@ -64,14 +67,15 @@ double value(const std::vector<Measured>& values, const std::string& name) {
   return m == nullptr || !m->value ? -1e9 : *m->value;
 }
 bool says(const Score& s, const std::string& what) {
-  return std::any_of(s.words.begin(), s.words.end(), [&](const std::string& w) { return w.find(what) != std::string::npos; });
+  return std::any_of(s.words.begin(), s.words.end(),
+                     [&](const std::string& w) { return w.find(what) != std::string::npos; });
 }
-Score score(const std::filesystem::path& file, const Procedure* procedure = nullptr, const Reference* reference = nullptr,
-            const std::string& subject = {}) {
+Score score(const std::filesystem::path& file, const Procedure* procedure = nullptr,
+            const Reference* reference = nullptr, const std::string& subject = {}) {
   return score_session(SessionReader(file, Damage::keep), block(), rod().get(), procedure, reference, subject);
 }
-RehearsalSummary record(const std::filesystem::path& file, int count, std::vector<SceneAction> actions = {}, bool camera = true,
-                        ScoreReader* live = nullptr) {
+RehearsalSummary record(const std::filesystem::path& file, int count, std::vector<SceneAction> actions = {},
+                        bool camera = true, ScoreReader* live = nullptr) {
   RehearsalOptions o = options(file);
   o.actions = std::move(actions);
   Rehearsal r(block(), std::make_unique<ScriptedDevice>(test::holes(count, -6, 4.2), 1000), o, {});
@@ -91,10 +95,11 @@ TEST(Sessions, LiveAndFromTheFileAreTheSameBits) {
   const World world = block();
   ScoreReader live(world, scene);
   live.camera({0, {0, -20, 200}, {0, 0, 4}});
-  const RehearsalSummary s = record(scratch / "s.oss", 3,
-                                    {at(1200, SceneAction::saw({{3, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1300, SceneAction::split(5)),
-                                     at(1800, SceneAction::plain(ActionKind::undo)), at(1900, SceneAction::plain(ActionKind::undo))},
-                                    true, &live);
+  const RehearsalSummary s =
+      record(scratch / "s.oss", 3,
+             {at(1200, SceneAction::saw({{3, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1300, SceneAction::split(5)),
+              at(1800, SceneAction::plain(ActionKind::undo)), at(1900, SceneAction::plain(ActionKind::undo))},
+             true, &live);
   const Score file = score(scratch / "s.oss");
   EXPECT_EQ(live.resyncs(), 0U);
   ASSERT_GT(live.keeper().values().size(), 20U);
@@ -242,7 +247,8 @@ TEST(Sessions, HardCasesHaveAWordEach) {
   EXPECT_EQ(half.steps.front().second, "not judged");
   // A procedure for another case.
   const Procedure other = parse_procedure(
-      "{ \"osteotome_procedure\": 1, \"name\": \"o\", \"structures\": [ {\"name\": \"jaw\", \"role\": \"keep\"} ] }", "o.json");
+      "{ \"osteotome_procedure\": 1, \"name\": \"o\", \"structures\": [ {\"name\": \"jaw\", \"role\": \"keep\"} ] }",
+      "o.json");
   try {
     static_cast<void>(score(whole, &other));
     FAIL();
@@ -252,7 +258,8 @@ TEST(Sessions, HardCasesHaveAWordEach) {
     EXPECT_NE(e.advice().find("'rod'"), std::string::npos);
   }
   // Another bone.
-  EXPECT_THROW(static_cast<void>(score_session(SessionReader(whole), test::solid_world(slab, 0.6, 24), nullptr, nullptr, nullptr, {})),
+  EXPECT_THROW(static_cast<void>(score_session(SessionReader(whole), test::solid_world(slab, 0.6, 24), nullptr, nullptr,
+                                               nullptr, {})),
                Error);
   // Nothing done at all.
   RehearsalOptions o = options(scratch / "idle.oss");
@@ -282,7 +289,8 @@ TEST(Sessions, BonesInPiecesInRegionsAndGoneAltogether) {
   const test::ScratchFolder scratch;
   const Procedure p = parse_procedure(kProcedure, "t.json");
   // Sawn in two and taken apart.
-  record(scratch / "two.oss", 2, {at(1200, SceneAction::saw({{3, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1300, SceneAction::split(5))});
+  record(scratch / "two.oss", 2,
+         {at(1200, SceneAction::saw({{3, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1300, SceneAction::split(5))});
   const Score two = score(scratch / "two.oss", &p);
   EXPECT_TRUE(says(two, "bone in pieces"));
   EXPECT_EQ(two.items[1].value, 2);
@@ -297,7 +305,8 @@ TEST(Sessions, BonesInPiecesInRegionsAndGoneAltogether) {
     EXPECT_NEAR(value(scored.values, "removed_mm3"), s.removed_mm3, 1e-3);
     return scored;
   };
-  // A finer region under the first hole: by each voxel's own volume, what is gone is what was removed, but for voxels that are half gone.
+  // A finer region under the first hole: by each voxel's own volume, what is gone is what was removed, but for voxels
+  // that are half gone.
   Frame fine;
   fine.dims = {24, 24, 24};
   fine.spacing_mm = {0.25, 0.25, 0.25};
@@ -315,7 +324,13 @@ TEST(Sessions, BonesInPiecesInRegionsAndGoneAltogether) {
   // A crumb that is drilled away.
   Script down;
   down.waypoints = {{0, {-6, 0, 8}, true}, {0.2, {-6, 0, 6}, true}, {1.5, {-6, 0, 2}, true}, {1.7, {-6, 0, 8}, false}};
-  const Score none = other_bone("crumb.oss", test::solid_world([](Vec3 q) { return 0.8 - length(q - Vec3{-6, 0, 3.5}); }, 0.5, 24), down);
+  const Score none = other_bone("crumb.oss",
+                                test::solid_world(
+                                    [](Vec3 q) {
+                                      return 0.8 - length(q - Vec3{-6, 0, 3.5});
+                                    },
+                                    0.5, 24),
+                                down);
   EXPECT_TRUE(says(none, "no bone is left"));
   EXPECT_FALSE(says(none, "nothing was removed"));
   EXPECT_TRUE(none.items[0].measured);
@@ -326,9 +341,9 @@ TEST(Sessions, AReferenceLeavesOutTheSamePerson) {
   for (int n = 1; n <= 3; ++n) record(scratch / ("s" + std::to_string(n) + ".oss"), n);
   Reference reference;
   for (int n = 1; n <= 3; ++n)
-    reference.sessions.push_back(
-        read_reference(SessionReader(scratch / ("s" + std::to_string(n) + ".oss")), block(), rod().get(),
-                       {"s" + std::to_string(n), "P" + std::to_string(n), n == 3 ? ReferenceGroup::novice : ReferenceGroup::expert}));
+    reference.sessions.push_back(read_reference(
+        SessionReader(scratch / ("s" + std::to_string(n) + ".oss")), block(), rod().get(),
+        {"s" + std::to_string(n), "P" + std::to_string(n), n == 3 ? ReferenceGroup::novice : ReferenceGroup::expert}));
   const Score s = score(scratch / "s1.oss", nullptr, &reference);
   EXPECT_TRUE(says(s, "1 sessions of the reference are left out"));
   // What only the novice took was kept: better than what the novice left.
@@ -362,8 +377,10 @@ TEST(Sessions, AReferenceIsReadStrictly) {
   };
   const std::string a = "{\"session\": \"a\", \"subject\": \"P1\", \"group\": \"expert\"}";
   EXPECT_EQ(wrong("{\"osteotome_reference\": 1, \"sessions\": [" + a + "]}"), "");
-  EXPECT_NE(wrong("{\"osteotome_reference\": 1, \"sessions\": [" + a + "," + a + "]}").find("there twice"), std::string::npos);
-  EXPECT_NE(wrong("{\"osteotome_reference\": 1, \"sessions\": [\n{\"session\": \"b\", \"subject\": \"P1\", \"group\": \"expert\"}]}")
+  EXPECT_NE(wrong("{\"osteotome_reference\": 1, \"sessions\": [" + a + "," + a + "]}").find("there twice"),
+            std::string::npos);
+  EXPECT_NE(wrong("{\"osteotome_reference\": 1, \"sessions\": [\n{\"session\": \"b\", \"subject\": \"P1\", \"group\": "
+                  "\"expert\"}]}")
                 .find("line 2"),
             std::string::npos);
 }

@@ -1,4 +1,5 @@
-// Every primitive of the end product on another lattice: shifted, turned, finer. Pass may change only where the margin is below 0.2.
+// Every primitive of the end product on another lattice: shifted, turned, finer. Pass may change only where the margin
+// is below 0.2.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -23,7 +24,8 @@ std::uint8_t structure_at(Vec3 p) {
   return 0;
 }
 const StructureMap& structures() {
-  static const StructureMap map = test::structure_map(structure_at, {{1, "ball", {}}, {2, "tube", {}}, {3, "cells", {}}}, 0.4, 26);
+  static const StructureMap map =
+      test::structure_map(structure_at, {{1, "ball", {}}, {2, "tube", {}}, {3, "cells", {}}}, 0.4, 26);
   return map;
 }
 const Procedure& procedure() {

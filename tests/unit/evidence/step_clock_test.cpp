@@ -22,7 +22,8 @@ const StructureMap& balls() {
       {{1, "a", {}}, {2, "b", {}}, {3, "c", {}}}, 0.5, 20);
   return map;
 }
-// b belongs to two steps, with one of another's between; a step about what the case lacks, and one about no structure at all.
+// b belongs to two steps, with one of another's between; a step about what the case lacks, and one about no structure
+// at all.
 const Procedure& procedure() {
   static const Procedure p = parse_procedure(
       R"({"osteotome_procedure": 1, "name": "t",

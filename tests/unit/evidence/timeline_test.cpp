@@ -3,9 +3,9 @@
 
 #include <numeric>
 
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/assessment/evidence/timeline.h"
 #include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "scene.h"
 #include "scratch.h"
 
@@ -45,7 +45,8 @@ TEST(TimelineKeeper, SamplesAreWhatTheirTicksSay) {
   TimelineKeeper keeper({1000, &two_balls(), nullptr});
   // 0.1 s at 10 mm/s away from the nerve's face at 7 mm, pressing; 0.1 s at rest.
   std::vector<TickRecord> ticks;
-  for (std::uint64_t n = 0; n < 100; ++n) ticks.push_back(tick(n, {6 + 0.01 * static_cast<double>(n), 0, 0}, n == 40 ? 3.0F : 0.5F));
+  for (std::uint64_t n = 0; n < 100; ++n)
+    ticks.push_back(tick(n, {6 + 0.01 * static_cast<double>(n), 0, 0}, n == 40 ? 3.0F : 0.5F));
   ticks[7].removed_mm3 = 0.25F;
   for (std::uint64_t n = 100; n < 200; ++n) ticks.push_back(tick(n, {6.99, 0, 0}, 0, 0));
   const std::vector<TickRecord> first(ticks.begin(), ticks.begin() + 100), second(ticks.begin() + 100, ticks.end());
@@ -82,7 +83,11 @@ TEST(TimelineKeeper, TouchesAndInjuriesAreEventsOfTheirLength) {
     // Into the nerve for 50 ms turning, out for 200 ms, in again at rest for 20 ms; then into the cells.
     for (std::uint64_t n = 0; n < 400; ++n) {
       const bool in = (n >= 10 && n < 60) || (n >= 260 && n < 280), cells = n >= 350;
-      ticks.push_back(tick(n, cells ? Vec3{0, 0, 7} : in ? Vec3{2.5, 0, 0} : Vec3{9, 0, 0}, 0, n >= 260 && n < 280 ? 0.0F : 20'000.0F));
+      ticks.push_back(tick(n,
+                           cells ? Vec3{0, 0, 7}
+                           : in  ? Vec3{2.5, 0, 0}
+                                 : Vec3{9, 0, 0},
+                           0, n >= 260 && n < 280 ? 0.0F : 20'000.0F));
     }
     keeper.frame({1000, {}, ticks, {}, {}, world, nullptr, 0});
     Timeline line = keeper.timeline({});
@@ -111,7 +116,8 @@ TEST(TimelineKeeper, ActionsNotesAndGapsAreEvents) {
     return a;
   };
   std::vector<SceneAction> actions{at(100, SceneAction::saw({{1, 2, 3}, {1, 0, 0}, {0, 0, 1}, 1})),
-                                   at(150, SceneAction::plain(ActionKind::undo)), at(180, SceneAction::plain(ActionKind::stroke))};
+                                   at(150, SceneAction::plain(ActionKind::undo)),
+                                   at(180, SceneAction::plain(ActionKind::stroke))};
   for (std::uint64_t n = 0; n < 50; ++n) actions.push_back(at(200 + 20 * n, SceneAction::move(3, {})));
   const std::vector<TickRecord> ticks{tick(1300, {0, 0, 0}, 0)};
   keeper.frame({1000, actions, ticks, {}, {}, world, nullptr, 0});
@@ -154,12 +160,14 @@ TEST(Timelines, OfAFileAgreesWithItsScore) {
   const World world = test::solid_world(slab, 0.5, 24);
   Script s;
   s.axis = {0, 0.3, 0.95};
-  s.waypoints = {{0, {-6, 0, 8}, true}, {0.2, {-6, 0, 5.4}, true}, {0.8, {-4, 0.5, 4.2}, true}, {0.9, {-4, 0, 8}, false}};
+  s.waypoints = {
+      {0, {-6, 0, 8}, true}, {0.2, {-6, 0, 5.4}, true}, {0.8, {-4, 0.5, 4.2}, true}, {0.9, {-4, 0, 8}, false}};
   RehearsalOptions o;
   o.session_file = scratch / "s.oss";
   o.haptics.device = SpringHand::traits();
   Rehearsal r(world.copy(), std::make_unique<ScriptedDevice>(s, 1000), o, {});
-  r.note("camera", "{\"eye_mm\":[0,-20,200],\"target_mm\":[0,0,4],\"up\":[0,1,0],\"view_angle_deg\":30,\"pixels_per_mm\":10}");
+  r.note("camera",
+         "{\"eye_mm\":[0,-20,200],\"target_mm\":[0,0,4],\"up\":[0,1,0],\"view_angle_deg\":30,\"pixels_per_mm\":10}");
   const RehearsalSummary summary = r.run_to_end({});
   const SessionReader session(scratch / "s.oss");
   const Timeline line = read_timeline(session, world.copy(), nullptr);

@@ -5,8 +5,8 @@
 
 #include <random>
 
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/geometry/grid/brick_places.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "scene.h"
 
 namespace osteo {
@@ -35,7 +35,8 @@ bool by_every_voxel(const World& world, Vec3 from, Vec3 to, const BoneSight::Lef
     const BrickGrid& bone = b.body->bone;
     const RigidTransform back = b.world_from_body.inverse();
     for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) {
-      if (bone.value(v) >= kSolid && passes(bone.frame(), bone.coordinate(v), back(from), back(to)) && !(left_out && left_out(b, v)))
+      if (bone.value(v) >= kSolid && passes(bone.frame(), bone.coordinate(v), back(from), back(to)) &&
+          !(left_out && left_out(b, v)))
         return true;
     }
   }
@@ -45,7 +46,8 @@ bool by_every_voxel(const World& world, Vec3 from, Vec3 to, const BoneSight::Lef
 // A shell with holes.
 double sponge(Vec3 p) {
   const double r = length(p);
-  return std::min(2.0 - std::abs(r - 7), 0.8 - std::sin(p.x * 1.3) * std::cos(p.y * 1.7) * std::sin(p.z * 1.1 + 1) * 2.5);
+  return std::min(2.0 - std::abs(r - 7),
+                  0.8 - std::sin(p.x * 1.3) * std::cos(p.y * 1.7) * std::sin(p.z * 1.1 + 1) * 2.5);
 }
 
 TEST(Visibility, ARayIsAsEveryVoxelsBoxSays) {
@@ -53,13 +55,15 @@ TEST(Visibility, ARayIsAsEveryVoxelsBoxSays) {
   std::uniform_real_distribution<double> u(-1, 1);
   for (const double turn : {0.0, 0.4}) {
     World world = test::solid_world(sponge, 0.5, 20, {0.13, -0.21, 0.07}, turn);
-    if (turn > 0) static_cast<void>(world.act(SceneAction::move(0, {rotation_about({}, {0, 0, 1}, 0.3).rotation, {1, 2, 3}})));
+    if (turn > 0)
+      static_cast<void>(world.act(SceneAction::move(0, {rotation_about({}, {0, 0, 1}, 0.3).rotation, {1, 2, 3}})));
     const BoneSight sight(world);
     int blocked = 0;
     for (int n = 0; n < 150; ++n) {
       const Vec3 from{u(random) * 9, u(random) * 9, u(random) * 9},
           to = normalized({u(random), u(random), u(random)}) * (5 + 60 * std::abs(u(random)));
-      const BoneSight::LeftOut out = n % 2 == 0 ? BoneSight::LeftOut() : [](const PlacedBody&, VoxelKey v) { return v % 3 == 0; };
+      const BoneSight::LeftOut out =
+          n % 2 == 0 ? BoneSight::LeftOut() : [](const PlacedBody&, VoxelKey v) { return v % 3 == 0; };
       const bool is = sight.blocked(from, to, out);
       ASSERT_EQ(is, by_every_voxel(world, from, to, out)) << n << ' ' << turn;
       blocked += is ? 1 : 0;
@@ -82,7 +86,9 @@ TEST(Visibility, AlongAxesAndFromOutside) {
 // A burr goes into a block from above; a roof stands over half of its way.
 class Drilled : public ::testing::Test {
  protected:
-  Drilled() : world_(test::solid_world([](Vec3 p) { return std::max(-p.z, std::min(1.0 - std::abs(p.z - 4), -p.x)); }, 0.5, 24)) {}
+  Drilled()
+      : world_(test::solid_world([](Vec3 p) { return std::max(-p.z, std::min(1.0 - std::abs(p.z - 4), -p.x)); }, 0.5,
+                                 24)) {}
 
   // Takes the bone within 0.9 mm of a point, in one frame, by a small burr there.
   void take(VisibilityMetric& metric, Vec3 at, std::uint64_t tick, const CameraPose* camera) {
@@ -135,7 +141,8 @@ TEST_F(Drilled, BoneInTouchWithTheBurrDoesNotHide) {
   // The same at the very edge of the block: all that is between is touched.
   VisibilityMetric edge({1000, nullptr, nullptr});
   take(edge, {11.2, 0, -3}, 20, &aside);
-  for (const auto& [name, v] : edge.voxels()) EXPECT_EQ(v.seen, VisibilityMetric::Seen::seen) << v.own_mm.x << ' ' << v.own_mm.z;
+  for (const auto& [name, v] : edge.voxels())
+    EXPECT_EQ(v.seen, VisibilityMetric::Seen::seen) << v.own_mm.x << ' ' << v.own_mm.z;
 }
 
 TEST_F(Drilled, WithoutACameraNothingIsSaidAndUndoTakesBack) {

@@ -26,7 +26,8 @@ Held peaks(std::size_t n, std::uint64_t seed, double shift_share = 0, double noi
   statistics::Random random(seed);
   std::vector<double> f(n, 0);
   for (int p = 0; p < 4; ++p) {
-    const double at = (0.15 + 0.22 * p + shift_share * random.normal()) * static_cast<double>(n), wide = 0.05 * static_cast<double>(n) + 1;
+    const double at = (0.15 + 0.22 * p + shift_share * random.normal()) * static_cast<double>(n),
+                 wide = 0.05 * static_cast<double>(n) + 1;
     for (std::size_t i = 0; i < n; ++i) f[i] += 6 * std::exp(-std::pow((static_cast<double>(i) - at) / wide, 2));
   }
   for (double& v : f) v += noise * random.normal();
@@ -46,7 +47,8 @@ TEST(Alignment, SameBitsAndPathAsThePlainRecurrence) {
   Aligner aligner;
   for (int seed = 0; seed < 24; ++seed) {
     const double shift = seed % 4 == 3 ? 0.12 : 0.004 * (seed % 4), noise = 0.05 * (seed % 3);
-    const Held a = peaks(300, 7), b = peaks(seed % 5 == 4 ? 240 : 300, static_cast<std::uint64_t>(seed) + 50, shift, noise);
+    const Held a = peaks(300, 7),
+               b = peaks(seed % 5 == 4 ? 240 : 300, static_cast<std::uint64_t>(seed) + 50, shift, noise);
     const Alignment& fast = aligner.align(a.curve(), b.curve());
     expect_same(fast, align_plainly(a.curve(), b.curve()), "seed " + std::to_string(seed));
     ++by[static_cast<int>(fast.by)];
@@ -70,7 +72,8 @@ TEST(Alignment, ANarrowBandIsNotBelieved) {
   }
 }
 
-// Every step aside is paid by the bound: a curve that is wrong by a constant aligns with itself, whatever the cost, and is certain by it.
+// Every step aside is paid by the bound: a curve that is wrong by a constant aligns with itself, whatever the cost, and
+// is certain by it.
 TEST(Alignment, TheBoundKnowsWhatNoWayAvoids) {
   Held target = held(std::vector<double>(300, 2.0)), applied = held(std::vector<double>(300, 9.0));
   Aligner aligner;
@@ -82,7 +85,8 @@ TEST(Alignment, TheBoundKnowsWhatNoWayAvoids) {
 }
 
 TEST(Alignment, HardShapes) {
-  const std::vector<std::pair<std::size_t, std::size_t>> sizes{{1, 1}, {1, 9}, {9, 1}, {2, 1}, {3, 200}, {200, 3}, {17, 18}, {64, 64}};
+  const std::vector<std::pair<std::size_t, std::size_t>> sizes{{1, 1},   {1, 9},   {9, 1},   {2, 1},
+                                                               {3, 200}, {200, 3}, {17, 18}, {64, 64}};
   for (const auto& [n, m] : sizes) {
     for (const double distortion : {0.0, 0.3, 1000.0}) {
       const Held a = peaks(n, 3, 0, 0.4), b = peaks(m, 4, 0, 0.4);
@@ -104,7 +108,8 @@ TEST(Alignment, HardShapes) {
   half.weight.assign(200, 1);
   for (std::size_t i = 0; i < 100; ++i) half.weight[i] = 0;
   expect_same(aligner.align(half.curve(), other.curve()), align_plainly(half.curve(), other.curve()), "weights");
-  EXPECT_LT(aligner.align(half.curve(), other.curve()).cost_n, align_plainly(peaks(200, 6).curve(), other.curve()).cost_n);
+  EXPECT_LT(aligner.align(half.curve(), other.curve()).cost_n,
+            align_plainly(peaks(200, 6).curve(), other.curve()).cost_n);
 }
 
 TEST(Alignment, PathsGoOnByOne) {

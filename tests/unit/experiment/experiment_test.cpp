@@ -5,12 +5,12 @@
 #include <map>
 #include <set>
 
-#include "osteo/core/base/error.h"
-#include "osteo/core/base/files.h"
 #include "osteo/assessment/experiment/analysis.h"
 #include "osteo/assessment/experiment/desk.h"
-#include "osteo/session/recording/session_reader.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
 #include "osteo/core/statistics/basics.h"
+#include "osteo/session/recording/session_reader.h"
 
 namespace osteo::experiment {
 namespace {
@@ -303,7 +303,8 @@ TEST(Desk, GoesThroughATrialAndSavesIt) {
 TEST(Display, ShowsBarsWhereTheyBelong) {
   Protocol p = small();
   const Stimulus s = stimulus_of(p, trials_of(p, 0)[0]);
-  const auto areas = [&](Training training, RunKind kind, bool saturated = false, Feedback feedback = Feedback::concurrent) {
+  const auto areas = [&](Training training, RunKind kind, bool saturated = false,
+                         Feedback feedback = Feedback::concurrent) {
     DisplayState state;
     state.training = training;
     state.kind = kind;
@@ -321,7 +322,10 @@ TEST(Display, ShowsBarsWhereTheyBelong) {
         hi = std::max(hi, at[1]);
       }
       const auto& c = *path->fill;
-      height[c[2] > 180 && c[0] < 100 ? "blue" : c[1] > 120 && c[0] < 100 ? "green" : c[0] > 180 && c[1] < 60 ? "red" : "other"] = hi - lo;
+      height[c[2] > 180 && c[0] < 100   ? "blue"
+             : c[1] > 120 && c[0] < 100 ? "green"
+             : c[0] > 180 && c[1] < 60  ? "red"
+                                        : "other"] = hi - lo;
     }
     return height;
   };
@@ -425,8 +429,8 @@ TEST(ForceAnalysis, FindsWhatIsThere) {
   }
   EXPECT_TRUE(a.json.find("refused")->empty());
   const std::string html = sheet_html(a.sheet);
-  for (const char* const said :
-       {"SIMULATED", "INVALID", "figure-22", "figure-23", "figure-24-a", "figure-25", "figure-26", "figure-27", "figure-28", "table 1"})
+  for (const char* const said : {"SIMULATED", "INVALID", "figure-22", "figure-23", "figure-24-a", "figure-25",
+                                 "figure-26", "figure-27", "figure-28", "table 1"})
     EXPECT_NE(html.find(said), std::string::npos) << said;
 }
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "osteo/core/base/error.h"
 #include "osteo/assessment/experiment/stimulus.h"
+#include "osteo/core/base/error.h"
 
 namespace osteo::experiment {
 namespace {
@@ -18,7 +18,8 @@ const Stimulus& stimulus() {
 }
 std::vector<double> shifted(double by_s, double gain = 1) {
   std::vector<double> f;
-  for (std::size_t i = 0; i < stimulus().force_n.size(); ++i) f.push_back(gain * stimulus().force_at(static_cast<double>(i) / 1000 - by_s));
+  for (std::size_t i = 0; i < stimulus().force_n.size(); ++i)
+    f.push_back(gain * stimulus().force_at(static_cast<double>(i) / 1000 - by_s));
   return f;
 }
 Recall score(const std::vector<double>& applied, const std::vector<bool>& saturated = {}) {
@@ -51,8 +52,8 @@ TEST(Recall, ErrorsComeApart) {
   EXPECT_LT(late.thesis_n, late.plain_rms_n + 1);
 }
 
-// The dissertation's figure 25: three peaks recalled at slightly wrong times, each in another direction, are nearer than no force at all;
-// the plain difference says the opposite.
+// The dissertation's figure 25: three peaks recalled at slightly wrong times, each in another direction, are nearer
+// than no force at all; the plain difference says the opposite.
 TEST(Recall, FigureTwentyFive) {
   std::vector<double> target, recalled;
   for (int i = 0; i < 15000; ++i) {
@@ -89,7 +90,8 @@ TEST(Recall, WhatCannotBeScored) {
   EXPECT_THROW((void)score_recall(f, f, {true, true, true}, 1000), Error);
   EXPECT_THROW((void)score_recall(f, f, {}, 0), Error);
   EXPECT_THROW((void)score_recall(std::vector<double>{1}, std::vector<double>{1}, {}, 1000), Error);
-  EXPECT_THROW((void)score_recall(f, std::vector<double>{0, std::numeric_limits<double>::quiet_NaN(), 1}, {}, 1000), Error);
+  EXPECT_THROW((void)score_recall(f, std::vector<double>{0, std::numeric_limits<double>::quiet_NaN(), 1}, {}, 1000),
+               Error);
 }
 
 TEST(Recall, TheBoxIsAMean) {

@@ -40,12 +40,15 @@ void expect_refused(ExitCode code, const std::string& word, F&& f) {
 
 static_assert(!too_many_bricks(BrickGrid::kMostBricks) && too_many_bricks(BrickGrid::kMostBricks + 1ULL));
 // The last voxel of the last brick is not the name that stands for none.
-static_assert((static_cast<std::uint64_t>(BrickGrid::kMostBricks) - 1) * BrickGrid::kVoxels + BrickGrid::kVoxels - 1 < BrickGrid::kNone);
-static_assert(!too_wide_for_bricks({512, 512, 512}) && too_wide_for_bricks({512, 512, 513}) && too_wide_for_bricks({1ULL << 28, 1, 1}));
+static_assert((static_cast<std::uint64_t>(BrickGrid::kMostBricks) - 1) * BrickGrid::kVoxels + BrickGrid::kVoxels - 1 <
+              BrickGrid::kNone);
+static_assert(!too_wide_for_bricks({512, 512, 512}) && too_wide_for_bricks({512, 512, 513}) &&
+              too_wide_for_bricks({1ULL << 28, 1, 1}));
 // Surfaces name a cell by 20 bits an axis.
 static_assert(!too_wide_for_bricks({(1ULL << 17) - 1, 1, 1}) && too_wide_for_bricks({1, 1ULL << 17, 1}));
 // Products that wrap around 64 bits.
-static_assert(too_wide_for_bricks({1ULL << 22, 1ULL << 22, 1ULL << 22}) && too_wide_for_bricks({1ULL << 32, 1ULL << 32, 1}));
+static_assert(too_wide_for_bricks({1ULL << 22, 1ULL << 22, 1ULL << 22}) &&
+              too_wide_for_bricks({1ULL << 32, 1ULL << 32, 1}));
 
 TEST(VdbFile, VoxelsTooSmallForItAreRefusedInWords) {
   SparseGrid tiny = grid_of([](openvdb::FloatGrid& g) { g.tree().setValue({1, 1, 1}, 1.0F); });
@@ -57,7 +60,9 @@ TEST(VdbFile, VoxelsTooSmallForItAreRefusedInWords) {
 
 TEST(BrickLimits, BricksFarApartAreRefusedNotWrittenOutOfBounds) {
   for (const Ijk far : {Ijk{1 << 22, 1 << 22, 1 << 22}, Ijk{0, 1 << 27, 0}, Ijk{600, 600, 600}, Ijk{-1, 0, 0}})
-    expect_refused(ExitCode::corrupt, far.i < 0 ? "negative" : "too far apart", [&] { BrickGrid({}, {{0, 0, 0}, far}); });
+    expect_refused(ExitCode::corrupt, far.i < 0 ? "negative" : "too far apart", [&] {
+      BrickGrid({}, {{0, 0, 0}, far});
+    });
   const BrickGrid far_but_thin({}, {{0, 0, 0}, {(1 << 17) - 2, 0, 0}});
   EXPECT_NE(far_but_thin.find((1 << 20) - 16 + 3, 1, 2), BrickGrid::kNone);
 }

@@ -6,12 +6,12 @@
 #include "ball.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/imaging/dicom/save_series.h"
-#include "osteo/imaging/dicom/volume.h"
 #include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/geometry/grid/resample.h"
 #include "osteo/geometry/grid/sampler.h"
+#include "osteo/imaging/dicom/save_series.h"
+#include "osteo/imaging/dicom/volume.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/threshold.h"
 
@@ -54,7 +54,8 @@ TEST(Resample, DensityIsTheShareOfTheVoxelInside) {
       for (int i = 5; i < f.dims[0] - 5; i += 3) {
         double inside = 0;
         for (int s = 0; s < 1000; ++s) {
-          inside += length(f.world_from_index({i + (s % 10 - 4.5) / 10, j + (s / 10 % 10 - 4.5) / 10, k + (s / 100 - 4.5) / 10})) < 20.3
+          inside += length(f.world_from_index(
+                        {i + (s % 10 - 4.5) / 10, j + (s / 10 % 10 - 4.5) / 10, k + (s / 100 - 4.5) / 10})) < 20.3
                         ? 0.001
                         : 0;
         }
@@ -81,8 +82,10 @@ TEST(Resample, DroppedPiecesStayDropped) {
   for (int k = 0; k < 12; ++k)
     for (int j = 0; j < 12; ++j)
       for (int i = 0; i < 30; ++i)
-        v[at++] =
-            (i > 2 && i < 11 && j > 1 && j < 10 && k > 1 && k < 10) || (i > 20 && i < 25 && j > 3 && j < 8 && k > 3 && k < 8) ? 1000 : 0;
+        v[at++] = (i > 2 && i < 11 && j > 1 && j < 10 && k > 1 && k < 10) ||
+                          (i > 20 && i < 25 && j > 3 && j < 8 && k > 3 && k < 8)
+                      ? 1000
+                      : 0;
   const Image ct{f, v};
   ThresholdParams t;
   t.lower = 500;
@@ -128,7 +131,8 @@ TEST(GridIo, VdbKeepsVoxelsAndObliqueFrame) {
     const Ijk c = bricks.coordinate(v);
     EXPECT_EQ(back.at(c.i, c.j, c.k), bricks.value(v));
   }
-#ifndef __SANITIZE_ADDRESS__  // OpenVDB may then ask for an absurd amount of memory, which ends the program there instead of throwing
+#ifndef __SANITIZE_ADDRESS__  // OpenVDB may then ask for an absurd amount of memory, which ends the program there
+                              // instead of throwing
   std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
   EXPECT_THROW(static_cast<void>(load_grid(path)), Error);
 #endif
@@ -189,8 +193,8 @@ TEST(Resample, NothingButBoneIsKept) {
   EXPECT_LT(near, skin / 2);
 }
 
-// A wall of 0.8 mm, oblique in voxels of 1 mm: it never reaches its own value there. With the threshold for thin bone, the grid keeps
-// it whole: every line across it meets bone.
+// A wall of 0.8 mm, oblique in voxels of 1 mm: it never reaches its own value there. With the threshold for thin bone,
+// the grid keeps it whole: every line across it meets bone.
 TEST(Resample, WallThinnerThanAVoxelStaysWhole) {
   Frame f;
   f.dims = {50, 50, 50};
@@ -259,7 +263,8 @@ double terrace_mm(const SparseGrid& bone, Vec3 n) {
   for (double a = -10; a <= 10; a += 0.43)
     for (double b = -10; b <= 10; b += 0.43, ++lines) {
       double filled = 0;  // length of bone along the line, from 4 mm within
-      for (double c = -4; c < 4; c += 0.05) filled += 0.05 * static_cast<double>(density.nearest(u * a + w * b + n * c));
+      for (double c = -4; c < 4; c += 0.05)
+        filled += 0.05 * static_cast<double>(density.nearest(u * a + w * b + n * c));
       sum += std::abs(filled - 4);
     }
   return sum / lines;
@@ -280,7 +285,8 @@ TEST(Resample, OutlinesMakeNoTerraces) {
         p.between = between;
         return resample_bone(ct, mask, p);
       };
-      const double values = terrace_mm(by(Between::values).density, n), outlines = terrace_mm(by(Between::outlines).density, n);
+      const double values = terrace_mm(by(Between::values).density, n),
+                   outlines = terrace_mm(by(Between::outlines).density, n);
       EXPECT_LT(outlines, std::max(0.6 * values, 0.05)) << degrees << " degrees, slices of " << z;
       EXPECT_LT(outlines, 0.1) << degrees << " degrees, slices of " << z;
       EXPECT_EQ(to_bricks(by(Between::automatic).density).hash(), to_bricks(by(Between::outlines).density).hash());
@@ -293,7 +299,9 @@ TEST(Resample, OutlinesOfEvenVoxelsAreOffByDefault) {
   ThresholdParams t;
   t.lower = 500;
   const Labels mask = threshold(ct, t);
-  const auto by = [&](Between between) { return to_bricks(resample_bone(ct, mask, {.lower = 500, .between = between}).density).hash(); };
+  const auto by = [&](Between between) {
+    return to_bricks(resample_bone(ct, mask, {.lower = 500, .between = between}).density).hash();
+  };
   EXPECT_EQ(by(Between::automatic), by(Between::values));
   EXPECT_NE(by(Between::automatic), by(Between::outlines));
 }

@@ -4,9 +4,9 @@
 #include <fstream>
 #include <numbers>
 
+#include "osteo/assessment/ground_truth/experiments.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/assessment/ground_truth/experiments.h"
 #include "scratch.h"
 
 namespace osteo::truth {
@@ -121,7 +121,8 @@ TEST(Trajectories, ASpringToTheSurfaceMakesTheirForce) {
 
 TEST(Trajectories, InstrumentsAddWhatTheyAreSaidTo) {
   const auto plane = make_solid("plane");
-  const Trajectory t = way_over(*plane, 0, 20), seen = measured_trajectory(*plane, t, {}), again = measured_trajectory(*plane, t, {});
+  const Trajectory t = way_over(*plane, 0, 20), seen = measured_trajectory(*plane, t, {}),
+                   again = measured_trajectory(*plane, t, {});
   double off2 = 0;
   for (std::size_t i = 0; i < t.moments.size(); ++i) {
     const Vec3 off = seen.moments[i].surface_mm - t.moments[i].surface_mm;
@@ -147,7 +148,8 @@ TEST(Trajectories, FilesComeBack) {
   // What another would have made of the recording is the recording.
   const Trajectory back = trajectory_of(*duck, probe, 0.5);
   EXPECT_NEAR(back.rate_hz, 1000, 0.01);
-  for (std::size_t i = 0; i < probe.size(); ++i) EXPECT_LT(length(back.moments[i].device_mm - t.moments[i].device_mm), 1e-5);
+  for (std::size_t i = 0; i < probe.size(); ++i)
+    EXPECT_LT(length(back.moments[i].device_mm - t.moments[i].device_mm), 1e-5);
   EXPECT_EQ(parse_traj(traj_text(t, TrajectoryRole::in), "p", "t x y z fx fy fz", 0)[10].force_n, (Vec3{}));
   EXPECT_EQ(parse_traj(traj_text(t, TrajectoryRole::out), "p", "t x y z fx fy fz", 0)[10].force_n, (Vec3{0, 0, 1}));
 }
@@ -180,7 +182,8 @@ TEST(Trajectories, AreReadByColumnsAndRefusedByLine) {
 TEST(Renderers, OursHoldTheBars) {
   for (const char* name : {"plane", "sphere", "torus", "duck", "saddle"}) {
     const auto solid = make_solid(name);
-    const Played smooth = played("spline:64", *solid, way_over(*solid, 0)), rough = played("spline:64", *solid, way_over(*solid, 0.3, 5));
+    const Played smooth = played("spline:64", *solid, way_over(*solid, 0)),
+                 rough = played("spline:64", *solid, way_over(*solid, 0.3, 5));
     EXPECT_LT(smooth.accuracy.mean_n, 0.0005) << name;
     EXPECT_LT(rough.accuracy.mean_n, 0.001) << name;
     EXPECT_LT(rough.cost.memory_mb, 1.1);
@@ -192,7 +195,8 @@ TEST(Renderers, TheSplineIsNearerOnSmoothSolids) {
   for (const char* name : {"sphere", "torus", "duck"}) {
     const auto solid = make_solid(name);
     const Trajectory t = way_over(*solid, 0);
-    EXPECT_LT(played("spline:64", *solid, t).accuracy.mean_n, played("field:64", *solid, t).accuracy.mean_n / 5) << name;
+    EXPECT_LT(played("spline:64", *solid, t).accuracy.mean_n, played("field:64", *solid, t).accuracy.mean_n / 5)
+        << name;
   }
 }
 
@@ -200,7 +204,8 @@ TEST(Renderers, TheOldOnesDoWhatTheyDid) {
   const auto duck = make_solid("duck");
   const Trajectory t = way_over(*duck, 0), rough = way_over(*duck, 0.3);
   // The proxy of triangles comes near with their number; shading helps; voxels come near it (table 4).
-  const double coarse = played("cone:440", *duck, t).accuracy.mean_n, fine = played("cone:9024", *duck, t).accuracy.mean_n;
+  const double coarse = played("cone:440", *duck, t).accuracy.mean_n,
+               fine = played("cone:9024", *duck, t).accuracy.mean_n;
   EXPECT_GT(coarse, 3 * fine);
   EXPECT_GT(fine, 0.01);
   EXPECT_LT(played("cone-shaded:9024", *duck, t).accuracy.mean_n, fine / 1.5);
@@ -213,7 +218,8 @@ TEST(Renderers, TheOldOnesDoWhatTheyDid) {
   const auto wall = make_solid("wall");
   const Trajectory through = way_over(*wall, 0);
   EXPECT_GT(played("voxel:64/6000", *wall, through).accuracy.popped, 100U);
-  for (const char* what : {"spline:64", "shaded:6000", "cone:6000"}) EXPECT_EQ(played(what, *wall, through).accuracy.popped, 0U) << what;
+  for (const char* what : {"spline:64", "shaded:6000", "cone:6000"})
+    EXPECT_EQ(played(what, *wall, through).accuracy.popped, 0U) << what;
 }
 
 TEST(Renderers, UnitsChangeNothing) {
@@ -301,7 +307,8 @@ TEST(Measures, EnergyOfAClosedWayIsNoneForAProxy) {
 
 TEST(Measures, StepsOfForceAreThoseOfTheTriangles) {
   const auto duck = make_solid("duck");
-  const auto smooth = make_point_renderer("spline:64", *duck, {}), flat = make_point_renderer("voxel:32/1000", *duck, {});
+  const auto smooth = make_point_renderer("spline:64", *duck, {}),
+             flat = make_point_renderer("voxel:32/1000", *duck, {});
   EXPECT_LT(step_n(*duck, *smooth, 0.5), 0.002);
   EXPECT_GT(step_n(*duck, *flat, 0.5), 0.02);
 }
@@ -313,7 +320,9 @@ TEST(Measures, FrictionIsFoundWithinAPercent) {
   p.rate_hz = 250;
   for (const double friction : {0.1, 0.3}) {
     p.friction = friction;
-    EXPECT_NEAR(identify_friction(true_trajectory(*duck, p), *duck, "spline:32", 0, 0.8).friction, friction, 0.01 * friction) << friction;
+    EXPECT_NEAR(identify_friction(true_trajectory(*duck, p), *duck, "spline:32", 0, 0.8).friction, friction,
+                0.01 * friction)
+        << friction;
   }
 }
 
@@ -347,12 +356,16 @@ TEST(Experiments, AreReadWithTheirLines) {
     }
   };
   refused("{}", "osteotome_ground_truth");
-  refused("{\"osteotome_ground_truth\": 1, \"id\": \"a\",\n\"solids\": [\"duk\"], \"renderers\": [\"field:16\"]}", "line 2");
+  refused("{\"osteotome_ground_truth\": 1, \"id\": \"a\",\n\"solids\": [\"duk\"], \"renderers\": [\"field:16\"]}",
+          "line 2");
   refused(R"({"osteotome_ground_truth": 1, "id": "a", "solids": ["duck"]})", "renderers");
-  refused(R"({"osteotome_ground_truth": 1, "id": "A b", "solids": ["duck"], "renderers": ["field:16"]})", "small letters");
-  refused(R"({"osteotome_ground_truth": 1, "id": "a", "solids": ["duck"], "renderers": ["field:16"], "secnds": 2})", "secnds");
-  refused(R"({"osteotome_ground_truth": 1, "id": "a", "solids": ["duck"], "renderers": ["field:16"], "printed": {"field:8": 1}})",
-          "field:8");
+  refused(R"({"osteotome_ground_truth": 1, "id": "A b", "solids": ["duck"], "renderers": ["field:16"]})",
+          "small letters");
+  refused(R"({"osteotome_ground_truth": 1, "id": "a", "solids": ["duck"], "renderers": ["field:16"], "secnds": 2})",
+          "secnds");
+  refused(
+      R"({"osteotome_ground_truth": 1, "id": "a", "solids": ["duck"], "renderers": ["field:16"], "printed": {"field:8": 1}})",
+      "field:8");
   EXPECT_GE(built_in_experiments().size(), 5U);
 }
 
@@ -433,7 +446,8 @@ TEST(Reports, AreWrittenWholeAndNotOverOthers) {
   GroundTruthOptions o;
   o.share = 0.05;
   o.only = {parse_experiment(
-      R"({"osteotome_ground_truth": 1, "id": "a", "title": "A <table>", "solids": ["plane"], "renderers": ["field:16"]})", "x")};
+      R"({"osteotome_ground_truth": 1, "id": "a", "title": "A <table>", "solids": ["plane"], "renderers": ["field:16"]})",
+      "x")};
   const GroundTruthResult r = run_ground_truth(o);
   const fs::path out = scratch / "out";
   write_ground_truth(r, o, out, false);

@@ -35,7 +35,8 @@ BrickGrid body(double h, double half_mm, Inside inside) {
   return test::solid(h, half_mm, inside, {}, 8);
 }
 
-const ContactMethod kMethods[] = {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy};
+const ContactMethod kMethods[] = {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap,
+                                  ContactMethod::proxy};
 
 std::unique_ptr<ContactModel> model_of(ContactMethod method, double h, ContactParams params = {}) {
   params.method = method;
@@ -98,7 +99,8 @@ TEST(RoundCone, DistanceIsThatOfTheHullOfItsBalls) {
 TEST(BurrSurface, SamplesLieOnItEvenly) {
   for (const BurrShape shape : {BurrShape::ball, BurrShape::cylinder, BurrShape::taper}) {
     const Burr& burr = burr_library()[static_cast<std::size_t>(burr_index(BurrKind::cutting, 4, shape))];
-    const auto s = sample_head_surface(burr.head(), burr.falloff_mm3_per_s_per_n_per_rad / burr.rate_mm3_per_s_per_n, 2000);
+    const auto s =
+        sample_head_surface(burr.head(), burr.falloff_mm3_per_s_per_n_per_rad / burr.rate_mm3_per_s_per_n, 2000);
     Vec3 sum{};
     for (std::size_t i = 0; i < s.offset_mm.size(); ++i) {
       const auto& o = s.offset_mm[i];
@@ -124,7 +126,8 @@ TEST(Overlap, OfSolidBoneIsTheShapesVolume) {
                                          {RoundCone{-4, 8, 1.2, 1.2}, 2e-3}}) {
     for (int n = 0; n < 20; ++n) {
       const Vec3 axis = normalized({u(random), u(random), u(random)});
-      const auto o = overlap.measure(solid, shape, Vec3{u(random), u(random), u(random)} - axis * (shape.length_mm / 2), axis);
+      const auto o =
+          overlap.measure(solid, shape, Vec3{u(random), u(random), u(random)} - axis * (shape.length_mm / 2), axis);
       EXPECT_NEAR(o.bone_mm3 / shape.volume_mm3(), 1, tolerance) << shape.start_radius_mm << " " << shape.length_mm;
       // Pressed from all sides alike.
       EXPECT_LT(length(o.area_mm2), 0.5 * std::pow(shape.volume_mm3(), 2.0 / 3) * 0.5 / shape.start_radius_mm);
@@ -139,7 +142,8 @@ TEST(Overlap, AreaIsTheGradientOfTheVolume) {
   std::uniform_real_distribution<double> u(-1, 1);
   for (int n = 0; n < 50; ++n) {
     const RoundCone shape = n % 2 == 0 ? RoundCone{0, 0, 2, 2} : RoundCone{0, 6, 1, 2};
-    const Vec3 axis = normalized({u(random), u(random), 0.3 + std::abs(u(random))}), x{u(random), u(random), 0.8 + 0.5 * u(random)};
+    const Vec3 axis = normalized({u(random), u(random), 0.3 + std::abs(u(random))}),
+               x{u(random), u(random), 0.8 + 0.5 * u(random)};
     const auto o = overlap.measure(bone, shape, x, axis);
     const double e = 0.1;
     Vec3 slope;
@@ -147,7 +151,8 @@ TEST(Overlap, AreaIsTheGradientOfTheVolume) {
       Vec3 up = x, down = x;
       up[a] += e;
       down[a] -= e;
-      slope[a] = (overlap.measure(bone, shape, up, axis).bone_mm3 - overlap.measure(bone, shape, down, axis).bone_mm3) / (2 * e);
+      slope[a] = (overlap.measure(bone, shape, up, axis).bone_mm3 - overlap.measure(bone, shape, down, axis).bone_mm3) /
+                 (2 * e);
     }
     EXPECT_LT(length(slope - o.area_mm2), 0.03 * length(o.area_mm2) + (n % 2 == 0 ? 0.03 : 0.15)) << n;
   }
@@ -161,8 +166,9 @@ TEST(Overlap, SameBitsForEveryInstructionSet) {
   std::vector<overlap::Partial> partials(3 * 512);
   const overlap::BrickFunction functions[] = {&overlap::brick_base, &overlap::brick_avx2, &overlap::brick_avx512};
   for (int n = 0; n < 2000; ++n) {
-    overlap::Shape s{{0.6F, 0, 0.8F}, n % 2 == 0 ? 0.0F : 7.0F, 4.3F, n % 4 == 1 ? 0.2F : 0.0F, n % 4 == 1 ? 0.204F : 0.0F, 0.3F,
-                     n % 2 == 0};
+    overlap::Shape s{
+        {0.6F, 0, 0.8F}, n % 2 == 0 ? 0.0F : 7.0F, 4.3F, n % 4 == 1 ? 0.2F : 0.0F, n % 4 == 1 ? 0.204F : 0.0F, 0.3F,
+        n % 2 == 0};
     const float first[3] = {u(random), u(random), u(random)};
     const std::uint32_t brick = static_cast<std::uint32_t>(random()) % static_cast<std::uint32_t>(bone.brick_count());
     overlap::Sums sums[3];
@@ -242,8 +248,8 @@ TEST(Contact, ForceIsContinuousAndCapped) {
   }
 }
 
-// Along the surface of a ball a fiftieth of a voxel changes the force by less than 1 %, 1.5 % where it is less than a third of a voxel
-// deep.
+// Along the surface of a ball a fiftieth of a voxel changes the force by less than 1 %, 1.5 % where it is less than a
+// third of a voxel deep.
 TEST(Contact, ExactOverlapHasNoSteps) {
   const auto ball = body(0.5, 8, [](Vec3 p) { return length(p) < 6.3; });
   const auto model = model_of(ContactMethod::overlap, 0.5);
@@ -253,7 +259,8 @@ TEST(Contact, ExactOverlapHasNoSteps) {
     for (int s = 0; s < 2000; ++s) {
       const double a = 0.3 + s * (0.01 / 8);  // steps of 0.01 mm: a fiftieth of a voxel
       const double reach = 6.3 + 2 - depth;
-      const auto f = model->contact(ball, at(reach * std::cos(a), reach * std::sin(a) * 0.8, reach * std::sin(a) * 0.6)).force_n;
+      const auto f =
+          model->contact(ball, at(reach * std::cos(a), reach * std::sin(a) * 0.8, reach * std::sin(a) * 0.6)).force_n;
       if (s > 0) worst = std::max(worst, length(f - before) / length(f));
       before = f;
     }
@@ -263,7 +270,8 @@ TEST(Contact, ExactOverlapHasNoSteps) {
 
 // A closed path through static bone gains nothing: the force is the slope of an energy.
 TEST(Contact, ExactOverlapGivesNoEnergyOnAClosedPath) {
-  const auto ball = body(0.5, 8, [](Vec3 p) { return length(p) < 5.7 || (p.x > 2 && std::abs(p.y) < 3 && std::abs(p.z) < 3); });
+  const auto ball =
+      body(0.5, 8, [](Vec3 p) { return length(p) < 5.7 || (p.x > 2 && std::abs(p.y) < 3 && std::abs(p.z) < 3); });
   const auto model = model_of(ContactMethod::overlap, 0.5);
   double work = 0, turned_over = 0;
   const int n = 4000;
@@ -353,7 +361,8 @@ TEST(Removal, WhatIsTakenIsWhatIsMissing) {
     for (int t = 0; t < 3000; ++t) {
       const auto r = model->contact(bone, at(2 * std::sin(t / 300.0), 2 * std::cos(t / 300.0), 2.5 - t / 1500.0));
       double removed = 0;
-      removal.remove(bone, model->cut(bone), burr_library()[3], r.normal_force_n, Burr::kNominalRpm, 1e-3, nullptr, removed);
+      removal.remove(bone, model->cut(bone), burr_library()[3], r.normal_force_n, Burr::kNominalRpm, 1e-3, nullptr,
+                     removed);
       total += removed;
     }
     EXPECT_GT(total, 5);
@@ -383,7 +392,8 @@ TEST(Removal, PoleRemovesLessThanEquator) {
       pose.axis = axis;
       const auto r = model->contact(bone, pose);
       double removed = 0;
-      removal.remove(bone, model->cut(bone), burr_library()[3], r.normal_force_n, Burr::kNominalRpm, 1e-3, nullptr, removed);
+      removal.remove(bone, model->cut(bone), burr_library()[3], r.normal_force_n, Burr::kNominalRpm, 1e-3, nullptr,
+                     removed);
       return removed;
     };
     EXPECT_LT(rate({0, 0, 1}), 0.6 * rate({1, 0, 0}));
@@ -403,7 +413,8 @@ TEST(Removal, TurnsFasterAndSofterBoneGivesMore) {
 
 // HU by depth; where it is not said otherwise, cortex of 1500 HU down to 5 mm, below it cancellous bone of 500 HU.
 std::shared_ptr<const Hardness> layered(
-    const BrickGrid& bone, const HardnessLaw& law = {}, double (*hu_at)(double z) = [](double z) { return z > -5 ? 1500.0 : 500.0; }) {
+    const BrickGrid& bone, const HardnessLaw& law = {},
+    double (*hu_at)(double z) = [](double z) { return z > -5 ? 1500.0 : 500.0; }) {
   BrickGrid hu(bone);
   for (VoxelKey v = 0; v < hu.brick_count() * BrickGrid::kVoxels; ++v) {
     const Ijk c = hu.coordinate(v);
@@ -418,8 +429,8 @@ TEST(Hardness, FollowsItsLaw) {
     EXPECT_NEAR(law.at(hu), std::clamp(hu / 1500, 0.125, 3.0), 1e-12);
     EXPECT_EQ(law.at(hu), HardnessLaw{}.at(hu));
   }
-  const HardnessLaw other =
-      parse_hardness(R"({"osteotome_hardness": 1, "cortical_hu": 1000, "zero_hu": -100, "exponent": 2, "least": 0.05})", "x");
+  const HardnessLaw other = parse_hardness(
+      R"({"osteotome_hardness": 1, "cortical_hu": 1000, "zero_hu": -100, "exponent": 2, "least": 0.05})", "x");
   EXPECT_NEAR(other.at(450), 0.25, 1e-12);
   EXPECT_EQ(other.at(-100), 0.05);
   auto bone = slab(0.5);
@@ -451,7 +462,8 @@ TEST(Hardness, TheFileIsCheckedWithKeyAndLine) {
   refused(R"({"osteotome_hardness": 1, "cortical_hu": 100, "zero_hu": 200})", "below");
 }
 
-// The burr fed down through cortex into cancellous bone, at a given speed and by a hand on a spring: what presses on it in either.
+// The burr fed down through cortex into cancellous bone, at a given speed and by a hand on a spring: what presses on it
+// in either.
 struct Layers {
   double cortex_n = 0, cancellous_n = 0;
   [[nodiscard]] double step() const { return (cortex_n - cancellous_n) / cortex_n; }
@@ -483,12 +495,14 @@ Layers fed(bool hard, double h, double hz, double mm_s = 1) {
   return {sum.cortex_n / in_cortex, sum.cancellous_n / in_cancellous};
 }
 
-// What a hand can tell apart: 7 % (X. Pang, H. Tan, N. Durlach, Percept Psychophys 49(6), 1991, from 2.5 to 10 N); 10 % to be careful.
+// What a hand can tell apart: 7 % (X. Pang, H. Tan, N. Durlach, Percept Psychophys 49(6), 1991, from 2.5 to 10 N); 10 %
+// to be careful.
 TEST(Hardness, TheStepFromCortexToCancellousBoneIsFelt) {
   constexpr double kNoticed = 0.10;
   const Layers alike = fed(false, 0.5, 1000), hard = fed(true, 0.5, 1000);
-  std::printf("fed 1 mm/s: alike %.2f N then %.2f N (step %.0f %%); by HU %.2f N then %.2f N (step %.0f %%)\n", alike.cortex_n,
-              alike.cancellous_n, 100 * alike.step(), hard.cortex_n, hard.cancellous_n, 100 * hard.step());
+  std::printf("fed 1 mm/s: alike %.2f N then %.2f N (step %.0f %%); by HU %.2f N then %.2f N (step %.0f %%)\n",
+              alike.cortex_n, alike.cancellous_n, 100 * alike.step(), hard.cortex_n, hard.cancellous_n,
+              100 * hard.step());
   EXPECT_LT(std::abs(alike.step()), kNoticed / 2);
   EXPECT_GT(hard.step(), 2 * kNoticed);
   EXPECT_GT(hard.step(), 0.4);  // 500 HU against 1500: two thirds, less what the hole is wider in soft bone
@@ -497,7 +511,8 @@ TEST(Hardness, TheStepFromCortexToCancellousBoneIsFelt) {
   }
 }
 
-// What a hand of constant force takes out in a time goes by the bone alone, also where hard and soft lie under the burr at once.
+// What a hand of constant force takes out in a time goes by the bone alone, also where hard and soft lie under the burr
+// at once.
 TEST(Hardness, RemovalIsTheSameForAnyVoxelAndTick) {
   const auto drilled = [](double h, double hz) {
     auto bone = slab(h);

@@ -27,7 +27,8 @@ TEST(Contact, SixFacesGiveTheSameDepth) {
         };
         static_cast<void>(at(-1));  // the proxy comes from outside
         const ContactResult r = at(0.8);
-        SCOPED_TRACE(std::string(EnumNames<ContactMethod>::values[m]) + " axis " + std::to_string(a) + " side " + std::to_string(side));
+        SCOPED_TRACE(std::string(EnumNames<ContactMethod>::values[m]) + " axis " + std::to_string(a) + " side " +
+                     std::to_string(side));
         EXPECT_NEAR(r.depth_mm, 0.8, params.method == ContactMethod::rays ? 0.15 : 0.06);
         EXPECT_GT(side * r.normal[a], 0.99);
       }

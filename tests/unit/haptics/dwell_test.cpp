@@ -1,4 +1,5 @@
-// A burr that is pressed goes on cutting, by whatever method its contact is felt: what presses on it is what it can take.
+// A burr that is pressed goes on cutting, by whatever method its contact is felt: what presses on it is what it can
+// take.
 #include <gtest/gtest.h>
 
 #include "osteo/simulation/haptics/simulated_device.h"
@@ -42,17 +43,19 @@ Pressed pressed(ContactMethod method, double h, double force_n, int tool, double
   return p;
 }
 
-// However lightly it is pressed and whatever the method and the voxels, the rate is what decides: it neither stops nor goes by the voxels.
+// However lightly it is pressed and whatever the method and the voxels, the rate is what decides: it neither stops nor
+// goes by the voxels.
 TEST(Pressed, AConstantForceNeverStopsCutting) {
   for (const auto& [tool, seconds] : {std::pair{3, 1.5}, {5, 1.0}}) {
     for (const double force_n : {0.05, 0.3, 1.0}) {
       double least = 1e9, most = 0;
-      for (const ContactMethod method : {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
+      for (const ContactMethod method :
+           {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
         for (const double h : {0.3, 0.5, 0.9}) {
           if (tool == 5 && h == 0.3) continue;
           const Pressed p = pressed(method, h, force_n, tool, seconds, 500);
-          SCOPED_TRACE(std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)]) + ", " + std::to_string(h) + " mm, " +
-                       std::to_string(force_n) + " N, tool " + std::to_string(tool));
+          SCOPED_TRACE(std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)]) + ", " +
+                       std::to_string(h) + " mm, " + std::to_string(force_n) + " N, tool " + std::to_string(tool));
           EXPECT_GT(p.late_mm3, 0.15 * p.removed_mm3);
           least = std::min(least, p.depth_mm);
           most = std::max(most, p.depth_mm);

@@ -22,7 +22,8 @@ CubicField duck_field(int n, double half = 40) {
   std::size_t at = 0;
   for (int k = 0; k < n; ++k)
     for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i) v[at++] = static_cast<float>(test::duck(f.world_from_index({double(i), double(j), double(k)})));
+      for (int i = 0; i < n; ++i)
+        v[at++] = static_cast<float>(test::duck(f.world_from_index({double(i), double(j), double(k)})));
   return CubicField(f, std::move(v));
 }
 
@@ -101,7 +102,8 @@ TEST(CubicField, TheSplineGoesThroughItsValues) {
   std::vector<float> v;
   for (int k = 0; k < 28; ++k)
     for (int j = 0; j < 26; ++j)
-      for (int i = 0; i < 24; ++i) v.push_back(static_cast<float>(height(f.world_from_index({double(i), double(j), double(k)}))));
+      for (int i = 0; i < 24; ++i)
+        v.push_back(static_cast<float>(height(f.world_from_index({double(i), double(j), double(k)}))));
   const CubicField field(f, v, FieldCurve::spline);
   // Away from the rim, where the mirror is felt: 0.27 for each voxel.
   for (double x = 4; x < 8; x += 0.37)
@@ -112,7 +114,8 @@ TEST(CubicField, TheSplineGoesThroughItsValues) {
       EXPECT_LT(length(field(at).gradient - slope), 2e-3);
     }
   for (const auto& [i, j, k] : {std::array{2, 3, 2}, {12, 13, 14}, {21, 22, 25}})
-    EXPECT_NEAR(field(f.world_from_index({double(i), double(j), double(k)})).value_mm, static_cast<double>(v[(k * 26 + j) * 24 + i]), 1e-5);
+    EXPECT_NEAR(field(f.world_from_index({double(i), double(j), double(k)})).value_mm,
+                static_cast<double>(v[(k * 26 + j) * 24 + i]), 1e-5);
 }
 
 // Fields with an answer in closed form.
@@ -139,7 +142,8 @@ TEST(GodObject, RestsInACornerOfThreeWalls) {
     GodObject proxy;
     proxy.place({0, 0, 5});
     GodObject::Answer a;
-    for (int i = 0; i < 400; ++i) a = proxy.update(w, {0.3, -0.2, 3 - std::min(i, 300) * 0.02}, {.feature_mm = 0.5, .tolerance_mm = 1e-6});
+    for (int i = 0; i < 400; ++i)
+      a = proxy.update(w, {0.3, -0.2, 3 - std::min(i, 300) * 0.02}, {.feature_mm = 0.5, .tolerance_mm = 1e-6});
     EXPECT_TRUE(a.contact);
     EXPECT_LT(length(a.proxy_mm), 0.02) << lean;
     EXPECT_GT(w(a.proxy_mm).value_mm, -1e-4);

@@ -21,20 +21,24 @@ class Stability : public testing::TestWithParam<test::StabilityCase> {};
 TEST_P(Stability, RestsOnAWallOf2kNPerM) {
   for (const double push_n : {0.3, 1.0, 3.0}) {
     const auto r = test::push_against_wall(GetParam(), 2, true, push_n);
-    EXPECT_TRUE(r.stable) << push_n << " N: " << r.fastest_mm_s << " mm/s at the end with " << r.stiffness_n_per_mm << " N/mm";
+    EXPECT_TRUE(r.stable) << push_n << " N: " << r.fastest_mm_s << " mm/s at the end with " << r.stiffness_n_per_mm
+                          << " N/mm";
     // What the wall gave, at any time, beyond what it had taken.
     EXPECT_LT(r.gained_mj, GetParam().device.late_share > 0.03 ? 1.5 : 0.5) << push_n;
   }
 }
 INSTANTIATE_TEST_SUITE_P(Table, Stability, testing::ValuesIn(test::kStabilityCases), [](const auto& row) {
   std::string name;
-  for (const char* c = row.param.name; *c != 0; ++c) name += std::isalnum(static_cast<unsigned char>(*c)) != 0 ? *c : '_';
+  for (const char* c = row.param.name; *c != 0; ++c)
+    name += std::isalnum(static_cast<unsigned char>(*c)) != 0 ? *c : '_';
   return name;
 });
 
-// --- every tick of every hard case: finite, capped, of bounded rate and reach, the same again -----------------------------------------
+// --- every tick of every hard case: finite, capped, of bounded rate and reach, the same again
+// -----------------------------------------
 
-const ContactMethod kMethods[] = {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy};
+const ContactMethod kMethods[] = {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap,
+                                  ContactMethod::proxy};
 
 HapticSetup setup_for(ContactMethod method) {
   HapticSetup s;
@@ -54,7 +58,8 @@ struct Checked {
   double removed = 0;
   std::vector<TickRecord> records;
 
-  Checked(const HapticSetup& s, BrickGrid& bone, double dt_s = 1e-3) : renderer(s, bone, {}, dt_s), dt(dt_s), setup(s) {}
+  Checked(const HapticSetup& s, BrickGrid& bone, double dt_s = 1e-3)
+      : renderer(s, bone, {}, dt_s), dt(dt_s), setup(s) {}
 
   Vec3 step(const DeviceSample& sample) {
     const auto [r, changes] = renderer.step(sample);
@@ -91,7 +96,12 @@ const HardCase kHardCases[] = {
     {"acute_wedge", [](Vec3 p) { return p.z < 0 && std::abs(p.x) < -0.3 * p.z; }, {0.1, 0, 6}, {-0.4, 1, -4}, false, 0},
     {"saddle", [](Vec3 p) { return p.z < 0.08 * (p.x * p.x - p.y * p.y); }, {0, 0, 6}, {1, 1, -3}, false, 0},
     {"three_contacts", [](Vec3 p) { return p.x < -1 || p.y < -1 || p.z < -1; }, {5, 5, 5}, {-2, -2.2, -1.8}, false, 0},
-    {"slot_narrower_than_the_burr", [](Vec3 p) { return p.z < 0 && std::abs(p.x) > 1; }, {0, 0, 6}, {0.3, 0, -4}, false, 0},
+    {"slot_narrower_than_the_burr",
+     [](Vec3 p) { return p.z < 0 && std::abs(p.x) > 1; },
+     {0, 0, 6},
+     {0.3, 0, -4},
+     false,
+     0},
     {"bump", [](Vec3 p) { return p.z < 0 || length(p) < 1; }, {-6, 0, 4}, {6, 0.1, -1}, false, 0},
     {"start_inside", [](Vec3 p) { return length(p) < 9; }, {2, 1, 0}, {2, 1, 0}, false, 0},
     {"one_voxel",
@@ -135,14 +145,16 @@ TEST_P(HardCases, StayWithinAllBounds) {
     if (round == 0) {
       first = run.records;
     } else {
-      for (std::size_t i = 0; i < first.size(); ++i) ASSERT_EQ(std::memcmp(&first[i], &run.records[i], sizeof(TickRecord)), 0) << i;
+      for (std::size_t i = 0; i < first.size(); ++i)
+        ASSERT_EQ(std::memcmp(&first[i], &run.records[i], sizeof(TickRecord)), 0) << i;
     }
   }
 }
-INSTANTIATE_TEST_SUITE_P(All, HardCases, testing::Combine(testing::ValuesIn(kMethods), testing::ValuesIn(kHardCases)), [](const auto& row) {
-  return std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(std::get<0>(row.param))]) + "_" +
-         std::get<1>(row.param).name;
-});
+INSTANTIATE_TEST_SUITE_P(
+    All, HardCases, testing::Combine(testing::ValuesIn(kMethods), testing::ValuesIn(kHardCases)), [](const auto& row) {
+      return std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(std::get<0>(row.param))]) + "_" +
+             std::get<1>(row.param).name;
+    });
 
 DeviceSample at(double x, double y, double z) {
   DeviceSample s;
@@ -245,7 +257,8 @@ TEST(HardCase, AStallOfFourTicksChangesTheForceWithoutAStep) {
 
 TEST(HardCase, TimeGoingBackwardsOrStandingStillIsAMillisecond) {
   Guard guard({}, {});
-  for (const double dt : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+  for (const double dt :
+       {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     const auto out = guard.limit({{0, 0, 1}, {0, 0, 5}, {0, 0, 1}, {}, 0, false}, dt);
     EXPECT_TRUE(std::isfinite(length(out.force_n)));
     EXPECT_LE(length(out.force_n), 8.001);
@@ -256,7 +269,8 @@ TEST(Guard, LimitsForceAndRate) {
   GuardParams p;
   p.max_force_n = 5;
   p.max_rate_n_per_s = 1000;
-  Guard guard(p, {.damping_n_s_per_m = 1, .delay_s = 0, .encoder_mm = 0, .max_force_n = 3, .max_stiffness_n_per_mm = 1e9});
+  Guard guard(p,
+              {.damping_n_s_per_m = 1, .delay_s = 0, .encoder_mm = 0, .max_force_n = 3, .max_stiffness_n_per_mm = 1e9});
   Vec3 last{};
   for (int t = 0; t < 10; ++t) {
     const auto out = guard.limit({{0, 0, 1}, {0, 0, 50}, {0, 0, 1}, {}, 0, false}, 1e-3);
@@ -268,7 +282,8 @@ TEST(Guard, LimitsForceAndRate) {
 }
 
 TEST(Guard, StiffnessFollowsTickDelayAndDamping) {
-  const DeviceTraits plain{.damping_n_s_per_m = 1, .delay_s = 0, .encoder_mm = 0, .max_force_n = 8, .max_stiffness_n_per_mm = 1e9};
+  const DeviceTraits plain{
+      .damping_n_s_per_m = 1, .delay_s = 0, .encoder_mm = 0, .max_force_n = 8, .max_stiffness_n_per_mm = 1e9};
   EXPECT_NEAR(safe_stiffness_n_per_mm(plain, 1, 1e-3), 2, 1e-9);
   EXPECT_NEAR(safe_stiffness_n_per_mm(plain, 1, 0.5e-3), 4, 1e-9);
   auto slow = plain;
@@ -283,26 +298,30 @@ double any_bits(std::mt19937_64& random) {
   return std::bit_cast<double>(random());
 }
 
-// Any bit patterns at all for whatever it is given or made with: what comes out is finite and within the limits of force and rate.
+// Any bit patterns at all for whatever it is given or made with: what comes out is finite and within the limits of
+// force and rate.
 TEST(Fuzz, TheGuardLetsNothingThatIsNoNumberThrough) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> u(-1, 1);
   // Mostly plausible, so that one bad value at a time meets all the good ones; now and then everything is bad.
-  const auto one = [&](double most, int bad) { return static_cast<int>(random() % 100) < bad ? any_bits(random) : most * u(random); };
+  const auto one = [&](double most, int bad) {
+    return static_cast<int>(random() % 100) < bad ? any_bits(random) : most * u(random);
+  };
   for (int round = 0; round < 4000; ++round) {
     const int bad = round % 4 == 0 ? 100 : round % 4 == 1 ? 0 : 5;
     const bool bad_limits = round % 8 >= 6;
     GuardParams p;
     DeviceTraits d;
-    for (double* const x :
-         {&p.max_rate_n_per_s, &p.max_force_n, &p.max_damping_n_s_per_m, &p.contact_damping_n_s_per_m, &p.resume_s, &p.stale_ms, &p.fade_ms,
-          &d.damping_n_s_per_m, &d.delay_s, &d.encoder_mm, &d.max_force_n, &d.max_stiffness_n_per_mm}) {
+    for (double* const x : {&p.max_rate_n_per_s, &p.max_force_n, &p.max_damping_n_s_per_m, &p.contact_damping_n_s_per_m,
+                            &p.resume_s, &p.stale_ms, &p.fade_ms, &d.damping_n_s_per_m, &d.delay_s, &d.encoder_mm,
+                            &d.max_force_n, &d.max_stiffness_n_per_mm}) {
       if (bad_limits && random() % 3 == 0) *x = any_bits(random);
     }
     p.passivity = random() % 2 == 0;
     const auto strict = [](double limit) { return limit > 0 ? limit : 0; };
     const double most = std::min(strict(p.max_force_n), strict(d.max_force_n));
-    const double stiffness = safe_stiffness_n_per_mm(d, p.contact_damping_n_s_per_m, bad_limits ? any_bits(random) : 1e-3);
+    const double stiffness =
+        safe_stiffness_n_per_mm(d, p.contact_damping_n_s_per_m, bad_limits ? any_bits(random) : 1e-3);
     EXPECT_GE(stiffness, 0);
     Guard guard(p, d);
     Vec3 last{};
@@ -325,7 +344,8 @@ TEST(Fuzz, TheGuardLetsNothingThatIsNoNumberThrough) {
       if (p.max_rate_n_per_s != 0) {
         ASSERT_LE(length(f - last), strict(p.max_rate_n_per_s * step) * (1 + 1e-9) + 1e-12 * most) << round << ' ' << t;
       }
-      ASSERT_TRUE(std::isfinite(guard.energy_mj()) && std::isfinite(length(guard.velocity_mm_s()))) << round << ' ' << t;
+      ASSERT_TRUE(std::isfinite(guard.energy_mj()) && std::isfinite(length(guard.velocity_mm_s())))
+          << round << ' ' << t;
       last = f;
     }
     // It has not lost itself: with plausible input the force comes.
@@ -346,17 +366,21 @@ TEST(Guard, ANormalThatIsNoNumberLeavesTheForce) {
   }
 }
 
-// The bytes of a report may be anything: every number of every record stays finite, and force and rate within their limits.
+// The bytes of a report may be anything: every number of every record stays finite, and force and rate within their
+// limits.
 TEST(Fuzz, AnyBytesFromADeviceGiveFiniteRecords) {
   const auto number = [](const TickRecord& r) {
-    double sum = static_cast<double>(r.normal_force_n) + static_cast<double>(r.depth_mm) + static_cast<double>(r.removed_mm3) +
-                 static_cast<double>(r.energy_mj) + static_cast<double>(r.thickness_mm) + static_cast<double>(r.clearance_mm);
+    double sum = static_cast<double>(r.normal_force_n) + static_cast<double>(r.depth_mm) +
+                 static_cast<double>(r.removed_mm3) + static_cast<double>(r.energy_mj) +
+                 static_cast<double>(r.thickness_mm) + static_cast<double>(r.clearance_mm);
     for (std::size_t a = 0; a < 3; ++a)
-      sum += static_cast<double>(r.force_n[a]) + static_cast<double>(r.torque_n_mm[a]) + static_cast<double>(r.shown_offset_mm[a]);
+      sum += static_cast<double>(r.force_n[a]) + static_cast<double>(r.torque_n_mm[a]) +
+             static_cast<double>(r.shown_offset_mm[a]);
     return sum;
   };
   for (const ContactMethod method : kMethods) {
-    auto bone = test::solid(0.5, 8, [](Vec3 p) { return std::sin(p.x) + std::sin(1.3 * p.y) + std::sin(0.9 * p.z) < 0.2; });
+    auto bone =
+        test::solid(0.5, 8, [](Vec3 p) { return std::sin(p.x) + std::sin(1.3 * p.y) + std::sin(0.9 * p.z) < 0.2; });
     const HapticSetup setup = setup_for(method);
     HapticRenderer renderer(setup, bone, {}, 1e-3);
     Vec3 last{};
@@ -382,13 +406,15 @@ TEST(Fuzz, AnyBytesFromADeviceGiveFiniteRecords) {
       ASSERT_LE(length(f - last), setup.params.guard.max_rate_n_per_s * 1e-3 * (1 + 1e-5)) << t;
       last = f;
     }
-    for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) ASSERT_TRUE(bone.value(v) >= 0 && bone.value(v) <= 1);
+    for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v)
+      ASSERT_TRUE(bone.value(v) >= 0 && bone.value(v) <= 1);
   }
 }
 
 TEST(Renderer, ARateThatIsNoNumberIsRefused) {
   auto bone = test::slab(1);
-  for (const double dt : {0.0, -1e-3, 2.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
+  for (const double dt :
+       {0.0, -1e-3, 2.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
     EXPECT_THROW(HapticRenderer(setup_for(ContactMethod::overlap), bone, {}, dt), Error) << dt;
 }
 
@@ -410,7 +436,8 @@ TEST(SpringHand, AGoalOrForceThatIsNoNumberDoesNotLoseIt) {
 // Anything a device may say, for a hundred thousand ticks; osteo bench haptics does a hundred million.
 TEST(Fuzz, NoForceIsEverOutOfBounds) {
   for (const ContactMethod method : kMethods) {
-    auto bone = test::solid(0.5, 12, [](Vec3 p) { return std::sin(p.x) + std::sin(1.3 * p.y) + std::sin(0.9 * p.z) < 0.2; });
+    auto bone =
+        test::solid(0.5, 12, [](Vec3 p) { return std::sin(p.x) + std::sin(1.3 * p.y) + std::sin(0.9 * p.z) < 0.2; });
     auto setup = setup_for(method);
     setup.params.effects.spin_up_s = 0;  // each tick has another burr, which would never come up to speed
     Checked run(setup, bone);

@@ -55,9 +55,11 @@ TEST(Guide, DeadZoneDampingAndTheLeadersForce) {
   EXPECT_NEAR(f.x, 0, 1e-9);
   EXPECT_NEAR(f.z, 2, 1e-9);
   // Its time stands still: the force fades.
-  for (int t = 0; t < 25; ++t) f = law.step({}, {}, leader_at({0.9, 0, 0}, kLeadStrength | kLeadStill), {0, 0, 2}, 1e-3);
+  for (int t = 0; t < 25; ++t)
+    f = law.step({}, {}, leader_at({0.9, 0, 0}, kLeadStrength | kLeadStill), {0, 0, 2}, 1e-3);
   EXPECT_NEAR(f.z, 1, 0.05);
-  for (int t = 0; t < 30; ++t) f = law.step({}, {}, leader_at({0.9, 0, 0}, kLeadStrength | kLeadStill), {0, 0, 2}, 1e-3);
+  for (int t = 0; t < 30; ++t)
+    f = law.step({}, {}, leader_at({0.9, 0, 0}, kLeadStrength | kLeadStill), {0, 0, 2}, 1e-3);
   EXPECT_EQ(f.z, 0);
   // The leader moves at 100 mm/s, the hand rests: 0.01 N s/mm x 100 mm/s.
   for (int t = 0; t < 100; ++t) f = law.step({}, {}, leader_at({0, 0.005 + 0.1 * t - 5, 0}), {}, 1e-3);
@@ -72,8 +74,8 @@ TEST(Guide, TheDeviceBearsNoMoreThanHalfAWall) {
   EXPECT_EQ(law_of(g, weak).stiffness_n_per_mm(), safe_stiffness_n_per_mm(weak, 1, 1e-3) / 2);
 }
 
-// All that leads a hand together is within the limit, and what is forwarded gives way as the hand goes off: wherever it is, the sum leads
-// back beyond kNearMm, whatever the leader pressed with.
+// All that leads a hand together is within the limit, and what is forwarded gives way as the hand goes off: wherever it
+// is, the sum leads back beyond kNearMm, whatever the leader pressed with.
 TEST(Guide, TheLeadersForceCannotCarryTheHandOff) {
   HandGuide g;
   g.stiffness_n_per_mm = 1;
@@ -100,7 +102,8 @@ TEST(Guide, TheLeadersForceCannotCarryTheHandOff) {
   }
 }
 
-// A hand of 0.1 kg that gives way, on three arms, is shown strokes of up to 4 mm/s that the leader pressed on with up to 8 N.
+// A hand of 0.1 kg that gives way, on three arms, is shown strokes of up to 4 mm/s that the leader pressed on with up
+// to 8 N.
 TEST(Guide, AHandThatIsShownFollowsWithinAMillimetre) {
   struct Arm {
     double damping, delay_s, encoder_mm;
@@ -143,7 +146,8 @@ TEST(Guide, AHandThatIsShownFollowsWithinAMillimetre) {
           most = std::max(most, e);
           ++n;
         }
-        EXPECT_LT(std::sqrt(squares / n), 1) << arm.damping << " " << arm.delay_s << " " << pressed << " N, grip " << grip;
+        EXPECT_LT(std::sqrt(squares / n), 1)
+            << arm.damping << " " << arm.delay_s << " " << pressed << " N, grip " << grip;
         EXPECT_LT(most, 2) << pressed << " N, grip " << grip;
       }
     }
@@ -173,7 +177,8 @@ TEST(Guide, PushingAwayHasItsOwnLimits) {
   EXPECT_EQ(f, Vec3{});
   // A device that damps little bears little: 5/s.
   g.damping_n_s_per_m = 0;
-  EXPECT_NEAR(law_of(g, {.damping_n_s_per_m = 1, .delay_s = 0, .encoder_mm = 0, .max_force_n = 8}).stiffness_n_per_mm(), -0.005, 1e-12);
+  EXPECT_NEAR(law_of(g, {.damping_n_s_per_m = 1, .delay_s = 0, .encoder_mm = 0, .max_force_n = 8}).stiffness_n_per_mm(),
+              -0.005, 1e-12);
 }
 
 TEST(Guide, WhatIsNoNumberLeadsNobody) {
@@ -198,8 +203,8 @@ TEST(Guide, IsRecordedAsItIs) {
   EXPECT_FALSE(HandGuide{}.on());
 }
 
-// Two hands in a renderer: nobody led gives the same bits as before there were guides; a leader that stands still meets no bone, and goes
-// on as if nothing had been.
+// Two hands in a renderer: nobody led gives the same bits as before there were guides; a leader that stands still meets
+// no bone, and goes on as if nothing had been.
 TEST(Guide, ALeaderThatStandsStillGoesOnAsBefore) {
   HapticSetup setup;
   setup.device = kFirm;

@@ -42,7 +42,8 @@ bool same(TickRecord a, TickRecord b) {
 TEST(Hands, EachFeelsWhatItWouldFeelAlone) {
   const int tools[] = {burr(BurrKind::cutting, 4), instrument_index("sucker 8 Fr"), instrument_index("probe 1 mm"),
                        burr(BurrKind::diamond, 3)};
-  for (const ContactMethod method : {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy}) {
+  for (const ContactMethod method :
+       {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy}) {
     HapticSetup setup = hands(4);
     setup.params.contact.method = method;
     const auto sample = [&](std::size_t h, int t) {
@@ -58,7 +59,8 @@ TEST(Hands, EachFeelsWhatItWouldFeelAlone) {
     std::vector<std::unique_ptr<HapticRenderer>> alone;
     HapticSetup one = hands(1);
     one.params.contact.method = method;
-    for (std::size_t h = 0; h < 4; ++h) alone.push_back(std::make_unique<HapticRenderer>(one, bones[h], Anatomy{}, 1e-3));
+    for (std::size_t h = 0; h < 4; ++h)
+      alone.push_back(std::make_unique<HapticRenderer>(one, bones[h], Anatomy{}, 1e-3));
     double felt[4] = {};
     for (int t = 0; t < 600; ++t) {
       std::array<DeviceSample, 4> samples;
@@ -98,7 +100,8 @@ TEST(Hands, TwoBurrsShareTheBone) {
     }
     for (std::size_t c = step.changes.size(); c-- > 0;) {
       bool later = false;
-      for (std::size_t d = c + 1; d < step.changes.size(); ++d) later = later || step.changes[d].voxel == step.changes[c].voxel;
+      for (std::size_t d = c + 1; d < step.changes.size(); ++d)
+        later = later || step.changes[d].voxel == step.changes[c].voxel;
       if (!later) {
         ASSERT_EQ(bone.value(step.changes[c].voxel), step.changes[c].density);
       }
@@ -160,7 +163,8 @@ TEST(Speed, FollowsThePedal) {
   s.pedal = 0;
   double still_at = 0;
   for (int t = 1; t <= 2000 && speed > 0; ++t, still_at = t * 1e-3) speed = r.step(s).record.speed_rpm;
-  EXPECT_NEAR(still_at, 0.2 * std::log((to + (from - to) * std::exp(-1.5)) / 60), 0.002);  // within 60 rpm of rest it rests
+  EXPECT_NEAR(still_at, 0.2 * std::log((to + (from - to) * std::exp(-1.5)) / 60),
+              0.002);  // within 60 rpm of rest it rests
   // Another burr begins at rest; what is no burr never turns.
   s.pedal = 255;
   for (int t = 0; t < 1000; ++t) static_cast<void>(r.step(s));
@@ -251,7 +255,8 @@ TEST(Settings, NumbersNamesAndValuesAgree) {
   for (std::size_t n = 0; n < setting_names().size(); ++n) {
     const int number = static_cast<int>(n);
     EXPECT_EQ(setting_number(setting_names()[n]), number);
-    EXPECT_NO_THROW(change_setting(p, static_cast<std::uint32_t>(n), setting_value(number, usual))) << setting_names()[n];
+    EXPECT_NO_THROW(change_setting(p, static_cast<std::uint32_t>(n), setting_value(number, usual)))
+        << setting_names()[n];
     EXPECT_EQ(setting_value(number, p), setting_value(number, usual));
   }
   EXPECT_EQ(setting_number("stiffnes"), -1);

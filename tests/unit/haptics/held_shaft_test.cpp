@@ -42,12 +42,13 @@ struct Mover {
   }
 };
 
-// A plate of some thickness, x > 0, off the borders of voxels; the shaft stands across it and comes from the side. Its whole thickness is bone
-// on both sides of a shaft that is in it, so that pushes cancel there.
+// A plate of some thickness, x > 0, off the borders of voxels; the shaft stands across it and comes from the side. Its
+// whole thickness is bone on both sides of a shaft that is in it, so that pushes cancel there.
 TEST(HeldShaft, StopsAtTheRimOfAPlateOfAnyThickness) {
   for (const double h : kVoxels) {
     for (const double thick : {0.5, 1.0, 2.0, 4.0}) {
-      const auto plate = test::solid(h, 8, [&](Vec3 p) { return p.x > 0.07 && std::abs(p.z - 0.13) < thick / 2; }, {}, 3);
+      const auto plate = test::solid(
+          h, 8, [&](Vec3 p) { return p.x > 0.07 && std::abs(p.z - 0.13) < thick / 2; }, {}, 3);
       for (const double speed : {1.0, 25.0, 300.0}) {
         Mover m{plate, {0, 0, 1}};
         m.go({-2.2, 0.3, -30}, speed);
@@ -75,7 +76,8 @@ TEST(HeldShaft, StopsAtTheRimOfAPlateOfAnyThickness) {
 // Lying under a plate and drawn up, and drawn out sideways through what is in the way.
 TEST(HeldShaft, StopsWhenItIsDrawnOut) {
   for (const double h : kVoxels) {
-    const auto plate = test::solid(h, 8, [&](Vec3 p) { return std::abs(p.z - 0.13) < 1; }, {}, 3);
+    const auto plate = test::solid(
+        h, 8, [&](Vec3 p) { return std::abs(p.z - 0.13) < 1; }, {}, 3);
     Mover m{plate, {1, 0, 0}};
     m.go({-30, 0.2, -4}, 25);
     const Vec3 x = m.go({-30, 0.2, 12}, 100);
@@ -83,11 +85,13 @@ TEST(HeldShaft, StopsWhenItIsDrawnOut) {
   }
 }
 
-// A slot between two plates: wide enough it is gone through, narrower than the shaft the shaft rests on its two corners.
+// A slot between two plates: wide enough it is gone through, narrower than the shaft the shaft rests on its two
+// corners.
 TEST(HeldShaft, ASlotHoldsWhatDoesNotFit) {
   for (const double h : kVoxels) {
     for (const double gap : {1.2, 2 * kRadius + 1.2 * h}) {
-      const auto plates = test::solid(h, 8, [&](Vec3 p) { return p.y > 0 && std::abs(p.x) > gap / 2 && std::abs(p.z) < 1; }, {}, 3);
+      const auto plates = test::solid(
+          h, 8, [&](Vec3 p) { return p.y > 0 && std::abs(p.x) > gap / 2 && std::abs(p.z) < 1; }, {}, 3);
       Mover m{plates, {0, 0, 1}};
       m.go({0, -4, -30}, 25);
       const Vec3 x = m.go({0, 6, -30}, 50);
@@ -105,7 +109,8 @@ TEST(HeldShaft, ASlotHoldsWhatDoesNotFit) {
 TEST(HeldShaft, InAHoleItGoesToTheWall) {
   for (const double h : kVoxels) {
     const double hole = 2.6;
-    const auto ring = test::solid(h, 8, [&](Vec3 p) { return std::hypot(p.x, p.y) > hole && std::abs(p.z) < 1; }, {}, 3);
+    const auto ring = test::solid(
+        h, 8, [&](Vec3 p) { return std::hypot(p.x, p.y) > hole && std::abs(p.z) < 1; }, {}, 3);
     for (int n = 0; n < 7; ++n) {
       const double a = 0.3 + n * 0.9;
       Mover m{ring, {0, 0, 1}};
@@ -118,20 +123,22 @@ TEST(HeldShaft, InAHoleItGoesToTheWall) {
 }
 
 TEST(HeldShaft, InBoneAllAroundItIsLetBe) {
-  const auto solid = test::solid(0.5, 8, [](Vec3) { return true; }, {}, 1);
+  const auto solid = test::solid(
+      0.5, 8, [](Vec3) { return true; }, {}, 1);
   Mover m{solid, {0, 0, 1}};
   for (int n = 0; n < 5; ++n) EXPECT_EQ(length(m.go({0.1 * n, 0, -30}, 25) - m.at), 0);
   Mover nowhere{solid, {0, 0, 1}};
   EXPECT_EQ(nowhere.held.follow(solid, nullptr, kShaft, 0.25, {NAN, 0, 0}, {0, 0, 1}).offset_mm, Vec3{});
 }
 
-// Through a hole in a plate, the hand pushes to the side with a constant force, drill off and on: the tool stays in the hole, though the burr
-// mills where it can. (A hand went 30 mm through any thickness.)
+// Through a hole in a plate, the hand pushes to the side with a constant force, drill off and on: the tool stays in the
+// hole, though the burr mills where it can. (A hand went 30 mm through any thickness.)
 TEST(HeldShaft, AHandDoesNotPushItThroughCortex) {
   for (const char* const name : {"cutting 4 mm", "sucker 8 Fr", "probe 1 mm"}) {
     for (const double push : {0.2, 1.3}) {
       const double h = 0.5;
-      auto plate = test::solid(h, 12, [](Vec3 p) { return std::abs(p.z) < 1.75 && std::hypot(p.x, p.y) > 3; }, {}, 2);
+      auto plate = test::solid(
+          h, 12, [](Vec3 p) { return std::abs(p.z) < 1.75 && std::hypot(p.x, p.y) > 3; }, {}, 2);
       HapticSetup setup;
       setup.params.effects.vibration = false;
       SimulatedDeviceParams held;
@@ -151,7 +158,8 @@ TEST(HeldShaft, AHandDoesNotPushItThroughCortex) {
         force = from_floats(record.force_n);
         flags |= record.flags;
         if (t > 1000) farthest = std::max(farthest, device.position_mm().x);
-        tool_farthest = std::max(tool_farthest, static_cast<double>(record.device.position_mm[0] + record.shown_offset_mm[0]));
+        tool_farthest =
+            std::max(tool_farthest, static_cast<double>(record.device.position_mm[0] + record.shown_offset_mm[0]));
         gained = std::max(gained, static_cast<double>(record.energy_mj));
       }
       const double room = 3 - instrument_library()[static_cast<std::size_t>(tool)].shaft.start_radius_mm;

@@ -29,7 +29,8 @@ TEST(Sweep, IsThatOfClosedForms) {
 }
 
 TEST(Removal, ARestingBurrTakesItsCapAndNoMore) {
-  for (const ContactMethod method : {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
+  for (const ContactMethod method :
+       {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
     SCOPED_TRACE(EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)]);
     for (const auto& [h, high] : {std::pair{0.25, 0.07}, {0.35, 0.1}, {0.5, 0.0}, {0.6, 0.23}, {0.9, 0.31}}) {
       const Face face{{0, 0, 1}, high};
@@ -57,7 +58,8 @@ TEST(Removal, EveryBurrTakesWhatItSweptAndNoMore) {
         Path path = groove(tool, 0.35, 1, 1, 0, axis);
         const double swept = swept_mm3(path, face, 50000);
         // So slow that time suffices: the burr takes rate * force, and what is left presses less and less.
-        path.legs[1].mm_per_s = 4.06 * 0.015 * burr_library()[static_cast<std::size_t>(tool)].rate_mm3_per_s_per_n / swept;
+        path.legs[1].mm_per_s =
+            4.06 * 0.015 * burr_library()[static_cast<std::size_t>(tool)].rate_mm3_per_s_per_n / swept;
         auto bone = block(0.5, face);
         const double ratio = removed_mm3(path, bone, ContactMethod::overlap, 250) / swept;
         EXPECT_LT(ratio, kMost) << burr_library()[static_cast<std::size_t>(tool)].name();
@@ -103,8 +105,8 @@ TEST(Grains, SameBitsForEveryInstructionSet) {
   for (int n = 0; n < 3000; ++n) {
     const std::uint32_t parts = n % 3 == 0 ? 1 : n % 3 == 1 ? 2 : 4;
     const float slope = n % 2 == 0 ? 0.0F : 0.2F;
-    const overlap::Shape shape{{0.6F, 0, 0.8F}, n % 4 < 2 ? 0.0F : 6.0F, 2.1F, n % 4 == 3 ? slope : 0, n % 4 == 3 ? 0.204F : 0, 0,
-                               n % 4 < 2};
+    const overlap::Shape shape{
+        {0.6F, 0, 0.8F}, n % 4 < 2 ? 0.0F : 6.0F, 2.1F, n % 4 == 3 ? slope : 0, n % 4 == 3 ? 0.204F : 0, 0, n % 4 < 2};
     const float at[3] = {3 * u(), 3 * u(), 3 * u()}, normal[3] = {u(), u(), u()};
     std::uint64_t left[3][64];
     std::uint32_t count[3][2];
@@ -142,7 +144,8 @@ TEST(Grains, HalfAVoxelIsHalfItsBone) {
   }
 }
 
-// A voxel half full of bone, below: what covers its upper half takes nothing, what covers its left half takes a half of it.
+// A voxel half full of bone, below: what covers its upper half takes nothing, what covers its left half takes a half of
+// it.
 TEST(Grains, BoneLiesOnItsNeighboursSide) {
   const double h = 0.5;
   auto bone = block(h, {{0, 0, 1}, -1.5});
@@ -303,7 +306,8 @@ TEST(Removal, APieceThatWasMovedLosesWhatWasSweptInIt) {
 
 TEST(Removal, BurrsTooSmallForTheirVoxelsAreTold) {
   const auto told = [](double diameter, BurrShape shape, double h) {
-    return too_small_for_voxels(burr_library()[static_cast<std::size_t>(burr_index(BurrKind::cutting, diameter, shape))], h);
+    return too_small_for_voxels(
+        burr_library()[static_cast<std::size_t>(burr_index(BurrKind::cutting, diameter, shape))], h);
   };
   EXPECT_EQ(told(2, BurrShape::ball, 0.5), "");
   EXPECT_EQ(told(4, BurrShape::taper, 0.5), "");
@@ -313,8 +317,8 @@ TEST(Removal, BurrsTooSmallForTheirVoxelsAreTold) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
 }
 
-// Where nothing is known any more of where the burr has been, as where a session goes on from another's end, the bone's own shape stands in
-// for it: the same path again takes a little more at first touch.
+// Where nothing is known any more of where the burr has been, as where a session goes on from another's end, the bone's
+// own shape stands in for it: the same path again takes a little more at first touch.
 TEST(Removal, OnBoneThatWasDrilledBeforeLittleMoreGoes) {
   const Face face{normalized({0.1, 0.05, 1}), 0.11};
   for (const auto& [h, most] : {std::pair{0.2, 0.01}, {0.5, 0.03}, {0.9, 0.08}}) {

@@ -35,7 +35,8 @@ Vec3 settled(HapticRenderer& r, const DeviceSample& s, int ticks = 60) {
   return {record.force_n[0], record.force_n[1], record.force_n[2]};
 }
 
-// On its side the burr drags across its axis and along the surface, the other way round for the other hand; on its pole it does not.
+// On its side the burr drags across its axis and along the surface, the other way round for the other hand; on its pole
+// it does not.
 TEST(Drag, RunsAlongTheSurfaceAndTurnsWithTheBurr) {
   double sideways[2];
   for (const bool left : {false, true}) {
@@ -55,8 +56,8 @@ TEST(Drag, RunsAlongTheSurfaceAndTurnsWithTheBurr) {
   EXPECT_LT(std::hypot(f.x, f.y), 0.05);
 }
 
-// A tool that slides over bone feels the scene's texture and one that rests does not; where none is listed nothing changes, to the bit; a
-// burr that turns has its own.
+// A tool that slides over bone feels the scene's texture and one that rests does not; where none is listed nothing
+// changes, to the bit; a burr that turns has its own.
 TEST(Textured, IsFeltByWhatSlidesOverBone) {
   const auto forces = [](const std::string& texture, double mm_a_tick, bool drill) {
     auto bone = test::slab(0.5);
@@ -65,7 +66,8 @@ TEST(Textured, IsFeltByWhatSlidesOverBone) {
     HapticRenderer r(setup, bone, {}, 1e-3);
     settled(r, at({-3, 0, 1.4}, {0, 0, 1}, false), 200);
     std::vector<std::array<float, 3>> all;
-    for (int t = 0; t < 200; ++t) all.push_back(r.step(at({-3 + mm_a_tick * t, 0, 1.4}, {0, 0, 1}, drill)).record.force_n);
+    for (int t = 0; t < 200; ++t)
+      all.push_back(r.step(at({-3 + mm_a_tick * t, 0, 1.4}, {0, 0, 1}, drill)).record.force_n);
     return all;
   };
   const std::string texture =
@@ -109,7 +111,8 @@ TEST(Vibration, HasThePeaksOfItsSpectrum) {
       double outside = 0;
       for (int f = 5; f < 500; ++f) {
         std::complex<double> sum;
-        for (int t = 0; t < n; ++t) sum += x[static_cast<std::size_t>(t)] * std::polar(1.0, -2 * std::numbers::pi * f * t / 1000.0);
+        for (int t = 0; t < n; ++t)
+          sum += x[static_cast<std::size_t>(t)] * std::polar(1.0, -2 * std::numbers::pi * f * t / 1000.0);
         const double amplitude = 2 * std::abs(sum) / n;
         const auto& peaks = default_vibration().by_kind[static_cast<std::size_t>(kind)];
         const auto peak = std::find_if(peaks.begin(), peaks.end(), [&](const auto& p) { return p.frequency_hz == f; });
@@ -136,8 +139,9 @@ TEST(Vibration, TheFileIsCheckedWithThePlace) {
   EXPECT_TRUE(refused("{", "'v.json' line 1"));
   EXPECT_TRUE(refused(R"({"osteotome_vibration": 2})", "must be 1"));
   EXPECT_TRUE(refused(R"({"osteotome_vibration": 1, "band_hz": [400, 20]})", "band_hz"));
-  EXPECT_TRUE(refused(R"({"osteotome_vibration": 1, "band_hz": [20, 400], "cutting": [{"frequency_hz": -1, "idle_n": 0, "per_n": 0}]})",
-                      "cutting 1"));
+  EXPECT_TRUE(refused(
+      R"({"osteotome_vibration": 1, "band_hz": [20, 400], "cutting": [{"frequency_hz": -1, "idle_n": 0, "per_n": 0}]})",
+      "cutting 1"));
   EXPECT_TRUE(refused(R"({"osteotome_vibration": 1, "band_hz": [20, 400], "cutting": []})", "diamond"));
   // Nothing is left out in silence.
   const std::string good(default_vibration_json());
@@ -147,11 +151,12 @@ TEST(Vibration, TheFileIsCheckedWithThePlace) {
     return text;
   };
   EXPECT_NO_THROW(static_cast<void>(parse_vibration(good, "v.json")));
-  EXPECT_TRUE(
-      refused(with("\"band_hz\": [20, 400],", "\"band_hz\": [20, 400],\n\"band\": [1, 2],"), "line 5: the key \"band\" is not known"));
-  EXPECT_TRUE(
-      refused(with("\"idle_n\": 0.015", "\"idle\": 0.015"), "line 7: cutting 2: the key \"idle\" is not known: did you mean \"idle_n\"?"));
-  EXPECT_TRUE(refused(with("\"idle_n\": 0.015", "\"idle_n\": 15"), "line 7: cutting 2: \"idle_n\" is 15 and must be from 0 to 10"));
+  EXPECT_TRUE(refused(with("\"band_hz\": [20, 400],", "\"band_hz\": [20, 400],\n\"band\": [1, 2],"),
+                      "line 5: the key \"band\" is not known"));
+  EXPECT_TRUE(refused(with("\"idle_n\": 0.015", "\"idle\": 0.015"),
+                      "line 7: cutting 2: the key \"idle\" is not known: did you mean \"idle_n\"?"));
+  EXPECT_TRUE(refused(with("\"idle_n\": 0.015", "\"idle_n\": 15"),
+                      "line 7: cutting 2: \"idle_n\" is 15 and must be from 0 to 10"));
   EXPECT_TRUE(refused(with("[20, 400]", "[20, 1e400]"), "line 4"));
 }
 
@@ -176,7 +181,8 @@ TEST(Torque, ComesFromWhereTheBoneIs) {
   auto bone = test::slab(0.5);
   HapticRenderer r(quiet(), bone, {}, 1e-3);
   const int cylinder = burr_index(BurrKind::cutting, 4, BurrShape::cylinder);
-  const auto on_tip = at({19, 0, 1.6}, {1, 0, 0}, false, cylinder), on_end = at({-25, 0, 1.6}, {1, 0, 0}, false, cylinder);
+  const auto on_tip = at({19, 0, 1.6}, {1, 0, 0}, false, cylinder),
+             on_end = at({-25, 0, 1.6}, {1, 0, 0}, false, cylinder);
   static_cast<void>(settled(r, on_tip));
   const double tip = r.contact().torque_n_mm.y, tip_force = r.contact().force_n.z;
   HapticRenderer r2(quiet(), bone, {}, 1e-3);
@@ -204,7 +210,8 @@ TEST(Stiffness, IsWhatTheDeviceBears) {
   auto bone = test::slab(0.5);
   HapticSetup setup;
   setup.params.contact.stiffness_n_per_mm = 4;
-  setup.device = {.damping_n_s_per_m = 1, .delay_s = 5e-3, .encoder_mm = 0, .max_force_n = 8, .max_stiffness_n_per_mm = 1e9};
+  setup.device = {
+      .damping_n_s_per_m = 1, .delay_s = 5e-3, .encoder_mm = 0, .max_force_n = 8, .max_stiffness_n_per_mm = 1e9};
   const HapticRenderer slow(setup, bone, {}, 1e-3);
   EXPECT_NEAR(slow.stiffness_n_per_mm(), 0.5 * 2 / 5.5, 1e-9);
   setup.device.delay_s = 0;
@@ -233,7 +240,8 @@ TEST(Structures, ClearanceThicknessAndInjury) {
   TickRecord record;
   for (int t = 0; t < 200; ++t) record = r.step(at({0, 0, 5 - 0.018 * t}, {1, 0, 0}, false)).record;
   EXPECT_EQ(record.structure, 6u);
-  EXPECT_NEAR(record.clearance_mm, 3.25, 0.06);  // the tool is shown at the surface; three voxels of 0.5 mm make the nerve
+  EXPECT_NEAR(record.clearance_mm, 3.25,
+              0.06);  // the tool is shown at the surface; three voxels of 0.5 mm make the nerve
   EXPECT_EQ(record.flags & (kStructureTouched | kStructureInjured), 0u);
   EXPECT_EQ(record.thickness_mm, 10);  // the slab is thicker than the reach
   // The bone above it gone, the burr comes down on the nerve.

@@ -35,14 +35,15 @@ HapticSetup setup() {
   return s;
 }
 
-// What a saw does to a bar of 30 x 10 x 8 mm that it is led down through: the blade lies along y, the hand is where `hand` says.
+// What a saw does to a bar of 30 x 10 x 8 mm that it is led down through: the blade lies along y, the hand is where
+// `hand` says.
 struct Cut {
   World world{test::bar(0.25, 0.4)};
   double removed_mm3 = 0, middle_mm = 0, spread_mm = 0, farthest_mm = 0, most_n = 0, shown_off_mm = 0, seconds = 0;
   std::vector<TickRecord> records;
 
-  explicit Cut(const CuttingGuide& guide, const std::function<DeviceSample(double t_s, double z_mm)>& hand, double mm_per_s = 1,
-               double most_s = 1e9) {
+  explicit Cut(const CuttingGuide& guide, const std::function<DeviceSample(double t_s, double z_mm)>& hand,
+               double mm_per_s = 1, double most_s = 1e9) {
     EXPECT_TRUE(world.act(SceneAction::cutting_guide(guide)).done);
     const HapticSetup s = setup();
     HapticScene scene = HapticScene::of(world, s);
@@ -57,7 +58,8 @@ struct Cut {
       const double t_s = t / 1000.0, z = 5.2 - mm_per_s * t_s;
       const HapticRenderer::HandStep step = r.step(hand(t_s, z));
       for (const VoxelChange& c : step.changes) {
-        const double gone = static_cast<double>(c.before - c.density) * voxel, x = place_of_voxel_mm(bone, c.voxel).x - kGuide.at_mm.x;
+        const double gone = static_cast<double>(c.before - c.density) * voxel,
+                     x = place_of_voxel_mm(bone, c.voxel).x - kGuide.at_mm.x;
         removed_mm3 += gone;
         sum += gone * x;
         squares += gone * x * x;

@@ -89,7 +89,8 @@ TEST(Texture, TheFileIsCheckedWithItsLine) {
   refused(file_of("-1.2, 1.01"), "not stable");
   refused(file_of("-2.1, 0.9"), "not stable");
   refused(file_of("0.5", ", \"colour\": 1"), "colour");
-  refused("{\"osteotome_texture\": 1, \"rate_hz\": 1000,\n\"force_n\": [2, 1], \"speed_mm_s\": [1], \"models\": []}", "line 2");
+  refused("{\"osteotome_texture\": 1, \"rate_hz\": 1000,\n\"force_n\": [2, 1], \"speed_mm_s\": [1], \"models\": []}",
+          "line 2");
   refused(
       R"({"osteotome_texture": 1, "rate_hz": 1000, "force_n": [1, 2], "speed_mm_s": [20], "models": [{"force_n": 1, "speed_mm_s": 20, "ar": [0], "noise_n2": 1}]})",
       "one for each");
@@ -137,7 +138,9 @@ TEST(Texture, KeepsItsSpectrumAtAnotherRate) {
     const TextureModel other = at_rate(model, rate);
     EXPECT_EQ(other.rate_hz, rate);
     for (double hz = 10; hz < std::min(450.0, 0.45 * rate); hz += 10)
-      EXPECT_NEAR(10 * std::log10(spectrum_n2_per_hz(other.nodes[0], hz, rate) / spectrum_n2_per_hz(model.nodes[0], hz, 1000)), 0, 1)
+      EXPECT_NEAR(
+          10 * std::log10(spectrum_n2_per_hz(other.nodes[0], hz, rate) / spectrum_n2_per_hz(model.nodes[0], hz, 1000)),
+          0, 1)
           << rate << " " << hz;
   }
   EXPECT_THROW(static_cast<void>(at_rate(model, 0)), Error);
@@ -165,7 +168,8 @@ TEST(Texture, ShakesAcrossTheMotion) {
 
 // The Penn toolkit's layout, of made-up numbers: a square of four models in two triangles.
 std::string hatt(const std::string& from = "", const std::string& to = "") {
-  std::string x = R"(<?xml version="1.0" encoding="utf-8"?><modelSet texture="1"><material>made up</material><AccelUnits>m/s^2</AccelUnits>
+  std::string x =
+      R"(<?xml version="1.0" encoding="utf-8"?><modelSet texture="1"><material>made up</material><AccelUnits>m/s^2</AccelUnits>
 <SpeedUnits>mm/s</SpeedUnits><ForceUnits>N</ForceUnits><SampleRate>1000</SampleRate><mu>0.4</mu><numMod>4</numMod><numTri>2</numTri>)";
   for (const char* tri : {"1 2 3", "2 4 3"}) {
     x += "<tri type=\"array\">";
@@ -174,9 +178,10 @@ std::string hatt(const std::string& from = "", const std::string& to = "") {
   }
   for (int m = 0; m < 4; ++m)
     x += "<model><modNum>" + std::to_string(m + 1) +
-         "</modNum><ARcoeff><value>1.0</value><value>-0.5</value></ARcoeff><MAcoeff><value>1</value><value>0.25</value></MAcoeff><var>" +
-         (m % 2 == 0 ? "0" : "4") + "</var><gain>3</gain><speedMod>" + (m % 2 == 0 ? "0" : "120") + "</speedMod><forceMod>" +
-         (m < 2 ? "0" : "2") + "</forceMod></model>\n";
+         "</modNum><ARcoeff><value>1.0</value><value>-0.5</value></ARcoeff><MAcoeff><value>1</value><value>0.25</"
+         "value></MAcoeff><var>" +
+         (m % 2 == 0 ? "0" : "4") + "</var><gain>3</gain><speedMod>" + (m % 2 == 0 ? "0" : "120") +
+         "</speedMod><forceMod>" + (m < 2 ? "0" : "2") + "</forceMod></model>\n";
   x += "</modelSet>";
   if (!from.empty()) x.replace(x.find(from), from.size(), to);
   return x;
@@ -188,7 +193,8 @@ TEST(Texture, ReadsTheLayoutOfThePennToolkit) {
   ASSERT_EQ(t.nodes.size(), 30U);
   EXPECT_EQ(t.forces_n.back(), 2);
   EXPECT_EQ(t.speeds_mm_s.back(), 120);
-  // gain^2 var |1 + 0.25 z|^2 / |1 - 0.5 z|^2 at full speed, times the mass; half the amplitude at half the speed, whatever the force.
+  // gain^2 var |1 + 0.25 z|^2 / |1 - 0.5 z|^2 at full speed, times the mass; half the amplitude at half the speed,
+  // whatever the force.
   for (double hz = 10; hz < 500; hz += 30) {
     const auto norm = [&](double c) { return 1 + c * c + 2 * c * std::cos(2 * 3.14159265358979 * hz / 1000); };
     const double due = 0.01 * 9 * 2 * 4 / 1000 * norm(0.25) / norm(-0.5);

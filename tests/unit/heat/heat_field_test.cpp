@@ -1,4 +1,5 @@
-// Heat conduction against analytic solutions (Carslaw and Jaeger, Conduction of Heat in Solids, 2nd ed.) and its own balance.
+// Heat conduction against analytic solutions (Carslaw and Jaeger, Conduction of Heat in Solids, 2nd ed.) and its own
+// balance.
 #include "osteo/simulation/heat/heat_field.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +12,8 @@
 namespace osteo {
 namespace {
 
-constexpr double kK = 0.55e-3, kC = 1900.0 * 1300 / 1e9, kAlpha = kK / kC, kPi = std::numbers::pi;  // W/(mm K), J/(mm3 K), mm2/s
+constexpr double kK = 0.55e-3, kC = 1900.0 * 1300 / 1e9, kAlpha = kK / kC,
+                 kPi = std::numbers::pi;  // W/(mm K), J/(mm3 K), mm2/s
 
 HeatField everywhere(double h) {
   return HeatField(h, {}, [](Ijk) { return HeatMatter{1, 0}; });
@@ -42,7 +44,8 @@ void expect_near_of(double got, double truth, double share, const char* what) {
 double instantaneous(double r, double s) {
   return s <= 0 ? 0 : 1 / (kC * std::pow(4 * kPi * kAlpha * s, 1.5)) * std::exp(-r * r / (4 * kAlpha * s));
 }
-// A point of heat on a face, or what is the same to a wall, half as much at either side of it: heat in a cell lies at its centre.
+// A point of heat on a face, or what is the same to a wall, half as much at either side of it: heat in a cell lies at
+// its centre.
 double in_the_cell(Vec3 off, double depth, const auto& f) {
   return 0.5 * (f(length(off - Vec3{0, 0, depth})) + f(length(off + Vec3{0, 0, depth})));
 }
@@ -54,7 +57,8 @@ TEST(HeatField, AnInstantaneousPoint) {
   double t = 0;
   // Where cells have their centres: along the lattice, between two axes and between three.
   for (const auto& cell : {Ijk{4, 0, 0}, {3, 3, 0}, {3, 3, 3}, {8, 0, 0}, {5, 5, 5}, {12, 0, 0}, {7, 7, 7}}) {
-    const double r = 0.25 * std::sqrt(double(cell.i * cell.i + cell.j * cell.j + cell.k * cell.k)), peak_s = r * r / (6 * kAlpha);
+    const double r = 0.25 * std::sqrt(double(cell.i * cell.i + cell.j * cell.j + cell.k * cell.k)),
+                 peak_s = r * r / (6 * kAlpha);
     f.step(peak_s - t);
     t = peak_s;
     char what[64];
@@ -78,9 +82,12 @@ TEST(HeatField, AFixedPointOnASurface) {
     // Where cells have their centres: straight below and aside.
     for (const auto& cell : {Ijk{0, 0, 4}, {4, 0, 0}, {0, 0, 8}, {6, 6, 0}, {0, 0, 12}, {7, 7, 7}}) {
       const Vec3 at{kH * cell.i, kH * cell.j, kH * (cell.k + 0.5)};
-      const auto continuous = [&](double r) { return 1 / (2 * kPi * kK * r) * std::erfc(r / std::sqrt(4 * kAlpha * t)); };
+      const auto continuous = [&](double r) {
+        return 1 / (2 * kPi * kK * r) * std::erfc(r / std::sqrt(4 * kAlpha * t));
+      };
       char what[64];
-      std::snprintf(what, sizeof(what), "1 W on a point, %.0f s, %.3f mm off (%d %d %d)", t, length(at), cell.i, cell.j, cell.k);
+      std::snprintf(what, sizeof(what), "1 W on a point, %.0f s, %.3f mm off (%d %d %d)", t, length(at), cell.i, cell.j,
+                    cell.k);
       expect_near_of(f.at(cell), in_the_cell(at, kH / 2, continuous), 0.01, what);
       // On the face itself instead of half a cell below: that much no lattice of such cells can tell.
       EXPECT_NEAR(f.at(cell), continuous(length(at)), 0.03 * continuous(length(at))) << what;
@@ -105,12 +112,14 @@ TEST(HeatField, AMovingPoint) {
       double sum = 0;
       for (int n = 0; n < 4 * steps; ++n) {
         const double then = (n + 0.5) * kDt / 4;
-        sum += 2 * kW * kDt / 4 * in_the_cell(at - Vec3{v * then, 0, 0}, kH / 2, [&](double r) { return instantaneous(r, t - then); });
+        sum += 2 * kW * kDt / 4 *
+               in_the_cell(at - Vec3{v * then, 0, 0}, kH / 2, [&](double r) { return instantaneous(r, t - then); });
       }
       return sum;
     };
-    for (const auto& [off, where] :
-         {std::pair{Vec3{-2, 0, 0.125}, "2 mm behind"}, {{-1, 0, 1.125}, "behind and below"}, {{0, 0, 1.125}, "1.1 mm below"}}) {
+    for (const auto& [off, where] : {std::pair{Vec3{-2, 0, 0.125}, "2 mm behind"},
+                                     {{-1, 0, 1.125}, "behind and below"},
+                                     {{0, 0, 1.125}, "1.1 mm below"}}) {
       char what[64];
       std::snprintf(what, sizeof(what), "0.1 W at %.1f mm/s, %s", v, where);
       const double i = std::round((v * t + off.x) / kH);
@@ -123,7 +132,9 @@ TEST(HeatField, AMovingPoint) {
 TEST(HeatField, UniformFluxIntoAWall) {
   for (const double h : {0.25, 0.5, 1.0}) {
     // A column one brick wide: nothing goes sideways.
-    HeatField f(h, {}, [](Ijk c) { return HeatMatter{c.k >= 0 && c.i >= 0 && c.i < 4 && c.j >= 0 && c.j < 4 ? 1.0F : 0.0F, 0}; });
+    HeatField f(h, {}, [](Ijk c) {
+      return HeatMatter{c.k >= 0 && c.i >= 0 && c.i < 4 && c.j >= 0 && c.j < 4 ? 1.0F : 0.0F, 0};
+    });
     double t = 0;
     const double flux = 0.01;
     for (const double until : {5.0, 10.0, 30.0}) {
@@ -158,7 +169,8 @@ TEST(HeatField, ADiscHeatsUp) {
       for (int i = -4; i <= 4; ++i) {
         // The share of each square that the disc covers.
         int in = 0;
-        for (int n = 0; n < 400; ++n) in += std::hypot(i + (n % 20 + 0.5) / 20 - 0.5, j + (n / 20 + 0.5) / 20 - 0.5) * kH < kA ? 1 : 0;
+        for (int n = 0; n < 400; ++n)
+          in += std::hypot(i + (n % 20 + 0.5) / 20 - 0.5, j + (n / 20 + 0.5) / 20 - 0.5) * kH < kA ? 1 : 0;
         if (in > 0) f.add({{double(i), double(j), 0}, 0.1}, kW / (kPi * kA * kA) * kH * kH * in / 400 * dt);
       }
     }
@@ -195,8 +207,8 @@ TEST(HeatField, WaterOnAWall) {
   const double hh = kFilm / 1e6 / kK;
   for (const double z : {0.125, 1.125, 2.125}) {
     const double root = 2 * std::sqrt(kAlpha * t);
-    const double truth =
-        kWater * (std::erfc(z / root) - std::exp(hh * z + hh * hh * kAlpha * t) * std::erfc(z / root + hh * std::sqrt(kAlpha * t)));
+    const double truth = kWater * (std::erfc(z / root) - std::exp(hh * z + hh * hh * kAlpha * t) *
+                                                             std::erfc(z / root + hh * std::sqrt(kAlpha * t)));
     char what[64];
     std::snprintf(what, sizeof(what), "water 15 K below, 5 s, %.3f mm", z);
     expect_near_of(wall.at(Vec3{0, 0, z / kH - 0.5}), truth, 0.03, what);

@@ -33,8 +33,8 @@ TEST(Denoise, TakesNoiseAndLeavesEdges) {
       was += std::pow(noisy.voxels[i] - truth.voxels[i], 2);
       is += std::pow(quiet.voxels[i] - truth.voxels[i], 2);
     }
-    std::printf("strength %.1f: noise %.1f to %.1f HU, edges %.2f to %.2f mm, off the truth %.1f to %.1f HU RMS\n", strength,
-                before.noise_hu, after.noise_hu, before.edge_width_mm, after.edge_width_mm,
+    std::printf("strength %.1f: noise %.1f to %.1f HU, edges %.2f to %.2f mm, off the truth %.1f to %.1f HU RMS\n",
+                strength, before.noise_hu, after.noise_hu, before.edge_width_mm, after.edge_width_mm,
                 std::sqrt(was / static_cast<double>(truth.frame.voxel_count())),
                 std::sqrt(is / static_cast<double>(truth.frame.voxel_count())));
     if (strength != 1) continue;
@@ -72,7 +72,8 @@ TEST(Projections, ComeBack) {
   EXPECT_LT(off, 15);
 }
 
-// A slice of soft tissue with bone, and two fillings whose rays lose photons and harden: made with projections of its own resolution.
+// A slice of soft tissue with bone, and two fillings whose rays lose photons and harden: made with projections of its
+// own resolution.
 struct Streaked {
   Image truth, image;
 };
@@ -85,8 +86,11 @@ Streaked streaked() {
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       const double x = (i - 149.5) * 0.7, y = (j - 149.5) * 0.7;
-      const auto disc = [&](double a, double b, double r) { return 0.5 * (1 + std::tanh((r - std::hypot(x - a, y - b)) / 0.6)); };
-      const double head = disc(0, 0, 85), jaw = disc(0, -25, 45) - disc(0, -22, 36), spine = disc(0, 45, 16) - disc(0, 45, 7);
+      const auto disc = [&](double a, double b, double r) {
+        return 0.5 * (1 + std::tanh((r - std::hypot(x - a, y - b)) / 0.6));
+      };
+      const double head = disc(0, 0, 85), jaw = disc(0, -25, 45) - disc(0, -22, 36),
+                   spine = disc(0, 45, 16) - disc(0, 45, 7);
       clean.at<float>(j, i) = static_cast<float>(1040 * head + 900 * jaw + 700 * spine);
       metal.at<float>(j, i) = static_cast<float>(25000 * (disc(-37, -30, 3) + disc(36, -34, 3.5)));
     }
@@ -108,7 +112,8 @@ Streaked streaked() {
       const float t = clean.at<float>(i / n, i % n) - 1000, m = metal.at<float>(i / n, i % n);
       truth[at] = static_cast<std::int16_t>(std::lround(t + m));
       voxels[at] = k == 1 ? static_cast<std::int16_t>(std::lround(t))
-                          : static_cast<std::int16_t>(std::lround(std::clamp(wrong.at<float>(i / n, i % n) - 1000, -1024.0F, 30000.0F)));
+                          : static_cast<std::int16_t>(
+                                std::lround(std::clamp(wrong.at<float>(i / n, i % n) - 1000, -1024.0F, 30000.0F)));
     }
   return {{f, truth}, {f, voxels}};
 }
@@ -134,8 +139,8 @@ TEST(ReduceMetal, WeakensStreaks) {
       bone_is += std::abs(b);
       ++bone;
     }
-  std::printf("streaks: %.1f to %.1f HU RMS, worst %.0f to %.0f; in bone %.1f to %.1f mean\n", std::sqrt(was / n), std::sqrt(is / n),
-              was_far, is_far, bone_was / bone, bone_is / bone);
+  std::printf("streaks: %.1f to %.1f HU RMS, worst %.0f to %.0f; in bone %.1f to %.1f mean\n", std::sqrt(was / n),
+              std::sqrt(is / n), was_far, is_far, bone_was / bone, bone_is / bone);
   EXPECT_GT(std::sqrt(was / n), 60);  // or nothing would have been shown
   EXPECT_LT(std::sqrt(is / n), 0.7 * std::sqrt(was / n));
   // Metal and the slice without it are as they were.

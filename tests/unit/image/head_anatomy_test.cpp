@@ -1,4 +1,5 @@
-// The anatomy against what is published of sizes and distances (docs/phantom.md names the sources), for ten individuals.
+// The anatomy against what is published of sizes and distances (docs/phantom.md names the sources), for ten
+// individuals.
 #include "osteo/imaging/image/head_anatomy.h"
 
 #include <gtest/gtest.h>
@@ -109,8 +110,9 @@ TEST(HeadAnatomy, EveryPointWithinTheMarginHasTheSameTissue) {
       ASSERT_GE(s.margin_mm, 0);
       const Vec3 d = normalized({one(random), one(random), one(random)});
       const Vec3 q = p + d * (s.margin_mm * 0.999 * (n % 3 == 0 ? std::abs(one(random)) : 1));
-      ASSERT_EQ(head.tissue(q), s.tissue) << tissue_name(head.tissue(q)) << " beside " << tissue_name(s.tissue) << " with margin "
-                                          << s.margin_mm << " at " << p.x << ", " << p.y << ", " << p.z << " of " << who;
+      ASSERT_EQ(head.tissue(q), s.tissue)
+          << tissue_name(head.tissue(q)) << " beside " << tissue_name(s.tissue) << " with margin " << s.margin_mm
+          << " at " << p.x << ", " << p.y << ", " << p.z << " of " << who;
     }
   }
 }
@@ -145,7 +147,8 @@ TEST(HeadAnatomy, FacialNerveHasPublishedLengthsAndLiesWhereItsLineSays) {
       walked += length(line[n + 1].at_mm - at);
       if (std::abs(walked - m.geniculate_mm) < 3) continue;  // the hairpin, where the nerve lies beside itself
       const Vec3 side = any_perpendicular(way), other = cross(way, side);
-      for (const Vec3 d : {side, -side, other, -other}) {  // across the line the label ends at the radius; bends and tapers aside
+      for (const Vec3 d :
+           {side, -side, other, -other}) {  // across the line the label ends at the radius; bends and tapers aside
         EXPECT_EQ(head.tissue(at + d * (line[n].radius_mm * 0.9)), Tissue::facial_nerve);
         EXPECT_NE(head.tissue(at + d * (line[n].radius_mm * 1.25 + 0.1)), Tissue::facial_nerve);
       }
@@ -161,7 +164,8 @@ TEST(HeadAnatomy, TubesAreOnePieceInTheLabels) {
   for (const int who : {0, 6}) {
     p.individual = who;
     const Phantom phantom = make_phantom(p);
-    for (const Tissue t : {Tissue::facial_nerve, Tissue::sigmoid_sinus, Tissue::labyrinth, Tissue::tympanic_cavity, Tissue::ear_canal}) {
+    for (const Tissue t :
+         {Tissue::facial_nerve, Tissue::sigmoid_sinus, Tissue::labyrinth, Tissue::tympanic_cavity, Tissue::ear_canal}) {
       // Pieces of the label, joined by corners.
       const Frame& f = phantom.labels.frame;
       std::vector<std::uint8_t> left(f.voxel_count());
@@ -183,7 +187,8 @@ TEST(HeadAnatomy, TubesAreOnePieceInTheLabels) {
         for (int n = 0; n < 27; ++n) {
           const int i = x + n % 3 - 1, j = y + n / 3 % 3 - 1, k = z + n / 9 - 1;
           if (i < 0 || j < 0 || k < 0 || i >= f.dims[0] || j >= f.dims[1] || k >= f.dims[2]) continue;
-          const std::size_t at = (static_cast<std::size_t>(k) * ny + static_cast<std::size_t>(j)) * nx + static_cast<std::size_t>(i);
+          const std::size_t at =
+              (static_cast<std::size_t>(k) * ny + static_cast<std::size_t>(j)) * nx + static_cast<std::size_t>(i);
           if (left[at] == 0) continue;
           left[at] = 0;
           open.push_back(at);
@@ -215,13 +220,16 @@ TEST(HeadAnatomy, StructuresLieAsFarFromEachOtherAsPublished) {
     const double bulb = gap(nerve_between(head, m.second_genu_mm - 0.1, m.second_genu_mm + 0.1), vessel.subspan(48));
     EXPECT_NEAR(bulb, 9.5, 2 * 2.6) << i;  // 8.7 and 11.2
     EXPECT_GT(gap(mastoid, vessel.subspan(48)), 1.5) << i;
-    EXPECT_NEAR(gap(nerve_between(head, m.foramen_mm - 0.1, m.foramen_mm + 0.1), vessel.subspan(48)), 5.4, 2 * 2.2) << i;
+    EXPECT_NEAR(gap(nerve_between(head, m.foramen_mm - 0.1, m.foramen_mm + 0.1), vessel.subspan(48)), 5.4, 2 * 2.2)
+        << i;
     // Under the horizontal canal, clear of it by a wall.
     double lateral = 1e9;
-    for (const TubePoint& p : tympanic) lateral = std::min(lateral, nearest(head, p.at_mm, Tissue::labyrinth, 6) - p.radius_mm);
+    for (const TubePoint& p : tympanic)
+      lateral = std::min(lateral, nearest(head, p.at_mm, Tissue::labyrinth, 6) - p.radius_mm);
     EXPECT_GT(lateral, 0.2) << i;
     EXPECT_LT(lateral, 2.5) << i;
-    // The chorda leaves the nerve at an acute angle, and between the two a burr of 2 mm finds its way to the middle ear.
+    // The chorda leaves the nerve at an acute angle, and between the two a burr of 2 mm finds its way to the middle
+    // ear.
     const auto chorda = head.chorda_tympani();
     const Vec3 up = normalized(nerve_at_height(head, -21).at_mm - nerve_at_height(head, -25.5).at_mm);
     const double angle = std::acos(dot(up, normalized(chorda[6].at_mm - chorda[0].at_mm))) * 180 / std::numbers::pi;
@@ -259,8 +267,8 @@ TEST(HeadAnatomy, PlatesAndTablesAreAsThickAsPublished) {
       ++air;
       const Vec3 q = p + normalized({one(random), one(random), one(random)}) * 0.45;
       const Tissue t = head.tissue(q);
-      EXPECT_TRUE(t == Tissue::air_cells || t == Tissue::cellular || t == Tissue::cortical || t == Tissue::tympanic_cavity ||
-                  t == Tissue::diploe)
+      EXPECT_TRUE(t == Tissue::air_cells || t == Tissue::cellular || t == Tissue::cortical ||
+                  t == Tissue::tympanic_cavity || t == Tissue::diploe)
           << tissue_name(t) << " of " << i;
     }
     EXPECT_GT(air, 2000) << i;
@@ -300,9 +308,11 @@ TEST(HeadAnatomy, VolumesAreInPublishedRanges) {
     std::array<double, kTissueCount> ml{};
     for (const auto l : phantom.labels.span()) ml[l] += phantom.labels.frame.voxel_volume_mm3() / 1000;
     const auto of = [&](Tissue t) { return ml[static_cast<std::size_t>(t)]; };
-    std::printf("%d: cells %.2f mL, walls %.2f, cavity and antrum %.2f, canal %.2f, labyrinth %.3f, ossicles %.3f, nerve %.3f\n", i,
-                of(Tissue::air_cells), of(Tissue::cellular), of(Tissue::tympanic_cavity), of(Tissue::ear_canal), of(Tissue::labyrinth),
-                of(Tissue::ossicle), of(Tissue::facial_nerve));
+    std::printf(
+        "%d: cells %.2f mL, walls %.2f, cavity and antrum %.2f, canal %.2f, labyrinth %.3f, ossicles %.3f, nerve "
+        "%.3f\n",
+        i, of(Tissue::air_cells), of(Tissue::cellular), of(Tissue::tympanic_cavity), of(Tissue::ear_canal),
+        of(Tissue::labyrinth), of(Tissue::ossicle), of(Tissue::facial_nerve));
     EXPECT_GT(of(Tissue::air_cells), 3) << i;
     EXPECT_LT(of(Tissue::air_cells), 10) << i;
     EXPECT_GT(of(Tissue::tympanic_cavity), 0.8) << i;
@@ -333,7 +343,8 @@ TEST(HeadAnatomy, JawHoldsItsNerveAndTheTeethStandInBone) {
       for (const double z : {-63.5, -75.0}) {
         Tissue before = Tissue::soft;
         for (double a = 0; a < 1.62; a += 0.001) {
-          const Vec3 p{side * (z > -70 ? 28.5 : 26.5) * std::sin(a), -46 + (z > -70 ? 0 : 1) - (z > -70 ? 44 : 41) * std::cos(a), z};
+          const Vec3 p{side * (z > -70 ? 28.5 : 26.5) * std::sin(a),
+                       -46 + (z > -70 ? 0 : 1) - (z > -70 ? 44 : 41) * std::cos(a), z};
           const Tissue t = head.tissue(p);
           teeth += t == Tissue::tooth && before != Tissue::tooth;
           before = t;

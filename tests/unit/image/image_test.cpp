@@ -5,8 +5,8 @@
 #include <random>
 
 #include "osteo/core/base/error.h"
-#include "osteo/imaging/image/components.h"
 #include "osteo/geometry/distance/binary_distance.h"
+#include "osteo/imaging/image/components.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/threshold.h"
 
@@ -22,7 +22,8 @@ std::vector<std::uint8_t> random_mask(std::size_t n, double share, unsigned seed
 }
 
 // Flood fill, the obvious way.
-std::vector<int> brute_components(const std::vector<std::uint8_t>& mask, std::array<int, 3> d, bool full, std::uint8_t value) {
+std::vector<int> brute_components(const std::vector<std::uint8_t>& mask, std::array<int, 3> d, bool full,
+                                  std::uint8_t value) {
   std::vector<int> label(mask.size(), -1);
   int next = 0;
   for (std::size_t s = 0; s < mask.size(); ++s) {
@@ -100,7 +101,8 @@ TEST(Distance, WithinAWindowItIsTheSame) {
             ++told;
             EXPECT_NEAR(near[v], whole[v], 1e-6 * whole[v]);
           } else {
-            EXPECT_TRUE(near[v] == std::numeric_limits<float>::infinity() || whole[v] < within * within * (1 + 1e-5)) << near[v];
+            EXPECT_TRUE(near[v] == std::numeric_limits<float>::infinity() || whole[v] < within * within * (1 + 1e-5))
+                << near[v];
           }
         }
         EXPECT_GT(told, 0U);
@@ -110,7 +112,8 @@ TEST(Distance, WithinAWindowItIsTheSame) {
   Frame f;
   f.dims = {1, 1, 1};
   const std::vector<std::uint8_t> one(1, 1);
-  for (const double bad : {0.0, -1.0, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()})
+  for (const double bad :
+       {0.0, -1.0, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()})
     EXPECT_THROW((void)squared_distance_within_mm2(one, f, 1, bad), Error);
 }
 
@@ -158,7 +161,8 @@ TEST(Threshold, HysteresisKeepsOnlyPiecesWithACore) {
 }
 
 TEST(Threshold, ClosingBridgesGapsAndFillingFillsCavities) {
-  const auto gap = image_of({21, 9, 9}, [](int i, int j, int k) { return i != 10 && j > 1 && j < 7 && k > 1 && k < 7 ? 500 : 0; });
+  const auto gap =
+      image_of({21, 9, 9}, [](int i, int j, int k) { return i != 10 && j > 1 && j < 7 && k > 1 && k < 7 ? 500 : 0; });
   ThresholdParams p;
   p.keep_largest = 1;
   EXPECT_EQ(count(threshold(gap, p)), 250u);
@@ -176,7 +180,8 @@ TEST(Threshold, ClosingBridgesGapsAndFillingFillsCavities) {
 }
 
 TEST(Threshold, KeepsTheLargestAndDropsTheSmall) {
-  const auto ct = image_of({30, 3, 3}, [](int i, int, int) { return i < 10 || (i > 12 && i < 18) || i == 25 ? 500 : 0; });
+  const auto ct =
+      image_of({30, 3, 3}, [](int i, int, int) { return i < 10 || (i > 12 && i < 18) || i == 25 ? 500 : 0; });
   ThresholdParams p;
   EXPECT_EQ(count(threshold(ct, p)), 90u + 45u);  // the slab of 9 mm3 goes
   p.keep_largest = 1;
@@ -230,8 +235,9 @@ TEST(Phantom, LabelsAreTheExactTissue) {
   for (int k = 0; k < phantom.labels.frame.dims[2]; ++k)
     for (int j = 0; j < phantom.labels.frame.dims[1]; ++j)
       for (int i = 0; i < phantom.labels.frame.dims[0]; ++i) {
-        EXPECT_EQ(phantom.labels.at(i, j, k),
-                  static_cast<int>(head.tissue(phantom.labels.frame.world_from_index({double(i), double(j), double(k)}))));
+        EXPECT_EQ(
+            phantom.labels.at(i, j, k),
+            static_cast<int>(head.tissue(phantom.labels.frame.world_from_index({double(i), double(j), double(k)}))));
       }
 }
 

@@ -80,7 +80,8 @@ TEST(Outlines, OfAMaskAreSmooth) {
   const std::vector<Outline> lines = outlines_of(mask_of(ring(9.3, 20.4), 4), {2, 2}, 4);
   ASSERT_EQ(lines.size(), 2u);
   double off = 0;
-  for (const Vec3& p : lines[0].points_mm) off += std::abs(std::hypot(p.x, p.y) - 20.4) / static_cast<double>(lines[0].points_mm.size());
+  for (const Vec3& p : lines[0].points_mm)
+    off += std::abs(std::hypot(p.x, p.y) - 20.4) / static_cast<double>(lines[0].points_mm.size());
   EXPECT_LT(off, 0.25);  // a third of a pixel: a mask knows no better
   EXPECT_TRUE(outlines_of(mask_of(ring(9.3, 20.4), 4), {2, 2}, 5).empty());
 }
@@ -167,7 +168,9 @@ PlaneImage blobs(double dx, double dy, double angle) {
   for (int j = 0; j < p.height; ++j)
     for (int i = 0; i < p.width; ++i) {
       const double x = i - dx - cx, y = j - dy - cy, u = c * x - s * y, v = s * x + c * y;
-      const auto blob = [&](double a, double b, double r) { return std::exp(-((u - a) * (u - a) + (v - b) * (v - b)) / (r * r)); };
+      const auto blob = [&](double a, double b, double r) {
+        return std::exp(-((u - a) * (u - a) + (v - b) * (v - b)) / (r * r));
+      };
       p.values.push_back(static_cast<float>(blob(-12, 6, 9) + 0.7 * blob(14, -10, 6) + 0.5 * blob(8, 15, 12)));
     }
   return p;

@@ -36,7 +36,8 @@ Scene scene(bool tissue, bool with_holder, const std::function<double(Vec3)>& ex
     for (int j = 0; j < kN; ++j) {
       for (int i = 0; i < kN; ++i, ++at) {
         const Vec3 p = s.ct.frame.world_from_index({double(i), double(j), double(k)});
-        const double skin = ellipsoid(p, {75, 90, 95}), outer = ellipsoid(p, {68, 83, 88}), inner = ellipsoid(p, {62, 77, 82});
+        const double skin = ellipsoid(p, {75, 90, 95}), outer = ellipsoid(p, {68, 83, 88}),
+                     inner = ellipsoid(p, {62, 77, 82});
         double hu = -1000;
         if (tissue && skin < 1) hu = 40;
         if (outer < 1 && inner >= 1) hu = 1000;
@@ -114,7 +115,8 @@ TEST(Table, KeptWhenAsked) {
 
 TEST(Table, WhatTouchesTheSkullStaysAndIsTold) {
   // A bar from the holder into the skull.
-  const Scene s = scene(true, true, [](Vec3 p) { return std::abs(p.x) < 3 && std::abs(p.z) < 3 && p.y > 70 && p.y < 105 ? 900 : -3000; });
+  const Scene s = scene(
+      true, true, [](Vec3 p) { return std::abs(p.x) < 3 && std::abs(p.z) < 3 && p.y > 70 && p.y < 105 ? 900 : -3000; });
   const Outcome o = take_off(s);
   EXPECT_EQ(o.head_lost, 0U);
   EXPECT_EQ(o.holder_left, o.holder);
@@ -155,7 +157,9 @@ TEST(Table, DrySkullLosesNothing) {
 TEST(Table, ASkullFilledWithGelLosesNoLooseJaw) {
   // A teaching phantom: gel inside, no skin, and a jaw that hangs free in front.
   const auto jaw = [](Vec3 p) { return std::abs(p.x) < 30 && std::abs(p.y + 98) < 5 && std::abs(p.z + 5) < 8; };
-  Scene s = scene(false, false, [&](Vec3 p) { return jaw(p) ? 1000.0 : ellipsoid(p, {62, 77, 82}) < 1 ? 40.0 : -3000.0; });
+  Scene s = scene(false, false, [&](Vec3 p) {
+    return jaw(p) ? 1000.0 : ellipsoid(p, {62, 77, 82}) < 1 ? 40.0 : -3000.0;
+  });
   std::size_t at = 0;
   for (int k = 0; k < kSlices; ++k) {
     for (int j = 0; j < kN; ++j) {

@@ -58,7 +58,8 @@ TEST_P(EveryFormat, LeftStaysLeft) {
   for (int k = 0; k < back.frame.dims[2]; ++k)
     for (int j = 0; j < back.frame.dims[1]; ++j)
       for (int i = 0; i < back.frame.dims[0]; ++i) {
-        if (back.at(i, j, k) > 1500) (back.frame.world_from_index({double(i), double(j), double(k)}).x > 0 ? left : right) += 1;
+        if (back.at(i, j, k) > 1500)
+          (back.frame.world_from_index({double(i), double(j), double(k)}).x > 0 ? left : right) += 1;
       }
   EXPECT_GT(left, 0);
   EXPECT_EQ(right, 0);
@@ -72,7 +73,8 @@ TEST_P(EveryFormat, CutFileIsRefusedByName) {
   save_image(make_phantom(p).ct, whole);
   const std::string text = read_text(whole);
   for (const double share : {0.0, 0.02, 0.5, 0.95}) {
-    std::ofstream(cut, std::ios::binary) << text.substr(0, static_cast<std::size_t>(share * static_cast<double>(text.size())));
+    std::ofstream(cut, std::ios::binary) << text.substr(
+        0, static_cast<std::size_t>(share * static_cast<double>(text.size())));
     try {
       static_cast<void>(load_image(cut));
       FAIL() << "a file cut to " << share << " was read";
@@ -83,17 +85,19 @@ TEST_P(EveryFormat, CutFileIsRefusedByName) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Io, EveryFormat, testing::Values(".nrrd", ".nii", ".nii.gz", ".mha", ".vti"), [](const auto& test) {
-  std::string n = test.param;
-  std::erase(n, '.');
-  return n;
-});
+INSTANTIATE_TEST_SUITE_P(Io, EveryFormat, testing::Values(".nrrd", ".nii", ".nii.gz", ".mha", ".vti"),
+                         [](const auto& test) {
+                           std::string n = test.param;
+                           std::erase(n, '.');
+                           return n;
+                         });
 
 TEST(Nrrd, RasBigEndianRawIsReadRight) {
   const auto path = folder() / "ras.nrrd";
   std::ofstream out(path, std::ios::binary);
   out << "NRRD0005\n# by hand\ntype: short\ndimension: 3\nspace: right-anterior-superior\nsizes: 2 1 1\n"
-         "space directions: (2,0,0) (0,3,0) (0,0,4)\nkinds: domain domain domain\nendian: big\nencoding: raw\nspace origin: (10,20,30)\n\n";
+         "space directions: (2,0,0) (0,3,0) (0,0,4)\nkinds: domain domain domain\nendian: big\nencoding: raw\nspace "
+         "origin: (10,20,30)\n\n";
   out.write("\x01\x02\xff\xfe", 4);
   out.close();
   const Image image = load_image(path);
@@ -113,7 +117,9 @@ TEST(Nrrd, SeveralDataFilesAreReadInTheirOrder) {
     write_file(at / name, bytes);
   };
   const auto header = [&](const std::string& rest) {
-    write_file(at / "v.nhdr", "NRRD0004\ntype: short\ndimension: 3\nsizes: 3 2 4\nspacings: 1 1 2\nendian: little\nencoding: raw\n" + rest);
+    write_file(
+        at / "v.nhdr",
+        "NRRD0004\ntype: short\ndimension: 3\nsizes: 3 2 4\nspacings: 1 1 2\nendian: little\nencoding: raw\n" + rest);
     return at / "v.nhdr";
   };
   const auto expect_in_order = [&](const fs::path& path) {
@@ -144,8 +150,9 @@ TEST(Nrrd, SeveralDataFilesAreReadInTheirOrder) {
 
 TEST(Nrrd, ShearIsRefused) {
   const auto path = folder() / "shear.nrrd";
-  std::ofstream(path, std::ios::binary) << "NRRD0004\ntype: uchar\ndimension: 3\nspace: left-posterior-superior\nsizes: 1 1 1\n"
-                                           "space directions: (1,0,0) (0,1,0) (0,0.3,1)\nencoding: raw\nspace origin: (0,0,0)\n\nx";
+  std::ofstream(path, std::ios::binary)
+      << "NRRD0004\ntype: uchar\ndimension: 3\nspace: left-posterior-superior\nsizes: 1 1 1\n"
+         "space directions: (1,0,0) (0,1,0) (0,0.3,1)\nencoding: raw\nspace origin: (0,0,0)\n\nx";
   EXPECT_THROW(static_cast<void>(load_labels(path)), Error);
 }
 

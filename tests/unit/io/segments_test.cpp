@@ -73,14 +73,16 @@ TEST(Segments, OverlapInLayersAndOldFilesWithoutLayers) {
   const auto write = [&](const std::string& keys) {
     std::string text =
         "NRRD0004\ntype: uint8\ndimension: 4\nspace: left-posterior-superior\nsizes: 2 2 2 1\n"
-        "space directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: list domain domain domain\nencoding: raw\nspace origin: (0,0,0)\n" +
+        "space directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: list domain domain domain\nencoding: raw\nspace "
+        "origin: (0,0,0)\n" +
         keys + "\n";
     const char voxels[] = {1, 1, 0, 1, 1, 0, 0, 0};
     text.append(voxels, sizeof voxels);
     write_file(file, text);
   };
   const std::string names = "Segment0_Name:=a\nSegment1_Name:=b\n";
-  for (const std::string& layers : {std::string(), std::string("Segment0_Layer:=0\nSegment1_Layer:=1\nSegment0_LabelValue:=1\n")}) {
+  for (const std::string& layers :
+       {std::string(), std::string("Segment0_Layer:=0\nSegment1_Layer:=1\nSegment0_LabelValue:=1\n")}) {
     write(names + layers);
     const auto s = load_segments(file);
     ASSERT_EQ(s.size(), 2u);
@@ -98,9 +100,11 @@ TEST(Segments, OverlapInLayersAndOldFilesWithoutLayers) {
 // Slicer writes one voxel where there is nothing to write.
 TEST(Segments, OneVoxelIsNothing) {
   const TemporaryFolder folder;
-  write_file(folder.path() / "s.seg.nrrd",
-             std::string("NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: 1 1 1\n"
-                         "space directions: (1,0,0) (0,1,0) (0,0,1)\nencoding: raw\nspace origin: (0,0,0)\nSegment0_Name:=a\n\n\1"));
+  write_file(
+      folder.path() / "s.seg.nrrd",
+      std::string(
+          "NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: 1 1 1\n"
+          "space directions: (1,0,0) (0,1,0) (0,0,1)\nencoding: raw\nspace origin: (0,0,0)\nSegment0_Name:=a\n\n\1"));
   const auto s = load_segments(folder.path() / "s.seg.nrrd");
   ASSERT_EQ(s.size(), 1u);
   EXPECT_FALSE(s[0].mask);

@@ -66,7 +66,8 @@ void expect_values(const Image& image) {
 
 std::string meta_header(const std::string& more, const std::string& data = "LOCAL") {
   return "ObjectType = Image\nNDims = 3\nBinaryData = True\n" + more +
-         "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 10 20 30\nElementSpacing = 2 3 4\nDimSize = 4 3 2\nElementType = MET_SHORT\n"
+         "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 10 20 30\nElementSpacing = 2 3 4\nDimSize = 4 3 2\nElementType "
+         "= MET_SHORT\n"
          "ElementDataFile = " +
          data + "\n";
 }
@@ -104,7 +105,8 @@ TEST(MetaImage, UnitsAreConverted) {
 
 TEST(MetaImage, SeveralVolumesAreRefusedForWhatTheyAre) {
   write(file("four.mha"),
-        "ObjectType = Image\nNDims = 4\nBinaryData = True\nBinaryDataByteOrderMSB = False\nElementSpacing = 1 1 1 1\nDimSize = 4 3 2 3\n"
+        "ObjectType = Image\nNDims = 4\nBinaryData = True\nBinaryDataByteOrderMSB = False\nElementSpacing = 1 1 1 "
+        "1\nDimSize = 4 3 2 3\n"
         "ElementType = MET_SHORT\nElementDataFile = LOCAL\n" +
             voxels(false, 3));
   const std::string said = refusal(file("four.mha"));
@@ -167,7 +169,8 @@ TEST(Nifti, UnitsAreConverted) {
       n.put<char>(123, static_cast<char>(unit | time));
       const auto in_file = [&m = mm](double v) { return static_cast<float>(v / m); };
       for (std::size_t a = 0; a < 3; ++a) n.put<float>(80 + 4 * a, in_file(2.0 + static_cast<double>(a)));
-      n.sform({{{in_file(-2), 0, 0, in_file(-10)}, {0, in_file(-3), 0, in_file(-20)}, {0, 0, in_file(4), in_file(30)}}});
+      n.sform(
+          {{{in_file(-2), 0, 0, in_file(-10)}, {0, in_file(-3), 0, in_file(-20)}, {0, 0, in_file(4), in_file(30)}}});
       n.save(file("unit.nii"));
       const Loaded l = load(file("unit.nii"));
       expect_values(l.image);
@@ -207,7 +210,8 @@ TEST(Nifti, FormsThatDisagreeAreTold) {
 }
 
 std::string nrrd(const std::string& more) {
-  return "NRRD0004\ntype: short\ndimension: 3\nsizes: 4 3 2\n" + more + "endian: little\nencoding: raw\n\n" + voxels(false);
+  return "NRRD0004\ntype: short\ndimension: 3\nsizes: 4 3 2\n" + more + "endian: little\nencoding: raw\n\n" +
+         voxels(false);
 }
 const std::string kDirections = "space directions: (2,0,0) (0,3,0) (0,0,4)\nspace origin: (10,20,30)\n";
 
@@ -228,11 +232,13 @@ TEST(Nrrd, WithoutAnAnatomicalSpaceItsSidesAreNotKnown) {
 
 TEST(Nrrd, UnitsAreConverted) {
   const auto units = [](const std::string& u) { return "\"" + u + "\" \"" + u + "\" \"" + u + "\"\n"; };
-  for (const auto& [unit, mm] : {std::pair{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"um", 1e-3}, {"micron", 1e-3}, {"", 1.0}}) {
+  for (const auto& [unit, mm] :
+       {std::pair{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"um", 1e-3}, {"micron", 1e-3}, {"", 1.0}}) {
     SCOPED_TRACE(unit);
     const auto in_file = [&m = mm](double v) { return std::to_string(v / m); };
-    write(file("unit.nrrd"), nrrd("space: LPS\nspace directions: (" + in_file(2) + ",0,0) (0," + in_file(3) + ",0) (0,0," + in_file(4) +
-                                  ")\nspace origin: (" + in_file(10) + "," + in_file(20) + "," + in_file(30) + ")\nspace units: " + units(unit)));
+    write(file("unit.nrrd"), nrrd("space: LPS\nspace directions: (" + in_file(2) + ",0,0) (0," + in_file(3) +
+                                  ",0) (0,0," + in_file(4) + ")\nspace origin: (" + in_file(10) + "," + in_file(20) +
+                                  "," + in_file(30) + ")\nspace units: " + units(unit)));
     const Loaded l = load(file("unit.nrrd"));
     EXPECT_NEAR(length(l.image.frame.spacing_mm - Vec3{2, 3, 4}), 0, 1e-9);
     EXPECT_NEAR(length(l.image.frame.origin_mm - Vec3{10, 20, 30}), 0, 1e-9);
@@ -248,9 +254,11 @@ TEST(Nrrd, UnitsAreConverted) {
 
 // A header that states more than the file can hold is told before memory is asked for.
 TEST(VolumeFile, AHeaderThatStatesTooMuchIsRefused) {
-  write(file("big.nrrd"), "NRRD0004\ntype: short\ndimension: 3\nspace: LPS\nsizes: 30000 30000 30000\nencoding: gzip\n\nxyz");
+  write(file("big.nrrd"),
+        "NRRD0004\ntype: short\ndimension: 3\nspace: LPS\nsizes: 30000 30000 30000\nencoding: gzip\n\nxyz");
   write(file("big.mha"),
-        "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nElementSpacing = 1 1 1\nDimSize = 30000 30000 "
+        "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nElementSpacing = 1 1 "
+        "1\nDimSize = 30000 30000 "
         "30000\nElementType = MET_SHORT\nElementDataFile = LOCAL\nxyz");
   Nifti n;
   for (std::size_t a = 1; a <= 3; ++a) n.put<std::int16_t>(40 + 2 * a, 30000);
@@ -263,7 +271,8 @@ TEST(VolumeFile, ValuesThatAreNoNumbersAreRefusedWithAHint) {
   const float nan = std::nanf("");
   std::string bytes(sizeof(float) * kVoxels, '\0');
   std::memcpy(bytes.data() + 8, &nan, sizeof nan);
-  write(file("nan.nrrd"), "NRRD0004\ntype: float\ndimension: 3\nspace: LPS\nsizes: 4 3 2\n" + kDirections + "endian: little\nencoding: raw\n\n" + bytes);
+  write(file("nan.nrrd"), "NRRD0004\ntype: float\ndimension: 3\nspace: LPS\nsizes: 4 3 2\n" + kDirections +
+                              "endian: little\nencoding: raw\n\n" + bytes);
   EXPECT_NE(refusal(file("nan.nrrd")).find("-1024"), std::string::npos);
 }
 

@@ -33,9 +33,10 @@ class Calibration : public ::testing::Test {
   CameraCalibration calibration_;
 
   GrayPicture view(int i, double tilt_deg) {
-    return renderer_.picture(plate_pose(480 + 30 * (i % 4), tilt_deg * std::sin(1.3 * i + 0.5), tilt_deg * std::cos(2.1 * i),
-                                        90 + 12 * (i % 5), {70 * std::sin(2.6 * i), 45 * std::cos(1.9 * i), 0}),
-                             look_);
+    return renderer_.picture(
+        plate_pose(480 + 30 * (i % 4), tilt_deg * std::sin(1.3 * i + 0.5), tilt_deg * std::cos(2.1 * i),
+                   90 + 12 * (i % 5), {70 * std::sin(2.6 * i), 45 * std::cos(1.9 * i), 0}),
+        look_);
   }
 };
 
@@ -51,7 +52,8 @@ TEST_F(Calibration, ViewsFromAllSidesGiveTheCamera) {
   EXPECT_NEAR(r.camera.cy, camera_.cy, 8);
   EXPECT_LT(r.focal_spread, 0.005);
   EXPECT_FALSE(r.camera.mirrored);
-  // What counts: where points are seen from each other. A shift of all is a turn of the camera, which nobody knows anyway.
+  // What counts: where points are seen from each other. A shift of all is a turn of the camera, which nobody knows
+  // anyway.
   const auto middle = project(camera_, {0, 0, 400}), found = project(r.camera, {0, 0, 400});
   for (const Vec3 p : {Vec3{120, 60, 400}, Vec3{-130, -80, 420}, Vec3{-100, 90, 380}}) {
     const auto a = project(camera_, p), b = project(r.camera, p);
@@ -76,13 +78,14 @@ TEST_F(Calibration, RefusesTooFewViewsAndViewsThatDoNotVary) {
   EXPECT_THROW(calibration_.add(GrayPicture{320, 240, std::vector<std::uint8_t>(320 * 240, 90)}), Error);
   // Always flat before the camera: a near plate and a short lens look as a far one and a long one.
   for (int i = 0; i < 11; ++i)
-    calibration_.add(renderer_.picture(plate_pose(480, 0, 0, 90, {-60 + 40.0 * (i % 4), -40 + 40.0 * (i / 4), 0}), look_));
+    calibration_.add(
+        renderer_.picture(plate_pose(480, 0, 0, 90, {-60 + 40.0 * (i % 4), -40 + 40.0 * (i / 4), 0}), look_));
   ASSERT_GE(calibration_.views(), CameraCalibration::kLeastViews);
   try {
     static_cast<void>(calibration_.solve());
     const auto r = calibration_.solve();
-    FAIL() << "the focal length cannot be known: " << r.focal_spread << " " << r.camera.fx << " for " << camera_.fx << " rms "
-           << r.camera.rms_px;
+    FAIL() << "the focal length cannot be known: " << r.focal_spread << " " << r.camera.fx << " for " << camera_.fx
+           << " rms " << r.camera.rms_px;
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::failed);
     EXPECT_NE(std::string(e.what()).find("too much alike"), std::string::npos) << e.what();

@@ -88,7 +88,9 @@ class PenHand : public ::testing::Test {
     }));
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  std::unique_ptr<MarkerDevice> device() { return std::make_unique<MarkerDevice>(link_, camera_, start_, to_scene_, 1.0, nullptr); }
+  std::unique_ptr<MarkerDevice> device() {
+    return std::make_unique<MarkerDevice>(link_, camera_, start_, to_scene_, 1.0, nullptr);
+  }
   static DeviceSample run(MarkerDevice& d, int ticks) {
     DeviceSample s;
     for (int t = 0; t < ticks; ++t) s = d.read(0, 1e-3, {});
@@ -150,7 +152,8 @@ TEST_F(PenHand, UnpluggedTheDrillStopsAndSeenAgainNothingJumps) {
   DeviceSample last = run(*d, 3000);
   ASSERT_EQ(last.pedal, 255);
   feed_->plug(false);
-  ASSERT_TRUE(soon([&] { return !link_->connected() && link_->trouble().find("/dev/video9") != std::string::npos; })) << link_->trouble();
+  ASSERT_TRUE(soon([&] { return !link_->connected() && link_->trouble().find("/dev/video9") != std::string::npos; }))
+      << link_->trouble();
   DeviceSample s = run(*d, 500);
   EXPECT_EQ(s.age_ms, 255);
   EXPECT_EQ(s.pedal, 0);
@@ -176,7 +179,9 @@ TEST_F(PenHand, UnpluggedTheDrillStopsAndSeenAgainNothingJumps) {
 }
 
 TEST_F(PenHand, SaysWhatIsWrong) {
-  const auto says = [&](const std::string& what) { return soon([&] { return link_->trouble().find(what) != std::string::npos; }); };
+  const auto says = [&](const std::string& what) {
+    return soon([&] { return link_->trouble().find(what) != std::string::npos; });
+  };
   give(GrayPicture{640, 480, std::vector<std::uint8_t>(640 * 480, 4)}, 5);
   EXPECT_TRUE(says("too dark")) << link_->trouble();
   give(GrayPicture{640, 480, std::vector<std::uint8_t>(640 * 480, 150)}, 5);
@@ -227,7 +232,8 @@ TEST(Pictures, AVideoStandsForACamera) {
   EXPECT_EQ(pictures, 5);
   // One that ends is not begun anew: the hand is gone, and it is said.
   PenLink link([&] { return open_pictures(path); }, test::webcam(320, 240), Pen{});
-  for (int i = 0; i < 6000 && link.trouble() != "the video has ended"; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  for (int i = 0; i < 6000 && link.trouble() != "the video has ended"; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   EXPECT_EQ(link.trouble(), "the video has ended");
   EXPECT_EQ(link.pictures(), 5U);
   PenLink::State s;

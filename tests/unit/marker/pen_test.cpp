@@ -60,10 +60,13 @@ TEST(Pivot, ASlipIsLeftOutAndNoiseIsTold) {
 
 TEST(Pivot, RefusesWhatCannotTellTheTip) {
   const Vec3 tip{0, 0, -110}, pivot{0, 50, 400};
-  EXPECT_NE(complaint([&] { static_cast<void>(fit_pivot(pivoting(tip, pivot, 12, 30))); }).find("12 pictures"), std::string::npos);
-  EXPECT_NE(complaint([&] { static_cast<void>(fit_pivot(pivoting(tip, pivot, 60, 5))); }).find("tilted by"), std::string::npos);
+  EXPECT_NE(complaint([&] { static_cast<void>(fit_pivot(pivoting(tip, pivot, 12, 30))); }).find("12 pictures"),
+            std::string::npos);
+  EXPECT_NE(complaint([&] { static_cast<void>(fit_pivot(pivoting(tip, pivot, 60, 5))); }).find("tilted by"),
+            std::string::npos);
   auto poses = pivoting(tip, pivot, 60, 30);
-  for (std::size_t i = 0; i < poses.size(); ++i) poses[i].shift_mm += Vec3{10 * std::sin(i * 0.9), 10 * std::cos(i * 1.3), 0};
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    poses[i].shift_mm += Vec3{10 * std::sin(i * 0.9), 10 * std::cos(i * 1.3), 0};
   EXPECT_NE(complaint([&] { static_cast<void>(fit_pivot(poses)); }).find("wandered"), std::string::npos);
 }
 
@@ -107,7 +110,8 @@ TEST(Filter, AtRestItSmoothsAndInEvenMotionItDoesNotLag) {
   EXPECT_LT(length(moving.motion().tip_at(1.03) - later(tip)), 0.1);
   EXPECT_LT(test::angle_deg(moving.motion().rotation_at(1.03), later.rotation), 0.1);
   // No farther than it may.
-  EXPECT_NEAR(length(moving.motion().tip_at(9) - moving.motion().tip_mm), PenMotion::kMostAheadS * length(velocity), 0.5);
+  EXPECT_NEAR(length(moving.motion().tip_at(9) - moving.motion().tip_mm), PenMotion::kMostAheadS * length(velocity),
+              0.5);
 }
 
 TEST(Filter, AfterAGapItStartsAnew) {
@@ -163,7 +167,8 @@ TEST_F(Files, WhatIsWrongInACameraIsSaidWithItsLine) {
   EXPECT_NE(with("\"fx\"", "\"fz\"").find("fz"), std::string::npos);
   EXPECT_NE(with("\"osteotome_camera\": 1", "\"osteotome_camera\": 2").find("osteotome_camera"), std::string::npos);
   EXPECT_NE(with("\"cx\": ", "\"cx\": 9").find("lens"), std::string::npos);
-  EXPECT_NE(complaint([&] { static_cast<void>(load_camera(folder_.path() / "nowhere.json")); }).find("nowhere.json"), std::string::npos);
+  EXPECT_NE(complaint([&] { static_cast<void>(load_camera(folder_.path() / "nowhere.json")); }).find("nowhere.json"),
+            std::string::npos);
 }
 
 TEST_F(Files, APenComesBackAsItWas) {

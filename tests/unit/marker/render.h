@@ -1,4 +1,5 @@
-// A camera that sees a pen or a plate at a known place: perspective, lens distortion, exposure with motion, blur, uneven light, noise.
+// A camera that sees a pen or a plate at a known place: perspective, lens distortion, exposure with motion, blur,
+// uneven light, noise.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -28,8 +29,8 @@ inline void draw_marker(Face& f, MarkerKind kind, int id, double left_cells, dou
   const auto m = marker_cells(kind, id);
   for (int y = 0; y < n * cells_a_module; ++y) {
     for (int x = 0; x < n * cells_a_module; ++x)
-      f.cells[static_cast<std::size_t>((static_cast<int>(top_cells) + y) * f.across + static_cast<int>(left_cells) + x)] =
-          m[static_cast<std::size_t>(y / cells_a_module * n + x / cells_a_module)];
+      f.cells[static_cast<std::size_t>((static_cast<int>(top_cells) + y) * f.across + static_cast<int>(left_cells) +
+                                       x)] = m[static_cast<std::size_t>(y / cells_a_module * n + x / cells_a_module)];
   }
 }
 
@@ -62,7 +63,15 @@ inline std::vector<Face> pen_faces(int pen = 1, double scale = 1) {
 
 inline std::vector<Face> plate_face() {
   constexpr int kW = 390, kH = 530;  // half millimetres, with a border of 10 mm
-  Face f{{87.5, 122.5, 0}, {1, 0, 0}, {0, -1, 0}, kW / 2.0, kH / 2.0, false, kW, kH, std::vector<std::uint8_t>(kW * kH, 1)};
+  Face f{{87.5, 122.5, 0},
+         {1, 0, 0},
+         {0, -1, 0},
+         kW / 2.0,
+         kH / 2.0,
+         false,
+         kW,
+         kH,
+         std::vector<std::uint8_t>(kW * kH, 1)};
   for (int y = 0; y < PlateBody::kDown; ++y) {
     for (int x = 0; x < PlateBody::kAcross; ++x) {
       if (!plate_square_is_black(x, y)) continue;
@@ -91,11 +100,12 @@ struct Look {
   bool clutter = true;
 };
 
-inline RigidTransform pen_pose(double distance_mm, double turn_deg, double lean_deg = 0, double nod_deg = 0, Vec3 off_mm = {}) {
+inline RigidTransform pen_pose(double distance_mm, double turn_deg, double lean_deg = 0, double nod_deg = 0,
+                               Vec3 off_mm = {}) {
   constexpr double k = std::numbers::pi / 180;
   const RigidTransform upright{Mat3{{Vec3{1, 0, 0}, Vec3{0, 0, 1}, Vec3{0, -1, 0}}}, {}};
-  RigidTransform pose = rotation_about({}, {1, 0, 0}, nod_deg * k) * rotation_about({}, {0, 0, 1}, lean_deg * k) * upright *
-                        rotation_about({}, {0, 0, 1}, turn_deg * k);
+  RigidTransform pose = rotation_about({}, {1, 0, 0}, nod_deg * k) * rotation_about({}, {0, 0, 1}, lean_deg * k) *
+                        upright * rotation_about({}, {0, 0, 1}, turn_deg * k);
   pose.shift_mm = Vec3{0, 0, distance_mm} + off_mm;
   return pose;
 }
@@ -142,8 +152,10 @@ class Renderer {
         }
       }
     }
-    const int x0 = std::clamp(static_cast<int>(lo[0]) - 2, 0, image.cols), x1 = std::clamp(static_cast<int>(hi[0]) + 3, 0, image.cols);
-    const int y0 = std::clamp(static_cast<int>(lo[1]) - 2, 0, image.rows), y1 = std::clamp(static_cast<int>(hi[1]) + 3, 0, image.rows);
+    const int x0 = std::clamp(static_cast<int>(lo[0]) - 2, 0, image.cols),
+              x1 = std::clamp(static_cast<int>(hi[0]) + 3, 0, image.cols);
+    const int y0 = std::clamp(static_cast<int>(lo[1]) - 2, 0, image.rows),
+              y1 = std::clamp(static_cast<int>(hi[1]) + 3, 0, image.rows);
     std::vector<std::vector<Seen>> seen;
     for (const RigidTransform& p : at) seen.push_back(faces_towards(p, look));
     const int n = look.samples;
@@ -169,7 +181,8 @@ class Renderer {
     for (int y = 0; y < image.rows; ++y) {
       for (int x = 0; x < image.cols; ++x) {
         const double light = 1 - look.gradient * x / image.cols;
-        result.pixels.push_back(static_cast<std::uint8_t>(std::clamp(image(y, x) * light + look.noise * noise(random_) + 0.5, 0.0, 255.0)));
+        result.pixels.push_back(
+            static_cast<std::uint8_t>(std::clamp(image(y, x) * light + look.noise * noise(random_) + 0.5, 0.0, 255.0)));
       }
     }
     return result;

@@ -27,8 +27,8 @@ std::vector<MarkerCorners> exact_corners(const CameraModel& camera, const RigidT
 TEST(Pose, ExactCornersGiveThePoseToAMillionth) {
   const CameraModel camera = test::webcam(1280, 720);
   for (int i = 0; i < 60; ++i) {
-    const RigidTransform pose =
-        pen_pose(220 + 8.0 * i, 37.0 * i, 60 * std::sin(i), 40 * std::cos(1.7 * i), {30 * std::sin(2.0 * i), 25 * std::cos(3.0 * i), 0});
+    const RigidTransform pose = pen_pose(220 + 8.0 * i, 37.0 * i, 60 * std::sin(i), 40 * std::cos(1.7 * i),
+                                         {30 * std::sin(2.0 * i), 25 * std::cos(3.0 * i), 0});
     const PenSight s = pose_of(camera, exact_corners(camera, pose));
     ASSERT_EQ(s.state, State::seen) << i;
     EXPECT_LT(length(s.camera_from_body.shift_mm - pose.shift_mm), 1e-6) << i;
@@ -42,10 +42,13 @@ TEST(Pose, AFlatMarkerFromAfarIsAmbiguousUntilSomethingBeforeSaysWhich) {
   // Leant by 20 degrees; the mirrored lean explains the corners nearly as well.
   const RigidTransform pose = pen_pose(600, -90, 0, 20);
   auto seen = exact_corners(camera, pose);
-  std::erase_if(seen, [&](const MarkerCorners& c) { return dot(pose.rotation * c.patch.out(), normalized(pose.shift_mm)) > -0.8; });
+  std::erase_if(seen, [&](const MarkerCorners& c) {
+    return dot(pose.rotation * c.patch.out(), normalized(pose.shift_mm)) > -0.8;
+  });
   ASSERT_EQ(seen.size(), 2U);
   seen.pop_back();
-  for (auto& p : seen[0].pixel) p = {std::round(p[0] * 4) / 4, std::round(p[1] * 4) / 4};  // as well as a camera knows them
+  for (auto& p : seen[0].pixel)
+    p = {std::round(p[0] * 4) / 4, std::round(p[1] * 4) / 4};  // as well as a camera knows them
   EXPECT_EQ(pose_of(camera, seen).state, State::ambiguous);
   const PenSight s = pose_of(camera, seen, &pose);
   ASSERT_EQ(s.state, State::seen);

@@ -42,7 +42,8 @@ void expect_closed_manifold(const TriMesh& mesh) {
 TEST(SurfaceNets, SphereLiesOnTheExactBoundary) {
   const double r = 13.3;
   const auto grid = make_grid(4, [&](int i, int j, int k) {
-    return std::clamp(0.5 + r - std::sqrt((i - 15.6) * (i - 15.6) + (j - 16.1) * (j - 16.1) + (k - 15.9) * (k - 15.9)), 0.0, 1.0);
+    return std::clamp(0.5 + r - std::sqrt((i - 15.6) * (i - 15.6) + (j - 16.1) * (j - 16.1) + (k - 15.9) * (k - 15.9)),
+                      0.0, 1.0);
   });
   const auto surface = surface_nets(grid);
   expect_closed_manifold(surface.mesh);
@@ -97,7 +98,8 @@ void expect_no_equal_points(const TriMesh& mesh) {
   expect_closed_manifold(m);
   std::size_t flat = 0;
   for (const auto& t : m.triangles) {
-    const Vec3 a = from_floats(m.points_mm[t[0]]), b = from_floats(m.points_mm[t[1]]), c = from_floats(m.points_mm[t[2]]);
+    const Vec3 a = from_floats(m.points_mm[t[0]]), b = from_floats(m.points_mm[t[1]]),
+               c = from_floats(m.points_mm[t[2]]);
     flat += length(cross(b - a, c - a)) == 0 ? 1 : 0;
   }
   EXPECT_EQ(flat, 0u);
@@ -106,7 +108,8 @@ void expect_no_equal_points(const TriMesh& mesh) {
 // Voxels of just the surface's density, or next to it, drew the vertices of the cells around them to one place.
 TEST(SurfaceNets, NoPointsAreEqualWhereverTheDensityIsJustTheSurfaces) {
   std::mt19937 random(17);
-  const float half = 0.5F, values[] = {0, 0.3F, std::nextafter(half, 0.0F), half, half, std::nextafter(half, 1.0F), 0.8F, 1};
+  const float half = 0.5F,
+              values[] = {0, 0.3F, std::nextafter(half, 0.0F), half, half, std::nextafter(half, 1.0F), 0.8F, 1};
   for (int trial = 0; trial < 40; ++trial) {
     std::discrete_distribution<int> pick({1.0 + trial % 7, 1, 1, 1.0 + trial % 3, 1, 1, 1, 1.0 + trial % 5});
     auto grid = make_grid(2, [&](int, int, int) { return values[pick(random)]; });
@@ -153,7 +156,8 @@ TEST(VolumeSurface, EnclosesWhatTheGridHoldsAndStaysWhereItIs) {
     EXPECT_NEAR(s.bone_mm3 / true_mm3, 1, 1e-2);
     EXPECT_GT(std::abs(enclosed_volume_mm3(at_half) / s.bone_mm3 - 1), 2e-3) << "nothing to correct";
     EXPECT_EQ(s.scale, 1);
-    EXPECT_NEAR(s.moved_mm, (s.surface_mm3 - enclosed_volume_mm3(at_half)) / area_mm2(at_half), 0.1 * std::abs(s.moved_mm));
+    EXPECT_NEAR(s.moved_mm, (s.surface_mm3 - enclosed_volume_mm3(at_half)) / area_mm2(at_half),
+                0.1 * std::abs(s.moved_mm));
     EXPECT_LT(std::abs(s.moved_mm), 0.1 * h);
     // The surface is no farther from the truth than it was, but for what it was moved.
     EXPECT_LT(worst_distance(s.mesh, distance), worst_distance(at_half, distance) + 1.5 * std::abs(s.moved_mm));
@@ -209,7 +213,8 @@ TEST(SurfaceNets, PatchesAfterEditsEqualRebuild) {
     const int i = at(random), j = at(random), k = at(random);
     grid.set(grid.find(i, j, k), value(random));
     for (int n = 0; n < 27; ++n) {
-      const auto b = grid.find_brick((i + (n % 3 - 1) * 2) >> 3, (j + (n / 3 % 3 - 1) * 2) >> 3, (k + (n / 9 - 1) * 2) >> 3);
+      const auto b =
+          grid.find_brick((i + (n % 3 - 1) * 2) >> 3, (j + (n / 3 % 3 - 1) * 2) >> 3, (k + (n / 9 - 1) * 2) >> 3);
       if (b != BrickGrid::kNone) patches[b] = extract_patch(grid, b);
     }
   }
@@ -232,7 +237,8 @@ TEST(SurfaceNets, SameForAnyThreadCount) {
 }
 
 TEST(SurfaceNets, MapsTieVoxelsToTheirTriangles) {
-  const auto grid = make_grid(2, [](int i, int j, int k) { return i > 3 && i < 12 && j > 3 && j < 12 && k > 3 && k < 12 ? 1.0F : 0.0F; });
+  const auto grid = make_grid(
+      2, [](int i, int j, int k) { return i > 3 && i < 12 && j > 3 && j < 12 && k > 3 && k < 12 ? 1.0F : 0.0F; });
   const auto s = surface_nets(grid);
   EXPECT_EQ(s.voxels.size(), 8u * 8 * 8 - 6 * 6 * 6);  // the cube's outer layer
   EXPECT_EQ(s.triangles_of_vertex.items.size(), s.mesh.triangles.size() * 3);
@@ -246,7 +252,8 @@ TEST(SurfaceNets, MapsTieVoxelsToTheirTriangles) {
 }
 
 TEST(VoxelSurface, CubeHasOneTriangleForEachHalfSquare) {
-  const auto grid = make_grid(2, [](int i, int j, int k) { return i > 3 && i < 12 && j > 3 && j < 12 && k > 3 && k < 12 ? 1.0F : 0.0F; });
+  const auto grid = make_grid(
+      2, [](int i, int j, int k) { return i > 3 && i < 12 && j > 3 && j < 12 && k > 3 && k < 12 ? 1.0F : 0.0F; });
   const auto s = voxel_surface(grid);
   EXPECT_EQ(s.voxels.size(), 8u * 8 * 8 - 6 * 6 * 6);
   EXPECT_EQ(s.mesh.triangles.size(), 6u * 7 * 7 * 2);
@@ -255,8 +262,9 @@ TEST(VoxelSurface, CubeHasOneTriangleForEachHalfSquare) {
 }
 
 TEST(VoxelSurface, BallIsClosedAndEachVertexIsAVoxel) {
-  const auto grid =
-      make_grid(4, [](int i, int j, int k) { return (i - 16) * (i - 16) + (j - 16) * (j - 16) + (k - 15) * (k - 15) < 130 ? 1.0F : 0.0F; });
+  const auto grid = make_grid(4, [](int i, int j, int k) {
+    return (i - 16) * (i - 16) + (j - 16) * (j - 16) + (k - 15) * (k - 15) < 130 ? 1.0F : 0.0F;
+  });
   const auto s = voxel_surface(grid);
   const MeshCheck c = check(s.mesh);
   EXPECT_EQ(c.open_edges, 0u);

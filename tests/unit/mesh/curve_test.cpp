@@ -88,12 +88,14 @@ TEST(Curve, APenaltyOnTheWayKeepsTheBranch) {
   EXPECT_EQ(curve.nearest_from({6, 0.1, 0}, curve.nearest({4.5, 0, 0}).arc_mm, 0.3, 1).segment, 2U);
 }
 
-// Figure 47: along a curve that comes near itself again and again, a deviating hand never leaves its place by more than it moved.
+// Figure 47: along a curve that comes near itself again and again, a deviating hand never leaves its place by more than
+// it moved.
 TEST(Curve, TracksThroughNearMisses) {
   std::vector<Vec3> points;
   for (int i = 0; i < 20000; ++i) {
     const double t = i * 0.002;
-    points.push_back({20 * std::cos(t) * (1 + 0.02 * std::sin(9 * t)), 20 * std::sin(t) * (1 + 0.02 * std::sin(7 * t)), 0.05 * t});
+    points.push_back(
+        {20 * std::cos(t) * (1 + 0.02 * std::sin(9 * t)), 20 * std::sin(t) * (1 + 0.02 * std::sin(7 * t)), 0.05 * t});
   }
   const Curve curve(points);
   std::mt19937 random(4);

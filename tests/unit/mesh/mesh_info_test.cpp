@@ -15,7 +15,8 @@ TEST(MeshInfo, OfASphere) {
   EXPECT_TRUE(s.watertight && s.manifold);
   EXPECT_EQ(s.bodies, 1U);
   EXPECT_EQ(s.euler, 2);
-  EXPECT_EQ(s.open_edges + s.holes + s.degenerate + s.duplicates + s.zero_area + s.needles + s.caps + s.inward_bodies, 0U);
+  EXPECT_EQ(s.open_edges + s.holes + s.degenerate + s.duplicates + s.zero_area + s.needles + s.caps + s.inward_bodies,
+            0U);
   EXPECT_NEAR(s.volume_mm3, 4 / 3.0 * std::numbers::pi * 1000, 60);
   EXPECT_NEAR(s.area_mm2, 4 * std::numbers::pi * 100, 10);
 }
@@ -67,8 +68,8 @@ TEST(Repair, MakesASoupASolid) {
 
 TEST(Repair, TurnsBodiesButLeavesCavities) {
   RepairReport r;
-  const TriMesh m =
-      mesh_of(repaired(mesh_of(joined(joined(sphere(10, 2), turned(sphere(5, 2))), turned(box({20, 0, 0}, {25, 5, 5})))), {}, r));
+  const TriMesh m = mesh_of(repaired(
+      mesh_of(joined(joined(sphere(10, 2), turned(sphere(5, 2))), turned(box({20, 0, 0}, {25, 5, 5})))), {}, r));
   EXPECT_EQ(r.turned_bodies, 1U);
   const double shell = 4 / 3.0 * std::numbers::pi * (1000 - 125);
   EXPECT_NEAR(enclosed_volume_mm3(m), shell + 125, 0.05 * shell);

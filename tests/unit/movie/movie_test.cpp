@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "evidence/scene.h"
+#include "osteo/assessment/movie/movie_file.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/assessment/movie/movie_file.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "rewrite_session.h"
 #include "scratch.h"
@@ -22,7 +22,11 @@ namespace {
 
 // A slab below z = 4; a hole is drilled at x = y = 0 from 0.2 s to 1.5 s, then the hand rests aside until 5 s.
 World block() {
-  return test::solid_world([](Vec3 p) { return std::min({4 - p.z, p.z + 4, 11 - std::abs(p.x), 11 - std::abs(p.y)}); }, 0.5, 24);
+  return test::solid_world(
+      [](Vec3 p) {
+        return std::min({4 - p.z, p.z + 4, 11 - std::abs(p.x), 11 - std::abs(p.y)});
+      },
+      0.5, 24);
 }
 const char* const kFromAbove = "{\"eye_mm\":[0,0,104],\"target_mm\":[0,0,4],\"up\":[0,1,0],\"magnification\":8}";
 const char* const kFromAside = "{\"eye_mm\":[0,-100,4],\"target_mm\":[0,0,4],\"up\":[0,0,1],\"magnification\":8}";
@@ -94,7 +98,8 @@ TEST(MovieTimes, EvenlyThroughTheSessionToItsEnd) {
   EXPECT_EQ(movie_times(s, 0, 99, 1, 30, false).ticks.size(), 300U);
   EXPECT_EQ(code_of([&] { (void)movie_times(s, 10, -1, 1, 30, false); }), ExitCode::usage);
   EXPECT_EQ(code_of([&] { (void)movie_times(s, 5, 4, 1, 30, false); }), ExitCode::usage);
-  EXPECT_EQ(code_of([&] { (void)movie_times(survey_with_idle(1000000, 0, 0), 0, -1, 0.1, 120, false); }), ExitCode::usage);
+  EXPECT_EQ(code_of([&] { (void)movie_times(survey_with_idle(1000000, 0, 0), 0, -1, 0.1, 120, false); }),
+            ExitCode::usage);
   EXPECT_EQ(code_of([&] { (void)movie_times({}, 0, -1, 1, 30, false); }), ExitCode::no_input);
 }
 
@@ -156,7 +161,8 @@ TEST(Movie, ShowsTheHoleAtItsEndFromWhereTheSurgeonLooked) {
   EXPECT_EQ(file.codec, "h264");
   const std::vector<cv::Mat> frames = frames_of(scratch / "a.mp4");
   ASSERT_EQ(frames.size(), 25U);
-  // 25 mm in 120 pixels: at 9.6 mm to the side lies bone that nothing touched. The hole is darker than it was; the tool has gone aside.
+  // 25 mm in 120 pixels: at 9.6 mm to the side lies bone that nothing touched. The hole is darker than it was; the tool
+  // has gone aside.
   o.to_s = 0.01;
   (void)make_movie(session, block(), {}, o, scratch / "begin.mp4");
   const std::vector<cv::Mat> begin = frames_of(scratch / "begin.mp4");
@@ -219,8 +225,9 @@ TEST(Movie, WhatCannotBeRunAgainIsToldAsRecordedWithTheSameBone) {
   EXPECT_EQ(part.frames, static_cast<std::uint64_t>(std::llround(survey_of(cut).seconds() * 5)));
   // Another bone.
   EXPECT_EQ(code_of([&] {
-              (void)make_movie(SessionReader(scratch / "s.oss"), test::solid_world([](Vec3 p) { return 5 - length(p); }, 0.5, 24), {},
-                               small(), scratch / "x.mp4");
+              (void)make_movie(SessionReader(scratch / "s.oss"),
+                               test::solid_world([](Vec3 p) { return 5 - length(p); }, 0.5, 24), {}, small(),
+                               scratch / "x.mp4");
             }),
             ExitCode::corrupt);
 }
@@ -286,7 +293,8 @@ TEST(MovieFile, WhatCannotBeMadeIsSaid) {
               MovieFile file(scratch / "full.webm", 640, 480, 25);
               Picture p{640, 480, {}};
               p.rgb.resize(640 * 480 * 3);
-              for (std::size_t n = 0; n < p.rgb.size(); ++n) p.rgb[n] = static_cast<std::uint8_t>(n * 2654435761U >> 13);
+              for (std::size_t n = 0; n < p.rgb.size(); ++n)
+                p.rgb[n] = static_cast<std::uint8_t>(n * 2654435761U >> 13);
               for (int n = 0; n < 60; ++n) file.add(p);
               file.finish();
             }),

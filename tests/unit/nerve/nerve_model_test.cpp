@@ -37,19 +37,26 @@ TEST(MonitorSetup, IsReadStrictly) {
   EXPECT_EQ(setup().nerves.size(), 3u);
   EXPECT_EQ(setup().nerves[0].channels[2].name, "orbicularis oris");
   EXPECT_DOUBLE_EQ(setup().constants.soft_ma_per_mm2, 0.11);
-  EXPECT_NE(
-      refusal(with(good, R"("value": 0.11, "unit": "mA/mm2")", R"("value": 0.11, "unit": "mA/mm")")).find("soft_ma_per_mm2 is in mA/mm2"),
-      std::string::npos);
-  EXPECT_NE(refusal(with(good, R"("bare_ma": { "value": 0.21)", R"("bare_ma": { "value": -1)")).find("m.json' line 5"), std::string::npos);
+  EXPECT_NE(refusal(with(good, R"("value": 0.11, "unit": "mA/mm2")", R"("value": 0.11, "unit": "mA/mm")"))
+                .find("soft_ma_per_mm2 is in mA/mm2"),
+            std::string::npos);
+  EXPECT_NE(refusal(with(good, R"("bare_ma": { "value": 0.21)", R"("bare_ma": { "value": -1)")).find("m.json' line 5"),
+            std::string::npos);
   EXPECT_NE(refusal(with(good, R"("contact_mm")", R"("contact_m")")).find("contact_m"), std::string::npos);
-  EXPECT_NE(refusal(with(good, R"("source": "50 or 60, by country")", R"("source": "")")).find("no source"), std::string::npos);
-  EXPECT_NE(refusal(with(good, R"("name": "mentalis")", R"("name": "frontalis")")).find("two channels"), std::string::npos);
-  EXPECT_NE(refusal(with(good, R"("distal": [0, 0, -1])", R"("distal": [0, 0, 0])")).find("no direction"), std::string::npos);
-  EXPECT_NE(refusal(with(good, R"("value": 0.05, "unit": "s")", R"("value": 0.5, "unit": "s")")).find("burst_least_s is more"),
+  EXPECT_NE(refusal(with(good, R"("source": "50 or 60, by country")", R"("source": "")")).find("no source"),
+            std::string::npos);
+  EXPECT_NE(refusal(with(good, R"("name": "mentalis")", R"("name": "frontalis")")).find("two channels"),
+            std::string::npos);
+  EXPECT_NE(refusal(with(good, R"("distal": [0, 0, -1])", R"("distal": [0, 0, 0])")).find("no direction"),
+            std::string::npos);
+  EXPECT_NE(refusal(with(good, R"("value": 0.05, "unit": "s")", R"("value": 0.5, "unit": "s")"))
+                .find("burst_least_s is more"),
             std::string::npos);
   std::string many;
-  for (int i = 0; i < 14; ++i) many += R"({ "name": "m)" + std::to_string(i) + R"(", "evoked_uv": 1, "latency_ms": 4, "share": 1 }, )";
-  EXPECT_NE(refusal(with(good, R"({ "name": "frontalis")", many + R"({ "name": "frontalis")")).find("more than 16"), std::string::npos);
+  for (int i = 0; i < 14; ++i)
+    many += R"({ "name": "m)" + std::to_string(i) + R"(", "evoked_uv": 1, "latency_ms": 4, "share": 1 }, )";
+  EXPECT_NE(refusal(with(good, R"({ "name": "frontalis")", many + R"({ "name": "frontalis")")).find("more than 16"),
+            std::string::npos);
 }
 
 // Published: 1, 2 and 3 mA fire a nerve through 2.20, 3.80 and 4.80 mm of soft tissue (PMC10071533).
@@ -61,7 +68,8 @@ TEST(Threshold, SoftTissueAsMeasured) {
   const double through_bone = stimulus_threshold_ma(c, 0, 1, 0.1);
   EXPECT_GT(through_bone, 1);
   EXPECT_LT(through_bone, 5);
-  EXPECT_LT(stimulus_threshold_ma(c, 2, 0.5, 0.3), stimulus_threshold_ma(c, 2, 0.5, 0.1)) << "a longer pulse needs less";
+  EXPECT_LT(stimulus_threshold_ma(c, 2, 0.5, 0.3), stimulus_threshold_ma(c, 2, 0.5, 0.1))
+      << "a longer pulse needs less";
   double before = 0;
   for (double d = 0; d < 8; d += 0.05) {
     const double now = stimulus_threshold_ma(c, d, 0, 0.1);
@@ -139,7 +147,8 @@ TEST(NerveCourse, IsTheMiddleOfATube) {
     EXPECT_LT(worst, 0.25);  // at the ends, which go straight on
     EXPECT_EQ(course.points.back().to_distal_mm, 0);
     EXPECT_NEAR(course.points.front().to_distal_mm, 12 * std::numbers::pi / 2, 1.5);
-    EXPECT_GT((course.points.back().at_mm.z - course.points.front().at_mm.z) * down, 0) << "the far end lies where it was said to";
+    EXPECT_GT((course.points.back().at_mm.z - course.points.front().at_mm.z) * down, 0)
+        << "the far end lies where it was said to";
   }
   EXPECT_TRUE(course_of({}, {0, 0, 1}, "none").points.empty());
 }
@@ -172,7 +181,8 @@ Fired run(NerveModel& model, NerveStress stress, double seconds, const NerveMode
 TEST(NerveModel, BurstsBeforeTouchTrainsUnderPressure) {
   NerveModel far = straight(), near = straight(), nearer = straight(), pressed = straight(), at_rest = straight();
   EXPECT_EQ(run(far, {0, 20, 1.05, 1.05, 2, true, true}, 60).bursts, 0);
-  const int some = run(near, {0, 20, 0.6, 0.6, 2, true, true}, 60).bursts, more = run(nearer, {0, 20, 0.1, 0.1, 2, true, true}, 60).bursts;
+  const int some = run(near, {0, 20, 0.6, 0.6, 2, true, true}, 60).bursts,
+            more = run(nearer, {0, 20, 0.1, 0.1, 2, true, true}, 60).bursts;
   // The hazard: 6 (1 - d)^2 a second, 57.6 and 291.6 in a minute; fewer where four go on already.
   EXPECT_NEAR(some, 57.6, 4 * std::sqrt(57.6));
   EXPECT_GT(more, 200);

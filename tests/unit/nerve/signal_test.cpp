@@ -1,4 +1,5 @@
-// The signal and what a monitor makes of it: noise as large as said, answers when they should come, events by their length, files.
+// The signal and what a monitor makes of it: noise as large as said, answers when they should come, events by their
+// length, files.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,7 +24,8 @@ const MonitorSetup& setup() {
 
 // One nerve 20 mm long, heard by the channels of the facial nerve.
 struct Bench {
-  explicit Bench(MonitorConstants c, std::uint64_t seed = 1) : constants(c), model(c, {course()}, seed), signal(c, channels(), seed) {}
+  explicit Bench(MonitorConstants c, std::uint64_t seed = 1)
+      : constants(c), model(c, {course()}, seed), signal(c, channels(), seed) {}
   static NerveCourse course() {
     NerveCourse n;
     n.name = "facial nerve";
@@ -73,7 +75,8 @@ TEST(Electromyogram, NoiseMainsAndDrillAreAsLargeAsSaid) {
   Bench mains(c);
   mains.run(1);
   EXPECT_NEAR(mains.rms(0), 40 * std::sqrt(0.5 * 1.04), 0.5);
-  for (std::size_t i = 0; i < 4000; ++i) EXPECT_EQ(mains.samples[i], mains.samples[i + 600 * 4]) << "50 Hz: 600 samples";
+  for (std::size_t i = 0; i < 4000; ++i)
+    EXPECT_EQ(mains.samples[i], mains.samples[i + 600 * 4]) << "50 Hz: 600 samples";
 }
 
 TEST(Electromyogram, SameBitsForTheSameSeed) {
@@ -103,7 +106,8 @@ TEST(Electromyogram, AnAnswerComesByLatencyAndConduction) {
     }
     EXPECT_NEAR(most, channels[ch].electrode.evoked_uv, 1);
     // Half the wave, 20 mm at 50 m/s, the electrode's own.
-    EXPECT_NEAR(1000 * (static_cast<double>(peak) - 30) / 30000, channels[ch].electrode.latency_ms + 0.4 + 0.5 * c.evoked_ms, 0.1);
+    EXPECT_NEAR(1000 * (static_cast<double>(peak) - 30) / 30000,
+                channels[ch].electrode.latency_ms + 0.4 + 0.5 * c.evoked_ms, 0.1);
   }
 }
 
@@ -128,7 +132,8 @@ struct Heard {
     return nullptr;
   }
 };
-Heard hear(const std::vector<std::int16_t>& samples, std::vector<std::uint64_t> pulses = {}, std::size_t in_blocks_of = kBlock) {
+Heard hear(const std::vector<std::int16_t>& samples, std::vector<std::uint64_t> pulses = {},
+           std::size_t in_blocks_of = kBlock) {
   ActivityDetector detector(setup().constants, 1);
   Heard heard;
   const auto take = [&] {

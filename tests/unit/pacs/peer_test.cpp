@@ -19,8 +19,8 @@ TEST(Peer, IsReadStrictly) {
   EXPECT_EQ(p.port, 4242);
   EXPECT_EQ(peer_text(p), "ORTHANC@pacs.example:4242");
   EXPECT_EQ(parse_peer("A@B@h:1").ae, "A@B");  // a title may hold it
-  for (const char* const bad : {"", "@h:1", "A@:1", "A@h", "A@h:", "A@h:0", "A@h:65536", "A@h:1x", "A@h:-1", "h:104", "A@[::1]:104",
-                                "SEVENTEENLETTERS1@h:1", "A\\B@h:1", "\x01@h:1"})
+  for (const char* const bad : {"", "@h:1", "A@:1", "A@h", "A@h:", "A@h:0", "A@h:65536", "A@h:1x", "A@h:-1", "h:104",
+                                "A@[::1]:104", "SEVENTEENLETTERS1@h:1", "A\\B@h:1", "\x01@h:1"})
     EXPECT_THROW(static_cast<void>(parse_peer(bad)), Error) << bad;
 }
 
@@ -38,7 +38,9 @@ TEST(Receive, CountsAreWrittenAsPrometheusReadsThem) {
   ReceiveCounters c;
   c.stored = 7;
   const std::string text = metrics_text(c);
-  EXPECT_NE(text.find("# TYPE osteotome_receive_stored_total counter\nosteotome_receive_stored_total 7\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("# TYPE osteotome_receive_stored_total counter\nosteotome_receive_stored_total 7\n"),
+            std::string::npos)
+      << text;
   EXPECT_EQ(std::ranges::count(text, '\n'), 3 * 10);
 }
 

@@ -60,7 +60,8 @@ TEST(Rules, SayWhyNoneMatches) {
   const RuleChoice c = choose_rule(rules, f);
   EXPECT_EQ(c.rule, nullptr);
   EXPECT_EQ(c.why,
-            "'overviews': its description has none of the words; 'ear': another modality than CT; 'any head': another modality than CT");
+            "'overviews': its description has none of the words; 'ear': another modality than CT; 'any head': another "
+            "modality than CT");
   f = head();
   f.own = true;
   EXPECT_EQ(choose_rule(rules, f).rule, nullptr) << "what we made never runs";

@@ -29,7 +29,8 @@ std::string parts_of(const std::string& text, std::size_t size, const std::strin
 
 TEST(Multipart, PartsAreTheSameInPiecesOfAnySize) {
   const std::string text =
-      "words before\r\n--b0\r\nContent-Type: application/dicom\r\nX:  y \r\n\r\nfirst\r\n-\r\n--b\r\n--b0 \t\r\n\r\n\r\n--b0\r\nA: "
+      "words before\r\n--b0\r\nContent-Type: application/dicom\r\nX:  y \r\n\r\nfirst\r\n-\r\n--b\r\n--b0 "
+      "\t\r\n\r\n\r\n--b0\r\nA: "
       "1\r\n\r\n\r\n\r\n--b0--words after\r\n--b0\r\n";
   for (std::size_t size = 1; size <= text.size(); ++size)
     ASSERT_EQ(parts_of(text, size), "[content-type=application/dicom;x=y;|first\r\n-\r\n--b][|][a=1;|\r\n]") << size;
@@ -49,11 +50,13 @@ TEST(Multipart, WhatIsNoneIsRefused) {
   for (const std::string& text : all)
     for (const std::size_t size : {std::size_t{1}, std::size_t{7}, std::size_t{1} << 20U})
       EXPECT_THROW(static_cast<void>(parts_of(text, size)), Error) << text.substr(0, 40) << " in pieces of " << size;
-  for (const std::string& boundary : {std::string(), std::string(71, 'a'), std::string("a\r\nb"), std::string("a "), std::string("a\"b")})
+  for (const std::string& boundary :
+       {std::string(), std::string(71, 'a'), std::string("a\r\nb"), std::string("a "), std::string("a\"b")})
     EXPECT_THROW(MultipartReader(boundary, {}), Error) << boundary;
 }
 
-// Whatever comes: the same parts, or the same refusal, in pieces of any size, and nothing is read that is not there (sanitizers).
+// Whatever comes: the same parts, or the same refusal, in pieces of any size, and nothing is read that is not there
+// (sanitizers).
 TEST(Multipart, MutationsAreTakenTheSameWayInPieces) {
   const std::string begin = "\r\n--b0\r\nA: 1\r\n\r\nfirst\r\n--b0\r\n\r\n--b\r\n--b0--", bits = "\r\n-b0 :;=\"\\A";
   std::mt19937 random(7);
@@ -114,12 +117,13 @@ TEST(WebServer, AddressesAreReadStrictly) {
     s.login = login;
     check_dicomweb(s);
   };
-  for (const char* const good :
-       {"https://pacs.example/dicom-web", "http://127.0.0.1:8042/x/", "http://localhost", "http://[::1]:80/x", "https://[::2]"})
+  for (const char* const good : {"https://pacs.example/dicom-web", "http://127.0.0.1:8042/x/", "http://localhost",
+                                 "http://[::1]:80/x", "https://[::2]"})
     EXPECT_NO_THROW(check(good, "a:b")) << good;
-  for (const char* const bad : {"", "ftp://x", "https://", "https:///", "HTTPS://x", "https://a:b@x", "https://x?y", "https://x#y",
-                                "https://x y", "https://x\\y", "https://x\r\ny", "http://pacs.example", "http://127.0.0.1.example",
-                                "http://[::1].example", "http://localhost.example", "http://127.0.0.10", "http://[::1"})
+  for (const char* const bad :
+       {"", "ftp://x", "https://", "https:///", "HTTPS://x", "https://a:b@x", "https://x?y", "https://x#y",
+        "https://x y", "https://x\\y", "https://x\r\ny", "http://pacs.example", "http://127.0.0.1.example",
+        "http://[::1].example", "http://localhost.example", "http://127.0.0.10", "http://[::1"})
     EXPECT_THROW(check(bad), Error) << bad;
 }
 

@@ -26,13 +26,14 @@ struct MakeStage {
     visit({"refuse", "fails with a finding"}, p.refuse);
   }
   static StageInfo info() {
-    return {.name = "make",
-            .synopsis = "an image",
-            .description = {},
-            .inputs = {},
-            .outputs = {{"image", {DataKind::image}, "image"}, {"finding", {DataKind::document}, "what was found", true}},
-            .references = {},
-            .example = {}};
+    return {
+        .name = "make",
+        .synopsis = "an image",
+        .description = {},
+        .inputs = {},
+        .outputs = {{"image", {DataKind::image}, "image"}, {"finding", {DataKind::document}, "what was found", true}},
+        .references = {},
+        .example = {}};
   }
   static std::vector<Data> run(const Params& p, std::span<const Data>, const Context& context) {
     ++g_runs;
@@ -79,13 +80,17 @@ const Registry& registry() {
 }
 
 Pipeline make_only(const fs::path& out, const std::string& add = "0") {
-  return {"p", "", {{.id = "make", .stage = "make", .params = {{"add", add}}, .inputs = {}, .outputs = {{"image", out}}}}};
+  return {
+      "p", "", {{.id = "make", .stage = "make", .params = {{"add", add}}, .inputs = {}, .outputs = {{"image", out}}}}};
 }
 
 Pipeline chain(const fs::path& folder, const std::string& add = "0") {
   Pipeline p = make_only(folder / "image.nrrd", add);
-  p.nodes.push_back(
-      {.id = "odd", .stage = "mask", .params = {}, .inputs = {{"image", {"make", "", {}}}}, .outputs = {{"mask", folder / "mask.nrrd"}}});
+  p.nodes.push_back({.id = "odd",
+                     .stage = "mask",
+                     .params = {},
+                     .inputs = {{"image", {"make", "", {}}}},
+                     .outputs = {{"mask", folder / "mask.nrrd"}}});
   return p;
 }
 
@@ -186,7 +191,8 @@ TEST(Run, FolderThatWasMadeIsReplacedUnlessSomethingWasPutIntoItOrChanged) {
   run(make_only(out, "6"), kReuse);
 
   put(out / "notes.txt", "mine");
-  EXPECT_NE(std::string(refusal([&] { run(make_only(out, "7"), kForce); }).what()).find("notes.txt"), std::string::npos);
+  EXPECT_NE(std::string(refusal([&] { run(make_only(out, "7"), kForce); }).what()).find("notes.txt"),
+            std::string::npos);
   fs::remove(out / "notes.txt");
   fs::create_directory(out / "sub");
   EXPECT_EQ(refusal([&] { run(make_only(out, "7"), kForce); }).code(), ExitCode::cannot_write);
@@ -220,7 +226,8 @@ TEST(Run, FileAndFolderInEachOthersPlaceAreRefusedBeforeTheWork) {
 TEST(Run, OutputsCanBeWrittenBesideTheirPlaces) {
   const TemporaryFolder at;
   fs::create_directory(at.path() / "staged");
-  const RunOptions staged{.reuse = true, .place = [&](const fs::path& p) { return p.parent_path() / "staged" / p.filename(); }};
+  const RunOptions staged{.reuse = true,
+                          .place = [&](const fs::path& p) { return p.parent_path() / "staged" / p.filename(); }};
   const auto results = run(chain(at.path()), staged);
   EXPECT_FALSE(fs::exists(at.path() / "image.nrrd"));
   EXPECT_TRUE(fs::exists(at.path() / "staged/mask.nrrd.prov.json"));
@@ -247,7 +254,8 @@ TEST(Run, RefusalKeepsItsDocumentAndNamesTheStage) {
 TEST(Run, TheRecordSaysWhichProgram) {
   const std::string version(program_version());
   EXPECT_TRUE(version.starts_with("0.")) << version;
-  EXPECT_TRUE(version.find(" (commit ") != std::string::npos || version.find(" (unknown commit)") != std::string::npos) << version;
+  EXPECT_TRUE(version.find(" (commit ") != std::string::npos || version.find(" (unknown commit)") != std::string::npos)
+      << version;
   const TemporaryFolder at;
   run(make_only(at.path() / "a.nrrd"));
   EXPECT_EQ(record(at.path() / "a.nrrd")["osteotome"], version);
@@ -263,17 +271,25 @@ TEST(Parse, VariablesInNamesOfFilesAreKnown) {
 }
 
 TEST(Parse, MistakesAreNamedWithThePlace) {
-  const auto what = [](const char* text) { return std::string(refusal([&] { (void)parse_pipeline(text, {}); }).what()); };
+  const auto what = [](const char* text) {
+    return std::string(refusal([&] { (void)parse_pipeline(text, {}); }).what());
+  };
   EXPECT_NE(what("{\"osteotome\": 1,\n\"stages\": [}").find("line 2"), std::string::npos);
-  EXPECT_NE(what(R"({"osteotome": 1, "stages": [{"stage": "make"}, {"stage": "make"}]})").find("two stages"), std::string::npos);
+  EXPECT_NE(what(R"({"osteotome": 1, "stages": [{"stage": "make"}, {"stage": "make"}]})").find("two stages"),
+            std::string::npos);
   EXPECT_NE(what(R"({"osteotome": 1, "stages": [{"id": "a.b", "stage": "make"}]})").find("no dots"), std::string::npos);
   EXPECT_NE(what(R"({"stages": []})").find("osteotome"), std::string::npos);
-  const auto says = [&](const char* text, const char* part) { EXPECT_NE(what(text).find(part), std::string::npos) << what(text); };
-  says("{\"osteotome\": 1,\n\"stage\": []}", "'pipeline' line 2: the key \"stage\" is not known: did you mean \"stages\"?");
-  says("{\"osteotome\": 1, \"stages\": [\n{\"stage\": \"make\",\n\"parms\": {}}]}", "line 3: stage 1: the key \"parms\" is not known");
+  const auto says = [&](const char* text, const char* part) {
+    EXPECT_NE(what(text).find(part), std::string::npos) << what(text);
+  };
+  says("{\"osteotome\": 1,\n\"stage\": []}",
+       "'pipeline' line 2: the key \"stage\" is not known: did you mean \"stages\"?");
+  says("{\"osteotome\": 1, \"stages\": [\n{\"stage\": \"make\",\n\"parms\": {}}]}",
+       "line 3: stage 1: the key \"parms\" is not known");
   says("{\"osteotome\": 1, \"stages\": [\n{\"stage\": \"make\", \"params\": {\n\"value\": {}}}]}",
        "line 3: stage 'make' parameter 'value': must be");
-  says("{\"osteotome\": 1,\n\"stages\": [{\"stage\": \"make\",\n \"in\": {\"image\": 7}}]}", "line 3: stage 'make' input 'image'");
+  says("{\"osteotome\": 1,\n\"stages\": [{\"stage\": \"make\",\n \"in\": {\"image\": 7}}]}",
+       "line 3: stage 'make' input 'image'");
   says("{\"osteotome\": 1,\n\"stages\": [{\"stage\": \"make\", \"out\": {\"image\":\n \"${where}/x\"}}]}",
        "line 3: stage 'make' output 'image': the variable 'where' has no value");
   says("{\"osteotome\": 1, \"stages\": [],\n\"stages\": []}", "line 2: the key \"stages\" is there twice");

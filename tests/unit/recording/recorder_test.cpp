@@ -47,8 +47,8 @@ class Servo {
         bone[c.voxel] = c.density;
       }
       if (next % 5000 == 4999) {
-        SceneAction a =
-            next % 2 == 0 ? SceneAction::plain(ActionKind::undo) : SceneAction::suction({1, 2, 3}, 4, static_cast<double>(next));
+        SceneAction a = next % 2 == 0 ? SceneAction::plain(ActionKind::undo)
+                                      : SceneAction::suction({1, 2, 3}, 4, static_cast<double>(next));
         a.tick = next;
         while (!reader_.actions.push(a)) std::this_thread::sleep_for(std::chrono::microseconds(200));
         ++actions;
@@ -57,8 +57,10 @@ class Servo {
       t.tick = next;
       t.voxels_changed = static_cast<std::uint32_t>(changes_a_tick);
       t.removed_mm3 = static_cast<float>(next % 100);
-      // The servo would drop what the ring has no room for; here the recorder's first thread is waited for, the disk never.
-      while (reader_.ticks.room() < 1 || !reader_.changes.push(changes)) std::this_thread::sleep_for(std::chrono::microseconds(200));
+      // The servo would drop what the ring has no room for; here the recorder's first thread is waited for, the disk
+      // never.
+      while (reader_.ticks.room() < 1 || !reader_.changes.push(changes))
+        std::this_thread::sleep_for(std::chrono::microseconds(200));
       reader_.ticks.push(t);
     }
   }
@@ -147,7 +149,8 @@ TEST(Recorder, ALongerStallIsAGapThatIsCountedAndBoneBehindItIsRight) {
     EXPECT_EQ(s.gaps[g].first_tick, gaps[g].first_tick);
     EXPECT_EQ(s.gaps[g].ticks, gaps[g].ticks);
     EXPECT_FALSE(s.gaps[g].bone_lost);
-    const auto behind = std::find_if(s.ticks.begin(), s.ticks.end(), [&](const TickRecord& t) { return t.tick > gaps[g].first_tick; });
+    const auto behind =
+        std::find_if(s.ticks.begin(), s.ticks.end(), [&](const TickRecord& t) { return t.tick > gaps[g].first_tick; });
     ASSERT_TRUE(behind != s.ticks.end() && behind != s.ticks.begin());
     EXPECT_EQ(behind->tick, gaps[g].first_tick + gaps[g].ticks);
     EXPECT_EQ(std::prev(behind)->tick + 1, gaps[g].first_tick);
@@ -252,7 +255,8 @@ TEST(Recorder, WhatTheRingHadNoRoomForIsAGapAndBoneIsWrittenAtTheEnd) {
 
 class FullDisk final : public SessionSink {
  public:
-  FullDisk(std::size_t room, bool odd, std::unique_ptr<SessionSink> file) : room_(room), odd_(odd), file_(std::move(file)) {}
+  FullDisk(std::size_t room, bool odd, std::unique_ptr<SessionSink> file)
+      : room_(room), odd_(odd), file_(std::move(file)) {}
   void write(std::span<const std::byte> bytes) override {
     if (bytes.size() > room_) {
       if (odd_) throw std::runtime_error("something unforeseen");
@@ -280,7 +284,8 @@ TEST(Recorder, AFullDiskIsToldAtOnceAndRemembered) {
         if (by_thread) recorder.start();
         servo.run(200, 10);
         if (!by_thread) recorder.drain();
-        while (by_thread && recorder.status().waiting_bytes > 0) std::this_thread::sleep_for(std::chrono::microseconds(200));
+        while (by_thread && recorder.status().waiting_bytes > 0)
+          std::this_thread::sleep_for(std::chrono::microseconds(200));
         EXPECT_FALSE(recorder.status().failure);
         // While it runs, long before anybody closes it; the ring is emptied all the same.
         for (int n = 0; n < 400; ++n) {
@@ -289,7 +294,8 @@ TEST(Recorder, AFullDiskIsToldAtOnceAndRemembered) {
         }
         while (by_thread && !recorder.status().failure) std::this_thread::sleep_for(std::chrono::microseconds(200));
         ASSERT_TRUE(recorder.status().failure);
-        EXPECT_NE(std::string(recorder.status().failure->what()).find(odd ? "unforeseen" : "No space left"), std::string::npos);
+        EXPECT_NE(std::string(recorder.status().failure->what()).find(odd ? "unforeseen" : "No space left"),
+                  std::string::npos);
         recorder.stop();
         recorder.finish({servo.next, "", "", 0, {}, 0, 0});
         EXPECT_TRUE(recorder.status().failure);
@@ -333,7 +339,8 @@ TEST(Recorder, NotesKeepTheirOrderAndWhatFindsNoRoomIsCounted) {
     std::vector<std::thread> threads;
     for (int t = 0; t < 3; ++t) {
       threads.emplace_back([&recorder, t] {
-        for (int n = 0; n < 500; ++n) recorder.note({static_cast<std::uint64_t>(n), "thread " + std::to_string(t), std::to_string(n)});
+        for (int n = 0; n < 500; ++n)
+          recorder.note({static_cast<std::uint64_t>(n), "thread " + std::to_string(t), std::to_string(n)});
       });
     }
     servo.run(3000, 5);
@@ -382,7 +389,8 @@ TEST(Recorder, NotesWaitWhileTheDiskStalls) {
   fs::remove(path);
 }
 
-// What a checkpoint holds is what came before it, the shortest way; and each action that looks at bone finds the bone it found.
+// What a checkpoint holds is what came before it, the shortest way; and each action that looks at bone finds the bone
+// it found.
 TEST(SessionFile, CheckpointsHoldTheSameSceneInLess) {
   const auto path = fresh("checkpoints");
   SessionHeader h = header();
@@ -394,7 +402,8 @@ TEST(SessionFile, CheckpointsHoldTheSameSceneInLess) {
       SessionBatch b;
       b.ticks.resize(1);
       b.ticks[0].tick = t;
-      for (int c = 0; c < 5; ++c) b.changes.push_back({static_cast<VoxelKey>(random() % 50), static_cast<float>(random() % 100)});
+      for (int c = 0; c < 5; ++c)
+        b.changes.push_back({static_cast<VoxelKey>(random() % 50), static_cast<float>(random() % 100)});
       if (t % 7 == 3) b.actions.push_back(SceneAction::plain(ActionKind::soft_push));
       if (t % 100 == 50) b.actions.push_back(SceneAction::move(static_cast<std::uint32_t>(t), {}));
       if (t % 150 == 70) b.actions.insert(b.actions.begin(), SceneAction::split(static_cast<double>(t)));
@@ -432,7 +441,8 @@ TEST(SessionFile, CheckpointsHoldTheSameSceneInLess) {
         EXPECT_EQ(*q->checkpoint, marks.back());
         break;
       }
-      for (const SceneAction& a : q->actions) EXPECT_FALSE(a.is(ActionKind::soft_push)) << "nothing of the scene follows from it";
+      for (const SceneAction& a : q->actions)
+        EXPECT_FALSE(a.is(ActionKind::soft_push)) << "nothing of the scene follows from it";
       shorter.take(*q);
     }
     EXPECT_EQ(shorter.bone, all.bone);

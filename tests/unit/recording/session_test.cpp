@@ -9,12 +9,12 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/simulation/bone/burr.h"
-#include "osteo/simulation/haptics/texture.h"
 #include "osteo/session/recording/haptic_settings.h"
 #include "osteo/session/recording/recorder.h"
 #include "osteo/session/recording/script_file.h"
 #include "osteo/session/recording/session_reader.h"
+#include "osteo/simulation/bone/burr.h"
+#include "osteo/simulation/haptics/texture.h"
 
 namespace osteo {
 namespace {
@@ -57,7 +57,8 @@ TEST(HapticSettings, HardnessIsAutomaticUnlessSaid) {
   EXPECT_EQ(loaded(R"("hardness": true)").hardness, true);
   EXPECT_EQ(loaded(R"("hardness": false)").hardness, false);
   EXPECT_FALSE(loaded(R"("hardness": "auto")").hardness.has_value());
-  EXPECT_EQ(parse_hardness(loaded("\"hardness_file\": \"" + law.filename().string() + "\"").hardness_json, "").exponent, 2);
+  EXPECT_EQ(parse_hardness(loaded("\"hardness_file\": \"" + law.filename().string() + "\"").hardness_json, "").exponent,
+            2);
   EXPECT_THROW(loaded(R"("hardness": "yes")"), Error);
   EXPECT_THROW(loaded(R"("hardness": 1)"), Error);
   std::ofstream(law) << R"({"osteotome_hardness": 1, "exponent": 20})";
@@ -87,7 +88,8 @@ TEST(SessionFile, KeepsTheLawOfHardness) {
   fs::remove(path);
 }
 
-// A texture that a case names is kept as it is felt: what the header holds is read to the same model. Without one there is no key.
+// A texture that a case names is kept as it is felt: what the header holds is read to the same model. Without one there
+// is no key.
 TEST(SessionFile, KeepsTheTexture) {
   const auto path = fresh("texture"), file = fresh("textured.json"), texture = fresh("texture.json");
   write_file(
@@ -209,7 +211,8 @@ TEST(SessionFile, CutAnywhereKeepsWhatWasWholeBefore) {
   const auto path = fresh("cut");
   {
     SessionWriter w(path, header());
-    for (std::uint64_t b = 0; b < 5; ++b) w.append({{}, some_ticks(b * 10, 10), {{static_cast<VoxelKey>(b), 0.5F}}, {}});
+    for (std::uint64_t b = 0; b < 5; ++b)
+      w.append({{}, some_ticks(b * 10, 10), {{static_cast<VoxelKey>(b), 0.5F}}, {}});
     w.finish({50, "bone", "surface", 1, {}, 0, 0});
   }
   const std::string whole = read_text(path);
@@ -270,8 +273,10 @@ TEST(Script, RoundTripAndErrorsSayWhere) {
     return "read";
   };
   EXPECT_NE(message("{}").find("\"osteotome_strokes\" is missing"), std::string::npos);
-  EXPECT_NE(message(R"({"osteotome_strokes":1,"burr":{"kind":"cutting","diameter_mm":4.5},"axis":[0,0,1],"waypoints":[]})").find("4.5 mm"),
-            std::string::npos);
+  EXPECT_NE(
+      message(R"({"osteotome_strokes":1,"burr":{"kind":"cutting","diameter_mm":4.5},"axis":[0,0,1],"waypoints":[]})")
+          .find("4.5 mm"),
+      std::string::npos);
   EXPECT_NE(
       message(
           R"({"osteotome_strokes":1,"burr":{"kind":"cutting","diameter_mm":4},"axis":[0,0,1],"waypoints":[{"t_s":1,"at_mm":[0,0,0]},{"t_s":1,"at_mm":[0,0,0]}]})")
@@ -286,7 +291,8 @@ TEST(Script, IsReadStrictlyAndErrorsSayFileAndLine) {
   const std::string burr = "  \"burr\": { \"kind\": \"cutting\", \"diameter_mm\": 3, \"shape\": \"taper\" },\n";
   const std::string axis = "  \"axis\": [0, 0, 1],\n";
   const std::string points =
-      "  \"waypoints\": [ { \"t_s\": 0, \"at_mm\": [0, 0, 8], \"drill\": false },\n{ \"t_s\": 1, \"at_mm\": [0, 0, 5] } ]";
+      "  \"waypoints\": [ { \"t_s\": 0, \"at_mm\": [0, 0, 8], \"drill\": false },\n{ \"t_s\": 1, \"at_mm\": [0, 0, 5] "
+      "} ]";
   const auto message = [&](const std::string& text) -> std::string {
     fs::remove(path);
     write_file(path, text);
@@ -298,8 +304,12 @@ TEST(Script, IsReadStrictlyAndErrorsSayFileAndLine) {
     }
     return "read";
   };
-  const auto with_points = [&](const std::string& p) { return message(head + burr + axis + "  \"waypoints\": [\n" + p + "\n] }"); };
-  const auto with_action = [&](const std::string& a) { return message(head + burr + axis + points + ",\n\"actions\": [\n" + a + "\n] }"); };
+  const auto with_points = [&](const std::string& p) {
+    return message(head + burr + axis + "  \"waypoints\": [\n" + p + "\n] }");
+  };
+  const auto with_action = [&](const std::string& a) {
+    return message(head + burr + axis + points + ",\n\"actions\": [\n" + a + "\n] }");
+  };
   ASSERT_EQ(message(head + burr + axis + points + "}"), "read");
   const Script script = load_script(path);
   EXPECT_EQ(script.tool, burr_index(BurrKind::cutting, 3, BurrShape::taper));
@@ -319,48 +329,59 @@ TEST(Script, IsReadStrictlyAndErrorsSayFileAndLine) {
   expect(message(head + burr + "  \"axis\": [0, 0, 0],\n" + points + "}"), "3", "has no length");
   expect(message(head + "\"burr\": { \"kind\": \"tungsten\", \"diameter_mm\": 4 },\n" + axis + points + "}"), "2",
          "burr: \"kind\": 'tungsten' is not one of cutting, diamond");
-  expect(message(head + "\"burr\": { \"kind\": \"cutting\", \"diameter_mm\": 4,\n\"shape\": \"cube\" },\n" + axis + points + "}"), "3",
-         "'cube' is not one of ball");
-  expect(message(head + "\"burr\": { \"kind\": \"cutting\", \"diameter_mm\": 2.5 },\n" + axis + points + "}"), "2", "no burr of 2.5 mm");
+  expect(message(head + "\"burr\": { \"kind\": \"cutting\", \"diameter_mm\": 4,\n\"shape\": \"cube\" },\n" + axis +
+                 points + "}"),
+         "3", "'cube' is not one of ball");
+  expect(message(head + "\"burr\": { \"kind\": \"cutting\", \"diameter_mm\": 2.5 },\n" + axis + points + "}"), "2",
+         "no burr of 2.5 mm");
   expect(message("{ \"osteotome_strokes\": 2,\n" + burr + axis + points + "}"), "1", "\"osteotome_strokes\" is 2");
   expect(message(head + burr + axis + points + ",\n}"), "6", "not valid JSON");
-  expect(message(head + burr + axis + points + ", \"camera\": { \"centre_mm\": [0, 0, 0], \"radius_mm\": -2, \"eye\": [1, 0, 0] } }"), "5",
-         "camera: \"radius_mm\" is -2");
+  expect(message(head + burr + axis + points +
+                 ", \"camera\": { \"centre_mm\": [0, 0, 0], \"radius_mm\": -2, \"eye\": [1, 0, 0] } }"),
+         "5", "camera: \"radius_mm\" is -2");
   // Waypoints.
   expect(with_points("{ \"t_s\": 0, \"at_mm\": [0, 0, 8],\n\"drill_on\": false }"), "6",
          "waypoint 1: the key \"drill_on\" is not known: did you mean \"drill\"?");
   expect(with_points("{ \"t_s\": 0, \"at_mm\": [0, 0, 8], \"dril\": false }"), "5", "did you mean \"drill\"?");
-  expect(with_points("{ \"t_s\": 1e12, \"at_mm\": [0, 0, 8] }"), "5", "\"t_s\" is 1e+12 but must be between 0 s and 21600 s");
+  expect(with_points("{ \"t_s\": 1e12, \"at_mm\": [0, 0, 8] }"), "5",
+         "\"t_s\" is 1e+12 but must be between 0 s and 21600 s");
   expect(with_points("{ \"t_s\": -1, \"at_mm\": [0, 0, 8] }"), "5", "\"t_s\" is -1");
   expect(with_points("{ \"t_s\": 1, \"at_mm\": [1e300, 0, 8] }"), "5", "\"at_mm\" is 1e+300 but must be");
   expect(with_points("{ \"t_s\": 1, \"at_mm\": [NaN, 0, 8] }"), "5", "not valid JSON");
   expect(with_points("{ \"t_s\": 1, \"at_mm\": [0, 8] }"), "5", "must be three numbers");
   expect(with_points("{ \"t_s\": 1 }"), "5", "waypoint 1: \"at_mm\" is missing");
-  expect(with_points("{ \"t_s\": 1, \"at_mm\": [0, 0, 0] },\n{ \"t_s\": 0.5, \"at_mm\": [0, 0, 0] }"), "6", "waypoint 2: times must rise");
+  expect(with_points("{ \"t_s\": 1, \"at_mm\": [0, 0, 0] },\n{ \"t_s\": 0.5, \"at_mm\": [0, 0, 0] }"), "6",
+         "waypoint 2: times must rise");
   expect(with_points(""), "4", "there are no waypoints");
   expect(with_points("{ \"t_s\": 0, \"at_mm\": [0, 0, 0] }"), "4", "takes no time");
   const std::string cavity = "{ \"t_s\": 1, \"cavity\": { \"centre_mm\": [0, 0, 0], \"towards\": [0, 0, -1], ";
   EXPECT_EQ(with_points(cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4 } }"), "read");
-  expect(with_points(cavity + "\"radius_mm\": -3, \"depth_mm\": 2, \"over_s\": 4 } }"), "5", "waypoint 1, cavity: \"radius_mm\" is -3");
+  expect(with_points(cavity + "\"radius_mm\": -3, \"depth_mm\": 2, \"over_s\": 4 } }"), "5",
+         "waypoint 1, cavity: \"radius_mm\" is -3");
   expect(with_points(cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 1e9 } }"), "5", "\"over_s\" is 1e+09");
-  expect(with_points(cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4, \"turns\": 2 } }"), "5", "did you mean \"turns_per_s\"?");
-  expect(with_points(cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4 }, \"at_mm\": [0, 0, 0] }"), "5", "\"at_mm\" is not known");
-  expect(with_points("{ \"t_s\": 2, \"at_mm\": [0, 0, 0] },\n" + cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4 } }"), "6",
-         "times must rise");
-  expect(with_points("{ \"t_s\": 1, \"cavity\": { \"centre_mm\": [0, 0, 0], \"towards\": [0, 0, 0], \"radius_mm\": 3, \"depth_mm\": 2, "
+  expect(with_points(cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4, \"turns\": 2 } }"), "5",
+         "did you mean \"turns_per_s\"?");
+  expect(with_points(cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4 }, \"at_mm\": [0, 0, 0] }"), "5",
+         "\"at_mm\" is not known");
+  expect(with_points("{ \"t_s\": 2, \"at_mm\": [0, 0, 0] },\n" + cavity +
+                     "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4 } }"),
+         "6", "times must rise");
+  expect(with_points("{ \"t_s\": 1, \"cavity\": { \"centre_mm\": [0, 0, 0], \"towards\": [0, 0, 0], \"radius_mm\": 3, "
+                     "\"depth_mm\": 2, "
                      "\"over_s\": 4 } }"),
          "5", "\"towards\" is a direction");
   // Actions.
-  expect(with_action(
-             "{ \"t_s\": 0.1, \"split\": {} },\n{ \"t_s\": 0.2, \"saw\": { \"at_mm\": [0, 0, 0], \"normal\": [1, 0, 0],\n\"kerf\": 3 } }"),
+  expect(with_action("{ \"t_s\": 0.1, \"split\": {} },\n{ \"t_s\": 0.2, \"saw\": { \"at_mm\": [0, 0, 0], \"normal\": "
+                     "[1, 0, 0],\n\"kerf\": 3 } }"),
          "9", "action 2, saw: the key \"kerf\" is not known: did you mean \"kerf_mm\"?");
   const std::string saw = "{ \"t_s\": 0.2, \"saw\": { \"at_mm\": [0, 0, 0], \"normal\": [1, 0, 0], ";
   EXPECT_EQ(with_action(saw + "\"kerf_mm\": 1, \"length_mm\": 0, \"depth_mm\": 5, \"piece\": 2 } }"), "read");
-  for (const std::string bad :
-       {"\"kerf_mm\": 100", "\"kerf_mm\": 0", "\"length_mm\": -5", "\"depth_mm\": -1", "\"piece\": -2", "\"piece\": 1.5"})
+  for (const std::string bad : {"\"kerf_mm\": 100", "\"kerf_mm\": 0", "\"length_mm\": -5", "\"depth_mm\": -1",
+                                "\"piece\": -2", "\"piece\": 1.5"})
     expect(with_action(saw + bad + " } }"), "7", "action 1, saw: \"" + bad.substr(1, bad.find('"', 1) - 1) + "\"");
   expect(with_action(saw + "\"along\": [2, 0, 0] } }"), "7", "\"along\" lies along \"normal\"");
-  expect(with_action("{ \"t_s\": 0.2, \"saw\": { \"at_mm\": [0, 0, 0], \"normal\": [0, 0, 0] } }"), "7", "\"normal\" is a direction");
+  expect(with_action("{ \"t_s\": 0.2, \"saw\": { \"at_mm\": [0, 0, 0], \"normal\": [0, 0, 0] } }"), "7",
+         "\"normal\" is a direction");
   expect(with_action("{ \"t_s\": 0.2, \"split\": {}, \"undo\": {} }"), "7", "more than one thing");
   expect(with_action("{ \"t_s\": 0.2 }"), "7", "nothing that can be done");
   expect(with_action("{ \"split\": {} }"), "7", "action 1: \"t_s\" is missing");
@@ -369,10 +390,13 @@ TEST(Script, IsReadStrictlyAndErrorsSayFileAndLine) {
   expect(with_action("{ \"t_s\": 0.2, \"undo\": true }"), "7", "must be an object");
   expect(with_action("{ \"t_s\": 0.2, \"move\": { \"piece\": 0, \"over_s\": -1 } }"), "7", "\"over_s\" is -1");
   expect(with_action("{ \"t_s\": 0.2, \"move\": { \"piece\": 0, \"over_s\": 1e9 } }"), "7", "\"over_s\" is 1e+09");
-  expect(with_action("{ \"t_s\": 0.2, \"move\": { \"piece\": 0, \"axis\": [0, 0, 0] } }"), "7", "\"axis\" is a direction");
-  expect(with_action("{ \"t_s\": 0.2, \"attach\": { \"plate\": \"tin\", \"at_mm\": [0, 0, 0], \"pieces\": [0] } }"), "7", "tin");
+  expect(with_action("{ \"t_s\": 0.2, \"move\": { \"piece\": 0, \"axis\": [0, 0, 0] } }"), "7",
+         "\"axis\" is a direction");
+  expect(with_action("{ \"t_s\": 0.2, \"attach\": { \"plate\": \"tin\", \"at_mm\": [0, 0, 0], \"pieces\": [0] } }"),
+         "7", "tin");
   for (const std::string pieces : {"[]", "[0, 1, 2]", "[1, 1]"})
-    expect(with_action("{ \"t_s\": 0.2, \"attach\": { \"plate\": \"miniplate-4\", \"at_mm\": [0, 0, 0], \"pieces\": " + pieces + " } }"),
+    expect(with_action("{ \"t_s\": 0.2, \"attach\": { \"plate\": \"miniplate-4\", \"at_mm\": [0, 0, 0], \"pieces\": " +
+                       pieces + " } }"),
            "7", "\"pieces\" are one, or two");
   expect(with_action("{ \"t_s\": 0.2, \"suction\": { \"at_mm\": [0, 0, 0], \"radius_mm\": 150 } }"), "7",
          "\"radius_mm\" is 150 but must be");
@@ -400,7 +424,8 @@ TEST(Script, MovesGoOnFromWhereThePieceIs) {
   fs::remove(path);
 }
 
-// Schema and reader go by one declaration: every range that the schema tells is the reader's, every key it does not know is refused.
+// Schema and reader go by one declaration: every range that the schema tells is the reader's, every key it does not
+// know is refused.
 TEST(Script, SchemaAndReaderAgree) {
   const auto schema = nlohmann::json::parse(script_schema());
   const auto path = fresh("schema.json");
@@ -414,8 +439,8 @@ TEST(Script, SchemaAndReaderAgree) {
     }
     return true;
   };
-  const nlohmann::json whole =
-      nlohmann::json::parse(R"({"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 4}, "axis": [0, 0, 1],
+  const nlohmann::json whole = nlohmann::json::parse(
+      R"({"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 4}, "axis": [0, 0, 1],
       "waypoints": [{"t_s": 1, "at_mm": [0, 0, 0]}]})");
   ASSERT_TRUE(taken(whole));
   for (const auto& key : schema["required"]) {
@@ -485,7 +510,8 @@ TEST(HapticSettings, ErrorsSayFileAndLine) {
     }
     return "read";
   };
-  EXPECT_EQ(message("{ \"osteotome_haptics\": 1, // as printed\n\"stiffness_n_per_mm\": 2, \"hardness\": false, \"tools\": { \"diamond\": "
+  EXPECT_EQ(message("{ \"osteotome_haptics\": 1, // as printed\n\"stiffness_n_per_mm\": 2, \"hardness\": false, "
+                    "\"tools\": { \"diamond\": "
                     "\"proxy\" } }"),
             "read");
   for (const auto& [members, says] : {std::pair{"\"stifness_n_per_mm\": 2", "did you mean \"stiffness_n_per_mm\"?"},

@@ -9,9 +9,9 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/session/recording/export.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/bone/plates.h"
-#include "osteo/session/recording/export.h"
 #include "other_session.h"
 
 namespace osteo {
@@ -46,7 +46,8 @@ std::vector<TickRecord> some_ticks(std::uint64_t first, std::size_t n) {
 }
 
 bool has(const std::vector<std::string>& lines, const std::string& word) {
-  return std::any_of(lines.begin(), lines.end(), [&](const std::string& l) { return l.find(word) != std::string::npos; });
+  return std::any_of(lines.begin(), lines.end(),
+                     [&](const std::string& l) { return l.find(word) != std::string::npos; });
 }
 
 std::string refusal(const fs::path& path) {
@@ -67,7 +68,8 @@ TEST(Versions, ALaterSessionIsReadByThisVersion) {
     test::OtherWriter w(path, header("later"), test::with_pulse(), [](ordered_json& j) {
       j["instruments"].push_back({{"name", "laser 1 mm"}, {"kind", "laser"}});
       j["actions"]["99"] = "glue";
-      j["records"]["nerve"] = {{"part", 9}, {"fields", {{{"name", "v_mv"}, {"type", "f64"}, {"unit", "mV"}, {"role", "result"}}}}};
+      j["records"]["nerve"] = {{"part", 9},
+                               {"fields", {{{"name", "v_mv"}, {"type", "f64"}, {"unit", "mV"}, {"role", "result"}}}}};
       j["what comes next"] = {1, 2, 3};
     });
     SceneAction glue;
@@ -87,7 +89,8 @@ TEST(Versions, ALaterSessionIsReadByThisVersion) {
   }
   const Session s = read_session(path);
   ASSERT_EQ(s.ticks.size(), 53u);
-  for (std::size_t i = 0; i < ticks.size(); ++i) ASSERT_EQ(first_difference(s.tick_fields, &s.ticks[i], &ticks[i]), nullptr) << i;
+  for (std::size_t i = 0; i < ticks.size(); ++i)
+    ASSERT_EQ(first_difference(s.tick_fields, &s.ticks[i], &ticks[i]), nullptr) << i;
   EXPECT_EQ(s.ticks[5].work_us, 3.25F) << "fields behind the added one too";
   ASSERT_EQ(s.actions.size(), 1u);
   EXPECT_EQ(s.actions[0].action.kind, 99u);
@@ -96,7 +99,8 @@ TEST(Versions, ALaterSessionIsReadByThisVersion) {
   EXPECT_EQ(s.notes[0].kind, "twitch");
   EXPECT_EQ(s.notes[0].json, "{\"mv\":0.5}");
   EXPECT_TRUE(s.end);
-  EXPECT_TRUE(has(s.newer, "pulse_bpm") && has(s.newer, "'nerve'") && has(s.newer, "1 frame of a kind 42")) << s.newer.size();
+  EXPECT_TRUE(has(s.newer, "pulse_bpm") && has(s.newer, "'nerve'") && has(s.newer, "1 frame of a kind 42"))
+      << s.newer.size();
   EXPECT_EQ(s.newer.size(), 3u);
   EXPECT_EQ(s.not_replayable, "") << "the servo was not fed with what is new";
   EXPECT_EQ(s.tools.size(), instrument_library().size()) << "a laser that nobody took is no matter";
@@ -246,16 +250,20 @@ TEST(Versions, WhatTheServoCannotRepeatIsSaid) {
   EXPECT_EQ(why(test::tick_fields()), "");
   EXPECT_NE(why(test::with_pulse(FieldRole::input)).find("'pulse_bpm'"), std::string::npos);
   EXPECT_NE(why(test::without("buttons")).find("'buttons'"), std::string::npos);
-  EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) { j["kernels"]["contact"] = 1000; }).find("other bits"), std::string::npos);
+  EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) { j["kernels"]["contact"] = 1000; }).find("other bits"),
+            std::string::npos);
   EXPECT_NE(why(test::tick_fields(),
                 [](ordered_json& j) {
                   j["hands"] = 5;
-                  while (j["haptics"]["devices"].size() < 5) j["haptics"]["devices"].push_back(j["haptics"]["devices"][0]);
+                  while (j["haptics"]["devices"].size() < 5)
+                    j["haptics"]["devices"].push_back(j["haptics"]["devices"][0]);
                 })
                 .find("5 hands"),
             std::string::npos);
-  EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) { j["haptics"]["params"]["magic"] = "2"; }).find("'magic'"), std::string::npos);
-  EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) { j["haptics"]["params"]["method"] = "magic"; }).find("magic"), std::string::npos);
+  EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) { j["haptics"]["params"]["magic"] = "2"; }).find("'magic'"),
+            std::string::npos);
+  EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) { j["haptics"]["params"]["method"] = "magic"; }).find("magic"),
+            std::string::npos);
   fs::remove(path);
 }
 
@@ -290,7 +298,8 @@ TEST(Versions, OtherFormatsAreRefusedWithAdvice) {
   EXPECT_NE(refusal(path).find("format 1"), std::string::npos);
   EXPECT_NE(refusal(path).find("use the version it was recorded with"), std::string::npos);
   {
-    test::OtherWriter w(path, header("osteotome 9"), test::tick_fields(), [](ordered_json& j) { j["osteotome_session"] = 3; });
+    test::OtherWriter w(path, header("osteotome 9"), test::tick_fields(),
+                        [](ordered_json& j) { j["osteotome_session"] = 3; });
   }
   EXPECT_NE(refusal(path).find("format 3, recorded by osteotome 9"), std::string::npos) << refusal(path);
   {
@@ -321,7 +330,8 @@ TEST(Versions, FramesThatDoNotHoldWhatTheySay) {
     fill(w);
     return refusal(path);
   };
-  EXPECT_NE(with([](auto& w) { w.frame(2, 0, 1, "not compressed"); }).find("cannot be decompressed"), std::string::npos);
+  EXPECT_NE(with([](auto& w) { w.frame(2, 0, 1, "not compressed"); }).find("cannot be decompressed"),
+            std::string::npos);
   EXPECT_NE(with([](auto& w) {
               w.part(1, 1000, std::vector<std::byte>(50));
               w.end_frame(2, 0, 1000);
@@ -381,7 +391,8 @@ TEST(Records, EveryBitComesBack) {
       get_records(file, bytes, n, out.data(), table->memory_bytes);
       // What no field covers is not written: a change's density before it (4 bytes), an action's padding.
       std::vector<std::uint8_t> covered(table->memory_bytes);
-      for (const RecordField& f : table->fields) std::fill_n(covered.begin() + f.offset, size_of(f.type), std::uint8_t{1});
+      for (const RecordField& f : table->fields)
+        std::fill_n(covered.begin() + f.offset, size_of(f.type), std::uint8_t{1});
       const auto left_out = static_cast<std::size_t>(std::count(covered.begin(), covered.end(), 0));
       EXPECT_EQ(left_out, table == &change_table() ? 4U : table == &tick_table() ? 0U : 4U) << table->name;
       auto* const bytes_in = reinterpret_cast<std::uint8_t*>(in.data());

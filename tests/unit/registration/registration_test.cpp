@@ -83,12 +83,13 @@ TEST_P(PhantomPair, IsFoundToAThirdOfAMillimetre) {
   const Registration r = register_scans(first(), second, p);
   const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const double error = target_error_mm(c.second.second_from_first, r.second_from_first, {0, 0, 0}, 60);
-  std::printf("%s: target %.3f mm, there and back %.3f, edges median %.2f p90 %.2f found %.2f, overlap %.2f, %.2f s\n", c.name, error,
-              r.inverse_mm, r.residual.median_mm, r.residual.p90_mm, r.residual.found, r.overlap, s);
+  std::printf("%s: target %.3f mm, there and back %.3f, edges median %.2f p90 %.2f found %.2f, overlap %.2f, %.2f s\n",
+              c.name, error, r.inverse_mm, r.residual.median_mm, r.residual.p90_mm, r.residual.found, r.overlap, s);
   EXPECT_LT(error, 0.3);
   EXPECT_LT(r.inverse_mm, 0.5);
   EXPECT_GT(r.residual.found, 0.6);
-  // Thick slices and MR are tried in a mirror too. The phantom's sides are alike, so it is no worse there, but no better either.
+  // Thick slices and MR are tried in a mirror too. The phantom's sides are alike, so it is no worse there, but no
+  // better either.
   if (r.mirror_tried) {
     EXPECT_GT(r.mirror.median_mm, 0.8 * r.residual.median_mm);
   }
@@ -97,14 +98,18 @@ TEST_P(PhantomPair, IsFoundToAThirdOfAMillimetre) {
 INSTANTIATE_TEST_SUITE_P(
     Register, PhantomPair,
     testing::Values(
-        PairCase{"turned30", {.second_from_first = motion({1, 2, -1}, 30, {40, -25, 15}), .spacing_mm = {2, 2, 2}}, RegisterMethod::mutual},
+        PairCase{"turned30",
+                 {.second_from_first = motion({1, 2, -1}, 30, {40, -25, 15}), .spacing_mm = {2, 2, 2}},
+                 RegisterMethod::mutual},
         PairCase{"thick_drilled",
                  {.second_from_first = motion({0, 1, 3}, -20, {-30, 10, 38}),
                   .spacing_mm = {1.5, 1.5, 3},
                   .cavity_mm = {58, 12, -20},
                   .cavity_radius_mm = 12},
                  RegisterMethod::mutual},
-        PairCase{"thick5", {.second_from_first = motion({1, 1, 0}, 10, {5, 8, 10}), .spacing_mm = {2, 2, 5}}, RegisterMethod::mutual},
+        PairCase{"thick5",
+                 {.second_from_first = motion({1, 1, 0}, 10, {5, 8, 10}), .spacing_mm = {2, 2, 5}},
+                 RegisterMethod::mutual},
         PairCase{"mr4",
                  {.second_from_first = motion({1, 1, 0}, 10, {5, 8, 10}), .spacing_mm = {2, 2, 4}, .air = 30},
                  RegisterMethod::mutual,
@@ -124,8 +129,8 @@ INSTANTIATE_TEST_SUITE_P(
 std::string refusal(const Image& a, const Image& b, const RegisterParams& p = {}) {
   try {
     const Registration r = register_scans(a, b, p);
-    std::printf("accepted: edges median %.2f p90 %.2f found %.2f points %d, back %.2f, overlap %.2f\n", r.residual.median_mm,
-                r.residual.p90_mm, r.residual.found, r.residual.points, r.inverse_mm, r.overlap);
+    std::printf("accepted: edges median %.2f p90 %.2f found %.2f points %d, back %.2f, overlap %.2f\n",
+                r.residual.median_mm, r.residual.p90_mm, r.residual.found, r.residual.points, r.inverse_mm, r.overlap);
     return "accepted";
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::failed);
@@ -179,10 +184,12 @@ TEST(RegisterRefuses, TheOtherSide) {
   const Box left = find_region(first(), {.region = Region::left_temporal}),
             right = find_region(first(), {.region = Region::right_temporal});
   EXPECT_NE(refusal(crop(first(), left), crop(clean().ct, right)), "accepted");
-  EXPECT_NE(refusal(crop(first(), left), mirrored(crop(first(), left))), "accepted") << "as if a file had left and right changed";
+  EXPECT_NE(refusal(crop(first(), left), mirrored(crop(first(), left))), "accepted")
+      << "as if a file had left and right changed";
 }
 
-// A file with left and right exchanged, of a head whose sides are nearly alike: half of all edges meet to half a millimetre.
+// A file with left and right exchanged, of a head whose sides are nearly alike: half of all edges meet to half a
+// millimetre.
 TEST(RegisterRefuses, AMirroredRealSkull) {
   const auto data = std::filesystem::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom" / "S21570" / "S2030";
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "no real skull phantom at hand";
@@ -194,7 +201,8 @@ TEST(RegisterRefuses, AMirroredRealSkull) {
 
 TEST(RegisterRefuses, NoOverlap) {
   // The vault and the chin: whatever lies upon what, it is not the same.
-  const Image top = crop(first(), {{-90, -110, 55}, {90, 110, 95}}), chin = crop(first(), {{-60, -110, -115}, {60, -20, -70}});
+  const Image top = crop(first(), {{-90, -110, 55}, {90, 110, 95}}),
+              chin = crop(first(), {{-60, -110, -115}, {60, -20, -70}});
   EXPECT_NE(refusal(top, chin), "accepted");
 }
 
@@ -202,7 +210,8 @@ TEST(RegisterRefuses, TooLittleToGoBy) {
   Image air = first();
   const auto v = make_voxels<std::int16_t>(air.frame.voxel_count());
   std::mt19937 random(3);
-  for (std::size_t i = 0; i < air.frame.voxel_count(); ++i) v[i] = static_cast<std::int16_t>(-1000 + static_cast<int>(random() % 40));
+  for (std::size_t i = 0; i < air.frame.voxel_count(); ++i)
+    v[i] = static_cast<std::int16_t>(-1000 + static_cast<int>(random() % 40));
   air.voxels = v;
   EXPECT_NE(refusal(first(), air), "accepted");
   RegisterParams p;
@@ -259,7 +268,8 @@ TEST(Register, LabelsAndValuesAreCarriedOver) {
   const Image moved = moved_onto(first().frame, second, s.second_from_first);
   double off = 0;
   std::size_t n = 0;
-  for (std::size_t i = 0; i < moved.frame.voxel_count(); i += 7, ++n) off += std::abs(moved.voxels[i] - clean().ct.voxels[i]);
+  for (std::size_t i = 0; i < moved.frame.voxel_count(); i += 7, ++n)
+    off += std::abs(moved.voxels[i] - clean().ct.voxels[i]);
   EXPECT_LT(off / static_cast<double>(n), 25);
   // Outside the second scan there is air.
   const Labels nothing = moved_onto(first().frame, labels, motion({1, 0, 0}, 0, {5000, 0, 0}));
@@ -278,7 +288,8 @@ TEST(Register, ItkTransformHoldsTheMatrixByRows) {
   std::array<double, 12> m{};
   for (double& x : m) ASSERT_TRUE(numbers >> x);
   const Vec3 p{10, -20, 30}, q = t(p);
-  for (std::size_t r = 0; r < 3; ++r) EXPECT_NEAR(m[3 * r] * p.x + m[3 * r + 1] * p.y + m[3 * r + 2] * p.z + m[9 + r], q[r], 1e-9);
+  for (std::size_t r = 0; r < 3; ++r)
+    EXPECT_NEAR(m[3 * r] * p.x + m[3 * r + 1] * p.y + m[3 * r + 2] * p.z + m[9 + r], q[r], 1e-9);
 }
 
 TEST(Register, CheckerboardShowsBoth) {
@@ -295,7 +306,8 @@ TEST(Register, CheckerboardShowsBoth) {
 TEST(Register, RealSkullStraightAndTilted) {
   const auto data = std::filesystem::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom";
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "no real skull phantom at hand";
-  const Image straight = import_ct(data / "S21570" / "S2030", {}).image, tilted = import_ct(data / "S21610" / "S2010", {}).image;
+  const Image straight = import_ct(data / "S21570" / "S2030", {}).image,
+              tilted = import_ct(data / "S21610" / "S2010", {}).image;
   std::array<RigidTransform, 2> found;
   for (const RegisterMethod method : {RegisterMethod::mutual, RegisterMethod::surface}) {
     RegisterParams p;
@@ -304,10 +316,11 @@ TEST(Register, RealSkullStraightAndTilted) {
     const Registration r = register_scans(straight, tilted, p);
     const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     std::printf(
-        "method %d: turned %.2f deg, moved %.2f mm, there and back %.3f, edges %.2f p90 %.2f found %.2f, surface %.3f p95 %.3f shape %.3f, "
+        "method %d: turned %.2f deg, moved %.2f mm, there and back %.3f, edges %.2f p90 %.2f found %.2f, surface %.3f "
+        "p95 %.3f shape %.3f, "
         "shift %.3f, %.2f s\n",
-        static_cast<int>(method), r.rotation_deg, r.shift_mm, r.inverse_mm, r.residual.median_mm, r.residual.p90_mm, r.residual.found,
-        r.surface_mean_mm, r.surface_p95_mm, r.surface_shape_mm, r.boundary_shift_mm, s);
+        static_cast<int>(method), r.rotation_deg, r.shift_mm, r.inverse_mm, r.residual.median_mm, r.residual.p90_mm,
+        r.residual.found, r.surface_mean_mm, r.surface_p95_mm, r.surface_shape_mm, r.boundary_shift_mm, s);
     EXPECT_LT(r.inverse_mm, 0.3);
     EXPECT_LT(r.residual.median_mm, 0.5);
     found[static_cast<std::size_t>(method)] = r.second_from_first;

@@ -60,7 +60,8 @@ TEST(Sheet, ADrawingIsTheSameLinesInBoth) {
   d.text(50, 25, "a < b", 8, {0, 0, 0}, 0);
   const std::string svg = svg_of(d);
   EXPECT_NE(svg.find("aria-label=\"force &quot;over&quot; time\""), std::string::npos);
-  EXPECT_NE(svg.find("<path d=\"M0 0L10.12 20\" fill=\"none\" stroke=\"#ff0000\" stroke-width=\"2\""), std::string::npos);
+  EXPECT_NE(svg.find("<path d=\"M0 0L10.12 20\" fill=\"none\" stroke=\"#ff0000\" stroke-width=\"2\""),
+            std::string::npos);
   EXPECT_NE(svg.find("<path d=\"M1 2L4 2L4 6L1 6Z\" fill=\"#0000ff\" opacity=\"0.5\"/>"), std::string::npos);
   EXPECT_NE(svg.find("text-anchor=\"middle\">a &lt; b</text>"), std::string::npos);
   Sheet s = example();
@@ -124,7 +125,8 @@ TEST(Sheet, IsMadeSmallerBeforeItIsLonger) {
 
 TEST(Sheet, ASignatureChangesNothingElse) {
   Sheet open = example(100), closed = example(100);
-  closed.blocks.back() = {sheet::Signature{"A. Łukasiewicz", "2031-02-03", std::string(300, 'w') + " long", "approved", Tone::good}};
+  closed.blocks.back() = {
+      sheet::Signature{"A. Łukasiewicz", "2031-02-03", std::string(300, 'w') + " long", "approved", Tone::good}};
   EXPECT_NE(sheet_html(open), sheet_html(closed));
   EXPECT_EQ(html_without_signature(sheet_html(open)), html_without_signature(sheet_html(closed)));
   closed.footer += ".";

@@ -6,12 +6,12 @@
 #include <cmath>
 
 #include "evidence/scene.h"
+#include "osteo/assessment/review/heat_sheet.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/simulation/bone/instrument.h"
-#include "osteo/geometry/grid/brick_places.h"
-#include "osteo/assessment/review/heat_sheet.h"
 #include "osteo/display/view/stills.h"
+#include "osteo/geometry/grid/brick_places.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "scene_parts.h"
 #include "scratch.h"
 
@@ -46,17 +46,19 @@ Review example() {
   r.findings = findings_of(r.score, nullptr, nullptr);
   r.timeline.known.assign(120, 1);
   r.timeline.drilling.assign(120, 1);
-  for (auto* const v : {&r.timeline.force_n, &r.timeline.speed_mm_s, &r.timeline.distance_mm, &r.timeline.removed_mm3, &r.timeline.seen_mm3,
-                        &r.timeline.hidden_mm3, &r.timeline.unknown_mm3})
+  for (auto* const v : {&r.timeline.force_n, &r.timeline.speed_mm_s, &r.timeline.distance_mm, &r.timeline.removed_mm3,
+                        &r.timeline.seen_mm3, &r.timeline.hidden_mm3, &r.timeline.unknown_mm3})
     v->assign(120, 0.5F);
   r.timeline.structure.assign(120, 6);
   r.timeline.tool.assign(120, 0);
   r.timeline.at_mm.assign(120, {1, 2, 3});
   r.timeline.structure_names[6] = "facial nerve";
-  r.timeline.events = {{EventKind::injury, 3, 3.4, "a turning burr reached the facial nerve", "facial nerve", true, {1, 2, 3}},
-                       {EventKind::note, 5, 5, "note: </script><script>alert(1)</script>", {}, false, {}}};
-  r.pictures = {
-      {"before", "Before", grey(32, 24)}, {"after", "After", grey(32, 24)}, {"injury-facial-nerve", "the nerve \"here\"", grey(32, 24)}};
+  r.timeline.events = {
+      {EventKind::injury, 3, 3.4, "a turning burr reached the facial nerve", "facial nerve", true, {1, 2, 3}},
+      {EventKind::note, 5, 5, "note: </script><script>alert(1)</script>", {}, false, {}}};
+  r.pictures = {{"before", "Before", grey(32, 24)},
+                {"after", "After", grey(32, 24)},
+                {"injury-facial-nerve", "the nerve \"here\"", grey(32, 24)}};
   TriMesh m = review::dots_at({{1, 2, 3}}, 1, 10);
   r.meshes = {{"after", "bone, after", {237, 224, 196}, m}};
   r.hidden_mm3 = 31;
@@ -74,8 +76,8 @@ TEST(ReviewPage, SaysWhatWasFoundAndAsksForNothing) {
   EXPECT_LT(html.find("Scripted"), html.find("A turning burr"));
   EXPECT_LT(html.find("id=\"finding-injury-facial-nerve\""), html.find("id=\"finding-hidden\""));
   EXPECT_EQ(count(html, "http"), 1U);  // http-equiv
-  for (const char* const way :
-       {"//cdn", "url(", "@import", "<link", "<iframe", "fetch(", "XMLHttpRequest", "import(", "WebSocket", "sendBeacon"})
+  for (const char* const way : {"//cdn", "url(", "@import", "<link", "<iframe", "fetch(", "XMLHttpRequest", "import(",
+                                "WebSocket", "sendBeacon"})
     EXPECT_EQ(html.find(way), std::string::npos) << way;
   // Pictures: each with what is read aloud, inside the page.
   EXPECT_EQ(count(html, "<img "), 3U);
@@ -99,7 +101,8 @@ TEST(ReviewPage, ItsDataCanBeReadAndMeshesAreWhole) {
   const auto data = Json::parse(html.substr(from, html.find("</script>", from) - from));
   ASSERT_TRUE(data);
   EXPECT_EQ(*data->find("timeline")->find("samples")->number(), 120);
-  EXPECT_EQ(*data->find("timeline")->find("events")->items()[1].find("what")->text(), "note: </script><script>alert(1)</script>");
+  EXPECT_EQ(*data->find("timeline")->find("events")->items()[1].find("what")->text(),
+            "note: </script><script>alert(1)</script>");
   const Json& mesh = data->find("meshes")->items()[0];
   EXPECT_EQ(*mesh.find("count")->number(), 3 * 2 * 32 * 15);
   EXPECT_EQ(mesh.find("points")->text()->size(), (17 * 32 * 3 * 2 + 2) / 3 * 4U);
@@ -108,14 +111,15 @@ TEST(ReviewPage, ItsDataCanBeReadAndMeshesAreWhole) {
 
 TEST(ReviewPage, HardCasesHaveAWord) {
   Review nothing;
-  nothing.score.values = {measured("duration_s", 0), measured("removed_mm3", 0), not_measured("seen_share", "nothing was removed"),
+  nothing.score.values = {measured("duration_s", 0), measured("removed_mm3", 0),
+                          not_measured("seen_share", "nothing was removed"),
                           not_measured("touches", "the case has no structures")};
   nothing.score.words = {"nothing was removed"};
   nothing.findings = findings_of(nothing.score, nullptr, nullptr);
   nothing.left_out = {"pictures and the view in 3D were not asked for"};
   const std::string html = review_html(nothing);
-  for (const char* const said : {"No bone was removed.", "Nothing was recorded.", "the case has no structures", "There is nothing to tell.",
-                                 "pictures and the view in 3D were not asked for"})
+  for (const char* const said : {"No bone was removed.", "Nothing was recorded.", "the case has no structures",
+                                 "There is nothing to tell.", "pictures and the view in 3D were not asked for"})
     EXPECT_NE(html.find(said), std::string::npos) << said;
   EXPECT_EQ(html.find("<canvas"), std::string::npos);
   EXPECT_EQ(html.find("id=\"comparison\""), std::string::npos);
@@ -139,7 +143,8 @@ TEST(ReviewFolder, IsWrittenWholeAndReplacesOnlyAReview) {
   const test::ScratchFolder scratch;
   const Review r = example();
   write_review(r, scratch / "r", false);
-  for (const char* const file : {"review.html", "review.json", "review.pdf"}) EXPECT_TRUE(fs::exists(scratch / "r" / file)) << file;
+  for (const char* const file : {"review.html", "review.json", "review.pdf"})
+    EXPECT_TRUE(fs::exists(scratch / "r" / file)) << file;
   EXPECT_EQ(read_text(scratch / "r" / "review.pdf").substr(0, 5), "%PDF-");
   EXPECT_THROW(write_review(r, scratch / "r", false), Error);
   write_review(r, scratch / "r", true);
@@ -154,7 +159,11 @@ TEST(ReviewFolder, IsWrittenWholeAndReplacesOnlyAReview) {
 }
 
 TEST(ReviewScene, RemovedVoxelsAreASurfaceAroundThem) {
-  const World world = test::solid_world([](Vec3 p) { return 8 - std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }, 0.5, 24);
+  const World world = test::solid_world(
+      [](Vec3 p) {
+        return 8 - std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+      },
+      0.5, 24);
   const BrickGrid& bone = world.bodies()[0].body->bone;
   std::vector<VisibilityMetric::Voxel> voxels;
   for (VoxelKey k = 0; k < bone.brick_count() * BrickGrid::kVoxels; ++k) {
@@ -177,8 +186,9 @@ TEST(ReviewScene, OneLooksFromWhereItIsSeen) {
   const World world = test::solid_world(
       [](Vec3 p) {
         const double box = 8 - std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-        const double shaft =
-            p.z > -2 ? std::hypot(p.x, p.y) - 1.5 : std::hypot(std::hypot(p.x, p.y) > 1.5 ? std::hypot(p.x, p.y) - 1.5 : 0.0, p.z + 2);
+        const double shaft = p.z > -2
+                                 ? std::hypot(p.x, p.y) - 1.5
+                                 : std::hypot(std::hypot(p.x, p.y) > 1.5 ? std::hypot(p.x, p.y) - 1.5 : 0.0, p.z + 2);
         return std::min(box, shaft);
       },
       0.5, 24);
@@ -205,20 +215,23 @@ TEST(Stills, ShowPartsWhereTheyAreAndCutThemOpen) {
   const std::vector<Still> stills{s, cut};
   const auto pictures = draw_stills(parts, stills);
   ASSERT_EQ(pictures.size(), 2U);
-  const auto at = [](const Picture& p, int x, int y) { return &p.rgb[static_cast<std::size_t>(3 * (y * p.width + x))]; };
+  const auto at = [](const Picture& p, int x, int y) {
+    return &p.rgb[static_cast<std::size_t>(3 * (y * p.width + x))];
+  };
   const auto yellow = [](const std::uint8_t* c) { return c[0] > 2 * c[2] && c[0] > 60; };
   const auto blue = [](const std::uint8_t* c) { return c[2] > 2 * c[0]; };
   EXPECT_TRUE(yellow(at(pictures[0], 50, 50)));
-  EXPECT_TRUE(blue(at(pictures[1], 50, 50)));                                      // what it hid
-  EXPECT_TRUE(yellow(at(pictures[1], 40, 50)));                                    // 2 mm off: the far side, from within
-  EXPECT_TRUE(yellow(at(pictures[0], 28, 50)));                                    // 4.4 mm off
+  EXPECT_TRUE(blue(at(pictures[1], 50, 50)));    // what it hid
+  EXPECT_TRUE(yellow(at(pictures[1], 40, 50)));  // 2 mm off: the far side, from within
+  EXPECT_TRUE(yellow(at(pictures[0], 28, 50)));  // 4.4 mm off
   for (const int x : {2, 20, 97}) EXPECT_GT(at(pictures[0], x, 50)[2], 200) << x;  // beyond it: the ground
 }
 
-// Pressed by a diamond burr from above: the section is red there, grey far off, and nothing is painted where there is no bone.
+// Pressed by a diamond burr from above: the section is red there, grey far off, and nothing is painted where there is
+// no bone.
 TEST(HeatSheet, ASectionShowsWhereItWasHot) {
-  const World world =
-      test::solid_world([](Vec3 p) { return std::min(8 - std::abs(p.x), std::min(6 - std::abs(p.y), 4 - std::abs(p.z))); }, 0.5, 24);
+  const World world = test::solid_world(
+      [](Vec3 p) { return std::min(8 - std::abs(p.x), std::min(6 - std::abs(p.y), 4 - std::abs(p.z))); }, 0.5, 24);
   const StructureMap ball = test::structure_map(
       [](Vec3 p) -> std::uint8_t {
         return length(p - Vec3{0, 0, 1}) < 1.5 ? 1 : 0;
@@ -235,7 +248,8 @@ TEST(HeatSheet, ASectionShowsWhereItWasHot) {
   for (r.tick = 0; r.tick < 3000; ++r.tick) heat.tick(r, {});
   const Picture p = review::heat_section(heat, &ball, {0, 0, 0}, {1, 0, 0}, {0, 0, -1}, 24, 240);
   const auto at = [&](double x, double z) {
-    const auto column = static_cast<std::size_t>(std::lround(120 + 10 * x)), row = static_cast<std::size_t>(std::lround(120 - 10 * z));
+    const auto column = static_cast<std::size_t>(std::lround(120 + 10 * x)),
+               row = static_cast<std::size_t>(std::lround(120 - 10 * z));
     const std::size_t n = 3 * (row * 240 + column);
     return std::array<int, 3>{p.rgb[n], p.rgb[n + 1], p.rgb[n + 2]};
   };

@@ -187,7 +187,8 @@ TEST(Loop, LocksNoMoreMemoryThanItMay) {
     ::setrlimit(RLIMIT_MEMLOCK, &limit);
     bool allocated = false;
     FixedRateLoop loop(1000, [&](std::int64_t) {
-      void* const p = ::mmap(nullptr, 1UL << 30, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+      void* const p =
+          ::mmap(nullptr, 1UL << 30, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
       allocated = p != MAP_FAILED;
       return false;
     });

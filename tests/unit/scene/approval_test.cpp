@@ -111,7 +111,8 @@ TEST_F(Approved, EverySessionSaysIt) {
   const SessionFolder session = create_session_folder({}, folder, {});
   put(folder / "bone.vdb", "changed");
   EXPECT_EQ(open_session_folder(session.folder).approval.find("approved by A. Miller on "), 0U);  // as it was then
-  EXPECT_NE(open_session_folder(create_session_folder({}, folder, {}).folder).approval.find("no longer valid"), std::string::npos);
+  EXPECT_NE(open_session_folder(create_session_folder({}, folder, {}).folder).approval.find("no longer valid"),
+            std::string::npos);
   // Of an earlier version.
   put(session.folder / "session.json", R"({"osteotome_session_folder": 1, "case": "../.."})");
   EXPECT_EQ(open_session_folder(session.folder).approval, "");

@@ -6,15 +6,15 @@
 #include <filesystem>
 #include <functional>
 
-#include "osteo/simulation/bone/burr.h"
-#include "osteo/simulation/bone/structure_map.h"
-#include "osteo/imaging/dicom/import.h"
 #include "osteo/geometry/grid/resample.h"
-#include "osteo/simulation/haptics/renderer.h"
+#include "osteo/imaging/dicom/import.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/structures.h"
 #include "osteo/imaging/image/threshold.h"
 #include "osteo/session/scene/free_ways.h"
+#include "osteo/simulation/bone/burr.h"
+#include "osteo/simulation/bone/structure_map.h"
+#include "osteo/simulation/haptics/renderer.h"
 
 namespace osteo {
 namespace {
@@ -58,7 +58,9 @@ struct View {
     return normalized(v - forward() * dot(v, forward()));
   }
   [[nodiscard]] Vec3 right() const { return cross(forward(), up()); }
-  [[nodiscard]] Vec3 axis() const { return normalized(right() * 0.62 + up() * 0.45 - forward() * 0.64); }  // as the window holds a drill
+  [[nodiscard]] Vec3 axis() const {
+    return normalized(right() * 0.62 + up() * 0.45 - forward() * 0.64);
+  }  // as the window holds a drill
 };
 const View kViews[] = {{"left", {0.94, -0.25, 0.22}}, {"right", {-0.94, -0.25, 0.22}}, {"front", {0, -1, 0.1}},
                        {"behind", {0, 1, 0.1}},       {"above", {0, -0.05, 1}},        {"below", {0, -0.05, -1}}};
@@ -105,7 +107,9 @@ class Hand {
     device_.set_goal({to_mm, last_.device.axis, static_cast<std::uint8_t>(drill ? 255 : 0), kTool});
     for (int t = 0; t < ticks; ++t) tick();
   }
-  [[nodiscard]] HandPose pose() const { return {from_floats(last_.device.position_mm), from_floats(last_.device.axis)}; }
+  [[nodiscard]] HandPose pose() const {
+    return {from_floats(last_.device.position_mm), from_floats(last_.device.axis)};
+  }
   // Where the tool is shown: at the bone's surface.
   [[nodiscard]] HandPose shown() const { return {pose().at_mm + from_floats(last_.shown_offset_mm), pose().axis}; }
   [[nodiscard]] double force_n() const { return length(force_n_); }
@@ -141,7 +145,8 @@ void from_six_views(const char* name, const World& world, const StructureMap* st
   for (const View& view : kViews) {
     for (const auto& [across, up] : {std::pair{0.0, 0.0}, {0.35, 0.2}, {-0.3, -0.3}}) {
       const Vec3 eye = ways.centre_mm() - view.forward() * (4 * ways.radius_mm());
-      const Vec3 aim = ways.centre_mm() + view.right() * (across * ways.radius_mm()) + view.up() * (up * ways.radius_mm());
+      const Vec3 aim =
+          ways.centre_mm() + view.right() * (across * ways.radius_mm()) + view.up() * (up * ways.radius_mm());
       const auto at = seen(world, eye, normalized(aim - eye), 8 * ways.radius_mm());
       if (!at) continue;
       EXPECT_EQ(hand.walk({}), Led::arrived);
@@ -171,7 +176,8 @@ void from_six_views(const char* name, const World& world, const StructureMap* st
   EXPECT_EQ(hand.walk(out), Led::arrived) << name;
   EXPECT_EQ(hand.force_n(), 0);
   std::printf(
-      "%s: %d ways from six views, %d put; most force %.3f N, least gap within %.1f mm of the bone seen, longest %.1f s, found in at most "
+      "%s: %d ways from six views, %d put; most force %.3f N, least gap within %.1f mm of the bone seen, longest %.1f "
+      "s, found in at most "
       "%.2f s\n",
       name, walked, put, most_n, farthest, longest_s, plan_s);
 }
@@ -203,7 +209,8 @@ TEST(FreeWays, FromSixViewsWithStructuresAtRisk) {
 }
 
 TEST(FreeWays, FromSixViewsOnAHead) {
-  const std::filesystem::path file = std::filesystem::path(OSTEO_SHARED_DATA) / "ct_head_unc/CThead_HU_256x256x113_derived.nrrd";
+  const std::filesystem::path file =
+      std::filesystem::path(OSTEO_SHARED_DATA) / "ct_head_unc/CThead_HU_256x256x113_derived.nrrd";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << "no " << file;
   ImportParams p;
   p.axes = "LPI";
@@ -216,7 +223,8 @@ TEST(FreeWays, FromSixViewsOnASkull) {
   from_six_views("CT of a skull", world_of(import_ct(folder, {}).image, 300, 1));
 }
 
-// A slot too narrow for the head, a tunnel below it, and at one end a hole that lets it out: back along the tunnel, then up.
+// A slot too narrow for the head, a tunnel below it, and at one end a hole that lets it out: back along the tunnel,
+// then up.
 TEST(FreeWays, BackThroughATunnel) {
   const auto bone = [](Vec3 p) {
     const bool slot = std::abs(p.y) < 1.8 && p.x > -20 && p.x < 12 && p.z > -4;
@@ -235,7 +243,8 @@ TEST(FreeWays, BackThroughATunnel) {
   EXPECT_FALSE(way.put);
   EXPECT_EQ(hand.walk(way), Led::arrived);
   EXPECT_LT(hand.most_n(), 1.0);
-  // And in again, to the floor of the tunnel's far end, which only a slanting look can see: as near as it gets, never harder.
+  // And in again, to the floor of the tunnel's far end, which only a slanting look can see: as near as it gets, never
+  // harder.
   const FreeWays::Found a = ways.approach(hand.pose(), {8, 0, -7}, {0, 0, -1}, {0, 0, 1});
   EXPECT_EQ(hand.walk(a.way), Led::arrived);
   EXPECT_LT(hand.most_n(), 1.0);
@@ -367,7 +376,8 @@ StructureMap structures_of(Vec3 half_mm, const std::function<bool(Vec3)>& inside
   std::size_t v = 0;
   for (int k = 0; k < f.dims[2]; ++k)
     for (int j = 0; j < f.dims[1]; ++j)
-      for (int i = 0; i < f.dims[0]; ++i) voxels[v++] = inside(f.world_from_index({double(i), double(j), double(k)})) ? 1 : 0;
+      for (int i = 0; i < f.dims[0]; ++i)
+        voxels[v++] = inside(f.world_from_index({double(i), double(j), double(k)})) ? 1 : 0;
   labels.voxels = voxels;
   labels.structures = {{1, "nerve", {240, 220, 60}}};
   return StructureMap(labels);
@@ -393,7 +403,8 @@ double least_clearance(const StructureMap& structures, Hand& hand, const HandWay
 
 // A pit with a nerve laid bare across it, above the burr: past the nerve, not through it.
 TEST(FreeWays, KeepClearOfANerveThatHasBeenLaidBare) {
-  const World world = carved({24, 24, 12}, [](Vec3 p) { return p.z < 4 && (std::abs(p.x) > 14 || std::abs(p.y) > 9 || p.z < -8); });
+  const World world =
+      carved({24, 24, 12}, [](Vec3 p) { return p.z < 4 && (std::abs(p.x) > 14 || std::abs(p.y) > 9 || p.z < -8); });
   const StructureMap nerve = structures_of({24, 24, 14}, [](Vec3 p) { return std::hypot(p.x, p.z) < 1.2; });
   const HandPose inside{{0, 0, -5}, normalized({0.7, 0, 0.7})};
   const ToolSkin skin = skin_of_instrument(kTool);

@@ -9,9 +9,9 @@
 
 #include "bar.h"
 #include "osteo/core/base/error.h"
-#include "osteo/simulation/bone/instrument.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/recording/export.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "scratch.h"
 
 namespace osteo {
@@ -31,8 +31,11 @@ Script drill_and_suck() {
   Strokes sucker;
   sucker.tool = instrument_index("sucker 12 Fr");
   sucker.axis = normalized({0, 1, 1});
-  sucker.waypoints = {
-      {0, {-6, 4, 7}, false}, {0.5, {-8, 0, 6}, true}, {1.2, {-4, 0, 5}, false}, {1.5, {-2, 0, 5}, true}, {2.2, {4, 0, 5}, false}};
+  sucker.waypoints = {{0, {-6, 4, 7}, false},
+                      {0.5, {-8, 0, 6}, true},
+                      {1.2, {-4, 0, 5}, false},
+                      {1.5, {-2, 0, 5}, true},
+                      {2.2, {4, 0, 5}, false}};
   s.more_hands = {sucker};
   return s;
 }
@@ -95,7 +98,8 @@ TEST(TwoHands, OneSucksWhileTheOtherDrillsAndAReplayGetsTheSame) {
   }
 }
 
-// A plate in the second hand is the second hand's when it is replayed too; in a file without the field, as before, the first's.
+// A plate in the second hand is the second hand's when it is replayed too; in a file without the field, as before, the
+// first's.
 TEST(TwoHands, WhoseHandAnActionMeansIsRecorded) {
   const test::ScratchFolder scratch;
   const Script script = drill_and_suck();
@@ -106,8 +110,8 @@ TEST(TwoHands, WhoseHandAnActionMeansIsRecorded) {
   Rehearsal r(bar(), devices_of(script, 1000), o, {});
   const RehearsalSummary s = r.run_to_end({});
   const Session session = read_session(scratch / "grip.oss");
-  const auto found =
-      std::find_if(session.actions.begin(), session.actions.end(), [](const RecordedAction& a) { return a.action.is(ActionKind::grip); });
+  const auto found = std::find_if(session.actions.begin(), session.actions.end(),
+                                  [](const RecordedAction& a) { return a.action.is(ActionKind::grip); });
   ASSERT_NE(found, session.actions.end());
   EXPECT_EQ(found->action.hand, 1u);
   std::uint64_t held[2] = {};
@@ -170,12 +174,15 @@ TEST(LiveSettings, AllOfThemAreReplayedToTheBit) {
   for (std::size_t n = 0; n < setting_names().size(); ++n, t += 0.03) {
     const double now = setting_value(static_cast<int>(n), usual);
     const bool flag = now == 0 || now == 1;
-    const double next = setting_names()[n] == "method" ? setting_value(static_cast<int>(n), "proxy") : flag ? 1 - now : 0.8 * now;
+    const double next = setting_names()[n] == "method" ? setting_value(static_cast<int>(n), "proxy")
+                        : flag                         ? 1 - now
+                                                       : 0.8 * now;
     script.actions.push_back({t, SceneAction::setting(static_cast<std::uint32_t>(n), next)});
   }
   // And back: the distance map is made anew of the bone as it is then.
   for (const char* name : {"method", "fail_safe", "shaft", "vibration"})
-    script.actions.push_back({t += 0.03, SceneAction::setting(setting(name), setting_value(setting_number(name), usual))});
+    script.actions.push_back(
+        {t += 0.03, SceneAction::setting(setting(name), setting_value(setting_number(name), usual))});
   ASSERT_LT(t, 1.6);
   for (const bool by_the_clock : {false, true}) {
     const fs::path file = scratch / (by_the_clock ? "clock.oss" : "fast.oss");
@@ -214,7 +221,8 @@ TEST(LiveSettings, TakeEffectAtTheirTick) {
 TEST(LiveSettings, WhatIsOutOfRangeIsRefusedAndToldOf) {
   const test::ScratchFolder scratch;
   Script script = drill_and_suck();
-  script.actions = {{0.1, SceneAction::setting(setting("stiffness_n_per_mm"), 1e6)}, {0.2, SceneAction::setting(9999, 1)}};
+  script.actions = {{0.1, SceneAction::setting(setting("stiffness_n_per_mm"), 1e6)},
+                    {0.2, SceneAction::setting(9999, 1)}};
   const RehearsalSummary s = run(script, false, scratch / "s.oss");
   ASSERT_EQ(s.notes.size(), 2u);
   EXPECT_FALSE(s.notes[0].done);

@@ -6,8 +6,8 @@
 #include "bar.h"
 #include "evidence/scene.h"
 #include "osteo/assessment/scoring/heat_score.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/recording/session_reader.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "scratch.h"
 
 namespace osteo {
@@ -38,9 +38,13 @@ struct Heated {
 };
 Heated told(const HeatReader& h) {
   const HeatLedger l = h.ledger();
-  return {
-      h.hottest_c(),   l.added_j,   l.added_j - l.chips_j - l.cooled_j - l.forgotten_j - h.stored_j(), l.cooled_j, h.celsius_at({-4, 0, 2}),
-      h.warm_bricks(), h.restarts()};
+  return {h.hottest_c(),
+          l.added_j,
+          l.added_j - l.chips_j - l.cooled_j - l.forgotten_j - h.stored_j(),
+          l.cooled_j,
+          h.celsius_at({-4, 0, 2}),
+          h.warm_bricks(),
+          h.restarts()};
 }
 
 struct Drilled {
@@ -125,7 +129,8 @@ TEST(HeatReader, ASawHeatsAlongItsBlade) {
   tilted.device.axis = {0.88F, 0, 0.475F};
   tilted.flags |= kInSlot;
   for (tilted.tick = 0; tilted.tick < 1000; ++tilted.tick) held.tick(tilted, {});
-  for (const double x : {-5.0, 0.0, 5.0, 10.0}) EXPECT_NEAR(held.celsius_at({x, 0, 3.5}), heat.celsius_at({x, 0, 3.5}), 1e-9) << x;
+  for (const double x : {-5.0, 0.0, 5.0, 10.0})
+    EXPECT_NEAR(held.celsius_at({x, 0, 3.5}), heat.celsius_at({x, 0, 3.5}), 1e-9) << x;
   HeatReader loose(world, nullptr, 1000, params);
   loose.resync(world);
   for (tilted.tick = 0; tilted.tick < 1000; ++tilted.tick) loose.tick(tilted, {});
@@ -216,7 +221,8 @@ TEST(HeatReader, HistoryKeepsTheHighestOfEachPlace) {
   // What was there at any time, seen from outside.
   HeatReader again(world, &balls, 1000);
   double highest = 0, deeper = 0;
-  const Vec3 below = warmest->at_mm - world.bodies()[0].body->bone.frame().direction.column[2] * 1.5;  // a cell's centre too
+  const Vec3 below =
+      warmest->at_mm - world.bodies()[0].body->bone.frame().direction.column[2] * 1.5;  // a cell's centre too
   press(again, [&] {
     highest = std::max(highest, again.celsius_at(warmest->at_mm));
     deeper = std::max(deeper, again.celsius_at(below));
@@ -225,7 +231,8 @@ TEST(HeatReader, HistoryKeepsTheHighestOfEachPlace) {
   EXPECT_NEAR(heat.peak_c_at(warmest->at_mm), highest, 1e-9);
   EXPECT_NEAR(heat.peak_c_at(below), deeper, 1e-9);
   EXPECT_GT(deeper, 38);
-  EXPECT_LT(again.celsius_at(warmest->at_mm), highest - 5) << "it has cooled since: the highest is no longer there to be read";
+  EXPECT_LT(again.celsius_at(warmest->at_mm), highest - 5)
+      << "it has cooled since: the highest is no longer there to be read";
   ASSERT_TRUE(heat.courses().contains(1));
   const auto& course = heat.courses().at(1);
   EXPECT_EQ(course.size(), heat.steps());
@@ -238,10 +245,11 @@ TEST(HeatReader, HistoryKeepsTheHighestOfEachPlace) {
 
 // Bone that is cut, taken apart and put together again while it is warm.
 TEST(HeatReader, CutsAndUndo) {
-  const Drilled cut = run(true,
-                          {at(1000, SceneAction::saw({{2, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1500, SceneAction::split(20)),
-                           at(2200, SceneAction::plain(ActionKind::undo)), at(2300, SceneAction::plain(ActionKind::undo))},
-                          0);
+  const Drilled cut =
+      run(true,
+          {at(1000, SceneAction::saw({{2, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1500, SceneAction::split(20)),
+           at(2200, SceneAction::plain(ActionKind::undo)), at(2300, SceneAction::plain(ActionKind::undo))},
+          0);
   EXPECT_EQ(cut.live, cut.again);
   EXPECT_NEAR(cut.live.balance_j, 0, 1e-6 * cut.live.added_j);
   EXPECT_GT(cut.live.added_j, 0);

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "ear.h"
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/session/scene/monitor_reader.h"
+#include "osteo/simulation/bone/instrument.h"
 
 namespace osteo {
 namespace {
@@ -19,7 +19,8 @@ double loudest(std::span<const float> x) {
   return most;
 }
 
-// Tick by tick as they would come, and a card that asks for 5.3 ms at a time: from the tick in which a probe meets the bare nerve.
+// Tick by tick as they would come, and a card that asks for 5.3 ms at a time: from the tick in which a probe meets the
+// bare nerve.
 TEST(MonitorSound, ATouchIsHeardWithinATenthOfASecond) {
   const HeadAnatomy head;
   test::Ear ear = test::ear(head, 0.5);

@@ -1,4 +1,5 @@
-// The nerve monitor of a rehearsal: a burr that comes nearer to the phantom's facial nerve, live and from the file to the bit.
+// The nerve monitor of a rehearsal: a burr that comes nearer to the phantom's facial nerve, live and from the file to
+// the bit.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +16,8 @@
 namespace osteo {
 namespace {
 
-// Through the bone onto the nerve (its outer face at x = 45.7), stands on it with its weight, then goes into it, and away.
+// Through the bone onto the nerve (its outer face at x = 45.7), stands on it with its weight, then goes into it, and
+// away.
 Script onto_the_nerve() {
   Script s;
   s.tool = burr_index(BurrKind::cutting, 3);
@@ -66,8 +68,9 @@ class Witness : public MonitorSink {
 std::string told(const Witness& w) {
   std::string text = std::to_string(w.samples) + " " + w.hasher.hex();
   for (const MonitorEvent& e : w.events)
-    text += "\n" + std::to_string(e.sample) + " " + std::string(name_of(e.kind)) + " " + std::to_string(e.channel) + " " +
-            format_number(e.uv) + " " + format_number(e.ma) + " " + std::string(name_of(e.cause)) + " " + std::to_string(e.tick);
+    text += "\n" + std::to_string(e.sample) + " " + std::string(name_of(e.kind)) + " " + std::to_string(e.channel) +
+            " " + format_number(e.uv) + " " + format_number(e.ma) + " " + std::string(name_of(e.cause)) + " " +
+            std::to_string(e.tick);
   return text;
 }
 

@@ -7,9 +7,9 @@
 #include <thread>
 
 #include "bar.h"
-#include "osteo/simulation/bone/plates.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/recording/session_file.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/bone/plates.h"
 #include "scratch.h"
 
 namespace osteo {
@@ -41,23 +41,25 @@ const SawCut kCut{{-4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1.0};
 std::vector<SceneAction> everything() {
   const auto mini = static_cast<std::uint32_t>(plate_index("miniplate-4")),
              distractor = static_cast<std::uint32_t>(plate_index("distractor"));
-  return at_ticks({{200, SceneAction::suction({4, 0, 5}, 3, 40)},
-                   {400, SceneAction::saw(kCut)},
-                   {500, SceneAction::split(20)},
-                   {600, SceneAction::move(0, RigidTransform{{}, {0.5, 0, 0.3}} * rotation_about({5, 0, 0}, {0, 0, 1}, 0.2))},
-                   {700, SceneAction::attach(mini, {{}, {-4, 0, 4}}, 0, 1)},
-                   {800, SceneAction::move(1, {{}, {0.2, 0.1, 0}})},
-                   {900, SceneAction::detach(1)},
-                   {901, SceneAction::attach(distractor, {{}, {-4, 0, 4}}, 0, 1)},
-                   {1000, SceneAction::open(2, 3)},
-                   {1100, SceneAction::irrigate({4, 0, 5}, 5, 2)},
-                   {1200, SceneAction::plain(ActionKind::undo)},  // what was drilled since the distractor was opened
-                   {1300, SceneAction::saw({{9, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.7}, 0)},
-                   {1301, SceneAction::split(20)},
-                   {1401, SceneAction::grip(mini)},
-                   {1450, SceneAction::plain(ActionKind::undo)},  // what was drilled since the split,
-                   {1460, SceneAction::plain(ActionKind::undo)},  // and the split: with a plate in the hand nothing is drilled between
-                   {1600, SceneAction::grip(SceneAction::kNobody)}});
+  return at_ticks(
+      {{200, SceneAction::suction({4, 0, 5}, 3, 40)},
+       {400, SceneAction::saw(kCut)},
+       {500, SceneAction::split(20)},
+       {600, SceneAction::move(0, RigidTransform{{}, {0.5, 0, 0.3}} * rotation_about({5, 0, 0}, {0, 0, 1}, 0.2))},
+       {700, SceneAction::attach(mini, {{}, {-4, 0, 4}}, 0, 1)},
+       {800, SceneAction::move(1, {{}, {0.2, 0.1, 0}})},
+       {900, SceneAction::detach(1)},
+       {901, SceneAction::attach(distractor, {{}, {-4, 0, 4}}, 0, 1)},
+       {1000, SceneAction::open(2, 3)},
+       {1100, SceneAction::irrigate({4, 0, 5}, 5, 2)},
+       {1200, SceneAction::plain(ActionKind::undo)},  // what was drilled since the distractor was opened
+       {1300, SceneAction::saw({{9, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.7}, 0)},
+       {1301, SceneAction::split(20)},
+       {1401, SceneAction::grip(mini)},
+       {1450, SceneAction::plain(ActionKind::undo)},  // what was drilled since the split,
+       {1460,
+        SceneAction::plain(ActionKind::undo)},  // and the split: with a plate in the hand nothing is drilled between
+       {1600, SceneAction::grip(SceneAction::kNobody)}});
 }
 
 RehearsalOptions options(const std::filesystem::path& file, ContactMethod method) {
@@ -71,7 +73,8 @@ RehearsalOptions options(const std::filesystem::path& file, ContactMethod method
 }
 
 TEST(Operation, EverythingComesOutTheSameFromTheStream) {
-  for (const ContactMethod method : {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
+  for (const ContactMethod method :
+       {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
     for (const bool by_the_clock : {false, true}) {
       const test::ScratchFolder scratch;
       const auto file = scratch / "all.oss";
@@ -87,7 +90,8 @@ TEST(Operation, EverythingComesOutTheSameFromTheStream) {
         s = r.run_to_end({});
       }
       EXPECT_EQ(r.take_refusal(), "");
-      EXPECT_GT(s.removed_mm3, by_the_clock ? 0.0 : 2);  // a busy machine takes its time to saw, and nothing is drilled meanwhile
+      EXPECT_GT(s.removed_mm3,
+                by_the_clock ? 0.0 : 2);  // a busy machine takes its time to saw, and nothing is drilled meanwhile
       EXPECT_NEAR(s.sawn_mm3 + s.crumbs_mm3, 80 + 56, 12);
       ASSERT_TRUE(s.dust);
       const Dust::Totals& d = *s.dust;
@@ -109,7 +113,8 @@ TEST(Operation, NothingIsRemovedWhileTheSceneIsPrepared) {
   const test::ScratchFolder scratch;
   const auto file = scratch / "hold.oss";
   World world(test::bar(0.25, 0));
-  Rehearsal r(std::move(world), std::make_unique<ScriptedDevice>(strokes(4, 2), 1000), options(file, ContactMethod::overlap), {});
+  Rehearsal r(std::move(world), std::make_unique<ScriptedDevice>(strokes(4, 2), 1000),
+              options(file, ContactMethod::overlap), {});
   r.start();
   while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
   r.stop();
@@ -132,7 +137,8 @@ TEST(Operation, NothingIsRemovedWhileTheSceneIsPrepared) {
   EXPECT_GT(held_ticks, 3u);
 }
 
-// The same strokes on bone that was cut but not moved remove the same and feel nearly the same: nobody notices that it is two pieces.
+// The same strokes on bone that was cut but not moved remove the same and feel nearly the same: nobody notices that it
+// is two pieces.
 TEST(Operation, ACutThatNobodyOpenedIsNotFelt) {
   for (const bool split : {false, true}) {
     static std::vector<float> whole_force;
@@ -267,7 +273,8 @@ TEST(Operation, TheBorderOfARegionIsNotFelt) {
   EXPECT_LT(sideways, 0.03 * most);
 }
 
-// Two structures in the bar: the strokes go through one and near the other. What the summary tells follows from the stream alone.
+// Two structures in the bar: the strokes go through one and near the other. What the summary tells follows from the
+// stream alone.
 TEST(Rehearsal, TellsOfEveryStructureAndAReplayAgrees) {
   Labels labels;
   labels.frame.dims = {48, 40, 48};

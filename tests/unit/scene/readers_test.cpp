@@ -9,8 +9,8 @@
 
 #include "bar.h"
 #include "hole_script.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/recording/session_reader.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "rewrite_session.h"
 #include "scratch.h"
 
@@ -37,7 +37,8 @@ RehearsalOptions options(const std::filesystem::path& file) {
 
 const SceneAction kUndo = SceneAction::plain(ActionKind::undo);
 
-// The page on readers (docs/readers.md) tells how to write one; this is its example: how long the burr pressed harder than it should.
+// The page on readers (docs/readers.md) tells how to write one; this is its example: how long the burr pressed harder
+// than it should.
 class PressureScore final : public Reader {
  public:
   PressureScore(double most_n, double rate_hz) : most_n_(most_n), rate_hz_(rate_hz) {}
@@ -57,7 +58,8 @@ TEST(Readers, AScoreComesOutOfAFileAsItDidLive) {
   const test::ScratchFolder scratch;
   const World world(test::bar(0.5, 0.2));
   RehearsalOptions o = options(scratch / "score.oss");
-  o.actions = {at(700, SceneAction::saw({{2, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1700, SceneAction::split(20)), at(2700, kUndo)};
+  o.actions = {at(700, SceneAction::saw({{2, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1700, SceneAction::split(20)),
+               at(2700, kUndo)};
   Rehearsal r(world.copy(), std::make_unique<ScriptedDevice>(holes(4), 1000), o, {});
   PressureScore live(0.5, 1000);
   SurfaceReader surface(world, {});
@@ -174,8 +176,8 @@ TEST(Readers, ALateReaderIsRightFromThereOn) {
     if (t == 950) act(SceneAction::split(20));
     if (t == 1000) {
       hub.drain();
-      for (Reader* const r :
-           {static_cast<Reader*>(late.surface.get()), static_cast<Reader*>(late.pieces.get()), static_cast<Reader*>(late.dust.get())})
+      for (Reader* const r : {static_cast<Reader*>(late.surface.get()), static_cast<Reader*>(late.pieces.get()),
+                              static_cast<Reader*>(late.dust.get())})
         hub.add(*r);
       EXPECT_EQ(late.dust->dust().totals().added_mm3, 0);
       removed = operation.removed_mm3();
@@ -193,13 +195,14 @@ TEST(Readers, ALateReaderIsRightFromThereOn) {
   EXPECT_EQ(operation.world().bodies().size(), 1u);
   EXPECT_EQ(late.surface_hash(), fresh.surface_hash());
   ASSERT_EQ(late.large_pieces().size(), fresh.large_pieces().size());
-  for (std::size_t p = 0; p < fresh.large_pieces().size(); ++p) EXPECT_EQ(late.large_pieces()[p].voxels, fresh.large_pieces()[p].voxels);
+  for (std::size_t p = 0; p < fresh.large_pieces().size(); ++p)
+    EXPECT_EQ(late.large_pieces()[p].voxels, fresh.large_pieces()[p].voxels);
   EXPECT_GT(late.dust->dust().totals().sucked_mm3, 0) << "it was told of the sucker that was there before it";
   EXPECT_NEAR(late.dust->dust().totals().added_mm3, operation.removed_mm3() - removed, 1e-3);
 }
 
-// Holes, a cut, a split and a move between them, and everything back, live and without a clock; the recording gives the same, both ways.
-// Whoever holds a lock takes what it can in its time; what is left comes later, in its order.
+// Holes, a cut, a split and a move between them, and everything back, live and without a clock; the recording gives the
+// same, both ways. Whoever holds a lock takes what it can in its time; what is left comes later, in its order.
 TEST(Readers, ALittleAtATimeIsTheSame) {
   World world(test::bar(0.5, 0.2));
   HapticSetup setup;
@@ -212,7 +215,9 @@ TEST(Readers, ALittleAtATimeIsTheSame) {
   class Order final : public Reader {
    public:
     void action(const SceneAction& a) override { told.push_back({a.tick, true}); }
-    void tick(const TickRecord& r, std::span<const VoxelChange> c) override { told.push_back({r.tick, false}), changes += c.size(); }
+    void tick(const TickRecord& r, std::span<const VoxelChange> c) override {
+      told.push_back({r.tick, false}), changes += c.size();
+    }
     std::vector<std::pair<std::uint64_t, bool>> told;
     std::size_t changes = 0;
   } at_once, by_and_by;
@@ -243,9 +248,9 @@ TEST(Strokes, AreTakenBackLiveAndInAReplay) {
       at(800, kUndo),                                                    // the first hole, whose stroke goes on still
       at(1990, SceneAction::saw({{2, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})),  //
       at(2400, SceneAction::move(0, {{}, {0, 0, 0.2}})),                 // in the middle of the third hole: two strokes
-      at(3400, kUndo),                                                   // in the middle of the fourth: what it took up to now
-      at(3900, SceneAction::split(20)),                                  //
-      at(4990, kUndo),                                                   // the fifth
+      at(3400, kUndo),                   // in the middle of the fourth: what it took up to now
+      at(3900, SceneAction::split(20)),  //
+      at(4990, kUndo),                   // the fifth
       at(5700, kUndo),
       at(5800, kUndo),
       at(5810, kUndo),

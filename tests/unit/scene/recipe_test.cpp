@@ -29,8 +29,9 @@ const RecipeChange* find(const std::vector<RecipeChange>& changes, const std::st
 TEST(Recipe, OneChangeKeepsTheRest) {
   Recipe r{.settings = {{"lower", "500"}, {"region", "left_temporal"}, {"names", "6=facial nerve"}}};
   const auto changes = change_settings(r, Given{{"lower", "550"}, {"spacing_mm", "0.3"}}, false);
-  EXPECT_EQ(r.settings, (std::map<std::string, std::string>{
-                            {"lower", "550"}, {"names", "6=facial nerve"}, {"region", "left_temporal"}, {"spacing_mm", "0.3"}}));
+  EXPECT_EQ(r.settings,
+            (std::map<std::string, std::string>{
+                {"lower", "550"}, {"names", "6=facial nerve"}, {"region", "left_temporal"}, {"spacing_mm", "0.3"}}));
   ASSERT_EQ(changes.size(), 2U);
   EXPECT_EQ(find(changes, "lower")->from, "500");
   EXPECT_EQ(find(changes, "lower")->to, "550");
@@ -42,7 +43,8 @@ TEST(Recipe, OneChangeKeepsTheRest) {
 
 TEST(Recipe, WhatBelongsToAChangedThingGoesWithItAndIsTold) {
   const Recipe before{
-      .settings = {{"region", "box"}, {"centre_mm", "1,2,3"}, {"size_mm", "9,9,9"}, {"preset", "cellular"}, {"names", "1=a"}}};
+      .settings = {
+          {"region", "box"}, {"centre_mm", "1,2,3"}, {"size_mm", "9,9,9"}, {"preset", "cellular"}, {"names", "1=a"}}};
   Recipe r = before;
   auto changes = change_settings(r, Given{{"region", "jaw"}}, false);
   EXPECT_FALSE(r.settings.contains("centre_mm"));
@@ -97,7 +99,10 @@ TEST_F(Memory, HoldsFilesByTheirContent) {
 
 TEST_F(Memory, WhatNamesAPatientIsNotInTheCase) {
   const TemporaryFolder at;
-  Recipe r{.source_hash = "abc", .structures_hash = "def", .settings = {{"lower", "500"}, {"series", "1.2.3.4.5"}}, .withheld = {"series"}};
+  Recipe r{.source_hash = "abc",
+           .structures_hash = "def",
+           .settings = {{"lower", "500"}, {"series", "1.2.3.4.5"}},
+           .withheld = {"series"}};
   const std::string text = recipe_json(r).dump();
   EXPECT_EQ(text.find("1.2.3.4.5"), std::string::npos);
   put(at.path() / "manifest.json", R"({"osteotome_case": 1, "recipe": )" + text + "}");
@@ -129,7 +134,8 @@ struct CaseFolder : TemporaryFolder {
     CaseUpdate u(folder);
     put(u.place(folder / "bone.vdb"), "1");
     put(u.place(folder / "structures.seg.nrrd"), "nerve");
-    u.commit(manifest({{"bone", u.place(folder / "bone.vdb")}, {"structures", u.place(folder / "structures.seg.nrrd")}}));
+    u.commit(
+        manifest({{"bone", u.place(folder / "bone.vdb")}, {"structures", u.place(folder / "structures.seg.nrrd")}}));
   }
   std::size_t entries() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), {})); }
 };
@@ -227,7 +233,8 @@ TEST(Case, ForeignFilesAreTold) {
   put(c.folder / "haptics.json", "mine");
   put(c.folder / "preview.png", "a photograph");
   EXPECT_TRUE(foreign_files(c.folder, {c.folder / "bone.vdb"}).empty());
-  EXPECT_EQ(foreign_files(c.folder, {c.folder / "bone.vdb", c.folder / "preview.png"}), std::vector<std::string>{"preview.png"});
+  EXPECT_EQ(foreign_files(c.folder, {c.folder / "bone.vdb", c.folder / "preview.png"}),
+            std::vector<std::string>{"preview.png"});
 }
 
 TEST(Case, AManifestIsReadStrictly) {

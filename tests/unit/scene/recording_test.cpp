@@ -97,7 +97,8 @@ TEST(Recording, NoActionIsLostByTheClock) {
     const auto file = fresh("start.oss");
     RehearsalOptions o = options(file);
     o.follow = {false, true, true};
-    o.actions = {at(0, SceneAction::saw(kCut)), at(0, SceneAction::move(0, {{}, {0, 0, 1}})), at(29, SceneAction::suction({}, 1, 1))};
+    o.actions = {at(0, SceneAction::saw(kCut)), at(0, SceneAction::move(0, {{}, {0, 0, 1}})),
+                 at(29, SceneAction::suction({}, 1, 1))};
     Rehearsal r(world.copy(), std::make_unique<ScriptedDevice>(strokes(0.03), 1000), o, {});
     r.start();
     while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));

@@ -17,7 +17,8 @@ TEST(ToolShape, BallsFillEachHeadFromEndToEnd) {
     const double apart = 0.25 * std::min(head.start_radius_mm, head.end_radius_mm) + 1e-9;
     ASSERT_FALSE(balls.empty()) << burr.name();
     EXPECT_NEAR(length(balls.front().centre_mm - (at + axis * head.start_mm)), 0, 1e-9) << burr.name();
-    EXPECT_NEAR(length(balls.back().centre_mm - (at + axis * (head.start_mm + head.length_mm))), 0, 1e-9) << burr.name();
+    EXPECT_NEAR(length(balls.back().centre_mm - (at + axis * (head.start_mm + head.length_mm))), 0, 1e-9)
+        << burr.name();
     for (std::size_t b = 0; b < balls.size(); ++b) {
       // On the axis, and as large as fits: to a cone's slope, which a ball inside touches beside its middle.
       Vec3 outwards;

@@ -8,17 +8,18 @@
 
 #include "bar.h"
 #include "osteo/core/base/files.h"
-#include "osteo/simulation/bone/plates.h"
-#include "osteo/session/scene/rehearsal.h"
-#include "osteo/session/scene/session_folder.h"
 #include "osteo/session/recording/script_file.h"
 #include "osteo/session/recording/session_file.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/simulation/bone/plates.h"
 
 namespace osteo {
 namespace {
 
 std::filesystem::path fresh(const std::string& name) {
-  const auto path = std::filesystem::temp_directory_path() / ("osteo-script-" + std::to_string(::getpid()) + "-" + name);
+  const auto path =
+      std::filesystem::temp_directory_path() / ("osteo-script-" + std::to_string(::getpid()) + "-" + name);
   std::filesystem::remove_all(path);
   return path;
 }
@@ -31,7 +32,8 @@ Script press() {
   return s;
 }
 
-RehearsalSummary run(const Script& script, bool by_the_clock, const std::filesystem::path& file = {}, bool dust = false) {
+RehearsalSummary run(const Script& script, bool by_the_clock, const std::filesystem::path& file = {},
+                     bool dust = false) {
   RehearsalOptions o;
   o.session_file = file;
   o.follow = {true, true, dust};
@@ -95,8 +97,9 @@ TEST(ScriptedScene, EveryRefusalIsInTheSummaryWithItsTime) {
     const auto folder = fresh("session");
     const std::string text = write_summary(create_session_folder(folder, "nowhere", {}), s, 1000, "cutting 4 mm", {});
     EXPECT_EQ(text, read_text(folder / "summary.json"));
-    for (const char* const part : {"\"actions_refused\"", "\"tick\": 50", "\"t_s\": 0.05", "\"action\": \"saw\"", "the saw meets no bone",
-                                   "there is no piece 9", "\"times\": 5", "\"warnings\"", "a doubt"})
+    for (const char* const part :
+         {"\"actions_refused\"", "\"tick\": 50", "\"t_s\": 0.05", "\"action\": \"saw\"", "the saw meets no bone",
+          "there is no piece 9", "\"times\": 5", "\"warnings\"", "a doubt"})
       EXPECT_NE(text.find(part), std::string::npos) << part;
     EXPECT_EQ(text.find("actions_done_otherwise"), std::string::npos);
     std::filesystem::remove_all(folder);

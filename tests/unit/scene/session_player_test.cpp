@@ -14,7 +14,11 @@ namespace osteo {
 namespace {
 
 World block() {
-  return test::solid_world([](Vec3 p) { return std::min({4 - p.z, p.z + 4, 11 - std::abs(p.x), 11 - std::abs(p.y)}); }, 0.5, 24);
+  return test::solid_world(
+      [](Vec3 p) {
+        return std::min({4 - p.z, p.z + 4, 11 - std::abs(p.x), 11 - std::abs(p.y)});
+      },
+      0.5, 24);
 }
 SceneAction at(std::uint64_t tick, SceneAction a) {
   a.tick = tick;
@@ -73,8 +77,9 @@ TEST(SessionPlayer, GivesTheBoneOfAnyTimeForwardsAndBack) {
 TEST(SessionPlayer, GoesAcrossSawCutsAndUndo) {
   const test::ScratchFolder scratch;
   record(scratch / "s.oss",
-         {at(950, SceneAction::saw({{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1050, SceneAction::plain(ActionKind::undo)),
-          at(1100, SceneAction::plain(ActionKind::undo)), at(1600, SceneAction::saw({{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1}))});
+         {at(950, SceneAction::saw({{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})),
+          at(1050, SceneAction::plain(ActionKind::undo)), at(1100, SceneAction::plain(ActionKind::undo)),
+          at(1600, SceneAction::saw({{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1}))});
   expect_everywhere(scratch / "s.oss");
 }
 

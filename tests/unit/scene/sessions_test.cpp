@@ -8,12 +8,12 @@
 #include <set>
 
 #include "bar.h"
+#include "osteo/assessment/evidence/score.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/simulation/bone/instrument.h"
-#include "osteo/assessment/evidence/score.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "other_session.h"
 #include "rewrite_session.h"
 #include "scratch.h"
@@ -147,7 +147,8 @@ TEST(Sessions, OfOtherVersionsAreRepeatedWhereTheServoIsTheSame) {
   }
   EXPECT_TRUE(replay(SessionReader(later), start.copy(), {}, {}).identical);
   {
-    test::OtherWriter w(later, header, test::tick_fields(), [](nlohmann::ordered_json& j) { j["kernels"]["contact"] = 99; });
+    test::OtherWriter w(later, header, test::tick_fields(),
+                        [](nlohmann::ordered_json& j) { j["kernels"]["contact"] = 99; });
     test::write_otherwise(file, w);
   }
   const SessionReader other(later);

@@ -10,8 +10,8 @@
 
 #include "bar.h"
 #include "osteo/core/base/error.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/recording/session_file.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "scratch.h"
 #include "tissue/block.h"
 
@@ -101,8 +101,8 @@ TEST(SoftBody, PushesBackAndIsReplayedToTheBit) {
   }
 }
 
-// A burr that turns cuts its way in; the replay, which knows no tissue, still comes out the same. A skin loses what was cut, and the cut
-// shows.
+// A burr that turns cuts its way in; the replay, which knows no tissue, still comes out the same. A skin loses what was
+// cut, and the cut shows.
 TEST(SoftBody, ATurningBurrCutsVoxelsOff) {
   const TetMesh rest = pad();
   const TriMesh skin = boundary_of(rest);
@@ -168,7 +168,8 @@ TEST(SoftBody, BoneCarriesIt) {
     SoftBody soft(m, problem);
     if (bone) soft.meet(&world);
     const std::size_t burr = static_cast<std::size_t>(burr_index(BurrKind::diamond, 6));
-    for (int n = 0; n < 100; ++n) update(soft, {{shift.x + 20, middle.y, top + 9.3 + 3 - 0.06 * std::min(n, 80)}, {0, 0, 1}, burr, false});
+    for (int n = 0; n < 100; ++n)
+      update(soft, {{shift.x + 20, middle.y, top + 9.3 + 3 - 0.06 * std::min(n, 80)}, {0, 0, 1}, burr, false});
     double z = 1e9;
     for (const Vec3& p : soft.points_mm()) z = std::min(z, p.z);
     return z - top;
@@ -206,7 +207,8 @@ TEST(SoftBody, ACaseThatListsItByHalvesIsRefused) {
   const test::ScratchFolder scratch;
   const auto& folder = scratch.path();
   EXPECT_EQ(soft_tissue_of(folder), nullptr);
-  std::filesystem::copy_file(std::filesystem::path(OSTEO_SOURCE) / "pipelines/tissue/gear.json", folder / "tissue.json");
+  std::filesystem::copy_file(std::filesystem::path(OSTEO_SOURCE) / "pipelines/tissue/gear.json",
+                             folder / "tissue.json");
   EXPECT_THROW(static_cast<void>(soft_tissue_of(folder)), Error);
 }
 

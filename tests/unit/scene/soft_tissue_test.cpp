@@ -1,4 +1,5 @@
-// Several bodies of soft tissue and several hands: felt together, asleep while nothing is near, held aside, pressed deep.
+// Several bodies of soft tissue and several hands: felt together, asleep while nothing is near, held aside, pressed
+// deep.
 #include "osteo/session/scene/soft_tissue.h"
 
 #include <gtest/gtest.h>
@@ -12,10 +13,10 @@
 
 #include "bar.h"
 #include "osteo/core/base/error.h"
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/imaging/io/tet_io.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/recording/session_file.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "scratch.h"
 #include "tissue/block.h"
 
@@ -35,8 +36,8 @@ TetMesh voxels(int nx, int ny, int nz, double h, Vec3 corner) {
 
 // Held in boxes, or by bone alone.
 std::string problem(double young_kpa, const std::string& boxes = "") {
-  return R"({"osteotome_tissue": 1, "material": {"young_kpa": )" + std::to_string(young_kpa) + R"(, "poisson": 0.45}, "fixed": [)" +
-         (boxes.empty() ? "" : R"({"box_mm": )" + boxes + "}") + "]}";
+  return R"({"osteotome_tissue": 1, "material": {"young_kpa": )" + std::to_string(young_kpa) +
+         R"(, "poisson": 0.45}, "fixed": [)" + (boxes.empty() ? "" : R"({"box_mm": )" + boxes + "}") + "]}";
 }
 
 // A pad of 24 x 24 x 9 mm with its underside, which is held, at z = 60: far from the bar.
@@ -88,8 +89,8 @@ double winding(const TriMesh& surface, Vec3 at) {
   return sum / (4 * std::numbers::pi);
 }
 
-// A pad that lies on bone and has grown on it, pressed by a burr of 3 mm three radii deep: without grip the surface slipped round the burr
-// beyond two, and it was found inside the body with next to no force.
+// A pad that lies on bone and has grown on it, pressed by a burr of 3 mm three radii deep: without grip the surface
+// slipped round the burr beyond two, and it was found inside the body with next to no force.
 TEST(SoftTissue, ABurrPressedThreeRadiiDeepDoesNotSlipThrough) {
   const World world(test::bar(1, 0));
   const double top = upper_face(world), h = 1.5, r = 1.5, thick = 9;
@@ -111,14 +112,16 @@ TEST(SoftTissue, ABurrPressedThreeRadiiDeepDoesNotSlipThrough) {
       if (n > 0) {
         EXPECT_GT(push.force_n.z, 0.95 * force) << deep / r;
       }
-      EXPECT_LT(std::abs(winding(body.drawn(), tip)), 0.5) << press.young_kpa << " kPa: inside at " << deep / r << " radii";
+      EXPECT_LT(std::abs(winding(body.drawn(), tip)), 0.5)
+          << press.young_kpa << " kPa: inside at " << deep / r << " radii";
       before = force;
       if (n == 60) at_two = force;
     }
     EXPECT_GT(before, 1.3 * at_two) << "three radii push harder than two";
     // Taken out again it is whole: nothing stays caught on the burr.
     const std::vector<Vec3> dented = body.points_mm();
-    for (int n = 0; n < 60; ++n) update(body, {{press.x, press.y, surface + r - 4.5 + 0.2 * n}, {0, 0, 1}, diamond(3), false});
+    for (int n = 0; n < 60; ++n)
+      update(body, {{press.x, press.y, surface + r - 4.5 + 0.2 * n}, {0, 0, 1}, diamond(3), false});
     for (int n = 0; n < 60; ++n) update(body, kFar);
     std::vector<Vec3> rest;
     for (const auto& p : voxels(16, 8, 6, h, {-12, -6, top - 0.8}).points_mm) rest.push_back(from_floats(p));
@@ -138,12 +141,15 @@ TEST(SoftTissue, WhatHasDugInLetsGoOfAToolThatJumps) {
   }
 }
 
-// Two pads one above the other with the tool between them: what it feels is their sum, and each rises along its own way.
+// Two pads one above the other with the tool between them: what it feels is their sum, and each rises along its own
+// way.
 TEST(SoftTissue, ForcesOfAllBodiesOnAToolAreOnePlane) {
   const SoftTool tool{{12, 12, 72}, {1, 0, 0}, diamond(6), false};
   const auto tilted = [](bool above) {  // one below, and one beside the tool
-    return above ? std::make_unique<SoftBody>(voxels(8, 8, 3, 3, {14.2, 0, 62}), problem(20, "[[37, -1e3, -1e3], [39, 1e3, 1e3]]"))
-                 : std::make_unique<SoftBody>(voxels(8, 8, 3, 3, {0, 0, 61}), problem(40, "[[-1e3, -1e3, 60.9], [1e3, 1e3, 61.1]]"));
+    return above ? std::make_unique<SoftBody>(voxels(8, 8, 3, 3, {14.2, 0, 62}),
+                                              problem(20, "[[37, -1e3, -1e3], [39, 1e3, 1e3]]"))
+                 : std::make_unique<SoftBody>(voxels(8, 8, 3, 3, {0, 0, 61}),
+                                              problem(40, "[[-1e3, -1e3, 60.9], [1e3, 1e3, 61.1]]"));
   };
   SoftTissue both;
   both.add("below", tilted(false));
@@ -193,7 +199,8 @@ TEST(SoftTissue, BodiesThatOverlapAddUp) {
   EXPECT_EQ(twice.body(1).points_mm(), once->points_mm());
 }
 
-// At rest and far from every tool it costs nothing; a tool that comes near finds it as if it had been awake all the time.
+// At rest and far from every tool it costs nothing; a tool that comes near finds it as if it had been awake all the
+// time.
 TEST(SoftTissue, SleepsUntilAToolComesNear) {
   SoftTissue tissue;
   tissue.add("flap", pad());
@@ -319,7 +326,8 @@ std::vector<std::unique_ptr<Device>> devices(const std::vector<Strokes>& hands) 
   return all;
 }
 
-// Two hands in two bodies: each feels its own, with its own plane, and a replay, which knows no tissue, comes out the same.
+// Two hands in two bodies: each feels its own, with its own plane, and a replay, which knows no tissue, comes out the
+// same.
 TEST(SoftTissue, EachHandFeelsItsOwn) {
   for (const bool by_the_clock : {false, true}) {
     const test::ScratchFolder scratch;
@@ -330,8 +338,10 @@ TEST(SoftTissue, EachHandFeelsItsOwn) {
     tissue->add("left flap", pad(40, 3, {0, 0, 60}));
     tissue->add("right flap", pad(10, 3, {0, 60, 60}));
     const std::vector<Strokes> hands{
-        strokes(diamond(6), {0, 0, 1}, {{0, {12, 12, 76}}, {0.4, {12, 12, 70}}, {1, {12, 12, 70}}, {1.4, {12, 12, 80}}}),
-        strokes(instrument("sucker 12 Fr"), {0, 0, 1}, {{0, {12, 72, 76}}, {0.4, {12, 72, 69}}, {1, {12, 72, 69}}, {1.4, {12, 72, 69}}})};
+        strokes(diamond(6), {0, 0, 1},
+                {{0, {12, 12, 76}}, {0.4, {12, 12, 70}}, {1, {12, 12, 70}}, {1.4, {12, 12, 80}}}),
+        strokes(instrument("sucker 12 Fr"), {0, 0, 1},
+                {{0, {12, 72, 76}}, {0.4, {12, 72, 69}}, {1, {12, 72, 69}}, {1.4, {12, 72, 69}}})};
     Rehearsal r(std::move(world), devices(hands), options(file, tissue, 2), {});
     if (by_the_clock) {
       r.start();
@@ -399,13 +409,16 @@ TEST(SoftTissue, TheSecondHandHoldsAFlapAside) {
       // 24 mm long, 6 mm wide, 4.5 mm high, held at one end, half a millimetre above the bone; it lies over the place.
       tissue->add("flap", std::make_unique<SoftBody>(voxels(16, 4, 3, h, {-20, -3, top + 0.5}),
                                                      problem(60, "[[-21, -1e3, -1e3], [-19.9, 1e3, 1e3]]")));
-      std::vector<Strokes> hands{strokes(
-          static_cast<std::uint8_t>(burr_index(BurrKind::cutting, 3)), {0, 0, 1},
-          {{0, {2, 0, top + 16}, false}, {1.6, {2, 0, top + 16}, true}, {2.4, {2, 0, top + 1.4}, true}, {4, {2, 0, top + 0.6}, true}})};
+      std::vector<Strokes> hands{strokes(static_cast<std::uint8_t>(burr_index(BurrKind::cutting, 3)), {0, 0, 1},
+                                         {{0, {2, 0, top + 16}, false},
+                                          {1.6, {2, 0, top + 16}, true},
+                                          {2.4, {2, 0, top + 1.4}, true},
+                                          {4, {2, 0, top + 0.6}, true}})};
       // From the side, handle to the side: it meets the flap at half its height, and stays.
       if (held)
-        hands.push_back(strokes(instrument("sucker 12 Fr"), {0, 1, 0},
-                                {{0, {-3, 7, top + 2.75}}, {1.4, {-3, -3.5, top + 2.75}}, {4, {-3, -3.5, top + 2.75}}}));
+        hands.push_back(
+            strokes(instrument("sucker 12 Fr"), {0, 1, 0},
+                    {{0, {-3, 7, top + 2.75}}, {1.4, {-3, -3.5, top + 2.75}}, {4, {-3, -3.5, top + 2.75}}}));
       Rehearsal r(std::move(world), devices(hands), options(file, tissue, hands.size()), {});
       const RehearsalSummary s = r.run_to_end({});
       tissue_mm3[held] = s.tissue_mm3;
@@ -415,7 +428,8 @@ TEST(SoftTissue, TheSecondHandHoldsAFlapAside) {
       double retractor = 0;
       for (const auto& a : session.actions) {
         if (!a.action.is(ActionKind::soft_push)) continue;
-        (a.action.hand == 0 ? felt[held] : retractor) = std::max(a.action.hand == 0 ? felt[held] : retractor, a.action.values[6]);
+        (a.action.hand == 0 ? felt[held] : retractor) =
+            std::max(a.action.hand == 0 ? felt[held] : retractor, a.action.values[6]);
       }
       EXPECT_EQ(retractor > 0.005, held) << retractor;
       ASSERT_EQ(s.tissue.size(), 1u);

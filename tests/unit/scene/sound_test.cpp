@@ -58,7 +58,8 @@ std::span<const float> second(const std::vector<float>& x, double from, double t
 
 TEST(Sound, OfASessionFollowsContactAndIsTheSameEachTime) {
   const test::ScratchFolder folder;
-  Rehearsal r(World(test::bar(0.5, 0.2)), std::make_unique<ScriptedDevice>(one_hole(3), 1000), recorded_in(folder / "s.oss"), {});
+  Rehearsal r(World(test::bar(0.5, 0.2)), std::make_unique<ScriptedDevice>(one_hole(3), 1000),
+              recorded_in(folder / "s.oss"), {});
   ASSERT_GT(r.run_to_end({}).removed_mm3, 0.5);
   const SessionReader session(folder / "s.oss");
   const SoundFileFacts facts = write_session_sound(session, {}, 1, false, folder / "a.wav", {});
@@ -99,7 +100,8 @@ TEST(Sound, LiveIsHeardAsItHappensAndEndsInSilence) {
 
 TEST(Sound, AReaderThatComesAndGoesWhileItRunsCostsTheOthersNothing) {
   const test::ScratchFolder folder;
-  Rehearsal r(World(test::bar(0.5, 0.2)), std::make_unique<ScriptedDevice>(one_hole(30), 1000), recorded_in(folder / "s.oss"), {});
+  Rehearsal r(World(test::bar(0.5, 0.2)), std::make_unique<ScriptedDevice>(one_hole(30), 1000),
+              recorded_in(folder / "s.oss"), {});
   r.start();
   std::vector<float> out(256);
   for (int i = 0; i < 50; ++i) {
@@ -201,7 +203,8 @@ TEST(SoundTracker, HearsInstrumentsTouch) {
 }
 
 TEST(SoundTracker, KnowsSoftStructuresByTheirNames) {
-  const std::vector<Structure> names{{1, "facial nerve"}, {2, "Sigmoid sinus"}, {3, "dura"}, {4, "jugular bulb"}, {5, "malleus"}};
+  const std::vector<Structure> names{
+      {1, "facial nerve"}, {2, "Sigmoid sinus"}, {3, "dura"}, {4, "jugular bulb"}, {5, "malleus"}};
   EXPECT_EQ(soft_structures(names), (std::set<std::uint32_t>{2, 3, 4}));
 }
 

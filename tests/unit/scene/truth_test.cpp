@@ -5,9 +5,9 @@
 
 #include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/geometry/grid/resample.h"
+#include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/threshold.h"
-#include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/session/scene/rehearsal.h"
 
 namespace osteo {
@@ -36,7 +36,8 @@ const Job& head() {
   return job;
 }
 
-// The walls between air cells are thinner than a voxel: what the CT loses of them no threshold brings back. Around them 1 %, with them 2 %.
+// The walls between air cells are thinner than a voxel: what the CT loses of them no threshold brings back. Around them
+// 1 %, with them 2 %.
 TEST(Truth, VolumeOfBoneWithinOnePercentOfTheExactLabels) {
   const auto& labels = head().phantom.labels;
   const Frame& f = labels.frame;
@@ -57,8 +58,9 @@ TEST(Truth, VolumeOfBoneWithinOnePercentOfTheExactLabels) {
   EXPECT_NEAR(head().bone.volume_after_mm3 / head().bone.volume_before_mm3, 1, 0.01);
   EXPECT_NEAR(enclosed_volume_mm3(head().nets.mesh) / exact, 1, 0.02);
   std::printf("outside the ears: exact labels %.0f mm3, CT above 500 HU %.0f\n", exact_around, seen_around);
-  std::printf("bone: exact labels %.0f mm3, 27 samples a voxel %.0f, mask %.0f, grid %.0f, surface %.0f\n", exact, head().phantom.bone_mm3,
-              head().bone.volume_before_mm3, head().bone.volume_after_mm3, enclosed_volume_mm3(head().nets.mesh));
+  std::printf("bone: exact labels %.0f mm3, 27 samples a voxel %.0f, mask %.0f, grid %.0f, surface %.0f\n", exact,
+              head().phantom.bone_mm3, head().bone.volume_before_mm3, head().bone.volume_after_mm3,
+              enclosed_volume_mm3(head().nets.mesh));
 }
 
 // Distance of a surface point to the exact boundary along its normal, by bisection; at most 3 mm is looked for.
@@ -91,8 +93,9 @@ TEST(Truth, SurfaceWithinHalfAVoxelOfTheExactBoundary) {
   }
   std::sort(all.begin(), all.end());
   const double mean_voxels = sum / static_cast<double>(all.size()) / 0.5;
-  std::printf("surface to exact boundary, voxels of 0.5 mm: mean %.3f, p95 %.3f, p99 %.3f (%zu points; CT voxels of 0.8 mm)\n", mean_voxels,
-              all[all.size() * 95 / 100] / 0.5, all[all.size() * 99 / 100] / 0.5, all.size());
+  std::printf(
+      "surface to exact boundary, voxels of 0.5 mm: mean %.3f, p95 %.3f, p99 %.3f (%zu points; CT voxels of 0.8 mm)\n",
+      mean_voxels, all[all.size() * 95 / 100] / 0.5, all[all.size() * 99 / 100] / 0.5, all.size());
   EXPECT_LT(mean_voxels, 0.5);
   EXPECT_TRUE(check(mesh).watertight());
   EXPECT_TRUE(check(mesh).manifold());

@@ -39,7 +39,8 @@ Image changed(const Image& ct, const std::function<int(std::size_t, Vec3, int)>&
   for (int k = 0; k < ct.frame.dims[2]; ++k)
     for (int j = 0; j < ct.frame.dims[1]; ++j)
       for (int i = 0; i < ct.frame.dims[0]; ++i, ++at)
-        v[at] = static_cast<std::int16_t>(change(at, ct.frame.world_from_index({double(i), double(j), double(k)}), ct.voxels[at]));
+        v[at] = static_cast<std::int16_t>(
+            change(at, ct.frame.world_from_index({double(i), double(j), double(k)}), ct.voxels[at]));
   return {ct.frame, v};
 }
 
@@ -80,7 +81,8 @@ TEST(Ear, TheRightEarIsTheMirrorOfTheLeft) {
   Image ct = ear().ct;
   ct.frame.origin_mm.x *= -1;
   for (Vec3& c : ct.frame.direction.column) c.x *= -1;
-  const EarFindings left = find(ear().ct, "ear_canal,air_cells,tegmen"), right = find(ct, "ear_canal,air_cells,tegmen", Side::right);
+  const EarFindings left = find(ear().ct, "ear_canal,air_cells,tegmen"),
+                    right = find(ct, "ear_canal,air_cells,tegmen", Side::right);
   ASSERT_EQ(left.findings.size(), right.findings.size());
   for (std::size_t i = 0; i < ct.frame.voxel_count(); ++i) ASSERT_EQ(left.labels.voxels[i], right.labels.voxels[i]);
   EXPECT_DOUBLE_EQ(left.drum_mm.x, -right.drum_mm.x);
@@ -155,8 +157,10 @@ TEST(Ear, NoiseMakesItUnsureRatherThanWrong) {
   const HeadAnatomy head(3);
   for (const EarFinding& f : found.findings) {
     if (!f.found) continue;
-    const Overlap o = overlap(found.labels, static_cast<std::uint8_t>(1 + static_cast<int>(f.what)), ear_truth(noisy.labels, head, f.what));
-    EXPECT_GT(o.dice, 0.5) << EnumNames<EarStructure>::values[static_cast<std::size_t>(f.what)] << " of quality " << f.quality;
+    const Overlap o = overlap(found.labels, static_cast<std::uint8_t>(1 + static_cast<int>(f.what)),
+                              ear_truth(noisy.labels, head, f.what));
+    EXPECT_GT(o.dice, 0.5) << EnumNames<EarStructure>::values[static_cast<std::size_t>(f.what)] << " of quality "
+                           << f.quality;
   }
 }
 

@@ -17,7 +17,8 @@ inline constexpr Vec3 kTrueDrum{45, 0, -20};
 inline Image scaled(const Image& ct, double factor) {
   const std::size_t n = ct.frame.voxel_count();
   const auto v = make_voxels<std::int16_t>(n);
-  for (std::size_t i = 0; i < n; ++i) v[i] = static_cast<std::int16_t>(std::clamp(std::lround(ct.voxels[i] * factor), -1024L, 3071L));
+  for (std::size_t i = 0; i < n; ++i)
+    v[i] = static_cast<std::int16_t>(std::clamp(std::lround(ct.voxels[i] * factor), -1024L, 3071L));
   return {ct.frame, v};
 }
 
@@ -27,7 +28,8 @@ inline std::vector<bool> held_part(const HeadAnatomy& head) {
   std::vector<bool> held(line.size());
   std::vector<double> share(line.size());
   for (std::size_t i = 1; i + 1 < line.size(); ++i) {
-    const Vec3 along = normalized(line[i + 1].at_mm - line[i - 1].at_mm), u = any_perpendicular(along), v = cross(along, u);
+    const Vec3 along = normalized(line[i + 1].at_mm - line[i - 1].at_mm), u = any_perpendicular(along),
+               v = cross(along, u);
     int n = 0;
     for (int q = 0; q < 64; ++q) {
       const double a = 2 * std::numbers::pi * q / 64;
@@ -47,7 +49,8 @@ inline std::vector<bool> held_part(const HeadAnatomy& head) {
   const auto end_of = [&](int step) {
     std::size_t end = middle;
     double since = 0;
-    for (auto i = static_cast<std::ptrdiff_t>(middle); i > 0 && i + 1 < static_cast<std::ptrdiff_t>(line.size()); i += step) {
+    for (auto i = static_cast<std::ptrdiff_t>(middle); i > 0 && i + 1 < static_cast<std::ptrdiff_t>(line.size());
+         i += step) {
       const auto at = static_cast<std::size_t>(i);
       since += length(line[at].at_mm - line[static_cast<std::size_t>(i - step)].at_mm);
       if (share[at] >= 0.5) end = at, since = 0;
@@ -80,7 +83,8 @@ inline std::vector<std::uint8_t> ear_truth(const Labels& labels, const HeadAnato
     case EarStructure::air_cells:
       for (std::size_t i = 0; i < n; ++i) {
         const Vec3 d = place(i) - kTrueDrum;
-        m[i] = (is(i, Tissue::air_cells) || is(i, Tissue::tympanic_cavity)) && d.x > -9 && d.y > -12 && d.z > -36 && d.x < 42;
+        m[i] = (is(i, Tissue::air_cells) || is(i, Tissue::tympanic_cavity)) && d.x > -9 && d.y > -12 && d.z > -36 &&
+               d.x < 42;
       }
       break;
     case EarStructure::sigmoid_sinus: {
@@ -91,7 +95,8 @@ inline std::vector<std::uint8_t> ear_truth(const Labels& labels, const HeadAnato
         const Vec3 p = place(i);
         std::size_t best = 0;
         for (std::size_t q = 0; q < line.size(); ++q)
-          if (length(line[q].at_mm - p) - line[q].radius_mm < length(line[best].at_mm - p) - line[best].radius_mm) best = q;
+          if (length(line[q].at_mm - p) - line[q].radius_mm < length(line[best].at_mm - p) - line[best].radius_mm)
+            best = q;
         m[i] = held[best];
       }
       break;
@@ -133,7 +138,8 @@ inline std::vector<std::uint8_t> ear_truth(const Labels& labels, const HeadAnato
           for (int i = 0; i < nx; ++i)
             for (int y = std::max(0, j - r); y <= std::min(ny - 1, j + r); ++y)
               for (int x = std::max(0, i - r); x <= std::min(nx - 1, i + r); ++x)
-                if (std::hypot(x - i, y - j) * f.spacing_mm.x <= reach && a[static_cast<std::size_t>(y * nx + x)] == value)
+                if (std::hypot(x - i, y - j) * f.spacing_mm.x <= reach &&
+                    a[static_cast<std::size_t>(y * nx + x)] == value)
                   b[static_cast<std::size_t>(j * nx + i)] = value;
         return b;
       };
@@ -218,8 +224,8 @@ inline Overlap overlap(const Labels& found, std::uint8_t value, const std::vecto
         for (int i = 0; i < nx; ++i, ++at) {
           if (!m[at]) continue;
           const auto x = static_cast<std::size_t>(nx), y = x * static_cast<std::size_t>(ny);
-          s[at] = (i > 0 && !m[at - 1]) || (i + 1 < nx && !m[at + 1]) || (j > 0 && !m[at - x]) || (j + 1 < ny && !m[at + x]) ||
-                  (k > 0 && !m[at - y]) || (k + 1 < nz && !m[at + y]);
+          s[at] = (i > 0 && !m[at - 1]) || (i + 1 < nx && !m[at + 1]) || (j > 0 && !m[at - x]) ||
+                  (j + 1 < ny && !m[at + x]) || (k > 0 && !m[at - y]) || (k + 1 < nz && !m[at + y]);
         }
     return s;
   };

@@ -95,10 +95,12 @@ inline Image make_tube_ct(const Line& line, const TubeCt& s) {
   };
   std::vector<Ball> cells;
   for (int i = 0; s.cellular && i < 6000; ++i) {
-    const Vec3 c{lo.x + (hi.x - lo.x) * unit(random), lo.y + (hi.y - lo.y) * unit(random), lo.z + (hi.z - lo.z) * unit(random)};
+    const Vec3 c{lo.x + (hi.x - lo.x) * unit(random), lo.y + (hi.y - lo.y) * unit(random),
+                 lo.z + (hi.z - lo.z) * unit(random)};
     const double r = 1 + unit(random);
     if (distance_to(line, c) < line.radius_mm + r + 0.8) continue;
-    if (std::any_of(cells.begin(), cells.end(), [&](const Ball& b) { return length(b.c - c) < b.r + r + 0.4; })) continue;
+    if (std::any_of(cells.begin(), cells.end(), [&](const Ball& b) { return length(b.c - c) < b.r + r + 0.4; }))
+      continue;
     cells.push_back({c, r});
   }
   const auto value = [&](Vec3 p) {
@@ -127,7 +129,8 @@ inline Image make_tube_ct(const Line& line, const TubeCt& s) {
     std::vector<float> w(n);
     for (std::size_t at = 0; at < n; ++at) {
       const std::size_t i = at / stride % static_cast<std::size_t>(f.dims[a]);
-      const float before = i > 0 ? v[at - stride] : v[at], after = i + 1 < static_cast<std::size_t>(f.dims[a]) ? v[at + stride] : v[at];
+      const float before = i > 0 ? v[at - stride] : v[at],
+                  after = i + 1 < static_cast<std::size_t>(f.dims[a]) ? v[at + stride] : v[at];
       w[at] = (before + 4 * v[at] + after) / 6;
     }
     v = w;

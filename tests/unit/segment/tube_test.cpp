@@ -155,8 +155,10 @@ TEST(Tube, SameForAnyNumberOfThreads) {
 TEST(Tube, Refusals) {
   const Line line = straight_line(1);
   const Image ct = make_tube_ct(line, {});
-  const Vec3 one[] = {line.points[3]}, same[] = {line.points[3], line.points[3]}, outside[] = {line.points[3], {100, 0, 0}};
-  for (const std::span<const Vec3> points : {std::span<const Vec3>(one), std::span<const Vec3>(same), std::span<const Vec3>(outside)}) {
+  const Vec3 one[] = {line.points[3]}, same[] = {line.points[3], line.points[3]},
+             outside[] = {line.points[3], {100, 0, 0}};
+  for (const std::span<const Vec3> points :
+       {std::span<const Vec3>(one), std::span<const Vec3>(same), std::span<const Vec3>(outside)}) {
     try {
       (void)trace_tube(ct, points, {});
       ADD_FAILURE();

@@ -30,7 +30,8 @@ SoundState burr(Edge edge, double rpm, double press_n, double diameter_mm = 4, d
   return s;
 }
 
-std::vector<float> play(Synthesizer& s, const SoundState& state, double seconds, std::size_t block = Synthesizer::kBlock) {
+std::vector<float> play(Synthesizer& s, const SoundState& state, double seconds,
+                        std::size_t block = Synthesizer::kBlock) {
   std::vector<float> out(static_cast<std::size_t>(seconds * kRate) / block * block);
   for (std::size_t at = 0; at < out.size(); at += block) s.render(state, 1, std::span(out).subspan(at, block));
   return out;
@@ -49,7 +50,8 @@ double line_amplitude(const std::vector<float>& x, double hz) {
   const std::complex<double> step = std::polar(1.0, -2 * std::numbers::pi * hz / kRate);
   std::complex<double> turn = 1;
   for (std::size_t i = 0; i < x.size(); ++i) {
-    const double w = 1 - std::cos(2 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(x.size()));
+    const double w =
+        1 - std::cos(2 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(x.size()));
     sum += w * static_cast<double>(x[i]) * turn;
     weight += w;
     turn *= step;
@@ -85,7 +87,8 @@ TEST(Synthesizer, LinesAreWithinAHertzAndADecibelOfTheTable) {
       const BurrSpectrum table = burr_spectrum(state.voices[0], model);
       const std::vector<float> x = steady(state, 2);
       for (const SoundLine& line : table.lines) {
-        // In 2 s it stands out of the noise beside it, which is 37 dB weaker in a hertz than in all, only where it is not much weaker.
+        // In 2 s it stands out of the noise beside it, which is 37 dB weaker in a hertz than in all, only where it is
+        // not much weaker.
         if (line.db < table.noise_db + envelope_db(line.hz) - 20 || line.db < 0) continue;
         ++compared;
         double best_hz = 0, best = 0;
@@ -94,7 +97,8 @@ TEST(Synthesizer, LinesAreWithinAHertzAndADecibelOfTheTable) {
           if (a > best) best = a, best_hz = hz;
         }
         EXPECT_NEAR(best_hz, line.hz, 1) << rpm << " rpm, " << press << " N";
-        EXPECT_NEAR(db_of(best / std::numbers::sqrt2, model), line.db, 1) << line.hz << " Hz, " << rpm << " rpm, " << press << " N";
+        EXPECT_NEAR(db_of(best / std::numbers::sqrt2, model), line.db, 1)
+            << line.hz << " Hz, " << rpm << " rpm, " << press << " N";
       }
     }
   }
@@ -188,7 +192,8 @@ TEST(Synthesizer, NothingClicks) {
   // Without any change: amplitude times angle of the lines, and the noise of a burr that runs free.
   const std::vector<float> free = steady(loud, 1);
   double usual = 0;
-  for (std::size_t i = 1; i < free.size(); ++i) usual = std::max(usual, std::abs(static_cast<double>(free[i] - free[i - 1])));
+  for (std::size_t i = 1; i < free.size(); ++i)
+    usual = std::max(usual, std::abs(static_cast<double>(free[i] - free[i - 1])));
   EXPECT_LT(step, 1.5 * usual);
   // Silence stays silence, to the last bit.
   for (int i = 0; i < 3; ++i) s.render({}, 1, out);
@@ -199,8 +204,16 @@ TEST(Synthesizer, NothingClicks) {
 TEST(Synthesizer, WhateverTheStateSamplesAreFiniteAndBelowOne) {
   std::mt19937 random(5);
   const auto any = [&]() -> double {
-    static constexpr double kOdd[] = {
-        0, -1, 1e300, -1e300, 1e-300, 0.5, 3, 60000, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()};
+    static constexpr double kOdd[] = {0,
+                                      -1,
+                                      1e300,
+                                      -1e300,
+                                      1e-300,
+                                      0.5,
+                                      3,
+                                      60000,
+                                      std::numeric_limits<double>::infinity(),
+                                      std::numeric_limits<double>::quiet_NaN()};
     return kOdd[random() % std::size(kOdd)];
   };
   Synthesizer s;
@@ -253,7 +266,8 @@ TEST(Synthesizer, WaterGurglesMetalRingsAlarmsBeep) {
     const std::vector<float> x = steady(sucks, 6);
     double least = 1e9, most = 0;
     for (std::size_t at = 0; at + 960 <= x.size(); at += 960) {
-      const double r = rms({x.begin() + static_cast<std::ptrdiff_t>(at), x.begin() + static_cast<std::ptrdiff_t>(at + 960)});
+      const double r =
+          rms({x.begin() + static_cast<std::ptrdiff_t>(at), x.begin() + static_cast<std::ptrdiff_t>(at + 960)});
       least = std::min(least, r);
       most = std::max(most, r);
     }

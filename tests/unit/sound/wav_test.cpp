@@ -38,7 +38,8 @@ TEST(Wav, IsWhatReadersExpect) {
 
 TEST(Wav, WholeOrNotAtAll) {
   const test::ScratchFolder folder;
-  EXPECT_THROW(write_wav(folder / "a.wav", 48000, [](std::vector<float>&) -> bool { throw Error(ExitCode::corrupt, "in the middle"); }),
+  EXPECT_THROW(write_wav(folder / "a.wav", 48000,
+                         [](std::vector<float>&) -> bool { throw Error(ExitCode::corrupt, "in the middle"); }),
                Error);
   EXPECT_FALSE(std::filesystem::exists(folder / "a.wav"));
   EXPECT_THROW(write_wav(folder.path() / "none" / "a.wav", 48000, [](std::vector<float>&) { return false; }), Error);

@@ -17,7 +17,8 @@ struct LengthStage {
     return {.name = "length",
             .synopsis = "how long",
             .description = {},
-            .inputs = {{"text", {DataKind::document}, "one"}, {"more", {DataKind::document, DataKind::picture}, "another", true}},
+            .inputs = {{"text", {DataKind::document}, "one"},
+                       {"more", {DataKind::document, DataKind::picture}, "another", true}},
             .outputs = {{"length", {DataKind::document}, "its length"}},
             .references = {},
             .example = {}};

@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "meshes.h"
+#include "osteo/app/stages/segment.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/data/tet_mesh.h"
-#include "osteo/app/stages/segment.h"
 
 namespace osteo {
 namespace {
@@ -100,7 +100,8 @@ TEST(Tetrahedralize, EveryMethodFillsTheBall) {
   const TriangleSoup ball = test::sphere(6, 3, {10, 0, -4});
   const double volume = enclosed_volume_mm3(mesh_of(ball));
   const Data in = surface(ball);
-  for (const TetMethod method : {TetMethod::grid, TetMethod::grid_conforming, TetMethod::graded, TetMethod::tetgen, TetMethod::cgal}) {
+  for (const TetMethod method :
+       {TetMethod::grid, TetMethod::grid_conforming, TetMethod::graded, TetMethod::tetgen, TetMethod::cgal}) {
     const std::string name(EnumNames<TetMethod>::values[static_cast<std::size_t>(method)]);
     if (method == TetMethod::cgal && copyleft_parts().find("CGAL") == std::string_view::npos) continue;
     if (method == TetMethod::tetgen && copyleft_parts().find("TetGen") == std::string_view::npos) continue;
@@ -163,7 +164,8 @@ Image canal(bool bent) {
     for (int j = 0; j < f.dims[1]; ++j)
       for (int i = 0; i < f.dims[0]; ++i) {
         const Vec3 p = f.world_from_index({double(i), double(j), double(k)}), q = p - Vec3{13, 13, 6};
-        const double ring = std::hypot(std::hypot(q.x, std::min(q.y, 0.0)) - 7, q.z) + (q.y > 0 ? std::max(0.0, q.y - 2) : 0);
+        const double ring =
+            std::hypot(std::hypot(q.x, std::min(q.y, 0.0)) - 7, q.z) + (q.y > 0 ? std::max(0.0, q.y - 2) : 0);
         const double d = bent ? ring : std::hypot(q.y, q.z) + std::max(0.0, std::abs(q.x) - 7);
         voxels[n++] = static_cast<std::int16_t>(40 + 1460 * std::clamp((d - 1) / 0.5 + 0.5, 0.0, 1.0));
       }

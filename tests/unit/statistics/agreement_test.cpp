@@ -1,4 +1,5 @@
-// Agreement of raters: tables of textbooks, other people's programs, and what happens when there is nothing to agree about.
+// Agreement of raters: tables of textbooks, other people's programs, and what happens when there is nothing to agree
+// about.
 #include "osteo/core/statistics/agreement.h"
 
 #include "osteo/core/base/error.h"
@@ -46,8 +47,8 @@ TEST(Kappa, OfATextbook) {
 TEST(Kappa, AsStatsmodels) {
   const Json r = reference("agreement");
   const auto a = wholes(r, "a"), b = wholes(r, "b");
-  for (const auto& [name, weights] :
-       {std::pair{"none", Weights::none}, std::pair{"linear", Weights::linear}, std::pair{"quadratic", Weights::quadratic}}) {
+  for (const auto& [name, weights] : {std::pair{"none", Weights::none}, std::pair{"linear", Weights::linear},
+                                      std::pair{"quadratic", Weights::quadratic}}) {
     const Json& expected = *r.find("kappa")->find(name);
     const Kappa k = cohen_kappa(a, b, 5, weights);
     expect_same(k.value, number(expected, "value"), name);

@@ -184,7 +184,8 @@ TEST(Correlation, WhatIsHeldMayLeaveNothing) {
   std::vector<double> twice = y;
   for (double& v : twice) v *= 2;
   const std::vector<double> other{5, 1, 2, 8, 3, 4};
-  EXPECT_TRUE(std::isnan(partial_pearson(x, other, std::vector<std::vector<double>>{y, twice}).r)) << "one follows from the other";
+  EXPECT_TRUE(std::isnan(partial_pearson(x, other, std::vector<std::vector<double>>{y, twice}).r))
+      << "one follows from the other";
   EXPECT_TRUE(std::isnan(partial_pearson(std::span(x).first(3), std::span(y).first(3), just({1, 5, 2})).r));
   EXPECT_TRUE(std::isfinite(partial_pearson(x, y, just(other)).r));
   EXPECT_THROW(static_cast<void>(partial_pearson(x, y, just({1, 2}))), Error);
@@ -240,7 +241,8 @@ TEST(PassMark, HalfWayOfEqualSpreads) {
   EXPECT_TRUE(std::isnan(contrasting_groups(better, std::vector<double>{1, 1, 1}).mark.value));
   EXPECT_TRUE(std::isnan(contrasting_groups(std::vector<double>{4}, worse).mark.value));
   // One spread so much wider that the curves do not cross between the means.
-  EXPECT_TRUE(std::isnan(contrasting_groups(std::vector<double>{-9, 0.05, 9.1}, std::vector<double>{-0.1, 0, 0.1}).mark.value));
+  EXPECT_TRUE(
+      std::isnan(contrasting_groups(std::vector<double>{-9, 0.05, 9.1}, std::vector<double>{-0.1, 0, 0.1}).mark.value));
 }
 
 TEST(Power, AsTheNonCentralT) {

@@ -22,12 +22,14 @@ TEST(Smoothness, PublishedOracles) {
   const auto bell = sampled(-1, 2, 100, [](double t) { return std::exp(-5 * t * t); });
   EXPECT_NEAR(sparc(bell, 100), -1.41403, 5e-6);
   EXPECT_NEAR(log_dimensionless_jerk(bell, 100), -5.81636, 5e-6);
-  for (const auto& [rate, expected_sparc, expected_jerk] : {std::array{100.0, -1.4058, -5.224}, std::array{1000.0, -1.4024, -5.312}}) {
+  for (const auto& [rate, expected_sparc, expected_jerk] :
+       {std::array{100.0, -1.4058, -5.224}, std::array{1000.0, -1.4024, -5.312}}) {
     const auto reach = sampled(0, 1, rate, minimum_jerk);
     EXPECT_NEAR(sparc(reach, rate), expected_sparc, 5e-5);
     EXPECT_NEAR(log_dimensionless_jerk(reach, rate), expected_jerk, 5e-4);
   }
-  for (const auto& [rate, expected_sparc, expected_jerk] : {std::array{100.0, -1.764, -6.970}, std::array{1000.0, -1.750, -7.050}}) {
+  for (const auto& [rate, expected_sparc, expected_jerk] :
+       {std::array{100.0, -1.764, -6.970}, std::array{1000.0, -1.750, -7.050}}) {
     const auto two = sampled(0, 1.6, rate, [](double t) { return minimum_jerk(t) + minimum_jerk(t - 0.6); });
     EXPECT_NEAR(sparc(two, rate), expected_sparc, 5e-4);
     EXPECT_NEAR(log_dimensionless_jerk(two, rate), expected_jerk, 5e-4);
@@ -59,7 +61,8 @@ TEST(Smoothness, OfShapeOnly) {
   EXPECT_LT(log_dimensionless_jerk(shaky, 1000), log_dimensionless_jerk(reach, 1000) - 1);
 }
 
-// Ten micrometres of noise at 1 kHz: jerk without a filter is nothing but it, SPARC hardly notices (evidence.md 1.6: -25.0, -8.8, -1.408).
+// Ten micrometres of noise at 1 kHz: jerk without a filter is nothing but it, SPARC hardly notices (evidence.md 1.6:
+// -25.0, -8.8, -1.408).
 TEST(Smoothness, OfNoisyPositions) {
   Random random(11);
   std::vector<std::array<double, 3>> positions;

@@ -43,7 +43,8 @@ TEST(WithinPeople, UnevenOnesByCountingAll) {
   const WithinPeople more = permutation_within_people(values, more_people, more_conditions);
   EXPECT_EQ(more.left_out, 1U);
   EXPECT_EQ(more.p, w.p);
-  EXPECT_TRUE(std::isnan(permutation_within_people(std::vector<double>{1}, std::vector<int>{1}, std::vector<int>{1}).p));
+  EXPECT_TRUE(
+      std::isnan(permutation_within_people(std::vector<double>{1}, std::vector<int>{1}, std::vector<int>{1}).p));
 }
 
 TEST(MixedModel, AsFortyDigitsOfItsDefinition) {
@@ -87,7 +88,8 @@ TEST(MixedModel, BalancedIsTheAnalysisOfVariance) {
   }
   const MixedModel m = mixed_model(y, design, 3, person);
   // Between: Student's t of the people's means.
-  const double pooled = (variance(group_means[0]) + variance(group_means[1])) / 2, difference = mean(group_means[1]) - mean(group_means[0]);
+  const double pooled = (variance(group_means[0]) + variance(group_means[1])) / 2,
+               difference = mean(group_means[1]) - mean(group_means[0]);
   EXPECT_NEAR(m.coefficients[1].value, difference, 1e-9);
   EXPECT_NEAR(m.coefficients[1].t, difference / std::sqrt(pooled * 2 / 5), 1e-7);
   EXPECT_NEAR(m.coefficients[1].df, people - 2, 1e-6);
@@ -152,7 +154,8 @@ double loss(const MonotoneCurve& c, const std::vector<double>& x, const std::vec
 TEST(Isotonic, AsScikitLearnAndALinearProgramme) {
   const Json r = reference("isotonic");
   const auto x = numbers(r, "x"), y = numbers(r, "y");
-  const MonotoneCurve rising = isotonic_mean(x, y, Trend::rising, numbers(r, "weights")), falling = isotonic_mean(x, y, Trend::falling);
+  const MonotoneCurve rising = isotonic_mean(x, y, Trend::rising, numbers(r, "weights")),
+                      falling = isotonic_mean(x, y, Trend::falling);
   EXPECT_EQ(rising.x, numbers(r, "places"));
   expect_same(rising.y, numbers(r, "rising_weighted"));
   expect_same(falling.y, numbers(r, "falling"));

@@ -1,4 +1,5 @@
-// A study from its first file to its report: what is written, what is refused and where, and what the analysis says of too little.
+// A study from its first file to its report: what is written, what is refused and where, and what the analysis says of
+// too little.
 #include "osteo/assessment/study/study.h"
 
 #include <gtest/gtest.h>
@@ -9,10 +10,10 @@
 #include <regex>
 #include <set>
 
+#include "osteo/assessment/study/analysis.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/statistics/basics.h"
-#include "osteo/assessment/study/analysis.h"
 #include "scratch.h"
 
 namespace osteo::study {
@@ -38,7 +39,8 @@ Study example(int each = 7, int raters = 3, Plan plan = plan_of()) {
   s.metrics = {"seconds", "noise"};
   statistics::Random random(3);
   for (std::size_t g = 0; g < s.plan.groups.size(); ++g) {
-    for (int i = 0; i < each; ++i) s.participants.push_back({s.plan.groups[g].substr(0, 1) + std::to_string(i), s.plan.groups[g]});
+    for (int i = 0; i < each; ++i)
+      s.participants.push_back({s.plan.groups[g].substr(0, 1) + std::to_string(i), s.plan.groups[g]});
   }
   for (int r = 0; r < raters; ++r) s.raters.push_back({"R" + std::to_string(r + 1), {}});
   for (const Participant& p : s.participants) {
@@ -48,7 +50,8 @@ Study example(int each = 7, int raters = 3, Plan plan = plan_of()) {
       const double now = skill + 0.3 * random.normal();
       one.metrics["seconds"] = 600 - 100 * now + 10 * random.normal();
       one.metrics["noise"] = random.normal();
-      for (RaterSheet& r : s.raters) r.sessions[one.blind]["overall"] = std::clamp(std::round(2.2 + now + 0.4 * random.normal()), 1.0, 5.0);
+      for (RaterSheet& r : s.raters)
+        r.sessions[one.blind]["overall"] = std::clamp(std::round(2.2 + now + 0.4 * random.normal()), 1.0, 5.0);
       s.sessions.push_back(std::move(one));
     }
   }
@@ -112,12 +115,14 @@ TEST_F(InAFolder, GrowsAndIsReadAgain) {
   EXPECT_EQ(add_participant(folder_, "K-7", "novice"), "K-7");
   EXPECT_EQ(add_participant(folder_, "", "novice"), "P02");
   std::vector<std::string> notes;
-  const std::string first =
-      add_session(folder_, "P01", "left", 1, file("a.json", "{\"seconds\": 10.5, \"who\": \"x\", \"volume_mm3\": 3}"), notes);
+  const std::string first = add_session(
+      folder_, "P01", "left", 1, file("a.json", "{\"seconds\": 10.5, \"who\": \"x\", \"volume_mm3\": 3}"), notes);
   ASSERT_EQ(notes.size(), 1U);
   EXPECT_NE(notes[0].find("'who' is no number"), std::string::npos);
-  const std::string second = add_session(folder_, "K-7", "left", 1, file("b.csv", "seconds,\"peak, N\"\r\n20,1.5\r\n"), notes);
-  add_session(folder_, "K-7", "left", 2, file("c.json", "[{\"name\": \"seconds\", \"value\": 30, \"unit\": \"s\"}]"), notes);
+  const std::string second =
+      add_session(folder_, "K-7", "left", 1, file("b.csv", "seconds,\"peak, N\"\r\n20,1.5\r\n"), notes);
+  add_session(folder_, "K-7", "left", 2, file("c.json", "[{\"name\": \"seconds\", \"value\": 30, \"unit\": \"s\"}]"),
+              notes);
   add_session(folder_, "K-7", "right", 1, file("d.json", "{\"metrics\": {\"seconds\": 40}}"), notes);
   const Study s = read_study(folder_);
   EXPECT_EQ(s.metrics, (std::vector<std::string>{"seconds", "volume_mm3", "peak, N"}));
@@ -162,7 +167,9 @@ TEST_F(InAFolder, EveryFaultNamesFileAndLine) {
     fs::remove(folder_ / name);
     return said.find(name) == std::string::npos ? "file not named: " + said : said;
   };
-  const auto has = [](const std::string& said, const std::string& what) { EXPECT_NE(said.find(what), std::string::npos) << said; };
+  const auto has = [](const std::string& said, const std::string& what) {
+    EXPECT_NE(said.find(what), std::string::npos) << said;
+  };
   has(fault("participants.csv", "participant,group\nA,novice\nA,expert\n"), "line 3: 'A' is there twice");
   has(fault("participants.csv", "participant,group\nA,nurse\n"), "line 2: 'nurse' is none of the groups");
   has(fault("participants.csv", "participant,group\nA,novice,1\n"), "line 2: 3 fields");
@@ -180,18 +187,24 @@ TEST_F(InAFolder, EveryFaultNamesFileAndLine) {
   write_file(folder_ / "sessions.csv", head + "X,A,left,1,NaN\n");
   EXPECT_TRUE(read_study(folder_).sessions[0].metrics.empty());
   has(fault("ratings/R.json",
-            "{\"osteotome_ratings\": 1, \"rater\": \"R\", \"ratings\": [\n{\"session\": \"X\", \"item\": \"overall\", \"value\": 9}]}"),
+            "{\"osteotome_ratings\": 1, \"rater\": \"R\", \"ratings\": [\n{\"session\": \"X\", \"item\": \"overall\", "
+            "\"value\": 9}]}"),
       "line 2");
   has(fault("ratings/R.json",
-            "{\"osteotome_ratings\": 1, \"rater\": \"R\", \"ratings\": [\n{\"session\": \"Q\", \"item\": \"overall\", \"value\": 3}]}"),
+            "{\"osteotome_ratings\": 1, \"rater\": \"R\", \"ratings\": [\n{\"session\": \"Q\", \"item\": \"overall\", "
+            "\"value\": 3}]}"),
       "no session 'Q'");
   has(fault("ratings/R.json",
-            "{\"osteotome_ratings\": 1, \"rater\": \"R\", \"ratings\": [\n{\"session\": \"X\", \"item\": \"care\", \"value\": 3}]}"),
+            "{\"osteotome_ratings\": 1, \"rater\": \"R\", \"ratings\": [\n{\"session\": \"X\", \"item\": \"care\", "
+            "\"value\": 3}]}"),
       "'care' is none");
-  has(fault("ratings/R.json", "{\"osteotome_ratings\": 1, \"study\": \"other\", \"rater\": \"R\", \"ratings\": []}"), "of another study");
+  has(fault("ratings/R.json", "{\"osteotome_ratings\": 1, \"study\": \"other\", \"rater\": \"R\", \"ratings\": []}"),
+      "of another study");
   has(fault("study.json", "{\"osteotome_study\": 1,\n\"groups\": [\"a\"], \"cases\": [\"c\"], \"grops\": 1}"), "grops");
-  has(fault("study.json", "{\"osteotome_study\": 1, \"groups\": [\"a\", \"a\"], \"cases\": [\"c\"]}"), "groups name one twice");
-  has(fault("study.json", "{\"osteotome_study\": 1, \"groups\": [\"a\"], \"cases\": [\"c\"], \"competent\": \"b\"}"), "competent is 'b'");
+  has(fault("study.json", "{\"osteotome_study\": 1, \"groups\": [\"a\", \"a\"], \"cases\": [\"c\"]}"),
+      "groups name one twice");
+  has(fault("study.json", "{\"osteotome_study\": 1, \"groups\": [\"a\"], \"cases\": [\"c\"], \"competent\": \"b\"}"),
+      "competent is 'b'");
   EXPECT_NE(message_of([&] { static_cast<void>(read_study(root_ / "none")); }).find("is no study"), std::string::npos);
 }
 
@@ -207,7 +220,8 @@ TEST(Form, HoldsWhatARaterMayKnowAndNothingElse) {
   EXPECT_EQ(one.find("http:"), std::string::npos);
   EXPECT_EQ(one.find("https:"), std::string::npos);
   EXPECT_EQ(one.find("</script><b>"), std::string::npos);
-  EXPECT_FALSE(std::regex_search(one, std::regex("(19|20)[0-9]{2}[-./][0-9]{1,2}|[0-9]{1,2}[./-](19|20)[0-9]{2}"))) << "a date";
+  EXPECT_FALSE(std::regex_search(one, std::regex("(19|20)[0-9]{2}[-./][0-9]{1,2}|[0-9]{1,2}[./-](19|20)[0-9]{2}")))
+      << "a date";
   EXPECT_LT(one.find("\"B"), one.size());
   EXPECT_THROW(static_cast<void>(form_html(s, "Dr. Miller")), Error);
   s.sessions.clear();
@@ -238,11 +252,11 @@ TEST(Form, OrderFollowsSeedAndRaterAndNotHowSessionsWereAdded) {
 TEST(Ratings, WhatIsMissingIsTold) {
   const Study s = example(1, 0);
   std::vector<std::string> notes;
-  const RaterSheet r = read_ratings(
-      "{\"osteotome_ratings\": 1, \"study\": \"" + study_id(s.plan) +
-          "\", \"rater\": \"R1\", \"ratings\": [{\"session\": \"B0\", \"item\": \"overall\", \"value\": 4}, {\"session\": \"B1\", "
-          "\"item\": \"overall\", \"value\": null}]}",
-      "r.json", s, notes);
+  const RaterSheet r = read_ratings("{\"osteotome_ratings\": 1, \"study\": \"" + study_id(s.plan) +
+                                        "\", \"rater\": \"R1\", \"ratings\": [{\"session\": \"B0\", \"item\": "
+                                        "\"overall\", \"value\": 4}, {\"session\": \"B1\", "
+                                        "\"item\": \"overall\", \"value\": null}]}",
+                                    "r.json", s, notes);
   EXPECT_EQ(r.sessions.at("B0").at("overall"), 4);
   EXPECT_FALSE(r.sessions.at("B1").at("overall"));
   ASSERT_EQ(notes.size(), 2U);
@@ -271,7 +285,8 @@ TEST(Analyse, FindsWhatWasPutIn) {
   EXPECT_LT(number(a.json.find("roc")->items()[1], {"area", "value"}), 0.1);
   EXPECT_FALSE(*a.json.find("pass_marks")->items()[1].find("higher_is_better")->flag());
   EXPECT_GT(number(a.json, {"agreement", "overall", "icc_a_1", "value"}), 0.5);
-  EXPECT_GT(number(a.json, {"agreement", "overall", "icc_a_k", "value"}), number(a.json, {"agreement", "overall", "icc_a_1", "value"}));
+  EXPECT_GT(number(a.json, {"agreement", "overall", "icc_a_k", "value"}),
+            number(a.json, {"agreement", "overall", "icc_a_1", "value"}));
   EXPECT_NEAR(number(a.json.find("power")->items()[0], {"detectable_effect"}), 1.65, 0.15);
   EXPECT_TRUE(a.json.find("refused")->empty());
   EXPECT_EQ(a.json.dump(), analyse(s, {0.95, 500}).json.dump());
@@ -338,7 +353,10 @@ TEST(Analyse, WhatIsHeldIsTakenAway) {
   EXPECT_TRUE(refused(a, "Partial correlation of seconds", "among what is held"));
   EXPECT_NE(sheet_html(a.sheet).find("r, held"), std::string::npos);
   EXPECT_EQ(sheet_html(plain.sheet).find("held"), std::string::npos);
-  EXPECT_NE(message_of([&] { static_cast<void>(analyse(s, {0.95, 200, {"second"}})); }).find("'second' is no metric"), std::string::npos);
+  EXPECT_NE(message_of([&] {
+              static_cast<void>(analyse(s, {0.95, 200, {"second"}}));
+            }).find("'second' is no metric"),
+            std::string::npos);
 }
 
 TEST(Analyse, MissingRatingsAndMetrics) {
@@ -380,7 +398,8 @@ TEST(Analyse, ThreePeople) {
   EXPECT_TRUE(refused(a, "Power", "two people"));
   // Said once for each pair of groups, not for each outcome.
   int said = 0;
-  for (const Json& r : a.json.find("refused")->items()) said += r.find("what")->text()->starts_with("Comparison") ? 1 : 0;
+  for (const Json& r : a.json.find("refused")->items())
+    said += r.find("what")->text()->starts_with("Comparison") ? 1 : 0;
   EXPECT_EQ(said, 1);
 }
 

@@ -69,7 +69,8 @@ TEST(Tetgen, OutlivesWhatTetGenDoesNot) {
       {"touching in an edge", joined(box({0, 0, 0}, {4, 4, 4}), box({4, 4, 0}, {8, 8, 4})), 128},
       {"touching in a point", joined(box({0, 0, 0}, {4, 4, 4}), box({4, 4, 4}, {8, 8, 8})), 128},
       {"crossing", joined(sphere(5, 2), sphere(5, 2, {3, 0, 0})), 0},
-      {"nested three times", joined(joined(sphere(9, 2), sphere(6, 2)), sphere(3, 2)), enclosed_volume_mm3(mesh_of(sphere(9, 2)))},
+      {"nested three times", joined(joined(sphere(9, 2), sphere(6, 2)), sphere(3, 2)),
+       enclosed_volume_mm3(mesh_of(sphere(9, 2)))},
       {"a sliver", box({0, 0, 0}, {1e4, 1, 1e-4}), 1},
       {"tiny", test::moved(sphere(1, 2), 1e-12, {}), 0}};
   int meshed = 0;
@@ -122,7 +123,8 @@ TEST(Tetgen, SaysWhatItCannotMesh) {
   open.triangles.pop_back();
   refuses(open, "3 edges of this one are open");
   // TetGen 1.5.0 ends the program when it is given these.
-  refuses(test::joined(test::box({0, 0, 0}, {4, 4, 4}), test::box({2.1, 2.2, 2.3}, {7, 7, 7})), "6 triangles of this one do");
+  refuses(test::joined(test::box({0, 0, 0}, {4, 4, 4}), test::box({2.1, 2.2, 2.3}, {7, 7, 7})),
+          "6 triangles of this one do");
   refuses(test::joined(test::sphere(5, 2), test::sphere(5, 2, {3, 0, 0})), "does not intersect itself");
 }
 

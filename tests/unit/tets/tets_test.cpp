@@ -11,12 +11,12 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/data/tet_check.h"
 #include "osteo/geometry/distance/compare.h"
-#include "osteo/imaging/io/tet_io.h"
 #include "osteo/geometry/tets/graded_tets.h"
 #include "osteo/geometry/tets/grid_tets.h"
 #include "osteo/geometry/tets/quality.h"
 #include "osteo/geometry/tets/skin.h"
 #include "osteo/geometry/tets/stuffing.h"
+#include "osteo/imaging/io/tet_io.h"
 
 namespace osteo {
 namespace {
@@ -61,8 +61,8 @@ TEST(Quality, SeesCrossedDiagonals) {
   for (int c = 0; c < 2; ++c) {
     std::array<std::uint32_t, 8> v{};
     for (std::uint32_t n = 0; n < 8; ++n) v[n] = c + (n & 1) + 3 * (n >> 1 & 1) + 6 * (n >> 2);
-    for (const auto& t :
-         {std::array{0, 3, 5, 6}, std::array{1, 3, 5, 0}, std::array{2, 0, 6, 3}, std::array{4, 6, 0, 5}, std::array{7, 5, 3, 6}}) {
+    for (const auto& t : {std::array{0, 3, 5, 6}, std::array{1, 3, 5, 0}, std::array{2, 0, 6, 3},
+                          std::array{4, 6, 0, 5}, std::array{7, 5, 3, 6}}) {
       std::array<std::uint32_t, 4> tet{v[t[0]], v[t[1]], v[t[2]], v[t[3]]};
       m.tets.push_back(tet);
       TetMesh one;
@@ -274,7 +274,9 @@ TEST(Stuffing, KeepsThinWallsAndOpensHinges) {
   EXPECT_EQ(q.inverted, 0U);
   EXPECT_TRUE(q.boundary_closed && q.boundary_manifold);
   // What is thick enough stays as it is.
-  EXPECT_EQ(stuffed_tets_keeping(sphere(10, 3), {2, 15}, volume_mm3(stuffed_tets(sphere(10, 4), {1, 15})), 0.05, 3).spacing_mm, 2);
+  EXPECT_EQ(stuffed_tets_keeping(sphere(10, 3), {2, 15}, volume_mm3(stuffed_tets(sphere(10, 4), {1, 15})), 0.05, 3)
+                .spacing_mm,
+            2);
 }
 
 TEST(Stuffing, HingesComeApart) {

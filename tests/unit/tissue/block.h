@@ -9,7 +9,8 @@
 
 namespace osteo::test {
 
-/// The voxels of nx x ny x nz (edge h mm, the first corner at the origin) whose middle f accepts, as grid_tets() makes them.
+/// The voxels of nx x ny x nz (edge h mm, the first corner at the origin) whose middle f accepts, as grid_tets() makes
+/// them.
 struct Block {
   std::vector<Vec3> points;
   std::vector<std::array<std::uint32_t, 4>> tets;

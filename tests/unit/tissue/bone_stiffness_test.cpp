@@ -34,7 +34,8 @@ Image ct_of(Vec3 size, Vec3 spacing, const std::function<double(Vec3)>& of, Mat3
   for (int k = 0; k < f.dims[2]; ++k)
     for (int j = 0; j < f.dims[1]; ++j)
       for (int i = 0; i < f.dims[0]; ++i, ++n)
-        v[n] = static_cast<std::int16_t>(std::lround(of({(i - 1) * spacing.x, (j - 1) * spacing.y, (k - 1) * spacing.z})));
+        v[n] =
+            static_cast<std::int16_t>(std::lround(of({(i - 1) * spacing.x, (j - 1) * spacing.y, (k - 1) * spacing.z})));
   return {f, v};
 }
 
@@ -51,7 +52,9 @@ TetMesh mesh_of(const Block& b, Mat3 turn = {}) {
 std::vector<double> volumes(const Block& b) {
   std::vector<double> v;
   for (const auto& t : b.tets)
-    v.push_back(dot(cross(b.points[t[1]] - b.points[t[0]], b.points[t[2]] - b.points[t[0]]), b.points[t[3]] - b.points[t[0]]) / 6);
+    v.push_back(
+        dot(cross(b.points[t[1]] - b.points[t[0]], b.points[t[2]] - b.points[t[0]]), b.points[t[3]] - b.points[t[0]]) /
+        6);
   return v;
 }
 
@@ -83,8 +86,8 @@ TEST(BoneStiffness, LawsGiveTheirPublishedValues) {
   // The correction: as 0.877 r + 0.079 it is mostly quoted.
   d.ash_correction = true;
   EXPECT_NEAR(ash_density(1000, d), 0.877 + 0.079, 1e-3);
-  for (const StiffnessLaw law :
-       {StiffnessLaw::morgan_2003, StiffnessLaw::keller_1994, StiffnessLaw::carter_hayes_1977, StiffnessLaw::keyak_1998}) {
+  for (const StiffnessLaw law : {StiffnessLaw::morgan_2003, StiffnessLaw::keller_1994, StiffnessLaw::carter_hayes_1977,
+                                 StiffnessLaw::keyak_1998}) {
     d.law = law;
     EXPECT_EQ(young_mpa(-1000, d), 0) << static_cast<int>(law);
   }
@@ -130,7 +133,8 @@ TEST(BoneStiffness, TurnsWithTheCt) {
   const Mat3 turn{{x, y, cross(x, y)}};
   const BoneStiffness a = bone_stiffness(mesh_of(b), ct_of({6, 6, 6}, spacing, of), {}, 0);
   const BoneStiffness c = bone_stiffness(mesh_of(b, turn), ct_of({6, 6, 6}, spacing, of, turn), {}, 0);
-  for (std::size_t t = 0; t < a.young_mpa.size(); ++t) EXPECT_NEAR(a.young_mpa[t], c.young_mpa[t], 1e-4 * a.young_mpa[t]);
+  for (std::size_t t = 0; t < a.young_mpa.size(); ++t)
+    EXPECT_NEAR(a.young_mpa[t], c.young_mpa[t], 1e-4 * a.young_mpa[t]);
 }
 
 TEST(BoneStiffness, MaterialsAreAsStiffTogetherAsBefore) {
@@ -145,7 +149,8 @@ TEST(BoneStiffness, MaterialsAreAsStiffTogetherAsBefore) {
   Context one, two;
   one.threads = 1;
   two.threads = 2;
-  EXPECT_EQ(bone_stiffness(mesh_of(b), ct, {}, 0.02, one).young_mpa, bone_stiffness(mesh_of(b), ct, {}, 0.02, two).young_mpa);
+  EXPECT_EQ(bone_stiffness(mesh_of(b), ct, {}, 0.02, one).young_mpa,
+            bone_stiffness(mesh_of(b), ct, {}, 0.02, two).young_mpa);
 }
 
 TEST(BoneStiffness, AGradedBarStretchesByTheIntegralOfItsCompliance) {
@@ -201,7 +206,8 @@ TEST(BoneStiffness, WeighsByTheCt) {
   EXPECT_NEAR(weighed_density(1524, d), 1.919, 1e-3);
 }
 
-// Hung up by its end a bar that is stiffer and heavier below stretches by the integral of what hangs below each place over EA.
+// Hung up by its end a bar that is stiffer and heavier below stretches by the integral of what hangs below each place
+// over EA.
 TEST(BoneStiffness, AGradedBarHangsByItsOwnWeight) {
   const int n = 24;
   const Block b = block(3, 3, n, 1.0);
@@ -248,7 +254,8 @@ TEST(BoneStiffness, AGradedBarHangsByItsOwnWeight) {
     }
     const auto u = test::by_calculix(inp, body.point_count());
     ASSERT_EQ(u.size(), body.point_count());
-    for (std::size_t p = 0; p < u.size(); ++p) ASSERT_LT(length(u[p] - (r.points_mm[p] - body.rest()[p])), 1e-5 * tip) << p;
+    for (std::size_t p = 0; p < u.size(); ++p)
+      ASSERT_LT(length(u[p] - (r.points_mm[p] - body.rest()[p])), 1e-5 * tip) << p;
   }
   // No weight without density, and none among forces that was to be apart.
   const FemBody light(b.points, b.tets, {{100, 0.3}}, ElasticLaw::linear, TetOrder::t4);
@@ -260,7 +267,9 @@ TEST(BoneStiffness, AGradedBarHangsByItsOwnWeight) {
 
 TEST(BoneStiffness, SaysWhatItLimitsAndRefuses) {
   const Block b = block(4, 4, 4, 1.0);
-  const Image ct = ct_of({4, 4, 4}, {0.5, 0.5, 0.5}, [](Vec3 p) { return p.x < 0.9 ? -1000 : p.x > 3.1 ? 20000 : 800; });
+  const Image ct = ct_of({4, 4, 4}, {0.5, 0.5, 0.5}, [](Vec3 p) {
+    return p.x < 0.9 ? -1000 : p.x > 3.1 ? 20000 : 800;
+  });
   const BoneDensity d;
   const BoneStiffness s = bone_stiffness(mesh_of(b), ct, d);
   EXPECT_GT(s.share_above, 0.1);

@@ -159,7 +159,8 @@ TEST(Calibrate, AMapFindsMaterialsItIsNotToldOf) {
   for (std::size_t s = 1; s < r.cost.size(); ++s) EXPECT_LE(r.cost[s], r.cost[s - 1]);
 }
 
-// A coarse search does no harm, and is the same each time; from far off it finds what the closed form would have led to.
+// A coarse search does no harm, and is the same each time; from far off it finds what the closed form would have led
+// to.
 TEST(Calibrate, CoarseSearch) {
   if (!has_ceres()) GTEST_SKIP() << "built without Ceres: calibration not tested";
   const Problem p;

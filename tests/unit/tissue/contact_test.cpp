@@ -16,7 +16,8 @@ namespace {
 TriMesh box(Vec3 lo, Vec3 hi) {
   TriMesh m;
   for (int c = 0; c < 8; ++c)
-    m.points_mm.push_back(to_floats({(c & 1) != 0 ? hi.x : lo.x, (c & 2) != 0 ? hi.y : lo.y, (c & 4) != 0 ? hi.z : lo.z}));
+    m.points_mm.push_back(
+        to_floats({(c & 1) != 0 ? hi.x : lo.x, (c & 2) != 0 ? hi.y : lo.y, (c & 4) != 0 ? hi.z : lo.z}));
   m.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
                  {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
   return m;
@@ -60,7 +61,8 @@ TEST(Contact, ABlockRestsOnAPlate) {
   const Material m{0.1, 0.45};
   TissueModel model = TissueModel::of_voxels(b.points, b.tets, std::span(&m, 1));
   model.scale({1, 1, 0, 1});
-  const auto plate = std::make_shared<SurfaceShape>(box({-20, -20, -10}, {20, 20, -0.5}), Vec3{-5, -5, -3}, Vec3{11, 11, 8}, 0.5);
+  const auto plate =
+      std::make_shared<SurfaceShape>(box({-20, -20, -10}, {20, 20, -0.5}), Vec3{-5, -5, -3}, Vec3{11, 11, 8}, 0.5);
   TissueDynamics<double> d(model, {}, {.damping_per_s = 100});
   std::vector<std::pair<std::uint32_t, Vec3>> load;
   for (std::uint32_t p = 0; p < b.points.size(); ++p) load.push_back({p, {0, 0, -1e-3}});
@@ -87,7 +89,9 @@ TEST(Contact, WhatLiesInsideAtRestIsTiedToIt) {
   TissueModel model = TissueModel::of_voxels(b.points, b.tets, std::span(&m, 1));
   model.scale({1, 1, 0, 1});
   TissueDynamics<double> d(model, {}, {.damping_per_s = 100});
-  d.set_obstacle({std::make_shared<SurfaceShape>(box({-20, -20, -10}, {20, 20, 1.3}), Vec3{-5, -5, -3}, Vec3{11, 11, 8}, 0.5), 0.05});
+  d.set_obstacle(
+      {std::make_shared<SurfaceShape>(box({-20, -20, -10}, {20, 20, 1.3}), Vec3{-5, -5, -3}, Vec3{11, 11, 8}, 0.5),
+       0.05});
   d.step(2000);
   const auto x = d.positions_mm();
   for (std::size_t p = 0; p < x.size(); ++p) EXPECT_LT(length(x[p] - b.points[p]), 1e-9);
@@ -100,8 +104,8 @@ TEST(Contact, WhatLiesInsideAtRestIsTiedToIt) {
   for (std::size_t p = 0; p < x.size(); ++p) EXPECT_LT(length(d.positions_mm()[p] - b.points[p]), 1);
 }
 
-// Pressed four tenths of its thickness deep by a large ball it lies still: contact takes energy out, it never puts any in; and let go it
-// comes back.
+// Pressed four tenths of its thickness deep by a large ball it lies still: contact takes energy out, it never puts any
+// in; and let go it comes back.
 TEST(Contact, PressedDeepItLiesStill) {
   const auto b = test::block(10, 10, 5, 1.5);
   const Material m{0.02, 0.45};

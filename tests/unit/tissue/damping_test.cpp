@@ -18,7 +18,8 @@ using test::block;
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-// A bar held at one end, a load in proportion to a mode's inertia, and that mode by itself: what it does is known in closed form.
+// A bar held at one end, a load in proportion to a mode's inertia, and that mode by itself: what it does is known in
+// closed form.
 struct Bar {
   test::Block body = block(6, 1, 1, 2.0);
   TissueModel model;
@@ -33,7 +34,8 @@ struct Bar {
     for (const auto& t : body.tets) {
       const auto& x = body.points;
       for (const std::uint32_t p : t)
-        mass[p] += dot(x[t[1]] - x[t[0]], cross(x[t[2]] - x[t[0]], x[t[3]] - x[t[0]])) / 24 * 1e-9;  // 1000 kg/m3 in tonnes
+        mass[p] +=
+            dot(x[t[1]] - x[t[0]], cross(x[t[2]] - x[t[0]], x[t[3]] - x[t[0]])) / 24 * 1e-9;  // 1000 kg/m3 in tonnes
     }
     for (std::uint32_t p = 0; p < body.points.size(); ++p) {
       if (body.points[p].x < 1e-9) fixed.push_back(p);
@@ -84,7 +86,8 @@ struct Bar {
     return (a * std::exp(-b * t) - b * std::exp(-a * t)) / (a - b);
   }
   // At the tip along z, sampled `per_swing` times a swing for so many swings of the body's own frequency.
-  [[nodiscard]] MeasuredMotion measured(double w0, double damping, double swings, double per_swing, double noise, unsigned seed = 1) const {
+  [[nodiscard]] MeasuredMotion measured(double w0, double damping, double swings, double per_swing, double noise,
+                                        unsigned seed = 1) const {
     MeasuredMotion m;
     m.channels.push_back({tip, {0, 0, 1}, "uz_mm", {}, {}});
     std::mt19937_64 random(seed);
@@ -182,8 +185,9 @@ TEST(Damping, WhatTheStepsTakeAwayIsNotDamping) {
   options.step_s = 0.1 / w;
   const DampingFit f = bar().fit(bar().measured(w, truth, 3, 25, 0), options);
   const double h = options.step_s, stiff = f.stiffness_times.value * w * w, taken = std::log1p(h * h * stiff) / (2 * h);
-  std::printf("implicit: damping %.4f of %.4f; decay %.4f, numerical %.4f (closed form %.4f), stiffness %.5f\n", f.damping_per_s.value,
-              truth, f.model.decay_per_s, f.undamped.decay_per_s, taken, f.stiffness_times.value);
+  std::printf("implicit: damping %.4f of %.4f; decay %.4f, numerical %.4f (closed form %.4f), stiffness %.5f\n",
+              f.damping_per_s.value, truth, f.model.decay_per_s, f.undamped.decay_per_s, taken,
+              f.stiffness_times.value);
   EXPECT_NEAR(f.undamped.decay_per_s, taken, 0.01 * taken);
   EXPECT_NEAR(f.model.decay_per_s, truth / 2, 0.005 * truth);
   // 1 + ch + (wh)^2 = exp(2 h decay), of which the root times the cosine of the swing's angle is 1 + ch / 2.
@@ -199,8 +203,8 @@ TEST(Damping, AStiffnessThatIsOffIsFoundToo) {
   if (!has_ceres()) GTEST_SKIP() << "built without Ceres";
   const double w = std::pow(1.8751040687, 2) / (12 * 12) * std::sqrt(0.1 * 2 * 2 / 12 / 1e-9), truth = 0.1 * w;
   const DampingFit f = bar().fit(bar().measured(w, truth, 8, 25, 0.02));
-  std::printf("beam: %.4f Hz, the body's %.4f Hz (swing of its trace %.4f), stiffness %.4f, damping %.3f of %.3f\n", w / kTurn,
-              bar().w / kTurn, f.model_hz, f.stiffness_times.value, f.damping_per_s.value, truth);
+  std::printf("beam: %.4f Hz, the body's %.4f Hz (swing of its trace %.4f), stiffness %.4f, damping %.3f of %.3f\n",
+              w / kTurn, bar().w / kTurn, f.model_hz, f.stiffness_times.value, f.damping_per_s.value, truth);
   EXPECT_NEAR(f.stiffness_times.value, std::pow(w / bar().w, 2), 0.01 * std::pow(w / bar().w, 2));
   EXPECT_NEAR(f.damping_per_s.value, truth, 0.02 * truth);
   EXPECT_NEAR(f.model_hz, bar().w / kTurn, 1e-3 * bar().w);
@@ -227,7 +231,8 @@ TEST(Damping, DriftIsNotTakenForMotion) {
   const double w = bar().w, truth = 0.1 * w;
   MeasuredMotion m = bar().measured(w, truth, 8, 25, 0.01);
   const double per_s = 0.1 * bar().tip_mm * w;
-  for (std::size_t n = 0; n < m.channels[0].mm.size(); ++n) m.channels[0].mm[n] += 5 * bar().tip_mm + per_s * m.channels[0].time_s[n];
+  for (std::size_t n = 0; n < m.channels[0].mm.size(); ++n)
+    m.channels[0].mm[n] += 5 * bar().tip_mm + per_s * m.channels[0].time_s[n];
   const DampingFit f = bar().fit(m);
   EXPECT_NEAR(f.damping_per_s.value, truth, 0.02 * truth);
   EXPECT_NEAR(f.drift_mm_per_s[0], per_s, 0.01 * per_s);

@@ -17,7 +17,8 @@ inline std::vector<Vec3> shaken(const std::vector<Vec3>& x, double by, unsigned 
   return y;
 }
 
-/// Of every element at `x`: the gradient by central differences of the energy, the Hessian by those of the gradient, and symmetric.
+/// Of every element at `x`: the gradient by central differences of the energy, the Hessian by those of the gradient,
+/// and symmetric.
 inline void expect_exact_derivatives(const Energy& energy, const std::vector<Vec3>& x) {
   for (std::size_t e = 0; e < energy.element_count(); ++e) {
     const auto nodes = energy.nodes(e);

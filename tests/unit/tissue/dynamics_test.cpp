@@ -40,7 +40,8 @@ TEST(Dynamics, ForcesAreTheModels) {
     for (const auto& t : model.tets()) {
       const auto& r = model.rest();
       for (const std::uint32_t p : t)
-        mass[p] += dot(r[t[1]] - r[t[0]], cross(r[t[2]] - r[t[0]], r[t[3]] - r[t[0]])) / 24 * 1e-9;  // 1000 kg/m3 in N s2/mm
+        mass[p] +=
+            dot(r[t[1]] - r[t[0]], cross(r[t[2]] - r[t[0]], r[t[3]] - r[t[0]])) / 24 * 1e-9;  // 1000 kg/m3 in N s2/mm
     }
     for (std::size_t p = 0; p < x.size(); ++p) {
       const Vec3 f = (y[p] - x[p]) * (mass[p] / (d.step_s() * d.step_s()));
@@ -55,7 +56,8 @@ TEST(Dynamics, MomentumIsKeptAndEnergyDoesNotDrift) {
   TissueDynamics<double> d(model, {});
   std::mt19937 random(4);
   std::uniform_real_distribution<double> u(-0.15, 0.15);
-  for (std::uint32_t p = 0; p < d.point_count(); ++p) d.set_position(p, model.rest()[p] + Vec3{u(random), u(random), u(random)});
+  for (std::uint32_t p = 0; p < d.point_count(); ++p)
+    d.set_position(p, model.rest()[p] + Vec3{u(random), u(random), u(random)});
   const double begin = d.elastic_mj();
   double most = 0, early = 0, momentum = 0, scale = 0;
   for (int n = 0; n < 200; ++n) {
@@ -80,7 +82,8 @@ TEST(Dynamics, TheStepIsCertified) {
       TissueDynamics<double> d(model, {}, {.density_kg_m3 = 1000, .damping_per_s = 0, .step_share = share});
       std::mt19937 random(9);
       std::uniform_real_distribution<double> u(-1e-3, 1e-3);
-      for (std::uint32_t p = 0; p < d.point_count(); ++p) d.set_position(p, model.rest()[p] + Vec3{u(random), u(random), u(random)});
+      for (std::uint32_t p = 0; p < d.point_count(); ++p)
+        d.set_position(p, model.rest()[p] + Vec3{u(random), u(random), u(random)});
       const double begin = d.elastic_mj();
       d.step(20000);
       const double end = d.elastic_mj() + d.kinetic_mj();
@@ -193,7 +196,8 @@ TEST(Dynamics, AskedForALongerStepItMakesPointsHeavierAndSaysSo) {
   const TissueModel model = model_of(b, 0.499);
   const TissueDynamics<float> plain(model, {});
   EXPECT_EQ(plain.counts().made_heavier, 0u);
-  TissueDynamics<float> d(model, {}, {.density_kg_m3 = 1000, .damping_per_s = 0, .step_share = 0.9, .least_step_s = 5 * plain.step_s()});
+  TissueDynamics<float> d(
+      model, {}, {.density_kg_m3 = 1000, .damping_per_s = 0, .step_share = 0.9, .least_step_s = 5 * plain.step_s()});
   EXPECT_GT(d.counts().made_heavier, 0u);
   EXPECT_GE(d.step_s(), 4.9 * plain.step_s());
   d.set_position(0, model.rest()[0] + Vec3{0.1, 0, 0});

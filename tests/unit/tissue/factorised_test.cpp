@@ -76,8 +76,8 @@ double most_off(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   return most;
 }
 
-// It comes to rest where Newton's method finds the equilibrium of the same law, at strains of a half; near incompressible with more
-// iterations.
+// It comes to rest where Newton's method finds the equilibrium of the same law, at strains of a half; near
+// incompressible with more iterations.
 TEST(Factorised, RestsAtTheEquilibrium) {
   for (const double nu : {0.3, 0.45, 0.49}) {
     const Pad pad(nu);
@@ -149,8 +149,8 @@ TEST(Factorised, ThreeIterationsLieNearManyUnderATool) {
   EXPECT_EQ(few.force, again.force);  // to the bit
 }
 
-// Two radii deep, in voxels of half a radius: the surface under the tool stays before it, the force rises all the way, and what was pressed
-// comes back.
+// Two radii deep, in voxels of half a radius: the surface under the tool stays before it, the force rises all the way,
+// and what was pressed comes back.
 TEST(Factorised, ABurrPressedTwoRadiiDeepDoesNotSlipThrough) {
   for (const double nu : {0.3, 0.45}) {
     const Pad pad(nu, 8, 6, 1.5);

@@ -54,13 +54,15 @@ TEST(Implicit, OfFirstOrderInTime) {
   double error[3];
   int n = 0;
   for (const int steps : {100, 200, 400}) {
-    ImplicitDynamics d(model, fixed, {.density_kg_m3 = 1000, .damping_per_s = 20, .step_s = end / steps, .tolerance = 1e-9});
+    ImplicitDynamics d(model, fixed,
+                       {.density_kg_m3 = 1000, .damping_per_s = 20, .step_s = end / steps, .tolerance = 1e-9});
     d.set_load(load);
     d.step(steps);
     EXPECT_EQ(d.counts().unfinished, 0u);
     error[n++] = off(d.positions_mm(), fine.positions_mm(), model.rest());
   }
-  std::printf("implicit steps of %.2f ms: %.3f off, halved %.3f, again %.3f\n", 1000 * end / 100, error[0], error[1], error[2]);
+  std::printf("implicit steps of %.2f ms: %.3f off, halved %.3f, again %.3f\n", 1000 * end / 100, error[0], error[1],
+              error[2]);
   EXPECT_NEAR(error[1] / error[0], 0.5, 0.1);
   EXPECT_NEAR(error[2] / error[1], 0.5, 0.06);
 }
@@ -108,7 +110,8 @@ TEST(Implicit, MomentumInFreeFlight) {
   }
 }
 
-// A hundredth of a second a step where explicit ones may take microseconds: 10,000 : 1 of stiffness, and almost no change of volume.
+// A hundredth of a second a step where explicit ones may take microseconds: 10,000 : 1 of stiffness, and almost no
+// change of volume.
 TEST(Implicit, StiffBodies) {
   const auto b = block(4, 4, 4, 2.0);
   const auto fixed = base_of(b);
@@ -223,7 +226,8 @@ TEST(Implicit, InvertedAndTeleported) {
   EXPECT_EQ(model.inverted(d.positions_mm()), 0u);
   std::uniform_real_distribution<double> place(0, 8);
   for (int n = 0; n < 40; ++n) {
-    d.set_tool({std::make_shared<BallShape>(Vec3{place(random), place(random), n % 7 == 3 ? NAN : place(random)}, 2), 5});
+    d.set_tool(
+        {std::make_shared<BallShape>(Vec3{place(random), place(random), n % 7 == 3 ? NAN : place(random)}, 2), 5});
     EXPECT_TRUE(std::isfinite(length(d.step())));
   }
   d.set_tool({});

@@ -30,8 +30,8 @@ inline TissueLoad held(const Mapped& m, const std::function<int(Vec3)>& axes) {
   return load;
 }
 // Force over area, as a function of place, on the boundary where `in` is true of all three corners.
-inline void load_faces(const Mapped& m, const std::function<bool(Vec3)>& in, const std::function<Vec3(Vec3 area_outwards)>& force,
-                       TissueLoad& load) {
+inline void load_faces(const Mapped& m, const std::function<bool(Vec3)>& in,
+                       const std::function<Vec3(Vec3 area_outwards)>& force, TissueLoad& load) {
   TetMesh mesh;
   for (const Vec3& p : m.b.points) mesh.points_mm.push_back(to_floats(p));
   for (const auto& t : m.b.tets) mesh.tets.push_back(t);

@@ -28,7 +28,8 @@ std::string said(F&& f) {
   return {};
 }
 
-// A post, 8 x 8 x 16 mm, 1000 kPa below and 50 kPa above or all alike, pulled and bent; finite elements on a mesh half again as fine.
+// A post, 8 x 8 x 16 mm, 1000 kPa below and 50 kPa above or all alike, pulled and bent; finite elements on a mesh half
+// again as fine.
 struct Post {
   test::Block coarse = block(4, 4, 8, 2.0), fine = block(6, 6, 12, 4.0 / 3);
   double young_below = 1, young_above = 0.05;
@@ -101,8 +102,9 @@ double rms(std::span<const Vec3> a, std::span<const Vec3> b) {
   return std::sqrt(sum / static_cast<double>(a.size()));
 }
 
-// One material of unknown stiffness, from half of its surface, with noise, a tenth of the points astray, and a guess four times too soft:
-// what a clean scan of all of it would have told. (That is 12 % below the material's own: four voxels across bend too little.)
+// One material of unknown stiffness, from half of its surface, with noise, a tenth of the points astray, and a guess
+// four times too soft: what a clean scan of all of it would have told. (That is 12 % below the material's own: four
+// voxels across bend too little.)
 TEST(Measured, StiffnessFromHalfOfANoisySurface) {
   if (!has_ceres()) GTEST_SKIP() << "built without Ceres: calibration not tested";
   const auto& [post, end, truth] = bent();
@@ -113,8 +115,9 @@ TEST(Measured, StiffnessFromHalfOfANoisySurface) {
   const MeasuredCalibration r = calibrate_measured(model, boundary_surface(model), std::span(&c, 1));
   ASSERT_TRUE(r.fit.converged) << r.fit.why;
   const double kpa = 50 * std::exp(r.all.log);
-  std::printf("%.0f kPa (200), deviation %.3f; noise %.4f (%.4f), rejected %zu of %zu, seen %.2f\n", kpa, r.all.deviation,
-              r.views[0].noise_mm, scan.noise_mm, r.views[0].rejected, r.views[0].drawn, r.views[0].seen_share);
+  std::printf("%.0f kPa (200), deviation %.3f; noise %.4f (%.4f), rejected %zu of %zu, seen %.2f\n", kpa,
+              r.all.deviation, r.views[0].noise_mm, scan.noise_mm, r.views[0].rejected, r.views[0].drawn,
+              r.views[0].seen_share);
   const MeasuredCase clean{c.load, {scanned("bend", post.fine, truth, {3000, 0, 0, [](Vec3) { return true; }, 4})}};
   TissueModel by_all = post.model(0.05);
   const double told = 50 * std::exp(calibrate_measured(by_all, boundary_surface(by_all), std::span(&clean, 1)).all.log);
@@ -146,7 +149,8 @@ TEST(Measured, StiffnessFromHalfOfANoisySurface) {
   EXPECT_EQ(t.views[0].points, 1500U);
   EXPECT_NEAR(t.all.log, r.all.log, 0.1);
   EXPECT_GT(t.all.deviation, r.all.deviation);
-  EXPECT_EQ(calibrate_measured(again, boundary_surface(model), std::span(&c, 1), few).fit.log_factors, t.fit.log_factors);
+  EXPECT_EQ(calibrate_measured(again, boundary_surface(model), std::span(&c, 1), few).fit.log_factors,
+            t.fit.log_factors);
 }
 
 // 20 : 1, without being told of it, from a cloud of the whole surface and from markers.
@@ -161,15 +165,17 @@ TEST(Measured, AMapFindsTheContrast) {
   o.calibrate.pull = 0.01;
   for (const bool markers : {false, true}) {
     const Scan scan{1500, 0.02 * moved, 0, [](Vec3) { return true; }, 5};
-    const MeasuredCase c{Post::load(post.coarse, end, side),
-                         {markers ? test::marked("m", post.fine, truth, 4, scan.noise_mm, 5) : scanned("c", post.fine, truth, scan)}};
+    const MeasuredCase c{
+        Post::load(post.coarse, end, side),
+        {markers ? test::marked("m", post.fine, truth, 4, scan.noise_mm, 5) : scanned("c", post.fine, truth, scan)}};
     TissueModel model = post.model(0.3);
     o.group_of = Post::halves(model);
     const MeasuredCalibration r = calibrate_measured(model, boundary_surface(model), std::span(&c, 1), o);
     ASSERT_TRUE(r.fit.converged) << r.fit.why;
     const double below = 300 * std::exp(r.groups[0].log), above = 300 * std::exp(r.groups[1].log);
-    std::printf("%s: %.0f (1000, %.2f), %.1f (50, %.2f) kPa, contrast %.1f (20), noise %.4f (%.4f)\n", markers ? "markers" : "cloud", below,
-                r.groups[0].deviation, above, r.groups[1].deviation, below / above, r.views[0].noise_mm, scan.noise_mm);
+    std::printf("%s: %.0f (1000, %.2f), %.1f (50, %.2f) kPa, contrast %.1f (20), noise %.4f (%.4f)\n",
+                markers ? "markers" : "cloud", below, r.groups[0].deviation, above, r.groups[1].deviation,
+                below / above, r.views[0].noise_mm, scan.noise_mm);
     EXPECT_EQ(r.views[0].markers, markers);
     EXPECT_NEAR(std::log(below / above), std::log(20), std::log(1.5));
     EXPECT_NEAR(std::log(below / 1000), 0, std::log(1.5));
@@ -178,14 +184,17 @@ TEST(Measured, AMapFindsTheContrast) {
   }
 }
 
-// What was measured lies elsewhere: without finding its pose the stiffness is wrong, with it, it is right, and so is the pose.
+// What was measured lies elsewhere: without finding its pose the stiffness is wrong, with it, it is right, and so is
+// the pose.
 TEST(Measured, FindsWhereTheCloudLies) {
   if (!has_ceres()) GTEST_SKIP() << "built without Ceres: calibration not tested";
   const auto& [post, end, truth] = bent();
-  MeasuredCase c{Post::load(post.coarse, end, {}), {scanned("bend", post.fine, truth, {1500, 0.005, 0, [](Vec3) { return true; }, 7})}};
+  MeasuredCase c{Post::load(post.coarse, end, {}),
+                 {scanned("bend", post.fine, truth, {1500, 0.005, 0, [](Vec3) { return true; }, 7})}};
   const double turn = 0.05;
   for (Vec3& p : c.views[0].points_mm)
-    p = Vec3{p.x * std::cos(turn) - p.y * std::sin(turn), p.x * std::sin(turn) + p.y * std::cos(turn), p.z} + Vec3{0.5, -0.3, 0.4};
+    p = Vec3{p.x * std::cos(turn) - p.y * std::sin(turn), p.x * std::sin(turn) + p.y * std::cos(turn), p.z} +
+        Vec3{0.5, -0.3, 0.4};
   MeasuredOptions o;
   TissueModel wrong = post.model(0.1), model = post.model(0.1);
   const MeasuredCalibration without = calibrate_measured(wrong, boundary_surface(wrong), std::span(&c, 1), o);
@@ -244,7 +253,8 @@ TEST(Measured, DistancesHaveExactDerivatives) {
   }
 }
 
-// Residuals' derivatives, as the fit takes them, lead it to factors that are there: what the model itself does, seen without noise.
+// Residuals' derivatives, as the fit takes them, lead it to factors that are there: what the model itself does, seen
+// without noise.
 TEST(Measured, FindsFactorsThatAreThere) {
   if (!has_ceres()) GTEST_SKIP() << "built without Ceres: calibration not tested";
   const Post post;
@@ -322,12 +332,15 @@ TEST(Measured, Files) {
   EXPECT_NE(wrong("x_mm,y_mm,z_mm\n").find("no line"), std::string::npos);
 
   const TemporaryFolder folder;
-  const auto write = [&](const std::string& name, const std::string& text) { std::ofstream(folder.path() / name) << text; };
+  const auto write = [&](const std::string& name, const std::string& text) {
+    std::ofstream(folder.path() / name) << text;
+  };
   write("pull.csv", "x_mm,y_mm,z_mm\n1,2,3\n");
   write("pull.more.xyz", "4 5 6\n7 8 9\n");
   // As a scanner writes it: no triangle.
   write("twist.ply",
-        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n4 5 6\n1 2 3\n");
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 "
+        "2 3\n4 5 6\n1 2 3\n");
   write(".hidden", "");
   write("twist.ply.prov.json", "{}");
   const std::vector<std::string> loads{"pull", "twist", "pull.more"};
@@ -341,8 +354,9 @@ TEST(Measured, Files) {
   EXPECT_EQ(files[2].points.name, "twist.ply");
   EXPECT_EQ(read_measured(folder.path() / "pull.csv", loads).size(), 1U);
   write("push.csv", "x_mm,y_mm,z_mm\n1,2,3\n");
-  EXPECT_NE(said([&] { static_cast<void>(read_measured(folder.path(), loads)); }).find("'push.csv' is called like no load"),
-            std::string::npos);
+  EXPECT_NE(
+      said([&] { static_cast<void>(read_measured(folder.path(), loads)); }).find("'push.csv' is called like no load"),
+      std::string::npos);
 }
 
 }  // namespace

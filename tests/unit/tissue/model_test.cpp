@@ -46,8 +46,8 @@ TEST(TissueModel, ForcesAndTorquesSumToZero) {
   EXPECT_LT(length(torque), 1e-13 * arm);
 }
 
-// Any small strain of a block of voxels costs what an isotropic solid of that material costs, and its inner points are in balance: the
-// closed form is exact.
+// Any small strain of a block of voxels costs what an isotropic solid of that material costs, and its inner points are
+// in balance: the closed form is exact.
 TEST(TissueModel, TheClosedFormIsIsotropicElasticity) {
   for (const double nu : {0.25, 0.3, 0.45, 0.499}) {
     const auto b = block(4, 4, 4, 2.0);
@@ -101,7 +101,8 @@ TEST(TissueModel, InvertedAndFlatComeBack) {
     const Equilibrium r = solver.solve(model, start, {}, {.tolerance = 1e-9});
     EXPECT_TRUE(r.converged) << r.why;
     EXPECT_LE(r.iterations, 40);
-    for (std::size_t p = 0; p < b.points.size(); ++p) EXPECT_LT(length(r.points_mm[p] - model.rest()[p]), 1e-4) << noise;
+    for (std::size_t p = 0; p < b.points.size(); ++p)
+      EXPECT_LT(length(r.points_mm[p] - model.rest()[p]), 1e-4) << noise;
   }
   // A gear, four tenths of it turned inside out: back in a few iterations, without any clamp.
   const auto gear = block(16, 16, 3, 125, [](Vec3 p) {
@@ -122,7 +123,8 @@ TEST(TissueModel, InvertedAndFlatComeBack) {
   EXPECT_TRUE(back.converged) << back.why;
   EXPECT_LE(back.iterations, 30);
   std::printf("%.0f %% inverted: back in %d iterations\n",
-              100.0 * static_cast<double>(large.inverted(start)) / static_cast<double>(gear.tets.size()), back.iterations);
+              100.0 * static_cast<double>(large.inverted(start)) / static_cast<double>(gear.tets.size()),
+              back.iterations);
   for (std::size_t p = 0; p < gear.points.size(); ++p) EXPECT_LT(length(back.points_mm[p] - large.rest()[p]), 0.1);
   // All points in a heap, all in a plane: finite energies and forces, whatever they are.
   for (const double z : {0.0, 1e-3}) {

@@ -23,11 +23,12 @@ TetMesh mesh_of(const test::Block& b) {
 
 TEST(TissueProblem, IsReadOntoAMesh) {
   const TetMesh mesh = mesh_of(test::block(4, 2, 2, 5.0));
-  const TissueProblem p = parse_tissue_problem(R"({"osteotome_tissue": 1, "material": {"young_kpa": 100, "poisson": 0.45},
+  const TissueProblem p =
+      parse_tissue_problem(R"({"osteotome_tissue": 1, "material": {"young_kpa": 100, "poisson": 0.45},
     "regions": [{"box_mm": [[10, -1, -1], [21, 11, 11]], "young_kpa": 50, "poisson": 0.3}],
     "fixed": [{"box_mm": [[-1, -1, -1], [0.1, 11, 11]]}],
     "loads": [{"name": "A", "forces": [{"at_mm": [20, 5, 5], "radius_mm": 6, "total_n": [0, 0, 2]}]}, {"forces": [{"box_mm": [[19, 0, 0], [21, 10, 10]], "total_n": [1, 0, 0]}]}]})",
-                                               mesh);
+                           mesh);
   EXPECT_EQ(p.fixed.size(), 9u);
   ASSERT_EQ(p.materials.size(), mesh.tets.size());
   EXPECT_EQ(p.materials.front().young_mpa, 0.1);
@@ -103,7 +104,9 @@ TEST(TissueProblem, FactorsOfAGridAreAppliedAsTheyWereFitted) {
     ASSERT_EQ(r.log_factors.size(), 6u * kTissueClasses);
     const TissueModel again = with_log_factors(model, o.grid, r.log_factors);
     for (std::size_t k = 0; k < again.constraints().size(); ++k)
-      EXPECT_NEAR(again.constraints()[k].stiffness, fitted.constraints()[k].stiffness, 1e-9 * fitted.constraints()[k].stiffness) << shared;
+      EXPECT_NEAR(again.constraints()[k].stiffness, fitted.constraints()[k].stiffness,
+                  1e-9 * fitted.constraints()[k].stiffness)
+          << shared;
     EXPECT_LT(r.after[0].nrms, 0.05);
   }
   EXPECT_THROW(with_log_factors(model, {2, 2, 2}, std::vector<double>(5)), Error);
@@ -113,16 +116,18 @@ TEST(TissueProblem, FactorsOfAGridAreAppliedAsTheyWereFitted) {
 TEST(TissueProblem, NamesItsLawAndItsElements) {
   const TetMesh mesh = mesh_of(test::block(2, 1, 1, 5.0));
   const auto problem = [&](const std::string& keys) {
-    return parse_tissue_problem("{\"osteotome_tissue\": 1,\n" + keys + R"( "material": {"young_kpa": 100, "poisson": 0.4999},
+    return parse_tissue_problem(
+        "{\"osteotome_tissue\": 1,\n" + keys + R"( "material": {"young_kpa": 100, "poisson": 0.4999},
       "fixed": [{"box_mm": [[-1, -1, -1], [0.1, 11, 11]]}]})",
-                                mesh, false);
+        mesh, false);
   };
   EXPECT_FALSE(problem("").law.has_value() || problem("").order.has_value());
   const TissueProblem p = problem(R"("law": "corotated", "order": "t4_mean",)");
   EXPECT_EQ(p.law, ElasticLaw::corotated);
   EXPECT_EQ(p.order, TetOrder::t4_mean);
   EXPECT_EQ(problem(R"("order": "t10",)").order, TetOrder::t10);
-  for (const std::string& wrong : {std::string(R"("order": "t5",)"), std::string(R"("law": "hooke",)"), std::string(R"("order": 4,)")}) {
+  for (const std::string& wrong :
+       {std::string(R"("order": "t5",)"), std::string(R"("law": "hooke",)"), std::string(R"("order": 4,)")}) {
     try {
       static_cast<void>(problem(wrong));
       ADD_FAILURE() << wrong;
@@ -131,7 +136,8 @@ TEST(TissueProblem, NamesItsLawAndItsElements) {
     }
   }
   // Neither has a counterpart in an .inp file.
-  for (const auto& [law, order] : {std::pair{ElasticLaw::corotated, TetOrder::t4}, {ElasticLaw::linear, TetOrder::t4_mean}}) {
+  for (const auto& [law, order] :
+       {std::pair{ElasticLaw::corotated, TetOrder::t4}, {ElasticLaw::linear, TetOrder::t4_mean}}) {
     const FemBody body(points_of(mesh), tets_of(mesh), p.materials, law, order);
     EXPECT_THROW(static_cast<void>(inp_text(body, {})), Error);
   }
@@ -140,20 +146,22 @@ TEST(TissueProblem, NamesItsLawAndItsElements) {
 // Written and read back as .inp: the same body under the same load, forces on faces and sliders too.
 TEST(TissueProblem, GoesThroughAnInpFile) {
   const TetMesh mesh = mesh_of(test::block(4, 2, 2, 5.0));
-  const TissueProblem p = parse_tissue_problem(R"({"osteotome_tissue": 1, "material": {"young_kpa": 100, "poisson": 0.45},
+  const TissueProblem p =
+      parse_tissue_problem(R"({"osteotome_tissue": 1, "material": {"young_kpa": 100, "poisson": 0.45},
     "regions": [{"box_mm": [[10, -1, -1], [21, 11, 11]], "young_kpa": 50, "poisson": 0.3}],
     "fixed": [{"box_mm": [[-1, -1, -1], [0.1, 0.1, 11]]}, {"box_mm": [[-1, -1, -1], [0.1, 11, 11]], "axes": "xz"}],
     "loads": [{"surfaces": [{"box_mm": [[19.9, 0, 0], [21, 10, 10]], "kpa": -2}, {"box_mm": [[0, 0, 9.9], [20, 10, 11]], "kpa": [0.1, 0, 0]}],
                "forces": [{"at_mm": [20, 5, 5], "radius_mm": 3, "total_n": [0, 0.01, 0]}]}]})",
-                                               mesh);
+                           mesh);
   EXPECT_EQ(p.fixed.size(), 3u);
   EXPECT_EQ(p.sliders.size(), 9u);
   Vec3 total{};
   for (const auto& [point, f] : p.loads[0].forces_n) total += f;
   EXPECT_NEAR(total.x, 0.002 * 100 + 0.0001 * 200, 1e-9);
   EXPECT_NEAR(total.y, 0.01, 1e-9);
-  for (const auto& [law, order] :
-       {std::pair{ElasticLaw::linear, TetOrder::t4}, {ElasticLaw::stvk, TetOrder::t10}, {ElasticLaw::neo_hooke_split, TetOrder::t10}}) {
+  for (const auto& [law, order] : {std::pair{ElasticLaw::linear, TetOrder::t4},
+                                   {ElasticLaw::stvk, TetOrder::t10},
+                                   {ElasticLaw::neo_hooke_split, TetOrder::t10}}) {
     const FemBody body(points_of(mesh), tets_of(mesh), p.materials, law, order);
     const TissueLoad load = body.on_all_points(p.loads[0]);
     const std::string text = inp_text(body, load);
@@ -165,7 +173,8 @@ TEST(TissueProblem, GoesThroughAnInpFile) {
     const FemBody other(points_of(read), tets_of(read), again.materials, law, order);
     const TissueLoad other_load = other.on_all_points(again.loads[0]);
     EquilibriumSolver a(body, body.rest(), load), b(other, other.rest(), other_load);
-    const Equilibrium ra = a.solve(body, body.rest(), load.forces_n), rb = b.solve(other, other.rest(), other_load.forces_n);
+    const Equilibrium ra = a.solve(body, body.rest(), load.forces_n),
+                      rb = b.solve(other, other.rest(), other_load.forces_n);
     ASSERT_TRUE(ra.converged && rb.converged) << ra.why << rb.why;
     for (std::size_t q = 0; q < mesh.points_mm.size(); ++q) EXPECT_LT(length(ra.points_mm[q] - rb.points_mm[q]), 1e-9);
   }

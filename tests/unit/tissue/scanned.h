@@ -32,7 +32,8 @@ inline MeasuredPoints scanned(const std::string& name, const Block& b, std::span
     const Vec3 a = b.points[of[t[0]]], out = cross(b.points[of[t[1]]] - a, b.points[of[t[2]]] - a);
     if (!scan.sees(normalized(out))) continue;
     faces.push_back({moved[of[t[0]]], moved[of[t[1]]], moved[of[t[2]]]});
-    area.push_back(length(cross(faces.back()[1] - faces.back()[0], faces.back()[2] - faces.back()[0])) + (area.empty() ? 0 : area.back()));
+    area.push_back(length(cross(faces.back()[1] - faces.back()[0], faces.back()[2] - faces.back()[0])) +
+                   (area.empty() ? 0 : area.back()));
     for (const Vec3& p : faces.back())
       for (std::size_t k = 0; k < 3; ++k) {
         lo[k] = std::min(lo[k], p[k]);
@@ -51,21 +52,23 @@ inline MeasuredPoints scanned(const std::string& name, const Block& b, std::span
       m.points_mm.push_back(p);
       continue;
     }
-    const auto face = static_cast<std::size_t>(std::lower_bound(area.begin(), area.end() - 1, u(random) * area.back()) - area.begin());
+    const auto face = static_cast<std::size_t>(std::lower_bound(area.begin(), area.end() - 1, u(random) * area.back()) -
+                                               area.begin());
     double s = u(random), t = u(random);
     if (s + t > 1) {
       s = 1 - s;
       t = 1 - t;
     }
     const auto& f = faces[face];
-    m.points_mm.push_back(f[0] + (f[1] - f[0]) * s + (f[2] - f[0]) * t + Vec3{g(random), g(random), g(random)} * scan.noise_mm);
+    m.points_mm.push_back(f[0] + (f[1] - f[0]) * s + (f[2] - f[0]) * t +
+                          Vec3{g(random), g(random), g(random)} * scan.noise_mm);
   }
   return m;
 }
 
 // Markers on the corners of the boundary, every so-many-th.
-inline MeasuredPoints marked(const std::string& name, const Block& b, std::span<const Vec3> moved, std::size_t every, double noise_mm,
-                             unsigned seed) {
+inline MeasuredPoints marked(const std::string& name, const Block& b, std::span<const Vec3> moved, std::size_t every,
+                             double noise_mm, unsigned seed) {
   TetMesh mesh;
   for (const Vec3& p : b.points) mesh.points_mm.push_back(to_floats(p));
   for (const auto& t : b.tets) mesh.tets.push_back(t);

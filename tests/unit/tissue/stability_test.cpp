@@ -1,4 +1,5 @@
-// Hard cases of the issue of tissue: each comes to rest, or says that and why it did not; nothing is clamped in silence.
+// Hard cases of the issue of tissue: each comes to rest, or says that and why it did not; nothing is clamped in
+// silence.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -39,7 +40,8 @@ bool finite_all(std::span<const Vec3> x) {
   return std::all_of(x.begin(), x.end(), [](Vec3 p) { return std::isfinite(p.x + p.y + p.z); });
 }
 // Forces balance: what holds it carries the load.
-void expect_balance(const Energy& energy, const Equilibrium& r, const std::vector<std::pair<std::uint32_t, Vec3>>& load) {
+void expect_balance(const Energy& energy, const Equilibrium& r,
+                    const std::vector<std::pair<std::uint32_t, Vec3>>& load) {
   std::vector<Vec3> g(r.points_mm.size());
   total_gradient(energy, r.points_mm, g);
   Vec3 sum{}, total{};
@@ -103,17 +105,19 @@ TEST(TissueStability, HugeLoadsComeToRestOrSaySo) {
   for (const double newtons : {1.0, 10.0, 100.0, 1e3, 1e6}) {
     const auto load = x.top({0.3 * newtons, 0, newtons});
     EquilibriumSolver solver(model, model.rest(), x.fixed), fem(body, body.rest(), x.fixed);
-    for (const Equilibrium& r :
-         {solver.solve(model, model.rest(), load, {1e-9, 200, 1}), fem.solve(body, body.rest(), load, {1e-9, 200, 1})}) {
+    for (const Equilibrium& r : {solver.solve(model, model.rest(), load, {1e-9, 200, 1}),
+                                 fem.solve(body, body.rest(), load, {1e-9, 200, 1})}) {
       EXPECT_TRUE(finite_all(r.points_mm)) << newtons;
       EXPECT_TRUE(r.converged || !r.why.empty()) << newtons;
       EXPECT_TRUE(r.converged || newtons > 100) << newtons << ": " << r.why;
     }
     // Load steps are another way to the same place.
     if (newtons <= 10) {
-      const Equilibrium once = fem.solve(body, body.rest(), load), often = fem.solve(body, body.rest(), load, {1e-10, 100, 5});
+      const Equilibrium once = fem.solve(body, body.rest(), load),
+                        often = fem.solve(body, body.rest(), load, {1e-10, 100, 5});
       double off = 0;
-      for (std::size_t p = 0; p < once.points_mm.size(); ++p) off = std::max(off, length(once.points_mm[p] - often.points_mm[p]));
+      for (std::size_t p = 0; p < once.points_mm.size(); ++p)
+        off = std::max(off, length(once.points_mm[p] - often.points_mm[p]));
       EXPECT_LT(off, 1e-6);
     }
   }
@@ -221,7 +225,8 @@ TEST(TissueStability, EnergyThroughAMillionSteps) {
   TissueDynamics<double> d(model, {}, {.density_kg_m3 = 1000, .damping_per_s = 0, .step_share = 0.5});
   std::mt19937 random(4);
   std::uniform_real_distribution<double> u(-0.2, 0.2);
-  for (std::uint32_t p = 0; p < d.point_count(); ++p) d.set_position(p, model.rest()[p] + Vec3{u(random), u(random), u(random)});
+  for (std::uint32_t p = 0; p < d.point_count(); ++p)
+    d.set_position(p, model.rest()[p] + Vec3{u(random), u(random), u(random)});
   const double begin = d.elastic_mj();
   double early = 0, late = 0;
   for (int n = 0; n < 1000; ++n) {

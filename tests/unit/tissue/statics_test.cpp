@@ -62,7 +62,8 @@ struct Column {
 TEST(Statics, PrescribedMovementOfABar) {
   const Column c;
   // Pulled by 3 mm: strain 0.05 everywhere, the section 0.3 of it narrower; reaction E A strain.
-  const std::string pull = R"({"name": "pull", "moved": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "axes": "z", "by_mm": [0,0,3]}]})";
+  const std::string pull =
+      R"({"name": "pull", "moved": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "axes": "z", "by_mm": [0,0,3]}]})";
   for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
     const Statics r = c.solve(pull, ElasticLaw::linear, order);
     ASSERT_TRUE(r.converged) << r.why;
@@ -72,7 +73,8 @@ TEST(Statics, PrescribedMovementOfABar) {
     for (std::size_t p = 0; p < c.mesh.points_mm.size(); ++p) widest = std::max(widest, r.points_mm[p].x);
     EXPECT_NEAR(widest, 20 * (1 - 0.3 * 0.05), 1e-9);
   }
-  // To 2.5 times its length, where a step at once turns elements inside out: the law's own stress, P = mu (l - 1/l ...), by its energy.
+  // To 2.5 times its length, where a step at once turns elements inside out: the law's own stress, P = mu (l - 1/l
+  // ...), by its energy.
   const std::string far = R"({"moved": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "axes": "z", "by_mm": [0,0,90]}]})";
   const Statics r = c.solve(far, ElasticLaw::neo_hooke, TetOrder::t10);
   ASSERT_TRUE(r.converged) << r.why;
@@ -80,7 +82,8 @@ TEST(Statics, PrescribedMovementOfABar) {
   const double mu = 0.1 / 2.6, lambda = 0.1 * 0.3 / (1.3 * 0.4), l = 2.5;
   double narrow = 1;  // mu (n^2 - 1) + lambda ln(l n^2) = 0: no stress on the sides
   for (int i = 0; i < 100; ++i)
-    narrow -= (mu * (narrow * narrow - 1) + lambda * std::log(l * narrow * narrow)) / (2 * mu * narrow + 2 * lambda / narrow);
+    narrow -=
+        (mu * (narrow * narrow - 1) + lambda * std::log(l * narrow * narrow)) / (2 * mu * narrow + 2 * lambda / narrow);
   double widest = 0;
   for (std::size_t p = 0; p < c.mesh.points_mm.size(); ++p) widest = std::max(widest, r.points_mm[p].x);
   EXPECT_NEAR(widest, 20 * narrow, 1e-6);
@@ -93,7 +96,8 @@ TEST(Statics, PrescribedMovementOfABar) {
 
 TEST(Statics, AColumnUnderItsOwnWeight) {
   const Column c;
-  // u(z) = -rho g (H z - z^2 / 2) / E for nu 0; the mean over a section is that for any nu, whose sides only curve. rho g = 9.81e-6 N/mm3.
+  // u(z) = -rho g (H z - z^2 / 2) / E for nu 0; the mean over a section is that for any nu, whose sides only curve. rho
+  // g = 9.81e-6 N/mm3.
   const double rho_g = 1e-6 * 9.81, height = 60, young = 0.1;
   const Statics r = c.solve(R"({"gravity_m_s2": [0, 0, -9.81]})", ElasticLaw::linear, TetOrder::t10);
   ASSERT_TRUE(r.converged) << r.why;
@@ -101,15 +105,15 @@ TEST(Statics, AColumnUnderItsOwnWeight) {
   EXPECT_NEAR(c.rise(r, 60), -rho_g * height * height / 2 / young, 0.02 * rho_g * height * height / 2 / young);
   EXPECT_NEAR(c.rise(r, 30), -rho_g * (height * 30 - 450) / young, 0.02 * rho_g * height * height / 2 / young);
   // A force spread over the volume is the same.
-  const Statics same =
-      c.solve(R"({"volumes": [{"box_mm": [[-1,-1,-1],[21,21,61]], "total_n": [0, 0, -0.235440]}]})", ElasticLaw::linear, TetOrder::t10);
+  const Statics same = c.solve(R"({"volumes": [{"box_mm": [[-1,-1,-1],[21,21,61]], "total_n": [0, 0, -0.235440]}]})",
+                               ElasticLaw::linear, TetOrder::t10);
   EXPECT_NEAR(c.rise(same, 60), c.rise(r, 60), 1e-9);
 }
 
 TEST(Statics, APlateStopsWhatIsPressed) {
   const Column c;
-  // Pressed up by 2 kPa of 100: free it would rise by 1.2 mm; a plate 0.5 mm above holds all but what 0.5 mm takes, and gives way by that
-  // over its stiffness.
+  // Pressed up by 2 kPa of 100: free it would rise by 1.2 mm; a plate 0.5 mm above holds all but what 0.5 mm takes, and
+  // gives way by that over its stiffness.
   const std::string load = R"({"surfaces": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "kpa": [0, 0, 2]}],
     "contacts": [{"at_mm": [0, 0, 60.5], "normal": [0, 0, -1], "stiffness_n_per_mm": 1000}]})";
   for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
@@ -125,7 +129,8 @@ TEST(Statics, APlateStopsWhatIsPressed) {
                                ElasticLaw::neo_hooke, TetOrder::t10);
   ASSERT_TRUE(ball.converged) << ball.why;
   EXPECT_GT(ball.touching, 0u);
-  for (const Vec3& p : ball.points_mm) EXPECT_GT(length(p - Vec3{10, 10, 68}), 10 - length(ball.contact_n) / 100 - 1e-9);
+  for (const Vec3& p : ball.points_mm)
+    EXPECT_GT(length(p - Vec3{10, 10, 68}), 10 - length(ball.contact_n) / 100 - 1e-9);
   EXPECT_LT(ball.contact_n.z, 0);
   // Contact holds nothing by itself.
   TissueProblem p = problem_of(load, c.mesh);
@@ -145,9 +150,10 @@ TEST(Statics, AgreesWithCalculixNearZeroAndMoved) {
       if (v == 0) v = ++near_zero % 2 == 0 ? 1.2345678e-15F : -6.5432119e-17F;
     }
   }
-  for (const std::string load : {R"({"gravity_m_s2": [0, 0, -9.81]})",
-                                 R"({"moved": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "axes": "z", "by_mm": [0,0,3.3333333333333333]}]})",
-                                 R"({"forces": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "total_n": [0, 0, 0.1234567891234567]}]})"}) {
+  for (const std::string load :
+       {R"({"gravity_m_s2": [0, 0, -9.81]})",
+        R"({"moved": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "axes": "z", "by_mm": [0,0,3.3333333333333333]}]})",
+        R"({"forces": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "total_n": [0, 0, 0.1234567891234567]}]})"}) {
     const TissueProblem p = problem_of(load, mesh);
     for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
       const FemBody body(points_of(mesh), tets_of(mesh), p.materials, ElasticLaw::linear, order);
@@ -156,7 +162,8 @@ TEST(Statics, AgreesWithCalculixNearZeroAndMoved) {
       std::istringstream lines(inp);
       for (std::string line; std::getline(lines, line);) {
         std::istringstream fields(line);
-        for (std::string f; line[0] != '*' && std::getline(fields, f, ',');) ASSERT_LE(f.size() - f.find_first_not_of(' '), 20u) << line;
+        for (std::string f; line[0] != '*' && std::getline(fields, f, ',');)
+          ASSERT_LE(f.size() - f.find_first_not_of(' '), 20u) << line;
       }
       const Statics ours = statics(body, all);
       ASSERT_TRUE(ours.converged) << ours.why;
@@ -178,8 +185,8 @@ TEST(Statics, AgreesWithCalculixNearZeroAndMoved) {
   }
 }
 
-// Contact pairs push faces where we push points: the same against a plane but for the depth that is left, and against a ball as far as the
-// mesh resolves what it touches.
+// Contact pairs push faces where we push points: the same against a plane but for the depth that is left, and against a
+// ball as far as the mesh resolves what it touches.
 TEST(Statics, ContactAgreesWithCalculix) {
   if (!test::calculix_is_here()) GTEST_SKIP() << "CalculiX (ccx) is not installed: agreement with it not tested";
   const Column c;
@@ -190,11 +197,17 @@ TEST(Statics, ContactAgreesWithCalculix) {
     TetOrder order;
     double bound;
   };
-  const std::string plane = "{" + press + R"(, "contacts": [{"at_mm": [0, 0, 60.5], "normal": [0, 0, -2], "stiffness_n_per_mm": 100}]})",
-                    side = R"({"contacts": [{"at_mm": [19, 0, 60], "normal": [-1, 0, -0.2], "stiffness_n_per_mm": 100}]})",
+  const std::string plane =
+                        "{" + press +
+                        R"(, "contacts": [{"at_mm": [0, 0, 60.5], "normal": [0, 0, -2], "stiffness_n_per_mm": 100}]})",
+                    side =
+                        R"({"contacts": [{"at_mm": [19, 0, 60], "normal": [-1, 0, -0.2], "stiffness_n_per_mm": 100}]})",
                     ball = R"({"contacts": [{"at_mm": [10, 10, 118], "radius_mm": 60, "stiffness_n_per_mm": 100}]})",
-                    soft = "{" + press + R"(, "contacts": [{"at_mm": [0, 0, 60.5], "normal": [0, 0, -1], "stiffness_n_per_mm": 0.2}]})",
-                    both = "{" + press + R"(, "contacts": [{"at_mm": [0, 0, 60.5], "normal": [0, 0, -1], "stiffness_n_per_mm": 100},
+                    soft =
+                        "{" + press +
+                        R"(, "contacts": [{"at_mm": [0, 0, 60.5], "normal": [0, 0, -1], "stiffness_n_per_mm": 0.2}]})",
+                    both = "{" + press +
+                           R"(, "contacts": [{"at_mm": [0, 0, 60.5], "normal": [0, 0, -1], "stiffness_n_per_mm": 100},
                                                           {"at_mm": [79.5, 10, 30], "radius_mm": 60, "stiffness_n_per_mm": 100}]})";
   for (const Case& k : {Case{plane, ElasticLaw::linear, TetOrder::t4, 2e-3},
                         {plane, ElasticLaw::linear, TetOrder::t10, 5e-4},
@@ -218,7 +231,8 @@ TEST(Statics, ContactAgreesWithCalculix) {
       off += dot(u[q] - own, u[q] - own);
       sum += dot(u[q], u[q]);
     }
-    std::printf("contact, order %d, law %d: %.2e off CalculiX\n", static_cast<int>(k.order), static_cast<int>(k.law), std::sqrt(off / sum));
+    std::printf("contact, order %d, law %d: %.2e off CalculiX\n", static_cast<int>(k.order), static_cast<int>(k.law),
+                std::sqrt(off / sum));
     EXPECT_LT(std::sqrt(off / sum), k.bound) << k.load;
   }
 }
@@ -302,7 +316,8 @@ TEST(Statics, SaysWhatAProblemCannotMean) {
   };
   says(R"({"gravity": [0,0,-9.81]})", "the key \"gravity\" is not known: did you mean \"gravity_m_s2\"?");
   says(R"({"name": "nothing"})", "it has none of");
-  says(R"({"moved": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "axes": "z", "by_mm": [1,0,0]}]})", "an axis that \"axes\" leaves free");
+  says(R"({"moved": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "axes": "z", "by_mm": [1,0,0]}]})",
+       "an axis that \"axes\" leaves free");
   says(R"({"moved": [{"box_mm": [[99,99,99],[100,100,100]], "by_mm": [1,0,0]}]})", "moved 1: no point lies in it");
   says(R"({"contacts": [{"at_mm": [0,0,0], "stiffness_n_per_mm": 1}]})", "it needs \"normal\"");
   says(R"({"contacts": [{"at_mm": [0,0,0], "normal": [0,0,0], "stiffness_n_per_mm": 1}]})", "no length");

@@ -6,12 +6,12 @@
 #include <filesystem>
 
 #include "../evidence/scene.h"
-#include "osteo/core/base/error.h"
-#include "osteo/session/scene/rehearsal.h"
-#include "osteo/session/recording/simulated.h"
 #include "osteo/assessment/trainee/group.h"
 #include "osteo/assessment/trainee/simulate.h"
 #include "osteo/assessment/trainee/trainee_hand.h"
+#include "osteo/core/base/error.h"
+#include "osteo/session/recording/simulated.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "scratch.h"
 
 namespace osteo {
@@ -97,7 +97,8 @@ TEST(Hand, HoldsItsForce) {
   }
 }
 
-// Depth is judged by the burr that is seen, which stays at the bone's surface: until that is deep enough the force is the wanted one.
+// Depth is judged by the burr that is seen, which stays at the bone's surface: until that is deep enough the force is
+// the wanted one.
 TEST(Hand, PressesUntilTheBurrThatItSeesIsDeepEnough) {
   const auto force_at_end = [](double yields_mm_per_n) {
     TraineeSkill skill;
@@ -150,7 +151,8 @@ TEST(Hand, TremblesBetweenEightAndTwelveHertz) {
   for (const double v : x) sum += v / static_cast<double>(x.size());
   for (double hz = 0.5; hz < 40; hz += 0.125) {
     std::complex<double> c;
-    for (std::size_t i = 0; i < x.size(); ++i) c += (x[i] - sum) * std::polar(1.0, -2 * M_PI * hz * static_cast<double>(i) * kDt);
+    for (std::size_t i = 0; i < x.size(); ++i)
+      c += (x[i] - sum) * std::polar(1.0, -2 * M_PI * hz * static_cast<double>(i) * kDt);
     all += std::norm(c);
     if (hz > 7.5 && hz < 12.5) in_band += std::norm(c);
   }
@@ -162,7 +164,11 @@ TEST(Hand, TremblesBetweenEightAndTwelveHertz) {
 
 // A slab below z = 4.5 with a rod along y at z = 0 (1) and a space of cells beside it (2).
 World slab() {
-  return test::solid_world([](Vec3 p) { return std::min({4.5 - p.z, p.z + 11, 11 - std::abs(p.x), 11 - std::abs(p.y)}); }, 0.8, 24);
+  return test::solid_world(
+      [](Vec3 p) {
+        return std::min({4.5 - p.z, p.z + 11, 11 - std::abs(p.x), 11 - std::abs(p.y)});
+      },
+      0.8, 24);
 }
 const std::shared_ptr<const StructureMap>& rod_and_cells() {
   static const auto map = std::make_shared<const StructureMap>(test::structure_map(
@@ -174,9 +180,12 @@ const std::shared_ptr<const StructureMap>& rod_and_cells() {
   return map;
 }
 const char* const kProcedure =
-    "{ \"osteotome_procedure\": 1, \"name\": \"t\", \"structures\": [ {\"name\": \"rod\", \"role\": \"expose\"}, {\"name\": \"cells\", "
-    "\"role\": \"enter\"} ], \"regions\": [ {\"name\": \"to the rod\", \"kind\": \"target\", \"structure\": \"rod\", \"within_mm\": 1} ],"
-    "\"items\": [ {\"name\": \"shown\", \"kind\": \"exposed\", \"structure\": \"rod\", \"towards\": [0, 0, 1], \"within_deg\": 60,"
+    "{ \"osteotome_procedure\": 1, \"name\": \"t\", \"structures\": [ {\"name\": \"rod\", \"role\": \"expose\"}, "
+    "{\"name\": \"cells\", "
+    "\"role\": \"enter\"} ], \"regions\": [ {\"name\": \"to the rod\", \"kind\": \"target\", \"structure\": \"rod\", "
+    "\"within_mm\": 1} ],"
+    "\"items\": [ {\"name\": \"shown\", \"kind\": \"exposed\", \"structure\": \"rod\", \"towards\": [0, 0, 1], "
+    "\"within_deg\": 60,"
     " \"threshold\": 0.1}, {\"name\": \"intact\", \"kind\": \"not_violated\", \"structure\": \"rod\"} ] }";
 
 TEST(Plan, GoesDownToTheStructureAndStopsBeforeIt) {
@@ -271,7 +280,8 @@ TEST(Truth, BallsOnAPlainFace) {
   EXPECT_FALSE(own_truth(procedure, *rod_and_cells(), {})[0].pass);
 }
 
-SimulatedSession session(const TraineeSkill& skill, std::uint64_t seed, const std::filesystem::path& folder, double most_s = 12) {
+SimulatedSession session(const TraineeSkill& skill, std::uint64_t seed, const std::filesystem::path& folder,
+                         double most_s = 12) {
   std::filesystem::create_directories(folder);
   TraineeScene scene;
   scene.procedure = parse_procedure(kProcedure, "t.json");
@@ -290,7 +300,8 @@ TEST(Session, IsTheSameForTheSameSeedAndSaysThatItIsSimulated) {
   const test::ScratchFolder scratch;
   TraineeSkill skill;
   skill.tremor_mm = 0.2;
-  const SimulatedSession a = session(skill, 4, scratch / "a"), b = session(skill, 4, scratch / "b"), c = session(skill, 5, scratch / "c");
+  const SimulatedSession a = session(skill, 4, scratch / "a"), b = session(skill, 4, scratch / "b"),
+                         c = session(skill, 5, scratch / "c");
   EXPECT_GT(a.summary.removed_mm3, 20);
   EXPECT_EQ(a.summary.bone_hash, b.summary.bone_hash);
   EXPECT_NE(a.summary.bone_hash, c.summary.bone_hash);
@@ -298,7 +309,8 @@ TEST(Session, IsTheSameForTheSameSeedAndSaysThatItIsSimulated) {
   EXPECT_NE(simulated_words(reader), "");
   const Session recorded = read_session(scratch / "a" / "stream.oss");
   EXPECT_EQ(recorded.notes.front().kind, kSimulatedNote);
-  EXPECT_TRUE(std::any_of(recorded.notes.begin(), recorded.notes.end(), [](const Note& n) { return n.kind == "camera"; }));
+  EXPECT_TRUE(
+      std::any_of(recorded.notes.begin(), recorded.notes.end(), [](const Note& n) { return n.kind == "camera"; }));
   const ReplayResult again = replay(reader, slab(), {nullptr, nullptr, rod_and_cells()}, {});
   EXPECT_TRUE(again.identical) << again.difference;
 }

@@ -149,10 +149,12 @@ TEST(Attack, WhateverComesNothingBreaks) {
     if (i % 3 == 0) {
       b.resize(below(1400));
       for (auto& x : b) x = static_cast<std::uint8_t>(below(256));
-      if (i % 6 == 0 && b.size() > 6) std::memset(b.data(), 0, 4), b[4] = static_cast<std::uint8_t>(1 + below(5)), b[5] = kTutorProtocol;
+      if (i % 6 == 0 && b.size() > 6)
+        std::memset(b.data(), 0, 4), b[4] = static_cast<std::uint8_t>(1 + below(5)), b[5] = kTutorProtocol;
     } else {
       b = i % 3 == 1 && !m.heard_by_host.empty() ? m.heard_by_host[below(m.heard_by_host.size())] : good[below(3)];
-      for (std::size_t k = below(4) + 1; k > 0 && !b.empty(); --k) b[below(b.size())] = static_cast<std::uint8_t>(below(256));
+      for (std::size_t k = below(4) + 1; k > 0 && !b.empty(); --k)
+        b[below(b.size())] = static_cast<std::uint8_t>(below(256));
       if (below(3) == 0) b.resize(below(b.size() + 1));
       if (below(5) == 0) b.resize(b.size() + below(300));
     }
@@ -191,7 +193,8 @@ TEST(Attack, AnAnswerIsNoLongerThanItsQuestion) {
       m.host.receive(peer(static_cast<std::uint64_t>(i)), Bytes(128, 0), 200'000 + i * 10);
       continue;
     }
-    for (const Bytes& ask : one.poll(200'000)) m.host.receive(peer(static_cast<std::uint64_t>(i)), ask, 200'000 + i * 10);
+    for (const Bytes& ask : one.poll(200'000))
+      m.host.receive(peer(static_cast<std::uint64_t>(i)), ask, 200'000 + i * 10);
     answers += m.host.poll(200'000 + i * 10).size();
   }
   EXPECT_LE(answers, 22U);

@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "bar.h"
+#include "osteo/network/tutor/live.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/haptics/simulated_device.h"
-#include "osteo/network/tutor/live.h"
 #include "sim_network.h"
 
 namespace osteo::test {
@@ -53,7 +53,11 @@ struct LiveParams {
 class LivePair {
  public:
   explicit LivePair(const LiveParams& p)
-      : p_(p), to_host_(p.faults, 11), to_guest_(p.faults, 12), host_hand_(Vec3{-6, 0, 9}), guest_hand_(Vec3{-5, 0, 9}) {
+      : p_(p),
+        to_host_(p.faults, 11),
+        to_guest_(p.faults, 12),
+        host_hand_(Vec3{-6, 0, 9}),
+        guest_hand_(Vec3{-5, 0, 9}) {
     setup_.device = host_hand_.traits();
     setup_.more_devices = {guest_hand_.traits()};
     host_.emplace(kCode, Bytes{1, 2, 3}, 2, far_);
@@ -75,8 +79,9 @@ class LivePair {
     return o;
   }
   void make_feel() {
-    copy_->rehearsal()->look(
-        [&](const World& world, SceneReaders&) { feel_.emplace(world, setup_, Anatomy{}, guest_hand_.traits(), guide(0, 1), 1000); });
+    copy_->rehearsal()->look([&](const World& world, SceneReaders&) {
+      feel_.emplace(world, setup_, Anatomy{}, guest_hand_.traits(), guide(0, 1), 1000);
+    });
   }
 
   HandGuide guide(std::uint32_t hand, std::uint32_t leader) const {
@@ -90,7 +95,8 @@ class LivePair {
 
   void step() {
     const std::int64_t now = static_cast<std::int64_t>(tick_) * 1000,
-                       theirs = p_.guest_clock_us + static_cast<std::int64_t>(static_cast<double>(now) * (1 + p_.guest_drift));
+                       theirs = p_.guest_clock_us +
+                                static_cast<std::int64_t>(static_cast<double>(now) * (1 + p_.guest_drift));
     for (const Bytes& b : to_host_.arrived(now)) host_->receive(kGuest, b, now);
     for (const Bytes& b : to_guest_.arrived(now)) guest_->receive(b, theirs);
     operation_->step(0);
@@ -107,9 +113,13 @@ class LivePair {
     }
     ++tick_;
   }
-  [[nodiscard]] double apart_mm() { return length(host_hand_.device().position_mm() - guest_hand_.device().position_mm()); }
+  [[nodiscard]] double apart_mm() {
+    return length(host_hand_.device().position_mm() - guest_hand_.device().position_mm());
+  }
   [[nodiscard]] double kinetic_mj() {
-    const auto of = [](SimHand& h) { return 0.5 * 0.1 * dot(h.device().velocity_mm_s(), h.device().velocity_mm_s()) / 1000; };
+    const auto of = [](SimHand& h) {
+      return 0.5 * 0.1 * dot(h.device().velocity_mm_s(), h.device().velocity_mm_s()) / 1000;
+    };
     return of(host_hand_) + of(guest_hand_);
   }
   // The rest of the log, without new ticks.

@@ -1,4 +1,5 @@
-// Live tutoring over a network that is simulated: the same bone on both sides, hands that stay together, nothing that swings.
+// Live tutoring over a network that is simulated: the same bone on both sides, hands that stay together, nothing that
+// swings.
 #include "osteo/network/tutor/live.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +31,8 @@ Stroke stroke(const LiveParams& p) {
     const double at = t * 1e-3;
     // 12 mm there and back in 2.4 s, pressing into the bar: 16 mm/s at most.
     pair.host_hand_.device().set_hand(
-        {}, {-6 * std::cos(2 * M_PI * at / 2.4), 2 * std::sin(2 * M_PI * at / 3.1), at < 0.3 ? 9.0 - 15 * at : 4.6}, 0.6);
+        {}, {-6 * std::cos(2 * M_PI * at / 2.4), 2 * std::sin(2 * M_PI * at / 3.1), at < 0.3 ? 9.0 - 15 * at : 4.6},
+        0.6);
     place += (pair.guest_hand_.device().position_mm() - place) * 0.01;
     pair.guest_hand_.device().set_hand({}, place, 0.1);
     pair.step();
@@ -49,7 +51,8 @@ Stroke stroke(const LiveParams& p) {
 }
 
 TEST(Live, HandsStayTogetherAndBoneIsTheSameOverABadNetwork) {
-  for (const auto& [rtt, loss, jitter] : {std::tuple(0.0, 0.0, 0.0), std::tuple(20.0, 0.01, 4.0), std::tuple(50.0, 0.05, 10.0)}) {
+  for (const auto& [rtt, loss, jitter] :
+       {std::tuple(0.0, 0.0, 0.0), std::tuple(20.0, 0.01, 4.0), std::tuple(50.0, 0.05, 10.0)}) {
     LiveParams p;
     p.faults = {rtt / 2 - jitter / 2, jitter, loss, 0.01};
     const Stroke s = stroke(p);
@@ -75,7 +78,8 @@ TEST(Live, BoneIsTheSameAfterALongTime) {
   RecordProperty("rms_um", static_cast<int>(s.rms_mm * 1000));
 }
 
-// After a push both hands come to rest, however late they hear of each other; without the brake they swing themselves up.
+// After a push both hands come to rest, however late they hear of each other; without the brake they swing themselves
+// up.
 TEST(Live, NothingSwingsUpAtTwoHundredMilliseconds) {
   const auto swing = [](double brake) {
     LiveParams p;

@@ -1,4 +1,5 @@
-// A recorded hand leads another: how near it stays, that bone is the recorded one, that the guided session replays to the bit.
+// A recorded hand leads another: how near it stays, that bone is the recorded one, that the guided session replays to
+// the bit.
 #include "osteo/network/tutor/playback.h"
 
 #include <gtest/gtest.h>
@@ -7,8 +8,8 @@
 
 #include "bar.h"
 #include "osteo/core/base/error.h"
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "scratch.h"
 
 namespace osteo {
@@ -45,14 +46,16 @@ struct Played {
   std::shared_ptr<Playback> playback;
 };
 
-Played play(const fs::path& expert, const PlaybackParams& params, double hand_n_per_m, const fs::path& file, Vec3 off = {0, 0, 2}) {
+Played play(const fs::path& expert, const PlaybackParams& params, double hand_n_per_m, const fs::path& file,
+            Vec3 off = {0, 0, 2}) {
   const SessionReader session(expert);
   auto playback = std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(session, 0, 0)), params);
   const DeviceSample& first = playback->lesson->hands.front().front();
   RehearsalOptions o;
   o.session_file = file;
   auto devices =
-      playback_devices(std::make_unique<FollowingHand>(hand_n_per_m, from_floats(first.position_mm) + off, playback), playback, o.haptics);
+      playback_devices(std::make_unique<FollowingHand>(hand_n_per_m, from_floats(first.position_mm) + off, playback),
+                       playback, o.haptics);
   o.actions = playback_actions(*playback);
   Rehearsal r(bar(), std::move(devices), o, {});
   Played p{r.run_to_end({}), {}, playback};
@@ -83,7 +86,8 @@ TEST_F(Playbacks, HandsOfThreeStiffnessesFollowWithinAMillimetre) {
       EXPECT_GT(p.facts.ticks, 2500U);
       EXPECT_LT(p.facts.rms_mm, 1);
       EXPECT_LE(p.facts.most_pull_n, params.most_n + 8);
-      EXPECT_LT(p.facts.most_work_mj, 8);    // what it takes to carry the hand along, and no more: twice as much would be swinging
+      EXPECT_LT(p.facts.most_work_mj,
+                8);  // what it takes to carry the hand along, and no more: twice as much would be swinging
       EXPECT_EQ(p.summary.bone_hash, bone);  // to the bit, though another hand was there
       EXPECT_TRUE(replays(file));
     }
@@ -134,7 +138,8 @@ TEST_F(Playbacks, FeelingAloneLeadsNobodyAndBoneIsTheRecordedOne) {
 }
 
 TEST_F(Playbacks, OneWhoDoesNotComeOnEndsItWhereItWasToldTo) {
-  auto playback = std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(SessionReader(expert), 0, 0)), PlaybackParams{});
+  auto playback =
+      std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(SessionReader(expert), 0, 0)), PlaybackParams{});
   playback->patience_s = 0.5;
   class Rock final : public Device {
     DeviceSample read(std::uint64_t, double, Vec3) noexcept override {
@@ -156,7 +161,8 @@ TEST_F(Playbacks, OneWhoDoesNotComeOnEndsItWhereItWasToldTo) {
 TEST_F(Playbacks, AHandThatIsLetGoComesToRest) {
   PlaybackParams params;
   params.ramp_s = 0.2;
-  auto playback = std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(SessionReader(expert), 0, 0)), params);
+  auto playback =
+      std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(SessionReader(expert), 0, 0)), params);
   RehearsalOptions o;
   auto hand = std::make_unique<FollowingHand>(100, Vec3{-6, 0, 8}, playback);
   FollowingHand* const held = hand.get();

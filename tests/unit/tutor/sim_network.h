@@ -1,4 +1,5 @@
-// A network between two programs that is none: delay, jitter (which reorders), loss, duplicates. The same seed, the same network.
+// A network between two programs that is none: delay, jitter (which reorders), loss, duplicates. The same seed, the
+// same network.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -21,7 +22,9 @@ class SimNetwork {
     ++sent;
     bytes += packet.size();
     if (cut || chance() < faults.loss) return;
-    const auto arrive = [&] { return now_us + static_cast<std::int64_t>(1000 * (faults.delay_ms + faults.jitter_ms * chance())); };
+    const auto arrive = [&] {
+      return now_us + static_cast<std::int64_t>(1000 * (faults.delay_ms + faults.jitter_ms * chance()));
+    };
     on_its_way_.emplace(arrive(), packet);
     if (chance() < faults.duplicates) on_its_way_.emplace(arrive(), packet);
   }

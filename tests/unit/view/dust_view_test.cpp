@@ -9,12 +9,12 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "osteo/simulation/bone/live_surface.h"
-#include "osteo/imaging/io/surface_io.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/bone_view.h"
 #include "osteo/display/view/dust_view.h"
 #include "osteo/display/view/offscreen.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/simulation/bone/live_surface.h"
 #include "solid.h"
 
 namespace osteo {
@@ -29,7 +29,8 @@ BrickGrid bowl() {
 
 // Where somebody wants to look at them.
 void keep(const Picture& picture, const char* name) {
-  if (const char* const folder = std::getenv("OSTEO_PICTURES")) save_picture(picture, std::filesystem::path(folder) / name);
+  if (const char* const folder = std::getenv("OSTEO_PICTURES"))
+    save_picture(picture, std::filesystem::path(folder) / name);
 }
 
 // The dust's colour: brighter than the background, red over blue.
@@ -72,7 +73,8 @@ TEST(DustView, IsSeenWhereItLies) {
 double likeness(const Picture& p, int width, std::array<int, 4> part, int dx, int dy) {
   const auto [x0, x1, y0, y1] = part;
   const auto at = [&](int x, int y) {
-    return static_cast<double>(p.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x))]);
+    return static_cast<double>(
+        p.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x))]);
   };
   double mean = 0;
   for (int y = y0; y < y1; ++y)
@@ -92,8 +94,8 @@ double pixels_a_cell(double radius_mm) {
   return 0.5 * 300 / (2 * std::tan(15 * 3.14159265358979 / 180) * radius_mm / 0.24);
 }
 
-// A flat layer of dust seen from above, along the rows of its cells: brightness moved by a cell's width resembles itself no more than when
-// moved by any other width.
+// A flat layer of dust seen from above, along the rows of its cells: brightness moved by a cell's width resembles
+// itself no more than when moved by any other width.
 TEST(DustView, ShowsNoRows) {
   const auto bone = test::slab(0.5);
   Dust dust(bone, {.gravity = {0, 0, -1}});
@@ -111,14 +113,15 @@ TEST(DustView, ShowsNoRows) {
   for (const int cells : {1, 2, 3}) {
     const int by = static_cast<int>(std::lround(cells * pixels_a_cell(6)));
     for (int off = -2; off <= 2; ++off)
-      worst = std::max({worst, likeness(p, 300, {70, 230, 70, 230}, by + off, 0), likeness(p, 300, {70, 230, 70, 230}, 0, by + off)});
+      worst = std::max({worst, likeness(p, 300, {70, 230, 70, 230}, by + off, 0),
+                        likeness(p, 300, {70, 230, 70, 230}, 0, by + off)});
   }
   std::printf("likeness at the cells' distance (%.1f pixels): %.3f\n", pixels_a_cell(6), worst);
   EXPECT_LT(worst, 0.25);
 }
 
-// Slurry that runs over an edge and falls, seen from the side: drops, not rods along gravity. Of how pixels within the stream differ,
-// hardly anything is what columns of pixels have in common.
+// Slurry that runs over an edge and falls, seen from the side: drops, not rods along gravity. Of how pixels within the
+// stream differ, hardly anything is what columns of pixels have in common.
 TEST(DustView, WhatFallsShowsNoRows) {
   const auto bone = test::solid(0.5, 12, [](Vec3 p) { return p.x < 0 && p.y > -10 && p.y < -6; });
   Dust dust(bone, {.gravity = {0, 1, 0}});
@@ -154,7 +157,8 @@ TEST(DustView, WhatFallsShowsNoRows) {
     for (int y = 60; y < 240; ++y) {
       pixels += (at(x, y) - c) * (at(x, y) - c);
       for (int cells = 1; cells < 4; ++cells)
-        alike[static_cast<std::size_t>(cells)] += (at(x, y) - c) * (at(x, y + static_cast<int>(std::lround(cells * pixels_a_cell(6)))) - c);
+        alike[static_cast<std::size_t>(cells)] +=
+            (at(x, y) - c) * (at(x, y + static_cast<int>(std::lround(cells * pixels_a_cell(6)))) - c);
     }
   }
   const double worst = *std::max_element(alike.begin(), alike.end()) / pixels;
@@ -175,7 +179,8 @@ TEST(DustView, WaterIsSeenAndSlurryIsPaler) {
   const auto brightness = [](const Picture& p) {
     double sum = 0;
     for (int y = 140; y < 160; ++y)
-      for (int x = 140; x < 160; ++x) sum += p.rgb[3 * (static_cast<std::size_t>(y) * 300 + static_cast<std::size_t>(x)) + 1];
+      for (int x = 140; x < 160; ++x)
+        sum += p.rgb[3 * (static_cast<std::size_t>(y) * 300 + static_cast<std::size_t>(x)) + 1];
     return sum / 400;
   };
   const auto warmth = [](const Picture& p) {

@@ -7,10 +7,10 @@
 #include <cstdlib>
 #include <numbers>
 
-#include "osteo/imaging/io/surface_io.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/instrument_view.h"
 #include "osteo/display/view/offscreen.h"
+#include "osteo/imaging/io/surface_io.h"
 
 namespace osteo {
 namespace {
@@ -18,7 +18,8 @@ namespace {
 constexpr int kSize = 300;
 
 void keep(const Picture& picture, const std::string& name) {
-  if (const char* const folder = std::getenv("OSTEO_PICTURES")) save_picture(picture, std::filesystem::path(folder) / (name + ".png"));
+  if (const char* const folder = std::getenv("OSTEO_PICTURES"))
+    save_picture(picture, std::filesystem::path(folder) / (name + ".png"));
 }
 
 struct Stage {
@@ -100,7 +101,9 @@ TEST(InstrumentView, FlutesAreSeenAtRestTurnWithTheBurrAndAreABlurAtSpeed) {
   const auto width = [&](const Picture& p) {
     int n = 0;
     for (int x = 0; x < kSize; ++x)
-      n += p.rgb[3 * (static_cast<std::size_t>(kSize / 2) * kSize + static_cast<std::size_t>(x))] > 45 ? 1 : 0;  // the background has 23
+      n += p.rgb[3 * (static_cast<std::size_t>(kSize / 2) * kSize + static_cast<std::size_t>(x))] > 45
+               ? 1
+               : 0;  // the background has 23
     return n / pixels_a_mm;
   };
   EXPECT_NEAR(width(fast), 5, 0.15);
@@ -109,14 +112,15 @@ TEST(InstrumentView, FlutesAreSeenAtRestTurnWithTheBurrAndAreABlurAtSpeed) {
 
 TEST(InstrumentView, EachLooksLikeWhatItIs) {
   std::vector<Picture> all;
-  for (const char* const name :
-       {"cutting 4 mm", "diamond 4 mm", "cutting taper 4 mm", "sucker 10 Fr", "irrigator 2 mm", "probe 1 mm", "hook 2 mm"}) {
+  for (const char* const name : {"cutting 4 mm", "diamond 4 mm", "cutting taper 4 mm", "sucker 10 Fr", "irrigator 2 mm",
+                                 "probe 1 mm", "hook 2 mm"}) {
     Stage stage({0, 0, 2.5}, 5, normalized({0.3, -0.8, -0.5}));
     stage.view.show(holding(name), 1000);
     all.push_back(stage.window.render());
     keep(all.back(), std::string("instrument-") + name);
     EXPECT_GT(drawn(all.back()), 800) << name;
-    for (std::size_t other = 0; other + 1 < all.size(); ++other) EXPECT_GT(difference(all[other], all.back()), 0.5) << name;
+    for (std::size_t other = 0; other + 1 < all.size(); ++other)
+      EXPECT_GT(difference(all[other], all.back()), 0.5) << name;
     stage.view.hide();
     EXPECT_LT(drawn(stage.window.render()), 50) << name;
   }
@@ -144,7 +148,8 @@ TEST(InstrumentView, OfTheShaftNothingIsDrawnWithinBone) {
   EXPECT_GT(stage.view.shaft_in_bone(), 0.02);
   EXPECT_LT(drawn(cut), drawn(free) - 300);
   int orange = 0;
-  for (std::size_t i = 0; i + 2 < cut.rgb.size(); i += 3) orange += cut.rgb[i] > 120 && cut.rgb[i] > 2 * cut.rgb[i + 2] ? 1 : 0;
+  for (std::size_t i = 0; i + 2 < cut.rgb.size(); i += 3)
+    orange += cut.rgb[i] > 120 && cut.rgb[i] > 2 * cut.rgb[i + 2] ? 1 : 0;
   EXPECT_GT(orange, 100);
   t.flags = 0;
   stage.view.show(t, 1000, wall);

@@ -13,11 +13,11 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/simulation/bone/live_surface.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/bone_view.h"
 #include "osteo/display/view/dust_view.h"
 #include "osteo/display/view/offscreen.h"
+#include "osteo/simulation/bone/live_surface.h"
 #include "solid.h"
 
 namespace osteo {

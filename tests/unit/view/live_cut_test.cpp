@@ -7,10 +7,10 @@
 #include <cstdio>
 #include <numbers>
 
-#include "osteo/simulation/bone/instrument.h"
+#include "osteo/display/view/cut_outline.h"
 #include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/geometry/mesh/bone_surface.h"
-#include "osteo/display/view/cut_outline.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "solid.h"
 
 namespace osteo {
@@ -24,7 +24,8 @@ std::shared_ptr<Body> ball_of_bone(double h = 0.5) {
   return body;
 }
 
-// CT values of a ball: 1000 HU in its middle, falling evenly to 200 at 8 mm; as cases keep them, only where there is bone.
+// CT values of a ball: 1000 HU in its middle, falling evenly to 200 at 8 mm; as cases keep them, only where there is
+// bone.
 double hu_of(Vec3 p) {
   return 1000 - 100 * length(p);
 }
@@ -32,7 +33,9 @@ SparseGrid hu_where_bone_is(const BrickGrid& bone) {
   BrickGrid hu = bone;
   for (VoxelKey v = 0; v < hu.brick_count() * BrickGrid::kVoxels; ++v) {
     const Ijk c = hu.coordinate(v);
-    hu.set(v, bone.value(v) > 0 ? static_cast<float>(hu_of(hu.frame().world_from_index({double(c.i), double(c.j), double(c.k)}))) : 0);
+    hu.set(v, bone.value(v) > 0
+                  ? static_cast<float>(hu_of(hu.frame().world_from_index({double(c.i), double(c.j), double(c.k)})))
+                  : 0);
   }
   return to_sparse(hu, "hu");
 }
@@ -114,7 +117,8 @@ TEST(LiveCut, KnowsTheScanOfTheCaseFromAnother) {
     for (int k = 0; k < size; ++k)
       for (int j = 0; j < size; ++j)
         for (int i = 0; i < size; ++i)
-          v[n++] = static_cast<std::int16_t>(std::lround(hu_of(scan.frame.world_from_index({double(i), double(j), double(k)}) - shift)));
+          v[n++] = static_cast<std::int16_t>(
+              std::lround(hu_of(scan.frame.world_from_index({double(i), double(j), double(k)}) - shift)));
     scan.voxels = v;
     return scan;
   };
@@ -137,7 +141,8 @@ TEST(LiveCut, TintsWhatIsMissingAndOnlyThat) {
   const Vec3 at{7, 0, 0};
   for (VoxelKey v = 0; v < body->bone.brick_count() * BrickGrid::kVoxels; ++v) {
     const Ijk c = body->bone.coordinate(v);
-    if (length(body->bone.frame().world_from_index({double(c.i), double(c.j), double(c.k)}) - at) < 3) body->bone.set(v, 0);
+    if (length(body->bone.frame().world_from_index({double(c.i), double(c.j), double(c.k)}) - at) < 3)
+      body->bone.set(v, 0);
   }
   draw_live_cut(view, cut, rgba);
   double tinted_mm2 = 0;
@@ -186,7 +191,8 @@ TEST(LiveCut, APieceThatWasMovedTakesItsValuesAlong) {
 }
 
 TEST(LiveCut, TheFinerGridTellsWhatWasThere) {
-  // A fine block in which there was no bone, inside a coarse one that (before the block was taken out of it) was full there.
+  // A fine block in which there was no bone, inside a coarse one that (before the block was taken out of it) was full
+  // there.
   const auto body = ball_of_bone();
   const GridSampler coarse(to_sparse(body->bone, "density"));
   BrickGrid empty = test::solid(0.25, 2, [](Vec3 p) { return p.x > 1.6; });
@@ -233,7 +239,9 @@ TEST(CutOutline, OfABallIsACircleWithinHalfAPixel) {
 
 TEST(CutOutline, TwoBodiesAreTwoLoopsAndAnOpenMeshALine) {
   auto body = std::make_shared<Body>();
-  body->bone = test::solid(0.5, 12, [](Vec3 p) { return length(p - Vec3{5, 0, 0}) < 3 || length(p + Vec3{5, 0, 0}) < 2; });
+  body->bone = test::solid(0.5, 12, [](Vec3 p) {
+    return length(p - Vec3{5, 0, 0}) < 3 || length(p + Vec3{5, 0, 0}) < 2;
+  });
   EXPECT_EQ(section_of(surface_nets(body->bone).mesh, {}, {0, 0, 1}).size(), 2u);
   TriMesh sheet;  // two triangles, upright
   sheet.points_mm = {{0, 0, -1}, {2, 0, -1}, {2, 0, 1}, {0, 0, 1}};

@@ -23,7 +23,8 @@ TEST(Openness, IsWholeOnFlatAndBulgingBone) {
   const auto tilted = test::solid(
       0.5, 14, [](Vec3 p) { return p.x + p.z < 0; }, {}, 2);
   const Openness slope(tilted);
-  for (double y = -4; y < 4; y += 0.37) EXPECT_NEAR(at(slope, tilted, {0.1 * y, y, -0.1 * y}, normalized({1, 0, 1})), 1, 0.06) << y;
+  for (double y = -4; y < 4; y += 0.37)
+    EXPECT_NEAR(at(slope, tilted, {0.1 * y, y, -0.1 * y}, normalized({1, 0, 1})), 1, 0.06) << y;
   const auto ball = test::solid(
       0.5, 12, [](Vec3 p) { return length(p) < 9; }, {}, 2);
   const Openness round(ball);
@@ -37,7 +38,8 @@ TEST(Openness, IsWholeOnFlatAndBulgingBone) {
 TEST(Openness, AtTheBottomOfHolesIsNearTheExactShare) {
   double worst = 0;
   for (const double voxel : {0.2, 0.4, 0.5}) {
-    for (const auto& [radius, depth] : {std::pair{4.0, 2.0}, {4.0, 4.0}, {3.0, 3.0}, {3.0, 6.0}, {2.0, 4.0}, {2.0, 6.0}, {1.5, 6.0}}) {
+    for (const auto& [radius, depth] :
+         {std::pair{4.0, 2.0}, {4.0, 4.0}, {3.0, 3.0}, {3.0, 6.0}, {2.0, 4.0}, {2.0, 6.0}, {1.5, 6.0}}) {
       if (voxel == 0.2 && radius != 3.0) continue;  // a million points to count
       const auto bone = test::solid(
           voxel, 10, [&](Vec3 p) { return p.z < 2 && !(p.z > 2 - depth && std::hypot(p.x, p.y) < radius); }, {}, 2);
@@ -76,7 +78,8 @@ TEST(Openness, RenewedIsAsMadeAnew) {
   live.renew(bone, bricks);
   const Openness anew(bone);
   for (double x = -5; x < 5; x += 0.61)
-    EXPECT_EQ(at(live, bone, {x, 0.2 * x, 2 - std::abs(x) / 4}, {0, 0, 1}), at(anew, bone, {x, 0.2 * x, 2 - std::abs(x) / 4}, {0, 0, 1}));
+    EXPECT_EQ(at(live, bone, {x, 0.2 * x, 2 - std::abs(x) / 4}, {0, 0, 1}),
+              at(anew, bone, {x, 0.2 * x, 2 - std::abs(x) / 4}, {0, 0, 1}));
   EXPECT_LT(at(live, bone, {0.3, -0.2, -1.1}, {0, 0, 1}), 0.8);
 }
 
@@ -84,7 +87,9 @@ TEST(Openness, RenewedIsAsMadeAnew) {
 TEST(Openness, TwoBodiesShadeEachOther) {
   constexpr double kVoxel = 0.4, kRegion = 3.2;
   const auto is_bone = [](Vec3 p) { return p.z < 2 && !(p.z > -2 && std::hypot(p.x, p.y) < 3); };
-  const auto in_region = [](Vec3 p) { return std::abs(p.x) < kRegion && std::abs(p.y) < kRegion && std::abs(p.z + 2) < kRegion; };
+  const auto in_region = [](Vec3 p) {
+    return std::abs(p.x) < kRegion && std::abs(p.y) < kRegion && std::abs(p.z + 2) < kRegion;
+  };
   const auto whole = test::solid(kVoxel, 10, is_bone, {}, 2);
   const auto around = test::solid(
       kVoxel, 10, [&](Vec3 p) { return is_bone(p) && !in_region(p); }, {}, 2);
@@ -102,12 +107,14 @@ TEST(Openness, TwoBodiesShadeEachOther) {
     for (const double r : {0.0, 1.0, 2.0}) {  // the floor, in the region
       const Vec3 p{r * std::cos(a), r * std::sin(a), -2}, n{0, 0, 1};
       const double exact = at(all, whole, p, n);
-      worst = std::max(worst, std::abs(near->at(to_floats(fine.frame().index_from_world(p)), to_floats(n), of_far) - exact));
+      worst = std::max(worst,
+                       std::abs(near->at(to_floats(fine.frame().index_from_world(p)), to_floats(n), of_far) - exact));
       alone = std::max(alone, std::abs(at(*near, fine, p, n) - exact));
     }
     // The wall above it, outside of the region.
     const Vec3 n{-std::cos(a), -std::sin(a), 0}, p = n * -3 + Vec3{0, 0, 1.6};
-    worst = std::max(worst, std::abs(far->at(to_floats(around.frame().index_from_world(p)), to_floats(n), of_near) - at(all, whole, p, n)));
+    worst = std::max(worst, std::abs(far->at(to_floats(around.frame().index_from_world(p)), to_floats(n), of_near) -
+                                     at(all, whole, p, n)));
   }
   std::printf("off one body's: each with the other %.3f, alone %.3f\n", worst, alone);
   EXPECT_LT(worst, 0.12);

@@ -14,13 +14,13 @@
 #include <numbers>
 #include <thread>
 
-#include "osteo/imaging/io/surface_io.h"
-#include "osteo/imaging/io/vtk_data.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/bone_view.h"
 #include "osteo/display/view/changes.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/display/view/wet_film.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/imaging/io/vtk_data.h"
 #include "solid.h"
 
 namespace osteo {
@@ -33,7 +33,8 @@ BrickGrid block() {
       [](Vec3 p) {
         const bool hole = p.y < 2 && std::hypot(p.x, p.z) < 3;
         const bool ridge = p.y > -6 - 3 && p.y <= -6 && std::abs(p.x - 9) < (p.y + 9);
-        return (p.y > -6 && p.y < 9 && std::abs(p.x) < 13 && std::abs(p.z) < 11 && !hole) || (ridge && std::abs(p.z) < 9);
+        return (p.y > -6 && p.y < 9 && std::abs(p.x) < 13 && std::abs(p.z) < 11 && !hole) ||
+               (ridge && std::abs(p.z) < 9);
       },
       {}, 2);
 }
@@ -205,8 +206,9 @@ TEST(Picture, FewerTrianglesInMotionLookTheSame) {
   for (std::size_t n = 0; n < view.chunks(); ++n) {
     const auto a = view.arrays(n);
     const std::size_t before = static_cast<std::size_t>(a.triangles->GetNumberOfValues());
-    auto fewer = coarse_triangles({a.points_mm->GetPointer(0), static_cast<std::size_t>(a.points_mm->GetNumberOfValues())},
-                                  {a.triangles->GetPointer(0), before}, 0.35 * 0.4);
+    auto fewer =
+        coarse_triangles({a.points_mm->GetPointer(0), static_cast<std::size_t>(a.points_mm->GetNumberOfValues())},
+                         {a.triangles->GetPointer(0), before}, 0.35 * 0.4);
     EXPECT_LE(fewer.size(), before);
     view.keep_coarse(n, a.version, fewer);
     EXPECT_TRUE(view.has_coarse(n));
@@ -307,7 +309,8 @@ TEST(Colours, ShineThroughThinBoneWithoutSteps) {
   const auto voxels = make_voxels<std::uint8_t>(labels.frame.voxel_count());
   for (int k = 0; k < 40; ++k)
     for (int j = 0; j < 40; ++j)
-      for (int i = 0; i < 40; ++i) voxels[static_cast<std::size_t>((k * 40 + j) * 40 + i)] = std::hypot(j - 20, k - 20) < 4 ? 6 : 0;
+      for (int i = 0; i < 40; ++i)
+        voxels[static_cast<std::size_t>((k * 40 + j) * 40 + i)] = std::hypot(j - 20, k - 20) < 4 ? 6 : 0;
   labels.voxels = voxels;
   labels.structures = {{6, "facial nerve", {255, 255, 0}}};
   const StructureMap map(labels);

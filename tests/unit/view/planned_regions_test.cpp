@@ -9,10 +9,10 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/simulation/bone/live_surface.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/bone_view.h"
 #include "osteo/display/view/offscreen.h"
+#include "osteo/simulation/bone/live_surface.h"
 #include "solid.h"
 
 namespace osteo {
@@ -78,10 +78,12 @@ TEST(PlannedRegions, AreSeenThroughBoneInTheirColoursUntilHidden) {
       for (int x = 0; x < 300; ++x) {
         const auto i = 3 * (static_cast<std::size_t>(y) * 300 + static_cast<std::size_t>(x));
         const double r = std::hypot(x - 149.5, y - 149.5) / pixels_per_mm;
-        if (std::abs(r - 3.9) < 0.15) red += with.rgb[i] - without.rgb[i], green += with.rgb[i + 1] - without.rgb[i + 1], ++n;
+        if (std::abs(r - 3.9) < 0.15)
+          red += with.rgb[i] - without.rgb[i], green += with.rgb[i + 1] - without.rgb[i + 1], ++n;
         if (r < 1.5) middle += std::abs(with.rgb[i] - without.rgb[i]), ++m;
       }
-    std::printf("%s: rim red %+.0f, green %+.0f; middle %.0f\n", forbidden ? "forbidden" : "target", red / n, green / n, middle / m);
+    std::printf("%s: rim red %+.0f, green %+.0f; middle %.0f\n", forbidden ? "forbidden" : "target", red / n, green / n,
+                middle / m);
     EXPECT_GT((forbidden ? 1 : -1) * (red - green) / n, 25);
     EXPECT_LT(middle / m, 40);
     regions.show(false);

@@ -5,10 +5,10 @@
 
 #include <cstdlib>
 
-#include "osteo/imaging/io/surface_io.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/display/view/plate_view.h"
+#include "osteo/imaging/io/surface_io.h"
 #include "slab.h"
 
 namespace osteo {

@@ -8,18 +8,19 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "osteo/imaging/io/surface_io.h"
-#include "osteo/session/scene/scene_readers.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/display/view/world_view.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/session/scene/scene_readers.h"
 #include "solid.h"
 
 namespace osteo {
 namespace {
 
 void keep(const Picture& picture, const char* name) {
-  if (const char* const folder = std::getenv("OSTEO_PICTURES")) save_picture(picture, std::filesystem::path(folder) / name);
+  if (const char* const folder = std::getenv("OSTEO_PICTURES"))
+    save_picture(picture, std::filesystem::path(folder) / name);
 }
 
 bool is_bone(Vec3 p) {
@@ -56,7 +57,8 @@ TEST(RegionView, IsShadedByTheBoneAroundItAsIfBothWereOne) {
       floor_two += two.rgb[i];
       ++n;
     }
-  std::printf("floor: one body %.1f, region %.1f; mean difference %.2f, most %.0f\n", floor_one / n, floor_two / n, off, most);
+  std::printf("floor: one body %.1f, region %.1f; mean difference %.2f, most %.0f\n", floor_one / n, floor_two / n, off,
+              most);
   EXPECT_LT(floor_one / n, 160);
   EXPECT_NEAR(floor_two / n, floor_one / n, 14);
   EXPECT_LT(off, 5);

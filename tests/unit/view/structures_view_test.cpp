@@ -40,7 +40,8 @@ struct Errors {
   double mean_mm = 0, rms_mm = 0, normals_deg = 0, volume = 0;
 };
 // Of the points of a surface but where `counts` says no; against the distance's own gradient.
-Errors errors_of(const TriMesh& mesh, const std::function<double(Vec3)>& signed_mm, const std::function<bool(Vec3)>& counts) {
+Errors errors_of(const TriMesh& mesh, const std::function<double(Vec3)>& signed_mm,
+                 const std::function<bool(Vec3)>& counts) {
   Errors e;
   int n = 0;
   for (std::size_t p = 0; p < mesh.points_mm.size(); ++p) {
@@ -50,7 +51,8 @@ Errors errors_of(const TriMesh& mesh, const std::function<double(Vec3)>& signed_
     const Vec3 g = normalized({signed_mm(x + Vec3{eps, 0, 0}) - signed_mm(x - Vec3{eps, 0, 0}),
                                signed_mm(x + Vec3{0, eps, 0}) - signed_mm(x - Vec3{0, eps, 0}),
                                signed_mm(x + Vec3{0, 0, eps}) - signed_mm(x - Vec3{0, 0, eps})});
-    const double angle = std::acos(std::clamp(dot(g, from_floats(mesh.normals[p])), -1.0, 1.0)) * 180 / std::numbers::pi;
+    const double angle =
+        std::acos(std::clamp(dot(g, from_floats(mesh.normals[p])), -1.0, 1.0)) * 180 / std::numbers::pi;
     e.mean_mm += d;
     e.rms_mm += d * d;
     e.normals_deg += angle * angle;
@@ -97,8 +99,11 @@ TEST(StructureSurfaces, AreSmoothAndWhereTheBodyIs) {
     const TriMesh smooth = smooth_surface(map.face(0), map.label_spacing_mm()[1] / 2);
     const Errors was = errors_of(map.face(0), b.signed_mm, b.whole ? everywhere : not_at_ends);
     const Errors now = errors_of(smooth, b.signed_mm, b.whole ? everywhere : not_at_ends);
-    std::printf("%-26s face: %+.3f rms %.3f mm normals %4.1f   drawn: %+.3f rms %.3f mm normals %4.1f  volume %.3f of the face's\n", b.name,
-                was.mean_mm, was.rms_mm, was.normals_deg, now.mean_mm, now.rms_mm, now.normals_deg, now.volume / was.volume);
+    std::printf(
+        "%-26s face: %+.3f rms %.3f mm normals %4.1f   drawn: %+.3f rms %.3f mm normals %4.1f  volume %.3f of the "
+        "face's\n",
+        b.name, was.mean_mm, was.rms_mm, was.normals_deg, now.mean_mm, now.rms_mm, now.normals_deg,
+        now.volume / was.volume);
     EXPECT_LT(now.rms_mm, b.rms_mm) << b.name;
     EXPECT_LT(now.normals_deg, b.normals_deg) << b.name;
     EXPECT_LT(now.rms_mm, 1.1 * was.rms_mm) << b.name;
@@ -117,7 +122,9 @@ TEST(StructureSurfaces, AreSmoothAndWhereTheBodyIs) {
 }
 
 TEST(StructureSurfaces, ACrumbStaysWhatItIs) {
-  const Labels labels = labelled(6, {0.5, 0.5, 0.5}, [](Vec3 p) { return std::min(length(p) - 3, length(p - Vec3{5, 0, 0}) - 0.45); });
+  const Labels labels = labelled(6, {0.5, 0.5, 0.5}, [](Vec3 p) {
+    return std::min(length(p) - 3, length(p - Vec3{5, 0, 0}) - 0.45);
+  });
   const StructureMap map(labels, 2);
   const TriMesh smooth = smooth_surface(map.face(0), 0.25);
   int crumb = 0, moved = 0;
@@ -142,8 +149,9 @@ TEST(StructuresView, ClearLetsEveryOtherPixelThroughAndHiddenAll) {
     for (int j = 0; j < labels.frame.dims[1]; ++j)
       for (int i = 0; i < labels.frame.dims[0]; ++i) {
         const std::size_t at = labels.offset(i, j, k);
-        v[at] = length(labels.frame.world_from_index({double(i), double(j), double(k)}) - Vec3{0, 5, 0}) < 2 ? std::uint8_t{2}
-                                                                                                             : labels.voxels[at];
+        v[at] = length(labels.frame.world_from_index({double(i), double(j), double(k)}) - Vec3{0, 5, 0}) < 2
+                    ? std::uint8_t{2}
+                    : labels.voxels[at];
       }
   labels.voxels = v;
   labels.structures = {{1, "in front", {255, 0, 0}}, {2, "behind", {0, 255, 0}}};

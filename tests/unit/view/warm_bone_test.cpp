@@ -7,11 +7,11 @@
 
 #include <array>
 
-#include "osteo/simulation/bone/live_surface.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/bone_view.h"
 #include "osteo/display/view/changes.h"
 #include "osteo/display/view/offscreen.h"
+#include "osteo/simulation/bone/live_surface.h"
 #include "solid.h"
 
 namespace osteo {
@@ -22,7 +22,10 @@ std::array<double, 3> mean(const Picture& p, int cx, int cy) {
   for (int y = cy - 10; y <= cy + 10; ++y)
     for (int x = cx - 10; x <= cx + 10; ++x)
       for (std::size_t c = 0; c < 3; ++c)
-        sum[c] += p.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(p.width) + static_cast<std::size_t>(x)) + c] / 441.0;
+        sum[c] +=
+            p.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(p.width) + static_cast<std::size_t>(x)) +
+                  c] /
+            441.0;
   return sum;
 }
 

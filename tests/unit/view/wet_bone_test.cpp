@@ -9,27 +9,29 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "osteo/simulation/bone/live_surface.h"
-#include "osteo/imaging/io/surface_io.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/bone_view.h"
 #include "osteo/display/view/changes.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/display/view/wet_film.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/simulation/bone/live_surface.h"
 #include "solid.h"
 
 namespace osteo {
 namespace {
 
 void keep(const Picture& picture, const char* name) {
-  if (const char* const folder = std::getenv("OSTEO_PICTURES")) save_picture(picture, std::filesystem::path(folder) / name);
+  if (const char* const folder = std::getenv("OSTEO_PICTURES"))
+    save_picture(picture, std::filesystem::path(folder) / name);
 }
 
 double mean(const Picture& p, int cx, int cy, int half) {
   double sum = 0;
   for (int y = cy - half; y <= cy + half; ++y)
     for (int x = cx - half; x <= cx + half; ++x) {
-      const auto i = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(p.width) + static_cast<std::size_t>(x));
+      const auto i =
+          3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(p.width) + static_cast<std::size_t>(x));
       sum += (p.rgb[i] + p.rgb[i + 1] + p.rgb[i + 2]) / 3.0;
     }
   return sum / ((2 * half + 1) * (2 * half + 1));
@@ -45,11 +47,14 @@ struct WetBone : testing::Test {
     look(0.05, 0);
   }
   // From above, so much aside.
-  void look(double x, double y) { look_at(renderer, bone.frame().world_from_index({39.5, 39.5, 31.5}), 8, normalized({x, y, 1})); }
+  void look(double x, double y) {
+    look_at(renderer, bone.frame().world_from_index({39.5, 39.5, 31.5}), 8, normalized({x, y, 1}));
+  }
   // Water over what shows on the right (smaller x), without the layer of water itself.
   void wash(double mm3) {
     for (int j = 26; j < 54; ++j)
-      for (int i = 25; i < 35; ++i) dust.irrigate(bone.frame().world_from_index({double(i), double(j), 36}), {0, 0, -1}, 15, mm3 / 280);
+      for (int i = 25; i < 35; ++i)
+        dust.irrigate(bone.frame().world_from_index({double(i), double(j), 36}), {0, 0, -1}, 15, mm3 / 280);
   }
   bool update() {
     const bool changed = film.update(dust);
@@ -81,7 +86,8 @@ TEST_F(WetBone, AWashedPatchIsDarkerThanDryBesideItUntilItDries) {
   ASSERT_TRUE(update());
   const Picture wet = draw();
   keep(wet, "wet-patch.png");
-  std::printf("dry %.1f and %.1f, washed %.1f and %.1f\n", left, right, mean(wet, 75, 150, 20), mean(wet, 225, 150, 20));
+  std::printf("dry %.1f and %.1f, washed %.1f and %.1f\n", left, right, mean(wet, 75, 150, 20),
+              mean(wet, 225, 150, 20));
   EXPECT_LT(mean(wet, 225, 150, 20), 0.88 * right);
   EXPECT_NEAR(mean(wet, 75, 150, 20), left, 1);  // beside it, dry
   // A stroke of the burr through it: what is cut is as wet as what is around it, at once.

@@ -1,17 +1,17 @@
-// Every file in pipelines/, run by both engines on made data: the same files, byte for byte, the same records and the same report. A new
-// file is found by itself and needs a line in the table.
+// Every file in pipelines/, run by both engines on made data: the same files, byte for byte, the same records and the
+// same report. A new file is found by itself and needs a line in the table.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <fstream>
 #include <regex>
 
+#include "osteo/app/stages/registry.h"
+#include "osteo/app/vtk/pipeline.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/imaging/pipeline/engine.h"
 #include "osteo/imaging/pipeline/report_json.h"
-#include "osteo/app/stages/registry.h"
-#include "osteo/app/vtk/pipeline.h"
 #include "scratch.h"
 
 namespace osteo {
@@ -71,9 +71,12 @@ std::map<std::string, Settings> table() {
         {"spacing_mm", "1.5"},
         {"edge_mm", "8"}}},
       {"tissue-mesh", {{"surface", f + "/bone.ply"}, {"spacing_mm", "6"}}},
-      {"calibrate-tissue", {{"surface", gear}, {"problem", source + "/pipelines/tissue/gear.json"}, {"spacing_mm", "9"}}},
+      {"calibrate-tissue",
+       {{"surface", gear}, {"problem", source + "/pipelines/tissue/gear.json"}, {"spacing_mm", "9"}}},
       {"thesis-gear",
-       {{"surface", source + "/testdata/gear-2m.stl"}, {"problem", source + "/pipelines/tissue/thesis-gear.json"}, {"spacing_mm", "200"}}},
+       {{"surface", source + "/testdata/gear-2m.stl"},
+        {"problem", source + "/pipelines/tissue/thesis-gear.json"},
+        {"spacing_mm", "200"}}},
       {"thesis-cube",
        {{"surface", source + "/testdata/cube.stl"},
         {"problem", source + "/pipelines/tissue/two-materials.json"},
@@ -107,9 +110,11 @@ std::string name_of(const testing::TestParamInfo<fs::path>& info) {
 // A file's content, without how long it took: durations of records and of documents that tell them.
 std::string content(const fs::path& file, const std::string& folder = {}) {
   std::string text = text_of(file);
-  if (file.extension() == ".svg") return std::regex_replace(text, std::regex(R"re(solves, [0-9.e+-]+ s: )re"), "solves: ");
+  if (file.extension() == ".svg")
+    return std::regex_replace(text, std::regex(R"re(solves, [0-9.e+-]+ s: )re"), "solves: ");
   if (file.extension() != ".json") return text;
-  for (std::size_t at = folder.empty() ? std::string::npos : text.find(folder); at != std::string::npos; at = text.find(folder))
+  for (std::size_t at = folder.empty() ? std::string::npos : text.find(folder); at != std::string::npos;
+       at = text.find(folder))
     text.erase(at, folder.size());
   return std::regex_replace(text, std::regex(R"re("(seconds|peak_memory_mb)": [-+.0-9e]+)re"), "\"$1\": 0");
 }
@@ -126,7 +131,8 @@ TEST_P(EveryPipeline, GivesTheSameBytesByBothEngines) {
   const std::string text = text_of(GetParam());
   const auto known = table();
   const auto line = known.find(GetParam().stem().string());
-  ASSERT_NE(line, known.end()) << GetParam() << " has no line in the table of this test: with which made data can it run?";
+  ASSERT_NE(line, known.end()) << GetParam()
+                               << " has no line in the table of this test: with which made data can it run?";
   const test::ScratchFolder by_stages, by_vtk;
   int asked = 0;
   const auto counted = [&](const Pipeline& to_run) {
@@ -148,7 +154,9 @@ TEST_P(EveryPipeline, GivesTheSameBytesByBothEngines) {
     EXPECT_EQ(first[n].key, second[n].key);
     EXPECT_EQ(first[n].params, second[n].params);
     Report a = first[n].report, b = second[n].report;
-    const auto timed = [](const auto& fact) { return fact.first == "finer_truth_estimate_s" || fact.first == "seconds"; };
+    const auto timed = [](const auto& fact) {
+      return fact.first == "finer_truth_estimate_s" || fact.first == "seconds";
+    };
     std::erase_if(a, timed);
     std::erase_if(b, timed);
     EXPECT_EQ(a, b) << first[n].id;
@@ -161,7 +169,8 @@ TEST_P(EveryPipeline, GivesTheSameBytesByBothEngines) {
     const bool record = name.ends_with(".prov.json");
     outputs += record ? 0 : 1;
     if (hash == others.at(name)) continue;
-    std::string a = content(by_stages / name, by_stages.path().string()), b = content(by_vtk / name, by_vtk.path().string());
+    std::string a = content(by_stages / name, by_stages.path().string()),
+                b = content(by_vtk / name, by_vtk.path().string());
     if (record && is_timed(by_stages / name)) {
       const std::regex hash_of(R"re("output_hash": "[0-9a-f]+")re");
       a = std::regex_replace(a, hash_of, "");

@@ -1,6 +1,6 @@
-// Every stage of osteo as a VTK filter: fed through VTK's own data sets it must give what the stage gives by itself, bit for bit, and its
-// images must be what their information announces. A new stage is tried by itself, with inputs of the first kind that its ports take; one
-// that needs parameters, a document or a file has a line in the table.
+// Every stage of osteo as a VTK filter: fed through VTK's own data sets it must give what the stage gives by itself,
+// bit for bit, and its images must be what their information announces. A new stage is tried by itself, with inputs of
+// the first kind that its ports take; one that needs parameters, a document or a file has a line in the table.
 #include <gtest/gtest.h>
 #include <unistd.h>
 #include <vtkExecutive.h>
@@ -16,18 +16,18 @@
 
 #include <fstream>
 
-#include "osteo/core/base/files.h"
-#include "osteo/imaging/dicom/save_series.h"
-#include "osteo/geometry/grid/resample.h"
-#include "osteo/imaging/image/phantom.h"
-#include "osteo/imaging/image/threshold.h"
-#include "osteo/imaging/io/vtk_data.h"
 #include "osteo/app/stages/edit.h"
 #include "osteo/app/stages/mesh.h"
 #include "osteo/app/stages/registry.h"
-#include "osteo/simulation/tissue/calibrate.h"
 #include "osteo/app/vtk/vtkOsteoDataObject.h"
 #include "osteo/app/vtk/vtkOsteoStage.h"
+#include "osteo/core/base/files.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/imaging/dicom/save_series.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/threshold.h"
+#include "osteo/imaging/io/vtk_data.h"
+#include "osteo/simulation/tissue/calibrate.h"
 
 namespace osteo {
 namespace {
@@ -70,7 +70,10 @@ const std::map<std::string, Recipe>& table() {
       {"register", {{{"finest_mm", "4"}}, {}, {"labels"}}},
       {"saw", {{{"normal", "0,0,1"}}, {}, {}}},
       {"curve", {{}, {{"curve", "0 0 0\n10 0 0\n10 10 0\n"}, {"path", "1 1 0\n9 1 0\n9 8 0\n"}}, {}}},
-      {"tube", {{{"points_mm", "53.4,25.9,-15.6; 48,24,-28"}, {"max_radius_mm", "5"}, {"name", "sigmoid sinus"}}, {}, {"line"}}},
+      {"tube",
+       {{{"points_mm", "53.4,25.9,-15.6; 48,24,-28"}, {"max_radius_mm", "5"}, {"name", "sigmoid sinus"}},
+        {},
+        {"line"}}},
       {"find-structures", {{{"what", "ear_canal,air_cells"}}, {}, {"findings"}}},
       {"phantom", {{{"region", "temporal"}, {"spacing_mm", "4"}}, {}, {}}},
   };

@@ -8,9 +8,9 @@
 
 #include "osteo/app/stages/distance.h"
 #include "osteo/app/stages/mesh.h"
-#include "osteo/geometry/tets/skin.h"
 #include "osteo/app/vtk/vtkOsteoDataObject.h"
 #include "osteo/app/vtk/vtkOsteoStage.h"
+#include "osteo/geometry/tets/skin.h"
 
 namespace osteo {
 namespace {

@@ -9,17 +9,17 @@
 #include <vtkPolyData.h>
 #include <vtkPolyDataNormals.h>
 
-#include "osteo/imaging/dicom/import.h"
-#include "osteo/geometry/grid/resample.h"
-#include "osteo/imaging/image/phantom.h"
-#include "osteo/imaging/image/threshold.h"
-#include "osteo/imaging/io/vtk_data.h"
-#include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/app/stages/bone.h"
 #include "osteo/app/stages/image.h"
 #include "osteo/app/stages/import.h"
 #include "osteo/app/vtk/vtkOsteoDataObject.h"
 #include "osteo/app/vtk/vtkOsteoStage.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/threshold.h"
+#include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo {
 namespace {

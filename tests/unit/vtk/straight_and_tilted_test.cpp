@@ -13,12 +13,12 @@
 #include <cstdio>
 
 #include "osteo/core/base/files.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/imaging/bone_import/import_bone.h"
 #include "osteo/imaging/dicom/import.h"
-#include "osteo/geometry/grid/resample.h"
 #include "osteo/imaging/image/threshold.h"
 #include "osteo/imaging/io/vtk_data.h"
-#include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo {
 namespace {
@@ -76,7 +76,8 @@ Fit register_and_compare(vtkPolyData* tilted, vtkPolyData* straight) {
   locator->SetDataSet(straight);
   locator->BuildLocator();
   vtkNew<vtkMatrix4x4> total;
-  // First the middles, then rigid steps over ever nearer pairs (trimmed, so that what only one scan covers does not pull).
+  // First the middles, then rigid steps over ever nearer pairs (trimmed, so that what only one scan covers does not
+  // pull).
   double ca[3], cb[3];
   tilted->GetCenter(ca);
   straight->GetCenter(cb);
@@ -113,7 +114,8 @@ class StraightAndTilted : public testing::TestWithParam<SparseGrid (*)(const fs:
 TEST_P(StraightAndTilted, AreTheSameShape) {
   const fs::path data = fs::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom";
   if (!fs::exists(data)) GTEST_SKIP() << "no " << data;
-  const auto straight = surface_of(GetParam()(data / "S21570" / "S2030")), tilted = surface_of(GetParam()(data / "S21610" / "S2010"));
+  const auto straight = surface_of(GetParam()(data / "S21570" / "S2030")),
+             tilted = surface_of(GetParam()(data / "S21610" / "S2010"));
   const Fit f = register_and_compare(tilted, straight);
   std::printf("tilted to straight: mean %.3f mm, 95 %% below %.3f mm, %zu points\n", f.mean, f.p95, f.points);
   EXPECT_GT(f.points, 5000u);

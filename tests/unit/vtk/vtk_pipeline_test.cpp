@@ -1,4 +1,5 @@
-// A pipeline file as a pipeline of VTK: what runs and what does not, what is written, how it ends early; of toy stages that count.
+// A pipeline file as a pipeline of VTK: what runs and what does not, what is written, how it ends early; of toy stages
+// that count.
 #include "osteo/app/vtk/pipeline.h"
 
 #include <gtest/gtest.h>
@@ -10,11 +11,11 @@
 
 #include <fstream>
 
+#include "osteo/app/vtk/vtkOsteoDataObject.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/io/volume_io.h"
 #include "osteo/imaging/io/vtk_data.h"
-#include "osteo/app/vtk/vtkOsteoDataObject.h"
 #include "scratch.h"
 
 namespace osteo {
@@ -40,13 +41,14 @@ struct MakeStage {
     visit({"value", "of all voxels", "", 0, 100}, p.value);
   }
   static StageInfo info() {
-    return {.name = "make",
-            .synopsis = "an image",
-            .description = {},
-            .inputs = {},
-            .outputs = {{"image", {DataKind::image}, "image"}, {"seen", {DataKind::document}, "its surroundings", true}},
-            .references = {},
-            .example = {}};
+    return {
+        .name = "make",
+        .synopsis = "an image",
+        .description = {},
+        .inputs = {},
+        .outputs = {{"image", {DataKind::image}, "image"}, {"seen", {DataKind::document}, "its surroundings", true}},
+        .references = {},
+        .example = {}};
   }
   static std::vector<Data> run(const Params& p, std::span<const Data>, const Context& context) {
     ++g_runs[p.called];
@@ -67,17 +69,19 @@ struct AddStage {
     visit({"refuse", "fails with a finding"}, p.refuse);
   }
   static StageInfo info() {
-    return {.name = "add",
-            .synopsis = "adds",
-            .description = {},
-            .inputs = {{"image", {DataKind::image}, "image"}, {"other", {DataKind::image}, "added too", true}},
-            .outputs = {{"image", {DataKind::image}, "image"}, {"finding", {DataKind::document}, "what was found", true}},
-            .references = {},
-            .example = {}};
+    return {
+        .name = "add",
+        .synopsis = "adds",
+        .description = {},
+        .inputs = {{"image", {DataKind::image}, "image"}, {"other", {DataKind::image}, "added too", true}},
+        .outputs = {{"image", {DataKind::image}, "image"}, {"finding", {DataKind::document}, "what was found", true}},
+        .references = {},
+        .example = {}};
   }
   static std::vector<Data> run(const Params& p, std::span<const Data> in, const Context& context) {
     ++g_runs[p.called];
-    if (p.refuse) throw ErrorWithDocument(Error(ExitCode::failed, "refused", "do not"), "finding", {R"({"status": "refused"})"});
+    if (p.refuse)
+      throw ErrorWithDocument(Error(ExitCode::failed, "refused", "do not"), "finding", {R"({"status": "refused"})"});
     for (int n = 0; n <= 4; ++n) context.progress(n / 4.0, "adding");
     int sum = std::get<Image>(in[0]).span()[0] + p.add;
     if (const auto* other = std::get_if<Image>(&in[1])) sum += other->span()[0];
@@ -163,7 +167,8 @@ class VtkPipelineTest : public testing::Test {
     more["out"] = folder.path().string();
     return more;
   }
-  [[nodiscard]] VtkPipeline load(bool overwrite = false, const std::map<std::string, std::string>& more = {{"b.add", "20"}}) const {
+  [[nodiscard]] VtkPipeline load(bool overwrite = false,
+                                 const std::map<std::string, std::string>& more = {{"b.add", "20"}}) const {
     Pipeline p = parse_pipeline(kGraph, settings(more));
     for (PipelineNode& n : p.nodes) n.outputs.erase("finding");  // made only on failure
     return {p, registry(), {.overwrite = overwrite}};
@@ -284,7 +289,8 @@ TEST_F(VtkPipelineTest, ErrorsNameFileLineAndTheStepThatFailed) {
   EXPECT_EQ(said({{"b.refuse", "true"}}, "c"), "");
   EXPECT_EQ(said({{"c.ad", "1"}}, "c").find(name.substr(0, name.size() - 6)), 0U);
   EXPECT_NE(said({{"c.ad", "1"}}, "c").find("line 9: stage 'c'"), std::string::npos) << said({{"c.ad", "1"}}, "c");
-  EXPECT_NE(said({{"sum.add", "1000"}}, "b").find("line 10: stage 'sum'"), std::string::npos) << said({{"sum.add", "1000"}}, "b");
+  EXPECT_NE(said({{"sum.add", "1000"}}, "b").find("line 10: stage 'sum'"), std::string::npos)
+      << said({{"sum.add", "1000"}}, "b");
   std::ofstream(file()) << R"({ "osteotome": 1, "stages": [
     { "id": "here", "stage": "add", "in": { "image": { "file": "/nowhere/x.nrrd" } } } ] })";
   try {
@@ -334,8 +340,8 @@ TEST_F(VtkPipelineTest, ProgressIsToldAndAbortLeavesNoFile) {
 }
 
 TEST_F(VtkPipelineTest, WhatVtkHasNoPlaceForGoesAlong) {
-  const Pipeline two =
-      parse_pipeline(R"({ "osteotome": 1, "stages": [ { "stage": "name" }, { "stage": "say", "in": { "labels": "name" } } ] })", {});
+  const Pipeline two = parse_pipeline(
+      R"({ "osteotome": 1, "stages": [ { "stage": "name" }, { "stage": "say", "in": { "labels": "name" } } ] })", {});
   VtkPipeline p(two, registry());
   const auto said = [&] {
     p.update("say");
@@ -359,7 +365,8 @@ TEST_F(VtkPipelineTest, TheSeedArrives) {
   VtkPipeline p(one, registry(), {.seed = 7});
   const auto seed = [&] {
     p.update("make");
-    return std::get<Document>(vtkOsteoDataObject::SafeDownCast(p.step("make")->GetOutputDataObject(1))->GetValue()).json;
+    return std::get<Document>(vtkOsteoDataObject::SafeDownCast(p.step("make")->GetOutputDataObject(1))->GetValue())
+        .json;
   };
   EXPECT_EQ(seed(), "{\"seed\": 7}");
   p.step("make")->SetSeed(8);

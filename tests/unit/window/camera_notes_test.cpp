@@ -41,7 +41,8 @@ TEST(CameraNotes, AreReadBackAsTheViewTheyTellOf) {
   const PictureArea area{0, 0, 1000, 800};
   CameraNotes notes;
   const auto note = notes.next(
-      {view.eye_mm(), view.focus_mm, view.up, view.view_angle_deg(area), view.pixels_per_mm(area), view.magnification}, 0, &notes);
+      {view.eye_mm(), view.focus_mm, view.up, view.view_angle_deg(area), view.pixels_per_mm(area), view.magnification},
+      0, &notes);
   ASSERT_TRUE(note);
   const auto back = view_of_note(*note);
   ASSERT_TRUE(back);
@@ -51,8 +52,8 @@ TEST(CameraNotes, AreReadBackAsTheViewTheyTellOf) {
   EXPECT_NEAR(error.zoom, 1, 1e-12);
   EXPECT_NEAR(back->working_distance_mm, view.working_distance_mm, 1e-9);
   // Older notes: the angle of view alone, which is that of the picture's height.
-  const auto old =
-      view_of_note("{\"eye_mm\":[250,0,0],\"target_mm\":[0,0,0],\"view_angle_deg\":" + std::to_string(view.view_angle_deg(area)) + "}");
+  const auto old = view_of_note("{\"eye_mm\":[250,0,0],\"target_mm\":[0,0,0],\"view_angle_deg\":" +
+                                std::to_string(view.view_angle_deg(area)) + "}");
   ASSERT_TRUE(old);
   EXPECT_NEAR(old->view_angle_deg({0, 0, 500, 400}), view.view_angle_deg(area), 1e-4);
   EXPECT_NEAR(old->back.x, 1, 1e-12);

@@ -64,7 +64,8 @@ TEST(CutsControl, AClickLooksThereInAllThree) {
   c.drag(c.at(1, there), c.at(1, there), SliceButton::left);
   expect_near(c.control.cross_mm(), there);
   EXPECT_FALSE(c.control.follows());
-  for (int cut = 0; cut < 3; ++cut) EXPECT_NEAR(dot(c.control.view(cut).world(7, 9) - there, c.control.view(cut).normal()), 0, 1e-9);
+  for (int cut = 0; cut < 3; ++cut)
+    EXPECT_NEAR(dot(c.control.view(cut).world(7, 9) - there, c.control.view(cut).normal()), 0, 1e-9);
   // Shift-move without a button; without Shift nothing moves.
   c.control.move(c.at(0, {1, 2, 40}));
   expect_near(c.control.cross_mm(), there);
@@ -199,7 +200,8 @@ TEST(CutsControl, PointsUnderTheMouseAndEdgesOfTheBody) {
 // --- what is drawn when
 // -------------------------------------------------------------------------------------------------------------------
 
-std::vector<DrawnCut> draw_all(CutsDrawer& drawer, const std::array<std::optional<SliceView>, 3>& views, const CutsScene& scene) {
+std::vector<DrawnCut> draw_all(CutsDrawer& drawer, const std::array<std::optional<SliceView>, 3>& views,
+                               const CutsScene& scene) {
   std::vector<DrawnCut> drawn;
   for (int n = 0; n < 2000; ++n) {
     for (DrawnCut& d : drawer.next(views, scene)) drawn.push_back(std::move(d));

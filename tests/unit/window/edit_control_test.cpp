@@ -54,8 +54,9 @@ TEST(EditControl, EveryKeyIsToldAndEveryTellingHasAKey) {
   for (const EditKeyRow& r : edit_key_table()) {
     has.insert(r.does);
     // Found by exactly its keys, and no two rows want the same.
-    const EditKeyRow* const found = find_edit_key(r.code, r.with == EditKeyRow::With::control || r.with == EditKeyRow::With::control_shift,
-                                                  r.with == EditKeyRow::With::shift || r.with == EditKeyRow::With::control_shift);
+    const EditKeyRow* const found =
+        find_edit_key(r.code, r.with == EditKeyRow::With::control || r.with == EditKeyRow::With::control_shift,
+                      r.with == EditKeyRow::With::shift || r.with == EditKeyRow::With::control_shift);
     EXPECT_EQ(found, &r);
   }
   EXPECT_EQ(told, has);
@@ -66,7 +67,8 @@ TEST(EditControl, TheGuideHasTheTableOfKeys) {
   std::ifstream in(std::string(OSTEO_SOURCE) + "/docs/edit.md");
   std::stringstream text;
   text << in.rdbuf();
-  EXPECT_NE(text.str().find(edit_help_table()), std::string::npos) << "docs/edit.md lacks this table:\n" << edit_help_table();
+  EXPECT_NE(text.str().find(edit_help_table()), std::string::npos) << "docs/edit.md lacks this table:\n"
+                                                                   << edit_help_table();
 }
 
 TEST(EditControl, PixelsAndMillimetresGoBothWaysInEachView) {
@@ -313,7 +315,8 @@ TEST(CutPicture, DrawsGreyOutlineAndStructures) {
     const auto q = view.pixel(p);
     return pixels[static_cast<std::size_t>(std::lround(q[1])) * 200 + static_cast<std::size_t>(std::lround(q[0]))];
   };
-  const std::uint32_t grey = 0xff7f7f7fU, edge = 0xff000000U | kBoneColour[0] | kBoneColour[1] << 8 | kBoneColour[2] << 16;
+  const std::uint32_t grey = 0xff7f7f7fU,
+                      edge = 0xff000000U | kBoneColour[0] | kBoneColour[1] << 8 | kBoneColour[2] << 16;
   EXPECT_EQ(at(c), grey);  // level is middle grey; within, no outline
   EXPECT_EQ(at({10, 10, 20}), grey);
   EXPECT_EQ(at({-2, 20, 20}), 0xff000000U);  // beside the scan
@@ -341,7 +344,8 @@ TEST(CutPicture, DrawsGreyOutlineAndStructures) {
 TEST(EditWorker, TheLatestPictureWins) {
   const Image ct = test::walnut({90, 80, 70});
   EditWorker worker;
-  for (int lower = 200; lower <= 600; lower += 20) worker.preview({ct, ThresholdEdit{double(lower), 32767}, nullptr, {}, 50000});
+  for (int lower = 200; lower <= 600; lower += 20)
+    worker.preview({ct, ThresholdEdit{double(lower), 32767}, nullptr, {}, 50000});
   std::optional<Preview> last;
   while (worker.previewing() || !last) {
     if (auto p = worker.take_preview()) last = std::move(p);

@@ -48,7 +48,8 @@ TEST(HandMotion, WithTheClutchTheToolStaysAndGoesOnFromThere) {
   EXPECT_EQ(motion.moved(at, {{9, 2, 3}, {4, 0, 0}}), at);
   EXPECT_EQ(motion.factor(), 0);
   motion.clutch = false;
-  EXPECT_EQ(motion.moved(at, {{10, 2, 3}, {1, 0, 0}}), (Vec3{2, 2, 3})) << "not under the pointer, but as far as it goes";
+  EXPECT_EQ(motion.moved(at, {{10, 2, 3}, {1, 0, 0}}), (Vec3{2, 2, 3}))
+      << "not under the pointer, but as far as it goes";
   motion.meet();
   EXPECT_EQ(motion.moved(at, {{10, 2, 3}, {1, 0, 0}}), (Vec3{10, 2, 3})) << "brought there, they go together again";
 }
@@ -155,8 +156,9 @@ TEST(HandHold, APlateIsHeldFlatAndTheDrillAsBefore) {
 // --- what buttons are called and do
 
 TEST(HandButtons, NamesGoBothWays) {
-  for (const int b : {int{'A'}, 32, 290, 302, 320, 325, 331, 161, button::kPedal, button::kPedal + 2, button::kDevice + 1,
-                      button::kMouse + 3, button::kPad, button::kPadRightTrigger, button::kStick + 4, button::kAxis}) {
+  for (const int b :
+       {int{'A'}, 32, 290, 302, 320, 325, 331, 161, button::kPedal, button::kPedal + 2, button::kDevice + 1,
+        button::kMouse + 3, button::kPad, button::kPadRightTrigger, button::kStick + 4, button::kAxis}) {
     const std::string name = button_name(b);
     ASSERT_TRUE(button_named(name)) << name;
     EXPECT_EQ(*button_named(name), b) << name;

@@ -47,7 +47,10 @@ TEST(Keys, HelpNamesTheKeysThemselves) {
     for (const Key& k : key_table()) {
       const bool letter = k.code >= 'A' && k.code <= 'Z';
       const bool told = std::find(line.commands.begin(), line.commands.end(), k.command) != line.commands.end();
-      const std::string name = std::string(k.with == kWithCtrl ? "Ctrl-" : k.with == kWithAlt ? "Alt-" : "") + static_cast<char>(k.code);
+      const std::string name = std::string(k.with == kWithCtrl  ? "Ctrl-"
+                                           : k.with == kWithAlt ? "Alt-"
+                                                                : "") +
+                               static_cast<char>(k.code);
       if (letter) {
         EXPECT_EQ(keys.find(" " + name + ",") != std::string::npos, told) << line.keys;
       }
@@ -68,13 +71,17 @@ TEST(Keys, TheGuideTellsOfEachKey) {
   std::erase(keys, '*');
   for (const Key& k : key_table()) {
     if (k.code < 'A' || k.code > 'Z') continue;
-    const std::string name = std::string(k.with == kWithCtrl ? "Ctrl-" : k.with == kWithAlt ? "Alt-" : "") + static_cast<char>(k.code);
+    const std::string name = std::string(k.with == kWithCtrl  ? "Ctrl-"
+                                         : k.with == kWithAlt ? "Alt-"
+                                                              : "") +
+                             static_cast<char>(k.code);
     EXPECT_NE(keys.find(" " + name + ","), std::string::npos) << name;
   }
   for (const char* name :
-       {" F5,", " Enter,", " Esc,", " Home,", " Space,",      " Up,",      " Down,",   " F1,",         " 1 to 7,",    " F2,",
-        " F9,", " F10,",   " F11,", " Tab,",  " Alt-arrows,", " Page Up,", " Insert,", " apostrophe,", " backslash,", " grave accent,",
-        " -,",  " =,",     " 9,",   " 0,",    " Alt-H,",      " Ctrl-H,",  " Ctrl-T,", " Left,",       " Right,"})
+       {" F5,",     " Enter,",      " Esc,",       " Home,",         " Space,", " Up,",  " Down,",       " F1,",
+        " 1 to 7,", " F2,",         " F9,",        " F10,",          " F11,",   " Tab,", " Alt-arrows,", " Page Up,",
+        " Insert,", " apostrophe,", " backslash,", " grave accent,", " -,",     " =,",   " 9,",          " 0,",
+        " Alt-H,",  " Ctrl-H,",     " Ctrl-T,",    " Left,",         " Right,"})
     EXPECT_NE(keys.find(name), std::string::npos) << name << " in" << keys;
 }
 

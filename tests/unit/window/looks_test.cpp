@@ -22,7 +22,8 @@ TEST(Looks, AreReadBackAsTheyWereNoted) {
                         {8, "structure", R"({"structure":8,"name":"","look":"loud"})"},
                         {9, "cuts", "yes"}};
   const Looks looks = looks_of(notes);
-  EXPECT_EQ(looks.structures, (std::map<std::uint8_t, StructureLook>{{6, StructureLook::clear}, {7, StructureLook::clear}}));
+  EXPECT_EQ(looks.structures,
+            (std::map<std::uint8_t, StructureLook>{{6, StructureLook::clear}, {7, StructureLook::clear}}));
   ASSERT_TRUE(looks.cuts);
   EXPECT_EQ(*looks.cuts, cuts);
   EXPECT_EQ(looks.unreadable, 3U);

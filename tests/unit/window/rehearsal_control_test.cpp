@@ -33,7 +33,8 @@ struct Sitting {
     a.begin = [this](bool from_case, const HandView& view) {
       if (fails_to_begin) throw Error(*std::exchange(fails_to_begin, {}));
       World world = (from_case ? first : last).copy();
-      const HandPose pose = FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
+      const HandPose pose =
+          FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
       const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
       RehearsalOptions options;
       options.follow = {true, true, true};
@@ -152,11 +153,14 @@ TEST(RehearsalControl, APlannedCutIsChosenAndOneIsKept) {
   tools.choose_planned(0);
   EXPECT_EQ(tools.note(control.rehearsal()), "saw at the planned cut 'body'");
   tools.take_saw(control.rehearsal());
-  ASSERT_TRUE(frames_until(control, [&] { return of_world(control, [](const World& w) { return w.cutting_guide().on(); }); }));
-  EXPECT_EQ(of_world(control, [](const World& w) { return w.cutting_guide(); }), (CuttingGuide{{8, 0, 0}, {1, 0, 0}, 1.5}));
+  ASSERT_TRUE(
+      frames_until(control, [&] { return of_world(control, [](const World& w) { return w.cutting_guide().on(); }); }));
+  EXPECT_EQ(of_world(control, [](const World& w) { return w.cutting_guide(); }),
+            (CuttingGuide{{8, 0, 0}, {1, 0, 0}, 1.5}));
   tools.put_saw_away(control.rehearsal());
   // Another beside it, where meanwhile somebody added a third.
-  write_file(file, planned_cuts_json(std::vector<PlannedCut>{tools.planned()[0], {"theirs", {{1, 2, 3}, {0, 1, 0}}, 2}}));
+  write_file(file,
+             planned_cuts_json(std::vector<PlannedCut>{tools.planned()[0], {"theirs", {{1, 2, 3}, {0, 1, 0}}, 2}}));
   SawCut cut = tools.cut();
   cut.at_mm = {-4, 0.1, 1.0 / 3};
   tools.set_cut(cut);
@@ -194,8 +198,10 @@ TEST(RehearsalControl, TheSawIsTakenIntoTheHandAndHeldInItsPlane) {
   EXPECT_TRUE(control.tools().saw_in_hand());
   EXPECT_EQ(control.tools().tool(), HandTools::Tool::drill) << "the hand moves it";
   const auto saw = static_cast<std::uint8_t>(instrument_index("saw 25 mm"));
-  ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().device.tool == saw && !control.leading(); }));
-  EXPECT_EQ(of_world(control, [](const World& w) { return w.cutting_guide(); }), (CuttingGuide{{8, 0, 0}, {1, 0, 0}, 3}));
+  ASSERT_TRUE(
+      frames_until(control, [&] { return control.rehearsal().latest().device.tool == saw && !control.leading(); }));
+  EXPECT_EQ(of_world(control, [](const World& w) { return w.cutting_guide(); }),
+            (CuttingGuide{{8, 0, 0}, {1, 0, 0}, 3}));
   // A hand beside the plane cuts in it.
   control.move_hand({9.5, 0, 8});
   ASSERT_TRUE(frames_until(control, [&] { return (control.rehearsal().latest().flags & kInSlot) != 0; }));
@@ -213,14 +219,17 @@ TEST(RehearsalControl, TheSawIsTakenIntoTheHandAndHeldInItsPlane) {
   press(control, Command::lift);
   ASSERT_TRUE(frames_until(control, [&] { return !control.leading(); }));
   EXPECT_EQ(control.message(), "saw lifted out");
-  ASSERT_TRUE(frames_until(control, [&] { return of_world(control, [](const World& w) { return w.cutting_guide().on(); }); }));
+  ASSERT_TRUE(
+      frames_until(control, [&] { return of_world(control, [](const World& w) { return w.cutting_guide().on(); }); }));
   // A burr puts it away, and takes the guide off; so does its own key.
   control.move_hand({9.5, 0, 20});
   ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().device.position_mm[2] > 15; }));
   press(control, Command::burr_kind, static_cast<int>(BurrKind::diamond));
   EXPECT_FALSE(control.tools().saw_in_hand());
-  ASSERT_TRUE(frames_until(control, [&] { return !of_world(control, [](const World& w) { return w.cutting_guide().on(); }); }));
-  ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().device.tool == burr_index(BurrKind::diamond, 4); }));
+  ASSERT_TRUE(
+      frames_until(control, [&] { return !of_world(control, [](const World& w) { return w.cutting_guide().on(); }); }));
+  ASSERT_TRUE(frames_until(
+      control, [&] { return control.rehearsal().latest().device.tool == burr_index(BurrKind::diamond, 4); }));
   control.tools().take_saw(control.rehearsal());
   press(control, Command::saw);
   EXPECT_FALSE(control.tools().saw_in_hand());
@@ -411,7 +420,8 @@ TEST(RehearsalControl, WhatFailsIsToldAndCanBePutRight) {
   EXPECT_NE(std::string(control.failure()->what()).find("ended by itself"), std::string::npos);
 }
 
-// A tilt turns the handle about the burr's centre: the burr stays where it is. It stays tilted, and what was recorded says so.
+// A tilt turns the handle about the burr's centre: the burr stays where it is. It stays tilted, and what was recorded
+// says so.
 TEST(RehearsalControl, ATiltLeavesTheBurrWhereItIs) {
   Sitting sitting;
   RehearsalControl control = sitting.control();
@@ -419,7 +429,8 @@ TEST(RehearsalControl, ATiltLeavesTheBurrWhereItIs) {
   ASSERT_TRUE(control.begin(true, false));
   const auto tick = [&] { return control.rehearsal().latest(); };
   const auto axis = [&] { return from_floats(tick().device.axis); };
-  ASSERT_TRUE(frames_until(control, [&] { return tick().tick > 300 && length(axis() - control.handle().axis(kFromAbove)) < 2e-3; }));
+  ASSERT_TRUE(frames_until(
+      control, [&] { return tick().tick > 300 && length(axis() - control.handle().axis(kFromAbove)) < 2e-3; }));
   const Vec3 at = from_floats(tick().device.position_mm), before = axis();
   for (int n = 0; n < 5; ++n) press(control, Command::tilt, 1);  // 15 degrees to the right
   press(control, Command::roll, 1);

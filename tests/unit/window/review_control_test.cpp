@@ -17,7 +17,11 @@ namespace osteo {
 namespace {
 
 World block() {
-  return test::solid_world([](Vec3 p) { return std::min({4 - p.z, p.z + 4, 11 - std::abs(p.x), 11 - std::abs(p.y)}); }, 0.5, 24);
+  return test::solid_world(
+      [](Vec3 p) {
+        return std::min({4 - p.z, p.z + 4, 11 - std::abs(p.x), 11 - std::abs(p.y)});
+      },
+      0.5, 24);
 }
 SessionReview review_of_two_seconds(const std::filesystem::path& file) {
   Script s;
@@ -140,7 +144,8 @@ TEST(Hints, AreTurnedOffOneByOne) {
   EXPECT_EQ(hints_left(all, off)[0].id, all[1].id);
   EXPECT_EQ(with_hint(with_hint(off, all[0].id, true), all[2].id, true), "");
   EXPECT_EQ(with_hint(off, all[0].id, false).size(), off.size());
-  EXPECT_EQ(hint_note({"force", "press \"less\"", "nerve", 1}), R"({"id":"force","words":"press \"less\"","structure":"nerve"})");
+  EXPECT_EQ(hint_note({"force", "press \"less\"", "nerve", 1}),
+            R"({"id":"force","words":"press \"less\"","structure":"nerve"})");
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "osteo/core/base/files.h"
 #include "osteo/app/window/person_settings.h"
+#include "osteo/core/base/files.h"
 #include "scratch.h"
 #include "start_list.h"
 
@@ -49,7 +49,9 @@ TEST(PersonSettings, AreKept) {
 TEST(PersonSettings, WhatIsWrongIsToldWithItsLineAndTheRestIsTaken) {
   const test::ScratchFolder scratch;
   const fs::path file = scratch / "settings.json";
-  write(file, "{\"osteotome_settings\": 1,\n\"volume\": 0.25,\n\"colour\": \"red\",\n\"scale\": 99,\n\"layout\": \"sideways\"}");
+  write(file,
+        "{\"osteotome_settings\": 1,\n\"volume\": 0.25,\n\"colour\": \"red\",\n\"scale\": 99,\n\"layout\": "
+        "\"sideways\"}");
   PersonSettings p(file);
   ASSERT_EQ(p.complaints().size(), 3U);
   EXPECT_NE(p.complaints()[0].find("line 3"), std::string::npos) << p.complaints()[0];
@@ -67,8 +69,8 @@ TEST(PersonSettings, WhatIsWrongIsToldWithItsLineAndTheRestIsTaken) {
 
 TEST(PersonSettings, AFileThatCannotBeReadIsLeftAlone) {
   const test::ScratchFolder scratch;
-  for (const std::string text :
-       {"{\"osteotome_settings\": 1,\n", "[]", "{\"osteotome_settings\": 2}", "{\"osteotome_settings\": 1, // mine\n\"volume\": 1}"}) {
+  for (const std::string text : {"{\"osteotome_settings\": 1,\n", "[]", "{\"osteotome_settings\": 2}",
+                                 "{\"osteotome_settings\": 1, // mine\n\"volume\": 1}"}) {
     const fs::path file = scratch / "settings.json";
     write(file, text);
     PersonSettings p(file);
@@ -118,7 +120,8 @@ TEST(PersonSettings, AWrongButtonIsToldWithItsLineAndTheOthersAreTaken) {
   const test::ScratchFolder scratch;
   const fs::path file = scratch / "settings.json";
   write(file,
-        "{\"osteotome_settings\": 1,\n\"buttons\": {\n\"knee 1\": \"drill\",\n\"pedal 1\": \"fly\",\n\"pedal 2\": 3,\n\"pedal 3\": "
+        "{\"osteotome_settings\": 1,\n\"buttons\": {\n\"knee 1\": \"drill\",\n\"pedal 1\": \"fly\",\n\"pedal 2\": "
+        "3,\n\"pedal 3\": "
         "\"undo\"},\n\"motion_one_to\": 3}");
   PersonSettings p(file);
   ASSERT_EQ(p.complaints().size(), 4U);

@@ -1,4 +1,5 @@
-// Panels drawn into memory: nothing is cut off, nothing lies outside, at any size of window and text. ImGui without a screen.
+// Panels drawn into memory: nothing is cut off, nothing lies outside, at any size of window and text. ImGui without a
+// screen.
 #include "room_panels.h"
 
 #include <gtest/gtest.h>
@@ -110,7 +111,8 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
       const auto six_steps = [&] { draw_first_steps(list, true); };
       frames([&] {
         help.draw(s.width, s.height, six_steps);
-        EXPECT_EQ(draw_question(s.width, s.height, "Bone whole again?", "This session is saved and ends.", "whole again"), 0);
+        EXPECT_EQ(
+            draw_question(s.width, s.height, "Bone whole again?", "This session is saved and ends.", "whole again"), 0);
       });
       const ScreenBox whole{0, 0, static_cast<float>(s.width), static_cast<float>(s.height)};
       // The help is never scrolled: what one page cannot hold is on the next.
@@ -194,7 +196,8 @@ TEST(Panels, AButtonGivesTheCommandOfItsKey) {
       for (const Keyboard::Press& p : pressed.presses) seen.push_back(p.command);
     }
   }
-  for (const Command c : {Command::help, Command::wheel, Command::bring, Command::lift, Command::saw, Command::undo, Command::quit}) {
+  for (const Command c :
+       {Command::help, Command::wheel, Command::bring, Command::lift, Command::saw, Command::undo, Command::quit}) {
     EXPECT_NE(std::find(seen.begin(), seen.end(), c), seen.end()) << key_name(c);
     EXPECT_FALSE(key_name(c).empty());
   }

@@ -33,7 +33,8 @@ std::vector<ScreenBox> boxes_of(const RoomLayout& l) {
 TEST(RoomLayout, BoxesTileTheWindow) {
   for (const Size s : kSizes) {
     for (const double by_hand : {0.6, 1.0, 1.7, 2.5}) {
-      const auto em = static_cast<float>(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), by_hand, s.width, s.height));
+      const auto em = static_cast<float>(
+          kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), by_hand, s.width, s.height));
       for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan, Layout::review}) {
         const auto boxes = boxes_of(lay_out(wanted, s.width, s.height, em));
         float area = 0;
@@ -44,8 +45,8 @@ TEST(RoomLayout, BoxesTileTheWindow) {
           EXPECT_LE(boxes[a].right(), static_cast<float>(s.width));
           EXPECT_LE(boxes[a].bottom(), static_cast<float>(s.height));
           for (std::size_t b = 0; b < a; ++b) {
-            const bool apart = boxes[a].right() <= boxes[b].x || boxes[b].right() <= boxes[a].x || boxes[a].bottom() <= boxes[b].y ||
-                               boxes[b].bottom() <= boxes[a].y;
+            const bool apart = boxes[a].right() <= boxes[b].x || boxes[b].right() <= boxes[a].x ||
+                               boxes[a].bottom() <= boxes[b].y || boxes[b].bottom() <= boxes[a].y;
             EXPECT_TRUE(apart) << s.width << " layout " << static_cast<int>(wanted) << " boxes " << a << " " << b;
           }
         }
@@ -58,7 +59,8 @@ TEST(RoomLayout, BoxesTileTheWindow) {
 // What is shown for a while takes its strip from the pictures alone, and together they still tile the window.
 TEST(RoomLayout, AStripTakesFromThePicturesAlone) {
   for (const Size s : kSizes) {
-    const auto em = static_cast<float>(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), 1, s.width, s.height));
+    const auto em =
+        static_cast<float>(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), 1, s.width, s.height));
     for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan}) {
       for (const float high : {13.5F * em, 1e5F}) {
         const RoomLayout before = lay_out(wanted, s.width, s.height, em);
@@ -77,8 +79,8 @@ TEST(RoomLayout, AStripTakesFromThePicturesAlone) {
         for (std::size_t a = 0; a < boxes.size(); ++a) {
           area += boxes[a].width * boxes[a].height;
           for (std::size_t b = 0; b < a; ++b)
-            EXPECT_TRUE(boxes[a].right() <= boxes[b].x || boxes[b].right() <= boxes[a].x || boxes[a].bottom() <= boxes[b].y ||
-                        boxes[b].bottom() <= boxes[a].y)
+            EXPECT_TRUE(boxes[a].right() <= boxes[b].x || boxes[b].right() <= boxes[a].x ||
+                        boxes[a].bottom() <= boxes[b].y || boxes[b].bottom() <= boxes[a].y)
                 << s.width << " layout " << static_cast<int>(wanted) << " boxes " << a << " " << b;
         }
         EXPECT_NEAR(area, static_cast<float>(s.width) * static_cast<float>(s.height), 1e-5F * area);
@@ -94,8 +96,8 @@ TEST(RoomLayout, AStripTakesFromThePicturesAlone) {
 // The least size of all shows every layout at its usual text.
 TEST(RoomLayout, AllLayoutsFitTheSizesTheyAreFor) {
   for (const Size s : kSizes) {
-    const auto em =
-        static_cast<float>(std::lround(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), 1, s.width, s.height)));
+    const auto em = static_cast<float>(
+        std::lround(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), 1, s.width, s.height)));
     EXPECT_GE(em, 16);
     for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan}) {
       const RoomLayout l = lay_out(wanted, s.width, s.height, em);
@@ -140,7 +142,8 @@ TEST(Scale, TextKeepsItsShareOfALargeScreen) {
   EXPECT_LT(scale_that_fits(1, 2.5, 1024, 700) * kTextPixels * 40, 1025);
 }
 
-// --- colours: IEC 61966-2-1 to linear light; contrast as WCAG 2.1 defines it; dichromats after Vienot, Brettel and Mollon 1999
+// --- colours: IEC 61966-2-1 to linear light; contrast as WCAG 2.1 defines it; dichromats after Vienot, Brettel and
+// Mollon 1999
 
 std::array<double, 3> linear(Colour c) {
   const auto one = [](float v) {
@@ -157,7 +160,8 @@ double contrast(Colour a, Colour b) {
 }
 
 TEST(Palette, WordsCanBeReadOnTheirGround) {
-  for (const Colour c : {palette::kText, palette::kFaint, palette::kYellow, palette::kOrange, palette::kSkyBlue, palette::kVermillion}) {
+  for (const Colour c :
+       {palette::kText, palette::kFaint, palette::kYellow, palette::kOrange, palette::kSkyBlue, palette::kVermillion}) {
     EXPECT_GE(contrast(c, palette::kGround), 4.5);
   }
   EXPECT_GE(contrast(palette::kText, palette::kRaised), 4.5);
@@ -181,7 +185,8 @@ TEST(Palette, StatesDifferForTheColourBlind) {
           return out;
         };
         const auto x = seen(a), y = seen(b);
-        const double lightness = (std::max(luminance(x), luminance(y)) + 0.05) / (std::min(luminance(x), luminance(y)) + 0.05);
+        const double lightness =
+            (std::max(luminance(x), luminance(y)) + 0.05) / (std::min(luminance(x), luminance(y)) + 0.05);
         const double blue = std::abs(x[2] - y[2]);
         EXPECT_TRUE(lightness > 1.3 || blue > 0.2)
             << static_cast<int>(a) << " " << static_cast<int>(b) << ": " << lightness << ", " << blue;

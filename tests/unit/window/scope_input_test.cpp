@@ -28,7 +28,8 @@ ScopeInput some_input() {
   return input;
 }
 
-std::string press(ScopeInput& input, Command command, int value = 0, bool shift = false, std::optional<Vec3> under = {}) {
+std::string press(ScopeInput& input, Command command, int value = 0, bool shift = false,
+                  std::optional<Vec3> under = {}) {
   std::string said;
   EXPECT_TRUE(input.key({command, value, shift}, some_scene(), under, said));
   input.advance(Keyboard(), false, {}, 1);

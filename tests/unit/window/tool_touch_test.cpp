@@ -22,7 +22,8 @@ TEST(ToolTouch, IsToldOnceAndShownWhileItLasts) {
   const auto told = look(3);
   ASSERT_TRUE(told);
   EXPECT_EQ(told->words, "the sucker touches the drill");
-  EXPECT_EQ(told->note.find("{\"hands\":[0,1],\"tools\":[\"cutting 4 mm\",\"sucker 8 Fr\"],\"at_mm\":["), 0U) << told->note;
+  EXPECT_EQ(told->note.find("{\"hands\":[0,1],\"tools\":[\"cutting 4 mm\",\"sucker 8 Fr\"],\"at_mm\":["), 0U)
+      << told->note;
   ASSERT_TRUE(touch.at_mm());
   EXPECT_NEAR(touch.at_mm()->x, 1.83, 0.05);
   EXPECT_FALSE(look(3));  // once

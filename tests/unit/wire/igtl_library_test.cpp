@@ -75,7 +75,8 @@ TEST(IgtlLibrary, WritesTheSameBytes) {
   status->SetSubCode(-3);
   status->SetErrorName("dropped");
   status->SetStatusString("too slow");
-  EXPECT_EQ(igtl_status("Osteotome", 0, IgtlStatus::overflow, -3, "dropped", "too slow"), packed(status, "Osteotome", 0, 0));
+  EXPECT_EQ(igtl_status("Osteotome", 0, IgtlStatus::overflow, -3, "dropped", "too slow"),
+            packed(status, "Osteotome", 0, 0));
 
   const auto word = [](unsigned char name) {
     auto unit = igtl::Unit::New();

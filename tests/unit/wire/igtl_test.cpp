@@ -156,8 +156,8 @@ TEST(Igtl, MatricesThatAreNoPoses) {
   EXPECT_EQ(parser.messages(), 1u);
 }
 
-// 20,000 streams of what may come: messages with bytes changed, cut off, doubled, in pieces of any size. Nothing is read that was not sent
-// whole.
+// 20,000 streams of what may come: messages with bytes changed, cut off, doubled, in pieces of any size. Nothing is
+// read that was not sent whole.
 TEST(Igtl, WhateverComesIsTakenOrLeft) {
   std::mt19937 random(20);
   const auto upto = [&](std::size_t n) { return std::uniform_int_distribution<std::size_t>(0, n)(random); };

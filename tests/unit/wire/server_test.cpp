@@ -53,7 +53,8 @@ TEST(WireAddress, PortAloneIsThisMachine) {
   EXPECT_EQ(wire_address("18944").port, 18944);
   EXPECT_EQ(wire_address("[::1]:7").host, "::1");
   EXPECT_EQ(wire_address("a.example:7").host, "a.example");
-  for (const char* const wrong : {"", "x", ":1", "1:", "1:99999", "1:-2", "1:2x"}) EXPECT_THROW((void)wire_address(wrong), Error) << wrong;
+  for (const char* const wrong : {"", "x", ":1", "1:", "1:99999", "1:-2", "1:2x"})
+    EXPECT_THROW((void)wire_address(wrong), Error) << wrong;
   for (const char* const wrong : {"igtl", "igtl:", "lsl:1", "cerebus:1.2.3.4:5/9", "ftp:1", "igtl:x"})
     EXPECT_THROW((void)stream_targets(wrong), Error) << wrong;
   EXPECT_EQ(stream_targets("igtl:1, cerebus:127.0.0.1:51002/3.11,lsl").size(), 3u);
@@ -69,10 +70,11 @@ TEST(WireServer, EveryClientGetsEverythingInOrder) {
     std::vector<std::unique_ptr<WireClient>> clients;
     std::array<std::atomic<int>, 3> counts{};
     for (std::size_t c = 0; c < 3; ++c)
-      clients.push_back(std::make_unique<WireClient>(WireAddress{"127.0.0.1", server.port()}, 1 << 16, [&, c](const IgtlMessage& m) {
-        heard[c].push_back(std::stoi(*igtl_string_in(m)));
-        ++counts[c];
-      }));
+      clients.push_back(
+          std::make_unique<WireClient>(WireAddress{"127.0.0.1", server.port()}, 1 << 16, [&, c](const IgtlMessage& m) {
+            heard[c].push_back(std::stoi(*igtl_string_in(m)));
+            ++counts[c];
+          }));
     ASSERT_TRUE(server.wait_for_clients(3, 30));
     for (int i = 1; i <= kMessages; ++i) server.send(igtl_string("n", 0, std::to_string(i)));
     EXPECT_TRUE(soon([&] { return counts[0] + counts[1] + counts[2] == 3 * (kMessages + 1); }));
@@ -85,7 +87,8 @@ TEST(WireServer, EveryClientGetsEverythingInOrder) {
   EXPECT_TRUE(soon([&] { return server.counts().clients == 0; }));
 }
 
-// One that takes nothing: its own messages are dropped and counted, it is told when it takes again; memory is bounded, others get all.
+// One that takes nothing: its own messages are dropped and counted, it is told when it takes again; memory is bounded,
+// others get all.
 TEST(WireServer, WhoStallsLosesAloneAndIsTold) {
   WireServer server({"127.0.0.1", 0}, notice, 600);
   const int stalled = connected_to(server.port(), 4096);
@@ -152,7 +155,8 @@ TEST(WireServer, FloodsVanishingClientsAndTooManyOfThem) {
   const std::uint64_t heard = server.counts().heard;
   const double took_s = static_cast<double>(monotonic_ns() - begin) / 1e9;
   // A second's worth, and what one read takes beyond it, in each second that has begun.
-  EXPECT_LE(static_cast<double>(heard), (took_s + 1) * (WireServer::kMostHeard + 16384)) << "it is read no faster than that";
+  EXPECT_LE(static_cast<double>(heard), (took_s + 1) * (WireServer::kMostHeard + 16384))
+      << "it is read no faster than that";
   stop = true;
   flood.join();
   EXPECT_TRUE(soon([&] { return server.counts().clients == 1; }));
@@ -275,8 +279,10 @@ TEST(RemoteMonitor, HasEverySampleAndEvent) {
   std::vector<std::int16_t> sent;
   for (int block = 0; block < 200; ++block) {
     std::vector<std::int16_t> values(300);
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<std::int16_t>(block * 300 + static_cast<int>(i));
-    const std::uint64_t first = static_cast<std::uint64_t>(block) * 150 + (block >= 100 ? 600 : 0);  // 20 ms are missing
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] = static_cast<std::int16_t>(block * 300 + static_cast<int>(i));
+    const std::uint64_t first =
+        static_cast<std::uint64_t>(block) * 150 + (block >= 100 ? 600 : 0);  // 20 ms are missing
     outlet->block({first, 2, values});
     sent.insert(sent.end(), values.begin(), values.end());
   }
@@ -313,16 +319,18 @@ TEST(RemoteMonitor, HasEverySampleAndEvent) {
 
 TEST(RemoteMonitor, LiesInTextsAreNothing) {
   for (const char* const wrong :
-       {"", "[]", "{}", "{\"event\":\"cause\",\"sample\":1}", "{\"event\":\"burst\"}", "{\"event\":\"burst\",\"sample\":-1}",
-        "{\"event\":7,\"sample\":1}", "{\"event\":\"burst\",\"sample\":\"x\"}"})
+       {"", "[]", "{}", "{\"event\":\"cause\",\"sample\":1}", "{\"event\":\"burst\"}",
+        "{\"event\":\"burst\",\"sample\":-1}", "{\"event\":7,\"sample\":1}", "{\"event\":\"burst\",\"sample\":\"x\"}"})
     EXPECT_FALSE(event_in(wrong)) << wrong;
-  for (const char* const wrong : {"", "{}", "{\"osteotome_wire\":2,\"rate_hz\":30000,\"uv_per_bit\":0.25,\"event_uv\":100,\"channels\":[]}",
-                                  "{\"osteotome_wire\":1,\"rate_hz\":30000,\"uv_per_bit\":0.25,\"event_uv\":-1,\"channels\":[]}",
-                                  "{\"osteotome_wire\":1,\"rate_hz\":30000,\"uv_per_bit\":0.25,\"event_uv\":100,\"channels\":[1]}"})
+  for (const char* const wrong :
+       {"", "{}", "{\"osteotome_wire\":2,\"rate_hz\":30000,\"uv_per_bit\":0.25,\"event_uv\":100,\"channels\":[]}",
+        "{\"osteotome_wire\":1,\"rate_hz\":30000,\"uv_per_bit\":0.25,\"event_uv\":-1,\"channels\":[]}",
+        "{\"osteotome_wire\":1,\"rate_hz\":30000,\"uv_per_bit\":0.25,\"event_uv\":100,\"channels\":[1]}"})
     EXPECT_FALSE(monitor_in(wrong)) << wrong;
   EXPECT_TRUE(monitor_in(monitor_json({{"a"}, 100})));
   EXPECT_FALSE(monitor_in(monitor_json({std::vector<std::string>(17, "a"), 100})));
-  for (const char* const wrong : {"", "{}", "{\"eye_mm\":[1,2],\"target_mm\":[0,0,0]}", "{\"eye_mm\":[0,0,0],\"target_mm\":[0,0,0]}"})
+  for (const char* const wrong :
+       {"", "{}", "{\"eye_mm\":[1,2],\"target_mm\":[0,0,0]}", "{\"eye_mm\":[0,0,0],\"target_mm\":[0,0,0]}"})
     EXPECT_FALSE(camera_in_note(wrong)) << wrong;
 }
 

@@ -164,11 +164,13 @@ TEST(StimulatorLink, WhateverComesNothingBreaksAndNothingIsSet) {
   EXPECT_EQ(room.set.size(), 1U);
   // A flood in one moment: no more is looked at than in a second.
   const auto before = room.door.counts().refused;
-  for (int i = 0; i < 1000; ++i) with(link.begin(), [&](const IgtlMessage& m) { static_cast<void>(room.door.hear(3, m, room.at_s)); });
+  for (int i = 0; i < 1000; ++i)
+    with(link.begin(), [&](const IgtlMessage& m) { static_cast<void>(room.door.hear(3, m, room.at_s)); });
   EXPECT_GE(room.door.counts().refused - before, 1000U - 101U);
 }
 
-// Over the loopback, from a console to the door behind an OpenIGTLink server; and one who does not have the code hears as before.
+// Over the loopback, from a console to the door behind an OpenIGTLink server; and one who does not have the code hears
+// as before.
 TEST(StimulatorLink, OverTheNetwork) {
   auto outlet = make_outlet({StreamTarget::Kind::igtl, "127.0.0.1:0", "", true});
   std::mutex mutex;
@@ -205,7 +207,8 @@ TEST(StimulatorLink, OverTheNetwork) {
   e.ma = 0.4;
   outlet->event(e, "threshold");
   ASSERT_TRUE(soon([&] { return with_code.stimulator().now.current_ma == 0; }));
-  // One who floods its connection with what looks right, and one with what is no message at all: neither is in anybody's way.
+  // One who floods its connection with what looks right, and one with what is no message at all: neither is in
+  // anybody's way.
   const int flooder = connected_to(port), babbler = connected_to(port);
   WireBytes much;
   for (int i = 0; i < 2000; ++i) {

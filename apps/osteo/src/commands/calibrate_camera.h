@@ -21,8 +21,9 @@ struct CalibrateCameraCommand {
     visit({"width", "asked of a camera; files have their own", "pixels", 160, 8192}, p.width);
     visit({"height", "asked of a camera; files have their own", "pixels", 120, 8192}, p.height);
     visit({"fps", "pictures a second that it is asked for, here and later", "Hz", 1, 240}, p.fps);
-    visit({"latency_ms", "from the middle of an exposure until the picture is here, where it is known (-1: one period is taken)", "ms", -1,
-           500},
+    visit({"latency_ms",
+           "from the middle of an exposure until the picture is here, where it is known (-1: one period is taken)",
+           "ms", -1, 500},
           p.latency_ms);
   }
   static cli::CommandInfo info();

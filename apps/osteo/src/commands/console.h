@@ -2,8 +2,8 @@
 #pragma once
 #include <string>
 
-#include "osteo/app/cli/command.h"
 #include "console_flags.h"
+#include "osteo/app/cli/command.h"
 
 namespace osteo {
 

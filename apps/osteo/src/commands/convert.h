@@ -14,9 +14,13 @@ struct ConvertCommand {
     std::string description = "Bone";
   };
   static void describe(Params& p, auto& visit) {
-    visit({"source", "DICOM it was made from: a .dcm output takes over its patient, study and frame of reference"}, p.source);
-    visit({"series", "which series of the source, by number, UID, or scan like A1a or A1a:203 (empty: the recommended one)"}, p.series);
-    visit({"onto_source", "a label map as .dcm: on the source's own slices, tilted and uneven as they are"}, p.onto_source);
+    visit({"source", "DICOM it was made from: a .dcm output takes over its patient, study and frame of reference"},
+          p.source);
+    visit({"series",
+           "which series of the source, by number, UID, or scan like A1a or A1a:203 (empty: the recommended one)"},
+          p.series);
+    visit({"onto_source", "a label map as .dcm: on the source's own slices, tilted and uneven as they are"},
+          p.onto_source);
     visit({"description", "of a .dcm output, as a PACS lists it"}, p.description);
   }
   static cli::CommandInfo info();

@@ -13,7 +13,9 @@ struct DocsCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"check", "compare instead of writing; fails when a page is stale"}, p.check);
-    visit({"shared", "instead: man pages, completion of bash, zsh and fish, modules of 3D Slicer; what is there is replaced"}, p.shared);
+    visit({"shared",
+           "instead: man pages, completion of bash, zsh and fish, modules of 3D Slicer; what is there is replaced"},
+          p.shared);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

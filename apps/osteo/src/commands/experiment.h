@@ -20,10 +20,12 @@ struct ExperimentCommand {
     double level = 0.95;
   };
   static void describe(Params& p, auto& visit) {
-    visit({"out", "camera: every view and its time, as CSV (empty: only the table); demo: its folder (also -o)"}, p.out);
+    visit({"out", "camera: every view and its time, as CSV (empty: only the table); demo: its folder (also -o)"},
+          p.out);
     visit({"targets", "views to bring the camera to", "", 1, 10000}, p.targets);
     visit({"noise", "standard deviation of a move's end, of its length", "", 0, 0.5}, p.noise);
-    visit({"crosstalk", "six degrees and rates: what an axis that was not meant gets of the others", "", 0, 1}, p.crosstalk);
+    visit({"crosstalk", "six degrees and rates: what an axis that was not meant gets of the others", "", 0, 1},
+          p.crosstalk);
     visit({"reaction_s", "a look before each move", "s", 0, 2}, p.reaction_s);
     visit({"participant", "force-skill: whose trials, by code"}, p.participant);
     visit({"people", "codes of a new experiment's participants, as 'P01, P02' (empty: twelve)"}, p.people);
@@ -34,7 +36,9 @@ struct ExperimentCommand {
     visit({"retention", "force-skill: on another day: every stimulus once, without aid"}, p.retention);
     visit({"null", "programs that learn equally well by each training"}, p.null);
     visit({"experiments", "null: how many", "", 10, 100000}, p.experiments);
-    visit({"chain", "null: small experiments by programs, run and scored, instead of drawn scores; 0.3 s of one core each"}, p.chain);
+    visit({"chain",
+           "null: small experiments by programs, run and scored, instead of drawn scores; 0.3 s of one core each"},
+          p.chain);
     visit({"level", "of intervals", "", 0.5, 0.999}, p.level);
     visit({"state_file", "force-skill: the window writes here what it shows, for tests"}, p.state_file);
   }

@@ -14,15 +14,21 @@ struct GroundTruthCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder for tables, leaderboard and trajectories (also -o)"}, p.out);
-    visit({"program", "command of a renderer to measure beside ours: positions come by its standard input, forces go by its output"},
-          p.program);
-    visit({"experiment", "solids, renderers and friction as JSON, as in pipelines/ground-truth (empty: all that is built in)"},
+    visit(
+        {"program",
+         "command of a renderer to measure beside ours: positions come by its standard input, forces go by its output"},
+        p.program);
+    visit({"experiment",
+           "solids, renderers and friction as JSON, as in pipelines/ground-truth (empty: all that is built in)"},
           p.experiment);
     visit({"bone", "closed surface of a bone to add to the solids (.ply, .stl, ...; empty: none)"}, p.bone);
-    visit({"trajectory", "a recorded out-trajectory with its forces to play instead, as text (needs --surface)"}, p.trajectory);
+    visit({"trajectory", "a recorded out-trajectory with its forces to play instead, as text (needs --surface)"},
+          p.trajectory);
     visit({"surface", "closed surface of what was probed, in the trajectory's own coordinates, mm"}, p.surface);
-    visit({"columns", "of the trajectory: t, x, y, z, fx, fy, fz in their order, '-' for what is not wanted; s, mm, N"}, p.columns);
-    visit({"stiffness_n_per_mm", "of the spring that the recorded forces are taken for", "N/mm", 0.01, 100}, p.stiffness_n_per_mm);
+    visit({"columns", "of the trajectory: t, x, y, z, fx, fy, fz in their order, '-' for what is not wanted; s, mm, N"},
+          p.columns);
+    visit({"stiffness_n_per_mm", "of the spring that the recorded forces are taken for", "N/mm", 0.01, 100},
+          p.stiffness_n_per_mm);
     visit({"share", "of each trajectory's length: less is quicker, and less is seen", "", 0.02, 10}, p.share);
   }
   static cli::CommandInfo info();

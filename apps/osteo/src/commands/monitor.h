@@ -17,9 +17,11 @@ struct MonitorCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder for what it writes (also -o)"}, p.out);
-    visit({"setup", "constants and channels, as JSON (empty: as the session was recorded with, or the built-in ones)"}, p.setup);
+    visit({"setup", "constants and channels, as JSON (empty: as the session was recorded with, or the built-in ones)"},
+          p.setup);
     visit({"channel", "that channel.wav has (empty: the first); 1 mV is full scale"}, p.channel);
-    visit({"stimulator_ma", "what if: a tool's tip stimulates all the time it touches (0: as the session has it)", "mA", 0, 5},
+    visit({"stimulator_ma", "what if: a tool's tip stimulates all the time it touches (0: as the session has it)", "mA",
+           0, 5},
           p.stimulator_ma);
     visit({"pulses_per_s", "of that", "1/s", 1, 30}, p.pulses_per_s);
     visit({"width_ms", "of its pulses", "ms", 0.05, 1}, p.width_ms);

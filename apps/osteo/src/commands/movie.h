@@ -17,16 +17,20 @@ struct MovieCommand {
     std::string case_folder;
   };
   static void describe(Params& p, auto& visit) {
-    visit({"camera", "surgeon: from where was looked (notes of the session); fixed: from one place, all that was drilled"}, p.camera);
+    visit({"camera",
+           "surgeon: from where was looked (notes of the session); fixed: from one place, all that was drilled"},
+          p.camera);
     visit({"speed", "times as fast as it was", "", 0.1, 100}, p.speed);
     visit({"from_s", "of the session", "s", 0, 1e6}, p.from_s);
     visit({"to_s", "of the session (-1: its end)", "s", -1, 1e6}, p.to_s);
-    visit({"skip_idle", "leave out where for over 2 s neither hand nor camera moves and no pedal is down"}, p.skip_idle);
+    visit({"skip_idle", "leave out where for over 2 s neither hand nor camera moves and no pedal is down"},
+          p.skip_idle);
     visit({"no_overlay", "without time, force, nearest structure and volume removed"}, p.no_overlay);
     visit({"blind", "for raters: no overlay, and with a folder as output a random name"}, p.blind);
     visit({"size", "pixels, width and height, both even"}, p.size);
     visit({"fps", "frames a second", "Hz", 1, 120}, p.fps);
-    visit({"deep", "creases shaded and edges smoothed, which without a graphics card takes several times as long"}, p.deep);
+    visit({"deep", "creases shaded and edges smoothed, which without a graphics card takes several times as long"},
+          p.deep);
     visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
   }
   static cli::CommandInfo info();

@@ -24,11 +24,11 @@ struct PlaybackCommand {
     PlaybackParams::describe(p, visit);
     visit({"from_s", "of the session: where the lesson begins; bone is as it was then", "s", 0, 1e6}, p.from_s);
     visit({"to_s", "and where it ends (0: with the session)", "s", 0, 1e6}, p.to_s);
-    visit(
-        {"experts",
-         "fading, amplify: more sessions of the same step, by commas; three quarters of the distances between their ways and the lesson's "
-         "are the dead zone"},
-        p.experts);
+    visit({"experts",
+           "fading, amplify: more sessions of the same step, by commas; three quarters of the distances between their "
+           "ways and the lesson's "
+           "are the dead zone"},
+          p.experts);
     visit({"headless", "without a window and as fast as possible: a simulated hand is led"}, p.headless);
     visit({"hand", "headless: simulated:STIFFNESS, in N/m (100 to 500 is a grip); it has no will of its own"}, p.hand);
     visit({"device", "in the window, what moves the drill, as in 'rehearse'"}, p.device);

@@ -19,11 +19,18 @@ struct ReviewCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder for review.html, review.pdf and review.json, made when it is not there (also -o)"}, p.out);
-    visit({"procedure", "what was to be done, as JSON (pipelines/procedures); empty: no items, regions or rules"}, p.procedure);
-    visit({"mirror", "the procedure is written for the other side of the body: its directions and curves turn about x = 0"}, p.mirror);
-    visit({"reference", "folder with reference.json and sessions of others on the same case; empty: no comparison"}, p.reference);
-    visit({"subject", "who this is, by the reference's code: sessions of the same person are left out of the comparison"}, p.subject);
-    visit({"earlier", "earlier sessions of the same person in their order, with commas between (empty: none)"}, p.earlier);
+    visit({"procedure", "what was to be done, as JSON (pipelines/procedures); empty: no items, regions or rules"},
+          p.procedure);
+    visit({"mirror",
+           "the procedure is written for the other side of the body: its directions and curves turn about x = 0"},
+          p.mirror);
+    visit({"reference", "folder with reference.json and sessions of others on the same case; empty: no comparison"},
+          p.reference);
+    visit(
+        {"subject", "who this is, by the reference's code: sessions of the same person are left out of the comparison"},
+        p.subject);
+    visit({"earlier", "earlier sessions of the same person in their order, with commas between (empty: none)"},
+          p.earlier);
     visit({"no_pictures", "without pictures and the view in 3D: needs no OpenGL"}, p.no_pictures);
     visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
   }

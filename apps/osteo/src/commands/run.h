@@ -23,9 +23,10 @@ struct RunCommand {
     visit({"validate", "check the whole pipeline without reading any data, answer in JSON, and stop"}, p.validate);
     visit({"dry_run", "show what would be run and written, and stop"}, p.dry_run);
     visit({"reuse", "keep outputs that exist and would come out the same"}, p.reuse);
-    visit(
-        {"engine", "who runs the stages: stages, one after the other; vtk, as connected filters by VTK's executive, with the same results"},
-        p.engine);
+    visit({"engine",
+           "who runs the stages: stages, one after the other; vtk, as connected filters by VTK's executive, with the "
+           "same results"},
+          p.engine);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

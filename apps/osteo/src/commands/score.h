@@ -18,13 +18,21 @@ struct ScoreCommand {
     std::string case_folder;
   };
   static void describe(Params& p, auto& visit) {
-    visit({"procedure", "what was to be done, as JSON (pipelines/procedures); empty: no items, regions or rules"}, p.procedure);
-    visit({"mirror", "the procedure is written for the other side of the body: its directions and curves turn about x = 0"}, p.mirror);
-    visit({"reference", "folder with reference.json and sessions of others on the same case; empty: no comparison"}, p.reference);
-    visit({"subject", "who this is, by the reference's code: sessions of the same person are left out of the comparison"}, p.subject);
+    visit({"procedure", "what was to be done, as JSON (pipelines/procedures); empty: no items, regions or rules"},
+          p.procedure);
+    visit({"mirror",
+           "the procedure is written for the other side of the body: its directions and curves turn about x = 0"},
+          p.mirror);
+    visit({"reference", "folder with reference.json and sessions of others on the same case; empty: no comparison"},
+          p.reference);
+    visit(
+        {"subject", "who this is, by the reference's code: sessions of the same person are left out of the comparison"},
+        p.subject);
     visit({"csv", "also write a header and a row of all values (.csv)"}, p.csv);
     visit({"evidence", "with --json: also the places that prove each item, and all bone removed unseen"}, p.evidence);
-    visit({"heat", "also how warm bone and structures became: runs the session again, which takes several times as long"}, p.heat);
+    visit(
+        {"heat", "also how warm bone and structures became: runs the session again, which takes several times as long"},
+        p.heat);
     visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
   }
   static cli::CommandInfo info();

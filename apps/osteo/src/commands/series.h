@@ -13,7 +13,9 @@ struct SeriesCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"studies", "also the date and description of each study, which can tell who the patient is"}, p.studies);
-    visit({"thumbnails", "a folder for a picture of the middle slice of each series, named by scan and series; a face may be seen in them"},
+    visit({"thumbnails",
+           "a folder for a picture of the middle slice of each series, named by scan and series; a face may be seen in "
+           "them"},
           p.thumbnails);
   }
   static cli::CommandInfo info();

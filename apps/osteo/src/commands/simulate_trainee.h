@@ -19,11 +19,16 @@ struct SimulateTraineeCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder of the session (empty: CASE/sessions/N; also -o)"}, p.out);
-    visit({"skill", "expert or novice, then KEY=VALUE by commas, like 'novice, undercut=0.8'; what is not named is an expert's"}, p.skill);
+    visit({"skill",
+           "expert or novice, then KEY=VALUE by commas, like 'novice, undercut=0.8'; what is not named is an expert's"},
+          p.skill);
     visit({"procedure", "what is to be done, as JSON (pipelines/procedures)"}, p.procedure);
-    visit({"mirror", "the procedure is written for the other side of the body: its directions and curves turn about x = 0"}, p.mirror);
+    visit({"mirror",
+           "the procedure is written for the other side of the body: its directions and curves turn about x = 0"},
+          p.mirror);
     visit({"minutes", "then it stops, wherever it is", "min", 0.05, 60}, p.minutes);
-    visit({"approach", "from the bone to who drills, LPS (0,0,0: as the procedure's items have it)", "", -1e4, 1e4}, p.approach);
+    visit({"approach", "from the bone to who drills, LPS (0,0,0: as the procedure's items have it)", "", -1e4, 1e4},
+          p.approach);
     visit({"window_mm", "radius of what it opens, for the burr's middle", "mm", 1, 20}, p.window_mm);
   }
   static cli::CommandInfo info();

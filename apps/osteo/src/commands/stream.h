@@ -16,12 +16,15 @@ struct StreamCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"to",
-           "where to: igtl:PORT, igtl:HOST:PORT (to listen on), cerebus:HOST:PORT/VERSION (3.11, 4.0, 4.1 or 4.2), lsl; several with "
+           "where to: igtl:PORT, igtl:HOST:PORT (to listen on), cerebus:HOST:PORT/VERSION (3.11, 4.0, 4.1 or 4.2), "
+           "lsl; several with "
            "commas between"},
           p.to);
-    visit({"setup", "of the nerve monitor, as JSON (empty: as the session was recorded with, or the built-in one)"}, p.setup);
+    visit({"setup", "of the nerve monitor, as JSON (empty: as the session was recorded with, or the built-in one)"},
+          p.setup);
     visit({"speed", "times real time", "", 0.05, 20}, p.speed);
-    visit({"listeners", "it begins when so many are there (0: at once); Cerebus packets have none", "", 0, 8}, p.listeners);
+    visit({"listeners", "it begins when so many are there (0: at once); Cerebus packets have none", "", 0, 8},
+          p.listeners);
     visit({"wait_s", "for them, at most", "s", 1, 86400}, p.wait_s);
     visit({"case_folder", "where the case is now, when it was moved"}, p.case_folder);
   }

@@ -14,7 +14,8 @@ struct TakeBackCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"source", "the scan of the case, where it is not known on this machine"}, p.source);
-    visit({"by_place", "take segments that bear no mark of the scan, when most of the bone lies where it was"}, p.by_place);
+    visit({"by_place", "take segments that bear no mark of the scan, when most of the bone lies where it was"},
+          p.by_place);
     visit({"check", "say what changed, and leave the case as it is"}, p.check);
   }
   static cli::CommandInfo info();

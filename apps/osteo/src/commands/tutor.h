@@ -20,16 +20,19 @@ struct TutorCommand {
     visit({"out", "folder for the session (empty: a new one in CASE/sessions; also -o)"}, p.out);
     visit({"script", "the instructor's strokes, as JSON"}, p.script);
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
-    visit({"resume", "a session to go on from (empty: the case's bone); those who join are sent what it did"}, p.resume);
+    visit({"resume", "a session to go on from (empty: the case's bone); those who join are sent what it did"},
+          p.resume);
     visit({"listen",
-           "address of this machine to be heard on; 127.0.0.1 or ::1: by this machine alone, 0.0.0.0 or :: : by all that can reach it"},
+           "address of this machine to be heard on; 127.0.0.1 or ::1: by this machine alone, 0.0.0.0 or :: : by all "
+           "that can reach it"},
           p.listen);
     visit({"port", "UDP; 0: any that is free", "", 0, 65535}, p.port);
     visit({"two_way", "the instructor's hand is pulled by the trainee's too"}, p.two_way);
     visit({"stiffness_n_per_mm", "with --two-way, of that pull; less where the delay would not bear it", "N/mm", 0, 10},
           p.stiffness_n_per_mm);
     visit({"most_n", "with --two-way, at most", "N", 0, 20}, p.most_n);
-    visit({"attend", "so many are to have joined, with their copies made, when the session begins", "", 0, 9}, p.attend);
+    visit({"attend", "so many are to have joined, with their copies made, when the session begins", "", 0, 9},
+          p.attend);
     visit({"wait_s", "for them at most; then it begins with those who are there", "s", 0, 3600}, p.wait_s);
   }
   static cli::CommandInfo info();

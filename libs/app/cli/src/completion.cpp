@@ -64,7 +64,8 @@ std::vector<Word> words_of(const Program& program) {
 
 std::string bash_completion(const Program& program) {
   std::ostringstream out;
-  out << "# bash completion of osteo: source it, or put it into /etc/bash_completion.d\n_osteo() {\n  local cur=${COMP_WORDS[COMP_CWORD]} "
+  out << "# bash completion of osteo: source it, or put it into /etc/bash_completion.d\n_osteo() {\n  local "
+         "cur=${COMP_WORDS[COMP_CWORD]} "
          "prev=${COMP_WORDS[COMP_CWORD-1]}\n"
       << "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n    COMPREPLY=($(compgen -W \"";
   for (const auto& name : program.registry.names()) out << name << ' ';
@@ -101,14 +102,16 @@ std::string bash_completion(const Program& program) {
     for (const FieldRef& f : c->fields()) out << ' ' << f.flag();
     out << "\" ;;\n";
   }
-  out << "  esac\n  case \"$cur\" in\n    -*) COMPREPLY=($(compgen -W \"$flags\" -- \"$cur\")) ;;\n    *) COMPREPLY=($(compgen -f -- "
+  out << "  esac\n  case \"$cur\" in\n    -*) COMPREPLY=($(compgen -W \"$flags\" -- \"$cur\")) ;;\n    *) "
+         "COMPREPLY=($(compgen -f -- "
          "\"$cur\")) ;;\n  esac\n}\ncomplete -o filenames -F _osteo osteo ./osteo\n";
   return out.str();
 }
 
 std::string zsh_completion(const Program& program) {
   std::ostringstream out;
-  out << "#compdef osteo\n# completion of zsh for osteo: a file _osteo in a folder of $fpath\n_osteo() {\n  local -a words_\n  if (( "
+  out << "#compdef osteo\n# completion of zsh for osteo: a file _osteo in a folder of $fpath\n_osteo() {\n  local -a "
+         "words_\n  if (( "
          "CURRENT == 2 )); "
          "then\n    words_=(\n";
   const auto words = words_of(program);
@@ -160,4 +163,4 @@ std::string fish_completion(const Program& program) {
   return out.str();
 }
 
-}  // namespace osteo::app::cli
+}  // namespace osteo::inline app::cli

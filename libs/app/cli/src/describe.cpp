@@ -111,7 +111,8 @@ std::string markdown_fields(const std::vector<FieldRef>& fields) {
     if (range.empty()) range = range_text(f);
     const std::string off = f.kind() == "flag" && f.to_text() == "true" ? " / `--no-" + f.flag().substr(2) + "`" : "";
     text += "| `" + f.flag() + "`" + off + " | `" + std::string(f.doc.name) + "` | " +
-            (f.to_text().empty() ? "" : "`" + f.to_text() + "`") + " | " + range + " | " + std::string(f.doc.help) + " |\n";
+            (f.to_text().empty() ? "" : "`" + f.to_text() + "`") + " | " + range + " | " + std::string(f.doc.help) +
+            " |\n";
   }
   return text;
 }
@@ -153,7 +154,8 @@ std::string program_help(const Program& program) {
   out << "\nCommands:\n";
   for (const auto& c : program.commands) row(out, c->info().name, c->info().synopsis);
   row(out, "help", "this text, or the help of a stage or command");
-  out << "\n'osteo help NAME' tells all of a stage or command. First steps:\n  osteo prepare DICOM_FOLDER -o CASE    then    osteo "
+  out << "\n'osteo help NAME' tells all of a stage or command. First steps:\n  osteo prepare DICOM_FOLDER -o CASE    "
+         "then    osteo "
          "rehearse CASE\n";
   return out.str();
 }
@@ -165,10 +167,12 @@ std::string stage_help(Stage& stage) {
   wrap(out, info.description, 0);
   if (!info.inputs.empty()) {
     out << "\nInputs:\n";
-    for (const Port& p : info.inputs) row(out, p.optional ? "--" + p.name + " <file>" : "<" + p.name + ">", port_text(p, false));
+    for (const Port& p : info.inputs)
+      row(out, p.optional ? "--" + p.name + " <file>" : "<" + p.name + ">", port_text(p, false));
   }
   out << "\nOutputs:\n";
-  for (const Port& p : info.outputs) row(out, p.optional ? output_flag(p) + " <file>" : "<" + p.name + ".out>", port_text(p, true));
+  for (const Port& p : info.outputs)
+    row(out, p.optional ? output_flag(p) + " <file>" : "<" + p.name + ".out>", port_text(p, true));
   const auto fields = stage.fields();
   if (!fields.empty()) {
     out << "\nParameters:\n";
@@ -263,7 +267,8 @@ std::string pipeline_schema(const Program& program) {
       in["properties"][port.name] = {
           {"description", port.help + " (" + kinds_text(port.kinds) + ")"},
           {"anyOf",
-           {{{"type", "string"}}, {{"type", "object"}, {"required", {"file"}}, {"properties", {{"file", {{"type", "string"}}}}}}}}};
+           {{{"type", "string"}},
+            {{"type", "object"}, {"required", {"file"}}, {"properties", {{"file", {{"type", "string"}}}}}}}}};
       if (!port.optional) in["required"].push_back(port.name);
     }
     sp["in"] = in;
@@ -271,7 +276,8 @@ std::string pipeline_schema(const Program& program) {
     for (const FieldRef& f : stage->fields()) params["properties"][std::string(f.doc.name)] = or_variable(schema_of(f));
     sp["params"] = params;
     Json outputs{{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
-    for (const Port& port : stage->info().outputs) outputs["properties"][port.name] = {{"type", "string"}, {"description", port.help}};
+    for (const Port& port : stage->info().outputs)
+      outputs["properties"][port.name] = {{"type", "string"}, {"description", port.help}};
     sp["out"] = outputs;
     any.push_back(s);
   }
@@ -287,14 +293,16 @@ std::map<std::string, std::string> reference_pages(const Program& program) {
     const auto stage = program.registry.make(name);
     const StageInfo& info = stage->info();
     index += "| [" + name + "](stage-" + name + ".md) | " + info.synopsis + " |\n";
-    std::string page = note + "# " + info.name + "\n\n" + info.synopsis + "\n\n```\n" + usage_line(info) + "\n```\n\n" + info.description +
-                       "\n\n## Inputs\n\n";
+    std::string page = note + "# " + info.name + "\n\n" + info.synopsis + "\n\n```\n" + usage_line(info) + "\n```\n\n" +
+                       info.description + "\n\n## Inputs\n\n";
     if (info.inputs.empty()) page += "None.\n";
     for (const Port& p : info.inputs)
-      page += "- `" + p.name + "`: " + port_text(p, false) + (p.optional ? "; optional, `--" + p.name + " FILE`" : "") + "\n";
+      page += "- `" + p.name + "`: " + port_text(p, false) + (p.optional ? "; optional, `--" + p.name + " FILE`" : "") +
+              "\n";
     page += "\n## Outputs\n\n";
     for (const Port& p : info.outputs)
-      page += "- `" + p.name + "`: " + port_text(p, true) + (p.optional ? "; optional, `" + output_flag(p) + " FILE`" : "") + "\n";
+      page += "- `" + p.name + "`: " + port_text(p, true) +
+              (p.optional ? "; optional, `" + output_flag(p) + " FILE`" : "") + "\n";
     page += "\n## Parameters\n\n" + markdown_fields(stage->fields());
     if (!info.references.empty()) {
       page += "\n## References\n\n";
@@ -307,11 +315,12 @@ std::map<std::string, std::string> reference_pages(const Program& program) {
   for (const auto& c : program.commands) {
     const CommandInfo& info = c->info();
     index += "| [" + info.name + "](command-" + info.name + ".md) | " + info.synopsis + " |\n";
-    std::string page =
-        note + "# " + info.name + "\n\n" + info.synopsis + "\n\n```\n" + usage_line(info) + "\n```\n\n" + info.description + "\n\n";
+    std::string page = note + "# " + info.name + "\n\n" + info.synopsis + "\n\n```\n" + usage_line(info) + "\n```\n\n" +
+                       info.description + "\n\n";
     if (!info.positionals.empty()) {
       page += "## Arguments\n\n";
-      for (const auto& p : info.positionals) page += "- `" + p.name + "`: " + p.help + (p.optional ? " (optional)" : "") + "\n";
+      for (const auto& p : info.positionals)
+        page += "- `" + p.name + "`: " + p.help + (p.optional ? " (optional)" : "") + "\n";
       page += "\n";
     }
     page += "## Flags\n\n" + markdown_fields(c->fields());
@@ -320,16 +329,18 @@ std::map<std::string, std::string> reference_pages(const Program& program) {
   }
   index += "\n## Flags of every stage and command\n\n" + markdown_fields(common_fields());
   index +=
-      "\n[Exit codes](exit-codes.md), [schema of pipeline files](pipeline.schema.json), [of scripts of strokes](script.schema.json), "
+      "\n[Exit codes](exit-codes.md), [schema of pipeline files](pipeline.schema.json), [of scripts of "
+      "strokes](script.schema.json), "
       "[actions of sessions](actions.md), [bash completion](osteo.bash).\n";
   pages["README.md"] = index;
   std::string codes = note + "# Exit codes\n\n| code | name | meaning |\n|---|---|---|\n";
   for (const auto& d : exit_code_table)
-    codes += "| " + std::to_string(static_cast<int>(d.code)) + " | " + std::string(d.name) + " | " + std::string(d.meaning) + " |\n";
+    codes += "| " + std::to_string(static_cast<int>(d.code)) + " | " + std::string(d.name) + " | " +
+             std::string(d.meaning) + " |\n";
   pages["exit-codes.md"] = codes;
   pages["pipeline.schema.json"] = pipeline_schema(program);
   pages["osteo.bash"] = bash_completion(program);
   return pages;
 }
 
-}  // namespace osteo::app::cli
+}  // namespace osteo::inline app::cli

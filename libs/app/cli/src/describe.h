@@ -1,4 +1,5 @@
-// Everything that is printed from declarations: help, reference pages, schema, completion, Slicer XML. Private to libs/app/cli.
+// Everything that is printed from declarations: help, reference pages, schema, completion, Slicer XML. Private to
+// libs/app/cli.
 #pragma once
 #include <map>
 #include <string>
@@ -32,4 +33,4 @@ namespace osteo::inline app::cli {
 [[nodiscard]] std::string flag_text(const FieldRef& field);
 [[nodiscard]] std::string output_flag(const Port& port);
 
-}  // namespace osteo::app::cli
+}  // namespace osteo::inline app::cli

@@ -3,14 +3,15 @@
 #include <sstream>
 
 #include "describe.h"
-#include "osteo/core/base/error.h"
 #include "osteo/app/cli/report.h"
+#include "osteo/core/base/error.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 
 namespace osteo::inline app::cli {
 namespace {
 
-// roff's own characters lose their meaning: a backslash anywhere, a dot or an apostrophe at the beginning of a line, and hyphens stay.
+// roff's own characters lose their meaning: a backslash anywhere, a dot or an apostrophe at the beginning of a line,
+// and hyphens stay.
 std::string roff(std::string_view text) {
   std::string out;
   bool first = true;
@@ -51,7 +52,8 @@ std::string man_page(const Program& program, const std::string& subject) {
   }
   std::ostringstream out;
   const std::string version(program_version());
-  out << ".TH \"" << upper(title) << "\" 1 \"\" \"osteo " << version.substr(0, version.find(' ')) << "\" \"Osteotome\"\n.SH NAME\n"
+  out << ".TH \"" << upper(title) << "\" 1 \"\" \"osteo " << version.substr(0, version.find(' '))
+      << "\" \"Osteotome\"\n.SH NAME\n"
       << roff(title) << " \\- " << roff(synopsis) << "\n.SH SYNOPSIS\n";
   // A line "Usage: ..." is the synopsis; one that ends with a colon and is not indented heads a section.
   std::istringstream lines(help);
@@ -64,7 +66,8 @@ std::string man_page(const Program& program, const std::string& subject) {
     else
       rest.push_back(line);
   }
-  out << ".nf\n" << roff(usage.empty() ? "osteo STAGE|COMMAND [arguments] [flags]" : usage) << "\n.fi\n.SH DESCRIPTION\n.nf\n";
+  out << ".nf\n"
+      << roff(usage.empty() ? "osteo STAGE|COMMAND [arguments] [flags]" : usage) << "\n.fi\n.SH DESCRIPTION\n.nf\n";
   for (const std::string& l : rest) {
     if (l.size() > 1 && l[0] != ' ' && l.back() == ':' && l.size() < 60)
       out << ".fi\n.SH \"" << roff(upper(l.substr(0, l.size() - 1))) << "\"\n.nf\n";
@@ -72,7 +75,8 @@ std::string man_page(const Program& program, const std::string& subject) {
       out << roff(l) << '\n';
   }
   out << ".fi\n.SH \"EXIT STATUS\"\n";
-  for (const auto& d : exit_code_table) out << ".TP\n" << static_cast<int>(d.code) << '\n' << roff(std::string(d.meaning)) << '\n';
+  for (const auto& d : exit_code_table)
+    out << ".TP\n" << static_cast<int>(d.code) << '\n' << roff(std::string(d.meaning)) << '\n';
   out << ".SH NOTES\nNot a medical device: for rehearsal, teaching and research, not for treatment decisions.\n";
   return out.str();
 }
@@ -86,11 +90,12 @@ std::map<std::string, std::string> shared_files(const Program& program) {
     files[module] = slicer_module_script(name);
     files[module + ".xml"] = stage_xml(*program.registry.make(name));
   }
-  for (const auto& c : program.commands) files["man/man1/osteo-" + c->info().name + ".1"] = man_page(program, c->info().name);
+  for (const auto& c : program.commands)
+    files["man/man1/osteo-" + c->info().name + ".1"] = man_page(program, c->info().name);
   files["bash-completion/completions/osteo"] = bash_completion(program);
   files["zsh/site-functions/_osteo"] = zsh_completion(program);
   files["fish/vendor_completions.d/osteo.fish"] = fish_completion(program);
   return files;
 }
 
-}  // namespace osteo::app::cli
+}  // namespace osteo::inline app::cli

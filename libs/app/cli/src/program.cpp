@@ -8,11 +8,11 @@
 #include <set>
 
 #include "describe.h"
+#include "osteo/app/cli/command.h"
+#include "osteo/app/cli/report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/simd.h"
-#include "osteo/app/cli/command.h"
-#include "osteo/app/cli/report.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "progress.h"
 
@@ -22,7 +22,8 @@ namespace {
 std::atomic<bool> g_cancel{false};
 
 extern "C" void on_signal(int signal) {
-  // The first asks the work to stop and clean up; a second Ctrl-C ends the program at once. A logout may send SIGTERM and SIGHUP together.
+  // The first asks the work to stop and clean up; a second Ctrl-C ends the program at once. A logout may send SIGTERM
+  // and SIGHUP together.
   if (g_cancel.exchange(true) && signal == SIGINT) ::_exit(130);
 }
 
@@ -39,8 +40,8 @@ std::string dashed(std::string flag) {
   return flag;
 }
 
-Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields, const std::vector<std::string>& file_flags,
-             bool takes_settings) {
+Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
+             const std::vector<std::string>& file_flags, bool takes_settings) {
   Parsed parsed;
   std::vector<std::string> known{"--help"};
   for (const auto& f : fields) known.push_back(f.flag());
@@ -76,7 +77,8 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
       parsed.settings.emplace_back(text.substr(0, at), text.substr(at + 1));
       continue;
     }
-    if (const auto it = std::find_if(file_flags.begin(), file_flags.end(), [&](const std::string& f) { return "--" + dashed(f) == name; });
+    if (const auto it = std::find_if(file_flags.begin(), file_flags.end(),
+                                     [&](const std::string& f) { return "--" + dashed(f) == name; });
         it != file_flags.end()) {
       parsed.files[*it] = take_value();
       continue;
@@ -103,7 +105,8 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
       }
     }
     const std::string near = nearest_name(name, known);
-    throw Error(ExitCode::usage, "there is no flag " + written, near.empty() ? "--help shows the flags" : "did you mean " + near + "?");
+    throw Error(ExitCode::usage, "there is no flag " + written,
+                near.empty() ? "--help shows the flags" : "did you mean " + near + "?");
   }
   return parsed;
 }
@@ -114,8 +117,8 @@ std::string count_text(std::size_t wanted, std::size_t given) {
          (given == 0 ? "none was" : std::to_string(given) + (given == 1 ? " was" : " were")) + " given";
 }
 
-int run_stage(const Registry& registry, Stage& stage, const std::vector<std::string>& args, Invocation& invocation, Common::Params& common,
-              const std::function<void()>& ready) {
+int run_stage(const Registry& registry, Stage& stage, const std::vector<std::string>& args, Invocation& invocation,
+              Common::Params& common, const std::function<void()>& ready) {
   const StageInfo& info = stage.info();
   auto fields = stage.fields();
   for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
@@ -142,7 +145,8 @@ int run_stage(const Registry& registry, Stage& stage, const std::vector<std::str
   if (parsed.positionals.size() != required) {
     std::string wanted;
     for (const auto& n : names) wanted += " " + n;
-    throw Error(ExitCode::usage, "osteo " + info.name + " takes" + wanted + count_text(required, parsed.positionals.size()),
+    throw Error(ExitCode::usage,
+                "osteo " + info.name + " takes" + wanted + count_text(required, parsed.positionals.size()),
                 "'osteo help " + info.name + "' tells more");
   }
   ready();
@@ -169,7 +173,8 @@ int run_stage(const Registry& registry, Stage& stage, const std::vector<std::str
     }
   }
   for (const FieldRef& f : stage.fields()) node.params[std::string(f.doc.name)] = f.to_text();
-  const auto results = run_pipeline({info.name, "", {node}}, registry, {.overwrite = common.force, .reuse = false}, invocation.context);
+  const auto results =
+      run_pipeline({info.name, "", {node}}, registry, {.overwrite = common.force, .reuse = false}, invocation.context);
   invocation.end_progress();
   print_results(results, invocation);
   return 0;
@@ -204,8 +209,8 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
   }
   const std::string name = args.front();
   args.erase(args.begin());
-  const bool wants_help =
-      std::find(args.begin(), args.end(), "--help") != args.end() || std::find(args.begin(), args.end(), "-h") != args.end();
+  const bool wants_help = std::find(args.begin(), args.end(), "--help") != args.end() ||
+                          std::find(args.begin(), args.end(), "-h") != args.end();
   if (name == "--help" || name == "-h" || (name == "help" && args.empty())) {
     out << program_help(program);
     return 0;
@@ -270,7 +275,8 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
     for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
     Parsed parsed = parse(args, fields, {}, command->info().takes_settings);
     const auto& wanted = command->info().positionals;
-    const auto required = static_cast<std::size_t>(std::count_if(wanted.begin(), wanted.end(), [](const auto& p) { return !p.optional; }));
+    const auto required = static_cast<std::size_t>(
+        std::count_if(wanted.begin(), wanted.end(), [](const auto& p) { return !p.optional; }));
     if (parsed.positionals.size() < required || parsed.positionals.size() > wanted.size()) {
       std::string list;
       for (const auto& p : wanted) list += p.optional ? " [" + p.name + "]" : " <" + p.name + ">";
@@ -299,8 +305,8 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
   ::signal(SIGXFSZ, SIG_IGN);
   std::unique_ptr<ProgressPrinter> printer;
   const std::vector<std::string> args{argv + 1, argv + argc};
-  const bool json =
-      std::find(args.begin(), std::find(args.begin(), args.end(), "--"), "--json") != std::find(args.begin(), args.end(), "--");
+  const bool json = std::find(args.begin(), std::find(args.begin(), args.end(), "--"), "--json") !=
+                    std::find(args.begin(), args.end(), "--");
   // Slicer reads progress from standard output, and takes whatever comes on standard error for an error.
   const auto style = std::find(args.begin(), args.end(), "--progress");
   const bool slicer = std::find(args.begin(), args.end(), "--progress=slicer") != args.end() ||
@@ -323,9 +329,9 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
   } catch (const std::bad_alloc&) {
     return failed(Error(ExitCode::resources, "out of memory", "use larger voxels or a smaller region"));
   } catch (const std::exception& e) {
-    return failed(
-        Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(), "this is a defect of the program; please report it"));
+    return failed(Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(),
+                        "this is a defect of the program; please report it"));
   }
 }
 
-}  // namespace osteo::app::cli
+}  // namespace osteo::inline app::cli

@@ -27,8 +27,9 @@ void ProgressPrinter::update(double fraction, std::string_view activity) {
     bar_shown_ = true;
     constexpr int kWidth = 30;
     const int filled = static_cast<int>(std::lround(fraction * kWidth));
-    err_ << "\r[" << std::string(static_cast<std::size_t>(filled), '#') << std::string(static_cast<std::size_t>(kWidth - filled), '.')
-         << "] " << static_cast<int>(fraction * 100) << " %  " << activity_ << "\x1b[K" << std::flush;
+    err_ << "\r[" << std::string(static_cast<std::size_t>(filled), '#')
+         << std::string(static_cast<std::size_t>(kWidth - filled), '.') << "] " << static_cast<int>(fraction * 100)
+         << " %  " << activity_ << "\x1b[K" << std::flush;
     return;
   }
   // Machines read each step once, and never backwards.
@@ -40,7 +41,9 @@ void ProgressPrinter::update(double fraction, std::string_view activity) {
     line["activity"] = activity_;
     err_ << line.dump() << '\n' << std::flush;
   } else {
-    err_ << "<filter-progress>" << fraction << "</filter-progress>\n<filter-comment>" << activity_ << "</filter-comment>\n" << std::flush;
+    err_ << "<filter-progress>" << fraction << "</filter-progress>\n<filter-comment>" << activity_
+         << "</filter-comment>\n"
+         << std::flush;
   }
 }
 
@@ -61,4 +64,4 @@ void ProgressPrinter::clear_locked() {
   bar_shown_ = false;
 }
 
-}  // namespace osteo::app::cli
+}  // namespace osteo::inline app::cli

@@ -30,4 +30,4 @@ class ProgressPrinter {
   bool bar_shown_ = false;
 };
 
-}  // namespace osteo::app::cli
+}  // namespace osteo::inline app::cli

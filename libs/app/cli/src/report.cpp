@@ -68,7 +68,8 @@ bool with_unit(std::string& name, double v, std::string& text) {
   } else if (ends("_mean_voxels")) {
     text = four(v) + " voxels on average";
   } else {
-    for (const auto& [ending, unit] : {std::pair{"_ms", "ms"}, std::pair{"_s", "s"}, std::pair{"_n", "N"}, std::pair{"_kpa", "kPa"}}) {
+    for (const auto& [ending, unit] :
+         {std::pair{"_ms", "ms"}, std::pair{"_s", "s"}, std::pair{"_n", "N"}, std::pair{"_kpa", "kPa"}}) {
       if (!ends(ending)) continue;
       text = four(v) + " " + unit;
       return true;
@@ -79,25 +80,26 @@ bool with_unit(std::string& name, double v, std::string& text) {
 }
 
 // What imaging staff call it, where the name of the fact is not that.
-constexpr std::array<std::array<std::string_view, 3>, 19> kWords{{{"source_kind", "source", ""},
-                                                                  {"slice_gap_min_mm", "least distance of slices", ""},
-                                                                  {"slice_gap_max_mm", "greatest distance of slices", ""},
-                                                                  {"position_error_mm", "a pixel is out of place by", ""},
-                                                                  {"axes", "axes of the voxels point to", ""},
-                                                                  {"hu_min", "lowest value", "HU"},
-                                                                  {"hu_max", "highest value", "HU"},
-                                                                  {"looks_like_hu", "values look like HU", ""},
-                                                                  {"lower_hu", "threshold", ""},
-                                                                  {"change_percent_per_50_hu", "50 HU either way change bone by", "%"},
-                                                                  {"table", "table, head holder", ""},
-                                                                  {"outside_body_mm3", "taken off outside the body", ""},
-                                                                  {"small_pieces_mm3", "small pieces dropped", ""},
-                                                                  {"mask_volume_mm3", "bone by the mask", ""},
-                                                                  {"volume_before_mm3", "bone by the mask", ""},
-                                                                  {"volume_after_mm3", "bone in the case", ""},
-                                                                  {"volume_change_percent", "difference", ""},
-                                                                  {"volume_change_unshifted_percent", "difference without the shift", ""},
-                                                                  {"boundary_offset_hu", "threshold shifted by", ""}}};
+constexpr std::array<std::array<std::string_view, 3>, 19> kWords{
+    {{"source_kind", "source", ""},
+     {"slice_gap_min_mm", "least distance of slices", ""},
+     {"slice_gap_max_mm", "greatest distance of slices", ""},
+     {"position_error_mm", "a pixel is out of place by", ""},
+     {"axes", "axes of the voxels point to", ""},
+     {"hu_min", "lowest value", "HU"},
+     {"hu_max", "highest value", "HU"},
+     {"looks_like_hu", "values look like HU", ""},
+     {"lower_hu", "threshold", ""},
+     {"change_percent_per_50_hu", "50 HU either way change bone by", "%"},
+     {"table", "table, head holder", ""},
+     {"outside_body_mm3", "taken off outside the body", ""},
+     {"small_pieces_mm3", "small pieces dropped", ""},
+     {"mask_volume_mm3", "bone by the mask", ""},
+     {"volume_before_mm3", "bone by the mask", ""},
+     {"volume_after_mm3", "bone in the case", ""},
+     {"volume_change_percent", "difference", ""},
+     {"volume_change_unshifted_percent", "difference without the shift", ""},
+     {"boundary_offset_hu", "threshold shifted by", ""}}};
 
 }  // namespace
 
@@ -118,8 +120,8 @@ std::pair<std::string, std::string> fact_text(const std::string& key, const Repo
 }
 
 std::string error_json(const Error& error) {
-  const auto* doc =
-      std::find_if(std::begin(exit_code_table), std::end(exit_code_table), [&](const auto& d) { return d.code == error.code(); });
+  const auto* doc = std::find_if(std::begin(exit_code_table), std::end(exit_code_table),
+                                 [&](const auto& d) { return d.code == error.code(); });
   Json j;
   j["error"] = {{"exit_code", static_cast<int>(error.code())},
                 {"name", doc == std::end(exit_code_table) ? "" : std::string(doc->name)},
@@ -147,7 +149,8 @@ void print_results(const std::vector<NodeResult>& results, Invocation& invocatio
       invocation.err << '\n';
       for (const auto& [key, value] : r.report) {
         const auto [name, text] = fact_text(key, value);
-        invocation.err << "    " << name << std::string(name.size() < kFactColumn ? kFactColumn - name.size() : 1, ' ') << text << '\n';
+        invocation.err << "    " << name << std::string(name.size() < kFactColumn ? kFactColumn - name.size() : 1, ' ')
+                       << text << '\n';
       }
       for (const auto& [port, path] : r.outputs) invocation.err << "  " << port << " -> " << path.string() << '\n';
     }
@@ -163,4 +166,4 @@ void print_results(const std::vector<NodeResult>& results, Invocation& invocatio
   invocation.out << Json{{"stages", list}, {"peak_memory_mb", peak_memory_mb()}}.dump(2) << '\n';
 }
 
-}  // namespace osteo::app::cli
+}  // namespace osteo::inline app::cli

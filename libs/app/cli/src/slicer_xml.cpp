@@ -1,5 +1,6 @@
 // A stage as a module of 3D Slicer: its description (Slicer Execution Model) and what starts it.
-// What Slicer's own parser refuses is in docs/slicer.md; names of parameters and flags are letters, digits and underscores there.
+// What Slicer's own parser refuses is in docs/slicer.md; names of parameters and flags are letters, digits and
+// underscores there.
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -68,7 +69,8 @@ Tag tag_of(DataKind kind, bool output) {
 }
 
 void element(std::ostream& out, int indent, const char* tag, std::string_view text) {
-  out << std::string(static_cast<std::size_t>(indent), ' ') << '<' << tag << '>' << escape_xml(text) << "</" << tag << ">\n";
+  out << std::string(static_cast<std::size_t>(indent), ' ') << '<' << tag << '>' << escape_xml(text) << "</" << tag
+      << ">\n";
 }
 
 void field_xml(std::ostream& out, const FieldRef& f) {
@@ -164,9 +166,10 @@ std::string slicer_module_name(const std::string& stage) {
 }
 
 std::string slicer_module_script(const std::string& stage) {
-  return "#!/bin/sh\n# A module of 3D Slicer. Its folder goes into Slicer's Application Settings, Modules, Additional module paths.\n"
+  return "#!/bin/sh\n# A module of 3D Slicer. Its folder goes into Slicer's Application Settings, Modules, Additional "
+         "module paths.\n"
          "exec \"$(dirname \"$(readlink -f \"$0\")\")/../../../bin/osteo\" " +
          stage + " --progress slicer --force \"$@\"\n";
 }
 
-}  // namespace osteo::app::cli
+}  // namespace osteo::inline app::cli

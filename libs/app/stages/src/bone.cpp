@@ -5,9 +5,9 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/simulation/bone/pieces.h"
 #include "osteo/simulation/bone/saw.h"
-#include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo::inline app {
 namespace {
@@ -33,17 +33,17 @@ Vec3 centre_of_mass(const BrickGrid& bone) {
 }  // namespace
 
 StageInfo SawStage::info() {
-  return {
-      .name = "saw",
-      .version = 1,
-      .synopsis = "a cut through bone by a plane or a blade",
-      .description =
-          "Removes what a box of the blade's thickness covers, voxels in part where it covers them in part. With no length and depth the "
-          "cut goes all through. What falls apart is told by 'pieces'.",
-      .inputs = {{"bone", {DataKind::grid}, "density, as resample makes it"}},
-      .outputs = {{"cut", {DataKind::grid}, "the same with the cut"}},
-      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.5"},
-      .example = "osteo saw bone.vdb cut.vdb --normal 1,0,0 --kerf-mm 0.8"};
+  return {.name = "saw",
+          .version = 1,
+          .synopsis = "a cut through bone by a plane or a blade",
+          .description =
+              "Removes what a box of the blade's thickness covers, voxels in part where it covers them in part. With "
+              "no length and depth the "
+              "cut goes all through. What falls apart is told by 'pieces'.",
+          .inputs = {{"bone", {DataKind::grid}, "density, as resample makes it"}},
+          .outputs = {{"cut", {DataKind::grid}, "the same with the cut"}},
+          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.5"},
+          .example = "osteo saw bone.vdb cut.vdb --normal 1,0,0 --kerf-mm 0.8"};
 }
 
 std::vector<Data> SawStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
@@ -67,8 +67,10 @@ StageInfo PiecesStage::info() {
       .version = 2,
       .synopsis = "bone taken apart into what hangs together",
       .description =
-          "Finds the parts that no longer hang together, with mass (from density), centre and inertia; drops crumbs; writes the surface of "
-          "all pieces, each enclosing what its bone measures, moved apart for a look when asked, and the bone of one or all.",
+          "Finds the parts that no longer hang together, with mass (from density), centre and inertia; drops crumbs; "
+          "writes the surface of "
+          "all pieces, each enclosing what its bone measures, moved apart for a look when asked, and the bone of one "
+          "or all.",
       .inputs = {{"bone", {DataKind::grid}, "density, as resample or saw make it"}},
       .outputs = {{"pieces", {DataKind::document}, "the pieces, largest first, in JSON"},
                   {"surface", {DataKind::surface}, "closed, one body or more a piece", true},
@@ -82,10 +84,11 @@ std::vector<Data> PiecesStage::run(const Params& p, std::span<const Data> inputs
   const BrickGrid bone = to_bricks(grid);
   const Split split = split_bone(bone, p.least_mm3, p.connectivity);
   const double voxel = bone.frame().voxel_volume_mm3();
-  if (split.pieces.empty()) throw Error(ExitCode::failed, "no part is as large as --least-mm3", "is this a grid of bone density?");
+  if (split.pieces.empty())
+    throw Error(ExitCode::failed, "no part is as large as --least-mm3", "is this a grid of bone density?");
   if (p.keep > static_cast<int>(split.pieces.size()))
-    throw Error(ExitCode::usage,
-                "--keep " + std::to_string(p.keep) + ": there are only " + std::to_string(split.pieces.size()) + " pieces");
+    throw Error(ExitCode::usage, "--keep " + std::to_string(p.keep) + ": there are only " +
+                                     std::to_string(split.pieces.size()) + " pieces");
   Vec3 middle{};
   double mass = 0;
   for (const Piece& piece : split.pieces) {
@@ -114,7 +117,8 @@ std::vector<Data> PiecesStage::run(const Params& p, std::span<const Data> inputs
     const TriMesh& mesh = surface.mesh;
     const auto first = static_cast<std::uint32_t>(all.points_mm.size());
     for (const auto& q : mesh.points_mm)
-      all.points_mm.push_back({q[0] + static_cast<float>(away.x), q[1] + static_cast<float>(away.y), q[2] + static_cast<float>(away.z)});
+      all.points_mm.push_back(
+          {q[0] + static_cast<float>(away.x), q[1] + static_cast<float>(away.y), q[2] + static_cast<float>(away.z)});
     for (const auto& t : mesh.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
   }
   context.report("pieces", static_cast<std::int64_t>(split.pieces.size()));
@@ -138,4 +142,4 @@ std::vector<Data> PiecesStage::run(const Params& p, std::span<const Data> inputs
   return {Document{j.dump(1) + "\n"}, std::make_shared<const TriMesh>(std::move(all)), std::move(kept)};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

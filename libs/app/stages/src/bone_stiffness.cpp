@@ -17,7 +17,8 @@ using namespace tissue;
 namespace {
 
 // Of a quantity of the tetrahedra, by volume: at shares from 0 to 1.
-std::vector<double> quantiles(const std::vector<double>& values, const std::vector<double>& volume, const std::vector<double>& shares) {
+std::vector<double> quantiles(const std::vector<double>& values, const std::vector<double>& volume,
+                              const std::vector<double>& shares) {
   std::vector<std::size_t> order(values.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
@@ -32,8 +33,8 @@ std::vector<double> quantiles(const std::vector<double>& values, const std::vect
   return found;
 }
 
-// What hangs together by its points, as far as the load holds it: a part that can move freely has no solution. Crumbs of the meshing are
-// left out, larger ones are for a person to decide.
+// What hangs together by its points, as far as the load holds it: a part that can move freely has no solution. Crumbs
+// of the meshing are left out, larger ones are for a person to decide.
 struct Held {
   TetMesh mesh;
   std::size_t loose_parts = 0;
@@ -66,12 +67,12 @@ Held held_parts(const TetMesh& mesh, const std::vector<double>& volume, const Ti
   for (std::uint32_t p = 0; p < root.size(); ++p) {
     if (find(p) != p || size[p] == 0 || axes[p] >= 6) continue;
     if (size[p] > kCrumb * all)
-      throw Error(
-          ExitCode::usage,
-          "nothing holds a part of the bone of " + format_number(std::round(size[p])) + " mm3 at " + format_number(mesh.points_mm[p][0]) +
-              ", " + format_number(mesh.points_mm[p][1]) + ", " + format_number(mesh.points_mm[p][2]) + " mm, of " +
-              format_number(std::round(all)) + " mm3 in all",
-          "let a place of \"fixed\" reach it, or leave it out of the mesh (threshold --keep-largest); --keep-loose writes it as it is");
+      throw Error(ExitCode::usage,
+                  "nothing holds a part of the bone of " + format_number(std::round(size[p])) + " mm3 at " +
+                      format_number(mesh.points_mm[p][0]) + ", " + format_number(mesh.points_mm[p][1]) + ", " +
+                      format_number(mesh.points_mm[p][2]) + " mm, of " + format_number(std::round(all)) + " mm3 in all",
+                  "let a place of \"fixed\" reach it, or leave it out of the mesh (threshold --keep-largest); "
+                  "--keep-loose writes it as it is");
     ++held.loose_parts;
     held.loose_mm3 += size[p];
   }
@@ -108,10 +109,14 @@ StageInfo BoneStiffnessStage::info() {
       .version = 1,
       .synopsis = "bone as stiff as its CT says: a finite element problem with graded material",
       .description =
-          "Each tetrahedron gets the mean, over its volume, of Young's modulus by the density of the CT's voxels. The problem says what "
-          "is fixed and loaded, and Poisson's ratio; the young_kpa of its material is not used, while its regions (a screw, a plate) "
-          "keep their own stiffness. The file can be solved by CalculiX or Abaqus, and by 'osteo fem', given as mesh and as problem. "
-          "What nothing holds has no solution: crumbs of the mesh below 1 % of the volume are left out, which is told. The laws were "
+          "Each tetrahedron gets the mean, over its volume, of Young's modulus by the density of the CT's voxels. The "
+          "problem says what "
+          "is fixed and loaded, and Poisson's ratio; the young_kpa of its material is not used, while its regions (a "
+          "screw, a plate) "
+          "keep their own stiffness. The file can be solved by CalculiX or Abaqus, and by 'osteo fem', given as mesh "
+          "and as problem. "
+          "What nothing holds has no solution: crumbs of the mesh below 1 % of the volume are left out, which is told. "
+          "The laws were "
           "measured on long bones, none on a skull, and the CT's blur makes thin cortex too soft. Density is "
           "written too (--weight), so that a load's gravity weighs by the CT; regions weigh by their density_kg_m3.",
       .inputs = {{"mesh", {DataKind::tets}, "bone, as tetrahedralize makes it"},
@@ -120,12 +125,15 @@ StageInfo BoneStiffnessStage::info() {
       .outputs = {{"inp", {DataKind::document}, "mesh, materials and load for CalculiX or Abaqus (.inp)"},
                   {"map", {DataKind::tets}, "the mesh with young_mpa at its points, to look at", true},
                   {"report", {DataKind::document}, "moduli, mass, what was limited, in JSON", true}},
-      .references = {"E. Morgan, H. Bayraktar, T. Keaveny, Journal of Biomechanics 36, 2003", "T. Keller, Journal of Biomechanics 27, 1994",
+      .references = {"E. Morgan, H. Bayraktar, T. Keaveny, Journal of Biomechanics 36, 2003",
+                     "T. Keller, Journal of Biomechanics 27, 1994",
                      "D. Carter, W. Hayes, Journal of Bone and Joint Surgery 59-A, 1977",
                      "J. Keyak et al., Journal of Biomechanics 31, 1998",
                      "W. Schneider, T. Bortfeld, W. Schlegel, Physics in Medicine and Biology 45, 2000",
-                     "E. Schileo et al., Journal of Biomechanics 41, 2008", "F. Taddei et al., Medical Engineering and Physics 29, 2007"},
-      .example = "osteo bone-stiffness jaw.vtu ct.nrrd problem.json jaw.inp --density-per-1000-hu 0.76 --report-out jaw.json"};
+                     "E. Schileo et al., Journal of Biomechanics 41, 2008",
+                     "F. Taddei et al., Medical Engineering and Physics 29, 2007"},
+      .example =
+          "osteo bone-stiffness jaw.vtu ct.nrrd problem.json jaw.inp --density-per-1000-hu 0.76 --report-out jaw.json"};
 }
 
 std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
@@ -137,7 +145,8 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
   if (!p.keep_loose) {
     held = held_parts(*given, volumes_mm3(*given), problem.loads[n]);
     if (held.loose_parts > 0) {
-      context.warn(std::to_string(held.loose_parts) + " parts of " + format_number(std::round(100 * held.loose_mm3) / 100) +
+      context.warn(std::to_string(held.loose_parts) + " parts of " +
+                   format_number(std::round(100 * held.loose_mm3) / 100) +
                    " mm3 in all, which nothing holds, were left out; --keep-loose keeps them");
       problem = parse_tissue_problem(text, held.mesh, true, Weight::apart);
     }
@@ -147,7 +156,8 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
   if (*problem.law != ElasticLaw::linear && *problem.law != ElasticLaw::stvk)
     throw Error(ExitCode::usage, "bone is linear or stvk; the problem's law is " + std::string(name_of(*problem.law)),
                 "leave \"law\" out: linear");
-  const BoneStiffness bone = bone_stiffness(mesh, std::get<Image>(inputs[1]), p.density, p.step_percent / 100, context.sub(0, 0.7));
+  const BoneStiffness bone =
+      bone_stiffness(mesh, std::get<Image>(inputs[1]), p.density, p.step_percent / 100, context.sub(0, 0.7));
   std::vector<Material> materials(mesh.tets.size());
   std::size_t of_regions = 0, weightless = 0;
   for (std::size_t t = 0; t < materials.size(); ++t) {
@@ -160,7 +170,8 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
   const double pull = length(problem.loads[n].gravity_m_s2);
   if (weightless > 0 && pull > 0)
     throw Error(ExitCode::usage,
-                std::to_string(weightless) + " tetrahedra of the problem's regions have no \"density_kg_m3\", and the load has gravity",
+                std::to_string(weightless) +
+                    " tetrahedra of the problem's regions have no \"density_kg_m3\", and the load has gravity",
                 "give each region one; titanium has 4430");
   problem.materials = materials;
   const Elements elements = elements_for(LawChoice::automatic, p.order, problem, mesh);
@@ -215,12 +226,13 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
   const BoneDensity guess;
   if (p.density.per_1000_hu == guess.per_1000_hu && p.density.at_0_hu == guess.at_0_hu)
     context.warn("density by a guess of " + format_number(guess.per_1000_hu) +
-                 " g/cm3 at 1000 HU, which may be 15 % off (stiffness 20 to 40 %): give --density-per-1000-hu and --density-at-0-hu of the "
+                 " g/cm3 at 1000 HU, which may be 15 % off (stiffness 20 to 40 %): give --density-per-1000-hu and "
+                 "--density-at-0-hu of the "
                  "scanner's calibration phantom");
   const auto limited = [&](double share, const char* than, double limit) {
     if (share > 0.01)
-      context.warn(format_number(std::round(1000 * share) / 10) + " % of the volume came out " + than + ' ' + format_number(limit) +
-                   " MPa and was set to it");
+      context.warn(format_number(std::round(1000 * share) / 10) + " % of the volume came out " + than + ' ' +
+                   format_number(limit) + " MPa and was set to it");
   };
   limited(bone.share_below, "softer than", p.density.least_mpa);
   limited(bone.share_above, "stiffer than", p.density.most_mpa);
@@ -230,10 +242,11 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
   TetMesh map = mesh;
   map.values_name = "young_mpa";
   map.values.resize(at_point.size());
-  for (std::size_t v = 0; v < at_point.size(); ++v) map.values[v] = shared[v] > 0 ? static_cast<float>(at_point[v] / shared[v]) : 0.0F;
+  for (std::size_t v = 0; v < at_point.size(); ++v)
+    map.values[v] = shared[v] > 0 ? static_cast<float>(at_point[v] / shared[v]) : 0.0F;
   Document inp{inp_text(body, body.on_all_points(problem.loads[n]))};
   context.progress(1);
   return {std::move(inp), std::make_shared<const TetMesh>(std::move(map)), Document{written(j)}};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

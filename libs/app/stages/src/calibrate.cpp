@@ -59,30 +59,41 @@ StageInfo CalibrateStage::info() {
       .version = 2,
       .synopsis = "constants of the fast tissue model, fitted to finite elements or to what was measured",
       .description =
-          "The body of voxels (tetrahedralize --method grid) under the problem's loads is solved by finite elements; the constants of the "
-          "distance and volume model are then fitted to it, from their closed form, with exact derivatives through the equilibrium "
+          "The body of voxels (tetrahedralize --method grid) under the problem's loads is solved by finite elements; "
+          "the constants of the "
+          "distance and volume model are then fitted to it, from their closed form, with exact derivatives through the "
+          "equilibrium "
           "(Ceres). The "
-          "report holds errors before and after, on loads that were not fitted too, beside the truth's own error of discretisation (linear "
-          "against quadratic tetrahedra, and with --check-truth finer ones: a residual below that says nothing); uncertain factors; the "
+          "report holds errors before and after, on loads that were not fitted too, beside the truth's own error of "
+          "discretisation (linear "
+          "against quadratic tetrahedra, and with --check-truth finer ones: a residual below that says nothing); "
+          "uncertain factors; the "
           "course of the fit. A map of stiffness (--grid-x, -y, -z) finds what the "
           "regions of "
-          "a body are made of, also without being told of them (--blind). With --measured the truth is what was measured: clouds of points "
-          "on the deformed surface (.ply .stl .obj .vtp .csv .xyz), with noise, stray points and only a part of it seen, or markers whose "
-          "places at rest are known (.csv with x0_mm, y0_mm, z0_mm). The report then has distances before and after, the noise that was "
+          "a body are made of, also without being told of them (--blind). With --measured the truth is what was "
+          "measured: clouds of points "
+          "on the deformed surface (.ply .stl .obj .vtp .csv .xyz), with noise, stray points and only a part of it "
+          "seen, or markers whose "
+          "places at rest are known (.csv with x0_mm, y0_mm, z0_mm). The report then has distances before and after, "
+          "the noise that was "
           "found, points that were rejected, how much of the surface was seen, and 95 % intervals.",
-      .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
-                 {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON or .inp"},
-                 {"measured",
-                  {DataKind::source},
-                  "instead of finite elements: points of the deformed body, a file or a folder of them, called like their loads",
-                  true},
-                 {"surface", {DataKind::surface}, "measured: the body's surface at rest, which the mesh stands for", true}},
-      .outputs = {{"constants", {DataKind::document}, "factors and report, in JSON"},
-                  {"deformed", {DataKind::tets}, "the calibrated model under the first fitted load", true},
-                  {"map", {DataKind::tets}, "the mesh with the learnt stiffness at its points (snapshot draws it)", true},
-                  {"course", {DataKind::document}, "the course of the fit as a plot (.svg)", true}},
-      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, sections 5.3 and 5.4",
-                     "M. Teschner et al., A Versatile and Robust Model for Geometrically Complex Deformable Solids, CGI 2004"},
+      .inputs =
+          {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
+           {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON or .inp"},
+           {"measured",
+            {DataKind::source},
+            "instead of finite elements: points of the deformed body, a file or a folder of them, called like their "
+            "loads",
+            true},
+           {"surface", {DataKind::surface}, "measured: the body's surface at rest, which the mesh stands for", true}},
+      .outputs =
+          {{"constants", {DataKind::document}, "factors and report, in JSON"},
+           {"deformed", {DataKind::tets}, "the calibrated model under the first fitted load", true},
+           {"map", {DataKind::tets}, "the mesh with the learnt stiffness at its points (snapshot draws it)", true},
+           {"course", {DataKind::document}, "the course of the fit as a plot (.svg)", true}},
+      .references =
+          {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, sections 5.3 and 5.4",
+           "M. Teschner et al., A Versatile and Robust Model for Geometrically Complex Deformable Solids, CGI 2004"},
       .example = "osteo calibrate tissue.vtu problem.json constants.json --fit pull"};
 }
 
@@ -97,8 +108,8 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
   std::vector<std::size_t> fitted = loads_named(problem, p.fit);
   if (const auto* const measured = std::get_if<Source>(&inputs[2]); measured != nullptr) {
     const auto* const surface = std::get_if<Surface>(&inputs[3]);
-    return calibrate_to_measured(p, mesh, problem, std::move(model), measured->path, surface != nullptr ? surface->get() : nullptr,
-                                 std::move(fitted), context);
+    return calibrate_to_measured(p, mesh, problem, std::move(model), measured->path,
+                                 surface != nullptr ? surface->get() : nullptr, std::move(fitted), context);
   }
   if (std::get_if<Surface>(&inputs[3]) != nullptr || p.find_pose || p.most_points != CalibrateParams{}.most_points)
     throw Error(ExitCode::usage, "--surface, --find-pose and --most-points have no effect without --measured",
@@ -106,12 +117,14 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
   if (fitted.empty()) fitted.push_back(0);
   for (std::size_t n = 0; n < problem.loads.size(); ++n) {
     if (!problem.loads[n].moved.empty() || !problem.loads[n].contacts.empty())
-      throw Error(ExitCode::usage, "the load '" + problem.load_names[n] + "' moves points or has contacts; calibrate fits to forces",
+      throw Error(ExitCode::usage,
+                  "the load '" + problem.load_names[n] + "' moves points or has contacts; calibrate fits to forces",
                   "leave it out of the problem that calibrate gets");
   }
   const Elements elements = elements_for(p.law, p.order, problem, mesh);
   const auto body = [&](TetOrder order) { return FemBody(points, tets, problem.materials, elements.law, order); };
-  const FemBody true_body = body(elements.order), other_body = body(elements.order == TetOrder::t10 ? TetOrder::t4 : TetOrder::t10);
+  const FemBody true_body = body(elements.order),
+                other_body = body(elements.order == TetOrder::t10 ? TetOrder::t4 : TetOrder::t10);
   Truth true_statics(true_body, true_body.on_all_points(problem.loads.front())),
       other_statics(other_body, other_body.on_all_points(problem.loads.front()));
   // The truth, and how far it may be off itself: the other order on the same mesh.
@@ -127,12 +140,15 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
   }
   std::vector<double> doubt_finer;
   if (p.check_truth) {
-    // Eight times as many elements: that much more to add up, and sparse Cholesky of a solid takes the square of its unknowns.
-    const double share = std::min(1.0, static_cast<double>(true_body.point_count()) / 2e4), estimate_s = true_s * (8 + 56 * share);
+    // Eight times as many elements: that much more to add up, and sparse Cholesky of a solid takes the square of its
+    // unknowns.
+    const double share = std::min(1.0, static_cast<double>(true_body.point_count()) / 2e4),
+                 estimate_s = true_s * (8 + 56 * share);
     context.report("finer_truth_estimate_s", estimate_s);
-    context.warn("--check-truth solves " + std::to_string(8 * tets.size()) + " elements under " + std::to_string(problem.loads.size()) +
-                 (problem.loads.size() == 1 ? " load" : " loads") + ": about " + format_number(std::max(1.0, std::round(estimate_s))) +
-                 " s (the truth itself took " + format_number(std::round(10 * true_s) / 10) + ")");
+    context.warn("--check-truth solves " + std::to_string(8 * tets.size()) + " elements under " +
+                 std::to_string(problem.loads.size()) + (problem.loads.size() == 1 ? " load" : " loads") + ": about " +
+                 format_number(std::max(1.0, std::round(estimate_s))) + " s (the truth itself took " +
+                 format_number(std::round(10 * true_s) / 10) + ")");
     // Held and loaded as quadratic elements are: in the middle of an edge, too.
     const FemBody quadratic = body(TetOrder::t10);
     std::vector<Material> materials = problem.materials;
@@ -145,12 +161,14 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
     for (std::size_t n = 0; n < problem.loads.size(); ++n) {
       context.progress(0.5, "finite elements half as large");
       const auto x = finer.solve(quadratic.on_all_points(problem.loads[n]), context);
-      doubt_finer.push_back(calibration_error(points, {truth[n].data(), points.size()}, {x.data(), points.size()}).nrms);
+      doubt_finer.push_back(
+          calibration_error(points, {truth[n].data(), points.size()}, {x.data(), points.size()}).nrms);
     }
   }
   std::vector<CalibrationCase> cases;
   for (const std::size_t n : fitted)
-    cases.push_back({problem.loads[n], {truth[n].begin(), truth[n].begin() + static_cast<std::ptrdiff_t>(points.size())}});
+    cases.push_back(
+        {problem.loads[n], {truth[n].begin(), truth[n].begin() + static_cast<std::ptrdiff_t>(points.size())}});
   CalibrateOptions options;
   options.grid = {p.grid_x, p.grid_y, p.grid_z};
   options.shared_grid = p.shared_grid;
@@ -209,17 +227,19 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
   if (fitted.size() < problem.loads.size()) {
     context.report("worst_nrms_not_fitted", unseen);
   } else {
-    context.warn("all loads were fitted, so nothing says how the constants do on another: give the problem loads that are not fitted");
+    context.warn(
+        "all loads were fitted, so nothing says how the constants do on another: give the problem loads that are not "
+        "fitted");
   }
   context.report("truth_off_other_order", doubt[fitted.front()]);
   if (p.check_truth) context.report("truth_off_finer", doubt_finer[fitted.front()]);
   context.report("equilibrium_solves", static_cast<std::int64_t>(c.solves));
   context.progress(1);
-  const std::string title = std::to_string(c.parameters) + " factors in " + std::to_string(c.solves) + " equilibrium solves, " +
-                            format_number(std::round(100 * c.seconds) / 100) + " s: NRMS " +
+  const std::string title = std::to_string(c.parameters) + " factors in " + std::to_string(c.solves) +
+                            " equilibrium solves, " + format_number(std::round(100 * c.seconds) / 100) + " s: NRMS " +
                             format_number(std::round(1e4 * c.before.front().nrms) / 1e4) + " to " +
                             format_number(std::round(1e4 * c.after.front().nrms) / 1e4);
   return {Document{written(j)}, deformed, stiffness_map(mesh, model, kpa), Document{course_svg(c, title)}};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

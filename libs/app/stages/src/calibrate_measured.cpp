@@ -48,7 +48,8 @@ void refuse_what_has_no_effect(const CalibrateParams& p) {
     throw Error(ExitCode::usage, "--law, --order and --check-truth have no effect with --measured",
                 "no finite elements are solved: what was measured is the truth");
   if (p.starts != 1 || p.samples != 0)
-    throw Error(ExitCode::usage, "--starts and --samples have no effect with --measured", "it begins at the one factor that explains most");
+    throw Error(ExitCode::usage, "--starts and --samples have no effect with --measured",
+                "it begins at the one factor that explains most");
 }
 
 // What a user should not have to find out from the figures.
@@ -58,7 +59,8 @@ void warn_of(const MeasuredCalibration& c, std::size_t weak, std::size_t points,
   for (const MeasuredView& v : c.views) distances += v.drawn * (v.markers ? 3 : 1);
   if (distances < 3 * static_cast<std::size_t>(c.fit.parameters))
     context.warn(std::to_string(distances) + " distances are few for " + std::to_string(c.fit.parameters) +
-                 " parameters: the fit follows the noise, which it then tells too small, and its intervals too narrow; take a coarser map");
+                 " parameters: the fit follows the noise, which it then tells too small, and its intervals too narrow; "
+                 "take a coarser map");
   for (const MeasuredView& v : c.views) {
     const double rejected = static_cast<double>(v.rejected) / static_cast<double>(v.drawn);
     if (rejected > 0.2)
@@ -68,14 +70,16 @@ void warn_of(const MeasuredCalibration& c, std::size_t weak, std::size_t points,
       context.warn(v.name + " shows " + percent(v.seen_share) +
                    " of the surface that moves; inside the rest the stiffness is hardly known");
     if (v.noise_mm > 0.3 * v.after.moved_rms_mm)
-      context.warn(v.name + ": what is left (" + format_number(rounded(v.noise_mm)) + " mm) is not small against the movement (" +
-                   format_number(rounded(v.after.moved_rms_mm)) + " mm): push harder, or measure better");
+      context.warn(v.name + ": what is left (" + format_number(rounded(v.noise_mm)) +
+                   " mm) is not small against the movement (" + format_number(rounded(v.after.moved_rms_mm)) +
+                   " mm): push harder, or measure better");
     if (v.correlation > 0.5 && v.noise_mm > 0.03 * v.after.moved_rms_mm)
-      context.warn(
-          v.name + ": what the fit leaves (" + format_number(rounded(v.noise_mm)) +
-          " mm) is no noise, it goes together at neighbouring points (correlation " + format_number(rounded(v.correlation)) +
-          "): the body's shape at rest may not be the mesh's (--surface), its place another (--find-pose), or the map too coarse. The "
-          "intervals were widened for it");
+      context.warn(v.name + ": what the fit leaves (" + format_number(rounded(v.noise_mm)) +
+                   " mm) is no noise, it goes together at neighbouring points (correlation " +
+                   format_number(rounded(v.correlation)) +
+                   "): the body's shape at rest may not be the mesh's (--surface), its place another (--find-pose), or "
+                   "the map too coarse. The "
+                   "intervals were widened for it");
   }
   if (2 * weak > points && points > 1)
     context.warn(std::to_string(weak) + " of the map's " + std::to_string(points) +
@@ -84,12 +88,15 @@ void warn_of(const MeasuredCalibration& c, std::size_t weak, std::size_t points,
 
 }  // namespace
 
-std::vector<Data> calibrate_to_measured(const CalibrateParams& p, const TetMesh& mesh, const TissueProblem& problem, TissueModel model,
-                                        const std::filesystem::path& measured, const TriMesh* surface, std::vector<std::size_t> fitted,
+std::vector<Data> calibrate_to_measured(const CalibrateParams& p, const TetMesh& mesh, const TissueProblem& problem,
+                                        TissueModel model, const std::filesystem::path& measured,
+                                        const TriMesh* surface, std::vector<std::size_t> fitted,
                                         const Context& context) {
   refuse_what_has_no_effect(p);
   const std::vector<MeasuredOfLoad> files = read_measured(measured, problem.load_names);
-  const auto has = [&](std::size_t load) { return std::any_of(files.begin(), files.end(), [&](const auto& f) { return f.load == load; }); };
+  const auto has = [&](std::size_t load) {
+    return std::any_of(files.begin(), files.end(), [&](const auto& f) { return f.load == load; });
+  };
   if (fitted.empty()) {
     for (std::size_t n = 0; n < problem.loads.size(); ++n) {
       if (has(n)) fitted.push_back(n);
@@ -108,8 +115,10 @@ std::vector<Data> calibrate_to_measured(const CalibrateParams& p, const TetMesh&
   for (const MeasuredOfLoad& f : files) {
     const TissueLoad& load = problem.loads[f.load];
     if (!load.moved.empty() || !load.contacts.empty())
-      throw Error(ExitCode::usage, "the load '" + problem.load_names[f.load] + "' moves points or has contacts; calibrate fits to forces",
-                  "a body of any stiffness follows where it is moved to: only a known force tells how stiff it is");
+      throw Error(
+          ExitCode::usage,
+          "the load '" + problem.load_names[f.load] + "' moves points or has contacts; calibrate fits to forces",
+          "a body of any stiffness follows where it is moved to: only a known force tells how stiff it is");
   }
   const BodySurface skin = surface != nullptr ? following(*surface, mesh, context) : boundary_surface(model);
   const MaterialEdges edges = material_edges(problem, model);
@@ -203,8 +212,12 @@ std::vector<Data> calibrate_to_measured(const CalibrateParams& p, const TetMesh&
     for (const MeasuredOfLoad& f : files) {
       if (f.load != n) continue;
       const MeasuredError e = measured_error(model, skin, f.points, after.points_mm, p.find_pose);
-      Json view{{"file", f.points.name}, {"load", problem.load_names[n]}, {"fitted", false}, {"points", f.points.points_mm.size()}};
-      if (before.converged) view["closed_form"] = error(measured_error(model, skin, f.points, before.points_mm, p.find_pose));
+      Json view{{"file", f.points.name},
+                {"load", problem.load_names[n]},
+                {"fitted", false},
+                {"points", f.points.points_mm.size()}};
+      if (before.converged)
+        view["closed_form"] = error(measured_error(model, skin, f.points, before.points_mm, p.find_pose));
       view["calibrated"] = error(e);
       j["measured"].push_back(view);
       carried = true;
@@ -232,7 +245,9 @@ std::vector<Data> calibrate_to_measured(const CalibrateParams& p, const TetMesh&
   if (carried) {
     context.report("worst_rms_mm_not_fitted", worst);
   } else {
-    context.warn("all that was measured was fitted, so nothing says how the constants do on another load: keep one out of --fit");
+    context.warn(
+        "all that was measured was fitted, so nothing says how the constants do on another load: keep one out of "
+        "--fit");
   }
   context.report("points_of_map_not_settled", static_cast<std::int64_t>(weak));
   context.report("equilibrium_solves", static_cast<std::int64_t>(c.fit.solves));
@@ -240,12 +255,12 @@ std::vector<Data> calibrate_to_measured(const CalibrateParams& p, const TetMesh&
   warn_of(c, weak, points, context);
   context.progress(1);
   const TissueModel uniform = TissueModel::of_voxels(points_of(mesh), tets_of(mesh), std::span(&problem.general, 1));
-  const std::string title = std::to_string(c.fit.parameters) + " factors in " + std::to_string(c.fit.solves) + " equilibrium solves, " +
-                            format_number(std::round(100 * c.fit.seconds) / 100) +
+  const std::string title = std::to_string(c.fit.parameters) + " factors in " + std::to_string(c.fit.solves) +
+                            " equilibrium solves, " + format_number(std::round(100 * c.fit.seconds) / 100) +
                             " s: " + format_number(rounded(c.views.front().before.rms_mm)) + " mm to " +
                             format_number(rounded(c.views.front().after.rms_mm)) + " mm";
   return {Document{written(j)}, deformed, stiffness_map(mesh, model, stiffness_kpa(model, uniform, problem.general)),
           Document{course_svg(c.fit, title)}};
 }
 
-}  // namespace osteo::app::tissue
+}  // namespace osteo::inline app::tissue

@@ -35,7 +35,8 @@ Tets stiffness_map(const TetMesh& mesh, const TissueModel& model, std::span<cons
       count[p] += 1;
     }
   }
-  for (std::size_t p = 0; p < sum.size(); ++p) map.values.push_back(static_cast<float>(count[p] > 0 ? std::exp(sum[p] / count[p]) : 0));
+  for (std::size_t p = 0; p < sum.size(); ++p)
+    map.values.push_back(static_cast<float>(count[p] > 0 ? std::exp(sum[p] / count[p]) : 0));
   return std::make_shared<const TetMesh>(std::move(map));
 }
 
@@ -46,7 +47,8 @@ MaterialEdges material_edges(const TissueProblem& problem, const TissueModel& mo
   if (problem.materials.size() == 1) return edges;
   std::vector<std::size_t> of_point(model.point_count(), kUnseen);
   const auto same = [&](std::size_t a, std::size_t b) {
-    return problem.materials[a].young_mpa == problem.materials[b].young_mpa && problem.materials[a].poisson == problem.materials[b].poisson;
+    return problem.materials[a].young_mpa == problem.materials[b].young_mpa &&
+           problem.materials[a].poisson == problem.materials[b].poisson;
   };
   for (std::size_t t = 0; t < problem.materials.size(); ++t) {
     for (const std::uint32_t p : model.tets()[t]) {
@@ -78,7 +80,9 @@ Json learnt(const MaterialEdges& edges, std::span<const double> kpa) {
       sum += std::log(kpa[c]);
       ++count;
     }
-    all.push_back({{"young_kpa", edges.young_kpa[m]}, {"learnt_kpa", std::exp(sum / static_cast<double>(count))}, {"edges", count}});
+    all.push_back({{"young_kpa", edges.young_kpa[m]},
+                   {"learnt_kpa", std::exp(sum / static_cast<double>(count))},
+                   {"edges", count}});
   }
   return all;
 }
@@ -93,4 +97,4 @@ std::vector<std::size_t> loads_named(const TissueProblem& problem, const std::st
   return loads;
 }
 
-}  // namespace osteo::app::tissue
+}  // namespace osteo::inline app::tissue

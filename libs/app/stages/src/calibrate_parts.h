@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "osteo/core/base/json_document.h"
 #include "osteo/app/stages/tissue.h"
+#include "osteo/core/base/json_document.h"
 #include "osteo/simulation/tissue/problem.h"
 
 namespace osteo::inline app::tissue {
@@ -28,9 +28,11 @@ Json learnt(const MaterialEdges& edges, std::span<const double> kpa);
 /// 'A,B' as numbers; empty: none.
 std::vector<std::size_t> loads_named(const TissueProblem& problem, const std::string& names);
 
-/// The outputs of calibrate. `surface`: of the body at rest, or null: the mesh's own. `fitted` empty: all that was measured.
-std::vector<Data> calibrate_to_measured(const CalibrateParams& p, const TetMesh& mesh, const TissueProblem& problem, TissueModel model,
-                                        const std::filesystem::path& measured, const TriMesh* surface, std::vector<std::size_t> fitted,
+/// The outputs of calibrate. `surface`: of the body at rest, or null: the mesh's own. `fitted` empty: all that was
+/// measured.
+std::vector<Data> calibrate_to_measured(const CalibrateParams& p, const TetMesh& mesh, const TissueProblem& problem,
+                                        TissueModel model, const std::filesystem::path& measured,
+                                        const TriMesh* surface, std::vector<std::size_t> fitted,
                                         const Context& context);
 
-}  // namespace osteo::app::tissue
+}  // namespace osteo::inline app::tissue

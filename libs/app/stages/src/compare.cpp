@@ -17,17 +17,20 @@ TriangleSoup soup_from(const Data& data, double iso, const Context& context) {
 }  // namespace
 
 StageInfo CompareStage::info() {
-  return {.name = "compare",
-          .version = 1,
-          .synopsis = "how far apart two surfaces, grids or tetrahedral meshes are",
-          .description =
-              "Distances from each surface to the other: mean, RMS and 95th percentile over area, and the maximum (Hausdorff) "
-              "with a bound that it cannot exceed. Enclosed volumes. A grid stands for its isosurface, tetrahedra for their boundary.",
-          .inputs = {{"a", {DataKind::surface, DataKind::tets, DataKind::grid}, "one surface"},
-                     {"b", {DataKind::surface, DataKind::tets, DataKind::grid}, "the other"}},
-          .outputs = {{"findings", {DataKind::document}, "the figures in JSON"}},
-          .references = {"P. Cignoni et al., Metro: measuring error on simplified surfaces, Computer Graphics Forum 1998"},
-          .example = "osteo compare bone.ply repaired.ply difference.json"};
+  return {
+      .name = "compare",
+      .version = 1,
+      .synopsis = "how far apart two surfaces, grids or tetrahedral meshes are",
+      .description =
+          "Distances from each surface to the other: mean, RMS and 95th percentile over area, and the maximum "
+          "(Hausdorff) "
+          "with a bound that it cannot exceed. Enclosed volumes. A grid stands for its isosurface, tetrahedra for "
+          "their boundary.",
+      .inputs = {{"a", {DataKind::surface, DataKind::tets, DataKind::grid}, "one surface"},
+                 {"b", {DataKind::surface, DataKind::tets, DataKind::grid}, "the other"}},
+      .outputs = {{"findings", {DataKind::document}, "the figures in JSON"}},
+      .references = {"P. Cignoni et al., Metro: measuring error on simplified surfaces, Computer Graphics Forum 1998"},
+      .example = "osteo compare bone.ply repaired.ply difference.json"};
 }
 
 std::vector<Data> CompareStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
@@ -55,4 +58,4 @@ std::vector<Data> CompareStage::run(const Params& params, std::span<const Data> 
   return {Document{j.dump(2) + "\n"}};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -16,21 +16,26 @@ constexpr const char* kNames[kTissueClasses] = {"axis edges", "diagonal edges", 
 
 class Drawing {
  public:
-  void text(double x, double y, const std::string& s, const char* anchor = "middle", const char* colour = "#222", int size = 13) {
-    add("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" fill=\"%s\" font-size=\"%d\">%s</text>\n", x, y, anchor, colour, size, s.c_str());
+  void text(double x, double y, const std::string& s, const char* anchor = "middle", const char* colour = "#222",
+            int size = 13) {
+    add("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" fill=\"%s\" font-size=\"%d\">%s</text>\n", x, y, anchor, colour,
+        size, s.c_str());
   }
   void line(double x0, double y0, double x1, double y1, const char* colour, double width = 1) {
-    add("<line x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\" stroke=\"%s\" stroke-width=\"%.1f\"/>\n", x0, y0, x1, y1, colour, width);
+    add("<line x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\" stroke=\"%s\" stroke-width=\"%.1f\"/>\n", x0, y0, x1, y1,
+        colour, width);
   }
   void curve(const std::vector<std::pair<double, double>>& points, const char* colour, double width) {
-    svg_ += "<polyline fill=\"none\" stroke=\"" + std::string(colour) + "\" stroke-width=\"" + format_number(width) + "\" points=\"";
+    svg_ += "<polyline fill=\"none\" stroke=\"" + std::string(colour) + "\" stroke-width=\"" + format_number(width) +
+            "\" points=\"";
     for (const auto& [x, y] : points) add("%.1f,%.1f ", x, y);
     svg_ += "\"/>\n";
   }
   [[nodiscard]] std::string done() const {
     char head[200];
     std::snprintf(head, sizeof head,
-                  "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" font-family=\"sans-serif\">\n<rect width=\"100%%\" "
+                  "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" "
+                  "font-family=\"sans-serif\">\n<rect width=\"100%%\" "
                   "height=\"100%%\" fill=\"#fff\"/>\n",
                   kWidth, kHeight);
     return head + svg_ + "</svg>\n";
@@ -50,7 +55,9 @@ class Drawing {
 struct Panel {
   double left, steps, lo, hi;
   [[nodiscard]] double x(double step) const { return left + kPanel * (steps > 0 ? step / steps : 0.5); }
-  [[nodiscard]] double y(double value) const { return kHeight - kBottom - (kHeight - kTop - kBottom) * (value - lo) / (hi - lo); }
+  [[nodiscard]] double y(double value) const {
+    return kHeight - kBottom - (kHeight - kTop - kBottom) * (value - lo) / (hi - lo);
+  }
 };
 
 void frame(Drawing& d, const Panel& p, const std::string& what, double tick, bool powers) {
@@ -76,7 +83,9 @@ std::string course_svg(const Calibration& c, const std::string& title) {
   d.text(kLeft, 20, title, "start", "#000", 15);
   if (c.cost.empty() || c.course.size() != c.cost.size()) return d.done();
   const double steps = static_cast<double>(c.cost.size() - 1);
-  const auto error = [](double cost) { return 0.5 * std::log10(std::max(2 * cost, 1e-12)); };  // of a share of the truth's RMS
+  const auto error = [](double cost) {
+    return 0.5 * std::log10(std::max(2 * cost, 1e-12));
+  };  // of a share of the truth's RMS
   Panel left{kLeft, steps, 1e9, -1e9};
   for (const double cost : c.cost) {
     left.lo = std::min(left.lo, error(cost));
@@ -86,7 +95,8 @@ std::string course_svg(const Calibration& c, const std::string& title) {
   left.hi = std::ceil(10 * left.hi) / 10 + 0.05;
   frame(d, left, "distance to the truth (with the pull), of its RMS", left.hi - left.lo > 1.5 ? 0.5 : 0.1, true);
   std::vector<std::pair<double, double>> points;
-  for (std::size_t s = 0; s < c.cost.size(); ++s) points.push_back({left.x(static_cast<double>(s)), left.y(error(c.cost[s]))});
+  for (std::size_t s = 0; s < c.cost.size(); ++s)
+    points.push_back({left.x(static_cast<double>(s)), left.y(error(c.cost[s]))});
   d.curve(points, "#222", 2);
 
   Panel right{kLeft + kPanel + kGap, steps, -0.5, 0.5};
@@ -96,12 +106,18 @@ std::string course_svg(const Calibration& c, const std::string& title) {
       right.hi = std::max(right.hi, v + 0.2);
     }
   }
-  frame(d, right, "factors on the closed form", std::log(10.0) * (right.hi - right.lo > 12 ? 2 : right.hi - right.lo > 5 ? 1 : 0.5), false);
-  const std::size_t parameters = c.course.front().size(), classes = std::min(parameters, kTissueClasses), map = parameters - classes;
+  frame(d, right, "factors on the closed form",
+        std::log(10.0) * (right.hi - right.lo > 12  ? 2
+                          : right.hi - right.lo > 5 ? 1
+                                                    : 0.5),
+        false);
+  const std::size_t parameters = c.course.front().size(), classes = std::min(parameters, kTissueClasses),
+                    map = parameters - classes;
   const bool own_maps = map > 0 && c.log_stiffness.size() <= 1;
   for (std::size_t j = 0; j < parameters; ++j) {
     points.clear();
-    for (std::size_t s = 0; s < c.course.size(); ++s) points.push_back({right.x(static_cast<double>(s)), right.y(c.course[s][j])});
+    for (std::size_t s = 0; s < c.course.size(); ++s)
+      points.push_back({right.x(static_cast<double>(s)), right.y(c.course[s][j])});
     const bool of_class = j >= map && !own_maps;
     d.curve(points, of_class ? kColours[j - map] : "#b8b8b8", of_class ? 2.2 : 0.7);
   }
@@ -117,7 +133,8 @@ std::string course_svg(const Calibration& c, const std::string& title) {
     if (log > 2) {
       std::snprintf(line, sizeof line, "%s %.2g, not determined", kNames[k], std::exp(c.course.back()[map + k]));
     } else {
-      std::snprintf(line, sizeof line, "%s %.2g, within %.0f %%", kNames[k], std::exp(c.course.back()[map + k]), 100 * (std::exp(log) - 1));
+      std::snprintf(line, sizeof line, "%s %.2g, within %.0f %%", kNames[k], std::exp(c.course.back()[map + k]),
+                    100 * (std::exp(log) - 1));
     }
     d.text(kWidth - kRight + 14, label, line, "start", kColours[k], 12);
     label += 20;
@@ -125,4 +142,4 @@ std::string course_svg(const Calibration& c, const std::string& title) {
   return d.done();
 }
 
-}  // namespace osteo::app::tissue
+}  // namespace osteo::inline app::tissue

@@ -11,7 +11,8 @@ StageInfo CurveStage::info() {
           .version = 1,
           .synopsis = "where a curve holds a moving hand, and with what force",
           .description =
-              "Runs the curve constraint over a path, point after point, as the haptic thread would: the place on the curve that minimises "
+              "Runs the curve constraint over a path, point after point, as the haptic thread would: the place on the "
+              "curve that minimises "
               "distance "
               "plus a penalty on the way from the last place, found exactly, and the spring's force.",
           .inputs = {{"curve", {DataKind::source}, "text file of the curve's points in order"},
@@ -22,8 +23,10 @@ StageInfo CurveStage::info() {
 }
 
 std::vector<Data> CurveStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
-  if (p.release_mm < p.engage_mm) throw Error(ExitCode::usage, "--release-mm is smaller than --engage-mm: the constraint would flutter");
-  const std::vector<Vec3> points = load_points(std::get<Source>(inputs[0]).path), path = load_points(std::get<Source>(inputs[1]).path);
+  if (p.release_mm < p.engage_mm)
+    throw Error(ExitCode::usage, "--release-mm is smaller than --engage-mm: the constraint would flutter");
+  const std::vector<Vec3> points = load_points(std::get<Source>(inputs[0]).path),
+                          path = load_points(std::get<Source>(inputs[1]).path);
   const Curve curve(points);
   CurveConstraint constraint(curve, p);
   Json places = Json::list();
@@ -54,4 +57,4 @@ std::vector<Data> CurveStage::run(const Params& p, std::span<const Data> inputs,
   return {Document{j.dump(1) + "\n"}};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -17,7 +17,8 @@
 namespace osteo::inline app {
 
 Frame GridParams::frame(const TriangleSoup& surface) const {
-  return spacing_mm > 0 ? frame_around_mm(surface, spacing_mm, margin_voxels) : frame_around(surface, resolution, margin_voxels);
+  return spacing_mm > 0 ? frame_around_mm(surface, spacing_mm, margin_voxels)
+                        : frame_around(surface, resolution, margin_voxels);
 }
 
 namespace {
@@ -40,8 +41,8 @@ void report_inside(const InsideReport& r, const Context& context) {
 }
 
 // Distances that another method found, in the form of the exact map.
-DistanceMap as_map(const Frame& frame, const VoxelBits& wanted, const VoxelBits& inside, const std::vector<double>& unsigned_mm,
-                   const DistanceMapOptions& o) {
+DistanceMap as_map(const Frame& frame, const VoxelBits& wanted, const VoxelBits& inside,
+                   const std::vector<double>& unsigned_mm, const DistanceMapOptions& o) {
   DistanceMap map;
   map.frame = frame;
   std::size_t at = 0;
@@ -56,11 +57,12 @@ DistanceMap as_map(const Frame& frame, const VoxelBits& wanted, const VoxelBits&
     }
   }
   const auto number = [&](int i, int j, int k) {
-    std::size_t n = row_first[static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j)];
+    std::size_t n =
+        row_first[static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j)];
     for (int w = 0; w < i / 64; ++w)
       n += static_cast<std::size_t>(__builtin_popcountll(wanted.words[wanted.row(j, k) + static_cast<std::size_t>(w)]));
-    return n + static_cast<std::size_t>(
-                   __builtin_popcountll(wanted.words[wanted.row(j, k) + static_cast<std::size_t>(i / 64)] & ((1ULL << (i % 64)) - 1)));
+    return n + static_cast<std::size_t>(__builtin_popcountll(
+                   wanted.words[wanted.row(j, k) + static_cast<std::size_t>(i / 64)] & ((1ULL << (i % 64)) - 1)));
   };
   for (int bk = 0; bk < blocks(2); ++bk) {
     for (int bj = 0; bj < blocks(1); ++bj) {
@@ -106,7 +108,8 @@ std::vector<std::uint8_t> values_of(const Labels& labels, const std::string& wan
   std::string known;
   for (const Structure& s : labels.structures) {
     known += (known.empty() ? "" : ", ") + s.name + " (" + std::to_string(s.value) + ")";
-    if (wanted.empty() || lower_case(s.name) == lower_case(wanted) || std::to_string(s.value) == wanted) values.push_back(s.value);
+    if (wanted.empty() || lower_case(s.name) == lower_case(wanted) || std::to_string(s.value) == wanted)
+      values.push_back(s.value);
   }
   if (wanted.empty()) {
     values.clear();
@@ -131,21 +134,28 @@ StageInfo DistanceStage::info() {
       .version = 1,
       .synopsis = "signed distance from voxels to a surface or to a structure",
       .description =
-          "Of a surface: the exact distance to its triangles, negative inside, in double precision, with the nearest triangle as a second "
-          "grid when wanted. Inside is where the winding number says so: a whole number for closed surfaces, the generalized one for "
+          "Of a surface: the exact distance to its triangles, negative inside, in double precision, with the nearest "
+          "triangle as a second "
+          "grid when wanted. Inside is where the winding number says so: a whole number for closed surfaces, the "
+          "generalized one for "
           "open ones; the report says which. Of labels: the exact Euclidean distance between voxel centres.",
       .inputs = {{"subject", {DataKind::surface, DataKind::labels}, "surface, mask or label map"},
-                 {"like", {DataKind::image, DataKind::labels, DataKind::grid}, "put the voxels where this volume's are", true}},
-      .outputs = {{"distance",
-                   {DataKind::grid},
-                   "distance in mm, negative inside; far voxels are not stored (.nrrd and .vti: have the background's value)"},
-                  {"nearest",
-                   {DataKind::grid},
-                   "index of the nearest triangle, or with --name-nearest value of the nearest structure, in the same voxels",
-                   true}},
-      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.3",
-                     "A. Jacobson et al., Robust Inside-Outside Segmentation using Generalized Winding Numbers, SIGGRAPH 2013",
-                     "P. Felzenszwalb and D. Huttenlocher, Distance Transforms of Sampled Functions, Theory of Computing 2012"},
+                 {"like",
+                  {DataKind::image, DataKind::labels, DataKind::grid},
+                  "put the voxels where this volume's are",
+                  true}},
+      .outputs =
+          {{"distance",
+            {DataKind::grid},
+            "distance in mm, negative inside; far voxels are not stored (.nrrd and .vti: have the background's value)"},
+           {"nearest",
+            {DataKind::grid},
+            "index of the nearest triangle, or with --name-nearest value of the nearest structure, in the same voxels",
+            true}},
+      .references =
+          {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.3",
+           "A. Jacobson et al., Robust Inside-Outside Segmentation using Generalized Winding Numbers, SIGGRAPH 2013",
+           "P. Felzenszwalb and D. Huttenlocher, Distance Transforms of Sampled Functions, Theory of Computing 2012"},
       .example = "osteo distance bone.ply distance.vdb --spacing-mm 0.5 --region band"};
 }
 
@@ -181,7 +191,8 @@ std::vector<Data> DistanceStage::run(const Params& p, std::span<const Data> inpu
         for (int j = 0; j < frame.dims[1]; ++j) {
           for (int i = 0; i < frame.dims[0]; ++i) {
             if (wanted.at(i, j, k)) {
-              d.push_back(all[(static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j)) *
+              d.push_back(all[(static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) +
+                               static_cast<std::size_t>(j)) *
                                   static_cast<std::size_t>(frame.dims[0]) +
                               static_cast<std::size_t>(i)]);
             }
@@ -202,7 +213,8 @@ std::vector<Data> DistanceStage::run(const Params& p, std::span<const Data> inpu
     map = as_map(frame, wanted, inside, d, options);
   }
   if (map.bricks.empty())
-    throw Error(ExitCode::failed, "no voxel lies in the region that gets distances", "choose smaller voxels or a wider band");
+    throw Error(ExitCode::failed, "no voxel lies in the region that gets distances",
+                "choose smaller voxels or a wider band");
   double lo = 0, hi = 0;
   for (const double d : map.distance_mm) {
     if (d < lo) lo = d;
@@ -214,7 +226,8 @@ std::vector<Data> DistanceStage::run(const Params& p, std::span<const Data> inpu
   Data nearest;
   if (p.method == DistanceMethod::exact) {
     if (surface.triangles.size() >= (1U << 24)) {
-      context.warn("more than 2^24 triangles: the grid of nearest triangles cannot tell neighbours apart and is left out");
+      context.warn(
+          "more than 2^24 triangles: the grid of nearest triangles cannot tell neighbours apart and is left out");
     } else {
       std::vector<float> ids(map.triangle.begin(), map.triangle.end());
       nearest = to_sparse(map.frame, "nearest_triangle", map.bricks, map.stored, ids, -1);
@@ -225,16 +238,18 @@ std::vector<Data> DistanceStage::run(const Params& p, std::span<const Data> inpu
 }
 
 StageInfo DistanceAtStage::info() {
-  return {.name = "distance-at",
-          .version = 1,
-          .synopsis = "signed distance and closest point at given points",
-          .description =
-              "For each point of a text file (x, y, z in LPS mm a line; commas, blanks or tabs between) the exact distance to the surface, "
-              "negative inside, the closest point and its triangle.",
-          .inputs = {{"surface", {DataKind::surface}, "triangles"}, {"points", {DataKind::source}, "text file of points"}},
-          .outputs = {{"distances", {DataKind::document}, "one entry a point, in JSON"}},
-          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.3"},
-          .example = "osteo distance-at bone.ply points.csv distances.json"};
+  return {
+      .name = "distance-at",
+      .version = 1,
+      .synopsis = "signed distance and closest point at given points",
+      .description =
+          "For each point of a text file (x, y, z in LPS mm a line; commas, blanks or tabs between) the exact distance "
+          "to the surface, "
+          "negative inside, the closest point and its triangle.",
+      .inputs = {{"surface", {DataKind::surface}, "triangles"}, {"points", {DataKind::source}, "text file of points"}},
+      .outputs = {{"distances", {DataKind::document}, "one entry a point, in JSON"}},
+      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.3"},
+      .example = "osteo distance-at bone.ply points.csv distances.json"};
 }
 
 std::vector<Data> DistanceAtStage::run(const Params&, std::span<const Data> inputs, const Context& context) {
@@ -276,14 +291,21 @@ StageInfo VoxelizeStage::info() {
       .version = 1,
       .synopsis = "which voxels lie inside a surface",
       .description =
-          "Labels interior and border voxels; the rest is exterior. Counts crossings of rows of voxels in a way that never leaks at shared "
-          "edges; open surfaces are decided by the generalized winding number. Self-intersecting, duplicated and inside-out triangles "
+          "Labels interior and border voxels; the rest is exterior. Counts crossings of rows of voxels in a way that "
+          "never leaks at shared "
+          "edges; open surfaces are decided by the generalized winding number. Self-intersecting, duplicated and "
+          "inside-out triangles "
           "do no harm.",
       .inputs = {{"surface", {DataKind::surface}, "triangles"},
-                 {"like", {DataKind::image, DataKind::labels, DataKind::grid}, "put the voxels where this volume's are", true}},
-      .outputs = {{"labels", {DataKind::labels}, "1 interior, 2 border"}, {"grid", {DataKind::grid}, "the same, sparse", true}},
-      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.2.2",
-                     "A. Jacobson et al., Robust Inside-Outside Segmentation using Generalized Winding Numbers, SIGGRAPH 2013"},
+                 {"like",
+                  {DataKind::image, DataKind::labels, DataKind::grid},
+                  "put the voxels where this volume's are",
+                  true}},
+      .outputs = {{"labels", {DataKind::labels}, "1 interior, 2 border"},
+                  {"grid", {DataKind::grid}, "the same, sparse", true}},
+      .references =
+          {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.2.2",
+           "A. Jacobson et al., Robust Inside-Outside Segmentation using Generalized Winding Numbers, SIGGRAPH 2013"},
       .example = "osteo voxelize bone.ply voxels.seg.nrrd --resolution 195"};
 }
 
@@ -352,4 +374,4 @@ std::vector<Data> VoxelizeStage::run(const Params& p, std::span<const Data> inpu
   return {std::move(labels), std::move(sparse)};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

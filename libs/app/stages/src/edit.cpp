@@ -3,22 +3,23 @@
 namespace osteo::inline app {
 
 StageInfo ApplyEditsStage::info() {
-  return {
-      .name = "apply-edits",
-      .version = 1,
-      .synopsis = "corrections made by hand in 'osteo edit', done again on a mask",
-      .description =
-          "Does what edits.json holds, in order and to the bit: thresholds, pieces, boxes, cavities, smoothing, brush strokes, structures. "
-          "The edits belong to one CT, and another is refused; from another mask than they began with they go on, and it says so.",
-      .inputs = {{"image", {DataKind::image}, "CT in HU"},
-                 {"mask", {DataKind::labels}, "bone mask to begin with"},
-                 {"edits", {DataKind::document}, "edits.json of 'osteo edit'"},
-                 {"labels", {DataKind::labels}, "structures to begin with", true}},
-      .outputs = {{"mask", {DataKind::labels}, "1 in bone, 0 elsewhere"},
-                  {"structures", {DataKind::labels}, "structures at risk, with names and colours", true},
-                  {"edits", {DataKind::document}, "the edits as they were read", true}},
-      .references = {},
-      .example = "osteo apply-edits ct.nrrd mask.nrrd edits.json corrected.nrrd"};
+  return {.name = "apply-edits",
+          .version = 1,
+          .synopsis = "corrections made by hand in 'osteo edit', done again on a mask",
+          .description =
+              "Does what edits.json holds, in order and to the bit: thresholds, pieces, boxes, cavities, smoothing, "
+              "brush strokes, structures. "
+              "The edits belong to one CT, and another is refused; from another mask than they began with they go on, "
+              "and it says so.",
+          .inputs = {{"image", {DataKind::image}, "CT in HU"},
+                     {"mask", {DataKind::labels}, "bone mask to begin with"},
+                     {"edits", {DataKind::document}, "edits.json of 'osteo edit'"},
+                     {"labels", {DataKind::labels}, "structures to begin with", true}},
+          .outputs = {{"mask", {DataKind::labels}, "1 in bone, 0 elsewhere"},
+                      {"structures", {DataKind::labels}, "structures at risk, with names and colours", true},
+                      {"edits", {DataKind::document}, "the edits as they were read", true}},
+          .references = {},
+          .example = "osteo apply-edits ct.nrrd mask.nrrd edits.json corrected.nrrd"};
 }
 
 std::vector<Data> ApplyEditsStage::run(const Params&, std::span<const Data> inputs, const Context& context) {
@@ -38,4 +39,4 @@ std::vector<Data> ApplyEditsStage::run(const Params&, std::span<const Data> inpu
   return {document.bone_labels(context.threads), std::move(structures), Document{text}};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

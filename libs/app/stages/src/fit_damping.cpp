@@ -21,7 +21,10 @@ Json interval(const Estimate& e) {
   return Json{{"value", e.value}, {"low_95", e.low}, {"high_95", e.high}};
 }
 Json swing(const Swing& s) {
-  return Json{{"hz", s.hz}, {"decay_per_s", s.decay_per_s}, {"decrement", s.hz > 0 ? s.decay_per_s / s.hz : 0.0}, {"swings", s.swings}};
+  return Json{{"hz", s.hz},
+              {"decay_per_s", s.decay_per_s},
+              {"decrement", s.hz > 0 ? s.decay_per_s / s.hz : 0.0},
+              {"swings", s.swings}};
 }
 double rounded(double v) {
   return v == 0 || !std::isfinite(v) ? v
@@ -52,7 +55,8 @@ std::string table_of(const DampingFit& fit) {
   for (std::size_t c = 0; c < fit.used.channels.size(); ++c) {
     const auto& channel = fit.used.channels[c];
     for (std::size_t i = 0; i < channel.mm.size(); ++i)
-      t += csv_line({channel.name, format_number(channel.time_s[i]), format_number(channel.mm[i]), format_number(fit.fitted_mm[c][i])});
+      t += csv_line({channel.name, format_number(channel.time_s[i]), format_number(channel.mm[i]),
+                     format_number(fit.fitted_mm[c][i])});
   }
   return t;
 }
@@ -62,28 +66,34 @@ void warn_of(const DampingFit& fit, const FitDampingParams& p, const Context& co
   if (!fit.converged) context.warn("the fit did not come to its end: " + fit.why);
   const Estimate& c = fit.damping_per_s;
   if (c.low <= 0) {
-    context.warn("what was measured cannot tell this damping from none: up to " + format_number(rounded(c.high)) + " /s are possible");
+    context.warn("what was measured cannot tell this damping from none: up to " + format_number(rounded(c.high)) +
+                 " /s are possible");
   } else if (c.high - c.low > c.value) {
     context.warn("the damping is known to a factor of " + format_number(rounded(c.high / c.low)) +
                  " only: measure longer, or with less noise");
   }
   if (p.fit_stiffness && !(fit.stiffness_times.value > 0.25 && fit.stiffness_times.value < 4))
     context.warn("the body would have to be " + format_number(rounded(fit.stiffness_times.value)) +
-                 " times as stiff as the problem says: another swing than its first one may have been measured, or it was measured "
+                 " times as stiff as the problem says: another swing than its first one may have been measured, or it "
+                 "was measured "
                  "too seldom, or density or young_kpa are far off");
   if (fit.measured.swings && fit.interval_s * fit.measured.hz > 0.2)
     context.warn(format_number(rounded(1 / (fit.interval_s * fit.measured.hz))) +
                  " values a swing are few: a faster swing would look the same");
   if (fit.amplitude_times < 0)
-    context.warn("it was plucked the other way than the load pulls (amplitude " + format_number(rounded(fit.amplitude_times)) + " of it)");
+    context.warn("it was plucked the other way than the load pulls (amplitude " +
+                 format_number(rounded(fit.amplitude_times)) + " of it)");
   if (fit.correlation > 0.3)
-    context.warn("what the fit leaves (" + percent(fit.residual_share) +
-                 " of the motion) is no noise: each value goes with the next (correlation " + format_number(rounded(fit.correlation)) +
-                 "); a base line that wanders, or several swings, are not in the model. The intervals were widened for it");
+    context.warn(
+        "what the fit leaves (" + percent(fit.residual_share) +
+        " of the motion) is no noise: each value goes with the next (correlation " +
+        format_number(rounded(fit.correlation)) +
+        "); a base line that wanders, or several swings, are not in the model. The intervals were widened for it");
   for (std::size_t k = 0; k < fit.drift_mm_per_s.size(); ++k) {
     const double drift = fit.drift_mm_per_s[k];
     if (std::abs(drift) > 4 * fit.drift_error_mm_per_s[k] && std::abs(drift) * fit.span_s > 0.05 * fit.largest_mm[k])
-      context.warn(fit.used.channels[k].name + " drifts by " + format_number(rounded(drift)) + " mm/s, which was taken out");
+      context.warn(fit.used.channels[k].name + " drifts by " + format_number(rounded(drift)) +
+                   " mm/s, which was taken out");
   }
 }
 
@@ -95,11 +105,15 @@ StageInfo FitDampingStage::info() {
       .version = 1,
       .synopsis = "damping of the fast tissue model, from a motion that was measured",
       .description =
-          "A body was plucked by the problem's load, let go, and its displacement measured over time (CSV: time_s; ux_mm, uy_mm, uz_mm or "
-          "u_mm along --along; perhaps point, the number of a point of the mesh). Found are the damping that simulate has to be "
-          "given, a factor on the stiffness (from the frequency), the moment of release, how far it was plucked, and the drift of each "
+          "A body was plucked by the problem's load, let go, and its displacement measured over time (CSV: time_s; "
+          "ux_mm, uy_mm, uz_mm or "
+          "u_mm along --along; perhaps point, the number of a point of the mesh). Found are the damping that simulate "
+          "has to be "
+          "given, a factor on the stiffness (from the frequency), the moment of release, how far it was plucked, and "
+          "the drift of each "
           "channel, each with its 95 % interval: least squares (Ceres) against simulate's own steps, so that "
-          "what these take away of a motion by themselves is not taken for damping. The report says how much that is. Tables that are too "
+          "what these take away of a motion by themselves is not taken for damping. The report says how much that is. "
+          "Tables that are too "
           "short, too coarse, that do not swing, that are not sorted or hold no number are refused with what to do.",
       .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
                  {"problem", {DataKind::document}, "materials, what is fixed, the load that plucks, in JSON"},
@@ -116,20 +130,22 @@ std::vector<Data> FitDampingStage::run(const Params& p, std::span<const Data> in
   const TetMesh& mesh = *std::get<Tets>(inputs[0]);
   const TissueProblem problem = parse_tissue_problem(std::get<Document>(inputs[1]).json, mesh);
   const auto* const constants = std::get_if<Document>(&inputs[3]);
-  const TissueModel model = model_of_problem(mesh, problem, constants != nullptr ? std::optional(constants->json) : std::nullopt);
+  const TissueModel model =
+      model_of_problem(mesh, problem, constants != nullptr ? std::optional(constants->json) : std::nullopt);
   const std::size_t n = load_named(problem, p.load);
   const Vec3 at{p.at_mm[0], p.at_mm[1], p.at_mm[2]};
   const std::uint32_t nearest = nearest_point(model, at);
   const auto& path = std::get<Source>(inputs[2]).path;
-  const MeasuredMotion motion = read_motion(read_text(path), path.filename().string(), static_cast<std::uint32_t>(model.point_count()),
-                                            nearest, {p.along[0], p.along[1], p.along[2]});
+  const MeasuredMotion motion =
+      read_motion(read_text(path), path.filename().string(), static_cast<std::uint32_t>(model.point_count()), nearest,
+                  {p.along[0], p.along[1], p.along[2]});
   const bool by_place = motion.channels.front().name.find(" of point ") == std::string::npos;
   const double off = length(model.rest()[nearest] - at);
   if (by_place && off > longest_edge(model))
-    throw Error(
-        ExitCode::usage,
-        "the nearest point of the mesh to --at-mm lies " + format_number(rounded(off)) + " mm from it: it was not measured on this body",
-        "places are LPS mm; mesh-info tells where the mesh is");
+    throw Error(ExitCode::usage,
+                "the nearest point of the mesh to --at-mm lies " + format_number(rounded(off)) +
+                    " mm from it: it was not measured on this body",
+                "places are LPS mm; mesh-info tells where the mesh is");
   DampingOptions options;
   options.density_kg_m3 = p.density_kg_m3;
   options.stepping = p.method == TimeMethod::implicit_steps ? Stepping::implicit_steps : Stepping::explicit_steps;
@@ -182,4 +198,4 @@ std::vector<Data> FitDampingStage::run(const Params& p, std::span<const Data> in
   return {Document{written(j)}, Document{table_of(fit)}};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

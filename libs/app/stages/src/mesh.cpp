@@ -179,7 +179,8 @@ StageInfo MeshInfoStage::info() {
           .version = 1,
           .synopsis = "what a surface is like: closedness, bodies, holes, bad triangles",
           .description =
-              "Counts what can be wrong with a surface and what it measures. Takes any file that can be read, however bad the surface.",
+              "Counts what can be wrong with a surface and what it measures. Takes any file that can be read, however "
+              "bad the surface.",
           .inputs = {{"surface", {DataKind::surface}, "triangles"}},
           .outputs = {{"findings", {DataKind::document}, "the figures in JSON"}},
           .references = {},
@@ -223,7 +224,8 @@ std::vector<Data> MeshInfoStage::run(const Params& p, std::span<const Data> inpu
     const auto pairs = self_intersections(soup_of(*surface), context.sub(0.5, 1.0));
     put("self_intersections", static_cast<std::uint64_t>(pairs.size()));
     auto& first = j["first_self_intersections"] = Json::list();
-    for (std::size_t i = 0; i < std::min<std::size_t>(pairs.size(), 20); ++i) first.push_back({pairs[i].first, pairs[i].second});
+    for (std::size_t i = 0; i < std::min<std::size_t>(pairs.size(), 20); ++i)
+      first.push_back({pairs[i].first, pairs[i].second});
   }
 #else
   if (p.self_intersections) context.warn("this build has no CGAL: self-intersections are not counted");
@@ -245,11 +247,15 @@ StageInfo MeshRepairStage::info() {
           .version = 2,
           .synopsis = "mends a surface: holes, duplicates, orientation, degenerate triangles, self-intersections",
           .description =
-              "Takes out unsound, degenerate and duplicate triangles, joins equal points, makes neighbours and bodies agree on what is "
+              "Takes out unsound, degenerate and duplicate triangles, joins equal points, makes neighbours and bodies "
+              "agree on what is "
               "outside, "
-              "closes holes, and resolves self-intersections: triangles are cut along each other exactly, and what bounds the inside (by "
-              "the winding number) stays. Holes and self-intersections need a build with CGAL. Each step is measured (volume, area, "
-              "Hausdorff distance); one that takes more than 3 % of the volume is undone. The report says what was done and what is left.",
+              "closes holes, and resolves self-intersections: triangles are cut along each other exactly, and what "
+              "bounds the inside (by "
+              "the winding number) stays. Holes and self-intersections need a build with CGAL. Each step is measured "
+              "(volume, area, "
+              "Hausdorff distance); one that takes more than 3 % of the volume is undone. The report says what was "
+              "done and what is left.",
           .inputs = {{"surface", {DataKind::surface}, "triangles"}},
           .outputs = {{"repaired", {DataKind::surface}, "the mended surface"}},
           .references = {"P. Liepa, Filling Holes in Meshes, SGP 2003", "CGAL 5.5, Polygon Mesh Processing",
@@ -269,25 +275,29 @@ std::vector<Data> MeshRepairStage::run(const Params& p, std::span<const Data> in
 }
 
 StageInfo TetrahedralizeStage::info() {
-  return {
-      .name = "tetrahedralize",
-      .version = 2,
-      .synopsis = "tetrahedra that fill a surface",
-      .description =
-          "Five methods. grid and graded make staircases of perfectly shaped tetrahedra, in no time; grid-conforming follows the surface "
-          "with angles that "
-          "stay good, whatever the surface; tetgen and cgal need a closed surface that does not intersect itself, and run in a process of "
-          "their own. Whatever the "
-          "method, inside is where the winding number is not zero: a shell that faces inward is a cavity, a body within another changes "
-          "nothing, overlaps count once. The volume is held against the surface's, with a warning beyond 5 %. Reports a quality table: "
-          "angles, "
-          "aspect, volumes, conformity, and the distance of the boundary to the surface.",
-      .inputs = {{"surface", {DataKind::surface}, "triangles"}},
-      .outputs = {{"mesh", {DataKind::tets}, "tetrahedra (.vtu, or TetGen's .node and .ele)"}},
-      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.2",
-                     "F. Labelle and J. Shewchuk, Isosurface Stuffing, SIGGRAPH 2007", "J. Maubach, Local bisection refinement, SISC 1995",
-                     "H. Si, TetGen, ACM TOMS 2015", "CGAL 5.5, 3D Mesh Generation"},
-      .example = "osteo tetrahedralize bone.ply bone.vtu --method grid-conforming --spacing-mm 2"};
+  return {.name = "tetrahedralize",
+          .version = 2,
+          .synopsis = "tetrahedra that fill a surface",
+          .description =
+              "Five methods. grid and graded make staircases of perfectly shaped tetrahedra, in no time; "
+              "grid-conforming follows the surface "
+              "with angles that "
+              "stay good, whatever the surface; tetgen and cgal need a closed surface that does not intersect itself, "
+              "and run in a process of "
+              "their own. Whatever the "
+              "method, inside is where the winding number is not zero: a shell that faces inward is a cavity, a body "
+              "within another changes "
+              "nothing, overlaps count once. The volume is held against the surface's, with a warning beyond 5 %. "
+              "Reports a quality table: "
+              "angles, "
+              "aspect, volumes, conformity, and the distance of the boundary to the surface.",
+          .inputs = {{"surface", {DataKind::surface}, "triangles"}},
+          .outputs = {{"mesh", {DataKind::tets}, "tetrahedra (.vtu, or TetGen's .node and .ele)"}},
+          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.2",
+                         "F. Labelle and J. Shewchuk, Isosurface Stuffing, SIGGRAPH 2007",
+                         "J. Maubach, Local bisection refinement, SISC 1995", "H. Si, TetGen, ACM TOMS 2015",
+                         "CGAL 5.5, 3D Mesh Generation"},
+          .example = "osteo tetrahedralize bone.ply bone.vtu --method grid-conforming --spacing-mm 2"};
 }
 
 std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
@@ -303,7 +313,8 @@ std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data
     case TetMethod::grid: {
       const VoxelBits inside = voxels_inside(soup, frame_around_mm(soup, spacing, 2), work.sub(0, 0.5));
       mesh = grid_tets(p.margin ? inside.dilated() : inside, work.sub(0.5, 1));
-      if (mesh.tets.empty()) throw Error(ExitCode::failed, "no voxel's centre is inside the surface", "choose a smaller spacing");
+      if (mesh.tets.empty())
+        throw Error(ExitCode::failed, "no voxel's centre is inside the surface", "choose a smaller spacing");
       break;
     }
     case TetMethod::grid_conforming:
@@ -311,7 +322,8 @@ std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data
         KeptThin kept = stuffed_tets_keeping(soup, {spacing, p.target_dihedral_deg}, surface_mm3, kVolumeOff, 3, work);
         if (kept.spacing_mm < spacing)
           context.warn("parts of the surface are too thin for a lattice of " + format_number(spacing) +
-                       " mm: " + format_number(kept.spacing_mm) + " mm was taken; --no-keep-thin keeps the spacing and loses them");
+                       " mm: " + format_number(kept.spacing_mm) +
+                       " mm was taken; --no-keep-thin keeps the spacing and loses them");
         context.report("spacing_taken_mm", kept.spacing_mm);
         context.report("hinges_opened", static_cast<std::int64_t>(kept.hinges));
         mesh = std::move(kept.mesh);
@@ -327,7 +339,9 @@ std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data
 #ifdef OSTEO_WITH_TETGEN
       // A regular tetrahedron's volume is 0.118 of its edge's cube.
       mesh = tets_by_tetgen(
-          soup, {p.max_volume_mm3 > 0 ? p.max_volume_mm3 : 0.118 * spacing * spacing * spacing, 1.414, 0, kMostTets, limits}, work);
+          soup,
+          {p.max_volume_mm3 > 0 ? p.max_volume_mm3 : 0.118 * spacing * spacing * spacing, 1.414, 0, kMostTets, limits},
+          work);
       break;
 #else
       throw not_built("TetGen", "OSTEO_TETGEN");
@@ -354,4 +368,4 @@ std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data
   return {std::make_shared<const TetMesh>(std::move(mesh))};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

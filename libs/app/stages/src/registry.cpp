@@ -53,4 +53,4 @@ Registry osteo_stages() {
   return registry;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -9,11 +9,15 @@ StageInfo ResampleStage::info() {
           .version = 6,
           .synopsis = "CT and bone mask to isotropic sparse bone density (OpenVDB)",
           .description =
-              "Finds the bone boundary between the voxels of the CT and gives each output voxel the share of it that is bone. "
-              "The volume of bone is kept and reported. Only voxels with bone are stored. Between slices that lie far apart the boundary "
+              "Finds the bone boundary between the voxels of the CT and gives each output voxel the share of it that "
+              "is bone. "
+              "The volume of bone is kept and reported. Only voxels with bone are stored. Between slices that lie far "
+              "apart the boundary "
               "follows "
-              "their outlines (--between values: not, as before version 6); no detail is added that the slices do not show.",
-          .inputs = {{"image", {DataKind::image}, "CT in HU"}, {"mask", {DataKind::labels}, "bone mask on the same voxels"}},
+              "their outlines (--between values: not, as before version 6); no detail is added that the slices do not "
+              "show.",
+          .inputs = {{"image", {DataKind::image}, "CT in HU"},
+                     {"mask", {DataKind::labels}, "bone mask on the same voxels"}},
           .outputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"},
                       {"hu", {DataKind::grid}, "CT value in the voxels that hold bone", true}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.1",
@@ -28,4 +32,4 @@ std::vector<Data> ResampleStage::run(const Params& params, std::span<const Data>
   return {bone.density, bone.hu};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -30,7 +30,8 @@ std::vector<Vec3> parse_points(const std::string& text) {
       const std::size_t a = word.find_first_not_of(" \t"), b = word.find_last_not_of(" \t");
       v.push_back(parse_number(a == std::string::npos ? "" : word.substr(a, b - a + 1), "--points-mm"));
     }
-    if (v.size() != 3) throw Error(ExitCode::usage, "--points-mm: '" + item + "' is not x,y,z", "like --points-mm '41,7,-16; 43,8,-22'");
+    if (v.size() != 3)
+      throw Error(ExitCode::usage, "--points-mm: '" + item + "' is not x,y,z", "like --points-mm '41,7,-16; 43,8,-22'");
     points.push_back({v[0], v[1], v[2]});
   }
   return points;
@@ -48,16 +49,23 @@ StageInfo TubeStage::info() {
       .version = 1,
       .synopsis = "a nerve or vessel from a few points on it: centre line, radius, mask",
       .description =
-          "Finds the cheapest way between the points through what looks like a tube, moves it to the middle of the walls across it, "
-          "measures its radius, and draws it into a label map. Says where no walls are seen: there the line is a smooth curve through "
+          "Finds the cheapest way between the points through what looks like a tube, moves it to the middle of the "
+          "walls across it, "
+          "measures its radius, and draws it into a label map. Says where no walls are seen: there the line is a "
+          "smooth curve through "
           "the points. Points that no tube joins are refused. docs/structures.md has how far off it is.",
-      .inputs = {{"image", {DataKind::image}, "CT in HU"},
-                 {"points", {DataKind::source}, "text file, a point x, y, z (LPS mm) a line; in place of --points-mm", true},
-                 {"labels", {DataKind::labels}, "label map of this CT to which it is added", true}},
+      .inputs =
+          {{"image", {DataKind::image}, "CT in HU"},
+           {"points", {DataKind::source}, "text file, a point x, y, z (LPS mm) a line; in place of --points-mm", true},
+           {"labels", {DataKind::labels}, "label map of this CT to which it is added", true}},
       .outputs = {{"structures", {DataKind::labels}, "label map with the tube"},
-                  {"line", {DataKind::document}, "centre line as text (.csv): x, y, z, radius, way and confidence of each point", true}},
+                  {"line",
+                   {DataKind::document},
+                   "centre line as text (.csv): x, y, z, radius, way and confidence of each point",
+                   true}},
       .references = {"Y. Sato et al., Three-dimensional multi-scale line filter, Med. Image Anal. 1998",
-                     "S. Prevrhal et al., Accuracy limits for the determination of cortical width and density, Phys. Med. Biol. 1999"},
+                     "S. Prevrhal et al., Accuracy limits for the determination of cortical width and density, Phys. "
+                     "Med. Biol. 1999"},
       .example = "osteo tube ct.nrrd nerve.seg.nrrd --points-mm '36,-2,-12; 42,7,-18; 46,8,-38' --line-out nerve.csv"};
 }
 
@@ -72,11 +80,13 @@ void warn_of_detours(const Tube& tube, std::span<const Vec3> points, const Conte
     for (std::size_t s = from; s < tube.stations.size(); ++s) {
       if (length(tube.stations[s].at_mm - points[leg]) < length(tube.stations[to].at_mm - points[leg])) to = s;
     }
-    const double way = tube.stations[to].arc_mm - tube.stations[from].arc_mm, straight = length(points[leg] - points[leg - 1]);
+    const double way = tube.stations[to].arc_mm - tube.stations[from].arc_mm,
+                 straight = length(points[leg] - points[leg - 1]);
     if (way > kLong * straight && way > straight + kExtraMm) {
-      context.warn("from point " + std::to_string(leg) + " to " + std::to_string(leg + 1) + " the way is " +
-                   format_number(rounded(way, 10)) + " mm for " + format_number(rounded(straight, 10)) +
-                   " mm of straight line: it may be a detour; look at it, and give a point before and behind each bend");
+      context.warn(
+          "from point " + std::to_string(leg) + " to " + std::to_string(leg + 1) + " the way is " +
+          format_number(rounded(way, 10)) + " mm for " + format_number(rounded(straight, 10)) +
+          " mm of straight line: it may be a detour; look at it, and give a point before and behind each bend");
     }
     from = to;
   }
@@ -100,7 +110,8 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
   context.report("confidence", rounded(tube.confidence, 100));
   std::string unsure;
   for (const auto& u : tube.unsure_mm) {
-    unsure += (unsure.empty() ? "" : ", ") + format_number(rounded(u[0], 10)) + " to " + format_number(rounded(u[1], 10));
+    unsure +=
+        (unsure.empty() ? "" : ", ") + format_number(rounded(u[0], 10)) + " to " + format_number(rounded(u[1], 10));
   }
   if (!unsure.empty()) {
     context.report("unsure_mm", unsure);
@@ -109,7 +120,8 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
   warn_of_detours(tube, points, context);
   std::string csv = "x_mm,y_mm,z_mm,radius_mm,along_mm,confidence\n";
   for (const TubeStation& s : tube.stations) {
-    for (const double v : {s.at_mm.x, s.at_mm.y, s.at_mm.z, s.radius_mm, s.arc_mm}) csv += format_number(rounded(v, 1000)) + ",";
+    for (const double v : {s.at_mm.x, s.at_mm.y, s.at_mm.z, s.radius_mm, s.arc_mm})
+      csv += format_number(rounded(v, 1000)) + ",";
     csv += format_number(rounded(s.confidence, 100)) + "\n";
   }
   return {with_colours(draw_tube(tube, ct.frame, p.name, onto)), Document{csv}};
@@ -120,13 +132,17 @@ StageInfo FindStructuresStage::info() {
           .version = 1,
           .synopsis = "ear canal, air cells, sigmoid sinus, tegmen, dura, labyrinth found in a CT",
           .description =
-              "Looks for structures of one ear by what bone, air and soft tissue bound: the external canal from the air outside, the air "
+              "Looks for structures of one ear by what bone, air and soft tissue bound: the external canal from the "
+              "air outside, the air "
               "behind "
-              "the drum, the round vessel in the groove of the sigmoid sinus, the plate of bone under the middle fossa, 2 mm of brain's "
+              "the drum, the round vessel in the groove of the sigmoid sinus, the plate of bone under the middle "
+              "fossa, 2 mm of brain's "
               "side on "
-              "the skull's inner surface, and, from a point in it, the fluid of the labyrinth. Each has a quality from 0 to 1 or a reason "
+              "the skull's inner surface, and, from a point in it, the fluid of the labyrinth. Each has a quality from "
+              "0 to 1 or a reason "
               "why it "
-              "was not found. A proposal to be looked at: docs/structures.md says how far off it is and what it does not know.",
+              "was not found. A proposal to be looked at: docs/structures.md says how far off it is and what it does "
+              "not know.",
           .inputs = {{"image", {DataKind::image}, "CT in HU, of a head or around an ear"}},
           .outputs = {{"structures", {DataKind::labels}, "label map with names and colours of what was found"},
                       {"findings", {DataKind::document}, "what was found, how well, or why not, in JSON", true}},
@@ -161,11 +177,12 @@ std::vector<Data> FindStructuresStage::run(const Params& p, std::span<const Data
   if (found.labels.structures.empty()) {
     throw ErrorWithDocument(
         Error(ExitCode::failed,
-              "nothing was found on the " + std::string(EnumNames<Side>::values[static_cast<std::size_t>(p.side)]) + ": " + missing,
+              "nothing was found on the " + std::string(EnumNames<Side>::values[static_cast<std::size_t>(p.side)]) +
+                  ": " + missing,
               "is it the right side, and is the ear within the image with air outside of it?"),
         "findings", document);
   }
   return {found.labels, document};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

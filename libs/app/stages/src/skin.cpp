@@ -15,18 +15,18 @@ Vec3 vec(const std::array<float, 3>& p) {
 }  // namespace
 
 StageInfo SkinStage::info() {
-  return {
-      .name = "skin",
-      .version = 1,
-      .synopsis = "a surface that follows a tetrahedral mesh when it deforms",
-      .description =
-          "Binds the surface to the mesh at rest and moves it with the deformed mesh, which must have the same points in the same order.",
-      .inputs = {{"surface", {DataKind::surface}, "surface at rest"},
-                 {"rest", {DataKind::tets}, "mesh at rest"},
-                 {"deformed", {DataKind::tets}, "the same mesh, its points moved"}},
-      .outputs = {{"skinned", {DataKind::surface}, "the surface, moved"}},
-      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.4.2"},
-      .example = "osteo skin bone.ply rest.vtu deformed.vtu moved.ply"};
+  return {.name = "skin",
+          .version = 1,
+          .synopsis = "a surface that follows a tetrahedral mesh when it deforms",
+          .description =
+              "Binds the surface to the mesh at rest and moves it with the deformed mesh, which must have the same "
+              "points in the same order.",
+          .inputs = {{"surface", {DataKind::surface}, "surface at rest"},
+                     {"rest", {DataKind::tets}, "mesh at rest"},
+                     {"deformed", {DataKind::tets}, "the same mesh, its points moved"}},
+          .outputs = {{"skinned", {DataKind::surface}, "the surface, moved"}},
+          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.4.2"},
+          .example = "osteo skin bone.ply rest.vtu deformed.vtu moved.ply"};
 }
 
 std::vector<Data> SkinStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
@@ -49,4 +49,4 @@ std::vector<Data> SkinStage::run(const Params& p, std::span<const Data> inputs, 
   return {std::make_shared<const TriMesh>(std::move(moved))};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

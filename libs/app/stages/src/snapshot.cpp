@@ -7,10 +7,14 @@ StageInfo SnapshotStage::info() {
           .version = 2,
           .synopsis = "a picture (PNG) of a CT, mask, grid, surface or tetrahedra",
           .description =
-              "Three cuts through the middle (axial seen from the feet: the patient's left is on the right) and a lit view in "
-              "3D. Of tetrahedra the half that faces away, with its edges, coloured by the values at its points where it has some; of a "
+              "Three cuts through the middle (axial seen from the feet: the patient's left is on the right) and a lit "
+              "view in "
+              "3D. Of tetrahedra the half that faces away, with its edges, coloured by the values at its points where "
+              "it has some; of a "
               "distance grid lines of equal distance. Needs no display.",
-          .inputs = {{"subject", {DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::tets}, "what to show"},
+          .inputs = {{"subject",
+                      {DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::tets},
+                      "what to show"},
                      {"mask", {DataKind::labels, DataKind::grid}, "tinted over the cuts and shown in 3D", true},
                      {"surface", {DataKind::surface}, "shown in 3D", true}},
           .outputs = {{"picture", {DataKind::picture}, "the picture"}},
@@ -22,4 +26,4 @@ std::vector<Data> SnapshotStage::run(const Params& params, std::span<const Data>
   return {snapshot({inputs[0], inputs[1], inputs[2]}, params, context)};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

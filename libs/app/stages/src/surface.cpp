@@ -9,9 +9,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/app/stages/bone.h"
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/mesh/bone_surface.h"
-#include "osteo/app/stages/bone.h"
 
 namespace osteo::inline app {
 namespace {
@@ -21,8 +21,10 @@ struct Deviation {
   std::int64_t samples = 0;
 };
 
-// Distance, in voxels, of the surface's points to VTK's marching cubes of the same voxels, on up to 200 bricks spread evenly.
-Deviation deviation_from_marching_cubes(const BrickGrid& bone, const BoneSurface& surface, double iso, const Context& context) {
+// Distance, in voxels, of the surface's points to VTK's marching cubes of the same voxels, on up to 200 bricks spread
+// evenly.
+Deviation deviation_from_marching_cubes(const BrickGrid& bone, const BoneSurface& surface, double iso,
+                                        const Context& context) {
   Deviation result;
   std::vector<std::uint32_t> bricks;  // those with surface, from the voxel list
   std::vector<std::size_t> first_voxel;
@@ -43,7 +45,8 @@ Deviation deviation_from_marching_cubes(const BrickGrid& bone, const BoneSurface
     block->SetDimensions(kN, kN, kN);
     block->SetOrigin(o.i * 8 - kPad, o.j * 8 - kPad, o.k * 8 - kPad);
     block->AllocateScalars(VTK_FLOAT, 1);
-    bone.read_block({o.i * 8 - kPad, o.j * 8 - kPad, o.k * 8 - kPad}, {kN, kN, kN}, static_cast<float*>(block->GetScalarPointer()));
+    bone.read_block({o.i * 8 - kPad, o.j * 8 - kPad, o.k * 8 - kPad}, {kN, kN, kN},
+                    static_cast<float*>(block->GetScalarPointer()));
     vtkNew<vtkMarchingCubes> cubes;
     cubes->SetInputData(block);
     cubes->SetValue(0, iso);
@@ -76,28 +79,30 @@ Deviation deviation_from_marching_cubes(const BrickGrid& bone, const BoneSurface
 }  // namespace
 
 StageInfo SurfaceStage::info() {
-  return {
-      .name = "surface",
-      .version = 2,
-      .synopsis = "triangle surface of a bone density grid",
-      .description =
-          "nets: one vertex for each sheet of surface between eight voxels; closed, oriented and manifold for any bone. "
-          "voxel: each vertex is a voxel on the surface, as in the thesis, without hidden triangles. "
-          "Reports counts, closedness, enclosed volume, and the distance to marching cubes of the same voxels.",
-      .inputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"}},
-      .outputs = {{"surface", {DataKind::surface}, "triangles in LPS mm, facing out of the bone"}},
-      .references = {"S. Gibson, Constrained Elastic Surface Nets, MERL 1998", "G. Nielson, Dual Marching Cubes, IEEE Visualization 2004",
-                     "R. Wenger, Isosurfaces: Geometry, Topology, and Algorithms, 2013",
-                     "D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.2"},
-      .example = "osteo surface bone.vdb bone.ply"};
+  return {.name = "surface",
+          .version = 2,
+          .synopsis = "triangle surface of a bone density grid",
+          .description =
+              "nets: one vertex for each sheet of surface between eight voxels; closed, oriented and manifold for any "
+              "bone. "
+              "voxel: each vertex is a voxel on the surface, as in the thesis, without hidden triangles. "
+              "Reports counts, closedness, enclosed volume, and the distance to marching cubes of the same voxels.",
+          .inputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"}},
+          .outputs = {{"surface", {DataKind::surface}, "triangles in LPS mm, facing out of the bone"}},
+          .references = {"S. Gibson, Constrained Elastic Surface Nets, MERL 1998",
+                         "G. Nielson, Dual Marching Cubes, IEEE Visualization 2004",
+                         "R. Wenger, Isosurfaces: Geometry, Topology, and Algorithms, 2013",
+                         "D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.2"},
+          .example = "osteo surface bone.vdb bone.ply"};
 }
 
 std::vector<Data> SurfaceStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
   const BrickGrid bone = to_bricks(std::get<SparseGrid>(inputs[0]));
   const auto iso = static_cast<float>(p.iso);
-  BoneSurface surface =
-      p.method == SurfaceMethod::nets ? surface_nets(bone, iso, context.sub(0, 0.6)) : voxel_surface(bone, iso, context.sub(0, 0.6));
-  if (surface.mesh.triangles.empty()) throw Error(ExitCode::failed, "the grid has no surface at density " + format_number(p.iso));
+  BoneSurface surface = p.method == SurfaceMethod::nets ? surface_nets(bone, iso, context.sub(0, 0.6))
+                                                        : voxel_surface(bone, iso, context.sub(0, 0.6));
+  if (surface.mesh.triangles.empty())
+    throw Error(ExitCode::failed, "the grid has no surface at density " + format_number(p.iso));
   context.progress(0.6, "checking");
   const MeshCheck checked = check(surface.mesh);
   const Deviation d = deviation_from_marching_cubes(bone, surface, p.iso, context);
@@ -114,4 +119,4 @@ std::vector<Data> SurfaceStage::run(const Params& p, std::span<const Data> input
   return {std::make_shared<const TriMesh>(std::move(surface.mesh))};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -21,23 +21,29 @@ StageInfo FemStage::info() {
           .version = 2,
           .synopsis = "how a soft body deforms under a load, by finite elements",
           .description =
-              "Static equilibrium of tetrahedra under dead loads: Newton's method with exact Hessians and sparse Cholesky. Linear "
+              "Static equilibrium of tetrahedra under dead loads: Newton's method with exact Hessians and sparse "
+              "Cholesky. Linear "
               "elasticity, Saint "
-              "Venant-Kirchhoff, neo-Hookean or corotated; linear or quadratic tetrahedra, or linear ones that do not lock near "
+              "Venant-Kirchhoff, neo-Hookean or corotated; linear or quadratic tetrahedra, or linear ones that do not "
+              "lock near "
               "incompressibility; a material for each region. Agrees with CalculiX to 1e-6 "
               "where that "
-              "has the same law. Reads and writes input files of CalculiX and Abaqus: give one .inp as mesh and as problem.",
+              "has the same law. Reads and writes input files of CalculiX and Abaqus: give one .inp as mesh and as "
+              "problem.",
           .inputs = {{"mesh", {DataKind::tets}, "the body at rest, as tetrahedralize makes it, or .inp"},
                      {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON or .inp"}},
-          .outputs =
-              {{"deformed", {DataKind::tets}, "the same mesh under the load"},
-               {"report", {DataKind::document}, "displacements, energy, reaction, iterations, in JSON", true},
-               {"inp",
-                {DataKind::document},
-                "the problem for CalculiX or Abaqus (not neo_hooke, corotated or t4_mean, which are not known there); contacts as contact "
-                "pairs",
-                true},
-               {"nodes", {DataKind::document}, "all nodes in double precision, middles of edges too, with displacement_mm (.vtu)", true}},
+          .outputs = {{"deformed", {DataKind::tets}, "the same mesh under the load"},
+                      {"report", {DataKind::document}, "displacements, energy, reaction, iterations, in JSON", true},
+                      {"inp",
+                       {DataKind::document},
+                       "the problem for CalculiX or Abaqus (not neo_hooke, corotated or t4_mean, which are not known "
+                       "there); contacts as contact "
+                       "pairs",
+                       true},
+                      {"nodes",
+                       {DataKind::document},
+                       "all nodes in double precision, middles of edges too, with displacement_mm (.vtu)",
+                       true}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.3",
                          "J. Bonet, R. Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2008"},
           .example = "osteo fem tissue.vtu problem.json deformed.vtu --report-out report.json"};
@@ -80,13 +86,15 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
   context.report("iterations", static_cast<std::int64_t>(r.iterations));
   context.progress(1);
   Document inp;
-  const bool known = elements.law != ElasticLaw::neo_hooke && elements.law != ElasticLaw::corotated && elements.order != TetOrder::t4_mean;
+  const bool known = elements.law != ElasticLaw::neo_hooke && elements.law != ElasticLaw::corotated &&
+                     elements.order != TetOrder::t4_mean;
   if (known) {
     inp.json = inp_text(body, load);
   } else {
     // Whoever asked for the file finds in it why it holds no problem.
-    inp.json = "** osteotome wrote no problem: CalculiX and Abaqus know no " + std::string(name_of(elements.law)) + " with " +
-               std::string(name_of(elements.order)) + "; give --law linear, stvk or neo_hooke_split, --order t4 or t10\n";
+    inp.json = "** osteotome wrote no problem: CalculiX and Abaqus know no " + std::string(name_of(elements.law)) +
+               " with " + std::string(name_of(elements.order)) +
+               "; give --law linear, stvk or neo_hooke_split, --order t4 or t10\n";
   }
   return {moved_mesh(mesh, corners), Document{written(j)}, std::move(inp), Document{nodes_vtu(body, r.points_mm)}};
 }
@@ -97,8 +105,10 @@ StageInfo SimulateStage::info() {
       .version = 3,
       .synopsis = "a soft body in time, by the fast distance and volume model",
       .description =
-          "Explicit steps with a limit that is certified, or implicit ones of any length for stiff bodies; lumped masses, viscous damping. "
-          "Constants in closed form from the problem's materials, or those that calibrate found. A ball can be pushed into the body "
+          "Explicit steps with a limit that is certified, or implicit ones of any length for stiff bodies; lumped "
+          "masses, viscous damping. "
+          "Constants in closed form from the problem's materials, or those that calibrate found. A ball can be pushed "
+          "into the body "
           "(an indentation), and a surface such as bone be in its way. Ends at rest, by the balance of forces.",
       .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
                  {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON"},
@@ -133,22 +143,23 @@ void require_together(std::span<const Vec3> x, std::span<const Vec3> rest, doubl
   for (std::size_t p = 0; p < x.size(); ++p) {
     const double far = length(x[p] - rest[p]);
     if (!(far <= kFarthest * size))
-      throw Error(
-          ExitCode::failed,
-          "stopped after " + format_number(seconds) + " s of simulated time: point " + std::to_string(p) +
-              (std::isfinite(far) ? " has moved " + format_number(far) + " mm, over " + format_number(kFarthest) + " times the body's size"
-                                  : std::string(" is nowhere any more")),
-          "the load is too large for the material, or nothing holds that part; --method implicit bears more");
+      throw Error(ExitCode::failed,
+                  "stopped after " + format_number(seconds) + " s of simulated time: point " + std::to_string(p) +
+                      (std::isfinite(far) ? " has moved " + format_number(far) + " mm, over " +
+                                                format_number(kFarthest) + " times the body's size"
+                                          : std::string(" is nowhere any more")),
+                  "the load is too large for the material, or nothing holds that part; --method implicit bears more");
   }
 }
 
 // Both ways of going on in time, until rest or the end.
 template <class Dynamics>
-Course go_on(Dynamics& dynamics, const SimulateParams& p, int batch, const TissueModel& model, const std::vector<TissueLoad::Moved>& moved,
-             const Context& context) {
+Course go_on(Dynamics& dynamics, const SimulateParams& p, int batch, const TissueModel& model,
+             const std::vector<TissueLoad::Moved>& moved, const Context& context) {
   Course c;
   const auto steps = static_cast<long>(std::ceil(p.seconds / dynamics.step_s()));
-  const Vec3 from{p.tool_from_mm[0], p.tool_from_mm[1], p.tool_from_mm[2]}, to{p.tool_to_mm[0], p.tool_to_mm[1], p.tool_to_mm[2]};
+  const Vec3 from{p.tool_from_mm[0], p.tool_from_mm[1], p.tool_from_mm[2]},
+      to{p.tool_to_mm[0], p.tool_to_mm[1], p.tool_to_mm[2]};
   const bool tool = p.tool_radius_mm > 0 || !moved.empty();  // things that go on for half of the time
   while (c.done < steps && !c.at_rest) {
     const double share = static_cast<double>(c.done) / static_cast<double>(steps), way = std::min(1.0, 2 * share);
@@ -157,12 +168,14 @@ Course go_on(Dynamics& dynamics, const SimulateParams& p, int batch, const Tissu
       const std::vector<Vec3> x = dynamics.positions_mm();
       for (const TissueLoad::Moved& m : moved) {
         Vec3 at = x[m.point];
-        for (std::size_t a = 0; a < 3; ++a) at[a] = (m.held >> a & 1) != 0 ? model.rest()[m.point][a] + way * m.by_mm[a] : at[a];
+        for (std::size_t a = 0; a < 3; ++a)
+          at[a] = (m.held >> a & 1) != 0 ? model.rest()[m.point][a] + way * m.by_mm[a] : at[a];
         dynamics.set_position(m.point, at);
       }
     }
     if (p.tool_radius_mm > 0)
-      dynamics.set_tool({std::make_shared<BallShape>(from + (to - from) * way, p.tool_radius_mm, false), p.tool_stiffness_n_per_mm});
+      dynamics.set_tool(
+          {std::make_shared<BallShape>(from + (to - from) * way, p.tool_radius_mm, false), p.tool_stiffness_n_per_mm});
     const int now = static_cast<int>(std::min<long>(tool ? std::max(1, batch / 10) : batch, steps - c.done));
     const Vec3 force = dynamics.step(now);
     c.done += now;
@@ -170,7 +183,8 @@ Course go_on(Dynamics& dynamics, const SimulateParams& p, int batch, const Tissu
     c.tool_most_n = std::max(c.tool_most_n, c.tool_now_n);
     context.progress(static_cast<double>(c.done) / static_cast<double>(steps), "steps");
     require_together(dynamics.positions_mm(), model.rest(), static_cast<double>(c.done) * dynamics.step_s());
-    c.at_rest = p.until_rest && (!tool || way >= 1) && dynamics.residual() < 1e-3 && dynamics.kinetic_mj() < 1e-6 * dynamics.elastic_mj();
+    c.at_rest = p.until_rest && (!tool || way >= 1) && dynamics.residual() < 1e-3 &&
+                dynamics.kinetic_mj() < 1e-6 * dynamics.elastic_mj();
   }
   return c;
 }
@@ -181,7 +195,8 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
   const TetMesh& mesh = *std::get<Tets>(inputs[0]);
   const TissueProblem problem = parse_tissue_problem(std::get<Document>(inputs[1]).json, mesh, false);
   const auto* const constants = std::get_if<Document>(&inputs[2]);
-  const TissueModel model = model_of_problem(mesh, problem, constants != nullptr ? std::optional(constants->json) : std::nullopt);
+  const TissueModel model =
+      model_of_problem(mesh, problem, constants != nullptr ? std::optional(constants->json) : std::nullopt);
   RigidContact obstacle{nullptr, p.obstacle_stiffness_n_per_mm};
   if (const auto* const surface = std::get_if<Surface>(&inputs[3])) {
     Vec3 lo = model.rest().front(), hi = lo;
@@ -194,8 +209,9 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
     const Vec3 size = hi - lo;
     const double around = 0.25 * std::max({size.x, size.y, size.z});
     const auto& t = model.tets().front();
-    obstacle.shape = std::make_shared<SurfaceShape>(**surface, lo - Vec3{around, around, around}, hi + Vec3{around, around, around},
-                                                    length(model.rest()[t[1]] - model.rest()[t[0]]) / 4, context.sub(0, 0.1));
+    obstacle.shape =
+        std::make_shared<SurfaceShape>(**surface, lo - Vec3{around, around, around}, hi + Vec3{around, around, around},
+                                       length(model.rest()[t[1]] - model.rest()[t[0]]) / 4, context.sub(0, 0.1));
   }
   std::vector<std::pair<std::uint32_t, Vec3>> load;
   std::vector<TissueLoad::Moved> moved;
@@ -211,7 +227,8 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
       if (m.held != 7) sliders.push_back({m.point, m.held});
     }
     if (!problem.loads[n].contacts.empty())
-      throw Error(ExitCode::usage, "simulate does not read a load's contacts", "give it the rigid thing as --obstacle, or use fem");
+      throw Error(ExitCode::usage, "simulate does not read a load's contacts",
+                  "give it the rigid thing as --obstacle, or use fem");
     name = problem.load_names[n];
   } else if (p.load != "none" && !p.load.empty()) {
     load_named(problem, p.load);
@@ -237,7 +254,8 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
     j["displacement"] = displacement(model.rest(), x);
     j["inverted_tetrahedra"] = model.inverted(x);
     if (p.until_rest && !c.at_rest)
-      context.warn("not at rest after " + format_number(p.seconds) + " s: residual " + format_number(dynamics.residual()));
+      context.warn("not at rest after " + format_number(p.seconds) + " s: residual " +
+                   format_number(dynamics.residual()));
     context.report("step_ms", 1000 * dynamics.step_s());
   };
   if (p.method == TimeMethod::implicit_steps) {
@@ -264,18 +282,20 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
     const auto& counts = dynamics.counts();
     if (counts.not_finite > 0)
       throw Error(ExitCode::failed,
-                  std::to_string(counts.not_finite) + " times a point was to go to a place that is no number: the load is too large",
+                  std::to_string(counts.not_finite) +
+                      " times a point was to go to a place that is no number: the load is too large",
                   "make it smaller, or take --method implicit");
     j["places_not_finite"] = counts.not_finite;
     j["points_made_heavier"] = counts.made_heavier;
     j["points_made_heavier_by_stretch"] = counts.stretched;
     j["pushes_softened"] = counts.softened;
     if (counts.made_heavier > 0)
-      context.warn(std::to_string(counts.made_heavier) + " points were made heavier for steps of " + format_number(p.least_step_ms) +
-                   " ms: motion is slower than it would be");
+      context.warn(std::to_string(counts.made_heavier) + " points were made heavier for steps of " +
+                   format_number(p.least_step_ms) + " ms: motion is slower than it would be");
     if (counts.softened > 0)
-      context.warn(std::to_string(counts.softened) +
-                   " pushes were softer than asked for, so that steps stay stable; --method implicit needs no such limit");
+      context.warn(
+          std::to_string(counts.softened) +
+          " pushes were softer than asked for, so that steps stay stable; --method implicit needs no such limit");
   }
   context.report("steps", static_cast<std::int64_t>(c.done));
   if (p.tool_radius_mm > 0) context.report("tool_n", c.tool_now_n);
@@ -283,4 +303,4 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
   return {moved_mesh(mesh, x), Document{written(j)}};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

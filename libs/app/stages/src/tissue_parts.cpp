@@ -16,7 +16,8 @@ constexpr double kSafePoisson = 0.4;       // above, linear elements lock
 }  // namespace
 
 Elements elements_for(LawChoice law, OrderChoice order, const TissueProblem& problem, const TetMesh& mesh) {
-  Elements t{law == LawChoice::automatic ? problem.law.value_or(ElasticLaw::neo_hooke) : static_cast<ElasticLaw>(static_cast<int>(law) - 1),
+  Elements t{law == LawChoice::automatic ? problem.law.value_or(ElasticLaw::neo_hooke)
+                                         : static_cast<ElasticLaw>(static_cast<int>(law) - 1),
              order == OrderChoice::t4        ? TetOrder::t4
              : order == OrderChoice::t4_mean ? TetOrder::t4_mean
                                              : TetOrder::t10,
@@ -31,8 +32,8 @@ Elements elements_for(LawChoice law, OrderChoice order, const TissueProblem& pro
       t.because += "; linear tetrahedra lock at a Poisson's ratio of " + format_number(poisson);
   } else if (mesh.tets.size() > kManyTets && poisson <= kSafePoisson) {
     t.order = TetOrder::t4;
-    t.because = std::to_string(mesh.tets.size()) + " tetrahedra, and none locks at a Poisson's ratio of " + format_number(poisson) +
-                ": linear ones";
+    t.because = std::to_string(mesh.tets.size()) + " tetrahedra, and none locks at a Poisson's ratio of " +
+                format_number(poisson) + ": linear ones";
   } else {
     t.because = poisson > kSafePoisson ? "linear tetrahedra lock at a Poisson's ratio of " + format_number(poisson)
                                        : "linear tetrahedra bend too little";
@@ -84,4 +85,4 @@ std::string written(const Json& j) {
   return j.dump(1) + "\n";
 }
 
-}  // namespace osteo::app::tissue
+}  // namespace osteo::inline app::tissue

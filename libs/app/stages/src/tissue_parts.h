@@ -3,8 +3,8 @@
 #include <span>
 #include <string>
 
-#include "osteo/core/base/json_document.h"
 #include "osteo/app/stages/tissue.h"
+#include "osteo/core/base/json_document.h"
 #include "osteo/simulation/tissue/problem.h"
 
 namespace osteo::inline app::tissue {
@@ -27,4 +27,4 @@ Json displacement(std::span<const Vec3> rest, std::span<const Vec3> x);
 Error not_at_rest(const Equilibrium& r, const std::string& advice);
 std::string written(const Json& j);
 
-}  // namespace osteo::app::tissue
+}  // namespace osteo::inline app::tissue

@@ -21,4 +21,4 @@ VtkFailure vtk_failure(const std::exception_ptr& thrown) {
   }
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -11,4 +11,4 @@ struct VtkFailure {
 };
 [[nodiscard]] VtkFailure vtk_failure(const std::exception_ptr& thrown);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -4,10 +4,10 @@
 #include <vtkDataObject.h>
 #include <vtkExecutive.h>
 
+#include "osteo/app/vtk/vtkOsteoDataObject.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/io/vtk_data.h"
-#include "osteo/app/vtk/vtkOsteoDataObject.h"
 #include "values.h"
 
 namespace osteo::inline app {
@@ -95,7 +95,8 @@ VtkPipeline::VtkPipeline(Pipeline pipeline, const Registry& registry, const VtkP
     filter->SetThreads(options.threads);
     filter->SetSeed(options.seed);
     for (const auto& [name, value] : node.params) done = done && filter->SetParameter(name, value);
-    if (!done) throw Error(ExitCode::usage, "stage '" + node.id + "': " + filter->GetLastError());  // not after validate()
+    if (!done)
+      throw Error(ExitCode::usage, "stage '" + node.id + "': " + filter->GetLastError());  // not after validate()
     const auto stage = registry.make(node.stage);
     for (const Port& port : stage->info().inputs) {
       const auto from = node.inputs.find(port.name);
@@ -130,7 +131,8 @@ const VtkPipeline::Step& VtkPipeline::at(const std::string& id) const {
   const auto it = steps_.find(id);
   if (it != steps_.end()) return it->second;
   const std::string near = nearest_name(id, ids_);
-  throw Error(ExitCode::usage, "the pipeline has no stage '" + id + "'", near.empty() ? "" : "did you mean '" + near + "'?");
+  throw Error(ExitCode::usage, "the pipeline has no stage '" + id + "'",
+              near.empty() ? "" : "did you mean '" + near + "'?");
 }
 
 vtkOsteoStage* VtkPipeline::step(const std::string& id) const {
@@ -140,7 +142,8 @@ vtkOsteoStage* VtkPipeline::step(const std::string& id) const {
 vtkAlgorithmOutput* VtkPipeline::output(const std::string& id, const std::string& port) const {
   vtkOsteoStage* const filter = at(id).filter;
   const int p = port.empty() ? 0 : filter->GetOutputPortIndex(port);
-  if (p < 0 || p >= filter->GetNumberOfOutputPorts()) throw Error(ExitCode::usage, "stage '" + id + "' has no output '" + port + "'");
+  if (p < 0 || p >= filter->GetNumberOfOutputPorts())
+    throw Error(ExitCode::usage, "stage '" + id + "' has no output '" + port + "'");
   return filter->GetOutputPort(p);
 }
 
@@ -195,12 +198,14 @@ void VtkPipeline::rethrow(const std::string& id, const std::exception_ptr& throw
   }
 }
 
-VtkPipeline load_vtk_pipeline(const fs::path& file, const std::map<std::string, std::string>& settings, const Registry& registry,
-                              const VtkPipelineOptions& options) {
+VtkPipeline load_vtk_pipeline(const fs::path& file, const std::map<std::string, std::string>& settings,
+                              const Registry& registry, const VtkPipelineOptions& options) {
   const std::string text = read_text(file), name = "'" + file.string() + "'";
   try {
     Pipeline pipeline = parse_pipeline(text, settings);
-    const auto where = [name, lines = step_lines(text)](const std::string& id) { return name + " line " + std::to_string(lines.at(id)); };
+    const auto where = [name, lines = step_lines(text)](const std::string& id) {
+      return name + " line " + std::to_string(lines.at(id));
+    };
     // One step at a time knows of itself only; whose error it is stands in its text, so the line is looked up by that.
     try {
       return {std::move(pipeline), registry, options, where};
@@ -220,4 +225,4 @@ MakeEngine vtk_engine(const Registry& registry) {
   return [&registry](const Pipeline& to_run) { return std::make_unique<VtkEngine>(to_run, registry); };
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -10,9 +10,9 @@
 
 #include <algorithm>
 
+#include "osteo/app/vtk/vtkOsteoDataObject.h"
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/io/vtk_data.h"
-#include "osteo/app/vtk/vtkOsteoDataObject.h"
 
 namespace osteo::inline app {
 
@@ -52,7 +52,8 @@ void inform(vtkInformation* info, const Data& value) {
   info->Set(vtkDataObject::SPACING(), image->GetSpacing(), 3);
   info->Set(vtkDataObject::ORIGIN(), image->GetOrigin(), 3);
   info->Set(vtkDataObject::DIRECTION(), image->GetDirectionMatrix()->GetData(), 9);
-  if (image->GetPointData()->GetScalars() != nullptr) vtkDataObject::SetPointDataActiveScalarInfo(info, image->GetScalarType(), 1);
+  if (image->GetPointData()->GetScalars() != nullptr)
+    vtkDataObject::SetPointDataActiveScalarInfo(info, image->GetScalarType(), 1);
 }
 
 void fill(vtkDataObject* object, const Data& value) {
@@ -78,7 +79,8 @@ void fill(vtkDataObject* object, const Data& value) {
 Data value_of(vtkDataObject* object, std::span<const DataKind> kinds, const std::string& called) {
   if (auto* const own = vtkOsteoDataObject::SafeDownCast(object)) return own->GetValue();
   const auto taken = [&](DataKind kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); };
-  if (const Data* const value = vtkOsteoDataObject::GetAttached(object); value != nullptr && taken(kind_of(*value))) return *value;
+  if (const Data* const value = vtkOsteoDataObject::GetAttached(object); value != nullptr && taken(kind_of(*value)))
+    return *value;
   for (const DataKind kind : kinds) {
     if (auto* const image = vtkImageData::SafeDownCast(object)) {
       const bool bytes = image->GetScalarType() == VTK_UNSIGNED_CHAR;
@@ -95,4 +97,4 @@ Data value_of(vtkDataObject* object, std::span<const DataKind> kinds, const std:
   throw Error(ExitCode::usage, "the input '" + called + "' cannot be a " + object->GetClassName());
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

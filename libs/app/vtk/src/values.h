@@ -25,4 +25,4 @@ void fill(vtkDataObject* object, const Data& value);
 /// Errors: usage, with `called`, when it can be none; corrupt, as of osteo/imaging/io/vtk_data.h.
 [[nodiscard]] Data value_of(vtkDataObject* object, std::span<const DataKind> kinds, const std::string& called);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

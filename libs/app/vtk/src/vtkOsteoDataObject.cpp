@@ -10,7 +10,8 @@ vtkStandardNewMacro(vtkOsteoDataObject);
 namespace {
 
 vtkInformationObjectBaseKey* attached_key() {
-  static vtkInformationObjectBaseKey* const key = vtkInformationObjectBaseKey::MakeKey("ATTACHED_VALUE", "osteo", "vtkOsteoDataObject");
+  static vtkInformationObjectBaseKey* const key =
+      vtkInformationObjectBaseKey::MakeKey("ATTACHED_VALUE", "osteo", "vtkOsteoDataObject");
   return key;
 }
 
@@ -62,7 +63,8 @@ void vtkOsteoDataObject::Attach(vtkDataObject* object, osteo::Data value) {
 
 const osteo::Data* vtkOsteoDataObject::GetAttached(vtkDataObject* object) {
   const auto* const holder = dynamic_cast<vtkOsteoDataObject*>(object->GetInformation()->Get(attached_key()));
-  return holder != nullptr && holder->Shown == object && holder->ShownTime == object->GetMTime() ? &holder->Value : nullptr;
+  return holder != nullptr && holder->Shown == object && holder->ShownTime == object->GetMTime() ? &holder->Value
+                                                                                                 : nullptr;
 }
 
 void vtkOsteoDataObject::Detach(vtkDataObject* object) {

@@ -17,7 +17,8 @@ using osteo::DataKind;
 vtkStandardNewMacro(vtkOsteoReader);
 
 vtkOsteoReader::vtkOsteoReader()
-    : Kinds{DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::picture, DataKind::document, DataKind::tets} {
+    : Kinds{DataKind::image,   DataKind::labels,   DataKind::grid, DataKind::surface,
+            DataKind::picture, DataKind::document, DataKind::tets} {
   this->SetNumberOfInputPorts(0);
   this->SetNumberOfOutputPorts(1);
 }
@@ -51,9 +52,11 @@ int vtkOsteoReader::FillOutputPortInformation(int, vtkInformation* info) {
   return 1;
 }
 
-vtkTypeBool vtkOsteoReader::ProcessRequest(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) {
+vtkTypeBool vtkOsteoReader::ProcessRequest(vtkInformation* request, vtkInformationVector** inputs,
+                                           vtkInformationVector* outputs) {
   using Request = vtkDemandDrivenPipeline;
-  const bool object = request->Has(Request::REQUEST_DATA_OBJECT()) != 0, information = request->Has(Request::REQUEST_INFORMATION()) != 0,
+  const bool object = request->Has(Request::REQUEST_DATA_OBJECT()) != 0,
+             information = request->Has(Request::REQUEST_INFORMATION()) != 0,
              data = request->Has(Request::REQUEST_DATA()) != 0;
   if (!object && !information && !data) return this->Superclass::ProcessRequest(request, inputs, outputs);
   if (!this->Load()) return 0;
@@ -68,13 +71,15 @@ vtkTypeBool vtkOsteoReader::ProcessRequest(vtkInformation* request, vtkInformati
 }
 
 bool vtkOsteoReader::Load() {
-  if (!std::holds_alternative<std::monostate>(this->Value) && this->ValueTime >= this->Superclass::GetMTime()) return true;
+  if (!std::holds_alternative<std::monostate>(this->Value) && this->ValueTime >= this->Superclass::GetMTime())
+    return true;
   this->Failed = false;
   this->Failure = nullptr;
   this->LastError.clear();
   try {
     if (this->FileName.empty()) throw osteo::Error(osteo::ExitCode::usage, "no file was named", "SetFileName");
-    this->Value = osteo::load_data(this->FileName, this->Kinds, this->Surroundings != nullptr ? *this->Surroundings : osteo::Context());
+    this->Value = osteo::load_data(this->FileName, this->Kinds,
+                                   this->Surroundings != nullptr ? *this->Surroundings : osteo::Context());
     this->ValueTime = this->Superclass::GetMTime();
     this->SetErrorCode(vtkErrorCode::NoError);
     return true;

@@ -109,7 +109,8 @@ void vtkOsteoStage::SetSeed(std::uint64_t seed) {
 
 int vtkOsteoStage::GetInputPortIndex(const std::string& name) const {
   for (std::size_t p = 0; p < this->StageInputOfPort.size(); ++p) {
-    if (this->Stage->info().inputs[static_cast<std::size_t>(this->StageInputOfPort[p])].name == name) return static_cast<int>(p);
+    if (this->Stage->info().inputs[static_cast<std::size_t>(this->StageInputOfPort[p])].name == name)
+      return static_cast<int>(p);
   }
   return -1;
 }
@@ -129,7 +130,8 @@ vtkMTimeType vtkOsteoStage::GetMTime() {
 }
 
 int vtkOsteoStage::FillInputPortInformation(int port, vtkInformation* info) {
-  const osteo::Port& p = this->Stage->info().inputs[static_cast<std::size_t>(this->StageInputOfPort[static_cast<std::size_t>(port)])];
+  const osteo::Port& p =
+      this->Stage->info().inputs[static_cast<std::size_t>(this->StageInputOfPort[static_cast<std::size_t>(port)])];
   std::vector<std::string> classes;
   for (const DataKind kind : p.kinds) {
     const std::string name = class_of(kind);
@@ -142,11 +144,13 @@ int vtkOsteoStage::FillInputPortInformation(int port, vtkInformation* info) {
 }
 
 int vtkOsteoStage::FillOutputPortInformation(int port, vtkInformation* info) {
-  info->Set(vtkDataObject::DATA_TYPE_NAME(), class_of(this->Stage->info().outputs[static_cast<std::size_t>(port)].kinds.front()));
+  info->Set(vtkDataObject::DATA_TYPE_NAME(),
+            class_of(this->Stage->info().outputs[static_cast<std::size_t>(port)].kinds.front()));
   return 1;
 }
 
-vtkTypeBool vtkOsteoStage::ProcessRequest(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) {
+vtkTypeBool vtkOsteoStage::ProcessRequest(vtkInformation* request, vtkInformationVector** inputs,
+                                          vtkInformationVector* outputs) {
   if (!this->Stage) {
     vtkErrorMacro("SetStage was not called");
     return 0;
@@ -178,11 +182,12 @@ bool vtkOsteoStage::CreateOutputs(vtkInformationVector* outputs) {
   return true;
 }
 
-// Whoever reads an image wants to know its extent before it exists. Only the stage itself knows it (crop finds its box in the voxels), so
-// a stage that makes an image is run here; Execute hands over what came out.
+// Whoever reads an image wants to know its extent before it exists. Only the stage itself knows it (crop finds its box
+// in the voxels), so a stage that makes an image is run here; Execute hands over what came out.
 bool vtkOsteoStage::Inform(vtkInformationVector** inputs, vtkInformationVector* outputs) {
   const auto& ports = this->Stage->info().outputs;
-  const bool makes_image = std::any_of(ports.begin(), ports.end(), [](const auto& p) { return is_image(p.kinds.front()); });
+  const bool makes_image =
+      std::any_of(ports.begin(), ports.end(), [](const auto& p) { return is_image(p.kinds.front()); });
   if (!makes_image) return true;
   for (int p = 0; p < this->GetNumberOfInputPorts(); ++p) {
     for (int c = 0; c < this->GetNumberOfInputConnections(p); ++c) {
@@ -252,7 +257,8 @@ bool vtkOsteoStage::Execute(vtkInformationVector** inputs, vtkInformationVector*
   const bool ready = !this->Results.empty() && this->ResultsTime >= this->Superclass::GetMTime();
   if (!ready && !this->Run(inputs)) return false;
   for (std::size_t p = 0; p < this->Results.size(); ++p) {
-    osteo::fill(outputs->GetInformationObject(static_cast<int>(p))->Get(vtkDataObject::DATA_OBJECT()), this->Results[p]);
+    osteo::fill(outputs->GetInformationObject(static_cast<int>(p))->Get(vtkDataObject::DATA_OBJECT()),
+                this->Results[p]);
   }
   this->Results.clear();
   return true;

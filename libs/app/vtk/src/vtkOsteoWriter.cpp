@@ -30,7 +30,8 @@ vtkOsteoWriter::~vtkOsteoWriter() = default;
 
 void vtkOsteoWriter::PrintSelf(ostream& os, vtkIndent indent) {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "FileName: " << this->FileName << '\n' << indent << "Overwrite: " << (this->Overwrite ? "on" : "off") << '\n';
+  os << indent << "FileName: " << this->FileName << '\n'
+     << indent << "Overwrite: " << (this->Overwrite ? "on" : "off") << '\n';
 }
 
 void vtkOsteoWriter::SetFileName(const std::string& path) {
@@ -68,7 +69,8 @@ int vtkOsteoWriter::FillInputPortInformation(int, vtkInformation* info) {
   return 1;
 }
 
-vtkTypeBool vtkOsteoWriter::ProcessRequest(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) {
+vtkTypeBool vtkOsteoWriter::ProcessRequest(vtkInformation* request, vtkInformationVector** inputs,
+                                           vtkInformationVector* outputs) {
   using Request = vtkStreamingDemandDrivenPipeline;
   if (request->Has(Request::REQUEST_UPDATE_EXTENT())) {
     vtkInformation* const info = inputs[0]->GetInformationObject(0);

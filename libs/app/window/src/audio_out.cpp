@@ -9,7 +9,8 @@
 namespace osteo::inline app {
 namespace {
 
-// While a card is looked for: where there is none, ALSA's library writes a dozen lines on standard error, and we say it in one.
+// While a card is looked for: where there is none, ALSA's library writes a dozen lines on standard error, and we say it
+// in one.
 class QuietAlsa {
  public:
   using Handler = void (*)(const char* file, int line, const char* function, int error, const char* format, ...);
@@ -33,7 +34,8 @@ AudioOut::AudioOut(std::function<void(std::span<float>)> fill) : fill_(std::move
   const QuietAlsa quiet;
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");  // Ctrl-C is ours
   SDL_SetHint(SDL_HINT_AUDIO_DEVICE_APP_NAME, "Osteotome");
-  if (SDL_InitSubSystem(SDL_INIT_AUDIO) != 0) throw Error(ExitCode::failed, std::string("there is no sound: ") + SDL_GetError());
+  if (SDL_InitSubSystem(SDL_INIT_AUDIO) != 0)
+    throw Error(ExitCode::failed, std::string("there is no sound: ") + SDL_GetError());
   SDL_AudioSpec wanted{}, got{};
   wanted.freq = Synthesizer::kRateHz;
   wanted.format = AUDIO_F32SYS;
@@ -41,7 +43,8 @@ AudioOut::AudioOut(std::function<void(std::span<float>)> fill) : fill_(std::move
   wanted.samples = kSamples;
   wanted.userdata = this;
   wanted.callback = [](void* self, Uint8* bytes, int length) {
-    static_cast<AudioOut*>(self)->fill_({reinterpret_cast<float*>(bytes), static_cast<std::size_t>(length) / sizeof(float)});
+    static_cast<AudioOut*>(self)->fill_(
+        {reinterpret_cast<float*>(bytes), static_cast<std::size_t>(length) / sizeof(float)});
   };
   device_ = SDL_OpenAudioDevice(nullptr, 0, &wanted, &got, 0);
   if (device_ == 0) {
@@ -67,4 +70,4 @@ AudioOut::Pause::~Pause() {
   SDL_UnlockAudioDevice(out_.device_);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -5,8 +5,8 @@
 #include <vtkPolyData.h>
 #include <vtkRenderWindow.h>
 
-#include "osteo/imaging/io/vtk_data.h"
 #include "osteo/display/view/actors.h"
+#include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo::inline app {
 
@@ -31,4 +31,4 @@ void BeforeView::place(vtkRenderer* now, bool shown) {
   renderer_->ResetCameraClippingRange();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

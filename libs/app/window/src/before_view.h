@@ -27,4 +27,4 @@ class BeforeView {
   vtkNew<vtkRenderer> renderer_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -27,8 +27,10 @@ std::string ButtonAssign::take(int button, HandButtons& buttons) {
     cancel();
     return does + " has no button now; its keys of the table (F1) go on";
   }
-  if (button == kF1 || button == kF10) return name + " stays what it is: help and the panel are reached by it; press another, or Esc";
-  if (button >= kFirstModifier && button <= kLastModifier) return "Shift, Ctrl and Alt go with other keys; press another, or Esc";
+  if (button == kF1 || button == kF10)
+    return name + " stays what it is: help and the panel are reached by it; press another, or Esc";
+  if (button >= kFirstModifier && button <= kLastModifier)
+    return "Shift, Ctrl and Alt go with other keys; press another, or Esc";
   const std::optional<HandFunction> before = buttons.assign(button, *for_);
   std::string said = name + ": " + does;
   if (before == for_) {
@@ -45,4 +47,4 @@ std::string ButtonAssign::take(int button, HandButtons& buttons) {
   return said;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -13,8 +13,8 @@ class ButtonAssign {
   void listen(HandFunction function) { for_ = function; }
   [[nodiscard]] std::optional<HandFunction> listens() const { return for_; }
   void cancel() { for_.reset(); }
-  /// A button went down while it listens: Esc gives up, Delete takes all buttons from it. Returns what there is to say: what the button did
-  /// before and no longer does, or why it was refused (then it goes on listening).
+  /// A button went down while it listens: Esc gives up, Delete takes all buttons from it. Returns what there is to say:
+  /// what the button did before and no longer does, or why it was refused (then it goes on listening).
   std::string take(int button, HandButtons& buttons);
 
  private:
@@ -24,4 +24,4 @@ class ButtonAssign {
 /// "drill", "wrist rest": as people read it.
 [[nodiscard]] std::string words_of(HandFunction function);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

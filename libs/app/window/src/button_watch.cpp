@@ -18,7 +18,8 @@ ButtonWatch::State& ButtonWatch::state_of(int button) {
   return all_.back();
 }
 
-void ButtonWatch::frame(std::span<const ButtonLevel> levels, bool attended, const HandButtons& buttons, Keyboard& keyboard) {
+void ButtonWatch::frame(std::span<const ButtonLevel> levels, bool attended, const HandButtons& buttons,
+                        Keyboard& keyboard) {
   pressed_.reset();
   const auto tell = [&](int button, Keyboard::Event event) {
     // One that was given another thing to do while it was down is let go all the same.
@@ -26,7 +27,8 @@ void ButtonWatch::frame(std::span<const ButtonLevel> levels, bool attended, cons
     keyboard.on(button, event);
   };
   std::erase_if(all_, [&](const State& s) {
-    const bool gone = std::none_of(levels.begin(), levels.end(), [&](const ButtonLevel& l) { return l.button == s.button; });
+    const bool gone =
+        std::none_of(levels.begin(), levels.end(), [&](const ButtonLevel& l) { return l.button == s.button; });
     if (gone && s.down) tell(s.button, Keyboard::Event::released);
     return gone;
   });
@@ -47,9 +49,10 @@ double ButtonWatch::drill(const HandButtons& buttons, bool by_device) const {
   double most = 0;
   for (const State& s : all_) {
     const bool own = s.button >= button::kPedal && s.button < button::kMouse;
-    if (s.down && !(own && by_device) && buttons.function(s.button) == HandFunction::drill) most = std::max(most, s.level);
+    if (s.down && !(own && by_device) && buttons.function(s.button) == HandFunction::drill)
+      most = std::max(most, s.level);
   }
   return most;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// Buttons of pedals, devices, pads and sticks, as if they were keys. Private to libs/app/window; reads none of them itself.
+// Buttons of pedals, devices, pads and sticks, as if they were keys. Private to libs/app/window; reads none of them
+// itself.
 #pragma once
 #include <optional>
 #include <span>
@@ -16,11 +17,12 @@ struct ButtonLevel {
 
 class ButtonWatch {
  public:
-  /// `levels`: of all that is there, in this frame; what is no longer among them is let go (its device is gone). `attended`: the window has
-  /// the keys; while it has not all is let go, and what was down then must come up before it counts again. What drills is not told to the
-  /// keyboard: see level().
+  /// `levels`: of all that is there, in this frame; what is no longer among them is let go (its device is gone).
+  /// `attended`: the window has the keys; while it has not all is let go, and what was down then must come up before it
+  /// counts again. What drills is not told to the keyboard: see level().
   void frame(std::span<const ButtonLevel> levels, bool attended, const HandButtons& buttons, Keyboard& keyboard);
-  /// The farthest down of those that count and drill, 0 to 1. `by_device`: what the device and its pedal press is its own business.
+  /// The farthest down of those that count and drill, 0 to 1. `by_device`: what the device and its pedal press is its
+  /// own business.
   [[nodiscard]] double drill(const HandButtons& buttons, bool by_device) const;
   /// A button that went down in the last frame.
   [[nodiscard]] std::optional<int> pressed() const { return pressed_; }
@@ -36,4 +38,4 @@ class ButtonWatch {
   std::optional<int> pressed_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

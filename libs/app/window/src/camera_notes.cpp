@@ -19,9 +19,10 @@ std::optional<std::string> CameraNotes::next(const CameraView& view, double now_
   if (noted_ && (*noted_ == view || now_s - noted_s_ < kLeastS)) return std::nullopt;
   noted_ = view;
   noted_s_ = now_s;
-  return "{\"eye_mm\":" + triple(view.eye_mm) + ",\"target_mm\":" + triple(view.target_mm) + ",\"up\":" + triple(view.up) +
-         ",\"view_angle_deg\":" + format_number(view.view_angle_deg) + ",\"pixels_per_mm\":" + format_number(view.pixels_per_mm) +
+  return "{\"eye_mm\":" + triple(view.eye_mm) + ",\"target_mm\":" + triple(view.target_mm) +
+         ",\"up\":" + triple(view.up) + ",\"view_angle_deg\":" + format_number(view.view_angle_deg) +
+         ",\"pixels_per_mm\":" + format_number(view.pixels_per_mm) +
          ",\"magnification\":" + format_number(view.magnification) + "}";
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -17,8 +17,8 @@ struct CameraView {
 
 class CameraNotes {
  public:
-  /// The value of a "camera" note, when the view is another than the last one noted in this session, and at most 60 times a second. What
-  /// comes too soon is noted with the next picture.
+  /// The value of a "camera" note, when the view is another than the last one noted in this session, and at most 60
+  /// times a second. What comes too soon is noted with the next picture.
   std::optional<std::string> next(const CameraView& view, double now_s, const void* session);
 
  private:
@@ -27,4 +27,4 @@ class CameraNotes {
   double noted_s_ = 0;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -20,14 +20,15 @@ std::optional<std::string> ask_for_code(WindowShell& shell, const std::string& h
     shell.new_frame();
     const auto w = static_cast<float>(shell.width()), h = static_cast<float>(shell.height());
     const float e = em(), wide = std::min(w, 30 * e), high = std::min(h, 14 * e);
-    begin_fixed("code", {std::floor((w - wide) / 2), std::floor((h - high) / 2), wide, high}, ImGuiWindowFlags_NoScrollbar);
+    begin_fixed("code", {std::floor((w - wide) / 2), std::floor((h - high) / 2), wide, high},
+                ImGuiWindowFlags_NoScrollbar);
     ImGui::TextWrapped("Join the session at %s", host.c_str());
     ImGui::TextWrapped("Type the code that it shows there: eight letters and digits.");
     ImGui::Dummy({0, 0.4F * e});
     if (!told) ImGui::SetKeyboardFocusHere();
     ImGui::SetNextItemWidth(16 * e);
-    done =
-        ImGui::InputText("##code", typed.data(), typed.size(), ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_CharsUppercase);
+    done = ImGui::InputText("##code", typed.data(), typed.size(),
+                            ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_CharsUppercase);
     ImGui::SameLine();
     done = ImGui::Button("join (Enter)") || done;
     ImGui::Dummy({0, 0.4F * e});
@@ -42,4 +43,4 @@ std::optional<std::string> ask_for_code(WindowShell& shell, const std::string& h
   return done ? std::optional(std::string(typed.data())) : std::nullopt;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -8,9 +8,9 @@
 
 #include "monitor_panel.h"
 #include "monitor_screen.h"
+#include "osteo/app/window/audio_out.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/app/window/audio_out.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -47,10 +47,12 @@ class ConsoleSound {
   std::optional<AudioOut> card_;
 };
 
-void write_state(const std::filesystem::path& file, const ConsoleFacts& facts, MonitorDesk* desk, bool answers, std::uint64_t pictures) {
+void write_state(const std::filesystem::path& file, const ConsoleFacts& facts, MonitorDesk* desk, bool answers,
+                 std::uint64_t pictures) {
   if (file.empty()) return;
-  Json j{{"page", "console"},        {"pictures", pictures}, {"connected", facts.connected}, {"ended", facts.ended},
-         {"samples", facts.samples}, {"lost", facts.lost},   {"events", facts.events},       {"trouble", facts.trouble}};
+  Json j{{"page", "console"},      {"pictures", pictures},     {"connected", facts.connected},
+         {"ended", facts.ended},   {"samples", facts.samples}, {"lost", facts.lost},
+         {"events", facts.events}, {"trouble", facts.trouble}};
   if (desk != nullptr) {
     j["channels"] = desk->wiring().labels();
     j["answers"] = answers;
@@ -67,7 +69,8 @@ void write_state(const std::filesystem::path& file, const ConsoleFacts& facts, M
     if (const auto found = desk->screen().threshold_ma()) j["threshold_ma"] = *found;
     j["muted"] = desk->sound().muted();
     j["gains_uv"] = Json::list();
-    for (std::size_t ch = 0; ch < desk->wiring().channels.size(); ++ch) j["gains_uv"].push_back(desk->screen().gain_uv(ch));
+    for (std::size_t ch = 0; ch < desk->wiring().channels.size(); ++ch)
+      j["gains_uv"].push_back(desk->screen().gain_uv(ch));
   }
   const std::filesystem::path beside = file.string() + ".new";
   std::ofstream(beside) << j.dump() << '\n';
@@ -111,7 +114,8 @@ void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
     } else {
       begin_fixed("waiting", {0, 0, w, h - foot});
       ImGui::TextWrapped(
-          "Waiting for a nerve monitor at %s: 'osteo rehearse CASE --stream igtl:PORT', or 'osteo stream SESSION --to igtl:PORT'.",
+          "Waiting for a nerve monitor at %s: 'osteo rehearse CASE --stream igtl:PORT', or 'osteo stream SESSION --to "
+          "igtl:PORT'.",
           options.server.c_str());
       ImGui::End();
     }
@@ -121,10 +125,11 @@ void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
       ImGui::TextUnformatted(("! " + facts.trouble).c_str());
       ImGui::PopStyleColor();
     } else {
-      ImGui::TextDisabled("%s  %s%s  %s  F freeze  M mute  G view%s  Q close", options.server.c_str(),
-                          facts.ended ? "the session has ended" : "connected",
-                          facts.lost > 0 ? (", " + std::to_string(facts.lost) + " samples lost on the way").c_str() : "",
-                          sound.words().c_str(), desk && desk->stimulates() ? "  S stimulator  T threshold" : "");
+      ImGui::TextDisabled(
+          "%s  %s%s  %s  F freeze  M mute  G view%s  Q close", options.server.c_str(),
+          facts.ended ? "the session has ended" : "connected",
+          facts.lost > 0 ? (", " + std::to_string(facts.lost) + " samples lost on the way").c_str() : "",
+          sound.words().c_str(), desk && desk->stimulates() ? "  S stimulator  T threshold" : "");
     }
     ImGui::End();
     shell.show_page();
@@ -133,4 +138,4 @@ void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
   sound.follow(nullptr);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

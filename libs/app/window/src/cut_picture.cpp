@@ -15,7 +15,9 @@ constexpr std::uint32_t colour(const std::array<std::uint8_t, 3>& c) {
   return colour(c[0], c[1], c[2]);
 }
 std::uint32_t mix(std::uint32_t a, const std::array<std::uint8_t, 3>& b, std::uint32_t share) {  // share of b, of 256
-  const auto part = [&](int shift, std::uint8_t v) { return (((a >> shift & 255) * (256 - share) + v * share) >> 8) << shift; };
+  const auto part = [&](int shift, std::uint8_t v) {
+    return (((a >> shift & 255) * (256 - share) + v * share) >> 8) << shift;
+  };
   return part(0, b[0]) | part(8, b[1]) | part(16, b[2]) | 0xff000000U;
 }
 
@@ -32,7 +34,8 @@ std::optional<double> hu_at(const Image& ct, Vec3 world_mm) {
   return sample_linear(ct, x);
 }
 
-void draw_cut(const SliceView& view, const EditDocument& document, const CutLook& look, std::vector<std::uint32_t>& rgba) {
+void draw_cut(const SliceView& view, const EditDocument& document, const CutLook& look,
+              std::vector<std::uint32_t>& rgba) {
   const Image& ct = document.ct();
   const auto width = static_cast<std::size_t>(view.width), height = static_cast<std::size_t>(view.height);
   rgba.resize(width * height);
@@ -65,7 +68,8 @@ void draw_cut(const SliceView& view, const EditDocument& document, const CutLook
           return static_cast<float>(c - static_cast<double>(low));
         };
         std::ptrdiff_t i = 0, j = 0, k = 0, si = 0, sj = 0, sk = 0;
-        const float u = split(at.x, f.dims[0], i, si), v = split(at.y, f.dims[1], j, sj), w = split(at.z, f.dims[2], k, sk);
+        const float u = split(at.x, f.dims[0], i, si), v = split(at.y, f.dims[1], j, sj),
+                    w = split(at.z, f.dims[2], k, sk);
         const std::int16_t* const c = ct.voxels.get() + k * nxy + j * nx + i;
         const auto lerp = [](float a, float b, float t) { return a + (b - a) * t; };
         const auto square = [&](const std::int16_t* q) {
@@ -75,10 +79,14 @@ void draw_cut(const SliceView& view, const EditDocument& document, const CutLook
         const float hu = w == 0 ? square(c) : lerp(square(c), square(c + sk * nxy), w);
         const auto g = static_cast<std::uint32_t>(std::clamp((static_cast<double>(hu) - black) * scale, 0.0, 255.0));
         rgba[p] = colour(g, g, g);
-        const int ni = static_cast<int>(at.x + 0.5), nj = static_cast<int>(at.y + 0.5), nk = static_cast<int>(at.z + 0.5);
+        const int ni = static_cast<int>(at.x + 0.5), nj = static_cast<int>(at.y + 0.5),
+                  nk = static_cast<int>(at.z + 0.5);
         unsigned is = document.bone().at(ni, nj, nk) ? 1U : 0U;
-        if (look.live && static_cast<double>(hu) >= look.live->lower_hu && static_cast<double>(hu) <= look.live->upper_hu) is |= 2U;
-        if (const std::uint8_t label = labels[static_cast<std::size_t>(nk * nxy + nj * nx + ni)]; label != 0 && shown[label] != nullptr)
+        if (look.live && static_cast<double>(hu) >= look.live->lower_hu &&
+            static_cast<double>(hu) <= look.live->upper_hu)
+          is |= 2U;
+        if (const std::uint8_t label = labels[static_cast<std::size_t>(nk * nxy + nj * nx + ni)];
+            label != 0 && shown[label] != nullptr)
           is |= static_cast<unsigned>(label) << 8;
         what[p] = static_cast<What>(is);
       }
@@ -121,4 +129,4 @@ void draw_cut(const SliceView& view, const EditDocument& document, const CutLook
   });
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

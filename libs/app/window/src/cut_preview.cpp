@@ -43,4 +43,4 @@ void CutPreview::clear() {
   *this = {};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

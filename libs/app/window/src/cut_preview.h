@@ -31,4 +31,4 @@ class CutPreview {
   std::string text_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -42,7 +42,8 @@ void CutsControl::set_cross(Vec3 world_mm) {
   }
   cross_mm_ = world_mm;
   for (SliceView& v : views_) v.through_mm = cross_mm_;
-  if (pointer_.view >= 0) under_mouse_ = view(pointer_.view).world(pointer_.x, pointer_.y);  // another slice is under it
+  if (pointer_.view >= 0)
+    under_mouse_ = view(pointer_.view).world(pointer_.x, pointer_.y);  // another slice is under it
 }
 
 void CutsControl::go_to(Vec3 world_mm) {
@@ -80,7 +81,8 @@ void CutsControl::keep_cross_in_view() {
 }
 
 void CutsControl::turn_to_tool() {
-  // Carried along by the smallest turn: taken from the body's axes at each moment it would jump where the tool passes one of them.
+  // Carried along by the smallest turn: taken from the body's axes at each moment it would jump where the tool passes
+  // one of them.
   Vec3 right = beside_.right - axis_ * dot(beside_.right, axis_);
   if (length(right) < 0.05) right = beside_.down - axis_ * dot(beside_.down, axis_);
   beside_.right = normalized(right);
@@ -175,4 +177,4 @@ void CutsControl::double_click(SlicePointer p) {
   if (p.view >= 0) enlarge_or_back();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

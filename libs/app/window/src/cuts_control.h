@@ -1,5 +1,5 @@
-// The three cuts beside the bone without their screen: which planes, where, how bright, what the mouse does. Private to libs/app/window; no
-// GLFW, no ImGui, no VTK.
+// The three cuts beside the bone without their screen: which planes, where, how bright, what the mouse does. Private to
+// libs/app/window; no GLFW, no ImGui, no VTK.
 #pragma once
 #include <array>
 #include <optional>
@@ -20,11 +20,11 @@ class CutsControl {
   // --- each frame
   /// Pixels of a cut on the screen.
   void resize(int cut, int width, int height);
-  /// A box around the bone: the crosshair stays in it, and its middle is in the middle of the pictures at first. `step_mm`: how far a notch
-  /// of the wheel scrolls.
+  /// A box around the bone: the crosshair stays in it, and its middle is in the middle of the pictures at first.
+  /// `step_mm`: how far a notch of the wheel scrolls.
   void set_bounds(Vec3 lo_mm, Vec3 hi_mm, double step_mm);
-  /// The tool in the hand: its tip and its axis (unit, along the handle). While the cuts follow it, they go through its tip (or the
-  /// place of the bone's box nearest to it), and the picture stands still until that comes near its edge.
+  /// The tool in the hand: its tip and its axis (unit, along the handle). While the cuts follow it, they go through its
+  /// tip (or the place of the bone's box nearest to it), and the picture stands still until that comes near its edge.
   void tool_is(Vec3 tip_mm, Vec3 axis);
 
   [[nodiscard]] const SliceView& view(int cut) const { return views_[static_cast<std::size_t>(cut)]; }
@@ -45,8 +45,9 @@ class CutsControl {
   [[nodiscard]] int preset() const { return preset_; }
   void take_preset(int number);  ///< index in grey_presets()
 
-  // --- mouse: left click: crosshair; left drag: ruler; right drag: window and level, right click: as the preset has them; middle drag:
-  // moves; wheel: scrolls, with Ctrl: nearer and farther; moved with Shift: crosshair; double click: enlarge_or_back()
+  // --- mouse: left click: crosshair; left drag: ruler; right drag: window and level, right click: as the preset has
+  // them; middle drag: moves; wheel: scrolls, with Ctrl: nearer and farther; moved with Shift: crosshair; double click:
+  // enlarge_or_back()
   void press(SlicePointer at, SliceButton button);
   void move(SlicePointer at);
   void release(SlicePointer at, SliceButton button);
@@ -83,4 +84,4 @@ class CutsControl {
   std::optional<Ruler> ruler_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

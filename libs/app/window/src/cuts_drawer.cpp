@@ -10,8 +10,8 @@ namespace {
 bool same_cut(const SliceView& a, const SliceView& b) {
   const SliceAxes x = a.axes(), y = b.axes();
   // The crosshair may move within a cut, which stays the same.
-  return a.width == b.width && a.height == b.height && a.mm_per_pixel == b.mm_per_pixel && x.right == y.right && x.down == y.down &&
-         length(a.world(0, 0) - b.world(0, 0)) < 1e-9;
+  return a.width == b.width && a.height == b.height && a.mm_per_pixel == b.mm_per_pixel && x.right == y.right &&
+         x.down == y.down && length(a.world(0, 0) - b.world(0, 0)) < 1e-9;
 }
 
 // That a processor has given to this thread.
@@ -87,7 +87,8 @@ std::vector<DrawnCut> CutsDrawer::next(const std::array<std::optional<SliceView>
       one.cut = number;
       one.view = picture_of(view);
       draw_live_cut(one.view, cut, one.rgba);
-      for (const CutStructure& s : structures_) one.outlines.push_back({s.value, section_of(*s.surface, view.through_mm, view.normal())});
+      for (const CutStructure& s : structures_)
+        one.outlines.push_back({s.value, section_of(*s.surface, view.through_mm, view.normal())});
     }
     done.ms = thread_ms() - begin_ms;
     return done;
@@ -95,4 +96,4 @@ std::vector<DrawnCut> CutsDrawer::next(const std::array<std::optional<SliceView>
   return drawn;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

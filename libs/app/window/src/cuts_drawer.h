@@ -1,4 +1,5 @@
-// Draws the cuts beside the window, in a thread, and only when what they show has changed. Private to libs/app/window; no OpenGL, no ImGui.
+// Draws the cuts beside the window, in a thread, and only when what they show has changed. Private to libs/app/window;
+// no OpenGL, no ImGui.
 #pragma once
 #include <array>
 #include <chrono>
@@ -43,13 +44,16 @@ struct DrawnCut {
 class CutsDrawer {
  public:
   ~CutsDrawer();
-  /// What never changes in a session. `ct` and `before` as LiveCut has them; owned. `least_mm_per_pixel`: pixels are no finer.
+  /// What never changes in a session. `ct` and `before` as LiveCut has them; owned. `least_mm_per_pixel`: pixels are no
+  /// finer.
   void show(std::shared_ptr<const CtValues> ct, std::vector<std::shared_ptr<const GridSampler>> before,
             std::vector<CutStructure> structures, double least_mm_per_pixel);
 
-  /// Takes what has been drawn since the last call, and begins to draw what `views` (none: not seen) and `scene` ask for, where that is
-  /// something else, nothing is being drawn, and drawing has not just taken more than a third of a processor.
-  [[nodiscard]] std::vector<DrawnCut> next(const std::array<std::optional<SliceView>, 3>& views, const CutsScene& scene);
+  /// Takes what has been drawn since the last call, and begins to draw what `views` (none: not seen) and `scene` ask
+  /// for, where that is something else, nothing is being drawn, and drawing has not just taken more than a third of a
+  /// processor.
+  [[nodiscard]] std::vector<DrawnCut> next(const std::array<std::optional<SliceView>, 3>& views,
+                                           const CutsScene& scene);
   [[nodiscard]] bool busy() const { return drawing_.valid(); }
   /// Of a processor, for all cuts of the drawing that ended last; 0: none yet.
   [[nodiscard]] double last_ms() const { return last_ms_; }
@@ -72,4 +76,4 @@ class CutsDrawer {
   double last_ms_ = 0;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

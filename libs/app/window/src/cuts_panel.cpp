@@ -14,8 +14,10 @@ namespace osteo::inline app {
 namespace {
 
 constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
-                                    ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse;
-constexpr ImU32 kHead = IM_COL32(255, 170, 60, 240), kShaft = IM_COL32(190, 200, 215, 220), kPlanned = IM_COL32(255, 90, 220, 230);
+                                    ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoScrollbar |
+                                    ImGuiWindowFlags_NoScrollWithMouse;
+constexpr ImU32 kHead = IM_COL32(255, 170, 60, 240), kShaft = IM_COL32(190, 200, 215, 220),
+                kPlanned = IM_COL32(255, 90, 220, 230);
 
 float scale_now() {
   return ImGui::GetFontSize() / 13;
@@ -29,8 +31,8 @@ TriMesh blade_of(const SawCut& cut) {
                         deep * ((cut.depth_mm > 0 ? cut.depth_mm : kEndless) / 2)};
   TriMesh box;
   for (int c = 0; c < 8; ++c) {
-    box.points_mm.push_back(
-        to_floats(cut.at_mm + half[0] * ((c & 1) != 0 ? 1 : -1) + half[1] * ((c & 2) != 0 ? 1 : -1) + half[2] * ((c & 4) != 0 ? 1 : -1)));
+    box.points_mm.push_back(to_floats(cut.at_mm + half[0] * ((c & 1) != 0 ? 1 : -1) +
+                                      half[1] * ((c & 2) != 0 ? 1 : -1) + half[2] * ((c & 4) != 0 ? 1 : -1)));
   }
   box.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
@@ -117,7 +119,8 @@ void CutsPanel::begin(Rehearsal& rehearsal, StructuresView* structures, RegionsV
       const BrickGrid& bone = b.body->bone;
       for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) {
         const Ijk at = bone.brick_coordinate(brick);
-        const Vec3 p = b.world_from_body(bone.frame().world_from_index({at.i * 8 + 3.5, at.j * 8 + 3.5, at.k * 8 + 3.5}));
+        const Vec3 p =
+            b.world_from_body(bone.frame().world_from_index({at.i * 8 + 3.5, at.j * 8 + 3.5, at.k * 8 + 3.5}));
         for (std::size_t a = 0; a < 3; ++a) {
           lo[a] = std::min(lo[a], p[a]);
           hi[a] = std::max(hi[a], p[a]);
@@ -145,7 +148,8 @@ void CutsPanel::lay_out(const RoomLayout& room) {
     header_ = {c.x, c.y, c.width, std::min(top, c.height)};
     footer_ = {c.x, std::max(c.y, c.bottom() - bottom), c.width, std::min(bottom, c.height)};
     const float each = std::floor((c.height - top - bottom) / CutsControl::kCuts);
-    for (std::size_t n = 0; n < boxes_.size(); ++n) boxes_[n] = {c.x, c.y + top + static_cast<float>(n) * each, c.width, each - 2};
+    for (std::size_t n = 0; n < boxes_.size(); ++n)
+      boxes_[n] = {c.x, c.y + top + static_cast<float>(n) * each, c.width, each - 2};
   } else if (!room.cuts[0].empty()) {
     boxes_ = room.cuts;
     ScreenBox& first = boxes_.front();
@@ -168,7 +172,8 @@ void CutsPanel::upload(DrawnCut cut) {
   const auto n = static_cast<std::size_t>(cut.cut);
   glBindTexture(GL_TEXTURE_2D, textures_[n]);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, cut.view.width, cut.view.height, 0, GL_RGBA, GL_UNSIGNED_BYTE, cut.rgba.data());
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, cut.view.width, cut.view.height, 0, GL_RGBA, GL_UNSIGNED_BYTE,
+               cut.rgba.data());
   glBindTexture(GL_TEXTURE_2D, 0);
   cut.rgba = {};
   drawn_[n] = std::move(cut);
@@ -193,7 +198,8 @@ void CutsPanel::take(Rehearsal& rehearsal) {
 
 void CutsPanel::draw(Rehearsal& rehearsal, const SawCut* planned) {
   const TickRecord tick = rehearsal.latest();
-  control_.tool_is(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm), normalized(from_floats(tick.device.axis)));
+  control_.tool_is(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
+                   normalized(from_floats(tick.device.axis)));
   if (const auto note = notes_.next(look(), ImGui::GetTime())) rehearsal.note("cuts", *note);
   if (header_.empty()) return;
   ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
@@ -225,15 +231,19 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
     if (ImGui::IsItemHovered()) {
       const HuWindow& hu = grey_presets()[static_cast<std::size_t>(p)].hu;
       ImGui::SetTooltip(
-          "window %.0f, level %.0f HU. Drag with the right button in a cut to change it; right click: back to this.%s", hu.width, hu.level,
-          ct_ && !ct_->soft_tissue() ? "\nThe case keeps CT values of bone only: soft tissue stays black without --scan." : "");
+          "window %.0f, level %.0f HU. Drag with the right button in a cut to change it; right click: back to this.%s",
+          hu.width, hu.level,
+          ct_ && !ct_->soft_tissue()
+              ? "\nThe case keeps CT values of bone only: soft tissue stays black without --scan."
+              : "");
     }
   }
   bool follows = control_.follows();
   if (ImGui::Checkbox("follow", &follows)) control_.follow(follows);
   ImGui::SameLine();
   const bool along = control_.planes() == CutsControl::Planes::tool;
-  if (small_button("along the drill (F4)", along)) control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
+  if (small_button("along the drill (F4)", along))
+    control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
   ImGui::Checkbox("removed", &shown_.tint_removed);
   if (before_.empty()) shown_.tint_removed = false;
   if (rehearsal.structures() != nullptr) {
@@ -246,7 +256,8 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
     if (small_button("plan", regions_->shown())) regions_->show(!regions_->shown());
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("what the procedure wants removed (green) or left (orange); Ctrl-L");
   }
-  ImGui::TextDisabled("%.0f / %.0f HU   F3: %s", control_.hu.width, control_.hu.level, control_.enlarged() >= 0 ? "back" : "in the middle");
+  ImGui::TextDisabled("%.0f / %.0f HU   F3: %s", control_.hu.width, control_.hu.level,
+                      control_.enlarged() >= 0 ? "back" : "in the middle");
   ImGui::End();
 }
 
@@ -255,8 +266,8 @@ void CutsPanel::mouse_over(int cut, float corner_x, float corner_y) {
   if (!hovered && !active) return;
   mouse_in_ = true;
   const ImGuiIO& io = ImGui::GetIO();
-  const SlicePointer at{cut, static_cast<double>(io.MousePos.x - corner_x) - 0.5, static_cast<double>(io.MousePos.y - corner_y) - 0.5,
-                        io.KeyShift, io.KeyCtrl};
+  const SlicePointer at{cut, static_cast<double>(io.MousePos.x - corner_x) - 0.5,
+                        static_cast<double>(io.MousePos.y - corner_y) - 0.5, io.KeyShift, io.KeyCtrl};
   control_.move(at);
   constexpr std::pair<ImGuiMouseButton, SliceButton> kButtons[] = {{ImGuiMouseButton_Left, SliceButton::left},
                                                                    {ImGuiMouseButton_Right, SliceButton::right},
@@ -284,8 +295,9 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
   ImGui::PushStyleColor(ImGuiCol_WindowBg, {0, 0, 0, 1});
   ImGui::Begin(("cut " + std::to_string(cut)).c_str(), nullptr, kFixed | ImGuiWindowFlags_NoBringToFrontOnFocus);
   const ImVec2 lo = ImGui::GetCursorScreenPos();
-  ImGui::InvisibleButton("picture", {box.width, box.height},
-                         ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight | ImGuiButtonFlags_MouseButtonMiddle);
+  ImGui::InvisibleButton(
+      "picture", {box.width, box.height},
+      ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight | ImGuiButtonFlags_MouseButtonMiddle);
   mouse_over(cut, lo.x, lo.y);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const SliceView& view = control_.view(cut);
@@ -304,9 +316,10 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
       for (const DrawnCut::Outline& o : drawn->outlines) {
         if (o.value >= CutStructure::kRegion) {
           if (!regions_->shown()) continue;
-          const auto c = region_colour(regions_->all()[static_cast<std::size_t>(o.value - CutStructure::kRegion)].region.forbidden);
-          const ImU32 ink =
-              ImGui::ColorConvertFloat4ToU32({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 0.9F});
+          const auto c = region_colour(
+              regions_->all()[static_cast<std::size_t>(o.value - CutStructure::kRegion)].region.forbidden);
+          const ImU32 ink = ImGui::ColorConvertFloat4ToU32(
+              {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 0.9F});
           for (const CutLine& line : o.lines) on.line(line, ink, 1.2F * scale);
           continue;
         }
@@ -314,14 +327,16 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
         const auto s = std::find_if(all.begin(), all.end(), [&](const auto& one) { return one.value == o.value; });
         if (s == all.end() || s->look == StructureLook::hidden) continue;
         const auto c = rehearsal.structures()->colour_of(s->value);
-        const ImU32 colour = ImGui::ColorConvertFloat4ToU32(
-            {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), s->look == StructureLook::clear ? 0.55F : 1.0F});
+        const ImU32 colour =
+            ImGui::ColorConvertFloat4ToU32({static_cast<float>(c[0]), static_cast<float>(c[1]),
+                                            static_cast<float>(c[2]), s->look == StructureLook::clear ? 0.55F : 1.0F});
         for (const CutLine& line : o.lines) on.line(line, colour, 1.6F * scale);
       }
     }
   }
   if (planned != nullptr) {
-    for (const CutLine& line : section_of(blade_of(*planned), view.through_mm, view.normal())) on.line(line, kPlanned, 1.5F * scale);
+    for (const CutLine& line : section_of(blade_of(*planned), view.through_mm, view.normal()))
+      on.line(line, kPlanned, 1.5F * scale);
   }
   for (std::size_t hand = 0; hand < rehearsal.hands(); ++hand) {
     const TickRecord tick = rehearsal.latest(hand);
@@ -356,8 +371,8 @@ void CutsPanel::readout(const Rehearsal& rehearsal) {
     if (const StructureMap* const map = rehearsal.structures()) {
       if (const auto near = map->at(*p); near.structure != 0) {
         char text[160];
-        std::snprintf(text, sizeof text, near.distance_mm < 0 ? "in %s" : "%s, %.1f mm away", map->name_of(near.structure).c_str(),
-                      near.distance_mm);
+        std::snprintf(text, sizeof text, near.distance_mm < 0 ? "in %s" : "%s, %.1f mm away",
+                      map->name_of(near.structure).c_str(), near.distance_mm);
         below += (below.empty() ? "" : ";  ") + std::string(text);
       }
     }
@@ -374,7 +389,8 @@ void CutsPanel::list_structures(Rehearsal& rehearsal) {
   ImGui::SetNextWindowPos({header_.x - width, header_.y});
   ImGui::SetNextWindowSizeConstraints({width, 0}, {width, 0.8F * middle_.height});
   ImGui::Begin("Structures", &list_open_,
-               ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_AlwaysAutoResize);
+               ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
+                   ImGuiWindowFlags_AlwaysAutoResize);
   static constexpr const char* kWords[] = {"solid", "clear", "hidden"};
   const auto take = [&](std::size_t number, StructureLook look) {
     const StructuresView::One& s = structures_->all()[number];
@@ -398,7 +414,8 @@ void CutsPanel::list_structures(Rehearsal& rehearsal) {
     const std::uint8_t value = structures_->all()[s].value;
     const auto c = map.colour_of(value);
     const std::string name = map.name_of(value), id = std::to_string(value);
-    ImGui::ColorButton(("##" + id).c_str(), {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 1},
+    ImGui::ColorButton(("##" + id).c_str(),
+                       {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 1},
                        ImGuiColorEditFlags_NoTooltip, {ImGui::GetFontSize(), ImGui::GetFontSize()});
     ImGui::SameLine();
     ImGui::TextUnformatted(name.c_str());
@@ -408,4 +425,4 @@ void CutsPanel::list_structures(Rehearsal& rehearsal) {
   ImGui::End();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

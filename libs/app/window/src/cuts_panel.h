@@ -1,4 +1,5 @@
-// The three linked cuts at the side of the window, one of which can take the middle, and the list of structures. Private to libs/app/window.
+// The three linked cuts at the side of the window, one of which can take the middle, and the list of structures.
+// Private to libs/app/window.
 #pragma once
 #include <array>
 #include <optional>
@@ -6,10 +7,10 @@
 #include "cuts_control.h"
 #include "cuts_drawer.h"
 #include "looks.h"
-#include "osteo/simulation/bone/saw.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/display/view/planned_regions.h"
 #include "osteo/display/view/structures_view.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/bone/saw.h"
 #include "room_layout.h"
 
 namespace osteo::inline app {
@@ -27,8 +28,8 @@ class CutsPanel {
   /// As they looked in another session.
   void take(const CutsLook& look);
 
-  /// Before the rest of a frame: where things lie. In a column one below the other, four up, or, where there is room for neither, not at
-  /// all.
+  /// Before the rest of a frame: where things lie. In a column one below the other, four up, or, where there is room
+  /// for neither, not at all.
   void lay_out(const RoomLayout& room);
   /// Width of the column as the person dragged it; 0: as the layout has it.
   [[nodiscard]] float wished_width() const { return wished_width_; }
@@ -65,4 +66,4 @@ class CutsPanel {
   bool list_open_ = false, mouse_in_ = false;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

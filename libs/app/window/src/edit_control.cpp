@@ -30,8 +30,14 @@ std::string rounded(double v) {
   return text;
 }
 
-constexpr std::array<std::array<int, 3>, 8> kColours{
-    {{255, 220, 60}, {90, 170, 255}, {90, 220, 130}, {240, 120, 200}, {255, 140, 80}, {120, 230, 230}, {190, 150, 255}, {200, 220, 110}}};
+constexpr std::array<std::array<int, 3>, 8> kColours{{{255, 220, 60},
+                                                      {90, 170, 255},
+                                                      {90, 220, 130},
+                                                      {240, 120, 200},
+                                                      {255, 140, 80},
+                                                      {120, 230, 230},
+                                                      {190, 150, 255},
+                                                      {200, 220, 110}}};
 
 }  // namespace
 
@@ -47,7 +53,8 @@ EditControl::EditControl(EditDocument& document)
   const Image& ct = document_.ct();
   int lowest = 32767;
   for (const Run& r : document_.bone().runs(true)) {
-    const std::int16_t* const row = ct.voxels.get() + static_cast<std::size_t>(r.row) * static_cast<std::size_t>(ct.frame.dims[0]);
+    const std::int16_t* const row =
+        ct.voxels.get() + static_cast<std::size_t>(r.row) * static_cast<std::size_t>(ct.frame.dims[0]);
     lowest = std::min(lowest, static_cast<int>(*std::min_element(row + r.begin, row + r.end)));
   }
   if (lowest < 32767) lower_hu = lowest;
@@ -67,7 +74,8 @@ EditControl::EditControl(EditDocument& document)
   fit();
 }
 
-// --- views ----------------------------------------------------------------------------------------------------------------------------
+// --- views
+// ----------------------------------------------------------------------------------------------------------------------------
 
 void EditControl::resize(int view, int width, int height) {
   SliceView& v = views_[static_cast<std::size_t>(view)];
@@ -80,8 +88,8 @@ void EditControl::fit() {
   const Frame& f = document_.ct().frame;
   Vec3 lo = f.centre_mm(), hi = lo;
   for (int c = 0; c < 8; ++c) {
-    const Vec3 p = f.world_from_index(
-        {(c & 1) != 0 ? f.dims[0] - 0.5 : -0.5, (c & 2) != 0 ? f.dims[1] - 0.5 : -0.5, (c & 4) != 0 ? f.dims[2] - 0.5 : -0.5});
+    const Vec3 p = f.world_from_index({(c & 1) != 0 ? f.dims[0] - 0.5 : -0.5, (c & 2) != 0 ? f.dims[1] - 0.5 : -0.5,
+                                       (c & 4) != 0 ? f.dims[2] - 0.5 : -0.5});
     for (std::size_t a = 0; a < 3; ++a) {
       lo[a] = std::min(lo[a], p[a]);
       hi[a] = std::max(hi[a], p[a]);
@@ -89,7 +97,8 @@ void EditControl::fit() {
   }
   const Vec3 size = hi - lo;
   for (SliceView& v : views_) {
-    const double across = v.plane == Plane::sagittal ? size.y : size.x, down = v.plane == Plane::axial ? size.y : size.z;
+    const double across = v.plane == Plane::sagittal ? size.y : size.x,
+                 down = v.plane == Plane::axial ? size.y : size.z;
     v.centre_mm = f.centre_mm();
     v.mm_per_pixel = 1.04 * std::max(across / v.width, down / v.height);
   }
@@ -129,7 +138,8 @@ std::pair<int, int> EditControl::slice(int view) const {
   return {dot(f.direction.column[a], count_along(plane)) >= 0 ? at + 1 : f.dims[a] - at, f.dims[a]};
 }
 
-// --- mouse ----------------------------------------------------------------------------------------------------------------------------
+// --- mouse
+// ----------------------------------------------------------------------------------------------------------------------------
 
 bool EditControl::refuse_when_busy() {
   if (busy()) message_ = "wait until it is worked out (Esc stops it)";
@@ -151,7 +161,8 @@ void EditControl::press(SlicePointer at, SliceButton button) {
       box_from_mm_ = p;
       break;
     case EditTool::piece:
-      if (!refuse_when_busy()) start({IslandEdit{{p.x, p.y, p.z}, at.shift ? IslandChoice::keep : IslandChoice::remove}});
+      if (!refuse_when_busy())
+        start({IslandEdit{{p.x, p.y, p.z}, at.shift ? IslandChoice::keep : IslandChoice::remove}});
       break;
     case EditTool::brush:
     case EditTool::eraser:
@@ -253,13 +264,16 @@ std::string EditControl::readout() const {
   text += "   " + std::to_string(std::lround(*here)) + " HU";
   const Vec3 x = ct.frame.index_from_world(*under_mouse_);
   std::array<int, 3> at{};
-  for (std::size_t a = 0; a < 3; ++a) at[a] = std::clamp(static_cast<int>(std::floor(x[a] + 0.5)), 0, ct.frame.dims[a] - 1);
+  for (std::size_t a = 0; a < 3; ++a)
+    at[a] = std::clamp(static_cast<int>(std::floor(x[a] + 0.5)), 0, ct.frame.dims[a] - 1);
   if (document_.bone().at(at[0], at[1], at[2])) text += "   bone";
-  if (const EditStructure* const s = document_.structure(document_.labels()[ct.offset(at[0], at[1], at[2])])) text += "   " + s->is.name;
+  if (const EditStructure* const s = document_.structure(document_.labels()[ct.offset(at[0], at[1], at[2])]))
+    text += "   " + s->is.name;
   return text;
 }
 
-// --- tools ----------------------------------------------------------------------------------------------------------------------------
+// --- tools
+// ----------------------------------------------------------------------------------------------------------------------------
 
 void EditControl::take(EditTool tool) {
   if (document_.in_stroke()) told(document_.end_stroke());
@@ -453,14 +467,16 @@ void EditControl::told(const EditOutcome& o) {
     return;
   }
   if (o.added_mm3 > 0) message_ += ": " + volume_text(o.added_mm3) + " added";
-  if (o.removed_mm3 > 0) message_ += std::string(o.added_mm3 > 0 ? ", " : ": ") + volume_text(o.removed_mm3) + " removed";
+  if (o.removed_mm3 > 0)
+    message_ += std::string(o.added_mm3 > 0 ? ", " : ": ") + volume_text(o.removed_mm3) + " removed";
   if (!o.note.empty()) message_ += " (" + o.note + ")";
 }
 
 void EditControl::tick() {
   if (auto done = worker_.take_plan()) {
     if (done->error) {
-      message_ = done->error->code() == ExitCode::cancelled ? "stopped; nothing was changed" : std::string(done->error->what());
+      message_ = done->error->code() == ExitCode::cancelled ? "stopped; nothing was changed"
+                                                            : std::string(done->error->what());
     } else {
       told(document_.commit(std::move(*done->plan)));
     }
@@ -475,8 +491,9 @@ void EditControl::tick() {
 
 void EditControl::ask_preview() {
   const auto wanted = live();
-  const bool same_live = wanted.has_value() == preview_live_.has_value() &&
-                         (!wanted || (wanted->lower_hu == preview_live_->lower_hu && wanted->upper_hu == preview_live_->upper_hu));
+  const bool same_live =
+      wanted.has_value() == preview_live_.has_value() &&
+      (!wanted || (wanted->lower_hu == preview_live_->lower_hu && wanted->upper_hu == preview_live_->upper_hu));
   if (busy() || document_.in_stroke() || (same_live && preview_version_ == document_.version())) return;
   preview_live_ = wanted;
   preview_version_ = document_.version();
@@ -503,4 +520,4 @@ void EditControl::ask_preview() {
   worker_.preview(std::move(request));
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// The editor without its screen: tools, views, what a click does. Private to libs/app/window; no GLFW, no ImGui, no VTK.
+// The editor without its screen: tools, views, what a click does. Private to libs/app/window; no GLFW, no ImGui, no
+// VTK.
 #pragma once
 #include <array>
 #include <optional>
@@ -8,8 +9,8 @@
 
 #include "edit_keys.h"
 #include "edit_worker.h"
-#include "osteo/imaging/edit/document.h"
 #include "osteo/display/view/slices.h"
+#include "osteo/imaging/edit/document.h"
 #include "slice_pointer.h"
 
 namespace osteo::inline app {
@@ -22,7 +23,8 @@ class EditControl {
   /// The document must outlive it.
   explicit EditControl(EditDocument& document);
 
-  // --- views --------------------------------------------------------------------------------------------------------------------------
+  // --- views
+  // --------------------------------------------------------------------------------------------------------------------------
   void resize(int view, int width, int height);
   /// Everything of the scan.
   void fit();
@@ -40,7 +42,8 @@ class EditControl {
   /// Of the picture in 3D: fewer where triangles are drawn without a graphics card.
   std::size_t preview_voxels = 3'000'000;
 
-  // --- mouse --------------------------------------------------------------------------------------------------------------------------
+  // --- mouse
+  // --------------------------------------------------------------------------------------------------------------------------
   void press(SlicePointer at, SliceButton button);
   /// Also without a button.
   void move(SlicePointer at);
@@ -52,7 +55,8 @@ class EditControl {
   /// "L 12.3  P 4.0  H 31.5 mm   345 HU   bone, facial nerve"; empty beside the slices.
   [[nodiscard]] std::string readout() const;
 
-  // --- tools --------------------------------------------------------------------------------------------------------------------------
+  // --- tools
+  // --------------------------------------------------------------------------------------------------------------------------
   [[nodiscard]] EditTool tool() const { return tool_; }
   void take(EditTool tool);
   double brush_radius_mm = 2, fill_mm3 = 50, smooth_mm = 1, pieces_mm3 = 10;
@@ -104,7 +108,9 @@ class EditControl {
   [[nodiscard]] bool take_redraw() { return std::exchange(redraw_, false); }
 
  private:
-  [[nodiscard]] Vec3 world(SlicePointer at) const { return views_[static_cast<std::size_t>(at.view)].world(at.x, at.y); }
+  [[nodiscard]] Vec3 world(SlicePointer at) const {
+    return views_[static_cast<std::size_t>(at.view)].world(at.x, at.y);
+  }
   void follow_cross();
   [[nodiscard]] bool refuse_when_busy();
   void ask_preview();
@@ -130,4 +136,4 @@ class EditControl {
 /// "12.3 cm3", "45 mm3".
 [[nodiscard]] std::string volume_text(double mm3);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

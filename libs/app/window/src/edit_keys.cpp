@@ -90,15 +90,17 @@ std::span<const EditKeyRow> edit_key_table() {
 
 const EditKeyRow* find_edit_key(int code, bool control, bool shift) {
   const With with = control ? (shift ? With::control_shift : With::control) : shift ? With::shift : With::nothing;
-  const auto* const at =
-      std::find_if(std::begin(kRows), std::end(kRows), [&](const EditKeyRow& k) { return k.code == code && k.with == with; });
+  const auto* const at = std::find_if(std::begin(kRows), std::end(kRows),
+                                      [&](const EditKeyRow& k) { return k.code == code && k.with == with; });
   return at == std::end(kRows) ? nullptr : at;
 }
 
 const std::vector<EditHelpLine>& edit_help_lines() {
   using enum EditKey;
   static const std::vector<EditHelpLine> lines = {
-      {"wheel, Up, Down, Right, Left, F, B", "next and previous slice of the view under the mouse", {next_slice, previous_slice}},
+      {"wheel, Up, Down, Right, Left, F, B",
+       "next and previous slice of the view under the mouse",
+       {next_slice, previous_slice}},
       {"Shift-move", "the crosshair goes to the mouse, and all views to it", {}},
       {"left drag (Look)", "window across, level up and down", {}},
       {"Ctrl-double-click", "window and level as at the beginning", {}},
@@ -108,7 +110,9 @@ const std::vector<EditHelpLine>& edit_help_lines() {
       {"R", "all views show the whole scan", {fit}},
       {"double click", "the view alone, and back to four", {}},
       {"3D: left, right, middle drag, wheel", "turns, zooms, moves, zooms", {}},
-      {"keypad 1, 3, 7", "3D from the front, left, above; with Shift from the other side", {from_front, from_left, from_above}},
+      {"keypad 1, 3, 7",
+       "3D from the front, left, above; with Shift from the other side",
+       {from_front, from_left, from_above}},
       {"C", "crosshair on and off", {cross}},
       {"O", "outlines on and off", {outline}},
       {"1 to 9, 0", "tool: look, ruler, threshold, piece, small pieces, box, fill, smooth, brush, eraser", {tool}},
@@ -131,4 +135,4 @@ std::string edit_help_table() {
   return text;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// Which key does what in the editor: one table for the window, its help, its guide and its tests. Private to libs/app/window.
+// Which key does what in the editor: one table for the window, its help, its guide and its tests. Private to
+// libs/app/window.
 #pragma once
 #include <span>
 #include <string>
@@ -52,4 +53,4 @@ struct EditHelpLine {
 /// The help as a table in Markdown, as docs/edit.md has it.
 [[nodiscard]] std::string edit_help_table();
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

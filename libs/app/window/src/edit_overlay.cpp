@@ -28,11 +28,13 @@ void annotate_slice(ImDrawList* draw, const EditControl& control, int v, ImVec2 
   if (brushes && control.under_mouse()) {
     // The ball cuts the other slices too, smaller the farther they are.
     const Vec3 m = *control.under_mouse();
-    const double off = dot(m - view.through_mm, view.normal()), r2 = control.brush_radius_mm * control.brush_radius_mm - off * off;
+    const double off = dot(m - view.through_mm, view.normal()),
+                 r2 = control.brush_radius_mm * control.brush_radius_mm - off * off;
     if (r2 > 0)
       draw->AddCircle(place(m), static_cast<float>(std::sqrt(r2) / view.mm_per_pixel),
-                      control.tool() == EditTool::brush ? IM_COL32(120, 255, 120, 255) : IM_COL32(255, 120, 120, 255), 0, 1.5F * scale);
+                      control.tool() == EditTool::brush ? IM_COL32(120, 255, 120, 255) : IM_COL32(255, 120, 120, 255),
+                      0, 1.5F * scale);
   }
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -8,4 +8,4 @@ namespace osteo::inline app {
 /// `lo`: upper left corner of the slice in the window. `scale`: of lines and distances, as of the text.
 void annotate_slice(ImDrawList* draw, const EditControl& control, int view, ImVec2 lo, float scale);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

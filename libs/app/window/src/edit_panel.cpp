@@ -25,8 +25,8 @@ bool wide_button(const char* text, bool enabled = true) {
 bool slider(const char* name, double& value, double lo, double hi, const char* format, bool logarithmic = false) {
   auto v = static_cast<float>(value);
   ImGui::SetNextItemWidth(-1);
-  const bool changed =
-      ImGui::SliderFloat(name, &v, static_cast<float>(lo), static_cast<float>(hi), format, logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
+  const bool changed = ImGui::SliderFloat(name, &v, static_cast<float>(lo), static_cast<float>(hi), format,
+                                          logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
   if (changed) value = std::clamp(static_cast<double>(v), lo, hi);
   return changed;
 }
@@ -37,7 +37,8 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
   Wishes wishes;
   ImGui::SetNextWindowPos({0, 0});
   ImGui::SetNextWindowSize({width, height});
-  ImGui::Begin("Edit", nullptr, ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoBringToFrontOnFocus);
+  ImGui::Begin("Edit", nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoBringToFrontOnFocus);
   // What is always needed stays at the bottom, whatever is above it.
   const float line = ImGui::GetFontSize() * 1.9F + ImGui::GetStyle().ItemSpacing.y;
   ImGui::BeginChild("upper", {0, height - 3 * line - 3 * ImGui::GetStyle().WindowPadding.y});
@@ -60,7 +61,8 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
   structures(control, scale);
   ImGui::EndChild();
   ImGui::Separator();
-  const float half = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2, tall = ImGui::GetFontSize() * 1.9F;
+  const float half = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2,
+              tall = ImGui::GetFontSize() * 1.9F;
   const EditDocument& d = control.document();
   ImGui::BeginDisabled(!d.can_undo() || control.busy());
   if (ImGui::Button("Undo (Ctrl-Z)", {half, tall})) control.undo();
@@ -142,8 +144,8 @@ void EditPanel::options(EditControl& control) {
       return;
     case EditTool::box:
       heading(title.c_str());
-      ImGui::Text("%.0f x %.0f x %.0f mm", control.box_hi_mm[0] - control.box_lo_mm[0], control.box_hi_mm[1] - control.box_lo_mm[1],
-                  control.box_hi_mm[2] - control.box_lo_mm[2]);
+      ImGui::Text("%.0f x %.0f x %.0f mm", control.box_hi_mm[0] - control.box_lo_mm[0],
+                  control.box_hi_mm[1] - control.box_lo_mm[1], control.box_hi_mm[2] - control.box_lo_mm[2]);
       if (wide_button("Clear inside (Enter)", free)) control.apply(BoxChoice::clear_inside);
       if (wide_button("Keep only inside", free)) control.apply(BoxChoice::keep_inside);
       return;
@@ -155,7 +157,8 @@ void EditPanel::options(EditControl& control) {
     case EditTool::smooth:
       heading(title.c_str());
       slider("##smooth", control.smooth_mm, 0.1, 5, "within %.1f mm");
-      ImGui::TextWrapped("Nothing farther from the surface changes; walls thinner than this may go. The volume is told.");
+      ImGui::TextWrapped(
+          "Nothing farther from the surface changes; walls thinner than this may go. The volume is told.");
       if (wide_button("Smooth (Enter)", free)) control.apply();
       return;
     case EditTool::brush:
@@ -213,10 +216,12 @@ void EditPanel::structures(EditControl& control, float scale) {
     const bool renamed = ImGui::IsItemDeactivatedAfterEdit() && s->is.name != name_.data();
     int role = static_cast<int>(s->role);
     ImGui::SetNextItemWidth(-1);
-    const bool other_role = ImGui::Combo("##role", &role, "at risk: goes into the case\0landmark: stays in the edits\0");
+    const bool other_role =
+        ImGui::Combo("##role", &role, "at risk: goes into the case\0landmark: stays in the edits\0");
     const int value = s->is.value;
     if (renamed || other_role) {
-      control.at_once(ChangeStructureEdit{value, renamed ? std::string(name_.data()) : s->is.name, rgb, static_cast<StructureRole>(role)});
+      control.at_once(ChangeStructureEdit{value, renamed ? std::string(name_.data()) : s->is.name, rgb,
+                                          static_cast<StructureRole>(role)});
       named_ = -1;
     }
     if (wide_button("Delete this structure", free)) {
@@ -225,10 +230,11 @@ void EditPanel::structures(EditControl& control, float scale) {
     }
   }
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - 64 * scale);
-  const bool entered =
-      ImGui::InputTextWithHint("##new", "new structure", new_name_.data(), new_name_.size(), ImGuiInputTextFlags_EnterReturnsTrue);
+  const bool entered = ImGui::InputTextWithHint("##new", "new structure", new_name_.data(), new_name_.size(),
+                                                ImGuiInputTextFlags_EnterReturnsTrue);
   ImGui::SameLine();
-  if ((ImGui::Button("Add", {-1, 0}) || entered) && new_name_[0] != 0 && control.add_structure(new_name_.data())) new_name_.fill(0);
+  if ((ImGui::Button("Add", {-1, 0}) || entered) && new_name_[0] != 0 && control.add_structure(new_name_.data()))
+    new_name_.fill(0);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

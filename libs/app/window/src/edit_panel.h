@@ -29,4 +29,4 @@ class EditPanel {
   std::array<float, 4> slider_{};
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

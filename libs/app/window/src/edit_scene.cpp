@@ -13,8 +13,8 @@
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
 
-#include "osteo/imaging/io/vtk_data.h"
 #include "osteo/display/view/actors.h"
+#include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo::inline app {
 
@@ -97,7 +97,8 @@ void EditScene::turn(double dx, double dy) {
 
 void EditScene::shift(double dx, double dy) {
   vtkCamera* const camera = impl_->renderer->GetActiveCamera();
-  const double mm = 2 * camera->GetDistance() * std::tan(camera->GetViewAngle() * 3.14159265 / 360) / std::max(1, impl_->height);
+  const double mm =
+      2 * camera->GetDistance() * std::tan(camera->GetViewAngle() * 3.14159265 / 360) / std::max(1, impl_->height);
   double d[3], u[3], p[3], f[3];
   camera->GetDirectionOfProjection(d);
   camera->GetViewUp(u);
@@ -153,4 +154,4 @@ std::size_t EditScene::triangles() const {
   return impl_->triangles;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

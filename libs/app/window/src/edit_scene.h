@@ -21,8 +21,8 @@ class EditScene {
   void turn(double dx, double dy);  ///< pixels
   void shift(double dx, double dy);
   void zoom(double factor);
-  /// The lower left `width` x `height` pixels of the back buffer are overwritten when it has to be drawn. The texture stays the scene's
-  /// own.
+  /// The lower left `width` x `height` pixels of the back buffer are overwritten when it has to be drawn. The texture
+  /// stays the scene's own.
   [[nodiscard]] unsigned texture(int width, int height);
   /// Where a point of the world lies in the picture, from its upper left corner; as last drawn.
   [[nodiscard]] std::array<double, 2> pixel(Vec3 world_mm);
@@ -33,4 +33,4 @@ class EditScene {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

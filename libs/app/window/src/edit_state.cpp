@@ -55,4 +55,4 @@ void write_edit_state(const EditWindowState& s, const EditControl& control, cons
   std::filesystem::rename(beside, file, ignored);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

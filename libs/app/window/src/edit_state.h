@@ -11,7 +11,9 @@ namespace osteo::inline app {
 
 struct EditViewBox {
   int x = 0, y = 0, width = 0, height = 0;  ///< in the window, from its upper left corner; no width: not shown
-  [[nodiscard]] bool holds(double px, double py) const { return px >= x && py >= y && px < x + width && py < y + height; }
+  [[nodiscard]] bool holds(double px, double py) const {
+    return px >= x && py >= y && px < x + width && py < y + height;
+  }
 };
 
 struct EditWindowState {
@@ -19,7 +21,8 @@ struct EditWindowState {
   int width = 0, height = 0;
   std::array<EditViewBox, 4> boxes;
   bool saving = false, asking = false;
-  double worst_ms = 0;  ///< longest that the window took over one picture since it opened, waiting for the screen left out
+  double worst_ms =
+      0;  ///< longest that the window took over one picture since it opened, waiting for the screen left out
   std::size_t triangles = 0;
   std::array<float, 4> threshold_slider{};  ///< x, y, width, height
 };
@@ -27,4 +30,4 @@ struct EditWindowState {
 /// As JSON, in place of what was there; a reader sees the one or the other. What cannot be written is left out.
 void write_edit_state(const EditWindowState& state, const EditControl& control, const std::filesystem::path& file);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

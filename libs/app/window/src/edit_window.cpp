@@ -43,7 +43,8 @@ class EditWindow {
     glBindTexture(GL_TEXTURE_2D, 0);
     const auto* const renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
     const std::string name = renderer != nullptr ? renderer : "";
-    if (name.find("llvmpipe") != std::string::npos || name.find("softpipe") != std::string::npos) control_.preview_voxels = 500'000;
+    if (name.find("llvmpipe") != std::string::npos || name.find("softpipe") != std::string::npos)
+      control_.preview_voxels = 500'000;
     control_.say("F1 shows what mouse and keys do");
   }
 
@@ -98,12 +99,15 @@ class EditWindow {
   }
 
   void open(const EditWindowOptions& options) {
-    window_ =
-        open_window(options.title, options.width, options.height, "is there a display? Without one: osteo edit CASE --apply edits.json");
+    window_ = open_window(options.title, options.width, options.height,
+                          "is there a display? Without one: osteo edit CASE --apply edits.json");
     glfwSetWindowUserPointer(window_, this);
-    // ImGui chains these behind its own. Events, not states: at few pictures a second a click begins and ends between two of them.
+    // ImGui chains these behind its own. Events, not states: at few pictures a second a click begins and ends between
+    // two of them.
     using K = Event::Kind;
-    glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double px, double py) { self(w).note({K::move, px, py, 0, 0, 0}); });
+    glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double px, double py) {
+      self(w).note({K::move, px, py, 0, 0, 0});
+    });
     glfwSetMouseButtonCallback(window_, [](GLFWwindow* w, int button, int action, int mods) {
       self(w).note({action == GLFW_PRESS ? K::press : K::release, 0, 0, button, mods, 0});
     });
@@ -218,13 +222,22 @@ class EditWindow {
     if (++pictures_ > 3) worst_ms_ = std::max(worst_ms_, ms);  // the first ones compile shaders
     glfwSwapBuffers(window_);
     if (!state_file_.empty()) {
-      EditWindowState state{
-          pictures_, width_, height_, boxes_, saving_, asking_, worst_ms_, scene_->triangles(), panel_.threshold_slider()};
+      EditWindowState state{pictures_,
+                            width_,
+                            height_,
+                            boxes_,
+                            saving_,
+                            asking_,
+                            worst_ms_,
+                            scene_->triangles(),
+                            panel_.threshold_slider()};
       write_edit_state(state, control_, state_file_);
     }
   }
 
-  [[nodiscard]] float panel_width() const { return std::round(std::min(290 * scale_, static_cast<float>(width_) * 0.4F)); }
+  [[nodiscard]] float panel_width() const {
+    return std::round(std::min(290 * scale_, static_cast<float>(width_) * 0.4F));
+  }
   [[nodiscard]] int bar_height() const { return static_cast<int>(std::round(60 * scale_)); }
 
   void lay_out() {
@@ -288,7 +301,8 @@ class EditWindow {
         case Event::Kind::press: {
           if (view < 0) break;
           const Clock::time_point now = Clock::now();
-          const bool twice = button == SliceButton::left && std::chrono::duration<double>(now - last_press_).count() < 0.4 &&
+          const bool twice = button == SliceButton::left &&
+                             std::chrono::duration<double>(now - last_press_).count() < 0.4 &&
                              std::abs(e.x - press_x_) < 6 && std::abs(e.y - press_y_) < 6;
           last_press_ = twice ? Clock::time_point() : now;
           press_x_ = drag_x_ = e.x;
@@ -368,7 +382,8 @@ class EditWindow {
       }
       const ImVec2 lo{static_cast<float>(b.x), static_cast<float>(b.y)},
           hi{static_cast<float>(b.x + b.width), static_cast<float>(b.y + b.height)};
-      draw->AddImage(reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(textures_[static_cast<std::size_t>(v)])), lo, hi);
+      draw->AddImage(reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(textures_[static_cast<std::size_t>(v)])),
+                     lo, hi);
       draw->PushClipRect(lo, hi);
       annotate_slice(draw, control_, v, lo, scale_);
       draw->PopClipRect();
@@ -400,14 +415,16 @@ class EditWindow {
 
   // The crosshair may move within a slice, which stays the same.
   static bool same_picture(const SliceView& a, const SliceView& b) {
-    return a.width == b.width && a.height == b.height && a.mm_per_pixel == b.mm_per_pixel && length(a.world(0, 0) - b.world(0, 0)) < 1e-9;
+    return a.width == b.width && a.height == b.height && a.mm_per_pixel == b.mm_per_pixel &&
+           length(a.world(0, 0) - b.world(0, 0)) < 1e-9;
   }
 
   void status_bar() {
     const float left = panel_width();
     ImGui::SetNextWindowPos({left, static_cast<float>(height_ - bar_height())});
     ImGui::SetNextWindowSize({static_cast<float>(width_) - left, static_cast<float>(bar_height())});
-    ImGui::Begin("Status", nullptr, ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoBringToFrontOnFocus);
+    ImGui::Begin("Status", nullptr,
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoBringToFrontOnFocus);
     const std::string place = control_.readout();
     ImGui::TextColored({0.75F, 0.85F, 1, 1}, "%s", control_.hint().c_str());
     if (!place.empty()) {
@@ -424,10 +441,12 @@ class EditWindow {
   }
 
   void help() {
-    const float w = std::min(760 * scale_, static_cast<float>(width_) - 20), h = std::min(680 * scale_, static_cast<float>(height_) - 20);
+    const float w = std::min(760 * scale_, static_cast<float>(width_) - 20),
+                h = std::min(680 * scale_, static_cast<float>(height_) - 20);
     ImGui::SetNextWindowPos({(static_cast<float>(width_) - w) / 2, (static_cast<float>(height_) - h) / 2});
     ImGui::SetNextWindowSize({w, h});
-    ImGui::Begin("Mouse and keys", &control_.show_help, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove);
+    ImGui::Begin("Mouse and keys", &control_.show_help,
+                 ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove);
     for (const EditHelpLine& l : edit_help_lines()) {
       ImGui::TextColored({1, 0.88F, 0.55F, 1}, "%s", l.keys);
       ImGui::SameLine(330 * scale_);
@@ -435,7 +454,8 @@ class EditWindow {
     }
     ImGui::Separator();
     ImGui::TextWrapped(
-        "Everything can be undone. The scan is never changed; what is saved is what was done, and the bone that follows from it.");
+        "Everything can be undone. The scan is never changed; what is saved is what was done, and the bone that "
+        "follows from it.");
     ImGui::End();
   }
 
@@ -505,4 +525,4 @@ int run_edit_window(EditDocument& document, const EditWindowOptions& options, co
   return EditWindow(document, options, actions).run();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

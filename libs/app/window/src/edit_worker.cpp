@@ -11,9 +11,10 @@ namespace {
 TriMesh surface_of(const CoarseMask& coarse_mask, const Context& context) {
   const auto& d = coarse_mask.frame.dims;
   const auto value = [&](int i, int j, int k) {
-    return coarse_mask.filled[(static_cast<std::size_t>(k) * static_cast<std::size_t>(d[1]) + static_cast<std::size_t>(j)) *
-                                  static_cast<std::size_t>(d[0]) +
-                              static_cast<std::size_t>(i)];
+    return coarse_mask
+        .filled[(static_cast<std::size_t>(k) * static_cast<std::size_t>(d[1]) + static_cast<std::size_t>(j)) *
+                    static_cast<std::size_t>(d[0]) +
+                static_cast<std::size_t>(i)];
   };
   std::vector<Ijk> bricks;
   for (int bk = 0; bk * 8 < d[2]; ++bk) {
@@ -47,13 +48,16 @@ TriMesh surface_of(const CoarseMask& coarse_mask, const Context& context) {
 Preview make_preview(const PreviewRequest& request, const Context& context) {
   Preview p;
   if (request.live) {
-    p.bone = surface_of(coarse(request.ct, request.live->lower_hu, request.live->upper_hu, request.most_voxels, context.threads), context);
+    p.bone = surface_of(
+        coarse(request.ct, request.live->lower_hu, request.live->upper_hu, request.most_voxels, context.threads),
+        context);
   } else if (request.bone) {
     p.bone = surface_of(coarse(*request.bone, request.ct.frame, request.most_voxels, context.threads), context);
   }
   for (const PreviewRequest::Part& part : request.structures) {
     context.check_cancelled();
-    p.structures.push_back({part.rgb, surface_of(coarse(part.voxels, part.frame, request.most_voxels / 4, context.threads), context)});
+    p.structures.push_back(
+        {part.rgb, surface_of(coarse(part.voxels, part.frame, request.most_voxels / 4, context.threads), context)});
   }
   return p;
 }
@@ -159,4 +163,4 @@ void EditWorker::preview_loop() {
   }
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// What the editor works out beside the window: changes of the whole volume, and the surface in 3D. Private to libs/app/window; no OpenGL.
+// What the editor works out beside the window: changes of the whole volume, and the surface in 3D. Private to
+// libs/app/window; no OpenGL.
 #pragma once
 #include <atomic>
 #include <condition_variable>
@@ -47,7 +48,8 @@ class EditWorker {
   EditWorker(const EditWorker&) = delete;
   EditWorker& operator=(const EditWorker&) = delete;
 
-  /// Works out operations on bone. The document must stay as it is until `take_plan` gives something; false when one is at work.
+  /// Works out operations on bone. The document must stay as it is until `take_plan` gives something; false when one is
+  /// at work.
   bool plan(const EditDocument& document, std::vector<EditOperation> operations);
   [[nodiscard]] bool planning() const { return planning_; }
   [[nodiscard]] double progress() const { return progress_.load(); }
@@ -86,4 +88,4 @@ class EditWorker {
   std::thread planner_, previewer_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -48,7 +48,8 @@ std::string FileDialog::open(const std::filesystem::path& folder) {
   ::posix_spawn_file_actions_init(&actions);
   ::posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   ::posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-  ::posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);  // toolkits complain there about themes
+  ::posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY,
+                                     0);  // toolkits complain there about themes
   const int failed = ::posix_spawnp(&process_, kProgram, &actions, nullptr, arguments.data(), environ);
   ::posix_spawn_file_actions_destroy(&actions);
   ::close(ends[1]);
@@ -86,8 +87,10 @@ std::optional<FileDialog::Answer> FileDialog::poll() {
   close();
   if (!said.empty() && said.back() == '\n') said.pop_back();
   if (sane && WIFEXITED(status) && WEXITSTATUS(status) == 1) return Answer{};
-  if (sane && !(WIFEXITED(status) && WEXITSTATUS(status) == 0)) return Answer{{}, "the dialog has ended without an answer; choose here"};
-  const bool path = sane && said.starts_with('/') && std::none_of(said.begin(), said.end(), [](char c) { return c == '\n' || c == '\0'; });
+  if (sane && !(WIFEXITED(status) && WEXITSTATUS(status) == 0))
+    return Answer{{}, "the dialog has ended without an answer; choose here"};
+  const bool path = sane && said.starts_with('/') &&
+                    std::none_of(said.begin(), said.end(), [](char c) { return c == '\n' || c == '\0'; });
   if (!path) return Answer{{}, "the dialog named no folder; choose here"};
   return Answer{said, {}};
 }
@@ -103,4 +106,4 @@ void FileDialog::close() {
   said_.clear();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// The desktop's own dialog for choosing a folder: zenity, where it is installed. Private to libs/app/window; no screen of its own.
+// The desktop's own dialog for choosing a folder: zenity, where it is installed. Private to libs/app/window; no screen
+// of its own.
 #pragma once
 #include <sys/types.h>
 
@@ -38,4 +39,4 @@ class FileDialog {
   std::string said_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -15,4 +15,4 @@ struct PadMotion {
 /// Buttons and triggers of the gamepad; buttons and axes of the first other joystick, such as a pedal that acts as one.
 void read_stick_buttons(std::vector<ButtonLevel>& levels);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

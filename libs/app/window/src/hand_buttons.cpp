@@ -21,8 +21,9 @@ constexpr std::string_view kPadNames[] = {
     "left thumb", "right thumb", "up", "right", "down",        "left",         "left trigger", "right trigger"};
 
 std::span<const Kind> kinds() {
-  static const Kind all[] = {{"pedal", button::kPedal, 32, {}},    {"device", button::kDevice, 8, {}}, {"mouse", button::kMouse, 8, {}},
-                             {"pad", button::kPad, 17, kPadNames}, {"stick", button::kStick, 32, {}},  {"axis", button::kAxis, 16, {}}};
+  static const Kind all[] = {{"pedal", button::kPedal, 32, {}}, {"device", button::kDevice, 8, {}},
+                             {"mouse", button::kMouse, 8, {}},  {"pad", button::kPad, 17, kPadNames},
+                             {"stick", button::kStick, 32, {}}, {"axis", button::kAxis, 16, {}}};
   return all;
 }
 
@@ -33,7 +34,8 @@ std::string button_name(int button) {
   for (const Kind& k : kinds()) {
     const int n = button - k.first;
     if (n < 0 || n >= k.count) continue;
-    return std::string(k.word) + " " + (k.names.empty() ? std::to_string(n + 1) : std::string(k.names[static_cast<std::size_t>(n)]));
+    return std::string(k.word) + " " +
+           (k.names.empty() ? std::to_string(n + 1) : std::string(k.names[static_cast<std::size_t>(n)]));
   }
   return "button " + std::to_string(button);
 }
@@ -91,4 +93,4 @@ unsigned HandButtons::mask(int first, HandFunction function) const {
   return bits;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

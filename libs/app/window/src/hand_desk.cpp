@@ -11,7 +11,8 @@ bool HandDesk::key(int code, int action) {
   return action != 0;
 }
 
-void HandDesk::read(std::vector<ButtonLevel> levels, bool attended, const WindowActions& actions, RehearsalControl& control) {
+void HandDesk::read(std::vector<ButtonLevel> levels, bool attended, const WindowActions& actions,
+                    RehearsalControl& control) {
   if (attended_ && !attended) {
     keyboard_.let_go();
     if (control.latched()) control.say("another window has the keys: the drill is off");
@@ -19,13 +20,15 @@ void HandDesk::read(std::vector<ButtonLevel> levels, bool attended, const Window
   }
   attended_ = attended;
   const auto any = [&](int from, int to) {
-    return std::any_of(levels.begin(), levels.end(), [&](const ButtonLevel& l) { return l.button >= from && l.button < to; });
+    return std::any_of(levels.begin(), levels.end(),
+                       [&](const ButtonLevel& l) { return l.button >= from && l.button < to; });
   };
   pad_there_ = any(button::kPad, button::kStick);
   stick_there_ = any(button::kStick, button::kAxis + 100);
   const std::optional<std::uint32_t> switches = actions.switches ? actions.switches(attended) : std::nullopt;
   pedal_there_ = switches.has_value();
-  for (int n = 0; pedal_there_ && n < 3; ++n) levels.push_back({button::kPedal + n, (*switches >> n & 1U) != 0 ? 1.0 : 0.0});
+  for (int n = 0; pedal_there_ && n < 3; ++n)
+    levels.push_back({button::kPedal + n, (*switches >> n & 1U) != 0 ? 1.0 : 0.0});
   device_there_ = control.moves_by_itself();
   if (device_there_) {
     const std::uint32_t down = control.rehearsal().latest().device.buttons;
@@ -54,7 +57,8 @@ void HandDesk::take(const RehearsalControl& control) {
 
 HandInput HandDesk::input(const RehearsalControl& control) const {
   HandInput in;
-  in.drill = std::max(keyboard_.held(Command::pedal) ? 1.0 : 0.0, watch_.drill(person_.buttons, control.moves_by_itself()));
+  in.drill =
+      std::max(keyboard_.held(Command::pedal) ? 1.0 : 0.0, watch_.drill(person_.buttons, control.moves_by_itself()));
   in.clutch = keyboard_.held(Command::clutch);
   in.wrist_rest = keyboard_.held(Command::wrist_rest);
   in.second_hand = keyboard_.held(Command::second_mouse);
@@ -76,4 +80,4 @@ bool HandDesk::there(int button) const {
   return button < button::kStick ? pad_there_ : stick_there_;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

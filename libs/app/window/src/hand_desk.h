@@ -1,4 +1,5 @@
-// The person's hand at this desk: what was chosen for it, and what pedals, buttons and keys do to it. Private to libs/app/window.
+// The person's hand at this desk: what was chosen for it, and what pedals, buttons and keys do to it. Private to
+// libs/app/window.
 #pragma once
 #include <string>
 #include <vector>
@@ -12,12 +13,14 @@ namespace osteo::inline app {
 
 class HandDesk {
  public:
-  HandDesk(PersonSettings& person, Keyboard& keyboard) : person_(person), keyboard_(keyboard) { keyboard_.bind(&person_.buttons); }
+  HandDesk(PersonSettings& person, Keyboard& keyboard) : person_(person), keyboard_(keyboard) {
+    keyboard_.bind(&person_.buttons);
+  }
 
   /// Each key as it goes down or up; true: it is being given something to do.
   bool key(int code, int action);
-  /// What is down beside keys, in this frame: `levels` of pads and the mouse; pedal and device are asked for here. Before the keyboard is
-  /// asked for this frame. `attended`: the window has the keys.
+  /// What is down beside keys, in this frame: `levels` of pads and the mouse; pedal and device are asked for here.
+  /// Before the keyboard is asked for this frame. `attended`: the window has the keys.
   void read(std::vector<ButtonLevel> levels, bool attended, const WindowActions& actions, RehearsalControl& control);
   /// The choices into the control, before its frame; and back, when keys have changed them.
   void give(RehearsalControl& control) const;
@@ -31,8 +34,8 @@ class HandDesk {
   /// The row of the page that the keys' cursor is on; empty: on none.
   [[nodiscard]] const std::string& row() const { return row_; }
   [[nodiscard]] bool mirror_mouse() const { return person_.values.mirror_mouse; }
-  /// Into the current ImGui window: a header that opens, and under it all that can be chosen for the hand. `show`: it is
-  /// opened now, and the keys' cursor put on it.
+  /// Into the current ImGui window: a header that opens, and under it all that can be chosen for the hand. `show`: it
+  /// is opened now, and the keys' cursor put on it.
   void draw(RehearsalControl& control, bool show);
 
  private:
@@ -46,4 +49,4 @@ class HandDesk {
   bool attended_ = true, pedal_there_ = false, device_there_ = false, pad_there_ = false, stick_there_ = false;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -11,7 +11,8 @@ namespace {
 
 bool share_slider(const char* name, double& share, double least, const char* help) {
   auto percent = static_cast<float>(100 * share);
-  const bool changed = ImGui::SliderFloat(name, &percent, static_cast<float>(100 * least), 100, "%.0f %%", ImGuiSliderFlags_AlwaysClamp);
+  const bool changed =
+      ImGui::SliderFloat(name, &percent, static_cast<float>(100 * least), 100, "%.0f %%", ImGuiSliderFlags_AlwaysClamp);
   if (changed) share = static_cast<double>(percent) / 100;
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", help);
   return changed;
@@ -21,7 +22,8 @@ bool share_slider(const char* name, double& share, double least, const char* hel
 std::string key_of(HandFunction function, const HandButtons& buttons) {
   const ButtonCommand does = command_of(function);
   for (const Key& key : key_table()) {
-    if (key.command == does.command && key.value == does.value && !buttons.function(key.code)) return key_word(key.code);
+    if (key.command == does.command && key.value == does.value && !buttons.function(key.code))
+      return key_word(key.code);
   }
   return {};
 }
@@ -52,7 +54,8 @@ void HandDesk::draw(RehearsalControl& control, bool show) {
   share_slider("burr at most", v.burr_share, 0.25, "of its full speed, pedal or button all the way down; keys 9 and 0");
   ImGui::PopItemWidth();
   ImGui::Checkbox("left-handed", &v.left_handed);
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("the drill is held from the left, the second hand comes from the right");
+  if (ImGui::IsItemHovered())
+    ImGui::SetTooltip("the drill is held from the left, the second hand comes from the right");
   ImGui::Checkbox("mouse buttons change places", &v.mirror_mouse);
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("where the system has not done so already");
   char words[64];
@@ -90,7 +93,8 @@ void HandDesk::draw_buttons() {
     const std::string row = words_of(function) + ": " + by + "##" + std::to_string(n);
     if (ImGui::Selectable(row.c_str(), assign_.listens() == function)) assign_.listen(function);
     if (ImGui::IsItemFocused()) row_ = words_of(function);
-    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s: %s", words_of(function).c_str(), all.empty() ? "no button" : all.c_str());
+    if (ImGui::IsItemHovered())
+      ImGui::SetTooltip("%s: %s", words_of(function).c_str(), all.empty() ? "no button" : all.c_str());
   }
   if (ImGui::Button("all as usual", {-1, 0})) {
     person_.buttons = HandButtons::usual();
@@ -99,4 +103,4 @@ void HandDesk::draw_buttons() {
   }
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -96,7 +96,8 @@ void HandTools::take_saw(Rehearsal& rehearsal) {
   tool_ = Tool::drill;
   saw_in_hand_ = true;
   rehearsal.act(SceneAction::cutting_guide(guide()));
-  note_ = "saw in the hand, held in its plane: " + key_name(Command::bring) + " brings it, " + key_name(Command::saw) + " puts it away";
+  note_ = "saw in the hand, held in its plane: " + key_name(Command::bring) + " brings it, " + key_name(Command::saw) +
+          " puts it away";
 }
 
 void HandTools::loosen_saw(bool loose, Rehearsal& rehearsal) {
@@ -164,13 +165,14 @@ void HandTools::attach(Rehearsal& rehearsal) {
   const RigidTransform pose = plate_pose(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
                                          normalized(from_floats(tick.device.axis)), grip_of(turn_deg_, tilt_deg_));
   std::vector<std::uint32_t> under;
-  rehearsal.look([&](const World& world, SceneReaders&) { under = bodies_under(world, plate_library()[plate_], pose); });
+  rehearsal.look(
+      [&](const World& world, SceneReaders&) { under = bodies_under(world, plate_library()[plate_], pose); });
   if (under.empty()) {
     note_ = "no bone within 2 mm below the plate";
     return;
   }
-  rehearsal.act(
-      SceneAction::attach(static_cast<std::uint32_t>(plate_), pose, under[0], under.size() > 1 ? under[1] : SceneAction::kNobody));
+  rehearsal.act(SceneAction::attach(static_cast<std::uint32_t>(plate_), pose, under[0],
+                                    under.size() > 1 ? under[1] : SceneAction::kNobody));
   note_ = under.size() > 1 ? "fixed to two pieces" : "fixed to one piece";
   tool_ = Tool::drill;
 }
@@ -213,11 +215,13 @@ std::string HandTools::how() const {
     case Tool::drill:
       break;
     case Tool::saw:
-      return "saw: drag moves it, " + key_name(Command::perform) + " cuts, " + key_name(Command::put_away) + " puts it away";
+      return "saw: drag moves it, " + key_name(Command::perform) + " cuts, " + key_name(Command::put_away) +
+             " puts it away";
     case Tool::piece:
       return "pieces: " + key_name(Command::perform) + " takes apart, drag moves one";
     case Tool::plate:
-      return "plate: " + key_name(Command::bring) + " brings it, wheel presses it on, " + key_name(Command::perform) + " fixes it";
+      return "plate: " + key_name(Command::bring) + " brings it, wheel presses it on, " + key_name(Command::perform) +
+             " fixes it";
   }
   return {};
 }
@@ -265,4 +269,4 @@ bool HandTools::key(Command command, Rehearsal& rehearsal, const ViewAxes& view)
   }
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

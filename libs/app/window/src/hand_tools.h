@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "keys.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/recording/planned_cuts.h"
+#include "osteo/session/scene/rehearsal.h"
 
 namespace osteo::inline app {
 
@@ -31,7 +31,8 @@ class HandTools {
   void choose(Tool tool, Rehearsal& rehearsal, const ViewAxes& view);
   /// True when the key was meant for a tool.
   bool key(Command command, Rehearsal& rehearsal, const ViewAxes& view);
-  /// A motion of the mouse over the view by so many mm at the tool's depth, or a wheel step; only where in_hand() is false.
+  /// A motion of the mouse over the view by so many mm at the tool's depth, or a wheel step; only where in_hand() is
+  /// false.
   void drag(double right_mm, double up_mm, bool turn, Rehearsal& rehearsal, const ViewAxes& view);
   void push(double deeper_mm, Rehearsal& rehearsal, const ViewAxes& view);
   /// Takes up the piece that a ray hits.
@@ -39,7 +40,8 @@ class HandTools {
   /// Cuts, takes apart, fixes the plate: what the tool is for.
   void perform(Rehearsal& rehearsal);
   void undo(Rehearsal& rehearsal);
-  /// The saw into the hand, where the blade's plane becomes a cutting guide; what it cuts then is by force and time, as with a burr.
+  /// The saw into the hand, where the blade's plane becomes a cutting guide; what it cuts then is by force and time, as
+  /// with a burr.
   void take_saw(Rehearsal& rehearsal);
   void put_saw_away(Rehearsal& rehearsal);
   /// While the hand is led somewhere the guide does not hold its saw.
@@ -52,7 +54,8 @@ class HandTools {
   [[nodiscard]] std::span<const PlannedCut> planned() const { return planned_; }
   /// The saw there, and its guide as that says.
   void choose_planned(std::size_t cut);
-  /// The saw's plane as it is now, as a planned cut of that name: into the file, beside what it holds by now. note() says what came of it.
+  /// The saw's plane as it is now, as a planned cut of that name: into the file, beside what it holds by now. note()
+  /// says what came of it.
   void keep_planned(const std::string& name);
 
   /// Of the saw. Another one: as set in a panel.
@@ -111,4 +114,4 @@ struct BoneHit {
 };
 [[nodiscard]] std::optional<BoneHit> bone_on_ray(const World& world, Vec3 from_mm, Vec3 direction, double reach_mm);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

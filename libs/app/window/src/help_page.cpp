@@ -12,8 +12,8 @@
 namespace osteo::inline app {
 namespace {
 
-// In heights of text. What a column needs at least to be read without a break in each second word, and what more would only part keys and
-// words.
+// In heights of text. What a column needs at least to be read without a break in each second word, and what more would
+// only part keys and words.
 constexpr float kLeastColumnEm = 25, kMostColumnEm = 34, kKeysEm = 9.6F, kGapEm = 1.2F;
 constexpr int kMostColumns = 4;
 
@@ -56,7 +56,8 @@ void HelpPage::draw(int width, int height, const std::function<void()>& steps) {
   const float e = em(), line = 0.25F * e;
   const ImVec2 pad = ImGui::GetStyle().WindowPadding;
   const float room = w - e - 2 * pad.x;
-  const int columns = std::clamp(static_cast<int>((room + kGapEm * e) / ((kLeastColumnEm + kGapEm) * e)), 1, kMostColumns);
+  const int columns =
+      std::clamp(static_cast<int>((room + kGapEm * e) / ((kLeastColumnEm + kGapEm) * e)), 1, kMostColumns);
   const auto count = static_cast<float>(columns);
   const float column = std::min((room - (count - 1) * kGapEm * e) / count, kMostColumnEm * e);
   const float keys_wide = std::min(kKeysEm * e, column / 2), text_wide = column - keys_wide - 0.5F * e;
@@ -68,11 +69,15 @@ void HelpPage::draw(int width, int height, const std::function<void()>& steps) {
     rows.push_back({heading ? 1.9F * e : std::max(high(l.keys, keys_wide), high(l.text, text_wide)) + line, heading});
   }
   // Title, what turns the pages, and above the first page's keys what a new user does first.
-  const float title = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemSpacing.y, foot = ImGui::GetFrameHeightWithSpacing();
-  const float above = !steps ? 0 : steps_high_ > 0 ? steps_high_ : (room > 70 * e ? 6 : 9) * e;  // known from the second picture on
+  const float title = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemSpacing.y,
+              foot = ImGui::GetFrameHeightWithSpacing();
+  const float above = !steps            ? 0
+                      : steps_high_ > 0 ? steps_high_
+                                        : (room > 70 * e ? 6 : 9) * e;  // known from the second picture on
   const float most = h - e - title - foot - 2 * pad.y;
   const std::vector<HelpColumn> packed = into_columns(rows, static_cast<std::size_t>(columns), most - above, most);
-  pages_ = static_cast<int>((packed.size() + static_cast<std::size_t>(columns) - 1) / static_cast<std::size_t>(columns));
+  pages_ =
+      static_cast<int>((packed.size() + static_cast<std::size_t>(columns) - 1) / static_cast<std::size_t>(columns));
   page_ = std::clamp(page_, 0, pages_ - 1);
 
   const float wide = std::min(w - e, count * column + (count - 1) * kGapEm * e + 2 * pad.x);
@@ -85,8 +90,9 @@ void HelpPage::draw(int width, int height, const std::function<void()>& steps) {
   const float tall = std::min(h - e, title + keys_high + foot + 2 * pad.y);
   ImGui::SetNextWindowPos({std::floor((w - wide) / 2), std::floor((h - tall) / 2)});
   ImGui::SetNextWindowSize({wide, tall});
-  ImGui::Begin("Mouse and keys", &open_,
-               ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoScrollbar);
+  ImGui::Begin(
+      "Mouse and keys", &open_,
+      ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoScrollbar);
   const float began = ImGui::GetCursorPosY();
   if (steps && page_ == 0) {
     steps();
@@ -121,4 +127,4 @@ void HelpPage::draw(int width, int height, const std::function<void()>& steps) {
   ImGui::End();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// The window's help: mouse and keys in columns, on as many pages as they need, so that nothing has to be scrolled. Private to libs/app/window.
+// The window's help: mouse and keys in columns, on as many pages as they need, so that nothing has to be scrolled.
+// Private to libs/app/window.
 #pragma once
 #include <cstddef>
 #include <functional>
@@ -14,9 +15,11 @@ struct HelpRow {
 struct HelpColumn {
   std::size_t from = 0, to = 0;
 };
-/// Rows in their order into columns, of which the first `lower` are at most `low` high and the others at most `height`; a row that is
-/// higher than its column is the last of it. A heading is never the last of a column that others follow. No ImGui.
-[[nodiscard]] std::vector<HelpColumn> into_columns(const std::vector<HelpRow>& rows, std::size_t lower, float low, float height);
+/// Rows in their order into columns, of which the first `lower` are at most `low` high and the others at most `height`;
+/// a row that is higher than its column is the last of it. A heading is never the last of a column that others follow.
+/// No ImGui.
+[[nodiscard]] std::vector<HelpColumn> into_columns(const std::vector<HelpRow>& rows, std::size_t lower, float low,
+                                                   float height);
 
 class HelpPage {
  public:
@@ -30,7 +33,8 @@ class HelpPage {
   [[nodiscard]] int page() const { return page_; }
   /// As it was drawn last.
   [[nodiscard]] int pages() const { return pages_; }
-  /// Between ImGui::NewFrame and Render, in a window of this size; `steps`: drawn above the first page's keys. No-op while it is closed.
+  /// Between ImGui::NewFrame and Render, in a window of this size; `steps`: drawn above the first page's keys. No-op
+  /// while it is closed.
   void draw(int width, int height, const std::function<void()>& steps = {});
 
  private:
@@ -39,4 +43,4 @@ class HelpPage {
   float steps_high_ = 0;  // as they were drawn last
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

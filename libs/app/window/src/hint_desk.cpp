@@ -118,4 +118,4 @@ void HintDesk::panel() {
   }
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "osteo/app/window/person_settings.h"
 #include "osteo/assessment/scoring/hint_reader.h"
 #include "osteo/session/scene/rehearsal.h"
-#include "osteo/app/window/person_settings.h"
 #include "room_layout.h"
 
 namespace osteo::inline app {
@@ -50,4 +50,4 @@ class HintDesk {
   double until_s_ = 0;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -366,7 +366,8 @@ void Keyboard::on(int code, Event event, int modifiers) {
   }
   const bool shift = (modifiers & kWithShift) != 0;
   if (event == Event::pressed || key.when == Key::When::repeated) presses_.push_back({key.command, key.value, shift});
-  if (std::none_of(down_.begin(), down_.end(), [&](const Down& d) { return d.code == code; })) down_.push_back({code, key.command});
+  if (std::none_of(down_.begin(), down_.end(), [&](const Down& d) { return d.code == code; }))
+    down_.push_back({code, key.command});
   if (!has(since_, key.command)) since_.push_back(key.command);
 }
 
@@ -387,4 +388,4 @@ bool Keyboard::held(Command command) const {
   return has(held_, command);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// Which key does what: one table for the window, its help and its tests. Private to libs/app/window; no GLFW, no ImGui, no screen.
+// Which key does what: one table for the window, its help and its tests. Private to libs/app/window; no GLFW, no ImGui,
+// no screen.
 #pragma once
 #include <array>
 #include <optional>
@@ -118,8 +119,9 @@ struct HelpLine {
 };
 [[nodiscard]] const std::vector<HelpLine>& help_lines();
 
-/// Keys as the window's callback reports them. Events, not states: at few pictures a second a short press begins and ends between two
-/// frames. ImGui is not asked: until 1.87 it knew keys by the numbers of its backend, since then by its own.
+/// Keys as the window's callback reports them. Events, not states: at few pictures a second a short press begins and
+/// ends between two frames. ImGui is not asked: until 1.87 it knew keys by the numbers of its backend, since then by
+/// its own.
 class Keyboard {
  public:
   enum class Event { released = 0, pressed = 1, repeated = 2 };  // as GLFW numbers them
@@ -151,4 +153,4 @@ class Keyboard {
   std::vector<Command> since_, held_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// The drill finds its way with nobody at it: who leads the hand lets go of it meanwhile. Private to libs/app/window; no GLFW, no ImGui, no VTK.
+// The drill finds its way with nobody at it: who leads the hand lets go of it meanwhile. Private to libs/app/window; no
+// GLFW, no ImGui, no VTK.
 #pragma once
 #include "osteo/app/window/rehearsal_window.h"
 
@@ -38,4 +39,4 @@ class LeadPause {
   bool on_ = false;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -40,7 +40,9 @@ CutsLook read_cuts(const JsonFile& json) {
 }  // namespace
 
 std::string note_of(std::uint8_t value, const std::string& name, StructureLook look) {
-  return Json{{"structure", value}, {"name", name}, {"look", EnumNames<StructureLook>::values[static_cast<std::size_t>(look)]}}.dump();
+  return Json{
+      {"structure", value}, {"name", name}, {"look", EnumNames<StructureLook>::values[static_cast<std::size_t>(look)]}}
+      .dump();
 }
 
 std::string note_of(const CutsLook& c) {
@@ -78,4 +80,4 @@ std::optional<std::string> CutsNotes::next(const CutsLook& now, double now_s) {
   return note_of(now);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// How structures and cuts are shown, as a session's notes keep it: who resumes one sees what was seen. Private to libs/app/window; no screen.
+// How structures and cuts are shown, as a session's notes keep it: who resumes one sees what was seen. Private to
+// libs/app/window; no screen.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -6,8 +7,8 @@
 #include <span>
 #include <string>
 
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/display/view/structures_view.h"
+#include "osteo/session/scene/rehearsal.h"
 
 namespace osteo::inline app {
 
@@ -41,4 +42,4 @@ class CutsNotes {
   double since_s_ = 0;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -29,7 +29,9 @@ std::optional<std::string> Ruler::click(Vec3 at_mm) {
   if (points_.size() == 2) points_.clear();
   points_.push_back(at_mm);
   if (points_.size() < 2) return std::nullopt;
-  return Json{{"from_mm", list_of(points_[0])}, {"to_mm", list_of(points_[1])}, {"length_mm", std::round(*length_mm() * 1000) / 1000}}
+  return Json{{"from_mm", list_of(points_[0])},
+              {"to_mm", list_of(points_[1])},
+              {"length_mm", std::round(*length_mm() * 1000) / 1000}}
       .dump();
 }
 
@@ -56,4 +58,4 @@ double scale_bar_mm(double pixels_per_mm, double most_pixels) {
   return decade;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

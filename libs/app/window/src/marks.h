@@ -1,5 +1,5 @@
-// What a person measures and writes on the bone: a ruler, notes pinned to places. They touch no physics and go into the session as notes.
-// Private to libs/app/window; no ImGui.
+// What a person measures and writes on the bone: a ruler, notes pinned to places. They touch no physics and go into the
+// session as notes. Private to libs/app/window; no ImGui.
 #pragma once
 #include <optional>
 #include <string>
@@ -14,7 +14,8 @@ class Ruler {
   [[nodiscard]] bool on() const { return on_; }
   /// Off: what it showed is gone.
   void turn(bool on);
-  /// A point on the bone. The second completes a measure, the third begins another one. The value of a "ruler" note, once complete.
+  /// A point on the bone. The second completes a measure, the third begins another one. The value of a "ruler" note,
+  /// once complete.
   std::optional<std::string> click(Vec3 at_mm);
   [[nodiscard]] const std::vector<Vec3>& points_mm() const { return points_; }
   /// Nothing before the second point.
@@ -34,8 +35,8 @@ struct PinnedNote {
 class PinnedNotes {
  public:
   static constexpr std::size_t kMostBytes = 300;
-  /// The value of a "note" note. Blanks at the ends are dropped; empty text: nothing is pinned, nothing returned. Beyond kMostBytes it is
-  /// cut at a letter's end.
+  /// The value of a "note" note. Blanks at the ends are dropped; empty text: nothing is pinned, nothing returned.
+  /// Beyond kMostBytes it is cut at a letter's end.
   std::optional<std::string> pin(Vec3 at_mm, std::string text);
   [[nodiscard]] const std::vector<PinnedNote>& all() const { return notes_; }
   /// Another session.
@@ -48,4 +49,4 @@ class PinnedNotes {
 /// 1, 2 or 5 times a power of ten: the longest that is at most so many pixels on the screen.
 [[nodiscard]] double scale_bar_mm(double pixels_per_mm, double most_pixels);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -22,7 +22,8 @@ struct MonitorDesk::Parts {
   std::string invitation;
 };
 
-MonitorDesk::MonitorDesk(Rehearsal& rehearsal, const MonitorOptions& options) : parts_(std::make_unique<Parts>(rehearsal, options)) {
+MonitorDesk::MonitorDesk(Rehearsal& rehearsal, const MonitorOptions& options)
+    : parts_(std::make_unique<Parts>(rehearsal, options)) {
   for (MonitorSink* const s : sinks()) parts_->reader->add_sink(*s);
   parts_->reader->add_sink(*parts_->notes);
   rehearsal.add_reader(*parts_->reader);
@@ -83,8 +84,9 @@ void MonitorDesk::stimulate(const StimulatorSetting& setting) {
 StimulatorSetting MonitorDesk::stimulator() const {
   if (parts_->far) return parts_->far->now();
   StimulatorSetting now;
-  if (parts_->rehearsal != nullptr) parts_->rehearsal->look([&](const World&, SceneReaders&) { now = parts_->reader->stimulator(); });
+  if (parts_->rehearsal != nullptr)
+    parts_->rehearsal->look([&](const World&, SceneReaders&) { now = parts_->reader->stimulator(); });
   return now;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -30,7 +30,8 @@ void beside(float wide) {
 ScreenBox lane_head(MonitorScreen& screen, std::size_t channel, const std::string& name, const ScreenBox& lane) {
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const float e = em(), wide = 8.2F * e;
-  fitted_text(draw, {lane.x, lane.y, wide - 0.4F * e, std::min(lane.height / 2, 1.1F * e)}, e * 0.85F, palette::kText, name);
+  fitted_text(draw, {lane.x, lane.y, wide - 0.4F * e, std::min(lane.height / 2, 1.1F * e)}, e * 0.85F, palette::kText,
+              name);
   ImGui::SetCursorScreenPos({lane.x, lane.y + lane.height / 2});
   ImGui::PushID(static_cast<int>(channel));
   ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, ImVec2(e * 0.25F, 0));
@@ -42,8 +43,8 @@ ScreenBox lane_head(MonitorScreen& screen, std::size_t channel, const std::strin
   ImGui::PopStyleVar();
   ImGui::PopID();
   const ImVec2 at = ImGui::GetItemRectMax();
-  fitted_text(draw, {at.x + e * 0.3F, lane.y + lane.height / 2, wide - 3 * e, std::min(lane.height / 2, 1.1F * e)}, e * 0.75F,
-              palette::kFaint, std::to_string(screen.gain_uv(channel)) + " uV");
+  fitted_text(draw, {at.x + e * 0.3F, lane.y + lane.height / 2, wide - 3 * e, std::min(lane.height / 2, 1.1F * e)},
+              e * 0.75F, palette::kFaint, std::to_string(screen.gain_uv(channel)) + " uV");
   return {lane.x + wide, lane.y, lane.width - wide, lane.height};
 }
 
@@ -65,13 +66,16 @@ void MonitorPanel::draw_sweep(MonitorDesk& desk, float height) {
     draw->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32({0.02F, 0.03F, 0.03F}, 0.9F));
     for (const float sign : {-1.0F, 1.0F}) {
       const auto uv = sign * static_cast<float>(view.event_uv);
-      if (std::abs(uv) < gain) draw->AddLine({box.x, y_of(uv)}, {box.right(), y_of(uv)}, im_colour32(palette::kOrange, 0.5F));
+      if (std::abs(uv) < gain)
+        draw->AddLine({box.x, y_of(uv)}, {box.right(), y_of(uv)}, im_colour32(palette::kOrange, 0.5F));
     }
     // As wide as the screen has pixels: a column is all that falls into it, and reaches to the one before.
-    const auto columns = static_cast<std::size_t>(std::max(1.0F, std::min(box.width, static_cast<float>(MonitorScreen::kBins))));
+    const auto columns =
+        static_cast<std::size_t>(std::max(1.0F, std::min(box.width, static_cast<float>(MonitorScreen::kBins))));
     float last_least = 0, last_most = 0;
     for (std::size_t c = 0; c < columns; ++c) {
-      const std::size_t from = c * MonitorScreen::kBins / columns, to = std::max(from + 1, (c + 1) * MonitorScreen::kBins / columns);
+      const std::size_t from = c * MonitorScreen::kBins / columns,
+                        to = std::max(from + 1, (c + 1) * MonitorScreen::kBins / columns);
       float least = view.sweep[ch][from].least_uv, most = view.sweep[ch][from].most_uv;
       bool gap = false;
       for (std::size_t b = from; b < to; ++b) {
@@ -82,10 +86,12 @@ void MonitorPanel::draw_sweep(MonitorDesk& desk, float height) {
       }
       const bool over = most >= static_cast<float>(view.event_uv) || least <= -static_cast<float>(view.event_uv);
       const float x = box.x + (static_cast<float>(c) + 0.5F) * box.width / static_cast<float>(columns);
-      const float joined_least = c > 0 ? std::min(least, last_most) : least, joined_most = c > 0 ? std::max(most, last_least) : most;
+      const float joined_least = c > 0 ? std::min(least, last_most) : least,
+                  joined_most = c > 0 ? std::max(most, last_least) : most;
       if (!gap)
         draw->AddLine({x, y_of(joined_most)}, {x, std::max(y_of(joined_least), y_of(joined_most) + 1)},
-                      im_colour32(over ? palette::kYellow : palette::kGreen), std::max(1.0F, box.width / static_cast<float>(columns)));
+                      im_colour32(over ? palette::kYellow : palette::kGreen),
+                      std::max(1.0F, box.width / static_cast<float>(columns)));
       last_least = least;
       last_most = most;
     }
@@ -111,7 +117,8 @@ void MonitorPanel::draw_answers(MonitorDesk& desk, float height) {
       const float x = box.x + box.width * static_cast<float>(ms) / 20;
       draw->AddLine({x, box.y}, {x, box.bottom()}, im_colour32(palette::kRaised));
       if (ch + 1 == view.labels.size())
-        fitted_text(draw, {x + 2, box.bottom() - em(), 4 * em(), em()}, em() * 0.75F, palette::kFaint, std::to_string(ms) + " ms");
+        fitted_text(draw, {x + 2, box.bottom() - em(), 4 * em(), em()}, em() * 0.75F, palette::kFaint,
+                    std::to_string(ms) + " ms");
     }
     const auto& traces = view.traces[ch];
     for (std::size_t t = 0; t < traces.size(); ++t) {
@@ -121,8 +128,8 @@ void MonitorPanel::draw_answers(MonitorDesk& desk, float height) {
                         middle - std::clamp(traces[t].uv[i] / gain, -1.0F, 1.0F) * half});
       const bool newest = t + 1 == traces.size();
       draw->AddPolyline(line.data(), static_cast<int>(line.size()),
-                        im_colour32(traces[t].answered ? palette::kYellow : palette::kSkyBlue, newest ? 1 : 0.35F), ImDrawFlags_None,
-                        newest ? 1.6F : 1);
+                        im_colour32(traces[t].answered ? palette::kYellow : palette::kSkyBlue, newest ? 1 : 0.35F),
+                        ImDrawFlags_None, newest ? 1.6F : 1);
     }
   }
   ImGui::SetCursorScreenPos({corner.x, corner.y + height});
@@ -134,8 +141,9 @@ void MonitorPanel::draw_stimulator(MonitorDesk& desk) {
   const bool on = now.current_ma > 0;
   auto ma = static_cast<float>(wanted_.current_ma);
   ImGui::SetNextItemWidth(std::min(9 * em(), ImGui::GetContentRegionAvail().x));
-  const bool moved = ImGui::SliderFloat("##ma", &ma, static_cast<float>(StimulatorSetting::kLeastMa),
-                                        static_cast<float>(StimulatorSetting::kMostMa), "%.2f mA", ImGuiSliderFlags_Logarithmic);
+  const bool moved =
+      ImGui::SliderFloat("##ma", &ma, static_cast<float>(StimulatorSetting::kLeastMa),
+                         static_cast<float>(StimulatorSetting::kMostMa), "%.2f mA", ImGuiSliderFlags_Logarithmic);
   wanted_.current_ma = static_cast<double>(ma);
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("current of the stimulator: the tip of the tool is its electrode");
   const char* const turn = on ? "stimulator on" : "stimulator off";
@@ -214,7 +222,8 @@ void MonitorPanel::draw_switches(MonitorDesk& desk) {
 
 void MonitorPanel::lay_out(RoomLayout& room, float em_pixels, bool there) {
   box_ = {};
-  if (there && shown_) box_ = take_strip(room, std::clamp(room.view.height * 0.28F, kLeastEm * em_pixels, kMostEm * em_pixels));
+  if (there && shown_)
+    box_ = take_strip(room, std::clamp(room.view.height * 0.28F, kLeastEm * em_pixels, kMostEm * em_pixels));
 }
 
 void MonitorPanel::draw(MonitorDesk& desk) {
@@ -222,7 +231,8 @@ void MonitorPanel::draw(MonitorDesk& desk) {
   const float e = em();
   begin_fixed("monitor", box_, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
   if (desk.wiring().channels.empty()) {
-    ImGui::TextWrapped("The case lists none of the nerves that the monitor knows: prepare it with --structures and --names.");
+    ImGui::TextWrapped(
+        "The case lists none of the nerves that the monitor knows: prepare it with --structures and --names.");
     ImGui::End();
     return;
   }
@@ -255,7 +265,8 @@ void MonitorPanel::draw(MonitorDesk& desk) {
     ImGui::EndChild();
   } else {
     draw_switches(desk);
-    const float left = ImGui::GetContentRegionAvail().y, least = kLeastLaneEm * e * static_cast<float>(desk.wiring().channels.size());
+    const float left = ImGui::GetContentRegionAvail().y,
+                least = kLeastLaneEm * e * static_cast<float>(desk.wiring().channels.size());
     const float log_high = std::min(left - least, 5 * e);
     const bool told = log_high > 1.2F * e;
     lanes(told ? left - log_high - ImGui::GetStyle().ItemSpacing.y : left);
@@ -264,4 +275,4 @@ void MonitorPanel::draw(MonitorDesk& desk) {
   ImGui::End();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -36,4 +36,4 @@ class MonitorPanel {
   StimulatorSetting wanted_{0, 0.5, 4, 0.1, false};
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -38,7 +38,8 @@ void MonitorScreen::block(const MonitorBlock& block) {
     for (std::size_t p = 0; p < pulses_.size() && p < traces.size(); ++p) {
       Trace& trace = traces[traces.size() - pulses_.size() + p];
       for (std::size_t i = 0; i < n && trace.uv.size() < kTraceSamples; ++i) {
-        if (block.first_sample + i >= pulses_[p]) trace.uv.push_back(static_cast<float>(uv_of(block.values[i * block.channels + ch])));
+        if (block.first_sample + i >= pulses_[p])
+          trace.uv.push_back(static_cast<float>(uv_of(block.values[i * block.channels + ch])));
       }
     }
   }
@@ -150,4 +151,4 @@ void MonitorScreen::change_gain(std::size_t channel, int steps) {
   gains_[channel] = static_cast<std::size_t>(std::clamp(static_cast<int>(gains_[channel]) + steps, 0, last));
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// What a nerve monitor's screen shows: sweeps, answers to pulses, a log. Private to libs/app/window; no ImGui, no screen.
+// What a nerve monitor's screen shows: sweeps, answers to pulses, a log. Private to libs/app/window; no ImGui, no
+// screen.
 #pragma once
 #include <array>
 #include <deque>
@@ -17,7 +18,8 @@ class MonitorScreen final : public MonitorSink {
   static constexpr std::size_t kTraceSamples = 600;  ///< of an answer: 20 ms
   static constexpr std::size_t kTraces = 5, kLines = 100;
   static constexpr double kAlarmS = 1;
-  static constexpr std::array<int, 7> kGains{20, 50, 100, 200, 500, 1000, 2000};  ///< uV from the middle of a lane to its edge
+  static constexpr std::array<int, 7> kGains{20,  50,   100, 200,
+                                             500, 1000, 2000};  ///< uV from the middle of a lane to its edge
 
   /// `setup` and `wiring` are copied.
   MonitorScreen(const MonitorSetup& setup, const MonitorWiring& wiring);
@@ -73,4 +75,4 @@ class MonitorScreen final : public MonitorSink {
   std::optional<double> threshold_ma_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

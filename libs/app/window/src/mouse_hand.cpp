@@ -6,7 +6,8 @@
 
 namespace osteo::inline app {
 
-MouseStep mouse_step(const ScopeView& view, const PictureArea& area, double x, double y, double dx, double dy, Vec3 at_mm) {
+MouseStep mouse_step(const ScopeView& view, const PictureArea& area, double x, double y, double dx, double dy,
+                     Vec3 at_mm) {
   const Vec3 under = view.at_depth_of(at_mm, area, x, y);
   return {under, under - view.at_depth_of(at_mm, area, x - dx, y - dy)};
 }
@@ -68,4 +69,4 @@ double HandHold::tilted_rad() const {
   return std::atan2(length(cross(a, b)), dot(a, b));
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

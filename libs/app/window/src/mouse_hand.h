@@ -1,4 +1,5 @@
-// How a mouse or keys are the hand: how far the tool goes for a motion, and how its handle is held. Private to libs/app/window; no screen.
+// How a mouse or keys are the hand: how far the tool goes for a motion, and how its handle is held. Private to
+// libs/app/window; no screen.
 #pragma once
 #include "hand_tools.h"
 #include "osteo/simulation/camera/microscope.h"
@@ -12,10 +13,11 @@ struct MouseStep {
 };
 
 /// Of a pointer that is at (x, y) now and has come by (dx, dy) pixels, at the depth of `at_mm`.
-[[nodiscard]] MouseStep mouse_step(const ScopeView& view, const PictureArea& area, double x, double y, double dx, double dy, Vec3 at_mm);
+[[nodiscard]] MouseStep mouse_step(const ScopeView& view, const PictureArea& area, double x, double y, double dx,
+                                   double dy, Vec3 at_mm);
 
-/// Scaling, wrist rest and clutch. At 1:1 the tool is under the pointer; once the two have parted, by a clutch or a finer motion, the tool
-/// goes as far as the pointer does, until they meet again.
+/// Scaling, wrist rest and clutch. At 1:1 the tool is under the pointer; once the two have parted, by a clutch or a
+/// finer motion, the tool goes as far as the pointer does, until they meet again.
 class HandMotion {
  public:
   /// A mm of the hand is 1 / one_to mm of the tool: 1, 2, 4 or 8.
@@ -38,8 +40,9 @@ class HandMotion {
   bool parted_ = false;
 };
 
-/// The handle as the view shows it: from the right, a little from above and towards the eye; a left hand from the left; a plate flat
-/// against what one looks at. Tilted and rolled from there it stays so, also when the view turns. Turns are about the tip, which stays.
+/// The handle as the view shows it: from the right, a little from above and towards the eye; a left hand from the left;
+/// a plate flat against what one looks at. Tilted and rolled from there it stays so, also when the view turns. Turns
+/// are about the tip, which stays.
 class HandHold {
  public:
   /// Which hand holds it; how it is held is mirrored.
@@ -49,8 +52,8 @@ class HandHold {
   void take(bool plate);
   /// Unit, from the tip along the handle.
   [[nodiscard]] Vec3 axis(const ViewAxes& view) const;
-  /// The handle's end goes right and up in the picture by so many radians; behind the tip by no more than 20 degrees, since nobody reaches
-  /// round what one looks at.
+  /// The handle's end goes right and up in the picture by so many radians; behind the tip by no more than 20 degrees,
+  /// since nobody reaches round what one looks at.
   void tilt(double right_rad, double up_rad);
   /// About the line of sight, clockwise as it is seen.
   void roll(double rad);
@@ -65,4 +68,4 @@ class HandHold {
   Vec3 held_[2] = {{0.62, 0.45, 0.64}, {0, 0, 1}};  // in the view's right, up and towards the eye
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -11,7 +11,8 @@
 
 namespace osteo::inline app {
 
-GLFWwindow* open_window(const std::string& title, int width, int height, const std::string& without_display, bool two_buffers) {
+GLFWwindow* open_window(const std::string& title, int width, int height, const std::string& without_display,
+                        bool two_buffers) {
   static std::string reason;
   glfwSetErrorCallback([](int, const char* text) { reason = text; });
   if (glfwInit() == GLFW_FALSE) throw Error(ExitCode::failed, "no window can be opened: " + reason, without_display);
@@ -19,7 +20,8 @@ GLFWwindow* open_window(const std::string& title, int width, int height, const s
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   int x = 0, y = 0, screen_width = 0, screen_height = 0;
-  if (GLFWmonitor* const monitor = glfwGetPrimaryMonitor()) glfwGetMonitorWorkarea(monitor, &x, &y, &screen_width, &screen_height);
+  if (GLFWmonitor* const monitor = glfwGetPrimaryMonitor())
+    glfwGetMonitorWorkarea(monitor, &x, &y, &screen_width, &screen_height);
   if (screen_width > 0) width = std::min(width, screen_width);
   if (screen_height > 0) height = std::min(height, screen_height);
   glfwWindowHint(GLFW_STEREO, two_buffers ? GLFW_TRUE : GLFW_FALSE);
@@ -37,4 +39,4 @@ GLFWwindow* open_window(const std::string& title, int width, int height, const s
   return window;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

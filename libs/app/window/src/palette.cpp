@@ -11,4 +11,4 @@ const NearnessLook& look_of(Nearness nearness) {
   return kLooks[static_cast<int>(nearness)];
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -10,7 +10,8 @@
 namespace osteo::inline app {
 namespace {
 
-constexpr std::string_view kFormat = "osteotome_settings", kCases = "recent_cases", kButtons = "buttons", kNothing = "nothing";
+constexpr std::string_view kFormat = "osteotome_settings", kCases = "recent_cases", kButtons = "buttons",
+                           kNothing = "nothing";
 
 Json value_of(const FieldRef& f) {
   if (auto* const flag = std::get_if<bool*>(&f.target)) return Json(**flag);
@@ -50,7 +51,8 @@ PersonSettings::PersonSettings(std::filesystem::path file) : file_(std::move(fil
           read_buttons(json, m.value);
           continue;
         }
-        const auto at = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == m.key; });
+        const auto at =
+            std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == m.key; });
         if (at == fields.end()) throw json.wrong(m.value, "'" + m.key + "' is no setting", "it is left as it is");
         json.read(m.value, {}, *at);
         if (m.key == "layout" && values.layout != "beside" && values.layout != "operate" && values.layout != "plan") {
@@ -68,7 +70,8 @@ PersonSettings::PersonSettings(std::filesystem::path file) : file_(std::move(fil
     // A comment, say, would be lost.
     if (!Json::parse(was_)) {
       leave_alone_ = true;
-      complaints_.push_back("'" + file_.string() + "' has comments, so what you change in the window is not kept in it");
+      complaints_.push_back("'" + file_.string() +
+                            "' has comments, so what you change in the window is not kept in it");
     }
   } catch (const Error& e) {
     complaints_.push_back(std::string(e.what()) + "; the usual settings are taken, and the file is left as it is");
@@ -91,7 +94,9 @@ void PersonSettings::read_buttons(const JsonFile& json, const JsonValue& value) 
   for (const JsonMember& m : value.members) {
     try {
       const std::optional<int> which = button_named(m.key);
-      if (!which) throw json.wrong(m.value, "there is no button '" + m.key + "'", "such as 'pedal 1', 'device 2', 'mouse 4', 'key F13'");
+      if (!which)
+        throw json.wrong(m.value, "there is no button '" + m.key + "'",
+                         "such as 'pedal 1', 'device 2', 'mouse 4', 'key F13'");
       const std::string& does = json.text(m.value, "what '" + m.key + "' does");
       const auto& all = EnumNames<HandFunction>::values;
       const auto* const at = std::find(all.begin(), all.end(), does);
@@ -131,7 +136,8 @@ std::string PersonSettings::text() const {
   // Only what is not as usual; what is not known stays.
   const HandButtons usual = HandButtons::usual();
   if (buttons != usual || j.find(kButtons) != nullptr) {
-    Json given = j.find(kButtons) != nullptr && !j.find(kButtons)->members().empty() ? *j.find(kButtons) : Json::object();
+    Json given =
+        j.find(kButtons) != nullptr && !j.find(kButtons)->members().empty() ? *j.find(kButtons) : Json::object();
     std::vector<std::string> known;
     for (const Json::Member& m : given.members()) {
       const std::string does = m.value.text() != nullptr ? *m.value.text() : std::string();
@@ -141,7 +147,8 @@ std::string PersonSettings::text() const {
     }
     for (const std::string& name : known) given.erase(name);
     for (const auto& [b, function] : buttons.all()) {
-      if (usual.function(b) != function) given[button_name(b)] = EnumNames<HandFunction>::values[static_cast<std::size_t>(function)];
+      if (usual.function(b) != function)
+        given[button_name(b)] = EnumNames<HandFunction>::values[static_cast<std::size_t>(function)];
     }
     for (const auto& [b, function] : usual.all()) {
       if (!buttons.function(b)) given[button_name(b)] = kNothing;
@@ -171,4 +178,4 @@ std::string PersonSettings::save() {
   }
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

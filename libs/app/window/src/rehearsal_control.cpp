@@ -24,7 +24,8 @@ bool RehearsalControl::guarded(F&& f) {
   } catch (const std::bad_alloc&) {
     failure_ = Error(ExitCode::resources, "out of memory");
   } catch (const std::exception& e) {
-    failure_ = Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(), "this is a defect of the program; please report it");
+    failure_ = Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(),
+                     "this is a defect of the program; please report it");
   }
   return false;
 }
@@ -100,7 +101,8 @@ void RehearsalControl::watch() {
   } else if (ran_) {
     guarded([&] {
       actions_.save();
-      throw Error(ExitCode::failed, "the session has ended by itself; it is saved", "please report this with the session");
+      throw Error(ExitCode::failed, "the session has ended by itself; it is saved",
+                  "please report this with the session");
     });
     lost_ = failure_;
   }
@@ -130,7 +132,8 @@ FreeWays RehearsalControl::free_ways(bool whole_tool) const {
   ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_.plate(), tools_.plate_grip())
                                   : skin_of_instrument(static_cast<std::size_t>(instrument()), whole_tool);
   std::optional<FreeWays> ways;
-  rehearsal().look([&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin), rehearsal().structures()); });
+  rehearsal().look(
+      [&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin), rehearsal().structures()); });
   return *std::move(ways);
 }
 
@@ -391,7 +394,9 @@ bool RehearsalControl::command(const Keyboard::Press& press, const std::optional
     case Command::motion: {
       motion_.step(press.value);
       say("motion of the hand 1:" + std::to_string(motion_.one_to) +
-          (motion_.one_to == 1 && motion_.parted() ? "; " + key_name(Command::bring) + " brings the drill under the mouse again" : ""));
+          (motion_.one_to == 1 && motion_.parted()
+               ? "; " + key_name(Command::bring) + " brings the drill under the mouse again"
+               : ""));
       return true;
     }
     case Command::burr_speed:
@@ -472,4 +477,4 @@ std::string RehearsalControl::told() const {
   return std::chrono::steady_clock::now() < message_until_ ? message_ : std::string();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// What mouse, keys and buttons do to a rehearsal: all of the window but its pictures. Private to libs/app/window; no GLFW, no ImGui, no VTK.
+// What mouse, keys and buttons do to a rehearsal: all of the window but its pictures. Private to libs/app/window; no
+// GLFW, no ImGui, no VTK.
 #pragma once
 #include <chrono>
 #include <functional>
@@ -10,8 +11,8 @@
 #include "keys.h"
 #include "lead_pause.h"
 #include "mouse_hand.h"
-#include "osteo/session/scene/free_ways.h"
 #include "osteo/app/window/rehearsal_window.h"
+#include "osteo/session/scene/free_ways.h"
 #include "second_hand.h"
 
 namespace osteo::inline app {
@@ -27,11 +28,12 @@ struct HandInput {
   std::optional<PadMotion> pad;  ///< of a gamepad, where there is one
 };
 
-/// Sessions that begin and end, the hand and where it is led, the tool in it, the second hand, and what is told. One thread; between two
-/// calls nothing happens but what the rehearsal does by itself.
+/// Sessions that begin and end, the hand and where it is led, the tool in it, the second hand, and what is told. One
+/// thread; between two calls nothing happens but what the rehearsal does by itself.
 class RehearsalControl {
  public:
-  /// `show` is called with each rehearsal that has begun, after bone() is known of it; what it throws ends that session.
+  /// `show` is called with each rehearsal that has begun, after bone() is known of it; what it throws ends that
+  /// session.
   RehearsalControl(const WindowActions& actions, int tool, std::function<void(Rehearsal&)> show)
       : actions_(actions), show_(std::move(show)), tool_(tool) {}
 
@@ -41,7 +43,8 @@ class RehearsalControl {
   void save();   ///< and goes on from there
   void reset();  ///< saves, and begins with the case's bone
   bool end();    ///< saves; nothing runs then. False: it could not be saved, failure() says why
-  /// Each frame: what can no longer be recorded is ended; a rehearsal that has ended without having been asked to says why.
+  /// Each frame: what can no longer be recorded is ended; a rehearsal that has ended without having been asked to says
+  /// why.
   void watch();
   /// Why nothing runs.
   [[nodiscard]] const std::optional<Error>& failure() const { return failure_; }
@@ -91,13 +94,13 @@ class RehearsalControl {
   [[nodiscard]] HandTools& tools() { return tools_; }
   [[nodiscard]] const HandTools& tools() const { return tools_; }
 
-  /// A key that is not for the window itself (picture, view, help, closing): false then. `direction`: from the eye through the mouse; none:
-  /// it is not over the view.
+  /// A key that is not for the window itself (picture, view, help, closing): false then. `direction`: from the eye
+  /// through the mouse; none: it is not over the view.
   bool command(const Keyboard::Press& press, const std::optional<Vec3>& direction);
   /// After all of a frame's mouse and keys: moves the hand on.
   void hold(const HandInput& input);
-  /// The second hand, where no device moves it: what it holds is beside the burr, a sucker or water while one of the two is asked for,
-  /// else out of the way.
+  /// The second hand, where no device moves it: what it holds is beside the burr, a sucker or water while one of the
+  /// two is asked for, else out of the way.
   void wash(bool suck, bool wash);
   [[nodiscard]] bool sucking() const { return second_.sucking(); }
   [[nodiscard]] bool washing() const { return second_.washing(); }
@@ -163,4 +166,4 @@ class RehearsalControl {
   std::chrono::steady_clock::time_point message_until_{};
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

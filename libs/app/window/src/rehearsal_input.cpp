@@ -8,7 +8,8 @@ namespace osteo::inline app {
 
 ScopeMouse RehearsalWindow::mouse() const {
   const ImGuiIO& io = ImGui::GetIO();
-  const auto [x, y] = unsqueezed(stereo_.params.mode, scope_.area, static_cast<double>(io.MousePos.x), static_cast<double>(io.MousePos.y));
+  const auto [x, y] = unsqueezed(stereo_.params.mode, scope_.area, static_cast<double>(io.MousePos.x),
+                                 static_cast<double>(io.MousePos.y));
   return {x,
           y,
           static_cast<double>(io.MouseDelta.x),
@@ -52,7 +53,8 @@ void RehearsalWindow::mouse_and_keys() {
   }
   scope_.advance(keyboard_, io.KeyShift, devices, seconds);
   control_.look_from(view_axes());
-  if (const auto said = trial_.advance(scope_.control, seconds, actions_.folder() / "camera-trial.csv")) control_.say(*said);
+  if (const auto said = trial_.advance(scope_.control, seconds, actions_.folder() / "camera-trial.csv"))
+    control_.say(*said);
   const bool may_drill = in_view && !io.WantCaptureMouse && !measured && !room_.ruler().on() && !room_.before();
   desk_.take(control_);
   HandInput hand = desk_.input(control_);
@@ -86,13 +88,14 @@ bool RehearsalWindow::tilt_by_mouse(const ScopeMouse& m) {
 
 void RehearsalWindow::do_press(const Keyboard::Press& press, const std::optional<Vec3>& direction) {
   // What begins or ends a session shows pictures of its own.
-  const bool long_work = press.command == Command::save || press.command == Command::quit || press.command == Command::perform ||
-                         press.command == Command::before;
+  const bool long_work = press.command == Command::save || press.command == Command::quit ||
+                         press.command == Command::perform || press.command == Command::before;
   if (long_work) ImGui::EndFrame();
   const std::optional<Vec3> bone = press.command == Command::mark ? bone_seen(direction) : std::nullopt;
   if (press.command == Command::before) {
     show_before(!room_.before());
-  } else if (!room_.takes(press, control_, bone) && !camera_takes(press, direction) && !control_.command(press, direction)) {
+  } else if (!room_.takes(press, control_, bone) && !camera_takes(press, direction) &&
+             !control_.command(press, direction)) {
     command(press.command);
   }
   if (long_work) shell_.new_frame();
@@ -193,4 +196,4 @@ void RehearsalWindow::monitor_command(Command command) {
   }
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

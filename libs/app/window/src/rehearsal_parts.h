@@ -1,5 +1,6 @@
-// The window of a rehearsal: one class in four files by what they do: rehearsal_window.cpp (sessions begin and end, a frame),
-// rehearsal_input.cpp (mouse and keys), rehearsal_picture.cpp (what is seen), rehearsal_state.cpp (the same as numbers, for tests).
+// The window of a rehearsal: one class in four files by what they do: rehearsal_window.cpp (sessions begin and end, a
+// frame), rehearsal_input.cpp (mouse and keys), rehearsal_picture.cpp (what is seen), rehearsal_state.cpp (the same as
+// numbers, for tests).
 #pragma once
 // GLEW, through VTK, must come before anything that includes GL.
 #include <vtk_glew.h>
@@ -25,11 +26,11 @@
 #include "looks.h"
 #include "monitor_panel.h"
 #include "monitor_screen.h"
+#include "osteo/app/window/rehearsal_window.h"
 #include "osteo/display/view/instrument_view.h"
 #include "osteo/display/view/planned_regions.h"
 #include "osteo/display/view/structures_view.h"
 #include "osteo/display/view/world_view.h"
-#include "osteo/app/window/rehearsal_window.h"
 #include "rehearsal_control.h"
 #include "review_scene.h"
 #include "room.h"
@@ -185,4 +186,4 @@ class RehearsalWindow {
   std::chrono::steady_clock::time_point warmth_at_{};  // when it is looked at again
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

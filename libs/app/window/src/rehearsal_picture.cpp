@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "osteo/core/base/error.h"
-#include "osteo/simulation/bone/world_mesh.h"
-#include "osteo/imaging/io/surface_io.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/display/view/scope_camera.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/simulation/bone/world_mesh.h"
 #include "rehearsal_parts.h"
 #include "scope_panel.h"
 
@@ -23,7 +23,8 @@ ScopeScene RehearsalWindow::scope_scene() {
     scene.drill_mm = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm);
     scene.handle = normalized(from_floats(tick.device.axis));
   }
-  scene.bone = [rehearsal, reach = length(scene.centre_mm - scope_.view().eye_mm()) + 4 * scene.radius_mm](Vec3 from, Vec3 direction) {
+  scene.bone = [rehearsal, reach = length(scene.centre_mm - scope_.view().eye_mm()) + 4 * scene.radius_mm](
+                   Vec3 from, Vec3 direction) {
     std::optional<BoneHit> hit;
     rehearsal->look([&](const World& world, SceneReaders&) { hit = bone_on_ray(world, from, direction, reach); });
     return hit ? std::optional(hit->at_mm) : std::nullopt;
@@ -34,7 +35,8 @@ ScopeScene RehearsalWindow::scope_scene() {
 // The bone in the middle of the picture; or the middle of all of it.
 Vec3 RehearsalWindow::middle_of_bone() {
   const ScopeScene scene = scope_scene();
-  return (scene.bone ? scene.bone(scope_.view().eye_mm(), scope_.view().back * -1) : std::nullopt).value_or(scene.centre_mm);
+  return (scene.bone ? scene.bone(scope_.view().eye_mm(), scope_.view().back * -1) : std::nullopt)
+      .value_or(scene.centre_mm);
 }
 
 void RehearsalWindow::show() {
@@ -58,7 +60,8 @@ void RehearsalWindow::show() {
     tools_->show(control_.tools(), tick, world, now.structures(), ImGui::GetTime());
   });
   draw_saw_line(control_.tools(), tools_->preview(), scene.project, cuts_.scene(), ImGui::GetBackgroundDrawList());
-  control_.wash(keyboard_.held(Command::suck) || room_.holds(Command::suck), keyboard_.held(Command::wash) || room_.holds(Command::wash));
+  control_.wash(keyboard_.held(Command::suck) || room_.holds(Command::suck),
+                keyboard_.held(Command::wash) || room_.holds(Command::wash));
   note_camera(now);
   hints_.frame(scope_.view().eye_mm(), ImGui::GetTime());
   hints_.draw(cuts_.scene());
@@ -103,7 +106,9 @@ void RehearsalWindow::show_tutor(Rehearsal& now) {
   std::vector<TickRecord> hands;
   for (std::size_t hand = 0; hand < now.hands(); ++hand) {
     hands.push_back(now.latest(hand));
-    if (hand > 0) hands_[hand]->tell_apart({kPartnerColour.red, kPartnerColour.green, kPartnerColour.blue}, tutor_.ghosts ? 0.5 : 1);
+    if (hand > 0)
+      hands_[hand]->tell_apart({kPartnerColour.red, kPartnerColour.green, kPartnerColour.blue},
+                               tutor_.ghosts ? 0.5 : 1);
   }
   TutorPanel::draw(tutor_, hands, cuts_.scene(), [this](Vec3 at) { return project(at); });
 }
@@ -129,8 +134,9 @@ void RehearsalWindow::tell_touch(Rehearsal& now) {
 
 void RehearsalWindow::note_camera(Rehearsal& rehearsal) {
   const ScopeView& view = scope_.view();
-  const CameraView noted{view.eye_mm(),     view.focus_mm, view.up, view.view_angle_deg(scope_.area), view.pixels_per_mm(scope_.area),
-                         view.magnification};
+  const CameraView noted{
+      view.eye_mm(),     view.focus_mm, view.up, view.view_angle_deg(scope_.area), view.pixels_per_mm(scope_.area),
+      view.magnification};
   const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
   if (const auto note = camera_notes_.next(noted, now_s, &rehearsal)) rehearsal.note("camera", *note);
 }
@@ -164,23 +170,27 @@ RoomScene RehearsalWindow::room_scene(Rehearsal& now) {
 // A point of the world in pixels of the window, from its upper left corner.
 std::optional<std::array<float, 2>> RehearsalWindow::project(Vec3 at) const {
   const auto p = scope_.view().pixel(at, scope_.area);
-  return p ? std::optional(std::array<float, 2>{static_cast<float>((*p)[0]), static_cast<float>((*p)[1])}) : std::nullopt;
+  return p ? std::optional(std::array<float, 2>{static_cast<float>((*p)[0]), static_cast<float>((*p)[1])})
+           : std::nullopt;
 }
 
 bool RehearsalWindow::input() {
   const ImGuiIO& io = ImGui::GetIO();
-  return io.MouseDelta.x != 0 || io.MouseDelta.y != 0 || io.MouseWheel != 0 || ImGui::IsAnyMouseDown() || !io.InputQueueCharacters.empty();
+  return io.MouseDelta.x != 0 || io.MouseDelta.y != 0 || io.MouseWheel != 0 || ImGui::IsAnyMouseDown() ||
+         !io.InputQueueCharacters.empty();
 }
 
 void RehearsalWindow::end_picture() {
   render_window_->SetSize(width_, height_);
   const PictureArea& area = scope_.area;
-  renderer_->SetViewport(area.x / width_, 1 - (area.y + area.height) / height_, (area.x + area.width) / width_, 1 - area.y / height_);
+  renderer_->SetViewport(area.x / width_, 1 - (area.y + area.height) / height_, (area.x + area.width) / width_,
+                         1 - area.y / height_);
   aim(renderer_, scope_.view(), area);
   if (before_view_) before_view_->place(renderer_, room_.before());
   renderer_->ResetCameraClippingRange();
   const bool scene = world_view_ && !control_.failure(), two_eyes = scene && stereo_.on();
-  if (scene && !screenshot_wanted_) draw_scope(scope_.view(), area, stereo_.params.mode);  // the caption has a bar of its own
+  if (scene && !screenshot_wanted_)
+    draw_scope(scope_.view(), area, stereo_.params.mode);  // the caption has a bar of its own
   if (scene) trial_.draw(scope_.view(), area);
   if (two_eyes) {
     world_view_->wake();  // what the middle of them cannot see, one of the eyes may
@@ -192,7 +202,8 @@ void RehearsalWindow::end_picture() {
     const SceneBox box{whole(area.x), height_ - whole(area.y + area.height), std::max(1, whole(area.width)),
                        std::max(1, whole(area.height))};
     const bool settled = !scene || world_view_->rest(box.width, box.height, painter_->coarse());
-    if (!painter_->begin({box, width_, height_, settled, input(), screenshot_wanted_}, ImGui::GetDrawData())) return painter_->wait();
+    if (!painter_->begin({box, width_, height_, settled, input(), screenshot_wanted_}, ImGui::GetDrawData()))
+      return painter_->wait();
   }
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   stereo_.show([&] {
@@ -231,4 +242,4 @@ void RehearsalWindow::save_screenshot() {
   }
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -42,9 +42,15 @@ void RehearsalWindow::write_state() {
     state.monitor.seconds = desk->screen().view().now_s;
     state.monitor.events = desk->screen().events();
   }
-  const auto heard = std::count_if(tutor_.links.begin(), tutor_.links.end(), [](const TutorNow::Link& l) { return l.heard; });
-  state.tutor = {tutor_.title, tutor_.invitation, tutor_.links.size(), static_cast<std::size_t>(heard), tutor_.leads && tutor_.guiding,
-                 tutor_.pull,  tutor_.apart_mm};
+  const auto heard =
+      std::count_if(tutor_.links.begin(), tutor_.links.end(), [](const TutorNow::Link& l) { return l.heard; });
+  state.tutor = {tutor_.title,
+                 tutor_.invitation,
+                 tutor_.links.size(),
+                 static_cast<std::size_t>(heard),
+                 tutor_.leads && tutor_.guiding,
+                 tutor_.pull,
+                 tutor_.apart_mm};
   state.cut_in_middle = cuts_.control().enlarged();
   state.cuts_along_tool = cuts_.control().planes() == CutsControl::Planes::tool;
   state.cuts_ms = cuts_.last_ms();
@@ -96,7 +102,8 @@ RoomState RehearsalWindow::room_state() const {
   for (const Step& s : room_.steps().steps()) {
     if (s.done) r.steps_done.push_back(s.name());
   }
-  if (const int next = room_.steps().next(); next >= 0) r.next_step = room_.steps().steps()[static_cast<std::size_t>(next)].name();
+  if (const int next = room_.steps().next(); next >= 0)
+    r.next_step = room_.steps().steps()[static_cast<std::size_t>(next)].name();
   r.help_pages = room_.help().pages();
   r.help_page = room_.help().page();
   const ScreenBox& v = cuts_.scene();
@@ -104,4 +111,4 @@ RoomState RehearsalWindow::room_state() const {
   return r;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

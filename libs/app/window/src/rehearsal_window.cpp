@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <utility>
 
-#include "osteo/core/base/error.h"
-#include "osteo/simulation/bone/world_mesh.h"
-#include "osteo/display/view/actors.h"
 #include "osteo/app/window/start_page.h"
+#include "osteo/core/base/error.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/simulation/bone/world_mesh.h"
 #include "rehearsal_parts.h"
 
 namespace osteo::inline app {
 
-RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, const WindowOptions& options, const SparseGrid* hu,
-                                 const WindowActions& actions, SoundOut& sound)
+RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, const WindowOptions& options,
+                                 const SparseGrid* hu, const WindowActions& actions, SoundOut& sound)
     : shell_(shell),
       room_(shell, person),
       control_(working(actions), options.tool, [this](Rehearsal& rehearsal) { show_bone(rehearsal); }),
@@ -50,7 +50,8 @@ RehearsalWindow::~RehearsalWindow() {
   review_.end();
   if (actions_.rehearsal() != nullptr) hints_.leave();
   // The session is the caller's to save, and goes on until then.
-  if (Rehearsal* const rehearsal = actions_.rehearsal(); rehearsal != nullptr && work_) rehearsal->remove_reader(*work_);
+  if (Rehearsal* const rehearsal = actions_.rehearsal(); rehearsal != nullptr && work_)
+    rehearsal->remove_reader(*work_);
   cuts_.release();
   structures_.reset();
   regions_.reset();
@@ -134,12 +135,14 @@ void RehearsalWindow::plan_and_looks(const Rehearsal& rehearsal) {
       control_.say("the case knows no structures: the procedure's regions are not shown");
     } else {
       regions_ = std::make_unique<RegionsView>(renderer_, *rehearsal.structures(), planned_);
-      for (const std::string& name : regions_->missing()) control_.say("the case lacks the structure of region '" + name + "'");
+      for (const std::string& name : regions_->missing())
+        control_.say("the case lacks the structure of region '" + name + "'");
     }
   }
   if (!actions_.notes_before) return;
   const Looks looks = looks_of(actions_.notes_before());
-  if (looks.unreadable > 0) control_.say(std::to_string(looks.unreadable) + " notes of the session before could not be read");
+  if (looks.unreadable > 0)
+    control_.say(std::to_string(looks.unreadable) + " notes of the session before could not be read");
   if (structures_) {
     for (std::size_t s = 0; s < structures_->all().size(); ++s) {
       if (const auto look = looks.structures.find(structures_->all()[s].value); look != looks.structures.end())
@@ -200,8 +203,8 @@ void RehearsalWindow::lay_out() {
   monitor_.lay_out(room, static_cast<float>(shell_.em_pixels()), !ended_ && monitor_desk() != nullptr);
   cuts_.lay_out(room);
   const ScreenBox& scene = cuts_.scene();
-  scope_.area = {static_cast<double>(scene.x), static_cast<double>(scene.y), std::max(1.0, static_cast<double>(scene.width)),
-                 std::max(1.0, static_cast<double>(scene.height))};
+  scope_.area = {static_cast<double>(scene.x), static_cast<double>(scene.y),
+                 std::max(1.0, static_cast<double>(scene.width)), std::max(1.0, static_cast<double>(scene.height))};
 }
 
 // The bone as it was: made when it is first asked for, kept while the session runs. Between two frames.
@@ -267,11 +270,13 @@ void RehearsalWindow::tell_failure() {
   const float wide = std::min(static_cast<float>(width_), 30 * ImGui::GetFontSize());
   ImGui::SetNextWindowPos({(static_cast<float>(width_) - wide) / 2, static_cast<float>(height_) / 3});
   ImGui::SetNextWindowSize({wide, 0});
-  ImGui::Begin("No session runs", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
+  ImGui::Begin("No session runs", nullptr,
+               ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
   ImGui::TextWrapped("%s", control_.failure()->what());
   if (!control_.failure()->advice().empty()) ImGui::TextWrapped("%s", control_.failure()->advice().c_str());
   ImGui::Separator();
-  if (const auto folder = actions_.folder(); !folder.empty()) ImGui::TextWrapped("What was recorded is kept: %s", folder.string().c_str());
+  if (const auto folder = actions_.folder(); !folder.empty())
+    ImGui::TextWrapped("What was recorded is kept: %s", folder.string().c_str());
   bool go_on = ImGui::Button("Go on from there (F5)", {-1, 0});
   bool anew = ImGui::Button("Begin anew from the case (R)", {-1, 0});
   if (ImGui::Button("Close (Q)", {-1, 0})) quit_ = true;
@@ -285,9 +290,9 @@ void RehearsalWindow::tell_failure() {
   if (go_on || anew) begin_again(anew);
 }
 
-WindowEnd run_rehearsal_window(WindowShell& shell, PersonSettings& person, const WindowOptions& options, const SparseGrid* hu,
-                               const WindowActions& actions, SoundOut& sound) {
+WindowEnd run_rehearsal_window(WindowShell& shell, PersonSettings& person, const WindowOptions& options,
+                               const SparseGrid* hu, const WindowActions& actions, SoundOut& sound) {
   return RehearsalWindow(shell, person, options, hu, actions, sound).run();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

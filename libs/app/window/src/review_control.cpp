@@ -68,7 +68,8 @@ void ReviewControl::play(bool on) {
 }
 
 void ReviewControl::change_speed(int steps) {
-  speed_ = static_cast<std::size_t>(std::clamp(static_cast<int>(speed_) + steps, 0, static_cast<int>(kSpeeds.size()) - 1));
+  speed_ =
+      static_cast<std::size_t>(std::clamp(static_cast<int>(speed_) + steps, 0, static_cast<int>(kSpeeds.size()) - 1));
 }
 
 void ReviewControl::advance(double seconds) {
@@ -129,4 +130,4 @@ std::optional<std::vector<Vec3>> ReviewControl::take_places() {
   return chosen_ < 0 || !review_ ? std::vector<Vec3>{} : review_->findings[static_cast<std::size_t>(chosen_)].places_mm;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

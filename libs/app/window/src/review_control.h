@@ -1,5 +1,5 @@
-// A session that is over, looked at again: made in a thread, gone through in time, one finding after another. Private to libs/app/window; no
-// ImGui, no VTK, no screen.
+// A session that is over, looked at again: made in a thread, gone through in time, one finding after another. Private
+// to libs/app/window; no ImGui, no VTK, no screen.
 #pragma once
 #include <atomic>
 #include <functional>
@@ -8,8 +8,8 @@
 #include <string>
 
 #include "keys.h"
-#include "osteo/core/base/context.h"
 #include "osteo/app/window/session_review.h"
+#include "osteo/core/base/context.h"
 
 namespace osteo::inline app {
 
@@ -52,7 +52,8 @@ class ReviewControl {
   /// The scene is another since it was last asked.
   [[nodiscard]] bool take_moved() { return std::exchange(moved_, false); }
 
-  /// True when the key was for it: its own, and while it is shown Left, Right (with Shift ten times as far), Up, Down: speed, Space.
+  /// True when the key was for it: its own, and while it is shown Left, Right (with Shift ten times as far), Up, Down:
+  /// speed, Space.
   bool key(const Keyboard::Press& press);
 
   /// A finding is looked at, and its first moment gone to; chosen again, its next. No such finding: none is.
@@ -76,4 +77,4 @@ class ReviewControl {
   std::optional<Vec3> look_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

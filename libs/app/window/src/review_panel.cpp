@@ -77,7 +77,8 @@ void draw_findings(ReviewControl& control) {
     const float wide = ImGui::GetContentRegionAvail().x, left = 1.4F * e;
     const ImVec2 size = ImGui::CalcTextSize(f.text.c_str(), nullptr, false, wide - left);
     ImGui::PushID(static_cast<int>(n));
-    if (ImGui::Selectable("##finding", control.chosen() == static_cast<int>(n), 0, {wide, size.y})) control.choose(static_cast<int>(n));
+    if (ImGui::Selectable("##finding", control.chosen() == static_cast<int>(n), 0, {wide, size.y}))
+      control.choose(static_cast<int>(n));
     if (ImGui::IsItemHovered() && !f.why.empty()) {
       ImGui::BeginTooltip();
       ImGui::PushTextWrapPos(30 * e);
@@ -87,8 +88,8 @@ void draw_findings(ReviewControl& control) {
     }
     ImGui::PopID();
     draw_sign(ImGui::GetWindowDrawList(), {at.x + 0.5F * e, at.y + 0.6F * e}, 0.4F * e, look.corners, look.colour);
-    ImGui::GetWindowDrawList()->AddText(ImGui::GetFont(), e, {at.x + left, at.y}, im_colour32(palette::kText), f.text.c_str(), nullptr,
-                                        wide - left);
+    ImGui::GetWindowDrawList()->AddText(ImGui::GetFont(), e, {at.x + left, at.y}, im_colour32(palette::kText),
+                                        f.text.c_str(), nullptr, wide - left);
   }
   for (const std::string& w : r.words) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kFaint));
@@ -128,11 +129,13 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
     fitted_text(draw, {at.x, l.top, names - 0.5F * e, l.height}, 0.85F * e, palette::kFaint, l.name);
   }
   float most_mm3 = 0;
-  for (std::size_t n = 0; n < course.size(); ++n) most_mm3 = std::max(most_mm3, course.seen_mm3[n] + course.hidden_mm3[n]);
+  for (std::size_t n = 0; n < course.size(); ++n)
+    most_mm3 = std::max(most_mm3, course.seen_mm3[n] + course.hidden_mm3[n]);
   const auto samples = static_cast<double>(course.size());
   for (int px = 0; px < static_cast<int>(wide); ++px) {
     const auto sample = [&](int p) {
-      return static_cast<std::size_t>(std::min(samples, std::floor(p / static_cast<double>(wide) * end_s * ReviewCourse::kRateHz)));
+      return static_cast<std::size_t>(
+          std::min(samples, std::floor(p / static_cast<double>(wide) * end_s * ReviewCourse::kRateHz)));
     };
     const std::size_t from = sample(px), to = std::max(from + 1, sample(px + 1));
     const float x = left + static_cast<float>(px);
@@ -142,10 +145,12 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
       const float bottom = l.top + l.height - 1, tall = l.height - 2;
       draw->AddRectFilled({x, bottom - share * tall}, {x + 1, bottom - first * tall}, im_colour32(colour));
     };
-    if (const float f = of_pixel(course.force_n, from, to, true); f > 0) bar(lanes[0], f, lanes[0].full, palette::kSkyBlue);
+    if (const float f = of_pixel(course.force_n, from, to, true); f > 0)
+      bar(lanes[0], f, lanes[0].full, palette::kSkyBlue);
     // The nearer, the higher.
     if (const float d = of_pixel(course.distance_mm, from, to, false); d < lanes[1].full)
-      bar(lanes[1], lanes[1].full - std::max(d, 0.0F), lanes[1].full, d < 0.5F ? palette::kVermillion : palette::kYellow);
+      bar(lanes[1], lanes[1].full - std::max(d, 0.0F), lanes[1].full,
+          d < 0.5F ? palette::kVermillion : palette::kYellow);
     const float hidden = of_pixel(course.hidden_mm3, from, to, true), seen = of_pixel(course.seen_mm3, from, to, true);
     if (most_mm3 > 0) {
       const float below = std::isnan(hidden) ? 0 : hidden;
@@ -165,7 +170,8 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   draw->AddLine({now, at.y}, {now, at.y + high}, im_colour32(palette::kText), 2);
   ImGui::SetCursorScreenPos({left, at.y});
   ImGui::InvisibleButton("time", {wide, high});
-  const double under_s = (static_cast<double>(ImGui::GetIO().MousePos.x) - static_cast<double>(left)) / static_cast<double>(wide) * end_s;
+  const double under_s =
+      (static_cast<double>(ImGui::GetIO().MousePos.x) - static_cast<double>(left)) / static_cast<double>(wide) * end_s;
   if (ImGui::IsItemActive()) {
     control.play(false);
     control.go_to(under_s);
@@ -180,4 +186,4 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   ImGui::End();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

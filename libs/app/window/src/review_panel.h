@@ -13,4 +13,4 @@ void draw_findings(ReviewControl& control);
 /// In a box: time, play and speed; force, distance, bone seen and unseen, events; a click or a drag goes there.
 void draw_course(const ScreenBox& box, ReviewControl& control);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -43,7 +43,8 @@ void ReviewScene::draw_findings() {
 }
 
 void ReviewScene::show(vtkRenderer* renderer, std::unique_ptr<WorldView>& world,
-                       std::array<std::unique_ptr<InstrumentView>, kMostHands>& hands, ScopeInput& scope, double seconds) {
+                       std::array<std::unique_ptr<InstrumentView>, kMostHands>& hands, ScopeInput& scope,
+                       double seconds) {
   renderer_ = renderer;
   if (control_.poll() != ReviewControl::State::ready) return;
   control_.advance(seconds);
@@ -73,7 +74,8 @@ void ReviewScene::show_hands(std::array<std::unique_ptr<InstrumentView>, kMostHa
       hands[h]->hide();
     } else {
       hands[h]->show(
-          *tick, player.rate_hz(), [&](Vec3 p) { return is_bone(world, p); }, world.cutting_guide(static_cast<std::uint32_t>(h)));
+          *tick, player.rate_hz(), [&](Vec3 p) { return is_bone(world, p); },
+          world.cutting_guide(static_cast<std::uint32_t>(h)));
     }
   }
 }
@@ -112,4 +114,4 @@ void ReviewScene::state(RoomState& state) const {
   state.review_mm3 = volume_mm3_;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

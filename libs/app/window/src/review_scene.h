@@ -1,5 +1,5 @@
-// A session that is over in the picture: the bone and the hands as of the time that is looked at, the places of a finding. Private to
-// libs/app/window.
+// A session that is over in the picture: the bone and the hands as of the time that is looked at, the places of a
+// finding. Private to libs/app/window.
 #pragma once
 #include <array>
 #include <memory>
@@ -33,8 +33,8 @@ class ReviewScene {
   void draw_findings();
   [[nodiscard]] bool key(const Keyboard::Press& press) { return control_.key(press); }
   /// `world` is replaced by a view of the session's own scene as soon as that is there.
-  void show(vtkRenderer* renderer, std::unique_ptr<WorldView>& world, std::array<std::unique_ptr<InstrumentView>, kMostHands>& hands,
-            ScopeInput& scope, double seconds);
+  void show(vtkRenderer* renderer, std::unique_ptr<WorldView>& world,
+            std::array<std::unique_ptr<InstrumentView>, kMostHands>& hands, ScopeInput& scope, double seconds);
   void state(RoomState& state) const;
 
  private:
@@ -49,4 +49,4 @@ class ReviewScene {
   vtkSmartPointer<vtkActor> places_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -24,13 +24,14 @@ Layout layout_named(const std::string& name) {
 
 }  // namespace
 
-Room::Room(WindowShell& shell, PersonSettings& person) : shell_(shell), person_(person), wanted_(layout_named(person.values.layout)) {
+Room::Room(WindowShell& shell, PersonSettings& person)
+    : shell_(shell), person_(person), wanted_(layout_named(person.values.layout)) {
   lay_out(false, 0);
 }
 
 const RoomLayout& Room::lay_out(bool over, float column_width) {
-  layout_ = osteo::lay_out(over ? Layout::review : wanted_, shell_.width(), shell_.height(), static_cast<float>(shell_.em_pixels()),
-                           column_width);
+  layout_ = osteo::lay_out(over ? Layout::review : wanted_, shell_.width(), shell_.height(),
+                           static_cast<float>(shell_.em_pixels()), column_width);
   return layout_;
 }
 
@@ -74,8 +75,8 @@ bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const 
   if (keys_in_panel_) {
     keys_in_panel_ = c != Command::put_away && c != Command::panel_keys;
     // Arrows, Space and Enter are the panel's; other keys go on.
-    if (c == Command::put_away || c == Command::panel_keys || c == Command::deeper || c == Command::back || c == Command::drill ||
-        c == Command::perform)
+    if (c == Command::put_away || c == Command::panel_keys || c == Command::deeper || c == Command::back ||
+        c == Command::drill || c == Command::perform)
       return true;
   }
   if (wheel_.open()) {
@@ -89,7 +90,8 @@ bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const 
       const WheelItem& item = wheel_items()[static_cast<std::size_t>(wheel_.chosen())];
       const Command chosen = item.command;
       // A burr is for the drill.
-      const bool burr = chosen != Command::saw && chosen != Command::pieces && chosen != Command::plates && chosen != Command::put_away;
+      const bool burr = chosen != Command::saw && chosen != Command::pieces && chosen != Command::plates &&
+                        chosen != Command::put_away;
       if (burr && control.tools().tool() != HandTools::Tool::drill) pressed_.press(Command::put_away);
       pressed_.press(chosen, item.value);
     }
@@ -135,7 +137,8 @@ bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const 
       const auto kept = [&](float at, float lo, float length) {
         return length < 2 * edge ? lo + length / 2 : std::clamp(at, lo + edge, lo + length - edge);
       };
-      wheel_.show(inside ? kept(m.x, v.x, v.width) : v.x + v.width / 2, inside ? kept(m.y, v.y, v.height) : v.y + v.height / 2);
+      wheel_.show(inside ? kept(m.x, v.x, v.width) : v.x + v.width / 2,
+                  inside ? kept(m.y, v.y, v.height) : v.y + v.height / 2);
       return true;
     }
     case Command::ruler:
@@ -214,7 +217,8 @@ void Room::see(const RoomScene& scene) {
     facts.dust = readers.dust != nullptr;
     if (facts.dust) facts.sucked_mm3 = readers.dust->dust().totals().sucked_mm3;
   });
-  // Asked for, and then done. Not told by the steps there are: a burr that runs out in bone given back makes another at once.
+  // Asked for, and then done. Not told by the steps there are: a burr that runs out in bone given back makes another at
+  // once.
   facts.undone = undone_ && undone > times_undone_;
   times_undone_ = undone;
   if (facts.undone) {
@@ -241,20 +245,23 @@ void Room::draw(const RoomScene& scene) {
   if (keys_in_panel_ && !ImGui::IsAnyItemActive() && !io.NavVisible) ImGui::SetNextWindowFocus();
   if (!layout_.panel.empty()) draw_panel(scene);
   if (!layout_.tray.empty()) draw_tray(layout_.tray, hand, pressed_);
-  draw_state(layout_.state, state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr), control.told());
+  draw_state(layout_.state, state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr),
+             control.told());
   draw_marks(scene);
   if (writing_) draw_note_field(control);
   help_.draw(shell_.width(), shell_.height(), [&] { draw_first_steps(steps_, true); });
   if (wheel_.open()) {
     const float e = em();
-    if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0) wheel_.point((io.MousePos.x - wheel_.x()) / e, (io.MousePos.y - wheel_.y()) / e);
+    if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0)
+      wheel_.point((io.MousePos.x - wheel_.x()) / e, (io.MousePos.y - wheel_.y()) / e);
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) pressed_.press(Command::wheel);
     draw_wheel(wheel_);
   }
   if (asking_) {
     // As if it were a key, at the next frame: what the answer begins shows pictures of its own.
-    const int said = draw_question(shell_.width(), shell_.height(), "Bone whole again?",
-                                   "This session is saved and ends. Another one begins with the bone as the case has it.", "whole again");
+    const int said = draw_question(
+        shell_.width(), shell_.height(), "Bone whole again?",
+        "This session is saved and ends. Another one begins with the bone as the case has it.", "whole again");
     if (said != 0) pressed_.press(said > 0 ? Command::perform : Command::put_away);
   }
 }
@@ -291,9 +298,11 @@ void Room::draw_panel(const RoomScene& scene) {
     draw_approval(scene.machine.approval, scene.machine.approval_ended);
     if (scene.machine.scan != nullptr) draw_scan(*scene.machine.scan);
     ImGui::TextWrapped("hand: %s", scene.machine.device.c_str());
-    ImGui::TextWrapped("%s", rehearsal.realtime() ? "real-time priority: yes"
-                                                  : "real-time priority: REFUSED. The force may stutter: allow rtprio in limits.conf.");
-    ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(scene.tick.work_us), static_cast<double>(scene.tick.lateness_us));
+    ImGui::TextWrapped("%s", rehearsal.realtime()
+                                 ? "real-time priority: yes"
+                                 : "real-time priority: REFUSED. The force may stutter: allow rtprio in limits.conf.");
+    ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(scene.tick.work_us),
+                static_cast<double>(scene.tick.lateness_us));
     ImGui::Text("%.2f of %.2f M triangles", scene.machine.drawn_millions, scene.machine.triangles_millions);
     ImGui::TextWrapped("%s", scene.machine.pictures.c_str());
     ImGui::Checkbox("list of first steps", &person_.values.first_steps);
@@ -308,7 +317,8 @@ void Room::draw_note_field(RehearsalControl& control) {
   const float e = em(), wide = std::min(layout_.view.width - e, 26 * e);
   ImGui::SetNextWindowPos({layout_.view.x + (layout_.view.width - wide) / 2, layout_.view.y + e});
   ImGui::SetNextWindowSize({wide, 0});
-  ImGui::Begin("Note (without names)", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
+  ImGui::Begin("Note (without names)", nullptr,
+               ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
   if (write_focus_) ImGui::SetKeyboardFocusHere();
   write_focus_ = false;
   ImGui::SetNextItemWidth(-1);
@@ -374,8 +384,8 @@ void Room::draw_caption(const RoomScene& scene) {
   const double bar_mm = scale_bar_mm(scene.pixels_per_mm, static_cast<double>(v.width) / 4);
   const StateFacts state = state_of_tick(scene.tick, nullptr, scene.control.rehearsal().rate_hz());
   char text[200];
-  std::snprintf(text, sizeof text, "case %s, %s, %s, %.4g mm", scene.machine.case_hash.substr(0, 8).c_str(), state.tool.c_str(),
-                state.time.c_str(), bar_mm);
+  std::snprintf(text, sizeof text, "case %s, %s, %s, %.4g mm", scene.machine.case_hash.substr(0, 8).c_str(),
+                state.tool.c_str(), state.time.c_str(), bar_mm);
   const float bar = static_cast<float>(bar_mm * scene.pixels_per_mm), y = v.bottom() - 2 * e;
   draw->AddRectFilled({v.x, y}, {v.right(), v.bottom()}, im_colour32(palette::kGround, 0.85F));
   const float x = v.right() - bar - e;
@@ -404,8 +414,8 @@ EndChoice Room::draw_end(const EndFacts& facts, const std::function<void()>& fin
   begin_fixed("end", layout_.page);
   const float e = em();
   fitted_text(ImGui::GetWindowDrawList(),
-              {ImGui::GetCursorScreenPos().x, ImGui::GetCursorScreenPos().y, layout_.page.width - 2 * e, 1.6F * e}, 1.6F * e,
-              palette::kText, facts.past ? "A session, looked at again" : "The session is over, and saved");
+              {ImGui::GetCursorScreenPos().x, ImGui::GetCursorScreenPos().y, layout_.page.width - 2 * e, 1.6F * e},
+              1.6F * e, palette::kText, facts.past ? "A session, looked at again" : "The session is over, and saved");
   ImGui::Dummy({0, 1.8F * e});
   EndChoice choice = EndChoice::none;
   const auto button = [&](const char* words, EndChoice of) {
@@ -453,4 +463,4 @@ EndChoice Room::draw_end(const EndFacts& facts, const std::function<void()>& fin
   return choice;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

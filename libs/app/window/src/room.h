@@ -1,5 +1,5 @@
-// The room around the bone: layouts, panels, tray, wheel, help, questions, ruler, notes, first steps, the page at the end. Private to
-// libs/app/window; ImGui, no VTK and no GL: what it draws on the bone it projects itself.
+// The room around the bone: layouts, panels, tray, wheel, help, questions, ruler, notes, first steps, the page at the
+// end. Private to libs/app/window; ImGui, no VTK and no GL: what it draws on the bone it projects itself.
 #pragma once
 #include <functional>
 #include <optional>
@@ -70,7 +70,8 @@ class Room {
 
   /// Another session has begun.
   void renew();
-  /// Each key as it is pressed, as GLFW numbers it: a note is finished by one that may be over before the next picture, which ImGui misses.
+  /// Each key as it is pressed, as GLFW numbers it: a note is finished by one that may be over before the next picture,
+  /// which ImGui misses.
   void key(int code);
   /// Presses of buttons since the last call, as if they were keys.
   [[nodiscard]] std::vector<Keyboard::Press> take_presses();
@@ -96,7 +97,8 @@ class Room {
   void draw_note_field(RehearsalControl& control);
   void answer(int answer, RehearsalControl& control);
   void see(const RoomScene& scene);
-  [[nodiscard]] HandFacts hand_facts(const RehearsalControl& control, const SoundOut& sound, std::size_t undo_steps) const;
+  [[nodiscard]] HandFacts hand_facts(const RehearsalControl& control, const SoundOut& sound,
+                                     std::size_t undo_steps) const;
 
   WindowShell& shell_;
   PersonSettings& person_;
@@ -117,4 +119,4 @@ class Room {
   bool hand_page_ = false;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

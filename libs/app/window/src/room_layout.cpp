@@ -38,7 +38,8 @@ RoomLayout lay_out(Layout wanted, int width, int height, float em, float column_
       // Squares one below the other use the column's height, where the picture can spare the width.
       const float usual = std::max(kColumnEm * em, std::min(h / 3 - 2 * em, 0.24F * w));
       const float panel = ems(kPanelEm),
-                  column = std::round(column_width > 0 ? std::clamp(column_width, std::min(12 * em, 0.3F * w), 0.45F * w) : usual);
+                  column = std::round(
+                      column_width > 0 ? std::clamp(column_width, std::min(12 * em, 0.3F * w), 0.45F * w) : usual);
       out.panel = {0, 0, panel, h};
       out.column = {w - column, 0, column, h};
       out.view = {panel, 0, w - panel - column, above};
@@ -104,4 +105,4 @@ double next_scale(double by_hand, int steps) {
   return std::clamp(by_hand * std::pow(1.1, steps), 0.6, 2.5);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

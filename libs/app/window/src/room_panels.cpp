@@ -25,11 +25,13 @@ bool tool_button(const std::string& text, ImVec2 size, bool used) {
   const ImVec2 at = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();
   const float inset = em() * 0.3F;
   if (!text.starts_with("##"))
-    fitted_text(ImGui::GetWindowDrawList(), {at.x + inset, at.y, to.x - at.x - 2 * inset, to.y - at.y}, em(), palette::kText, text, true);
+    fitted_text(ImGui::GetWindowDrawList(), {at.x + inset, at.y, to.x - at.x - 2 * inset, to.y - at.y}, em(),
+                palette::kText, text, true);
   if (used) {
     ImGui::PopStyleColor();
     const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
-    ImGui::GetWindowDrawList()->AddRectFilled(lo, {lo.x + std::max(3.0F, em() / 5), hi.y}, im_colour32(palette::kYellow));
+    ImGui::GetWindowDrawList()->AddRectFilled(lo, {lo.x + std::max(3.0F, em() / 5), hi.y},
+                                              im_colour32(palette::kYellow));
   }
   return pressed;
 }
@@ -37,7 +39,8 @@ bool tool_button(const std::string& text, ImVec2 size, bool used) {
 // Of so many buttons in a row, each.
 float share_of_row(int buttons) {
   const float gap = ImGui::GetStyle().ItemSpacing.x;
-  return std::floor((ImGui::GetContentRegionAvail().x - gap * static_cast<float>(buttons - 1)) / static_cast<float>(buttons));
+  return std::floor((ImGui::GetContentRegionAvail().x - gap * static_cast<float>(buttons - 1)) /
+                    static_cast<float>(buttons));
 }
 
 }  // namespace
@@ -62,7 +65,8 @@ void draw_state(const ScreenBox& box, const StateFacts& f, const std::string& me
 
   const ScreenBox tool = column(0);
   head(tool, f.tool);
-  draw_sign(draw, {tool.x + e * 0.5F, tool.y + row / 2}, e * 0.5F, f.turning ? 3 : 4, f.turning ? palette::kYellow : palette::kFaint);
+  draw_sign(draw, {tool.x + e * 0.5F, tool.y + row / 2}, e * 0.5F, f.turning ? 3 : 4,
+            f.turning ? palette::kYellow : palette::kFaint);
   fitted_text(draw, {tool.x + e * 1.3F, tool.y, tool.width - e * 1.3F, row}, row * 0.85F, palette::kText, f.speed);
 
   const ScreenBox force = column(1);
@@ -70,7 +74,8 @@ void draw_state(const ScreenBox& box, const StateFacts& f, const std::string& me
   fitted_text(draw, {force.x, force.y, force.width, row * 0.8F}, row * 0.8F, palette::kText, f.force);
   const float bar = std::max(3.0F, e * 0.25F);
   draw->AddRectFilled({force.x, force.bottom() - bar}, {force.right(), force.bottom()}, im_colour32(palette::kRaised));
-  draw->AddRectFilled({force.x, force.bottom() - bar}, {force.x + force.width * static_cast<float>(f.force_share), force.bottom()},
+  draw->AddRectFilled({force.x, force.bottom() - bar},
+                      {force.x + force.width * static_cast<float>(f.force_share), force.bottom()},
                       im_colour32(f.force_share < 0.5 ? palette::kSkyBlue
                                   : f.force_share < 1 ? palette::kYellow
                                                       : palette::kVermillion));
@@ -81,13 +86,15 @@ void draw_state(const ScreenBox& box, const StateFacts& f, const std::string& me
 
   const ScreenBox near = column(3);
   const NearnessLook& look = look_of(f.nearness);
-  head(near, (f.distance.empty() ? std::string("structures at risk") : f.structure) + (f.warmth.empty() ? "" : ", " + f.warmth));
+  head(near, (f.distance.empty() ? std::string("structures at risk") : f.structure) +
+                 (f.warmth.empty() ? "" : ", " + f.warmth));
   if (f.nearness == Nearness::touched)  // as large as it can be
     draw->AddRectFilled({near.x - pad / 2, near.y}, {near.right(), near.bottom()}, im_colour32(look.colour));
   const Colour ink = f.nearness == Nearness::touched ? Colour{0, 0, 0} : look.colour;
   draw_sign(draw, {near.x + e * 0.5F, near.y + row / 2}, e * 0.5F, look.corners, ink);
   const std::string words = f.distance.empty() ? f.structure : f.distance + "  " + look.word;
-  fitted_text(draw, {near.x + e * 1.3F, near.y, near.width - e * 1.3F, row}, f.distance.empty() ? e : row * 0.85F, ink, words);
+  fitted_text(draw, {near.x + e * 1.3F, near.y, near.width - e * 1.3F, row}, f.distance.empty() ? e : row * 0.85F, ink,
+              words);
 
   // The line below.
   const float below = box.bottom() - line - pad * 0.4F, small = std::min(e, below);
@@ -151,9 +158,11 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, Pressed& pressed) {
     const float inner = wide - em() * 0.5F;
     if (high >= em() * 1.9F) {
       fitted_text(draw, {at.x + em() * 0.25F, at.y, inner, high * 0.56F}, em(), ink, r.word, true);
-      fitted_text(draw, {at.x + em() * 0.25F, at.y + high * 0.52F, inner, high * 0.46F}, em() * 0.8F, palette::kFaint, key, true);
+      fitted_text(draw, {at.x + em() * 0.25F, at.y + high * 0.52F, inner, high * 0.46F}, em() * 0.8F, palette::kFaint,
+                  key, true);
     } else {
-      fitted_text(draw, {at.x + em() * 0.25F, at.y, inner, high}, em() * 0.85F, ink, std::string(r.word) + " " + key, true);
+      fitted_text(draw, {at.x + em() * 0.25F, at.y, inner, high}, em() * 0.85F, ink, std::string(r.word) + " " + key,
+                  true);
     }
   }
   ImGui::End();
@@ -230,10 +239,13 @@ void draw_first_steps(const FirstSteps& steps, bool all_in_full) {
     if (beside) ImGui::TableNextColumn();
     const ImVec2 at = ImGui::GetCursorScreenPos();
     // A ticked box, or an empty one.
-    draw->AddRect({at.x + e * 0.1F, at.y + e * 0.15F}, {at.x + e * 0.8F, at.y + e * 0.85F}, im_colour32(palette::kFaint), 0, 0, e / 12);
+    draw->AddRect({at.x + e * 0.1F, at.y + e * 0.15F}, {at.x + e * 0.8F, at.y + e * 0.85F},
+                  im_colour32(palette::kFaint), 0, 0, e / 12);
     if (step.done) {
-      draw->AddLine({at.x + e * 0.2F, at.y + e * 0.5F}, {at.x + e * 0.4F, at.y + e * 0.75F}, im_colour32(palette::kYellow), e / 6);
-      draw->AddLine({at.x + e * 0.4F, at.y + e * 0.75F}, {at.x + e * 0.85F, at.y + e * 0.1F}, im_colour32(palette::kYellow), e / 6);
+      draw->AddLine({at.x + e * 0.2F, at.y + e * 0.5F}, {at.x + e * 0.4F, at.y + e * 0.75F},
+                    im_colour32(palette::kYellow), e / 6);
+      draw->AddLine({at.x + e * 0.4F, at.y + e * 0.75F}, {at.x + e * 0.85F, at.y + e * 0.1F},
+                    im_colour32(palette::kYellow), e / 6);
     }
     ImGui::SetCursorPosX(ImGui::GetCursorPosX() + e * 1.2F);
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(n == next ? palette::kText : palette::kFaint));
@@ -260,9 +272,11 @@ void draw_wheel(const ToolWheel& wheel) {
     }
     const float edge = angle + step / 2;
     draw->AddLine({middle.x + inner * std::cos(edge), middle.y + inner * std::sin(edge)},
-                  {middle.x + outer * std::cos(edge), middle.y + outer * std::sin(edge)}, im_colour32(palette::kFaint), 1);
+                  {middle.x + outer * std::cos(edge), middle.y + outer * std::sin(edge)}, im_colour32(palette::kFaint),
+                  1);
     const float r = outer * 0.68F, wide = 4.4F * e;
-    const ScreenBox box{middle.x + r * std::cos(angle) - wide / 2, middle.y + r * std::sin(angle) - e * 1.1F, wide, e * 1.2F};
+    const ScreenBox box{middle.x + r * std::cos(angle) - wide / 2, middle.y + r * std::sin(angle) - e * 1.1F, wide,
+                        e * 1.2F};
     fitted_text(draw, box, e * (chosen ? 1.15F : 1), palette::kText, items[n].word, true);
     fitted_text(draw, {box.x, box.bottom(), wide, e * 0.9F}, e * 0.8F, palette::kFaint,
                 key_name(items[n].command, items[n].value), true);
@@ -276,7 +290,8 @@ int draw_question(int width, int height, const std::string& title, const std::st
   const float wide = std::min(w - em(), 28 * em());
   ImGui::SetNextWindowPos({std::floor((w - wide) / 2), std::floor(h / 3)});
   ImGui::SetNextWindowSize({wide, 0});
-  ImGui::Begin(title.c_str(), nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
+  ImGui::Begin(title.c_str(), nullptr,
+               ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
   ImGui::TextWrapped("%s", text.c_str());
   ImGui::Dummy({0, em() * 0.4F});
   int answer = 0;
@@ -290,4 +305,4 @@ int draw_question(int width, int height, const std::string& title, const std::st
   return answer;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -20,7 +20,8 @@
 namespace osteo::inline app {
 namespace {
 
-// How long nothing has changed when the picture rests; how often panels alone are shown again, with and without a change that is known of.
+// How long nothing has changed when the picture rests; how often panels alone are shown again, with and without a
+// change that is known of.
 constexpr std::chrono::milliseconds kRest{300}, kPanels{100}, kPictures{250};
 constexpr double kLookAgainS = 0.008, kIdleS = 0.05;
 
@@ -52,14 +53,16 @@ std::uint64_t panels_stamp(const ImDrawData* panels) {
   return h;
 }
 
-ScenePainter::ScenePainter(vtkGenericOpenGLRenderWindow* window, vtkRenderer* renderer) : window_(window), renderer_(renderer) {
+ScenePainter::ScenePainter(vtkGenericOpenGLRenderWindow* window, vtkRenderer* renderer)
+    : window_(window), renderer_(renderer) {
   window->SetFrameBlitModeToNoBlit();
 }
 
 bool ScenePainter::begin(const Turn& turn, const ImDrawData* panels) {
   began_ = Clock::now();
   const bool resized = turn.width != turn_.width || turn.height != turn_.height || turn.box.left != turn_.box.left ||
-                       turn.box.bottom != turn_.box.bottom || turn.box.width != turn_.box.width || turn.box.height != turn_.box.height;
+                       turn.box.bottom != turn_.box.bottom || turn.box.width != turn_.box.width ||
+                       turn.box.height != turn_.box.height;
   turn_ = turn;
   const std::uint64_t scene = scene_stamp(renderer_), flat = panels_stamp(panels);
   if (scene != seen_ || resized) {
@@ -98,8 +101,8 @@ void ScenePainter::show() {
     ++drawn_;
   }
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
-  window_->BlitDisplayFramebuffer(0, 0, 0, width, height, turn_.box.left, turn_.box.bottom, turn_.box.width, turn_.box.height,
-                                  GL_COLOR_BUFFER_BIT, style_.scale < 1 ? GL_LINEAR : GL_NEAREST);
+  window_->BlitDisplayFramebuffer(0, 0, 0, width, height, turn_.box.left, turn_.box.bottom, turn_.box.width,
+                                  turn_.box.height, GL_COLOR_BUFFER_BIT, style_.scale < 1 ? GL_LINEAR : GL_NEAREST);
   // VTK leaves its state for itself; ImGui saves and restores what it touches.
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glDisable(GL_SCISSOR_TEST);
@@ -120,9 +123,12 @@ void ScenePainter::wait() const {
 std::string ScenePainter::words() const {
   char text[96];
   const QualityChoice& q = quality_;
-  const auto name = [](Quality level) { return std::string(EnumNames<Quality>::values[static_cast<std::size_t>(level)]); };
+  const auto name = [](Quality level) {
+    return std::string(EnumNames<Quality>::values[static_cast<std::size_t>(level)]);
+  };
   std::snprintf(text, sizeof text, "picture %.0f ms, at rest %.0f ms", q.moving_ms(), q.resting_ms());
-  return std::string(text) + "\nquality (J): " + name(q.wish()) + (q.wish() == Quality::automatic ? ", now " + name(q.level()) : "");
+  return std::string(text) + "\nquality (J): " + name(q.wish()) +
+         (q.wish() == Quality::automatic ? ", now " + name(q.level()) : "");
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -19,8 +19,8 @@ struct SceneBox {
   int left = 0, bottom = 0, width = 1, height = 1;
 };
 
-/// In each turn of a window's loop: begin(), where it says so show(), panels on top, the swap, then done(); else wait(). What is drawn of
-/// the scene stays with VTK's window and is shown again while only panels change.
+/// In each turn of a window's loop: begin(), where it says so show(), panels on top, the swap, then done(); else
+/// wait(). What is drawn of the scene stays with VTK's window and is shown again while only panels change.
 class ScenePainter {
  public:
   /// Both must outlive this. VTK's window draws into its own frame and shows nothing by itself.
@@ -68,4 +68,4 @@ class ScenePainter {
 /// Another number when panels would look different. Pictures in them do not count.
 [[nodiscard]] std::uint64_t panels_stamp(const ImDrawData* panels);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

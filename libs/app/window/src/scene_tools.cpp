@@ -12,10 +12,10 @@
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
 
-#include "osteo/simulation/bone/plates.h"
-#include "osteo/simulation/bone/world_mesh.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/plate_view.h"
+#include "osteo/simulation/bone/plates.h"
+#include "osteo/simulation/bone/world_mesh.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -204,7 +204,8 @@ void SceneTools::show(const HandTools& tools, const TickRecord& tick, const Worl
     plane_->GetProperty()->SetColor(0.35, 0.75, 1.0);
   }
   if (shown) {
-    const Vec3 n = normalized(cut.normal), along = normalized(cut.along - n * dot(n, cut.along)), across = cross(n, along);
+    const Vec3 n = normalized(cut.normal), along = normalized(cut.along - n * dot(n, cut.along)),
+               across = cross(n, along);
     const double half_long = (cut.length_mm > 0 ? cut.length_mm : 1.4 * tools.size_mm()) / 2;
     const double half_deep = (cut.depth_mm > 0 ? cut.depth_mm : 1.4 * tools.size_mm()) / 2;
     vtkNew<vtkPoints> points;
@@ -232,4 +233,4 @@ void SceneTools::show(const HandTools& tools, const TickRecord& tick, const Worl
   hand_in_bone_mm_ = plate_in_bone_mm(world, plate_library()[tools.plate()], pose);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -51,4 +51,4 @@ class SceneTools {
   std::array<char, 64> plan_name_{};
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -72,7 +72,8 @@ bool ScopeInput::mouse(const ScopeMouse& m, bool as_device, double seconds) {
   return false;
 }
 
-bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, const std::optional<Vec3>& under_mouse, std::string& said) {
+bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, const std::optional<Vec3>& under_mouse,
+                     std::string& said) {
   const auto bone = [&](Vec3 direction) { return scene.bone ? scene.bone(view().eye_mm(), direction) : std::nullopt; };
   const auto tell = [&](const char* format, auto... values) {
     char text[96];
@@ -160,8 +161,11 @@ void ScopeInput::advance(const Keyboard& keyboard, bool shift, const CameraDevic
     hand_mm_ = devices.hand_mm;
     hand_axis_ = axis;
   }
-  const auto pair = [&](Command less, Command more) { return (keyboard.held(more) ? 1.0 : 0.0) - (keyboard.held(less) ? 1.0 : 0.0); };
-  const double right = pair(Command::orbit_left, Command::orbit_right), up = pair(Command::orbit_down, Command::orbit_up);
+  const auto pair = [&](Command less, Command more) {
+    return (keyboard.held(more) ? 1.0 : 0.0) - (keyboard.held(less) ? 1.0 : 0.0);
+  };
+  const double right = pair(Command::orbit_left, Command::orbit_right),
+               up = pair(Command::orbit_down, Command::orbit_up);
   if (right != 0 || up != 0) {
     if (shift) {
       control.pan(right * 0.5 * view().field_mm() * seconds, up * 0.5 * view().field_mm() * seconds);
@@ -175,10 +179,11 @@ void ScopeInput::advance(const Keyboard& keyboard, bool shift, const CameraDevic
 
 std::string scope_words(const ScopeView& view) {
   char text[96];
-  std::snprintf(text, sizeof text,
-                view.magnification < kNakedEye ? "eye %.1fx  field %.0f mm  at %.0f mm" : "%.1fx  field %.1f mm  WD %.0f mm",
-                view.magnification, view.field_mm(), view.working_distance_mm);
+  std::snprintf(
+      text, sizeof text,
+      view.magnification < kNakedEye ? "eye %.1fx  field %.0f mm  at %.0f mm" : "%.1fx  field %.1f mm  WD %.0f mm",
+      view.magnification, view.field_mm(), view.working_distance_mm);
   return text;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,12 +1,13 @@
-// What mouse, keys and devices do to the microscope in the window. Private to libs/app/window; no GLFW, no ImGui, no VTK.
+// What mouse, keys and devices do to the microscope in the window. Private to libs/app/window; no GLFW, no ImGui, no
+// VTK.
 #pragma once
 #include <functional>
 #include <optional>
 #include <string>
 
 #include "keys.h"
-#include "osteo/simulation/camera/scope_control.h"
 #include "osteo/app/window/rehearsal_window.h"
+#include "osteo/simulation/camera/scope_control.h"
 
 namespace osteo::inline app {
 
@@ -25,8 +26,8 @@ struct ScopeScene {
   std::function<std::optional<Vec3>(Vec3 from, Vec3 direction)> bone;  ///< the first bone on a ray
 };
 
-/// Views of the procedure: from the sides, and from where the surgeon sits: beside the head, the face up in the picture, from a little
-/// behind the ear, on the side that is looked at.
+/// Views of the procedure: from the sides, and from where the surgeon sits: beside the head, the face up in the
+/// picture, from a little behind the ear, on the side that is looked at.
 enum class StandardView { left, right, front, above, surgeon };
 
 class ScopeInput {
@@ -39,11 +40,12 @@ class ScopeInput {
   /// Where the picture is; before anything else of a frame.
   PictureArea area;
 
-  /// The mouse over the picture; `as_device`: it moves the camera as a device does. True when it was for the camera, and so not for the
-  /// hand.
+  /// The mouse over the picture; `as_device`: it moves the camera as a device does. True when it was for the camera,
+  /// and so not for the hand.
   bool mouse(const ScopeMouse& mouse, bool as_device, double seconds);
   /// True when the key was the camera's; `said` is what there is to say of it. `under_mouse`: ray through the mouse.
-  bool key(const Keyboard::Press& press, const ScopeScene& scene, const std::optional<Vec3>& under_mouse, std::string& said);
+  bool key(const Keyboard::Press& press, const ScopeScene& scene, const std::optional<Vec3>& under_mouse,
+           std::string& said);
   /// Keys that are held, devices, flights: once a frame, after the mouse.
   void advance(const Keyboard& keyboard, bool shift, const CameraDevices& devices, double seconds);
   /// The whole bone, as when a session begins; `fly`: or at once.
@@ -61,4 +63,4 @@ class ScopeInput {
 /// "10x  field 20 mm  WD 250 mm"; the naked eye has no magnification to speak of.
 [[nodiscard]] std::string scope_words(const ScopeView& view);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

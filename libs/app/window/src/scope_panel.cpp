@@ -15,11 +15,13 @@ void draw_scope(const ScopeView& view, const PictureArea& area, StereoMode stere
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
   const float line = ImGui::GetTextLineHeight();
   const auto draw = [&](double right, double up, double squeezed) {
-    const float x = static_cast<float>(area.x + right * area.width) + line, y = static_cast<float>(area.y + area.height * (1 - up)) - line;
+    const float x = static_cast<float>(area.x + right * area.width) + line,
+                y = static_cast<float>(area.y + area.height * (1 - up)) - line;
     const float wide = static_cast<float>(bar.length_px * squeezed);
     constexpr ImU32 kInk = IM_COL32(235, 235, 235, 255);
     const float most = std::max(wide, ImGui::CalcTextSize(words.c_str()).x);
-    list->AddRectFilled({x - 8, y - 14 - 2 * line}, {x + most + 8, y + 8}, IM_COL32(10, 14, 20, 150), 4);  // legible on white bone too
+    list->AddRectFilled({x - 8, y - 14 - 2 * line}, {x + most + 8, y + 8}, IM_COL32(10, 14, 20, 150),
+                        4);  // legible on white bone too
     list->AddRectFilled({x, y - 3}, {x + wide, y}, kInk);
     list->AddText({x, y - 5 - line}, kInk, length.c_str());
     list->AddText({x, y - 7 - 2 * line}, kInk, words.c_str());
@@ -40,11 +42,13 @@ void draw_stereo(StereoScreen& screen) {
   if (ImGui::Combo("##stereo", &mode, kModes, IM_ARRAYSIZE(kModes))) s.mode = static_cast<StereoMode>(mode);
   if (s.mode == StereoMode::quad_buffer && !screen.has_quad_buffer())
     ImGui::TextWrapped(
-        "This display has no buffer for each eye, or the window was not opened with --stereo quad_buffer: the left eye is shown.");
+        "This display has no buffer for each eye, or the window was not opened with --stereo quad_buffer: the left eye "
+        "is shown.");
   if (s.mode == StereoMode::off) return;
   auto base = static_cast<float>(s.base_mm), convergence = static_cast<float>(s.convergence_mm);
   if (ImGui::SliderFloat("base, mm", &base, 0, 65, "%.0f")) s.base_mm = static_cast<double>(base);
-  if (ImGui::SliderFloat("in front, mm", &convergence, -50, 50, "%.0f")) s.convergence_mm = static_cast<double>(convergence);
+  if (ImGui::SliderFloat("in front, mm", &convergence, -50, 50, "%.0f"))
+    s.convergence_mm = static_cast<double>(convergence);
   ImGui::Checkbox("eyes swapped", &s.swap);
 }
 
@@ -78,7 +82,8 @@ void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene&
   if (ImGui::Checkbox("head stays up", &upright)) control.set_upright(upright);
   ImGui::Checkbox("fly to views (0.4 s)", &control.flights);
   auto inertia = static_cast<float>(control.arm.params.inertia_s);
-  if (ImGui::SliderFloat("inertia, s", &inertia, 0, 0.5F, "%.2f")) control.arm.params.inertia_s = static_cast<double>(inertia);
+  if (ImGui::SliderFloat("inertia, s", &inertia, 0, 0.5F, "%.2f"))
+    control.arm.params.inertia_s = static_cast<double>(inertia);
   ImGui::Text("O, pedal: the device");
   int mode = static_cast<int>(scope.mode);
   bool changed = ImGui::RadioButton("moves", &mode, 0);
@@ -103,4 +108,4 @@ void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene&
   ImGui::TreePop();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -5,9 +5,10 @@
 
 namespace osteo::inline app {
 
-/// Magnification, field of view, working distance and a scale bar, in the lower left corner of the picture (of each eye's).
+/// Magnification, field of view, working distance and a scale bar, in the lower left corner of the picture (of each
+/// eye's).
 void draw_scope(const ScopeView& view, const PictureArea& area, StereoMode stereo);
 /// Into the current ImGui window.
 void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene& scene);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

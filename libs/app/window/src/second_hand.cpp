@@ -57,7 +57,8 @@ void SecondHand::hold(Rehearsal& rehearsal, const ViewAxes& view, bool suck, boo
   if (placed_mm_) {
     goal.position_mm = *placed_mm_;
   } else {
-    const double gap = instrument_of(tick.device.tool).head.largest_radius_mm() + instrument_of(goal.tool).head.largest_radius_mm();
+    const double gap =
+        instrument_of(tick.device.tool).head.largest_radius_mm() + instrument_of(goal.tool).head.largest_radius_mm();
     goal.position_mm = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm) + side * gap;
     // Held ready beside it, or put away.
     if (!works) goal.position_mm += holds_ > 0 ? side * 8 - view.forward * 6 : side * 30 - view.forward * 40;
@@ -65,4 +66,4 @@ void SecondHand::hold(Rehearsal& rehearsal, const ViewAxes& view, bool suck, boo
   hand->set_goal(goal);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

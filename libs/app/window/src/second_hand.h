@@ -1,4 +1,5 @@
-// The hand without the drill, where no device moves it: beside the burr, or where the mouse has put it. Private to libs/app/window; no screen.
+// The hand without the drill, where no device moves it: beside the burr, or where the mouse has put it. Private to
+// libs/app/window; no screen.
 #pragma once
 #include <optional>
 #include <string>
@@ -9,10 +10,11 @@ namespace osteo::inline app {
 
 class SecondHand {
  public:
-  /// The next of sucker, irrigator, probe and nothing; a device's hand always holds one of the three. What there is to say.
+  /// The next of sucker, irrigator, probe and nothing; a device's hand always holds one of the three. What there is to
+  /// say.
   std::string take_next(Rehearsal& rehearsal);
-  /// The mouse moves it: from where it is, and it stays where it is put. With nothing in it, it takes a sucker. False: there is none that a
-  /// mouse could move, and `said` is why.
+  /// The mouse moves it: from where it is, and it stays where it is put. With nothing in it, it takes a sucker. False:
+  /// there is none that a mouse could move, and `said` is why.
   bool move(Rehearsal& rehearsal, Vec3 by_mm, std::string& said);
   /// Beside the burr again.
   void follow() { placed_mm_.reset(); }
@@ -32,4 +34,4 @@ class SecondHand {
   std::optional<Vec3> placed_mm_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

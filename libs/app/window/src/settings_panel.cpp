@@ -23,7 +23,8 @@ bool draw_field(const FieldRef& f) {
   }
   double& value = **std::get_if<double*>(&f.target);
   const auto speed = static_cast<float>(std::max(std::abs(value), 0.05) / 100);
-  return ImGui::DragScalar(name.c_str(), ImGuiDataType_Double, &value, speed, &f.doc.lo, &f.doc.hi, "%.4g", ImGuiSliderFlags_AlwaysClamp);
+  return ImGui::DragScalar(name.c_str(), ImGuiDataType_Double, &value, speed, &f.doc.lo, &f.doc.hi, "%.4g",
+                           ImGuiSliderFlags_AlwaysClamp);
 }
 
 }  // namespace
@@ -46,9 +47,11 @@ void draw_posture(Rehearsal& rehearsal) {
   }
   auto turned = static_cast<float>(now.head_turned_deg);
   ImGui::PushItemWidth(5 * ImGui::GetFontSize());
-  if (now.posture != Posture::sitting && ImGui::SliderFloat("head turned", &turned, -90, 90, "%.0f deg")) changed = true;
+  if (now.posture != Posture::sitting && ImGui::SliderFloat("head turned", &turned, -90, 90, "%.0f deg"))
+    changed = true;
   ImGui::PopItemWidth();
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("where dust and water fall to; positive: the face towards the patient's left");
+  if (ImGui::IsItemHovered())
+    ImGui::SetTooltip("where dust and water fall to; positive: the face towards the patient's left");
   if (changed) rehearsal.act(SceneAction::posture(down_of(now.posture, static_cast<double>(turned))));
 }
 
@@ -82,4 +85,4 @@ void draw_settings(Rehearsal& rehearsal) {
   ImGui::PopItemWidth();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

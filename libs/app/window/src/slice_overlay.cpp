@@ -100,4 +100,4 @@ void SliceOnScreen::line(const CutLine& l, ImU32 colour, float pixels) const {
   draw->AddPolyline(points.data(), static_cast<int>(points.size()), colour, l.closed ? ImDrawFlags_Closed : 0, pixels);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

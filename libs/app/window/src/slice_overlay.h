@@ -13,7 +13,8 @@ namespace osteo::inline app {
 inline constexpr ImU32 kCrossColour = IM_COL32(120, 200, 120, 170);
 
 /// Light, with a dark edge, so that it can be read on bone. `size`: height of a line, pixels; 0: the font's.
-void shadowed_text(ImDrawList* draw, ImVec2 at, const std::string& words, ImU32 ink = IM_COL32(235, 235, 235, 255), float size = 0);
+void shadowed_text(ImDrawList* draw, ImVec2 at, const std::string& words, ImU32 ink = IM_COL32(235, 235, 235, 255),
+                   float size = 0);
 
 /// A slice on the screen: `lo` its upper left corner in the window, `scale` of lines and distances, as of the text.
 struct SliceOnScreen {
@@ -38,4 +39,4 @@ struct SliceOnScreen {
   void line(const CutLine& line_mm, ImU32 colour, float pixels) const;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

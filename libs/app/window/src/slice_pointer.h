@@ -12,4 +12,4 @@ struct SlicePointer {
   bool shift = false, control = false;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/app/window/audio_out.h"
 #include "osteo/core/base/error.h"
 #include "osteo/session/scene/sound.h"
-#include "osteo/app/window/audio_out.h"
 
 namespace osteo::inline app {
 
@@ -74,8 +74,8 @@ void SoundOut::set_alarms(bool alarms) {
 std::string SoundOut::status() const {
   if (!failure_.empty()) return failure_;
   if (!playing_) return on_ ? "" : "off";
-  return (on_ ? "through " : "off; ") + playing_->card.driver() + ", " + std::to_string(std::lround(1000 * playing_->card.buffer_s())) +
-         " ms at a time";
+  return (on_ ? "through " : "off; ") + playing_->card.driver() + ", " +
+         std::to_string(std::lround(1000 * playing_->card.buffer_s())) + " ms at a time";
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -17,4 +17,4 @@ void draw_sound(SoundOut& sound) {
   ImGui::PopItemWidth();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -7,4 +7,4 @@ namespace osteo::inline app {
 /// Into the current ImGui window, two lines.
 void draw_sound(SoundOut& sound);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

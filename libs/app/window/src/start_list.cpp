@@ -32,11 +32,14 @@ std::string name_of(const fs::path& folder) {
 FolderLook look_at_path(const fs::path& path) {
   std::error_code failed;
   const fs::file_status status = fs::status(path, failed);
-  if (!fs::exists(status)) return {FolderKind::nothing, path, "'" + path.string() + "' is not there, or may not be read"};
+  if (!fs::exists(status))
+    return {FolderKind::nothing, path, "'" + path.string() + "' is not there, or may not be read"};
   if (!fs::is_directory(status)) {
     const fs::path name = path.filename();
-    if (name == "manifest.json" || name == "session.json" || name == "stream.oss") return look_at_path(fs::absolute(path).parent_path());
-    return {FolderKind::nothing, path, "'" + name.string() + "' is a file: a case is a folder, made from a scan by 'osteo prepare'"};
+    if (name == "manifest.json" || name == "session.json" || name == "stream.oss")
+      return look_at_path(fs::absolute(path).parent_path());
+    return {FolderKind::nothing, path,
+            "'" + name.string() + "' is a file: a case is a folder, made from a scan by 'osteo prepare'"};
   }
   const auto has = [&](const char* name) { return fs::is_regular_file(path / name, failed); };
   if (has("manifest.json")) return {FolderKind::the_case, path, {}};
@@ -47,8 +50,8 @@ FolderLook look_at_path(const fs::path& path) {
 std::vector<fs::path> sessions_of(const fs::path& the_case) {
   std::vector<fs::path> found;
   std::error_code failed;
-  for (fs::directory_iterator at(the_case / "sessions", fs::directory_options::skip_permission_denied, failed), end; !failed && at != end;
-       at.increment(failed)) {
+  for (fs::directory_iterator at(the_case / "sessions", fs::directory_options::skip_permission_denied, failed), end;
+       !failed && at != end; at.increment(failed)) {
     if (look_at_path(at->path()).kind == FolderKind::session) found.push_back(at->path());
   }
   std::sort(found.begin(), found.end(), before_in_order);
@@ -56,7 +59,8 @@ std::vector<fs::path> sessions_of(const fs::path& the_case) {
   return found;
 }
 
-StartList::StartList(std::vector<fs::path> recent, fs::path from) : recent_(std::move(recent)), folder_(fs::absolute(from)) {
+StartList::StartList(std::vector<fs::path> recent, fs::path from)
+    : recent_(std::move(recent)), folder_(fs::absolute(from)) {
   list();
 }
 
@@ -74,8 +78,11 @@ void StartList::list() {
   const fs::path of = inside ? folder_ : recent_.empty() ? fs::path() : recent_.front();
   if (!of.empty()) {
     for (const fs::path& s : sessions_of(of)) {
-      if (std::count_if(entries_.begin(), entries_.end(), [](const StartEntry& e) { return e.group == Group::session; }) == 5) break;
-      entries_.push_back({Group::session, FolderKind::session, s, "go on from session " + name_of(s) + " of " + name_of(of)});
+      if (std::count_if(entries_.begin(), entries_.end(),
+                        [](const StartEntry& e) { return e.group == Group::session; }) == 5)
+        break;
+      entries_.push_back(
+          {Group::session, FolderKind::session, s, "go on from session " + name_of(s) + " of " + name_of(of)});
     }
   }
   if (folder_.has_parent_path() && folder_ != folder_.root_path())
@@ -93,7 +100,8 @@ void StartList::list() {
   }
   std::sort(below.begin(), below.end(), before_in_order);
   if (below.size() > kMostListed) {
-    message_ = "of " + std::to_string(below.size()) + " folders the first " + std::to_string(kMostListed) + " are listed";
+    message_ =
+        "of " + std::to_string(below.size()) + " folders the first " + std::to_string(kMostListed) + " are listed";
     below.resize(kMostListed);
   }
   if (inside) entries_.push_back({Group::browse, FolderKind::the_case, folder_, "this case: " + name_of(folder_)});
@@ -118,7 +126,8 @@ void StartList::look_into(const fs::path& folder) {
   message_.clear();
   list();
   // To what is in it, not to the cases above.
-  const auto at = std::find_if(entries_.begin(), entries_.end(), [](const StartEntry& e) { return e.group == StartEntry::Group::browse; });
+  const auto at = std::find_if(entries_.begin(), entries_.end(),
+                               [](const StartEntry& e) { return e.group == StartEntry::Group::browse; });
   if (at != entries_.end()) selected_ = static_cast<int>(at - entries_.begin());
 }
 
@@ -147,7 +156,8 @@ std::optional<StartChoice> choice_of(const fs::path& path, std::string& why) {
       return std::nullopt;
     }
   }
-  why = look.kind == FolderKind::nothing ? look.why : "'" + name_of(look.folder) + "' is no case: its folders are listed";
+  why =
+      look.kind == FolderKind::nothing ? look.why : "'" + name_of(look.folder) + "' is no case: its folders are listed";
   return std::nullopt;
 }
 
@@ -186,4 +196,4 @@ void StartList::forget_recent() {
   list();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

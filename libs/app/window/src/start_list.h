@@ -1,4 +1,5 @@
-// What the start page offers: cases opened last, sessions that can be gone on from, folders to look into. Private to libs/app/window; no ImGui.
+// What the start page offers: cases opened last, sessions that can be gone on from, folders to look into. Private to
+// libs/app/window; no ImGui.
 #pragma once
 #include <filesystem>
 #include <optional>
@@ -15,8 +16,8 @@ struct FolderLook {
   std::filesystem::path folder;
   std::string why;  ///< of nothing: what it is instead, and what to do
 };
-/// What a path stands for. A file that a case or a session is known by (manifest.json, session.json, stream.oss) stands for its folder.
-/// Reads names only. Never throws.
+/// What a path stands for. A file that a case or a session is known by (manifest.json, session.json, stream.oss) stands
+/// for its folder. Reads names only. Never throws.
 [[nodiscard]] FolderLook look_at_path(const std::filesystem::path& path);
 
 struct StartEntry {
@@ -61,4 +62,4 @@ class StartList {
 /// Sessions of a case, the last first; by the number or the name of their folders.
 [[nodiscard]] std::vector<std::filesystem::path> sessions_of(const std::filesystem::path& the_case);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

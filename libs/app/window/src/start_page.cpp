@@ -61,7 +61,8 @@ bool draw_entries(StartList& list, bool follow) {
     const bool dull = e.kind == FolderKind::nothing || e.kind == FolderKind::folder;
     const bool selected = n == list.selected();
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(dull ? palette::kFaint : palette::kText));
-    if (ImGui::Selectable(((selected ? "> " : "   ") + e.words).c_str(), selected, ImGuiSelectableFlags_AllowDoubleClick)) {
+    if (ImGui::Selectable(((selected ? "> " : "   ") + e.words).c_str(), selected,
+                          ImGuiSelectableFlags_AllowDoubleClick)) {
       list.select(n);
       opened = opened || ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left);
     }
@@ -113,10 +114,12 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
     const float e = em(), wide = std::min(w, 60 * e);
     begin_fixed("start", {std::floor((w - wide) / 2), 0, wide, h}, ImGuiWindowFlags_NoScrollbar);
     const ImVec2 at = ImGui::GetCursorScreenPos();
-    fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, wide - 2 * e, 2.2F * e}, 2.2F * e, palette::kText, "Osteotome");
+    fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, wide - 2 * e, 2.2F * e}, 2.2F * e, palette::kText,
+                "Osteotome");
     ImGui::Dummy({0, 2.4F * e});
     ImGui::TextWrapped(
-        "Choose a case: a folder made by 'osteo prepare', or drop one here. Up, Down and Enter; Backspace: the folder above; Q: close.");
+        "Choose a case: a folder made by 'osteo prepare', or drop one here. Up, Down and Enter; Backspace: the folder "
+        "above; Q: close.");
     if (!list.message().empty()) {
       ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
       ImGui::TextWrapped("! %s", list.message().c_str());
@@ -152,4 +155,4 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
   return choice;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -105,4 +105,4 @@ StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const
   return f;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -34,10 +34,12 @@ struct WarmthNow {
   double bone_c = 37;                           ///< the warmest so far
   std::map<std::uint8_t, double> structures_c;  ///< those that are warm at all, by value
 };
-/// Of the nearest structure; warns from 47 C on for any of them, which bone bears for a minute. `structures` may be null.
+/// Of the nearest structure; warns from 47 C on for any of them, which bone bears for a minute. `structures` may be
+/// null.
 void tell_warmth(StateFacts& facts, const WarmthNow& warmth, const TickRecord& tick, const StructureMap* structures);
 /// `warmth`: null where the scene has no heat.
-[[nodiscard]] StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const WarmthNow* warmth = nullptr);
+[[nodiscard]] StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick,
+                                     const WarmthNow* warmth = nullptr);
 /// The part of it that follows from a tick alone. `structures` may be null.
 [[nodiscard]] StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures, double rate_hz);
 
@@ -47,4 +49,4 @@ void tell_warmth(StateFacts& facts, const WarmthNow& warmth, const TickRecord& t
 /// "3:07"; from an hour "1:03:07".
 [[nodiscard]] std::string clock_text(double seconds);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

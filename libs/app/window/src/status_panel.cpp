@@ -8,7 +8,8 @@ namespace osteo::inline app {
 // The words of the import's verdict.
 void draw_scan(const VerdictSummary& scan) {
   if (scan.status.empty()) return;
-  const bool open = ImGui::TreeNode("scan", "Scan: %s (%d notes)", scan.status.c_str(), static_cast<int>(scan.findings.size()));
+  const bool open =
+      ImGui::TreeNode("scan", "Scan: %s (%d notes)", scan.status.c_str(), static_cast<int>(scan.findings.size()));
   if (!open) return;
   for (const Finding& f : scan.findings) {
     const ImVec4 colour = f.severity == Severity::info ? im_colour(palette::kFaint) : im_colour(palette::kYellow);
@@ -28,4 +29,4 @@ void draw_approval(const std::string& words, bool ended) {
   ImGui::PopStyleColor();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -11,4 +11,4 @@ void draw_scan(const VerdictSummary& scan);
 /// Who stands for the case: a calm line, in another colour where a later change has ended it.
 void draw_approval(const std::string& words, bool ended);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

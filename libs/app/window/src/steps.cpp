@@ -14,13 +14,15 @@ constexpr double kDrilledMm3 = 0.5, kSuckedMm3 = 0.05, kZoomed = 0.1;
 
 FirstSteps::FirstSteps() {
   const auto key = [](Command c) { return key_name(c); };
-  steps_ = {{"Drill: point at the bone, " + key(Command::bring) + " brings the drill; hold the left button, wheel away from you: deeper"},
+  steps_ = {{"Drill: point at the bone, " + key(Command::bring) +
+             " brings the drill; hold the left button, wheel away from you: deeper"},
             {"Undo: " + key(Command::undo) + " takes the last stroke back"},
             {"Suck: drill on, and hold " + key(Command::suck) + ": a sucker beside the burr takes the dust"},
             {"Zoom: Ctrl-wheel; right drag turns the view"},
-            {"Cut: " + key(Command::saw) + " sets the saw where you point, drag moves it, " + key(Command::perform) + " cuts"},
-            {"Plate: " + key(Command::plates) + " takes one, " + key(Command::bring) + " brings it where you point, wheel presses it on, " +
-             key(Command::perform) + " fixes it"}};
+            {"Cut: " + key(Command::saw) + " sets the saw where you point, drag moves it, " + key(Command::perform) +
+             " cuts"},
+            {"Plate: " + key(Command::plates) + " takes one, " + key(Command::bring) +
+             " brings it where you point, wheel presses it on, " + key(Command::perform) + " fixes it"}};
 }
 
 void FirstSteps::see(const StepFacts& now) {
@@ -42,4 +44,4 @@ int FirstSteps::next() const {
   return -1;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// The first five minutes: what a new user does once, ticked off by what came of it. Private to libs/app/window; no ImGui.
+// The first five minutes: what a new user does once, ticked off by what came of it. Private to libs/app/window; no
+// ImGui.
 #pragma once
 #include <optional>
 #include <string>
@@ -37,4 +38,4 @@ class FirstSteps {
   std::optional<StepFacts> first_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

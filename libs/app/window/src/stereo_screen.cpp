@@ -44,8 +44,8 @@ bool StereoScreen::has_quad_buffer() {
   return quad_buffer_ == 1;
 }
 
-void StereoScreen::draw(vtkRenderer* renderer, vtkGenericOpenGLRenderWindow* window, const ScopeView& view, const PictureArea& area,
-                        int window_height) {
+void StereoScreen::draw(vtkRenderer* renderer, vtkGenericOpenGLRenderWindow* window, const ScopeView& view,
+                        const PictureArea& area, int window_height) {
   const int width = static_cast<int>(area.width), height = static_cast<int>(area.height);
   if (width < 1 || height < 1) return;
   if (textures_[0] == 0) glGenTextures(2, textures_.data());
@@ -62,14 +62,17 @@ void StereoScreen::draw(vtkRenderer* renderer, vtkGenericOpenGLRenderWindow* win
     glBindTexture(GL_TEXTURE_2D, textures_[static_cast<std::size_t>(eye)]);
     if (width != width_ || height != height_) {
       glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE, nullptr);
-      for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER}) glTexParameteri(GL_TEXTURE_2D, filter, GL_LINEAR);
-      for (const GLenum edge : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T}) glTexParameteri(GL_TEXTURE_2D, edge, GL_CLAMP_TO_EDGE);
+      for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+        glTexParameteri(GL_TEXTURE_2D, filter, GL_LINEAR);
+      for (const GLenum edge : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+        glTexParameteri(GL_TEXTURE_2D, edge, GL_CLAMP_TO_EDGE);
       if (eye == 1) {
         width_ = width;
         height_ = height;
       }
     }
-    glCopyTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, static_cast<int>(area.x), window_height - static_cast<int>(area.y) - height, width, height);
+    glCopyTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, static_cast<int>(area.x),
+                        window_height - static_cast<int>(area.y) - height, width, height);
     glBindTexture(GL_TEXTURE_2D, 0);
   }
   aim(renderer, view, area);
@@ -113,4 +116,4 @@ void StereoScreen::release() {
   textures_ = {};
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

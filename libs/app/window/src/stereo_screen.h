@@ -17,9 +17,10 @@ class StereoScreen {
   /// Whether this display has a buffer for each eye; asked once, in the context.
   [[nodiscard]] bool has_quad_buffer();
 
-  /// Draws both eyes and leaves them in ImGui's background, before ImGui::Render(). The camera is the middle one again afterwards. Twice
-  /// the time of one picture.
-  void draw(vtkRenderer* renderer, vtkGenericOpenGLRenderWindow* window, const ScopeView& view, const PictureArea& area, int window_height);
+  /// Draws both eyes and leaves them in ImGui's background, before ImGui::Render(). The camera is the middle one again
+  /// afterwards. Twice the time of one picture.
+  void draw(vtkRenderer* renderer, vtkGenericOpenGLRenderWindow* window, const ScopeView& view, const PictureArea& area,
+            int window_height);
   /// After ImGui::Render(): what ImGui drew, to each eye's buffer where there are two. `clear`: what stood there.
   void show(const std::function<void()>& clear);
   /// Of OpenGL; in the context.
@@ -31,4 +32,4 @@ class StereoScreen {
   int quad_buffer_ = -1;  // not asked yet
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

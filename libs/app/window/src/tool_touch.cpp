@@ -8,8 +8,9 @@ namespace osteo::inline app {
 namespace {
 
 std::string name_of(const Instrument& held, bool head) {
-  const std::string kind =
-      held.kind == InstrumentKind::burr ? "drill" : std::string(EnumNames<InstrumentKind>::values[static_cast<std::size_t>(held.kind)]);
+  const std::string kind = held.kind == InstrumentKind::burr
+                               ? "drill"
+                               : std::string(EnumNames<InstrumentKind>::values[static_cast<std::size_t>(held.kind)]);
   return "the " + kind + (head || held.kind != InstrumentKind::burr ? "" : "'s shaft");
 }
 
@@ -47,4 +48,4 @@ std::optional<ToolTouch::Told> ToolTouch::look(std::span<const TickRecord> hands
   return told;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

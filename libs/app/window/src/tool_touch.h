@@ -1,5 +1,5 @@
-// That two hands' instruments touch each other: told once when it begins, shown where, and kept as a note. No physics: they pass through.
-// Private to libs/app/window.
+// That two hands' instruments touch each other: told once when it begins, shown where, and kept as a note. No physics:
+// they pass through. Private to libs/app/window.
 #pragma once
 #include <optional>
 #include <span>
@@ -28,4 +28,4 @@ class ToolTouch {
   bool told_ = false;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

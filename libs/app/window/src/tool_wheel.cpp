@@ -45,4 +45,4 @@ void ToolWheel::turn(int items) {
   chosen_ = chosen_ < 0 ? (items > 0 ? 0 : count - 1) : (chosen_ + items % count + count) % count;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

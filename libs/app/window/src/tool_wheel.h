@@ -35,4 +35,4 @@ class ToolWheel {
   int chosen_ = -1;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -30,7 +30,8 @@ void TrialOverlay::draw(const ScopeView& view, const PictureArea& area) const {
     std::array<ImVec2, kAround> points;
     for (int n = 0; n < kAround; ++n) {
       const double a = 2 * std::numbers::pi * n / kAround, r = share * t.field_mm() / 2;
-      const auto p = view.pixel(t.focus_mm + t.back * nearer_mm + t.right() * (r * std::cos(a)) + t.up * (r * std::sin(a)), area);
+      const auto p =
+          view.pixel(t.focus_mm + t.back * nearer_mm + t.right() * (r * std::cos(a)) + t.up * (r * std::sin(a)), area);
       if (!p) return;
       points[static_cast<std::size_t>(n)] = {static_cast<float>((*p)[0]), static_cast<float>((*p)[1])};
     }
@@ -47,15 +48,16 @@ void TrialOverlay::draw(const ScopeView& view, const PictureArea& area) const {
     list->AddCircleFilled(m, 4, ink);
   }
   char words[96];
-  std::snprintf(words, sizeof words, "view %zu of %zu, %.1fx: %.1f s%s", trial_->results().size() + 1, trial_->count(), t.magnification,
-                trial_->seconds(), close ? ", hold" : "");
+  std::snprintf(words, sizeof words, "view %zu of %zu, %.1fx: %.1f s%s", trial_->results().size() + 1, trial_->count(),
+                t.magnification, trial_->seconds(), close ? ", hold" : "");
   const ImVec2 at{static_cast<float>(area.x) + 16, static_cast<float>(area.y) + 16}, size = ImGui::CalcTextSize(words);
   list->AddRectFilled({at.x - 8, at.y - 6}, {at.x + size.x + 8, at.y + size.y + 6}, IM_COL32(10, 14, 20, 170), 4);
   list->AddText(at, ink, words);
   list->PopClipRect();
 }
 
-std::optional<std::string> TrialOverlay::advance(const ScopeControl& control, double seconds, const std::filesystem::path& csv) {
+std::optional<std::string> TrialOverlay::advance(const ScopeControl& control, double seconds,
+                                                 const std::filesystem::path& csv) {
   if (!running()) return std::nullopt;
   const bool reached = trial_->advance(control, seconds);
   if (!reached) return std::nullopt;
@@ -66,9 +68,9 @@ std::optional<std::string> TrialOverlay::advance(const ScopeControl& control, do
   }
   const TrialSummary s = summary_of(trial_->results());
   char words[120];
-  std::snprintf(words, sizeof words, "view %zu of %zu reached in %.1f s%s", s.targets, trial_->count(), trial_->results().back().seconds,
-                running() ? "" : "; times are in camera-trial.csv");
+  std::snprintf(words, sizeof words, "view %zu of %zu reached in %.1f s%s", s.targets, trial_->count(),
+                trial_->results().back().seconds, running() ? "" : "; times are in camera-trial.csv");
   return std::string(words);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

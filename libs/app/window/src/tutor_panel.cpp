@@ -12,8 +12,8 @@ namespace osteo::inline app {
 std::string link_words(const TutorNow::Link& link) {
   if (!link.heard) return link.who + ": not heard";
   char text[160];
-  std::snprintf(text, sizeof text, "there and back %.1f ms, %.0f %% lost, clock %+.1f ms, %+.0f ppm", link.rtt_ms, 100 * link.lost,
-                link.offset_ms, link.drift_ppm);
+  std::snprintf(text, sizeof text, "there and back %.1f ms, %.0f %% lost, clock %+.1f ms, %+.0f ppm", link.rtt_ms,
+                100 * link.lost, link.offset_ms, link.drift_ppm);
   std::string words = link.who + ": " + text;
   if (link.behind_s > 0.5) {
     std::snprintf(text, sizeof text, ", %.1f s behind", link.behind_s);
@@ -40,17 +40,20 @@ std::optional<std::string> LinkWatch::look(const TutorNow& now) {
     if (before == heard_.end()) {
       if (l.heard) said = l.who + " has joined";
     } else if (before->second != l.heard) {
-      said = l.heard ? "the link to the " + l.who + " is back" : "the link to the " + l.who + " has dropped: your hand is let go";
+      said = l.heard ? "the link to the " + l.who + " is back"
+                     : "the link to the " + l.who + " has dropped: your hand is let go";
     }
   }
   for (const auto& [who, was] : heard_) {
-    if (std::none_of(heard.begin(), heard.end(), [&, name = who](const auto& h) { return h.first == name; })) said = who + " has left";
+    if (std::none_of(heard.begin(), heard.end(), [&, name = who](const auto& h) { return h.first == name; }))
+      said = who + " has left";
   }
   heard_ = std::move(heard);
   return said;
 }
 
-void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands, const ScreenBox& area, const Project& project) {
+void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands, const ScreenBox& area,
+                      const Project& project) {
   if (now.title.empty()) return;
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
   for (std::size_t h = 1; h < std::min(now.hands.size(), hands.size()); ++h) {
@@ -70,8 +73,8 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
   ImGui::SetNextWindowSize({wide, 0}, ImGuiCond_Always);
   ImGui::SetNextWindowBgAlpha(0.82F);
   ImGui::Begin("tutoring", nullptr,
-               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                   ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
+               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
+                   ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
   ImGui::TextWrapped("%s", now.title.c_str());
   if (!now.invitation.empty()) ImGui::TextWrapped("%s", now.invitation.c_str());
   if (!now.trouble.empty()) {
@@ -96,4 +99,4 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
   ImGui::End();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

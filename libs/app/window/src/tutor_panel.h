@@ -1,4 +1,5 @@
-// Who teaches and who learns, in the window: a small panel, names beside the hands of others, who cuts. Private to libs/app/window; ImGui.
+// Who teaches and who learns, in the window: a small panel, names beside the hands of others, who cuts. Private to
+// libs/app/window; ImGui.
 #pragma once
 #include <array>
 #include <functional>
@@ -6,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/app/window/tutor_now.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "palette.h"
 #include "room_layout.h"
 
@@ -35,7 +36,8 @@ class TutorPanel {
  public:
   using Project = std::function<std::optional<std::array<float, 2>>(Vec3)>;
   /// Between ImGui::NewFrame and Render; `area`: of the bone, at whose upper right corner it is.
-  static void draw(const TutorNow& now, const std::vector<TickRecord>& hands, const ScreenBox& area, const Project& project);
+  static void draw(const TutorNow& now, const std::vector<TickRecord>& hands, const ScreenBox& area,
+                   const Project& project);
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

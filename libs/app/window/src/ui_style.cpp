@@ -44,7 +44,8 @@ void set_ui_style(int em_pixels) {
   const auto size = static_cast<float>(em_pixels);
   // Latin with its accents, for folders and names, and Greek.
   static constexpr ImWchar kLetters[] = {0x20, 0x17F, 0x370, 0x3FF, 0x2013, 0x2026, 0};
-  if (ui_font().file.empty() || io.Fonts->AddFontFromFileTTF(ui_font().file.c_str(), size, nullptr, kLetters) == nullptr) {
+  if (ui_font().file.empty() ||
+      io.Fonts->AddFontFromFileTTF(ui_font().file.c_str(), size, nullptr, kLetters) == nullptr) {
     ImFontConfig config;
     config.SizePixels = size;
     io.Fonts->AddFontDefault(&config);
@@ -65,7 +66,8 @@ void set_ui_style(int em_pixels) {
   style.Colors[ImGuiCol_Border] = {0.25F, 0.29F, 0.34F, 1};
   style.Colors[ImGuiCol_ButtonHovered] = style.Colors[ImGuiCol_FrameBgHovered] = {0.20F, 0.27F, 0.35F, 1};
   style.Colors[ImGuiCol_ButtonActive] = style.Colors[ImGuiCol_FrameBgActive] = im_colour(kBlue);
-  style.Colors[ImGuiCol_Header] = style.Colors[ImGuiCol_HeaderActive] = im_colour(kBlue);  // what is chosen stands out, not the mouse
+  style.Colors[ImGuiCol_Header] = style.Colors[ImGuiCol_HeaderActive] =
+      im_colour(kBlue);  // what is chosen stands out, not the mouse
   style.Colors[ImGuiCol_HeaderHovered] = {0.20F, 0.27F, 0.35F, 1};
   style.Colors[ImGuiCol_CheckMark] = style.Colors[ImGuiCol_SliderGrab] = im_colour(kSkyBlue);
   style.Colors[ImGuiCol_NavHighlight] = im_colour(kYellow);
@@ -77,11 +79,12 @@ void begin_fixed(const char* name, const ScreenBox& box, ImGuiWindowFlags more) 
   ImGui::SetNextWindowPos({box.x, box.y});
   ImGui::SetNextWindowSize({box.width, box.height});
   ImGui::Begin(name, nullptr,
-               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
-                   ImGuiWindowFlags_NoBringToFrontOnFocus | more);
+               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
+                   ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoBringToFrontOnFocus | more);
 }
 
-void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour colour, const std::string& text, bool middle) {
+void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour colour, const std::string& text,
+                 bool middle) {
   if (text.empty() || box.empty()) return;
   ImFont* const font = ImGui::GetFont();
   float size = std::min(em_pixels, box.height);
@@ -89,8 +92,8 @@ void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour
   if (width > box.width) size *= box.width / width;
   const ImVec2 taken = font->CalcTextSizeA(size, FLT_MAX, 0, text.c_str());
   const float x = middle ? box.x + (box.width - taken.x) / 2 : box.x;
-  draw->AddText(font, size, {std::floor(x), std::floor(box.y + (box.height - taken.y) / 2)}, im_colour32(colour, ImGui::GetStyle().Alpha),
-                text.c_str());
+  draw->AddText(font, size, {std::floor(x), std::floor(box.y + (box.height - taken.y) / 2)},
+                im_colour32(colour, ImGui::GetStyle().Alpha), text.c_str());
 }
 
 void draw_sign(ImDrawList* draw, ImVec2 centre, float radius, int corners, Colour colour) {
@@ -100,11 +103,11 @@ void draw_sign(ImDrawList* draw, ImVec2 centre, float radius, int corners, Colou
     return;
   }
   for (int k = 0; k < corners; ++k) {
-    const float angle =
-        std::numbers::pi_v<float> * (2 * static_cast<float>(k) / static_cast<float>(corners) - 0.5F + (corners == 8 ? 0.125F : 0));
+    const float angle = std::numbers::pi_v<float> *
+                        (2 * static_cast<float>(k) / static_cast<float>(corners) - 0.5F + (corners == 8 ? 0.125F : 0));
     draw->PathLineTo({centre.x + radius * std::cos(angle), centre.y + radius * std::sin(angle)});
   }
   draw->PathFillConvex(paint);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -35,4 +35,4 @@ WayView::~WayView() {
   if (actor_) renderer_->RemoveActor(actor_);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -24,4 +24,4 @@ class WayView {
   vtkSmartPointer<vtkActor> actor_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

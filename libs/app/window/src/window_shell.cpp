@@ -22,8 +22,8 @@
 namespace osteo::inline app {
 
 WindowShell::WindowShell(const ShellOptions& options) : fixed_scale_(options.scale), by_hand_(options.by_hand) {
-  window_ = open_window(options.title, options.width, options.height, "is there a display? Without one: osteo rehearse CASE --headless",
-                        options.two_buffers);
+  window_ = open_window(options.title, options.width, options.height,
+                        "is there a display? Without one: osteo rehearse CASE --headless", options.two_buffers);
   glewExperimental = GL_TRUE;
   glewInit();
   while (glGetError() != GL_NO_ERROR) {
@@ -33,14 +33,16 @@ WindowShell::WindowShell(const ShellOptions& options) : fixed_scale_(options.sca
   glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int modifiers) {
     auto* const shell = static_cast<WindowShell*>(glfwGetWindowUserPointer(w));
     if ((modifiers & GLFW_MOD_CONTROL) != 0 && action != GLFW_RELEASE) {
-      const bool larger = key == GLFW_KEY_EQUAL || key == GLFW_KEY_KP_ADD, smaller = key == GLFW_KEY_MINUS || key == GLFW_KEY_KP_SUBTRACT;
+      const bool larger = key == GLFW_KEY_EQUAL || key == GLFW_KEY_KP_ADD,
+                 smaller = key == GLFW_KEY_MINUS || key == GLFW_KEY_KP_SUBTRACT;
       if (larger || smaller) return shell->change_scale(larger ? 1 : -1);
       if (key == GLFW_KEY_0 || key == GLFW_KEY_KP_0) return shell->change_scale(0);
     }
     if (shell->on_key) shell->on_key(key, action, modifiers & (GLFW_MOD_SHIFT | GLFW_MOD_CONTROL | GLFW_MOD_ALT));
   });
-  glfwSetWindowFocusCallback(
-      window_, [](GLFWwindow* w, int has) { static_cast<WindowShell*>(glfwGetWindowUserPointer(w))->attended_ = has != GLFW_FALSE; });
+  glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int has) {
+    static_cast<WindowShell*>(glfwGetWindowUserPointer(w))->attended_ = has != GLFW_FALSE;
+  });
   glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** paths) {
     auto* const shell = static_cast<WindowShell*>(glfwGetWindowUserPointer(w));
     shell->dropped_.insert(shell->dropped_.end(), paths, paths + count);
@@ -164,7 +166,8 @@ void WindowShell::show_page() {
   glfwSwapBuffers(window_);
 }
 
-void WindowShell::while_working(const std::string& words, const Context& context, const std::function<void(const Context&)>& work) {
+void WindowShell::while_working(const std::string& words, const Context& context,
+                                const std::function<void(const Context&)>& work) {
   struct Progress {
     std::mutex mutex;
     double fraction = 0;
@@ -174,8 +177,9 @@ void WindowShell::while_working(const std::string& words, const Context& context
   Context inside;
   inside.threads = context.threads;
   inside.seed = context.seed;
-  inside.on_log(
-      [&context](LogLevel level, std::string_view text) { level == LogLevel::warning ? context.warn(text) : context.info(text); });
+  inside.on_log([&context](LogLevel level, std::string_view text) {
+    level == LogLevel::warning ? context.warn(text) : context.info(text);
+  });
   inside.on_progress([&](double fraction, std::string_view activity) {
     context.progress(fraction, activity);
     const std::lock_guard lock(progress.mutex);
@@ -196,10 +200,12 @@ void WindowShell::while_working(const std::string& words, const Context& context
     }
     new_frame();
     const auto w = static_cast<float>(width_), h = static_cast<float>(height_), e = static_cast<float>(em_);
-    begin_fixed("working", {w / 2 - std::min(15 * e, w / 2), h / 2 - 4 * e, std::min(30 * e, w), 8 * e}, ImGuiWindowFlags_NoScrollbar);
+    begin_fixed("working", {w / 2 - std::min(15 * e, w / 2), h / 2 - 4 * e, std::min(30 * e, w), 8 * e},
+                ImGuiWindowFlags_NoScrollbar);
     ImGui::TextUnformatted(words.c_str());
     // Where nobody says how far it is, that it goes on can be seen at least.
-    const float shown = fraction > 0 ? static_cast<float>(fraction) : static_cast<float>(0.5 - 0.5 * std::cos(seconds * 2));
+    const float shown =
+        fraction > 0 ? static_cast<float>(fraction) : static_cast<float>(0.5 - 0.5 * std::cos(seconds * 2));
     ImGui::ProgressBar(shown, {-1, 1.5F * e}, fraction > 0 ? nullptr : "");
     ImGui::Text("%s%s%.0f s", activity.c_str(), activity.empty() ? "" : ", ", seconds);
     ImGui::End();
@@ -208,4 +214,4 @@ void WindowShell::while_working(const std::string& words, const Context& context
   done.get();
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -122,4 +122,4 @@ void write_window_state(const WindowState& s, const std::filesystem::path& file)
   std::filesystem::rename(beside, file, ignored);
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "osteo/core/data/rigid_transform.h"
+#include "osteo/display/view/quality.h"
 #include "osteo/simulation/bone/saw.h"
 #include "osteo/simulation/camera/microscope.h"
 #include "osteo/simulation/haptics/stream.h"
-#include "osteo/display/view/quality.h"
 
 namespace osteo::inline app {
 
@@ -17,8 +17,8 @@ namespace osteo::inline app {
 struct RoomState {
   std::string layout;
   int em_pixels = 0;
-  bool full_screen = false, asking = false, wheel = false, panel_keys = false, before = false, writing = false, ended = false,
-       ruler = false;
+  bool full_screen = false, asking = false, wheel = false, panel_keys = false, before = false, writing = false,
+       ended = false, ruler = false;
   double ruler_mm = 0;
   std::size_t notes = 0;
   std::string hint;  // that is shown
@@ -92,4 +92,4 @@ struct WindowState {
 /// As JSON, in place of what was there; a reader sees the one or the other. What cannot be written is left out.
 void write_window_state(const WindowState& state, const std::filesystem::path& file);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -73,4 +73,4 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
   return out;
 }
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "osteo/session/scene/reader.h"
 #include "osteo/app/window/rehearsal_window.h"
+#include "osteo/session/scene/reader.h"
 #include "palette.h"
 
 namespace osteo::inline app {
@@ -41,4 +41,4 @@ struct EndFacts {
 };
 [[nodiscard]] EndFacts end_facts(const SessionFacts& session, const WorkDone& work);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

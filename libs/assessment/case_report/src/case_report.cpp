@@ -8,14 +8,14 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/param.h"
-#include "osteo/simulation/bone/live_surface.h"
+#include "osteo/core/report/sheet.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/imaging/io/volume_io.h"
 #include "osteo/imaging/pipeline/pipeline.h"
-#include "osteo/core/report/sheet.h"
 #include "osteo/session/scene/approval.h"
 #include "osteo/session/scene/case.h"
+#include "osteo/simulation/bone/live_surface.h"
 #include "pictures.h"
 #include "words.h"
 
@@ -51,9 +51,10 @@ void complete_normals(TriMesh& mesh) {
   for (const Vec3& n : sum) mesh.normals.push_back(to_floats(normalized(n)));
 }
 
-// With normals that do not show the CT's slices as terraces, where the surface is that of the case's bone as it is; measures go by the
-// triangles' own.
-std::shared_ptr<const TriMesh> lit_as_in_the_window(std::shared_ptr<const TriMesh> mesh, const BrickGrid& bone, const Context& context) {
+// With normals that do not show the CT's slices as terraces, where the surface is that of the case's bone as it is;
+// measures go by the triangles' own.
+std::shared_ptr<const TriMesh> lit_as_in_the_window(std::shared_ptr<const TriMesh> mesh, const BrickGrid& bone,
+                                                    const Context& context) {
   LiveSurface live(bone, context);
   live.shade(context);
   BoneSurface made = live.joined();
@@ -91,7 +92,8 @@ struct Content {
     if (structures) subject.structures = &*structures;
     std::tie(subject.lo_mm, subject.hi_mm) = bounds_of_bone(*bone);
     if (const auto lower = facts.reported("threshold", "lower_hu")) subject.lower_hu = *lower;
-    if (const std::string upper = facts.param("threshold", "upper"); !upper.empty()) subject.upper_hu = std::atof(upper.c_str());
+    if (const std::string upper = facts.param("threshold", "upper"); !upper.empty())
+      subject.upper_hu = std::atof(upper.c_str());
   }
 
   void draw(const std::optional<CaseScan>& scan, const Context& context) {
@@ -116,15 +118,18 @@ struct Content {
     if (surface && !surface->points_mm.empty()) {
       context.progress(0.8, "report: thin bone");
       const std::vector<float> below = thickness_below(*surface, *bone, 5, context);
-      thin_percent = 100.0 * static_cast<double>(std::count_if(below.begin(), below.end(), [](float t) { return t < 1; })) /
+      thin_percent = 100.0 *
+                     static_cast<double>(std::count_if(below.begin(), below.end(), [](float t) { return t < 1; })) /
                      static_cast<double>(below.size());
-      thin_percent = std::round(100 * thin_percent) / 100;  // as the report keeps it: it says the same when it is read back
+      thin_percent =
+          std::round(100 * thin_percent) / 100;  // as the report keeps it: it says the same when it is read back
       draw_thin(subject, below, pictures);
     }
   }
 };
 
-void add_row(Sheet& s, const Pictures& pictures, double height_mm, const std::vector<std::pair<std::string, std::string>>& wanted) {
+void add_row(Sheet& s, const Pictures& pictures, double height_mm,
+             const std::vector<std::pair<std::string, std::string>>& wanted) {
   sheet::Pictures row{{}, height_mm};
   for (const auto& [id, caption] : wanted) {
     if (const auto it = pictures.find(id); it != pictures.end()) row.row.push_back({id, it->second, caption});
@@ -171,7 +176,8 @@ std::string sources_of(const std::vector<StructureMeasure>& measures) {
   for (const StructureMeasure& m : measures) {
     const Plausibility p = plausibility_of(m);
     if (!p.known) continue;
-    const std::string text = lower_case(m.structure.name).find("facial") != std::string::npos ? "facial nerve: " + p.source : p.source;
+    const std::string text =
+        lower_case(m.structure.name).find("facial") != std::string::npos ? "facial nerve: " + p.source : p.source;
     if (std::find(said.begin(), said.end(), text) == said.end()) said.push_back(text);
   }
   std::string all;
@@ -179,7 +185,8 @@ std::string sources_of(const std::vector<StructureMeasure>& measures) {
   return all.empty() ? all : all + ". Lengths are along the structure, up to 8 % long; distances to half a voxel.";
 }
 
-Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& asked_for, const std::vector<std::string>& left_out) {
+Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& asked_for,
+               const std::vector<std::string>& left_out) {
   const CaseFacts& f = c.facts;
   Sheet s;
   s.title = "Case report";
@@ -195,23 +202,26 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
 
   const bool scan = c.pictures.contains("soft-axial");
   const Vec3 p = cut_point(c.subject);
-  s.blocks.push_back({sheet::Heading{c.subject.measures.empty() ? "Cuts through the middle of the bone"
-                                                                : "Cuts through the " + c.subject.measures.front().structure.name}});
+  s.blocks.push_back(
+      {sheet::Heading{c.subject.measures.empty() ? "Cuts through the middle of the bone"
+                                                 : "Cuts through the " + c.subject.measures.front().structure.name}});
   if (scan)
     add_row(s, c.pictures, 62,
             {{"soft-axial", "soft tissue (-160 to 240 HU); axial, seen from the feet"},
              {"soft-coronal", "coronal, seen from the front"},
              {"soft-sagittal", "sagittal, front to the left"}});
   add_row(s, c.pictures, 62,
-          {{"bone-axial", (scan ? "bone (-500 to 1500 HU); z " : "bone only: the scan was not at hand; z ") + number_text(p.z, 0) + " mm"},
+          {{"bone-axial", (scan ? "bone (-500 to 1500 HU); z " : "bone only: the scan was not at hand; z ") +
+                              number_text(p.z, 0) + " mm"},
            {"bone-coronal", "y " + number_text(p.y, 0) + " mm"},
            {"bone-sagittal", "x " + number_text(p.x, 0) + " mm"}});
-  s.blocks.push_back(
-      {sheet::Paragraph{"Orange: where the bone of the case ends. " + std::string(c.structures ? "Other colours: structures. " : "") +
-                            "L and R are the patient's. x, y, z grow to the patient's left, back and head.",
-                        Tone::quiet}});
+  s.blocks.push_back({sheet::Paragraph{
+      "Orange: where the bone of the case ends. " + std::string(c.structures ? "Other colours: structures. " : "") +
+          "L and R are the patient's. x, y, z grow to the patient's left, back and head.",
+      Tone::quiet}});
   std::vector<std::pair<std::string, std::string>> slices;
-  for (int n = 1; n <= 8; ++n) slices.emplace_back("slice-" + std::to_string(n), n == 1 ? "lowest" : n == 8 ? "highest" : "");
+  for (int n = 1; n <= 8; ++n)
+    slices.emplace_back("slice-" + std::to_string(n), n == 1 ? "lowest" : n == 8 ? "highest" : "");
   s.blocks.push_back({sheet::Heading{"Eight slices, from the feet up"}});
   add_row(s, c.pictures, 27, slices);
   s.blocks.push_back({sheet::Heading{"The bone from six sides"}});
@@ -225,9 +235,11 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
 
   s.blocks.push_back({sheet::PageBreak{}});
   // Where the threshold lies, beside what was taken off.
-  SheetBlocks left{{sheet::Heading{"Values of the scan, and the threshold"}}}, right{{sheet::Heading{"Taken off, and left on"}}};
+  SheetBlocks left{{sheet::Heading{"Values of the scan, and the threshold"}}},
+      right{{sheet::Heading{"Taken off, and left on"}}};
   if (!c.histogram.empty()) {
-    sheet::Bars bars{"histogram", kHistogramFrom, kHistogramTo, 500, c.histogram, {}, "HU; voxels on a logarithmic scale", 30};
+    sheet::Bars bars{
+        "histogram", kHistogramFrom, kHistogramTo, 500, c.histogram, {}, "HU; voxels on a logarithmic scale", 30};
     if (const auto v = f.reported("threshold", "soft_tissue_hu"))
       bars.marks.push_back({*v, "soft tissue " + number_text(*v, 0), Tone::quiet});
     if (const auto v = f.reported("threshold", "lower_hu"))
@@ -249,37 +261,42 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
   }
   if (!removed.row.empty()) {
     right.push_back({removed});
-    right.push_back(
-        {sheet::Paragraph{"Red: above the threshold, but not in the case. Grey: the bone of the case, seen through.", Tone::quiet}});
+    right.push_back({sheet::Paragraph{
+        "Red: above the threshold, but not in the case. Grey: the bone of the case, seen through.", Tone::quiet}});
   } else {
-    right.push_back({sheet::Paragraph{scan ? "Nothing above the threshold was taken off." : "Pictures of it need the scan.", Tone::quiet}});
+    right.push_back({sheet::Paragraph{
+        scan ? "Nothing above the threshold was taken off." : "Pictures of it need the scan.", Tone::quiet}});
   }
   s.blocks.push_back({sheet::Columns{{left, right}, {}}});
 
   SheetBlocks thin{{sheet::Heading{"Thin bone"}}}, small{{sheet::Heading{"What the scan can resolve"}}};
   sheet::Pictures thin_row{{}, 46};
-  for (const auto& [id, caption] : {std::pair{"thin-left-front", "from the left front"}, std::pair{"thin-below", "from below"}}) {
+  for (const auto& [id, caption] :
+       {std::pair{"thin-left-front", "from the left front"}, std::pair{"thin-below", "from below"}}) {
     if (const auto it = c.pictures.find(id); it != c.pictures.end()) thin_row.row.push_back({id, it->second, caption});
   }
   if (!thin_row.row.empty()) thin.push_back({thin_row});
   if (c.thin_percent >= 0)
-    thin.push_back({sheet::Paragraph{
-        "Red: less than 1 mm of bone beneath the surface (" + number_text(c.thin_percent, c.thin_percent < 9.95 ? 1 : 0) +
-        " % of it); yellow 1 mm; pale 2 mm and more. Bone thinner than a voxel of the scan is too thin or missing here."}});
+    thin.push_back({sheet::Paragraph{"Red: less than 1 mm of bone beneath the surface (" +
+                                     number_text(c.thin_percent, c.thin_percent < 9.95 ? 1 : 0) +
+                                     " % of it); yellow 1 mm; pale 2 mm and more. Bone thinner than a voxel of the "
+                                     "scan is too thin or missing here."}});
   small.push_back({resolution_table(f)});
   small.push_back({sheet::Paragraph{
-      "Sizes are of adults, from textbooks. Two voxels across are the least by which a structure is seen everywhere.", Tone::quiet}});
+      "Sizes are of adults, from textbooks. Two voxels across are the least by which a structure is seen everywhere.",
+      Tone::quiet}});
   for (const auto& note : verdict_notes(f)) small.push_back({note});
   s.blocks.push_back({sheet::Columns{{thin, small}, {}}});
 
   s.blocks.push_back({sheet::Heading{"Structures"}});
   if (c.subject.measures.empty()) {
-    s.blocks.push_back({sheet::Paragraph{"None were given: nerves and vessels are not marked in this case.", Tone::caution}});
-  } else if (const auto it = c.pictures.find("structures"); it != c.pictures.end()) {
     s.blocks.push_back(
-        {sheet::Columns{{{{structure_table(c.subject.measures)}, {sheet::Paragraph{sources_of(c.subject.measures), Tone::quiet}}},
-                         {{sheet::Pictures{{{"structures", it->second, "structures in clear bone"}}, 48}}}},
-                        {76, 24}}});
+        {sheet::Paragraph{"None were given: nerves and vessels are not marked in this case.", Tone::caution}});
+  } else if (const auto it = c.pictures.find("structures"); it != c.pictures.end()) {
+    s.blocks.push_back({sheet::Columns{
+        {{{structure_table(c.subject.measures)}, {sheet::Paragraph{sources_of(c.subject.measures), Tone::quiet}}},
+         {{sheet::Pictures{{{"structures", it->second, "structures in clear bone"}}, 48}}}},
+        {76, 24}}});
   } else {
     s.blocks.push_back({structure_table(c.subject.measures)});
     s.blocks.push_back({sheet::Paragraph{sources_of(c.subject.measures), Tone::quiet}});
@@ -290,23 +307,28 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
     const Json* const v = f.manifest().find(key);
     return v == nullptr || v->text() == nullptr ? std::string("not known") : *v->text();
   };
-  s.blocks.push_back({sheet::Facts{{{"Asked for", asked_for.substr(std::min(asked_for.size(), asked_for.find_first_not_of(' ')))},
-                                    {"Pipeline", manifest_text("pipeline")},
-                                    {"Made by", "Osteotome " + manifest_text("program")},
-                                    {"Bone", c.bone->hash().substr(0, 16)},
-                                    {"Content of the case", case_hash(folder).substr(0, 16)},
-                                    {"Left out", left_out.empty() ? "nothing" : left_out.front()}},
-                                   2}});
+  s.blocks.push_back(
+      {sheet::Facts{{{"Asked for", asked_for.substr(std::min(asked_for.size(), asked_for.find_first_not_of(' ')))},
+                     {"Pipeline", manifest_text("pipeline")},
+                     {"Made by", "Osteotome " + manifest_text("program")},
+                     {"Bone", c.bone->hash().substr(0, 16)},
+                     {"Content of the case", case_hash(folder).substr(0, 16)},
+                     {"Left out", left_out.empty() ? "nothing" : left_out.front()}},
+                    2}});
 
   const ApprovalNow now = approval_of(folder);
   sheet::Signature line;
   line.state = now.words();
-  line.tone = now.state == ApprovalState::valid ? Tone::good : now.state == ApprovalState::outdated ? Tone::bad : Tone::plain;
+  line.tone = now.state == ApprovalState::valid      ? Tone::good
+              : now.state == ApprovalState::outdated ? Tone::bad
+                                                     : Tone::plain;
   if (now.approval) {
     line.by = now.approval->by;
     line.date = now.approval->date;
     line.note = now.approval->note;
-    line.state = now.state == ApprovalState::valid ? "Approved" : "Approved before the last change (" + now.changed + "): no longer valid";
+    line.state = now.state == ApprovalState::valid
+                     ? "Approved"
+                     : "Approved before the last change (" + now.changed + "): no longer valid";
   } else {
     line.state = "Not approved: sign here, or osteo approve CASE --by NAME --note TEXT";
   }
@@ -327,7 +349,8 @@ std::string case_code(const fs::path& folder) {
   const CaseFacts facts(folder);
   std::string hash;
   if (const Json* const recipe = facts.manifest().find("recipe")) {
-    if (const Json* const source = recipe->find("source_hash"); source != nullptr && source->text() != nullptr) hash = *source->text();
+    if (const Json* const source = recipe->find("source_hash"); source != nullptr && source->text() != nullptr)
+      hash = *source->text();
   }
   if (hash.empty()) {
     const Json* const files = facts.manifest().find("files");
@@ -354,16 +377,20 @@ std::string case_code(const fs::path& folder) {
 std::vector<std::pair<std::string, std::string>> case_facts(const fs::path& folder) {
   const CaseFacts f(folder);
   const sheet::Band verdict = verdict_band(f);
-  Rows rows{{"Case", case_code(folder)}, {"Approval", approval_of(folder).words()}, {"Verdict", verdict.word + ": " + verdict.text}};
-  for (const Rows& more : {scan_rows(f), bone_rows(f), removed_rows(f)}) rows.insert(rows.end(), more.begin(), more.end());
+  Rows rows{{"Case", case_code(folder)},
+            {"Approval", approval_of(folder).words()},
+            {"Verdict", verdict.word + ": " + verdict.text}};
+  for (const Rows& more : {scan_rows(f), bone_rows(f), removed_rows(f)})
+    rows.insert(rows.end(), more.begin(), more.end());
   if (const Json* const files = f.manifest().find("files")) {
     std::string roles;
     for (const auto& [role, file] : files->members()) roles += (roles.empty() ? "" : ", ") + role;
     rows.emplace_back("Holds", roles);
   }
   const fs::path html = report_file(folder, ".html");
-  rows.emplace_back("Report", !output_exists(html) ? "none: osteo report " + folder.string()
-                                                   : html.string() + (report_shows(folder) ? "" : " (of an earlier state)"));
+  rows.emplace_back("Report", !output_exists(html)
+                                  ? "none: osteo report " + folder.string()
+                                  : html.string() + (report_shows(folder) ? "" : " (of an earlier state)"));
   return rows;
 }
 
@@ -374,8 +401,8 @@ bool report_shows(const fs::path& folder) {
 
 bool has_full_report(const fs::path& folder) {
   const std::string html = earlier_html(folder);
-  return !html.empty() && output_exists(report_file(folder, ".pdf")) && mark_of_html(html, "state") == state_of(folder) &&
-         mark_of_html(html, "left-out").empty();
+  return !html.empty() && output_exists(report_file(folder, ".pdf")) &&
+         mark_of_html(html, "state") == state_of(folder) && mark_of_html(html, "left-out").empty();
 }
 
 CaseReport write_case_report(const fs::path& folder, const std::string& asked_for, const std::optional<CaseScan>& scan,
@@ -395,12 +422,14 @@ CaseReport write_case_report(const fs::path& folder, const std::string& asked_fo
     c.pictures = pictures_of_html(earlier);
     const auto bars = bars_of_html(earlier);
     if (const auto it = bars.find("histogram"); it != bars.end()) c.histogram = it->second;
-    if (const std::string thin = mark_of_html(earlier, "thin-percent"); !thin.empty()) c.thin_percent = std::atof(thin.c_str());
+    if (const std::string thin = mark_of_html(earlier, "thin-percent"); !thin.empty())
+      c.thin_percent = std::atof(thin.c_str());
   } else {
     c.draw(scan, context);
   }
   if (!c.pictures.contains("soft-axial"))
-    report.left_out.emplace_back("soft tissue, histogram and what was taken off: these need the scan (osteo report CASE --scan SCAN)");
+    report.left_out.emplace_back(
+        "soft tissue, histogram and what was taken off: these need the scan (osteo report CASE --scan SCAN)");
   if (!c.pictures.contains("side-front")) report.left_out.emplace_back("the bone in 3D: the case holds no surface");
   Sheet s = sheet_of(folder, c, asked_for, report.left_out);
   s.marks["state"] = state;
@@ -415,4 +444,4 @@ CaseReport write_case_report(const fs::path& folder, const std::string& asked_fo
   return report;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -8,8 +8,8 @@
 
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
-#include "osteo/simulation/bone/thickness.h"
 #include "osteo/imaging/image/components.h"
+#include "osteo/simulation/bone/thickness.h"
 
 namespace osteo::inline assessment::case_report {
 namespace {
@@ -18,7 +18,9 @@ constexpr double kSpeck_mm3 = 0.5;
 constexpr std::size_t kLongestPath = 2'000'000;  // voxels of a part whose length is measured
 
 struct Box {
-  std::array<int, 3> lo{std::numeric_limits<int>::max(), std::numeric_limits<int>::max(), std::numeric_limits<int>::max()}, hi{-1, -1, -1};
+  std::array<int, 3> lo{std::numeric_limits<int>::max(), std::numeric_limits<int>::max(),
+                        std::numeric_limits<int>::max()},
+      hi{-1, -1, -1};
 };
 
 // The voxels of one part, and which is where.
@@ -67,9 +69,11 @@ struct Shell {
 double nearest(const Shell& a, const Shell& b) {
   double best = std::numeric_limits<double>::infinity();
   for (const Vec3& p : a.points_mm) {
-    const auto from = std::lower_bound(b.points_mm.begin(), b.points_mm.end(), p.x, [](const Vec3& q, double x) { return q.x < x; });
+    const auto from =
+        std::lower_bound(b.points_mm.begin(), b.points_mm.end(), p.x, [](const Vec3& q, double x) { return q.x < x; });
     for (auto q = from; q != b.points_mm.end() && q->x - p.x < best; ++q) best = std::min(best, length(*q - p));
-    for (auto q = from; q != b.points_mm.begin() && p.x - std::prev(q)->x < best; --q) best = std::min(best, length(*std::prev(q) - p));
+    for (auto q = from; q != b.points_mm.begin() && p.x - std::prev(q)->x < best; --q)
+      best = std::min(best, length(*std::prev(q) - p));
   }
   return best;
 }
@@ -105,7 +109,8 @@ std::vector<StructureMeasure> measure_structures(const Labels& labels, const Con
     m.volume_mm3 = static_cast<double>(count[s.value]) * f.voxel_volume_mm3();
     const Box& box = boxes[s.value];
     const std::array<int, 3> n{box.hi[0] - box.lo[0] + 1, box.hi[1] - box.lo[1] + 1, box.hi[2] - box.lo[2] + 1};
-    std::vector<std::uint8_t> mask(static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(n[2]));
+    std::vector<std::uint8_t> mask(static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1]) *
+                                   static_cast<std::size_t>(n[2]));
     m.lo_mm = {1e30, 1e30, 1e30};
     m.hi_mm = {-1e30, -1e30, -1e30};
     Shell shell;
@@ -118,9 +123,12 @@ std::vector<StructureMeasure> measure_structures(const Labels& labels, const Con
           mask[at] = 1;
           const auto other = [&](int di, int dj, int dk) {
             const int a = gi + di, b = gj + dj, c = gk + dk;
-            return a < 0 || b < 0 || c < 0 || a >= f.dims[0] || b >= f.dims[1] || c >= f.dims[2] || labels.at(a, b, c) != s.value;
+            return a < 0 || b < 0 || c < 0 || a >= f.dims[0] || b >= f.dims[1] || c >= f.dims[2] ||
+                   labels.at(a, b, c) != s.value;
           };
-          if (!(other(1, 0, 0) || other(-1, 0, 0) || other(0, 1, 0) || other(0, -1, 0) || other(0, 0, 1) || other(0, 0, -1))) continue;
+          if (!(other(1, 0, 0) || other(-1, 0, 0) || other(0, 1, 0) || other(0, -1, 0) || other(0, 0, 1) ||
+                other(0, 0, -1)))
+            continue;
           const Vec3 p = f.world_from_index({double(gi), double(gj), double(gk)});
           for (std::size_t a = 0; a < 3; ++a) {
             m.lo_mm[a] = std::min(m.lo_mm[a], p[a]);
@@ -132,9 +140,11 @@ std::vector<StructureMeasure> measure_structures(const Labels& labels, const Con
     }
     std::sort(shell.points_mm.begin(), shell.points_mm.end(), [](Vec3 a, Vec3 b) { return a.x < b.x; });
     const Components parts = connected_components(mask, n, 1, Connectivity::full);
-    const auto largest = static_cast<std::uint32_t>(std::max_element(parts.voxels.begin(), parts.voxels.end()) - parts.voxels.begin());
+    const auto largest =
+        static_cast<std::uint32_t>(std::max_element(parts.voxels.begin(), parts.voxels.end()) - parts.voxels.begin());
     for (std::uint32_t c = 0; c < parts.voxels.size(); ++c)
-      ++(c == largest || static_cast<double>(parts.voxels[c]) * f.voxel_volume_mm3() >= kSpeck_mm3 ? m.parts : m.specks);
+      ++(c == largest || static_cast<double>(parts.voxels[c]) * f.voxel_volume_mm3() >= kSpeck_mm3 ? m.parts
+                                                                                                   : m.specks);
     Part part;
     Vec3 mean{};
     for (std::size_t r = 0; r < parts.runs.size(); ++r) {
@@ -149,18 +159,21 @@ std::vector<StructureMeasure> measure_structures(const Labels& labels, const Con
     mean = mean / static_cast<double>(part.voxels.size());
     const auto& middle = *std::min_element(part.voxels.begin(), part.voxels.end(), [&](const auto& a, const auto& b) {
       const auto d = [&](const auto& x) {
-        const Vec3 w{(x[0] - mean.x) * f.spacing_mm.x, (x[1] - mean.y) * f.spacing_mm.y, (x[2] - mean.z) * f.spacing_mm.z};
+        const Vec3 w{(x[0] - mean.x) * f.spacing_mm.x, (x[1] - mean.y) * f.spacing_mm.y,
+                     (x[2] - mean.z) * f.spacing_mm.z};
         return dot(w, w);
       };
       return d(a) < d(b);
     });
-    m.middle_mm = f.world_from_index({double(box.lo[0] + middle[0]), double(box.lo[1] + middle[1]), double(box.lo[2] + middle[2])});
+    m.middle_mm = f.world_from_index(
+        {double(box.lo[0] + middle[0]), double(box.lo[1] + middle[1]), double(box.lo[2] + middle[2])});
     if (part.voxels.size() <= kLongestPath && plausibility_of(m).expected.find(" long") != std::string::npos) {
       for (std::uint32_t v = 0; v < part.voxels.size(); ++v)
         part.number[Part::name(part.voxels[v][0], part.voxels[v][1], part.voxels[v][2])] = v;
       const auto end = farthest(part, f.spacing_mm, 0).first;
       // Between the outer faces of the voxels at both ends.
-      m.length_mm = farthest(part, f.spacing_mm, end).second + std::min({f.spacing_mm.x, f.spacing_mm.y, f.spacing_mm.z});
+      m.length_mm =
+          farthest(part, f.spacing_mm, end).second + std::min({f.spacing_mm.x, f.spacing_mm.y, f.spacing_mm.z});
     }
     all.push_back(std::move(m));
     shells.push_back(std::move(shell));
@@ -174,7 +187,8 @@ std::vector<StructureMeasure> measure_structures(const Labels& labels, const Con
       all[b].gaps.push_back({all[a].structure.value, gap});
     }
   }
-  for (StructureMeasure& m : all) std::stable_sort(m.gaps.begin(), m.gaps.end(), [](const auto& x, const auto& y) { return x.mm < y.mm; });
+  for (StructureMeasure& m : all)
+    std::stable_sort(m.gaps.begin(), m.gaps.end(), [](const auto& x, const auto& y) { return x.mm < y.mm; });
   return all;
 }
 
@@ -232,7 +246,8 @@ Plausibility plausibility_of(const StructureMeasure& m) {
   const std::string name = lower_case(m.structure.name);
   Plausibility p;
   for (const Usual& u : usual()) {
-    if (std::none_of(u.words.begin(), u.words.end(), [&](const char* w) { return name.find(w) != std::string::npos; })) continue;
+    if (std::none_of(u.words.begin(), u.words.end(), [&](const char* w) { return name.find(w) != std::string::npos; }))
+      continue;
     const int sides = m.on_both_sides() ? 2 : 1;
     p.known = true;
     p.source = u.source;
@@ -255,14 +270,16 @@ Plausibility plausibility_of(const StructureMeasure& m) {
   return p;
 }
 
-std::vector<float> thickness_below(const TriMesh& mesh, const BrickGrid& bone, double reach_mm, const Context& context) {
+std::vector<float> thickness_below(const TriMesh& mesh, const BrickGrid& bone, double reach_mm,
+                                   const Context& context) {
   std::vector<float> below(mesh.points_mm.size(), static_cast<float>(reach_mm));
   if (mesh.normals.size() != mesh.points_mm.size()) return below;
   parallel_for(below.size(), 1 << 14, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p)
-      below[p] = static_cast<float>(thickness_mm(bone, from_floats(mesh.points_mm[p]), -from_floats(mesh.normals[p]), reach_mm));
+      below[p] = static_cast<float>(
+          thickness_mm(bone, from_floats(mesh.points_mm[p]), -from_floats(mesh.normals[p]), reach_mm));
   });
   return below;
 }
 
-}  // namespace osteo::assessment::case_report
+}  // namespace osteo::inline assessment::case_report

@@ -17,7 +17,8 @@ struct StructureMeasure {
   int parts = 0;                 ///< of at least 0.5 mm3, or the largest; voxels that touch by a corner are joined
   int specks = 0;                ///< smaller ones
   Vec3 lo_mm, hi_mm, middle_mm;  ///< middle: the voxel of the largest part that is nearest to the part's mean
-  double length_mm = 0;          ///< of the largest part along itself, from end to end; 0 where it is no tube or too large to measure
+  double length_mm =
+      0;  ///< of the largest part along itself, from end to end; 0 where it is no tube or too large to measure
   struct Gap {
     std::uint8_t other = 0;
     double mm = 0;  ///< between the nearest faces of voxels; 0: they touch
@@ -26,7 +27,8 @@ struct StructureMeasure {
   [[nodiscard]] bool on_both_sides() const { return hi_mm.x - lo_mm.x > 55; }  ///< an ear is not that wide
 };
 
-/// In the order of the map's structures. Distances to half a voxel; lengths 0 to 8 % long (a path over voxels), ends included.
+/// In the order of the map's structures. Distances to half a voxel; lengths 0 to 8 % long (a path over voxels), ends
+/// included.
 [[nodiscard]] std::vector<StructureMeasure> measure_structures(const Labels& labels, const Context& context);
 
 struct Plausibility {
@@ -39,6 +41,7 @@ struct Plausibility {
 [[nodiscard]] Plausibility plausibility_of(const StructureMeasure& m);
 
 /// For each point of a surface the bone beneath it, at most `reach_mm`.
-[[nodiscard]] std::vector<float> thickness_below(const TriMesh& mesh, const BrickGrid& bone, double reach_mm, const Context& context);
+[[nodiscard]] std::vector<float> thickness_below(const TriMesh& mesh, const BrickGrid& bone, double reach_mm,
+                                                 const Context& context);
 
-}  // namespace osteo::assessment::case_report
+}  // namespace osteo::inline assessment::case_report

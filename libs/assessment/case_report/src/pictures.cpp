@@ -5,11 +5,11 @@
 
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
-#include "osteo/geometry/grid/brick_linear.h"
-#include "osteo/geometry/grid/sampler.h"
 #include "osteo/display/view/sides.h"
 #include "osteo/display/view/slices.h"
 #include "osteo/display/view/snapshot.h"
+#include "osteo/geometry/grid/brick_linear.h"
+#include "osteo/geometry/grid/sampler.h"
 
 namespace osteo::inline assessment::case_report {
 namespace {
@@ -19,14 +19,16 @@ constexpr Rgb8 kOutline{255, 105, 10}, kGone{224, 60, 40};
 
 void put(Picture& p, int x, int y, Rgb8 c, double share = 1) {
   if (x < 0 || y < 0 || x >= p.width || y >= p.height) return;
-  std::uint8_t* const at =
-      p.rgb.data() + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(p.width) + static_cast<std::size_t>(x));
+  std::uint8_t* const at = p.rgb.data() + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(p.width) +
+                                               static_cast<std::size_t>(x));
   for (std::size_t a = 0; a < 3; ++a) at[a] = static_cast<std::uint8_t>(std::lround(at[a] + share * (c[a] - at[a])));
 }
 
 // Grey of a HU value under a window.
 GreyAt grey_under(const Subject& s, double from_hu, double to_hu) {
-  const auto grey = [from_hu, to_hu](double hu) { return std::clamp((hu - from_hu) / (to_hu - from_hu), 0.0, 1.0) * 255; };
+  const auto grey = [from_hu, to_hu](double hu) {
+    return std::clamp((hu - from_hu) / (to_hu - from_hu), 0.0, 1.0) * 255;
+  };
   if (s.scan != nullptr) {
     const Image* const ct = &s.scan->ct;
     const Mat3 inv = inverse(ct->frame.direction);
@@ -95,7 +97,8 @@ Picture cut(const Subject& s, const SliceView& view, double from_hu, double to_h
       kinds(view,
             [&](Vec3 w) {
               const Vec3 v = inv * (w - f.origin_mm);
-              return linear_at(*s.bone, {v.x / f.spacing_mm.x, v.y / f.spacing_mm.y, v.z / f.spacing_mm.z}) >= 0.5F ? 1 : 0;
+              return linear_at(*s.bone, {v.x / f.spacing_mm.x, v.y / f.spacing_mm.y, v.z / f.spacing_mm.z}) >= 0.5F ? 1
+                                                                                                                    : 0;
             }),
       [](int) { return kOutline; }, thick);
   if (s.structures != nullptr) {
@@ -235,7 +238,8 @@ void draw_thin(const Subject& s, std::span<const float> below, Pictures& into) {
     const double t = static_cast<double>(below[p]);
     const auto mix = [](Rgb8 a, Rgb8 b, double share) {
       Rgb8 c{};
-      for (std::size_t n = 0; n < 3; ++n) c[n] = static_cast<std::uint8_t>(std::lround(a[n] + std::clamp(share, 0.0, 1.0) * (b[n] - a[n])));
+      for (std::size_t n = 0; n < 3; ++n)
+        c[n] = static_cast<std::uint8_t>(std::lround(a[n] + std::clamp(share, 0.0, 1.0) * (b[n] - a[n])));
       return c;
     };
     constexpr Rgb8 kRed{205, 45, 35}, kYellow{245, 190, 60}, kBone{237, 226, 200};
@@ -244,7 +248,8 @@ void draw_thin(const Subject& s, std::span<const float> below, Pictures& into) {
   const Vec3 size = s.hi_mm - s.lo_mm, centre = (s.lo_mm + s.hi_mm) * 0.5;
   constexpr int kPixels = 440;
   // From the corner the box is as wide as its diagonal.
-  const double mm_per_pixel = 1.02 * std::max({std::hypot(size.x, size.y), size.z + 0.25 * std::hypot(size.x, size.y), 1.0}) / kPixels;
+  const double mm_per_pixel =
+      1.02 * std::max({std::hypot(size.x, size.y), size.z + 0.25 * std::hypot(size.x, size.y), 1.0}) / kPixels;
   constexpr std::array<ViewFrom, 2> kSides{ViewFrom::left_front, ViewFrom::below};
   std::vector<Picture> pictures = draw_sides(*s.surface, kSides, centre, mm_per_pixel, kPixels, kPixels, rgb);
   into["thin-left-front"] = std::move(pictures[0]);
@@ -260,8 +265,9 @@ void draw_removed(const Subject& s, Pictures& into) {
     const char* name;
     Vec3 right, down;
   };
-  constexpr std::array<View, 3> kViews{
-      {{"removed-axial", {1, 0, 0}, {0, 1, 0}}, {"removed-front", {1, 0, 0}, {0, 0, -1}}, {"removed-side", {0, 1, 0}, {0, 0, -1}}}};
+  constexpr std::array<View, 3> kViews{{{"removed-axial", {1, 0, 0}, {0, 1, 0}},
+                                        {"removed-front", {1, 0, 0}, {0, 0, -1}},
+                                        {"removed-side", {0, 1, 0}, {0, 0, -1}}}};
   // Voxels that were bone by their value and are not in the mask.
   struct Projection {
     std::size_t right, down;
@@ -283,13 +289,17 @@ void draw_removed(const Subject& s, Pictures& into) {
   for (int k = 0; k < f.dims[2]; ++k) {
     for (int j = 0; j < f.dims[1]; ++j) {
       for (int i = 0; i < f.dims[0]; ++i, ++at) {
-        const bool kept = mask.voxels[at] != 0, gone = !kept && ct.voxels[at] >= s.lower_hu && ct.voxels[at] <= s.upper_hu;
+        const bool kept = mask.voxels[at] != 0,
+                   gone = !kept && ct.voxels[at] >= s.lower_hu && ct.voxels[at] <= s.upper_hu;
         if (!kept && !gone) continue;
         removed += gone ? 1 : 0;
         const std::array<int, 3> x{i, j, k};
         for (Projection& p : projections) {
-          const int px = p.right_forward ? x[p.right] : p.w - 1 - x[p.right], py = p.down_forward ? x[p.down] : p.h - 1 - x[p.down];
-          ++(kept ? p.kept : p.gone)[static_cast<std::size_t>(py) * static_cast<std::size_t>(p.w) + static_cast<std::size_t>(px)];
+          const int px = p.right_forward ? x[p.right] : p.w - 1 - x[p.right],
+                    py = p.down_forward ? x[p.down] : p.h - 1 - x[p.down];
+          ++(kept
+                 ? p.kept
+                 : p.gone)[static_cast<std::size_t>(py) * static_cast<std::size_t>(p.w) + static_cast<std::size_t>(px)];
         }
       }
     }
@@ -298,8 +308,9 @@ void draw_removed(const Subject& s, Pictures& into) {
   for (std::size_t v = 0; v < kViews.size(); ++v) {
     const Projection& p = projections[v];
     const double sr = f.spacing_mm[p.right], sd = f.spacing_mm[p.down], mm = std::max(p.w * sr, p.h * sd) / 380;
-    Picture picture{
-        std::max(1, static_cast<int>(std::lround(p.w * sr / mm))), std::max(1, static_cast<int>(std::lround(p.h * sd / mm))), {}};
+    Picture picture{std::max(1, static_cast<int>(std::lround(p.w * sr / mm))),
+                    std::max(1, static_cast<int>(std::lround(p.h * sd / mm))),
+                    {}};
     picture.rgb.assign(static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height) * 3, 255);
     for (int y = 0; y < picture.height; ++y) {
       for (int x = 0; x < picture.width; ++x) {
@@ -327,11 +338,12 @@ void draw_removed(const Subject& s, Pictures& into) {
 std::vector<double> histogram_of(const Image& ct) {
   std::vector<double> bins(static_cast<std::size_t>((kHistogramTo - kHistogramFrom) / kHistogramStep));
   for (const std::int16_t v : ct.span()) {
-    if (v >= kHistogramFrom && v < kHistogramTo) bins[static_cast<std::size_t>((v - kHistogramFrom) / kHistogramStep)] += 1;
+    if (v >= kHistogramFrom && v < kHistogramTo)
+      bins[static_cast<std::size_t>((v - kHistogramFrom) / kHistogramStep)] += 1;
   }
   const double most = std::max(2.0, *std::max_element(bins.begin(), bins.end()));
   for (double& b : bins) b = b < 1 ? 0 : std::round(1000 * std::log1p(b) / std::log1p(most)) / 1000;
   return bins;
 }
 
-}  // namespace osteo::assessment::case_report
+}  // namespace osteo::inline assessment::case_report

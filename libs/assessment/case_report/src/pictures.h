@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "measures.h"
-#include "osteo/core/base/context.h"
 #include "osteo/assessment/case_report/case_report.h"
+#include "osteo/core/base/context.h"
 #include "osteo/core/data/data.h"
 #include "osteo/geometry/grid/brick_grid.h"
 
@@ -31,8 +31,8 @@ struct Subject {
 [[nodiscard]] Vec3 cut_point(const Subject& s);
 
 using Pictures = std::map<std::string, Picture>;
-/// "soft-axial", ..., "bone-sagittal": with the bone's outline and the structures'. With the scan, or of bone alone where only HU are
-/// known.
+/// "soft-axial", ..., "bone-sagittal": with the bone's outline and the structures'. With the scan, or of bone alone
+/// where only HU are known.
 void draw_cuts(const Subject& s, Pictures& into, const Context& context);
 /// "slice-1" to "slice-8", from the feet up.
 void draw_slices(const Subject& s, Pictures& into);
@@ -46,4 +46,4 @@ void draw_removed(const Subject& s, Pictures& into);
 inline constexpr double kHistogramFrom = -1200, kHistogramTo = 3000, kHistogramStep = 40;
 [[nodiscard]] std::vector<double> histogram_of(const Image& ct);
 
-}  // namespace osteo::assessment::case_report
+}  // namespace osteo::inline assessment::case_report

@@ -104,17 +104,22 @@ sheet::Band verdict_band(const CaseFacts& f) {
   }
   // Less than any table has, and teeth and the tip of a nose reach so far (libs/imaging/image, threshold).
   constexpr double kLeastHolderMm3 = 1000;
-  if (const auto left = f.reported("threshold", "outside_body_left_mm3"); status == "good" && left.value_or(0) >= kLeastHolderMm3) {
-    const std::string said = volume_text(*left) + " outside the body are left in the bone, which may be table or head holder";
+  if (const auto left = f.reported("threshold", "outside_body_left_mm3");
+      status == "good" && left.value_or(0) >= kLeastHolderMm3) {
+    const std::string said =
+        volume_text(*left) + " outside the body are left in the bone, which may be table or head holder";
     return {"Look", said + "; 'osteo prepare --remove-table' takes them off.", Tone::caution};
   }
   if (status == "good" && text(f.verdict("source")) == "DICOM")
-    return {"Good", "Every slice was taken as the scanner stored it; nothing was guessed, moved or left out.", Tone::good};
+    return {"Good", "Every slice was taken as the scanner stored it; nothing was guessed, moved or left out.",
+            Tone::good};
   if (status == "good")
-    return {"Good", "Values and places are as the file has them; what was done to the scan before is not known.", Tone::good};
+    return {"Good", "Values and places are as the file has them; what was done to the scan before is not known.",
+            Tone::good};
   if (status == "repaired") {
     std::string said = first.empty() ? "Slices were resampled onto upright, even ones." : first;
-    if (warnings > 1) said += " And " + std::to_string(warnings - 1) + (warnings == 2 ? " more note, below." : " more notes, below.");
+    if (warnings > 1)
+      said += " And " + std::to_string(warnings - 1) + (warnings == 2 ? " more note, below." : " more notes, below.");
     // A warning alone mends nothing.
     const Json* const resampled = f.verdict("geometry", "resampled");
     const Json* const aside = f.verdict("set_aside");
@@ -155,7 +160,8 @@ Rows scan_rows(const CaseFacts& f) {
                       scanner = text(f.verdict("series", "scanner"));
     add("Scan", (modality == "CT" ? "CT" : modality) + (scanner.empty() ? "" : ", " + scanner) +
                     (kernel.empty() ? ", kernel not stated" : ", kernel " + kernel));
-    const double usual = number(f.verdict("geometry", "gap_usual_mm")), least = number(f.verdict("geometry", "gap_min_mm")),
+    const double usual = number(f.verdict("geometry", "gap_usual_mm")),
+                 least = number(f.verdict("geometry", "gap_min_mm")),
                  most = number(f.verdict("geometry", "gap_max_mm"));
     std::string slices = number_text(number(f.verdict("geometry", "slices")), 0) + " of " +
                          number_text(number(f.verdict("geometry", "columns")), 0) + " x " +
@@ -163,12 +169,13 @@ Rows scan_rows(const CaseFacts& f) {
     const double thickness = number(f.verdict("series", "thickness_mm"));
     if (thickness > 0) slices += ", " + number_text(thickness, 2) + " mm thick";
     add("Slices", slices);
-    add("Distance", most - least > 0.02 ? number_text(least, 2) + " to " + number_text(most, 2) + " mm, mostly " + number_text(usual, 2)
-                                        : number_text(usual, 2) + " mm, even");
+    add("Distance", most - least > 0.02
+                        ? number_text(least, 2) + " to " + number_text(most, 2) + " mm, mostly " + number_text(usual, 2)
+                        : number_text(usual, 2) + " mm, even");
     const Json* const pixel = f.verdict("geometry", "pixel_mm");
     if (pixel != nullptr && pixel->items().size() == 2)
-      add("Pixel",
-          number_text(pixel->items()[0].number().value_or(0), 3) + " x " + number_text(pixel->items()[1].number().value_or(0), 3) + " mm");
+      add("Pixel", number_text(pixel->items()[0].number().value_or(0), 3) + " x " +
+                       number_text(pixel->items()[1].number().value_or(0), 3) + " mm");
     const double tilt = number(f.verdict("geometry", "tilt_deg"));
     if (std::abs(tilt) >= 0.05) add("Gantry tilt", number_text(std::abs(tilt), 1) + " degrees");
     const Json* const resampled = f.verdict("geometry", "resampled");
@@ -180,8 +187,9 @@ Rows scan_rows(const CaseFacts& f) {
     add("Scan", "a volume file: of scanner, kernel and slices nothing is known");
     const Json* const dims = f.verdict("output", "dims");
     if (dims != nullptr && dims->items().size() == 3)
-      add("Voxels", number_text(dims->items()[0].number().value_or(0), 0) + " x " + number_text(dims->items()[1].number().value_or(0), 0) +
-                        " x " + number_text(dims->items()[2].number().value_or(0), 0));
+      add("Voxels", number_text(dims->items()[0].number().value_or(0), 0) + " x " +
+                        number_text(dims->items()[1].number().value_or(0), 0) + " x " +
+                        number_text(dims->items()[2].number().value_or(0), 0));
   }
   const Json* const made = f.verdict("geometry", "resampled");
   add(made != nullptr && made->flag() != nullptr && *made->flag() ? "Voxel, resampled" : "Voxel of the scan",
@@ -190,8 +198,8 @@ Rows scan_rows(const CaseFacts& f) {
   if (const std::string given = f.param("import", "axes"); !given.empty())
     add("Orientation", "given by hand as " + given + ": the file does not know it");
   if (f.verdict("values") != nullptr)
-    add("Values", number_text(number(f.verdict("values", "hu_min")), 0) + " to " + number_text(number(f.verdict("values", "hu_max")), 0) +
-                      " HU" +
+    add("Values", number_text(number(f.verdict("values", "hu_min")), 0) + " to " +
+                      number_text(number(f.verdict("values", "hu_max")), 0) + " HU" +
                       (f.verdict("values", "air_hu") != nullptr && f.verdict("values", "air_hu")->number()
                            ? "; air at " + number_text(number(f.verdict("values", "air_hu")), 0)
                            : ""));
@@ -209,10 +217,12 @@ Rows bone_rows(const CaseFacts& f) {
     rows.emplace_back("Region", name == "whole" ? "the whole scan" : name == "box" ? "a box, chosen by hand" : name);
   }
   if (const auto lower = f.reported("threshold", "lower_hu")) {
-    rows.emplace_back("Threshold", number_text(*lower, 0) + " HU" +
-                                       (preset.empty() || preset == "fixed" ? ", given" : ", found for " + preset + " bone"));
+    rows.emplace_back("Threshold",
+                      number_text(*lower, 0) + " HU" +
+                          (preset.empty() || preset == "fixed" ? ", given" : ", found for " + preset + " bone"));
     if (const auto change = f.reported("threshold", "change_percent_per_50_hu"))
-      rows.emplace_back("", "50 HU more or less change the volume by " + number_text(*change, *change < 9.95 ? 1 : 0) + " %");
+      rows.emplace_back(
+          "", "50 HU more or less change the volume by " + number_text(*change, *change < 9.95 ? 1 : 0) + " %");
     if (const auto sure = f.reported("threshold", "confidence"); sure && *sure < 0.7)
       rows.emplace_back("", *sure < 0.4 ? "Poor: bone and tissue are hard to tell apart" : "Fair: look at the outline");
   }
@@ -220,19 +230,23 @@ Rows bone_rows(const CaseFacts& f) {
     rows.emplace_back("Bone", volume_text(*volume));
     const Json* const dims = f.verdict("output", "dims");
     const Json* const spacing = f.verdict("output", "spacing_mm");
-    // Of a whole scan only: what a slice of a head holds on average (libs/imaging/image, bone_threshold: up to 45 cm2; a pelvis 60).
-    if (region == "whole" && dims != nullptr && spacing != nullptr && dims->items().size() == 3 && spacing->items().size() == 3) {
+    // Of a whole scan only: what a slice of a head holds on average (libs/imaging/image, bone_threshold: up to 45 cm2;
+    // a pelvis 60).
+    if (region == "whole" && dims != nullptr && spacing != nullptr && dims->items().size() == 3 &&
+        spacing->items().size() == 3) {
       const double height = dims->items()[2].number().value_or(0) * spacing->items()[2].number().value_or(0);
       const double cm2 = height > 0 ? *volume / height / 100 : 0;
-      rows.emplace_back(
-          "", number_text(cm2, 1) + " cm2 in a slice on average; a head has up to 45" + (cm2 > 45 ? ": LOOK AT THE OUTLINE" : ""));
+      rows.emplace_back("", number_text(cm2, 1) + " cm2 in a slice on average; a head has up to 45" +
+                                (cm2 > 45 ? ": LOOK AT THE OUTLINE" : ""));
     } else {
       rows.emplace_back("", "no usual range known for this region");
     }
     if (const auto change = f.reported("resample", "volume_change_percent"))
-      rows.emplace_back("Against the mask", std::abs(*change) < 0.05 ? "less than 0.1 % apart" : number_text(*change, 1) + " %");
+      rows.emplace_back("Against the mask",
+                        std::abs(*change) < 0.05 ? "less than 0.1 % apart" : number_text(*change, 1) + " %");
   }
-  if (const Json* const spacing = at(f.manifest().find("frame"), "spacing_mm")) rows.emplace_back("Voxel of the case", edges_text(spacing));
+  if (const Json* const spacing = at(f.manifest().find("frame"), "spacing_mm"))
+    rows.emplace_back("Voxel of the case", edges_text(spacing));
   return rows;
 }
 
@@ -249,8 +263,10 @@ Rows removed_rows(const CaseFacts& f) {
   const auto found = f.reported("threshold", "pieces_found"), kept = f.reported("threshold", "pieces_kept");
   if (found && kept) {
     const double dropped = *found - *kept;
-    std::string said = dropped > 0 ? number_text(dropped, 0) + " of " + number_text(*found, 0) + " dropped" : "none dropped";
-    if (const auto mm3 = f.reported("threshold", "small_pieces_mm3"); mm3 && dropped > 0) said += ", " + volume_text(*mm3) + " together";
+    std::string said =
+        dropped > 0 ? number_text(dropped, 0) + " of " + number_text(*found, 0) + " dropped" : "none dropped";
+    if (const auto mm3 = f.reported("threshold", "small_pieces_mm3"); mm3 && dropped > 0)
+      said += ", " + volume_text(*mm3) + " together";
     const std::string least = f.param("threshold", "min_volume_mm3"), largest = f.param("threshold", "keep_largest");
     if (!least.empty()) said += "; each below " + least + " mm3";
     if (!largest.empty() && largest != "0") said += ", or not among the " + largest + " largest";
@@ -266,7 +282,8 @@ Rows removed_rows(const CaseFacts& f) {
     }
     rows.emplace_back("Metal", said);
     if (number(f.verdict("values", "saturated_mm3")) > 0)
-      rows.emplace_back("", volume_text(number(f.verdict("values", "saturated_mm3"))) + " lie at the scanner's highest value");
+      rows.emplace_back(
+          "", volume_text(number(f.verdict("values", "saturated_mm3"))) + " lie at the scanner's highest value");
   }
   return rows;
 }
@@ -282,16 +299,21 @@ sheet::Table resolution_table(const CaseFacts& f) {
     finest = std::min(finest, v.number().value_or(1));
     coarsest = std::max(coarsest, v.number().value_or(1));
   }
-  // What the scanner took, not what was interpolated between: the widest distance of slices, or their thickness where that is more.
+  // What the scanner took, not what was interpolated between: the widest distance of slices, or their thickness where
+  // that is more.
   if (text(f.verdict("source")) == "DICOM")
-    coarsest = std::max({coarsest, number(f.verdict("geometry", "gap_max_mm")), number(f.verdict("series", "thickness_mm"))});
+    coarsest =
+        std::max({coarsest, number(f.verdict("geometry", "gap_max_mm")), number(f.verdict("series", "thickness_mm"))});
   // Slices further apart than a structure is wide hide it where it runs within them, however fine their pixels.
-  constexpr std::pair<const char*, double> kSmall[] = {
-      {"mandibular canal", 2.5}, {"facial canal", 1.3}, {"tegmen, sinus plate", 1.0}, {"wall of an air cell, chorda", 0.5}};
+  constexpr std::pair<const char*, double> kSmall[] = {{"mandibular canal", 2.5},
+                                                       {"facial canal", 1.3},
+                                                       {"tegmen, sinus plate", 1.0},
+                                                       {"wall of an air cell, chorda", 0.5}};
   for (const auto& [name, mm] : kSmall) {
     const double least = mm / coarsest, most = mm / finest;
     const bool shown = least >= 2, partly = least >= 1;
-    const std::string across = most - least < 0.15 ? number_text(least, 1) : number_text(least, 1) + " to " + number_text(most, 1);
+    const std::string across =
+        most - least < 0.15 ? number_text(least, 1) : number_text(least, 1) + " to " + number_text(most, 1);
     t.rows.push_back({{name, Tone::plain},
                       {number_text(mm, 1) + " mm", Tone::plain},
                       {across, Tone::plain},
@@ -305,4 +327,4 @@ sheet::Table resolution_table(const CaseFacts& f) {
   return t;
 }
 
-}  // namespace osteo::assessment::case_report
+}  // namespace osteo::inline assessment::case_report

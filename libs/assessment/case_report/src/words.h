@@ -44,4 +44,4 @@ using Rows = std::vector<std::pair<std::string, std::string>>;
 /// How many voxels small structures have, and what that means.
 [[nodiscard]] sheet::Table resolution_table(const CaseFacts& facts);
 
-}  // namespace osteo::assessment::case_report
+}  // namespace osteo::inline assessment::case_report

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/core/base/parallel.h"
 #include "osteo/assessment/evidence/visibility.h"
+#include "osteo/core/base/parallel.h"
 #include "osteo/geometry/grid/brick_linear.h"
 
 namespace osteo::inline assessment {
@@ -44,7 +44,8 @@ void add_row(const Extent& extent, Vec3 first, Vec3 step, std::span<float> row) 
     to = std::min(to, std::max(u, v));
   }
   if (from > to) return;
-  const auto begin = static_cast<std::size_t>(std::floor(from)), end = std::min(row.size(), static_cast<std::size_t>(std::ceil(to)) + 1);
+  const auto begin = static_cast<std::size_t>(std::floor(from)),
+             end = std::min(row.size(), static_cast<std::size_t>(std::ceil(to)) + 1);
   // A lattice that is the bone's own reads its voxels, whatever rounding has done.
   const auto snap = [](double x) {
     const double near = std::round(x);
@@ -150,7 +151,8 @@ int squares_below(double limit_mm2, double cell_mm) {
 
 namespace {
 
-// Rows of the lattice that a density reaches which is not the same in both worlds; all where their bricks are not the same.
+// Rows of the lattice that a density reaches which is not the same in both worlds; all where their bricks are not the
+// same.
 std::vector<std::uint8_t> changed_rows(const World& before, const World& after, const Frame& lattice) {
   const int ny = lattice.dims[1], nz = lattice.dims[2];
   std::vector<std::uint8_t> rows(static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz), 0);
@@ -167,15 +169,19 @@ std::vector<std::uint8_t> changed_rows(const World& before, const World& after, 
       double lo[2] = {1e9, 1e9}, hi[2] = {-1e9, -1e9};
       for (int c = 0; c < 8; ++c) {
         const auto corner = [&](int at, int bit) { return at * 8 + (bit != 0 ? 8.0 : -1.0); };
-        const Vec3 x =
-            lattice.index_from_world(a.frame().world_from_index({corner(o.i, c & 1), corner(o.j, c >> 1 & 1), corner(o.k, c >> 2)}));
+        const Vec3 x = lattice.index_from_world(
+            a.frame().world_from_index({corner(o.i, c & 1), corner(o.j, c >> 1 & 1), corner(o.k, c >> 2)}));
         lo[0] = std::min(lo[0], x.y);
         hi[0] = std::max(hi[0], x.y);
         lo[1] = std::min(lo[1], x.z);
         hi[1] = std::max(hi[1], x.z);
       }
-      const auto first = [](double x, int last) { return static_cast<int>(std::clamp(std::floor(x) - 1, 0.0, double(last))); };
-      const auto end = [](double x, int last) { return static_cast<int>(std::clamp(std::ceil(x) + 2, 0.0, double(last))); };
+      const auto first = [](double x, int last) {
+        return static_cast<int>(std::clamp(std::floor(x) - 1, 0.0, double(last)));
+      };
+      const auto end = [](double x, int last) {
+        return static_cast<int>(std::clamp(std::ceil(x) + 2, 0.0, double(last)));
+      };
       for (int z = first(lo[1], nz); z < end(hi[1], nz); ++z)
         for (int y = first(lo[0], ny); y < end(hi[0], ny); ++y)
           rows[static_cast<std::size_t>(z) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(y)] = 1;
@@ -185,32 +191,35 @@ std::vector<std::uint8_t> changed_rows(const World& before, const World& after, 
 }
 
 // `wanted`: a flag for each row; empty for all.
-void fill_rows(const World& world, const Frame& lattice, const std::vector<std::uint8_t>& wanted, BitMask& out, const Context& context) {
+void fill_rows(const World& world, const Frame& lattice, const std::vector<std::uint8_t>& wanted, BitMask& out,
+               const Context& context) {
   const auto nx = static_cast<std::size_t>(lattice.dims[0]), ny = static_cast<std::size_t>(lattice.dims[1]);
   std::vector<Extent> bones;
   for (const PlacedBody& b : world.bodies()) {
     if (b.body->bone.brick_count() > 0) bones.push_back(extent_of(b.body->bone));
   }
-  parallel_for(ny * static_cast<std::size_t>(lattice.dims[2]), 64, context.threads, [&](std::size_t begin, std::size_t end) {
-    std::vector<float> density(nx);
-    for (std::size_t row = begin; row < end; ++row) {
-      if (!wanted.empty() && wanted[row] == 0) continue;
-      std::fill(density.begin(), density.end(), 0.0F);
-      const double j = static_cast<double>(row % ny), k = static_cast<double>(row / ny);
-      const Vec3 at = lattice.world_from_index({0, j, k}), next = lattice.world_from_index({1, j, k});
-      for (const Extent& e : bones) {
-        const Frame& own = e.bone->frame();
-        const Vec3 first = own.index_from_world(at);
-        add_row(e, first, own.index_from_world(next) - first, density);
-      }
-      const std::span<std::uint64_t> words = out.row(row);
-      for (std::size_t w = 0; w < words.size(); ++w) {
-        std::uint64_t word = 0;
-        for (std::size_t i = w * 64; i < std::min(nx, w * 64 + 64); ++i) word |= std::uint64_t{density[i] >= kSolid} << (i % 64);
-        words[w] = word;
-      }
-    }
-  });
+  parallel_for(ny * static_cast<std::size_t>(lattice.dims[2]), 64, context.threads,
+               [&](std::size_t begin, std::size_t end) {
+                 std::vector<float> density(nx);
+                 for (std::size_t row = begin; row < end; ++row) {
+                   if (!wanted.empty() && wanted[row] == 0) continue;
+                   std::fill(density.begin(), density.end(), 0.0F);
+                   const double j = static_cast<double>(row % ny), k = static_cast<double>(row / ny);
+                   const Vec3 at = lattice.world_from_index({0, j, k}), next = lattice.world_from_index({1, j, k});
+                   for (const Extent& e : bones) {
+                     const Frame& own = e.bone->frame();
+                     const Vec3 first = own.index_from_world(at);
+                     add_row(e, first, own.index_from_world(next) - first, density);
+                   }
+                   const std::span<std::uint64_t> words = out.row(row);
+                   for (std::size_t w = 0; w < words.size(); ++w) {
+                     std::uint64_t word = 0;
+                     for (std::size_t i = w * 64; i < std::min(nx, w * 64 + 64); ++i)
+                       word |= std::uint64_t{density[i] >= kSolid} << (i % 64);
+                     words[w] = word;
+                   }
+                 }
+               });
 }
 
 }  // namespace
@@ -221,7 +230,8 @@ BitMask solid_cells(const World& world, const Frame& lattice, const Context& con
   return out;
 }
 
-BitMask solid_cells(const World& world, const Frame& lattice, const World& before, BitMask cells, const Context& context) {
+BitMask solid_cells(const World& world, const Frame& lattice, const World& before, BitMask cells,
+                    const Context& context) {
   fill_rows(world, lattice, changed_rows(before, world, lattice), cells, context);
   return cells;
 }
@@ -252,7 +262,8 @@ BitMask grown(const BitMask& mask, int most2, const Context& context) {
         const std::span<std::uint64_t> to = out.row(r);
         for (const auto& [dj, dk] : offsets) {
           if (j + dj < 0 || j + dj >= ny || k + dk < 0 || k + dk >= nz) continue;
-          const std::size_t beside = static_cast<std::size_t>(k + dk) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j + dj);
+          const std::size_t beside =
+              static_cast<std::size_t>(k + dk) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j + dj);
           if (any[beside] == 0) continue;
           const std::span<const std::uint64_t> from = wide.row(beside);
           for (std::size_t n = 0; n < to.size(); ++n) to[n] |= from[n];
@@ -263,8 +274,8 @@ BitMask grown(const BitMask& mask, int most2, const Context& context) {
   return out;
 }
 
-BitMask cavity_of(const BitMask& solid, const BitMask& gone, const BitMask& closed, double cell_mm, double ball_mm, double opened_mm,
-                  const Context& context) {
+BitMask cavity_of(const BitMask& solid, const BitMask& gone, const BitMask& closed, double cell_mm, double ball_mm,
+                  double opened_mm, const Context& context) {
   const BitMask none(solid.dims());
   const auto is_empty = [&](const BitMask& m) { return m == none; };
   if (is_empty(gone)) return none;
@@ -298,4 +309,4 @@ BitMask cavity_of(const BitMask& solid, const BitMask& gone, const BitMask& clos
   return cavity;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

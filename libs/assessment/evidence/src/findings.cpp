@@ -42,7 +42,8 @@ std::string capital(std::string s) {
 
 class Finder {
  public:
-  Finder(const Score& score, const StructureMap* structures, const Procedure* procedure, const FindingLimits& limits, Findings& out)
+  Finder(const Score& score, const StructureMap* structures, const Procedure* procedure, const FindingLimits& limits,
+         Findings& out)
       : score_(score), structures_(structures), procedure_(procedure), limits_(limits), out_(out) {}
 
   void all() {
@@ -79,7 +80,8 @@ class Finder {
     const ProcedureStructure* const p = procedure_ == nullptr ? nullptr : procedure_->find(structure);
     return p != nullptr && p->role == ProcedureRole::enter;
   }
-  ScoreFinding& add(std::string kind, const std::string& of, FindingSeverity severity, std::string text, std::string why = {}) {
+  ScoreFinding& add(std::string kind, const std::string& of, FindingSeverity severity, std::string text,
+                    std::string why = {}) {
     ScoreFinding f;
     f.id = of.empty() ? kind : kind + "-" + slug(of);
     f.kind = std::move(kind);
@@ -115,15 +117,17 @@ class Finder {
     Vec3 middle;
     for (std::size_t n = 0; n < keep; ++n) f.places_mm.push_back(all[n * all.size() / keep]);
     for (const Vec3 p : f.places_mm) middle += p / static_cast<double>(keep);
-    f.at_mm =
-        *std::min_element(f.places_mm.begin(), f.places_mm.end(), [&](Vec3 a, Vec3 b) { return length(a - middle) < length(b - middle); });
+    f.at_mm = *std::min_element(f.places_mm.begin(), f.places_mm.end(),
+                                [&](Vec3 a, Vec3 b) { return length(a - middle) < length(b - middle); });
   }
 
   void summary() {
-    const auto duration = value("duration_s"), drilling = value("drilling_s"), removed = value("removed_mm3"), sawn = value("sawn_mm3");
+    const auto duration = value("duration_s"), drilling = value("drilling_s"), removed = value("removed_mm3"),
+               sawn = value("sawn_mm3");
     if (duration) {
       std::string s = "The session lasted " + told_seconds(*duration);
-      s += drilling && *drilling > 0 ? "; for " + told_seconds(*drilling) + " of it a burr was drilling." : "; no burr drilled.";
+      s += drilling && *drilling > 0 ? "; for " + told_seconds(*drilling) + " of it a burr was drilling."
+                                     : "; no burr drilled.";
       out_.summary.push_back(s);
     }
     if (removed && *removed > 0) {
@@ -136,9 +140,9 @@ class Finder {
       out_.summary.push_back("No bone was removed.");
     }
     if (!score_.procedure.empty() && !score_.items.empty()) {
-      std::string s = score_.judged() == 0
-                          ? "No item of the scale could be judged."
-                          : std::to_string(score_.passed()) + " of " + std::to_string(score_.judged()) + " items of the scale passed";
+      std::string s = score_.judged() == 0 ? "No item of the scale could be judged."
+                                           : std::to_string(score_.passed()) + " of " +
+                                                 std::to_string(score_.judged()) + " items of the scale passed";
       if (score_.judged() > 0) {
         if (score_.judged() < score_.items.size())
           s += "; " + std::to_string(score_.items.size() - score_.judged()) + " could not be judged";
@@ -174,8 +178,9 @@ class Finder {
         moments(f, "reached by the running saw", name);
         std::sort(f.times_s.begin(), f.times_s.end());
       } else if (n > 0) {
-        ScoreFinding& f = add("touch", name, FindingSeverity::caution,
-                              "The burr touched the " + name + " " + times(n) + ", for " + told_seconds(touched) + ", without turning.");
+        ScoreFinding& f = add(
+            "touch", name, FindingSeverity::caution,
+            "The burr touched the " + name + " " + times(n) + ", for " + told_seconds(touched) + ", without turning.");
         from(f, "touches", name, n, 0);
         moments(f, "touched from the first tick on", name);
       }
@@ -204,8 +209,9 @@ class Finder {
     }
     for (const auto& [name, c] : values("clearance_mm")) {
       if (c <= 0 || c >= limits_.near_miss_mm || value("touches", name).value_or(0) > 0) continue;
-      ScoreFinding& f = add("clearance", name, FindingSeverity::note, "The burr came within " + in(c, "mm") + " of the " + name + ".",
-                            "Told below " + told_number(limits_.near_miss_mm) + " mm.");
+      ScoreFinding& f =
+          add("clearance", name, FindingSeverity::note, "The burr came within " + in(c, "mm") + " of the " + name + ".",
+              "Told below " + told_number(limits_.near_miss_mm) + " mm.");
       from(f, "clearance_mm", name, c, limits_.near_miss_mm);
     }
     if (any && nearest.second > 0 && !cut) {
@@ -239,17 +245,20 @@ class Finder {
     std::string text = in(*mm3, "mm3") + " of bone (" + percent(1 - *share) + ") was removed unseen";
     for (std::size_t n = 0; n < std::min<std::size_t>(near.size(), 3); ++n) {
       text += n == 0 ? ", " : n + 1 == std::min<std::size_t>(near.size(), 3) ? " and " : ", ";
-      text += in(near[n].second, "mm3") + (n == 0 ? " of it within " + told_number(kNearMm) + " mm of the " : " of the ") + near[n].first;
+      text += in(near[n].second, "mm3") +
+              (n == 0 ? " of it within " + told_number(kNearMm) + " mm of the " : " of the ") + near[n].first;
     }
-    ScoreFinding& f = add("hidden", {}, danger || *share < limits_.seen_well ? FindingSeverity::caution : FindingSeverity::good, text + ".",
-                          "Unseen: bone lay between it and the eye as it went; voxels in touch with the burr are left out.");
+    ScoreFinding& f = add(
+        "hidden", {}, danger || *share < limits_.seen_well ? FindingSeverity::caution : FindingSeverity::good,
+        text + ".", "Unseen: bone lay between it and the eye as it went; voxels in touch with the burr are left out.");
     from(f, "hidden_mm3", {}, *mm3, std::nullopt);
     std::vector<Vec3> all, close;
     for (const auto& [name, v] : score_.hidden) {
       all.push_back(v.own_mm);
       if (structures_ == nullptr) continue;
       const StructureMap::Answer a = structures_->at(v.own_mm);
-      if (a.structure != 0 && a.distance_mm <= kNearMm && !to_be_opened(structures_->name_of(a.structure))) close.push_back(v.own_mm);
+      if (a.structure != 0 && a.distance_mm <= kNearMm && !to_be_opened(structures_->name_of(a.structure)))
+        close.push_back(v.own_mm);
     }
     const double each = score_.hidden.empty() ? 0 : static_cast<double>(score_.hidden.front().second.mm3);
     places(f, all, all.size(), each);
@@ -257,7 +266,8 @@ class Finder {
     if (!close.empty()) {
       Vec3 middle;
       for (const Vec3 p : close) middle += p / static_cast<double>(close.size());
-      f.at_mm = *std::min_element(close.begin(), close.end(), [&](Vec3 a, Vec3 b) { return length(a - middle) < length(b - middle); });
+      f.at_mm = *std::min_element(close.begin(), close.end(),
+                                  [&](Vec3 a, Vec3 b) { return length(a - middle) < length(b - middle); });
     }
     for (const Moment& m : score_.moments) {
       if (m.what == "removed unseen" && !to_be_opened(m.structure) && f.times_s.size() < ScoreFinding::kMostTimes)
@@ -274,20 +284,21 @@ class Finder {
         most = std::max(most, m.value);
         limit = m.limit;
       }
-      ScoreFinding& f = add("force", name, FindingSeverity::caution,
-                            "Near the " + name + " the burr pressed harder than the " + in(limit, "N") +
-                                " that the procedure allows there" + (most > 0 ? ": " + in(most, "N") + " was seen." : "."),
-                            "Impulse above the limit: " + in(ns, "N s") + ".");
+      ScoreFinding& f =
+          add("force", name, FindingSeverity::caution,
+              "Near the " + name + " the burr pressed harder than the " + in(limit, "N") +
+                  " that the procedure allows there" + (most > 0 ? ": " + in(most, "N") + " was seen." : "."),
+              "Impulse above the limit: " + in(ns, "N s") + ".");
       from(f, "excess_force_ns", name, ns, 0);
       moments(f, "pressed too hard near it", name);
     }
     const auto band = [&](MetricName metric, const char* kind, const char* how, const char* what) {
       for (const auto& [name, share] : values(metric)) {
         if (share <= limits_.above_band_share || to_be_opened(name)) continue;
-        ScoreFinding& f = add(
-            kind, name, FindingSeverity::caution,
-            percent(share) + " of the drilling near the " + name + " was " + how + " than nine in ten moments of the reference's experts.",
-            "At the same distance; by chance it would be 10 %.");
+        ScoreFinding& f = add(kind, name, FindingSeverity::caution,
+                              percent(share) + " of the drilling near the " + name + " was " + how +
+                                  " than nine in ten moments of the reference's experts.",
+                              "At the same distance; by chance it would be 10 %.");
         f.id = std::string(kind) + "-band-" + slug(name);
         from(f, metric, name, share, limits_.above_band_share);
         if (what[0] != 0) moments(f, what, name);
@@ -298,7 +309,8 @@ class Finder {
     if (const auto peak = value("force_peak_n")) {
       const auto p95 = value("force_p95_n"), middle = value("force_median_n");
       ScoreFinding& f = add("force-peak", {}, FindingSeverity::note,
-                            "The hardest press was " + in(*peak, "N") + (middle ? "; the middle of all was " + in(*middle, "N") : "") +
+                            "The hardest press was " + in(*peak, "N") +
+                                (middle ? "; the middle of all was " + in(*middle, "N") : "") +
                                 (p95 ? ", and 5 % were above " + in(*p95, "N") : "") + ".");
       f.kind = "force";
       from(f, "force_peak_n", {}, *peak, std::nullopt);
@@ -310,16 +322,19 @@ class Finder {
     if (const auto share = value("burr_choice_share")) {
       if (*share < 1) {
         from(add("instrument", {}, FindingSeverity::caution,
-                 "For " + percent(1 - *share) + " of the drilling where the procedure restricts burrs, another was in the hand."),
+                 "For " + percent(1 - *share) +
+                     " of the drilling where the procedure restricts burrs, another was in the hand."),
              "burr_choice_share", {}, *share, 1);
       } else {
-        from(add("instrument", {}, FindingSeverity::good, "Where the procedure restricts burrs, only allowed ones were used."),
+        from(add("instrument", {}, FindingSeverity::good,
+                 "Where the procedure restricts burrs, only allowed ones were used."),
              "burr_choice_share", {}, *share, 1);
       }
     }
     if (const auto wet = value("irrigation_share"); wet && *wet < 1 - limits_.dry_share) {
       from(add("water", {}, FindingSeverity::note,
-               *wet > 0 ? percent(1 - *wet) + " of the drilling was without water." : "No water was used while drilling.",
+               *wet > 0 ? percent(1 - *wet) + " of the drilling was without water."
+                        : "No water was used while drilling.",
                "Water cools bone; burrs heat it."),
            "irrigation_share", {}, *wet, 1 - limits_.dry_share);
     }
@@ -328,12 +343,14 @@ class Finder {
   void regions() {
     for (const auto& [name, mm3] : values("forbidden_mm3")) {
       if (mm3 <= 0) continue;
-      from(add("region", name, FindingSeverity::caution, in(mm3, "mm3") + " of bone is gone that should have stayed: " + name + "."),
+      from(add("region", name, FindingSeverity::caution,
+               in(mm3, "mm3") + " of bone is gone that should have stayed: " + name + "."),
            "forbidden_mm3", name, mm3, 0);
       out_.list.back().structure.clear();
     }
     for (const auto& [name, share] : values("target_share")) {
-      from(add("region", name, FindingSeverity::note, percent(share) + " of the bone that was to be removed is gone: " + name + "."),
+      from(add("region", name, FindingSeverity::note,
+               percent(share) + " of the bone that was to be removed is gone: " + name + "."),
            "target_share", name, share, std::nullopt);
       out_.list.back().structure.clear();
     }
@@ -350,7 +367,8 @@ class Finder {
     for (const Product::Result& r : score_.items) {
       if (!r.measured) continue;
       const ProcedureStructure* const s = procedure_ == nullptr ? nullptr : procedure_->find(r.item->structure);
-      const bool violated = r.item->kind == ItemKind::not_violated && !r.pass && s != nullptr && s->role == ProcedureRole::never_touch;
+      const bool violated =
+          r.item->kind == ItemKind::not_violated && !r.pass && s != nullptr && s->role == ProcedureRole::never_touch;
       ScoreFinding& f = add("item", r.item->name,
                             r.pass     ? FindingSeverity::good
                             : violated ? FindingSeverity::serious
@@ -392,7 +410,8 @@ class Finder {
       case ItemKind::fixed:
         break;
     }
-    return told_number(r.value) + ", at least " + told_number(r.threshold) + (r.threshold == 1 ? " is asked" : " are asked");
+    return told_number(r.value) + ", at least " + told_number(r.threshold) +
+           (r.threshold == 1 ? " is asked" : " are asked");
   }
 
   void time() {
@@ -402,15 +421,15 @@ class Finder {
                "What is said here is of the rest."),
            "lost_s", {}, *lost, 0);
     if (procedure_ != nullptr && procedure_->usual_s > 0 && duration > procedure_->usual_s) {
-      ScoreFinding& f =
-          add("time", {}, FindingSeverity::note,
-              "It took " + told_seconds(duration) + "; " + told_seconds(procedure_->usual_s) + " are usual for this procedure.");
+      ScoreFinding& f = add("time", {}, FindingSeverity::note,
+                            "It took " + told_seconds(duration) + "; " + told_seconds(procedure_->usual_s) +
+                                " are usual for this procedure.");
       from(f, "duration_s", {}, duration, procedure_->usual_s);
     }
     if (const auto idle = value("idle_s"); idle && duration > 0 && *idle > limits_.idle_share * duration)
-      from(
-          add("idle", {}, FindingSeverity::note, "For " + told_seconds(*idle) + " (" + percent(*idle / duration) + ") neither hand moved."),
-          "idle_s", {}, *idle, limits_.idle_share * duration);
+      from(add("idle", {}, FindingSeverity::note,
+               "For " + told_seconds(*idle) + " (" + percent(*idle / duration) + ") neither hand moved."),
+           "idle_s", {}, *idle, limits_.idle_share * duration);
     for (ScoreFinding& f : out_.list) {
       if (f.id == "idle") f.kind = "time";
     }
@@ -479,7 +498,8 @@ const ScoreFinding* Findings::find(std::string_view id) const {
   return at == list.end() ? nullptr : &*at;
 }
 
-Findings findings_of(const Score& score, const StructureMap* structures, const Procedure* procedure, const FindingLimits& limits) {
+Findings findings_of(const Score& score, const StructureMap* structures, const Procedure* procedure,
+                     const FindingLimits& limits) {
   Findings out;
   Finder(score, structures, procedure, limits, out).all();
   return out;
@@ -522,4 +542,4 @@ Json findings_json(const Findings& findings, bool with_places) {
   return j;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -29,14 +29,16 @@ std::vector<CameraPose> camera_poses(std::span<const Note> notes, std::size_t& u
   for (const Note& n : notes) {
     if (n.kind != "camera") continue;
     const auto j = Json::parse(n.json);
-    const auto eye = j ? vec_of(j->find("eye_mm")) : std::nullopt, target = j ? vec_of(j->find("target_mm")) : std::nullopt;
+    const auto eye = j ? vec_of(j->find("eye_mm")) : std::nullopt,
+               target = j ? vec_of(j->find("target_mm")) : std::nullopt;
     if (eye && target) {
       poses.push_back({n.tick, *eye, *target});
     } else {
       ++unreadable;
     }
   }
-  std::stable_sort(poses.begin(), poses.end(), [](const CameraPose& a, const CameraPose& b) { return a.tick < b.tick; });
+  std::stable_sort(poses.begin(), poses.end(),
+                   [](const CameraPose& a, const CameraPose& b) { return a.tick < b.tick; });
   return poses;
 }
 
@@ -49,10 +51,12 @@ FrameMaker::FrameMaker(World begin, double rate_hz, const std::vector<CameraPose
 
 void FrameMaker::flush() {
   if (actions_.empty() && ticks_.empty() && changes_.empty() && sawn_.empty()) return;
-  std::sort(changes_.begin(), changes_.end(), [](const VoxelChange& a, const VoxelChange& b) { return a.voxel < b.voxel; });
-  const auto behind =
-      std::upper_bound(cameras_.begin(), cameras_.end(), next_tick_, [](std::uint64_t t, const CameraPose& c) { return t <= c.tick; });
-  sink_({rate_hz_, actions_, ticks_, changes_, sawn_, world_, behind == cameras_.begin() ? nullptr : &*(behind - 1), lost_});
+  std::sort(changes_.begin(), changes_.end(),
+            [](const VoxelChange& a, const VoxelChange& b) { return a.voxel < b.voxel; });
+  const auto behind = std::upper_bound(cameras_.begin(), cameras_.end(), next_tick_,
+                                       [](std::uint64_t t, const CameraPose& c) { return t <= c.tick; });
+  sink_({rate_hz_, actions_, ticks_, changes_, sawn_, world_, behind == cameras_.begin() ? nullptr : &*(behind - 1),
+         lost_});
   actions_.clear();
   ticks_.clear();
   changes_.clear();
@@ -164,4 +168,4 @@ World tell_frames(const SessionReader& session, World begin, const FrameMaker::S
   return maker.world().copy();
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -67,4 +67,4 @@ std::uint64_t IdleClock::idle_ticks() const {
   return ticks;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -4,11 +4,11 @@
 #include <set>
 
 #include "hints_json.h"
+#include "osteo/assessment/evidence/process.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
 #include "osteo/simulation/bone/instrument.h"
-#include "osteo/assessment/evidence/process.h"
 
 namespace osteo::inline assessment {
 namespace {
@@ -45,7 +45,8 @@ std::vector<HintRule> parse_hints(std::string_view json, const std::string& name
     }
     if (!has_limit(rule.kind) && item.find("limit") != nullptr)
       throw file.wrong(*item.find("limit"), where + ": 'limit' says nothing for " + kind);
-    if (has_limit(rule.kind) && item.find("limit") == nullptr) throw file.wrong(item, where + ": " + kind + " needs a 'limit'");
+    if (has_limit(rule.kind) && item.find("limit") == nullptr)
+      throw file.wrong(item, where + ": " + kind + " needs a 'limit'");
     if (!is_near(rule.kind) && rule.words.find(kStructure) != std::string::npos)
       throw file.wrong(item, where + ": " + kind + " knows no {structure}");
     rules.push_back(std::move(rule));
@@ -108,7 +109,8 @@ void HintWatch::tick(const TickRecord& t) {
     return;
   }
   last_ = t;
-  drilling_ = instrument_of(t.device.tool).cutter() != nullptr && static_cast<double>(t.speed_rpm) > kTurnsRpm && t.normal_force_n > 0;
+  drilling_ = instrument_of(t.device.tool).cutter() != nullptr && static_cast<double>(t.speed_rpm) > kTurnsRpm &&
+              t.normal_force_n > 0;
   const auto pause = static_cast<std::uint64_t>(kPauseS * rate_hz_);
   for (std::size_t n = 0; n < rules_.size(); ++n) {
     Watched& w = rules_[n];
@@ -135,8 +137,10 @@ std::optional<Hint> HintWatch::take() {
     if (w.held == 0 || w.missed > 0 || static_cast<double>(w.held) < w.rule.for_s * rate_hz_) continue;
     if (w.said_s && t_s - *w.said_s < w.rule.quiet_s) continue;
     Hint hint{w.rule.id, w.rule.words, {}, t_s};
-    if (is_near(w.rule.kind) && structures_ != nullptr) hint.structure = structures_->name_of(static_cast<std::uint8_t>(last_.structure));
-    if (const auto at = hint.words.find(kStructure); at != std::string::npos) hint.words.replace(at, kStructure.size(), hint.structure);
+    if (is_near(w.rule.kind) && structures_ != nullptr)
+      hint.structure = structures_->name_of(static_cast<std::uint8_t>(last_.structure));
+    if (const auto at = hint.words.find(kStructure); at != std::string::npos)
+      hint.words.replace(at, kStructure.size(), hint.structure);
     w.said_s = last_s_ = t_s;
     w.held = 0;
     return hint;
@@ -144,4 +148,4 @@ std::optional<Hint> HintWatch::take() {
   return std::nullopt;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -24,4 +24,4 @@ void not_measured_all(std::vector<Measured>& values, MetricPlace place, std::ini
   }
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

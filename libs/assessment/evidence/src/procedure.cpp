@@ -57,7 +57,9 @@ class Reading {
     list(root, "structures", out_.structures, [&](auto& s, const std::string&, const JsonValue& v) {
       if (declared(s.name)) throw file_.wrong(v, "structure '" + s.name + "' is there twice");
     });
-    const auto of_structure = [&](auto& r, const std::string& where, const JsonValue& v) { known_structure(r.structure, where, v); };
+    const auto of_structure = [&](auto& r, const std::string& where, const JsonValue& v) {
+      known_structure(r.structure, where, v);
+    };
     list(root, "regions", out_.regions, of_structure);
     list(root, "instruments", out_.instruments, of_structure);
     list(root, "force_limits", out_.force_limits, of_structure);
@@ -128,14 +130,16 @@ class Reading {
       if (const JsonValue* const c = v.find("curve_mm")) {
         for (const JsonValue& p : file_.list(*c, "curve_mm")) {
           Vec3 at;
-          for (std::size_t a = 0; a < 3; ++a) at[a] = file_.number(file_.list(p, "a point of curve_mm", 3)[a], "curve_mm", -1e4, 1e4);
+          for (std::size_t a = 0; a < 3; ++a)
+            at[a] = file_.number(file_.list(p, "a point of curve_mm", 3)[a], "curve_mm", -1e4, 1e4);
           item.curve_mm.push_back(at);
         }
         if (item.curve_mm.size() < 2) throw file_.wrong(*c, where + ": 'curve_mm' needs two points at least");
       }
       if (v.find("threshold") == nullptr) item.threshold = usual_threshold(item.kind);
       if (v.find("spread") == nullptr) item.spread = usual_spread(item.kind);
-      if (v.find("most") == nullptr) item.most = item.kind == ItemKind::thinned ? 2.5 : item.kind == ItemKind::margin ? 3 : 1e6;
+      if (v.find("most") == nullptr)
+        item.most = item.kind == ItemKind::thinned ? 2.5 : item.kind == ItemKind::margin ? 3 : 1e6;
       out_.items.push_back(std::move(item));
     }
   }
@@ -167,7 +171,8 @@ class Reading {
 }  // namespace
 
 const ProcedureStructure* Procedure::find(std::string_view structure) const {
-  const auto s = std::find_if(structures.begin(), structures.end(), [&](const ProcedureStructure& p) { return p.name == structure; });
+  const auto s = std::find_if(structures.begin(), structures.end(),
+                              [&](const ProcedureStructure& p) { return p.name == structure; });
   return s == structures.end() ? nullptr : &*s;
 }
 
@@ -239,4 +244,4 @@ double usual_spread(ItemKind kind) {
   return 1;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -6,10 +6,10 @@
 #include <numbers>
 #include <utility>
 
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/assessment/evidence/visibility.h"
-#include "osteo/simulation/haptics/saw_slot.h"
 #include "osteo/core/statistics/basics.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/simulation/haptics/saw_slot.h"
 
 namespace osteo::inline assessment {
 namespace {
@@ -110,7 +110,8 @@ void ProcessMetric::frame(const EvidenceFrame& f) {
                                           : seconds(f.ticks.back().tick + 1, f.rate_hz),
                           removed_mm3_);
   if (f.camera != nullptr) {
-    const bool moved = camera_ && (!(camera_->eye_mm == f.camera->eye_mm) || !(camera_->target_mm == f.camera->target_mm));
+    const bool moved =
+        camera_ && (!(camera_->eye_mm == f.camera->eye_mm) || !(camera_->target_mm == f.camera->target_mm));
     if (moved) camera_ticks_ += ticks;
     if (moved && !camera_moving_) ++camera_moves_;
     camera_moving_ = moved;
@@ -129,8 +130,10 @@ void ProcessMetric::finish(const World& /*world*/, std::vector<Measured>& values
   if (sawn_mm3_ > 0) values.push_back(measured("sawn_mm3", sawn_mm3_));
   values.push_back(measured("path_mm", path_mm_));
   values.push_back(measured("work_mj", work_mj_));
-  for (const auto& [tool, ticks] : by_tool_) values.push_back(measured("instrument_s", seconds(ticks, hz), instrument_of(tool).name));
-  for (const auto& [tool, mm3] : removed_by_tool_) values.push_back(measured("instrument_mm3", mm3, instrument_of(tool).name));
+  for (const auto& [tool, ticks] : by_tool_)
+    values.push_back(measured("instrument_s", seconds(ticks, hz), instrument_of(tool).name));
+  for (const auto& [tool, mm3] : removed_by_tool_)
+    values.push_back(measured("instrument_mm3", mm3, instrument_of(tool).name));
   if (any_camera_) {
     values.push_back(measured("camera_moves", static_cast<double>(camera_moves_)));
     values.push_back(measured("camera_s", seconds(camera_ticks_, hz)));
@@ -267,8 +270,9 @@ void NearMetric::frame(const EvidenceFrame& f) {
       if (injures) {
         count(o.injured, o.injured_until);
         if (hand.at[s].injury.begins(t.tick, f.rate_hz, kSameContactS))
-          moments_.push_back({t_s, at, tool.kind == InstrumentKind::saw ? "reached by the running saw" : "reached by a turning burr",
-                              scene_.structures->name_of(names[s]), d, 0});
+          moments_.push_back(
+              {t_s, at, tool.kind == InstrumentKind::saw ? "reached by the running saw" : "reached by a turning burr",
+               scene_.structures->name_of(names[s]), d, 0});
       }
       for (std::size_t b = 0; b < kBandsMm.size(); ++b) {
         if (d >= kBandsMm[b]) continue;
@@ -299,7 +303,9 @@ void NearMetric::frame(const EvidenceFrame& f) {
     for (std::size_t l = 0; l < scene_.procedure->force_limits.size(); ++l) {
       const ForceLimit& limit = scene_.procedure->force_limits[l];
       for (std::size_t s = 0; s < of_.size(); ++s) {
-        if (each_[s] >= limit.within_mm || force <= limit.most_n || scene_.structures->name_of(names[s]) != limit.structure) continue;
+        if (each_[s] >= limit.within_mm || force <= limit.most_n ||
+            scene_.structures->name_of(names[s]) != limit.structure)
+          continue;
         of_[s].excess_ns += (force - limit.most_n) / f.rate_hz;
         if (hand.excess[l].begins(t.tick, f.rate_hz, kSameExcessS))
           moments_.push_back({t_s, at, "pressed too hard near it", limit.structure, force, limit.most_n});
@@ -322,7 +328,8 @@ void NearMetric::finish(const World& /*world*/, std::vector<Measured>& values, s
     if (o.least_mm < scene_.structures->reach_mm()) {
       values.push_back(measured("clearance_mm", o.least_mm, name));
     } else {
-      values.push_back(not_measured("clearance_mm", "no burr came within " + format_number(scene_.structures->reach_mm()) + " mm", name));
+      values.push_back(not_measured(
+          "clearance_mm", "no burr came within " + format_number(scene_.structures->reach_mm()) + " mm", name));
     }
     values.push_back(measured("touches", static_cast<double>(o.touches), name));
     values.push_back(measured("touched_s", seconds(o.touched, scene_.rate_hz), name));
@@ -345,9 +352,10 @@ void NearMetric::finish(const World& /*world*/, std::vector<Measured>& values, s
     }
   }
   if (!scene_.procedure->instruments.empty()) {
-    values.push_back(ruled_ == 0 ? not_measured("burr_choice_share", "no burr drilled where a rule on burrs holds")
-                                 : measured("burr_choice_share", static_cast<double>(allowed_) / static_cast<double>(ruled_)));
+    values.push_back(ruled_ == 0
+                         ? not_measured("burr_choice_share", "no burr drilled where a rule on burrs holds")
+                         : measured("burr_choice_share", static_cast<double>(allowed_) / static_cast<double>(ruled_)));
   }
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

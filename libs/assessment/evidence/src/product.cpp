@@ -15,7 +15,8 @@ namespace {
 struct Walls {
   BitMask blocked, closed;
 };
-Walls walls_of(const Frame& lattice, const std::vector<std::uint8_t>& label, const std::array<bool, 256>& blocks, const Context& context) {
+Walls walls_of(const Frame& lattice, const std::vector<std::uint8_t>& label, const std::array<bool, 256>& blocks,
+               const Context& context) {
   Walls w{BitMask(lattice.dims), BitMask(lattice.dims)};
   const auto nx = static_cast<std::size_t>(lattice.dims[0]);
   parallel_for(w.blocked.rows(), 256, context.threads, [&](std::size_t begin, std::size_t end) {
@@ -66,7 +67,8 @@ Product::Product(const World& before, const World& after, const StructureMap& st
   measure_cavity_distances(context);
 }
 
-// Around the cavity as far as an item's verdict goes by a distance; to faces and curves whose distance itself is told, all the way.
+// Around the cavity as far as an item's verdict goes by a distance; to faces and curves whose distance itself is told,
+// all the way.
 void Product::measure_cavity_distances(const Context& context) {
   const double h = frame_.spacing_mm.x;
   cells_->opened = block_of(cells_->cavity);
@@ -75,7 +77,8 @@ void Product::measure_cavity_distances(const Context& context) {
   CellBlock part;
   for (const ScaleItem& item : procedure_.items) {
     std::uint8_t s = 0;
-    if (item.kind == ItemKind::exposed || item.kind == ItemKind::followed) reach_mm = std::max(reach_mm, item.cover_mm + off_mm() + h / 2);
+    if (item.kind == ItemKind::exposed || item.kind == ItemKind::followed)
+      reach_mm = std::max(reach_mm, item.cover_mm + off_mm() + h / 2);
     if (item.kind == ItemKind::thinned && value_of(item.structure, s)) part = block_around(part, cells_->near(s, h));
     for (const Vec3 p : item.curve_mm) {
       const Vec3 x = index_of(p);
@@ -87,7 +90,8 @@ void Product::measure_cavity_distances(const Context& context) {
       part = block_around(part, at);
     }
   }
-  // A value between cells may be less than the distance by as much as a cube's diagonal, and its corners lie a cell away.
+  // A value between cells may be less than the distance by as much as a cube's diagonal, and its corners lie a cell
+  // away.
   const int more = static_cast<int>(std::ceil(std::min(reach_mm / h, 1e6) + std::sqrt(3.0))) + 2;
   CellBlock around = cells_->opened;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -118,7 +122,8 @@ void Product::lay_lattice(const World& before) {
   }
   if (lo.x > hi.x) take(bone.centre_mm());
   // No farther than the bone: beyond it there is nothing.
-  const Vec3 far{(bone.dims[0] - 1) * bone.spacing_mm.x, (bone.dims[1] - 1) * bone.spacing_mm.y, (bone.dims[2] - 1) * bone.spacing_mm.z};
+  const Vec3 far{(bone.dims[0] - 1) * bone.spacing_mm.x, (bone.dims[1] - 1) * bone.spacing_mm.y,
+                 (bone.dims[2] - 1) * bone.spacing_mm.z};
   for (std::size_t a = 0; a < 3; ++a) {
     lo[a] = std::max(lo[a] - kAroundMm, -kAroundMm);
     hi[a] = std::max(std::min(hi[a] + kAroundMm, far[a] + kAroundMm), lo[a] + 2 * kAroundMm);
@@ -130,7 +135,8 @@ void Product::lay_lattice(const World& before) {
   };
   if (count(h) > static_cast<double>(kMostCells)) {
     while (count(h) > static_cast<double>(kMostCells)) h *= 1.05;
-    word_ = "the end product was measured on cubes of " + format_number(std::round(h * 1000) / 1000) + " mm, to keep memory in bounds";
+    word_ = "the end product was measured on cubes of " + format_number(std::round(h * 1000) / 1000) +
+            " mm, to keep memory in bounds";
   }
   frame_ = bone;
   frame_.spacing_mm = {h, h, h};
@@ -218,7 +224,8 @@ double Product::off_mm() const {
 void Product::settle(Result& r, bool passes_at_worst, bool passes_at_best) const {
   if (passes_at_worst == passes_at_best) return;
   r.margin = r.pass ? std::clamp(r.margin, 0.0, kDraw / 2) : std::clamp(r.margin, -kDraw / 2, 0.0);
-  r.word = joined(r.word, "a draw: within what cubes of " + format_number(std::round(frame_.spacing_mm.x * 1000) / 1000) + " mm can tell");
+  r.word = joined(r.word, "a draw: within what cubes of " +
+                              format_number(std::round(frame_.spacing_mm.x * 1000) / 1000) + " mm can tell");
 }
 
 std::string Product::joined(const std::string& a, const std::string& b) {
@@ -291,4 +298,4 @@ double Product::cavity_mm3() const {
   return static_cast<double>(cells_->cavity.count()) * frame_.voxel_volume_mm3();
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

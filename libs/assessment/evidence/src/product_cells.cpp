@@ -3,14 +3,15 @@
 #include <cmath>
 #include <numbers>
 
-#include "osteo/core/base/parallel.h"
 #include "osteo/assessment/evidence/product.h"
+#include "osteo/core/base/parallel.h"
 #include "osteo/geometry/distance/binary_distance.h"
 #include "product_lattice.h"
 
 namespace osteo::inline assessment {
 
-void Product::violated(const ScaleItem& item, std::uint8_t s, const std::vector<std::string>& injured, Result& r) const {
+void Product::violated(const ScaleItem& item, std::uint8_t s, const std::vector<std::string>& injured,
+                       Result& r) const {
   // What lies so near the face that another lattice would have put it on the other side.
   double surely = 0, perhaps = 0;
   for (const RemovedVoxel& v : removed_) {
@@ -78,8 +79,8 @@ void Product::overhang(const ScaleItem& item, std::uint8_t s, Vec3 approach, Res
     const double a = d * std::numbers::pi / 4, off = 15 * std::numbers::pi / 180;
     views.push_back(axis * std::cos(off) + (u * std::cos(a) + v * std::sin(a)) * std::sin(off));
   }
-  // At rest: seen through the lattice, half a cell a step. A cell's length of bone is in the way; less is how a slanting wall is made of
-  // cells.
+  // At rest: seen through the lattice, half a cell a step. A cell's length of bone is in the way; less is how a
+  // slanting wall is made of cells.
   const double h = frame_.spacing_mm.x;
   const BitMask &after = cells_->after, &cavity = cells_->cavity;
   const CellBlock& bone = cells_->bone;
@@ -98,7 +99,8 @@ void Product::overhang(const ScaleItem& item, std::uint8_t s, Vec3 approach, Res
     }
   };
   const auto is_bone = [&](int i, int j, int k) {
-    return i >= 0 && j >= 0 && k >= 0 && i < frame_.dims[0] && j < frame_.dims[1] && k < frame_.dims[2] && after.at(i, j, k);
+    return i >= 0 && j >= 0 && k >= 0 && i < frame_.dims[0] && j < frame_.dims[1] && k < frame_.dims[2] &&
+           after.at(i, j, k);
   };
   std::uint64_t all = 0, seen = 0;
   each_cell(common_block(cells_->near(s, item.within_mm), cells_->opened), [&](int i, int j, int k) {
@@ -132,8 +134,9 @@ void Product::sharp(const ScaleItem& item, std::uint8_t s, Result& r) const {
     r.word = "the case has no '" + item.second + "'";
     return;
   }
-  // The largest ball in bone that is left, near both plates: twice the half cell between centres and faces. Distances are made around
-  // where both are near; a ball that is larger than what was looked at around there asks for all of the lattice.
+  // The largest ball in bone that is left, near both plates: twice the half cell between centres and faces. Distances
+  // are made around where both are near; a ball that is larger than what was looked at around there asks for all of the
+  // lattice.
   const CellBlock both = common_block(cells_->near(s, item.within_mm), cells_->near(other, item.within_mm));
   Vec3 where;
   bool any = false;
@@ -142,7 +145,8 @@ void Product::sharp(const ScaleItem& item, std::uint8_t s, Result& r) const {
     Ijk first;
     for (std::size_t a = 0; a < 3; ++a) {
       const double more = around_mm / frame_.spacing_mm.x + 1, last = frame_.dims[a];
-      const int lo = static_cast<int>(std::max(0.0, both.lo[a] - more)), hi = static_cast<int>(std::min(last, both.hi[a] + more));
+      const int lo = static_cast<int>(std::max(0.0, both.lo[a] - more)),
+                hi = static_cast<int>(std::min(last, both.hi[a] + more));
       (a == 0 ? first.i : a == 1 ? first.j : first.k) = lo;
       part.dims[a] = hi - lo;
     }
@@ -151,7 +155,8 @@ void Product::sharp(const ScaleItem& item, std::uint8_t s, Result& r) const {
     parallel_for(py * static_cast<std::size_t>(part.dims[2]), 64, 0, [&](std::size_t begin, std::size_t end) {
       for (std::size_t row = begin; row < end; ++row) {
         const int j = static_cast<int>(row % py) + first.j, k = static_cast<int>(row / py) + first.k;
-        for (std::size_t i = 0; i < px; ++i) bone[row * px + i] = cells_->after.at(static_cast<int>(i) + first.i, j, k) ? 1 : 0;
+        for (std::size_t i = 0; i < px; ++i)
+          bone[row * px + i] = cells_->after.at(static_cast<int>(i) + first.i, j, k) ? 1 : 0;
       }
     });
     const std::vector<float> d2 = squared_distance_mm2(bone, part, 0);
@@ -190,9 +195,9 @@ Product::Result Product::count(const ScaleItem& item, const World& world) {
   }
   r.measured = true;
   r.pass = r.value >= item.threshold && (item.kind == ItemKind::fixed || r.value <= item.most);
-  r.margin =
-      (item.kind == ItemKind::fixed ? r.value - item.threshold + 1 : std::min(r.value - item.threshold + 1, item.most - r.value + 1)) /
-      item.spread;
+  r.margin = (item.kind == ItemKind::fixed ? r.value - item.threshold + 1
+                                           : std::min(r.value - item.threshold + 1, item.most - r.value + 1)) /
+             item.spread;
   if (!r.pass) r.margin = std::min(r.margin, 0.0) - 1;
   return r;
 }
@@ -235,10 +240,11 @@ double Product::outside_targets_mm3() const {
   }
   double mm3 = 0;
   for (const RemovedVoxel& v : removed_) {
-    if (std::none_of(targets.begin(), targets.end(), [&](const auto& t) { return distance_to(t.first, v.own_mm) <= t.second; }))
+    if (std::none_of(targets.begin(), targets.end(),
+                     [&](const auto& t) { return distance_to(t.first, v.own_mm) <= t.second; }))
       mm3 += static_cast<double>(v.mm3);
   }
   return mm3;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -18,7 +18,8 @@ std::vector<Product::Patch> Product::patch_of(std::uint8_t value, const ScaleIte
   std::vector<Patch> patch;
   const TriMesh& face = structures_.face(number_[value]);
   for (const auto& t : face.triangles) {
-    const Vec3 a = from_floats(face.points_mm[t[0]]), b = from_floats(face.points_mm[t[1]]), c = from_floats(face.points_mm[t[2]]);
+    const Vec3 a = from_floats(face.points_mm[t[0]]), b = from_floats(face.points_mm[t[1]]),
+               c = from_floats(face.points_mm[t[2]]);
     const Vec3 n = cross(b - a, c - a);
     const double area = length(n) / 2;
     if (area <= 0 || (!all && dot(normalized(n), towards) < least)) continue;
@@ -49,7 +50,8 @@ void Product::exposed(const ScaleItem& item, std::uint8_t s, Result& r) const {
   r.value = share(item.cover_mm);
   r.pass = r.value >= item.threshold;
   r.margin = (r.value - item.threshold) / item.spread;
-  settle(r, share(std::max(0.0, item.cover_mm - off_mm())) >= item.threshold, share(item.cover_mm + off_mm()) >= item.threshold);
+  settle(r, share(std::max(0.0, item.cover_mm - off_mm())) >= item.threshold,
+         share(item.cover_mm + off_mm()) >= item.threshold);
 }
 
 // Triangles that share a point hang together.
@@ -65,7 +67,8 @@ void Product::hole(const ScaleItem& item, std::uint8_t s, Result& r) const {
   std::vector<Bare> bare;
   const TriMesh& face = structures_.face(number_[s]);
   for (const auto& t : face.triangles) {
-    const Vec3 a = from_floats(face.points_mm[t[0]]), b = from_floats(face.points_mm[t[1]]), c = from_floats(face.points_mm[t[2]]);
+    const Vec3 a = from_floats(face.points_mm[t[0]]), b = from_floats(face.points_mm[t[1]]),
+               c = from_floats(face.points_mm[t[2]]);
     const Vec3 n = cross(b - a, c - a), at = (a + b + c) / 3;
     if (!all && dot(normalized(n), towards) < least) continue;
     if (cell(at) == frame_.voxel_count()) continue;
@@ -78,7 +81,8 @@ void Product::hole(const ScaleItem& item, std::uint8_t s, Result& r) const {
   std::sort(points.begin(), points.end());
   points.erase(std::unique(points.begin(), points.end()), points.end());
   for (Bare& b : bare) {
-    for (std::uint32_t& p : b.points) p = static_cast<std::uint32_t>(std::lower_bound(points.begin(), points.end(), p) - points.begin());
+    for (std::uint32_t& p : b.points)
+      p = static_cast<std::uint32_t>(std::lower_bound(points.begin(), points.end(), p) - points.begin());
   }
   std::vector<std::uint32_t> part(points.size());
   std::vector<double> area(points.size());
@@ -174,7 +178,8 @@ void Product::followed(const ScaleItem& item, std::uint8_t s, Result& r) const {
       for (int k = -1; k <= 1; ++k)
         for (int j = -1; j <= 1; ++j)
           for (int i = -1; i <= 1; ++i) {
-            const auto to = number.find(static_cast<std::size_t>(static_cast<std::ptrdiff_t>(inside[at]) + i + j * nx + k * nxy));
+            const auto to =
+                number.find(static_cast<std::size_t>(static_cast<std::ptrdiff_t>(inside[at]) + i + j * nx + k * nxy));
             if (to == number.end()) continue;
             const double next = d + h * std::sqrt(double(i * i + j * j + k * k));
             if (next < way[to->second] - 1e-9) queue.emplace(way[to->second] = next, to->second);
@@ -192,7 +197,8 @@ void Product::followed(const ScaleItem& item, std::uint8_t s, Result& r) const {
   const std::vector<double> way = ways_from(farthest(ways_from(0)));
   const auto bins = static_cast<std::size_t>(way[farthest(way)]) + 1;
   std::vector<double> cover(bins, 1e9);
-  // Its face, not its middle, is what the cavity comes near to: each triangle counts where the cell just inside it lies.
+  // Its face, not its middle, is what the cavity comes near to: each triangle counts where the cell just inside it
+  // lies.
   for (const Patch& p : patch_of(s, item)) {
     for (double in = 0.5; in <= 2; in += 0.5) {
       const auto n = number.find(cell(p.at_mm - p.normal * (in * h)));
@@ -218,29 +224,34 @@ void Product::followed(const ScaleItem& item, std::uint8_t s, Result& r) const {
     return place(static_cast<int>(c % row), static_cast<int>(c % slice / row), static_cast<int>(c / slice));
   };
   for (std::size_t n = 0; n < inside.size(); ++n) {
-    if (way[n] < 1e9 && cover[std::min(bins - 1, static_cast<std::size_t>(way[n]))] <= item.cover_mm) keep(r, place_of(inside[n]));
+    if (way[n] < 1e9 && cover[std::min(bins - 1, static_cast<std::size_t>(way[n]))] <= item.cover_mm)
+      keep(r, place_of(inside[n]));
   }
   r.measured = share(item.cover_mm) >= 0;
   r.value = std::max(0.0, share(item.cover_mm));
   r.pass = r.measured && r.value >= item.threshold;
   r.margin = (r.value - item.threshold) / item.spread;
-  settle(r, share(std::max(0.0, item.cover_mm - off_mm())) >= item.threshold, share(item.cover_mm + off_mm()) >= item.threshold);
+  settle(r, share(std::max(0.0, item.cover_mm - off_mm())) >= item.threshold,
+         share(item.cover_mm + off_mm()) >= item.threshold);
 }
 
-// The cavity reaches a landmark curve: everywhere near it, nowhere far beyond. Value: the farthest that the curve is from it.
+// The cavity reaches a landmark curve: everywhere near it, nowhere far beyond. Value: the farthest that the curve is
+// from it.
 void Product::margin(const ScaleItem& item, Vec3 approach, Result& r) const {
   if (cells_->to_cavity.empty()) {
     r.word = "nothing was opened";
     return;
   }
   Vec3 middle;
-  for (const RemovedVoxel& v : removed_) middle += v.own_mm / static_cast<double>(std::max<std::size_t>(1, removed_.size()));
+  for (const RemovedVoxel& v : removed_)
+    middle += v.own_mm / static_cast<double>(std::max<std::size_t>(1, removed_.size()));
   double beyond = 0;
   std::vector<Vec3> samples;
   for (std::size_t n = 0; n + 1 < item.curve_mm.size(); ++n) {
     const Vec3 a = item.curve_mm[n], by = item.curve_mm[n + 1] - a;
     const int steps = std::max(1, static_cast<int>(std::ceil(length(by) / 0.25)));
-    for (int t = 0; t < steps + (n + 2 == item.curve_mm.size() ? 1 : 0); ++t) samples.push_back(a + by * (double(t) / steps));
+    for (int t = 0; t < steps + (n + 2 == item.curve_mm.size() ? 1 : 0); ++t)
+      samples.push_back(a + by * (double(t) / steps));
   }
   for (const Vec3 p : samples) {
     const double d = cell(p) == frame_.voxel_count() ? 1e9 : cavity_distance_mm(p);
@@ -257,9 +268,12 @@ void Product::margin(const ScaleItem& item, Vec3 approach, Result& r) const {
   r.measured = true;
   r.pass = r.value <= item.threshold && beyond <= item.most;
   r.margin = std::min(item.threshold - r.value, item.most - beyond) / item.spread;
-  const auto passes = [&](double short_mm, double beyond_mm) { return short_mm <= item.threshold && beyond_mm <= item.most; };
-  settle(r, passes(r.value + off_mm(), beyond) && passes(r.value, beyond + off_mm()), passes(r.value - off_mm(), beyond - off_mm()));
+  const auto passes = [&](double short_mm, double beyond_mm) {
+    return short_mm <= item.threshold && beyond_mm <= item.most;
+  };
+  settle(r, passes(r.value + off_mm(), beyond) && passes(r.value, beyond + off_mm()),
+         passes(r.value - off_mm(), beyond - off_mm()));
   r.word = joined(r.word, "beyond it by " + format_number(std::round(beyond * 10) / 10) + " mm");
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

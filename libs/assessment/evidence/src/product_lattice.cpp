@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "osteo/core/base/parallel.h"
-#include "osteo/geometry/grid/brick_linear.h"
 #include "osteo/geometry/distance/binary_distance.h"
+#include "osteo/geometry/grid/brick_linear.h"
 
 namespace osteo::inline assessment {
 
@@ -62,14 +62,16 @@ class Labeller {
   Labeller(const Frame& lattice, const StructureMap& structures, const std::vector<std::size_t>& number, std::size_t s,
            const CellBlock& within, std::vector<std::uint8_t>& label)
       : lattice_(lattice), structures_(structures), number_(number), s_(s), within_(within), label_(label) {
-    for (std::size_t e = 0; e < kEdges.size(); ++e) slack_mm_[e] = block_slack_mm(structures, lattice.spacing_mm.x, kEdges[e]);
+    for (std::size_t e = 0; e < kEdges.size(); ++e)
+      slack_mm_[e] = block_slack_mm(structures, lattice.spacing_mm.x, kEdges[e]);
   }
   static constexpr std::array<int, 2> kEdges{16, 4};
 
   void visit(std::array<int, 3> at, std::size_t level) const {
     const int edge = kEdges[level];
     const double middle = (edge - 1) / 2.0;
-    const double d = structures_.distance_mm(s_, lattice_.world_from_index({at[0] + middle, at[1] + middle, at[2] + middle}));
+    const double d =
+        structures_.distance_mm(s_, lattice_.world_from_index({at[0] + middle, at[1] + middle, at[2] + middle}));
     if (d > slack_mm_[level]) return;
     CellBlock block{at, {at[0] + edge, at[1] + edge, at[2] + edge}};
     block = common_block(block, within_);
@@ -89,7 +91,8 @@ class Labeller {
 
  private:
   [[nodiscard]] std::uint8_t& label(int i, int j, int k) const {
-    return label_[(static_cast<std::size_t>(k) * static_cast<std::size_t>(lattice_.dims[1]) + static_cast<std::size_t>(j)) *
+    return label_[(static_cast<std::size_t>(k) * static_cast<std::size_t>(lattice_.dims[1]) +
+                   static_cast<std::size_t>(j)) *
                       static_cast<std::size_t>(lattice_.dims[0]) +
                   static_cast<std::size_t>(i)];
   }
@@ -125,8 +128,8 @@ class Labeller {
 
 }  // namespace
 
-std::vector<std::uint8_t> label_cells(const Frame& lattice, const StructureMap& structures, const std::vector<CellBlock>& within,
-                                      const Context& context) {
+std::vector<std::uint8_t> label_cells(const Frame& lattice, const StructureMap& structures,
+                                      const std::vector<CellBlock>& within, const Context& context) {
   std::vector<std::uint8_t> label(lattice.voxel_count());
   std::vector<std::size_t> number(256);
   for (std::size_t s = 0; s < structures.values().size(); ++s) number[structures.values()[s]] = s;
@@ -139,13 +142,15 @@ std::vector<std::uint8_t> label_cells(const Frame& lattice, const StructureMap& 
     parallel_for(layers, 1, context.threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t l = begin; l < end; ++l)
         for (int j = b.lo[1]; j < b.hi[1]; j += kEdge)
-          for (int i = b.lo[0]; i < b.hi[0]; i += kEdge) labeller.visit({i, j, b.lo[2] + static_cast<int>(l) * kEdge}, 0);
+          for (int i = b.lo[0]; i < b.hi[0]; i += kEdge)
+            labeller.visit({i, j, b.lo[2] + static_cast<int>(l) * kEdge}, 0);
     });
   }
   return label;
 }
 
-CavityDistance::CavityDistance(const BitMask& cavity, const Frame& lattice, CellBlock part, const Context& context) : dims_(lattice.dims) {
+CavityDistance::CavityDistance(const BitMask& cavity, const Frame& lattice, CellBlock part, const Context& context)
+    : dims_(lattice.dims) {
   const CellBlock all{{0, 0, 0}, dims_}, there = block_of(cavity);
   if (there.empty()) return;
   part_ = block_around(common_block(part, all), there);
@@ -156,7 +161,8 @@ CavityDistance::CavityDistance(const BitMask& cavity, const Frame& lattice, Cell
   for (int k = part_.lo[2]; k < part_.hi[2]; ++k) {
     for (int j = part_.lo[1]; j < part_.hi[1]; ++j, at += static_cast<std::size_t>(f.dims[0])) {
       if (k < there.lo[2] || k >= there.hi[2] || j < there.lo[1] || j >= there.hi[1]) continue;
-      for (int i = there.lo[0]; i < there.hi[0]; ++i) mask[at + static_cast<std::size_t>(i - part_.lo[0])] = cavity.at(i, j, k) ? 1 : 0;
+      for (int i = there.lo[0]; i < there.hi[0]; ++i)
+        mask[at + static_cast<std::size_t>(i - part_.lo[0])] = cavity.at(i, j, k) ? 1 : 0;
     }
   }
   mm_ = squared_distance_mm2(mask, f, 1, context);
@@ -183,8 +189,8 @@ double CavityDistance::linear(Vec3 index) const {
   }
   float d[8];
   for (int c = 0; c < 8; ++c) {
-    const double corner =
-        at(std::min(lo[0] + (c & 1), dims_[0] - 1), std::min(lo[1] + (c >> 1 & 1), dims_[1] - 1), std::min(lo[2] + (c >> 2), dims_[2] - 1));
+    const double corner = at(std::min(lo[0] + (c & 1), dims_[0] - 1), std::min(lo[1] + (c >> 1 & 1), dims_[1] - 1),
+                             std::min(lo[2] + (c >> 2), dims_[2] - 1));
     if (corner >= kFarMm) return kFarMm;
     d[c] = static_cast<float>(corner);
   }
@@ -202,4 +208,4 @@ CellBlock Product::Lattice::near(std::uint8_t value, double mm) const {
   return b;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

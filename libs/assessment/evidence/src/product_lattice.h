@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "osteo/core/base/context.h"
-#include "osteo/simulation/bone/structure_map.h"
-#include "osteo/imaging/edit/bit_mask.h"
 #include "osteo/assessment/evidence/product.h"
+#include "osteo/core/base/context.h"
+#include "osteo/imaging/edit/bit_mask.h"
+#include "osteo/simulation/bone/structure_map.h"
 
 namespace osteo::inline assessment {
 
@@ -29,18 +29,19 @@ void each_cell(const CellBlock& b, F&& f) {
       for (int i = b.lo[0]; i < b.hi[0]; ++i) f(i, j, k);
 }
 
-/// How far a distance may be from that at the middle of a block of `edge` cubes, which is asked for in its stead: distances rise no faster
-/// than one goes, and between the points of their lattice they are off by half its diagonal at most, at either end of the way. mm.
+/// How far a distance may be from that at the middle of a block of `edge` cubes, which is asked for in its stead:
+/// distances rise no faster than one goes, and between the points of their lattice they are off by half its diagonal at
+/// most, at either end of the way. mm.
 [[nodiscard]] double block_slack_mm(const StructureMap& structures, double cell_mm, int edge);
 
-/// Inside which structure a cell of cubes lies, by the structure's value: the one it is deepest in, 0 for none. `within`: of each structure
-/// in the order of values(), a block around its face. Cells are asked one by one only in blocks that a face goes through: O(cells of the
-/// faces' neighbourhood), and a byte for each cell.
+/// Inside which structure a cell of cubes lies, by the structure's value: the one it is deepest in, 0 for none.
+/// `within`: of each structure in the order of values(), a block around its face. Cells are asked one by one only in
+/// blocks that a face goes through: O(cells of the faces' neighbourhood), and a byte for each cell.
 [[nodiscard]] std::vector<std::uint8_t> label_cells(const Frame& lattice, const StructureMap& structures,
                                                     const std::vector<CellBlock>& within, const Context& context);
 
-/// Distances to a cavity, from centre to centre, in a part of its lattice. In it they are those that a transform of all of the lattice
-/// gives; the part holds all of the cavity.
+/// Distances to a cavity, from centre to centre, in a part of its lattice. In it they are those that a transform of all
+/// of the lattice gives; the part holds all of the cavity.
 class CavityDistance {
  public:
   static constexpr double kFarMm = 1e8;  ///< outside the part
@@ -77,4 +78,4 @@ struct Product::Lattice {
   [[nodiscard]] CellBlock near(std::uint8_t value, double mm) const;
 };
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

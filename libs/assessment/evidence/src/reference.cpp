@@ -24,14 +24,16 @@ std::vector<ReferenceSession> load_reference(const std::filesystem::path& folder
       throw file.wrong(v, where + ": '" + s.session + "' is no session", "name folders beside reference.json");
     for (const ReferenceSession& o : sessions) {
       if (o.session == s.session) throw file.wrong(v, where + ": '" + s.session + "' is there twice");
-      if (o.subject == s.subject && o.group != s.group) throw file.wrong(v, where + ": subject '" + s.subject + "' is in both groups");
+      if (o.subject == s.subject && o.group != s.group)
+        throw file.wrong(v, where + ": subject '" + s.subject + "' is in both groups");
     }
     sessions.push_back(std::move(s));
   }
   return sessions;
 }
 
-RegionScore score_region(const RemovedSet& session, std::span<const RemovedSet> experts, std::span<const RemovedSet> novices) {
+RegionScore score_region(const RemovedSet& session, std::span<const RemovedSet> experts,
+                         std::span<const RemovedSet> novices) {
   struct Count {
     std::uint32_t experts = 0, novices = 0;
     bool here = false;
@@ -75,9 +77,9 @@ IsotonicQuantile::IsotonicQuantile(std::span<const Point> points, double q) {
 double IsotonicQuantile::at(double distance_mm) const {
   if (steps_.empty()) return 0;
   const double step = std::floor(distance_mm / kStepMm) * kStepMm;
-  const auto behind =
-      std::upper_bound(steps_.begin(), steps_.end(), step + kStepMm / 2, [](double d, const Point& p) { return d < p.distance_mm; });
+  const auto behind = std::upper_bound(steps_.begin(), steps_.end(), step + kStepMm / 2,
+                                       [](double d, const Point& p) { return d < p.distance_mm; });
   return behind == steps_.begin() ? steps_.front().value : (behind - 1)->value;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

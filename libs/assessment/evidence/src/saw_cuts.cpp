@@ -51,4 +51,4 @@ void SawCutMetric::finish(const World& /*world*/, std::vector<Measured>& values,
   }
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -6,8 +6,8 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/geometry/grid/brick_places.h"
+#include "osteo/simulation/bone/instrument.h"
 
 namespace osteo::inline assessment {
 
@@ -24,11 +24,13 @@ void ScoreKeeper::frame(const EvidenceFrame& f) {
       if (c.before < kSolid || c.density >= kSolid) continue;
       if (const PlacedBody* const b = f.world.owner(c.voxel)) {
         const BrickGrid& bone = b->body->bone;
-        removed_[c.voxel] = {place_of_voxel_mm(bone, c.voxel - b->body->name_of(0)), static_cast<float>(bone.frame().voxel_volume_mm3())};
+        removed_[c.voxel] = {place_of_voxel_mm(bone, c.voxel - b->body->name_of(0)),
+                             static_cast<float>(bone.frame().voxel_volume_mm3())};
       }
     }
   }
-  for (const TickRecord& t : f.ticks) axes_ += normalized(from_floats(t.device.axis)) * static_cast<double>(t.removed_mm3);
+  for (const TickRecord& t : f.ticks)
+    axes_ += normalized(from_floats(t.device.axis)) * static_cast<double>(t.removed_mm3);
 }
 
 void ScoreKeeper::finish(const World& end) {
@@ -58,7 +60,8 @@ std::size_t Score::judged() const {
   return static_cast<std::size_t>(std::count_if(items.begin(), items.end(), [](const auto& i) { return i.measured; }));
 }
 std::size_t Score::passed() const {
-  return static_cast<std::size_t>(std::count_if(items.begin(), items.end(), [](const auto& i) { return i.measured && i.pass; }));
+  return static_cast<std::size_t>(
+      std::count_if(items.begin(), items.end(), [](const auto& i) { return i.measured && i.pass; }));
 }
 
 namespace {
@@ -100,11 +103,14 @@ void check_procedure(const Procedure& p, const StructureMap* structures, std::ve
   }
   if (found == 0) {
     std::string there;
-    for (const std::uint8_t v : structures->values()) there += (there.empty() ? "'" : ", '") + structures->name_of(v) + "'";
-    throw Error(ExitCode::usage, "'" + p.file + "' is a procedure for another case: it has none of the structures " + missing,
+    for (const std::uint8_t v : structures->values())
+      there += (there.empty() ? "'" : ", '") + structures->name_of(v) + "'";
+    throw Error(ExitCode::usage,
+                "'" + p.file + "' is a procedure for another case: it has none of the structures " + missing,
                 "this case has " + there + "; structures belong to a procedure by their names");
   }
-  if (!missing.empty()) words.push_back("the case lacks " + missing + ": what the procedure asks of them is not judged");
+  if (!missing.empty())
+    words.push_back("the case lacks " + missing + ": what the procedure asks of them is not judged");
 }
 
 void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, const Reference* reference,
@@ -120,7 +126,8 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
   }
   const std::size_t left_out = reference->sessions.size() - experts.size() - novices.size();
   if (left_out > 0)
-    score.words.push_back(std::to_string(left_out) + " sessions of the reference are left out: of the same person, or the same session");
+    score.words.push_back(std::to_string(left_out) +
+                          " sessions of the reference are left out: of the same person, or the same session");
   const auto no = [&](MetricWhen what, const std::string& why, const std::string& of = {}) {
     not_measured_all(score.values, MetricPlace::reference, {what}, why, of);
   };
@@ -130,8 +137,9 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
   } else {
     const RegionScore r = score_region(mine, experts, novices);
     score.values.push_back(measured("region_log_ratio", r.log_ratio));
-    score.values.push_back(r.effective_voxels > 0 ? measured("region_per_voxel", r.per_voxel)
-                                                  : not_measured("region_per_voxel", "experts and novices took the same"));
+    score.values.push_back(r.effective_voxels > 0
+                               ? measured("region_per_voxel", r.per_voxel)
+                               : not_measured("region_per_voxel", "experts and novices took the same"));
     score.values.push_back(measured("region_voxels", r.effective_voxels));
     score.values.push_back(measured("region_thesis", r.thesis));
   }
@@ -168,7 +176,8 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
       if (static_cast<double>(s.force_n) <= limit) continue;
       ++harder;
       if (d <= kNearMm && s.t_s - last_told_s > 1) {
-        score.moments.push_back({s.t_s, s.at_mm, "pressed harder than experts do there", name, static_cast<double>(s.force_n), limit});
+        score.moments.push_back(
+            {s.t_s, s.at_mm, "pressed harder than experts do there", name, static_cast<double>(s.force_n), limit});
         last_told_s = s.t_s;
       }
     }
@@ -181,8 +190,8 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
   }
 }
 
-void judge(const World& begin, const World& end, const ScoreKeeper& keeper, const StructureMap* structures, const Procedure& procedure,
-           Score& score, const Context& context) {
+void judge(const World& begin, const World& end, const ScoreKeeper& keeper, const StructureMap* structures,
+           const Procedure& procedure, Score& score, const Context& context) {
   if (structures == nullptr) {
     for (const ScaleItem& item : procedure.items) {
       if (item.kind == ItemKind::pieces || item.kind == ItemKind::fixed) {
@@ -219,15 +228,17 @@ void judge(const World& begin, const World& end, const ScoreKeeper& keeper, cons
       score.values.push_back(not_measured("target_share", "there is no bone in it", r.region->name));
     }
   }
-  if (std::any_of(procedure.regions.begin(), procedure.regions.end(), [](const auto& r) { return r.kind == RegionKind::target; }))
+  if (std::any_of(procedure.regions.begin(), procedure.regions.end(),
+                  [](const auto& r) { return r.kind == RegionKind::target; }))
     score.values.push_back(measured("outside_target_mm3", product.outside_targets_mm3()));
   score.values.push_back(measured("cavity_mm3", product.cavity_mm3()));
 }
 
 }  // namespace
 
-Score score_session(const SessionReader& session, World begin, const StructureMap* structures, const Procedure* procedure,
-                    const Reference* reference, const std::string& subject, const Context& context, ScoreDetail* detail) {
+Score score_session(const SessionReader& session, World begin, const StructureMap* structures,
+                    const Procedure* procedure, const Reference* reference, const std::string& subject,
+                    const Context& context, ScoreDetail* detail) {
   Score score;
   if (procedure != nullptr) {
     score.procedure = procedure->name;
@@ -245,7 +256,8 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
       session, std::move(begin),
       [&](const EvidenceFrame& f) {
         keeper.frame(f);
-        undone += std::count_if(f.actions.begin(), f.actions.end(), [](const SceneAction& a) { return a.is(ActionKind::undo); });
+        undone += std::count_if(f.actions.begin(), f.actions.end(),
+                                [](const SceneAction& a) { return a.is(ActionKind::undo); });
         if (detail != nullptr && detail->frame) detail->frame(f);
       },
       context.sub(0, 0.8));
@@ -255,16 +267,21 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
   score.moments = keeper.moments();
   if (keeper.removed().empty()) score.words.push_back("nothing was removed");
   if (undone > 0)
-    score.words.push_back((undone == 1 ? "a step was taken back" : std::to_string(undone) + " steps were taken back") +
-                          std::string(": what was seen and the end product go by what is gone at the end; all else counts the work done"));
+    score.words.push_back(
+        (undone == 1 ? "a step was taken back" : std::to_string(undone) + " steps were taken back") +
+        std::string(
+            ": what was seen and the end product go by what is gone at the end; all else counts the work done"));
   const auto count = [](const World& w, bool of_region) {
-    return std::count_if(w.bodies().begin(), w.bodies().end(), [&](const PlacedBody& b) { return b.of_region == of_region; });
+    return std::count_if(w.bodies().begin(), w.bodies().end(),
+                         [&](const PlacedBody& b) { return b.of_region == of_region; });
   };
   if (count(first, false) > 1 || count(end, false) > 1)
     score.words.push_back("bone in pieces: the end product is measured with each where it lay at the beginning");
-  if (count(first, true) > 0) score.words.push_back("the case has a finer region: volumes and what was seen go by each voxel's own size");
+  if (count(first, true) > 0)
+    score.words.push_back("the case has a finer region: volumes and what was seen go by each voxel's own size");
   if (!keeper.removed().empty() && no_bone(end)) score.words.push_back("no bone is left");
-  if (structures == nullptr && procedure == nullptr) score.words.push_back("the case has no structures: nothing is known of what was near");
+  if (structures == nullptr && procedure == nullptr)
+    score.words.push_back("the case has no structures: nothing is known of what was near");
   for (const Moment& m : score.moments) {
     if (m.what == "touched from the first tick on")
       score.words.push_back("'" + m.structure + "' was touched from the first tick on: the tool began inside it");
@@ -289,7 +306,8 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
   }
   score.seconds_product = now_s() - t;
   by_reference(keeper, structures, reference, subject, score);
-  std::stable_sort(score.moments.begin(), score.moments.end(), [](const Moment& a, const Moment& b) { return a.t_s < b.t_s; });
+  std::stable_sort(score.moments.begin(), score.moments.end(),
+                   [](const Moment& a, const Moment& b) { return a.t_s < b.t_s; });
   for (const auto& v : keeper.visibility().voxels()) {
     if (v.second.seen == VisibilityMetric::Seen::hidden) score.hidden.emplace_back(v.first, v.second);
   }
@@ -304,8 +322,8 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
   return score;
 }
 
-Reference::One read_reference(const SessionReader& session, World begin, const StructureMap* structures, const ReferenceSession& which,
-                              const Context& context) {
+Reference::One read_reference(const SessionReader& session, World begin, const StructureMap* structures,
+                              const ReferenceSession& which, const Context& context) {
   Reference::One one{which.subject, which.group, {}, {}};
   ScoreKeeper keeper({session.header().rate_hz, structures, nullptr});
   const World end = tell_frames(
@@ -316,4 +334,4 @@ Reference::One read_reference(const SessionReader& session, World begin, const S
   return one;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

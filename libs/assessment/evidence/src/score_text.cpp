@@ -41,11 +41,14 @@ std::string csv_text(const std::string& s) {
 }  // namespace
 
 Json score_json(const Score& score, bool evidence) {
-  Json j{{"osteotome_score", 1}, {"procedure", score.procedure.empty() ? Json() : Json(score.procedure)}, {"words", score.words}};
+  Json j{{"osteotome_score", 1},
+         {"procedure", score.procedure.empty() ? Json() : Json(score.procedure)},
+         {"words", score.words}};
   j["metrics"] = Json::list();
   for (const Measured& m : score.values) {
-    Json v{{"name", m.row->name}, {"of", m.of.empty() ? Json() : Json(m.of)}, {"value", m.value ? Json(*m.value) : Json()},
-           {"unit", m.row->unit}, {"better", name_of(m.row->better)},         {"source", m.row->source}};
+    Json v{
+        {"name", m.row->name}, {"of", m.of.empty() ? Json() : Json(m.of)}, {"value", m.value ? Json(*m.value) : Json()},
+        {"unit", m.row->unit}, {"better", name_of(m.row->better)},         {"source", m.row->source}};
     if (!m.word.empty()) v["word"] = m.word;
     j["metrics"].push_back(std::move(v));
   }
@@ -54,8 +57,9 @@ Json score_json(const Score& score, bool evidence) {
     j["items_judged"] = score.judged();
     j["items"] = Json::list();
     for (const Product::Result& r : score.items) {
-      Json i{
-          {"name", r.item->name}, {"kind", kind_of(*r.item)}, {"structure", r.item->structure.empty() ? Json() : Json(r.item->structure)}};
+      Json i{{"name", r.item->name},
+             {"kind", kind_of(*r.item)},
+             {"structure", r.item->structure.empty() ? Json() : Json(r.item->structure)}};
       i["value"] = r.measured ? Json(r.value) : Json();
       i["threshold"] = r.threshold;
       i["unit"] = r.unit;
@@ -88,7 +92,8 @@ Json score_json(const Score& score, bool evidence) {
   }
   if (evidence) {
     j["hidden"] = Json::list();
-    for (const auto& [name, v] : score.hidden) j["hidden"].push_back({{"voxel", name}, {"at_mm", place(v.own_mm)}, {"tick", v.tick}});
+    for (const auto& [name, v] : score.hidden)
+      j["hidden"].push_back({{"voxel", name}, {"at_mm", place(v.own_mm)}, {"tick", v.tick}});
   }
   return j;
 }
@@ -115,16 +120,18 @@ std::string score_lines(const Score& score) {
     out += padded(m.name(), 44) + " " + (m.value ? short_number(*m.value) + unit : "- (" + m.word + ")") + "\n";
   }
   if (!score.procedure.empty()) {
-    out += score.procedure + ": " + std::to_string(score.passed()) + " of " + std::to_string(score.judged()) + " items passed";
-    if (score.judged() < score.items.size()) out += ", " + std::to_string(score.items.size() - score.judged()) + " not judged";
+    out += score.procedure + ": " + std::to_string(score.passed()) + " of " + std::to_string(score.judged()) +
+           " items passed";
+    if (score.judged() < score.items.size())
+      out += ", " + std::to_string(score.items.size() - score.judged()) + " not judged";
     out += "\n";
   }
   for (const Product::Result& r : score.items) {
     const std::string unit = r.unit == "1" || r.unit.empty() ? "" : " " + r.unit;
     out += padded(std::string(!r.measured ? "  ?    " : r.pass ? "  pass " : "  fail ") + r.item->name, 44) + " ";
     if (r.measured) {
-      out += short_number(r.value) + unit + " (" + kind_of(*r.item) + ", threshold " + short_number(r.threshold) + ", margin " +
-             short_number(r.margin) + ")";
+      out += short_number(r.value) + unit + " (" + kind_of(*r.item) + ", threshold " + short_number(r.threshold) +
+             ", margin " + short_number(r.margin) + ")";
       if (!r.word.empty()) out += "; " + r.word;
     } else {
       out += "not judged: " + r.word;
@@ -144,4 +151,4 @@ std::string metric_table_markdown() {
   return out;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

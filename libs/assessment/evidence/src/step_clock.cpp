@@ -20,7 +20,8 @@ StepClock::StepClock(const StructureMap& structures, const Procedure& procedure,
       }
     }
   }
-  const auto first = std::find_if(has_.begin(), has_.end(), [](const auto& has) { return std::count(has.begin(), has.end(), 1) > 0; });
+  const auto first =
+      std::find_if(has_.begin(), has_.end(), [](const auto& has) { return std::count(has.begin(), has.end(), 1) > 0; });
   now_ = first == has_.end() ? 0 : static_cast<std::size_t>(first - has_.begin());
 }
 
@@ -67,9 +68,10 @@ void StepClock::finish(std::vector<Measured>& values) const {
     } else if (std::count(has_[n].begin(), has_[n].end(), 1) == 0) {
       values.push_back(not_measured("step_s", "its items are about no structure of the case", name));
     } else {
-      values.push_back(measured("step_s", static_cast<double>(ticks_[n] + (n == now_ ? last_ - begun_ : 0)) / rate_hz_, name));
+      values.push_back(
+          measured("step_s", static_cast<double>(ticks_[n] + (n == now_ ? last_ - begun_ : 0)) / rate_hz_, name));
     }
   }
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

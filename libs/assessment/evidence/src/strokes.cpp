@@ -36,7 +36,8 @@ void StrokeFinder::end_period() {
       turn[i] = degrees(before(i), behind(i));
       continue;
     }
-    // Who slows down, rests and goes back turns too: in the middle of the rest, from the way before it to the way behind.
+    // Who slows down, rests and goes back turns too: in the middle of the rest, from the way before it to the way
+    // behind.
     const std::size_t from = i;
     while (i + 1 + kReach < n && still(i + 1)) ++i;
     if (from > kReach && i + 1 + kReach < n) turn[(from + i) / 2] = degrees(before(from - 1), behind(i + 1));
@@ -77,7 +78,8 @@ void StrokeFinder::measure(std::size_t first) {
     std::vector<double> values;
     for (const Sample& s : period_) values.push_back(s.at_mm[a]);
     // Where the burr left the bone for less than a pause, straight on.
-    const std::vector<double> even = statistics::low_pass(statistics::resample(times_s, values, kRateHz), kRateHz, kSmoothHz);
+    const std::vector<double> even =
+        statistics::low_pass(statistics::resample(times_s, values, kRateHz), kRateHz, kSmoothHz);
     places.resize(even.size());
     for (std::size_t i = 0; i < even.size(); ++i) places[i][a] = even[i];
   }
@@ -111,14 +113,16 @@ double stroke_variance(const std::vector<Stroke>& strokes) {
     }
     // The largest eigenvalue of a symmetric matrix, in closed form.
     const double q = (m[0][0] + m[1][1] + m[2][2]) / 3, off = m[0][1] * m[0][1] + m[0][2] * m[0][2] + m[1][2] * m[1][2];
-    const double p2 = (m[0][0] - q) * (m[0][0] - q) + (m[1][1] - q) * (m[1][1] - q) + (m[2][2] - q) * (m[2][2] - q) + 2 * off;
+    const double p2 =
+        (m[0][0] - q) * (m[0][0] - q) + (m[1][1] - q) * (m[1][1] - q) + (m[2][2] - q) * (m[2][2] - q) + 2 * off;
     const double p = std::sqrt(p2 / 6);
     double largest = q;
     if (p > 1e-12) {
       auto b = m;
       for (std::size_t a = 0; a < 3; ++a)
         for (std::size_t c = 0; c < 3; ++c) b[a][c] = (m[a][c] - (a == c ? q : 0)) / p;
-      const double det = b[0][0] * (b[1][1] * b[2][2] - b[1][2] * b[2][1]) - b[0][1] * (b[1][0] * b[2][2] - b[1][2] * b[2][0]) +
+      const double det = b[0][0] * (b[1][1] * b[2][2] - b[1][2] * b[2][1]) -
+                         b[0][1] * (b[1][0] * b[2][2] - b[1][2] * b[2][0]) +
                          b[0][2] * (b[1][0] * b[2][1] - b[1][1] * b[2][0]);
       largest = q + 2 * p * std::cos(std::acos(std::clamp(det / 2, -1.0, 1.0)) / 3);
     }
@@ -127,4 +131,4 @@ double stroke_variance(const std::vector<Stroke>& strokes) {
   return sum / static_cast<double>(strokes.size() - kWindow + 1);
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/assessment/evidence/frames.h"
 #include "osteo/assessment/evidence/process.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/haptics/saw_slot.h"
 
 namespace osteo::inline assessment {
@@ -116,7 +116,9 @@ void TimelineKeeper::near(const EvidenceFrame& f, const TickRecord& t, std::size
 
 void TimelineKeeper::act(const SceneAction& a, double rate_hz) {
   const double t_s = second_of(a.tick, rate_hz);
-  const auto placed = [&](EventKind kind, std::string what, Vec3 at) { add({kind, t_s, t_s, std::move(what), {}, true, at}); };
+  const auto placed = [&](EventKind kind, std::string what, Vec3 at) {
+    add({kind, t_s, t_s, std::move(what), {}, true, at});
+  };
   if (a.is(ActionKind::undo)) {
     add({EventKind::undo, t_s, t_s, "a step was taken back", {}, false, {}});
   } else if (a.is(ActionKind::saw)) {
@@ -130,14 +132,16 @@ void TimelineKeeper::act(const SceneAction& a, double rate_hz) {
   } else if (a.is(ActionKind::open) || a.is(ActionKind::move)) {
     // They come many times a second while something is wound or pulled: one event for as long as that goes on.
     const bool move = a.is(ActionKind::move);
-    const std::string what = move ? "piece " + std::to_string(a.body) + " was moved"
-                                  : "a distractor was opened to " + format_number(std::round(a.values[0] * 100) / 100) + " mm";
+    const std::string what =
+        move ? "piece " + std::to_string(a.body) + " was moved"
+             : "a distractor was opened to " + format_number(std::round(a.values[0] * 100) / 100) + " mm";
     const auto last = last_slow_.find({a.kind, move ? a.body : a.item});
     if (last != last_slow_.end() && last->second < line_.events.size() && t_s - line_.events[last->second].end_s < 1) {
       line_.events[last->second].end_s = t_s;
       line_.events[last->second].what = what;
     } else {
-      last_slow_[{a.kind, move ? a.body : a.item}] = add({move ? EventKind::move : EventKind::plate, t_s, t_s, what, {}, false, {}});
+      last_slow_[{a.kind, move ? a.body : a.item}] =
+          add({move ? EventKind::move : EventKind::plate, t_s, t_s, what, {}, false, {}});
     }
   }
 }
@@ -213,7 +217,9 @@ void TimelineKeeper::note(const Note& n) {
     e.what = v ? "measured " + format_number(std::round(*v * 10) / 10) + " mm" : "a measurement";
     place("from_mm");
   } else if (n.kind == "message") {
-    e.what = text != nullptr && text->text() != nullptr ? *text->text() : j && j->text() != nullptr ? *j->text() : "a message";
+    e.what = text != nullptr && text->text() != nullptr ? *text->text()
+             : j && j->text() != nullptr                ? *j->text()
+                                                        : "a message";
   } else {
     return;
   }
@@ -243,7 +249,8 @@ Timeline TimelineKeeper::timeline(const std::map<VoxelKey, VisibilityMetric::Vox
      : v.seen == VisibilityMetric::Seen::hidden ? line.hidden_mm3
                                                 : line.unknown_mm3)[n] += v.mm3;
   }
-  std::stable_sort(line.events.begin(), line.events.end(), [](const TimelineEvent& a, const TimelineEvent& b) { return a.t_s < b.t_s; });
+  std::stable_sort(line.events.begin(), line.events.end(),
+                   [](const TimelineEvent& a, const TimelineEvent& b) { return a.t_s < b.t_s; });
   return line;
 }
 
@@ -255,8 +262,8 @@ void tell_notes(const SessionReader& session, TimelineKeeper& keeper) {
   for (const Gap& g : session.outline().gaps) keeper.gap(g);
 }
 
-Timeline read_timeline(const SessionReader& session, World begin, const StructureMap* structures, const Procedure* procedure,
-                       const Context& context) {
+Timeline read_timeline(const SessionReader& session, World begin, const StructureMap* structures,
+                       const Procedure* procedure, const Context& context) {
   const EvidenceScene scene{session.header().rate_hz, structures, procedure};
   TimelineKeeper keeper(scene);
   VisibilityMetric visibility(scene);
@@ -313,4 +320,4 @@ Json timeline_json(const Timeline& line) {
   return j;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

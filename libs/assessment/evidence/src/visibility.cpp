@@ -4,14 +4,15 @@
 #include <cmath>
 #include <limits>
 
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/assessment/evidence/hand_motion.h"
 #include "osteo/geometry/grid/brick_places.h"
+#include "osteo/simulation/bone/instrument.h"
 
 namespace osteo::inline assessment {
 namespace {
 
-// Walks the cells of a lattice that a segment passes through, in index coordinates where cell n spans [n - 0.5, n + 0.5].
+// Walks the cells of a lattice that a segment passes through, in index coordinates where cell n spans [n - 0.5, n +
+// 0.5].
 class Walk {
  public:
   Walk(Vec3 from, Vec3 to, double cell) {
@@ -58,7 +59,8 @@ bool hits(const PlacedBody& placed, Vec3 from_mm, Vec3 to_mm, const BoneSight::L
   const BrickGrid& bone = placed.body->bone;
   if (bone.brick_count() == 0) return false;
   const RigidTransform back = placed.world_from_body.inverse();
-  const Vec3 whole_from = bone.frame().index_from_world(back(from_mm)), whole_to = bone.frame().index_from_world(back(to_mm));
+  const Vec3 whole_from = bone.frame().index_from_world(back(from_mm)),
+             whole_to = bone.frame().index_from_world(back(to_mm));
   const auto& dims = bone.frame().dims;
   const auto up = [](int n) { return (n + 7) / 8 * 8 + 8 - 0.5; };
   const auto [t0, t1] = within(whole_from, whole_to, {-0.5, -0.5, -0.5}, {up(dims[0]), up(dims[1]), up(dims[2])});
@@ -153,7 +155,8 @@ void VisibilityMetric::frame(const EvidenceFrame& f) {
       const Frame& frame = body.body->bone.frame();
       const Vec3 p = body.world_from_body(place_of_voxel_mm(body.body->bone, own));
       const double diagonal = length(frame.spacing_mm);
-      at->second = std::any_of(heads.begin(), heads.end(), [&](const Head& h) { return distance_mm(h, p) <= diagonal; });
+      at->second =
+          std::any_of(heads.begin(), heads.end(), [&](const Head& h) { return distance_mm(h, p) <= diagonal; });
     }
     return at->second;
   };
@@ -162,8 +165,10 @@ void VisibilityMetric::frame(const EvidenceFrame& f) {
     if (b == nullptr) continue;
     const VoxelKey own = name - b->body->name_of(0);
     const Vec3 own_mm = place_of_voxel_mm(b->body->bone, own);
-    Voxel v{Seen::unknown, f.ticks.empty() ? 0 : f.ticks.back().tick, own_mm, static_cast<float>(b->body->bone.frame().voxel_volume_mm3())};
-    if (f.camera != nullptr) v.seen = sight.blocked(b->world_from_body(own_mm), f.camera->eye_mm, touched) ? Seen::hidden : Seen::seen;
+    Voxel v{Seen::unknown, f.ticks.empty() ? 0 : f.ticks.back().tick, own_mm,
+            static_cast<float>(b->body->bone.frame().voxel_volume_mm3())};
+    if (f.camera != nullptr)
+      v.seen = sight.blocked(b->world_from_body(own_mm), f.camera->eye_mm, touched) ? Seen::hidden : Seen::seen;
     voxels_[name] = v;
   }
 }
@@ -202,7 +207,8 @@ void VisibilityMetric::finish(const World& world, std::vector<Measured>& values,
   for (const auto& v : voxels_) {
     if (v.second.seen == Seen::hidden) in_time.push_back(&v);
   }
-  std::stable_sort(in_time.begin(), in_time.end(), [](const auto* a, const auto* b) { return a->second.tick < b->second.tick; });
+  std::stable_sort(in_time.begin(), in_time.end(),
+                   [](const auto* a, const auto* b) { return a->second.tick < b->second.tick; });
   for (const auto* const v : in_time) {
     const StructureMap::Answer a = scene_.structures->at(v->second.own_mm);
     if (a.structure == 0 || a.distance_mm > kNearMm) continue;
@@ -214,4 +220,4 @@ void VisibilityMetric::finish(const World& world, std::vector<Measured>& values,
   }
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

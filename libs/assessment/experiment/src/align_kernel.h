@@ -3,8 +3,9 @@
 
 namespace osteo::inline assessment::experiment {
 
-/// Places first to last of the target. `f`, `fs`, `fw` by target; `g`, `gs`, `gw` shifted so that the same index is the partner's.
-/// `before`: costs of the anti-diagonal before, `both`: of the one before that, by target. Weights null: all 1.
+/// Places first to last of the target. `f`, `fs`, `fw` by target; `g`, `gs`, `gw` shifted so that the same index is the
+/// partner's. `before`: costs of the anti-diagonal before, `both`: of the one before that, by target. Weights null:
+/// all 1.
 struct Diagonal {
   long first, last;
   const double *f, *fs, *fw, *g, *gs, *gw, *before, *both;
@@ -23,4 +24,4 @@ inline double place_cost(double f, double fs, double g, double gs, double force,
   return force * (df < 0 ? -df : df) + slope * (ds < 0 ? -ds : ds);
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

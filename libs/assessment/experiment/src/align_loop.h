@@ -36,4 +36,4 @@ void run_any(const Diagonal& d) {
 }
 
 }  // namespace
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

@@ -20,12 +20,15 @@ DiagonalFunction diagonal_function() {
 }
 
 void need_curve(const Curve& c, const char* called) {
-  const auto refuse = [&](const std::string& what) { throw Error(ExitCode::usage, "the " + std::string(called) + " curve " + what); };
+  const auto refuse = [&](const std::string& what) {
+    throw Error(ExitCode::usage, "the " + std::string(called) + " curve " + what);
+  };
   if (c.force_n.empty()) refuse("has no samples");
   if (c.slope_n_per_s.size() != c.force_n.size() || (!c.weight.empty() && c.weight.size() != c.force_n.size()))
     refuse("has not as many slopes or weights as forces");
   for (std::size_t i = 0; i < c.force_n.size(); ++i) {
-    if (!std::isfinite(c.force_n[i]) || !std::isfinite(c.slope_n_per_s[i])) refuse("is not a number at sample " + std::to_string(i));
+    if (!std::isfinite(c.force_n[i]) || !std::isfinite(c.slope_n_per_s[i]))
+      refuse("is not a number at sample " + std::to_string(i));
     if (!c.weight.empty() && !(c.weight[i] >= 0 && std::isfinite(c.weight[i])))
       refuse("has a weight below 0 at sample " + std::to_string(i));
   }
@@ -39,7 +42,8 @@ void need_costs(const AlignCosts& c) {
 
 void need_room(std::size_t n, std::size_t m) {
   if (n > (std::size_t{1} << 28) / m)
-    throw Error(ExitCode::usage, "curves of " + std::to_string(n) + " and " + std::to_string(m) + " samples are too long to align",
+    throw Error(ExitCode::usage,
+                "curves of " + std::to_string(n) + " and " + std::to_string(m) + " samples are too long to align",
                 "resample them");
 }
 
@@ -75,13 +79,15 @@ const Alignment& Aligner::align(const Curve& target, const Curve& applied) {
   const long whole = std::max(n_, m_) - 1, least_low = std::min(0L, m_ - n_), least_high = std::max(0L, m_ - n_);
   const auto low = [&](long half) { return std::max(-(n_ - 1), least_low - half); };
   const auto high = [&](long half) { return std::min(m_ - 1, least_high + half); };
-  long half = std::min(whole, std::max(2L, static_cast<long>(std::lround(std::min(1.0, first_band_) * static_cast<double>(whole)))));
+  long half = std::min(
+      whole, std::max(2L, static_cast<long>(std::lround(std::min(1.0, first_band_) * static_cast<double>(whole)))));
   result_.places = 0;
   result_.cost_n = fill(low(half), high(half));
   if (half < whole) {
-    // Who leaves a band of half width w stands still |difference of lengths| + 2 (w + 1) times. Sums in another order differ in their last
-    // bits: the certificate does not live off those.
-    const double spare = result_.cost_n * (1 + 1e-12) - least_cost() - static_cast<double>(std::abs(m_ - n_)) * costs_.distortion_n;
+    // Who leaves a band of half width w stands still |difference of lengths| + 2 (w + 1) times. Sums in another order
+    // differ in their last bits: the certificate does not live off those.
+    const double spare =
+        result_.cost_n * (1 + 1e-12) - least_cost() - static_cast<double>(std::abs(m_ - n_)) * costs_.distortion_n;
     const auto certain = [&](long w) { return spare < 2 * static_cast<double>(w + 1) * costs_.distortion_n; };
     if (!certain(half)) {
       const double wide = costs_.distortion_n > 0 ? std::floor(spare / (2 * costs_.distortion_n)) : kFar;
@@ -102,7 +108,8 @@ double Aligner::least_cost() const {
   const double weight = weighted_ ? *std::min_element(gw_.begin(), gw_.end()) : 1;
   double sum = 0;
   for (std::size_t i = 0; i < f_.size(); ++i)
-    sum += (weighted_ ? fw_[i] * weight : 1) * (costs_.force * gap(f_[i], *lo, *hi) + costs_.slope_s * gap(fs_[i], *slow, *shigh));
+    sum += (weighted_ ? fw_[i] * weight : 1) *
+           (costs_.force * gap(f_[i], *lo, *hi) + costs_.slope_s * gap(fs_[i], *slow, *shigh));
   return sum * (1 - 1e-12);
 }
 
@@ -123,7 +130,8 @@ double Aligner::fill(long lowest, long highest) {
   if (cost_.size() < size) cost_.resize(size);
   std::fill_n(cost_.begin(), 4, kFar);
   const auto place = [&](long d) {
-    return cost_.data() + (static_cast<std::ptrdiff_t>(row_[static_cast<std::size_t>(d + 2)]) - static_cast<std::ptrdiff_t>(n_));
+    return cost_.data() +
+           (static_cast<std::ptrdiff_t>(row_[static_cast<std::size_t>(d + 2)]) - static_cast<std::ptrdiff_t>(n_));
   };
   Diagonal d{};
   d.force = costs_.force;
@@ -156,7 +164,8 @@ double Aligner::fill(long lowest, long highest) {
 void Aligner::trace(long lowest, long highest) {
   const auto value = [&](long i, long j) {
     if (i < 0 || j < 0 || j - i < lowest || j - i > highest) return kFar;
-    return cost_[row_[static_cast<std::size_t>(i + j) + 2] - static_cast<std::size_t>(n_) + static_cast<std::size_t>(i)];
+    return cost_[row_[static_cast<std::size_t>(i + j) + 2] - static_cast<std::size_t>(n_) +
+                 static_cast<std::size_t>(i)];
   };
   result_.path.clear();
   result_.path.reserve(static_cast<std::size_t>(n_ + m_));
@@ -188,9 +197,10 @@ Alignment align_plainly(const Curve& target, const Curve& applied, const AlignCo
   const auto value = [&](std::size_t i, std::size_t j) { return cost[i * m + j]; };
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < m; ++j) {
-      double own =
-          place_cost(target.force_n[i], target.slope_n_per_s[i], applied.force_n[j], applied.slope_n_per_s[j], costs.force, costs.slope_s);
-      if (weighted) own *= (target.weight.empty() ? 1 : target.weight[i]) * (applied.weight.empty() ? 1 : applied.weight[j]);
+      double own = place_cost(target.force_n[i], target.slope_n_per_s[i], applied.force_n[j], applied.slope_n_per_s[j],
+                              costs.force, costs.slope_s);
+      if (weighted)
+        own *= (target.weight.empty() ? 1 : target.weight[i]) * (applied.weight.empty() ? 1 : applied.weight[j]);
       double before = i + j == 0 ? 0 : kFar;
       if (i > 0) before = std::min(before, value(i - 1, j) + costs.distortion_n);
       if (j > 0) before = std::min(before, value(i, j - 1) + costs.distortion_n);
@@ -230,4 +240,4 @@ std::vector<double> slopes(std::span<const double> force_n, double rate_hz) {
   return s;
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

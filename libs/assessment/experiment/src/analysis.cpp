@@ -25,7 +25,8 @@ std::string p_text(double p) {
   return !std::isfinite(p) ? "-" : p < 0.0001 ? "< 0.0001" : text(p, 2);
 }
 std::string with(const Estimate& e) {
-  return std::isfinite(e.interval.lo) ? text(e.value) + " (" + text(e.interval.lo) + " to " + text(e.interval.hi) + ")" : text(e.value);
+  return std::isfinite(e.interval.lo) ? text(e.value) + " (" + text(e.interval.lo) + " to " + text(e.interval.hi) + ")"
+                                      : text(e.value);
 }
 Json json_of(const Estimate& e) {
   return Json{{"value", e.value}, {"interval", Json{e.interval.lo, e.interval.hi}}};
@@ -86,8 +87,9 @@ class Analyst {
     people_ = people_of(data_, data_.trials, data_.protocol.trials, [](const TrialScore& t) { return t.recall.score; });
     opening();
     if (people_.codes.size() < kPeopleNeeded) {
-      refuse("Comparison of trainings", std::to_string(people_.codes.size()) + " people have done all of their trials; " +
-                                            std::to_string(kPeopleNeeded) + " are needed.");
+      refuse("Comparison of trainings", std::to_string(people_.codes.size()) +
+                                            " people have done all of their trials; " + std::to_string(kPeopleNeeded) +
+                                            " are needed.");
     } else {
       compare();
       table_one();
@@ -111,7 +113,8 @@ class Analyst {
 
   void opening() {
     if (data_.protocol.simulated)
-      add(sheet::Band{"SIMULATED", "Participants are programs of known memory and noise. Nothing here is about people.", Tone::caution});
+      add(sheet::Band{"SIMULATED", "Participants are programs of known memory and noise. Nothing here is about people.",
+                      Tone::caution});
     std::size_t by_hand = 0;
     double saturated = 0, lag = 0, off = 0;
     for (const TrialScore& t : data_.trials) {
@@ -122,12 +125,14 @@ class Analyst {
     }
     const double n = std::max<double>(1, static_cast<double>(data_.trials.size()));
     if (by_hand > 0)
-      say(std::to_string(by_hand) + " trials were done by mouse or keys: their force was set, not pressed, and nothing was felt.",
+      say(std::to_string(by_hand) +
+              " trials were done by mouse or keys: their force was set, not pressed, and nothing was felt.",
           Tone::caution);
-    add(sheet::Facts{{{"participants with all trials",
-                       std::to_string(people_.codes.size()) + " of " + std::to_string(data_.protocol.participants.size())},
+    add(sheet::Facts{{{"participants with all trials", std::to_string(people_.codes.size()) + " of " +
+                                                           std::to_string(data_.protocol.participants.size())},
                       {"trials", std::to_string(data_.trials.size())},
-                      {"each", std::to_string(data_.protocol.trials) + " in blocks of " + std::to_string(data_.protocol.repetitions)},
+                      {"each", std::to_string(data_.protocol.trials) + " in blocks of " +
+                                   std::to_string(data_.protocol.repetitions)},
                       {"seed", std::to_string(data_.protocol.seed)},
                       {"samples kept out as saturated", text(100 * saturated / n) + " %"},
                       {"hand behind the path, mean", text(lag / n) + " mm"},
@@ -151,13 +156,17 @@ class Analyst {
     Json levels = Json::list();
     for (std::size_t t = 0; t < kTrainings; ++t) {
       const Interval i = mean_interval(people_.means[t], level_);
-      means.rows.push_back({{short_name(kTrainingOrder[t])}, {text(mean(people_.means[t]))}, {text(i.lo) + " to " + text(i.hi)}});
-      levels.push_back({{"training", short_name(kTrainingOrder[t])}, {"mean", mean(people_.means[t])}, {"interval", Json{i.lo, i.hi}}});
+      means.rows.push_back(
+          {{short_name(kTrainingOrder[t])}, {text(mean(people_.means[t]))}, {text(i.lo) + " to " + text(i.hi)}});
+      levels.push_back({{"training", short_name(kTrainingOrder[t])},
+                        {"mean", mean(people_.means[t])},
+                        {"interval", Json{i.lo, i.hi}}});
     }
-    row.columns.push_back({{std::move(means)},
-                           {sheet::Paragraph{"Score: 0 is a perfect recall, 1 no force at all. One value a person and training. "
-                                             "The dissertation's figure 28 has relative units and intervals over pooled trials.",
-                                             Tone::quiet}}});
+    row.columns.push_back(
+        {{std::move(means)},
+         {sheet::Paragraph{"Score: 0 is a perfect recall, 1 no force at all. One value a person and training. "
+                           "The dissertation's figure 28 has relative units and intervals over pooled trials.",
+                           Tone::quiet}}});
     add(std::move(row));
     json_["means"] = levels;
 
@@ -194,8 +203,11 @@ class Analyst {
                                    {"p_hf", a.p_hf},
                                    {"partial_eta2", a.partial_eta2},
                                    {"generalised_eta2", a.generalised_eta2}};
-    json_["pooled_anova_as_printed"] = Json{
-        {"valid", false}, {"f", pooled.f}, {"df", Json{pooled.df_groups, pooled.df_error}}, {"p", pooled.p}, {"printed_p_below", 0.001}};
+    json_["pooled_anova_as_printed"] = Json{{"valid", false},
+                                            {"f", pooled.f},
+                                            {"df", Json{pooled.df_groups, pooled.df_error}},
+                                            {"p", pooled.p},
+                                            {"printed_p_below", 0.001}};
 
     std::vector<double> p;
     std::vector<Paired> pairs;
@@ -211,19 +223,20 @@ class Analyst {
           condition.push_back(c);
         }
       }
-      exact.push_back(
-          permutation_within_people(values, person, condition, {200000, 20000, static_cast<std::uint64_t>(data_.protocol.seed)}));
+      exact.push_back(permutation_within_people(values, person, condition,
+                                                {200000, 20000, static_cast<std::uint64_t>(data_.protocol.seed)}));
       p.push_back(exact.back().p);
     }
     const std::vector<double> adjusted = holm(p);
-    sheet::Table table{{"pair", "difference", "paired t: p", "sign flips: p", "Holm", "dz", "g (av)", "power", "printed"},
-                       {},
-                       {1.1, 2.4, 1.1, 1.1, 1.1, 2.2, 2.2, 0.9, 1.4}};
+    sheet::Table table{
+        {"pair", "difference", "paired t: p", "sign flips: p", "Holm", "dz", "g (av)", "power", "printed"},
+        {},
+        {1.1, 2.4, 1.1, 1.1, 1.1, 2.2, 2.2, 0.9, 1.4}};
     static constexpr std::array<const char*, 3> kPrinted{"one-tailed 0.002", "one-tailed 0.01", "-"};
     Json rows = Json::list();
     for (std::size_t k = 0; k < kPairs.size(); ++k) {
-      const std::string name =
-          std::string(short_name(kTrainingOrder[kPairs[k].first])) + " - " + short_name(kTrainingOrder[kPairs[k].second]);
+      const std::string name = std::string(short_name(kTrainingOrder[kPairs[k].first])) + " - " +
+                               short_name(kTrainingOrder[kPairs[k].second]);
       const Paired& d = pairs[k];
       const double power = std::isfinite(d.dz.value) ? power_paired(people_.codes.size(), d.dz.value) : kUndefined;
       table.rows.push_back({{name},
@@ -250,10 +263,14 @@ class Analyst {
     }
     json_["pairs"] = rows;
     add(std::move(table));
-    say("One value a person: the mean of that person's trials of a training. Sign flips: exact, of people's means. Holm: of those, for the "
-        "three pairs together. Power: to find an effect as large as this one again, which is no evidence of its own. With " +
-            std::to_string(people_.codes.size()) + " people a paired test finds dz of " + text(detectable_dz(people_.codes.size())) +
-            " or more in four of five experiments; no sign flips could give a p below " + text(exact[0].smallest_p, 2) + ".",
+    say("One value a person: the mean of that person's trials of a training. Sign flips: exact, of people's means. "
+        "Holm: of those, for the "
+        "three pairs together. Power: to find an effect as large as this one again, which is no evidence of its own. "
+        "With " +
+            std::to_string(people_.codes.size()) + " people a paired test finds dz of " +
+            text(detectable_dz(people_.codes.size())) +
+            " or more in four of five experiments; no sign flips could give a p below " + text(exact[0].smallest_p, 2) +
+            ".",
         Tone::quiet);
     json_["detectable_dz"] = detectable_dz(people_.codes.size());
   }
@@ -272,7 +289,9 @@ class Analyst {
                                                                                   {"V+H", "H"},
                                                                                   {"V+H", "H"},
                                                                                   {"V+H", "H"}}};
-    sheet::Table table{{"person", "best", "worst", "H", "V", "V+H", "printed for its subject of this number"}, {}, {1, 1, 1, 1, 1, 1, 2.6}};
+    sheet::Table table{{"person", "best", "worst", "H", "V", "V+H", "printed for its subject of this number"},
+                       {},
+                       {1, 1, 1, 1, 1, 1, 2.6}};
     Json rows = Json::list();
     int best_vh = 0, worst_vh = 0;
     for (std::size_t k = 0; k < people_.codes.size(); ++k) {
@@ -291,13 +310,15 @@ class Analyst {
                             {text(people_.means[1][k])},
                             {text(people_.means[2][k])},
                             {printed}});
-      rows.push_back(
-          {{"person", people_.codes[k]}, {"best", short_name(kTrainingOrder[best])}, {"worst", short_name(kTrainingOrder[worst])}});
+      rows.push_back({{"person", people_.codes[k]},
+                      {"best", short_name(kTrainingOrder[best])},
+                      {"worst", short_name(kTrainingOrder[worst])}});
     }
     add(std::move(table));
-    say("V+H is best for " + std::to_string(best_vh) + " of " + std::to_string(people_.codes.size()) + " and worst for " +
-        std::to_string(worst_vh) + "; printed: best for 9 of 12, worst for 1.");
-    json_["table_1"] = Json{{"rows", rows}, {"best_vh", best_vh}, {"worst_vh", worst_vh}, {"printed_best_vh", 9}, {"printed_worst_vh", 1}};
+    say("V+H is best for " + std::to_string(best_vh) + " of " + std::to_string(people_.codes.size()) +
+        " and worst for " + std::to_string(worst_vh) + "; printed: best for 9 of 12, worst for 1.");
+    json_["table_1"] = Json{
+        {"rows", rows}, {"best_vh", best_vh}, {"worst_vh", worst_vh}, {"printed_best_vh", 9}, {"printed_worst_vh", 1}};
   }
 
   void stimulus_figures() {
@@ -308,12 +329,13 @@ class Analyst {
     row.columns = {{{path_plot(s)}}, {{force_plot(s)}}};
     add(std::move(row));
     sheet::Columns views;
-    for (const Training t : kTrainingOrder) views.columns.push_back({{display_of(s, t, RunKind::training, data_.protocol)}});
+    for (const Training t : kTrainingOrder)
+      views.columns.push_back({{display_of(s, t, RunKind::training, data_.protocol)}});
     views.columns.push_back({{display_of(s, Training::haptic, RunKind::test, data_.protocol)}});
     add(std::move(views));
     if (s.scale < 1)
-      say("Forces are " + text(100 * s.scale) + " % of those printed, so that their 12 N are the " + text(data_.protocol.device_n) +
-              " N that the device can hold.",
+      say("Forces are " + text(100 * s.scale) + " % of those printed, so that their 12 N are the " +
+              text(data_.protocol.device_n) + " N that the device can hold.",
           Tone::quiet);
   }
 
@@ -326,7 +348,8 @@ class Analyst {
     std::vector<const TrialScore*> sorted;
     for (const TrialScore& t : data_.trials) sorted.push_back(&t);
     std::sort(sorted.begin(), sorted.end(), [](const TrialScore* a, const TrialScore* b) {
-      return std::tie(a->recall.score, a->participant, a->trial.number) < std::tie(b->recall.score, b->participant, b->trial.number);
+      return std::tie(a->recall.score, a->participant, a->trial.number) <
+             std::tie(b->recall.score, b->participant, b->trial.number);
     });
     const TrialScore& middle = *sorted[sorted.size() / 2];
     const Recall r = score_recall(middle.target_n, middle.applied_n, {}, middle.rate_hz);
@@ -334,7 +357,8 @@ class Analyst {
     row.columns.push_back({{warped_plot(r)}});
     add(std::move(row));
     say(synthetic_words() + " Figures 26 and 27 are the trial of middle score: " + middle.participant + ", trial " +
-            std::to_string(middle.trial.number) + " (" + short_name(middle.trial.training) + "), score " + text(middle.recall.score) + ".",
+            std::to_string(middle.trial.number) + " (" + short_name(middle.trial.training) + "), score " +
+            text(middle.recall.score) + ".",
         Tone::quiet);
   }
 
@@ -354,12 +378,18 @@ class Analyst {
     for (const auto& [name, value] : measures) {
       const People p = people_of(data_, data_.trials, data_.protocol.trials, value);
       const RepeatedAnova a = repeated_anova(p.table(), kTrainings);
-      table.rows.push_back({{name}, {text(mean(p.means[0]))}, {text(mean(p.means[1]))}, {text(mean(p.means[2]))}, {p_text(a.p_gg)}});
-      rows.push_back({{"measure", name}, {"h", mean(p.means[0])}, {"v", mean(p.means[1])}, {"vh", mean(p.means[2])}, {"p_gg", a.p_gg}});
+      table.rows.push_back(
+          {{name}, {text(mean(p.means[0]))}, {text(mean(p.means[1]))}, {text(mean(p.means[2]))}, {p_text(a.p_gg)}});
+      rows.push_back({{"measure", name},
+                      {"h", mean(p.means[0])},
+                      {"v", mean(p.means[1])},
+                      {"vh", mean(p.means[2])},
+                      {"p_gg", a.p_gg}});
     }
     add(std::move(table));
     json_["measures"] = rows;
-    say("Only the first was planned; p values of the others stand for themselves and are not corrected for being many.", Tone::quiet);
+    say("Only the first was planned; p values of the others stand for themselves and are not corrected for being many.",
+        Tone::quiet);
   }
 
   void retention() {
@@ -368,14 +398,19 @@ class Analyst {
     add(sheet::Heading{"On another day, without aid"});
     const People p = people_of(data_, data_.retention, wanted, [](const TrialScore& t) { return t.recall.score; });
     if (p.codes.size() < kPeopleNeeded) {
-      refuse("Retention", std::to_string(p.codes.size()) + " people have done it; " + std::to_string(kPeopleNeeded) + " are needed.");
+      refuse("Retention", std::to_string(p.codes.size()) + " people have done it; " + std::to_string(kPeopleNeeded) +
+                              " are needed.");
       return;
     }
     const RepeatedAnova a = repeated_anova(p.table(), kTrainings);
-    say("Mean scores H " + text(mean(p.means[0])) + ", V " + text(mean(p.means[1])) + ", V+H " + text(mean(p.means[2])) + " of " +
-        std::to_string(p.codes.size()) + " people; repeated measures, Greenhouse and Geisser: p " + p_text(a.p_gg) + ".");
-    json_["retention"] =
-        Json{{"people", p.codes.size()}, {"h", mean(p.means[0])}, {"v", mean(p.means[1])}, {"vh", mean(p.means[2])}, {"p_gg", a.p_gg}};
+    say("Mean scores H " + text(mean(p.means[0])) + ", V " + text(mean(p.means[1])) + ", V+H " +
+        text(mean(p.means[2])) + " of " + std::to_string(p.codes.size()) +
+        " people; repeated measures, Greenhouse and Geisser: p " + p_text(a.p_gg) + ".");
+    json_["retention"] = Json{{"people", p.codes.size()},
+                              {"h", mean(p.means[0])},
+                              {"v", mean(p.means[1])},
+                              {"vh", mean(p.means[2])},
+                              {"p_gg", a.p_gg}};
   }
 
   void closing() {
@@ -387,13 +422,16 @@ class Analyst {
       return text(100.0 * found / n.experiments) + " % (" + text(100 * i.lo) + " to " + text(100 * i.hi) + ")";
     };
     sheet::Table table{
-        {"test at 5 %", "found something in " + std::to_string(n.experiments) + " experiments with nothing in them"}, {}, {}};
+        {"test at 5 %", "found something in " + std::to_string(n.experiments) + " experiments with nothing in them"},
+        {},
+        {}};
     table.rows = {{{"repeated measures"}, {rate(n.repeated)}},
                   {{"repeated measures, Greenhouse and Geisser"}, {rate(n.repeated_gg)}},
                   {{"any pair, paired t with Holm"}, {rate(n.any_pair_holm)}},
                   {{"pooled one-way ANOVA over trials, as printed", Tone::caution}, {rate(n.pooled), Tone::caution}}};
     add(std::move(table));
-    say("Simulated scores: 12 people, 24 trials a training, no difference of trainings; people differ by 15 % and in what suits them by 10 "
+    say("Simulated scores: 12 people, 24 trials a training, no difference of trainings; people differ by 15 % and in "
+        "what suits them by 10 "
         "%. "
         "The last is what a pooled test takes for an effect of the training.",
         Tone::quiet);
@@ -437,4 +475,4 @@ ExperimentAnalysis analyse(const ExperimentData& data, double level) {
   return Analyst(data, level).run();
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

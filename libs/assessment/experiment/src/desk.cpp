@@ -6,8 +6,8 @@
 
 namespace osteo::inline assessment::experiment {
 
-ForceSkillDesk::ForceSkillDesk(std::filesystem::path experiment, Protocol protocol, std::size_t participant, bool retention, Mover mover,
-                               std::string device, const DeviceTraits& traits)
+ForceSkillDesk::ForceSkillDesk(std::filesystem::path experiment, Protocol protocol, std::size_t participant,
+                               bool retention, Mover mover, std::string device, const DeviceTraits& traits)
     : protocol_(std::move(protocol)), participant_(protocol_.participants.at(participant)), retention_(retention) {
   folder_ = trials_folder(experiment, participant_, retention);
   trials_ = retention ? retention_of(protocol_, participant) : trials_of(protocol_, participant);
@@ -34,7 +34,8 @@ void ForceSkillDesk::load() {
 }
 
 void ForceSkillDesk::begin(RunKind kind) {
-  task_ = std::make_unique<ForceTask>(*stimulus_, trials_[next_], kind, TaskGains{}, record_.traits, protocol_.peak_n, kLeadS);
+  task_ = std::make_unique<ForceTask>(*stimulus_, trials_[next_], kind, TaskGains{}, record_.traits, protocol_.peak_n,
+                                      kLeadS);
   record_.lead_ticks = task_->lead_ticks();
   ticks_ = kind == RunKind::training ? &record_.training : &record_.test;
   ticks_->clear();
@@ -78,8 +79,9 @@ void ForceSkillDesk::update() {
   if (running()) return;
   if (page_ == DeskPage::training) {
     // Sight of the own force behind the run, where it was not there in it.
-    page_ =
-        protocol_.feedback == Feedback::delayed && trials_[next_].training != Training::haptic ? DeskPage::feedback : DeskPage::before_test;
+    page_ = protocol_.feedback == Feedback::delayed && trials_[next_].training != Training::haptic
+                ? DeskPage::feedback
+                : DeskPage::before_test;
   } else if (page_ == DeskPage::test) {
     (void)save_trial(folder_, participant_, *stimulus_, record_);
     ++next_;
@@ -120,14 +122,16 @@ std::pair<std::string, std::string> ForceSkillDesk::words() const {
       "The blue bar will show a force, the green one what you press. Keep both equally high, and learn the force."};
   switch (page_) {
     case DeskPage::pause:
-      return {"A break of " + std::to_string(static_cast<int>(protocol_.break_min)) + " minutes", "The space bar goes on."};
+      return {"A break of " + std::to_string(static_cast<int>(protocol_.break_min)) + " minutes",
+              "The space bar goes on."};
     case DeskPage::before_training:
       return {number + ": training " + short_name(t.training),
               std::string(kToDo[static_cast<std::size_t>(t.training)]) + " The space bar begins."};
     case DeskPage::feedback:
       return {number + ": what you pressed", "Blue: the force to learn. Green: yours. The space bar goes on."};
     case DeskPage::before_test:
-      return {number + ": test", "Press the force that you have learned, while you are led along the path. The space bar begins."};
+      return {number + ": test",
+              "Press the force that you have learned, while you are led along the path. The space bar begins."};
     default:
       return {number, ""};
   }
@@ -135,8 +139,9 @@ std::pair<std::string, std::string> ForceSkillDesk::words() const {
 
 std::pair<std::vector<double>, std::vector<double>> ForceSkillDesk::last_training() const {
   std::vector<double> applied;
-  for (std::size_t i = record_.lead_ticks; i < record_.training.size(); ++i) applied.push_back(record_.training[i].normal_force_n);
+  for (std::size_t i = record_.lead_ticks; i < record_.training.size(); ++i)
+    applied.push_back(record_.training[i].normal_force_n);
   return {stimulus_ ? stimulus_->force_n : std::vector<double>{}, applied};
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

@@ -18,12 +18,14 @@ sheet::Drawing run_drawing(const Stimulus& s, const DisplayState& state, double 
   d.alt = std::string("path and position, ") + (state.kind == RunKind::test ? "test" : short_name(state.training));
   d.box(0, 0, width, height, kPaper);
   // Room for the bars above and below the path's own height.
-  const double scale = std::min(0.8 * width / s.params.length_mm, 0.55 * height / s.params.width_mm), bar = 0.32 * height;
+  const double scale = std::min(0.8 * width / s.params.length_mm, 0.55 * height / s.params.width_mm),
+               bar = 0.32 * height;
   const auto at = [&](double x_mm, double z_mm) -> std::array<double, 2> {
     return {width / 2 + scale * x_mm, 0.55 * height + scale * z_mm};
   };
   std::vector<std::array<double, 2>> path;
-  for (std::size_t i = 0; i < s.x_mm.size(); i += std::max<std::size_t>(1, s.x_mm.size() / 400)) path.push_back(at(s.x_mm[i], s.z_mm[i]));
+  for (std::size_t i = 0; i < s.x_mm.size(); i += std::max<std::size_t>(1, s.x_mm.size() / 400))
+    path.push_back(at(s.x_mm[i], s.z_mm[i]));
   path.push_back(at(s.x_mm.back(), s.z_mm.back()));
   const double line = std::max(1.0, height / 250);
   d.line(path, kPath, line);
@@ -36,7 +38,8 @@ sheet::Drawing run_drawing(const Stimulus& s, const DisplayState& state, double 
     d.box(hand[0] - 1.4 * wide, hand[1] - target - wide, wide, target, kBlue, std::max(0.15, state.aid));
     d.line({{hand[0] - 1.5 * wide, hand[1] - wide}, {hand[0] - 0.3 * wide, hand[1] - wide}}, kBlue, line);
     if (state.training == Training::visuohaptic && (state.feedback == Feedback::concurrent || state.view.done)) {
-      const double shown = state.view.target_n + state.amplification * (state.view.applied_n - state.view.target_n), own = height_of(shown);
+      const double shown = state.view.target_n + state.amplification * (state.view.applied_n - state.view.target_n),
+                   own = height_of(shown);
       d.box(hand[0] + 0.4 * wide, hand[1] - own - wide, wide, own, kGreen);
       d.line({{hand[0] + 0.3 * wide, hand[1] - wide}, {hand[0] + 1.5 * wide, hand[1] - wide}}, kGreen, line);
     }
@@ -61,4 +64,4 @@ sheet::Drawing run_drawing(const Stimulus& s, const DisplayState& state, double 
   return d;
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/core/base/portable_math.h"
 #include "osteo/assessment/experiment/analysis.h"
+#include "osteo/core/base/portable_math.h"
 #include "osteo/core/statistics/line.h"
 
 namespace osteo::inline assessment::experiment {
@@ -29,7 +29,8 @@ sheet::Plot::Line curve(const std::vector<double>& values, double seconds, Tone 
   return line;
 }
 double highest(const Recall& r) {
-  return std::max(*std::max_element(r.target_n.begin(), r.target_n.end()), *std::max_element(r.applied_n.begin(), r.applied_n.end()));
+  return std::max(*std::max_element(r.target_n.begin(), r.target_n.end()),
+                  *std::max_element(r.applied_n.begin(), r.applied_n.end()));
 }
 
 struct Synthetic {
@@ -63,7 +64,8 @@ sheet::Plot path_plot(const Stimulus& s) {
   p.x = {-55, 55, 25, "x, mm", {}};
   p.y = {-35, 35, 15, "-z, mm (away from the person)", {}};
   sheet::Plot::Line line;
-  for (std::size_t i = 0; i < s.x_mm.size(); i += std::max<std::size_t>(1, s.x_mm.size() / 400)) line.at.push_back({s.x_mm[i], -s.z_mm[i]});
+  for (std::size_t i = 0; i < s.x_mm.size(); i += std::max<std::size_t>(1, s.x_mm.size() / 400))
+    line.at.push_back({s.x_mm[i], -s.z_mm[i]});
   p.lines = {line};
   return p;
 }
@@ -88,8 +90,14 @@ sheet::Drawing display_of(const Stimulus& s, Training training, RunKind kind, co
   state.view.applied_n = 0.8 * s.force_n[i];
   sheet::Drawing d = run_drawing(s, state, 520, 400);
   const bool test = kind == RunKind::test;
-  d.id = test ? "figure-24-t" : training == Training::haptic ? "figure-24-a" : training == Training::visual ? "figure-24-b" : "figure-24-c";
-  d.caption = test ? "T" : training == Training::haptic ? "Figure 24a: H" : training == Training::visual ? "24b: V" : "24c: V+H";
+  d.id = test                           ? "figure-24-t"
+         : training == Training::haptic ? "figure-24-a"
+         : training == Training::visual ? "figure-24-b"
+                                        : "figure-24-c";
+  d.caption = test                           ? "T"
+              : training == Training::haptic ? "Figure 24a: H"
+              : training == Training::visual ? "24b: V"
+                                             : "24c: V+H";
   return d;
 }
 
@@ -103,11 +111,11 @@ sheet::Plot synthetic_plot() {
 std::string synthetic_words() {
   char out[300];
   const Synthetic& s = synthetic();
-  std::snprintf(
-      out, sizeof out,
-      "Figure 25: three peaks (dark), recalled at wrong times (red), and no force (green). RMS without alignment: red %.2f N, green "
-      "%.2f N; score: red %.2f, green %.2f.",
-      s.red.plain_rms_n, s.green.plain_rms_n, s.red.score, s.green.score);
+  std::snprintf(out, sizeof out,
+                "Figure 25: three peaks (dark), recalled at wrong times (red), and no force (green). RMS without "
+                "alignment: red %.2f N, green "
+                "%.2f N; score: red %.2f, green %.2f.",
+                s.red.plain_rms_n, s.green.plain_rms_n, s.red.score, s.green.score);
   return out;
 }
 
@@ -159,4 +167,4 @@ sheet::Plot means_plot(const std::array<std::vector<double>, kTrainings>& means,
   return p;
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

@@ -11,13 +11,14 @@
 
 namespace osteo::inline assessment::experiment {
 
-[[nodiscard]] sheet::Plot path_plot(const Stimulus& stimulus);                                                        // 22
-[[nodiscard]] sheet::Plot force_plot(const Stimulus& stimulus);                                                       // 23
-[[nodiscard]] sheet::Drawing display_of(const Stimulus& stimulus, Training training, RunKind kind, const Protocol&);  // 24
-[[nodiscard]] sheet::Plot synthetic_plot();                                                                           // 25
+[[nodiscard]] sheet::Plot path_plot(const Stimulus& stimulus);   // 22
+[[nodiscard]] sheet::Plot force_plot(const Stimulus& stimulus);  // 23
+[[nodiscard]] sheet::Drawing display_of(const Stimulus& stimulus, Training training, RunKind kind,
+                                        const Protocol&);  // 24
+[[nodiscard]] sheet::Plot synthetic_plot();                // 25
 [[nodiscard]] std::string synthetic_words();
 [[nodiscard]] sheet::Plot alignment_plot(const Recall& recall);                                                // 26
 [[nodiscard]] sheet::Plot warped_plot(const Recall& recall);                                                   // 27
 [[nodiscard]] sheet::Plot means_plot(const std::array<std::vector<double>, kTrainings>& means, double level);  // 28
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

@@ -1,16 +1,18 @@
 #include <cmath>
 
+#include "osteo/assessment/experiment/analysis.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
-#include "osteo/assessment/experiment/analysis.h"
 #include "osteo/core/statistics/within.h"
 
 namespace osteo::inline assessment::experiment {
 namespace {
 
-// Scores of an experiment: by training, person by person; and one mean a person and training, those of each person together.
+// Scores of an experiment: by training, person by person; and one mean a person and training, those of each person
+// together.
 struct Scores {
-  std::vector<std::vector<double>> pooled = std::vector<std::vector<double>>(kTrainings), of = std::vector<std::vector<double>>(kTrainings);
+  std::vector<std::vector<double>> pooled = std::vector<std::vector<double>>(kTrainings),
+                                   of = std::vector<std::vector<double>>(kTrainings);
   std::vector<double> means;
   void add_person(const std::array<std::vector<double>, kTrainings>& scores) {
     for (std::size_t t = 0; t < kTrainings; ++t) {
@@ -39,7 +41,8 @@ void count(const Scores& s, double alpha, NullResult& r) {
 
 NullResult null_experiments(const NullSettings& s) {
   if (s.experiments < 1 || s.people < 2 || s.trials < 1 || !(s.mean > 0))
-    throw Error(ExitCode::usage, "null experiments need one experiment, two people and a trial at least, and a mean above 0");
+    throw Error(ExitCode::usage,
+                "null experiments need one experiment, two people and a trial at least, and a mean above 0");
   NullResult r;
   r.experiments = s.experiments;
   statistics::Random random(s.seed);
@@ -50,7 +53,8 @@ NullResult null_experiments(const NullSettings& s) {
       std::array<std::vector<double>, kTrainings> drawn;
       for (std::size_t t = 0; t < kTrainings; ++t) {
         // H, V, V+H: each better than the one before by `effect`.
-        const double level = s.mean * (1 + own + s.person_by_training * random.normal() + s.effect * (1 - static_cast<double>(t)));
+        const double level =
+            s.mean * (1 + own + s.person_by_training * random.normal() + s.effect * (1 - static_cast<double>(t)));
         for (int k = 0; k < s.trials; ++k) drawn[t].push_back(level + s.trial_sd * random.normal());
       }
       scores.add_person(drawn);
@@ -62,7 +66,8 @@ NullResult null_experiments(const NullSettings& s) {
 
 NullResult null_chain(const NullSettings& s, const ParticipantModel& model, const Context& context) {
   if (s.experiments < 1 || s.people < 2 || s.trials < 3 || s.trials % 3 != 0)
-    throw Error(ExitCode::usage, "experiments by simulated people need one experiment, two people, and trials a training in threes");
+    throw Error(ExitCode::usage,
+                "experiments by simulated people need one experiment, two people, and trials a training in threes");
   std::vector<Scores> all(static_cast<std::size_t>(s.experiments));
   parallel_for(all.size(), 1, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t e = begin; e < end; ++e) {
@@ -82,7 +87,8 @@ NullResult null_chain(const NullSettings& s, const ParticipantModel& model, cons
           t.aid = 0;  // no training
           const Stimulus stimulus = stimulus_of(p, t);
           const TrialRecord record = simulate_trial(p, t, stimulus, person);
-          scores[static_cast<std::size_t>(t.training)].push_back(score_trial(p.participants[who], stimulus, record).recall.score);
+          scores[static_cast<std::size_t>(t.training)].push_back(
+              score_trial(p.participants[who], stimulus, record).recall.score);
         }
         all[e].add_person(scores);
       }
@@ -94,4 +100,4 @@ NullResult null_chain(const NullSettings& s, const ParticipantModel& model, cons
   return r;
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

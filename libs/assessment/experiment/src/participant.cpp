@@ -73,13 +73,15 @@ void SimulatedParticipant::begin(const Stimulus& stimulus, const Trial& trial, R
   lead_s_ = lead_s;
   mean_n_ = statistics::mean(stimulus.force_n);
   sigma_ = memory_of(trial) * mean_n_;
-  const std::uint64_t own = mixed(seed_, static_cast<std::uint64_t>(trial.number) * 4 + static_cast<std::uint64_t>(kind) + 100);
+  const std::uint64_t own =
+      mixed(seed_, static_cast<std::uint64_t>(trial.number) * 4 + static_cast<std::uint64_t>(kind) + 100);
   memory_ = Wander::made(mixed(own, 1), 8, 0.4);
   timing_ = Wander::made(mixed(own, 2), 4, 0.1);
   tremor_ = Wander::made(mixed(own, 3), 12, 4);
   const double relative = model_.memory[1] > 0 ? memory_of(trial) / model_.memory[1] : 0;
   shift_s_ = model_.timing_s * relative;
-  // What it will press: in a test what it recalls, where it has learned at all; in a training what it is told, after its reaction.
+  // What it will press: in a test what it recalls, where it has learned at all; in a training what it is told, after
+  // its reaction.
   plan_n_.clear();
   constexpr std::size_t kEvery = 10;
   for (std::size_t i = 0; i < stimulus.force_n.size(); i += kEvery) {
@@ -104,7 +106,8 @@ DeviceSample SimulatedParticipant::read(std::uint64_t tick, double dt_s, Vec3 fo
   double down = 0;
   if (t >= 0 && !plan_n_.empty()) {
     const double at = std::min(t * stimulus_->rate_hz / 10, static_cast<double>(plan_n_.size() - 1));
-    const auto i = std::min(static_cast<std::size_t>(at), plan_n_.size() - 1), next = std::min(i + 1, plan_n_.size() - 1);
+    const auto i = std::min(static_cast<std::size_t>(at), plan_n_.size() - 1),
+               next = std::min(i + 1, plan_n_.size() - 1);
     down = plan_n_[i] + (at - static_cast<double>(i)) * (plan_n_[next] - plan_n_[i]);
   }
   // Pushed by the device, it stays in the plane by the arm's own stiffness; else it only presses.
@@ -114,4 +117,4 @@ DeviceSample SimulatedParticipant::read(std::uint64_t tick, double dt_s, Vec3 fo
   return device_.read(tick, dt_s, force_n);
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

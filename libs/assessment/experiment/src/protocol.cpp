@@ -34,7 +34,8 @@ std::string wrong_with(const Protocol& p) {
   if (p.peak_n < p.device_n) return "peak_n is below device_n: no device holds more than it can give";
   const int whole = p.repetitions * static_cast<int>(kTrainings);
   if (p.trials % whole != 0)
-    return "trials is " + std::to_string(p.trials) + ": no multiple of " + std::to_string(whole) + ", a block for each training";
+    return "trials is " + std::to_string(p.trials) + ": no multiple of " + std::to_string(whole) +
+           ", a block for each training";
   return {};
 }
 
@@ -69,7 +70,8 @@ Protocol read_protocol(const fs::path& folder) {
 void write_protocol(const fs::path& folder, const Protocol& given) {
   check(given);
   const fs::path file = folder / "protocol.json";
-  if (output_exists(file)) throw Error(ExitCode::cannot_write, "'" + file.string() + "' is there already", "give another folder");
+  if (output_exists(file))
+    throw Error(ExitCode::cannot_write, "'" + file.string() + "' is there already", "give another folder");
   make_output_folder(folder);
   Protocol p = given;
   Json j{{"osteotome_force_skill", 1}, {"participants", p.participants}};
@@ -142,4 +144,4 @@ std::size_t participant_number(const Protocol& p, const std::string& code) {
               near.empty() ? "protocol.json lists them" : "did you mean '" + near + "'?");
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

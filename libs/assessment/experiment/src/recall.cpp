@@ -33,11 +33,12 @@ std::vector<double> box_filtered(std::span<const double> values, std::size_t wid
   return out;
 }
 
-Recall score_recall(std::span<const double> target_n, std::span<const double> applied_n, const std::vector<bool>& saturated, double rate_hz,
-                    const RecallSettings& s) {
+Recall score_recall(std::span<const double> target_n, std::span<const double> applied_n,
+                    const std::vector<bool>& saturated, double rate_hz, const RecallSettings& s) {
   if (target_n.size() != applied_n.size() || target_n.size() < 2 || s.samples < 2)
     throw Error(ExitCode::usage, "a recall needs target and applied force of the same length, two samples at least");
-  if (!saturated.empty() && saturated.size() != target_n.size()) throw Error(ExitCode::usage, "saturation is told of another length");
+  if (!saturated.empty() && saturated.size() != target_n.size())
+    throw Error(ExitCode::usage, "saturation is told of another length");
   if (!(rate_hz > 0)) throw Error(ExitCode::usage, "a recall needs a rate above 0");
   for (std::size_t i = 0; i < target_n.size(); ++i) {
     if (!std::isfinite(target_n[i]) || !std::isfinite(applied_n[i]))
@@ -51,14 +52,17 @@ Recall score_recall(std::span<const double> target_n, std::span<const double> ap
   if (std::find(saturated.begin(), saturated.end(), true) != saturated.end()) {
     // A sample of the coarser time base is out where the one nearest to it is.
     for (std::size_t k = 0; k < s.samples; ++k) {
-      const double at = static_cast<double>(k) * static_cast<double>(saturated.size() - 1) / static_cast<double>(s.samples - 1);
+      const double at =
+          static_cast<double>(k) * static_cast<double>(saturated.size() - 1) / static_cast<double>(s.samples - 1);
       weight.push_back(saturated[static_cast<std::size_t>(std::lround(at))] ? 0 : 1);
     }
-    r.saturated = 1 - static_cast<double>(std::count(weight.begin(), weight.end(), 1.0)) / static_cast<double>(s.samples);
+    r.saturated =
+        1 - static_cast<double>(std::count(weight.begin(), weight.end(), 1.0)) / static_cast<double>(s.samples);
   }
   const double rate = static_cast<double>(s.samples - 1) / r.seconds, step_s = 1 / rate;
   const std::vector<double> target_slope = slopes(r.target_n, rate), applied_slope = slopes(r.applied_n, rate);
-  // What no force at all would cost: partners are those of the same time, since each step aside costs and none is better there.
+  // What no force at all would cost: partners are those of the same time, since each step aside costs and none is
+  // better there.
   double nothing = 0, rms = 0, counted = 0;
   for (std::size_t k = 0; k < s.samples; ++k) {
     const double w = weight.empty() ? 1 : weight[k];
@@ -68,7 +72,8 @@ Recall score_recall(std::span<const double> target_n, std::span<const double> ap
   }
   if (!(nothing > 0)) throw Error(ExitCode::usage, "the target holds no force that could be recalled");
   Aligner aligner(s.costs);
-  // Left out by the target's time: were the applied curve's samples left out as well, a way through them would cost nothing anywhere.
+  // Left out by the target's time: were the applied curve's samples left out as well, a way through them would cost
+  // nothing anywhere.
   const Alignment& a = aligner.align({r.target_n, target_slope, weight}, {r.applied_n, applied_slope, {}});
   r.score = a.cost_n / nothing;
   r.by = a.by;
@@ -88,7 +93,8 @@ Recall score_recall(std::span<const double> target_n, std::span<const double> ap
     sum[p.target] += r.applied_n[p.applied];
     ++many[p.target];
   }
-  for (double* const part : {&r.phase_s, &r.lag_s, &r.amplitude_n, &r.slope_n_per_s}) *part = weights > 0 ? *part / weights : 0;
+  for (double* const part : {&r.phase_s, &r.lag_s, &r.amplitude_n, &r.slope_n_per_s})
+    *part = weights > 0 ? *part / weights : 0;
   for (std::size_t k = 0; k < s.samples; ++k) r.warped_n.push_back(sum[k] / many[k]);
   const std::vector<double> warped_slope = slopes(r.warped_n, rate);
   double force2 = 0, slope2 = 0;
@@ -97,9 +103,10 @@ Recall score_recall(std::span<const double> target_n, std::span<const double> ap
     force2 += w * (r.target_n[k] - r.warped_n[k]) * (r.target_n[k] - r.warped_n[k]);
     slope2 += w * (target_slope[k] - warped_slope[k]) * (target_slope[k] - warped_slope[k]);
   }
-  r.thesis_n =
-      (s.alignment * a.cost_n / counted + s.after_force * std::sqrt(force2 / counted) + s.after_slope_s * std::sqrt(slope2 / counted)) / 3;
+  r.thesis_n = (s.alignment * a.cost_n / counted + s.after_force * std::sqrt(force2 / counted) +
+                s.after_slope_s * std::sqrt(slope2 / counted)) /
+               3;
   return r;
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

@@ -41,7 +41,8 @@ void check(const StimulusParams& p, double rate_hz) {
   const auto need = [](bool good, const char* what) {
     if (!good) throw Error(ExitCode::usage, std::string("a stimulus needs ") + what);
   };
-  need(p.length_mm > 0 && p.width_mm > 0 && p.length_mm <= 1000 && p.width_mm <= 1000, "a length and a width from 0 to 1000 mm");
+  need(p.length_mm > 0 && p.width_mm > 0 && p.length_mm <= 1000 && p.width_mm <= 1000,
+       "a length and a width from 0 to 1000 mm");
   need(p.speed_mm_s > 0 && p.path_sinusoids > 0 && p.force_sinusoids > 0, "a speed and sinusoids");
   need(p.path_cycles_per_cm > 0 && p.force_hz > 0, "frequencies above 0");
   need(p.force_n > 0 && p.bump_n >= p.force_n, "a force above 0 and bumps that reach at least as high");
@@ -87,13 +88,15 @@ Stimulus make_stimulus(std::uint64_t seed, const StimulusParams& p, double rate_
   spread(z, -p.width_mm / 2, p.width_mm / 2);
   for (std::size_t i = 1; i < fine; ++i) along[i] = along[i - 1] + portable::hypot(x[i] - x[i - 1], z[i] - z[i - 1]);
   const double seconds = along.back() / p.speed_mm_s;
-  if (!(seconds > 2 * p.ramp_s)) throw Error(ExitCode::usage, "the ramps of a stimulus of " + std::to_string(seconds) + " s meet");
+  if (!(seconds > 2 * p.ramp_s))
+    throw Error(ExitCode::usage, "the ramps of a stimulus of " + std::to_string(seconds) + " s meet");
   const auto samples = static_cast<std::size_t>(std::floor(seconds * rate_hz)) + 1;
   std::size_t leg = 0;
   for (std::size_t i = 0; i < samples; ++i) {
     const double at = static_cast<double>(i) / rate_hz * p.speed_mm_s;
     while (leg + 2 < fine && along[leg + 1] < at) ++leg;
-    const double step = along[leg + 1] - along[leg], share = step > 0 ? std::clamp((at - along[leg]) / step, 0.0, 1.0) : 0;
+    const double step = along[leg + 1] - along[leg],
+                 share = step > 0 ? std::clamp((at - along[leg]) / step, 0.0, 1.0) : 0;
     s.x_mm.push_back(x[leg] + share * (x[leg + 1] - x[leg]) - p.length_mm / 2);
     s.z_mm.push_back(z[leg] + share * (z[leg + 1] - z[leg]));
     s.vx_mm_s.push_back(step > 0 ? p.speed_mm_s * (x[leg + 1] - x[leg]) / step : 0);
@@ -144,7 +147,8 @@ std::string stimulus_csv(const Stimulus& s, double rate_hz) {
   std::string out = "time_s,x_mm,z_mm,force_n,saturated\n";
   each_sample(s, rate_hz, [&](double t, std::size_t i) {
     char line[120];
-    std::snprintf(line, sizeof line, "%.4f,%.4f,%.4f,%.4f,%d\n", t, s.x_mm[i], s.z_mm[i], s.force_n[i], s.saturated[i] ? 1 : 0);
+    std::snprintf(line, sizeof line, "%.4f,%.4f,%.4f,%.4f,%d\n", t, s.x_mm[i], s.z_mm[i], s.force_n[i],
+                  s.saturated[i] ? 1 : 0);
     out += line;
   });
   return out;
@@ -181,4 +185,4 @@ std::string stimulus_json(const Stimulus& s, double rate_hz) {
   return j.dump() + "\n";
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

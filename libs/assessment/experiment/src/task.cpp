@@ -29,8 +29,8 @@ GuardParams task_guard(double limit_n) {
   return p;
 }
 
-ForceTask::ForceTask(const Stimulus& stimulus, const Trial& trial, RunKind kind, const TaskGains& gains, const DeviceTraits& device,
-                     double limit_n, double lead_s)
+ForceTask::ForceTask(const Stimulus& stimulus, const Trial& trial, RunKind kind, const TaskGains& gains,
+                     const DeviceTraits& device, double limit_n, double lead_s)
     : stimulus_(&stimulus),
       trial_(trial),
       kind_(kind),
@@ -68,10 +68,12 @@ TickRecord ForceTask::step(std::uint64_t tick, const DeviceSample& sample) noexc
   // Pushed upwards by what is to be learned, or held in the plane by as much as the hand presses.
   const double plane = -gains_.plane_n_per_mm * hand.y - gains_.plane_n_s_per_mm * velocity_.y;
   force.y = pushed && !leading ? trial_.aid * target : plane;
-  // At its limit the device lets the hand sink rather than leave the path: what is left beside the path's pull is the plane's.
+  // At its limit the device lets the hand sink rather than leave the path: what is left beside the path's pull is the
+  // plane's.
   const double limit = limit_n_, along = std::sqrt(force.x * force.x + force.z * force.z);
   bool capped = false;
-  if (const double left = std::sqrt(std::max(0.0, limit * limit - along * along)); along < limit && std::abs(force.y) > left) {
+  if (const double left = std::sqrt(std::max(0.0, limit * limit - along * along));
+      along < limit && std::abs(force.y) > left) {
     force.y = force.y > 0 ? left : -left;
     capped = true;
   }
@@ -99,4 +101,4 @@ TickRecord ForceTask::step(std::uint64_t tick, const DeviceSample& sample) noexc
   return r;
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

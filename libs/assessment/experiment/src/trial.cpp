@@ -119,7 +119,9 @@ TrialScore read_trial(const fs::path& file) {
   json.require_format("osteotome_force_skill_trial");
   const JsonValue& root = json.root();
   json.allow(root, "", kTrialKeys);
-  const auto number = [&](const char* key, double lo, double hi) { return json.number(json.need(root, "", key), key, lo, hi); };
+  const auto number = [&](const char* key, double lo, double hi) {
+    return json.number(json.need(root, "", key), key, lo, hi);
+  };
   TrialScore s;
   s.participant = json.text(json.need(root, "", "participant"), "participant");
   s.trial.number = static_cast<int>(number("trial", 1, 1000));
@@ -148,10 +150,12 @@ TrialScore read_trial(const fs::path& file) {
 
 }  // namespace
 
-TrialScore score_trial(const std::string& participant, const Stimulus& stimulus, const TrialRecord& r, const RecallSettings& settings) {
+TrialScore score_trial(const std::string& participant, const Stimulus& stimulus, const TrialRecord& r,
+                       const RecallSettings& settings) {
   const std::size_t n = stimulus.force_n.size();
   if (r.test.size() != r.lead_ticks + n)
-    throw Error(ExitCode::usage, "the test has " + std::to_string(r.test.size()) + " ticks instead of " + std::to_string(r.lead_ticks + n));
+    throw Error(ExitCode::usage, "the test has " + std::to_string(r.test.size()) + " ticks instead of " +
+                                     std::to_string(r.lead_ticks + n));
   TrialScore s;
   s.participant = participant;
   s.trial = r.trial;
@@ -179,7 +183,8 @@ fs::path trials_folder(const fs::path& experiment, const std::string& participan
   return retention ? experiment / participant / "retention" : experiment / participant;
 }
 
-TrialScore save_trial(const fs::path& folder, const std::string& participant, const Stimulus& stimulus, const TrialRecord& r) {
+TrialScore save_trial(const fs::path& folder, const std::string& participant, const Stimulus& stimulus,
+                      const TrialRecord& r) {
   const TrialScore s = score_trial(participant, stimulus, r);
   make_output_folder(folder);
   const std::string name = trial_name(r.trial.number);
@@ -222,9 +227,11 @@ std::vector<TrialScore> read_trials(const fs::path& folder) {
   std::vector<TrialScore> all;
   if (!fs::is_directory(folder)) return all;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().extension() == ".json" && entry.path().filename().string().starts_with("trial-")) all.push_back(read_trial(entry));
+    if (entry.path().extension() == ".json" && entry.path().filename().string().starts_with("trial-"))
+      all.push_back(read_trial(entry));
   }
-  std::sort(all.begin(), all.end(), [](const TrialScore& a, const TrialScore& b) { return a.trial.number < b.trial.number; });
+  std::sort(all.begin(), all.end(),
+            [](const TrialScore& a, const TrialScore& b) { return a.trial.number < b.trial.number; });
   return all;
 }
 
@@ -235,7 +242,8 @@ std::size_t first_unfinished(const fs::path& folder, const std::vector<Trial>& t
   return trials.size();
 }
 
-TrialRecord simulate_trial(const Protocol& p, const Trial& trial, const Stimulus& stimulus, SimulatedParticipant& participant) {
+TrialRecord simulate_trial(const Protocol& p, const Trial& trial, const Stimulus& stimulus,
+                           SimulatedParticipant& participant) {
   TrialRecord r;
   r.trial = trial;
   r.device = "simulated participant";
@@ -259,7 +267,8 @@ TrialRecord simulate_trial(const Protocol& p, const Trial& trial, const Stimulus
 }
 
 std::size_t simulate_participant(const fs::path& experiment, const Protocol& p, std::size_t participant, bool retention,
-                                 const ParticipantModel& model, const Context& context, const std::function<void()>& after_each) {
+                                 const ParticipantModel& model, const Context& context,
+                                 const std::function<void()>& after_each) {
   const std::string& code = p.participants.at(participant);
   const fs::path folder = trials_folder(experiment, code, retention);
   const std::vector<Trial> trials = retention ? retention_of(p, participant) : trials_of(p, participant);
@@ -278,4 +287,4 @@ std::size_t simulate_participant(const fs::path& experiment, const Protocol& p, 
   return done;
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

@@ -1,12 +1,13 @@
-// A proxy as the libraries of 2006 had it: it runs towards the device until triangles stop it, along one, then along the edge of two, into
-// the corner of three (C. Zilles, J. Salisbury, IROS 1995), kept off each by a fixed small distance; friction by a cone about the normal
-// (W. Harwin, N. Melder, EuroHaptics 2002). It knows triangles only where the way crosses them. Written from the papers, as a baseline.
+// A proxy as the libraries of 2006 had it: it runs towards the device until triangles stop it, along one, then along
+// the edge of two, into the corner of three (C. Zilles, J. Salisbury, IROS 1995), kept off each by a fixed small
+// distance; friction by a cone about the normal (W. Harwin, N. Melder, EuroHaptics 2002). It knows triangles only where
+// the way crosses them. Written from the papers, as a baseline.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 
-#include "osteo/geometry/distance/triangle_tree.h"
 #include "osteo/assessment/ground_truth/point_renderer.h"
+#include "osteo/geometry/distance/triangle_tree.h"
 
 namespace osteo::inline assessment::truth {
 namespace {
@@ -19,7 +20,8 @@ class SegmentFinder {
     const double most = std::max({size.x, size.y, size.z});
     cell_ = most / std::clamp(std::sqrt(static_cast<double>(soup.triangles.size()) / 3), 4.0, 128.0);
     for (std::size_t a = 0; a < 3; ++a) n_[a] = static_cast<int>(size[a] / cell_) + 1;
-    first_.assign(static_cast<std::size_t>(n_[0]) * static_cast<std::size_t>(n_[1]) * static_cast<std::size_t>(n_[2]) + 1, 0);
+    first_.assign(
+        static_cast<std::size_t>(n_[0]) * static_cast<std::size_t>(n_[1]) * static_cast<std::size_t>(n_[2]) + 1, 0);
     for (const bool filling : {false, true}) {
       for (std::uint32_t t = 0; t < soup.triangles.size(); ++t) {
         BoxMm b;
@@ -66,7 +68,8 @@ class SegmentFinder {
         if (dot(way, normal_[t]) >= 0) continue;
         // T. Moeller, B. Trumbore 1997.
         const auto& c = soup_.triangles[t];
-        const Vec3 p = soup_.points_mm[c[0]], e1 = soup_.points_mm[c[1]] - p, e2 = soup_.points_mm[c[2]] - p, h = cross(way, e2);
+        const Vec3 p = soup_.points_mm[c[0]], e1 = soup_.points_mm[c[1]] - p, e2 = soup_.points_mm[c[2]] - p,
+                   h = cross(way, e2);
         const double det = dot(e1, h);
         if (det == 0) continue;
         const Vec3 from = a - p, q = cross(from, e1);
@@ -79,8 +82,8 @@ class SegmentFinder {
   }
   [[nodiscard]] Vec3 normal(std::uint32_t t) const { return normal_[t]; }
   [[nodiscard]] std::size_t memory_bytes() const {
-    return items_.size() * 4 + first_.size() * 4 + seen_.size() * 4 + normal_.size() * sizeof(Vec3) + soup_.triangles.size() * 12 +
-           soup_.points_mm.size() * sizeof(Vec3);
+    return items_.size() * 4 + first_.size() * 4 + seen_.size() * 4 + normal_.size() * sizeof(Vec3) +
+           soup_.triangles.size() * 12 + soup_.points_mm.size() * sizeof(Vec3);
   }
 
  private:
@@ -163,8 +166,8 @@ class ConeRenderer final : public PointRenderer {
     if (r.contact) {
       Vec3 spring = at - device;
       if (shaded_ && stopped < 3) {
-        // Force shading (H. Morgenbesser, M. Srinivasan 1996): as hard as the triangle pushes, along the normal between its corners'. Where
-        // the proxy slid on, that of where it is now.
+        // Force shading (H. Morgenbesser, M. Srinivasan 1996): as hard as the triangle pushes, along the normal between
+        // its corners'. Where the proxy slid on, that of where it is now.
         const auto here = finder_.first(at + face * off_, at - face * (3 * off_), r.operations);
         const auto& where = here.triangle != ClosestPoint::kNone ? here : touched;
         const double depth = dot(spring, face);
@@ -192,8 +195,9 @@ class ConeRenderer final : public PointRenderer {
 
 }  // namespace
 
-std::unique_ptr<PointRenderer> make_cone_renderer(const TriangleSoup& mesh, bool shaded, const RenderSettings& settings) {
+std::unique_ptr<PointRenderer> make_cone_renderer(const TriangleSoup& mesh, bool shaded,
+                                                  const RenderSettings& settings) {
   return std::make_unique<ConeRenderer>(mesh, shaded, settings);
 }
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

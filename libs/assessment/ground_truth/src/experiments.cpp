@@ -139,10 +139,11 @@ sheet::Plot plot_by_size(const Experiment& e, const std::vector<Row>& rows, std:
 void add_table(const Experiment& e, const std::vector<Row>& rows, const RunAll& run) {
   ResultTable table{e.id, e.title, e.note, {"solid", "renderer", "friction"}, {}, {}};
   if (!e.printed.empty()) table.head.push_back("printed N");
-  for (const char* h : {"mean N", "RMS N", "p95 N", "max N", "direction deg", "position mm", "over 0.5 mm %", "missed ms", "false ms",
-                        "pushed in", "operations"})
+  for (const char* h : {"mean N", "RMS N", "p95 N", "max N", "direction deg", "position mm", "over 0.5 mm %",
+                        "missed ms", "false ms", "pushed in", "operations"})
     table.head.push_back(h);
-  ResultTable cost{e.id + "-cost", e.title + ": cost", "", {"solid", "renderer", "ns p50", "ns p99", "set-up s", "MB"}, {}, {}};
+  ResultTable cost{
+      e.id + "-cost", e.title + ": cost", "", {"solid", "renderer", "ns p50", "ns p99", "set-up s", "MB"}, {}, {}};
   for (const Row& r : rows) {
     const Accuracy& a = r.played.accuracy;
     std::vector<std::string> cells{r.solid, r.renderer, digits(r.friction, 2)};
@@ -158,13 +159,14 @@ void add_table(const Experiment& e, const std::vector<Row>& rows, const RunAll& 
       cells.push_back(c);
     table.cells.push_back(std::move(cells));
     const Cost& c = r.played.cost;
-    cost.cells.push_back({r.solid, r.renderer, fixed(c.ns_p50, 0), fixed(c.ns_p99, 0), fixed(c.setup_s, 3), fixed(c.memory_mb, 2)});
+    cost.cells.push_back(
+        {r.solid, r.renderer, fixed(c.ns_p50, 0), fixed(c.ns_p99, 0), fixed(c.setup_s, 3), fixed(c.memory_mb, 2)});
   }
   if (e.plot_by_size) {
     std::string legend;
     table.plots.push_back(plot_by_size(e, rows, legend));
-    table.note +=
-        std::string(table.note.empty() ? "" : " ") + "Lines: " + legend + (e.printed.empty() ? "." : "; dashed: printed in 2006.");
+    table.note += std::string(table.note.empty() ? "" : " ") + "Lines: " + legend +
+                  (e.printed.empty() ? "." : "; dashed: printed in 2006.");
   }
   run.result.tables.push_back(std::move(table));
   run.result.costs.push_back(std::move(cost));
@@ -178,7 +180,9 @@ void run_recorded(const RunAll& run) {
   Experiment e;
   e.id = "recorded";
   e.title = "A recorded trajectory";
-  e.note = "Forces as they were recorded; the contact is the nearest point of the surface, the in-trajectory p_out - F_n / k.";
+  e.note =
+      "Forces as they were recorded; the contact is the nearest point of the surface, the in-trajectory p_out - F_n / "
+      "k.";
   e.printed = {{"voxel:32/1000", 0.136}, {"voxel:64/1000", 0.130}, {"cone:1000", 0.129}};
   e.renderers = {"voxel:32/1000", "voxel:64/1000", "cone:1000", "cone-shaded:1000", "triangles:1000",
                  "shaded:1000",   "field:64",      "spline:64", "spline:128"};
@@ -187,7 +191,8 @@ void run_recorded(const RunAll& run) {
   for (const std::string& what : e.renderers) {
     run.context.progress(static_cast<double>(rows.size()) / static_cast<double>(e.renderers.size()), what);
     const RenderSettings s{.stiffness_n_per_mm = t.stiffness_n_per_mm, .rate_hz = t.rate_hz};
-    rows.push_back({"recorded", what, 0, play(t, *make_point_renderer(what, *solid, s, run.context), s, false, run.context)});
+    rows.push_back(
+        {"recorded", what, 0, play(t, *make_point_renderer(what, *solid, s, run.context), s, false, run.context)});
   }
   add_table(e, rows, run);
 }
@@ -214,7 +219,8 @@ void run_experiment(const Experiment& e, const RunAll& run, const std::shared_pt
       rank.friction_mean_n /= std::max(1, rough);
       run.result.ranks.push_back(rank);
     }
-    std::stable_sort(run.result.ranks.begin(), run.result.ranks.end(), [](const Rank& a, const Rank& b) { return a.mean_n < b.mean_n; });
+    std::stable_sort(run.result.ranks.begin(), run.result.ranks.end(),
+                     [](const Rank& a, const Rank& b) { return a.mean_n < b.mean_n; });
     for (const double friction : {0.0, 0.3}) {
       // The smooth ones are what 1 MB, 64^3 voxels, can hold.
       double worst = 0, duck = 0, all = 0;
@@ -227,12 +233,15 @@ void run_experiment(const Experiment& e, const RunAll& run, const std::shared_pt
           worst = std::max(worst, m);
       }
       const double limit = friction > 0 ? 0.001 : 0.0005;
-      run.result.bars.push_back({std::string("mean force error on the duck, 1 MB (spline:64), friction ") + digits(friction, 2),
-                                 fixed(limit, 4) + " N", fixed(duck, 5) + " N", duck <= limit});
-      run.result.bars.push_back({std::string("the same, worst of plane, sphere, torus, duck, saddle, friction ") + digits(friction, 2),
-                                 fixed(limit, 4) + " N", fixed(worst, 5) + " N", worst <= limit});
-      run.result.bars.push_back({std::string("the same, worst of all nine (sharp edges, a thin wall), friction ") + digits(friction, 2),
-                                 fixed(limit, 4) + " N", fixed(all, 5) + " N", all <= limit});
+      run.result.bars.push_back(
+          {std::string("mean force error on the duck, 1 MB (spline:64), friction ") + digits(friction, 2),
+           fixed(limit, 4) + " N", fixed(duck, 5) + " N", duck <= limit});
+      run.result.bars.push_back(
+          {std::string("the same, worst of plane, sphere, torus, duck, saddle, friction ") + digits(friction, 2),
+           fixed(limit, 4) + " N", fixed(worst, 5) + " N", worst <= limit});
+      run.result.bars.push_back(
+          {std::string("the same, worst of all nine (sharp edges, a thin wall), friction ") + digits(friction, 2),
+           fixed(limit, 4) + " N", fixed(all, 5) + " N", all <= limit});
     }
   }
 }
@@ -286,7 +295,8 @@ Experiment parse_experiment(std::string_view text, const std::string& name) {
   e.renderers = texts("renderers");
   if (const JsonValue* f = file.root().find("frictions")) {
     e.frictions.clear();
-    for (const JsonValue& v : file.list(*f, "\"frictions\"")) e.frictions.push_back(file.number(v, "an item of \"frictions\"", 0, 3));
+    for (const JsonValue& v : file.list(*f, "\"frictions\""))
+      e.frictions.push_back(file.number(v, "an item of \"frictions\"", 0, 3));
     if (e.frictions.empty()) throw file.wrong(*f, "\"frictions\" names nothing");
   }
   if (const JsonValue* p = file.root().find("printed")) {
@@ -302,14 +312,16 @@ Experiment parse_experiment(std::string_view text, const std::string& name) {
 const std::vector<Experiment>& built_in_experiments() {
   static const std::vector<Experiment> all = [] {
     std::vector<Experiment> v;
-    for (const auto& [name, text] : kGroundTruthJson) v.push_back(parse_experiment(text, "the built-in " + std::string(name)));
+    for (const auto& [name, text] : kGroundTruthJson)
+      v.push_back(parse_experiment(text, "the built-in " + std::string(name)));
     return v;
   }();
   return all;
 }
 
 GroundTruthResult run_ground_truth(const GroundTruthOptions& options, const Context& context) {
-  if (!(options.share > 0 && options.share <= 10)) throw Error(ExitCode::usage, "the share of the length lies between 0 and 10");
+  if (!(options.share > 0 && options.share <= 10))
+    throw Error(ExitCode::usage, "the share of the length lies between 0 and 10");
   GroundTruthResult result;
   std::shared_ptr<const Solid> bone;
   // Its progress is not part of the whole's.
@@ -320,9 +332,11 @@ GroundTruthResult run_ground_truth(const GroundTruthOptions& options, const Cont
     e.id = "bone";
     e.title = "A bone, by the exact distance to its mesh";
     e.note =
-        "Brought to 70 mm. The truth is the surface where that distance, in voxels of 1.25 mm joined by the cubic spline, is 0; 8 N/mm. "
+        "Brought to 70 mm. The truth is the surface where that distance, in voxels of 1.25 mm joined by the cubic "
+        "spline, is 0; 8 N/mm. "
         "Triangles are the "
-        "mesh itself, so they differ from it by what the spline rounds off as well. Sharper than its voxels it is still here and there: ";
+        "mesh itself, so they differ from it by what the spline rounds off as well. Sharper than its voxels it is "
+        "still here and there: ";
     // Where the way in has another way out, the truth is not the only one.
     const PathParams path{options.seed, false};
     int other = 0;
@@ -330,7 +344,8 @@ GroundTruthResult run_ground_truth(const GroundTruthOptions& options, const Cont
       const Vec3 at = bone->place(0.05 * i, path);
       other += length(bone->foot(at - bone->normal(at) * (2 / bone->stiffness_n_per_mm())) - at) > 0.1 ? 1 : 0;
     }
-    e.note += "at " + std::to_string(other) + " of 400 places of the way the surface nearest to the device, pressed with 2 N, is another.";
+    e.note += "at " + std::to_string(other) +
+              " of 400 places of the way the surface nearest to the device, pressed with 2 N, is another.";
     e.solids = {"bone"};
     e.frictions = {0, 0.3};
     e.renderers = {"exact",       "field:128",      "spline:128", "field:64",     "spline:64",
@@ -349,15 +364,16 @@ GroundTruthResult run_ground_truth(const GroundTruthOptions& options, const Cont
   std::size_t step = 0;
   const auto next = [&] {
     ++step;
-    return context.sub(static_cast<double>(step - 1) / static_cast<double>(steps), static_cast<double>(step) / static_cast<double>(steps));
+    return context.sub(static_cast<double>(step - 1) / static_cast<double>(steps),
+                       static_cast<double>(step) / static_cast<double>(steps));
   };
   for (const Experiment& e : experiments) {
     const Context part = next();
     run_experiment(e, {options, part, result}, bone);
   }
   if (options.only.empty()) {
-    for (auto* const run : {run_friction, run_ridges, run_units, run_rates, run_smoothness, run_receding, run_layers, run_delay,
-                            run_vibration, run_texture}) {
+    for (auto* const run : {run_friction, run_ridges, run_units, run_rates, run_smoothness, run_receding, run_layers,
+                            run_delay, run_vibration, run_texture}) {
       const Context part = next();
       part.progress(0, "special experiments");
       run({options, part, result});
@@ -366,4 +382,4 @@ GroundTruthResult run_ground_truth(const GroundTruthOptions& options, const Cont
   return result;
 }
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

@@ -63,7 +63,8 @@ double amplitude(const std::vector<double>& signal, double hz, double rate) {
 void run_receding(const RunAll& run) {
   ResultTable table{"receding",
                     "Bone taken away under the burr",
-                    "Flat bone sinks under a burr of 4 mm that follows it half a millimetre deep, 4 N/mm, voxels of 0.5 mm; every tick the "
+                    "Flat bone sinks under a burr of 4 mm that follows it half a millimetre deep, 4 N/mm, voxels of "
+                    "0.5 mm; every tick the "
                     "voxels of the face lose their share. "
                     "The truth is the depth times the stiffness.",
                     {"method", "mm/s", "mean N", "max N", "lost ms", "largest change in a tick N", "the truth's own"},
@@ -121,14 +122,17 @@ void run_receding(const RunAll& run) {
 }
 
 void run_layers(const RunAll& run) {
-  ResultTable table{"layers",
-                    "Drilling through two layers",
-                    "A 4 mm burr on its side, fed down at 1 mm/s through 5 mm of 1500 HU into 500 HU, a third as hard. Its lowest point "
-                    "meets the soft bone at 5 mm, its middle at 7 mm. Force is not asked to fall to a third, since the hole is wider in "
-                    "soft bone; what is removed is bounded by what the burr swept: a closed form.",
-                    {"voxels mm", "Hz", "N in hard bone", "N in soft bone", "a tenth of the step at mm", "removed over swept"},
-                    {},
-                    {}};
+  ResultTable table{
+      "layers",
+      "Drilling through two layers",
+      "A 4 mm burr on its side, fed down at 1 mm/s through 5 mm of 1500 HU into 500 HU, a third as hard. Its lowest "
+      "point "
+      "meets the soft bone at 5 mm, its middle at 7 mm. Force is not asked to fall to a third, since the hole is wider "
+      "in "
+      "soft bone; what is removed is bounded by what the burr swept: a closed form.",
+      {"voxels mm", "Hz", "N in hard bone", "N in soft bone", "a tenth of the step at mm", "removed over swept"},
+      {},
+      {}};
   struct Case {
     double h, hz;
   };
@@ -141,7 +145,8 @@ void run_layers(const RunAll& run) {
       fill_to(bone, 0, -20, 20);
       BrickGrid hu(bone);
       for (VoxelKey v = 0; v < hu.brick_count() * BrickGrid::kVoxels; ++v)
-        hu.set(v, hu.frame().world_from_index({0, 0, static_cast<double>(hu.coordinate(v).k)}).z > -5 ? 1500.0F : 500.0F);
+        hu.set(v,
+               hu.frame().world_from_index({0, 0, static_cast<double>(hu.coordinate(v).k)}).z > -5 ? 1500.0F : 500.0F);
       const auto hardness = std::make_shared<const Hardness>(bone, to_sparse(hu, "hu"));
       HapticSetup setup;
       setup.params.effects.vibration = setup.params.effects.shaft = false;
@@ -177,8 +182,10 @@ void run_layers(const RunAll& run) {
           break;
         }
       // A ball that went straight down `deep`: half a ball and a cylinder, less what is above the face.
-      const double r = 2, deep = deep_mm.back(), swept = std::numbers::pi * r * r * (deep - r) + 2.0 / 3 * std::numbers::pi * r * r * r;
-      table.cells[c] = {digits(h, 2), digits(hz, 4), fixed(hard, 2), fixed(soft, 2), fixed(begins, 2), fixed(removed / swept, 3)};
+      const double r = 2, deep = deep_mm.back(),
+                   swept = std::numbers::pi * r * r * (deep - r) + 2.0 / 3 * std::numbers::pi * r * r * r;
+      table.cells[c] = {digits(h, 2),   digits(hz, 4),    fixed(hard, 2),
+                        fixed(soft, 2), fixed(begins, 2), fixed(removed / swept, 3)};
     }
   });
   run.result.tables.push_back(std::move(table));
@@ -187,7 +194,8 @@ void run_layers(const RunAll& run) {
 void run_vibration(const RunAll& run) {
   ResultTable table{"vibration",
                     "The drill's vibration against its file",
-                    "Each peak of the built-in file below 500 Hz, from the forces of 8 s, pressed with 0, 1 and 3 N at full and at half "
+                    "Each peak of the built-in file below 500 Hz, from the forces of 8 s, pressed with 0, 1 and 3 N at "
+                    "full and at half "
                     "speed; the largest difference over rates of 1, 2 and 5 kHz. "
                     "Peaks above 0.45 of the rate are not played.",
                     {"burr", "pressed N", "speed", "peaks", "largest difference dB"},
@@ -217,7 +225,8 @@ void run_vibration(const RunAll& run) {
         table.cells.push_back({std::string(kBurrKinds[index].name), digits(pressed, 2), digits(speed, 2),
                                std::to_string(peaks), fixed(most, 3)});
       }
-  run.result.bars.push_back({"vibration of the drill against its file, below 500 Hz", "1 dB", fixed(worst, 3) + " dB", worst <= 1});
+  run.result.bars.push_back(
+      {"vibration of the drill against its file, below 500 Hz", "1 dB", fixed(worst, 3) + " dB", worst <= 1});
   run.result.tables.push_back(std::move(table));
 }
 
@@ -247,17 +256,20 @@ void run_texture(const RunAll& run) {
     return parse_texture(text + R"(], "noise_n2": )" + digits(noise, 17) + "}]}", "the texture of the test").nodes[0];
   };
   model.nodes = {node_of(60, 220, 1e-5), node_of(140, 380, 4e-5), node_of(70, 240, 4e-5), node_of(160, 420, 1.6e-4)};
-  ResultTable table{
-      "texture",
-      "A texture against its file",
-      "A model of vibration at four pairs of force and speed, played for 400 s; Welch's spectrum (Hann, 1024 samples at 2 kHz) against the "
-      "model's own, every "
-      "8 Hz from 16 to 496 Hz. What such a mean of 781 spectra is off by chance: 0.16 dB each, about 0.5 dB the worst of 61. 'Found "
-      "again': Burg's method on what was played.",
-      {"pressed N", "mm/s", "largest difference dB", "mean difference dB", "rms N", "rms of the file N", "found again, largest dB"},
-      {},
-      {}};
-  const std::size_t samples = static_cast<std::size_t>(std::max(40.0, 400 * std::min(1.0, run.options.share)) * kRate), window = 1024;
+  ResultTable table{"texture",
+                    "A texture against its file",
+                    "A model of vibration at four pairs of force and speed, played for 400 s; Welch's spectrum (Hann, "
+                    "1024 samples at 2 kHz) against the "
+                    "model's own, every "
+                    "8 Hz from 16 to 496 Hz. What such a mean of 781 spectra is off by chance: 0.16 dB each, about 0.5 "
+                    "dB the worst of 61. 'Found "
+                    "again': Burg's method on what was played.",
+                    {"pressed N", "mm/s", "largest difference dB", "mean difference dB", "rms N", "rms of the file N",
+                     "found again, largest dB"},
+                    {},
+                    {}};
+  const std::size_t samples = static_cast<std::size_t>(std::max(40.0, 400 * std::min(1.0, run.options.share)) * kRate),
+                    window = 1024;
   table.cells.resize(4);
   std::array<double, 4> largest{};
   parallel_for(4, 1, run.context.threads, [&](std::size_t begin, std::size_t end) {
@@ -279,7 +291,8 @@ void run_texture(const RunAll& run) {
       for (double hz = 16; hz < 500; hz += 8) {
         double weight = 0;
         for (std::size_t i = 0; i < window; ++i) {
-          const double w = 0.5 - 0.5 * portable::sin_cos_turns(static_cast<double>(i) / static_cast<double>(window)).cos;
+          const double w =
+              0.5 - 0.5 * portable::sin_cos_turns(static_cast<double>(i) / static_cast<double>(window)).cos;
           const auto turn = portable::sin_cos_turns(std::fmod(hz * static_cast<double>(i) / kRate, 1.0));
           re[i] = w * turn.cos;
           im[i] = w * turn.sin;
@@ -309,8 +322,9 @@ void run_texture(const RunAll& run) {
     }
   });
   const double worst = *std::max_element(largest.begin(), largest.end());
-  run.result.bars.push_back({"texture's spectrum against its file, below 500 Hz", "1 dB", fixed(worst, 2) + " dB", worst <= 1});
+  run.result.bars.push_back(
+      {"texture's spectrum against its file, below 500 Hz", "1 dB", fixed(worst, 2) + " dB", worst <= 1});
   run.result.tables.push_back(std::move(table));
 }
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

@@ -23,7 +23,8 @@ double at_share(std::vector<double>& v, double share) {
 
 }  // namespace
 
-Played play(const Trajectory& t, PointRenderer& renderer, const RenderSettings& settings, bool keep, const Context& context) {
+Played play(const Trajectory& t, PointRenderer& renderer, const RenderSettings& settings, bool keep,
+            const Context& context) {
   Played out;
   Accuracy& a = out.accuracy;
   out.cost.setup_s = renderer.setup_s();
@@ -91,7 +92,8 @@ Played play(const Trajectory& t, PointRenderer& renderer, const RenderSettings& 
   return out;
 }
 
-double energy_per_cycle_mj(const Solid& solid, const std::string& what, double rate_hz, double* kept, const Context& context) {
+double energy_per_cycle_mj(const Solid& solid, const std::string& what, double rate_hz, double* kept,
+                           const Context& context) {
   TruthParams p;
   p.path.closed = true;
   p.seconds = 2 * kCycleS;
@@ -109,7 +111,8 @@ double energy_per_cycle_mj(const Solid& solid, const std::string& what, double r
   const std::size_t half = t.moments.size() / 2;
   double work = 0, turned = 0;
   for (std::size_t i = half; i < t.moments.size(); ++i) {
-    // Of the hand from the moment before to this one, against the mean of the forces: the trapezoid's error is of second order.
+    // Of the hand from the moment before to this one, against the mean of the forces: the trapezoid's error is of
+    // second order.
     const Vec3 way = t.moments[i].device_mm - t.moments[i - 1].device_mm;
     const double w_i = dot((played.rendered[i].force_n + played.rendered[i - 1].force_n) * 0.5, way);
     work += w_i;
@@ -170,4 +173,4 @@ Identified identify_friction(const Trajectory& t, const Solid& solid, const std:
   return out;
 }
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

@@ -24,7 +24,8 @@ class FieldRenderer final : public PointRenderer {
       : begin_(std::chrono::steady_clock::now()), field_(make()), stiffness_(s.stiffness_n_per_mm / s.unit) {
     setup_s_ = seconds_since(begin_);
     grain_mm_ = grain;
-    params_ = {.friction = s.friction, .static_friction = s.friction, .feature_mm = feature, .tolerance_mm = 2e-7 * size};
+    params_ = {
+        .friction = s.friction, .static_friction = s.friction, .feature_mm = feature, .tolerance_mm = 2e-7 * size};
   }
   void remember(std::size_t bytes) { memory_bytes_ = bytes; }
   [[nodiscard]] const Field& field() const { return field_; }
@@ -95,8 +96,8 @@ double number_of(const std::string& what, std::string_view text, double lo, doub
   double v = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), v);
   if (error != std::errc() || end != text.data() + text.size() || !(v >= lo && v <= hi))
-    throw Error(ExitCode::usage, "renderer '" + what + "': '" + std::string(text) + "' is no number from " + std::to_string(lo) + " to " +
-                                     std::to_string(hi));
+    throw Error(ExitCode::usage, "renderer '" + what + "': '" + std::string(text) + "' is no number from " +
+                                     std::to_string(lo) + " to " + std::to_string(hi));
   return v;
 }
 
@@ -127,30 +128,35 @@ std::unique_ptr<PointRenderer> make_point_renderer(const std::string& what, cons
     const double h = 2 * solid.half_mm() / (n - 1);
     const FieldCurve curve = kind == "spline" ? FieldCurve::spline : FieldCurve::catmull_rom;
     // Steps along the surface as long as the field is smooth, but not beyond what is felt.
-    auto r = std::make_unique<FieldRenderer<CubicField>>([&] { return sampled_field(solid, n, s.unit, curve, context); }, s,
-                                                         std::min(2.0, 1.5 * h) * s.unit, size, h);
+    auto r = std::make_unique<FieldRenderer<CubicField>>(
+        [&] { return sampled_field(solid, n, s.unit, curve, context); }, s, std::min(2.0, 1.5 * h) * s.unit, size, h);
     r->remember(r->field().memory_bytes());
     return r;
   }
   if (kind == "exact") {
     if (!rest.empty()) throw Error(ExitCode::usage, "renderer 'exact' takes no settings");
-    return std::make_unique<FieldRenderer<ExactField>>([&] { return ExactField(solid, s.unit); }, s, 0.25 * s.unit, size, 0.25);
+    return std::make_unique<FieldRenderer<ExactField>>([&] { return ExactField(solid, s.unit); }, s, 0.25 * s.unit,
+                                                       size, 0.25);
   }
   if (kind == "triangles" || kind == "shaded") {
     const TriangleSoup mesh = scaled(solid.mesh(static_cast<int>(number_of(what, rest, 4, 1e7))), s.unit);
-    auto r = std::make_unique<FieldRenderer<MeshField>>([&] { return MeshField(mesh, kind == "shaded", context); }, s, 2 * s.unit, size,
-                                                        edge_of(mesh) / s.unit);
+    auto r = std::make_unique<FieldRenderer<MeshField>>([&] { return MeshField(mesh, kind == "shaded", context); }, s,
+                                                        2 * s.unit, size, edge_of(mesh) / s.unit);
     r->remember(mesh.triangles.size() * 240);
     return r;
   }
   if (kind == "voxel") {
     const std::size_t slash = rest.find('/');
-    if (slash == std::string::npos) throw Error(ExitCode::usage, "renderer '" + what + "' needs voxels and triangles, as in voxel:32/6000");
-    const TriangleSoup mesh = scaled(solid.mesh(static_cast<int>(number_of(what, rest.substr(slash + 1), 4, 1e7))), s.unit);
-    return make_voxel_renderer(mesh, static_cast<int>(number_of(what, rest.substr(0, slash), 4, 512)), solid.half_mm(), s, context);
+    if (slash == std::string::npos)
+      throw Error(ExitCode::usage, "renderer '" + what + "' needs voxels and triangles, as in voxel:32/6000");
+    const TriangleSoup mesh =
+        scaled(solid.mesh(static_cast<int>(number_of(what, rest.substr(slash + 1), 4, 1e7))), s.unit);
+    return make_voxel_renderer(mesh, static_cast<int>(number_of(what, rest.substr(0, slash), 4, 512)), solid.half_mm(),
+                               s, context);
   }
   if (kind == "cone" || kind == "cone-shaded")
-    return make_cone_renderer(scaled(solid.mesh(static_cast<int>(number_of(what, rest, 4, 1e7))), s.unit), kind == "cone-shaded", s);
+    return make_cone_renderer(scaled(solid.mesh(static_cast<int>(number_of(what, rest, 4, 1e7))), s.unit),
+                              kind == "cone-shaded", s);
   if (kind == "process") {
     if (rest.empty()) throw Error(ExitCode::usage, "renderer 'process:' needs a command");
     return make_process_renderer(rest, scaled(solid.mesh(20000), s.unit), s);
@@ -158,13 +164,16 @@ std::unique_ptr<PointRenderer> make_point_renderer(const std::string& what, cons
   for (std::size_t m = 0; m < EnumNames<ContactMethod>::values.size(); ++m) {
     if (kind != EnumNames<ContactMethod>::values[m]) continue;
     if (s.unit != 1 || s.probe_radius_mm != 2)
-      throw Error(ExitCode::usage,
-                  "renderer '" + what + "' is a 4 mm burr in millimetres: the trajectory must be of a probe of 2 mm radius");
-    return std::make_unique<BurrRenderer>(static_cast<ContactMethod>(m), solid, number_of(what, rest, 0.2, 2), s, context);
+      throw Error(
+          ExitCode::usage,
+          "renderer '" + what + "' is a 4 mm burr in millimetres: the trajectory must be of a probe of 2 mm radius");
+    return std::make_unique<BurrRenderer>(static_cast<ContactMethod>(m), solid, number_of(what, rest, 0.2, 2), s,
+                                          context);
   }
   throw Error(ExitCode::usage, "there is no renderer '" + what + "'",
-              "exact, field:N, spline:N, triangles:N, shaded:N, voxel:N/M, cone:M, cone-shaded:M, overlap:H, proxy:H, volume:H, rays:H, "
+              "exact, field:N, spline:N, triangles:N, shaded:N, voxel:N/M, cone:M, cone-shaded:M, overlap:H, proxy:H, "
+              "volume:H, rays:H, "
               "process:COMMAND");
 }
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

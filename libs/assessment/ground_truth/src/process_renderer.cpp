@@ -14,9 +14,9 @@
 #include <cstring>
 #include <mutex>
 
+#include "osteo/assessment/ground_truth/point_renderer.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/assessment/ground_truth/point_renderer.h"
 
 extern char** environ;  // NOLINT
 
@@ -27,13 +27,15 @@ constexpr std::size_t kLongestLine = 1 << 16;
 
 // As OFF: every language reads it in ten lines.
 std::string off_text(const TriangleSoup& mesh) {
-  std::string text = "OFF\n" + std::to_string(mesh.points_mm.size()) + " " + std::to_string(mesh.triangles.size()) + " 0\n";
+  std::string text =
+      "OFF\n" + std::to_string(mesh.points_mm.size()) + " " + std::to_string(mesh.triangles.size()) + " 0\n";
   char line[128];
   for (const Vec3& p : mesh.points_mm) {
     std::snprintf(line, sizeof line, "%.17g %.17g %.17g\n", p.x, p.y, p.z);
     text += line;
   }
-  for (const auto& t : mesh.triangles) text += "3 " + std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]) + "\n";
+  for (const auto& t : mesh.triangles)
+    text += "3 " + std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]) + "\n";
   return text;
 }
 
@@ -45,8 +47,8 @@ class ProcessRenderer final : public PointRenderer {
     write_file(folder_.path() / "solid.off", off_text(mesh));
     start();
     char text[512];
-    std::snprintf(text, sizeof text, "stiffness %.17g\nfriction %.17g\nrate_hz %.17g\nunit_mm %.17g\n", s.stiffness_n_per_mm / s.unit,
-                  s.friction, s.rate_hz, 1 / s.unit);
+    std::snprintf(text, sizeof text, "stiffness %.17g\nfriction %.17g\nrate_hz %.17g\nunit_mm %.17g\n",
+                  s.stiffness_n_per_mm / s.unit, s.friction, s.rate_hz, 1 / s.unit);
     say("osteotome-ground-truth 1\nmesh " + (folder_.path() / "solid.off").string() + "\n" + text + "ready?\n");
     const std::string answer = hear();
     if (answer.rfind("ready", 0) != 0) fail("said '" + answer.substr(0, 80) + "' where 'ready' was due");
@@ -65,8 +67,9 @@ class ProcessRenderer final : public PointRenderer {
     Rendered r;
     int contact = 0, used = 0;
     own_ns_ = -1;
-    const int got = std::sscanf(answer.c_str(), "force %lf %lf %lf contact %d %lf %lf %lf%n", &r.force_n.x, &r.force_n.y, &r.force_n.z,
-                                &contact, &r.contact_mm.x, &r.contact_mm.y, &r.contact_mm.z, &used);
+    const int got =
+        std::sscanf(answer.c_str(), "force %lf %lf %lf contact %d %lf %lf %lf%n", &r.force_n.x, &r.force_n.y,
+                    &r.force_n.z, &contact, &r.contact_mm.x, &r.contact_mm.y, &r.contact_mm.z, &used);
     const auto finite = [](Vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
     if (got < 7 || !finite(r.force_n) || !finite(r.contact_mm))
       fail("answered '" + answer.substr(0, 80) + "' where 'force FX FY FZ contact 0|1 X Y Z [ns N]' was due");
@@ -138,7 +141,8 @@ class ProcessRenderer final : public PointRenderer {
         return line;
       }
       if (heard_.size() > kLongestLine) fail("says more than a line holds");
-      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - std::chrono::steady_clock::now()).count();
+      const auto left =
+          std::chrono::duration_cast<std::chrono::milliseconds>(until - std::chrono::steady_clock::now()).count();
       pollfd wait{from_, POLLIN, 0};
       const int ready = left > 0 ? ::poll(&wait, 1, static_cast<int>(left)) : 0;
       if (ready < 0 && errno == EINTR) continue;
@@ -178,9 +182,9 @@ class ProcessRenderer final : public PointRenderer {
 
 }  // namespace
 
-std::unique_ptr<PointRenderer> make_process_renderer(const std::string& command, const TriangleSoup& mesh, const RenderSettings& settings,
-                                                     double patience_s) {
+std::unique_ptr<PointRenderer> make_process_renderer(const std::string& command, const TriangleSoup& mesh,
+                                                     const RenderSettings& settings, double patience_s) {
   return std::make_unique<ProcessRenderer>(command, mesh, settings, patience_s);
 }
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

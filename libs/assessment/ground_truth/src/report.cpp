@@ -102,8 +102,14 @@ std::string markdown_of(const GroundTruthResult& r) {
 std::string results_json(const GroundTruthResult& r, const GroundTruthOptions& o) {
   Json tables = Json::list(), bars = Json::list();
   for (const ResultTable& t : r.tables) tables.push_back(json_of(t));
-  for (const Bar& b : r.bars) bars.push_back({{"what", b.what}, {"limit", b.limit}, {"measured", b.measured}, {"held", b.held}});
-  return Json{{"osteotome_ground_truth_results", 1}, {"seed", o.seed}, {"share", o.share}, {"bars", bars}, {"tables", tables}}.dump(1) +
+  for (const Bar& b : r.bars)
+    bars.push_back({{"what", b.what}, {"limit", b.limit}, {"measured", b.measured}, {"held", b.held}});
+  return Json{{"osteotome_ground_truth_results", 1},
+              {"seed", o.seed},
+              {"share", o.share},
+              {"bars", bars},
+              {"tables", tables}}
+             .dump(1) +
          "\n";
 }
 
@@ -119,7 +125,8 @@ Sheet leaderboard_sheet(const GroundTruthResult& r, const GroundTruthOptions& o)
     const bool all = std::all_of(r.bars.begin(), r.bars.end(), [](const Bar& b) { return b.held; });
     const auto missed = std::count_if(r.bars.begin(), r.bars.end(), [](const Bar& b) { return !b.held; });
     add(sheet::Band{all ? "All bars held" : std::to_string(missed) + " missed",
-                    "Errors of renderers against solids of which surface, normal and force are known.", all ? Tone::good : Tone::caution});
+                    "Errors of renderers against solids of which surface, normal and force are known.",
+                    all ? Tone::good : Tone::caution});
     sheet::Table t;
     t.head = {"bar", "limit", "measured", ""};
     t.widths = {60, 14, 14, 10};
@@ -133,7 +140,8 @@ Sheet leaderboard_sheet(const GroundTruthResult& r, const GroundTruthOptions& o)
   if (!r.ranks.empty()) {
     add(sheet::Heading{"Leaderboard"});
     add(
-        sheet::Paragraph{"Mean over all solids of the mean force error, lifts included. Time and memory are the largest of any solid, on "
+        sheet::Paragraph{"Mean over all solids of the mean force error, lifts included. Time and memory are the "
+                         "largest of any solid, on "
                          "the machine that ran this.",
                          Tone::quiet});
     sheet::Table t;
@@ -166,11 +174,14 @@ Sheet leaderboard_sheet(const GroundTruthResult& r, const GroundTruthOptions& o)
 void require_result_folder(const std::filesystem::path& folder, bool replace) {
   if (!output_exists(folder) || (fs::is_directory(folder) && fs::is_empty(folder))) return;
   if (!fs::exists(folder / "results.json") || !fs::exists(folder / "leaderboard.html"))
-    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds something that is no result of this", "give another folder");
-  if (!replace) throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds results already", "--force replaces them");
+    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds something that is no result of this",
+                "give another folder");
+  if (!replace)
+    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds results already", "--force replaces them");
 }
 
-void write_ground_truth(const GroundTruthResult& r, const GroundTruthOptions& o, const std::filesystem::path& folder, bool replace) {
+void write_ground_truth(const GroundTruthResult& r, const GroundTruthOptions& o, const std::filesystem::path& folder,
+                        bool replace) {
   const auto may_replace = [&](const fs::path& old) { require_result_folder(old, replace); };
   write_folder_atomically(folder, may_replace, [&](const fs::path& out) {
     write_file(out / "results.json", results_json(r, o));
@@ -198,4 +209,4 @@ void write_ground_truth(const GroundTruthResult& r, const GroundTruthOptions& o,
   });
 }
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

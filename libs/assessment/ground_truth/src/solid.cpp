@@ -104,7 +104,8 @@ class Cylinder final : public BallLike {
   }
   // t is the share of the profile's length, times pi.
   [[nodiscard]] Vec3 chart(double t, double p) const override {
-    const double quarter = kRadius * std::numbers::pi / 2, all = 2 * quarter + 2 * kReach, at = t / std::numbers::pi * all;
+    const double quarter = kRadius * std::numbers::pi / 2, all = 2 * quarter + 2 * kReach,
+                 at = t / std::numbers::pi * all;
     const auto b = sin_cos(p);
     double r = kRadius, z = kReach - (at - quarter);
     if (at < quarter || at > all - quarter) {
@@ -137,7 +138,8 @@ class Torus final : public Solid {
               around = std::max(4, triangles / 2 / across);
     Patch m;
     for (int i = 0; i < around; ++i)
-      for (int j = 0; j < across; ++j) m.add(chart(2 * std::numbers::pi * j / across, 2 * std::numbers::pi * i / around));
+      for (int j = 0; j < across; ++j)
+        m.add(chart(2 * std::numbers::pi * j / across, 2 * std::numbers::pi * i / around));
     const auto id = [&](int i, int j) { return static_cast<std::uint32_t>(i % around * across + j % across); };
     for (int i = 0; i < around; ++i)
       for (int j = 0; j < across; ++j) m.quad(id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1));
@@ -170,7 +172,8 @@ class Sheet : public Solid {
   [[nodiscard]] Vec3 place(double s, const PathParams& path) const override {
     const Phases f(path.seed);
     const double w = 2 * std::numbers::pi / kCycleS;
-    const double turn = path.closed ? w * s + 0.3 * sin_cos(2 * w * s + f[0]).sin : 0.9 * s + 0.4 * sin_cos(1.7 * s + f[0]).sin;
+    const double turn =
+        path.closed ? w * s + 0.3 * sin_cos(2 * w * s + f[0]).sin : 0.9 * s + 0.4 * sin_cos(1.7 * s + f[0]).sin;
     const double out = (0.45 + 0.15 * sin_cos((path.closed ? w : 0.83) * s + f[1]).sin) * half_mm();
     const auto a = sin_cos(turn);
     const double x = out * a.cos, y = out * a.sin;
@@ -315,15 +318,18 @@ double RidgeProfile::height(double x) const {
   const double run = height_mm / tan;
   // Upper arc, whose centre lies `radius` below the top at d = -cut; lower arc above the plane at d = run + cut.
   if (d <= -cut) return height_mm;
-  if (d < -cut + radius_mm * a.sin) return height_mm - radius_mm + std::sqrt(radius_mm * radius_mm - (d + cut) * (d + cut));
+  if (d < -cut + radius_mm * a.sin)
+    return height_mm - radius_mm + std::sqrt(radius_mm * radius_mm - (d + cut) * (d + cut));
   if (d >= run + cut) return 0;
-  if (d > run + cut - radius_mm * a.sin) return radius_mm - std::sqrt(radius_mm * radius_mm - (d - run - cut) * (d - run - cut));
+  if (d > run + cut - radius_mm * a.sin)
+    return radius_mm - std::sqrt(radius_mm * radius_mm - (d - run - cut) * (d - run - cut));
   return height_mm - tan * d;
 }
 double RidgeProfile::slope(double x) const {
   const double angle = degrees * std::numbers::pi / 180;
   const auto a = portable::sin_cos(angle);
-  const double tan = a.sin / a.cos, cut = radius_mm * a.sin / (1 + a.cos), d = std::abs(x) - top_mm / 2, run = height_mm / tan;
+  const double tan = a.sin / a.cos, cut = radius_mm * a.sin / (1 + a.cos), d = std::abs(x) - top_mm / 2,
+               run = height_mm / tan;
   const double side = x < 0 ? -1 : 1;
   if (d <= -cut || d >= run + cut) return 0;
   if (d < -cut + radius_mm * a.sin) return -side * (d + cut) / std::sqrt(radius_mm * radius_mm - (d + cut) * (d + cut));
@@ -339,7 +345,8 @@ double RidgeProfile::distance(double x, double z) const {
   const double cut = radius_mm * a.sin / (1 + a.cos), run = height_mm * a.cos / a.sin, d = std::abs(x) - top_mm / 2;
   double best = 1e300;
   const auto line = [&](double x0, double z0, double x1, double z1) {
-    const double ux = x1 - x0, uz = z1 - z0, t = std::clamp(((d - x0) * ux + (z - z0) * uz) / (ux * ux + uz * uz), 0.0, 1.0);
+    const double ux = x1 - x0, uz = z1 - z0,
+                 t = std::clamp(((d - x0) * ux + (z - z0) * uz) / (ux * ux + uz * uz), 0.0, 1.0);
     best = std::min(best, portable::hypot(d - x0 - t * ux, z - z0 - t * uz));
   };
   // The arcs turn by the angle of the side: up from the upper centre, down from the lower one.
@@ -364,7 +371,8 @@ std::shared_ptr<const Solid> make_ridge(const RidgeProfile& profile) {
 }
 
 const std::vector<std::string>& solid_names() {
-  static const std::vector<std::string> names{"plane", "sphere", "cylinder", "torus", "duck", "wedge", "saddle", "bump", "wall"};
+  static const std::vector<std::string> names{"plane", "sphere", "cylinder", "torus", "duck",
+                                              "wedge", "saddle", "bump",     "wall"};
   return names;
 }
 
@@ -396,8 +404,8 @@ CubicField sampled_field(const Solid& solid, int n, double scale, FieldCurve cur
       std::size_t at = k * static_cast<std::size_t>(n) * static_cast<std::size_t>(n);
       for (int j = 0; j < n; ++j)
         for (int i = 0; i < n; ++i)
-          v[at++] = static_cast<float>(
-              scale * solid.clearance_mm(Vec3{i * h, j * h, static_cast<double>(k) * h} - Vec3{1, 1, 1} * solid.half_mm()));
+          v[at++] = static_cast<float>(scale * solid.clearance_mm(Vec3{i * h, j * h, static_cast<double>(k) * h} -
+                                                                  Vec3{1, 1, 1} * solid.half_mm()));
     }
   });
   return CubicField(f, std::move(v), curve);
@@ -427,7 +435,8 @@ BrickGrid sampled_bone(const Solid& solid, double h, const Context& context) {
           if (std::abs(c) < 1.8 * h) {
             in = 0;
             for (int s = 0; s < 64; ++s)
-              in += solid.clearance_mm(x + Vec3{(s & 3) - 1.5, (s >> 2 & 3) - 1.5, (s >> 4) - 1.5} * (h / 4)) < 0 ? 1 : 0;
+              in +=
+                  solid.clearance_mm(x + Vec3{(s & 3) - 1.5, (s >> 2 & 3) - 1.5, (s >> 4) - 1.5} * (h / 4)) < 0 ? 1 : 0;
           }
           g.set(g.find(i, j, k), static_cast<float>(in) / 64.0F);
         }
@@ -435,4 +444,4 @@ BrickGrid sampled_bone(const Solid& solid, double h, const Context& context) {
   return g;
 }
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

@@ -15,4 +15,4 @@ class Phases {
   std::array<double, 4> phase_{};
 };
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

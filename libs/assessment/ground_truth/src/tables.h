@@ -30,4 +30,4 @@ void run_delay(const RunAll& run);
 void run_vibration(const RunAll& run);
 void run_texture(const RunAll& run);
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

@@ -35,9 +35,11 @@ double rounded_to(double v, double step) {
 
 Trajectory true_trajectory(const Solid& solid, const TruthParams& p) {
   const double k = p.stiffness_n_per_mm > 0 ? p.stiffness_n_per_mm : solid.stiffness_n_per_mm();
-  if (!(p.seconds > 0 && p.seconds <= 3600 && p.rate_hz >= 1 && p.rate_hz <= 1e5 && p.friction >= 0 && p.friction <= 3 &&
-        p.push_n > p.swing_n && p.swing_n >= 0 && p.probe_radius_mm >= 0))
-    throw Error(ExitCode::usage, "a trajectory takes up to an hour at 1 to 100,000 Hz, friction up to 3, and a push that stays positive");
+  if (!(p.seconds > 0 && p.seconds <= 3600 && p.rate_hz >= 1 && p.rate_hz <= 1e5 && p.friction >= 0 &&
+        p.friction <= 3 && p.push_n > p.swing_n && p.swing_n >= 0 && p.probe_radius_mm >= 0))
+    throw Error(
+        ExitCode::usage,
+        "a trajectory takes up to an hour at 1 to 100,000 Hz, friction up to 3, and a push that stays positive");
   Trajectory t;
   t.stiffness_n_per_mm = k;
   t.friction = p.friction;
@@ -62,7 +64,8 @@ Trajectory true_trajectory(const Solid& solid, const TruthParams& p) {
       }
       m.force_n = spring;
     }
-    m.device_mm = m.surface_mm + m.normal * p.probe_radius_mm - (p.device_by_normal_force ? m.normal * push : spring) / k;
+    m.device_mm =
+        m.surface_mm + m.normal * p.probe_radius_mm - (p.device_by_normal_force ? m.normal * push : spring) / k;
     t.moments.push_back(m);
   }
   return t;
@@ -87,7 +90,8 @@ Trajectory measured_trajectory(const Solid& solid, const Trajectory& truth, cons
     m.surface_mm = solid.foot(seen[i] + (seen[i + 1] - seen[i]) * (at - static_cast<double>(i)));
     m.normal = solid.normal(m.surface_mm);
     m.force_n += gauss(in.force_sd_n);
-    m.force_n = {rounded_to(m.force_n.x, 1.0 / 320), rounded_to(m.force_n.y, 1.0 / 320), rounded_to(m.force_n.z, 1.0 / 640)};
+    m.force_n = {rounded_to(m.force_n.x, 1.0 / 320), rounded_to(m.force_n.y, 1.0 / 320),
+                 rounded_to(m.force_n.z, 1.0 / 640)};
     const double pressed_n = std::max(0.0, dot(m.force_n, m.normal));
     m.device_mm = m.surface_mm + m.normal * t.probe_radius_mm - m.normal * (pressed_n / t.stiffness_n_per_mm);
   }
@@ -99,7 +103,9 @@ std::string traj_text(const Trajectory& t, TrajectoryRole role) {
   char line[256];
   for (const Moment& m : t.moments) {
     const Vec3 x = role == TrajectoryRole::in ? m.device_mm : m.surface_mm;
-    const Vec3 f = role == TrajectoryRole::probe ? m.force_n : role == TrajectoryRole::out && m.contact ? Vec3{0, 0, 1} : Vec3{};
+    const Vec3 f = role == TrajectoryRole::probe              ? m.force_n
+                   : role == TrajectoryRole::out && m.contact ? Vec3{0, 0, 1}
+                                                              : Vec3{};
     std::snprintf(line, sizeof line, "%.6f %.9g %.9g %.9g %.9g %.9g %.9g\n", m.time_s, x.x, x.y, x.z, f.x, f.y, f.z);
     text += line;
   }
@@ -108,19 +114,22 @@ std::string traj_text(const Trajectory& t, TrajectoryRole role) {
 
 std::string trajectory_csv(const Trajectory& t) {
   std::string text =
-      "time_s,surface_x_mm,surface_y_mm,surface_z_mm,normal_x,normal_y,normal_z,force_x_n,force_y_n,force_z_n,device_x_mm,device_y_mm,"
+      "time_s,surface_x_mm,surface_y_mm,surface_z_mm,normal_x,normal_y,normal_z,force_x_n,force_y_n,force_z_n,device_x_"
+      "mm,device_y_mm,"
       "device_z_mm,contact\n";
   char line[512];
   for (const Moment& m : t.moments) {
-    std::snprintf(line, sizeof line, "%.6f,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%d\n", m.time_s,
-                  m.surface_mm.x, m.surface_mm.y, m.surface_mm.z, m.normal.x, m.normal.y, m.normal.z, m.force_n.x, m.force_n.y, m.force_n.z,
-                  m.device_mm.x, m.device_mm.y, m.device_mm.z, m.contact ? 1 : 0);
+    std::snprintf(line, sizeof line,
+                  "%.6f,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%d\n", m.time_s,
+                  m.surface_mm.x, m.surface_mm.y, m.surface_mm.z, m.normal.x, m.normal.y, m.normal.z, m.force_n.x,
+                  m.force_n.y, m.force_n.z, m.device_mm.x, m.device_mm.y, m.device_mm.z, m.contact ? 1 : 0);
     text += line;
   }
   return text;
 }
 
-std::vector<TrajSample> parse_traj(std::string_view text, const std::string& name, std::string_view columns, double rate_hz) {
+std::vector<TrajSample> parse_traj(std::string_view text, const std::string& name, std::string_view columns,
+                                   double rate_hz) {
   enum { kTime, kX, kY, kZ, kFx, kFy, kFz, kKinds };
   static constexpr std::array<std::string_view, kKinds> kNames{"t", "x", "y", "z", "fx", "fy", "fz"};
   const auto next_word = [](std::string_view& rest) {
@@ -141,7 +150,8 @@ std::vector<TrajSample> parse_traj(std::string_view text, const std::string& nam
     const auto* const found = std::find(kNames.begin(), kNames.end(), word);
     const auto kind = static_cast<int>(found - kNames.begin());
     if (word != "-" && (found == kNames.end() || there[static_cast<std::size_t>(kind)]))
-      throw Error(ExitCode::usage, "'" + std::string(word) + "' is no column, or there twice", "columns are t, x, y, z, fx, fy, fz and -");
+      throw Error(ExitCode::usage, "'" + std::string(word) + "' is no column, or there twice",
+                  "columns are t, x, y, z, fx, fy, fz and -");
     kinds.push_back(word == "-" ? -1 : kind);
     if (word != "-") there[static_cast<std::size_t>(kind)] = true;
   }
@@ -179,7 +189,8 @@ std::vector<TrajSample> parse_traj(std::string_view text, const std::string& nam
     }
     if (bad || column < kinds.size())
       throw Error(ExitCode::corrupt,
-                  "'" + name + "' line " + std::to_string(number) + ": there are not " + std::to_string(kinds.size()) + " numbers",
+                  "'" + name + "' line " + std::to_string(number) + ": there are not " + std::to_string(kinds.size()) +
+                      " numbers",
                   "--columns says what stands where");
     TrajSample s;
     s.time_s = there[kTime] ? value[kTime] : static_cast<double>(all.size()) / rate_hz;
@@ -217,4 +228,4 @@ Trajectory trajectory_of(const Solid& solid, const std::vector<TrajSample>& samp
   return t;
 }
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

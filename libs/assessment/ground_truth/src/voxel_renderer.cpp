@@ -1,10 +1,11 @@
-// D. Morris 2006, section 7.4.1: for each voxel the triangle nearest to its middle; in that voxel its plane is the surface.
+// D. Morris 2006, section 7.4.1: for each voxel the triangle nearest to its middle; in that voxel its plane is the
+// surface.
 #include <chrono>
 #include <cmath>
 
+#include "osteo/assessment/ground_truth/point_renderer.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/geometry/distance/triangle_tree.h"
-#include "osteo/assessment/ground_truth/point_renderer.h"
 
 namespace osteo::inline assessment::truth {
 namespace {
@@ -65,9 +66,9 @@ class VoxelRenderer final : public PointRenderer {
 
 }  // namespace
 
-std::unique_ptr<PointRenderer> make_voxel_renderer(const TriangleSoup& mesh, int voxels, double half, const RenderSettings& settings,
-                                                   const Context& context) {
+std::unique_ptr<PointRenderer> make_voxel_renderer(const TriangleSoup& mesh, int voxels, double half,
+                                                   const RenderSettings& settings, const Context& context) {
   return std::make_unique<VoxelRenderer>(mesh, voxels, half, settings, context);
 }
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

@@ -7,8 +7,8 @@
 #include <span>
 
 #include "movie_stage.h"
-#include "osteo/core/base/error.h"
 #include "osteo/assessment/movie/movie_file.h"
+#include "osteo/core/base/error.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_scene.h"
 
@@ -39,14 +39,16 @@ ScopeView fixed_view(const SessionSurvey& survey, const World& begin) {
     const Vec3 eye = length(survey.handle) > 0 ? survey.handle : Vec3{1, 0, 0};
     // From a little aside, so that the shaft does not hide what its burr does.
     const Vec3 aside = std::abs(eye.z) < 0.8 ? Vec3{0, 0, 1} : Vec3{0, -1, 0};
-    return overview((lo + hi) * 0.5, std::max(kLeastMm, 0.5 * length(hi - lo) + kAroundMm), normalized(eye + aside * 0.7));
+    return overview((lo + hi) * 0.5, std::max(kLeastMm, 0.5 * length(hi - lo) + kAroundMm),
+                    normalized(eye + aside * 0.7));
   }
   Vec3 lo{1e9, 1e9, 1e9}, hi = lo * -1;
   for (const PlacedBody& b : begin.bodies()) {
     const Frame& f = b.body->bone.frame();
     for (int c = 0; c < 8; ++c) {
-      const Vec3 at = b.world_from_body(f.world_from_index(
-          {(c & 1) != 0 ? f.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? f.dims[1] - 1.0 : 0.0, (c & 4) != 0 ? f.dims[2] - 1.0 : 0.0}));
+      const Vec3 at = b.world_from_body(
+          f.world_from_index({(c & 1) != 0 ? f.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? f.dims[1] - 1.0 : 0.0,
+                              (c & 4) != 0 ? f.dims[2] - 1.0 : 0.0}));
       for (std::size_t a = 0; a < 3; ++a) {
         lo[a] = std::min(lo[a], at[a]);
         hi[a] = std::max(hi[a], at[a]);
@@ -97,8 +99,8 @@ class MovieReader final : public Reader {
 
   [[nodiscard]] const ScopeView& view_at(std::uint64_t tick) const {
     if (options_.camera == MovieCamera::fixed || survey_.views.empty()) return fixed_;
-    const auto behind =
-        std::upper_bound(survey_.views.begin(), survey_.views.end(), tick, [](std::uint64_t t, const auto& v) { return t < v.first; });
+    const auto behind = std::upper_bound(survey_.views.begin(), survey_.views.end(), tick,
+                                         [](std::uint64_t t, const auto& v) { return t < v.first; });
     return behind == survey_.views.begin() ? behind->second : (behind - 1)->second;
   }
 
@@ -110,8 +112,8 @@ class MovieReader final : public Reader {
     hardest_n_ = 0;
     const double done = static_cast<double>(next_ + 1), all = static_cast<double>(times_.ticks.size());
     const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
-    context_.progress(done / all, "frame " + std::to_string(next_ + 1) + " of " + std::to_string(times_.ticks.size()) + ", " +
-                                      clock(took_s * (all - done) / done) + " left");
+    context_.progress(done / all, "frame " + std::to_string(next_ + 1) + " of " + std::to_string(times_.ticks.size()) +
+                                      ", " + clock(took_s * (all - done) / done) + " left");
   }
 
   [[nodiscard]] std::vector<std::string> words_at(std::uint64_t tick) const {
@@ -124,8 +126,8 @@ class MovieReader final : public Reader {
     }
     words.push_back(fixed(scene_.removed_mm3(), 1) + " mm3 removed");
     if (structures_ != nullptr && t.structure != 0)
-      words.push_back(structures_->name_of(static_cast<std::uint8_t>(t.structure)) + " " + fixed(static_cast<double>(t.clearance_mm), 1) +
-                      " mm");
+      words.push_back(structures_->name_of(static_cast<std::uint8_t>(t.structure)) + " " +
+                      fixed(static_cast<double>(t.clearance_mm), 1) + " mm");
     if (options_.speed != 1) words.push_back("x" + format_number(options_.speed));
     return words;
   }
@@ -143,9 +145,10 @@ class MovieReader final : public Reader {
   std::size_t next_ = 0;
   std::uint64_t told_tick_ = 0;
   // What lies before the movie is stepped through, but the first frame tells of its own time alone.
-  const std::uint64_t first_told_ = times_.ticks.size() < 2
-                                        ? times_.ticks.front()
-                                        : times_.ticks.front() - std::min(times_.ticks.front(), times_.ticks[1] - times_.ticks[0]);
+  const std::uint64_t first_told_ =
+      times_.ticks.size() < 2
+          ? times_.ticks.front()
+          : times_.ticks.front() - std::min(times_.ticks.front(), times_.ticks[1] - times_.ticks[0]);
   double hardest_n_ = 0;  // since the frame before
   bool ended_ = false;
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
@@ -164,10 +167,11 @@ std::string why_not_repeated(const SessionOutline& outline, const Anatomy& anato
 
 }  // namespace
 
-MovieFacts make_movie(const SessionReader& session, const World& begin, const Anatomy& anatomy, const MovieOptions& options,
-                      const std::filesystem::path& path, const Context& context) {
+MovieFacts make_movie(const SessionReader& session, const World& begin, const Anatomy& anatomy,
+                      const MovieOptions& options, const std::filesystem::path& path, const Context& context) {
   const SessionSurvey survey = survey_of(session);
-  const MovieTimes times = movie_times(survey, options.from_s, options.to_s, options.speed, options.fps, options.skip_idle);
+  const MovieTimes times =
+      movie_times(survey, options.from_s, options.to_s, options.speed, options.fps, options.skip_idle);
   MovieOptions o = options;
   MovieFacts facts;
   if (survey.unreadable_views > 0)
@@ -180,14 +184,15 @@ MovieFacts make_movie(const SessionReader& session, const World& begin, const An
     facts.words.emplace_back("behind its gap the bone is not known: from there on the movie stands still");
   MovieFile file(path, o.width, o.height, o.fps);
   const ScopeView fixed = fixed_view(survey, begin);
-  MovieReader reader(survey, times, o, fixed, anatomy.structures.get(), session.header().haptics.hands(), session.header().dust, file,
-                     context);
+  MovieReader reader(survey, times, o, fixed, anatomy.structures.get(), session.header().haptics.hands(),
+                     session.header().dust, file, context);
   const std::string why = why_not_repeated(session.outline(), anatomy);
   try {
     if (why.empty()) {
       Reader* const readers[] = {&reader};
       const ReplayResult r = replay(session, begin.copy(), anatomy, {}, readers);
-      if (!r.identical) facts.words.push_back("it did not come out as it was recorded (" + r.difference + "): neither may the movie");
+      if (!r.identical)
+        facts.words.push_back("it did not come out as it was recorded (" + r.difference + "): neither may the movie");
     } else {
       tell_recorded(session, begin, reader);
       facts.words.push_back(why + ": bone changes in steps of a tenth of a second" +
@@ -207,4 +212,4 @@ MovieFacts make_movie(const SessionReader& session, const World& begin, const An
   return facts;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -25,7 +25,8 @@ std::string words_of(int code) {
 }
 
 Error cannot_write(const std::filesystem::path& path, int code) {
-  return {ExitCode::cannot_write, "the movie cannot be written to '" + path.filename().string() + "': " + words_of(code),
+  return {ExitCode::cannot_write,
+          "the movie cannot be written to '" + path.filename().string() + "': " + words_of(code),
           "make room on the disk, or write somewhere else"};
 }
 
@@ -97,24 +98,30 @@ struct MovieFile::Impl {
   }
 };
 
-MovieFile::MovieFile(const std::filesystem::path& path, int width, int height, int fps) : impl_(std::make_unique<Impl>()) {
+MovieFile::MovieFile(const std::filesystem::path& path, int width, int height, int fps)
+    : impl_(std::make_unique<Impl>()) {
   be_quiet();
   Impl& m = *impl_;
   m.path = path;
   const std::string ending = path.extension().string();
   if (ending != ".mp4" && ending != ".webm")
-    throw Error(ExitCode::usage, "'" + path.filename().string() + "' is no movie that can be written", "name it NAME.mp4 or NAME.webm");
+    throw Error(ExitCode::usage, "'" + path.filename().string() + "' is no movie that can be written",
+                "name it NAME.mp4 or NAME.webm");
   const auto fits = [](int edge) { return edge >= kLeastEdge && edge <= kMostEdge && edge % 2 == 0; };
   if (!fits(width) || !fits(height))
-    throw Error(ExitCode::usage, "a movie of " + std::to_string(width) + "x" + std::to_string(height) + " pixels cannot be made",
-                "give even numbers from " + std::to_string(kLeastEdge) + " to " + std::to_string(kMostEdge) + ", such as 1280x720");
+    throw Error(ExitCode::usage,
+                "a movie of " + std::to_string(width) + "x" + std::to_string(height) + " pixels cannot be made",
+                "give even numbers from " + std::to_string(kLeastEdge) + " to " + std::to_string(kMostEdge) +
+                    ", such as 1280x720");
   if (fps < 1 || fps > kMostFps)
-    throw Error(ExitCode::usage, std::to_string(fps) + " frames a second cannot be made", "give 1 to " + std::to_string(kMostFps));
+    throw Error(ExitCode::usage, std::to_string(fps) + " frames a second cannot be made",
+                "give 1 to " + std::to_string(kMostFps));
   const AVCodec* const encoder = encoder_for(ending);
   if (encoder == nullptr)
     throw Error(ExitCode::failed, "this machine's libav has no encoder for " + ending,
-                ending == ".mp4" ? "install one with libx264 or libopenh264 (Debian's libavcodec has it), or write a .webm"
-                                 : "install one with libvpx (Debian's libavcodec has it), or write a .mp4");
+                ending == ".mp4"
+                    ? "install one with libx264 or libopenh264 (Debian's libavcodec has it), or write a .webm"
+                    : "install one with libvpx (Debian's libavcodec has it), or write a .mp4");
   m.encoder = encoder->name;
   const bool x264 = m.encoder == "libx264", vp9 = ending == ".webm";
 
@@ -153,7 +160,8 @@ MovieFile::MovieFile(const std::filesystem::path& path, int width, int height, i
   }
   if (const int code = avcodec_open2(m.codec, encoder, nullptr); code < 0)
     throw Error(ExitCode::failed,
-                m.encoder + " does not take pictures of " + std::to_string(width) + "x" + std::to_string(height) + ": " + words_of(code),
+                m.encoder + " does not take pictures of " + std::to_string(width) + "x" + std::to_string(height) +
+                    ": " + words_of(code),
                 "choose another size");
   m.check(avcodec_parameters_from_context(m.stream->codecpar, m.codec));
   m.stream->time_base = c.time_base;
@@ -161,7 +169,8 @@ MovieFile::MovieFile(const std::filesystem::path& path, int width, int height, i
   if (!vp9) {
     // Encoders write their name and settings into the pictures' stream (SEI, unit 6): they are taken out again.
     const AVBitStreamFilter* const kind = av_bsf_get_by_name("filter_units");
-    if (kind == nullptr) throw Error(ExitCode::failed, "this machine's libav has no 'filter_units'", "install Debian's libavcodec");
+    if (kind == nullptr)
+      throw Error(ExitCode::failed, "this machine's libav has no 'filter_units'", "install Debian's libavcodec");
     m.check(av_bsf_alloc(kind, &m.filter));
     av_opt_set(m.filter->priv_data, "remove_types", "6", 0);
     m.check(avcodec_parameters_copy(m.filter->par_in, m.stream->codecpar));
@@ -174,10 +183,11 @@ MovieFile::MovieFile(const std::filesystem::path& path, int width, int height, i
   m.frame->width = width;
   m.frame->height = height;
   m.check(av_frame_get_buffer(m.frame, 0));
-  m.to_yuv = sws_getContext(width, height, AV_PIX_FMT_RGB24, width, height, c.pix_fmt, SWS_BICUBIC | SWS_ACCURATE_RND | SWS_BITEXACT,
-                            nullptr, nullptr, nullptr);
+  m.to_yuv = sws_getContext(width, height, AV_PIX_FMT_RGB24, width, height, c.pix_fmt,
+                            SWS_BICUBIC | SWS_ACCURATE_RND | SWS_BITEXACT, nullptr, nullptr, nullptr);
   if (m.to_yuv == nullptr) throw Error(ExitCode::resources, "no memory for the movie");
-  sws_setColorspaceDetails(m.to_yuv, sws_getCoefficients(SWS_CS_DEFAULT), 1, sws_getCoefficients(SWS_CS_ITU709), 0, 0, 1 << 16, 1 << 16);
+  sws_setColorspaceDetails(m.to_yuv, sws_getCoefficients(SWS_CS_DEFAULT), 1, sws_getCoefficients(SWS_CS_ITU709), 0, 0,
+                           1 << 16, 1 << 16);
 
   m.check(avio_open(&m.format->pb, path.c_str(), AVIO_FLAG_WRITE));
   AVDictionary* options = nullptr;
@@ -209,7 +219,8 @@ void MovieFile::finish() {
   m.check(avio_closep(&m.format->pb));
   const MovieFileFacts facts = read_movie_facts(m.path);
   if (facts.frames != m.frames || facts.width != m.codec->width || facts.height != m.codec->height)
-    throw Error(ExitCode::failed, "the movie reads back with " + std::to_string(facts.frames) + " frames of " + std::to_string(m.frames));
+    throw Error(ExitCode::failed,
+                "the movie reads back with " + std::to_string(facts.frames) + " frames of " + std::to_string(m.frames));
 }
 
 std::uint64_t MovieFile::frames() const {
@@ -228,7 +239,8 @@ MovieFileFacts read_movie_facts(const std::filesystem::path& path) {
     avformat_close_input(&format);
     return Error(ExitCode::corrupt, "'" + path.filename().string() + "' cannot be read as a movie: " + why);
   };
-  if (const int code = avformat_open_input(&format, path.c_str(), nullptr, nullptr); code < 0) throw corrupt(words_of(code));
+  if (const int code = avformat_open_input(&format, path.c_str(), nullptr, nullptr); code < 0)
+    throw corrupt(words_of(code));
   if (const int code = avformat_find_stream_info(format, nullptr); code < 0) throw corrupt(words_of(code));
   const int number = av_find_best_stream(format, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
   if (number < 0) throw corrupt("it has no pictures");
@@ -242,9 +254,10 @@ MovieFileFacts read_movie_facts(const std::filesystem::path& path) {
     const AVDictionaryEntry* tag = nullptr;
     while ((tag = av_dict_get(tags, "", tag, AV_DICT_IGNORE_SUFFIX)) != nullptr) {
       const std::string_view key = tag->key, value = tag->value;
-      const bool of_format = key == "major_brand" || key == "minor_version" || key == "compatible_brands" || key == "vendor_id" ||
-                             (key == "language" && value == "und") || (key == "handler_name" && value == "VideoHandler") ||
-                             key == "DURATION" || ((key == "ENCODER" || key == "encoder") && value == "Lavf");
+      const bool of_format = key == "major_brand" || key == "minor_version" || key == "compatible_brands" ||
+                             key == "vendor_id" || (key == "language" && value == "und") ||
+                             (key == "handler_name" && value == "VideoHandler") || key == "DURATION" ||
+                             ((key == "ENCODER" || key == "encoder") && value == "Lavf");
       if (!of_format) ++facts.tags;
     }
   };
@@ -269,4 +282,4 @@ std::string movie_encoder_licence() {
   return avcodec_license();
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -49,7 +49,8 @@ Picture MovieStage::draw(SessionScene& scene, const ScopeView& view, std::size_t
 void write_strip(Picture& picture, const std::vector<std::string>& words) {
   const int size = std::max(9, picture.height / 30), height = 2 * size, top = picture.height - height;
   for (int y = std::max(0, top); y < picture.height; ++y) {
-    std::uint8_t* const row = picture.rgb.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width) * 3;
+    std::uint8_t* const row =
+        picture.rgb.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width) * 3;
     for (int n = 0; n < 3 * picture.width; ++n) row[n] = static_cast<std::uint8_t>(row[n] * 2 / 5);
   }
   // So wide, about, are letters of this font.
@@ -62,4 +63,4 @@ void write_strip(Picture& picture, const std::vector<std::string>& words) {
   }
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

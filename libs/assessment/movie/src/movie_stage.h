@@ -8,12 +8,12 @@
 #include <vtkNew.h>
 #include <vtkRenderer.h>
 
-#include "osteo/simulation/camera/microscope.h"
-#include "osteo/session/scene/session_scene.h"
 #include "osteo/display/view/instrument_view.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/display/view/structures_view.h"
 #include "osteo/display/view/world_view.h"
+#include "osteo/session/scene/session_scene.h"
+#include "osteo/simulation/camera/microscope.h"
 
 namespace osteo::inline assessment {
 
@@ -38,8 +38,8 @@ class MovieStage {
   bool deep_ = false;
 };
 
-/// Words in a row along the lower edge, on a darker strip; of what does not fit the last are left out. Text is as high as a thirtieth of
-/// the picture.
+/// Words in a row along the lower edge, on a darker strip; of what does not fit the last are left out. Text is as high
+/// as a thirtieth of the picture.
 void write_strip(Picture& picture, const std::vector<std::string>& words);
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -3,9 +3,9 @@
 #include <array>
 #include <cmath>
 
+#include "osteo/assessment/movie/movie.h"
 #include "osteo/core/base/error.h"
 #include "osteo/simulation/camera/view_note.h"
-#include "osteo/assessment/movie/movie.h"
 
 namespace osteo::inline assessment {
 namespace {
@@ -21,7 +21,8 @@ void widen(std::optional<std::pair<Vec3, Vec3>>& box, Vec3 at) {
 }
 
 // In seconds: what is shown, piece by piece.
-std::vector<std::pair<double, double>> shown_parts(const SessionSurvey& survey, double from_s, double to_s, bool skip_idle) {
+std::vector<std::pair<double, double>> shown_parts(const SessionSurvey& survey, double from_s, double to_s,
+                                                   bool skip_idle) {
   if (!skip_idle) return {{from_s, to_s}};
   std::vector<std::pair<double, double>> parts;
   double begin = from_s;
@@ -32,7 +33,8 @@ std::vector<std::pair<double, double>> shown_parts(const SessionSurvey& survey, 
       ++b;
       continue;
     }
-    const double first = std::max(from_s, static_cast<double>(b) * kBinS), last = std::min(to_s, static_cast<double>(e) * kBinS);
+    const double first = std::max(from_s, static_cast<double>(b) * kBinS),
+                 last = std::min(to_s, static_cast<double>(e) * kBinS);
     if (last - first > kIdleS) {
       parts.emplace_back(begin, first + kRestS);
       begin = last - kRestS;
@@ -49,7 +51,9 @@ SessionSurvey survey_of(const SessionReader& session) {
   SessionSurvey s;
   s.rate_hz = session.header().rate_hz;
   const double bin_ticks = std::max(1.0, kBinS * s.rate_hz);
-  const auto bin_of = [&](std::uint64_t tick) { return static_cast<std::size_t>(static_cast<double>(tick) / bin_ticks); };
+  const auto bin_of = [&](std::uint64_t tick) {
+    return static_cast<std::size_t>(static_cast<double>(tick) / bin_ticks);
+  };
   const auto stir = [&](std::uint64_t tick) {
     const std::size_t b = bin_of(tick);
     if (b >= s.idle.size()) s.idle.resize(b + 1, true);
@@ -69,7 +73,8 @@ SessionSurvey survey_of(const SessionReader& session) {
       const Vec3 at = from_floats(t.device.position_mm);
       auto& from = began[std::min<std::size_t>(t.hand, kMostHands - 1)];
       if (!from || from->first != bin) from.emplace(bin, at);
-      if (t.device.pedal > 0 || t.voxels_changed > 0 || length(at - from->second) > kStillMmPerS * kBinS) s.idle[bin] = false;
+      if (t.device.pedal > 0 || t.voxels_changed > 0 || length(at - from->second) > kStillMmPerS * kBinS)
+        s.idle[bin] = false;
       if (t.removed_mm3 <= 0) continue;
       widen(s.drilled_mm, at + from_floats(t.shown_offset_mm));
       axes += normalized(from_floats(t.device.axis)) * static_cast<double>(t.removed_mm3);
@@ -95,7 +100,8 @@ MovieTimes movie_times(const SessionSurvey& survey, double from_s, double to_s, 
   if (survey.end_tick == 0) throw Error(ExitCode::no_input, "the session holds no tick: there is nothing to show");
   if (!(from_s >= 0) || from_s >= last_s)
     throw Error(ExitCode::usage,
-                "from " + format_number(from_s) + " s to " + format_number(to_s < 0 ? end_s : to_s) + " s there is nothing of the session",
+                "from " + format_number(from_s) + " s to " + format_number(to_s < 0 ? end_s : to_s) +
+                    " s there is nothing of the session",
                 "it lasts " + format_number(std::round(end_s * 10) / 10) + " s");
   const auto parts = shown_parts(survey, from_s, last_s, skip_idle);
   MovieTimes times;
@@ -110,7 +116,8 @@ MovieTimes movie_times(const SessionSurvey& survey, double from_s, double to_s, 
   std::size_t part = 0;
   double before_s = 0;  // shown in the parts before this one
   for (std::uint64_t n = 1; n <= frames; ++n) {
-    const double shown = n == frames ? times.shown_s : times.shown_s * static_cast<double>(n) / static_cast<double>(frames);
+    const double shown =
+        n == frames ? times.shown_s : times.shown_s * static_cast<double>(n) / static_cast<double>(frames);
     while (part + 1 < parts.size() && shown > before_s + (parts[part].second - parts[part].first)) {
       before_s += parts[part].second - parts[part].first;
       ++part;
@@ -121,4 +128,4 @@ MovieTimes movie_times(const SessionSurvey& survey, double from_s, double to_s, 
   return times;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -11,8 +11,8 @@ namespace osteo::inline assessment::review {
 namespace {
 
 using Colour = sheet::Drawing::Colour;
-constexpr Colour kInk{38, 42, 48}, kQuiet{112, 118, 126}, kRule{222, 222, 216}, kForce{92, 108, 128}, kBand{214, 222, 230},
-    kAccent = kHiddenRgb, kSeen = kSeenRgb;
+constexpr Colour kInk{38, 42, 48}, kQuiet{112, 118, 126}, kRule{222, 222, 216}, kForce{92, 108, 128},
+    kBand{214, 222, 230}, kAccent = kHiddenRgb, kSeen = kSeenRgb;
 
 // A step of 1, 2 or 5 times a power of ten, about `wanted` of which make up the range.
 double nice_step(double range, int wanted) {
@@ -54,7 +54,8 @@ sheet::Drawing timeline_chart(const Review& r) {
   const auto each = [&](const auto& take) {
     for (std::size_t c = 0; c < columns; ++c) {
       const std::size_t from = c * line.size() / columns, to = std::max(from + 1, (c + 1) * line.size() / columns);
-      if (from < line.size()) take(kLeft + w * static_cast<double>(c) / static_cast<double>(columns), from, std::min(to, line.size()));
+      if (from < line.size())
+        take(kLeft + w * static_cast<double>(c) / static_cast<double>(columns), from, std::min(to, line.size()));
     }
   };
   const double column = w / static_cast<double>(columns);
@@ -74,7 +75,8 @@ sheet::Drawing timeline_chart(const Review& r) {
 
   // Events: marks above all.
   for (const TimelineEvent& e : line.events) {
-    if (e.kind == EventKind::gap) d.box(px(e.t_s), y, std::max(0.8, px(e.end_s) - px(e.t_s)), 4 * (kLane + kGap), kRule, 0.8);
+    if (e.kind == EventKind::gap)
+      d.box(px(e.t_s), y, std::max(0.8, px(e.end_s) - px(e.t_s)), 4 * (kLane + kGap), kRule, 0.8);
   }
   for (const TimelineEvent& e : line.events) {
     const bool bad = e.kind == EventKind::injury;
@@ -154,7 +156,8 @@ sheet::Drawing timeline_chart(const Review& r) {
   shape.assign({{kLeft, y + kLane}});
   each([&](double x, std::size_t from, std::size_t to) {
     double v = 0;
-    for (std::size_t n = from; n < to; ++n) v += static_cast<double>(line.speed_mm_s[n]) / static_cast<double>(to - from);
+    for (std::size_t n = from; n < to; ++n)
+      v += static_cast<double>(line.speed_mm_s[n]) / static_cast<double>(to - from);
     const double at = y + kLane * (1 - std::min(1.0, v / fast));
     shape.push_back({x, at});
     shape.push_back({x + column, at});
@@ -168,7 +171,8 @@ sheet::Drawing timeline_chart(const Review& r) {
   int shade = 0;
   for (std::size_t n = 1; n <= line.size(); ++n) {
     if (n < line.size() && line.tool[n] == line.tool[from]) continue;
-    const double x = px(static_cast<double>(from) / Timeline::kRateHz), x1 = px(static_cast<double>(n) / Timeline::kRateHz);
+    const double x = px(static_cast<double>(from) / Timeline::kRateHz),
+                 x1 = px(static_cast<double>(n) / Timeline::kRateHz);
     d.box(x, y, std::max(0.5, x1 - x), 12, shade++ % 2 == 0 ? kBand : kRule);
     const std::string name = line.tool[from] == Timeline::kPlate ? "a plate" : instrument_of(line.tool[from]).name;
     if (x1 - x > 4.6 * static_cast<double>(name.size()) + 4) d.text(x + 3, y + 9, name, 8.5, kInk);
@@ -198,7 +202,8 @@ sheet::Drawing profile_chart(const ForceProfile& p, bool reference) {
   const double step = nice_step(most, 4);
   most = std::ceil(most / step) * step;
   const auto at = [&](double mm, double n) {
-    return std::array<double, 2>{kLeft + kW * std::clamp(mm, 0.0, kFar) / kFar, kTop + kH * (1 - std::clamp(n / most, 0.0, 1.0))};
+    return std::array<double, 2>{kLeft + kW * std::clamp(mm, 0.0, kFar) / kFar,
+                                 kTop + kH * (1 - std::clamp(n / most, 0.0, 1.0))};
   };
   d.text(0, 12, p.structure, 11, kInk, -1, true);
   d.text(kLeft + kW, 12, told_seconds(p.drilled_s) + " of drilling near it", 9, kQuiet, 1);
@@ -234,7 +239,8 @@ sheet::Drawing profile_chart(const ForceProfile& p, bool reference) {
   d.line(steps(p.middle), kInk, 1.2, true);
   d.line(steps(p.most), kAccent, 1.8);
   d.text(kLeft + kW, d.height - 2,
-         reference ? (p.experts_most.empty() ? "experts drilled less than a second here" : "grey: nine in ten of the experts' moments")
+         reference ? (p.experts_most.empty() ? "experts drilled less than a second here"
+                                             : "grey: nine in ten of the experts' moments")
                    : "no reference: no band of experts",
          8, kQuiet, 1);
   d.text(0, d.height - 2, "orange: nine in ten of yours; dashed: half", 8, kQuiet);
@@ -294,7 +300,9 @@ sheet::Drawing comparison_chart(const Comparison& c) {
   const auto px = [&](double v) { return kFrom + (kTo - kFrom) * (v - lo) / (hi - lo); };
   d.text(0, kMid + 3.5, std::string(plain_name(c.row->name)), 11, kInk);
   d.line({{kFrom - 6, kMid}, {kTo + 6, kMid}}, kRule, 1);
-  const std::string better = c.row->better == Better::higher ? "more is better" : c.row->better == Better::lower ? "less is better" : "";
+  const std::string better = c.row->better == Better::higher  ? "more is better"
+                             : c.row->better == Better::lower ? "less is better"
+                                                              : "";
   std::string alt = std::string(plain_name(c.row->name)) + ": ";
   if (!c.experts.empty()) {
     const auto [a, b] = std::minmax_element(c.experts.begin(), c.experts.end());
@@ -306,7 +314,8 @@ sheet::Drawing comparison_chart(const Comparison& c) {
   // The earlier the paler.
   for (std::size_t n = 0; n < c.earlier.size(); ++n) {
     if (!c.earlier[n]) continue;
-    const double x = px(*c.earlier[n]), share = 0.25 + 0.5 * static_cast<double>(n + 1) / static_cast<double>(c.earlier.size());
+    const double x = px(*c.earlier[n]),
+                 share = 0.25 + 0.5 * static_cast<double>(n + 1) / static_cast<double>(c.earlier.size());
     d.area({{x, kMid - 4}, {x + 4, kMid}, {x, kMid + 4}, {x - 4, kMid}}, kInk, share);
   }
   if (c.value) {
@@ -323,4 +332,4 @@ sheet::Drawing comparison_chart(const Comparison& c) {
   return d;
 }
 
-}  // namespace osteo::assessment::review
+}  // namespace osteo::inline assessment::review

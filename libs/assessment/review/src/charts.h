@@ -1,7 +1,7 @@
 // Charts of a review as drawings: the same on the page (where a script makes the timeline livelier) and on paper.
 #pragma once
-#include "osteo/core/report/sheet.h"
 #include "osteo/assessment/review/review.h"
+#include "osteo/core/report/sheet.h"
 
 namespace osteo::inline assessment::review {
 
@@ -15,4 +15,4 @@ namespace osteo::inline assessment::review {
 [[nodiscard]] std::string_view plain_name(std::string_view metric);
 [[nodiscard]] std::string told_value(const MetricRow& row, double value);
 
-}  // namespace osteo::assessment::review
+}  // namespace osteo::inline assessment::review

@@ -39,7 +39,8 @@ std::string minutes_of(double x) {
 
 sheet::Plot course_of(const HeatReader& heat, std::uint8_t value, const std::string& name) {
   std::vector<double> c = heat.courses().at(value);
-  const double top = *std::max_element(c.begin(), c.end()), whole_s = std::max(1.0, static_cast<double>(heat.steps()) * heat.step_s());
+  const double top = *std::max_element(c.begin(), c.end()),
+               whole_s = std::max(1.0, static_cast<double>(heat.steps()) * heat.step_s());
   sheet::Plot p;
   p.id = "course-" + std::to_string(value);
   p.title = name + ": its warmest place, C";
@@ -58,9 +59,9 @@ sheet::Plot course_of(const HeatReader& heat, std::uint8_t value, const std::str
   // Not more points than paper can show; of those in between the highest.
   const std::size_t each = std::max<std::size_t>(1, c.size() / 600);
   for (std::size_t n = 0; n < c.size(); n += each)
-    line.at.push_back(
-        {static_cast<double>(n) * heat.step_s(), *std::max_element(c.begin() + static_cast<std::ptrdiff_t>(n),
-                                                                   c.begin() + static_cast<std::ptrdiff_t>(std::min(c.size(), n + each)))});
+    line.at.push_back({static_cast<double>(n) * heat.step_s(),
+                       *std::max_element(c.begin() + static_cast<std::ptrdiff_t>(n),
+                                         c.begin() + static_cast<std::ptrdiff_t>(std::min(c.size(), n + each)))});
   p.lines.push_back({{{0, 47}, {whole_s, 47}}, Tone::caution, true});
   p.lines.push_back(std::move(line));
   return p;
@@ -68,8 +69,8 @@ sheet::Plot course_of(const HeatReader& heat, std::uint8_t value, const std::str
 
 }  // namespace
 
-Picture heat_section(const HeatReader& heat, const StructureMap* structures, Vec3 centre_mm, Vec3 right, Vec3 down, double side_mm,
-                     int pixels) {
+Picture heat_section(const HeatReader& heat, const StructureMap* structures, Vec3 centre_mm, Vec3 right, Vec3 down,
+                     double side_mm, int pixels) {
   const auto n = static_cast<std::size_t>(pixels);
   std::vector<double> celsius(n * n);
   std::vector<std::uint8_t> inside(n * n);
@@ -117,7 +118,8 @@ Picture heat_section(const HeatReader& heat, const StructureMap* structures, Vec
   return picture;
 }
 
-Sheet heat_sheet(const HeatReader& heat, const StructureMap* structures, const HeatOfCutting& by, const std::string& code) {
+Sheet heat_sheet(const HeatReader& heat, const StructureMap* structures, const HeatOfCutting& by,
+                 const std::string& code) {
   Sheet s;
   s.title = "Heat of a rehearsal";
   s.code = code;
@@ -127,26 +129,28 @@ Sheet heat_sheet(const HeatReader& heat, const StructureMap* structures, const H
   const HeatLedger l = heat.ledger();
   const bool hot = left && left->peak_c >= 47;
   add(sheet::Band{left ? tenths(left->peak_c) + " C" : "cool",
-                  left ? "the highest that bone has had which is still there; " + tenths(heat.hottest_c()) + " C where it was drilled away"
+                  left ? "the highest that bone has had which is still there; " + tenths(heat.hottest_c()) +
+                             " C where it was drilled away"
                        : "no bone that is left was warmer than the body",
                   hot ? Tone::caution : Tone::plain});
-  add(sheet::Paragraph{
-      "How much of a burr's work becomes heat in bone is known within a factor of ten at best, and temperatures follow it in "
-      "proportion. Nothing clinical follows from this page.",
-      Tone::quiet});
+  add(
+      sheet::Paragraph{"How much of a burr's work becomes heat in bone is known within a factor of ten at best, and "
+                       "temperatures follow it in "
+                       "proportion. Nothing clinical follows from this page.",
+                       Tone::quiet});
   if (left) {
     const Vec3 x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
     const auto section = [&](const char* id, Vec3 right, Vec3 down, const char* words) {
       return sheet::Image{id, heat_section(heat, structures, left->at_mm, right, down, kSideMm, kPixels), words};
     };
     add(sheet::Heading{"Sections of " + format_number(kSideMm) + " mm through the warmest bone that is left"});
-    add(sheet::Pictures{
-        {section("axial", x, y, "axial, from below: left of the picture is the patient's right"),
-         section("coronal", x, z * -1.0, "coronal, from the front"), section("sagittal", y, z * -1.0, "sagittal, from the patient's left")},
-        56});
-    add(
-        sheet::Paragraph{"Colour: the highest temperature of each place, pale from 38, amber from 42, red from 57 C on; lines at 42, 47 "
-                         "and 57 C. Outlines: structures."});
+    add(sheet::Pictures{{section("axial", x, y, "axial, from below: left of the picture is the patient's right"),
+                         section("coronal", x, z * -1.0, "coronal, from the front"),
+                         section("sagittal", y, z * -1.0, "sagittal, from the patient's left")},
+                        56});
+    add(sheet::Paragraph{
+        "Colour: the highest temperature of each place, pale from 38, amber from 42, red from 57 C on; lines at 42, 47 "
+        "and 57 C. Outlines: structures."});
   }
   if (structures != nullptr) {
     const auto found = heat.structures();
@@ -176,7 +180,8 @@ Sheet heat_sheet(const HeatReader& heat, const StructureMap* structures, const H
       two.columns.resize(2);
       for (std::size_t n = 0; n < std::min<std::size_t>(4, order.size()); ++n) {
         const std::uint8_t value = order[n].second;
-        if (heat.courses().contains(value)) two.columns[n % 2].push_back({course_of(heat, value, structures->name_of(value))});
+        if (heat.courses().contains(value))
+          two.columns[n % 2].push_back({course_of(heat, value, structures->name_of(value))});
       }
       if (!two.columns[0].empty()) add(std::move(two));
     }
@@ -185,10 +190,10 @@ Sheet heat_sheet(const HeatReader& heat, const StructureMap* structures, const H
   add(sheet::Facts{{{"cutting burrs", format_number(by.cutting_share) + " of their work"},
                     {"diamond burrs", format_number(by.diamond_w_per_n) + " W for each newton"},
                     {"water", tenths(by.water_c) + " C, " + format_number(by.film_w_per_m2_k) + " W/(m2 K)"},
-                    {"into bone", tenths(l.added_j) + " J, of which " + tenths(l.chips_j) + " left with chips and " + tenths(l.cooled_j) +
-                                      " went into water"}},
+                    {"into bone", tenths(l.added_j) + " J, of which " + tenths(l.chips_j) + " left with chips and " +
+                                      tenths(l.cooled_j) + " went into water"}},
                    2});
   return s;
 }
 
-}  // namespace osteo::assessment::review
+}  // namespace osteo::inline assessment::review

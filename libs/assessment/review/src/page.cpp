@@ -1,4 +1,5 @@
-// A review as one page: text and charts stand in it as they are; a script makes the timeline livelier and shows the scene in 3D.
+// A review as one page: text and charts stand in it as they are; a script makes the timeline livelier and shows the
+// scene in 3D.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -36,14 +37,16 @@ Sign sign_of(FindingSeverity s) {
 }
 
 const ReviewPicture* picture_of(const Review& r, std::string_view id) {
-  const auto at = std::find_if(r.pictures.begin(), r.pictures.end(), [&](const ReviewPicture& p) { return p.id == id; });
+  const auto at =
+      std::find_if(r.pictures.begin(), r.pictures.end(), [&](const ReviewPicture& p) { return p.id == id; });
   return at == r.pictures.end() ? nullptr : &*at;
 }
 
 std::string figure(const ReviewPicture& p, bool caption) {
-  return "<figure><img id=\"picture-" + e(p.id) + "\" alt=\"" + e(p.caption) + "\" width=\"" + std::to_string(p.picture.width) +
-         "\" height=\"" + std::to_string(p.picture.height) + "\" src=\"" + png_url_of(p.picture) + "\">" +
-         (caption ? "<figcaption>" + e(p.caption) + "</figcaption>" : "") + "</figure>\n";
+  return "<figure><img id=\"picture-" + e(p.id) + "\" alt=\"" + e(p.caption) + "\" width=\"" +
+         std::to_string(p.picture.width) + "\" height=\"" + std::to_string(p.picture.height) + "\" src=\"" +
+         png_url_of(p.picture) + "\">" + (caption ? "<figcaption>" + e(p.caption) + "</figcaption>" : "") +
+         "</figure>\n";
 }
 
 std::optional<double> value_of(const Score& score, MetricName name) {
@@ -189,11 +192,13 @@ void findings(std::ostream& out, const Review& r) {
       continue;
     }
     out << "<li class=\"" << name_of(f.severity) << (p != nullptr ? " shown" : "") << "\" id=\"finding-" << e(f.id)
-        << "\"><div class=\"mark\"><i>" << sign.glyph << "</i>" << sign.word << "</div><div><p class=\"said\">" << e(f.text) << "</p>";
+        << "\"><div class=\"mark\"><i>" << sign.glyph << "</i>" << sign.word << "</div><div><p class=\"said\">"
+        << e(f.text) << "</p>";
     if (!f.why.empty()) out << "<p class=\"small whence\">" << e(f.why) << "</p>";
     out << "<div class=\"screen\">";
     for (std::size_t n = 0; n < std::min<std::size_t>(6, f.times_s.size()); ++n)
-      out << "<button type=\"button\" data-t=\"" << format_number(f.times_s[n]) << "\">" << clock(f.times_s[n]) << "</button>";
+      out << "<button type=\"button\" data-t=\"" << format_number(f.times_s[n]) << "\">" << clock(f.times_s[n])
+          << "</button>";
     if (f.times_s.size() > 6) out << "<span class=\"small\">and " << f.times_s.size() - 6 << " more</span> ";
     if (f.at_mm && !r.meshes.empty()) out << "<button type=\"button\" data-f=\"" << e(f.id) << "\">show in 3D</button>";
     out << "</div></div>";
@@ -202,8 +207,8 @@ void findings(std::ostream& out, const Review& r) {
   }
   if (!passed.empty()) {
     const Sign sign = sign_of(FindingSeverity::good);
-    out << "<li class=\"good\"><div class=\"mark\"><i>" << sign.glyph << "</i>" << sign.word << "</div><div class=\"passed small\">"
-        << passed << "</div></li>\n";
+    out << "<li class=\"good\"><div class=\"mark\"><i>" << sign.glyph << "</i>" << sign.word
+        << "</div><div class=\"passed small\">" << passed << "</div></li>\n";
   }
   out << "</ol></section>\n";
 }
@@ -220,8 +225,8 @@ void pictures(std::ostream& out, const Review& r) {
   std::string text = "<p class=\"legend\">";
   if (known > 0)
     text += "<span class=\"swatch\" style=\"background:var(--seen);margin-left:0\"></span>" + told_number(r.seen_mm3) +
-            " mm³ seen as it went <span class=\"swatch\" style=\"background:var(--accent)\"></span>" + told_number(r.hidden_mm3) +
-            " mm³ unseen";
+            " mm³ seen as it went <span class=\"swatch\" style=\"background:var(--accent)\"></span>" +
+            told_number(r.hidden_mm3) + " mm³ unseen";
   if (r.unknown_mm3 > 0)
     text += " <span class=\"swatch\" style=\"background:#969696\"></span>" + told_number(r.unknown_mm3) +
             " mm³ before it was known from where one looked";
@@ -230,13 +235,17 @@ void pictures(std::ostream& out, const Review& r) {
 
 void in_3d(std::ostream& out, const Review& r) {
   if (r.meshes.empty()) return;
-  out << "<section id=\"in-3d\"><h2>In 3D</h2>\n<p class=\"small\" id=\"no-view\" hidden>This browser shows no 3D (WebGL 2): the pictures "
+  out << "<section id=\"in-3d\"><h2>In 3D</h2>\n<p class=\"small\" id=\"no-view\" hidden>This browser shows no 3D "
+         "(WebGL 2): the pictures "
          "above say the same.</p>\n"
-         "<div id=\"view\"><canvas tabindex=\"0\" aria-label=\"The bone, structures and what was removed; drag or use the arrow keys to "
+         "<div id=\"view\"><canvas tabindex=\"0\" aria-label=\"The bone, structures and what was removed; drag or use "
+         "the arrow keys to "
          "turn\"></canvas>"
          "<div class=\"small hint screen\">drag turns &#183; wheel zooms &#183; shift and drag moves</div></div>\n"
-         "<div class=\"bar screen\" id=\"parts\"></div><div class=\"bar screen\"><label class=\"small\" for=\"clear\">bone clear</label>"
-         "<input type=\"range\" id=\"clear\" min=\"0\" max=\"90\" value=\"0\"><button type=\"button\" id=\"home\">as at "
+         "<div class=\"bar screen\" id=\"parts\"></div><div class=\"bar screen\"><label class=\"small\" "
+         "for=\"clear\">bone clear</label>"
+         "<input type=\"range\" id=\"clear\" min=\"0\" max=\"90\" value=\"0\"><button type=\"button\" id=\"home\">as "
+         "at "
          "first</button></div></section>\n";
 }
 
@@ -247,18 +256,22 @@ void over_time(std::ostream& out, const Review& r) {
     out << "<p>Nothing was recorded.</p></section>\n";
     return;
   }
-  out << "<p class=\"small screen\">Drag across it to look at a part of the session; arrow keys move, + and - zoom, Escape shows all "
+  out << "<p class=\"small screen\">Drag across it to look at a part of the session; arrow keys move, + and - zoom, "
+         "Escape shows all "
          "again.</p>\n"
          "<p class=\"small\" id=\"readout\" aria-live=\"off\"></p>\n<div id=\"timeline\" tabindex=\"0\" data-alt=\""
       << e(still.alt) << "\">" << svg_of(still)
-      << "</div>\n<div class=\"bar\"><span class=\"small\" id=\"range\"></span><button type=\"button\" id=\"whole\" class=\"screen\">whole "
+      << "</div>\n<div class=\"bar\"><span class=\"small\" id=\"range\"></span><button type=\"button\" id=\"whole\" "
+         "class=\"screen\">whole "
          "session</button></div>\n"
-         "<p class=\"small\" id=\"event-count\"></p>\n<div class=\"scroll\"><table id=\"events\"><thead><tr><th>at</th><th>what "
+         "<p class=\"small\" id=\"event-count\"></p>\n<div class=\"scroll\"><table "
+         "id=\"events\"><thead><tr><th>at</th><th>what "
          "happened</th><th>for</th></tr></thead><tbody>\n";
   // Without a script the table is whole.
   for (const TimelineEvent& ev : r.timeline.events) {
-    out << "<tr" << (ev.kind == EventKind::injury ? " class=\"bad\"" : "") << "><td class=\"n\">" << clock(ev.t_s) << "</td><td>"
-        << e(ev.what) << "</td><td class=\"n\">" << (ev.end_s - ev.t_s > 0.05 ? told_seconds(ev.end_s - ev.t_s) : "") << "</td></tr>\n";
+    out << "<tr" << (ev.kind == EventKind::injury ? " class=\"bad\"" : "") << "><td class=\"n\">" << clock(ev.t_s)
+        << "</td><td>" << e(ev.what) << "</td><td class=\"n\">"
+        << (ev.end_s - ev.t_s > 0.05 ? told_seconds(ev.end_s - ev.t_s) : "") << "</td></tr>\n";
     if (&ev - r.timeline.events.data() > 300) break;
   }
   out << "</tbody></table></div></section>\n";
@@ -271,12 +284,13 @@ void force(std::ostream& out, const Review& r) {
         << (r.timeline.structure_names.empty() ? ": the case has no structures" : "") << ".</p></section>\n";
     return;
   }
-  out << "<p class=\"small\">How hard the burr pressed on bone at each distance of its surface from a structure: orange, what nine in ten "
+  out << "<p class=\"small\">How hard the burr pressed on bone at each distance of its surface from a structure: "
+         "orange, what nine in ten "
          "moments "
          "stay below; dashed, half of them; dots, moments. ";
   if (r.experts > 0) {
-    out << "Grey: below it lie nine in ten of the moments of " << r.experts << (r.experts == 1 ? " session" : " sessions")
-        << " of experts.";
+    out << "Grey: below it lie nine in ten of the moments of " << r.experts
+        << (r.experts == 1 ? " session" : " sessions") << " of experts.";
   } else {
     out << "Without a reference there is no band of experts.";
   }
@@ -291,10 +305,13 @@ void comparison(std::ostream& out, const Review& r) {
   out << "<section id=\"comparison\"><h2>Beside other sessions</h2>\n<p class=\"legend\"><span class=\"swatch\" "
          "style=\"background:var(--accent);margin-left:0\"></span>this session";
   if (r.earlier > 0)
-    out << "<span class=\"swatch\" style=\"background:var(--ink)\"></span>" << r.earlier << " earlier, the later the darker";
-  if (r.experts > 0) out << "<span class=\"swatch\" style=\"background:var(--band)\"></span>band of " << r.experts << " by experts";
+    out << "<span class=\"swatch\" style=\"background:var(--ink)\"></span>" << r.earlier
+        << " earlier, the later the darker";
+  if (r.experts > 0)
+    out << "<span class=\"swatch\" style=\"background:var(--band)\"></span>band of " << r.experts << " by experts";
   if (r.novices > 0)
-    out << "<span class=\"swatch\" style=\"background:var(--quiet);width:.15rem;border-radius:0\"></span>" << r.novices << " by novices";
+    out << "<span class=\"swatch\" style=\"background:var(--quiet);width:.15rem;border-radius:0\"></span>" << r.novices
+        << " by novices";
   out << "</p>\n<div class=\"chart\">\n";
   for (const Comparison& c : r.comparison) out << svg_of(review::comparison_chart(c));
   out << "</div></section>\n";
@@ -303,20 +320,22 @@ void comparison(std::ostream& out, const Review& r) {
 void tables(std::ostream& out, const Review& r) {
   if (!r.score.items.empty()) {
     out << "<section id=\"items\"><h2>The "
-           "scale</h2>\n<table><thead><tr><th>item</th><th>value</th><th>asked</th><th>margin</th><th></th></tr></thead><tbody>\n";
+           "scale</h2>\n<table><thead><tr><th>item</th><th>value</th><th>asked</th><th>margin</th><th></th></tr></"
+           "thead><tbody>\n";
     for (const Product::Result& i : r.score.items) {
       const std::string unit = unit_text(i.unit).empty() ? "" : " " + unit_text(i.unit);
       out << "<tr><td>" << e(i.item->name) << "</td>";
       if (i.measured) {
-        out << "<td class=\"n\">" << e(told_number(i.value) + unit) << "</td><td class=\"n\">" << e(told_number(i.threshold) + unit)
-            << "</td><td class=\"n\">" << e(told_number(i.margin)) << "</td><td"
+        out << "<td class=\"n\">" << e(told_number(i.value) + unit) << "</td><td class=\"n\">"
+            << e(told_number(i.threshold) + unit) << "</td><td class=\"n\">" << e(told_number(i.margin)) << "</td><td"
             << (i.pass ? ">&#10003; passed" : " class=\"bad\">not passed");
       } else {
         out << "<td colspan=\"3\">not judged: " << e(i.word) << "</td><td>";
       }
       out << "</td></tr>\n";
     }
-    out << "</tbody></table>\n<p class=\"small\">Margin: distance from what is asked, in units of what good results differ by; negative "
+    out << "</tbody></table>\n<p class=\"small\">Margin: distance from what is asked, in units of what good results "
+           "differ by; negative "
            "where it does not pass.</p>\n";
     if (!r.score.steps.empty()) {
       out << "<p>Steps: ";
@@ -332,7 +351,8 @@ void tables(std::ostream& out, const Review& r) {
     out << "</section>\n";
   }
   out << "<section id=\"figures\"><h2>All figures</h2><details><summary>" << r.score.values.size()
-      << " figures, each with what it is</summary>\n<table><thead><tr><th>figure</th><th>of</th><th>value</th><th>what it "
+      << " figures, each with what it is</summary>\n<table><thead><tr><th>figure</th><th>of</th><th>value</th><th>what "
+         "it "
          "is</th></tr></thead><tbody>\n";
   for (const Measured& m : r.score.values) {
     out << "<tr><td>" << m.row->name << "</td><td>" << e(m.of) << "</td><td class=\"n\">"
@@ -357,16 +377,18 @@ std::string review_html(const Review& r) {
   std::ostringstream out;
   out << "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
          // The browser itself keeps the page from asking for anything.
-         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src "
-         "'unsafe-inline'\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>Review of a "
+         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src "
+         "'unsafe-inline'; script-src "
+         "'unsafe-inline'\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>Review "
+         "of a "
          "session</title>\n<style>\n"
       << kReviewCss << "</style></head>\n<body>\n<header><p>Review of a session</p><h1>"
       << e(r.procedure.empty() ? std::string("A rehearsal, without a procedure") : r.procedure)
       << "</h1></header>\n<section id=\"summary\">\n";
   for (const std::string& label : r.labels) {
     const auto colon = label.find(": ");
-    out << "<p class=\"label\"><b>" << e(label.substr(0, colon)) << ":</b> " << e(colon == std::string::npos ? "" : label.substr(colon + 2))
-        << "</p>\n";
+    out << "<p class=\"label\"><b>" << e(label.substr(0, colon)) << ":</b> "
+        << e(colon == std::string::npos ? "" : label.substr(colon + 2)) << "</p>\n";
   }
   out << "<p class=\"lead\">";
   for (std::size_t n = 0; n < r.findings.summary.size(); ++n) out << (n > 0 ? " " : "") << e(r.findings.summary[n]);
@@ -380,13 +402,15 @@ std::string review_html(const Review& r) {
   force(out, r);
   comparison(out, r);
   tables(out, r);
-  out << "<footer class=\"small\">Osteotome. Thresholds are starting values, fitted to no rated session; near means within 2 mm; what each "
+  out << "<footer class=\"small\">Osteotome. Thresholds are starting values, fitted to no rated session; near means "
+         "within 2 mm; what each "
          "figure "
-         "means and may not be used for: docs/review.md and docs/evidence.md. A rehearsal is no proof of skill.</footer>\n"
+         "means and may not be used for: docs/review.md and docs/evidence.md. A rehearsal is no proof of "
+         "skill.</footer>\n"
          "<script type=\"application/json\" id=\"review-data\">"
       << page_data(r) << "</script>\n<script>\n"
       << kReviewJs << "</script>\n</body></html>\n";
   return std::move(out).str();
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

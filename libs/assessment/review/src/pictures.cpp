@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/display/view/snapshot.h"
 #include "osteo/display/view/stills.h"
 #include "osteo/display/view/structures_view.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "scene_parts.h"
 
 namespace osteo::inline assessment::review {
@@ -19,8 +19,9 @@ std::array<double, 3> shares(std::array<std::uint8_t, 3> rgb) {
   return {rgb[0] / 255.0, rgb[1] / 255.0, rgb[2] / 255.0};
 }
 bool at_rest(const World& w) {
-  return std::all_of(w.bodies().begin(), w.bodies().end(),
-                     [](const PlacedBody& b) { return b.world_from_body.rotation == Mat3{} && b.world_from_body.shift_mm == Vec3{}; });
+  return std::all_of(w.bodies().begin(), w.bodies().end(), [](const PlacedBody& b) {
+    return b.world_from_body.rotation == Mat3{} && b.world_from_body.shift_mm == Vec3{};
+  });
 }
 
 class Drawer {
@@ -50,7 +51,8 @@ class Drawer {
     evidence();
     context_.progress(0.5, "drawing");
     std::vector<Picture> pictures = draw_stills(parts_, stills_);
-    for (std::size_t n = 0; n < pictures.size(); ++n) r_.pictures.push_back({ids_[n], captions_[n], std::move(pictures[n])});
+    for (std::size_t n = 0; n < pictures.size(); ++n)
+      r_.pictures.push_back({ids_[n], captions_[n], std::move(pictures[n])});
     for_page();
   }
 
@@ -103,7 +105,8 @@ class Drawer {
         const std::uint8_t value = structures_->values()[s];
         const TriMesh smooth = smooth_surface(structures_->face(s), structures_->label_spacing_mm()[1] / 2);
         structure_parts_.push_back(part(smooth, structures_->colour_of(value)));
-        const ProcedureStructure* const p = r_.of_procedure == nullptr ? nullptr : r_.of_procedure->find(structures_->name_of(value));
+        const ProcedureStructure* const p =
+            r_.of_procedure == nullptr ? nullptr : r_.of_procedure->find(structures_->name_of(value));
         // Air cells fill the picture with what is not in danger.
         opened_.push_back(p != nullptr && p->role == ProcedureRole::enter);
       }
@@ -132,19 +135,22 @@ class Drawer {
     const double radius = std::min(work_.radius_mm * 1.15 + 6, kMostSeenMm);
     // Who took nothing held no shaft that would tell the side.
     const bool nothing = by_[0].empty() && by_[1].empty() && by_[2].empty();
-    still(
-        "before",
-        nothing ? "Before: nothing was drilled that would tell from where one worked" : "Before: as one looked along the burr's mean shaft",
-        view(work_.centre_mm, radius, eye_, with_structures({before_})));
+    still("before",
+          nothing ? "Before: nothing was drilled that would tell from where one worked"
+                  : "Before: as one looked along the burr's mean shaft",
+          view(work_.centre_mm, radius, eye_, with_structures({before_})));
     still("after", "After: from the same side", view(work_.centre_mm, radius, eye_, with_structures({after_})));
     if (nothing) return;
     // Without the bone: from where one worked, and from the side, where undercutting shows.
     const Vec3 side = normalized(cross(std::abs(eye_.z) < 0.9 ? Vec3{0, 0, 1} : Vec3{0, -1, 0}, eye_));
     const double close = work_.radius_mm * 1.12 + 2;
-    const std::string what = by_[0].empty() && by_[1].empty() ? "What was removed, without the bone; nobody knows from where one looked"
-                                                              : "What was removed, without the bone: blue-grey seen, orange unseen";
-    still("unseen", what + "; from where one worked", view(work_.centre_mm, close, eye_, with_structures({seen_, hidden_, unknown_})));
-    still("unseen-side", what + "; from the side", view(work_.centre_mm, close, side, with_structures({seen_, hidden_, unknown_})));
+    const std::string what = by_[0].empty() && by_[1].empty()
+                                 ? "What was removed, without the bone; nobody knows from where one looked"
+                                 : "What was removed, without the bone: blue-grey seen, orange unseen";
+    still("unseen", what + "; from where one worked",
+          view(work_.centre_mm, close, eye_, with_structures({seen_, hidden_, unknown_})));
+    still("unseen-side", what + "; from the side",
+          view(work_.centre_mm, close, side, with_structures({seen_, hidden_, unknown_})));
   }
 
   void evidence() {
@@ -169,7 +175,8 @@ class Drawer {
           hidden ? hidden_
           : ball_mm > 0
               ? part(dots_at(near, ball_mm, 12), shares(kHiddenRgb), 0.6)
-              : part(dots_at(near, std::clamp((near.size() < 20 ? 0.03 : 0.012) * ball.radius_mm, 0.12, 0.7), 2500), shares(kHiddenRgb));
+              : part(dots_at(near, std::clamp((near.size() < 20 ? 0.03 : 0.012) * ball.radius_mm, 0.12, 0.7), 2500),
+                     shares(kHiddenRgb));
       Still s = view(ball.centre_mm, ball.radius_mm, from.eye, with_structures({after_, marks}));
       std::string caption = f.text;
       if (ball_mm > 0) caption += f.kind == "item" ? " (Orange: that ball.)" : " (Orange: the burr at these moments.)";
@@ -189,17 +196,19 @@ class Drawer {
       still(f.id, caption, s);
     }
     if (wanted > drawn)
-      r_.left_out.push_back("pictures of " + std::to_string(wanted - drawn) + " more findings: the first " + std::to_string(drawn) +
-                            " have one");
+      r_.left_out.push_back("pictures of " + std::to_string(wanted - drawn) + " more findings: the first " +
+                            std::to_string(drawn) + " have one");
   }
 
-  // What a place stands for, where that is a ball: the burr in hand at the first of a finding's moments, or the ball that fits in. Else 0.
+  // What a place stands for, where that is a ball: the burr in hand at the first of a finding's moments, or the ball
+  // that fits in. Else 0.
   [[nodiscard]] double ball_radius(const ScoreFinding& f) const {
     for (const Product::Result& r : r_.score.items) {
       if (f.kind == "item" && r.item->name == f.metric && r.item->kind == ItemKind::sharp_angle) return r.value;
     }
     if (f.kind != "injury" && f.kind != "touch" && f.kind != "force") return 0;
-    const auto n = f.times_s.empty() ? r_.timeline.size() : static_cast<std::size_t>(f.times_s.front() * Timeline::kRateHz);
+    const auto n =
+        f.times_s.empty() ? r_.timeline.size() : static_cast<std::size_t>(f.times_s.front() * Timeline::kRateHz);
     if (n >= r_.timeline.size() || r_.timeline.tool[n] == Timeline::kPlate) return 0;
     const Instrument& tool = instrument_of(r_.timeline.tool[n]);
     return tool.as_burr() == nullptr ? 0 : tool.as_burr()->diameter_mm / 2;
@@ -212,8 +221,8 @@ class Drawer {
     r_.view_eye = eye_;
     r_.view_radius_mm = std::min(work_.radius_mm * 1.15 + 6, kMostSeenMm);
     const double voxel = begin_.finest_voxel_mm();
-    const auto add = [&](std::string id, std::string name, std::array<std::uint8_t, 3> rgb, std::size_t part, std::size_t most,
-                         double error) {
+    const auto add = [&](std::string id, std::string name, std::array<std::uint8_t, 3> rgb, std::size_t part,
+                         std::size_t most, double error) {
       const TriMesh cropped = within(*parts_[part].mesh, work_.centre_mm, around_mm_);
       if (cropped.triangles.empty()) return;
       r_.meshes.push_back({std::move(id), std::move(name), rgb, simplified(cropped, most, error)});
@@ -225,8 +234,8 @@ class Drawer {
       const auto c = structures_->colour_of(value);
       std::array<std::uint8_t, 3> rgb{};
       for (std::size_t a = 0; a < 3; ++a) rgb[a] = static_cast<std::uint8_t>(std::lround(255 * c[a]));
-      add((opened_[s] ? "opened-" : "structure-") + std::to_string(value), structures_->name_of(value), rgb, structure_parts_[s], 12'000,
-          0.1);
+      add((opened_[s] ? "opened-" : "structure-") + std::to_string(value), structures_->name_of(value), rgb,
+          structure_parts_[s], 12'000, 0.1);
     }
     add("seen", "removed, seen", kSeenRgb, seen_solid_, 40'000, 0.2 * voxel);
     add("hidden", "removed, unseen", kHiddenRgb, hidden_, 40'000, 0.1 * voxel);
@@ -251,9 +260,9 @@ class Drawer {
 
 }  // namespace
 
-void draw_pictures(Review& r, const World& begin, const World& end, const StructureMap* structures, const ScoreDetail& detail,
-                   const std::vector<CameraPose>& cameras, const Context& context) {
+void draw_pictures(Review& r, const World& begin, const World& end, const StructureMap* structures,
+                   const ScoreDetail& detail, const std::vector<CameraPose>& cameras, const Context& context) {
   Drawer(r, begin, end, structures, detail, cameras, context).all();
 }
 
-}  // namespace osteo::assessment::review
+}  // namespace osteo::inline assessment::review

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/assessment/evidence/frames.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/assessment/evidence/frames.h"
 #include "osteo/session/recording/simulated.h"
 #include "pictures.h"
 
@@ -39,10 +39,11 @@ struct Opened {
   }
 };
 
-Told told_of(const Opened& o, World begin, const Procedure* procedure, const Reference* reference, const std::string& subject,
-             const Context& context) {
+Told told_of(const Opened& o, World begin, const Procedure* procedure, const Reference* reference,
+             const std::string& subject, const Context& context) {
   Told t;
-  t.score = score_session(o.session, std::move(begin), o.anatomy.structures.get(), procedure, reference, subject, context, &t.detail);
+  t.score = score_session(o.session, std::move(begin), o.anatomy.structures.get(), procedure, reference, subject,
+                          context, &t.detail);
   return t;
 }
 
@@ -86,7 +87,8 @@ std::vector<ForceProfile> profiles_of(const ScoreDetail& detail, const Reference
     if (s != nullptr && s->role == ProcedureRole::enter) continue;
     p.drilled_s = static_cast<double>(samples.size()) / 100;
     std::vector<IsotonicQuantile::Point> mine, theirs;
-    for (const NearMetric::Sample& v : samples) mine.push_back({static_cast<double>(v.distance_mm), static_cast<double>(v.force_n)});
+    for (const NearMetric::Sample& v : samples)
+      mine.push_back({static_cast<double>(v.distance_mm), static_cast<double>(v.force_n)});
     for (std::size_t n = 0; reference != nullptr && n < reference->sessions.size(); ++n) {
       const Reference::One& o = reference->sessions[n];
       if (o.group != ReferenceGroup::expert || (!subject.empty() && o.subject == subject)) continue;
@@ -106,7 +108,8 @@ std::vector<ForceProfile> profiles_of(const ScoreDetail& detail, const Reference
     }
     if (!p.most.empty()) all.push_back(std::move(p));
   }
-  std::stable_sort(all.begin(), all.end(), [](const ForceProfile& a, const ForceProfile& b) { return a.drilled_s > b.drilled_s; });
+  std::stable_sort(all.begin(), all.end(),
+                   [](const ForceProfile& a, const ForceProfile& b) { return a.drilled_s > b.drilled_s; });
   return all;
 }
 
@@ -127,8 +130,10 @@ std::vector<std::string> labels_of(const Opened& o, const HandWasLed& seen) {
     all.emplace_back("Scripted: a file of strokes moved the hand, no person did.");
   }
   if (!o.folder.guided.empty() || seen.curve || seen.guide)
-    all.push_back("Guided: " + (o.folder.guided.empty() ? std::string("forces that led the hand were on at times") : o.folder.guided) +
-                  ". What was done then is not the hand's alone.");
+    all.push_back(
+        "Guided: " +
+        (o.folder.guided.empty() ? std::string("forces that led the hand were on at times") : o.folder.guided) +
+        ". What was done then is not the hand's alone.");
   if (!o.session.outline().end) all.emplace_back("Cut short: the program was stopped before the session was closed.");
   return all;
 }
@@ -159,12 +164,15 @@ Review make_review(const ReviewRequest& q, const Context& context) {
       const Opened one(q.reference / list[n].session, o.folder.case_folder, context);
       World its = one.begin(context);
       if (its.hash() != o.session.header().bone_hash || one.session.header().bone_hash != o.session.header().bone_hash)
-        throw Error(ExitCode::usage, "session '" + list[n].session + "' of the reference was recorded on another bone than this one",
+        throw Error(ExitCode::usage,
+                    "session '" + list[n].session + "' of the reference was recorded on another bone than this one",
                     "a reference is of one case: leave it out of reference.json");
       Told t = told_of(one, std::move(its), procedure, nullptr, {}, Context());
-      reference->sessions.push_back({list[n].subject, list[n].group, std::move(t.detail.removed), std::move(t.detail.near)});
+      reference->sessions.push_back(
+          {list[n].subject, list[n].group, std::move(t.detail.removed), std::move(t.detail.near)});
       if (q.subject.empty() || list[n].subject != q.subject)
-        others.push_back({std::move(t.score), list[n].group == ReferenceGroup::expert ? Other::Of::expert : Other::Of::novice});
+        others.push_back(
+            {std::move(t.score), list[n].group == ReferenceGroup::expert ? Other::Of::expert : Other::Of::novice});
     }
   }
   for (const fs::path& path : q.earlier) {
@@ -182,11 +190,12 @@ Review make_review(const ReviewRequest& q, const Context& context) {
     led.frame(f);
   };
   const World first = begin.copy();
-  r.score = score_session(o.session, std::move(begin), structures, procedure, reference ? &*reference : nullptr, q.subject,
-                          context.sub(0.35, 0.7), &detail);
+  r.score = score_session(o.session, std::move(begin), structures, procedure, reference ? &*reference : nullptr,
+                          q.subject, context.sub(0.35, 0.7), &detail);
   if (!o.session.header().haptics.structures.empty() && structures != nullptr &&
       o.session.header().haptics.structures != structures->hash())
-    r.score.words.emplace_back("the case's structures are not those that the session watched: they are measured as the case has them now");
+    r.score.words.emplace_back(
+        "the case's structures are not those that the session watched: they are measured as the case has them now");
   r.labels = labels_of(o, led);
   r.procedure = r.score.procedure;
   r.findings = findings_of(r.score, structures, procedure);
@@ -197,7 +206,8 @@ Review make_review(const ReviewRequest& q, const Context& context) {
                                                 : r.unknown_mm3) += static_cast<double>(v.mm3);
   }
   r.profiles = profiles_of(detail, reference ? &*reference : nullptr, q.subject, structures, procedure);
-  for (const Other& other : others) ++(other.of == Other::Of::earlier ? r.earlier : other.of == Other::Of::expert ? r.experts : r.novices);
+  for (const Other& other : others)
+    ++(other.of == Other::Of::earlier ? r.earlier : other.of == Other::Of::expert ? r.experts : r.novices);
   if (!others.empty()) {
     for (const MetricName name : kCompared) {
       Comparison c{&name.row(), std::nullopt, {}, {}, {}};
@@ -227,4 +237,4 @@ Review make_review(const ReviewRequest& q, const Context& context) {
   return r;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -7,9 +7,9 @@
 #include <map>
 #include <numbers>
 
+#include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/simulation/bone/live_surface.h"
 #include "osteo/simulation/bone/world_mesh.h"
-#include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo::inline assessment::review {
 namespace {
@@ -41,7 +41,8 @@ void set_normals(TriMesh& m) {
     for (const std::uint32_t p : t) sum[p] += n;
   }
   m.normals.resize(sum.size());
-  for (std::size_t p = 0; p < sum.size(); ++p) m.normals[p] = to_floats(length(sum[p]) > 0 ? normalized(sum[p]) : Vec3{0, 0, 1});
+  for (std::size_t p = 0; p < sum.size(); ++p)
+    m.normals[p] = to_floats(length(sum[p]) > 0 ? normalized(sum[p]) : Vec3{0, 0, 1});
 }
 
 }  // namespace
@@ -58,7 +59,8 @@ TriMesh blob_of(const std::vector<VisibilityMetric::Voxel>& voxels, const World&
       if (taken[n] || std::abs(static_cast<double>(voxels[n].mm3) - mm3) > 0.01 * mm3) continue;
       taken[n] = true;
       const Vec3 x = frame.index_from_world(voxels[n].own_mm);
-      at.push_back({static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)), static_cast<int>(std::lround(x.z))});
+      at.push_back(
+          {static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)), static_cast<int>(std::lround(x.z))});
       lo = {std::min(lo.i, at.back().i), std::min(lo.j, at.back().j), std::min(lo.k, at.back().k)};
     }
     if (at.empty()) continue;
@@ -111,9 +113,10 @@ TriMesh simplified(const TriMesh& mesh, std::size_t triangles, double error_mm) 
   const std::size_t points = mesh.points_mm.size();
   const float scale = meshopt_simplifyScale(mesh.points_mm.front().data(), points, sizeof(mesh.points_mm.front()));
   const auto reduce = [&](std::size_t to, double error) {
-    const std::size_t kept = meshopt_simplify(coarse.triangles.front().data(), mesh.triangles.front().data(), 3 * mesh.triangles.size(),
-                                              mesh.points_mm.front().data(), points, sizeof(mesh.points_mm.front()), 3 * to,
-                                              scale > 0 ? static_cast<float>(error) / scale : 0.01F, 0, nullptr);
+    const std::size_t kept =
+        meshopt_simplify(coarse.triangles.front().data(), mesh.triangles.front().data(), 3 * mesh.triangles.size(),
+                         mesh.points_mm.front().data(), points, sizeof(mesh.points_mm.front()), 3 * to,
+                         scale > 0 ? static_cast<float>(error) / scale : 0.01F, 0, nullptr);
     coarse.triangles.resize(kept / 3);
   };
   // First what the eye will not miss; more only where it is still too much.
@@ -134,7 +137,8 @@ TriMesh dots_at(const std::vector<Vec3>& places, double radius, std::size_t most
   for (std::uint32_t a = 0; a <= rings; ++a) {
     for (std::uint32_t b = 0; b < around; ++b) {
       const double polar = std::numbers::pi * a / rings, turn = 2 * std::numbers::pi * b / around;
-      one.normals.push_back(to_floats({std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar)}));
+      one.normals.push_back(
+          to_floats({std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar)}));
     }
   }
   for (std::uint32_t a = 0; a < rings; ++a) {
@@ -213,4 +217,4 @@ Lookout look_at_places(const World& world, const std::vector<Vec3>& places, Vec3
   return best;
 }
 
-}  // namespace osteo::assessment::review
+}  // namespace osteo::inline assessment::review

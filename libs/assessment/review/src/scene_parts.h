@@ -3,16 +3,17 @@
 #include <functional>
 #include <vector>
 
-#include "osteo/simulation/bone/structure_map.h"
-#include "osteo/simulation/bone/world.h"
 #include "osteo/assessment/evidence/visibility.h"
 #include "osteo/assessment/review/review.h"
+#include "osteo/simulation/bone/structure_map.h"
+#include "osteo/simulation/bone/world.h"
 
 namespace osteo::inline assessment::review {
 
-/// Removed voxels as a surface around them, where they lay at the beginning. `frames`: of the bodies of the session's beginning; a voxel
-/// belongs to the one whose voxels are as large.
-[[nodiscard]] TriMesh blob_of(const std::vector<VisibilityMetric::Voxel>& voxels, const World& begin, const Context& context);
+/// Removed voxels as a surface around them, where they lay at the beginning. `frames`: of the bodies of the session's
+/// beginning; a voxel belongs to the one whose voxels are as large.
+[[nodiscard]] TriMesh blob_of(const std::vector<VisibilityMetric::Voxel>& voxels, const World& begin,
+                              const Context& context);
 /// Of all bodies where they lay at the beginning, with normals to light by.
 [[nodiscard]] TriMesh bone_at_rest(const World& world, const Context& context);
 /// Triangles with a corner in the ball, on their own points.
@@ -31,12 +32,12 @@ struct Ball {
 /// Around nine tenths of those near `at_mm`.
 [[nodiscard]] Ball close_to(Vec3 at_mm, const std::vector<Vec3>& places_mm);
 
-/// From where places are seen: of 200 directions the one from which most of them are not behind bone, and of equals the one nearest to
-/// `wish` (unit).
+/// From where places are seen: of 200 directions the one from which most of them are not behind bone, and of equals the
+/// one nearest to `wish` (unit).
 struct Lookout {
   Vec3 eye;
   double seen_share = 0;
 };
 [[nodiscard]] Lookout look_at_places(const World& world, const std::vector<Vec3>& places_mm, Vec3 wish);
 
-}  // namespace osteo::assessment::review
+}  // namespace osteo::inline assessment::review

@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "charts.h"
+#include "osteo/assessment/review/review.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/assessment/review/review.h"
 
 namespace osteo::inline assessment {
 namespace {
@@ -20,7 +20,8 @@ Tone tone_of(FindingSeverity s) {
 }
 
 const ReviewPicture* picture_with(const Review& r, std::string_view id) {
-  const auto at = std::find_if(r.pictures.begin(), r.pictures.end(), [&](const ReviewPicture& p) { return p.id == id; });
+  const auto at =
+      std::find_if(r.pictures.begin(), r.pictures.end(), [&](const ReviewPicture& p) { return p.id == id; });
   return at == r.pictures.end() ? nullptr : &*at;
 }
 
@@ -42,7 +43,8 @@ Json review_json(const Review& r) {
   j["labels"] = r.labels;
   j["procedure"] = r.procedure.empty() ? Json() : Json(r.procedure);
   j["damaged"] = r.damaged;
-  j["removed_by_burrs"] = {{"seen_mm3", r.seen_mm3}, {"hidden_mm3", r.hidden_mm3}, {"sight_unknown_mm3", r.unknown_mm3}};
+  j["removed_by_burrs"] = {
+      {"seen_mm3", r.seen_mm3}, {"hidden_mm3", r.hidden_mm3}, {"sight_unknown_mm3", r.unknown_mm3}};
   j["findings"] = findings_json(r.findings, true);
   j["score"] = score_json(r.score, false);
   j["timeline"] = timeline_json(r.timeline);
@@ -52,8 +54,10 @@ Json review_json(const Review& r) {
   compared["novice_sessions"] = r.novices;
   compared["metrics"] = Json::list();
   for (const Comparison& c : r.comparison) {
-    Json m{
-        {"name", c.row->name}, {"plain_name", review::plain_name(c.row->name)}, {"unit", c.row->unit}, {"better", name_of(c.row->better)}};
+    Json m{{"name", c.row->name},
+           {"plain_name", review::plain_name(c.row->name)},
+           {"unit", c.row->unit},
+           {"better", name_of(c.row->better)}};
     m["value"] = c.value ? Json(*c.value) : Json();
     m["earlier"] = Json::list();
     for (const auto& v : c.earlier) m["earlier"].push_back(v ? Json(*v) : Json());
@@ -96,7 +100,8 @@ Sheet review_sheet(const Review& r) {
   s.pages = 4;
   for (const std::string& label : r.labels) {
     const auto colon = label.find(": ");
-    s.blocks.push_back({sheet::Band{label.substr(0, colon), colon == std::string::npos ? "" : label.substr(colon + 2), Tone::caution}});
+    s.blocks.push_back({sheet::Band{label.substr(0, colon), colon == std::string::npos ? "" : label.substr(colon + 2),
+                                    Tone::caution}});
   }
   std::string summary;
   for (const std::string& line : r.findings.summary) summary += (summary.empty() ? "" : " ") + line;
@@ -105,7 +110,8 @@ Sheet review_sheet(const Review& r) {
   sheet::Table list{{"what was found", "look at"}, {}, {84, 16}};
   for (const ScoreFinding& f : r.findings.list) {
     std::string when;
-    for (std::size_t n = 0; n < std::min<std::size_t>(3, f.times_s.size()); ++n) when += (n > 0 ? ", " : "") + review::clock(f.times_s[n]);
+    for (std::size_t n = 0; n < std::min<std::size_t>(3, f.times_s.size()); ++n)
+      when += (n > 0 ? ", " : "") + review::clock(f.times_s[n]);
     if (f.times_s.size() > 3) when += ", ...";
     list.rows.push_back({{f.text, tone_of(f.severity)}, {when, Tone::quiet}});
   }
@@ -187,7 +193,8 @@ void may_write_review(const fs::path& path, bool force) {
     if (std::find(kFiles.begin(), kFiles.end(), name) == kFiles.end())
       throw Error(ExitCode::cannot_write, "'" + path.string() + "' holds '" + name + "', which is no part of a review",
                   "name another folder");
-    if (!force) throw Error(ExitCode::cannot_write, "'" + path.string() + "' holds a review already", "--force replaces it");
+    if (!force)
+      throw Error(ExitCode::cannot_write, "'" + path.string() + "' holds a review already", "--force replaces it");
   }
 }
 
@@ -200,4 +207,4 @@ void write_review(const Review& r, const fs::path& folder, bool force) {
   });
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -21,4 +21,4 @@ std::vector<Measured> heat_values(const HeatReader& heat, const StructureMap* st
   return values;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

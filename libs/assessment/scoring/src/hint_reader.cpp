@@ -3,9 +3,9 @@
 #include <cmath>
 #include <utility>
 
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/assessment/evidence/visibility.h"
 #include "osteo/geometry/grid/brick_places.h"
+#include "osteo/simulation/bone/instrument.h"
 
 namespace osteo::inline assessment {
 
@@ -23,7 +23,8 @@ void HintReader::update() {
       eye = eye_mm_;
     }
     if (eye) {
-      const Vec3 tip = from_floats(last_.device.position_mm) + from_floats(last_.shown_offset_mm), axis = from_floats(last_.device.axis);
+      const Vec3 tip = from_floats(last_.device.position_mm) + from_floats(last_.shown_offset_mm),
+                 axis = from_floats(last_.device.axis);
       const RoundCone& head = instrument_of(last_.device.tool).head;
       watch_.seen(!BoneSight(*world_).blocked(*eye, tip, [&](const PlacedBody& body, VoxelKey own) {
         const BrickGrid& bone = body.body->bone;
@@ -51,4 +52,4 @@ std::optional<Hint> HintReader::take() {
   return std::exchange(hint_, std::nullopt);
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

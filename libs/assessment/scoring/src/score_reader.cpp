@@ -44,4 +44,4 @@ void ScoreReader::end() {
   keeper_.finish(maker_->world());
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

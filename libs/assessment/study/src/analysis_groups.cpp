@@ -12,7 +12,8 @@ void Analyst::compare() {
     refuse("Comparison", "There is one group.");
     return;
   }
-  sheet::Table table{{"outcome", "groups", "people", "means", "difference", "p (Welch)", "p (exact)", "Holm", "Hedges g", "Cliff's delta"},
+  sheet::Table table{{"outcome", "groups", "people", "means", "difference", "p (Welch)", "p (exact)", "Holm",
+                      "Hedges g", "Cliff's delta"},
                      {},
                      {15, 13, 6, 10, 16, 7, 7, 7, 15, 15}};
   std::vector<Json> rows;
@@ -24,7 +25,8 @@ void Analyst::compare() {
     for (const std::string& g : study_.plan.groups) of_groups[g] = json_of(summarise(means_of_people(study_, o, g)));
     groups.push_back({{"outcome", o.name}, {"groups", of_groups}});
     for (std::size_t i = 0; i < study_.plan.groups.size(); ++i) {
-      for (std::size_t j = 0; j < i; ++j) compare_two(o, study_.plan.groups[i], study_.plan.groups[j], rows, p, table, said);
+      for (std::size_t j = 0; j < i; ++j)
+        compare_two(o, study_.plan.groups[i], study_.plan.groups[j], rows, p, table, said);
     }
   }
   json_["groups"] = groups;
@@ -36,7 +38,8 @@ void Analyst::compare() {
   }
   if (rows.empty()) return;
   add(std::move(table));
-  say("One value a person: the mean of that person's sessions. p (exact): of the difference of means, by exchanging people between "
+  say("One value a person: the mean of that person's sessions. p (exact): of the difference of means, by exchanging "
+      "people between "
       "groups. "
       "Holm: the latter, for all rows of this table together.",
       Tone::quiet);
@@ -49,20 +52,24 @@ void Analyst::compare() {
       enough = enough || people.back().size() >= kPeopleToCompare;
     }
     if (enough && charts.size() < kMostCharts)
-      charts.push_back(groups_chart("groups-" + std::to_string(charts.size() + 1), o.name, study_.plan.groups, people, settings_.level));
+      charts.push_back(groups_chart("groups-" + std::to_string(charts.size() + 1), o.name, study_.plan.groups, people,
+                                    settings_.level));
   }
-  add_charts(std::move(charts), "Dots: people. Box: quartiles and ends. Red: mean with its t interval (one group by itself).");
+  add_charts(std::move(charts),
+             "Dots: people. Box: quartiles and ends. Red: mean with its t interval (one group by itself).");
   repeated_table();
 }
 
-void Analyst::compare_two(const Outcome& o, const std::string& first, const std::string& second, std::vector<Json>& rows,
-                          std::vector<double>& p, sheet::Table& table, std::set<std::string>& said) {
+void Analyst::compare_two(const Outcome& o, const std::string& first, const std::string& second,
+                          std::vector<Json>& rows, std::vector<double>& p, sheet::Table& table,
+                          std::set<std::string>& said) {
   const std::vector<double> a = means_of_people(study_, o, first), b = means_of_people(study_, o, second);
   if (a.size() < kPeopleToCompare || b.size() < kPeopleToCompare) {
     // Of the same two groups once, unless this outcome has others than the rest.
-    const std::string why = first + " has " + counted(a.size(), "person", "people") + ", " + second + " " + std::to_string(b.size()) +
-                            "; " + std::to_string(kPeopleToCompare) + " in each are needed.";
-    if (said.insert(why).second) refuse("Comparison of " + first + " and " + second + ", wherever so few have a value", why);
+    const std::string why = first + " has " + counted(a.size(), "person", "people") + ", " + second + " " +
+                            std::to_string(b.size()) + "; " + std::to_string(kPeopleToCompare) + " in each are needed.";
+    if (said.insert(why).second)
+      refuse("Comparison of " + first + " and " + second + ", wherever so few have a value", why);
     return;
   }
   const Welch w = welch(a, b, settings_.level);
@@ -101,10 +108,12 @@ void Analyst::compare_two(const Outcome& o, const std::string& first, const std:
                         {with(g)},
                         {with(d)}});
   if (exact.smallest_p > 0.05 && said.insert(first + second + "few").second)
-    say(first + " and " + second + ": so few people that no result whatever could give an exact p below " + text(exact.smallest_p, 2) + ".",
+    say(first + " and " + second + ": so few people that no result whatever could give an exact p below " +
+            text(exact.smallest_p, 2) + ".",
         Tone::caution);
   if (std::isnan(g.value))
-    say(o.name + ", " + first + " and " + second + ": nobody differs within a group, so there is no effect size in standard deviations.",
+    say(o.name + ", " + first + " and " + second +
+            ": nobody differs within a group, so there is no effect size in standard deviations.",
         Tone::caution);
 }
 
@@ -154,13 +163,15 @@ void Analyst::repeated_table() {
                           {text(value("icc"), 2)}});
   }
   if (table.rows.empty()) return;
-  say("People came several times. The same differences from single sessions, by a mixed model with a random intercept for each person "
+  say("People came several times. The same differences from single sessions, by a mixed model with a random intercept "
+      "for each person "
       "(REML, Satterthwaite's degrees of freedom):");
   add(std::move(table));
   if (at_edge)
-    say("Where the share between people is 0, the model takes sessions for people, and its p may be too small: go by the table of "
+    say("Where the share between people is 0, the model takes sessions for people, and its p may be too small: go by "
+        "the table of "
         "people.",
         Tone::caution);
 }
 
-}  // namespace osteo::assessment::study
+}  // namespace osteo::inline assessment::study

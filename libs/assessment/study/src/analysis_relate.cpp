@@ -15,9 +15,10 @@ void Analyst::agreement() {
   }
   std::vector<double> categories;
   for (int v = study_.plan.lowest; v <= study_.plan.highest; ++v) categories.push_back(v);
-  sheet::Table table{{"item", "sessions", "same, %", "kappa", "weighted kappa", "AC1", "ICC(A,1)", "ICC(A,k)", "ICC(C,1)"},
-                     {},
-                     {16, 8, 7, 7, 8, 16, 16, 16, 16}};
+  sheet::Table table{
+      {"item", "sessions", "same, %", "kappa", "weighted kappa", "AC1", "ICC(A,1)", "ICC(A,k)", "ICC(C,1)"},
+      {},
+      {16, 8, 7, 7, 8, 16, 16, 16, 16}};
   for (const std::string& item : study_.plan.items) {
     const Ratings r = ratings_of(study_, item);
     const CategoryAgreement c = category_agreement(r, categories, settings_.level);
@@ -51,15 +52,20 @@ void Analyst::agreement() {
                           {with(i.a_1)},
                           {with(i.a_k)},
                           {with(i.c_1)}});
-    if (std::isnan(c.kappa)) say(item + ": kappa is not defined, since raters gave one value throughout.", Tone::caution);
+    if (std::isnan(c.kappa))
+      say(item + ": kappa is not defined, since raters gave one value throughout.", Tone::caution);
     if (std::isnan(i.a_1.value))
-      say(item + ": no intraclass correlation, since ratings do not vary or no two sessions were rated by all.", Tone::caution);
+      say(item + ": no intraclass correlation, since ratings do not vary or no two sessions were rated by all.",
+          Tone::caution);
     if (i.left_out > 0)
-      say(item + ": intraclass correlations leave out " + counted(i.left_out, "session", "sessions") + " not rated by all.", Tone::quiet);
+      say(item + ": intraclass correlations leave out " + counted(i.left_out, "session", "sessions") +
+              " not rated by all.",
+          Tone::quiet);
   }
   if (table.rows.empty()) return;
   add(std::move(table));
-  say("Kappas are means over pairs of raters; weighted: quadratic. A: agreement, C: consistency; 1: one rater, k: the mean of all.",
+  say("Kappas are means over pairs of raters; weighted: quadratic. A: agreement, C: consistency; 1: one rater, k: the "
+      "mean of all.",
       Tone::quiet);
   std::vector<sheet::Plot> charts;
   for (const std::string& item : study_.plan.items) {
@@ -74,11 +80,13 @@ void Analyst::agreement() {
         }
         if (first.size() < kTargetsToAgree || charts.size() >= 4) continue;
         charts.push_back(agreement_chart("agreement-" + std::to_string(charts.size() + 1),
-                                         item + ": " + study_.raters[i].rater + " and " + study_.raters[j].rater, first, second));
+                                         item + ": " + study_.raters[i].rater + " and " + study_.raters[j].rater, first,
+                                         second));
       }
     }
   }
-  add_charts(std::move(charts), "Each dot a session (equal ones side by side); red: mean difference and limits of agreement (1.96 SD).");
+  add_charts(std::move(charts),
+             "Each dot a session (equal ones side by side); red: mean difference and limits of agreement (1.96 SD).");
 }
 
 // The correlation without what the metrics given explain of both, of sessions that have all of them.
@@ -91,13 +99,18 @@ void Analyst::hold(const Outcome& metric, const Outcome& rating, std::vector<she
     const auto rated = std::find(rating.session.begin(), rating.session.end(), metric.session[i]);
     if (rated == rating.session.end()) continue;
     const auto& has = study_.sessions[metric.session[i]].metrics;
-    if (!std::all_of(settings_.given.begin(), settings_.given.end(), [&](const std::string& g) { return has.contains(g); })) continue;
+    if (!std::all_of(settings_.given.begin(), settings_.given.end(),
+                     [&](const std::string& g) { return has.contains(g); }))
+      continue;
     x.push_back(metric.values[i]);
     y.push_back(rating.values[static_cast<std::size_t>(rated - rating.session.begin())]);
     for (std::size_t g = 0; g < given.size(); ++g) given[g].push_back(has.at(settings_.given[g]));
   }
-  const Correlation p = partial_pearson(x, y, given, settings_.level), s = partial_spearman(x, y, given, settings_.level);
-  const auto told = [](const Correlation& c) { return Json{{"value", c.r}, {"p", c.p}, {"interval", json_of(c.interval)}}; };
+  const Correlation p = partial_pearson(x, y, given, settings_.level),
+                    s = partial_spearman(x, y, given, settings_.level);
+  const auto told = [](const Correlation& c) {
+    return Json{{"value", c.r}, {"p", c.p}, {"interval", json_of(c.interval)}};
+  };
   j["sessions_with_all"] = x.size();
   j["partial_pearson"] = told(p);
   j["partial_spearman"] = told(s);
@@ -151,14 +164,15 @@ void Analyst::correlate() {
       refuse("Correlation of " + o.name, "Metric or rating never varies.");
       continue;
     }
-    json_["correlations"].push_back({{"metric", o.name},
-                                     {"with", rating->name},
-                                     {"sessions", c.pairs},
-                                     {"people", c.people},
-                                     {"pearson", Json{{"value", c.pearson.r}, {"interval", json_of(c.pearson_by_people.interval)}}},
-                                     {"r_squared", c.pearson.r * c.pearson.r},
-                                     {"spearman", Json{{"value", c.spearman.r}, {"interval", json_of(c.spearman_by_people.interval)}}},
-                                     {"resamples_left_out", c.pearson_by_people.left_out}});
+    json_["correlations"].push_back(
+        {{"metric", o.name},
+         {"with", rating->name},
+         {"sessions", c.pairs},
+         {"people", c.people},
+         {"pearson", Json{{"value", c.pearson.r}, {"interval", json_of(c.pearson_by_people.interval)}}},
+         {"r_squared", c.pearson.r * c.pearson.r},
+         {"spearman", Json{{"value", c.spearman.r}, {"interval", json_of(c.spearman_by_people.interval)}}},
+         {"resamples_left_out", c.pearson_by_people.left_out}});
     table.rows.push_back({{o.name},
                           {std::to_string(c.pairs)},
                           {std::to_string(c.people)},
@@ -167,7 +181,8 @@ void Analyst::correlate() {
                           {with({c.spearman.r, c.spearman_by_people.interval})}});
     if (holds) hold(o, *rating, table.rows.back());
     if (charts.size() < kMostCharts)
-      charts.push_back(scatter_chart("scatter-" + std::to_string(charts.size() + 1), o.name, rating->name, x, y, able, settings_.level));
+      charts.push_back(scatter_chart("scatter-" + std::to_string(charts.size() + 1), o.name, rating->name, x, y, able,
+                                     settings_.level));
   }
   if (table.rows.empty()) return;
   add(std::move(table));
@@ -176,14 +191,15 @@ void Analyst::correlate() {
     std::string names;
     for (const std::string& g : settings_.given) names += (names.empty() ? "" : ", ") + g;
     say("Held (partial correlation, by straight lines): " + names +
-            ". Intervals by Fisher's transformation, as if sessions knew nothing of each other: too narrow where people come several "
+            ". Intervals by Fisher's transformation, as if sessions knew nothing of each other: too narrow where "
+            "people come several "
             "times.",
         Tone::quiet);
   }
-  add_charts(std::move(charts),
-             "Full dots: sessions of " + study_.plan.competent +
-                 ", hollow ones: of others. Red: least squares; the band is the line's t interval as if sessions knew nothing of "
-                 "each other, so too narrow where people come several times.");
+  add_charts(std::move(charts), "Full dots: sessions of " + study_.plan.competent +
+                                    ", hollow ones: of others. Red: least squares; the band is the line's t interval "
+                                    "as if sessions knew nothing of "
+                                    "each other, so too narrow where people come several times.");
 }
 
 void Analyst::decide() {
@@ -195,7 +211,9 @@ void Analyst::decide() {
     return;
   }
   sheet::Table table{
-      {"outcome", "people", "area under ROC", "pass mark", "fail though " + study_.plan.competent, "pass though other"}, {}, {}};
+      {"outcome", "people", "area under ROC", "pass mark", "fail though " + study_.plan.competent, "pass though other"},
+      {},
+      {}};
   std::set<std::string> said;
   std::vector<sheet::Plot> charts;
   for (const Outcome& o : outcomes_) {
@@ -206,28 +224,32 @@ void Analyst::decide() {
       const std::vector<double> more = means_of_people(study_, o, g);
       others.insert(others.end(), more.begin(), more.end());
     }
-    const std::string sizes =
-        study_.plan.competent + " has " + counted(able.size(), "person", "people") + ", others " + std::to_string(others.size());
+    const std::string sizes = study_.plan.competent + " has " + counted(able.size(), "person", "people") + ", others " +
+                              std::to_string(others.size());
     if (able.size() < kPeopleToCompare || others.size() < kPeopleToCompare) {
       if (said.insert(sizes).second)
-        refuse("ROC and pass marks, wherever so few have a value", sizes + "; " + std::to_string(kPeopleToCompare) + " each are needed.");
+        refuse("ROC and pass marks, wherever so few have a value",
+               sizes + "; " + std::to_string(kPeopleToCompare) + " each are needed.");
       continue;
     }
     const Roc r = roc(able, others, settings_.level);
     Json curve = Json::list();
     for (const auto& p : r.curve)
-      curve.push_back({{"at_least", p.threshold}, {"true_positive", p.true_positive}, {"false_positive", p.false_positive}});
+      curve.push_back(
+          {{"at_least", p.threshold}, {"true_positive", p.true_positive}, {"false_positive", p.false_positive}});
     json_["roc"].push_back({{"outcome", o.name},
                             {"positive", study_.plan.competent},
                             {"area", json_of(r.area)},
                             {"standard_error", r.standard_error},
                             {"best_threshold", r.best.threshold},
                             {"curve", curve}});
-    std::vector<sheet::Cell> row{
-        {o.name}, {std::to_string(able.size()) + ", " + std::to_string(others.size())}, {with(r.area)}, {"-"}, {"-"}, {"-"}};
+    std::vector<sheet::Cell> row{{o.name},       {std::to_string(able.size()) + ", " + std::to_string(others.size())},
+                                 {with(r.area)}, {"-"},
+                                 {"-"},          {"-"}};
     if (able.size() < kPeopleForAMark || others.size() < kPeopleForAMark) {
       if (said.insert("mark" + sizes).second)
-        refuse("Pass marks, wherever so few have a value", sizes + "; " + std::to_string(kPeopleForAMark) + " each are needed.");
+        refuse("Pass marks, wherever so few have a value",
+               sizes + "; " + std::to_string(kPeopleForAMark) + " each are needed.");
     } else {
       const PassMark m = contrasting_groups(able, others, resampling_);
       if (std::isnan(m.mark.value)) {
@@ -241,7 +263,8 @@ void Analyst::decide() {
                                        {"others_pass", m.other_pass_counted},
                                        {"others_pass_fitted", m.other_pass_fitted}});
         row[3].text = (m.higher_is_better ? "at least " : "at most ") + with(m.mark);
-        row[4].text = text(100 * m.competent_fail_counted, 2) + " % (fitted " + text(100 * m.competent_fail_fitted, 2) + " %)";
+        row[4].text =
+            text(100 * m.competent_fail_counted, 2) + " % (fitted " + text(100 * m.competent_fail_fitted, 2) + " %)";
         row[5].text = text(100 * m.other_pass_counted, 2) + " % (fitted " + text(100 * m.other_pass_fitted, 2) + " %)";
       }
     }
@@ -253,8 +276,9 @@ void Analyst::decide() {
   add(std::move(table));
   add_charts(std::move(charts), "The dot: the threshold with the most true less false positives (Youden).");
   say("An area below a half: " + study_.plan.competent +
-          " have the smaller values. Marks and areas were found on the very people they are told for; others will do worse.",
+          " have the smaller values. Marks and areas were found on the very people they are told for; others will do "
+          "worse.",
       Tone::quiet);
 }
 
-}  // namespace osteo::assessment::study
+}  // namespace osteo::inline assessment::study

@@ -6,8 +6,8 @@
 #include <map>
 #include <set>
 
-#include "osteo/core/statistics/compare.h"
 #include "osteo/assessment/study/analysis.h"
+#include "osteo/core/statistics/compare.h"
 #include "outcomes.h"
 
 namespace osteo::inline assessment::study {
@@ -33,7 +33,8 @@ inline std::string p_text(double p) {
   return !std::isfinite(p) ? "-" : p < 0.0001 ? "< 0.0001" : text(p, 2);
 }
 inline std::string with(const Estimate& e) {
-  return std::isfinite(e.interval.lo) ? text(e.value) + " (" + text(e.interval.lo) + " to " + text(e.interval.hi) + ")" : text(e.value);
+  return std::isfinite(e.interval.lo) ? text(e.value) + " (" + text(e.interval.lo) + " to " + text(e.interval.hi) + ")"
+                                      : text(e.value);
 }
 inline std::string counted(std::size_t n, const std::string& one, const std::string& more) {
   return std::to_string(n) + " " + (n == 1 ? one : more);
@@ -96,8 +97,8 @@ class Analyst {
   void opening();
   void agreement();
   void compare();
-  void compare_two(const Outcome& o, const std::string& first, const std::string& second, std::vector<Json>& rows, std::vector<double>& p,
-                   sheet::Table& table, std::set<std::string>& said);
+  void compare_two(const Outcome& o, const std::string& first, const std::string& second, std::vector<Json>& rows,
+                   std::vector<double>& p, sheet::Table& table, std::set<std::string>& said);
   [[nodiscard]] Json mixed(const Outcome& o, const std::string& first, const std::string& second) const;
   void repeated_table();
   void correlate();
@@ -107,4 +108,4 @@ class Analyst {
   void closing();
 };
 
-}  // namespace osteo::assessment::study
+}  // namespace osteo::inline assessment::study

@@ -74,8 +74,9 @@ sheet::Plot groups_chart(const std::string& id, const std::string& outcome, cons
   return p;
 }
 
-sheet::Plot scatter_chart(const std::string& id, const std::string& metric, const std::string& rating, std::span<const double> x,
-                          std::span<const double> y, const std::vector<bool>& marked, double level) {
+sheet::Plot scatter_chart(const std::string& id, const std::string& metric, const std::string& rating,
+                          std::span<const double> x, std::span<const double> y, const std::vector<bool>& marked,
+                          double level) {
   sheet::Plot p;
   p.id = id;
   p.title = metric;
@@ -166,4 +167,4 @@ SheetBlocks in_rows(std::vector<sheet::Plot> plots) {
   return rows;
 }
 
-}  // namespace osteo::assessment::study
+}  // namespace osteo::inline assessment::study

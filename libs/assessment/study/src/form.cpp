@@ -1,8 +1,9 @@
-// The page to rate with. It asks no network for anything: its policy forbids it, movies of the study's own folder excepted.
+// The page to rate with. It asks no network for anything: its policy forbids it, movies of the study's own folder
+// excepted.
+#include "osteo/assessment/study/study.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/statistics/basics.h"
-#include "osteo/assessment/study/study.h"
 
 namespace osteo::inline assessment::study {
 namespace {
@@ -97,7 +98,8 @@ std::string study_id(const Plan& plan) {
 std::vector<std::string> rating_order(const Study& study, const std::string& rater) {
   std::vector<std::string> blinds;
   for (const Session& s : study.sessions) blinds.push_back(s.blind);
-  statistics::Random random(std::stoull(hash_text(std::to_string(study.plan.seed) + "\nform\n" + rater).substr(0, 16), nullptr, 16));
+  statistics::Random random(
+      std::stoull(hash_text(std::to_string(study.plan.seed) + "\nform\n" + rater).substr(0, 16), nullptr, 16));
   random.shuffle(blinds);
   return blinds;
 }
@@ -105,7 +107,8 @@ std::vector<std::string> rating_order(const Study& study, const std::string& rat
 std::string form_html(const Study& study, const std::string& rater) {
   need_code(rater, "the rater");
   if (study.sessions.empty())
-    throw Error(ExitCode::no_input, "the study has no sessions to rate", "add them with: osteo study add STUDY metrics.json");
+    throw Error(ExitCode::no_input, "the study has no sessions to rate",
+                "add them with: osteo study add STUDY metrics.json");
   const Json values{{"title", study.plan.title.empty() ? "Study" : study.plan.title},
                     {"id", study_id(study.plan)},
                     {"rater", rater},
@@ -119,4 +122,4 @@ std::string form_html(const Study& study, const std::string& rater) {
   return std::string(kHead) + data + std::string(kTail);
 }
 
-}  // namespace osteo::assessment::study
+}  // namespace osteo::inline assessment::study

@@ -77,4 +77,4 @@ std::vector<double> means_of_people(const Study& study, const Outcome& outcome, 
   return means;
 }
 
-}  // namespace osteo::assessment::study
+}  // namespace osteo::inline assessment::study

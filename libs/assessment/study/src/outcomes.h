@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "osteo/core/statistics/agreement.h"
 #include "osteo/assessment/study/study.h"
+#include "osteo/core/statistics/agreement.h"
 
 namespace osteo::inline assessment::study {
 
@@ -24,4 +24,4 @@ struct Outcome {
 /// Of each person of a group the mean of that person's sessions; people without any are not in it.
 [[nodiscard]] std::vector<double> means_of_people(const Study& study, const Outcome& outcome, const std::string& group);
 
-}  // namespace osteo::assessment::study
+}  // namespace osteo::inline assessment::study

@@ -28,22 +28,26 @@ std::string listed(const std::vector<std::string>& names) {
 }
 
 Json plan_json(const Plan& p) {
-  return Json{{"osteotome_study", 1},     {"title", p.title},       {"procedure", p.procedure}, {"groups", Json(p.groups)},
-              {"competent", p.competent}, {"cases", Json(p.cases)}, {"attempts", p.attempts},   {"items", Json(p.items)},
-              {"lowest", p.lowest},       {"highest", p.highest},   {"seed", p.seed},           {"simulated", p.simulated}};
+  return Json{{"osteotome_study", 1},     {"title", p.title},         {"procedure", p.procedure},
+              {"groups", Json(p.groups)}, {"competent", p.competent}, {"cases", Json(p.cases)},
+              {"attempts", p.attempts},   {"items", Json(p.items)},   {"lowest", p.lowest},
+              {"highest", p.highest},     {"seed", p.seed},           {"simulated", p.simulated}};
 }
 
 // What holds of a plan wherever it comes from; empty when all is well.
 std::string wrong_with(const Plan& p) {
-  for (const auto& [names, called] : {std::pair{&p.groups, "groups"}, std::pair{&p.cases, "cases"}, std::pair{&p.items, "items"}}) {
+  for (const auto& [names, called] :
+       {std::pair{&p.groups, "groups"}, std::pair{&p.cases, "cases"}, std::pair{&p.items, "items"}}) {
     if (names->empty()) return std::string(called) + " must name one at least";
     const std::set<std::string> different(names->begin(), names->end());
     if (different.size() != names->size()) return std::string(called) + " name one twice";
     if (different.contains("")) return std::string(called) + " hold an empty name";
   }
-  if (!among(p.groups, p.competent)) return "competent is '" + p.competent + "', which is none of the groups " + listed(p.groups);
+  if (!among(p.groups, p.competent))
+    return "competent is '" + p.competent + "', which is none of the groups " + listed(p.groups);
   if (p.attempts < 1 || p.attempts > 100) return "attempts is from 1 to 100";
-  if (p.lowest >= p.highest || p.highest - p.lowest > 100) return "lowest is below highest, and not more than 100 below";
+  if (p.lowest >= p.highest || p.highest - p.lowest > 100)
+    return "lowest is below highest, and not more than 100 below";
   return {};
 }
 
@@ -88,7 +92,8 @@ Csv read_table(const fs::path& file, const std::vector<std::string>& columns) {
   if (!output_exists(file)) return csv;
   csv = read_csv(read_text(file), file.string());
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    if (i >= csv.columns.size() || csv.columns[i] != columns[i]) throw csv.wrong(1, "the first columns are not " + listed(columns));
+    if (i >= csv.columns.size() || csv.columns[i] != columns[i])
+      throw csv.wrong(1, "the first columns are not " + listed(columns));
   }
   return csv;
 }
@@ -119,7 +124,8 @@ void write_sessions(const fs::path& folder, const Study& s) {
   std::string text = csv_line(head);
   for (const Session& one : s.sessions) {
     std::vector<std::string> row{one.blind, one.participant, one.case_name, std::to_string(one.attempt)};
-    for (const std::string& m : s.metrics) row.push_back(one.metrics.contains(m) ? format_number(one.metrics.at(m)) : "");
+    for (const std::string& m : s.metrics)
+      row.push_back(one.metrics.contains(m) ? format_number(one.metrics.at(m)) : "");
     text += csv_line(row);
   }
   write_file(folder / "sessions.csv", text);
@@ -134,7 +140,8 @@ std::vector<std::pair<std::string, double>> read_metrics(const fs::path& file, s
   };
   if (file.extension() == ".csv") {
     const Csv csv = read_csv(text, name);
-    if (csv.rows.size() != 1) throw csv.wrong(1, "there are " + std::to_string(csv.rows.size()) + " rows of values, not one");
+    if (csv.rows.size() != 1)
+      throw csv.wrong(1, "there are " + std::to_string(csv.rows.size()) + " rows of values, not one");
     for (std::size_t i = 0; i < csv.columns.size(); ++i) {
       const std::string& field = csv.rows[0].fields[i];
       try {
@@ -155,7 +162,8 @@ std::vector<std::pair<std::string, double>> read_metrics(const fs::path& file, s
       }
     };
     if (root->kind == JsonValue::Kind::list) {
-      for (const JsonValue& v : root->items) take(json.text(json.need(v, "a metric", "name"), "name"), json.need(v, "a metric", "value"));
+      for (const JsonValue& v : root->items)
+        take(json.text(json.need(v, "a metric", "name"), "name"), json.need(v, "a metric", "value"));
     } else if (root->kind == JsonValue::Kind::object) {
       for (const JsonMember& m : root->members) take(m.key, m.value);
     } else {
@@ -166,7 +174,8 @@ std::vector<std::pair<std::string, double>> read_metrics(const fs::path& file, s
   for (const auto& [metric, value] : found) {
     if (metric.empty() || among(kSessionColumns, metric))
       throw Error(ExitCode::usage, "'" + name + "': a metric cannot be called '" + metric + "'");
-    if (!seen.insert(metric).second) throw Error(ExitCode::usage, "'" + name + "': the metric '" + metric + "' is there twice");
+    if (!seen.insert(metric).second)
+      throw Error(ExitCode::usage, "'" + name + "': the metric '" + metric + "' is there twice");
   }
   if (found.empty()) throw Error(ExitCode::no_input, "'" + name + "' holds no number");
   return found;
@@ -184,9 +193,11 @@ void need_code(const std::string& code, const std::string& called) {
 }
 
 void new_study(const fs::path& folder, const Plan& plan) {
-  if (const std::string what = wrong_with(plan); !what.empty()) throw Error(ExitCode::usage, "the study cannot be made: " + what);
+  if (const std::string what = wrong_with(plan); !what.empty())
+    throw Error(ExitCode::usage, "the study cannot be made: " + what);
   if (output_exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
-    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' is there already", "choose another folder; a study is never replaced");
+    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' is there already",
+                "choose another folder; a study is never replaced");
   make_output_folder(folder);
   write_file(folder / "study.json", plan_json(plan).dump(2) + "\n");
   write_file(folder / "participants.csv", "participant,group\n");
@@ -212,7 +223,8 @@ Study read_study(const fs::path& folder) {
   }
   const Csv order = read_table(folder / "order.csv", {"participant", "position", "case"});
   for (const CsvRow& row : order.rows) {
-    if (find(s, row.fields[0]) == nullptr) throw order.wrong(row.line, "there is no participant '" + row.fields[0] + "'");
+    if (find(s, row.fields[0]) == nullptr)
+      throw order.wrong(row.line, "there is no participant '" + row.fields[0] + "'");
     if (!among(s.plan.cases, row.fields[2]))
       throw order.wrong(row.line, "'" + row.fields[2] + "' is none of the cases " + listed(s.plan.cases));
     s.order.push_back({row.fields[0], order.whole(row, 1), row.fields[2]});
@@ -223,10 +235,13 @@ Study read_study(const fs::path& folder) {
   for (const CsvRow& row : sessions.rows) {
     Session one{row.fields[0], row.fields[1], row.fields[2], sessions.whole(row, 3), {}};
     const auto wrong = [&](const std::string& what) { return sessions.wrong(row.line, what); };
-    if (one.blind.empty() || !blinds.insert(one.blind).second) throw wrong("the blind code '" + one.blind + "' is empty or there twice");
+    if (one.blind.empty() || !blinds.insert(one.blind).second)
+      throw wrong("the blind code '" + one.blind + "' is empty or there twice");
     if (find(s, one.participant) == nullptr) throw wrong("there is no participant '" + one.participant + "'");
-    if (!among(s.plan.cases, one.case_name)) throw wrong("'" + one.case_name + "' is none of the cases " + listed(s.plan.cases));
-    if (one.attempt < 1 || one.attempt > s.plan.attempts) throw wrong("attempt is from 1 to " + std::to_string(s.plan.attempts));
+    if (!among(s.plan.cases, one.case_name))
+      throw wrong("'" + one.case_name + "' is none of the cases " + listed(s.plan.cases));
+    if (one.attempt < 1 || one.attempt > s.plan.attempts)
+      throw wrong("attempt is from 1 to " + std::to_string(s.plan.attempts));
     if (!done.insert(one.participant + "\n" + one.case_name + "\n" + row.fields[3]).second)
       throw wrong("this attempt of '" + one.participant + "' is there twice");
     for (std::size_t c = 4; c < sessions.columns.size(); ++c) {
@@ -253,7 +268,8 @@ Study read_study(const fs::path& folder) {
     s.raters.push_back(read_ratings(read_text(file), file.string(), s, notes));
     for (std::size_t i = 0; i + 1 < s.raters.size(); ++i) {
       if (s.raters[i].rater == s.raters.back().rater)
-        throw Error(ExitCode::usage, "'" + file.string() + "': rater '" + s.raters[i].rater + "' has another file already");
+        throw Error(ExitCode::usage,
+                    "'" + file.string() + "': rater '" + s.raters[i].rater + "' has another file already");
     }
   }
   return s;
@@ -268,25 +284,29 @@ std::string add_participant(const fs::path& folder, std::string code, const std:
   need_code(code, "a participant");
   if (find(s, code) != nullptr) throw Error(ExitCode::usage, "participant '" + code + "' is there already");
   if (!among(s.plan.groups, group))
-    throw Error(ExitCode::usage, "'" + group + "' is none of the groups " + listed(s.plan.groups), "give it with --group");
+    throw Error(ExitCode::usage, "'" + group + "' is none of the groups " + listed(s.plan.groups),
+                "give it with --group");
   std::string text = csv_line({"participant", "group"});
   for (const Participant& p : s.participants) text += csv_line({p.code, p.group});
   write_file(folder / "participants.csv", text + csv_line({code, group}));
   return code;
 }
 
-std::string add_session(const fs::path& folder, const std::string& participant, const std::string& case_name, int attempt,
-                        const fs::path& file, std::vector<std::string>& notes) {
+std::string add_session(const fs::path& folder, const std::string& participant, const std::string& case_name,
+                        int attempt, const fs::path& file, std::vector<std::string>& notes) {
   Study s = read_study(folder);
   if (find(s, participant) == nullptr)
     throw Error(ExitCode::usage, "there is no participant '" + participant + "'", "add the participant first");
-  if (!among(s.plan.cases, case_name)) throw Error(ExitCode::usage, "'" + case_name + "' is none of the cases " + listed(s.plan.cases));
-  if (attempt < 1 || attempt > s.plan.attempts) throw Error(ExitCode::usage, "--attempt is from 1 to " + std::to_string(s.plan.attempts));
+  if (!among(s.plan.cases, case_name))
+    throw Error(ExitCode::usage, "'" + case_name + "' is none of the cases " + listed(s.plan.cases));
+  if (attempt < 1 || attempt > s.plan.attempts)
+    throw Error(ExitCode::usage, "--attempt is from 1 to " + std::to_string(s.plan.attempts));
   std::set<std::string> taken;
   for (const Session& one : s.sessions) {
     taken.insert(one.blind);
     if (one.participant == participant && one.case_name == case_name && one.attempt == attempt)
-      throw Error(ExitCode::usage, "this attempt of '" + participant + "' is there already", "take its line out of sessions.csv first");
+      throw Error(ExitCode::usage, "this attempt of '" + participant + "' is there already",
+                  "take its line out of sessions.csv first");
   }
   Session added{"", participant, case_name, attempt, {}};
   for (const auto& [metric, value] : read_metrics(file, notes)) {
@@ -294,8 +314,8 @@ std::string add_session(const fs::path& folder, const std::string& participant, 
     added.metrics[metric] = value;
   }
   for (int i = 0; added.blind.empty() || taken.contains(added.blind); ++i)
-    added.blind =
-        blind_code(seed_of(s.plan.seed, participant + "\n" + case_name + "\n" + std::to_string(attempt) + "\n" + std::to_string(i)));
+    added.blind = blind_code(seed_of(
+        s.plan.seed, participant + "\n" + case_name + "\n" + std::to_string(attempt) + "\n" + std::to_string(i)));
   s.sessions.push_back(added);
   write_sessions(folder, s);
   return added.blind;
@@ -340,7 +360,8 @@ std::size_t make_order(const fs::path& folder) {
   return added;
 }
 
-RaterSheet read_ratings(const std::string& text, const std::string& name, const Study& study, std::vector<std::string>& notes) {
+RaterSheet read_ratings(const std::string& text, const std::string& name, const Study& study,
+                        std::vector<std::string>& notes) {
   const JsonFile json(text, name);
   json.require_format("osteotome_ratings");
   json.allow(json.root(), "", std::vector<std::string>{"osteotome_ratings", "study", "rater", "ratings"});
@@ -387,4 +408,4 @@ RaterSheet read_ratings(const std::string& text, const std::string& name, const 
   return sheet;
 }
 
-}  // namespace osteo::assessment::study
+}  // namespace osteo::inline assessment::study

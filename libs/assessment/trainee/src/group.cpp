@@ -14,11 +14,14 @@ struct Span {
   std::array<double, 2> novice, expert;  // shares of the way from worst to best
 };
 const std::vector<Span>& spans() {
-  static const std::vector<Span> all{
-      {&TraineeSkill::region, 0, 1, {0, 0.7}, {0.6, 1}},        {&TraineeSkill::undercut, 1, 0, {0.1, 0.7}, {0.6, 1}},
-      {&TraineeSkill::force_control, 0, 1, {0, 0.7}, {0.6, 1}}, {&TraineeSkill::tremor_mm, 0.5, 0.02, {0.1, 0.7}, {0.6, 1}},
-      {&TraineeSkill::speed_mm_s, 12, 40, {0, 0.7}, {0.5, 1}},  {&TraineeSkill::knowledge, 0, 1, {0, 0.8}, {0.7, 1}},
-      {&TraineeSkill::instruments, 0, 1, {0, 0.7}, {0.7, 1}},   {&TraineeSkill::camera, 0, 1, {0, 0.7}, {0.5, 1}}};
+  static const std::vector<Span> all{{&TraineeSkill::region, 0, 1, {0, 0.7}, {0.6, 1}},
+                                     {&TraineeSkill::undercut, 1, 0, {0.1, 0.7}, {0.6, 1}},
+                                     {&TraineeSkill::force_control, 0, 1, {0, 0.7}, {0.6, 1}},
+                                     {&TraineeSkill::tremor_mm, 0.5, 0.02, {0.1, 0.7}, {0.6, 1}},
+                                     {&TraineeSkill::speed_mm_s, 12, 40, {0, 0.7}, {0.5, 1}},
+                                     {&TraineeSkill::knowledge, 0, 1, {0, 0.8}, {0.7, 1}},
+                                     {&TraineeSkill::instruments, 0, 1, {0, 0.7}, {0.7, 1}},
+                                     {&TraineeSkill::camera, 0, 1, {0, 0.7}, {0.5, 1}}};
   return all;
 }
 
@@ -42,7 +45,8 @@ std::vector<TraineeSkill> latin_hypercube(std::size_t n, std::uint64_t seed) {
     for (std::size_t i = 0; i < n; ++i) order[i] = i;
     random.shuffle(order);
     for (std::size_t i = 0; i < n; ++i)
-      all[i].*s.member = s.worst + (s.best - s.worst) * (static_cast<double>(order[i]) + random.uniform()) / static_cast<double>(n);
+      all[i].*s.member =
+          s.worst + (s.best - s.worst) * (static_cast<double>(order[i]) + random.uniform()) / static_cast<double>(n);
   }
   return all;
 }
@@ -53,4 +57,4 @@ double overall(const TraineeSkill& skill) {
   return sum / static_cast<double>(spans().size());
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

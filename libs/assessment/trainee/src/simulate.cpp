@@ -5,24 +5,26 @@
 #include <deque>
 #include <utility>
 
+#include "osteo/assessment/trainee/trainee_hand.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/simulation/bone/instrument.h"
-#include "osteo/session/scene/reader.h"
 #include "osteo/session/recording/simulated.h"
-#include "osteo/assessment/trainee/trainee_hand.h"
+#include "osteo/session/scene/reader.h"
+#include "osteo/simulation/bone/instrument.h"
 
 namespace osteo::inline assessment {
 namespace {
 
 constexpr double kClearMm = 6;  // above the bone, where burrs are changed
 constexpr double kHopMm = 1.3, kLeastStrokeMm = 12, kShortMm = 1.2;
-// What lies within a burr's rim, or is less, is not worth a stroke; in a layer with others below it that is more than in the last.
+// What lies within a burr's rim, or is less, is not worth a stroke; in a layer with others below it that is more than
+// in the last.
 constexpr double kRimMm = 0.45, kSeenMm3 = 2, kWorthMm3 = 6;
 // Of a layer: what is left then is met again in the next, but for the last ones.
 constexpr int kMostRepeats = 5, kMostLastRepeats = 25;
-// How it learns by how much its hand goes below the burr that it sees: from ticks with so much force, so much of each, at most mm/N.
+// How it learns by how much its hand goes below the burr that it sees: from ticks with so much force, so much of each,
+// at most mm/N.
 constexpr double kFeltN = 0.3, kNoticed = 0.02, kMostYields = 0.5;
 constexpr double kEyeMm = 180, kViewDeg = 30;
 
@@ -31,8 +33,8 @@ Json triple(Vec3 v) {
   return Json{micrometres(v.x), micrometres(v.y), micrometres(v.z)};
 }
 
-// What goes on behind the hand: it looks at what bone is left, and says what comes next. Told by the stream like any reader, in the thread
-// that steps the servo.
+// What goes on behind the hand: it looks at what bone is left, and says what comes next. Told by the stream like any
+// reader, in the thread that steps the servo.
 class TraineeMind final : public Reader {
  public:
   using Note = std::function<void(const std::string& kind, const std::string& json)>;
@@ -50,7 +52,8 @@ class TraineeMind final : public Reader {
   void tick(const TickRecord& record, std::span<const VoxelChange>) override {
     now_ = record;
     const Instrument& tool = instrument_of(record.device.tool);
-    if (record.device.pedal == 0 || record.speed_rpm < 1000 || tool.as_burr() == nullptr || record.normal_force_n <= 0) return;
+    if (record.device.pedal == 0 || record.speed_rpm < 1000 || tool.as_burr() == nullptr || record.normal_force_n <= 0)
+      return;
     const double pushed_n = dot(from_floats(record.force_n), plan_.toward);
     if (pushed_n > kFeltN) {
       yields_ += (dot(from_floats(record.shown_offset_mm), plan_.toward) / pushed_n - yields_) * kNoticed;
@@ -58,7 +61,9 @@ class TraineeMind final : public Reader {
     }
     // Where it is shown: at the bone's surface, not in bone that it has not taken yet.
     const Vec3 at = from_floats(record.device.position_mm) + from_floats(record.shown_offset_mm);
-    if (!swept_.empty() && length(swept_.back().centre_mm - at) < 0.1 && swept_.back().radius_mm == tool.head.largest_radius_mm()) return;
+    if (!swept_.empty() && length(swept_.back().centre_mm - at) < 0.1 &&
+        swept_.back().radius_mm == tool.head.largest_radius_mm())
+      return;
     swept_.push_back({at, tool.head.largest_radius_mm()});
   }
 
@@ -182,11 +187,14 @@ class TraineeMind final : public Reader {
       out.tool = hand_.tool();
       over.tool = s.tool;
       const bool outside = change || above < -0.5 || sideways > 9 || !in_hole_before;
-      const auto beside = [&](Vec3 p) { return p - plan_.centre_mm - plan_.toward * dot(p - plan_.centre_mm, plan_.toward); };
+      const auto beside = [&](Vec3 p) {
+        return p - plan_.centre_mm - plan_.toward * dot(p - plan_.centre_mm, plan_.toward);
+      };
       if (outside) {
         // In and out by the middle of the opening, where what lies under its edge is gone to.
         if (length(beside(here)) > plan_.open_mm) out.points.push_back({here - beside(here), axis});
-        out.points.push_back({plan_.centre_mm + plan_.toward * kClearMm + beside(out.points.empty() ? here : plan_.centre_mm), axis});
+        out.points.push_back(
+            {plan_.centre_mm + plan_.toward * kClearMm + beside(out.points.empty() ? here : plan_.centre_mm), axis});
         const bool under = length(beside(first)) > plan_.open_mm;
         const Vec3 above_first = first + plan_.toward * (std::max(0.0, dot(plan_.centre_mm - first, plan_.toward)) + 2);
         over.points.push_back({under ? above_first - beside(first) : above_first, axis});
@@ -217,7 +225,8 @@ class TraineeMind final : public Reader {
     if (!note_ || (looked_ && t_s - looked_s_ < every_s)) return;
     const Vec3 work = looked_ ? hand_.position_mm() : plan_.centre_mm;
     // The view goes where the work is, and looks down the middle of the window.
-    const Vec3 off = work - plan_.centre_mm, target = plan_.centre_mm + (off - plan_.toward * dot(off, plan_.toward)) * 0.5;
+    const Vec3 off = work - plan_.centre_mm,
+               target = plan_.centre_mm + (off - plan_.toward * dot(off, plan_.toward)) * 0.5;
     if (looked_ && length(target - looked_at_) < 0.05) return;
     looked_ = true;
     looked_s_ = t_s;
@@ -259,8 +268,8 @@ TraineeScene trainee_scene(const std::filesystem::path& case_folder, Procedure p
   return scene;
 }
 
-SimulatedSession simulate_trainee(const TraineeScene& scene, World begin, const TraineeOptions& options, const SessionFolder& folder,
-                                  const Context& context) {
+SimulatedSession simulate_trainee(const TraineeScene& scene, World begin, const TraineeOptions& options,
+                                  const SessionFolder& folder, const Context& context) {
   const Procedure& procedure = scene.procedure;
   RehearsalOptions o;
   o.haptics = scene.haptics;
@@ -275,8 +284,8 @@ SimulatedSession simulate_trainee(const TraineeScene& scene, World begin, const 
     const ProcedureStructure* const named = procedure.find(o.anatomy.structures->name_of(value));
     guarded.push_back(named == nullptr || named->role != ProcedureRole::enter);
   }
-  auto device =
-      std::make_unique<TraineeHand>(options.skill, options.seed, o.anatomy.structures.get(), guarded, start, plan.toward, plan.toward);
+  auto device = std::make_unique<TraineeHand>(options.skill, options.seed, o.anatomy.structures.get(), guarded, start,
+                                              plan.toward, plan.toward);
   TraineeHand& hand = *device;
   // The burr that it begins with is in its hand.
   TraineeStroke wait;
@@ -286,7 +295,10 @@ SimulatedSession simulate_trainee(const TraineeScene& scene, World begin, const 
   hand.begin(wait);
   TraineeMind mind(plan, options, o.rate_hz, hand);
   Rehearsal rehearsal(std::move(begin), std::move(device), o, context);
-  Json simulated{{"by", "simulated trainee"}, {"skill", skill_json(options.skill)}, {"seed", options.seed}, {"procedure", procedure.name}};
+  Json simulated{{"by", "simulated trainee"},
+                 {"skill", skill_json(options.skill)},
+                 {"seed", options.seed},
+                 {"procedure", procedure.name}};
   rehearsal.note(std::string(kSimulatedNote), simulated.dump());
   mind.tell([&](const std::string& kind, const std::string& json) { rehearsal.note(kind, json); });
   rehearsal.add_reader(mind);
@@ -295,12 +307,14 @@ SimulatedSession simulate_trainee(const TraineeScene& scene, World begin, const 
   result.finished = mind.finished();
   result.seconds = static_cast<double>(result.summary.ticks) / o.rate_hz;
   result.truth = own_truth(procedure, *o.anatomy.structures, mind.swept());
-  const std::string text = write_summary(folder, result.summary, o.rate_hz, instrument_library()[plan.coarse_tool].name, o.anatomy);
+  const std::string text =
+      write_summary(folder, result.summary, o.rate_hz, instrument_library()[plan.coarse_tool].name, o.anatomy);
   Json summary = Json::parse(text).value_or(Json::object());
   summary["simulated"] = simulated;
   write_file(folder.summary(), summary.dump(2) + "\n");
   Json truth = Json::list();
-  for (const OwnTruth& t : result.truth) truth.push_back({{"item", t.item->name}, {"value", t.value}, {"pass", t.pass}});
+  for (const OwnTruth& t : result.truth)
+    truth.push_back({{"item", t.item->name}, {"value", t.value}, {"pass", t.pass}});
   write_file(folder.folder / "trainee.json", Json{{"osteotome_trainee", 1},
                                                   {"simulated", true},
                                                   {"skill", skill_json(options.skill)},
@@ -317,4 +331,4 @@ SimulatedSession simulate_trainee(const TraineeScene& scene, World begin, const 
   return result;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -37,10 +37,11 @@ TraineeSkill parse_skill(std::string_view text) {
       const std::string near = nearest_name(key, names);
       std::string all;
       for (const std::string& n : names) all += (all.empty() ? "" : ", ") + n;
-      throw Error(
-          ExitCode::usage,
-          field == fields.end() ? "a trainee has no skill '" + std::string(key) + "'" : "skill '" + std::string(key) + "' has no value",
-          near.empty() || field != fields.end() ? "expert or novice, then KEY=VALUE of: " + all : "did you mean '" + near + "'?");
+      throw Error(ExitCode::usage,
+                  field == fields.end() ? "a trainee has no skill '" + std::string(key) + "'"
+                                        : "skill '" + std::string(key) + "' has no value",
+                  near.empty() || field != fields.end() ? "expert or novice, then KEY=VALUE of: " + all
+                                                        : "did you mean '" + near + "'?");
     }
     field->from_text(trimmed(part.substr(equals + 1)), "skill " + std::string(key));
   }
@@ -54,4 +55,4 @@ Json skill_json(const TraineeSkill& skill) {
   return j;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "osteo/core/base/portable_math.h"
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/core/statistics/basics.h"
+#include "osteo/simulation/bone/instrument.h"
 
 namespace osteo::inline assessment {
 namespace {
@@ -16,7 +16,8 @@ constexpr double kContactN = 0.05;
 constexpr double kRampNPerS = 60, kFeltS = 0.02, kCorrectPerS = 5, kAxisS = 0.15;
 constexpr std::size_t kLagPoints = 5;  // of its stroke, by which the hand may be behind the place it pulls towards
 constexpr double kTravelSidewaysMm = 2.5;
-constexpr double kSidewaysShare = 0.8, kLeastSidewaysMm = 0.5;  // it pulls sideways by no more than this share of what it presses
+constexpr double kSidewaysShare = 0.8,
+                 kLeastSidewaysMm = 0.5;  // it pulls sideways by no more than this share of what it presses
 constexpr double kComeDownS = 1.5;
 constexpr double kStallS = 0.4;  // then it goes on to the next place
 constexpr double kTooHard = 1, kWavering = 0.9, kEasedShare = 0.75;
@@ -37,15 +38,16 @@ double Wavering::at(double t_s) const noexcept {
   return sum * std::sqrt(2.0 / 3.0);
 }
 
-TraineeHand::TraineeHand(const TraineeSkill& skill, std::uint64_t seed, const StructureMap* structures, std::vector<bool> guarded,
-                         Vec3 start_mm, Vec3 toward, Vec3 axis)
+TraineeHand::TraineeHand(const TraineeSkill& skill, std::uint64_t seed, const StructureMap* structures,
+                         std::vector<bool> guarded, Vec3 start_mm, Vec3 toward, Vec3 axis)
     : skill_(skill),
       structures_(structures),
       guarded_(std::move(guarded)),
       near_mm_(guarded_.size()),
       toward_(toward),
       force_wave_(seed ^ 0x666f726365ULL, 0.3, 1.5),
-      tremor_{Wavering(seed ^ 0x7472656d31ULL, 8, 12), Wavering(seed ^ 0x7472656d32ULL, 8, 12), Wavering(seed ^ 0x7472656d33ULL, 8, 12)},
+      tremor_{Wavering(seed ^ 0x7472656d31ULL, 8, 12), Wavering(seed ^ 0x7472656d32ULL, 8, 12),
+              Wavering(seed ^ 0x7472656d33ULL, 8, 12)},
       at_mm_(start_mm),
       carrot_mm_(start_mm),
       axis_(axis) {
@@ -59,13 +61,17 @@ void TraineeHand::begin(TraineeStroke stroke) {
   carrot_mm_ = at_mm_;
 }
 
-// How deep it wants to come where the hand is, as planned along the part of the stroke that it is on, however high it is.
+// How deep it wants to come where the hand is, as planned along the part of the stroke that it is on, however high it
+// is.
 double TraineeHand::wanted_height_mm() const noexcept {
   const auto sideways = [&](Vec3 v) { return v - toward_ * dot(v, toward_); };
-  const auto floor_mm = [&](std::size_t p) { return dot(stroke_.points[p].at_mm, toward_) - stroke_.points[p].press_mm; };
+  const auto floor_mm = [&](std::size_t p) {
+    return dot(stroke_.points[p].at_mm, toward_) - stroke_.points[p].press_mm;
+  };
   double nearest = 1e300, height = floor_mm(next_);
   for (std::size_t p = next_ > kLagPoints ? next_ - kLagPoints : 0; p < next_; ++p) {
-    const Vec3 from = stroke_.points[p].at_mm, way = sideways(stroke_.points[p + 1].at_mm - from), to_hand = sideways(at_mm_ - from);
+    const Vec3 from = stroke_.points[p].at_mm, way = sideways(stroke_.points[p + 1].at_mm - from),
+               to_hand = sideways(at_mm_ - from);
     const double square = dot(way, way), share = square > 1e-12 ? std::clamp(dot(to_hand, way) / square, 0.0, 1.0) : 1;
     const double off = length(to_hand - way * share);
     if (off > nearest) continue;  // of two as near, the one that comes later
@@ -94,7 +100,8 @@ void TraineeHand::go_on(double dt_s, double most_sideways_mm) noexcept {
   if (stroke_.drilling && next_ == 0) {
     const double above = dot(at_mm_ - stroke_.points[0].at_mm, toward_);
     coming_s_ += dt_s;
-    if (felt_n_ < kContactN && above > 0.4 && coming_s_ < kComeDownS && length(sideways(stroke_.points[0].at_mm - at_mm_)) < 1) {
+    if (felt_n_ < kContactN && above > 0.4 && coming_s_ < kComeDownS &&
+        length(sideways(stroke_.points[0].at_mm - at_mm_)) < 1) {
       carrot_mm_ = stroke_.points[0].at_mm;
       return;
     }
@@ -114,7 +121,8 @@ void TraineeHand::go_on(double dt_s, double most_sideways_mm) noexcept {
 }
 
 double TraineeHand::wanted_n(double t_s, double dt_s) noexcept {
-  double n = skill_.force_n * std::max(0.05, 1 + (1 - skill_.force_control) * (kTooHard + kWavering * force_wave_.at(t_s)));
+  double n =
+      skill_.force_n * std::max(0.05, 1 + (1 - skill_.force_control) * (kTooHard + kWavering * force_wave_.at(t_s)));
   if (structures_ != nullptr) {
     const double radius = instrument_of(stroke_.tool).head.largest_radius_mm();
     structures_->clearance(RoundCone{0, 0, radius, radius}, at_mm_, toward_, near_mm_);
@@ -129,7 +137,8 @@ double TraineeHand::wanted_n(double t_s, double dt_s) noexcept {
   } else {
     ramp_n_ += kRampNPerS * dt_s;
     // It takes back what is too much, and does not press after bone that gives way.
-    bias_n_ = std::clamp(bias_n_ + skill_.force_control * kCorrectPerS * (std::min(n, ramp_n_) - felt_n_) * dt_s, -0.5 * n, 0.0);
+    bias_n_ = std::clamp(bias_n_ + skill_.force_control * kCorrectPerS * (std::min(n, ramp_n_) - felt_n_) * dt_s,
+                         -0.5 * n, 0.0);
   }
   ramp_n_ = std::min(ramp_n_, n);
   return ramp_n_ + bias_n_;
@@ -140,7 +149,8 @@ DeviceSample TraineeHand::read(std::uint64_t tick, double dt_s, Vec3 force_n) no
   if (std::isfinite(push)) felt_n_ += (std::max(0.0, push) - felt_n_) * std::min(1.0, dt_s / kFeltS);
   const bool drilling = stroke_.drilling && !done();
   const double press_n = drilling ? wanted_n(t_s, dt_s) : 0;
-  const double most_sideways_mm = drilling ? std::max(kLeastSidewaysMm, kSidewaysShare * press_n / kSpringNPerMm) : kTravelSidewaysMm;
+  const double most_sideways_mm =
+      drilling ? std::max(kLeastSidewaysMm, kSidewaysShare * press_n / kSpringNPerMm) : kTravelSidewaysMm;
   go_on(dt_s, most_sideways_mm);
   if (stroke_.drilling && !done()) carrot_mm_ += toward_ * (wanted_height_mm() - dot(carrot_mm_, toward_));
   const Vec3 ahead = carrot_mm_ - at_mm_;
@@ -170,4 +180,4 @@ DeviceSample TraineeHand::read(std::uint64_t tick, double dt_s, Vec3 force_n) no
   return sample;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -43,7 +43,8 @@ std::vector<Place> places_of(const TriMesh& face, const ScaleItem& item, bool al
   const double least = std::cos(item.within_deg * 3.14159265358979323846 / 180);
   std::vector<Place> places;
   for (const auto& t : face.triangles) {
-    const Vec3 a = from_floats(face.points_mm[t[0]]), b = from_floats(face.points_mm[t[1]]), c = from_floats(face.points_mm[t[2]]);
+    const Vec3 a = from_floats(face.points_mm[t[0]]), b = from_floats(face.points_mm[t[1]]),
+               c = from_floats(face.points_mm[t[2]]);
     const Vec3 n = cross(b - a, c - a);
     const double area = length(n) / 2;
     if (area <= 0 || (!all && dot(normalized(n), towards) < least)) continue;
@@ -54,13 +55,15 @@ std::vector<Place> places_of(const TriMesh& face, const ScaleItem& item, bool al
 
 }  // namespace
 
-std::vector<OwnTruth> own_truth(const Procedure& procedure, const StructureMap& structures, const std::vector<SweptBall>& swept) {
+std::vector<OwnTruth> own_truth(const Procedure& procedure, const StructureMap& structures,
+                                const std::vector<SweptBall>& swept) {
   std::vector<OwnTruth> truths;
   for (const ScaleItem& item : procedure.items) {
-    const bool known = item.kind == ItemKind::exposed || item.kind == ItemKind::not_violated || item.kind == ItemKind::no_hole ||
-                       item.kind == ItemKind::thinned;
+    const bool known = item.kind == ItemKind::exposed || item.kind == ItemKind::not_violated ||
+                       item.kind == ItemKind::no_hole || item.kind == ItemKind::thinned;
     std::size_t number = 0;
-    while (number < structures.values().size() && structures.name_of(structures.values()[number]) != item.structure) ++number;
+    while (number < structures.values().size() && structures.name_of(structures.values()[number]) != item.structure)
+      ++number;
     // What opens into a space that was there before is more than where the burr has been.
     const ProcedureStructure* const named = procedure.find(item.structure);
     if (named != nullptr && named->role == ProcedureRole::enter) continue;
@@ -74,7 +77,8 @@ std::vector<OwnTruth> own_truth(const Procedure& procedure, const StructureMap& 
     for (const SweptBall& ball : swept) {
       const double reach = ball.radius_mm + kFarMm;
       bool near = true;
-      for (std::size_t a = 0; a < 3; ++a) near = near && ball.centre_mm[a] > box.lo[a] - reach && ball.centre_mm[a] < box.hi[a] + reach;
+      for (std::size_t a = 0; a < 3; ++a)
+        near = near && ball.centre_mm[a] > box.lo[a] - reach && ball.centre_mm[a] < box.hi[a] + reach;
       if (!near) continue;
       for (Place& p : places) {
         const Vec3 d = p.at_mm - ball.centre_mm;
@@ -119,4 +123,4 @@ std::vector<OwnTruth> own_truth(const Procedure& procedure, const StructureMap& 
   return truths;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

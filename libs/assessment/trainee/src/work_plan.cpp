@@ -6,8 +6,8 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/portable_math.h"
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/core/statistics/basics.h"
+#include "osteo/simulation/bone/instrument.h"
 
 namespace osteo::inline assessment {
 
@@ -45,7 +45,8 @@ struct Column {
 
 class Columns {
  public:
-  Columns(const World& world, const StructureMap& structures, const Procedure& procedure, Vec3 toward, double most_depth)
+  Columns(const World& world, const StructureMap& structures, const Procedure& procedure, Vec3 toward,
+          double most_depth)
       : bone_(world.bodies().front().body->bone),
         structures_(structures),
         toward_(toward),
@@ -58,7 +59,8 @@ class Columns {
       role_.push_back(s != nullptr ? s->role : ProcedureRole::keep);
       double within = -1;
       for (const ProcedureRegion& r : procedure.regions)
-        if (r.kind == RegionKind::target && r.structure == structures.name_of(value)) within = std::max(within, r.within_mm);
+        if (r.kind == RegionKind::target && r.structure == structures.name_of(value))
+          within = std::max(within, r.within_mm);
       within_.push_back(within);
       double ruled = 0;
       for (const InstrumentRule& r : procedure.instruments)
@@ -78,10 +80,12 @@ class Columns {
       throw Error(ExitCode::usage,
                   names.empty() ? "the procedure has no target region, so there is nothing to drill towards"
                                 : "the case has none of the structures that the target regions lie around: " + names,
-                  names.empty() ? "add one of kind \"target\" to its \"regions\"" : "prepare the case with --structures and --names");
+                  names.empty() ? "add one of kind \"target\" to its \"regions\""
+                                : "prepare the case with --structures and --names");
     }
     for (int c = 0; c < 8; ++c) {
-      const Vec3 p{(c & 1) != 0 ? box.hi.x : box.lo.x, (c & 2) != 0 ? box.hi.y : box.lo.y, (c & 4) != 0 ? box.hi.z : box.lo.z};
+      const Vec3 p{(c & 1) != 0 ? box.hi.x : box.lo.x, (c & 2) != 0 ? box.hi.y : box.lo.y,
+                   (c & 4) != 0 ? box.hi.z : box.lo.z};
       flat_.include({dot(p, across_), dot(p, along_), dot(p, toward_)});
     }
     above_ = flat_.hi.z + 25;
@@ -92,7 +96,8 @@ class Columns {
   [[nodiscard]] Vec3 across() const { return across_; }
   [[nodiscard]] Vec3 along() const { return along_; }
 
-  /// `belief`: by how much it thinks structures deeper. `ruled`: it keeps out of where only other instruments are allowed.
+  /// `belief`: by how much it thinks structures deeper. `ruled`: it keeps out of where only other instruments are
+  /// allowed.
   [[nodiscard]] Column column(double u, double v, double radius, double belief, bool ruled) const {
     Column c;
     const RoundCone ball{0, 0, radius, radius};
@@ -109,7 +114,8 @@ class Columns {
       structures_.clearance(ball, place(u, v, t + radius), toward_, each_);
       bool reaches = false;
       for (std::size_t n = 0; n < each_.size(); ++n) {
-        const double kept = std::max(kept_mm(role_[n]), ruled && role_[n] != ProcedureRole::enter ? ruled_[n] : -1e9) - belief;
+        const double kept =
+            std::max(kept_mm(role_[n]), ruled && role_[n] != ProcedureRole::enter ? ruled_[n] : -1e9) - belief;
         if (each_[n] < kept) return c;
         reaches = reaches || (within_[n] >= 0 && each_[n] <= within_[n]);
       }
@@ -146,13 +152,14 @@ Vec3 toward_of(const Procedure& procedure) {
   return toward;
 }
 
-// Leaning over the middle of the window, the more the farther from it, as far as the shaft finds room in the opening: `room` around its
-// middle, `depth` above the burr.
+// Leaning over the middle of the window, the more the farther from it, as far as the shaft finds room in the opening:
+// `room` around its middle, `depth` above the burr.
 Vec3 lean(const Columns& c, Vec3 toward, double u, double v, double radius, double room, double depth) {
   const double off = portable::hypot(u, v), share = std::min(1.0, off / std::max(0.1, radius));
   const auto usual = portable::sin_cos(kLeanDeg * 3.14159265358979323846 / 180);
   const double deep = std::max(1.0, depth);
-  const double tangent = std::clamp(usual.sin / usual.cos, std::max(0.0, (off - room) / deep), std::min(2.0, (off + room) / deep));
+  const double tangent =
+      std::clamp(usual.sin / usual.cos, std::max(0.0, (off - room) / deep), std::min(2.0, (off + room) / deep));
   const Vec3 inwards = off > 1e-6 ? (c.across() * u + c.along() * v) * (-1 / off) : Vec3{};
   const Vec3 side = inwards * share + c.across() * (1 - share);
   return normalized(toward + side * tangent);
@@ -160,8 +167,8 @@ Vec3 lean(const Columns& c, Vec3 toward, double u, double v, double radius, doub
 
 }  // namespace
 
-WorkPlan plan_work(const World& world, const StructureMap& structures, const Procedure& procedure, const TraineeSkill& skill,
-                   std::uint64_t seed, const WorkPlanOptions& o) {
+WorkPlan plan_work(const World& world, const StructureMap& structures, const Procedure& procedure,
+                   const TraineeSkill& skill, std::uint64_t seed, const WorkPlanOptions& o) {
   WorkPlan plan;
   plan.toward = o.toward ? normalized(*o.toward) : toward_of(procedure);
   plan.radius_mm = o.radius_mm;
@@ -189,7 +196,8 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
     }
   if (!any)
     throw Error(ExitCode::usage,
-                "from this side nothing of the target regions is within " + format_number(o.most_depth_mm) + " mm of the bone's surface",
+                "from this side nothing of the target regions is within " + format_number(o.most_depth_mm) +
+                    " mm of the bone's surface",
                 "give another --approach");
   const int reach = static_cast<int>(o.radius_mm / kPitch);
   double best = -1e300, u0 = 0, v0 = 0;
@@ -237,13 +245,15 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
       Cell c{u, v, real_fine.top, 0, 0, 0};
       c.fine = std::max(c.top - depth_fine - belief, real_fine.safe);
       c.fine_by_coarse = std::max(c.top - std::max(depth_swap, depth_coarse) - belief, real_swap.safe);
-      // Where the coarse burr reaches no target region above what is ruled out, it goes as deep as it may on the way there.
+      // Where the coarse burr reaches no target region above what is ruled out, it goes as deep as it may on the way
+      // there.
       const double wanted = depth_coarse > 0 ? depth_coarse : depth_fine;
       c.coarse = std::max({c.top - wanted - belief, real_coarse.safe, c.fine});
       cells[{a, b}] = c;
       // The opening is the window, drawn together towards its middle: a continuous matter, whatever the columns' pitch.
       const double narrow = open / o.radius_mm;
-      const Column above = narrow < 1 ? columns.column(u0 + du + u * narrow, v0 + dv + v * narrow, coarse, belief, true) : real_coarse;
+      const Column above =
+          narrow < 1 ? columns.column(u0 + du + u * narrow, v0 + dv + v * narrow, coarse, belief, true) : real_coarse;
       if (!above.bone) continue;
       Cell narrowed = c;
       narrowed.u *= narrow;
@@ -253,7 +263,8 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
       opening[{a, b}] = narrowed;
     }
   if (cells.empty())
-    throw Error(ExitCode::usage, "there is no bone where this trainee means to drill", "another --seed, or more of skill 'region'");
+    throw Error(ExitCode::usage, "there is no bone where this trainee means to drill",
+                "another --seed, or more of skill 'region'");
   double middle = 0, deepest = 0;
   for (const auto& [key, c] : cells) {
     middle += c.top / static_cast<double>(cells.size());
@@ -261,15 +272,15 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
   }
   plan.centre_mm = columns.place(u0 + du, v0 + dv, middle);
 
-  // Rows to and fro, the next layer's at right angles. `lowest`: where the lowest point goes and where it may at most, nothing where the
-  // cell has no part.
+  // Rows to and fro, the next layer's at right angles. `lowest`: where the lowest point goes and where it may at most,
+  // nothing where the cell has no part.
   int layer = 0;
   const double room = open + fine - 1.5;
   struct Low {
     double at, most;
   };
-  const auto rows = [&](const std::map<std::pair<int, int>, Cell>& of, bool crosswise, std::uint8_t tool, double radius, int row_step,
-                        const auto& lowest) {
+  const auto rows = [&](const std::map<std::pair<int, int>, Cell>& of, bool crosswise, std::uint8_t tool, double radius,
+                        int row_step, const auto& lowest) {
     bool back = false;
     for (int r = -reach; r <= reach; r += row_step) {
       TraineeStroke s;
@@ -292,11 +303,12 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
     }
   };
   for (double d = o.layer_mm; d < deepest + o.layer_mm; d += o.layer_mm) {
-    rows(d <= roof ? opening : cells, layer % 2 == 1, plan.coarse_tool, coarse, 2, [&](const Cell& c) -> std::optional<Low> {
-      const double low = std::max(c.top - d, c.coarse);
-      if (low > c.top - d + o.layer_mm) return std::nullopt;  // done in a layer before
-      return Low{low, c.coarse};
-    });
+    rows(d <= roof ? opening : cells, layer % 2 == 1, plan.coarse_tool, coarse, 2,
+         [&](const Cell& c) -> std::optional<Low> {
+           const double low = std::max(c.top - d, c.coarse);
+           if (low > c.top - d + o.layer_mm) return std::nullopt;  // done in a layer before
+           return Low{low, c.coarse};
+         });
     ++layer;
   }
   // What is left for the fine burr; of its rows a share is done with the coarse one by those who choose badly.
@@ -313,7 +325,8 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
     rows(cells, layer % 2 == 1, plan.fine_tool, fine, 1, [&](const Cell& c) { return low_of(c, c.fine); });
     good.assign(plan.strokes.begin() + static_cast<std::ptrdiff_t>(before), plan.strokes.end());
     plan.strokes.resize(before);
-    rows(cells, layer % 2 == 1, plan.coarse_tool, coarse, 1, [&](const Cell& c) { return low_of(c, c.fine_by_coarse); });
+    rows(cells, layer % 2 == 1, plan.coarse_tool, coarse, 1,
+         [&](const Cell& c) { return low_of(c, c.fine_by_coarse); });
     bad.assign(plan.strokes.begin() + static_cast<std::ptrdiff_t>(before), plan.strokes.end());
     plan.strokes.resize(before);
     // Rows with one burr come together: burrs are changed twice a layer at most.
@@ -333,4 +346,4 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
   return plan;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -65,7 +65,8 @@ Csv read_csv(std::string_view text, const std::string& name) {
     }
     if (row.fields.size() != csv.columns.size())
       throw csv.wrong(row.line,
-                      std::to_string(row.fields.size()) + " fields where the first line names " + std::to_string(csv.columns.size()),
+                      std::to_string(row.fields.size()) + " fields where the first line names " +
+                          std::to_string(csv.columns.size()),
                       "a field with a comma in it goes into quotes");
     csv.rows.push_back(std::move(row));
   }

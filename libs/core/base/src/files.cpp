@@ -31,7 +31,8 @@ class Temporary {
   explicit Temporary(const fs::path& target) {
     static std::atomic<int> counter{0};
     const std::string suffix = target.filename().string();
-    path_ = target.parent_path() / (".osteo-tmp-" + std::to_string(::getpid()) + "-" + std::to_string(counter++) + "-" + suffix);
+    path_ = target.parent_path() /
+            (".osteo-tmp-" + std::to_string(::getpid()) + "-" + std::to_string(counter++) + "-" + suffix);
     const std::lock_guard lock(g_temporaries_mutex);
     temporaries().insert(path_);
   }
@@ -67,8 +68,8 @@ void sync_path(const fs::path& path, const fs::path& shown, int (*sync)(int) = :
   if (rc != 0 && error != EINVAL && error != ENOTSUP) throw_write_error(shown, error);
 }
 
-// Some libraries do not notice that a disk filled up under them. A file that ends exactly with the disk's last block is taken
-// for cut: better a good file refused than a cut one accepted.
+// Some libraries do not notice that a disk filled up under them. A file that ends exactly with the disk's last block is
+// taken for cut: better a good file refused than a cut one accepted.
 void require_space_left(const fs::path& path) {
   std::error_code ec;
   const auto space = fs::space(path.has_parent_path() ? path.parent_path() : fs::path("."), ec);
@@ -81,7 +82,8 @@ void prepare_parent(const fs::path& path) {
   std::error_code ec;
   if (!fs::is_directory(parent, ec)) {
     if (ec && ec.value() != ENOENT) throw_write_error(path, ec.value());
-    throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': there is no folder '" + parent.string() + "'",
+    throw Error(ExitCode::cannot_write,
+                "cannot write '" + path.string() + "': there is no folder '" + parent.string() + "'",
                 "create the folder first");
   }
   if (::access(parent.c_str(), W_OK) != 0) throw_write_error(path, errno);
@@ -113,12 +115,14 @@ void require_readable(const fs::path& path) {
   }
   if (!fs::exists(status)) throw Error(ExitCode::no_input, "there is no file or folder '" + path.string() + "'");
   const int mode = fs::is_directory(status) ? R_OK | X_OK : R_OK;
-  // Root passes access() on files without any read bit. A file nobody may read is refused for root as well: the hospital
-  // server that runs as root should behave like the workstation where the case was tried.
+  // Root passes access() on files without any read bit. A file nobody may read is refused for root as well: the
+  // hospital server that runs as root should behave like the workstation where the case was tried.
   const bool no_read_bit =
-      (status.permissions() & (fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read)) == fs::perms::none;
+      (status.permissions() & (fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read)) ==
+      fs::perms::none;
   if (::access(path.c_str(), mode) != 0 || no_read_bit) {
-    throw Error(ExitCode::cannot_read, "cannot read '" + path.string() + "': permission denied", "ask the owner for read permission");
+    throw Error(ExitCode::cannot_read, "cannot read '" + path.string() + "': permission denied",
+                "ask the owner for read permission");
   }
 }
 
@@ -180,7 +184,8 @@ fs::path output_folder(const fs::path& path) {
   if (!output_exists(target)) return target;
   if (!fs::is_directory(fs::status(target, ec))) {
     const bool nowhere = fs::is_symlink(target, ec) && !fs::exists(target, ec);
-    throw Error(ExitCode::cannot_write, "'" + path.string() + "' is a " + (nowhere ? "link that leads nowhere" : "file") + ", not a folder",
+    throw Error(ExitCode::cannot_write,
+                "'" + path.string() + "' is a " + (nowhere ? "link that leads nowhere" : "file") + ", not a folder",
                 "give another name, or move it away");
   }
   target = fs::canonical(target, ec);
@@ -188,7 +193,8 @@ fs::path output_folder(const fs::path& path) {
   const fs::path here = fs::current_path(ec);
   const auto [end, unused] = std::mismatch(target.begin(), target.end(), here.begin(), here.end());
   if (end == target.end()) {
-    throw Error(ExitCode::cannot_write, "'" + path.string() + "' is the folder you are in, or holds it: it cannot be replaced",
+    throw Error(ExitCode::cannot_write,
+                "'" + path.string() + "' is the folder you are in, or holds it: it cannot be replaced",
                 "give the name of a new folder");
   }
   return target;
@@ -211,7 +217,8 @@ void write_folder_atomically(const fs::path& path, const std::function<void(cons
   const auto ask = [&] {
     if (!output_exists(target) || fs::is_empty(target, ec)) return;
     if (!may_replace) {
-      throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists already", "give another name, or --force to replace it");
+      throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists already",
+                  "give another name, or --force to replace it");
     }
     may_replace(target);
   };
@@ -227,8 +234,8 @@ void write_folder_atomically(const fs::path& path, const std::function<void(cons
   fs::rename(temporary.path(), target, ec);
   if (!ec || exchange(temporary.path(), target)) return;
   if (ec.value() != ENOTEMPTY && ec.value() != EEXIST) throw_write_error(target, ec.value());
-  // Some file systems cannot exchange: the old folder steps aside under a name of its own, which no clean-up removes, until the new one is
-  // there.
+  // Some file systems cannot exchange: the old folder steps aside under a name of its own, which no clean-up removes,
+  // until the new one is there.
   const fs::path aside = target.string() + ".old-" + std::to_string(::getpid());
   fs::rename(target, aside, ec);
   if (ec) throw_write_error(target, ec.value());
@@ -252,7 +259,8 @@ void make_output_folder(const fs::path& path) {
   std::error_code ec;
   if (output_exists(path) && !fs::is_directory(path, ec)) {
     if (ec) throw_write_error(path, ec.value());
-    throw Error(ExitCode::cannot_write, "'" + path.string() + "' is a file, not a folder", "give another name, or move it away");
+    throw Error(ExitCode::cannot_write, "'" + path.string() + "' is a file, not a folder",
+                "give another name, or move it away");
   }
   fs::create_directories(path, ec);
   if (ec) throw_write_error(path, ec.value());
@@ -263,9 +271,11 @@ Error error_of(const fs::filesystem_error& error) {
   const fs::path path = error.path2().empty() ? error.path1() : error.path2();
   const bool there = fs::exists(fs::symlink_status(path, ec));
   if (there && ::access(path.c_str(), fs::is_directory(path, ec) ? R_OK | X_OK : R_OK) != 0) {
-    return {ExitCode::cannot_read, "cannot read '" + path.string() + "': " + error.code().message(), "ask the owner for permission"};
+    return {ExitCode::cannot_read, "cannot read '" + path.string() + "': " + error.code().message(),
+            "ask the owner for permission"};
   }
-  return {ExitCode::cannot_write, "cannot use '" + path.string() + "': " + error.code().message(), "choose a place that you may write to"};
+  return {ExitCode::cannot_write, "cannot use '" + path.string() + "': " + error.code().message(),
+          "choose a place that you may write to"};
 }
 
 void remove_temporaries() noexcept {

@@ -29,7 +29,8 @@
 namespace osteo {
 namespace {
 
-// What the child says first: its bytes follow, an Error's code, text and advice, that it ran out of memory, or that it threw anything else.
+// What the child says first: its bytes follow, an Error's code, text and advice, that it ran out of memory, or that it
+// threw anything else.
 constexpr char kDone = 'd', kError = 'e', kMemory = 'm', kThrown = 't';
 
 bool write_all(int to, const char* bytes, std::size_t count) {
@@ -58,8 +59,8 @@ bool write_all(int to, const char* bytes, std::size_t count) {
       if (std::fscanf(statm, "%lu", &pages) != 1) pages = 0;
       std::fclose(statm);
     }
-    const auto bytes =
-        static_cast<rlim_t>(pages) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + static_cast<rlim_t>(limits.memory_gb * 1e9);
+    const auto bytes = static_cast<rlim_t>(pages) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) +
+                       static_cast<rlim_t>(limits.memory_gb * 1e9);
     const rlimit most{bytes, bytes};
     ::setrlimit(RLIMIT_AS, &most);
   }
@@ -120,7 +121,8 @@ class Child {
 std::string run_guarded(const std::string& what, const std::string& advice, const GuardLimits& limits,
                         const std::function<std::string()>& work, const Context& context) {
   int ends[2];
-  if (::pipe2(ends, O_CLOEXEC) != 0) throw Error(ExitCode::resources, what + " cannot be started: " + std::strerror(errno));
+  if (::pipe2(ends, O_CLOEXEC) != 0)
+    throw Error(ExitCode::resources, what + " cannot be started: " + std::strerror(errno));
   const pid_t pid = ::fork();
   if (pid < 0) {
     const std::string why = std::strerror(errno);
@@ -141,7 +143,8 @@ std::string run_guarded(const std::string& what, const std::string& advice, cons
   while (true) {
     context.check_cancelled();
     if (limits.seconds > 0 && std::chrono::duration<double>(Clock::now() - begin).count() > limits.seconds)
-      throw Error(ExitCode::resources, what + " was stopped: it had not ended after " + format_number(limits.seconds) + " s", advice);
+      throw Error(ExitCode::resources,
+                  what + " was stopped: it had not ended after " + format_number(limits.seconds) + " s", advice);
     pollfd wanted{child.from(), POLLIN, 0};
     if (::poll(&wanted, 1, 50) <= 0) continue;
     const ssize_t n = ::read(child.from(), buffer.data(), buffer.size());
@@ -159,10 +162,12 @@ std::string run_guarded(const std::string& what, const std::string& advice, cons
                                                         : "signal " + std::to_string(s);
     throw Error(s == SIGKILL ? ExitCode::resources : ExitCode::failed, what + " crashed: " + why, advice);
   }
-  if (reply.empty() || (reply[0] != kDone && reply[0] != kError && reply[0] != kMemory && reply[0] != kThrown) || WEXITSTATUS(state) != 0)
+  if (reply.empty() || (reply[0] != kDone && reply[0] != kError && reply[0] != kMemory && reply[0] != kThrown) ||
+      WEXITSTATUS(state) != 0)
     throw Error(ExitCode::failed, what + " ended without a result", advice);
   if (reply[0] == kMemory)
-    throw Error(ExitCode::resources, what + " ran out of memory, of which it has " + format_number(limits.memory_gb) + " GB", advice);
+    throw Error(ExitCode::resources,
+                what + " ran out of memory, of which it has " + format_number(limits.memory_gb) + " GB", advice);
   if (reply[0] == kThrown) throw Error(ExitCode::failed, what + " failed: " + reply.substr(1), advice);
   if (reply[0] == kError) {
     const std::size_t end = reply.find('\0', 2);

@@ -12,7 +12,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Which line the parser has come to. Numbers end where the next character is not theirs, so the last one read does not count.
+// Which line the parser has come to. Numbers end where the next character is not theirs, so the last one read does not
+// count.
 struct Lines {
   std::size_t before_last = 1, now = 1;
 };
@@ -181,8 +182,10 @@ void JsonFile::allow(const JsonValue& object, const std::string& where, std::spa
   for (const JsonMember& m : object.members) {
     if (std::find(known.begin(), known.end(), m.key) != known.end()) continue;
     const std::string near = meant(m.key, known);
-    throw wrong(m.value, at + "the key \"" + m.key + "\" is not known" + (near.empty() ? "" : ": did you mean \"" + near + "\"?"),
-                known.empty() ? "there are none here" : "known are " + list_of(known));
+    throw wrong(
+        m.value,
+        at + "the key \"" + m.key + "\" is not known" + (near.empty() ? "" : ": did you mean \"" + near + "\"?"),
+        known.empty() ? "there are none here" : "known are " + list_of(known));
   }
 }
 
@@ -196,8 +199,8 @@ void JsonFile::read(const JsonValue& object, const std::string& where, std::span
     if (const JsonValue* const value = object.find(f.doc.name); value != nullptr) {
       read(*value, where, f);
     } else if (f.doc.needed) {
-      throw wrong(object, (where.empty() ? "" : where + ": ") + "\"" + std::string(f.doc.name) +
-                              "\" is missing: " + std::string(f.doc.help) + (f.doc.unit.empty() ? "" : ", " + std::string(f.doc.unit)));
+      throw wrong(object, (where.empty() ? "" : where + ": ") + "\"" + std::string(f.doc.name) + "\" is missing: " +
+                              std::string(f.doc.help) + (f.doc.unit.empty() ? "" : ", " + std::string(f.doc.unit)));
     }
   }
 }
@@ -208,7 +211,8 @@ void JsonFile::read(const JsonValue& value, const std::string& where, const Fiel
   const std::string called = (where.empty() ? "" : where + ": ") + "\"" + std::string(field.doc.name) + "\"";
   const auto numbers = [&](std::size_t least, std::size_t most) {
     return value.kind == Kind::list && value.items.size() >= least && value.items.size() <= most &&
-           std::all_of(value.items.begin(), value.items.end(), [](const JsonValue& v) { return v.kind == Kind::number; });
+           std::all_of(value.items.begin(), value.items.end(),
+                       [](const JsonValue& v) { return v.kind == Kind::number; });
   };
   std::string text;
   bool right = false;
@@ -244,7 +248,8 @@ const JsonValue& JsonFile::need(const JsonValue& object, const std::string& wher
 double JsonFile::number(const JsonValue& value, const std::string& called, double lo, double hi) const {
   if (value.kind != JsonValue::Kind::number) throw wrong(value, called + " must be a number");
   if (value.number >= lo && value.number <= hi) return value.number;
-  const std::string from = lo > -std::numeric_limits<double>::max() ? format_number(lo) : "", to = hi < 1e300 ? format_number(hi) : "";
+  const std::string from = lo > -std::numeric_limits<double>::max() ? format_number(lo) : "",
+                    to = hi < 1e300 ? format_number(hi) : "";
   throw wrong(value, called + " is " + format_number(value.number) + " and must be " +
                          (from.empty() ? "at most " + to
                           : to.empty() ? "at least " + from
@@ -256,17 +261,21 @@ const std::string& JsonFile::text(const JsonValue& value, const std::string& cal
   return value.text;
 }
 
-const std::vector<JsonValue>& JsonFile::list(const JsonValue& value, const std::string& called, std::size_t count) const {
+const std::vector<JsonValue>& JsonFile::list(const JsonValue& value, const std::string& called,
+                                             std::size_t count) const {
   if (value.kind != JsonValue::Kind::list) throw wrong(value, called + " must be a list in brackets");
-  if (count > 0 && value.items.size() != count) throw wrong(value, called + " must have " + std::to_string(count) + " items");
+  if (count > 0 && value.items.size() != count)
+    throw wrong(value, called + " must have " + std::to_string(count) + " items");
   return value.items;
 }
 
 void JsonFile::require_format(std::string_view format) const {
   const JsonValue* const version = root_.kind == JsonValue::Kind::object ? root_.find(format) : nullptr;
-  if (version == nullptr) throw wrong(root_, "\"" + std::string(format) + "\": 1 is missing", "it says which format the file has");
+  if (version == nullptr)
+    throw wrong(root_, "\"" + std::string(format) + "\": 1 is missing", "it says which format the file has");
   if (version->kind != JsonValue::Kind::number || version->number != 1)
-    throw wrong(*version, "\"" + std::string(format) + "\" must be 1", "a file of another version wants another program");
+    throw wrong(*version, "\"" + std::string(format) + "\" must be 1",
+                "a file of another version wants another program");
 }
 
 std::string json_complaint(const std::exception& e) {

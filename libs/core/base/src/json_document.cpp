@@ -38,7 +38,8 @@ Json from_library(const ordered_json& j) {
 }
 
 void write_text(std::string& out, const std::string& text) {
-  const bool plain = std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c < '\x7f' && c != '"' && c != '\\'; });
+  const bool plain =
+      std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c < '\x7f' && c != '"' && c != '\\'; });
   if (plain) {
     out.append("\"").append(text).append("\"");
   } else {
@@ -67,8 +68,9 @@ Json& Json::operator=(Json&&) noexcept = default;
 Json::~Json() = default;
 
 Json::Json(std::initializer_list<Json> items) {
-  const bool pairs =
-      std::all_of(items.begin(), items.end(), [](const Json& i) { return i.items().size() == 2 && i.items().front().text() != nullptr; });
+  const bool pairs = std::all_of(items.begin(), items.end(), [](const Json& i) {
+    return i.items().size() == 2 && i.items().front().text() != nullptr;
+  });
   if (!pairs) {
     value_ = List(items);
     return;
@@ -116,7 +118,8 @@ Json& Json::back() {
 }
 
 void Json::erase(std::string_view key) {
-  if (auto* const object = std::get_if<Object>(&value_)) std::erase_if(*object, [&](const Member& m) { return m.key == key; });
+  if (auto* const object = std::get_if<Object>(&value_))
+    std::erase_if(*object, [&](const Member& m) { return m.key == key; });
 }
 
 const Json::List& Json::items() const {
@@ -147,7 +150,8 @@ namespace {
 
 // The items between brackets, each on a line of its own where there is an indent.
 template <class Items, class WriteItem>
-void write_all(std::string& out, const Items& items, const char* brackets, int indent, std::size_t level, const WriteItem& write_item) {
+void write_all(std::string& out, const Items& items, const char* brackets, int indent, std::size_t level,
+               const WriteItem& write_item) {
   out += brackets[0];
   const auto line = [&](std::size_t depth) {
     if (indent >= 0) out.append("\n").append(depth * static_cast<std::size_t>(indent), ' ');

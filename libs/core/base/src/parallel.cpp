@@ -16,7 +16,8 @@
 
 namespace osteo {
 
-void parallel_for(std::size_t n, std::size_t grain, int threads, const std::function<void(std::size_t, std::size_t)>& body) {
+void parallel_for(std::size_t n, std::size_t grain, int threads,
+                  const std::function<void(std::size_t, std::size_t)>& body) {
   grain = std::max<std::size_t>(grain, 1);
   const std::size_t chunks = (n + grain - 1) / grain;
   const auto run = [&](std::size_t c) { body(c * grain, std::min(n, (c + 1) * grain)); };
@@ -25,7 +26,8 @@ void parallel_for(std::size_t n, std::size_t grain, int threads, const std::func
     return;
   }
 #ifdef __SANITIZE_THREAD__
-  // oneTBB is not built for the thread sanitizer, which does not see that its tasks end before their caller goes on. Plain threads it sees.
+  // oneTBB is not built for the thread sanitizer, which does not see that its tasks end before their caller goes on.
+  // Plain threads it sees.
   std::atomic<std::size_t> next{0};
   std::exception_ptr failure;
   std::mutex mutex;
@@ -38,7 +40,8 @@ void parallel_for(std::size_t n, std::size_t grain, int threads, const std::func
       if (!failure) failure = std::current_exception();
     }
   };
-  std::vector<std::thread> others(std::min<std::size_t>(threads > 0 ? static_cast<std::size_t>(threads) : 4, chunks) - 1);
+  std::vector<std::thread> others(std::min<std::size_t>(threads > 0 ? static_cast<std::size_t>(threads) : 4, chunks) -
+                                  1);
   for (auto& t : others) t = std::thread(work);
   work();
   for (auto& t : others) t.join();

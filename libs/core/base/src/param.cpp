@@ -40,7 +40,8 @@ void check_range(const FieldRef& field, std::string_view name, double value) {
 }  // namespace
 
 std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return text;
 }
 
@@ -67,26 +68,30 @@ std::string FieldRef::flag() const {
 }
 
 std::string_view FieldRef::kind() const {
-  return std::visit(Overload{[](bool*) { return std::string_view("flag"); }, [](int*) { return std::string_view("int"); },
-                             [](double*) { return std::string_view("number"); }, [](std::string*) { return std::string_view("text"); },
-                             [](std::array<double, 3>*) { return std::string_view("triple"); },
-                             [](std::vector<int>*) { return std::string_view("list"); }, [](Choice) { return std::string_view("choice"); }},
-                    target);
+  return std::visit(
+      Overload{[](bool*) { return std::string_view("flag"); }, [](int*) { return std::string_view("int"); },
+               [](double*) { return std::string_view("number"); },
+               [](std::string*) { return std::string_view("text"); },
+               [](std::array<double, 3>*) { return std::string_view("triple"); },
+               [](std::vector<int>*) { return std::string_view("list"); },
+               [](Choice) { return std::string_view("choice"); }},
+      target);
 }
 
 std::string FieldRef::to_text() const {
-  return std::visit(Overload{[](bool* p) { return std::string(*p ? "true" : "false"); }, [](int* p) { return std::to_string(*p); },
-                             [](double* p) { return format_number(*p); }, [](std::string* p) { return *p; },
-                             [](std::array<double, 3>* p) {
-                               return format_number((*p)[0]) + "," + format_number((*p)[1]) + "," + format_number((*p)[2]);
-                             },
-                             [](std::vector<int>* p) {
-                               std::string text;
-                               for (const int v : *p) text += (text.empty() ? "" : ",") + std::to_string(v);
-                               return text;
-                             },
-                             [](Choice c) { return std::string(c.names[static_cast<std::size_t>(*c.index)]); }},
-                    target);
+  return std::visit(
+      Overload{[](bool* p) { return std::string(*p ? "true" : "false"); }, [](int* p) { return std::to_string(*p); },
+               [](double* p) { return format_number(*p); }, [](std::string* p) { return *p; },
+               [](std::array<double, 3>* p) {
+                 return format_number((*p)[0]) + "," + format_number((*p)[1]) + "," + format_number((*p)[2]);
+               },
+               [](std::vector<int>* p) {
+                 std::string text;
+                 for (const int v : *p) text += (text.empty() ? "" : ",") + std::to_string(v);
+                 return text;
+               },
+               [](Choice c) { return std::string(c.names[static_cast<std::size_t>(*c.index)]); }},
+      target);
 }
 
 void FieldRef::from_text(std::string_view text, std::string_view called) const {
@@ -97,7 +102,8 @@ void FieldRef::from_text(std::string_view text, std::string_view called) const {
                         } else if (text == "false" || text == "0" || text == "no") {
                           *p = false;
                         } else {
-                          throw Error(ExitCode::usage, name + ": '" + std::string(text) + "' is neither true nor false");
+                          throw Error(ExitCode::usage,
+                                      name + ": '" + std::string(text) + "' is neither true nor false");
                         }
                       },
                       [&](int* p) {
@@ -120,7 +126,8 @@ void FieldRef::from_text(std::string_view text, std::string_view called) const {
                         for (std::size_t i = 0; i < 3; ++i) {
                           const std::size_t comma = rest.find(',');
                           if ((comma == std::string_view::npos) != (i == 2)) {
-                            throw Error(ExitCode::usage, name + ": '" + std::string(text) + "' is not three numbers like 1,2,3");
+                            throw Error(ExitCode::usage,
+                                        name + ": '" + std::string(text) + "' is not three numbers like 1,2,3");
                           }
                           value[i] = parse_number(rest.substr(0, comma), name);
                           check_range(*this, name, value[i]);
@@ -134,7 +141,8 @@ void FieldRef::from_text(std::string_view text, std::string_view called) const {
                           const std::size_t comma = rest.find(',');
                           const double value = parse_number(rest.substr(0, comma), name);
                           if (value != std::floor(value) || std::abs(value) > 2e9)
-                            throw Error(ExitCode::usage, name + ": '" + std::string(rest.substr(0, comma)) + "' is not a whole number");
+                            throw Error(ExitCode::usage,
+                                        name + ": '" + std::string(rest.substr(0, comma)) + "' is not a whole number");
                           check_range(*this, name, value);
                           values.push_back(static_cast<int>(value));
                           rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);

@@ -15,7 +15,8 @@ SinCos of_small(double r) noexcept {
   const double z = r * r;
   constexpr double kSin[8] = {-1 / 6.0,        1 / 120.0,        -1 / 5040.0,          1 / 362880.0,
                               -1 / 39916800.0, 1 / 6227020800.0, -1 / 1307674368000.0, 1 / 355687428096000.0};
-  constexpr double kCos[7] = {1 / 24.0, -1 / 720.0, 1 / 40320.0, -1 / 3628800.0, 1 / 479001600.0, -1 / 87178291200.0, 1 / 20922789888000.0};
+  constexpr double kCos[7] = {1 / 24.0,        -1 / 720.0,         1 / 40320.0,         -1 / 3628800.0,
+                              1 / 479001600.0, -1 / 87178291200.0, 1 / 20922789888000.0};
   double s = kSin[7], c = kCos[6];
   for (int i = 6; i >= 0; --i) s = s * z + kSin[i];
   for (int i = 5; i >= 0; --i) c = c * z + kCos[i];
@@ -57,7 +58,8 @@ SinCos sin_cos(double angle) noexcept {
   if (!(std::abs(angle) <= 1e6)) angle = std::fmod(angle, 2 * kPi);
   const double n = std::floor(angle * (2 / kPi) + 0.5);
   // A quarter of a turn in three parts; n times the first two is exact.
-  return turned(of_small(((angle - n * 0x1.921fb54400000p+0) - n * 0x1.0b4611a600000p-34) - n * 0x1.3198a2e037073p-69), n);
+  return turned(of_small(((angle - n * 0x1.921fb54400000p+0) - n * 0x1.0b4611a600000p-34) - n * 0x1.3198a2e037073p-69),
+                n);
 }
 
 SinCos sin_cos_turns(double turns) noexcept {

@@ -27,7 +27,8 @@ Simd simd_for(const char* wish) {
   if (wish == nullptr) return widest_simd();
   const auto* const name = std::find(kNames.begin(), kNames.end(), wish);
   if (name == kNames.end())
-    throw Error(ExitCode::usage, "OSTEO_SIMD is '" + std::string(wish) + "' in the environment, which names no instruction set",
+    throw Error(ExitCode::usage,
+                "OSTEO_SIMD is '" + std::string(wish) + "' in the environment, which names no instruction set",
                 "one of scalar, avx2, avx512; or unset it");
   return std::min(static_cast<Simd>(name - kNames.begin()), widest_simd());
 }

@@ -13,7 +13,8 @@ void require_valid(const Frame& frame) {
     if (frame.dims[a] < 1) throw Error(ExitCode::corrupt, "the volume has no voxels along axis " + std::to_string(a));
     const double s = frame.spacing_mm[a];
     if (!(s > 0) || !std::isfinite(s) || s > 1000) {
-      throw Error(ExitCode::corrupt, "the voxel spacing along axis " + std::to_string(a) + " is " + format_number(s) + " mm",
+      throw Error(ExitCode::corrupt,
+                  "the voxel spacing along axis " + std::to_string(a) + " is " + format_number(s) + " mm",
                   "a spacing must be positive and in millimetres");
     }
     if (!std::isfinite(frame.origin_mm[a])) throw Error(ExitCode::corrupt, "the volume's position is not a number");

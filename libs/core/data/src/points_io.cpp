@@ -37,11 +37,13 @@ std::vector<Vec3> load_points(const fs::path& path) {
     }
     if (!good) {
       if (line == 1) continue;  // a heading
-      throw Error(ExitCode::corrupt, "'" + path.string() + "', line " + std::to_string(line) + ": three finite numbers x, y, z are wanted");
+      throw Error(ExitCode::corrupt, "'" + path.string() + "', line " + std::to_string(line) +
+                                         ": three finite numbers x, y, z are wanted");
     }
     points.push_back(p);
   }
-  if (points.empty()) throw Error(ExitCode::no_input, "'" + path.string() + "' holds no points", "one point a line: x, y, z in LPS mm");
+  if (points.empty())
+    throw Error(ExitCode::no_input, "'" + path.string() + "' holds no points", "one point a line: x, y, z in LPS mm");
   return points;
 }
 

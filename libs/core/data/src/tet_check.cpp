@@ -28,20 +28,21 @@ void require_sound(const TetMesh& mesh) {
       if (p >= mesh.points_mm.size())
         throw refuse("tetrahedron " + std::to_string(t) + " names point " + std::to_string(p) + ", which is not there");
     }
-    const Vec3 o = from_floats(mesh.points_mm[c[0]]), u = from_floats(mesh.points_mm[c[1]]) - o, v = from_floats(mesh.points_mm[c[2]]) - o,
-               w = from_floats(mesh.points_mm[c[3]]) - o;
+    const Vec3 o = from_floats(mesh.points_mm[c[0]]), u = from_floats(mesh.points_mm[c[1]]) - o,
+               v = from_floats(mesh.points_mm[c[2]]) - o, w = from_floats(mesh.points_mm[c[3]]) - o;
     if (dot(cross(u, v), w) > 0) continue;
     first = bad == 0 ? t : first;
     ++bad;
   }
   if (bad > 0)
-    throw refuse(
-        std::to_string(bad) + " of " + std::to_string(mesh.tets.size()) + " tetrahedra are inside out or have no volume (the first: " +
-            std::to_string(first) + "); coordinates reach " + format_number(farthest) + " mm, where they are kept to " +
-            format_number(static_cast<double>(std::nextafter(static_cast<float>(farthest), std::numeric_limits<float>::infinity())) -
-                          static_cast<double>(static_cast<float>(farthest))) +
-            " mm",
-        "a smaller load, larger tetrahedra, or a body nearer to the origin");
+    throw refuse(std::to_string(bad) + " of " + std::to_string(mesh.tets.size()) +
+                     " tetrahedra are inside out or have no volume (the first: " + std::to_string(first) +
+                     "); coordinates reach " + format_number(farthest) + " mm, where they are kept to " +
+                     format_number(static_cast<double>(std::nextafter(static_cast<float>(farthest),
+                                                                      std::numeric_limits<float>::infinity())) -
+                                   static_cast<double>(static_cast<float>(farthest))) +
+                     " mm",
+                 "a smaller load, larger tetrahedra, or a body nearer to the origin");
 }
 
 }  // namespace osteo

@@ -40,7 +40,9 @@ TriMesh boundary_of(const TetMesh& mesh, std::vector<std::uint32_t>* point_of) {
   std::vector<std::uint32_t> once;
   for (std::size_t p = 0; p + 1 < first.size(); ++p) {
     const auto begin = faces.begin() + first[p], end = faces.begin() + first[p + 1];
-    std::sort(begin, end, [](const Face& x, const Face& y) { return x.b != y.b ? x.b < y.b : x.c != y.c ? x.c < y.c : x.id < y.id; });
+    std::sort(begin, end, [](const Face& x, const Face& y) {
+      return x.b != y.b ? x.b < y.b : x.c != y.c ? x.c < y.c : x.id < y.id;
+    });
     for (auto f = begin; f != end;) {
       auto g = f + 1;
       while (g != end && g->b == f->b && g->c == f->c) ++g;

@@ -72,7 +72,8 @@ MeshCheck check(const TriMesh& mesh) {
   for (std::size_t i = 0; i < edges.size();) {
     std::size_t j = i;
     int forward = 0;
-    while (j < edges.size() && edges[j].lo == edges[i].lo && edges[j].hi == edges[i].hi) forward += edges[j++].forward ? 1 : 0;
+    while (j < edges.size() && edges[j].lo == edges[i].lo && edges[j].hi == edges[i].hi)
+      forward += edges[j++].forward ? 1 : 0;
     const std::size_t uses = j - i;
     if (uses == 1) ++result.open_edges;
     if (uses > 2) ++result.nonmanifold_edges;

@@ -14,7 +14,8 @@ double sample_linear(const Image& image, Vec3 index) {
   }
   double sum = 0;
   for (int c = 0; c < 8; ++c) {
-    const double w = ((c & 1) != 0 ? t[0] : 1 - t[0]) * ((c & 2) != 0 ? t[1] : 1 - t[1]) * ((c & 4) != 0 ? t[2] : 1 - t[2]);
+    const double w =
+        ((c & 1) != 0 ? t[0] : 1 - t[0]) * ((c & 2) != 0 ? t[1] : 1 - t[1]) * ((c & 4) != 0 ? t[2] : 1 - t[2]);
     if (w > 0) sum += w * image.at(lo[0] + (c & 1), lo[1] + (c >> 1 & 1), lo[2] + (c >> 2));
   }
   return sum;

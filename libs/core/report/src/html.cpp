@@ -79,43 +79,47 @@ void write_table(std::ostream& out, const sheet::Table& t) {
 }
 
 void write_bars(std::ostream& out, const sheet::Bars& b) {
-  const double w = 600, line = 17, marks = line * static_cast<double>(b.marks.size()), h = b.height_mm * 5.2, base = marks + h;
+  const double w = 600, line = 17, marks = line * static_cast<double>(b.marks.size()), h = b.height_mm * 5.2,
+               base = marks + h;
   const double most = b.heights.empty() ? 0 : *std::max_element(b.heights.begin(), b.heights.end());
   const double step = w / static_cast<double>(std::max<std::size_t>(1, b.heights.size()));
   const auto at = [&](double v) { return w * (v - b.from) / (b.to - b.from); };
-  out << "<svg id=\"" << escaped(b.id) << "\" class=\"bars\" role=\"img\" aria-label=\"" << escaped(b.axis) << "\" viewBox=\"-12 0 "
-      << w + 24 << ' ' << base + 38 << "\" data-heights=\"";
+  out << "<svg id=\"" << escaped(b.id) << "\" class=\"bars\" role=\"img\" aria-label=\"" << escaped(b.axis)
+      << "\" viewBox=\"-12 0 " << w + 24 << ' ' << base + 38 << "\" data-heights=\"";
   for (std::size_t i = 0; i < b.heights.size(); ++i) out << (i > 0 ? " " : "") << format_number(b.heights[i]);
   out << "\">\n<g fill=\"#949eb0\">";
   for (std::size_t i = 0; i < b.heights.size(); ++i) {
     const double height = most > 0 ? h * b.heights[i] / most : 0;
     if (height > 0)
-      out << "<rect x=\"" << two_digits(step * static_cast<double>(i)) << "\" y=\"" << two_digits(base - height) << "\" width=\""
-          << two_digits(step * 0.92) << "\" height=\"" << two_digits(height) << "\"/>";
+      out << "<rect x=\"" << two_digits(step * static_cast<double>(i)) << "\" y=\"" << two_digits(base - height)
+          << "\" width=\"" << two_digits(step * 0.92) << "\" height=\"" << two_digits(height) << "\"/>";
   }
   const std::string quiet = css(ink(Tone::quiet));
-  out << "</g>\n<line x1=\"0\" x2=\"" << w << "\" y1=\"" << base << "\" y2=\"" << base << "\" stroke=\"" << quiet << "\"/>\n";
+  out << "</g>\n<line x1=\"0\" x2=\"" << w << "\" y1=\"" << base << "\" y2=\"" << base << "\" stroke=\"" << quiet
+      << "\"/>\n";
   for (double v = std::ceil(b.from / b.tick) * b.tick; v <= b.to; v += b.tick)
-    out << "<text x=\"" << two_digits(at(v)) << "\" y=\"" << base + 15 << "\" text-anchor=\"middle\" font-size=\"12\" fill=\"" << quiet
-        << "\">" << tick_text(v) << "</text>";
+    out << "<text x=\"" << two_digits(at(v)) << "\" y=\"" << base + 15
+        << "\" text-anchor=\"middle\" font-size=\"12\" fill=\"" << quiet << "\">" << tick_text(v) << "</text>";
   for (std::size_t m = 0; m < b.marks.size(); ++m) {
     const double px = std::clamp(at(b.marks[m].at), 0.0, w), py = line * static_cast<double>(m);
     const std::string c = css(ink(b.marks[m].tone));
     const bool left = px > 0.6 * w;
-    out << "\n<line x1=\"" << two_digits(px) << "\" x2=\"" << two_digits(px) << "\" y1=\"" << py << "\" y2=\"" << base << "\" stroke=\""
-        << c << "\" stroke-width=\"1.5\"/><text x=\"" << two_digits(px + (left ? -4 : 4)) << "\" y=\"" << py + 12 << "\" font-size=\"13\""
-        << (left ? " text-anchor=\"end\"" : "") << " fill=\"" << c << "\">" << escaped(b.marks[m].text) << "</text>";
+    out << "\n<line x1=\"" << two_digits(px) << "\" x2=\"" << two_digits(px) << "\" y1=\"" << py << "\" y2=\"" << base
+        << "\" stroke=\"" << c << "\" stroke-width=\"1.5\"/><text x=\"" << two_digits(px + (left ? -4 : 4)) << "\" y=\""
+        << py + 12 << "\" font-size=\"13\"" << (left ? " text-anchor=\"end\"" : "") << " fill=\"" << c << "\">"
+        << escaped(b.marks[m].text) << "</text>";
   }
-  out << "\n<text x=\"" << w / 2 << "\" y=\"" << base + 32 << "\" text-anchor=\"middle\" font-size=\"12\" fill=\"" << quiet << "\">"
-      << escaped(b.axis) << "</text></svg>\n";
+  out << "\n<text x=\"" << w / 2 << "\" y=\"" << base + 32 << "\" text-anchor=\"middle\" font-size=\"12\" fill=\""
+      << quiet << "\">" << escaped(b.axis) << "</text></svg>\n";
 }
 
 void write_signature(std::ostream& out, const sheet::Signature& s) {
   const auto field = [&](const char* cls, const char* name, const std::string& text) {
-    out << "<div class=\"" << cls << "\"><div class=\"line\">" << escaped(text) << "</div><div class=\"quiet\">" << name << "</div></div>";
+    out << "<div class=\"" << cls << "\"><div class=\"line\">" << escaped(text) << "</div><div class=\"quiet\">" << name
+        << "</div></div>";
   };
-  out << kSignatureBegin << "<section class=\"signature " << tone_class(s.tone) << "\"><b class=\"" << tone_class(s.tone) << "\">"
-      << sign(s.tone) << escaped(s.state) << "</b><div class=\"fields\">";
+  out << kSignatureBegin << "<section class=\"signature " << tone_class(s.tone) << "\"><b class=\""
+      << tone_class(s.tone) << "\">" << sign(s.tone) << escaped(s.state) << "</b><div class=\"fields\">";
   field("by", "approved by", s.by);
   field("date", "date", s.date);
   field("note", "note", s.note);
@@ -130,8 +134,9 @@ struct Writer {
     out << "<p class=\"" << tone_class(p.tone) << "\">" << sign(p.tone) << escaped(p.text) << "</p>\n";
   }
   void operator()(const sheet::Band& b) const {
-    out << "<div class=\"band\" style=\"background:" << css(wash(b.tone)) << ";border-color:" << css(ink(b.tone)) << "\"><b class=\""
-        << tone_class(b.tone) << "\">" << sign(b.tone) << escaped(b.word) << "</b><span>" << escaped(b.text) << "</span></div>\n";
+    out << "<div class=\"band\" style=\"background:" << css(wash(b.tone)) << ";border-color:" << css(ink(b.tone))
+        << "\"><b class=\"" << tone_class(b.tone) << "\">" << sign(b.tone) << escaped(b.word) << "</b><span>"
+        << escaped(b.text) << "</span></div>\n";
   }
   void operator()(const sheet::Facts& f) const {
     const auto n = static_cast<std::size_t>(std::max(1, f.columns));
@@ -152,9 +157,9 @@ struct Writer {
     for (const sheet::Image& i : p.row) {
       const double width = i.picture.height > 0 ? height * i.picture.width / i.picture.height : height;
       // In sizes of the text, so that a print made smaller makes the pictures smaller too.
-      out << "<figure style=\"width:" << two_digits(width / (kTextPt * kPtMm)) << "rem\"><img id=\"" << escaped(i.id) << "\" alt=\""
-          << escaped(i.caption) << "\" width=\"" << i.picture.width << "\" height=\"" << i.picture.height << "\" src=\""
-          << png_url_of(i.picture) << "\">";
+      out << "<figure style=\"width:" << two_digits(width / (kTextPt * kPtMm)) << "rem\"><img id=\"" << escaped(i.id)
+          << "\" alt=\"" << escaped(i.caption) << "\" width=\"" << i.picture.width << "\" height=\"" << i.picture.height
+          << "\" src=\"" << png_url_of(i.picture) << "\">";
       if (!i.caption.empty()) out << "<figcaption>" << escaped(i.caption) << "</figcaption>";
       out << "</figure>\n";
     }
@@ -166,7 +171,9 @@ struct Writer {
     if (!d.caption.empty()) out << "<figcaption>" << escaped(d.caption) << "</figcaption>";
     out << "</figure>\n";
   }
-  void operator()(const sheet::Plot& p) const { out << "<div class=\"plot\">" << svg_of(drawing_of(p, width_mm / kPtMm)) << "</div>\n"; }
+  void operator()(const sheet::Plot& p) const {
+    out << "<div class=\"plot\">" << svg_of(drawing_of(p, width_mm / kPtMm)) << "</div>\n";
+  }
   void operator()(const sheet::Signature& s) const { write_signature(out, s); }
   void operator()(const sheet::Columns& c) const {
     double all = 0;
@@ -204,7 +211,8 @@ std::string style_of(double scale) {
     << "}\n"
        ".pictures{display:flex;gap:.28rem;margin-bottom:.5rem;break-inside:avoid}\n"
        ".columns{display:flex;gap:1.15rem;margin-bottom:.3rem}.columns>*{flex:1;min-width:0}\n"
-       "dl{display:grid;grid-template-columns:30% 1fr;gap:.14rem .4rem;margin:0 0 .3rem;font-size:.96rem;align-content:start}\n"
+       "dl{display:grid;grid-template-columns:30% 1fr;gap:.14rem .4rem;margin:0 0 "
+       ".3rem;font-size:.96rem;align-content:start}\n"
        "dt{color:"
     << css(ink(Tone::quiet))
     << "}dd{margin:0}\n"
@@ -213,20 +221,26 @@ std::string style_of(double scale) {
     << css(ink(Tone::quiet))
     << ";border-bottom:.1rem solid #d1d6de}td{border-bottom:.05rem solid #d1d6de;vertical-align:top}\n"
        "th,td{padding:.1rem .3rem .1rem 0}tr{break-inside:avoid}\n"
-       ".band{display:flex;align-items:baseline;border-left:.28rem solid;padding:.4rem .7rem;margin-bottom:.5rem;break-inside:avoid}\n"
+       ".band{display:flex;align-items:baseline;border-left:.28rem solid;padding:.4rem "
+       ".7rem;margin-bottom:.5rem;break-inside:avoid}\n"
        ".band b{font-size:1.3rem;flex:0 0 20%}\n"
        ".bars,.drawing{width:100%;display:block}.plot{margin-bottom:.4rem;break-inside:avoid}\n"
-       ".signature{padding:.5rem .7rem;background:#f1f2f5;height:6.1rem;overflow:hidden;box-sizing:border-box;break-inside:avoid}\n"
+       ".signature{padding:.5rem "
+       ".7rem;background:#f1f2f5;height:6.1rem;overflow:hidden;box-sizing:border-box;break-inside:avoid}\n"
        ".signature b{font-size:1.12rem}.fields{display:flex;gap:1rem;align-items:flex-end;height:3.9rem}\n"
-       ".by{flex:2}.date{flex:1}.note{flex:3}.line{border-bottom:.05rem solid #666;min-height:1.3em}.fields .quiet{font-size:.8rem}\n"
+       ".by{flex:2}.date{flex:1}.note{flex:3}.line{border-bottom:.05rem solid #666;min-height:1.3em}.fields "
+       ".quiet{font-size:.8rem}\n"
        "footer{font-size:.8rem;color:"
     << css(ink(Tone::quiet)) << ";margin-top:.6rem}\n";
-  for (const Tone t : {Tone::quiet, Tone::good, Tone::caution, Tone::bad}) s << '.' << tone_class(t) << "{color:" << css(ink(t)) << "}";
+  for (const Tone t : {Tone::quiet, Tone::good, Tone::caution, Tone::bad})
+    s << '.' << tone_class(t) << "{color:" << css(ink(t)) << "}";
   for (const Tone t : {Tone::good, Tone::caution, Tone::bad})
     s << ".signature." << tone_class(t) << "{color:inherit;background:" << css(wash(t)) << "}";
   // Text is as large as on paper; a browser sets lines a little wider than the PDF, hence the last few percent.
-  s << "\n@page{size:A4;margin:" << kMargin << "mm}\n@media print{html{font-size:" << two_digits(kTextPt * scale * 0.965)
-    << "pt;-webkit-print-color-adjust:exact;print-color-adjust:exact}body{margin:0;padding:0;max-width:none}.page{break-before:page}}\n"
+  s << "\n@page{size:A4;margin:" << kMargin
+    << "mm}\n@media print{html{font-size:" << two_digits(kTextPt * scale * 0.965)
+    << "pt;-webkit-print-color-adjust:exact;print-color-adjust:exact}body{margin:0;padding:0;max-width:none}.page{"
+       "break-before:page}}\n"
        "@media screen{.page{border-top:.1rem dashed #bbb;margin:1.2rem 0}}\n";
   return s.str();
 }
@@ -294,12 +308,12 @@ std::string png_url_of(const Picture& picture) {
 std::string svg_of(const sheet::Drawing& d) {
   std::ostringstream out;
   const auto rgb = [](const sheet::Drawing::Colour& c) { return css({c[0] / 255.0, c[1] / 255.0, c[2] / 255.0}); };
-  out << "<svg id=\"" << escaped(d.id) << "\" class=\"drawing\" role=\"img\" aria-label=\"" << escaped(d.alt) << "\" viewBox=\"0 0 "
-      << two_digits(d.width) << ' ' << two_digits(d.height) << "\">\n";
+  out << "<svg id=\"" << escaped(d.id) << "\" class=\"drawing\" role=\"img\" aria-label=\"" << escaped(d.alt)
+      << "\" viewBox=\"0 0 " << two_digits(d.width) << ' ' << two_digits(d.height) << "\">\n";
   for (const auto& mark : d.marks) {
     if (const auto* const t = std::get_if<sheet::Drawing::Text>(&mark)) {
-      out << "<text x=\"" << two_digits(t->x) << "\" y=\"" << two_digits(t->y) << "\" font-size=\"" << two_digits(t->size) << "\" fill=\""
-          << rgb(t->colour) << '"'
+      out << "<text x=\"" << two_digits(t->x) << "\" y=\"" << two_digits(t->y) << "\" font-size=\""
+          << two_digits(t->size) << "\" fill=\"" << rgb(t->colour) << '"'
           << (t->align == 0  ? " text-anchor=\"middle\""
               : t->align > 0 ? " text-anchor=\"end\""
                              : "")
@@ -307,9 +321,9 @@ std::string svg_of(const sheet::Drawing& d) {
       continue;
     }
     if (const auto* const dot = std::get_if<sheet::Drawing::Dot>(&mark)) {
-      out << "<circle cx=\"" << two_digits(dot->x) << "\" cy=\"" << two_digits(dot->y) << "\" r=\"" << two_digits(dot->radius)
-          << "\" fill=\"" << (dot->hollow ? "#fff" : rgb(dot->colour)) << "\" stroke=\"" << rgb(dot->colour)
-          << "\" stroke-width=\"0.7\"/>\n";
+      out << "<circle cx=\"" << two_digits(dot->x) << "\" cy=\"" << two_digits(dot->y) << "\" r=\""
+          << two_digits(dot->radius) << "\" fill=\"" << (dot->hollow ? "#fff" : rgb(dot->colour)) << "\" stroke=\""
+          << rgb(dot->colour) << "\" stroke-width=\"0.7\"/>\n";
       continue;
     }
     const auto& p = std::get<sheet::Drawing::Path>(mark);
@@ -317,7 +331,9 @@ std::string svg_of(const sheet::Drawing& d) {
     for (std::size_t n = 0; n < p.points.size(); ++n)
       out << (n == 0 ? 'M' : 'L') << two_digits(p.points[n][0]) << ' ' << two_digits(p.points[n][1]);
     out << (p.fill ? "Z\" fill=\"" + rgb(*p.fill) : std::string("\" fill=\"none")) << '"';
-    if (p.stroke) out << " stroke=\"" << rgb(*p.stroke) << "\" stroke-width=\"" << two_digits(p.width) << "\" stroke-linejoin=\"round\"";
+    if (p.stroke)
+      out << " stroke=\"" << rgb(*p.stroke) << "\" stroke-width=\"" << two_digits(p.width)
+          << "\" stroke-linejoin=\"round\"";
     if (p.dashed) out << " stroke-dasharray=\"" << two_digits(4 * p.width) << ' ' << two_digits(3 * p.width) << '"';
     if (p.opacity < 1) out << " opacity=\"" << two_digits(p.opacity) << '"';
     out << "/>\n";
@@ -329,8 +345,10 @@ std::string svg_of(const sheet::Drawing& d) {
 std::string sheet_html(const Sheet& s) {
   const double scale = fitting_scale(s);
   std::ostringstream out;
-  out << "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n";
-  for (const auto& [key, value] : s.marks) out << "<meta name=\"osteotome-" << escaped(key) << "\" content=\"" << escaped(value) << "\">\n";
+  out << "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+         "content=\"width=device-width\">\n";
+  for (const auto& [key, value] : s.marks)
+    out << "<meta name=\"osteotome-" << escaped(key) << "\" content=\"" << escaped(value) << "\">\n";
   out << "<title>" << escaped(s.title + " " + s.code) << "</title>\n<style>\n"
       << style_of(scale) << "</style></head>\n<body>\n<header><h1>" << escaped(s.title) << "</h1><b>" << escaped(s.code)
       << "</b></header>\n";
@@ -376,7 +394,8 @@ std::map<std::string, std::vector<double>> bars_of_html(std::string_view html) {
 
 std::string mark_of_html(std::string_view html, std::string_view key) {
   std::string found;
-  each_tag(html, "<meta name=\"osteotome-" + std::string(key) + "\"", [&](std::string_view tag) { found = attribute_of(tag, "content"); });
+  each_tag(html, "<meta name=\"osteotome-" + std::string(key) + "\"",
+           [&](std::string_view tag) { found = attribute_of(tag, "content"); });
   return found;
 }
 

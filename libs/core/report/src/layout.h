@@ -1,4 +1,5 @@
-// Where things lie on a page. Private to libs/core/report; millimetres from the upper left corner unless it says otherwise.
+// Where things lie on a page. Private to libs/core/report; millimetres from the upper left corner unless it says
+// otherwise.
 #pragma once
 #include "osteo/core/report/sheet.h"
 

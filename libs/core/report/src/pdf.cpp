@@ -115,9 +115,12 @@ class Pen {
     if (!on) return;
     for (const auto& mark : d.marks) {
       if (const auto* const t = std::get_if<sheet::Drawing::Text>(&mark)) {
-        // Texts are placed by their baselines: a line of Pango's is as high as ascent and descent together, of which the ascent is 0.8.
+        // Texts are placed by their baselines: a line of Pango's is as high as ascent and descent together, of which
+        // the ascent is 0.8.
         const double size = t->size * scale, wide = 400;
-        const PangoAlignment align = t->align < 0 ? PANGO_ALIGN_LEFT : t->align == 0 ? PANGO_ALIGN_CENTER : PANGO_ALIGN_RIGHT;
+        const PangoAlignment align = t->align < 0    ? PANGO_ALIGN_LEFT
+                                     : t->align == 0 ? PANGO_ALIGN_CENTER
+                                                     : PANGO_ALIGN_RIGHT;
         const double left = x + t->x * scale - (t->align < 0 ? 0 : t->align == 0 ? wide / 2 : wide);
         text(t->text, left, y + t->y * scale - 0.905 * size, wide,
              {size, t->bold, {t->colour[0] / 255.0, t->colour[1] / 255.0, t->colour[2] / 255.0}, align, 1});
@@ -125,7 +128,8 @@ class Pen {
       }
       if (const auto* const spot = std::get_if<sheet::Drawing::Dot>(&mark)) {
         const auto& c = spot->colour;
-        dot(x + spot->x * scale, y + spot->y * scale, spot->radius * scale, {c[0] / 255.0, c[1] / 255.0, c[2] / 255.0}, spot->hollow);
+        dot(x + spot->x * scale, y + spot->y * scale, spot->radius * scale, {c[0] / 255.0, c[1] / 255.0, c[2] / 255.0},
+            spot->hollow);
         continue;
       }
       const auto& p = std::get<sheet::Drawing::Path>(mark);
@@ -163,7 +167,8 @@ class Pen {
 
 double draw(const Pen& pen, const SheetBlocks& blocks, double x, double y, double w);
 
-double draw_row(const Pen& pen, const sheet::Table& t, const std::vector<sheet::Cell>& cells, bool head, double x, double y, double w) {
+double draw_row(const Pen& pen, const sheet::Table& t, const std::vector<sheet::Cell>& cells, bool head, double x,
+                double y, double w) {
   double all = 0, height = 0;
   const auto share = [&](std::size_t c) { return c < t.widths.size() ? t.widths[c] : 1.0; };
   const std::size_t n = std::max(t.head.size(), cells.size());
@@ -173,7 +178,8 @@ double draw_row(const Pen& pen, const sheet::Table& t, const std::vector<sheet::
     const double width = w * share(c) / all;
     if (c < cells.size()) {
       const Style style{kTextPt - 0.6, head, head ? ink(Tone::quiet) : ink(cells[c].tone)};
-      height = std::max(height, pen.text(std::string(sign(cells[c].tone)) + cells[c].text, at, y + 0.35 * kPad, width - kPad, style));
+      height = std::max(
+          height, pen.text(std::string(sign(cells[c].tone)) + cells[c].text, at, y + 0.35 * kPad, width - kPad, style));
     }
     at += width;
   }
@@ -210,7 +216,8 @@ double draw_bars(const Pen& pen, const sheet::Bars& b, double x, double y, doubl
     pen.text(b.marks[m].text, left ? x : px + 2, py - 1, left ? px - 2 - x : x + w - px - 2,
              {kTextPt - 1.4, false, c, left ? PANGO_ALIGN_RIGHT : PANGO_ALIGN_LEFT, 1});
   }
-  return marks + h + 11 + pen.text(b.axis, x, base + 10.5, w, {kTextPt - 1.4, false, ink(Tone::quiet), PANGO_ALIGN_CENTER, 1});
+  return marks + h + 11 +
+         pen.text(b.axis, x, base + 10.5, w, {kTextPt - 1.4, false, ink(Tone::quiet), PANGO_ALIGN_CENTER, 1});
 }
 
 double draw_signature(const Pen& pen, const sheet::Signature& s, double x, double y, double w) {
@@ -243,7 +250,8 @@ double draw(const Pen& pen, const SheetBlock& block, double x, double y, double 
       return height + 0.8 * kMm;
     }
     double operator()(const sheet::Paragraph& p) const {
-      return pen.text(std::string(sign(p.tone)) + p.text, x, y, w, {p.tone == Tone::quiet ? kTextPt - 1 : kTextPt, false, ink(p.tone)});
+      return pen.text(std::string(sign(p.tone)) + p.text, x, y, w,
+                      {p.tone == Tone::quiet ? kTextPt - 1 : kTextPt, false, ink(p.tone)});
     }
     double operator()(const sheet::Band& b) const {
       const Style word{kTextPt + 2.5, true, ink(b.tone)}, text{kTextPt + 0.5, false, ink(Tone::plain)};
@@ -261,14 +269,16 @@ double draw(const Pen& pen, const SheetBlock& block, double x, double y, double 
     double operator()(const sheet::Facts& f) const {
       const auto n = static_cast<std::size_t>(std::max(1, f.columns));
       const std::size_t each = (f.rows.size() + n - 1) / n;
-      const double width = (w - kGap * 2 * static_cast<double>(n - 1)) / static_cast<double>(n), name = (n > 1 ? 0.30 : 0.34) * width;
+      const double width = (w - kGap * 2 * static_cast<double>(n - 1)) / static_cast<double>(n),
+                   name = (n > 1 ? 0.30 : 0.34) * width;
       double height = 0;
       for (std::size_t c = 0; c < n; ++c) {
         double at = y;
         const double left = x + static_cast<double>(c) * (width + 2 * kGap);
         for (std::size_t r = c * each; r < std::min(f.rows.size(), (c + 1) * each); ++r) {
           const double a = pen.text(f.rows[r].first, left, at, name - kPad, {kTextPt - 0.3, false, ink(Tone::quiet)});
-          const double b = pen.text(f.rows[r].second, left + name, at, width - name, {kTextPt - 0.3, false, ink(Tone::plain)});
+          const double b =
+              pen.text(f.rows[r].second, left + name, at, width - name, {kTextPt - 0.3, false, ink(Tone::plain)});
           at += std::max(a, b) + 0.5 * kPad;
         }
         height = std::max(height, at - y);
@@ -291,7 +301,8 @@ double draw(const Pen& pen, const SheetBlock& block, double x, double y, double 
         const double width = i.picture.height > 0 ? real * i.picture.width / i.picture.height : real;
         pen.picture(i.picture, at, y, width, real);
         if (!i.caption.empty())
-          caption = std::max(caption, pen.text(i.caption, at, y + real + 0.8, width - gap, {kTextPt - 1.4, false, ink(Tone::quiet)}));
+          caption = std::max(
+              caption, pen.text(i.caption, at, y + real + 0.8, width - gap, {kTextPt - 1.4, false, ink(Tone::quiet)}));
         at += width + gap;
       }
       return real + (caption > 0 ? caption + 1.2 : 0);
@@ -347,10 +358,12 @@ std::vector<Unit> units_of(const Sheet& s) {
     } else if (const auto* t = std::get_if<sheet::Table>(&block.is); t != nullptr && t->rows.size() > 3) {
       if (!t->head.empty())
         units.push_back(
-            {[t](const Pen& p, double x, double y, double w) { return draw_row(p, *t, head_of(*t), true, x, y, w); }, true, false, 0});
+            {[t](const Pen& p, double x, double y, double w) { return draw_row(p, *t, head_of(*t), true, x, y, w); },
+             true, false, 0});
       for (const auto& row : t->rows)
         units.push_back(
-            {[t, &row](const Pen& p, double x, double y, double w) { return draw_row(p, *t, row, false, x, y, w); }, false, false, 0});
+            {[t, &row](const Pen& p, double x, double y, double w) { return draw_row(p, *t, row, false, x, y, w); },
+             false, false, 0});
       units.back().after = kGap;
     } else {
       units.push_back({[&block](const Pen& p, double x, double y, double w) { return draw(p, block, x, y, w); },
@@ -362,7 +375,8 @@ std::vector<Unit> units_of(const Sheet& s) {
 
 // Goes over all pages; returns how many. `total`: to show, 0 while they are counted.
 int go(cairo_t* cairo, const Sheet& s, double scale, int total) {
-  const double width = (kPageWidth - 2 * kMargin) * kMm / scale, left = kMargin * kMm / scale, top = kMargin * kMm / scale;
+  const double width = (kPageWidth - 2 * kMargin) * kMm / scale, left = kMargin * kMm / scale,
+               top = kMargin * kMm / scale;
   const double bottom = (kPageHeight - kMargin - kFoot) * kMm / scale;
   Pen pen(cairo);
   Pen measure(cairo);
@@ -371,8 +385,8 @@ int go(cairo_t* cairo, const Sheet& s, double scale, int total) {
   const auto begin_page = [&] {
     ++page;
     pen.on = total > 0;
-    const double a =
-        pen.text(s.title, left, top, 0.72 * width, {kTextPt + (page == 1 ? 7 : 3), true, {0.10, 0.25, 0.42}, PANGO_ALIGN_LEFT, 1});
+    const double a = pen.text(s.title, left, top, 0.72 * width,
+                              {kTextPt + (page == 1 ? 7 : 3), true, {0.10, 0.25, 0.42}, PANGO_ALIGN_LEFT, 1});
     const double b = pen.text(s.code, left + 0.6 * width, top, 0.4 * width,
                               {kTextPt + (page == 1 ? 7 : 3), true, ink(Tone::plain), PANGO_ALIGN_RIGHT, 1});
     y = top + std::max(a, b) + 1;
@@ -389,7 +403,8 @@ int go(cairo_t* cairo, const Sheet& s, double scale, int total) {
   double first = y;
   for (std::size_t u = 0; u < units.size(); ++u) {
     double need = measure.on ? 0 : units[u].draw(measure, left, y, width);
-    if (units[u].keep_with_next && u + 1 < units.size()) need += units[u].after + units[u + 1].draw(measure, left, y, width);
+    if (units[u].keep_with_next && u + 1 < units.size())
+      need += units[u].after + units[u + 1].draw(measure, left, y, width);
     if ((units[u].new_page || y + need > bottom) && y > first) {
       if (total > 0) cairo_show_page(cairo);
       begin_page();
@@ -409,7 +424,8 @@ cairo_status_t append(void* sink, const unsigned char* bytes, unsigned n) {
 
 struct Paper {
   std::string bytes;
-  CairoOwned<cairo_surface_t> surface{cairo_pdf_surface_create_for_stream(&append, &bytes, kPageWidth* kMm, kPageHeight* kMm)};
+  CairoOwned<cairo_surface_t> surface{
+      cairo_pdf_surface_create_for_stream(&append, &bytes, kPageWidth* kMm, kPageHeight* kMm)};
   CairoOwned<cairo_t> cairo{cairo_create(surface.get())};
 };
 
@@ -418,7 +434,9 @@ void require_a_font() {
   int n = 0;
   pango_font_map_list_families(pango_cairo_font_map_get_default(), &families, &n);
   g_free(families);
-  if (n == 0) throw Error(ExitCode::failed, "there is no font on this machine to write a report with", "install fonts-liberation");
+  if (n == 0)
+    throw Error(ExitCode::failed, "there is no font on this machine to write a report with",
+                "install fonts-liberation");
 }
 
 }  // namespace
@@ -443,13 +461,15 @@ std::string sheet_pdf(const Sheet& s) {
     pages = go(counted.cairo.get(), s, scale, 0);
   }
   Paper paper;
-  cairo_pdf_surface_set_metadata(paper.surface.get(), CAIRO_PDF_METADATA_TITLE, valid_utf8(s.title + " " + s.code).c_str());
+  cairo_pdf_surface_set_metadata(paper.surface.get(), CAIRO_PDF_METADATA_TITLE,
+                                 valid_utf8(s.title + " " + s.code).c_str());
   cairo_pdf_surface_set_metadata(paper.surface.get(), CAIRO_PDF_METADATA_CREATOR, "Osteotome");
   cairo_pdf_surface_set_metadata(paper.surface.get(), CAIRO_PDF_METADATA_CREATE_DATE, "2000-01-01T00:00:00Z");
   go(paper.cairo.get(), s, scale, pages);
   cairo_surface_finish(paper.surface.get());
   const cairo_status_t status = cairo_surface_status(paper.surface.get());
-  if (status != CAIRO_STATUS_SUCCESS) throw Error(ExitCode::failed, std::string("cannot make the PDF: ") + cairo_status_to_string(status));
+  if (status != CAIRO_STATUS_SUCCESS)
+    throw Error(ExitCode::failed, std::string("cannot make the PDF: ") + cairo_status_to_string(status));
   // A date that is not true is worse than none: blanks in its place, so that no offset moves.
   if (const auto at = paper.bytes.find("/CreationDate ("); at != std::string::npos) {
     const auto end = paper.bytes.find(')', at);

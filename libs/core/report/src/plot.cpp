@@ -48,7 +48,9 @@ sheet::Drawing drawing_of(const sheet::Plot& p, double width) {
   const double right = width - kRight, base = height - kBottom;
   const auto px = [&](double x) { return kLeft + (right - kLeft) * (x - p.x.from) / (p.x.to - p.x.from); };
   const auto py = [&](double y) { return base - (base - kTop) * (y - p.y.from) / (p.y.to - p.y.from); };
-  const auto inside = [&](const sheet::Plot::At& a) { return a[0] >= p.x.from && a[0] <= p.x.to && a[1] >= p.y.from && a[1] <= p.y.to; };
+  const auto inside = [&](const sheet::Plot::At& a) {
+    return a[0] >= p.x.from && a[0] <= p.x.to && a[1] >= p.y.from && a[1] <= p.y.to;
+  };
   const Colour quiet = colour_of(ink(Tone::quiet)), plain = colour_of(ink(Tone::plain)), grid{230, 232, 237};
   const auto ticks = [](const sheet::Plot::Axis& axis) {
     std::vector<std::pair<double, std::string>> all = axis.named;
@@ -68,7 +70,8 @@ sheet::Drawing drawing_of(const sheet::Plot& p, double width) {
   for (const auto& a : p.areas) {
     std::vector<sheet::Plot::At> corners;
     // Corners are brought to the edge: bands are narrow and lie along an axis.
-    for (const auto& c : a.at) corners.push_back({std::clamp(px(c[0]), kLeft, right), std::clamp(py(c[1]), kTop, base)});
+    for (const auto& c : a.at)
+      corners.push_back({std::clamp(px(c[0]), kLeft, right), std::clamp(py(c[1]), kTop, base)});
     if (!corners.empty()) d.area(std::move(corners), colour_of(wash(a.tone)));
   }
   for (const auto& [at, name] : ticks(p.y)) {
@@ -101,7 +104,8 @@ sheet::Drawing drawing_of(const sheet::Plot& p, double width) {
   }
   for (const auto& s : p.points) {
     for (const auto& a : s.at)
-      if (inside(a)) d.marks.emplace_back(sheet::Drawing::Dot{px(a[0]), py(a[1]), kDot, colour_of(ink(s.tone)), s.hollow});
+      if (inside(a))
+        d.marks.emplace_back(sheet::Drawing::Dot{px(a[0]), py(a[1]), kDot, colour_of(ink(s.tone)), s.hollow});
   }
   return d;
 }

@@ -15,7 +15,8 @@ std::string png_of(const Picture& picture) {
   std::vector<unsigned char> pixels(static_cast<std::size_t>(stride) * static_cast<std::size_t>(picture.height));
   const std::uint8_t* from = picture.rgb.data();
   for (int y = 0; y < picture.height; ++y) {
-    auto* to = reinterpret_cast<std::uint32_t*>(pixels.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(stride));
+    auto* to = reinterpret_cast<std::uint32_t*>(pixels.data() +
+                                                static_cast<std::size_t>(y) * static_cast<std::size_t>(stride));
     for (int x = 0; x < picture.width; ++x, from += 3, ++to)
       *to = static_cast<std::uint32_t>(from[0]) << 16 | static_cast<std::uint32_t>(from[1]) << 8 | from[2];
   }
@@ -30,7 +31,8 @@ std::string png_of(const Picture& picture) {
       },
       &png);
   cairo_surface_destroy(surface);
-  if (status != CAIRO_STATUS_SUCCESS) throw Error(ExitCode::failed, std::string("cannot make a PNG: ") + cairo_status_to_string(status));
+  if (status != CAIRO_STATUS_SUCCESS)
+    throw Error(ExitCode::failed, std::string("cannot make a PNG: ") + cairo_status_to_string(status));
   return png;
 }
 
@@ -121,7 +123,8 @@ std::string_view sign(Tone tone) {
 
 double row_height_mm(const sheet::Pictures& pictures, double width_mm, double gap_mm) {
   double aspects = 0;
-  for (const sheet::Image& i : pictures.row) aspects += i.picture.height > 0 ? double(i.picture.width) / i.picture.height : 1;
+  for (const sheet::Image& i : pictures.row)
+    aspects += i.picture.height > 0 ? double(i.picture.width) / i.picture.height : 1;
   const double room = width_mm - gap_mm * static_cast<double>(pictures.row.empty() ? 0 : pictures.row.size() - 1);
   return aspects > 0 ? std::min(pictures.height_mm, room / aspects) : 0;
 }

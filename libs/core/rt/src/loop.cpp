@@ -38,20 +38,22 @@ std::int64_t thread_cpu_ns() noexcept {
   for (std::size_t i = 0; i < sizeof page; i += 4096) page[i] = 0;
 }
 
-// Where the system limits what may be locked, locking all that is to come would make later allocations of the whole program fail: there
-// only what there is now is locked.
+// Where the system limits what may be locked, locking all that is to come would make later allocations of the whole
+// program fail: there only what there is now is locked.
 bool lock_memory() noexcept {
   rlimit limit{};
   bool unlimited = ::getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY;
   __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
   std::array<__user_cap_data_struct, 2> may{};
-  if (::syscall(SYS_capget, &header, may.data()) == 0) unlimited = unlimited || (may[0].effective >> CAP_IPC_LOCK & 1U) != 0;
+  if (::syscall(SYS_capget, &header, may.data()) == 0)
+    unlimited = unlimited || (may[0].effective >> CAP_IPC_LOCK & 1U) != 0;
   return ::mlockall(unlimited ? MCL_CURRENT | MCL_FUTURE : MCL_CURRENT) == 0;
 }
 
 }  // namespace
 
-FixedRateLoop::FixedRateLoop(double rate_hz, std::function<bool(std::int64_t)> tick) : rate_hz_(rate_hz), tick_(std::move(tick)) {}
+FixedRateLoop::FixedRateLoop(double rate_hz, std::function<bool(std::int64_t)> tick)
+    : rate_hz_(rate_hz), tick_(std::move(tick)) {}
 
 FixedRateLoop::~FixedRateLoop() {
   request_stop();

@@ -18,8 +18,8 @@ std::string kinds_text(std::span<const DataKind> kinds) {
 std::vector<Data> Stage::run(std::span<const Data> inputs, const Context& context) const {
   const auto& ports = info().inputs;
   if (inputs.size() != ports.size()) {
-    throw Error(ExitCode::usage,
-                "stage '" + info().name + "' takes " + std::to_string(ports.size()) + " inputs, not " + std::to_string(inputs.size()));
+    throw Error(ExitCode::usage, "stage '" + info().name + "' takes " + std::to_string(ports.size()) + " inputs, not " +
+                                     std::to_string(inputs.size()));
   }
   for (std::size_t i = 0; i < ports.size(); ++i) {
     const DataKind kind = kind_of(inputs[i]);
@@ -28,8 +28,8 @@ std::vector<Data> Stage::run(std::span<const Data> inputs, const Context& contex
       throw Error(ExitCode::usage, "stage '" + info().name + "' needs its input '" + ports[i].name + "'");
     }
     if (std::find(ports[i].kinds.begin(), ports[i].kinds.end(), kind) == ports[i].kinds.end()) {
-      throw Error(ExitCode::usage, "stage '" + info().name + "' takes " + kinds_text(ports[i].kinds) + " as '" + ports[i].name + "', not " +
-                                       std::string(kind_name(kind)));
+      throw Error(ExitCode::usage, "stage '" + info().name + "' takes " + kinds_text(ports[i].kinds) + " as '" +
+                                       ports[i].name + "', not " + std::string(kind_name(kind)));
     }
   }
   return do_run(inputs, context);

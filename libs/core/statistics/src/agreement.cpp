@@ -14,7 +14,8 @@ Kappa cohen_kappa(std::span<const int> a, std::span<const int> b, int categories
   if (categories < 2 || categories > 1000) refuse("kappa is of two to a thousand categories");
   for (const auto& list : {a, b}) {
     for (const int c : list) {
-      if (c < 0 || c >= categories) refuse("category " + std::to_string(c) + " is not below " + std::to_string(categories));
+      if (c < 0 || c >= categories)
+        refuse("category " + std::to_string(c) + " is not below " + std::to_string(categories));
     }
   }
   Kappa k;
@@ -22,7 +23,8 @@ Kappa cohen_kappa(std::span<const int> a, std::span<const int> b, int categories
   const auto q = static_cast<std::size_t>(categories);
   const double n = static_cast<double>(a.size());
   std::vector<double> p(q * q), row(q), column(q);
-  for (std::size_t i = 0; i < a.size(); ++i) p[static_cast<std::size_t>(a[i]) * q + static_cast<std::size_t>(b[i])] += 1 / n;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    p[static_cast<std::size_t>(a[i]) * q + static_cast<std::size_t>(b[i])] += 1 / n;
   for (std::size_t i = 0; i < q; ++i) {
     for (std::size_t j = 0; j < q; ++j) {
       row[i] += p[i * q + j];
@@ -33,7 +35,8 @@ Kappa cohen_kappa(std::span<const int> a, std::span<const int> b, int categories
     const double apart = std::abs(static_cast<double>(i) - static_cast<double>(j)) / static_cast<double>(q - 1);
     return weights == Weights::none ? (i == j ? 1.0 : 0.0) : weights == Weights::linear ? 1 - apart : 1 - apart * apart;
   };
-  std::vector<double> row_weight(q), column_weight(q);  // of a rating i by the first, j by the second, against the other's shares
+  std::vector<double> row_weight(q),
+      column_weight(q);  // of a rating i by the first, j by the second, against the other's shares
   k.observed = k.expected = 0;
   for (std::size_t i = 0; i < q; ++i) {
     for (std::size_t j = 0; j < q; ++j) {
@@ -136,7 +139,8 @@ CategoryAgreement category_agreement(const Ratings& ratings, std::span<const dou
       }
       result.ac1_standard_error = std::sqrt(sum / (n * (n - 1)));
       const double t = student_quantile(0.5 + level / 2, n - 1);
-      result.ac1.interval = {std::max(-1.0, ac1 - t * result.ac1_standard_error), std::min(1.0, ac1 + t * result.ac1_standard_error)};
+      result.ac1.interval = {std::max(-1.0, ac1 - t * result.ac1_standard_error),
+                             std::min(1.0, ac1 + t * result.ac1_standard_error)};
     }
   }
   // Every pair of raters, on what both rated.
@@ -152,7 +156,8 @@ CategoryAgreement category_agreement(const Ratings& ratings, std::span<const dou
       }
       double values[3];
       for (const Weights w : {Weights::none, Weights::linear, Weights::quadratic})
-        values[static_cast<int>(w)] = a.size() < 2 ? kUndefined : cohen_kappa(a, b, static_cast<int>(q), w, level).value;
+        values[static_cast<int>(w)] =
+            a.size() < 2 ? kUndefined : cohen_kappa(a, b, static_cast<int>(q), w, level).value;
       if (std::isnan(values[0])) {
         ++result.pairs_without_kappa;
         continue;
@@ -245,7 +250,8 @@ BlandAltman bland_altman(std::span<const double> a, std::span<const double> b, d
   if (r.n < 3) return r;
   std::vector<double> d;
   for (std::size_t i = 0; i < r.n; ++i) d.push_back(a[i] - b[i]);
-  const double m = mean(d), n = static_cast<double>(r.n), z = normal_quantile(0.975), t = student_quantile(0.5 + level / 2, n - 1);
+  const double m = mean(d), n = static_cast<double>(r.n), z = normal_quantile(0.975),
+               t = student_quantile(0.5 + level / 2, n - 1);
   r.sd = std::sqrt(variance(d));
   const auto with = [](double value, double half) { return Estimate{value, {value - half, value + half}}; };
   r.bias = with(m, t * r.sd / std::sqrt(n));

@@ -110,7 +110,8 @@ double Random::normal() {
   return normal_quantile(uniform());
 }
 
-Bootstrap bootstrap(std::size_t people, const std::function<double(std::span<const std::size_t>)>& statistic, const Resampling& r) {
+Bootstrap bootstrap(std::size_t people, const std::function<double(std::span<const std::size_t>)>& statistic,
+                    const Resampling& r) {
   need_level(r.level);
   if (r.resamples < 100) refuse("a bootstrap of fewer than 100 resamples says nothing");
   Bootstrap result;

@@ -13,7 +13,8 @@ namespace osteo::statistics {
 }
 inline void need_finite(std::span<const double> values, const char* called) {
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!std::isfinite(values[i])) refuse(std::string(called) + ", value " + std::to_string(i + 1) + ", is not a number");
+    if (!std::isfinite(values[i]))
+      refuse(std::string(called) + ", value " + std::to_string(i + 1) + ", is not a number");
   }
 }
 inline void need_same_size(std::size_t a, std::size_t b) {

@@ -98,7 +98,8 @@ MannWhitney mann_whitney(std::span<const double> a, std::span<const double> b) {
   return r;
 }
 
-Permutation permutation_of_means(std::span<const double> a, std::span<const double> b, const PermutationSettings& settings) {
+Permutation permutation_of_means(std::span<const double> a, std::span<const double> b,
+                                 const PermutationSettings& settings) {
   need_groups(a, b);
   if (a.empty() || b.empty()) return {};
   std::vector<double> all(a.begin(), a.end());
@@ -115,9 +116,12 @@ Estimate hedges_g(std::span<const double> a, std::span<const double> b, double l
   const double na = static_cast<double>(a.size()), nb = static_cast<double>(b.size()), df = na + nb - 2;
   const double pooled = ((na - 1) * variance(a) + (nb - 1) * variance(b)) / df;
   if (pooled <= 0) return {};
-  const double d = (mean(a) - mean(b)) / std::sqrt(pooled), scale = std::sqrt(1 / na + 1 / nb), factor = hedges_factor(df);
+  const double d = (mean(a) - mean(b)) / std::sqrt(pooled), scale = std::sqrt(1 / na + 1 / nb),
+               factor = hedges_factor(df);
   const double t = d / scale;
-  return {factor * d, {factor * scale * non_centrality(t, df, 0.5 + level / 2), factor * scale * non_centrality(t, df, 0.5 - level / 2)}};
+  return {factor * d,
+          {factor * scale * non_centrality(t, df, 0.5 + level / 2),
+           factor * scale * non_centrality(t, df, 0.5 - level / 2)}};
 }
 
 Estimate cliffs_delta(std::span<const double> a, std::span<const double> b, double level) {
@@ -153,8 +157,10 @@ Estimate cliffs_delta(std::span<const double> a, std::span<const double> b, doub
     e.interval = delta > 0 ? Interval{bound, 1} : Interval{-1, -bound};
     return e;
   }
-  const double zs = z * z * spread, room = 1 - delta * delta, half = z * std::sqrt(spread) * std::sqrt(room * room + zs);
-  e.interval = {std::max(-1.0, (delta * room - half) / (room + zs)), std::min(1.0, (delta * room + half) / (room + zs))};
+  const double zs = z * z * spread, room = 1 - delta * delta,
+               half = z * std::sqrt(spread) * std::sqrt(room * room + zs);
+  e.interval = {std::max(-1.0, (delta * room - half) / (room + zs)),
+                std::min(1.0, (delta * room + half) / (room + zs))};
   return e;
 }
 

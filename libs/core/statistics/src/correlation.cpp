@@ -71,7 +71,8 @@ std::vector<double> left_of(std::span<const double> x, std::span<const std::vect
   return {rest.begin(), rest.end()};
 }
 
-Correlation partial(std::span<const double> x, std::span<const double> y, std::span<const std::vector<double>> given, double level) {
+Correlation partial(std::span<const double> x, std::span<const double> y, std::span<const std::vector<double>> given,
+                    double level) {
   need_pairs(x, y);
   need_level(level);
   for (const auto& g : given) {
@@ -87,7 +88,8 @@ Correlation partial(std::span<const double> x, std::span<const double> y, std::s
   c.r = product_moment(a, b);
   c.p = p_of(c.r, c.n - k);
   if (std::isfinite(c.r) && c.n > k + 3) {
-    const double half = normal_quantile(0.5 + level / 2) / std::sqrt(static_cast<double>(c.n - k) - 3), z = std::atanh(c.r);
+    const double half = normal_quantile(0.5 + level / 2) / std::sqrt(static_cast<double>(c.n - k) - 3),
+                 z = std::atanh(c.r);
     c.interval = {std::tanh(z - half), std::tanh(z + half)};
   }
   return c;
@@ -95,13 +97,13 @@ Correlation partial(std::span<const double> x, std::span<const double> y, std::s
 
 }  // namespace
 
-Correlation partial_pearson(std::span<const double> x, std::span<const double> y, std::span<const std::vector<double>> given,
-                            double level) {
+Correlation partial_pearson(std::span<const double> x, std::span<const double> y,
+                            std::span<const std::vector<double>> given, double level) {
   return partial(x, y, given, level);
 }
 
-Correlation partial_spearman(std::span<const double> x, std::span<const double> y, std::span<const std::vector<double>> given,
-                             double level) {
+Correlation partial_spearman(std::span<const double> x, std::span<const double> y,
+                             std::span<const std::vector<double>> given, double level) {
   need_pairs(x, y);
   std::vector<std::vector<double>> of;
   for (const auto& g : given) {
@@ -134,8 +136,8 @@ Correlation spearman(std::span<const double> x, std::span<const double> y) {
   return c;
 }
 
-CorrelationByPeople correlation_by_people(std::span<const double> x, std::span<const double> y, std::span<const int> person,
-                                          const Resampling& resampling) {
+CorrelationByPeople correlation_by_people(std::span<const double> x, std::span<const double> y,
+                                          std::span<const int> person, const Resampling& resampling) {
   need_pairs(x, y);
   need_same_size(x.size(), person.size());
   std::map<int, std::vector<std::size_t>> by_person;

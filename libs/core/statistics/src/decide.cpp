@@ -32,7 +32,8 @@ Roc roc(std::span<const double> positive, std::span<const double> negative, doub
   if (positive.size() > 1 && negative.size() > 1) {
     const double z = normal_quantile(0.5 + level / 2);
     r.standard_error = std::sqrt(variance(of_positive) / m + variance(of_negative) / n);
-    r.area.interval = {std::max(0.0, r.area.value - z * r.standard_error), std::min(1.0, r.area.value + z * r.standard_error)};
+    r.area.interval = {std::max(0.0, r.area.value - z * r.standard_error),
+                       std::min(1.0, r.area.value + z * r.standard_error)};
     if (r.area.value >= 1) r.area.interval = {wilson(std::min(m, n), std::min(m, n), level).lo, 1};
     if (r.area.value <= 0) r.area.interval = {0, wilson(0, std::min(m, n), level).hi};
   }
@@ -69,8 +70,10 @@ double crossing(const Normal& a, const Normal& b) {
   const double lo = std::min(a.mean, b.mean), hi = std::max(a.mean, b.mean);
   if (!(hi > lo)) return kUndefined;
   // (x - m)^2 / s^2 + 2 ln s alike, as a quadratic in x - (middle of the means), which does not cancel.
-  const double middle = (lo + hi) / 2, ma = a.mean - middle, mb = b.mean - middle, wa = 1 / (a.sd * a.sd), wb = 1 / (b.sd * b.sd);
-  const double two = wa - wb, one = -2 * (ma * wa - mb * wb), none = ma * ma * wa - mb * mb * wb + 2 * std::log(a.sd / b.sd);
+  const double middle = (lo + hi) / 2, ma = a.mean - middle, mb = b.mean - middle, wa = 1 / (a.sd * a.sd),
+               wb = 1 / (b.sd * b.sd);
+  const double two = wa - wb, one = -2 * (ma * wa - mb * wb),
+               none = ma * ma * wa - mb * mb * wb + 2 * std::log(a.sd / b.sd);
   const double under = one * one - 4 * two * none;
   if (under < 0) return kUndefined;
   const double q = -0.5 * (one + std::copysign(std::sqrt(under), one));
@@ -82,7 +85,8 @@ double crossing(const Normal& a, const Normal& b) {
 
 }  // namespace
 
-PassMark contrasting_groups(std::span<const double> competent, std::span<const double> others, const Resampling& resampling) {
+PassMark contrasting_groups(std::span<const double> competent, std::span<const double> others,
+                            const Resampling& resampling) {
   need_finite(competent, "the competent group");
   need_finite(others, "the other group");
   PassMark r;
@@ -95,7 +99,8 @@ PassMark contrasting_groups(std::span<const double> competent, std::span<const d
   r.competent_fail_fitted = normal_cdf(way * (mark - c.mean) / c.sd);
   r.other_pass_fitted = normal_cdf(way * (o.mean - mark) / o.sd);
   const auto share = [&](std::span<const double> values, bool passes) {
-    const auto n = std::count_if(values.begin(), values.end(), [&](double v) { return (way * (v - mark) >= 0) == passes; });
+    const auto n =
+        std::count_if(values.begin(), values.end(), [&](double v) { return (way * (v - mark) >= 0) == passes; });
     return static_cast<double>(n) / static_cast<double>(values.size());
   };
   r.competent_fail_counted = share(competent, false);
@@ -118,8 +123,11 @@ PassMark contrasting_groups(std::span<const double> competent, std::span<const d
 namespace {
 
 void need_power(const PowerSettings& s) {
-  if (s.sessions < 1 || !(s.icc >= 0 && s.icc <= 1) || !(s.alpha > 0 && s.alpha < 1) || s.draws < 100 || !std::isfinite(s.effect))
-    refuse("power needs a session a person, an icc from 0 to 1, alpha between 0 and 1, 100 draws and an effect that is a number");
+  if (s.sessions < 1 || !(s.icc >= 0 && s.icc <= 1) || !(s.alpha > 0 && s.alpha < 1) || s.draws < 100 ||
+      !std::isfinite(s.effect))
+    refuse(
+        "power needs a session a person, an icc from 0 to 1, alpha between 0 and 1, 100 draws and an effect that is a "
+        "number");
 }
 
 }  // namespace
@@ -127,7 +135,8 @@ void need_power(const PowerSettings& s) {
 Estimate power_two_groups(std::size_t n_a, std::size_t n_b, const PowerSettings& s) {
   need_power(s);
   if (n_a < 2 || n_b < 2) refuse("power is of groups of two at least");
-  // Means and variances of normal groups are drawn from their own distributions, so that large groups cost no more than small ones.
+  // Means and variances of normal groups are drawn from their own distributions, so that large groups cost no more than
+  // small ones.
   Random random(s.seed);
   const double v = s.icc + (1 - s.icc) / s.sessions, na = static_cast<double>(n_a), nb = static_cast<double>(n_b);
   int found = 0;
@@ -135,7 +144,8 @@ Estimate power_two_groups(std::size_t n_a, std::size_t n_b, const PowerSettings&
     const double noise = random.normal() * std::sqrt(v / na + v / nb);
     const double va = v * chi_squared_quantile(random.uniform(), na - 1) / (na - 1) / na;
     const double vb = v * chi_squared_quantile(random.uniform(), nb - 1) / (nb - 1) / nb;
-    const double t = (s.effect + noise) / std::sqrt(va + vb), df = (va + vb) * (va + vb) / (va * va / (na - 1) + vb * vb / (nb - 1));
+    const double t = (s.effect + noise) / std::sqrt(va + vb),
+                 df = (va + vb) * (va + vb) / (va * va / (na - 1) + vb * vb / (nb - 1));
     found += student_p(t, df) < s.alpha ? 1 : 0;
   }
   return {static_cast<double>(found) / s.draws, wilson(found, s.draws, 0.95)};

@@ -18,7 +18,8 @@ Places places_of(std::span<const double> x, Trend trend) {
   p.order.resize(x.size());
   std::iota(p.order.begin(), p.order.end(), std::size_t{0});
   const bool rising = trend == Trend::rising;
-  std::stable_sort(p.order.begin(), p.order.end(), [&](std::size_t i, std::size_t j) { return rising ? x[i] < x[j] : x[j] < x[i]; });
+  std::stable_sort(p.order.begin(), p.order.end(),
+                   [&](std::size_t i, std::size_t j) { return rising ? x[i] < x[j] : x[j] < x[i]; });
   for (std::size_t i = 0; i < p.order.size(); ++i) {
     if (i == 0 || x[p.order[i]] != x[p.order[i - 1]]) p.begin.push_back(i);
   }
@@ -54,7 +55,8 @@ double MonotoneCurve::at(double where) const {
   return y[above - 1] + share * (y[above] - y[above - 1]);
 }
 
-MonotoneCurve isotonic_mean(std::span<const double> x, std::span<const double> y, Trend trend, std::span<const double> weights) {
+MonotoneCurve isotonic_mean(std::span<const double> x, std::span<const double> y, Trend trend,
+                            std::span<const double> weights) {
   need_curve(x, y);
   if (!weights.empty()) {
     need_same_size(x.size(), weights.size());
@@ -96,8 +98,8 @@ MonotoneCurve isotonic_quantile(std::span<const double> x, std::span<const doubl
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
   std::vector<double> level(p.begin.size() - 1);
-  // Places from..to take values lo..hi. Whether a place is to lie at or below values[middle - 1] or above is a question of counting, and
-  // where the one ends and the other begins splits both.
+  // Places from..to take values lo..hi. Whether a place is to lie at or below values[middle - 1] or above is a question
+  // of counting, and where the one ends and the other begins splits both.
   struct Part {
     std::size_t from, to, lo, hi;
   };
@@ -107,8 +109,8 @@ MonotoneCurve isotonic_quantile(std::span<const double> x, std::span<const doubl
     parts.pop_back();
     if (part.from == part.to) continue;
     if (part.hi - part.lo == 1) {
-      std::fill(level.begin() + static_cast<std::ptrdiff_t>(part.from), level.begin() + static_cast<std::ptrdiff_t>(part.to),
-                values[part.lo]);
+      std::fill(level.begin() + static_cast<std::ptrdiff_t>(part.from),
+                level.begin() + static_cast<std::ptrdiff_t>(part.to), values[part.lo]);
       continue;
     }
     const std::size_t middle = (part.lo + part.hi) / 2;

@@ -47,7 +47,8 @@ Estimate FittedLine::at(double x) const {
   Estimate e;
   e.value = intercept + slope * x;
   if (!std::isfinite(residual_sd)) return e;
-  const double half = student_quantile(0.5 + level / 2, n - 2) * residual_sd * std::sqrt(1 / n + (x - mean_x) * (x - mean_x) / sum_xx);
+  const double half =
+      student_quantile(0.5 + level / 2, n - 2) * residual_sd * std::sqrt(1 / n + (x - mean_x) * (x - mean_x) / sum_xx);
   e.interval = {e.value - half, e.value + half};
   return e;
 }

@@ -21,7 +21,8 @@ void need_rate(double rate_hz) {
 double sparc(std::span<const double> speed, double rate_hz, const SparcSettings& s) {
   need_finite(speed, "the speed");
   need_rate(rate_hz);
-  if (!(s.cutoff_hz > 0) || !(s.threshold >= 0 && s.threshold <= 1)) refuse("SPARC's cutoff is above 0, its threshold from 0 to 1");
+  if (!(s.cutoff_hz > 0) || !(s.threshold >= 0 && s.threshold <= 1))
+    refuse("SPARC's cutoff is above 0, its threshold from 0 to 1");
   if (speed.size() < 2) return kUndefined;
   const std::size_t n = std::bit_ceil(speed.size()) << 4;
   std::vector<double> padded(n, 0.0);
@@ -69,7 +70,8 @@ std::vector<double> resample(std::span<const double> times_s, std::span<const do
   need_rate(rate_hz);
   if (times_s.empty()) return {};
   for (std::size_t i = 1; i < times_s.size(); ++i) {
-    if (!(times_s[i] > times_s[i - 1])) refuse("times to resample rise from each to the next; time " + std::to_string(i + 1) + " does not");
+    if (!(times_s[i] > times_s[i - 1]))
+      refuse("times to resample rise from each to the next; time " + std::to_string(i + 1) + " does not");
   }
   // A last sample that the rounding of a sum would lose is kept.
   const double span_s = times_s.back() - times_s.front(), steps = span_s * rate_hz;
@@ -94,7 +96,8 @@ std::vector<double> resample(std::span<const double> times_s, std::span<const do
 std::vector<double> low_pass(std::span<const double> values, double rate_hz, double corner_hz) {
   need_finite(values, "values to filter");
   need_rate(rate_hz);
-  if (!(corner_hz > 0 && corner_hz < rate_hz / 2)) refuse("the corner of a filter lies between 0 and half the rate of the samples");
+  if (!(corner_hz > 0 && corner_hz < rate_hz / 2))
+    refuse("the corner of a filter lies between 0 and half the rate of the samples");
   constexpr std::size_t kPad = 9;
   if (values.size() <= kPad) refuse("a filter needs ten samples at least");
   // The analogue prototype by the bilinear transform, bent so that the corner stays where it is.
@@ -128,9 +131,9 @@ std::vector<double> speed_of(std::span<const std::array<double, 3>> positions, d
   for (std::size_t i = 1; i < positions.size(); ++i) {
     need_finite(positions[i - 1], "a position");
     need_finite(positions[i], "a position");
-    speed.push_back(
-        std::hypot(positions[i][0] - positions[i - 1][0], positions[i][1] - positions[i - 1][1], positions[i][2] - positions[i - 1][2]) *
-        rate_hz);
+    speed.push_back(std::hypot(positions[i][0] - positions[i - 1][0], positions[i][1] - positions[i - 1][1],
+                               positions[i][2] - positions[i - 1][2]) *
+                    rate_hz);
   }
   return speed;
 }

@@ -15,8 +15,8 @@
 
 namespace osteo::statistics {
 
-WithinPeople permutation_within_people(std::span<const double> values, std::span<const int> person, std::span<const int> condition,
-                                       const PermutationSettings& settings) {
+WithinPeople permutation_within_people(std::span<const double> values, std::span<const int> person,
+                                       std::span<const int> condition, const PermutationSettings& settings) {
   need_same_size(values.size(), person.size());
   need_same_size(values.size(), condition.size());
   need_finite(values, "the values");
@@ -46,8 +46,8 @@ namespace {
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
-// All that the likelihood of a ratio of variances is made of. Sums inside people and of people's means are kept apart, so that nothing
-// cancels where the ratio is large.
+// All that the likelihood of a ratio of variances is made of. Sums inside people and of people's means are kept apart,
+// so that nothing cancels where the ratio is large.
 struct Model {
   Matrix x;
   Vector y;
@@ -129,8 +129,8 @@ struct Model {
 
 }  // namespace
 
-MixedModel mixed_model(std::span<const double> y, std::span<const double> design, std::size_t columns, std::span<const int> person,
-                       double level) {
+MixedModel mixed_model(std::span<const double> y, std::span<const double> design, std::size_t columns,
+                       std::span<const int> person, double level) {
   need_level(level);
   need_same_size(y.size(), person.size());
   need_same_size(y.size() * columns, design.size());
@@ -146,7 +146,9 @@ MixedModel mixed_model(std::span<const double> y, std::span<const double> design
   for (Eigen::Index i = 0; i < n; ++i) by_person[person[static_cast<std::size_t>(i)]].push_back(i);
   for (auto& [code, rows] : by_person) m.rows_of.push_back(std::move(rows));
   const auto people = static_cast<Eigen::Index>(m.rows_of.size());
-  if (n <= p) refuse("a mixed model of " + std::to_string(columns) + " coefficients needs more than " + std::to_string(y.size()) + " rows");
+  if (n <= p)
+    refuse("a mixed model of " + std::to_string(columns) + " coefficients needs more than " + std::to_string(y.size()) +
+           " rows");
   if (people == n) refuse("a mixed model needs people who come more than once");
   if (Eigen::ColPivHouseholderQR<Matrix>(m.x).rank() < p) refuse("columns of the mixed model depend on each other");
 

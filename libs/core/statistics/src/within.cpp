@@ -28,7 +28,8 @@ RepeatedAnova repeated_anova(std::span<const double> values, std::size_t conditi
   double ss_people = 0, ss_conditions = 0, ss_error = 0;
   for (const double m : of_person) ss_people += kd * (m - all) * (m - all);
   for (const double m : of_condition) ss_conditions += nd * (m - all) * (m - all);
-  // What is left of each value: its covariance over people is the one that sphericity is about, with rows and columns centred.
+  // What is left of each value: its covariance over people is the one that sphericity is about, with rows and columns
+  // centred.
   std::vector<double> left(values.size()), covariance(k * k, 0);
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t c = 0; c < k; ++c) {

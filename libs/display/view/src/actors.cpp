@@ -35,8 +35,8 @@ namespace {
 constexpr double kDrySpecular = 0.05, kDryPower = 20, kWetSpecular = 0.22, kWetPower = 70;
 constexpr double kWetDarker[3] = {0.19, 0.25, 0.33};  // of red, green, blue: water takes the white off the surface
 
-// VTK's own translucent pass loses the depth of what is opaque where the window's depth buffer has another format than the pass', and then
-// draws through bone; and without depth peeling it sorts nothing.
+// VTK's own translucent pass loses the depth of what is opaque where the window's depth buffer has another format than
+// the pass', and then draws through bone; and without depth peeling it sorts nothing.
 class LateActor : public vtkOpenGLActor {
  public:
   static LateActor* New();
@@ -123,7 +123,8 @@ vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape) {
   const auto ring = [&](double centre, double radius, double latitude) {
     for (int a = 0; a < kAround; ++a) {
       const double angle = 2 * std::numbers::pi * a / kAround;
-      const double n[3] = {std::cos(latitude) * std::cos(angle), std::cos(latitude) * std::sin(angle), std::sin(latitude)};
+      const double n[3] = {std::cos(latitude) * std::cos(angle), std::cos(latitude) * std::sin(angle),
+                           std::sin(latitude)};
       points->InsertNextPoint(radius * n[0], radius * n[1], centre + radius * n[2]);
       normals->InsertNextTuple(n);
     }
@@ -136,7 +137,8 @@ vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape) {
   };
   constexpr double kPole = std::numbers::pi / 2;
   for (int r = 0; r <= kRings; ++r) ring(shape.start_mm, shape.start_radius_mm, -kPole + (waist + kPole) * r / kRings);
-  for (int r = 0; r <= kRings; ++r) ring(shape.start_mm + shape.length_mm, shape.end_radius_mm, waist + (kPole - waist) * r / kRings);
+  for (int r = 0; r <= kRings; ++r)
+    ring(shape.start_mm + shape.length_mm, shape.end_radius_mm, waist + (kPole - waist) * r / kRings);
   auto data = vtkSmartPointer<vtkPolyData>::New();
   data->SetPoints(points);
   data->SetPolys(cells);
@@ -173,8 +175,8 @@ void set_depth(vtkRenderer* renderer, const PictureStyle& style) {
   renderer->SetUseSSAO(style.effects);
   renderer->SetUseFXAA(style.effects);
   if (!style.effects) return;
-  // VTK keeps places for it in half floats: from a microscope's eye, 250 mm away, in steps of 0.12 to 0.25 mm. What lies less than two of
-  // them deeper is not seen as deeper, or flat bone would be striped along its depths.
+  // VTK keeps places for it in half floats: from a microscope's eye, 250 mm away, in steps of 0.12 to 0.25 mm. What
+  // lies less than two of them deeper is not seen as deeper, or flat bone would be striped along its depths.
   const double step_mm = std::exp2(std::floor(std::log2(1.15 * renderer->GetActiveCamera()->GetDistance())) - 10);
   const double radius_mm = std::clamp(std::max(0.035 * seen_height_mm(renderer), 8 * step_mm), 0.5, 8.0);
   renderer->SetSSAORadius(radius_mm);
@@ -193,4 +195,4 @@ void look_at(vtkRenderer* renderer, Vec3 centre, double radius_mm, Vec3 eye) {
   renderer->ResetCameraClippingRange();
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

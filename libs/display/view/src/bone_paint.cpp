@@ -8,7 +8,8 @@ namespace {
 
 // Chosen by eye beside photographs of drilled temporal bones.
 constexpr Vec3 kIvory{0.95, 0.90, 0.81}, kMarrow{0.80, 0.60, 0.47};
-constexpr double kFadeMm = 0.8;  // bone this thick lets a third of the colour below through (a guess: what drilled bone looks like)
+constexpr double kFadeMm =
+    0.8;  // bone this thick lets a third of the colour below through (a guess: what drilled bone looks like)
 // Of Hardness, 1 being dense cortical bone: where marrow ends and ivory begins.
 constexpr double kSpongy = 0.22, kDense = 0.55;
 constexpr double kSpeckleMm = 0.45, kSpeckle = 0.16;
@@ -41,7 +42,8 @@ double speckle(Vec3 p) {
   }
   double sum = 0;
   for (int c = 0; c < 8; ++c) {
-    const double w = ((c & 1) != 0 ? f[0] : 1 - f[0]) * ((c >> 1 & 1) != 0 ? f[1] : 1 - f[1]) * ((c >> 2) != 0 ? f[2] : 1 - f[2]);
+    const double w =
+        ((c & 1) != 0 ? f[0] : 1 - f[0]) * ((c >> 1 & 1) != 0 ? f[1] : 1 - f[1]) * ((c >> 2) != 0 ? f[2] : 1 - f[2]);
     sum += w * lattice(n[0] + (c & 1), n[1] + (c >> 1 & 1), n[2] + (c >> 2));
   }
   return sum;
@@ -113,4 +115,4 @@ void BonePaint::paint(const BrickGrid& bone, const SurfacePatch& patch, std::vec
   }
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -30,11 +30,13 @@
 namespace osteo::inline display {
 namespace {
 
-// Of a temporal bone chunks of 32 voxels: an edit renews about 5,000 triangles. A head would have too many of them: 48 voxels, 500 chunks.
+// Of a temporal bone chunks of 32 voxels: an edit renews about 5,000 triangles. A head would have too many of them: 48
+// voxels, 500 chunks.
 constexpr int kChunkBricks = 4, kLargeChunkBricks = 6;
 constexpr std::size_t kLargeFromBricks = 12'000;
 
-// Chosen to be seen on ivory and by the colour-blind; below where nothing happens to bone, at the end what coagulates at once.
+// Chosen to be seen on ivory and by the colour-blind; below where nothing happens to bone, at the end what coagulates
+// at once.
 constexpr double kSeenFromC = 42, kRedFromC = 57;
 constexpr std::uint8_t kMostSteps = static_cast<std::uint8_t>(kRedFromC - kSeenFromC);
 
@@ -43,7 +45,8 @@ Rgb glowing(Rgb colour, std::uint8_t steps) {
   const Vec3 heat = Vec3{236, 170, 40} * (1 - share) + Vec3{200, 40, 20} * share;
   const double lit = static_cast<double>(std::max({colour[0], colour[1], colour[2]})) / 242;  // creases stay dark
   for (std::size_t c = 0; c < 3; ++c)
-    colour[c] = static_cast<std::uint8_t>(std::lround((1 - cover) * static_cast<double>(colour[c]) + cover * lit * heat[c]));
+    colour[c] =
+        static_cast<std::uint8_t>(std::lround((1 - cover) * static_cast<double>(colour[c]) + cover * lit * heat[c]));
   return colour;
 }
 
@@ -66,7 +69,8 @@ void BoneView::show(const LiveSurface& surface) {
   chunk_of_brick_.resize(surface.bone().brick_count());
   for (std::uint32_t b = 0; b < chunk_of_brick_.size(); ++b) {
     const Ijk o = surface.bone().brick_coordinate(b);
-    const auto [it, fresh] = index.try_emplace({o.k / edge, o.j / edge, o.i / edge}, static_cast<std::uint32_t>(chunks_.size()));
+    const auto [it, fresh] =
+        index.try_emplace({o.k / edge, o.j / edge, o.i / edge}, static_cast<std::uint32_t>(chunks_.size()));
     if (fresh) chunks_.emplace_back();
     chunks_[it->second].bricks.push_back(b);
     chunk_of_brick_[b] = it->second;
@@ -135,7 +139,9 @@ void BoneView::refresh(const LiveSurface& surface) {
     for (int k = o.k - bricks; k <= o.k + bricks; ++k)
       for (int j = o.j - bricks; j <= o.j + bricks; ++j)
         for (int i = o.i - bricks; i <= o.i + bricks; ++i)
-          if (const std::uint32_t n = bone.find_brick(i, j, k); n != BrickGrid::kNone && !surface.patch(n).vertices.empty()) near.insert(n);
+          if (const std::uint32_t n = bone.find_brick(i, j, k);
+              n != BrickGrid::kNone && !surface.patch(n).vertices.empty())
+            near.insert(n);
   };
   if (all_updated_) {
     for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
@@ -147,7 +153,8 @@ void BoneView::refresh(const LiveSurface& surface) {
     std::set<std::tuple<int, int, int>> places;
     for (const Vec3 at : updated_beside_mm_) {
       const Vec3 x = bone.frame().index_from_world(at);
-      places.insert({static_cast<int>(std::floor(x.x / 8)), static_cast<int>(std::floor(x.y / 8)), static_cast<int>(std::floor(x.z / 8))});
+      places.insert({static_cast<int>(std::floor(x.x / 8)), static_cast<int>(std::floor(x.y / 8)),
+                     static_cast<int>(std::floor(x.z / 8))});
     }
     double widest_mm = 0;
     for (const BoneView* const other : others_) widest_mm = std::max(widest_mm, 8 * other->voxel_mm_);
@@ -173,7 +180,8 @@ bool BoneView::wet_brick(const LiveSurface& surface, std::uint32_t brick) {
   for (std::size_t n = 0; n < patch.vertices.size(); ++n) {
     // A quarter of a voxel out of the bone: in the cell that the film lies in.
     const auto& v = patch.vertices[n];
-    const double share = film_->at(placed_(frame.world_from_index(from_floats(v.index) + from_floats(v.normal) * 0.25)));
+    const double share =
+        film_->at(placed_(frame.world_from_index(from_floats(v.index) + from_floats(v.normal) * 0.25)));
     if (share > 0 && now.empty()) now.assign(patch.vertices.size(), 0);
     if (!now.empty()) now[n] = static_cast<std::uint8_t>(std::lround(255 * std::min(1.0, share)));
   }
@@ -189,12 +197,14 @@ void BoneView::wet(const LiveSurface& surface) {
   std::set<std::uint32_t> touched;
   for (std::uint32_t b = 0; b < wet_.size(); ++b) {
     if (surface.patch(b).vertices.empty()) continue;
-    if ((moved || film_->changed_near(placed_(middle_mm(surface.bone(), b)))) && wet_brick(surface, b)) touched.insert(chunk_of_brick_[b]);
+    if ((moved || film_->changed_near(placed_(middle_mm(surface.bone(), b)))) && wet_brick(surface, b))
+      touched.insert(chunk_of_brick_[b]);
   }
   for (const std::uint32_t c : touched) recolour(chunks_[c]);
 }
 
-bool BoneView::warm_brick(const LiveSurface& surface, std::uint32_t brick, const std::function<double(Vec3)>& celsius_at) {
+bool BoneView::warm_brick(const LiveSurface& surface, std::uint32_t brick,
+                          const std::function<double(Vec3)>& celsius_at) {
   const SurfacePatch& patch = surface.patch(brick);
   const Frame& frame = surface.bone().frame();
   std::vector<std::uint8_t> now;
@@ -225,9 +235,11 @@ void BoneView::warm(const LiveSurface& surface, std::span<const std::pair<Vec3, 
   for (const std::uint32_t c : touched) recolour(chunks_[c]);
 }
 
-// Of a wet chunk the fourth byte says how dry a vertex is: what VTK takes for opacity, of which the shader makes another use.
+// Of a wet chunk the fourth byte says how dry a vertex is: what VTK takes for opacity, of which the shader makes
+// another use.
 void BoneView::set_colours(Chunk& chunk) {
-  const bool wet = std::any_of(chunk.bricks.begin(), chunk.bricks.end(), [&](std::uint32_t b) { return !wet_[b].empty(); });
+  const bool wet =
+      std::any_of(chunk.bricks.begin(), chunk.bricks.end(), [&](std::uint32_t b) { return !wet_[b].empty(); });
   std::size_t points = 0;
   for (const std::uint32_t b : chunk.bricks) points += colours_[b].size();
   vtkNew<vtkUnsignedCharArray> colours;
@@ -277,10 +289,10 @@ void BoneView::rebuild(Chunk& chunk, const LiveSurface& surface) {
   for (const std::uint32_t b : chunk.bricks) {
     const SurfacePatch& patch = surface.patch(b);
     for (const auto& v : patch.vertices) {
-      const Vec3 w =
-          frame.world_from_index({static_cast<double>(v.index[0]), static_cast<double>(v.index[1]), static_cast<double>(v.index[2])});
-      const Vec3 d =
-          frame.direction * Vec3{static_cast<double>(v.normal[0]), static_cast<double>(v.normal[1]), static_cast<double>(v.normal[2])};
+      const Vec3 w = frame.world_from_index(
+          {static_cast<double>(v.index[0]), static_cast<double>(v.index[1]), static_cast<double>(v.index[2])});
+      const Vec3 d = frame.direction * Vec3{static_cast<double>(v.normal[0]), static_cast<double>(v.normal[1]),
+                                            static_cast<double>(v.normal[2])};
       for (std::size_t a = 0; a < 3; ++a) {
         *p++ = static_cast<float>(w[a]);
         *n++ = static_cast<float>(d[a]);
@@ -328,7 +340,8 @@ void set_triangles(vtkPolyData* data, vtkTypeInt32Array* connectivity) {
 vtkSmartPointer<vtkTypeInt32Array> array_of(std::span<const std::uint32_t> triangles) {
   auto array = vtkSmartPointer<vtkTypeInt32Array>::New();
   array->SetNumberOfValues(static_cast<vtkIdType>(triangles.size()));
-  std::transform(triangles.begin(), triangles.end(), array->GetPointer(0), [](std::uint32_t v) { return static_cast<int>(v); });
+  std::transform(triangles.begin(), triangles.end(), array->GetPointer(0),
+                 [](std::uint32_t v) { return static_cast<int>(v); });
   return array;
 }
 
@@ -393,21 +406,22 @@ std::size_t BoneView::drawn_triangles() const {
   return total;
 }
 
-std::vector<std::uint32_t> coarse_triangles(std::span<const float> points_mm, std::span<const int> triangles, double error_mm) {
+std::vector<std::uint32_t> coarse_triangles(std::span<const float> points_mm, std::span<const int> triangles,
+                                            double error_mm) {
   if (triangles.empty()) return {};
   const std::size_t points = points_mm.size() / 3;
   std::vector<std::uint32_t> whole(triangles.begin(), triangles.end()), joined(whole.size()), coarse(whole.size());
   // Bricks have points of their own along their common face.
-  meshopt_generateShadowIndexBuffer(joined.data(), whole.data(), whole.size(), points_mm.data(), points, 3 * sizeof(float),
-                                    3 * sizeof(float));
+  meshopt_generateShadowIndexBuffer(joined.data(), whole.data(), whole.size(), points_mm.data(), points,
+                                    3 * sizeof(float), 3 * sizeof(float));
   const float scale = meshopt_simplifyScale(points_mm.data(), points, 3 * sizeof(float));
-  const std::size_t kept =
-      meshopt_simplify(coarse.data(), joined.data(), joined.size(), points_mm.data(), points, 3 * sizeof(float), whole.size() / 12 * 3,
-                       static_cast<float>(error_mm) / std::max(scale, 1e-6F), meshopt_SimplifyLockBorder, nullptr);
+  const std::size_t kept = meshopt_simplify(
+      coarse.data(), joined.data(), joined.size(), points_mm.data(), points, 3 * sizeof(float), whole.size() / 12 * 3,
+      static_cast<float>(error_mm) / std::max(scale, 1e-6F), meshopt_SimplifyLockBorder, nullptr);
   coarse.resize(kept);
   std::vector<std::uint32_t> order(kept);
   meshopt_optimizeVertexCache(order.data(), coarse.data(), kept, points);
   return order;
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -65,4 +65,4 @@ std::uint64_t scene_stamp(vtkRenderer* renderer) {
   return stamp.value();
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

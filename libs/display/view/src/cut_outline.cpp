@@ -20,7 +20,8 @@ std::vector<CutLine> section_of(const TriMesh& mesh, Vec3 through, Vec3 normal) 
   std::vector<std::array<std::uint32_t, 2>> more;  // a third segment and on, where the mesh is no manifold
   const auto point_on = [&](std::uint32_t a, std::uint32_t b) {
     if (a > b) std::swap(a, b);
-    const auto [it, is_new] = point_of_edge.try_emplace(std::uint64_t{a} << 32 | b, static_cast<std::uint32_t>(points.size()));
+    const auto [it, is_new] =
+        point_of_edge.try_emplace(std::uint64_t{a} << 32 | b, static_cast<std::uint32_t>(points.size()));
     if (is_new) {
       const Vec3 p = from_floats(mesh.points_mm[a]), q = from_floats(mesh.points_mm[b]);
       points.push_back(p + (q - p) * (above[a] / (above[a] - above[b])));
@@ -68,8 +69,8 @@ std::vector<CutLine> section_of(const TriMesh& mesh, Vec3 through, Vec3 normal) 
 }
 
 CutLine section_of(const RoundCone& shape, Vec3 at, Vec3 axis, Vec3 through, Vec3 normal) {
-  // A cut of a round convex body is convex, and the same on both sides of the axis as seen along the normal: a line u along it, half widths
-  // v beside it.
+  // A cut of a round convex body is convex, and the same on both sides of the axis as seen along the normal: a line u
+  // along it, half widths v beside it.
   const Vec3 flat = axis - normal * dot(axis, normal);
   const Vec3 u = length(flat) > 1e-9 ? normalized(flat) : any_perpendicular(normal), v = cross(normal, u);
   const Vec3 base = at - normal * dot(at - through, normal);
@@ -111,4 +112,4 @@ CutLine section_of(const RoundCone& shape, Vec3 at, Vec3 axis, Vec3 through, Vec
   return line;
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

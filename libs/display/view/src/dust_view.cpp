@@ -103,12 +103,14 @@ struct DustView::Impl {
       Chance chance(std::lround(x.x), std::lround(x.y), std::lround(x.z));
       if (kept < 1 && chance.next() > kept) return;
       const int count = std::clamp(static_cast<int>(full * each + static_cast<double>(chance.next())), 1, each);
-      const auto mean = static_cast<float>(0.5 * cell_mm * std::cbrt(std::min(full, 1.5) / count / static_cast<double>(kept)));
+      const auto mean =
+          static_cast<float>(0.5 * cell_mm * std::cbrt(std::min(full, 1.5) / count / static_cast<double>(kept)));
       for (int g = 0; g < count; ++g) {
         // Even over the cell's own width: sums over all cells are even too.
         const auto aside = [&] { return static_cast<double>(chance.next()) - 0.5; };
         const Vec3 at = frame.world_from_index(x + Vec3{aside(), aside(), aside()});
-        const float size = 0.55F + 0.75F * chance.next() * chance.next() + 0.2F * chance.next(), shade = 0.86F + 0.2F * chance.next();
+        const float size = 0.55F + 0.75F * chance.next() * chance.next() + 0.2F * chance.next(),
+                    shade = 0.86F + 0.2F * chance.next();
         grains.add(at, mean * size, 0.90F * shade, 0.84F * shade, (0.70F + 0.06F * chance.next()) * shade);
       }
     });
@@ -172,7 +174,8 @@ DustView::DustView(vtkRenderer* renderer, double cell_mm) : impl_(std::make_uniq
 }
 
 DustView::~DustView() {
-  for (vtkActor* const a : {impl_->grains.actor.Get(), impl_->drops.actor.Get(), impl_->water.Get()}) impl_->renderer->RemoveActor(a);
+  for (vtkActor* const a : {impl_->grains.actor.Get(), impl_->drops.actor.Get(), impl_->water.Get()})
+    impl_->renderer->RemoveActor(a);
 }
 
 void DustView::update(const Dust& dust) {
@@ -184,4 +187,4 @@ void DustView::update(const Dust& dust) {
   m.show_water(dust);
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

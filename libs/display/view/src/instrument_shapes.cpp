@@ -25,7 +25,8 @@ constexpr double kTurn = 2 * std::numbers::pi;
 struct Colour {
   double r, g, b;
 };
-constexpr Colour kSteel{0.66, 0.69, 0.74}, kDarkSteel{0.36, 0.38, 0.42}, kTouches{0.95, 0.45, 0.12}, kHandpiece{0.45, 0.48, 0.53};
+constexpr Colour kSteel{0.66, 0.69, 0.74}, kDarkSteel{0.36, 0.38, 0.42}, kTouches{0.95, 0.45, 0.12},
+    kHandpiece{0.45, 0.48, 0.53};
 
 Colour mix(Colour a, Colour b, double t) {
   return {a.r + (b.r - a.r) * t, a.g + (b.g - a.g) * t, a.b + (b.b - a.b) * t};
@@ -55,7 +56,11 @@ class Rings {
   }
   // Around the z axis.
   void circle(double z, double radius, Colour c) {
-    ring([&](double angle) { return Vec3{radius * std::cos(angle), radius * std::sin(angle), z}; }, [&](double) { return c; });
+    ring(
+        [&](double angle) {
+          return Vec3{radius * std::cos(angle), radius * std::sin(angle), z};
+        },
+        [&](double) { return c; });
   }
   [[nodiscard]] vtkSmartPointer<vtkPolyData> done(double feature_deg) {
     vtkNew<vtkPolyData> raw;
@@ -91,7 +96,8 @@ std::vector<Place> profile(const RoundCone& shape, int rings) {
   constexpr double kPole = std::numbers::pi / 2;
   for (int r = 0; r <= rings; ++r) {
     const double latitude = -kPole + (waist + kPole) * r / rings;
-    all.push_back({shape.start_mm + shape.start_radius_mm * std::sin(latitude), shape.start_radius_mm * std::cos(latitude), 0});
+    all.push_back(
+        {shape.start_mm + shape.start_radius_mm * std::sin(latitude), shape.start_radius_mm * std::cos(latitude), 0});
   }
   const int side = shape.length_mm > 0 ? 8 : 0;
   const Place last = all.back();
@@ -119,8 +125,8 @@ double grain(int a, int r) {
   return (x & 0xffffU) / 65535.0;
 }
 
-// A flat blade, toothed at one edge: as thick as what is felt; as wide as blades are, which is not felt. Its flat lies across x; which way
-// it is turned about its own axis the hand does not tell.
+// A flat blade, toothed at one edge: as thick as what is felt; as wide as blades are, which is not felt. Its flat lies
+// across x; which way it is turned about its own axis the hand does not tell.
 void blade(Rings& rings, const RoundCone& head) {
   const double thick = head.start_radius_mm, end = head.length_mm + head.end_radius_mm;
   constexpr Colour kTooth{0.86, 0.87, 0.88};
@@ -162,7 +168,9 @@ vtkSmartPointer<vtkPolyData> burr_surface(const Burr& burr, double sharp) {
       const double x = angle / kTurn * flutes + p.along * kTwist * flutes, t = x - std::floor(x);
       return t < 0.7 ? t / 0.7 : (1 - t) / 0.3;
     };
-    const auto speck = [&](double angle) { return grain(static_cast<int>(std::lround(angle / kTurn * around)), static_cast<int>(n)); };
+    const auto speck = [&](double angle) {
+      return grain(static_cast<int>(std::lround(angle / kTurn * around)), static_cast<int>(n));
+    };
     rings.ring(
         [&](double angle) {
           const double cut = flutes > 0 ? kDepth * groove(angle) : 0.05 * speck(angle);
@@ -195,12 +203,15 @@ vtkSmartPointer<vtkPolyData> tip_surface(const Instrument& i) {
     const double rod = 0.3 * r;
     rings.lift();
     for (int n = 0; n <= 14; ++n) {
-      const double t = static_cast<double>(n) / 14, bend = std::numbers::pi / 2 * std::max(0.0, 1 - t * 1.4), b = r - rod;
+      const double t = static_cast<double>(n) / 14, bend = std::numbers::pi / 2 * std::max(0.0, 1 - t * 1.4),
+                   b = r - rod;
       const Vec3 middle{b * std::sin(bend), 0, b - b * std::cos(bend) - (r - rod) + t * 0.9 * r};
-      const Vec3 along = normalized({-std::cos(bend), 0, std::max(0.05, 1 - std::sin(bend))}), side{0, 1, 0}, up = cross(along, side);
+      const Vec3 along = normalized({-std::cos(bend), 0, std::max(0.05, 1 - std::sin(bend))}), side{0, 1, 0},
+                 up = cross(along, side);
       const double thick = n == 0 ? 0.02 : rod * std::min(1.0, 0.35 + 2 * t);
-      rings.ring([&](double angle) { return middle + up * (thick * std::cos(angle)) + side * (thick * std::sin(angle)); },
-                 [&](double) { return kSteel; });
+      rings.ring(
+          [&](double angle) { return middle + up * (thick * std::cos(angle)) + side * (thick * std::sin(angle)); },
+          [&](double) { return kSteel; });
     }
     rings.circle(begin, shaft.start_radius_mm, kSteel);
   } else {
@@ -230,14 +241,18 @@ ShaftSurface shaft_surface(const Instrument& i, const std::function<bool(Vec3)>&
   Rings rings(32);
   for (int n = 0; n <= steps; ++n) {
     double near = 0;
-    for (int m = std::max(0, n - 2); m <= std::min(steps, n + 2); ++m) near = std::max(near, share[static_cast<std::size_t>(m)]);
+    for (int m = std::max(0, n - 2); m <= std::min(steps, n + 2); ++m)
+      near = std::max(near, share[static_cast<std::size_t>(m)]);
     out.in_bone += share[static_cast<std::size_t>(n)] > 0 ? 1.0 / (steps + 1) : 0;
     if (share[static_cast<std::size_t>(n)] > 0.9) {
       rings.lift();
       continue;
     }
     const double z = begin + (end - begin) * n / steps;
-    rings.circle(z, r, near > 0 ? kTouches : i.kind == InstrumentKind::irrigator ? mix(kSteel, {0.45, 0.62, 0.85}, 0.5) : kSteel);
+    rings.circle(z, r,
+                 near > 0                              ? kTouches
+                 : i.kind == InstrumentKind::irrigator ? mix(kSteel, {0.45, 0.62, 0.85}, 0.5)
+                                                       : kSteel);
   }
   if (i.cutter() != nullptr) {
     // The collet and the handpiece behind it: not felt.
@@ -250,11 +265,20 @@ ShaftSurface shaft_surface(const Instrument& i, const std::function<bool(Vec3)>&
                                             {26, 6.4, 2},
                                             {kBackMm, 7.0, 1},
                                             {kBackMm, 0.1, 1}})
-      rings.circle(end + z, radius, colour == 0 ? kDarkSteel : colour == 2 ? mix(kHandpiece, kDarkSteel, 0.5) : kHandpiece);
+      rings.circle(end + z, radius,
+                   colour == 0   ? kDarkSteel
+                   : colour == 2 ? mix(kHandpiece, kDarkSteel, 0.5)
+                                 : kHandpiece);
   } else if (i.kind == InstrumentKind::sucker || i.kind == InstrumentKind::irrigator) {
     // A finger's plate, the bend, and where the hose sits.
-    for (const auto& [z, radius] :
-         {std::pair{0.0, r}, {1.0, 3.2}, {9.0, 3.8}, {10.0, r + 0.6}, {32.0, r + 0.6}, {33.0, r + 1.4}, {42.0, r + 1.4}, {42.0, 0.1}}) {
+    for (const auto& [z, radius] : {std::pair{0.0, r},
+                                    {1.0, 3.2},
+                                    {9.0, 3.8},
+                                    {10.0, r + 0.6},
+                                    {32.0, r + 0.6},
+                                    {33.0, r + 1.4},
+                                    {42.0, r + 1.4},
+                                    {42.0, 0.1}}) {
       rings.ring(
           [&](double angle) {
             const double flat = radius > 3 && z < 10 ? 0.35 : 1, bent = 0.35 * std::max(0.0, z - 10);
@@ -270,4 +294,4 @@ ShaftSurface shaft_surface(const Instrument& i, const std::function<bool(Vec3)>&
   return out;
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

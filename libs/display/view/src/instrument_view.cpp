@@ -27,8 +27,9 @@ void BurrSpin::turn(double speed_rpm, double seconds, int flutes) {
 }
 
 bool is_bone(const World& world, Vec3 at_mm) {
-  return std::any_of(world.bodies().begin(), world.bodies().end(),
-                     [&](const PlacedBody& placed) { return placed.body->bone.nearest(placed.world_from_body.inverse()(at_mm)) >= 0.5F; });
+  return std::any_of(world.bodies().begin(), world.bodies().end(), [&](const PlacedBody& placed) {
+    return placed.body->bone.nearest(placed.world_from_body.inverse()(at_mm)) >= 0.5F;
+  });
 }
 
 struct InstrumentView::Impl {
@@ -90,7 +91,8 @@ void InstrumentView::tell_apart(Vec3 colour, double opacity) {
   for (Impl::Part* const p : {&impl_->head, &impl_->shaft}) p->actor->GetProperty()->SetOpacity(opacity);
 }
 
-void InstrumentView::show(const TickRecord& tick, double rate_hz, const std::function<bool(Vec3)>& solid, const CuttingGuide& guide) {
+void InstrumentView::show(const TickRecord& tick, double rate_hz, const std::function<bool(Vec3)>& solid,
+                          const CuttingGuide& guide) {
   Impl& m = *impl_;
   if ((tick.flags & kPlateInHand) != 0) return hide();
   if (m.tool != tick.device.tool) m.choose(tick.device.tool);
@@ -135,4 +137,4 @@ bool InstrumentView::ghost_shown() const {
   return impl_->ghost.actor->GetVisibility() != 0;
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -44,7 +44,8 @@ bool stands(const Field& f, const BrickGrid& bone, Ijk at, Vec3 step) {
   const Vec3 from{double(at.i), double(at.j), double(at.k)};
   for (int n = 1;; ++n) {
     const Vec3 p = from + step * n;
-    const Ijk c{static_cast<int>(std::lround(p.x)), static_cast<int>(std::lround(p.y)), static_cast<int>(std::lround(p.z))};
+    const Ijk c{static_cast<int>(std::lround(p.x)), static_cast<int>(std::lround(p.y)),
+                static_cast<int>(std::lround(p.z))};
     if (is_bone(c)) return true;
     if (!(f.grid.at(c.i, c.j, c.k) >= 0.5F)) return false;  // air, or beyond what is stored
   }
@@ -57,7 +58,9 @@ Field field_of(const Dust& dust) {
     Cell cell;
   };
   std::vector<Wet> wet;
-  dust.visit_liquid([&](Ijk at, double full, double solid) { wet.push_back({at, {static_cast<float>(full), static_cast<float>(solid)}}); });
+  dust.visit_liquid([&](Ijk at, double full, double solid) {
+    wet.push_back({at, {static_cast<float>(full), static_cast<float>(solid)}});
+  });
   Field f;
   if (wet.empty()) return f;
   Ijk lo = wet.front().at, hi = lo;
@@ -69,9 +72,11 @@ Field field_of(const Dust& dust) {
   hi = {(hi.i >> 3) + 1, (hi.j >> 3) + 1, (hi.k >> 3) + 1};
   f.shift = {lo.i * 8, lo.j * 8, lo.k * 8};
   const std::array<int, 3> n{hi.i - lo.i + 1, hi.j - lo.j + 1, hi.k - lo.k + 1};
-  std::vector<std::uint8_t> stored(static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(n[2]));
+  std::vector<std::uint8_t> stored(static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1]) *
+                                   static_cast<std::size_t>(n[2]));
   const auto place = [&](int i, int j, int k) {
-    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(n[1]) + static_cast<std::size_t>(j)) * static_cast<std::size_t>(n[0]) +
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(n[1]) + static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(n[0]) +
            static_cast<std::size_t>(i);
   };
   for (const Wet& w : wet) stored[place((w.at.i >> 3) - lo.i, (w.at.j >> 3) - lo.j, (w.at.k >> 3) - lo.k)] = 2;
@@ -82,7 +87,8 @@ Field field_of(const Dust& dust) {
         bool near = false;
         for (int z = std::max(0, k - 1); z <= std::min(n[2] - 1, k + 1) && !near; ++z)
           for (int y = std::max(0, j - 1); y <= std::min(n[1] - 1, j + 1) && !near; ++y)
-            for (int x = std::max(0, i - 1); x <= std::min(n[0] - 1, i + 1) && !near; ++x) near = stored[place(x, y, z)] == 2;
+            for (int x = std::max(0, i - 1); x <= std::min(n[0] - 1, i + 1) && !near; ++x)
+              near = stored[place(x, y, z)] == 2;
         if (near) bricks.push_back({i, j, k});
       }
   Frame frame = bone.frame();
@@ -95,7 +101,8 @@ Field field_of(const Dust& dust) {
     if (stored[place(at.i, at.j, at.k)] == 2) f.wet.push_back(b);
     const std::uint32_t of_bone = bone.find_brick(at.i + lo.i, at.j + lo.j, at.k + lo.k);
     if (of_bone == BrickGrid::kNone) continue;
-    for (VoxelKey v = 0; v < BrickGrid::kVoxels; ++v) f.grid.set(b * BrickGrid::kVoxels + v, bone.value(of_bone * BrickGrid::kVoxels + v));
+    for (VoxelKey v = 0; v < BrickGrid::kVoxels; ++v)
+      f.grid.set(b * BrickGrid::kVoxels + v, bone.value(of_bone * BrickGrid::kVoxels + v));
   }
   for (const Wet& w : wet) {
     const VoxelKey v = f.grid.find(w.at.i - f.shift.i, w.at.j - f.shift.j, w.at.k - f.shift.k);
@@ -106,7 +113,8 @@ Field field_of(const Dust& dust) {
   const double most = std::max({std::abs(down.x), std::abs(down.y), std::abs(down.z)});
   for (const Wet& w : wet) {
     const Ijk at{w.at.i - f.shift.i, w.at.j - f.shift.j, w.at.k - f.shift.k};
-    if (w.cell.full >= kLeastDrop && !(most > 0 && stands(f, bone, at, down / most))) f.falling.push_back(f.grid.find(at.i, at.j, at.k));
+    if (w.cell.full >= kLeastDrop && !(most > 0 && stands(f, bone, at, down / most)))
+      f.falling.push_back(f.grid.find(at.i, at.j, at.k));
   }
   for (const VoxelKey v : f.falling) f.grid.set(v, std::max(0.0F, f.grid.value(v) - f.cells[v].full));
   return f;
@@ -146,7 +154,8 @@ LiquidSurface liquid_surface(const Dust& dust) {
     }
     for (const auto& t : patch.triangles) {
       const std::array<std::uint32_t, 3> of{name[t[0]], name[t[1]], name[t[2]]};
-      if (std::any_of(of.begin(), of.end(), [&](std::uint32_t p) { return out.rgba[p][3] > 2; })) out.triangles.push_back(of);
+      if (std::any_of(of.begin(), of.end(), [&](std::uint32_t p) { return out.rgba[p][3] > 2; }))
+        out.triangles.push_back(of);
     }
   }
   for (int ring = 0; ring < 3; ++ring) {
@@ -171,11 +180,13 @@ LiquidSurface liquid_surface(const Dust& dust) {
     const double radius = frame.spacing_mm.x * 0.62 * std::cbrt(static_cast<double>(c.full) / count);
     for (int n = 0; n < count; ++n) {
       const auto aside = [&] { return LiquidSurface::kSpread * (static_cast<double>(chance.next()) - 0.5); };
-      const Vec3 p = frame.world_from_index(Vec3{double(at.i), double(at.j), double(at.k)} + Vec3{aside(), aside(), aside()});
-      out.drops.push_back({to_floats(p), static_cast<float>(radius) * (0.8F + 0.4F * chance.next()), std::min(1.0F, c.solid / 0.12F)});
+      const Vec3 p =
+          frame.world_from_index(Vec3{double(at.i), double(at.j), double(at.k)} + Vec3{aside(), aside(), aside()});
+      out.drops.push_back(
+          {to_floats(p), static_cast<float>(radius) * (0.8F + 0.4F * chance.next()), std::min(1.0F, c.solid / 0.12F)});
     }
   }
   return out;
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -14,7 +14,9 @@ struct Even {
   Vec3 first, across, down;
   template <class F>
   Even(const SliceView& view, F&& coordinates)
-      : first(coordinates(view.world(0, 0))), across(coordinates(view.world(1, 0)) - first), down(coordinates(view.world(0, 1)) - first) {}
+      : first(coordinates(view.world(0, 0))),
+        across(coordinates(view.world(1, 0)) - first),
+        down(coordinates(view.world(0, 1)) - first) {}
   [[nodiscard]] Vec3 at(int x, int y) const { return first + across * x + down * y; }
 };
 
@@ -71,12 +73,14 @@ void draw_live_cut(const SliceView& view, const LiveCut& cut, std::vector<std::u
   }
   const Even ct_here(view, ct_index);
   std::vector<Even> before;
-  for (const GridSampler* const b : cut.before) before.emplace_back(view, [&](Vec3 w) { return b->frame().index_from_world(w); });
+  for (const GridSampler* const b : cut.before)
+    before.emplace_back(view, [&](Vec3 w) { return b->frame().index_from_world(w); });
   const auto density_before = [&](int x, int y) {
     for (std::size_t b = 0; b < before.size(); ++b) {
       const Vec3 at = before[b].at(x, y);
       const auto& dims = cut.before[b]->frame().dims;
-      if (at.x >= -0.5 && at.y >= -0.5 && at.z >= -0.5 && at.x < dims[0] - 0.5 && at.y < dims[1] - 0.5 && at.z < dims[2] - 0.5)
+      if (at.x >= -0.5 && at.y >= -0.5 && at.z >= -0.5 && at.x < dims[0] - 0.5 && at.y < dims[1] - 0.5 &&
+          at.z < dims[2] - 0.5)
         return cut.before[b]->linear_at(at);
     }
     return 0.0F;
@@ -112,4 +116,4 @@ void draw_live_cut(const SliceView& view, const LiveCut& cut, std::vector<std::u
   }
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -20,16 +20,19 @@ struct OffscreenWindow::Impl {
 
 OffscreenWindow::OffscreenWindow(int width, int height) : impl_(std::make_unique<Impl>()) {
   const auto fail = [](const char* what) {
-    return Error(ExitCode::failed, std::string("cannot draw: ") + what, "install Mesa's software OpenGL (libegl1, libgl1-mesa-dri)");
+    return Error(ExitCode::failed, std::string("cannot draw: ") + what,
+                 "install Mesa's software OpenGL (libegl1, libgl1-mesa-dri)");
   };
-  const auto get_display = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(eglGetProcAddress("eglGetPlatformDisplayEXT"));
+  const auto get_display =
+      reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(eglGetProcAddress("eglGetPlatformDisplayEXT"));
   if (get_display != nullptr) impl_->display = get_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
   if (impl_->display == EGL_NO_DISPLAY) impl_->display = eglGetDisplay(EGL_DEFAULT_DISPLAY);
   if (impl_->display == EGL_NO_DISPLAY || eglInitialize(impl_->display, nullptr, nullptr) == EGL_FALSE)
     throw fail("there is no EGL display");
   eglBindAPI(EGL_OPENGL_API);
-  const EGLint config_wish[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_RED_SIZE, 8, EGL_DEPTH_SIZE, 24,
-                                EGL_NONE};
+  const EGLint config_wish[] = {
+      EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_RED_SIZE, 8, EGL_DEPTH_SIZE, 24,
+      EGL_NONE};
   EGLConfig config = nullptr;
   EGLint count = 0;
   eglChooseConfig(impl_->display, config_wish, &config, 1, &count);
@@ -100,4 +103,4 @@ Picture grab(vtkGenericOpenGLRenderWindow* window) {
   return picture;
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -38,7 +38,8 @@ Openness::Openness(const BrickGrid& bone, int threads) : frame_(bone.frame()) {
     Level& level = levels_[l];
     level.edge_voxels = edge_ << l;
     for (std::size_t a = 0; a < 3; ++a) level.n[a] = static_cast<int>(std::ceil((most[a] + 1) * 8 / level.edge_voxels));
-    level.cells.assign(static_cast<std::size_t>(level.n[0]) * static_cast<std::size_t>(level.n[1]) * static_cast<std::size_t>(level.n[2]),
+    level.cells.assign(static_cast<std::size_t>(level.n[0]) * static_cast<std::size_t>(level.n[1]) *
+                           static_cast<std::size_t>(level.n[2]),
                        0);
   }
   parallel_for(bone.brick_count(), 256, threads, [&](std::size_t begin, std::size_t end) {
@@ -52,7 +53,8 @@ void Openness::sum_brick(const BrickGrid& bone, std::uint32_t brick) {
   std::array<float, 512> sums{};
   const VoxelKey first = brick * static_cast<VoxelKey>(BrickGrid::kVoxels);
   for (std::uint32_t v = 0; v < BrickGrid::kVoxels; ++v) {
-    const int i = static_cast<int>(v & 7) / edge_, j = static_cast<int>(v >> 3 & 7) / edge_, k = static_cast<int>(v >> 6) / edge_;
+    const int i = static_cast<int>(v & 7) / edge_, j = static_cast<int>(v >> 3 & 7) / edge_,
+              k = static_cast<int>(v >> 6) / edge_;
     sums[static_cast<std::size_t>((k * m + j) * m + i)] += bone.value(first + v);
   }
   const float share = 255.0F / static_cast<float>(edge_ * edge_ * edge_);
@@ -61,10 +63,12 @@ void Openness::sum_brick(const BrickGrid& bone, std::uint32_t brick) {
   for (int k = 0; k < m; ++k)
     for (int j = 0; j < m; ++j)
       for (int i = 0; i < m; ++i)
-        level.cells[(static_cast<std::size_t>(o.k * m + k) * static_cast<std::size_t>(level.n[1]) + static_cast<std::size_t>(o.j * m + j)) *
+        level.cells[(static_cast<std::size_t>(o.k * m + k) * static_cast<std::size_t>(level.n[1]) +
+                     static_cast<std::size_t>(o.j * m + j)) *
                         static_cast<std::size_t>(level.n[0]) +
                     static_cast<std::size_t>(o.i * m + i)] =
-            static_cast<std::uint8_t>(std::clamp(sums[static_cast<std::size_t>((k * m + j) * m + i)] * share + 0.5F, 0.0F, 255.0F));
+            static_cast<std::uint8_t>(
+                std::clamp(sums[static_cast<std::size_t>((k * m + j) * m + i)] * share + 0.5F, 0.0F, 255.0F));
 }
 
 // Cells [lo, hi) of a level from the eight below each.
@@ -118,10 +122,13 @@ double Openness::sample(const Level& level, Vec3 index) {
   for (int c = 0; c < 8; ++c) {
     const int i = n[0] + (c & 1), j = n[1] + (c >> 1 & 1), k = n[2] + (c >> 2);
     if (i < 0 || j < 0 || k < 0 || i >= level.n[0] || j >= level.n[1] || k >= level.n[2]) continue;
-    const double w = ((c & 1) != 0 ? f[0] : 1 - f[0]) * ((c >> 1 & 1) != 0 ? f[1] : 1 - f[1]) * ((c >> 2) != 0 ? f[2] : 1 - f[2]);
-    sum += w * level.cells[(static_cast<std::size_t>(k) * static_cast<std::size_t>(level.n[1]) + static_cast<std::size_t>(j)) *
-                               static_cast<std::size_t>(level.n[0]) +
-                           static_cast<std::size_t>(i)];
+    const double w =
+        ((c & 1) != 0 ? f[0] : 1 - f[0]) * ((c >> 1 & 1) != 0 ? f[1] : 1 - f[1]) * ((c >> 2) != 0 ? f[2] : 1 - f[2]);
+    sum +=
+        w *
+        level.cells[(static_cast<std::size_t>(k) * static_cast<std::size_t>(level.n[1]) + static_cast<std::size_t>(j)) *
+                        static_cast<std::size_t>(level.n[0]) +
+                    static_cast<std::size_t>(i)];
   }
   return sum / 255;
 }
@@ -163,4 +170,4 @@ double Openness::at(const std::array<float, 3>& index, const std::array<float, 3
   return std::pow(std::min(1.0, kSlack * open), kBlocked);
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

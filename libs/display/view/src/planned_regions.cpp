@@ -12,10 +12,10 @@
 #include <cmath>
 
 #include "osteo/core/base/parallel.h"
-#include "osteo/imaging/io/vtk_data.h"
-#include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/structures_view.h"
+#include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo::inline display {
 
@@ -57,18 +57,21 @@ TriMesh offset_surface(const StructureMap& map, std::size_t number, double withi
         static_cast<void>(map.clearance({0, 0, 0, 0}, p, {0, 0, 1}, each));
         // As if it were density: half at the surface, falling by a quarter a voxel.
         const double d = each[number];
-        if (d < map.reach_mm()) field.set(key, static_cast<float>(std::clamp(0.5 + (within_mm - d) / (4 * h), 0.0, 1.0)));
+        if (d < map.reach_mm())
+          field.set(key, static_cast<float>(std::clamp(0.5 + (within_mm - d) / (4 * h), 0.0, 1.0)));
       }
     }
   });
   return smooth_surface(surface_nets(field, 0.5F, context).mesh, h / 4);
 }
 
-RegionsView::RegionsView(vtkRenderer* renderer, const StructureMap& map, const std::vector<PlannedRegion>& regions, const Context& context)
+RegionsView::RegionsView(vtkRenderer* renderer, const StructureMap& map, const std::vector<PlannedRegion>& regions,
+                         const Context& context)
     : renderer_(renderer) {
   for (const PlannedRegion& r : regions) {
     const auto& values = map.values();
-    const auto at = std::find_if(values.begin(), values.end(), [&](std::uint8_t v) { return map.name_of(v) == r.structure; });
+    const auto at =
+        std::find_if(values.begin(), values.end(), [&](std::uint8_t v) { return map.name_of(v) == r.structure; });
     if (at == values.end()) {
       missing_.push_back(r.name);
       continue;
@@ -107,4 +110,4 @@ void RegionsView::show(bool on) {
   for (const One& one : all_) one.actor->SetVisibility(on ? 1 : 0);
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

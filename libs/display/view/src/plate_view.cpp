@@ -20,11 +20,11 @@
 #include <numbers>
 #include <optional>
 
-#include "osteo/simulation/bone/plate_fit.h"
-#include "osteo/simulation/bone/world_mesh.h"
-#include "osteo/imaging/io/vtk_data.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/instrument_view.h"
+#include "osteo/imaging/io/vtk_data.h"
+#include "osteo/simulation/bone/plate_fit.h"
+#include "osteo/simulation/bone/world_mesh.h"
 
 namespace osteo::inline display {
 namespace {
@@ -42,8 +42,8 @@ vtkSmartPointer<vtkPolyData> shaded(vtkPolyData* data) {
   return out;
 }
 
-// A screw along -z, its head's underside at z = 0: a dome with a cross in it would be too small to see, so a dome; threads as rings that
-// climb by their pitch in a turn.
+// A screw along -z, its head's underside at z = 0: a dome with a cross in it would be too small to see, so a dome;
+// threads as rings that climb by their pitch in a turn.
 vtkSmartPointer<vtkPolyData> screw_surface(double diameter_mm, double length_mm) {
   constexpr int kAround = 24;
   const double r = diameter_mm / 2, pitch = 0.4 * diameter_mm, core = 0.72 * r;
@@ -56,7 +56,8 @@ vtkSmartPointer<vtkPolyData> screw_surface(double diameter_mm, double length_mm)
       points->InsertNextPoint(radius * std::cos(angle), radius * std::sin(angle), height_of(angle));
     }
     for (int a = 0; rings > 0 && a < kAround; ++a) {
-      const vtkIdType next = (a + 1) % kAround, below = static_cast<vtkIdType>(rings - 1) * kAround, above = below + kAround;
+      const vtkIdType next = (a + 1) % kAround, below = static_cast<vtkIdType>(rings - 1) * kAround,
+                      above = below + kAround;
       const vtkIdType quad[4] = {below + a, below + next, above + next, above + a};
       cells->InsertNextCell(4, quad);
     }
@@ -76,7 +77,8 @@ vtkSmartPointer<vtkPolyData> screw_surface(double diameter_mm, double length_mm)
         },
         [&](double) { return z; });
   }
-  for (const auto& [radius, z] : {std::pair{0.9, 0.0}, {0.9, 0.12}, {0.8, 0.28}, {0.55, 0.42}, {0.28, 0.46}, {0.26, 0.22}, {0.005, 0.20}})
+  for (const auto& [radius, z] :
+       {std::pair{0.9, 0.0}, {0.9, 0.12}, {0.8, 0.28}, {0.55, 0.42}, {0.28, 0.46}, {0.26, 0.22}, {0.005, 0.20}})
     circle(radius * diameter_mm, z * diameter_mm);
   vtkNew<vtkPolyData> data;
   data->SetPoints(points);
@@ -126,8 +128,9 @@ struct Part {
       const Vec3 p = pose({at[0], at[1], at[2] < thickness_mm + 0.2 ? 0.02 : at[2]}), up = pose.rotation.column[2];
       double deep = 0;
       while (deep < kMostMm && is_bone(world, p + up * deep)) deep += kStepMm;
-      const double red =
-          deep > kPlateCollisionMm ? 0.35 + 0.65 * std::min(1.0, (deep - kPlateCollisionMm) / (kMostMm - kPlateCollisionMm)) : 0;
+      const double red = deep > kPlateCollisionMm
+                             ? 0.35 + 0.65 * std::min(1.0, (deep - kPlateCollisionMm) / (kMostMm - kPlateCollisionMm))
+                             : 0;
       tinted += red > 0 ? 1 : 0;
       colours->SetTuple3(n, 164 + (230 - 164) * red, 172 + (50 - 172) * red, 190 + (40 - 190) * red);
     }
@@ -138,7 +141,8 @@ struct Part {
 
 }  // namespace
 
-double plate_in_bone_mm(const World& world, const PlateModel& plate, const RigidTransform& world_from_plate, double opening_mm) {
+double plate_in_bone_mm(const World& world, const PlateModel& plate, const RigidTransform& world_from_plate,
+                        double opening_mm) {
   double deepest = 0;
   for (const PlateGap& g : plate_gaps(world, plate, world_from_plate, opening_mm, 150, 1)) {
     if (g.body != SceneAction::kNobody) deepest = std::max(deepest, -g.gap_mm);
@@ -164,7 +168,8 @@ struct PlateView::Impl {
     d.parts.push_back(std::make_unique<Part>(renderer, to_vtk(model.mesh)));
     if (!model.moving.triangles.empty()) d.parts.push_back(std::make_unique<Part>(renderer, to_vtk(model.moving)));
     const auto screw = screws ? screw_surface(model.screw_mm, 3 * model.screw_mm) : nullptr;
-    for (std::size_t n = 0; screws && n < model.holes_mm.size(); ++n) d.parts.push_back(std::make_unique<Part>(renderer, screw));
+    for (std::size_t n = 0; screws && n < model.holes_mm.size(); ++n)
+      d.parts.push_back(std::make_unique<Part>(renderer, screw));
     return d;
   }
   void remove(const Drawn& d) const {
@@ -205,7 +210,8 @@ PlateView::~PlateView() {
 void PlateView::update(const World& world) {
   Impl& m = *impl_;
   std::erase_if(m.fixed, [&](auto& f) {
-    const bool there = std::any_of(world.fixtures().begin(), world.fixtures().end(), [&](const Fixture& x) { return x.id == f.first; });
+    const bool there = std::any_of(world.fixtures().begin(), world.fixtures().end(),
+                                   [&](const Fixture& x) { return x.id == f.first; });
     if (!there) m.remove(f.second);
     return !there;
   });
@@ -238,4 +244,4 @@ std::size_t PlateView::tinted() const {
   return all;
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -16,7 +16,8 @@ void QualityChoice::took(const PictureStyle& style, bool moving, double ms, doub
   (moving ? moving_ms_ : resting_ms_) = ms;
   if (moving) {
     constexpr int kSlow = 3, kQuick = 8;
-    // Times of another scale are late news. What a picture costs apart from its pixels is not known: none of it is counted on to shrink.
+    // Times of another scale are late news. What a picture costs apart from its pixels is not known: none of it is
+    // counted on to shrink.
     if (style.scale == kScales[scale_]) {
       const double more = scale_ > 0 ? kScales[scale_ - 1] / kScales[scale_] : 1;
       slow_ = ms > kMovingMs ? slow_ + 1 : 0;
@@ -46,4 +47,4 @@ void QualityChoice::took(const PictureStyle& style, bool moving, double ms, doub
   want(wish_);
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

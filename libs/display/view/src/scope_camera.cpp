@@ -22,9 +22,10 @@ void aim(vtkRenderer* renderer, const ScopeView& view, const PictureArea& area) 
   place(renderer, view, area, view.eye_mm(), 0);
 }
 
-void aim_eye(vtkRenderer* renderer, const ScopeView& view, const StereoParams& stereo, const PictureArea& area, int eye) {
+void aim_eye(vtkRenderer* renderer, const ScopeView& view, const StereoParams& stereo, const PictureArea& area,
+             int eye) {
   const StereoEye e = stereo_eye(view, stereo, area, eye);
   place(renderer, view, area, e.eye_mm, e.window_centre_x);
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -17,17 +17,17 @@
 #include <cmath>
 
 #include "osteo/core/base/param.h"
-#include "osteo/imaging/io/vtk_data.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/display/view/slices.h"
+#include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo::inline display {
 
 namespace {
 
-// Fewer triangles on the same points, where there are far more than a picture of this size can show. Software draws a million in half a
-// second.
+// Fewer triangles on the same points, where there are far more than a picture of this size can show. Software draws a
+// million in half a second.
 TriMesh coarse_enough(const TriMesh& mesh, std::size_t pictures) {
   constexpr std::size_t kTriangles = 800'000;
   if (pictures < 2 || mesh.triangles.size() <= kTriangles) return mesh;
@@ -35,17 +35,17 @@ TriMesh coarse_enough(const TriMesh& mesh, std::size_t pictures) {
   coarse.points_mm = mesh.points_mm;
   coarse.normals = mesh.normals;
   coarse.triangles.resize(mesh.triangles.size());
-  const std::size_t kept =
-      meshopt_simplifySloppy(coarse.triangles.front().data(), mesh.triangles.front().data(), 3 * mesh.triangles.size(),
-                             mesh.points_mm.front().data(), mesh.points_mm.size(), sizeof(mesh.points_mm.front()), 3 * kTriangles, 0.01F);
+  const std::size_t kept = meshopt_simplifySloppy(
+      coarse.triangles.front().data(), mesh.triangles.front().data(), 3 * mesh.triangles.size(),
+      mesh.points_mm.front().data(), mesh.points_mm.size(), sizeof(mesh.points_mm.front()), 3 * kTriangles, 0.01F);
   coarse.triangles.resize(kept / 3);
   return coarse;
 }
 
 }  // namespace
 
-std::vector<Picture> draw_sides(const TriMesh& mesh, std::span<const ViewFrom> sides, Vec3 centre, double mm_per_pixel, int width,
-                                int height, std::span<const std::array<std::uint8_t, 3>> rgb) {
+std::vector<Picture> draw_sides(const TriMesh& mesh, std::span<const ViewFrom> sides, Vec3 centre, double mm_per_pixel,
+                                int width, int height, std::span<const std::array<std::uint8_t, 3>> rgb) {
   std::vector<Picture> pictures;
   const auto data = to_vtk(coarse_enough(mesh, sides.size()));
   if (rgb.size() == mesh.points_mm.size() && !rgb.empty()) {
@@ -104,11 +104,12 @@ void write_scale_bar(Picture& onto, double mm_per_pixel, int ink) {
   const int thick = std::max(3, onto.height / 130);
   for (int row = y; row < std::min(y + thick, onto.height); ++row) {
     for (int column = x; column < std::min(x + pixels, onto.width); ++column) {
-      const auto at = 3 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(onto.width) + static_cast<std::size_t>(column));
+      const auto at =
+          3 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(onto.width) + static_cast<std::size_t>(column));
       std::fill_n(onto.rgb.begin() + static_cast<std::ptrdiff_t>(at), 3, static_cast<std::uint8_t>(ink));
     }
   }
   write_text(onto, format_number(length_mm) + " mm", x, y - thick, std::max(14, onto.height / 19), {ink, ink, ink});
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -14,8 +14,14 @@ namespace osteo::inline display {
 namespace {
 
 // Distinct tints for the first labels; later ones repeat.
-constexpr std::array<std::array<double, 3>, 8> kTints{
-    {{235, 120, 60}, {90, 200, 120}, {90, 150, 255}, {240, 220, 80}, {220, 90, 200}, {80, 220, 220}, {255, 150, 150}, {180, 180, 90}}};
+constexpr std::array<std::array<double, 3>, 8> kTints{{{235, 120, 60},
+                                                       {90, 200, 120},
+                                                       {90, 150, 255},
+                                                       {240, 220, 80},
+                                                       {220, 90, 200},
+                                                       {80, 220, 220},
+                                                       {255, 150, 150},
+                                                       {180, 180, 90}}};
 
 }  // namespace
 
@@ -40,7 +46,8 @@ Vec3 SliceView::world(double px, double py) const {
   const SliceAxes a = axes();
   const Vec3 n = cross(a.right, a.down);
   const Vec3 base = centre_mm + n * dot(through_mm - centre_mm, n);
-  return base + a.right * ((px + 0.5 - width / 2.0) * mm_per_pixel) + a.down * ((py + 0.5 - height / 2.0) * mm_per_pixel);
+  return base + a.right * ((px + 0.5 - width / 2.0) * mm_per_pixel) +
+         a.down * ((py + 0.5 - height / 2.0) * mm_per_pixel);
 }
 
 std::array<double, 2> SliceView::pixel(Vec3 world_mm) const {
@@ -72,7 +79,8 @@ std::array<std::string, 4> edge_letters(const SliceView& view) {
     constexpr const char* kSides[3] = {"RL", "AP", "FH"};
     constexpr double kNear = 0.35;  // a direction 70 degrees off is not told
     std::array<std::size_t, 3> order{0, 1, 2};
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return std::abs(d[a]) > std::abs(d[b]); });
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return std::abs(d[a]) > std::abs(d[b]); });
     std::string letters;
     for (const std::size_t a : order) {
       if (std::abs(d[a]) > kNear) letters += kSides[a][d[a] > 0 ? 1 : 0];
@@ -84,8 +92,8 @@ std::array<std::string, 4> edge_letters(const SliceView& view) {
 
 std::string place_text(Vec3 p) {
   char text[96];
-  std::snprintf(text, sizeof text, "%c %.1f  %c %.1f  %c %.1f", p.x >= 0 ? 'L' : 'R', std::abs(p.x), p.y >= 0 ? 'P' : 'A', std::abs(p.y),
-                p.z >= 0 ? 'H' : 'F', std::abs(p.z));
+  std::snprintf(text, sizeof text, "%c %.1f  %c %.1f  %c %.1f", p.x >= 0 ? 'L' : 'R', std::abs(p.x),
+                p.y >= 0 ? 'P' : 'A', std::abs(p.y), p.z >= 0 ? 'H' : 'F', std::abs(p.z));
   return text;
 }
 
@@ -100,7 +108,8 @@ void HuWindow::drag(double dx, double dy) {
 }
 
 std::span<const GreyPreset> grey_presets() {
-  static constexpr GreyPreset kPresets[] = {{"Bone", {1000, 400}}, {"Soft tissue", {350, 40}}, {"Temporal bone", {4000, 700}}};
+  static constexpr GreyPreset kPresets[] = {
+      {"Bone", {1000, 400}}, {"Soft tissue", {350, 40}}, {"Temporal bone", {4000, 700}}};
   return kPresets;
 }
 
@@ -108,7 +117,8 @@ double grey_of_hu(double hu) {
   return std::clamp((hu + 200) / 1700 * 255, 0.0, 255.0);
 }
 
-Picture draw_slice(const SliceView& view, const GreyAt& grey, const LabelAt& label, const std::vector<Structure>& structures) {
+Picture draw_slice(const SliceView& view, const GreyAt& grey, const LabelAt& label,
+                   const std::vector<Structure>& structures) {
   Picture picture{view.width, view.height, {}};
   picture.rgb.resize(static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height) * 3);
   std::array<std::array<double, 3>, 256> tints{};
@@ -160,8 +170,10 @@ void write_text(Picture& onto, std::string_view text, int x, int y, int size, st
       if (p[3] == 0 || px < 0 || py < 0 || px >= onto.width || py >= onto.height) continue;
       const double alpha = p[3] / 255.0;
       std::uint8_t* const out =
-          onto.rgb.data() + (static_cast<std::size_t>(py) * static_cast<std::size_t>(onto.width) + static_cast<std::size_t>(px)) * 3;
-      for (std::size_t c = 0; c < 3; ++c) out[c] = static_cast<std::uint8_t>(std::lround(out[c] * (1 - alpha) + rgb[c] * alpha));
+          onto.rgb.data() +
+          (static_cast<std::size_t>(py) * static_cast<std::size_t>(onto.width) + static_cast<std::size_t>(px)) * 3;
+      for (std::size_t c = 0; c < 3; ++c)
+        out[c] = static_cast<std::uint8_t>(std::lround(out[c] * (1 - alpha) + rgb[c] * alpha));
     }
   }
 }
@@ -174,4 +186,4 @@ void write_directions(Picture& onto, const SliceView& view, int x, int y) {
   write_text(onto, letters[3], x + view.width / 2, y + view.height - 8, 16);
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -19,13 +19,13 @@
 #include <memory>
 
 #include "osteo/core/base/error.h"
-#include "osteo/simulation/bone/live_surface.h"
-#include "osteo/geometry/grid/sampler.h"
-#include "osteo/imaging/io/vtk_data.h"
-#include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/display/view/slices.h"
+#include "osteo/geometry/grid/sampler.h"
+#include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/imaging/io/vtk_data.h"
+#include "osteo/simulation/bone/live_surface.h"
 
 namespace osteo::inline display {
 namespace {
@@ -94,8 +94,8 @@ std::pair<Vec3, Vec3> bounds_of(const Data& data) {
   };
   const auto add_frame = [&](const Frame& f) {
     for (int c = 0; c < 8; ++c)
-      add(f.world_from_index(
-          {(c & 1) != 0 ? f.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? f.dims[1] - 1.0 : 0.0, (c & 4) != 0 ? f.dims[2] - 1.0 : 0.0}));
+      add(f.world_from_index({(c & 1) != 0 ? f.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? f.dims[1] - 1.0 : 0.0,
+                              (c & 4) != 0 ? f.dims[2] - 1.0 : 0.0}));
   };
   if (const auto* image = std::get_if<Image>(&data)) add_frame(image->frame);
   if (const auto* labels = std::get_if<Labels>(&data)) add_frame(labels->frame);
@@ -109,7 +109,8 @@ std::pair<Vec3, Vec3> bounds_of(const Data& data) {
   return {lo, hi};
 }
 
-// Isosurface of a dense volume, closed at its border. Made in voxel indices and placed here: VTK 9.1's filters drop the direction.
+// Isosurface of a dense volume, closed at its border. Made in voxel indices and placed here: VTK 9.1's filters drop the
+// direction.
 template <class T>
 vtkSmartPointer<vtkPolyData> isosurface(const Volume<T>& volume, double value, double outside) {
   Volume<T> upright = volume;
@@ -157,7 +158,8 @@ vtkSmartPointer<vtkPolyData> isosurface(const Volume<T>& volume, double value, d
 const std::vector<Structure>& structures_of(const SnapshotSubjects& s) {
   static const std::vector<Structure> none;
   for (const Data* data : {&s.mask, &s.subject}) {
-    if (const auto* labels = std::get_if<Labels>(data); labels != nullptr && !labels->structures.empty()) return labels->structures;
+    if (const auto* labels = std::get_if<Labels>(data); labels != nullptr && !labels->structures.empty())
+      return labels->structures;
   }
   return none;
 }
@@ -170,7 +172,8 @@ vtkSmartPointer<vtkActor> structure_actor(const Labels& labels, const Structure&
   return actor;
 }
 
-// Values as colours, dark to light (after viridis); on a logarithmic scale where they are all above 0 and span more than a factor of five.
+// Values as colours, dark to light (after viridis); on a logarithmic scale where they are all above 0 and span more
+// than a factor of five.
 class Colours {
  public:
   explicit Colours(std::span<const float> values) {
@@ -186,7 +189,8 @@ class Colours {
     const auto i = static_cast<std::size_t>(std::min(3.0, std::floor(t)));
     std::array<unsigned char, 3> rgb{};
     for (std::size_t c = 0; c < 3; ++c)
-      rgb[c] = static_cast<unsigned char>(std::lround(kStops[i][c] + (t - static_cast<double>(i)) * (kStops[i + 1][c] - kStops[i][c])));
+      rgb[c] = static_cast<unsigned char>(
+          std::lround(kStops[i][c] + (t - static_cast<double>(i)) * (kStops[i + 1][c] - kStops[i][c])));
     return rgb;
   }
   [[nodiscard]] std::array<unsigned char, 3> of(double value) const {
@@ -209,8 +213,8 @@ void write_legend(Picture& picture, const TetMesh& mesh) {
   for (int row = 0; row < kHeight; ++row) {
     const auto rgb = Colours::at(1 - static_cast<double>(row) / (kHeight - 1));
     for (int column = 0; column < kWidth; ++column) {
-      const auto i =
-          3 * (static_cast<std::size_t>(y + row) * static_cast<std::size_t>(picture.width) + static_cast<std::size_t>(x + column));
+      const auto i = 3 * (static_cast<std::size_t>(y + row) * static_cast<std::size_t>(picture.width) +
+                          static_cast<std::size_t>(x + column));
       if (x < 0 || i + 2 >= picture.rgb.size()) return;
       std::copy(rgb.begin(), rgb.end(), picture.rgb.begin() + static_cast<std::ptrdiff_t>(i));
     }
@@ -225,7 +229,9 @@ void write_legend(Picture& picture, const TetMesh& mesh) {
 
 // The half of a mesh that is farther from the eye, so that its inside shows; coloured where the mesh has values.
 vtkSmartPointer<vtkPolyData> half_of(const TetMesh& mesh, Vec3 eye) {
-  const auto at = [&](std::uint32_t v) { return Vec3{mesh.points_mm[v][0], mesh.points_mm[v][1], mesh.points_mm[v][2]}; };
+  const auto at = [&](std::uint32_t v) {
+    return Vec3{mesh.points_mm[v][0], mesh.points_mm[v][1], mesh.points_mm[v][2]};
+  };
   Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
   for (std::uint32_t v = 0; v < mesh.points_mm.size(); ++v) {
     for (std::size_t a = 0; a < 3; ++a) {
@@ -252,7 +258,8 @@ vtkSmartPointer<vtkPolyData> half_of(const TetMesh& mesh, Vec3 eye) {
     vtkNew<vtkUnsignedCharArray> rgb;
     rgb->SetName("colour");
     rgb->SetNumberOfComponents(3);
-    for (const std::uint32_t p : point_of) rgb->InsertNextTypedTuple(colours.of(static_cast<double>(mesh.values[p])).data());
+    for (const std::uint32_t p : point_of)
+      rgb->InsertNextTypedTuple(colours.of(static_cast<double>(mesh.values[p])).data());
     surface->GetPointData()->SetScalars(rgb);
   }
   return surface;
@@ -385,12 +392,13 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
   } else {
     write_text(picture, "no bone at this threshold", p.width - sw + 20, p.height - sh / 2, 18);
   }
-  write_text(picture, "seen from " + std::string(EnumNames<ViewFrom>::values[static_cast<std::size_t>(p.view)]), p.width - sw + 10,
-             p.height - sh + 24, 15, {150, 165, 180});
-  if (const auto* tets = std::get_if<Tets>(&s.subject); tets != nullptr && !(*tets)->values.empty()) write_legend(picture, **tets);
+  write_text(picture, "seen from " + std::string(EnumNames<ViewFrom>::values[static_cast<std::size_t>(p.view)]),
+             p.width - sw + 10, p.height - sh + 24, 15, {150, 165, 180});
+  if (const auto* tets = std::get_if<Tets>(&s.subject); tets != nullptr && !(*tets)->values.empty())
+    write_legend(picture, **tets);
   if (!p.title.empty()) write_text(picture, p.title, p.width - sw + 10, p.height - 12, 16);
   context.progress(1.0);
   return picture;
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

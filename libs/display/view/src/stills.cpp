@@ -14,10 +14,10 @@
 #include <cmath>
 #include <map>
 
-#include "osteo/imaging/io/vtk_data.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/display/view/sides.h"
+#include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo::inline display {
 
@@ -78,4 +78,4 @@ std::vector<Picture> draw_stills(std::span<const StillPart> parts, std::span<con
   return pictures;
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

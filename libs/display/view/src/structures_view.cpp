@@ -14,8 +14,8 @@
 #include <numeric>
 
 #include "osteo/core/base/parallel.h"
-#include "osteo/imaging/io/vtk_data.h"
 #include "osteo/display/view/actors.h"
+#include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo::inline display {
 
@@ -24,7 +24,8 @@ namespace {
 void set_normals(TriMesh& mesh) {
   std::vector<Vec3> normals(mesh.points_mm.size());
   for (const auto& t : mesh.triangles) {
-    const Vec3 a = from_floats(mesh.points_mm[t[0]]), b = from_floats(mesh.points_mm[t[1]]), c = from_floats(mesh.points_mm[t[2]]);
+    const Vec3 a = from_floats(mesh.points_mm[t[0]]), b = from_floats(mesh.points_mm[t[1]]),
+               c = from_floats(mesh.points_mm[t[2]]);
     const Vec3 twice_area = cross(b - a, c - a);
     for (const std::uint32_t p : t) normals[p] += twice_area;
   }
@@ -77,9 +78,9 @@ TriMesh smooth_surface(const TriMesh& face, double most_mm) {
   smooth.points_mm = face.points_mm;
   smooth.triangles = face.triangles;
   if (face.triangles.empty()) return smooth;
-  // A tube of few voxels is drawn in by the filter. What it lost is much the same all around, unlike the steps that were smoothed away:
-  // spread over the surface, that is given back. In rounds, each so weak that a tube two voxels thick is still a tube before it gets it
-  // back.
+  // A tube of few voxels is drawn in by the filter. What it lost is much the same all around, unlike the steps that
+  // were smoothed away: spread over the surface, that is given back. In rounds, each so weak that a tube two voxels
+  // thick is still a tube before it gets it back.
   constexpr int kRounds = 3, kPasses = 30, kTimes = 2, kSpread = 20;
   constexpr double kPassBand = 0.06;
   std::vector<double> lost(smooth.points_mm.size());
@@ -102,7 +103,8 @@ TriMesh smooth_surface(const TriMesh& face, double most_mm) {
     for (int n = 0; n < kTimes; ++n) {
       set_normals(smooth);
       for (std::size_t p = 0; p < lost.size(); ++p)
-        lost[p] = dot(from_floats(face.points_mm[p]) - from_floats(smooth.points_mm[p]), from_floats(smooth.normals[p]));
+        lost[p] =
+            dot(from_floats(face.points_mm[p]) - from_floats(smooth.points_mm[p]), from_floats(smooth.normals[p]));
       spread(smooth, lost, kSpread);
       for (std::size_t p = 0; p < lost.size(); ++p)
         smooth.points_mm[p] = to_floats(from_floats(smooth.points_mm[p]) + from_floats(smooth.normals[p]) * lost[p]);
@@ -120,10 +122,12 @@ TriMesh smooth_surface(const TriMesh& face, double most_mm) {
   return smooth;
 }
 
-StructuresView::StructuresView(vtkRenderer* renderer, const StructureMap& map) : renderer_(renderer), all_(map.values().size()) {
+StructuresView::StructuresView(vtkRenderer* renderer, const StructureMap& map)
+    : renderer_(renderer), all_(map.values().size()) {
   const double most_mm = map.label_spacing_mm()[1] / 2;
   parallel_for(all_.size(), 1, 0, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s) all_[s].surface = std::make_shared<const TriMesh>(smooth_surface(map.face(s), most_mm));
+    for (std::size_t s = begin; s < end; ++s)
+      all_[s].surface = std::make_shared<const TriMesh>(smooth_surface(map.face(s), most_mm));
   });
   for (std::size_t s = 0; s < all_.size(); ++s) {
     One& one = all_[s];
@@ -153,4 +157,4 @@ void StructuresView::show(std::size_t number, StructureLook look) {
   one.actor->GetShaderProperty()->AddFragmentShaderReplacement("//VTK::Light::Impl", true, discard, false);
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

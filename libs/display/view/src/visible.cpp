@@ -43,7 +43,8 @@ bool cover(const Point& a, const Point& b, const Point& c, int width, int height
       const float v = ((c.x - px) * (a.y - py) - (a.x - px) * (c.y - py)) / area;
       const float w = 1 - u - v;
       if (u < 0 || v < 0 || w < 0) continue;
-      f(static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x), u * a.z + v * b.z + w * c.z);
+      f(static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x),
+        u * a.z + v * b.z + w * c.z);
     }
   }
   return true;
@@ -70,7 +71,9 @@ std::vector<std::vector<std::uint32_t>> visible_triangles(std::span<const Visibl
       float most = -2;
       for (int j = std::max(0, y - 1); j <= std::min(height - 1, y + 1); ++j)
         for (int i = std::max(0, x - 1); i <= std::min(width - 1, x + 1); ++i)
-          most = std::max(most, nearest[static_cast<std::size_t>(j) * static_cast<std::size_t>(width) + static_cast<std::size_t>(i)]);
+          most = std::max(
+              most,
+              nearest[static_cast<std::size_t>(j) * static_cast<std::size_t>(width) + static_cast<std::size_t>(i)]);
       limit[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)] = most + 1e-5F;
     }
   }
@@ -79,7 +82,8 @@ std::vector<std::vector<std::uint32_t>> visible_triangles(std::span<const Visibl
     const VisibleMesh& m = meshes[n];
     const auto& p = points[n];
     for (std::size_t t = 0; t + 2 < m.triangles.size(); t += 3) {
-      const Point corner[3] = {p[static_cast<std::size_t>(m.triangles[t])], p[static_cast<std::size_t>(m.triangles[t + 1])],
+      const Point corner[3] = {p[static_cast<std::size_t>(m.triangles[t])],
+                               p[static_cast<std::size_t>(m.triangles[t + 1])],
                                p[static_cast<std::size_t>(m.triangles[t + 2])]};
       bool wins = false;
       const bool may = cover(corner[0], corner[1], corner[2], width, height,
@@ -89,7 +93,9 @@ std::vector<std::vector<std::uint32_t>> visible_triangles(std::span<const Visibl
         const int x = static_cast<int>(corner[c].x), y = static_cast<int>(corner[c].y);
         if (!corner[c].in_front) wins = true;
         if (corner[c].x < 0 || corner[c].y < 0 || x >= width || y >= height) continue;
-        wins = wins || corner[c].z <= limit[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+        wins = wins ||
+               corner[c].z <=
+                   limit[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
       }
       if (wins) seen[n].push_back(static_cast<std::uint32_t>(t / 3));
     }
@@ -97,4 +103,4 @@ std::vector<std::vector<std::uint32_t>> visible_triangles(std::span<const Visibl
   return seen;
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -50,7 +50,8 @@ bool WetFilm::update(const Dust& dust) {
   for (const std::uint64_t name : differ) {
     for (std::uint64_t i = 0; i < 3; ++i)
       for (std::uint64_t j = 0; j < 3; ++j)
-        for (std::uint64_t k = 0; k < 3; ++k) changed_.insert(name + (i * kStepI + j * kStepJ + k * kStepK) - (kStepI + kStepJ + kStepK));
+        for (std::uint64_t k = 0; k < 3; ++k)
+          changed_.insert(name + (i * kStepI + j * kStepJ + k * kStepK) - (kStepI + kStepJ + kStepK));
   }
   return true;
 }
@@ -58,13 +59,15 @@ bool WetFilm::update(const Dust& dust) {
 double WetFilm::at(Vec3 world_mm) const {
   if (bricks_.empty()) return 0;
   const Vec3 x = bone_->frame().index_from_world(world_mm);
-  const int i0 = static_cast<int>(std::floor(x.x)), j0 = static_cast<int>(std::floor(x.y)), k0 = static_cast<int>(std::floor(x.z));
+  const int i0 = static_cast<int>(std::floor(x.x)), j0 = static_cast<int>(std::floor(x.y)),
+            k0 = static_cast<int>(std::floor(x.z));
   const double f[3] = {x.x - i0, x.y - j0, x.z - k0};
   double wet = 0, all = 0;
   for (int c = 0; c < 8; ++c) {
     const int i = i0 + (c & 1), j = j0 + (c >> 1 & 1), k = k0 + (c >> 2);
     if (bone_->at(i, j, k) >= 0.5F) continue;  // no water is in bone
-    const double w = ((c & 1) != 0 ? f[0] : 1 - f[0]) * ((c >> 1 & 1) != 0 ? f[1] : 1 - f[1]) * ((c >> 2) != 0 ? f[2] : 1 - f[2]);
+    const double w =
+        ((c & 1) != 0 ? f[0] : 1 - f[0]) * ((c >> 1 & 1) != 0 ? f[1] : 1 - f[1]) * ((c >> 2) != 0 ? f[2] : 1 - f[2]);
     all += w;
     const auto brick = bricks_.find(key(i >> 3, j >> 3, k >> 3));
     if (brick != bricks_.end()) wet += w * (*brick->second)[BrickGrid::offset_in_brick(i, j, k)];
@@ -79,4 +82,4 @@ bool WetFilm::changed_near(Vec3 world_mm) const {
   return changed_.contains(key(brick(x.x), brick(x.y), brick(x.z)));
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

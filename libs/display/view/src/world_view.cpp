@@ -18,11 +18,11 @@
 #include <cmath>
 #include <optional>
 
-#include "osteo/imaging/io/vtk_data.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/display/view/structures_view.h"
 #include "osteo/display/view/visible.h"
+#include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo::inline display {
 namespace {
@@ -124,7 +124,8 @@ bool WorldView::look_at_heat(const SceneReaders& readers, std::chrono::steady_cl
   heat_at_ = now + kEvery;
   const bool was_warm = !warm_places_.empty();
   warm_places_.clear();
-  readers.heat->for_warm_places([&](Vec3 centre_mm, double radius_mm) { warm_places_.emplace_back(centre_mm, radius_mm); });
+  readers.heat->for_warm_places(
+      [&](Vec3 centre_mm, double radius_mm) { warm_places_.emplace_back(centre_mm, radius_mm); });
   return was_warm || !warm_places_.empty();
 }
 
@@ -151,7 +152,8 @@ void WorldView::update_soft(SoftTissue& soft) {
       continue;
     }
     vtkPoints* const at = view.data->GetPoints();
-    for (std::size_t p = 0; p < mesh.points_mm.size(); ++p) at->SetPoint(static_cast<vtkIdType>(p), mesh.points_mm[p].data());
+    for (std::size_t p = 0; p < mesh.points_mm.size(); ++p)
+      at->SetPoint(static_cast<vtkIdType>(p), mesh.points_mm[p].data());
     at->Modified();
     view.data->Modified();
   }
@@ -191,9 +193,9 @@ void WorldView::make_coarse() {
     for (Seen& job : jobs) {
       if (stop_) break;
       auto& a = job.arrays;
-      job.triangles =
-          coarse_triangles({a.points_mm->GetPointer(0), static_cast<std::size_t>(a.points_mm->GetNumberOfValues())},
-                           {a.triangles->GetPointer(0), static_cast<std::size_t>(a.triangles->GetNumberOfValues())}, job.error_mm);
+      job.triangles = coarse_triangles(
+          {a.points_mm->GetPointer(0), static_cast<std::size_t>(a.points_mm->GetNumberOfValues())},
+          {a.triangles->GetPointer(0), static_cast<std::size_t>(a.triangles->GetNumberOfValues())}, job.error_mm);
     }
     return jobs;
   });
@@ -211,10 +213,12 @@ bool WorldView::rest(int width, int height, bool coarse) {
   // All that decides what is seen; not the clipping planes, which follow the drill.
   vtkCamera* const camera = renderer_->GetActiveCamera();
   std::vector<double> now{static_cast<double>(width), static_cast<double>(height), camera->GetViewAngle()};
-  for (const double* const v : {camera->GetPosition(), camera->GetFocalPoint(), camera->GetViewUp()}) now.insert(now.end(), v, v + 3);
+  for (const double* const v : {camera->GetPosition(), camera->GetFocalPoint(), camera->GetViewUp()})
+    now.insert(now.end(), v, v + 3);
   for (const auto& [id, view] : bodies_) {
     const RigidTransform t = view->placed();
-    for (const Vec3 v : {t.rotation.column[0], t.rotation.column[1], t.shift_mm}) now.insert(now.end(), {v.x, v.y, v.z});
+    for (const Vec3 v : {t.rotation.column[0], t.rotation.column[1], t.shift_mm})
+      now.insert(now.end(), {v.x, v.y, v.z});
   }
   std::uint64_t version = 0;
   for (const auto& [id, view] : bodies_) version += view->version();
@@ -248,7 +252,8 @@ bool WorldView::rest(int width, int height, bool coarse) {
   }
   looked_version_ = version;
   looked_ = true;
-  const double* const m = camera->GetCompositeProjectionTransformMatrix(renderer_->GetTiledAspectRatio(), -1, 1)->GetData();
+  const double* const m =
+      camera->GetCompositeProjectionTransformMatrix(renderer_->GetTiledAspectRatio(), -1, 1)->GetData();
   std::vector<Seen> jobs;
   std::vector<std::array<double, 16>> matrices;
   for (const auto& [id, view] : bodies_) {
@@ -256,7 +261,8 @@ bool WorldView::rest(int width, int height, bool coarse) {
     std::array<double, 16> clip{};
     for (std::size_t r = 0; r < 4; ++r) {
       for (std::size_t c = 0; c < 4; ++c) {
-        for (std::size_t k = 0; k < 3; ++k) clip[4 * r + c] += m[4 * r + k] * (c < 3 ? t.rotation.column[c][k] : t.shift_mm[k]);
+        for (std::size_t k = 0; k < 3; ++k)
+          clip[4 * r + c] += m[4 * r + k] * (c < 3 ? t.rotation.column[c][k] : t.shift_mm[k]);
         if (c == 3) clip[4 * r + c] += m[4 * r + 3];
       }
     }
@@ -265,7 +271,8 @@ bool WorldView::rest(int width, int height, bool coarse) {
       matrices.push_back(clip);
     }
   }
-  looking_ = std::async(std::launch::async, [jobs = std::move(jobs), matrices = std::move(matrices), width, height]() mutable {
+  looking_ = std::async(std::launch::async, [jobs = std::move(jobs), matrices = std::move(matrices), width,
+                                             height]() mutable {
     std::vector<VisibleMesh> meshes;
     for (std::size_t n = 0; n < jobs.size(); ++n) {
       auto& a = jobs[n].arrays;
@@ -277,7 +284,8 @@ bool WorldView::rest(int width, int height, bool coarse) {
     std::vector<std::uint32_t> order;
     for (std::size_t n = 0; n < jobs.size(); ++n) {
       for (const std::uint32_t t : seen[n]) {
-        for (std::size_t c = 0; c < 3; ++c) jobs[n].triangles.push_back(static_cast<std::uint32_t>(meshes[n].triangles[3 * t + c]));
+        for (std::size_t c = 0; c < 3; ++c)
+          jobs[n].triangles.push_back(static_cast<std::uint32_t>(meshes[n].triangles[3 * t + c]));
       }
       if (jobs[n].triangles.empty()) continue;
       // So that a corner is worked on once for the triangles that share it.
@@ -290,7 +298,8 @@ bool WorldView::rest(int width, int height, bool coarse) {
   return false;
 }
 
-Picture draw_world(const World& world, SceneReaders& readers, const StructureMap* structures, const WorldPicture& p, SoftTissue* soft) {
+Picture draw_world(const World& world, SceneReaders& readers, const StructureMap* structures, const WorldPicture& p,
+                   SoftTissue* soft) {
   OffscreenWindow window(p.width, p.height);
   vtkNew<vtkRenderer> renderer;
   window.window()->AddRenderer(renderer);
@@ -305,4 +314,4 @@ Picture draw_world(const World& world, SceneReaders& readers, const StructureMap
   return window.render();
 }
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

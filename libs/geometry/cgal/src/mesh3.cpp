@@ -40,10 +40,12 @@ struct Graded {
   }
 };
 
-const char* const kAdvice = "try 'osteo mesh-repair' first (--clean does), or the method grid-conforming, which takes any surface";
+const char* const kAdvice =
+    "try 'osteo mesh-repair' first (--clean does), or the method grid-conforming, which takes any surface";
 
 // Points and tetrahedra as bytes: counts, then both.
-std::string refined(const Mesh& mesh, const TriangleSoup& surface, const CgalMeshOptions& options, const Context& context) {
+std::string refined(const Mesh& mesh, const TriangleSoup& surface, const CgalMeshOptions& options,
+                    const Context& context) {
   try {
     CGAL::get_default_random() = CGAL::Random(static_cast<unsigned>(context.seed));
     const Domain domain(mesh, &CGAL::get_default_random());
@@ -51,7 +53,8 @@ std::string refined(const Mesh& mesh, const TriangleSoup& surface, const CgalMes
     using namespace CGAL::parameters;
     C3t3 c3t3;
     const auto make = [&](const auto& size) {
-      const Criteria criteria(facet_angle = 25, facet_size = size, facet_distance = distance, cell_radius_edge_ratio = 3, cell_size = size);
+      const Criteria criteria(facet_angle = 25, facet_size = size, facet_distance = distance,
+                              cell_radius_edge_ratio = 3, cell_size = size);
       c3t3 = CGAL::make_mesh_3<C3t3>(domain, criteria, no_perturb(), no_exude());
     };
     if (options.surface_cell_mm > 0 && options.surface_cell_mm < options.cell_mm) {
@@ -104,7 +107,8 @@ TetMesh tets_by_cgal(const TriangleSoup& surface, const CgalMeshOptions& options
   const TriangleSoup solid = compacted(solid_surface(surface, context).soup);
   if (const std::uint64_t touching = check(mesh_of(solid)).nonmanifold_points; touching > 0)
     context.warn("the surface touches itself at " + std::to_string(touching) +
-                 " points; towards such a point CGAL may make ever smaller tetrahedra, until its time is over: grid-conforming takes it");
+                 " points; towards such a point CGAL may make ever smaller tetrahedra, until its time is over: "
+                 "grid-conforming takes it");
   std::vector<K::Point_3> points;
   for (const Vec3 p : solid.points_mm) points.emplace_back(p.x, p.y, p.z);
   std::vector<std::array<std::size_t, 3>> triangles;
@@ -112,13 +116,16 @@ TetMesh tets_by_cgal(const TriangleSoup& surface, const CgalMeshOptions& options
   PMP::orient_polygon_soup(points, triangles);
   Mesh mesh;
   PMP::polygon_soup_to_polygon_mesh(points, triangles, mesh);
-  if (!CGAL::is_closed(mesh)) throw Error(ExitCode::failed, "CGAL needs a closed surface; this one has openings", kAdvice);
+  if (!CGAL::is_closed(mesh))
+    throw Error(ExitCode::failed, "CGAL needs a closed surface; this one has openings", kAdvice);
   // A regular tetrahedron of circumradius r has a volume of 0.51 r^3.
-  const double expected = inside_volume_mm3(solid, context) / (0.51 * options.cell_mm * options.cell_mm * options.cell_mm);
+  const double expected =
+      inside_volume_mm3(solid, context) / (0.51 * options.cell_mm * options.cell_mm * options.cell_mm);
   if (!(expected < options.most_tets))
     throw Error(ExitCode::resources,
-                "CGAL would make over " + format_number(expected) + " tetrahedra of at most " + format_number(options.cell_mm) +
-                    " mm, more than the " + format_number(options.most_tets) + " that are allowed",
+                "CGAL would make over " + format_number(expected) + " tetrahedra of at most " +
+                    format_number(options.cell_mm) + " mm, more than the " + format_number(options.most_tets) +
+                    " that are allowed",
                 "choose a larger spacing");
   context.progress(0.2, "refining");
   const std::string bytes = run_guarded(
@@ -135,4 +142,4 @@ TetMesh tets_by_cgal(const TriangleSoup& surface, const CgalMeshOptions& options
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

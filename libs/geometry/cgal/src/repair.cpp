@@ -22,7 +22,8 @@ namespace PMP = CGAL::Polygon_mesh_processing;
 
 }  // namespace
 
-std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const TriangleSoup& surface, const Context& context) {
+std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const TriangleSoup& surface,
+                                                                        const Context& context) {
   const Ordered used = ordered(surface, context);
   std::vector<K::Point_3> points;
   for (const Vec3 p : used.soup.points_mm) points.emplace_back(p.x, p.y, p.z);
@@ -31,7 +32,8 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const Tr
   std::vector<Box> boxes;
   const auto& triangles = used.soup.triangles;
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-    boxes.emplace_back(points[triangles[t][0]].bbox() + points[triangles[t][1]].bbox() + points[triangles[t][2]].bbox(), t);
+    boxes.emplace_back(points[triangles[t][0]].bbox() + points[triangles[t][1]].bbox() + points[triangles[t][2]].bbox(),
+                       t);
   }
   std::vector<std::pair<std::uint32_t, std::uint32_t>> found;
   const auto test = [&](const Box& x, const Box& y) {
@@ -41,7 +43,9 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const Tr
     for (const auto a : u) {
       if (std::find(v.begin(), v.end(), a) != v.end()) shared.push_back(a);
     }
-    const auto triangle = [&](const std::array<std::uint32_t, 3>& w) { return K::Triangle_3(points[w[0]], points[w[1]], points[w[2]]); };
+    const auto triangle = [&](const std::array<std::uint32_t, 3>& w) {
+      return K::Triangle_3(points[w[0]], points[w[1]], points[w[2]]);
+    };
     const auto other = [&](const std::array<std::uint32_t, 3>& w, std::size_t skip) {
       std::vector<std::uint32_t> rest;
       for (const auto a : w) {
@@ -64,7 +68,8 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const Tr
       const auto a = other(u, 2), b = other(v, 2);
       const auto &p = points[shared[0]], &q = points[shared[1]];
       hit = CGAL::coplanar(p, q, points[a[0]], points[b[0]]) && !CGAL::collinear(p, q, points[a[0]]) &&
-            !CGAL::collinear(p, q, points[b[0]]) && CGAL::coplanar_orientation(p, q, points[a[0]], points[b[0]]) == CGAL::POSITIVE;
+            !CGAL::collinear(p, q, points[b[0]]) &&
+            CGAL::coplanar_orientation(p, q, points[a[0]], points[b[0]]) == CGAL::POSITIVE;
     }
     if (hit) found.emplace_back(used.source[s], used.source[t]);
   };
@@ -77,7 +82,8 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const Tr
   return found;
 }
 
-TriangleSoup holes_closed(const TriangleSoup& surface, int max_hole_edges, CgalRepairReport& report, const Context& context) {
+TriangleSoup holes_closed(const TriangleSoup& surface, int max_hole_edges, CgalRepairReport& report,
+                          const Context& context) {
   report.holes_filled = report.holes_left = 0;
   const Ordered used = ordered(surface, context);
   std::vector<K::Point_3> points;
@@ -127,4 +133,4 @@ TriangleSoup holes_closed(const TriangleSoup& surface, int max_hole_edges, CgalR
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

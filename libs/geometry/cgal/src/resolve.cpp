@@ -1,4 +1,5 @@
-// Self-intersections resolved exactly: triangles are cut along each other, then the pieces that bound the inside are kept.
+// Self-intersections resolved exactly: triangles are cut along each other, then the pieces that bound the inside are
+// kept.
 #include <CGAL/Constrained_Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_exact_constructions_kernel.h>
 #include <CGAL/intersections.h>
@@ -78,8 +79,8 @@ class Arrangement {
       }
     }
     for (const E::Point_3& p : exact_)
-      result.points_mm.push_back(
-          {CGAL::to_double(CGAL::exact(p.x())), CGAL::to_double(CGAL::exact(p.y())), CGAL::to_double(CGAL::exact(p.z()))});
+      result.points_mm.push_back({CGAL::to_double(CGAL::exact(p.x())), CGAL::to_double(CGAL::exact(p.y())),
+                                  CGAL::to_double(CGAL::exact(p.z()))});
     // What was a point of the surface stays where it was, to the bit.
     std::copy(soup_.points_mm.begin(), soup_.points_mm.end(), result.points_mm.begin());
     return result;
@@ -140,7 +141,8 @@ class Arrangement {
 }  // namespace
 
 TriangleSoup intersections_resolved(const TriangleSoup& surface, CgalRepairReport& report, const Context& context) {
-  report.self_intersections_before = report.self_intersections_after = self_intersections(surface, context.sub(0, 0.2)).size();
+  report.self_intersections_before = report.self_intersections_after =
+      self_intersections(surface, context.sub(0, 0.2)).size();
   if (report.self_intersections_before == 0) return surface;
   try {
     const TriangleSoup whole = compacted(welded(surface));
@@ -162,4 +164,4 @@ TriangleSoup intersections_resolved(const TriangleSoup& surface, CgalRepairRepor
   }
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -23,7 +23,8 @@ void transform_row(const std::uint8_t* mask, std::uint8_t value, float* d, int n
   for (int i = n - 1; i >= 0; --i) {
     if (mask[i] == value) next = i;
     const float steps = next < 0 ? d[i] : std::min(d[i], static_cast<float>(next - i));
-    d[i] = steps == kInfinity ? kInfinity : static_cast<float>((static_cast<double>(steps) * h) * (static_cast<double>(steps) * h));
+    d[i] = steps == kInfinity ? kInfinity
+                              : static_cast<float>((static_cast<double>(steps) * h) * (static_cast<double>(steps) * h));
   }
 }
 
@@ -104,8 +105,8 @@ std::vector<float> squared_distance_mm2(std::span<const std::uint8_t> mask, cons
         transform_row(mask.data() + k * nx * ny + j * nx, value, slice + j * nx, frame.dims[0], frame.spacing_mm.x);
       }
       for (std::size_t s = 0; s < strips; ++s) {
-        transform_lines(slice + s * kTogether, nx, frame.dims[1], frame.spacing_mm.y, std::min(kTogether, nx - s * kTogether), turned,
-                        lower);
+        transform_lines(slice + s * kTogether, nx, frame.dims[1], frame.spacing_mm.y,
+                        std::min(kTogether, nx - s * kTogether), turned, lower);
       }
     }
   });
@@ -123,16 +124,19 @@ std::vector<float> squared_distance_mm2(std::span<const std::uint8_t> mask, cons
   return d;
 }
 
-std::vector<float> squared_distance_within_mm2(std::span<const std::uint8_t> mask, const Frame& frame, std::uint8_t value, double within_mm,
-                                               const Context& context) {
-  if (!(within_mm > 0) || !std::isfinite(within_mm)) throw Error(ExitCode::usage, "a distance to look within is positive and finite");
+std::vector<float> squared_distance_within_mm2(std::span<const std::uint8_t> mask, const Frame& frame,
+                                               std::uint8_t value, double within_mm, const Context& context) {
+  if (!(within_mm > 0) || !std::isfinite(within_mm))
+    throw Error(ExitCode::usage, "a distance to look within is positive and finite");
   std::vector<float> d(mask.size());
   const auto nx = static_cast<std::size_t>(frame.dims[0]);
   const auto ny = static_cast<std::size_t>(frame.dims[1]);
   const auto nz = static_cast<std::size_t>(frame.dims[2]);
   const double most = within_mm * within_mm * (1 + 1e-6);
-  // Rows `stride` apart from f, each `width` wide, become the least of those beside them; in strips that stay in the cache.
-  const auto transform_rows = [&](float* f, std::size_t stride, std::size_t n, std::size_t width, double h, std::vector<float>& before) {
+  // Rows `stride` apart from f, each `width` wide, become the least of those beside them; in strips that stay in the
+  // cache.
+  const auto transform_rows = [&](float* f, std::size_t stride, std::size_t n, std::size_t width, double h,
+                                  std::vector<float>& before) {
     const auto window = static_cast<std::size_t>(std::floor(std::sqrt(most) / h));
     if (window == 0) return;
     before.resize(n * width);
@@ -178,4 +182,4 @@ std::vector<float> squared_distance_within_mm2(std::span<const std::uint8_t> mas
   return d;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -46,9 +46,10 @@ class BlockMapper {
         step_(frame.spacing_mm / tree.unit_mm) {}
 
   // Nearest triangles of the wanted voxels of the block at `lo`: wanted[16 * z + y] has bit x. Leaves them in scratch.
-  // Voxels farther than `reach` (tree units) from everything may be left without. The tree is asked once for each cube of
-  // `edge` voxels.
-  void run(std::array<int, 3> lo, const std::array<std::uint16_t, 256>& wanted, double reach, int edge, std::uint32_t& hint) {
+  // Voxels farther than `reach` (tree units) from everything may be left without. The tree is asked once for each cube
+  // of `edge` voxels.
+  void run(std::array<int, 3> lo, const std::array<std::uint16_t, 256>& wanted, double reach, int edge,
+           std::uint32_t& hint) {
     lo_ = lo;
     wanted_ = &wanted;
     reach_ = static_cast<float>(reach);
@@ -71,9 +72,10 @@ class BlockMapper {
     const double c[3] = {centre.x, centre.y, centre.z};
     const double radius = std::sqrt(double(half[0]) * half[0] + double(half[1]) * half[1] + double(half[2]) * half[2]);
     // Single precision rounds more, the farther the block lies from the surface.
-    margin_ =
-        tree_.view.margin * static_cast<float>(std::max(1.0, std::max(std::abs(c[0]), std::max(std::abs(c[1]), std::abs(c[2]))) / 128));
-    const double limit = std::isfinite(reach_) ? (static_cast<double>(reach_) + radius) * 1.00001 + static_cast<double>(margin_) : 1e150;
+    margin_ = tree_.view.margin * static_cast<float>(std::max(
+                                      1.0, std::max(std::abs(c[0]), std::max(std::abs(c[1]), std::abs(c[2]))) / 128));
+    const double limit =
+        std::isfinite(reach_) ? (static_cast<double>(reach_) + radius) * 1.00001 + static_cast<double>(margin_) : 1e150;
     const distance::Nearest nearest = kernel_.closest(tree_.view, c, hint, limit * limit);
     if (nearest.triangle == ClosestPoint::kNone) return;
     hint = nearest.triangle;
@@ -94,7 +96,9 @@ class BlockMapper {
     descend(at, edge, s_.ids.data(), count, 0);
   }
 
-  [[nodiscard]] float half_of(int edge, std::size_t axis) const { return static_cast<float>((edge - 1) / 2.0 * step_[axis]) * 1.000001F; }
+  [[nodiscard]] float half_of(int edge, std::size_t axis) const {
+    return static_cast<float>((edge - 1) / 2.0 * step_[axis]) * 1.000001F;
+  }
   [[nodiscard]] Vec3 centre_of(std::array<int, 3> at, int edge) const {
     const double h = (edge - 1) / 2.0;
     return {origin_.x + (lo_[0] + at[0] + h) * step_.x, origin_.y + (lo_[1] + at[1] + h) * step_.y,
@@ -186,7 +190,8 @@ class BlockMapper {
       const int full = (n + 7) / 8 * 8;
       for (int i = n; i < full; ++i) x[i] = x[n - 1], y[i] = y[n - 1], z[i] = z[n - 1];
       for (int i = 0; i < full; ++i) d2[i] = std::numeric_limits<double>::infinity(), id[i] = ClosestPoint::kNone;
-      kernel_.measure_block(tree_.view.exact, ids, static_cast<int>(count), x.data(), y.data(), z.data(), full, d2.data(), id.data());
+      kernel_.measure_block(tree_.view.exact, ids, static_cast<int>(count), x.data(), y.data(), z.data(), full,
+                            d2.data(), id.data());
       for (int i = 0; i < n; ++i) {
         s_.best_d2[voxel[i]] = d2[i];
         s_.best_id[voxel[i]] = id[i];
@@ -219,7 +224,8 @@ class BlockMapper {
     if (s_.d2.size() < full) s_.d2.resize(s_.pair_id.size());
     const Vec3 o = centre_of({0, 0, 0}, 1);
     const double origin[3] = {o.x, o.y, o.z}, step[3] = {step_.x, step_.y, step_.z};
-    kernel_.measure_voxels(tree_.view.exact, s_.pair_id.data(), s_.pair_voxel.data(), static_cast<int>(full), origin, step, s_.d2.data());
+    kernel_.measure_voxels(tree_.view.exact, s_.pair_id.data(), s_.pair_voxel.data(), static_cast<int>(full), origin,
+                           step, s_.d2.data());
     for (std::size_t i = 0; i < n;) {
       const std::uint32_t v = s_.pair_voxel[i];
       double best = s_.d2[i];
@@ -243,8 +249,8 @@ class BlockMapper {
   float reach_ = 0, margin_ = 0;
 };
 
-// From which edge on it is cheapest to hand lists down, for surfaces with `density` triangles a voxel face. Nanoseconds a
-// voxel, as measured: a question to the tree, and a triangle tried for a child.
+// From which edge on it is cheapest to hand lists down, for surfaces with `density` triangles a voxel face. Nanoseconds
+// a voxel, as measured: a question to the tree, and a triangle tried for a child.
 inline int start_edge(double density) {
   constexpr double kAsk = 4000, kTry = 1.4;
   const auto list = [&](int edge, double slack) {
@@ -266,4 +272,4 @@ inline int start_edge(const TriangleTree::Data& tree, const Frame& frame) {
   return start_edge(tree.area > 0 ? std::max(1e-6, tree.view.triangles / (tree.area / (face * face))) : 1.0);
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -15,7 +15,9 @@ struct Piece {
   Vec3 a, b, c;
   double upper;         // no point of it is farther than this
   std::uint64_t order;  // ties
-  friend bool operator<(const Piece& x, const Piece& y) { return x.upper != y.upper ? x.upper < y.upper : x.order > y.order; }
+  friend bool operator<(const Piece& x, const Piece& y) {
+    return x.upper != y.upper ? x.upper < y.upper : x.order > y.order;
+  }
 };
 
 OneWayDistance one_way(const TriangleSoup& from, const TriangleTree& to, double extent, const Context& context) {
@@ -98,7 +100,8 @@ OneWayDistance one_way(const TriangleSoup& from, const TriangleTree& to, double 
     for (const auto& part : parts) {
       const Vec3 m = (part[0] + part[1] + part[2]) / 3;
       const double d = offer(m);
-      const double upper = std::min(q.upper, d + std::max({length(part[0] - m), length(part[1] - m), length(part[2] - m)}));
+      const double upper =
+          std::min(q.upper, d + std::max({length(part[0] - m), length(part[1] - m), length(part[2] - m)}));
       if (upper > result.max_mm + tolerance) queue.push({part[0], part[1], part[2], upper, order++});
     }
     questions += 7;
@@ -126,4 +129,4 @@ SurfaceComparison compare_surfaces(const TriangleSoup& a, const TriangleSoup& b,
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -46,7 +46,9 @@ std::uint64_t DistanceMap::count() const {
 
 std::int64_t DistanceMap::find(int i, int j, int k) const {
   const Ijk b{i >> 3, j >> 3, k >> 3};
-  const auto before = [](const Ijk& x, const Ijk& y) { return x.k != y.k ? x.k < y.k : x.j != y.j ? x.j < y.j : x.i < y.i; };
+  const auto before = [](const Ijk& x, const Ijk& y) {
+    return x.k != y.k ? x.k < y.k : x.j != y.j ? x.j < y.j : x.i < y.i;
+  };
   const auto it = std::lower_bound(bricks.begin(), bricks.end(), b, before);
   if (it == bricks.end() || !(*it == b)) return -1;
   const auto brick = static_cast<std::size_t>(it - bricks.begin());
@@ -81,7 +83,8 @@ DistanceMap DistanceMapper::map_of(const VoxelBits& wanted, double reach_mm, con
   return run(&wanted, reach_mm, reach_mm, context);
 }
 
-DistanceMap DistanceMapper::run(const VoxelBits* wanted, double inside_mm, double outside_mm, const Context& context) const {
+DistanceMap DistanceMapper::run(const VoxelBits* wanted, double inside_mm, double outside_mm,
+                                const Context& context) const {
   const TriangleTree::Data& tree = tree_.data();
   const auto& dims = frame_.dims;
   const auto blocks = [&](std::size_t a) { return static_cast<std::size_t>((dims[a] + kBlock - 1) / kBlock); };
@@ -102,7 +105,8 @@ DistanceMap DistanceMapper::run(const VoxelBits* wanted, double inside_mm, doubl
                                     static_cast<int>(r / blocks(1)) * kBlock};
         // 16 divides 64: a block's bits lie in one word of each row.
         const auto read = [&](const VoxelBits& bits, int j, int k) {
-          return static_cast<std::uint16_t>(bits.words[bits.row(j, k) + static_cast<std::size_t>(lo[0]) / 64] >> (lo[0] % 64));
+          return static_cast<std::uint16_t>(bits.words[bits.row(j, k) + static_cast<std::size_t>(lo[0]) / 64] >>
+                                            (lo[0] % 64));
         };
         const auto in_box = static_cast<std::uint16_t>(dims[0] - lo[0] >= 16 ? 0xffff : (1 << (dims[0] - lo[0])) - 1);
         std::array<std::uint16_t, 256> want{}, in{};
@@ -181,7 +185,8 @@ DistanceMap DistanceMapper::run(const VoxelBits* wanted, double inside_mm, doubl
       const BlockResult& from = results[order[o].first];
       const std::size_t b = order[o].second;
       map.bricks[o] = from.bricks[b];
-      std::copy_n(from.stored.begin() + static_cast<std::ptrdiff_t>(b * 8), 8, map.stored.begin() + static_cast<std::ptrdiff_t>(o * 8));
+      std::copy_n(from.stored.begin() + static_cast<std::ptrdiff_t>(b * 8), 8,
+                  map.stored.begin() + static_cast<std::ptrdiff_t>(o * 8));
       std::copy_n(from.distance_mm.begin() + static_cast<std::ptrdiff_t>(b * 512), 512,
                   map.distance_mm.begin() + static_cast<std::ptrdiff_t>(o * 512));
       std::copy_n(from.triangle.begin() + static_cast<std::ptrdiff_t>(b * 512), 512,
@@ -201,4 +206,4 @@ SparseGrid to_sparse(const DistanceMap& map) {
   return to_sparse(map.frame, "distance_mm", map.bricks, map.stored, values, farthest);
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -1,21 +1,22 @@
 // The inner loops over triangles and boxes, compiled for several instruction sets. Private to libs/geometry/distance.
 //
 // Everything in single precision only decides what may be left out, with a margin for its own rounding; what is kept is
-// measured by `measure` in double precision, whose operations are the same in every instruction set. So results are equal.
-// Lengths are in units of the tree (mm times a power of two), relative to the tree's centre.
+// measured by `measure` in double precision, whose operations are the same in every instruction set. So results are
+// equal. Lengths are in units of the tree (mm times a power of two), relative to the tree's centre.
 #pragma once
 #include <cstdint>
 
 namespace osteo::inline geometry::distance {
 
-/// A triangle for culling: corner A (opposite the longest edge), unit edges u = AB, v = AC, their lengths and that of BC.
-/// `face` = 1/(1 - (u.v)^2), or NaN when the triangle is too thin for a face in single precision. `slack` bounds by how much
-/// single precision may overestimate the distance.
+/// A triangle for culling: corner A (opposite the longest edge), unit edges u = AB, v = AC, their lengths and that of
+/// BC. `face` = 1/(1 - (u.v)^2), or NaN when the triangle is too thin for a face in single precision. `slack` bounds by
+/// how much single precision may overestimate the distance.
 struct alignas(64) TriangleRecord {
   float ax, ay, az, ux, uy, uz, vx, vy, vz, u_length, v_length, w_length, inverse_w, cosine, face, slack;
 };
 
-/// A triangle for measuring: corners, unit normal (NaN when it has none), 1/length^2 of AB, AC, BC (0 when without length).
+/// A triangle for measuring: corners, unit normal (NaN when it has none), 1/length^2 of AB, AC, BC (0 when without
+/// length).
 struct alignas(128) ExactTriangle {
   double a[3], b[3], c[3], n[3], inverse_ab, inverse_ac, inverse_bc;
   double turned;  ///< 0, 1, 2: A is the first, second, third corner as given
@@ -26,8 +27,8 @@ struct alignas(64) BoxGroup {
   float lo[3][16], hi[3][16];
 };
 
-/// The tree as the loops see it. Triangle t is in pack t / 16; pack p has box p % 16 of boxes[0][p / 16]; group g of a level
-/// has box g % 16 of group g / 16 of the next. The last level is one group. Records are padded to whole packs.
+/// The tree as the loops see it. Triangle t is in pack t / 16; pack p has box p % 16 of boxes[0][p / 16]; group g of a
+/// level has box g % 16 of group g / 16 of the next. The last level is one group. Records are padded to whole packs.
 struct TreeView {
   static constexpr int kMaxLevels = 8;
   const TriangleRecord* records;
@@ -35,10 +36,12 @@ struct TreeView {
   const BoxGroup* boxes[kMaxLevels];
   int levels;
   std::uint32_t triangles;
-  float margin;  ///< rounding of any single-precision distance within 128 units of the centre, besides each triangle's slack
+  float margin;  ///< rounding of any single-precision distance within 128 units of the centre, besides each triangle's
+                 ///< slack
 };
 
-/// What is nearest to `centre`, and so bounds the distance of all points near it: distance and unit direction from there to it.
+/// What is nearest to `centre`, and so bounds the distance of all points near it: distance and unit direction from
+/// there to it.
 struct Pivot {
   float distance;
   float direction[3];
@@ -70,11 +73,11 @@ struct Kernel {
   void (*filter)(FilterTask&);
   /// d2[i] of voxel i to triangle ids[i]. A voxel is x + 16 y + 256 z; its centre is origin + step * (x, y, z).
   /// Readable and writable up to the next multiple of 8.
-  void (*measure_voxels)(const ExactTriangle*, const std::uint32_t* ids, const std::uint32_t* voxels, int count, const double origin[3],
-                         const double step[3], double* d2);
+  void (*measure_voxels)(const ExactTriangle*, const std::uint32_t* ids, const std::uint32_t* voxels, int count,
+                         const double origin[3], const double step[3], double* d2);
   /// Points to all of a list of triangles: `best` is brought down where a triangle is nearer.
-  void (*measure_block)(const ExactTriangle*, const std::uint32_t* ids, int count, const double* px, const double* py, const double* pz,
-                        int points, double* best_d2, std::uint32_t* best_id);
+  void (*measure_block)(const ExactTriangle*, const std::uint32_t* ids, int count, const double* px, const double* py,
+                        const double* pz, int points, double* best_d2, std::uint32_t* best_id);
   /// The triangle nearest to a point. `hint` is any triangle; a near one makes it fast. Only triangles nearer than
   /// sqrt(limit_d2); else triangle = 0xffffffff. Allocates nothing.
   Nearest (*closest)(const TreeView&, const double point[3], std::uint32_t hint, double limit_d2);
@@ -93,4 +96,4 @@ extern const Kernel kAvx512;
 /// The one for simd().
 const Kernel& kernel();
 
-}  // namespace osteo::geometry::distance
+}  // namespace osteo::inline geometry::distance

@@ -137,5 +137,5 @@ inline void load_exact(const ExactTriangle* exact, const std::uint32_t* ids, D* 
 
 const Kernel kAvx2{filter, measure_voxels, measure_block, closest, collect};
 
-}  // namespace osteo::geometry::distance
+}  // namespace osteo::inline geometry::distance
 #endif

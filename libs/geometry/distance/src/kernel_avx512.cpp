@@ -103,7 +103,8 @@ inline Lanes load_records(const TriangleRecord* records, const std::uint32_t* id
   Lanes l;
   for (int c = 0; c < 4; ++c) {
     const __m512 p = _mm512_shuffle_f32x4(r[c], r[4 + c], 0x88), q = _mm512_shuffle_f32x4(r[c], r[4 + c], 0xdd);
-    const __m512 s = _mm512_shuffle_f32x4(r[8 + c], r[12 + c], 0x88), u = _mm512_shuffle_f32x4(r[8 + c], r[12 + c], 0xdd);
+    const __m512 s = _mm512_shuffle_f32x4(r[8 + c], r[12 + c], 0x88),
+                 u = _mm512_shuffle_f32x4(r[8 + c], r[12 + c], 0xdd);
     l.f[c].v = _mm512_shuffle_f32x4(p, s, 0x88);
     l.f[8 + c].v = _mm512_shuffle_f32x4(p, s, 0xdd);
     l.f[4 + c].v = _mm512_shuffle_f32x4(q, u, 0x88);
@@ -123,7 +124,8 @@ inline void load_exact(const ExactTriangle* exact, const std::uint32_t* ids, D* 
     }
     for (int o = 0; o < 2; ++o) {
       const __m512d p = _mm512_shuffle_f64x2(t[o], t[2 + o], 0x88), q = _mm512_shuffle_f64x2(t[o], t[2 + o], 0xdd);
-      const __m512d s = _mm512_shuffle_f64x2(t[4 + o], t[6 + o], 0x88), u = _mm512_shuffle_f64x2(t[4 + o], t[6 + o], 0xdd);
+      const __m512d s = _mm512_shuffle_f64x2(t[4 + o], t[6 + o], 0x88),
+                    u = _mm512_shuffle_f64x2(t[4 + o], t[6 + o], 0xdd);
       f[8 * h + o].v = _mm512_shuffle_f64x2(p, s, 0x88);
       f[8 * h + 4 + o].v = _mm512_shuffle_f64x2(p, s, 0xdd);
       f[8 * h + 2 + o].v = _mm512_shuffle_f64x2(q, u, 0x88);
@@ -136,6 +138,6 @@ inline void load_exact(const ExactTriangle* exact, const std::uint32_t* ids, D* 
 
 const Kernel kAvx512{filter, measure_voxels, measure_block, closest, collect};
 
-}  // namespace osteo::geometry::distance
+}  // namespace osteo::inline geometry::distance
 #pragma GCC diagnostic pop
 #endif

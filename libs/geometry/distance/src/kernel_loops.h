@@ -1,8 +1,8 @@
 // The loops of kernel.h, written once over
 //   F: a vector of kF floats   (F::load, F::all; + - *; fma, fnma, min, max, select, at_least, at_most, less, root)
 //   D: a vector of kD doubles  (the same, without fused operations)
-// Included by kernel_*.cpp after those. No library functions here: each file is compiled for another instruction set, and an
-// inline function shared with the rest of the program could end up there in a form this machine cannot run.
+// Included by kernel_*.cpp after those. No library functions here: each file is compiled for another instruction set,
+// and an inline function shared with the rest of the program could end up there in a form this machine cannot run.
 
 namespace {
 
@@ -182,15 +182,16 @@ inline D measure(const D* f, D px, D py, D pz) {
   const auto left = [&](D ex, D ey, D ez, D qx, D qy, D qz) {
     return dot3(ny * ez - nz * ey, nz * ex - nx * ez, nx * ey - ny * ex, qx, qy, qz);
   };
-  const auto inside = both(both(at_least(left(abx, aby, abz, pax, pay, paz), zero), at_least(zero, left(acx, acy, acz, pax, pay, paz))),
-                           at_least(left(bcx, bcy, bcz, pbx, pby, pbz), zero));
+  const auto inside =
+      both(both(at_least(left(abx, aby, abz, pax, pay, paz), zero), at_least(zero, left(acx, acy, acz, pax, pay, paz))),
+           at_least(left(bcx, bcy, bcz, pbx, pby, pbz), zero));
   // The height over the plane, measured from the foot on the longest edge: exact to rounding even for slivers.
   const D h = dot3(pbx - sbc * bcx, pby - sbc * bcy, pbz - sbc * bcz, nx, ny, nz);
   return select(inside, min(h * h, edges), edges);
 }
 
-void measure_voxels(const ExactTriangle* exact, const std::uint32_t* ids, const std::uint32_t* voxels, int count, const double origin[3],
-                    const double step[3], double* d2) {
+void measure_voxels(const ExactTriangle* exact, const std::uint32_t* ids, const std::uint32_t* voxels, int count,
+                    const double origin[3], const double step[3], double* d2) {
   const D ox = D::all(origin[0]), oy = D::all(origin[1]), oz = D::all(origin[2]);
   const D sx = D::all(step[0]), sy = D::all(step[1]), sz = D::all(step[2]);
   for (int i = 0; i < count; i += kD) {
@@ -206,8 +207,8 @@ void measure_voxels(const ExactTriangle* exact, const std::uint32_t* ids, const 
   }
 }
 
-void measure_block(const ExactTriangle* exact, const std::uint32_t* ids, int count, const double* px, const double* py, const double* pz,
-                   int points, double* best_d2, std::uint32_t* best_id) {
+void measure_block(const ExactTriangle* exact, const std::uint32_t* ids, int count, const double* px, const double* py,
+                   const double* pz, int points, double* best_d2, std::uint32_t* best_id) {
   for (int t = 0; t < count; ++t) {
     const auto* e = reinterpret_cast<const double*>(exact + ids[t]);
     D f[16];
@@ -257,7 +258,8 @@ Nearest closest(const TreeView& tree, const double p[3], std::uint32_t hint, dou
   const float q[3] = {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
   const F px = F::all(q[0]), py = F::all(q[1]), pz = F::all(q[2]);
   // A far point rounds more than the tree does.
-  const float size = __builtin_fmaxf(__builtin_fmaxf(__builtin_fabsf(q[0]), __builtin_fabsf(q[1])), __builtin_fabsf(q[2]));
+  const float size =
+      __builtin_fmaxf(__builtin_fmaxf(__builtin_fabsf(q[0]), __builtin_fabsf(q[1])), __builtin_fabsf(q[2]));
   const float margin = tree.margin + size * 2e-6F;
   Nearest best{limit_d2, kNone};
   float reach = 0;
@@ -316,8 +318,8 @@ Nearest closest(const TreeView& tree, const double p[3], std::uint32_t hint, dou
   return best;
 }
 
-int collect(const TreeView& tree, const float centre[3], const float half[3], const Pivot& pivot, float reach, float margin,
-            std::uint32_t* packs) {
+int collect(const TreeView& tree, const float centre[3], const float half[3], const Pivot& pivot, float reach,
+            float margin, std::uint32_t* packs) {
   struct Entry {
     std::uint32_t group;
     int level;
@@ -345,8 +347,9 @@ int collect(const TreeView& tree, const float centre[3], const float half[3], co
       const F dz = pz - min(max(pz, lz), F::load(g.hi[2] + i));
       const F d2 = max(fma(dx, dx, fma(dy, dy, dz * dz)), tiny);
       const F inverse = inverse_root(d2);
-      const F turn = fma(hx, absolute(fma(dx, inverse, zero - ox)),
-                         fma(hy, absolute(fma(dy, inverse, zero - oy)), fma(hz, absolute(fma(dz, inverse, zero - oz)), curve)));
+      const F turn =
+          fma(hx, absolute(fma(dx, inverse, zero - ox)),
+              fma(hy, absolute(fma(dy, inverse, zero - oy)), fma(hz, absolute(fma(dz, inverse, zero - oz)), curve)));
       // Empty boxes have lo > hi far away: their distance is huge.
       keep |= bits(at_most(d2 * inverse, min(base + min(turn, most), limit))) << i;
     }

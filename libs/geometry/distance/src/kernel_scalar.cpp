@@ -73,4 +73,4 @@ Lanes load_records(const TriangleRecord* records, const std::uint32_t* ids) {
 
 const Kernel kScalar{filter, measure_voxels, measure_block, closest, collect};
 
-}  // namespace osteo::geometry::distance
+}  // namespace osteo::inline geometry::distance

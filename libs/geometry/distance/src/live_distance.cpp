@@ -9,7 +9,8 @@
 
 namespace osteo::inline geometry {
 
-LiveDistance::LiveDistance(const TriangleSoup& surface, const Frame& frame, double reach_mm, const InsideAt& inside, const Context& context)
+LiveDistance::LiveDistance(const TriangleSoup& surface, const Frame& frame, double reach_mm, const InsideAt& inside,
+                           const Context& context)
     : frame_(frame), reach_mm_(reach_mm) {
   require_sound(surface);
   std::size_t count = 1;
@@ -21,7 +22,8 @@ LiveDistance::LiveDistance(const TriangleSoup& surface, const Frame& frame, doub
   table_.assign(count, -1);
   std::vector<std::array<Vec3, 3>> added;
   added.reserve(surface.triangles.size());
-  for (const auto& t : surface.triangles) added.push_back({surface.points_mm[t[0]], surface.points_mm[t[1]], surface.points_mm[t[2]]});
+  for (const auto& t : surface.triangles)
+    added.push_back({surface.points_mm[t[0]], surface.points_mm[t[1]], surface.points_mm[t[2]]});
   context.check_cancelled();
   update({}, added, inside);
 }
@@ -130,7 +132,8 @@ std::uint32_t LiveDistance::update(std::span<const std::uint32_t> removed, std::
   return first_added;
 }
 
-void LiveDistance::measure(std::array<int, 3> lo, std::array<int, 3> hi, const VoxelBits& wanted, const InsideAt& inside) {
+void LiveDistance::measure(std::array<int, 3> lo, std::array<int, 3> hi, const VoxelBits& wanted,
+                           const InsideAt& inside) {
   // Triangles that can be within reach of a wanted voxel, by cells.
   std::array<int, 3> from = hi, to = lo;
   for (int k = lo[2]; k < hi[2]; ++k) {
@@ -225,4 +228,4 @@ void LiveDistance::measure(std::array<int, 3> lo, std::array<int, 3> hi, const V
   }
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

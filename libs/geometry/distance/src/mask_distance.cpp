@@ -5,13 +5,13 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
-#include "osteo/geometry/grid/brick_values.h"
 #include "osteo/geometry/distance/binary_distance.h"
+#include "osteo/geometry/grid/brick_values.h"
 
 namespace osteo::inline geometry {
 
-MaskDistance mask_distance(const Labels& labels, std::span<const std::uint8_t> wanted, const DistanceMapOptions& options, bool name_nearest,
-                           const Context& context) {
+MaskDistance mask_distance(const Labels& labels, std::span<const std::uint8_t> wanted,
+                           const DistanceMapOptions& options, bool name_nearest, const Context& context) {
   const Frame& f = labels.frame;
   std::array<std::uint8_t, 256> is{};
   for (const std::uint8_t v : wanted) is[v] = 1;
@@ -33,7 +33,8 @@ MaskDistance mask_distance(const Labels& labels, std::span<const std::uint8_t> w
     const auto most = band ? static_cast<float>(reach * reach * (1 + 1e-6)) : std::numeric_limits<float>::infinity();
     parallel_for(count, 16, context.threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t b = begin; b < end; ++b) {
-        const auto bi = static_cast<int>(b % bricks_along(0)) * 8, bj = static_cast<int>(b / bricks_along(0) % bricks_along(1)) * 8,
+        const auto bi = static_cast<int>(b % bricks_along(0)) * 8,
+                   bj = static_cast<int>(b / bricks_along(0) % bricks_along(1)) * 8,
                    bk = static_cast<int>(b / bricks_along(0) / bricks_along(1)) * 8;
         for (int z = 0; z < std::min(8, f.dims[2] - bk); ++z) {
           for (int y = 0; y < std::min(8, f.dims[1] - bj); ++y) {
@@ -58,7 +59,8 @@ MaskDistance mask_distance(const Labels& labels, std::span<const std::uint8_t> w
     for (const std::uint8_t v : labels.span()) present[v] = is[v];
     for (int value = 1; value < 256; ++value) {
       if (present[static_cast<std::size_t>(value)] == 0) continue;
-      const std::vector<float> d2 = squared_distance_mm2(labels.span(), f, static_cast<std::uint8_t>(value), context.sub(0.9, 0.9));
+      const std::vector<float> d2 =
+          squared_distance_mm2(labels.span(), f, static_cast<std::uint8_t>(value), context.sub(0.9, 0.9));
       parallel_for(count, 16, context.threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t b = begin; b < end; ++b) {
           if (values[b].empty()) continue;
@@ -66,12 +68,13 @@ MaskDistance mask_distance(const Labels& labels, std::span<const std::uint8_t> w
             names[b].assign(512, 0.0F);
             best[b].assign(512, std::numeric_limits<float>::infinity());
           }
-          const auto bi = static_cast<int>(b % bricks_along(0)) * 8, bj = static_cast<int>(b / bricks_along(0) % bricks_along(1)) * 8,
+          const auto bi = static_cast<int>(b % bricks_along(0)) * 8,
+                     bj = static_cast<int>(b / bricks_along(0) % bricks_along(1)) * 8,
                      bk = static_cast<int>(b / bricks_along(0) / bricks_along(1)) * 8;
           for (std::size_t v = 0; v < 512; ++v) {
             if ((stored[b * 8 + (v >> 6)] >> (v & 63) & 1U) == 0) continue;
-            const float d =
-                d2[labels.offset(bi + static_cast<int>(v & 7), bj + static_cast<int>(v >> 3 & 7), bk + static_cast<int>(v >> 6))];
+            const float d = d2[labels.offset(bi + static_cast<int>(v & 7), bj + static_cast<int>(v >> 3 & 7),
+                                             bk + static_cast<int>(v >> 6))];
             if (d >= best[b][v]) continue;
             best[b][v] = d;
             names[b][v] = static_cast<float>(value);
@@ -102,4 +105,4 @@ MaskDistance mask_distance(const Labels& labels, std::span<const std::uint8_t> w
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -47,8 +47,8 @@ bool SignedDistance::inside(Vec3 p) const {
     const Entry e = stack[--top];
     const distance::BoxGroup& g = d.view.boxes[e.level][e.group];
     for (std::uint32_t i = 0; i < 16; ++i) {
-      if (g.lo[0][i] - margin > q.x || g.lo[1][i] - margin > q.y || g.hi[1][i] + margin < q.y || g.lo[2][i] - margin > q.z ||
-          g.hi[2][i] + margin < q.z)
+      if (g.lo[0][i] - margin > q.x || g.lo[1][i] - margin > q.y || g.hi[1][i] + margin < q.y ||
+          g.lo[2][i] - margin > q.z || g.hi[2][i] + margin < q.z)
         continue;
       const std::uint32_t item = e.group * 16 + i;
       if (e.level > 0) {
@@ -65,4 +65,4 @@ bool SignedDistance::inside(Vec3 p) const {
   return fans_->beyond_half(winding + fans_->crossings_before(p), p);
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -95,12 +95,14 @@ std::optional<SolidSurface> solid_of(const TriangleSoup& input, const Context& c
             [](const Edge& x, const Edge& y) { return std::tie(x.a, x.b, x.layer) < std::tie(y.a, y.b, y.layer); });
   for (std::size_t i = 0, j = 0; i < edges.size(); i = j) {
     for (j = i + 1; j < edges.size() && edges[j].a == edges[i].a && edges[j].b == edges[i].b;) ++j;
-    if (j - i == 2 && edges[i].forward != edges[i + 1].forward && layers[edges[i].layer].net == layers[edges[i + 1].layer].net)
+    if (j - i == 2 && edges[i].forward != edges[i + 1].forward &&
+        layers[edges[i].layer].net == layers[edges[i + 1].layer].net)
       join_sets(parent, edges[i].layer, edges[i + 1].layer);
   }
   std::map<std::uint32_t, std::pair<std::uint32_t, double>> largest;  // of each patch
   for (std::uint32_t s = 0; s < layers.size(); ++s) {
-    const double area = length(cross(corner(layers[s], 1) - corner(layers[s], 0), corner(layers[s], 2) - corner(layers[s], 0)));
+    const double area =
+        length(cross(corner(layers[s], 1) - corner(layers[s], 0), corner(layers[s], 2) - corner(layers[s], 0)));
     auto& [which, most] = largest.try_emplace(root_of(parent, s), s, -1.0).first->second;
     if (area > most) which = s, most = area;
   }
@@ -113,7 +115,8 @@ std::optional<SolidSurface> solid_of(const TriangleSoup& input, const Context& c
     double others = 0;
     for (std::uint32_t s = 0; s < layers.size(); ++s) {
       if (s != found.first && layers[s].net != 0)
-        others += layers[s].net * corner_solid_angle(corner(layers[s], 0), corner(layers[s], 1), corner(layers[s], 2), p);
+        others +=
+            layers[s].net * corner_solid_angle(corner(layers[s], 0), corner(layers[s], 1), corner(layers[s], 2), p);
     }
     const double behind = others + own.net / 2.0, before = others - own.net / 2.0;
     const auto inside = [](double w) { return std::abs(w) > 0.5; };
@@ -159,14 +162,15 @@ double inside_volume_mm3(const TriangleSoup& soup, const Context& context) {
   if (!is_closed(whole)) return static_cast<double>(bits.count()) * frame.voxel_volume_mm3();
   const auto solid = solid_of(soup, context);
   if (!solid) return 0;
-  // The divergence theorem counts a place as often as the surface winds about it. What that is too much is counted in voxels, so that only
-  // it is as coarse as these, and nothing where nothing overlaps.
-  // A surface that was sound is not counted again.
+  // The divergence theorem counts a place as often as the surface winds about it. What that is too much is counted in
+  // voxels, so that only it is as coarse as these, and nothing where nothing overlaps. A surface that was sound is not
+  // counted again.
   InsideReport of_solid = report;
-  const bool untouched = solid->buried == 0 && solid->turned == 0 && solid->soup.triangles.size() == whole.triangles.size();
+  const bool untouched =
+      solid->buried == 0 && solid->turned == 0 && solid->soup.triangles.size() == whole.triangles.size();
   const bool same = untouched || voxels_inside(solid->soup, frame, context, &of_solid).words == bits.words;
   const TriangleSoup& used = same ? solid->soup : whole;
   return divergence(used) - static_cast<double>(same ? of_solid.surplus : report.surplus) * frame.voxel_volume_mm3();
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

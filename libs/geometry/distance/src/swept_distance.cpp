@@ -12,7 +12,8 @@ namespace osteo::inline geometry {
 std::vector<double> swept_distance_mm(const TriangleSoup& soup, const Frame& frame, const Context& context) {
   require_sound(soup);
   require_valid(frame);
-  if (soup.triangles.empty()) throw Error(ExitCode::failed, "the surface has no triangles, so nothing has a distance to it");
+  if (soup.triangles.empty())
+    throw Error(ExitCode::failed, "the surface has no triangles, so nothing has a distance to it");
   const Vec3 s = frame.spacing_mm;
   const Mat3 back = inverse(frame.direction);
   std::vector<Vec3> points;
@@ -26,7 +27,8 @@ std::vector<double> swept_distance_mm(const TriangleSoup& soup, const Frame& fra
   std::vector<std::uint32_t> nearest(d2.size(), kNone);
   const auto& n = frame.dims;
   const auto offset = [&](int i, int j, int k) {
-    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(n[1]) + static_cast<std::size_t>(j)) * static_cast<std::size_t>(n[0]) +
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(n[1]) + static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(n[0]) +
            static_cast<std::size_t>(i);
   };
   const auto offer = [&](std::size_t at, int i, int j, int k, std::uint32_t t) {
@@ -80,4 +82,4 @@ std::vector<double> swept_distance_mm(const TriangleSoup& soup, const Frame& fra
   return d2;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -41,12 +41,14 @@ struct ThesisDistance::Tree {
     const std::size_t axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
     const auto centre = [&](std::uint32_t t) { return exact[t].a[axis] + exact[t].b[axis] + exact[t].c[axis]; };
     const double middle = 1.5 * (node.lo[axis] + node.hi[axis]);
-    const auto first = order.begin() + static_cast<std::ptrdiff_t>(begin), last = order.begin() + static_cast<std::ptrdiff_t>(end);
+    const auto first = order.begin() + static_cast<std::ptrdiff_t>(begin),
+               last = order.begin() + static_cast<std::ptrdiff_t>(end);
     auto split = std::stable_partition(first, last, [&](std::uint32_t t) { return centre(t) < middle; });
     if (split == first || split == last) {
       split = first + (last - first) / 2;
-      std::nth_element(first, split, last,
-                       [&](std::uint32_t x, std::uint32_t y) { return std::make_pair(centre(x), x) < std::make_pair(centre(y), y); });
+      std::nth_element(first, split, last, [&](std::uint32_t x, std::uint32_t y) {
+        return std::make_pair(centre(x), x) < std::make_pair(centre(y), y);
+      });
     }
     const auto at = static_cast<std::size_t>(split - order.begin());
     const std::int32_t left = build(order, begin, at, id);
@@ -131,4 +133,4 @@ std::vector<double> ThesisDistance::distances_mm(std::span<const Vec3> points, c
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -28,7 +28,8 @@ struct TriangleTree::Data {
 };
 
 namespace distance {
-/// The closest point on a triangle of the tree, in its units: d2 as `measure` gives it is not used here, only the place.
+/// The closest point on a triangle of the tree, in its units: d2 as `measure` gives it is not used here, only the
+/// place.
 struct Place {
   Vec3 point;
   Feature feature;
@@ -37,4 +38,4 @@ struct Place {
 [[nodiscard]] ExactTriangle make_exact(Vec3 a, Vec3 b, Vec3 c);
 }  // namespace distance
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

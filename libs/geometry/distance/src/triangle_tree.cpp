@@ -117,7 +117,8 @@ TriangleRecord make_record(const ExactTriangle& t, float margin) {
   const double sine2 = dot(n, n);
   // Which edge is nearest is decided from squares that rounding blurs by about eps * length^2.
   const double edges = 6e-4 * lw;
-  // With the face: the foot of the perpendicular is off by 1/sine^2 times rounding. Without it: by the triangle's height.
+  // With the face: the foot of the perpendicular is off by 1/sine^2 times rounding. Without it: by the triangle's
+  // height.
   const double inverse_sine2 = 1 / sine2, with_face = margin * inverse_sine2, height = lu * lv * std::sqrt(sine2) * iw;
   const bool face = sine2 > 1e-6 && with_face < height;
   const auto f = [](double x) { return static_cast<float>(x); };
@@ -145,7 +146,8 @@ void build_boxes(TriangleTree::Data& d, const Context& context) {
   std::size_t items = (n + 15) / 16;
   const auto outward = [](double v, int direction) {
     const auto f = static_cast<float>(v);
-    return std::nextafterf(f, direction < 0 ? -std::numeric_limits<float>::infinity() : std::numeric_limits<float>::infinity());
+    return std::nextafterf(
+        f, direction < 0 ? -std::numeric_limits<float>::infinity() : std::numeric_limits<float>::infinity());
   };
   for (int level = 0;; ++level) {
     const std::size_t groups = (items + 15) / 16;
@@ -261,7 +263,8 @@ TriangleTree::TriangleTree(const TriangleSoup& soup, const Mat3& axes, const Con
   }
   for (std::size_t i = 0; i < n; ++i) {
     const distance::TriangleRecord& r = d.records[i];
-    if (r.face > 0) d.area += 0.5 * static_cast<double>(r.u_length * r.v_length) / std::sqrt(static_cast<double>(r.face));
+    if (r.face > 0)
+      d.area += 0.5 * static_cast<double>(r.u_length * r.v_length) / std::sqrt(static_cast<double>(r.face));
   }
   distance::build_boxes(d, context);
   d.view.records = d.records.data();
@@ -274,8 +277,9 @@ std::size_t TriangleTree::triangle_count() const {
 }
 
 std::size_t TriangleTree::memory_bytes() const {
-  std::size_t sum = (triangle_count() + 15) / 16 * 16 * (sizeof(distance::TriangleRecord) + sizeof(distance::ExactTriangle)) +
-                    (data_->original.size() + data_->rank.size()) * 4;
+  std::size_t sum =
+      (triangle_count() + 15) / 16 * 16 * (sizeof(distance::TriangleRecord) + sizeof(distance::ExactTriangle)) +
+      (data_->original.size() + data_->rank.size()) * 4;
   for (const auto& b : data_->boxes) sum += b.size() * sizeof(distance::BoxGroup);
   return sum;
 }
@@ -285,8 +289,8 @@ ClosestPoint TriangleTree::closest(Vec3 point_mm, std::uint32_t hint, double lim
   const Vec3 p = d.to_tree(point_mm);
   const double q[3] = {p.x, p.y, p.z};
   const double limit = limit_mm / d.unit_mm;
-  const distance::Nearest n =
-      distance::kernel().closest(d.view, q, hint < d.rank.size() ? d.rank[hint] : hint, std::isfinite(limit) ? limit * limit : 1e300);
+  const distance::Nearest n = distance::kernel().closest(d.view, q, hint < d.rank.size() ? d.rank[hint] : hint,
+                                                         std::isfinite(limit) ? limit * limit : 1e300);
   ClosestPoint c;
   if (n.triangle == ClosestPoint::kNone) return c;
   const distance::Place place = distance::place_on(d.exact[n.triangle], p);
@@ -308,4 +312,4 @@ ClosestPoint closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
   return {std::sqrt(d2), 0, place.feature, place.point + p};
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

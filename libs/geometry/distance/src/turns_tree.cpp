@@ -33,8 +33,8 @@ TurnsTree::TurnsTree(std::vector<Fan> triangles) : triangles_(std::move(triangle
   nodes_.push_back({});
   nodes_[0].end = static_cast<std::uint32_t>(triangles_.size());
   for (std::uint32_t n = 0; n < nodes_.size(); ++n) build(n);
-  // An angle is off by some 1e-15; each addition by half a unit of the last place of a partial sum, which is at most half the weights.
-  // Twice, for the sum in order and for ours, and ours takes terms away again.
+  // An angle is off by some 1e-15; each addition by half a unit of the last place of a partial sum, which is at most
+  // half the weights. Twice, for the sum in order and for ours, and ours takes terms away again.
   const auto n = static_cast<double>(triangles_.size());
   rounding_ = 1e-10 + n * (4e-15 + 4.5e-16 * nodes_[0].weight);
 }
@@ -76,12 +76,16 @@ void TurnsTree::build(std::uint32_t index) {
     node.third += length(n) * most * most * most;
     n0 += n;
     trace += dot(n, m);
-    const std::array<double, 6> nm{n.x * m.x, n.y * m.y, n.z * m.z, n.y * m.z + n.z * m.y, n.z * m.x + n.x * m.z, n.x * m.y + n.y * m.x};
+    const std::array<double, 6> nm{
+        n.x * m.x, n.y * m.y, n.z * m.z, n.y * m.z + n.z * m.y, n.z * m.x + n.x * m.z, n.x * m.y + n.y * m.x};
     for (std::size_t k = 0; k < 6; ++k) first_order[k] += nm[k];
     // The mean of y y^T over a triangle.
-    const auto q = [&](std::size_t i, std::size_t j) { return (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + 9 * m[i] * m[j]) / 12; };
+    const auto q = [&](std::size_t i, std::size_t j) {
+      return (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + 9 * m[i] * m[j]) / 12;
+    };
     const double xx = q(0, 0), yy = q(1, 1), zz = q(2, 2), yz = q(1, 2), zx = q(2, 0), xy = q(0, 1);
-    u += n * (xx + yy + zz) + Vec3{n.x * xx + n.y * xy + n.z * zx, n.x * xy + n.y * yy + n.z * yz, n.x * zx + n.y * yz + n.z * zz} * 2;
+    u += n * (xx + yy + zz) +
+         Vec3{n.x * xx + n.y * xy + n.z * zx, n.x * xy + n.y * yy + n.z * yz, n.x * zx + n.y * yz + n.z * zz} * 2;
     const std::array<double, 10> own{n.x * xx,
                                      n.y * yy,
                                      n.z * zz,
@@ -138,10 +142,11 @@ TurnsTree::Turns TurnsTree::of(const Node& node, Vec3 p) const {
   const double zeroth = m[0] * x + m[1] * y + m[2] * z;
   const double first = m[4] * x * x + m[5] * y * y + m[6] * z * z + m[7] * y * z + m[8] * z * x + m[9] * x * y;
   const double trace = m[10] * x + m[11] * y + m[12] * z;
-  const double cubic = x * (x * (m[13] * x + m[16] * y + m[17] * z) + y * (m[18] * y + m[22] * z)) + y * (y * (m[14] * y + m[19] * z)) +
-                       z * (z * (m[15] * z + m[20] * x + m[21] * y));
+  const double cubic = x * (x * (m[13] * x + m[16] * y + m[17] * z) + y * (m[18] * y + m[22] * z)) +
+                       y * (y * (m[14] * y + m[19] * z)) + z * (z * (m[15] * z + m[20] * x + m[21] * y));
   const double value = (zeroth + m[3]) * i3 + i5 * (-3 * first - 1.5 * trace + 7.5 * cubic * i2);
-  // Rounding of the moments: a few units of the last place for each triangle, of sums that are below six times the area's.
+  // Rounding of the moments: a few units of the last place for each triangle, of sums that are below six times the
+  // area's.
   const double rounding = (node.end - node.begin + 64.0) * 2e-15 * node.area * i2 / kSphere;
   return {value / kSphere, error + rounding};
 }
@@ -190,7 +195,9 @@ TurnsTree::Turns TurnsTree::turns(Vec3 p, double tolerance) const {
 }
 
 bool TurnsTree::beyond_half(int winding, Vec3 p) const {
-  const auto decided = [&](const Turns& t) { return std::abs(std::abs(winding - t.value) - 0.5) > t.error + rounding_; };
+  const auto decided = [&](const Turns& t) {
+    return std::abs(std::abs(winding - t.value) - 0.5) > t.error + rounding_;
+  };
   const Turns t = refine(p, decided);
   return std::abs(winding - (decided(t) ? t.value : sum(p))) > 0.5;
 }
@@ -217,4 +224,4 @@ int TurnsTree::crossings_before(Vec3 p) const {
   return count;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

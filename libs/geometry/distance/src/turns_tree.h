@@ -1,4 +1,5 @@
-// How many turns many triangles make around a point, in a hierarchy with a proven bound. Private to libs/geometry/distance.
+// How many turns many triangles make around a point, in a hierarchy with a proven bound. Private to
+// libs/geometry/distance.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -8,16 +9,17 @@
 
 namespace osteo::inline geometry {
 
-/// Decides on which side of 1/2 a winding number is, as a sum over all triangles in their order would, at a fraction of its cost.
+/// Decides on which side of 1/2 a winding number is, as a sum over all triangles in their order would, at a fraction of
+/// its cost.
 ///
-/// A node stands for its triangles by the moments of their area up to second order about its centre (after G. Barill et al., Fast
-/// winding numbers for soups and clouds, ACM Trans. Graph. 2018). What is left out has a bound in closed form. A point at R from the
-/// centre sees an element of area at y through the gradient of sum |y|^n P_n / R^(n+1); the gradient of |y|^n P_n is at most
-/// n |y|^(n-1) (Bernstein and Szego: P_n'^2 + n^2 P_n^2 <= n^2 for a trigonometric polynomial that is at most 1). With terms up to n = 3
-/// kept and |y| <= r, rho = r/R < 1, that leaves at most
+/// A node stands for its triangles by the moments of their area up to second order about its centre (after G. Barill et
+/// al., Fast winding numbers for soups and clouds, ACM Trans. Graph. 2018). What is left out has a bound in closed
+/// form. A point at R from the centre sees an element of area at y through the gradient of sum |y|^n P_n / R^(n+1); the
+/// gradient of |y|^n P_n is at most n |y|^(n-1) (Bernstein and Szego: P_n'^2 + n^2 P_n^2 <= n^2 for a trigonometric
+/// polynomial that is at most 1). With terms up to n = 3 kept and |y| <= r, rho = r/R < 1, that leaves at most
 ///   |y|^3 / R^5 (4 / (1 - rho) + rho / (1 - rho)^2)   for each unit of area.
-/// The node with the largest bound is split until the sum of bounds decides. Where rounding could decide, all triangles are added up in
-/// their order.
+/// The node with the largest bound is split until the sum of bounds decides. Where rounding could decide, all triangles
+/// are added up in their order.
 ///
 /// Immutable; any number of threads may ask. Build O(n log n); about 250 bytes a triangle. Coordinates in any one unit.
 class TurnsTree {
@@ -27,7 +29,8 @@ class TurnsTree {
 
   /// |winding - turns(p)| > 1/2, turns added in order of the triangles. Expected O(log n) where that is clear.
   [[nodiscard]] bool beyond_half(int winding, Vec3 p) const;
-  /// How often a ray along x has crossed the triangles when it comes to p, with their weights. O(log n + those in its way).
+  /// How often a ray along x has crossed the triangles when it comes to p, with their weights. O(log n + those in its
+  /// way).
   [[nodiscard]] int crossings_before(Vec3 p) const;
 
   struct Turns {
@@ -57,4 +60,4 @@ class TurnsTree {
   double rounding_ = 0;  // of any of the sums
 };
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

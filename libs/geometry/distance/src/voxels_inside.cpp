@@ -58,14 +58,16 @@ int round_up(double x) {
 }
 
 // Scan conversion in index coordinates.
-void scan_triangle(const Vec3& a, const Vec3& b, const Vec3& c, int weight, const std::array<int, 3>& dims, std::vector<Crossing>& out) {
+void scan_triangle(const Vec3& a, const Vec3& b, const Vec3& c, int weight, const std::array<int, 3>& dims,
+                   std::vector<Crossing>& out) {
   const double lowest = std::min(a.z, std::min(b.z, c.z)), highest = std::max(a.z, std::max(b.z, c.z));
   if (highest < 0 || lowest >= dims[2]) return;
   const int k0 = lowest < 0 ? 0 : static_cast<int>(lowest) + 1;
   const int k1 = highest >= dims[2] - 1 ? dims[2] - 1 : static_cast<int>(highest);
   for (int k = k0; k <= k1; ++k) {
     const LevelCut s = cut(a, b, c, k);
-    // Seen along x, an edge that goes up on the far side of y is counter-clockwise: the surface faces +x and the ray leaves.
+    // Seen along x, an edge that goes up on the far side of y is counter-clockwise: the surface faces +x and the ray
+    // leaves.
     const bool leaves = s.y[0] > s.y[1];
     const double y0 = leaves ? s.y[1] : s.y[0], y1 = leaves ? s.y[0] : s.y[1];
     if (!(y1 >= 0) || y0 > dims[1] - 1) continue;
@@ -76,13 +78,15 @@ void scan_triangle(const Vec3& a, const Vec3& b, const Vec3& c, int weight, cons
     for (int j = j0; j < j1; ++j) {
       const double at = std::clamp(x0 + (j - y0) * slope, std::min(x0, x1), std::max(x0, x1));
       if (at > dims[0] - 1) continue;
-      out.push_back({static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(dims[1]) + static_cast<std::uint32_t>(j),
-                     at <= 0 ? 0 : round_up(at), leaves ? -weight : weight});
+      out.push_back(
+          {static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(dims[1]) + static_cast<std::uint32_t>(j),
+           at <= 0 ? 0 : round_up(at), leaves ? -weight : weight});
     }
   }
 }
 
-// Voxels near the openings, whose sign the fans' solid angle may decide. Solid angles in turns: share of the full sphere.
+// Voxels near the openings, whose sign the fans' solid angle may decide. Solid angles in turns: share of the full
+// sphere.
 class Openings {
  public:
   Openings(std::vector<Fan> fans, Vec3 spacing) : fans_(std::move(fans)) {
@@ -94,8 +98,8 @@ class Openings {
       area_.push_back(std::abs(f.weight) * length(cross(f.b - f.a, f.c - f.a)) / 2);
     }
   }
-  // The fans near a ball, one by one, and the others together: their turns at the ball's centre, and by how much those can
-  // differ elsewhere in it.
+  // The fans near a ball, one by one, and the others together: their turns at the ball's centre, and by how much those
+  // can differ elsewhere in it.
   struct Near {
     std::vector<std::uint32_t> fans;
     double far_turns = 0, far_error = 0;
@@ -154,12 +158,15 @@ class Openings {
     const double d = length(centre - middle_[i]) - radius - reach_[i], most = 0.5 * std::abs(fans_[i].weight);
     return d > 0 ? std::min(area_[i] / (d * d) / (4 * std::numbers::pi), most) : most;
   }
-  // How much the turns can change within the ball: a surface element's solid angle has a gradient of at most 2 area / distance^3.
+  // How much the turns can change within the ball: a surface element's solid angle has a gradient of at most 2 area /
+  // distance^3.
   [[nodiscard]] double variation(std::uint32_t i, Vec3 centre, double radius) const {
     const double d = length(centre - middle_[i]) - radius - reach_[i];
     return d > 0 ? radius * 2 * area_[i] / (d * d * d) / (4 * std::numbers::pi) : 1e300;
   }
-  [[nodiscard]] static double turns(const Fan& f, Vec3 p) { return f.weight * solid_angle(f.a, f.b, f.c, p) / (4 * std::numbers::pi); }
+  [[nodiscard]] static double turns(const Fan& f, Vec3 p) {
+    return f.weight * solid_angle(f.a, f.b, f.c, p) / (4 * std::numbers::pi);
+  }
 
   std::vector<Fan> fans_;
   std::vector<Vec3> middle_;
@@ -176,8 +183,8 @@ struct RowCrossings {
   }
 };
 
-RowCrossings scan(const TriangleSoup& soup, const std::vector<Vec3>& points, const std::vector<Fan>& fans, const std::array<int, 3>& dims,
-                  const Context& context) {
+RowCrossings scan(const TriangleSoup& soup, const std::vector<Vec3>& points, const std::vector<Fan>& fans,
+                  const std::array<int, 3>& dims, const Context& context) {
   constexpr std::size_t kGrain = 16384;
   const std::size_t n = soup.triangles.size();
   std::vector<std::vector<Crossing>> parts((n + kGrain - 1) / kGrain + 1);
@@ -208,7 +215,9 @@ RowCrossings scan(const TriangleSoup& soup, const std::vector<Vec3>& points, con
   parallel_for(row_count, 1024, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t r = begin; r < end; ++r) {
       std::sort(rows.items.begin() + rows.first[r], rows.items.begin() + rows.first[r + 1],
-                [](const Crossing& x, const Crossing& y) { return x.first != y.first ? x.first < y.first : x.delta > y.delta; });
+                [](const Crossing& x, const Crossing& y) {
+                  return x.first != y.first ? x.first < y.first : x.delta > y.delta;
+                });
     }
   });
   return rows;
@@ -254,7 +263,8 @@ VoxelBits VoxelBits::dilated() const {
 
 VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Context& context, InsideReport* report) {
   require_sound(soup);
-  if (static_cast<double>(frame.dims[1]) * frame.dims[2] > 4e9) throw Error(ExitCode::resources, "the grid has more than 4e9 rows");
+  if (static_cast<double>(frame.dims[1]) * frame.dims[2] > 4e9)
+    throw Error(ExitCode::resources, "the grid has more than 4e9 rows");
   // A closed surface needs no order made: its winding number is whole as it is.
   bool closed = is_closed(soup);
   Ordered mended;
@@ -308,13 +318,15 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
     // A row of blocks along x is one work item: no word of bits is shared between two.
     parallel_for(blocks(1) * blocks(2), 1, context.threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t b = begin; b < end; ++b) {
-        const int large_j = static_cast<int>(b % blocks(1)) * kLarge, large_k = static_cast<int>(b / blocks(1)) * kLarge;
+        const int large_j = static_cast<int>(b % blocks(1)) * kLarge,
+                  large_k = static_cast<int>(b / blocks(1)) * kLarge;
         for (int large_i = 0; large_i < frame.dims[0]; large_i += kLarge) {
           context.check_cancelled();
           const Openings::Near large = narrowed(everything, large_i, large_j, large_k, kLarge, 0.02);
           if (large.bound < 0.5) continue;
           for (int part = 0; part < 64; ++part) {
-            const int i0 = large_i + part % 4 * kSmall, j0 = large_j + part / 4 % 4 * kSmall, k0 = large_k + part / 16 * kSmall;
+            const int i0 = large_i + part % 4 * kSmall, j0 = large_j + part / 4 % 4 * kSmall,
+                      k0 = large_k + part / 16 * kSmall;
             if (i0 >= frame.dims[0] || j0 >= frame.dims[1] || k0 >= frame.dims[2]) continue;
             const Openings::Near small = narrowed(large, i0, j0, k0, kSmall, 0.1);
             if (small.bound < 0.5) continue;
@@ -323,7 +335,8 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
                 for (int i = i0; i < std::min(i0 + kSmall, frame.dims[0]); ++i) {
                   const Vec3 p{i * s.x, j * s.y, k * s.z};
                   if (openings.bound(small, p) < 0.5) continue;
-                  const std::size_t r = static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j);
+                  const std::size_t r = static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) +
+                                        static_cast<std::size_t>(j);
                   std::uint64_t& word = bits.words[r * bits.words_per_row + static_cast<std::size_t>(i) / 64];
                   const std::uint64_t bit = 1ULL << (static_cast<unsigned>(i) % 64);
                   word = openings.inside(small, p, rows.winding(r, i)) ? word | bit : word & ~bit;
@@ -352,7 +365,8 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
 
 double winding_number(const TriangleSoup& soup, Vec3 p) {
   double sum = 0;
-  for (const auto& t : soup.triangles) sum += solid_angle(soup.points_mm[t[0]], soup.points_mm[t[1]], soup.points_mm[t[2]], p);
+  for (const auto& t : soup.triangles)
+    sum += solid_angle(soup.points_mm[t[0]], soup.points_mm[t[1]], soup.points_mm[t[2]], p);
   return sum / (4 * std::numbers::pi);
 }
 
@@ -366,7 +380,8 @@ Frame frame_around_mm(const TriangleSoup& soup, double spacing_mm, int margin) {
     const double n = std::ceil((hi[a] - lo[a]) / spacing_mm - 1e-9);
     if (n > 100000) {
       throw Error(ExitCode::usage,
-                  "voxels of " + format_number(spacing_mm) + " mm would make a grid of " + format_number(n) + " voxels along an axis",
+                  "voxels of " + format_number(spacing_mm) + " mm would make a grid of " + format_number(n) +
+                      " voxels along an axis",
                   "choose larger voxels");
     }
     f.dims[a] = std::max(1, static_cast<int>(n)) + 2 * margin;
@@ -382,4 +397,4 @@ Frame frame_around(const TriangleSoup& soup, int resolution, int margin) {
   return frame_around_mm(soup, longest > 0 ? longest / resolution : 1.0, margin);
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

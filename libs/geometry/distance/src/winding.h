@@ -25,9 +25,9 @@ namespace osteo::inline geometry {
   return 2 * portable::atan2(det, along);
 }
 
-/// Where the plane z = `level` cuts a triangle: at (y[0], x[0]) the edge that goes up in z, at [1] the one that goes down.
-/// Which edges are cut, and where, is a property of the edge alone, so that triangles that share it never leave a gap nor
-/// overlap, whatever the rounding.
+/// Where the plane z = `level` cuts a triangle: at (y[0], x[0]) the edge that goes up in z, at [1] the one that goes
+/// down. Which edges are cut, and where, is a property of the edge alone, so that triangles that share it never leave a
+/// gap nor overlap, whatever the rounding.
 struct LevelCut {
   double y[2] = {0, 0}, x[2] = {0, 0};
   bool any = false;
@@ -61,4 +61,4 @@ struct LevelCut {
   return x <= p.x ? (leaves ? -1 : 1) : 0;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -36,11 +36,12 @@ void copy_brick(float* from, float* to) {
 }  // namespace
 
 BrickGrid::BrickGrid(Frame frame, std::vector<Ijk> bricks) : frame_(frame), origins_(std::move(bricks)) {
-  std::sort(origins_.begin(), origins_.end(), [](Ijk a, Ijk b) { return std::tie(a.k, a.j, a.i) < std::tie(b.k, b.j, b.i); });
+  std::sort(origins_.begin(), origins_.end(),
+            [](Ijk a, Ijk b) { return std::tie(a.k, a.j, a.i) < std::tie(b.k, b.j, b.i); });
   if (too_many_bricks(origins_.size()))
     throw Error(ExitCode::corrupt,
-                "the sparse grid has " + std::to_string(origins_.size()) + " bricks of 8^3 voxels; " + std::to_string(kMostBricks) +
-                    " can be numbered",
+                "the sparse grid has " + std::to_string(origins_.size()) + " bricks of 8^3 voxels; " +
+                    std::to_string(kMostBricks) + " can be numbered",
                 "make it with larger voxels, or of a smaller region");
   for (const Ijk b : origins_) {
     if (b.i < 0 || b.j < 0 || b.k < 0)
@@ -54,11 +55,13 @@ BrickGrid::BrickGrid(Frame frame, std::vector<Ijk> bricks) : frame_(frame), orig
     throw Error(ExitCode::corrupt,
                 "the sparse grid's voxels lie too far apart: within " + std::to_string(8ULL * extent_[0]) + " x " +
                     std::to_string(8ULL * extent_[1]) + " x " + std::to_string(8ULL * extent_[2]) + " voxels",
-                "single voxels far from the rest are mostly a fault of the program that wrote it; make it again, or of a smaller region");
+                "single voxels far from the rest are mostly a fault of the program that wrote it; make it again, or of "
+                "a smaller region");
   table_.assign(static_cast<std::size_t>(extent_[0]) * extent_[1] * extent_[2], kNone);
   for (std::uint32_t n = 0; n < origins_.size(); ++n) {
     const Ijk b = origins_[n];
-    table_[(static_cast<std::size_t>(b.k) * extent_[1] + static_cast<std::size_t>(b.j)) * extent_[0] + static_cast<std::size_t>(b.i)] = n;
+    table_[(static_cast<std::size_t>(b.k) * extent_[1] + static_cast<std::size_t>(b.j)) * extent_[0] +
+           static_cast<std::size_t>(b.i)] = n;
   }
   bricks_ = in_a_block(zeros(origins_.size()), origins_.size());
 }
@@ -68,7 +71,8 @@ BrickGrid::BrickGrid(const BrickGrid& other)
       extent_(other.extent_),
       table_(other.table_),
       origins_(other.origins_),
-      bricks_(in_a_block(std::make_shared_for_overwrite<float[]>(other.origins_.size() * kVoxels), other.origins_.size())) {
+      bricks_(
+          in_a_block(std::make_shared_for_overwrite<float[]>(other.origins_.size() * kVoxels), other.origins_.size())) {
   parallel_for(origins_.size(), 2048, 0, [&](std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) copy_brick(other.bricks_[b].get(), bricks_[b].get());
   });
@@ -98,8 +102,9 @@ void BrickGrid::empty_bricks(std::span<const std::uint32_t> bricks) {
 void BrickGrid::read_block(Ijk lo, std::array<int, 3> n, float* out) const {
   for (int k = 0; k < n[2]; ++k) {
     for (int j = 0; j < n[1]; ++j) {
-      float* const row = out + (static_cast<std::size_t>(k) * static_cast<std::size_t>(n[1]) + static_cast<std::size_t>(j)) *
-                                   static_cast<std::size_t>(n[0]);
+      float* const row =
+          out + (static_cast<std::size_t>(k) * static_cast<std::size_t>(n[1]) + static_cast<std::size_t>(j)) *
+                    static_cast<std::size_t>(n[0]);
       for (int i = 0; i < n[0];) {
         // One table look-up for each brick that the row crosses.
         const int x = lo.i + i, y = lo.j + j, z = lo.k + k;
@@ -119,12 +124,14 @@ void BrickGrid::read_block(Ijk lo, std::array<int, 3> n, float* out) const {
 
 double BrickGrid::sum() const {
   double total = 0;
-  for (std::size_t v = 0; v < origins_.size() * kVoxels; ++v) total += static_cast<double>(value(static_cast<VoxelKey>(v)));
+  for (std::size_t v = 0; v < origins_.size() * kVoxels; ++v)
+    total += static_cast<double>(value(static_cast<VoxelKey>(v)));
   return total;
 }
 
 std::size_t BrickGrid::memory_bytes() const {
-  return origins_.size() * (kVoxels * sizeof(float) + sizeof(Ijk) + sizeof(bricks_[0])) + table_.size() * sizeof(std::uint32_t);
+  return origins_.size() * (kVoxels * sizeof(float) + sizeof(Ijk) + sizeof(bricks_[0])) +
+         table_.size() * sizeof(std::uint32_t);
 }
 
 std::string BrickGrid::hash() const {
@@ -141,4 +148,4 @@ std::string BrickGrid::hash() const {
   return h.hex();
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -4,8 +4,8 @@
 
 namespace osteo::inline geometry {
 
-SparseGrid to_sparse(const Frame& frame, const std::string& name, std::span<const Ijk> bricks, std::span<const std::uint64_t> stored,
-                     std::span<const float> values, double background) {
+SparseGrid to_sparse(const Frame& frame, const std::string& name, std::span<const Ijk> bricks,
+                     std::span<const std::uint64_t> stored, std::span<const float> values, double background) {
   grid::initialize_vdb();
   auto vdb = openvdb::FloatGrid::create(static_cast<float>(background));
   for (std::size_t b = 0; b < bricks.size(); ++b) {
@@ -21,4 +21,4 @@ SparseGrid to_sparse(const Frame& frame, const std::string& name, std::span<cons
   return grid::wrap(vdb, frame, name);
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

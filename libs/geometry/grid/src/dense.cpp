@@ -26,13 +26,15 @@ Volume<float> to_dense(const SparseGrid& grid, std::array<int, 3> lo, std::array
     // OpenVDB aligns nodes of 4096 voxels around a box.
     constexpr std::int64_t most = std::numeric_limits<int>::max() - 4096;
     if (n[a] < 1 || lo[a] < -most || std::int64_t{lo[a]} + n[a] > most)
-      throw Error(ExitCode::usage, "a box of " + std::to_string(n[a]) + " voxels from " + std::to_string(lo[a]) + " on is none",
+      throw Error(ExitCode::usage,
+                  "a box of " + std::to_string(n[a]) + " voxels from " + std::to_string(lo[a]) + " on is none",
                   "give at least one voxel along each axis");
   }
   Volume<float> v;
   v.frame = grid.frame;
   v.frame.dims = n;
-  v.frame.origin_mm = grid.frame.world_from_index({static_cast<double>(lo[0]), static_cast<double>(lo[1]), static_cast<double>(lo[2])});
+  v.frame.origin_mm =
+      grid.frame.world_from_index({static_cast<double>(lo[0]), static_cast<double>(lo[1]), static_cast<double>(lo[2])});
   require_valid(v.frame);
   const auto voxels = make_voxels<float>(v.frame.voxel_count());
   Dense dense(box_of(lo, n), voxels.get());
@@ -44,8 +46,10 @@ Volume<float> to_dense(const SparseGrid& grid, std::array<int, 3> lo, std::array
 SparseGrid to_sparse(const Volume<float>& volume, const std::string& name, double background) {
   require_valid(volume.frame);
   const auto values = volume.span();
-  if (!std::isfinite(background) || !std::all_of(values.begin(), values.end(), [](float f) { return std::isfinite(f); }))
-    throw Error(ExitCode::usage, "a value of the grid is not finite", "numpy.nan_to_num puts numbers in place of those");
+  if (!std::isfinite(background) ||
+      !std::all_of(values.begin(), values.end(), [](float f) { return std::isfinite(f); }))
+    throw Error(ExitCode::usage, "a value of the grid is not finite",
+                "numpy.nan_to_num puts numbers in place of those");
   grid::initialize_vdb();
   auto vdb = openvdb::FloatGrid::create(static_cast<float>(background));
   // It is only read, but OpenVDB has no view of values that are const.
@@ -54,4 +58,4 @@ SparseGrid to_sparse(const Volume<float>& volume, const std::string& name, doubl
   return grid::wrap(vdb, volume.frame, name);
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -14,7 +14,9 @@ struct Slice {
   int nu, nv;
   std::size_t su, sv;
   float hu, hv;
-  [[nodiscard]] float at(int u, int v) const { return field[static_cast<std::size_t>(u) * su + static_cast<std::size_t>(v) * sv]; }
+  [[nodiscard]] float at(int u, int v) const {
+    return field[static_cast<std::size_t>(u) * su + static_cast<std::size_t>(v) * sv];
+  }
 };
 
 // Farther than this no outline is looked for, however thick the slices: the cost grows with the square.
@@ -31,8 +33,8 @@ bool bone(float x) {
 // Where between pixels 0 and 1 the cubic through four in a row (Catmull-Rom, as resampling has it) crosses 0.
 float crossing(float a, float b, float c, float d) {
   const auto value = [&](float t) {
-    const float p = t * (-0.5F + t * (1 - 0.5F * t)), q = 1 + t * t * (1.5F * t - 2.5F), r = t * (0.5F + t * (2 - 1.5F * t)),
-                s = t * t * (0.5F * t - 0.5F);
+    const float p = t * (-0.5F + t * (1 - 0.5F * t)), q = 1 + t * t * (1.5F * t - 2.5F),
+                r = t * (0.5F + t * (2 - 1.5F * t)), s = t * t * (0.5F * t - 0.5F);
     return a * p + b * q + c * r + d * s;
   };
   float lo = 0, hi = 1, t = b / (b - c);
@@ -58,7 +60,8 @@ void mark(const Slice& s, Point a, Point b, int reach_u, int reach_v, std::vecto
             u1 = std::min(s.nu - 1, static_cast<int>(std::max(a.u, b.u)) + 1 + reach_u);
   const int v0 = std::max(0, static_cast<int>(std::min(a.v, b.v)) - reach_v),
             v1 = std::min(s.nv - 1, static_cast<int>(std::max(a.v, b.v)) + 1 + reach_v);
-  const float du = (b.u - a.u) * s.hu, dv = (b.v - a.v) * s.hv, length2 = du * du + dv * dv, scale = length2 > 0 ? 1 / length2 : 0;
+  const float du = (b.u - a.u) * s.hu, dv = (b.v - a.v) * s.hv, length2 = du * du + dv * dv,
+              scale = length2 > 0 ? 1 / length2 : 0;
   for (int v = v0; v <= v1; ++v) {
     float* const row = square.data() + static_cast<std::size_t>(v) * static_cast<std::size_t>(s.nu);
     const float pv = (static_cast<float>(v) - a.v) * s.hv;
@@ -74,7 +77,8 @@ void mark(const Slice& s, Point a, Point b, int reach_u, int reach_v, std::vecto
 // Of each pixel the squared distance to the outline, up to the reach; below zero where there is no bone.
 void measure(const Slice& s, float reach_mm, std::vector<float>& square) {
   square.assign(static_cast<std::size_t>(s.nu) * static_cast<std::size_t>(s.nv), reach_mm * reach_mm);
-  const int reach_u = static_cast<int>(std::ceil(reach_mm / s.hu)), reach_v = static_cast<int>(std::ceil(reach_mm / s.hv));
+  const int reach_u = static_cast<int>(std::ceil(reach_mm / s.hu)),
+            reach_v = static_cast<int>(std::ceil(reach_mm / s.hv));
   for (int v = 0; v + 1 < s.nv; ++v) {
     for (int u = 0; u + 1 < s.nu; ++u) {
       const float c[4] = {s.at(u, v), s.at(u + 1, v), s.at(u + 1, v + 1), s.at(u, v + 1)};
@@ -82,7 +86,8 @@ void measure(const Slice& s, float reach_mm, std::vector<float>& square) {
       if (kind == 0 || kind == 15) continue;
       // Where the outline crosses the cell's sides: below, right, above, left.
       Point p[4];
-      const bool cut[4] = {bone(c[0]) != bone(c[1]), bone(c[1]) != bone(c[2]), bone(c[2]) != bone(c[3]), bone(c[3]) != bone(c[0])};
+      const bool cut[4] = {bone(c[0]) != bone(c[1]), bone(c[1]) != bone(c[2]), bone(c[2]) != bone(c[3]),
+                           bone(c[3]) != bone(c[0])};
       if (cut[0]) p[0] = along_u(s, u, v);
       if (cut[1]) p[1] = along_v(s, u + 1, v);
       if (cut[2]) p[2] = along_u(s, u, v + 1);
@@ -110,8 +115,9 @@ void measure(const Slice& s, float reach_mm, std::vector<float>& square) {
   }
 }
 
-// How much a voxel and the one above or below it are of one slope of the boundary: where their outlines lie apart by up to 3.5 slices,
-// wholly; by 5 and more (a flat end, a body that begins) not at all, and the values alone decide, as partial volume has them.
+// How much a voxel and the one above or below it are of one slope of the boundary: where their outlines lie apart by up
+// to 3.5 slices, wholly; by 5 and more (a flat end, a body that begins) not at all, and the values alone decide, as
+// partial volume has them.
 float of_one_slope(float apart, float slice_mm, float reach_mm) {
   const float from = std::min(3.5F * slice_mm, 0.7F * reach_mm), to = std::min(5 * slice_mm, reach_mm);
   return std::clamp((to - apart) / (to - from), 0.0F, 1.0F);
@@ -128,14 +134,16 @@ SliceAxis slice_axis(const Frame& f) {
   return s;
 }
 
-void limit_by_outlines(std::vector<float>& field, const Frame& f, std::size_t axis, double per_mm, const Context& context) {
+void limit_by_outlines(std::vector<float>& field, const Frame& f, std::size_t axis, double per_mm,
+                       const Context& context) {
   const std::array<std::size_t, 3> stride{1, static_cast<std::size_t>(f.dims[0]),
                                           static_cast<std::size_t>(f.dims[0]) * static_cast<std::size_t>(f.dims[1])};
   const std::size_t u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
   const auto nu = static_cast<std::size_t>(f.dims[u]), nv = static_cast<std::size_t>(f.dims[v]),
              nk = static_cast<std::size_t>(f.dims[axis]);
   const auto slice_mm = static_cast<float>(f.spacing_mm[axis]);
-  const auto reach_mm = static_cast<float>(std::min(5 * f.spacing_mm[axis], kMostPixels * std::max(f.spacing_mm[u], f.spacing_mm[v])));
+  const auto reach_mm =
+      static_cast<float>(std::min(5 * f.spacing_mm[axis], kMostPixels * std::max(f.spacing_mm[u], f.spacing_mm[v])));
   const auto slope = static_cast<float>(per_mm);
   // A batch of slices at a time, with the distances of one slice more at each end.
   constexpr std::size_t kBatch = 16;
@@ -147,8 +155,8 @@ void limit_by_outlines(std::vector<float>& field, const Frame& f, std::size_t ax
     parallel_for(upto - known, 1, context.threads, [&](std::size_t begin, std::size_t end) {
       context.check_cancelled();
       for (std::size_t k = known + begin; k < known + end; ++k)
-        measure({field.data() + k * stride[axis], f.dims[u], f.dims[v], stride[u], stride[v], static_cast<float>(f.spacing_mm[u]),
-                 static_cast<float>(f.spacing_mm[v])},
+        measure({field.data() + k * stride[axis], f.dims[u], f.dims[v], stride[u], stride[v],
+                 static_cast<float>(f.spacing_mm[u]), static_cast<float>(f.spacing_mm[v])},
                 reach_mm, of(k));
     });
     known = upto;
@@ -177,4 +185,4 @@ void limit_by_outlines(std::vector<float>& field, const Frame& f, std::size_t ax
   }
 }
 
-}  // namespace osteo::geometry::grid
+}  // namespace osteo::inline geometry::grid

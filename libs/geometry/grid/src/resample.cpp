@@ -22,13 +22,16 @@ constexpr int kVoxels = BrickGrid::kVoxels;
 constexpr float kForcedHu = 100;
 
 constexpr float kTrace = 1.0F / 256;
-// Measured (docs/accuracy.md): from here on outlines are the better in nearly every body, and of a real skull; in finer slices values are.
-// And how much the field may grow over as far as slices lie apart: with less, ends of bodies suffer, with more, flat slopes.
+// Measured (docs/accuracy.md): from here on outlines are the better in nearly every body, and of a real skull; in finer
+// slices values are. And how much the field may grow over as far as slices lie apart: with less, ends of bodies suffer,
+// with more, flat slopes.
 constexpr double kThickSlices = 1.3, kThickMm = 1.5, kHuPerSlice = 200;
-// A scan has voxels of every value between tissue and bone; a gap as wide as this is one of made, binned or two-level values.
+// A scan has voxels of every value between tissue and bone; a gap as wide as this is one of made, binned or two-level
+// values.
 constexpr int kOpenHu = 20;
 
-// The thresholds that the mask looks most like: from the lowest to the highest at which the fewest voxels differ from it.
+// The thresholds that the mask looks most like: from the lowest to the highest at which the fewest voxels differ from
+// it.
 std::pair<int, int> lower_of_mask(const Image& ct, const Labels& mask) {
   constexpr int kLow = -32768, kCount = 65536;
   std::vector<std::int64_t> balance(kCount);  // of each value: voxels in the mask less voxels outside
@@ -59,8 +62,8 @@ std::vector<float> signed_field(const Image& ct, const Labels& mask, double lowe
   return field;
 }
 
-// How the samples of the output lie between the samples of the CT along one axis: four taps of a cubic (Catmull-Rom) each.
-// R. Keys, Cubic Convolution Interpolation for Digital Image Processing, IEEE TASSP 1981.
+// How the samples of the output lie between the samples of the CT along one axis: four taps of a cubic (Catmull-Rom)
+// each. R. Keys, Cubic Convolution Interpolation for Digital Image Processing, IEEE TASSP 1981.
 struct AxisMap {
   int sub = 1;                               // sub-voxels along an output voxel
   std::vector<int> first;                    // CT index of the first tap; may lie outside, where the border repeats
@@ -73,14 +76,17 @@ AxisMap make_axis(int ct_dim, double ct_spacing, int out_first, int out_dim, dou
   m.sub = std::max(1, static_cast<int>(std::ceil(out_spacing / ct_spacing - 1e-6)));
   const double h = out_spacing / m.sub;
   for (int s = 0; s < out_dim * m.sub; ++s) {
-    const double x = std::clamp((-0.5 * ct_spacing + (out_first * m.sub + s + 0.5) * h) / ct_spacing, -0.5, ct_dim - 0.5);
+    const double x =
+        std::clamp((-0.5 * ct_spacing + (out_first * m.sub + s + 0.5) * h) / ct_spacing, -0.5, ct_dim - 0.5);
     const int i = static_cast<int>(std::floor(x));
     const double t = x - i, per_mm = h / ct_spacing;
     m.first.push_back(i - 1);
-    m.weight.push_back({static_cast<float>(t * (-0.5 + t * (1 - 0.5 * t))), static_cast<float>(1 + t * t * (1.5 * t - 2.5)),
-                        static_cast<float>(t * (0.5 + t * (2 - 1.5 * t))), static_cast<float>(t * t * (0.5 * t - 0.5))});
-    m.slope.push_back({static_cast<float>(per_mm * (-0.5 + t * (2 - 1.5 * t))), static_cast<float>(per_mm * t * (4.5 * t - 5)),
-                       static_cast<float>(per_mm * (0.5 + t * (4 - 4.5 * t))), static_cast<float>(per_mm * t * (1.5 * t - 1))});
+    m.weight.push_back(
+        {static_cast<float>(t * (-0.5 + t * (1 - 0.5 * t))), static_cast<float>(1 + t * t * (1.5 * t - 2.5)),
+         static_cast<float>(t * (0.5 + t * (2 - 1.5 * t))), static_cast<float>(t * t * (0.5 * t - 0.5))});
+    m.slope.push_back(
+        {static_cast<float>(per_mm * (-0.5 + t * (2 - 1.5 * t))), static_cast<float>(per_mm * t * (4.5 * t - 5)),
+         static_cast<float>(per_mm * (0.5 + t * (4 - 4.5 * t))), static_cast<float>(per_mm * t * (1.5 * t - 1))});
   }
   return m;
 }
@@ -92,7 +98,8 @@ struct Scratch {
 
 class Resampler {
  public:
-  Resampler(const Image& ct, const std::vector<float>& field, const ResampleParams& p) : ct_(ct), field_(field), h_(p.spacing_mm) {
+  Resampler(const Image& ct, const std::vector<float>& field, const ResampleParams& p)
+      : ct_(ct), field_(field), h_(p.spacing_mm) {
     frame_.direction = ct.frame.direction;
     frame_.spacing_mm = {h_, h_, h_};
     Vec3 first;
@@ -113,8 +120,8 @@ class Resampler {
   [[nodiscard]] const Frame& frame() const { return frame_; }
   [[nodiscard]] const std::vector<Ijk>& bricks() const { return bricks_; }
 
-  // Calls take(voxel in brick, signed HU, HU of a full ramp across the sub-voxel, weight) for each sub-voxel of a brick.
-  // Separable: first along x for the CT rows that the brick needs, then along y, then along z.
+  // Calls take(voxel in brick, signed HU, HU of a full ramp across the sub-voxel, weight) for each sub-voxel of a
+  // brick. Separable: first along x for the CT rows that the brick needs, then along y, then along z.
   template <class F>
   void sample_brick(Ijk brick, Scratch& scratch, F&& take) const {
     const std::array<int, 3> b{brick.i, brick.j, brick.k};
@@ -126,22 +133,28 @@ class Resampler {
       lo[a] = axis_[a].first[begin[a]];
       n[a] = axis_[a].first[begin[a] + count[a] - 1] + 4 - lo[a];
     }
-    const auto nx = static_cast<std::size_t>(n[0]), ny = static_cast<std::size_t>(n[1]), nz = static_cast<std::size_t>(n[2]);
-    const auto inside = [&](std::size_t a, int i) { return static_cast<std::size_t>(std::clamp(i, 0, ct_.frame.dims[a] - 1)); };
+    const auto nx = static_cast<std::size_t>(n[0]), ny = static_cast<std::size_t>(n[1]),
+               nz = static_cast<std::size_t>(n[2]);
+    const auto inside = [&](std::size_t a, int i) {
+      return static_cast<std::size_t>(std::clamp(i, 0, ct_.frame.dims[a] - 1));
+    };
     scratch.ct.resize(nx * ny * nz);
     for (std::size_t k = 0; k < nz; ++k) {
       for (std::size_t j = 0; j < ny; ++j) {
-        const float* const row = field_.data() + (inside(2, lo[2] + static_cast<int>(k)) * static_cast<std::size_t>(ct_.frame.dims[1]) +
-                                                  inside(1, lo[1] + static_cast<int>(j))) *
-                                                     static_cast<std::size_t>(ct_.frame.dims[0]);
-        for (std::size_t i = 0; i < nx; ++i) scratch.ct[(k * ny + j) * nx + i] = row[inside(0, lo[0] + static_cast<int>(i))];
+        const float* const row =
+            field_.data() + (inside(2, lo[2] + static_cast<int>(k)) * static_cast<std::size_t>(ct_.frame.dims[1]) +
+                             inside(1, lo[1] + static_cast<int>(j))) *
+                                static_cast<std::size_t>(ct_.frame.dims[0]);
+        for (std::size_t i = 0; i < nx; ++i)
+          scratch.ct[(k * ny + j) * nx + i] = row[inside(0, lo[0] + static_cast<int>(i))];
       }
     }
     scratch.x.resize(count[0] * ny * nz);
     scratch.dx.resize(scratch.x.size());
     for (std::size_t row = 0; row < ny * nz; ++row) {
       for (std::size_t i = 0; i < count[0]; ++i) {
-        const float* const p = scratch.ct.data() + row * nx + static_cast<std::size_t>(axis_[0].first[begin[0] + i] - lo[0]);
+        const float* const p =
+            scratch.ct.data() + row * nx + static_cast<std::size_t>(axis_[0].first[begin[0] + i] - lo[0]);
         const auto &w = axis_[0].weight[begin[0] + i], &d = axis_[0].slope[begin[0] + i];
         scratch.x[row * count[0] + i] = p[0] * w[0] + p[1] * w[1] + p[2] * w[2] + p[3] * w[3];
         scratch.dx[row * count[0] + i] = p[0] * d[0] + p[1] * d[1] + p[2] * d[2] + p[3] * d[3];
@@ -177,7 +190,8 @@ class Resampler {
           const float value = along_z(scratch.y, at, w);
           const float gx = along_z(scratch.xy, at, w), gy = along_z(scratch.dy, at, w), gz = along_z(scratch.y, at, d);
           // A plane cuts a cube over a width between the 2-norm and the 1-norm of this change.
-          const float ramp = 0.5F * (std::sqrt(gx * gx + gy * gy + gz * gz) + std::abs(gx) + std::abs(gy) + std::abs(gz));
+          const float ramp =
+              0.5F * (std::sqrt(gx * gx + gy * gy + gz * gz) + std::abs(gx) + std::abs(gy) + std::abs(gz));
           take(BrickGrid::offset_in_brick(static_cast<int>(i) / axis_[0].sub, static_cast<int>(j) / axis_[1].sub,
                                           static_cast<int>(k) / axis_[2].sub),
                value, std::max(ramp, 1e-3F), share);
@@ -198,7 +212,9 @@ class Resampler {
     return static_cast<float>(std::floor(sample_linear(ct_, index) + 0.5));
   }
 
-  [[nodiscard]] static bool boxed(const ResampleParams& p) { return p.box_mm[0] > 0 && p.box_mm[1] > 0 && p.box_mm[2] > 0; }
+  [[nodiscard]] static bool boxed(const ResampleParams& p) {
+    return p.box_mm[0] > 0 && p.box_mm[1] > 0 && p.box_mm[2] > 0;
+  }
 
  private:
   static constexpr int kBlock = 4;
@@ -212,7 +228,8 @@ class Resampler {
     }
     if (step == 0)
       throw Error(ExitCode::usage,
-                  "no whole number of voxels of " + format_number(h_) + " mm fills voxels of " + format_number(p.align_mm) + " mm",
+                  "no whole number of voxels of " + format_number(h_) + " mm fills voxels of " +
+                      format_number(p.align_mm) + " mm",
                   "choose a --spacing-mm like 0.1, 0.125, 0.2 or 0.25");
     const Vec3 centre = ct_.frame.index_from_world({p.centre_mm[0], p.centre_mm[1], p.centre_mm[2]});
     for (std::size_t a = 0; a < 3; ++a) {
@@ -221,20 +238,24 @@ class Resampler {
                 hi = static_cast<int>(std::ceil((middle + half) / step - 1e-6)) * step;
       first_[a] = std::max(lo, 0);
       const int end = std::min(hi, frame_.dims[a] / step * step);
-      if (end <= first_[a]) throw Error(ExitCode::usage, "the box does not lie in the image", "give --centre-mm in LPS mm, within the CT");
+      if (end <= first_[a])
+        throw Error(ExitCode::usage, "the box does not lie in the image", "give --centre-mm in LPS mm, within the CT");
       frame_.dims[a] = end - first_[a];
     }
   }
 
   void find_occupied_blocks() {
     for (std::size_t a = 0; a < 3; ++a) blocks_[a] = (ct_.frame.dims[a] + kBlock - 1) / kBlock;
-    occupied_.assign(static_cast<std::size_t>(blocks_[0]) * static_cast<std::size_t>(blocks_[1]) * static_cast<std::size_t>(blocks_[2]), 0);
+    occupied_.assign(static_cast<std::size_t>(blocks_[0]) * static_cast<std::size_t>(blocks_[1]) *
+                         static_cast<std::size_t>(blocks_[2]),
+                     0);
     std::size_t at = 0;
     for (int k = 0; k < ct_.frame.dims[2]; ++k) {
       for (int j = 0; j < ct_.frame.dims[1]; ++j) {
-        std::uint8_t* const row = occupied_.data() + (static_cast<std::size_t>(k / kBlock) * static_cast<std::size_t>(blocks_[1]) +
-                                                      static_cast<std::size_t>(j / kBlock)) *
-                                                         static_cast<std::size_t>(blocks_[0]);
+        std::uint8_t* const row =
+            occupied_.data() + (static_cast<std::size_t>(k / kBlock) * static_cast<std::size_t>(blocks_[1]) +
+                                static_cast<std::size_t>(j / kBlock)) *
+                                   static_cast<std::size_t>(blocks_[0]);
         for (int i = 0; i < ct_.frame.dims[0]; ++i, ++at) {
           if (field_[at] > -kForcedHu) row[i / kBlock] = 1;
         }
@@ -261,7 +282,8 @@ class Resampler {
           for (int z = z0; z <= z1 && !any; ++z) {
             for (int y = y0; y <= y1 && !any; ++y) {
               for (int x = x0; x <= x1 && !any; ++x) {
-                any = occupied_[(static_cast<std::size_t>(z) * static_cast<std::size_t>(blocks_[1]) + static_cast<std::size_t>(y)) *
+                any = occupied_[(static_cast<std::size_t>(z) * static_cast<std::size_t>(blocks_[1]) +
+                                 static_cast<std::size_t>(y)) *
                                     static_cast<std::size_t>(blocks_[0]) +
                                 static_cast<std::size_t>(x)] != 0;
               }
@@ -270,7 +292,8 @@ class Resampler {
           if (any) bricks_.push_back({i, j, k});
           if (too_many_bricks(bricks_.size()))
             throw Error(ExitCode::resources,
-                        "voxels of " + format_number(h_) + " mm make more than " + std::to_string(BrickGrid::kMostBricks) +
+                        "voxels of " + format_number(h_) + " mm make more than " +
+                            std::to_string(BrickGrid::kMostBricks) +
                             " bricks of 8^3 that may hold bone, which is all that can be numbered",
                         "choose a larger --spacing-mm, or a smaller region");
         }
@@ -308,7 +331,8 @@ double find_offset(const Resampler& resampler, double wanted_mm3, const Context&
       v.fill(0);
       resampler.sample_brick(bricks[b], scratch, [&](std::uint32_t, float value, float ramp, float weight) {
         if (value - kOffsets.front() < -0.5F * ramp) return;
-        for (std::size_t o = 0; o < kOffsets.size(); ++o) v[o] += static_cast<double>(weight * coverage(value, ramp, kOffsets[o]));
+        for (std::size_t o = 0; o < kOffsets.size(); ++o)
+          v[o] += static_cast<double>(weight * coverage(value, ramp, kOffsets[o]));
       });
     }
   });
@@ -331,7 +355,8 @@ double find_offset(const Resampler& resampler, double wanted_mm3, const Context&
 
 ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleParams& given, const Context& context) {
   if (!same_place(ct.frame, mask.frame)) {
-    throw Error(ExitCode::usage, "the mask does not lie on the voxels of the CT", "make the mask from this CT with 'osteo threshold'");
+    throw Error(ExitCode::usage, "the mask does not lie on the voxels of the CT",
+                "make the mask from this CT with 'osteo threshold'");
   }
   ResampleParams p = given;
   if (p.lower == 0) {
@@ -348,21 +373,25 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   context.report("lower_hu", p.lower);
   std::array<std::uint64_t, 3> cells{};
   for (std::size_t a = 0; a < 3; ++a)
-    cells[a] = static_cast<std::uint64_t>(std::ceil(ct.frame.dims[a] * ct.frame.spacing_mm[a] / p.spacing_mm / BrickGrid::kEdge));
+    cells[a] = static_cast<std::uint64_t>(
+        std::ceil(ct.frame.dims[a] * ct.frame.spacing_mm[a] / p.spacing_mm / BrickGrid::kEdge));
   if (too_wide_for_bricks(cells)) {
     throw Error(ExitCode::resources,
-                "voxels of " + format_number(p.spacing_mm) + " mm make a grid of more than " + std::to_string(BrickGrid::kMostCells) +
-                    " bricks of 8^3",
+                "voxels of " + format_number(p.spacing_mm) + " mm make a grid of more than " +
+                    std::to_string(BrickGrid::kMostCells) + " bricks of 8^3",
                 "choose a larger --spacing-mm, or a smaller region");
   }
   ResampledBone result;
-  result.volume_before_mm3 = static_cast<double>(std::count_if(mask.span().begin(), mask.span().end(), [](auto v) { return v != 0; })) *
-                             ct.frame.voxel_volume_mm3();
+  result.volume_before_mm3 =
+      static_cast<double>(std::count_if(mask.span().begin(), mask.span().end(), [](auto v) { return v != 0; })) *
+      ct.frame.voxel_volume_mm3();
   std::vector<float> field = signed_field(ct, mask, p.lower);
   const grid::SliceAxis slices = grid::slice_axis(ct.frame);
-  const bool outlines = p.between == Between::outlines ||
-                        (p.between == Between::automatic && slices.ratio > kThickSlices && ct.frame.spacing_mm[slices.axis] >= kThickMm);
-  if (outlines) grid::limit_by_outlines(field, ct.frame, slices.axis, kHuPerSlice / ct.frame.spacing_mm[slices.axis], context);
+  const bool outlines =
+      p.between == Between::outlines ||
+      (p.between == Between::automatic && slices.ratio > kThickSlices && ct.frame.spacing_mm[slices.axis] >= kThickMm);
+  if (outlines)
+    grid::limit_by_outlines(field, ct.frame, slices.axis, kHuPerSlice / ct.frame.spacing_mm[slices.axis], context);
   context.report("between_slices", std::string(outlines ? "outlines" : "values"));
   const Resampler resampler(ct, field, p);
   const auto& bricks = resampler.bricks();
@@ -373,7 +402,8 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   whole.box_mm = {0, 0, 0};
   const bool boxed = Resampler::boxed(p);
   const std::unique_ptr<const Resampler> all = boxed ? std::make_unique<const Resampler>(ct, field, whole) : nullptr;
-  const auto offset = static_cast<float>(find_offset(all ? *all : resampler, result.volume_before_mm3, context, unshifted));
+  const auto offset =
+      static_cast<float>(find_offset(all ? *all : resampler, result.volume_before_mm3, context, unshifted));
   context.progress(0.5, "voxels");
 
   std::vector<std::unique_ptr<float[]>> densities(bricks.size()), values(bricks.size());
@@ -409,7 +439,8 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
     auto* const hu_leaf = hu->tree().touchLeaf(origin);
     for (std::uint32_t v = 0; v < kVoxels; ++v) {
       if (densities[b][v] <= 0) continue;
-      const openvdb::Coord c = origin.offsetBy(static_cast<int>(v & 7), static_cast<int>(v >> 3 & 7), static_cast<int>(v >> 6));
+      const openvdb::Coord c =
+          origin.offsetBy(static_cast<int>(v & 7), static_cast<int>(v >> 3 & 7), static_cast<int>(v >> 6));
       density_leaf->setValueOn(c, densities[b][v]);
       hu_leaf->setValueOn(c, values[b][v]);
       total += static_cast<double>(densities[b][v]);
@@ -440,4 +471,4 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

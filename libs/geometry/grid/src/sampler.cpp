@@ -20,7 +20,8 @@ GridSampler::GridSampler(GridSampler&&) noexcept = default;
 
 float GridSampler::nearest(Vec3 world_mm) const {
   const Vec3 i = impl_->grid.frame.index_from_world(world_mm);
-  return impl_->accessor.getValue(openvdb::Coord(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)),
+  return impl_->accessor.getValue(openvdb::Coord(static_cast<int>(std::floor(i.x + 0.5)),
+                                                 static_cast<int>(std::floor(i.y + 0.5)),
                                                  static_cast<int>(std::floor(i.z + 0.5))));
 }
 
@@ -58,7 +59,8 @@ float GridSampler::linear_at(Vec3 index) const {
 float GridSampler::linear_stored_at(Vec3 index) const {
   constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
   const auto round = [](double v) { return static_cast<int>(std::floor(v + 0.5)); };
-  if (!in_range(index) || !impl_->accessor.isValueOn(openvdb::Coord(round(index.x), round(index.y), round(index.z)))) return kNone;
+  if (!in_range(index) || !impl_->accessor.isValueOn(openvdb::Coord(round(index.x), round(index.y), round(index.z))))
+    return kNone;
   double sum = 0, weights = 0;
   around(impl_->accessor, index, [&](float value, bool stored, double weight) {
     if (!stored) return;
@@ -83,4 +85,4 @@ std::pair<Vec3, Vec3> GridSampler::bounds_mm(const SparseGrid& grid) {
   return {lo, hi};
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

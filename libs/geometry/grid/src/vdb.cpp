@@ -69,7 +69,8 @@ Frame frame_of(const openvdb::FloatGrid& grid) {
   }
   f.origin_mm = {m(3, 0), m(3, 1), m(3, 2)};
   const auto box = grid.evalActiveVoxelBoundingBox();
-  for (int a = 0; a < 3; ++a) f.dims[static_cast<std::size_t>(a)] = std::min(box.max()[a], std::numeric_limits<int>::max() - 1) + 1;
+  for (int a = 0; a < 3; ++a)
+    f.dims[static_cast<std::size_t>(a)] = std::min(box.max()[a], std::numeric_limits<int>::max() - 1) + 1;
   if (const auto meta = grid.getMetadata<openvdb::Vec3IMetadata>("osteo_dims")) {
     for (int a = 0; a < 3; ++a) f.dims[static_cast<std::size_t>(a)] = meta->value()[a];
   }
@@ -126,7 +127,8 @@ SparseGrid to_sparse(const BrickGrid& bricks, const std::string& name) {
     for (std::uint32_t v = 0; v < BrickGrid::kVoxels; ++v) {
       const float value = bricks.value(b * BrickGrid::kVoxels + v);
       if (value == 0) continue;
-      const openvdb::Coord c(o.i * 8 + static_cast<int>(v & 7), o.j * 8 + static_cast<int>(v >> 3 & 7), o.k * 8 + static_cast<int>(v >> 6));
+      const openvdb::Coord c(o.i * 8 + static_cast<int>(v & 7), o.j * 8 + static_cast<int>(v >> 3 & 7),
+                             o.k * 8 + static_cast<int>(v >> 6));
       if (leaf == nullptr) leaf = vdb->tree().touchLeaf(c);
       leaf->setValueOn(c, value);
     }
@@ -149,8 +151,9 @@ void make_uuid_of_content(const fs::path& path) {
   file.write(uuid.data(), static_cast<std::streamsize>(kLength));
 }
 
-// OpenVDB does not report a short write. Its last act is to go back and write where the grid ends: a file that is not as long
-// as that, or has nothing there, was cut. (Reading it back would tell as well, for as much memory as the grid takes.)
+// OpenVDB does not report a short write. Its last act is to go back and write where the grid ends: a file that is not
+// as long as that, or has nothing there, was cut. (Reading it back would tell as well, for as much memory as the grid
+// takes.)
 bool is_complete(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   const auto skip_text = [&] {
@@ -187,7 +190,8 @@ void save_grid(const SparseGrid& sparse, const fs::path& path) {
       file.write({copy}, openvdb::MetaMap());
       file.close();
     } catch (const openvdb::Exception& e) {
-      throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + e.what(), "see that the disk has room");
+      throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + e.what(),
+                  "see that the disk has room");
     }
     make_uuid_of_content(temporary);
     if (!is_complete(temporary)) {
@@ -217,9 +221,10 @@ SparseGrid load_grid(const fs::path& path) {
                 "the file may be cut short; make it again");
   } catch (const std::bad_alloc&) {
     // OpenVDB takes lengths from a cut file as they come.
-    throw Error(ExitCode::corrupt, "'" + path.string() + "' cannot be read as OpenVDB: it asks for more memory than there is",
+    throw Error(ExitCode::corrupt,
+                "'" + path.string() + "' cannot be read as OpenVDB: it asks for more memory than there is",
                 "the file may be cut short; make it again");
   }
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -11,14 +11,16 @@
 namespace osteo::inline geometry {
 
 Curve::Curve(std::span<const Vec3> points) : points_(points.begin(), points.end()), loops_(&Loops::chosen()) {
-  if (points_.size() < 2) throw Error(ExitCode::corrupt, "a curve needs at least two points; this has " + std::to_string(points_.size()));
+  if (points_.size() < 2)
+    throw Error(ExitCode::corrupt, "a curve needs at least two points; this has " + std::to_string(points_.size()));
   Vec3 lo = points_[0], hi = points_[0];
   arcs_.reserve(points_.size());
   double arc = 0;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Vec3 p = points_[i];
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-      throw Error(ExitCode::corrupt, "point " + std::to_string(i) + " of the curve has a coordinate that is no finite number");
+      throw Error(ExitCode::corrupt,
+                  "point " + std::to_string(i) + " of the curve has a coordinate that is no finite number");
     }
     if (i > 0) arc += length(p - points_[i - 1]);
     arcs_.push_back(arc);
@@ -68,7 +70,8 @@ Curve::Curve(std::span<const Vec3> points) : points_(points.begin(), points.end(
           group.arc_hi[s] = std::nextafterf(static_cast<float>(arcs_[last]), above);
         } else {
           const Group& from = levels_.back()[item];
-          const std::size_t below_items = level == 1 ? (points_.size() - 1 + 15) / 16 : levels_[levels_.size() - 2].size();
+          const std::size_t below_items =
+              level == 1 ? (points_.size() - 1 + 15) / 16 : levels_[levels_.size() - 2].size();
           const std::size_t n = std::min<std::size_t>(16, below_items - item * 16);
           for (std::size_t i = 0; i < n; ++i) {
             for (std::size_t a = 0; a < 3; ++a) {
@@ -117,8 +120,8 @@ CurvePoint Curve::on_segment(std::uint32_t segment, Vec3 p, double arc, double p
   const auto score = [&](double s) {
     return std::sqrt(height * height + (s - foot) * (s - foot)) + penalty * std::abs(arcs_[segment] + s - arc);
   };
-  // The score is convex along the segment: its minimum is where distance grows as fast as the penalty falls, on either side of
-  // where the constraint was, or there itself.
+  // The score is convex along the segment: its minimum is where distance grows as fast as the penalty falls, on either
+  // side of where the constraint was, or there itself.
   double best = std::clamp(foot, 0.0, l);
   if (penalty > 0) {
     const double here = std::clamp(arc - arcs_[segment], 0.0, l);
@@ -152,8 +155,8 @@ CurvePoint Curve::minimum(Vec3 p, double arc, double penalty, std::uint32_t hint
   CurvePoint best = on_segment(std::min(hint, last_segment), p, arc, penalty);
   const Vec3 q = p - centre_;
   const float pf[3] = {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z)};
-  const double rounding =
-      rounding_ + (std::abs(q.x) + std::abs(q.y) + std::abs(q.z)) * 4e-7 + penalty * (arc_rounding_ + std::abs(arc) * 2e-7);
+  const double rounding = rounding_ + (std::abs(q.x) + std::abs(q.y) + std::abs(q.z)) * 4e-7 +
+                          penalty * (arc_rounding_ + std::abs(arc) * 2e-7);
   float reach = 0;
   const auto set_reach = [&] { reach = static_cast<float>(best.score_mm * (1 + 4e-7) + rounding); };
   set_reach();
@@ -181,7 +184,8 @@ CurvePoint Curve::minimum(Vec3 p, double arc, double penalty, std::uint32_t hint
       continue;
     }
     float bound[16];
-    loops_->bounds(levels_[static_cast<std::size_t>(e.level - 1)][e.item], pf, static_cast<float>(arc), static_cast<float>(penalty), bound);
+    loops_->bounds(levels_[static_cast<std::size_t>(e.level - 1)][e.item], pf, static_cast<float>(arc),
+                   static_cast<float>(penalty), bound);
     const int begin = top;
     for (std::uint32_t i = 0; i < 16; ++i) {
       if (!(bound[i] <= reach)) continue;
@@ -199,8 +203,8 @@ CurvePoint Curve::minimum(Vec3 p, double arc, double penalty, std::uint32_t hint
 CurvePoint Curve::at_arc(double arc) const {
   const double a = std::clamp(arc, 0.0, arcs_.back());
   auto it = std::upper_bound(arcs_.begin(), arcs_.end(), a);
-  const auto segment =
-      static_cast<std::uint32_t>(std::clamp<std::ptrdiff_t>(it - arcs_.begin() - 1, 0, static_cast<std::ptrdiff_t>(points_.size()) - 2));
+  const auto segment = static_cast<std::uint32_t>(
+      std::clamp<std::ptrdiff_t>(it - arcs_.begin() - 1, 0, static_cast<std::ptrdiff_t>(points_.size()) - 2));
   CurvePoint r;
   r.segment = segment;
   const double l = arcs_[segment + 1] - arcs_[segment];
@@ -210,4 +214,4 @@ CurvePoint Curve::at_arc(double arc) const {
   return r;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -14,4 +14,4 @@ struct Curve::Loops {
   static const Loops& chosen();  // for simd()
 };
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -1,5 +1,5 @@
-// Included by one file for each instruction set, which defines OSTEO_ISA. No inline function of others is called: the linker keeps one copy
-// of such a function for the whole program, perhaps one with the wider instructions.
+// Included by one file for each instruction set, which defines OSTEO_ISA. No inline function of others is called: the
+// linker keeps one copy of such a function for the whole program, perhaps one with the wider instructions.
 #include "curve_kernel.h"
 
 namespace osteo::inline geometry {
@@ -18,8 +18,10 @@ const Curve::Loops Curve::Loops::OSTEO_ISA{
     [](const Leaf& g, const float p[3], float arc, float penalty, float out[16]) {
       for (int i = 0; i < 16; ++i) {
         const float x = p[0] - g.at[0][i], y = p[1] - g.at[1][i], z = p[2] - g.at[2][i];
-        const float foot = smaller(larger(x * g.direction[0][i] + y * g.direction[1][i] + z * g.direction[2][i], 0.0F), g.length[i]);
-        const float rx = x - foot * g.direction[0][i], ry = y - foot * g.direction[1][i], rz = z - foot * g.direction[2][i];
+        const float foot =
+            smaller(larger(x * g.direction[0][i] + y * g.direction[1][i] + z * g.direction[2][i], 0.0F), g.length[i]);
+        const float rx = x - foot * g.direction[0][i], ry = y - foot * g.direction[1][i],
+                    rz = z - foot * g.direction[2][i];
         const float way = larger(larger(g.arc[i] - arc, arc - g.arc[i] - g.length[i]), 0.0F);
         out[i] = __builtin_sqrtf(rx * rx + ry * ry + rz * rz) + penalty * way;
       }
@@ -34,4 +36,4 @@ const Curve::Loops Curve::Loops::OSTEO_ISA{
       }
     }};
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -17,4 +17,4 @@ IndexRows triangles_of_vertices(const TriMesh& mesh) {
   return rows;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

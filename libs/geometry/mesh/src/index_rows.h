@@ -7,4 +7,4 @@ namespace osteo::inline geometry {
 /// One row a point: its triangles, ascending.
 [[nodiscard]] IndexRows triangles_of_vertices(const TriMesh& mesh);
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

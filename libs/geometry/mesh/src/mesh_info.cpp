@@ -190,7 +190,8 @@ TriangleSoup repaired(const TriMesh& mesh, const RepairOptions& options, RepairR
     for (std::uint32_t i = 0; i < to.size(); ++i) {
       const Vec3 p = soup.points_mm[i];
       std::array<std::int64_t, 3> cell{};
-      for (std::size_t a = 0; a < 3; ++a) cell[a] = static_cast<std::int64_t>(std::floor(std::clamp(p[a] / options.weld_mm, -4e18, 4e18)));
+      for (std::size_t a = 0; a < 3; ++a)
+        cell[a] = static_cast<std::int64_t>(std::floor(std::clamp(p[a] / options.weld_mm, -4e18, 4e18)));
       to[i] = i;
       for (int n = 0; n < 27 && to[i] == i; ++n) {
         const auto found = cells.find({cell[0] + n % 3 - 1, cell[1] + n / 3 % 3 - 1, cell[2] + n / 9 - 1});
@@ -221,7 +222,9 @@ TriangleSoup repaired(const TriMesh& mesh, const RepairOptions& options, RepairR
   std::vector<BoxMm> box(count);
   for (std::size_t t = 0; t < body.size(); ++t) {
     const auto& v = o.soup.triangles[t];
-    area[body[t]] += length(cross(o.soup.points_mm[v[1]] - o.soup.points_mm[v[0]], o.soup.points_mm[v[2]] - o.soup.points_mm[v[0]])) / 2;
+    area[body[t]] += length(cross(o.soup.points_mm[v[1]] - o.soup.points_mm[v[0]],
+                                  o.soup.points_mm[v[2]] - o.soup.points_mm[v[0]])) /
+                     2;
     volume[body[t]] += signed_volume(o.soup, v, o.soup.points_mm[o.soup.triangles[0][0]]);
     for (const auto i : v) box[body[t]].include(o.soup.points_mm[i]);
   }
@@ -248,7 +251,8 @@ TriangleSoup repaired(const TriMesh& mesh, const RepairOptions& options, RepairR
     for (std::uint32_t other = 0; other < count && !cavity; ++other) {
       if (other == b || volume[other] <= -volume[b] || open[other] != 0) continue;
       bool within = true;
-      for (std::size_t a = 0; a < 3; ++a) within &= box[other].lo[a] <= box[b].lo[a] && box[b].hi[a] <= box[other].hi[a];
+      for (std::size_t a = 0; a < 3; ++a)
+        within &= box[other].lo[a] <= box[b].lo[a] && box[b].hi[a] <= box[other].hi[a];
       cavity = within;
     }
     if (!cavity) {
@@ -269,4 +273,4 @@ TriangleSoup repaired(const TriMesh& mesh, const RepairOptions& options, RepairR
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

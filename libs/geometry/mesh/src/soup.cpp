@@ -14,15 +14,17 @@ void require_sound(const TriangleSoup& soup) {
   for (std::size_t i = 0; i < soup.points_mm.size(); ++i) {
     const Vec3 p = soup.points_mm[i];
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-      throw Error(ExitCode::corrupt, "point " + std::to_string(i) + " of the surface has a coordinate that is no finite number",
+      throw Error(ExitCode::corrupt,
+                  "point " + std::to_string(i) + " of the surface has a coordinate that is no finite number",
                   "'osteo mesh-repair' takes such points out");
     }
   }
   for (std::size_t t = 0; t < soup.triangles.size(); ++t) {
     for (const auto v : soup.triangles[t]) {
       if (v >= soup.points_mm.size()) {
-        throw Error(ExitCode::corrupt, "triangle " + std::to_string(t) + " of the surface names point " + std::to_string(v) +
-                                           ", but there are only " + std::to_string(soup.points_mm.size()) + " points");
+        throw Error(ExitCode::corrupt, "triangle " + std::to_string(t) + " of the surface names point " +
+                                           std::to_string(v) + ", but there are only " +
+                                           std::to_string(soup.points_mm.size()) + " points");
       }
     }
   }
@@ -81,7 +83,8 @@ std::vector<std::uint32_t> representatives(const std::vector<Vec3>& points, std:
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     const Vec3 p = points[i];
     std::uint64_t h = 0;
-    for (std::size_t a = 0; a < 3; ++a) h = (h ^ std::bit_cast<std::uint64_t>(p[a] + 0.0)) * 0x9e3779b97f4a7c15ULL, h ^= h >> 29;
+    for (std::size_t a = 0; a < 3; ++a)
+      h = (h ^ std::bit_cast<std::uint64_t>(p[a] + 0.0)) * 0x9e3779b97f4a7c15ULL, h ^= h >> 29;
     std::size_t s = h & (slots - 1);
     while (table[s] != 0xffffffffU && !(points[table[s]] == p)) s = (s + 1) & (slots - 1);
     if (table[s] == 0xffffffffU) {
@@ -147,7 +150,8 @@ void for_each_edge(const std::vector<HalfEdge>& edges, Visit visit) {
 // Turns triangles round until neighbours across edges of two agree.
 std::uint64_t orient(TriangleSoup& soup, const std::vector<HalfEdge>& edges) {
   bool any_disagree = false;
-  for_each_edge(edges, [&](std::span<const HalfEdge> e) { any_disagree |= e.size() == 2 && e[0].forward == e[1].forward; });
+  for_each_edge(edges,
+                [&](std::span<const HalfEdge> e) { any_disagree |= e.size() == 2 && e[0].forward == e[1].forward; });
   if (!any_disagree) return 0;
   struct Neighbour {
     std::uint32_t triangle;
@@ -265,4 +269,4 @@ Ordered ordered(const TriangleSoup& input, const Context& context) {
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

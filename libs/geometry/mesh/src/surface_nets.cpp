@@ -1,10 +1,10 @@
 // Surface nets with one vertex for each sheet of surface in a cell.
 //
-// A cell is the cube between 8 voxels. Corner c of a cell has offset (c&1, c>>1&1, c>>2). A crossing edge joins a bone and an
-// empty corner. On each face the crossing edges pair up to arcs; the arcs close to loops; a loop is one sheet and gets one
-// vertex. A face with four crossings is ambiguous: by default its arcs go around the bone corners (bone is separate across a
-// diagonal). When both cells at the face would have both arcs in one sheet, their vertices would share an edge of four quads;
-// there, both cells pair the arcs around the empty corners instead.
+// A cell is the cube between 8 voxels. Corner c of a cell has offset (c&1, c>>1&1, c>>2). A crossing edge joins a bone
+// and an empty corner. On each face the crossing edges pair up to arcs; the arcs close to loops; a loop is one sheet
+// and gets one vertex. A face with four crossings is ambiguous: by default its arcs go around the bone corners (bone is
+// separate across a diagonal). When both cells at the face would have both arcs in one sheet, their vertices would
+// share an edge of four quads; there, both cells pair the arcs around the empty corners instead.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -24,9 +24,11 @@ namespace {
 struct EdgeEnds {
   int from, to;
 };
-constexpr std::array<EdgeEnds, 12> kEdges{{{0, 1}, {2, 3}, {4, 5}, {6, 7}, {0, 2}, {1, 3}, {4, 6}, {5, 7}, {0, 4}, {1, 5}, {2, 6}, {3, 7}}};
+constexpr std::array<EdgeEnds, 12> kEdges{
+    {{0, 1}, {2, 3}, {4, 5}, {6, 7}, {0, 2}, {1, 3}, {4, 6}, {5, 7}, {0, 4}, {1, 5}, {2, 6}, {3, 7}}};
 // Face f: axis f/2, at the low (even) or high (odd) side; its corners in cyclic order.
-constexpr std::array<std::array<int, 4>, 6> kFaces{{{0, 2, 6, 4}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 3, 7, 6}, {0, 1, 3, 2}, {4, 5, 7, 6}}};
+constexpr std::array<std::array<int, 4>, 6> kFaces{
+    {{0, 2, 6, 4}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 3, 7, 6}, {0, 1, 3, 2}, {4, 5, 7, 6}}};
 
 constexpr int edge_between(int a, int b) {
   for (int e = 0; e < 12; ++e) {
@@ -46,7 +48,9 @@ constexpr Sheets sheets_of(unsigned mask, unsigned flipped_faces) {
     const bool a = mask >> kEdges[e].from & 1, b = mask >> kEdges[e].to & 1;
     parent[e] = a != b ? e : std::uint8_t{12};
   }
-  const auto join = [&](int a, int b) { join_sets(parent, static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(b)); };
+  const auto join = [&](int a, int b) {
+    join_sets(parent, static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(b));
+  };
   for (unsigned f = 0; f < 6; ++f) {
     const auto& c = kFaces[f];
     std::array<int, 4> crossing{};
@@ -57,7 +61,8 @@ constexpr Sheets sheets_of(unsigned mask, unsigned flipped_faces) {
     }
     if (count == 2) join(crossing[0], crossing[1]);
     if (count == 4) {
-      // crossing[i] lies between corners i and i+1: pair the two edges at each bone corner (or empty corner, if flipped).
+      // crossing[i] lies between corners i and i+1: pair the two edges at each bone corner (or empty corner, if
+      // flipped).
       const bool first_is_centre = ((mask >> c[0] & 1) != 0) != ((flipped_faces >> f & 1) != 0);
       if (first_is_centre) {
         join(crossing[3], crossing[0]);
@@ -101,8 +106,9 @@ const Tables& tables() {
 
 // The voxels of a brick and 2 beyond it on each side.
 constexpr int kPad = 2, kBlock = BrickGrid::kEdge + 2 * kPad;
-// A crossing keeps this share of its edge away from both ends. Else a voxel of just the surface's density would draw the vertices of all
-// cells around it together; so, no two vertices are nearer than two thirds of this, and single precision keeps them apart.
+// A crossing keeps this share of its edge away from both ends. Else a voxel of just the surface's density would draw
+// the vertices of all cells around it together; so, no two vertices are nearer than two thirds of this, and single
+// precision keeps them apart.
 constexpr float kFromEnds = 0.01F;
 constexpr int kCells = BrickGrid::kEdge + 1;  // cells -1 .. 7 along each axis can hold vertices of this brick
 
@@ -115,7 +121,8 @@ struct Block {
 
 unsigned cell_mask(const Block& b, int i, int j, int k, float iso) {
   unsigned mask = 0;
-  for (int c = 0; c < 8; ++c) mask |= static_cast<unsigned>(b.at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)) >= iso) << c;
+  for (int c = 0; c < 8; ++c)
+    mask |= static_cast<unsigned>(b.at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)) >= iso) << c;
   return mask;
 }
 
@@ -146,7 +153,8 @@ class PatchBuilder {
           for (int axis = 0; axis < 3; ++axis) {
             for (int side = 0; side < 2; ++side) {
               const int d = side == 0 ? -1 : 1;
-              if (block_.at(i + (axis == 0 ? d : 0), j + (axis == 1 ? d : 0), k + (axis == 2 ? d : 0)) >= iso_) continue;
+              if (block_.at(i + (axis == 0 ? d : 0), j + (axis == 1 ? d : 0), k + (axis == 2 ? d : 0)) >= iso_)
+                continue;
               add_quad(i, j, k, axis, side);
             }
           }
@@ -180,7 +188,8 @@ class PatchBuilder {
     for (unsigned f = 0; doubled != 0 && f < 6; ++f) {
       if ((doubled >> f & 1) == 0) continue;
       const int d = (f & 1) != 0 ? 1 : -1;
-      const unsigned other = cell_mask(block_, i + (f / 2 == 0 ? d : 0), j + (f / 2 == 1 ? d : 0), k + (f / 2 == 2 ? d : 0), iso_);
+      const unsigned other =
+          cell_mask(block_, i + (f / 2 == 0 ? d : 0), j + (f / 2 == 1 ? d : 0), k + (f / 2 == 2 ? d : 0), iso_);
       if ((tables().doubled[other] >> (f ^ 1U) & 1) != 0) flip |= 1U << f;
     }
     cell.flipped_faces = static_cast<std::uint8_t>(flip);
@@ -188,11 +197,10 @@ class PatchBuilder {
     return cell.sheets;
   }
 
-  // The area vector of the polygon in which a sheet cuts the faces of its cell. It needs no neighbours, so both sides of a
-  // wall one voxel thin get their own; density gradients would cancel there.
-  // False where that has no area.
-  static bool sheet_normal(const CellSheets& cell, std::uint8_t sheet, const std::array<std::array<float, 3>, 12>& crossing,
-                           std::array<float, 3>& area) {
+  // The area vector of the polygon in which a sheet cuts the faces of its cell. It needs no neighbours, so both sides
+  // of a wall one voxel thin get their own; density gradients would cancel there. False where that has no area.
+  static bool sheet_normal(const CellSheets& cell, std::uint8_t sheet,
+                           const std::array<std::array<float, 3>, 12>& crossing, std::array<float, 3>& area) {
     area = {0, 0, 0};
     for (unsigned f = 0; f < 6; ++f) {
       const auto& c = kFaces[f];
@@ -208,10 +216,12 @@ class PatchBuilder {
       // Arcs as in sheets_of: a face with two crossings has one, an ambiguous face two.
       const auto add_arc = [&](std::size_t a, std::size_t b) {
         if (cell.sheets[edge[a]] != sheet) return;
-        const bool counter_clockwise = ((f & 1) != 0) != (f / 2 == 1);  // the face's corners, seen from outside the cell
+        const bool counter_clockwise =
+            ((f & 1) != 0) != (f / 2 == 1);  // the face's corners, seen from outside the cell
         const bool forward = leaves_bone[a] != counter_clockwise;
         const auto &p = crossing[edge[forward ? a : b]], &q = crossing[edge[forward ? b : a]];
-        for (std::size_t x = 0; x < 3; ++x) area[x] += p[(x + 1) % 3] * q[(x + 2) % 3] - p[(x + 2) % 3] * q[(x + 1) % 3];
+        for (std::size_t x = 0; x < 3; ++x)
+          area[x] += p[(x + 1) % 3] * q[(x + 2) % 3] - p[(x + 2) % 3] * q[(x + 1) % 3];
       };
       if (count == 2) add_arc(0, 1);
       if (count == 4) {
@@ -226,7 +236,9 @@ class PatchBuilder {
     return true;
   }
 
-  static std::size_t cell_index(int i, int j, int k) { return static_cast<std::size_t>(((k + 1) * kCells + j + 1) * kCells + i + 1); }
+  static std::size_t cell_index(int i, int j, int k) {
+    return static_cast<std::size_t>(((k + 1) * kCells + j + 1) * kCells + i + 1);
+  }
 
   std::uint32_t vertex_at(int i, int j, int k, int edge) {
     const Sheets& sheets = sheets_at(i, j, k);
@@ -263,7 +275,9 @@ class PatchBuilder {
     const std::uint64_t key = ((part(cell.k) << 20 | part(cell.j)) << 20 | part(cell.i)) << 4 | sheet;
     vertex = static_cast<std::uint32_t>(patch_.vertices.size());
     patch_.vertices.push_back(
-        {{static_cast<float>(cell.i) + at[0], static_cast<float>(cell.j) + at[1], static_cast<float>(cell.k) + at[2]}, g, key});
+        {{static_cast<float>(cell.i) + at[0], static_cast<float>(cell.j) + at[1], static_cast<float>(cell.k) + at[2]},
+         g,
+         key});
     return vertex;
   }
 
@@ -357,9 +371,10 @@ BoneSurface join_patches(const BrickGrid& bone, std::span<const SurfacePatch> pa
       } else {
         global[v] = fresh;
       }
-      const Vec3 p = frame.world_from_index(
-          {static_cast<double>(vertex.index[0]), static_cast<double>(vertex.index[1]), static_cast<double>(vertex.index[2])});
-      const Vec3 n = normalized(frame.direction * Vec3{static_cast<double>(vertex.normal[0]), static_cast<double>(vertex.normal[1]),
+      const Vec3 p = frame.world_from_index({static_cast<double>(vertex.index[0]), static_cast<double>(vertex.index[1]),
+                                             static_cast<double>(vertex.index[2])});
+      const Vec3 n = normalized(frame.direction * Vec3{static_cast<double>(vertex.normal[0]),
+                                                       static_cast<double>(vertex.normal[1]),
                                                        static_cast<double>(vertex.normal[2])});
       result.mesh.points_mm.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
       result.mesh.normals.push_back({static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
@@ -438,8 +453,8 @@ VolumeSurface surface_of_volume(const BrickGrid& bone, const Context& context) {
   result.bone_mm3 = wanted * voxel_mm3;
   if (!(densest > 0)) return result;
 
-  // Volume falls as density rises: from one half by the surface's own area, then between the nearest from above and from below (the
-  // Illinois rule). Where it jumps, as at a new speck, the nearest that was met stands.
+  // Volume falls as density rises: from one half by the surface's own area, then between the nearest from above and
+  // from below (the Illinois rule). Where it jumps, as at a new speck, the nearest that was met stands.
   struct Point {
     float iso;
     double off;
@@ -456,8 +471,8 @@ VolumeSurface surface_of_volume(const BrickGrid& bone, const Context& context) {
   const Point half = look(kHalf);
   const double step = 1.5 * half.off / std::max(area_at_half, 1e-9);
   Point a = half, b = half;
-  for (float reach = static_cast<float>(std::copysign(std::clamp(std::abs(step), 1e-4, 0.5), step)); std::abs(half.off) > kEnough * wanted;
-       reach *= 3) {
+  for (float reach = static_cast<float>(std::copysign(std::clamp(std::abs(step), 1e-4, 0.5), step));
+       std::abs(half.off) > kEnough * wanted; reach *= 3) {
     b = look(std::clamp(kHalf + reach, low, high));
     if ((b.off > 0) != (half.off > 0) || b.iso == low || b.iso == high) break;
     a = b;
@@ -494,4 +509,4 @@ VolumeSurface surface_of_volume(const BrickGrid& bone, const Context& context) {
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -30,7 +30,8 @@ std::vector<Candidate> make_candidates() {
   for (int a = 0; a < 8; ++a) {
     for (int b = a + 1; b < 8; ++b) {
       for (int c = b + 1; c < 8; ++c) {
-        Candidate t{{static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(b), static_cast<std::uint8_t>(c)}, {}, 0, 0, -1};
+        Candidate t{
+            {static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(b), static_cast<std::uint8_t>(c)}, {}, 0, 0, -1};
         const auto p = corner(a), q = corner(b), r = corner(c);
         std::array<int, 3> u{}, v{};
         for (std::size_t x = 0; x < 3; ++x) {
@@ -110,7 +111,8 @@ BoneSurface voxel_surface(const BrickGrid& bone, float iso, const Context& conte
       vertex_of[key] = static_cast<std::uint32_t>(result.voxels.size());
       result.voxels.push_back(key);
       const Vec3 p = place_of_voxel_mm(bone, key);
-      const Vec3 n = normalized(frame.direction * Vec3{static_cast<double>(g[0]), static_cast<double>(g[1]), static_cast<double>(g[2])});
+      const Vec3 n = normalized(frame.direction *
+                                Vec3{static_cast<double>(g[0]), static_cast<double>(g[1]), static_cast<double>(g[2])});
       result.mesh.points_mm.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
       result.mesh.normals.push_back({static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
     }
@@ -118,8 +120,8 @@ BoneSurface voxel_surface(const BrickGrid& bone, float iso, const Context& conte
   context.progress(0.4, "triangles");
 
   // Pass 2: triangles cell by cell. A triple is seen from a side when every corner of the cell on that side is empty; a
-  // triple on a face of the cell is judged, on its outer side, by the corners of the cell beyond, and belongs to the cell
-  // that has it on its low side.
+  // triple on a face of the cell is judged, on its outer side, by the corners of the cell beyond, and belongs to the
+  // cell that has it on its low side.
   const bool mirrored = determinant(frame.direction) < 0;
   std::vector<std::vector<std::array<std::uint32_t, 3>>> triangles(bone.brick_count());
   parallel_for(triangles.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
@@ -129,7 +131,8 @@ BoneSurface voxel_surface(const BrickGrid& bone, float iso, const Context& conte
       const Ijk o = load(static_cast<std::uint32_t>(n), b);
       const auto mask_at = [&](int i, int j, int k) {
         unsigned mask = 0;
-        for (int c = 0; c < 8; ++c) mask |= static_cast<unsigned>(at(b, i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)) >= iso) << c;
+        for (int c = 0; c < 8; ++c)
+          mask |= static_cast<unsigned>(at(b, i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)) >= iso) << c;
         return mask;
       };
       // Each triple is emitted by the brick of its first corner (ascending corner order is ascending z, y, x).
@@ -147,13 +150,16 @@ BoneSurface voxel_surface(const BrickGrid& bone, float iso, const Context& conte
               if (t.face >= 0) {
                 if ((t.face & 1) != 0) continue;  // the cell beyond has it on its low face
                 const int axis = t.face / 2;
-                const unsigned beyond = mask_at(i - (axis == 0 ? 1 : 0), j - (axis == 1 ? 1 : 0), k - (axis == 2 ? 1 : 0));
+                const unsigned beyond =
+                    mask_at(i - (axis == 0 ? 1 : 0), j - (axis == 1 ? 1 : 0), k - (axis == 2 ? 1 : 0));
                 // Of the cell beyond, the corners off the shared face are those at its low side.
                 unsigned low_side = 0;
-                for (int c = 0; c < 8; ++c) low_side |= static_cast<unsigned>(corner(c)[static_cast<std::size_t>(axis)] == 0) << c;
+                for (int c = 0; c < 8; ++c)
+                  low_side |= static_cast<unsigned>(corner(c)[static_cast<std::size_t>(axis)] == 0) << c;
                 (t.above != 0 ? below : above) = beyond & low_side;
                 // A full square has two ways to be split: keep the one along its first corner.
-                const std::array<unsigned, 3> squares{1U << 0 | 1U << 2 | 1U << 4 | 1U << 6, 1U << 0 | 1U << 1 | 1U << 4 | 1U << 5,
+                const std::array<unsigned, 3> squares{1U << 0 | 1U << 2 | 1U << 4 | 1U << 6,
+                                                      1U << 0 | 1U << 1 | 1U << 4 | 1U << 5,
                                                       1U << 0 | 1U << 1 | 1U << 2 | 1U << 3};
                 const unsigned square = squares[static_cast<std::size_t>(axis)];
                 const bool full = (mask & square) == square;
@@ -195,7 +201,8 @@ BoneSurface voxel_surface(const BrickGrid& bone, float iso, const Context& conte
       }
     }
   });
-  for (const auto& list : triangles) result.mesh.triangles.insert(result.mesh.triangles.end(), list.begin(), list.end());
+  for (const auto& list : triangles)
+    result.mesh.triangles.insert(result.mesh.triangles.end(), list.begin(), list.end());
   result.vertices_of_voxel.first.resize(result.voxels.size() + 1);
   result.vertices_of_voxel.items.resize(result.voxels.size());
   for (std::uint32_t v = 0; v < result.voxels.size(); ++v) {
@@ -206,4 +213,4 @@ BoneSurface voxel_surface(const BrickGrid& bone, float iso, const Context& conte
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

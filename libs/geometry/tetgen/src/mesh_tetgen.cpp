@@ -16,7 +16,8 @@
 namespace osteo::inline geometry {
 namespace {
 
-const char* const kAdvice = "try 'osteo mesh-repair' first (--clean does), or the method grid-conforming, which takes any surface";
+const char* const kAdvice =
+    "try 'osteo mesh-repair' first (--clean does), or the method grid-conforming, which takes any surface";
 
 // What TetGen makes: the child's answer, as bytes.
 struct Made {
@@ -70,14 +71,15 @@ std::string crossings(const TriangleSoup& soup) {
     char detect[] = "dQ";
     tetrahedralize(detect, &in, &crossing);
   } catch (const int code) {
-    throw Error(ExitCode::failed, "TetGen cannot tell whether the surface intersects itself (its code " + std::to_string(code) + ")",
+    throw Error(ExitCode::failed,
+                "TetGen cannot tell whether the surface intersects itself (its code " + std::to_string(code) + ")",
                 kAdvice);
   }
   if (crossing.numberoftrifaces > 0)
-    throw Error(
-        ExitCode::failed,
-        "TetGen needs a surface that does not intersect itself; " + std::to_string(crossing.numberoftrifaces) + " triangles of this one do",
-        kAdvice);
+    throw Error(ExitCode::failed,
+                "TetGen needs a surface that does not intersect itself; " + std::to_string(crossing.numberoftrifaces) +
+                    " triangles of this one do",
+                kAdvice);
   return {};
 }
 
@@ -104,11 +106,12 @@ std::string mesh(const TriangleSoup& soup, const TetgenOptions& options) {
     made.points.push_back({out.pointlist[3 * i], out.pointlist[3 * i + 1], out.pointlist[3 * i + 2]});
   for (int i = 0; i < out.numberoftetrahedra; ++i) {
     const int* v = out.tetrahedronlist + static_cast<std::ptrdiff_t>(i) * out.numberofcorners;
-    made.tets.push_back({static_cast<std::uint32_t>(v[0]), static_cast<std::uint32_t>(v[1]), static_cast<std::uint32_t>(v[2]),
-                         static_cast<std::uint32_t>(v[3])});
-    made.region.push_back(out.numberoftetrahedronattributes > 0
-                              ? out.tetrahedronattributelist[static_cast<std::ptrdiff_t>(i) * out.numberoftetrahedronattributes]
-                              : 0);
+    made.tets.push_back({static_cast<std::uint32_t>(v[0]), static_cast<std::uint32_t>(v[1]),
+                         static_cast<std::uint32_t>(v[2]), static_cast<std::uint32_t>(v[3])});
+    made.region.push_back(
+        out.numberoftetrahedronattributes > 0
+            ? out.tetrahedronattributelist[static_cast<std::ptrdiff_t>(i) * out.numberoftetrahedronattributes]
+            : 0);
   }
   std::string bytes;
   put(bytes, made.points);
@@ -127,7 +130,8 @@ double volume_of(const Made& m, const std::array<std::uint32_t, 4>& t) {
 TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options, const Context& context) {
   const Ordered order = ordered(surface, context);
   if (const TriangleSoup whole = welded(surface); !is_closed(whole) && !order.open.empty()) {
-    throw Error(ExitCode::failed, "TetGen needs a closed surface; " + std::to_string(order.open.size()) + " edges of this one are open",
+    throw Error(ExitCode::failed,
+                "TetGen needs a closed surface; " + std::to_string(order.open.size()) + " edges of this one are open",
                 kAdvice);
   }
   // Before anything is left out: of surfaces that cross no patch lies wholly inside or outside.
@@ -141,8 +145,9 @@ TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options
     const double expected = volume / options.max_volume_mm3;
     if (!(expected < options.most_tets))
       throw Error(ExitCode::resources,
-                  "TetGen would make over " + format_number(expected) + " tetrahedra of at most " + format_number(options.max_volume_mm3) +
-                      " mm3, more than the " + format_number(options.most_tets) + " that are allowed",
+                  "TetGen would make over " + format_number(expected) + " tetrahedra of at most " +
+                      format_number(options.max_volume_mm3) + " mm3, more than the " +
+                      format_number(options.most_tets) + " that are allowed",
                   "choose a larger spacing, or larger --max-volume-mm3");
   }
   context.progress(0.2, "meshing");
@@ -153,7 +158,8 @@ TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options
   get(bytes, at, made.points);
   get(bytes, at, made.tets);
   get(bytes, at, made.region);
-  // TetGen fills all that is enclosed. A region of it is bounded by the surface, so one place in it tells whether it is inside.
+  // TetGen fills all that is enclosed. A region of it is bounded by the surface, so one place in it tells whether it is
+  // inside.
   std::map<double, std::pair<std::size_t, double>> largest;
   for (std::size_t t = 0; t < made.tets.size(); ++t) {
     const double v = std::abs(volume_of(made, made.tets[t]));
@@ -189,10 +195,11 @@ TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options
   // It keeps the surface, so the volume is the surface's, or something went wrong without a word.
   if (!(std::abs(filled - volume) <= 0.001 * volume))
     throw Error(ExitCode::failed,
-                "TetGen's tetrahedra fill " + format_number(filled) + " mm3 of a surface that holds " + format_number(volume) + " mm3",
+                "TetGen's tetrahedra fill " + format_number(filled) + " mm3 of a surface that holds " +
+                    format_number(volume) + " mm3",
                 kAdvice);
   context.progress(1.0);
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -27,7 +27,9 @@ class Bisector {
   explicit Bisector(const Frame& coarse) : frame_(coarse) {
     // Cubes of six tetrahedra along paths from one corner to the opposite one, all the same way round.
     const auto& n = coarse.dims;
-    const auto id = [&](int i, int j, int k) { return static_cast<std::uint32_t>((k * (n[1] + 1) + j) * (n[0] + 1) + i); };
+    const auto id = [&](int i, int j, int k) {
+      return static_cast<std::uint32_t>((k * (n[1] + 1) + j) * (n[0] + 1) + i);
+    };
     for (int k = 0; k <= n[2]; ++k) {
       for (int j = 0; j <= n[1]; ++j) {
         for (int i = 0; i <= n[0]; ++i) points.push_back(coarse.world_from_index({i - 0.5, j - 0.5, k - 0.5}));
@@ -169,11 +171,12 @@ TetMesh graded_tets(const TriangleSoup& surface, const GradedOptions& options, c
     result.tets.push_back(v);
   }
   if (result.tets.empty()) {
-    throw Error(ExitCode::failed, "no tetrahedron of " + format_number(options.spacing_mm) + " mm has its centre inside the surface",
+    throw Error(ExitCode::failed,
+                "no tetrahedron of " + format_number(options.spacing_mm) + " mm has its centre inside the surface",
                 "choose a smaller spacing");
   }
   context.progress(1.0);
   return result;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

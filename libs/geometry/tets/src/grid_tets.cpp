@@ -22,7 +22,8 @@ constexpr FiveTets oriented(FiveTets tets, bool right_handed) {
     for (int i = 0; i < 3; ++i) {
       for (int a = 0; a < 3; ++a) e[i][a] = corner(t[static_cast<std::size_t>(i) + 1], a) - corner(t[0], a);
     }
-    const double volume = e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) - e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
+    const double volume = e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) -
+                          e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
                           e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
     if ((volume > 0) != right_handed) std::swap(t[2], t[3]);
   }
@@ -53,7 +54,8 @@ TetMesh grid_tets(const VoxelBits& voxels, const Context& context) {
           if (w < voxels.words_per_row) {
             for (int dk = -1; dk <= 0; ++dk) {
               for (int dj = -1; dj <= 0; ++dj) {
-                if (j + dj >= 0 && j + dj < ny && k + dk >= 0 && k + dk < nz) v |= voxels.words[voxels.row(j + dj, k + dk) + w];
+                if (j + dj >= 0 && j + dj < ny && k + dk >= 0 && k + dk < nz)
+                  v |= voxels.words[voxels.row(j + dj, k + dk) + w];
               }
             }
           }
@@ -67,7 +69,8 @@ TetMesh grid_tets(const VoxelBits& voxels, const Context& context) {
         std::uint64_t count = 0;
         for (std::size_t w = 0; w < voxels.words_per_row; ++w)
           count += static_cast<std::uint64_t>(std::popcount(voxels.words[voxels.row(j, k) + w]));
-        first_voxel[static_cast<std::size_t>(k) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j) + 1] = count;
+        first_voxel[static_cast<std::size_t>(k) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j) + 1] =
+            count;
       }
     }
   });
@@ -92,22 +95,25 @@ TetMesh grid_tets(const VoxelBits& voxels, const Context& context) {
         const Vec3 start = voxels.frame.world_from_index({-0.5, j - 0.5, k - 0.5});
         for (std::size_t w = 0; w < words; ++w) {
           for (std::uint64_t rest = used[r * words + w]; rest != 0; rest &= rest - 1) {
-            const Vec3 p = start + step * static_cast<double>(w * 64 + static_cast<std::size_t>(std::countr_zero(rest)));
+            const Vec3 p =
+                start + step * static_cast<double>(w * 64 + static_cast<std::size_t>(std::countr_zero(rest)));
             mesh.points_mm[at++] = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
           }
         }
       }
       for (int j = 0; j < ny && k < nz; ++j) {
         std::array<std::uint32_t, 4>* out =
-            mesh.tets.data() + 5 * first_voxel[static_cast<std::size_t>(k) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j)];
-        const std::size_t rows[4] = {corner_row(j, k), corner_row(j + 1, k), corner_row(j, k + 1), corner_row(j + 1, k + 1)};
+            mesh.tets.data() +
+            5 * first_voxel[static_cast<std::size_t>(k) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j)];
+        const std::size_t rows[4] = {corner_row(j, k), corner_row(j + 1, k), corner_row(j, k + 1),
+                                     corner_row(j + 1, k + 1)};
         std::uint32_t before[4];  // points of the row before this word
         for (int q = 0; q < 4; ++q) before[q] = static_cast<std::uint32_t>(first_point[rows[q]]);
         for (std::size_t w = 0; w < voxels.words_per_row; ++w) {
           std::uint64_t bits = voxels.words[voxels.row(j, k) + w];
           while (bits != 0) {
-            // A run of voxels: the corners along it are numbered one after the other, so each voxel has the tetrahedra of the
-            // one before with 1 added, in the two patterns by turns.
+            // A run of voxels: the corners along it are numbered one after the other, so each voxel has the tetrahedra
+            // of the one before with 1 added, in the two patterns by turns.
             const int start = std::countr_zero(bits), length = std::countr_one(bits >> start);
             bits = start + length == 64 ? 0 : bits & (~0ULL << (start + length));
             std::uint32_t corner_of[8];
@@ -120,7 +126,8 @@ TetMesh grid_tets(const VoxelBits& voxels, const Context& context) {
             for (int n = 0; n < 2; ++n) {
               const FiveTets& five = patterns[(start + n + j + k) & 1];
               for (std::size_t t = 0; t < 5; ++t) {
-                for (std::size_t c = 0; c < 4; ++c) first[n][4 * t + c] = corner_of[five[t][c]] + static_cast<std::uint32_t>(n);
+                for (std::size_t c = 0; c < 4; ++c)
+                  first[n][4 * t + c] = corner_of[five[t][c]] + static_cast<std::uint32_t>(n);
               }
             }
             auto* flat = out->data();
@@ -141,4 +148,4 @@ TetMesh grid_tets(const VoxelBits& voxels, const Context& context) {
   return mesh;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -8,8 +8,11 @@
 
 namespace osteo::inline geometry {
 
-double improve_tets(TetMesh& mesh, const TriangleSoup& surface, double target_deg, double spacing_mm, const Context& context) {
-  const auto p = [&](std::uint32_t i) { return Vec3{mesh.points_mm[i][0], mesh.points_mm[i][1], mesh.points_mm[i][2]}; };
+double improve_tets(TetMesh& mesh, const TriangleSoup& surface, double target_deg, double spacing_mm,
+                    const Context& context) {
+  const auto p = [&](std::uint32_t i) {
+    return Vec3{mesh.points_mm[i][0], mesh.points_mm[i][1], mesh.points_mm[i][2]};
+  };
   // The worse of the smallest angle and 180 less the largest.
   const auto quality = [&](const std::array<std::uint32_t, 4>& t) {
     const Vec3 a = p(t[0]), b = p(t[1]), c = p(t[2]), d = p(t[3]);
@@ -111,4 +114,4 @@ double improve_tets(TetMesh& mesh, const TriangleSoup& surface, double target_de
   return worst;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

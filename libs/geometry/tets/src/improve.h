@@ -6,9 +6,10 @@
 
 namespace osteo::inline geometry {
 
-/// Moves points of tetrahedra with a dihedral angle below the target (or above 180 less it) so that the worst angle around each gets
-/// better, never worse. Points of the boundary move along it only: off `surface` by at most 2 % of the spacing more than they were.
-/// Returns the smallest dihedral angle afterwards.
-double improve_tets(TetMesh& mesh, const TriangleSoup& surface, double target_deg, double spacing_mm, const Context& context);
+/// Moves points of tetrahedra with a dihedral angle below the target (or above 180 less it) so that the worst angle
+/// around each gets better, never worse. Points of the boundary move along it only: off `surface` by at most 2 % of the
+/// spacing more than they were. Returns the smallest dihedral angle afterwards.
+double improve_tets(TetMesh& mesh, const TriangleSoup& surface, double target_deg, double spacing_mm,
+                    const Context& context);
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -10,7 +10,8 @@
 namespace osteo::inline geometry {
 
 Dihedrals dihedral_angles(Vec3 a, Vec3 b, Vec3 c, Vec3 d, double* all_deg) {
-  // Outward normals of the faces opposite a, b, c, d; the angle along the edge of two faces is pi less that of the normals.
+  // Outward normals of the faces opposite a, b, c, d; the angle along the edge of two faces is pi less that of the
+  // normals.
   const Vec3 n[4] = {cross(c - b, d - b), cross(d - a, c - a), cross(b - a, d - a), cross(c - a, b - a)};
   Dihedrals r{180, 0};
   int at = 0;
@@ -177,4 +178,4 @@ void report_quality(const TetQuality& q, const Context& context) {
   context.report("unused_points", whole(q.unused_points));
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -21,10 +21,12 @@ class Cells {
   Cells(Vec3 lo, Vec3 hi, std::size_t items) : lo_(lo) {
     const Vec3 extent = hi - lo;
     const double largest = std::max({extent.x, extent.y, extent.z, 1e-30});
-    const double volume = std::max(extent.x, 1e-3 * largest) * std::max(extent.y, 1e-3 * largest) * std::max(extent.z, 1e-3 * largest);
+    const double volume =
+        std::max(extent.x, 1e-3 * largest) * std::max(extent.y, 1e-3 * largest) * std::max(extent.z, 1e-3 * largest);
     size_ = std::cbrt(volume / static_cast<double>(std::max<std::size_t>(1, items)));
     for (std::size_t a = 0; a < 3; ++a) n_[a] = std::clamp(static_cast<int>(extent[a] / size_) + 1, 1, 1024);
-    first_.assign(static_cast<std::size_t>(n_[0]) * static_cast<std::size_t>(n_[1]) * static_cast<std::size_t>(n_[2]) + 1, 0);
+    first_.assign(
+        static_cast<std::size_t>(n_[0]) * static_cast<std::size_t>(n_[1]) * static_cast<std::size_t>(n_[2]) + 1, 0);
   }
   [[nodiscard]] std::array<int, 3> cell(Vec3 p) const {
     std::array<int, 3> c{};
@@ -59,7 +61,8 @@ class Cells {
 
  private:
   [[nodiscard]] std::size_t at(int x, int y, int z) const {
-    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(n_[1]) + static_cast<std::size_t>(y)) * static_cast<std::size_t>(n_[0]) +
+    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(n_[1]) + static_cast<std::size_t>(y)) *
+               static_cast<std::size_t>(n_[0]) +
            static_cast<std::size_t>(x);
   }
   Vec3 lo_;
@@ -143,7 +146,8 @@ void Skin::embed(const TriMesh& surface, const TetMesh& rest, const Context& con
         }
         return least > 0;
       };
-      bool found = begin != i && inside[i - 1] != 0 && offer(last);  // neighbours in the list are often neighbours in space
+      bool found =
+          begin != i && inside[i - 1] != 0 && offer(last);  // neighbours in the list are often neighbours in space
       if (!found) {
         const auto c = cells.cell(p);
         for (const std::uint32_t tet : cells.items(c[0], c[1], c[2])) {
@@ -219,7 +223,8 @@ void Skin::frame(const TriMesh& surface, const TetMesh& rest, int neighbours) {
   const std::span<const std::array<float, 3>> points(rest.points_mm.data(), rest.points_mm.size());
   std::vector<std::array<Vec3, 3>> axes_of;
   for (std::uint32_t v = 0; v < n; ++v) {
-    FrameOf f{point_of[v], point_of[v], static_cast<std::uint32_t>(fan_.size()), static_cast<std::uint32_t>(triangles[v].size())};
+    FrameOf f{point_of[v], point_of[v], static_cast<std::uint32_t>(fan_.size()),
+              static_cast<std::uint32_t>(triangles[v].size())};
     for (const std::uint32_t t : triangles[v]) {
       const auto& c = boundary.triangles[t];
       fan_.push_back({point_of[c[0]], point_of[c[1]], point_of[c[2]]});
@@ -268,23 +273,24 @@ void Skin::frame(const TriMesh& surface, const TetMesh& rest, int neighbours) {
       const auto [d2, i] = near[static_cast<std::size_t>(k)];
       const Vec3 offset = p - vec(boundary.points_mm[i]);
       const auto& e = axes_of[i];
-      votes_.push_back(
-          {i,
-           static_cast<float>(1 / std::max(d2, least) / total),
-           {static_cast<float>(dot(e[0], offset)), static_cast<float>(dot(e[1], offset)), static_cast<float>(dot(e[2], offset))}});
+      votes_.push_back({i,
+                        static_cast<float>(1 / std::max(d2, least) / total),
+                        {static_cast<float>(dot(e[0], offset)), static_cast<float>(dot(e[1], offset)),
+                         static_cast<float>(dot(e[2], offset))}});
     }
   }
 }
 
 void Skin::apply(std::span<const std::array<float, 3>> points, std::span<std::array<float, 3>> out) const {
   if (points.size() != mesh_points_ || out.size() != count_) {
-    throw Error(ExitCode::usage,
-                "the moved mesh has " + std::to_string(points.size()) + " points; at rest it had " + std::to_string(mesh_points_));
+    throw Error(ExitCode::usage, "the moved mesh has " + std::to_string(points.size()) + " points; at rest it had " +
+                                     std::to_string(mesh_points_));
   }
   for (std::size_t i = 0; i < embeddings_.size(); ++i) {
     const Embedding& e = embeddings_[i];
     for (std::size_t a = 0; a < 3; ++a) {
-      out[i][a] = e.w[0] * points[e.v[0]][a] + e.w[1] * points[e.v[1]][a] + e.w[2] * points[e.v[2]][a] + e.w[3] * points[e.v[3]][a];
+      out[i][a] = e.w[0] * points[e.v[0]][a] + e.w[1] * points[e.v[1]][a] + e.w[2] * points[e.v[2]][a] +
+                  e.w[3] * points[e.v[3]][a];
     }
   }
   if (frames_.empty()) return;
@@ -303,4 +309,4 @@ void Skin::apply(std::span<const std::array<float, 3>> points, std::span<std::ar
   }
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -53,7 +53,8 @@ Lattice sample(const TriangleSoup& surface, double spacing_mm, const Context& co
   lattice.value.resize(2 * lattice.half[0] * lattice.half[1] * lattice.half[2]);
   for (int z = 0; z < f.dims[2]; ++z) {
     for (int y = z & 1; y < f.dims[1]; y += 2) {
-      for (int x = z & 1; x < f.dims[0]; x += 2) lattice.value[lattice.at(x, y, z)] = mapper.inside().at(x, y, z) ? -3.0F : 3.0F;
+      for (int x = z & 1; x < f.dims[0]; x += 2)
+        lattice.value[lattice.at(x, y, z)] = mapper.inside().at(x, y, z) ? -3.0F : 3.0F;
     }
   }
   for (std::size_t b = 0; b < map.bricks.size(); ++b) {
@@ -86,7 +87,8 @@ class Stuffer {
   static constexpr std::uint32_t kNone = 0xffffffffU;
 
  public:
-  Stuffer(Lattice& lattice, const Context& context) : l_(lattice), context_(context), points_(lattice.value.size(), kNone) {}
+  Stuffer(Lattice& lattice, const Context& context)
+      : l_(lattice), context_(context), points_(lattice.value.size(), kNone) {}
 
   TetMesh run() {
     warp();
@@ -108,10 +110,12 @@ class Stuffer {
   [[nodiscard]] bool within(const std::array<int, 3>& p) const {
     return p[0] >= 0 && p[1] >= 0 && p[2] >= 0 && p[0] < l_.n[0] && p[1] < l_.n[1] && p[2] < l_.n[2];
   }
-  [[nodiscard]] float value(const std::array<int, 3>& p) const { return within(p) ? l_.value[l_.at(p[0], p[1], p[2])] : 3.0F; }
+  [[nodiscard]] float value(const std::array<int, 3>& p) const {
+    return within(p) ? l_.value[l_.at(p[0], p[1], p[2])] : 3.0F;
+  }
 
-  // Moves lattice points onto the surface where it passes near, one after another; a moved point has value 0 from then on, so
-  // that its edges are cut no more.
+  // Moves lattice points onto the surface where it passes near, one after another; a moved point has value 0 from then
+  // on, so that its edges are cut no more.
   void warp() {
     const float near = 2.0F;
     for (int z = 0; z < l_.n[2]; ++z) {
@@ -161,7 +165,8 @@ class Stuffer {
     const auto [it, made] = cuts_.try_emplace(ia << 32 ^ ib, 0);
     if (made) {
       const double t = static_cast<double>(a.value) / (static_cast<double>(a.value) - static_cast<double>(b.value));
-      it->second = add(Vec3{a.at[0] + t * (b.at[0] - a.at[0]), a.at[1] + t * (b.at[1] - a.at[1]), a.at[2] + t * (b.at[2] - a.at[2])});
+      it->second = add(Vec3{a.at[0] + t * (b.at[0] - a.at[0]), a.at[1] + t * (b.at[1] - a.at[1]),
+                            a.at[2] + t * (b.at[2] - a.at[2])});
     }
     return it->second;
   }
@@ -192,18 +197,20 @@ class Stuffer {
   }
 
   void emit(std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
-    const auto p = [&](std::uint32_t i) { return Vec3{mesh_.points_mm[i][0], mesh_.points_mm[i][1], mesh_.points_mm[i][2]}; };
+    const auto p = [&](std::uint32_t i) {
+      return Vec3{mesh_.points_mm[i][0], mesh_.points_mm[i][1], mesh_.points_mm[i][2]};
+    };
     const double volume = dot(cross(p(b) - p(a), p(c) - p(a)), p(d) - p(a));
     if (volume < 0) std::swap(c, d);
     mesh_.tets.push_back({a, b, c, d});
   }
 
   [[nodiscard]] static bool is_long(const Corner& a, const Corner& b) { return ((a.at[0] ^ b.at[0]) & 1) == 0; }
-  // A face with two inside corners a, b and one outside, c, is left with a quadrilateral. Its diagonal goes from the corner
-  // this chooses to the other's cut. Both tetrahedra of a face choose alike.
+  // A face with two inside corners a, b and one outside, c, is left with a quadrilateral. Its diagonal goes from the
+  // corner this chooses to the other's cut. Both tetrahedra of a face choose alike.
   [[nodiscard]] static bool diagonal_from_first(const Corner& a, const Corner& b, const Corner& c) {
-    // One cut on a long and one on a short edge: the diagonal ends in the cut of the long edge. Two short ones: the parity of
-    // the corners' coordinates decides.
+    // One cut on a long and one on a short edge: the diagonal ends in the cut of the long edge. Two short ones: the
+    // parity of the corners' coordinates decides.
     if (is_long(a, c)) return false;
     if (is_long(b, c)) return true;
     const auto larger = [](const Corner& p, const Corner& q) {
@@ -214,8 +221,8 @@ class Stuffer {
     return larger(a, b) % 2 != 0 || (larger(a, b) == 0 && larger(b, a) % 2 == 0);
   }
 
-  // A prism between triangles (a0, a1, a2) and (b0, b1, b2), whose sides' diagonals are given: from_low[i]: side i, between
-  // i and i + 1, has the diagonal a_i - b_(i+1), else a_(i+1) - b_i.
+  // A prism between triangles (a0, a1, a2) and (b0, b1, b2), whose sides' diagonals are given: from_low[i]: side i,
+  // between i and i + 1, has the diagonal a_i - b_(i+1), else a_(i+1) - b_i.
   void prism(std::array<std::uint32_t, 3> a, std::array<std::uint32_t, 3> b, std::array<bool, 3> from_low) {
     if (from_low[0] == from_low[1] && from_low[1] == from_low[2]) {
       // The diagonals run in a circle: only a point in the middle helps.
@@ -291,9 +298,10 @@ class Stuffer {
     if (n == 2) {  // wedge: triangles (a, cut a-p, cut a-q) and (b, cut b-p, cut b-q)
       const Corner &a = neg[0], &b = neg[1];
       const bool first_p = diagonal_from_first(a, b, pos[0]), first_q = diagonal_from_first(a, b, pos[1]);
-      const std::array<std::uint32_t, 3> ta{point(a), cut(a, pos[0]), cut(a, pos[1])}, tb{point(b), cut(b, pos[0]), cut(b, pos[1])};
-      // Side 0: a - b over p. Side 2: over q. Side 1, cut p to cut q, lies on the surface: no neighbour, so the one that
-      // makes no circle, and of two the shorter.
+      const std::array<std::uint32_t, 3> ta{point(a), cut(a, pos[0]), cut(a, pos[1])},
+          tb{point(b), cut(b, pos[0]), cut(b, pos[1])};
+      // Side 0: a - b over p. Side 2: over q. Side 1, cut p to cut q, lies on the surface: no neighbour, so the one
+      // that makes no circle, and of two the shorter.
       const bool s0 = first_p, s2 = !first_q;
       bool s1 = !s0;
       if (s0 != s2) s1 = length2(ta[1], tb[2]) <= length2(ta[2], tb[1]);
@@ -333,11 +341,13 @@ TetMesh stuffed_tets(const TriangleSoup& surface, const StuffingOptions& options
   Lattice lattice = sample(surface, options.spacing_mm, context);
   TetMesh mesh = Stuffer(lattice, context).run();
   if (mesh.tets.empty()) {
-    throw Error(ExitCode::failed,
-                "no point of the lattice is inside the surface at a spacing of " + format_number(options.spacing_mm) + " mm",
-                "choose a smaller spacing");
+    throw Error(
+        ExitCode::failed,
+        "no point of the lattice is inside the surface at a spacing of " + format_number(options.spacing_mm) + " mm",
+        "choose a smaller spacing");
   }
-  if (options.target_dihedral_deg > 0) improve_tets(mesh, surface, options.target_dihedral_deg, options.spacing_mm, context.sub(0.9, 1.0));
+  if (options.target_dihedral_deg > 0)
+    improve_tets(mesh, surface, options.target_dihedral_deg, options.spacing_mm, context.sub(0.9, 1.0));
   context.progress(1.0);
   return mesh;
 }
@@ -377,9 +387,11 @@ std::uint64_t open_hinges(TetMesh& mesh) {
       sides.push_back({other[0], other[2], k});
       sides.push_back({other[1], other[2], k});
     }
-    std::sort(sides.begin(), sides.end(), [](const Side& x, const Side& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; });
+    std::sort(sides.begin(), sides.end(),
+              [](const Side& x, const Side& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; });
     for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
-      if (sides[i].a == sides[i + 1].a && sides[i].b == sides[i + 1].b) join_sets(parent, sides[i].local, sides[i + 1].local);
+      if (sides[i].a == sides[i + 1].a && sides[i].b == sides[i + 1].b)
+        join_sets(parent, sides[i].local, sides[i + 1].local);
     }
     const std::uint32_t stays = n > 0 ? root_of(parent, 0) : 0;
     std::unordered_map<std::uint32_t, std::uint32_t> own;
@@ -399,8 +411,8 @@ std::uint64_t open_hinges(TetMesh& mesh) {
   return made;
 }
 
-KeptThin stuffed_tets_keeping(const TriangleSoup& surface, const StuffingOptions& options, double volume, double most_lost, int halvings,
-                              const Context& context) {
+KeptThin stuffed_tets_keeping(const TriangleSoup& surface, const StuffingOptions& options, double volume,
+                              double most_lost, int halvings, const Context& context) {
   KeptThin best;
   StuffingOptions now = options;
   for (int halving = 0;; ++halving) {
@@ -421,4 +433,4 @@ KeptThin stuffed_tets_keeping(const TriangleSoup& surface, const StuffingOptions
   return best;
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -31,7 +31,8 @@ class OutLock {
     // A file system without locks (some of a network's) is taken as it is: the cases themselves refuse two writers.
     if (::flock(fd_, (shared ? LOCK_SH : LOCK_EX) | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
       ::close(fd_);
-      throw Error(ExitCode::cannot_write, "another batch is at work in '" + out.string() + "'", "wait for it, or give another folder");
+      throw Error(ExitCode::cannot_write, "another batch is at work in '" + out.string() + "'",
+                  "wait for it, or give another folder");
     }
   }
   ~OutLock() { ::close(fd_); }
@@ -132,7 +133,8 @@ class Batch {
     }
     result.untouched = untouched;
     result.stopped = std::move(stopped);
-    if (cancelled) throw Error(ExitCode::cancelled, "stopped: " + progress_words(), "the same line again goes on from here");
+    if (cancelled)
+      throw Error(ExitCode::cancelled, "stopped: " + progress_words(), "the same line again goes on from here");
     return result;
   }
 
@@ -162,7 +164,8 @@ class Batch {
         queue_.clear();
         children_.stop();
       }
-      while (!queue_.empty() && children_.running() < static_cast<std::size_t>(std::max(1, options_.jobs)) && !context_.cancelled()) {
+      while (!queue_.empty() && children_.running() < static_cast<std::size_t>(std::max(1, options_.jobs)) &&
+             !context_.cancelled()) {
         if (const double mb = free_mb(options_.out); mb < options_.keep_free_mb) {
           stopped = "only " + format_number(std::round(mb)) + " MB are free where the cases go";
           queue_.clear();
@@ -200,7 +203,8 @@ class Batch {
     const fs::path folder = case_folder(options_.out, row.code);
     CaseRecord record = record_of(row, key, end, number, limits_, folder);
     record.program = options_.program;
-    if (record.state == CaseState::waiting || (context_.cancelled() && record.state != CaseState::done)) return;  // interrupted
+    if (record.state == CaseState::waiting || (context_.cancelled() && record.state != CaseState::done))
+      return;  // interrupted
     if (record.state == CaseState::resources && number <= options_.retries) {
       context_.info(row.code + ": " + record.why + "; tried again");
       queue_.push_back({end.id, number + 1});
@@ -225,7 +229,8 @@ class Batch {
     // Cancelling is this class' own business: a running case is to be asked first.
     if (!context_.cancelled()) {
       try {
-        context_.progress(to_do_ == 0 ? 1.0 : static_cast<double>(ended_) / static_cast<double>(to_do_), progress_words() + left);
+        context_.progress(to_do_ == 0 ? 1.0 : static_cast<double>(ended_) / static_cast<double>(to_do_),
+                          progress_words() + left);
       } catch (const Error&) {
       }
     }
@@ -245,8 +250,9 @@ class Batch {
 
 }  // namespace
 
-BatchResult run_batch(const std::vector<BatchCase>& table, const BatchOptions& options, const CaseWork& work, const Context& context) {
+BatchResult run_batch(const std::vector<BatchCase>& table, const BatchOptions& options, const CaseWork& work,
+                      const Context& context) {
   return Batch(table, options, work, context).run();
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -31,7 +31,8 @@ double seconds_since(Clock::time_point t) {
   return std::chrono::duration<double>(Clock::now() - t).count();
 }
 
-// Memory in use that is this process' alone, in MB; what is mapped from files can be given back at any time and does not count.
+// Memory in use that is this process' alone, in MB; what is mapped from files can be given back at any time and does
+// not count.
 double own_memory_mb(pid_t pid) {
   std::ifstream in("/proc/" + std::to_string(pid) + "/statm");
   double size = 0, resident = 0, shared = 0;
@@ -62,7 +63,8 @@ constexpr bool kShadowMemory =
     false;
 #endif
 
-[[noreturn]] void run_in_child(const std::function<int()>& work, const ChildLimits& limits, int out, int err, pid_t parent) {
+[[noreturn]] void run_in_child(const std::function<int()>& work, const ChildLimits& limits, int out, int err,
+                               pid_t parent) {
   ::setpgid(0, 0);                     // Ctrl-C at the terminal reaches the parent, which asks each child once
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // it cleans up behind itself
   if (::getppid() != parent) ::_exit(1);
@@ -228,7 +230,8 @@ std::optional<ChildEnd> Children::wait(double at_most_s) {
     const double left = at_most_s - seconds_since(start);
     if (left <= 0) return std::nullopt;
     // Who has closed both ends is about to be gone: look again soon.
-    const bool closing = std::any_of(impl_->children.begin(), impl_->children.end(), [](const Child& c) { return c.out < 0 && c.err < 0; });
+    const bool closing = std::any_of(impl_->children.begin(), impl_->children.end(),
+                                     [](const Child& c) { return c.out < 0 && c.err < 0; });
     const double nap = std::min(left, closing ? 0.001 : kLook);
     const int ready = ::poll(fds.data(), fds.size(), static_cast<int>(nap * 1000) + 1);
     if (ready < 0 && errno == EINTR) return impl_->take_ended();
@@ -248,4 +251,4 @@ std::size_t Children::running() const {
   return impl_->children.size();
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

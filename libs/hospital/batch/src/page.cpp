@@ -40,11 +40,14 @@ void html_row(std::ostream& page, const CaseRecord& r, const fs::path& out) {
   else
     page << r.code;
   page << "</td><td class=\"pic\">";
-  if (has_picture) page << "<img loading=\"lazy\" src=\"cases/" << r.code << ".thumbnail.png\" alt=\"bone of " << r.code << "\">";
+  if (has_picture)
+    page << "<img loading=\"lazy\" src=\"cases/" << r.code << ".thumbnail.png\" alt=\"bone of " << r.code << "\">";
   page << "</td><td class=\"state\">" << state_words(r.state) << "</td><td>" << html_escaped(r.verdict);
-  for (std::size_t i = 0; i < r.findings.size(); ++i) page << (i == 0 ? "<small>" : "<br>") << html_escaped(r.findings[i]);
+  for (std::size_t i = 0; i < r.findings.size(); ++i)
+    page << (i == 0 ? "<small>" : "<br>") << html_escaped(r.findings[i]);
   page << (r.findings.empty() ? "" : "</small>");
-  if (has_verdict && r.state == CaseState::refused) page << "<small><a href=\"cases/" << r.code << "/import.svg\">its values</a></small>";
+  if (has_verdict && r.state == CaseState::refused)
+    page << "<small><a href=\"cases/" << r.code << "/import.svg\">its values</a></small>";
   page << "</td>";
   cell(page, number_text(r.volume_mm3 / 1000, 1), number_text(r.volume_mm3, 0));
   cell(page, r.triangles > 0 ? std::to_string(r.triangles) : "", r.triangles > 0 ? std::to_string(r.triangles) : "");
@@ -60,22 +63,26 @@ void count_box(std::ostream& page, std::size_t count, const char* words) {
   page << "<div><b>" << count << "</b><span>" << words << "</span></div>";
 }
 
-void html_page(std::ostream& page, const std::vector<BatchCase>& table, const fs::path& out, const BatchResult& sum, double seconds,
-               double peak_mb) {
-  page << "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">"
+void html_page(std::ostream& page, const std::vector<BatchCase>& table, const fs::path& out, const BatchResult& sum,
+               double seconds, double peak_mb) {
+  page << "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+          "content=\"width=device-width\">"
           "<title>Batch</title><style>"
        << kBatchCss << "</style></head><body>\n<header><h1>Batch: " << sum.done << " of " << sum.cases
-       << " cases done</h1><p>Not a medical device: for rehearsal, teaching and research, not for treatment decisions.</p></header>\n"
+       << " cases done</h1><p>Not a medical device: for rehearsal, teaching and research, not for treatment "
+          "decisions.</p></header>\n"
           "<div class=\"counts\">";
   count_box(page, sum.done, "done");
   count_box(page, sum.refused, "refused for their input");
   count_box(page, sum.failed, "failed");
   count_box(page, sum.resources, "out of memory or time");
   count_box(page, sum.waiting, "waiting");
-  page << "<div><b>" << number_text(seconds / 3600, 2) << "</b><span>hours of work</span></div><div><b>" << number_text(peak_mb, 0)
+  page << "<div><b>" << number_text(seconds / 3600, 2) << "</b><span>hours of work</span></div><div><b>"
+       << number_text(peak_mb, 0)
        << "</b><span>MB at the highest</span></div></div>\n"
           "<div class=\"tools\"><button data-show=\"all\" aria-pressed=\"true\">all</button><button data-show=\"done\" "
-          "aria-pressed=\"false\">done</button><button data-show=\"refused failed resources\" aria-pressed=\"false\">not done</button>"
+          "aria-pressed=\"false\">done</button><button data-show=\"refused failed resources\" "
+          "aria-pressed=\"false\">not done</button>"
           "<button data-show=\"waiting\" aria-pressed=\"false\">waiting</button>"
           "<input id=\"find\" type=\"search\" placeholder=\"find\" aria-label=\"find in the table\"></div>\n"
           "<div class=\"scroll\"><table id=\"cases\"><thead><tr>";
@@ -98,7 +105,8 @@ void html_page(std::ostream& page, const std::vector<BatchCase>& table, const fs
     waiting.code = c.code;
     html_row(page, known_record(out, c.code).value_or(waiting), out);
   }
-  page << "</tbody></table><p id=\"none\" hidden>No such case.</p></div>\n<footer>Seconds and MB (memory at its highest) are of the last "
+  page << "</tbody></table><p id=\"none\" hidden>No such case.</p></div>\n<footer>Seconds and MB (memory at its "
+          "highest) are of the last "
           "try. "
           "A case's report, behind its code, shows cuts of the patient.</footer>\n<script>"
        << kBatchJs << "</script></body></html>\n";
@@ -118,8 +126,8 @@ BatchResult write_batch_report(const std::vector<BatchCase>& table, const fs::pa
     });
   };
   file(out / "report.csv", [&](std::ostream& csv) {
-    csv << csv_line({"case", "state", "exit_code", "verdict", "findings", "bone_mm3", "triangles", "seconds", "peak_memory_mb", "tries",
-                     "why", "advice", "program"});
+    csv << csv_line({"case", "state", "exit_code", "verdict", "findings", "bone_mm3", "triangles", "seconds",
+                     "peak_memory_mb", "tries", "why", "advice", "program"});
     for (const BatchCase& c : table) {
       const auto r = known_record(out, c.code);
       count(r, sum);
@@ -132,15 +140,17 @@ BatchResult write_batch_report(const std::vector<BatchCase>& table, const fs::pa
       std::string findings;
       for (const std::string& f : r->findings) findings += (findings.empty() ? "" : " ") + f;
       csv << csv_line({r->code, std::string(state_name(r->state)), std::to_string(r->exit_code), r->verdict, findings,
-                       number_text(r->volume_mm3, 3), r->triangles > 0 ? std::to_string(r->triangles) : "", number_text(r->seconds, 3),
-                       number_text(r->peak_mb, 0), std::to_string(r->tries), r->why, r->advice, r->program});
+                       number_text(r->volume_mm3, 3), r->triangles > 0 ? std::to_string(r->triangles) : "",
+                       number_text(r->seconds, 3), number_text(r->peak_mb, 0), std::to_string(r->tries), r->why,
+                       r->advice, r->program});
     }
   });
   file(out / "report.json", [&](std::ostream& json) {
     json << "{\n  \"osteotome_batch_report\": 1,\n  \"cases\": " << sum.cases << ",\n  \"done\": " << sum.done
-         << ",\n  \"refused\": " << sum.refused << ",\n  \"failed\": " << sum.failed << ",\n  \"resources\": " << sum.resources
-         << ",\n  \"waiting\": " << sum.waiting << ",\n  \"seconds\": " << format_number(seconds)
-         << ",\n  \"peak_memory_mb\": " << format_number(peak_mb) << ",\n  \"rows\": [";
+         << ",\n  \"refused\": " << sum.refused << ",\n  \"failed\": " << sum.failed
+         << ",\n  \"resources\": " << sum.resources << ",\n  \"waiting\": " << sum.waiting
+         << ",\n  \"seconds\": " << format_number(seconds) << ",\n  \"peak_memory_mb\": " << format_number(peak_mb)
+         << ",\n  \"rows\": [";
     const char* comma = "\n    ";
     for (const BatchCase& c : table) {
       const auto r = known_record(out, c.code);
@@ -156,4 +166,4 @@ BatchResult write_batch_report(const std::vector<BatchCase>& table, const fs::pa
   return sum;
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -63,7 +63,8 @@ std::string last_line(const std::string& text) {
 
 bool is_name_like(const std::string& quoted, const fs::path& source) {
   if (quoted.empty() || quoted.starts_with("--") || quoted.starts_with("osteo ")) return false;
-  if (quoted.find_first_of("/\\.") != std::string::npos || quoted == source.filename() || quoted == source.string()) return true;
+  if (quoted.find_first_of("/\\.") != std::string::npos || quoted == source.filename() || quoted == source.string())
+    return true;
   std::error_code ec;
   return fs::exists(source / quoted, ec) || ec;
 }
@@ -84,8 +85,8 @@ std::string without_names(const std::string& text, const fs::path& source) {
         return i < plain.size() && std::string_view(of).find(plain[i]) != std::string::npos;
       };
       // The last part alone may be a word like any other, unless it stands where names do.
-      if (name[0] != '/' &&
-          !(at > 0 && is_any(at - 1, "/'\"") && (at + name.size() == plain.size() || is_any(at + name.size(), "/'\" ")))) {
+      if (name[0] != '/' && !(at > 0 && is_any(at - 1, "/'\"") &&
+                              (at + name.size() == plain.size() || is_any(at + name.size(), "/'\" ")))) {
         at += name.size();
         continue;
       }
@@ -99,7 +100,8 @@ std::string without_names(const std::string& text, const fs::path& source) {
   for (std::size_t at = 0; at < plain.size();) {
     const std::size_t open = plain.find('\'', at);
     // An apostrophe inside a word opens nothing.
-    const bool opens = open != std::string::npos && (open == 0 || std::isalnum(static_cast<unsigned char>(plain[open - 1])) == 0);
+    const bool opens =
+        open != std::string::npos && (open == 0 || std::isalnum(static_cast<unsigned char>(plain[open - 1])) == 0);
     const std::size_t close = opens ? plain.find('\'', open + 1) : std::string::npos;
     if (!opens || close == std::string::npos) {
       const std::size_t to = open == std::string::npos ? plain.size() : open + 1;
@@ -144,7 +146,8 @@ CaseRecord CaseRecord::from_json(std::string_view text, const std::string& name)
   r.seconds = number("seconds");
   r.peak_mb = number("peak_memory_mb");
   r.verdict = said("verdict");
-  for (const JsonValue& f : file.list(file.need(root, "", "findings"), "findings")) r.findings.push_back(file.text(f, "a finding"));
+  for (const JsonValue& f : file.list(file.need(root, "", "findings"), "findings"))
+    r.findings.push_back(file.text(f, "a finding"));
   r.volume_mm3 = number("bone_mm3");
   r.triangles = static_cast<std::int64_t>(number("triangles"));
   r.why = said("why");
@@ -187,8 +190,8 @@ void count(const std::optional<CaseRecord>& record, BatchResult& result) {
   }
 }
 
-CaseRecord record_of(const BatchCase& row, const std::string& key, const ChildEnd& end, int tries, const ChildLimits& limits,
-                     const fs::path& folder) {
+CaseRecord record_of(const BatchCase& row, const std::string& key, const ChildEnd& end, int tries,
+                     const ChildLimits& limits, const fs::path& folder) {
   CaseRecord r;
   r.code = row.code;
   r.key = key;
@@ -203,7 +206,9 @@ CaseRecord record_of(const BatchCase& row, const std::string& key, const ChildEn
     for (const Json& stage : stages->items()) {
       const Json* report = stage.find("report");
       if (report == nullptr) continue;
-      const auto number = [&](const char* name) { return report->find(name) != nullptr ? report->find(name)->number() : std::nullopt; };
+      const auto number = [&](const char* name) {
+        return report->find(name) != nullptr ? report->find(name)->number() : std::nullopt;
+      };
       if (const auto v = number("volume_after_mm3")) r.volume_mm3 = *v;
       if (const auto v = number("mask_volume_mm3"); v && r.volume_mm3 == 0) r.volume_mm3 = *v;
       if (const auto v = number("triangles")) r.triangles = static_cast<std::int64_t>(*v);
@@ -219,9 +224,11 @@ CaseRecord record_of(const BatchCase& row, const std::string& key, const ChildEn
     r.why = without_names(text_of(error->find("message")), row.source);
     r.advice = without_names(text_of(error->find("advice")), row.source);
   }
-  // A disk without room is no fault of the case. Some libraries do not say why a file came out short: then the advice speaks of room.
+  // A disk without room is no fault of the case. Some libraries do not say why a file came out short: then the advice
+  // speaks of room.
   if (r.state == CaseState::failed && r.exit_code == static_cast<int>(ExitCode::cannot_write)) {
-    for (const char* sign : {"No space left", "Disk quota exceeded", "File too large", "free some space", "the disk has room"})
+    for (const char* sign :
+         {"No space left", "Disk quota exceeded", "File too large", "free some space", "the disk has room"})
       if (end.out.find(sign) != std::string::npos) r.state = CaseState::resources;
   }
   const std::string peak = " (at its highest " + whole(end.peak_mb) + " MB)";
@@ -240,4 +247,4 @@ CaseRecord record_of(const BatchCase& row, const std::string& key, const ChildEn
   return r;
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -17,4 +17,4 @@ void count(const std::optional<CaseRecord>& record, BatchResult& result);
   return out / "cases" / code;
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -11,7 +11,8 @@ namespace osteo::inline hospital {
 namespace {
 
 constexpr std::size_t kLongestCode = 64;
-constexpr const char* kCodeAdvice = "a code is letters, digits, - and _, begins with a letter or a digit, and has 64 of them at most";
+constexpr const char* kCodeAdvice =
+    "a code is letters, digits, - and _, begins with a letter or a digit, and has 64 of them at most";
 
 bool is_plain(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
@@ -155,8 +156,8 @@ std::string plain_table(std::string_view bytes, const std::filesystem::path& fil
   return with_commas(text, separator_of(text));
 }
 
-std::vector<BatchCase> read_batch_table(std::string_view text, const std::filesystem::path& file, std::span<const std::string> known,
-                                        std::span<const std::string> paths) {
+std::vector<BatchCase> read_batch_table(std::string_view text, const std::filesystem::path& file,
+                                        std::span<const std::string> known, std::span<const std::string> paths) {
   const Csv csv = read_csv(plain_table(text, file), file.string());
   const auto column = [&](const char* name) {
     const auto at = std::find(csv.columns.begin(), csv.columns.end(), name);
@@ -168,7 +169,8 @@ std::vector<BatchCase> read_batch_table(std::string_view text, const std::filesy
   const std::size_t source = column("source"), code = column("case");
   for (std::size_t i = 0; i < csv.columns.size(); ++i) {
     const std::string& name = csv.columns[i];
-    if (i == source || i == code || name.find('.') != std::string::npos || std::find(known.begin(), known.end(), name) != known.end())
+    if (i == source || i == code || name.find('.') != std::string::npos ||
+        std::find(known.begin(), known.end(), name) != known.end())
       continue;
     const std::string near = nearest_name(name, known);
     throw csv.wrong(1, "column '" + name + "' is no setting of a case",
@@ -223,4 +225,4 @@ void check_batch_table(std::span<const BatchCase> cases, const std::filesystem::
   throw Error(ExitCode::usage, first->what() + more, first->advice());
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

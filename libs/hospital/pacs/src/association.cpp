@@ -19,7 +19,8 @@
 namespace osteo::inline hospital::pacs {
 namespace {
 
-constexpr unsigned kDuplicate = 0x0111, kBadUid = 0x0117, kNoMatch = 0xA900, kNoRoom = 0xA700, kCannotUnderstand = 0xC000;
+constexpr unsigned kDuplicate = 0x0111, kBadUid = 0x0117, kNoMatch = 0xA900, kNoRoom = 0xA700,
+                   kCannotUnderstand = 0xC000;
 
 void limit(int what, double most) {
   rlimit r{};
@@ -41,7 +42,8 @@ bool same_data_set(const fs::path& a, const fs::path& b) {
   const auto data = [](std::ifstream& in) {
     std::array<unsigned char, 144> head{};
     if (!in.read(reinterpret_cast<char*>(head.data()), head.size())) return false;
-    const std::uint64_t group = head[140] | head[141] << 8U | head[142] << 16U | static_cast<std::uint64_t>(head[143]) << 24U;
+    const std::uint64_t group =
+        head[140] | head[141] << 8U | head[142] << 16U | static_cast<std::uint64_t>(head[143]) << 24U;
     return static_cast<bool>(in.seekg(static_cast<std::streamoff>(group), std::ios::cur));
   };
   std::ifstream x(a, std::ios::binary), y(b, std::ios::binary);
@@ -113,12 +115,14 @@ unsigned keep(Serving& s, const T_DIMSE_C_StoreRQ& request) {
   ObjectHead head;
   if (!read_head(s.file, head)) return kCannotUnderstand;
   if (!is_uid(head.study) || !is_uid(head.series)) return kBadUid;
-  if (head.sop_class != request.AffectedSOPClassUID || head.sop_instance != request.AffectedSOPInstanceUID) return kNoMatch;
+  if (head.sop_class != request.AffectedSOPClassUID || head.sop_instance != request.AffectedSOPInstanceUID)
+    return kNoMatch;
   const fs::path place = place_of(head), whole = s.folder / place;
   std::error_code error;
   fs::create_directories(whole.parent_path(), error);
   if (error) return kNoRoom;
-  // A link fails where there is something, so that nothing is ever written over, whoever else receives it at this moment.
+  // A link fails where there is something, so that nothing is ever written over, whoever else receives it at this
+  // moment.
   if (::link(s.file.c_str(), whole.c_str()) != 0) {
     if (errno != EEXIST) return kNoRoom;
     if (!same_data_set(s.file, whole)) return kDuplicate;
@@ -139,19 +143,21 @@ bool room(const Serving& s) {
          static_cast<double>(s.counts.folder_before) + static_cast<double>(s.counts.bytes) < s.options.folder_gb * 1e9;
 }
 
-void came(void* data, T_DIMSE_StoreProgress* progress, T_DIMSE_C_StoreRQ* request, char*, DcmDataset**, T_DIMSE_C_StoreRSP* response,
-          DcmDataset**) {
+void came(void* data, T_DIMSE_StoreProgress* progress, T_DIMSE_C_StoreRQ* request, char*, DcmDataset**,
+          T_DIMSE_C_StoreRSP* response, DcmDataset**) {
   Serving& s = *static_cast<Serving*>(data);
   if (progress->progressBytes > 0) s.bytes = static_cast<std::uint64_t>(progress->progressBytes);
   s.deadline.came(s.bytes);
   if (progress->state != DIMSE_StoreEnd) return;
   s.deadline.none();
   // Before this, DCMTK has set the status to what happened on the way.
-  if (response->DimseStatus == STATUS_Success) response->DimseStatus = static_cast<Uint16>(room(s) ? keep(s, *request) : kNoRoom);
+  if (response->DimseStatus == STATUS_Success)
+    response->DimseStatus = static_cast<Uint16>(room(s) ? keep(s, *request) : kNoRoom);
   if (response->DimseStatus != STATUS_Success) ++s.counts.refused;
 }
 
-OFCondition store(T_ASC_Association* association, T_ASC_PresentationContextID id, T_DIMSE_C_StoreRQ& request, Serving& s) {
+OFCondition store(T_ASC_Association* association, T_ASC_PresentationContextID id, T_DIMSE_C_StoreRQ& request,
+                  Serving& s) {
   char name[32];
   static int number = 0;
   std::snprintf(name, sizeof name, "%d-%d", ::getpid(), number++);
@@ -160,14 +166,14 @@ OFCondition store(T_ASC_Association* association, T_ASC_PresentationContextID id
   s.file = s.folder / kIncoming / name;
   s.bytes = 0;
   const int timeout = static_cast<int>(std::ceil(s.options.timeout_s));
-  const OFCondition done =
-      DIMSE_storeProvider(association, id, &request, s.file.c_str(), OFTrue, nullptr, came, &s, DIMSE_NONBLOCKING, timeout);
+  const OFCondition done = DIMSE_storeProvider(association, id, &request, s.file.c_str(), OFTrue, nullptr, came, &s,
+                                               DIMSE_NONBLOCKING, timeout);
   ::unlink(s.file.c_str());
   return done;
 }
 
-void reject(T_ASC_Association* association, SharedCounts& counts, T_ASC_RejectParametersResult result, T_ASC_RejectParametersSource source,
-            T_ASC_RejectParametersReason reason) {
+void reject(T_ASC_Association* association, SharedCounts& counts, T_ASC_RejectParametersResult result,
+            T_ASC_RejectParametersSource source, T_ASC_RejectParametersReason reason) {
   ++counts.refused_associations;
   const T_ASC_RejectParameters why{result, source, reason};
   ASC_rejectAssociation(association, &why);
@@ -185,18 +191,21 @@ bool let_in(T_ASC_Association* association, const ReceiveOptions& options, Share
     }
   };
   if (title(called) != options.ae) {
-    reject(association, counts, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER, ASC_REASON_SU_CALLEDAETITLENOTRECOGNIZED);
+    reject(association, counts, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER,
+           ASC_REASON_SU_CALLEDAETITLENOTRECOGNIZED);
     return false;
   }
   const std::string from = title(calling);
   if (from.empty() || (!options.anybody && std::ranges::find(options.allowed, from) == options.allowed.end())) {
-    reject(association, counts, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER, ASC_REASON_SU_CALLINGAETITLENOTRECOGNIZED);
+    reject(association, counts, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER,
+           ASC_REASON_SU_CALLINGAETITLENOTRECOGNIZED);
     return false;
   }
   char context[129] = "";
   ASC_getApplicationContextName(association->params, context, sizeof context);
   if (std::string_view(context) != UID_StandardApplicationContext) {
-    reject(association, counts, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER, ASC_REASON_SU_APPCONTEXTNAMENOTSUPPORTED);
+    reject(association, counts, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER,
+           ASC_REASON_SU_APPCONTEXTNAMENOTSUPPORTED);
     return false;
   }
   // What a sender has is taken as it is: compressed forms first, so that nobody decodes for us.
@@ -218,7 +227,8 @@ bool let_in(T_ASC_Association* association, const ReceiveOptions& options, Share
   OFCondition done = ASC_acceptContextsWithPreferredTransferSyntaxes(association->params, echo, 1, plain, 2);
   if (done.good())
     done = ASC_acceptContextsWithPreferredTransferSyntaxes(association->params, dcmAllStorageSOPClassUIDs,
-                                                           numberOfDcmAllStorageSOPClassUIDs, forms, static_cast<int>(std::size(forms)));
+                                                           numberOfDcmAllStorageSOPClassUIDs, forms,
+                                                           static_cast<int>(std::size(forms)));
   return done.good() && ASC_acknowledgeAssociation(association).good();
 }
 
@@ -230,8 +240,8 @@ fs::path place_of(const ObjectHead& head) {
 }
 
 void serve(int connection, int pipe, const fs::path& folder, const ReceiveOptions& options, SharedCounts& counts) {
-  // A peer can end this process and nothing else. It ends at once: what the program does on its way out waits for threads that a child has
-  // not.
+  // A peer can end this process and nothing else. It ends at once: what the program does on its way out waits for
+  // threads that a child has not.
   std::set_new_handler([] { ::_exit(5); });
   std::set_terminate([] { ::_exit(6); });
   limit(RLIMIT_CORE, 0);
@@ -252,7 +262,8 @@ void serve(int connection, int pipe, const fs::path& folder, const ReceiveOption
   const std::unique_ptr<DcmTLSTransportLayer> layer = tls_layer(options.tls, NET_ACCEPTOR);
   if (layer != nullptr && ASC_setTransportLayer(network, layer.get(), 0).bad()) ::_exit(3);
   const OFBool secure = layer != nullptr ? OFTrue : OFFalse;
-  if (ASC_receiveAssociation(network, &association, ASC_DEFAULTMAXPDU, nullptr, nullptr, secure, DUL_NOBLOCK, timeout).bad()) {
+  if (ASC_receiveAssociation(network, &association, ASC_DEFAULTMAXPDU, nullptr, nullptr, secure, DUL_NOBLOCK, timeout)
+          .bad()) {
     ++counts.refused_associations;
     ::_exit(2);
   }
@@ -294,4 +305,4 @@ void serve(int connection, int pipe, const fs::path& folder, const ReceiveOption
   }
 }
 
-}  // namespace osteo::hospital::pacs
+}  // namespace osteo::inline hospital::pacs

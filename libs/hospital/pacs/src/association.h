@@ -22,7 +22,9 @@ inline constexpr std::string_view kIncoming = ".incoming";
 /// Where an object belongs in the folder: names from hashes, so that no UID can lead out of it.
 [[nodiscard]] fs::path place_of(const ObjectHead& head);
 
-/// Serves the connection until its end, then leaves the process. `pipe`: a line for each object that came, its folder relative to `folder`.
-[[noreturn]] void serve(int connection, int pipe, const fs::path& folder, const ReceiveOptions& options, SharedCounts& counts);
+/// Serves the connection until its end, then leaves the process. `pipe`: a line for each object that came, its folder
+/// relative to `folder`.
+[[noreturn]] void serve(int connection, int pipe, const fs::path& folder, const ReceiveOptions& options,
+                        SharedCounts& counts);
 
-}  // namespace osteo::hospital::pacs
+}  // namespace osteo::inline hospital::pacs

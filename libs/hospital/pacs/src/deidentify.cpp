@@ -38,7 +38,8 @@ constexpr std::string_view kTakenClasses[] = {
 };
 
 Key key_of(const fs::path& file) {
-  if (::sodium_init() < 0) throw Error(ExitCode::failed, "there is no randomness for a key", "libsodium cannot be used on this machine");
+  if (::sodium_init() < 0)
+    throw Error(ExitCode::failed, "there is no randomness for a key", "libsodium cannot be used on this machine");
   Key key{};
   if (file.empty()) {
     ::randombytes_buf(key.data(), key.size());
@@ -52,16 +53,20 @@ Key key_of(const fs::path& file) {
   if ((facts.st_mode & 077) != 0)
     throw Error(ExitCode::usage, "others may read the key '" + file.string() + "'", "chmod 600 " + file.string());
   if (facts.st_size < 32 || facts.st_size > 4096)
-    throw Error(ExitCode::usage, "the key '" + file.string() + "' has " + std::to_string(facts.st_size) + " bytes, not 32 to 4096", kHow);
+    throw Error(ExitCode::usage,
+                "the key '" + file.string() + "' has " + std::to_string(facts.st_size) + " bytes, not 32 to 4096",
+                kHow);
   const auto bytes = read_file(file);
-  ::crypto_generichash(key.data(), key.size(), reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), nullptr, 0);
+  ::crypto_generichash(key.data(), key.size(), reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(),
+                       nullptr, 0);
   return key;
 }
 
 std::array<unsigned char, 16> keyed(const Key& key, char kind, std::string_view text) {
   const std::string all = kind + std::string(text);
   std::array<unsigned char, 16> hash{};
-  ::crypto_generichash(hash.data(), hash.size(), reinterpret_cast<const unsigned char*>(all.data()), all.size(), key.data(), key.size());
+  ::crypto_generichash(hash.data(), hash.size(), reinterpret_cast<const unsigned char*>(all.data()), all.size(),
+                       key.data(), key.size());
   return hash;
 }
 
@@ -87,7 +92,8 @@ std::string new_uid(const Key& key, const std::string& uid) {
 std::string code_of(const Key& key, DcmItem& data) {
   std::string who = pacs::text_of(data, DCM_PatientID);
   // Who has no number is told apart by the study, so that no two persons become one.
-  who = who.empty() ? "s" + pacs::text_of(data, DCM_StudyInstanceUID) : "p" + pacs::text_of(data, DCM_IssuerOfPatientID) + '\n' + who;
+  who = who.empty() ? "s" + pacs::text_of(data, DCM_StudyInstanceUID)
+                    : "p" + pacs::text_of(data, DCM_IssuerOfPatientID) + '\n' + who;
   const auto hash = keyed(key, 'c', who);
   constexpr std::string_view kHex = "0123456789ABCDEF";
   std::string code = "CASE-";
@@ -276,7 +282,8 @@ bool is_words(DcmEVR kind) {
 std::string why_not(DcmItem& data, const std::string& sop_class) {
   if (std::ranges::find(kTakenClasses, sop_class) == std::end(kTakenClasses))
     return pacs::class_name(sop_class) + " may hold words that no table knows";
-  if (pacs::text_of(data, DCM_BurnedInAnnotation) == "YES") return "words are burned into its pixels (BurnedInAnnotation is YES)";
+  if (pacs::text_of(data, DCM_BurnedInAnnotation) == "YES")
+    return "words are burned into its pixels (BurnedInAnnotation is YES)";
   OFString type;
   data.findAndGetOFStringArray(DCM_ImageType, type);
   std::string plain;
@@ -303,8 +310,8 @@ void mark(DcmDataset& data, const std::string& code) {
 
 }  // namespace
 
-DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, const fs::path& out, const DeidentifyOptions& options,
-                                    const Context& context) {
+DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, const fs::path& out,
+                                    const DeidentifyOptions& options, const Context& context) {
   pacs::quiet_dcmtk(1);
   const Key key = key_of(options.key);
   const Cleaner cleaner(key);
@@ -319,7 +326,8 @@ DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, con
       refuse("it is damaged");
       continue;
     }
-    // Without the head of the file as it came: titles and names of programs in it, and what hides before it, stay behind.
+    // Without the head of the file as it came: titles and names of programs in it, and what hides before it, stay
+    // behind.
     DcmDataset& data = *read.getDataset();
     const std::string sop_class = pacs::text_of(data, DCM_SOPClassUID);
     if (const std::string why = why_not(data, sop_class); !why.empty()) {
@@ -327,7 +335,8 @@ DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, con
       continue;
     }
     const std::set<std::string> telling = telling_words(data);
-    DeidentifiedStudy study{code_of(key, data), {}, pacs::text_of(data, DCM_PatientID), pacs::text_of(data, DCM_StudyInstanceUID)};
+    DeidentifiedStudy study{
+        code_of(key, data), {}, pacs::text_of(data, DCM_PatientID), pacs::text_of(data, DCM_StudyInstanceUID)};
     for (char& c : study.patient_id)
       if (static_cast<unsigned char>(c) < 32 || static_cast<unsigned char>(c) > 126) c = '?';
     const E_TransferSyntax syntax = data.getOriginalXfer();
@@ -364,12 +373,13 @@ DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, con
     }
     fs::create_directories(to.parent_path());
     DcmFileFormat fresh(&data, OFFalse);
-    const OFCondition saved =
-        fresh.saveFile(to.c_str(), syntax, EET_UndefinedLength, EGL_withoutGL, EPD_withoutPadding, 0, 0, EWM_createNewMeta);
+    const OFCondition saved = fresh.saveFile(to.c_str(), syntax, EET_UndefinedLength, EGL_withoutGL, EPD_withoutPadding,
+                                             0, 0, EWM_createNewMeta);
     static_cast<void>(fresh.getAndRemoveDataset());  // it is `read`'s
     pacs::ObjectHead written;
     if (saved.bad() || !pacs::read_head(to, written) || written.sop_instance != head.sop_instance)
-      throw Error(ExitCode::cannot_write, "an object cannot be written: " + std::string(saved.text()), "is the disk full?");
+      throw Error(ExitCode::cannot_write, "an object cannot be written: " + std::string(saved.text()),
+                  "is the disk full?");
     study.study = head.study;
     studies.emplace(std::pair{study.code, study.study}, study);
     ++report.written;
@@ -380,18 +390,21 @@ DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, con
 
 void write_deidentify_map(const fs::path& file, const DeidentifyReport& report) {
   if (output_exists(file))
-    throw Error(ExitCode::cannot_write, "'" + file.string() + "' exists already", "another name: a map is never replaced");
+    throw Error(ExitCode::cannot_write, "'" + file.string() + "' exists already",
+                "another name: a map is never replaced");
   Json studies = Json::list();
   for (const DeidentifiedStudy& s : report.studies)
-    studies.push_back({{"code", s.code}, {"patient_id", s.patient_id}, {"study", s.study}, {"original_study", s.original}});
+    studies.push_back(
+        {{"code", s.code}, {"patient_id", s.patient_id}, {"study", s.study}, {"original_study", s.original}});
   const std::string text = Json{{"osteotome_deidentified", 1}, {"studies", studies}}.dump(2) + "\n";
   write_atomically(file, [&](const fs::path& temporary) {
     // For nobody else from its first byte on.
     const int to = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-    const bool good = to >= 0 && ::fchmod(to, 0600) == 0 && ::write(to, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+    const bool good = to >= 0 && ::fchmod(to, 0600) == 0 &&
+                      ::write(to, text.data(), text.size()) == static_cast<ssize_t>(text.size());
     if (to >= 0) ::close(to);
     if (!good) throw Error(ExitCode::cannot_write, "'" + file.string() + "' cannot be written");
   });
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -1,5 +1,5 @@
-// PS3.15 2026c, table E.1-1, column "Basic Profile": attributes and what is done with them, by tag. Repeating groups 50xx and 60xx and private
-// attributes are rules of deidentify.cpp.
+// PS3.15 2026c, table E.1-1, column "Basic Profile": attributes and what is done with them, by tag. Repeating groups
+// 50xx and 60xx and private attributes are rules of deidentify.cpp.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -181,4 +181,4 @@ inline constexpr std::array<DeidRow, 652> kDeidTable{{
 }};
 // clang-format on
 
-}  // namespace osteo::hospital::pacs
+}  // namespace osteo::inline hospital::pacs

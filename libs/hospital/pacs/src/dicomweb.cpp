@@ -79,13 +79,13 @@ int number_in(const Json& object, const char* attribute, int otherwise) {
   return value;
 }
 
-// Everything but what RFC 3986 calls unreserved, and slash and colon, which it lets stand in a query: Orthanc's plugin 1.7 takes what is
-// written with % as it is written.
+// Everything but what RFC 3986 calls unreserved, and slash and colon, which it lets stand in a query: Orthanc's
+// plugin 1.7 takes what is written with % as it is written.
 std::string escaped(std::string_view text) {
   std::string out;
   for (const char c : text) {
-    if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '.' || c == '_' || c == '~' ||
-        c == '/' || c == ':') {
+    if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '.' ||
+        c == '_' || c == '~' || c == '/' || c == ':') {
       out += c;
     } else {
       char hex[4];
@@ -106,19 +106,22 @@ class Web {
  public:
   Web(const WebServer& server, const Context& context) : context_(context), http_(server, context) {}
 
-  /// Calls `take` for each match of QIDO-RS, page by page until nothing new comes: a server may give fewer at a time than it is asked for.
-  /// `identity` is the attribute that tells one from another. `keys` begins with '?'.
+  /// Calls `take` for each match of QIDO-RS, page by page until nothing new comes: a server may give fewer at a time
+  /// than it is asked for. `identity` is the attribute that tells one from another. `keys` begins with '?'.
   void query(const std::string& path, const std::string& keys, const char* identity, std::size_t most,
              const std::function<void(const Json&, const std::string& uid)>& take) {
     std::set<std::string> seen;
     for (std::size_t offset = 0, page = 0;; ++page) {
-      if (page == kMostPages) throw http_.wrong("does not come to the end of a list", "ask for less: a date, a modality, a study");
-      const pacs::Reply reply = http_.ask({.path = path + keys + "limit=" + std::to_string(kPage) + "&offset=" + std::to_string(offset),
-                                           .accept = "application/dicom+json",
-                                           .most = kMostText});
+      if (page == kMostPages)
+        throw http_.wrong("does not come to the end of a list", "ask for less: a date, a modality, a study");
+      const pacs::Reply reply =
+          http_.ask({.path = path + keys + "limit=" + std::to_string(kPage) + "&offset=" + std::to_string(offset),
+                     .accept = "application/dicom+json",
+                     .most = kMostText});
       if (reply.status == 204) return;
       if (reply.status != 200)
-        throw http_.wrong("answers with status " + std::to_string(reply.status), "is it the root of a DICOMweb server?");
+        throw http_.wrong("answers with status " + std::to_string(reply.status),
+                          "is it the root of a DICOMweb server?");
       const auto list = Json::parse(reply.text);
       if (!list || reply.text.find_first_not_of(" \r\n\t") != reply.text.find('['))
         throw http_.wrong("gives an answer that is no list in JSON", "is it the root of a DICOMweb server?");
@@ -128,7 +131,8 @@ class Web {
         if (!pacs::is_uid(uid)) throw http_.wrong("gives a match without a UID");
         if (!seen.insert(uid).second) continue;
         if (seen.size() > most)
-          throw Error(ExitCode::usage, "more than " + std::to_string(most) + " match", "ask for less: a date, a modality, a study");
+          throw Error(ExitCode::usage, "more than " + std::to_string(most) + " match",
+                      "ask for less: a date, a modality, a study");
         take(match, uid);
       }
       if (seen.size() == before) return;
@@ -162,7 +166,8 @@ bool is_file_of_part_10(const fs::path& file) {
   return in.read(head.data(), head.size()) && std::string_view(head.data() + 128, 4) == "DICM";
 }
 
-// --- sending -------------------------------------------------------------------------------------------------------------------------
+// --- sending
+// -------------------------------------------------------------------------------------------------------------------------
 
 // The body of a request: heads of parts and files, one after the other.
 class Body {
@@ -178,7 +183,8 @@ class Body {
     }
     for (std::size_t n = 0; n < objects.size(); ++n) {
       const DicomObject& o = objects[n]->object;
-      pieces_.push_back({(n == 0 ? "--" : "\r\n--") + boundary_ + "\r\nContent-Type: application/dicom\r\n\r\n", {}, 0});
+      pieces_.push_back(
+          {(n == 0 ? "--" : "\r\n--") + boundary_ + "\r\nContent-Type: application/dicom\r\n\r\n", {}, 0});
       pieces_.push_back({{}, o.file, o.bytes});
     }
     pieces_.push_back({"\r\n--" + boundary_ + "--\r\n", {}, 0});
@@ -238,7 +244,8 @@ class Body {
 std::string reason_text(const Json& item, const char* attribute) {
   const int reason = number_in(item, attribute, -1);
   if (reason < 0 || reason > 0xFFFF) return "it refused it, and does not say why";
-  return reason == 0xC122 ? "it does not take this transfer syntax (status C122)" : pacs::status_text(static_cast<unsigned>(reason));
+  return reason == 0xC122 ? "it does not take this transfer syntax (status C122)"
+                          : pacs::status_text(static_cast<unsigned>(reason));
 }
 
 std::string status_words(long status) {
@@ -274,8 +281,10 @@ void judge(std::span<SentObject* const> batch, const pacs::Reply& reply) {
     return all("the server does not say what became of it (status " + std::to_string(reply.status) + ", no JSON)");
   std::map<std::string, std::string> stored, failed;  // UID -> what else it says
   for (const Json& item : values_of(*said, kStored))
-    stored[text_in(item, kReferencedInstance)] = values_of(item, kWarningReason).empty() ? "" : reason_text(item, kWarningReason);
-  for (const Json& item : values_of(*said, kFailed)) failed[text_in(item, kReferencedInstance)] = reason_text(item, kFailureReason);
+    stored[text_in(item, kReferencedInstance)] =
+        values_of(item, kWarningReason).empty() ? "" : reason_text(item, kWarningReason);
+  for (const Json& item : values_of(*said, kFailed))
+    failed[text_in(item, kReferencedInstance)] = reason_text(item, kFailureReason);
   for (SentObject* const s : batch) {
     const auto bad = failed.find(s->object.sop_instance), good = stored.find(s->object.sop_instance);
     if (bad != failed.end()) {
@@ -308,7 +317,8 @@ std::string check(Web& web, SendReport& report, const Context& context) {
   return {};
 }
 
-// --- fetching ------------------------------------------------------------------------------------------------------------------------
+// --- fetching
+// ------------------------------------------------------------------------------------------------------------------------
 
 // Parts of an answer, each into a file of its own, and judged there.
 class Parts {
@@ -331,7 +341,8 @@ class Parts {
     if (!reader_ || !reader_->whole()) throw http.wrong("broke off in the middle of the series", "tried again later");
     if (static_cast<std::size_t>(got.images) != expected_.size())
       throw Error(ExitCode::failed,
-                  "there are " + std::to_string(expected_.size()) + " objects in the series, and " + std::to_string(got.images) + " came",
+                  "there are " + std::to_string(expected_.size()) + " objects in the series, and " +
+                      std::to_string(got.images) + " came",
                   "more may have arrived meanwhile: ask again");
     Children reader;
     reader.start(
@@ -356,10 +367,10 @@ class Parts {
     if (type.name != "multipart/related" || (of != type.parameters.end() && !alike(of->second, "application/dicom")))
       throw http.wrong("gives no DICOM objects in several parts", "is it the root of a DICOMweb server?");
     const auto boundary = type.parameters.find("boundary");
-    reader_ =
-        std::make_unique<pacs::MultipartReader>(boundary == type.parameters.end() ? "" : boundary->second,
-                                                pacs::PartEvents{[&http, this](const auto& h) { open(http, h); },
-                                                                 [this](std::string_view data) { write(data); }, [this] { close(); }});
+    reader_ = std::make_unique<pacs::MultipartReader>(
+        boundary == type.parameters.end() ? "" : boundary->second,
+        pacs::PartEvents{[&http, this](const auto& h) { open(http, h); },
+                         [this](std::string_view data) { write(data); }, [this] { close(); }});
   }
 
   void open(const pacs::Http& http, const std::map<std::string, std::string>& head) {
@@ -399,7 +410,8 @@ class Parts {
       pacs::ObjectHead head;
       DcmFileFormat whole;
       // To its last byte, long values by their length alone: a server may cut an object and end the part as it should.
-      if (!is_file_of_part_10(file) || whole.loadFile(file.c_str(), EXS_Unknown, EGL_noChange, 1024).bad() || !pacs::read_head(file, head))
+      if (!is_file_of_part_10(file) || whole.loadFile(file.c_str(), EXS_Unknown, EGL_noChange, 1024).bad() ||
+          !pacs::read_head(file, head))
         return "gives what is no whole DICOM object";
       if (head.study != series_.study || head.series != series_.series || expected_.erase(head.sop_instance) == 0)
         return "gives an object that was not asked for, or gives one twice";
@@ -441,10 +453,12 @@ class Parts {
 void check_dicomweb(const WebServer& server) {
   pacs::check_address(server);
   if (server.url.starts_with("http://") && !pacs::own_machine(server.url))
-    throw Error(ExitCode::usage, "patients' data would go over the network in the clear", "https://, or a tunnel to 127.0.0.1");
+    throw Error(ExitCode::usage, "patients' data would go over the network in the clear",
+                "https://, or a tunnel to 127.0.0.1");
 }
 
-SendReport send_objects(const WebServer& server, const std::vector<DicomObject>& objects, bool check_after, const Context& context) {
+SendReport send_objects(const WebServer& server, const std::vector<DicomObject>& objects, bool check_after,
+                        const Context& context) {
   check_dicomweb(server);
   pacs::quiet_dcmtk(server.timeout_s);
   SendReport report;
@@ -462,7 +476,8 @@ SendReport send_objects(const WebServer& server, const std::vector<DicomObject>&
   for (auto& [study, all] : studies) {
     for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {
       std::uint64_t bytes = 0;
-      while (end < all.size() && end - begin < kBatchObjects && (end == begin || bytes + all[end]->object.bytes <= kBatchBytes))
+      while (end < all.size() && end - begin < kBatchObjects &&
+             (end == begin || bytes + all[end]->object.bytes <= kBatchBytes))
         bytes += all[end++]->object.bytes;
       const auto batch = std::span(all).subspan(begin, end - begin);
       context.progress(static_cast<double>(done) / static_cast<double>(objects.size()), "sending");
@@ -473,7 +488,10 @@ SendReport send_objects(const WebServer& server, const std::vector<DicomObject>&
       }
       try {
         const Body body(batch);
-        judge(batch, web.http().ask({.path = "/studies", .accept = "application/dicom+json", .most = kMostText, .upload = &body.upload()}));
+        judge(
+            batch,
+            web.http().ask(
+                {.path = "/studies", .accept = "application/dicom+json", .most = kMostText, .upload = &body.upload()}));
         ++answers;
       } catch (const Error& e) {
         if (e.code() == ExitCode::cancelled || (answers == 0 && e.code() != ExitCode::cannot_read)) throw;
@@ -490,7 +508,9 @@ std::vector<RemoteSeries> find_series(const WebServer& server, const SeriesKeys&
   check_dicomweb(server);
   pacs::check_keys(keys);
   Web web(server, context);
-  const auto key = [](const char* name, const std::string& value) { return value.empty() ? "" : name + ("=" + escaped(value)) + "&"; };
+  const auto key = [](const char* name, const std::string& value) {
+    return value.empty() ? "" : name + ("=" + escaped(value)) + "&";
+  };
   const auto agrees = [](const Json& match, const char* attribute, const std::string& asked) {
     const std::string given = text_in(match, attribute);
     return asked.empty() || given.empty() || alike(given, asked);
@@ -509,10 +529,12 @@ std::vector<RemoteSeries> find_series(const WebServer& server, const SeriesKeys&
                      number_in(match, kImages, -1)};
       if (r.study.empty()) r.study = study;  // the address says it
       if (!pacs::is_uid(r.study)) throw web.http().wrong("gives a match without a UID");
-      if ((!study.empty() && r.study != study) || !agrees(match, kSeries, keys.series) || !agrees(match, kModality, keys.modality))
+      if ((!study.empty() && r.study != study) || !agrees(match, kSeries, keys.series) ||
+          !agrees(match, kModality, keys.modality))
         throw web.strange("series");
       if (all.size() == kMostSeries)
-        throw Error(ExitCode::usage, "more than " + std::to_string(kMostSeries) + " match", "ask for less: a date, a modality, a study");
+        throw Error(ExitCode::usage, "more than " + std::to_string(kMostSeries) + " match",
+                    "ask for less: a date, a modality, a study");
       all.push_back(std::move(r));
     });
   };
@@ -521,8 +543,8 @@ std::vector<RemoteSeries> find_series(const WebServer& server, const SeriesKeys&
   } else {
     std::vector<std::pair<std::string, std::string>> studies;
     web.query("/studies",
-              "?" + key("StudyInstanceUID", keys.study) + key("StudyDate", keys.study_date) + key("AccessionNumber", keys.accession) +
-                  key("PatientID", keys.patient_id),
+              "?" + key("StudyInstanceUID", keys.study) + key("StudyDate", keys.study_date) +
+                  key("AccessionNumber", keys.accession) + key("PatientID", keys.patient_id),
               kStudy, kMostSeries, [&](const Json& match, const std::string& uid) {
                 if (!agrees(match, kStudy, keys.study) || !agrees(match, kAccession, keys.accession) ||
                     !agrees(match, kPatientId, keys.patient_id))
@@ -535,10 +557,11 @@ std::vector<RemoteSeries> find_series(const WebServer& server, const SeriesKeys&
   return all;
 }
 
-FetchReport fetch_series(const WebServer& server, const RemoteSeries& series, const fs::path& folder, const FetchLimits& limits,
-                         const Context& context) {
+FetchReport fetch_series(const WebServer& server, const RemoteSeries& series, const fs::path& folder,
+                         const FetchLimits& limits, const Context& context) {
   check_dicomweb(server);
-  if (!fs::is_directory(folder) || !fs::is_empty(folder)) throw Error(ExitCode::cannot_write, folder.string() + " is no empty folder");
+  if (!fs::is_directory(folder) || !fs::is_empty(folder))
+    throw Error(ExitCode::cannot_write, folder.string() + " is no empty folder");
   for (const std::string& uid : {series.study, series.series})
     if (!pacs::is_uid(uid)) throw Error(ExitCode::usage, "'" + uid + "' is no UID", "digits and dots, at most 64");
   pacs::quiet_dcmtk(server.timeout_s);
@@ -546,19 +569,20 @@ FetchReport fetch_series(const WebServer& server, const RemoteSeries& series, co
   std::set<std::string> listed = web.instances(series.study, series.series);
   if (listed.empty()) throw Error(ExitCode::no_input, web_text(server) + " has nothing of this series");
   if (series.images >= 0 && listed.size() != static_cast<std::size_t>(series.images))
-    throw Error(
-        ExitCode::failed,
-        "there are " + std::to_string(series.images) + " objects in the series, and " + std::to_string(listed.size()) + " are listed",
-        "more may have arrived meanwhile: ask again");
+    throw Error(ExitCode::failed,
+                "there are " + std::to_string(series.images) + " objects in the series, and " +
+                    std::to_string(listed.size()) + " are listed",
+                "more may have arrived meanwhile: ask again");
   Parts parts(series, std::move(listed), folder, limits, context);
-  const pacs::Reply reply =
-      web.http().ask({.path = "/studies/" + series.study + "/series/" + series.series,
-                      .accept = R"(multipart/related; type="application/dicom"; transfer-syntax=*)",
-                      .most = kMostText,
-                      .take = [&](const pacs::Reply& head, std::string_view piece) { parts.take(web.http(), head, piece); }});
-  if (reply.status != 200) throw web.http().wrong("does not give the series (status " + std::to_string(reply.status) + ")");
+  const pacs::Reply reply = web.http().ask(
+      {.path = "/studies/" + series.study + "/series/" + series.series,
+       .accept = R"(multipart/related; type="application/dicom"; transfer-syntax=*)",
+       .most = kMostText,
+       .take = [&](const pacs::Reply& head, std::string_view piece) { parts.take(web.http(), head, piece); }});
+  if (reply.status != 200)
+    throw web.http().wrong("does not give the series (status " + std::to_string(reply.status) + ")");
   parts.finish(web.http());
   return parts.got;
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

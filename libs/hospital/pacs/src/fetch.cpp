@@ -43,7 +43,8 @@ class Getter : public pacs::Scu {
   std::set<std::string> instances;
 
  private:
-  OFCondition handleSTORERequestFile(T_ASC_PresentationContextID* id, const OFString&, T_DIMSE_C_StoreRQ* request) override {
+  OFCondition handleSTORERequestFile(T_ASC_PresentationContextID* id, const OFString&,
+                                     T_DIMSE_C_StoreRQ* request) override {
     char name[24];
     std::snprintf(name, sizeof name, "%06d.dcm", got.images + 1);
     const fs::path file = folder_ / name;
@@ -66,7 +67,8 @@ class Getter : public pacs::Scu {
     resources = static_cast<double>(got.bytes) > limits_.series_gb * 1e9 ||
                 (!error && static_cast<double>(space.available) < limits_.keep_free_gb * 1e9);
     if (resources)
-      problem = static_cast<double>(got.bytes) > limits_.series_gb * 1e9 ? "the series is larger than allowed" : "the disk is nearly full";
+      problem = static_cast<double>(got.bytes) > limits_.series_gb * 1e9 ? "the series is larger than allowed"
+                                                                         : "the disk is nearly full";
     if (expected_ > 0) context_.progress(std::min(1.0, static_cast<double>(got.images) / expected_), "fetching");
     return resources || context_.cancelled() ? EC_InvalidStream : EC_Normal;
   }
@@ -113,11 +115,13 @@ bool pacs::before(const RemoteSeries& a, const RemoteSeries& b) {
 }
 
 void pacs::check_keys(const SeriesKeys& keys) {
-  if (keys.study.empty() && keys.series.empty() && keys.accession.empty() && keys.patient_id.empty() && keys.study_date.empty())
+  if (keys.study.empty() && keys.series.empty() && keys.accession.empty() && keys.patient_id.empty() &&
+      keys.study_date.empty())
     throw Error(ExitCode::usage, "say what to look for: a whole archive is not listed",
                 "--study, --series, --accession, --patient-id or --date");
   for (const std::string& uid : {keys.study, keys.series})
-    if (!uid.empty() && !pacs::is_uid(uid)) throw Error(ExitCode::usage, "'" + uid + "' is no UID", "digits and dots, at most 64");
+    if (!uid.empty() && !pacs::is_uid(uid))
+      throw Error(ExitCode::usage, "'" + uid + "' is no UID", "digits and dots, at most 64");
   for (const std::string& text : {keys.accession, keys.patient_id, keys.study_date, keys.modality})
     if (text.size() > 64 || text.find_first_of("\\*?") != std::string::npos)
       throw Error(ExitCode::usage, "'" + text + "' cannot be looked for", "at most 64 characters, without \\, * and ?");
@@ -134,7 +138,8 @@ std::vector<RemoteSeries> find_series(const DicomPeer& peer, const SeriesKeys& k
   studies.putAndInsertString(DCM_AccessionNumber, keys.accession.c_str());
   studies.putAndInsertString(DCM_PatientID, keys.patient_id.c_str());
   std::vector<RemoteSeries> all;
-  const bool by_series_alone = keys.study.empty() && keys.accession.empty() && keys.patient_id.empty() && keys.study_date.empty();
+  const bool by_series_alone =
+      keys.study.empty() && keys.accession.empty() && keys.patient_id.empty() && keys.study_date.empty();
   std::vector<std::pair<std::string, std::string>> of;
   if (by_series_alone) {
     of.emplace_back("", "");  // many nodes answer all the same
@@ -167,9 +172,10 @@ std::vector<RemoteSeries> find_series(const DicomPeer& peer, const SeriesKeys& k
   return all;
 }
 
-FetchReport fetch_series(const DicomPeer& peer, const RemoteSeries& series, const fs::path& folder, const FetchLimits& limits,
-                         const Context& context) {
-  if (!fs::is_directory(folder) || !fs::is_empty(folder)) throw Error(ExitCode::cannot_write, folder.string() + " is no empty folder");
+FetchReport fetch_series(const DicomPeer& peer, const RemoteSeries& series, const fs::path& folder,
+                         const FetchLimits& limits, const Context& context) {
+  if (!fs::is_directory(folder) || !fs::is_empty(folder))
+    throw Error(ExitCode::cannot_write, folder.string() + " is no empty folder");
   Getter scu(folder, limits, series.images, context);
   scu.prepare(peer);
   scu.setStorageMode(DCMSCU_STORAGE_BIT_PRESERVING);
@@ -182,15 +188,22 @@ FetchReport fetch_series(const DicomPeer& peer, const RemoteSeries& series, cons
       scu.addPresentationContext(sop_class, one, ASC_SC_ROLE_SCP);
     }
   };
-  const auto slices = {
-      UID_LittleEndianExplicitTransferSyntax, UID_LittleEndianImplicitTransferSyntax, UID_DeflatedExplicitVRLittleEndianTransferSyntax,
-      UID_JPEGProcess14SV1TransferSyntax,     UID_JPEGProcess14TransferSyntax,        UID_JPEGLSLosslessTransferSyntax,
-      UID_JPEG2000LosslessOnlyTransferSyntax, UID_RLELosslessTransferSyntax,          UID_JPEGProcess2_4TransferSyntax,
-      UID_JPEGProcess1TransferSyntax,         UID_JPEGLSLossyTransferSyntax,          UID_JPEG2000TransferSyntax};
+  const auto slices = {UID_LittleEndianExplicitTransferSyntax,
+                       UID_LittleEndianImplicitTransferSyntax,
+                       UID_DeflatedExplicitVRLittleEndianTransferSyntax,
+                       UID_JPEGProcess14SV1TransferSyntax,
+                       UID_JPEGProcess14TransferSyntax,
+                       UID_JPEGLSLosslessTransferSyntax,
+                       UID_JPEG2000LosslessOnlyTransferSyntax,
+                       UID_RLELosslessTransferSyntax,
+                       UID_JPEGProcess2_4TransferSyntax,
+                       UID_JPEGProcess1TransferSyntax,
+                       UID_JPEGLSLossyTransferSyntax,
+                       UID_JPEG2000TransferSyntax};
   for (const char* const c : {UID_CTImageStorage, UID_MRImageStorage, UID_EnhancedCTImageStorage}) take(c, slices);
-  for (const char* const c :
-       {UID_SegmentationStorage, UID_EncapsulatedSTLStorage, UID_EncapsulatedPDFStorage, UID_SecondaryCaptureImageStorage,
-        UID_ComprehensiveSRStorage, UID_EnhancedSRStorage, UID_BasicTextSRStorage, UID_RTStructureSetStorage})
+  for (const char* const c : {UID_SegmentationStorage, UID_EncapsulatedSTLStorage, UID_EncapsulatedPDFStorage,
+                              UID_SecondaryCaptureImageStorage, UID_ComprehensiveSRStorage, UID_EnhancedSRStorage,
+                              UID_BasicTextSRStorage, UID_RTStructureSetStorage})
     take(c, {UID_LittleEndianExplicitTransferSyntax, UID_LittleEndianImplicitTransferSyntax,
              UID_DeflatedExplicitVRLittleEndianTransferSyntax});
   scu.connect(peer);
@@ -212,16 +225,18 @@ FetchReport fetch_series(const DicomPeer& peer, const RemoteSeries& series, cons
   if (done.bad()) throw Error(ExitCode::failed, peer_text(peer) + " did not give the series: " + done.text());
   scu.releaseAssociation();
   if (scu.failed > 0)
-    throw Error(ExitCode::failed, peer_text(peer) + " says that " + std::to_string(scu.failed) + " objects could not be sent",
+    throw Error(ExitCode::failed,
+                peer_text(peer) + " says that " + std::to_string(scu.failed) + " objects could not be sent",
                 "perhaps in a form that is not taken here");
-  if (scu.status != STATUS_Success) throw Error(ExitCode::failed, peer_text(peer) + ": " + pacs::status_text(scu.status));
+  if (scu.status != STATUS_Success)
+    throw Error(ExitCode::failed, peer_text(peer) + ": " + pacs::status_text(scu.status));
   if (scu.got.images == 0) throw Error(ExitCode::no_input, peer_text(peer) + " has nothing of this series");
   if (series.images >= 0 && static_cast<int>(scu.instances.size()) != series.images)
-    throw Error(
-        ExitCode::failed,
-        "there are " + std::to_string(series.images) + " objects in the series, and " + std::to_string(scu.instances.size()) + " came",
-        "more may have arrived meanwhile: ask again");
+    throw Error(ExitCode::failed,
+                "there are " + std::to_string(series.images) + " objects in the series, and " +
+                    std::to_string(scu.instances.size()) + " came",
+                "more may have arrived meanwhile: ask again");
   return scu.got;
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

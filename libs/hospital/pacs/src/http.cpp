@@ -50,11 +50,13 @@ void check_address(const WebServer& server) {
   };
   if (!plain && !url.starts_with("https://")) throw bad("the address begins with neither https:// nor http://");
   if (url.find('@') != std::string::npos) throw bad("no user and password in the address: others could see them");
-  if (web_text(server).size() <= url.find("://") + 3 ||
-      std::ranges::any_of(url, [](unsigned char c) { return c <= ' ' || c >= 127 || c == '?' || c == '#' || c == '\\'; }))
+  if (web_text(server).size() <= url.find("://") + 3 || std::ranges::any_of(url, [](unsigned char c) {
+        return c <= ' ' || c >= 127 || c == '?' || c == '#' || c == '\\';
+      }))
     throw bad("that is no address of a server");
   if (plain && !server.login.empty() && !own_machine(url))
-    throw Error(ExitCode::usage, "the password would go over the network in the clear", "https://, or a tunnel to 127.0.0.1");
+    throw Error(ExitCode::usage, "the password would go over the network in the clear",
+                "https://, or a tunnel to 127.0.0.1");
   if (!server.ca.empty()) require_readable(server.ca);
 }
 
@@ -117,7 +119,8 @@ void Http::set(int option, T value) {
     throw Error(ExitCode::failed, "libcurl does not know an option that is needed", "7.85 or later");
 }
 
-Http::Http(const WebServer& server, const Context& context) : server_(server), url_(web_text(server)), context_(context) {
+Http::Http(const WebServer& server, const Context& context)
+    : server_(server), url_(web_text(server)), context_(context) {
   if (::curl_global_init(CURL_GLOBAL_DEFAULT) != CURLE_OK || (curl_ = ::curl_easy_init()) == nullptr)
     throw Error(ExitCode::resources, "libcurl cannot be started");
 }
@@ -165,8 +168,9 @@ Reply Http::ask(const Question& question) {
       });
   set(CURLOPT_WRITEDATA, &transfer);
   set(
-      CURLOPT_WRITEFUNCTION,
-      +[](char* data, std::size_t, std::size_t n, void* t) -> std::size_t { return static_cast<Transfer*>(t)->body(data, n); });
+      CURLOPT_WRITEFUNCTION, +[](char* data, std::size_t, std::size_t n, void* t) -> std::size_t {
+        return static_cast<Transfer*>(t)->body(data, n);
+      });
   std::unique_ptr<curl_slist, decltype(&::curl_slist_free_all)> heads(nullptr, &::curl_slist_free_all);
   const auto head = [&](const std::string& line) {
     curl_slist* const more = ::curl_slist_append(heads.get(), line.c_str());
@@ -181,11 +185,13 @@ Reply Http::ask(const Question& question) {
     set(CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(question.upload->bytes));
     set(CURLOPT_READDATA, &transfer);
     set(
-        CURLOPT_READFUNCTION,
-        +[](char* to, std::size_t size, std::size_t n, void* t) -> std::size_t { return static_cast<Transfer*>(t)->send(to, size * n); });
+        CURLOPT_READFUNCTION, +[](char* to, std::size_t size, std::size_t n, void* t) -> std::size_t {
+          return static_cast<Transfer*>(t)->send(to, size * n);
+        });
     set(CURLOPT_SEEKDATA, &transfer);
     set(
-        CURLOPT_SEEKFUNCTION, +[](void* t, curl_off_t offset, int) -> int { return static_cast<Transfer*>(t)->again(offset); });
+        CURLOPT_SEEKFUNCTION,
+        +[](void* t, curl_off_t offset, int) -> int { return static_cast<Transfer*>(t)->again(offset); });
   }
   if (heads) set(CURLOPT_HTTPHEADER, heads.get());
   set(CURLOPT_URL, (url_ + question.path).c_str());
@@ -198,7 +204,8 @@ Reply Http::ask(const Question& question) {
     throw wrong(server_.login.empty() ? "asks for a login" : "refuses the login", server_.flag + "-login FILE");
   if (transfer.endless_head) throw wrong("gives an answer whose head does not end");
   if (reply.status >= 300 && reply.status < 400)
-    throw wrong("points elsewhere (status " + std::to_string(reply.status) + "), which is not followed", "give the address it is at");
+    throw wrong("points elsewhere (status " + std::to_string(reply.status) + "), which is not followed",
+                "give the address it is at");
   // An answer of another status may be of any length: the status is what counts.
   if (reply.status >= 400) return reply;
   if (transfer.over) throw wrong("gives an answer of more than " + std::to_string(question.most / 1'000'000) + " MB");
@@ -207,4 +214,4 @@ Reply Http::ask(const Question& question) {
 }
 
 }  // namespace pacs
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -1,5 +1,5 @@
-// Questions to a web server, by libcurl. What it answers is believed in nothing: no redirect is followed, no proxy is asked, nothing is
-// decompressed, and what is read has a bound. Private to libs/hospital/pacs.
+// Questions to a web server, by libcurl. What it answers is believed in nothing: no redirect is followed, no proxy is
+// asked, nothing is decompressed, and what is read has a bound. Private to libs/hospital/pacs.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -51,8 +51,8 @@ class Http {
   Http(const Http&) = delete;
   Http& operator=(const Http&) = delete;
 
-  /// Errors: failed when there is no connection, it stalls or breaks off, the login is refused, it points elsewhere or says more than
-  /// `most`; cancelled; what `take` and the upload throw.
+  /// Errors: failed when there is no connection, it stalls or breaks off, the login is refused, it points elsewhere or
+  /// says more than `most`; cancelled; what `take` and the upload throw.
   Reply ask(const Question& question);
 
   /// Error(failed): "https://... gives a list that is none".
@@ -69,4 +69,4 @@ class Http {
   void* curl_ = nullptr;  // CURL
 };
 
-}  // namespace osteo::hospital::pacs
+}  // namespace osteo::inline hospital::pacs

@@ -134,4 +134,4 @@ std::vector<ClosedSeries> Inbox::close_quiet(Time now) {
   return closed;
 }
 
-}  // namespace osteo::hospital::pacs
+}  // namespace osteo::inline hospital::pacs

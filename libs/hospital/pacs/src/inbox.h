@@ -59,4 +59,4 @@ class Inbox {
   bool complained_ = false;
 };
 
-}  // namespace osteo::hospital::pacs
+}  // namespace osteo::inline hospital::pacs

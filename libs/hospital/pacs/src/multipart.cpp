@@ -29,7 +29,9 @@ std::string_view trimmed(std::string_view text) {
 }  // namespace
 
 MediaType parse_media_type(std::string_view text) {
-  const auto wrong = [] { return Error(ExitCode::failed, "an answer says of itself what cannot be understood (Content-Type)"); };
+  const auto wrong = [] {
+    return Error(ExitCode::failed, "an answer says of itself what cannot be understood (Content-Type)");
+  };
   MediaType type;
   std::size_t at = std::min(text.find(';'), text.size());
   type.name = small(trimmed(text.substr(0, at)));
@@ -61,11 +63,14 @@ MediaType parse_media_type(std::string_view text) {
   return type;
 }
 
-MultipartReader::MultipartReader(std::string boundary, PartEvents events) : delimiter_("\r\n--" + boundary), events_(std::move(events)) {
+MultipartReader::MultipartReader(std::string boundary, PartEvents events)
+    : delimiter_("\r\n--" + boundary), events_(std::move(events)) {
   constexpr std::string_view kAllowed = "'()+_,-./:=? ";
-  const bool good = !boundary.empty() && boundary.size() <= 70 && boundary.back() != ' ' && std::ranges::all_of(boundary, [&](char c) {
-    return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || kAllowed.find(c) != std::string_view::npos;
-  });
+  const bool good = !boundary.empty() && boundary.size() <= 70 && boundary.back() != ' ' &&
+                    std::ranges::all_of(boundary, [&](char c) {
+                      return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+                             kAllowed.find(c) != std::string_view::npos;
+                    });
   if (!good) throw bad("its boundary is none");
 }
 
@@ -123,7 +128,8 @@ bool MultipartReader::step() {
         rest.remove_prefix(2);  // the end of the line before
         const std::size_t line = std::min(rest.find("\r\n"), rest.size()), colon = rest.find(':');
         if (colon == std::string_view::npos || colon > line ||
-            !head.emplace(small(trimmed(rest.substr(0, colon))), trimmed(rest.substr(colon + 1, line - colon - 1))).second)
+            !head.emplace(small(trimmed(rest.substr(0, colon))), trimmed(rest.substr(colon + 1, line - colon - 1)))
+                 .second)
           throw bad("the head of a part cannot be understood");
         rest.remove_prefix(line);
       }
@@ -138,4 +144,4 @@ bool MultipartReader::step() {
   return false;
 }
 
-}  // namespace osteo::hospital::pacs
+}  // namespace osteo::inline hospital::pacs

@@ -7,8 +7,8 @@
 
 namespace osteo::inline hospital::pacs {
 
-/// "multipart/related; type=\"application/dicom\"; boundary=x": what stands before the first semicolon in small letters, and parameters by
-/// name in small letters.
+/// "multipart/related; type=\"application/dicom\"; boundary=x": what stands before the first semicolon in small
+/// letters, and parameters by name in small letters.
 struct MediaType {
   std::string name;
   std::map<std::string, std::string> parameters;
@@ -42,4 +42,4 @@ class MultipartReader {
   std::string buffer_ = "\r\n";  // a boundary at the very beginning has no line before it
 };
 
-}  // namespace osteo::hospital::pacs
+}  // namespace osteo::inline hospital::pacs

@@ -23,7 +23,8 @@ std::string checked_ae(std::string_view title) {
 
 DicomPeer parse_peer(std::string_view text) {
   const auto bad = [&] {
-    return Error(ExitCode::usage, "'" + std::string(text) + "' is no DICOM node", "TITLE@HOST:PORT, like ORTHANC@127.0.0.1:4242");
+    return Error(ExitCode::usage, "'" + std::string(text) + "' is no DICOM node",
+                 "TITLE@HOST:PORT, like ORTHANC@127.0.0.1:4242");
   };
   const auto at = text.rfind('@'), colon = text.rfind(':');
   if (at == std::string_view::npos || colon == std::string_view::npos || colon < at || colon == at + 1) throw bad();
@@ -47,8 +48,8 @@ namespace pacs {
 
 void quiet_dcmtk(double timeout_s) {
   OFLog::configure(OFLogger::OFF_LOG_LEVEL);
-  // A message is several small packets: waiting for the answer to each before the next (Nagle) costs 0.1 s an object. DCMTK takes this from
-  // the environment alone; who has set it keeps what was set.
+  // A message is several small packets: waiting for the answer to each before the next (Nagle) costs 0.1 s an object.
+  // DCMTK takes this from the environment alone; who has set it keeps what was set.
   ::setenv("TCP_NODELAY", "1", 0);
   dcmConnectionTimeout.set(static_cast<Sint32>(std::ceil(timeout_s)));
   // Also while TLS shakes hands, of which DCMTK keeps no time itself.
@@ -70,14 +71,17 @@ std::unique_ptr<DcmTLSTransportLayer> tls_layer(const DicomTls& tls, T_ASC_Netwo
   auto layer = std::make_unique<DcmTLSTransportLayer>(role, nullptr, OFFalse);
   layer->setPrivateKeyPasswd("");  // or OpenSSL would ask at the terminal
   const auto need = [](bool good, const std::string& file, const char* what) {
-    if (!good) throw Error(ExitCode::cannot_read, "'" + file + "' " + what, "files in PEM form are needed, a key without a password");
+    if (!good)
+      throw Error(ExitCode::cannot_read, "'" + file + "' " + what,
+                  "files in PEM form are needed, a key without a password");
   };
   need(layer->addTrustedCertificateFile(tls.ca.c_str(), DCF_Filetype_PEM).good(), tls.ca, "holds no certificate");
   if (!tls.key.empty()) {
     require_readable(tls.certificate);
     require_readable(tls.key);
     need(layer->setPrivateKeyFile(tls.key.c_str(), DCF_Filetype_PEM).good(), tls.key, "holds no key that can be read");
-    need(layer->setCertificateFile(tls.certificate.c_str(), DCF_Filetype_PEM).good(), tls.certificate, "holds no certificate");
+    need(layer->setCertificateFile(tls.certificate.c_str(), DCF_Filetype_PEM).good(), tls.certificate,
+         "holds no certificate");
     need(layer->checkPrivateKeyMatchesCertificate() == OFTrue, tls.key, "is not the key of the certificate");
   }
   layer->setCertificateVerification(DCV_requireCertificate);
@@ -108,13 +112,16 @@ void Scu::connect(const DicomPeer& peer) {
   if (done.good()) done = negotiateAssociation();
   if (done.good()) return;
   if (done == NET_EC_NoAcceptablePresentationContexts)
-    throw Error(ExitCode::failed, peer_text(peer) + " takes none of these kinds of objects", "ask its administrator what it accepts");
+    throw Error(ExitCode::failed, peer_text(peer) + " takes none of these kinds of objects",
+                "ask its administrator what it accepts");
   std::string why = done.text();
   for (char& c : why)
     if (c == '\n') c = ' ';
   const bool rejected = done == DUL_ASSOCIATIONREJECTED || why.find("Reject") != std::string::npos;
-  throw Error(ExitCode::failed, peer_text(peer) + (rejected ? " refuses " + peer.own_ae : " cannot be reached") + ": " + why,
-              rejected ? "the node must know our title (--ae) and we must call it by its own" : "check host, port and firewall");
+  throw Error(ExitCode::failed,
+              peer_text(peer) + (rejected ? " refuses " + peer.own_ae : " cannot be reached") + ": " + why,
+              rejected ? "the node must know our title (--ae) and we must call it by its own"
+                       : "check host, port and firewall");
 }
 
 bool is_uid(std::string_view text) {
@@ -172,7 +179,8 @@ bool read_head(const fs::path& file, ObjectHead& head, DcmFileFormat* whole) {
   DcmFileFormat mine;
   DcmFileFormat& format = whole != nullptr ? *whole : mine;
   // Long values are not read before they are asked for.
-  if (format.loadFileUntilTag(file.c_str(), EXS_Unknown, EGL_noChange, 1024, ERM_autoDetect, DCM_PixelData).bad()) return false;
+  if (format.loadFileUntilTag(file.c_str(), EXS_Unknown, EGL_noChange, 1024, ERM_autoDetect, DCM_PixelData).bad())
+    return false;
   DcmDataset& data = *format.getDataset();
   head = {text_of(data, DCM_SOPClassUID), text_of(data, DCM_SOPInstanceUID), text_of(data, DCM_StudyInstanceUID),
           text_of(data, DCM_SeriesInstanceUID), DcmXfer(data.getOriginalXfer()).getXferID()};
@@ -184,10 +192,11 @@ bool holds_data_set(const fs::path& file, std::uint64_t bytes) {
   std::ifstream in(file, std::ios::binary);
   std::array<unsigned char, 144> head{};
   if (!in.read(reinterpret_cast<char*>(head.data()), head.size())) return false;
-  const std::uint64_t group = head[140] | head[141] << 8U | head[142] << 16U | static_cast<std::uint64_t>(head[143]) << 24U;
+  const std::uint64_t group =
+      head[140] | head[141] << 8U | head[142] << 16U | static_cast<std::uint64_t>(head[143]) << 24U;
   std::error_code error;
   return fs::file_size(file, error) == head.size() + group + bytes && !error;
 }
 
 }  // namespace pacs
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

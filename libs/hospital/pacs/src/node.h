@@ -55,4 +55,4 @@ struct ObjectHead {
 /// Whether the bytes after the file meta information are `bytes` in number: a full disk can cut a file without a word.
 [[nodiscard]] bool holds_data_set(const fs::path& file, std::uint64_t bytes);
 
-}  // namespace osteo::hospital::pacs
+}  // namespace osteo::inline hospital::pacs

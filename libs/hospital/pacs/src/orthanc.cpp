@@ -20,8 +20,8 @@ namespace osteo::inline hospital {
 namespace {
 
 constexpr std::size_t kMaxAnswerBytes = 64'000'000;  // bytes of an answer: 1 kB for each of 64,000 objects
-constexpr int kChangesPerPage = 200;                     // changes
-constexpr int kTries = 3;                      // of a series whose objects are wrong
+constexpr int kChangesPerPage = 200;                 // changes
+constexpr int kTries = 3;                            // of a series whose objects are wrong
 constexpr const char* kState = ".orthanc.json";
 
 // What the server gives is not what it says; another try may or may not help.
@@ -41,7 +41,8 @@ struct Fd {
 
 void sync(const fs::path& path) {
   const Fd f(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (f.fd < 0 || ::fsync(f.fd) != 0) throw Error(ExitCode::cannot_write, std::string("the copy of a series: ") + std::strerror(errno));
+  if (f.fd < 0 || ::fsync(f.fd) != 0)
+    throw Error(ExitCode::cannot_write, std::string("the copy of a series: ") + std::strerror(errno));
 }
 
 class Rest {
@@ -60,22 +61,25 @@ class Rest {
   /// Exactly so many bytes; false: the server has no such thing.
   bool fetch(const std::string& path, const fs::path& file, std::uint64_t bytes) {
     const Fd fd(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> f(fd.fd < 0 ? nullptr : ::fdopen(::dup(fd.fd), "wb"), &std::fclose);
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> f(fd.fd < 0 ? nullptr : ::fdopen(::dup(fd.fd), "wb"),
+                                                            &std::fclose);
     if (!f) throw lost();
     std::uint64_t got = 0;
-    const pacs::Reply reply =
-        http_.ask({.path = path, .accept = {}, .most = kMaxAnswerBytes, .take = [&](const pacs::Reply&, std::string_view piece) {
-                     if (piece.size() > bytes - got) throw WrongObject("an object is longer than " + url_ + " says");
-                     got += piece.size();
-                     if (std::fwrite(piece.data(), 1, piece.size(), f.get()) != piece.size()) throw lost();
-                   }});
+    const pacs::Reply reply = http_.ask(
+        {.path = path, .accept = {}, .most = kMaxAnswerBytes, .take = [&](const pacs::Reply&, std::string_view piece) {
+           if (piece.size() > bytes - got) throw WrongObject("an object is longer than " + url_ + " says");
+           got += piece.size();
+           if (std::fwrite(piece.data(), 1, piece.size(), f.get()) != piece.size()) throw lost();
+         }});
     if (!good(reply)) return false;
     if (std::fflush(f.get()) != 0 || ::fsync(fd.fd) != 0) throw lost();
     if (got != bytes) throw WrongObject("an object is shorter than " + url_ + " says");
     return true;
   }
 
-  [[nodiscard]] Error wrong(const std::string& what) const { return http_.wrong(what, "is it the address of an Orthanc?"); }
+  [[nodiscard]] Error wrong(const std::string& what) const {
+    return http_.wrong(what, "is it the address of an Orthanc?");
+  }
 
  private:
   [[nodiscard]] bool good(const pacs::Reply& reply) const {
@@ -84,7 +88,8 @@ class Rest {
     return true;
   }
   static Error lost() {
-    return {errno == ENOSPC ? ExitCode::resources : ExitCode::cannot_write, std::string("the copy of an object: ") + std::strerror(errno)};
+    return {errno == ENOSPC ? ExitCode::resources : ExitCode::cannot_write,
+            std::string("the copy of an object: ") + std::strerror(errno)};
   }
 
   const std::string url_;
@@ -111,8 +116,9 @@ State read_state(const fs::path& folder) {
 }
 
 void write_state(const fs::path& folder, const State& s) {
-  write_file(folder / kState,
-             Json{{"osteotome_orthanc", 1}, {"url", s.url}, {"last", s.last}, {"id", s.id}, {"tries", s.tries}}.dump() + "\n");
+  write_file(
+      folder / kState,
+      Json{{"osteotome_orthanc", 1}, {"url", s.url}, {"last", s.last}, {"id", s.id}, {"tries", s.tries}}.dump() + "\n");
 }
 
 std::string string_member(const Json& object, const char* key) {
@@ -124,7 +130,8 @@ std::string string_member(const Json& object, const char* key) {
 bool is_id(const std::string& id) {
   if (id.size() != 44) return false;
   for (std::size_t i = 0; i < id.size(); ++i)
-    if (i % 9 == 8 ? id[i] != '-' : std::string_view("0123456789abcdef").find(id[i]) == std::string_view::npos) return false;
+    if (i % 9 == 8 ? id[i] != '-' : std::string_view("0123456789abcdef").find(id[i]) == std::string_view::npos)
+      return false;
   return true;
 }
 
@@ -140,7 +147,8 @@ class Follower {
       const Json* const list = page.find("Changes");
       const Json* const done = page.find("Done");
       if (done == nullptr || done->flag() == nullptr) throw http_.wrong("gives no list of changes");
-      if (list->items().empty() && !*done->flag()) throw http_.wrong("says that there are more changes, and gives none");
+      if (list->items().empty() && !*done->flag())
+        throw http_.wrong("says that there are more changes, and gives none");
       for (const Json& change : list->items()) {
         const std::int64_t seq = seq_of(change);
         if (seq <= state_.last) throw http_.wrong("gives changes out of their order");
@@ -180,7 +188,8 @@ class Follower {
     return static_cast<std::int64_t>(*seq);
   }
 
-  // A server that was set up anew counts from 1 again. Beginning again costs questions only: what is here is not fetched twice.
+  // A server that was set up anew counts from 1 again. Beginning again costs questions only: what is here is not
+  // fetched twice.
   void check_log() {
     if (state_.last == 0) return;
     const Json page = changes(state_.last - 1, 1);
@@ -223,7 +232,8 @@ class Follower {
       if (bytes > server_.object_gb * 1e9) throw WrongObject("an object is larger than allowed (--object-gb)");
       const std::string file = hash_text(instance).substr(0, 24) + ".dcm";
       if (fs::exists(whole / file)) continue;
-      if (fs::exists(half / file) || one(instance, half / file, static_cast<std::uint64_t>(bytes))) fresh.push_back(file);
+      if (fs::exists(half / file) || one(instance, half / file, static_cast<std::uint64_t>(bytes)))
+        fresh.push_back(file);
     }
     if (fresh.empty()) {
       fs::remove_all(half);
@@ -271,7 +281,8 @@ void open_orthanc_folder(const fs::path& folder, const OrthancServer& server) {
   if (output_exists(folder / kState)) {
     const State s = read_state(folder);
     if (s.url != web_text(server))
-      throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds the series of " + s.url, "give another folder");
+      throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds the series of " + s.url,
+                  "give another folder");
     return;
   }
   std::error_code ec;
@@ -296,4 +307,4 @@ void follow_orthanc(const fs::path& folder, const OrthancServer& server, const C
   }
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

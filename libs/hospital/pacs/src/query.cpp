@@ -22,8 +22,11 @@ std::vector<std::unique_ptr<DcmDataset>> Query::ask(DcmDataset& keys, std::size_
   more_ = false;
   const OFCondition done = sendFINDRequest(id, &keys, nullptr);
   if (done.bad()) throw Error(ExitCode::failed, peer_ + " does not answer: " + done.text());
-  if (more_) throw Error(ExitCode::usage, "more than " + std::to_string(most) + " match", "ask for less: a date, a modality, a study");
-  if (status_ != STATUS_Success) throw Error(ExitCode::failed, peer_ + " refuses the question: " + status_text(status_));
+  if (more_)
+    throw Error(ExitCode::usage, "more than " + std::to_string(most) + " match",
+                "ask for less: a date, a modality, a study");
+  if (status_ != STATUS_Success)
+    throw Error(ExitCode::failed, peer_ + " refuses the question: " + status_text(status_));
   return std::move(found_);
 }
 
@@ -38,4 +41,4 @@ OFCondition Query::handleFINDResponse(T_ASC_PresentationContextID, QRResponse* r
   return EC_Normal;
 }
 
-}  // namespace osteo::hospital::pacs
+}  // namespace osteo::inline hospital::pacs

@@ -31,4 +31,4 @@ class Query : public Scu {
   unsigned status_ = 0;
 };
 
-}  // namespace osteo::hospital::pacs
+}  // namespace osteo::inline hospital::pacs

@@ -72,9 +72,10 @@ Descriptor listen_at(const ReceiveOptions& o, int& port) {
   const int on = 1;
   ::setsockopt(fd.value, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
   socklen_t size = sizeof at;
-  if (fd.value < 0 || ::bind(fd.value, reinterpret_cast<sockaddr*>(&at), sizeof at) != 0 || ::listen(fd.value, 64) != 0 ||
-      ::getsockname(fd.value, reinterpret_cast<sockaddr*>(&at), &size) != 0)
-    throw Error(ExitCode::failed, "cannot listen on " + o.address + ":" + std::to_string(o.port) + ": " + std::strerror(errno),
+  if (fd.value < 0 || ::bind(fd.value, reinterpret_cast<sockaddr*>(&at), sizeof at) != 0 ||
+      ::listen(fd.value, 64) != 0 || ::getsockname(fd.value, reinterpret_cast<sockaddr*>(&at), &size) != 0)
+    throw Error(ExitCode::failed,
+                "cannot listen on " + o.address + ":" + std::to_string(o.port) + ": " + std::strerror(errno),
                 "--port another, or stop what listens there");
   port = ntohs(at.sin_port);
   return fd;
@@ -84,7 +85,8 @@ void check(const ReceiveOptions& o) {
   static_cast<void>(checked_ae(o.ae));
   for (const std::string& title : o.allowed) static_cast<void>(checked_ae(title));
   if (o.allowed.empty() && !o.anybody)
-    throw Error(ExitCode::usage, "nobody may send", "--allow TITLE,TITLE names the nodes that may; --anybody lets all in");
+    throw Error(ExitCode::usage, "nobody may send",
+                "--allow TITLE,TITLE names the nodes that may; --anybody lets all in");
   static_cast<void>(pacs::tls_layer(o.tls, NET_ACCEPTOR));  // what is wrong with its files is told now
 }
 
@@ -177,7 +179,8 @@ class Node {
     if (connection.value < 0) return;
     ++seen_.associations;
     if (children_.size() >= static_cast<std::size_t>(options_.most_associations)) {
-      // A-ASSOCIATE-RJ, rejected for now, by the provider, local limit exceeded (PS3.8 9.3.4): no process is made for it.
+      // A-ASSOCIATE-RJ, rejected for now, by the provider, local limit exceeded (PS3.8 9.3.4): no process is made for
+      // it.
       constexpr std::array<unsigned char, 10> kBusy{3, 0, 0, 0, 0, 4, 0, 2, 3, 2};
       ::send(connection.value, kBusy.data(), kBusy.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
       ++(*counts_).refused_associations;
@@ -277,7 +280,8 @@ class Node {
 
 }  // namespace
 
-void receive_objects(const fs::path& folder, const ReceiveOptions& options, const ReceiveEvents& events, const Context& context) {
+void receive_objects(const fs::path& folder, const ReceiveOptions& options, const ReceiveEvents& events,
+                     const Context& context) {
   check(options);
   try {
     Node(folder, options, events, context).run();
@@ -290,7 +294,8 @@ std::string metrics_text(const ReceiveCounters& c) {
   std::string text;
   const auto row = [&](const char* name, const char* help, std::uint64_t value) {
     const std::string full = std::string("osteotome_receive_") + name + "_total";
-    text += "# HELP " + full + " " + help + "\n# TYPE " + full + " counter\n" + full + " " + std::to_string(value) + "\n";
+    text +=
+        "# HELP " + full + " " + help + "\n# TYPE " + full + " counter\n" + full + " " + std::to_string(value) + "\n";
   };
   row("associations", "connections", c.associations);
   row("refused_associations", "connections that were not let in", c.refused_associations);
@@ -305,4 +310,4 @@ std::string metrics_text(const ReceiveCounters& c) {
   return text;
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -14,7 +14,8 @@ std::vector<std::string> words(const JsonFile& file, const JsonValue& rule, cons
   if (list == nullptr) return all;
   for (const JsonValue& v : file.list(*list, key)) {
     all.push_back(lower_case(file.text(v, key)));
-    if (all.back().empty()) throw file.wrong(v, std::string(key) + ": an empty word is in every description", "take it out");
+    if (all.back().empty())
+      throw file.wrong(v, std::string(key) + ": an empty word is in every description", "take it out");
   }
   return all;
 }
@@ -41,7 +42,8 @@ SeriesRule read_rule(const JsonFile& file, const JsonValue& v, const fs::path& f
     r.least_objects = static_cast<std::size_t>(least);
   }
   if (const JsonValue* i = v.find("ignore")) {
-    if (i->kind != JsonValue::Kind::flag || !i->flag) throw file.wrong(*i, "ignore: only true is meant", "leave it out otherwise");
+    if (i->kind != JsonValue::Kind::flag || !i->flag)
+      throw file.wrong(*i, "ignore: only true is meant", "leave it out otherwise");
     r.ignore = true;
   }
   if (const JsonValue* p = v.find("pipeline")) {
@@ -52,7 +54,8 @@ SeriesRule read_rule(const JsonFile& file, const JsonValue& v, const fs::path& f
   }
   if (const JsonValue* set = v.find("set")) {
     if (r.ignore) throw file.wrong(*set, "a rule that ignores sets nothing");
-    if (set->kind != JsonValue::Kind::object) throw file.wrong(*set, "set: names and values are needed", R"({"lower": "400"})");
+    if (set->kind != JsonValue::Kind::object)
+      throw file.wrong(*set, "set: names and values are needed", R"({"lower": "400"})");
     for (const JsonMember& m : set->members) {
       if (!r.set.emplace(m.key, file.text(m.value, m.key)).second) throw file.wrong(m.value, m.key + " is set twice");
     }
@@ -70,7 +73,8 @@ std::string misses(const SeriesRule& r, const SeriesFacts& f) {
   const bool bounded = r.least_mm > 0 || std::isfinite(r.most_mm);
   if (bounded && !(f.slice_mm > 0)) return "its slice thickness is not said";
   if (bounded && (f.slice_mm < r.least_mm || f.slice_mm > r.most_mm))
-    return "slices of " + format_number(f.slice_mm) + " mm, not " + format_number(r.least_mm) + " to " + format_number(r.most_mm);
+    return "slices of " + format_number(f.slice_mm) + " mm, not " + format_number(r.least_mm) + " to " +
+           format_number(r.most_mm);
   if (f.objects < r.least_objects) return "fewer than " + std::to_string(r.least_objects) + " objects";
   return {};
 }
@@ -108,4 +112,4 @@ RuleChoice choose_rule(const std::vector<SeriesRule>& rules, const SeriesFacts& 
   return choice;
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

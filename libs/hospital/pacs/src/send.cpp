@@ -52,7 +52,8 @@ std::size_t SendReport::accepted() const {
 }
 
 std::size_t SendReport::safe() const {
-  return static_cast<std::size_t>(std::ranges::count_if(objects, [](const SentObject& s) { return s.accepted && s.found.value_or(true); }));
+  return static_cast<std::size_t>(
+      std::ranges::count_if(objects, [](const SentObject& s) { return s.accepted && s.found.value_or(true); }));
 }
 
 DicomObjects list_objects(const std::vector<fs::path>& sources, const Context& context) {
@@ -82,14 +83,15 @@ DicomObjects list_objects(const std::vector<fs::path>& sources, const Context& c
       found.set_aside.push_back(files[n]);
       continue;
     }
-    found.objects.push_back({files[n], fs::file_size(files[n]), pacs::class_name(head.sop_class), head.sop_class, head.sop_instance,
-                             head.study, head.series, head.syntax});
+    found.objects.push_back({files[n], fs::file_size(files[n]), pacs::class_name(head.sop_class), head.sop_class,
+                             head.sop_instance, head.study, head.series, head.syntax});
   }
   if (found.objects.empty()) throw Error(ExitCode::no_input, "there is no DICOM object in what is given");
   return found;
 }
 
-SendReport send_objects(const DicomPeer& peer, const std::vector<DicomObject>& objects, bool check_after, const Context& context) {
+SendReport send_objects(const DicomPeer& peer, const std::vector<DicomObject>& objects, bool check_after,
+                        const Context& context) {
   SendReport report;
   std::map<std::pair<std::string, std::string>, std::vector<std::size_t>> by_context;
   for (const DicomObject& o : objects) {
@@ -111,7 +113,8 @@ SendReport send_objects(const DicomPeer& peer, const std::vector<DicomObject>& o
         context.progress(static_cast<double>(done++) / static_cast<double>(objects.size()), "sending");
         SentObject& s = report.objects[n];
         if (id == 0) {
-          s.problem = "the node does not take " + s.object.kind + " in the form '" + DcmXfer(syntax.c_str()).getXferName() + "'";
+          s.problem = "the node does not take " + s.object.kind + " in the form '" +
+                      DcmXfer(syntax.c_str()).getXferName() + "'";
           continue;
         }
         Uint16 status = 0;
@@ -134,4 +137,4 @@ SendReport send_objects(const DicomPeer& peer, const std::vector<DicomObject>& o
   return report;
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

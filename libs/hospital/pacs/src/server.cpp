@@ -64,8 +64,8 @@ std::string in_quotes(const fs::path& path) {
   return "'" + path.string() + "'";
 }
 
-// Writes into the folder as the services would, and takes it away again. Empty: it could. `apart_s`: how far the clock that stamps files
-// is from ours.
+// Writes into the folder as the services would, and takes it away again. Empty: it could. `apart_s`: how far the clock
+// that stamps files is from ours.
 std::string try_to_write(const fs::path& folder, double& apart_s) {
   std::string name = (folder / ".osteo-doctor-XXXXXX").string();
   const int fd = ::mkstemp(name.data());
@@ -89,22 +89,28 @@ std::string try_to_write(const fs::path& folder, double& apart_s) {
 fs::path there_above(fs::path folder) {
   std::error_code ignored;
   folder = fs::absolute(folder, ignored);
-  while (!fs::exists(folder, ignored) && folder.has_parent_path() && folder != folder.parent_path()) folder = folder.parent_path();
+  while (!fs::exists(folder, ignored) && folder.has_parent_path() && folder != folder.parent_path())
+    folder = folder.parent_path();
   return folder;
 }
 
-void check_folder(Findings& all, const std::string& what, const fs::path& folder, double keep_free_gb, bool of_patients) {
-  const auto say = [&](FindingState state, const std::string& says, const std::string& advice) { all.push_back({what, state, says, advice}); };
+void check_folder(Findings& all, const std::string& what, const fs::path& folder, double keep_free_gb,
+                  bool of_patients) {
+  const auto say = [&](FindingState state, const std::string& says, const std::string& advice) {
+    all.push_back({what, state, says, advice});
+  };
   std::error_code error;
   const fs::path above = there_above(folder);
   const bool there = fs::exists(folder, error);
   const std::string name = in_quotes(folder);
-  if (!fs::is_directory(above, error)) return say(FindingState::bad, in_quotes(above) + " is no folder", "another folder, or move that file away");
+  if (!fs::is_directory(above, error))
+    return say(FindingState::bad, in_quotes(above) + " is no folder", "another folder, or move that file away");
   double apart_s = 0;
   if (const std::string why = try_to_write(above, apart_s); !why.empty())
     return say(FindingState::bad, user() + " cannot write into " + in_quotes(above) + ": " + why,
-               why == std::strerror(ENOSPC) ? "make room there"
-                                            : "let " + user() + " write there (chown, chmod, mount); run this as the services' user");
+               why == std::strerror(ENOSPC)
+                   ? "make room there"
+                   : "let " + user() + " write there (chown, chmod, mount); run this as the services' user");
   struct statvfs disk {};
   struct stat s {};
   if (::statvfs(above.c_str(), &disk) != 0 || ::stat(above.c_str(), &s) != 0)
@@ -113,19 +119,23 @@ void check_folder(Findings& all, const std::string& what, const fs::path& folder
   const std::string room = gigabytes(free_gb) + " free";
   if (free_gb < keep_free_gb)
     return say(FindingState::bad,
-               name + ": " + room + ", and " + gigabytes(keep_free_gb) + " are to stay free: nothing would be taken in or begun",
+               name + ": " + room + ", and " + gigabytes(keep_free_gb) +
+                   " are to stay free: nothing would be taken in or begun",
                "make room, or a smaller --keep-free-gb");
   if (disk.f_files > 0 && disk.f_favail < kFewFiles)
     return say(FindingState::bad, name + ": room for " + std::to_string(disk.f_favail) + " files more",
                "make room: the disk's inodes are used up");
   if (of_patients && there && (s.st_mode & 07) != 0)
-    return say(FindingState::care, name + ": " + room + "; everybody on this machine may look into it, and it names patients",
+    return say(FindingState::care,
+               name + ": " + room + "; everybody on this machine may look into it, and it names patients",
                "chmod o= " + folder.string());
   if (std::abs(apart_s) > kClocksApart)
     return say(FindingState::care,
-               name + ": its clock is " + format_number(std::abs(apart_s)) + " s " + (apart_s > 0 ? "before" : "behind") + " ours",
+               name + ": its clock is " + format_number(std::abs(apart_s)) + " s " +
+                   (apart_s > 0 ? "before" : "behind") + " ours",
                "let both machines keep time by NTP");
-  if (free_gb < kRoomGb) return say(FindingState::care, name + ": " + room, "a day of scans may need more than " + gigabytes(kRoomGb));
+  if (free_gb < kRoomGb)
+    return say(FindingState::care, name + ": " + room, "a day of scans may need more than " + gigabytes(kRoomGb));
   say(FindingState::good, name + ": " + room + (there ? "" : "; it will be made"), {});
 }
 
@@ -141,7 +151,8 @@ std::string listener(int port) {
       std::array<std::string, 10> w;
       for (std::string& word : w) words >> word;
       const std::size_t colon = w[1].rfind(':');
-      if (colon != std::string::npos && w[3] == "0A" && std::strtol(w[1].c_str() + colon + 1, nullptr, 16) == port) inode = w[9];
+      if (colon != std::string::npos && w[3] == "0A" && std::strtol(w[1].c_str() + colon + 1, nullptr, 16) == port)
+        inode = w[9];
     }
   }
   if (inode.empty()) return {};
@@ -172,7 +183,8 @@ void check_port(Findings& all, const ServerSetup& s) {
   at.sin_family = AF_INET;
   at.sin_port = htons(static_cast<std::uint16_t>(s.port));
   if (::inet_pton(AF_INET, s.bind.c_str(), &at.sin_addr) != 1)
-    return say(FindingState::bad, in_quotes(s.bind) + " is no IPv4 address", "127.0.0.1 for this machine alone, 0.0.0.0 for every network");
+    return say(FindingState::bad, in_quotes(s.bind) + " is no IPv4 address",
+               "127.0.0.1 for this machine alone, 0.0.0.0 for every network");
   const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   const int on = 1;
   ::setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
@@ -191,8 +203,11 @@ void check_port(Findings& all, const ServerSetup& s) {
     return say(FindingState::bad, where + " is taken by " + (who.empty() ? "what " + user() + " may not see" : who),
                "--port another, or stop what listens there");
   }
-  if (why == EACCES) return say(FindingState::bad, where + ": " + user() + " may not listen there", "a port above 1023: the units have no rights");
-  if (why == EADDRNOTAVAIL) return say(FindingState::bad, where + " is no address of this machine", "'ip address' lists those that are");
+  if (why == EACCES)
+    return say(FindingState::bad, where + ": " + user() + " may not listen there",
+               "a port above 1023: the units have no rights");
+  if (why == EADDRNOTAVAIL)
+    return say(FindingState::bad, where + " is no address of this machine", "'ip address' lists those that are");
   say(FindingState::bad, where + ": " + std::strerror(why), "--bind and --port another");
 }
 
@@ -208,10 +223,11 @@ void try_to(Findings& all, const std::string& what, const std::string& good, con
 }
 
 void check_titles(Findings& all, const ServerSetup& s) {
-  try_to(all, "title", in_quotes(s.ae) + (s.allowed.empty() ? "" : "; " + std::to_string(s.allowed.size()) + " may send"), [&] {
-    static_cast<void>(checked_ae(s.ae));
-    for (const std::string& title : s.allowed) static_cast<void>(checked_ae(title));
-  });
+  try_to(all, "title",
+         in_quotes(s.ae) + (s.allowed.empty() ? "" : "; " + std::to_string(s.allowed.size()) + " may send"), [&] {
+           static_cast<void>(checked_ae(s.ae));
+           for (const std::string& title : s.allowed) static_cast<void>(checked_ae(title));
+         });
 }
 
 void check_tls(Findings& all, const ServerSetup& s) {
@@ -233,10 +249,11 @@ void check_memory(Findings& all, const ServerSetup& s) {
     if (line.starts_with("MemAvailable:")) available_mb = std::strtod(line.c_str() + 13, nullptr) * 1.024e-3;
   }
   const double wanted_mb = s.jobs * s.memory_mb;
-  const std::string there = std::to_string(cores) + (cores == 1 ? " core, " : " cores, ") + gigabytes(total_mb / 1e3) + " of memory, " +
-                            gigabytes(available_mb / 1e3) + " of it available";
-  const std::string want =
-      "; " + std::to_string(s.jobs) + (s.jobs == 1 ? " case may take " : " cases at a time may take ") + gigabytes(wanted_mb / 1e3);
+  const std::string there = std::to_string(cores) + (cores == 1 ? " core, " : " cores, ") + gigabytes(total_mb / 1e3) +
+                            " of memory, " + gigabytes(available_mb / 1e3) + " of it available";
+  const std::string want = "; " + std::to_string(s.jobs) +
+                           (s.jobs == 1 ? " case may take " : " cases at a time may take ") +
+                           gigabytes(wanted_mb / 1e3);
   if (total_mb > 0 && wanted_mb > total_mb)
     all.push_back({"machine", FindingState::bad, there + want, "fewer --jobs, less --memory-mb, or more memory"});
   else if (total_mb > 0 && wanted_mb > available_mb)
@@ -255,9 +272,11 @@ void check_clock(Findings& all) {
   timex t{};
   const int kept = ::adjtimex(&t);
   if (now < kMadeAfter)
-    all.push_back({"clock", FindingState::bad, std::string("it says ") + text.data(), "set it: certificates and records go by it"});
+    all.push_back({"clock", FindingState::bad, std::string("it says ") + text.data(),
+                   "set it: certificates and records go by it"});
   else if (kept == TIME_ERROR || (t.status & STA_UNSYNC) != 0)
-    all.push_back({"clock", FindingState::care, std::string(text.data()) + "; nothing keeps it", "timedatectl set-ntp true (or chrony)"});
+    all.push_back({"clock", FindingState::care, std::string(text.data()) + "; nothing keeps it",
+                   "timedatectl set-ntp true (or chrony)"});
   else
     all.push_back({"clock", FindingState::good, std::string(text.data()) + ", kept", {}});
 }
@@ -308,7 +327,8 @@ bool answer_of(std::vector<std::string> words, std::string& said) {
 // False: systemd does not answer.
 bool check_unit(Findings& all, const std::string& unit) {
   std::string said;
-  if (!answer_of({"systemctl", "show", "--property=LoadState,ActiveState,UnitFileState,Result", unit}, said)) return false;
+  if (!answer_of({"systemctl", "show", "--property=LoadState,ActiveState,UnitFileState,Result", unit}, said))
+    return false;
   const auto value = [&](const std::string& key) {
     std::istringstream lines(said);
     for (std::string line; std::getline(lines, line);)
@@ -318,8 +338,8 @@ bool check_unit(Findings& all, const std::string& unit) {
   const std::string active = value("ActiveState");
   const bool starts = value("UnitFileState").starts_with("enabled");
   if (value("LoadState") != "loaded")
-    all.push_back(
-        {unit, FindingState::none, "not installed (" + value("LoadState") + ")", "it comes with the package osteo, for the prefix /usr"});
+    all.push_back({unit, FindingState::none, "not installed (" + value("LoadState") + ")",
+                   "it comes with the package osteo, for the prefix /usr"});
   else if (active == "failed")
     all.push_back({unit, FindingState::bad, "has failed: " + value("Result"), "journalctl -u " + unit});
   else if (active != "active" && active != "activating")
@@ -327,7 +347,8 @@ bool check_unit(Findings& all, const std::string& unit) {
   else if (active == "activating")
     all.push_back({unit, FindingState::care, "is being started, perhaps again and again", "journalctl -u " + unit});
   else if (!starts)
-    all.push_back({unit, FindingState::care, "runs, but not after the next start of the machine", "systemctl enable " + unit});
+    all.push_back(
+        {unit, FindingState::care, "runs, but not after the next start of the machine", "systemctl enable " + unit});
   else
     all.push_back({unit, FindingState::good, "runs", {}});
   return true;
@@ -336,14 +357,15 @@ bool check_unit(Findings& all, const std::string& unit) {
 void check_units(Findings& all) {
   for (const std::string unit : kUnits) {
     if (!in_path("systemctl") || !check_unit(all, unit)) {
-      all.push_back(
-          {"systemd", FindingState::none, "no systemd runs here", "start 'osteo receive' and 'osteo watch' by what starts services here"});
+      all.push_back({"systemd", FindingState::none, "no systemd runs here",
+                     "start 'osteo receive' and 'osteo watch' by what starts services here"});
       return;
     }
   }
   // Those that were started since the machine was, also if they have failed; that there is none is nothing to tell.
   std::string said;
-  if (!answer_of({"systemctl", "list-units", "--all", "--plain", "--no-legend", kInstances + std::string("*")}, said)) return;
+  if (!answer_of({"systemctl", "list-units", "--all", "--plain", "--no-legend", kInstances + std::string("*")}, said))
+    return;
   std::istringstream lines(said);
   for (std::string line; std::getline(lines, line);)
     if (line.starts_with(kInstances)) static_cast<void>(check_unit(all, line.substr(0, line.find(' '))));
@@ -352,11 +374,13 @@ void check_units(Findings& all) {
 void check_cluster(Findings& all) {
   // What pipelines/snakemake/profiles/slurm calls.
   std::string missing, there;
-  for (const char* const program : {"snakemake", "sbatch", "scontrol"}) (in_path(program) ? there : missing) += std::string(" ") + program;
+  for (const char* const program : {"snakemake", "sbatch", "scontrol"})
+    (in_path(program) ? there : missing) += std::string(" ") + program;
   if (there.empty())
     all.push_back({"Slurm", FindingState::none, "not here: 'osteo batch' runs cases on this machine alone", {}});
   else if (!missing.empty())
-    all.push_back({"Slurm", FindingState::none, "there is" + there + ", but not" + missing, "cases over a cluster want all three"});
+    all.push_back({"Slurm", FindingState::none, "there is" + there + ", but not" + missing,
+                   "cases over a cluster want all three"});
   else
     all.push_back({"Slurm", FindingState::good, "there are" + there, {}});
 }
@@ -405,14 +429,16 @@ std::vector<ServerFinding> check_server(const ServerSetup& s) {
   check_port(all, s);
   check_tls(all, s);
   for (const fs::path& login : s.logins)
-    try_to(all, "login", in_quotes(login) + ": only " + user() + " may read it", [&] { static_cast<void>(read_login(login)); });
+    try_to(all, "login", in_quotes(login) + ": only " + user() + " may read it",
+           [&] { static_cast<void>(read_login(login)); });
   for (const fs::path& file : s.metrics) {
     // It is replaced, never written into: what counts is its folder.
     const fs::path folder = fs::absolute(file, error).parent_path();
     if (fs::is_directory(file, error))
       all.push_back({"counters", FindingState::bad, in_quotes(file) + " is a folder", "the name of a file"});
     else if (!fs::exists(folder, error))
-      all.push_back({"counters", FindingState::bad, in_quotes(folder) + " is not there", "mkdir -p " + folder.string()});
+      all.push_back(
+          {"counters", FindingState::bad, in_quotes(folder) + " is not there", "mkdir -p " + folder.string()});
     else
       check_folder(all, "counters", folder, 0, false);
   }
@@ -421,4 +447,4 @@ std::vector<ServerFinding> check_server(const ServerSetup& s) {
   return all;
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -34,8 +34,9 @@ constexpr double kTick = 0.2;         // seconds: how long the wish to stop may 
 
 // Classes that bone is made from.
 bool is_scan(const std::string& sop_class) {
-  static const std::set<std::string> kScans{UID_CTImageStorage, UID_EnhancedCTImageStorage, UID_LegacyConvertedEnhancedCTImageStorage,
-                                            UID_MRImageStorage, UID_EnhancedMRImageStorage, UID_LegacyConvertedEnhancedMRImageStorage};
+  static const std::set<std::string> kScans{
+      UID_CTImageStorage, UID_EnhancedCTImageStorage, UID_LegacyConvertedEnhancedCTImageStorage,
+      UID_MRImageStorage, UID_EnhancedMRImageStorage, UID_LegacyConvertedEnhancedMRImageStorage};
   return kScans.contains(sop_class);
 }
 
@@ -115,7 +116,12 @@ struct Entry {
 };
 
 Json to_json(const std::string& code, const Entry& e) {
-  Json j{{"osteotome_watch_series", 1}, {"series", code}, {"state", e.state}, {"rule", e.rule}, {"run", e.run}, {"tries", e.tries}};
+  Json j{{"osteotome_watch_series", 1},
+         {"series", code},
+         {"state", e.state},
+         {"rule", e.rule},
+         {"run", e.run},
+         {"tries", e.tries}};
   j["objects"] = Json(e.objects);
   j["how"] = e.how;
   return j;
@@ -129,7 +135,8 @@ Entry entry_of(const fs::path& path) {
   e.state = file.text(file.need(root, "", "state"), "state");
   e.rule = file.text(file.need(root, "", "rule"), "rule");
   e.run = static_cast<int>(file.number(file.need(root, "", "run"), "run", 1, 1e6));
-  for (const JsonValue& o : file.list(file.need(root, "", "objects"), "objects")) e.objects.insert(file.text(o, "an object"));
+  for (const JsonValue& o : file.list(file.need(root, "", "objects"), "objects"))
+    e.objects.insert(file.text(o, "an object"));
   // What ended for memory or time is worth another try at the next start.
   if (e.state == state_name(CaseState::resources)) e.state = "begun";
   return e;
@@ -151,7 +158,8 @@ class Out {
     for (const char* part : {"cases", "records", "sources"}) make_output_folder(out / part);
     fd_ = ::open(mark.c_str(), O_RDONLY | O_CLOEXEC);
     if (fd_ < 0) throw Error(ExitCode::cannot_write, "'" + mark.string() + "': " + std::strerror(errno));
-    // Children that outlive a killed watcher hold the lock with it until they have ended, so that nothing is begun beside them.
+    // Children that outlive a killed watcher hold the lock with it until they have ended, so that nothing is begun
+    // beside them.
     const auto until = Clock::now() + std::chrono::duration<double>(kPatience);
     while (::flock(fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
       if (Clock::now() < until) {
@@ -159,7 +167,8 @@ class Out {
         continue;
       }
       ::close(fd_);
-      throw Error(ExitCode::cannot_write, "another watcher is at work in '" + out.string() + "'", "stop it, or give another folder");
+      throw Error(ExitCode::cannot_write, "another watcher is at work in '" + out.string() + "'",
+                  "stop it, or give another folder");
     }
   }
   ~Out() { ::close(fd_); }
@@ -198,7 +207,8 @@ class Watcher {
       read_new_heads();
       if (due) waiting = begin_ready();
       due = false;
-      if (o_.once && !waiting && !due && children_.running() == 0 && unread_ == 0 && looked != Clock::time_point{} && (!o_.feed || fed_))
+      if (o_.once && !waiting && !due && children_.running() == 0 && unread_ == 0 && looked != Clock::time_point{} &&
+          (!o_.feed || fed_))
         break;
       if (children_.running() == 0) {
         std::this_thread::sleep_for(std::chrono::duration<double>(kTick));
@@ -232,7 +242,8 @@ class Watcher {
       context_.warn(end.err.substr(at, to - at));
     feed_failed_ = end.exit_code != 0;
     if (end.exit_code < 0)
-      context_.warn(end.over_time || end.over_memory ? "fetching took more time or memory than it may" : "fetching ended by force");
+      context_.warn(end.over_time || end.over_memory ? "fetching took more time or memory than it may"
+                                                     : "fetching ended by force");
     feed_wait_ = feed_failed_ ? std::min(kLongestWait, 2 * feed_wait_) : o_.poll_s;
     feed_at_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(feed_wait_));
   }
@@ -244,9 +255,10 @@ class Watcher {
     std::set<fs::path> seen;
     std::error_code ec;
     const auto skip = fs::directory_options::skip_permission_denied;
-    if (!fs::is_directory(o_.folder, ec)) throw Error(ExitCode::no_input, "the folder that is watched is not there", "mount it again");
-    for (auto it = fs::recursive_directory_iterator(o_.folder, skip, ec); !ec && it != fs::recursive_directory_iterator();
-         it.increment(ec)) {
+    if (!fs::is_directory(o_.folder, ec))
+      throw Error(ExitCode::no_input, "the folder that is watched is not there", "mount it again");
+    for (auto it = fs::recursive_directory_iterator(o_.folder, skip, ec);
+         !ec && it != fs::recursive_directory_iterator(); it.increment(ec)) {
       if (it->path().filename().string().starts_with('.')) {  // half of something, by custom
         if (it->is_directory(ec)) it.disable_recursion_pending();
         continue;
@@ -262,7 +274,8 @@ class Watcher {
     }
     // A folder that could not be read to its end tells nothing of what is gone.
     if (ec && o_.once)
-      throw Error(ExitCode::cannot_read, "the folder that is watched could not be read whole: " + ec.message(), "try again");
+      throw Error(ExitCode::cannot_read, "the folder that is watched could not be read whole: " + ec.message(),
+                  "try again");
     if (ec) context_.warn("the folder that is watched could not be read whole: " + ec.message());
     if (!ec) std::erase_if(files_, [&](const auto& f) { return !seen.contains(f.first); });
     count_unread();
@@ -286,7 +299,8 @@ class Watcher {
 
   void take_heads(const ChildEnd& end) {
     std::size_t n = 0;
-    for (std::size_t at = 0, to = 0; n < reading_.size() && (to = end.out.find('\n', at)) != std::string::npos; ++n, at = to + 1)
+    for (std::size_t at = 0, to = 0; n < reading_.size() && (to = end.out.find('\n', at)) != std::string::npos;
+         ++n, at = to + 1)
       take(n, head_of(end.out.substr(at, to - at)));
     // It ended before its time: at the first file that it has not told of. The others are read by the next.
     if (n < reading_.size() && !context_.cancelled()) {
@@ -368,24 +382,32 @@ class Watcher {
     std::error_code ec;
     const auto space = fs::space(o_.out, ec);
     const bool room = ec || static_cast<double>(space.available) / 1e6 >= o_.keep_free_mb;
-    if (!room && o_.once) throw Error(ExitCode::resources, "the disk of the cases is full", "make room, or lower --keep-free-mb");
+    if (!room && o_.once)
+      throw Error(ExitCode::resources, "the disk of the cases is full", "make room, or lower --keep-free-mb");
     if (!room && !told_full_) context_.warn("the disk of the cases is full: nothing is begun until there is room");
     told_full_ = !room;
     return room;
   }
 
-  static std::string name_of(const std::string& code, int run) { return run == 1 ? code : code + "-" + std::to_string(run); }
-  [[nodiscard]] fs::path case_of(const std::string& code, int run) const { return o_.out / "cases" / name_of(code, run); }
-  [[nodiscard]] fs::path record_of_series(const std::string& code) const { return o_.out / "records" / (code + ".json"); }
+  static std::string name_of(const std::string& code, int run) {
+    return run == 1 ? code : code + "-" + std::to_string(run);
+  }
+  [[nodiscard]] fs::path case_of(const std::string& code, int run) const {
+    return o_.out / "cases" / name_of(code, run);
+  }
+  [[nodiscard]] fs::path record_of_series(const std::string& code) const {
+    return o_.out / "records" / (code + ".json");
+  }
 
   // A folder with the files of this series and of no other.
   [[nodiscard]] fs::path source_of(const std::string& name, const std::string& code, const Group& g) const {
     const fs::path parent = g.files.front().parent_path();
     const std::string below = parent.string() + "/";
-    const bool alone = std::ranges::all_of(g.files, [&](const fs::path& f) { return f.parent_path() == parent; }) &&
-                       std::ranges::all_of(files_, [&](const auto& f) {
-                         return f.second.head.series.empty() || f.second.head.series == code || !f.first.string().starts_with(below);
-                       });
+    const bool alone =
+        std::ranges::all_of(g.files, [&](const fs::path& f) { return f.parent_path() == parent; }) &&
+        std::ranges::all_of(files_, [&](const auto& f) {
+          return f.second.head.series.empty() || f.second.head.series == code || !f.first.string().starts_with(below);
+        });
     if (alone) return parent;
     const fs::path folder = o_.out / "sources" / name;
     fs::remove_all(folder);
@@ -414,11 +436,13 @@ class Watcher {
     e.objects = g.objects;
     const fs::path folder = case_of(code, e.run), source = source_of(name_of(code, e.run), code, g);
     journal_[code] = e;
-    write_file(record_of_series(code), to_json(code, e).dump(2) + "\n");  // before the child: whoever comes next must know
+    write_file(record_of_series(code),
+               to_json(code, e).dump(2) + "\n");  // before the child: whoever comes next must know
     const std::size_t id = ++last_id_;
     running_[id] = {code, source};
     children_.start(
-        id, [this, &rule, source, folder] { return work_(rule, source, folder); }, ChildLimits{o_.memory_mb, o_.seconds});
+        id, [this, &rule, source, folder] { return work_(rule, source, folder); },
+        ChildLimits{o_.memory_mb, o_.seconds});
     tell({code, "begun", rule.name, "", folder, g.objects.size()});
   }
 
@@ -479,12 +503,15 @@ class Watcher {
 void check_watch_folders(const fs::path& folder, const fs::path& out) {
   const std::string a = fs::weakly_canonical(folder).string() + "/", b = fs::weakly_canonical(out).string() + "/";
   if (b.starts_with(a) || a.starts_with(b))
-    throw Error(ExitCode::usage, "cases may not lie in the folder that is watched, nor it among them", "give --out another folder");
+    throw Error(ExitCode::usage, "cases may not lie in the folder that is watched, nor it among them",
+                "give --out another folder");
 }
 
 WatchCounters watch_folder(const std::vector<SeriesRule>& rules, const WatchOptions& options, const WatchWork& work,
-                           const std::function<void(const WatchEvent&, const WatchCounters&)>& tell, const Context& context) {
-  if (!fs::is_directory(options.folder)) throw Error(ExitCode::no_input, "'" + options.folder.string() + "' is no folder to watch");
+                           const std::function<void(const WatchEvent&, const WatchCounters&)>& tell,
+                           const Context& context) {
+  if (!fs::is_directory(options.folder))
+    throw Error(ExitCode::no_input, "'" + options.folder.string() + "' is no folder to watch");
   check_watch_folders(options.folder, options.out);
   try {
     return Watcher(rules, options, work, tell, context).run();
@@ -497,7 +524,8 @@ std::string metrics_text(const WatchCounters& c) {
   std::string text;
   const auto row = [&](const char* name, const char* kind, const char* help, std::size_t value) {
     const std::string full = std::string("osteotome_watch_") + name;
-    text += "# HELP " + full + " " + help + "\n# TYPE " + full + " " + kind + "\n" + full + " " + std::to_string(value) + "\n";
+    text += "# HELP " + full + " " + help + "\n# TYPE " + full + " " + kind + "\n" + full + " " +
+            std::to_string(value) + "\n";
   };
   row("series", "gauge", "series in the folder", c.series);
   row("done_total", "counter", "cases made", c.done);
@@ -507,4 +535,4 @@ std::string metrics_text(const WatchCounters& c) {
   return text;
 }
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -5,9 +5,9 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
-#include "osteo/imaging/dicom/volume.h"
 #include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/geometry/grid/vdb.h"
+#include "osteo/imaging/dicom/volume.h"
 
 namespace osteo::inline imaging {
 namespace {
@@ -43,7 +43,8 @@ class BoneBuilder {
     fill(from, to, have);
     for (int l = from; l < to; ++l) insert(base + l, l);
     held_ = std::min(2, have);
-    std::copy_n(hu_.data() + area * static_cast<std::size_t>(have - held_), area * static_cast<std::size_t>(held_), hu_.data());
+    std::copy_n(hu_.data() + area * static_cast<std::size_t>(have - held_), area * static_cast<std::size_t>(held_),
+                hu_.data());
   }
 
   // Small pieces go; returns the number of pieces found and kept.
@@ -62,7 +63,8 @@ class BoneBuilder {
       }
     }
     density_grid->tree().prune();
-    return {static_cast<std::int64_t>(drop.size()), static_cast<std::int64_t>(std::count(drop.begin(), drop.end(), false))};
+    return {static_cast<std::int64_t>(drop.size()),
+            static_cast<std::int64_t>(std::count(drop.begin(), drop.end(), false))};
   }
 
   openvdb::FloatGrid::Ptr density_grid, hu_grid, valid_grid;
@@ -90,7 +92,8 @@ class BoneBuilder {
           for (std::size_t y = by; y < ey; ++y) {
             for (std::size_t x = bx; x < ex; ++x) {
               if (slab[(z * ny_ + y) * nx_ + x] == DicomSlabs::kNoValue) continue;
-              leaf->setValueOn(openvdb::Coord(static_cast<int>(x), static_cast<int>(y), first + static_cast<int>(z)), 1.0F);
+              leaf->setValueOn(openvdb::Coord(static_cast<int>(x), static_cast<int>(y), first + static_cast<int>(z)),
+                               1.0F);
             }
           }
         }
@@ -108,7 +111,8 @@ class BoneBuilder {
         const std::size_t l = static_cast<std::size_t>(from) + r / ny_, y = r % ny_;
         const auto row = [&](std::size_t layer, std::size_t line) { return hu_.data() + (layer * ny_ + line) * nx_; };
         const std::int16_t* const p = row(l, y);
-        const std::int16_t* const near[4] = {row(l, y > 0 ? y - 1 : y), row(l, y + 1 < ny_ ? y + 1 : y), row(l > 0 ? l - 1 : l, y),
+        const std::int16_t* const near[4] = {row(l, y > 0 ? y - 1 : y), row(l, y + 1 < ny_ ? y + 1 : y),
+                                             row(l > 0 ? l - 1 : l, y),
                                              row(l + 1 < static_cast<std::size_t>(have) ? l + 1 : l, y)};
         float* const out = density_.data() + r * nx_;
         for (std::size_t x = 0; x < nx_; ++x) {
@@ -120,7 +124,8 @@ class BoneBuilder {
             return 0.5F * (std::max(-1024.0F, static_cast<float>(b)) - std::max(-1024.0F, static_cast<float>(a)));
           };
           const float gx = slope(left, right), gy = slope(near[0][x], near[1][x]), gz = slope(near[2][x], near[3][x]);
-          const float ramp = 0.5F * (std::sqrt(gx * gx + gy * gy + gz * gz) + std::abs(gx) + std::abs(gy) + std::abs(gz));
+          const float ramp =
+              0.5F * (std::sqrt(gx * gx + gy * gy + gz * gz) + std::abs(gx) + std::abs(gy) + std::abs(gz));
           out[x] = std::clamp(0.5F + (static_cast<float>(p[x]) - lower) / std::max(ramp, 1.0F), 0.0F, 1.0F);
         }
       }
@@ -172,11 +177,14 @@ ImportedBone import_bone(const fs::path& source, const ImportBoneParams& p, cons
   ImportedBone result;
   DicomSlabs slabs(series, options, p.spacing_mm);
   const auto refuse = [&](const std::string& what) {
-    return Error(ExitCode::resources, "voxels of " + format_number(p.spacing_mm) + " mm make " + what, "choose a larger --spacing-mm");
+    return Error(ExitCode::resources, "voxels of " + format_number(p.spacing_mm) + " mm make " + what,
+                 "choose a larger --spacing-mm");
   };
   std::array<std::uint64_t, 3> cells{};
-  for (std::size_t a = 0; a < 3; ++a) cells[a] = static_cast<std::uint64_t>(slabs.frame().dims[a]) / BrickGrid::kEdge + 1;
-  if (too_wide_for_bricks(cells)) throw refuse("a grid of more than " + std::to_string(BrickGrid::kMostCells) + " bricks of 8^3");
+  for (std::size_t a = 0; a < 3; ++a)
+    cells[a] = static_cast<std::uint64_t>(slabs.frame().dims[a]) / BrickGrid::kEdge + 1;
+  if (too_wide_for_bricks(cells))
+    throw refuse("a grid of more than " + std::to_string(BrickGrid::kMostCells) + " bricks of 8^3");
   slabs.run(kLayers, context.sub(0.1, 0.95), [&](int first, int layers, const std::int16_t* slab) {
     if (first == 0) builder.begin(slabs.frame());
     builder.take(first, layers, slab);
@@ -205,4 +213,4 @@ ImportedBone import_bone(const fs::path& source, const ImportBoneParams& p, cons
   return result;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -39,13 +39,16 @@ std::string valid_uid(const std::string& uid) {
 }
 
 void load_identity(const DicomSeries& source, DcmFileFormat& file, const Context& context) {
-  const auto first = std::find_if(source.headers.begin(), source.headers.end(), [](const auto& h) { return h.usable(); });
+  const auto first =
+      std::find_if(source.headers.begin(), source.headers.end(), [](const auto& h) { return h.usable(); });
   if (first == source.headers.end() || file.loadFile(first->file.c_str(), EXS_Unknown, EGL_noChange, 64).bad())
     throw Error(ExitCode::corrupt, "the source series holds no slice that can be read");
   DcmDataset& d = *file.getDataset();
   delete d.remove(DCM_PixelData);
   std::string names;
-  const auto told = [&](const DcmElement& e) { names += (names.empty() ? "" : ", ") + std::string(DcmTag(e.getTag()).getTagName()); };
+  const auto told = [&](const DcmElement& e) {
+    names += (names.empty() ? "" : ", ") + std::string(DcmTag(e.getTag()).getTagName());
+  };
   for (unsigned long i = 0; i < d.card(); ++i) {
     DcmElement* const e = d.getElement(i);
     if (!e->isLeaf() || e->getGTag() > 0x0020) continue;
@@ -77,4 +80,4 @@ std::string decimal(double value) {
   return text;
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

@@ -23,12 +23,12 @@ void require(const OFCondition& condition, const fs::path& path);
 /// The UID, or where it is none, a valid one made from it.
 [[nodiscard]] std::string valid_uid(const std::string& uid);
 
-/// What an object takes over from its source: the first usable slice without its pixels, and without values that DICOM does not allow (an
-/// invalid UID is replaced by valid_uid, any other such value is emptied). Their names are told as a warning. Error(corrupt) when there is
-/// no slice that can be read.
+/// What an object takes over from its source: the first usable slice without its pixels, and without values that DICOM
+/// does not allow (an invalid UID is replaced by valid_uid, any other such value is emptied). Their names are told as a
+/// warning. Error(corrupt) when there is no slice that can be read.
 void load_identity(const DicomSeries& source, DcmFileFormat& file, const Context& context);
 
 /// At most 16 characters, as DS asks.
 [[nodiscard]] std::string decimal(double value);
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

@@ -30,7 +30,8 @@ struct Shape {
   unsigned width = 0, height = 0, components = 0, precision = 0;
 };
 
-// What the codestream itself says: SOF of JPEG and JPEG-LS (ISO 10918-1 B.2.2, 14495-1), SIZ of JPEG 2000 (15444-1 A.5.1).
+// What the codestream itself says: SOF of JPEG and JPEG-LS (ISO 10918-1 B.2.2, 14495-1), SIZ of JPEG 2000 (15444-1
+// A.5.1).
 Shape shape_of(std::span<const char> bytes, bool jpeg2000) {
   const std::size_t n = bytes.size();
   const char* const p = bytes.data();
@@ -39,11 +40,13 @@ Shape shape_of(std::span<const char> bytes, bool jpeg2000) {
     for (std::size_t at = 0; at + 42 < n && at < 4096; ++at) {
       if (u32(p + at) != 0xFF4FFF51U) continue;
       const char* const siz = p + at + 8;  // after SOC, SIZ, length
-      return {u32(siz) - u32(siz + 8), u32(siz + 4) - u32(siz + 12), u16(siz + 32), (static_cast<unsigned char>(siz[34]) & 127U) + 1};
+      return {u32(siz) - u32(siz + 8), u32(siz + 4) - u32(siz + 12), u16(siz + 32),
+              (static_cast<unsigned char>(siz[34]) & 127U) + 1};
     }
     return {};
   }
-  // Markers up to the scan must follow each other without a gap: GDCM's decoders abort on some pictures that libjpeg patches up.
+  // Markers up to the scan must follow each other without a gap: GDCM's decoders abort on some pictures that libjpeg
+  // patches up.
   Shape shape;
   bool tables = false;
   std::size_t at = 2;
@@ -55,9 +58,12 @@ Shape shape_of(std::span<const char> bytes, bool jpeg2000) {
       continue;
     }
     const bool jpeg_ls = marker == 0xF7;
-    const bool frame = (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC) || jpeg_ls;
+    const bool frame =
+        (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC) || jpeg_ls;
     if (frame && shape.width > 0) return {};
-    if (frame) shape = {u16(p + at + 7), u16(p + at + 5), static_cast<unsigned char>(p[at + 9]), static_cast<unsigned char>(p[at + 4])};
+    if (frame)
+      shape = {u16(p + at + 7), u16(p + at + 5), static_cast<unsigned char>(p[at + 9]),
+               static_cast<unsigned char>(p[at + 4])};
     tables = tables || jpeg_ls || marker == 0xC4;
     if (marker == 0xDA) return tables && p[at + 4] == 1 ? shape : Shape{};
     if (marker == 0xD9) return {};
@@ -83,12 +89,13 @@ bool decode_with_gdcm(const DicomHeader& h, std::span<const char> in, F&& take) 
   }();
   static_cast<void>(quiet);
   const std::string& ts = h.transfer_syntax;
-  const bool jpeg2000 = ts.ends_with(".4.90") || ts.ends_with(".4.91"), jpeg_ls = ts.ends_with(".4.80") || ts.ends_with(".4.81");
+  const bool jpeg2000 = ts.ends_with(".4.90") || ts.ends_with(".4.91"),
+             jpeg_ls = ts.ends_with(".4.80") || ts.ends_with(".4.81");
   const Shape shape = shape_of(in, jpeg2000);
-  if (shape.width != static_cast<unsigned>(h.columns) || shape.height != static_cast<unsigned>(h.rows) || shape.components != 1 ||
-      shape.precision < (h.bits_allocated == 1 ? 1U : 2U) || shape.precision > 16) {
-    throw PixelError("its compressed pixels are damaged: they are no " + std::to_string(h.columns) + "x" + std::to_string(h.rows) +
-                     " grey picture");
+  if (shape.width != static_cast<unsigned>(h.columns) || shape.height != static_cast<unsigned>(h.rows) ||
+      shape.components != 1 || shape.precision < (h.bits_allocated == 1 ? 1U : 2U) || shape.precision > 16) {
+    throw PixelError("its compressed pixels are damaged: they are no " + std::to_string(h.columns) + "x" +
+                     std::to_string(h.rows) + " grey picture");
   }
   const unsigned short stored = static_cast<unsigned short>(shape.precision);
   // GDCM chooses its JPEG decoder (8, 12 or 16 bits) by this.
@@ -96,8 +103,8 @@ bool decode_with_gdcm(const DicomHeader& h, std::span<const char> in, F&& take) 
                                                                : stored <= 8       ? 8
                                                                : stored <= 12      ? 12
                                                                                    : 16);
-  const gdcm::PixelFormat format(1, allocated, std::min(stored, allocated), static_cast<unsigned short>(std::min(stored, allocated) - 1),
-                                 h.is_signed ? 1 : 0);
+  const gdcm::PixelFormat format(1, allocated, std::min(stored, allocated),
+                                 static_cast<unsigned short>(std::min(stored, allocated) - 1), h.is_signed ? 1 : 0);
   const auto run = [&](auto& codec) {
     const unsigned dims[3] = {static_cast<unsigned>(h.columns), static_cast<unsigned>(h.rows), 1};
     codec.SetNumberOfDimensions(2);
@@ -126,7 +133,8 @@ bool decode_with_gdcm(const DicomHeader& h, std::span<const char> in, F&& take) 
     }
     if (jpeg_ls) {
       gdcm::JPEGLSCodec codec;
-      codec.SetBufferLength(static_cast<unsigned long>(h.pixels_per_frame() * static_cast<std::size_t>(std::max(8, h.bits_allocated) / 8)));
+      codec.SetBufferLength(static_cast<unsigned long>(h.pixels_per_frame() *
+                                                       static_cast<std::size_t>(std::max(8, h.bits_allocated) / 8)));
       return run(codec);
     }
     gdcm::JPEGCodec codec;
@@ -159,7 +167,8 @@ bool supported(const std::string& ts) {
 
 // Items of a stated length, one after the other (PS3.5 A.4): a table of offsets, then the fragments.
 CompressedFrames::CompressedFrames(const DicomHeader& h) : header_(h) {
-  if (!supported(h.transfer_syntax)) throw PixelError("its pixels are encoded by " + h.transfer_syntax + ", which is not supported");
+  if (!supported(h.transfer_syntax))
+    throw PixelError("its pixels are encoded by " + h.transfer_syntax + ", which is not supported");
   if (h.pixel_offset >= h.file_bytes) throw PixelError("its compressed pixels are missing");
   bytes_.resize(static_cast<std::size_t>(h.file_bytes - h.pixel_offset));
   read_bytes(h, h.pixel_offset, bytes_.data(), bytes_.size());
@@ -204,17 +213,21 @@ CompressedFrames::CompressedFrames(const DicomHeader& h) : header_(h) {
     }
   }
   if (first_.size() != frames) {
-    throw PixelError("it should hold " + std::to_string(frames) + " pictures, but " + std::to_string(first_.size()) + " were found");
+    throw PixelError("it should hold " + std::to_string(frames) + " pictures, but " + std::to_string(first_.size()) +
+                     " were found");
   }
   first_.push_back(items_.size());
 }
 
 std::span<const char> CompressedFrames::bytes_of(int frame, std::vector<char>& joined) const {
   const auto f = static_cast<std::size_t>(frame);
-  const auto piece = [&](std::size_t i) { return std::span(bytes_.data() + items_[i].first, static_cast<std::size_t>(items_[i].second)); };
+  const auto piece = [&](std::size_t i) {
+    return std::span(bytes_.data() + items_[i].first, static_cast<std::size_t>(items_[i].second));
+  };
   std::span<const char> all = piece(first_[f]);
   if (first_[f + 1] > first_[f] + 1) {
-    for (std::size_t i = first_[f]; i < first_[f + 1]; ++i) joined.insert(joined.end(), piece(i).begin(), piece(i).end());
+    for (std::size_t i = first_[f]; i < first_[f + 1]; ++i)
+      joined.insert(joined.end(), piece(i).begin(), piece(i).end());
     all = joined;
   }
   if (all.size() < 8) throw PixelError("its compressed pixels are cut short");
@@ -269,4 +282,4 @@ std::vector<std::uint16_t> CompressedFrames::decode(int frame) const {
   return values;
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

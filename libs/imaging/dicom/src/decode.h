@@ -1,7 +1,8 @@
 // Compressed pictures to stored values. Private to libs/imaging/dicom.
 //
-// The fragments are taken out of the file here, with every length checked against the file, and each codec is handed one picture
-// whose stated size is that of the header: the codecs' own readers ask for memory by whatever a damaged file says, or abort.
+// The fragments are taken out of the file here, with every length checked against the file, and each codec is handed
+// one picture whose stated size is that of the header: the codecs' own readers ask for memory by whatever a damaged
+// file says, or abort.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -28,4 +29,4 @@ class CompressedFrames {
   std::vector<std::size_t> first_;                              // first fragment of each frame, and one past the last
 };
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

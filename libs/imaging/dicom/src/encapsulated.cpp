@@ -16,7 +16,8 @@ void put(DcmItem& d, const DcmTagKey& tag, const std::string& value, const fs::p
   dicom::require(d.putAndInsertString(DcmTag(tag), value.c_str()), path);
 }
 
-void put_code(DcmItem& d, const DcmTagKey& sequence, const char* value, const char* scheme, const char* meaning, const fs::path& path) {
+void put_code(DcmItem& d, const DcmTagKey& sequence, const char* value, const char* scheme, const char* meaning,
+              const fs::path& path) {
   DcmItem* item = nullptr;
   dicom::require(d.findOrCreateSequenceItem(sequence, item, 0), path);
   put(*item, DCM_CodeValue, value, path);
@@ -29,15 +30,27 @@ bool of_space(const DcmTagKey& tag) {
 }
 
 // Patient and study are the source's, or nobody's. A document lies in no space: it has no frame of reference.
-void put_identity(DcmDataset& d, const DicomObjectOptions& o, const std::string& content, bool in_space, const fs::path& path,
-                  const Context& context) {
-  static const DcmTagKey kTaken[] = {
-      DCM_SpecificCharacterSet,  DCM_PatientName,      DCM_PatientID,           DCM_PatientBirthDate,           DCM_PatientSex,
-      DCM_StudyInstanceUID,      DCM_StudyDate,        DCM_StudyTime,           DCM_ReferringPhysicianName,     DCM_StudyID,
-      DCM_AccessionNumber,       DCM_StudyDescription, DCM_FrameOfReferenceUID, DCM_PositionReferenceIndicator, DCM_PatientIdentityRemoved,
-      DCM_DeidentificationMethod};
-  for (const auto& tag : {DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyDate, DCM_StudyTime, DCM_ReferringPhysicianName, DCM_StudyID,
-                          DCM_AccessionNumber, DCM_PositionReferenceIndicator}) {
+void put_identity(DcmDataset& d, const DicomObjectOptions& o, const std::string& content, bool in_space,
+                  const fs::path& path, const Context& context) {
+  static const DcmTagKey kTaken[] = {DCM_SpecificCharacterSet,
+                                     DCM_PatientName,
+                                     DCM_PatientID,
+                                     DCM_PatientBirthDate,
+                                     DCM_PatientSex,
+                                     DCM_StudyInstanceUID,
+                                     DCM_StudyDate,
+                                     DCM_StudyTime,
+                                     DCM_ReferringPhysicianName,
+                                     DCM_StudyID,
+                                     DCM_AccessionNumber,
+                                     DCM_StudyDescription,
+                                     DCM_FrameOfReferenceUID,
+                                     DCM_PositionReferenceIndicator,
+                                     DCM_PatientIdentityRemoved,
+                                     DCM_DeidentificationMethod};
+  for (const auto& tag :
+       {DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyDate, DCM_StudyTime, DCM_ReferringPhysicianName, DCM_StudyID,
+        DCM_AccessionNumber, DCM_PositionReferenceIndicator}) {
     if (in_space || !of_space(tag)) dicom::require(d.insertEmptyElement(DcmTag(tag)), path);
   }
   if (o.source == nullptr) {
@@ -54,7 +67,8 @@ void put_identity(DcmDataset& d, const DicomObjectOptions& o, const std::string&
   for (const auto& tag : kTaken) {
     OFString value;
     if (!in_space && of_space(tag)) continue;
-    if (source.getDataset()->findAndGetOFStringArray(tag, value).good() && !value.empty()) put(d, tag, value.c_str(), path);
+    if (source.getDataset()->findAndGetOFStringArray(tag, value).good() && !value.empty())
+      put(d, tag, value.c_str(), path);
   }
   DcmItem *item = nullptr, *series = nullptr;
   if (in_space) {  // Common Instance Reference, which the standard gives to models and not to documents
@@ -115,21 +129,25 @@ void save_document(DcmFileFormat& file, std::string bytes, const fs::path& path)
   dicom::require(d.putAndInsertUint8Array(DCM_EncapsulatedDocument, reinterpret_cast<const Uint8*>(bytes.data()),
                                           static_cast<unsigned long>(bytes.size())),
                  path);
-  write_atomically(path,
-                   [&](const fs::path& temporary) { dicom::require(file.saveFile(temporary.c_str(), EXS_LittleEndianExplicit), path); });
+  write_atomically(path, [&](const fs::path& temporary) {
+    dicom::require(file.saveFile(temporary.c_str(), EXS_LittleEndianExplicit), path);
+  });
 }
 
 }  // namespace
 
-void save_encapsulated_stl(const TriMesh& mesh, const fs::path& path, const DicomObjectOptions& options, const Context& context) {
-  if (mesh.triangles.empty()) throw Error(ExitCode::usage, "the surface is empty: there is nothing to write to '" + path.string() + "'");
+void save_encapsulated_stl(const TriMesh& mesh, const fs::path& path, const DicomObjectOptions& options,
+                           const Context& context) {
+  if (mesh.triangles.empty())
+    throw Error(ExitCode::usage, "the surface is empty: there is nothing to write to '" + path.string() + "'");
   dicom::quiet_dcmtk();
   std::string stl = stl_text(mesh);
   const std::string content = hash_text(stl);
   DcmFileFormat file;
   DcmDataset& d = *file.getDataset();
   put_identity(d, options, content, true, path, context);
-  put_document(d, {UID_EncapsulatedSTLStorage, "M3D", "9002", "model/stl", content}, options, options.description, path);
+  put_document(d, {UID_EncapsulatedSTLStorage, "M3D", "9002", "model/stl", content}, options, options.description,
+               path);
   put_code(d, DCM_ConceptNameCodeSequence, "85040-4", "LN", "3D Model", path);
   put_code(d, DCM_MeasurementUnitsCodeSequence, "mm", "UCUM", "mm", path);
   put(d, DCM_ModelModification, "NO", path);
@@ -138,17 +156,20 @@ void save_encapsulated_stl(const TriMesh& mesh, const fs::path& path, const Dico
   save_document(file, std::move(stl), path);
 }
 
-void save_encapsulated_pdf(std::string_view pdf, const std::string& title, const fs::path& path, const DicomObjectOptions& options,
-                           const Context& context) {
-  if (!pdf.starts_with("%PDF-")) throw Error(ExitCode::usage, "that is no PDF: there is nothing to write to '" + path.string() + "'");
+void save_encapsulated_pdf(std::string_view pdf, const std::string& title, const fs::path& path,
+                           const DicomObjectOptions& options, const Context& context) {
+  if (!pdf.starts_with("%PDF-"))
+    throw Error(ExitCode::usage, "that is no PDF: there is nothing to write to '" + path.string() + "'");
   if (pdf.size() > 0xFFFFFFFEU - 1)
-    throw Error(ExitCode::usage, "a PDF of more than 4 GB does not fit a DICOM object: '" + path.string() + "' is not written");
+    throw Error(ExitCode::usage,
+                "a PDF of more than 4 GB does not fit a DICOM object: '" + path.string() + "' is not written");
   dicom::quiet_dcmtk();
   DcmFileFormat file;
   DcmDataset& d = *file.getDataset();
   std::string content = hash_text(pdf);
   put_identity(d, options, content, false, path, context);
-  // The pages name nobody, so they can be the same in two studies, as after a scan was made anonymous: the objects are not.
+  // The pages name nobody, so they can be the same in two studies, as after a scan was made anonymous: the objects are
+  // not.
   OFString study;
   dicom::require(d.findAndGetOFString(DCM_StudyInstanceUID, study), path);
   content += study.c_str();
@@ -160,4 +181,4 @@ void save_encapsulated_pdf(std::string_view pdf, const std::string& title, const
   save_document(file, std::string(pdf), path);
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -37,7 +37,8 @@ std::string text_of(vtkDICOMMetaData* meta, vtkDICOMTag tag) {
   return trimmed(meta->Get(tag).AsString());
 }
 
-// Values of these name a person, a visit or a place. They are looked for in whatever could leave the program, and removed.
+// Values of these name a person, a visit or a place. They are looked for in whatever could leave the program, and
+// removed.
 constexpr std::array kIdentifying{DC::PatientName,
                                   DC::PatientID,
                                   DC::OtherPatientIDs,
@@ -135,7 +136,8 @@ DicomFrame read_frame(vtkDICOMMetaData* meta, int frame) {
   f.has_orientation = read_vec(iop, 0, f.along_row) && read_vec(iop, 3, f.along_column);
   if (f.has_orientation) {
     const double lu = length(f.along_row), lv = length(f.along_column);
-    f.has_orientation = std::abs(lu - 1) < 0.01 && std::abs(lv - 1) < 0.01 && std::abs(dot(f.along_row, f.along_column)) < 0.01;
+    f.has_orientation =
+        std::abs(lu - 1) < 0.01 && std::abs(lv - 1) < 0.01 && std::abs(dot(f.along_row, f.along_column)) < 0.01;
     if (f.has_orientation) {
       f.along_row = normalized(f.along_row);
       f.along_column = normalized(f.along_column - f.along_row * dot(f.along_row, f.along_column));
@@ -146,7 +148,8 @@ DicomFrame read_frame(vtkDICOMMetaData* meta, int frame) {
     f.column_spacing_mm = s.GetDouble(1);
   }
   if (const vtkDICOMValue& s = get(DC::RescaleSlope); s.IsValid() && s.GetNumberOfValues() > 0) f.slope = s.AsDouble();
-  if (const vtkDICOMValue& s = get(DC::RescaleIntercept); s.IsValid() && s.GetNumberOfValues() > 0) f.intercept = s.AsDouble();
+  if (const vtkDICOMValue& s = get(DC::RescaleIntercept); s.IsValid() && s.GetNumberOfValues() > 0)
+    f.intercept = s.AsDouble();
   f.rescale_type = trimmed(get(DC::RescaleType).AsString());
   return f;
 }
@@ -190,8 +193,10 @@ void judge(DicomHeader& h, bool has_pixels) {
   }
   if (h.columns <= 0 || h.rows <= 0 || h.columns > 65535 || h.rows > 65535)
     return set_problem(h, code::pixels_damaged, "it states no size");
-  if (h.float_pixels) return set_problem(h, code::no_pixels, "its pixels are no whole numbers (Float Pixel Data), which are not read");
-  if (h.palette) return set_problem(h, code::colour, "a picture in the colours of a palette: its numbers are places in a table");
+  if (h.float_pixels)
+    return set_problem(h, code::no_pixels, "its pixels are no whole numbers (Float Pixel Data), which are not read");
+  if (h.palette)
+    return set_problem(h, code::colour, "a picture in the colours of a palette: its numbers are places in a table");
   if (h.value_table)
     return set_problem(h, code::slope_invalid,
                        "its values go through a table (Modality LUT) and not a slope; Hounsfield units cannot be had");
@@ -199,19 +204,24 @@ void judge(DicomHeader& h, bool has_pixels) {
   if (h.bits_allocated != 8 && h.bits_allocated != 16 && h.bits_allocated != 32) {
     return set_problem(h, code::pixels_damaged, std::to_string(h.bits_allocated) + " bits a pixel are not supported");
   }
-  if (h.image_type.find("LOCALIZER") != std::string::npos) return set_problem(h, code::localizer, "a localizer, not a slice");
+  if (h.image_type.find("LOCALIZER") != std::string::npos)
+    return set_problem(h, code::localizer, "a localizer, not a slice");
   // A slice image whose SOP class says screen shot: its numbers are for the eye.
-  if (h.sop_class.starts_with("1.2.840.10008.5.1.4.1.1.7")) return set_problem(h, code::not_an_image, "a secondary capture, not a scan");
+  if (h.sop_class.starts_with("1.2.840.10008.5.1.4.1.1.7"))
+    return set_problem(h, code::not_an_image, "a secondary capture, not a scan");
   const std::uint64_t wanted = h.bytes_per_frame() * h.frames.size();
   if (!h.compressed && h.pixel_offset + wanted > h.file_bytes) {
-    return set_problem(h, code::pixels_damaged,
-                       "the file is cut short: " + std::to_string(h.file_bytes > h.pixel_offset ? h.file_bytes - h.pixel_offset : 0) +
-                           " of " + std::to_string(wanted) + " bytes of pixels are there");
+    return set_problem(
+        h, code::pixels_damaged,
+        "the file is cut short: " + std::to_string(h.file_bytes > h.pixel_offset ? h.file_bytes - h.pixel_offset : 0) +
+            " of " + std::to_string(wanted) + " bytes of pixels are there");
   }
   for (const DicomFrame& f : h.frames) {
     if (!f.has_position) return set_problem(h, code::position_missing, "it states no position (ImagePositionPatient)");
-    if (!f.has_orientation) return set_problem(h, code::orientation_missing, "it states no valid orientation (ImageOrientationPatient)");
-    if (!(f.column_spacing_mm > 0) || !(f.row_spacing_mm > 0) || !std::isfinite(f.column_spacing_mm + f.row_spacing_mm)) {
+    if (!f.has_orientation)
+      return set_problem(h, code::orientation_missing, "it states no valid orientation (ImageOrientationPatient)");
+    if (!(f.column_spacing_mm > 0) || !(f.row_spacing_mm > 0) ||
+        !std::isfinite(f.column_spacing_mm + f.row_spacing_mm)) {
       return set_problem(h, code::spacing_missing, "it states no pixel spacing");
     }
     if (!(f.slope > 0) || !std::isfinite(f.slope) || !std::isfinite(f.intercept)) {
@@ -228,7 +238,8 @@ bool parse(const fs::path& file, DicomHeader& h) {
   parser->SetFileName(file.c_str());
   parser->Update();
   h.transfer_syntax = text_of(meta, DC::TransferSyntaxUID);
-  if (parser->GetErrorCode() != 0 || h.transfer_syntax == kDeflated || meta->GetNumberOfDataElements() == 0) return false;
+  if (parser->GetErrorCode() != 0 || h.transfer_syntax == kDeflated || meta->GetNumberOfDataElements() == 0)
+    return false;
 
   h.sop_class = text_of(meta, DC::SOPClassUID);
   if (h.sop_class.empty()) h.sop_class = text_of(meta, DC::MediaStorageSOPClassUID);
@@ -244,8 +255,8 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.image_type = trimmed(meta->Get(DC::ImageType).AsString());
   h.description = text_of(meta, DC::SeriesDescription);
   const std::string technique = text_of(meta, DC::VolumeBasedCalculationTechnique);
-  h.projection = is_projection(h.image_type) || is_projection(h.description) || technique == "MAX_IP" || technique == "MIN_IP" ||
-                 technique == "VOLUME_RENDER" || technique == "SURFACE_RENDER";
+  h.projection = is_projection(h.image_type) || is_projection(h.description) || technique == "MAX_IP" ||
+                 technique == "MIN_IP" || technique == "VOLUME_RENDER" || technique == "SURFACE_RENDER";
   h.kernel = text_of(meta, DC::ConvolutionKernel);
   h.manufacturer = text_of(meta, DC::Manufacturer);
   h.series_number = meta->Get(DC::SeriesNumber).AsInt();
@@ -283,10 +294,13 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.padding = read_padding(meta->Get(DC::PixelPaddingValue), h);
   h.padding_limit = read_padding(meta->Get(DC::PixelPaddingRangeLimit), h);
   h.big_endian = h.transfer_syntax == kBigEndian;
-  h.compressed = !(h.big_endian || h.transfer_syntax.empty() || h.transfer_syntax == kImplicit || h.transfer_syntax == kExplicit);
-  static constexpr std::array<std::string_view, 5> kLossy{"1.2.840.10008.1.2.4.50", "1.2.840.10008.1.2.4.51", "1.2.840.10008.1.2.4.53",
-                                                          "1.2.840.10008.1.2.4.55", "1.2.840.10008.1.2.4.81"};
-  h.lossy = text_of(meta, DC::LossyImageCompression) == "01" || std::find(kLossy.begin(), kLossy.end(), h.transfer_syntax) != kLossy.end();
+  h.compressed =
+      !(h.big_endian || h.transfer_syntax.empty() || h.transfer_syntax == kImplicit || h.transfer_syntax == kExplicit);
+  static constexpr std::array<std::string_view, 5> kLossy{"1.2.840.10008.1.2.4.50", "1.2.840.10008.1.2.4.51",
+                                                          "1.2.840.10008.1.2.4.53", "1.2.840.10008.1.2.4.55",
+                                                          "1.2.840.10008.1.2.4.81"};
+  h.lossy = text_of(meta, DC::LossyImageCompression) == "01" ||
+            std::find(kLossy.begin(), kLossy.end(), h.transfer_syntax) != kLossy.end();
   h.pixel_offset = static_cast<std::uint64_t>(parser->GetFileOffset());
   const int count = std::clamp(meta->Get(DC::NumberOfFrames).AsInt(), 1, 100000);
   if (h.samples == 1 && parser->GetPixelDataFound()) {
@@ -304,7 +318,8 @@ bool could_be_dicom(const fs::path& file) {
   if (in.gcount() < 8) return false;
   if (in.gcount() == 132 && std::memcmp(head.data() + 128, "DICM", 4) == 0) return true;
   // A data set without preamble begins with an element of group 2 or 8, in either byte order.
-  const bool little = (head[0] == 2 || head[0] == 8) && head[1] == 0, big = head[0] == 0 && (head[1] == 2 || head[1] == 8);
+  const bool little = (head[0] == 2 || head[0] == 8) && head[1] == 0,
+             big = head[0] == 0 && (head[1] == 2 || head[1] == 8);
   return little || big;
 }
 
@@ -350,4 +365,4 @@ DicomHeader read_dicom_header(const fs::path& file, const fs::path& scratch) {
   return h;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

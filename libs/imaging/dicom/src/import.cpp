@@ -42,19 +42,22 @@ void tell_findings(Verdict& v, const std::vector<VolumeFinding>& findings, bool 
     switch (f.what) {
       case VolumeFinding::What::axes_not_stated:
         if (!axes_given)
-          v.add(code::axes_not_stated, Severity::warning, f.text, "see which side is which ('osteo snapshot'); --axes states it");
+          v.add(code::axes_not_stated, Severity::warning, f.text,
+                "see which side is which ('osteo snapshot'); --axes states it");
         break;
       case VolumeFinding::What::lengths_converted:
         v.add(code::lengths_converted, Severity::warning, f.text, "see that the size is that of a body");
         break;
       case VolumeFinding::What::places_disagree:
-        v.add(code::places_disagree, Severity::warning, f.text, "find out which of them is right before the sides of the body matter");
+        v.add(code::places_disagree, Severity::warning, f.text,
+              "find out which of them is right before the sides of the body matter");
         break;
     }
   }
 }
 
-// A header beside its voxels, as of SPM and Analyze: true to the letter it is no DICOM, but nobody is helped by hearing so.
+// A header beside its voxels, as of SPM and Analyze: true to the letter it is no DICOM, but nobody is helped by hearing
+// so.
 void refuse_pair(const fs::path& source) {
   fs::path header = source;
   const std::string suffix = lower_case(source.extension().string());
@@ -62,11 +65,14 @@ void refuse_pair(const fs::path& source) {
   if (suffix == ".img") header.replace_extension(source.extension() == ".IMG" ? ".HDR" : ".hdr");
   std::array<unsigned char, 4> size{};
   std::ifstream(header, std::ios::binary).read(reinterpret_cast<char*>(size.data()), 4);
-  const auto is = [&](int a, int b, int c, int d) { return size[0] == a && size[1] == b && size[2] == c && size[3] == d; };
+  const auto is = [&](int a, int b, int c, int d) {
+    return size[0] == a && size[1] == b && size[2] == c && size[3] == d;
+  };
   if (is(0x5C, 1, 0, 0) || is(0, 0, 1, 0x5C))  // 348, the length of such a header, in either byte order
     throw Error(ExitCode::corrupt,
-                "'" + source.string() + "' is of a pair of files (.hdr and .img, Analyze or NIfTI); pairs are not read, for the older of "
-                                        "them do not state left and right",
+                "'" + source.string() +
+                    "' is of a pair of files (.hdr and .img, Analyze or NIfTI); pairs are not read, for the older of "
+                    "them do not state left and right",
                 "save it as one file (.nii.gz)");
 }
 
@@ -82,7 +88,8 @@ Verdict judge_file(Image& image, const ImportParams& params, const std::vector<V
   dicom::ValueCount count;
   const std::size_t area = header.pixels_per_frame();
   const auto lowest = *std::min_element(image.span().begin(), image.span().end());
-  const auto out = lowest < -1200 || params.hu_offset != 0 ? make_voxels<std::int16_t>(image.frame.voxel_count()) : nullptr;
+  const auto out =
+      lowest < -1200 || params.hu_offset != 0 ? make_voxels<std::int16_t>(image.frame.voxel_count()) : nullptr;
   std::vector<std::int16_t> scratch(out ? 0 : area);
   std::vector<dicom::SliceFigure> figures;
   for (int k = 0; k < image.frame.dims[2]; ++k) {
@@ -96,7 +103,8 @@ Verdict judge_file(Image& image, const ImportParams& params, const std::vector<V
   v.source = "volume file";
   v.output = image.frame;
   if (params.hu_offset != 0) {
-    v.add(code::hu_offset, Severity::warning, format_number(params.hu_offset) + " HU are added to all values, as asked for",
+    v.add(code::hu_offset, Severity::warning,
+          format_number(params.hu_offset) + " HU are added to all values, as asked for",
           "look at the mask before you rely on a threshold");
   }
   tell_findings(v, findings, !params.axes.empty());
@@ -114,7 +122,8 @@ Verdict judge_file(Image& image, const ImportParams& params, const std::vector<V
 
 void tell_verdict(const Verdict& v, const Context& context) {
   for (const Finding& f : v.findings) {
-    if (f.severity == Severity::warning) context.warn(f.message + " [" + f.code + "]" + (f.advice.empty() ? "" : "; " + f.advice));
+    if (f.severity == Severity::warning)
+      context.warn(f.message + " [" + f.code + "]" + (f.advice.empty() ? "" : "; " + f.advice));
     if (f.severity == Severity::info) context.info(f.message + " [" + f.code + "]");
   }
   context.report("verdict", v.status());
@@ -142,7 +151,8 @@ Imported import_ct(const fs::path& source, const ImportParams& params, const Con
     result.verdict = judge_file(result.image, params, findings);
   } else {
     if (fs::is_directory(source) && fs::is_empty(source)) {
-      throw Error(ExitCode::no_input, "the folder '" + source.string() + "' is empty", "give the folder with the CT's slices");
+      throw Error(ExitCode::no_input, "the folder '" + source.string() + "' is empty",
+                  "give the folder with the CT's slices");
     }
     if (!fs::is_directory(source)) refuse_pair(source);
     const PlaceOptions options = place_options(params);
@@ -162,4 +172,4 @@ Imported import_ct(const fs::path& source, const ImportParams& params, const Con
   return result;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -41,14 +41,18 @@ class StackJudge {
     v.gap_max_mm = sorted.back();
     v.gap_usual_mm = sorted[sorted.size() / 2];
 
-    const auto step = [&](std::size_t i) { return std::abs(headers_[s[i + 1].header].instance - headers_[s[i].header].instance); };
+    const auto step = [&](std::size_t i) {
+      return std::abs(headers_[s[i + 1].header].instance - headers_[s[i].header].instance);
+    };
     std::size_t ones = 0;
     for (std::size_t i = 0; i < gaps.size(); ++i) ones += step(i) == 1 ? 1 : 0;
     const bool numbered = ones * 2 > gaps.size();
 
     // Positions written to tenths of a millimetre make distances of even slices wander by as much.
-    const auto equal = std::count_if(gaps.begin(), gaps.end(), [&](double g) { return std::abs(g - v.gap_usual_mm) <= kSamePlaceMm; });
-    tenths_ = equal * 5 < static_cast<std::ptrdiff_t>(gaps.size()) * 4 && std::all_of(s.begin(), s.end(), [](const PlacedSlice& p) {
+    const auto equal =
+        std::count_if(gaps.begin(), gaps.end(), [&](double g) { return std::abs(g - v.gap_usual_mm) <= kSamePlaceMm; });
+    tenths_ = equal * 5 < static_cast<std::ptrdiff_t>(gaps.size()) * 4 &&
+              std::all_of(s.begin(), s.end(), [](const PlacedSlice& p) {
                 return std::abs(p.along_mm * 10 - std::round(p.along_mm * 10)) < 1e-4;
               });
     const double slack = tenths_ ? 0.101 : 0;
@@ -77,8 +81,8 @@ class StackJudge {
         v.gaps.push_back({a, b, gaps[i], usual, 0, false});
         if (!v.has(code::gap_too_wide)) {
           v.add(code::gap_too_wide, Severity::error,
-                "the slices are " + mm(gaps[i]) + " apart (between '" + a + "' and '" + b + "'); up to " + mm(options_.max_gap_mm) +
-                    " is interpolated",
+                "the slices are " + mm(gaps[i]) + " apart (between '" + a + "' and '" + b + "'); up to " +
+                    mm(options_.max_gap_mm) + " is interpolated",
                 "ask for a thinner reconstruction; --max-gap-mm accepts wider distances", {a, b});
         }
         continue;
@@ -90,16 +94,18 @@ class StackJudge {
       files.push_back(b);
       if (gaps[i] > widest) {
         widest = gaps[i];
-        first_message = std::to_string(count) + (count == 1 ? " slice is" : " slices are") + " missing between '" + a + "' and '" + b +
-                        "' (" + mm(gaps[i]) + " apart instead of " + mm(usual) + ")";
+        first_message = std::to_string(count) + (count == 1 ? " slice is" : " slices are") + " missing between '" + a +
+                        "' and '" + b + "' (" + mm(gaps[i]) + " apart instead of " + mm(usual) + ")";
       }
     }
     if (missing == 0) return;
     const bool refuse = widest > options_.max_hole_mm;
     v.add(refuse ? code::hole_too_wide : code::slices_missing, refuse ? Severity::error : Severity::warning,
-          (v.gaps.size() > 1 ? std::to_string(missing) + " slices are missing; at the widest place " : std::string()) + first_message +
+          (v.gaps.size() > 1 ? std::to_string(missing) + " slices are missing; at the widest place " : std::string()) +
+              first_message +
               (refuse ? "; up to " + mm(options_.max_hole_mm) + " is interpolated" : "; the hole is interpolated"),
-          "copy the missing files from their source" + std::string(refuse ? "; --max-hole-mm accepts wider holes" : ""), files);
+          "copy the missing files from their source" + std::string(refuse ? "; --max-hole-mm accepts wider holes" : ""),
+          files);
   }
 
   // Whether the pictures are slices of Hounsfield units at all, and how sharp they are along the normal.
@@ -114,11 +120,12 @@ class StackJudge {
             "choose the series of thin slices that they were made from");
     } else if (thickness > 1.25 * gap && thickness > 0.5) {
       const bool by_far = thickness >= 4 * gap && thickness >= 3;
-      v.add(code::slices_overlap, by_far ? Severity::warning : Severity::info,
-            "slices of " + mm(thickness) + " lie " + mm(gap) + " apart and overlap: along their normal nothing finer than " +
-                mm(thickness) + " is seen" +
-                (by_far ? "; slabs like these may also be maximum-intensity projections, which make bone too thick" : ""),
-            by_far ? "choose a series whose slices are as thick as they are apart" : "");
+      v.add(
+          code::slices_overlap, by_far ? Severity::warning : Severity::info,
+          "slices of " + mm(thickness) + " lie " + mm(gap) +
+              " apart and overlap: along their normal nothing finer than " + mm(thickness) + " is seen" +
+              (by_far ? "; slabs like these may also be maximum-intensity projections, which make bone too thick" : ""),
+          by_far ? "choose a series whose slices are as thick as they are apart" : "");
     }
     const auto other = std::find_if(stack_.begin(), stack_.end(), [&](const Candidate& c) {
       const std::string type = upper_case(pictures_.frame_of(c).rescale_type);
@@ -128,13 +135,15 @@ class StackJudge {
     const std::string& type = pictures_.frame_of(*other).rescale_type;
     const bool modified = upper_case(type) == "HU_MOD";
     v.add(code::rescale_type, modified ? Severity::warning : grave,
-          modified ? "the values are modified Hounsfield units (HU_MOD), as spectral scanners write them"
-                   : "the values are no Hounsfield units but '" + type + "' (RescaleType), as of a spectral or material map",
+          modified
+              ? "the values are modified Hounsfield units (HU_MOD), as spectral scanners write them"
+              : "the values are no Hounsfield units but '" + type + "' (RescaleType), as of a spectral or material map",
           modified ? "look at the mask before you rely on a threshold" : "choose a series in Hounsfield units");
   }
 
   static std::string upper_case(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
     return text;
   }
 
@@ -146,8 +155,8 @@ class StackJudge {
     return *middle;
   }
 
-  // Drift in mm per mm along the normal, and where it is at the first slice: a line through most slices, which single slices that are
-  // shifted do not turn (a line by least squares would call one shifted slice a tilt).
+  // Drift in mm per mm along the normal, and where it is at the first slice: a line through most slices, which single
+  // slices that are shifted do not turn (a line by least squares would call one shifted slice a tilt).
   [[nodiscard]] std::pair<double, double> drift(std::size_t a) const {
     const auto& s = result_.slices;
     std::vector<double> slopes, rest;
@@ -180,7 +189,8 @@ class StackJudge {
       zz += (s[i].along_mm - mean) * (s[i].along_mm - mean);
       zs += (s[i].along_mm - mean) * (s[i].sideways_mm[a] - mean_side);
     }
-    // The least squares of these, where the steps from slice to slice agree with it as well: a step in the middle is no drift.
+    // The least squares of these, where the steps from slice to slice agree with it as well: a step in the middle is no
+    // drift.
     const double fitted = zz > 0 ? zs / zz : slope;
     const auto agreeing = [&](double by) {
       int count = 0;
@@ -227,24 +237,26 @@ class StackJudge {
     v.position_error_mm += corners;
 
     if (v.tilt_deg > kTiltDeg) {
-      v.add(
-          code::tilted, Severity::info,
-          "the slices lean by " + format_number(std::round(v.tilt_deg * 100) / 100) + " degrees (gantry tilt); they are resampled upright");
+      v.add(code::tilted, Severity::info,
+            "the slices lean by " + format_number(std::round(v.tilt_deg * 100) / 100) +
+                " degrees (gantry tilt); they are resampled upright");
     }
     if (jitter > kShiftMm) {
       v.add(code::shifted_sideways, Severity::warning,
-            (shifted.size() == 1 ? "one slice ('" + shifted.front() + "') is shifted sideways by "
-                                 : std::to_string(shifted.size()) + " slices are shifted sideways against the others by up to ") +
+            (shifted.size() == 1
+                 ? "one slice ('" + shifted.front() + "') is shifted sideways by "
+                 : std::to_string(shifted.size()) + " slices are shifted sideways against the others by up to ") +
                 mm(jitter) + "; each is taken where it says it lies",
-            "compare with the scanner's own pictures: a moved table is in the positions, a moved patient is not", shifted);
+            "compare with the scanner's own pictures: a moved table is in the positions, a moved patient is not",
+            shifted);
     }
     const bool uneven = v.gap_max_mm - v.gap_min_mm > 2 * kSamePlaceMm && !p.even;
     if (uneven && !v.has(code::slices_missing) && !v.has(code::hole_too_wide)) {
       // Positions rounded to a tenth of a millimetre are common, and no reason to worry anybody.
       const bool rounding = v.gap_max_mm - v.gap_min_mm < (tenths_ ? 0.11 : std::min(0.11, 0.2 * v.gap_usual_mm));
       v.add(code::gaps_uneven, rounding ? Severity::info : Severity::warning,
-            "the slices are " + std::string(rounding ? "slightly " : "") + "unevenly spaced (" + mm(v.gap_min_mm) + " to " +
-                mm(v.gap_max_mm) + "); they are interpolated between their true places",
+            "the slices are " + std::string(rounding ? "slightly " : "") + "unevenly spaced (" + mm(v.gap_min_mm) +
+                " to " + mm(v.gap_max_mm) + "); they are interpolated between their true places",
             rounding ? "" : "fine structures between slices " + mm(v.gap_max_mm) + " apart are not in the scan");
     }
   }
@@ -276,7 +288,8 @@ class StackJudge {
     const auto& s = result_.slices;
     std::size_t steps = 0;
     for (std::size_t i = 1; i < s.size(); ++i)
-      steps += std::abs(static_cast<long>(headers_[s[i].header].instance) - headers_[s[i - 1].header].instance) == n ? 1 : 0;
+      steps +=
+          std::abs(static_cast<long>(headers_[s[i].header].instance) - headers_[s[i - 1].header].instance) == n ? 1 : 0;
     return steps * 10 >= (s.size() - 1) * 9;
   }
 
@@ -295,8 +308,9 @@ class StackJudge {
       const int missing = parts - static_cast<int>(there.size());
       if (missing <= 0) continue;
       result_.verdict.add(code::concatenation_incomplete, Severity::warning,
-                          "the scan is spread over " + std::to_string(parts) + " files, of which " + std::to_string(missing) +
-                              (missing == 1 ? " is" : " are") + " not here: a part of the body is missing",
+                          "the scan is spread over " + std::to_string(parts) + " files, of which " +
+                              std::to_string(missing) + (missing == 1 ? " is" : " are") +
+                              " not here: a part of the body is missing",
                           "copy the missing files from their source");
       return;
     }
@@ -313,7 +327,8 @@ class StackJudge {
     spaces.erase("");
     if (spaces.size() > 1) {
       v.add(code::frame_of_reference_wrong, Severity::warning,
-            "each of the slices names a frame of reference of its own, as careless anonymisation leaves them; they are taken as one scan",
+            "each of the slices names a frame of reference of its own, as careless anonymisation leaves them; they are "
+            "taken as one scan",
             "see that all slices are of one patient and one scan");
     }
     if (pictures_.header_of(stack_.front()).inverted) {
@@ -330,13 +345,15 @@ class StackJudge {
   const std::vector<Candidate>& stack_;
   const PlaceOptions& options_;
   Placement& result_;
-  bool tenths_ = false;  ///< positions are rounded to tenths of a millimetre, and the distance of slices is no whole number of these
+  bool tenths_ = false;  ///< positions are rounded to tenths of a millimetre, and the distance of slices is no whole
+                         ///< number of these
 };
 
 }  // namespace
 
-void judge_stack(const Pictures& pictures, const std::vector<Candidate>& stack, const PlaceOptions& options, Placement& p) {
+void judge_stack(const Pictures& pictures, const std::vector<Candidate>& stack, const PlaceOptions& options,
+                 Placement& p) {
   StackJudge(pictures, stack, options, p).run();
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

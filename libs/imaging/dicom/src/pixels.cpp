@@ -15,17 +15,17 @@
 namespace osteo::inline imaging::dicom {
 namespace {
 
-// Scanners mark what they did not measure with one value that no tissue has, below the noise of air. Dark streaks beside metal come down
-// here as well, but with many values.
+// Scanners mark what they did not measure with one value that no tissue has, below the noise of air. Dark streaks
+// beside metal come down here as well, but with many values.
 constexpr double kPaddingBelowHu = -1200;
 constexpr double kSamePaddingHu = 8;
 // A padding tag that names a value above this names tissue.
 constexpr double kTissueFromHu = -900;
 constexpr std::int16_t kMetalHu = 3000;
 
-// The values of words: BitsStored bits up to HighBit, with their sign extended; what lies around them is no part of a pixel, and a file
-// need not extend the sign (PS3.5 8.1.1, C.7.6.3.1.2). Two errors of files are told from that by the pixels themselves: a HighBit that
-// leaves out bits which are in use, and a BitsStored that the values exceed.
+// The values of words: BitsStored bits up to HighBit, with their sign extended; what lies around them is no part of a
+// pixel, and a file need not extend the sign (PS3.5 8.1.1, C.7.6.3.1.2). Two errors of files are told from that by the
+// pixels themselves: a HighBit that leaves out bits which are in use, and a BitsStored that the values exceed.
 template <class T>
 void take_stored_bits(const DicomHeader& h, T* p, std::size_t n, ValueCount& count) {
   static_assert(std::is_unsigned_v<T>);
@@ -33,7 +33,9 @@ void take_stored_bits(const DicomHeader& h, T* p, std::size_t n, ValueCount& cou
   const int stored = h.bits_stored;
   if (stored <= 0 || stored >= kBits || h.high_bit >= kBits || h.high_bit + 1 < stored) return;
   const T mask = static_cast<T>((T{1} << stored) - 1), sign = static_cast<T>(T{1} << (stored - 1));
-  const auto extended = [&](T v) { return static_cast<T>(h.is_signed && (v & sign) != 0 ? v | static_cast<T>(~mask) : v & mask); };
+  const auto extended = [&](T v) {
+    return static_cast<T>(h.is_signed && (v & sign) != 0 ? v | static_cast<T>(~mask) : v & mask);
+  };
 
   const int shift = h.high_bit + 1 - stored;
   if (shift > 0) {
@@ -46,7 +48,8 @@ void take_stored_bits(const DicomHeader& h, T* p, std::size_t n, ValueCount& cou
     }
     ++count.high_bit_wrong;
   }
-  // Nearly all files are in order, which is quickly seen: a sum moves what may lie above the stored bits to where it shows.
+  // Nearly all files are in order, which is quickly seen: a sum moves what may lie above the stored bits to where it
+  // shows.
   const T lowest = h.is_signed ? sign : T{0};
   bool odd = false;
   constexpr std::size_t kBlock = 4096;
@@ -61,8 +64,9 @@ void take_stored_bits(const DicomHeader& h, T* p, std::size_t n, ValueCount& cou
   // Padding that its tag gives in more bits than are stored is no value either way.
   const auto is_padding = [&](T word) {
     if (!h.padding) return false;
-    const auto v = static_cast<std::int64_t>(h.is_signed ? static_cast<std::int64_t>(static_cast<std::make_signed_t<T>>(word))
-                                                         : static_cast<std::int64_t>(word));
+    const auto v =
+        static_cast<std::int64_t>(h.is_signed ? static_cast<std::int64_t>(static_cast<std::make_signed_t<T>>(word))
+                                              : static_cast<std::int64_t>(word));
     const int end = h.padding_limit.value_or(*h.padding);
     return v >= std::min(*h.padding, end) && v <= std::max(*h.padding, end);
   };
@@ -79,7 +83,8 @@ void take_stored_bits(const DicomHeader& h, T* p, std::size_t n, ValueCount& cou
     changed += w != v ? 1 : 0;
     unextended += w != v && static_cast<T>(w & static_cast<T>(~mask)) == 0 ? 1 : 0;
     too_low += w != v && h.is_signed && static_cast<T>(w | mask) == static_cast<T>(~T{0}) ? 1 : 0;
-    if (i % columns == 0 || (w == v && p[i - 1] == extended(p[i - 1])) || is_padding(w) || is_padding(p[i - 1])) continue;
+    if (i % columns == 0 || (w == v && p[i - 1] == extended(p[i - 1])) || is_padding(w) || is_padding(p[i - 1]))
+      continue;
     by_tags += std::abs(number(v) - number(extended(p[i - 1])));
     by_words += std::abs(number(w) - number(p[i - 1]));
   }
@@ -107,8 +112,9 @@ class Converter {
       (is_tissue ? tissue_lo_ : pad_lo_) = lo;
       (is_tissue ? tissue_hi_ : pad_hi_) = hi;
     }
-    const double top =
-        h.bits_stored > 0 && h.bits_stored < 16 ? (h.is_signed ? (1 << (h.bits_stored - 1)) - 1 : (1 << h.bits_stored) - 1) : 1e9;
+    const double top = h.bits_stored > 0 && h.bits_stored < 16
+                           ? (h.is_signed ? (1 << (h.bits_stored - 1)) - 1 : (1 << h.bits_stored) - 1)
+                           : 1e9;
     top_ = h.bits_stored > 8 ? static_cast<std::int64_t>(top) : std::int64_t{1} << 40;
   }
 
@@ -122,7 +128,8 @@ class Converter {
   }
 
  private:
-  // Up to two values (the corners of a picture, and what lies outside the table) that many pixels share, below all others.
+  // Up to two values (the corners of a picture, and what lies outside the table) that many pixels share, below all
+  // others.
   template <class T>
   void find_padding(const T* in, std::size_t n) {
     T least = n > 0 ? in[0] : T{};
@@ -171,7 +178,8 @@ class Converter {
     count_.hu_max = std::max(count_.hu_max, static_cast<std::int64_t>(std::floor(high + 0.5)));
     if (hi >= top_) {
       for (std::size_t i = 0; i < n; ++i)
-        count_.saturated += out[i] >= static_cast<std::int64_t>(std::floor(hounsfield(static_cast<double>(top_), f_))) ? 1 : 0;
+        count_.saturated +=
+            out[i] >= static_cast<std::int64_t>(std::floor(hounsfield(static_cast<double>(top_), f_))) ? 1 : 0;
     }
     if (high >= kMetalHu) {
       for (std::size_t i = 0; i < n; ++i) count_.metal += out[i] >= kMetalHu ? 1 : 0;
@@ -213,7 +221,8 @@ class Converter {
   const DicomFrame& f_;
   ValueCount& count_;
   std::int64_t pad_lo_ = 1, pad_hi_ = 0, tissue_lo_ = 1, tissue_hi_ = 0, top_ = 0;
-  std::int64_t found_ = std::numeric_limits<std::int64_t>::min();  // stored values up to this are padding that no tag names
+  std::int64_t found_ =
+      std::numeric_limits<std::int64_t>::min();  // stored values up to this are padding that no tag names
 };
 
 }  // namespace
@@ -230,7 +239,8 @@ void read_bytes(const DicomHeader& h, std::uint64_t offset, void* out, std::size
   }
   ::close(fd);
   if (got < bytes)
-    throw PixelError("the file is cut short: " + std::to_string(got) + " of " + std::to_string(bytes) + " bytes of pixels are there");
+    throw PixelError("the file is cut short: " + std::to_string(got) + " of " + std::to_string(bytes) +
+                     " bytes of pixels are there");
 }
 
 void ValueCount::add(const ValueCount& o) {
@@ -255,7 +265,8 @@ void ValueCount::add(const ValueCount& o) {
 }
 
 void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, ValueCount& count, int threads) {
-  const std::size_t n = h.pixels_per_frame(), columns = static_cast<std::size_t>(h.columns), rows = static_cast<std::size_t>(h.rows);
+  const std::size_t n = h.pixels_per_frame(), columns = static_cast<std::size_t>(h.columns),
+                    rows = static_cast<std::size_t>(h.rows);
   const auto convert = [&](const FrameTarget& t, const auto* stored, ValueCount& to) {
     Converter(h, h.frames[static_cast<std::size_t>(t.frame)], to).run(stored, t.out, columns, rows);
   };
@@ -293,7 +304,9 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
     if (h.bits_allocated == 32) {
       std::vector<std::uint32_t> stored(n);
       read_bytes(h, offset, stored.data(), n * 4);
-      if (h.big_endian) std::transform(stored.begin(), stored.end(), stored.begin(), [](std::uint32_t v) { return __builtin_bswap32(v); });
+      if (h.big_endian)
+        std::transform(stored.begin(), stored.end(), stored.begin(),
+                       [](std::uint32_t v) { return __builtin_bswap32(v); });
       take_stored_bits(h, stored.data(), n, count);
       if (h.is_signed) {
         convert(t, reinterpret_cast<const std::int32_t*>(stored.data()), count);
@@ -316,7 +329,8 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
 }
 
 void convert_values(const DicomHeader& h, const std::int16_t* stored, std::int16_t* out, ValueCount& count) {
-  Converter(h, h.frames.front(), count).run(stored, out, static_cast<std::size_t>(h.columns), static_cast<std::size_t>(h.rows));
+  Converter(h, h.frames.front(), count)
+      .run(stored, out, static_cast<std::size_t>(h.columns), static_cast<std::size_t>(h.rows));
 }
 
 bool same_stored_pixels(const DicomHeader& a, const DicomHeader& b) {
@@ -334,4 +348,4 @@ bool same_stored_pixels(const DicomHeader& a, const DicomHeader& b) {
   }
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

@@ -58,7 +58,8 @@ double Pictures::corner_deviation(const Candidate& a, const Candidate& b) const 
 
 }  // namespace dicom
 
-Placement place_slices(const std::vector<DicomHeader>& headers, const PlaceOptions& options, const std::vector<FileSetAside>& excluded,
+Placement place_slices(const std::vector<DicomHeader>& headers, const PlaceOptions& options,
+                       const std::vector<FileSetAside>& excluded,
                        const std::function<bool(std::size_t, std::size_t)>& same_pixels) {
   const dicom::Pictures pictures{headers};
   Placement p;
@@ -76,10 +77,12 @@ Placement place_slices(const std::vector<DicomHeader>& headers, const PlaceOptio
   for (const dicom::Candidate& c : stack) {
     const Vec3 d = pictures.frame_of(c).position_mm - p.origin_mm;
     p.slices.push_back({c.header, c.frame, dot(d, p.normal), {dot(d, p.along_row), dot(d, p.along_column)}});
-    v.slices.push_back({headers[c.header].name, c.frame, pictures.frame_of(c).position_mm, c.along - stack.front().along, 0});
+    v.slices.push_back(
+        {headers[c.header].name, c.frame, pictures.frame_of(c).position_mm, c.along - stack.front().along, 0});
   }
   v.series = h.series_number;
-  if (!h.study_uid.empty() && !h.frame_of_reference_uid.empty()) v.scan_hash = hash_text(h.study_uid + '\n' + h.frame_of_reference_uid);
+  if (!h.study_uid.empty() && !h.frame_of_reference_uid.empty())
+    v.scan_hash = hash_text(h.study_uid + '\n' + h.frame_of_reference_uid);
   v.modality = h.modality;
   v.kernel = h.kernel;
   v.scanner = known_maker(h.manufacturer);
@@ -92,4 +95,4 @@ Placement place_slices(const std::vector<DicomHeader>& headers, const PlaceOptio
   return p;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -20,4 +20,4 @@ std::string rewrite_plainly(const std::filesystem::path& from, const std::filesy
   return status.bad() ? status.text() : "";
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

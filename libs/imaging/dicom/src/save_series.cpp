@@ -34,7 +34,8 @@ void save_dicom_series(const Image& image, const fs::path& folder, const Context
     vtkNew<vtkMatrix4x4> matrix;
     for (int a = 0; a < 3; ++a) {
       for (int r = 0; r < 3; ++r) {
-        matrix->SetElement(r, a, image.frame.direction.column[static_cast<std::size_t>(a)][static_cast<std::size_t>(r)]);
+        matrix->SetElement(r, a,
+                           image.frame.direction.column[static_cast<std::size_t>(a)][static_cast<std::size_t>(r)]);
       }
       matrix->SetElement(a, 3, image.frame.origin_mm[static_cast<std::size_t>(a)]);
     }
@@ -50,7 +51,8 @@ void save_dicom_series(const Image& image, const fs::path& folder, const Context
     writer->SetFilePattern("%s/%04d.dcm");
     writer->Write();
     if (writer->GetErrorCode() != 0) throw vtk_write_error(folder, writer->GetErrorCode());
-    const std::size_t slice_bytes = image.frame.voxel_count() / static_cast<std::size_t>(image.frame.dims[2]) * sizeof(std::int16_t);
+    const std::size_t slice_bytes =
+        image.frame.voxel_count() / static_cast<std::size_t>(image.frame.dims[2]) * sizeof(std::int16_t);
     for (const auto& entry : fs::directory_iterator(temporary)) {
       // vtk-dicom does not look whether its bytes arrived.
       if (entry.file_size() < slice_bytes) throw vtk_write_error(folder, vtkErrorCode::OutOfDiskSpaceError);
@@ -59,4 +61,4 @@ void save_dicom_series(const Image& image, const fs::path& folder, const Context
   });
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -40,7 +40,8 @@ std::vector<Found> files_below(const fs::path& folder, std::vector<FileSetAside>
     std::error_code status;
     if (it->is_regular_file(status)) found.push_back({it->path(), it->path().lexically_relative(folder).string()});
     if (it->is_directory(status) && ::access(it->path().c_str(), R_OK | X_OK) != 0) {
-      unreadable.push_back({it->path().lexically_relative(folder).string(), std::string(code::cannot_read), "the folder may not be read"});
+      unreadable.push_back({it->path().lexically_relative(folder).string(), std::string(code::cannot_read),
+                            "the folder may not be read"});
     }
   }
   std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
@@ -73,7 +74,8 @@ std::vector<Found> files_of_index(const fs::path& index, std::vector<FileSetAsid
       auto& entries = listing[at];
       if (entries.empty()) {
         std::error_code ec;
-        for (const auto& e : fs::directory_iterator(at, ec)) entries[lower_case(e.path().filename().string())] = e.path();
+        for (const auto& e : fs::directory_iterator(at, ec))
+          entries[lower_case(e.path().filename().string())] = e.path();
       }
       const auto it = entries.find(lower_case(piece));
       there = there && it != entries.end();
@@ -91,7 +93,8 @@ std::vector<Found> files_of_index(const fs::path& index, std::vector<FileSetAsid
 // A name, or free text, that holds a value which identifies the patient.
 bool identifies(const std::string& text, const std::set<std::string>& values) {
   const std::string low = lower_case(text);
-  return std::any_of(values.begin(), values.end(), [&](const std::string& v) { return low.find(v) != std::string::npos; });
+  return std::any_of(values.begin(), values.end(),
+                     [&](const std::string& v) { return low.find(v) != std::string::npos; });
 }
 
 // Folders that identify become "*", the file itself its number in the order of names.
@@ -142,10 +145,11 @@ bool bone_kernel(const DicomSeries& s, const std::string& manufacturer) {
 double cost(const DicomSeries& s, const Placement& p, std::string& why) {
   const bool bone = bone_kernel(s, s.headers.front().manufacturer);
   const bool axial = std::abs(p.normal.z) > 0.7;
-  const bool whole = !p.verdict.has(code::slices_missing) &&
-                     std::all_of(p.verdict.set_aside.begin(), p.verdict.set_aside.end(), [](const FileSetAside& f) {
-                       return f.code == code::duplicate_file || f.code == code::duplicate_slice || f.code == code::localizer;
-                     });
+  const bool whole =
+      !p.verdict.has(code::slices_missing) &&
+      std::all_of(p.verdict.set_aside.begin(), p.verdict.set_aside.end(), [](const FileSetAside& f) {
+        return f.code == code::duplicate_file || f.code == code::duplicate_slice || f.code == code::localizer;
+      });
   const bool original = s.headers.front().image_type.starts_with("ORIGINAL") || s.headers.front().image_type.empty();
   const double extent = p.slices.back().along_mm;
   why = "slices " + format_number(std::round(p.verdict.gap_usual_mm * 100) / 100) + " mm apart";
@@ -181,7 +185,10 @@ void judge(DicomSeries& s, const PlaceOptions& options, double& price) {
   }
   s.usable = true;
   const Vec3 n = p.normal;
-  s.what = std::string(std::abs(n.z) > 0.7 ? "axial" : std::abs(n.y) > 0.7 ? "coronal" : std::abs(n.x) > 0.7 ? "sagittal" : "oblique");
+  s.what = std::string(std::abs(n.z) > 0.7   ? "axial"
+                       : std::abs(n.y) > 0.7 ? "coronal"
+                       : std::abs(n.x) > 0.7 ? "sagittal"
+                                             : "oblique");
   if (p.verdict.has(code::tilted)) s.what += ", tilted";
   if (p.verdict.has(code::gaps_uneven)) s.what += ", uneven";
   if (p.verdict.has(code::slices_missing)) s.what += ", holes";
@@ -206,8 +213,8 @@ class Numbering {
   std::map<std::string, std::size_t> numbers_;
 };
 
-// What a slice belongs to. Where each slice of a series has a frame of reference of its own, whoever wrote them meant nothing by it; a
-// slice without one is of the only one there is.
+// What a slice belongs to. Where each slice of a series has a frame of reference of its own, whoever wrote them meant
+// nothing by it; a slice without one is of the only one there is.
 std::vector<std::string> spaces_of(const std::vector<DicomHeader>& headers) {
   std::map<std::string, int> count;
   for (const DicomHeader& h : headers) {
@@ -217,7 +224,9 @@ std::vector<std::string> spaces_of(const std::vector<DicomHeader>& headers) {
   std::vector<std::string> spaces;
   for (const DicomHeader& h : headers) {
     const std::string& uid = h.frame_of_reference_uid;
-    spaces.push_back(count.empty() ? "" : meaningless || (uid.empty() && count.size() == 1) ? count.begin()->first : uid);
+    spaces.push_back(count.empty()                                       ? ""
+                     : meaningless || (uid.empty() && count.size() == 1) ? count.begin()->first
+                                                                         : uid);
   }
   return spaces;
 }
@@ -352,7 +361,8 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
       scan.set_aside.push_back({h.name, h.problem_code, h.problem});
       continue;
     }
-    const std::string key = h.series_uid.empty() ? h.study_uid + "/" + std::to_string(h.series_number) + "/" + h.description : h.series_uid;
+    const std::string key =
+        h.series_uid.empty() ? h.study_uid + "/" + std::to_string(h.series_number) + "/" + h.description : h.series_uid;
     const auto [it, is_new] = group.try_emplace(key, scan.series.size());
     if (is_new) scan.series.emplace_back();
     scan.series[it->second].headers.push_back(std::move(h));
@@ -385,13 +395,15 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
     context.progress(0.9 + 0.1 * static_cast<double>(i + 1) / static_cast<double>(scan.series.size()), "sorting");
   }
   if (scan.series.empty()) {
-    const std::string more = scan.set_aside.empty() ? "" : " ('" + scan.set_aside.front().file + "': " + scan.set_aside.front().why + ")";
+    const std::string more =
+        scan.set_aside.empty() ? "" : " ('" + scan.set_aside.front().file + "': " + scan.set_aside.front().why + ")";
     throw Error(ExitCode::no_input, "'" + source.string() + "' holds no DICOM image" + more,
                 "give the folder with the CT's slices, or a .nrrd, .nii.gz, .mha or .vti file");
   }
   recommend(scan.series, price);
-  std::stable_sort(scan.series.begin(), scan.series.end(),
-                   [](const auto& a, const auto& b) { return std::tie(a.scan, a.number) < std::tie(b.scan, b.number); });
+  std::stable_sort(scan.series.begin(), scan.series.end(), [](const auto& a, const auto& b) {
+    return std::tie(a.scan, a.number) < std::tie(b.scan, b.number);
+  });
   return scan;
 }
 
@@ -407,16 +419,18 @@ const DicomSeries& choose_series(const DicomScan& scan, const std::string& wante
     for (const DicomSeries* s : found)
       list += (list.empty() ? "" : "; ") + named(*s) + ": " + std::to_string(s->images) + " pictures, " + s->what;
     if (!wanted.empty()) {
-      const bool same_scan = std::any_of(found.begin() + 1, found.end(), [&](const auto* s) { return s->scan == found.front()->scan; });
+      const bool same_scan =
+          std::any_of(found.begin() + 1, found.end(), [&](const auto* s) { return s->scan == found.front()->scan; });
       throw Error(ExitCode::usage, "there are several series " + wanted + " (" + list + ")",
                   same_scan ? "'osteo import --list --json FOLDER' shows their UIDs: give one of those"
                             : "give --series " + named(*found.front()) + " or another of these");
     }
-    throw Error(ExitCode::corrupt,
-                "'" + source_name + "' holds " + std::to_string(found.size()) + " scans that do not belong together, " +
-                    what_differs(found) + " (" + list + ")",
-                "choose one, like --series " + found.front()->scan +
-                    "; 'osteo import --list FOLDER' shows all series, --studies the date and description of each study");
+    throw Error(
+        ExitCode::corrupt,
+        "'" + source_name + "' holds " + std::to_string(found.size()) + " scans that do not belong together, " +
+            what_differs(found) + " (" + list + ")",
+        "choose one, like --series " + found.front()->scan +
+            "; 'osteo import --list FOLDER' shows all series, --studies the date and description of each study");
   }
   // When there is but one, its own verdict says more than a list.
   if (wanted.empty() && scan.series.size() == 1) return scan.series.front();
@@ -427,7 +441,8 @@ const DicomSeries& choose_series(const DicomScan& scan, const std::string& wante
     throw Error(ExitCode::no_input, "'" + source_name + "' holds no CT series that makes a volume (" + list + ")",
                 "'osteo import --list FOLDER' shows what each series is");
   }
-  throw Error(ExitCode::usage, "there is no series '" + wanted + "' (" + list + ")", "'osteo import --list FOLDER' shows the series");
+  throw Error(ExitCode::usage, "there is no series '" + wanted + "' (" + list + ")",
+              "'osteo import --list FOLDER' shows the series");
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

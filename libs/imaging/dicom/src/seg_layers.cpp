@@ -56,17 +56,20 @@ SegLayers place_seg_frames(const std::vector<double>& along_mm, double spacing_m
   SegLayers s;
   std::vector<double> places = along_mm;
   std::sort(places.begin(), places.end());
-  places.erase(std::unique(places.begin(), places.end(), [](double a, double b) { return b - a <= kSamePlaceMm; }), places.end());
+  places.erase(std::unique(places.begin(), places.end(), [](double a, double b) { return b - a <= kSamePlaceMm; }),
+               places.end());
   const double stated = std::abs(spacing_mm);
   if (places.size() == 1) {
     s.pitch_mm = stated > 0 ? stated : thickness_mm;
-    if (!(s.pitch_mm > 0)) s.problem = "all frames lie in one slice, and it states neither distance nor thickness of slices";
+    if (!(s.pitch_mm > 0))
+      s.problem = "all frames lie in one slice, and it states neither distance nor thickness of slices";
   } else if (double pitch = stated; fits(places, pitch)) {
     s.pitch_mm = pitch;
     double nearest = places.back() - places.front();
     for (std::size_t i = 1; i < places.size(); ++i) nearest = std::min(nearest, places[i] - places[i - 1]);
     if (nearest > 1.5 * pitch)
-      s.warning = "no two neighbouring slices hold anything: the frames lie at least " + mm(nearest) + " apart, the slices " + mm(pitch) +
+      s.warning = "no two neighbouring slices hold anything: the frames lie at least " + mm(nearest) +
+                  " apart, the slices " + mm(pitch) +
                   " as the file states (SpacingBetweenSlices); those between are taken as empty";
   } else {
     pitch = common_distance(places, 0.02);
@@ -77,11 +80,13 @@ SegLayers place_seg_frames(const std::vector<double>& along_mm, double spacing_m
     s.pitch_mm = pitch;
     const double parts = thickness_mm > 0 ? pitch / thickness_mm : 1;
     if (stated > 0) {
-      s.warning = "the file states slices " + mm(stated) + " apart (SpacingBetweenSlices), but its frames lie at multiples of " + mm(pitch) +
+      s.warning = "the file states slices " + mm(stated) +
+                  " apart (SpacingBetweenSlices), but its frames lie at multiples of " + mm(pitch) +
                   "; the positions count";
     } else if (parts > 1.5 && std::abs(parts - std::round(parts)) < 0.02 * parts) {
       s.problem = "its frames lie " + mm(pitch) + " apart and its slices are " + mm(thickness_mm) +
-                  " thick, but it does not state how far apart slices are (SpacingBetweenSlices): whether empty frames were left out cannot "
+                  " thick, but it does not state how far apart slices are (SpacingBetweenSlices): whether empty frames "
+                  "were left out cannot "
                   "be told";
       return s;
     }
@@ -92,4 +97,4 @@ SegLayers place_seg_frames(const std::vector<double>& along_mm, double spacing_m
   return s;
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

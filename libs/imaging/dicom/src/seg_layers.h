@@ -20,4 +20,4 @@ struct SegLayers {
 /// (segments). 0: the file states none. O(n log n).
 [[nodiscard]] SegLayers place_seg_frames(const std::vector<double>& along_mm, double spacing_mm, double thickness_mm);
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

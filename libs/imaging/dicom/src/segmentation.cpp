@@ -46,7 +46,8 @@ std::vector<Structure> structures_of(const Labels& labels) {
   for (const auto v : labels.span()) there[v] = true;
   std::vector<Structure> list;
   for (std::size_t v = 1; v < 256; ++v) {
-    if (there[v]) list.push_back({static_cast<std::uint8_t>(v), v == 1 ? "Bone" : "Structure " + std::to_string(v), {}});
+    if (there[v])
+      list.push_back({static_cast<std::uint8_t>(v), v == 1 ? "Bone" : "Structure " + std::to_string(v), {}});
   }
   return list;
 }
@@ -72,15 +73,16 @@ std::vector<std::size_t> slices_around(const DicomSeries& source, Vec3 point) {
 
 Stack stack_of(const Labels& labels, const DicomSeries* source) {
   const Frame& f = labels.frame;
-  Stack s{f.dims[0], f.dims[1], f.direction.column[0], f.direction.column[1], f.spacing_mm.x, f.spacing_mm.y, f.spacing_mm.z, {}};
+  Stack s{f.dims[0],      f.dims[1],      f.direction.column[0], f.direction.column[1],
+          f.spacing_mm.x, f.spacing_mm.y, f.spacing_mm.z,        {}};
   const std::size_t area = static_cast<std::size_t>(s.columns) * static_cast<std::size_t>(s.rows);
   for (int k = 0; k < f.dims[2]; ++k) {
     const std::uint8_t* const p = labels.voxels.get() + static_cast<std::size_t>(k) * area;
     if (std::all_of(p, p + area, [](std::uint8_t v) { return v == 0; })) continue;
     Plane plane{f.world_from_index({0, 0, static_cast<double>(k)}), {p, p + area}, {}};
     if (source != nullptr) {
-      plane.source_headers =
-          slices_around(*source, f.world_from_index({(s.columns - 1) / 2.0, (s.rows - 1) / 2.0, static_cast<double>(k)}));
+      plane.source_headers = slices_around(
+          *source, f.world_from_index({(s.columns - 1) / 2.0, (s.rows - 1) / 2.0, static_cast<double>(k)}));
     }
     s.planes.push_back(std::move(plane));
   }
@@ -89,7 +91,8 @@ Stack stack_of(const Labels& labels, const DicomSeries* source) {
 
 Stack stack_on_source(const Labels& labels, const DicomSeries& source) {
   const Placement p = place_slices(source.headers, {.max_gap_mm = 1e9, .max_hole_mm = 1e9});
-  if (p.slices.size() < 2) throw Error(ExitCode::corrupt, "the source series is no volume", "'osteo import --list' shows what it is");
+  if (p.slices.size() < 2)
+    throw Error(ExitCode::corrupt, "the source series is no volume", "'osteo import --list' shows what it is");
   Stack s{p.verdict.columns, p.verdict.rows,         p.along_row, p.along_column, p.column_spacing_mm,
           p.row_spacing_mm,  p.verdict.gap_usual_mm, {}};
   const Frame& f = labels.frame;
@@ -99,11 +102,14 @@ Stack stack_on_source(const Labels& labels, const DicomSeries& source) {
     bool any = false;
     for (int j = 0; j < s.rows; ++j) {
       for (int i = 0; i < s.columns; ++i) {
-        const Vec3 at = f.index_from_world(plane.position + s.along_row * (i * s.column_mm) + s.along_column * (j * s.row_mm));
-        const int x = static_cast<int>(std::lround(at.x)), y = static_cast<int>(std::lround(at.y)), z = static_cast<int>(std::lround(at.z));
+        const Vec3 at =
+            f.index_from_world(plane.position + s.along_row * (i * s.column_mm) + s.along_column * (j * s.row_mm));
+        const int x = static_cast<int>(std::lround(at.x)), y = static_cast<int>(std::lround(at.y)),
+                  z = static_cast<int>(std::lround(at.z));
         if (x < 0 || y < 0 || z < 0 || x >= f.dims[0] || y >= f.dims[1] || z >= f.dims[2]) continue;
         const std::uint8_t v = labels.at(x, y, z);
-        plane.labels[static_cast<std::size_t>(j) * static_cast<std::size_t>(s.columns) + static_cast<std::size_t>(i)] = v;
+        plane.labels[static_cast<std::size_t>(j) * static_cast<std::size_t>(s.columns) + static_cast<std::size_t>(i)] =
+            v;
         any = any || v != 0;
       }
     }
@@ -112,8 +118,8 @@ Stack stack_on_source(const Labels& labels, const DicomSeries& source) {
   return s;
 }
 
-void take_over_identity(DcmSegmentation& seg, const DicomObjectOptions& o, const std::string& content, const fs::path& path,
-                        const Context& context) {
+void take_over_identity(DcmSegmentation& seg, const DicomObjectOptions& o, const std::string& content,
+                        const fs::path& path, const Context& context) {
   if (o.source != nullptr) {
     DcmFileFormat source;
     dicom::load_identity(*o.source, source, context);
@@ -122,7 +128,8 @@ void take_over_identity(DcmSegmentation& seg, const DicomObjectOptions& o, const
     require(seg.getPatient().setPatientName(dicom::kAnonymousName), path);
     require(seg.getPatient().setPatientID(dicom::kAnonymousId), path);
     require(seg.getStudy().setStudyInstanceUID(dicom::uid_of(hash_text(content + "study")).c_str()), path);
-    require(seg.getFrameOfReference().setFrameOfReferenceUID(dicom::uid_of(hash_text(content + "frame")).c_str()), path);
+    require(seg.getFrameOfReference().setFrameOfReferenceUID(dicom::uid_of(hash_text(content + "frame")).c_str()),
+            path);
   }
   require(seg.getSeries().setSeriesInstanceUID(dicom::uid_of(hash_text(content + "series")).c_str()), path);
   require(seg.getSOPCommon().setSOPInstanceUID(dicom::uid_of(hash_text(content + "instance")).c_str()), path);
@@ -143,9 +150,10 @@ void refer_to_series(DcmSegmentation& seg, const DicomSeries& source) {
   seg.getCommonInstanceReference().getReferencedSeriesItems().push_back(item);
 }
 
-void write(const Stack& stack, const std::vector<Structure>& structures, const fs::path& path, const DicomObjectOptions& o,
-           const Context& context) {
-  if (stack.planes.empty()) throw Error(ExitCode::usage, "the label map is empty: there is nothing to write to '" + path.string() + "'");
+void write(const Stack& stack, const std::vector<Structure>& structures, const fs::path& path,
+           const DicomObjectOptions& o, const Context& context) {
+  if (stack.planes.empty())
+    throw Error(ExitCode::usage, "the label map is empty: there is nothing to write to '" + path.string() + "'");
   dicom::quiet_dcmtk();
   Hasher hasher;
   for (const Plane& p : stack.planes) {
@@ -157,8 +165,8 @@ void write(const Stack& stack, const std::vector<Structure>& structures, const f
   DcmSegmentation* made = nullptr;
   const IODGeneralEquipmentModule::EquipmentInfo equipment("Osteotome", "osteo", "0", "0.1");
   const ContentIdentificationMacro identity("1", "BONE", o.description.substr(0, 64).c_str(), "OSTEOTOME^");
-  require(DcmSegmentation::createBinarySegmentation(made, static_cast<Uint16>(stack.rows), static_cast<Uint16>(stack.columns), equipment,
-                                                    identity),
+  require(DcmSegmentation::createBinarySegmentation(made, static_cast<Uint16>(stack.rows),
+                                                    static_cast<Uint16>(stack.columns), equipment, identity),
           path);
   const std::unique_ptr<DcmSegmentation> seg(made);
   take_over_identity(*seg, o, content, path, context);
@@ -167,11 +175,12 @@ void write(const Stack& stack, const std::vector<Structure>& structures, const f
   for (const Structure& s : structures) {
     const bool bone = s.name.find("one") != std::string::npos || structures.size() == 1;
     const CodeSequenceMacro category("123037004", "SCT", "Anatomical Structure");
-    const CodeSequenceMacro type = bone ? CodeSequenceMacro("272673000", "SCT", "Bone") : CodeSequenceMacro("85756007", "SCT", "Tissue");
+    const CodeSequenceMacro type =
+        bone ? CodeSequenceMacro("272673000", "SCT", "Bone") : CodeSequenceMacro("85756007", "SCT", "Tissue");
     DcmSegment* segment = nullptr;
-    require(
-        DcmSegment::create(segment, s.name.substr(0, 64).c_str(), category, type, DcmSegTypes::SAT_SEMIAUTOMATIC, "Osteotome threshold"),
-        path);
+    require(DcmSegment::create(segment, s.name.substr(0, 64).c_str(), category, type, DcmSegTypes::SAT_SEMIAUTOMATIC,
+                               "Osteotome threshold"),
+            path);
     Uint16 number = 0;
     require(seg->addSegment(segment, number), path);
   }
@@ -187,10 +196,11 @@ void write(const Stack& stack, const std::vector<Structure>& structures, const f
       FGPlaneOrientationPatient::createMinimal(text(u.x), text(u.y), text(u.z), text(v.x), text(v.y), text(v.z)));
   require(seg->addForAllFrames(*orientation), path);
   const std::string organization = dicom::uid_of(hash_text(content + "dimensions"));
-  require(seg->getDimensions().addDimensionIndex(DCM_ReferencedSegmentNumber, organization.c_str(), DCM_SegmentIdentificationSequence,
-                                                 "Segment"),
+  require(seg->getDimensions().addDimensionIndex(DCM_ReferencedSegmentNumber, organization.c_str(),
+                                                 DCM_SegmentIdentificationSequence, "Segment"),
           path);
-  require(seg->getDimensions().addDimensionIndex(DCM_ImagePositionPatient, organization.c_str(), DCM_PlanePositionSequence, "Position"),
+  require(seg->getDimensions().addDimensionIndex(DCM_ImagePositionPatient, organization.c_str(),
+                                                 DCM_PlanePositionSequence, "Position"),
           path);
 
   std::vector<Uint8> bits;  // of all frames, a byte each
@@ -215,7 +225,8 @@ void write(const Stack& stack, const std::vector<Structure>& structures, const f
       FGDerivationImage derivation;
       if (!plane.source_headers.empty()) {
         DerivationImageItem* derived = nullptr;
-        require(derivation.addDerivationImageItem(CodeSequenceMacro("113076", "DCM", "Segmentation"), "", derived), path);
+        require(derivation.addDerivationImageItem(CodeSequenceMacro("113076", "DCM", "Segmentation"), "", derived),
+                path);
         for (const std::size_t index : plane.source_headers) {
           const DicomHeader& h = o.source->headers[index];
           DcmDataset reference;
@@ -231,29 +242,36 @@ void write(const Stack& stack, const std::vector<Structure>& structures, const f
       bits.insert(bits.end(), frame.begin(), frame.end());
     }
   }
-  // DCMTK 3.6.7 shifts frames whose size is no multiple of 8: the bits are packed here, one frame right after the other (PS3.5 8.1.1).
+  // DCMTK 3.6.7 shifts frames whose size is no multiple of 8: the bits are packed here, one frame right after the other
+  // (PS3.5 8.1.1).
   DcmFileFormat file;
   require(seg->writeDataset(*file.getDataset()), path);
   std::vector<Uint8> packed((bits.size() + 15) / 16 * 2);
   for (std::size_t i = 0; i < bits.size(); ++i) packed[i / 8] = static_cast<Uint8>(packed[i / 8] | bits[i] << (i % 8));
-  require(file.getDataset()->putAndInsertUint8Array(DCM_PixelData, packed.data(), static_cast<unsigned long>(packed.size())), path);
-  write_atomically(path, [&](const fs::path& temporary) { require(file.saveFile(temporary.c_str(), EXS_LittleEndianExplicit), path); });
+  require(file.getDataset()->putAndInsertUint8Array(DCM_PixelData, packed.data(),
+                                                    static_cast<unsigned long>(packed.size())),
+          path);
+  write_atomically(path, [&](const fs::path& temporary) {
+    require(file.saveFile(temporary.c_str(), EXS_LittleEndianExplicit), path);
+  });
 }
 
 bool read_position(DcmSegmentation& seg, Uint32 frame, Vec3& position) {
-  auto* const fg = OFstatic_cast(FGPlanePosPatient*, seg.getFunctionalGroups().get(frame, DcmFGTypes::EFG_PLANEPOSPATIENT));
+  auto* const fg =
+      OFstatic_cast(FGPlanePosPatient*, seg.getFunctionalGroups().get(frame, DcmFGTypes::EFG_PLANEPOSPATIENT));
   return fg != nullptr && fg->getImagePositionPatient(position.x, position.y, position.z).good();
 }
 
 // Whether a frame has the axes and pixels of the first.
 bool lies_as(DcmSegmentation& seg, Uint32 frame, Vec3 along_row, Vec3 along_column, double row_mm, double column_mm) {
   FGInterface& groups = seg.getFunctionalGroups();
-  auto* const orientation = OFstatic_cast(FGPlaneOrientationPatient*, groups.get(frame, DcmFGTypes::EFG_PLANEORIENTPATIENT));
+  auto* const orientation =
+      OFstatic_cast(FGPlaneOrientationPatient*, groups.get(frame, DcmFGTypes::EFG_PLANEORIENTPATIENT));
   auto* const measures = OFstatic_cast(FGPixelMeasures*, groups.get(frame, DcmFGTypes::EFG_PIXELMEASURES));
   Vec3 u, v;
   Float64 row = 0, column = 0;
-  if (orientation == nullptr || orientation->getImageOrientationPatient(u.x, u.y, u.z, v.x, v.y, v.z).bad() || measures == nullptr ||
-      measures->getPixelSpacing(row, 0).bad() || measures->getPixelSpacing(column, 1).bad())
+  if (orientation == nullptr || orientation->getImageOrientationPatient(u.x, u.y, u.z, v.x, v.y, v.z).bad() ||
+      measures == nullptr || measures->getPixelSpacing(row, 0).bad() || measures->getPixelSpacing(column, 1).bad())
     return false;
   constexpr double kSame = 1e-3;
   return length(u - along_row) < kSame && length(v - along_column) < kSame && std::abs(row - row_mm) < kSame * row_mm &&
@@ -289,12 +307,15 @@ void unpack_pixels(const fs::path& path, DcmDataset& d) {
 
 }  // namespace
 
-void save_segmentation(const Labels& labels, const fs::path& path, const DicomObjectOptions& options, const Context& context) {
+void save_segmentation(const Labels& labels, const fs::path& path, const DicomObjectOptions& options,
+                       const Context& context) {
   write(stack_of(labels, options.source), structures_of(labels), path, options, context);
 }
 
-void save_segmentation_on_source(const Labels& labels, const fs::path& path, const DicomObjectOptions& options, const Context& context) {
-  if (options.source == nullptr) throw Error(ExitCode::usage, "a segmentation on the slices of its source needs the source series");
+void save_segmentation_on_source(const Labels& labels, const fs::path& path, const DicomObjectOptions& options,
+                                 const Context& context) {
+  if (options.source == nullptr)
+    throw Error(ExitCode::usage, "a segmentation on the slices of its source needs the source series");
   write(stack_on_source(labels, *options.source), structures_of(labels), path, options, context);
 }
 
@@ -303,7 +324,8 @@ bool is_segmentation(const fs::path& path) {
   OFString uid;
   DcmFileFormat file;
   if (file.loadFile(path.c_str(), EXS_Unknown, EGL_noChange, 64, ERM_fileOnly).bad()) return false;
-  return (file.getMetaInfo()->findAndGetOFString(DCM_MediaStorageSOPClassUID, uid).good() && uid == UID_SegmentationStorage) ||
+  return (file.getMetaInfo()->findAndGetOFString(DCM_MediaStorageSOPClassUID, uid).good() &&
+          uid == UID_SegmentationStorage) ||
          (file.getDataset()->findAndGetOFString(DCM_SOPClassUID, uid).good() && uid == UID_SegmentationStorage);
 }
 
@@ -338,13 +360,15 @@ Labels load_segmentation(const fs::path& path, const Context& context) {
   file.getDataset()->findAndGetUint8Array(DCM_PixelData, pixels, &pixel_bytes);
   auto* const orientation =
       OFstatic_cast(FGPlaneOrientationPatient*, seg->getFunctionalGroups().get(0, DcmFGTypes::EFG_PLANEORIENTPATIENT));
-  auto* const measures = OFstatic_cast(FGPixelMeasures*, seg->getFunctionalGroups().get(0, DcmFGTypes::EFG_PIXELMEASURES));
+  auto* const measures =
+      OFstatic_cast(FGPixelMeasures*, seg->getFunctionalGroups().get(0, DcmFGTypes::EFG_PIXELMEASURES));
   Labels labels;
   Frame& f = labels.frame;
   Vec3 &u = f.direction.column[0], &v = f.direction.column[1];
   Float64 row_mm = 0, column_mm = 0;
-  if (orientation == nullptr || orientation->getImageOrientationPatient(u.x, u.y, u.z, v.x, v.y, v.z).bad() || measures == nullptr ||
-      measures->getPixelSpacing(row_mm, 0).bad() || measures->getPixelSpacing(column_mm, 1).bad()) {
+  if (orientation == nullptr || orientation->getImageOrientationPatient(u.x, u.y, u.z, v.x, v.y, v.z).bad() ||
+      measures == nullptr || measures->getPixelSpacing(row_mm, 0).bad() ||
+      measures->getPixelSpacing(column_mm, 1).bad()) {
     throw fail("it does not say where its frames lie in the patient");
   }
   u = normalized(u);
@@ -355,7 +379,8 @@ Labels load_segmentation(const fs::path& path, const Context& context) {
   for (Uint32 i = 0; i < frames; ++i) {
     if (!read_position(*seg, i, at[i])) throw fail("frame " + std::to_string(i + 1) + " states no position");
     if (!lies_as(*seg, i, u, v, row_mm, column_mm))
-      throw fail("frame " + std::to_string(i + 1) + " is turned against the first, or has other pixels: the frames make no one volume");
+      throw fail("frame " + std::to_string(i + 1) +
+                 " is turned against the first, or has other pixels: the frames make no one volume");
     along.push_back(dot(at[i], f.direction.column[2]));
   }
   Float64 spacing_mm = 0, thickness_mm = 0;
@@ -392,7 +417,8 @@ Labels load_segmentation(const fs::path& path, const Context& context) {
   for (Uint32 i = 0; i < frames; ++i) {
     auto* const group = OFstatic_cast(FGSegmentation*, seg->getFunctionalGroups().get(i, DcmFGTypes::EFG_SEGMENTATION));
     Uint16 number = 0;
-    if (group == nullptr || group->getReferencedSegmentNumber(number).bad() || number < 1 || number > labels.structures.size()) {
+    if (group == nullptr || group->getReferencedSegmentNumber(number).bad() || number < 1 ||
+        number > labels.structures.size()) {
       throw fail("frame " + std::to_string(i + 1) + " does not say which segment it shows");
     }
     std::uint8_t* const out = voxels.get() + static_cast<std::size_t>(layers.layer[i]) * area;
@@ -400,14 +426,16 @@ Labels load_segmentation(const fs::path& path, const Context& context) {
       overlap += out[p] != 0 ? 1 : 0;
       out[p] = static_cast<std::uint8_t>(number);
     };
-    if (pixels == nullptr || pixel_bytes * (bits ? 8 : 1) < (i + 1) * area) throw fail("frame " + std::to_string(i + 1) + " is cut short");
+    if (pixels == nullptr || pixel_bytes * (bits ? 8 : 1) < (i + 1) * area)
+      throw fail("frame " + std::to_string(i + 1) + " is cut short");
     for (std::size_t p = 0, bit = i * area; p < area; ++p, ++bit) {
       if (bits ? (pixels[bit / 8] >> (bit % 8) & 1) != 0 : pixels[bit] >= half) mark(p);
     }
   }
-  if (overlap > 0) context.warn(std::to_string(overlap) + " voxels belong to several segments; the last one keeps them");
+  if (overlap > 0)
+    context.warn(std::to_string(overlap) + " voxels belong to several segments; the last one keeps them");
   labels.voxels = voxels;
   return labels;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

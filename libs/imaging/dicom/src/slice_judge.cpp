@@ -34,7 +34,8 @@ double difference(const SliceFigure& a, const SliceFigure& b, int turned_over = 
   for (int j = 0; j < a.rows(); ++j) {
     for (int i = 0; i < a.columns(); ++i) {
       const auto& p = a.at(i, j);
-      const auto& q = b.at((turned_over & 1) != 0 ? a.columns() - 1 - i : i, (turned_over & 2) != 0 ? a.rows() - 1 - j : j);
+      const auto& q =
+          b.at((turned_over & 1) != 0 ? a.columns() - 1 - i : i, (turned_over & 2) != 0 ? a.rows() - 1 - j : j);
       if (std::max(p.hu, q.hu) < kObjectHu) continue;
       sum += std::abs(std::clamp(p.hu, -1000.F, 1500.F) - std::clamp(q.hu, -1000.F, 1500.F));
       ++n;
@@ -45,7 +46,8 @@ double difference(const SliceFigure& a, const SliceFigure& b, int turned_over = 
 
 class SliceJudge {
  public:
-  SliceJudge(Verdict& v, const std::vector<JudgedSlice>& slices, const std::vector<SliceFigure>& figures, double block_mm2)
+  SliceJudge(Verdict& v, const std::vector<JudgedSlice>& slices, const std::vector<SliceFigure>& figures,
+             double block_mm2)
       : verdict_(v), slices_(slices), figures_(figures), block_mm2_(block_mm2), odd_(figures.size(), false) {}
 
   void run() {
@@ -67,13 +69,14 @@ class SliceJudge {
   [[nodiscard]] const SliceFigure& figure(std::size_t s) const { return figures_[sound_[s]]; }
   [[nodiscard]] const std::string& name(std::size_t s) const { return slices_[sound_[s]].name; }
   [[nodiscard]] static int object_blocks(const SliceFigure& f) {
-    return static_cast<int>(
-        std::count_if(f.blocks().begin(), f.blocks().end(), [](const auto& b) { return !b.one_value && b.hu > kObjectHu; }));
+    return static_cast<int>(std::count_if(f.blocks().begin(), f.blocks().end(),
+                                          [](const auto& b) { return !b.one_value && b.hu > kObjectHu; }));
   }
 
   [[nodiscard]] std::string listed(const std::vector<std::string>& names) const {
-    return names.size() == 1 ? "'" + names.front() + "'"
-                             : std::to_string(names.size()) + " slices ('" + names.front() + "' to '" + names.back() + "')";
+    return names.size() == 1
+               ? "'" + names.front() + "'"
+               : std::to_string(names.size()) + " slices ('" + names.front() + "' to '" + names.back() + "')";
   }
 
   // A slice of one value between slices that show a body, or at an end where the body is too large to end between two
@@ -89,7 +92,9 @@ class SliceJudge {
       std::size_t end = k;
       while (end < n && figures_[end].blank()) ++end;
       const int before = k > 0 ? object_blocks(figures_[k - 1]) : 0, after = end < n ? object_blocks(figures_[end]) : 0;
-      const double gap = k > 0 ? slices_[k].along_mm - slices_[k - 1].along_mm : end < n ? slices_[end].along_mm - slices_[end - 1].along_mm : 0;
+      const double gap = k > 0     ? slices_[k].along_mm - slices_[k - 1].along_mm
+                         : end < n ? slices_[end].along_mm - slices_[end - 1].along_mm
+                                   : 0;
       const double beside_mm2 = std::max(before, after) * block_mm2_;
       const bool within = before >= kLeastBlocks && after >= kLeastBlocks;
       if (within || beside_mm2 > kSliceBlankEndMm2PerMm * std::max(gap, 0.5)) {
@@ -101,10 +106,11 @@ class SliceJudge {
       k = end;
     }
     if (names.empty()) return;
-    verdict_.add(code::slice_blank, Severity::warning,
-                 listed(names) + (names.size() == 1 ? " shows" : " show") +
-                     " nothing, every pixel has the same value, where the slices beside it show a body: bone is missing there",
-                 "copy the files again from their source, or export the series again", names);
+    verdict_.add(
+        code::slice_blank, Severity::warning,
+        listed(names) + (names.size() == 1 ? " shows" : " show") +
+            " nothing, every pixel has the same value, where the slices beside it show a body: bone is missing there",
+        "copy the files again from their source, or export the series again", names);
   }
 
   // Rows or columns of one value where the slices before and after show a body, or as much anywhere: what was not sent,
@@ -117,7 +123,9 @@ class SliceJudge {
     std::vector<std::pair<std::size_t, std::size_t>> run_of(lost.size());
     const std::vector<bool> odd_before = odd_;
     constexpr std::size_t kReach = 12;
-    const auto body = [&](std::size_t k, std::size_t b) { return !figures_[k].blocks()[b].one_value && figures_[k].blocks()[b].hu > kObjectHu; };
+    const auto body = [&](std::size_t k, std::size_t b) {
+      return !figures_[k].blocks()[b].one_value && figures_[k].blocks()[b].hu > kObjectHu;
+    };
     for (std::size_t k = 0; k < n; ++k) {
       if (odd_before[k]) continue;
       int all = 0, gone = 0;
@@ -139,7 +147,8 @@ class SliceJudge {
         if (after < n) ++runs[run_of[b] = {before, after}];
       }
       if (runs.empty()) continue;
-      const auto most = std::max_element(runs.begin(), runs.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+      const auto most =
+          std::max_element(runs.begin(), runs.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
       gone = most->second;
       for (std::size_t b = 0; b < lost.size(); ++b) lost[b] = run_of[b] == most->first;
       // Lines of blocks from edge to edge.
@@ -157,7 +166,8 @@ class SliceJudge {
         return found;
       };
       const int of_rows = lines(rows, columns, [&](int l, int i) { return static_cast<std::size_t>(l * columns + i); });
-      const int of_columns = lines(columns, rows, [&](int l, int i) { return static_cast<std::size_t>(i * columns + l); });
+      const int of_columns =
+          lines(columns, rows, [&](int l, int i) { return static_cast<std::size_t>(i * columns + l); });
       if (of_rows == 0 && of_columns == 0 && (gone < kLeastBlocks || gone < kSlicePartShare * (all + gone))) continue;
       names.push_back(slices_[k].name);
       odd_[k] = true;
@@ -165,7 +175,8 @@ class SliceJudge {
     if (names.empty()) return;
     verdict_.add(code::slice_part_missing, Severity::warning,
                  "a part of " + listed(names) +
-                     " is of one value where the slices before and after show a body: the picture was not written whole, bone is missing there",
+                     " is of one value where the slices before and after show a body: the picture was not written "
+                     "whole, bone is missing there",
                  "copy the files again from their source, or export the series again", names);
   }
 
@@ -194,7 +205,8 @@ class SliceJudge {
     std::vector<double> steps;
     const auto within = [](const SliceFigure& f, int i, int j) {
       const auto body = [](float hu) { return hu > kObjectHu && hu < -kObjectHu + 100; };
-      return body(f.at(i, j).hu) && body(f.at(i - 1, j).hu) && body(f.at(i + 1, j).hu) && body(f.at(i, j - 1).hu) && body(f.at(i, j + 1).hu);
+      return body(f.at(i, j).hu) && body(f.at(i - 1, j).hu) && body(f.at(i + 1, j).hu) && body(f.at(i, j - 1).hu) &&
+             body(f.at(i, j + 1).hu);
     };
     const auto soft = [](float hu) { return hu > -200 && hu < 200; };
     for (int j = 1; j + 1 < a.rows(); ++j) {
@@ -207,7 +219,8 @@ class SliceJudge {
   }
   // Nearly all blocks step alike.
   static bool exceeds(const Step& step, double limit, double least_share) {
-    return step.known && std::abs(step.hu) > limit && std::abs(step.least) > least_share * std::abs(step.hu) && step.least * step.hu > 0;
+    return step.known && std::abs(step.hu) > limit && std::abs(step.least) > least_share * std::abs(step.hu) &&
+           step.least * step.hu > 0;
   }
 
   // Air and soft tissue are as bright in a slice as in the next: a step of either is another scale, which no body has.
@@ -220,7 +233,8 @@ class SliceJudge {
       if (air.back().known) sizes_air.push_back(std::abs(air.back().hu));
       if (soft.back().known) sizes_soft.push_back(std::abs(soft.back().hu));
     }
-    const double limit_air = std::max(kSliceStepHu, 6 * median(sizes_air)), limit_soft = std::max(kSliceStepHu, 6 * median(sizes_soft));
+    const double limit_air = std::max(kSliceStepHu, 6 * median(sizes_air)),
+                 limit_soft = std::max(kSliceStepHu, 6 * median(sizes_soft));
     std::vector<std::string> names;
     std::string said;
     double most = 0;
@@ -236,10 +250,11 @@ class SliceJudge {
              (hu > 0 ? "brighter" : "darker") + " in '" + name(s + 1) + "' than in '" + name(s) + "' beside it";
     }
     if (names.empty()) return;
-    verdict_.add(code::slice_values_step, Severity::warning,
-                 said + (names.size() > 1 ? "; the values step at " + std::to_string(names.size()) + " places" : "") +
-                     ": the rescale slope or intercept of some slices is wrong, and a threshold takes another bone there",
-                 "compare with the scanner's own pictures, or export the series again", names);
+    verdict_.add(
+        code::slice_values_step, Severity::warning,
+        said + (names.size() > 1 ? "; the values step at " + std::to_string(names.size()) + " places" : "") +
+            ": the rescale slope or intercept of some slices is wrong, and a threshold takes another bone there",
+        "compare with the scanner's own pictures, or export the series again", names);
   }
 
   // A slice that fits the one beside it better when it is turned over.
@@ -261,7 +276,8 @@ class SliceJudge {
     static constexpr const char* kHow[] = {"", "left and right", "up and down", "both ways (half a turn)"};
     verdict_.add(code::slice_mirrored, Severity::warning,
                  "from '" + names.front() + "' on the pictures fit those before only when turned over, " + kHow[how] +
-                     (names.size() > 1 ? ", until '" + names[1] + "'" : "") + ": some slices are mirrored, and left is not left in them",
+                     (names.size() > 1 ? ", until '" + names[1] + "'" : "") +
+                     ": some slices are mirrored, and left is not left in them",
                  "compare with the scanner's own pictures, or export the series again", names);
   }
 
@@ -312,28 +328,34 @@ class SliceJudge {
     verdict_.add(code::slice_order, Severity::warning,
                  "'" + name(at.first) + "' and '" + name(at.second) +
                      "' fit the slices beside them better in each other's place: their positions seem to be exchanged",
-                 "compare with the scanner's own pictures, or export the series again", {name(at.first), name(at.second)});
+                 "compare with the scanner's own pictures, or export the series again",
+                 {name(at.first), name(at.second)});
   }
 
-  [[nodiscard]] bool explained(std::size_t s) const { return std::find(explained_.begin(), explained_.end(), s) != explained_.end(); }
+  [[nodiscard]] bool explained(std::size_t s) const {
+    return std::find(explained_.begin(), explained_.end(), s) != explained_.end();
+  }
   static std::string whole(double v) { return format_number(std::round(v)); }
 
   Verdict& verdict_;
   const std::vector<JudgedSlice>& slices_;
   const std::vector<SliceFigure>& figures_;
   double block_mm2_;
-  std::vector<bool> odd_;            // shows nothing, or not all
-  std::vector<std::size_t> sound_;   // the others
-  std::vector<double> steps_;        // difference of a sound slice from the next
+  std::vector<bool> odd_;               // shows nothing, or not all
+  std::vector<std::size_t> sound_;      // the others
+  std::vector<double> steps_;           // difference of a sound slice from the next
   std::vector<std::size_t> explained_;  // steps that are told already
 };
 
 }  // namespace
 
 SliceFigure::SliceFigure(const std::int16_t* hu, int columns, int rows)
-    : columns_(std::clamp(columns / 4, 1, kSide)), rows_(std::clamp(rows / 4, 1, kSide)), blocks_(static_cast<std::size_t>(columns_ * rows_)) {
+    : columns_(std::clamp(columns / 4, 1, kSide)),
+      rows_(std::clamp(rows / 4, 1, kSide)),
+      blocks_(static_cast<std::size_t>(columns_ * rows_)) {
   std::vector<int> first(static_cast<std::size_t>(columns_) + 1);
-  for (int i = 0; i <= columns_; ++i) first[static_cast<std::size_t>(i)] = static_cast<int>(static_cast<std::int64_t>(i) * columns / columns_);
+  for (int i = 0; i <= columns_; ++i)
+    first[static_cast<std::size_t>(i)] = static_cast<int>(static_cast<std::int64_t>(i) * columns / columns_);
   std::vector<std::int64_t> sum(static_cast<std::size_t>(columns_)), padding(sum.size());
   std::vector<std::int16_t> lowest(sum.size()), highest(sum.size());
   const std::int16_t any = hu[0];
@@ -363,7 +385,8 @@ SliceFigure::SliceFigure(const std::int16_t* hu, int columns, int rows)
     }
     for (std::size_t i = 0; i < sum.size(); ++i) {
       Block& b = blocks_[static_cast<std::size_t>(j * columns_) + i];
-      const std::int64_t count = static_cast<std::int64_t>(end - begin) * (first[i + 1] - first[i]), seen = count - padding[i];
+      const std::int64_t count = static_cast<std::int64_t>(end - begin) * (first[i + 1] - first[i]),
+                         seen = count - padding[i];
       b.one_value = lowest[i] == highest[i];
       b.measured = seen > 0;
       if (seen > 0) b.hu = static_cast<float>(sum[i] - padding[i] * kNoValue) / static_cast<float>(seen);
@@ -376,7 +399,8 @@ void judge_slices(Verdict& verdict, const std::vector<JudgedSlice>& slices, cons
                   double picture_mm2) {
   if (figures.size() != slices.size()) return;
   // A lattice may end before the last slices, which are then not read.
-  const auto end = std::find_if(figures.begin(), figures.end(), [](const SliceFigure& f) { return f.blocks().empty(); });
+  const auto end =
+      std::find_if(figures.begin(), figures.end(), [](const SliceFigure& f) { return f.blocks().empty(); });
   const auto n = static_cast<std::size_t>(end - figures.begin());
   if (n < kLeastSlices || figures.front().columns() < kLeastSide || figures.front().rows() < kLeastSide) return;
   const double block_mm2 = picture_mm2 / static_cast<double>(figures.front().blocks().size());
@@ -386,4 +410,4 @@ void judge_slices(Verdict& verdict, const std::vector<JudgedSlice>& slices, cons
   SliceJudge(verdict, read_slices, read, block_mm2).run();
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

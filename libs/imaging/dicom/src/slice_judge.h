@@ -45,6 +45,7 @@ struct JudgedSlice {
 /// picture, pictures of which a part is missing, steps in the values, slices in another order than their positions say,
 /// slices that are mirrored. Nothing for fewer than four slices or fewer than 48 pixels a side. Slices are in order
 /// along the normal, all figures of one size; `picture_mm2` is the area of one. O(slices * blocks).
-void judge_slices(Verdict& verdict, const std::vector<JudgedSlice>& slices, const std::vector<SliceFigure>& figures, double picture_mm2);
+void judge_slices(Verdict& verdict, const std::vector<JudgedSlice>& slices, const std::vector<SliceFigure>& figures,
+                  double picture_mm2);
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

@@ -10,7 +10,8 @@
 
 namespace osteo::inline imaging::dicom {
 
-void SliceReader::read(std::size_t begin, std::size_t end, const std::vector<std::int16_t*>& out, const Context& context) {
+void SliceReader::read(std::size_t begin, std::size_t end, const std::vector<std::int16_t*>& out,
+                       const Context& context) {
   // Frames of one file are one job.
   std::map<std::size_t, std::vector<FrameTarget>> jobs;
   for (std::size_t k = begin; k < end; ++k) {
@@ -20,7 +21,8 @@ void SliceReader::read(std::size_t begin, std::size_t end, const std::vector<std
   std::vector<ValueCount> counts(list.size());
   std::optional<DamagedFile> damaged;
   std::mutex mutex;
-  // A compressed file of many frames is decoded once, a frame a thread, before the files of single frames are shared out.
+  // A compressed file of many frames is decoded once, a frame a thread, before the files of single frames are shared
+  // out.
   for (std::size_t f = 0; f < list.size() && !damaged; ++f) {
     const auto& [index, targets] = list[f];
     const DicomHeader& h = headers_[index];
@@ -96,12 +98,14 @@ SliceSampler::SliceSampler(const Placement& placement, int columns, int rows, co
 std::pair<std::size_t, std::size_t> SliceSampler::slices_of(int z) const {
   const auto& s = placement_.slices;
   const double at = along(z);
-  const auto it = std::lower_bound(s.begin(), s.end(), at + 1e-9, [](const PlacedSlice& p, double v) { return p.along_mm < v; });
+  const auto it =
+      std::lower_bound(s.begin(), s.end(), at + 1e-9, [](const PlacedSlice& p, double v) { return p.along_mm < v; });
   const auto above = std::clamp<std::ptrdiff_t>(it - s.begin(), 1, static_cast<std::ptrdiff_t>(s.size()) - 1);
   return {static_cast<std::size_t>(above - 1), static_cast<std::size_t>(above)};
 }
 
-void SliceSampler::row(int y, int z, const std::vector<const std::int16_t*>& slices, std::int16_t* out, Scratch& scratch) const {
+void SliceSampler::row(int y, int z, const std::vector<const std::int16_t*>& slices, std::int16_t* out,
+                       Scratch& scratch) const {
   const auto nx = static_cast<std::size_t>(frame_.dims[0]), columns = static_cast<std::size_t>(columns_);
   const auto [below, above] = slices_of(z);
   const double low = placement_.slices[below].along_mm, high = placement_.slices[above].along_mm;
@@ -114,7 +118,8 @@ void SliceSampler::row(int y, int z, const std::vector<const std::int16_t*>& sli
     const auto share = static_cast<float>(side == 0 ? 1 - t : t);
     if (share < 1e-6F) continue;
     const std::size_t k = side == 0 ? below : above;
-    double j = (side_first_[1] + y * frame_.spacing_mm.y - placement_.slices[k].sideways_mm[1]) / placement_.row_spacing_mm;
+    double j =
+        (side_first_[1] + y * frame_.spacing_mm.y - placement_.slices[k].sideways_mm[1]) / placement_.row_spacing_mm;
     if (std::abs(j - std::round(j)) < 1e-6) j = std::round(j);
     if (j < -0.5 || j > rows_ - 0.5) continue;
     j = std::clamp(j, 0.0, rows_ - 1.0);
@@ -128,9 +133,11 @@ void SliceSampler::row(int y, int z, const std::vector<const std::int16_t*>& sli
     for (std::size_t i = 0; i < columns; ++i) lowest = std::min({lowest, p[i], q[i]});
     const float wp = share * (1 - fy), wq = share * fy;
     const AlongRow& table = *of_slice_[k];
-    const auto begin = static_cast<std::size_t>(table.begin), end = static_cast<std::size_t>(std::max(table.begin, table.end));
+    const auto begin = static_cast<std::size_t>(table.begin),
+               end = static_cast<std::size_t>(std::max(table.begin, table.end));
     if (lowest != kNoValue) {
-      for (std::size_t i = 0; i < columns; ++i) value[i] = wp * static_cast<float>(p[i]) + wq * static_cast<float>(q[i]);
+      for (std::size_t i = 0; i < columns; ++i)
+        value[i] = wp * static_cast<float>(p[i]) + wq * static_cast<float>(q[i]);
       value[columns] = value[columns - 1];
       for (std::size_t x = begin; x < end; ++x) {
         const Tap tap = table.taps[x];
@@ -162,4 +169,4 @@ void SliceSampler::row(int y, int z, const std::vector<const std::int16_t*>& sli
   }
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

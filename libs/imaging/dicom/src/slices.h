@@ -36,13 +36,15 @@ class SliceReader {
   std::map<std::size_t, std::vector<std::int16_t>> decoded_;  // compressed multi-frame files, kept
 };
 
-/// An upright lattice above the slices of a placement: linear along rows, columns and the normal, each slice where it lies.
+/// An upright lattice above the slices of a placement: linear along rows, columns and the normal, each slice where it
+/// lies.
 class SliceSampler {
  public:
   SliceSampler(const Placement& placement, int columns, int rows, const Frame& frame);
   /// Slices [first, last] that layer z lies between.
   [[nodiscard]] std::pair<std::size_t, std::size_t> slices_of(int z) const;
-  /// One row of the lattice. slice(k) gives the pixels of slice k. Voxels that no measured pixel reaches become kNoValue.
+  /// One row of the lattice. slice(k) gives the pixels of slice k. Voxels that no measured pixel reaches become
+  /// kNoValue.
   struct Scratch {
     std::vector<float> value, weight, sum, sum_weight;
   };
@@ -67,4 +69,4 @@ class SliceSampler {
   std::map<long long, AlongRow> tables_;  // by sideways shift: slices that stand above each other share one
 };
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

@@ -49,7 +49,8 @@ class Walker {
     if (at + n > size_) return false;
     if (at < window_at_ || at + n > window_at_ + window_.size()) {
       window_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(1 << 15, size_ - at)));
-      if (::pread(fd_, window_.data(), window_.size(), static_cast<off_t>(at)) != static_cast<ssize_t>(window_.size())) {
+      if (::pread(fd_, window_.data(), window_.size(), static_cast<off_t>(at)) !=
+          static_cast<ssize_t>(window_.size())) {
         window_.clear();
         return false;
       }
@@ -87,8 +88,9 @@ class Walker {
     const std::string_view name(vr, 2);
     e.sequence = name == "SQ";
     e.unknown = name == "UN";
-    const bool wide = e.sequence || e.unknown || name == "OB" || name == "OW" || name == "OF" || name == "OD" || name == "OL" ||
-                      name == "OV" || name == "UT" || name == "UC" || name == "UR" || name == "SV" || name == "UV";
+    const bool wide = e.sequence || e.unknown || name == "OB" || name == "OW" || name == "OF" || name == "OD" ||
+                      name == "OL" || name == "OV" || name == "UT" || name == "UC" || name == "UR" || name == "SV" ||
+                      name == "UV";
     if (!wide) return u16(at + 6, e.length);
     e.value_at = at + 12;
     return u32(at + 8, e.length);
@@ -127,7 +129,8 @@ class Walker {
     return true;
   }
 
-  // Elements from `at` to `end`; inside an item of undefined length they end with its delimiter, and `at` is left behind it.
+  // Elements from `at` to `end`; inside an item of undefined length they end with its delimiter, and `at` is left
+  // behind it.
   bool elements(std::uint64_t& at, std::uint64_t end, bool delimited, int depth) {
     if (depth == 0) {
       explicit_ = !implicit_next_;
@@ -191,4 +194,4 @@ bool header_is_sound(const std::filesystem::path& file) {
   return Walker(file).sound();
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

@@ -70,7 +70,9 @@ class StackChooser {
  private:
   [[nodiscard]] const DicomFrame& frame_of(const Candidate& c) const { return pictures_.frame_of(c); }
   [[nodiscard]] std::string name_of(const Candidate& c) const { return pictures_.name_of(c); }
-  [[nodiscard]] double corner_deviation(const Candidate& a, const Candidate& b) const { return pictures_.corner_deviation(a, b); }
+  [[nodiscard]] double corner_deviation(const Candidate& a, const Candidate& b) const {
+    return pictures_.corner_deviation(a, b);
+  }
   void set_aside(std::size_t header, std::string_view code, const std::string& why) {
     verdict_.set_aside.push_back({headers_[header].name, std::string(code), why});
   }
@@ -95,16 +97,17 @@ class StackChooser {
     for (auto& [code, files] : damaged) {
       const std::string why = verdict_.set_aside[index_of(files.front())].why;
       verdict_.add(code, Severity::warning,
-                   (files.size() == 1 ? "'" + files.front() + "' is left out: "
-                                      : std::to_string(files.size()) + " files are left out, the first '" + files.front() + "': ") +
+                   (files.size() == 1
+                        ? "'" + files.front() + "' is left out: "
+                        : std::to_string(files.size()) + " files are left out, the first '" + files.front() + "': ") +
                        why,
                    "copy the files again from their source, or ask for the original export", files);
     }
     if (all.empty()) {
       verdict_.add(verdict_.set_aside.empty() ? code::not_a_volume : verdict_.set_aside.front().code, Severity::error,
-                   verdict_.set_aside.empty()
-                       ? "there is no slice"
-                       : "no file can be used; '" + verdict_.set_aside.front().file + "': " + verdict_.set_aside.front().why,
+                   verdict_.set_aside.empty() ? "there is no slice"
+                                              : "no file can be used; '" + verdict_.set_aside.front().file +
+                                                    "': " + verdict_.set_aside.front().why,
                    "choose another series");
     }
     return all;
@@ -121,7 +124,8 @@ class StackChooser {
   void require_ct(const std::vector<Candidate>& all) {
     const std::string& modality = headers_[all.front().header].modality;
     if (modality == "CT") return;
-    verdict_.add(code::not_ct, Severity::error, "the series is not a CT but " + (modality.empty() ? "of no stated modality" : modality),
+    verdict_.add(code::not_ct, Severity::error,
+                 "the series is not a CT but " + (modality.empty() ? "of no stated modality" : modality),
                  "Hounsfield units, and with them bone, are known in a CT only; --any-modality takes it all the same");
   }
 
@@ -157,9 +161,9 @@ class StackChooser {
     return std::adjacent_find(sorted.begin(), sorted.end(), same_place) != sorted.end();
   }
 
-  // Leaves out what is there twice, then parts what does not belong together: acquisitions, times, tube voltages, kinds, kernels and
-  // thicknesses that share places or take turns. A stack that still has two different slices at one place comes back as it is; choose()
-  // refuses it.
+  // Leaves out what is there twice, then parts what does not belong together: acquisitions, times, tube voltages,
+  // kinds, kernels and thicknesses that share places or take turns. A stack that still has two different slices at one
+  // place comes back as it is; choose() refuses it.
   std::vector<std::vector<Candidate>> without_conflicts(std::vector<Candidate> cluster) {
     sort_along(cluster);
     drop_duplicates(cluster);
@@ -192,7 +196,8 @@ class StackChooser {
     return d - normal * dot(d, normal);
   }
 
-  // Two reconstructions beside each other, like both ears: two groups, if slices at one place, or slices in turn, lie well apart sideways.
+  // Two reconstructions beside each other, like both ears: two groups, if slices at one place, or slices in turn, lie
+  // well apart sideways.
   [[nodiscard]] std::vector<std::vector<Candidate>> side_by_side(const std::vector<Candidate>& sorted) const {
     constexpr double kApartMm = 5;
     const bool conflict = has_conflict(sorted);
@@ -212,7 +217,8 @@ class StackChooser {
       sides[side].push_back(c);
     }
     if (sides[0].size() < 2 || sides[1].size() < 2) return {};
-    if (conflict ? has_conflict(sides[0]) || has_conflict(sides[1]) : changes < 4 || changes * 4 < sorted.size()) return {};
+    if (conflict ? has_conflict(sides[0]) || has_conflict(sides[1]) : changes < 4 || changes * 4 < sorted.size())
+      return {};
     return sides;
   }
 
@@ -235,8 +241,8 @@ class StackChooser {
     sorted = std::move(kept);
   }
 
-  // Two scans in one series whose slices interleave without meeting. One value a slice is a counter, and blocks one after the other are
-  // one scan in parts.
+  // Two scans in one series whose slices interleave without meeting. One value a slice is a counter, and blocks one
+  // after the other are one scan in parts.
   template <class Key>
   [[nodiscard]] bool take_turns(const std::vector<Candidate>& sorted, const Key& key) const {
     std::size_t changes = 0;
@@ -269,7 +275,8 @@ class StackChooser {
     if (options_.stack > 0) {
       if (static_cast<std::size_t>(options_.stack) > std::max<std::size_t>(volumes, 1)) {
         verdict_.add(code::not_a_volume, Severity::error,
-                     "there is no stack " + std::to_string(options_.stack) + "; the series holds " + std::to_string(verdict_.stacks));
+                     "there is no stack " + std::to_string(options_.stack) + "; the series holds " +
+                         std::to_string(verdict_.stacks));
         return {};
       }
       take = static_cast<std::size_t>(options_.stack) - 1;
@@ -285,13 +292,13 @@ class StackChooser {
       for (std::size_t s = 0; s < volumes; ++s) {
         const DicomHeader& h = headers_[stacks[s].front().header];
         list += (s == 0 ? "" : "; ") + std::to_string(s + 1) + ": " + std::to_string(stacks[s].size()) + " slices of " +
-                std::to_string(h.columns) + "x" + std::to_string(h.rows) + (axial(stacks[s]) ? ", axial" : ", not axial") + described(h) +
-                place_of(stacks[s], stacks);
+                std::to_string(h.columns) + "x" + std::to_string(h.rows) +
+                (axial(stacks[s]) ? ", axial" : ", not axial") + described(h) + place_of(stacks[s], stacks);
       }
-      verdict_.add(
-          code::several_stacks, Severity::warning,
-          "the series holds " + std::to_string(volumes) + " stacks (" + list + "); stack " + std::to_string(take + 1) + " is taken",
-          "--stack takes another");
+      verdict_.add(code::several_stacks, Severity::warning,
+                   "the series holds " + std::to_string(volumes) + " stacks (" + list + "); stack " +
+                       std::to_string(take + 1) + " is taken",
+                   "--stack takes another");
     }
     if (chosen.size() < 2) {
       verdict_.add(code::not_a_volume, Severity::error, "there is only one slice ('" + name_of(chosen.front()) + "')",
@@ -301,26 +308,30 @@ class StackChooser {
     if (has_conflict(chosen)) {
       const auto at = std::adjacent_find(chosen.begin(), chosen.end(), same_place);
       const bool all = same_place(chosen.front(), chosen.back());
-      verdict_.add(all ? code::not_a_volume : code::slices_at_one_place, Severity::error,
-                   all ? "all " + std::to_string(chosen.size()) + " slices lie at one place ('" + name_of(chosen.front()) + "', ...)"
-                       : "'" + name_of(at[0]) + "' and '" + name_of(at[1]) + "' lie at one place but show different pictures",
-                   all ? "this is a series over time, not a volume; choose another series"
-                       : "the series mixes several scans and does not say which slice is of which; export one of them",
-                   {name_of(at[0]), name_of(at[1])});
+      verdict_.add(
+          all ? code::not_a_volume : code::slices_at_one_place, Severity::error,
+          all ? "all " + std::to_string(chosen.size()) + " slices lie at one place ('" + name_of(chosen.front()) +
+                    "', ...)"
+              : "'" + name_of(at[0]) + "' and '" + name_of(at[1]) + "' lie at one place but show different pictures",
+          all ? "this is a series over time, not a volume; choose another series"
+              : "the series mixes several scans and does not say which slice is of which; export one of them",
+          {name_of(at[0]), name_of(at[1])});
       return {};
     }
     return chosen;
   }
 
   // Of the middle of a stack, where the stacks lie beside each other.
-  [[nodiscard]] std::string place_of(const std::vector<Candidate>& stack, const std::vector<std::vector<Candidate>>& stacks) const {
-    if (std::none_of(stacks.begin(), stacks.end(),
-                     [&](const auto& s) { return length(sideways(stack.front(), s.front())) > 5 && axial(s) == axial(stack); }))
+  [[nodiscard]] std::string place_of(const std::vector<Candidate>& stack,
+                                     const std::vector<std::vector<Candidate>>& stacks) const {
+    if (std::none_of(stacks.begin(), stacks.end(), [&](const auto& s) {
+          return length(sideways(stack.front(), s.front())) > 5 && axial(s) == axial(stack);
+        }))
       return {};
     const DicomFrame& f = frame_of(stack.front());
     const DicomHeader& h = headers_[stack.front().header];
-    const Vec3 centre =
-        f.position_mm + f.along_row * (f.column_spacing_mm * (h.columns - 1) / 2) + f.along_column * (f.row_spacing_mm * (h.rows - 1) / 2);
+    const Vec3 centre = f.position_mm + f.along_row * (f.column_spacing_mm * (h.columns - 1) / 2) +
+                        f.along_column * (f.row_spacing_mm * (h.rows - 1) / 2);
     return ", its middle at " + mm(std::round(centre.x)) + " to the left";
   }
 
@@ -329,12 +340,13 @@ class StackChooser {
     if (c.frame > 0 && !verdict_.set_aside.empty() && verdict_.set_aside.back().file == a.name) return;
     const DicomFrame &f = frame_of(c), &g = frame_of(chosen);
     if (a.columns != b.columns || a.rows != b.rows) {
-      const std::string why = "it has " + std::to_string(a.columns) + "x" + std::to_string(a.rows) + " pixels, the others " +
-                              std::to_string(b.columns) + "x" + std::to_string(b.rows);
+      const std::string why = "it has " + std::to_string(a.columns) + "x" + std::to_string(a.rows) +
+                              " pixels, the others " + std::to_string(b.columns) + "x" + std::to_string(b.rows);
       set_aside(c.header, code::other_size, why);
     } else if (std::abs(f.column_spacing_mm - g.column_spacing_mm) * a.columns > kSamePlaceMm ||
                std::abs(f.row_spacing_mm - g.row_spacing_mm) * a.rows > kSamePlaceMm) {
-      set_aside(c.header, code::other_spacing, "its pixels are " + mm(f.column_spacing_mm) + ", the others' " + mm(g.column_spacing_mm));
+      set_aside(c.header, code::other_spacing,
+                "its pixels are " + mm(f.column_spacing_mm) + ", the others' " + mm(g.column_spacing_mm));
     } else if (corner_deviation(c, chosen) > kSamePlaceMm) {
       const Vec3 n = cross(f.along_row, f.along_column), m = cross(g.along_row, g.along_column);
       const double angle = std::acos(std::clamp(dot(n, m), -1.0, 1.0)) * kDegrees;
@@ -342,12 +354,13 @@ class StackChooser {
                 "it is turned against the others by " + format_number(std::round(angle * 100) / 100) + " degrees");
     } else {
       set_aside(c.header, code::other_acquisition,
-                a.acquisition != b.acquisition       ? "it is of another acquisition (" + std::to_string(a.acquisition) + ")"
-                : time_of(a) != time_of(b)           ? "it is of another time or tube voltage"
-                : kernel_of(a) != kernel_of(b)       ? "it is of another reconstruction (kernel " + a.kernel + ")"
-                : thickness_of(a) != thickness_of(b) ? "its slice is " + mm(a.thickness_mm) + " thick, the others " + mm(b.thickness_mm)
-                : length(sideways(chosen, c)) > 5    ? "it lies beside the others"
-                                                     : "it is of another kind (ImageType)");
+                a.acquisition != b.acquisition ? "it is of another acquisition (" + std::to_string(a.acquisition) + ")"
+                : time_of(a) != time_of(b)     ? "it is of another time or tube voltage"
+                : kernel_of(a) != kernel_of(b) ? "it is of another reconstruction (kernel " + a.kernel + ")"
+                : thickness_of(a) != thickness_of(b)
+                    ? "its slice is " + mm(a.thickness_mm) + " thick, the others " + mm(b.thickness_mm)
+                : length(sideways(chosen, c)) > 5 ? "it lies beside the others"
+                                                  : "it is of another kind (ImageType)");
     }
   }
 
@@ -366,8 +379,9 @@ class StackChooser {
       if (files.empty()) continue;
       const bool harmless = kind == code::duplicate_file || kind == code::duplicate_slice || verdict_.stacks > 1;
       verdict_.add(kind, harmless ? Severity::info : Severity::warning,
-                   (files.size() == 1 ? "'" + files.front() + "' is left out: "
-                                      : std::to_string(files.size()) + " files are left out, the first '" + files.front() + "': ") +
+                   (files.size() == 1
+                        ? "'" + files.front() + "' is left out: "
+                        : std::to_string(files.size()) + " files are left out, the first '" + files.front() + "': ") +
                        why,
                    harmless ? "" : "ask for the original export if these slices belong to the scan", files);
     }
@@ -382,9 +396,10 @@ class StackChooser {
 
 }  // namespace
 
-std::vector<Candidate> choose_stack(const Pictures& pictures, const PlaceOptions& options, const std::vector<FileSetAside>& excluded,
-                                    const SamePixels& same_pixels, Verdict& verdict) {
+std::vector<Candidate> choose_stack(const Pictures& pictures, const PlaceOptions& options,
+                                    const std::vector<FileSetAside>& excluded, const SamePixels& same_pixels,
+                                    Verdict& verdict) {
   return StackChooser(pictures, options, excluded, same_pixels, verdict).run();
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

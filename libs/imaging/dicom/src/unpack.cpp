@@ -34,7 +34,8 @@ std::vector<Unpacked> unpack(const fs::path& path, const fs::path& to, const Con
     if (status < ARCHIVE_WARN) throw fail("its index is damaged");
     if (archive_entry_filetype(entry) != AE_IFREG) continue;
     const char* const name = archive_entry_pathname(entry);
-    Unpacked u{to / ("unpacked-" + std::to_string(result.size())), name != nullptr ? name : "file-" + std::to_string(result.size())};
+    Unpacked u{to / ("unpacked-" + std::to_string(result.size())),
+               name != nullptr ? name : "file-" + std::to_string(result.size())};
     std::ofstream out(u.file, std::ios::binary);
     for (;;) {
       const la_ssize_t n = archive_read_data(in.get(), buffer.data(), buffer.size());
@@ -45,17 +46,20 @@ std::vector<Unpacked> unpack(const fs::path& path, const fs::path& to, const Con
       const auto space = fs::space(to, ec);
       if (!ec && space.available < (std::uintmax_t{1} << 29)) {
         throw Error(ExitCode::resources,
-                    "'" + path.string() + "' does not fit into the temporary folder after " + std::to_string(total >> 20) + " MB",
+                    "'" + path.string() + "' does not fit into the temporary folder after " +
+                        std::to_string(total >> 20) + " MB",
                     "set TMPDIR to a folder with more room, or unpack it by hand");
       }
       out.write(buffer.data(), n);
       context.progress(std::min(0.99, static_cast<double>(archive_filter_bytes(in.get(), -1)) / size), "unpacking");
     }
     out.close();
-    if (!out) throw Error(ExitCode::cannot_write, "cannot write '" + u.file.string() + "'", "set TMPDIR to a folder with more room");
+    if (!out)
+      throw Error(ExitCode::cannot_write, "cannot write '" + u.file.string() + "'",
+                  "set TMPDIR to a folder with more room");
     result.push_back(std::move(u));
   }
   return result;
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

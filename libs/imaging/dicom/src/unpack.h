@@ -15,6 +15,7 @@ struct Unpacked {
 
 /// Every regular file of the archive, under numbers in `to`; names in the archive are never used as paths.
 /// Errors: corrupt, with the archive's own reason; resources when the disk would fill up.
-[[nodiscard]] std::vector<Unpacked> unpack(const std::filesystem::path& archive, const std::filesystem::path& to, const Context& context);
+[[nodiscard]] std::vector<Unpacked> unpack(const std::filesystem::path& archive, const std::filesystem::path& to,
+                                           const Context& context);
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

@@ -21,12 +21,14 @@ int bin_of(double hu) {
 }
 
 // The highest place of the histogram between two values, and the share of all voxels within 40 HU of it.
-Peak peak_between(const std::vector<double>& smooth, const std::vector<std::uint32_t>& raw, double total, double lo, double hi) {
+Peak peak_between(const std::vector<double>& smooth, const std::vector<std::uint32_t>& raw, double total, double lo,
+                  double hi) {
   const int a = bin_of(lo), b = bin_of(hi);
   const auto it = std::max_element(smooth.begin() + a, smooth.begin() + b + 1);
   const int at = static_cast<int>(it - smooth.begin());
   double near = 0;
-  for (int i = std::max(0, at - 10); i <= std::min(ValueCount::kBins - 1, at + 10); ++i) near += raw[static_cast<std::size_t>(i)];
+  for (int i = std::max(0, at - 10); i <= std::min(ValueCount::kBins - 1, at + 10); ++i)
+    near += raw[static_cast<std::size_t>(i)];
   return {centre_of(at), total > 0 ? near / total : 0};
 }
 
@@ -41,16 +43,18 @@ namespace {
 // More bone than kMaxBoneCm2 is soft tissue or air on a wrong scale, or a threshold that is not bone's.
 constexpr double kBoneHu = 300;
 
-void check_bone(Verdict& v, const std::vector<std::uint32_t>& histogram, double total, double voxel_mm3, double pixels) {
+void check_bone(Verdict& v, const std::vector<std::uint32_t>& histogram, double total, double voxel_mm3,
+                double pixels) {
   double bone = 0;
   for (int i = bin_of(kBoneHu); i < ValueCount::kBins; ++i) bone += histogram[static_cast<std::size_t>(i)];
   const double bone_mm3 = bone / std::max(total, 1.0) * pixels * voxel_mm3;
   double height_mm = 0;
-  for (std::size_t a = 0; a < 3; ++a) height_mm += std::abs(v.output.direction.column[a].z) * v.output.spacing_mm[a] * v.output.dims[a];
+  for (std::size_t a = 0; a < 3; ++a)
+    height_mm += std::abs(v.output.direction.column[a].z) * v.output.spacing_mm[a] * v.output.dims[a];
   if (height_mm <= 0 || bone_mm3 / height_mm <= kMaxBoneCm2 * 100) return;
   v.add(code::bone_implausible, Severity::warning,
-        whole(bone_mm3 / 1000) + " cm3 are at " + whole(kBoneHu) + " HU or above, " + whole(bone_mm3 / height_mm / 100) +
-            " cm2 of each slice on average: more than a body has bone",
+        whole(bone_mm3 / 1000) + " cm3 are at " + whole(kBoneHu) + " HU or above, " +
+            whole(bone_mm3 / height_mm / 100) + " cm2 of each slice on average: more than a body has bone",
         "see whether the values are Hounsfield units, and look at the mask ('osteo snapshot')");
 }
 
@@ -63,38 +67,45 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3, bool an
   c.hu_max = count.hu_max;
   c.rounding_error_hu = count.fractional ? 0.5 : 0;
   if (count.fractional) {
-    v.add(code::values_rounded, Severity::info, "the HU scale is fractional; values are rounded to whole HU, at most 0.5 HU off");
+    v.add(code::values_rounded, Severity::info,
+          "the HU scale is fractional; values are rounded to whole HU, at most 0.5 HU off");
   }
 
   if (count.sign_not_extended > 0) {
-    v.add(
-        code::sign_not_extended, Severity::info,
-        "the sign of " + std::to_string(count.sign_not_extended) + " negative pixels is not extended above their stored bits; it is here");
+    v.add(code::sign_not_extended, Severity::info,
+          "the sign of " + std::to_string(count.sign_not_extended) +
+              " negative pixels is not extended above their stored bits; it is here");
   }
   if (count.bits_foreign > 0) {
     v.add(code::bits_foreign, Severity::info,
-          std::to_string(count.bits_foreign) + " pixels have other bits above HighBit, such as an overlay; they are cleared");
+          std::to_string(count.bits_foreign) +
+              " pixels have other bits above HighBit, such as an overlay; they are cleared");
   }
   if (count.bits_exceeded > 0) {
     v.add(code::bits_stored_wrong, Severity::warning,
           std::to_string(count.bits_exceeded) +
-              " pixels need more bits than the file says it stores (BitsStored), and fit their neighbours only with these: whole words are "
+              " pixels need more bits than the file says it stores (BitsStored), and fit their neighbours only with "
+              "these: whole words are "
               "taken",
           "compare with the scanner's own pictures, near metal above all");
   }
   if (count.high_bit_wrong > 0) {
     v.add(code::high_bit_wrong, Severity::warning,
-          "the file says that the lowest bits belong to no pixel (HighBit), but they are in use: the lowest BitsStored bits are taken",
+          "the file says that the lowest bits belong to no pixel (HighBit), but they are in use: the lowest BitsStored "
+          "bits are taken",
           "compare with the scanner's own pictures");
   }
 
   const double pixels = std::max<double>(1, static_cast<double>(count.pixels));
   c.padding_share = static_cast<double>(count.by_tag + count.found) / pixels;
   c.padding_hu = count.padding_hu;
-  c.padding_source = count.by_tag > 0 ? (count.found > 0 ? "tag and found" : "tag") : count.found > 0 ? "found" : "none";
+  c.padding_source = count.by_tag > 0  ? (count.found > 0 ? "tag and found" : "tag")
+                     : count.found > 0 ? "found"
+                                       : "none";
   const std::string share = format_number(std::round(c.padding_share * 1000) / 10) + " % of the pixels";
   if (count.by_tag > 0)
-    v.add(code::padding_tag, Severity::info, "padding (" + whole(c.padding_hu) + " HU by its tag), " + share + ", is taken as air");
+    v.add(code::padding_tag, Severity::info,
+          "padding (" + whole(c.padding_hu) + " HU by its tag), " + share + ", is taken as air");
   if (count.found > 0) {
     v.add(code::padding_found, Severity::info,
           "values down to " + whole(c.padding_hu) + " HU" +
@@ -102,13 +113,14 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3, bool an
               ", are taken for padding and become air");
   }
   if (static_cast<double>(count.declared_tissue) > 0.001 * pixels) {
-    v.add(code::padding_tag_wrong, Severity::warning, "the padding tag names a value that tissue has; the tag is ignored");
+    v.add(code::padding_tag_wrong, Severity::warning,
+          "the padding tag names a value that tissue has; the tag is ignored");
   }
   if (count.out_of_range > 0) {
     const bool many = static_cast<double>(count.out_of_range) > 1e-4 * pixels;
     v.add(code::values_out_of_range, many ? Severity::error : Severity::warning,
-          std::to_string(count.out_of_range) + " pixels are above 32767 HU (up to " + std::to_string(count.hu_max) + ")" +
-              (many ? "" : "; they are cut there"),
+          std::to_string(count.out_of_range) + " pixels are above 32767 HU (up to " + std::to_string(count.hu_max) +
+              ")" + (many ? "" : "; they are cut there"),
           many ? "the file states the wrong sign or scale of its pixels; ask for the original export" : "");
   }
   c.saturated_mm3 = static_cast<double>(count.saturated) * voxel_mm3;
@@ -120,7 +132,8 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3, bool an
           "an extended CT scale shows metal better");
   }
   if (c.metal_mm3 > 20) {
-    v.add(code::metal, Severity::info, whole(c.metal_mm3) + " mm3 are at 3000 HU or above, as metal is; near it, streaks look like bone",
+    v.add(code::metal, Severity::info,
+          whole(c.metal_mm3) + " mm3 are at 3000 HU or above, as metal is; near it, streaks look like bone",
           "look at the mask near it; 'threshold --metal-mm' clears streaks");
   }
 
@@ -144,13 +157,15 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3, bool an
     for (int i = bin_of(lo); i < bin_of(hi); ++i) n += raw[static_cast<std::size_t>(i)];
     return n;
   };
-  // Lungs, where the scan shows nothing outside the body. The airways in them are air, well apart from the peak, which air on a smaller
-  // scale would not have.
+  // Lungs, where the scan shows nothing outside the body. The airways in them are air, well apart from the peak, which
+  // air on a smaller scale would not have.
   int below = bin_of(air.hu);
-  while (below > 0 && smooth[static_cast<std::size_t>(below)] > 0.5 * smooth[static_cast<std::size_t>(bin_of(air.hu))]) --below;
+  while (below > 0 && smooth[static_cast<std::size_t>(below)] > 0.5 * smooth[static_cast<std::size_t>(bin_of(air.hu))])
+    --below;
   const double half_width = air.hu - centre_of(below);
   const double lung_share = 0.005 * between(-940, -600);
-  const bool lungs = c.has_air && air.hu >= -940 && between(-1060, std::min(-940.0, air.hu - 2.5 * half_width)) > lung_share;
+  const bool lungs =
+      c.has_air && air.hu >= -940 && between(-1060, std::min(-940.0, air.hu - 2.5 * half_width)) > lung_share;
   // Much between air and tissue, and hardly a voxel of air: greys of another scale.
   const bool no_true_air = !c.has_air && under.share > 0.2 && between(-1100, -940) < lung_share;
   const bool air_right = c.has_air && ((air.hu > -1040 && air.hu < -940) || lungs);
@@ -161,24 +176,29 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3, bool an
   const bool turned = plus_air.share > 0.2 && std::abs(plus_air.hu - 1000) < 60 && plus_air.share > 2 * air.share;
   // No air at all but much "padding" far below it: air on a larger scale.
   const bool no_air_left = !c.has_air && static_cast<double>(count.found + count.below_air) > 0.2 * pixels;
-  c.plausible = soft_right && !turned && !no_air_left && (air_right || (!c.has_air && !no_true_air && count.hu_min < -200));
+  c.plausible =
+      soft_right && !turned && !no_air_left && (air_right || (!c.has_air && !no_true_air && count.hu_min < -200));
   check_bone(v, raw, total, voxel_mm3, pixels);
   const Severity grave = any_values ? Severity::warning : Severity::error;
   const std::string range = std::to_string(count.hu_min) + " to " + std::to_string(count.hu_max);
   if (count.below_air > 0) {
     v.add(code::below_air, c.plausible ? Severity::info : Severity::warning,
-          std::to_string(count.below_air) + " pixels lie below -1200 HU (down to " + std::to_string(count.hu_min) + ") and are no padding" +
+          std::to_string(count.below_air) + " pixels lie below -1200 HU (down to " + std::to_string(count.hu_min) +
+              ") and are no padding" +
               (c.plausible ? ": noise of air, or dark streaks beside metal; they are kept" : "; they are kept"),
           c.plausible ? "" : "see whether the values are Hounsfield units");
   }
   if (c.plausible) {
-    if (!c.has_air && !cut_air) v.add(code::no_air, Severity::info, "there is no air in the pictures by which to check the HU scale");
+    if (!c.has_air && !cut_air)
+      v.add(code::no_air, Severity::info, "there is no air in the pictures by which to check the HU scale");
     return;
   }
-  const std::string advice = "check the bone threshold by eye ('osteo snapshot'), or ask for a series in Hounsfield units";
+  const std::string advice =
+      "check the bone threshold by eye ('osteo snapshot'), or ask for a series in Hounsfield units";
   if (turned) {
     c.histogram = raw;
-    v.add(code::hu_wrong_sign, grave, "the values (" + range + ") look like HU with the sign turned: air at " + whole(plus_air.hu),
+    v.add(code::hu_wrong_sign, grave,
+          "the values (" + range + ") look like HU with the sign turned: air at " + whole(plus_air.hu),
           "the file states the wrong scale; ask for the original export");
     return;
   }
@@ -195,17 +215,20 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3, bool an
     c.histogram = raw;
     c.offset_hu = offset;
     v.add(code::hu_shifted, small ? Severity::warning : grave,
-          "the values (" + range + ") look like HU shifted by " + whole(low + 1000) + ": air at " + whole(low) + ", tissue at " +
-              whole(low + apart) + "; " + whole(offset) + " HU added to each would put them right",
+          "the values (" + range + ") look like HU shifted by " + whole(low + 1000) + ": air at " + whole(low) +
+              ", tissue at " + whole(low + apart) + "; " + whole(offset) + " HU added to each would put them right",
           "--hu-offset " + whole(offset) + " adds it; 'osteo guide SCAN --hu-offset " + whole(offset) +
               " --picture histogram.svg' shows the result first; or ask for the original export");
   } else if (second.share > 0.02 && apart > 400 && c.has_air) {
     v.add(code::hu_scaled, Severity::warning,
-          "the values (" + range + ") look like HU on another scale: air at " + whole(low) + ", tissue at " + whole(low + apart), advice);
+          "the values (" + range + ") look like HU on another scale: air at " + whole(low) + ", tissue at " +
+              whole(low + apart),
+          advice);
   } else {
     v.add(code::not_hu, Severity::warning,
-          "the values (" + range + ") do not look like Hounsfield units; cone-beam scanners give greys like these", advice);
+          "the values (" + range + ") do not look like Hounsfield units; cone-beam scanners give greys like these",
+          advice);
   }
 }
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

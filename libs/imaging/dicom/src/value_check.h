@@ -5,8 +5,8 @@
 
 namespace osteo::inline imaging::dicom {
 
-/// Fills verdict.values and adds what is to be said about them. Needs verdict.output. Values that are no HU by about a thousand, or turned,
-/// are errors unless `any_values`.
+/// Fills verdict.values and adds what is to be said about them. Needs verdict.output. Values that are no HU by about a
+/// thousand, or turned, are errors unless `any_values`.
 void check_values(Verdict& verdict, const ValueCount& count, double voxel_mm3, bool any_values);
 
-}  // namespace osteo::imaging::dicom
+}  // namespace osteo::inline imaging::dicom

@@ -24,7 +24,8 @@ Json direction(Vec3 v) {
 
 }  // namespace
 
-void Verdict::add(std::string_view code, Severity severity, std::string message, std::string advice, std::vector<std::string> files) {
+void Verdict::add(std::string_view code, Severity severity, std::string message, std::string advice,
+                  std::vector<std::string> files) {
   findings.push_back({std::string(code), severity, std::move(message), std::move(advice), std::move(files)});
 }
 
@@ -38,7 +39,8 @@ bool Verdict::refused() const {
 
 std::string Verdict::status() const {
   if (refused()) return "refused";
-  const bool warned = std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.severity == Severity::warning; });
+  const bool warned =
+      std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.severity == Severity::warning; });
   return resampled || warned ? "repaired" : "good";
 }
 
@@ -74,13 +76,13 @@ std::string to_json(const Verdict& v) {
                      {"position_error_mm", tidy(v.position_error_mm)}};
   }
   if (v.output.voxel_count() > 0) {
-    j["output"] = {
-        {"dims", v.output.dims},
-        {"spacing_mm", {v.output.spacing_mm.x, v.output.spacing_mm.y, v.output.spacing_mm.z}},
-        {"origin_lps_mm", triple(v.output.origin_mm)},
-        {"direction",
-         {direction(v.output.direction.column[0]), direction(v.output.direction.column[1]), direction(v.output.direction.column[2])}},
-        {"axes", orientation_code(v.output)}};
+    j["output"] = {{"dims", v.output.dims},
+                   {"spacing_mm", {v.output.spacing_mm.x, v.output.spacing_mm.y, v.output.spacing_mm.z}},
+                   {"origin_lps_mm", triple(v.output.origin_mm)},
+                   {"direction",
+                    {direction(v.output.direction.column[0]), direction(v.output.direction.column[1]),
+                     direction(v.output.direction.column[2])}},
+                   {"axes", orientation_code(v.output)}};
   }
   if (v.values.checked) {
     Json values{{"hu_min", v.values.hu_min}, {"hu_max", v.values.hu_max}, {"plausible_hu", v.values.plausible}};
@@ -113,7 +115,8 @@ std::string to_json(const Verdict& v) {
       j["slices"].push_back(std::move(e));
     }
     j["set_aside"] = Json::list();
-    for (const FileSetAside& f : v.set_aside) j["set_aside"].push_back({{"file", f.file}, {"code", f.code}, {"why", f.why}});
+    for (const FileSetAside& f : v.set_aside)
+      j["set_aside"].push_back({{"file", f.file}, {"code", f.code}, {"why", f.why}});
   }
   return j.dump(2) + "\n";
 }
@@ -127,17 +130,21 @@ VerdictSummary read_verdict(std::string_view text) {
     };
     VerdictSummary summary;
     summary.status = text_of(file.root(), "status");
-    if (const JsonValue* const series = file.root().find("series"); series != nullptr && series->find("scan_hash") != nullptr)
+    if (const JsonValue* const series = file.root().find("series");
+        series != nullptr && series->find("scan_hash") != nullptr)
       summary.scan_hash = text_of(*series, "scan_hash");
     for (const JsonValue& f : file.list(file.need(file.root(), "", "findings"), "\"findings\"")) {
       Finding finding;
       finding.code = text_of(f, "code");
       const std::string severity = text_of(f, "severity");
-      finding.severity = severity == "error" ? Severity::error : severity == "warning" ? Severity::warning : Severity::info;
+      finding.severity = severity == "error"     ? Severity::error
+                         : severity == "warning" ? Severity::warning
+                                                 : Severity::info;
       finding.message = text_of(f, "message");
       if (f.find("advice") != nullptr) finding.advice = text_of(f, "advice");
       if (const JsonValue* const files = f.find("files"); files != nullptr) {
-        for (const JsonValue& name : file.list(*files, "\"files\"")) finding.files.push_back(file.text(name, "\"files\""));
+        for (const JsonValue& name : file.list(*files, "\"files\""))
+          finding.files.push_back(file.text(name, "\"files\""));
       }
       summary.findings.push_back(std::move(finding));
     }
@@ -147,4 +154,4 @@ VerdictSummary read_verdict(std::string_view text) {
   }
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -26,7 +26,8 @@ const Finding& first_error(const Verdict& v) {
 }
 
 std::string why(const Verdict& v) {
-  std::string text = v.source == "DICOM" ? "series " + std::to_string(v.series) + " is refused" : "the volume is refused";
+  std::string text =
+      v.source == "DICOM" ? "series " + std::to_string(v.series) + " is refused" : "the volume is refused";
   for (const Finding& f : v.findings) {
     if (f.severity == Severity::error) text += ": " + f.message + " [" + f.code + "]";
   }
@@ -37,22 +38,28 @@ std::string why(const Verdict& v) {
 }
 
 // What a series with these files left out looks like; throws Refused.
-Placement place_or_refuse(const DicomSeries& series, const PlaceOptions& options, const std::vector<FileSetAside>& excluded) {
-  Placement p = place_slices(series.headers, options, excluded,
-                             [&](std::size_t a, std::size_t b) { return dicom::same_stored_pixels(series.headers[a], series.headers[b]); });
+Placement place_or_refuse(const DicomSeries& series, const PlaceOptions& options,
+                          const std::vector<FileSetAside>& excluded) {
+  Placement p = place_slices(series.headers, options, excluded, [&](std::size_t a, std::size_t b) {
+    return dicom::same_stored_pixels(series.headers[a], series.headers[b]);
+  });
   if (p.verdict.series == 0) p.verdict.series = series.number;
   if (p.verdict.modality.empty()) p.verdict.modality = series.modality;
-  if (series.strays) p.verdict.set_aside.insert(p.verdict.set_aside.end(), series.strays->begin(), series.strays->end());
+  if (series.strays)
+    p.verdict.set_aside.insert(p.verdict.set_aside.end(), series.strays->begin(), series.strays->end());
   if (!series.foreign.empty()) {
     p.verdict.add(code::several_scans, Severity::warning,
                   "the series also holds " + std::to_string(series.foreign.size()) +
-                      " slices of another patient, study or frame of reference ('" + series.foreign.front() + "', ...); they are left out",
+                      " slices of another patient, study or frame of reference ('" + series.foreign.front() +
+                      "', ...); they are left out",
                   "'osteo import --list FOLDER' shows which belong together", series.foreign);
     for (const std::string& f : series.foreign)
-      p.verdict.set_aside.push_back({f, std::string(code::several_scans), "it is of another patient, study or frame of reference"});
+      p.verdict.set_aside.push_back(
+          {f, std::string(code::several_scans), "it is of another patient, study or frame of reference"});
   }
   if (options.hu_offset != 0) {
-    p.verdict.add(code::hu_offset, Severity::warning, format_number(options.hu_offset) + " HU are added to all values, as asked for",
+    p.verdict.add(code::hu_offset, Severity::warning,
+                  format_number(options.hu_offset) + " HU are added to all values, as asked for",
                   "look at the mask before you rely on a threshold");
   }
   p.verdict.why_chosen = series.recommended ? series.why : "asked for";
@@ -74,7 +81,8 @@ void with_placement(const DicomSeries& series, const PlaceOptions& options, F&& 
   }
 }
 
-// Upright above all slices, whole pixels of margin to hold the lean; `h` is the spacing along rows, columns and the normal.
+// Upright above all slices, whole pixels of margin to hold the lean; `h` is the spacing along rows, columns and the
+// normal.
 Frame lattice_of(const Placement& p, int columns, int rows, Vec3 h) {
   double lo[2] = {0, 0}, hi[2] = {0, 0};
   for (const PlacedSlice& s : p.slices) {
@@ -100,8 +108,8 @@ Frame lattice_of(const Placement& p, int columns, int rows, Vec3 h) {
   return f;
 }
 
-// Layers lie on the slices where these are as far apart as ever, with or without holes: upright ones then stay as they are, leaning ones
-// are interpolated in their own plane only.
+// Layers lie on the slices where these are as far apart as ever, with or without holes: upright ones then stay as they
+// are, leaning ones are interpolated in their own plane only.
 double layer_distance(const Placement& p) {
   const double pitch = p.verdict.gap_min_mm, extent = p.slices.back().along_mm;
   const double wanted = std::max(std::min(pitch, 0.5), std::min(p.column_spacing_mm, p.row_spacing_mm));
@@ -109,8 +117,9 @@ double layer_distance(const Placement& p) {
     return std::abs(s.along_mm - std::round(s.along_mm / pitch) * pitch) <= kSamePlaceMm;
   });
   if (!regular) return wanted;
-  const bool upright = std::all_of(p.slices.begin(), p.slices.end(),
-                                   [](const PlacedSlice& s) { return std::hypot(s.sideways_mm[0], s.sideways_mm[1]) <= kSamePlaceMm; });
+  const bool upright = std::all_of(p.slices.begin(), p.slices.end(), [](const PlacedSlice& s) {
+    return std::hypot(s.sideways_mm[0], s.sideways_mm[1]) <= kSamePlaceMm;
+  });
   const double each = upright ? 1 : std::max(1.0, std::round(pitch / wanted));
   return extent / (std::round(extent / pitch) * each);
 }
@@ -121,12 +130,14 @@ void finish(Placement& p, const Frame& frame, const SliceReader& reader, const P
   for (std::size_t k = 0; k < v.slices.size(); ++k) {
     v.slices[k].output_index = v.resampled ? p.slices[k].along_mm / frame.spacing_mm.z : static_cast<double>(k);
   }
-  dicom::check_values(v, reader.count(), p.column_spacing_mm * p.row_spacing_mm * p.verdict.gap_usual_mm, options.any_modality);
+  dicom::check_values(v, reader.count(), p.column_spacing_mm * p.row_spacing_mm * p.verdict.gap_usual_mm,
+                      options.any_modality);
   std::vector<dicom::JudgedSlice> slices;
   for (const SliceRecord& s : v.slices) {
     // Where all slices are of one file, it is the picture that tells them apart.
     const bool one_file = v.slices.size() > 1 && v.slices.front().file == v.slices.back().file;
-    slices.push_back({one_file || s.frame > 0 ? s.file + " (picture " + std::to_string(s.frame + 1) + ")" : s.file, s.along_mm});
+    slices.push_back(
+        {one_file || s.frame > 0 ? s.file + " (picture " + std::to_string(s.frame + 1) + ")" : s.file, s.along_mm});
   }
   dicom::judge_slices(v, slices, reader.figures(), v.columns * p.column_spacing_mm * v.rows * p.row_spacing_mm);
   if (v.refused()) throw Refused(v);
@@ -135,14 +146,16 @@ void finish(Placement& p, const Frame& frame, const SliceReader& reader, const P
 }  // namespace
 
 Refused::Refused(const Verdict& verdict)
-    : Error(ExitCode::corrupt, why(verdict), first_error(verdict).advice), verdict_(std::make_shared<const Verdict>(verdict)) {}
+    : Error(ExitCode::corrupt, why(verdict), first_error(verdict).advice),
+      verdict_(std::make_shared<const Verdict>(verdict)) {}
 
 DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& options, const Context& context) {
   const QuietVtk quiet;
   DicomVolume result;
   with_placement(series, options, [&](Placement& p) {
     const int columns = p.verdict.columns, rows = p.verdict.rows;
-    const std::size_t area = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), count = p.slices.size();
+    const std::size_t area = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows),
+                      count = p.slices.size();
     auto pixels = make_voxels<std::int16_t>(area * count);
     std::vector<std::int16_t*> slice(count);
     for (std::size_t k = 0; k < count; ++k) slice[k] = pixels.get() + k * area;
@@ -211,7 +224,8 @@ const Verdict& DicomSlabs::verdict() const {
   return impl_->verdict;
 }
 
-void DicomSlabs::run(int layers_each, const Context& context, const std::function<void(int, int, const std::int16_t*)>& take) {
+void DicomSlabs::run(int layers_each, const Context& context,
+                     const std::function<void(int, int, const std::int16_t*)>& take) {
   const QuietVtk quiet;
   with_placement(impl_->series, impl_->options, [&](Placement& p) {
     const int columns = p.verdict.columns, rows = p.verdict.rows;
@@ -255,4 +269,4 @@ void DicomSlabs::run(int layers_each, const Context& context, const std::functio
   });
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

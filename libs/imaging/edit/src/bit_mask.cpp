@@ -40,7 +40,8 @@ void mark_range(const std::int16_t* in, std::size_t n, Range range, std::uint8_t
     std::memset(flags, 0, n);
     return;
   }
-  const auto lo = static_cast<std::int16_t>(std::max(range.lo, -32768)), hi = static_cast<std::int16_t>(std::min(range.hi, 32767));
+  const auto lo = static_cast<std::int16_t>(std::max(range.lo, -32768)),
+             hi = static_cast<std::int16_t>(std::min(range.hi, 32767));
   for (std::size_t i = 0; i < n; ++i) flags[i] = static_cast<std::uint8_t>((in[i] >= lo) & (in[i] <= hi));
 }
 
@@ -130,7 +131,8 @@ void BitMask::to_bytes(std::uint8_t* out, int threads) const {
   const auto nx = static_cast<std::size_t>(dims_[0]);
   parallel_for(rows(), kRowGrain, threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t r = begin; r < end; ++r) {
-      for (std::size_t i = 0; i < nx; ++i) out[r * nx + i] = static_cast<std::uint8_t>(words_[r * words_per_row_ + i / 64] >> (i % 64) & 1);
+      for (std::size_t i = 0; i < nx; ++i)
+        out[r * nx + i] = static_cast<std::uint8_t>(words_[r * words_per_row_ + i / 64] >> (i % 64) & 1);
     }
   });
 }
@@ -178,7 +180,9 @@ CoarseMask gather(const Frame& frame, std::size_t most, int threads,
         std::fill(sums.begin(), sums.end(), 0U);
         for (int k = static_cast<int>(z) * f[2]; k < std::min(frame.dims[2], (static_cast<int>(z) + 1) * f[2]); ++k) {
           for (int j = static_cast<int>(y) * f[1]; j < std::min(frame.dims[1], (static_cast<int>(y) + 1) * f[1]); ++j)
-            count_row(static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j), f[0], sums);
+            count_row(
+                static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j),
+                f[0], sums);
         }
         for (std::size_t x = 0; x < nx; ++x) c.filled[(z * ny + y) * nx + x] = static_cast<float>(sums[x]) * scale;
       }
@@ -212,4 +216,4 @@ CoarseMask coarse(const Image& ct, double lower_hu, double upper_hu, std::size_t
   return coarse(BitMask(ct, lower_hu, upper_hu, threads), ct.frame, most, threads);
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -24,8 +24,8 @@ std::string run(const IslandEdit& o, const Image& ct, BitMask& bone, const Conte
   context.progress(0.1, "finding pieces");
   const Components pieces = connected_components(bone.runs(true), bone.dims(), Connectivity::full);
   context.progress(0.8, "marking");
-  const std::uint32_t row =
-      static_cast<std::uint32_t>(at[2]) * static_cast<std::uint32_t>(bone.dims()[1]) + static_cast<std::uint32_t>(at[1]);
+  const std::uint32_t row = static_cast<std::uint32_t>(at[2]) * static_cast<std::uint32_t>(bone.dims()[1]) +
+                            static_cast<std::uint32_t>(at[1]);
   const auto x = static_cast<std::uint32_t>(at[0]);
   std::uint32_t chosen = 0;
   for (std::size_t i = 0; i < pieces.runs.size(); ++i) {
@@ -41,15 +41,17 @@ std::string run(const IslandSizeEdit& o, const Image& ct, BitMask& bone, const C
   context.progress(0.1, "finding pieces");
   const Components pieces = connected_components(bone.runs(true), bone.dims(), Connectivity::full);
   context.progress(0.8, "marking");
-  const std::vector<bool> drop = components_to_drop(pieces, o.min_volume_mm3 / ct.frame.voxel_volume_mm3(), o.keep_largest);
+  const std::vector<bool> drop =
+      components_to_drop(pieces, o.min_volume_mm3 / ct.frame.voxel_volume_mm3(), o.keep_largest);
   clear_runs(
       bone, pieces, [&](std::uint32_t c) { return static_cast<bool>(drop[c]); }, false);
   const auto n = std::count(drop.begin(), drop.end(), true);
-  return std::to_string(n) + (n == 1 ? " piece" : " pieces") + " removed, " + std::to_string(drop.size() - static_cast<std::size_t>(n)) +
-         " left";
+  return std::to_string(n) + (n == 1 ? " piece" : " pieces") + " removed, " +
+         std::to_string(drop.size() - static_cast<std::size_t>(n)) + " left";
 }
 
-// Of a row, the voxels whose centres lie within [lo, hi] along every axis: x as far as it is so. A range, since a box is convex.
+// Of a row, the voxels whose centres lie within [lo, hi] along every axis: x as far as it is so. A range, since a box
+// is convex.
 std::pair<int, int> row_in_box(Vec3 first, Vec3 step, int n, Vec3 lo, Vec3 hi) {
   const auto inside = [&](int i) {
     const Vec3 p = first + step * i;
@@ -67,7 +69,8 @@ std::pair<int, int> row_in_box(Vec3 first, Vec3 step, int n, Vec3 lo, Vec3 hi) {
   }
   if (from > to + 1) return {0, 0};
   // The division may be off by a bit: the test itself decides at the ends.
-  int begin = std::clamp(static_cast<int>(std::floor(from)) - 1, 0, n), end = std::clamp(static_cast<int>(std::ceil(to)) + 2, 0, n);
+  int begin = std::clamp(static_cast<int>(std::floor(from)) - 1, 0, n),
+      end = std::clamp(static_cast<int>(std::ceil(to)) + 2, 0, n);
   while (begin < end && !inside(begin)) ++begin;
   while (end > begin && !inside(end - 1)) --end;
   return {begin, end};
@@ -102,7 +105,8 @@ std::string run(const FillEdit& o, const Image& ct, BitMask& bone, const Context
   for (std::size_t i = 0; i < spaces.runs.size(); ++i) {
     const Run& r = spaces.runs[i];
     const std::uint32_t j = r.row % ny, k = r.row / ny;
-    if (r.begin == 0 || r.end == static_cast<std::uint32_t>(bone.dims()[0]) || j == 0 || j + 1 == ny || k == 0 || k + 1 == nz)
+    if (r.begin == 0 || r.end == static_cast<std::uint32_t>(bone.dims()[0]) || j == 0 || j + 1 == ny || k == 0 ||
+        k + 1 == nz)
       open[spaces.component[i]] = true;
   }
   const double most = o.max_volume_mm3 / ct.frame.voxel_volume_mm3();
@@ -115,7 +119,8 @@ std::string run(const FillEdit& o, const Image& ct, BitMask& bone, const Context
   }
   clear_runs(
       bone, spaces, [&](std::uint32_t c) { return static_cast<bool>(fill[c]); }, true);
-  return std::to_string(filled) + (filled == 1 ? " cavity" : " cavities") + " filled, " + std::to_string(larger) + " larger left";
+  return std::to_string(filled) + (filled == 1 ? " cavity" : " cavities") + " filled, " + std::to_string(larger) +
+         " larger left";
 }
 
 constexpr int kMostReach = 5;  // the weights' product fits 32 bits
@@ -125,7 +130,8 @@ std::string run(const SmoothEdit& o, const Image& ct, BitMask& bone, const Conte
   for (std::size_t a = 0; a < 3; ++a)
     reach[a] = std::clamp(static_cast<int>(std::floor(o.radius_mm / ct.frame.spacing_mm[a] + 1e-9)), 0, kMostReach);
   if (reach[0] + reach[1] + reach[2] == 0)
-    throw Error(ExitCode::usage, "smoothing within less than a voxel does nothing", "take at least the distance of two voxels");
+    throw Error(ExitCode::usage, "smoothing within less than a voxel does nothing",
+                "take at least the distance of two voxels");
   // Binomial weights: 1 2 1, 1 4 6 4 1, ...
   std::array<std::array<std::uint32_t, 2 * kMostReach + 1>, 3> weight{};
   std::uint32_t total = 1;
@@ -145,7 +151,8 @@ std::string run(const SmoothEdit& o, const Image& ct, BitMask& bone, const Conte
     context.check_cancelled();
     std::array<std::uint32_t, 64 + 2 * kMostReach> column{};
     for (std::size_t r = first; r < last; ++r) {
-      const int j = static_cast<int>(r % static_cast<std::size_t>(ny)), k = static_cast<int>(r / static_cast<std::size_t>(ny));
+      const int j = static_cast<int>(r % static_cast<std::size_t>(ny)),
+                k = static_cast<int>(r / static_cast<std::size_t>(ny));
       // Beyond the edge of the volume it is as at the edge.
       const auto row_at = [&](int dj, int dk) {
         return before.row(static_cast<std::size_t>(std::clamp(k + dk, 0, nz - 1)) * static_cast<std::size_t>(ny) +
@@ -162,7 +169,8 @@ std::string run(const SmoothEdit& o, const Image& ct, BitMask& bone, const Conte
             const std::uint64_t left = w > 0 ? row[w - 1] >> 58 : 0, right = w + 1 < words ? row[w + 1] & 63 : 0;
             any |= here | left | right;
             all &= full & (w > 0 ? left | ~std::uint64_t{63} : ~std::uint64_t{0}) &
-                   (w + 1 < words ? (row[w + 1] | ~bits_of_word(0, 0, std::min(nx - x0 - 64, kMostReach))) : ~std::uint64_t{0});
+                   (w + 1 < words ? (row[w + 1] | ~bits_of_word(0, 0, std::min(nx - x0 - 64, kMostReach)))
+                                  : ~std::uint64_t{0});
           }
         }
         if (any == 0 || all == ~std::uint64_t{0}) continue;
@@ -170,14 +178,16 @@ std::string run(const SmoothEdit& o, const Image& ct, BitMask& bone, const Conte
         for (int dk = -reach[2]; dk <= reach[2]; ++dk) {
           for (int dj = -reach[1]; dj <= reach[1]; ++dj) {
             const std::span<const std::uint64_t> row = row_at(dj, dk);
-            const std::uint32_t v = weight[1][static_cast<std::size_t>(dj + reach[1])] * weight[2][static_cast<std::size_t>(dk + reach[2])];
+            const std::uint32_t v =
+                weight[1][static_cast<std::size_t>(dj + reach[1])] * weight[2][static_cast<std::size_t>(dk + reach[2])];
             const auto bit = [&](int x) {
               const int c = std::clamp(x, 0, nx - 1);
               return static_cast<std::uint32_t>(row[static_cast<std::size_t>(c) / 64] >> (c % 64) & 1);
             };
             for (int x = -reach[0]; x < 0; ++x) column[static_cast<std::size_t>(x + kMostReach)] += v * bit(x0 + x);
             const std::uint64_t here = row[w];
-            for (int x = 0; x < n; ++x) column[static_cast<std::size_t>(x + kMostReach)] += v * static_cast<std::uint32_t>(here >> x & 1);
+            for (int x = 0; x < n; ++x)
+              column[static_cast<std::size_t>(x + kMostReach)] += v * static_cast<std::uint32_t>(here >> x & 1);
             for (int x = n; x < n + reach[0]; ++x) column[static_cast<std::size_t>(x + kMostReach)] += v * bit(x0 + x);
           }
         }
@@ -185,7 +195,8 @@ std::string run(const SmoothEdit& o, const Image& ct, BitMask& bone, const Conte
         for (int x = 0; x < n; ++x) {
           std::uint32_t sum = 0;
           for (int d = -reach[0]; d <= reach[0]; ++d)
-            sum += weight[0][static_cast<std::size_t>(d + reach[0])] * column[static_cast<std::size_t>(x + d + kMostReach)];
+            sum += weight[0][static_cast<std::size_t>(d + reach[0])] *
+                   column[static_cast<std::size_t>(x + d + kMostReach)];
           const std::uint64_t mask = std::uint64_t{1} << x;
           if (2 * static_cast<std::uint64_t>(sum) > total) out |= mask;
           if (2 * static_cast<std::uint64_t>(sum) < total) out &= ~mask;
@@ -256,7 +267,8 @@ void rows_of_capsule(const Frame& frame, Vec3 a_mm, Vec3 b_mm, double radius_mm,
       while (begin < end && !inside(begin)) ++begin;
       while (end > begin && !inside(end - 1)) --end;
       if (begin < end)
-        visit(static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j), begin, end);
+        visit(static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j),
+              begin, end);
     }
   }
 }
@@ -271,4 +283,4 @@ bool voxel_at(const Frame& frame, Vec3 world_mm, std::array<int, 3>& ijk) {
   return true;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

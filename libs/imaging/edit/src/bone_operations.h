@@ -9,14 +9,16 @@
 
 namespace osteo::inline imaging {
 
-/// Changes `bone` as the operation says, which must change bone. Returns what a person has to know beside the volumes, else empty.
+/// Changes `bone` as the operation says, which must change bone. Returns what a person has to know beside the volumes,
+/// else empty.
 std::string run_on_bone(const EditOperation& operation, const Image& ct, BitMask& bone, const Context& context);
 
-/// Rows of voxels whose centres lie within `radius_mm` of the segment from `a` to `b` (LPS mm), each with its range along x.
+/// Rows of voxels whose centres lie within `radius_mm` of the segment from `a` to `b` (LPS mm), each with its range
+/// along x.
 void rows_of_capsule(const Frame& frame, Vec3 a, Vec3 b, double radius_mm,
                      const std::function<void(std::size_t row, int begin, int end)>& visit);
 
 /// The voxel that holds a point; nothing outside the volume.
 [[nodiscard]] bool voxel_at(const Frame& frame, Vec3 world_mm, std::array<int, 3>& ijk);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -112,7 +112,8 @@ BonePlan EditDocument::plan(std::vector<EditOperation> operations, const Context
 
 EditOutcome EditDocument::commit(BonePlan plan) {
   State& s = *state_;
-  if (s.stroke || plan.version != s.version) throw Error(ExitCode::failed, "the mask was changed meanwhile", "do it again");
+  if (s.stroke || plan.version != s.version)
+    throw Error(ExitCode::failed, "the mask was changed meanwhile", "do it again");
   if (!plan.outcome.changed) return plan.outcome;
   std::swap(s.bone, plan.bone);
   s.push({std::move(plan.operations), true, *plan.changes, {}, {}});
@@ -160,7 +161,8 @@ EditOutcome EditDocument::end_stroke() {
   const Recorder recorder = std::exchange(s.stroke_changes, Recorder());
   outcome.text = operation_text(stroke);
   const bool on_bone = stroke.structure == 0;
-  const std::span<const std::uint64_t> words = on_bone ? std::span<const std::uint64_t>(s.bone.words()) : s.labels.words();
+  const std::span<const std::uint64_t> words =
+      on_bone ? std::span<const std::uint64_t>(s.bone.words()) : s.labels.words();
   const double voxel = s.ct.frame.voxel_volume_mm3();
   for (const auto& [w, before] : recorder.before()) {
     if (on_bone) {
@@ -333,4 +335,4 @@ VoxelsEdit voxels_of(const Labels& labels, std::uint8_t value, int structure) {
   return edit;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

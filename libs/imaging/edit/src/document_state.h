@@ -29,7 +29,9 @@ class LabelWords {
     if (!at_) throw std::bad_alloc();
   }
   [[nodiscard]] std::span<std::uint64_t> words() { return {at_.get(), words_}; }
-  [[nodiscard]] std::span<const std::uint8_t> bytes() const { return {reinterpret_cast<const std::uint8_t*>(at_.get()), voxels_}; }
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const {
+    return {reinterpret_cast<const std::uint8_t*>(at_.get()), voxels_};
+  }
   [[nodiscard]] std::uint8_t* data() { return reinterpret_cast<std::uint8_t*>(at_.get()); }
 
  private:
@@ -89,7 +91,8 @@ void each_run(const std::string& runs, std::size_t voxels, const Visit& visit) {
   const auto next = [&](std::size_t& value) {
     while (p < end && *p == ' ') ++p;
     const auto r = std::from_chars(p, end, value);
-    if (r.ec != std::errc() || value > voxels) throw Error(ExitCode::usage, "the runs of a structure's voxels cannot be read");
+    if (r.ec != std::errc() || value > voxels)
+      throw Error(ExitCode::usage, "the runs of a structure's voxels cannot be read");
     p = r.ptr;
   };
   while (p < end) {
@@ -113,7 +116,8 @@ struct EditDocument::State {
   State(Image image, const Labels& mask, const Labels* given, EditLimits l)
       : ct(std::move(image)), bone(ct.frame.dims, mask.span()), labels(ct.frame.voxel_count()), limits(l) {
     if (!same_place(ct.frame, mask.frame)) throw Error(ExitCode::usage, "the bone mask is not on the CT's grid");
-    if (ct.frame.voxel_count() / 8 >= 0xffffffffU) throw Error(ExitCode::resources, "the CT has too many voxels to be edited");
+    if (ct.frame.voxel_count() / 8 >= 0xffffffffU)
+      throw Error(ExitCode::resources, "the CT has too many voxels to be edited");
     if (given != nullptr) take_over(*given);
     start_structures = structures;
     const BitMask none(ct.frame.dims);
@@ -123,7 +127,8 @@ struct EditDocument::State {
     ct_hash = hash_of(ct);
   }
 
-  // --- the state ----------------------------------------------------------------------------------------------------------------------
+  // --- the state
+  // ----------------------------------------------------------------------------------------------------------------------
 
   Image ct;
   BitMask bone;
@@ -164,10 +169,12 @@ struct EditDocument::State {
     }
     for (int v = 1; v < 256; ++v) {
       if (bounds[static_cast<std::size_t>(v)].hi[0] > 0 && find(v) == nullptr)
-        structures.push_back(
-            {{static_cast<std::uint8_t>(v), "structure " + std::to_string(v), {255, 200, 60}}, StructureRole::at_risk, true});
+        structures.push_back({{static_cast<std::uint8_t>(v), "structure " + std::to_string(v), {255, 200, 60}},
+                              StructureRole::at_risk,
+                              true});
     }
-    std::sort(structures.begin(), structures.end(), [](const auto& a, const auto& b) { return a.is.value < b.is.value; });
+    std::sort(structures.begin(), structures.end(),
+              [](const auto& a, const auto& b) { return a.is.value < b.is.value; });
   }
 
   [[nodiscard]] std::vector<std::pair<std::uint32_t, std::uint64_t>> sparse_labels() {
@@ -207,15 +214,16 @@ struct EditDocument::State {
     h.add(bone.words().data(), bone.words().size_bytes());
     h.add(labels.bytes().data(), labels.bytes().size());
     for (const EditStructure& s : structures) {
-      const std::string text = std::to_string(s.is.value) + "\n" + s.is.name + "\n" + std::to_string(s.is.rgb[0]) + "," +
-                               std::to_string(s.is.rgb[1]) + "," + std::to_string(s.is.rgb[2]) + "\n" +
+      const std::string text = std::to_string(s.is.value) + "\n" + s.is.name + "\n" + std::to_string(s.is.rgb[0]) +
+                               "," + std::to_string(s.is.rgb[1]) + "," + std::to_string(s.is.rgb[2]) + "\n" +
                                std::to_string(static_cast<int>(s.role)) + "\n";
       h.add(text.data(), text.size());
     }
     return h.hex();
   }
 
-  // --- operations on structures -------------------------------------------------------------------------------------------------------
+  // --- operations on structures
+  // -------------------------------------------------------------------------------------------------------
 
   // Voxels [from, to) in scan order, of one row, become `value`; with `only` those that have that value.
   void write(std::size_t from, std::size_t to, std::uint8_t value, int only, Recorder& recorder) {
@@ -228,7 +236,8 @@ struct EditDocument::State {
     if (value == 0) return;
     const auto nx = static_cast<std::size_t>(ct.frame.dims[0]), ny = static_cast<std::size_t>(ct.frame.dims[1]);
     const std::size_t row = from / nx;
-    grow(value, static_cast<int>(from % nx), static_cast<int>(to - row * nx), static_cast<int>(row % ny), static_cast<int>(row / ny));
+    grow(value, static_cast<int>(from % nx), static_cast<int>(to - row * nx), static_cast<int>(row % ny),
+         static_cast<int>(row / ny));
   }
 
   void draw(const BrushEdit& o, Vec3 a, Vec3 b, Recorder& recorder) {
@@ -236,7 +245,8 @@ struct EditDocument::State {
     rows_of_capsule(ct.frame, a, b, o.radius_mm, [&](std::size_t row, int begin, int end) {
       if (o.structure == 0) {
         const std::size_t first = row * bone.words_per_row();
-        recorder.note(bone.words(), first + static_cast<std::size_t>(begin) / 64, first + static_cast<std::size_t>(end - 1) / 64);
+        recorder.note(bone.words(), first + static_cast<std::size_t>(begin) / 64,
+                      first + static_cast<std::size_t>(end - 1) / 64);
         bone.set(row, begin, end, !o.erase);
       } else {
         write(row * nx + static_cast<std::size_t>(begin), row * nx + static_cast<std::size_t>(end),
@@ -250,12 +260,14 @@ struct EditDocument::State {
     Recorder& recorder;
     void operator()(const BrushEdit& o) const {
       s.need(o.structure);
-      for (std::size_t i = 0; i < o.points_mm.size(); ++i) s.draw(o, o.points_mm[i > 0 ? i - 1 : 0], o.points_mm[i], recorder);
+      for (std::size_t i = 0; i < o.points_mm.size(); ++i)
+        s.draw(o, o.points_mm[i > 0 ? i - 1 : 0], o.points_mm[i], recorder);
     }
     void operator()(const VoxelsEdit& o) const {
       s.need(o.structure);
       const std::size_t voxels = s.ct.frame.voxel_count(), nx = static_cast<std::size_t>(s.ct.frame.dims[0]);
-      edit_inside::each_run(o.runs, voxels, [](std::size_t, std::size_t) {});  // all of it is right before any is written
+      edit_inside::each_run(o.runs, voxels,
+                            [](std::size_t, std::size_t) {});  // all of it is right before any is written
       edit_inside::each_run(o.runs, voxels, [&](std::size_t from, std::size_t to) {
         while (from < to) {
           const std::size_t stop = std::min(to, (from / nx + 1) * nx);
@@ -265,10 +277,12 @@ struct EditDocument::State {
       });
     }
     void operator()(const AddStructureEdit& o) const {
-      if (s.find(o.structure) != nullptr) throw Error(ExitCode::usage, "there is a structure " + std::to_string(o.structure) + " already");
+      if (s.find(o.structure) != nullptr)
+        throw Error(ExitCode::usage, "there is a structure " + std::to_string(o.structure) + " already");
       s.require_free(o.name, 0);
       s.structures.push_back({{static_cast<std::uint8_t>(o.structure), o.name, colour(o.rgb)}, o.role, true});
-      std::sort(s.structures.begin(), s.structures.end(), [](const auto& a, const auto& b) { return a.is.value < b.is.value; });
+      std::sort(s.structures.begin(), s.structures.end(),
+                [](const auto& a, const auto& b) { return a.is.value < b.is.value; });
     }
     void operator()(const ChangeStructureEdit& o) const {
       EditStructure& is = s.need(o.structure);
@@ -302,14 +316,18 @@ struct EditDocument::State {
       return {static_cast<std::uint8_t>(rgb[0]), static_cast<std::uint8_t>(rgb[1]), static_cast<std::uint8_t>(rgb[2])};
     }
   };
-  void run_on_structures(const EditOperation& operation, Recorder& recorder) { std::visit(Runner{*this, recorder}, operation); }
+  void run_on_structures(const EditOperation& operation, Recorder& recorder) {
+    std::visit(Runner{*this, recorder}, operation);
+  }
   void require_free(const std::string& name, int but) const {
     for (const EditStructure& s : structures) {
-      if (s.is.name == name && s.is.value != but) throw Error(ExitCode::usage, "there is a structure '" + name + "' already");
+      if (s.is.name == name && s.is.value != but)
+        throw Error(ExitCode::usage, "there is a structure '" + name + "' already");
     }
   }
 
-  // --- steps --------------------------------------------------------------------------------------------------------------------------
+  // --- steps
+  // --------------------------------------------------------------------------------------------------------------------------
 
   void measure(const BitMask& after, EditOutcome& outcome) const {
     std::uint64_t added = 0, removed = 0;
@@ -398,4 +416,4 @@ struct EditDocument::State {
   }
 };
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

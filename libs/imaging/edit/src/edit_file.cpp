@@ -23,21 +23,24 @@ Json value_of(const FieldRef& field) {
 
 // One of each kind, as it is when nothing is said.
 const std::vector<EditOperation>& all_kinds() {
-  static const std::vector<EditOperation> kinds{ThresholdEdit{},    IslandEdit{},          IslandSizeEdit{},     BoxEdit{},
-                                            FillEdit{},         SmoothEdit{},          BrushEdit{},          VoxelsEdit{},
-                                            AddStructureEdit{}, ChangeStructureEdit{}, DeleteStructureEdit{}};
+  static const std::vector<EditOperation> kinds{
+      ThresholdEdit{},    IslandEdit{},          IslandSizeEdit{},     BoxEdit{},
+      FillEdit{},         SmoothEdit{},          BrushEdit{},          VoxelsEdit{},
+      AddStructureEdit{}, ChangeStructureEdit{}, DeleteStructureEdit{}};
   return kinds;
 }
 
 EditOperation read_operation(const JsonFile& file, const JsonValue& j, const std::string& where) {
   const JsonValue& does = file.need(j, where, "do");
   const std::string& name = file.text(does, where + ": \"do\"");
-  const auto kind = std::find_if(all_kinds().begin(), all_kinds().end(), [&](const EditOperation& o) { return operation_name(o) == name; });
+  const auto kind = std::find_if(all_kinds().begin(), all_kinds().end(),
+                                 [&](const EditOperation& o) { return operation_name(o) == name; });
   if (kind == all_kinds().end()) {
     std::vector<std::string> known;
     for (const EditOperation& o : all_kinds()) known.emplace_back(operation_name(o));
     const std::string near = nearest_name(name, known);
-    throw file.wrong(does, where + ": '" + name + "' is nothing that can be done", near.empty() ? "" : "did you mean '" + near + "'?");
+    throw file.wrong(does, where + ": '" + name + "' is nothing that can be done",
+                     near.empty() ? "" : "did you mean '" + near + "'?");
   }
   EditOperation operation = *kind;
   std::vector<FieldRef> fields = operation_fields(operation);
@@ -104,7 +107,8 @@ std::string edits_text(const EditRecipe& recipe) {
       continue;
     }
     text += "[";
-    for (std::size_t i = 0; i < m.value.items().size(); ++i) text += (i > 0 ? ",\n    " : "\n    ") + m.value.items()[i].dump();
+    for (std::size_t i = 0; i < m.value.items().size(); ++i)
+      text += (i > 0 ? ",\n    " : "\n    ") + m.value.items()[i].dump();
     text += m.value.items().empty() ? "]" : "\n  ]";
   }
   return text + "\n}\n";
@@ -113,8 +117,12 @@ std::string edits_text(const EditRecipe& recipe) {
 EditRecipe parse_edits(std::string_view text, const std::string& name) {
   const JsonFile file(text, name);
   file.require_format("osteotome_edits");
-  file.allow(file.root(), "", std::vector<std::string>{"osteotome_edits", "ct_hash", "start_hash", "result_hash", "operations", "hidden"});
-  const auto hash = [&](const char* key) { return file.text(file.need(file.root(), "", key), std::string("\"") + key + "\""); };
+  file.allow(
+      file.root(), "",
+      std::vector<std::string>{"osteotome_edits", "ct_hash", "start_hash", "result_hash", "operations", "hidden"});
+  const auto hash = [&](const char* key) {
+    return file.text(file.need(file.root(), "", key), std::string("\"") + key + "\"");
+  };
   EditRecipe r{hash("ct_hash"), hash("start_hash"), hash("result_hash"), {}, {}};
   const auto& operations = file.list(file.need(file.root(), "", "operations"), "\"operations\"");
   for (std::size_t i = 0; i < operations.size(); ++i)
@@ -152,7 +160,8 @@ void apply_edits(EditDocument& document, const EditRecipe& recipe, const Context
     return;
   }
   context.warn("the edits began from another mask or other structures, so their result is another one: look at it" +
-               (vain > 0 ? "; " + std::to_string(vain) + " of " + std::to_string(recipe.operations.size()) + " steps change nothing"
+               (vain > 0 ? "; " + std::to_string(vain) + " of " + std::to_string(recipe.operations.size()) +
+                               " steps change nothing"
                          : std::string()));
 }
 
@@ -163,4 +172,4 @@ std::optional<double> threshold_of(const EditRecipe& recipe) {
   return std::nullopt;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

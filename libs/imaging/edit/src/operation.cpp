@@ -19,7 +19,8 @@ std::string number(double v) {
 }
 
 void require_colour(const std::vector<int>& rgb) {
-  if (rgb.size() != 3 || *std::min_element(rgb.begin(), rgb.end()) < 0 || *std::max_element(rgb.begin(), rgb.end()) > 255)
+  if (rgb.size() != 3 || *std::min_element(rgb.begin(), rgb.end()) < 0 ||
+      *std::max_element(rgb.begin(), rgb.end()) > 255)
     throw Error(ExitCode::usage, "a colour has three numbers from 0 to 255");
 }
 void require_name(const std::string& name) {
@@ -41,7 +42,8 @@ struct Check {
     if (o.points_mm.empty()) throw Error(ExitCode::usage, "a brush needs a point");
     for (const Vec3 p : o.points_mm) {
       for (std::size_t a = 0; a < 3; ++a) {
-        if (!(std::abs(p[a]) <= 1e6)) throw Error(ExitCode::usage, "a point of a brush lies more than a kilometre away");
+        if (!(std::abs(p[a]) <= 1e6))
+          throw Error(ExitCode::usage, "a point of a brush lies more than a kilometre away");
       }
     }
   }
@@ -65,15 +67,22 @@ std::string_view operation_name(const EditOperation& operation) {
 std::string operation_text(const EditOperation& operation) {
   struct Text {
     std::string operator()(const ThresholdEdit& o) const {
-      return "threshold from " + number(o.lower_hu) + (o.upper_hu < 32767 ? " to " + number(o.upper_hu) : std::string()) + " HU";
+      return "threshold from " + number(o.lower_hu) +
+             (o.upper_hu < 32767 ? " to " + number(o.upper_hu) : std::string()) + " HU";
     }
-    std::string operator()(const IslandEdit& o) const { return o.choice == IslandChoice::remove ? "piece removed" : "one piece kept"; }
+    std::string operator()(const IslandEdit& o) const {
+      return o.choice == IslandChoice::remove ? "piece removed" : "one piece kept";
+    }
     std::string operator()(const IslandSizeEdit& o) const {
       return o.keep_largest > 0 ? "largest " + std::to_string(o.keep_largest) + " pieces kept"
                                 : "pieces below " + number(o.min_volume_mm3) + " mm3 removed";
     }
-    std::string operator()(const BoxEdit& o) const { return o.choice == BoxChoice::keep_inside ? "kept inside a box" : "box cleared"; }
-    std::string operator()(const FillEdit& o) const { return "cavities up to " + number(o.max_volume_mm3) + " mm3 filled"; }
+    std::string operator()(const BoxEdit& o) const {
+      return o.choice == BoxChoice::keep_inside ? "kept inside a box" : "box cleared";
+    }
+    std::string operator()(const FillEdit& o) const {
+      return "cavities up to " + number(o.max_volume_mm3) + " mm3 filled";
+    }
     std::string operator()(const SmoothEdit& o) const { return "smoothed within " + number(o.radius_mm) + " mm"; }
     std::string operator()(const BrushEdit& o) const {
       return std::string(o.erase ? "eraser " : "brush ") + number(2 * o.radius_mm) + " mm" +
@@ -82,7 +91,9 @@ std::string operation_text(const EditOperation& operation) {
     std::string operator()(const VoxelsEdit& o) const { return "voxels of structure " + std::to_string(o.structure); }
     std::string operator()(const AddStructureEdit& o) const { return "structure '" + o.name + "' added"; }
     std::string operator()(const ChangeStructureEdit& o) const { return "structure '" + o.name + "' changed"; }
-    std::string operator()(const DeleteStructureEdit& o) const { return "structure " + std::to_string(o.structure) + " deleted"; }
+    std::string operator()(const DeleteStructureEdit& o) const {
+      return "structure " + std::to_string(o.structure) + " deleted";
+    }
   };
   return std::visit(Text{}, operation);
 }
@@ -102,4 +113,4 @@ void require_valid(const EditOperation& operation) {
   std::visit(Check{}, operation);
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -79,7 +79,8 @@ void WordChanges::apply(std::span<std::uint64_t> words) const {
   if (packed_.size() != raw_bytes_) {
     unpacked.resize(raw_bytes_);
     const std::size_t n = ZSTD_decompress(unpacked.data(), unpacked.size(), packed_.data(), packed_.size());
-    if (ZSTD_isError(n) != 0 || n != raw_bytes_) throw Error(ExitCode::failed, "the history of edits is damaged in memory");
+    if (ZSTD_isError(n) != 0 || n != raw_bytes_)
+      throw Error(ExitCode::failed, "the history of edits is damaged in memory");
     at = unpacked.data();
   }
   for (const std::byte* const end = at + raw_bytes_; at < end;) {
@@ -94,4 +95,4 @@ void WordChanges::apply(std::span<std::uint64_t> words) const {
   }
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -8,7 +8,8 @@
 
 namespace osteo::inline imaging {
 
-/// Applied twice it is undone: runs of words, each to be combined by exclusive or, packed by zstd where that is shorter.
+/// Applied twice it is undone: runs of words, each to be combined by exclusive or, packed by zstd where that is
+/// shorter.
 class WordChanges {
  public:
   WordChanges() = default;
@@ -27,4 +28,4 @@ class WordChanges {
   std::size_t raw_bytes_ = 0;  // as long as packed_: not packed
 };
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -13,7 +13,8 @@
 
 namespace osteo::inline imaging::anatomy {
 
-// Distances are signed, negative inside, and grow by at most kLipschitz a mm: ellipsoids and sheared bodies are first-order.
+// Distances are signed, negative inside, and grow by at most kLipschitz a mm: ellipsoids and sheared bodies are
+// first-order.
 inline constexpr double kLipschitz = 1.6;
 
 // Union and intersection with a fillet of about k mm: polynomial, exact where the two are further apart than k.
@@ -47,7 +48,8 @@ inline double cone(Vec3 p, Vec3 a, Vec3 b, double ra, double rb) {  // round con
   return length(p - (a + ab * t)) - mix(ra, rb, t);
 }
 inline double box(Vec3 p, Vec3 c, Vec3 half, double round) {
-  const Vec3 q{std::abs(p.x - c.x) - half.x + round, std::abs(p.y - c.y) - half.y + round, std::abs(p.z - c.z) - half.z + round};
+  const Vec3 q{std::abs(p.x - c.x) - half.x + round, std::abs(p.y - c.y) - half.y + round,
+               std::abs(p.z - c.z) - half.z + round};
   const Vec3 o{std::max(q.x, 0.0), std::max(q.y, 0.0), std::max(q.z, 0.0)};
   return length(o) + std::min(std::max({q.x, q.y, q.z}), 0.0) - round;
 }
@@ -106,7 +108,8 @@ class Tube {
         const double t = static_cast<double>(s) / kSteps, t2 = t * t, t3 = t2 * t;
         const double wa = -0.5 * t3 + t2 - 0.5 * t, wb = 1.5 * t3 - 2.5 * t2 + 1, wc = -1.5 * t3 + 2 * t2 + 0.5 * t,
                      wd = 0.5 * t3 - 0.5 * t2;
-        points_.push_back({a.at_mm * wa + b.at_mm * wb + c.at_mm * wc + d.at_mm * wd, mix(b.radius_mm, c.radius_mm, t)});
+        points_.push_back(
+            {a.at_mm * wa + b.at_mm * wb + c.at_mm * wc + d.at_mm * wd, mix(b.radius_mm, c.radius_mm, t)});
       }
       chunk.last = points_.size() - 1;
       for (std::size_t k = chunk.first; k <= chunk.last; ++k) {
@@ -130,7 +133,8 @@ class Tube {
         continue;
       }
       for (std::size_t k = c.first; k < c.last; ++k) {
-        best = std::min(best, cone(p, points_[k].at_mm, points_[k + 1].at_mm, points_[k].radius_mm, points_[k + 1].radius_mm));
+        best = std::min(
+            best, cone(p, points_[k].at_mm, points_[k + 1].at_mm, points_[k].radius_mm, points_[k + 1].radius_mm));
       }
     }
     return best;
@@ -146,4 +150,4 @@ class Tube {
   std::vector<Chunk> chunks_;
 };
 
-}  // namespace osteo::imaging::anatomy
+}  // namespace osteo::inline imaging::anatomy

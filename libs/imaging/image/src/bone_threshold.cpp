@@ -28,7 +28,8 @@ Histogram histogram_of(const Image& ct, int threads, F&& wanted) {
     std::size_t at = k * static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny);
     for (int j = 0; j < ny; ++j) {
       for (int i = 0; i < nx; ++i, ++at) {
-        if (wanted(at, i, j, static_cast<int>(k))) ++h[static_cast<std::size_t>(std::clamp<int>(ct.voxels[at], kLow, kHigh - 1) - kLow)];
+        if (wanted(at, i, j, static_cast<int>(k)))
+          ++h[static_cast<std::size_t>(std::clamp<int>(ct.voxels[at], kLow, kHigh - 1) - kLow)];
       }
     }
     parts[k] = std::move(h);
@@ -71,11 +72,13 @@ BoneGuide guide_threshold(const Image& ct, int threads) {
   }
   const double voxels = static_cast<double>(ct.frame.voxel_count());
   if (best < 1e-3 * voxels)
-    throw Error(ExitCode::failed, "there is no soft tissue to go by: the values are no CT of a body", "give --lower by eye");
+    throw Error(ExitCode::failed, "there is no soft tissue to go by: the values are no CT of a body",
+                "give --lower by eye");
   // Its spread, from where it has fallen to 0.6065 of the peak, on the side where no partial volume of bone lies.
   const auto smooth = [&](int c) {
     double sum = 0;
-    for (int v = c - 3; v <= c + 3; ++v) sum += static_cast<double>(all[static_cast<std::size_t>(std::clamp(v, kLow, kHigh - 1) - kLow)]);
+    for (int v = c - 3; v <= c + 3; ++v)
+      sum += static_cast<double>(all[static_cast<std::size_t>(std::clamp(v, kLow, kHigh - 1) - kLow)]);
     return sum;
   };
   const int peak = static_cast<int>(g.soft_tissue_hu);
@@ -88,15 +91,18 @@ BoneGuide guide_threshold(const Image& ct, int threads) {
   const int nx = ct.frame.dims[0], ny = ct.frame.dims[1], nz = ct.frame.dims[2];
   const std::size_t sy = static_cast<std::size_t>(nx), sz = sy * static_cast<std::size_t>(ny);
   const Histogram inside = histogram_of(ct, threads, [&](std::size_t at, int i, int j, int k) {
-    if (ct.voxels[at] < provisional || i == 0 || j == 0 || k == 0 || i == nx - 1 || j == ny - 1 || k == nz - 1) return false;
+    if (ct.voxels[at] < provisional || i == 0 || j == 0 || k == 0 || i == nx - 1 || j == ny - 1 || k == nz - 1)
+      return false;
     const auto* const p = ct.voxels.get() + at;
-    return p[-1] >= provisional && p[1] >= provisional && p[-static_cast<std::ptrdiff_t>(sy)] >= provisional && p[sy] >= provisional &&
-           p[-static_cast<std::ptrdiff_t>(sz)] >= provisional && p[sz] >= provisional;
+    return p[-1] >= provisional && p[1] >= provisional && p[-static_cast<std::ptrdiff_t>(sy)] >= provisional &&
+           p[sy] >= provisional && p[-static_cast<std::ptrdiff_t>(sz)] >= provisional && p[sz] >= provisional;
   });
   const double count = at_or_above(inside, provisional);
   if (count * ct.frame.voxel_volume_mm3() < 50) {
-    throw Error(ExitCode::failed, "there is no bone to go by: hardly a voxel lies above " + format_number(std::round(provisional)) + " HU",
-                "see that the series is the right one, or give --lower by eye");
+    throw Error(
+        ExitCode::failed,
+        "there is no bone to go by: hardly a voxel lies above " + format_number(std::round(provisional)) + " HU",
+        "see that the series is the right one, or give --lower by eye");
   }
   // Metal is no bone.
   g.dense_bone_hu = quantile(inside, static_cast<int>(provisional), 3000, 0.75);
@@ -110,18 +116,21 @@ BoneGuide guide_threshold(const Image& ct, int threads) {
     p.lower_hu = std::round(std::max(g.soft_tissue_hu + kShare[n].second * distance, floor));
     const double volume = at_or_above(all, p.lower_hu);
     p.volume_mm3 = volume * ct.frame.voxel_volume_mm3();
-    p.change_percent = 50 * (at_or_above(all, p.lower_hu - 50) - at_or_above(all, p.lower_hu + 50)) / std::max(volume, 1.0);
+    p.change_percent =
+        50 * (at_or_above(all, p.lower_hu - 50) - at_or_above(all, p.lower_hu + 50)) / std::max(volume, 1.0);
   }
   const double apart = std::clamp(distance / (10 * g.noise_hu), 0.0, 1.0);
   g.confidence = apart * std::clamp(1.2 - g.presets[0].change_percent / 25, 0.0, 1.0);
 
-  // A skull fills up to 45 cm2 of each slice on average, a pelvis 60, and no part of a body is bone almost alone: else tissue passes for
-  // bone and air for tissue, as where the values lack their offset.
+  // A skull fills up to 45 cm2 of each slice on average, a pelvis 60, and no part of a body is bone almost alone: else
+  // tissue passes for bone and air for tissue, as where the values lack their offset.
   constexpr double kMostCm2 = 80, kMostShare = 0.85;
   double height_mm = 0;
-  for (std::size_t a = 0; a < 3; ++a) height_mm += std::abs(ct.frame.direction.column[a].z) * ct.frame.spacing_mm[a] * ct.frame.dims[a];
+  for (std::size_t a = 0; a < 3; ++a)
+    height_mm += std::abs(ct.frame.direction.column[a].z) * ct.frame.spacing_mm[a] * ct.frame.dims[a];
   const double cm2 = g.presets[0].volume_mm3 / std::max(height_mm, 1e-6) / 100;
-  const double share = at_or_above(all, g.presets[0].lower_hu) / std::max(1.0, at_or_above(all, g.soft_tissue_hu - 150));
+  const double share =
+      at_or_above(all, g.presets[0].lower_hu) / std::max(1.0, at_or_above(all, g.soft_tissue_hu - 150));
   if (cm2 > kMostCm2 || share > kMostShare) {
     g.confidence = 0;
     g.doubt = format_number(std::round(g.presets[0].volume_mm3 / 1000)) + " cm3 would be bone, " +
@@ -132,4 +141,4 @@ BoneGuide guide_threshold(const Image& ct, int threads) {
   return g;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

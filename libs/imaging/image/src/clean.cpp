@@ -6,8 +6,8 @@
 #include <limits>
 #include <vector>
 
-#include "osteo/imaging/image/components.h"
 #include "osteo/geometry/distance/binary_distance.h"
+#include "osteo/imaging/image/components.h"
 
 namespace osteo::inline imaging::image {
 namespace {
@@ -124,11 +124,13 @@ Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& c
     for (std::size_t r = 0; r < pieces.runs.size(); ++r) {
       const Run& run = pieces.runs[r];
       const int j = static_cast<int>(run.row) % ct.frame.dims[1], k = static_cast<int>(run.row) / ct.frame.dims[1];
-      for (std::uint32_t i = run.begin; i < run.end; ++i) take(pieces.component[r], static_cast<int>(i), j, k, run.row * nx + i);
+      for (std::uint32_t i = run.begin; i < run.end; ++i)
+        take(pieces.component[r], static_cast<int>(i), j, k, run.row * nx + i);
     }
   };
   const auto coarse_at = [&](int i, int j, int k) {
-    return (static_cast<std::size_t>(k / c.step[2]) * static_cast<std::size_t>(c.frame.dims[1]) + static_cast<std::size_t>(j / c.step[1])) *
+    return (static_cast<std::size_t>(k / c.step[2]) * static_cast<std::size_t>(c.frame.dims[1]) +
+            static_cast<std::size_t>(j / c.step[1])) *
                static_cast<std::size_t>(c.frame.dims[0]) +
            static_cast<std::size_t>(i / c.step[0]);
   };
@@ -152,8 +154,8 @@ Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& c
       const Run& run = parts.runs[r];
       const std::size_t row = static_cast<std::size_t>(run.row) * static_cast<std::size_t>(c.frame.dims[0]);
       if (chosen(parts.component[r]))
-        std::fill(map.begin() + static_cast<std::ptrdiff_t>(row + run.begin), map.begin() + static_cast<std::ptrdiff_t>(row + run.end),
-                  std::uint8_t{1});
+        std::fill(map.begin() + static_cast<std::ptrdiff_t>(row + run.begin),
+                  map.begin() + static_cast<std::ptrdiff_t>(row + run.end), std::uint8_t{1});
     }
     return map;
   };
@@ -165,7 +167,8 @@ Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& c
     return !hulls[static_cast<std::size_t>(x[up])].holds(x[(up + 1) % 3], x[(up + 2) % 3]);
   };
   std::vector<std::uint64_t> beyond(pieces.voxels.size());
-  std::uint64_t outside = 0, all = 0, covered = 0;  // voxels of the mask; covered: not outside, and with matter around them
+  std::uint64_t outside = 0, all = 0,
+                covered = 0;  // voxels of the mask; covered: not outside, and with matter around them
   const auto look_around = [&](const std::vector<std::uint8_t>& body) {
     to_body = squared_distance_mm2(body, c.frame, 1, context);
     hulls = hulls_of(body, c.frame);
@@ -208,7 +211,9 @@ Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& c
     nearest[p] = std::min(nearest[p], to_body[at]);
     if (!to_limb.empty() && to_limb[at] <= kReach) limb[p] = 1;
   });
-  const auto is_speck = [&](std::uint32_t p) { return static_cast<double>(pieces.voxels[p]) * ct.frame.voxel_volume_mm3() < kSpeck_mm3; };
+  const auto is_speck = [&](std::uint32_t p) {
+    return static_cast<double>(pieces.voxels[p]) * ct.frame.voxel_volume_mm3() < kSpeck_mm3;
+  };
   const auto is_certain = [&](std::uint32_t p) { return result.body && beyond[p] == pieces.voxels[p] && limb[p] == 0; };
   bool reaches = false, tissue = false;
   float least = std::numeric_limits<float>::infinity();
@@ -224,10 +229,11 @@ Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& c
   if (result.pieces > 0) result.nearest_mm = static_cast<double>(std::sqrt(least) - kThin);
   each_voxel([&](std::uint32_t p, int i, int j, int k, std::size_t v) {
     // Of a dry skull only what stands apart as a whole.
-    if (beyond[p] == 0 || is_speck(p) || (!result.body && beyond[p] != pieces.voxels[p]) || !is_outside(i, j, k)) return;
+    if (beyond[p] == 0 || is_speck(p) || (!result.body && beyond[p] != pieces.voxels[p]) || !is_outside(i, j, k))
+      return;
     (is_certain(p) ? result.certain : result.doubtful).push_back(v);
   });
-  result.doubt = !result.body        ? "there is no soft tissue around the bone (a dry skull?), so it may be a part of it"
+  result.doubt = !result.body ? "there is no soft tissue around the bone (a dry skull?), so it may be a part of it"
                  : reaches && tissue ? "it touches bone of the body, or has tissue near it as a limb has"
                  : reaches           ? "it touches bone of the body"
                                      : "it has tissue near it, as a limb has";
@@ -255,4 +261,4 @@ std::size_t clear_streaks(std::uint8_t* mask, const Image& ct, double radius_mm,
   return cleared;
 }
 
-}  // namespace osteo::imaging::image
+}  // namespace osteo::inline imaging::image

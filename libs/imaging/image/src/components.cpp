@@ -80,7 +80,8 @@ Components connected_components(std::vector<Run> runs, std::array<int, 3> dims, 
 std::vector<bool> components_to_drop(const Components& components, double min_voxels, int keep_largest) {
   std::vector<std::uint32_t> order(components.voxels.size());
   std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return components.voxels[a] > components.voxels[b]; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](auto a, auto b) { return components.voxels[a] > components.voxels[b]; });
   std::vector<bool> drop(order.size(), true);
   for (std::size_t rank = 0; rank < order.size(); ++rank) {
     const bool counted = keep_largest == 0 || rank < static_cast<std::size_t>(keep_largest);
@@ -89,4 +90,4 @@ std::vector<bool> components_to_drop(const Components& components, double min_vo
   return drop;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -40,8 +40,10 @@ Skull find_skull(const Image& ct) {
   }
   const Components parts = connected_components(bone, f.dims, 1, Connectivity::full);
   if (parts.voxels.empty())
-    throw Error(ExitCode::failed, "there is no bone by which to find the region", "give --region box with --centre-mm and --size-mm");
-  const auto largest = static_cast<std::uint32_t>(std::max_element(parts.voxels.begin(), parts.voxels.end()) - parts.voxels.begin());
+    throw Error(ExitCode::failed, "there is no bone by which to find the region",
+                "give --region box with --centre-mm and --size-mm");
+  const auto largest =
+      static_cast<std::uint32_t>(std::max_element(parts.voxels.begin(), parts.voxels.end()) - parts.voxels.begin());
   Skull s;
   // The index axis that runs up the body, and its end at the head.
   std::size_t up = 0;
@@ -65,7 +67,8 @@ Skull find_skull(const Image& ct) {
       const std::array<int, 3> index{static_cast<int>(x), y, z};
       if (index[up] != last) continue;
       s.top_mm2 += pixel;
-      for (std::size_t a = 0; a < 3; ++a) s.top_at_side = s.top_at_side || (a != up && (index[a] == 0 || index[a] == f.dims[a] - 1));
+      for (std::size_t a = 0; a < 3; ++a)
+        s.top_at_side = s.top_at_side || (a != up && (index[a] == 0 || index[a] == f.dims[a] - 1));
     }
   }
   return s;
@@ -90,15 +93,16 @@ Volume<T> cut(const Volume<T>& v, const Box& box) {
     last[a] = std::min(f.dims[a] - 1, static_cast<int>(std::ceil(hi[a] - 0.5 - 1e-6)));
     if (first[a] > last[a]) {
       const Vec3 c = (box.lo_mm + box.hi_mm) * 0.5;
-      throw Error(
-          ExitCode::usage,
-          "the box around (" + format_number(c.x) + ", " + format_number(c.y) + ", " + format_number(c.z) + ") mm lies outside the scan",
-          "'osteo info FILE' shows where the scan lies (LPS mm)");
+      throw Error(ExitCode::usage,
+                  "the box around (" + format_number(c.x) + ", " + format_number(c.y) + ", " + format_number(c.z) +
+                      ") mm lies outside the scan",
+                  "'osteo info FILE' shows where the scan lies (LPS mm)");
     }
   }
   Volume<T> out;
   out.frame = f;
-  out.frame.origin_mm = f.world_from_index({static_cast<double>(first[0]), static_cast<double>(first[1]), static_cast<double>(first[2])});
+  out.frame.origin_mm =
+      f.world_from_index({static_cast<double>(first[0]), static_cast<double>(first[1]), static_cast<double>(first[2])});
   for (std::size_t a = 0; a < 3; ++a) out.frame.dims[a] = last[a] - first[a] + 1;
   if (out.frame.dims == f.dims) return v;
   const auto voxels = make_voxels<T>(out.frame.voxel_count());
@@ -121,8 +125,10 @@ Vec3 vec(const std::array<double, 3>& v) {
 Box find_region(const Image& ct, const CropParams& p) {
   const bool centre_given = vec(p.centre_mm) != Vec3{}, size_given = vec(p.size_mm) != Vec3{};
   Vec3 centre = vec(p.centre_mm), size = vec(p.size_mm);
-  if (p.region == Region::box && !size_given) throw Error(ExitCode::usage, "--region box needs --size-mm, the edges of the box");
-  if (size_given && !(size.x > 0 && size.y > 0 && size.z > 0)) throw Error(ExitCode::usage, "--size-mm: all three edges must be above 0");
+  if (p.region == Region::box && !size_given)
+    throw Error(ExitCode::usage, "--region box needs --size-mm, the edges of the box");
+  if (size_given && !(size.x > 0 && size.y > 0 && size.z > 0))
+    throw Error(ExitCode::usage, "--size-mm: all three edges must be above 0");
   if (!size_given) size = p.region == Region::jaw ? Vec3{140, 115, 95} : Vec3{70, 85, 75};
   if (p.region != Region::box && !centre_given) {
     const Skull s = find_skull(ct);
@@ -154,4 +160,4 @@ Labels crop(const Labels& labels, const Box& box) {
   return {cut<std::uint8_t>(labels, box), labels.structures};
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

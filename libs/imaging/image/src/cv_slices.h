@@ -24,14 +24,17 @@ struct SliceLayout {
   double mm_u = 1, mm_v = 1;
 };
 inline SliceLayout layout_of(const Frame& f, SliceAt slice) {
-  if (slice.axis < 0 || slice.axis > 2 || slice.index < 0 || slice.index >= f.dims[static_cast<std::size_t>(slice.axis)])
-    throw Error(ExitCode::usage, "there is no slice " + std::to_string(slice.index) + " across axis " + std::to_string(slice.axis));
+  if (slice.axis < 0 || slice.axis > 2 || slice.index < 0 ||
+      slice.index >= f.dims[static_cast<std::size_t>(slice.axis)])
+    throw Error(ExitCode::usage,
+                "there is no slice " + std::to_string(slice.index) + " across axis " + std::to_string(slice.axis));
   const std::array<std::size_t, 3> step{1, static_cast<std::size_t>(f.dims[0]),
                                         static_cast<std::size_t>(f.dims[0]) * static_cast<std::size_t>(f.dims[1])};
   SliceLayout l;
   l.u = slice.axis == 0 ? 1 : 0;
   l.v = slice.axis == 2 ? 1 : 2;
-  const auto u = static_cast<std::size_t>(l.u), v = static_cast<std::size_t>(l.v), a = static_cast<std::size_t>(slice.axis);
+  const auto u = static_cast<std::size_t>(l.u), v = static_cast<std::size_t>(l.v),
+             a = static_cast<std::size_t>(slice.axis);
   l.begin = step[a] * static_cast<std::size_t>(slice.index);
   l.step_u = step[u];
   l.step_v = step[v];
@@ -57,4 +60,4 @@ cv::Mat slice_of(const Volume<T>& volume, SliceAt slice) {
   return copy;
 }
 
-}  // namespace osteo::imaging::image
+}  // namespace osteo::inline imaging::image

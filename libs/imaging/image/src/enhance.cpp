@@ -15,7 +15,7 @@ namespace osteo::inline imaging {
 namespace {
 
 constexpr int kLowestHu = -1024, kHighestHu = 3071;  // what is beyond is metal or padding, and stays
-constexpr double kStrength = 0.8;          // of OpenCV's filter, for each HU of noise: measured (docs/accuracy.md)
+constexpr double kStrength = 0.8;  // of OpenCV's filter, for each HU of noise: measured (docs/accuracy.md)
 
 // Writes what `change` makes of each slice, which it gets as a copy in single precision, into a new volume.
 template <class F>
@@ -49,7 +49,8 @@ double median(std::vector<float>& v) {
 float edge_width(const cv::Mat& values, const cv::Mat& gx, const cv::Mat& gy, int i, int j, double mm_u, double mm_v) {
   constexpr int kSteps = 32;
   constexpr double kReachMm = 4;
-  const double x = static_cast<double>(gx.at<float>(j, i)) / mm_u, y = static_cast<double>(gy.at<float>(j, i)) / mm_v, n = std::hypot(x, y);
+  const double x = static_cast<double>(gx.at<float>(j, i)) / mm_u, y = static_cast<double>(gy.at<float>(j, i)) / mm_v,
+               n = std::hypot(x, y);
   std::array<float, 2 * kSteps + 1> line{};
   for (int s = -kSteps; s <= kSteps; ++s) {
     const double d = kReachMm * s / kSteps, u = i + x / n * d / mm_u, v = j + y / n * d / mm_v;
@@ -73,7 +74,8 @@ float edge_width(const cv::Mat& values, const cv::Mat& gx, const cv::Mat& gy, in
     }
     return static_cast<float>(hi);
   };
-  return (crossing(foot + 0.9F * (top - foot)) - crossing(foot + 0.1F * (top - foot))) * static_cast<float>(kReachMm / kSteps);
+  return (crossing(foot + 0.9F * (top - foot)) - crossing(foot + 0.1F * (top - foot))) *
+         static_cast<float>(kReachMm / kSteps);
 }
 
 // What must be added to sums so that they run straight across the trace of metal; 0 beside it.
@@ -116,7 +118,8 @@ cv::Mat tissue_classes(const cv::Mat& values, const cv::Mat& metal) {
 }  // namespace
 
 Sharpness sharpness_of(const Image& image, const Image& edges_of) {
-  if (!same_place(image.frame, edges_of.frame)) throw Error(ExitCode::usage, "edges are looked for in a scan on the same voxels");
+  if (!same_place(image.frame, edges_of.frame))
+    throw Error(ExitCode::usage, "edges are looked for in a scan on the same voxels");
   std::vector<float> noise, widths;
   // Some slices tell enough.
   const int step = std::max(1, image.frame.dims[2] / 24);
@@ -132,10 +135,12 @@ Sharpness sharpness_of(const Image& image, const Image& edges_of) {
           const float w = where.at<float>(j + n / 3 - 1, i + n % 3 - 1);
           soft = soft && w > -150 && w < 150;
         }
-        // The difference of two second differences: what is smooth drops out (J. Immerkaer, CVIU 1996). 6 times the noise wide.
+        // The difference of two second differences: what is smooth drops out (J. Immerkaer, CVIU 1996). 6 times the
+        // noise wide.
         if (soft)
-          noise.push_back(std::abs(v(i - 1, j - 1) - 2 * v(i, j - 1) + v(i + 1, j - 1) - 2 * (v(i - 1, j) - 2 * v(i, j) + v(i + 1, j)) +
-                                   v(i - 1, j + 1) - 2 * v(i, j + 1) + v(i + 1, j + 1)));
+          noise.push_back(std::abs(v(i - 1, j - 1) - 2 * v(i, j - 1) + v(i + 1, j - 1) -
+                                   2 * (v(i - 1, j) - 2 * v(i, j) + v(i + 1, j)) + v(i - 1, j + 1) - 2 * v(i, j + 1) +
+                                   v(i + 1, j + 1)));
       }
     cv::GaussianBlur(where, where, {5, 5}, 1);
     cv::Sobel(where, gx, CV_32F, 1, 0);
@@ -189,7 +194,8 @@ Image reduce_metal(const Image& image, const MetalParams& params, const Context&
     const cv::Mat metal = slice >= params.metal_hu;
     if (cv::countNonZero(metal) < std::max(1.0, least)) return;
     // A square of square pixels, in which air outside is 0.
-    const double width = f.dims[0] * f.spacing_mm.x, height = f.dims[1] * f.spacing_mm.y, edge = std::max(width, height);
+    const double width = f.dims[0] * f.spacing_mm.x, height = f.dims[1] * f.spacing_mm.y,
+                 edge = std::max(width, height);
     const double pixel = std::max(edge / kMostPixels, std::min(f.spacing_mm.x, f.spacing_mm.y));
     const cv::Size size(std::max(1, static_cast<int>(std::lround(width / pixel))),
                         std::max(1, static_cast<int>(std::lround(height / pixel))));
@@ -201,10 +207,11 @@ Image reduce_metal(const Image& image, const MetalParams& params, const Context&
     metal.convertTo(share, CV_32F, 1.0 / 255);
     cv::resize(share, share, size, 0, 0, cv::INTER_AREA);
     cv::copyMakeBorder(small, square, top, n - size.height - top, left, n - size.width - left, cv::BORDER_CONSTANT, 0);
-    cv::copyMakeBorder(share, square_metal, top, n - size.height - top, left, n - size.width - left, cv::BORDER_CONSTANT, 0);
+    cv::copyMakeBorder(share, square_metal, top, n - size.height - top, left, n - size.width - left,
+                       cv::BORDER_CONSTANT, 0);
     const cv::Mat sums = image::project(square), trace = image::project(square_metal);
-    // First straight across the metal's trace, then once more across what a picture of mere tissue classes, taken from the first result,
-    // leaves.
+    // First straight across the metal's trace, then once more across what a picture of mere tissue classes, taken from
+    // the first result, leaves.
     cv::Mat correction = image::project_back(across(sums, trace), n);
     const cv::Mat classes = tissue_classes(square + correction, square_metal), expected = image::project(classes);
     correction = image::project_back(across(sums - expected, trace), n);
@@ -216,8 +223,9 @@ Image reduce_metal(const Image& image, const MetalParams& params, const Context&
     for (int j = 0; j < slice.rows; ++j)
       for (int i = 0; i < slice.cols; ++i) {
         if (near.at<std::uint8_t>(j, i) != 0) continue;
-        const std::int16_t was = slice.at<std::int16_t>(j, i), now = rounded(std::max(static_cast<float>(was) + full.at<float>(j, i),
-                                                                                      static_cast<float>(std::min<int>(was, kLowestHu))));
+        const std::int16_t was = slice.at<std::int16_t>(j, i),
+                           now = rounded(std::max(static_cast<float>(was) + full.at<float>(j, i),
+                                                  static_cast<float>(std::min<int>(was, kLowestHu))));
         to[static_cast<std::size_t>(j) * static_cast<std::size_t>(slice.cols) + static_cast<std::size_t>(i)] = now;
         changed[k] += now != was;
         by[k] += std::abs(now - was);
@@ -230,11 +238,12 @@ Image reduce_metal(const Image& image, const MetalParams& params, const Context&
     with_metal += changed[k] > 0;
     sum += by[k];
   }
-  if (with_metal == 0) context.warn("no slice holds metal at or above " + format_number(params.metal_hu) + " HU: nothing was changed");
+  if (with_metal == 0)
+    context.warn("no slice holds metal at or above " + format_number(params.metal_hu) + " HU: nothing was changed");
   context.report("slices_with_metal", with_metal);
   context.report("voxels_changed", voxels);
   context.report("mean_change_hu", voxels > 0 ? sum / static_cast<double>(voxels) : 0.0);
   return out;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -11,14 +11,15 @@ namespace osteo::inline imaging {
 using namespace anatomy;
 namespace {
 
-// Bone and what lies around it have their mean near 500, so that one threshold finds unbiased boundaries; cancellous bone, which lies
-// within a cortex, is above it.
+// Bone and what lies around it have their mean near 500, so that one threshold finds unbiased boundaries; cancellous
+// bone, which lies within a cortex, is above it.
 constexpr std::array<double, kTissueCount> kHu{-1000, 40,   960, 960, 960, 1200, 60, 50,    2600,  700,
                                                700,   1500, 30,  50,  50,  50,   60, -1000, -1000, -1000};
 constexpr std::array<std::string_view, kTissueCount> kNames{
-    "air",         "soft tissue", "cortical bone", "cellular bone",  "mandible",  "ossicle",        "facial nerve",   "sigmoid sinus",
-    "left marker", "diploe",      "jaw marrow",    "tooth",          "labyrinth", "chorda tympani", "alveolar nerve", "carotid artery",
-    "dura",        "air cells",   "ear canal",     "tympanic cavity"};
+    "air",          "soft tissue",    "cortical bone",  "cellular bone",  "mandible",   "ossicle",
+    "facial nerve", "sigmoid sinus",  "left marker",    "diploe",         "jaw marrow", "tooth",
+    "labyrinth",    "chorda tympani", "alveolar nerve", "carotid artery", "dura",       "air cells",
+    "ear canal",    "tympanic cavity"};
 
 }  // namespace
 
@@ -36,8 +37,8 @@ HeadAnatomy::Sample HeadAnatomy::Model::sample(Vec3 world) const {
   if (!inside(skin_d)) return is(Tissue::air);
   // The ear's parts lie in a box; beyond it and a rim they decide nothing.
   const Vec3 lo{8, -50, -70}, hi{80, 40, -2};
-  const double away = length(
-      Vec3{std::max({lo.x - p.x, p.x - hi.x, 0.0}), std::max({lo.y - p.y, p.y - hi.y, 0.0}), std::max({lo.z - p.z, p.z - hi.z, 0.0})});
+  const double away = length(Vec3{std::max({lo.x - p.x, p.x - hi.x, 0.0}), std::max({lo.y - p.y, p.y - hi.y, 0.0}),
+                                  std::max({lo.z - p.z, p.z - hi.z, 0.0})});
   constexpr double kRim = 4;
   const bool near_ear = away < kRim;
   Ear e;
@@ -77,9 +78,11 @@ HeadAnatomy::Sample HeadAnatomy::Model::sample(Vec3 world) const {
   if (inside(nasal_d)) {
     // Septum and conchae: bone within mucosa.
     const double septum = smax(p.x - 0.7, -84 - p.y, 1);
-    const double concha = std::min(cone(p, {9, -84, -30}, {9, -54, -30}, 2.6, 2.6), cone(p, {6.5, -80, -16}, {6.5, -52, -16}, 2.2, 2.2));
+    const double concha =
+        std::min(cone(p, {9, -84, -30}, {9, -54, -30}, 2.6, 2.6), cone(p, {6.5, -80, -16}, {6.5, -52, -16}, 2.2, 2.2));
     if (inside(septum) || inside(concha, -1.8)) return is(Tissue::cortical);
-    if (inside(septum, 1.0) || inside(concha) || inside(nasal_d, 0) == false || !inside(nasal_d, -1.2)) return is(Tissue::soft);
+    if (inside(septum, 1.0) || inside(concha) || inside(nasal_d, 0) == false || !inside(nasal_d, -1.2))
+      return is(Tissue::soft);
     return is(Tissue::air);
   }
   const double tooth_d = tooth(p);
@@ -99,8 +102,8 @@ HeadAnatomy::Sample HeadAnatomy::Model::sample(Vec3 world) const {
   }
   if (near_ear) {
     // Openings between the cells and to the antrum go through any wall but those to what must not be opened.
-    const double kept =
-        std::min({e.nerve - 0.8, e.chorda - 0.3, e.labyrinth - 1.3, e.canal - 1.0, sinus_d - 0.9, brain_d - 0.8, -bone - 1.5});
+    const double kept = std::min(
+        {e.nerve - 0.8, e.chorda - 0.3, e.labyrinth - 1.3, e.canal - 1.0, sinus_d - 0.9, brain_d - 0.8, -bone - 1.5});
     if (inside(in_duct(p)) && !inside(kept)) return is(Tissue::air_cells);
     const double region = cell_region(p, bone, brain_d, sinus_d, e);
     if (inside(region, 0.5)) {
@@ -110,8 +113,8 @@ HeadAnatomy::Sample HeadAnatomy::Model::sample(Vec3 world) const {
       return is(Tissue::cellular);
     }
     // The petrous bone is dense around what it holds.
-    if (inside(e.labyrinth, 2.0) || inside(e.nerve, 0.9) || inside(e.canal, 1.2) || inside(e.cavity, 1.0) || inside(e.meatus, 1.0) ||
-        inside(e.carotid, 1.0))
+    if (inside(e.labyrinth, 2.0) || inside(e.nerve, 0.9) || inside(e.canal, 1.2) || inside(e.cavity, 1.0) ||
+        inside(e.meatus, 1.0) || inside(e.carotid, 1.0))
       return is(Tissue::cortical);
   }
   if (inside(bone, -1.6) && !inside(sinus_d, 1.2)) return is(Tissue::diploe);
@@ -148,4 +151,4 @@ double tissue_hu(Tissue tissue) {
   return kHu[static_cast<std::size_t>(tissue)];
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -10,7 +10,8 @@ using namespace anatomy;
 
 HeadAnatomy::Model::Ear HeadAnatomy::Model::ear(Vec3 p) const {
   Ear e;
-  // The drum: a plane that faces outward, forward and down; the lateral part of the tube is the canal, the medial the cavity.
+  // The drum: a plane that faces outward, forward and down; the lateral part of the tube is the canal, the medial the
+  // cavity.
   const Vec3 centre{45, 0, -20}, out = normalized({0.78, -0.34, -0.52});
   const double drum = dot(p - centre, out);
   const Vec3 tall{p.x, p.y, -20 + (p.z + 20) * 0.86};
@@ -18,7 +19,8 @@ HeadAnatomy::Model::Ear HeadAnatomy::Model::ear(Vec3 p) const {
   e.canal = std::max(tube, 0.12 - drum);
   e.drum = std::max(tube, std::abs(drum) - 0.12);
   // Labyrinth.
-  const Vec3 ridge = normalized({0.72, 0.69, 0}), back = normalized({-0.69, 0.72, 0}), level = normalized({0, 0.5, 0.87});
+  const Vec3 ridge = normalized({0.72, 0.69, 0}), back = normalized({-0.69, 0.72, 0}),
+             level = normalized({0, 0.5, 0.87});
   const double k = build.canals;
   double l = ellipsoid(p, {36.4, 3.5, -16.1}, {1.6, 2.7, 2.3});
   l = smin(l, torus(p, {35.5, 4.3, -12.3}, ridge, 3.2 * k, 0.55), 0.5);
@@ -81,7 +83,8 @@ double HeadAnatomy::Model::cell_region(Vec3 p, double bone, double brain_d, doub
 
 std::optional<std::size_t> HeadAnatomy::Model::lattice_index(Vec3 p) const {
   const Vec3 q = (p - lattice_lo) / kPitch;
-  const std::array<int, 3> i{static_cast<int>(std::floor(q.x)), static_cast<int>(std::floor(q.y)), static_cast<int>(std::floor(q.z))};
+  const std::array<int, 3> i{static_cast<int>(std::floor(q.x)), static_cast<int>(std::floor(q.y)),
+                             static_cast<int>(std::floor(q.z))};
   for (std::size_t a = 0; a < 3; ++a)
     if (i[a] < 0 || i[a] >= lattice[a]) return std::nullopt;
   return static_cast<std::size_t>((i[2] * lattice[1] + i[1]) * lattice[0] + i[0]);
@@ -112,7 +115,8 @@ double HeadAnatomy::Model::in_duct(Vec3 p) const {
   const auto at = lattice_index(p);
   double d = 0.8;
   if (!at) return d;
-  for (const auto c : near_ducts[*at]) d = std::min(d, cone(p, ducts[c].a, ducts[c].b, ducts[c].radius, ducts[c].radius));
+  for (const auto c : near_ducts[*at])
+    d = std::min(d, cone(p, ducts[c].a, ducts[c].b, ducts[c].radius, ducts[c].radius));
   return d;
 }
 
@@ -125,7 +129,8 @@ void HeadAnatomy::Model::place_cells(std::uint64_t seed) {
     const double brain_d = brain(p, vault, sinus_d, e, orbit_d, 1e9);
     return cell_region(p, skull(p, vault, brain_d, orbit_d, nasal_d, 1e9, sinus_d, e), brain_d, sinus_d, e);
   };
-  // Large ones first; each try smaller. Sizes are log-normal about their place's: small around the antrum, large in the tip and behind.
+  // Large ones first; each try smaller. Sizes are log-normal about their place's: small around the antrum, large in the
+  // tip and behind.
   const Vec3 antrum{47.6, 14.2, -12.9};
   for (int i = 0; i < 14000; ++i) {
     const Vec3 p{random.uniform(lo.x, hi.x), random.uniform(lo.y, hi.y), random.uniform(lo.z, hi.z)};
@@ -158,7 +163,8 @@ void HeadAnatomy::Model::place_cells(std::uint64_t seed) {
       if (done[i] == 0 && (best == n || cost[i] < cost[best])) best = i;
     done[best] = 1;
     for (std::size_t i = 0; i < n; ++i) {
-      const double gap = length(cells[i].centre_mm - cells[best].centre_mm) - cells[i].radius_mm - cells[best].radius_mm;
+      const double gap =
+          length(cells[i].centre_mm - cells[best].centre_mm) - cells[i].radius_mm - cells[best].radius_mm;
       const double c = cost[best] + (0.5 + std::max(0.0, gap)) * (0.5 + std::max(0.0, gap));
       if (done[i] == 0 && gap < 2.5 && c < cost[i]) {
         cost[i] = c;
@@ -179,7 +185,8 @@ void HeadAnatomy::Model::place_cells(std::uint64_t seed) {
   // Lattice: a cell matters in a box if it can be among the nearest two anywhere in it.
   lattice_lo = lo - Vec3{4, 4, 4};
   for (std::size_t a = 0; a < 3; ++a) lattice[a] = static_cast<int>(std::ceil((hi[a] - lo[a] + 8) / kPitch));
-  near_cells.resize(static_cast<std::size_t>(lattice[0]) * static_cast<std::size_t>(lattice[1]) * static_cast<std::size_t>(lattice[2]));
+  near_cells.resize(static_cast<std::size_t>(lattice[0]) * static_cast<std::size_t>(lattice[1]) *
+                    static_cast<std::size_t>(lattice[2]));
   near_ducts.resize(near_cells.size());
   const double half = 0.5 * kPitch * std::sqrt(3.0);
   std::vector<double> f(n);
@@ -207,4 +214,4 @@ void HeadAnatomy::Model::place_cells(std::uint64_t seed) {
       }
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

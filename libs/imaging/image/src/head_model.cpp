@@ -103,8 +103,11 @@ HeadAnatomy::Model::Model(std::uint64_t individual) : build(build_of(individual)
                   {{17, -19, -19}, 2.4},
                   {{11, -22, -11}, 2.3},
                   {{10.5, -30, -6}, 2.2}});
-  auditory_tube =
-      Tube({{{41.2, -4.2, -17.6}, 1.6}, {{38.5, -9.5, -19.6}, 1.1}, {{33, -18, -23}, 0.8}, {{24, -30, -28.5}, 0.8}, {{13, -44, -34}, 1.6}});
+  auditory_tube = Tube({{{41.2, -4.2, -17.6}, 1.6},
+                        {{38.5, -9.5, -19.6}, 1.1},
+                        {{33, -18, -23}, 0.8},
+                        {{24, -30, -28.5}, 0.8},
+                        {{13, -44, -34}, 1.6}});
   arch_tube = Tube({{{47, -68, -19}, 6.0},
                     {{55, -60, -19.5}, 4.2},
                     {{61.5, -46, -19.5}, 3.2},
@@ -120,8 +123,13 @@ HeadAnatomy::Model::Model(std::uint64_t individual) : build(build_of(individual)
                    {{25.5, -77.2, -94}, 1.3},
                    {{27.5, -82, -91}, 1.4}});
   const double g = b.gonion_out;
-  jaw_line =
-      Tube({{{-7, -88.7, 0}}, {{7, -88.7, 0}}, {{20, -82, 0}}, {{31, -67, 0}}, {{39.5 + 0.4 * g, -45, 0}}, {{45.5 + g, -22, 0}}}).points();
+  jaw_line = Tube({{{-7, -88.7, 0}},
+                   {{7, -88.7, 0}},
+                   {{20, -82, 0}},
+                   {{31, -67, 0}},
+                   {{39.5 + 0.4 * g, -45, 0}},
+                   {{45.5 + g, -22, 0}}})
+                 .points();
   // Cochlea: 2.5 turns about the modiolus, which points forward and outward. The radius shrinks as the spiral rises.
   {
     const Vec3 base{34.2, -2.4, -19.0}, axis = normalized({0.66, -0.72, -0.2});
@@ -179,7 +187,8 @@ HeadAnatomy::Model::Model(std::uint64_t individual) : build(build_of(individual)
       Tooth& tooth = teeth[static_cast<std::size_t>(row * 8 + i)];
       tooth.up = row == 0 ? 1 : -1;
       tooth.half = {0.5 * d[0] * fit - 0.12, 0.5 * d[1], 0.5 * d[2]};
-      tooth.centre = {rx * a.sin, ty + (row == 0 ? 0.0 : 1.0), occlusal + tooth.up * ((row == 0 ? 1.2 : 2.4) + 0.5 * d[2])};
+      tooth.centre = {rx * a.sin, ty + (row == 0 ? 0.0 : 1.0),
+                      occlusal + tooth.up * ((row == 0 ? 1.2 : 2.4) + 0.5 * d[2])};
       tooth.along = normalized({rx * a.cos, ry * a.sin, 0});
       tooth.root = d[3];
     }
@@ -187,4 +196,4 @@ HeadAnatomy::Model::Model(std::uint64_t individual) : build(build_of(individual)
   place_cells(individual);
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -1,5 +1,6 @@
-// One head's sizes, lines and cells, and the solids made of them. head_model.cpp sets sizes and lines, head_solids.cpp has skull, jaw
-// and soft parts, head_ear.cpp the ear and the mastoid's cells, head_anatomy.cpp asks them all for a point's tissue.
+// One head's sizes, lines and cells, and the solids made of them. head_model.cpp sets sizes and lines, head_solids.cpp
+// has skull, jaw and soft parts, head_ear.cpp the ear and the mastoid's cells, head_anatomy.cpp asks them all for a
+// point's tissue.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -51,7 +52,8 @@ struct HeadAnatomy::Model {
  private:
   // What is needed of a point more than once.
   struct Ear {
-    double canal = 1e9, drum = 1e9, cavity = 1e9, labyrinth = 1e9, nerve = 1e9, chorda = 1e9, meatus = 1e9, carotid = 1e9;
+    double canal = 1e9, drum = 1e9, cavity = 1e9, labyrinth = 1e9, nerve = 1e9, chorda = 1e9, meatus = 1e9,
+           carotid = 1e9;
   };
   [[nodiscard]] Ear ear(Vec3 p) const;
   [[nodiscard]] double outer_vault(Vec3 p) const;
@@ -67,7 +69,8 @@ struct HeadAnatomy::Model {
   [[nodiscard]] double in_cell(Vec3 p) const;
   [[nodiscard]] double in_duct(Vec3 p) const;
   [[nodiscard]] std::optional<std::size_t> lattice_index(Vec3 p) const;
-  [[nodiscard]] double skull(Vec3 p, double vault, double brain, double orbit, double nasal, double air, double sinus, const Ear& e) const;
+  [[nodiscard]] double skull(Vec3 p, double vault, double brain, double orbit, double nasal, double air, double sinus,
+                             const Ear& e) const;
   void place_cells(std::uint64_t seed);
 
   // Cells that can matter in each box of a lattice, and the openings between them.
@@ -82,4 +85,4 @@ struct HeadAnatomy::Model {
   std::vector<Duct> ducts;
 };
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

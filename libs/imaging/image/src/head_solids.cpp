@@ -86,13 +86,14 @@ double HeadAnatomy::Model::tooth(Vec3 p) const {
     const bool molar = t.half.x > 4 && t.half.y > 4.5;
     const double blade = molar || t.half.y > 4 ? 1 : mix(0.45, 1, ramp(q.z, -t.half.z, t.half.z));
     const double neck = mix(1, 0.78, ramp(q.z, 0, t.half.z));
-    double crown =
-        box({q.x / neck, q.y / (blade * neck), q.z}, {}, {t.half.x, t.half.y, t.half.z}, std::min(t.half.x, t.half.y) * 0.62) * 0.7;
+    double crown = box({q.x / neck, q.y / (blade * neck), q.z}, {}, {t.half.x, t.half.y, t.half.z},
+                       std::min(t.half.x, t.half.y) * 0.62) *
+                   0.7;
     double root = 1e9;
     if (molar) {
       for (const double side : {-1.0, 1.0}) {
-        root = std::min(root, cone(q, {side * t.half.x * 0.4, 0, t.half.z * 0.6}, {side * t.half.x * 0.55, 0, t.half.z + t.root},
-                                   t.half.x * 0.45, 1.0));
+        root = std::min(root, cone(q, {side * t.half.x * 0.4, 0, t.half.z * 0.6},
+                                   {side * t.half.x * 0.55, 0, t.half.z + t.root}, t.half.x * 0.45, 1.0));
       }
     } else {
       root = cone(q, {0, 0, t.half.z * 0.6}, {0, 0, t.half.z + t.root}, std::min(t.half.x, t.half.y) * 0.72, 0.9);
@@ -112,7 +113,8 @@ double HeadAnatomy::Model::mandible(Vec3 p) const {
   const double x = p.x + lean;
   double way = 1e9;
   for (std::size_t i = 0; i + 1 < jaw_line.size(); ++i) {
-    way = std::min(way, segment2(x, p.y, jaw_line[i].at_mm.x, jaw_line[i].at_mm.y, jaw_line[i + 1].at_mm.x, jaw_line[i + 1].at_mm.y));
+    way = std::min(way, segment2(x, p.y, jaw_line[i].at_mm.x, jaw_line[i].at_mm.y, jaw_line[i + 1].at_mm.x,
+                                 jaw_line[i + 1].at_mm.y));
   }
   const double thick = mix(5.2, 5.8, ramp(p.z, -86, -98)) + 0.8 * ramp(p.y, -80, -90);
   double body = smax(way - thick, std::abs(p.z - 0.5 * (low + high)) - 0.5 * (high - low), 6) * 0.85;
@@ -165,8 +167,8 @@ double HeadAnatomy::Model::face(Vec3 p, double orbit_d, double nasal_d) const {
   return smin(d, cone(p, {46, -66, 4}, {36, -46, -4}, 3, 4), 6);
 }
 
-double HeadAnatomy::Model::skull(Vec3 p, double vault, double brain_d, double orbit_d, double nasal_d, double air, double sinus_d,
-                                 const Ear& e) const {
+double HeadAnatomy::Model::skull(Vec3 p, double vault, double brain_d, double orbit_d, double nasal_d, double air,
+                                 double sinus_d, const Ear& e) const {
   // Underside of the base.
   double under = mix(-24 - 0.42 * (p.y + 40), -17.5, ramp(p.x, 14, 26));
   under = mix(under, -32.2, ramp(p.y, -14, -2));
@@ -199,4 +201,4 @@ double HeadAnatomy::Model::skull(Vec3 p, double vault, double brain_d, double or
   return std::max({d, -sinus_d, -e.carotid, -air});
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -66,9 +66,11 @@ VoxelMean voxel_mean(const HeadAnatomy& head, Vec3 centre, Vec3 spacing) {
   VoxelMean v{s.tissue, tissue_hu(s.tissue), is_bone(s.tissue) ? 1.0 : 0.0};
   if (s.margin_mm >= 0.5 * length(spacing)) return v;
   v.hu = v.bone = 0;
-  // A lattice of rank 1 about the centre: 27 levels along every axis, where a cubic one has three and leaves terraces on surfaces.
+  // A lattice of rank 1 about the centre: 27 levels along every axis, where a cubic one has three and leaves terraces
+  // on surfaces.
   for (int n = 0; n < 27; ++n) {
-    const Vec3 offset{(n - 13) * spacing.x / 27, ((8 * n + 17) % 27 - 13) * spacing.y / 27, ((10 * n + 18) % 27 - 13) * spacing.z / 27};
+    const Vec3 offset{(n - 13) * spacing.x / 27, ((8 * n + 17) % 27 - 13) * spacing.y / 27,
+                      ((10 * n + 18) % 27 - 13) * spacing.z / 27};
     const Tissue t = length(offset) < s.margin_mm ? s.tissue : head.tissue(centre + offset);
     v.hu += tissue_hu(t) / 27;
     v.bone += is_bone(t) ? 1.0 / 27 : 0;
@@ -81,7 +83,8 @@ VoxelMean voxel_mean(const HeadAnatomy& head, Vec3 centre, Vec3 spacing) {
 Phantom make_phantom(const PhantomParams& p, const Context& context) {
   const Frame frame = phantom_frame(p);
   if (static_cast<double>(frame.voxel_count()) > 1e9) {
-    throw Error(ExitCode::resources, "a phantom of this size has more than 10^9 voxels", "use --region temporal or a larger --spacing-mm");
+    throw Error(ExitCode::resources, "a phantom of this size has more than 10^9 voxels",
+                "use --region temporal or a larger --spacing-mm");
   }
   const HeadAnatomy head(static_cast<std::uint64_t>(p.individual));
   const auto hu = make_voxels<std::int16_t>(frame.voxel_count());
@@ -133,7 +136,8 @@ Phantom make_phantom(const PhantomParams& p, const Context& context) {
   parallel_for(means.size(), 1 << 16, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t at = begin; at < end; ++at) {
       const double noise = p.noise_hu > 0 ? p.noise_hu * gaussian(context.seed, at) : 0;
-      hu[at] = static_cast<std::int16_t>(std::clamp(std::lround(static_cast<double>(means[at]) + noise), -1024L, 3071L));
+      hu[at] =
+          static_cast<std::int16_t>(std::clamp(std::lround(static_cast<double>(means[at]) + noise), -1024L, 3071L));
     }
   });
   Phantom result{{frame, hu}, {frame, labels}, 0};
@@ -142,4 +146,4 @@ Phantom make_phantom(const PhantomParams& p, const Context& context) {
   return result;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -27,7 +27,9 @@ std::vector<Outline> outlines(const cv::Mat& values, const Frame& frame, SliceAt
   std::vector<std::vector<cv::Point>> lines;
   std::vector<cv::Vec4i> family;
   cv::findContours(mask, lines, family, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
-  const auto at = [&](int x, int y) { return fine.at<float>(std::clamp(y, 0, fine.rows - 1), std::clamp(x, 0, fine.cols - 1)); };
+  const auto at = [&](int x, int y) {
+    return fine.at<float>(std::clamp(y, 0, fine.rows - 1), std::clamp(x, 0, fine.cols - 1));
+  };
   std::vector<Outline> out;
   for (std::size_t n = 0; n < lines.size(); ++n) {
     if (lines[n].size() < 3) continue;
@@ -64,31 +66,34 @@ std::vector<Outline> outlines(const cv::Mat& values, const Frame& frame, SliceAt
   return out;
 }
 
-// Calls change(mask of the value in a slice, 0 or 255) for each slice, and puts what it returns into a copy of the labels.
+// Calls change(mask of the value in a slice, 0 or 255) for each slice, and puts what it returns into a copy of the
+// labels.
 template <class F>
 Labels each_slice(const Labels& labels, std::uint8_t value, int axis, const Context& context, F&& change) {
   static_cast<void>(image::layout_of(labels.frame, {axis, 0}));
   const std::size_t n = labels.frame.voxel_count();
   const auto voxels = make_voxels<std::uint8_t>(n);
   std::copy_n(labels.voxels.get(), n, voxels.get());
-  parallel_for(static_cast<std::size_t>(labels.frame.dims[static_cast<std::size_t>(axis)]), 1, context.threads,
-               [&](std::size_t begin, std::size_t end) {
-                 for (std::size_t k = begin; k < end; ++k) {
-                   context.check_cancelled();
-                   const SliceAt slice{axis, static_cast<int>(k)};
-                   const cv::Mat mask = image::slice_of(labels, slice) == value;
-                   if (cv::countNonZero(mask) == 0) continue;
-                   const cv::Mat changed = change(mask);
-                   const image::SliceLayout l = image::layout_of(labels.frame, slice);
-                   for (int j = 0; j < l.height; ++j)
-                     for (int i = 0; i < l.width; ++i) {
-                       std::uint8_t& x = voxels[l.begin + static_cast<std::size_t>(i) * l.step_u + static_cast<std::size_t>(j) * l.step_v];
-                       const bool now = changed.at<std::uint8_t>(j, i) != 0;
-                       if (x == value && !now) x = 0;
-                       if (x == 0 && now) x = value;
-                     }
-                 }
-               });
+  parallel_for(
+      static_cast<std::size_t>(labels.frame.dims[static_cast<std::size_t>(axis)]), 1, context.threads,
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+          context.check_cancelled();
+          const SliceAt slice{axis, static_cast<int>(k)};
+          const cv::Mat mask = image::slice_of(labels, slice) == value;
+          if (cv::countNonZero(mask) == 0) continue;
+          const cv::Mat changed = change(mask);
+          const image::SliceLayout l = image::layout_of(labels.frame, slice);
+          for (int j = 0; j < l.height; ++j)
+            for (int i = 0; i < l.width; ++i) {
+              std::uint8_t& x =
+                  voxels[l.begin + static_cast<std::size_t>(i) * l.step_u + static_cast<std::size_t>(j) * l.step_v];
+              const bool now = changed.at<std::uint8_t>(j, i) != 0;
+              if (x == value && !now) x = 0;
+              if (x == 0 && now) x = value;
+            }
+        }
+      });
   Labels out;
   out.frame = labels.frame;
   out.structures = labels.structures;
@@ -98,7 +103,8 @@ Labels each_slice(const Labels& labels, std::uint8_t value, int axis, const Cont
 
 cv::Mat mat_of(const PlaneImage& p) {
   image::without_own_threads();
-  if (p.width < 8 || p.height < 8 || p.values.size() != static_cast<std::size_t>(p.width) * static_cast<std::size_t>(p.height))
+  if (p.width < 8 || p.height < 8 ||
+      p.values.size() != static_cast<std::size_t>(p.width) * static_cast<std::size_t>(p.height))
     throw Error(ExitCode::usage, "a plane to be matched has at least 8 x 8 values");
   return {p.height, p.width, CV_32F, const_cast<float*>(p.values.data())};
 }
@@ -120,7 +126,8 @@ std::vector<Outline> outlines_of(const Labels& labels, SliceAt slice, std::uint8
   return outlines(values, labels.frame, slice, 0.5F);
 }
 
-Labels morph_slices(const Labels& labels, std::uint8_t value, Morphology what, double radius_mm, int axis, const Context& context) {
+Labels morph_slices(const Labels& labels, std::uint8_t value, Morphology what, double radius_mm, int axis,
+                    const Context& context) {
   const image::SliceLayout l = image::layout_of(labels.frame, {axis, 0});
   const int ru = static_cast<int>(radius_mm / l.mm_u + 1e-6), rv = static_cast<int>(radius_mm / l.mm_v + 1e-6);
   // A disc in mm; OpenCV's own ellipse is rounded otherwise.
@@ -149,7 +156,8 @@ Labels fill_slices(const Labels& labels, std::uint8_t value, double most_mm2, in
     const int n = cv::connectedComponentsWithStats(outside, parts, facts, middles, 4, CV_32S);
     const int around = parts.at<int>(0, 0);
     std::vector<char> enclosed(static_cast<std::size_t>(n));
-    for (int c = 1; c < n; ++c) enclosed[static_cast<std::size_t>(c)] = c != around && facts.at<int>(c, cv::CC_STAT_AREA) <= most;
+    for (int c = 1; c < n; ++c)
+      enclosed[static_cast<std::size_t>(c)] = c != around && facts.at<int>(c, cv::CC_STAT_AREA) <= most;
     cv::Mat out = mask.clone();
     for (int j = 0; j < mask.rows; ++j)
       for (int i = 0; i < mask.cols; ++i)
@@ -167,8 +175,9 @@ Picture thumbnail(const Image& image, SliceAt slice, int pixels, double lo, doub
   image::slice_of(image, slice).convertTo(grey, CV_32F, 255 / (hi - lo), -255 * lo / (hi - lo));
   grey = cv::min(cv::max(grey, 0.0F), 255.0F);
   cv::resize(grey, small,
-             {std::max(1, static_cast<int>(std::lround(width * scale))), std::max(1, static_cast<int>(std::lround(height * scale)))}, 0, 0,
-             cv::INTER_AREA);
+             {std::max(1, static_cast<int>(std::lround(width * scale))),
+              std::max(1, static_cast<int>(std::lround(height * scale)))},
+             0, 0, cv::INTER_AREA);
   // Head up and front up, whichever way the axes run.
   const auto up = [&](int axis) {
     const Vec3& d = image.frame.direction.column[static_cast<std::size_t>(axis)];
@@ -201,16 +210,19 @@ PlaneMatch match_by_phase(const PlaneImage& first, const PlaneImage& second) {
 PlaneMatch match_by_correlation(const PlaneImage& first, const PlaneImage& second, const PlaneMatch& guess) {
   const cv::Mat a = mat_of(first), b = mat_of(second);
   // OpenCV turns about the corner.
-  const double cx = 0.5 * (a.cols - 1), cy = 0.5 * (a.rows - 1), c = std::cos(guess.angle_rad), s = std::sin(guess.angle_rad);
-  cv::Mat warp = (cv::Mat_<float>(2, 3) << c, -s, cx + guess.dx - c * cx + s * cy, s, c, cy + guess.dy - s * cx - c * cy);
+  const double cx = 0.5 * (a.cols - 1), cy = 0.5 * (a.rows - 1), c = std::cos(guess.angle_rad),
+               s = std::sin(guess.angle_rad);
+  cv::Mat warp =
+      (cv::Mat_<float>(2, 3) << c, -s, cx + guess.dx - c * cx + s * cy, s, c, cy + guess.dy - s * cx - c * cy);
   try {
-    const double score =
-        cv::findTransformECC(a, b, warp, cv::MOTION_EUCLIDEAN, {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-7});
+    const double score = cv::findTransformECC(a, b, warp, cv::MOTION_EUCLIDEAN,
+                                              {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-7});
     const auto m = [&](int i, int j) { return static_cast<double>(warp.at<float>(i, j)); };
-    return {m(0, 0) * cx + m(0, 1) * cy + m(0, 2) - cx, m(1, 0) * cx + m(1, 1) * cy + m(1, 2) - cy, std::atan2(m(1, 0), m(0, 0)), score};
+    return {m(0, 0) * cx + m(0, 1) * cy + m(0, 2) - cx, m(1, 0) * cx + m(1, 1) * cy + m(1, 2) - cy,
+            std::atan2(m(1, 0), m(0, 0)), score};
   } catch (const cv::Exception&) {
     return {};  // what OpenCV throws where the correlation cannot be raised
   }
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -22,7 +22,8 @@ cv::Mat project(const cv::Mat& picture) {
   const int n = width_of(picture.cols);
   cv::Mat rows(kAngles, n, CV_32F), turned, sums;
   for (int a = 0; a < kAngles; ++a) {
-    cv::warpAffine(picture, turned, turning(picture.cols, n, a * 180.0 / kAngles), {n, n}, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
+    cv::warpAffine(picture, turned, turning(picture.cols, n, a * 180.0 / kAngles), {n, n}, cv::INTER_LINEAR,
+                   cv::BORDER_CONSTANT, 0);
     cv::reduce(turned, sums, 0, cv::REDUCE_SUM, CV_32F);
     sums.copyTo(rows.row(a));
   }
@@ -48,10 +49,11 @@ cv::Mat project_back(const cv::Mat& rows, int pixels) {
   cv::Mat picture = cv::Mat::zeros(pixels, pixels, CV_32F), spread, turned;
   for (int a = 0; a < kAngles; ++a) {
     cv::repeat(filtered(cv::Rect(0, a, n, 1)), n, 1, spread);
-    cv::warpAffine(spread, turned, turning(n, pixels, -a * 180.0 / kAngles), {pixels, pixels}, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
+    cv::warpAffine(spread, turned, turning(n, pixels, -a * 180.0 / kAngles), {pixels, pixels}, cv::INTER_LINEAR,
+                   cv::BORDER_CONSTANT, 0);
     picture += turned;
   }
   return picture * (CV_PI / kAngles);
 }
 
-}  // namespace osteo::imaging::image
+}  // namespace osteo::inline imaging::image

@@ -23,7 +23,8 @@ std::map<int, std::string> parse_names(const std::string& text) {
     rest = comma < rest.size() ? rest.substr(comma + 1) : std::string();
     const std::size_t equals = item.find('=');
     const std::string value = trimmed(item.substr(0, equals));
-    const bool number = !value.empty() && value.find_first_not_of("0123456789") == std::string::npos && value.size() < 4;
+    const bool number =
+        !value.empty() && value.find_first_not_of("0123456789") == std::string::npos && value.size() < 4;
     const int v = number ? std::atoi(value.c_str()) : 0;
     const std::string name = equals == std::string::npos ? std::string() : trimmed(item.substr(equals + 1));
     if (v < 1 || v > 255 || name.empty()) {
@@ -62,8 +63,8 @@ Labels name_structures(const Labels& labels, const StructuresParams& params, con
         if (v == 0) continue;
         ++count[v];
         if (ct == nullptr) continue;
-        const Vec3 x =
-            ct->frame.index_from_world(f.world_from_index({static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)}));
+        const Vec3 x = ct->frame.index_from_world(
+            f.world_from_index({static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)}));
         bool in = true;
         for (std::size_t a = 0; a < 3; ++a) in = in && x[a] > -0.5 && x[a] < ct->frame.dims[a] - 0.5;
         inside[v] += in ? 1 : 0;
@@ -77,12 +78,14 @@ Labels name_structures(const Labels& labels, const StructuresParams& params, con
   }
   if (all == 0) throw Error(ExitCode::failed, "the label map is empty: no voxel is above 0");
   if (ct != nullptr && all_inside == 0) {
-    throw Error(ExitCode::failed, "no labelled voxel lies inside the CT: the label map is of another scan, or its frame is wrong",
+    throw Error(ExitCode::failed,
+                "no labelled voxel lies inside the CT: the label map is of another scan, or its frame is wrong",
                 "'osteo info' shows where each lies (LPS mm)");
   }
   if (ct != nullptr && 2 * all_inside < all) context.warn("more than half of the labelled voxels lie outside the CT");
   for (const auto& [value, name] : given) {
-    if (count[static_cast<std::size_t>(value)] == 0) context.warn("no voxel has the value " + std::to_string(value) + " (" + name + ")");
+    if (count[static_cast<std::size_t>(value)] == 0)
+      context.warn("no voxel has the value " + std::to_string(value) + " (" + name + ")");
   }
   Labels result = labels;
   result.structures.clear();
@@ -118,4 +121,4 @@ Labels name_structures(const Labels& labels, const StructuresParams& params, con
   return result;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -27,8 +27,10 @@ void keep_cored_pieces(std::uint8_t* mask, const Image& ct, double core, Connect
   std::vector<bool> drop(parts.voxels.size(), true);
   for (std::size_t r = 0; r < parts.runs.size(); ++r) {
     const Run& run = parts.runs[r];
-    const std::int16_t* const row = ct.voxels.get() + static_cast<std::size_t>(run.row) * static_cast<std::size_t>(ct.frame.dims[0]);
-    if (std::any_of(row + run.begin, row + run.end, [&](std::int16_t hu) { return hu >= core; })) drop[parts.component[r]] = false;
+    const std::int16_t* const row =
+        ct.voxels.get() + static_cast<std::size_t>(run.row) * static_cast<std::size_t>(ct.frame.dims[0]);
+    if (std::any_of(row + run.begin, row + run.end, [&](std::int16_t hu) { return hu >= core; }))
+      drop[parts.component[r]] = false;
   }
   paint(mask, parts, ct.frame.dims[0], 0, drop);
 }
@@ -54,7 +56,8 @@ void fill_cavities(std::uint8_t* mask, const Frame& frame, double max_mm3) {
   for (std::size_t r = 0; r < parts.runs.size(); ++r) {
     const Run& run = parts.runs[r];
     const std::uint32_t y = run.row % ny, z = run.row / ny;
-    if (run.begin == 0 || run.end == nx || y == 0 || y + 1 == ny || z == 0 || z + 1 == nz) enclosed[parts.component[r]] = false;
+    if (run.begin == 0 || run.end == nx || y == 0 || y + 1 == ny || z == 0 || z + 1 == nz)
+      enclosed[parts.component[r]] = false;
   }
   paint(mask, parts, frame.dims[0], 1, enclosed);
 }
@@ -85,14 +88,17 @@ void take_table_off(std::uint8_t* mask, const Image& ct, const ThresholdParams& 
     clear(found.certain);
     if (!found.certain.empty()) {
       said = "taken off: " + volume(found.certain.size()) + " in " + std::to_string(found.pieces) +
-             (found.pieces == 1 ? " piece, " : " pieces, ") + std::to_string(std::lround(found.nearest_mm)) + " mm and more from the body";
+             (found.pieces == 1 ? " piece, " : " pieces, ") + std::to_string(std::lround(found.nearest_mm)) +
+             " mm and more from the body";
       context.info("table or head holder " + said + " (--keep-table leaves it on)");
     }
     if (!found.doubtful.empty()) {
-      const std::string left = volume(found.doubtful.size()) + " outside the body, which may be table or holder, LEFT ON: " + found.doubt;
+      const std::string left =
+          volume(found.doubtful.size()) + " outside the body, which may be table or holder, LEFT ON: " + found.doubt;
       said += (said.empty() ? "" : "; ") + left;
       // Less than any table has, and teeth and the tip of a nose reach so far.
-      if (static_cast<double>(found.doubtful.size()) * voxel_mm3 >= 1000) context.warn(left + "; --remove-table takes it off");
+      if (static_cast<double>(found.doubtful.size()) * voxel_mm3 >= 1000)
+        context.warn(left + "; --remove-table takes it off");
     }
   }
   context.report("table", said);
@@ -136,7 +142,8 @@ Labels threshold(const Image& ct, const ThresholdParams& given, const Context& c
   if (p.keep_table && p.remove_table)
     throw Error(ExitCode::usage, "--keep-table and --remove-table contradict each other", "give one of them");
   if (p.lower > p.upper) {
-    throw Error(ExitCode::usage, "--lower " + format_number(p.lower) + " HU is above --upper " + format_number(p.upper) + " HU");
+    throw Error(ExitCode::usage,
+                "--lower " + format_number(p.lower) + " HU is above --upper " + format_number(p.upper) + " HU");
   }
   const std::size_t n = ct.frame.voxel_count();
   const auto mask = make_voxels<std::uint8_t>(n);
@@ -147,8 +154,8 @@ Labels threshold(const Image& ct, const ThresholdParams& given, const Context& c
   take_table_off(mask.get(), ct, p, context.sub(0.1, 0.15));
   if (p.metal_mm > 0) {
     std::size_t metal = 0;
-    const std::size_t cleared =
-        image::clear_streaks(mask.get(), ct, p.metal_mm, p.metal_hu, std::max(p.metal_lower, p.lower), metal, context.sub(0.15, 0.2));
+    const std::size_t cleared = image::clear_streaks(mask.get(), ct, p.metal_mm, p.metal_hu,
+                                                     std::max(p.metal_lower, p.lower), metal, context.sub(0.15, 0.2));
     context.report("metal_mm3", static_cast<double>(metal) * ct.frame.voxel_volume_mm3());
     context.report("streaks_mm3", static_cast<double>(cleared) * ct.frame.voxel_volume_mm3());
   }
@@ -160,7 +167,8 @@ Labels threshold(const Image& ct, const ThresholdParams& given, const Context& c
   drop_small_pieces(mask.get(), ct.frame, p, context);
   const auto count = static_cast<std::int64_t>(std::count(mask.get(), mask.get() + n, std::uint8_t{1}));
   if (count == 0) {
-    throw Error(ExitCode::failed, "no voxel is left between " + format_number(p.lower) + " and " + format_number(p.upper) + " HU",
+    throw Error(ExitCode::failed,
+                "no voxel is left between " + format_number(p.lower) + " and " + format_number(p.upper) + " HU",
                 "'osteo info FILE' shows the range of values; lower --lower or --min-volume-mm3");
   }
   context.report("mask_voxels", count);
@@ -169,4 +177,4 @@ Labels threshold(const Image& ct, const ThresholdParams& given, const Context& c
   return {ct.frame, mask};
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

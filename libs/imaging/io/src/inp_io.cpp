@@ -69,7 +69,8 @@ class Parser {
   }
   [[nodiscard]] long whole(const InpCard& card, const std::string& field) const {
     const double v = number(card, field);
-    if (v != std::floor(v) || std::abs(v) > 1e15) throw fail(card, "'" + field + "' under *" + card.name + " is no whole number");
+    if (v != std::floor(v) || std::abs(v) > 1e15)
+      throw fail(card, "'" + field + "' under *" + card.name + " is no whole number");
     return static_cast<long>(v);
   }
 
@@ -101,7 +102,8 @@ class Parser {
         continue;
       }
       if (cards_.empty())
-        throw Error(ExitCode::corrupt, "'" + name_ + "', line " + std::to_string(line_number) + ": data before any line with '*'");
+        throw Error(ExitCode::corrupt,
+                    "'" + name_ + "', line " + std::to_string(line_number) + ": data before any line with '*'");
       auto fields = fields_of(line);
       if (continued && !cards_.back().rows.empty() && cards_.back().name == "ELEMENT") {
         auto& last = cards_.back().rows.back();
@@ -121,7 +123,8 @@ class Parser {
       const Vec3 x{number(card, row[1]), number(card, row[2]), number(card, row[3])};
       if (!place_.try_emplace(label, nodes_.size()).second) throw fail(card, "node " + row[0] + " is there twice");
       nodes_.push_back({label, x});
-      if (const auto s = card.options.find("NSET"); s != card.options.end()) file_.node_sets[s->second].push_back(label);
+      if (const auto s = card.options.find("NSET"); s != card.options.end())
+        file_.node_sets[s->second].push_back(label);
     }
   }
 
@@ -133,12 +136,14 @@ class Parser {
       throw fail(card, "elements of type " + (kind.empty() ? "?" : kind) + " are not read", "C3D4 and C3D10 are");
     if (!elements_.empty() && ten != file_.quadratic)
       throw fail(card, "linear and quadratic elements are mixed",
-                 "rigid things of a contact, as fem --inp-out writes them, are not read back: give fem the mesh and the problem that they "
+                 "rigid things of a contact, as fem --inp-out writes them, are not read back: give fem the mesh and "
+                 "the problem that they "
                  "came from");
     file_.quadratic = ten;
     for (const auto& row : card.rows) {
       if (row.size() != (ten ? 11U : 5U))
-        throw fail(card, "an element of " + kind + " has " + std::to_string(row.size()) + " numbers, not " + (ten ? "11" : "5"));
+        throw fail(card, "an element of " + kind + " has " + std::to_string(row.size()) + " numbers, not " +
+                             (ten ? "11" : "5"));
       Element e{whole(card, row[0]), {}, card.line};
       for (std::size_t i = 1; i < row.size(); ++i) {
         e.nodes.push_back(whole(card, row[i]));
@@ -157,7 +162,8 @@ class Parser {
     for (const auto& row : card.rows) {
       if (card.options.contains("GENERATE")) {
         if (row.size() < 2) throw fail(card, "GENERATE needs first, last and perhaps a step");
-        const long first = whole(card, row[0]), last = whole(card, row[1]), step = row.size() > 2 ? whole(card, row[2]) : 1;
+        const long first = whole(card, row[0]), last = whole(card, row[1]),
+                   step = row.size() > 2 ? whole(card, row[2]) : 1;
         if (step < 1 || last < first || (last - first) / step > 100'000'000)
           throw fail(card, "GENERATE cannot go from " + row[0] + " to " + row[1]);
         for (long i = first; i <= last; i += step) members.push_back(i);
@@ -179,8 +185,8 @@ class Parser {
     const auto at = [&](const Element& e, std::size_t i) {
       const auto found = place_.find(e.nodes[i]);
       if (found == place_.end())
-        throw Error(ExitCode::corrupt, "'" + name_ + "', element " + std::to_string(e.number) + " under line " + std::to_string(e.line) +
-                                           ": there is no node " + std::to_string(e.nodes[i]));
+        throw Error(ExitCode::corrupt, "'" + name_ + "', element " + std::to_string(e.number) + " under line " +
+                                           std::to_string(e.line) + ": there is no node " + std::to_string(e.nodes[i]));
       return found->second;
     };
     for (const Element& e : elements_)
@@ -209,8 +215,8 @@ class Parser {
       if (true_volume != 0 && !(volume / true_volume > 0.5 && volume / true_volume < 2))
         throw Error(ExitCode::corrupt,
                     "'" + name_ + "', element " + std::to_string(e.number) +
-                        ": coordinates are kept in single precision, which turns its volume of " + format_number(true_volume / 6) +
-                        " mm3 into " + format_number(volume / 6),
+                        ": coordinates are kept in single precision, which turns its volume of " +
+                        format_number(true_volume / 6) + " mm3 into " + format_number(volume / 6),
                     "move the body nearer to the origin");
       if (volume < 0) std::swap(t[2], t[3]);
       file_.mesh.tets.push_back(t);
@@ -240,4 +246,4 @@ InpFile parse_inp(std::string_view text, const std::string& name) {
   return Parser(text, name).run();
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

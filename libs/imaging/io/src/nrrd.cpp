@@ -83,7 +83,8 @@ std::vector<double> numbers_in(std::string_view text) {
   std::vector<double> out;
   std::string word;
   while (in >> word) {
-    out.push_back(word == "nan" || word == "NaN" ? std::numeric_limits<double>::quiet_NaN() : parse_number(word, "NRRD header"));
+    out.push_back(word == "nan" || word == "NaN" ? std::numeric_limits<double>::quiet_NaN()
+                                                 : parse_number(word, "NRRD header"));
   }
   return out;
 }
@@ -106,7 +107,8 @@ void inflate_into(std::span<const std::byte> packed, std::byte* out, std::size_t
     if (in_before == z.avail_in && out_before == z.avail_out) break;
   }
   inflateEnd(&z);
-  if (out_done < size) fail(path, "the compressed voxels end early or are damaged", "copy the file again from its source");
+  if (out_done < size)
+    fail(path, "the compressed voxels end early or are damaged", "copy the file again from its source");
 }
 
 struct Header {
@@ -121,8 +123,9 @@ struct Header {
   }
 };
 
-// What "data file" names (teem.sourceforge.net/nrrd/format.html#detached): one file, "LIST [subdim]" with a name a line, or
-// "NAME%03d.EXT first last step [subdim]". Each holds as much as the others, one after the other along the slowest axis.
+// What "data file" names (teem.sourceforge.net/nrrd/format.html#detached): one file, "LIST [subdim]" with a name a
+// line, or "NAME%03d.EXT first last step [subdim]". Each holds as much as the others, one after the other along the
+// slowest axis.
 std::vector<fs::path> data_files(const std::string& value, const std::vector<std::string>& list, const fs::path& path) {
   std::vector<fs::path> files;
   const auto add = [&](const std::string& name) { files.push_back(path.parent_path() / name); };
@@ -144,7 +147,8 @@ std::vector<fs::path> data_files(const std::string& value, const std::vector<std
     for (long n = first; step > 0 ? n <= last : n >= last; n += step) {
       std::string number = std::to_string(std::abs(n));
       const std::size_t wanted = width.empty() ? 0 : static_cast<std::size_t>(std::stoi(width));
-      const std::size_t missing = wanted > number.size() + (n < 0 ? 1 : 0) ? wanted - number.size() - (n < 0 ? 1 : 0) : 0;
+      const std::size_t missing =
+          wanted > number.size() + (n < 0 ? 1 : 0) ? wanted - number.size() - (n < 0 ? 1 : 0) : 0;
       number.insert(0, missing, width.starts_with('0') ? '0' : ' ');
       add(name.substr(0, sign) + (n < 0 ? "-" : "") + number + name.substr(end + 1));
     }
@@ -175,7 +179,8 @@ Header parse_header(std::string_view all, const fs::path& path) {
       continue;
     }
     const std::size_t colon = line.find(':');
-    if (colon == std::string_view::npos) fail(path, "the header line '" + std::string(line.substr(0, 60)) + "' has no colon");
+    if (colon == std::string_view::npos)
+      fail(path, "the header line '" + std::string(line.substr(0, 60)) + "' has no colon");
     if (line.substr(colon).starts_with(":=")) {
       header.notes[std::string(line.substr(0, colon))] = std::string(line.substr(colon + 2));
       continue;
@@ -217,11 +222,13 @@ void read_place(const Header& header, RawVolume& raw, const fs::path& path) {
   Frame& frame = raw.frame;
   const std::string space = lower_case(header.get("space"));
   Vec3 to_lps{1, 1, 1};
-  if (space != "lps" && space != "left-posterior-superior" && space != "ras" && space != "right-anterior-superior" && space != "las" &&
-      space != "left-anterior-superior") {
-    raw.findings.push_back({VolumeFinding::What::axes_not_stated,
-                            (space.empty() ? "the NRRD header states no anatomical space" : "the NRRD space '" + space + "' is not anatomical") +
-                                std::string(": left and right, front and back, head and foot are not known; LPS is taken")});
+  if (space != "lps" && space != "left-posterior-superior" && space != "ras" && space != "right-anterior-superior" &&
+      space != "las" && space != "left-anterior-superior") {
+    raw.findings.push_back(
+        {VolumeFinding::What::axes_not_stated,
+         (space.empty() ? "the NRRD header states no anatomical space"
+                        : "the NRRD space '" + space + "' is not anatomical") +
+             std::string(": left and right, front and back, head and foot are not known; LPS is taken")});
   }
   if (space == "ras" || space == "right-anterior-superior") to_lps = {-1, -1, 1};
   if (space == "las" || space == "left-anterior-superior") to_lps = {1, -1, 1};
@@ -265,15 +272,18 @@ void read_units(const Header& header, RawVolume& raw, const fs::path& path) {
   std::erase(units, "");
   if (units.empty()) return;
   if (std::any_of(units.begin(), units.end(), [&](const std::string& u) { return u != units.front(); }))
-    fail(path, "its axes have different units ('" + units.front() + "', '" + units.back() + "')", "save it in millimetres");
+    fail(path, "its axes have different units ('" + units.front() + "', '" + units.back() + "')",
+         "save it in millimetres");
   static const std::map<std::string, double, std::less<>> kMillimetres{
-      {"mm", 1},         {"millimeter", 1},      {"millimeters", 1},  {"millimetre", 1}, {"millimetres", 1}, {"cm", 10},
-      {"centimeter", 10}, {"centimetre", 10},    {"m", 1000},         {"meter", 1000},   {"meters", 1000},   {"metre", 1000},
-      {"metres", 1000},  {"um", 1e-3},           {"\xC2\xB5m", 1e-3}, {"\xCE\xBCm", 1e-3}, {"micron", 1e-3},   {"microns", 1e-3},
-      {"micrometer", 1e-3}, {"micrometre", 1e-3}, {"nm", 1e-6},       {"inch", 25.4},    {"in", 25.4}};
+      {"mm", 1},           {"millimeter", 1},  {"millimeters", 1}, {"millimetre", 1},    {"millimetres", 1},
+      {"cm", 10},          {"centimeter", 10}, {"centimetre", 10}, {"m", 1000},          {"meter", 1000},
+      {"meters", 1000},    {"metre", 1000},    {"metres", 1000},   {"um", 1e-3},         {"\xC2\xB5m", 1e-3},
+      {"\xCE\xBCm", 1e-3}, {"micron", 1e-3},   {"microns", 1e-3},  {"micrometer", 1e-3}, {"micrometre", 1e-3},
+      {"nm", 1e-6},        {"inch", 25.4},     {"in", 25.4}};
   const auto mm = kMillimetres.find(lower_case(units.front()));
   if (mm == kMillimetres.end()) {
-    fail(path, "its unit of length '" + units.front() + "' ('" + key + "') is not known", "save it in millimetres (\"mm\")");
+    fail(path, "its unit of length '" + units.front() + "' ('" + key + "') is not known",
+         "save it in millimetres (\"mm\")");
   }
   convert_lengths(raw, mm->second, units.front() + " ('" + key + "')");
 }
@@ -305,7 +315,8 @@ void decode(const Header& header, std::span<const std::byte> body, std::span<std
   const std::string encoding = lower_case(header.get("encoding"));
   if (encoding == "raw") {
     if (body.size() < voxels.size()) {
-      fail(from, "it holds " + std::to_string(body.size()) + " bytes of voxels but needs " + std::to_string(voxels.size()),
+      fail(from,
+           "it holds " + std::to_string(body.size()) + " bytes of voxels but needs " + std::to_string(voxels.size()),
            "the file was cut short; copy it again from its source");
     }
     std::memcpy(voxels.data(), body.data(), voxels.size());
@@ -329,7 +340,8 @@ RawVolume read_nrrd(const fs::path& path) {
   require_valid_in(path, raw.frame);
 
   const auto files = data_files_of(header, path);
-  const std::size_t scalar = size_of(raw.type), size = raw.frame.voxel_count() * scalar * static_cast<std::size_t>(raw.layers);
+  const std::size_t scalar = size_of(raw.type),
+                    size = raw.frame.voxel_count() * scalar * static_cast<std::size_t>(raw.layers);
   double there = 0;
   for (const fs::path& f : files) {
     require_readable(f);
@@ -346,9 +358,11 @@ RawVolume read_nrrd(const fs::path& path) {
     decode(header, std::span(bytes).subspan(*header.body), all, path, path);
   } else {
     if (size % files.size() != 0)
-      fail(path, std::to_string(size) + " bytes of voxels cannot lie in " + std::to_string(files.size()) + " files of the same size");
+      fail(path, std::to_string(size) + " bytes of voxels cannot lie in " + std::to_string(files.size()) +
+                     " files of the same size");
     const std::size_t each = size / files.size();
-    for (std::size_t i = 0; i < files.size(); ++i) decode(header, read_file(files[i]), all.subspan(i * each, each), files[i], path);
+    for (std::size_t i = 0; i < files.size(); ++i)
+      decode(header, read_file(files[i]), all.subspan(i * each, each), files[i], path);
   }
   const bool big = lower_case(header.get("endian")) == "big";
   if (scalar > 1 && big != (std::endian::native == std::endian::big)) {
@@ -363,13 +377,14 @@ void write_nrrd(const RawVolume& raw, const fs::path& path) {
   header.precision(17);
   const Frame& f = raw.frame;
   header << "NRRD0004\n# Osteotome: left-posterior-superior, mm\ntype: " << type_name(raw.type) << "\ndimension: 3\n"
-         << "space: left-posterior-superior\nsizes: " << f.dims[0] << ' ' << f.dims[1] << ' ' << f.dims[2] << "\nspace directions:";
+         << "space: left-posterior-superior\nsizes: " << f.dims[0] << ' ' << f.dims[1] << ' ' << f.dims[2]
+         << "\nspace directions:";
   for (std::size_t a = 0; a < 3; ++a) {
     const Vec3 v = f.direction.column[a] * f.spacing_mm[a];
     header << " (" << v.x << ',' << v.y << ',' << v.z << ')';
   }
-  header << "\nkinds: domain domain domain\nendian: little\nencoding: gzip\nspace origin: (" << f.origin_mm.x << ',' << f.origin_mm.y << ','
-         << f.origin_mm.z << ")\n";
+  header << "\nkinds: domain domain domain\nendian: little\nencoding: gzip\nspace origin: (" << f.origin_mm.x << ','
+         << f.origin_mm.y << ',' << f.origin_mm.z << ")\n";
   for (const auto& [key, value] : raw.notes) header << key << ":=" << value << '\n';
   header << '\n';
   static_assert(std::endian::native == std::endian::little);
@@ -396,4 +411,4 @@ void write_nrrd(const RawVolume& raw, const fs::path& path) {
   write_file(path, packed);
 }
 
-}  // namespace osteo::imaging::io
+}  // namespace osteo::inline imaging::io

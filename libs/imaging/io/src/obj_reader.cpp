@@ -56,7 +56,8 @@ vtkSmartPointer<vtkPolyData> read_obj(const fs::path& path) {
         if (problem != std::errc()) throw fail("a face needs the numbers of its points");
         // From 1, or from the end when negative.
         const long place = id > 0 ? id - 1 : points->GetNumberOfPoints() + id;
-        if (place < 0 || place >= points->GetNumberOfPoints()) throw fail("there is no point " + std::to_string(id) + " yet");
+        if (place < 0 || place >= points->GetNumberOfPoints())
+          throw fail("there is no point " + std::to_string(id) + " yet");
         face.push_back(place);
         p = next;
         while (p < last && *p != ' ' && *p != '\t' && *p != '\r') ++p;  // texture and normal
@@ -71,4 +72,4 @@ vtkSmartPointer<vtkPolyData> read_obj(const fs::path& path) {
   return poly;
 }
 
-}  // namespace osteo::imaging::io
+}  // namespace osteo::inline imaging::io

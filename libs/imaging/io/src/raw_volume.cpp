@@ -35,16 +35,17 @@ void convert_lengths(RawVolume& raw, double mm, const std::string& unit) {
   raw.frame.origin_mm = raw.frame.origin_mm * mm;
   const auto text = [](double v) { return format_number(std::round(v * 1e6) / 1e6); };
   const Vec3 s = raw.frame.spacing_mm;
-  raw.findings.push_back({VolumeFinding::What::lengths_converted, "the file's lengths are in " + unit + " and were converted: voxels of " +
-                                                                      text(s.x) + " x " + text(s.y) + " x " + text(s.z) + " mm"});
+  raw.findings.push_back({VolumeFinding::What::lengths_converted, "the file's lengths are in " + unit +
+                                                                      " and were converted: voxels of " + text(s.x) +
+                                                                      " x " + text(s.y) + " x " + text(s.z) + " mm"});
 }
 
 void require_room(const std::filesystem::path& path, double voxels, double bytes_each, double there, bool packed) {
   constexpr double kMaxInflation = 1032, kHeader = 1024;
   if (voxels * bytes_each <= (packed ? (there + kHeader) * kMaxInflation : there + kHeader)) return;
   throw Error(ExitCode::corrupt,
-              "'" + path.string() + "': its header states " + format_number(voxels) + " voxels, which " + format_number(there) +
-                  " bytes cannot hold",
+              "'" + path.string() + "': its header states " + format_number(voxels) + " voxels, which " +
+                  format_number(there) + " bytes cannot hold",
               "the header is wrong or the file was cut short; copy it again from its source");
 }
 
@@ -64,7 +65,8 @@ Image image_from(const RawVolume& raw, const Context& context) {
       const double v = static_cast<double>(p[i]);
       if (!std::isfinite(v)) {
         throw Error(ExitCode::corrupt, "voxel " + std::to_string(i) + " is not a finite number (NaN or infinite)",
-                    "programs that resample or mask mark what lies outside so: write air there, -1024, and save the volume again");
+                    "programs that resample or mask mark what lies outside so: write air there, -1024, and save the "
+                    "volume again");
       }
       lo = std::min(lo, v);
       hi = std::max(hi, v);
@@ -73,7 +75,8 @@ Image image_from(const RawVolume& raw, const Context& context) {
     }
   });
   if (hi - lo < 16) {
-    throw Error(ExitCode::corrupt, "the values run only from " + format_number(lo) + " to " + format_number(hi) + ": this is not CT in HU",
+    throw Error(ExitCode::corrupt,
+                "the values run only from " + format_number(lo) + " to " + format_number(hi) + ": this is not CT in HU",
                 "rescale the image to Hounsfield units, or load it as labels");
   }
   if (clipped > 0) context.warn(std::to_string(clipped) + " voxels beyond the range of 16 bits were clipped");
@@ -86,7 +89,8 @@ namespace {
 Labels merge_layers(const RawVolume& raw, const std::vector<SegmentNote>& segments, const Context& context) {
   if (segments.empty()) throw Error(ExitCode::corrupt, "it holds several layers but names no segments");
   if (segments.size() > 255)
-    throw Error(ExitCode::corrupt, "it holds " + std::to_string(segments.size()) + " segments; up to 255 are supported");
+    throw Error(ExitCode::corrupt,
+                "it holds " + std::to_string(segments.size()) + " segments; up to 255 are supported");
   const std::size_t n = raw.frame.voxel_count(), layers = static_cast<std::size_t>(raw.layers);
   const auto out = make_voxels<std::uint8_t>(n);
   std::fill_n(out.get(), n, std::uint8_t{0});
@@ -107,7 +111,8 @@ Labels merge_layers(const RawVolume& raw, const std::vector<SegmentNote>& segmen
       structures.push_back(std::move(named));
     }
   });
-  if (overlap > 0) context.warn(std::to_string(overlap) + " voxels belong to several segments; the last one keeps them");
+  if (overlap > 0)
+    context.warn(std::to_string(overlap) + " voxels belong to several segments; the last one keeps them");
   return {{raw.frame, out}, structures};
 }
 
@@ -121,7 +126,8 @@ Labels labels_from(const RawVolume& raw, const Context& context) {
   for (const SegmentNote& s : segments) {
     if (s.value >= 1 && s.value <= 255) structures.push_back(s.structure);
   }
-  std::stable_sort(structures.begin(), structures.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
+  std::stable_sort(structures.begin(), structures.end(),
+                   [](const auto& a, const auto& b) { return a.value < b.value; });
   const std::size_t n = raw.frame.voxel_count();
   if (raw.type == Scalar::u8) {
     auto shared = std::static_pointer_cast<const std::uint8_t>(raw.data);
@@ -141,4 +147,4 @@ Labels labels_from(const RawVolume& raw, const Context& context) {
   return {{raw.frame, out}, structures};
 }
 
-}  // namespace osteo::imaging::io
+}  // namespace osteo::inline imaging::io

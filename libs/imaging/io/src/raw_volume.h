@@ -20,8 +20,9 @@ enum class Scalar { u8, i8, u16, i16, u32, i32, f32, f64 };
 struct RawVolume {
   Frame frame;
   Scalar type = Scalar::i16;
-  std::shared_ptr<const void> data;          ///< frame.voxel_count() * layers scalars in machine byte order, layer fastest, then x
-  int layers = 1;                            ///< label maps of 3D Slicer may hold several that overlap
+  std::shared_ptr<const void>
+      data;        ///< frame.voxel_count() * layers scalars in machine byte order, layer fastest, then x
+  int layers = 1;  ///< label maps of 3D Slicer may hold several that overlap
   std::map<std::string, std::string> notes;  ///< key:=value lines of NRRD
   std::vector<VolumeFinding> findings;       ///< what the file leaves open
 };
@@ -71,11 +72,12 @@ void visit_scalars(const RawVolume& raw, F&& f) {
 [[nodiscard]] RawVolume read_meta(const std::filesystem::path& path);
 [[nodiscard]] RawVolume read_vti(const std::filesystem::path& path);
 
-/// Spacing and origin times `mm`, the file's unit in millimetres, with a finding where that is not 1. `unit`: "metres (xyzt_units)".
+/// Spacing and origin times `mm`, the file's unit in millimetres, with a finding where that is not 1. `unit`: "metres
+/// (xyzt_units)".
 void convert_lengths(RawVolume& raw, double mm, const std::string& unit);
 
-/// Error(corrupt) when `there` bytes of a file cannot hold the `voxels` its header states: checked before memory is asked for. Packed
-/// bytes (deflate) grow at most 1032 times.
+/// Error(corrupt) when `there` bytes of a file cannot hold the `voxels` its header states: checked before memory is
+/// asked for. Packed bytes (deflate) grow at most 1032 times.
 void require_room(const std::filesystem::path& path, double voxels, double bytes_each, double there, bool packed);
 
 void write_nrrd(const RawVolume& raw, const std::filesystem::path& path);
@@ -83,4 +85,4 @@ void write_nifti(const RawVolume& raw, const std::filesystem::path& path);
 void write_meta(const RawVolume& raw, const std::filesystem::path& path);
 void write_vti(const RawVolume& raw, const std::filesystem::path& path);
 
-}  // namespace osteo::imaging::io
+}  // namespace osteo::inline imaging::io

@@ -31,7 +31,9 @@ std::vector<SegmentNote> segments_from(const std::map<std::string, std::string>&
       const std::size_t colon = tag.find(':');
       if (colon != std::string::npos) s.tags[tag.substr(0, colon)] = tag.substr(colon + 1);
     }
-    s.structure.name = !get("Name").empty() ? get("Name") : !get("ID").empty() ? get("ID") : "Segment_" + std::to_string(n + 1);
+    s.structure.name = !get("Name").empty() ? get("Name")
+                       : !get("ID").empty() ? get("ID")
+                                            : "Segment_" + std::to_string(n + 1);
     std::istringstream colour(get("Color"));
     for (auto& c : s.structure.rgb) {
       double v = 0;
@@ -68,7 +70,8 @@ std::map<std::string, std::string> notes_from(const Labels& labels, const std::m
         {{241, 214, 145}, {230, 180, 40}, {216, 101, 79}, {111, 184, 210}, {128, 174, 128}, {183, 156, 220}}};
     for (std::size_t v = 1; v < 256; ++v) {
       if (extent[v].hi[0] >= 0) {
-        list.push_back({static_cast<std::uint8_t>(v), "Segment_" + std::to_string(v), kColours[(v - 1) % kColours.size()]});
+        list.push_back(
+            {static_cast<std::uint8_t>(v), "Segment_" + std::to_string(v), kColours[(v - 1) % kColours.size()]});
       }
     }
   }
@@ -79,7 +82,8 @@ std::map<std::string, std::string> notes_from(const Labels& labels, const std::m
     const Extent& e = extent[s.value];
     std::string box, colour;
     for (std::size_t a = 0; a < 3; ++a) {
-      box += (a > 0 ? " " : "") + std::to_string(e.hi[0] < 0 ? 0 : e.lo[a]) + " " + std::to_string(e.hi[0] < 0 ? -1 : e.hi[a]);
+      box += (a > 0 ? " " : "") + std::to_string(e.hi[0] < 0 ? 0 : e.lo[a]) + " " +
+             std::to_string(e.hi[0] < 0 ? -1 : e.hi[a]);
       colour += (a > 0 ? " " : "") + format_number(std::round(s.rgb[a] / 255.0 * 1e6) / 1e6);
     }
     std::string name = s.name;
@@ -105,4 +109,4 @@ std::map<std::string, std::string> notes_from(const Labels& labels, const std::m
   return notes;
 }
 
-}  // namespace osteo::imaging::io
+}  // namespace osteo::inline imaging::io

@@ -16,11 +16,13 @@ struct SegmentNote {
   std::string id;
   std::map<std::string, std::string> tags;  ///< Slicer keeps those that it does not know
 };
-/// In the order of the file's numbers; empty when there are none. Files of Slicer 4.10 and before name no layers: each segment has its own.
+/// In the order of the file's numbers; empty when there are none. Files of Slicer 4.10 and before name no layers: each
+/// segment has its own.
 [[nodiscard]] std::vector<SegmentNote> segments_from(const std::map<std::string, std::string>& notes);
 
-/// For a label map without names, its values become "Segment_1", ... with colours of their own. `tags` go to each segment.
-/// A segment always has a tag: Slicer up to 4.11 at least waits for ever on a "|" without one.
-[[nodiscard]] std::map<std::string, std::string> notes_from(const Labels& labels, const std::map<std::string, std::string>& tags = {});
+/// For a label map without names, its values become "Segment_1", ... with colours of their own. `tags` go to each
+/// segment. A segment always has a tag: Slicer up to 4.11 at least waits for ever on a "|" without one.
+[[nodiscard]] std::map<std::string, std::string> notes_from(const Labels& labels,
+                                                            const std::map<std::string, std::string>& tags = {});
 
-}  // namespace osteo::imaging::io
+}  // namespace osteo::inline imaging::io

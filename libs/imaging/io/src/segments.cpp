@@ -31,7 +31,8 @@ std::optional<Volume<std::uint8_t>> mask_of(const RawVolume& raw, const T* p, st
   if (hi[0] < 0) return {};
   Volume<std::uint8_t> mask;
   mask.frame = raw.frame;
-  mask.frame.origin_mm = raw.frame.world_from_index({static_cast<double>(lo[0]), static_cast<double>(lo[1]), static_cast<double>(lo[2])});
+  mask.frame.origin_mm =
+      raw.frame.world_from_index({static_cast<double>(lo[0]), static_cast<double>(lo[1]), static_cast<double>(lo[2])});
   for (std::size_t a = 0; a < 3; ++a) mask.frame.dims[a] = hi[a] - lo[a] + 1;
   auto voxels = make_voxels<std::uint8_t>(mask.frame.voxel_count());
   std::size_t to = 0;
@@ -60,7 +61,8 @@ std::vector<Segment> segments_of(const RawVolume& raw) {
   for (const SegmentNote& n : notes) {
     Segment s{n.id, n.structure.name, n.structure.rgb, n.tags, {}};
     const int layer = raw.layers == 1 ? 0 : n.layer;
-    if (layer < 0 || layer >= raw.layers) throw Error(ExitCode::corrupt, "segment '" + s.name + "' is in a layer that is not there");
+    if (layer < 0 || layer >= raw.layers)
+      throw Error(ExitCode::corrupt, "segment '" + s.name + "' is in a layer that is not there");
     if (!nothing && n.value != 0)
       visit_scalars(raw, [&](const auto* p) { s.mask = mask_of(raw, p, static_cast<std::size_t>(layer), n.value); });
     result.push_back(std::move(s));
@@ -68,4 +70,4 @@ std::vector<Segment> segments_of(const RawVolume& raw) {
   return result;
 }
 
-}  // namespace osteo::imaging::io
+}  // namespace osteo::inline imaging::io

@@ -72,7 +72,8 @@ vtkSmartPointer<vtkPolyData> read_poly(const fs::path& path) {
   if (e == ".obj") poly = io::read_obj(path);
   if (e == ".vtp") poly = read_with<vtkXMLPolyDataReader>(path);
   if (!poly)
-    throw Error(ExitCode::corrupt, "'" + path.string() + "' is not a surface file by its name", "surfaces are .ply .stl .obj .vtp");
+    throw Error(ExitCode::corrupt, "'" + path.string() + "' is not a surface file by its name",
+                "surfaces are .ply .stl .obj .vtp");
   return poly;
 }
 
@@ -102,12 +103,15 @@ std::vector<Vec3> load_surface_points(const fs::path& path) {
     poly->GetPoint(static_cast<vtkIdType>(p), x);
     points[p] = {x[0], x[1], x[2]};
     if (!std::isfinite(dot(points[p], points[p])))
-      throw Error(ExitCode::corrupt, "'" + path.string() + "': point " + std::to_string(p) + " has a coordinate that is no finite number");
+      throw Error(ExitCode::corrupt,
+                  "'" + path.string() + "': point " + std::to_string(p) + " has a coordinate that is no finite number");
   }
   // Flat shading writes a point for each of its triangles.
   const auto before = [](Vec3 a, Vec3 b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); };
   std::sort(points.begin(), points.end(), before);
-  points.erase(std::unique(points.begin(), points.end(), [&](Vec3 a, Vec3 b) { return !before(a, b) && !before(b, a); }), points.end());
+  points.erase(
+      std::unique(points.begin(), points.end(), [&](Vec3 a, Vec3 b) { return !before(a, b) && !before(b, a); }),
+      points.end());
   if (points.empty()) throw Error(ExitCode::corrupt, "'" + path.string() + "': it holds no points");
   return points;
 }
@@ -116,15 +120,16 @@ void save_surface(const TriMesh& mesh, const fs::path& path) {
   for (std::size_t p = 0; p < mesh.points_mm.size(); ++p) {
     for (const float v : mesh.points_mm[p]) {
       if (!std::isfinite(v))
-        throw Error(ExitCode::failed,
-                    "the surface is not written: point " + std::to_string(p) + " has a coordinate that is no finite number");
+        throw Error(ExitCode::failed, "the surface is not written: point " + std::to_string(p) +
+                                          " has a coordinate that is no finite number");
     }
   }
   const auto e = path.extension();
   if (e == ".ply") return write_file(path, io::ply_text(mesh));
   if (e == ".stl") return write_file(path, stl_text(mesh));
   if (e == ".glb") return write_file(path, io::glb_text(mesh));
-  if (e == ".3mf") return write_atomically(path, [&](const fs::path& temporary) { io::write_3mf(mesh, temporary, path); });
+  if (e == ".3mf")
+    return write_atomically(path, [&](const fs::path& temporary) { io::write_3mf(mesh, temporary, path); });
   if (e == ".obj") return write_file(path, io::obj_text(mesh));
   if (e == ".vtp") {
     vtkNew<vtkXMLPolyDataWriter> writer;
@@ -151,7 +156,8 @@ void save_picture(const Picture& picture, const fs::path& path) {
   writer->SetInputData(image);
   writer->Write();
   vtkUnsignedCharArray* const bytes = writer->GetResult();
-  write_file(path, {reinterpret_cast<const char*>(bytes->GetPointer(0)), static_cast<std::size_t>(bytes->GetNumberOfValues())});
+  write_file(path, {reinterpret_cast<const char*>(bytes->GetPointer(0)),
+                    static_cast<std::size_t>(bytes->GetNumberOfValues())});
 }
 
 Picture load_picture(const fs::path& path) {
@@ -174,4 +180,4 @@ Picture load_picture(const fs::path& path) {
   return picture;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -55,8 +55,9 @@ namespace io {
 
 std::string ply_text(const TriMesh& mesh) {
   const bool normals = mesh.normals.size() == mesh.points_mm.size();
-  std::string text = "ply\nformat binary_little_endian 1.0\ncomment " + std::string(kSurfaceNote) + "\nelement vertex " +
-                     std::to_string(mesh.points_mm.size()) + "\nproperty float x\nproperty float y\nproperty float z\n" +
+  std::string text = "ply\nformat binary_little_endian 1.0\ncomment " + std::string(kSurfaceNote) +
+                     "\nelement vertex " + std::to_string(mesh.points_mm.size()) +
+                     "\nproperty float x\nproperty float y\nproperty float z\n" +
                      (normals ? "property float nx\nproperty float ny\nproperty float nz\n" : "") + "element face " +
                      std::to_string(mesh.triangles.size()) + "\nproperty list uchar uint vertex_indices\nend_header\n";
   text.reserve(text.size() + mesh.points_mm.size() * (normals ? 24 : 12) + mesh.triangles.size() * 13);
@@ -119,23 +120,30 @@ std::string glb_text(const TriMesh& mesh) {
     append_number(t, v);
     return t;
   };
-  const auto triple = [&](const std::array<float, 3>& v) { return "[" + number(v[0]) + "," + number(v[1]) + "," + number(v[2]) + "]"; };
+  const auto triple = [&](const std::array<float, 3>& v) {
+    return "[" + number(v[0]) + "," + number(v[1]) + "," + number(v[2]) + "]";
+  };
   const auto count = [&](std::size_t n) { return number(static_cast<std::uint64_t>(n)); };
   std::string json =
       R"({"asset":{"version":"2.0","generator":"Osteotome","extras":{"frame_of_points":"LPS mm","turned_by_node":"metres, x left, y head, z front"}},)";
   json +=
       R"("scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"name":"bone","matrix":[0.001,0,0,0,0,0,-0.001,0,0,0.001,0,0,0,0,0,1]}],)";
-  json += R"("materials":[{"pbrMetallicRoughness":{"baseColorFactor":[0.89,0.85,0.76,1],"metallicFactor":0,"roughnessFactor":0.8}}],)";
+  json +=
+      R"("materials":[{"pbrMetallicRoughness":{"baseColorFactor":[0.89,0.85,0.76,1],"metallicFactor":0,"roughnessFactor":0.8}}],)";
   json += R"("meshes":[{"primitives":[{"attributes":{"POSITION":0)" + std::string(normals ? R"(,"NORMAL":2)" : "") +
           R"(},"indices":1,"material":0}]}],)";
-  json += R"("accessors":[{"bufferView":0,"componentType":5126,"count":)" + count(mesh.points_mm.size()) + R"(,"type":"VEC3","min":)" +
-          triple(lo) + R"(,"max":)" + triple(hi) + R"(},{"bufferView":1,"componentType":5125,"count":)" + count(mesh.triangles.size() * 3) +
+  json += R"("accessors":[{"bufferView":0,"componentType":5126,"count":)" + count(mesh.points_mm.size()) +
+          R"(,"type":"VEC3","min":)" + triple(lo) + R"(,"max":)" + triple(hi) +
+          R"(},{"bufferView":1,"componentType":5125,"count":)" + count(mesh.triangles.size() * 3) +
           R"(,"type":"SCALAR"})";
-  if (normals) json += R"(,{"bufferView":2,"componentType":5126,"count":)" + count(mesh.normals.size()) + R"(,"type":"VEC3"})";
-  json += R"(],"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":)" + count(points) + R"(,"target":34962},{"buffer":0,"byteOffset":)" +
-          count(points) + R"(,"byteLength":)" + count(faces) + R"(,"target":34963})";
   if (normals)
-    json += R"(,{"buffer":0,"byteOffset":)" + count(points + faces) + R"(,"byteLength":)" + count(points) + R"(,"target":34962})";
+    json += R"(,{"bufferView":2,"componentType":5126,"count":)" + count(mesh.normals.size()) + R"(,"type":"VEC3"})";
+  json += R"(],"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":)" + count(points) +
+          R"(,"target":34962},{"buffer":0,"byteOffset":)" + count(points) + R"(,"byteLength":)" + count(faces) +
+          R"(,"target":34963})";
+  if (normals)
+    json += R"(,{"buffer":0,"byteOffset":)" + count(points + faces) + R"(,"byteLength":)" + count(points) +
+            R"(,"target":34962})";
   json += R"(],"buffers":[{"byteLength":)" + count(total) + "}]}";
   while (json.size() % 4 != 0) json += ' ';
 
@@ -188,7 +196,8 @@ void write_3mf(const TriMesh& mesh, const std::filesystem::path& to, const std::
   const std::unique_ptr<archive, decltype(&archive_write_free)> out(archive_write_new(), &archive_write_free);
   const auto fail = [&] {
     const char* const why = archive_error_string(out.get());
-    return Error(ExitCode::cannot_write, "cannot write '" + shown.string() + "': " + (why != nullptr ? why : "the file is incomplete"),
+    return Error(ExitCode::cannot_write,
+                 "cannot write '" + shown.string() + "': " + (why != nullptr ? why : "the file is incomplete"),
                  "see that the disk has room");
   };
   archive_write_set_format_zip(out.get());
@@ -201,7 +210,8 @@ void write_3mf(const TriMesh& mesh, const std::filesystem::path& to, const std::
     archive_entry_set_perm(entry.get(), 0644);
     archive_entry_set_mtime(entry.get(), 315532800, 0);  // the first day of zip: the same surface, the same bytes
     if (archive_write_header(out.get(), entry.get()) != ARCHIVE_OK) throw fail();
-    if (archive_write_data(out.get(), content.data(), content.size()) != static_cast<la_ssize_t>(content.size())) throw fail();
+    if (archive_write_data(out.get(), content.data(), content.size()) != static_cast<la_ssize_t>(content.size()))
+      throw fail();
   };
   add("[Content_Types].xml",
       R"(<?xml version="1.0" encoding="UTF-8"?>
@@ -216,4 +226,4 @@ void write_3mf(const TriMesh& mesh, const std::filesystem::path& to, const std::
 }
 
 }  // namespace io
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

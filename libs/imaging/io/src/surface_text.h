@@ -1,4 +1,5 @@
-// Surfaces as the bytes of a file: formats simple enough to write here, where every byte is seen to reach the disk. Private to libs/imaging/io.
+// Surfaces as the bytes of a file: formats simple enough to write here, where every byte is seen to reach the disk.
+// Private to libs/imaging/io.
 #pragma once
 #include <vtkPolyData.h>
 #include <vtkSmartPointer.h>
@@ -21,4 +22,4 @@ inline constexpr const char* kSurfaceNote = "Osteotome; LPS; mm";
 /// 3MF core 1.2, unit millimetre. `shown` is the name for errors.
 void write_3mf(const TriMesh& mesh, const std::filesystem::path& to, const std::filesystem::path& shown);
 
-}  // namespace osteo::imaging::io
+}  // namespace osteo::inline imaging::io

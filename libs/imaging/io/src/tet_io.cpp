@@ -70,7 +70,8 @@ class Lines {
       at_ = end + 1;
     }
     if (numbers.size() < wanted)
-      throw fail("holds " + std::to_string(numbers.size()) + " numbers where " + what + " has " + std::to_string(wanted));
+      throw fail("holds " + std::to_string(numbers.size()) + " numbers where " + what + " has " +
+                 std::to_string(wanted));
     return numbers;
   }
   [[nodiscard]] Error fail(const std::string& what) const {
@@ -197,7 +198,8 @@ TetMesh tets_from_vtk(vtkUnstructuredGrid* grid) {
     double x[3];
     grid->GetPoint(i, x);
     for (const double v : x) {
-      if (!std::isfinite(v)) throw Error(ExitCode::corrupt, "point " + std::to_string(i) + " has a coordinate that is no finite number");
+      if (!std::isfinite(v))
+        throw Error(ExitCode::corrupt, "point " + std::to_string(i) + " has a coordinate that is no finite number");
     }
     mesh.points_mm.push_back({static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])});
   }
@@ -219,7 +221,8 @@ TetMesh tets_from_vtk(vtkUnstructuredGrid* grid) {
     for (int k = 0; k < 4; ++k) {
       const vtkIdType id = ids->GetId(k);
       if (id < 0 || id >= grid->GetNumberOfPoints()) {
-        throw Error(ExitCode::corrupt, "cell " + std::to_string(c) + " names point " + std::to_string(id) + ", which is not there");
+        throw Error(ExitCode::corrupt,
+                    "cell " + std::to_string(c) + " names point " + std::to_string(id) + ", which is not there");
       }
       t[static_cast<std::size_t>(k)] = static_cast<std::uint32_t>(id);
     }
@@ -228,7 +231,8 @@ TetMesh tets_from_vtk(vtkUnstructuredGrid* grid) {
   if (vtkDataArray* const values = grid->GetPointData()->GetScalars();
       values != nullptr && values->GetNumberOfComponents() == 1 && values->GetName() != nullptr) {
     mesh.values_name = values->GetName();
-    for (vtkIdType i = 0; i < values->GetNumberOfTuples(); ++i) mesh.values.push_back(static_cast<float>(values->GetComponent(i, 0)));
+    for (vtkIdType i = 0; i < values->GetNumberOfTuples(); ++i)
+      mesh.values.push_back(static_cast<float>(values->GetComponent(i, 0)));
   }
   if (quadratic) drop_middles(mesh, middle);
   turn_round(mesh);
@@ -300,4 +304,4 @@ void save_tets(const TetMesh& mesh, const fs::path& path) {
   write_file(ele, text);
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

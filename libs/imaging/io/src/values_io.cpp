@@ -12,7 +12,8 @@ void save_values(const Volume<float>& values, const std::filesystem::path& path)
   raw.data = std::shared_ptr<const void>(values.voxels, values.voxels.get());
   if (path.extension() == ".nrrd") return io::write_nrrd(raw, path);
   if (path.extension() == ".vti") return io::write_vti(raw, path);
-  throw Error(ExitCode::usage, "cannot write a grid as '" + path.filename().string() + "'", "name it .vdb, .nrrd or .vti");
+  throw Error(ExitCode::usage, "cannot write a grid as '" + path.filename().string() + "'",
+              "name it .vdb, .nrrd or .vti");
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

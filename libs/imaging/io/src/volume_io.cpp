@@ -64,10 +64,12 @@ auto in_file(const fs::path& path, F&& convert) {
 }
 
 template <class T>
-void save_volume(const Volume<T>& volume, io::Scalar type, const fs::path& path, std::map<std::string, std::string> notes = {}) {
+void save_volume(const Volume<T>& volume, io::Scalar type, const fs::path& path,
+                 std::map<std::string, std::string> notes = {}) {
   const Format* const format = format_of(path);
   if (format == nullptr || format->write == nullptr) {
-    throw Error(ExitCode::usage, "cannot write a volume as '" + path.filename().string() + "'", "name it .nrrd, .nii.gz, .mha or .vti");
+    throw Error(ExitCode::usage, "cannot write a volume as '" + path.filename().string() + "'",
+                "name it .nrrd, .nii.gz, .mha or .vti");
   }
   io::RawVolume raw;
   raw.frame = volume.frame;
@@ -117,4 +119,4 @@ void save_labels(const Labels& labels, const fs::path& path) {
   save_volume(labels, io::Scalar::u8, path, named ? io::notes_from(labels) : std::map<std::string, std::string>{});
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

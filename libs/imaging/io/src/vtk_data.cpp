@@ -41,7 +41,8 @@ class VoxelOwner : public vtkObjectBase {
 };
 
 vtkInformationObjectBaseKey* owner_key() {
-  static vtkInformationObjectBaseKey* const key = vtkInformationObjectBaseKey::MakeKey("VOXEL_OWNER", "osteo", "VoxelOwner");
+  static vtkInformationObjectBaseKey* const key =
+      vtkInformationObjectBaseKey::MakeKey("VOXEL_OWNER", "osteo", "VoxelOwner");
   return key;
 }
 
@@ -110,7 +111,8 @@ vtkSmartPointer<vtkPolyData> to_vtk(const TriMesh& mesh) {
   vtkNew<vtkTypeInt32Array> offsets, connectivity;
   offsets->SetNumberOfValues(static_cast<vtkIdType>(mesh.triangles.size() + 1));
   connectivity->SetNumberOfValues(static_cast<vtkIdType>(mesh.triangles.size() * 3));
-  for (std::size_t t = 0; t <= mesh.triangles.size(); ++t) offsets->SetValue(static_cast<vtkIdType>(t), static_cast<int>(3 * t));
+  for (std::size_t t = 0; t <= mesh.triangles.size(); ++t)
+    offsets->SetValue(static_cast<vtkIdType>(t), static_cast<int>(3 * t));
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     for (std::size_t c = 0; c < 3; ++c) {
       connectivity->SetValue(static_cast<vtkIdType>(3 * t + c), static_cast<int>(mesh.triangles[t][c]));
@@ -136,7 +138,8 @@ TriMesh mesh_from_vtk(vtkPolyData* data) {
   for (vtkIdType i = 0; i < data->GetNumberOfPoints(); ++i) {
     double p[3];
     data->GetPoint(i, p);
-    mesh.points_mm[static_cast<std::size_t>(i)] = {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
+    mesh.points_mm[static_cast<std::size_t>(i)] = {static_cast<float>(p[0]), static_cast<float>(p[1]),
+                                                   static_cast<float>(p[2])};
   }
   const auto it = vtk::TakeSmartPointer(data->GetPolys()->NewIterator());
   for (it->GoToFirstCell(); !it->IsDoneWithTraversal(); it->GoToNextCell()) {
@@ -145,8 +148,9 @@ TriMesh mesh_from_vtk(vtkPolyData* data) {
     it->GetCurrentCell(n, ids);
     for (vtkIdType k = 0; k < n; ++k) {
       if (ids[k] < 0 || ids[k] >= data->GetNumberOfPoints()) {
-        throw Error(ExitCode::corrupt, "polygon " + std::to_string(it->GetCurrentCellId()) + " names point " + std::to_string(ids[k]) +
-                                           ", but there are only " + std::to_string(data->GetNumberOfPoints()) + " points");
+        throw Error(ExitCode::corrupt, "polygon " + std::to_string(it->GetCurrentCellId()) + " names point " +
+                                           std::to_string(ids[k]) + ", but there are only " +
+                                           std::to_string(data->GetNumberOfPoints()) + " points");
       }
     }
     if (n < 3) continue;
@@ -167,7 +171,8 @@ TriMesh mesh_from_vtk(vtkPolyData* data) {
       }
       continue;
     }
-    mesh.triangles.push_back({static_cast<std::uint32_t>(ids[0]), static_cast<std::uint32_t>(ids[1]), static_cast<std::uint32_t>(ids[2])});
+    mesh.triangles.push_back(
+        {static_cast<std::uint32_t>(ids[0]), static_cast<std::uint32_t>(ids[1]), static_cast<std::uint32_t>(ids[2])});
   }
   return mesh;
 }
@@ -196,4 +201,4 @@ std::string QuietVtk::first_message() const {
   return text;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -52,7 +52,8 @@ int vtk_type(Scalar s) {
 }
 
 Scalar scalar_from_vtk(int type) {
-  for (const Scalar s : {Scalar::u8, Scalar::i8, Scalar::u16, Scalar::i16, Scalar::u32, Scalar::i32, Scalar::f32, Scalar::f64}) {
+  for (const Scalar s :
+       {Scalar::u8, Scalar::i8, Scalar::u16, Scalar::i16, Scalar::u32, Scalar::i32, Scalar::f32, Scalar::f64}) {
     if (vtk_type(s) == type) return s;
   }
   if (type == VTK_CHAR) return Scalar::i8;
@@ -103,7 +104,8 @@ void set_frame(vtkImageData* image, const Frame& f) {
 RawVolume raw_from_vtk(vtkImageData* image) {
   vtkDataArray* const scalars = image->GetPointData()->GetScalars();
   if (scalars == nullptr) throw Error(ExitCode::corrupt, "the image has no scalars");
-  if (scalars->GetNumberOfComponents() != 1) throw Error(ExitCode::corrupt, "the image has several components; a CT has one");
+  if (scalars->GetNumberOfComponents() != 1)
+    throw Error(ExitCode::corrupt, "the image has several components; a CT has one");
   RawVolume raw;
   int extent[6];
   image->GetExtent(extent);
@@ -139,7 +141,8 @@ RawVolume read_vti(const fs::path& path) {
   if (reader->CanReadFile(path.c_str()) == 0) fail(path, "this is not a VTK image file (.vti)");
   reader->SetFileName(path.c_str());
   reader->Update();
-  if (reader->GetErrorCode() != 0 || !quiet.first_message().empty()) fail(path, "cannot be read: " + quiet.first_message());
+  if (reader->GetErrorCode() != 0 || !quiet.first_message().empty())
+    fail(path, "cannot be read: " + quiet.first_message());
   return raw_from_vtk(reader->GetOutput());
 }
 
@@ -155,7 +158,8 @@ void write_vti(const RawVolume& raw, const fs::path& path) {
 
 namespace {
 
-// How the two forms of a NIfTI header differ, where it has both. Found before the reader, which calls a mirrored one an error of the file.
+// How the two forms of a NIfTI header differ, where it has both. Found before the reader, which calls a mirrored one an
+// error of the file.
 void require_like_handed(vtkNIFTIImageHeader& h, const fs::path& path) {
   if (h.GetSFormCode() <= 0 || h.GetQFormCode() <= 0) return;
   const double *const x = h.GetSRowX(), *const y = h.GetSRowY(), *const z = h.GetSRowZ();
@@ -170,7 +174,8 @@ void require_like_handed(vtkNIFTIImageHeader& h, const fs::path& path) {
 double farthest_apart(const Frame& a, const Frame& b) {
   double most = 0;
   for (int c = 0; c < 8; ++c) {
-    const Vec3 corner{(c & 1) != 0 ? a.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? a.dims[1] - 1.0 : 0.0, (c & 4) != 0 ? a.dims[2] - 1.0 : 0.0};
+    const Vec3 corner{(c & 1) != 0 ? a.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? a.dims[1] - 1.0 : 0.0,
+                      (c & 4) != 0 ? a.dims[2] - 1.0 : 0.0};
     most = std::max(most, length(a.world_from_index(corner) - b.world_from_index(corner)));
   }
   return most;
@@ -198,8 +203,8 @@ RawVolume read_nifti(const fs::path& path) {
       fail(path, "it holds " + std::to_string(volumes) + " volumes (a series over time, or of channels), not one",
            "save the one to be used as a file of its own");
     if (readable && (path.extension() == ".gz" || voxels > 1'000'000'000))
-      require_room(path, static_cast<double>(voxels), header->GetBitPix() / 8.0, static_cast<double>(fs::file_size(path)),
-                   path.extension() == ".gz");
+      require_room(path, static_cast<double>(voxels), header->GetBitPix() / 8.0,
+                   static_cast<double>(fs::file_size(path)), path.extension() == ".gz");
   }
   reader->Update();
   if (reader->GetErrorCode() != 0 || !quiet.first_message().empty()) {
@@ -222,7 +227,8 @@ RawVolume read_nifti(const fs::path& path) {
         raw.findings.push_back({VolumeFinding::What::places_disagree,
                                 "the file states two places (sform and qform) that are turned against each other by " +
                                     format_number(std::round(degrees * 10) / 10) + " degrees and put a voxel up to " +
-                                    format_number(std::round(apart / voxel * 10) / 10) + " voxels apart; the sform is taken"});
+                                    format_number(std::round(apart / voxel * 10) / 10) +
+                                    " voxels apart; the sform is taken"});
       }
     }
   } else if (qform != nullptr) {
@@ -234,8 +240,10 @@ RawVolume read_nifti(const fs::path& path) {
   const int unit = header != nullptr ? header->GetXYZTUnits() & 7 : 0;
   if (unit == 1) convert_lengths(raw, 1000, "metres (xyzt_units)");
   if (unit == 3) convert_lengths(raw, 1e-3, "micrometres (xyzt_units)");
-  if (unit > 3) fail(path, "its unit of length (xyzt_units " + std::to_string(unit) + ") is none", "save it in millimetres");
-  if (std::abs(reader->GetRescaleSlope()) > 0 && (reader->GetRescaleSlope() != 1 || reader->GetRescaleIntercept() != 0)) {
+  if (unit > 3)
+    fail(path, "its unit of length (xyzt_units " + std::to_string(unit) + ") is none", "save it in millimetres");
+  if (std::abs(reader->GetRescaleSlope()) > 0 &&
+      (reader->GetRescaleSlope() != 1 || reader->GetRescaleIntercept() != 0)) {
     const double slope = reader->GetRescaleSlope(), intercept = reader->GetRescaleIntercept();
     const std::size_t n = raw.frame.voxel_count();
     const auto scaled = std::make_shared_for_overwrite<float[]>(n);
@@ -311,7 +319,8 @@ std::string meta_value(std::string_view all, std::string_view key) {
       return text;
     };
     const std::size_t equals = line.find('=');
-    if (equals != std::string_view::npos && trimmed(line.substr(0, equals)) == key) return std::string(trimmed(line.substr(equals + 1)));
+    if (equals != std::string_view::npos && trimmed(line.substr(0, equals)) == key)
+      return std::string(trimmed(line.substr(equals + 1)));
     at = end + 1;
   }
   return {};
@@ -322,7 +331,8 @@ void require_whole_meta(const fs::path& path) {
   const auto bytes = read_file(path);
   const std::string_view all(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   const std::string data_file = meta_value(all, "ElementDataFile");
-  if (data_file.empty()) fail(path, "this is not a whole MetaImage header", "the file may be cut short; copy it again from its source");
+  if (data_file.empty())
+    fail(path, "this is not a whole MetaImage header", "the file may be cut short; copy it again from its source");
   if (const std::string axes = meta_value(all, "NDims"); !axes.empty() && axes != "3") {
     fail(path, "it has " + axes + " axes; a volume has three",
          axes == "4" ? "a series over time or of channels: save one of its volumes as a file of its own" : "");
@@ -357,7 +367,8 @@ RawVolume read_meta(const fs::path& path) {
   require_whole_meta(path);
   vtkmetaio::MetaImage meta;
   const QuietCerr quiet;
-  if (!meta.Read(path.c_str(), true)) fail(path, "cannot be read as MetaImage", "the file may be cut short or its data file missing");
+  if (!meta.Read(path.c_str(), true))
+    fail(path, "cannot be read as MetaImage", "the file may be cut short or its data file missing");
   // MetaIO leaves bytes in the file's order (BinaryDataByteOrderMSB); numbers written as text have none.
   if (meta.BinaryData()) meta.ElementByteOrderFix();
   if (meta.NDims() != 3) fail(path, "it has " + std::to_string(meta.NDims()) + " axes; a volume has three");
@@ -396,9 +407,11 @@ RawVolume read_meta(const fs::path& path) {
     raw.frame.dims[ua] = meta.DimSize(a);
     raw.frame.spacing_mm[ua] = meta.ElementSpacing(a);
     raw.frame.origin_mm[ua] = meta.Offset(a);
-    raw.frame.direction.column[ua] = {meta.TransformMatrix(a, 0), meta.TransformMatrix(a, 1), meta.TransformMatrix(a, 2)};
+    raw.frame.direction.column[ua] = {meta.TransformMatrix(a, 0), meta.TransformMatrix(a, 1),
+                                      meta.TransformMatrix(a, 2)};
   }
-  if (meta.DistanceUnits() == vtkmetaio::MET_DISTANCE_UNITS_UM) convert_lengths(raw, 1e-3, "micrometres (DistanceUnits)");
+  if (meta.DistanceUnits() == vtkmetaio::MET_DISTANCE_UNITS_UM)
+    convert_lengths(raw, 1e-3, "micrometres (DistanceUnits)");
   if (meta.DistanceUnits() == vtkmetaio::MET_DISTANCE_UNITS_CM) convert_lengths(raw, 10, "centimetres (DistanceUnits)");
   try {
     require_valid(raw.frame);
@@ -468,4 +481,4 @@ void write_meta(const RawVolume& raw, const fs::path& path) {
   });
 }
 
-}  // namespace osteo::imaging::io
+}  // namespace osteo::inline imaging::io

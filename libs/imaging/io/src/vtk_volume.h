@@ -15,4 +15,4 @@ void set_frame(vtkImageData* image, const Frame& frame);
 /// Shares the scalars for the time of the call: the result must not outlive `raw`.
 [[nodiscard]] vtkSmartPointer<vtkImageData> vtk_view(const RawVolume& raw);
 
-}  // namespace osteo::imaging::io
+}  // namespace osteo::inline imaging::io

@@ -5,15 +5,15 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/imaging/dicom/objects.h"
-#include "osteo/imaging/dicom/save_series.h"
+#include "osteo/core/stage/stage.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/geometry/grid/sampler.h"
+#include "osteo/imaging/dicom/objects.h"
+#include "osteo/imaging/dicom/save_series.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/imaging/io/tet_io.h"
 #include "osteo/imaging/io/values_io.h"
 #include "osteo/imaging/io/volume_io.h"
-#include "osteo/core/stage/stage.h"
 
 namespace osteo::inline imaging {
 namespace {
@@ -39,7 +39,8 @@ Volume<float> dense(const SparseGrid& grid, const Context& context) {
   constexpr double kMostVoxels = 2e9;
   const auto& n = grid.frame.dims;
   if (1.0 * n[0] * n[1] * n[2] > kMostVoxels)
-    throw Error(ExitCode::resources, "the box around the grid has over 2e9 voxels", "write it as .vdb, which is sparse");
+    throw Error(ExitCode::resources, "the box around the grid has over 2e9 voxels",
+                "write it as .vdb, which is sparse");
   Volume<float> all;
   all.frame = grid.frame;
   const auto values = make_voxels<float>(grid.frame.voxel_count());
@@ -59,7 +60,8 @@ Volume<float> dense(const SparseGrid& grid, const Context& context) {
 
 std::string suffixes_of(DataKind kind) {
   for (const auto& s : kSuffixes) {
-    if (s.kind == kind) return std::string(s.writable) + (kind == DataKind::image ? ", or a folder name without suffix for DICOM" : "");
+    if (s.kind == kind)
+      return std::string(s.writable) + (kind == DataKind::image ? ", or a folder name without suffix for DICOM" : "");
   }
   return {};
 }
@@ -71,8 +73,8 @@ Data load_data(const fs::path& path, std::span<const DataKind> accepted, const C
   }
   require_readable(path);
   const auto wrong = [&](DataKind found) {
-    return Error(ExitCode::usage,
-                 "'" + path.string() + "' is a " + std::string(kind_name(found)) + " by its name; " + kinds_text(accepted) + " is wanted");
+    return Error(ExitCode::usage, "'" + path.string() + "' is a " + std::string(kind_name(found)) + " by its name; " +
+                                      kinds_text(accepted) + " is wanted");
   };
   if (path.extension() == ".vdb") {
     if (!accepts(accepted, DataKind::grid)) throw wrong(DataKind::grid);
@@ -128,10 +130,12 @@ void require_savable(DataKind kind, const fs::path& path) {
       rest = space == std::string_view::npos ? std::string_view() : rest.substr(space + 1);
     }
   }
-  throw Error(ExitCode::usage, "cannot write a " + std::string(kind_name(kind)) + " as '" + name + "'", "name it " + suffixes_of(kind));
+  throw Error(ExitCode::usage, "cannot write a " + std::string(kind_name(kind)) + " as '" + name + "'",
+              "name it " + suffixes_of(kind));
 }
 
-void save_data(const Data& data, const fs::path& path, const Context& context, const std::function<void(const fs::path&)>& may_replace) {
+void save_data(const Data& data, const fs::path& path, const Context& context,
+               const std::function<void(const fs::path&)>& may_replace) {
   require_savable(kind_of(data), path);
   switch (kind_of(data)) {
     case DataKind::image:
@@ -178,4 +182,4 @@ void save_data(const Data& data, const fs::path& path, const Context& context, c
   throw Error(ExitCode::unspecified, "a stage returned nothing for '" + path.string() + "'");
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

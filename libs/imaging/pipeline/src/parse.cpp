@@ -32,10 +32,12 @@ class PipelineReader {
         for (const JsonMember& input : in != nullptr ? in->members : std::vector<JsonMember>{}) {
           const JsonValue* const file = input.value.find("file");
           variable.in_file_name |=
-              file != nullptr && scalar(*file, "input '" + input.key + "'").find("${" + m.key + "}") != std::string::npos;
+              file != nullptr &&
+              scalar(*file, "input '" + input.key + "'").find("${" + m.key + "}") != std::string::npos;
         }
       }
-      if (const JsonValue* const fallback = m.value.find("default"); fallback != nullptr) variable.fallback = scalar(*fallback, where);
+      if (const JsonValue* const fallback = m.value.find("default"); fallback != nullptr)
+        variable.fallback = scalar(*fallback, where);
       result.push_back(std::move(variable));
     }
     std::sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
@@ -62,17 +64,21 @@ class PipelineReader {
     for (const JsonValue& s : stages()) {
       const std::string number = "stage " + std::to_string(result.size() + 1);
       const bool has_id = s.kind == JsonValue::Kind::object && s.find("id") != nullptr;
-      result[has_id ? text_of(s, "id", number) : file_.text(file_.need(s, number, "stage"), number + ": \"stage\"")] = s.line;
+      result[has_id ? text_of(s, "id", number) : file_.text(file_.need(s, number, "stage"), number + ": \"stage\"")] =
+          s.line;
     }
     return result;
   }
 
  private:
   [[nodiscard]] const JsonValue& root() const { return file_.root(); }
-  [[nodiscard]] const std::vector<JsonValue>& stages() const { return file_.list(file_.need(root(), "", "stages"), "\"stages\""); }
+  [[nodiscard]] const std::vector<JsonValue>& stages() const {
+    return file_.list(file_.need(root(), "", "stages"), "\"stages\"");
+  }
 
   // Of an object that may be left out.
-  [[nodiscard]] const std::vector<JsonMember>& members(const JsonValue& object, const std::string& key, const std::string& where) const {
+  [[nodiscard]] const std::vector<JsonMember>& members(const JsonValue& object, const std::string& key,
+                                                       const std::string& where) const {
     static const std::vector<JsonMember> none;
     const JsonValue* const found = object.find(key);
     if (found == nullptr) return none;
@@ -82,7 +88,8 @@ class PipelineReader {
   }
   [[nodiscard]] std::string text_of(const JsonValue& object, const std::string& key, const std::string& where) const {
     const JsonValue* const found = object.find(key);
-    return found == nullptr ? std::string() : file_.text(*found, (where.empty() ? "" : where + ": ") + "\"" + key + "\"");
+    return found == nullptr ? std::string()
+                            : file_.text(*found, (where.empty() ? "" : where + ": ") + "\"" + key + "\"");
   }
 
   // A parameter as a flag would have it.
@@ -97,7 +104,8 @@ class PipelineReader {
   }
 
   // The same, with what "${NAME}" stands for.
-  [[nodiscard]] std::string substituted(const JsonValue& value, const Variables& values, const std::string& where) const {
+  [[nodiscard]] std::string substituted(const JsonValue& value, const Variables& values,
+                                        const std::string& where) const {
     std::string text = scalar(value, where);
     for (std::size_t at = text.find("${"); at != std::string::npos; at = text.find("${", at)) {
       const std::size_t end = text.find('}', at);
@@ -105,7 +113,8 @@ class PipelineReader {
       const std::string name = text.substr(at + 2, end - at - 2);
       const auto it = values.find(name);
       if (it == values.end())
-        throw file_.wrong(value, where + ": the variable '" + name + "' has no value", "give it with --set " + name + "=VALUE");
+        throw file_.wrong(value, where + ": the variable '" + name + "' has no value",
+                          "give it with --set " + name + "=VALUE");
       text.replace(at, end - at + 1, it->second);
       at += it->second.size();
     }
@@ -128,7 +137,8 @@ class PipelineReader {
     return node;
   }
 
-  [[nodiscard]] PipelineNode::Input read_input(const JsonValue& value, const std::string& where, const Variables& values) const {
+  [[nodiscard]] PipelineNode::Input read_input(const JsonValue& value, const std::string& where,
+                                               const Variables& values) const {
     PipelineNode::Input input;
     if (value.kind == JsonValue::Kind::object) {
       file_.allow(value, where, Names{"file"});
@@ -169,7 +179,8 @@ Pipeline parse_pipeline(std::string_view text, const std::map<std::string, std::
     if (std::find(known.begin(), known.end(), key) == known.end()) {
       const std::string near = nearest_name(key, known);
       throw Error(ExitCode::usage, "--set " + key + ": the pipeline has no variable '" + key + "'",
-                  near.empty() ? "a parameter of one stage is set as --set ID.PARAMETER=VALUE" : "did you mean '" + near + "'?");
+                  near.empty() ? "a parameter of one stage is set as --set ID.PARAMETER=VALUE"
+                               : "did you mean '" + near + "'?");
     }
     values[key] = value;
   }
@@ -195,4 +206,4 @@ std::map<std::string, std::size_t> step_lines(std::string_view json) {
   return PipelineReader(json).lines();
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -83,7 +83,8 @@ class Runner {
       const bool always = options_.always.contains(pipeline_.nodes[n].id);
       if (!always && (fresh[n] || pipeline_.nodes[n].outputs.empty())) continue;
       mark_needed(n, fresh);
-      for (const auto& [port, path] : pipeline_.nodes[n].outputs) check_place(*find_port(stages_[n]->info().outputs, port), path);
+      for (const auto& [port, path] : pipeline_.nodes[n].outputs)
+        check_place(*find_port(stages_[n]->info().outputs, port), path);
     }
     for (const bool b : needed_) to_run += b ? 1 : 0;
     if (make_engine && to_run > 0) engine_ = make_engine(pipeline_to_run());
@@ -113,7 +114,8 @@ class Runner {
     for (const auto& node : pipeline_.nodes) {
       for (const auto& [port, path] : node.outputs) {
         if (output_exists(path))
-          throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists already", "give another name, or --force to replace it");
+          throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists already",
+                      "give another name, or --force to replace it");
       }
     }
   }
@@ -137,7 +139,8 @@ class Runner {
     result.id = node.id;
     result.stage = node.stage;
     result.outputs = node.outputs;
-    std::string text = node.stage + "/" + std::to_string(stages_[n]->info().version) + "\nseed=" + std::to_string(context_.seed) + "\n";
+    std::string text = node.stage + "/" + std::to_string(stages_[n]->info().version) +
+                       "\nseed=" + std::to_string(context_.seed) + "\n";
     for (const auto& f : stages_[n]->fields()) {
       // The key depends on a UID, the record says only that there was one.
       result.params[std::string(f.doc.name)] = without_uid(f.to_text());
@@ -257,12 +260,14 @@ class Runner {
       if (e.code() == ExitCode::cancelled || pipeline_.nodes.size() == 1) throw;
       throw e.in("stage '" + node.id + "'");
     } catch (const std::bad_alloc&) {
-      throw Error(ExitCode::resources, "stage '" + node.id + "' ran out of memory", "use larger voxels or a smaller region");
+      throw Error(ExitCode::resources, "stage '" + node.id + "' ran out of memory",
+                  "use larger voxels or a smaller region");
     }
     free_unneeded(n);
   }
 
-  void save_output(std::size_t n, const std::string& port, const Data& value, const fs::path& path, const Context& context) {
+  void save_output(std::size_t n, const std::string& port, const Data& value, const fs::path& path,
+                   const Context& context) {
     const fs::path place = written(path);
     const bool is_new = !output_exists(place);
     save_data(value, place, context, [&](const fs::path& old) { require_replaceable(old, path); });
@@ -354,10 +359,12 @@ void validate(Pipeline& pipeline, const Registry& registry) {
       const StageInfo& from = *infos[input.node];
       if (from.outputs.empty()) throw Error(ExitCode::usage, where + ": stage '" + input.node + "' has no output");
       const Port* const out = input.port.empty() ? &from.outputs.front() : find_port(from.outputs, input.port);
-      if (out == nullptr) unknown(where + " input '" + name + "'", "output of '" + input.node + "'", input.port, names_of(from.outputs));
+      if (out == nullptr)
+        unknown(where + " input '" + name + "'", "output of '" + input.node + "'", input.port, names_of(from.outputs));
       if (std::find(port->kinds.begin(), port->kinds.end(), out->kinds.front()) == port->kinds.end()) {
-        throw Error(ExitCode::usage, where + " takes " + kinds_text(port->kinds) + " as '" + name + "', but '" + input.node + "." +
-                                         out->name + "' is " + std::string(kind_name(out->kinds.front())));
+        throw Error(ExitCode::usage, where + " takes " + kinds_text(port->kinds) + " as '" + name + "', but '" +
+                                         input.node + "." + out->name + "' is " +
+                                         std::string(kind_name(out->kinds.front())));
       }
     }
     for (const Port& port : info.inputs) {
@@ -369,7 +376,8 @@ void validate(Pipeline& pipeline, const Registry& registry) {
       if (port == nullptr) unknown(where, "output", name, names_of(info.outputs));
       require_savable(port->kinds.front(), path);
       const auto [it, inserted] = written_by.try_emplace(path.lexically_normal().string(), node.id);
-      if (!inserted) throw Error(ExitCode::usage, where + " and stage '" + it->second + "' both write '" + path.string() + "'");
+      if (!inserted)
+        throw Error(ExitCode::usage, where + " and stage '" + it->second + "' both write '" + path.string() + "'");
     }
   }
   // Order of the file, each node after its inputs.
@@ -379,8 +387,9 @@ void validate(Pipeline& pipeline, const Registry& registry) {
     const std::size_t before = ordered.size();
     for (const PipelineNode& node : pipeline.nodes) {
       if (placed.contains(node.id)) continue;
-      const bool ready = std::all_of(node.inputs.begin(), node.inputs.end(),
-                                     [&](const auto& in) { return in.second.node.empty() || placed.contains(in.second.node); });
+      const bool ready = std::all_of(node.inputs.begin(), node.inputs.end(), [&](const auto& in) {
+        return in.second.node.empty() || placed.contains(in.second.node);
+      });
       if (!ready) continue;
       placed.insert(node.id);
       ordered.push_back(node);
@@ -390,12 +399,13 @@ void validate(Pipeline& pipeline, const Registry& registry) {
   pipeline.nodes = std::move(ordered);
 }
 
-std::vector<NodeResult> run_pipeline(Pipeline pipeline, const Registry& registry, const RunOptions& options, const Context& context) {
+std::vector<NodeResult> run_pipeline(Pipeline pipeline, const Registry& registry, const RunOptions& options,
+                                     const Context& context) {
   return run_pipeline(std::move(pipeline), registry, options, context, {});
 }
 
-std::vector<NodeResult> run_pipeline(Pipeline pipeline, const Registry& registry, const RunOptions& options, const Context& context,
-                                     const MakeEngine& make_engine) {
+std::vector<NodeResult> run_pipeline(Pipeline pipeline, const Registry& registry, const RunOptions& options,
+                                     const Context& context, const MakeEngine& make_engine) {
   validate(pipeline, registry);
   return Runner(pipeline, registry, options, context).run(make_engine);
 }
@@ -420,10 +430,12 @@ void require_replaceable(const fs::path& folder, const fs::path& output) {
   }
   std::error_code ec;
   for (const auto& entry : fs::directory_iterator(folder, ec)) {
-    if (entry.is_directory() && !entry.is_symlink() && fs::is_empty(entry.path(), ec)) foreign.push_back(entry.path().filename().string());
+    if (entry.is_directory() && !entry.is_symlink() && fs::is_empty(entry.path(), ec))
+      foreign.push_back(entry.path().filename().string());
   }
   if (foreign.empty()) return;
-  throw Error(ExitCode::cannot_write, "'" + output.string() + "' holds what this program has no record of: " + list_names(foreign),
+  throw Error(ExitCode::cannot_write,
+              "'" + output.string() + "' holds what this program has no record of: " + list_names(foreign),
               "give another name, or move them away; --force replaces only what the program made");
 }
 
@@ -450,4 +462,4 @@ std::string_view program_version() {
   return text;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

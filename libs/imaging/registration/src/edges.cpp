@@ -28,7 +28,8 @@ struct Gradient {
 Gradient gradient_at(const Levels& l, int i, int j, int k) {
   const Level& v = l.levels.front();
   const auto at = [&](int x, int y, int z) { return std::clamp(v.at(x, y, z), l.lo, l.hi); };
-  const Vec3 g{static_cast<double>(at(i + 1, j, k) - at(i - 1, j, k)), static_cast<double>(at(i, j + 1, k) - at(i, j - 1, k)),
+  const Vec3 g{static_cast<double>(at(i + 1, j, k) - at(i - 1, j, k)),
+               static_cast<double>(at(i, j + 1, k) - at(i, j - 1, k)),
                static_cast<double>(at(i, j, k + 1) - at(i, j, k - 1))};
   const double n = length(g);
   return {n > 0 ? v.frame.direction * (g / n) : Vec3{}, static_cast<float>(n)};
@@ -52,13 +53,15 @@ std::vector<Edge> edges_of(const Levels& l, const Context& context) {
           if (g.size < steep) continue;
           const Vec3 step = transposed(v.frame.direction) * g.direction;
           const auto beside = [&](double t) {
-            return gradient_at(l, i + static_cast<int>(std::lround(t * step.x)), j + static_cast<int>(std::lround(t * step.y)),
+            return gradient_at(l, i + static_cast<int>(std::lround(t * step.x)),
+                               j + static_cast<int>(std::lround(t * step.y)),
                                k + static_cast<int>(std::lround(t * step.z)))
                 .size;
           };
           if (g.size < beside(1) || g.size <= beside(-1)) continue;
           of_slice[s + 2].push_back(
-              {v.frame.world_from_index({static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)}), g.direction});
+              {v.frame.world_from_index({static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)}),
+               g.direction});
         }
     }
   });
@@ -89,8 +92,8 @@ struct Offset {
 };
 
 // Where along the line the second's slopes look most like the first's.
-std::optional<Offset> offset_at(const Edge& e, const Levels& first, const IndexMap& own, const Levels& second, const IndexMap& other,
-                                Vec3 centre) {
+std::optional<Offset> offset_at(const Edge& e, const Levels& first, const IndexMap& own, const Levels& second,
+                                const IndexMap& other, Vec3 centre) {
   std::array<float, 2 * kHalf + 1> a;
   std::array<float, 2 * (kHalf + kReach) + 1> b;
   if (!slopes_along<2 * kHalf + 1>(first, own, e.at_mm - centre, e.normal, a) ||
@@ -144,7 +147,8 @@ std::vector<Measured> measure(const std::vector<Edge>& all, const Levels& first,
   std::vector<std::optional<Offset>> offsets(n);
   parallel_for(n, 128, context.threads, [&](std::size_t begin, std::size_t end) {
     context.check_cancelled();
-    for (std::size_t i = begin; i < end; ++i) offsets[i] = offset_at(edges[i * step], first, own, second, other, centre);
+    for (std::size_t i = begin; i < end; ++i)
+      offsets[i] = offset_at(edges[i * step], first, own, second, other, centre);
   });
   std::vector<Measured> measured;
   for (std::size_t i = 0; i < n; ++i) {
@@ -155,7 +159,8 @@ std::vector<Measured> measure(const std::vector<Edge>& all, const Levels& first,
 
 }  // namespace
 
-RigidTransform fit_edges(const Levels& first, const Levels& second, const RigidTransform& guess, const Context& context) {
+RigidTransform fit_edges(const Levels& first, const Levels& second, const RigidTransform& guess,
+                         const Context& context) {
   const std::vector<Edge> edges = edges_of(first, context);
   RigidTransform second_from_first = guess;
   for (int n = 0; n < 12; ++n) {
@@ -179,7 +184,8 @@ RigidTransform fit_edges(const Levels& first, const Levels& second, const RigidT
   return second_from_first;
 }
 
-EdgeResidual edge_residual(const Levels& first, const Levels& second, const RigidTransform& second_from_first, const Context& context) {
+EdgeResidual edge_residual(const Levels& first, const Levels& second, const RigidTransform& second_from_first,
+                           const Context& context) {
   std::vector<double> size, signed_mm;
   EdgeResidual r;
   for (const Measured& m : measure(edges_of(first, context), first, second, second_from_first, context)) {
@@ -198,4 +204,4 @@ EdgeResidual edge_residual(const Levels& first, const Levels& second, const Rigi
   return r;
 }
 
-}  // namespace osteo::imaging::registration
+}  // namespace osteo::inline imaging::registration

@@ -5,11 +5,13 @@
 
 namespace osteo::inline imaging::registration {
 
-/// The motion that brings edges upon edges, from a guess that is right to 2 mm. Blind to how bright the sides are, so a coil's shading,
-/// which pulls mutual information by some tenths of a millimetre, does not matter. The guess itself where there are too few edges.
-[[nodiscard]] RigidTransform fit_edges(const Levels& first, const Levels& second, const RigidTransform& guess, const Context& context);
+/// The motion that brings edges upon edges, from a guess that is right to 2 mm. Blind to how bright the sides are, so a
+/// coil's shading, which pulls mutual information by some tenths of a millimetre, does not matter. The guess itself
+/// where there are too few edges.
+[[nodiscard]] RigidTransform fit_edges(const Levels& first, const Levels& second, const RigidTransform& guess,
+                                       const Context& context);
 
-[[nodiscard]] EdgeResidual edge_residual(const Levels& first, const Levels& second, const RigidTransform& second_from_first,
-                                         const Context& context);
+[[nodiscard]] EdgeResidual edge_residual(const Levels& first, const Levels& second,
+                                         const RigidTransform& second_from_first, const Context& context);
 
-}  // namespace osteo::imaging::registration
+}  // namespace osteo::inline imaging::registration

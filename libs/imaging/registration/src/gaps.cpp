@@ -38,4 +38,4 @@ Closing close_gaps(const std::vector<Gap>& gaps) {
   return c;
 }
 
-}  // namespace osteo::imaging::registration
+}  // namespace osteo::inline imaging::registration

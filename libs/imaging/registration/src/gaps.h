@@ -20,4 +20,4 @@ struct Closing {
 /// Least squares over turn, shift and offset (small turns). At least seven gaps.
 [[nodiscard]] Closing close_gaps(const std::vector<Gap>& gaps);
 
-}  // namespace osteo::imaging::registration
+}  // namespace osteo::inline imaging::registration

@@ -75,7 +75,8 @@ Level finest(const Image& image, double h, const Context& context) {
         for (std::size_t i = 0; i < ox; ++i) {
           const Taps& tx = taps[0][i];
           float sum = 0;
-          for (std::size_t t = 0; t < tx.weight.size(); ++t) sum += tx.weight[t] * plane[j * nx + static_cast<std::size_t>(tx.first) + t];
+          for (std::size_t t = 0; t < tx.weight.size(); ++t)
+            sum += tx.weight[t] * plane[j * nx + static_cast<std::size_t>(tx.first) + t];
           wide[j * ox + i] = sum;
         }
       }
@@ -108,7 +109,8 @@ Level halved(const Level& in) {
       for (int i = 0; i < out.frame.dims[0]; ++i, ++at) {
         float sum = 0;
         for (int c = 0; c < 8; ++c)
-          sum += in.at(std::min(2 * i + (c & 1), in.frame.dims[0] - 1), std::min(2 * j + (c >> 1 & 1), in.frame.dims[1] - 1),
+          sum += in.at(std::min(2 * i + (c & 1), in.frame.dims[0] - 1),
+                       std::min(2 * j + (c >> 1 & 1), in.frame.dims[1] - 1),
                        std::min(2 * k + (c >> 2), in.frame.dims[2] - 1));
         out.values[at] = sum / 8;
       }
@@ -149,4 +151,4 @@ IndexMap index_map(const Frame& to, const RigidTransform& to_from, Vec3 centre_m
   return m;
 }
 
-}  // namespace osteo::imaging::registration
+}  // namespace osteo::inline imaging::registration

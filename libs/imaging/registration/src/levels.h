@@ -12,7 +12,8 @@ struct Level {
   Frame frame;
   std::vector<float> values;
   [[nodiscard]] float at(int i, int j, int k) const {
-    return values[(static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j)) *
+    return values[(static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) +
+                   static_cast<std::size_t>(j)) *
                       static_cast<std::size_t>(frame.dims[0]) +
                   static_cast<std::size_t>(i)];
   }
@@ -26,7 +27,8 @@ struct Levels {
 /// `wanted_mm`, or the finest that both scans have, or what keeps a level of either scan below 40 million voxels.
 [[nodiscard]] double finest_of(const Frame& a, const Frame& b, double wanted_mm);
 
-/// Means over voxels of `finest_mm` (linear between voxels where the scan is coarser), then of 2^3 of them, down to 8 mm or more.
+/// Means over voxels of `finest_mm` (linear between voxels where the scan is coarser), then of 2^3 of them, down to 8
+/// mm or more.
 [[nodiscard]] Levels make_levels(const Image& image, double finest_mm, const Context& context);
 
 /// From points of one frame's world to index coordinates of a level.
@@ -47,8 +49,8 @@ inline bool sample(const Level& level, float x, float y, float z, float& value) 
   const int k = z >= static_cast<float>(d[2] - 1) && d[2] > 1 ? d[2] - 2 : static_cast<int>(z);
   const float fx = x - static_cast<float>(i), fy = y - static_cast<float>(j), fz = z - static_cast<float>(k);
   const auto nx = static_cast<std::size_t>(d[0]), nxy = nx * static_cast<std::size_t>(d[1]);
-  const float* const p =
-      level.values.data() + static_cast<std::size_t>(k) * nxy + static_cast<std::size_t>(j) * nx + static_cast<std::size_t>(i);
+  const float* const p = level.values.data() + static_cast<std::size_t>(k) * nxy + static_cast<std::size_t>(j) * nx +
+                         static_cast<std::size_t>(i);
   // An axis of one voxel has no neighbour.
   const std::size_t sx = d[0] > 1 ? 1 : 0, sy = d[1] > 1 ? nx : 0, sz = d[2] > 1 ? nxy : 0;
   const auto row = [&](const float* q) { return q[0] + fx * (q[sx] - q[0]); };
@@ -61,4 +63,4 @@ inline bool sample(const Level& level, float x, float y, float z, float& value) 
   return true;
 }
 
-}  // namespace osteo::imaging::registration
+}  // namespace osteo::inline imaging::registration

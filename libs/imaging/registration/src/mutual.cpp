@@ -29,22 +29,24 @@ float scale_of(const Levels& l, int bins) {
   return static_cast<float>(bins - 1) / (l.hi - l.lo);
 }
 
-// Half anywhere, half where values change: those hold what there is to align. Between voxels, since points on one lattice sampled on
-// another give ripples of their own (J. Pluim et al., Interpolation artefacts in mutual information-based image registration, CVIU 2000).
-// With `where`, only points that it puts into `other`.
-Samples take_samples(const Levels& from, std::size_t level, std::size_t count, int bins, std::uint64_t seed, const Frame* other = nullptr,
-                     const RigidTransform& where = {}) {
+// Half anywhere, half where values change: those hold what there is to align. Between voxels, since points on one
+// lattice sampled on another give ripples of their own (J. Pluim et al., Interpolation artefacts in mutual
+// information-based image registration, CVIU 2000). With `where`, only points that it puts into `other`.
+Samples take_samples(const Levels& from, std::size_t level, std::size_t count, int bins, std::uint64_t seed,
+                     const Frame* other = nullptr, const RigidTransform& where = {}) {
   const Level& l = from.levels[level];
   const auto seen = [&](const std::array<float, 3>& p) {
     if (other == nullptr) return true;
-    const Vec3 x = other->index_from_world(
-        where(l.frame.world_from_index({static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])})));
+    const Vec3 x = other->index_from_world(where(
+        l.frame.world_from_index({static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])})));
     for (std::size_t a = 0; a < 3; ++a)
       if (!(x[a] >= 0 && x[a] <= other->dims[a] - 1)) return false;
     return true;
   };
   std::mt19937_64 random(seed * 1000003 + level);
-  const auto uniform = [&](int n) { return static_cast<float>((static_cast<double>(random() >> 11) * 0x1p-53) * std::max(0, n - 1)); };
+  const auto uniform = [&](int n) {
+    return static_cast<float>((static_cast<double>(random() >> 11) * 0x1p-53) * std::max(0, n - 1));
+  };
   struct Point {
     std::array<float, 3> p;
     float value, slope;
@@ -85,10 +87,11 @@ Samples take_samples(const Levels& from, std::size_t level, std::size_t count, i
   s.bins = bins;
   std::vector<Vec3> world;
   for (const Point& q : points) {
-    world.push_back(l.frame.world_from_index({static_cast<double>(q.p[0]), static_cast<double>(q.p[1]), static_cast<double>(q.p[2])}));
+    world.push_back(l.frame.world_from_index(
+        {static_cast<double>(q.p[0]), static_cast<double>(q.p[1]), static_cast<double>(q.p[2])}));
     s.centre_mm += world.back() * (1.0 / static_cast<double>(points.size()));
-    s.bin.push_back(
-        static_cast<std::uint8_t>(std::clamp(static_cast<int>((q.value - from.lo) * scale_of(from, bins) + 0.5F), 0, bins - 1)));
+    s.bin.push_back(static_cast<std::uint8_t>(
+        std::clamp(static_cast<int>((q.value - from.lo) * scale_of(from, bins) + 0.5F), 0, bins - 1)));
   }
   double square = 0;
   for (const Vec3& w : world) {
@@ -104,8 +107,8 @@ Samples take_samples(const Levels& from, std::size_t level, std::size_t count, i
 
 using Joint = std::array<float, static_cast<std::size_t>(kMostBins* kMostBins)>;
 
-std::size_t fill(const Samples& s, const Levels& to, const Level& level, const IndexMap& m, std::size_t begin, std::size_t end,
-                 Joint& joint) {
+std::size_t fill(const Samples& s, const Levels& to, const Level& level, const IndexMap& m, std::size_t begin,
+                 std::size_t end, Joint& joint) {
   const float scale = scale_of(to, s.bins), top = static_cast<float>(s.bins - 1);
   std::size_t inside = 0;
   for (std::size_t i = begin; i < end; ++i) {
@@ -178,7 +181,8 @@ Match evaluate(const Samples& s, const Levels& to, std::size_t level, const Rigi
   }
   match.overlap = static_cast<double>(inside) / static_cast<double>(s.x.size());
   // Little overlap is no match, however well it fits; the way back must still lead uphill.
-  match.score = match.overlap < kLeastOverlap ? match.overlap - kLeastOverlap + 0.9 : normalized_information(joint, s.bins, inside);
+  match.score = match.overlap < kLeastOverlap ? match.overlap - kLeastOverlap + 0.9
+                                              : normalized_information(joint, s.bins, inside);
   return match;
 }
 
@@ -193,8 +197,8 @@ RigidTransform moved(const RigidTransform& base, const Samples& s, const Six& p)
 }
 
 // J. Nelder, R. Mead, A simplex method for function minimization, Computer Journal 1965.
-Match simplex(const Samples& s, const Levels& to, std::size_t level, const Match& start, double step_mm, double end_mm, int most,
-              int threads) {
+Match simplex(const Samples& s, const Levels& to, std::size_t level, const Match& start, double step_mm, double end_mm,
+              int most, int threads) {
   struct Corner {
     Six p{};
     Match m;
@@ -245,7 +249,8 @@ Match simplex(const Samples& s, const Levels& to, std::size_t level, const Match
       }
     }
   }
-  return std::max_element(c.begin(), c.end(), [](const Corner& a, const Corner& b) { return a.m.score < b.m.score; })->m;
+  return std::max_element(c.begin(), c.end(), [](const Corner& a, const Corner& b) { return a.m.score < b.m.score; })
+      ->m;
 }
 
 // The middle of what is no air: values above the middle between the background's and the rest's mean.
@@ -273,7 +278,8 @@ Vec3 middle_of_body(const Levels& l) {
   return count > 0 ? sum / count : c.frame.centre_mm();
 }
 
-// Shift of the second against the first where their shadows along the three axes fit best, by phase correlation of sums along them.
+// Shift of the second against the first where their shadows along the three axes fit best, by phase correlation of sums
+// along them.
 Vec3 shift_of_shadows(const Levels& from, const Levels& to) {
   const Level &a = from.levels.back(), &b = to.levels.back();
   const double h = b.frame.spacing_mm.x;
@@ -290,7 +296,9 @@ Vec3 shift_of_shadows(const Levels& from, const Levels& to) {
       for (int j = 0; j < n; ++j)
         for (int i = 0; i < n; ++i) {
           const auto mm = [&](int x) { return static_cast<float>((x - 0.5 * (n - 1)) * h); };
-          const auto along = [&](std::size_t r) { return m.row[r][0] * mm(i) + m.row[r][1] * mm(j) + m.row[r][2] * mm(k) + m.shift[r]; };
+          const auto along = [&](std::size_t r) {
+            return m.row[r][0] * mm(i) + m.row[r][1] * mm(j) + m.row[r][2] * mm(k) + m.shift[r];
+          };
           float v = 0;
           if (!sample(l, along(0), along(1), along(2), v)) continue;
           v = std::max(0.0F, v - air);
@@ -304,9 +312,12 @@ Vec3 shift_of_shadows(const Levels& from, const Levels& to) {
   std::array<PlaneMatch, 3> m;
   for (std::size_t c = 0; c < 3; ++c) m[c] = match_by_phase(sa[c], sb[c]);
   // Each axis is seen twice: the clearer one counts.
-  const auto clearer = [](const PlaneMatch& p, double x, const PlaneMatch& q, double y) { return p.score >= q.score ? x : y; };
-  const Vec3 found =
-      Vec3{clearer(m[1], m[1].dx, m[2], m[2].dx), clearer(m[0], m[0].dx, m[2], m[2].dy), clearer(m[0], m[0].dy, m[1], m[1].dy)} * h;
+  const auto clearer = [](const PlaneMatch& p, double x, const PlaneMatch& q, double y) {
+    return p.score >= q.score ? x : y;
+  };
+  const Vec3 found = Vec3{clearer(m[1], m[1].dx, m[2], m[2].dx), clearer(m[0], m[0].dx, m[2], m[2].dy),
+                          clearer(m[0], m[0].dy, m[1], m[1].dy)} *
+                     h;
   return b.frame.centre_mm() - a.frame.centre_mm() + found;
 }
 
@@ -354,7 +365,8 @@ std::vector<Match> best_of(std::vector<Match> all, std::size_t count, double apa
   std::vector<Match> kept;
   for (const Match& m : all) {
     if (kept.size() == count) break;
-    if (std::none_of(kept.begin(), kept.end(), [&](const Match& k) { return apart(k.to_from, m.to_from, s) < apart_mm; }))
+    if (std::none_of(kept.begin(), kept.end(),
+                     [&](const Match& k) { return apart(k.to_from, m.to_from, s) < apart_mm; }))
       kept.push_back(m);
   }
   return kept;
@@ -408,12 +420,14 @@ Match search(const Levels& from, const Levels& to, std::size_t stop, const Conte
   return matches.front();
 }
 
-Match refine(const Levels& from, const Levels& to, const RigidTransform& guess, std::size_t start, const Context& context) {
+Match refine(const Levels& from, const Levels& to, const RigidTransform& guess, std::size_t start,
+             const Context& context) {
   Match m{guess, 0, 0};
   for (std::size_t level = std::min({start + 1, from.levels.size(), to.levels.size()}); level-- > 0;) {
     const double h = to.levels[level].frame.spacing_mm.x;
     const Plan plan = plan_of(h);
-    const Samples s = take_samples(from, level, plan.points, plan.bins, context.seed, &to.levels[level].frame, m.to_from);
+    const Samples s =
+        take_samples(from, level, plan.points, plan.bins, context.seed, &to.levels[level].frame, m.to_from);
     m = simplex(s, to, level, m, 0.5 * h, 0.01 * h, plan.most, context.threads);
   }
   return m;
@@ -425,10 +439,13 @@ double likeness(const Levels& from, const Levels& to, const RigidTransform& to_f
   const IndexMap m = index_map(to.levels[level].frame, to_from, s.centre_mm);
   double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
   for (std::size_t i = 0; i < s.x.size(); ++i) {
-    const auto along = [&](std::size_t r) { return m.row[r][0] * s.x[i] + m.row[r][1] * s.y[i] + m.row[r][2] * s.z[i] + m.shift[r]; };
+    const auto along = [&](std::size_t r) {
+      return m.row[r][0] * s.x[i] + m.row[r][1] * s.y[i] + m.row[r][2] * s.z[i] + m.shift[r];
+    };
     float value = 0;
     if (!sample(to.levels[level], along(0), along(1), along(2), value)) continue;
-    const auto u = static_cast<double>(s.bin[i]), v = static_cast<double>((std::clamp(value, to.lo, to.hi) - to.lo) * scale_of(to, s.bins));
+    const auto u = static_cast<double>(s.bin[i]),
+               v = static_cast<double>((std::clamp(value, to.lo, to.hi) - to.lo) * scale_of(to, s.bins));
     ++n;
     a += u;
     b += v;
@@ -440,4 +457,4 @@ double likeness(const Levels& from, const Levels& to, const RigidTransform& to_f
   return va > 0 && vb > 0 ? (n * ab - a * b) / std::sqrt(va * vb) : 0;
 }
 
-}  // namespace osteo::imaging::registration
+}  // namespace osteo::inline imaging::registration

@@ -17,19 +17,23 @@ struct Row {
 };
 
 template <class T, class At>
-std::shared_ptr<T[]> sampled(const Frame& first, const Frame& second, const RigidTransform& t, const Context& context, At&& at) {
+std::shared_ptr<T[]> sampled(const Frame& first, const Frame& second, const RigidTransform& t, const Context& context,
+                             At&& at) {
   auto out = make_voxels<T>(first.voxel_count());
   const auto nx = static_cast<std::size_t>(first.dims[0]), ny = static_cast<std::size_t>(first.dims[1]);
-  parallel_for(ny * static_cast<std::size_t>(first.dims[2]), ny, context.threads, [&](std::size_t begin, std::size_t end) {
-    context.check_cancelled();
-    for (std::size_t r = begin; r < end; ++r) {
-      const auto where = [&](double i) {
-        return second.index_from_world(t(first.world_from_index({i, static_cast<double>(r % ny), static_cast<double>(r / ny)})));
-      };
-      const Row row{where(0), where(1) - where(0)};
-      for (std::size_t i = 0; i < nx; ++i) out[r * nx + i] = at(row.begin + row.step * static_cast<double>(i));
-    }
-  });
+  parallel_for(ny * static_cast<std::size_t>(first.dims[2]), ny, context.threads,
+               [&](std::size_t begin, std::size_t end) {
+                 context.check_cancelled();
+                 for (std::size_t r = begin; r < end; ++r) {
+                   const auto where = [&](double i) {
+                     return second.index_from_world(
+                         t(first.world_from_index({i, static_cast<double>(r % ny), static_cast<double>(r / ny)})));
+                   };
+                   const Row row{where(0), where(1) - where(0)};
+                   for (std::size_t i = 0; i < nx; ++i)
+                     out[r * nx + i] = at(row.begin + row.step * static_cast<double>(i));
+                 }
+               });
   return out;
 }
 
@@ -58,21 +62,26 @@ Window window_of(const Image& image) {
 
 }  // namespace
 
-Image moved_onto(const Frame& first, const Image& second, const RigidTransform& second_from_first, const Context& context) {
+Image moved_onto(const Frame& first, const Image& second, const RigidTransform& second_from_first,
+                 const Context& context) {
   const auto voxels = second.span();
   const std::int16_t nothing = voxels.empty() ? std::int16_t{0} : *std::min_element(voxels.begin(), voxels.end());
   return {first, sampled<std::int16_t>(first, second.frame, second_from_first, context, [&](Vec3 x) {
-            return inside(second.frame, x) ? static_cast<std::int16_t>(std::floor(sample_linear(second, x) + 0.5)) : nothing;
+            return inside(second.frame, x) ? static_cast<std::int16_t>(std::floor(sample_linear(second, x) + 0.5))
+                                           : nothing;
           })};
 }
 
-Labels moved_onto(const Frame& first, const Labels& second, const RigidTransform& second_from_first, const Context& context) {
+Labels moved_onto(const Frame& first, const Labels& second, const RigidTransform& second_from_first,
+                  const Context& context) {
   Labels out;
   out.frame = first;
   out.structures = second.structures;
   out.voxels = sampled<std::uint8_t>(first, second.frame, second_from_first, context, [&](Vec3 x) {
     if (!inside(second.frame, x)) return std::uint8_t{0};
-    const auto nearest = [&](std::size_t a) { return std::clamp(static_cast<int>(std::floor(x[a] + 0.5)), 0, second.frame.dims[a] - 1); };
+    const auto nearest = [&](std::size_t a) {
+      return std::clamp(static_cast<int>(std::floor(x[a] + 0.5)), 0, second.frame.dims[a] - 1);
+    };
     return second.at(nearest(0), nearest(1), nearest(2));
   });
   return out;
@@ -85,7 +94,8 @@ Picture checkerboard(const Image& first, const Image& second, const RigidTransfo
   // The body's box along the patient's axes.
   Vec3 half;
   for (std::size_t a = 0; a < 3; ++a)
-    for (std::size_t c = 0; c < 3; ++c) half[a] += 0.5 * std::abs(f.direction.column[c][a]) * f.dims[c] * f.spacing_mm[c];
+    for (std::size_t c = 0; c < 3; ++c)
+      half[a] += 0.5 * std::abs(f.direction.column[c][a]) * f.dims[c] * f.spacing_mm[c];
   const double mm_per_pixel = 2 * std::max({half.x, half.y, half.z}) / kPanel;
   const Window wa = window_of(first), wb = window_of(second);
   Picture picture;
@@ -97,15 +107,16 @@ Picture checkerboard(const Image& first, const Image& second, const RigidTransfo
   for (int panel = 0; panel < 3; ++panel)
     for (int j = 0; j < kPanel; ++j)
       for (int i = 0; i < kPanel; ++i) {
-        const Vec3 p =
-            centre + right[panel] * ((i - 0.5 * (kPanel - 1)) * mm_per_pixel) + down[panel] * ((j - 0.5 * (kPanel - 1)) * mm_per_pixel);
+        const Vec3 p = centre + right[panel] * ((i - 0.5 * (kPanel - 1)) * mm_per_pixel) +
+                       down[panel] * ((j - 0.5 * (kPanel - 1)) * mm_per_pixel);
         const bool of_second = (i / kSquare + j / kSquare) % 2 != 0;
         const Image& image = of_second ? second : first;
         const Vec3 x = image.frame.index_from_world(of_second ? second_from_first(p) : p);
         if (!inside(image.frame, x)) continue;
         const std::uint8_t g = (of_second ? wb : wa).grey(sample_linear(image, x));
-        auto* const out = picture.rgb.data() + 3 * (static_cast<std::size_t>(j) * static_cast<std::size_t>(picture.width) +
-                                                    static_cast<std::size_t>(panel * (kPanel + kGap) + i));
+        auto* const out =
+            picture.rgb.data() + 3 * (static_cast<std::size_t>(j) * static_cast<std::size_t>(picture.width) +
+                                      static_cast<std::size_t>(panel * (kPanel + kGap) + i));
         // A breath of colour tells whose square it is.
         out[0] = static_cast<std::uint8_t>(of_second ? g * 9 / 10 : g);
         out[1] = static_cast<std::uint8_t>(g * 19 / 20);
@@ -122,4 +133,4 @@ std::string itk_transform_text(const RigidTransform& t) {
   return text + "\nFixedParameters: 0 0 0\n";
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

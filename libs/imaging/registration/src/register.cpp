@@ -17,7 +17,8 @@ namespace reg = registration;
 
 constexpr double kLeastOverlap = 0.25, kMostInverseMm = 1, kManyOff = 1.3, kLike = 0.8;
 constexpr int kLeastEdges = 300;
-// Scans of one head meet to 0.03 to 0.1 mm at half of all edges; from here on a mirror is tried, and believed when it halves that.
+// Scans of one head meet to 0.03 to 0.1 mm at half of all edges; from here on a mirror is tried, and believed when it
+// halves that.
 constexpr double kDoubtMm = 0.15, kMirrorBetter = 0.5;
 
 double extent_mm3(const Frame& f) {
@@ -25,10 +26,12 @@ double extent_mm3(const Frame& f) {
 }
 
 // Where the same place of the body comes out after there and back, at the corners of what both scans show.
-double there_and_back(const RigidTransform& there, const RigidTransform& back, const Frame& first, const Frame& second) {
+double there_and_back(const RigidTransform& there, const RigidTransform& back, const Frame& first,
+                      const Frame& second) {
   Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
   for (int c = 0; c < 11 * 11 * 11; ++c) {
-    const Vec3 x{(c % 11) / 10.0 * (first.dims[0] - 1), (c / 11 % 11) / 10.0 * (first.dims[1] - 1), (c / 121) / 10.0 * (first.dims[2] - 1)};
+    const Vec3 x{(c % 11) / 10.0 * (first.dims[0] - 1), (c / 11 % 11) / 10.0 * (first.dims[1] - 1),
+                 (c / 121) / 10.0 * (first.dims[2] - 1)};
     const Vec3 p = first.world_from_index(x), y = second.index_from_world(there(p));
     bool in = true;
     for (std::size_t a = 0; a < 3; ++a) in = in && y[a] >= -0.5 && y[a] <= second.dims[a] - 0.5;
@@ -46,7 +49,8 @@ double there_and_back(const RigidTransform& there, const RigidTransform& back, c
   return most;
 }
 
-// As if the file had left and right exchanged: along the axis of the voxels that points most to the side, so that a head stays upright.
+// As if the file had left and right exchanged: along the axis of the voxels that points most to the side, so that a
+// head stays upright.
 Image in_a_mirror(const Image& image) {
   std::size_t axis = 0;
   for (std::size_t a = 1; a < 3; ++a)
@@ -68,15 +72,19 @@ std::string mm(double v) {
 // Empty when the two belong together.
 std::string doubt(const Registration& r, const RegisterParams& p) {
   if (r.overlap < kLeastOverlap)
-    return "only " + std::to_string(static_cast<int>(std::lround(100 * r.overlap))) + " % of the smaller scan lies inside the other";
+    return "only " + std::to_string(static_cast<int>(std::lround(100 * r.overlap))) +
+           " % of the smaller scan lies inside the other";
   if (r.residual.points < kLeastEdges)
-    return "both scans show only " + std::to_string(r.residual.points) + " points of an edge in the same place: too little to go by";
+    return "both scans show only " + std::to_string(r.residual.points) +
+           " points of an edge in the same place: too little to go by";
   if (r.mirror_tried && r.mirror.points >= kLeastEdges && r.mirror.median_mm < kMirrorBetter * r.residual.median_mm)
     return "the second scan fits better in a mirror, with left and right exchanged: half of all edges then meet to " +
-           mm(r.mirror.median_mm) + " instead of " + mm(r.residual.median_mm) + "; one of the two files is mirrored, or shows the other side";
+           mm(r.mirror.median_mm) + " instead of " + mm(r.residual.median_mm) +
+           "; one of the two files is mirrored, or shows the other side";
   if (r.residual.median_mm > p.max_residual_mm)
-    return "at half of all edges the other scan's edge is " + mm(r.residual.median_mm) + " off or missing, allowed are " +
-           mm(p.max_residual_mm) + ": another patient, the other side, or a body that has changed its shape";
+    return "at half of all edges the other scan's edge is " + mm(r.residual.median_mm) +
+           " off or missing, allowed are " + mm(p.max_residual_mm) +
+           ": another patient, the other side, or a body that has changed its shape";
   if (r.inverse_mm > kMostInverseMm)
     return "registered back by itself, a corner of the region ends up " + mm(r.inverse_mm) +
            " from where it began: there is no one best place";
@@ -85,9 +93,11 @@ std::string doubt(const Registration& r, const RegisterParams& p) {
 
 }  // namespace
 
-EdgeResidual edge_residual(const Image& first, const Image& second, const RigidTransform& second_from_first, const Context& context) {
+EdgeResidual edge_residual(const Image& first, const Image& second, const RigidTransform& second_from_first,
+                           const Context& context) {
   const double h = reg::finest_of(first.frame, second.frame, 1);
-  return reg::edge_residual(reg::make_levels(first, h, context), reg::make_levels(second, h, context), second_from_first, context);
+  return reg::edge_residual(reg::make_levels(first, h, context), reg::make_levels(second, h, context),
+                            second_from_first, context);
 }
 
 Registration register_scans(const Image& first, const Image& second, const RegisterParams& p, const Context& context) {
@@ -133,7 +143,8 @@ Registration register_scans(const Image& first, const Image& second, const Regis
   if (seen && (r.residual.median_mm > kDoubtMm || r.residual.p90_mm > kManyOff * p.max_residual_mm)) {
     context.progress(0.92, "in a mirror");
     const reg::Levels c = reg::make_levels(in_a_mirror(second), h, context);
-    const reg::Match other = swapped ? reg::search(c, a, 0, context.sub(0.92, 0.99)) : reg::search(a, c, 0, context.sub(0.92, 0.99));
+    const reg::Match other =
+        swapped ? reg::search(c, a, 0, context.sub(0.92, 0.99)) : reg::search(a, c, 0, context.sub(0.92, 0.99));
     r.mirror_tried = true;
     r.mirror = reg::edge_residual(a, c, swapped ? other.to_from.inverse() : other.to_from, context);
   }
@@ -160,18 +171,19 @@ Registration register_scans(const Image& first, const Image& second, const Regis
   context.report("rotation_deg", r.rotation_deg);
   context.report("shift_at_centre_mm", r.shift_mm);
   if (r.residual.p90_mm > kManyOff * p.max_residual_mm) {
-    context.warn(
-        "at a tenth of all edges the other scan's edge is " + mm(r.residual.p90_mm) +
-        " off or missing: drilled, swollen, a jaw or neck that moved, thick slices, or another patient; look at --checkerboard-out");
+    context.warn("at a tenth of all edges the other scan's edge is " + mm(r.residual.p90_mm) +
+                 " off or missing: drilled, swollen, a jaw or neck that moved, thick slices, or another patient; look "
+                 "at --checkerboard-out");
   }
   if (const std::string why = doubt(r, p); !why.empty()) {
     if (!p.accept_poor)
-      throw Error(ExitCode::failed, "the scans cannot be registered: " + why,
-                  "look whether both are of the same patient and region; --accept-poor writes the transform all the same");
+      throw Error(
+          ExitCode::failed, "the scans cannot be registered: " + why,
+          "look whether both are of the same patient and region; --accept-poor writes the transform all the same");
     context.warn("accepted as asked: " + why);
   }
   context.progress(1.0);
   return r;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

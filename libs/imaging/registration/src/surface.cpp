@@ -11,8 +11,8 @@
 #include "osteo/geometry/distance/triangle_tree.h"
 #include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/geometry/grid/resample.h"
-#include "osteo/imaging/image/threshold.h"
 #include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/imaging/image/threshold.h"
 
 namespace osteo::inline imaging::registration {
 namespace {
@@ -45,8 +45,8 @@ BoneOf bone_surface_of(const Image& ct, double bone_hu, const char* which, const
   quiet.threads = context.threads;
   const auto too_little = [&](double mm3) {
     return Error(ExitCode::failed,
-                 std::string("the ") + which + " scan holds " + format_number(std::round(mm3 / 100) / 10) + " cm3 of bone at or above " +
-                     format_number(bone_hu) + " HU: too little to go by",
+                 std::string("the ") + which + " scan holds " + format_number(std::round(mm3 / 100) / 10) +
+                     " cm3 of bone at or above " + format_number(bone_hu) + " HU: too little to go by",
                  "--bone-hu sets the threshold; --method mutual needs no bone");
   };
   std::optional<Labels> mask;
@@ -60,7 +60,8 @@ BoneOf bone_surface_of(const Image& ct, double bone_hu, const char* which, const
   return {surface_nets(to_bricks(bone.density), 0.5F, quiet).mesh, ct.frame};
 }
 
-SurfaceFit fit_surfaces(const BoneOf& first, const BoneOf& second, const RigidTransform& guess, const Context& context) {
+SurfaceFit fit_surfaces(const BoneOf& first, const BoneOf& second, const RigidTransform& guess,
+                        const Context& context) {
   const TriangleSoup soup = soup_of(first.mesh);
   const TriMesh& b = second.mesh;
   const TriangleTree tree(soup, context);
@@ -79,7 +80,8 @@ SurfaceFit fit_surfaces(const BoneOf& first, const BoneOf& second, const RigidTr
         hints[i] = c.triangle;
         if (c.triangle == ClosestPoint::kNone || !well_inside(first.scan, c.point_mm)) continue;
         const auto& t = soup.triangles[c.triangle];
-        const Vec3 normal = normalized(cross(soup.points_mm[t[1]] - soup.points_mm[t[0]], soup.points_mm[t[2]] - soup.points_mm[t[0]]));
+        const Vec3 normal =
+            normalized(cross(soup.points_mm[t[1]] - soup.points_mm[t[0]], soup.points_mm[t[2]] - soup.points_mm[t[0]]));
         // The other table of the skull is no partner.
         const Vec3 facing = first_from_second.rotation * from_floats(b.normals[i * step]);
         if (dot(normal, facing) < 0.5) continue;
@@ -104,7 +106,8 @@ SurfaceFit fit_surfaces(const BoneOf& first, const BoneOf& second, const RigidTr
   for (int n = 0; n < 60; ++n) {
     const std::vector<Pair> pairs = pairs_of(step, hints);
     if (pairs.size() < 500)
-      throw Error(ExitCode::failed, "too little bone is seen by both scans: " + std::to_string(pairs.size()) + " points of the surface",
+      throw Error(ExitCode::failed,
+                  "too little bone is seen by both scans: " + std::to_string(pairs.size()) + " points of the surface",
                   "--method mutual goes by all tissue");
     // Of what is left after a drilled cavity and what only one shows, thrice the median is generous.
     const double limit = std::max(3 * median(pairs, 0.5), 0.3);
@@ -128,4 +131,4 @@ SurfaceFit fit_surfaces(const BoneOf& first, const BoneOf& second, const RigidTr
   return fit;
 }
 
-}  // namespace osteo::imaging::registration
+}  // namespace osteo::inline imaging::registration

@@ -9,9 +9,10 @@ namespace osteo::inline imaging::registration {
 
 struct SurfaceFit {
   RigidTransform second_from_first;
-  double mean_mm = 0, p95_mm = 0;  // unsigned, of all points of the second's surface that both scans show, to the first's
-  double shape_mean_mm = 0;        // the same along the normals, less the shift of the boundary
-  double boundary_shift_mm = 0;    // how much larger the second bone is all round
+  double mean_mm = 0,
+         p95_mm = 0;             // unsigned, of all points of the second's surface that both scans show, to the first's
+  double shape_mean_mm = 0;      // the same along the normals, less the shift of the boundary
+  double boundary_shift_mm = 0;  // how much larger the second bone is all round
 };
 
 struct BoneOf {
@@ -22,6 +23,7 @@ struct BoneOf {
 [[nodiscard]] BoneOf bone_surface_of(const Image& ct, double bone_hu, const char* which, const Context& context);
 
 /// From a guess that is right to a few mm. Error(failed) for too little bone seen by both.
-[[nodiscard]] SurfaceFit fit_surfaces(const BoneOf& first, const BoneOf& second, const RigidTransform& guess, const Context& context);
+[[nodiscard]] SurfaceFit fit_surfaces(const BoneOf& first, const BoneOf& second, const RigidTransform& guess,
+                                      const Context& context);
 
-}  // namespace osteo::imaging::registration
+}  // namespace osteo::inline imaging::registration

@@ -38,8 +38,10 @@ std::vector<EarStructure> parse_what(const std::string& what) {
       const std::string near = nearest_name(word, known);
       std::string all;
       for (const std::string& k : known) all += (all.empty() ? "" : ", ") + k;
-      throw Error(ExitCode::usage, "--what: there is no finder for '" + word + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"),
-                  all);
+      throw Error(
+          ExitCode::usage,
+          "--what: there is no finder for '" + word + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"),
+          all);
     }
     asked[static_cast<std::size_t>(it - names.begin())] = true;
   }
@@ -82,10 +84,12 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
   const bool has_point = params.labyrinth_mm != std::array<double, 3>{};
   if (wants(EarStructure::labyrinth)) {
     if (!has_point && params.what.find("all") == std::string::npos)
-      throw Error(ExitCode::usage, "the labyrinth needs a point within it", "--labyrinth-mm X,Y,Z (LPS), in the vestibule");
+      throw Error(ExitCode::usage, "the labyrinth needs a point within it",
+                  "--labyrinth-mm X,Y,Z (LPS), in the vestibule");
     const Vec3 x = given.frame.index_from_world(labyrinth_given);
     for (std::size_t a = 0; has_point && a < 3; ++a) {
-      if (!(x[a] >= 0 && x[a] <= given.frame.dims[a] - 1)) throw Error(ExitCode::usage, "--labyrinth-mm lies outside the CT");
+      if (!(x[a] >= 0 && x[a] <= given.frame.dims[a] - 1))
+        throw Error(ExitCode::usage, "--labyrinth-mm lies outside the CT");
     }
   }
   const bool right = params.side == Side::right;
@@ -116,7 +120,8 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
         parallel_for(n / nx, 64, context.threads, [&](std::size_t begin, std::size_t end) {
           for (std::size_t r = begin; r < end; ++r) {
             for (std::size_t i = 0; i < nx; ++i) {
-              const Vec3 p = ct.frame.world_from_index({static_cast<double>(i), static_cast<double>(r % ny), static_cast<double>(r / ny)});
+              const Vec3 p = ct.frame.world_from_index(
+                  {static_cast<double>(i), static_cast<double>(r % ny), static_cast<double>(r / ny)});
               if (p.x < lo.x || p.y < lo.y || p.z < lo.z || p.x > hi.x || p.y > hi.y || p.z > hi.z) continue;
               if (mask.sample(p) >= 0.5) voxels[r * nx + i] = static_cast<std::uint8_t>(1 + static_cast<int>(s));
             }
@@ -131,8 +136,10 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
       const Part& part = parts[at];
       EarFinding finding{s, part.found && part.quality >= params.least_quality, part.quality, part.why, volume[at]};
       if (part.found && !finding.found)
-        finding.why = "quality " + format_number(std::round(part.quality * 100) / 100) + " is below --least-quality; " + part.why;
-      if (finding.found) result.labels.structures.push_back({static_cast<std::uint8_t>(1 + at), std::string(kTitles[at]), kColours[at]});
+        finding.why =
+            "quality " + format_number(std::round(part.quality * 100) / 100) + " is below --least-quality; " + part.why;
+      if (finding.found)
+        result.labels.structures.push_back({static_cast<std::uint8_t>(1 + at), std::string(kTitles[at]), kColours[at]});
       result.findings.push_back(finding);
     }
     result.labels.voxels = voxels;
@@ -202,17 +209,20 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
   }
   parts[static_cast<std::size_t>(EarStructure::ear_canal)] = canal;
   if (!canal.found) {
-    for (const EarStructure s : {EarStructure::air_cells, EarStructure::sigmoid_sinus, EarStructure::tegmen, EarStructure::dura})
+    for (const EarStructure s :
+         {EarStructure::air_cells, EarStructure::sigmoid_sinus, EarStructure::tegmen, EarStructure::dura})
       parts[static_cast<std::size_t>(s)].why = "no ear canal, by which it is placed: " + canal.why;
     done(&f);
     return result;
   }
   Part& air = parts[static_cast<std::size_t>(EarStructure::air_cells)];
-  if (wants(EarStructure::air_cells) || wants(EarStructure::tegmen)) air = find_air_cells(f, levels, canal, context.sub(0.4, 0.5));
+  if (wants(EarStructure::air_cells) || wants(EarStructure::tegmen))
+    air = find_air_cells(f, levels, canal, context.sub(0.4, 0.5));
   if (wants(EarStructure::sigmoid_sinus) || wants(EarStructure::tegmen) || wants(EarStructure::dura)) {
     const Brain brain = find_brain(f, levels, canal, context.sub(0.5, 0.6));
     Part &sinus = parts[static_cast<std::size_t>(EarStructure::sigmoid_sinus)],
-         &tegmen = parts[static_cast<std::size_t>(EarStructure::tegmen)], &dura = parts[static_cast<std::size_t>(EarStructure::dura)];
+         &tegmen = parts[static_cast<std::size_t>(EarStructure::tegmen)],
+         &dura = parts[static_cast<std::size_t>(EarStructure::dura)];
     sinus.why = tegmen.why = dura.why = brain.why;
     if (brain.found) {
       sinus = find_sinus(f, levels, canal, context.sub(0.6, 0.9));
@@ -230,4 +240,4 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
   return result;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -13,10 +13,11 @@ namespace {
 constexpr double kLeastBony = 0.5;
 constexpr double kOutsideBallMm = 8;                     // wider than the canal, narrower than what is outside
 constexpr double kCanalEnclosed = 0.75, kMouthMm = 2.5;  // where less of the round is wall, its mouth begins
-constexpr double kCavityMm3 = 60;  // the tympanic cavity below its ossicles has more; behind wax or a bend there is less
+constexpr double kCavityMm3 =
+    60;  // the tympanic cavity below its ossicles has more; behind wax or a bend there is less
 
-/// Of air that runs inward, what is a tube: shells of equal way from its inner end have about the same area. Where they widen it opens into
-/// a fold of the skin; from there on only what lies straight on is kept.
+/// Of air that runs inward, what is a tube: shells of equal way from its inner end have about the same area. Where they
+/// widen it opens into a fold of the skin; from there on only what lies straight on is kept.
 void keep_tube(const Field& f, Mask& mask, const std::vector<float>& to_outside) {
   const std::size_t n = f.size();
   float deepest = 0;
@@ -102,7 +103,8 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
   // Outside: where a ball of air reaches that begins at the outer face of the image.
   const std::vector<float> to_solid = distance_mm(f, solid, context);
   Mask core(n);
-  for (std::size_t i = 0; i < n; ++i) core[i] = air[i] != 0 && static_cast<double>(to_solid[i]) > kOutsideBallMm ? 1 : 0;
+  for (std::size_t i = 0; i < n; ++i)
+    core[i] = air[i] != 0 && static_cast<double>(to_solid[i]) > kOutsideBallMm ? 1 : 0;
   const Pieces cores = pieces_of(f, core, true);
   std::vector<std::uint8_t> outer(cores.size.size());
   for (int k = 0; k < f.n[2]; ++k)
@@ -115,7 +117,8 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
     return c;
   }
   const std::vector<float> to_core = distance_mm(f, core, context);
-  for (std::size_t i = 0; i < n; ++i) c.exterior[i] = air[i] != 0 && static_cast<double>(to_core[i]) <= kOutsideBallMm + f.h_mm ? 1 : 0;
+  for (std::size_t i = 0; i < n; ++i)
+    c.exterior[i] = air[i] != 0 && static_cast<double>(to_core[i]) <= kOutsideBallMm + f.h_mm ? 1 : 0;
   // Narrow air that opens to the outside, and goes deep into bone.
   Mask narrow(n), bone(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -157,7 +160,8 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
   for (std::size_t i = 0; i < n; ++i) {
     if (pieces.of[i] != best) continue;
     before[i] = !drum || static_cast<double>(up[i]) < pass.height ? 1 : 0;
-    behind[i] = drum && static_cast<double>(up[i]) >= pass.height && static_cast<double>(height[i]) < pass.height ? 1 : 0;
+    behind[i] =
+        drum && static_cast<double>(up[i]) >= pass.height && static_cast<double>(height[i]) < pass.height ? 1 : 0;
   }
   const std::vector<float> to_before = distance_mm(f, before, context), to_behind = distance_mm(f, behind, context);
   // The folds of the auricle are open to more sides than a canal is.
@@ -167,7 +171,8 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
       if (pieces.of[i] != best || static_cast<double>(to_before[i]) > static_cast<double>(to_behind[i])) continue;
       const auto p = f.place(i);
       inner[i] = static_cast<double>(to_outside[i]) > 25 ||
-                         enclosure(f, f.world(p[0], p[1], p[2]), 14, [&](std::size_t q) { return air[q] != 0 ? 0 : 1; }) > kCanalEnclosed
+                         enclosure(f, f.world(p[0], p[1], p[2]), 14,
+                                   [&](std::size_t q) { return air[q] != 0 ? 0 : 1; }) > kCanalEnclosed
                      ? 1
                      : 0;
     }
@@ -181,7 +186,8 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
   const std::vector<float> to_inner = distance_mm(f, inner, context);
   c.mask.assign(n, 0);
   for (std::size_t i = 0; i < n; ++i) {
-    c.mask[i] = pieces.of[i] == best && to_before[i] <= to_behind[i] && static_cast<double>(to_inner[i]) < kMouthMm ? 1 : 0;
+    c.mask[i] =
+        pieces.of[i] == best && to_before[i] <= to_behind[i] && static_cast<double>(to_inner[i]) < kMouthMm ? 1 : 0;
   }
   keep_tube(f, c.mask, to_outside);
   // Against bone the edge lies half way from air to bone, which is higher than half way to skin.
@@ -218,7 +224,8 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
   for (std::size_t i = 0; i < n; ++i) {
     if (c.mask[i] == 0) continue;
     volume += voxel;
-    if (static_cast<double>(to_outside[i]) < 0.5 * deepest || static_cast<double>(to_outside[i]) > deepest - 2.5) continue;
+    if (static_cast<double>(to_outside[i]) < 0.5 * deepest || static_cast<double>(to_outside[i]) > deepest - 2.5)
+      continue;
     if (static_cast<double>(to_solid[i]) > 1.5 * f.h_mm) continue;
     wall += 1;
     backed += static_cast<double>(to_bone[i]) < 1.5 + f.h_mm ? 1 : 0;
@@ -230,8 +237,8 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
     c.why = "the air that goes inward is no canal: no drum ends it";
   } else if (c.quality < kLeastBony) {
     // A fold, the mouth or the nose: what would be placed by it would be wrong.
-    c.why = "the air that goes inward has bone behind only " + std::to_string(static_cast<int>(std::lround(100 * c.quality))) +
-            " % of its wall";
+    c.why = "the air that goes inward has bone behind only " +
+            std::to_string(static_cast<int>(std::lround(100 * c.quality))) + " % of its wall";
   } else {
     c.found = true;
     if (!drum) c.why = "no air behind its end: the middle ear is not seen apart from it";
@@ -256,7 +263,10 @@ Part find_air_cells(const Field& f, const Levels& levels, const Canal& canal, co
   }
   const std::vector<float> to_bone = distance_mm(f, bone, context), to_taken = distance_mm(f, taken, context);
   for (std::size_t i = 0; i < n; ++i) {
-    sure[i] = static_cast<double>(f.v[i]) < levels.air_below && taken[i] == 0 && static_cast<double>(to_bone[i]) < 6 && in_box(i) ? 1 : 0;
+    sure[i] = static_cast<double>(f.v[i]) < levels.air_below && taken[i] == 0 && static_cast<double>(to_bone[i]) < 6 &&
+                      in_box(i)
+                  ? 1
+                  : 0;
   }
   // Pieces that bone surrounds: not the folds of the auricle.
   const Pieces pieces = pieces_of(f, sure, true);
@@ -275,7 +285,8 @@ Part find_air_cells(const Field& f, const Levels& levels, const Canal& canal, co
   for (std::size_t i = 0; i < n; ++i) {
     const std::uint32_t p = pieces.of[i];
     if (p == 0) continue;
-    kept[i] = near[p] > 0.7 * static_cast<double>(pieces.size[p]) && static_cast<double>(pieces.size[p]) * voxel > 0.6 &&
+    kept[i] = near[p] > 0.7 * static_cast<double>(pieces.size[p]) &&
+                      static_cast<double>(pieces.size[p]) * voxel > 0.6 &&
                       open[p] < 0.1 * static_cast<double>(pieces.size[p])
                   ? 1
                   : 0;
@@ -286,7 +297,8 @@ Part find_air_cells(const Field& f, const Levels& levels, const Canal& canal, co
   part.mask.assign(n, 0);
   constexpr double kShiftHu = 150;
   for (std::size_t i = 0; i < n; ++i) {
-    if (taken[i] != 0 || static_cast<double>(to_taken[i]) < 1.1 * f.h_mm || static_cast<double>(to_kept[i]) > 1.1 * f.h_mm || !in_box(i)) {
+    if (taken[i] != 0 || static_cast<double>(to_taken[i]) < 1.1 * f.h_mm ||
+        static_cast<double>(to_kept[i]) > 1.1 * f.h_mm || !in_box(i)) {
       part.mask[i] = kept[i];
       volume += kept[i] * voxel;
       more += kept[i] * voxel;
@@ -337,13 +349,15 @@ Part find_labyrinth(const Field& f, const Levels& levels, Vec3 point_mm, const C
   }
   const auto flood = [&](double level, const std::vector<std::uint8_t>* barred) {
     return climbed(f, f.v, {seed}, [&](std::size_t i) {
-      if (static_cast<double>(f.v[i]) > level || static_cast<double>(to_air[i]) <= 1.6 * f.h_mm || (barred != nullptr && (*barred)[i] != 0))
+      if (static_cast<double>(f.v[i]) > level || static_cast<double>(to_air[i]) <= 1.6 * f.h_mm ||
+          (barred != nullptr && (*barred)[i] != 0))
         return false;
       const auto p = f.place(i);
       return length(f.world(p[0], p[1], p[2]) - point_mm) < kReachMm;
     });
   };
-  // What lies behind a pass and is wide or large, is no part of it: the internal auditory canal, the fallopian canal, the brain.
+  // What lies behind a pass and is wide or large, is no part of it: the internal auditory canal, the fallopian canal,
+  // the brain.
   std::vector<std::uint8_t> barred(n, 0);
   std::vector<float> up;
   const double voxel = f.h_mm * f.h_mm * f.h_mm;
@@ -379,4 +393,4 @@ Part find_labyrinth(const Field& f, const Levels& levels, Vec3 point_mm, const C
   return part;
 }
 
-}  // namespace osteo::imaging::segment
+}  // namespace osteo::inline imaging::segment

@@ -7,8 +7,8 @@
 #include <queue>
 
 #include "osteo/core/base/parallel.h"
-#include "osteo/imaging/image/components.h"
 #include "osteo/geometry/distance/binary_distance.h"
+#include "osteo/imaging/image/components.h"
 
 namespace osteo::inline imaging::segment {
 
@@ -48,7 +48,8 @@ double enclosure(const Field& f, Vec3 from, double reach_mm, const std::function
   for (const Vec3& d : directions) {
     for (double l = 1.5; l < reach_mm; l += 0.7) {
       const Vec3 x = (from + d * l - f.origin_mm) / f.h_mm;
-      const int i = static_cast<int>(std::lround(x.x)), j = static_cast<int>(std::lround(x.y)), k = static_cast<int>(std::lround(x.z));
+      const int i = static_cast<int>(std::lround(x.x)), j = static_cast<int>(std::lround(x.y)),
+                k = static_cast<int>(std::lround(x.z));
       if (!f.inside(i, j, k)) break;
       const int w = what(f.at(i, j, k));
       if (w == 0) continue;
@@ -69,7 +70,8 @@ std::vector<float> climbed(const Field& f, const std::vector<float>& height, con
     best[s] = height[s];
     queue.emplace(best[s], s);
   }
-  constexpr std::array<std::array<int, 3>, 6> kSides{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
+  constexpr std::array<std::array<int, 3>, 6> kSides{
+      {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
   while (!queue.empty()) {
     const auto [h, at] = queue.top();
     queue.pop();
@@ -89,8 +91,8 @@ std::vector<float> climbed(const Field& f, const std::vector<float>& height, con
 }
 
 namespace {
-std::map<float, double> volumes_behind(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed,
-                                       double least_drop) {
+std::map<float, double> volumes_behind(const Field& f, const std::vector<float>& height,
+                                       const std::vector<float>& climbed, double least_drop) {
   std::map<float, double> behind;
   for (std::size_t i = 0; i < f.size(); ++i) {
     if (climbed[i] < std::numeric_limits<float>::infinity() && static_cast<double>(climbed[i] - height[i]) > least_drop)
@@ -100,17 +102,19 @@ std::map<float, double> volumes_behind(const Field& f, const std::vector<float>&
 }
 }  // namespace
 
-Pass greatest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed, double least_drop) {
+Pass greatest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed,
+                   double least_drop) {
   Pass pass;
   for (const auto& [h, volume] : volumes_behind(f, height, climbed, least_drop))
     if (volume > pass.volume_mm3) pass = {static_cast<double>(h), volume};
   return pass;
 }
 
-Pass lowest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed, double least_drop, double least_mm3) {
+Pass lowest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed, double least_drop,
+                 double least_mm3) {
   for (const auto& [h, volume] : volumes_behind(f, height, climbed, least_drop))
     if (volume >= least_mm3) return {static_cast<double>(h), volume};
   return {};
 }
 
-}  // namespace osteo::imaging::segment
+}  // namespace osteo::inline imaging::segment

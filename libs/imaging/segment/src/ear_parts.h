@@ -1,5 +1,5 @@
-// What the finders of the ear's structures share. Private to libs/imaging/segment. The side looked for is always the left: a right ear comes
-// mirrored, so +x is outward.
+// What the finders of the ear's structures share. Private to libs/imaging/segment. The side looked for is always the
+// left: a right ear comes mirrored, so +x is outward.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -52,31 +52,36 @@ struct Pieces {
 [[nodiscard]] Pieces pieces_of(const Field& f, const Mask& mask, bool full_connectivity);
 
 /// The share of 96 directions in space that meet a wall within `reach_mm`. `what`: 1 wall, 0 goes on, -1 open.
-[[nodiscard]] double enclosure(const Field& f, Vec3 from_mm, double reach_mm, const std::function<int(std::size_t)>& what);
+[[nodiscard]] double enclosure(const Field& f, Vec3 from_mm, double reach_mm,
+                               const std::function<int(std::size_t)>& what);
 
-/// From the seeds through what `open` lets in: the least height that must be climbed to each voxel (infinity: not reached).
-[[nodiscard]] std::vector<float> climbed(const Field& f, const std::vector<float>& height, const std::vector<std::size_t>& seeds,
+/// From the seeds through what `open` lets in: the least height that must be climbed to each voxel (infinity: not
+/// reached).
+[[nodiscard]] std::vector<float> climbed(const Field& f, const std::vector<float>& height,
+                                         const std::vector<std::size_t>& seeds,
                                          const std::function<bool(std::size_t)>& open);
 
-/// The pass behind which the most lies: voxels lower than the pass that lead to them. Volume 0 when nothing lies behind any.
+/// The pass behind which the most lies: voxels lower than the pass that lead to them. Volume 0 when nothing lies behind
+/// any.
 struct Pass {
   double height = std::numeric_limits<double>::infinity();
   double volume_mm3 = 0;
 };
-[[nodiscard]] Pass greatest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed, double least_drop);
+[[nodiscard]] Pass greatest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed,
+                                 double least_drop);
 
 /// The lowest pass behind which at least so much lies.
-[[nodiscard]] Pass lowest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed, double least_drop,
-                               double least_mm3);
+[[nodiscard]] Pass lowest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed,
+                               double least_drop, double least_mm3);
 
 [[nodiscard]] Canal find_canal(const Field& f, const Levels& levels, const Context& context);
 [[nodiscard]] Part find_air_cells(const Field& f, const Levels& levels, const Canal& canal, const Context& context);
 [[nodiscard]] Brain find_brain(const Field& f, const Levels& levels, const Canal& canal, const Context& context);
-[[nodiscard]] Part find_tegmen(const Field& f, const Levels& levels, const Canal& canal, const Brain& brain, const Mask& air,
-                               const Context& context);
-[[nodiscard]] Part find_dura(const Field& f, const Levels& levels, const Canal& canal, const Brain& brain, const Mask& sinus,
-                             const Context& context);
+[[nodiscard]] Part find_tegmen(const Field& f, const Levels& levels, const Canal& canal, const Brain& brain,
+                               const Mask& air, const Context& context);
+[[nodiscard]] Part find_dura(const Field& f, const Levels& levels, const Canal& canal, const Brain& brain,
+                             const Mask& sinus, const Context& context);
 [[nodiscard]] Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const Context& context);
 [[nodiscard]] Part find_labyrinth(const Field& f, const Levels& levels, Vec3 point_mm, const Context& context);
 
-}  // namespace osteo::imaging::segment
+}  // namespace osteo::inline imaging::segment

@@ -1,8 +1,9 @@
 // The sigmoid sinus: without contrast medium nothing tells it from brain but the groove in which it lies.
 //
-// A point in the groove has bone around it: of directions in space, most meet a wall within 12 mm. That gives the way of the groove from
-// the transverse sinus to the jugular foramen. Then circles are fitted to the walls across it; the vessel is taken to be round, so that the
-// arc of wall in the bone gives its open side too. Where bone no longer holds half of the round, the sinus as labelled here ends.
+// A point in the groove has bone around it: of directions in space, most meet a wall within 12 mm. That gives the way
+// of the groove from the transverse sinus to the jugular foramen. Then circles are fitted to the walls across it; the
+// vessel is taken to be round, so that the arc of wall in the bone gives its open side too. Where bone no longer holds
+// half of the round, the sinus as labelled here ends.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -67,7 +68,8 @@ Round fit_round(const Field& f, const Levels& levels, Vec3 at, Vec3 along, doubl
       const double off = (std::hypot(e.x - mx, e.y - my) - r) / reach;
       e.w = std::abs(off) < 1 ? (1 - off * off) * (1 - off * off) : 0;
       const double z = e.x * e.x + e.y * e.y;
-      s += e.w, sx += e.w * e.x, sy += e.w * e.y, sxx += e.w * e.x * e.x, sxy += e.w * e.x * e.y, syy += e.w * e.y * e.y;
+      s += e.w, sx += e.w * e.x, sy += e.w * e.y, sxx += e.w * e.x * e.x, sxy += e.w * e.x * e.y,
+          syy += e.w * e.y * e.y;
       sz += e.w * z, sxz += e.w * e.x * z, syz += e.w * e.y * z;
     }
     if (s < kRays / 5.0) return out;
@@ -78,8 +80,8 @@ Round fit_round(const Field& f, const Levels& levels, Vec3 at, Vec3 along, doubl
     my = (by * cxx - bx * cxy) / det;
     r = std::sqrt(std::max(0.0, (sz - 2 * mx * sx - 2 * my * sy) / s + mx * mx + my * my));
     // An arc that is too flat or too narrow says nothing of a vessel's size.
-    const double kept =
-        std::clamp(r, std::max(kLeastRadiusMm, radius > 0 ? radius - 0.7 : 0), std::min(kMostRadiusMm, radius > 0 ? radius + 0.7 : 10));
+    const double kept = std::clamp(r, std::max(kLeastRadiusMm, radius > 0 ? radius - 0.7 : 0),
+                                   std::min(kMostRadiusMm, radius > 0 ? radius + 0.7 : 10));
     if (kept != r) {
       // The middle moves along the normal of the arc's middle, so that the wall stays where it is.
       const double ax = sx / s - mx, ay = sy / s - my, l = std::hypot(ax, ay);
@@ -156,7 +158,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
   for (std::size_t i = 0; i < g.size(); ++i) {
     const auto p = g.place(i);
     const Vec3 x = g.world(p[0], p[1], p[2]) - canal.drum_mm;
-    deep[i] = g.v[i] > 0.62F && static_cast<double>(wide[i]) > kLeastRadiusMm && x.y > 5 && x.z > -20 && x.z < 16 ? 1 : 0;
+    deep[i] =
+        g.v[i] > 0.62F && static_cast<double>(wide[i]) > kLeastRadiusMm && x.y > 5 && x.z > -20 && x.z < 16 ? 1 : 0;
   }
   const Pieces pieces = pieces_of(g, deep, true);
   std::vector<double> most_z(pieces.size.size(), -1e9), least_z(pieces.size.size(), 1e9);
@@ -192,7 +195,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
   const auto worth = [&](std::size_t i) {
     const auto w = static_cast<double>(wide[i]);
-    return std::clamp((static_cast<double>(g.v[i]) - 0.4) / 0.3, 0.0, 1.0) * std::clamp((w - 2.2) / 1.8, 0.0, 1.0) * (w > 6.5 ? 0.3 : 1.0);
+    return std::clamp((static_cast<double>(g.v[i]) - 0.4) / 0.3, 0.0, 1.0) * std::clamp((w - 2.2) / 1.8, 0.0, 1.0) *
+           (w > 6.5 ? 0.3 : 1.0);
   };
   reached[start] = 0;
   queue.emplace(0.0F, start);
@@ -206,7 +210,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
         for (int i = -1; i <= 1; ++i) {
           if ((i == 0 && j == 0 && k == 0) || !g.inside(p[0] + i, p[1] + j, p[2] + k)) continue;
           const std::size_t to = g.at(p[0] + i, p[1] + j, p[2] + k);
-          if (g.v[to] < 0.52F || static_cast<double>(wide[to]) < kLeastRadiusMm || g.world(0, 0, p[2] + k).z < lowest) continue;
+          if (g.v[to] < 0.52F || static_cast<double>(wide[to]) < kLeastRadiusMm || g.world(0, 0, p[2] + k).z < lowest)
+            continue;
           const double step = std::sqrt(static_cast<double>(i * i + j * j + k * k));
           const auto cost = static_cast<float>(static_cast<double>(c) + step / (0.03 + worth(to) * worth(to)));
           if (cost < reached[to]) {
@@ -288,8 +293,9 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     // Sizes go along to where the stations are now.
     radius.assign(next.size(), 0.0);
     for (std::size_t i = 0; i < next.size(); ++i) {
-      const double at =
-          next.size() > 1 ? static_cast<double>(i) * static_cast<double>(line.size() - 1) / static_cast<double>(next.size() - 1) : 0;
+      const double at = next.size() > 1 ? static_cast<double>(i) * static_cast<double>(line.size() - 1) /
+                                              static_cast<double>(next.size() - 1)
+                                        : 0;
       radius[i] = sizes[static_cast<std::size_t>(std::lround(at))];
     }
     line = next;
@@ -307,7 +313,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
   // Short stretches that less bone holds, as before the jugular bulb, do not end it.
   const auto end_of = [&](int step) {
     std::size_t end = centre;
-    for (auto i = static_cast<std::ptrdiff_t>(centre); i >= 0 && i < static_cast<std::ptrdiff_t>(line.size()); i += step) {
+    for (auto i = static_cast<std::ptrdiff_t>(centre); i >= 0 && i < static_cast<std::ptrdiff_t>(line.size());
+         i += step) {
       const auto at = static_cast<std::size_t>(i);
       if (rounds[at].held < kBridged && !held(at)) break;
       if (held(at)) end = at;
@@ -316,7 +323,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     return end;
   };
   const std::size_t first = end_of(-1), last = end_of(1);
-  std::vector<Round> tube(rounds.begin() + static_cast<std::ptrdiff_t>(first), rounds.begin() + static_cast<std::ptrdiff_t>(last) + 1);
+  std::vector<Round> tube(rounds.begin() + static_cast<std::ptrdiff_t>(first),
+                          rounds.begin() + static_cast<std::ptrdiff_t>(last) + 1);
   for (std::size_t i = 0; i < tube.size(); ++i) tube[i].centre = line[first + i], tube[i].radius = radius[first + i];
   double long_mm = 0, hold = 0, rough = 0;
   for (std::size_t i = 0; i < tube.size(); ++i) {
@@ -325,7 +333,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     rough += tube[i].rough / static_cast<double>(tube.size());
   }
   if (long_mm < 15) {
-    part.why = "the groove behind the ear canal holds a vessel for only " + std::to_string(static_cast<int>(long_mm)) + " mm";
+    part.why =
+        "the groove behind the ear canal holds a vessel for only " + std::to_string(static_cast<int>(long_mm)) + " mm";
     return part;
   }
   part.mask.assign(n, 0);
@@ -352,4 +361,4 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
   return part;
 }
 
-}  // namespace osteo::imaging::segment
+}  // namespace osteo::inline imaging::segment

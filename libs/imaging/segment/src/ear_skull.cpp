@@ -22,7 +22,8 @@ Mask closed2(const Mask& m, int nx, int ny, double radius) {
         if (from[static_cast<std::size_t>(y * nx + x)] != value) continue;
         for (int dy = -r; dy <= r; ++dy)
           for (int dx = -r; dx <= r; ++dx) {
-            if (dx * dx + dy * dy > radius * radius || x + dx < 0 || y + dy < 0 || x + dx >= nx || y + dy >= ny) continue;
+            if (dx * dx + dy * dy > radius * radius || x + dx < 0 || y + dy < 0 || x + dx >= nx || y + dy >= ny)
+              continue;
             to[static_cast<std::size_t>((y + dy) * nx + x + dx)] = value;
           }
       }
@@ -73,11 +74,13 @@ Brain find_brain(const Field& f, const Levels& levels, const Canal& canal, const
   for (std::size_t i = 0; i < n; ++i) core[i] = inside[pieces.of[i]];
   const std::vector<float> to_core = distance_mm(f, core, context);
   b.mask.assign(n, 0);
-  for (std::size_t i = 0; i < n; ++i) b.mask[i] = soft[i] != 0 && static_cast<double>(to_core[i]) <= kBrainBallMm + 0.5 * f.h_mm ? 1 : 0;
+  for (std::size_t i = 0; i < n; ++i)
+    b.mask[i] = soft[i] != 0 && static_cast<double>(to_core[i]) <= kBrainBallMm + 0.5 * f.h_mm ? 1 : 0;
   return b;
 }
 
-Part find_tegmen(const Field& f, const Levels& levels, const Canal& canal, const Brain& brain, const Mask& air, const Context&) {
+Part find_tegmen(const Field& f, const Levels& levels, const Canal& canal, const Brain& brain, const Mask& air,
+                 const Context&) {
   Part part;
   const int nx = f.n[0], ny = f.n[1], nz = f.n[2];
   const auto columns = static_cast<std::size_t>(nx * ny);
@@ -110,7 +113,8 @@ Part find_tegmen(const Field& f, const Levels& levels, const Canal& canal, const
       int q = k;
       while (q > 0 && k - q <= reach && v(q) > levels.cell_below) --q;
       p.bottom = p.seen && v(q) <= levels.cell_below ? crossing(q + 1, levels.cell_below) : p.top;
-      p.air_below = v(q) <= levels.cell_below && (air[f.at(i, j, q)] != 0 || air[f.at(i, j, std::max(0, q - 1))] != 0) &&
+      p.air_below = v(q) <= levels.cell_below &&
+                    (air[f.at(i, j, q)] != 0 || air[f.at(i, j, std::max(0, q - 1))] != 0) &&
                     (p.top - p.bottom) * f.h_mm <= kPlateMm;
       over_air[static_cast<std::size_t>(j * nx + i)] = p.air_below ? 1 : 0;
     }
@@ -139,17 +143,20 @@ Part find_tegmen(const Field& f, const Levels& levels, const Canal& canal, const
     const double bottom = p.air_below ? p.bottom : std::max(p.bottom, p.top - kPlateMm / f.h_mm);
     const double low = !p.air_below && p.bottom >= p.top ? p.top - kPlateMm / f.h_mm : bottom;
     const int i = static_cast<int>(c) % nx, j = static_cast<int>(c) / nx;
-    for (int k = std::max(0, static_cast<int>(std::ceil(low))); k <= std::min(nz - 1, static_cast<int>(std::floor(p.top))); ++k)
+    for (int k = std::max(0, static_cast<int>(std::ceil(low)));
+         k <= std::min(nz - 1, static_cast<int>(std::floor(p.top))); ++k)
       part.mask[f.at(i, j, k)] = 1;
   }
   part.quality = seen / static_cast<double>(most);
   part.found = true;
   if (part.quality < 0.9)
-    part.why = "thinner than can be seen in " + std::to_string(static_cast<int>(std::lround(100 * (1 - part.quality)))) + " % of it";
+    part.why = "thinner than can be seen in " +
+               std::to_string(static_cast<int>(std::lround(100 * (1 - part.quality)))) + " % of it";
   return part;
 }
 
-Part find_dura(const Field& f, const Levels& levels, const Canal& canal, const Brain& brain, const Mask& sinus, const Context& context) {
+Part find_dura(const Field& f, const Levels& levels, const Canal& canal, const Brain& brain, const Mask& sinus,
+               const Context& context) {
   Part part;
   const std::size_t n = f.size();
   // Brain and what a smaller ball reaches from there: corners, not the canals of nerves and vessels.
@@ -163,14 +170,16 @@ Part find_dura(const Field& f, const Levels& levels, const Canal& canal, const B
   const std::vector<float> to_other = distance_mm(f, other, context), to_brain = distance_mm(f, brain.mask, context);
   Mask core(n);
   for (std::size_t i = 0; i < n; ++i) {
-    core[i] =
-        brain.mask[i] != 0 || (static_cast<double>(to_other[i]) > kBallMm && static_cast<double>(to_brain[i]) < 3 && sinus[i] == 0) ? 1 : 0;
+    core[i] = brain.mask[i] != 0 || (static_cast<double>(to_other[i]) > kBallMm &&
+                                     static_cast<double>(to_brain[i]) < 3 && sinus[i] == 0)
+                  ? 1
+                  : 0;
   }
   const std::vector<float> to_core = distance_mm(f, core, context);
   Mask inner(n), bone(n);
   for (std::size_t i = 0; i < n; ++i) {
-    inner[i] = brain.mask[i] != 0 ||
-                       (soft[i] != 0 && sinus[i] == 0 && static_cast<double>(to_core[i]) < kBallMm && static_cast<double>(to_brain[i]) < 4)
+    inner[i] = brain.mask[i] != 0 || (soft[i] != 0 && sinus[i] == 0 && static_cast<double>(to_core[i]) < kBallMm &&
+                                      static_cast<double>(to_brain[i]) < 4)
                    ? 1
                    : 0;
     bone[i] = static_cast<double>(f.v[i]) >= levels.bone_above ? 1 : 0;
@@ -218,4 +227,4 @@ Part find_dura(const Field& f, const Levels& levels, const Canal& canal, const B
   return part;
 }
 
-}  // namespace osteo::imaging::segment
+}  // namespace osteo::inline imaging::segment

@@ -37,8 +37,9 @@ void bounds_of(const Frame& frame, Vec3& lo_mm, Vec3& hi_mm) {
   lo_mm = {1e30, 1e30, 1e30};
   hi_mm = {-1e30, -1e30, -1e30};
   for (int c = 0; c < 8; ++c) {
-    const Vec3 p = frame.world_from_index(
-        {(c & 1) != 0 ? frame.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? frame.dims[1] - 1.0 : 0.0, (c & 4) != 0 ? frame.dims[2] - 1.0 : 0.0});
+    const Vec3 p =
+        frame.world_from_index({(c & 1) != 0 ? frame.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? frame.dims[1] - 1.0 : 0.0,
+                                (c & 4) != 0 ? frame.dims[2] - 1.0 : 0.0});
     for (std::size_t a = 0; a < 3; ++a) {
       lo_mm[a] = std::min(lo_mm[a], p[a]);
       hi_mm[a] = std::max(hi_mm[a], p[a]);
@@ -68,7 +69,8 @@ double noise_of(const Image& ct) {
   std::size_t d = 0;
   while (d < 255 && 5 * (sum + count[d]) < all) sum += count[d++];
   // Within the bin that the fifth falls into; its values are rounded.
-  const double inside = count[d] > 0 ? (0.2 * static_cast<double>(all) - static_cast<double>(sum)) / static_cast<double>(count[d]) : 0;
+  const double inside =
+      count[d] > 0 ? (0.2 * static_cast<double>(all) - static_cast<double>(sum)) / static_cast<double>(count[d]) : 0;
   const double fifth = d == 0 ? 0.5 * inside : static_cast<double>(d) - 0.5 + inside;
   return fifth / 0.2533 / std::sqrt(2.0);
 }
@@ -90,7 +92,8 @@ Field make_field(const Image& ct, Vec3 lo_mm, Vec3 hi_mm, double h_mm, int threa
   const auto rows = static_cast<std::size_t>(f.n[1]) * static_cast<std::size_t>(f.n[2]);
   parallel_for(rows, 64, threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t r = begin; r < end; ++r) {
-      const int j = static_cast<int>(r % static_cast<std::size_t>(f.n[1])), k = static_cast<int>(r / static_cast<std::size_t>(f.n[1]));
+      const int j = static_cast<int>(r % static_cast<std::size_t>(f.n[1])),
+                k = static_cast<int>(r / static_cast<std::size_t>(f.n[1]));
       for (int i = 0; i < f.n[0]; ++i) f.v[f.at(i, j, k)] = static_cast<float>(sample(f.world(i, j, k)));
     }
   });
@@ -104,7 +107,8 @@ std::vector<float> smoothed(const std::vector<float>& v, std::array<int, 3> n, d
   for (int i = -reach; i <= reach; ++i) sum += std::exp(-0.5 * i * i / (sigma * sigma));
   for (int i = -reach; i <= reach; ++i)
     w[static_cast<std::size_t>(i + reach)] = static_cast<float>(std::exp(-0.5 * i * i / (sigma * sigma)) / sum);
-  const auto nx = static_cast<std::size_t>(n[0]), ny = static_cast<std::size_t>(n[1]), nz = static_cast<std::size_t>(n[2]);
+  const auto nx = static_cast<std::size_t>(n[0]), ny = static_cast<std::size_t>(n[1]),
+             nz = static_cast<std::size_t>(n[2]);
   std::vector<float> a(v.size()), b(v.size());
   // Along x a row at a time; along y and z whole rows are added up, so that memory is read in order.
   parallel_for(ny * nz, 64, threads, [&](std::size_t begin, std::size_t end) {
@@ -129,7 +133,8 @@ std::vector<float> smoothed(const std::vector<float>& v, std::array<int, 3> n, d
         float* const out = to.data() + r * nx;
         std::fill(out, out + nx, 0.0F);
         for (int q = -reach; q <= reach; ++q) {
-          const int jj = axis == 1 ? std::clamp(j + q, 0, n[1] - 1) : j, kk = axis == 2 ? std::clamp(k + q, 0, n[2] - 1) : k;
+          const int jj = axis == 1 ? std::clamp(j + q, 0, n[1] - 1) : j,
+                    kk = axis == 2 ? std::clamp(k + q, 0, n[2] - 1) : k;
           const float* const in = from.data() + (static_cast<std::size_t>(kk) * ny + static_cast<std::size_t>(jj)) * nx;
           const float f = w[static_cast<std::size_t>(q + reach)];
           for (std::size_t i = 0; i < nx; ++i) out[i] += f * in[i];
@@ -142,4 +147,4 @@ std::vector<float> smoothed(const std::vector<float>& v, std::array<int, 3> n, d
   return a;
 }
 
-}  // namespace osteo::imaging::segment
+}  // namespace osteo::inline imaging::segment

@@ -20,7 +20,8 @@ std::vector<Vec3> evenly(const std::vector<Vec3>& line, double step) {
   return out;
 }
 
-std::vector<Vec3> smoothed_line(const std::vector<Vec3>& p, const std::vector<double>& weight, double step_mm, double along_mm) {
+std::vector<Vec3> smoothed_line(const std::vector<Vec3>& p, const std::vector<double>& weight, double step_mm,
+                                double along_mm) {
   const std::size_t n = p.size();
   if (n < 4) return p;
   const double k = along_mm / step_mm, lambda = k * k * k * k;
@@ -61,4 +62,4 @@ std::vector<Vec3> smoothed_line(const std::vector<Vec3>& p, const std::vector<do
   return out;
 }
 
-}  // namespace osteo::imaging::segment
+}  // namespace osteo::inline imaging::segment

@@ -101,7 +101,8 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
     const double half = 0.5 * (base + peak);
     int i = low;
     while (i < top && sign * r[static_cast<std::size_t>(i + 1)] < half) ++i;
-    const double a = sign * r[static_cast<std::size_t>(i)], b = sign * r[static_cast<std::size_t>(std::min(i + 1, n - 1))];
+    const double a = sign * r[static_cast<std::size_t>(i)],
+                 b = sign * r[static_cast<std::size_t>(std::min(i + 1, n - 1))];
     const double at_mm = (i + (b > a ? std::clamp((half - a) / (b - a), 0.0, 1.0) : 0.5)) * kRayStepMm;
     if (at_mm > 1.2 * params.max_radius_mm) continue;
     edges[q] = {at_mm, top * kRayStepMm, peak, true};
@@ -171,7 +172,8 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
 }  // namespace
 
 Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubeParams& params, const Context& context) {
-  if (points_mm.size() < 2) throw Error(ExitCode::usage, "a tube needs two points or more", "where it begins and where it ends");
+  if (points_mm.size() < 2)
+    throw Error(ExitCode::usage, "a tube needs two points or more", "where it begins and where it ends");
   const Vec3 last{ct.frame.dims[0] - 0.5, ct.frame.dims[1] - 0.5, ct.frame.dims[2] - 0.5};
   Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
   double longest = 0;
@@ -193,8 +195,8 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
   const double h = std::clamp(0.8 * std::min({s.x, s.y, s.z}), 0.3, 0.6);
   const segment::Field field = segment::make_field(ct, lo - rim, hi + rim, h, context.threads);
   const std::vector<float> like = segment::tubeness(field, params, context.sub(0, 0.5));
-  const std::vector<Vec3> way =
-      segment::cheapest_way(field, like, points_mm, std::min(params.snap_mm, params.max_radius_mm), context.sub(0.5, 0.9));
+  const std::vector<Vec3> way = segment::cheapest_way(
+      field, like, points_mm, std::min(params.snap_mm, params.max_radius_mm), context.sub(0.5, 0.9));
 
   const double noise = segment::noise_of(ct);
   const Sampler hu(ct);
@@ -277,8 +279,8 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
                                       [](const auto& a, const auto& b) { return a[1] - a[0] < b[1] - b[0]; });
     const auto mm = [](double x) { return format_number(std::round(x * 10) / 10); };
     throw Error(ExitCode::failed,
-                "the points are not joined by a tube: no walls from " + mm((*bad)[0]) + " to " + mm((*bad)[1]) + " mm of " +
-                    mm(tube.length_mm) + " mm along the way",
+                "the points are not joined by a tube: no walls from " + mm((*bad)[0]) + " to " + mm((*bad)[1]) +
+                    " mm of " + mm(tube.length_mm) + " mm along the way",
                 "give a point on it there, check --kind, or allow it with --max-unsure-mm");
   }
   tube.radius_mean_mm /= sure;
@@ -310,7 +312,8 @@ Labels draw_tube(const Tube& tube, const Frame& frame, const std::string& name, 
     if (free == 256) throw Error(ExitCode::usage, "the label map holds 255 structures already");
     value = static_cast<std::uint8_t>(free);
     out.structures.push_back({value, name, {}});
-    std::sort(out.structures.begin(), out.structures.end(), [](const Structure& a, const Structure& b) { return a.value < b.value; });
+    std::sort(out.structures.begin(), out.structures.end(),
+              [](const Structure& a, const Structure& b) { return a.value < b.value; });
   }
   const auto at = [&](int i, int j, int k) {
     return (static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j)) *
@@ -331,18 +334,22 @@ Labels draw_tube(const Tube& tube, const Frame& frame, const std::string& name, 
     for (int k = lo[2]; k <= hi[2]; ++k)
       for (int j = lo[1]; j <= hi[1]; ++j)
         for (int i = lo[0]; i <= hi[0]; ++i) {
-          const Vec3 p = frame.world_from_index({static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)});
+          const Vec3 p =
+              frame.world_from_index({static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)});
           const double t = std::clamp(dot(p - a.at_mm, ab) / l2, 0.0, 1.0);
-          if (length(p - (a.at_mm + ab * t)) <= a.radius_mm + (b.radius_mm - a.radius_mm) * t) voxels[at(i, j, k)] = value;
+          if (length(p - (a.at_mm + ab * t)) <= a.radius_mm + (b.radius_mm - a.radius_mm) * t)
+            voxels[at(i, j, k)] = value;
         }
     for (int q = 0; q <= 4; ++q) {
       const Vec3 x = ia + (ib - ia) * (q / 4.0);
-      const int i = static_cast<int>(std::lround(x.x)), j = static_cast<int>(std::lround(x.y)), k = static_cast<int>(std::lround(x.z));
-      if (i >= 0 && j >= 0 && k >= 0 && i < frame.dims[0] && j < frame.dims[1] && k < frame.dims[2]) voxels[at(i, j, k)] = value;
+      const int i = static_cast<int>(std::lround(x.x)), j = static_cast<int>(std::lround(x.y)),
+                k = static_cast<int>(std::lround(x.z));
+      if (i >= 0 && j >= 0 && k >= 0 && i < frame.dims[0] && j < frame.dims[1] && k < frame.dims[2])
+        voxels[at(i, j, k)] = value;
     }
   }
   out.voxels = voxels;
   return out;
 }
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

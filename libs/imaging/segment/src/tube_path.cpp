@@ -81,8 +81,8 @@ std::vector<float> tubeness(const Field& f, const TubeParams& params, const Cont
   return best;
 }
 
-std::vector<Vec3> cheapest_way(const Field& f, const std::vector<float>& tubeness, std::span<const Vec3> points_mm, double snap_mm,
-                               const Context& context) {
+std::vector<Vec3> cheapest_way(const Field& f, const std::vector<float>& tubeness, std::span<const Vec3> points_mm,
+                               double snap_mm, const Context& context) {
   struct Step {
     int i, j, k;
     double length;
@@ -91,8 +91,10 @@ std::vector<Vec3> cheapest_way(const Field& f, const std::vector<float>& tubenes
   for (int k = -1; k <= 1; ++k)
     for (int j = -1; j <= 1; ++j)
       for (int i = -1; i <= 1; ++i)
-        if (i != 0 || j != 0 || k != 0) steps.push_back({i, j, k, std::sqrt(static_cast<double>(i * i + j * j + k * k))});
-  // Squared: a long way in the tube must beat a short one through a foam of air cells, whose corners look like tubes in part.
+        if (i != 0 || j != 0 || k != 0)
+          steps.push_back({i, j, k, std::sqrt(static_cast<double>(i * i + j * j + k * k))});
+  // Squared: a long way in the tube must beat a short one through a foam of air cells, whose corners look like tubes in
+  // part.
   const auto cost = [&](std::size_t at) {
     const auto t = static_cast<double>(tubeness[at]);
     return 1 / (kFloor + t * t);
@@ -160,8 +162,9 @@ std::vector<Vec3> cheapest_way(const Field& f, const std::vector<float>& tubenes
         if (!f.inside(p[0] + d.i, p[1] + d.j, p[2] + d.k)) continue;
         const std::size_t to = f.at(p[0] + d.i, p[1] + d.j, p[2] + d.k);
         if (closed[to]) continue;
-        const auto c = static_cast<float>(static_cast<double>(reached[at]) +
-                                          0.5 * d.length * (own + cost(to)) * detour(p[0] + d.i, p[1] + d.j, p[2] + d.k));
+        const auto c =
+            static_cast<float>(static_cast<double>(reached[at]) +
+                               0.5 * d.length * (own + cost(to)) * detour(p[0] + d.i, p[1] + d.j, p[2] + d.k));
         if (c < reached[to]) {
           reached[to] = c;
           from[to] = static_cast<std::int8_t>(s);
@@ -186,4 +189,4 @@ std::vector<Vec3> cheapest_way(const Field& f, const std::vector<float>& tubenes
   return way;
 }
 
-}  // namespace osteo::imaging::segment
+}  // namespace osteo::inline imaging::segment

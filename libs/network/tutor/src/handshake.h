@@ -1,4 +1,5 @@
-// The packets of pairing: connection 0, kind, protocol, fields of fixed length, then a checksum. Private to libs/network/tutor.
+// The packets of pairing: connection 0, kind, protocol, fields of fixed length, then a checksum. Private to
+// libs/network/tutor.
 #pragma once
 #include <algorithm>
 #include <cstring>
@@ -8,7 +9,8 @@
 namespace osteo::inline network {
 
 enum class PairingStep : std::uint8_t { ask = 1, challenge, prove, welcome, refused, again, wait };
-/// Why: the code was wrong, too many wrong codes, the trainee's place is taken or nobody else can join, another protocol.
+/// Why: the code was wrong, too many wrong codes, the trainee's place is taken or nobody else can join, another
+/// protocol.
 enum class PairingRefusal : std::uint8_t { wrong_code = 1, locked, full, protocol };
 
 /// What asks is longer than what it is answered with, so that nobody can have others flooded.
@@ -75,4 +77,4 @@ class PairingFields {
   std::span<const std::uint8_t> left_;
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

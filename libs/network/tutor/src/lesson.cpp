@@ -31,7 +31,9 @@ std::vector<Lesson::Point> way_of(std::span<const DeviceSample> samples) {
 
 Lesson read_lesson(const SessionReader& session, double from_s, double to_s) {
   const SessionOutline& o = session.outline();
-  const auto at_s = [&](std::uint64_t tick) { return format_number(static_cast<double>(tick) / o.header.rate_hz) + " s"; };
+  const auto at_s = [&](std::uint64_t tick) {
+    return format_number(static_cast<double>(tick) / o.header.rate_hz) + " s";
+  };
   if (!o.not_replayable.empty())
     throw Error(ExitCode::corrupt, "the session cannot be repeated by this version: " + o.not_replayable,
                 "play it with " + o.header.program_version);
@@ -40,10 +42,12 @@ Lesson read_lesson(const SessionReader& session, double from_s, double to_s) {
   lesson.setup = o.header.haptics;
   const std::size_t hands = lesson.setup.hands();
   if (hands >= kMostHands)
-    throw Error(ExitCode::usage, "the session has " + std::to_string(hands) + " hands, and who learns needs one more than there can be",
+    throw Error(ExitCode::usage,
+                "the session has " + std::to_string(hands) + " hands, and who learns needs one more than there can be",
                 "record it with at most " + std::to_string(kMostHands - 1));
   if (lesson.setup.curve.size() >= 2)
-    throw Error(ExitCode::usage, "a curve of the settings holds the first hand of this session, and would hold who learns",
+    throw Error(ExitCode::usage,
+                "a curve of the settings holds the first hand of this session, and would hold who learns",
                 "record it without \"curve_file\"");
   lesson.first_tick = static_cast<std::uint64_t>(std::llround(from_s * lesson.rate_hz));
   const std::uint64_t end =
@@ -62,14 +66,16 @@ Lesson read_lesson(const SessionReader& session, double from_s, double to_s) {
       } else if (a.is(ActionKind::grip) || a.is(ActionKind::guide) || a.is(ActionKind::cutting_guide) ||
                  (a.tick >= lesson.first_tick && !plays_on(a))) {
         throw Error(ExitCode::usage,
-                    "at " + at_s(a.tick) + " the session has '" + std::string(name_of(a)) + "', which hands alone do not repeat",
+                    "at " + at_s(a.tick) + " the session has '" + std::string(name_of(a)) +
+                        "', which hands alone do not repeat",
                     "play a part before or behind it: --from-s, --to-s");
       }
     }
     for (const TickRecord& t : part->ticks) {
       if (t.tick < lesson.first_tick || t.tick >= end) continue;
       if (t.hand == 0 && t.tick != next++)
-        throw Error(ExitCode::corrupt, "ticks are missing before " + at_s(t.tick), "play a part that is whole: --from-s, --to-s");
+        throw Error(ExitCode::corrupt, "ticks are missing before " + at_s(t.tick),
+                    "play a part that is whole: --from-s, --to-s");
       lesson.hands[t.hand].push_back(t.device);
     }
     if (next >= end) break;
@@ -79,7 +85,8 @@ Lesson read_lesson(const SessionReader& session, double from_s, double to_s) {
     throw Error(ExitCode::usage, "the session has nothing from " + at_s(lesson.first_tick) + " on",
                 "it is shorter; give an earlier --from-s");
   lesson.way = way_of(lesson.hands.front());
-  if (lesson.way.empty()) throw Error(ExitCode::corrupt, "the first hand of the session has no pose that could be used");
+  if (lesson.way.empty())
+    throw Error(ExitCode::corrupt, "the first hand of the session has no pose that could be used");
   return lesson;
 }
 
@@ -101,4 +108,4 @@ double spread_mm(const Lesson& lesson, std::span<const Lesson> others, double sh
   return apart[static_cast<std::size_t>(at)];
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

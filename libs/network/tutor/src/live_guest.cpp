@@ -74,7 +74,8 @@ void LiveGuest::hear(const LogPacket& p, std::int64_t) {
   for (std::size_t i = 0; i < ticks; ++i) {
     const std::uint64_t tick = p.first_tick + i;
     // The host's hand as soon as it is heard of, for the spring; what is old serves the copy alone.
-    if (tick + 256 > newest_shown_) host_hand_->put({tick, p.samples[i * p.hands]}, tick > newest_shown_ && i + 1 == ticks);
+    if (tick + 256 > newest_shown_)
+      host_hand_->put({tick, p.samples[i * p.hands]}, tick > newest_shown_ && i + 1 == ticks);
     LiveTick t;
     t.tick = tick;
     for (std::size_t h = 0; h < p.hands; ++h) t.hands[h] = p.samples[i * p.hands + h];
@@ -150,4 +151,4 @@ std::vector<Bytes> LiveGuest::poll(std::int64_t now_us) {
   return out;
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

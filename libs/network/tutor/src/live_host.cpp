@@ -75,8 +75,9 @@ bool LiveHost::lost() const {
 
 bool LiveHost::waited_for(std::int64_t now_us) const {
   const std::lock_guard lock(mutex_);
-  return std::any_of(peers_.begin(), peers_.end(),
-                     [&](const auto& p) { return p->next_tick < log_.size() / hands_ && now_us - p->last_heard_us <= kGoneUs; });
+  return std::any_of(peers_.begin(), peers_.end(), [&](const auto& p) {
+    return p->next_tick < log_.size() / hands_ && now_us - p->last_heard_us <= kGoneUs;
+  });
 }
 
 int LiveHost::tries_left() const {
@@ -95,7 +96,8 @@ std::vector<PeerStatus> LiveHost::status(std::int64_t now_us) const {
   for (const auto& p : peers_) {
     const std::uint64_t ticks = log_.size() / hands_;
     all.push_back({p->role, p->clock.rtt_ms(), p->clock.offset_ms(), p->clock.drift_ppm(), p->channel->lost(),
-                   now_us - p->last_heard_us < 1'000'000, p->ready, ticks - std::min(ticks, p->next_tick), p->differs, p->same});
+                   now_us - p->last_heard_us < 1'000'000, p->ready, ticks - std::min(ticks, p->next_tick), p->differs,
+                   p->same});
   }
   return all;
 }
@@ -197,9 +199,10 @@ LogPacket LiveHost::log_from(std::uint64_t tick) const {
   p.first_tick = tick;
   p.now_tick = log_.size() / hands_;
   p.hands = static_cast<std::uint8_t>(hands_);
-  std::uint64_t end = std::min<std::uint64_t>(p.now_tick, tick + (hands_ <= 2 ? LogPacket::kMostTicks : LogPacket::kMostTicks / 2));
-  const auto from =
-      std::lower_bound(actions_.begin(), actions_.end(), tick, [](const SceneAction& a, std::uint64_t t) { return a.tick < t; });
+  std::uint64_t end =
+      std::min<std::uint64_t>(p.now_tick, tick + (hands_ <= 2 ? LogPacket::kMostTicks : LogPacket::kMostTicks / 2));
+  const auto from = std::lower_bound(actions_.begin(), actions_.end(), tick,
+                                     [](const SceneAction& a, std::uint64_t t) { return a.tick < t; });
   for (auto a = from; a != actions_.end() && a->tick < end; ++a) {
     if (p.actions.size() == LogPacket::kMostActions) {
       end = std::max(a->tick, tick + 1);  // more in one tick than fit are none that people do
@@ -209,11 +212,13 @@ LogPacket LiveHost::log_from(std::uint64_t tick) const {
   }
   std::erase_if(p.actions, [&](const SceneAction& a) { return a.tick >= end; });
   if (state_ == LogState::over && end == p.now_tick) {  // and those behind the last tick
-    const auto behind =
-        std::lower_bound(actions_.begin(), actions_.end(), end, [](const SceneAction& a, std::uint64_t t) { return a.tick < t; });
-    for (auto a = behind; a != actions_.end() && a->tick == end && p.actions.size() < LogPacket::kMostActions; ++a) p.actions.push_back(*a);
+    const auto behind = std::lower_bound(actions_.begin(), actions_.end(), end,
+                                         [](const SceneAction& a, std::uint64_t t) { return a.tick < t; });
+    for (auto a = behind; a != actions_.end() && a->tick == end && p.actions.size() < LogPacket::kMostActions; ++a)
+      p.actions.push_back(*a);
   }
-  p.samples.assign(log_.begin() + static_cast<std::ptrdiff_t>(tick * hands_), log_.begin() + static_cast<std::ptrdiff_t>(end * hands_));
+  p.samples.assign(log_.begin() + static_cast<std::ptrdiff_t>(tick * hands_),
+                   log_.begin() + static_cast<std::ptrdiff_t>(end * hands_));
   if (!marks_.empty()) p.mark = {marks_.rbegin()->first, marks_.rbegin()->second};
   return p;
 }
@@ -244,7 +249,8 @@ std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
         b.total = static_cast<std::uint32_t>(settings_.size());
         b.offset = static_cast<std::uint32_t>(at);
         const std::size_t end = std::min(settings_.size(), at + BlobPacket::kMost);
-        b.bytes.assign(settings_.begin() + static_cast<std::ptrdiff_t>(at), settings_.begin() + static_cast<std::ptrdiff_t>(end));
+        b.bytes.assign(settings_.begin() + static_cast<std::ptrdiff_t>(at),
+                       settings_.begin() + static_cast<std::ptrdiff_t>(end));
         send(b);
         at = end;
       }
@@ -258,7 +264,8 @@ std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
     }
     p.sent_to = std::max(p.sent_to, p.next_tick);
     int sent = 0;
-    while (p.sent_to + LogPacket::kMostTicks < ticks && p.sent_to < p.next_tick + kWindowTicks && sent < kPacketsAPoll) {
+    while (p.sent_to + LogPacket::kMostTicks < ticks && p.sent_to < p.next_tick + kWindowTicks &&
+           sent < kPacketsAPoll) {
       const LogPacket log = log_from(p.sent_to);
       p.sent_to += log.samples.size() / hands_;
       send(log);
@@ -274,4 +281,4 @@ std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
   return std::exchange(out_, {});
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

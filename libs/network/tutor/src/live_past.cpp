@@ -7,9 +7,9 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/network/tutor/live_run.h"
 #include "osteo/session/recording/apply.h"
 #include "osteo/session/recording/session_reader.h"
-#include "osteo/network/tutor/live_run.h"
 
 namespace osteo::inline network {
 namespace {
@@ -45,7 +45,8 @@ std::pair<std::span<const std::uint8_t>, std::span<const std::uint8_t>> parts_of
   std::uint32_t length = 0;
   if (bytes.size() >= sizeof length) std::memcpy(&length, bytes.data(), sizeof length);
   const auto rest = std::span<const std::uint8_t>(bytes).subspan(std::min(bytes.size(), sizeof length));
-  if (length == 0 || length > rest.size()) throw Error(ExitCode::corrupt, "the host's settings are damaged", "join once more");
+  if (length == 0 || length > rest.size())
+    throw Error(ExitCode::corrupt, "the host's settings are damaged", "join once more");
   return {rest.first(length), rest.subspan(length)};
 }
 
@@ -66,7 +67,8 @@ SessionHeader settings_of(const Bytes& bytes) {
   const BytesAsFile file(parts_of(bytes).first);
   const SessionReader reader = file.open();
   if (!reader.outline().not_replayable.empty())
-    throw Error(ExitCode::corrupt, "the host's session cannot be followed by this version: " + reader.outline().not_replayable,
+    throw Error(ExitCode::corrupt,
+                "the host's session cannot be followed by this version: " + reader.outline().not_replayable,
                 "both need the same version");
   // What comes live is not read from a file: its numbers are the host's.
   if (!reader.outline().numbered_alike)
@@ -91,7 +93,8 @@ Bytes past_bytes(const SessionFolder& session) {
     writer->append(batch);
     batch = {};
     if (bytes.size() > kMostPastBytes)
-      throw Error(ExitCode::failed, "the sessions that this one goes on from are too long to be sent", "begin with the case's bone");
+      throw Error(ExitCode::failed, "the sessions that this one goes on from are too long to be sent",
+                  "begin with the case's bone");
   };
   for (const SessionBefore& before : chain) {
     const SessionReader reader(before.session.stream());
@@ -121,13 +124,15 @@ Bytes past_bytes(const SessionFolder& session) {
   return bytes;
 }
 
-SessionFolder create_joined_folder(const fs::path& wanted, const fs::path& case_folder, const Bytes& past, const std::string& words) {
+SessionFolder create_joined_folder(const fs::path& wanted, const fs::path& case_folder, const Bytes& past,
+                                   const std::string& words) {
   fs::path before;
   if (!past.empty()) {
     fs::path beside = wanted.lexically_normal();  // not below it, also where it was written with a slash at its end
     if (!beside.empty() && !beside.has_filename()) beside = beside.parent_path();
     if (!beside.empty()) beside += "-before";
-    const SessionFolder made = create_session_folder(beside, case_folder, {}, words + "; what the instructor's session goes on from");
+    const SessionFolder made =
+        create_session_folder(beside, case_folder, {}, words + "; what the instructor's session goes on from");
     before = made.folder;
     write_file(made.stream(), std::string(past.begin(), past.end()));
   }
@@ -145,4 +150,4 @@ World world_of_past(const Bytes& past, const Case& the_case, const Anatomy& anat
   return world;
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

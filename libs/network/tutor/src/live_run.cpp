@@ -56,4 +56,4 @@ void wait_for_all(const LiveHost& host, double most_s) {
   std::this_thread::sleep_for(std::chrono::milliseconds(40));
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

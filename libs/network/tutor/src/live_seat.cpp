@@ -60,13 +60,15 @@ class LiveSeat::Feeling final : public Reader {
 };
 
 std::string joined_words(JoinRole role) {
-  return role == JoinRole::trainee ? "live tutoring: the second hand is this trainee's, led by the instructor's, far away"
-                                   : "live tutoring: watched from far away";
+  return role == JoinRole::trainee
+             ? "live tutoring: the second hand is this trainee's, led by the instructor's, far away"
+             : "live tutoring: watched from far away";
 }
 
 // --- the link
 
-LiveSeat::LiveSeat(const SeatOptions& options) : options_(options), guest_(options.tidy_code, options.role, leader_), socket_("", 0) {
+LiveSeat::LiveSeat(const SeatOptions& options)
+    : options_(options), guest_(options.tidy_code, options.role, leader_), socket_("", 0) {
   packets_ = std::thread([this] {
     while (!stop_packets_) {
       socket_.wait_ms(1);
@@ -119,7 +121,8 @@ SessionHeader LiveSeat::wait_for_session(double most_s, const Context& context) 
         throw Error(ExitCode::failed,
                     "the host at " + udp_name(options_.host) + " answers, but too little of it comes through",
                     "a bad line, or somebody floods the host: try again");
-      throw Error(ExitCode::failed, "nobody answers at " + udp_name(options_.host), "look at address, port and firewall");
+      throw Error(ExitCode::failed, "nobody answers at " + udp_name(options_.host),
+                  "look at address, port and firewall");
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
@@ -132,10 +135,11 @@ Bytes LiveSeat::past() const {
 
 // --- the session
 
-std::shared_ptr<Rehearsal> LiveSeat::begin(const SessionHeader& header, World begin, RehearsalOptions options, std::unique_ptr<Device> own,
-                                           const Context& context) {
+std::shared_ptr<Rehearsal> LiveSeat::begin(const SessionHeader& header, World begin, RehearsalOptions options,
+                                           std::unique_ptr<Device> own, const Context& context) {
   leave();
-  if (begin.hash() != header.bone_hash) throw Error(ExitCode::usage, "the host's bone is another", "both need the same case, unchanged");
+  if (begin.hash() != header.bone_hash)
+    throw Error(ExitCode::usage, "the host's bone is another", "both need the same case, unchanged");
   header_ = header;
   own_ = std::move(own);
   options.haptics = header.haptics;
@@ -282,4 +286,4 @@ SeatStatus LiveSeat::status() const {
   return s;
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -251,4 +251,4 @@ std::optional<Bytes> PairingGuest::poll(std::int64_t now_us) {
   return PairingPacket(PairingStep::ask).add(nonce_).add(role_).sealed(kAskBytes);
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -91,7 +91,8 @@ void LessonClock::step(Vec3 hand_mm, double dt_s) noexcept {
       if (!begun_) target_ = hand_mm;
       const Vec3 left = start - target_;
       const double far = length(left), step = kApproachMmPerS * dt_s;
-      if (length(hand_mm - target_) <= std::max(leash_mm_, kStartMm)) target_ = far <= step ? start : target_ + left * (step / far);
+      if (length(hand_mm - target_) <= std::max(leash_mm_, kStartMm))
+        target_ = far <= step ? start : target_ + left * (step / far);
       started_ = target_ == start && length(hand_mm - start) <= kStartMm;
     }
     begun_ = true;
@@ -167,8 +168,8 @@ DeviceSample RecordedDevice::read(std::uint64_t tick, double dt_s, Vec3) noexcep
   return sample;
 }
 
-std::vector<std::unique_ptr<Device>> playback_devices(std::unique_ptr<Device> learner, const std::shared_ptr<Playback>& playback,
-                                                      HapticSetup& setup) {
+std::vector<std::unique_ptr<Device>> playback_devices(std::unique_ptr<Device> learner,
+                                                      const std::shared_ptr<Playback>& playback, HapticSetup& setup) {
   setup = playback->lesson->setup;
   setup.more_devices.clear();
   setup.device = learner->traits();
@@ -189,10 +190,12 @@ std::vector<SceneAction> playback_actions(const Playback& playback) {
       continue;
     }
     if (a.is(ActionKind::setting))
-      throw Error(ExitCode::usage,
-                  "a haptic setting changes within the lesson, at " +
-                      format_number(static_cast<double>(a.tick + playback.lesson->first_tick) / playback.lesson->rate_hz) + " s",
-                  "play a part before or behind it: --from-s, --to-s");
+      throw Error(
+          ExitCode::usage,
+          "a haptic setting changes within the lesson, at " +
+              format_number(static_cast<double>(a.tick + playback.lesson->first_tick) / playback.lesson->rate_hz) +
+              " s",
+          "play a part before or behind it: --from-s, --to-s");
   }
   return all;
 }
@@ -233,7 +236,8 @@ GuidedFacts measure_guided(const SessionReader& session, std::uint64_t begin_tic
       if (t.hand != 1) continue;
       const Vec3 at = from_floats(own.device.position_mm);
       const GuideLaw::Hand hand{has_before && own_before.structure != 0 ? own_before.clearance_mm : 1e9F};
-      const Vec3 pull = law.guide().on() ? law.step(at, hand, t.device, from_floats(leader_before.force_n), dt) : Vec3{};
+      const Vec3 pull =
+          law.guide().on() ? law.step(at, hand, t.device, from_floats(leader_before.force_n), dt) : Vec3{};
       if (t.tick >= begin_tick && (t.device.buttons & kLeadStrength) != 0) {
         const double e = length(from_floats(t.device.position_mm) - at);
         errors.push_back(static_cast<float>(e));
@@ -259,4 +263,4 @@ GuidedFacts measure_guided(const SessionReader& session, std::uint64_t begin_tic
   return f;
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -11,12 +11,14 @@ void ClockSync::heard(const WireTimes& t, std::int64_t now_us) {
   last_heard_us_ = now_us;
   if (t.echo_us == 0) return;
   // Differences of what the other side says may be anything.
-  const double held = static_cast<double>(t.held_us), rtt = static_cast<double>(now_us) - static_cast<double>(t.echo_us) - held;
+  const double held = static_cast<double>(t.held_us),
+               rtt = static_cast<double>(now_us) - static_cast<double>(t.echo_us) - held;
   if (!(rtt >= 0 && rtt < 1e7 && held >= 0)) return;
   const double offset = static_cast<double>(t.sent_us) + rtt / 2 - static_cast<double>(now_us);
   last_[count_++ % last_.size()] = {rtt, offset};
-  const auto* const best = std::min_element(last_.begin(), last_.begin() + static_cast<std::ptrdiff_t>(std::min(count_, last_.size())),
-                                            [](const Exchange& a, const Exchange& b) { return a.rtt_us < b.rtt_us; });
+  const auto* const best =
+      std::min_element(last_.begin(), last_.begin() + static_cast<std::ptrdiff_t>(std::min(count_, last_.size())),
+                       [](const Exchange& a, const Exchange& b) { return a.rtt_us < b.rtt_us; });
   rtt_us_ = best->rtt_us;
   offset_us_ = best->offset_us;
   if (count_ == last_.size()) {
@@ -85,7 +87,8 @@ DeviceSample Playout::read(std::uint64_t now, bool pulls) noexcept {
   }
   const std::uint64_t silent = now > last_heard_ ? now - last_heard_ : 0;
   strength_ = pulls ? std::min(1.0, strength_ + 1.0 / kRampTicks) : std::max(0.0, strength_ - 1.0 / kFadeTicks);
-  if (silent > kSilenceTicks) strength_ = std::min(strength_, std::max(0.0, 1 - static_cast<double>(silent - kSilenceTicks) / kFadeTicks));
+  if (silent > kSilenceTicks)
+    strength_ = std::min(strength_, std::max(0.0, 1 - static_cast<double>(silent - kSilenceTicks) / kFadeTicks));
   DeviceSample s = held_;
   s.age_ms = static_cast<std::uint8_t>(std::min<std::uint64_t>(silent > kSilenceTicks ? silent : 0, 255));
   s.buttons = static_cast<std::uint8_t>(std::lround(strength_ * double{kLeadStrength}));
@@ -109,13 +112,15 @@ double delayed_stiffness_n_per_mm(double damping, double mass_kg, double delay_s
   return std::max(always, short_delay) / 1000;
 }
 
-HandGuide far_guide(std::uint32_t hand, std::uint32_t leader, const DeviceTraits& device, double wanted_n_per_mm, double most_n) {
+HandGuide far_guide(std::uint32_t hand, std::uint32_t leader, const DeviceTraits& device, double wanted_n_per_mm,
+                    double most_n) {
   HandGuide g;
   g.hand = hand;
   g.leader = leader;
   g.brake_n_s_per_m = kFarBrake;
   g.stiffness_n_per_mm =
-      std::min(wanted_n_per_mm, delayed_stiffness_n_per_mm(kFarBrake + std::min(device.damping_n_s_per_m, 5.0), kFarMassKg, 1e9));
+      std::min(wanted_n_per_mm,
+               delayed_stiffness_n_per_mm(kFarBrake + std::min(device.damping_n_s_per_m, 5.0), kFarMassKg, 1e9));
   g.most_n = most_n;
   return g;
 }
@@ -176,8 +181,8 @@ HapticSetup LiveFeel::setup_of(const HapticSetup& session, const DeviceTraits& o
   return setup;
 }
 
-LiveFeel::LiveFeel(const World& copy, const HapticSetup& session, const Anatomy& anatomy, const DeviceTraits& own, const HandGuide& guide,
-                   double rate_hz)
+LiveFeel::LiveFeel(const World& copy, const HapticSetup& session, const Anatomy& anatomy, const DeviceTraits& own,
+                   const HandGuide& guide, double rate_hz)
     : renderer_(setup_of(session, own), anatomy, 1 / rate_hz), scene_(HapticScene::of(copy, renderer_.setup())) {
   renderer_.show(&scene_);
   renderer_.hold(true);
@@ -191,4 +196,4 @@ TickRecord LiveFeel::step(const DeviceSample& own, const DeviceSample& host) noe
   return renderer_.step(both).hands.front();
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

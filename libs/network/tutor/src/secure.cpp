@@ -14,7 +14,8 @@ static_assert(kLetters.size() == 32);
 
 void need_sodium() {
   static const bool ready = ::sodium_init() >= 0;
-  if (!ready) throw Error(ExitCode::failed, "there is no randomness for a key", "libsodium cannot be used on this machine");
+  if (!ready)
+    throw Error(ExitCode::failed, "there is no randomness for a key", "libsodium cannot be used on this machine");
 }
 
 template <std::size_t N>
@@ -124,8 +125,8 @@ std::optional<PairKeys> Pairing::keys(const Share& theirs, bool i_am_host) const
 
 std::array<std::uint8_t, 16> proof(const PairKeys& keys, std::string_view label) {
   std::array<std::uint8_t, 16> tag;
-  ::crypto_generichash(tag.data(), tag.size(), reinterpret_cast<const unsigned char*>(label.data()), label.size(), keys.confirm.data(),
-                       keys.confirm.size());
+  ::crypto_generichash(tag.data(), tag.size(), reinterpret_cast<const unsigned char*>(label.data()), label.size(),
+                       keys.confirm.data(), keys.confirm.size());
   return tag;
 }
 
@@ -141,8 +142,8 @@ Bytes SecureChannel::seal(std::span<const std::uint8_t> plain) {
   std::array<std::uint8_t, crypto_aead_chacha20poly1305_ietf_NPUBBYTES> nonce{};
   std::memcpy(nonce.data(), &counter, 8);
   unsigned long long written = 0;
-  ::crypto_aead_chacha20poly1305_ietf_encrypt(packet.data() + 12, &written, plain.data(), plain.size(), packet.data(), 12, nullptr,
-                                              nonce.data(), send_.data());
+  ::crypto_aead_chacha20poly1305_ietf_encrypt(packet.data() + 12, &written, plain.data(), plain.size(), packet.data(),
+                                              12, nullptr, nonce.data(), send_.data());
   return packet;
 }
 
@@ -160,8 +161,9 @@ std::optional<Bytes> SecureChannel::open(std::span<const std::uint8_t> packet) {
   std::memcpy(nonce.data(), &counter, 8);
   Bytes plain(packet.size() - kOverhead);
   unsigned long long written = 0;
-  if (::crypto_aead_chacha20poly1305_ietf_decrypt(plain.data(), &written, nullptr, packet.data() + 12, packet.size() - 12, packet.data(),
-                                                  12, nonce.data(), receive_.data()) != 0)
+  if (::crypto_aead_chacha20poly1305_ietf_decrypt(plain.data(), &written, nullptr, packet.data() + 12,
+                                                  packet.size() - 12, packet.data(), 12, nonce.data(),
+                                                  receive_.data()) != 0)
     return std::nullopt;
   if (newer) {
     if (counter - newest_ >= kWindow) {
@@ -175,4 +177,4 @@ std::optional<Bytes> SecureChannel::open(std::span<const std::uint8_t> packet) {
   return plain;
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -91,11 +91,13 @@ std::string bare(const std::string& host) {
 
 UdpPeer udp_peer(const std::string& text) {
   const std::size_t colon = text.rfind(':');
-  const std::string host = text.substr(0, std::min(colon, text.size())), port = colon == std::string::npos ? "" : text.substr(colon + 1);
+  const std::string host = text.substr(0, std::min(colon, text.size())),
+                    port = colon == std::string::npos ? "" : text.substr(colon + 1);
   const bool two = host.find(':') != std::string::npos && (host.front() != '[' || host.back() != ']');
-  if (two || host.empty() || port.empty() || port.size() > 5 || port.find_first_not_of("0123456789") != std::string::npos ||
-      std::stoi(port) > 65535 || std::stoi(port) == 0)
-    throw Error(ExitCode::usage, "'" + text + "' is no HOST:PORT", "as the host shows it: 192.0.2.7:18950, or [2001:db8::7]:18950");
+  if (two || host.empty() || port.empty() || port.size() > 5 ||
+      port.find_first_not_of("0123456789") != std::string::npos || std::stoi(port) > 65535 || std::stoi(port) == 0)
+    throw Error(ExitCode::usage, "'" + text + "' is no HOST:PORT",
+                "as the host shows it: 192.0.2.7:18950, or [2001:db8::7]:18950");
   return peer_of(resolve(bare(host), port).storage);
 }
 
@@ -133,9 +135,10 @@ UdpSocket::UdpSocket(const std::string& address, int port) {
   if (::bind(fd_, a.any(), a.length) != 0) {
     const int why = errno;
     ::close(fd_);
-    throw Error(why == EADDRNOTAVAIL ? ExitCode::usage : ExitCode::failed,
-                "cannot listen on " + udp_name(peer_of(a.storage)) + ": " + std::strerror(why),
-                why == EADDRINUSE ? "another program has this port; give another --port" : "give an address of this machine");
+    throw Error(
+        why == EADDRNOTAVAIL ? ExitCode::usage : ExitCode::failed,
+        "cannot listen on " + udp_name(peer_of(a.storage)) + ": " + std::strerror(why),
+        why == EADDRINUSE ? "another program has this port; give another --port" : "give an address of this machine");
   }
 }
 
@@ -168,4 +171,4 @@ void UdpSocket::wait_ms(int most) noexcept {
   static_cast<void>(::poll(&p, 1, most));
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

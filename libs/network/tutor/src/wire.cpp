@@ -159,7 +159,8 @@ std::optional<LogPacket> decode_log(std::span<const std::uint8_t> bytes) {
   p.samples = r.list<DeviceSample>(std::size_t{ticks} * p.hands, LogPacket::kMostTicks * kMostHands);
   p.actions = r.list<SceneAction>(actions, LogPacket::kMostActions);
   const std::uint64_t behind = p.first_tick + ticks + (p.state == LogState::over ? 1 : 0);
-  for (const SceneAction& a : p.actions) r.need(a.tick >= p.first_tick && a.tick < behind && find_row(a.kind) != nullptr);
+  for (const SceneAction& a : p.actions)
+    r.need(a.tick >= p.first_tick && a.tick < behind && find_row(a.kind) != nullptr);
   if (!r.whole() || p.first_tick + ticks < p.first_tick) return std::nullopt;
   return p;
 }
@@ -179,4 +180,4 @@ std::optional<BlobPacket> decode_blob(std::span<const std::uint8_t> bytes) {
   return p;
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

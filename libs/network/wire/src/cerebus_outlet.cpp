@@ -1,4 +1,5 @@
-// Packets as Blackrock's signal processors send them: sample groups, spikes, and enough of the configuration to be understood.
+// Packets as Blackrock's signal processors send them: sample groups, spikes, and enough of the configuration to be
+// understood.
 #include <algorithm>
 #include <bit>
 
@@ -20,7 +21,8 @@ class Packet {
  public:
   template <class T>
   void number(T x) {
-    for (std::size_t i = 0; i < sizeof(T); ++i) bytes.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(x) >> 8 * i & 0xff));
+    for (std::size_t i = 0; i < sizeof(T); ++i)
+      bytes.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(x) >> 8 * i & 0xff));
   }
   void real(float x) { number(std::bit_cast<std::uint32_t>(x)); }
   void text(std::string_view t, std::size_t length) {
@@ -34,8 +36,8 @@ bool is_loopback(const UdpPeer& p) {
   return p.address[10] == 0xff && p.address[11] == 0xff && p.address[12] == 127;
 }
 
-// Times are samples of 30 kHz from the session's beginning (the system says so: its clock is 30,000 Hz). What the system cannot send at
-// once is lost, and counted; a stream of packets has no listeners to know of.
+// Times are samples of 30 kHz from the session's beginning (the system says so: its clock is 30,000 Hz). What the
+// system cannot send at once is lost, and counted; a stream of packets has no listeners to know of.
 class CerebusOutlet final : public WireOutlet {
  public:
   explicit CerebusOutlet(const StreamTarget& target)
@@ -53,7 +55,8 @@ class CerebusOutlet final : public WireOutlet {
     Packet body;
     for (std::size_t i = 0; i < b.samples(); ++i) {
       body.bytes.clear();
-      for (std::size_t ch = 0; ch < b.channels; ++ch) body.number(static_cast<std::uint16_t>(b.values[i * b.channels + ch]));
+      for (std::size_t ch = 0; ch < b.channels; ++ch)
+        body.number(static_cast<std::uint16_t>(b.values[i * b.channels + ch]));
       add(b.first_sample + i, 0, kRawGroup, body.bytes);
       ++samples_;
     }
@@ -71,8 +74,9 @@ class CerebusOutlet final : public WireOutlet {
     ++spikes_;
   }
   [[nodiscard]] std::string told() const override {
-    return "Cerebus " + version_ + " to " + udp_name(peer_) + ": " + std::to_string(samples_) + " samples of " + std::to_string(channels_) +
-           " channels, " + std::to_string(spikes_) + " spikes; " + std::to_string(dropped_) + " datagrams could not be sent";
+    return "Cerebus " + version_ + " to " + udp_name(peer_) + ": " + std::to_string(samples_) + " samples of " +
+           std::to_string(channels_) + " channels, " + std::to_string(spikes_) + " spikes; " +
+           std::to_string(dropped_) + " datagrams could not be sent";
   }
   [[nodiscard]] std::uint64_t dropped() const override { return dropped_; }
 
@@ -143,4 +147,4 @@ std::unique_ptr<WireOutlet> make_cerebus_outlet(const StreamTarget& target) {
   return std::make_unique<CerebusOutlet>(target);
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

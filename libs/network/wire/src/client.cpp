@@ -126,7 +126,8 @@ void WireClient::listen_to(int fd) {
     counts_.passed_over = before.passed_over + parser.passed_over();
     counts_.bytes += static_cast<std::uint64_t>(n);
     if (!understood) {
-      trouble_ = server_.host + ":" + std::to_string(server_.port) + ": what it says is no OpenIGTLink; connected again";
+      trouble_ =
+          server_.host + ":" + std::to_string(server_.port) + ": what it says is no OpenIGTLink; connected again";
       open = false;
     }
   }
@@ -153,4 +154,4 @@ void WireClient::run() {
   }
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

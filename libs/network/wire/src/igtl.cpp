@@ -80,7 +80,8 @@ bool finite(Vec3 v) {
 }  // namespace
 
 IgtlPose ras_of_lps(const IgtlPose& p) {
-  return {{{ras_of_lps(p.axes.column[0]), ras_of_lps(p.axes.column[1]), ras_of_lps(p.axes.column[2])}}, ras_of_lps(p.at_mm)};
+  return {{{ras_of_lps(p.axes.column[0]), ras_of_lps(p.axes.column[1]), ras_of_lps(p.axes.column[2])}},
+          ras_of_lps(p.at_mm)};
 }
 
 std::uint64_t igtl_crc64(std::span<const std::uint8_t> bytes) {
@@ -90,7 +91,8 @@ std::uint64_t igtl_crc64(std::span<const std::uint8_t> bytes) {
   return crc;
 }
 
-WireBytes igtl_message(std::string_view type, std::string_view device, double time_s, std::span<const std::uint8_t> body) {
+WireBytes igtl_message(std::string_view type, std::string_view device, double time_s,
+                       std::span<const std::uint8_t> body) {
   Out out;
   out.bytes.reserve(IgtlParser::kHeader + body.size());
   out.number(std::uint16_t{1});
@@ -131,7 +133,8 @@ WireBytes igtl_sensor(std::string_view device, double time_s, std::uint64_t unit
   return igtl_message("SENSOR", device, time_s, body.bytes);
 }
 
-WireBytes igtl_samples(std::string_view device, double time_s, std::size_t channels, std::span<const std::int16_t> values) {
+WireBytes igtl_samples(std::string_view device, double time_s, std::size_t channels,
+                       std::span<const std::int16_t> values) {
   Out body;
   body.bytes.reserve(6 + 2 * values.size());
   body.number(kInt16);
@@ -152,8 +155,8 @@ WireBytes igtl_string(std::string_view device, double time_s, std::string_view t
   return igtl_message("STRING", device, time_s, body.bytes);
 }
 
-WireBytes igtl_status(std::string_view device, double time_s, IgtlStatus code, std::int64_t sub_code, std::string_view name,
-                      std::string_view text) {
+WireBytes igtl_status(std::string_view device, double time_s, IgtlStatus code, std::int64_t sub_code,
+                      std::string_view name, std::string_view text) {
   Out body;
   body.number(static_cast<std::uint16_t>(code));
   body.number(static_cast<std::uint64_t>(sub_code));
@@ -216,7 +219,9 @@ bool is_rigid(const IgtlPose& p) {
   constexpr double kTolerance = 0.01, kFarMm = 10000;
   const auto& c = p.axes.column;
   for (std::size_t i = 0; i < 3; ++i) {
-    if (!finite(c[i]) || !(std::abs(length(c[i]) - 1) <= kTolerance) || !(std::abs(dot(c[i], c[(i + 1) % 3])) <= kTolerance)) return false;
+    if (!finite(c[i]) || !(std::abs(length(c[i]) - 1) <= kTolerance) ||
+        !(std::abs(dot(c[i], c[(i + 1) % 3])) <= kTolerance))
+      return false;
   }
   return determinant(p.axes) > 0 && finite(p.at_mm) && length(p.at_mm) <= kFarMm;
 }
@@ -229,7 +234,8 @@ bool IgtlParser::header() {
   now_.time_s = std::ldexp(static_cast<double>(in.number<std::uint64_t>()), -32);
   body_bytes_ = in.number<std::uint64_t>();
   crc_ = in.number<std::uint64_t>();
-  const bool words = !now_.type.empty() && std::all_of(now_.type.begin(), now_.type.end(), [](char c) { return c >= ' ' && c < 127; });
+  const bool words =
+      !now_.type.empty() && std::all_of(now_.type.begin(), now_.type.end(), [](char c) { return c >= ' ' && c < 127; });
   return version_ >= 1 && version_ <= 3 && words && body_bytes_ <= kMostPassedOver;
 }
 
@@ -288,4 +294,4 @@ bool IgtlParser::feed(std::span<const std::uint8_t> bytes, const std::function<v
   return !lost_;
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -45,16 +45,19 @@ class IgtlOutlet final : public WireOutlet {
   }
   void block(const MonitorBlock& b) override {
     if (b.channels > 0)
-      server_.send(igtl_samples("NerveSignal", static_cast<double>(b.first_sample) / MonitorSetup::kRateHz, b.channels, b.values));
+      server_.send(igtl_samples("NerveSignal", static_cast<double>(b.first_sample) / MonitorSetup::kRateHz, b.channels,
+                                b.values));
   }
   void event(const MonitorEvent& e, const std::string& words) override {
-    server_.send(igtl_string("NerveEvent", static_cast<double>(e.sample) / MonitorSetup::kRateHz, event_json(e, words)));
+    server_.send(
+        igtl_string("NerveEvent", static_cast<double>(e.sample) / MonitorSetup::kRateHz, event_json(e, words)));
   }
   void let_stimulate(const std::shared_ptr<StimulatorDoor>& door) override {
     if (!stimulator_) return;
-    server_.answer(
-        {[door](std::uint64_t client, const IgtlMessage& m) { return door->hear(client, m, static_cast<double>(monotonic_ns()) / 1e9); },
-         [door](std::uint64_t client) { door->gone(client); }});
+    server_.answer({[door](std::uint64_t client, const IgtlMessage& m) {
+                      return door->hear(client, m, static_cast<double>(monotonic_ns()) / 1e9);
+                    },
+                    [door](std::uint64_t client) { door->gone(client); }});
   }
   void end(double at_s, const std::string& json) override {
     server_.send(igtl_string("SessionEnd", at_s, json));
@@ -66,8 +69,8 @@ class IgtlOutlet final : public WireOutlet {
   }
   [[nodiscard]] std::string told() const override {
     const WireCounts c = server_.counts();
-    return "OpenIGTLink on port " + std::to_string(server_.port()) + ": " + std::to_string(c.accepted) + " listeners, " +
-           std::to_string(c.messages) + " messages sent, " + std::to_string(c.dropped) + " dropped" +
+    return "OpenIGTLink on port " + std::to_string(server_.port()) + ": " + std::to_string(c.accepted) +
+           " listeners, " + std::to_string(c.messages) + " messages sent, " + std::to_string(c.dropped) + " dropped" +
            (c.turned_away > 0 ? ", " + std::to_string(c.turned_away) + " turned away" : "");
   }
   [[nodiscard]] std::uint64_t dropped() const override { return server_.counts().dropped; }
@@ -83,4 +86,4 @@ std::unique_ptr<WireOutlet> make_igtl_outlet(const StreamTarget& target) {
   return std::make_unique<IgtlOutlet>(target);
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

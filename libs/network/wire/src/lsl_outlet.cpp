@@ -42,7 +42,8 @@ class Library {
     find(child, "lsl_append_child");
     find(value, "lsl_append_child_value");
   }
-  LslInfo* (*create_info)(const char* name, const char* type, std::int32_t channels, double rate, std::int32_t format, const char* id);
+  LslInfo* (*create_info)(const char* name, const char* type, std::int32_t channels, double rate, std::int32_t format,
+                          const char* id);
   void (*destroy_info)(LslInfo*);
   LslOutletHandle* (*create_outlet)(LslInfo*, std::int32_t chunk, std::int32_t buffered_s);
   void (*destroy_outlet)(LslOutletHandle*);
@@ -59,13 +60,14 @@ class Library {
   template <class F>
   void find(F& f, const char* name) {
     f = reinterpret_cast<F>(::dlsym(handle_, name));
-    if (f == nullptr) throw Error(ExitCode::failed, std::string("liblsl lacks ") + name, "a newer one is needed (1.13 or later)");
+    if (f == nullptr)
+      throw Error(ExitCode::failed, std::string("liblsl lacks ") + name, "a newer one is needed (1.13 or later)");
   }
   void* handle_ = nullptr;
 };
 
-// Samples are stamped by LSL's clock as of the session's beginning, so that its time and that of others agree. The library's own threads
-// send; what nobody takes within kBufferedS it drops.
+// Samples are stamped by LSL's clock as of the session's beginning, so that its time and that of others agree. The
+// library's own threads send; what nobody takes within kBufferedS it drops.
 class LslOutlet final : public WireOutlet {
  public:
   void begin(const WireMonitor& monitor) override {
@@ -74,8 +76,8 @@ class LslOutlet final : public WireOutlet {
     events_ = lsl_.create_outlet(events, 0, kBufferedS);
     lsl_.destroy_info(events);
     if (channels_ == 0) return;
-    LslInfo* const info =
-        lsl_.create_info("OsteotomeEMG", "EMG", static_cast<std::int32_t>(channels_), MonitorSetup::kRateHz, kLslInt16, "osteotome-emg");
+    LslInfo* const info = lsl_.create_info("OsteotomeEMG", "EMG", static_cast<std::int32_t>(channels_),
+                                           MonitorSetup::kRateHz, kLslInt16, "osteotome-emg");
     LslXml* const all = lsl_.child(lsl_.desc(info), "channels");
     for (const std::string& label : monitor.labels) {
       LslXml* const one = lsl_.child(all, "channel");
@@ -87,7 +89,8 @@ class LslOutlet final : public WireOutlet {
     lsl_.destroy_info(info);
   }
   ~LslOutlet() override {
-    // What the library has not sent yet is lost with the outlet, and it does not tell when it has: time for the last blocks.
+    // What the library has not sent yet is lost with the outlet, and it does not tell when it has: time for the last
+    // blocks.
     bool heard = false;
     for (LslOutletHandle* const o : {signal_, events_}) heard = heard || (o != nullptr && lsl_.have_consumers(o) != 0);
     if (heard) std::this_thread::sleep_for(std::chrono::seconds(1));
@@ -139,4 +142,4 @@ std::unique_ptr<WireOutlet> make_lsl_outlet() {
   return std::make_unique<LslOutlet>();
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -12,4 +12,4 @@ namespace osteo::inline network {
 /// Lab Streaming Layer, by its library where it is installed. Error(failed) where it is not.
 [[nodiscard]] std::unique_ptr<WireOutlet> make_lsl_outlet();
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

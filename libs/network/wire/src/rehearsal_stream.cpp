@@ -43,9 +43,9 @@ RehearsalStream::~RehearsalStream() {
 
 MonitorOptions monitor_options_of(const std::string& setup_file) {
   MonitorOptions options;
-  options.setup =
-      setup_file.empty() ? parse_monitor(default_monitor_json(), "the built-in monitor") : parse_monitor(read_text(setup_file), setup_file);
+  options.setup = setup_file.empty() ? parse_monitor(default_monitor_json(), "the built-in monitor")
+                                     : parse_monitor(read_text(setup_file), setup_file);
   return options;
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -25,7 +25,9 @@ std::string RemoteMonitor::trouble() const {
   if (!understood_) return "connected; it has not told of a nerve monitor";
   if (link_) {
     const StimulatorLink::State s = link_->state();
-    if (!s.paired) return s.refused.empty() ? "the stimulator is not paired: does the rehearsal stream with /stimulator?" : s.refused;
+    if (!s.paired)
+      return s.refused.empty() ? "the stimulator is not paired: does the rehearsal stream with /stimulator?"
+                               : s.refused;
   }
   return {};
 }
@@ -58,7 +60,8 @@ void RemoteMonitor::take(const IgtlMessage& m) {
       if (!event || event->channel >= static_cast<int>(monitor_->labels.size())) return;
       ++events_;
       if (link_ && event->kind == MonitorEventKind::stimulator) link_->told(event->ma, event->search);
-      if (link_ && (event->kind == MonitorEventKind::threshold || event->kind == MonitorEventKind::no_threshold)) link_->told(0, false);
+      if (link_ && (event->kind == MonitorEventKind::threshold || event->kind == MonitorEventKind::no_threshold))
+        link_->told(0, false);
       for (MonitorSink* const s : sinks_) s->event(*event);
     } else if (m.device == "SessionEnd") {
       ended_ = true;
@@ -67,7 +70,8 @@ void RemoteMonitor::take(const IgtlMessage& m) {
   }
   if (m.device != "NerveSignal" || !monitor_) return;
   const auto samples = igtl_samples_in(m);
-  if (!samples || samples->channels != monitor_->labels.size() || samples->channels == 0 || samples->values.empty()) return;
+  if (!samples || samples->channels != monitor_->labels.size() || samples->channels == 0 || samples->values.empty())
+    return;
   const auto first = static_cast<std::uint64_t>(std::llround(m.time_s * MonitorSetup::kRateHz));
   const MonitorBlock block{first, samples->channels, samples->values};
   // One that begins before what was heard is another session; connected to again, the same goes on behind a gap.
@@ -86,4 +90,4 @@ void RemoteMonitor::take(const IgtlMessage& m) {
   for (MonitorSink* const s : sinks_) s->block(block);
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

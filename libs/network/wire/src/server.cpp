@@ -42,7 +42,8 @@ WireServer::WireServer(const WireAddress& address, Notice notice, double most_si
     listen_ = -1;
   }
   if (listen_ < 0)
-    throw Error(why == EADDRNOTAVAIL ? ExitCode::usage : ExitCode::failed, "cannot listen on " + name + ": " + std::strerror(why),
+    throw Error(why == EADDRNOTAVAIL ? ExitCode::usage : ExitCode::failed,
+                "cannot listen on " + name + ": " + std::strerror(why),
                 why == EADDRINUSE ? "another program has this port; name another" : "give an address of this machine");
   SocketAddress own;
   own.size = sizeof own.storage;
@@ -246,4 +247,4 @@ void WireServer::run() {
   }
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

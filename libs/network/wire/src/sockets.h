@@ -23,4 +23,4 @@ struct SocketAddress {
 /// Of a name or number, for TCP. Error(usage) where there is none.
 [[nodiscard]] std::vector<SocketAddress> addresses_of(const std::string& host, int port, bool to_listen);
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

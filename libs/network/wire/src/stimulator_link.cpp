@@ -130,7 +130,8 @@ std::vector<WireBytes> StimulatorDoor::take(Client& c, std::span<const std::uint
       }
       c.channel.emplace(kConnection, keys->to_guest, keys->to_host);
       const auto [setting, hands] = now_();
-      return {message_of(Step::welcome, proof(*keys, "stimulator host")), message(Step::state, c.channel->seal(plain_of(setting, hands)))};
+      return {message_of(Step::welcome, proof(*keys, "stimulator host")),
+              message(Step::state, c.channel->seal(plain_of(setting, hands)))};
     }
     case Step::setting: {
       const auto plain = c.channel ? c.channel->open(body) : std::nullopt;
@@ -227,4 +228,4 @@ void StimulatorLink::told(double current_ma, bool search) {
   state_.now.search = search;
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -29,7 +29,8 @@ std::optional<Vec3> vector_in(const Json& j, const char* key) {
 std::vector<StreamTarget> stream_targets(const std::string& text) {
   const auto refuse = [](const std::string& one) -> StreamTarget {
     throw Error(ExitCode::usage, "'" + one + "' is no place to stream to",
-                "igtl:PORT, igtl:HOST:PORT, igtl:PORT/stimulator, cerebus:HOST:PORT/VERSION or lsl; several with commas between");
+                "igtl:PORT, igtl:HOST:PORT, igtl:PORT/stimulator, cerebus:HOST:PORT/VERSION or lsl; several with "
+                "commas between");
   };
   std::vector<StreamTarget> all;
   for (std::size_t at = 0; at < text.size();) {
@@ -98,8 +99,8 @@ std::optional<WireMonitor> monitor_in(const std::string& json) {
   const Json* const channels = j->find("channels");
   const auto event_uv = number("event_uv");
   if (number("osteotome_wire") != kWireVersion || number("rate_hz") != MonitorSetup::kRateHz ||
-      number("uv_per_bit") != MonitorSetup::kMicrovoltsPerBit || !event_uv || !(*event_uv > 0 && *event_uv < 1e5) || channels == nullptr ||
-      channels->items().size() > MonitorSetup::kMostChannels)
+      number("uv_per_bit") != MonitorSetup::kMicrovoltsPerBit || !event_uv || !(*event_uv > 0 && *event_uv < 1e5) ||
+      channels == nullptr || channels->items().size() > MonitorSetup::kMostChannels)
     return std::nullopt;
   WireMonitor m;
   m.event_uv = *event_uv;
@@ -112,7 +113,9 @@ std::optional<WireMonitor> monitor_in(const std::string& json) {
 
 std::string event_json(const MonitorEvent& e, const std::string& words) {
   if (e.kind == MonitorEventKind::cause) return {};
-  Json j{{"event", name_of(e.kind)}, {"sample", e.sample}, {"at_s", static_cast<double>(e.sample) / MonitorSetup::kRateHz}};
+  Json j{{"event", name_of(e.kind)},
+         {"sample", e.sample},
+         {"at_s", static_cast<double>(e.sample) / MonitorSetup::kRateHz}};
   if (e.channel >= 0) j["channel"] = e.channel;
   if (e.seconds > 0) j["seconds"] = e.seconds;
   if (e.uv > 0) j["uv"] = e.uv;
@@ -163,8 +166,12 @@ std::unique_ptr<WireOutlet> make_outlet(const StreamTarget& target) {
   return make_igtl_outlet(target);
 }
 
-StreamFeed::StreamFeed(std::span<const StreamTarget> targets, double rate_hz, std::size_t hands, const MonitorReader* monitor)
-    : rate_hz_(rate_hz), every_(static_cast<std::uint64_t>(std::max(1.0, std::round(rate_hz / kPoseHz)))), now_(hands), monitor_(monitor) {
+StreamFeed::StreamFeed(std::span<const StreamTarget> targets, double rate_hz, std::size_t hands,
+                       const MonitorReader* monitor)
+    : rate_hz_(rate_hz),
+      every_(static_cast<std::uint64_t>(std::max(1.0, std::round(rate_hz / kPoseHz)))),
+      now_(hands),
+      monitor_(monitor) {
   for (const StreamTarget& t : targets) outlets_.push_back(make_outlet(t));
   WireMonitor m;
   if (monitor != nullptr) m = {monitor->wiring().labels(), monitor->setup().constants.event_uv};
@@ -257,4 +264,4 @@ std::uint64_t StreamFeed::dropped() const {
   return sum;
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

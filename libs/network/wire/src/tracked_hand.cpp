@@ -17,15 +17,19 @@ TrackerAddress tracker_address(const std::string& text) {
   TrackerAddress t;
   const std::size_t slash = text.find('/');
   if (slash != std::string::npos) t.tool = text.substr(slash + 1);
-  if (t.tool.size() > 20) throw Error(ExitCode::usage, "'" + t.tool + "' is longer than OpenIGTLink's names", "at most 20 letters");
+  if (t.tool.size() > 20)
+    throw Error(ExitCode::usage, "'" + t.tool + "' is longer than OpenIGTLink's names", "at most 20 letters");
   t.server = wire_address(text.substr(0, slash));
   if (t.server.port == 0)
-    throw Error(ExitCode::usage, "'" + text + "' names no port", "HOST:PORT or HOST:PORT/NAME, as localhost:18944/Drill");
+    throw Error(ExitCode::usage, "'" + text + "' names no port",
+                "HOST:PORT or HOST:PORT/NAME, as localhost:18944/Drill");
   return t;
 }
 
 TrackedLink::TrackedLink(const TrackerAddress& tracker)
-    : tracker_(tracker), follows_(tracker.tool), client_(tracker.server, kMostBody, [this](const IgtlMessage& m) { take(m); }) {}
+    : tracker_(tracker),
+      follows_(tracker.tool),
+      client_(tracker.server, kMostBody, [this](const IgtlMessage& m) { take(m); }) {}
 
 void TrackedLink::take(const IgtlMessage& m) {
   if (m.type == "TRANSFORM") {
@@ -69,14 +73,17 @@ std::string TrackedLink::trouble() const {
   const double since_ms = s.heard_ns == 0 ? -1 : static_cast<double>(monotonic_ns() - s.heard_ns) / 1e6;
   if (since_ms >= 0 && since_ms <= 10 * kStaleMs) return {};
   const std::lock_guard lock(mutex_);
-  if (refused_ > 0 && poses_ == 0) return "the tracker's matrices are no poses: not finite, scaled, sheared or mirrored";
+  if (refused_ > 0 && poses_ == 0)
+    return "the tracker's matrices are no poses: not finite, scaled, sheared or mirrored";
   if (s.heard_ns == 0)
-    return follows_.empty() ? "the tracker has not said yet where a tool is"
-                            : "the tracker says nothing of '" + follows_ + "'" + (others_ > 0 ? ", but of other tools" : "");
+    return follows_.empty()
+               ? "the tracker has not said yet where a tool is"
+               : "the tracker says nothing of '" + follows_ + "'" + (others_ > 0 ? ", but of other tools" : "");
   return "the tracked tool '" + follows_ + "' is out of sight; the hand rests where it was";
 }
 
-TrackedHand::TrackedHand(std::shared_ptr<TrackedLink> link, const HandGoal& start, const FootPedal* pedal, std::size_t hand)
+TrackedHand::TrackedHand(std::shared_ptr<TrackedLink> link, const HandGoal& start, const FootPedal* pedal,
+                         std::size_t hand)
     : TunedHand(hand), link_(std::move(link)), pedal_(pedal), tool_(start.tool), goal_(start) {}
 
 DeviceSample TrackedHand::read(std::uint64_t, double dt_s, Vec3 force_n) noexcept {
@@ -108,4 +115,4 @@ DeviceSample TrackedHand::read(std::uint64_t, double dt_s, Vec3 force_n) noexcep
   return s;
 }
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -25,8 +25,9 @@ std::optional<VoxelChange> apply_change(const VoxelChange& change, World& world)
 void apply_part(const SessionPart& part, World& world) {
   for (const SceneAction& a : part.actions) apply_action(a, world);
   for (const VoxelChange& c : part.changes) {
-    if (!apply_change(c, world)) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
+    if (!apply_change(c, world))
+      throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
   }
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

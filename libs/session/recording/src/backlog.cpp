@@ -111,4 +111,4 @@ std::optional<Error> Backlog::failure() const {
   return failure_;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -14,8 +14,8 @@
 
 namespace osteo::inline session {
 
-/// Until start() it passes on what it is given. Then write() never waits: a thread writes, in order, and syncs each second. What that
-/// throws is handed to the next write() or sync(), and nothing is written any more.
+/// Until start() it passes on what it is given. Then write() never waits: a thread writes, in order, and syncs each
+/// second. What that throws is handed to the next write() or sync(), and nothing is written any more.
 class Backlog final : public SessionSink {
  public:
   explicit Backlog(std::unique_ptr<SessionSink> disk) : disk_(std::move(disk)) {}
@@ -47,4 +47,4 @@ class Backlog final : public SessionSink {
   std::thread thread_;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -69,7 +69,8 @@ class OutFile {
   }
   [[noreturn]] void fail() const {
     throw Error(ExitCode::cannot_write, "cannot write '" + shown_.string() + "': " + std::strerror(errno),
-                errno == ENOSPC || errno == EFBIG ? "free some space, or write to another disk" : "choose a folder that you may write to");
+                errno == ENOSPC || errno == EFBIG ? "free some space, or write to another disk"
+                                                  : "choose a folder that you may write to");
   }
   fs::path shown_;
   int fd_ = -1;
@@ -79,7 +80,8 @@ class OutFile {
 // What all formats need of a session while it goes by.
 class Rows {
  public:
-  Rows(const SessionReader& session, const Context& context) : outline_(session.outline()), context_(context), parts_(session.parts()) {}
+  Rows(const SessionReader& session, const Context& context)
+      : outline_(session.outline()), context_(context), parts_(session.parts()) {}
 
   const SessionPart* next() {
     const double ticks = std::max(1.0, static_cast<double>(outline_.tick_records));
@@ -117,7 +119,8 @@ Told told(const RecordField& f) {
 }
 // Where an action has no plate or fixture its item says nothing.
 std::optional<std::uint32_t> who(const RecordField& f, const SceneAction& a) {
-  const bool has_item = a.is(ActionKind::grip) || a.is(ActionKind::attach) || a.is(ActionKind::detach) || a.is(ActionKind::open);
+  const bool has_item =
+      a.is(ActionKind::grip) || a.is(ActionKind::attach) || a.is(ActionKind::detach) || a.is(ActionKind::open);
   if (f.name == "item" && !has_item) return std::nullopt;
   const auto id = static_cast<std::uint32_t>(value_of(f, &a));
   return id == SceneAction::kNobody ? std::nullopt : std::optional(id);
@@ -158,15 +161,17 @@ void csv(Rows rows, OutFile& ticks, OutFile& actions, OutFile& notes) {
       actions.write(line + "\n");
     }
     for (const Note& n : p->notes)
-      notes.write(format_number(rows.seconds(n.tick)) + "," + std::to_string(n.tick) + "," + quoted(n.kind) + "," + quoted(n.json) + "\n");
+      notes.write(format_number(rows.seconds(n.tick)) + "," + std::to_string(n.tick) + "," + quoted(n.kind) + "," +
+                  quoted(n.json) + "\n");
   }
 }
 
 void mcap(Rows rows, OutFile& out) {
   const SessionOutline& o = rows.outline();
   McapWriter file([&](std::string_view bytes) { out.write(bytes); }, "osteotome " + o.header.program_version);
-  const std::vector<std::pair<std::string, std::string>> about{
-      {"rate_hz", format_number(o.header.rate_hz)}, {"bone_hash", o.header.bone_hash}, {"complete", o.end ? "yes" : "no"}};
+  const std::vector<std::pair<std::string, std::string>> about{{"rate_hz", format_number(o.header.rate_hz)},
+                                                               {"bone_hash", o.header.bone_hash},
+                                                               {"complete", o.end ? "yes" : "no"}};
   const auto schema = [](const char* title) {
     ordered_json j{{"type", "object"}, {"title", title}, {"properties", ordered_json::object()}};
     j["properties"]["time_s"] = {{"type", "number"}, {"unit", "s"}};
@@ -183,7 +188,8 @@ void mcap(Rows rows, OutFile& out) {
     if (is_value(f)) continue;
     described(actions, f);
     if (told(f) == Told::kind) actions["properties"][std::string(f.name)] = {{"type", "string"}};
-    if (told(f) == Told::nobody_or_number) actions["properties"][std::string(f.name)]["type"] = ordered_json::array({"integer", "null"});
+    if (told(f) == Told::nobody_or_number)
+      actions["properties"][std::string(f.name)]["type"] = ordered_json::array({"integer", "null"});
   }
   actions["properties"]["values"] = {{"type", "array"}, {"items", {{"type", "number"}}}};
   for (const char* name : {"first_tick", "ticks", "bytes"}) gaps["properties"][name] = {{"type", "integer"}};
@@ -237,7 +243,8 @@ void mcap(Rows rows, OutFile& out) {
       file.message(on_gaps, ns(g->first_tick), j.dump());
     }
     for (const Note& n : p->notes) {
-      const ordered_json j{{"time_s", rows.seconds(n.tick)}, {"tick", n.tick}, {"kind", n.kind}, {"value", ordered_json::parse(n.json)}};
+      const ordered_json j{
+          {"time_s", rows.seconds(n.tick)}, {"tick", n.tick}, {"kind", n.kind}, {"value", ordered_json::parse(n.json)}};
       file.message(on_notes, ns(n.tick), j.dump());
     }
   }
@@ -245,12 +252,14 @@ void mcap(Rows rows, OutFile& out) {
   file.finish();
 }
 
-// --- HDF5 ------------------------------------------------------------------------------------------------------------------------------
+// --- HDF5
+// ------------------------------------------------------------------------------------------------------------------------------
 
 class Hdf5 {
  public:
   explicit Hdf5(const fs::path& path) {
-    // A file that could not be flushed for want of room stays half open in the library, which would crash on it at exit.
+    // A file that could not be flushed for want of room stays half open in the library, which would crash on it at
+    // exit.
     H5dont_atexit();
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     file_ = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
@@ -373,7 +382,8 @@ class Hdf5 {
     need(written);
   }
   void number(const char* name, double value) {
-    const hid_t space = H5Screate(H5S_SCALAR), a = H5Acreate2(file_, name, H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, H5P_DEFAULT);
+    const hid_t space = H5Screate(H5S_SCALAR),
+                a = H5Acreate2(file_, name, H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, H5P_DEFAULT);
     const bool written = a >= 0 && H5Awrite(a, H5T_NATIVE_DOUBLE, &value) >= 0;
     if (a >= 0) H5Aclose(a);
     H5Sclose(space);
@@ -402,8 +412,12 @@ void hdf5(Rows rows, const fs::path& path) {
     std::deque<Hdf5::Numbers<double>> doubles;
     std::deque<Hdf5::Numbers<std::int64_t>> whole;
     std::deque<Hdf5::Texts> texts;
-    const auto real = [&](const std::string& name, std::string_view unit) { return &doubles.emplace_back(file, name, unit); };
-    const auto integer = [&](const std::string& name, std::string_view unit) { return &whole.emplace_back(file, name, unit); };
+    const auto real = [&](const std::string& name, std::string_view unit) {
+      return &doubles.emplace_back(file, name, unit);
+    };
+    const auto integer = [&](const std::string& name, std::string_view unit) {
+      return &whole.emplace_back(file, name, unit);
+    };
     const auto text = [&](const std::string& name) { return &texts.emplace_back(file, name); };
     // What takes a field of a record.
     struct Field {
@@ -532,4 +546,4 @@ void export_session(const SessionReader& session, const fs::path& path, const Co
   }
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

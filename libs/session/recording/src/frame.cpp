@@ -24,7 +24,8 @@ std::vector<std::byte> compressed(std::span<const std::byte> bytes) {
   constexpr int kLevel = 3;  // higher ones gain 2 % and take ten times as long
   std::vector<std::byte> out(ZSTD_compressBound(bytes.size()));
   const std::size_t n = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), kLevel);
-  if (ZSTD_isError(n) != 0) throw Error(ExitCode::resources, "the session cannot be compressed", "it takes some memory");
+  if (ZSTD_isError(n) != 0)
+    throw Error(ExitCode::resources, "the session cannot be compressed", "it takes some memory");
   out.resize(n);
   return out;
 }
@@ -36,4 +37,4 @@ bool decompress(std::span<const std::byte> from, std::vector<std::byte>& to) {
   return ZSTD_decompress(to.data(), to.size(), from.data(), from.size()) == size;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -9,7 +9,13 @@ namespace osteo::inline session {
 
 constexpr std::uint32_t kMagic = 0x3246534f;     // "OSF2"
 constexpr std::uint32_t kOldMagic = 0x3146534f;  // "OSF1"
-enum FrameType : std::uint32_t { kHeaderFrame = 1, kRecordsFrame = 2, kGapFrame = 3, kCheckpointFrame = 4, kEndFrame = 5 };
+enum FrameType : std::uint32_t {
+  kHeaderFrame = 1,
+  kRecordsFrame = 2,
+  kGapFrame = 3,
+  kCheckpointFrame = 4,
+  kEndFrame = 5
+};
 constexpr std::uint32_t kLongestFrame = 64U << 20;  // also when it is no longer compressed
 
 struct FrameHead {
@@ -26,4 +32,4 @@ static_assert(sizeof(FrameHead) == 32);
 /// False where it is none, or of more than kLongestFrame.
 [[nodiscard]] bool decompress(std::span<const std::byte> from, std::vector<std::byte>& to);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -5,8 +5,8 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
-#include "osteo/simulation/bone/hardness.h"
 #include "osteo/core/data/points_io.h"
+#include "osteo/simulation/bone/hardness.h"
 #include "osteo/simulation/haptics/texture.h"
 
 namespace osteo::inline session {
@@ -15,9 +15,11 @@ namespace {
 struct CurveFields {
   using Params = CurveConstraintParams;
   static void describe(CurveConstraintParams& p, auto& visit) {
-    visit({"curve_stiffness_n_per_mm", "pull towards the curve for a mm of distance", "N/mm", 0, 100}, p.stiffness_n_per_mm);
+    visit({"curve_stiffness_n_per_mm", "pull towards the curve for a mm of distance", "N/mm", 0, 100},
+          p.stiffness_n_per_mm);
     visit({"curve_max_force_n", "the pull grows no further", "N", 0, 100}, p.max_force_n);
-    visit({"curve_arc_penalty", "mm of distance that a mm of way along the curve counts as", "", 0, 100}, p.arc_penalty);
+    visit({"curve_arc_penalty", "mm of distance that a mm of way along the curve counts as", "", 0, 100},
+          p.arc_penalty);
     visit({"curve_engage_mm", "takes hold when nearer than this", "mm", 0, 1e9}, p.engage_mm);
     visit({"curve_release_mm", "lets go when farther than this", "mm", 0, 1e9}, p.release_mm);
   }
@@ -29,7 +31,8 @@ std::vector<FieldRef> all_fields(HapticSetup& setup) {
   return fields;
 }
 
-// { "diamond": "proxy", "cutting taper": "volume", "sucker": "overlap" }: an instrument is meant when its name holds all of the words.
+// { "diamond": "proxy", "cutting taper": "volume", "sucker": "overlap" }: an instrument is meant when its name holds
+// all of the words.
 void set_tool_methods(const JsonValue& tools, const JsonFile& file, HapticSetup& setup) {
   if (tools.kind != JsonValue::Kind::object) throw file.wrong(tools, "\"tools\" must be an object in braces");
   for (const auto& [words, method_name] : tools.members) {
@@ -51,8 +54,9 @@ void set_tool_methods(const JsonValue& tools, const JsonFile& file, HapticSetup&
       any = true;
     }
     if (!any)
-      throw file.wrong(method_name, "tools: no instrument is a \"" + words + "\"",
-                       "words are cutting, diamond, ball, cylinder, taper, 1 mm to 7 mm, sucker, irrigator, probe, hook, saw");
+      throw file.wrong(
+          method_name, "tools: no instrument is a \"" + words + "\"",
+          "words are cutting, diamond, ball, cylinder, taper, 1 mm to 7 mm, sucker, irrigator, probe, hook, saw");
   }
 }
 
@@ -71,7 +75,8 @@ void load_haptic_settings(const fs::path& path, HapticSetup& setup) {
   others({"curve_file", "points of a curve, beside this file"}, curve_file);
   others({"vibration_file", "measured vibration, beside this file"}, vibration_file);
   others({"texture_file", "what tools feel that slide over bone, beside this file"}, texture_file);
-  others({"texture_mass_kg", "of hand and tool, by which a recorded acceleration is a force", "kg", 0.001, 10}, texture_mass_kg);
+  others({"texture_mass_kg", "of hand and tool, by which a recorded acceleration is a force", "kg", 0.001, 10},
+         texture_mass_kg);
   fields.insert(fields.end(), others.fields.begin(), others.fields.end());
   const std::vector<std::string> besides{"tools", "hardness"};
   file.read(file.root(), "", fields, besides);
@@ -113,8 +118,8 @@ std::string haptic_settings_json(const HapticSetup& setup) {
   const auto fields = all_fields(copy);
   for (const FieldRef& f : fields) {
     const bool quoted = f.kind() == "choice" || f.kind() == "text";
-    text +=
-        "  \"" + std::string(f.doc.name) + "\": " + (quoted ? "\"" + f.to_text() + "\"" : f.to_text()) + ",  // " + std::string(f.doc.help);
+    text += "  \"" + std::string(f.doc.name) + "\": " + (quoted ? "\"" + f.to_text() + "\"" : f.to_text()) + ",  // " +
+            std::string(f.doc.help);
     if (!f.doc.unit.empty()) text += ", " + std::string(f.doc.unit);
     text += "\n";
   }
@@ -122,8 +127,9 @@ std::string haptic_settings_json(const HapticSetup& setup) {
           (!setup.hardness   ? "\"auto\""
            : *setup.hardness ? "true"
                              : "false") +
-          "  // dense bone resists the burr more, by the HU of the case; auto: where it keeps them; false: all bone alike\n}\n";
+          "  // dense bone resists the burr more, by the HU of the case; auto: where it keeps them; false: all bone "
+          "alike\n}\n";
   return text;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -64,7 +64,8 @@ void McapWriter::put(std::string_view bytes) {
   crc_ = crc32_of(crc_, bytes);
 }
 
-std::uint16_t McapWriter::add_channel(std::string_view topic, std::string_view schema_name, std::string_view schema_json,
+std::uint16_t McapWriter::add_channel(std::string_view topic, std::string_view schema_name,
+                                      std::string_view schema_json,
                                       const std::vector<std::pair<std::string, std::string>>& metadata) {
   const auto id = static_cast<std::uint16_t>(channels_.size() + 1);
   Channel& c = channels_.emplace_back();
@@ -231,4 +232,4 @@ void McapWriter::finish() {
   put(all);
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -10,9 +10,9 @@
 
 namespace osteo::inline session {
 
-/// Laid out as the reference writers do: header; chunks of 768 KiB, uncompressed, with a CRC, each followed by an index of its messages for
-/// each channel; data end with the CRC of all before; schemas, channels, statistics, chunk index, summary offsets; footer with the
-/// summary's CRC. Memory: a chunk, and 60 bytes for each chunk written.
+/// Laid out as the reference writers do: header; chunks of 768 KiB, uncompressed, with a CRC, each followed by an index
+/// of its messages for each channel; data end with the CRC of all before; schemas, channels, statistics, chunk index,
+/// summary offsets; footer with the summary's CRC. Memory: a chunk, and 60 bytes for each chunk written.
 class McapWriter {
  public:
   using Out = std::function<void(std::string_view bytes)>;
@@ -45,4 +45,4 @@ class McapWriter {
   std::vector<Chunk> chunks_;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

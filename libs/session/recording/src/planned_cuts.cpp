@@ -26,7 +26,8 @@ struct Entry {
     visit({"name", "that a script and the window call it by", "", 0, 0, true}, p.name);
     visit({"about", "what it is for"}, p.about);
     SawFields::describe(p.saw, visit, true);
-    visit({"within_mm", "as a cutting guide: a saw this near slips in", "mm", 0.1, SceneAction::kMostSlotMm}, p.within_mm);
+    visit({"within_mm", "as a cutting guide: a saw this near slips in", "mm", 0.1, SceneAction::kMostSlotMm},
+          p.within_mm);
   }
 };
 
@@ -43,7 +44,8 @@ std::vector<PlannedCut> load_planned_cuts(const std::filesystem::path& path) {
   const std::vector<std::string> besides{"cuts"};
   file.read(root, "", fields_in(head), besides);
   const auto& items = file.list(file.need(root, "", "cuts"), "\"cuts\"");
-  if (items.empty()) throw file.wrong(file.need(root, "", "cuts"), "\"cuts\": there is none", "without planned cuts leave the file out");
+  if (items.empty())
+    throw file.wrong(file.need(root, "", "cuts"), "\"cuts\": there is none", "without planned cuts leave the file out");
   std::vector<PlannedCut> cuts;
   for (std::size_t n = 0; n < items.size(); ++n) {
     const std::string where = "cut " + std::to_string(n + 1);
@@ -52,7 +54,8 @@ std::vector<PlannedCut> load_planned_cuts(const std::filesystem::path& path) {
     if (e.name.empty()) throw file.wrong(items[n], where + ": \"name\" is empty");
     for (const PlannedCut& c : cuts) {
       if (c.name == e.name)
-        throw file.wrong(items[n], where + ": there is another \"" + e.name + "\" above", "give each a name of its own");
+        throw file.wrong(items[n], where + ": there is another \"" + e.name + "\" above",
+                         "give each a name of its own");
     }
     cuts.push_back({e.name, e.saw.checked(file, items[n], where), e.within_mm});
   }
@@ -90,4 +93,4 @@ const PlannedCut& planned_cut(std::span<const PlannedCut> cuts, std::string_view
               cuts.empty() ? "the case has no " + std::string(kPlannedCutsFile) : "there are: " + names);
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -1,5 +1,5 @@
-// Records as they stand in a frame: field by field, each as differences to the record before, the bytes of these transposed, so that what
-// changes little compresses well.
+// Records as they stand in a frame: field by field, each as differences to the record before, the bytes of these
+// transposed, so that what changes little compresses well.
 #pragma once
 #include <string>
 #include <vector>
@@ -22,9 +22,11 @@ struct FileTable {
 };
 
 /// Appends `n` records, `bytes` apart in memory.
-void put_records(std::vector<std::byte>& out, std::span<const RecordField> fields, const void* records, std::size_t n, std::size_t bytes);
-/// The reverse: `from` holds n * table.bytes. Fields that the file lacks stay as they are in `records`; another type of number is
-/// converted.
-void get_records(const FileTable& table, std::span<const std::byte> from, std::size_t n, void* records, std::size_t bytes);
+void put_records(std::vector<std::byte>& out, std::span<const RecordField> fields, const void* records, std::size_t n,
+                 std::size_t bytes);
+/// The reverse: `from` holds n * table.bytes. Fields that the file lacks stay as they are in `records`; another type of
+/// number is converted.
+void get_records(const FileTable& table, std::span<const std::byte> from, std::size_t n, void* records,
+                 std::size_t bytes);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -10,7 +10,8 @@
 #include "backlog.h"
 
 namespace osteo::inline session {
-Recorder::Recorder(StreamReader& reader, std::unique_ptr<SessionSink> sink, const SessionHeader& header, std::size_t most_waiting_bytes)
+Recorder::Recorder(StreamReader& reader, std::unique_ptr<SessionSink> sink, const SessionHeader& header,
+                   std::size_t most_waiting_bytes)
     : reader_(reader),
       backlog_(new Backlog(std::move(sink))),
       writer_(std::unique_ptr<SessionSink>(backlog_), header),
@@ -67,7 +68,8 @@ std::size_t Recorder::drain() {
       if (wanted > changes_buffer_.size()) changes_buffer_.resize(wanted);
     });
     for (std::size_t left = wanted; left > 0;) {  // also after a failure, so that the servo's ring does not fill
-      const std::size_t some = reader_.changes.pop({changes_buffer_.data() + (failed() ? 0 : got), std::min(left, changes_buffer_.size())});
+      const std::size_t some =
+          reader_.changes.pop({changes_buffer_.data() + (failed() ? 0 : got), std::min(left, changes_buffer_.size())});
       if (some == 0) break;
       got += some;
       left -= some;
@@ -96,7 +98,8 @@ void Recorder::take(std::size_t n, std::size_t got) {
       put_up_to(t);
       lose(next_tick_, r.tick - next_tick_, true);
     }
-    if (const std::uint64_t dropped = reader_.actions_dropped.load(std::memory_order_relaxed); r.hand == 0 && dropped > actions_dropped_) {
+    if (const std::uint64_t dropped = reader_.actions_dropped.load(std::memory_order_relaxed);
+        r.hand == 0 && dropped > actions_dropped_) {
       put_up_to(t);
       lose(r.tick, 0, true);
       actions_dropped_ = dropped;
@@ -248,4 +251,4 @@ Recorder::Status Recorder::status() const {
   return s;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

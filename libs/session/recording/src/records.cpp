@@ -23,7 +23,8 @@ constexpr std::size_t kPosition = offsetof(TickRecord, device.position_mm), kAxi
 constexpr std::size_t kForce = offsetof(TickRecord, force_n), kTorque = offsetof(TickRecord, torque_n_mm);
 constexpr std::size_t kShown = offsetof(TickRecord, shown_offset_mm);
 constexpr std::string_view kTip = "centre of the burr's tip, LPS", kToHandle = "unit, from burr to handle";
-constexpr std::string_view kOnHand = "force on the hand, after all limits", kTurning = "torque on the hand about the position";
+constexpr std::string_view kOnHand = "force on the hand, after all limits",
+                           kTurning = "torque on the hand about the position";
 constexpr std::string_view kWhereShown = "from the position to where the tool is shown";
 
 constexpr RecordField kTickFields[] = {
@@ -38,7 +39,8 @@ constexpr RecordField kTickFields[] = {
     {"pedal", u8, offsetof(TickRecord, device.pedal), "0 to 255", "how far down it is", input},
     {"tool", u8, offsetof(TickRecord, device.tool), "index", "in the header's instruments", input},
     {"buttons", u8, offsetof(TickRecord, device.buttons), "bits", "of the device, beyond the pedal's", input},
-    {"device_age_ms", u8, offsetof(TickRecord, device.age_ms), "ms", "since the device last reported; 255: longer", input},
+    {"device_age_ms", u8, offsetof(TickRecord, device.age_ms), "ms", "since the device last reported; 255: longer",
+     input},
     nth<TickRecord>("force_x_n", f32, kForce, 0, "N", kOnHand),
     nth<TickRecord>("force_y_n", f32, kForce, 1, "N", kOnHand),
     nth<TickRecord>("force_z_n", f32, kForce, 2, "N", kOnHand),
@@ -55,9 +57,12 @@ constexpr RecordField kTickFields[] = {
     {"voxels_changed", u32, offsetof(TickRecord, voxels_changed), "voxels", "in this tick"},
     {"immersed", u32, offsetof(TickRecord, immersed), "voxels", "of bone in the burr"},
     {"flags", u32, offsetof(TickRecord, flags), "bits", "what happened: see session-format.md"},
-    {"energy_mj", f32, offsetof(TickRecord, energy_mj), "mJ", "of the passivity observer: positive, the contact gave more than it took"},
-    {"thickness_mm", f32, offsetof(TickRecord, thickness_mm), "mm", "of bone under the burr along its push; 0 without contact, at most 10"},
-    {"clearance_mm", f32, offsetof(TickRecord, clearance_mm), "mm", "to the nearest structure at risk; negative inside"},
+    {"energy_mj", f32, offsetof(TickRecord, energy_mj), "mJ",
+     "of the passivity observer: positive, the contact gave more than it took"},
+    {"thickness_mm", f32, offsetof(TickRecord, thickness_mm), "mm",
+     "of bone under the burr along its push; 0 without contact, at most 10"},
+    {"clearance_mm", f32, offsetof(TickRecord, clearance_mm), "mm",
+     "to the nearest structure at risk; negative inside"},
     {"structure", u32, offsetof(TickRecord, structure), "label value", "which structure that is; 0: none within reach"},
     {"work_us", f32, offsetof(TickRecord, work_us), "us", "time the tick took", machine},
     {"lateness_us", f32, offsetof(TickRecord, lateness_us), "us", "how late it was woken", machine},
@@ -67,8 +72,9 @@ constexpr RecordField kChangeFields[] = {
     {"density", f32, offsetof(VoxelChange, density), "share of a voxel", "from now on"},
 };
 constexpr std::string_view kByAction = "as the kind of action says";
-constexpr std::array<std::string_view, 12> kValueNames{"value_0", "value_1", "value_2", "value_3", "value_4",  "value_5",
-                                                       "value_6", "value_7", "value_8", "value_9", "value_10", "value_11"};
+constexpr std::array<std::string_view, 12> kValueNames{"value_0", "value_1", "value_2",  "value_3",
+                                                       "value_4", "value_5", "value_6",  "value_7",
+                                                       "value_8", "value_9", "value_10", "value_11"};
 constexpr auto kActionFields = [] {
   std::array<RecordField, 6 + kValueNames.size()> f{{
       {"tick", u64, offsetof(SceneAction, tick), "1", "at whose beginning it happened", input},
@@ -125,8 +131,9 @@ To converted(From value) {
   if constexpr (std::is_integral_v<To> && std::is_integral_v<From>) {
     return std::in_range<To>(value) ? static_cast<To>(value) : To{};
   } else if constexpr (std::is_integral_v<To>) {
-    return value >= 0 && value < 18446744073709551616.0 && std::in_range<To>(static_cast<std::uint64_t>(value)) ? static_cast<To>(value)
-                                                                                                                : To{};
+    return value >= 0 && value < 18446744073709551616.0 && std::in_range<To>(static_cast<std::uint64_t>(value))
+               ? static_cast<To>(value)
+               : To{};
   } else {
     return static_cast<To>(value);
   }
@@ -154,20 +161,23 @@ std::size_t size_of(FieldType type) {
 }
 
 double value_of(const RecordField& field, const void* record) {
-  return with_type(field.type,
-                   [&](auto t) { return static_cast<double>(load<decltype(t)>(static_cast<const std::byte*>(record) + field.offset)); });
+  return with_type(field.type, [&](auto t) {
+    return static_cast<double>(load<decltype(t)>(static_cast<const std::byte*>(record) + field.offset));
+  });
 }
 
 const RecordField* first_difference(std::span<const RecordField* const> fields, const void* a, const void* b) {
   for (const RecordField* const f : fields) {
     if (f->role == machine) continue;
-    if (std::memcmp(static_cast<const std::byte*>(a) + f->offset, static_cast<const std::byte*>(b) + f->offset, size_of(f->type)) != 0)
+    if (std::memcmp(static_cast<const std::byte*>(a) + f->offset, static_cast<const std::byte*>(b) + f->offset,
+                    size_of(f->type)) != 0)
       return f;
   }
   return nullptr;
 }
 
-void put_records(std::vector<std::byte>& out, std::span<const RecordField> fields, const void* records, std::size_t n, std::size_t bytes) {
+void put_records(std::vector<std::byte>& out, std::span<const RecordField> fields, const void* records, std::size_t n,
+                 std::size_t bytes) {
   for (const RecordField& field : fields) {
     std::size_t at = out.size();
     out.resize(at + n * size_of(field.type));
@@ -184,7 +194,8 @@ void put_records(std::vector<std::byte>& out, std::span<const RecordField> field
   }
 }
 
-void get_records(const FileTable& table, std::span<const std::byte> from, std::size_t n, void* records, std::size_t bytes) {
+void get_records(const FileTable& table, std::span<const std::byte> from, std::size_t n, void* records,
+                 std::size_t bytes) {
   std::size_t at = 0;
   for (const FileField& field : table.fields) {
     const std::size_t column = at;
@@ -196,7 +207,8 @@ void get_records(const FileTable& table, std::span<const std::byte> from, std::s
       Bits now{};
       for (std::size_t i = 0; i < n; ++i, to += bytes) {
         Bits step{};
-        for (std::size_t k = 0; k < sizeof step; ++k) step |= static_cast<Bits>(static_cast<Bits>(from[column + i + k * n]) << (8 * k));
+        for (std::size_t k = 0; k < sizeof step; ++k)
+          step |= static_cast<Bits>(static_cast<Bits>(from[column + i + k * n]) << (8 * k));
         now = static_cast<Bits>(now + step);
         if (field.type == field.ours->type) {
           std::memcpy(to, &now, sizeof now);
@@ -216,4 +228,4 @@ void get_records(const FileTable& table, std::span<const std::byte> from, std::s
   }
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

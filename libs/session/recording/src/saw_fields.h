@@ -26,7 +26,8 @@ std::vector<FieldRef> fields_in(T& part) {
 }
 
 /// Unit. Error(usage) with its line when it has no length.
-inline Vec3 direction_of(const JsonFile& file, const JsonValue& object, const std::string& where, const char* key, const Triple& t) {
+inline Vec3 direction_of(const JsonFile& file, const JsonValue& object, const std::string& where, const char* key,
+                         const Triple& t) {
   const Vec3 v = vec(t);
   const JsonValue* const at = object.find(key);
   if (!(length(v) > 1e-9))
@@ -46,13 +47,16 @@ struct SawFields {
     visit({"length_mm", "of the cut; 0: through", "mm", 0, 2000}, p.length_mm);
     visit({"depth_mm", "across normal and length; 0: through", "mm", 0, 2000}, p.depth_mm);
   }
-  /// The cut, its directions as they are written (a cut takes any length). Error(usage) with its line: what is no direction.
+  /// The cut, its directions as they are written (a cut takes any length). Error(usage) with its line: what is no
+  /// direction.
   [[nodiscard]] SawCut checked(const JsonFile& file, const JsonValue& object, const std::string& where) const {
-    const Vec3 across = direction_of(file, object, where, "normal", normal), length_of = direction_of(file, object, where, "along", along);
+    const Vec3 across = direction_of(file, object, where, "normal", normal),
+               length_of = direction_of(file, object, where, "along", along);
     if (object.find("along") != nullptr && length(cross(across, length_of)) < 1e-6)
-      throw file.wrong(object, where + ": \"along\" lies along \"normal\"", "the length of the blade lies across its normal");
+      throw file.wrong(object, where + ": \"along\" lies along \"normal\"",
+                       "the length of the blade lies across its normal");
     return {vec(at_mm), vec(normal), vec(along), kerf_mm, length_mm, depth_mm};
   }
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -23,10 +23,10 @@ std::vector<SceneAction> actions_of(const Script& script, double rate_hz) {
 
 std::vector<std::unique_ptr<Device>> devices_of(const Script& script, double rate_hz) {
   std::vector<std::unique_ptr<Device>> devices;
-  devices.push_back(
-      std::make_unique<ScriptedDevice>(script, rate_hz, script.actions.empty() ? 0 : script.actions.back().tick(rate_hz) + 1));
+  devices.push_back(std::make_unique<ScriptedDevice>(
+      script, rate_hz, script.actions.empty() ? 0 : script.actions.back().tick(rate_hz) + 1));
   for (const Strokes& s : script.more_hands) devices.push_back(std::make_unique<ScriptedDevice>(s, rate_hz));
   return devices;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

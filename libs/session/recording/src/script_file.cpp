@@ -48,13 +48,15 @@ class ScriptReader {
     if (const JsonValue* const c = root.find("camera")) {
       CameraPart camera;
       file_.read(*c, "camera", fields_in(camera));
-      script_.camera = Script::Camera{vec(camera.centre_mm), camera.radius_mm, direction(*c, "camera", "eye", camera.eye)};
+      script_.camera =
+          Script::Camera{vec(camera.centre_mm), camera.radius_mm, direction(*c, "camera", "eye", camera.eye)};
     }
     const JsonValue& waypoints = read_waypoints(root, "", script_);
     read_hands(root);
     int number = 0;
     const JsonValue* const actions = root.find("actions");
-    if (actions != nullptr && actions->kind != JsonValue::Kind::list) throw file_.wrong(*actions, "\"actions\" must be a list");
+    if (actions != nullptr && actions->kind != JsonValue::Kind::list)
+      throw file_.wrong(*actions, "\"actions\" must be a list");
     for (std::size_t a = 0; actions != nullptr && a < actions->items.size(); ++a) {
       const std::string where = "action " + std::to_string(++number);
       const std::size_t before = script_.actions.size();
@@ -63,7 +65,8 @@ class ScriptReader {
         throw file_.wrong(actions->items[a], where + ": it begins before the one above has ended",
                           "actions stand in the order of their times");
     }
-    if (!(script_.seconds() > 0)) throw file_.wrong(waypoints, "the script takes no time", "give a last waypoint with \"t_s\" above 0");
+    if (!(script_.seconds() > 0))
+      throw file_.wrong(waypoints, "the script takes no time", "give a last waypoint with \"t_s\" above 0");
   }
 
  private:
@@ -100,7 +103,8 @@ class ScriptReader {
   }
 
   const JsonValue& read_waypoints(const JsonValue& of, const std::string& where, Strokes& hand) {
-    const JsonValue& waypoints = needed(of, "waypoints", JsonValue::Kind::list, "[{\"t_s\": 0, \"at_mm\": [80, 24, -26]}, ...]");
+    const JsonValue& waypoints =
+        needed(of, "waypoints", JsonValue::Kind::list, "[{\"t_s\": 0, \"at_mm\": [80, 24, -26]}, ...]");
     int number = 0;
     for (const JsonValue& w : waypoints.items) waypoint(w, where + "waypoint " + std::to_string(++number), hand);
     if (hand.waypoints.empty()) throw file_.wrong(waypoints, where + "there are no waypoints");
@@ -141,16 +145,19 @@ class ScriptReader {
       file_.read(w, where, fields_in(p));
       must_rise(p.t_s, w, where, hand);
       if (!p.drill && w.find("pedal") != nullptr && p.pedal > 0)
-        throw file_.wrong(*w.find("pedal"), where + ": the pedal is down and \"drill\" is false", "leave out one of the two");
+        throw file_.wrong(*w.find("pedal"), where + ": the pedal is down and \"drill\" is false",
+                          "leave out one of the two");
       hand.waypoints.push_back({p.t_s, vec(p.at_mm), p.drill, p.pedal});
     }
   }
   void must_rise(double t_s, const JsonValue& w, const std::string& where, const Strokes& hand) {
     if (!hand.waypoints.empty() && !(t_s > hand.waypoints.back().t_s))
-      throw file_.wrong(w, where + ": times must rise, but the one above ends at " + format_number(hand.waypoints.back().t_s) + " s");
+      throw file_.wrong(
+          w, where + ": times must rise, but the one above ends at " + format_number(hand.waypoints.back().t_s) + " s");
   }
   // Circles that open and close between the middle and the rim of a bowl, a little deeper each time.
-  void add_cavity(double begin_s, const Cavity& c, Vec3 in, const JsonValue& w, const std::string& where, Strokes& hand) {
+  void add_cavity(double begin_s, const Cavity& c, Vec3 in, const JsonValue& w, const std::string& where,
+                  Strokes& hand) {
     must_rise(begin_s, w, where, hand);
     const Vec3 u = any_perpendicular(in), v = cross(in, u);
     constexpr double kStep = 0.05, kSwaysPerS = 0.25;
@@ -160,7 +167,8 @@ class ScriptReader {
       const portable::SinCos turn = portable::sin_cos_turns(c.turns_per_s * t);
       // A bowl: less deep towards its rim.
       const double depth = c.depth_mm * share * (1 - 0.4 * (circle / c.radius_mm) * (circle / c.radius_mm));
-      hand.waypoints.push_back({begin_s + t, vec(c.centre_mm) + in * depth + u * (circle * turn.cos) + v * (circle * turn.sin), true});
+      hand.waypoints.push_back(
+          {begin_s + t, vec(c.centre_mm) + in * depth + u * (circle * turn.cos) + v * (circle * turn.sin), true});
     }
   }
 
@@ -176,7 +184,8 @@ class ScriptReader {
       throw file_.wrong(entry, where + ": it says nothing that can be done", "one of " + list);
     }
     if (entry.members.size() > 2)
-      throw file_.wrong(entry, where + ": it says more than one thing to do", "give each an entry of its own, with its own \"t_s\"");
+      throw file_.wrong(entry, where + ": it says more than one thing to do",
+                        "give each an entry of its own, with its own \"t_s\"");
     const JsonMember& what = entry.members[entry.members[0].key == "t_s" ? 1 : 0];
     std::apply(
         [&](auto... form) {
@@ -200,17 +209,20 @@ class ScriptReader {
   }
 
   // Named, or all that it is.
-  const PlannedCut* planned(const JsonValue& j, const std::string& where, const std::string& name, std::string_view beside) {
+  const PlannedCut* planned(const JsonValue& j, const std::string& where, const std::string& name,
+                            std::string_view beside) {
     if (name.empty()) {
       for (const char* const key : {"at_mm", "normal"}) {
         if (j.find(key) == nullptr)
-          throw file_.wrong(j, where + ": \"" + key + "\" is missing", "or name a planned cut of the case: {\"planned\": \"left body\"}");
+          throw file_.wrong(j, where + ": \"" + key + "\" is missing",
+                            "or name a planned cut of the case: {\"planned\": \"left body\"}");
       }
       return nullptr;
     }
     for (const JsonMember& m : j.members) {
       if (m.key != "planned" && m.key != beside)
-        throw file_.wrong(m.value, where + ": \"" + m.key + "\" beside \"planned\": the planned cut says that", "leave out one of the two");
+        throw file_.wrong(m.value, where + ": \"" + m.key + "\" beside \"planned\": the planned cut says that",
+                          "leave out one of the two");
     }
     return located(*j.find("planned"), where, [&] { return &planned_cut(planned_, name); });
   }
@@ -221,11 +233,14 @@ class ScriptReader {
   }
   void act(double t, const GuidePart& g, const JsonValue& j, const std::string& where) {
     const PlannedCut* const plan = planned(j, where, g.planned, "hand");
-    const CuttingGuide guide =
-        plan != nullptr ? plan->guide() : CuttingGuide{vec(g.at_mm), direction(j, where, "normal", g.normal), g.within_mm};
+    const CuttingGuide guide = plan != nullptr
+                                   ? plan->guide()
+                                   : CuttingGuide{vec(g.at_mm), direction(j, where, "normal", g.normal), g.within_mm};
     add(t, SceneAction::cutting_guide(guide, static_cast<std::uint32_t>(g.hand)));
   }
-  void act(double t, const SplitPart& s, const JsonValue&, const std::string&) { add(t, SceneAction::split(s.least_mm3)); }
+  void act(double t, const SplitPart& s, const JsonValue&, const std::string&) {
+    add(t, SceneAction::split(s.least_mm3));
+  }
   // What a move leaves out stays as it was.
   void now_at(const JsonValue& j, const std::string& where, Move& m) {
     file_.read(j, where, fields_in(m));
@@ -237,11 +252,12 @@ class ScriptReader {
   void act(double t, const Move& m, const JsonValue& j, const std::string& where) {
     const auto piece = static_cast<std::uint32_t>(m.piece);
     Place& now = places_[piece];
-    const Vec3 axis = direction(j, where, "axis", m.axis), about = vec(m.about_mm), from = vec(now.shift), to = vec(m.shift_mm);
+    const Vec3 axis = direction(j, where, "axis", m.axis), about = vec(m.about_mm), from = vec(now.shift),
+               to = vec(m.shift_mm);
     steps(t, m.over_s, [&](double share) {
       const double turn = now.turn_deg + (m.turn_deg - now.turn_deg) * share;
-      return SceneAction::move(piece,
-                               RigidTransform{{}, from + (to - from) * share} * rotation_about(about, axis, turn * std::numbers::pi / 180));
+      return SceneAction::move(piece, RigidTransform{{}, from + (to - from) * share} *
+                                          rotation_about(about, axis, turn * std::numbers::pi / 180));
     });
     now = {m.shift_mm, m.turn_deg};
   }
@@ -255,9 +271,9 @@ class ScriptReader {
   void act(double t, const Attach& a, const JsonValue& j, const std::string& where) {
     if (a.pieces.empty() || a.pieces.size() > 2 || (a.pieces.size() == 2 && a.pieces[0] == a.pieces[1]))
       throw file_.wrong(*j.find("pieces"), where + ": \"pieces\" are one, or two that are not the same");
-    add(t,
-        SceneAction::attach(plate(j, where, a.plate), {axes_of(j, where, a.x, a.z), vec(a.at_mm)}, static_cast<std::uint32_t>(a.pieces[0]),
-                            a.pieces.size() > 1 ? static_cast<std::uint32_t>(a.pieces[1]) : SceneAction::kNobody));
+    add(t, SceneAction::attach(plate(j, where, a.plate), {axes_of(j, where, a.x, a.z), vec(a.at_mm)},
+                               static_cast<std::uint32_t>(a.pieces[0]),
+                               a.pieces.size() > 1 ? static_cast<std::uint32_t>(a.pieces[1]) : SceneAction::kNobody));
   }
   void act(double t, const Detach& d, const JsonValue&, const std::string&) {
     add(t, SceneAction::detach(static_cast<std::uint32_t>(d.number)));
@@ -275,7 +291,9 @@ class ScriptReader {
     if (s.mm3_per_s > 0) must_be_somewhere(j, where);
     const Vec3 goal = s.mm3_per_s > 0 ? vec(s.at_mm) : sucker_;
     if (!(sucking_ > 0)) sucker_ = goal;  // it comes from nowhere
-    steps(t, s.over_s, [&](double share) { return SceneAction::suction(sucker_ + (goal - sucker_) * share, s.radius_mm, s.mm3_per_s); });
+    steps(t, s.over_s, [&](double share) {
+      return SceneAction::suction(sucker_ + (goal - sucker_) * share, s.radius_mm, s.mm3_per_s);
+    });
     sucker_ = goal;
     sucking_ = s.mm3_per_s;
   }
@@ -286,9 +304,12 @@ class ScriptReader {
   void act(double t, const Patient& p, const JsonValue&, const std::string&) {
     add(t, SceneAction::posture(down_of(p.position, p.head_turned_deg)));
   }
-  void act(double t, const Undo&, const JsonValue&, const std::string&) { add(t, SceneAction::plain(ActionKind::undo)); }
+  void act(double t, const Undo&, const JsonValue&, const std::string&) {
+    add(t, SceneAction::plain(ActionKind::undo));
+  }
 
-  // Each is an action of its own, in the order of the settings; as they are in the file, so that what is said of none is left alone.
+  // Each is an action of its own, in the order of the settings; as they are in the file, so that what is said of none
+  // is left alone.
   void act(double t, const Set& s, const JsonValue& j, const std::string& where) {
     if (j.members.empty()) throw file_.wrong(j, where + ": it names no setting");
     for (std::size_t n = 0; n < setting_names().size(); ++n) {
@@ -309,8 +330,10 @@ class ScriptReader {
 template <class T>
 ordered_json object_schema() {
   T part;
-  ordered_json s{
-      {"type", "object"}, {"additionalProperties", false}, {"required", ordered_json::array()}, {"properties", ordered_json::object()}};
+  ordered_json s{{"type", "object"},
+                 {"additionalProperties", false},
+                 {"required", ordered_json::array()},
+                 {"properties", ordered_json::object()}};
   for (const FieldRef& f : fields_in(part)) {
     s["properties"][std::string(f.doc.name)] = ordered_json::parse(field_schema(f).dump());
     if (f.doc.needed) s["required"].push_back(f.doc.name);
@@ -349,14 +372,16 @@ std::string script_json(const Script& script) {
 
 std::string script_schema() {
   ordered_json s = object_schema<Head>();
-  ordered_json root{{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "Script of strokes of Osteotome"}};
+  ordered_json root{{"$schema", "https://json-schema.org/draft/2020-12/schema"},
+                    {"title", "Script of strokes of Osteotome"}};
   s["properties"]["osteotome_strokes"] = {{"const", 1}};
   s["properties"]["burr"] = object_schema<BurrPart>();
   s["properties"]["camera"] = object_schema<CameraPart>();
   ordered_json cavity = object_schema<When>();
   cavity["properties"]["cavity"] = object_schema<Cavity>();
   cavity["required"].push_back("cavity");
-  s["properties"]["waypoints"] = {{"type", "array"}, {"minItems", 1}, {"items", {{"oneOf", {object_schema<Point>(), cavity}}}}};
+  s["properties"]["waypoints"] = {
+      {"type", "array"}, {"minItems", 1}, {"items", {{"oneOf", {object_schema<Point>(), cavity}}}}};
   ordered_json hand = object_schema<HandPart>();
   hand["properties"]["waypoints"] = s["properties"]["waypoints"];
   hand["required"].push_back("waypoints");
@@ -370,7 +395,8 @@ std::string script_schema() {
       what["properties"]["pieces"]["minItems"] = 1;
       what["properties"]["pieces"]["maxItems"] = 2;
     }
-    if (what["properties"].contains("planned")) what["anyOf"] = {{{"required", {"planned"}}}, {{"required", {"at_mm", "normal"}}}};
+    if (what["properties"].contains("planned"))
+      what["anyOf"] = {{{"required", {"planned"}}}, {{"required", {"at_mm", "normal"}}}};
     entry["properties"][F::kName] = what;
     entry["required"].push_back(F::kName);
     any.push_back(entry);
@@ -383,4 +409,4 @@ std::string script_schema() {
   return root.dump(2) + "\n";
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

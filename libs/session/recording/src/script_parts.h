@@ -10,7 +10,8 @@
 
 namespace osteo::inline session::script {
 
-// Of what a script may hold each part is declared once: name, help, unit, range. Reading and the schema both go by that.
+// Of what a script may hold each part is declared once: name, help, unit, range. Reading and the schema both go by
+// that.
 inline constexpr double kLongestS = 21600, kMostPieces = 1e6;
 
 struct Head {
@@ -101,7 +102,8 @@ struct Saw {
 };
 
 struct GuidePart {
-  static constexpr const char *kName = "cutting_guide", *kHelp = "a slot that holds a hand's saw in a plane, until the next of these";
+  static constexpr const char *kName = "cutting_guide",
+                              *kHelp = "a slot that holds a hand's saw in a plane, until the next of these";
   std::string planned;
   Triple at_mm{}, normal{};
   double within_mm = 2;
@@ -110,7 +112,8 @@ struct GuidePart {
     visit({"planned", "a planned cut of the case by its name, in place of what follows but the hand"}, p.planned);
     visit({"at_mm", "a point of the plane, LPS", "mm", -kFarMm, kFarMm}, p.at_mm);
     visit({"normal", "across the plane", "", -kFarMm, kFarMm}, p.normal);
-    visit({"within_mm", "a saw this near slips in; 0: the guide is taken away", "mm", 0, SceneAction::kMostSlotMm}, p.within_mm);
+    visit({"within_mm", "a saw this near slips in; 0: the guide is taken away", "mm", 0, SceneAction::kMostSlotMm},
+          p.within_mm);
     visit({"hand", "whose saw", "", 0, kMostHands - 1}, p.hand);
   }
 };
@@ -118,18 +121,23 @@ struct GuidePart {
 struct SplitPart {
   static constexpr const char *kName = "split", *kHelp = "take apart what does not hang together";
   double least_mm3 = 50;
-  static void describe(SplitPart& p, auto& visit) { visit({"least_mm3", "what is smaller becomes dust", "mm3", 0, 1e6}, p.least_mm3); }
+  static void describe(SplitPart& p, auto& visit) {
+    visit({"least_mm3", "what is smaller becomes dust", "mm3", 0, 1e6}, p.least_mm3);
+  }
 };
 
 struct Move {
-  static constexpr const char *kName = "move", *kHelp = "a piece, and all that is plated to it, from where it was in the case";
+  static constexpr const char *kName = "move",
+                              *kHelp = "a piece, and all that is plated to it, from where it was in the case";
   int piece = 0;
   Triple shift_mm{}, axis{0, 0, 1}, about_mm{};
   double turn_deg = 0, over_s = 0;
   static void describe(Move& p, auto& visit) {
     visit({"piece", "which", "", 0, kMostPieces, true}, p.piece);
-    visit({"shift_mm", "where to, after the turn; left out: as far as it was shifted before", "mm", -kFarMm, kFarMm}, p.shift_mm);
-    visit({"turn_deg", "about axis through about_mm; left out: as far as it was turned before", "deg", -360, 360}, p.turn_deg);
+    visit({"shift_mm", "where to, after the turn; left out: as far as it was shifted before", "mm", -kFarMm, kFarMm},
+          p.shift_mm);
+    visit({"turn_deg", "about axis through about_mm; left out: as far as it was turned before", "deg", -360, 360},
+          p.turn_deg);
     visit({"axis", "of the turn", "", -kFarMm, kFarMm}, p.axis);
     visit({"about_mm", "a point of that axis, LPS", "mm", -kFarMm, kFarMm}, p.about_mm);
     visit({"over_s", "how long it takes", "s", 0, 3600}, p.over_s);
@@ -199,7 +207,8 @@ struct Irrigate {
   double radius_mm = 15, mm3_per_s = 400;
   static void describe(Irrigate& p, auto& visit) {
     visit({"at_mm", "where, LPS", "mm", -kFarMm, kFarMm}, p.at_mm);
-    visit({"radius_mm", "how far it falls at most before it spreads", "mm", 0.1, SceneAction::kMostReachMm}, p.radius_mm);
+    visit({"radius_mm", "how far it falls at most before it spreads", "mm", 0.1, SceneAction::kMostReachMm},
+          p.radius_mm);
     visit({"mm3_per_s", "of water; 0: away", "mm3/s", 0, 1e5}, p.mm3_per_s);
   }
 };
@@ -226,6 +235,7 @@ struct Set {
   static void describe(Set& p, auto& visit) { HapticsParams::describe(p.params, visit); }
 };
 
-using Forms = std::tuple<Saw, GuidePart, SplitPart, Move, Grip, Attach, Detach, Open, Suction, Irrigate, Patient, Undo, Set>;
+using Forms =
+    std::tuple<Saw, GuidePart, SplitPart, Move, Grip, Attach, Detach, Open, Suction, Irrigate, Patient, Undo, Set>;
 
-}  // namespace osteo::session::script
+}  // namespace osteo::inline session::script

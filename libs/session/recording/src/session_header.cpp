@@ -75,8 +75,8 @@ HapticSetup setup_of(const ordered_json& j, const NamedNumbers& tools, std::vect
     }
   }
   for (const auto& d : j.at("devices"))
-    h.more_devices.push_back(
-        {d.at("damping_n_s_per_m"), d.at("delay_s"), d.at("encoder_mm"), d.at("max_force_n"), d.at("max_stiffness_n_per_mm")});
+    h.more_devices.push_back({d.at("damping_n_s_per_m"), d.at("delay_s"), d.at("encoder_mm"), d.at("max_force_n"),
+                              d.at("max_stiffness_n_per_mm")});
   if (!h.more_devices.empty()) {
     h.device = h.more_devices.front();
     h.more_devices.erase(h.more_devices.begin());
@@ -104,8 +104,10 @@ HapticSetup setup_of(const ordered_json& j, const NamedNumbers& tools, std::vect
 ordered_json instruments_json() {
   ordered_json j = ordered_json::array();
   const auto shape = [](const RoundCone& c) -> ordered_json {
-    return {
-        {"start_mm", c.start_mm}, {"length_mm", c.length_mm}, {"start_radius_mm", c.start_radius_mm}, {"end_radius_mm", c.end_radius_mm}};
+    return {{"start_mm", c.start_mm},
+            {"length_mm", c.length_mm},
+            {"start_radius_mm", c.start_radius_mm},
+            {"end_radius_mm", c.end_radius_mm}};
   };
   for (const Instrument& i : instrument_library()) {
     ordered_json one{{"name", i.name},
@@ -187,13 +189,15 @@ FileTable table_of(const std::string& kind, const ordered_json& j, const std::st
     t.bytes += size_of(field.type);
     const std::string field_name = f.at("name");
     if (ours != nullptr) {
-      const auto at = std::find_if(ours->fields.begin(), ours->fields.end(), [&](const RecordField& r) { return r.name == field_name; });
+      const auto at = std::find_if(ours->fields.begin(), ours->fields.end(),
+                                   [&](const RecordField& r) { return r.name == field_name; });
       if (at != ours->fields.end()) {
         field.ours = &*at;
         found.push_back(field.ours);
       } else {
         o.newer.push_back("the field '" + field_name + "' of each " + kind);
-        if (f.value("role", "result") == "input") say_not_replayable(o, "its servo was fed with '" + field_name + "' too");
+        if (f.value("role", "result") == "input")
+          say_not_replayable(o, "its servo was fed with '" + field_name + "' too");
       }
     }
     t.fields.push_back(field);
@@ -269,8 +273,8 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   h.program_version = j.at("program");
   if (j["osteotome_session"] != kSessionFormat) {
     throw Error(ExitCode::corrupt,
-                name + " is a session of format " + j["osteotome_session"].dump() + ", recorded by " + h.program_version +
-                    "; this version reads format " + std::to_string(kSessionFormat),
+                name + " is a session of format " + j["osteotome_session"].dump() + ", recorded by " +
+                    h.program_version + "; this version reads format " + std::to_string(kSessionFormat),
                 "use the version it was recorded with, which can also export it");
   }
   h.bone_hash = j.at("bone_hash");
@@ -291,13 +295,15 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
     for (const FileTable& f : tables) {
       // What nothing can be read without.
       const auto named = [&](std::size_t n) {
-        return std::any_of(f.fields.begin(), f.fields.end(), [&](const FileField& x) { return x.ours == &t->fields[n]; });
+        return std::any_of(f.fields.begin(), f.fields.end(),
+                           [&](const FileField& x) { return x.ours == &t->fields[n]; });
       };
       if (f.part == t->part && !(named(0) && (t != &change_table() || named(1))))
         throw Error(ExitCode::corrupt, name + " lacks '" + std::string(t->fields[0].name) + "' in its records");
     }
   }
-  for (const auto& [kind, action] : j.at("actions").items()) o.action_names[static_cast<std::uint32_t>(std::stoul(kind))] = action;
+  for (const auto& [kind, action] : j.at("actions").items())
+    o.action_names[static_cast<std::uint32_t>(std::stoul(kind))] = action;
   o.tools = names_of(instrument_library());
   o.plates = names_of(plate_library());
   numbers.tools = NamedNumbers("instrument", names_in(j.at("instruments")), o.tools);
@@ -305,7 +311,8 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   o.numbered_alike = numbers.tools.same() && numbers.plates.same();
   std::vector<std::string> unknown;
   h.haptics = setup_of(j.at("haptics"), numbers.tools, unknown);
-  if (j.at("hands") != h.haptics.hands()) throw Error(ExitCode::corrupt, name + " does not tell of a device for each hand");
+  if (j.at("hands") != h.haptics.hands())
+    throw Error(ExitCode::corrupt, name + " does not tell of a device for each hand");
   if (h.haptics.hands() > kMostHands) say_not_replayable(o, "it has " + std::to_string(h.haptics.hands()) + " hands");
   for (const auto& [setting, value] : j.at("haptics").at("params").items()) o.setting_names.push_back(setting);
   for (const std::string& u : unknown) {
@@ -314,4 +321,4 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   }
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -47,4 +47,4 @@ struct FileNumbers {
 void read_header(std::string_view text, const std::string& name, SessionOutline& outline,
                  std::vector<FileTable>& tables, FileNumbers& numbers);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -50,7 +50,9 @@ class Bytes {
   }
 
  private:
-  [[noreturn]] void fail() const { throw Error(ExitCode::cannot_read, "cannot read '" + path_.string() + "': " + std::strerror(errno)); }
+  [[noreturn]] void fail() const {
+    throw Error(ExitCode::cannot_read, "cannot read '" + path_.string() + "': " + std::strerror(errno));
+  }
   fs::path path_;
   int fd_ = -1;
   std::uint64_t size_ = 0;
@@ -117,16 +119,19 @@ std::vector<std::string> losses(const SessionOutline& s) {
     if (g.bytes > 0) {
       lines.push_back(
           "damaged at byte " + std::to_string(g.at_byte) + ": " + count(g.bytes, "byte") + " cannot be read, " +
-          (g.ticks > 0 ? ticks_of(g) + " missing" : "with a checkpoint, actions or the end around tick " + std::to_string(g.first_tick)));
+          (g.ticks > 0 ? ticks_of(g) + " missing"
+                       : "with a checkpoint, actions or the end around tick " + std::to_string(g.first_tick)));
     } else {
-      lines.push_back(
-          (g.ticks > 0 ? ticks_of(g) + " (" + count(g.ticks, "tick") + ")" : "actions before tick " + std::to_string(g.first_tick)) +
-          " were not recorded, since " +
-          (g.bone_lost ? "the recorder did not come to run; what they changed is missing too"
-                       : "the disk did not keep up; what they changed and what was done meanwhile is there"));
+      lines.push_back((g.ticks > 0 ? ticks_of(g) + " (" + count(g.ticks, "tick") + ")"
+                                   : "actions before tick " + std::to_string(g.first_tick)) +
+                      " were not recorded, since " +
+                      (g.bone_lost
+                           ? "the recorder did not come to run; what they changed is missing too"
+                           : "the disk did not keep up; what they changed and what was done meanwhile is there"));
     }
   }
-  if (s.torn_bytes > 0) lines.push_back("cut at its end: " + count(s.torn_bytes, "byte") + " behind the last whole frame left out");
+  if (s.torn_bytes > 0)
+    lines.push_back("cut at its end: " + count(s.torn_bytes, "byte") + " behind the last whole frame left out");
   return lines;
 }
 
@@ -146,7 +151,9 @@ struct SessionReader::File {
   void look_through();
   void take(std::uint64_t at, const FrameHead& head, std::span<const std::byte> payload);
   void arrive(std::uint64_t tick);
-  [[noreturn]] void missing() const { throw Error(ExitCode::corrupt, name + ": tick " + std::to_string(next_tick) + " is missing"); }
+  [[noreturn]] void missing() const {
+    throw Error(ExitCode::corrupt, name + ": tick " + std::to_string(next_tick) + " is missing");
+  }
 
   std::string name;
   Bytes bytes;
@@ -216,12 +223,13 @@ void SessionReader::File::look_through() {
     std::uint32_t magic = 0;
     static_cast<void>(bytes.read(0, &magic, sizeof magic));
     if (magic == kOldMagic)
-      throw Error(
-          ExitCode::corrupt,
-          name + " is a session of format 1, which this version does not read (it reads format " + std::to_string(kSessionFormat) + ")",
-          "use the version it was recorded with, which can also export it");
+      throw Error(ExitCode::corrupt,
+                  name + " is a session of format 1, which this version does not read (it reads format " +
+                      std::to_string(kSessionFormat) + ")",
+                  "use the version it was recorded with, which can also export it");
     throw Error(ExitCode::corrupt,
-                name + (magic == kMagic ? " is damaged at byte 0, in its header, or was cut before that ended" : " is not a session file"));
+                name + (magic == kMagic ? " is damaged at byte 0, in its header, or was cut before that ended"
+                                        : " is not a session file"));
   }
   std::uint64_t at = sizeof head + head.bytes;
   try {
@@ -249,7 +257,8 @@ void SessionReader::File::look_through() {
     throw Error(ExitCode::corrupt, name + " has a damaged header: " + e.what());
   }
   outline.torn_bytes = bytes.size() - at;
-  for (const auto& [type, n] : unknown_frames) outline.newer.push_back(count(n, "frame") + " of a kind " + std::to_string(type));
+  for (const auto& [type, n] : unknown_frames)
+    outline.newer.push_back(count(n, "frame") + " of a kind " + std::to_string(type));
 }
 
 SessionReader::SessionReader(const fs::path& path, Damage damage) : file_(std::make_unique<File>(path)) {
@@ -312,7 +321,8 @@ bool SessionReader::Parts::State::next_of_frame() {
     std::memcpy(head, left.data(), sizeof head);
     left = left.subspan(sizeof head);
     const std::size_t n = head[1];
-    const auto table = std::find_if(file.tables.begin(), file.tables.end(), [&](const FileTable& t) { return t.part == head[0]; });
+    const auto table =
+        std::find_if(file.tables.begin(), file.tables.end(), [&](const FileTable& t) { return t.part == head[0]; });
     if (table == file.tables.end()) file.broken(*entry, "it holds records that the header does not describe");
     if (n == 0 || n > left.size() / table->bytes) file.broken(*entry, "its records are fewer than it says");
     const auto from = left.first(n * table->bytes);
@@ -328,7 +338,8 @@ bool SessionReader::Parts::State::next_of_frame() {
       read(ticks);
       for (TickRecord& t : ticks) {
         t.device.tool = static_cast<std::uint8_t>(file.numbers.tools(t.device.tool, file.name));
-        if (t.tick != next_tick || t.hand != hand || t.tick >= entry->end_tick) file.broken(*entry, "tick " + std::to_string(next_tick) + " is missing");
+        if (t.tick != next_tick || t.hand != hand || t.tick >= entry->end_tick)
+          file.broken(*entry, "tick " + std::to_string(next_tick) + " is missing");
         if (++hand == file.outline.header.haptics.hands()) {
           hand = 0;
           ++next_tick;
@@ -358,10 +369,11 @@ bool SessionReader::Parts::State::next_of_frame() {
         const std::size_t length = std::min(lines.find('\n'), lines.size());
         const auto j = ordered_json::parse(lines.substr(0, length), nullptr, false);
         lines.remove_prefix(std::min(length + 1, lines.size()));
-        if (!j.is_object() || !j.contains("value") || !j.contains("kind") || !j["kind"].is_string() || !j.contains("tick") ||
-            !j["tick"].is_number_unsigned())
+        if (!j.is_object() || !j.contains("value") || !j.contains("kind") || !j["kind"].is_string() ||
+            !j.contains("tick") || !j["tick"].is_number_unsigned())
           file.broken(*entry, "it holds a note that is none");
-        notes.push_back({j["tick"], j["kind"], j["value"].dump(-1, ' ', false, ordered_json::error_handler_t::replace)});
+        notes.push_back(
+            {j["tick"], j["kind"], j["value"].dump(-1, ' ', false, ordered_json::error_handler_t::replace)});
       }
       part.notes = notes;
     } else {
@@ -382,7 +394,8 @@ bool SessionReader::Parts::State::next() {
     if (at > 0 && at <= frames.size() && !scene_only) {
       const std::size_t last = frames[at - 1];
       const bool ends = file.entries[last].type == kCheckpointFrame &&
-                        (last + 1 < file.entries.size() ? file.entries[last + 1].type != kCheckpointFrame : file.outline.end.has_value());
+                        (last + 1 < file.entries.size() ? file.entries[last + 1].type != kCheckpointFrame
+                                                        : file.outline.end.has_value());
       if (ends && !std::exchange(marked, true)) {
         part = {};
         part.checkpoint = file.entries[last].end_tick;
@@ -431,7 +444,8 @@ SessionReader::Parts SessionReader::scene_at(std::uint64_t tick, std::uint64_t& 
   // The last checkpoint that is whole and not behind the tick; those before lead to it.
   std::size_t from = 0;
   for (std::size_t i = 0; i < entries.size() && entries[i].first_tick < tick; ++i) {
-    const bool followed = i + 1 < entries.size() ? entries[i + 1].type != kCheckpointFrame : file_->outline.end.has_value();
+    const bool followed =
+        i + 1 < entries.size() ? entries[i + 1].type != kCheckpointFrame : file_->outline.end.has_value();
     if (entries[i].type == kCheckpointFrame && followed && entries[i].end_tick < tick) from = i + 1;
   }
   reached = from > 0 ? entries[from - 1].end_tick : 0;
@@ -439,7 +453,8 @@ SessionReader::Parts SessionReader::scene_at(std::uint64_t tick, std::uint64_t& 
     const File::Entry& e = entries[i];
     if (e.type == kGapFrame && file_->outline.gaps[e.gap].bone_lost)
       throw Error(ExitCode::corrupt,
-                  file_->name + " does not tell the scene at tick " + std::to_string(tick) + ": " + losses(file_->outline)[e.gap],
+                  file_->name + " does not tell the scene at tick " + std::to_string(tick) + ": " +
+                      losses(file_->outline)[e.gap],
                   "ask for a time before that");
     if (i >= from) reached = e.end_tick;
     if (e.type == (i < from ? kCheckpointFrame : kRecordsFrame)) state->frames.push_back(i);
@@ -461,4 +476,4 @@ Session read_session(const fs::path& path, Damage damage) {
   return s;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -26,7 +26,8 @@ constexpr std::size_t kManyChanges = 1U << 21;
 
 class FileSink final : public SessionSink {
  public:
-  explicit FileSink(const fs::path& path) : path_(path), fd_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644)) {
+  explicit FileSink(const fs::path& path)
+      : path_(path), fd_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644)) {
     if (fd_ >= 0) return;
     throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + std::strerror(errno),
                 errno == EEXIST ? "give another name" : "choose a folder that you may write to");
@@ -98,8 +99,8 @@ void put_part(std::vector<std::byte>& out, const RecordTable& table, std::span<c
 std::string line_of(const Note& note) {
   auto value = ordered_json::parse(note.json, nullptr, false);
   if (value.is_discarded()) value = note.json;
-  return ordered_json{{"tick", note.tick}, {"kind", note.kind}, {"value", value}}.dump(-1, ' ', false,
-                                                                                       ordered_json::error_handler_t::replace) +
+  return ordered_json{{"tick", note.tick}, {"kind", note.kind}, {"value", value}}.dump(
+             -1, ' ', false, ordered_json::error_handler_t::replace) +
          "\n";
 }
 
@@ -109,12 +110,14 @@ std::unique_ptr<SessionSink> session_file(const fs::path& path) {
   return std::make_unique<FileSink>(path);
 }
 
-SessionWriter::SessionWriter(std::unique_ptr<SessionSink> sink, const SessionHeader& h) : sink_(std::move(sink)), rate_hz_(h.rate_hz) {
+SessionWriter::SessionWriter(std::unique_ptr<SessionSink> sink, const SessionHeader& h)
+    : sink_(std::move(sink)), rate_hz_(h.rate_hz) {
   frame(kHeaderFrame, 0, 0, bytes_of(header_json(h)));
 }
 
 // One write for each, so that a kill rarely parts it.
-void SessionWriter::frame(std::uint32_t type, std::uint64_t first_tick, std::uint64_t end_tick, std::span<const std::byte> payload) {
+void SessionWriter::frame(std::uint32_t type, std::uint64_t first_tick, std::uint64_t end_tick,
+                          std::span<const std::byte> payload) {
   FrameHead head{kMagic, type, static_cast<std::uint32_t>(payload.size()), 0, first_tick, end_tick};
   head.crc = checksum(head, payload);
   const auto head_bytes = std::as_bytes(std::span(&head, 1));
@@ -124,8 +127,8 @@ void SessionWriter::frame(std::uint32_t type, std::uint64_t first_tick, std::uin
   bytes_ += out_.size();
 }
 
-void SessionWriter::records(std::uint32_t type, std::uint64_t first_tick, std::uint64_t end_tick, const Segment& segment,
-                            std::span<const TickRecord> ticks, std::span<const Note> notes) {
+void SessionWriter::records(std::uint32_t type, std::uint64_t first_tick, std::uint64_t end_tick,
+                            const Segment& segment, std::span<const TickRecord> ticks, std::span<const Note> notes) {
   raw_.clear();
   put_part(raw_, action_record_table(), std::span(segment.actions));
   put_part(raw_, tick_table(), ticks);
@@ -191,11 +194,15 @@ void SessionWriter::checkpoint() {
 
 void SessionWriter::finish(const SessionEnd& e) {
   checkpoint();
-  const ordered_json j{
-      {"ticks", e.ticks},         {"bone_hash", e.bone_hash},   {"surface_hash", e.surface_hash}, {"removed_mm3", e.removed_mm3},
-      {"dust_hash", e.dust_hash}, {"ticks_lost", e.ticks_lost}, {"notes_lost", e.notes_lost}};
+  const ordered_json j{{"ticks", e.ticks},
+                       {"bone_hash", e.bone_hash},
+                       {"surface_hash", e.surface_hash},
+                       {"removed_mm3", e.removed_mm3},
+                       {"dust_hash", e.dust_hash},
+                       {"ticks_lost", e.ticks_lost},
+                       {"notes_lost", e.notes_lost}};
   frame(kEndFrame, e.ticks, e.ticks, bytes_of(j.dump()));
   sync();
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

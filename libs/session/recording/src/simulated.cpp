@@ -13,4 +13,4 @@ std::string simulated_words(const SessionReader& session) {
   return {};
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -21,7 +21,8 @@ fs::path record_of(const fs::path& folder) {
 // Role -> content, of the files as they are; what is gone has an empty hash.
 std::map<std::string, std::string> contents(const fs::path& folder) {
   const fs::path manifest = folder / "manifest.json";
-  if (!fs::exists(manifest)) throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a prepared case: it has no manifest.json");
+  if (!fs::exists(manifest))
+    throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a prepared case: it has no manifest.json");
   std::map<std::string, std::string> hashes;
   for (const auto& [role, file] : parse_manifest(read_text(manifest), manifest.string())) {
     const fs::path path = folder / file.name;
@@ -86,7 +87,9 @@ ApprovalNow approval_of(const fs::path& folder) {
   try {
     const JsonFile j(read_text(file), file.string(), ExitCode::corrupt);
     j.require_format("osteotome_approval");
-    const auto text = [&](const char* key) { return j.text(j.need(j.root(), "", key), std::string("\"") + key + "\""); };
+    const auto text = [&](const char* key) {
+      return j.text(j.need(j.root(), "", key), std::string("\"") + key + "\"");
+    };
     a = {text("by"), text("date"), text("note"), text("case_hash"), text("report_hash")};
     now.approval = a;
     if (joined(is) != a.case_hash) {
@@ -117,8 +120,9 @@ void approve(const fs::path& folder, const std::string& by, const std::string& n
     throw Error(ExitCode::no_input, "'" + folder.string() + "' has no report beside it to look at and approve",
                 "make it with: osteo report " + folder.string());
   }
-  const Json j{{"osteotome_approval", 1}, {"by", by},         {"date", today()}, {"note", note}, {"case_hash", joined(is)},
-               {"report_hash", report},   {"files", Json(is)}};
+  const Json j{
+      {"osteotome_approval", 1}, {"by", by},         {"date", today()}, {"note", note}, {"case_hash", joined(is)},
+      {"report_hash", report},   {"files", Json(is)}};
   write_file(record_of(folder), j.dump(2) + "\n");
 }
 
@@ -148,4 +152,4 @@ Json approval_json(const ApprovalNow& now) {
   return j;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

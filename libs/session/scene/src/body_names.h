@@ -14,7 +14,8 @@ auto* owner_of(Bodies& bodies, VoxelKey name) {
   return decltype(&bodies.begin()->second)(nullptr);
 }
 
-/// Bricks that went from one body to another as they are: what is known of them went with them, and is not to be made again.
+/// Bricks that went from one body to another as they are: what is known of them went with them, and is not to be made
+/// again.
 class KnownBricks {
  public:
   void note(std::uint32_t body, const BrickGrid& whole, const PieceOrigin& origin) {
@@ -33,4 +34,4 @@ class KnownBricks {
   std::map<std::uint32_t, std::vector<std::uint8_t>> known_;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -53,17 +53,20 @@ const std::vector<JsonMember>& files_of(const JsonValue& manifest) {
 }
 
 bool lies_in(const fs::path& path, const fs::path& folder) {
-  return fs::absolute(path).lexically_normal().parent_path() == fs::absolute(folder / "x").lexically_normal().parent_path();
+  return fs::absolute(path).lexically_normal().parent_path() ==
+         fs::absolute(folder / "x").lexically_normal().parent_path();
 }
 
 void move_over(const fs::path& from, const fs::path& to) {
   std::error_code ec;
   fs::rename(from, to, ec);
   if (ec)
-    throw Error(ExitCode::cannot_write, "cannot write '" + to.string() + "': " + ec.message(), "choose a folder that you may write to");
+    throw Error(ExitCode::cannot_write, "cannot write '" + to.string() + "': " + ec.message(),
+                "choose a folder that you may write to");
 }
 
-// Moves a complete next state to its places; may be cut anywhere and begun again. The manifest goes last. Needs the lock.
+// Moves a complete next state to its places; may be cut anywhere and begun again. The manifest goes last. Needs the
+// lock.
 void settle(const fs::path& folder) {
   const fs::path next = folder / kNext;
   std::error_code ec;
@@ -73,7 +76,9 @@ void settle(const fs::path& folder) {
     for (const auto& [role, f] : files_of(after)) kept.insert(text_of(f, "file"));
     for (const auto& [role, f] : files_of(before)) {
       const fs::path stale = folder / text_of(f, "file");
-      if (kept.contains(text_of(f, "file")) || !fs::is_regular_file(stale, ec) || hash_path(stale) != text_of(f, "hash")) continue;
+      if (kept.contains(text_of(f, "file")) || !fs::is_regular_file(stale, ec) ||
+          hash_path(stale) != text_of(f, "hash"))
+        continue;
       fs::remove(stale, ec);
       fs::remove(provenance_path(stale), ec);
     }
@@ -94,7 +99,9 @@ int lock_folder(const fs::path& folder, bool wait) {
   if (::flock(fd, LOCK_EX | (wait ? 0 : LOCK_NB)) == 0) return fd;
   const bool taken = errno == EWOULDBLOCK;
   ::close(fd);
-  if (taken) throw Error(ExitCode::cannot_write, "another prepare is at work in '" + folder.string() + "'", "wait until it is done");
+  if (taken)
+    throw Error(ExitCode::cannot_write, "another prepare is at work in '" + folder.string() + "'",
+                "wait until it is done");
   return -1;
 }
 
@@ -148,7 +155,8 @@ void CaseUpdate::commit(const std::string& manifest) {
       if (j) j->erase("program");
       return j;
     };
-    const auto before = output_exists(folder_ / "manifest.json") ? without_program(read_text(folder_ / "manifest.json")) : std::nullopt;
+    const auto before =
+        output_exists(folder_ / "manifest.json") ? without_program(read_text(folder_ / "manifest.json")) : std::nullopt;
     if (before && before == without_program(manifest)) return;
   }
   write_file(staging_ / "manifest.json", manifest);
@@ -169,12 +177,14 @@ std::vector<std::string> foreign_files(const fs::path& folder, const std::vector
     for (const auto& entry : fs::directory_iterator(folder)) {
       const std::string name = entry.path().filename().string();
       if (name == kNext || name.starts_with(".osteo-tmp-")) continue;
-      // Outputs lie beside their records; the verdict on a refused scan, a damaged manifest and the record of a lost output stand alone.
+      // Outputs lie beside their records; the verdict on a refused scan, a damaged manifest and the record of a lost
+      // output stand alone.
       bool made = fs::exists(provenance_path(entry.path()));
       for (const auto& [ending, word] : {std::pair{"import.json", "\"osteotome_verdict\""},
                                          {"manifest.json", "\"osteotome_case\""},
                                          {".prov.json", "\"output_hash\""}}) {
-        if (!made && name.ends_with(ending) && entry.is_regular_file()) made = read_text(entry.path()).find(word) != std::string::npos;
+        if (!made && name.ends_with(ending) && entry.is_regular_file())
+          made = read_text(entry.path()).find(word) != std::string::npos;
       }
       if (made) ours.insert({name, name + ".prov.json"});
       is_case = is_case || (made && (name == "bone.vdb" || name == "import.json" || name == "manifest.json"));
@@ -184,9 +194,10 @@ std::vector<std::string> foreign_files(const fs::path& folder, const std::vector
     throw error_of(e);
   }
   for (const std::string& name : all) {
-    const bool replaced = name == "manifest.json" || std::any_of(outputs.begin(), outputs.end(), [&](const fs::path& o) {
-                            return lies_in(o, folder) && (o.filename() == name || provenance_path(o).filename() == name);
-                          });
+    const bool replaced =
+        name == "manifest.json" || std::any_of(outputs.begin(), outputs.end(), [&](const fs::path& o) {
+          return lies_in(o, folder) && (o.filename() == name || provenance_path(o).filename() == name);
+        });
     if (!ours.contains(name) && (!is_case || replaced)) foreign.push_back(name);
   }
   std::sort(foreign.begin(), foreign.end());
@@ -201,25 +212,31 @@ void recall_facts(const fs::path& folder, std::vector<NodeResult>& results) {
     if (!r.reused || !r.report.empty()) continue;
     for (const JsonValue& step : steps->items) {
       const JsonValue* const report = step.find("report");
-      if (report != nullptr && text_of(step, "id") == r.id && text_of(step, "key") == r.key) r.report = report_from_json(*report);
+      if (report != nullptr && text_of(step, "id") == r.id && text_of(step, "key") == r.key)
+        r.report = report_from_json(*report);
     }
   }
 }
 
-std::string make_manifest(const CaseUpdate& update, const std::string& pipeline_name, const std::vector<NodeResult>& results,
-                          const Recipe& recipe) {
+std::string make_manifest(const CaseUpdate& update, const std::string& pipeline_name,
+                          const std::vector<NodeResult>& results, const Recipe& recipe) {
   Json m;
   m["osteotome_case"] = 1;
   m["program"] = std::string(program_version());
   m["pipeline"] = pipeline_name;
   m["recipe"] = recipe_json(recipe);
-  m["units"] = {{"length", "mm"}, {"world", "LPS"}, {"density", "share of the voxel filled with bone, 0 to 1"}, {"hu", "Hounsfield units"}};
-  m["privacy"] = "No identity, no dates, no file names of the source. Only voxels that hold bone are stored: no skin, no face.";
+  m["units"] = {{"length", "mm"},
+                {"world", "LPS"},
+                {"density", "share of the voxel filled with bone, 0 to 1"},
+                {"hu", "Hounsfield units"}};
+  m["privacy"] =
+      "No identity, no dates, no file names of the source. Only voxels that hold bone are stored: no skin, no face.";
   m["files"] = Json::object();
   m["steps"] = Json::list();
   fs::path bone_file;
   for (const NodeResult& r : results) {
-    m["steps"].push_back({{"id", r.id}, {"stage", r.stage}, {"params", r.params}, {"key", r.key}, {"report", report_to_json(r.report)}});
+    m["steps"].push_back(
+        {{"id", r.id}, {"stage", r.stage}, {"params", r.params}, {"key", r.key}, {"report", report_to_json(r.report)}});
     for (const auto& [port, path] : r.outputs) {
       if (!lies_in(path, update.folder())) continue;
       // A finer part of the bone is bone too: its stage's name tells them apart.
@@ -238,7 +255,8 @@ std::string make_manifest(const CaseUpdate& update, const std::string& pipeline_
                 {"spacing_mm", triple(bone.frame.spacing_mm)},
                 {"origin_mm", triple(bone.frame.origin_mm)},
                 {"direction",
-                 {triple(bone.frame.direction.column[0]), triple(bone.frame.direction.column[1]), triple(bone.frame.direction.column[2])}},
+                 {triple(bone.frame.direction.column[0]), triple(bone.frame.direction.column[1]),
+                  triple(bone.frame.direction.column[2])}},
                 {"axes", orientation_code(bone.frame)}};
   m["bone_memory_mb"] = static_cast<double>(bone.memory_bytes) / 1e6;
   return m.dump(2) + "\n";
@@ -251,12 +269,14 @@ std::map<std::string, ManifestFile> parse_manifest(std::string_view json, const 
     const JsonFile m(json, name, ExitCode::corrupt);
     m.require_format("osteotome_case");
     m.allow(m.root(), "",
-            Names{"osteotome_case", "program", "pipeline", "recipe", "units", "privacy", "files", "steps", "frame", "bone_memory_mb"});
+            Names{"osteotome_case", "program", "pipeline", "recipe", "units", "privacy", "files", "steps", "frame",
+                  "bone_memory_mb"});
     const JsonValue& listed = m.need(m.root(), "", "files");
     if (listed.kind != JsonValue::Kind::object) throw m.wrong(listed, "\"files\" must be an object in braces");
     for (const auto& [role, f] : listed.members) {
       m.allow(f, role, Names{"file", "hash"});
-      ManifestFile file{m.text(m.need(f, role, "file"), role + ": \"file\""), m.text(m.need(f, role, "hash"), role + ": \"hash\"")};
+      ManifestFile file{m.text(m.need(f, role, "file"), role + ": \"file\""),
+                        m.text(m.need(f, role, "hash"), role + ": \"hash\"")};
       if (file.name.empty() || file.name.find('/') != std::string::npos || file.name == "..")
         throw m.wrong(f, role + ": '" + file.name + "' is no file inside the case");
       files[role] = std::move(file);
@@ -296,4 +316,4 @@ Case load_case(const fs::path& folder) {
   return result;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -9,11 +9,12 @@ std::vector<ChangedBricks> changed_bricks(const World& world, const World::Effec
     ChangedBricks bricks{changed.body, changed.bricks, {}};
     bricks.values.reserve(changed.bricks.size() * BrickGrid::kVoxels);
     for (const std::uint32_t b : changed.bricks) {
-      for (VoxelKey v = b * BrickGrid::kVoxels; v < (b + 1) * BrickGrid::kVoxels; ++v) bricks.values.push_back(bone.value(v));
+      for (VoxelKey v = b * BrickGrid::kVoxels; v < (b + 1) * BrickGrid::kVoxels; ++v)
+        bricks.values.push_back(bone.value(v));
     }
     all.push_back(std::move(bricks));
   }
   return all;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -21,8 +21,8 @@ Script make_default_script(const World& world, bool left, int tool, double secon
   // The mastoid of most heads lies behind and below the middle of their bone.
   const Vec3 centre = sum / weight + Vec3{0, 20, -22};
   const Vec3 out{left ? 1.0 : -1.0, 0, 0};
-  // The outside of the first bone met that is followed by 20 mm of nothing (air cells, the ear canal and a gap to a head holder are
-  // narrower and wider); try rays around the centre until one meets bone.
+  // The outside of the first bone met that is followed by 20 mm of nothing (air cells, the ear canal and a gap to a
+  // head holder are narrower and wider); try rays around the centre until one meets bone.
   std::optional<Vec3> entry;
   const auto& f = bone.frame();
   const double longest = length({f.dims[0] * f.spacing_mm.x, f.dims[1] * f.spacing_mm.y, f.dims[2] * f.spacing_mm.z});
@@ -42,7 +42,8 @@ Script make_default_script(const World& world, bool left, int tool, double secon
     }
   }
   if (!entry)
-    throw Error(ExitCode::failed, "no bone was found on the patient's " + std::string(left ? "left" : "right") + " side",
+    throw Error(ExitCode::failed,
+                "no bone was found on the patient's " + std::string(left ? "left" : "right") + " side",
                 "write a script of strokes for this case");
 
   const double radius = instrument_library()[static_cast<std::size_t>(tool)].head.largest_radius_mm();
@@ -60,11 +61,12 @@ Script make_default_script(const World& world, bool left, int tool, double secon
     const double circle = rim * (1 - sway);
     const portable::SinCos turn = portable::sin_cos_turns(1.2 * (t - first));
     const double depth = 3 + std::min(9.0, 0.12 * seconds + 1) * share;
-    script.waypoints.push_back({t, *entry + out * (radius - depth) + u * (circle * turn.cos) + v * (circle * turn.sin), true});
+    script.waypoints.push_back(
+        {t, *entry + out * (radius - depth) + u * (circle * turn.cos) + v * (circle * turn.sin), true});
   }
   script.waypoints.push_back({last + step, *entry + out * (radius + 2), false});
   script.waypoints.push_back({seconds, *entry + out * (radius + 8), false});
   return script;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/geometry/grid/brick_places.h"
+#include "osteo/simulation/bone/instrument.h"
 
 namespace osteo::inline session {
 namespace {
@@ -12,7 +12,8 @@ namespace {
 // The voxel that a point of the grid's own world lies in.
 VoxelKey voxel_at(const BrickGrid& grid, Vec3 at_mm) {
   const Vec3 x = grid.frame().index_from_world(at_mm);
-  return grid.find(static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)), static_cast<int>(std::lround(x.z)));
+  return grid.find(static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)),
+                   static_cast<int>(std::lround(x.z)));
 }
 
 }  // namespace
@@ -24,7 +25,8 @@ DustReader::DustReader(const World& world, double rate_hz) : rate_hz_(rate_hz) {
 void DustReader::begin(const World& world) {
   bones_.clear();
   for (const PlacedBody& placed : world.bodies())
-    bones_.emplace(placed.body->id, Bone{BrickGrid(placed.body->bone), placed.body->first_brick, placed.world_from_body, placed.of_region});
+    bones_.emplace(placed.body->id, Bone{BrickGrid(placed.body->bone), placed.body->first_brick, placed.world_from_body,
+                                         placed.of_region});
   // Dust lies in the first body's grid: a finer region counts there as the bone it holds.
   for (const auto& [id, d] : bones_) {
     for (VoxelKey v = 0; d.of_region && v < d.bone.brick_count() * BrickGrid::kVoxels; ++v) {
@@ -32,7 +34,8 @@ void DustReader::begin(const World& world) {
     }
   }
   dust_ = std::make_unique<Dust>(bones_.begin()->second.bone);
-  if (posture_.is(ActionKind::posture)) dust_->set_gravity({posture_.values[0], posture_.values[1], posture_.values[2]});
+  if (posture_.is(ActionKind::posture))
+    dust_->set_gravity({posture_.values[0], posture_.values[1], posture_.values[2]});
 }
 
 DustReader::Bone* DustReader::owner(VoxelKey name) {
@@ -53,7 +56,8 @@ void DustReader::remove_from_coarse(const Bone& from, VoxelKey own, float densit
   const VoxelKey there = voxel_at(coarse, place_of_voxel_mm(from.bone, own));
   const double share = from.bone.frame().voxel_volume_mm3() / coarse.frame().voxel_volume_mm3();
   if (there != BrickGrid::kNone)
-    coarse.set(there, std::clamp(coarse.value(there) - static_cast<float>(static_cast<double>(density) * share), 0.0F, 1.0F));
+    coarse.set(there,
+               std::clamp(coarse.value(there) - static_cast<float>(static_cast<double>(density) * share), 0.0F, 1.0F));
 }
 
 // An action's tick has come: the dust learns of it.
@@ -139,8 +143,9 @@ void DustReader::tick(const TickRecord& tick, std::span<const VoxelChange> chang
 void DustReader::resync(const World& world) {
   for (; !pending_.empty(); ++applied_early_) apply_next();
   // It was not told of pieces that came or went: it joined behind them, and where their bone is now is not dust.
-  const bool told = bones_.size() == world.bodies().size() &&
-                    std::all_of(bones_.begin(), bones_.end(), [&](const auto& b) { return world.find(b.first) != nullptr; });
+  const bool told =
+      bones_.size() == world.bodies().size() &&
+      std::all_of(bones_.begin(), bones_.end(), [&](const auto& b) { return world.find(b.first) != nullptr; });
   if (!told) return begin(world);
   std::vector<VoxelChange> changes;
   for (const auto& [id, d] : bones_) {
@@ -163,7 +168,8 @@ void DustReader::scene_changed(const World& world, const World::Effect& effect) 
   for (const PlacedBody& placed : world.bodies()) a.poses.emplace_back(placed.body->id, placed.world_from_body);
   for (const auto& made : effect.made) {
     const PlacedBody& placed = *world.find(made.body);
-    a.made.emplace_back(made.body, Bone{BrickGrid(placed.body->bone), placed.body->first_brick, placed.world_from_body, false});
+    a.made.emplace_back(made.body,
+                        Bone{BrickGrid(placed.body->bone), placed.body->first_brick, placed.world_from_body, false});
   }
   a.gone = effect.gone;
   a.dust = effect.dust;
@@ -171,4 +177,4 @@ void DustReader::scene_changed(const World& world, const World::Effect& effect) 
   pending_.push_back(std::move(a));
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "osteo/core/base/portable_math.h"
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/geometry/grid/brick_places.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/haptics/haptic_scene.h"
 
 namespace osteo::inline session {
@@ -114,7 +114,8 @@ ToolSkin skin_of_plate(std::size_t plate, const RigidTransform& grip) {
   return skin;
 }
 
-FreeWays::FreeWays(const World& world, ToolSkin tool, const StructureMap* structures) : tool_(std::move(tool)), structures_(structures) {
+FreeWays::FreeWays(const World& world, ToolSkin tool, const StructureMap* structures)
+    : tool_(std::move(tool)), structures_(structures) {
   Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
   for (const PlacedBody& placed : world.bodies()) {
     Bone b{placed.body, placed.world_from_body.inverse(), {}, 0};
@@ -196,7 +197,8 @@ std::size_t FreeWays::touching_bone(const HandPose& pose, double margin_mm, std:
 }
 
 bool FreeWays::in_bone(Vec3 at_mm) const {
-  return std::any_of(bones_.begin(), bones_.end(), [&](const Bone& b) { return b.body->bone.nearest(b.body_from_world(at_mm)) >= 0.5F; });
+  return std::any_of(bones_.begin(), bones_.end(),
+                     [&](const Bone& b) { return b.body->bone.nearest(b.body_from_world(at_mm)) >= 0.5F; });
 }
 
 bool FreeWays::free(const HandPose& pose, double margin_mm) const {
@@ -293,7 +295,8 @@ std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double
       return straight;
     }
     for (int d = 0; d < 27; ++d) {
-      const int i = static_cast<int>(here >> 40) - kHalf + d % 3 - 1, j = static_cast<int>(here >> 20 & 0xfffff) - kHalf + d / 3 % 3 - 1,
+      const int i = static_cast<int>(here >> 40) - kHalf + d % 3 - 1,
+                j = static_cast<int>(here >> 20 & 0xfffff) - kHalf + d / 3 % 3 - 1,
                 k = static_cast<int>(here & 0xfffff) - kHalf + d / 9 - 1;
       const std::int64_t there = name(i, j, k);
       if (seen.contains(there) || in_bone(place(there))) continue;
@@ -341,8 +344,8 @@ std::optional<FreeWays::Poses> FreeWays::across(const HandPose& from, const Hand
       }
       poses.push_back(to);
       HandPose last = from;
-      const bool all_free =
-          std::all_of(poses.begin(), poses.end(), [&](const HandPose& p) { return free_leg(std::exchange(last, p), p, margin); });
+      const bool all_free = std::all_of(poses.begin(), poses.end(),
+                                        [&](const HandPose& p) { return free_leg(std::exchange(last, p), p, margin); });
       if (all_free) return poses;
     }
   }
@@ -357,7 +360,8 @@ std::optional<FreeWays::Poses> FreeWays::over(const HandPose& from, const HandPo
   if (!free(from, here)) return std::nullopt;
   for (const double up : {0.0, 3.0, 8.0, 20.0, 40.0}) {
     const HandPose first{from.at_mm + lift * up, from.axis}, second{to.at_mm + lift * up, to.axis};
-    if (free_leg(first, second, kClearMm) && free_leg(second, to, kClearMm) && free_leg(from, first, here)) return Poses{first, second, to};
+    if (free_leg(first, second, kClearMm) && free_leg(second, to, kClearMm) && free_leg(from, first, here))
+      return Poses{first, second, to};
   }
   return std::nullopt;
 }
@@ -370,7 +374,8 @@ std::optional<HandWay> FreeWays::finished(const HandPose& from, const Poses& pos
   for (const HandPose& b : poses) {
     const int n = std::max(1, static_cast<int>(std::ceil(length(b.at_mm - a.at_mm))));
     std::vector<bool> far(static_cast<std::size_t>(n) + 1);
-    for (int i = 0; i <= n; ++i) far[static_cast<std::size_t>(i)] = free(on_leg(a, b, static_cast<double>(i) / n), kFarMm);
+    for (int i = 0; i <= n; ++i)
+      far[static_cast<std::size_t>(i)] = free(on_leg(a, b, static_cast<double>(i) / n), kFarMm);
     for (int i = 0, last_end = 0; i < n;) {
       // From i on to where it changes.
       const bool quick = far[static_cast<std::size_t>(i)];
@@ -409,7 +414,8 @@ FreeWays::Found FreeWays::way(const HandPose& from, const HandPose& to) const {
 }
 
 FreeWays::Found FreeWays::approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const {
-  return clear_or_past_structures([&](const FreeWays& ways) { return ways.found_approach(from, seen_mm, forward, axis); });
+  return clear_or_past_structures(
+      [&](const FreeWays& ways) { return ways.found_approach(from, seen_mm, forward, axis); });
 }
 
 FreeWays::Found FreeWays::found_way(const HandPose& from, const HandPose& to) const {
@@ -476,4 +482,4 @@ Vec3 FreeWays::turned(const HandPose& pose, Vec3 wanted, double most_rad) const 
   return pose.axis;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

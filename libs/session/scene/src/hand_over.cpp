@@ -104,8 +104,8 @@ struct Onto {
             in = in && at[a] >= 0 && at[a] < from.dims[a];
           }
           if (!in) continue;
-          const std::size_t v =
-              (static_cast<std::size_t>(at[2]) * ny + static_cast<std::size_t>(at[1])) * nx + static_cast<std::size_t>(at[0]);
+          const std::size_t v = (static_cast<std::size_t>(at[2]) * ny + static_cast<std::size_t>(at[1])) * nx +
+                                static_cast<std::size_t>(at[0]);
           if (mask[v] == 0) continue;
           f((static_cast<std::size_t>(k) * static_cast<std::size_t>(to.dims[1]) + static_cast<std::size_t>(j)) *
                 static_cast<std::size_t>(to.dims[0]) +
@@ -145,7 +145,8 @@ class Taker {
     std::vector<fs::path> files;
     if (fs::is_directory(folder)) {
       for (const auto& e : fs::directory_iterator(folder)) {
-        if (e.is_regular_file() && lower_case(e.path().filename().string()).ends_with(".seg.nrrd")) files.push_back(e.path());
+        if (e.is_regular_file() && lower_case(e.path().filename().string()).ends_with(".seg.nrrd"))
+          files.push_back(e.path());
       }
       std::sort(files.begin(), files.end());
     } else {
@@ -183,9 +184,11 @@ class Taker {
       const auto tag = s.tags.find(std::string(kScanTag));
       if (tag == s.tags.end()) continue;
       if (tag->second != images_.mark) {
-        throw Error(ExitCode::corrupt,
-                    "the segment '" + s.name + "' was drawn on another scan than that of the case, or on another part of it",
-                    "take it back into the case that was handed over; where the case's region was changed since, hand it over anew");
+        throw Error(
+            ExitCode::corrupt,
+            "the segment '" + s.name + "' was drawn on another scan than that of the case, or on another part of it",
+            "take it back into the case that was handed over; where the case's region was changed since, hand it over "
+            "anew");
       }
       marked = true;
     }
@@ -197,8 +200,10 @@ class Taker {
                   "take it back into the case that was handed over");
     }
     if (!options_.by_place || bone_ == nullptr) {
-      throw Error(ExitCode::corrupt, "nothing tells of which scan these segments are: they bear no mark, and no ct.nrrd lies beside them",
-                  "put the ct.nrrd of 'osteo hand-over' beside them, or give --by-place, which goes by where the bone lies");
+      throw Error(
+          ExitCode::corrupt,
+          "nothing tells of which scan these segments are: they bear no mark, and no ct.nrrd lies beside them",
+          "put the ct.nrrd of 'osteo hand-over' beside them, or give --by-place, which goes by where the bone lies");
     }
   }
 
@@ -223,7 +228,8 @@ class Taker {
                   "it is of another scan, or was moved: look at both in 3D Slicer");
     }
     if (inside < 0.9 * all)
-      context_.warn(percent(1 - inside / all) + " of '" + s.name + "' stick out of the scan, or are too fine for it, and are lost");
+      context_.warn(percent(1 - inside / all) + " of '" + s.name +
+                    "' stick out of the scan, or are too fine for it, and are lost");
     return voxels;
   }
 
@@ -253,11 +259,13 @@ class Taker {
     c.was = kBone;
     c.is_bone = true;
     const double kept = c.before_mm3 > 0 ? 1 - c.removed_mm3 / c.before_mm3 : 1;
-    if (c.after_mm3 <= 0) throw Error(ExitCode::corrupt, "the bone that comes back is empty", "was it saved with its segment shown?");
+    if (c.after_mm3 <= 0)
+      throw Error(ExitCode::corrupt, "the bone that comes back is empty", "was it saved with its segment shown?");
     if (kept < 0.5) {
-      throw Error(ExitCode::corrupt,
-                  "only " + percent(kept) + " of the bone lie where they were: it was moved, mirrored, or is of another scan",
-                  "look at the CT of the case and the segment together in 3D Slicer");
+      throw Error(
+          ExitCode::corrupt,
+          "only " + percent(kept) + " of the bone lie where they were: it was moved, mirrored, or is of another scan",
+          "look at the CT of the case and the segment together in 3D Slicer");
     }
     auto voxels = make_voxels<std::uint8_t>(after.size());
     std::copy(after.begin(), after.end(), voxels.get());
@@ -303,7 +311,8 @@ class Taker {
     for (const Segment* s : structures_) {
       const auto after = placed(*s, frame);
       const auto old = before.find(known_as(*s));
-      SegmentChange c = compare(old == before.end() ? none.data() : old->second.mask.data(), after.data(), n, frame.voxel_volume_mm3());
+      SegmentChange c = compare(old == before.end() ? none.data() : old->second.mask.data(), after.data(), n,
+                                frame.voxel_volume_mm3());
       c.name = s->name;
       if (old != before.end()) {
         c.was = old->second.name;
@@ -328,9 +337,10 @@ class Taker {
       c.was = kept.name;
       back.changes.push_back(std::move(c));
     }
-    if (overlap > 0) context_.warn(std::to_string(overlap) + " voxels belong to several structures; the last one keeps them");
-    back.structures_changed =
-        std::any_of(back.changes.begin(), back.changes.end(), [](const SegmentChange& c) { return !c.is_bone && c.changed(); });
+    if (overlap > 0)
+      context_.warn(std::to_string(overlap) + " voxels belong to several structures; the last one keeps them");
+    back.structures_changed = std::any_of(back.changes.begin(), back.changes.end(),
+                                          [](const SegmentChange& c) { return !c.is_bone && c.changed(); });
     labels.frame = frame;
     labels.voxels = std::move(voxels);
     back.structures = std::move(labels);
@@ -355,7 +365,8 @@ std::string scan_mark(const Image& ct) {
   return hasher.hex();
 }
 
-CaseImages images_of_case(const CasePipeline& from, const fs::path& case_folder, const Registry& registry, const Context& context) {
+CaseImages images_of_case(const CasePipeline& from, const fs::path& case_folder, const Registry& registry,
+                          const Context& context) {
   Pipeline pipeline = parse_pipeline(from.text, from.settings);
   const Parts parts = parts_of(pipeline);
   const TemporaryFolder scratch;
@@ -369,7 +380,8 @@ CaseImages images_of_case(const CasePipeline& from, const fs::path& case_folder,
     more = false;
     for (const PipelineNode& n : pipeline.nodes) {
       if (!wanted.contains(n.id)) continue;
-      for (const auto& [port, input] : n.inputs) more = (!input.node.empty() && wanted.insert(input.node).second) || more;
+      for (const auto& [port, input] : n.inputs)
+        more = (!input.node.empty() && wanted.insert(input.node).second) || more;
     }
   }
   std::erase_if(pipeline.nodes, [&](const PipelineNode& n) { return !wanted.contains(n.id); });
@@ -402,7 +414,8 @@ void hand_over(const CaseImages& images, const fs::path& folder) {
   });
 }
 
-TakenBack take_back(const CaseImages& images, const fs::path& folder, const TakeBackOptions& options, const Context& context) {
+TakenBack take_back(const CaseImages& images, const fs::path& folder, const TakeBackOptions& options,
+                    const Context& context) {
   return Taker(images, options, context).run(folder);
 }
 
@@ -421,7 +434,8 @@ std::string with_corrected_bone(const CasePipeline& from) {
   std::string lower;
   if (parts.mask != nullptr && parts.mask->stage == "threshold" && !parts.bone->params.contains("lower")) {
     const auto preset = parts.mask->params.find("preset"), at = parts.mask->params.find("lower");
-    if (at != parts.mask->params.end() && (preset == parts.mask->params.end() || preset->second == "fixed")) lower = at->second;
+    if (at != parts.mask->params.end() && (preset == parts.mask->params.end() || preset->second == "fixed"))
+      lower = at->second;
   }
   const std::optional<Json> old = Json::parse(from.text);
   if (!old) throw Error(ExitCode::corrupt, "the case's pipeline is not JSON");
@@ -441,7 +455,8 @@ std::string with_corrected_bone(const CasePipeline& from) {
       if (const Json* const in = stage.find("in")) {
         for (const Json::Member& port : in->members()) {
           const std::string* const node = port.value.text();
-          const bool of_mask = !mask_id.empty() && node != nullptr && (*node == mask_id || node->starts_with(mask_id + "."));
+          const bool of_mask =
+              !mask_id.empty() && node != nullptr && (*node == mask_id || node->starts_with(mask_id + "."));
           if (of_mask || (name == parts.bone->id && port.key == "mask"))
             copy["in"][port.key] = Json{{"file", "${case}/" + std::string(kCorrectedBone)}};
         }
@@ -453,4 +468,4 @@ std::string with_corrected_bone(const CasePipeline& from) {
   return made.dump(2) + "\n";
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

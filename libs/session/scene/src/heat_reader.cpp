@@ -29,8 +29,10 @@ struct HeatReader::Body {
   bool of_region = false;
   int edge = 1;  // voxels along a cell
   std::unique_ptr<HeatField> field;
-  std::map<std::array<int, 3>, std::vector<std::pair<int, std::size_t>>> places;  // by brick of cells: cell, number in places_
-  std::map<std::array<int, 3>, std::array<double, BrickGrid::kVoxels>> peaks;     // by brick of cells: K, where history is kept
+  std::map<std::array<int, 3>, std::vector<std::pair<int, std::size_t>>>
+      places;  // by brick of cells: cell, number in places_
+  std::map<std::array<int, 3>, std::array<double, BrickGrid::kVoxels>>
+      peaks;  // by brick of cells: K, where history is kept
 
   [[nodiscard]] Ijk cell_of(Ijk voxel) const {
     const auto down = [&](int v) { return v >= 0 ? v / edge : -((edge - 1 - v) / edge); };
@@ -75,7 +77,8 @@ std::unique_ptr<HeatReader::Body> HeatReader::body_of(const PlacedBody& placed) 
   b->of_region = placed.of_region;
   const double voxel_mm = b->bone.frame().spacing_mm.x;
   while (b->edge < 8 && b->edge * voxel_mm < 0.75 * params_.cell_mm) b->edge *= 2;
-  b->field = std::make_unique<HeatField>(b->edge * voxel_mm, HeatMaterials{}, [b, this](Ijk cell) { return b->matter(cell, structures_); });
+  b->field = std::make_unique<HeatField>(b->edge * voxel_mm, HeatMaterials{},
+                                         [b, this](Ijk cell) { return b->matter(cell, structures_); });
   return made;
 }
 
@@ -84,7 +87,8 @@ void HeatReader::begin(const World& world) {
   bodies_.clear();
   for (const PlacedBody& placed : world.bodies()) bodies_.push_back(body_of(placed));
   for (std::uint32_t hand = 0; hand < guides_.size(); ++hand) guides_[hand] = world.cutting_guide(hand);
-  std::stable_sort(bodies_.begin(), bodies_.end(), [](const auto& a, const auto& b) { return a->of_region && !b->of_region; });
+  std::stable_sort(bodies_.begin(), bodies_.end(),
+                   [](const auto& a, const auto& b) { return a->of_region && !b->of_region; });
   double longest_s = 0.2;
   for (const auto& b : bodies_) longest_s = std::min(longest_s, b->field->longest_step_s());
   every_ = static_cast<std::uint64_t>(std::max(1.0, std::floor(longest_s * rate_hz_)));
@@ -161,7 +165,8 @@ void HeatReader::action(const SceneAction& action) {
     Body& b = **it;
     std::size_t n = 0;
     for (const std::uint32_t brick : c.bricks) {
-      for (VoxelKey v = brick * BrickGrid::kVoxels; v < (brick + 1) * BrickGrid::kVoxels; ++v, ++n) b.bone.set(v, c.values[n]);
+      for (VoxelKey v = brick * BrickGrid::kVoxels; v < (brick + 1) * BrickGrid::kVoxels; ++v, ++n)
+        b.bone.set(v, c.values[n]);
     }
     for (const std::uint32_t brick : c.bricks) {
       const Ijk first = b.cell_of(b.bone.coordinate(brick * BrickGrid::kVoxels));
@@ -202,7 +207,8 @@ void HeatReader::tick(const TickRecord& record, std::span<const VoxelChange> cha
   }
   heat(record);
   if (record.hand > 0 || record.tick % every_ != 0) return;  // once for all hands
-  if (water_.values[4] > 0) cool({water_.values[0], water_.values[1], water_.values[2]}, water_.values[3], std::min(1.0, water_.values[4]));
+  if (water_.values[4] > 0)
+    cool({water_.values[0], water_.values[1], water_.values[2]}, water_.values[3], std::min(1.0, water_.values[4]));
   step();
 }
 
@@ -238,7 +244,8 @@ void HeatReader::heat(const TickRecord& record) {
   std::array<bool, kPlaces> in{};
   for (int n = 0; n < kPlaces; ++n)
     in[static_cast<std::size_t>(n)] = std::any_of(bodies_.begin(), bodies_.end(), [&](const auto& b) {
-      return b->field->holds({b->cells_from_world(contact + along * n), std::max(0.9, 0.5 * radius / b->field->cell_mm())}) > 0;
+      return b->field->holds(
+                 {b->cells_from_world(contact + along * n), std::max(0.9, 0.5 * radius / b->field->cell_mm())}) > 0;
     });
   const auto met = std::count(in.begin(), in.end(), true);
   for (int n = 0; n < kPlaces; ++n) {
@@ -250,7 +257,8 @@ void HeatReader::heat(const TickRecord& record) {
 void HeatReader::heat(Vec3 contact_mm, double radius_mm, double watt) {
   for (const double wider : {1.0, 1.5, 2.2}) {
     for (const auto& b : bodies_) {
-      const HeatField::Ball ball{b->cells_from_world(contact_mm), wider * std::max(0.9, 0.5 * radius_mm / b->field->cell_mm())};
+      const HeatField::Ball ball{b->cells_from_world(contact_mm),
+                                 wider * std::max(0.9, 0.5 * radius_mm / b->field->cell_mm())};
       if (b->field->holds(ball) < (wider < 2 ? 3 * b->field->full_cell_j_per_k() : 0)) continue;
       if (b->field->add(ball, watt / rate_hz_) > 0) return;
     }
@@ -310,14 +318,16 @@ double HeatReader::peak_c_at(Vec3 world_mm) const {
   for (const auto& b : bodies_) {
     if (b->peaks.empty()) continue;
     const Vec3 x = b->cells_from_world(world_mm);
-    const Ijk lo{static_cast<int>(std::floor(x.x)), static_cast<int>(std::floor(x.y)), static_cast<int>(std::floor(x.z))};
+    const Ijk lo{static_cast<int>(std::floor(x.x)), static_cast<int>(std::floor(x.y)),
+                 static_cast<int>(std::floor(x.z))};
     double sum = 0, weights = 0;
     for (int n = 0; n < 8; ++n) {
       const Ijk c{lo.i + (n & 1), lo.j + (n >> 1 & 1), lo.k + (n >> 2)};
       if (b->bone.nearest(b->body_from_cells(vec(c))) <= 0) continue;
       const double w = (1 - std::abs(x.x - c.i)) * (1 - std::abs(x.y - c.j)) * (1 - std::abs(x.z - c.k));
       const auto brick = b->peaks.find({c.i >> 3, c.j >> 3, c.k >> 3});
-      if (brick != b->peaks.end()) sum += w * brick->second[static_cast<std::size_t>((c.i & 7) | (c.j & 7) << 3 | (c.k & 7) << 6)];
+      if (brick != b->peaks.end())
+        sum += w * brick->second[static_cast<std::size_t>((c.i & 7) | (c.j & 7) << 3 | (c.k & 7) << 6)];
       weights += w;
     }
     if (weights > 0) peak_k = std::max(peak_k, sum / weights);
@@ -339,7 +349,8 @@ std::optional<HeatReader::Warmest> HeatReader::warmest_left() const {
         const double peak_c = params_.body_c + peaks[static_cast<std::size_t>(c)];
         if (peak_c <= (warmest ? warmest->peak_c : params_.body_c)) continue;
         const Ijk cell{brick[0] * 8 + (c & 7), brick[1] * 8 + (c >> 3 & 7), brick[2] * 8 + (c >> 6)};
-        if (b->matter(cell, nullptr).bone >= 0.5F) warmest = Warmest{b->world_from_body(b->body_from_cells(vec(cell))), peak_c};
+        if (b->matter(cell, nullptr).bone >= 0.5F)
+          warmest = Warmest{b->world_from_body(b->body_from_cells(vec(cell))), peak_c};
       }
     }
   }
@@ -377,7 +388,8 @@ std::map<std::uint8_t, HeatReader::OfStructure> HeatReader::structures() const {
     s.worst.coagulated = s.worst.coagulated || p.dose.coagulated;
     s.now_c = std::max(s.now_c, p.now_c);
   }
-  for (auto& [value, s] : all) s.share_over_limit = static_cast<double>(counts[value][0]) / static_cast<double>(counts[value][1]);
+  for (auto& [value, s] : all)
+    s.share_over_limit = static_cast<double>(counts[value][0]) / static_cast<double>(counts[value][1]);
   return all;
 }
 
@@ -408,8 +420,9 @@ std::size_t HeatReader::warm_bricks() const {
 std::vector<std::string> told(const HeatReader& heat, const StructureMap* structures) {
   const auto tenths = [](double x) { return format_number(std::round(x * 10) / 10); };
   const HeatLedger l = heat.ledger();
-  std::vector<std::string> lines{"warmest bone " + tenths(heat.hottest_c()) + " C; " + tenths(l.added_j) + " J into bone, of which " +
-                                 tenths(l.chips_j) + " left with chips, " + tenths(l.cooled_j) + " into water"};
+  std::vector<std::string> lines{"warmest bone " + tenths(heat.hottest_c()) + " C; " + tenths(l.added_j) +
+                                 " J into bone, of which " + tenths(l.chips_j) + " left with chips, " +
+                                 tenths(l.cooled_j) + " into water"};
   if (structures == nullptr) {
     lines.emplace_back("the case lists no structures at risk");
     return lines;
@@ -417,10 +430,10 @@ std::vector<std::string> told(const HeatReader& heat, const StructureMap* struct
   for (const auto& [value, s] : heat.structures()) {
     const double minutes = s.worst.cem43_min;
     lines.push_back(structures->name_of(value) + ": " + tenths(s.worst.peak_c) + " C at most, " +
-                    format_number(minutes < 1000 ? std::round(minutes * 100) / 100 : std::round(minutes)) + " min at 43 C" +
-                    (s.worst.coagulated ? ", COAGULATED" : ""));
+                    format_number(minutes < 1000 ? std::round(minutes * 100) / 100 : std::round(minutes)) +
+                    " min at 43 C" + (s.worst.coagulated ? ", COAGULATED" : ""));
   }
   return lines;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

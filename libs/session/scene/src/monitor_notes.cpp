@@ -16,14 +16,14 @@ void MonitorNotes::event(const MonitorEvent& e) {
     case MonitorEventKind::threshold:
     case MonitorEventKind::no_threshold:
     case MonitorEventKind::lost:
-      rehearsal_.note(
-          "monitor",
-          Json{{"event", name_of(e.kind)}, {"at_s", static_cast<double>(e.sample) / MonitorSetup::kRateHz}, {"words", words_of(e, wiring_)}}
-              .dump());
+      rehearsal_.note("monitor", Json{{"event", name_of(e.kind)},
+                                      {"at_s", static_cast<double>(e.sample) / MonitorSetup::kRateHz},
+                                      {"words", words_of(e, wiring_)}}
+                                     .dump());
       break;
     default:
       break;
   }
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -123,7 +123,8 @@ void MonitorReader::tick(const TickRecord& record, std::span<const VoxelChange> 
   if (heat_) heat_->tick(record, changes);
   if (world_ && !changes.empty()) {
     for (const VoxelChange& c : changes) {
-      if (const PlacedBody* const b = world_->owner(c.voxel)) b->body->bone.set(c.voxel - b->body->name_of(0), c.density);
+      if (const PlacedBody* const b = world_->owner(c.voxel))
+        b->body->bone.set(c.voxel - b->body->name_of(0), c.density);
     }
     world_->tell(changes);
   }
@@ -180,8 +181,9 @@ double MonitorReader::bone_between(Vec3 from_mm, Vec3 to_mm) const {
 void MonitorReader::find_nearest(const TickRecord& record, std::vector<Nearest>& all) const {
   all.clear();
   const Instrument& held = instrument_of(record.device.tool);
-  const Vec3 axis = from_floats(record.device.axis),
-             start = from_floats(record.device.position_mm) + from_floats(record.shown_offset_mm) + axis * held.head.start_mm;
+  const Vec3 axis = from_floats(record.device.axis), start = from_floats(record.device.position_mm) +
+                                                             from_floats(record.shown_offset_mm) +
+                                                             axis * held.head.start_mm;
   std::vector<double> clearance;
   for (std::size_t n = 0; n < wiring_.courses.size(); ++n) {
     const NerveCourse& course = wiring_.courses[n];
@@ -201,17 +203,19 @@ void MonitorReader::find_nearest(const TickRecord& record, std::vector<Nearest>&
     if (least > kReachMm) continue;
     if (clearance.empty()) {
       clearance.resize(structures_->values().size());
-      structures_->clearance(held.head, from_floats(record.device.position_mm) + from_floats(record.shown_offset_mm), axis, clearance);
+      structures_->clearance(held.head, from_floats(record.device.position_mm) + from_floats(record.shown_offset_mm),
+                             axis, clearance);
     }
-    const auto number =
-        std::find(structures_->values().begin(), structures_->values().end(), wiring_.structures[n]) - structures_->values().begin();
+    const auto number = std::find(structures_->values().begin(), structures_->values().end(), wiring_.structures[n]) -
+                        structures_->values().begin();
     Nearest found{n, nearest, clearance[static_cast<std::size_t>(number)], 0};
     if (found.clearance_mm >= structures_->reach_mm()) continue;
     const Vec3 on_axis = start + axis * foot_mm, to = course.points[nearest].at_mm - on_axis;
     const double way = length(to);
     const double radius = held.head.radius_at_mm(foot_mm), ends = way - course.points[nearest].radius_mm;
     if (ends > radius && way > 0)
-      found.bone_mm = std::min(std::max(0.0, found.clearance_mm), bone_between(on_axis + to * (radius / way), on_axis + to * (ends / way)));
+      found.bone_mm = std::min(std::max(0.0, found.clearance_mm),
+                               bone_between(on_axis + to * (radius / way), on_axis + to * (ends / way)));
     all.push_back(found);
   }
 }
@@ -281,7 +285,8 @@ void MonitorReader::step(std::uint64_t until_tick) {
     const bool moves = length(at - hand.was_mm) > kMovesMmPerS * dt;
     hand.was_mm = at;
     for (const Nearest& n : nearest_[h]) {
-      const bool on_sheath = n.clearance_mm <= options_.setup.constants.sheath_mm && n.bone_mm <= options_.setup.constants.sheath_mm;
+      const bool on_sheath =
+          n.clearance_mm <= options_.setup.constants.sheath_mm && n.bone_mm <= options_.setup.constants.sheath_mm;
       stresses_.push_back({n.nerve, n.point, n.clearance_mm, n.bone_mm, hand.press_n,
                            (hand.turns && (hand.press_n > 0 || on_sheath)) || (on_sheath && moves), hand.turns});
     }
@@ -338,7 +343,8 @@ std::string stimulator_note(const MonitorEvent& e) {
       .dump();
 }
 
-std::vector<std::pair<std::uint64_t, StimulatorSetting>> stimulator_notes(const SessionReader& session, std::size_t& unreadable) {
+std::vector<std::pair<std::uint64_t, StimulatorSetting>> stimulator_notes(const SessionReader& session,
+                                                                          std::size_t& unreadable) {
   std::vector<std::pair<std::uint64_t, StimulatorSetting>> all;
   auto parts = session.parts();
   while (const SessionPart* const part = parts.next()) {
@@ -349,8 +355,8 @@ std::vector<std::pair<std::uint64_t, StimulatorSetting>> stimulator_notes(const 
         const Json* const v = j ? j->find(key) : nullptr;
         return v == nullptr ? std::nullopt : v->number();
       };
-      const auto tick = number("at_tick"), hand = number("hand"), ma = number("current_ma"), rate = number("pulses_per_s"),
-                 width = number("width_ms");
+      const auto tick = number("at_tick"), hand = number("hand"), ma = number("current_ma"),
+                 rate = number("pulses_per_s"), width = number("width_ms");
       const Json* const search = j ? j->find("search") : nullptr;
       if (!tick || !hand || !ma || !rate || !width || search == nullptr || !(*tick >= 0 && *tick < 1e15) ||
           !(*hand >= 0 && *hand < kMostHands)) {
@@ -393,14 +399,16 @@ std::string words_of(const MonitorEvent& e, const MonitorWiring& wiring) {
     case MonitorEventKind::response:
       return words + ", " + hundredths(e.ma) + " mA: " + whole(e.uv) + " uV after " + hundredths(e.ms) + " ms";
     case MonitorEventKind::stimulator:
-      return e.ma <= 0 ? "stimulator off"
-                       : (e.search ? "stimulator looks for the threshold from " : "stimulator ") + hundredths(e.ma) + " mA";
+      return e.ma <= 0
+                 ? "stimulator off"
+                 : (e.search ? "stimulator looks for the threshold from " : "stimulator ") + hundredths(e.ma) + " mA";
     case MonitorEventKind::cause:
-      return words + ": " + std::string(name_of(e.cause)) + (e.integrity < 1 ? ", " + whole(100 * e.integrity) + " % whole there" : "");
+      return words + ": " + std::string(name_of(e.cause)) +
+             (e.integrity < 1 ? ", " + whole(100 * e.integrity) + " % whole there" : "");
     case MonitorEventKind::lost:
       return hundredths(e.seconds) + " s lost";
   }
   return words;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

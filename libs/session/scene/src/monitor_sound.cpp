@@ -10,7 +10,8 @@
 namespace osteo::inline session {
 namespace {
 
-constexpr auto kBegins = static_cast<std::size_t>(0.01 * MonitorSetup::kRateHz);  // waits before it is played: blocks come every 5 ms
+constexpr auto kBegins =
+    static_cast<std::size_t>(0.01 * MonitorSetup::kRateHz);  // waits before it is played: blocks come every 5 ms
 constexpr auto kMost = static_cast<std::size_t>(MonitorSound::kMostWaitingS * MonitorSetup::kRateHz);
 
 constexpr std::size_t kRing = 8192;  // a power of two: then a ring has exactly that room
@@ -31,7 +32,8 @@ void MonitorSound::block(const MonitorBlock& block) {
     int largest = -1;
     for (std::size_t ch = 0; ch < block.channels; ++ch) {
       int peak = 0;
-      for (std::size_t i = 0; i < n; ++i) peak = std::max(peak, std::abs(static_cast<int>(block.values[i * block.channels + ch])));
+      for (std::size_t i = 0; i < n; ++i)
+        peak = std::max(peak, std::abs(static_cast<int>(block.values[i * block.channels + ch])));
       if (peak > largest) {
         largest = peak;
         heard = ch;
@@ -100,7 +102,8 @@ void MonitorSound::mix(std::span<float> out) noexcept {
     if (tone_left_ > 0) {
       // Fades in and out over 2 ms.
       const int whole = static_cast<int>(kToneS * Synthesizer::kRateHz), edge = 96;
-      const float fade = std::min({1.0F, static_cast<float>(whole - tone_left_ + 1) / edge, static_cast<float>(tone_left_) / edge});
+      const float fade =
+          std::min({1.0F, static_cast<float>(whole - tone_left_ + 1) / edge, static_cast<float>(tone_left_) / edge});
       v += 0.25F * fade * static_cast<float>(portable::sin_cos_turns(static_cast<double>(tone_phase_)).sin);
       tone_phase_ += kTurn;
       if (tone_phase_ >= 1) tone_phase_ -= 1;
@@ -110,4 +113,4 @@ void MonitorSound::mix(std::span<float> out) noexcept {
   }
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -8,14 +8,18 @@
 
 namespace osteo::inline session {
 
-Operation::Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, std::span<Device* const> devices, Stream& stream,
-                     double rate_hz)
-    : world_(std::move(world)), setup_(setup), renderer_(setup, anatomy, 1 / rate_hz), servo_(renderer_, devices, stream, rate_hz) {
+Operation::Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, std::span<Device* const> devices,
+                     Stream& stream, double rate_hz)
+    : world_(std::move(world)),
+      setup_(setup),
+      renderer_(setup, anatomy, 1 / rate_hz),
+      servo_(renderer_, devices, stream, rate_hz) {
   scene_ = std::make_unique<HapticScene>(HapticScene::of(world_, setup_));
   renderer_.show(scene_.get());
 }
 
-Operation::Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, Device& device, Stream& stream, double rate_hz)
+Operation::Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, Device& device, Stream& stream,
+                     double rate_hz)
     : Operation(std::move(world), setup, anatomy, std::array<Device*, 1>{&device}, stream, rate_hz) {}
 
 // Only when nothing posted before waits: the scene before the last is then nobody's any more.
@@ -93,4 +97,4 @@ std::optional<World::Effect> Operation::act_live(const SceneAction& action, cons
   return effect;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -90,4 +90,4 @@ std::vector<LiveComponents::Component> PiecesReader::large_pieces() const {
   return large;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -7,10 +7,10 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/param.h"
+#include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/imaging/io/surface_io.h"
 #include "osteo/simulation/bone/plate_fit.h"
 #include "osteo/simulation/bone/world_mesh.h"
-#include "osteo/imaging/io/surface_io.h"
-#include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo::inline session {
 namespace {
@@ -36,8 +36,8 @@ Json gaps_of(const World& world, const Fixture& f, const fs::path& csv) {
   for (const PlateGap& g : plate_gaps(world, plate, pose, f.opening_mm, 400, kReachMm)) {
     const Vec3 p = pose(g.at_mm);
     const bool met = g.body != SceneAction::kNobody;
-    text += format_number(p.x) + "," + format_number(p.y) + "," + format_number(p.z) + "," + (met ? format_number(g.gap_mm) : "") + "," +
-            (met ? std::to_string(g.body) : "") + "\n";
+    text += format_number(p.x) + "," + format_number(p.y) + "," + format_number(p.z) + "," +
+            (met ? format_number(g.gap_mm) : "") + "," + (met ? std::to_string(g.body) : "") + "\n";
     if (met) gaps.push_back(g.gap_mm);
     none += met ? 0 : 1;
   }
@@ -88,12 +88,14 @@ std::string write_plan(const World& world, const fs::path& folder, const Context
     save_surface(moved(surface.mesh, b.world_from_body), folder / name);
     const double off_percent = surface.bone_mm3 > 0 ? 100 * (surface.surface_mm3 / surface.bone_mm3 - 1) : 0;
     if (std::abs(off_percent) > kWarnPercent)
-      context.warn("piece " + std::to_string(b.body->id) + ": its surface holds " + format_number(surface.surface_mm3) + " mm3, the bone " +
-                   format_number(surface.bone_mm3) + ": too few voxels for a surface of that volume");
+      context.warn("piece " + std::to_string(b.body->id) + ": its surface holds " + format_number(surface.surface_mm3) +
+                   " mm3, the bone " + format_number(surface.bone_mm3) +
+                   ": too few voxels for a surface of that volume");
     const LiveComponents solid(b.body->bone);
     const double voxel = b.body->bone.frame().voxel_volume_mm3();
     const auto& parts = solid.components();
-    const auto largest = std::max_element(parts.begin(), parts.end(), [](const auto& x, const auto& y) { return x.mass < y.mass; });
+    const auto largest =
+        std::max_element(parts.begin(), parts.end(), [](const auto& x, const auto& y) { return x.mass < y.mass; });
     Json piece{{"number", b.body->id},
                {"file", name},
                {"volume_mm3", surface.bone_mm3},
@@ -108,7 +110,8 @@ std::string write_plan(const World& world, const fs::path& folder, const Context
     if (largest != parts.end()) {
       piece["centre_mm"] = triple(b.world_from_body(largest->centre_mm));
       piece["inertia_g_mm2_at_1_g_per_cm3_in_the_case"] = Json::list();
-      for (const double i : largest->inertia_mm2) piece["inertia_g_mm2_at_1_g_per_cm3_in_the_case"].push_back(i * voxel / 1000);
+      for (const double i : largest->inertia_mm2)
+        piece["inertia_g_mm2_at_1_g_per_cm3_in_the_case"].push_back(i * voxel / 1000);
     }
     j["pieces"].push_back(piece);
   }
@@ -145,4 +148,4 @@ std::string write_plan(const World& world, const fs::path& folder, const Context
   return text;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -6,7 +6,8 @@
 
 namespace osteo::inline session {
 
-ReaderHub::ReaderHub(StreamReader& from, const World& world) : from_(from), world_(world), ticks_(1024), changes_(1 << 16) {}
+ReaderHub::ReaderHub(StreamReader& from, const World& world)
+    : from_(from), world_(world), ticks_(1024), changes_(1 << 16) {}
 
 void ReaderHub::add(Reader& reader, bool resync) {
   readers_.push_back(&reader);
@@ -64,7 +65,8 @@ std::size_t ReaderHub::drain(std::optional<double> about_ms) {
       used += changed;
     }
     total += n;
-    if (about_ms && std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count() > *about_ms) {
+    if (about_ms &&
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count() > *about_ms) {
       due = 0;  // their ticks may be among those that are left
       break;
     }
@@ -99,4 +101,4 @@ void ReaderHub::end(std::uint64_t ticks) {
   resync_and_update(lost);
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

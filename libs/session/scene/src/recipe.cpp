@@ -11,8 +11,10 @@ namespace {
 
 // Where notes are kept; empty without a home.
 fs::path notes_folder() {
-  if (const char* state = std::getenv("XDG_STATE_HOME"); state != nullptr && *state == '/') return fs::path(state) / "osteotome";
-  if (const char* home = std::getenv("HOME"); home != nullptr && *home == '/') return fs::path(home) / ".local/state/osteotome";
+  if (const char* state = std::getenv("XDG_STATE_HOME"); state != nullptr && *state == '/')
+    return fs::path(state) / "osteotome";
+  if (const char* home = std::getenv("HOME"); home != nullptr && *home == '/')
+    return fs::path(home) / ".local/state/osteotome";
   return {};
 }
 
@@ -76,7 +78,8 @@ std::optional<Recipe> read_recipe(const fs::path& case_folder) {
     const JsonValue* const j = m.root().find("recipe");
     if (j == nullptr) return std::nullopt;
     m.allow(*j, "recipe",
-            std::vector<std::string>{"source_hash", "structures_hash", "pipeline_hash", "edits_hash", "settings", "withheld"});
+            std::vector<std::string>{"source_hash", "structures_hash", "pipeline_hash", "edits_hash", "settings",
+                                     "withheld"});
     const auto text = [&](const char* key) {
       const JsonValue* const value = j->find(key);
       return value == nullptr ? std::string() : m.text(*value, std::string("recipe: \"") + key + "\"");
@@ -90,7 +93,8 @@ std::optional<Recipe> read_recipe(const fs::path& case_folder) {
     r.structures_hash = text("structures_hash");
     r.pipeline_hash = text("pipeline_hash");
     r.edits_hash = text("edits_hash");
-    each(&m.need(*j, "recipe", "settings"), [&](const std::string& name, const std::string& value) { r.settings[name] = value; });
+    each(&m.need(*j, "recipe", "settings"),
+         [&](const std::string& name, const std::string& value) { r.settings[name] = value; });
     each(j->find("withheld"), [&](const std::string& name, const std::string& hash) {
       if (const auto value = recall(hash)) {
         r.settings[name] = *value;
@@ -139,14 +143,16 @@ std::vector<RecipeChange> change_settings(Recipe& r, const std::map<std::string,
     dropped.emplace_back("lower", "the preset finds the threshold");
   if (given.contains("lower") && given.at("lower")) dropped.emplace_back("preset", "it would not use --lower");
   for (const auto& [one, other] : {std::pair{"keep_table", "remove_table"}, std::pair{"remove_table", "keep_table"}}) {
-    if (const auto it = given.find(one); it != given.end() && it->second == "true") dropped.emplace_back(other, "the other was asked for");
+    if (const auto it = given.find(one); it != given.end() && it->second == "true")
+      dropped.emplace_back(other, "the other was asked for");
   }
   for (const auto& [name, value] : given) set(name, value, "");
   for (const auto& [name, why] : dropped) {
     const auto it = r.settings.find(name);
-    if (!given.contains(name) && it != r.settings.end() && !(name == "preset" && it->second == "fixed")) set(name, std::nullopt, why);
+    if (!given.contains(name) && it != r.settings.end() && !(name == "preset" && it->second == "fixed"))
+      set(name, std::nullopt, why);
   }
   return changes;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -27,10 +27,12 @@ std::vector<Device*> pointers(const std::vector<std::unique_ptr<Device>>& device
 
 }  // namespace
 
-Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const RehearsalOptions& options, const Context& context)
+Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const RehearsalOptions& options,
+                     const Context& context)
     : Rehearsal(std::move(world), one(std::move(device)), options, context) {}
 
-Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, const RehearsalOptions& options, const Context& context)
+Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, const RehearsalOptions& options,
+                     const Context& context)
     : devices_(std::move(devices)),
       options_(options),
       voxel_mm3_(world.bodies().front().body->bone.frame().voxel_volume_mm3()),
@@ -48,7 +50,8 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
     recorder_ = std::make_unique<Recorder>(stream_.add_reader(Recorder::kTickCapacity), options_.session_file, header);
   }
   hub_.add(operation_.strokes(), false);
-  readers_ = std::make_unique<SceneReaders>(operation_.world(), options_.follow, options_.rate_hz, context, structures());
+  readers_ =
+      std::make_unique<SceneReaders>(operation_.world(), options_.follow, options_.rate_hz, context, structures());
   readers_->add_to(hub_);
   pieces_ = static_cast<int>(readers_->large_pieces().size());
   if (options_.soft) {
@@ -161,7 +164,8 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
     const std::lock_guard lock(queue_mutex_);
     const auto kind = static_cast<ActionKind>(action.kind);
     if (!effect.done) refused_ = std::string(name_of(action)) + ": " + effect.message;
-    if (!notes_.empty() && notes_.back().kind == kind && notes_.back().done == effect.done && notes_.back().why == effect.message) {
+    if (!notes_.empty() && notes_.back().kind == kind && notes_.back().done == effect.done &&
+        notes_.back().why == effect.message) {
       ++notes_.back().times;
     } else {
       notes_.push_back({operation_.ticks(), kind, effect.done, effect.message, 1});
@@ -197,11 +201,13 @@ void Rehearsal::move_soft() {
   std::vector<SoftTool> tools;
   for (std::size_t hand = 0; hand < devices_.size(); ++hand) {
     const TickRecord& now = hub_.latest(hand);
-    tools.push_back({from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool, now.speed_rpm > 0});
+    tools.push_back({from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool,
+                     now.speed_rpm > 0});
   }
   for (const SceneAction& push : options_.soft->update(tools)) {
     // In its place: a hand whose turn has not come yet does not lose it.
-    const auto before = std::find_if(soft_pushes_.begin(), soft_pushes_.end(), [&](const SceneAction& a) { return a.hand == push.hand; });
+    const auto before = std::find_if(soft_pushes_.begin(), soft_pushes_.end(),
+                                     [&](const SceneAction& a) { return a.hand == push.hand; });
     if (before != soft_pushes_.end()) {
       *before = push;
     } else {
@@ -214,12 +220,13 @@ void Rehearsal::move_soft() {
 void Rehearsal::act(const SceneAction& action) {
   const std::lock_guard lock(queue_mutex_);
   if (elsewhere_) {
-    if (!row_of(action).made_often) refused_ = std::string(name_of(action)) + ": the session runs on another machine, and is changed there";
+    if (!row_of(action).made_often)
+      refused_ = std::string(name_of(action)) + ": the session runs on another machine, and is changed there";
     return;
   }
   const auto same = [&](const SceneAction& before) {
-    return before.kind == action.kind && before.body == action.body && before.other == action.other && before.item == action.item &&
-           before.hand == action.hand;
+    return before.kind == action.kind && before.body == action.body && before.other == action.other &&
+           before.item == action.item && before.hand == action.hand;
   };
   const bool again = row_of(action).last_counts && !queue_.empty() && same(queue_.back());
   if (again) {
@@ -243,8 +250,10 @@ std::string Rehearsal::trouble() const {
   const Recorder::Status s = recording();
   if (s.failure) return std::string("recording has ended: ") + s.failure->what();
   if (s.ticks_lost > 0) return "the disk does not keep up: " + std::to_string(s.ticks_lost) + " ticks are not recorded";
-  if (s.notes_lost > 0) return std::to_string(s.notes_lost) + " notes (camera, marks) are not recorded: they came too fast";
-  if (s.behind_s > 3) return "the disk is " + std::to_string(std::lround(s.behind_s)) + " s behind; nothing is lost yet";
+  if (s.notes_lost > 0)
+    return std::to_string(s.notes_lost) + " notes (camera, marks) are not recorded: they came too fast";
+  if (s.behind_s > 3)
+    return "the disk is " + std::to_string(std::lround(s.behind_s)) + " s behind; nothing is lost yet";
   for (const auto& device : devices_) {
     if (std::string text = device->trouble(); !text.empty()) return text;
   }
@@ -296,7 +305,8 @@ void Rehearsal::follow_on() {
 }
 
 void Rehearsal::start() {
-  loop_ = std::make_unique<FixedRateLoop>(options_.rate_hz, [this](std::int64_t lateness_ns) { return operation_.step(lateness_ns); });
+  loop_ = std::make_unique<FixedRateLoop>(options_.rate_hz,
+                                          [this](std::int64_t lateness_ns) { return operation_.step(lateness_ns); });
   if (recorder_) recorder_->start();
   loop_->start();
   thread_ = std::thread([this] { follow(); });
@@ -385,7 +395,8 @@ RehearsalSummary Rehearsal::finish() {
       if (readers_->dust) {
         const Dust& dust = readers_->dust->dust();
         s.dust = dust.totals();
-        if (hub_.ticks_lost() == 0) dust_hash = dust.hash();  // else the same dust, but later: a replay's lies elsewhere
+        if (hub_.ticks_lost() == 0)
+          dust_hash = dust.hash();  // else the same dust, but later: a replay's lies elsewhere
       }
     } catch (...) {
       failure_ = std::current_exception();
@@ -411,24 +422,29 @@ RehearsalSummary Rehearsal::finish() {
   for (const std::uint8_t tool : readers_->tools.burrs_used()) {
     const Burr* const edge = instrument_of(tool).cutter();
     if (edge == nullptr) continue;
-    if (std::string text = too_small_for_voxels(*edge, finest_voxel_mm_); !text.empty()) s.warnings.push_back(std::move(text));
+    if (std::string text = too_small_for_voxels(*edge, finest_voxel_mm_); !text.empty())
+      s.warnings.push_back(std::move(text));
   }
   if (const std::uint64_t n = readers_->tools.ticks_without_room(); n > 0)
     s.warnings.push_back("in " + std::to_string(n) +
-                         " ticks bone was left at the burr's rim, since too much of the bone is drilled in part to remember it all: larger "
+                         " ticks bone was left at the burr's rim, since too much of the bone is drilled in part to "
+                         "remember it all: larger "
                          "voxels, or a smaller region, need less");
   if (recorder_) {
-    recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3, dust_hash, 0, 0}, [&](std::vector<VoxelChange>& all) {
-      for (const PlacedBody& b : operation_.world().bodies()) {
-        const BrickGrid& bone = b.body->bone;
-        for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) all.push_back({b.body->name_of(v), bone.value(v)});
-      }
-    });
+    recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3, dust_hash, 0, 0},
+                      [&](std::vector<VoxelChange>& all) {
+                        for (const PlacedBody& b : operation_.world().bodies()) {
+                          const BrickGrid& bone = b.body->bone;
+                          for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v)
+                            all.push_back({b.body->name_of(v), bone.value(v)});
+                        }
+                      });
     s.session_bytes = recorder_->bytes();
     s.gaps = recorder_->gaps();
     s.ticks_not_recorded = recorder_->status().ticks_lost;
     s.notes_not_recorded = recorder_->status().notes_lost;
-    if (const auto failure = recorder_->status().failure; failure && !failure_) failure_ = std::make_exception_ptr(Error(*failure));
+    if (const auto failure = recorder_->status().failure; failure && !failure_)
+      failure_ = std::make_exception_ptr(Error(*failure));
   }
   if (failure_) std::rethrow_exception(failure_);
   summary_ = s;
@@ -445,4 +461,4 @@ void Rehearsal::look(const std::function<void(const World&, SceneReaders&)>& f) 
   f(operation_.world(), *readers_);
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

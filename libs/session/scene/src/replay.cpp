@@ -4,8 +4,8 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/param.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/recording/apply.h"
+#include "osteo/session/scene/rehearsal.h"
 
 namespace osteo::inline session {
 
@@ -21,8 +21,9 @@ class RecordedHand final : public Device {
 void check_same_case(const SessionReader& session, const World& start, const Anatomy& anatomy) {
   const SessionHeader& header = session.header();
   if (const std::string& why = session.outline().not_replayable; !why.empty())
-    throw Error(ExitCode::corrupt, "the session cannot be repeated by this version: " + why,
-                "replay it with " + header.program_version + "; 'osteo export', 'osteo plan' and --resume use it all the same");
+    throw Error(
+        ExitCode::corrupt, "the session cannot be repeated by this version: " + why,
+        "replay it with " + header.program_version + "; 'osteo export', 'osteo plan' and --resume use it all the same");
   if (start.hash() != header.bone_hash) {
     throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's",
                 "give the case it was recorded on, unchanged");
@@ -40,7 +41,8 @@ void check_same_case(const SessionReader& session, const World& start, const Ana
 // The servo once more, and the recorded changes beside it.
 class Replaying {
  public:
-  Replaying(const SessionReader& session, World start, const Anatomy& anatomy, const Context& context, std::span<Reader* const> readers)
+  Replaying(const SessionReader& session, World start, const Anatomy& anatomy, const Context& context,
+            std::span<Reader* const> readers)
       : session_(session),
         context_(context),
         known_until_(session.outline().bone_known_until()),
@@ -116,7 +118,9 @@ class Replaying {
     result_.difference_since_s = seconds(checkpoint_);
   }
   void differ_in_bone() { differ("the recorded voxel changes give another bone than the recorded poses"); }
-  [[nodiscard]] double seconds(std::uint64_t tick) const { return static_cast<double>(tick) / session_.header().rate_hz; }
+  [[nodiscard]] double seconds(std::uint64_t tick) const {
+    return static_cast<double>(tick) / session_.header().rate_hz;
+  }
 
   std::vector<Device*> devices() {
     std::vector<Device*> all;
@@ -130,7 +134,8 @@ class Replaying {
     actions_.pop_front();
     if (row_of(action).by_servo) {  // not done again: it has to come again
       if (own_.empty() || own_.front() != std::pair(action.kind, action.tick)) {
-        differ("at tick " + std::to_string(action.tick) + " '" + std::string(name_of(action)) + "' came out differently");
+        differ("at tick " + std::to_string(action.tick) + " '" + std::string(name_of(action)) +
+               "' came out differently");
       } else {
         own_.pop_front();
       }
@@ -139,12 +144,14 @@ class Replaying {
     hub_.drain();
     const World::Effect effect = operation_.act(action, [&](const World::Effect& e) { hub_.scene_changed(e); });
     if (!effect.done)
-      differ("at tick " + std::to_string(action.tick) + " '" + std::string(name_of(action)) + "' could not be done: " + effect.message);
+      differ("at tick " + std::to_string(action.tick) + " '" + std::string(name_of(action)) +
+             "' could not be done: " + effect.message);
   }
   // Behind the last tick.
   void do_all() {
     for (; !actions_.empty(); operation_.finish()) act();
-    if (!own_.empty()) differ("a stroke ended at tick " + std::to_string(own_.front().second) + " that was not recorded");
+    if (!own_.empty())
+      differ("a stroke ended at tick " + std::to_string(own_.front().second) + " that was not recorded");
   }
   void end_readers() {
     hub_.drain();
@@ -159,7 +166,8 @@ class Replaying {
       hub_.drain();
     }
     // At most one a tick is done; the servo's own come with its step.
-    if (!actions_.empty() && actions_.front().tick <= recorded.front().tick && !row_of(actions_.front()).by_servo) act();
+    if (!actions_.empty() && actions_.front().tick <= recorded.front().tick && !row_of(actions_.front()).by_servo)
+      act();
     for (std::size_t h = 0; h < recorded.size(); ++h) hands_[h].sample = recorded[h].device;
     operation_.step(0);
     std::array<TickRecord, kMostHands> now;
@@ -169,11 +177,13 @@ class Replaying {
     for (SceneAction done; reader_.actions.pop({&done, 1}) > 0;) {
       if (row_of(done).by_servo) own_.emplace_back(done.kind, done.tick);
     }
-    while (!actions_.empty() && actions_.front().tick <= recorded.front().tick && row_of(actions_.front()).by_servo) act();
+    while (!actions_.empty() && actions_.front().tick <= recorded.front().tick && row_of(actions_.front()).by_servo)
+      act();
     for (std::size_t h = 0; h < recorded.size(); ++h) {
       if (const RecordField* const f = first_difference(session_.outline().tick_fields, &now[h], &recorded[h]))
-        differ("tick " + std::to_string(recorded[h].tick) + (recorded.size() > 1 ? ", hand " + std::to_string(h) + "," : "") +
-               " came out differently (" + std::string(f->name) + ")");
+        differ("tick " + std::to_string(recorded[h].tick) +
+               (recorded.size() > 1 ? ", hand " + std::to_string(h) + "," : "") + " came out differently (" +
+               std::string(f->name) + ")");
       result_.removed_mm3 += static_cast<double>(now[h].removed_mm3);
     }
     ++result_.ticks_repeated;
@@ -197,7 +207,8 @@ class Replaying {
     }
     const std::string repeated = operation_.world().hash();
     if (repeated != from_changes_.hash()) differ_in_bone();
-    if (repeated != from_checkpoints_.hash()) differ("the checkpoint at " + format_number(seconds(tick)) + " s holds another bone");
+    if (repeated != from_checkpoints_.hash())
+      differ("the checkpoint at " + format_number(seconds(tick)) + " s holds another bone");
     if (result_.difference_since_s && !failed_before_s_) failed_before_s_ = seconds(tick);
     checkpoint_ = tick;
   }
@@ -213,8 +224,9 @@ class Replaying {
   Operation operation_;
   ReaderHub hub_;
   SceneReaders readers_;
-  std::deque<SceneAction> actions_;                          // whose tick has not come
-  std::deque<std::pair<std::uint32_t, std::uint64_t>> own_;  // kind and tick of what the servo told of itself, not compared yet
+  std::deque<SceneAction> actions_;  // whose tick has not come
+  std::deque<std::pair<std::uint32_t, std::uint64_t>>
+      own_;  // kind and tick of what the servo told of itself, not compared yet
   std::vector<VoxelChange> changes_ = std::vector<VoxelChange>(1 << 16);
   bool repeating_ = true, changes_apply_ = true;
   std::uint64_t checkpoint_ = 0;
@@ -248,4 +260,4 @@ ReplayResult replay(const SessionReader& session, World start, const Anatomy& an
   return result;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

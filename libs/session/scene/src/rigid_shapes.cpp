@@ -12,12 +12,14 @@ RigidShape::Ball ToolShape::bounds() const {
 }
 
 std::vector<RigidShape::Ball> ToolShape::balls() const {
-  const int n = static_cast<int>(std::ceil(cone_.length_mm / (0.25 * std::min(cone_.start_radius_mm, cone_.end_radius_mm)))) + 1;
+  const int n =
+      static_cast<int>(std::ceil(cone_.length_mm / (0.25 * std::min(cone_.start_radius_mm, cone_.end_radius_mm)))) + 1;
   std::vector<Ball> balls;
   for (int i = 0; i < n; ++i) {
     const double along = n > 1 ? cone_.length_mm * i / (n - 1) : 0;
-    balls.push_back({at_ + axis_ * (cone_.start_mm + along),
-                     cone_.start_radius_mm + (n > 1 ? (cone_.end_radius_mm - cone_.start_radius_mm) * i / (n - 1) : 0)});
+    balls.push_back(
+        {at_ + axis_ * (cone_.start_mm + along),
+         cone_.start_radius_mm + (n > 1 ? (cone_.end_radius_mm - cone_.start_radius_mm) * i / (n - 1) : 0)});
   }
   return balls;
 }
@@ -70,4 +72,4 @@ double LiveBone::distance_mm(Vec3 at, Vec3& outwards) const {
   return -kReachMm;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -20,9 +20,9 @@ class ToolShape final : public RigidShape {
   Vec3 at_, axis_;
 };
 
-/// The bodies of a world by their densities now, drilled, sawn and moved as they are. Depth along the gradient to where the density falls
-/// below a half, found up to kReachMm deep; outside within a voxel. While the world's bodies do not come and go; densities may be written
-/// meanwhile.
+/// The bodies of a world by their densities now, drilled, sawn and moved as they are. Depth along the gradient to where
+/// the density falls below a half, found up to kReachMm deep; outside within a voxel. While the world's bodies do not
+/// come and go; densities may be written meanwhile.
 class LiveBone final : public RigidShape {
  public:
   static constexpr double kReachMm = 4;
@@ -35,4 +35,4 @@ class LiveBone final : public RigidShape {
   const World& world_;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -11,8 +11,9 @@ SceneReaders::SceneReaders(const World& world, const ReaderList& list, double ra
 }
 
 void SceneReaders::add_to(ReaderHub& hub) {
-  for (Reader* const r : {static_cast<Reader*>(surface.get()), static_cast<Reader*>(pieces.get()), static_cast<Reader*>(dust.get()),
-                          static_cast<Reader*>(heat.get()), static_cast<Reader*>(&tools)}) {
+  for (Reader* const r :
+       {static_cast<Reader*>(surface.get()), static_cast<Reader*>(pieces.get()), static_cast<Reader*>(dust.get()),
+        static_cast<Reader*>(heat.get()), static_cast<Reader*>(&tools)}) {
     if (r != nullptr) hub.add(*r, false);
   }
 }
@@ -21,4 +22,4 @@ std::vector<LiveComponents::Component> SceneReaders::large_pieces() const {
   return pieces ? pieces->large_pieces() : std::vector<LiveComponents::Component>();
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -9,12 +9,12 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
-#include "osteo/simulation/bone/plates.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/imaging/io/volume_io.h"
-#include "osteo/session/scene/approval.h"
 #include "osteo/session/recording/haptic_settings.h"
 #include "osteo/session/recording/session_reader.h"
+#include "osteo/session/scene/approval.h"
+#include "osteo/simulation/bone/plates.h"
 
 namespace osteo::inline session {
 namespace {
@@ -26,7 +26,8 @@ std::string relative_to(const fs::path& target, const fs::path& folder) {
 }
 
 ordered_json quantiles(const Histogram& h) {
-  return {{"p50", h.quantile_us(0.5)}, {"p99", h.quantile_us(0.99)}, {"p99.9", h.quantile_us(0.999)}, {"max", h.max_us()}};
+  return {
+      {"p50", h.quantile_us(0.5)}, {"p99", h.quantile_us(0.99)}, {"p99.9", h.quantile_us(0.999)}, {"max", h.max_us()}};
 }
 
 }  // namespace
@@ -40,7 +41,8 @@ SessionFolder create_session_folder(const fs::path& wanted, const fs::path& case
       if (!fs::exists(s.folder)) break;
     }
   } else if (fs::exists(wanted) && !(fs::is_directory(wanted) && fs::is_empty(wanted))) {
-    throw Error(ExitCode::cannot_write, "'" + wanted.string() + "' exists already", "give another name; a session is never overwritten");
+    throw Error(ExitCode::cannot_write, "'" + wanted.string() + "' exists already",
+                "give another name; a session is never overwritten");
   }
   std::error_code ec;
   fs::create_directories(s.folder, ec);
@@ -66,7 +68,8 @@ SessionFolder create_session_folder(const fs::path& wanted, const fs::path& case
 SessionFolder open_session_folder(const fs::path& folder, const fs::path& case_folder) {
   require_readable(folder);
   const fs::path file = folder / "session.json";
-  if (!fs::exists(file)) throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a session: it has no session.json");
+  if (!fs::exists(file))
+    throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a session: it has no session.json");
   SessionFolder s{folder, case_folder, {}, {}, 0, {}};
   try {
     const auto j = ordered_json::parse(read_text(file));
@@ -120,7 +123,8 @@ SessionReader begin_of(const SessionFolder& session, const World& world, const C
                 "give the case it was recorded on, unchanged");
   }
   for (const std::string& line : losses(recorded.outline())) context.warn(name + ": " + line);
-  for (const std::string& line : recorded.outline().newer) context.warn(name + " is of a later version: left out " + line);
+  for (const std::string& line : recorded.outline().newer)
+    context.warn(name + " is of a later version: left out " + line);
   return recorded;
 }
 
@@ -130,8 +134,8 @@ World until_time(const SessionFolder& session, double t_s, World world, const Co
   const auto tick = static_cast<std::uint64_t>(std::llround(t_s * rate_hz));
   if (const std::uint64_t reached = apply_recorded_until(recorded, world, tick); reached < tick)
     throw Error(ExitCode::usage,
-                "the session '" + session.folder.string() + "' lasts " + format_number(static_cast<double>(reached) / rate_hz) +
-                    " s, not " + format_number(t_s) + " s",
+                "the session '" + session.folder.string() + "' lasts " +
+                    format_number(static_cast<double>(reached) / rate_hz) + " s, not " + format_number(t_s) + " s",
                 "ask for a time within it, or for none: its end");
   return world;
 }
@@ -143,7 +147,8 @@ World until_end(const SessionFolder& session, World world, const Context& contex
   if (lost == o.gaps.end()) {
     apply_recorded(recorded, world);
     if (o.end && !o.end->bone_hash.empty() && world.hash() != o.end->bone_hash) {
-      throw Error(ExitCode::corrupt, "the changes recorded in '" + session.folder.string() + "' do not give the bone it ended with");
+      throw Error(ExitCode::corrupt,
+                  "the changes recorded in '" + session.folder.string() + "' do not give the bone it ended with");
     }
     return world;
   }
@@ -155,8 +160,8 @@ World until_end(const SessionFolder& session, World world, const Context& contex
   } catch (const Error&) {
     // It changes voxels of pieces that came to be while nothing was recorded.
   }
-  context.warn("the session '" + session.folder.string() + "': what it did from tick " + std::to_string(lost->first_tick) +
-               " on cannot be used; the bone is as it was before");
+  context.warn("the session '" + session.folder.string() + "': what it did from tick " +
+               std::to_string(lost->first_tick) + " on cannot be used; the bone is as it was before");
   apply_recorded_until(recorded, before, lost->first_tick);
   return before;
 }
@@ -235,7 +240,8 @@ ordered_json hardness_of(const Anatomy& anatomy) {
   return j;
 }
 
-ordered_json structures_of(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map, double rate_hz) {
+ordered_json structures_of(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map,
+                           double rate_hz) {
   ordered_json j = ordered_json::array();
   for (const auto& [value, e] : structures) {
     j.push_back({{"name", map.name_of(static_cast<std::uint8_t>(value))},
@@ -257,17 +263,18 @@ std::string told_hardness(const Anatomy& anatomy) {
   if (!anatomy.hardness) return "all bone resists the burr alike";
   const HardnessLaw& law = anatomy.hardness->law();
   const double half = law.zero_hu + (law.cortical_hu - law.zero_hu) / 2;
-  return "bone resists the burr by its HU: " + format_number(law.cortical_hu) + " HU as 1, " + format_number(half) + " HU as " +
-         format_number(std::round(100 * law.at(half)) / 100) +
+  return "bone resists the burr by its HU: " + format_number(law.cortical_hu) + " HU as 1, " + format_number(half) +
+         " HU as " + format_number(std::round(100 * law.at(half)) / 100) +
          R"(; {"osteotome_haptics": 1, "hardness": false} in --settings turns that off)";
 }
 
-std::string structures_json(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map, double rate_hz) {
+std::string structures_json(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map,
+                            double rate_hz) {
   return structures_of(structures, map, rate_hz).dump();
 }
 
-std::string write_summary(const SessionFolder& session, const RehearsalSummary& s, double rate_hz, const std::string& burr,
-                          const Anatomy& anatomy) {
+std::string write_summary(const SessionFolder& session, const RehearsalSummary& s, double rate_hz,
+                          const std::string& burr, const Anatomy& anatomy) {
   ordered_json j;
   j["osteotome_session_summary"] = 1;
   j["ticks"] = s.ticks;
@@ -310,7 +317,8 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   if (!s.pieces.empty()) {
     j["pieces"] = ordered_json::array();
     for (const auto& p : s.pieces) {
-      j["pieces"].push_back({{"volume_mm3", p.mass * s.voxel_mm3}, {"centre_mm", {p.centre_mm.x, p.centre_mm.y, p.centre_mm.z}}});
+      j["pieces"].push_back(
+          {{"volume_mm3", p.mass * s.voxel_mm3}, {"centre_mm", {p.centre_mm.x, p.centre_mm.y, p.centre_mm.z}}});
     }
   }
   if (s.dust) {
@@ -352,4 +360,4 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   return text;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -42,14 +42,16 @@ SessionPlayer::SessionPlayer(const SessionReader& session, World begin, const Co
     if (p->actions.empty() && p->changes.empty()) continue;
     Step step;
     step.actions.assign(p->actions.begin(), p->actions.end());
-    step.remakes = std::ranges::any_of(step.actions, [](const SceneAction& a) { return row_of(a).changes_world && !row_of(a).by_servo; });
+    step.remakes = std::ranges::any_of(
+        step.actions, [](const SceneAction& a) { return row_of(a).changes_world && !row_of(a).by_servo; });
     step.changes.assign(p->changes.begin(), p->changes.end());
     step.last = last;
     step.end_s = end_s_;
     for (const SceneAction& a : step.actions) step.end_s = std::max(step.end_s, static_cast<double>(a.tick) / rate_hz_);
     for (const SceneAction& a : step.actions) scene_.action(a);
     for (VoxelChange& c : step.changes) {
-      if (const PlacedBody* const b = scene_.world()->owner(c.voxel)) c.before = b->body->bone.value(c.voxel - b->body->name_of(0));
+      if (const PlacedBody* const b = scene_.world()->owner(c.voxel))
+        c.before = b->body->bone.value(c.voxel - b->body->name_of(0));
     }
     scene_.tick(step.last, step.changes);
     steps_.push_back(std::move(step));
@@ -66,7 +68,8 @@ void SessionPlayer::tell(const Step& step) {
 }
 
 void SessionPlayer::go_to_step(std::size_t steps) {
-  const auto between = std::span(steps_).subspan(std::min(done_, steps), std::max(done_, steps) - std::min(done_, steps));
+  const auto between =
+      std::span(steps_).subspan(std::min(done_, steps), std::max(done_, steps) - std::min(done_, steps));
   if (std::ranges::any_of(between, &Step::remakes)) {
     // What it does follows from all that was told before it.
     scene_.resync(begin_);
@@ -106,4 +109,4 @@ const std::string* SessionPlayer::camera() const {
   return behind == cameras_.begin() ? nullptr : &(behind - 1)->second;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

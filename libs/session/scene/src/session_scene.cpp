@@ -94,4 +94,4 @@ void tell_recorded(const SessionReader& session, const World& begin, Reader& rea
   reader.update();
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <set>
 
-#include "osteo/simulation/bone/instrument.h"
 #include "osteo/geometry/tets/skin.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/tissue/dynamics.h"
 #include "osteo/simulation/tissue/problem.h"
 #include "osteo/simulation/tissue/voxel_cutting.h"
@@ -18,11 +18,13 @@ constexpr int kMostSteps = 200;         // of an update: beside SoftBody::kMostW
 constexpr double kToolStiffness = 0.1;  // N/mm of each place that the tool meets
 constexpr double kBoneStiffness = 0.3;  // and of each point that meets bone
 constexpr double kLeastPushN = 1e-4;
-constexpr double kFeltStiffness = 0.05;  // N/mm for each place that the tool meets: in series with what gives way behind it
-constexpr double kDampingPerS = 150;     // tissue does not ring
-constexpr double kStepShare = 0.75;      // of the certified step, so that there is room for stiff contact
-constexpr double kGrip = 1;              // of what does not turn: a surface does not slip round what has dug in
-// Still: no point further than this from where it was so many updates ago. Then the bone is looked at once more, and it takes so many more.
+constexpr double kFeltStiffness =
+    0.05;  // N/mm for each place that the tool meets: in series with what gives way behind it
+constexpr double kDampingPerS = 150;  // tissue does not ring
+constexpr double kStepShare = 0.75;   // of the certified step, so that there is room for stiff contact
+constexpr double kGrip = 1;           // of what does not turn: a surface does not slip round what has dug in
+// Still: no point further than this from where it was so many updates ago. Then the bone is looked at once more, and it
+// takes so many more.
 constexpr double kStillMm = 1e-3;
 constexpr int kStillUpdates = 50, kLastUpdates = 5;
 
@@ -56,7 +58,8 @@ struct SoftBody::Impl {
   Impl(TissueModel m, const TissueProblem& problem, const TetMesh& of, const TriMesh* finer)
       : mesh(of),
         model(std::move(m)),
-        dynamics(model, problem.fixed, {.density_kg_m3 = 1000, .damping_per_s = kDampingPerS, .step_share = kStepShare}, problem.sliders),
+        dynamics(model, problem.fixed, {.density_kg_m3 = 1000, .damping_per_s = kDampingPerS, .step_share = kStepShare},
+                 problem.sliders),
         cutting(model, volume_mm3(mesh) / (static_cast<double>(model.tets().size()) / 5)) {
     if (finer != nullptr) {
       skin.emplace(*finer, mesh);
@@ -183,7 +186,9 @@ std::vector<SoftPush> SoftBody::update(std::span<const SoftTool> tools, double m
     const Burr* const edge = instrument_of(tools[n].tool).cutter();
     const double size = length(pushes[n].force_n);
     if (edge == nullptr || !tools[n].turns || !(size > 0)) continue;
-    cut = m.cutting.cut(m.dynamics, *shapes[n], VoxelCutting::rate_mm3_per_s(size, edge->rate_mm3_per_s_per_n) / kUpdatesPerS, n) || cut;
+    cut = m.cutting.cut(m.dynamics, *shapes[n],
+                        VoxelCutting::rate_mm3_per_s(size, edge->rate_mm3_per_s_per_n) / kUpdatesPerS, n) ||
+          cut;
   }
   if (cut) m.lay_surface();
   m.rest_or_not(disturbed);
@@ -241,7 +246,8 @@ const TriMesh& SoftBody::drawn() {
     for (std::size_t p = 0; p < x.size(); ++p) at[p] = to_floats(x[p]);
     m.skin->apply(at, std::span(m.drawn.points_mm.data(), m.skin_points));
   }
-  for (std::size_t p = 0; p < m.point_of.size(); ++p) m.drawn.points_mm[m.skin_points + p] = to_floats(x[m.point_of[p]]);
+  for (std::size_t p = 0; p < m.point_of.size(); ++p)
+    m.drawn.points_mm[m.skin_points + p] = to_floats(x[m.point_of[p]]);
   return m.drawn;
 }
 std::uint64_t SoftBody::version() const {
@@ -260,4 +266,4 @@ std::size_t SoftBody::memory_bytes() const {
   return impl_->model.element_count() * (sizeof(TissueModel::Constraint) + 40) + impl_->model.point_count() * 100;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

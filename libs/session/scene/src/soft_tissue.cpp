@@ -17,8 +17,8 @@ constexpr std::string_view kPlain = "tissue";  // the body whose files lie in th
 
 // Of a body in a folder: null where no file of it is there.
 std::unique_ptr<SoftBody> body_in(const fs::path& folder, const std::string& name, bool listed) {
-  const fs::path mesh = folder / "tissue.vtu", problem = folder / "tissue.json", constants = folder / "tissue-constants.json",
-                 skin = folder / "tissue.ply";
+  const fs::path mesh = folder / "tissue.vtu", problem = folder / "tissue.json",
+                 constants = folder / "tissue-constants.json", skin = folder / "tissue.ply";
   const std::array files{mesh, problem, constants, skin};
   const auto there = std::find_if(files.begin(), files.end(), [](const fs::path& f) { return output_exists(f); });
   if (there == files.end() && !listed) return nullptr;
@@ -27,12 +27,14 @@ std::unique_ptr<SoftBody> body_in(const fs::path& folder, const std::string& nam
     throw Error(ExitCode::no_input,
                 "the case lists its soft tissue '" + name + "' by halves: '" + needed.string() + "' is missing" +
                     (there != files.end() ? ", '" + there->filename().string() + "' is there" : ""),
-                "'osteo tetrahedralize --method grid' makes tissue.vtu, docs/tissue.md describes tissue.json; or remove what is there");
+                "'osteo tetrahedralize --method grid' makes tissue.vtu, docs/tissue.md describes tissue.json; or "
+                "remove what is there");
   }
   try {
     const Surface finer = output_exists(skin) ? load_surface(skin) : nullptr;
     return std::make_unique<SoftBody>(*load_tets(mesh), read_text(problem),
-                                      output_exists(constants) ? std::optional(read_text(constants)) : std::nullopt, finer.get());
+                                      output_exists(constants) ? std::optional(read_text(constants)) : std::nullopt,
+                                      finer.get());
   } catch (const Error& e) {
     throw Error(e.code(), "soft tissue '" + name + "': " + e.what(), e.advice());
   }
@@ -42,10 +44,12 @@ std::unique_ptr<SoftBody> body_in(const fs::path& folder, const std::string& nam
 
 void SoftTissue::add(const std::string& name, std::unique_ptr<SoftBody> body) {
   // It is told in lines and drawn on the screen.
-  const bool odd = name.empty() || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+  const bool odd =
+      name.empty() || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
   if (odd) throw Error(ExitCode::usage, "a body of soft tissue needs a name of one line", "rename its folder");
   for (const Facts& f : facts_) {
-    if (f.name == name) throw Error(ExitCode::usage, "there are two bodies of soft tissue named '" + name + "'", "rename one's folder");
+    if (f.name == name)
+      throw Error(ExitCode::usage, "there are two bodies of soft tissue named '" + name + "'", "rename one's folder");
   }
   bodies_.push_back(std::move(body));
   facts_.push_back({name});
@@ -61,7 +65,8 @@ std::vector<SceneAction> SoftTissue::update(std::span<const SoftTool> tools) {
   std::vector<std::size_t> awake(bodies_.size());
   std::iota(awake.begin(), awake.end(), std::size_t{0});
   std::erase_if(awake, [&](std::size_t b) { return bodies_[b]->sleeps_with(tools); });
-  std::stable_sort(awake.begin(), awake.end(), [&](std::size_t a, std::size_t b) { return bodies_[a]->work() < bodies_[b]->work(); });
+  std::stable_sort(awake.begin(), awake.end(),
+                   [&](std::size_t a, std::size_t b) { return bodies_[a]->work() < bodies_[b]->work(); });
   std::vector<std::vector<SoftPush>> pushes(bodies_.size(), std::vector<SoftPush>(tools.size()));
   double left = SoftBody::kMostWork;
   for (std::size_t n = 0; n < awake.size(); ++n) {
@@ -146,7 +151,8 @@ std::shared_ptr<SoftTissue> soft_tissue_of(const fs::path& folder) {
       for (const auto& e : fs::directory_iterator(more)) {
         if (e.path().filename().string().starts_with('.')) continue;  // what file managers leave
         if (!e.is_directory())
-          throw Error(ExitCode::usage, "'" + e.path().string() + "' is no folder: in 'tissue' each body of soft tissue has its own",
+          throw Error(ExitCode::usage,
+                      "'" + e.path().string() + "' is no folder: in 'tissue' each body of soft tissue has its own",
                       "put it into tissue/NAME/, as tissue.vtu, tissue.json, tissue-constants.json or tissue.ply");
         listed.insert(e.path());
       }
@@ -158,4 +164,4 @@ std::shared_ptr<SoftTissue> soft_tissue_of(const fs::path& folder) {
   return tissue->size() > 0 ? tissue : nullptr;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -17,10 +17,12 @@ static_assert(kMostHands == SoundState::kMostVoices);
 
 // How long water takes to fill a cavity, to be sucked off, and to run off by itself: designed for the ear.
 constexpr double kFillS = 1, kSuckS = 1.5, kRunOffS = 20;
-constexpr double kSoftReachMm = 2;                   // beneath the burr
-constexpr double kThicknessSmoothS = 0.03;           // a ray that meets a hole for a tick is no thin bone
-constexpr double kTouchN = 1, kTouchEveryS = 0.005;  // of two instruments: they do not push each other, so this is designed for the ear
-constexpr double kAlarmS = 0.4;                      // goes on so long behind the last touch, so that a beep is whole
+constexpr double kSoftReachMm = 2;          // beneath the burr
+constexpr double kThicknessSmoothS = 0.03;  // a ray that meets a hole for a tick is no thin bone
+constexpr double kTouchN = 1,
+                 kTouchEveryS =
+                     0.005;      // of two instruments: they do not push each other, so this is designed for the ear
+constexpr double kAlarmS = 0.4;  // goes on so long behind the last touch, so that a beep is whole
 
 }  // namespace
 
@@ -28,7 +30,8 @@ std::set<std::uint32_t> soft_structures(std::span<const Structure> structures) {
   std::set<std::uint32_t> soft;
   for (const Structure& s : structures) {
     std::string name = s.name;
-    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     for (const char* const word : {"sinus", "dura", "vein", "artery", "bulb"}) {
       if (name.find(word) != std::string::npos) soft.insert(s.value);
     }
@@ -53,7 +56,8 @@ bool SoundTracker::instruments_touch(std::uint64_t tick) noexcept {
   touching_ = false;
   const auto place = [&](std::size_t hand) {
     const TickRecord& t = last_[hand];
-    return InstrumentPlace{&instrument_of(t.device.tool), from_floats(t.device.position_mm) + from_floats(t.shown_offset_mm),
+    return InstrumentPlace{&instrument_of(t.device.tool),
+                           from_floats(t.device.position_mm) + from_floats(t.shown_offset_mm),
                            normalized(from_floats(t.device.axis))};
   };
   for (std::size_t a = 0; a < kMostHands; ++a) {
@@ -81,8 +85,8 @@ void SoundTracker::take(const TickRecord& record) noexcept {
     voice.diameter_mm = edge->diameter_mm;
     voice.press_n = record.normal_force_n;
     if (record.normal_force_n > 0 && record.thickness_mm > 0) {
-      thickness =
-          thickness > 0 ? thickness + (record.thickness_mm - thickness) * std::min(1.0, dt / kThicknessSmoothS) : record.thickness_mm;
+      thickness = thickness > 0 ? thickness + (record.thickness_mm - thickness) * std::min(1.0, dt / kThicknessSmoothS)
+                                : record.thickness_mm;
     } else if (record.normal_force_n <= 0) {
       thickness = 0;
     }
@@ -134,7 +138,8 @@ constexpr std::size_t kTicksAtOnce = 256, kChangesAtOnce = 4096, kActionsAtOnce 
 constexpr double kSilentAfterS = 0.1;  // without ticks
 
 std::set<std::uint32_t> soft_structures_of(const Rehearsal& rehearsal) {
-  return rehearsal.structures() == nullptr ? std::set<std::uint32_t>() : soft_structures(rehearsal.structures()->structures());
+  return rehearsal.structures() == nullptr ? std::set<std::uint32_t>()
+                                           : soft_structures(rehearsal.structures()->structures());
 }
 
 }  // namespace
@@ -169,16 +174,18 @@ void LiveSound::fill(std::span<float> out) noexcept {
     ticks += n;
   }
   without_ticks_s_ = ticks > 0 ? 0 : without_ticks_s_ + static_cast<double>(out.size()) / Synthesizer::kRateHz;
-  synthesizer_.render(without_ticks_s_ > kSilentAfterS ? SoundState{} : tracker_.state(), volume_.load(std::memory_order_relaxed), out);
+  synthesizer_.render(without_ticks_s_ > kSilentAfterS ? SoundState{} : tracker_.state(),
+                      volume_.load(std::memory_order_relaxed), out);
 }
 
 // --- to a file
 
-SoundFileFacts write_session_sound(const SessionReader& session, const std::set<std::uint32_t>& soft, double volume, bool alarms,
-                                   const std::filesystem::path& out, const Context& context) {
+SoundFileFacts write_session_sound(const SessionReader& session, const std::set<std::uint32_t>& soft, double volume,
+                                   bool alarms, const std::filesystem::path& out, const Context& context) {
   const SessionOutline& outline = session.outline();
   const double samples_per_tick = Synthesizer::kRateHz / outline.header.rate_hz;
-  const double all = std::max<double>(1, static_cast<double>(outline.tick_records) / static_cast<double>(outline.header.haptics.hands()));
+  const double all = std::max<double>(
+      1, static_cast<double>(outline.tick_records) / static_cast<double>(outline.header.haptics.hands()));
   SoundFileFacts facts;
   facts.gaps = outline.gaps.size();
   Synthesizer synthesizer;
@@ -222,4 +229,4 @@ SoundFileFacts write_session_sound(const SessionReader& session, const std::set<
   return facts;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

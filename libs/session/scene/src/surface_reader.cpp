@@ -56,7 +56,8 @@ void SurfaceReader::shade() {
   context.threads = threads_;
   for (auto& [id, f] : bodies_) {
     f.surface->shade(context);
-    for (std::uint32_t b = 0; b < f.surface->bone().brick_count(); ++b) f.changed_bricks.insert(f.changed_bricks.end(), b);
+    for (std::uint32_t b = 0; b < f.surface->bone().brick_count(); ++b)
+      f.changed_bricks.insert(f.changed_bricks.end(), b);
   }
 }
 
@@ -128,4 +129,4 @@ std::string SurfaceReader::hash() const {
   return bodies_.size() == 1 ? last : all.hex();
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

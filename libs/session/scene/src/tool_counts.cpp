@@ -22,4 +22,4 @@ void ToolCounts::tick(const TickRecord& record, std::span<const VoxelChange> /*c
   unusable_poses_ += (record.flags & kPoseInvalid) != 0 ? 1 : 0;
 }
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -22,12 +22,15 @@ constexpr ActionValue kSaw[] = {{"at_x", "mm"},    {"at_y", "mm"},    {"at_z", "
                                 {"normal_y", "1"}, {"normal_z", "1"}, {"along_x", "1"}, {"along_y", "1"},
                                 {"along_z", "1"},  {"kerf", "mm"},    {"length", "mm"}, {"depth", "mm"}};
 // A rotation by its columns, then the shift.
-constexpr ActionValue kPose[] = {{"x_x", "1"}, {"x_y", "1"}, {"x_z", "1"}, {"y_x", "1"},      {"y_y", "1"},      {"y_z", "1"},
-                                 {"z_x", "1"}, {"z_y", "1"}, {"z_z", "1"}, {"shift_x", "mm"}, {"shift_y", "mm"}, {"shift_z", "mm"}};
+constexpr ActionValue kPose[] = {{"x_x", "1"}, {"x_y", "1"},      {"x_z", "1"},      {"y_x", "1"},
+                                 {"y_y", "1"}, {"y_z", "1"},      {"z_x", "1"},      {"z_y", "1"},
+                                 {"z_z", "1"}, {"shift_x", "mm"}, {"shift_y", "mm"}, {"shift_z", "mm"}};
 constexpr ActionValue kSplit[] = {{"least", "mm3"}};
 constexpr ActionValue kOpen[] = {{"opening", "mm"}};
-constexpr ActionValue kSuction[] = {{"at_x", "mm"}, {"at_y", "mm"}, {"at_z", "mm"}, {"radius", "mm"}, {"rate", "mm3/s"}};
-constexpr ActionValue kIrrigate[] = {{"at_x", "mm"}, {"at_y", "mm"}, {"at_z", "mm"}, {"radius", "mm"}, {"rate", "mm3/s"}};
+constexpr ActionValue kSuction[] = {
+    {"at_x", "mm"}, {"at_y", "mm"}, {"at_z", "mm"}, {"radius", "mm"}, {"rate", "mm3/s"}};
+constexpr ActionValue kIrrigate[] = {
+    {"at_x", "mm"}, {"at_y", "mm"}, {"at_z", "mm"}, {"radius", "mm"}, {"rate", "mm3/s"}};
 constexpr ActionValue kPosture[] = {{"down_x", "1"}, {"down_y", "1"}, {"down_z", "1"}};
 constexpr ActionValue kSoftPush[] = {{"at_x", "mm"},    {"at_y", "mm"},    {"at_z", "mm"}, {"normal_x", "1"},
                                      {"normal_y", "1"}, {"normal_z", "1"}, {"force", "N"}, {"stiffness", "N/mm"}};
@@ -217,7 +220,8 @@ SceneAction SceneAction::grip(std::uint32_t plate, const RigidTransform& hand_fr
   return a;
 }
 
-SceneAction SceneAction::attach(std::uint32_t plate, const RigidTransform& world_from_plate, std::uint32_t body, std::uint32_t other) {
+SceneAction SceneAction::attach(std::uint32_t plate, const RigidTransform& world_from_plate, std::uint32_t body,
+                                std::uint32_t other) {
   SceneAction a = with_transform(ActionKind::attach, world_from_plate);
   a.item = plate;
   a.body = body;
@@ -315,4 +319,4 @@ std::string_view name_of(ActionKind kind) {
   return row_of(SceneAction::plain(kind)).name;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -22,7 +22,8 @@ float efficiency_at(double falloff_per_rad, double sine_of_latitude) {
 
 std::string Burr::name() const {
   if (length_mm > 0) return "saw " + format_number(length_mm) + " mm";
-  const std::string form = shape == BurrShape::ball ? "" : std::string(EnumNames<BurrShape>::values[static_cast<std::size_t>(shape)]) + " ";
+  const std::string form =
+      shape == BurrShape::ball ? "" : std::string(EnumNames<BurrShape>::values[static_cast<std::size_t>(shape)]) + " ";
   return std::string(row_of(kind).name) + " " + form + format_number(diameter_mm) + " mm";
 }
 
@@ -70,7 +71,8 @@ BurrSamples sample_head(const RoundCone& head, double falloff_per_rad) {
   constexpr double kSamples = 3000;
   const double r = head.largest_radius_mm(), volume = head.volume_mm3(), pitch = portable::cbrt(volume / kSamples);
   BurrSamples s;
-  const int n = static_cast<int>(std::ceil(r / pitch)) + 1, top = n + static_cast<int>(std::ceil(head.length_mm / pitch));
+  const int n = static_cast<int>(std::ceil(r / pitch)) + 1,
+            top = n + static_cast<int>(std::ceil(head.length_mm / pitch));
   for (int k = -n; k <= top; ++k) {
     for (int j = -n; j <= n; ++j) {
       for (int i = -n; i <= n; ++i) {
@@ -89,7 +91,8 @@ BurrSamples sample_head(const RoundCone& head, double falloff_per_rad) {
 
 BurrSurface sample_head_surface(const RoundCone& h, double falloff_per_rad, int samples) {
   // Along the profile from tip to top by area: the zone of the tip's ball, the side, the zone of the end's ball.
-  const double b = h.slope(), a = std::sqrt(1 - b * b), r1 = h.start_radius_mm, r2 = h.end_radius_mm, pi = std::numbers::pi;
+  const double b = h.slope(), a = std::sqrt(1 - b * b), r1 = h.start_radius_mm, r2 = h.end_radius_mm,
+               pi = std::numbers::pi;
   const double tip = 2 * pi * r1 * r1 * (1 + b), top = 2 * pi * r2 * r2 * (1 - b);
   const double slant = h.length_mm * a, side = pi * (a * r1 + a * r2) * slant;
   BurrSurface s;
@@ -106,7 +109,8 @@ BurrSurface sample_head_surface(const RoundCone& h, double falloff_per_rad, int 
     } else {
       // Area of the frustum up to the share x of the slant: side * (2 c1 x + (c2 - c1) x^2) / (c1 + c2).
       const double c1 = r1, c2 = r2, share = (area - tip) / side * (c1 + c2);
-      const double x = std::abs(c2 - c1) < 1e-12 ? share / (2 * c1) : (-c1 + std::sqrt(c1 * c1 + (c2 - c1) * share)) / (c2 - c1);
+      const double x =
+          std::abs(c2 - c1) < 1e-12 ? share / (2 * c1) : (-c1 + std::sqrt(c1 * c1 + (c2 - c1) * share)) / (c2 - c1);
       foot = x * h.length_mm;
       radius = h.radius_at_mm(foot);
     }
@@ -121,4 +125,4 @@ BurrSurface sample_head_surface(const RoundCone& h, double falloff_per_rad, int 
   return s;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

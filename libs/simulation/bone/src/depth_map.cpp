@@ -21,9 +21,11 @@ DepthMap::DepthMap(const BrickGrid& bone) : frame_(bone.frame()) {
     first_[a] = lo[a] * 2 - 1;
     dims_[a] = (hi[a] - lo[a] + 1) * 2 + 2;
   }
-  const std::size_t n = static_cast<std::size_t>(dims_[0]) * static_cast<std::size_t>(dims_[1]) * static_cast<std::size_t>(dims_[2]);
+  const std::size_t n =
+      static_cast<std::size_t>(dims_[0]) * static_cast<std::size_t>(dims_[1]) * static_cast<std::size_t>(dims_[2]);
   if (dims_[0] > 1024 || dims_[1] > 1024 || dims_[2] > 1024)
-    throw Error(ExitCode::failed, "the bone is too large for the fail-safe's distance map", "set \"fail_safe\" to false, or crop the case");
+    throw Error(ExitCode::failed, "the bone is too large for the fail-safe's distance map",
+                "set \"fail_safe\" to false, or crop the case");
   nearest_.resize(n);
   std::size_t number = 0;
   for (int k = 0; k < dims_[2]; ++k)
@@ -33,7 +35,8 @@ DepthMap::DepthMap(const BrickGrid& bone) : frame_(bone.frame()) {
   for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) {
     const Ijk o = bone.brick_coordinate(brick);
     for (int c = 0; c < 8; ++c) {
-      const int i = o.i * 2 + (c & 1) - first_[0], j = o.j * 2 + (c >> 1 & 1) - first_[1], k = o.k * 2 + (c >> 2) - first_[2];
+      const int i = o.i * 2 + (c & 1) - first_[0], j = o.j * 2 + (c >> 1 & 1) - first_[1],
+                k = o.k * 2 + (c >> 2) - first_[2];
       if (is_bone(bone, brick, c)) nearest_[(static_cast<std::size_t>(k) * dims_[1] + j) * dims_[0] + i] = kNowhere;
     }
   }
@@ -134,4 +137,4 @@ DepthMap::Answer DepthMap::at(Vec3 world_mm) const noexcept {
   return {std::max(0.0, distance - 0.5 * kBlock * frame_.spacing_mm.x), way / distance};
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

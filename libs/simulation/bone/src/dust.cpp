@@ -110,7 +110,8 @@ void Dust::wake(Ijk c) {
 
 void Dust::add_at(Vec3 world_mm, double mm3) {
   const Vec3 x = bone_.frame().index_from_world(world_mm);
-  add(Ijk{static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)), static_cast<int>(std::lround(x.z))}, mm3);
+  add(Ijk{static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)), static_cast<int>(std::lround(x.z))},
+      mm3);
 }
 
 void Dust::bone_changed(std::uint32_t brick) {
@@ -190,10 +191,12 @@ void Dust::step_brick(Brick& brick) {
   };
   const auto axis = static_cast<std::size_t>(axis_), side0 = (axis + 1) % 3, side1 = (axis + 2) % 3;
   const auto turn0 = static_cast<int>(steps_ % 4);
-  // A cell along the nearest axis each step, and along the others as often as the direction asks, so that the way is straight on average.
+  // A cell along the nearest axis each step, and along the others as often as the direction asks, so that the way is
+  // straight on average.
   Ijk down{};
   for (std::size_t a = 0; a < 3; ++a) {
-    const double rate = std::abs(pull_[a]) / std::abs(pull_[axis]), before = static_cast<double>(steps_ % 1000000) * rate;
+    const double rate = std::abs(pull_[a]) / std::abs(pull_[axis]),
+                 before = static_cast<double>(steps_ % 1000000) * rate;
     const int by = a == axis ? 1 : static_cast<int>(std::floor(before + rate + 0.5) - std::floor(before + 0.5));
     (a == 0 ? down.i : a == 1 ? down.j : down.k) = pull_[a] < 0 ? -by : by;
   }
@@ -258,7 +261,8 @@ void Dust::step_brick(Brick& brick) {
   }
 }
 
-// Row by row, as if all cells of the ball were walked; but dust lies in bricks alone, so that no radius costs more than they do.
+// Row by row, as if all cells of the ball were walked; but dust lies in bricks alone, so that no radius costs more than
+// they do.
 template <class F>
 void Dust::in_ball(Vec3 centre_mm, double radius_mm, F&& f) {
   const Frame& frame = bone_.frame();
@@ -268,7 +272,8 @@ void Dust::in_ball(Vec3 centre_mm, double radius_mm, F&& f) {
   std::vector<Brick*> met;
   for (const auto& b : bricks_) {
     const Ijk o{b->at.i * 8, b->at.j * 8, b->at.k * 8};
-    if (o.i <= x.x + r && o.i + 7 >= x.x - r && o.j <= x.y + r && o.j + 7 >= x.y - r && o.k <= x.z + r && o.k + 7 >= x.z - r)
+    if (o.i <= x.x + r && o.i + 7 >= x.x - r && o.j <= x.y + r && o.j + 7 >= x.y - r && o.k <= x.z + r &&
+        o.k + 7 >= x.z - r)
       met.push_back(b.get());
   }
   const auto place = [](const Brick* b) { return std::tuple(b->at.k, b->at.j, b->at.i); };
@@ -312,15 +317,17 @@ void Dust::push(const RoundCone& tool, Vec3 start_mm, Vec3 axis) {
     const Vec3 n = transposed(frame.direction) * (length(out) > 1e-6 ? normalized(out) : any_perpendicular(axis));
     const double far = inside / frame.spacing_mm.x;
     for (int s = 1; s <= 4 && units > 0; ++s) {
-      const Ijk to{static_cast<int>(std::lround(c.i + n.x * (far + s))), static_cast<int>(std::lround(c.j + n.y * (far + s))),
+      const Ijk to{static_cast<int>(std::lround(c.i + n.x * (far + s))),
+                   static_cast<int>(std::lround(c.j + n.y * (far + s))),
                    static_cast<int>(std::lround(c.k + n.z * (far + s)))};
       if (to == c) continue;
       if (move(units, to, units) > 0) wake(to);
     }
-    // No room: heaped up beyond what a cell holds, outside the tool along the normal, or where bone is there upwards out of it; it spreads
-    // with the next steps.
+    // No room: heaped up beyond what a cell holds, outside the tool along the normal, or where bone is there upwards
+    // out of it; it spreads with the next steps.
     for (int s = 1; s <= 64 && units > 0; ++s) {
-      const Ijk aside{static_cast<int>(std::lround(c.i + n.x * (far + s))), static_cast<int>(std::lround(c.j + n.y * (far + s))),
+      const Ijk aside{static_cast<int>(std::lround(c.i + n.x * (far + s))),
+                      static_cast<int>(std::lround(c.j + n.y * (far + s))),
                       static_cast<int>(std::lround(c.k + n.z * (far + s)))};
       const Ijk to = s == 1 ? aside : stepped(c, axis_, -sign_ * s);
       if (to == c || solid(to) || !in_reach(to)) continue;
@@ -346,7 +353,9 @@ double Dust::suck(Vec3 nozzle_mm, double radius_mm, double mm3) {
     std::uint32_t place;
   };
   std::vector<Near> near;
-  in_ball(nozzle_mm, radius_mm, [&](Ijk c, Brick& brick, std::uint32_t at, Vec3 d) { near.push_back({dot(d, d), c, &brick, at}); });
+  in_ball(nozzle_mm, radius_mm, [&](Ijk c, Brick& brick, std::uint32_t at, Vec3 d) {
+    near.push_back({dot(d, d), c, &brick, at});
+  });
   std::stable_sort(near.begin(), near.end(), [](const Near& a, const Near& b) { return a.distance2 < b.distance2; });
   std::uint64_t taken = 0;
   for (const Near& n : near) {
@@ -359,7 +368,8 @@ double Dust::suck(Vec3 nozzle_mm, double radius_mm, double mm3) {
     if (n.brick->water) {
       std::uint32_t &l = n.brick->water->units[n.place], &s = n.brick->water->solid[n.place];
       const auto drunk = static_cast<std::uint32_t>(std::min<std::uint64_t>(l, liquid));
-      const std::uint32_t with = drunk == l ? s : static_cast<std::uint32_t>(std::uint64_t{s} * drunk / std::max(1U, l));
+      const std::uint32_t with =
+          drunk == l ? s : static_cast<std::uint32_t>(std::uint64_t{s} * drunk / std::max(1U, l));
       l -= drunk;
       s -= with;
       liquid -= drunk;
@@ -411,8 +421,9 @@ std::string Dust::hash() const {
 std::vector<const Dust::Brick*> Dust::in_order() const {
   std::vector<const Brick*> order;
   for (const auto& b : bricks_) order.push_back(b.get());
-  std::sort(order.begin(), order.end(),
-            [](const Brick* a, const Brick* b) { return key(a->at.i, a->at.j, a->at.k) < key(b->at.i, b->at.j, b->at.k); });
+  std::sort(order.begin(), order.end(), [](const Brick* a, const Brick* b) {
+    return key(a->at.i, a->at.j, a->at.k) < key(b->at.i, b->at.j, b->at.k);
+  });
   return order;
 }
 
@@ -421,10 +432,11 @@ void Dust::visit(const std::function<void(Vec3, double)>& f) const {
     for (int v = 0; v < 512; ++v) {
       const std::uint32_t u = b->units[static_cast<std::size_t>(v)];
       if (u == 0) continue;
-      f(bone_.frame().world_from_index({double(b->at.i * 8 + (v & 7)), double(b->at.j * 8 + (v >> 3 & 7)), double(b->at.k * 8 + (v >> 6))}),
+      f(bone_.frame().world_from_index(
+            {double(b->at.i * 8 + (v & 7)), double(b->at.j * 8 + (v >> 3 & 7)), double(b->at.k * 8 + (v >> 6))}),
         static_cast<double>(u) / capacity_);
     }
   }
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

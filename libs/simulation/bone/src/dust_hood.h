@@ -30,7 +30,9 @@ struct Dust::Hood {
     return bone == BrickGrid::kNone ? 0.0F : d.bone_.value(bone * BrickGrid::kVoxels + offset(p));
   }
   [[nodiscard]] bool is_solid(const Place& p) const { return density(p) >= 0.5F; }
-  [[nodiscard]] Ijk cell_of(const Place& p) const { return {brick.at.i * 8 + p[0], brick.at.j * 8 + p[1], brick.at.k * 8 + p[2]}; }
+  [[nodiscard]] Ijk cell_of(const Place& p) const {
+    return {brick.at.i * 8 + p[0], brick.at.j * 8 + p[1], brick.at.k * 8 + p[2]};
+  }
   // Null beyond what dust may reach.
   [[nodiscard]] Brick* brick_of(const Place& p) {
     Neighbour& n = around[neighbour(p)];
@@ -69,4 +71,4 @@ struct Dust::Hood {
   std::uint32_t woken = 0;  // bits of the neighbourhood
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

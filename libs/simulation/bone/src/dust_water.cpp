@@ -26,11 +26,13 @@ void Dust::irrigate(Vec3 nozzle_mm, Vec3 direction, double reach_mm, double mm3)
   wet_ = true;
   ++version_;
   poured_ += left;
-  const Vec3 along = std::isfinite(dot(direction, direction)) && length(direction) > 0 ? normalized(direction) : gravity_;
+  const Vec3 along =
+      std::isfinite(dot(direction, direction)) && length(direction) > 0 ? normalized(direction) : gravity_;
   const double h = frame.spacing_mm.x;
   const auto cell_at = [&](Vec3 p) {
     const Vec3 x = frame.index_from_world(p);
-    return Ijk{static_cast<int>(std::floor(x.x + 0.5)), static_cast<int>(std::floor(x.y + 0.5)), static_cast<int>(std::floor(x.z + 0.5))};
+    return Ijk{static_cast<int>(std::floor(x.x + 0.5)), static_cast<int>(std::floor(x.y + 0.5)),
+               static_cast<int>(std::floor(x.z + 0.5))};
   };
   Vec3 end = nozzle_mm;
   for (double t = 0; t <= std::min(reach_mm, 50.0); t += h / 2) {
@@ -128,7 +130,8 @@ void Dust::step_water(Brick& brick, Hood& hood, Ijk down) {
         const double mine = room > 0 ? static_cast<double>(l) / room : 1, its = static_cast<double>(in_it) / there;
         const double level = (drop / (2 * half) + mine - its) / 2 * std::min(room > 0 ? room : kFull, there);
         if (level < kSlack) return;
-        const std::uint32_t amount = std::min({most, l - held, there - in_it, static_cast<std::uint32_t>(std::min(level, 4e9))});
+        const std::uint32_t amount =
+            std::min({most, l - held, there - in_it, static_cast<std::uint32_t>(std::min(level, 4e9))});
         pour(at, to, amount);
         moved = true;
       };
@@ -205,7 +208,8 @@ void Dust::level_pools() {
     return b.bone == BrickGrid::kNone ? 0.0F : bone_.value(b.bone * BrickGrid::kVoxels + at);
   };
   const auto cell_of = [](const Brick& b, std::uint32_t at) {
-    return Ijk{b.at.i * 8 + static_cast<int>(at & 7), b.at.j * 8 + static_cast<int>(at >> 3 & 7), b.at.k * 8 + static_cast<int>(at >> 6)};
+    return Ijk{b.at.i * 8 + static_cast<int>(at & 7), b.at.j * 8 + static_cast<int>(at >> 3 & 7),
+               b.at.k * 8 + static_cast<int>(at >> 6)};
   };
   std::vector<Filled> pool;
   const auto meet = [&](Brick& b, std::uint32_t at, bool or_rim) {
@@ -221,8 +225,9 @@ void Dust::level_pools() {
     if (b->stirred) seeds.push_back(b.get());
     b->stirred = false;
   }
-  std::sort(seeds.begin(), seeds.end(),
-            [](const Brick* a, const Brick* b) { return key(a->at.i, a->at.j, a->at.k) < key(b->at.i, b->at.j, b->at.k); });
+  std::sort(seeds.begin(), seeds.end(), [](const Brick* a, const Brick* b) {
+    return key(a->at.i, a->at.j, a->at.k) < key(b->at.i, b->at.j, b->at.k);
+  });
   std::vector<std::uint64_t> room_below;
   for (Brick* const seed : seeds) {
     for (std::uint32_t v = 0; v < 512; ++v) {
@@ -266,11 +271,14 @@ void Dust::level_pools() {
       std::stable_sort(pool.begin(), pool.end(), [](const Filled& a, const Filled& b) { return a.height < b.height; });
       room_below.assign(1, 0);
       for (const Filled& p : pool) room_below.push_back(room_below.back() + p.room);
-      const auto share = [&](const Filled& p, double level) { return std::clamp((level - p.height + half) / (2 * half), 0.0, 1.0); };
+      const auto share = [&](const Filled& p, double level) {
+        return std::clamp((level - p.height + half) / (2 * half), 0.0, 1.0);
+      };
       double lo = pool.front().height - half, hi = pool.back().height + half;
       for (int step = 0; step < 50; ++step) {
         const double level = 0.5 * (lo + hi);
-        const auto full = std::partition_point(pool.begin(), pool.end(), [&](const Filled& p) { return p.height + half <= level; });
+        const auto full =
+            std::partition_point(pool.begin(), pool.end(), [&](const Filled& p) { return p.height + half <= level; });
         auto holds = static_cast<double>(room_below[static_cast<std::size_t>(full - pool.begin())]);
         for (auto p = full; p != pool.end() && p->height - half < level; ++p) holds += p->room * share(*p, level);
         (holds < static_cast<double>(volume) ? lo : hi) = level;
@@ -278,7 +286,8 @@ void Dust::level_pools() {
       std::vector<std::uint32_t> units(pool.size());
       std::uint64_t left = volume;
       for (std::size_t n = 0; n < pool.size(); ++n) {
-        units[n] = static_cast<std::uint32_t>(std::min<std::uint64_t>(left, static_cast<std::uint64_t>(pool[n].room * share(pool[n], lo))));
+        units[n] = static_cast<std::uint32_t>(
+            std::min<std::uint64_t>(left, static_cast<std::uint64_t>(pool[n].room * share(pool[n], lo))));
         left -= units[n];
       }
       while (left > 0) {  // what rounding kept: a unit each
@@ -346,7 +355,8 @@ void Dust::dry() {
       dried_ += water;
       if (w.solid[v] > 0) {
         b->units[v] += w.solid[v];
-        wake({b->at.i * 8 + static_cast<int>(v & 7), b->at.j * 8 + static_cast<int>(v >> 3 & 7), b->at.k * 8 + static_cast<int>(v >> 6)});
+        wake({b->at.i * 8 + static_cast<int>(v & 7), b->at.j * 8 + static_cast<int>(v >> 3 & 7),
+              b->at.k * 8 + static_cast<int>(v >> 6)});
       }
       l = w.solid[v] = 0;
     }
@@ -359,10 +369,11 @@ void Dust::visit_liquid(const std::function<void(Ijk, double, double)>& f) const
     for (std::uint32_t v = 0; b->water && v < 512; ++v) {
       const std::uint32_t l = b->water->units[v];
       if (l > 0)
-        f({b->at.i * 8 + static_cast<int>(v & 7), b->at.j * 8 + static_cast<int>(v >> 3 & 7), b->at.k * 8 + static_cast<int>(v >> 6)},
+        f({b->at.i * 8 + static_cast<int>(v & 7), b->at.j * 8 + static_cast<int>(v >> 3 & 7),
+           b->at.k * 8 + static_cast<int>(v >> 6)},
           static_cast<double>(l) / kUnitsAVoxel, static_cast<double>(b->water->solid[v]) / l);
     }
   }
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

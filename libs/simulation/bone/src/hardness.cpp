@@ -55,4 +55,4 @@ Hardness::Hardness(const Hardness& whole, std::span<const std::uint32_t> bricks)
   }
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

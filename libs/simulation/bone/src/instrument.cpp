@@ -61,7 +61,8 @@ const std::vector<Instrument>& instrument_library() {
     Burr teeth{BurrKind::cutting, kBladeMm, 3, 1.35, BurrShape::cylinder};
     teeth.length_mm = 25;
     Instrument saw = cutting(InstrumentKind::saw, teeth);
-    saw.shaft.start_radius_mm = saw.shaft.end_radius_mm = 1.5 * kBladeMm;  // the chuck, which does not follow into the cut
+    saw.shaft.start_radius_mm = saw.shaft.end_radius_mm =
+        1.5 * kBladeMm;  // the chuck, which does not follow into the cut
     saw.shaft.start_mm = saw.head.length_mm + saw.head.end_radius_mm + saw.shaft.start_radius_mm;
     saw.speed_share = 0.25;
     all.push_back(std::move(saw));
@@ -78,7 +79,8 @@ int instrument_index(std::string_view name) {
   for (const Instrument& i : all) {
     if (i.kind != InstrumentKind::burr) names += ", " + i.name;
   }
-  throw Error(ExitCode::usage, "there is no instrument '" + std::string(name) + "'", "burrs as in 'cutting 4 mm'" + names);
+  throw Error(ExitCode::usage, "there is no instrument '" + std::string(name) + "'",
+              "burrs as in 'cutting 4 mm'" + names);
 }
 
 const Instrument& instrument_of(std::uint8_t tool) {
@@ -96,4 +98,4 @@ const CutDepth& shaft_cut_depth(std::size_t tool) {
   return all[tool];
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -16,7 +16,8 @@ struct Placed {
   const RoundCone* shape;
   Vec3 from, axis;
 
-  Placed(const RoundCone& s, const InstrumentPlace& p) : shape(&s), from(p.tip_mm + p.axis * s.start_mm), axis(p.axis) {}
+  Placed(const RoundCone& s, const InstrumentPlace& p)
+      : shape(&s), from(p.tip_mm + p.axis * s.start_mm), axis(p.axis) {}
   [[nodiscard]] Vec3 middle() const { return from + axis * (shape->length_mm / 2); }
   [[nodiscard]] double reach() const { return shape->length_mm / 2 + shape->largest_radius_mm(); }
   // The place on the axis whose ball is nearest to a point.
@@ -78,4 +79,4 @@ InstrumentGap gap_between(const InstrumentPlace& first, const InstrumentPlace& o
   return least;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

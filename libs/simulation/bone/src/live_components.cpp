@@ -69,7 +69,9 @@ void LiveComponents::label(std::uint32_t number) {
     if (density[v] >= kSolid) brick.solid[v >> 6] |= 1ULL << (v & 63);
   }
   std::array<std::uint16_t, 512> parent;
-  const auto solid = [&](int i, int j, int k) { return (brick.solid[static_cast<std::size_t>(k)] >> (j * 8 + i) & 1) != 0; };
+  const auto solid = [&](int i, int j, int k) {
+    return (brick.solid[static_cast<std::size_t>(k)] >> (j * 8 + i) & 1) != 0;
+  };
   for (std::uint16_t v = 0; v < 512; ++v) parent[v] = v;
   for (int k = 0; k < 8; ++k) {
     if (brick.solid[static_cast<std::size_t>(k)] == 0) continue;
@@ -79,7 +81,8 @@ void LiveComponents::label(std::uint32_t number) {
         for (const Ijk s : steps_) {
           const int x = i + s.i, y = j + s.j, z = k + s.k;
           if (((x | y | z) & ~7) != 0 || !solid(x, y, z)) continue;
-          join_sets(parent, static_cast<std::uint16_t>(k * 64 + j * 8 + i), static_cast<std::uint16_t>(z * 64 + y * 8 + x));
+          join_sets(parent, static_cast<std::uint16_t>(k * 64 + j * 8 + i),
+                    static_cast<std::uint16_t>(z * 64 + y * 8 + x));
         }
       }
     }
@@ -134,7 +137,8 @@ void LiveComponents::link(std::uint32_t number) {
           if ((there.solid[w >> 6] >> (w & 63) & 1) == 0) continue;
           const Link l{brick.label[v], there.label[w], other};
           const auto same = [&](const Link& k2) { return k2.from == l.from && k2.to == l.to && k2.brick == l.brick; };
-          if (brick.links.empty() || !(same(brick.links.back()) || std::any_of(brick.links.begin(), brick.links.end(), same)))
+          if (brick.links.empty() ||
+              !(same(brick.links.back()) || std::any_of(brick.links.begin(), brick.links.end(), same)))
             brick.links.push_back(l);
         }
       }
@@ -218,8 +222,8 @@ void LiveComponents::join_parts() {
     // Covariance along the grid's axes, each voxel a cube; turned into the world; inertia is its trace less itself.
     double cov[3][3];
     for (int a = 0; a < 3; ++a)
-      cov[a][a] =
-          s.second[static_cast<std::size_t>(a)] - m * centre[static_cast<std::size_t>(a)] * centre[static_cast<std::size_t>(a)] + m / 12;
+      cov[a][a] = s.second[static_cast<std::size_t>(a)] -
+                  m * centre[static_cast<std::size_t>(a)] * centre[static_cast<std::size_t>(a)] + m / 12;
     cov[0][1] = cov[1][0] = s.second[3] - m * centre.x * centre.y;
     cov[0][2] = cov[2][0] = s.second[4] - m * centre.x * centre.z;
     cov[1][2] = cov[2][1] = s.second[5] - m * centre.y * centre.z;
@@ -227,9 +231,11 @@ void LiveComponents::join_parts() {
     for (std::size_t a = 0; a < 3; ++a)
       for (std::size_t b = 0; b < 3; ++b)
         for (std::size_t i = 0; i < 3; ++i)
-          for (std::size_t j = 0; j < 3; ++j) world[a][b] += f.direction.column[i][a] * cov[i][j] * f.direction.column[j][b] * h * h;
+          for (std::size_t j = 0; j < 3; ++j)
+            world[a][b] += f.direction.column[i][a] * cov[i][j] * f.direction.column[j][b] * h * h;
     const double trace = world[0][0] + world[1][1] + world[2][2];
-    part.inertia_mm2 = {trace - world[0][0], trace - world[1][1], trace - world[2][2], -world[0][1], -world[0][2], -world[1][2]};
+    part.inertia_mm2 = {trace - world[0][0], trace - world[1][1], trace - world[2][2],
+                        -world[0][1],        -world[0][2],        -world[1][2]};
   }
 }
 
@@ -246,4 +252,4 @@ std::size_t LiveComponents::memory_bytes() const {
   return n;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -150,4 +150,4 @@ std::string surface_hash(const TriMesh& mesh) {
   return h.hex();
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

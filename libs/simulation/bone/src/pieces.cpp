@@ -12,8 +12,8 @@ std::uint32_t both(std::uint32_t a, std::uint32_t b) {
 }
 
 // Of a voxel below a half: who most of its solid neighbours belong to, the first of equals; a crumb without any.
-std::uint32_t nearest_owner(const BrickGrid& bone, const LiveComponents& components, std::span<const std::uint32_t> piece_of,
-                            VoxelKey key) {
+std::uint32_t nearest_owner(const BrickGrid& bone, const LiveComponents& components,
+                            std::span<const std::uint32_t> piece_of, VoxelKey key) {
   std::array<std::uint32_t, 26> near;
   std::size_t n = 0;
   const Ijk c = bone.coordinate(key);
@@ -65,7 +65,8 @@ Split split_bone(const BrickGrid& bone, const LiveComponents& components, double
   // Component -> piece, largest first; equals by their first voxel.
   std::vector<std::uint32_t> order(found.size()), piece_of(found.size(), kCrumb);
   for (std::uint32_t c = 0; c < order.size(); ++c) order[c] = c;
-  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return found[a].mass > found[b].mass; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return found[a].mass > found[b].mass; });
   std::vector<std::uint32_t> component_of_piece;
   for (const std::uint32_t c : order) {
     if (found[c].mass * voxel_mm3 < least_mm3) {
@@ -152,7 +153,8 @@ Split split_bone(const BrickGrid& bone, const LiveComponents& components, double
     }
   }
   for (const auto& [key, p] : apart) {
-    // A brick that is one piece's after all is shared with the bone, which others are reading: nothing is written there, not even the same.
+    // A brick that is one piece's after all is shared with the bone, which others are reading: nothing is written
+    // there, not even the same.
     if (p == kCrumb || around[key / BrickGrid::kVoxels] == p) continue;
     const Ijk c = bone.coordinate(key);
     BrickGrid& to = split.pieces[p].bone;
@@ -164,4 +166,4 @@ Split split_bone(const BrickGrid& bone, const LiveComponents& components, double
   return split;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -29,8 +29,8 @@ double gap_to(const PlacedBody& placed, Vec3 at, Vec3 down, double above_mm, dou
 
 }  // namespace
 
-std::vector<PlateGap> plate_gaps(const World& world, const PlateModel& plate, const RigidTransform& pose, double opening_mm, int count,
-                                 double reach_mm) {
+std::vector<PlateGap> plate_gaps(const World& world, const PlateModel& plate, const RigidTransform& pose,
+                                 double opening_mm, int count, double reach_mm) {
   std::vector<PlateGap> gaps;
   const double above = std::max(1.0, plate.thickness_mm);
   const Vec3 down = pose.rotation.column[2] * -1;
@@ -52,7 +52,8 @@ std::vector<PlateGap> plate_gaps(const World& world, const PlateModel& plate, co
   return gaps;
 }
 
-std::vector<std::uint32_t> bodies_under(const World& world, const PlateModel& plate, const RigidTransform& pose, double near_mm) {
+std::vector<std::uint32_t> bodies_under(const World& world, const PlateModel& plate, const RigidTransform& pose,
+                                        double near_mm) {
   const bool two_feet = !plate.moving.triangles.empty();
   std::map<std::uint32_t, int> all, moving;
   for (const PlateGap& g : plate_gaps(world, plate, pose, 0, 200, near_mm)) {
@@ -81,4 +82,4 @@ std::vector<std::uint32_t> bodies_under(const World& world, const PlateModel& pl
   return found;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

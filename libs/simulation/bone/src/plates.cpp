@@ -39,7 +39,8 @@ double to_segment(double x, double y, double x0, double x1) {
 }
 
 // A row of rings joined by a bar, with screw holes; `holes` ascending along x.
-double strip(Vec3 p, const std::vector<Vec3>& holes, double ring_mm, double bar_mm, double hole_mm, double thickness_mm) {
+double strip(Vec3 p, const std::vector<Vec3>& holes, double ring_mm, double bar_mm, double hole_mm,
+             double thickness_mm) {
   double flat = to_segment(p.x, p.y, holes.front().x, holes.back().x) - bar_mm / 2;
   for (const Vec3 c : holes) flat = std::min(flat, portable::hypot(p.x - c.x, p.y - c.y) - ring_mm / 2);
   for (const Vec3 c : holes) flat = std::max(flat, hole_mm / 2 - portable::hypot(p.x - c.x, p.y - c.y));
@@ -66,8 +67,8 @@ PlateModel make_strip(const StripPlan& s) {
     m.holes_mm.push_back({x + (x > 0 ? 0.5 : x < 0 ? -0.5 : 0) * s.gap_mm, 0, 0});
   }
   const double end = m.holes_mm.back().x + s.ring_mm / 2, side = s.ring_mm / 2;
-  m.mesh = surface_of([&](Vec3 p) { return strip(p, m.holes_mm, s.ring_mm, s.bar_mm, s.hole_mm, s.thickness_mm); }, {-end, -side, 0},
-                      {end, side, s.thickness_mm}, s.voxel_mm);
+  m.mesh = surface_of([&](Vec3 p) { return strip(p, m.holes_mm, s.ring_mm, s.bar_mm, s.hole_mm, s.thickness_mm); },
+                      {-end, -side, 0}, {end, side, s.thickness_mm}, s.voxel_mm);
   return m;
 }
 
@@ -99,7 +100,10 @@ PlateModel make_distractor() {
       },
       {-24, -kRing / 2, 0}, {30, kRing / 2, kRodHeight + kBlock / 2}, kVoxel);
   m.moving = surface_of(
-      [&](Vec3 p) { return std::max(std::min(strip(p, right, kRing, kBar, kHole, 1), block(p, 5.5)), -rod(p, -99, 99, kRod / 2 + 0.3)); },
+      [&](Vec3 p) {
+        return std::max(std::min(strip(p, right, kRing, kBar, kHole, 1), block(p, 5.5)),
+                        -rod(p, -99, 99, kRod / 2 + 0.3));
+      },
       {0.5, -kRing / 2, 0}, {20, kRing / 2, kRodHeight + kBlock / 2}, kVoxel);
   m.holes_mm = left;
   m.holes_mm.insert(m.holes_mm.end(), right.begin(), right.end());
@@ -110,16 +114,19 @@ PlateModel make_distractor() {
 
 const std::vector<PlateModel>& plate_library() {
   static const std::vector<PlateModel> library = [] {
-    // Miniplates: 0.9 to 1.0 mm thick, 2.0 mm screws (M. Champy et al., J. Maxillofac. Surg. 6, 1978, and the 2.0 mm systems since);
-    // midface plates of the 1.5 mm systems; load-bearing reconstruction plates of the 2.4 mm systems, 2.5 mm thick, holes 8 mm apart.
+    // Miniplates: 0.9 to 1.0 mm thick, 2.0 mm screws (M. Champy et al., J. Maxillofac. Surg. 6, 1978, and the 2.0 mm
+    // systems since); midface plates of the 1.5 mm systems; load-bearing reconstruction plates of the 2.4 mm
+    // systems, 2.5 mm thick, holes 8 mm apart.
     std::vector<PlateModel> all;
     for (const StripPlan& s :
-         {StripPlan{"miniplate-4", "miniplate: 1.0 mm thick, 4 holes for 2.0 mm screws, with a gap", 4, 6.5, 3, 5.5, 2.6, 2.2, 1.0, 2.0,
-                    0.2},
-          StripPlan{"miniplate-6", "miniplate: 1.0 mm thick, 6 holes for 2.0 mm screws", 6, 6.5, 0, 5.5, 2.6, 2.2, 1.0, 2.0, 0.2},
-          StripPlan{"midface-4", "midface plate: 0.6 mm thick, 4 holes for 1.5 mm screws", 4, 4.5, 1.5, 3.6, 1.8, 1.7, 0.6, 1.5, 0.15},
-          StripPlan{"reconstruction-8", "reconstruction plate: 2.5 mm thick, 8 holes for 2.4 mm screws", 8, 8, 0, 8, 5, 2.8, 2.5, 2.4,
-                    0.3}}) {
+         {StripPlan{"miniplate-4", "miniplate: 1.0 mm thick, 4 holes for 2.0 mm screws, with a gap", 4, 6.5, 3, 5.5,
+                    2.6, 2.2, 1.0, 2.0, 0.2},
+          StripPlan{"miniplate-6", "miniplate: 1.0 mm thick, 6 holes for 2.0 mm screws", 6, 6.5, 0, 5.5, 2.6, 2.2, 1.0,
+                    2.0, 0.2},
+          StripPlan{"midface-4", "midface plate: 0.6 mm thick, 4 holes for 1.5 mm screws", 4, 4.5, 1.5, 3.6, 1.8, 1.7,
+                    0.6, 1.5, 0.15},
+          StripPlan{"reconstruction-8", "reconstruction plate: 2.5 mm thick, 8 holes for 2.4 mm screws", 8, 8, 0, 8, 5,
+                    2.8, 2.5, 2.4, 0.3}}) {
       all.push_back(make_strip(s));
     }
     all.push_back(make_distractor());
@@ -178,4 +185,4 @@ std::vector<PlateSample> sample_plate(const PlateModel& plate, int count, double
   return samples;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -25,4 +25,4 @@ PostureNow posture_of(Vec3 down) {
   return {Posture::supine, degrees};
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

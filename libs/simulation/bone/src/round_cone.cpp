@@ -70,7 +70,8 @@ double cut_volume(const RoundCone& s, double sine, double cosine, double depth) 
     } else {
       r = (s.start_radius_mm - b * z) / a;
     }
-    // Near the pole the slices are nearly parallel to the plane: then a slice is in or out as a whole, in part by its thickness.
+    // Near the pole the slices are nearly parallel to the plane: then a slice is in or out as a whole, in part by its
+    // thickness.
     const double beyond = z * cosine - plane;
     if (sine > 1e-3) {
       sum += segment_area(r, -beyond / sine);
@@ -110,7 +111,9 @@ CutDepth::CutDepth(const RoundCone& shape)
       const double u0 = std::sqrt(volume[at]), u1 = std::sqrt(volume[at + 1]);
       const double share = std::clamp((std::sqrt(v) - u0) / (u1 - u0), 0.0, 1.0);
       const double d = depth[at] + share * (depth[at + 1] - depth[at]);
-      table_[static_cast<std::size_t>(a) * kVolumes + static_cast<std::size_t>(k)] = k == 0 ? 0 : k == kVolumes - 1 ? deepest : d;
+      table_[static_cast<std::size_t>(a) * kVolumes + static_cast<std::size_t>(k)] = k == 0              ? 0
+                                                                                     : k == kVolumes - 1 ? deepest
+                                                                                                         : d;
     }
   }
 }
@@ -122,7 +125,9 @@ double CutDepth::operator()(double volume_mm3, double cosine) const noexcept {
   const double v = (std::clamp(cosine, -1.0, 1.0) + 1) / 2 * (kAngles - 1);
   const int i = std::min(static_cast<int>(u), kVolumes - 2), j = std::min(static_cast<int>(v), kAngles - 2);
   const double s = u - i, t = v - j;
-  const auto at = [&](int a, int k) { return table_[static_cast<std::size_t>(a) * kVolumes + static_cast<std::size_t>(k)]; };
+  const auto at = [&](int a, int k) {
+    return table_[static_cast<std::size_t>(a) * kVolumes + static_cast<std::size_t>(k)];
+  };
   return (1 - t) * ((1 - s) * at(j, i) + s * at(j, i + 1)) + t * ((1 - s) * at(j + 1, i) + s * at(j + 1, i + 1));
 }
 
@@ -137,4 +142,4 @@ double CutDepth::area_mm2(double volume_mm3, double cosine) const noexcept {
   return step / std::max(rise, 1e-12);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -9,8 +9,8 @@
 namespace osteo::inline simulation {
 namespace {
 
-// Share of a cube of edge 1 that lies below a plane: its centre `depth` below, `n` the plane's unit normal. The sum of three uniform
-// spreads of widths |n| (R. Scardovelli, S. Zaleski, J. Comput. Phys. 164, 2000, in its plainest form).
+// Share of a cube of edge 1 that lies below a plane: its centre `depth` below, `n` the plane's unit normal. The sum of
+// three uniform spreads of widths |n| (R. Scardovelli, S. Zaleski, J. Comput. Phys. 164, 2000, in its plainest form).
 double share_below(double depth, Vec3 n) {
   double m[3] = {std::abs(n.x), std::abs(n.y), std::abs(n.z)};
   std::sort(m, m + 3);
@@ -47,8 +47,9 @@ void for_each_covered(const BrickGrid& bone, const SawCut& cut, F&& take) {
     double half;  // infinite: no faces there
   };
   const auto half_of = [&](double size_mm) { return size_mm > 0 ? size_mm / 2 / h : INFINITY; };
-  const std::array<Side, 3> sides{
-      Side{to_index * normal, cut.kerf_mm / 2 / h}, {to_index * along, half_of(cut.length_mm)}, {to_index * across, half_of(cut.depth_mm)}};
+  const std::array<Side, 3> sides{Side{to_index * normal, cut.kerf_mm / 2 / h},
+                                  {to_index * along, half_of(cut.length_mm)},
+                                  {to_index * across, half_of(cut.depth_mm)}};
   constexpr double kCorner = 6.1 + 0.9;  // from a brick's middle to a voxel's far corner
   for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
     const Ijk o = bone.brick_coordinate(b);
@@ -60,7 +61,8 @@ void for_each_covered(const BrickGrid& bone, const SawCut& cut, F&& take) {
       const VoxelKey key = b * BrickGrid::kVoxels + v;
       const float before = bone.value(key);
       if (before <= 0) continue;
-      const Vec3 p = Vec3{double(o.i * 8 + int(v & 7)), double(o.j * 8 + int(v >> 3 & 7)), double(o.k * 8 + int(v >> 6))} - centre;
+      const Vec3 p =
+          Vec3{double(o.i * 8 + int(v & 7)), double(o.j * 8 + int(v >> 3 & 7)), double(o.k * 8 + int(v >> 6))} - centre;
       double covered = 1;
       for (const Side& s : sides) {
         if (!std::isfinite(s.half)) continue;
@@ -103,4 +105,4 @@ std::vector<VoxelKey> voxels_sawn(const BrickGrid& bone, const SawCut& cut) {
   return voxels;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

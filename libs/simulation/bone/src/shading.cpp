@@ -108,15 +108,17 @@ void ShadingField::shade(std::uint32_t brick, SurfacePatch& patch) const {
           for (int j = std::max(lo, bj * m); j <= std::min(hi, bj * m + m - 1); ++j) {
             const int i0 = std::max(lo, bi * m), i1 = std::min(hi, bi * m + m - 1);
             const float* const row = from + ((k - bk * m) * m + j - bj * m) * m - bi * m;
-            std::copy(row + i0, row + i1 + 1, &block[static_cast<std::size_t>(((k - lo) * side + j - lo) * side + i0 - lo)]);
+            std::copy(row + i0, row + i1 + 1,
+                      &block[static_cast<std::size_t>(((k - lo) * side + j - lo) * side + i0 - lo)]);
           }
         }
       }
     }
   }
-  // Separable: along z, then y, then x. Of the four that are wanted (value and three slopes) each pass makes what the next ones need.
-  const auto pass = [&](const std::vector<float>& in, std::vector<float>& out, const std::vector<float>& taps, int stride, int outer,
-                        int outer_stride_in, int outer_stride_out, int inner, int out_stride) {
+  // Separable: along z, then y, then x. Of the four that are wanted (value and three slopes) each pass makes what the
+  // next ones need.
+  const auto pass = [&](const std::vector<float>& in, std::vector<float>& out, const std::vector<float>& taps,
+                        int stride, int outer, int outer_stride_in, int outer_stride_out, int inner, int out_stride) {
     for (int o = 0; o < outer; ++o) {
       for (int n = 0; n < nodes; ++n) {
         float* const to = &out[static_cast<std::size_t>(o * outer_stride_out + n * out_stride)];
@@ -171,8 +173,8 @@ void ShadingField::shade(std::uint32_t brick, SurfacePatch& patch) const {
     std::array<float, 3> f{};
     const std::array<int, 3> origin{at.i * 8, at.j * 8, at.k * 8};
     for (std::size_t x = 0; x < 3; ++x) {
-      const float u =
-          std::clamp((v.index[x] - static_cast<float>(origin[x]) + 0.5F) * scale + 0.5F, 0.0F, static_cast<float>(nodes) - 1.001F);
+      const float u = std::clamp((v.index[x] - static_cast<float>(origin[x]) + 0.5F) * scale + 0.5F, 0.0F,
+                                 static_cast<float>(nodes) - 1.001F);
       n[x] = static_cast<int>(u);
       f[x] = u - static_cast<float>(n[x]);
     }
@@ -195,7 +197,8 @@ void ShadingField::shade(std::uint32_t brick, SurfacePatch& patch) const {
     if (flat < 1) {
       if (!have_voxels) {
         voxels.resize(static_cast<std::size_t>(fine * fine * fine));
-        bone_->read_block({origin[0] - rn - 2, origin[1] - rn - 2, origin[2] - rn - 2}, {fine, fine, fine}, voxels.data());
+        bone_->read_block({origin[0] - rn - 2, origin[1] - rn - 2, origin[2] - rn - 2}, {fine, fine, fine},
+                          voxels.data());
         have_voxels = true;
       }
       // Around the voxel that is nearest to the vertex, by kernels moved to it.
@@ -209,7 +212,8 @@ void ShadingField::shade(std::uint32_t brick, SurfacePatch& patch) const {
         float sum = 0, moment = 0;
         for (int t = 0; t < taps; ++t) {
           const float d = static_cast<float>(nearest - rn + t) - u;
-          const auto g = static_cast<float>(portable::exp(-0.5 * static_cast<double>(d * d) / (kNarrowVoxels * kNarrowVoxels)));
+          const auto g =
+              static_cast<float>(portable::exp(-0.5 * static_cast<double>(d * d) / (kNarrowVoxels * kNarrowVoxels)));
           value[x][static_cast<std::size_t>(t)] = g;
           slope[x][static_cast<std::size_t>(t)] = d * g;
           sum += g;
@@ -223,7 +227,8 @@ void ShadingField::shade(std::uint32_t brick, SurfacePatch& patch) const {
       std::array<float, 3> g{};
       for (int k = 0; k < taps; ++k) {
         for (int j = 0; j < taps; ++j) {
-          const float* const row = &voxels[static_cast<std::size_t>(((first[2] + k) * fine + first[1] + j) * fine + first[0])];
+          const float* const row =
+              &voxels[static_cast<std::size_t>(((first[2] + k) * fine + first[1] + j) * fine + first[0])];
           float along = 0, slopes = 0;
           for (int i = 0; i < taps; ++i) {
             along += value[0][static_cast<std::size_t>(i)] * row[i];
@@ -237,12 +242,14 @@ void ShadingField::shade(std::uint32_t brick, SurfacePatch& patch) const {
       }
       const float tall = length_of(g);
       const float seen = tall > 0 ? smooth_step(kStepSeen, kStepSure, tall * whole_narrow) : 0;
-      for (std::size_t x = 0; x < 3; ++x) normal[x] += (1 - flat) * ((seen > 0 ? seen * -g[x] / tall : 0) + (1 - seen) * v.normal[x]);
+      for (std::size_t x = 0; x < 3; ++x)
+        normal[x] += (1 - flat) * ((seen > 0 ? seen * -g[x] / tall : 0) + (1 - seen) * v.normal[x]);
     }
     const float size = length_of(normal);
     // Never against the triangles: a wall's other side.
-    if (size > 0.1F && normal[0] * v.normal[0] + normal[1] * v.normal[1] + normal[2] * v.normal[2] > 0) v.normal = unit(normal, size);
+    if (size > 0.1F && normal[0] * v.normal[0] + normal[1] * v.normal[1] + normal[2] * v.normal[2] > 0)
+      v.normal = unit(normal, size);
   }
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -199,4 +199,4 @@ std::string told_structures_cut(const StructureMap& map, std::span<const Structu
   return all;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

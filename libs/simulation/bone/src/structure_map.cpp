@@ -8,11 +8,11 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/parallel.h"
-#include "osteo/simulation/bone/burr.h"
+#include "osteo/geometry/distance/binary_distance.h"
 #include "osteo/geometry/distance/distance_map.h"
 #include "osteo/geometry/grid/brick_linear.h"
-#include "osteo/geometry/distance/binary_distance.h"
 #include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/simulation/bone/burr.h"
 
 namespace osteo::inline simulation {
 
@@ -20,10 +20,10 @@ namespace {
 
 constexpr int kPad = 3;  // voxels beside a structure that its face depends on
 
-// Beside a structure's voxels: smoothed distance to its steps, in the label's smallest spacing, positive inside. Only voxels with a
-// neighbour on the other side of the face matter: the rest tell the side.
-// What smooths is 2 S - S^2, S being 1 2 1 along each axis: flat faces stay where they are as under S, while curved ones are not drawn
-// inwards (by 0.1 voxel at radii of 2 to 5 under S alone).
+// Beside a structure's voxels: smoothed distance to its steps, in the label's smallest spacing, positive inside. Only
+// voxels with a neighbour on the other side of the face matter: the rest tell the side. What smooths is 2 S - S^2, S
+// being 1 2 1 along each axis: flat faces stay where they are as under S, while curved ones are not drawn inwards (by
+// 0.1 voxel at radii of 2 to 5 under S alone).
 BrickGrid face_field(const Labels& crop, const Context& context) {
   const Frame& f = crop.frame;
   const Vec3 h = f.spacing_mm;
@@ -33,8 +33,8 @@ BrickGrid face_field(const Labels& crop, const Context& context) {
   constexpr int kSmooth = 2;                 // voxels to each side that the smoothing looks at
   constexpr std::array<float, 5> kOnce{0, 0.25F, 0.5F, 0.25F, 0}, kTwice{1 / 16.0F, 0.25F, 0.375F, 0.25F, 1 / 16.0F};
   // From a voxel of the smoothing to the one beside the face, and a step on across it.
-  const double within_mm =
-      1.001 * std::max({length({3 * h.x, 2 * h.y, 2 * h.z}), length({2 * h.x, 3 * h.y, 2 * h.z}), length({2 * h.x, 2 * h.y, 3 * h.z})});
+  const double within_mm = 1.001 * std::max({length({3 * h.x, 2 * h.y, 2 * h.z}), length({2 * h.x, 3 * h.y, 2 * h.z}),
+                                             length({2 * h.x, 2 * h.y, 3 * h.z})});
   // Slab by slab: the distances of a whole head are never in memory together.
   constexpr int kSlab = 48;
   struct Slab {
@@ -45,7 +45,8 @@ BrickGrid face_field(const Labels& crop, const Context& context) {
   const auto bx = static_cast<std::size_t>((nx + 7) / 8), by = static_cast<std::size_t>((ny + 7) / 8);
   const auto slab_of = [&](std::size_t s) {
     Slab& out = slabs[s];
-    const int begin = std::max(1, static_cast<int>(s) * kSlab), end = std::min(nz - 1, (static_cast<int>(s) + 1) * kSlab);
+    const int begin = std::max(1, static_cast<int>(s) * kSlab),
+              end = std::min(nz - 1, (static_cast<int>(s) + 1) * kSlab);
     const int more = kSmooth + static_cast<int>(std::ceil(within_mm / h.z));
     const int lo = std::max(0, begin - more), hi = std::min(nz, end + more);
     Frame part = f;
@@ -69,11 +70,15 @@ BrickGrid face_field(const Labels& crop, const Context& context) {
         for (int i = 1; i + 1 < nx; ++i) {
           const std::size_t v = crop.offset(i, j, k);
           const bool inside = crop.voxels[v] != 0;
-          const auto side = [&](int a, int b, int c) { return (crop.voxels[crop.offset(i + a, j + b, k + c)] != 0) == inside; };
-          const bool deep = side(-1, 0, 0) && side(1, 0, 0) && side(0, -1, 0) && side(0, 1, 0) && side(0, 0, -1) && side(0, 0, 1);
+          const auto side = [&](int a, int b, int c) {
+            return (crop.voxels[crop.offset(i + a, j + b, k + c)] != 0) == inside;
+          };
+          const bool deep =
+              side(-1, 0, 0) && side(1, 0, 0) && side(0, -1, 0) && side(0, 1, 0) && side(0, 0, -1) && side(0, 0, 1);
           if (deep && !inside) continue;
-          std::uint8_t& brick = wanted[(static_cast<std::size_t>(k % kSlab / 8) * by + static_cast<std::size_t>(j / 8)) * bx +
-                                       static_cast<std::size_t>(i / 8)];
+          std::uint8_t& brick =
+              wanted[(static_cast<std::size_t>(k % kSlab / 8) * by + static_cast<std::size_t>(j / 8)) * bx +
+                     static_cast<std::size_t>(i / 8)];
           if (brick == 0) out.bricks.push_back({i / 8, j / 8, k / 8});
           brick = 1;
           if (deep) continue;
@@ -82,8 +87,9 @@ BrickGrid face_field(const Labels& crop, const Context& context) {
             for (int b = -kSmooth; b <= kSmooth; ++b) {
               float row1 = 0, row2 = 0;
               for (int a = -kSmooth; a <= kSmooth; ++a) {
-                const float p =
-                    phi[crop.offset(std::clamp(i + a, 0, nx - 1), std::clamp(j + b, 0, ny - 1), std::clamp(k + c, 0, nz - 1)) - below];
+                const float p = phi[crop.offset(std::clamp(i + a, 0, nx - 1), std::clamp(j + b, 0, ny - 1),
+                                                std::clamp(k + c, 0, nz - 1)) -
+                                    below];
                 row1 += kOnce[static_cast<std::size_t>(a + 2)] * p;
                 row2 += kTwice[static_cast<std::size_t>(a + 2)] * p;
               }
@@ -122,10 +128,10 @@ BrickGrid face_field(const Labels& crop, const Context& context) {
 
 }  // namespace
 
-StructureMap::Field StructureMap::field_of(const TriangleSoup& face, const TriangleTree& tree, const Frame& frame, double inside_mm,
-                                           double outside_mm, const Context& context) {
-  const DistanceMap map =
-      DistanceMapper(face, tree, frame, context.sub(0, 0.2)).map({DistanceRegion::band, inside_mm, outside_mm}, context.sub(0.2, 1));
+StructureMap::Field StructureMap::field_of(const TriangleSoup& face, const TriangleTree& tree, const Frame& frame,
+                                           double inside_mm, double outside_mm, const Context& context) {
+  const DistanceMap map = DistanceMapper(face, tree, frame, context.sub(0, 0.2))
+                              .map({DistanceRegion::band, inside_mm, outside_mm}, context.sub(0.2, 1));
   Field field{BrickGrid(frame, map.bricks), {}};
   for (std::size_t b = 0; b < map.bricks.size(); ++b) {
     const Ijk o = map.bricks[b];
@@ -140,20 +146,22 @@ StructureMap::Field StructureMap::field_of(const TriangleSoup& face, const Trian
   return field;
 }
 
-StructureMap::Part StructureMap::part_of(const Labels& labels, std::uint8_t value, std::array<std::array<int, 2>, 3> box, double far_mm,
-                                         const Context& context) {
+StructureMap::Part StructureMap::part_of(const Labels& labels, std::uint8_t value,
+                                         std::array<std::array<int, 2>, 3> box, double far_mm, const Context& context) {
   const Vec3 h = labels.frame.spacing_mm;
   const double coarsest = std::max({h.x, h.y, h.z});
   Labels crop;
   crop.frame = labels.frame;
   for (std::size_t a = 0; a < 3; ++a) crop.frame.dims[a] = box[a][1] - box[a][0] + 1 + 2 * kPad;
-  crop.frame.origin_mm = labels.frame.world_from_index({double(box[0][0] - kPad), double(box[1][0] - kPad), double(box[2][0] - kPad)});
+  crop.frame.origin_mm =
+      labels.frame.world_from_index({double(box[0][0] - kPad), double(box[1][0] - kPad), double(box[2][0] - kPad)});
   const auto voxels = make_voxels<std::uint8_t>(crop.frame.voxel_count());
   std::fill_n(voxels.get(), crop.frame.voxel_count(), std::uint8_t{0});
   for (int k = box[2][0]; k <= box[2][1]; ++k) {
     for (int j = box[1][0]; j <= box[1][1]; ++j) {
       for (int i = box[0][0]; i <= box[0][1]; ++i) {
-        if (labels.at(i, j, k) == value) voxels[crop.offset(i - box[0][0] + kPad, j - box[1][0] + kPad, k - box[2][0] + kPad)] = 1;
+        if (labels.at(i, j, k) == value)
+          voxels[crop.offset(i - box[0][0] + kPad, j - box[1][0] + kPad, k - box[2][0] + kPad)] = 1;
       }
     }
   }
@@ -169,7 +177,8 @@ StructureMap::Part StructureMap::part_of(const Labels& labels, std::uint8_t valu
     Vec3 shift;
     for (std::size_t a = 0; a < 3; ++a) {
       const int more = static_cast<int>(std::ceil(beyond_mm / spacing[a])) + 1;
-      f.dims[a] = static_cast<int>(std::ceil((crop.frame.dims[a] - 1) * crop.frame.spacing_mm[a] / spacing[a])) + 1 + 2 * more;
+      f.dims[a] =
+          static_cast<int>(std::ceil((crop.frame.dims[a] - 1) * crop.frame.spacing_mm[a] / spacing[a])) + 1 + 2 * more;
       shift[a] = -more * spacing[a];
     }
     f.origin_mm = f.origin_mm + f.direction * shift;
@@ -180,8 +189,8 @@ StructureMap::Part StructureMap::part_of(const Labels& labels, std::uint8_t valu
   part.near = field_of(face, tree, around(h, near_mm), near_mm, near_mm, context.sub(0.2, 0.5));
   // A point is between lattice points up to a diagonal away.
   const double kept_mm = far_mm + std::sqrt(3.0) * wide;
-  part.whole =
-      field_of(face, tree, around({wide, wide, wide}, kept_mm), std::numeric_limits<double>::infinity(), kept_mm, context.sub(0.5, 1));
+  part.whole = field_of(face, tree, around({wide, wide, wide}, kept_mm), std::numeric_limits<double>::infinity(),
+                        kept_mm, context.sub(0.5, 1));
   return part;
 }
 
@@ -212,7 +221,8 @@ StructureMap::StructureMap(const Labels& labels, double reach_mm, const Context&
   for (const Burr& burr : burr_library()) thickest = std::max(thickest, burr.head().largest_radius_mm());
   for (const std::uint8_t value : values_) {
     const double done = static_cast<double>(parts_.size()), all = static_cast<double>(values_.size());
-    parts_.push_back(part_of(labels, value, boxes[value], reach_mm + thickest, context.sub(done / all, (done + 1) / all)));
+    parts_.push_back(
+        part_of(labels, value, boxes[value], reach_mm + thickest, context.sub(done / all, (done + 1) / all)));
   }
 }
 
@@ -235,7 +245,8 @@ double StructureMap::Field::at(Vec3 world_mm) const noexcept {
       d[c] = values.value(v);
     }
   }
-  return static_cast<double>(mix_linear(d, static_cast<float>(x.x - fi), static_cast<float>(x.y - fj), static_cast<float>(x.z - fk)));
+  return static_cast<double>(
+      mix_linear(d, static_cast<float>(x.x - fi), static_cast<float>(x.y - fj), static_cast<float>(x.z - fk)));
 }
 
 double StructureMap::Part::at(Vec3 world_mm) const noexcept {
@@ -277,14 +288,16 @@ double StructureMap::distance_mm(std::size_t number, Vec3 world_mm) const noexce
   return d < reach_mm_ ? d : reach_mm_;
 }
 
-StructureMap::Answer StructureMap::clearance(const RoundCone& tool, Vec3 start_mm, Vec3 axis, std::span<double> each) const noexcept {
+StructureMap::Answer StructureMap::clearance(const RoundCone& tool, Vec3 start_mm, Vec3 axis,
+                                             std::span<double> each) const noexcept {
   const Vec3 middle = start_mm + axis * (tool.start_mm + tool.length_mm / 2);
   const double reach = reach_mm_ + tool.length_mm / 2 + tool.largest_radius_mm();
   Answer nearest{reach_mm_, 0};
   for (std::size_t s = 0; s < parts_.size(); ++s) {
     const BoxMm& box = parts_[s].box;
     bool beyond = false;
-    for (std::size_t a = 0; a < 3; ++a) beyond = beyond || box.lo[a] - middle[a] > reach || middle[a] - box.hi[a] > reach;
+    for (std::size_t a = 0; a < 3; ++a)
+      beyond = beyond || box.lo[a] - middle[a] > reach || middle[a] - box.hi[a] > reach;
     const double gap = beyond ? reach_mm_ : parts_[s].clearance(tool, start_mm, axis);
     if (s < each.size()) each[s] = gap < reach_mm_ ? gap : reach_mm_;
     if (gap < nearest.distance_mm) nearest = {gap, values_[s]};
@@ -294,22 +307,29 @@ StructureMap::Answer StructureMap::clearance(const RoundCone& tool, Vec3 start_m
 
 std::array<double, 3> StructureMap::colour_of(std::uint8_t structure) const {
   for (const Structure& s : structures_) {
-    if (s.value == structure && s.rgb != std::array<std::uint8_t, 3>{}) return {s.rgb[0] / 255.0, s.rgb[1] / 255.0, s.rgb[2] / 255.0};
+    if (s.value == structure && s.rgb != std::array<std::uint8_t, 3>{})
+      return {s.rgb[0] / 255.0, s.rgb[1] / 255.0, s.rgb[2] / 255.0};
   }
-  static constexpr std::array<std::array<double, 3>, 6> kRow{
-      {{0.95, 0.85, 0.25}, {0.30, 0.45, 0.90}, {0.85, 0.25, 0.25}, {0.35, 0.75, 0.45}, {0.80, 0.45, 0.80}, {0.30, 0.75, 0.80}}};
+  static constexpr std::array<std::array<double, 3>, 6> kRow{{{0.95, 0.85, 0.25},
+                                                              {0.30, 0.45, 0.90},
+                                                              {0.85, 0.25, 0.25},
+                                                              {0.35, 0.75, 0.45},
+                                                              {0.80, 0.45, 0.80},
+                                                              {0.30, 0.75, 0.80}}};
   return kRow[(structure + 5U) % kRow.size()];
 }
 
 std::string StructureMap::name_of(std::uint8_t structure) const {
-  const auto s = std::find_if(structures_.begin(), structures_.end(), [&](const Structure& c) { return c.value == structure; });
+  const auto s =
+      std::find_if(structures_.begin(), structures_.end(), [&](const Structure& c) { return c.value == structure; });
   return s != structures_.end() ? s->name : "structure " + std::to_string(structure);
 }
 
 std::size_t StructureMap::memory_bytes() const {
   std::size_t sum = 0;
   for (const Part& p : parts_) {
-    sum += p.near.values.memory_bytes() + p.whole.values.memory_bytes() + p.face.triangles.size() * sizeof(p.face.triangles[0]) +
+    sum += p.near.values.memory_bytes() + p.whole.values.memory_bytes() +
+           p.face.triangles.size() * sizeof(p.face.triangles[0]) +
            p.face.points_mm.size() * (sizeof(p.face.points_mm[0]) + sizeof(p.face.normals[0]));
   }
   return sum;
@@ -327,4 +347,4 @@ std::string StructureMap::hash() const {
   return h.hex();
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -6,7 +6,8 @@ namespace osteo::inline simulation {
 namespace {
 
 float linear(const BrickGrid& g, Vec3 x) noexcept {
-  const int i = static_cast<int>(std::floor(x.x)), j = static_cast<int>(std::floor(x.y)), k = static_cast<int>(std::floor(x.z));
+  const int i = static_cast<int>(std::floor(x.x)), j = static_cast<int>(std::floor(x.y)),
+            k = static_cast<int>(std::floor(x.z));
   const auto u = static_cast<float>(x.x - i), v = static_cast<float>(x.y - j), w = static_cast<float>(x.z - k);
   const auto row = [&](int b, int c) { return (1 - u) * g.at(i, b, c) + u * g.at(i + 1, b, c); };
   return (1 - w) * ((1 - v) * row(j, k) + v * row(j + 1, k)) + w * ((1 - v) * row(j, k + 1) + v * row(j + 1, k + 1));
@@ -17,7 +18,9 @@ float linear(const BrickGrid& g, Vec3 x) noexcept {
 double thickness_mm(const BrickGrid& bone, Vec3 start_mm, Vec3 inwards, double reach_mm, double gap_mm) noexcept {
   const double h = bone.frame().spacing_mm.x, step = 0.5 * h;
   const Vec3 x0 = bone.frame().index_from_world(start_mm), d = (transposed(bone.frame().direction) * inwards) / h;
-  if (!std::isfinite(dot(x0, x0)) || !std::isfinite(dot(d, d)) || std::abs(x0.x) + std::abs(x0.y) + std::abs(x0.z) > 1e6) return 0;
+  if (!std::isfinite(dot(x0, x0)) || !std::isfinite(dot(d, d)) ||
+      std::abs(x0.x) + std::abs(x0.y) + std::abs(x0.z) > 1e6)
+    return 0;
   float before = linear(bone, x0);
   double entered = before >= 0.5F ? 0 : -1, left = -1;
   for (double t = step;; t += step) {
@@ -37,4 +40,4 @@ double thickness_mm(const BrickGrid& bone, Vec3 start_mm, Vec3 inwards, double r
   }
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -117,7 +117,8 @@ World::Done World::snapshot(ActionKind kind, std::uint32_t of) const {
 
 // Dragging a piece is one step, not one for each picture. So is turning a distractor's screw.
 bool World::goes_on(const Done& before, const Done& after) {
-  return (after.kind == ActionKind::move || after.kind == ActionKind::open) && before.kind == after.kind && before.of == after.of;
+  return (after.kind == ActionKind::move || after.kind == ActionKind::open) && before.kind == after.kind &&
+         before.of == after.of;
 }
 
 std::size_t World::undo_steps() const {
@@ -153,7 +154,8 @@ void World::end_stroke() {
   ++told_;
   // With what came before it: undo leaves nothing out on its way back.
   while (stroke_bytes_ > kMostStrokeBytes) {
-    const auto oldest = std::find_if(done_.begin(), done_.end(), [](const Done& d) { return d.kind == ActionKind::stroke; });
+    const auto oldest =
+        std::find_if(done_.begin(), done_.end(), [](const Done& d) { return d.kind == ActionKind::stroke; });
     const auto steps = oldest + 1 - done_.begin();
     stroke_bytes_ -= oldest->drilled.size() * sizeof(Change);
     done_.erase(done_.begin(), oldest + 1);
@@ -223,11 +225,13 @@ void World::move_group(const std::vector<std::uint32_t>& group, const RigidTrans
 
 // Which of the pieces that a plate is to be fixed to is not there; kNobody: none.
 std::uint32_t World::not_under_plate(const SceneAction& attach) const {
-  const auto gaps = plate_gaps(*this, plate_library()[attach.item], attach.transform(), 0, 400, SceneAction::kPlateReachMm);
+  const auto gaps =
+      plate_gaps(*this, plate_library()[attach.item], attach.transform(), 0, 400, SceneAction::kPlateReachMm);
   for (const std::uint32_t id : {attach.body, attach.other}) {
     if (id == SceneAction::kNobody) continue;
     const auto on = [&](const PlateGap& g) {
-      return g.body == id || (g.body != SceneAction::kNobody && id == bodies_.front().body->id && find(g.body)->of_region);
+      return g.body == id ||
+             (g.body != SceneAction::kNobody && id == bodies_.front().body->id && find(g.body)->of_region);
     };
     if (std::none_of(gaps.begin(), gaps.end(), on)) return id;
   }
@@ -243,7 +247,8 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
   }
   if (a.hand >= kMostHands) return nothing("there is no hand " + std::to_string(a.hand));
   const auto known = [&](std::uint32_t id) { return find(id) != nullptr; };
-  const auto fixture = std::find_if(fixtures_.begin(), fixtures_.end(), [&](const Fixture& f) { return f.id == a.item; });
+  const auto fixture =
+      std::find_if(fixtures_.begin(), fixtures_.end(), [&](const Fixture& f) { return f.id == a.item; });
   switch (static_cast<ActionKind>(a.kind)) {
     case ActionKind::hold:
     case ActionKind::resume:
@@ -251,17 +256,18 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
     case ActionKind::setting:
       break;
     case ActionKind::guide:
-      if (!(a.values[0] >= 0 && a.values[0] < kMostHands && a.values[0] == std::floor(a.values[0])) || a.item >= kMostHands ||
-          static_cast<double>(a.item) == a.values[0])
+      if (!(a.values[0] >= 0 && a.values[0] < kMostHands && a.values[0] == std::floor(a.values[0])) ||
+          a.item >= kMostHands || static_cast<double>(a.item) == a.values[0])
         return nothing("one hand is led by another, both below " + std::to_string(kMostHands));
-      if (!(a.values[1] >= -10 && a.values[1] <= 10 && a.values[2] >= 0 && a.values[2] <= 100 && std::abs(a.values[3]) <= 2 &&
-            a.values[4] >= 0 && a.values[4] <= 20 && a.values[5] >= 0 && (a.values[6] == 0 || a.values[6] == 1) && a.values[7] >= 0 &&
-            a.values[7] <= 100))
+      if (!(a.values[1] >= -10 && a.values[1] <= 10 && a.values[2] >= 0 && a.values[2] <= 100 &&
+            std::abs(a.values[3]) <= 2 && a.values[4] >= 0 && a.values[4] <= 20 && a.values[5] >= 0 &&
+            (a.values[6] == 0 || a.values[6] == 1) && a.values[7] >= 0 && a.values[7] <= 100))
         return nothing("a guide pulls with -10 to 10 N/mm, 0 to 100 N s/m, up to 20 N and twice the leader's force");
       break;
     case ActionKind::cutting_guide:
       if (!(a.values[6] >= 0 && a.values[6] <= SceneAction::kMostSlotMm))
-        return nothing("a saw slips into a cutting guide from 0 to " + format_number(SceneAction::kMostSlotMm) + " mm away");
+        return nothing("a saw slips into a cutting guide from 0 to " + format_number(SceneAction::kMostSlotMm) +
+                       " mm away");
       if (a.values[6] > 0 && !(length(Vec3{a.values[3], a.values[4], a.values[5]}) > 1e-9))
         return nothing("the plane of a cutting guide has no direction across it");
       guides_[a.hand] = a.guide();
@@ -277,8 +283,8 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
     case ActionKind::suction:
     case ActionKind::irrigate:
       if (a.values[4] > 0 && !(a.values[3] > 0 && a.values[3] <= SceneAction::kMostReachMm))
-        return nothing("it reaches " + format_number(a.values[3]) + " mm, but at most " + format_number(SceneAction::kMostReachMm) +
-                       " mm make sense");
+        return nothing("it reaches " + format_number(a.values[3]) + " mm, but at most " +
+                       format_number(SceneAction::kMostReachMm) + " mm make sense");
       break;
     case ActionKind::posture:
       if (const double n = length(Vec3{a.values[0], a.values[1], a.values[2]}); !(n > 0.99 && n < 1.01))
@@ -286,7 +292,8 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       break;
     case ActionKind::grip:
       if (!is_rigid(a.transform())) return nothing("this is no rigid motion");
-      if (a.item != SceneAction::kNobody && a.item >= plate_library().size()) return nothing("there is no plate " + std::to_string(a.item));
+      if (a.item != SceneAction::kNobody && a.item >= plate_library().size())
+        return nothing("there is no plate " + std::to_string(a.item));
       grips_[a.hand] = {a.item, a.transform()};
       break;
     case ActionKind::move: {
@@ -349,7 +356,8 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
 World::Effect World::saw(const SceneAction& a) {
   const SawCut cut = a.saw_cut();
   if (!(length(cut.normal) > 1e-9) || !(cut.kerf_mm > 0)) return nothing("a saw cut needs a direction and a width");
-  if (a.body != SceneAction::kNobody && find(a.body) == nullptr) return nothing("there is no piece " + std::to_string(a.body));
+  if (a.body != SceneAction::kNobody && find(a.body) == nullptr)
+    return nothing("there is no piece " + std::to_string(a.body));
   Effect effect;
   Done before = snapshot(ActionKind::saw);
   for (PlacedBody& placed : bodies_) {
@@ -359,7 +367,8 @@ World::Effect World::saw(const SceneAction& a) {
     own.at_mm = back(cut.at_mm);
     own.normal = back.rotation * cut.normal;
     own.along = back.rotation * cut.along;
-    auto sawn = std::make_shared<Body>(Body{placed.body->id, placed.body->first_brick, placed.body->bone.sharing(), placed.body->hardness});
+    auto sawn = std::make_shared<Body>(
+        Body{placed.body->id, placed.body->first_brick, placed.body->bone.sharing(), placed.body->hardness});
     std::vector<VoxelKey> changed;
     apply_saw(sawn->bone, own, changed);
     if (changed.empty()) continue;
@@ -369,7 +378,8 @@ World::Effect World::saw(const SceneAction& a) {
       const float was = placed.body->bone.value(v), is = sawn->bone.value(v);
       changes.push_back({v, was, is});
       effect.dust.emplace_back(sawn->name_of(v), was - is);
-      if (bricks.bricks.empty() || bricks.bricks.back() != v / BrickGrid::kVoxels) bricks.bricks.push_back(v / BrickGrid::kVoxels);
+      if (bricks.bricks.empty() || bricks.bricks.back() != v / BrickGrid::kVoxels)
+        bricks.bricks.push_back(v / BrickGrid::kVoxels);
     }
     before.sawn.emplace_back(sawn->id, std::move(changes));
     effect.changed.push_back(std::move(bricks));
@@ -407,14 +417,16 @@ World::Effect World::split(const SceneAction& a, const ComponentsOf& components)
       effect.dust.emplace_back(placed.body->name_of(voxel), density);
     }
     effect.changed.push_back({placed.body->id, std::move(split.changed_bricks)});
-    bodies.back().body =
-        std::make_shared<Body>(Body{placed.body->id, placed.body->first_brick, std::move(split.pieces[0].bone), placed.body->hardness});
+    bodies.back().body = std::make_shared<Body>(
+        Body{placed.body->id, placed.body->first_brick, std::move(split.pieces[0].bone), placed.body->hardness});
     for (std::size_t p = 1; p < split.pieces.size(); ++p) {
       Piece& piece = split.pieces[p];
-      if (too_many_bricks(next_brick + piece.bone.brick_count())) return nothing("too many pieces: no names are left for their voxels");
+      if (too_many_bricks(next_brick + piece.bone.brick_count()))
+        return nothing("too many pieces: no names are left for their voxels");
       auto body = std::make_shared<Body>(Body{next_body++, next_brick, std::move(piece.bone), nullptr});
       next_brick += static_cast<std::uint32_t>(body->bone.brick_count());
-      if (placed.body->hardness) body->hardness = std::make_shared<const Hardness>(*placed.body->hardness, piece.origin.brick);
+      if (placed.body->hardness)
+        body->hardness = std::make_shared<const Hardness>(*placed.body->hardness, piece.origin.brick);
       before.children.emplace_back(body->id, placed.body->id);
       effect.made.push_back({body->id, placed.body->id, std::move(piece.origin)});
       made.push_back({std::move(body), placed.world_from_body, false});
@@ -463,7 +475,8 @@ World::Effect World::undo() {
       if (r.id == id) return r;
     }
     PlacedBody* const old = placed(id);
-    old->body = std::make_shared<Body>(Body{id, old->body->first_brick, old->body->bone.sharing(), old->body->hardness});
+    old->body =
+        std::make_shared<Body>(Body{id, old->body->first_brick, old->body->bone.sharing(), old->body->hardness});
     touched.push_back({id, old->body.get(), {}, std::vector<std::uint8_t>(old->body->bone.brick_count())});
     return touched.back();
   };
@@ -528,7 +541,8 @@ World::Effect World::undo() {
 
 std::string World::hash() const {
   const auto& first = bodies_.front();
-  if (bodies_.size() == 1 && fixtures_.empty() && first.world_from_body.rotation == Mat3{} && first.world_from_body.shift_mm == Vec3{})
+  if (bodies_.size() == 1 && fixtures_.empty() && first.world_from_body.rotation == Mat3{} &&
+      first.world_from_body.shift_mm == Vec3{})
     return first.body->bone.hash();
   Hasher h;
   const auto add = [&](const auto& v) { h.add(&v, sizeof v); };
@@ -551,7 +565,8 @@ std::string World::hash() const {
 
 float World::nearest(Vec3 world_mm) const {
   float most = 0;
-  for (const PlacedBody& b : bodies_) most = std::max(most, b.body->bone.nearest(b.world_from_body.inverse()(world_mm)));
+  for (const PlacedBody& b : bodies_)
+    most = std::max(most, b.body->bone.nearest(b.world_from_body.inverse()(world_mm)));
   return most;
 }
 
@@ -567,4 +582,4 @@ double World::volume_mm3() const {
   return sum;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

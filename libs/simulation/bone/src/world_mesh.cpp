@@ -1,7 +1,7 @@
 #include "osteo/simulation/bone/world_mesh.h"
 
-#include "osteo/simulation/bone/plates.h"
 #include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/simulation/bone/plates.h"
 
 namespace osteo::inline simulation {
 
@@ -42,4 +42,4 @@ TriMesh plate_of(const World& world, const Fixture& fixture) {
   return moved(mesh, pose_of(world, fixture));
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

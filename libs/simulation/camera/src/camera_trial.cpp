@@ -25,7 +25,8 @@ class Random {
 
 bool close_to(const ScopeView& view, const ScopeView& target, const TrialTolerance& tolerance) {
   const ViewError e = view_error(view, target);
-  return e.place_mm <= tolerance.place * target.field_mm() && e.angle_rad <= tolerance.angle_rad && e.zoom <= tolerance.zoom;
+  return e.place_mm <= tolerance.place * target.field_mm() && e.angle_rad <= tolerance.angle_rad &&
+         e.zoom <= tolerance.zoom;
 }
 
 std::vector<ScopeView> camera_targets(const ScopeView& start, std::size_t count, std::uint64_t seed) {
@@ -82,8 +83,8 @@ enum class Grip { none, orbit, pan, depth, zoom, shift, turn, all };
 
 class Simulation {
  public:
-  Simulation(CameraMode mode, const ScopeView& start, const std::vector<ScopeView>& targets, const SimulatedPerson& person,
-             std::uint64_t seed, const TrialTolerance& tolerance)
+  Simulation(CameraMode mode, const ScopeView& start, const std::vector<ScopeView>& targets,
+             const SimulatedPerson& person, std::uint64_t seed, const TrialTolerance& tolerance)
       : mode_(mode), p_(person), tolerance_(tolerance), random_(seed), trial_(targets, tolerance) {
     ScopeView begin = start;
     begin.upright = mode != CameraMode::six;
@@ -182,7 +183,8 @@ class Simulation {
           mouse_pan(shift);
         } else {
           const double step = 0.02 * control_.view().field_mm();
-          wheel(Grip::depth, -shift.z / step, [&](double steps) { control_.focus(steps * 0.02 * control_.view().field_mm()); });
+          wheel(Grip::depth, -shift.z / step,
+                [&](double steps) { control_.focus(steps * 0.02 * control_.view().field_mm()); });
         }
         break;
       case CameraMode::device:
@@ -209,7 +211,8 @@ class Simulation {
   void mouse_orbit(const ScopeView& to) {
     take(Grip::orbit);
     const ScopeView& now = control_.view();
-    const double around = std::remainder(std::atan2(to.back.y, to.back.x) - std::atan2(now.back.y, now.back.x), 2 * std::numbers::pi);
+    const double around =
+        std::remainder(std::atan2(to.back.y, to.back.x) - std::atan2(now.back.y, now.back.x), 2 * std::numbers::pi);
     const double right = off(around), up = off(std::asin(to.back.z) - std::asin(now.back.z));
     constexpr double kRadPerPx = 0.35 * std::numbers::pi / 180;  // as the window has it
     const double hand_mm = std::hypot(right, up) / kRadPerPx * kMmPerPx;
@@ -228,12 +231,13 @@ class Simulation {
 
   // The device's way, at most its reach; more needs the clutch.
   void guided(CameraGuide guide, ScopeMotion way) {
-    const double part =
-        std::min({1.0, p_.reach_mm / std::max(1e-9, length(way.shift_mm)), p_.wrist_rad / std::max(1e-9, length(way.turn_rad))});
+    const double part = std::min(
+        {1.0, p_.reach_mm / std::max(1e-9, length(way.shift_mm)), p_.wrist_rad / std::max(1e-9, length(way.turn_rad))});
     way = {way.shift_mm * part, way.turn_rad * part};
-    submove(std::max(time_for(length(way.shift_mm), p_.hand_mm_s), time_for(length(way.turn_rad), p_.wrist_rad_s)), [&](double share) {
-      control_.guide(guide, {way.shift_mm * share, way.turn_rad * share}, kFrameS);
-    });
+    submove(std::max(time_for(length(way.shift_mm), p_.hand_mm_s), time_for(length(way.turn_rad), p_.wrist_rad_s)),
+            [&](double share) {
+              control_.guide(guide, {way.shift_mm * share, way.turn_rad * share}, kFrameS);
+            });
     // Inertia runs out before the brake is set.
     for (double t = 0; t < 0.25 && !done_; t += kFrameS) {
       control_.guide(guide, {}, kFrameS);
@@ -279,7 +283,8 @@ class Simulation {
       push[a] = off(fields[a]) + p_.crosstalk * all / std::sqrt(6.0) * random_.normal();
       twist[a] = off(halves[a]) + p_.crosstalk * all / std::sqrt(6.0) * random_.normal();
     }
-    submove(seconds, [&](double share) { control_.drive(push * (share / kFrameS), twist * (share / kFrameS), kFrameS); });
+    submove(seconds,
+            [&](double share) { control_.drive(push * (share / kFrameS), twist * (share / kFrameS), kFrameS); });
     for (double t = 0; t < 0.25 && !done_; t += kFrameS) {
       control_.drive({}, {}, kFrameS);
       frame();
@@ -299,7 +304,8 @@ class Simulation {
 }  // namespace
 
 std::vector<TrialResult> simulate_trial(CameraMode mode, const ScopeView& start, const std::vector<ScopeView>& targets,
-                                        const SimulatedPerson& person, std::uint64_t seed, const TrialTolerance& tolerance) {
+                                        const SimulatedPerson& person, std::uint64_t seed,
+                                        const TrialTolerance& tolerance) {
   return Simulation(mode, start, targets, person, seed, tolerance).run();
 }
 
@@ -341,4 +347,4 @@ std::string trial_csv(const std::vector<TrialResult>& results) {
   return csv;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

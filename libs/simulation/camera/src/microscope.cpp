@@ -52,7 +52,8 @@ Vec3 ScopeView::ray(const PictureArea& area, double x, double y) const {
 Vec3 ScopeView::at_depth_of(Vec3 reference_mm, const PictureArea& area, double x, double y) const {
   const Vec3 eye = eye_mm();
   const double depth = dot(eye - reference_mm, back), mm = depth / working_distance_mm / pixels_per_mm(area);
-  return eye - back * depth + right() * ((x - area.x - area.width / 2) * mm) + up * ((area.y + area.height / 2 - y) * mm);
+  return eye - back * depth + right() * ((x - area.x - area.width / 2) * mm) +
+         up * ((area.y + area.height / 2 - y) * mm);
 }
 
 std::optional<std::array<double, 2>> ScopeView::pixel(Vec3 place_mm, const PictureArea& area) const {
@@ -60,7 +61,8 @@ std::optional<std::array<double, 2>> ScopeView::pixel(Vec3 place_mm, const Pictu
   const double depth = -dot(from_eye, back);
   if (depth < 1e-6 * working_distance_mm) return std::nullopt;
   const double px = pixels_per_mm(area) * working_distance_mm / depth;
-  return std::array<double, 2>{area.x + area.width / 2 + dot(from_eye, right()) * px, area.y + area.height / 2 - dot(from_eye, up) * px};
+  return std::array<double, 2>{area.x + area.width / 2 + dot(from_eye, right()) * px,
+                               area.y + area.height / 2 - dot(from_eye, up) * px};
 }
 
 void magnify(ScopeView& view, double magnification) {
@@ -181,7 +183,8 @@ Vec3 turn_between(const ScopeView& from, const ScopeView& to) {
     for (int c = 0; c < 3; ++c) m[r][c] = dot(f[r], t[c]);
   }
   const Vec3 axis{m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]};
-  const double sine = length(axis) / 2, cosine = (m[0][0] + m[1][1] + m[2][2] - 1) / 2, angle = std::atan2(sine, cosine);
+  const double sine = length(axis) / 2, cosine = (m[0][0] + m[1][1] + m[2][2] - 1) / 2,
+               angle = std::atan2(sine, cosine);
   if (sine > 1e-7) return axis * (angle / (2 * sine));
   if (cosine > 0) return axis / 2;
   // Half a turn: the axis is the column of m + 1 that is longest.
@@ -220,4 +223,4 @@ ViewError view_error(const ScopeView& a, const ScopeView& b) {
           std::max(a.magnification / b.magnification, b.magnification / a.magnification)};
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -120,7 +120,8 @@ void ScopeControl::guide(CameraGuide mode, const ScopeMotion& device, double sec
   arm.params.most_mm_s = 4 * view_.field_mm();
   arm.params.friction_mm_s2 = 0.5 * view_.field_mm();
   const bool rests = length(wanted.shift_mm) == 0 && length(wanted.turn_rad) == 0;
-  const auto drive = rests ? std::nullopt : std::optional(ScopeRates{wanted.shift_mm / seconds, wanted.turn_rad / seconds});
+  const auto drive =
+      rests ? std::nullopt : std::optional(ScopeRates{wanted.shift_mm / seconds, wanted.turn_rad / seconds});
   move(view_, arm.advance(drive, seconds));
 }
 
@@ -211,4 +212,4 @@ void ScopeControl::advance(double seconds) {
   }
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

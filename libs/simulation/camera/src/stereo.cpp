@@ -16,7 +16,8 @@ double convergence_mm(const ScopeView& view, const StereoParams& stereo) {
 StereoEye stereo_eye(const ScopeView& view, const StereoParams& stereo, const PictureArea& area, int eye) {
   const double side = ((eye == 0) == stereo.swap ? 0.5 : -0.5) * stereo.base_mm;
   // Half of what the picture shows across, where the two agree.
-  const double half_mm = convergence_mm(view, stereo) / view.working_distance_mm * area.width / 2 / view.pixels_per_mm(area);
+  const double half_mm =
+      convergence_mm(view, stereo) / view.working_distance_mm * area.width / 2 / view.pixels_per_mm(area);
   return {view.eye_mm() + view.right() * side, -side / half_mm};
 }
 
@@ -67,4 +68,4 @@ std::array<double, 2> unsqueezed(StereoMode mode, const PictureArea& area, doubl
   return {x, y};
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -47,4 +47,4 @@ std::optional<ScopeView> view_of_note(std::string_view json) {
   return view;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

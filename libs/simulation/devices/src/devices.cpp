@@ -55,9 +55,14 @@ Vec3 extrapolate(const ForcePlane& p, Vec3 position_mm, std::int64_t now_ns, dou
   return force * (share * (n > most ? most / n : 1.0));
 }
 
-SpaceMouseDevice::SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal,
-                                   std::size_t hand)
-    : TunedHand(hand), goal_(start), tool_(start.tool), rotation_(rotation), pedal_(pedal), link_(std::move(open), *this, 100) {}
+SpaceMouseDevice::SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation,
+                                   const FootPedal* pedal, std::size_t hand)
+    : TunedHand(hand),
+      goal_(start),
+      tool_(start.tool),
+      rotation_(rotation),
+      pedal_(pedal),
+      link_(std::move(open), *this, 100) {}
 
 void SpaceMouseDevice::report(HidPort&, std::span<const std::byte> report) {
   if (!decode_space_mouse(report, own_.state)) return;
@@ -78,10 +83,12 @@ DeviceSample SpaceMouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) no
   const std::uint32_t switches = pedal_ != nullptr ? pedal_->pressed() : 0;
   SpaceMouseState s = lent ? SpaceMouseState{} : last_.state;
   if (t.clutch || (switches & t.clutch_switches) != 0) s.move = s.turn = {};
-  const Vec3 move{shaped(s.move[0]), shaped(s.move[1]), shaped(s.move[2])}, turn{shaped(s.turn[0]), shaped(s.turn[1]), shaped(s.turn[2])};
+  const Vec3 move{shaped(s.move[0]), shaped(s.move[1]), shaped(s.move[2])},
+      turn{shaped(s.turn[0]), shaped(s.turn[1]), shaped(s.turn[2])};
   goal_.position_mm += rotation_ * (move * (kFullMmPerS * t.scale * dt_s));
   if (const double rate = length(turn); rate > 0)
-    goal_.axis = to_floats(normalized(turned(from_floats(goal_.axis), rotation_ * (turn / rate), rate * kFullRadPerS * dt_s)));
+    goal_.axis =
+        to_floats(normalized(turned(from_floats(goal_.axis), rotation_ * (turn / rate), rate * kFullRadPerS * dt_s)));
   goal_.tool = tool_;
   goal_.pedal = lent ? 0 : pedal_of(t, s.buttons, switches);
   DeviceSample sample = hand_.step(goal_, dt_s, force_n);
@@ -94,8 +101,8 @@ DeviceMotion SpaceMouseDevice::motion() const noexcept {
   return motion_of(shared_.load().state);
 }
 
-WoodenHapticsDevice::WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool,
-                                         const FootPedal* pedal, std::size_t hand)
+WoodenHapticsDevice::WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry,
+                                         const WorkspaceMap& map, int tool, const FootPedal* pedal, std::size_t hand)
     : TunedHand(hand),
       geometry_(geometry),
       kinematics_(geometry),
@@ -127,7 +134,8 @@ void WoodenHapticsDevice::report(HidPort& port, std::span<const std::byte> bytes
     return;
   }
   newest_angles_rad_ = kinematics_.angles_rad(r.encoder);
-  newest_ = {kinematics_.position_mm(newest_angles_rad_), kinematics_.axis(newest_angles_rad_, r.encoder), r.button, monotonic_ns()};
+  newest_ = {kinematics_.position_mm(newest_angles_rad_), kinematics_.axis(newest_angles_rad_, r.encoder), r.button,
+             monotonic_ns()};
   pose_.store(newest_);
   ForcePlane plane;
   if (!force_.try_load(plane)) plane = {};
@@ -206,4 +214,4 @@ std::vector<FoundDevice> find_devices() {
   return found;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

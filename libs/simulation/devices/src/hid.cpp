@@ -76,8 +76,8 @@ std::vector<HidInfo> list_hid() {
   std::vector<HidInfo> all;
   hid_device_info* const first = hid_enumerate(0, 0);
   for (const hid_device_info* d = first; d != nullptr; d = d->next) {
-    all.push_back({d->path != nullptr ? d->path : "", d->vendor_id, d->product_id, d->usage_page, d->usage, d->interface_number,
-                   narrow(d->product_string), narrow(d->serial_number)});
+    all.push_back({d->path != nullptr ? d->path : "", d->vendor_id, d->product_id, d->usage_page, d->usage,
+                   d->interface_number, narrow(d->product_string), narrow(d->serial_number)});
   }
   hid_free_enumeration(first);
   std::sort(all.begin(), all.end(), [](const HidInfo& a, const HidInfo& b) { return a.path < b.path; });
@@ -87,7 +87,8 @@ std::vector<HidInfo> list_hid() {
 std::unique_ptr<HidPort> open_hid(const HidInfo& info, std::string& why) {
   start_hidapi();
   if (hid_device* const d = hid_open_path(info.path.c_str())) return std::make_unique<KernelPort>(d);
-  why = "cannot open " + info.path + (::access(info.path.c_str(), R_OK | W_OK) != 0 && errno == EACCES ? ": no permission" : "");
+  why = "cannot open " + info.path +
+        (::access(info.path.c_str(), R_OK | W_OK) != 0 && errno == EACCES ? ": no permission" : "");
   return nullptr;
 }
 
@@ -109,10 +110,12 @@ HidRecording load_hid_recording(const fs::path& path) {
     if (line.size() < 3 || line[1] != ':') continue;  // comments and what is not needed here
     std::istringstream words(line.substr(2));
     if (line[0] == 'N') {
-      r.info.name = line.substr(line.find_first_not_of(' ', 2) == std::string::npos ? 2 : line.find_first_not_of(' ', 2));
+      r.info.name =
+          line.substr(line.find_first_not_of(' ', 2) == std::string::npos ? 2 : line.find_first_not_of(' ', 2));
     } else if (line[0] == 'I') {
       unsigned bus = 0, vendor = 0, product = 0;
-      if (!(words >> std::hex >> bus >> vendor >> product) || vendor > 0xffff || product > 0xffff) refuse("no bus, vendor and product");
+      if (!(words >> std::hex >> bus >> vendor >> product) || vendor > 0xffff || product > 0xffff)
+        refuse("no bus, vendor and product");
       r.info.vendor = static_cast<std::uint16_t>(vendor);
       r.info.product = static_cast<std::uint16_t>(product);
     } else if (line[0] == 'E') {
@@ -122,7 +125,8 @@ HidRecording load_hid_recording(const fs::path& path) {
       words >> std::hex;
       for (std::size_t i = 0; i < length; ++i) {
         unsigned byte = 0;
-        if (!(words >> byte) || byte > 0xff) refuse("byte " + std::to_string(i + 1) + " of " + std::to_string(length) + " is missing");
+        if (!(words >> byte) || byte > 0xff)
+          refuse("byte " + std::to_string(i + 1) + " of " + std::to_string(length) + " is missing");
         e.report.push_back(static_cast<std::byte>(byte));
       }
       r.events.push_back(std::move(e));
@@ -131,4 +135,4 @@ HidRecording load_hid_recording(const fs::path& path) {
   return r;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

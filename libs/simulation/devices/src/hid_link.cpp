@@ -8,7 +8,8 @@
 
 namespace osteo::inline simulation {
 
-HidLink::HidLink(Open open, HidHandler& handler, int timeout_ms) : open_(std::move(open)), handler_(handler), timeout_ms_(timeout_ms) {
+HidLink::HidLink(Open open, HidHandler& handler, int timeout_ms)
+    : open_(std::move(open)), handler_(handler), timeout_ms_(timeout_ms) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -88,4 +89,4 @@ HidLink::Open open_first(std::function<bool(const HidInfo&)> wanted, int before)
   };
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

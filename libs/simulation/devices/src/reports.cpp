@@ -21,11 +21,14 @@ constexpr Known kKnown[] = {
     {0x046d, 0xc625, DeviceModel::space_mouse},    // SpacePilot
     {0x256f, 0xc635, DeviceModel::space_mouse},    // SpaceMouse Compact
     {0x256f, 0xc641, DeviceModel::space_mouse},    // SpaceMouse
-    {0x256f, 0xc62e, DeviceModel::space_mouse_wireless}, {0x256f, 0xc63a, DeviceModel::space_mouse_wireless},
-    {0x256f, 0xc632, DeviceModel::space_mouse_wireless},                                                       // Pro Wireless
-    {0x256f, 0xc638, DeviceModel::space_mouse_wireless}, {0x256f, 0xc633, DeviceModel::space_mouse_wireless},  // Enterprise
-    {0x256f, 0xc652, DeviceModel::space_mouse_wireless},                                                       // receiver
-    {0x05f3, 0x00ff, DeviceModel::pedal_infinity},       {0x0c45, 0x7403, DeviceModel::pedal_pcsensor},
+    {0x256f, 0xc62e, DeviceModel::space_mouse_wireless},
+    {0x256f, 0xc63a, DeviceModel::space_mouse_wireless},
+    {0x256f, 0xc632, DeviceModel::space_mouse_wireless},  // Pro Wireless
+    {0x256f, 0xc638, DeviceModel::space_mouse_wireless},
+    {0x256f, 0xc633, DeviceModel::space_mouse_wireless},  // Enterprise
+    {0x256f, 0xc652, DeviceModel::space_mouse_wireless},  // receiver
+    {0x05f3, 0x00ff, DeviceModel::pedal_infinity},
+    {0x0c45, 0x7403, DeviceModel::pedal_pcsensor},
 };
 
 int int16_at(std::span<const std::byte> r, std::size_t at) {
@@ -41,8 +44,8 @@ void put_int16(std::span<std::byte> r, std::size_t at, int value) {
 }  // namespace
 
 DeviceModel model_of(std::uint16_t vendor, std::uint16_t product) {
-  const auto* const k =
-      std::find_if(std::begin(kKnown), std::end(kKnown), [&](const Known& c) { return c.vendor == vendor && c.product == product; });
+  const auto* const k = std::find_if(std::begin(kKnown), std::end(kKnown),
+                                     [&](const Known& c) { return c.vendor == vendor && c.product == product; });
   return k != std::end(kKnown) ? k->model : DeviceModel::unknown;
 }
 
@@ -118,8 +121,8 @@ bool decode_woodenhaptics(std::span<const std::byte> r, WoodenHapticsReport& res
   return true;
 }
 
-std::vector<std::byte> encode_woodenhaptics(std::array<double, 3> current_ma, WoodenHapticsCommand command, std::array<int, 3> attributes,
-                                            std::size_t size) {
+std::vector<std::byte> encode_woodenhaptics(std::array<double, 3> current_ma, WoodenHapticsCommand command,
+                                            std::array<int, 3> attributes, std::size_t size) {
   std::vector<std::byte> r(std::max<std::size_t>(size, 15));
   for (std::size_t m = 0; m < 3; ++m) {
     const double ma = std::isfinite(current_ma[m]) ? current_ma[m] : 0;
@@ -130,7 +133,8 @@ std::vector<std::byte> encode_woodenhaptics(std::array<double, 3> current_ma, Wo
   return r;
 }
 
-bool decode_woodenhaptics_command(std::span<const std::byte> r, std::array<double, 3>& current_ma, WoodenHapticsCommand& command) {
+bool decode_woodenhaptics_command(std::span<const std::byte> r, std::array<double, 3>& current_ma,
+                                  WoodenHapticsCommand& command) {
   if (r.size() < 15) return false;
   for (std::size_t m = 0; m < 3; ++m) current_ma[m] = int16_at(r, 1 + 2 * m);
   command = static_cast<WoodenHapticsCommand>(int16_at(r, 7));
@@ -144,4 +148,4 @@ std::array<std::byte, 14> encode_woodenhaptics_report(const std::array<int, 6>& 
   return r;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -24,8 +24,8 @@ WoodenHapticsGeometry load_woodenhaptics(const fs::path& path) {
   fields.push_back({{"osteotome_woodenhaptics", "version of the format", "", 1, 1, true}, &version});
   file.read(file.root(), "", fields);
   for (std::size_t a = 0; a < 3; ++a) {
-    if (!(g.capstan_diameter_mm[a] > 0) || !(g.body_diameter_mm[a] > 0) || !(g.link_mm[a] > 0) || !(g.counts_a_turn[a] > 0) ||
-        !(g.torque_constant_nm_per_a[a] > 0) || !(g.gimbal_counts_a_turn[a] > 0))
+    if (!(g.capstan_diameter_mm[a] > 0) || !(g.body_diameter_mm[a] > 0) || !(g.link_mm[a] > 0) ||
+        !(g.counts_a_turn[a] > 0) || !(g.torque_constant_nm_per_a[a] > 0) || !(g.gimbal_counts_a_turn[a] > 0))
       throw Error(ExitCode::usage, name + ": diameters, links, counts and torque constants must be above 0");
   }
   return g;
@@ -52,7 +52,8 @@ Mat3 WoodenHapticsKinematics::jacobian_mm(Vec3 q) const {
 
 Vec3 WoodenHapticsKinematics::axis(Vec3 q, const std::array<int, 6>& encoder) const {
   // Yaw and pitch of the stylus against the forearm's plane; roll does not move a burr's axis.
-  const double yaw = q.x + kTurn * encoder[3] / g_.gimbal_counts_a_turn[0], pitch = kTurn * encoder[4] / g_.gimbal_counts_a_turn[1];
+  const double yaw = q.x + kTurn * encoder[3] / g_.gimbal_counts_a_turn[0],
+               pitch = kTurn * encoder[4] / g_.gimbal_counts_a_turn[1];
   return {-std::cos(yaw) * std::cos(pitch), -std::sin(yaw) * std::cos(pitch), std::sin(pitch)};
 }
 
@@ -74,7 +75,8 @@ std::array<double, 3> WoodenHapticsKinematics::currents_ma(Vec3 q, Vec3 force_n)
 
 Vec3 WoodenHapticsKinematics::force_n(Vec3 q, const std::array<double, 3>& current_ma) const {
   Vec3 torque_nmm;
-  for (std::size_t a = 0; a < 3; ++a) torque_nmm[a] = current_ma[a] / 1000 * g_.torque_constant_nm_per_a[a] * gear(a) * 1000;
+  for (std::size_t a = 0; a < 3; ++a)
+    torque_nmm[a] = current_ma[a] / 1000 * g_.torque_constant_nm_per_a[a] * gear(a) * 1000;
   return inverse(transposed(jacobian_mm(q))) * torque_nmm;
 }
 
@@ -83,12 +85,14 @@ std::optional<std::array<int, 6>> WoodenHapticsKinematics::encoders(Vec3 p) cons
   const double lb = g_.link_mm[1], lc = g_.link_mm[2], r = std::hypot(x, y), d2 = r * r + z * z, d = std::sqrt(d2);
   if (d >= lb + lc || d <= std::abs(lb - lc)) return std::nullopt;
   // In the arm's plane: lb at B from the vertical, then lc; its direction from the vertical is pi - C.
-  const double towards = std::atan2(r, z), bend = std::acos(std::clamp((lb * lb + d2 - lc * lc) / (2 * lb * d), -1.0, 1.0));
+  const double towards = std::atan2(r, z),
+               bend = std::acos(std::clamp((lb * lb + d2 - lc * lc) / (2 * lb * d), -1.0, 1.0));
   const double b = towards - bend, c = std::numbers::pi - std::atan2(r - lb * std::sin(b), z - lb * std::cos(b));
   const double angle[3] = {std::atan2(y, x), b, c};
   std::array<int, 6> counts{};
   for (std::size_t a = 0; a < 3; ++a)
-    counts[a] = static_cast<int>(std::lround((angle[a] - g_.zero_angle_rad[a]) / kTurn * g_.counts_a_turn[a] * gear(a)));
+    counts[a] =
+        static_cast<int>(std::lround((angle[a] - g_.zero_angle_rad[a]) / kTurn * g_.counts_a_turn[a] * gear(a)));
   return counts;
 }
 
@@ -96,8 +100,9 @@ double WoodenHapticsKinematics::resolution_mm() const {
   const Vec3 q{g_.zero_angle_rad[0], g_.zero_angle_rad[1], g_.zero_angle_rad[2]};
   const Mat3 j = jacobian_mm(q);
   double most = 0;
-  for (std::size_t a = 0; a < 3; ++a) most = std::max(most, length(j.column[a]) * kTurn / g_.counts_a_turn[a] / gear(a));
+  for (std::size_t a = 0; a < 3; ++a)
+    most = std::max(most, length(j.column[a]) * kTurn / g_.counts_a_turn[a] / gear(a));
   return most;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -15,10 +15,12 @@ std::size_t most_hits(double spacing_mm) {
     const double r = head.largest_radius_mm() + spacing_mm;
     most = std::max(most, RoundCone{0, head.length_mm, r, r}.volume_mm3());
   }
-  return static_cast<std::size_t>(std::min(most / (spacing_mm * spacing_mm * spacing_mm), 4.0 * kMostCutPerTick)) + 1024;
+  return static_cast<std::size_t>(std::min(most / (spacing_mm * spacing_mm * spacing_mm), 4.0 * kMostCutPerTick)) +
+         1024;
 }
 
-std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm, std::span<const std::size_t> tools) {
+std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm,
+                                                 std::span<const std::size_t> tools) {
   switch (params.method) {
     case ContactMethod::rays:
       return std::make_unique<RaySampling>(params, spacing_mm);
@@ -36,8 +38,8 @@ std::string too_small_for_voxels(const Burr& burr, double spacing_mm) {
   const double voxels = std::min(head.start_radius_mm, head.end_radius_mm) / spacing_mm;
   if (voxels >= kLeastRadiusVoxels) return {};
   return "the " + burr.name() + (burr.length_mm > 0 ? " is small for" : " burr is small for") + " voxels of " +
-         format_number(std::round(spacing_mm * 1000) / 1000) + " mm (radius " + format_number(std::round(voxels * 10) / 10) +
-         " voxels): force and its direction are coarse; from " +
+         format_number(std::round(spacing_mm * 1000) / 1000) + " mm (radius " +
+         format_number(std::round(voxels * 10) / 10) + " voxels): force and its direction are coarse; from " +
          format_number(std::floor(spacing_mm * voxels / kLeastRadiusVoxels * 100 + 1e-6) / 100) +
          " mm they are true: prepare with a smaller --spacing, or a finer region of interest where it drills";
 }
@@ -48,8 +50,9 @@ Removal::Removal(const BrickGrid& bone)
       weights_(reached_.size()),
       changes_(most_hits(bone.frame().spacing_mm.x)) {}
 
-std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n, double speed_rpm,
-                                             double dt_s, const Hardness* hardness, double& removed_mm3, std::size_t hand) noexcept {
+std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n,
+                                             double speed_rpm, double dt_s, const Hardness* hardness,
+                                             double& removed_mm3, std::size_t hand) noexcept {
   removed_mm3 = 0;
   if (cut.hits.empty()) return {};
   grains_.place(bone, burr.head(), cut.at_mm, cut.axis, cut.in_turns, hand);
@@ -59,7 +62,8 @@ std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, co
     const float density = bone.value(h.voxel);
     reached_[i] = density - grains_.reach(bone, h.voxel, h.share);
     if (!(reached_[i] > 0)) continue;
-    const double here = static_cast<double>(std::min(density * h.share, reached_[i])), w = here * static_cast<double>(h.efficiency);
+    const double here = static_cast<double>(std::min(density * h.share, reached_[i])),
+                 w = here * static_cast<double>(h.efficiency);
     may_go += here;
     listed += w;
     weights_[i] = hardness != nullptr ? w / static_cast<double>(hardness->at(h.voxel)) : w;
@@ -87,4 +91,4 @@ std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, co
   return {changes_.data(), changed};
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -27,7 +27,8 @@ class HeadOverlap {
  public:
   explicit HeadOverlap(double spacing_mm);
   /// With `cutting`, cut() is what it would take there.
-  const OverlapResult& measure(const BrickGrid& bone, const Grains* known, std::size_t tool, Vec3 at_mm, Vec3 axis, bool cutting) noexcept;
+  const OverlapResult& measure(const BrickGrid& bone, const Grains* known, std::size_t tool, Vec3 at_mm, Vec3 axis,
+                               bool cutting) noexcept;
   [[nodiscard]] const OverlapResult& last() const { return last_; }
   [[nodiscard]] Cut cut() const noexcept;
 
@@ -41,7 +42,8 @@ class HeadOverlap {
   std::uint32_t stride_ = 1, phase_ = 0;
 };
 
-/// Beside samples, which know of densities alone: the exact overlap of the head, for what it cuts and for where burrs have been.
+/// Beside samples, which know of densities alone: the exact overlap of the head, for what it cuts and for where burrs
+/// have been.
 class SampledHead {
  public:
   explicit SampledHead(double spacing_mm) : overlap_(spacing_mm) {}
@@ -56,8 +58,8 @@ class SampledHead {
   bool measured_ = false;
 };
 
-/// Exact overlap: the stiffness law of the depth of a flat cut of the same volume, against the gradient of the overlap. Where pushes from
-/// opposite sides cancel, as between two walls, so does the force.
+/// Exact overlap: the stiffness law of the depth of a flat cut of the same volume, against the gradient of the overlap.
+/// Where pushes from opposite sides cancel, as between two walls, so does the force.
 class ExactOverlap final : public ContactModel {
  public:
   ExactOverlap(const ContactParams& params, double spacing_mm);
@@ -70,10 +72,11 @@ class ExactOverlap final : public ContactModel {
 };
 
 /// The law of ExactOverlap; all but what was immersed.
-[[nodiscard]] ContactResult contact_of_overlap(const ContactParams& params, std::size_t tool, const OverlapResult& overlap,
-                                               Vec3 axis) noexcept;
+[[nodiscard]] ContactResult contact_of_overlap(const ContactParams& params, std::size_t tool,
+                                               const OverlapResult& overlap, Vec3 axis) noexcept;
 
-/// The share of a flat cut's push that is left when parts of the surface push against each other: 1 on flat bone, 0 between two walls.
+/// The share of a flat cut's push that is left when parts of the surface push against each other: 1 on flat bone, 0
+/// between two walls.
 [[nodiscard]] inline double push_left(const OverlapResult& o, double depth_mm, const RoundCone& shape) {
   // Of a flat cut: 1 - d / 2r for a ball, more for sides; down to 0.4 where the slenderest end is in.
   const double flat = std::max(0.4, 1 - depth_mm / (2 * std::min(shape.start_radius_mm, shape.end_radius_mm)));
@@ -105,8 +108,8 @@ class BurrProxy final : public ContactModel {
   Vec3 axis_;
 };
 
-/// The thesis' volume sampling (section 3.2.3.4 to 3.2.3.6): each sample of the burr's volume that lies in bone pushes it
-/// towards the burr's axis with unit strength, here times the bone's density there. The sum gives the direction; the
+/// The thesis' volume sampling (section 3.2.3.4 to 3.2.3.6): each sample of the burr's volume that lies in bone pushes
+/// it towards the burr's axis with unit strength, here times the bone's density there. The sum gives the direction; the
 /// magnitude is a two-gain function of the immersed volume, taken through the depth of a flat cut of that volume, so
 /// that stiffness is in N/mm whatever the burr; unlike the thesis' it is continuous. About 12 ns a sample.
 class VolumeSampling final : public ContactModel {
@@ -128,8 +131,9 @@ class VolumeSampling final : public ContactModel {
   SampledHead head_;
 };
 
-/// The thesis' first method (section 3.2.3.4, after Petersik 2002): samples of the burr's surface, each traced towards the axis until it
-/// leaves the bone. The sum of the penetrations, each along its ray, is the immersed volume and the direction of its push.
+/// The thesis' first method (section 3.2.3.4, after Petersik 2002): samples of the burr's surface, each traced towards
+/// the axis until it leaves the bone. The sum of the penetrations, each along its ray, is the immersed volume and the
+/// direction of its push.
 class RaySampling final : public ContactModel {
  public:
   RaySampling(const ContactParams& params, double spacing_mm);
@@ -142,4 +146,4 @@ class RaySampling final : public ContactModel {
   SampledHead head_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -30,7 +30,8 @@ DeviceSample SpringHand::step(const HandGoal& goal, double dt_s, Vec3 force_n) n
   Vec3 pull = (goal.position_mm - position_mm_) * kSpringNPerMm;
   if (const double n = length(pull); n > kMaxHandN) pull = pull * (kMaxHandN / n);
   Vec3 total = pull + force_n;
-  if (!std::isfinite(dot(total, total))) total = {};  // a goal or force that is no number must not lose the hand for good
+  if (!std::isfinite(dot(total, total)))
+    total = {};  // a goal or force that is no number must not lose the hand for good
   total -= velocity_mm_s_ * damping_n_s_per_mm;
   velocity_mm_s_ += total * (1000 * dt_s / kMassKg);
   position_mm_ += velocity_mm_s_ * dt_s;
@@ -144,7 +145,8 @@ HandGoal goal_at(const Strokes& strokes, double t_s, std::size_t& leg) noexcept 
   HandGoal goal;
   goal.tool = static_cast<std::uint8_t>(strokes.tool);
   goal.axis = to_floats(strokes.axis);
-  if (w[leg].drill_on && leg + 1 < w.size()) goal.pedal = static_cast<std::uint8_t>(std::lround(255 * std::clamp(w[leg].pedal, 0.0, 1.0)));
+  if (w[leg].drill_on && leg + 1 < w.size())
+    goal.pedal = static_cast<std::uint8_t>(std::lround(255 * std::clamp(w[leg].pedal, 0.0, 1.0)));
   goal.position_mm = w[leg].at_mm;
   if (leg + 1 < w.size()) {
     const double s = std::clamp((t_s - w[leg].t_s) / (w[leg + 1].t_s - w[leg].t_s), 0.0, 1.0);
@@ -157,4 +159,4 @@ DeviceSample ScriptedDevice::read(std::uint64_t tick, double dt_s, Vec3 force_n)
   return hand_.step(goal_at(strokes_, static_cast<double>(tick) / rate_hz_, leg_), dt_s, force_n);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

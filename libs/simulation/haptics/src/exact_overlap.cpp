@@ -8,7 +8,8 @@
 namespace osteo::inline simulation {
 namespace {
 
-// A saw with a shell as thick would rest on the shoulders of its own kerf; without any it would leave bone beside it: measured, a quarter.
+// A saw with a shell as thick would rest on the shoulders of its own kerf; without any it would leave bone beside it:
+// measured, a quarter.
 RoundCone shell_of(const Instrument& held, double spacing_mm) {
   RoundCone head = held.head;
   const double grow = (held.kind == InstrumentKind::saw ? 0.25 : 0.5) * spacing_mm;
@@ -24,11 +25,12 @@ const CutDepth& shell_depth(double spacing_mm, std::size_t tool) {
   const std::lock_guard lock(mutex);
   const auto key = std::pair(spacing_mm, tool);
   const auto it = known.find(key);
-  return it != known.end() ? it->second : known.try_emplace(key, shell_of(instrument_library()[tool], spacing_mm)).first->second;
+  return it != known.end() ? it->second
+                           : known.try_emplace(key, shell_of(instrument_library()[tool], spacing_mm)).first->second;
 }
 
-// How far the teeth of a proxy reach, in voxels; and how much deeper than by what they have before them the hand may be: on flat bone that
-// is as deep as it is.
+// How far the teeth of a proxy reach, in voxels; and how much deeper than by what they have before them the hand may
+// be: on flat bone that is as deep as it is.
 constexpr double kTeeth = 0.75, kTeethTell = 1.25;
 // A proxy that is no farther off the surface than this share of its shell rests on it.
 constexpr double kOnIt = 0.5;
@@ -49,15 +51,16 @@ HeadOverlap::HeadOverlap(double spacing_mm) : strides_(strides_for(spacing_mm)),
   for (const Instrument& i : instrument_library()) heads_.push_back(i.head);
 }
 
-const OverlapResult& HeadOverlap::measure(const BrickGrid& bone, const Grains* known, std::size_t tool, Vec3 at_mm, Vec3 axis,
-                                          bool cutting) noexcept {
+const OverlapResult& HeadOverlap::measure(const BrickGrid& bone, const Grains* known, std::size_t tool, Vec3 at_mm,
+                                          Vec3 axis, bool cutting) noexcept {
   last_ = {};
   cutting_ = cutting && finite(at_mm);
   if (!finite(at_mm)) return last_;
   at_mm_ = at_mm;
   axis_ = axis;
   stride_ = strides_[tool];
-  last_ = overlap_.measure(bone, heads_[tool], at_mm, axis, known, cutting, instrument_library()[tool].falloff_per_rad, stride_, phase_++);
+  last_ = overlap_.measure(bone, heads_[tool], at_mm, axis, known, cutting, instrument_library()[tool].falloff_per_rad,
+                           stride_, phase_++);
   return last_;
 }
 
@@ -79,7 +82,8 @@ ContactResult ExactOverlap::contact(const BrickGrid& bone, const DeviceSample& p
   return r;
 }
 
-ContactResult contact_of_overlap(const ContactParams& params, std::size_t tool, const OverlapResult& overlap, Vec3 axis) noexcept {
+ContactResult contact_of_overlap(const ContactParams& params, std::size_t tool, const OverlapResult& overlap,
+                                 Vec3 axis) noexcept {
   ContactResult r;
   r.bone_mm3 = overlap.bone_mm3;
   const double pressed = length(overlap.area_mm2);
@@ -101,10 +105,15 @@ Cut ExactOverlap::cut(const BrickGrid&) noexcept {
 }
 
 BurrProxy::BurrProxy(const ContactParams& params, double spacing_mm, std::span<const std::size_t> tools)
-    : ContactModel(params), spacing_mm_(spacing_mm), shell_depths_(instrument_library().size()), overlap_(0), head_(spacing_mm) {
+    : ContactModel(params),
+      spacing_mm_(spacing_mm),
+      shell_depths_(instrument_library().size()),
+      overlap_(0),
+      head_(spacing_mm) {
   for (const Instrument& i : instrument_library()) shells_.push_back(shell_of(i, spacing_mm));
   for (std::size_t tool = 0; tool < shells_.size(); ++tool) {
-    if (tools.empty() || std::find(tools.begin(), tools.end(), tool) != tools.end()) shell_depths_[tool] = &shell_depth(spacing_mm, tool);
+    if (tools.empty() || std::find(tools.begin(), tools.end(), tool) != tools.end())
+      shell_depths_[tool] = &shell_depth(spacing_mm, tool);
   }
 }
 
@@ -116,8 +125,8 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   if (!finite(at)) return r;
   if (tool_ != tool_of(pose)) proxy_.forget();
   tool_ = tool_of(pose);
-  // The proxy is a shell around the burr, half a voxel thick, that bone fills to exactly its depth: the cut of a shell that deep is
-  // measured well, where a bare touch would be lost in the voxels.
+  // The proxy is a shell around the burr, half a voxel thick, that bone fills to exactly its depth: the cut of a shell
+  // that deep is measured well, where a bare touch would be lost in the voxels.
   const double shell = 0.5 * spacing_mm_;
   if (shell_depths_[tool_] == nullptr) return r;
   const CutDepth& depths = *shell_depths_[tool_];
@@ -129,8 +138,8 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
     Clearance c;
     const double pressed = length(there.area_mm2);
     if (!(pressed > 0)) {
-      // No voxel with bone is touched: half a voxel further on it still does not reach the burr. Or bone on all sides alike: then back to
-      // where it came from.
+      // No voxel with bone is touched: half a voxel further on it still does not reach the burr. Or bone on all sides
+      // alike: then back to where it came from.
       c.value_mm = there.bone_mm3 > 0 ? -shell : shell;
       c.gradient = c.normal = there.bone_mm3 > 0 ? normalized(proxy_.position_mm() - at) : Vec3{0, 0, 1};
       if (length(c.normal) == 0) c.gradient = c.normal = axis_;
@@ -138,8 +147,8 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
     }
     c.normal = there.area_mm2 * (-1 / pressed);
     const double cosine = -dot(c.normal, axis_), flat_depth = depths(there.sharp_mm3, cosine);
-    // In a hollow of the burr's own shape there is more surface for the same volume than on flat bone, where the depth is twice the mean
-    // thickness of what lies in the shell: there it goes by that thickness.
+    // In a hollow of the burr's own shape there is more surface for the same volume than on flat bone, where the depth
+    // is twice the mean thickness of what lies in the shell: there it goes by that thickness.
     const double hollow = 3 / std::max(there.surface_mm2, 1e-9), depth = std::min(flat_depth, hollow * there.sharp_mm3);
     c.value_mm = shell - depth;
     // And it grows faster: the step out is then the shorter.
@@ -171,7 +180,8 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   if (cutting_) r.depth_mm = std::min(r.depth_mm, teeth(bone, answer.proxy_mm, -offset, normal));
   const double law = params_.force_n(r.depth_mm);
   r.force_n = normalized(offset) * law;
-  // A burr that turns has no friction: all walls that it rests on together push against the hand, and all of that presses on it.
+  // A burr that turns has no friction: all walls that it rests on together push against the hand, and all of that
+  // presses on it.
   r.normal = cutting_ ? normalized(offset) : normal;
   r.normal_force_n = std::max(0.0, dot(r.force_n, r.normal));
   if (!(where == answer.proxy_mm)) static_cast<void>(field(answer.proxy_mm));
@@ -183,11 +193,13 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   return r;
 }
 
-// The teeth reach a little beyond where the proxy rests, towards the hand but never past it; into what they take there it sinks. Where there
-// is nothing to take so near, they reach farther. Tells how deep the hand is in bone by what the teeth have before them: a shell that rests on
-// bone beside the burr is no reason to press where nothing is left to take.
+// The teeth reach a little beyond where the proxy rests, towards the hand but never past it; into what they take there
+// it sinks. Where there is nothing to take so near, they reach farther. Tells how deep the hand is in bone by what the
+// teeth have before them: a shell that rests on bone beside the burr is no reason to press where nothing is left to
+// take.
 double BurrProxy::teeth(const BrickGrid& bone, Vec3 proxy_mm, Vec3 to_hand_mm, Vec3 normal) noexcept {
-  const double far = length(to_hand_mm), usual = kTeeth * spacing_mm_, reach = std::min(far, std::max(teeth_mm_, usual));
+  const double far = length(to_hand_mm), usual = kTeeth * spacing_mm_,
+               reach = std::min(far, std::max(teeth_mm_, usual));
   const Vec3 at = far > 0 ? proxy_mm + to_hand_mm * (reach / far) : proxy_mm;
   const OverlapResult& there = head_.measure(bone, known_, tool_, at, axis_, true);
   const bool nothing = known_ != nullptr && !(there.sharp_mm3 > 0);
@@ -200,4 +212,4 @@ Cut BurrProxy::cut(const BrickGrid&) noexcept {
   return cutting_ ? head_.cut() : Cut{};
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

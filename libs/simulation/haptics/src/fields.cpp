@@ -112,7 +112,8 @@ Clearance CubicField::operator()(Vec3 world_mm) const {
     if (!(x[a] >= 1 && x[a] <= last + 1)) {
       // Beyond the grid: free, and as far as it is from the box.
       Vec3 out;
-      for (std::size_t c = 0; c < 3; ++c) out[c] = x[c] - std::clamp(x[c], 1.0, static_cast<double>(frame_.dims[c] - 2));
+      for (std::size_t c = 0; c < 3; ++c)
+        out[c] = x[c] - std::clamp(x[c], 1.0, static_cast<double>(frame_.dims[c] - 2));
       const double n = std::max(length(out), 1e-9);
       Clearance c;
       c.normal = c.gradient = frame_.direction * (out / n);
@@ -126,9 +127,10 @@ Clearance CubicField::operator()(Vec3 world_mm) const {
     else
       weights(t, w[a], d[a]);
   }
-  const std::size_t row = static_cast<std::size_t>(frame_.dims[0]), layer = row * static_cast<std::size_t>(frame_.dims[1]);
-  const float* const base = values_.data() + static_cast<std::size_t>(lo[2] - 1) * layer + static_cast<std::size_t>(lo[1] - 1) * row +
-                            static_cast<std::size_t>(lo[0] - 1);
+  const std::size_t row = static_cast<std::size_t>(frame_.dims[0]),
+                    layer = row * static_cast<std::size_t>(frame_.dims[1]);
+  const float* const base = values_.data() + static_cast<std::size_t>(lo[2] - 1) * layer +
+                            static_cast<std::size_t>(lo[1] - 1) * row + static_cast<std::size_t>(lo[0] - 1);
   F4 plain{}, along_y{}, along_z{};
   for (std::size_t k = 0; k < 4; ++k) {
     F4 sum{}, slope{};
@@ -142,7 +144,9 @@ Clearance CubicField::operator()(Vec3 world_mm) const {
     along_y += slope * w[2][k];
     along_z += sum * d[2][k];
   }
-  const auto dot4 = [](F4 a, const float* b) { return static_cast<double>((a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])); };
+  const auto dot4 = [](F4 a, const float* b) {
+    return static_cast<double>((a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]));
+  };
   Clearance c;
   c.value_mm = dot4(plain, w[0]) - radius_mm_;
   c.gradient = frame_.direction * (Vec3{dot4(plain, d[0]), dot4(along_y, w[0]), dot4(along_z, w[0])} / h);
@@ -190,10 +194,12 @@ Clearance MeshField::operator()(Vec3 x) const {
     case Feature::edge_ab:
     case Feature::edge_bc:
     case Feature::edge_ca:
-      outward = edge_normal_[near.triangle][static_cast<std::size_t>(near.feature) - static_cast<std::size_t>(Feature::edge_ab)];
+      outward = edge_normal_[near.triangle]
+                            [static_cast<std::size_t>(near.feature) - static_cast<std::size_t>(Feature::edge_ab)];
       break;
     default:
-      outward = corner_normal_[tri[static_cast<std::size_t>(near.feature) - static_cast<std::size_t>(Feature::corner_a)]];
+      outward =
+          corner_normal_[tri[static_cast<std::size_t>(near.feature) - static_cast<std::size_t>(Feature::corner_a)]];
   }
   const Vec3 away = x - near.point_mm;
   const double sign = dot(away, outward) < 0 ? -1 : 1;
@@ -208,8 +214,10 @@ Clearance MeshField::operator()(Vec3 x) const {
     const Vec3 whole = cross(b - a, d - a);
     const double area2 = dot(whole, whole);
     if (area2 > 0) {
-      const double wb = dot(cross(near.point_mm - a, d - a), whole) / area2, wd = dot(cross(b - a, near.point_mm - a), whole) / area2;
-      const Vec3 n = normalized(corner_normal_[tri[0]] * (1 - wb - wd) + corner_normal_[tri[1]] * wb + corner_normal_[tri[2]] * wd);
+      const double wb = dot(cross(near.point_mm - a, d - a), whole) / area2,
+                   wd = dot(cross(b - a, near.point_mm - a), whole) / area2;
+      const Vec3 n = normalized(corner_normal_[tri[0]] * (1 - wb - wd) + corner_normal_[tri[1]] * wb +
+                                corner_normal_[tri[2]] * wd);
       // Where faces meet at an angle, as at the rim of a hole, an interpolated normal would point nowhere useful.
       if (dot(n, face_normal_[near.triangle]) > 0.7) c.normal = n;
     }
@@ -217,4 +225,4 @@ Clearance MeshField::operator()(Vec3 x) const {
   return c;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -13,17 +13,20 @@ namespace {
 constexpr float kHalfDiagonal = 0.8661F;
 // Grains lie 0.05 to 0.07 mm apart: 64 of them in voxels below the first edge, 512 below the second, 4096 above.
 constexpr double kFineMm = 0.28, kCoarseMm = 0.56;
-// Counted in grains, a sweep is known to a percent at worst: the burr counts as a little smaller, so that it errs on the side of bone.
+// Counted in grains, a sweep is known to a percent at worst: the burr counts as a little smaller, so that it errs on
+// the side of bone.
 constexpr double kSpareMm = 0.0015;
-// Between two looks at a voxel the burr moves no farther than this if that can be had by looking each tick: what a ball leaves between two
-// places is an eighth of the square of their distance over its radius. But every fourth tick at least.
+// Between two looks at a voxel the burr moves no farther than this if that can be had by looking each tick: what a ball
+// leaves between two places is an eighth of the square of their distance over its radius. But every fourth tick at
+// least.
 constexpr double kTurnMm = 0.1;
 constexpr std::uint32_t kMostTurns = 4;
 // Cosine between two normals up to which they are of the same side of a voxel.
 constexpr float kAlike = 0.5F;
 
-// Share of a unit cube on the inner side of a plane; `alpha` from its inmost corner, in units of the sum of the normal's parts `m`, which
-// sum to 1 and are none of them 0. R. Scardovelli, S. Zaleski, J. Comput. Phys. 164 (2000), equation 3, as a sum over corners.
+// Share of a unit cube on the inner side of a plane; `alpha` from its inmost corner, in units of the sum of the
+// normal's parts `m`, which sum to 1 and are none of them 0. R. Scardovelli, S. Zaleski, J. Comput. Phys. 164 (2000),
+// equation 3, as a sum over corners.
 double share_below(double alpha, const double (&m)[3]) {
   const auto cube = [](double x) { return x > 0 ? x * x * x : 0; };
   return (cube(alpha) - cube(alpha - m[0]) - cube(alpha - m[1]) - cube(alpha - m[2]) + cube(alpha - m[0] - m[1]) +
@@ -48,20 +51,25 @@ Grains::Grains(const BrickGrid& bone) {
   covered_.resize((voxels + 63) / 64);
   begun_.resize((voxels + 7) / 8);
   // Twice as much as the burr's traces over 80 cm2 of bone need, or as a small piece has voxels.
-  slots_.resize(std::clamp(std::bit_ceil(voxels), std::size_t{1024}, (std::size_t{1} << 21) >> (parts_ == 1 ? 1 : parts_ == 2 ? 3 : 6)));
+  slots_.resize(std::clamp(std::bit_ceil(voxels), std::size_t{1024},
+                           (std::size_t{1} << 21) >> (parts_ == 1   ? 1
+                                                      : parts_ == 2 ? 3
+                                                                    : 6)));
   grains_.resize(slots_.size() * words_);
 }
 
 void Grains::inherit(const BrickGrid& bone, const BrickGrid& from, const Grains& known) {
   const Frame &a = bone.frame(), &b = from.frame();
   if (a.spacing_mm != b.spacing_mm || a.origin_mm != b.origin_mm || a.direction != b.direction) return;
-  // In order of their voxels, which is that of both bones: they come in the same order whatever their places in the table.
+  // In order of their voxels, which is that of both bones: they come in the same order whatever their places in the
+  // table.
   std::vector<std::uint32_t> begun;
   begun.reserve(known.used_);
   for (std::uint32_t s = 0; s < known.slots_.size(); ++s) {
     if (known.slots_[s].voxel != BrickGrid::kNone) begun.push_back(s);
   }
-  std::sort(begun.begin(), begun.end(), [&](std::uint32_t x, std::uint32_t y) { return known.slots_[x].voxel < known.slots_[y].voxel; });
+  std::sort(begun.begin(), begun.end(),
+            [&](std::uint32_t x, std::uint32_t y) { return known.slots_[x].voxel < known.slots_[y].voxel; });
   auto next = begun.begin();
   // What a saw takes it takes alike of all that is in the voxel.
   const auto kept = [](float is, float was) { return was > 0 ? is / was : 1.0F; };
@@ -78,7 +86,8 @@ void Grains::inherit(const BrickGrid& bone, const BrickGrid& from, const Grains&
     } else {
       for (std::size_t n = 0; n < BrickGrid::kVoxels; ++n) {
         if (is[n] > was[n]) continue;
-        before[n] = std::max(before[n], static_cast<std::uint8_t>(static_cast<float>(known_before[n]) * kept(is[n], was[n]) + 0.5F));
+        before[n] = std::max(
+            before[n], static_cast<std::uint8_t>(static_cast<float>(known_before[n]) * kept(is[n], was[n]) + 0.5F));
       }
     }
     for (std::uint32_t word = 0; word < BrickGrid::kVoxels / 64; ++word) {
@@ -105,7 +114,8 @@ void Grains::inherit(const BrickGrid& bone, const BrickGrid& from, const Grains&
 }
 
 std::size_t Grains::memory_bytes() const {
-  return before_.size() + covered_.size() * sizeof covered_[0] + begun_.size() + slots_.size() * sizeof slots_[0] + grains_.size() * sizeof grains_[0];
+  return before_.size() + covered_.size() * sizeof covered_[0] + begun_.size() + slots_.size() * sizeof slots_[0] +
+         grains_.size() * sizeof grains_[0];
 }
 
 // Rows of voxels stay together.
@@ -136,7 +146,8 @@ void Grains::erase(std::size_t slot) noexcept {
   --used_;
 }
 
-void Grains::place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis, bool every, std::size_t hand) noexcept {
+void Grains::place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis, bool every,
+                   std::size_t hand) noexcept {
   const Frame& frame = bone.frame();
   const double h = frame.spacing_mm.x, b = head.slope();
   const Vec3 start = frame.index_from_world(start_mm + axis * head.start_mm);
@@ -171,8 +182,8 @@ void Grains::fill(const BrickGrid& bone, VoxelKey voxel, std::size_t slot) noexc
   const bool inner = (place & 7) - 1 < 6U && (place >> 3 & 7) - 1 < 6U && (place >> 6) - 1 < 6U;
   for (int n = 0; n < 27; ++n) {
     const int d[3] = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
-    const VoxelKey neighbour =
-        inner ? voxel + static_cast<VoxelKey>(d[0] + 8 * d[1] + 64 * d[2]) : bone.find(c.i + d[0], c.j + d[1], c.k + d[2]);
+    const VoxelKey neighbour = inner ? voxel + static_cast<VoxelKey>(d[0] + 8 * d[1] + 64 * d[2])
+                                     : bone.find(c.i + d[0], c.j + d[1], c.k + d[2]);
     const int value = neighbour == BrickGrid::kNone ? 0 : before_[neighbour];
     for (int a = 0; a < 3; ++a) slope[a] += d[a] * value * (2 >> (d[(a + 1) % 3] & 1)) * (2 >> (d[(a + 2) % 3] & 1));
   }
@@ -189,7 +200,8 @@ void Grains::fill(const BrickGrid& bone, VoxelKey voxel, std::size_t slot) noexc
     (share_below(alpha, size) < density ? lo : hi) = alpha;
   }
   const float inwards[3] = {static_cast<float>(slope[0]), static_cast<float>(slope[1]), static_cast<float>(slope[2])};
-  const std::uint32_t count = overlap::grain_functions().plane(inwards, static_cast<float>((0.5 - lo) * sum), parts_, left);
+  const std::uint32_t count =
+      overlap::grain_functions().plane(inwards, static_cast<float>((0.5 - lo) * sum), parts_, left);
   if (count == 0) {
     std::fill_n(left, words_, ~std::uint64_t{0});
   } else {
@@ -224,7 +236,8 @@ float Grains::reach(const BrickGrid& bone, VoxelKey voxel, float share) noexcept
   const std::uint64_t bit = std::uint64_t{1} << (voxel % 64);
   if ((bits & bit) != 0) return 0;
   const Ijk c = bone.coordinate(voxel);
-  const float at[3] = {static_cast<float>(c.i - start_.x), static_cast<float>(c.j - start_.y), static_cast<float>(c.k - start_.z)};
+  const float at[3] = {static_cast<float>(c.i - start_.x), static_cast<float>(c.j - start_.y),
+                       static_cast<float>(c.k - start_.z)};
   const float along = at[0] * head_.axis[0] + at[1] * head_.axis[1] + at[2] * head_.axis[2];
   const float q2 = at[0] * at[0] + at[1] * at[1] + at[2] * at[2];
   const float off = head_.slope_run == 0 ? 0 : std::sqrt(std::max(q2 - along * along, 0.0F));
@@ -245,8 +258,13 @@ float Grains::reach(const BrickGrid& bone, VoxelKey voxel, float share) noexcept
     }
     Slot& s = slots_[slot];
     if (!waits) {
-      const overlap::Shape shape{
-          {head_.axis[0], head_.axis[1], head_.axis[2]}, head_.length, head_.start_radius, head_.slope, head_.slope_run, 0, head_.ball};
+      const overlap::Shape shape{{head_.axis[0], head_.axis[1], head_.axis[2]},
+                                 head_.length,
+                                 head_.start_radius,
+                                 head_.slope,
+                                 head_.slope_run,
+                                 0,
+                                 head_.ball};
       s.left = overlap::grain_functions().take(shape, at, parts_, &grains_[slot * words_]);
       float n[3], n2 = 1e-12F, cosine = 0;
       for (std::size_t a = 0; a < 3; ++a) {
@@ -269,4 +287,4 @@ float Grains::reach(const BrickGrid& bone, VoxelKey voxel, float share) noexcept
   return 0;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -29,7 +29,8 @@ double safe_stiffness_n_per_mm(const DeviceTraits& d, double contact_damping_n_s
   return limit_of(std::min(limit_of(share * bound / 1000), limit_of(d.max_stiffness_n_per_mm)));
 }
 
-double PassivityControl::update(Vec3 x_mm, Vec3 elastic_n, Vec3 velocity_mm_s, double dt_s, double encoder_mm, double most) noexcept {
+double PassivityControl::update(Vec3 x_mm, Vec3 elastic_n, Vec3 velocity_mm_s, double dt_s, double encoder_mm,
+                                double most) noexcept {
   if (started_) energy_mj_ += dot(last_force_n_, x_mm - last_x_mm_);
   started_ = true;
   last_x_mm_ = x_mm;
@@ -64,8 +65,8 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
     resume_ = 0;
     out.flags |= kPoseJumped;
   }
-  // From one tick to the next, in encoder steps or not: the steps average out, while any smoothing would come late, and damping by a
-  // late velocity drives what it should damp.
+  // From one tick to the next, in encoder steps or not: the steps average out, while any smoothing would come late, and
+  // damping by a late velocity drives what it should damp.
   const Vec3 at = placed ? in.position_mm : last_x_mm_;
   velocity_ = moving_ ? finite_or_zero((at - last_x_mm_) / dt) : Vec3{};
   last_x_mm_ = at;
@@ -89,7 +90,8 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
     force -= normal * std::min(damping, std::max(0.0, dot(elastic, normal)));
   }
   if (params_.passivity) {
-    const double alpha = passivity_.update(at, elastic, velocity_, dt, device_.encoder_mm, params_.max_damping_n_s_per_m);
+    const double alpha =
+        passivity_.update(at, elastic, velocity_, dt, device_.encoder_mm, params_.max_damping_n_s_per_m);
     if (alpha > 0) {
       force -= velocity_ * (alpha / 1000);
       out.flags |= kPassivity;
@@ -102,7 +104,8 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
     out.flags |= kForceCapped;
   }
   const Vec3 change = force - last_force_n_;
-  if (const double n = length(change), allowed = limit_of(params_.max_rate_n_per_s * dt); params_.max_rate_n_per_s != 0 && n > allowed) {
+  if (const double n = length(change), allowed = limit_of(params_.max_rate_n_per_s * dt);
+      params_.max_rate_n_per_s != 0 && n > allowed) {
     force = last_force_n_ + change * (allowed / n);
     out.flags |= kRateCapped;
   }
@@ -112,4 +115,4 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
   return out;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -8,8 +8,9 @@ namespace osteo::inline simulation {
 SceneAction action_of(const HandGuide& g) {
   SceneAction a = SceneAction::plain(ActionKind::guide);
   a.item = g.leader;
-  a.values = {static_cast<double>(g.hand), g.stiffness_n_per_mm, g.damping_n_s_per_m, g.forward, g.most_n, g.dead_zone_mm,
-              g.own_contact ? 1.0 : 0.0,   g.brake_n_s_per_m};
+  a.values = {
+      static_cast<double>(g.hand), g.stiffness_n_per_mm, g.damping_n_s_per_m, g.forward, g.most_n, g.dead_zone_mm,
+      g.own_contact ? 1.0 : 0.0,   g.brake_n_s_per_m};
   return a;
 }
 
@@ -18,7 +19,8 @@ HandGuide guide_of(const SceneAction& a) {
   return {static_cast<std::uint32_t>(v[0]), a.item, v[1], v[2], v[3], v[4], v[5], v[6] != 0, v[7]};
 }
 
-void GuideLaw::set(const HandGuide& guide, const DeviceTraits& device, double contact_damping_n_s_per_m, double tick_s) noexcept {
+void GuideLaw::set(const HandGuide& guide, const DeviceTraits& device, double contact_damping_n_s_per_m,
+                   double tick_s) noexcept {
   guide_ = guide;
   borne_ = safe_stiffness_n_per_mm(device, contact_damping_n_s_per_m, tick_s) / 2;
   if (guide.stiffness_n_per_mm < 0) {
@@ -29,7 +31,8 @@ void GuideLaw::set(const HandGuide& guide, const DeviceTraits& device, double co
   }
 }
 
-Vec3 GuideLaw::step(Vec3 at_mm, const Hand& hand, const DeviceSample& leader, Vec3 leader_force_n, double dt_s) noexcept {
+Vec3 GuideLaw::step(Vec3 at_mm, const Hand& hand, const DeviceSample& leader, Vec3 leader_force_n,
+                    double dt_s) noexcept {
   const Vec3 apart = from_floats(leader.position_mm) - at_mm;
   const bool there = leader.age_ms < 255 && std::isfinite(dot(apart, apart));
   if (!there) {
@@ -66,11 +69,12 @@ Vec3 GuideLaw::step(Vec3 at_mm, const Hand& hand, const DeviceSample& leader, Ve
   const double most = away ? std::min(guide_.most_n, kAwayN) : guide_.most_n;
   // What is forwarded gives way as the hand goes off, no more steeply than the device bears.
   Vec3 forwarded = leader_force_n * (guide_.forward * share_);
-  if (const double n = length(forwarded), limit = std::min(guide_.most_n, borne_ * kNearMm); n > limit) forwarded = forwarded * (limit / n);
+  if (const double n = length(forwarded), limit = std::min(guide_.most_n, borne_ * kNearMm); n > limit)
+    forwarded = forwarded * (limit / n);
   pull += forwarded * std::max(0.0, 1 - std::max(0.0, beyond) / kNearMm);
   if (const double n = length(pull); n > most) pull = pull * (most / n);
   const Vec3 force = pull * strength;
   return std::isfinite(dot(force, force)) ? force : Vec3{};
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

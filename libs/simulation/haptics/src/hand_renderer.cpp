@@ -29,14 +29,17 @@ void add(OverlapResult& sum, const OverlapResult& o) {
 
 }  // namespace
 
-HandRenderer::HandRenderer(const HapticRenderer::Common& common, const HapticSetup& setup, std::size_t number, const Curve* curve)
+HandRenderer::HandRenderer(const HapticRenderer::Common& common, const HapticSetup& setup, std::size_t number,
+                           const Curve* curve)
     : common_(common),
       number_(number),
       device_(setup.device_of(number)),
-      vibration_(setup.vibration_json.empty() ? default_vibration() : parse_vibration(setup.vibration_json, "the session's vibration")),
+      vibration_(setup.vibration_json.empty() ? default_vibration()
+                                              : parse_vibration(setup.vibration_json, "the session's vibration")),
       guard_(setup.params.guard, device_),
       instrument_(&instrument_library().front()) {
-  if (!setup.texture_json.empty()) texture_.emplace(parse_texture(setup.texture_json, "the session's texture"), number + 1, common.dt_s);
+  if (!setup.texture_json.empty())
+    texture_.emplace(parse_texture(setup.texture_json, "the session's texture"), number + 1, common.dt_s);
   if (curve != nullptr) constraint_.emplace(*curve, setup.curve_params);
   set();
 }
@@ -102,7 +105,8 @@ void HandRenderer::feel(const DeviceSample& sample) noexcept {
   elastic += contact_.force_n;
   torque += contact_.torque_n_mm;
   if (usable_ && !(soft_.normal == Vec3{})) {
-    const double push = std::clamp(soft_.force_n + soft_.stiffness_n_per_mm * dot(soft_.at_mm - at_, soft_.normal), 0.0, law_.max_force_n);
+    const double push = std::clamp(soft_.force_n + soft_.stiffness_n_per_mm * dot(soft_.at_mm - at_, soft_.normal), 0.0,
+                                   law_.max_force_n);
     elastic += soft_.normal * push;
     if (push > 0) flags_ |= kSoftContact;
   }
@@ -128,8 +132,10 @@ void HandRenderer::feel(const DeviceSample& sample) noexcept {
   const Guard::Output out = guard_.limit(in, common_.dt_s);
   flags_ |= out.flags;
   if (common_.held) flags_ |= kHeld;
-  if (usable_ && contact_.normal_force_n > 0 && loaded_ != nullptr) record_.thickness_mm = static_cast<float>(thickness());
-  // A hand whose force is not back yet, or that is not heard of, neither removes nor injures; nor does a burr that stands still.
+  if (usable_ && contact_.normal_force_n > 0 && loaded_ != nullptr)
+    record_.thickness_mm = static_cast<float>(thickness());
+  // A hand whose force is not back yet, or that is not heard of, neither removes nor injures; nor does a burr that
+  // stands still.
   cuts_ = pose_.pedal != 0 && !common_.held && (out.flags & (kPoseJumped | kPoseStale)) == 0;
   record_.force_n = to_floats(out.force_n);
   record_.torque_n_mm = to_floats(std::isfinite(dot(torque, torque)) ? torque : Vec3{});
@@ -178,7 +184,8 @@ void HandRenderer::meet() noexcept {
   if (!usable_) return;
   if (const PlateInHand* const held = plate()) {
     flags_ |= kPlateInHand;
-    contact_ = plate_contact(*held, plate_pose(at_, axis_, common_.scene->held[number_].grip), common_.scene->items, law_);
+    contact_ =
+        plate_contact(*held, plate_pose(at_, axis_, common_.scene->held[number_].grip), common_.scene->items, law_);
     return;
   }
   touch();
@@ -218,7 +225,8 @@ void HandRenderer::touch() noexcept {
     Touch& t = touched_[touched_count_++];
     t = {&item, model, model->contact(item.bone->bone(), own)};
     const Mat3& turn = item.world_from_body.rotation;
-    for (Vec3* const v : {&t.contact.force_n, &t.contact.torque_n_mm, &t.contact.normal, &t.contact.shown_offset_mm}) *v = turn * *v;
+    for (Vec3* const v : {&t.contact.force_n, &t.contact.torque_n_mm, &t.contact.normal, &t.contact.shown_offset_mm})
+      *v = turn * *v;
   }
 }
 
@@ -261,7 +269,8 @@ void HandRenderer::combine() noexcept {
 }
 
 void HandRenderer::escape() noexcept {
-  const double radius_mm = instrument_->head.largest_radius_mm(), full = contact_.bone_mm3 / instrument_->head.volume_mm3();
+  const double radius_mm = instrument_->head.largest_radius_mm(),
+               full = contact_.bone_mm3 / instrument_->head.volume_mm3();
   const double share = std::clamp((full - kEscapeFrom) / (kEscapeAll - kEscapeFrom), 0.0, 1.0);
   if (share <= 0 || loaded_ == nullptr || !loaded_->depth_map) return;
   DepthMap::Answer out = loaded_->depth_map->at(loaded_->body_from_world(at_));
@@ -270,7 +279,8 @@ void HandRenderer::escape() noexcept {
   const double push = law_.force_n(out.depth_mm + radius_mm);
   contact_.force_n = contact_.force_n * (1 - share) + out.outwards * (push * share);
   contact_.normal = normalized(contact_.normal * (1 - share) + out.outwards * share);
-  contact_.shown_offset_mm = contact_.shown_offset_mm * (1 - share) + out.outwards * (share * (out.depth_mm + radius_mm));
+  contact_.shown_offset_mm =
+      contact_.shown_offset_mm * (1 - share) + out.outwards * (share * (out.depth_mm + radius_mm));
   contact_.normal_force_n = std::max(0.0, dot(contact_.force_n, contact_.normal));
   contact_.depth_mm = std::max(contact_.depth_mm, share * (out.depth_mm + radius_mm));
   flags_ |= kEscape;
@@ -290,8 +300,8 @@ void HandRenderer::hold_shaft(Vec3& elastic, Vec3& torque) noexcept {
   for (const HapticScene::Item& item : scene.items) {
     HeldShaft& shaft = item.hands[number_]->shaft;
     const Vec3 own = item.body_from_world(at_), own_axis = item.body_from_world.rotation * axis_;
-    if (scene.items.size() > 1 &&
-        !item.bone->near(own + own_axis * (shape.start_mm + 0.5 * shape.length_mm), 0.5 * shape.length_mm + shape.largest_radius_mm() + 1)) {
+    if (scene.items.size() > 1 && !item.bone->near(own + own_axis * (shape.start_mm + 0.5 * shape.length_mm),
+                                                   0.5 * shape.length_mm + shape.largest_radius_mm() + 1)) {
       shaft.forget();
       continue;
     }
@@ -317,7 +327,8 @@ Vec3 HandRenderer::effects() noexcept {
   const Burr* const edge = instrument_->cutter();
   const bool turns = pose_.pedal != 0 && edge != nullptr;
   Vec3 shaken{};
-  if (texture_ && usable_) shaken = texture_->step(at_, contact_.normal, turns || plate() ? 0 : contact_.normal_force_n);
+  if (texture_ && usable_)
+    shaken = texture_->step(at_, contact_.normal, turns || plate() ? 0 : contact_.normal_force_n);
   if (!turns) return shaken;
   const EffectParams& with = common_.params.effects;
   const double speed = speed_rpm_ / Burr::kNominalRpm, turn = with.left_handed ? -1 : 1;
@@ -355,9 +366,10 @@ void HandRenderer::remove(std::size_t& count) noexcept {
     // What presses into this body: its share of what the burr is in.
     const double share = contact_.bone_mm3 > 0 ? t.contact.bone_mm3 / contact_.bone_mm3 : 1;
     double removed = 0;
-    const auto changes = bone.removal().remove(bone.bone(), t.model->cut(bone.bone()), *edge,
-                                               touched_count_ == 1 ? contact_.normal_force_n : share * contact_.normal_force_n, speed_rpm_,
-                                               common_.dt_s, bone.hardness(), removed, number_);
+    const auto changes =
+        bone.removal().remove(bone.bone(), t.model->cut(bone.bone()), *edge,
+                              touched_count_ == 1 ? contact_.normal_force_n : share * contact_.normal_force_n,
+                              speed_rpm_, common_.dt_s, bone.hardness(), removed, number_);
     removed_mm3 += removed;
     if (bone.removal().grains().overflowed()) flags_ |= kNoRoom;
     if (t.item->depth_map) t.item->depth_map->update(bone.bone(), bone.voxels_of(changes), 0);
@@ -379,4 +391,4 @@ const TickRecord& HandRenderer::finish() noexcept {
   return record_;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -24,7 +24,9 @@ class HandRenderer {
   /// The settings have changed.
   void set() noexcept;
   void push(const SceneAction& soft_push) noexcept;
-  void guide(const HandGuide& guide) noexcept { guide_.set(guide, device_, common_.params.guard.contact_damping_n_s_per_m, common_.dt_s); }
+  void guide(const HandGuide& guide) noexcept {
+    guide_.set(guide, device_, common_.params.guard.contact_damping_n_s_per_m, common_.dt_s);
+  }
   [[nodiscard]] const HandGuide& guided() const { return guide_.guide(); }
   /// Whether it leads another in the tick to come, and by whom it is led.
   void leads(bool on) noexcept { leads_ = on; }
@@ -105,4 +107,4 @@ class HandRenderer {
   TickRecord record_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

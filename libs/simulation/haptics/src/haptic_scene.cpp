@@ -60,7 +60,8 @@ PlateInHand::PlateInHand(const PlateModel& plate, int count) {
 namespace {
 
 // By method, the instruments that use it.
-std::array<std::vector<std::size_t>, EnumNames<ContactMethod>::values.size()> tools_by_method(const HapticSetup& setup) {
+std::array<std::vector<std::size_t>, EnumNames<ContactMethod>::values.size()> tools_by_method(
+    const HapticSetup& setup) {
   std::array<std::vector<std::size_t>, EnumNames<ContactMethod>::values.size()> tools;
   for (std::size_t tool = 0; tool < instrument_library().size(); ++tool)
     tools[static_cast<std::size_t>(method_of(setup, tool))].push_back(tool);
@@ -74,8 +75,9 @@ void fit(HapticScene::Item& item, const HapticSetup& setup, const HapticScene::I
     item.depth_map = before != nullptr && before->depth_map ? before->depth_map : std::make_shared<DepthMap>(bone);
   for (std::size_t h = 0; h < setup.hands(); ++h) {
     auto known = before != nullptr && h < before->hands.size() ? before->hands[h] : nullptr;
-    item.hands.push_back(known && known->serves(setup) ? known
-                                                       : std::make_shared<HandContact>(setup, bone.frame().spacing_mm.x, known.get()));
+    item.hands.push_back(known && known->serves(setup)
+                             ? known
+                             : std::make_shared<HandContact>(setup, bone.frame().spacing_mm.x, known.get()));
   }
 }
 
@@ -93,11 +95,13 @@ ContactMethod method_of(const HapticSetup& setup, ContactMethod usual, std::size
   return instrument_library()[tool].kind != InstrumentKind::burr ? ContactMethod::proxy : usual;
 }
 
-HandContact::HandContact(const HapticSetup& setup, double spacing_mm, const HandContact* before) : tools(tools_by_method(setup)) {
+HandContact::HandContact(const HapticSetup& setup, double spacing_mm, const HandContact* before)
+    : tools(tools_by_method(setup)) {
   for (std::size_t m = 0; m < models.size(); ++m) {
     if (before != nullptr && before->models[m]) {
       // What is for more instruments than before is another; one that nobody uses now may be used again.
-      const bool enough = std::includes(before->tools[m].begin(), before->tools[m].end(), tools[m].begin(), tools[m].end());
+      const bool enough =
+          std::includes(before->tools[m].begin(), before->tools[m].end(), tools[m].begin(), tools[m].end());
       if (enough) {
         models[m] = before->models[m];
         tools[m] = before->tools[m];
@@ -119,22 +123,26 @@ bool HandContact::serves(const HapticSetup& setup) const {
   return true;
 }
 
-void HapticScene::add(std::shared_ptr<TouchedBone> bone, const RigidTransform& world_from_body, const HapticSetup& setup) {
+void HapticScene::add(std::shared_ptr<TouchedBone> bone, const RigidTransform& world_from_body,
+                      const HapticSetup& setup) {
   items.push_back({std::move(bone), nullptr, {}, world_from_body, world_from_body.inverse()});
   fit(items.back(), setup, nullptr);
   make_room(*this, setup);
 }
 
 bool HapticScene::needs_bone_held(const HapticSetup& setup) const {
-  return setup.params.effects.fail_safe && std::any_of(items.begin(), items.end(), [](const Item& i) { return !i.depth_map; });
+  return setup.params.effects.fail_safe &&
+         std::any_of(items.begin(), items.end(), [](const Item& i) { return !i.depth_map; });
 }
 
 HapticScene HapticScene::of(const World& world, const HapticSetup& setup, const HapticScene* before) {
   HapticScene scene;
-  const std::span<const Item> known = before != nullptr ? std::span<const Item>(before->items) : std::span<const Item>();
+  const std::span<const Item> known =
+      before != nullptr ? std::span<const Item>(before->items) : std::span<const Item>();
   for (const PlacedBody& placed : world.bodies()) {
     Item item{nullptr, nullptr, {}, placed.world_from_body, placed.world_from_body.inverse()};
-    const auto same = std::find_if(known.begin(), known.end(), [&](const Item& i) { return i.bone->body() == placed.body.get(); });
+    const auto same =
+        std::find_if(known.begin(), known.end(), [&](const Item& i) { return i.bone->body() == placed.body.get(); });
     if (same != known.end()) {
       item.bone = same->bone;
     } else {
@@ -142,7 +150,8 @@ HapticScene HapticScene::of(const World& world, const HapticSetup& setup, const 
       // Of those that are gone: another has their place, they came apart, or were put together again.
       for (const Item& old : known) {
         const auto& bodies = world.bodies();
-        if (std::none_of(bodies.begin(), bodies.end(), [&](const PlacedBody& b) { return b.body.get() == old.bone->body(); }))
+        if (std::none_of(bodies.begin(), bodies.end(),
+                         [&](const PlacedBody& b) { return b.body.get() == old.bone->body(); }))
           item.bone->inherit(*old.bone);
       }
     }
@@ -151,7 +160,8 @@ HapticScene HapticScene::of(const World& world, const HapticSetup& setup, const 
   }
   for (std::uint32_t hand = 0; hand < kMostHands; ++hand) {
     const World::Grip& grip = world.grip(hand);
-    if (grip.plate != SceneAction::kNobody) scene.held[hand].plate = std::make_shared<const PlateInHand>(plate_library()[grip.plate]);
+    if (grip.plate != SceneAction::kNobody)
+      scene.held[hand].plate = std::make_shared<const PlateInHand>(plate_library()[grip.plate]);
     scene.held[hand].grip = grip.hand_from_plate;
     scene.guides[hand] = world.cutting_guide(hand);
   }
@@ -159,4 +169,4 @@ HapticScene HapticScene::of(const World& world, const HapticSetup& setup, const 
   return scene;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -67,4 +67,4 @@ void change_setting(HapticsParams& params, std::uint32_t number, double value) {
   params = changed;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

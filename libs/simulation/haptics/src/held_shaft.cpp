@@ -26,8 +26,8 @@ RoundCone grown(RoundCone shape, double by_mm) {
 
 }  // namespace
 
-HeldShaft::Answer HeldShaft::follow(const BrickGrid& bone, const Grains* known, const RoundCone& shaft, double shell_mm, Vec3 at_mm,
-                                    Vec3 axis) noexcept {
+HeldShaft::Answer HeldShaft::follow(const BrickGrid& bone, const Grains* known, const RoundCone& shaft, double shell_mm,
+                                    Vec3 at_mm, Vec3 axis) noexcept {
   Answer a;
   if (!std::isfinite(dot(at_mm, at_mm))) {
     forget();
@@ -57,8 +57,8 @@ HeldShaft::Answer HeldShaft::follow(const BrickGrid& bone, const Grains* known, 
     c.gradient = c.normal = {0, 0, 1};
     const double surface = there.surface_mm2, pressed = length(there.area_mm2);
     if (!(surface > 0) || !(there.sharp_mm3 > 0)) return c;
-    // Twice the mean thickness of what lies in the shell is how deep a ball's cap is, and no less than how deep a cylinder's side: it depends
-    // neither on how much of the bone there is beside the shaft nor on how thin it is.
+    // Twice the mean thickness of what lies in the shell is how deep a ball's cap is, and no less than how deep a
+    // cylinder's side: it depends neither on how much of the bone there is beside the shaft nor on how thin it is.
     const double crumb = std::min(1.0, surface / (kCrumb * h * h)), depth = 2 * there.sharp_mm3 / surface * crumb;
     c.value_mm = shell_mm - depth;
     one_way = pressed > kOneWay * surface;
@@ -97,8 +97,9 @@ HeldShaft::Answer HeldShaft::follow(const BrickGrid& bone, const Grains* known, 
     a.contact = touched_ = a.contact || (c.value_mm < kOnIt * shell_mm && dot(a.offset_mm, c.normal) > 0);
     if (!a.contact) return a;
   }
-  if (const double pressed = length(there.area_mm2); pressed > 0) a.torque_mm = cross(axis, there.area_foot_mm3) * (-1 / pressed);
+  if (const double pressed = length(there.area_mm2); pressed > 0)
+    a.torque_mm = cross(axis, there.area_foot_mm3) * (-1 / pressed);
   return a;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

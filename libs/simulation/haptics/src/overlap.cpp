@@ -63,8 +63,9 @@ Overlap::Overlap(std::size_t most_hits) : hits_(most_hits + 512), partial_(std::
 }
 Overlap::~Overlap() = default;
 
-OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Vec3 start_mm, Vec3 axis, const Grains* known, bool want_hits,
-                               double falloff_per_rad, std::uint32_t stride, std::uint32_t phase) noexcept {
+OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Vec3 start_mm, Vec3 axis,
+                               const Grains* known, bool want_hits, double falloff_per_rad, std::uint32_t stride,
+                               std::uint32_t phase) noexcept {
   OverlapResult result;
   count_ = 0;
   const Frame& frame = bone.frame();
@@ -83,15 +84,16 @@ OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Ve
   s.falloff = static_cast<float>(falloff_per_rad);
   s.ball = shape.length_mm == 0;
   overlap::Sums sums;
-  overlap::PartialList partial{partial_->items.data(), 0, partial_->items.size(), known != nullptr ? known->begun() : nullptr};
+  overlap::PartialList partial{partial_->items.data(), 0, partial_->items.size(),
+                               known != nullptr ? known->begun() : nullptr};
   overlap::HitList list;
   list.hits = want_hits ? hits_.data() : nullptr;
   list.capacity = hits_.size() - 512;
   list.stride = std::max(stride, 1U);
   list.phase = phase;
 
-  // Along the axis in pieces, so that an oblique shaft does not visit the whole box around it. A brick belongs to the piece its
-  // middle projects onto; the first and the last reach beyond the ends.
+  // Along the axis in pieces, so that an oblique shaft does not visit the whole box around it. A brick belongs to the
+  // piece its middle projects onto; the first and the last reach beyond the ends.
   constexpr double kHalf = 3.5, kCorner = 6.95;  // of a brick: to its middle, and to a voxel's far corner
   const overlap::BrickFunction brick = partial_->brick;
   const int pieces = std::max(1, static_cast<int>(std::ceil(length / 24)));
@@ -100,7 +102,8 @@ OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Ve
     int lo[3], hi[3];
     bool empty = false;
     for (std::size_t a = 0; a < 3; ++a) {
-      const double p0 = start[a] + along[a] * t0, p1 = start[a] + along[a] * t1, reach = radius + 1 + (pieces > 1 ? kCorner : 0);
+      const double p0 = start[a] + along[a] * t0, p1 = start[a] + along[a] * t1,
+                   reach = radius + 1 + (pieces > 1 ? kCorner : 0);
       const double low = std::floor((std::min(p0, p1) - reach) / 8), high = std::floor((std::max(p0, p1) + reach) / 8);
       const double last = (frame.dims[a] - 1) / 8;
       empty = empty || low > last || high < 0;
@@ -118,17 +121,18 @@ OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Ve
           if (pieces > 1 && ((piece > 0 && t < t0) || (piece + 1 < pieces && t >= t1))) continue;
           const double foot = std::clamp(t, 0.0, length);
           if (dot(q, q) - 2 * foot * t + foot * foot > (radius + kCorner) * (radius + kCorner)) continue;
-          const float first[3] = {static_cast<float>(q.x - kHalf), static_cast<float>(q.y - kHalf), static_cast<float>(q.z - kHalf)};
+          const float first[3] = {static_cast<float>(q.x - kHalf), static_cast<float>(q.y - kHalf),
+                                  static_cast<float>(q.z - kHalf)};
           brick(s, bone.values_of_brick(number), first, number * BrickGrid::kVoxels, sums, list, partial);
         }
       }
     }
   }
   count_ = list.count;
-  // The product of density and share is right when bone and shape are spread through a voxel without regard to each other. Where both end
-  // in it by a plane each, how the planes face decides: facing each other they share what is too much for the voxel, facing alike they
-  // share the lesser part. Those bounds (M. Frechet 1951) are mixed by the cosine between the normals.
-  // Where a burr has covered a voxel in part, it is known where its bone lies.
+  // The product of density and share is right when bone and shape are spread through a voxel without regard to each
+  // other. Where both end in it by a plane each, how the planes face decides: facing each other they share what is too
+  // much for the voxel, facing alike they share the lesser part. Those bounds (M. Frechet 1951) are mixed by the cosine
+  // between the normals. Where a burr has covered a voxel in part, it is known where its bone lies.
   double sharper = 0, moved = 0;
   for (std::size_t i = 0; i < partial.count; ++i) {
     const overlap::Partial& p = partial.items[i];
@@ -149,9 +153,11 @@ OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Ve
     const double n = std::sqrt(dot(inwards, inwards));
     if (!(n > 1e-3)) continue;
     // The bone's outward normal is -inwards: they face each other when the shape's normal points the way of `inwards`.
-    const double facing =
-        dot(inwards, {static_cast<double>(p.normal[0]), static_cast<double>(p.normal[1]), static_cast<double>(p.normal[2])}) / n;
-    const double density = static_cast<double>(p.density), share = static_cast<double>(p.share), product = density * share;
+    const double facing = dot(inwards, {static_cast<double>(p.normal[0]), static_cast<double>(p.normal[1]),
+                                        static_cast<double>(p.normal[2])}) /
+                          n;
+    const double density = static_cast<double>(p.density), share = static_cast<double>(p.share),
+                 product = density * share;
     const double bound = facing > 0 ? std::max(0.0, density + share - 1) : std::min(density, share);
     sharper += std::abs(facing) * (bound - product);
   }
@@ -164,9 +170,9 @@ OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Ve
   result.sharp_mm3 = std::max(0.0, (left + sharper) * volume);
   result.surface_mm2 = std::max(0.0, sums.surface) * area;
   result.area_mm2 = frame.direction * Vec3{sums.area[0], sums.area[1], sums.area[2]} * area;
-  result.area_foot_mm3 =
-      frame.direction * Vec3{sums.area_foot[0], sums.area_foot[1], sums.area_foot[2]} * volume + result.area_mm2 * shape.start_mm;
+  result.area_foot_mm3 = frame.direction * Vec3{sums.area_foot[0], sums.area_foot[1], sums.area_foot[2]} * volume +
+                         result.area_mm2 * shape.start_mm;
   return result;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -1,7 +1,7 @@
 #include "overlap_loops.h"
 
-void osteo::overlap::brick_base(const Shape& shape, const float* values, const float* first, VoxelKey key, Sums& sums, HitList& list,
-                                PartialList& partial) {
+void osteo::overlap::brick_base(const Shape& shape, const float* values, const float* first, VoxelKey key, Sums& sums,
+                                HitList& list, PartialList& partial) {
   run_brick(shape, values, first, key, sums, list, partial);
 }
 

@@ -17,7 +17,8 @@ struct Shape {
   bool ball;        // length 0
 };
 
-/// Sums over voxels, in voxels; n is the outward normal of the shape, A the area of its surface inside a voxel, t the foot.
+/// Sums over voxels, in voxels; n is the outward normal of the shape, A the area of its surface inside a voxel, t the
+/// foot.
 struct Sums {
   double volume = 0;         // density * share covered
   double surface = 0;        // density * A
@@ -25,8 +26,8 @@ struct Sums {
   double area_foot[3] = {};  // density * A * t * n
 };
 
-/// Where hits go: rows whose number plus `phase` is a multiple of `stride`. `hits` has room for 512 more than `capacity`; when
-/// that is reached the rest is not listed.
+/// Where hits go: rows whose number plus `phase` is a multiple of `stride`. `hits` has room for 512 more than
+/// `capacity`; when that is reached the rest is not listed.
 struct HitList {
   Hit* hits = nullptr;  // null: none wanted
   std::size_t count = 0, capacity = 0;
@@ -47,8 +48,8 @@ struct PartialList {
 };
 
 /// Adds the part of the shape in one brick. `first`: the brick's first voxel minus the start of the axis, in voxels.
-using BrickFunction = void (*)(const Shape& shape, const float* values, const float* first, VoxelKey key, Sums& sums, HitList& list,
-                               PartialList& partial);
+using BrickFunction = void (*)(const Shape& shape, const float* values, const float* first, VoxelKey key, Sums& sums,
+                               HitList& list, PartialList& partial);
 void brick_base(const Shape&, const float*, const float*, VoxelKey, Sums&, HitList&, PartialList&);
 void brick_avx2(const Shape&, const float*, const float*, VoxelKey, Sums&, HitList&, PartialList&);
 void brick_avx512(const Shape&, const float*, const float*, VoxelKey, Sums&, HitList&, PartialList&);
@@ -67,4 +68,4 @@ extern const GrainFunctions kGrainsBase, kGrainsAvx2, kGrainsAvx512;
 /// As brick_function() chooses.
 const GrainFunctions& grain_functions();
 
-}  // namespace osteo::simulation::overlap
+}  // namespace osteo::inline simulation::overlap

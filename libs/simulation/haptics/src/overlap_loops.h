@@ -1,5 +1,5 @@
-// The body of the overlap kernel, compiled once for each instruction set. A row of a brick is a vector of eight: the same operations on
-// the same lanes everywhere, no fused ones, so the same bits.
+// The body of the overlap kernel, compiled once for each instruction set. A row of a brick is a vector of eight: the
+// same operations on the same lanes everywhere, no fused ones, so the same bits.
 #include <cstring>
 
 #include "overlap_kernel.h"
@@ -37,9 +37,9 @@ inline float sum(F a) {
   return (e0 + e2) + (e1 + e3);
 }
 
-// Share of a unit cube on the inner side of a plane, and the area of the plane inside it. `s`: how far inside the shape the cube's
-// centre lies; nx, ny, nz: the unit normal. R. Scardovelli, S. Zaleski, J. Comput. Phys. 164 (2000), in the form without cancellation
-// for normals nearly along an axis; within 3e-5.
+// Share of a unit cube on the inner side of a plane, and the area of the plane inside it. `s`: how far inside the shape
+// the cube's centre lies; nx, ny, nz: the unit normal. R. Scardovelli, S. Zaleski, J. Comput. Phys. 164 (2000), in the
+// form without cancellation for normals nearly along an axis; within 3e-5.
 inline void cut_cube(F s, F nx, F ny, F nz, F& share, F& area) {
   const F ax = absolute(nx), ay = absolute(ny), az = absolute(nz);
   const F total = ax + ay + az, scale = all(1) / total;
@@ -78,11 +78,13 @@ inline F arc_sine(F x) {
 }
 
 template <bool kBall>
-void brick(const Shape& shape, const float* values, const float* first, VoxelKey key, Sums& sums, HitList& list, PartialList& partial) {
+void brick(const Shape& shape, const float* values, const float* first, VoxelKey key, Sums& sums, HitList& list,
+           PartialList& partial) {
   const F lane{0, 1, 2, 3, 4, 5, 6, 7};
   const F ax = all(shape.axis[0]), ay = all(shape.axis[1]), az = all(shape.axis[2]);
   const F x = lane + all(first[0]);
-  // Half a row and half a voxel's diagonal: a row whose middle is farther than this from the surface is wholly in or out.
+  // Half a row and half a voxel's diagonal: a row whose middle is farther than this from the surface is wholly in or
+  // out.
   constexpr float kReach = 3.5F + 0.9F;
   // Farther out than half its diagonal a voxel has no share in the shape.
   constexpr float kOut = 0.9F;
@@ -100,7 +102,8 @@ void brick(const Shape& shape, const float* values, const float* first, VoxelKey
         const F along = qx * ax + qy * ay + qz * az;
         const F off = root(most(q2 - along * along, all(0)));
         const F t = least(most(along - off * all(shape.slope_run), all(0)), all(shape.length));
-        row_depth = all(shape.start_radius) - all(shape.slope) * t - root(most(q2 - all(2) * t * along + t * t, all(0)));
+        row_depth =
+            all(shape.start_radius) - all(shape.slope) * t - root(most(q2 - all(2) * t * along + t * t, all(0)));
       }
     }
     for (int j = 0; j < 8; ++j) {
@@ -134,7 +137,8 @@ void brick(const Shape& shape, const float* values, const float* first, VoxelKey
       F share = all(1);
       if (!whole) {
         const F radius = all(shape.start_radius) - all(shape.slope) * t;
-        // The surface curves away from the plane that stands for it: in the mean over a cube by 1/24 of the sum of its curvatures.
+        // The surface curves away from the plane that stands for it: in the mean over a cube by 1/24 of the sum of its
+        // curvatures.
         F curvature = all(1.0F / 24) / most(radius, all(0.5F));
         if constexpr (kBall) {
           curvature = curvature + curvature;
@@ -145,7 +149,8 @@ void brick(const Shape& shape, const float* values, const float* first, VoxelKey
         F area;
         cut_cube(radius - distance - curvature, nx, ny, nz, share, area);
         const M both = (density < all(1)) & (density > all(0)) & (share < all(1)) & (share > all(0));
-        const unsigned begun = partial.begun != nullptr ? partial.begun[key / 8 + static_cast<std::uint32_t>(k * 8 + j)] : 0U;
+        const unsigned begun =
+            partial.begun != nullptr ? partial.begun[key / 8 + static_cast<std::uint32_t>(k * 8 + j)] : 0U;
         if (begun != 0 || any_of(both)) {
           for (int l = 0; l < 8 && partial.count < partial.capacity; ++l) {
             if (both[l] == 0 && ((begun >> l & 1U) == 0 || !(share[l] > 0) || !(density[l] > 0))) continue;
@@ -191,8 +196,8 @@ void brick(const Shape& shape, const float* values, const float* first, VoxelKey
   }
 }
 
-inline void run_brick(const Shape& shape, const float* values, const float* first, VoxelKey key, Sums& sums, HitList& list,
-                      PartialList& partial) {
+inline void run_brick(const Shape& shape, const float* values, const float* first, VoxelKey key, Sums& sums,
+                      HitList& list, PartialList& partial) {
   if (shape.ball) {
     brick<true>(shape, values, first, key, sums, list, partial);
   } else {
@@ -200,14 +205,17 @@ inline void run_brick(const Shape& shape, const float* values, const float* firs
   }
 }
 
-// 64 points of a voxel's cubes, from a cube's middle: a lattice of rank 1 with the generators of the longest shortest dual vector, so that
-// planes of points are close together whichever way they face, and along an axis no two points are level.
+// 64 points of a voxel's cubes, from a cube's middle: a lattice of rank 1 with the generators of the longest shortest
+// dual vector, so that planes of points are close together whichever way they face, and along an axis no two points are
+// level.
 struct Lattice {
   float x[64], y[64], z[64];
 };
 constexpr Lattice lattice(unsigned parts) {
   Lattice l{};
-  const auto at = [&](unsigned n) { return ((static_cast<float>(n % 64) + 0.5F) / 64 - 0.5F) / static_cast<float>(parts); };
+  const auto at = [&](unsigned n) {
+    return ((static_cast<float>(n % 64) + 0.5F) / 64 - 0.5F) / static_cast<float>(parts);
+  };
   for (unsigned n = 0; n < 64; ++n) {
     l.x[n] = at(n);
     l.y[n] = at(n * 5);
@@ -216,7 +224,8 @@ constexpr Lattice lattice(unsigned parts) {
   return l;
 }
 
-// Middles of the cubes of a voxel that is cut kParts times along each edge, from its own; a whole number of eights of them.
+// Middles of the cubes of a voxel that is cut kParts times along each edge, from its own; a whole number of eights of
+// them.
 template <unsigned kParts>
 struct Cubes {
   static constexpr unsigned kCount = kParts * kParts * kParts;
@@ -238,8 +247,8 @@ inline F load(const float* p) {
   return v;
 }
 
-// Clears the bits of points that lie `inside` what takes them; `depth`: how far inside. Cubes that are in or out as a whole are told by
-// their middle.
+// Clears the bits of points that lie `inside` what takes them; `depth`: how far inside. Cubes that are in or out as a
+// whole are told by their middle.
 template <unsigned kParts, class Depth, class Inside>
 inline std::uint32_t sift(std::uint64_t* left, const float* at, Depth depth, Inside inside) {
   static constexpr Cubes<kParts> kCubes = cubes<kParts>();
@@ -268,7 +277,8 @@ inline std::uint32_t sift(std::uint64_t* left, const float* at, Depth depth, Ins
         for (std::int32_t g = 0; g < 8; ++g) {
           const std::int32_t bit = 1 << g;
           const M bits{bit, bit, bit, bit, bit, bit, bit, bit};
-          set |= inside(mx + load(kLattice.x + 8 * g), my + load(kLattice.y + 8 * g), mz + load(kLattice.z + 8 * g)) & bits;
+          set |= inside(mx + load(kLattice.x + 8 * g), my + load(kLattice.y + 8 * g), mz + load(kLattice.z + 8 * g)) &
+                 bits;
         }
         using B = std::uint8_t __attribute__((vector_size(8)));
         const B bytes = __builtin_convertvector(set, B);
@@ -283,7 +293,9 @@ inline std::uint32_t sift(std::uint64_t* left, const float* at, Depth depth, Ins
 }
 template <class Depth, class Inside>
 inline std::uint32_t sift(std::uint32_t parts, std::uint64_t* left, const float* at, Depth depth, Inside inside) {
-  return parts == 1 ? sift<1>(left, at, depth, inside) : parts == 2 ? sift<2>(left, at, depth, inside) : sift<4>(left, at, depth, inside);
+  return parts == 1   ? sift<1>(left, at, depth, inside)
+         : parts == 2 ? sift<2>(left, at, depth, inside)
+                      : sift<4>(left, at, depth, inside);
 }
 
 inline std::uint32_t take_grains(const Shape& shape, const float* at, std::uint32_t parts, std::uint64_t* left) {
@@ -328,4 +340,4 @@ inline std::uint32_t grains_beyond(const float* inwards, float least_dot, std::u
 }
 
 }  // namespace
-}  // namespace osteo::simulation::overlap
+}  // namespace osteo::inline simulation::overlap

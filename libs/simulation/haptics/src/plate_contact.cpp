@@ -6,8 +6,8 @@
 #include "osteo/simulation/haptics/haptic_scene.h"
 
 namespace osteo::inline simulation {
-ContactResult plate_contact(const PlateInHand& plate, const RigidTransform& world_from_plate, std::span<const HapticScene::Item> items,
-                            const ContactParams& params) noexcept {
+ContactResult plate_contact(const PlateInHand& plate, const RigidTransform& world_from_plate,
+                            std::span<const HapticScene::Item> items, const ContactParams& params) noexcept {
   constexpr double kReachMm = 4;    // farther than that inside bone a sample knows no way out
   constexpr double kFullMm = 0.05;  // from this depth on a sample counts with its whole area
   ContactResult r;
@@ -64,4 +64,4 @@ ContactResult plate_contact(const PlateInHand& plate, const RigidTransform& worl
   return r;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -23,7 +23,8 @@ HapticRenderer::HapticRenderer(const HapticSetup& setup, const Anatomy& anatomy,
     : setup_(setup), anatomy_(anatomy), common_(std::make_unique<Common>()) {
   if (!(dt_s > 0) || !(dt_s <= 1)) throw Error(ExitCode::usage, "the servo's rate must be a number from 1 Hz on");
   if (setup.hands() > kMostHands)
-    throw Error(ExitCode::usage, std::to_string(setup.hands()) + " hands are too many", "at most " + std::to_string(kMostHands));
+    throw Error(ExitCode::usage, std::to_string(setup.hands()) + " hands are too many",
+                "at most " + std::to_string(kMostHands));
   if (anatomy_.structures) {
     clearances_.resize(anatomy_.structures->values().size());
     met_.resize(clearances_.size());
@@ -77,7 +78,8 @@ void HapticRenderer::guide(const SceneAction& action) noexcept {
 
 // Who leads, and what the led are told of it: poses of this tick, the leader's force of the tick before.
 void HapticRenderer::lead(std::span<const DeviceSample> samples) noexcept {
-  for (const auto& hand : hands_) hand->leads(!hand->guided().on());  // other hands of a lesson stand still with the first
+  for (const auto& hand : hands_)
+    hand->leads(!hand->guided().on());  // other hands of a lesson stand still with the first
   for (const auto& hand : hands_) {
     const HandGuide& guide = hand->guided();
     if (!guide.on()) continue;
@@ -97,7 +99,8 @@ double HapticRenderer::stiffness_n_per_mm(std::size_t hand) const {
 // What is at risk belongs to the patient: it goes with the first body.
 void HapticRenderer::watch(HandRenderer& hand) noexcept {
   const RigidTransform& own = common_->scene->items.front().body_from_world;
-  const auto nearest = anatomy_.structures->clearance(hand.head(), own(hand.shown_mm()), own.rotation * hand.axis(), clearances_);
+  const auto nearest =
+      anatomy_.structures->clearance(hand.head(), own(hand.shown_mm()), own.rotation * hand.axis(), clearances_);
   hand.record().clearance_mm = static_cast<float>(nearest.distance_mm);
   hand.record().structure = nearest.structure;
   for (std::size_t s = 0; s < events_.size(); ++s) {
@@ -111,7 +114,8 @@ void HapticRenderer::watch(HandRenderer& hand) noexcept {
 std::map<std::uint32_t, StructureEvents> HapticRenderer::structure_events() const {
   std::map<std::uint32_t, StructureEvents> by_value;
   for (std::size_t s = 0; s < events_.size(); ++s) {
-    if (events_[s].least_clearance_mm < anatomy_.structures->reach_mm()) by_value.emplace(anatomy_.structures->values()[s], events_[s]);
+    if (events_[s].least_clearance_mm < anatomy_.structures->reach_mm())
+      by_value.emplace(anatomy_.structures->values()[s], events_[s]);
   }
   return by_value;
 }
@@ -146,4 +150,4 @@ HapticRenderer::HandStep HapticRenderer::step(const DeviceSample& sample) noexce
   return {s.hands.front(), s.changes};
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

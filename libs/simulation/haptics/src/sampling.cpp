@@ -26,7 +26,8 @@ void SampledHead::begin(const DeviceSample& pose) noexcept {
 double SampledHead::share(const BrickGrid& bone, const Grains* known) noexcept {
   if (known == nullptr || known->used() == 0) return 1;
   measured_ = true;
-  const OverlapResult& o = overlap_.measure(bone, known, tool_of(pose_), position_of(pose_), axis_of(pose_), pose_.pedal != 0);
+  const OverlapResult& o =
+      overlap_.measure(bone, known, tool_of(pose_), position_of(pose_), axis_of(pose_), pose_.pedal != 0);
   return o.spread_mm3 > 0 ? std::min(1.0, o.bone_mm3 / o.spread_mm3) : 1;
 }
 
@@ -35,7 +36,8 @@ Cut SampledHead::cut(const BrickGrid& bone, const Grains* known) noexcept {
   return overlap_.cut();
 }
 
-VolumeSampling::VolumeSampling(const ContactParams& params, double spacing_mm) : ContactModel(params), head_(spacing_mm) {
+VolumeSampling::VolumeSampling(const ContactParams& params, double spacing_mm)
+    : ContactModel(params), head_(spacing_mm) {
   for (const Instrument& i : instrument_library()) {
     Tool tool{sample_head(i.head, i.falloff_per_rad), {}, {}, {}, false};
     tool.offset_index.resize(tool.samples.offset_mm.size());
@@ -82,8 +84,8 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
   const std::size_t n = tool.offset_index.size();
   for (std::size_t s = 0; s < n; ++s) {
     const auto& o = tool.offset_index[s];
-    const VoxelKey voxel =
-        bone.find(static_cast<int>(cx + o[0]) - kBase, static_cast<int>(cy + o[1]) - kBase, static_cast<int>(cz + o[2]) - kBase);
+    const VoxelKey voxel = bone.find(static_cast<int>(cx + o[0]) - kBase, static_cast<int>(cy + o[1]) - kBase,
+                                     static_cast<int>(cz + o[2]) - kBase);
     if (voxel == BrickGrid::kNone) continue;
     const float density = bone.value(voxel);
     if (density <= 0) continue;
@@ -114,7 +116,8 @@ Cut VolumeSampling::cut(const BrickGrid& bone) noexcept {
 }
 
 RaySampling::RaySampling(const ContactParams& params, double spacing_mm) : ContactModel(params), head_(spacing_mm) {
-  for (const Instrument& i : instrument_library()) tools_.push_back(sample_head_surface(i.head, i.falloff_per_rad, kSamples));
+  for (const Instrument& i : instrument_library())
+    tools_.push_back(sample_head_surface(i.head, i.falloff_per_rad, kSamples));
   static_cast<void>(head_cut_depth(0));  // not in the servo
 }
 
@@ -171,4 +174,4 @@ Cut RaySampling::cut(const BrickGrid& bone) noexcept {
   return head_.cut(bone, known_);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -28,4 +28,4 @@ Vec3 SawSlot::force_n(double stiffness_n_per_mm, double most_n) const noexcept {
   return held_.normal * std::clamp(-stiffness_n_per_mm * offset_mm_ * share_, -most_n, most_n);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

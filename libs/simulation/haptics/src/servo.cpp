@@ -14,7 +14,8 @@ Servo::Servo(HapticRenderer& renderer, std::span<Device* const> devices, Stream&
       dt_s_(1 / rate_hz),
       pause_ticks_(static_cast<std::uint64_t>(std::max(1.0, std::round(kStrokePauseS * rate_hz)))) {
   if (devices_.size() != renderer.hands())
-    throw Error(ExitCode::usage, std::to_string(devices_.size()) + " devices for " + std::to_string(renderer.hands()) + " hands",
+    throw Error(ExitCode::usage,
+                std::to_string(devices_.size()) + " devices for " + std::to_string(renderer.hands()) + " hands",
                 "give the traits of each device in the setup: device, more_devices");
 }
 
@@ -87,4 +88,4 @@ bool Servo::step(std::int64_t lateness_ns) noexcept {
   return true;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -44,7 +44,8 @@ DeviceSample SimulatedDevice::read(std::uint64_t tick, double dt_s, Vec3 force_n
   const Vec3 acting = forces_[static_cast<std::size_t>((newest_ - behind + kLongestDelay) % kLongestDelay)];
   double seconds = dt_s;
   if (params_.late_share > 0) {
-    const double chance = static_cast<double>(next(random_) >> 11) * 0x1p-53, amount = static_cast<double>(next(random_) >> 11) * 0x1p-53;
+    const double chance = static_cast<double>(next(random_) >> 11) * 0x1p-53,
+                 amount = static_cast<double>(next(random_) >> 11) * 0x1p-53;
     if (chance < params_.late_share) seconds += 0.001 + 0.002 * amount;
   }
   advance(seconds, acting);
@@ -59,4 +60,4 @@ DeviceSample SimulatedDevice::read(std::uint64_t tick, double dt_s, Vec3 force_n
   return sample;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

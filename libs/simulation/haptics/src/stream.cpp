@@ -10,9 +10,11 @@ namespace osteo::inline simulation {
 StreamReader& Stream::add_reader(std::size_t tick_capacity, std::size_t change_capacity) {
   auto made = std::make_unique<StreamReader>(tick_capacity, change_capacity);
   const std::lock_guard lock(mutex_);
-  const auto slot = std::find_if(slots_.begin(), slots_.end(), [](const auto& s) { return s.load(std::memory_order_relaxed) == nullptr; });
+  const auto slot = std::find_if(slots_.begin(), slots_.end(),
+                                 [](const auto& s) { return s.load(std::memory_order_relaxed) == nullptr; });
   if (slot == slots_.end())
-    throw Error(ExitCode::resources, "the stream has " + std::to_string(kMostReaders) + " readers already", "let one of them leave");
+    throw Error(ExitCode::resources, "the stream has " + std::to_string(kMostReaders) + " readers already",
+                "let one of them leave");
   readers_.push_back(std::move(made));
   slot->store(readers_.back().get(), std::memory_order_seq_cst);
   return *readers_.back();
@@ -28,4 +30,4 @@ void Stream::remove_reader(StreamReader& reader) {
   std::erase_if(readers_, [&](const auto& r) { return r.get() == &reader; });
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

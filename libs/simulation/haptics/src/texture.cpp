@@ -55,7 +55,9 @@ TextureModel parse_texture(std::string_view text, const std::string& name) {
   const JsonFile file(text, name);
   const JsonValue& root = file.root();
   file.require_format("osteotome_texture");
-  file.allow(root, "", std::vector<std::string>{"osteotome_texture", "about", "source", "rate_hz", "force_n", "speed_mm_s", "models"});
+  file.allow(
+      root, "",
+      std::vector<std::string>{"osteotome_texture", "about", "source", "rate_hz", "force_n", "speed_mm_s", "models"});
   TextureModel t;
   t.rate_hz = file.number(file.need(root, "", "rate_hz"), "\"rate_hz\"", 100, 20000);
   const auto axis = [&](const char* key, double most) {
@@ -63,7 +65,8 @@ TextureModel parse_texture(std::string_view text, const std::string& name) {
     const JsonValue& list = file.need(root, "", key);
     for (const JsonValue& item : file.list(list, std::string("\"") + key + "\"")) {
       v.push_back(file.number(item, std::string("an item of \"") + key + "\"", 0, most));
-      if (v.size() > 1 && !(v.back() > v[v.size() - 2])) throw file.wrong(item, std::string("\"") + key + "\" must rise");
+      if (v.size() > 1 && !(v.back() > v[v.size() - 2]))
+        throw file.wrong(item, std::string("\"") + key + "\" must rise");
     }
     if (v.empty()) throw file.wrong(list, std::string("\"") + key + "\" is empty");
     return v;
@@ -90,15 +93,18 @@ TextureModel parse_texture(std::string_view text, const std::string& name) {
     there[at] = true;
     std::vector<double> ar;
     const JsonValue& list = file.need(m, where, "ar");
-    for (const JsonValue& v : file.list(list, where + ": \"ar\"")) ar.push_back(file.number(v, where + ": an item of \"ar\""));
+    for (const JsonValue& v : file.list(list, where + ": \"ar\""))
+      ar.push_back(file.number(v, where + ": an item of \"ar\""));
     if (number == 1) order = ar.size();
     if (ar.size() != order || ar.size() > TextureModel::kMostOrder)
       throw file.wrong(list, where + ": \"ar\" must have as many coefficients as the first, at most 64");
-    if (!to_reflection(ar, t.nodes[at].reflection)) throw file.wrong(list, where + " is not stable: what rings would grow");
+    if (!to_reflection(ar, t.nodes[at].reflection))
+      throw file.wrong(list, where + " is not stable: what rings would grow");
     t.nodes[at].noise_n2 = file.number(file.need(m, where, "noise_n2"), where + ": \"noise_n2\"", 0, 100);
   }
   if (const auto missing = std::find(there.begin(), there.end(), false); missing != there.end())
-    throw file.wrong(models, "\"models\" needs one for each force and speed: " + std::to_string(t.nodes.size()) + ", all different");
+    throw file.wrong(
+        models, "\"models\" needs one for each force and speed: " + std::to_string(t.nodes.size()) + ", all different");
   return t;
 }
 
@@ -128,14 +134,16 @@ TextureModel load_texture(const std::filesystem::path& path, double mass_kg) {
 
 TextureModel::Node node_of_spectrum(const std::vector<double>& power, double rate, std::size_t order) {
   if (order < 1 || order > TextureModel::kMostOrder || power.size() < 17 || power.size() <= order || !(rate > 0))
-    throw Error(ExitCode::usage, "a texture's model takes 1 to 64 coefficients, and a spectrum of more values than that");
+    throw Error(ExitCode::usage,
+                "a texture's model takes 1 to 64 coefficients, and a spectrum of more values than that");
   // Autocorrelation: the trapezoid of power times cosine.
   const std::size_t n = power.size() - 1;
   std::vector<double> r(order + 1, 0);
   for (std::size_t m = 0; m <= order; ++m)
     for (std::size_t i = 0; i <= n; ++i) {
       const double weight = (i == 0 || i == n ? 0.5 : 1) * rate / 2 / static_cast<double>(n);
-      r[m] += weight * power[i] * portable::sin_cos_turns(std::fmod(static_cast<double>(m * i) / static_cast<double>(2 * n), 1.0)).cos;
+      r[m] += weight * power[i] *
+              portable::sin_cos_turns(std::fmod(static_cast<double>(m * i) / static_cast<double>(2 * n), 1.0)).cos;
     }
   TextureModel::Node node;
   node.reflection.assign(order, 0);
@@ -175,7 +183,8 @@ TextureModel at_rate(const TextureModel& model, double rate) {
       if (hz <= model.rate_hz / 2) power[i] = spectrum_n2_per_hz(node, hz, model.rate_hz);
       most = std::max(most, power[i]);
     }
-    for (double& v : power) v = std::max(v, 1e-4 * most);  // 40 dB below the loudest: what a model of so few numbers can hold
+    for (double& v : power)
+      v = std::max(v, 1e-4 * most);  // 40 dB below the loudest: what a model of so few numbers can hold
     node = node_of_spectrum(power, rate, TextureModel::kMostOrder);
   }
   return out;
@@ -249,9 +258,11 @@ double Texture::step(double force_n, double speed_mm_s) noexcept {
   const bool touching = force_n > 0;
   const Between f = between(model_.forces_n, force_n), s = between(model_.speeds_mm_s, speed_mm_s);
   const std::size_t wide = model_.speeds_mm_s.size();
-  const std::array<const TextureModel::Node*, 4> node{&model_.nodes[f.low * wide + s.low], &model_.nodes[f.low * wide + s.high],
-                                                      &model_.nodes[f.high * wide + s.low], &model_.nodes[f.high * wide + s.high]};
-  const std::array<double, 4> weight{(1 - f.share) * (1 - s.share), (1 - f.share) * s.share, f.share * (1 - s.share), f.share * s.share};
+  const std::array<const TextureModel::Node*, 4> node{
+      &model_.nodes[f.low * wide + s.low], &model_.nodes[f.low * wide + s.high], &model_.nodes[f.high * wide + s.low],
+      &model_.nodes[f.high * wide + s.high]};
+  const std::array<double, 4> weight{(1 - f.share) * (1 - s.share), (1 - f.share) * s.share, f.share * (1 - s.share),
+                                     f.share * s.share};
   // Amplitudes are interpolated, not powers: what is halfway sounds halfway.
   double amplitude = 0;
   for (std::size_t i = 0; i < 4; ++i) amplitude += weight[i] * std::sqrt(node[i]->noise_n2);
@@ -282,4 +293,4 @@ Vec3 SlidingTexture::step(Vec3 at, Vec3 normal, double pressed_n) noexcept {
   return pressed_n > 0 && speed > 1e-6 ? cross(normal, along) * (shake / speed) : Vec3{};
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -97,8 +97,8 @@ Recorded recorded_of(const HattReader& in, const Tree& m, double rate) {
 
 // Where a force and a speed lie in the triangles: models and their weights; outside all, the nearest model.
 std::vector<std::pair<std::size_t, double>> weights(const std::vector<Recorded>& models,
-                                                    const std::vector<std::array<std::size_t, 3>>& tris, double force, double speed,
-                                                    double force_unit, double speed_unit) {
+                                                    const std::vector<std::array<std::size_t, 3>>& tris, double force,
+                                                    double speed, double force_unit, double speed_unit) {
   for (const auto& t : tris) {
     const Recorded &a = models[t[0]], &b = models[t[1]], &c = models[t[2]];
     const double area = (b.speed - a.speed) * (c.force - a.force) - (c.speed - a.speed) * (b.force - a.force);
@@ -144,7 +144,8 @@ TextureModel parse_hatt(std::string_view xml, const std::string& name, double ma
     tris.push_back(tri);
   }
   if (models.empty()) throw in.wrong("there is no <model>");
-  if (static_cast<double>(models.size()) != in.number(in.set(), "numMod")) throw in.wrong("there are not <numMod> models");
+  if (static_cast<double>(models.size()) != in.number(in.set(), "numMod"))
+    throw in.wrong("there are not <numMod> models");
   double most_force = 0, most_speed = 0;
   for (const Recorded& m : models) {
     most_force = std::max(most_force, m.force);
@@ -167,4 +168,4 @@ TextureModel parse_hatt(std::string_view xml, const std::string& name, double ma
   return t;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

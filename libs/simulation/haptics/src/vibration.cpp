@@ -40,10 +40,12 @@ VibrationSpectrum parse_vibration(std::string_view text, const std::string& name
       const auto value = [&](const char* name_of, double least, double most) {
         return file.number(file.need(p, where, name_of), where + ": \"" + name_of + "\"", least, most);
       };
-      const VibrationSpectrum::Peak peak{value("frequency_hz", 0.001, 1e6), value("idle_n", 0, 10), value("per_n", 0, 1)};
+      const VibrationSpectrum::Peak peak{value("frequency_hz", 0.001, 1e6), value("idle_n", 0, 10),
+                                         value("per_n", 0, 1)};
       if (peak.frequency_hz >= lo && peak.frequency_hz <= hi) s.by_kind[index].push_back(peak);
     }
-    if (s.by_kind[index].size() > VibrationSpectrum::kMostPeaks) throw file.wrong(peaks, key + " has more than 16 peaks in the band");
+    if (s.by_kind[index].size() > VibrationSpectrum::kMostPeaks)
+      throw file.wrong(peaks, key + " has more than 16 peaks in the band");
   }
   return s;
 }
@@ -80,4 +82,4 @@ std::array<double, 2> Vibration::step(BurrKind kind, double pressed_n, double dt
   return force;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -53,7 +53,8 @@ void widen(const Brick& b, Value value, std::array<T, kWideCells>& out) {
       for (int y = lo[1]; y < hi[1]; ++y) {
         const int row = (y + off[1]) * 8 + (z + off[2]) * 64 + off[0];
         for (int x = lo[0]; x < hi[0]; ++x)
-          out[static_cast<std::size_t>(at_wide(x, y, z))] = from == nullptr ? T{} : value(*from)[static_cast<std::size_t>(row + x)];
+          out[static_cast<std::size_t>(at_wide(x, y, z))] =
+              from == nullptr ? T{} : value(*from)[static_cast<std::size_t>(row + x)];
       }
     }
   }
@@ -61,10 +62,12 @@ void widen(const Brick& b, Value value, std::array<T, kWideCells>& out) {
 
 }  // namespace
 
-HeatField::HeatField(double cell_mm, const HeatMaterials& m, MatterAt matter) : cell_mm_(cell_mm), matter_(std::move(matter)) {
+HeatField::HeatField(double cell_mm, const HeatMaterials& m, MatterAt matter)
+    : cell_mm_(cell_mm), matter_(std::move(matter)) {
   const auto positive = [](double x) { return std::isfinite(x) && x > 0; };
-  if (!positive(cell_mm) || !positive(m.bone_w_per_m_k) || !positive(m.bone_kg_per_m3) || !positive(m.bone_j_per_kg_k) ||
-      !positive(m.tissue_w_per_m_k) || !positive(m.tissue_kg_per_m3) || !positive(m.tissue_j_per_kg_k))
+  if (!positive(cell_mm) || !positive(m.bone_w_per_m_k) || !positive(m.bone_kg_per_m3) ||
+      !positive(m.bone_j_per_kg_k) || !positive(m.tissue_w_per_m_k) || !positive(m.tissue_kg_per_m3) ||
+      !positive(m.tissue_j_per_kg_k))
     throw Error(ExitCode::usage, "cells and materials of heat must be above zero", "");
   const double volume = cell_mm * cell_mm * cell_mm;
   bone_j_per_k_ = m.bone_kg_per_m3 * m.bone_j_per_kg_k / kMm3PerM3 * volume;
@@ -100,8 +103,8 @@ void HeatField::links_are_old_around(Brick& b) {
   }
 }
 
-// Of a square of four full cells a sixth goes along each diagonal and a twelfth along each side, else a quarter along each side: both let
-// the same heat through along either axis.
+// Of a square of four full cells a sixth goes along each diagonal and a twelfth along each side, else a quarter along
+// each side: both let the same heat through along either axis.
 void HeatField::link(Brick& b) {
   std::array<float, kWideCells> k;
   widen(
@@ -112,7 +115,8 @@ void HeatField::link(Brick& b) {
       for (int y = -1; y < 8; ++y) {
         for (int x = -1; x < 8; ++x) {
           const float* const c = &k[static_cast<std::size_t>(at_wide(x, y, z))];
-          b.diagonal[normal][static_cast<std::size_t>(at_link(x, y, z))] = std::min(std::min(c[0], c[u]), std::min(c[v], c[u + v])) / 6;
+          b.diagonal[normal][static_cast<std::size_t>(at_link(x, y, z))] =
+              std::min(std::min(c[0], c[u]), std::min(c[v], c[u + v])) / 6;
         }
       }
     }
@@ -129,7 +133,8 @@ void HeatField::link(Brick& b) {
           const float* const two = &k[static_cast<std::size_t>(at_wide(x, y, z))];
           const auto of = [](const auto& all, int n) { return all[static_cast<std::size_t>(n)]; };
           b.face[axis][static_cast<std::size_t>(c)] =
-              std::max(0.0F, std::min(two[0], two[kWide[axis]]) - ((of(p, c) + of(p, c - along_p)) + (of(q, c) + of(q, c - along_q))));
+              std::max(0.0F, std::min(two[0], two[kWide[axis]]) -
+                                 ((of(p, c) + of(p, c - along_p)) + (of(q, c) + of(q, c - along_q))));
         }
       }
     }
@@ -143,7 +148,8 @@ HeatField::Brick& HeatField::make(Ijk at) {
   made = std::make_unique<Brick>();
   Brick& b = *made;
   b.at = at;
-  for (int c = 0; c < kCells; ++c) fill(b, c, matter_({at.i * 8 + (c & 7), at.j * 8 + (c >> 3 & 7), at.k * 8 + (c >> 6)}));
+  for (int c = 0; c < kCells; ++c)
+    fill(b, c, matter_({at.i * 8 + (c & 7), at.j * 8 + (c >> 3 & 7), at.k * 8 + (c >> 6)}));
   for (int n = 0; n < 27; ++n) {
     const auto it = bricks_.find(key_of(around(at, n)));
     if (it == bricks_.end() || !it->second) continue;
@@ -179,7 +185,8 @@ double HeatField::add(const Ball& where, double joules) {
   const double capacity = holds(where);
   if (!(capacity > 0)) return 0;
   for_ball(where, true, [&](Brick& b, int c, Ijk) {
-    b.source[static_cast<std::size_t>(c)] += joules * static_cast<double>(b.capacity[static_cast<std::size_t>(c)]) / capacity;
+    b.source[static_cast<std::size_t>(c)] +=
+        joules * static_cast<double>(b.capacity[static_cast<std::size_t>(c)]) / capacity;
     b.heated = true;
   });
   ledger_.added_j += joules;
@@ -188,7 +195,8 @@ double HeatField::add(const Ball& where, double joules) {
 
 double HeatField::holds(const Ball& where) {
   double capacity = 0;
-  for_ball(where, true, [&](Brick& b, int c, Ijk) { capacity += static_cast<double>(b.capacity[static_cast<std::size_t>(c)]); });
+  for_ball(where, true,
+           [&](Brick& b, int c, Ijk) { capacity += static_cast<double>(b.capacity[static_cast<std::size_t>(c)]); });
   return capacity;
 }
 
@@ -266,7 +274,8 @@ void HeatField::heat(double share) {
 }
 
 void HeatField::conduct(double seconds) {
-  // Each cell asks its neighbours: what two say of their common link differs in sign only. Loops over x are plain vectors.
+  // Each cell asks its neighbours: what two say of their common link differs in sign only. Loops over x are plain
+  // vectors.
   std::array<double, kWideCells> wide;
   for (auto& [key, made] : bricks_) {
     Brick& b = *made;
@@ -283,12 +292,16 @@ void HeatField::conduct(double seconds) {
           const float* const face = &b.face[axis][static_cast<std::size_t>(first)];
           const int by = kWide[axis], back = kLink[axis];
           for (int x = 0; x < 8; ++x)
-            q[x] += static_cast<double>(face[x]) * (t[x + by] - t[x]) + static_cast<double>(face[x - back]) * (t[x - by] - t[x]);
+            q[x] += static_cast<double>(face[x]) * (t[x + by] - t[x]) +
+                    static_cast<double>(face[x - back]) * (t[x - by] - t[x]);
           const float* const d = &b.diagonal[axis][static_cast<std::size_t>(first)];
-          const int u = kWide[(axis + 1) % 3], v = kWide[(axis + 2) % 3], lu = kLink[(axis + 1) % 3], lv = kLink[(axis + 2) % 3];
+          const int u = kWide[(axis + 1) % 3], v = kWide[(axis + 2) % 3], lu = kLink[(axis + 1) % 3],
+                    lv = kLink[(axis + 2) % 3];
           for (int x = 0; x < 8; ++x) {
-            q[x] += (static_cast<double>(d[x]) * (t[x + u + v] - t[x]) + static_cast<double>(d[x - lu - lv]) * (t[x - u - v] - t[x])) +
-                    (static_cast<double>(d[x - lu]) * (t[x - u + v] - t[x]) + static_cast<double>(d[x - lv]) * (t[x + u - v] - t[x]));
+            q[x] += (static_cast<double>(d[x]) * (t[x + u + v] - t[x]) +
+                     static_cast<double>(d[x - lu - lv]) * (t[x - u - v] - t[x])) +
+                    (static_cast<double>(d[x - lu]) * (t[x - u + v] - t[x]) +
+                     static_cast<double>(d[x - lv]) * (t[x + u - v] - t[x]));
           }
         }
       }
@@ -298,8 +311,10 @@ void HeatField::conduct(double seconds) {
     Brick& b = *made;
     for (std::size_t c = 0; c < kCells; ++c) {
       const double holds = static_cast<double>(b.capacity[c]);
-      // Water halfway between before and after: stable however strong the film, since an open face stands where a neighbour would.
-      const double film = b.cooled ? 0.5 * seconds * static_cast<double>(b.film[c]) : 0, water = static_cast<double>(b.water[c]);
+      // Water halfway between before and after: stable however strong the film, since an open face stands where a
+      // neighbour would.
+      const double film = b.cooled ? 0.5 * seconds * static_cast<double>(b.film[c]) : 0,
+                   water = static_cast<double>(b.water[c]);
       if (!(holds > 0)) continue;
       const double before = b.kelvin[c];
       b.kelvin[c] = (before * (holds - film) + b.change[c] * seconds + 2 * film * water) / (holds + film);
@@ -315,7 +330,8 @@ void HeatField::wake_and_forget() {
     const int axis = d / 2, at = d % 2 == 0 ? 0 : 7;
     for (int n = 0; n < 64; ++n) {
       const int c = axis == 0 ? 8 * n + at : axis == 1 ? (n >> 3) * 64 + 8 * at + (n & 7) : 64 * at + n;
-      if (std::abs(b.kelvin[static_cast<std::size_t>(c)]) >= kLeastK && b.conducts[static_cast<std::size_t>(c)] > 0) return true;
+      if (std::abs(b.kelvin[static_cast<std::size_t>(c)]) >= kLeastK && b.conducts[static_cast<std::size_t>(c)] > 0)
+        return true;
     }
     return false;
   };
@@ -377,7 +393,8 @@ double HeatField::at(Vec3 where) const noexcept {
   double sum = 0, weights = 0;
   for (int n = 0; n < 8; ++n) {
     const Ijk c{o.i + (n & 1), o.j + (n >> 1 & 1), o.k + (n >> 2)};
-    const double w = ((n & 1) != 0 ? f[0] : 1 - f[0]) * ((n & 2) != 0 ? f[1] : 1 - f[1]) * ((n & 4) != 0 ? f[2] : 1 - f[2]);
+    const double w =
+        ((n & 1) != 0 ? f[0] : 1 - f[0]) * ((n & 2) != 0 ? f[1] : 1 - f[1]) * ((n & 4) != 0 ? f[2] : 1 - f[2]);
     const Brick* const b = find(brick_of(c));
     if (b != nullptr && b->capacity[static_cast<std::size_t>(place_of(c))] <= 0) continue;
     sum += w * (b == nullptr ? 0 : b->kelvin[static_cast<std::size_t>(place_of(c))]);
@@ -397,4 +414,4 @@ std::span<const double> HeatField::brick(Ijk at) const {
   return b == nullptr ? std::span<const double>() : std::span<const double>(b->kelvin);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -17,4 +17,4 @@ void ThermalDose::stay(double celsius, double seconds) noexcept {
   coagulated = coagulated || celsius >= kCoagulatedC;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -15,4 +15,4 @@ inline cv::Mat view_of(const GrayPicture& p) {
   return {p.height, p.width, CV_8UC1, const_cast<std::uint8_t*>(p.pixels.data())};
 }
 
-}  // namespace osteo::simulation::marker
+}  // namespace osteo::inline simulation::marker

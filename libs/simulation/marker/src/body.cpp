@@ -27,7 +27,8 @@ const cv::Ptr<cv::aruco::CharucoBoard>& plate_board() {
 
 std::vector<MarkerPatch> pen_markers(int pen, double scale) {
   if (pen < 1 || pen > PenBody::kMostPens)
-    throw Error(ExitCode::usage, "there is no pen " + std::to_string(pen), "pens are 1 to " + std::to_string(PenBody::kMostPens));
+    throw Error(ExitCode::usage, "there is no pen " + std::to_string(pen),
+                "pens are 1 to " + std::to_string(PenBody::kMostPens));
   std::vector<MarkerPatch> all;
   const int first = (pen - 1) * PenBody::kMarkers;
   for (int row = 0; row < 2; ++row) {
@@ -35,7 +36,8 @@ std::vector<MarkerPatch> pen_markers(int pen, double scale) {
       const double a = face * std::numbers::pi / 3;
       const Vec3 out{std::cos(a), std::sin(a), 0}, up{0, 0, 1};
       const double z = (row == 0 ? 0.25 : -0.25) * PenBody::kHeightMm;
-      all.push_back({first + 6 * row + face, (out * PenBody::kApothemMm + up * z) * scale, cross(up, out), up, PenBody::kMarkerMm * scale});
+      all.push_back({first + 6 * row + face, (out * PenBody::kApothemMm + up * z) * scale, cross(up, out), up,
+                     PenBody::kMarkerMm * scale});
     }
   }
   // Folded over from the upper edge of the second face.
@@ -67,7 +69,8 @@ std::vector<MarkerPatch> plate_markers() {
       const cv::Point3f& p = board.objPoints[i][c];
       return Vec3{p.x, p.y, p.z};
     };
-    all.push_back({board.ids[i], (at(0) + at(2)) * 0.5, normalized(at(1) - at(0)), normalized(at(0) - at(3)), PlateBody::kMarkerMm});
+    all.push_back({board.ids[i], (at(0) + at(2)) * 0.5, normalized(at(1) - at(0)), normalized(at(0) - at(3)),
+                   PlateBody::kMarkerMm});
   }
   return all;
 }
@@ -75,10 +78,11 @@ std::vector<MarkerPatch> plate_markers() {
 bool plate_square_is_black(int across, int down) {
   static const std::vector<MarkerPatch> markers = plate_markers();
   for (const MarkerPatch& m : markers) {
-    if (static_cast<int>(m.centre_mm.x / PlateBody::kSquareMm) == across && static_cast<int>(m.centre_mm.y / PlateBody::kSquareMm) == down)
+    if (static_cast<int>(m.centre_mm.x / PlateBody::kSquareMm) == across &&
+        static_cast<int>(m.centre_mm.y / PlateBody::kSquareMm) == down)
       return false;
   }
   return true;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

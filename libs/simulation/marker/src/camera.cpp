@@ -36,8 +36,9 @@ struct CameraFields {
     visit({"p2", "the same, across", "", -1, 1}, f.p2);
     visit({"mirrored", "the camera delivers mirrored pictures"}, c.mirrored);
     visit({"fps", "pictures a second that it is asked for", "Hz", 1, 1000}, c.fps);
-    visit({"latency_ms", "from the middle of an exposure until the picture is here (below 0: not known, one period is taken)", "ms", -1,
-           1000},
+    visit({"latency_ms",
+           "from the middle of an exposure until the picture is here (below 0: not known, one period is taken)", "ms",
+           -1, 1000},
           c.latency_ms);
     visit({"rms_px", "of its calibration", "pixels", 0, 1000}, c.rms_px);
     visit({"views", "of its calibration", "", 0, 100000}, c.views);
@@ -54,10 +55,12 @@ CameraModel load_camera(const fs::path& path) {
   file.read(file.root(), "", fields_of<CameraFields>(f));
   CameraModel& c = f.camera;
   c.distortion = {f.radial[0], f.radial[1], f.p1, f.p2, f.radial[2]};
-  if (std::abs(c.cx - 0.5 * c.width) > 0.5 * c.width || std::abs(c.cy - 0.5 * c.height) > 0.5 * c.height || c.fx > 2 * c.fy ||
-      c.fy > 2 * c.fx)
-    throw Error(ExitCode::usage, "'" + path.string() + "' describes a lens that looks past its own picture, or one far from square pixels",
-                "calibrate the camera again: osteo calibrate-camera");
+  if (std::abs(c.cx - 0.5 * c.width) > 0.5 * c.width || std::abs(c.cy - 0.5 * c.height) > 0.5 * c.height ||
+      c.fx > 2 * c.fy || c.fy > 2 * c.fx)
+    throw Error(
+        ExitCode::usage,
+        "'" + path.string() + "' describes a lens that looks past its own picture, or one far from square pixels",
+        "calibrate the camera again: osteo calibrate-camera");
   return c;
 }
 
@@ -148,7 +151,8 @@ Look CameraCalibration::add(const GrayPicture& picture) {
     if (most < 0.05) return Look::like_another;
   }
   if (views() >= kMostViews) return Look::like_another;
-  // Corners that the plane of the others does not explain were moved by blur. A lens bends the plane by a few pixels only.
+  // Corners that the plane of the others does not explain were moved by blur. A lens bends the plane by a few pixels
+  // only.
   std::vector<cv::Point2f> expected;
   cv::perspectiveTransform(flat, expected, plane);
   double sum = 0;
@@ -161,8 +165,8 @@ Look CameraCalibration::add(const GrayPicture& picture) {
 CameraCalibration::Result CameraCalibration::solve() const {
   if (views() < kLeastViews)
     throw Error(ExitCode::failed,
-                "only " + std::to_string(views()) + " of " + std::to_string(pictures_) + " pictures show the plate from another side; " +
-                    std::to_string(kLeastViews) + " are needed",
+                "only " + std::to_string(views()) + " of " + std::to_string(pictures_) +
+                    " pictures show the plate from another side; " + std::to_string(kLeastViews) + " are needed",
                 with_plate_ == 0 ? "is it the plate of 'osteo markers', flat, well lit, whole in the picture?"
                                  : "turn and tilt the plate, near and far, into all corners of the picture");
   std::vector<std::vector<cv::Point3f>> object;
@@ -185,10 +189,12 @@ CameraCalibration::Result CameraCalibration::solve() const {
   double rms = 0;
   // Without k3: a webcam's lens needs none, and few views bend it as they like where no corner was seen.
   try {
-    rms = cv::calibrateCamera(object, image, {width_, height_}, k, d, turns, shifts, spread, ignored, view_errors, cv::CALIB_FIX_K3,
+    rms = cv::calibrateCamera(object, image, {width_, height_}, k, d, turns, shifts, spread, ignored, view_errors,
+                              cv::CALIB_FIX_K3,
                               cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-10));
   } catch (const cv::Exception&) {
-    throw Error(ExitCode::failed, "no lens explains these views", "take them again: a flat plate, in focus, held still, tilted every way");
+    throw Error(ExitCode::failed, "no lens explains these views",
+                "take them again: a flat plate, in focus, held still, tilted every way");
   }
   Result r;
   CameraModel& c = r.camera;
@@ -202,7 +208,8 @@ CameraCalibration::Result CameraCalibration::solve() const {
   c.mirrored = mirrored_ > 0;
   c.rms_px = rms;
   c.views = views();
-  for (int i = 0; i < static_cast<int>(view_errors.total()); ++i) r.worst_view_px = std::max(r.worst_view_px, view_errors.at<double>(i));
+  for (int i = 0; i < static_cast<int>(view_errors.total()); ++i)
+    r.worst_view_px = std::max(r.worst_view_px, view_errors.at<double>(i));
   r.focal_spread = spread.at<double>(0) / c.fx;
   r.seen_width = (hi[0] - lo[0]) / width_;
   r.seen_height = (hi[1] - lo[1]) / height_;
@@ -214,12 +221,14 @@ CameraCalibration::Result CameraCalibration::solve() const {
   if (!(rms <= kMostRmsPx)) {
     char text[64];
     std::snprintf(text, sizeof text, "%.2f", rms);
-    throw Error(ExitCode::failed,
-                std::string("corners lie ") + text + " pixels (RMS) from where the lens would show them; at most 1 is taken",
-                "the plate has to be flat (glue it to a board), in focus and still; turn autofocus and picture stabilisation off");
+    throw Error(
+        ExitCode::failed,
+        std::string("corners lie ") + text + " pixels (RMS) from where the lens would show them; at most 1 is taken",
+        "the plate has to be flat (glue it to a board), in focus and still; turn autofocus and picture stabilisation "
+        "off");
   }
-  // A plate that is never tilted leaves the focal length open, and the spread does not tell: it is that of the lens that was found. What
-  // tells is that far edges look shorter.
+  // A plate that is never tilted leaves the focal length open, and the spread does not tell: it is that of the lens
+  // that was found. What tells is that far edges look shorter.
   int tilted = 0;
   for (const View& v : views_) {
     const auto edge = [&](std::size_t a, std::size_t b) {
@@ -230,13 +239,15 @@ CameraCalibration::Result CameraCalibration::solve() const {
   }
   if (3 * tilted < views() || !(r.focal_spread <= kMostFocalSpread) || !(c.fx > 0))
     throw Error(ExitCode::failed,
-                "the views are too much alike to tell the focal length: the plate is tilted in " + std::to_string(tilted) + " of " +
-                    std::to_string(views()) + "; it is open by " + percent(r.focal_spread),
+                "the views are too much alike to tell the focal length: the plate is tilted in " +
+                    std::to_string(tilted) + " of " + std::to_string(views()) + "; it is open by " +
+                    percent(r.focal_spread),
                 "tilt the plate by 30 degrees and more to all sides, near and far");
   if (std::min(r.seen_width, r.seen_height) < 0.7)
-    r.doubts.push_back("the plate was seen on " + percent(r.seen_width) + " of the width and " + percent(r.seen_height) +
+    r.doubts.push_back("the plate was seen on " + percent(r.seen_width) + " of the width and " +
+                       percent(r.seen_height) +
                        " of the height only: nearer to the border the pen's place will be less true");
   return r;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

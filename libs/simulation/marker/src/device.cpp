@@ -127,17 +127,21 @@ void PenLink::tell(const PenSight& sight, bool) {
   }
   if (unseen_ < quiet) return;
   if (sight.dark) return say("the camera's picture is too dark to see markers: more light, or open its shutter");
-  if (sight.state == Sight::doubled) return say("two pens with the same print are in the picture: take one away, or print pen 2");
+  if (sight.state == Sight::doubled)
+    return say("two pens with the same print are in the picture: take one away, or print pen 2");
   if (sight.state == Sight::unlike)
-    return say("markers are seen, but they do not make up this pen: another print, one glued otherwise, or another camera's file");
+    return say(
+        "markers are seen, but they do not make up this pen: another print, one glued otherwise, or another camera's "
+        "file");
   if (sight.state == Sight::ambiguous)
-    return say("too little of the pen is seen to tell how it is held: nearer, in better light, no finger over its markers");
+    return say(
+        "too little of the pen is seen to tell how it is held: nearer, in better light, no finger over its markers");
   if (sight.other_pen) return say("markers of another pen are seen, none of pen " + std::to_string(pen_.pen));
   say("the camera sees no marker of pen " + std::to_string(pen_.pen));
 }
 
-MarkerDevice::MarkerDevice(std::shared_ptr<PenLink> link, const CameraModel& camera, const HandGoal& start, const Mat3& scene_from_camera,
-                           double scale, const FootPedal* pedal, std::size_t hand)
+MarkerDevice::MarkerDevice(std::shared_ptr<PenLink> link, const CameraModel& camera, const HandGoal& start,
+                           const Mat3& scene_from_camera, double scale, const FootPedal* pedal, std::size_t hand)
     : TunedHand(hand),
       link_(std::move(link)),
       scene_from_camera_(scene_from_camera),
@@ -198,4 +202,4 @@ DeviceSample MarkerDevice::read(std::uint64_t, double dt_s, Vec3 force_n) noexce
   return s;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

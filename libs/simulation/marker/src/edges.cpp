@@ -67,8 +67,9 @@ bool refine_corners(const cv::Mat& gray, Quad& quad, int cells) {
       const double far = -(((c[0] + d[0]) - (a[0] + b[0])) * nx + ((c[1] + d[1]) - (a[1] + b[1])) * ny) / 2;
       const double cell_px = far / cells;
       if (!(cell_px > 1.5)) return false;
-      // Inside a cell of black, outside half a cell of white, less where the next face begins. First far enough to find the edge; then a
-      // short reach, the same to both sides of where the line is by now, so that what is cut off of a blurred edge is the same on both.
+      // Inside a cell of black, outside half a cell of white, less where the next face begins. First far enough to find
+      // the edge; then a short reach, the same to both sides of where the line is by now, so that what is cut off of a
+      // blurred edge is the same on both.
       const double reach = round == 0 ? std::clamp(0.4 * cell_px, 1.5, 5.0) : std::clamp(0.25 * cell_px, 1.0, 1.5);
       const int count = std::clamp(static_cast<int>(long_px), 8, 60);
       std::vector<EdgePoint> points;
@@ -114,4 +115,4 @@ bool refine_corners(const cv::Mat& gray, Quad& quad, int cells) {
   return true;
 }
 
-}  // namespace osteo::simulation::marker
+}  // namespace osteo::inline simulation::marker

@@ -108,11 +108,12 @@ void PenFilter::add(double time_s, const PenSight& sight) {
   p = turn_map;
   carry_on(p, dt, params_.turning_rad2_s3 * lively(motion_.turning_rad_s, p, params_.turning_rad_s));
   const Mat3 turned = product(small_turn(motion_.turning_rad_s * dt), motion_.rotation);
-  const auto turn = correct(p, turn_r, eigen_of(vector_of(product(sight.camera_from_body.rotation, transposed(turned)))));
+  const auto turn =
+      correct(p, turn_r, eigen_of(vector_of(product(sight.camera_from_body.rotation, transposed(turned)))));
   motion_.rotation = orthonormal(product(small_turn(vec_of(turn.head<3>())), turned));
   motion_.turning_rad_s += vec_of(turn.tail<3>());
   turn_map = p;
   motion_.time_s = time_s;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -26,8 +26,10 @@ struct PenFields {
     visit({"osteotome_pen", "version of the format", "", 1, 1, true}, f.version);
     visit({"pen", "which print it carries", "", 1, PenBody::kMostPens}, f.pen.pen);
     visit({"scale", "printed mm for a drawn one", "", 0.5, 2}, f.pen.scale);
-    visit({"tip_mm", "its tip, from the middle of the prism, z along the pen to its upper end", "mm", -500, 500, true}, f.tip_mm);
-    visit({"rms_mm", "how far the tip seemed to wander while the pen was turned on it (below 0: it was not)", "mm", -1, 1000},
+    visit({"tip_mm", "its tip, from the middle of the prism, z along the pen to its upper end", "mm", -500, 500, true},
+          f.tip_mm);
+    visit({"rms_mm", "how far the tip seemed to wander while the pen was turned on it (below 0: it was not)", "mm", -1,
+           1000},
           f.pen.rms_mm);
   }
 };
@@ -85,7 +87,8 @@ std::string pen_json(const Pen& p) {
 PivotFit fit_pivot(std::span<const RigidTransform> all, double most_rms_mm) {
   if (all.size() < kLeastPoses)
     throw Error(ExitCode::failed,
-                "the pen was seen in " + std::to_string(all.size()) + " pictures; " + std::to_string(kLeastPoses) + " are needed",
+                "the pen was seen in " + std::to_string(all.size()) + " pictures; " + std::to_string(kLeastPoses) +
+                    " are needed",
                 "turn it on its tip for ten seconds, its markers towards the camera, in good light");
   double least = 1;
   for (const RigidTransform& a : all) {
@@ -94,7 +97,8 @@ PivotFit fit_pivot(std::span<const RigidTransform> all, double most_rms_mm) {
   const double tilt_deg = std::acos(std::clamp(least, -1.0, 1.0)) * 180 / std::numbers::pi;
   char text[200];
   if (tilt_deg < kLeastTiltDeg) {
-    std::snprintf(text, sizeof text, "the pen was tilted by %.0f degrees only; its tip cannot be told from that", tilt_deg);
+    std::snprintf(text, sizeof text, "the pen was tilted by %.0f degrees only; its tip cannot be told from that",
+                  tilt_deg);
     throw Error(ExitCode::failed, text, "keep the tip in a small dent and lean the pen by 30 degrees to all sides");
   }
   std::vector<const RigidTransform*> poses;
@@ -115,10 +119,12 @@ PivotFit fit_pivot(std::span<const RigidTransform> all, double most_rms_mm) {
   }
   fit.tilt_deg = tilt_deg;
   if (fit.rms_mm > most_rms_mm) {
-    std::snprintf(text, sizeof text, "the tip wandered by %.1f mm (RMS); at most %.1f are taken", fit.rms_mm, most_rms_mm);
-    throw Error(ExitCode::failed, text, "hold the tip in a small dent so that it does not slip, and turn the pen slowly");
+    std::snprintf(text, sizeof text, "the tip wandered by %.1f mm (RMS); at most %.1f are taken", fit.rms_mm,
+                  most_rms_mm);
+    throw Error(ExitCode::failed, text,
+                "hold the tip in a small dent so that it does not slip, and turn the pen slowly");
   }
   return fit;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

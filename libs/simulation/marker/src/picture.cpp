@@ -48,7 +48,8 @@ const video::Module& video_module() {
       return *m;
     }
     throw Error(ExitCode::failed,
-                "what reads cameras and videos (osteo-camera.so) " + (why.empty() ? "is not on this machine" : "cannot be loaded: " + why),
+                "what reads cameras and videos (osteo-camera.so) " +
+                    (why.empty() ? "is not on this machine" : "cannot be loaded: " + why),
                 "install the package osteo-camera, or name the file in OSTEO_CAMERA_MODULE");
   }();
   return module;
@@ -61,13 +62,15 @@ class Folder final : public PictureSource {
       if (e.is_regular_file() && module_.is_picture(e.path().c_str())) files_.push_back(e.path());
     }
     std::sort(files_.begin(), files_.end());
-    if (files_.empty()) throw Error(ExitCode::no_input, "'" + folder.string() + "' holds no picture", "PNG and JPEG are read");
+    if (files_.empty())
+      throw Error(ExitCode::no_input, "'" + folder.string() + "' holds no picture", "PNG and JPEG are read");
   }
   bool next(GrayPicture& picture) override {
     if (at_ == files_.size()) return false;
     const fs::path& file = files_[at_++];
     if (!module_.read_picture(file.c_str(), picture))
-      throw Error(ExitCode::corrupt, "'" + file.string() + "' cannot be read as a picture", "copy the file again, or take it out");
+      throw Error(ExitCode::corrupt, "'" + file.string() + "' cannot be read as a picture",
+                  "copy the file again, or take it out");
     return true;
   }
 
@@ -115,7 +118,8 @@ std::unique_ptr<PictureSource> open_pictures(const std::string& from, int width,
   if (is_camera(from)) {
     const std::string path = from[0] == '/' ? from : "/dev/video" + from;
     if (!fs::exists(path))
-      throw Error(ExitCode::no_input, "there is no camera at '" + path + "'", "plug it in; 'ls /dev/video*' shows what there is");
+      throw Error(ExitCode::no_input, "there is no camera at '" + path + "'",
+                  "plug it in; 'ls /dev/video*' shows what there is");
     require_readable(path);
     video::Capture* const camera = video_module().open_camera(path.c_str(), width, height, fps);
     if (camera == nullptr)
@@ -127,8 +131,9 @@ std::unique_ptr<PictureSource> open_pictures(const std::string& from, int width,
   if (fs::is_directory(from)) return std::make_unique<Folder>(from);
   video::Capture* const file = video_module().open_video(from.c_str());
   if (file == nullptr)
-    throw Error(ExitCode::corrupt, "'" + from + "' cannot be read as a video", "a video, a folder of pictures, or /dev/video0");
+    throw Error(ExitCode::corrupt, "'" + from + "' cannot be read as a video",
+                "a video, a folder of pictures, or /dev/video0");
   return std::make_unique<Video>(file, false);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -49,7 +49,8 @@ class PoseFit {
     const cv::Matx33d k(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
     cv::undistortPoints(pixels, rays, k, camera.distortion, cv::noArray(), cv::noArray(),
                         cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 40, 1e-10));
-    for (std::size_t i = 0; i < rays.size(); ++i) rays_.push_back({seen[i / 4].patch.corner_mm(i % 4), rays[i].x, rays[i].y});
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      rays_.push_back({seen[i / 4].patch.corner_mm(i % 4), rays[i].x, rays[i].y});
   }
 
   // Squared length of a corner's error, px^2; infinite behind the camera.
@@ -116,8 +117,9 @@ class PoseFit {
 
   // Every marker is seen from outside.
   [[nodiscard]] bool faces_camera(const RigidTransform& pose) const {
-    return std::all_of(seen_.begin(), seen_.end(),
-                       [&](const MarkerCorners& m) { return dot(pose.rotation * m.patch.out(), pose(m.patch.centre_mm)) < 0; });
+    return std::all_of(seen_.begin(), seen_.end(), [&](const MarkerCorners& m) {
+      return dot(pose.rotation * m.patch.out(), pose(m.patch.centre_mm)) < 0;
+    });
   }
 
   // Both poses that one flat marker may have (T. Collins, A. Bartoli, IJCV 109(3), 2014).
@@ -129,11 +131,13 @@ class PoseFit {
     for (std::size_t i = 4 * m; i < 4 * m + 4; ++i) rays.emplace_back(rays_[i].x, rays_[i].y);
     std::vector<cv::Mat> turns, shifts;
     try {
-      cv::solvePnPGeneric(square, rays, cv::Matx33d::eye(), cv::noArray(), turns, shifts, false, cv::SOLVEPNP_IPPE_SQUARE);
+      cv::solvePnPGeneric(square, rays, cv::Matx33d::eye(), cv::noArray(), turns, shifts, false,
+                          cv::SOLVEPNP_IPPE_SQUARE);
     } catch (const cv::Exception&) {
       return;  // corners on a line
     }
-    const RigidTransform marker_from_body = RigidTransform{Mat3{{patch.right, patch.up, patch.out()}}, patch.centre_mm}.inverse();
+    const RigidTransform marker_from_body =
+        RigidTransform{Mat3{{patch.right, patch.up, patch.out()}}, patch.centre_mm}.inverse();
     for (std::size_t i = 0; i < turns.size(); ++i) {
       const cv::Vec3d w(turns[i].reshape(1, 3)), t(shifts[i].reshape(1, 3));
       poses.push_back(RigidTransform{turn_by({w[0], w[1], w[2]}), {t[0], t[1], t[2]}} * marker_from_body);
@@ -173,7 +177,8 @@ std::array<double, 2> project(const CameraModel& camera, Vec3 p) {
   const double x = p.x / p.z, y = p.y / p.z, r2 = x * x + y * y;
   const auto& k = camera.distortion;
   const double radial = 1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
-  const double xd = x * radial + 2 * k[2] * x * y + k[3] * (r2 + 2 * x * x), yd = y * radial + k[2] * (r2 + 2 * y * y) + 2 * k[3] * x * y;
+  const double xd = x * radial + 2 * k[2] * x * y + k[3] * (r2 + 2 * x * x),
+               yd = y * radial + k[2] * (r2 + 2 * y * y) + 2 * k[3] * x * y;
   return {camera.fx * xd + camera.cx, camera.fy * yd + camera.cy};
 }
 
@@ -204,13 +209,15 @@ PenSight pose_of(const CameraModel& camera, const std::vector<MarkerCorners>& al
     // Of one flat side, from afar: another pose that explains it nearly as well.
     if (on_one_plane(seen)) {
       for (const Fit& other : fits) {
-        if (angle_between(other.pose.rotation, fits.front().pose.rotation) < 5 * kDegree || other.cost > 4 * fits.front().cost + 0.1)
+        if (angle_between(other.pose.rotation, fits.front().pose.rotation) < 5 * kDegree ||
+            other.cost > 4 * fits.front().cost + 0.1)
           continue;
         if (guess == nullptr) {
           sight.state = PenSight::State::ambiguous;
           return sight;
         }
-        if (angle_between(other.pose.rotation, guess->rotation) < angle_between(best->pose.rotation, guess->rotation)) best = other;
+        if (angle_between(other.pose.rotation, guess->rotation) < angle_between(best->pose.rotation, guess->rotation))
+          best = other;
       }
     }
     // The marker that fits worst goes, when it is worse than the corners of the others allow.
@@ -238,4 +245,4 @@ PenSight pose_of(const CameraModel& camera, const std::vector<MarkerCorners>& al
   return sight;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -107,8 +107,8 @@ std::vector<Place> places_of_pen(Size s, int pen) {
   const auto markers = pen_markers(pen);
   const double margin = (cell - PenBody::kMarkerMm) / 2;
   for (int i = 0; i < 12; ++i)
-    all.push_back(
-        {markers[static_cast<std::size_t>(i)].id, left + (i % 6) * cell + margin, kStripTop + (i / 6) * cell + margin, PenBody::kMarkerMm});
+    all.push_back({markers[static_cast<std::size_t>(i)].id, left + (i % 6) * cell + margin,
+                   kStripTop + (i / 6) * cell + margin, PenBody::kMarkerMm});
   const double m = PenBody::kCapMarkerMm;
   all.push_back({markers[12].id, left + 1.5 * cell - m / 2, kStripTop - PenBody::kApothemMm - m / 2, m});
   return all;
@@ -131,8 +131,10 @@ void draw_pen(const Page& page, int pen) {
   const double left = strip_left(s), w = PenBody::kFaceMm, h = PenBody::kHeightMm, a = PenBody::kApothemMm;
   page.text("Osteotome: markers of pen " + std::to_string(pen), left, 9, 120, 4.5);
   page.text(
-      "Stiff paper. Cut along the outline, fold along the dashed lines, glue the flap under the first face: a prism of six sides. Fold "
-      "the lid with the marker over the upper end, the lid with the circle under the lower one; tape both. The pen goes in through the "
+      "Stiff paper. Cut along the outline, fold along the dashed lines, glue the flap under the first face: a prism of "
+      "six sides. Fold "
+      "the lid with the marker over the upper end, the lid with the circle under the lower one; tape both. The pen "
+      "goes in through the "
       "circle, its tip down, as far as it stands firmly in the middle; glue it. Nothing may bend or shine.",
       left + 76, 17, s.width_mm - 2 * left - 76, 2.9);
   const double bottom = kStripTop + h;
@@ -165,7 +167,8 @@ void draw_plate(const Page& page) {
   for (int y = 0; y < PlateBody::kDown; ++y) {
     for (int x = 0; x < PlateBody::kAcross; ++x) {
       if (plate_square_is_black(x, y))
-        page.box(left + x * PlateBody::kSquareMm, 10 + y * PlateBody::kSquareMm, PlateBody::kSquareMm, PlateBody::kSquareMm);
+        page.box(left + x * PlateBody::kSquareMm, 10 + y * PlateBody::kSquareMm, PlateBody::kSquareMm,
+                 PlateBody::kSquareMm);
     }
   }
   for (const Place& p : places_of_plate(s)) page.cells(MarkerKind::plate, p);
@@ -186,7 +189,8 @@ void draw_page(const Page& page, int pen, int number) {
 }  // namespace
 
 GrayPicture marker_page(Paper paper, int pen, int number, double dots_per_inch) {
-  if (number < 0 || number >= kMarkerPages) throw Error(ExitCode::usage, "there is no page " + std::to_string(number + 1));
+  if (number < 0 || number >= kMarkerPages)
+    throw Error(ExitCode::usage, "there is no page " + std::to_string(number + 1));
   const Size s = size_of(paper);
   const double dots = dots_per_inch / 25.4;
   const int w = static_cast<int>(std::ceil(s.width_mm * dots)), h = static_cast<int>(std::ceil(s.height_mm * dots));
@@ -196,13 +200,15 @@ GrayPicture marker_page(Paper paper, int pen, int number, double dots_per_inch) 
     draw_page(Page(cairo.get(), s, dots), pen, number);
   }
   cairo_surface_flush(surface.get());
-  if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS) throw Error(ExitCode::resources, "the page cannot be drawn");
+  if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS)
+    throw Error(ExitCode::resources, "the page cannot be drawn");
   GrayPicture p{w, h, std::vector<std::uint8_t>(static_cast<std::size_t>(w) * static_cast<std::size_t>(h))};
   const unsigned char* const data = cairo_image_surface_get_data(surface.get());
   const int stride = cairo_image_surface_get_stride(surface.get());
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x)
-      p.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(w) + static_cast<std::size_t>(x)] = data[y * stride + 4 * x];
+      p.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(w) + static_cast<std::size_t>(x)] =
+          data[y * stride + 4 * x];
   }
   return p;
 }
@@ -227,11 +233,14 @@ PageCheck check_page(Paper paper, int pen, int number) {
       if (ids[i] != p.id) continue;
       ++check.markers;
       // A pixel's middle is half a pixel from its border.
-      const double want[4][2] = {
-          {p.x_mm, p.y_mm}, {p.x_mm + p.size_mm, p.y_mm}, {p.x_mm + p.size_mm, p.y_mm + p.size_mm}, {p.x_mm, p.y_mm + p.size_mm}};
+      const double want[4][2] = {{p.x_mm, p.y_mm},
+                                 {p.x_mm + p.size_mm, p.y_mm},
+                                 {p.x_mm + p.size_mm, p.y_mm + p.size_mm},
+                                 {p.x_mm, p.y_mm + p.size_mm}};
       for (std::size_t c = 0; c < 4; ++c)
-        check.worst_mm = std::max(check.worst_mm, std::hypot((static_cast<double>(corners[i][c].x) + 0.5) / kDots - want[c][0],
-                                                             (static_cast<double>(corners[i][c].y) + 0.5) / kDots - want[c][1]));
+        check.worst_mm =
+            std::max(check.worst_mm, std::hypot((static_cast<double>(corners[i][c].x) + 0.5) / kDots - want[c][0],
+                                                (static_cast<double>(corners[i][c].y) + 0.5) / kDots - want[c][1]));
     }
   }
   return check;
@@ -242,8 +251,9 @@ std::string marker_pages_pdf(Paper paper, int pen) {
     const PageCheck check = check_page(paper, pen, p);
     if (check.markers != check.expected || !(check.worst_mm < 0.1))
       throw Error(ExitCode::failed,
-                  "page " + std::to_string(p + 1) + " does not read as it should: " + std::to_string(check.markers) + " of " +
-                      std::to_string(check.expected) + " markers, off by up to " + std::to_string(check.worst_mm) + " mm",
+                  "page " + std::to_string(p + 1) + " does not read as it should: " + std::to_string(check.markers) +
+                      " of " + std::to_string(check.expected) + " markers, off by up to " +
+                      std::to_string(check.worst_mm) + " mm",
                   "this is a defect of the program or of its libraries; please report it");
   }
   std::string pdf;
@@ -253,7 +263,8 @@ std::string marker_pages_pdf(Paper paper, int pen) {
     static_cast<std::string*>(closure)->append(reinterpret_cast<const char*>(data), length);
     return CAIRO_STATUS_SUCCESS;
   };
-  const CairoOwned<cairo_surface_t> surface(cairo_pdf_surface_create_for_stream(take, &pdf, s.width_mm * kPoints, s.height_mm * kPoints));
+  const CairoOwned<cairo_surface_t> surface(
+      cairo_pdf_surface_create_for_stream(take, &pdf, s.width_mm * kPoints, s.height_mm * kPoints));
   cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_TITLE, "Osteotome: markers");
   cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_CREATE_DATE, "2000-01-01T00:00:00Z");
   {
@@ -264,7 +275,8 @@ std::string marker_pages_pdf(Paper paper, int pen) {
     }
   }
   cairo_surface_finish(surface.get());
-  if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS) throw Error(ExitCode::failed, "the pages cannot be drawn");
+  if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS)
+    throw Error(ExitCode::failed, "the pages cannot be drawn");
   // Blanks for a date that is not true: no offset moves.
   if (const auto at = pdf.find("/CreationDate ("); at != std::string::npos) {
     if (const auto end = pdf.find(')', at); end != std::string::npos) pdf.replace(at, end - at + 1, end - at + 1, ' ');
@@ -272,4 +284,4 @@ std::string marker_pages_pdf(Paper paper, int pen) {
   return pdf;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

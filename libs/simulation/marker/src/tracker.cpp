@@ -139,7 +139,8 @@ struct PenTracker::Inside {
     for (const Detected& d : found) {
       const auto [it, is_new] = once.emplace(d.id, d);
       if (is_new) continue;
-      if (length(middle_of(d.quad) - middle_of(it->second.quad)) < 8) continue;  // the inner and outer outline of the same
+      if (length(middle_of(d.quad) - middle_of(it->second.quad)) < 8)
+        continue;  // the inner and outer outline of the same
       sight.doubled = true;
       if (guess == nullptr) continue;
       const Vec3 was = middle_of(quad_of(*patch(d.id), *guess));
@@ -150,14 +151,16 @@ struct PenTracker::Inside {
       sight.markers = static_cast<int>(once.size());
       return sight;
     }
-    // One alone may be another that was misread, in a mirrored picture for one: only what was seen before makes it the pen.
+    // One alone may be another that was misread, in a mirrored picture for one: only what was seen before makes it the
+    // pen.
     if (once.size() < 2 && guess == nullptr) {
       sight.state = PenSight::State::ambiguous;
       sight.markers = 1;
       return sight;
     }
     std::vector<MarkerCorners> corners;
-    std::vector<MarkerCorners> rough;  // a contour's corners lie inside of the true ones: with enough others they only mislead
+    std::vector<MarkerCorners>
+        rough;  // a contour's corners lie inside of the true ones: with enough others they only mislead
     for (auto& [id, d] : once) {
       const bool fine = marker::refine_corners(gray, d.quad, cells);
       (fine ? corners : rough).push_back({*patch(id), d.quad});
@@ -175,11 +178,13 @@ struct PenTracker::Inside {
     sight = pose;
   }
 
-  // Markers too narrow to be read say most of the tilt: now that the pose is nearly known, their edges are found where they must be.
+  // Markers too narrow to be read say most of the tilt: now that the pose is nearly known, their edges are found where
+  // they must be.
   void add_the_slanting(const cv::Mat& gray, std::vector<MarkerCorners>& corners, PenSight& sight) {
     const std::size_t read = corners.size();
     for (const MarkerPatch& p : patches) {
-      if (std::any_of(corners.begin(), corners.end(), [&](const MarkerCorners& c) { return c.patch.id == p.id; })) continue;
+      if (std::any_of(corners.begin(), corners.end(), [&](const MarkerCorners& c) { return c.patch.id == p.id; }))
+        continue;
       if (!towards(p, sight.camera_from_body, 0.2)) continue;
       Quad q = quad_of(p, sight.camera_from_body);
       if (marker::refine_corners(gray, q, cells)) corners.push_back({p, q});
@@ -192,7 +197,8 @@ struct PenTracker::Inside {
 };
 
 PenTracker::PenTracker(const CameraModel& camera, int pen, double scale)
-    : inside_(new Inside{.camera = camera, .patches = pen_markers(pen, scale), .last = {}, .mirrored = camera.mirrored}) {}
+    : inside_(
+          new Inside{.camera = camera, .patches = pen_markers(pen, scale), .last = {}, .mirrored = camera.mirrored}) {}
 PenTracker::~PenTracker() = default;
 
 void PenTracker::forget() {
@@ -203,8 +209,9 @@ PenSight PenTracker::look(const GrayPicture& picture) {
   Inside& in = *inside_;
   if (picture.width != in.camera.width || picture.height != in.camera.height)
     throw Error(ExitCode::usage,
-                "the camera gives pictures of " + std::to_string(picture.width) + " x " + std::to_string(picture.height) +
-                    ", it was calibrated at " + std::to_string(in.camera.width) + " x " + std::to_string(in.camera.height),
+                "the camera gives pictures of " + std::to_string(picture.width) + " x " +
+                    std::to_string(picture.height) + ", it was calibrated at " + std::to_string(in.camera.width) +
+                    " x " + std::to_string(in.camera.height),
                 "calibrate it at this size ('osteo calibrate-camera'), or set it to the other");
   const cv::Mat gray = marker::view_of(picture);
   const auto as_if = [&](bool mirrored) {
@@ -231,4 +238,4 @@ PenSight PenTracker::look(const GrayPicture& picture) {
   return sight;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

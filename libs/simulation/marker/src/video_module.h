@@ -1,6 +1,6 @@
-// What reads cameras, videos and pictures lies in a module of its own, osteo-camera.so, that is loaded when one is opened: with it come 140
-// shared libraries (codecs, GDAL, poppler), some of them under the GPL, that nothing else needs. Both sides are made of one tree; names are
-// in C.
+// What reads cameras, videos and pictures lies in a module of its own, osteo-camera.so, that is loaded when one is
+// opened: with it come 140 shared libraries (codecs, GDAL, poppler), some of them under the GPL, that nothing else
+// needs. Both sides are made of one tree; names are in C.
 #pragma once
 #include "osteo/simulation/marker/picture.h"
 
@@ -29,4 +29,4 @@ struct Module {
 };
 inline constexpr const char* kModuleEntry = "osteo_video_module";
 
-}  // namespace osteo::simulation::video
+}  // namespace osteo::inline simulation::video

@@ -28,7 +28,8 @@ void gray_of(const cv::Mat& m, GrayPicture& p) {
   }
   p = {gray.cols, gray.rows, {}};
   p.pixels.reserve(static_cast<std::size_t>(gray.cols) * static_cast<std::size_t>(gray.rows));
-  for (int y = 0; y < gray.rows; ++y) p.pixels.insert(p.pixels.end(), gray.ptr<std::uint8_t>(y), gray.ptr<std::uint8_t>(y) + gray.cols);
+  for (int y = 0; y < gray.rows; ++y)
+    p.pixels.insert(p.pixels.end(), gray.ptr<std::uint8_t>(y), gray.ptr<std::uint8_t>(y) + gray.cols);
 }
 
 bool is_picture(const char* file) {
@@ -85,7 +86,7 @@ double fps(Capture* c) {
 constexpr Module kModule{kModuleVersion, is_picture, read_picture, open_video, open_camera, close, next, fps};
 
 }  // namespace
-}  // namespace osteo::simulation::video
+}  // namespace osteo::inline simulation::video
 
 extern "C" [[gnu::visibility("default")]] const osteo::video::Module* osteo_video_module() {
   return &osteo::video::kModule;

@@ -23,8 +23,9 @@ std::uint64_t samples_of(double seconds) {
 }  // namespace
 
 std::string_view name_of(MonitorEventKind kind) {
-  static constexpr std::array<std::string_view, 11> kNames{"activity",  "burst",        "train",      "stimulus", "response", "no response",
-                                                           "threshold", "no threshold", "stimulator", "cause",    "lost"};
+  static constexpr std::array<std::string_view, 11> kNames{"activity",   "burst",       "train",     "stimulus",
+                                                           "response",   "no response", "threshold", "no threshold",
+                                                           "stimulator", "cause",       "lost"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -155,7 +156,8 @@ void ActivityDetector::take(std::uint64_t first, std::span<const std::int16_t> b
   const std::size_t frames = buffer_.size() / channels_;
   std::size_t at = MonitorSpike::kBefore;
   for (; at + kAfter <= frames; ++at) frame(next_++, &buffer_[at * channels_]);
-  buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>((at - MonitorSpike::kBefore) * channels_));
+  buffer_.erase(buffer_.begin(),
+                buffer_.begin() + static_cast<std::ptrdiff_t>((at - MonitorSpike::kBefore) * channels_));
 }
 
 void ActivityDetector::end() {
@@ -165,4 +167,4 @@ void ActivityDetector::end() {
   for (std::size_t ch = 0; ch < channels_; ++ch) close(ch);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -63,7 +63,8 @@ struct BlackrockFiles::Files {
     }
     void write(const std::string& s) const { write(s.data(), s.size()); }
     [[noreturn]] void fail() const {
-      throw Error(ExitCode::cannot_write, "'" + path.filename().string() + "' cannot be written: " + std::strerror(errno));
+      throw Error(ExitCode::cannot_write,
+                  "'" + path.filename().string() + "' cannot be written: " + std::strerror(errno));
     }
     void close() {
       if (std::fclose(file.release()) != 0) fail();
@@ -81,8 +82,8 @@ struct BlackrockFiles::Files {
   }
 };
 
-BlackrockFiles::BlackrockFiles(const std::filesystem::path& folder, const std::string& name, const std::vector<std::string>& labels,
-                               const MonitorConstants& constants)
+BlackrockFiles::BlackrockFiles(const std::filesystem::path& folder, const std::string& name,
+                               const std::vector<std::string>& labels, const MonitorConstants& constants)
     : files_(std::make_unique<Files>()) {
   Files& f = *files_;
   f.channels = labels.size();
@@ -93,10 +94,19 @@ BlackrockFiles::BlackrockFiles(const std::filesystem::path& folder, const std::s
 
   f.ns5.open(folder / (name + ".ns5"));
   Bytes h;
-  h.raw("NEURALCD").put<std::uint8_t>(2).put<std::uint8_t>(3).put<std::uint32_t>(314 + 66 * n).text("30 kS/s", 16).text(kComment, 256);
+  h.raw("NEURALCD")
+      .put<std::uint8_t>(2)
+      .put<std::uint8_t>(3)
+      .put<std::uint32_t>(314 + 66 * n)
+      .text("30 kS/s", 16)
+      .text(kComment, 256);
   h.put<std::uint32_t>(1).put<std::uint32_t>(kRate).date().put<std::uint32_t>(n);
   for (std::uint32_t ch = 0; ch < n; ++ch) {
-    h.raw("CC").put(static_cast<std::uint16_t>(ch + 1)).text(labels[ch], 16).put<std::uint8_t>(1).put(static_cast<std::uint8_t>(ch + 1));
+    h.raw("CC")
+        .put(static_cast<std::uint16_t>(ch + 1))
+        .text(labels[ch], 16)
+        .put<std::uint8_t>(1)
+        .put(static_cast<std::uint8_t>(ch + 1));
     h.put<std::int16_t>(-kMost).put(kMost).put<std::int16_t>(-kMostUv).put(kMostUv).text("uV", 16);
     h.put<std::uint32_t>(0).put<std::uint32_t>(0).put<std::uint16_t>(0);  // high-pass: none
     h.put(low_pass_mhz).put<std::uint32_t>(1).put<std::uint16_t>(1);      // low-pass, order, kind
@@ -109,18 +119,34 @@ BlackrockFiles::BlackrockFiles(const std::filesystem::path& folder, const std::s
   f.nev.open(folder / (name + ".nev"));
   Bytes e;
   e.raw("NEURALEV").put<std::uint8_t>(2).put<std::uint8_t>(3).put<std::uint16_t>(1);  // all waveforms are of 16 bits
-  e.put<std::uint32_t>(336 + 32 * (3 * n + 1)).put(kPacket).put(kRate).put(kRate).date().text(kProgram, 32).text(kComment, 256);
+  e.put<std::uint32_t>(336 + 32 * (3 * n + 1))
+      .put(kPacket)
+      .put(kRate)
+      .put(kRate)
+      .date()
+      .text(kProgram, 32)
+      .text(kComment, 256);
   e.put<std::uint32_t>(3 * n + 1);
   const auto hi = static_cast<std::int16_t>(constants.event_uv);
   for (std::uint32_t ch = 0; ch < n; ++ch) {
     const auto id = static_cast<std::uint16_t>(ch + 1);
-    e.raw("NEUEVWAV").put(id).put<std::uint8_t>(1).put(static_cast<std::uint8_t>(id)).put<std::uint16_t>(250).put<std::uint16_t>(0);
+    e.raw("NEUEVWAV")
+        .put(id)
+        .put<std::uint8_t>(1)
+        .put(static_cast<std::uint8_t>(id))
+        .put<std::uint16_t>(250)
+        .put<std::uint16_t>(0);
     e.put(hi).put<std::int16_t>(static_cast<std::int16_t>(-hi)).put<std::uint8_t>(0).put<std::uint8_t>(2);
     e.put(static_cast<std::uint16_t>(MonitorSpike::kLength)).text("", 8);
   }
-  for (std::uint32_t ch = 0; ch < n; ++ch) e.raw("NEUEVLBL").put(static_cast<std::uint16_t>(ch + 1)).text(labels[ch], 16).text("", 6);
+  for (std::uint32_t ch = 0; ch < n; ++ch)
+    e.raw("NEUEVLBL").put(static_cast<std::uint16_t>(ch + 1)).text(labels[ch], 16).text("", 6);
   for (std::uint32_t ch = 0; ch < n; ++ch) {
-    e.raw("NEUEVFLT").put(static_cast<std::uint16_t>(ch + 1)).put<std::uint32_t>(0).put<std::uint32_t>(0).put<std::uint16_t>(0);
+    e.raw("NEUEVFLT")
+        .put(static_cast<std::uint16_t>(ch + 1))
+        .put<std::uint32_t>(0)
+        .put<std::uint32_t>(0)
+        .put<std::uint16_t>(0);
     e.put(low_pass_mhz).put<std::uint32_t>(1).put<std::uint16_t>(1).text("", 2);
   }
   e.raw("DIGLABEL").text("stimulator", 16).put<std::uint8_t>(1).text("", 7);
@@ -152,7 +178,11 @@ void BlackrockFiles::event(const MonitorEvent& event) {
   const auto ua = static_cast<std::uint16_t>(event.ma * 1000 + 0.5);
   const auto value = static_cast<std::uint16_t>(event.kind == MonitorEventKind::response ? ua | 0x8000U : ua);
   Bytes b;
-  b.put(static_cast<std::uint32_t>(event.sample)).put<std::uint16_t>(0).put<std::uint8_t>(1).put<std::uint8_t>(0).put(value);
+  b.put(static_cast<std::uint32_t>(event.sample))
+      .put<std::uint16_t>(0)
+      .put<std::uint8_t>(1)
+      .put<std::uint8_t>(0)
+      .put(value);
   std::string packet = b.str();
   packet.resize(kPacket, '\0');
   files_->waiting.emplace(event.sample, packet);
@@ -177,4 +207,4 @@ std::uint64_t BlackrockFiles::spikes() const {
   return files_->spikes;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

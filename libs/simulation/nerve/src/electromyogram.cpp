@@ -33,12 +33,14 @@ Electromyogram::Electromyogram(const MonitorConstants& constants, std::vector<Ch
       coming_(channels_.size(), std::vector<float>(kRing, 0.0F)),
       filtered_(channels_.size(), 0.0F),
       jitter_(seed ^ 0x5851f42d4c957f2dULL) {
-  for (std::size_t i = 0; i <= kSine; ++i) sine_.push_back(static_cast<float>(portable::sin_cos_turns(static_cast<double>(i) / kSine).sin));
+  for (std::size_t i = 0; i <= kSine; ++i)
+    sine_.push_back(static_cast<float>(portable::sin_cos_turns(static_cast<double>(i) / kSine).sin));
   // A wave of whole samples: 600 at 50 Hz; with a fifth of its third harmonic.
   const auto period = static_cast<std::size_t>(std::max(1.0, std::floor(kRate / c_.mains_hz + 0.5)));
   for (std::size_t i = 0; i < period; ++i) {
     const double turns = static_cast<double>(i) / static_cast<double>(period);
-    mains_.push_back(static_cast<float>(c_.mains_uv * (portable::sin_cos_turns(turns).sin + 0.2 * portable::sin_cos_turns(3 * turns).sin)));
+    mains_.push_back(static_cast<float>(
+        c_.mains_uv * (portable::sin_cos_turns(turns).sin + 0.2 * portable::sin_cos_turns(3 * turns).sin)));
   }
   // The pulse itself is over in 0.1 ms; what is left of it in the amplifier falls off.
   for (std::size_t i = 0; i < static_cast<std::size_t>(10 * c_.artefact_ms * kRate / 1000) + 3; ++i) {
@@ -67,12 +69,14 @@ void Electromyogram::stimulate(std::size_t at, double current_ma) {
     add_wave(ch, static_cast<double>(at), artefact_, c_.artefact_uv * current_ma * (ch % 2 == 0 ? 1 : -0.8));
 }
 
-void Electromyogram::answer(std::size_t at, const NerveModel& model, std::size_t nerve, std::size_t point, double share) {
+void Electromyogram::answer(std::size_t at, const NerveModel& model, std::size_t nerve, std::size_t point,
+                            double share) {
   if (share <= 0) return;
   for (std::size_t ch = 0; ch < channels_.size(); ++ch) {
     const Channel& channel = channels_[ch];
     if (channel.nerve == nerve)
-      add_wave(ch, static_cast<double>(at) + delay(channel, model, point), evoked_, share * channel.electrode.evoked_uv);
+      add_wave(ch, static_cast<double>(at) + delay(channel, model, point), evoked_,
+               share * channel.electrode.evoked_uv);
   }
 }
 
@@ -83,7 +87,8 @@ void Electromyogram::render(const NerveModel& model, const DrillNoise& drill, st
 
   for (auto& [id, voice] : voices_) voice.seen = false;
   for (const NerveModel::Discharge& d : model.discharges()) {
-    Voice& voice = voices_.try_emplace(d.id, Voice{d.train ? 0.0 : 1.0, 0, true}).first->second;  // a burst's first spike comes at once
+    Voice& voice = voices_.try_emplace(d.id, Voice{d.train ? 0.0 : 1.0, 0, true})
+                       .first->second;  // a burst's first spike comes at once
     voice.seen = true;
     const double reaches = model.conducts(d.nerve, d.point), step = d.hz / kRate;
     if (d.train) {
@@ -147,7 +152,8 @@ void Electromyogram::render(const NerveModel& model, const DrillNoise& drill, st
       const auto rough = static_cast<float>(contact);
       // Two sources that know nothing of each other: their powers add.
       filtered += a * (white * std::sqrt(floor_uv * floor_uv + rough * rough) * whole - filtered);
-      v += filtered + mains_share * mains_[mains_at] + static_cast<float>(line) * sine_[static_cast<std::size_t>(phase * kSine)];
+      v += filtered + mains_share * mains_[mains_at] +
+           static_cast<float>(line) * sine_[static_cast<std::size_t>(phase * kSine)];
       if (++mains_at == mains_.size()) mains_at = 0;
       phase += drill_step;
       if (phase >= 1) phase -= 1;
@@ -168,4 +174,4 @@ void Electromyogram::render(const NerveModel& model, const DrillNoise& drill, st
   now_ = (now_ + n) % kRing;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -15,7 +15,8 @@ const std::vector<std::string> kChannelKeys{"name", "evoked_uv", "latency_ms", "
 
 void need_source(const JsonFile& file, const JsonValue& object, const std::string& where) {
   const JsonValue& source = file.need(object, where, "source");
-  if (file.text(source, "\"source\"").empty()) throw file.wrong(source, where + " has no source", "say where the number comes from");
+  if (file.text(source, "\"source\"").empty())
+    throw file.wrong(source, where + " has no source", "say where the number comes from");
 }
 
 void read_constants(const JsonFile& file, const JsonValue& object, MonitorConstants& constants) {
@@ -64,13 +65,15 @@ MonitoredNerve read_nerve(const JsonFile& file, const JsonValue& object, const s
     file.allow(c, where, kChannelKeys);
     const JsonValue& name = file.need(c, where, "name");
     channel.name = file.text(name, "\"name\"");
-    if (channel.name.empty() || channel.name.size() > 64) throw file.wrong(name, "a channel's name has 1 to 64 letters");
+    if (channel.name.empty() || channel.name.size() > 64)
+      throw file.wrong(name, "a channel's name has 1 to 64 letters");
     channel.evoked_uv = file.number(file.need(c, channel.name, "evoked_uv"), "\"evoked_uv\"", 0, 8000);
     channel.latency_ms = file.number(file.need(c, channel.name, "latency_ms"), "\"latency_ms\"", 0.5, 30);
     channel.share = file.number(file.need(c, channel.name, "share"), "\"share\"", 0, 1);
     nerve.channels.push_back(channel);
   }
-  if (nerve.channels.empty()) throw file.wrong(object, where + " has no channels", "without one it cannot be heard: leave the nerve out");
+  if (nerve.channels.empty())
+    throw file.wrong(object, where + " has no channels", "without one it cannot be heard: leave the nerve out");
   return nerve;
 }
 
@@ -80,7 +83,8 @@ MonitorSetup parse_monitor(std::string_view json, const std::string& name) {
   const JsonFile file(json, name);
   file.require_format("osteotome_monitor");
   const JsonValue& root = file.root();
-  file.allow(root, "", std::vector<std::string>{"osteotome_monitor", "$schema", "about", "seed", "constants", "nerves"});
+  file.allow(root, "",
+             std::vector<std::string>{"osteotome_monitor", "$schema", "about", "seed", "constants", "nerves"});
   MonitorSetup setup;
   if (const JsonValue* const seed = root.find("seed")) {
     const double value = file.number(*seed, "\"seed\"", 0, 9007199254740992.0);
@@ -106,4 +110,4 @@ std::string_view default_monitor_json() {
   return kMonitorJson;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -112,7 +112,8 @@ NerveCourse course_of(const TriMesh& face, Vec3 distal, std::string name) {
       all += count[k];
     }
     // Near the ends rings are not closed yet, only caps around a point.
-    const auto caps = std::min(rings / 3, static_cast<std::size_t>(std::numbers::pi * mean_radius / all / NerveCourse::kSpacingMm) + 1);
+    const auto caps = std::min(
+        rings / 3, static_cast<std::size_t>(std::numbers::pi * mean_radius / all / NerveCourse::kSpacingMm) + 1);
     Part part;
     for (std::size_t k = caps; k + caps < rings; ++k) {
       if (count[k] >= 3) part.points.push_back({middle[k], 0, radius[k] / count[k]});
@@ -122,15 +123,17 @@ NerveCourse course_of(const TriMesh& face, Vec3 distal, std::string name) {
       extend(part.points, reached, face);
       std::reverse(part.points.begin(), part.points.end());
     }
-    if (dot(part.points.front().at_mm - part.points.back().at_mm, distal) > 0) std::reverse(part.points.begin(), part.points.end());
+    if (dot(part.points.front().at_mm - part.points.back().at_mm, distal) > 0)
+      std::reverse(part.points.begin(), part.points.end());
     part.along = dot(part.points[part.points.size() / 2].at_mm, distal);
     parts.push_back(std::move(part));
   }
   std::stable_sort(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.along < b.along; });
   for (const Part& p : parts) course.points.insert(course.points.end(), p.points.begin(), p.points.end());
   for (std::size_t k = course.points.size(); k-- > 1;)
-    course.points[k - 1].to_distal_mm = course.points[k].to_distal_mm + length(course.points[k].at_mm - course.points[k - 1].at_mm);
+    course.points[k - 1].to_distal_mm =
+        course.points[k].to_distal_mm + length(course.points[k].at_mm - course.points[k - 1].at_mm);
   return course;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

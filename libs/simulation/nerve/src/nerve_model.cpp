@@ -23,14 +23,19 @@ std::string_view name_of(NerveCause cause) {
 
 double stimulus_threshold_ma(const MonitorConstants& c, double soft_mm, double bone_mm, double width_ms) noexcept {
   const double soft = std::max(0.0, soft_mm), bone = std::max(0.0, bone_mm);
-  const double at_usual = c.soft_ma + c.soft_ma_per_mm2 * soft * soft - (c.soft_ma - c.bare_ma) * portable::exp(-soft / c.contact_mm) +
+  const double at_usual = c.soft_ma + c.soft_ma_per_mm2 * soft * soft -
+                          (c.soft_ma - c.bare_ma) * portable::exp(-soft / c.contact_mm) +
                           c.bone_ma_per_mm2 * bone * bone;
   constexpr double kUsualMs = 0.1;
   return at_usual * (1 + c.chronaxie_ms / width_ms) / (1 + c.chronaxie_ms / kUsualMs);
 }
 
 NerveModel::NerveModel(const MonitorConstants& constants, std::vector<NerveCourse> courses, std::uint64_t seed)
-    : c_(constants), courses_(std::move(courses)), random_(seed), touches_(courses_.size(), false), touched_(courses_.size(), false) {
+    : c_(constants),
+      courses_(std::move(courses)),
+      random_(seed),
+      touches_(courses_.size(), false),
+      touched_(courses_.size(), false) {
   for (const NerveCourse& course : courses_) integrity_.emplace_back(course.points.size(), 1.0);
 }
 
@@ -46,8 +51,10 @@ double NerveModel::answer(std::size_t nerve, std::size_t point, double current_m
   return conducts(nerve, point) * std::clamp((current_ma - threshold_ma) / c_.recruit_ma, 0.0, 1.0) * spread;
 }
 
-void NerveModel::begin(NerveCause cause, bool train, std::size_t nerve, std::size_t point, double seconds, double hz, double uv) {
-  const auto of_it = std::count_if(discharges_.begin(), discharges_.end(), [&](const Discharge& d) { return d.nerve == nerve; });
+void NerveModel::begin(NerveCause cause, bool train, std::size_t nerve, std::size_t point, double seconds, double hz,
+                       double uv) {
+  const auto of_it =
+      std::count_if(discharges_.begin(), discharges_.end(), [&](const Discharge& d) { return d.nerve == nerve; });
   if (of_it < kMostOfANerve) {
     discharges_.push_back({next_id_++, cause, train, nerve, point, hz, uv, seconds});
     happenings_.push_back({cause, nerve, point, integrity_[nerve][point]});
@@ -122,8 +129,9 @@ void NerveModel::step(double dt_s, std::span<const NerveStress> stresses, std::s
       if (w.celsius[p] > w.celsius[hottest]) hottest = p;
       const double dose = w.cem43_min[p];
       if (dose <= c_.dose_from_min) continue;
-      const double left =
-          dose >= c_.dose_to_min ? 0 : 1 - portable::log(dose / c_.dose_from_min) / portable::log(c_.dose_to_min / c_.dose_from_min);
+      const double left = dose >= c_.dose_to_min ? 0
+                                                 : 1 - portable::log(dose / c_.dose_from_min) /
+                                                           portable::log(c_.dose_to_min / c_.dose_from_min);
       lose(n, p, left);
     }
     if (w.celsius.empty() || w.celsius[hottest] < c_.train_c || integrity_[n][hottest] <= 0) continue;
@@ -134,4 +142,4 @@ void NerveModel::step(double dt_s, std::span<const NerveStress> stresses, std::s
   }
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -65,4 +65,4 @@ std::optional<Stimulator::Found> Stimulator::take(bool response) {
   return found;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

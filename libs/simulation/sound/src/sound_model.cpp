@@ -29,7 +29,8 @@ double along(const std::array<std::array<double, 2>, N>& points, double x) noexc
 
 double speed_db(double rpm, const SoundModel& m) noexcept {
   constexpr double kSlow = 20000, kFast = 80000;
-  const double by_log = m.speed_db * portable::log(std::clamp(rpm, kSlow, kFast) / 60000) / portable::log(kFast / kSlow);
+  const double by_log =
+      m.speed_db * portable::log(std::clamp(rpm, kSlow, kFast) / 60000) / portable::log(kFast / kSlow);
   return by_log + (rpm < kSlow ? 40 * log10_of(rpm / kSlow) : 0);
 }
 
@@ -38,7 +39,8 @@ double speed_db(double rpm, const SoundModel& m) noexcept {
 double envelope_db(double hz) noexcept {
   if (!(hz > 0)) return kSilent;
   static const std::array<std::array<double, 2>, 7> points = [] {
-    std::array<std::array<double, 2>, 7> p{{{100, -20}, {1000, -8}, {2000, 0}, {4000, 0}, {8000, -24}, {16000, -60}, {20000, -80}}};
+    std::array<std::array<double, 2>, 7> p{
+        {{100, -20}, {1000, -8}, {2000, 0}, {4000, 0}, {8000, -24}, {16000, -60}, {20000, -80}}};
     for (auto& at : p) at[0] = portable::log(at[0]);
     return p;
   }();
@@ -63,7 +65,8 @@ BurrSpectrum burr_spectrum(const SoundVoice& voice, const SoundModel& m) noexcep
   const auto part = [](double of) { return of >= 1 ? 0 : of > 0 ? 10 * log10_of(of) : kSilent; };
   const double teeth = contact + part(share), rest = contact + part(1 - share);
   const auto weight = [&](double hz) {
-    return envelope_db(hz) + s.softness * m.soft_db * std::clamp(portable::log(std::max(hz, 1.0) / 2000) / portable::log(2), 0.0, 1.0);
+    return envelope_db(hz) +
+           s.softness * m.soft_db * std::clamp(portable::log(std::max(hz, 1.0) / 2000) / portable::log(2), 0.0, 1.0);
   };
   const auto add = [&](std::size_t line, double multiple, double db) {
     const double hz = s.rotation_hz * multiple;
@@ -86,8 +89,8 @@ BurrSpectrum burr_spectrum(const SoundVoice& voice, const SoundModel& m) noexcep
 double suction_db(const SoundVoice& voice, double water, const SoundModel& m) noexcept {
   const double draws = bounded(voice.draws, 0, 1);
   if (voice.kind != SoundKind::sucker || draws < 0.001) return kSilent;
-  return m.suction_db + m.suction_db_per_mm * (bounded(voice.diameter_mm, 1, 5) - 8.0 / 3) + m.suction_wet_db * bounded(water, 0, 1) +
-         20 * log10_of(draws);
+  return m.suction_db + m.suction_db_per_mm * (bounded(voice.diameter_mm, 1, 5) - 8.0 / 3) +
+         m.suction_wet_db * bounded(water, 0, 1) + 20 * log10_of(draws);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -28,7 +28,8 @@ void Synthesizer::Filter::low_pass(double hz, int order) {
   for (int k = 0; k < order / 2; ++k) {
     const double q = 1 / (2 * portable::sin_cos_turns((2 * k + 1) / (4.0 * order)).cos);
     const double alpha = w.sin / (2 * q), a0 = 1 + alpha;
-    sections[count++] = {(1 - w.cos) / 2 / a0, (1 - w.cos) / a0, (1 - w.cos) / 2 / a0, -2 * w.cos / a0, (1 - alpha) / a0, 0, 0};
+    sections[count++] = {
+        (1 - w.cos) / 2 / a0, (1 - w.cos) / a0, (1 - w.cos) / 2 / a0, -2 * w.cos / a0, (1 - alpha) / a0, 0, 0};
   }
 }
 
@@ -37,7 +38,8 @@ void Synthesizer::Filter::high_pass(double hz, int order) {
   for (int k = 0; k < order / 2; ++k) {
     const double q = 1 / (2 * portable::sin_cos_turns((2 * k + 1) / (4.0 * order)).cos);
     const double alpha = w.sin / (2 * q), a0 = 1 + alpha;
-    sections[count++] = {(1 + w.cos) / 2 / a0, -(1 + w.cos) / a0, (1 + w.cos) / 2 / a0, -2 * w.cos / a0, (1 - alpha) / a0, 0, 0};
+    sections[count++] = {
+        (1 + w.cos) / 2 / a0, -(1 + w.cos) / a0, (1 + w.cos) / 2 / a0, -2 * w.cos / a0, (1 - alpha) / a0, 0, 0};
   }
 }
 
@@ -177,7 +179,8 @@ void Synthesizer::render(const SoundState& to, double volume, std::span<float> o
   const auto samples = static_cast<double>(out.size());
   plan(to, samples);
   volume_.to(std::isfinite(volume) ? std::clamp(volume, 0.0, 1.0) : 0, samples);
-  const double keep = portable::exp(-1 / (safe_.over_s * kRate)), most = portable::exp(safe_.most_db * (portable::log(10) / 10));
+  const double keep = portable::exp(-1 / (safe_.over_s * kRate)),
+               most = portable::exp(safe_.most_db * (portable::log(10) / 10));
   for (float& sample : out) {
     double x = 0;
     for (Burr& b : burrs_) {
@@ -210,7 +213,8 @@ void Synthesizer::render(const SoundState& to, double volume, std::span<float> o
       if (beep_.level.now == 0) beep_.hz.now = hz;
       const double target = loud ? amplitude(model_.alarm_db) * std::numbers::sqrt2 : 0, rate = 1 / (0.01 * kRate);
       const double full = amplitude(model_.alarm_db) * std::numbers::sqrt2;
-      beep_.level.now = loud ? std::min(target, beep_.level.now + full * rate) : std::max(0.0, beep_.level.now - full * rate);
+      beep_.level.now =
+          loud ? std::min(target, beep_.level.now + full * rate) : std::max(0.0, beep_.level.now - full * rate);
       beep_.phase += beep_.hz.now / kRate;
       beep_.phase -= std::floor(beep_.phase);
       x += beep_.level.now * portable::sin_cos_turns(beep_.phase).sin;
@@ -229,4 +233,4 @@ double Synthesizer::held_down_db() const noexcept {
   return power_ > most ? 10 * portable::log(most / power_) / portable::log(10) : 0;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -32,7 +32,8 @@ static_assert(sizeof(WavHeader) == 44);
 
 }  // namespace
 
-void write_wav(const std::filesystem::path& out, int rate_hz, const std::function<bool(std::vector<float>& samples)>& next) {
+void write_wav(const std::filesystem::path& out, int rate_hz,
+               const std::function<bool(std::vector<float>& samples)>& next) {
   write_atomically(out, [&](const std::filesystem::path& temporary) {
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(temporary.c_str(), "wb"), &std::fclose);
     const auto write = [&](const void* data, std::size_t bytes) {
@@ -51,7 +52,8 @@ void write_wav(const std::filesystem::path& out, int rate_hz, const std::functio
       for (std::size_t i = 0; i < samples.size(); ++i)
         whole[i] = static_cast<std::int16_t>(std::lround(32767 * std::clamp(samples[i], -1.0F, 1.0F)));
       bytes += 2 * whole.size();
-      if (bytes > 0xffffff00U) throw Error(ExitCode::resources, "a WAV file cannot hold more than 4 GB", "cut the session into parts");
+      if (bytes > 0xffffff00U)
+        throw Error(ExitCode::resources, "a WAV file cannot hold more than 4 GB", "cut the session into parts");
       write(whole.data(), 2 * whole.size());
     }
     header.data_bytes = static_cast<std::uint32_t>(bytes);
@@ -63,4 +65,4 @@ void write_wav(const std::filesystem::path& out, int rate_hz, const std::functio
   });
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

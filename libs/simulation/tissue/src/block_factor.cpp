@@ -27,7 +27,8 @@ void store(float* to, Four v) {
 
 }  // namespace
 
-BlockFactor::BlockFactor(std::size_t points, std::vector<Block> blocks) : order_(points), first_(points + 1), room_(4 * points) {
+BlockFactor::BlockFactor(std::size_t points, std::vector<Block> blocks)
+    : order_(points), first_(points + 1), room_(4 * points) {
   // Ordered by points, so that the three columns of each have the same rows.
   std::vector<Eigen::Triplet<double>> pattern;
   for (const Block& b : blocks) pattern.emplace_back(static_cast<int>(b.row), static_cast<int>(b.column), 1.0);
@@ -50,7 +51,8 @@ BlockFactor::BlockFactor(std::size_t points, std::vector<Block> blocks) : order_
         const std::uint32_t row = 3 * r + i, column = 3 * c + j;
         if (r == c && row < column) continue;
         // Above the diagonal of the order: its mirror image.
-        entries.emplace_back(static_cast<int>(std::max(row, column)), static_cast<int>(std::min(row, column)), b.value[3 * i + j]);
+        entries.emplace_back(static_cast<int>(std::max(row, column)), static_cast<int>(std::min(row, column)),
+                             b.value[3 * i + j]);
       }
     }
   }
@@ -67,10 +69,11 @@ BlockFactor::BlockFactor(std::size_t points, std::vector<Block> blocks) : order_
   const double* const value = l.valuePtr();
   for (std::size_t c = 0; c < points; ++c) {
     const std::size_t begin = static_cast<std::size_t>(start[3 * c]), end = static_cast<std::size_t>(start[3 * c + 1]);
-    const std::size_t middle = static_cast<std::size_t>(start[3 * c + 1]), last = static_cast<std::size_t>(start[3 * c + 2]);
-    diagonal_.insert(diagonal_.end(),
-                     {static_cast<float>(1 / value[begin]), static_cast<float>(value[begin + 1]), static_cast<float>(1 / value[middle]),
-                      static_cast<float>(value[begin + 2]), static_cast<float>(value[middle + 1]), static_cast<float>(1 / value[last])});
+    const std::size_t middle = static_cast<std::size_t>(start[3 * c + 1]),
+                      last = static_cast<std::size_t>(start[3 * c + 2]);
+    diagonal_.insert(diagonal_.end(), {static_cast<float>(1 / value[begin]), static_cast<float>(value[begin + 1]),
+                                       static_cast<float>(1 / value[middle]), static_cast<float>(value[begin + 2]),
+                                       static_cast<float>(value[middle + 1]), static_cast<float>(1 / value[last])});
     first_[c] = rows_.size();
     for (std::size_t i = begin + 3, k = 0; i < end; i += 3, k += 3) {
       rows_.push_back(static_cast<std::uint32_t>(row[i]) / 3);
@@ -85,7 +88,8 @@ BlockFactor::BlockFactor(std::size_t points, std::vector<Block> blocks) : order_
 
 void BlockFactor::solve(std::span<float> x) {
   const std::size_t n = order_.size();
-  for (std::size_t i = 0; i < n; ++i) std::copy_n(x.data() + 4 * static_cast<std::size_t>(order_[i]), 4, room_.data() + 4 * i);
+  for (std::size_t i = 0; i < n; ++i)
+    std::copy_n(x.data() + 4 * static_cast<std::size_t>(order_[i]), 4, room_.data() + 4 * i);
   for (std::size_t c = 0; c < n; ++c) {
     float* const y = room_.data() + 4 * c;
     const float* const d = diagonal_.data() + 6 * c;
@@ -121,4 +125,4 @@ void BlockFactor::solve(std::span<float> x) {
   }
 }
 
-}  // namespace osteo::simulation::tissue
+}  // namespace osteo::inline simulation::tissue

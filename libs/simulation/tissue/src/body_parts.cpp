@@ -44,11 +44,13 @@ std::vector<std::uint32_t> points_of(std::span<const std::array<std::uint32_t, 3
 void require_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n, std::size_t points) {
   for (const auto& [p, f] : forces_n) {
     if (p >= points || !std::isfinite(dot(f, f)))
-      throw Error(ExitCode::usage, "a load on point " + std::to_string(p) + " is not finite, or there is no such point");
+      throw Error(ExitCode::usage,
+                  "a load on point " + std::to_string(p) + " is not finite, or there is no such point");
   }
 }
 
-std::vector<std::uint32_t> points_inside(const RigidShape& shape, std::span<const Vec3> rest, std::span<const std::uint32_t> points) {
+std::vector<std::uint32_t> points_inside(const RigidShape& shape, std::span<const Vec3> rest,
+                                         std::span<const std::uint32_t> points) {
   std::vector<std::uint32_t> inside;
   Vec3 out;
   for (const std::uint32_t p : points) {
@@ -57,4 +59,4 @@ std::vector<std::uint32_t> points_inside(const RigidShape& shape, std::span<cons
   return inside;
 }
 
-}  // namespace osteo::simulation::tissue
+}  // namespace osteo::inline simulation::tissue

@@ -56,7 +56,8 @@ double young_mpa(double hu, const BoneDensity& density) {
   return ash <= 0.27 ? 33900 * std::pow(ash, 2.20) : ash < 0.6 ? 5307 * ash + 469 : 10200 * std::pow(ash, 2.01);
 }
 
-BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDensity& density, double step, const Context& context) {
+BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDensity& density, double step,
+                             const Context& context) {
   require_usable(density, step);
   const Vec3 h = ct.frame.spacing_mm;
   const double apart_mm = 0.5 * std::min({h.x, h.y, h.z});
@@ -87,7 +88,8 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
       for (std::size_t c = 0; c < 4; ++c) {
         for (std::size_t b = 0; b < c; ++b) longest = std::max(longest, length(mm[c] - mm[b]));
       }
-      // Middles of the n^3 small tetrahedra that stand like the whole: their mean is that of the whole for anything linear.
+      // Middles of the n^3 small tetrahedra that stand like the whole: their mean is that of the whole for anything
+      // linear.
       const int n = std::clamp(static_cast<int>(std::ceil(longest / apart_mm)), 2, kMostAlongEdge);
       double sum = 0, sum_hu = 0, sum_density = 0;
       int samples = 0, beyond = 0;
@@ -129,12 +131,16 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
     s.share_above = above / s.volume_mm3;
   }
   if (s.share_outside > kMostOutside)
-    throw Error(ExitCode::usage, format_number(std::round(1000 * s.share_outside) / 10) + " % of the mesh lies outside of the CT",
-                "the CT is the one that the mesh was made from, before it was cropped; 'osteo info' prints where each is");
+    throw Error(
+        ExitCode::usage,
+        format_number(std::round(1000 * s.share_outside) / 10) + " % of the mesh lies outside of the CT",
+        "the CT is the one that the mesh was made from, before it was cropped; 'osteo info' prints where each is");
   struct Group {
     double volume = 0, sum = 0, grams = 0;
   };
-  const auto group_of = [&](double e) { return step > 0 ? std::round(std::log(e / density.least_mpa) / std::log1p(step)) : e; };
+  const auto group_of = [&](double e) {
+    return step > 0 ? std::round(std::log(e / density.least_mpa) / std::log1p(step)) : e;
+  };
   std::map<double, Group> groups;
   for (std::size_t t = 0; t < count; ++t) {
     Group& g = groups[group_of(s.young_mpa[t])];
@@ -153,4 +159,4 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
   return s;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

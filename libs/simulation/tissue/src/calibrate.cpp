@@ -60,7 +60,8 @@ class Watch final : public ceres::IterationCallback {
 
 }  // namespace
 
-CalibrationError calibration_error(std::span<const Vec3> rest, std::span<const Vec3> shape, std::span<const Vec3> truth) {
+CalibrationError calibration_error(std::span<const Vec3> rest, std::span<const Vec3> shape,
+                                   std::span<const Vec3> truth) {
   const double n = static_cast<double>(rest.size());
   double off = 0, moved = 0;
   Eigen::Vector3d a = Eigen::Vector3d::Zero(), b = a;
@@ -82,7 +83,8 @@ CalibrationError calibration_error(std::span<const Vec3> rest, std::span<const V
   return {std::sqrt(off / moved), std::sqrt(left / moved), std::sqrt(off / n), std::sqrt(moved / n)};
 }
 
-double force_error(std::span<const Vec3> rest, std::span<const Vec3> shape, std::span<const Vec3> truth, const TissueLoad& load) {
+double force_error(std::span<const Vec3> rest, std::span<const Vec3> shape, std::span<const Vec3> truth,
+                   const TissueLoad& load) {
   double own = 0, true_work = 0;
   for (const auto& [p, f] : load.forces_n) {
     own += dot(f, shape[p] - rest[p]);
@@ -91,17 +93,19 @@ double force_error(std::span<const Vec3> rest, std::span<const Vec3> shape, std:
   return own != 0 ? true_work / own - 1 : 0;
 }
 
-TissueModel with_log_factors(const TissueModel& model, const std::array<int, 3>& grid, std::span<const double> log_factors) {
+TissueModel with_log_factors(const TissueModel& model, const std::array<int, 3>& grid,
+                             std::span<const double> log_factors) {
   if (log_factors.size() != grid_points(grid) * kTissueClasses)
-    throw Error(ExitCode::usage,
-                std::to_string(log_factors.size()) + " factors do not fit a grid of " + std::to_string(grid_points(grid)) + " points");
+    throw Error(ExitCode::usage, std::to_string(log_factors.size()) + " factors do not fit a grid of " +
+                                     std::to_string(grid_points(grid)) + " points");
   TissueModel scaled = model;
   const std::vector<Share> share = shares(model, grid);
   std::vector<double> factors(share.size());
   for (std::size_t c = 0; c < share.size(); ++c) {
     double log = 0;
     for (std::size_t n = 0; n < 8; ++n)
-      log += share[c].weight[n] * log_factors[share[c].at[n] * kTissueClasses + static_cast<std::size_t>(model.constraints()[c].kind)];
+      log += share[c].weight[n] *
+             log_factors[share[c].at[n] * kTissueClasses + static_cast<std::size_t>(model.constraints()[c].kind)];
     factors[c] = std::exp(log);
   }
   scaled.scale_each(factors);
@@ -115,7 +119,8 @@ bool has_ceres() {
 }
 
 Calibration calibrate(TissueModel&, std::span<const CalibrationCase>, const CalibrateOptions&, const Context&) {
-  throw Error(ExitCode::failed, "this build cannot calibrate: it was made without Ceres", "build with -DOSTEO_CERES=ON");
+  throw Error(ExitCode::failed, "this build cannot calibrate: it was made without Ceres",
+              "build with -DOSTEO_CERES=ON");
 }
 
 #else
@@ -134,8 +139,8 @@ Descent tissue::descend(Fit& fit, std::vector<double> logs, const CalibrateOptio
   Watch watch(logs, context);
   ceres::Solver::Options o;
   o.linear_solver_type = ceres::DENSE_QR;
-  // A few factors from the closed form are nearly a linear problem; a map far from uniform is a long valley, which the dogleg follows
-  // better.
+  // A few factors from the closed form are nearly a linear problem; a map far from uniform is a long valley, which the
+  // dogleg follows better.
   o.trust_region_strategy_type = fit.parameters() > 8 ? ceres::DOGLEG : ceres::LEVENBERG_MARQUARDT;
   o.max_num_iterations = options.iterations;
   o.function_tolerance = options.tolerance;
@@ -157,7 +162,8 @@ Descent tissue::descend(Fit& fit, std::vector<double> logs, const CalibrateOptio
   return d;
 }
 
-Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context) {
+Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options,
+                      const Context& context) {
   if (cases.empty()) throw Error(ExitCode::usage, "a calibration needs at least one load");
   const auto begin = std::chrono::steady_clock::now();
   Fit fit(model, cases, options, context);
@@ -249,4 +255,4 @@ Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases
 
 #endif
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

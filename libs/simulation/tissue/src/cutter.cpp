@@ -5,8 +5,10 @@
 
 namespace osteo::inline simulation::tissue {
 
-Cutter::Cutter(const TissueModel& whole) : there_(whole.tets().size(), true), of_point_(whole.point_count()), had_(whole.element_count()) {
-  std::map<std::array<std::uint32_t, 4>, std::uint32_t> by_points;  // edges, faces and single tetrahedra, sorted, padded with the last
+Cutter::Cutter(const TissueModel& whole)
+    : there_(whole.tets().size(), true), of_point_(whole.point_count()), had_(whole.element_count()) {
+  std::map<std::array<std::uint32_t, 4>, std::uint32_t>
+      by_points;  // edges, faces and single tetrahedra, sorted, padded with the last
   std::vector<std::uint32_t> voxels;
   const auto key = [](std::span<const std::uint32_t> nodes) {
     std::array<std::uint32_t, 4> k{};
@@ -60,4 +62,4 @@ void Cutter::cut(TissueModel& model, std::span<const std::uint32_t> tets) {
   }
 }
 
-}  // namespace osteo::simulation::tissue
+}  // namespace osteo::inline simulation::tissue

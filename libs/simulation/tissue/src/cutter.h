@@ -8,12 +8,13 @@
 
 namespace osteo::inline simulation::tissue {
 
-/// Keeps which tetrahedra are still there. An edge or face keeps the share of its stiffness that its tetrahedra still there had of it; the
-/// volume of a voxel goes with its first tetrahedron.
+/// Keeps which tetrahedra are still there. An edge or face keeps the share of its stiffness that its tetrahedra still
+/// there had of it; the volume of a voxel goes with its first tetrahedron.
 class Cutter {
  public:
   explicit Cutter(const TissueModel& whole);
-  /// Sets the stiffness of what changed in `model`; tetrahedra that are gone already are passed over. O(constraints near them).
+  /// Sets the stiffness of what changed in `model`; tetrahedra that are gone already are passed over. O(constraints
+  /// near them).
   void cut(TissueModel& model, std::span<const std::uint32_t> tets);
   [[nodiscard]] bool there(std::uint32_t tet) const { return there_[tet]; }
   /// Tetrahedra of a point that are still there.
@@ -27,4 +28,4 @@ class Cutter {
   std::vector<double> whole_;                      // stiffness
 };
 
-}  // namespace osteo::simulation::tissue
+}  // namespace osteo::inline simulation::tissue

@@ -26,7 +26,8 @@ using namespace tissue;
 
 DampingFit fit_damping(const TissueModel&, const TissueLoad&, std::span<const std::uint32_t>, std::span<const Slider>,
                        const MeasuredMotion&, const DampingOptions&, const Context&) {
-  throw Error(ExitCode::failed, "this build cannot fit damping: it was made without Ceres", "build with -DOSTEO_CERES=ON");
+  throw Error(ExitCode::failed, "this build cannot fit damping: it was made without Ceres",
+              "build with -DOSTEO_CERES=ON");
 }
 
 #else
@@ -91,7 +92,8 @@ class Release {
     Trace trace{d.step_s(), std::vector<std::vector<double> >(channels_.size()), true};
     const double steps = std::ceil(seconds / d.step_s()) + 3;
     if (!(steps < kMostSteps))
-      throw Error(ExitCode::usage, shown(seconds) + " s are " + shown(steps) + " steps of " + shown(1000 * d.step_s()) + " ms, too many",
+      throw Error(ExitCode::usage,
+                  shown(seconds) + " s are " + shown(steps) + " steps of " + shown(1000 * d.step_s()) + " ms, too many",
                   "cut the table to the swings that are seen, or take longer, implicit steps");
     for (long n = 0; n <= static_cast<long>(steps); ++n) {
       if (n > 0) d.step();
@@ -117,19 +119,28 @@ class Release {
 MeasuredMotion as_measured(const Trace& trace, const MeasuredMotion& times) {
   MeasuredMotion m = times;
   for (std::size_t c = 0; c < m.channels.size(); ++c) {
-    for (std::size_t i = 0; i < m.channels[c].mm.size(); ++i) m.channels[c].mm[i] = trace.at(c, m.channels[c].time_s[i]);
+    for (std::size_t i = 0; i < m.channels[c].mm.size(); ++i)
+      m.channels[c].mm[i] = trace.at(c, m.channels[c].time_s[i]);
   }
   return m;
 }
 
-// Parameters: damping, log stiffness, release, amplitude, then of each channel where it rests and how it drifts; each scaled to about 1.
+// Parameters: damping, log stiffness, release, amplitude, then of each channel where it rests and how it drifts; each
+// scaled to about 1.
 enum : std::size_t { kDamping, kStiffness, kRelease, kAmplitude, kOfChannels };
 
 class DampingCost final : public ceres::CostFunction {
  public:
-  DampingCost(const Release& release, Stepping stepping, const MeasuredMotion& used, double damping_scale, double w, double size,
-              double span, const Context& context)
-      : release_(release), stepping_(stepping), used_(used), damping_(damping_scale), w_(w), size_(size), span_(span), context_(context) {
+  DampingCost(const Release& release, Stepping stepping, const MeasuredMotion& used, double damping_scale, double w,
+              double size, double span, const Context& context)
+      : release_(release),
+        stepping_(stepping),
+        used_(used),
+        damping_(damping_scale),
+        w_(w),
+        size_(size),
+        span_(span),
+        context_(context) {
     std::size_t values = 0;
     for (const auto& c : used.channels) values += c.mm.size();
     set_num_residuals(static_cast<int>(values));
@@ -165,7 +176,8 @@ class DampingCost final : public ceres::CostFunction {
         const double t = channel.time_s[i] - later;
         double speed = 0;
         const double u = trace[0].at(c, t, &speed), along = channel.time_s[i] / span_ - 0.5;
-        residuals[row] = (p[kAmplitude] * u - channel.mm[i]) * inverse + p[kOfChannels + 2 * c] + p[kOfChannels + 2 * c + 1] * along;
+        residuals[row] =
+            (p[kAmplitude] * u - channel.mm[i]) * inverse + p[kOfChannels + 2 * c] + p[kOfChannels + 2 * c + 1] * along;
         if (!derive) continue;
         double* const j = jacobians[0] + row * width;
         std::fill(j, j + width, 0.0);
@@ -204,7 +216,8 @@ Linear linear_fit(const Trace& trace, const MeasuredMotion& used, double later, 
       const auto& channel = used.channels[c];
       double n = 0, s = 0, ss = 0, u0 = 0, u1 = 0, y0 = 0, y1 = 0;
       for (std::size_t i = 0; i < channel.mm.size(); ++i) {
-        const double x = channel.time_s[i] / span - 0.5, u = trace.at(c, channel.time_s[i] - later), y = channel.mm[i] / size;
+        const double x = channel.time_s[i] / span - 0.5, u = trace.at(c, channel.time_s[i] - later),
+                     y = channel.mm[i] / size;
         if (pass == 0) {
           n += 1;
           s += x;
@@ -222,7 +235,8 @@ Linear linear_fit(const Trace& trace, const MeasuredMotion& used, double later, 
       }
       if (pass == 0) {
         const double det = n * ss - s * s;
-        lines.push_back({(ss * u0 - s * u1) / det, (n * u1 - s * u0) / det, (ss * y0 - s * y1) / det, (n * y1 - s * y0) / det});
+        lines.push_back(
+            {(ss * u0 - s * u1) / det, (n * u1 - s * u0) / det, (ss * y0 - s * y1) / det, (n * y1 - s * y0) / det});
       }
     }
   }
@@ -244,7 +258,8 @@ MeasuredMotion from_release(const MeasuredMotion& motion, double release_s) {
     used.channels.push_back({c.point, c.along, c.name, {}, {}});
     for (std::size_t i = 0; i < c.time_s.size(); ++i) {
       if (!std::isfinite(c.time_s[i]) || !std::isfinite(c.mm[i]) || (i > 0 && !(c.time_s[i] > c.time_s[i - 1])))
-        throw Error(ExitCode::usage, c.name + ": value " + std::to_string(i) + " is no number, or its time does not rise");
+        throw Error(ExitCode::usage,
+                    c.name + ": value " + std::to_string(i) + " is no number, or its time does not rise");
       if (c.time_s[i] < release_s) continue;
       used.channels.back().time_s.push_back(c.time_s[i] - release_s);
       used.channels.back().mm.push_back(c.mm[i]);
@@ -262,9 +277,11 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
   if (options.stepping == Stepping::implicit_steps && !(options.step_s > 0))
     throw Error(ExitCode::usage, "steps in time need a length above 0");
   if (!pluck.contacts.empty())
-    throw Error(ExitCode::usage, "a body that rests against something does not swing freely", "choose a load without contacts");
+    throw Error(ExitCode::usage, "a body that rests against something does not swing freely",
+                "choose a load without contacts");
   for (const auto& c : motion.channels) {
-    if (c.point >= model.point_count()) throw Error(ExitCode::usage, c.name + ": there is no point " + std::to_string(c.point));
+    if (c.point >= model.point_count())
+      throw Error(ExitCode::usage, c.name + ": there is no point " + std::to_string(c.point));
   }
   DampingFit fit;
   fit.used = from_release(motion, options.release_s);
@@ -276,8 +293,8 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
   for (const auto& c : used.channels) {
     if (c.mm.size() < kFewestValues)
       throw Error(ExitCode::usage,
-                  c.name + ": " + std::to_string(c.mm.size()) + " values from " + shown(options.release_s) + " s on, at least " +
-                      std::to_string(kFewestValues) + " are needed",
+                  c.name + ": " + std::to_string(c.mm.size()) + " values from " + shown(options.release_s) +
+                      " s on, at least " + std::to_string(kFewestValues) + " are needed",
                   "measure longer or more often, or let the release be earlier");
     values += c.mm.size();
     fit.span_s = std::max(fit.span_s, c.time_s.back());
@@ -295,7 +312,8 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
   std::nth_element(between.begin(), between.begin() + static_cast<std::ptrdiff_t>(between.size() / 2), between.end());
   fit.interval_s = between[between.size() / 2];
   const double size = std::sqrt(squares / static_cast<double>(values));
-  if (!(size > 1e-12 * farthest)) throw Error(ExitCode::usage, "nothing moves in what was measured", "the displacements are all the same");
+  if (!(size > 1e-12 * farthest))
+    throw Error(ExitCode::usage, "nothing moves in what was measured", "the displacements are all the same");
 
   // Plucked.
   EquilibriumSolver solver(model, model.rest(), pluck);
@@ -305,7 +323,8 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
   }
   const Equilibrium at = solver.solve(model, plucked, pluck.forces_n, {}, context);
   if (!at.converged)
-    throw Error(ExitCode::failed, "the body does not come to rest where it is plucked to: " + at.why, "make the load smaller");
+    throw Error(ExitCode::failed, "the body does not come to rest where it is plucked to: " + at.why,
+                "make the load smaller");
   require_held(model, model.rest(), fixed, sliders);
   plucked = at.points_mm;
   const std::vector<double> mass = masses(model, options.density_kg_m3);
@@ -321,7 +340,8 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
     throw Error(ExitCode::usage, "the load does not move what was measured (" + used.channels.front().name + ")",
                 "check the point, the direction and which load plucked it");
 
-  // The frequency of the body as it stands: J. Rayleigh's quotient of the shape, then what its channels do in four swings.
+  // The frequency of the body as it stands: J. Rayleigh's quotient of the shape, then what its channels do in four
+  // swings.
   Release release(model, fixed, sliders, used.channels, options, context);
   const double guess_hz = std::sqrt(2 * total_energy(model, plucked) / kinetic) / kTurn;
   const auto pluck_by = [&](double times) {
@@ -329,7 +349,8 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
     for (std::size_t p = 0; p < rest.size(); ++p) x[p] += (plucked[p] - rest[p]) * times;
     return x;
   };
-  const double gently = std::min(1.0, 1e-2 * fit.largest_mm.front() / seen);  // small, so that it is that of small motion
+  const double gently =
+      std::min(1.0, 1e-2 * fit.largest_mm.front() / seen);  // small, so that it is that of small motion
   release.start = pluck_by(gently);
   {
     const Trace t = release.run(Stepping::explicit_steps, 0, 1, 4 / guess_hz);
@@ -345,25 +366,30 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
   context.progress(0.1, "fitting");
   if (fit.interval_s > 0.5 / fit.model_hz)
     throw Error(ExitCode::usage,
-                "values " + shown(1000 * fit.interval_s) + " ms apart tell frequencies up to " + shown(0.5 / fit.interval_s) +
-                    " Hz, the body swings with " + shown(fit.model_hz) + " Hz (by the problem's stiffness and density)",
+                "values " + shown(1000 * fit.interval_s) + " ms apart tell frequencies up to " +
+                    shown(0.5 / fit.interval_s) + " Hz, the body swings with " + shown(fit.model_hz) +
+                    " Hz (by the problem's stiffness and density)",
                 "measure more often, or mend young_kpa and the density where they are far off");
   if (options.fit_stiffness && fit.span_s * fit.model_hz < kFewestSwings)
     throw Error(ExitCode::usage,
                 "the table holds " + shown(fit.span_s) + " s from the release on, " + shown(fit.span_s * fit.model_hz) +
-                    " swings of the body's " + shown(fit.model_hz) + " Hz; " + format_number(kFewestSwings) + " are needed",
+                    " swings of the body's " + shown(fit.model_hz) + " Hz; " + format_number(kFewestSwings) +
+                    " are needed",
                 "measure longer, or mend young_kpa and the density where they are far off");
   // Not slower than half a swing in the table, where a drift would be taken for one.
-  fit.measured = swing_of(used, std::max(fit.model_hz / 8, 0.5 / fit.span_s), std::min(8 * fit.model_hz, 0.475 / fit.interval_s));
+  fit.measured =
+      swing_of(used, std::max(fit.model_hz / 8, 0.5 / fit.span_s), std::min(8 * fit.model_hz, 0.475 / fit.interval_s));
   if (options.fit_stiffness) {
     if (!fit.measured.swings)
-      throw Error(ExitCode::usage,
-                  "what was measured does not swing (or not above its noise): damping and stiffness cannot be told from each other",
-                  "if the stiffness is known, leave it as it is: --no-fit-stiffness; else measure something that swings");
+      throw Error(
+          ExitCode::usage,
+          "what was measured does not swing (or not above its noise): damping and stiffness cannot be told from each "
+          "other",
+          "if the stiffness is known, leave it as it is: --no-fit-stiffness; else measure something that swings");
     if (fit.measured.hz * fit.span_s < kFewestSwings)
       throw Error(ExitCode::usage,
-                  "the table holds " + shown(fit.measured.hz * fit.span_s) + " swings (" + shown(fit.measured.hz) + " Hz in " +
-                      shown(fit.span_s) + " s); " + format_number(kFewestSwings) + " are needed",
+                  "the table holds " + shown(fit.measured.hz * fit.span_s) + " swings (" + shown(fit.measured.hz) +
+                      " Hz in " + shown(fit.span_s) + " s); " + format_number(kFewestSwings) + " are needed",
                   "measure longer");
   }
 
@@ -379,9 +405,10 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
     if (!(damping > -0.2 * decay) || h * w > 0.5 * std::numbers::pi) {
       const double taken = std::log1p(h * h * w * w) / (2 * h);
       throw Error(ExitCode::usage,
-                  "steps of " + shown(1000 * h) + " ms alone let the swing die down by " + shown(taken) + " /s; measured were " +
-                      shown(decay) + " /s",
-                  decay > 0 ? "take steps of at most " + shown(1000 * decay / (w * w)) + " ms, or explicit ones, which take nothing away"
+                  "steps of " + shown(1000 * h) + " ms alone let the swing die down by " + shown(taken) +
+                      " /s; measured were " + shown(decay) + " /s",
+                  decay > 0 ? "take steps of at most " + shown(1000 * decay / (w * w)) +
+                                  " ms, or explicit ones, which take nothing away"
                             : "take explicit steps, which take nothing away");
     }
     damping = std::max(0.0, damping);
@@ -410,7 +437,8 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
       later = 0.04 * n * kTurn / w0;
     }
   }
-  if (best.left > 1e299) throw Error(ExitCode::failed, "the model goes nowhere when it is let go", "make the load smaller");
+  if (best.left > 1e299)
+    throw Error(ExitCode::failed, "the model goes nowhere when it is let go", "make the load smaller");
   // As far as it really was plucked: large motion has another frequency than small one.
   double plucked_by = std::clamp(best.amplitude * gently, -1e6, 1e6);
   if (plucked_by == 0) plucked_by = gently;
@@ -455,7 +483,8 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
   cost->Evaluate(at_p, residuals.data(), rows);
   std::vector<Eigen::Index> free;
   for (std::size_t i = 0; i < width; ++i) {
-    if (std::find(held.begin(), held.end(), static_cast<int>(i)) == held.end()) free.push_back(static_cast<Eigen::Index>(i));
+    if (std::find(held.begin(), held.end(), static_cast<int>(i)) == held.end())
+      free.push_back(static_cast<Eigen::Index>(i));
   }
   const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> > all(
       jacobian.data(), static_cast<Eigen::Index>(values), static_cast<Eigen::Index>(width));
@@ -516,4 +545,4 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
 
 #endif
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

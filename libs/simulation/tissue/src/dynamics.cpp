@@ -57,8 +57,8 @@ void TissueDynamics<Real>::Impl::lay_out() {
     if (c.stiffness == 0 || c.rest == 0) continue;
     (c.nodes == 2 ? e : c.nodes == 3 ? f : c.nodes == 4 ? t : v[c.voxel]).push_back(&c);
   }
-  const auto put = [](const std::vector<const TissueModel::Constraint*>& list, std::size_t n, std::vector<std::uint32_t>& node,
-                      std::vector<Real>& k, std::vector<Real>& inverse) {
+  const auto put = [](const std::vector<const TissueModel::Constraint*>& list, std::size_t n,
+                      std::vector<std::uint32_t>& node, std::vector<Real>& k, std::vector<Real>& inverse) {
     node.resize(n * list.size());
     k.clear();
     inverse.clear();
@@ -88,11 +88,13 @@ void TissueDynamics<Real>::Impl::lay_out() {
   arrays.face = face.data();
   arrays.face_k = face_k.data();
   arrays.face_inverse = face_inverse.data();
-  for (int s = 0; s < 2; ++s) arrays.voxels[s] = {v[s].size(), voxel[s].data(), voxel_k[s].data(), voxel_inverse[s].data()};
+  for (int s = 0; s < 2; ++s)
+    arrays.voxels[s] = {v[s].size(), voxel[s].data(), voxel_k[s].data(), voxel_inverse[s].data()};
   arrays.tets = {t.size(), tet.data(), tet_k.data(), tet_inverse.data()};
 }
 
-// Of each point, a bound on its share of the highest frequency: sum over its constraints of k |grad_i C| sum_j |grad_j C|.
+// Of each point, a bound on its share of the highest frequency: sum over its constraints of k |grad_i C| sum_j |grad_j
+// C|.
 template <class Real>
 template <class At>
 void TissueDynamics<Real>::Impl::rows(bool edges, const At& place, std::vector<double>& row) const {
@@ -133,8 +135,9 @@ double TissueDynamics<Real>::Impl::certify() {
   return most > 0 ? options.step_share * 2 / std::sqrt(most) : 1e-3;
 }
 
-// Edges are as stiff along themselves however long they are, and across them less; areas and volumes get stiffer as they are stretched,
-// without a bound. What has become too stiff for the step is moved as if it were heavier while it is.
+// Edges are as stiff along themselves however long they are, and across them less; areas and volumes get stiffer as
+// they are stretched, without a bound. What has become too stiff for the step is moved as if it were heavier while it
+// is.
 template <class Real>
 void TissueDynamics<Real>::Impl::certify_again() {
   std::vector<double> row = edge_row;
@@ -157,8 +160,8 @@ void TissueDynamics<Real>::Impl::certify_again() {
 }
 
 template <class Real>
-TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const std::uint32_t> fixed, const DynamicsOptions& options,
-                                     std::span<const Slider> sliders)
+TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const std::uint32_t> fixed,
+                                     const DynamicsOptions& options, std::span<const Slider> sliders)
     : impl_(std::make_unique<Impl>(model, options)) {
   Impl& m = *impl_;
   if (!(options.density_kg_m3 > 0)) throw Error(ExitCode::usage, "tissue needs a density above 0");
@@ -167,20 +170,25 @@ TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const s
   const std::size_t n = model.point_count();
   m.fixed.assign(n, false);
   for (const std::uint32_t p : fixed) {
-    if (p >= n) throw Error(ExitCode::usage, "point " + std::to_string(p) + " is to be fixed, but there are only " + std::to_string(n));
+    if (p >= n)
+      throw Error(ExitCode::usage,
+                  "point " + std::to_string(p) + " is to be fixed, but there are only " + std::to_string(n));
     m.fixed[p] = true;
   }
   for (const Slider& s : sliders) {
     if (s.point >= n)
-      throw Error(ExitCode::usage, "point " + std::to_string(s.point) + " is to slide, but there are only " + std::to_string(n));
+      throw Error(ExitCode::usage,
+                  "point " + std::to_string(s.point) + " is to slide, but there are only " + std::to_string(n));
   }
   m.sliders.assign(sliders.begin(), sliders.end());
   m.mass = masses(model, options.density_kg_m3);
-  for (auto* const v : {&m.x, &m.y, &m.z, &m.px, &m.py, &m.pz, &m.fx, &m.fy, &m.fz, &m.lx, &m.ly, &m.lz}) v->assign(n, 0);
+  for (auto* const v : {&m.x, &m.y, &m.z, &m.px, &m.py, &m.pz, &m.fx, &m.fy, &m.fz, &m.lx, &m.ly, &m.lz})
+    v->assign(n, 0);
   for (std::uint32_t p = 0; p < n; ++p) set_position(p, model.rest()[p]);
   m.lay_out();
   m.lay_surface();
-  for (const auto& t : model.tets()) m.margin = std::max(m.margin, 0.25 * length(model.rest()[t[1]] - model.rest()[t[0]]));
+  for (const auto& t : model.tets())
+    m.margin = std::max(m.margin, 0.25 * length(model.rest()[t[1]] - model.rest()[t[0]]));
   m.dt = m.certify();
   m.inverse_mass.assign(n, 0);
   for (std::size_t p = 0; p < n; ++p) {
@@ -203,8 +211,8 @@ void TissueDynamics<Real>::set_load(std::span<const std::pair<std::uint32_t, Vec
     m.lz[p] += static_cast<Real>(f.z);
   }
   for (std::size_t p = 0; p < m.x.size(); ++p)
-    m.load_size =
-        std::max(m.load_size, std::hypot(static_cast<double>(m.lx[p]), static_cast<double>(m.ly[p]), static_cast<double>(m.lz[p])));
+    m.load_size = std::max(m.load_size, std::hypot(static_cast<double>(m.lx[p]), static_cast<double>(m.ly[p]),
+                                                   static_cast<double>(m.lz[p])));
 }
 
 template <class Real>
@@ -287,7 +295,8 @@ Vec3 TissueDynamics<Real>::step(int steps) {
     const Real dt2 = static_cast<Real>(m.dt * m.dt);
     for (std::size_t p = 0; p < m.x.size(); ++p) {
       const Real w = dt2 * m.inverse_mass[p];
-      const Real nx = (2 * m.x[p] - keep * m.px[p] + w * m.fx[p]) * whole, ny = (2 * m.y[p] - keep * m.py[p] + w * m.fy[p]) * whole,
+      const Real nx = (2 * m.x[p] - keep * m.px[p] + w * m.fx[p]) * whole,
+                 ny = (2 * m.y[p] - keep * m.py[p] + w * m.fy[p]) * whole,
                  nz = (2 * m.z[p] - keep * m.pz[p] + w * m.fz[p]) * whole;
       m.px[p] = m.x[p];
       m.py[p] = m.y[p];
@@ -347,7 +356,8 @@ double TissueDynamics<Real>::residual() const {
   double most = 0;
   for (std::size_t p = 0; p < m.x.size(); ++p) {
     if (m.inverse_mass[p] == 0) continue;
-    most = std::max(most, std::hypot(static_cast<double>(m.fx[p]), static_cast<double>(m.fy[p]), static_cast<double>(m.fz[p])));
+    most = std::max(
+        most, std::hypot(static_cast<double>(m.fx[p]), static_cast<double>(m.fy[p]), static_cast<double>(m.fz[p])));
   }
   return most / (m.load_size > 0 ? m.load_size : 1);
 }
@@ -360,9 +370,10 @@ double TissueDynamics<Real>::kinetic_mj() const {
   for (std::size_t p = 0; p < m.x.size(); ++p) {
     // The velocity now, half a step after that between the last two places.
     const Vec3 f{static_cast<double>(m.fx[p]), static_cast<double>(m.fy[p]), static_cast<double>(m.fz[p])};
-    const Vec3 v =
-        Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]), static_cast<double>(m.z[p] - m.pz[p])} / m.dt +
-        f * (0.5 * m.dt * static_cast<double>(m.inverse_mass[p]));
+    const Vec3 v = Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]),
+                        static_cast<double>(m.z[p] - m.pz[p])} /
+                       m.dt +
+                   f * (0.5 * m.dt * static_cast<double>(m.inverse_mass[p]));
     sum += m.fixed[p] ? 0 : 0.5 * m.mass[p] * dot(v, v);
   }
   return sum;
@@ -378,7 +389,8 @@ Vec3 TissueDynamics<Real>::momentum_n_s() const {
   const Impl& m = *impl_;
   Vec3 sum{};
   for (std::size_t p = 0; p < m.x.size(); ++p) {
-    sum += Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]), static_cast<double>(m.z[p] - m.pz[p])} *
+    sum += Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]),
+                static_cast<double>(m.z[p] - m.pz[p])} *
            (m.mass[p] / m.dt);
   }
   return sum;
@@ -387,4 +399,4 @@ Vec3 TissueDynamics<Real>::momentum_n_s() const {
 template class TissueDynamics<float>;
 template class TissueDynamics<double>;
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -111,8 +111,8 @@ void TissueDynamics<Real>::Impl::push_by(Tool& tool) {
   for (const std::uint32_t t : tool.near_triangles) push_triangle(tool, t);
 }
 
-// A tool outside pushes the surface inwards. Where its nearest side lies the other way it has sunk in by more than half, and without this
-// the surface would slip past it.
+// A tool outside pushes the surface inwards. Where its nearest side lies the other way it has sunk in by more than
+// half, and without this the surface would slip past it.
 template <class Real>
 void TissueDynamics<Real>::Impl::push_triangle(Tool& tool, std::uint32_t t) {
   const auto& q = triangles[t];
@@ -219,4 +219,4 @@ template void TissueDynamics<double>::look_at_obstacle();
 template struct TissueDynamics<float>::Impl;
 template struct TissueDynamics<double>::Impl;
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

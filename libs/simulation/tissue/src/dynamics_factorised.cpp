@@ -1,5 +1,5 @@
-// Long steps of TissueDynamics: backward Euler by conjugate gradients, preconditioned by the body's stiffness at rest, which is factorised
-// once (T. Liu et al., ACM Trans. Graph. 36, 2017, take such steps with a matrix of their own).
+// Long steps of TissueDynamics: backward Euler by conjugate gradients, preconditioned by the body's stiffness at rest,
+// which is factorised once (T. Liu et al., ACM Trans. Graph. 36, 2017, take such steps with a matrix of their own).
 #include <algorithm>
 #include <cmath>
 
@@ -41,8 +41,8 @@ double TissueDynamics<Real>::Impl::inertia(std::uint32_t p) const {
   return mass[p] * (1 + options.damping_per_s * dt) / (dt * dt);
 }
 
-// The model's Hessian at rest is positive (all its energies are squares), with masses positive definite. What is cut off later only lowers
-// it, so the factor stays a good one and none is made while a hand waits.
+// The model's Hessian at rest is positive (all its energies are squares), with masses positive definite. What is cut
+// off later only lowers it, so the factor stays a good one and none is made while a hand waits.
 template <class Real>
 void TissueDynamics<Real>::Impl::factorise() {
   std::vector<BlockFactor::Block> blocks;
@@ -119,7 +119,8 @@ void TissueDynamics<Real>::Impl::step_factorised() {
     before[p] = now[p];
     return static_cast<double>(now[p] = there);
   };
-  for (std::uint32_t p = 0; p < n; ++p) m.target[p] = {ahead(x, px, m.x0, p), ahead(y, py, m.y0, p), ahead(z, pz, m.z0, p)};
+  for (std::uint32_t p = 0; p < n; ++p)
+    m.target[p] = {ahead(x, px, m.x0, p), ahead(y, py, m.y0, p), ahead(z, pz, m.z0, p)};
   const auto product = [&](const std::vector<float>& a, const std::vector<float>& b) {
     double sum = 0;
     for (std::size_t i = 0; i < a.size(); ++i) sum += static_cast<double>(a[i]) * static_cast<double>(b[i]);
@@ -143,7 +144,8 @@ void TissueDynamics<Real>::Impl::step_factorised() {
     const double now = product(m.gradient, m.change);
     first = it == 0 ? now : first;
     if (!(now > kRounding * first) || !std::isfinite(now)) break;
-    const auto keep = static_cast<float>(last > 0 ? std::clamp((now - mixed) / last, 0.0, 1.0) : 0);  // E. Polak, G. Ribiere 1969
+    const auto keep =
+        static_cast<float>(last > 0 ? std::clamp((now - mixed) / last, 0.0, 1.0) : 0);  // E. Polak, G. Ribiere 1969
     for (std::size_t i = 0; i < m.direction.size(); ++i) m.direction[i] = keep * m.direction[i] - m.change[i];
     double slope = product(m.gradient, m.direction);
     if (!(slope < 0)) {
@@ -184,4 +186,4 @@ template std::size_t TissueDynamics<double>::factor_bytes() const;
 template void TissueDynamics<float>::Impl::step_factorised();
 template void TissueDynamics<double>::Impl::step_factorised();
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -35,8 +35,8 @@ struct TissueDynamics<Real>::Impl {
     double offset;  // pushes where normal . x < offset
   };
   std::vector<Plane> planes;
-  // The tool meets the triangles of the surface where they are nearest to it, and points: all, so that one that is inside is pushed out,
-  // too.
+  // The tool meets the triangles of the surface where they are nearest to it, and points: all, so that one that is
+  // inside is pushed out, too.
   std::vector<std::array<std::uint32_t, 3>> triangles;  // facing outwards
   std::vector<std::uint32_t> triangles_of;              // of each point: how many; 0 inside the body
   // Of a tool and a triangle, from when it was met until it has been left.
@@ -89,7 +89,9 @@ struct TissueDynamics<Real>::Impl {
     fy[p] += static_cast<Real>(f.y);
     fz[p] += static_cast<Real>(f.z);
   }
-  [[nodiscard]] Vec3 at(std::uint32_t p) const { return {static_cast<double>(x[p]), static_cast<double>(y[p]), static_cast<double>(z[p])}; }
+  [[nodiscard]] Vec3 at(std::uint32_t p) const {
+    return {static_cast<double>(x[p]), static_cast<double>(y[p]), static_cast<double>(z[p])};
+  }
   // Half of critical damping, as a depth less: velocity along `out` times the root of m / k.
   [[nodiscard]] double slowed(std::uint32_t p, double k, Vec3 out) const {
     const Vec3 before{static_cast<double>(px[p]), static_cast<double>(py[p]), static_cast<double>(pz[p])};
@@ -105,10 +107,12 @@ struct TissueDynamics<Real>::Impl {
   void push_by(Tool& tool);
   void push_triangle(Tool& tool, std::uint32_t triangle);
   // Each triangle of a point may push all of it, of each tool.
-  [[nodiscard]] double tool_share(std::uint32_t p) const { return room(p) / std::max<double>(1, triangles_of[p]) / crowd; }
+  [[nodiscard]] double tool_share(std::uint32_t p) const {
+    return room(p) / std::max<double>(1, triangles_of[p]) / crowd;
+  }
   void push_by_obstacle();
   // Points whose place in the obstacle is gone.
   void untie();
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

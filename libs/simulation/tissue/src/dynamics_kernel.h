@@ -40,4 +40,4 @@ OSTEO_TISSUE_ISA(avx2)
 OSTEO_TISSUE_ISA(avx512)
 #undef OSTEO_TISSUE_ISA
 
-}  // namespace osteo::simulation::tissue
+}  // namespace osteo::inline simulation::tissue

@@ -1,5 +1,5 @@
-// Included once by each dynamics_<isa>.cpp, with OSTEO_ISA the name of its namespace. No library that inlines may be included here: the
-// compiler's flags differ between those files.
+// Included once by each dynamics_<isa>.cpp, with OSTEO_ISA the name of its namespace. No library that inlines may be
+// included here: the compiler's flags differ between those files.
 #include <cmath>
 
 #include "dynamics_kernel.h"
@@ -16,7 +16,8 @@ struct Corners {
   alignas(64) Real x[N][kLanes], y[N][kLanes], z[N][kLanes];
   alignas(64) Real gx[N][kLanes], gy[N][kLanes], gz[N][kLanes];
 
-  void gather(const Arrays<Real>& a, const std::uint32_t* node, std::size_t count, std::size_t first, std::size_t lanes) {
+  void gather(const Arrays<Real>& a, const std::uint32_t* node, std::size_t count, std::size_t first,
+              std::size_t lanes) {
     for (int n = 0; n < N; ++n) {
       const std::uint32_t* const at = node + static_cast<std::size_t>(n) * count + first;
       if (lanes == kLanes) {
@@ -40,7 +41,8 @@ struct Corners {
       for (std::size_t l = 0; l < kLanes; ++l) gx[n][l] = gy[n][l] = gz[n][l] = 0;
   }
   // Forces: the gradients times what each element pushes with.
-  void scatter(const Arrays<Real>& a, const std::uint32_t* node, std::size_t count, std::size_t first, std::size_t lanes) {
+  void scatter(const Arrays<Real>& a, const std::uint32_t* node, std::size_t count, std::size_t first,
+               std::size_t lanes) {
     for (int n = 0; n < N; ++n) {
       const std::uint32_t* const at = node + static_cast<std::size_t>(n) * count + first;
       for (std::size_t l = 0; l < lanes; ++l) {
@@ -62,9 +64,12 @@ void add_volumes(Corners<Real, N>& c, const int (&tets)[T][4], Real* volume) {
       const Real bx = c.x[t[2]][l] - ox, by = c.y[t[2]][l] - oy, bz = c.z[t[2]][l] - oz;
       const Real dx = c.x[t[3]][l] - ox, dy = c.y[t[3]][l] - oy, dz = c.z[t[3]][l] - oz;
       constexpr Real kSixth = Real(1) / Real(6);
-      const Real px = (by * dz - bz * dy) * kSixth, py = (bz * dx - bx * dz) * kSixth, pz = (bx * dy - by * dx) * kSixth;
-      const Real qx = (dy * az - dz * ay) * kSixth, qy = (dz * ax - dx * az) * kSixth, qz = (dx * ay - dy * ax) * kSixth;
-      const Real rx = (ay * bz - az * by) * kSixth, ry = (az * bx - ax * bz) * kSixth, rz = (ax * by - ay * bx) * kSixth;
+      const Real px = (by * dz - bz * dy) * kSixth, py = (bz * dx - bx * dz) * kSixth,
+                 pz = (bx * dy - by * dx) * kSixth;
+      const Real qx = (dy * az - dz * ay) * kSixth, qy = (dz * ax - dx * az) * kSixth,
+                 qz = (dx * ay - dy * ax) * kSixth;
+      const Real rx = (ay * bz - az * by) * kSixth, ry = (az * bx - ax * bz) * kSixth,
+                 rz = (ax * by - ay * bx) * kSixth;
       volume[l] += ax * px + ay * py + az * pz;
       c.gx[t[1]][l] += px;
       c.gy[t[1]][l] += py;
@@ -83,8 +88,8 @@ void add_volumes(Corners<Real, N>& c, const int (&tets)[T][4], Real* volume) {
 }
 
 template <class Real, int N, int T>
-void volumes(const Arrays<Real>& a, const int (&tets)[T][4], std::size_t count, const std::uint32_t* node, const Real* k,
-             const Real* inverse) {
+void volumes(const Arrays<Real>& a, const int (&tets)[T][4], std::size_t count, const std::uint32_t* node,
+             const Real* k, const Real* inverse) {
   Corners<Real, N> c;
   alignas(64) Real push[kLanes];
   for (std::size_t e = 0; e < count; e += kLanes) {
@@ -147,7 +152,8 @@ void faces(const Arrays<Real>& a) {
       const Real vx = c.x[2][l] - c.x[0][l], vy = c.y[2][l] - c.y[0][l], vz = c.z[2][l] - c.z[0][l];
       const Real nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
       const Real twice = std::sqrt(nx * nx + ny * ny + nz * nz);
-      const Real push = twice > 0 ? -a.face_k[i] * (Real(0.5) * twice * a.face_inverse[i] - 1) * (Real(0.5) / twice) : 0;
+      const Real push =
+          twice > 0 ? -a.face_k[i] * (Real(0.5) * twice * a.face_inverse[i] - 1) * (Real(0.5) / twice) : 0;
       const Real wx = vx - ux, wy = vy - uy, wz = vz - uz;  // opposite the first corner
       const Real px = push * (ny * wz - nz * wy), py = push * (nz * wx - nx * wz), pz = push * (nx * wy - ny * wx);
       const Real qx = push * (nz * vy - ny * vz), qy = push * (nx * vz - nz * vx), qz = push * (ny * vx - nx * vy);
@@ -169,7 +175,8 @@ template <class Real>
 void forces(const Arrays<Real>& a) {
   edges(a);
   faces(a);
-  for (int s = 0; s < 2; ++s) volumes<Real, 8>(a, kVoxelSplit[s], a.voxels[s].count, a.voxels[s].node, a.voxels[s].k, a.voxels[s].inverse);
+  for (int s = 0; s < 2; ++s)
+    volumes<Real, 8>(a, kVoxelSplit[s], a.voxels[s].count, a.voxels[s].node, a.voxels[s].k, a.voxels[s].inverse);
   constexpr int kOne[1][4] = {{0, 1, 2, 3}};
   volumes<Real, 4>(a, kOne, a.tets.count, a.tets.node, a.tets.k, a.tets.inverse);
 }
@@ -183,4 +190,4 @@ void forces_double(const Arrays<double>& a) {
   forces(a);
 }
 
-}  // namespace osteo::simulation::tissue::OSTEO_ISA
+}  // namespace osteo::inline simulation::tissue::OSTEO_ISA

@@ -27,4 +27,4 @@ void total_gradient(const Energy& energy, std::span<const Vec3> x, std::span<Vec
   }
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -28,8 +28,8 @@ namespace {
 using Matrix = Eigen::SparseMatrix<double>;
 using Simplicial = Eigen::SimplicialLLT<Matrix, Eigen::Lower>;
 
-// Sparse Cholesky: Eigen's own for small systems; for large ones, where this build has it, CHOLMOD's with dense blocks through BLAS, in one
-// thread so that sums come in one order.
+// Sparse Cholesky: Eigen's own for small systems; for large ones, where this build has it, CHOLMOD's with dense blocks
+// through BLAS, in one thread so that sums come in one order.
 class Factor {
  public:
   // False where the matrix, with `shift` on its diagonal, is not positive definite.
@@ -73,8 +73,8 @@ class Factor {
 
 constexpr std::uint32_t kFixed = 0xffffffffU;
 
-// Of the six rigid motions of a part, how many the given axes of points leave free: rank of the moved distances, lengths taken relative to
-// the part's size.
+// Of the six rigid motions of a part, how many the given axes of points leave free: rank of the moved distances,
+// lengths taken relative to the part's size.
 int free_motions(std::span<const std::pair<Vec3, std::uint8_t>> held) {
   if (held.empty()) return 6;
   Vec3 middle{};
@@ -123,7 +123,8 @@ struct EquilibriumSolver::Impl {
   std::size_t moving = 0;
   std::vector<std::uint8_t> held;    // axes of each point that do not move
   std::vector<std::uint32_t> first;  // of each element in slots
-  std::vector<std::int64_t> slots;   // where block (a, b), a >= b by number, of an element goes: its first value in each of three columns
+  std::vector<std::int64_t>
+      slots;  // where block (a, b), a >= b by number, of an element goes: its first value in each of three columns
   Matrix h;
   Factor factor;
   double shift = 0;
@@ -249,14 +250,16 @@ struct Held {
 };
 
 // Parts that hang together must each be held.
-Held held_of(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed, std::span<const Slider> sliders) {
+Held held_of(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed,
+             std::span<const Slider> sliders) {
   const std::size_t points = energy.point_count();
   if (rest.size() != points) throw Error(ExitCode::usage, "the rest shape has another number of points than the model");
   Held result{std::vector<std::uint8_t>(points), std::vector<bool>(points)};
   auto& [held, used] = result;
   const auto hold = [&](std::uint32_t p, std::uint8_t axes) {
     if (p >= points)
-      throw Error(ExitCode::usage, "point " + std::to_string(p) + " is to be fixed, but there are only " + std::to_string(points));
+      throw Error(ExitCode::usage,
+                  "point " + std::to_string(p) + " is to be fixed, but there are only " + std::to_string(points));
     held[p] = static_cast<std::uint8_t>(held[p] | (axes & kAllAxes));
   };
   for (const std::uint32_t p : fixed) hold(p, kAllAxes);
@@ -268,7 +271,8 @@ Held held_of(const Energy& energy, std::span<const Vec3> rest, std::span<const s
     const auto nodes = energy.nodes(e);
     for (const std::uint32_t p : nodes) {
       if (p >= points)
-        throw Error(ExitCode::usage, "element " + std::to_string(e) + " names point " + std::to_string(p) + ", which is not there");
+        throw Error(ExitCode::usage,
+                    "element " + std::to_string(e) + " names point " + std::to_string(p) + ", which is not there");
       used[p] = true;
       join_sets(parent, nodes[0], p);
     }
@@ -276,14 +280,16 @@ Held held_of(const Energy& energy, std::span<const Vec3> rest, std::span<const s
   }
   std::vector<std::vector<std::pair<Vec3, std::uint8_t>>> holds(points);
   for (std::uint32_t p = 0; p < points; ++p) {
-    if (used[p] && (held[p] != 0 || anchored[p])) holds[root_of(parent, p)].push_back({rest[p], anchored[p] ? kAllAxes : held[p]});
+    if (used[p] && (held[p] != 0 || anchored[p]))
+      holds[root_of(parent, p)].push_back({rest[p], anchored[p] ? kAllAxes : held[p]});
   }
   for (std::uint32_t p = 0; p < points; ++p) {
     if (!used[p] || root_of(parent, p) != p) continue;
     if (const int left = free_motions(holds[p]); left > 0) {
       throw Error(ExitCode::usage,
-                  "the part of the body with point " + std::to_string(p) + " can move freely: of its six rigid motions " +
-                      std::to_string(holds[p].size()) + " points that are held stop " + std::to_string(6 - left),
+                  "the part of the body with point " + std::to_string(p) +
+                      " can move freely: of its six rigid motions " + std::to_string(holds[p].size()) +
+                      " points that are held stop " + std::to_string(6 - left),
                   "fix at least three of its points that do not lie in a line, or leave the part out");
     }
   }
@@ -298,15 +304,16 @@ std::vector<Slider> sliders_of(const TissueLoad& load) {
 
 }  // namespace
 
-void require_held(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed, std::span<const Slider> sliders) {
+void require_held(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed,
+                  std::span<const Slider> sliders) {
   static_cast<void>(held_of(energy, rest, fixed, sliders));
 }
 
 EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, const TissueLoad& held)
     : EquilibriumSolver(energy, rest, held.fixed, sliders_of(held)) {}
 
-EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed,
-                                     std::span<const Slider> sliders)
+EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest,
+                                     std::span<const std::uint32_t> fixed, std::span<const Slider> sliders)
     : impl_(std::make_unique<Impl>()) {
   const std::size_t points = energy.point_count();
   const auto [axes, used] = held_of(energy, rest, fixed, sliders);
@@ -322,8 +329,8 @@ EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3>
 EquilibriumSolver::~EquilibriumSolver() = default;
 
 Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3> start,
-                                     std::span<const std::pair<std::uint32_t, Vec3>> forces, const EquilibriumOptions& options,
-                                     const Context& context) {
+                                     std::span<const std::pair<std::uint32_t, Vec3>> forces,
+                                     const EquilibriumOptions& options, const Context& context) {
   Impl& m = *impl_;
   Equilibrium result;
   result.points_mm.assign(start.begin(), start.end());
@@ -386,7 +393,8 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
         return result;
       }
       step = m.factor.solve(right);
-      // What is left to move is lost in the rounding of the places themselves: at rest, whatever the forces' rounding adds up to.
+      // What is left to move is lost in the rounding of the places themselves: at rest, whatever the forces' rounding
+      // adds up to.
       if (step.size() == 0 || step.lpNorm<Eigen::Infinity>() <= 1e-13 * extent) {
         done = true;
         break;
@@ -435,8 +443,8 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
     }
     if (!done) {
       if (result.why.empty())
-        result.why =
-            "not at rest after " + std::to_string(options.iterations) + " iterations, at a residual of " + format_number(result.residual);
+        result.why = "not at rest after " + std::to_string(options.iterations) + " iterations, at a residual of " +
+                     format_number(result.residual);
       result.energy_mj = total_energy(energy, x);
       return result;
     }
@@ -448,7 +456,8 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
 
 void EquilibriumSolver::back_solve(std::span<const Vec3> right, std::span<Vec3> x) {
   Impl& m = *impl_;
-  if (Equilibrium ignored; m.stale && !m.factorise(ignored)) throw Error(ExitCode::failed, "the Hessian at rest is not finite");
+  if (Equilibrium ignored; m.stale && !m.factorise(ignored))
+    throw Error(ExitCode::failed, "the Hessian at rest is not finite");
   Eigen::VectorXd b(static_cast<Eigen::Index>(3 * m.moving));
   for (std::uint32_t p = 0; p < right.size(); ++p) {
     if (m.number[p] == kFixed) continue;
@@ -463,4 +472,4 @@ void EquilibriumSolver::back_solve(std::span<const Vec3> right, std::span<Vec3> 
   }
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -19,7 +19,8 @@ struct M3 {
 };
 
 double determinant_of(const M3& f) {
-  return f.m[0][0] * (f.m[1][1] * f.m[2][2] - f.m[1][2] * f.m[2][1]) - f.m[0][1] * (f.m[1][0] * f.m[2][2] - f.m[1][2] * f.m[2][0]) +
+  return f.m[0][0] * (f.m[1][1] * f.m[2][2] - f.m[1][2] * f.m[2][1]) -
+         f.m[0][1] * (f.m[1][0] * f.m[2][2] - f.m[1][2] * f.m[2][0]) +
          f.m[0][2] * (f.m[1][0] * f.m[2][1] - f.m[1][1] * f.m[2][0]);
 }
 
@@ -37,8 +38,8 @@ M3 inverse_transposed(const M3& f, double det) {
 
 constexpr int kEdges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};  // of C3D10
 
-// F = R S, R a rotation. The Hessian of tr S = max over rotations of tr(R^T F) has three eigenvectors (twists in the axes of S) that are
-// not of the value zero (B. Smith, F. De Goes, T. Kim, ACM Trans. Graph. 38, 2019).
+// F = R S, R a rotation. The Hessian of tr S = max over rotations of tr(R^T F) has three eigenvectors (twists in the
+// axes of S) that are not of the value zero (B. Smith, F. De Goes, T. Kim, ACM Trans. Graph. 38, 2019).
 struct Polar {
   M3 r{};
   double trace = 0;
@@ -66,7 +67,8 @@ Polar polar_of(const M3& f, bool second) {
   Eigen::Map<Square>(&p.u.m[0][0]) = u;
   Eigen::Map<Square>(&p.v.m[0][0]) = v;
   for (std::size_t t = 0; t < 3; ++t)
-    p.bend[t] = 2 / std::max(s[static_cast<Eigen::Index>(kPairs[t][0])] + s[static_cast<Eigen::Index>(kPairs[t][1])], 1e-3);
+    p.bend[t] =
+        2 / std::max(s[static_cast<Eigen::Index>(kPairs[t][0])] + s[static_cast<Eigen::Index>(kPairs[t][1])], 1e-3);
   return p;
 }
 
@@ -75,7 +77,8 @@ void twists(const Polar& p, std::size_t t, std::span<const Vec3> gradients, Vec3
   const std::size_t i = kPairs[t][0], j = kPairs[t][1];
   const Vec3 ui{p.u.m[0][i], p.u.m[1][i], p.u.m[2][i]}, uj{p.u.m[0][j], p.u.m[1][j], p.u.m[2][j]};
   const Vec3 vi{p.v.m[0][i], p.v.m[1][i], p.v.m[2][i]}, vj{p.v.m[0][j], p.v.m[1][j], p.v.m[2][j]};
-  for (std::size_t a = 0; a < gradients.size(); ++a) out[a] = (ui * dot(vj, gradients[a]) - uj * dot(vi, gradients[a])) * std::sqrt(0.5);
+  for (std::size_t a = 0; a < gradients.size(); ++a)
+    out[a] = (ui * dot(vj, gradients[a]) - uj * dot(vi, gradients[a])) * std::sqrt(0.5);
 }
 
 }  // namespace
@@ -89,8 +92,8 @@ std::vector<std::array<std::uint32_t, 4>> tets_of(const TetMesh& mesh) {
   return {mesh.tets.begin(), mesh.tets.end()};
 }
 
-FemBody::FemBody(std::span<const Vec3> points, std::span<const std::array<std::uint32_t, 4>> tets, std::vector<Material> materials,
-                 ElasticLaw law, TetOrder order)
+FemBody::FemBody(std::span<const Vec3> points, std::span<const std::array<std::uint32_t, 4>> tets,
+                 std::vector<Material> materials, ElasticLaw law, TetOrder order)
     : rest_(points.begin(), points.end()),
       count_(tets.size()),
       per_(order == TetOrder::t10 ? 10 : 4),
@@ -100,7 +103,8 @@ FemBody::FemBody(std::span<const Vec3> points, std::span<const std::array<std::u
       law_(law),
       order_(order) {
   if (materials_.size() != 1 && materials_.size() != tets.size())
-    throw Error(ExitCode::usage, std::to_string(materials_.size()) + " materials for " + std::to_string(tets.size()) + " tetrahedra",
+    throw Error(ExitCode::usage,
+                std::to_string(materials_.size()) + " materials for " + std::to_string(tets.size()) + " tetrahedra",
                 "give one for all, or one each");
   for (const Material& m : materials_) {
     if (!(m.young_mpa > 0 && std::isfinite(m.young_mpa)) || !(m.poisson > -1 && m.poisson < 0.5))
@@ -111,12 +115,15 @@ FemBody::FemBody(std::span<const Vec3> points, std::span<const std::array<std::u
   for (std::size_t t = 0; t < tets.size(); ++t) {
     for (const std::uint32_t p : tets[t]) {
       if (p >= corners_)
-        throw Error(ExitCode::usage, "tetrahedron " + std::to_string(t) + " names point " + std::to_string(p) + ", which is not there");
+        throw Error(ExitCode::usage,
+                    "tetrahedron " + std::to_string(t) + " names point " + std::to_string(p) + ", which is not there");
       nodes_.push_back(p);
     }
     for (int e = 0; e < 6 && per_ == 10; ++e) {
-      const std::uint32_t a = tets[t][static_cast<std::size_t>(kEdges[e][0])], b = tets[t][static_cast<std::size_t>(kEdges[e][1])];
-      const auto [it, fresh] = middles.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<std::uint32_t>(rest_.size()));
+      const std::uint32_t a = tets[t][static_cast<std::size_t>(kEdges[e][0])],
+                          b = tets[t][static_cast<std::size_t>(kEdges[e][1])];
+      const auto [it, fresh] =
+          middles.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<std::uint32_t>(rest_.size()));
       if (fresh) {
         rest_.push_back((rest_[a] + rest_[b]) * 0.5);
         middle_of_.push_back({a, b});
@@ -171,7 +178,8 @@ double FemBody::element(std::size_t e, const Vec3* x, double* gradient, double* 
     M3 f{};
     for (std::size_t a = 0; a < n; ++a) {
       for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) f.m[i][j] += x[a][static_cast<std::size_t>(i)] * g.gradient[a][static_cast<std::size_t>(j)];
+        for (int j = 0; j < 3; ++j)
+          f.m[i][j] += x[a][static_cast<std::size_t>(i)] * g.gradient[a][static_cast<std::size_t>(j)];
       }
     }
     const double w = g.weight_mm3;
@@ -302,9 +310,11 @@ double FemBody::element(std::size_t e, const Vec3* x, double* gradient, double* 
             if (law_ == ElasticLaw::linear) {
               v = mu * ((i == k ? both : 0) + ga[k] * gb[i]) + lambda * ga[i] * gb[k];
             } else if (law_ == ElasticLaw::stvk) {
-              v = (i == k ? stress : 0) + mu * (left[i][k] * both + turned[b][i] * turned[a][k]) + lambda * turned[a][i] * turned[b][k];
+              v = (i == k ? stress : 0) + mu * (left[i][k] * both + turned[b][i] * turned[a][k]) +
+                  lambda * turned[a][i] * turned[b][k];
             } else {
-              v = (i == k ? along_f * both : 0) - along_inv * back[b][i] * back[a][k] + twice_inv * back[a][i] * back[b][k];
+              v = (i == k ? along_f * both : 0) - along_inv * back[b][i] * back[a][k] +
+                  twice_inv * back[a][i] * back[b][k];
               if (mixed != 0) v += mixed * (turned[a][i] * back[b][k] + back[a][i] * turned[b][k]);
             }
             hessian[(3 * a + i) * 3 * n + 3 * b + k] += w * v;
@@ -316,8 +326,8 @@ double FemBody::element(std::size_t e, const Vec3* x, double* gradient, double* 
   return energy;
 }
 
-// Greedy: where the fewest neighbours are left a patch begins, and takes the neighbour that shares most faces with it, so that patches are
-// round and few tetrahedra are left over; those join a neighbour's patch afterwards.
+// Greedy: where the fewest neighbours are left a patch begins, and takes the neighbour that shares most faces with it,
+// so that patches are round and few tetrahedra are left over; those join a neighbour's patch afterwards.
 void FemBody::make_patches() {
   constexpr std::size_t kTets = 8, kFew = 4;
   constexpr std::uint32_t kNone = 0xffffffffU;
@@ -368,7 +378,8 @@ void FemBody::make_patches() {
           if (of[n] != kNone) continue;
           std::size_t shared = 0;
           for (const std::uint32_t m : near[n]) shared += of[m] == groups.size() - 1 ? 1 : 0;
-          if (best != kNone && (shared < best_shared || (shared == best_shared && std::pair{left[n], n} >= std::pair{left[best], best})))
+          if (best != kNone &&
+              (shared < best_shared || (shared == best_shared && std::pair{left[n], n} >= std::pair{left[best], best})))
             continue;
           best = n;
           best_shared = shared;
@@ -394,7 +405,8 @@ void FemBody::make_patches() {
       for (const std::uint32_t n : near[e]) {
         const std::uint32_t other = of[n];
         if (other == g || nodes_of(groups[g], groups[other]).size() > kMostNodes) continue;
-        if (smallest.second == kNone || std::pair{groups[other].size(), other} < smallest) smallest = {groups[other].size(), other};
+        if (smallest.second == kNone || std::pair{groups[other].size(), other} < smallest)
+          smallest = {groups[other].size(), other};
       }
     }
     if (smallest.second == kNone) continue;
@@ -411,7 +423,8 @@ void FemBody::make_patches() {
     for (const std::uint32_t e : group) {
       std::array<std::uint8_t, 4> local{};
       for (std::size_t a = 0; a < 4; ++a)
-        local[a] = static_cast<std::uint8_t>(std::lower_bound(p.nodes.begin(), p.nodes.end(), nodes(e)[a]) - p.nodes.begin());
+        local[a] =
+            static_cast<std::uint8_t>(std::lower_bound(p.nodes.begin(), p.nodes.end(), nodes(e)[a]) - p.nodes.begin());
       p.local.push_back(local);
       p.mm3 += gauss_[e].weight_mm3;
     }
@@ -420,7 +433,8 @@ void FemBody::make_patches() {
   }
 }
 
-// Volume times U(q), q the mean over the tetrahedra of what the law calls the change of volume: tr eps, tr E, tr S - 3 or det F.
+// Volume times U(q), q the mean over the tetrahedra of what the law calls the change of volume: tr eps, tr E, tr S - 3
+// or det F.
 double FemBody::patch_element(const Patch& patch, const Vec3* x, double* gradient, double* hessian) const {
   const std::size_t n = patch.nodes.size();
   const Material& mat = material(patch.tets.front());
@@ -468,7 +482,8 @@ double FemBody::patch_element(const Patch& patch, const Vec3* x, double* gradien
     }
     for (std::size_t a = 0; a < 4; ++a) {
       for (std::size_t i = 0; i < 3; ++i) {
-        for (std::size_t j = 0; j < 3; ++j) by_q[3 * patch.local[t][a] + i] += share * slope.m[i][j] * gradients(t)[a][j];
+        for (std::size_t j = 0; j < 3; ++j)
+          by_q[3 * patch.local[t][a] + i] += share * slope.m[i][j] * gradients(t)[a][j];
       }
     }
   }
@@ -523,7 +538,8 @@ double FemBody::patch_element(const Patch& patch, const Vec3* x, double* gradien
           block[2][1] = -v.x;
         }
         for (std::size_t i = 0; i < 3; ++i)
-          for (std::size_t k = 0; k < 3; ++k) hessian[(3 * patch.local[t][a] + i) * 3 * n + 3 * patch.local[t][b] + k] += w * block[i][k];
+          for (std::size_t k = 0; k < 3; ++k)
+            hessian[(3 * patch.local[t][a] + i) * 3 * n + 3 * patch.local[t][b] + k] += w * block[i][k];
       }
     }
   }
@@ -571,7 +587,8 @@ TissueLoad FemBody::on_all_points(const TissueLoad& load) const {
     const auto both = static_cast<std::uint8_t>(held[a] & held[b]);
     const auto [axes_a, by_a] = of(a);
     const auto [axes_b, by_b] = of(b);
-    const auto goes = static_cast<std::uint8_t>(both & (axes_a | axes_b)), stays = static_cast<std::uint8_t>(both & ~goes);
+    const auto goes = static_cast<std::uint8_t>(both & (axes_a | axes_b)),
+               stays = static_cast<std::uint8_t>(both & ~goes);
     if (goes != 0) all.moved.push_back({point, goes, (by_a + by_b) * 0.5});
     if (stays != 0 && stays != 7) all.sliders.push_back({point, stays});
     if (!load.edge_forces_n.empty()) middle[{std::min(a, b), std::max(a, b)}] = point;
@@ -579,8 +596,8 @@ TissueLoad FemBody::on_all_points(const TissueLoad& load) const {
   for (const auto& [edge, force] : load.edge_forces_n) {
     const auto found = middle.find({std::min(edge[0], edge[1]), std::max(edge[0], edge[1])});
     if (found == middle.end())
-      throw Error(ExitCode::usage,
-                  "a force acts between points " + std::to_string(edge[0]) + " and " + std::to_string(edge[1]) + ", which no edge joins");
+      throw Error(ExitCode::usage, "a force acts between points " + std::to_string(edge[0]) + " and " +
+                                       std::to_string(edge[1]) + ", which no edge joins");
     for (const std::uint32_t end : edge) all.forces_n.push_back({end, force * -0.5});
     all.forces_n.push_back({found->second, force});
   }
@@ -595,7 +612,8 @@ std::size_t FemBody::inverted(std::span<const Vec3> x) const {
       M3 f{};
       for (std::size_t a = 0; a < per_; ++a)
         for (std::size_t i = 0; i < 3; ++i)
-          for (std::size_t j = 0; j < 3; ++j) f.m[i][j] += x[nodes_[e * per_ + a]][i] * gauss_[e * gauss_per_ + q].gradient[a][j];
+          for (std::size_t j = 0; j < 3; ++j)
+            f.m[i][j] += x[nodes_[e * per_ + a]][i] * gauss_[e * gauss_per_ + q].gradient[a][j];
       bad = bad || !(determinant_of(f) > 0);
     }
     count += bad ? 1 : 0;
@@ -603,4 +621,4 @@ std::size_t FemBody::inverted(std::span<const Vec3> x) const {
   return count;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

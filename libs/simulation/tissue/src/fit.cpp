@@ -15,10 +15,11 @@ std::vector<double> scales_of(const TissueModel& model, std::span<const Calibrat
   std::vector<double> scales;
   for (const CalibrationCase& c : cases) {
     if (c.truth_mm.size() != model.point_count())
-      throw Error(ExitCode::usage,
-                  "the truth has " + std::to_string(c.truth_mm.size()) + " points, the model " + std::to_string(model.point_count()));
+      throw Error(ExitCode::usage, "the truth has " + std::to_string(c.truth_mm.size()) + " points, the model " +
+                                       std::to_string(model.point_count()));
     double sum = 0;
-    for (std::size_t p = 0; p < c.truth_mm.size(); ++p) sum += dot(c.truth_mm[p] - model.rest()[p], c.truth_mm[p] - model.rest()[p]);
+    for (std::size_t p = 0; p < c.truth_mm.size(); ++p)
+      sum += dot(c.truth_mm[p] - model.rest()[p], c.truth_mm[p] - model.rest()[p]);
     if (!(sum > 0) || !std::isfinite(sum))
       throw Error(ExitCode::usage, "a load of the calibration moves nothing, or its truth is not finite");
     const double rms = std::sqrt(sum / static_cast<double>(c.truth_mm.size()));
@@ -54,7 +55,8 @@ std::vector<TissueLoad> loads_of(std::span<const CalibrationCase> cases) {
 std::vector<std::unique_ptr<Goal>> goals_of(const TissueModel& model, std::span<const CalibrationCase> cases) {
   const std::vector<double> scales = scales_of(model, cases);
   std::vector<std::unique_ptr<Goal>> goals;
-  for (std::size_t n = 0; n < cases.size(); ++n) goals.push_back(std::make_unique<NodeGoal>(cases[n].truth_mm, scales[n]));
+  for (std::size_t n = 0; n < cases.size(); ++n)
+    goals.push_back(std::make_unique<NodeGoal>(cases[n].truth_mm, scales[n]));
   return goals;
 }
 
@@ -124,7 +126,8 @@ Fit::Fit(TissueModel& model, std::vector<TissueLoad> loads, std::vector<std::uni
     return axes;
   };
   for (const TissueLoad& load : loads_) {
-    if (held(load) != held(loads_.front())) throw Error(ExitCode::usage, "all loads of a calibration must fix the same points");
+    if (held(load) != held(loads_.front()))
+      throw Error(ExitCode::usage, "all loads of a calibration must fix the same points");
   }
   for (const auto& goal : goals_) {
     goal_rows_ += goal->rows();
@@ -134,7 +137,8 @@ Fit::Fit(TissueModel& model, std::vector<TissueLoad> loads, std::vector<std::uni
   if (nodes_ == 1 || !options_.shared_grid) class_level_ = level;
 }
 
-Fit::Fit(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context)
+Fit::Fit(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options,
+         const Context& context)
     : Fit(model, loads_of(cases), goals_of(model, cases), 0, options, context) {
   find_level(cases, scales_of(model, cases));
 }
@@ -158,7 +162,8 @@ void Fit::find_level(std::span<const CalibrationCase> cases, std::span<const dou
       if (!at.converged) return;
       shape_[n] = at.points_mm;
       for (std::size_t p = 0; p < at.points_mm.size(); ++p) {
-        const Vec3 u = (at.points_mm[p] - model_.rest()[p]) * scale[n], t = (cases[n].truth_mm[p] - model_.rest()[p]) * scale[n];
+        const Vec3 u = (at.points_mm[p] - model_.rest()[p]) * scale[n],
+                   t = (cases[n].truth_mm[p] - model_.rest()[p]) * scale[n];
         own += dot(u, u);
         both += dot(u, t);
       }
@@ -183,7 +188,8 @@ void Fit::set(const double* logs) {
 bool Fit::evaluate(const double* logs, double* residuals, double** jacobian_rows) {
   set(logs);
   const std::size_t parameters = used_.size(), wide = parameters + owns_;
-  if (jacobian_rows != nullptr) std::fill(*jacobian_rows, *jacobian_rows + static_cast<std::size_t>(this->residuals()) * wide, 0.0);
+  if (jacobian_rows != nullptr)
+    std::fill(*jacobian_rows, *jacobian_rows + static_cast<std::size_t>(this->residuals()) * wide, 0.0);
   std::size_t row = 0, own = parameters;
   for (std::size_t n = 0; n < loads_.size(); ++n) {
     const Equilibrium at = solver_.solve(model_, shape_[n], loads_[n].forces_n, options_.equilibrium, context_);
@@ -193,7 +199,8 @@ bool Fit::evaluate(const double* logs, double* residuals, double** jacobian_rows
       // From rest, before giving it up.
       ++result.failed_solves;
       ++result.solves;
-      const Equilibrium again = solver_.solve(model_, model_.rest(), loads_[n].forces_n, options_.equilibrium, context_);
+      const Equilibrium again =
+          solver_.solve(model_, model_.rest(), loads_[n].forces_n, options_.equilibrium, context_);
       if (!again.converged) return false;
       shape_[n] = again.points_mm;
     } else {
@@ -272,7 +279,8 @@ void Fit::differentiate(std::size_t n, double* jacobian, std::size_t first_row) 
     for (std::size_t a = 0; a < nodes.size(); ++a) local[a] = shape_[n][nodes[a]];
     model_.element(c, local, g, nullptr);
     for_parameters(c, [&](std::uint32_t k, double weight) {
-      for (std::size_t a = 0; a < nodes.size(); ++a) right[k][nodes[a]] -= Vec3{g[3 * a], g[3 * a + 1], g[3 * a + 2]} * weight;
+      for (std::size_t a = 0; a < nodes.size(); ++a)
+        right[k][nodes[a]] -= Vec3{g[3 * a], g[3 * a + 1], g[3 * a + 2]} * weight;
     });
   }
   std::vector<Vec3> du(points);
@@ -283,4 +291,4 @@ void Fit::differentiate(std::size_t n, double* jacobian, std::size_t first_row) 
   }
 }
 
-}  // namespace osteo::simulation::tissue
+}  // namespace osteo::inline simulation::tissue

@@ -1,4 +1,5 @@
-// What a calibration fits, without whoever minimises it: residuals of all cases and their Jacobian by the factors' logarithms.
+// What a calibration fits, without whoever minimises it: residuals of all cases and their Jacobian by the factors'
+// logarithms.
 #pragma once
 #include <array>
 #include <cmath>
@@ -22,9 +23,10 @@ std::size_t grid_points(const std::array<int, 3>& grid);
 /// Of each constraint, by its middle in the body's box.
 std::vector<Share> shares(const TissueModel& model, const std::array<int, 3>& grid);
 
-// Logarithms of the classes' factors (axis edges, diagonals, faces, volumes). Faces begin small: the closed form has none. The others lean
-// on edges, and on faces.
-inline constexpr std::array<double, kTissueClasses> kStarts[3] = {{0, 0, -2, 0}, {0.7, 0.7, -2, 0}, {-0.7, -0.7, 3, -0.7}};
+// Logarithms of the classes' factors (axis edges, diagonals, faces, volumes). Faces begin small: the closed form has
+// none. The others lean on edges, and on faces.
+inline constexpr std::array<double, kTissueClasses> kStarts[3] = {
+    {0, 0, -2, 0}, {0.7, 0.7, -2, 0}, {-0.7, -0.7, 3, -0.7}};
 
 // What the shape under one load is held against.
 class Goal {
@@ -45,8 +47,10 @@ class Goal {
 class Fit {
  public:
   // Against the truth at every point.
-  Fit(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context);
-  // Against goals, one a load; `level`: the logarithm of the factor on all of the closed form that it begins at and is pulled to.
+  Fit(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options,
+      const Context& context);
+  // Against goals, one a load; `level`: the logarithm of the factor on all of the closed form that it begins at and is
+  // pulled to.
   Fit(TissueModel& model, std::vector<TissueLoad> loads, std::vector<std::unique_ptr<Goal>> goals, double level,
       const CalibrateOptions& options, const Context& context);
 
@@ -54,14 +58,17 @@ class Fit {
   // With those that are the goals' own.
   [[nodiscard]] int width() const { return static_cast<int>(used_.size() + owns_); }
   [[nodiscard]] int goal_rows() const { return static_cast<int>(goal_rows_); }
-  [[nodiscard]] int residuals() const { return static_cast<int>(goal_rows_) + width() + static_cast<int>(neighbours_.size()); }
+  [[nodiscard]] int residuals() const {
+    return static_cast<int>(goal_rows_) + width() + static_cast<int>(neighbours_.size());
+  }
   // Where a start begins: logarithms for the classes, beside the level of a map.
   [[nodiscard]] double seed(int parameter, const std::array<double, kTissueClasses>& classes) const {
     return of_map(parameter) ? level_ : class_level_ + classes[static_cast<std::size_t>(kind_of(parameter))];
   }
   [[nodiscard]] double cost(const std::vector<double>& logs);
   [[nodiscard]] double pull_goal(int parameter) const { return seed(parameter, kStarts[0]); }
-  // Factors of a map and those of the classes are pulled as two families, or many points of a map would leave the classes free.
+  // Factors of a map and those of the classes are pulled as two families, or many points of a map would leave the
+  // classes free.
   [[nodiscard]] double pull_of(int parameter) const {
     const double family = !options_.shared_grid || nodes_ == 1 ? parameters()
                           : of_map(parameter)                  ? parameters() - static_cast<int>(kTissueClasses)
@@ -86,7 +93,9 @@ class Fit {
   [[nodiscard]] const std::vector<Share>& share() const { return share_; }
   // The number of a parameter among all_of()'s.
   [[nodiscard]] std::size_t number_of(int parameter) const { return used_[static_cast<std::size_t>(parameter)]; }
-  [[nodiscard]] bool of_map(int parameter) const { return options_.shared_grid && used_[static_cast<std::size_t>(parameter)] < nodes_; }
+  [[nodiscard]] bool of_map(int parameter) const {
+    return options_.shared_grid && used_[static_cast<std::size_t>(parameter)] < nodes_;
+  }
   // The parameters that scale a constraint, and how much of each.
   template <class F>
   void for_parameters(std::size_t c, F&& f) const {
@@ -102,7 +111,9 @@ class Fit {
 
  private:
   // Numbers of parameters: of own grids point times classes plus class; of a shared one the points, then the classes.
-  [[nodiscard]] std::size_t numbers() const { return options_.shared_grid ? nodes_ + kTissueClasses : nodes_ * kTissueClasses; }
+  [[nodiscard]] std::size_t numbers() const {
+    return options_.shared_grid ? nodes_ + kTissueClasses : nodes_ * kTissueClasses;
+  }
   [[nodiscard]] TissueClass kind_of(int parameter) const {
     const std::size_t number = used_[static_cast<std::size_t>(parameter)];
     return static_cast<TissueClass>(options_.shared_grid ? number - nodes_ : number % kTissueClasses);
@@ -144,4 +155,4 @@ struct Descent {
 Descent descend(Fit& fit, std::vector<double> start, const CalibrateOptions& options, const Context& context);
 #endif
 
-}  // namespace osteo::simulation::tissue
+}  // namespace osteo::inline simulation::tissue

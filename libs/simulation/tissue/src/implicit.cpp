@@ -68,7 +68,8 @@ class Incremental final : public Energy {
     if (!(d < 0)) return 0;
     for (std::size_t a = 0; a < 3; ++a) {
       if (gradient != nullptr) gradient[a] += by.stiffness_n_per_mm * d * out[a];
-      for (std::size_t b = 0; b < 3 && hessian != nullptr; ++b) hessian[3 * a + b] += by.stiffness_n_per_mm * out[a] * out[b];
+      for (std::size_t b = 0; b < 3 && hessian != nullptr; ++b)
+        hessian[3 * a + b] += by.stiffness_n_per_mm * out[a] * out[b];
     }
     return 0.5 * by.stiffness_n_per_mm * d * d;
   }
@@ -99,7 +100,8 @@ struct ImplicitDynamics::Impl {
   std::unique_ptr<Cutter> cutter;  // once something was cut
   Counts counts;
 
-  Impl(const TissueModel& m, std::span<const std::uint32_t> fixed, const ImplicitOptions& o, std::span<const Slider> sliders)
+  Impl(const TissueModel& m, std::span<const std::uint32_t> fixed, const ImplicitOptions& o,
+       std::span<const Slider> sliders)
       : energy(m),
         options(o),
         solver(energy, m.rest(), fixed, sliders),
@@ -112,8 +114,8 @@ struct ImplicitDynamics::Impl {
     for (const std::uint32_t p : fixed) held[p] = 7;
     for (const Slider& s : sliders) held[s.point] = static_cast<std::uint8_t>(held[s.point] | s.held);
     for (std::size_t p = 0; p < x.size(); ++p)
-      energy.weight[p] =
-          mass[p] > 0 ? mass[p] * (1 + o.damping_per_s * o.step_s) / (o.step_s * o.step_s) : 1;  // of no mass: of no element, stays
+      energy.weight[p] = mass[p] > 0 ? mass[p] * (1 + o.damping_per_s * o.step_s) / (o.step_s * o.step_s)
+                                     : 1;  // of no mass: of no element, stays
   }
   [[nodiscard]] Vec3 of_free(std::size_t p, Vec3 f) const {
     for (std::size_t a = 0; a < 3; ++a) f[a] = (held[p] >> a & 1) != 0 ? 0 : f[a];
@@ -121,8 +123,8 @@ struct ImplicitDynamics::Impl {
   }
 };
 
-ImplicitDynamics::ImplicitDynamics(const TissueModel& model, std::span<const std::uint32_t> fixed, const ImplicitOptions& options,
-                                   std::span<const Slider> sliders) {
+ImplicitDynamics::ImplicitDynamics(const TissueModel& model, std::span<const std::uint32_t> fixed,
+                                   const ImplicitOptions& options, std::span<const Slider> sliders) {
   if (!(options.density_kg_m3 > 0)) throw Error(ExitCode::usage, "tissue needs a density above 0");
   if (!(options.step_s > 0)) throw Error(ExitCode::usage, "steps in time need a length above 0");
   impl_ = std::make_unique<Impl>(model, fixed, options, sliders);
@@ -227,4 +229,4 @@ double ImplicitDynamics::elastic_mj() const {
   return total_energy(impl_->energy.model, impl_->x);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

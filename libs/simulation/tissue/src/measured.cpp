@@ -31,8 +31,8 @@ BodySurface boundary_surface(const TissueModel& model) {
   return surface;
 }
 
-MeasuredError measured_error(const TissueModel& model, const BodySurface& surface, const MeasuredPoints& view, std::span<const Vec3> shape,
-                             bool find_pose) {
+MeasuredError measured_error(const TissueModel& model, const BodySurface& surface, const MeasuredPoints& view,
+                             std::span<const Vec3> shape, bool find_pose) {
   const Context context;
   SurfaceGoal goal(model, surface, {&view, 1}, find_pose, 5000, context);
   std::vector<double> own(goal.own()), r(goal.rows());
@@ -43,9 +43,10 @@ MeasuredError measured_error(const TissueModel& model, const BodySurface& surfac
 
 #ifndef OSTEO_WITH_CERES
 
-MeasuredCalibration calibrate_measured(TissueModel&, const BodySurface&, std::span<const MeasuredCase>, const MeasuredOptions&,
-                                       const Context&) {
-  throw Error(ExitCode::failed, "this build cannot calibrate: it was made without Ceres", "build with -DOSTEO_CERES=ON");
+MeasuredCalibration calibrate_measured(TissueModel&, const BodySurface&, std::span<const MeasuredCase>,
+                                       const MeasuredOptions&, const Context&) {
+  throw Error(ExitCode::failed, "this build cannot calibrate: it was made without Ceres",
+              "build with -DOSTEO_CERES=ON");
 }
 
 #else
@@ -70,8 +71,8 @@ double seconds_since(Clock::time_point begin) {
 // Goals of several loads, and where their bodies rest with all of the closed form times one factor.
 class Level {
  public:
-  Level(const TissueModel& model, std::span<const MeasuredCase> cases, std::span<SurfaceGoal* const> goals, const CalibrateOptions& options,
-        const Context& context)
+  Level(const TissueModel& model, std::span<const MeasuredCase> cases, std::span<SurfaceGoal* const> goals,
+        const CalibrateOptions& options, const Context& context)
       : model_(model),
         cases_(cases),
         goals_(goals),
@@ -167,7 +168,8 @@ double median(std::vector<double> v) {
 }
 
 // Of a view, at the fitted shape.
-void describe(const SurfaceGoal& goal, std::size_t k, std::span<const Vec3> rest, std::span<const Vec3> shape, MeasuredView& view) {
+void describe(const SurfaceGoal& goal, std::size_t k, std::span<const Vec3> rest, std::span<const Vec3> shape,
+              MeasuredView& view) {
   const SurfaceGoal::View& v = goal.views()[k];
   view.noise_mm = v.sigma_mm;
   view.after = goal.error(k, shape);
@@ -228,8 +230,9 @@ void describe(const SurfaceGoal& goal, std::size_t k, std::span<const Vec3> rest
 
 }  // namespace
 
-MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& surface, std::span<const MeasuredCase> cases,
-                                       const MeasuredOptions& options, const Context& context) {
+MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& surface,
+                                       std::span<const MeasuredCase> cases, const MeasuredOptions& options,
+                                       const Context& context) {
   const auto begin = Clock::now();
   if (cases.empty()) throw Error(ExitCode::usage, "a calibration needs at least one load");
   MeasuredCalibration result;
@@ -237,9 +240,11 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   std::vector<SurfaceGoal*> goals;
   std::vector<TissueLoad> loads;
   for (const MeasuredCase& c : cases) {
-    if (c.views.empty()) throw Error(ExitCode::usage, "a load of the calibration has nothing that was measured under it");
+    if (c.views.empty())
+      throw Error(ExitCode::usage, "a load of the calibration has nothing that was measured under it");
     if (c.load.forces_n.empty())
-      throw Error(ExitCode::usage, "a load of the calibration has no force: without one no stiffness follows from how far a body moves");
+      throw Error(ExitCode::usage,
+                  "a load of the calibration has no force: without one no stiffness follows from how far a body moves");
     auto goal = std::make_unique<SurfaceGoal>(model, surface, c.views, options.find_pose, options.most_points, context);
     goals.push_back(goal.get());
     owned.push_back(std::move(goal));
@@ -265,9 +270,11 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   const Level::At start = level.find();
   result.level_log = start.log;
   if (!(start.off < 0.98 * level.rest))
-    throw Error(ExitCode::usage,
-                "what was measured lies nearest to the body at rest: no stiffness explains it better than one that lets nothing move",
-                "the noise may hide the movement, or it was measured under another load or in another frame than the mesh's");
+    throw Error(
+        ExitCode::usage,
+        "what was measured lies nearest to the body at rest: no stiffness explains it better than one that lets "
+        "nothing move",
+        "the noise may hide the movement, or it was measured under another load or in another frame than the mesh's");
   std::vector<double> at;
   double size = 0;
   std::size_t rows = 0;
@@ -293,10 +300,13 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   {
     const auto one = Clock::now();
     evaluate();
-    // A few factors end after some steps; a map is a valley, gone along once for the shape and twice more for the noise.
+    // A few factors end after some steps; a map is a valley, gone along once for the shape and twice more for the
+    // noise.
     const double steps = fit.parameters() > 8 ? 25 : 12;
-    result.estimate_s = steps * (seconds_since(one) + level.solve_s + 2e-9 * static_cast<double>(residuals.size() * width * width));
-    const std::string told = std::to_string(rows) + " distances and " + std::to_string(width) + " parameters: the fit takes about " +
+    result.estimate_s =
+        steps * (seconds_since(one) + level.solve_s + 2e-9 * static_cast<double>(residuals.size() * width * width));
+    const std::string told = std::to_string(rows) + " distances and " + std::to_string(width) +
+                             " parameters: the fit takes about " +
                              format_number(std::max(1.0, std::round(result.estimate_s))) + " s";
     if (result.estimate_s > 30) {
       context.warn(told);
@@ -307,7 +317,8 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   for (result.rounds = 1;; ++result.rounds) {
     Descent d = descend(fit, at, options.calibrate, context);
     if (!d.usable)
-      throw Error(ExitCode::failed, "no factors were found with which the model comes to rest under these loads: " + d.why,
+      throw Error(ExitCode::failed,
+                  "no factors were found with which the model comes to rest under these loads: " + d.why,
                   "make the loads smaller");
     at = d.parameters;
     fit.result.converged = d.converged;
@@ -325,7 +336,8 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
       std::vector<double> before;
       for (const auto& v : goal->views()) before.push_back(v.sigma_mm);
       goal->widen_by_noise(fit.shapes()[n]);
-      for (std::size_t k = 0; k < before.size(); ++k) stays = stays && std::abs(goal->views()[k].sigma_mm - before[k]) < 0.1 * before[k];
+      for (std::size_t k = 0; k < before.size(); ++k)
+        stays = stays && std::abs(goal->views()[k].sigma_mm - before[k]) < 0.1 * before[k];
     }
     if (stays || result.rounds == kMostRounds) break;
   }
@@ -333,10 +345,11 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
 
   // What is left, and how sure the factors are.
   for (MeasuredView& view : result.views) {
-    const std::size_t k = static_cast<std::size_t>(&view - result.views.data()) -
-                          static_cast<std::size_t>(std::find_if(result.views.begin(), result.views.end(),
-                                                                [&](const MeasuredView& o) { return o.load == view.load; }) -
-                                                   result.views.begin());
+    const std::size_t k =
+        static_cast<std::size_t>(&view - result.views.data()) -
+        static_cast<std::size_t>(std::find_if(result.views.begin(), result.views.end(),
+                                              [&](const MeasuredView& o) { return o.load == view.load; }) -
+                                 result.views.begin());
     describe(*goals[view.load], k, model.rest(), fit.shapes()[view.load], view);
     if (!options.find_pose) continue;
     const auto& v = goals[view.load]->views()[k];
@@ -355,7 +368,8 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   for (const MeasuredView& view : result.views) {
     const Eigen::Index n = static_cast<Eigen::Index>(view.drawn) * (view.markers ? 3 : 1);
     const DenseMatrix own = j.middleRows(row, n).transpose() * j.middleRows(row, n);
-    const double left = Eigen::Map<const Eigen::VectorXd>(residuals.data() + row, n).squaredNorm() / static_cast<double>(n);
+    const double left =
+        Eigen::Map<const Eigen::VectorXd>(residuals.data() + row, n).squaredNorm() / static_cast<double>(n);
     // Values on a plane that go with their neighbours count as fewer, by the sum of what each goes with.
     const double wide = view.correlation > 0 ? (1 + view.correlation) / (1 - view.correlation) : 1;
     data += own;
@@ -382,7 +396,9 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
     return x;
   };
   const double far = 0.5 * std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
-  const auto node_of = [&](int i) { return fit.of_map(i) ? fit.number_of(i) : shared ? nodes : fit.number_of(i) / kTissueClasses; };
+  const auto node_of = [&](int i) {
+    return fit.of_map(i) ? fit.number_of(i) : shared ? nodes : fit.number_of(i) / kTissueClasses;
+  };
   const auto class_of = [&](int i) {
     return fit.of_map(i) ? kTissueClasses : shared ? fit.number_of(i) - nodes : fit.number_of(i) % kTissueClasses;
   };
@@ -428,7 +444,8 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   result.all = stiffness(whole);
   int groups = 0;
   for (const int g : options.group_of) groups = std::max(groups, g + 1);
-  for (int g = 0; g < groups; ++g) result.groups.push_back(stiffness(mean_of([&](std::size_t c) { return options.group_of[c] == g; })));
+  for (int g = 0; g < groups; ++g)
+    result.groups.push_back(stiffness(mean_of([&](std::size_t c) { return options.group_of[c] == g; })));
   // A point of the map: its own logarithm, with the classes' as edges have them on the whole.
   result.deviation.assign(nodes, 0);
   result.settled.assign(nodes, 0);
@@ -477,4 +494,4 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
 
 #endif
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -46,7 +46,8 @@ MeasuredPoints read_measured_csv(std::string_view text, const std::string& name)
     if (!at[6]) continue;
     measured.noise_mm.push_back(number(6));
     if (!(measured.noise_mm.back() > 0))
-      throw csv.wrong(row.line, "noise_mm is " + row.fields[*at[6]] + "; it must be above 0", "leave the column out if it is not known");
+      throw csv.wrong(row.line, "noise_mm is " + row.fields[*at[6]] + "; it must be above 0",
+                      "leave the column out if it is not known");
   }
   if (measured.points_mm.empty()) throw csv.wrong(1, "there is no line under the names");
   return measured;
@@ -88,7 +89,8 @@ std::vector<MeasuredOfLoad> read_measured(const fs::path& path, const std::vecto
     } else if (is_surface_file(file)) {
       points.points_mm = load_surface_points(file);
     } else {
-      throw Error(ExitCode::usage, "'" + name + "' is no file of points by its name", "they are .csv .xyz .txt .ply .stl .obj .vtp");
+      throw Error(ExitCode::usage, "'" + name + "' is no file of points by its name",
+                  "they are .csv .xyz .txt .ply .stl .obj .vtp");
     }
     points.name = name;
     all.push_back({*load, std::move(points)});
@@ -96,4 +98,4 @@ std::vector<MeasuredOfLoad> read_measured(const fs::path& path, const std::vecto
   return all;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -17,7 +17,8 @@ namespace {
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kByChance = 20;  // how much better than no swing, by variances (F of 2 and many)
 
-// What is left of channels after the best a, b, c, d for that decay and frequency (w = 0: one that only dies down, without b).
+// What is left of channels after the best a, b, c, d for that decay and frequency (w = 0: one that only dies down,
+// without b).
 class SwingCost {
  public:
   explicit SwingCost(const MeasuredMotion& motion) : motion_(motion) {
@@ -57,7 +58,8 @@ class SwingCost {
       double left = 0;
       for (std::size_t i = 0; i < c.mm.size(); ++i) {
         const double t = c.time_s[i] - begin_, e = dies ? std::exp(-decay * t) : 0;
-        const Eigen::Vector4d row(e * std::cos(w * t), w > 0 ? e * std::sin(w * t) : 0, 1, span_ > 0 ? t / span_ - 0.5 : 0);
+        const Eigen::Vector4d row(e * std::cos(w * t), w > 0 ? e * std::sin(w * t) : 0, 1,
+                                  span_ > 0 ? t / span_ - 0.5 : 0);
         if (pass == 0) {
           a += row * row.transpose();
           b += row * c.mm[i];
@@ -78,7 +80,8 @@ class SwingCost {
 
 }  // namespace
 
-MeasuredMotion read_motion(std::string_view text, const std::string& name, std::uint32_t points, std::uint32_t point, Vec3 along) {
+MeasuredMotion read_motion(std::string_view text, const std::string& name, std::uint32_t points, std::uint32_t point,
+                           Vec3 along) {
   const Csv csv = read_csv(text, name);
   const std::string columns = "the columns are time_s, point (may be left out), and ux_mm, uy_mm, uz_mm or u_mm";
   std::optional<std::size_t> time, of_point;
@@ -137,9 +140,11 @@ MeasuredMotion read_motion(std::string_view text, const std::string& name, std::
     for (std::size_t v = 0; v < values.size(); ++v) {
       auto& channel = motion.channels[block * values.size() + v];
       if (!channel.time_s.empty() && !(t > channel.time_s.back()))
-        throw csv.wrong(
-            row.line, "time_s is " + row.fields[*time] + " and does not rise (before: " + format_number(channel.time_s.back()) + ")",
-            of_point ? "sort the lines of each point by time" : "sort the lines by time; of several points it needs a column point");
+        throw csv.wrong(row.line,
+                        "time_s is " + row.fields[*time] +
+                            " and does not rise (before: " + format_number(channel.time_s.back()) + ")",
+                        of_point ? "sort the lines of each point by time"
+                                 : "sort the lines by time; of several points it needs a column point");
       channel.time_s.push_back(t);
       channel.mm.push_back(number(row, values[v].at));
     }
@@ -194,4 +199,4 @@ Swing swing_of(const MeasuredMotion& motion, double least_hz, double most_hz) {
   return s;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

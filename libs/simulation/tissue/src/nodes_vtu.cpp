@@ -34,7 +34,9 @@ std::string nodes_vtu(const FemBody& body, std::span<const Vec3> x) {
   t.line("<PointData Vectors=\"displacement_mm\">");
   t.array("Float64", "displacement_mm", 3, nodes, [&](std::size_t p) { return three(x[p] - body.rest()[p]); });
   t.line("</PointData><CellData>");
-  const auto material = [&](std::size_t e) -> const Material& { return body.materials()[body.materials().size() == 1 ? 0 : e]; };
+  const auto material = [&](std::size_t e) -> const Material& {
+    return body.materials()[body.materials().size() == 1 ? 0 : e];
+  };
   t.array("Float64", "young_mpa", 1, cells, [&](std::size_t e) { return format_number(material(e).young_mpa); });
   t.array("Float64", "poisson", 1, cells, [&](std::size_t e) { return format_number(material(e).poisson); });
   t.line("</CellData><Points>");
@@ -51,4 +53,4 @@ std::string nodes_vtu(const FemBody& body, std::span<const Vec3> x) {
   return std::move(t.text_);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

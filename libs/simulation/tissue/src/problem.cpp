@@ -32,7 +32,8 @@ class ProblemReader {
   TissueProblem read(bool needs_loads) {
     const JsonValue& root = file_.root();
     file_.require_format("osteotome_tissue");
-    allow(root, "", Names{"osteotome_tissue", "$schema", "about", "law", "order", "material", "regions", "fixed", "loads"});
+    allow(root, "",
+          Names{"osteotome_tissue", "$schema", "about", "law", "order", "material", "regions", "fixed", "loads"});
     problem_.law = named<ElasticLaw>(root, "law", {"linear", "stvk", "neo_hooke", "neo_hooke_split", "corotated"});
     problem_.order = named<TetOrder>(root, "order", {"t4", "t10", "t4_mean"});
     const JsonValue& general = file_.need(root, "", "material");
@@ -43,7 +44,8 @@ class ProblemReader {
     problem_.materials.assign(regions.empty() ? 1 : mesh_.tets.size(), problem_.general);
     problem_.in_region.assign(regions.empty() ? 0 : mesh_.tets.size(), 0);
     each(regions, "region", [&](const JsonValue& r, const std::string& where) { read_region(r, where); });
-    each(items(root, "fixed", true), "fixed", [&](const JsonValue& f, const std::string& where) { read_fixed(f, where); });
+    each(items(root, "fixed", true), "fixed",
+         [&](const JsonValue& f, const std::string& where) { read_fixed(f, where); });
     const auto& loads = items(root, "loads", needs_loads);
     if (needs_loads && loads.empty()) throw file_.wrong(file_.need(root, "", "loads"), "\"loads\": there is none");
     each(loads, "load", [&](const JsonValue& l, const std::string& where) { read_load(l, where); });
@@ -72,7 +74,8 @@ class ProblemReader {
     }
     throw file_.wrong(*found, "\"" + key + "\" is one of " + all + ", not '" + name + "'");
   }
-  [[nodiscard]] const std::vector<JsonValue>& items(const JsonValue& object, const std::string& key, bool needed) const {
+  [[nodiscard]] const std::vector<JsonValue>& items(const JsonValue& object, const std::string& key,
+                                                    bool needed) const {
     static const std::vector<JsonValue> none;
     const JsonValue* const found = needed ? &file_.need(object, "", key) : object.find(key);
     return found == nullptr ? none : file_.list(*found, "\"" + key + "\"");
@@ -83,7 +86,8 @@ class ProblemReader {
 
   [[nodiscard]] Vec3 triple(const JsonValue& v, const std::string& called, double most) const {
     const auto& c = file_.list(v, called, 3);
-    return {file_.number(c[0], called, -most, most), file_.number(c[1], called, -most, most), file_.number(c[2], called, -most, most)};
+    return {file_.number(c[0], called, -most, most), file_.number(c[1], called, -most, most),
+            file_.number(c[2], called, -most, most)};
   }
 
   // A box or a ball; beside it the keys `others`.
@@ -96,10 +100,13 @@ class ProblemReader {
       throw file_.wrong(v, where + ": it needs a place: \"box_mm\", or \"at_mm\" with \"radius_mm\"", kWhere);
     if (box != nullptr) {
       const auto& corners = file_.list(*box, where + ": \"box_mm\"", 2);
-      const Vec3 lo = triple(corners[0], where + ": \"box_mm\"", kFarMm), hi = triple(corners[1], where + ": \"box_mm\"", kFarMm);
+      const Vec3 lo = triple(corners[0], where + ": \"box_mm\"", kFarMm),
+                 hi = triple(corners[1], where + ": \"box_mm\"", kFarMm);
       if (lo.x > hi.x || lo.y > hi.y || lo.z > hi.z)
         throw file_.wrong(*box, where + ": \"box_mm\" must be its lower corner, then its upper");
-      return [=](Vec3 p) { return p.x >= lo.x && p.y >= lo.y && p.z >= lo.z && p.x <= hi.x && p.y <= hi.y && p.z <= hi.z; };
+      return [=](Vec3 p) {
+        return p.x >= lo.x && p.y >= lo.y && p.z >= lo.z && p.x <= hi.x && p.y <= hi.y && p.z <= hi.z;
+      };
     }
     const Vec3 centre = triple(*at, where + ": \"at_mm\"", kFarMm);
     const double r = file_.number(*radius, where + ": \"radius_mm\"", 1e-6, kFarMm);
@@ -134,7 +141,8 @@ class ProblemReader {
     if (const JsonValue* const given = f.find("axes"); given != nullptr) {
       axes = 0;
       for (const char c : file_.text(*given, where + ": \"axes\"")) {
-        if (c < 'x' || c > 'z') throw file_.wrong(*given, where + ": \"axes\" are made of x, y and z, not '" + std::string(1, c) + "'");
+        if (c < 'x' || c > 'z')
+          throw file_.wrong(*given, where + ": \"axes\" are made of x, y and z, not '" + std::string(1, c) + "'");
         axes = static_cast<std::uint8_t>(axes | 1 << (c - 'x'));
       }
       if (axes == 0) throw file_.wrong(*given, where + ": \"axes\" names none", "leave it out to hold all three");
@@ -165,16 +173,24 @@ class ProblemReader {
     known.insert(known.end(), kinds.begin(), kinds.end());
     allow(l, where, known);
     if (std::none_of(kinds.begin(), kinds.end(), [&](const std::string& k) { return l.find(k) != nullptr; }))
-      throw file_.wrong(l, where + ": it has none of \"forces\", \"surfaces\", \"volumes\", \"gravity_m_s2\", \"moved\" and \"contacts\"");
+      throw file_.wrong(
+          l,
+          where +
+              ": it has none of \"forces\", \"surfaces\", \"volumes\", \"gravity_m_s2\", \"moved\" and \"contacts\"");
     TissueLoad load;
     load.fixed = problem_.fixed;
     load.sliders = problem_.sliders;
-    each(items(l, "surfaces", false), where + ", surface", [&](const JsonValue& s, const std::string& at) { add_surface(load, s, at); });
-    each(items(l, "forces", false), where + ", force", [&](const JsonValue& f, const std::string& at) { add_force(load, f, at); });
-    each(items(l, "volumes", false), where + ", volume", [&](const JsonValue& v, const std::string& at) { add_volume(load, v, at); });
+    each(items(l, "surfaces", false), where + ", surface",
+         [&](const JsonValue& s, const std::string& at) { add_surface(load, s, at); });
+    each(items(l, "forces", false), where + ", force",
+         [&](const JsonValue& f, const std::string& at) { add_force(load, f, at); });
+    each(items(l, "volumes", false), where + ", volume",
+         [&](const JsonValue& v, const std::string& at) { add_volume(load, v, at); });
     if (const JsonValue* const g = l.find("gravity_m_s2"); g != nullptr) add_gravity(load, *g, where);
-    each(items(l, "moved", false), where + ", moved", [&](const JsonValue& m, const std::string& at) { add_moved(load, m, at); });
-    each(items(l, "contacts", false), where + ", contact", [&](const JsonValue& c, const std::string& at) { add_contact(load, c, at); });
+    each(items(l, "moved", false), where + ", moved",
+         [&](const JsonValue& m, const std::string& at) { add_moved(load, m, at); });
+    each(items(l, "contacts", false), where + ", contact",
+         [&](const JsonValue& c, const std::string& at) { add_contact(load, c, at); });
     const JsonValue* const name = l.find("name");
     problem_.load_names.push_back(name != nullptr ? file_.text(*name, where + ": \"name\"") : where);
     problem_.loads.push_back(std::move(load));
@@ -198,7 +214,8 @@ class ProblemReader {
       load.add_on_face({point_of_[t[0]], point_of_[t[1]], point_of_[t[2]]},
                        directed ? over_area * (length(area) / 1000) : area * (-pressure / 1000));
     }
-    if (hit == 0) throw file_.wrong(s, where + ": no part of the body's surface lies where it is loaded", "make its place larger");
+    if (hit == 0)
+      throw file_.wrong(s, where + ": no part of the body's surface lies where it is loaded", "make its place larger");
   }
 
   void add_force(TissueLoad& load, const JsonValue& f, const std::string& where) {
@@ -208,7 +225,8 @@ class ProblemReader {
     for (std::uint32_t p = 0; p < held_.size(); ++p) {
       if (!held_[p] && in(from_floats(mesh_.points_mm[p]))) near.push_back(p);
     }
-    if (near.empty()) throw file_.wrong(f, where + ": no point that can move lies where a force acts", "make its place larger");
+    if (near.empty())
+      throw file_.wrong(f, where + ": no point that can move lies where a force acts", "make its place larger");
     for (const std::uint32_t p : near) load.forces_n.push_back({p, total / static_cast<double>(near.size())});
   }
 
@@ -244,7 +262,8 @@ class ProblemReader {
       const double density = problem_.materials[problem_.materials.size() == 1 ? 0 : t].density_kg_m3;
       if (density == 0)
         throw file_.wrong(g,
-                          where + ": gravity needs a \"density_kg_m3\" for all of the body; tetrahedron " + std::to_string(t) + " has none",
+                          where + ": gravity needs a \"density_kg_m3\" for all of the body; tetrahedron " +
+                              std::to_string(t) + " has none",
                           "give the material one; soft tissue has about 1050, bone 1900");
       load.add_in_tet(mesh_.tets[t], pull * (density * volume_of(t) * kNewtonPerMm3));
     }
@@ -256,13 +275,15 @@ class ProblemReader {
     const Vec3 by = triple(file_.need(m, where, "by_mm"), where + ": \"by_mm\"", 1e4);
     for (std::size_t a = 0; a < 3; ++a) {
       if ((axes >> a & 1) == 0 && by[a] != 0)
-        throw file_.wrong(m, where + ": \"by_mm\" moves along an axis that \"axes\" leaves free", "give 0 there, or name the axis");
+        throw file_.wrong(m, where + ": \"by_mm\" moves along an axis that \"axes\" leaves free",
+                          "give 0 there, or name the axis");
     }
     std::size_t hit = 0;
     for (std::uint32_t p = 0; p < held_.size(); ++p) {
       if (!in(from_floats(mesh_.points_mm[p]))) continue;
       if (held_[p])
-        throw file_.wrong(m, where + ": point " + std::to_string(p) + " is to move and is fixed", "let the two places not overlap");
+        throw file_.wrong(m, where + ": point " + std::to_string(p) + " is to move and is fixed",
+                          "let the two places not overlap");
       load.moved.push_back({p, axes, by});
       ++hit;
     }
@@ -274,15 +295,18 @@ class ProblemReader {
     const Vec3 at = triple(file_.need(c, where, "at_mm"), where + ": \"at_mm\"", kFarMm);
     const JsonValue *const normal = c.find("normal"), *const radius = c.find("radius_mm");
     if ((normal != nullptr) == (radius != nullptr))
-      throw file_.wrong(c, where + ": it needs \"normal\" (a plane that the body lies before) or \"radius_mm\" (a ball)");
+      throw file_.wrong(c,
+                        where + ": it needs \"normal\" (a plane that the body lies before) or \"radius_mm\" (a ball)");
     RigidContact contact;
-    contact.stiffness_n_per_mm = file_.number(file_.need(c, where, "stiffness_n_per_mm"), where + ": \"stiffness_n_per_mm\"", 1e-9, 1e9);
+    contact.stiffness_n_per_mm =
+        file_.number(file_.need(c, where, "stiffness_n_per_mm"), where + ": \"stiffness_n_per_mm\"", 1e-9, 1e9);
     if (normal != nullptr) {
       const Vec3 out = triple(*normal, where + ": \"normal\"", 1e6);
       if (!(length(out) > 1e-9)) throw file_.wrong(*normal, where + ": \"normal\" has no length");
       contact.shape = std::make_shared<PlaneShape>(at, out);
     } else {
-      contact.shape = std::make_shared<BallShape>(at, file_.number(*radius, where + ": \"radius_mm\"", 1e-6, kFarMm), false);
+      contact.shape =
+          std::make_shared<BallShape>(at, file_.number(*radius, where + ": \"radius_mm\"", 1e-6, kFarMm), false);
     }
     load.contacts.push_back(std::move(contact));
   }
@@ -299,12 +323,14 @@ class ProblemReader {
 }  // namespace
 
 TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, bool needs_loads, Weight weight) {
-  if (const std::size_t first = json.find_first_not_of(" \t\r\n"); first != std::string_view::npos && json[first] == '*')
+  if (const std::size_t first = json.find_first_not_of(" \t\r\n");
+      first != std::string_view::npos && json[first] == '*')
     return tissue::problem_of_inp(json, mesh, needs_loads, weight);
   return ProblemReader(json, mesh, weight).read(needs_loads);
 }
 
-TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem, const std::optional<std::string>& constants_json) {
+TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem,
+                             const std::optional<std::string>& constants_json) {
   std::optional<JsonFile> constants;
   if (constants_json) {
     constants.emplace(*constants_json, "constants of calibrate");
@@ -333,4 +359,4 @@ TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem, 
   return with_log_factors(model, grid, log_factors);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -17,10 +17,10 @@ class Reader {
  public:
   Reader(std::string_view text, const TetMesh& mesh) : file_(parse_inp(text, "the tissue problem")) {
     if (file_.mesh.points_mm.size() != mesh.points_mm.size() || file_.mesh.tets.size() != mesh.tets.size())
-      throw Error(
-          ExitCode::usage,
-          "the problem's .inp has " + std::to_string(file_.mesh.tets.size()) + " tetrahedra, the mesh " + std::to_string(mesh.tets.size()),
-          "give the same .inp file as mesh and as problem");
+      throw Error(ExitCode::usage,
+                  "the problem's .inp has " + std::to_string(file_.mesh.tets.size()) + " tetrahedra, the mesh " +
+                      std::to_string(mesh.tets.size()),
+                  "give the same .inp file as mesh and as problem");
   }
 
   TissueProblem run(bool needs_loads, Weight weight) {
@@ -74,17 +74,20 @@ class Reader {
       } else if (card.name == "CLOAD" || card.name == "DLOAD") {
         if (!in_step) throw fail(card, "it stands outside a *STEP");
         card.name == "CLOAD" ? cload(card, problem_.loads.back()) : dload(card, problem_.loads.back());
-      } else if (card.name != "STATIC" && card.name != "END STEP" && !card.name.ends_with("PRINT") && !card.name.ends_with("FILE") &&
-                 !card.name.ends_with("OUTPUT") && card.name != "CONTROLS" && card.name != "PREPRINT" && card.name != "RESTART" &&
-                 card.name != "ASSEMBLY" && card.name != "END ASSEMBLY") {
+      } else if (card.name != "STATIC" && card.name != "END STEP" && !card.name.ends_with("PRINT") &&
+                 !card.name.ends_with("FILE") && !card.name.ends_with("OUTPUT") && card.name != "CONTROLS" &&
+                 card.name != "PREPRINT" && card.name != "RESTART" && card.name != "ASSEMBLY" &&
+                 card.name != "END ASSEMBLY") {
         throw fail(card, "this card is not read, and might change the answer", "docs/tissue.md lists what is");
       }
     }
     settle_boundary();
-    if (needs_loads && problem_.loads.empty()) throw Error(ExitCode::usage, "the tissue problem, loads: there is no *STEP");
+    if (needs_loads && problem_.loads.empty())
+      throw Error(ExitCode::usage, "the tissue problem, loads: there is no *STEP");
     materials();
     if (weight == Weight::apart && !pulls_.empty())
-      throw fail(*pulls_.front().card, "gravity of an .inp weighs by its own *DENSITY, and cannot be kept apart; give the problem in JSON");
+      throw fail(*pulls_.front().card,
+                 "gravity of an .inp weighs by its own *DENSITY, and cannot be kept apart; give the problem in JSON");
     for (const Pull& p : pulls_) pull(p);
     problem_.order = file_.quadratic ? TetOrder::t10 : TetOrder::t4;
     if (problem_.law == ElasticLaw::linear && large) problem_.law = ElasticLaw::stvk;
@@ -105,7 +108,8 @@ class Reader {
   };
 
   [[nodiscard]] static Error fail(const InpCard& card, const std::string& what, const std::string& advice = {}) {
-    return {ExitCode::usage, "the tissue problem, line " + std::to_string(card.line) + ", *" + card.name + ": " + what, advice};
+    return {ExitCode::usage, "the tissue problem, line " + std::to_string(card.line) + ", *" + card.name + ": " + what,
+            advice};
   }
   [[nodiscard]] static std::string option(const InpCard& card, const std::string& name) {
     const auto found = card.options.find(name);
@@ -125,10 +129,12 @@ class Reader {
     problem_.law = l;
   }
   // Members of a set, or the one number.
-  [[nodiscard]] static std::vector<long> members(const InpCard& card, const std::map<std::string, std::vector<long>>& sets,
+  [[nodiscard]] static std::vector<long> members(const InpCard& card,
+                                                 const std::map<std::string, std::vector<long>>& sets,
                                                  const std::string& field) {
     if (const auto s = sets.find(field); s != sets.end()) return s->second;
-    if (field.empty() || field.find_first_not_of("0123456789") != std::string::npos) throw fail(card, "there is no set " + field);
+    if (field.empty() || field.find_first_not_of("0123456789") != std::string::npos)
+      throw fail(card, "there is no set " + field);
     return {static_cast<long>(number_of(card, field))};
   }
 
@@ -148,7 +154,8 @@ class Reader {
       if (!(first >= 1 && last <= 3 && first <= last)) throw fail(card, "axes go from 1 to 3, not " + row[1]);
       for (const long node : members(card, file_.node_sets, row[0])) {
         std::uint8_t& axes = held_[node];
-        for (int a = static_cast<int>(first); a <= static_cast<int>(last); ++a) axes = static_cast<std::uint8_t>(axes | 1 << (a - 1));
+        for (int a = static_cast<int>(first); a <= static_cast<int>(last); ++a)
+          axes = static_cast<std::uint8_t>(axes | 1 << (a - 1));
         last_boundary_ = &card;
       }
     }
@@ -158,7 +165,8 @@ class Reader {
     std::map<long, std::pair<std::uint8_t, Vec3>> moved;
     for (const auto& row : card.rows) {
       if (row.size() < 2) throw fail(card, "a line holds less than a node and an axis");
-      const double first = number_of(card, row[1]), last = row.size() > 2 && !row[2].empty() ? number_of(card, row[2]) : first,
+      const double first = number_of(card, row[1]),
+                   last = row.size() > 2 && !row[2].empty() ? number_of(card, row[2]) : first,
                    by = row.size() > 3 ? number_of(card, row[3]) : 0;
       if (!(first >= 1 && last <= 3 && first <= last)) throw fail(card, "axes go from 1 to 3, not " + row[1]);
       for (const long node : members(card, file_.node_sets, row[0])) {
@@ -202,7 +210,8 @@ class Reader {
       if (middle == file_.middle_of.end()) continue;  // a node that no element has
       const auto both = static_cast<std::uint8_t>(of_point[middle->second[0]] & of_point[middle->second[1]]);
       if (both != axes)
-        throw fail(*last_boundary_, "node " + std::to_string(node) + " in the middle of an edge is held otherwise than both its ends");
+        throw fail(*last_boundary_,
+                   "node " + std::to_string(node) + " in the middle of an edge is held otherwise than both its ends");
     }
     for (const auto& [p, axes] : of_point) {
       if (axes == 7) problem_.fixed.push_back(p);
@@ -233,7 +242,8 @@ class Reader {
     for (const auto& row : card.rows) {
       if (row.size() >= 6 && row[1] == "GRAV") {
         const Vec3 along{number_of(card, row[3]), number_of(card, row[4]), number_of(card, row[5])};
-        pulls_.push_back({problem_.loads.size() - 1, members(card, file_.element_sets, row[0]), along * number_of(card, row[2]), &card});
+        pulls_.push_back({problem_.loads.size() - 1, members(card, file_.element_sets, row[0]),
+                          along * number_of(card, row[2]), &card});
         continue;
       }
       if (row.size() < 3 || row[1].size() != 2 || row[1][0] != 'P' || row[1][1] < '1' || row[1][1] > '4')
@@ -260,8 +270,10 @@ class Reader {
       if (found == file_.corners_of.end()) throw fail(*p.card, "there is no element " + std::to_string(element));
       const auto at = [&](std::size_t i) { return from_floats(file_.mesh.points_mm[found->second[i]]); };
       const double volume = std::abs(dot(cross(at(1) - at(0), at(2) - at(0)), at(3) - at(0))) / 6,
-                   density = problem_.materials[problem_.materials.size() == 1 ? 0 : file_.tet_of.at(element)].density_kg_m3;
-      if (!(density > 0)) throw fail(*p.card, "the material of element " + std::to_string(element) + " has no *DENSITY");
+                   density =
+                       problem_.materials[problem_.materials.size() == 1 ? 0 : file_.tet_of.at(element)].density_kg_m3;
+      if (!(density > 0))
+        throw fail(*p.card, "the material of element " + std::to_string(element) + " has no *DENSITY");
       load.add_in_tet(found->second, p.mm_s2 * (density * kTonnesPerMm3 * volume));
     }
   }
@@ -270,7 +282,8 @@ class Reader {
     problem_.materials.assign(file_.mesh.tets.size(), {0, 0});
     for (const Section& s : sections_) {
       const auto m = materials_.find(s.material);
-      if (m == materials_.end() || !(m->second.young_mpa > 0)) throw fail(*s.card, "there is no elastic *MATERIAL " + s.material);
+      if (m == materials_.end() || !(m->second.young_mpa > 0))
+        throw fail(*s.card, "there is no elastic *MATERIAL " + s.material);
       const auto set = file_.element_sets.find(s.set);
       if (set == file_.element_sets.end()) throw fail(*s.card, "there is no set " + s.set);
       for (const long e : set->second) {
@@ -323,7 +336,8 @@ std::string field(double v) {
 constexpr int kBallHalvings = 4;  // of an icosahedron: 5120 triangles, off by 0.1 % of the radius
 constexpr std::size_t kFaces[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};  // S1 to S4
 
-// A rigid thing as tetrahedra that do not move, one behind each triangle of its surface; the first point is the common one inside.
+// A rigid thing as tetrahedra that do not move, one behind each triangle of its surface; the first point is the common
+// one inside.
 struct Rigid {
   std::vector<Vec3> points;
   std::vector<std::array<std::uint32_t, 3>> triangles;  // facing outwards
@@ -340,7 +354,8 @@ Rigid rigid_plane(const PlaneShape& plane, const std::vector<Vec3>& rest) {
   }
   const double size = 2 * length(hi - lo);
   const Vec3 n = plane.normal(), middle = (lo + hi) / 2, foot = middle - n * dot(middle - plane.at_mm(), n);
-  const Vec3 along = normalized(cross(n, std::abs(n.x) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0})), across = cross(n, along);
+  const Vec3 along = normalized(cross(n, std::abs(n.x) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0})),
+             across = cross(n, along);
   return {{foot - n * size, foot + along * (2 * size), foot - along * size + across * (1.8 * size),
            foot - along * size - across * (1.8 * size)},
           {{1, 2, 3}}};
@@ -351,20 +366,23 @@ Rigid rigid_ball(const RigidShape::Ball& ball) {
   std::vector<Vec3> x{{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
                       {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
   for (Vec3& v : x) v = normalized(v);
-  std::vector<std::array<std::uint32_t, 3>> triangles{{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                                                      {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
-                                                      {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
+  std::vector<std::array<std::uint32_t, 3>> triangles{{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
+                                                      {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                                                      {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
+                                                      {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
   for (int n = 0; n < kBallHalvings; ++n) {
     std::map<std::array<std::uint32_t, 2>, std::uint32_t> middles;
     const auto middle = [&](std::uint32_t a, std::uint32_t b) {
-      const auto [it, fresh] = middles.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<std::uint32_t>(x.size()));
+      const auto [it, fresh] =
+          middles.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<std::uint32_t>(x.size()));
       if (fresh) x.push_back(normalized(x[a] + x[b]));
       return it->second;
     };
     std::vector<std::array<std::uint32_t, 3>> halved;
     for (const auto& [a, b, c] : triangles) {
       const std::uint32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
-      for (const auto& t : {std::array{a, ab, ca}, std::array{ab, b, bc}, std::array{ca, bc, c}, std::array{ab, bc, ca}})
+      for (const auto& t :
+           {std::array{a, ab, ca}, std::array{ab, b, bc}, std::array{ca, bc, c}, std::array{ab, bc, ca}})
         halved.push_back(t);
     }
     triangles = std::move(halved);
@@ -378,19 +396,21 @@ Rigid rigid_ball(const RigidShape::Ball& ball) {
   return r;
 }
 
-// Contact pairs. Here each point of the surface is pushed by itself; there pressure grows with depth, by as much over what looks at the
-// thing.
+// Contact pairs. Here each point of the surface is pushed by itself; there pressure grows with depth, by as much over
+// what looks at the thing.
 std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& contacts) {
   std::map<std::array<std::uint32_t, 3>, std::pair<std::size_t, std::size_t>> faces;  // element, face; those of two go
   for (std::size_t e = 0; e < body.tet_count(); ++e) {
     for (std::size_t f = 0; f < 4; ++f) {
-      std::array<std::uint32_t, 3> face{body.nodes(e)[kFaces[f][0]], body.nodes(e)[kFaces[f][1]], body.nodes(e)[kFaces[f][2]]};
+      std::array<std::uint32_t, 3> face{body.nodes(e)[kFaces[f][0]], body.nodes(e)[kFaces[f][1]],
+                                        body.nodes(e)[kFaces[f][2]]};
       std::sort(face.begin(), face.end());
       if (!faces.try_emplace(face, e, f).second) faces.erase(face);
     }
   }
   std::string t = "*SURFACE, NAME=BODY, TYPE=ELEMENT\n";
-  for (const auto& [face, where] : faces) t += std::to_string(where.first + 1) + ", S" + std::to_string(where.second + 1) + "\n";
+  for (const auto& [face, where] : faces)
+    t += std::to_string(where.first + 1) + ", S" + std::to_string(where.second + 1) + "\n";
   // Points over area of the faces that look at a thing (within 45 degrees); of all where none does.
   const auto points_per_mm2 = [&](const auto& towards) {
     for (const double least : {std::sqrt(0.5), -2.0}) {
@@ -406,7 +426,8 @@ std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& 
         area += length(out);
         for (std::size_t i = 0; i < 3; ++i) {
           points.push_back({face[i], face[i]});
-          if (body.order() == TetOrder::t10) points.push_back({std::min(face[i], face[(i + 1) % 3]), std::max(face[i], face[(i + 1) % 3])});
+          if (body.order() == TetOrder::t10)
+            points.push_back({std::min(face[i], face[(i + 1) % 3]), std::max(face[i], face[(i + 1) % 3])});
         }
       }
       std::sort(points.begin(), points.end());
@@ -421,27 +442,31 @@ std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& 
     const auto* const plane = dynamic_cast<const PlaneShape*>(c.shape.get());
     const auto* const ball = dynamic_cast<const BallShape*>(c.shape.get());
     if (plane == nullptr && ball == nullptr)
-      throw Error(ExitCode::usage, "only planes and balls are written to .inp as rigid things", "choose a load without other contacts");
+      throw Error(ExitCode::usage, "only planes and balls are written to .inp as rigid things",
+                  "choose a load without other contacts");
     const Rigid r = plane != nullptr ? rigid_plane(*plane, body.rest()) : rigid_ball(ball->bounds());
-    const double density =
-        points_per_mm2([&](Vec3 at) { return plane != nullptr ? plane->normal() * -1 : normalized(ball->bounds().centre_mm - at); });
+    const double density = points_per_mm2(
+        [&](Vec3 at) { return plane != nullptr ? plane->normal() * -1 : normalized(ball->bounds().centre_mm - at); });
     const std::string name = std::to_string(++number);
     t += "*NODE, NSET=RIGID" + name + "\n";
     for (std::size_t p = 0; p < r.points.size(); ++p)
-      t += std::to_string(node + p + 1) + ", " + field(r.points[p].x) + ", " + field(r.points[p].y) + ", " + field(r.points[p].z) + "\n";
+      t += std::to_string(node + p + 1) + ", " + field(r.points[p].x) + ", " + field(r.points[p].y) + ", " +
+           field(r.points[p].z) + "\n";
     t += "*ELEMENT, TYPE=C3D4, ELSET=RIGID" + name + "\n";
     std::string surface = "*SURFACE, NAME=THING" + name + ", TYPE=ELEMENT\n";
     for (const auto& f : r.triangles) {
       // Seen from the fourth corner the first three turn clockwise.
-      t += std::to_string(++element) + ", " + std::to_string(node + f[0] + 1) + ", " + std::to_string(node + f[2] + 1) + ", " +
-           std::to_string(node + f[1] + 1) + ", " + std::to_string(node + 1) + "\n";
+      t += std::to_string(++element) + ", " + std::to_string(node + f[0] + 1) + ", " + std::to_string(node + f[2] + 1) +
+           ", " + std::to_string(node + f[1] + 1) + ", " + std::to_string(node + 1) + "\n";
       surface += std::to_string(element) + ", S1\n";
     }
     node += r.points.size();
     t += surface;
-    t += "*MATERIAL, NAME=RIGID" + name + "\n*ELASTIC\n1, 0\n*SOLID SECTION, ELSET=RIGID" + name + ", MATERIAL=RIGID" + name + "\n";
+    t += "*MATERIAL, NAME=RIGID" + name + "\n*ELASTIC\n1, 0\n*SOLID SECTION, ELSET=RIGID" + name + ", MATERIAL=RIGID" +
+         name + "\n";
     t += "*BOUNDARY\nRIGID" + name + ", 1, 3\n";
-    t += "** " + field(c.stiffness_n_per_mm) + " N/mm of each point that looks at it, spread over their area: MPa a mm of depth\n";
+    t += "** " + field(c.stiffness_n_per_mm) +
+         " N/mm of each point that looks at it, spread over their area: MPa a mm of depth\n";
     t += "*SURFACE INTERACTION, NAME=PUSH" + name + "\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n" +
          field(c.stiffness_n_per_mm * density) + "\n";
     t += "*CONTACT PAIR, INTERACTION=PUSH" + name + ", TYPE=SURFACE TO SURFACE\nBODY, THING" + name + "\n";
@@ -453,12 +478,15 @@ std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& 
 
 std::string inp_text(const FemBody& body, const TissueLoad& load) {
   if (body.law() == ElasticLaw::corotated)
-    throw Error(ExitCode::usage, "the corotated law has no counterpart in CalculiX or Abaqus", "write linear, stvk or neo_hooke_split");
+    throw Error(ExitCode::usage, "the corotated law has no counterpart in CalculiX or Abaqus",
+                "write linear, stvk or neo_hooke_split");
   if (body.order() == TetOrder::t4_mean)
-    throw Error(ExitCode::usage, "tetrahedra with the mean change of volume of a patch have no counterpart in CalculiX or Abaqus",
+    throw Error(ExitCode::usage,
+                "tetrahedra with the mean change of volume of a patch have no counterpart in CalculiX or Abaqus",
                 "write t4 or t10");
   if (body.law() == ElasticLaw::neo_hooke)
-    throw Error(ExitCode::usage, "this neo-Hookean law has no counterpart in CalculiX or Abaqus", "write linear, stvk or neo_hooke_split");
+    throw Error(ExitCode::usage, "this neo-Hookean law has no counterpart in CalculiX or Abaqus",
+                "write linear, stvk or neo_hooke_split");
   std::string t = "** written by osteotome: mm, N, MPa\n*NODE, NSET=ALL\n";
   char line[160];
   for (std::size_t p = 0; p < body.point_count(); ++p) {
@@ -482,8 +510,9 @@ std::string inp_text(const FemBody& body, const TissueLoad& load) {
     ++number;
     const Material m{material[0], material[1], material[2]};
     const bool split = body.law() == ElasticLaw::neo_hooke_split;
-    std::snprintf(line, sizeof line, "*MATERIAL, NAME=M%d\n*%s\n%s, %s\n", number, split ? "HYPERELASTIC, NEO HOOKE" : "ELASTIC",
-                  field(split ? m.shear_mpa() / 2 : m.young_mpa).c_str(), field(split ? 2 / m.bulk_mpa() : m.poisson).c_str());
+    std::snprintf(line, sizeof line, "*MATERIAL, NAME=M%d\n*%s\n%s, %s\n", number,
+                  split ? "HYPERELASTIC, NEO HOOKE" : "ELASTIC", field(split ? m.shear_mpa() / 2 : m.young_mpa).c_str(),
+                  field(split ? 2 / m.bulk_mpa() : m.poisson).c_str());
     t += line;
     if (m.density_kg_m3 > 0) t += "*DENSITY\n" + field(m.density_kg_m3 * kTonnesPerMm3) + "\n";
     t += "*ELSET, ELSET=E" + std::to_string(number) + "\n";
@@ -522,12 +551,14 @@ std::string inp_text(const FemBody& body, const TissueLoad& load) {
     }
   }
   if (const double pull = length(load.gravity_m_s2); pull > 0) {
-    if (std::any_of(body.materials().begin(), body.materials().end(), [](const Material& m) { return !(m.density_kg_m3 > 0); }))
+    if (std::any_of(body.materials().begin(), body.materials().end(),
+                    [](const Material& m) { return !(m.density_kg_m3 > 0); }))
       throw Error(ExitCode::usage, "gravity needs a density for all of the body");
     const Vec3 along = load.gravity_m_s2 / pull;
-    t += "*DLOAD\nEALL, GRAV, " + field(1000 * pull) + ", " + field(along.x) + ", " + field(along.y) + ", " + field(along.z) + "\n";
+    t += "*DLOAD\nEALL, GRAV, " + field(1000 * pull) + ", " + field(along.x) + ", " + field(along.y) + ", " +
+         field(along.z) + "\n";
   }
   return t + "*NODE PRINT, NSET=ALL\nU\n*END STEP\n";
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -8,4 +8,4 @@ namespace osteo::inline simulation::tissue {
 
 TissueProblem problem_of_inp(std::string_view text, const TetMesh& mesh, bool needs_loads, Weight weight);
 
-}  // namespace osteo::simulation::tissue
+}  // namespace osteo::inline simulation::tissue

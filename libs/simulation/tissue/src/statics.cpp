@@ -42,7 +42,8 @@ class Touching final : public Energy {
     for (std::size_t e = 0; e < body.tet_count() && body.order() == TetOrder::t10; ++e) {
       const auto n = body.nodes(e);
       for (std::size_t k = 0; k < 6; ++k) {
-        const std::array<std::uint32_t, 2> edge{std::min(n[kEnds[k][0]], n[kEnds[k][1]]), std::max(n[kEnds[k][0]], n[kEnds[k][1]])};
+        const std::array<std::uint32_t, 2> edge{std::min(n[kEnds[k][0]], n[kEnds[k][1]]),
+                                                std::max(n[kEnds[k][0]], n[kEnds[k][1]])};
         if (std::binary_search(edges.begin(), edges.end(), edge)) surface_.push_back(n[4 + k]);
       }
     }
@@ -50,9 +51,12 @@ class Touching final : public Energy {
     surface_.erase(std::unique(surface_.begin(), surface_.end()), surface_.end());
   }
   [[nodiscard]] std::size_t point_count() const override { return body_.point_count(); }
-  [[nodiscard]] std::size_t element_count() const override { return body_.element_count() + surface_.size() * contacts_.size(); }
+  [[nodiscard]] std::size_t element_count() const override {
+    return body_.element_count() + surface_.size() * contacts_.size();
+  }
   [[nodiscard]] std::span<const std::uint32_t> nodes(std::size_t e) const override {
-    return e < body_.element_count() ? body_.nodes(e) : std::span(&surface_[(e - body_.element_count()) % surface_.size()], 1);
+    return e < body_.element_count() ? body_.nodes(e)
+                                     : std::span(&surface_[(e - body_.element_count()) % surface_.size()], 1);
   }
   double element(std::size_t e, const Vec3* x, double* gradient, double* hessian) const override {
     if (e < body_.element_count()) return body_.element(e, x, gradient, hessian);
@@ -78,13 +82,16 @@ class Touching final : public Energy {
 
 }  // namespace
 
-Statics statics(const FemBody& body, const TissueLoad& load, const EquilibriumOptions& options, const Context& context) {
+Statics statics(const FemBody& body, const TissueLoad& load, const EquilibriumOptions& options,
+                const Context& context) {
   for (const TissueLoad::Moved& m : load.moved) {
     if (m.point >= body.point_count() || !std::isfinite(dot(m.by_mm, m.by_mm)))
-      throw Error(ExitCode::usage, "a movement of point " + std::to_string(m.point) + " is not finite, or there is no such point");
+      throw Error(ExitCode::usage,
+                  "a movement of point " + std::to_string(m.point) + " is not finite, or there is no such point");
   }
   if (length(load.gravity_m_s2) > 0)
-    throw Error(ExitCode::unspecified, "gravity that is kept apart is for files; what solves wants it among the forces");
+    throw Error(ExitCode::unspecified,
+                "gravity that is kept apart is for files; what solves wants it among the forces");
   const Touching touching(body, load.contacts);
   const Energy& energy = load.contacts.empty() ? static_cast<const Energy&>(body) : touching;
   // What touches something is not held by it.
@@ -152,4 +159,4 @@ Statics statics(const FemBody& body, const TissueLoad& load, const EquilibriumOp
   return result;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::size_t kFewestPoints = 20, kFewestMarkers = 4;
 constexpr double kCauchy = 2.385;  // widths of noise: 95 % as good as squares where there are no stray points
-// Two thirds of all distances lie below the standard deviation along a line, and below so many of an axis's in space. Not the median: what
-// hardly moves is hardly off, and would pass for all of the noise.
+// Two thirds of all distances lie below the standard deviation along a line, and below so many of an axis's in space.
+// Not the median: what hardly moves is hardly off, and would pass for all of the noise.
 constexpr double kTwoThirds = 0.6827, kOfThree = 1.878;
 constexpr double kStray = 4;
 constexpr double kLeastNoise = 0.005;  // of the RMS movement: no fast model is nearer to a body than that
@@ -61,8 +61,8 @@ void box_of(std::span<const Vec3> points, Vec3& lo, Vec3& hi) {
 
 }  // namespace
 
-SurfaceGoal::SurfaceGoal(const TissueModel& model, const BodySurface& surface, std::span<const MeasuredPoints> views, bool find_pose,
-                         std::size_t most, const Context& context)
+SurfaceGoal::SurfaceGoal(const TissueModel& model, const BodySurface& surface, std::span<const MeasuredPoints> views,
+                         bool find_pose, std::size_t most, const Context& context)
     : surface_(surface), rest_(model.rest()), find_pose_(find_pose), context_(context) {
   if (surface.triangles.empty()) throw Error(ExitCode::usage, "the body's surface has no triangle");
   const std::vector<Vec3> rest = moved(rest_);
@@ -106,8 +106,8 @@ SurfaceGoal::SurfaceGoal(const TissueModel& model, const BodySurface& surface, s
   for (std::size_t k = 0; k < views_.size(); ++k) {
     if (const double off = error(k, rest_).median_mm; off > 0.5 * length(hi - lo))
       throw Error(ExitCode::usage,
-                  views_[k].source->name + ": half of its points lie over " + shown(off) + " mm from the body at rest, which is " +
-                      shown(length(hi - lo)) + " mm large",
+                  views_[k].source->name + ": half of its points lie over " + shown(off) +
+                      " mm from the body at rest, which is " + shown(length(hi - lo)) + " mm large",
                   "bring it into the frame of the mesh (LPS mm) first");
   }
 }
@@ -116,13 +116,16 @@ void SurfaceGoal::check(const MeasuredPoints& v, Vec3 lo, Vec3 hi) const {
   const bool markers = !v.rest_mm.empty();
   const std::size_t fewest = markers ? kFewestMarkers : kFewestPoints;
   if (v.points_mm.size() < fewest)
-    throw Error(ExitCode::usage, v.name + ": it holds " + std::to_string(v.points_mm.size()) + (markers ? " markers, " : " points, ") +
-                                     std::to_string(fewest) + " are needed");
-  if ((markers && v.rest_mm.size() != v.points_mm.size()) || (!v.noise_mm.empty() && v.noise_mm.size() != v.points_mm.size()))
+    throw Error(ExitCode::usage, v.name + ": it holds " + std::to_string(v.points_mm.size()) +
+                                     (markers ? " markers, " : " points, ") + std::to_string(fewest) + " are needed");
+  if ((markers && v.rest_mm.size() != v.points_mm.size()) ||
+      (!v.noise_mm.empty() && v.noise_mm.size() != v.points_mm.size()))
     throw Error(ExitCode::usage, v.name + ": not every point has its rest or its noise");
   for (std::size_t p = 0; p < v.points_mm.size(); ++p) {
-    if (!std::isfinite(dot(v.points_mm[p], v.points_mm[p])) || (markers && !std::isfinite(dot(v.rest_mm[p], v.rest_mm[p]))))
-      throw Error(ExitCode::usage, v.name + ": point " + std::to_string(p) + " has a coordinate that is no finite number");
+    if (!std::isfinite(dot(v.points_mm[p], v.points_mm[p])) ||
+        (markers && !std::isfinite(dot(v.rest_mm[p], v.rest_mm[p]))))
+      throw Error(ExitCode::usage,
+                  v.name + ": point " + std::to_string(p) + " has a coordinate that is no finite number");
     if (!v.noise_mm.empty() && !(v.noise_mm[p] > 0 && std::isfinite(v.noise_mm[p])))
       throw Error(ExitCode::usage, v.name + ": point " + std::to_string(p) + " has a noise that is not above 0");
   }
@@ -137,7 +140,8 @@ void SurfaceGoal::check(const MeasuredPoints& v, Vec3 lo, Vec3 hi) const {
   }
   if (measured > 10 * whole || measured < 0.1 * whole)
     throw Error(ExitCode::usage,
-                v.name + ": it is " + shown(measured) + " mm large, the body " + shown(whole) + " mm: not the same body, or not in mm",
+                v.name + ": it is " + shown(measured) + " mm large, the body " + shown(whole) +
+                    " mm: not the same body, or not in mm",
                 "give it in LPS mm; a view that is smaller than a tenth of the body says too little");
 }
 
@@ -159,7 +163,8 @@ void SurfaceGoal::embed(const TissueModel& model, View& view) {
     }
     // A mesh of voxels lies within a voxel of the surface that it was made from.
     if (best < -1)
-      throw Error(ExitCode::usage, view.source->name + ": marker " + std::to_string(view.drawn[k]) + " lies outside the body at rest",
+      throw Error(ExitCode::usage,
+                  view.source->name + ": marker " + std::to_string(view.drawn[k]) + " lies outside the body at rest",
                   "x0_mm, y0_mm, z0_mm are where it was before the load, in the frame of the mesh (LPS mm)");
   }
 }
@@ -177,8 +182,8 @@ void SurfaceGoal::place(const double* own) {
     const View& v = views_[k];
     const Eigen::Vector3d w = v.turn * Eigen::Vector3d(own[0], own[1], own[2]);
     const double angle = w.norm();
-    const Eigen::Matrix3d turn =
-        angle > 0 ? Eigen::AngleAxisd(angle, w / angle).toRotationMatrix() : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+    const Eigen::Matrix3d turn = angle > 0 ? Eigen::AngleAxisd(angle, w / angle).toRotationMatrix()
+                                           : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
     const Vec3 by = Vec3{own[3], own[4], own[5]} * v.shift + v.centre;
     centre_[k] = by;
     for (std::size_t p = 0; p < v.drawn.size(); ++p) {
@@ -226,14 +231,17 @@ void SurfaceGoal::residuals(std::span<const Vec3> shape, const double* own, doub
       const ClosestPoint near = tree.closest(s.at, s.triangle);
       s.triangle = near.triangle;
       const auto& t = soup.triangles[near.triangle];
-      const Vec3 a = soup.points_mm[t[0]], b = soup.points_mm[t[1]] - a, c = soup.points_mm[t[2]] - a, d = near.point_mm - a;
+      const Vec3 a = soup.points_mm[t[0]], b = soup.points_mm[t[1]] - a, c = soup.points_mm[t[2]] - a,
+                 d = near.point_mm - a;
       const double bb = dot(b, b), bc = dot(b, c), cc = dot(c, c), det = bb * cc - bc * bc;
-      const double u = det > 0 ? (cc * dot(d, b) - bc * dot(d, c)) / det : 0, w = det > 0 ? (bb * dot(d, c) - bc * dot(d, b)) / det : 0;
+      const double u = det > 0 ? (cc * dot(d, b) - bc * dot(d, c)) / det : 0,
+                   w = det > 0 ? (bb * dot(d, c) - bc * dot(d, b)) / det : 0;
       s.share = {1 - u - w, u, w};
       const Vec3 normal = cross(b, c), to = s.at - near.point_mm;
       const double off = length(to), area = length(normal);
       s.out = area > 0 ? normal / area : Vec3{0, 0, 1};
-      // Nearest to an edge or a corner: away from that. On the face it is along the normal, also where it lies on it to rounding.
+      // Nearest to an edge or a corner: away from that. On the face it is along the normal, also where it lies on it to
+      // rounding.
       if (near.feature != Feature::face && off > 1e-9 * v.shift) s.out = to * ((dot(to, s.out) < 0 ? -1 : 1) / off);
       s.left = s.out * -dot(to, s.out);
       const double scale = scale_ / v.weight[p];
@@ -369,4 +377,4 @@ MeasuredError SurfaceGoal::error(std::size_t view, std::span<const Vec3> shape) 
   return e;
 }
 
-}  // namespace osteo::simulation::tissue
+}  // namespace osteo::inline simulation::tissue

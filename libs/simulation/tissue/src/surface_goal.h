@@ -12,8 +12,8 @@ namespace osteo::inline simulation::tissue {
 class SurfaceGoal final : public Goal {
  public:
   // Of one load. Views with more points than `most` keep that many, drawn by `seed`. Errors as of calibrate_measured().
-  SurfaceGoal(const TissueModel& model, const BodySurface& surface, std::span<const MeasuredPoints> views, bool find_pose, std::size_t most,
-              const Context& context);
+  SurfaceGoal(const TissueModel& model, const BodySurface& surface, std::span<const MeasuredPoints> views,
+              bool find_pose, std::size_t most, const Context& context);
 
   struct View {
     const MeasuredPoints* source = nullptr;
@@ -43,12 +43,15 @@ class SurfaceGoal final : public Goal {
   void align(std::span<const Vec3> shape, double* own);
   // Squared distances over weights, of the last shape; a marker's is a third of its square.
   [[nodiscard]] std::vector<double> squares() const;
-  // Of the last shape: what is left at a view's points, along the normal (of markers, in all three), as measured, not by the loss.
+  // Of the last shape: what is left at a view's points, along the normal (of markers, in all three), as measured, not
+  // by the loss.
   [[nodiscard]] Vec3 left(std::size_t view, std::size_t point) const { return seen_[seen_at_[view] + point].left; }
   // Where a view's points lie on the body, by the pose of the last shape.
   [[nodiscard]] Vec3 placed(std::size_t view, std::size_t point) const { return seen_[seen_at_[view] + point].at; }
   // The triangle of the surface that it is nearest to; of clouds.
-  [[nodiscard]] std::uint32_t nearest(std::size_t view, std::size_t point) const { return seen_[seen_at_[view] + point].triangle; }
+  [[nodiscard]] std::uint32_t nearest(std::size_t view, std::size_t point) const {
+    return seen_[seen_at_[view] + point].triangle;
+  }
   [[nodiscard]] MeasuredError error(std::size_t view, std::span<const Vec3> shape) const;
   [[nodiscard]] std::vector<Vec3> moved(std::span<const Vec3> shape) const;  // the surface's points
   [[nodiscard]] const BodySurface& surface() const { return surface_; }
@@ -84,4 +87,4 @@ class SurfaceGoal final : public Goal {
   double scale_ = 1;
 };
 
-}  // namespace osteo::simulation::tissue
+}  // namespace osteo::inline simulation::tissue

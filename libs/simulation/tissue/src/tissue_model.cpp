@@ -161,12 +161,14 @@ TissueModel TissueModel::of_voxels(std::span<const Vec3> points, std::span<const
   if (tets.empty() || tets.size() % 5 != 0) throw refuse("it has " + std::to_string(tets.size()) + " tetrahedra");
   const std::size_t voxels = tets.size() / 5;
   if (materials.size() != 1 && materials.size() != voxels)
-    throw Error(ExitCode::usage, std::to_string(materials.size()) + " materials for " + std::to_string(voxels) + " voxels",
+    throw Error(ExitCode::usage,
+                std::to_string(materials.size()) + " materials for " + std::to_string(voxels) + " voxels",
                 "give one for all, or one each");
   for (const Material& m : materials) {
     if (!(m.young_mpa > 0) || !(m.poisson >= 0.25) || !(m.poisson < 0.5))
-      throw Error(ExitCode::usage, "the closed form needs a modulus above 0 and a Poisson's ratio from 0.25 to below 0.5, not " +
-                                       std::to_string(m.young_mpa) + " MPa and " + std::to_string(m.poisson));
+      throw Error(ExitCode::usage,
+                  "the closed form needs a modulus above 0 and a Poisson's ratio from 0.25 to below 0.5, not " +
+                      std::to_string(m.young_mpa) + " MPa and " + std::to_string(m.poisson));
   }
   TissueModel model;
   model.rest_.assign(points.begin(), points.end());
@@ -192,8 +194,10 @@ TissueModel TissueModel::of_voxels(std::span<const Vec3> points, std::span<const
     }
     const Vec3 size = hi - lo;
     if (v == 0) h = size.x;
-    if (corners.size() != 8 || std::abs(size.x - h) > 1e-4 * h || std::abs(size.y - h) > 1e-4 * h || std::abs(size.z - h) > 1e-4 * h)
-      throw refuse("the tetrahedra " + std::to_string(5 * v) + " to " + std::to_string(5 * v + 4) + " fill no cube like the first");
+    if (corners.size() != 8 || std::abs(size.x - h) > 1e-4 * h || std::abs(size.y - h) > 1e-4 * h ||
+        std::abs(size.z - h) > 1e-4 * h)
+      throw refuse("the tetrahedra " + std::to_string(5 * v) + " to " + std::to_string(5 * v + 4) +
+                   " fill no cube like the first");
     Constraint volume;
     volume.nodes = 8;
     volume.kind = TissueClass::volume;
@@ -206,7 +210,8 @@ TissueModel TissueModel::of_voxels(std::span<const Vec3> points, std::span<const
     // Which split: the one whose first tetrahedron (the regular one) is among the five.
     for (std::uint32_t s = 0; s < 2; ++s) {
       std::array<std::uint32_t, 4> regular;
-      for (std::size_t i = 0; i < 4; ++i) regular[i] = volume.node[static_cast<std::size_t>(tissue::kVoxelSplit[s][0][i])];
+      for (std::size_t i = 0; i < 4; ++i)
+        regular[i] = volume.node[static_cast<std::size_t>(tissue::kVoxelSplit[s][0][i])];
       std::sort(regular.begin(), regular.end());
       for (std::size_t t = 0; t < 5; ++t) {
         auto sorted = tets[5 * v + t];
@@ -232,7 +237,8 @@ TissueModel TissueModel::of_voxels(std::span<const Vec3> points, std::span<const
     }
     for (const auto& [edge, unused] : own) {
       const bool diagonal = length(points[edge.second] - points[edge.first]) > 1.2 * h;
-      auto& k = edges.try_emplace(edge, 0.0, diagonal ? TissueClass::diagonal_edge : TissueClass::axis_edge).first->second;
+      auto& k =
+          edges.try_emplace(edge, 0.0, diagonal ? TissueClass::diagonal_edge : TissueClass::axis_edge).first->second;
       k.first += (diagonal ? 2.0 : 0.25) * mu * h * h * h;
     }
   }
@@ -263,8 +269,8 @@ TissueModel TissueModel::of_voxels(std::span<const Vec3> points, std::span<const
   return model;
 }
 
-TissueModel TissueModel::uniform(std::span<const Vec3> points, std::span<const std::array<std::uint32_t, 4>> tets, double distance,
-                                 double area, double volume) {
+TissueModel TissueModel::uniform(std::span<const Vec3> points, std::span<const std::array<std::uint32_t, 4>> tets,
+                                 double distance, double area, double volume) {
   TissueModel model;
   model.rest_.assign(points.begin(), points.end());
   model.tets_.assign(tets.begin(), tets.end());
@@ -332,4 +338,4 @@ std::size_t TissueModel::inverted(std::span<const Vec3> x) const {
   return count;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -8,7 +8,8 @@ double VoxelCutting::rate_mm3_per_s(double force_n, double bone_mm3_per_s_per_n)
   return std::min(force_n * bone_mm3_per_s_per_n * kEasierThanBone, kMostMm3PerS);
 }
 
-VoxelCutting::VoxelCutting(const TissueModel& model, double voxel_mm3) : model_(model), voxel_mm3_(voxel_mm3), gone_(model.tets().size()) {}
+VoxelCutting::VoxelCutting(const TissueModel& model, double voxel_mm3)
+    : model_(model), voxel_mm3_(voxel_mm3), gone_(model.tets().size()) {}
 
 bool VoxelCutting::cut(TissueDynamics<float>& body, const RigidShape& tool, double mm3, std::size_t number) {
   if (number >= saved_mm3_.size()) saved_mm3_.resize(number + 1);
@@ -51,4 +52,4 @@ void VoxelCutting::take(TissueDynamics<float>& body, std::span<const std::uint32
   body.cut_off(tets);
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

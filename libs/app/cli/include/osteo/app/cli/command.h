@@ -1,4 +1,5 @@
-// Commands: stages and the verbs beside them (run, prepare, rehearse, ...), all declared by the same kind of Params struct.
+// Commands: stages and the verbs beside them (run, prepare, rehearse, ...), all declared by the same kind of Params
+// struct.
 #pragma once
 #include <iosfwd>
 #include <memory>
@@ -34,7 +35,8 @@ struct Common {
     visit({"quiet", "no progress and no notes, only errors"}, p.quiet);
     visit({"json", "print what was done as JSON on standard output"}, p.json);
     visit({"progress",
-           "bar or JSON lines on standard error, Slicer's form on standard output and all notes with it; auto: a bar on a terminal"},
+           "bar or JSON lines on standard error, Slicer's form on standard output and all notes with it; auto: a bar "
+           "on a terminal"},
           p.progress);
     visit({"seed", "of random choices", "", 0, 2147483647}, p.seed);
   }
@@ -56,8 +58,8 @@ struct CommandInfo {
 struct Invocation {
   const Registry& registry;
   Common::Params common;
-  std::vector<std::string> arguments;                         ///< positionals, in order
-  std::set<std::string> given;                                ///< names of the fields that were on the command line, whatever their value
+  std::vector<std::string> arguments;  ///< positionals, in order
+  std::set<std::string> given;         ///< names of the fields that were on the command line, whatever their value
   std::vector<std::pair<std::string, std::string>> settings;  ///< --set k=v, in order
   Context context;
   std::ostream& out;
@@ -66,7 +68,8 @@ struct Invocation {
   std::function<void()> end_progress;
 };
 
-/// A verb. C has `struct Params`, `describe`, `static CommandInfo info()`, `static int run(const Params&, Invocation&)`.
+/// A verb. C has `struct Params`, `describe`, `static CommandInfo info()`, `static int run(const Params&,
+/// Invocation&)`.
 class Command {
  public:
   virtual ~Command() = default;
@@ -101,9 +104,9 @@ struct Program {
   [[nodiscard]] Command* find(std::string_view name) const;
 };
 
-/// The whole of a command-line program: parses, runs, reports errors, returns the exit code. stdout carries data only. With --json a
-/// failure is told there too: { "error": { "exit_code", "name", "message", "advice" } }, and beside it what the stage had to show of it,
-/// such as the "verdict" on a refused scan.
+/// The whole of a command-line program: parses, runs, reports errors, returns the exit code. stdout carries data only.
+/// With --json a failure is told there too: { "error": { "exit_code", "name", "message", "advice" } }, and beside it
+/// what the stage had to show of it, such as the "verdict" on a refused scan.
 int run_program(Program& program, int argc, char** argv, std::ostream& out, std::ostream& err);
 
-}  // namespace osteo::app::cli
+}  // namespace osteo::inline app::cli

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "osteo/core/base/error.h"
 #include "osteo/app/cli/command.h"
+#include "osteo/core/base/error.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 
 namespace osteo::inline app::cli {
@@ -22,8 +22,8 @@ void print_results(const std::vector<NodeResult>& results, Invocation& invocatio
 /// The reference pages made from the declarations of `program`: file name -> content.
 [[nodiscard]] std::map<std::string, std::string> reference_pages(const Program& program);
 
-/// What an installation shares, made from the declarations: path below PREFIX/share -> content. Man pages, completion of bash, zsh and
-/// fish, and the modules of 3D Slicer (scripts, which may be run, and .xml).
+/// What an installation shares, made from the declarations: path below PREFIX/share -> content. Man pages, completion
+/// of bash, zsh and fish, and the modules of 3D Slicer (scripts, which may be run, and .xml).
 [[nodiscard]] std::map<std::string, std::string> shared_files(const Program& program);
 
-}  // namespace osteo::app::cli
+}  // namespace osteo::inline app::cli

@@ -1,7 +1,7 @@
 // The stage curve: where a recorded hand would be held by a curve.
 #pragma once
-#include "osteo/simulation/haptics/curve_constraint.h"
 #include "osteo/core/stage/stage.h"
+#include "osteo/simulation/haptics/curve_constraint.h"
 
 namespace osteo::inline app {
 
@@ -18,4 +18,4 @@ struct CurveStage {
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -2,8 +2,8 @@
 #pragma once
 #include <string>
 
-#include "osteo/geometry/distance/distance_map.h"
 #include "osteo/core/stage/stage.h"
+#include "osteo/geometry/distance/distance_map.h"
 
 namespace osteo::inline app {
 
@@ -44,8 +44,11 @@ struct DistanceStage {
     visit({"band_inside_mm", "how deep the band reaches inside", "mm", 0, 1e6}, p.band_inside_mm);
     visit({"band_outside_mm", "how far the band reaches outside", "mm", 0, 1e6}, p.band_outside_mm);
     GridParams::describe(p.grid, visit);
-    visit({"method", "exact; swept: exact beside the surface, approximate beyond; thesis: its tree search, for comparison"}, p.method);
-    visit({"tree_ascend_n", "thesis: levels up from the last voxel's triangle where the search starts (-1: no such hint)", "", -1, 1000},
+    visit({"method",
+           "exact; swept: exact beside the surface, approximate beyond; thesis: its tree search, for comparison"},
+          p.method);
+    visit({"tree_ascend_n",
+           "thesis: levels up from the last voxel's triangle where the search starts (-1: no such hint)", "", -1, 1000},
           p.tree_ascend_n);
     visit({"breadth_first", "thesis: search breadth first"}, p.breadth_first);
     visit({"bound_as_printed", "thesis: the lower bound as printed, which loses nearer triangles"}, p.bound_as_printed);
@@ -75,7 +78,8 @@ struct VoxelizeStage {
   using Params = VoxelizeParams;
   static void describe(Params& p, auto& visit) {
     GridParams::describe(p.grid, visit);
-    visit({"margin", "exact: border voxels lie inside and touch the outside; thesis: one voxel more, outside"}, p.margin);
+    visit({"margin", "exact: border voxels lie inside and touch the outside; thesis: one voxel more, outside"},
+          p.margin);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
@@ -86,9 +90,11 @@ struct CompareParams {
 };
 struct CompareStage {
   using Params = CompareParams;
-  static void describe(Params& p, auto& visit) { visit({"iso", "value at the surface of a grid", "", -1e9, 1e9}, p.iso); }
+  static void describe(Params& p, auto& visit) {
+    visit({"iso", "value at the surface of a grid", "", -1e9, 1e9}, p.iso);
+  }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,7 +1,7 @@
 // The stage apply-edits: what was corrected by hand, done again.
 #pragma once
-#include "osteo/imaging/edit/edit_file.h"
 #include "osteo/core/stage/stage.h"
+#include "osteo/imaging/edit/edit_file.h"
 
 namespace osteo::inline app {
 
@@ -12,4 +12,4 @@ struct ApplyEditsStage {
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

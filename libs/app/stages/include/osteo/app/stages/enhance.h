@@ -1,14 +1,16 @@
 // The stages denoise and reduce-metal.
 #pragma once
-#include "osteo/imaging/image/enhance.h"
 #include "osteo/core/stage/stage.h"
+#include "osteo/imaging/image/enhance.h"
 
 namespace osteo::inline app {
 
 struct DenoiseStage {
   using Params = DenoiseParams;
   static void describe(Params& p, auto& visit) {
-    visit({"strength", "how strong: 1 goes by the noise that is found, less keeps more of both noise and detail", "", 0.1, 4}, p.strength);
+    visit({"strength", "how strong: 1 goes by the noise that is found, less keeps more of both noise and detail", "",
+           0.1, 4},
+          p.strength);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
@@ -24,4 +26,4 @@ struct ReduceMetalStage {
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

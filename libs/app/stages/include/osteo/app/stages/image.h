@@ -1,10 +1,10 @@
 // The stages crop, threshold, structures and phantom.
 #pragma once
+#include "osteo/core/stage/stage.h"
 #include "osteo/imaging/image/crop.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/structures.h"
 #include "osteo/imaging/image/threshold.h"
-#include "osteo/core/stage/stage.h"
 
 namespace osteo::inline app {
 
@@ -13,7 +13,8 @@ struct CropStage {
   static void describe(Params& p, auto& visit) {
     visit({"region", "what to cut out; the left is the patient's"}, p.region);
     visit({"centre_mm", "centre of the box, LPS (0,0,0: as found)", "mm"}, p.centre_mm);
-    visit({"size_mm", "edges of the box along left-right, front-back, feet-head (0,0,0: as the region has)", "mm"}, p.size_mm);
+    visit({"size_mm", "edges of the box along left-right, front-back, feet-head (0,0,0: as the region has)", "mm"},
+          p.size_mm);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
@@ -22,13 +23,16 @@ struct CropStage {
 struct ThresholdStage {
   using Params = ThresholdParams;
   static void describe(Params& p, auto& visit) {
-    visit({"preset", "how the threshold is found: fixed takes --lower, the others go by this scan (see 'osteo guide')"}, p.preset);
+    visit({"preset", "how the threshold is found: fixed takes --lower, the others go by this scan (see 'osteo guide')"},
+          p.preset);
     visit({"lower", "keep voxels at or above this value", "HU", -32768, 32767}, p.lower);
     visit({"upper", "keep voxels at or below this value", "HU", -32768, 32767}, p.upper);
-    visit({"core", "hysteresis: keep only pieces that hold a voxel at or above this value (off at or below lower)", "HU", -32768, 32767},
+    visit({"core", "hysteresis: keep only pieces that hold a voxel at or above this value (off at or below lower)",
+           "HU", -32768, 32767},
           p.core);
     visit({"remove_table",
-           "clear all that lies outside the body (table, head holder, wires), also where that is not certain; without it only what touches "
+           "clear all that lies outside the body (table, head holder, wires), also where that is not certain; without "
+           "it only what touches "
            "no bone "
            "of the body, is far from it and in air"},
           p.remove_table);
@@ -49,8 +53,10 @@ struct ThresholdStage {
 struct StructuresStage {
   using Params = StructuresParams;
   static void describe(Params& p, auto& visit) {
-    visit({"names", "what the values stand for, like '1=facial nerve, 2=sigmoid sinus' (empty: as the file says)"}, p.names);
-    visit({"only_named", "values that neither names nor the file name are background: tissue that is not at risk"}, p.only_named);
+    visit({"names", "what the values stand for, like '1=facial nerve, 2=sigmoid sinus' (empty: as the file says)"},
+          p.names);
+    visit({"only_named", "values that neither names nor the file name are background: tissue that is not at risk"},
+          p.only_named);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
@@ -59,11 +65,13 @@ struct StructuresStage {
 struct PhantomStage {
   using Params = PhantomParams;
   static void describe(Params& p, auto& visit) {
-    visit({"region", "the whole head, a block around the left temporal bone, or the lower jaw with its joints"}, p.region);
+    visit({"region", "the whole head, a block around the left temporal bone, or the lower jaw with its joints"},
+          p.region);
     visit({"spacing_mm", "voxel size in the slice", "mm", 0.2, 4}, p.spacing_mm);
     visit({"slice_mm", "distance of slices (0: same as spacing_mm)", "mm", 0, 10}, p.slice_mm);
     visit({"noise_hu", "standard deviation of the noise", "HU", 0, 200}, p.noise_hu);
-    visit({"individual", "whose head: 0 has mean sizes, another number varies them as people vary and places other air cells", "", 0,
+    visit({"individual",
+           "whose head: 0 has mean sizes, another number varies them as people vary and places other air cells", "", 0,
            1000000},
           p.individual);
   }
@@ -71,4 +79,4 @@ struct PhantomStage {
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

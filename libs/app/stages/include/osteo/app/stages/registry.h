@@ -6,4 +6,4 @@ namespace osteo::inline app {
 
 [[nodiscard]] Registry osteo_stages();
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -19,4 +19,4 @@ struct SnapshotStage {
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -30,15 +30,19 @@ struct FemStage {
   using Params = FemParams;
   static void describe(Params& p, auto& visit) {
     visit({"law",
-           "linear: small strains; stvk: Hooke's law in Green's strain; neo_hooke: large strains; neo_hooke_split: shape and volume apart, "
-           "as CalculiX has it; corotated: Hooke's law seen from where each element has turned to, finite for what is inside out; "
+           "linear: small strains; stvk: Hooke's law in Green's strain; neo_hooke: large strains; neo_hooke_split: "
+           "shape and volume apart, "
+           "as CalculiX has it; corotated: Hooke's law seen from where each element has turned to, finite for what is "
+           "inside out; "
            "auto: neo_hooke, or what the problem says"},
           p.law);
-    visit({"order",
-           "t4: linear tetrahedra; t10: quadratic; t4_mean: linear ones whose change of volume is the mean of a patch, for Poisson's "
-           "ratios near a half; "
-           "auto: what the problem says, else quadratic, but for large meshes whose Poisson's ratio lets linear ones do"},
-          p.order);
+    visit(
+        {"order",
+         "t4: linear tetrahedra; t10: quadratic; t4_mean: linear ones whose change of volume is the mean of a patch, "
+         "for Poisson's "
+         "ratios near a half; "
+         "auto: what the problem says, else quadratic, but for large meshes whose Poisson's ratio lets linear ones do"},
+        p.order);
     visit({"load", "name of the load (empty: the first)"}, p.load);
     visit({"load_steps", "equal steps in which the load grows", "", 1, 1000}, p.load_steps);
     visit({"tolerance", "residual force over load", "", 1e-14, 1e-2}, p.tolerance);
@@ -66,25 +70,35 @@ struct CalibrateParams {
 struct CalibrateStage {
   using Params = CalibrateParams;
   static void describe(Params& p, auto& visit) {
-    visit({"fit", "names of the loads to fit, like 'A,B' (empty: the first; measured: all that were); the others show how it carries over"},
+    visit({"fit",
+           "names of the loads to fit, like 'A,B' (empty: the first; measured: all that were); the others show how it "
+           "carries over"},
           p.fit);
     visit({"law", "of the truth, by finite elements"}, p.law);
     visit({"order", "of the truth's tetrahedra"}, p.order);
     visit({"grid_x", "points of the map of stiffness along x (1, 1, 1: one material)", "", 1, 20}, p.grid_x);
     visit({"grid_y", "along y", "", 1, 20}, p.grid_y);
     visit({"grid_z", "along z", "", 1, 20}, p.grid_z);
-    visit({"shared_grid", "one map for all kinds of constraint, and one factor a kind; else a map for each kind"}, p.shared_grid);
+    visit({"shared_grid", "one map for all kinds of constraint, and one factor a kind; else a map for each kind"},
+          p.shared_grid);
     visit({"blind", "the model is not told of the problem's regions: a map has to find them"}, p.blind);
     visit({"pull", "towards the closed form: what the loads do not tell stays there", "", 0, 10}, p.pull);
-    visit({"smooth", "what differences in a shared map cost; borders between tissues cost less than ripples", "", 0, 10}, p.smooth);
-    visit({"starts", "from other mixtures too; the best counts", "", 1, 3}, p.starts);
-    visit({"samples", "coarse search before: so many mixtures are tried, the best is a start too", "", 0, 10000}, p.samples);
-    visit({"iterations", "of the trust region, at most", "", 1, 1000}, p.iterations);
-    visit({"check_truth", "solve finite elements half as large too (eight times as many): how far the truth is off itself"}, p.check_truth);
     visit(
-        {"find_pose", "measured: each file may lie elsewhere by a small rigid motion, which is found too; else it is in the mesh's frame"},
-        p.find_pose);
-    visit({"most_points", "measured: of a larger cloud so many points are drawn at random", "", 20, 100000}, p.most_points);
+        {"smooth", "what differences in a shared map cost; borders between tissues cost less than ripples", "", 0, 10},
+        p.smooth);
+    visit({"starts", "from other mixtures too; the best counts", "", 1, 3}, p.starts);
+    visit({"samples", "coarse search before: so many mixtures are tried, the best is a start too", "", 0, 10000},
+          p.samples);
+    visit({"iterations", "of the trust region, at most", "", 1, 1000}, p.iterations);
+    visit({"check_truth",
+           "solve finite elements half as large too (eight times as many): how far the truth is off itself"},
+          p.check_truth);
+    visit({"find_pose",
+           "measured: each file may lie elsewhere by a small rigid motion, which is found too; else it is in the "
+           "mesh's frame"},
+          p.find_pose);
+    visit({"most_points", "measured: of a larger cloud so many points are drawn at random", "", 20, 100000},
+          p.most_points);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
@@ -113,11 +127,13 @@ struct SimulateStage {
   using Params = SimulateParams;
   static void describe(Params& p, auto& visit) {
     visit({"load", "name of the load (empty: the first; none: no load)"}, p.load);
-    visit({"method", "explicit: many quick steps of a certified length; implicit: few long ones, for stiff bodies"}, p.method);
+    visit({"method", "explicit: many quick steps of a certified length; implicit: few long ones, for stiff bodies"},
+          p.method);
     visit({"seconds", "of simulated time, at most", "s", 1e-4, 1000}, p.seconds);
     visit({"density_kg_m3", "of the tissue", "kg/m3", 1, 30000}, p.density_kg_m3);
     visit({"damping_per_s", "how fast motion dies down", "1/s", 0, 1e5}, p.damping_per_s);
-    visit({"least_step_ms", "steps at least this long: points are made heavier for it (0: as long as is stable)", "ms", 0, 100},
+    visit({"least_step_ms", "steps at least this long: points are made heavier for it (0: as long as is stable)", "ms",
+           0, 100},
           p.least_step_ms);
     visit({"step_ms", "implicit: length of a step, any", "ms", 1e-4, 1e5}, p.step_ms);
     visit({"until_rest", "ends when the forces balance to a thousandth of the load and little moves"}, p.until_rest);
@@ -132,4 +148,4 @@ struct SimulateStage {
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

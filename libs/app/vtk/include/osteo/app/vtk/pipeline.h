@@ -1,5 +1,6 @@
-// A pipeline file as a pipeline of VTK: its steps are filters that are connected as the file says, with sources before and writers at the
-// end. VTK's executive decides what runs: asking one step for its output runs what that needs and is not up to date, nothing else.
+// A pipeline file as a pipeline of VTK: its steps are filters that are connected as the file says, with sources before
+// and writers at the end. VTK's executive decides what runs: asking one step for its output runs what that needs and is
+// not up to date, nothing else.
 #pragma once
 #include <vtkSmartPointer.h>
 
@@ -11,12 +12,12 @@
 #include <string>
 #include <vector>
 
-#include "osteo/imaging/pipeline/engine.h"
-#include "osteo/imaging/pipeline/pipeline.h"
-#include "osteo/core/stage/stage.h"
 #include "osteo/app/vtk/vtkOsteoReader.h"
 #include "osteo/app/vtk/vtkOsteoStage.h"
 #include "osteo/app/vtk/vtkOsteoWriter.h"
+#include "osteo/core/stage/stage.h"
+#include "osteo/imaging/pipeline/engine.h"
+#include "osteo/imaging/pipeline/pipeline.h"
 
 class vtkAlgorithmOutput;
 
@@ -28,7 +29,8 @@ struct VtkPipelineOptions {
   bool overwrite = false;  ///< writers replace files that exist
 };
 
-/// The filters of a pipeline; they live as long as it or whoever else holds them. Used by one thread at a time, as VTK's are.
+/// The filters of a pipeline; they live as long as it or whoever else holds them. Used by one thread at a time, as
+/// VTK's are.
 class VtkPipeline {
  public:
   /// Checks the whole pipeline (validate) and connects it. Reads, runs and writes nothing.
@@ -47,10 +49,11 @@ class VtkPipeline {
   /// Of a step's outputs that the file names: port -> writer.
   [[nodiscard]] const std::map<std::string, vtkSmartPointer<vtkOsteoWriter>>& writers(const std::string& id) const;
 
-  /// Brings a step up to date. Throws what went wrong, with the step in which it did: as the stage threw it, cancelled after
-  /// vtkAlgorithm::AbortExecuteOn(). VTK's own messages are not shown.
+  /// Brings a step up to date. Throws what went wrong, with the step in which it did: as the stage threw it, cancelled
+  /// after vtkAlgorithm::AbortExecuteOn(). VTK's own messages are not shown.
   void update(const std::string& id);
-  /// Brings all writers up to date, in the order of the steps. Errors: as of update(), and cannot_write; files finished before stay.
+  /// Brings all writers up to date, in the order of the steps. Errors: as of update(), and cannot_write; files finished
+  /// before stay.
   void write();
 
  private:
@@ -70,11 +73,13 @@ class VtkPipeline {
 };
 
 /// A pipeline file so; errors begin with file and line. `settings` as of parse_pipeline().
-[[nodiscard]] VtkPipeline load_vtk_pipeline(const std::filesystem::path& file, const std::map<std::string, std::string>& settings,
+[[nodiscard]] VtkPipeline load_vtk_pipeline(const std::filesystem::path& file,
+                                            const std::map<std::string, std::string>& settings,
                                             const Registry& registry, const VtkPipelineOptions& options = {});
 
-/// For run_pipeline(): VTK's executive runs the steps. What is written is the same to the byte. Meshes need about twice their memory, since
-/// VTK's objects stand beside ours while a step that reads them is still to come. `registry` must outlive what is returned.
+/// For run_pipeline(): VTK's executive runs the steps. What is written is the same to the byte. Meshes need about twice
+/// their memory, since VTK's objects stand beside ours while a step that reads them is still to come. `registry` must
+/// outlive what is returned.
 [[nodiscard]] MakeEngine vtk_engine(const Registry& registry);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -24,8 +24,9 @@ class vtkOsteoDataObject : public vtkDataObject {
 
   static vtkOsteoDataObject* GetData(vtkInformation* info);
 
-  /// Lets a value go along with an object of VTK that shows it, for what VTK's classes have no place for (names of structures) and so that
-  /// nothing is made again from them. It is of this very object as it is now: copies have none, and a change (vtkObject::Modified) ends it.
+  /// Lets a value go along with an object of VTK that shows it, for what VTK's classes have no place for (names of
+  /// structures) and so that nothing is made again from them. It is of this very object as it is now: copies have none,
+  /// and a change (vtkObject::Modified) ends it.
   static void Attach(vtkDataObject* object, osteo::Data value);
   /// The object's value; null when it has none, or was changed since. The object's own: good until it changes.
   static const osteo::Data* GetAttached(vtkDataObject* object);

@@ -1,7 +1,8 @@
 /// @class vtkOsteoReader
-/// A file of any kind that Osteotome reads (by its suffix) as a VTK source: vtkImageData, vtkPolyData, vtkUnstructuredGrid or, for grids,
-/// pictures and documents, vtkOsteoDataObject. The file is read when its kind must be known, so already in UpdateInformation(), and again
-/// only after Modified(), as by VTK's own readers. A failure sets the error code, is told by vtkErrorMacro and tried again.
+/// A file of any kind that Osteotome reads (by its suffix) as a VTK source: vtkImageData, vtkPolyData,
+/// vtkUnstructuredGrid or, for grids, pictures and documents, vtkOsteoDataObject. The file is read when its kind must
+/// be known, so already in UpdateInformation(), and again only after Modified(), as by VTK's own readers. A failure
+/// sets the error code, is told by vtkErrorMacro and tried again.
 #ifndef vtkOsteoReader_h
 #define vtkOsteoReader_h
 
@@ -33,7 +34,8 @@ class vtkOsteoReader : public vtkAlgorithm {
   std::exception_ptr TakeFailure() { return std::exchange(this->Failure, nullptr); }
 
   vtkMTimeType GetMTime() override;
-  vtkTypeBool ProcessRequest(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  vtkTypeBool ProcessRequest(vtkInformation* request, vtkInformationVector** inputs,
+                             vtkInformationVector* outputs) override;
 
  protected:
   vtkOsteoReader();

@@ -1,8 +1,9 @@
 /// @class vtkOsteoStage
-/// Any Osteotome stage as a VTK filter. Images, masks and surfaces are VTK's own data sets, without copies of voxels; sparse
-/// grids and pictures travel as vtkOsteoDataObject. Progress and abort are VTK's; a failure sets the error code, is told by
-/// vtkErrorMacro, and keeps the filter modified, so that the next Update() tries again. A stage that makes an image does its work in
-/// UpdateInformation(), since only then its extent is known; Update() hands over the same result.
+/// Any Osteotome stage as a VTK filter. Images, masks and surfaces are VTK's own data sets, without copies of voxels;
+/// sparse grids and pictures travel as vtkOsteoDataObject. Progress and abort are VTK's; a failure sets the error code,
+/// is told by vtkErrorMacro, and keeps the filter modified, so that the next Update() tries again. A stage that makes
+/// an image does its work in UpdateInformation(), since only then its extent is known; Update() hands over the same
+/// result.
 ///
 /// @code
 /// vtkNew<vtkOsteoStage> threshold;
@@ -47,8 +48,8 @@ class vtkOsteoStage : public vtkAlgorithm {
   void SetThreads(int threads);
   /// Of random choices; 1 when it was not set.
   void SetSeed(std::uint64_t seed);
-  /// A program's own surroundings in place of the above: threads, seed, progress, notes, report and cancellation are this context's, VTK's
-  /// progress events and abort are not used. Borrowed until the next call; null: back to VTK's.
+  /// A program's own surroundings in place of the above: threads, seed, progress, notes, report and cancellation are
+  /// this context's, VTK's progress events and abort are not used. Borrowed until the next call; null: back to VTK's.
   void SetContext(const osteo::Context* context) { this->Surroundings = context; }
 
   /// Index of the VTK port of a stage's input or output; -1 when there is none.
@@ -62,7 +63,8 @@ class vtkOsteoStage : public vtkAlgorithm {
   const osteo::Report& GetReport() const { return this->LastReport; }
 
   vtkMTimeType GetMTime() override;
-  vtkTypeBool ProcessRequest(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  vtkTypeBool ProcessRequest(vtkInformation* request, vtkInformationVector** inputs,
+                             vtkInformationVector* outputs) override;
 
  protected:
   vtkOsteoStage();

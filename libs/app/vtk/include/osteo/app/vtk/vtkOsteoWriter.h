@@ -1,8 +1,9 @@
 /// @class vtkOsteoWriter
-/// The end of a VTK pipeline: what comes in, from Osteotome or from VTK, is written to a file by its suffix, whole or not at all, and again
-/// only when it changed. Something that is there already is replaced only after SetOverwrite(true), except what this writer wrote itself
-/// and nobody changed since; of a folder with files that it has no record of, nothing is replaced at all. A failure sets the error code, is
-/// told by vtkErrorMacro and tried again. No record (FILE.prov.json) is written: `osteo run --engine vtk` does that.
+/// The end of a VTK pipeline: what comes in, from Osteotome or from VTK, is written to a file by its suffix, whole or
+/// not at all, and again only when it changed. Something that is there already is replaced only after
+/// SetOverwrite(true), except what this writer wrote itself and nobody changed since; of a folder with files that it
+/// has no record of, nothing is replaced at all. A failure sets the error code, is told by vtkErrorMacro and tried
+/// again. No record (FILE.prov.json) is written: `osteo run --engine vtk` does that.
 #ifndef vtkOsteoWriter_h
 #define vtkOsteoWriter_h
 
@@ -26,7 +27,8 @@ class vtkOsteoWriter : public vtkAlgorithm {
   /// What an image of bytes, which could be a scan or a label map, is written as. Other objects say it themselves.
   void SetKind(osteo::DataKind kind);
 
-  /// Brings what is before it up to date and writes; nothing when the file is as it should be. Returns whether all went well.
+  /// Brings what is before it up to date and writes; nothing when the file is as it should be. Returns whether all went
+  /// well.
   bool Write();
 
   const std::string& GetLastError() const { return this->LastError; }
@@ -34,7 +36,8 @@ class vtkOsteoWriter : public vtkAlgorithm {
   std::exception_ptr TakeFailure() { return std::exchange(this->Failure, nullptr); }
 
   vtkMTimeType GetMTime() override;
-  vtkTypeBool ProcessRequest(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  vtkTypeBool ProcessRequest(vtkInformation* request, vtkInformationVector** inputs,
+                             vtkInformationVector* outputs) override;
 
  protected:
   vtkOsteoWriter();

@@ -7,13 +7,14 @@
 
 namespace osteo::inline app {
 
-/// Plays one channel at 48 kHz on the system's default output (SDL 2: PipeWire, PulseAudio, ALSA; SDL_AUDIODRIVER chooses another).
+/// Plays one channel at 48 kHz on the system's default output (SDL 2: PipeWire, PulseAudio, ALSA; SDL_AUDIODRIVER
+/// chooses another).
 class AudioOut {
  public:
   static constexpr int kSamples = 256;  ///< asked for at a time: 5.3 ms; what the card keeps besides is the driver's
 
-  /// Begins to play. `fill` is called in a thread of the driver, for as many samples as it asks; it must not wait. Error(failed) where
-  /// there is no output, with the driver's reason.
+  /// Begins to play. `fill` is called in a thread of the driver, for as many samples as it asks; it must not wait.
+  /// Error(failed) where there is no output, with the driver's reason.
   explicit AudioOut(std::function<void(std::span<float>)> fill);
   /// `fill` is not called any more when this returns.
   ~AudioOut();
@@ -42,4 +43,4 @@ class AudioOut {
   unsigned device_ = 0;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -9,9 +9,10 @@
 
 namespace osteo::inline app {
 
-/// What was typed, as it was; nothing: the person closed the page, or `stop` said so. `state_file`: for tests, "code_page": true while it
-/// is shown; never what is typed.
-[[nodiscard]] std::optional<std::string> ask_for_code(WindowShell& shell, const std::string& host, const std::function<bool()>& stop,
+/// What was typed, as it was; nothing: the person closed the page, or `stop` said so. `state_file`: for tests,
+/// "code_page": true while it is shown; never what is typed.
+[[nodiscard]] std::optional<std::string> ask_for_code(WindowShell& shell, const std::string& host,
+                                                      const std::function<bool()>& stop,
                                                       const std::filesystem::path& state_file);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -22,12 +22,14 @@ struct ConsoleOptions {
   std::string server;                ///< as it was named
   std::filesystem::path state_file;  ///< as of the rehearsal's window
   bool sound = true;
-  std::function<std::shared_ptr<MonitorDesk>()> desk;  ///< of the monitor that is heard of; null: none yet. Another one: another monitor
+  std::function<std::shared_ptr<MonitorDesk>()>
+      desk;  ///< of the monitor that is heard of; null: none yet. Another one: another monitor
   std::function<ConsoleFacts()> facts;
   std::function<bool()> stop;  ///< asked before each picture
 };
 
-/// Until the person closes it (Q). F: freeze, M: mute, G: free run or by stimulus, S: stimulator, T: its threshold, F11: full screen.
+/// Until the person closes it (Q). F: freeze, M: mute, G: free run or by stimulus, S: stimulator, T: its threshold,
+/// F11: full screen.
 void run_console_window(WindowShell& shell, const ConsoleOptions& options);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// The window of 'osteo edit': three slices and the bone in 3D, tools, structures. GLFW, Dear ImGui and VTK in one OpenGL context.
+// The window of 'osteo edit': three slices and the bone in 3D, tools, structures. GLFW, Dear ImGui and VTK in one
+// OpenGL context.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -12,7 +13,8 @@ namespace osteo::inline app {
 struct EditWindowOptions {
   int width = 1360, height = 860;  ///< made smaller where the screen is
   std::string title;
-  std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
+  std::filesystem::path
+      state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };
 
 /// How a save ended.
@@ -31,9 +33,9 @@ struct EditWindowActions {
   std::function<bool()> stop;
 };
 
-/// Opens a window and runs until it is closed; asks before it closes with corrections that were not saved. Nothing of the scan is written
-/// anywhere. Returns the number of OpenGL errors seen (0 when all is well). Error(failed) when no window can be opened.
-/// Mouse and keys: docs/edit.md, and F1 in the window.
+/// Opens a window and runs until it is closed; asks before it closes with corrections that were not saved. Nothing of
+/// the scan is written anywhere. Returns the number of OpenGL errors seen (0 when all is well). Error(failed) when no
+/// window can be opened. Mouse and keys: docs/edit.md, and F1 in the window.
 int run_edit_window(EditDocument& document, const EditWindowOptions& options, const EditWindowActions& actions);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -11,7 +11,8 @@
 
 namespace osteo::inline app {
 
-/// What a button can be given to do. camera: the mouse or the device moves the camera; second_hand: the mouse moves the second hand.
+/// What a button can be given to do. camera: the mouse or the device moves the camera; second_hand: the mouse moves the
+/// second hand.
 enum class HandFunction : int {
   drill,
   clutch,
@@ -34,9 +35,9 @@ enum class HandFunction : int {
   straight
 };
 [[nodiscard]] constexpr std::array<std::string_view, 19> enum_names(HandFunction) {
-  return {
-      "drill",      "clutch",      "wrist_rest",   "second_hand", "camera", "suck",   "water", "undo",    "bring",   "lift",
-      "other_burr", "larger_burr", "smaller_burr", "tool_wheel",  "faster", "slower", "finer", "coarser", "straight"};
+  return {"drill",  "clutch", "wrist_rest", "second_hand", "camera",      "suck",         "water",
+          "undo",   "bring",  "lift",       "other_burr",  "larger_burr", "smaller_burr", "tool_wheel",
+          "faster", "slower", "finer",      "coarser",     "straight"};
 }
 
 /// A button is a number: a key as GLFW numbers keys (32 to 348), or one of these and its own number from 0.
@@ -58,8 +59,8 @@ inline constexpr int kPadRightTrigger = kPad + 16;
 /// One thing for each button; a thing may have several buttons, and is done while any of them is down.
 class HandButtons {
  public:
-  /// As they are until a person changes them: pedals drill, clutch, camera; the device's first button and the pad's right trigger drill; at
-  /// the mouse's side clutch and wrist rest.
+  /// As they are until a person changes them: pedals drill, clutch, camera; the device's first button and the pad's
+  /// right trigger drill; at the mouse's side clutch and wrist rest.
   [[nodiscard]] static HandButtons usual();
   [[nodiscard]] std::optional<HandFunction> function(int button) const;
   /// Returns what it did before.
@@ -75,4 +76,4 @@ class HandButtons {
   std::map<int, HandFunction> all_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

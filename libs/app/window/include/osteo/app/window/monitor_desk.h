@@ -21,8 +21,8 @@ struct RemoteStimulator {
   std::function<std::size_t()> hands;  ///< of the rehearsal there
 };
 
-/// Follows one rehearsal: events become notes of its session ("monitor"; settings of the stimulator as `osteo monitor` reads them). Or
-/// shows what is told of a monitor that runs somewhere else.
+/// Follows one rehearsal: events become notes of its session ("monitor"; settings of the stimulator as `osteo monitor`
+/// reads them). Or shows what is told of a monitor that runs somewhere else.
 class MonitorDesk {
  public:
   /// Before it starts; it must outlive this.
@@ -58,4 +58,4 @@ class MonitorDesk {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,17 +1,17 @@
-// What a person chose, kept between sessions: XDG_CONFIG_HOME/osteotome/settings.json (else ~/.config). Nothing of a patient but the paths
-// of cases that were opened, and those only while `remember_cases` is true.
+// What a person chose, kept between sessions: XDG_CONFIG_HOME/osteotome/settings.json (else ~/.config). Nothing of a
+// patient but the paths of cases that were opened, and those only while `remember_cases` is true.
 #pragma once
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "osteo/core/base/param.h"
 #include "osteo/app/window/hand_buttons.h"
+#include "osteo/core/base/param.h"
 
 namespace osteo {
 class JsonFile;
 struct JsonValue;
-}
+}  // namespace osteo
 
 namespace osteo::inline app {
 
@@ -48,14 +48,15 @@ struct PersonValues {
 class PersonSettings {
  public:
   static constexpr std::size_t kMostCases = 12;
-  /// Reads the file where there is one. Never throws: what is wrong with it is told in complaints(), and the rest is taken.
+  /// Reads the file where there is one. Never throws: what is wrong with it is told in complaints(), and the rest is
+  /// taken.
   explicit PersonSettings(std::filesystem::path file);
   /// Where this user's are; empty where neither XDG_CONFIG_HOME nor HOME is set.
   [[nodiscard]] static std::filesystem::path usual_file();
 
   PersonValues values;
-  /// What buttons, pedals and keys have been given to do; in the file as "buttons": {"pedal 1": "drill", "key F13": "nothing"}, where
-  /// "nothing" takes away what it usually does.
+  /// What buttons, pedals and keys have been given to do; in the file as "buttons": {"pedal 1": "drill", "key F13":
+  /// "nothing"}, where "nothing" takes away what it usually does.
   HandButtons buttons = HandButtons::usual();
   /// Absolute paths, the last opened first; only those that are to be remembered.
   [[nodiscard]] const std::vector<std::filesystem::path>& cases() const { return cases_; }
@@ -63,8 +64,8 @@ class PersonSettings {
   void forget_cases() { cases_.clear(); }
   /// For people, with file and line.
   [[nodiscard]] const std::vector<std::string>& complaints() const { return complaints_; }
-  /// Writes when something has changed since it was read; keys that it does not know stay as they are. A file that could not be read whole
-  /// is left alone. Empty, or why it was not written.
+  /// Writes when something has changed since it was read; keys that it does not know stay as they are. A file that
+  /// could not be read whole is left alone. Empty, or why it was not written.
   std::string save();
 
  private:
@@ -79,4 +80,4 @@ class PersonSettings {
   bool leave_alone_ = false;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -6,21 +6,21 @@
 #include <string>
 #include <vector>
 
-#include "osteo/core/base/error.h"
-#include "osteo/simulation/camera/stereo.h"
-#include "osteo/core/data/sparse_grid.h"
-#include "osteo/core/data/volume.h"
-#include "osteo/imaging/dicom/verdict.h"
-#include "osteo/session/scene/rehearsal.h"
-#include "osteo/session/recording/planned_cuts.h"
-#include "osteo/display/view/planned_regions.h"
-#include "osteo/display/view/quality.h"
 #include "osteo/app/window/monitor_desk.h"
 #include "osteo/app/window/person_settings.h"
 #include "osteo/app/window/session_review.h"
 #include "osteo/app/window/sound_out.h"
 #include "osteo/app/window/tutor_now.h"
 #include "osteo/app/window/window_shell.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/data/sparse_grid.h"
+#include "osteo/core/data/volume.h"
+#include "osteo/display/view/planned_regions.h"
+#include "osteo/display/view/quality.h"
+#include "osteo/imaging/dicom/verdict.h"
+#include "osteo/session/recording/planned_cuts.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/camera/stereo.h"
 
 namespace osteo::inline simulation {
 struct HandTuning;
@@ -36,18 +36,22 @@ struct WindowOptions {
   VerdictSummary scan;           ///< what the import found in the scan; status empty: unknown
   std::string approval;          ///< of the case, in words; empty: unknown
   bool approval_ended = false;   ///< by a later change: said in another colour
-  std::vector<SparseGrid> bone;  ///< density as the case has it, the finest first: cuts show what is missing of it; empty: they do not
-  std::optional<Image> ct;       ///< the scan of the case, for its cuts; none: they show what the case keeps of it
-  std::vector<PlannedRegion> regions;       ///< of a procedure, to be outlined; those of structures that the case lacks are told
+  std::vector<SparseGrid>
+      bone;  ///< density as the case has it, the finest first: cuts show what is missing of it; empty: they do not
+  std::optional<Image> ct;  ///< the scan of the case, for its cuts; none: they show what the case keeps of it
+  std::vector<PlannedRegion>
+      regions;  ///< of a procedure, to be outlined; those of structures that the case lacks are told
   std::vector<PlannedCut> planned_cuts;     ///< to choose from
   std::filesystem::path planned_cuts_file;  ///< that a cut kept as planned is added to
   std::vector<Vec3> way;                    ///< of a recorded hand that leads; drawn; empty: none does
   StereoParams stereo;
-  bool review_only = false;          ///< a session that is over is shown: the page at the end, and nothing that begins another
-  bool camera_trial = false;         ///< views to bring the camera to are shown and timed; camera-trial.csv in the session's folder
-  std::string case_hash;             ///< of the manifest: names the case in captions, without its folder
-  bool end_page = true;              ///< what was done is shown when the person ends the session; false: the window closes
-  std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
+  bool review_only = false;  ///< a session that is over is shown: the page at the end, and nothing that begins another
+  bool camera_trial =
+      false;  ///< views to bring the camera to are shown and timed; camera-trial.csv in the session's folder
+  std::string case_hash;  ///< of the manifest: names the case in captions, without its folder
+  bool end_page = true;   ///< what was done is shown when the person ends the session; false: the window closes
+  std::filesystem::path
+      state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };
 
 /// What a session that has ended came to.
@@ -90,32 +94,37 @@ struct CameraDevices {
 struct WindowActions {
   /// Ends the session that runs, closes its files; where none runs, does nothing.
   std::function<void()> save;
-  /// Starts a session: from the case's bone (true) or from where the last one ended (false). The hand waits beside the bone, as returned.
+  /// Starts a session: from the case's bone (true) or from where the last one ended (false). The hand waits beside the
+  /// bone, as returned.
   std::function<HandGoal(bool from_case, const HandView& view)> begin;
   /// The rehearsal that runs now; null where none does.
   std::function<Rehearsal*()> rehearsal;
-  /// Notes of the session that the first one goes on from, asked for once when that has begun; none: it goes on from none.
+  /// Notes of the session that the first one goes on from, asked for once when that has begun; none: it goes on from
+  /// none.
   std::function<std::vector<Note>()> notes_before;
   /// Folder for screenshots of the session that runs now, or ran last.
   std::function<std::filesystem::path()> folder;
   /// Why the session that runs has to end now (its recording has): the window saves it and says so.
   std::function<std::optional<Error>()> failure;
-  /// Each frame: what hardware says to the camera. `lend`: the drill's hand is to rest where it is, its device moves the camera. May be
-  /// empty.
+  /// Each frame: what hardware says to the camera. `lend`: the drill's hand is to rest where it is, its device moves
+  /// the camera. May be empty.
   std::function<CameraDevices(bool lend)> camera;
-  /// Each frame, of a hand that moves by itself: how it works on its tool, and what keys and buttons of the window press. May be empty.
+  /// Each frame, of a hand that moves by itself: how it works on its tool, and what keys and buttons of the window
+  /// press. May be empty.
   std::function<void(const HandTuning&)> tune;
-  /// Each frame: switches of a foot pedal that are down, as bits; nothing: there is no pedal. `attended`: the window has the keys; while it
-  /// has not, no switch is to press anything, and after that not before it has come up. May be empty.
+  /// Each frame: switches of a foot pedal that are down, as bits; nothing: there is no pedal. `attended`: the window
+  /// has the keys; while it has not, no switch is to press anything, and after that not before it has come up. May be
+  /// empty.
   std::function<std::optional<std::uint32_t>(bool attended)> switches;
   /// Asked before each picture: whether the window is to close.
   std::function<bool()> stop;
   /// Of the session that was saved last.
   std::function<SessionFacts()> facts = {};
-  /// The scene as the session that runs began with it; may take seconds, and is called in another thread. Empty: cannot be told.
+  /// The scene as the session that runs began with it; may take seconds, and is called in another thread. Empty: cannot
+  /// be told.
   std::function<World(const Context&)> world_at_begin = {};
-  /// Of the session that was saved last: what there is to say of it. May take seconds, and is called in another thread, in which no session
-  /// is begun meanwhile. Empty: nothing is shown.
+  /// Of the session that was saved last: what there is to say of it. May take seconds, and is called in another thread,
+  /// in which no session is begun meanwhile. Empty: nothing is shown.
   std::function<SessionReview(const Context&)> review = {};
   /// The nerve monitor of the rehearsal that runs; null: it has none. Empty: there never is one.
   std::function<MonitorDesk*()> monitor = {};
@@ -131,11 +140,12 @@ struct WindowEnd {
   std::optional<std::filesystem::path> dropped = {};  ///< which, when it was dropped onto the window
 };
 
-/// Begins a session in the window and runs until the person leaves it; the session that runs then is the caller's to save. What fails
-/// meanwhile is shown in the window, which offers to begin anew; what was not put right, or was lost, is thrown at the end. `person`: what
-/// is changed in the window is changed there. `sound`: turned on and off, louder and softer in the window; whoever runs the rehearsal tells
-/// it which to follow. Mouse and keys: docs/guide-surgeon.md, and F1 in the window.
-WindowEnd run_rehearsal_window(WindowShell& shell, PersonSettings& person, const WindowOptions& options, const SparseGrid* hu,
-                               const WindowActions& actions, SoundOut& sound);
+/// Begins a session in the window and runs until the person leaves it; the session that runs then is the caller's to
+/// save. What fails meanwhile is shown in the window, which offers to begin anew; what was not put right, or was lost,
+/// is thrown at the end. `person`: what is changed in the window is changed there. `sound`: turned on and off, louder
+/// and softer in the window; whoever runs the rehearsal tells it which to follow. Mouse and keys:
+/// docs/guide-surgeon.md, and F1 in the window.
+WindowEnd run_rehearsal_window(WindowShell& shell, PersonSettings& person, const WindowOptions& options,
+                               const SparseGrid* hu, const WindowActions& actions, SoundOut& sound);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,5 +1,5 @@
-// What the window shows of a session that is over: findings, its course over time, and the session itself as of any time. Plain values;
-// who makes them may take seconds and is called in another thread.
+// What the window shows of a session that is over: findings, its course over time, and the session itself as of any
+// time. Plain values; who makes them may take seconds and is called in another thread.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -50,4 +50,4 @@ struct SessionReview {
   std::shared_ptr<const StructureMap> structures;  ///< null where the case has none
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

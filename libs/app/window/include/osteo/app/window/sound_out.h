@@ -45,4 +45,4 @@ class SoundOut {
   std::unique_ptr<Playing> playing_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -23,13 +23,15 @@ struct StartOptions {
   std::function<bool()> stop;        ///< asked before each picture
 };
 
-/// What a path that was dropped stands for: a case, a session or a file that one is known by; else nothing, and `why` says what to do.
+/// What a path that was dropped stands for: a case, a session or a file that one is known by; else nothing, and `why`
+/// says what to do.
 [[nodiscard]] std::optional<StartChoice> choice_of(const std::filesystem::path& path, std::string& why);
 /// The same for several dropped at once: the first that is one counts; `why` is about the first.
 [[nodiscard]] std::optional<StartChoice> choice_of(const std::vector<std::filesystem::path>& paths, std::string& why);
 
-/// Runs until something is chosen; nothing: the person closes the window. Cases opened last come from `person`, whose choices on the page
-/// are changed there.
-[[nodiscard]] std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& person, const StartOptions& options);
+/// Runs until something is chosen; nothing: the person closes the window. Cases opened last come from `person`, whose
+/// choices on the page are changed there.
+[[nodiscard]] std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& person,
+                                                        const StartOptions& options);
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

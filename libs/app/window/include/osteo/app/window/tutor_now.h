@@ -1,4 +1,5 @@
-// What the window shows of who leads the hand, and of who takes part from elsewhere: plain values, asked for with each picture.
+// What the window shows of who leads the hand, and of who takes part from elsewhere: plain values, asked for with each
+// picture.
 #pragma once
 #include <string>
 #include <vector>
@@ -15,18 +16,19 @@ struct TutorNow {
     double behind_s = 0;   ///< of the session's ticks
     bool differs = false;  ///< its bone is another
   };
-  std::string title;       ///< empty: nobody teaches, and nothing is shown
-  std::string invitation;  ///< what others need to join: address and code; shown, and written nowhere. Empty: nobody can
-  std::string trouble;     ///< for people; empty: all well
+  std::string title;  ///< empty: nobody teaches, and nothing is shown
+  std::string
+      invitation;       ///< what others need to join: address and code; shown, and written nowhere. Empty: nobody can
+  std::string trouble;  ///< for people; empty: all well
   std::vector<Link> links;
-  std::vector<std::string>
-      hands;                 ///< names of the hands in the order they are shown, the own first; others are drawn in a colour of their own
-  bool ghosts = false;       ///< and these faintly: they are no hands of today
-  bool leads = false;        ///< the own hand may be led
-  bool guiding = false;      ///< and it is not switched off
-  double pull = 0;           ///< of that, now: 0 to 1
-  double apart_mm = -1;      ///< between the own hand and who leads it; negative: not known
-  bool begin_again = false;  ///< what is shown is worth nothing any more: another session, or another bone
+  std::vector<std::string> hands;  ///< names of the hands in the order they are shown, the own first; others are drawn
+                                   ///< in a colour of their own
+  bool ghosts = false;             ///< and these faintly: they are no hands of today
+  bool leads = false;              ///< the own hand may be led
+  bool guiding = false;            ///< and it is not switched off
+  double pull = 0;                 ///< of that, now: 0 to 1
+  double apart_mm = -1;            ///< between the own hand and who leads it; negative: not known
+  bool begin_again = false;        ///< what is shown is worth nothing any more: another session, or another bone
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -1,4 +1,5 @@
-// The one window of the surgeon's programs: start page, rehearsals and what is between them are shown in it one after another.
+// The one window of the surgeon's programs: start page, rehearsals and what is between them are shown in it one after
+// another.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -31,8 +32,8 @@ class WindowShell {
 
   [[nodiscard]] GLFWwindow* window() const { return window_; }
   void set_title(const std::string& title);
-  /// Keys as GLFW numbers them; released 0, pressed 1, repeated 2; shift 1, Ctrl 2, Alt 4 were down with it. Ctrl with + and - is the
-  /// shell's.
+  /// Keys as GLFW numbers them; released 0, pressed 1, repeated 2; shift 1, Ctrl 2, Alt 4 were down with it. Ctrl with
+  /// + and - is the shell's.
   std::function<void(int key, int action, int modifiers)> on_key;
   /// The window has the keys; before it has ever had them, too.
   [[nodiscard]] bool attended() const { return attended_; }
@@ -61,8 +62,8 @@ class WindowShell {
   [[nodiscard]] int gl_errors() const { return gl_errors_; }
   void count_gl_errors();
 
-  /// Does `work` in a thread of its own and meanwhile shows what is being done and how far it is, so that the window answers. Returns when
-  /// it has ended, throws what it threw. `work` gets a context whose progress is shown.
+  /// Does `work` in a thread of its own and meanwhile shows what is being done and how far it is, so that the window
+  /// answers. Returns when it has ended, throws what it threw. `work` gets a context whose progress is shown.
   void while_working(const std::string& words, const Context& context, const std::function<void(const Context&)>& work);
 
  private:
@@ -76,4 +77,4 @@ class WindowShell {
   std::vector<std::filesystem::path> dropped_;
 };
 
-}  // namespace osteo::app
+}  // namespace osteo::inline app

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "osteo/core/base/json_document.h"
 #include "osteo/assessment/evidence/score.h"
+#include "osteo/core/base/json_document.h"
 
 namespace osteo::inline assessment {
 
@@ -18,12 +18,12 @@ enum class FindingSeverity : int {
 };
 [[nodiscard]] std::string_view name_of(FindingSeverity severity);
 
-/// A sentence with the figures in it, and where they come from. Everything in it is in the score; nothing is judged that the score or the
-/// procedure does not judge, but for the limits of FindingLimits.
+/// A sentence with the figures in it, and where they come from. Everything in it is in the score; nothing is judged
+/// that the score or the procedure does not judge, but for the limits of FindingLimits.
 struct ScoreFinding {
-  std::string id;  ///< of small letters, digits and '-': what it is about; the same for the same in every session
-  std::string
-      kind;  ///< "injury", "touch", "clearance", "hidden", "force", "speed", "instrument", "region", "item", "water", "time", "lost"
+  std::string id;    ///< of small letters, digits and '-': what it is about; the same for the same in every session
+  std::string kind;  ///< "injury", "touch", "clearance", "hidden", "force", "speed", "instrument", "region", "item",
+                     ///< "water", "time", "lost"
   FindingSeverity severity = FindingSeverity::note;
   std::string text;    ///< one sentence: "31 mm³ of bone went unseen, 9 mm³ of it within 2 mm of the sigmoid sinus."
   std::string why;     ///< how it is known, or what it is held against: one more sentence, may be empty
@@ -41,12 +41,13 @@ struct ScoreFinding {
 
 /// Where the score alone says nothing of good or bad. Proposals, fitted to nothing.
 struct FindingLimits {
-  double seen_well = 0.95;        ///< share of removed bone seen: at least this is good
-  double hidden_near_mm3 = 1;     ///< unseen within 2 mm of a structure: from here on a caution
-  double near_miss_mm = 0.5;      ///< a burr's surface that came nearer to a structure than this
-  double above_band_share = 0.2;  ///< of drilling near a structure outside what 90 % of experts do: twice what chance gives
-  double idle_share = 0.3;        ///< of the session
-  double dry_share = 0.5;         ///< of drilling without water
+  double seen_well = 0.95;     ///< share of removed bone seen: at least this is good
+  double hidden_near_mm3 = 1;  ///< unseen within 2 mm of a structure: from here on a caution
+  double near_miss_mm = 0.5;   ///< a burr's surface that came nearer to a structure than this
+  double above_band_share =
+      0.2;                  ///< of drilling near a structure outside what 90 % of experts do: twice what chance gives
+  double idle_share = 0.3;  ///< of the session
+  double dry_share = 0.5;   ///< of drilling without water
 };
 
 struct Findings {
@@ -70,4 +71,4 @@ struct Findings {
 [[nodiscard]] std::string told_number(double value);
 [[nodiscard]] std::string told_seconds(double seconds);
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

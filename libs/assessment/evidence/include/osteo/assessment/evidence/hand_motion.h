@@ -145,4 +145,4 @@ class IdleClock {
   PerHand<Hand> hands_;
 };
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -42,8 +42,8 @@ struct HintRule {
   }
 };
 
-/// Strict: Error(usage) with file and line for a key that is not known or says nothing for its kind, two of one id, what is out of range,
-/// {structure} where none is known.
+/// Strict: Error(usage) with file and line for a key that is not known or says nothing for its kind, two of one id,
+/// what is out of range, {structure} where none is known.
 [[nodiscard]] std::vector<HintRule> parse_hints(std::string_view json, const std::string& name);
 /// Errors as above; no_input.
 [[nodiscard]] std::vector<HintRule> load_hints(const std::filesystem::path& file);
@@ -90,4 +90,4 @@ class HintWatch {
   TickRecord last_;
 };
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

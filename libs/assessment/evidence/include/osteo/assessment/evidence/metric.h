@@ -9,12 +9,12 @@
 #include <string_view>
 #include <vector>
 
-#include "osteo/simulation/bone/structure_map.h"
-#include "osteo/simulation/bone/world.h"
 #include "osteo/assessment/evidence/metric_table.h"
 #include "osteo/assessment/evidence/procedure.h"
-#include "osteo/simulation/haptics/stream.h"
 #include "osteo/session/recording/session_file.h"
+#include "osteo/simulation/bone/structure_map.h"
+#include "osteo/simulation/bone/world.h"
+#include "osteo/simulation/haptics/stream.h"
 
 namespace osteo::inline assessment {
 
@@ -26,18 +26,19 @@ struct CameraPose {
 /// Of all "camera" notes, by tick. One that cannot be read is counted in `unreadable`.
 [[nodiscard]] std::vector<CameraPose> camera_poses(std::span<const Note> notes, std::size_t& unreadable);
 
-/// At most a tenth of a second, as session files keep it: they have of each voxel only the last density in it. Frames begin where a tick's
-/// number is a multiple of a tenth of a second, at an action that parts changes (parts_changes), and behind gaps; so live and from a file
-/// they are the same.
+/// At most a tenth of a second, as session files keep it: they have of each voxel only the last density in it. Frames
+/// begin where a tick's number is a multiple of a tenth of a second, at an action that parts changes (parts_changes),
+/// and behind gaps; so live and from a file they are the same.
 struct EvidenceFrame {
   double rate_hz = 1000;
   std::span<const SceneAction> actions;  ///< in their order; done before the changes
   std::span<const TickRecord> ticks;     ///< of all hands
-  std::span<const VoxelChange> changes;  ///< by the burrs: ascending names, each once; `before` is the density as the frame began
-  std::span<const VoxelChange> sawn;     ///< by a saw at the frame's beginning; names as in `changes`
-  const World& world;                    ///< as the frame left it
-  const CameraPose* camera = nullptr;    ///< the last before the frame's end; null where nothing was noted
-  std::uint64_t lost_before = 0;         ///< ticks that are not known between the frame before and this one
+  std::span<const VoxelChange>
+      changes;  ///< by the burrs: ascending names, each once; `before` is the density as the frame began
+  std::span<const VoxelChange> sawn;   ///< by a saw at the frame's beginning; names as in `changes`
+  const World& world;                  ///< as the frame left it
+  const CameraPose* camera = nullptr;  ///< the last before the frame's end; null where nothing was noted
+  std::uint64_t lost_before = 0;       ///< ticks that are not known between the frame before and this one
 };
 
 [[nodiscard]] std::string_view name_of(Better better);
@@ -49,7 +50,9 @@ struct Measured {
   std::optional<double> value;
   std::string word;  ///< why there is no value; empty where there is
   [[nodiscard]] bool is(MetricName metric) const { return row->name == metric.row().name; }
-  [[nodiscard]] std::string name() const { return of.empty() ? std::string(row->name) : std::string(row->name) + "[" + of + "]"; }
+  [[nodiscard]] std::string name() const {
+    return of.empty() ? std::string(row->name) : std::string(row->name) + "[" + of + "]";
+  }
 };
 [[nodiscard]] Measured measured(MetricName name, double value, std::string of = {});
 [[nodiscard]] Measured not_measured(MetricName name, std::string why, std::string of = {});
@@ -82,4 +85,4 @@ class Metric {
   virtual void finish(const World& world, std::vector<Measured>& values, std::vector<Moment>& moments) = 0;
 };
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

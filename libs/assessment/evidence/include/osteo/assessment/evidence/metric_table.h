@@ -123,7 +123,8 @@ inline constexpr MetricRow kRows[] = {
      "how long, by whichever hand"},
     {"injured_s", "s", kDown, "structures", MetricPlace::near, MetricWhen::structures, kProcess,
      "how long while it turned"},
-    {"cut_mm3", "mm3", kDown, "structures", MetricPlace::saw, MetricWhen::some, kOurs, "of it, in the path of cuts by a plane"},
+    {"cut_mm3", "mm3", kDown, "structures", MetricPlace::saw, MetricWhen::some, kOurs,
+     "of it, in the path of cuts by a plane"},
     {"saw_clearance_mm", "mm", kUp, "structures", MetricPlace::saw, MetricWhen::some, kOurs,
      "least distance of a cut by a plane, where it is below 5 mm and none went through it"},
     {"near_s", "s", kNone, "structures", MetricPlace::near, MetricWhen::structures, kProcess,
@@ -201,4 +202,4 @@ class MetricName {
   return metric_table_detail::kRows;
 }
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -22,7 +22,8 @@ enum class ProcedureRole : int {
   return {"expose", "keep", "thin", "never_touch", "enter"};
 }
 
-/// What an item of the scale asks of the end product. What each computes: docs/evidence.md, and the fields of ScaleItem.
+/// What an item of the scale asks of the end product. What each computes: docs/evidence.md, and the fields of
+/// ScaleItem.
 enum class ItemKind : int {
   exposed,
   not_violated,
@@ -37,9 +38,8 @@ enum class ItemKind : int {
   fixed
 };
 [[nodiscard]] constexpr std::array<std::string_view, 11> enum_names(ItemKind) {
-  return {"exposed",     "not_violated", "no_hole",     "no_cells_left",
-                                                           "no_overhang", "thinned",      "sharp_angle", "followed",
-                                                           "margin",      "pieces",       "fixed"};
+  return {"exposed",     "not_violated", "no_hole", "no_cells_left", "no_overhang", "thinned",
+          "sharp_angle", "followed",     "margin",  "pieces",        "fixed"};
 }
 
 struct ProcedureStructure {
@@ -118,12 +118,17 @@ struct ScaleItem {
     visit({"structure", "of what"}, p.structure);
     visit({"second", "sharp_angle: the other plate"}, p.second);
     visit({"cells", "no_cells_left: the structure that is cells"}, p.cells);
-    visit({"towards", "only the part of its face that looks this way, LPS (0,0,0: all of it)", "", -1e4, 1e4}, p.towards);
+    visit({"towards", "only the part of its face that looks this way, LPS (0,0,0: all of it)", "", -1e4, 1e4},
+          p.towards);
     visit({"within_deg", "and at most so far off", "deg", 1, 180}, p.within_deg);
     visit({"within_mm", "how far around the structure one looks", "mm", 0.5, 8}, p.within_mm);
     visit({"cover_mm", "what still counts as shown: bone between it and the cavity", "mm", 0, 8}, p.cover_mm);
-    visit({"threshold", "the item's value has to reach it, or stay below it; see docs/evidence.md for each kind", "", 0, 1e6}, p.threshold);
-    visit({"most", "thinned: 90 % of the wall is at most so thick; margin: not beyond; pieces: at most so many", "", 0, 1e6}, p.most);
+    visit({"threshold", "the item's value has to reach it, or stay below it; see docs/evidence.md for each kind", "", 0,
+           1e6},
+          p.threshold);
+    visit({"most", "thinned: 90 % of the wall is at most so thick; margin: not beyond; pieces: at most so many", "", 0,
+           1e6},
+          p.most);
     visit({"spread", "of the value among good results: the unit of the margin", "", 1e-6, 1e6}, p.spread);
   }
 };
@@ -147,8 +152,8 @@ struct Procedure {
   [[nodiscard]] const ProcedureStructure* find(std::string_view structure) const;
 };
 
-/// `name` as errors call it. Strict: Error(usage) with file, item and line for a key that is not known or says nothing for its kind, a
-/// structure or an item that is not declared, two of one name, what is out of range.
+/// `name` as errors call it. Strict: Error(usage) with file, item and line for a key that is not known or says nothing
+/// for its kind, a structure or an item that is not declared, two of one name, what is out of range.
 [[nodiscard]] Procedure parse_procedure(std::string_view json, const std::string& name);
 /// Errors as above; no_input.
 [[nodiscard]] Procedure load_procedure(const std::filesystem::path& file);
@@ -158,4 +163,4 @@ struct Procedure {
 [[nodiscard]] double usual_threshold(ItemKind kind);
 [[nodiscard]] double usual_spread(ItemKind kind);
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -12,8 +12,8 @@ namespace osteo::inline assessment {
 /// A burr drills when it turns faster than this and presses on bone.
 inline constexpr double kTurnsRpm = 1000;
 
-/// Time, path, strokes, force, work, instruments, suction and water, camera. Of the hands that hold a burr each counts; path and strokes
-/// are those of the first.
+/// Time, path, strokes, force, work, instruments, suction and water, camera. Of the hands that hold a burr each counts;
+/// path and strokes are those of the first.
 class ProcessMetric final : public Metric {
  public:
   explicit ProcessMetric(const EvidenceScene& scene) : scene_(scene), idle_(scene.rate_hz), path_(scene.rate_hz) {}
@@ -45,8 +45,8 @@ class ProcessMetric final : public Metric {
   Moment peak_;
 };
 
-/// What the burr did near each structure: distance, touch, injury, time and volume near it, rules of the procedure. Structures go with the
-/// first body. Distances are those of the burr's surface where it is shown.
+/// What the burr did near each structure: distance, touch, injury, time and volume near it, rules of the procedure.
+/// Structures go with the first body. Distances are those of the burr's surface where it is shown.
 class NearMetric final : public Metric {
  public:
   explicit NearMetric(const EvidenceScene& scene);
@@ -76,7 +76,7 @@ class NearMetric final : public Metric {
     std::uint64_t touches = 0;
     std::uint64_t touched = 0, injured = 0;              // ticks in which any hand does
     std::uint64_t touched_until = 0, injured_until = 0;  // behind the last of them
-    std::array<std::uint64_t, kBandsMm.size()> near{};  // ticks of drilling within each band
+    std::array<std::uint64_t, kBandsMm.size()> near{};   // ticks of drilling within each band
     std::array<double, kBandsMm.size()> near_mm3{};
     bool touched_first = false;
   };
@@ -107,4 +107,4 @@ class NearMetric final : public Metric {
   std::optional<StepClock> steps_;
 };
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "osteo/assessment/evidence/procedure.h"
 #include "osteo/core/base/context.h"
 #include "osteo/simulation/bone/structure_map.h"
 #include "osteo/simulation/bone/world.h"
-#include "osteo/assessment/evidence/procedure.h"
 
 namespace osteo::inline assessment {
 
@@ -19,22 +19,23 @@ struct RemovedVoxel {
   float mm3 = 0;
 };
 
-/// Bone before and after on one lattice, in the frame of the first body, with all pieces where they lay at the beginning. All distances in
-/// mm. The lattice: cubes of the bone's voxel, of 0.5 mm where that is larger, around all that was removed and all structures named, with
-/// 5 mm around; more than kMostCells cubes make it coarser, which it says (`word`).
-/// Solid: density of at least a half, between voxels linear. Structures but those to be opened are solid too: a cavity ends at them.
-/// Cavity: what a ball of kBallMm reaches from the lattice's faces through bone that is gone, and on through spaces that were closed (those
-/// to be opened, and all that nothing else led to).
+/// Bone before and after on one lattice, in the frame of the first body, with all pieces where they lay at the
+/// beginning. All distances in mm. The lattice: cubes of the bone's voxel, of 0.5 mm where that is larger, around all
+/// that was removed and all structures named, with 5 mm around; more than kMostCells cubes make it coarser, which it
+/// says (`word`). Solid: density of at least a half, between voxels linear. Structures but those to be opened are solid
+/// too: a cavity ends at them. Cavity: what a ball of kBallMm reaches from the lattice's faces through bone that is
+/// gone, and on through spaces that were closed (those to be opened, and all that nothing else led to).
 class Product {
  public:
-  /// A margin nearer to 0 than this is a draw: on a lattice laid otherwise the item may come out the other way. An item whose places would
-  /// have to be off by no more than the lattice can be (0.7 of a cube, docs/evidence.md) for that has such a margin, and says so.
+  /// A margin nearer to 0 than this is a draw: on a lattice laid otherwise the item may come out the other way. An item
+  /// whose places would have to be off by no more than the lattice can be (0.7 of a cube, docs/evidence.md) for that
+  /// has such a margin, and says so.
   static constexpr double kDraw = 0.2;
   static constexpr double kBallMm = 0.5, kOpenedMm = 2, kAroundMm = 5, kCoarsestMm = 0.5;
   static constexpr std::size_t kMostCells = 24'000'000;
 
-  /// All but `removed` must outlive this. O(cells): a few bits each; distances to the cavity only where an item of the procedure asks for
-  /// them.
+  /// All but `removed` must outlive this. O(cells): a few bits each; distances to the cavity only where an item of the
+  /// procedure asks for them.
   Product(const World& before, const World& after, const StructureMap& structures, const Procedure& procedure,
           std::vector<RemovedVoxel> removed, const Context& context = {});
   ~Product();
@@ -45,9 +46,10 @@ class Product {
     const ScaleItem* item = nullptr;
     bool measured = false, pass = false;
     double value = 0, threshold = 0;
-    double margin = 0;               ///< (value - threshold) / spread, positive where it passes
-    std::string unit, word;          ///< why it was not measured, or what else is to be said
-    std::vector<Vec3> evidence_mm;   ///< the places that prove it: bare, left, hidden, violated, ... by kind; at most 20000
+    double margin = 0;       ///< (value - threshold) / spread, positive where it passes
+    std::string unit, word;  ///< why it was not measured, or what else is to be said
+    std::vector<Vec3>
+        evidence_mm;  ///< the places that prove it: bare, left, hidden, violated, ... by kind; at most 20000
     std::size_t evidence_count = 0;  ///< of all
     double evidence_each = 0;        ///< mm2 or mm3 that one place stands for
   };
@@ -115,4 +117,4 @@ class Product {
   std::string word_;
 };
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -3,8 +3,8 @@
 #include <map>
 #include <vector>
 
-#include "osteo/simulation/bone/structure_cut.h"
 #include "osteo/assessment/evidence/metric.h"
+#include "osteo/simulation/bone/structure_cut.h"
 
 namespace osteo::inline assessment {
 
@@ -27,4 +27,4 @@ class SawCutMetric final : public Metric {
   std::vector<Moment> moments_;
 };
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

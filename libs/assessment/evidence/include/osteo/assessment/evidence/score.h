@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "osteo/core/base/json_document.h"
 #include "osteo/assessment/evidence/frames.h"
 #include "osteo/assessment/evidence/metric.h"
 #include "osteo/assessment/evidence/process.h"
@@ -14,6 +13,7 @@
 #include "osteo/assessment/evidence/reference.h"
 #include "osteo/assessment/evidence/saw_cuts.h"
 #include "osteo/assessment/evidence/visibility.h"
+#include "osteo/core/base/json_document.h"
 
 namespace osteo::inline assessment {
 
@@ -84,12 +84,13 @@ struct ScoreDetail {
   std::optional<World> end;
 };
 
-/// All of it. `procedure` may be null; `structures` may be null; `subject`: sessions of the reference by this one are left out (as is one
-/// that removed exactly the same voxels). Errors: corrupt (another bone), usage (a procedure that needs structures which the case does not
-/// have: says which; unless none of its structures is there, that is the procedure of another case).
-[[nodiscard]] Score score_session(const SessionReader& session, World begin, const StructureMap* structures, const Procedure* procedure,
-                                  const Reference* reference, const std::string& subject, const Context& context = {},
-                                  ScoreDetail* detail = nullptr);
+/// All of it. `procedure` may be null; `structures` may be null; `subject`: sessions of the reference by this one are
+/// left out (as is one that removed exactly the same voxels). Errors: corrupt (another bone), usage (a procedure that
+/// needs structures which the case does not have: says which; unless none of its structures is there, that is the
+/// procedure of another case).
+[[nodiscard]] Score score_session(const SessionReader& session, World begin, const StructureMap* structures,
+                                  const Procedure* procedure, const Reference* reference, const std::string& subject,
+                                  const Context& context = {}, ScoreDetail* detail = nullptr);
 /// A session of a reference, read. The bone has to be the same.
 [[nodiscard]] Reference::One read_reference(const SessionReader& session, World begin, const StructureMap* structures,
                                             const ReferenceSession& which, const Context& context = {});
@@ -103,4 +104,4 @@ struct ScoreDetail {
 /// All metrics with unit, direction, needs, source: docs/evidence.md has this table.
 [[nodiscard]] std::string metric_table_markdown();
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "osteo/core/base/json_document.h"
 #include "osteo/assessment/evidence/hand_motion.h"
 #include "osteo/assessment/evidence/metric.h"
 #include "osteo/assessment/evidence/visibility.h"
+#include "osteo/core/base/json_document.h"
 #include "osteo/session/recording/session_reader.h"
 
 namespace osteo::inline assessment {
@@ -44,16 +44,18 @@ struct Timeline {
   static constexpr double kRateHz = 10;
   static constexpr std::size_t kMostEvents = 20'000;
 
-  std::vector<std::uint8_t> known;      ///< 1: recorded at least in part
-  std::vector<std::uint8_t> drilling;   ///< 1: a burr turns and presses on bone at some tick of it
-  std::vector<float> force_n;           ///< of burrs on bone, the most
-  std::vector<float> speed_mm_s;        ///< of the first hand's tip, HandMotion's: mean of those known
-  std::vector<float> distance_mm;       ///< burr's surface to the nearest structure, the least; NaN where none is within reach
+  std::vector<std::uint8_t> known;     ///< 1: recorded at least in part
+  std::vector<std::uint8_t> drilling;  ///< 1: a burr turns and presses on bone at some tick of it
+  std::vector<float> force_n;          ///< of burrs on bone, the most
+  std::vector<float> speed_mm_s;       ///< of the first hand's tip, HandMotion's: mean of those known
+  std::vector<float>
+      distance_mm;  ///< burr's surface to the nearest structure, the least; NaN where none is within reach
   std::vector<std::uint8_t> structure;  ///< which that is: its value in the label map; 0: none
   std::vector<float> removed_mm3;       ///< by burrs in this sample, what was taken back later too
-  std::vector<float> seen_mm3, hidden_mm3, unknown_mm3;  ///< of what is gone at the end, whole voxels, at the time each went
-  std::vector<std::uint8_t> tool;                        ///< the first hand's, index in instrument_library(); kPlate: it holds a plate
-  std::vector<std::array<float, 3>> at_mm;               ///< the first hand's tip, in the world
+  std::vector<float> seen_mm3, hidden_mm3,
+      unknown_mm3;                 ///< of what is gone at the end, whole voxels, at the time each went
+  std::vector<std::uint8_t> tool;  ///< the first hand's, index in instrument_library(); kPlate: it holds a plate
+  std::vector<std::array<float, 3>> at_mm;  ///< the first hand's tip, in the world
   static constexpr std::uint8_t kPlate = 255;
 
   std::vector<TimelineEvent> events;  ///< by time
@@ -64,11 +66,12 @@ struct Timeline {
   [[nodiscard]] double duration_s() const { return static_cast<double>(size()) / kRateHz; }
 };
 
-/// Takes in frames in their order, live or from a file. 60 bytes a sample: 2 MB an hour. Cost: one StructureMap::clearance() for each tick
-/// with a burr, 0.1 to 1 us.
+/// Takes in frames in their order, live or from a file. 60 bytes a sample: 2 MB an hour. Cost: one
+/// StructureMap::clearance() for each tick with a burr, 0.1 to 1 us.
 class TimelineKeeper {
  public:
-  /// What the scene refers to must outlive this. Structures that the procedure wants opened are no danger: they are left out.
+  /// What the scene refers to must outlive this. Structures that the procedure wants opened are no danger: they are
+  /// left out.
   explicit TimelineKeeper(const EvidenceScene& scene);
   void frame(const EvidenceFrame& frame);
   /// In any order. "camera" notes are no events.
@@ -98,11 +101,12 @@ class TimelineKeeper {
   HandMotion motion_;                        // of the first hand
   std::vector<std::uint32_t> speeds_known_;  // by sample: ticks whose speed is in it
   int last_tool_ = -1;
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> last_slow_;  // kind and number of what is moved or opened -> event
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t>
+      last_slow_;  // kind and number of what is moved or opened -> event
 };
 
-/// Of a session file, streamed: notes, gaps, frames and what was seen; a pass more than score_session makes, which can keep one on the way
-/// (ScoreDetail). Errors: as tell_frames.
+/// Of a session file, streamed: notes, gaps, frames and what was seen; a pass more than score_session makes, which can
+/// keep one on the way (ScoreDetail). Errors: as tell_frames.
 [[nodiscard]] Timeline read_timeline(const SessionReader& session, World begin, const StructureMap* structures,
                                      const Procedure* procedure = nullptr, const Context& context = {});
 /// Tells a keeper what is in a session besides its frames.
@@ -111,4 +115,4 @@ void tell_notes(const SessionReader& session, TimelineKeeper& keeper);
 /// "osteotome_timeline": 1, rate, arrays (four digits that count, null where not known) and events.
 [[nodiscard]] Json timeline_json(const Timeline& timeline);
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

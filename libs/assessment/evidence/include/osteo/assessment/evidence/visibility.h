@@ -7,10 +7,10 @@
 
 namespace osteo::inline assessment {
 
-/// Whether the straight line between two points of the world meets a voxel of bone (density of at least a half), in any body. Every voxel
-/// that the open segment enters is looked at, one after the other (Amanatides and Woo 1987), whole bricks that are not stored at once.
-/// `left_out`, where not empty, says which voxels do not count: called for those of bone only. Cost: 10 to 20 ns a voxel passed, so 1 to 5
-/// us through a head in voxels of 0.5 mm.
+/// Whether the straight line between two points of the world meets a voxel of bone (density of at least a half), in any
+/// body. Every voxel that the open segment enters is looked at, one after the other (Amanatides and Woo 1987), whole
+/// bricks that are not stored at once. `left_out`, where not empty, says which voxels do not count: called for those of
+/// bone only. Cost: 10 to 20 ns a voxel passed, so 1 to 5 us through a head in voxels of 0.5 mm.
 class BoneSight {
  public:
   using LeftOut = std::function<bool(const PlacedBody& body, VoxelKey own)>;
@@ -27,10 +27,10 @@ class BoneSight {
   const World& world_;
 };
 
-/// A voxel counts as removed in the frame in which its density falls below a half, and as seen when from its centre the camera's eye of
-/// that frame can be seen past all bone but what was in touch with a burr then: what the frame itself removed, and voxels whose centres
-/// lie within a voxel's diagonal of a burr's head in a tick of the frame in which it removed bone. Of what is taken back by undo nothing is
-/// kept; what is removed again counts as it went the last time.
+/// A voxel counts as removed in the frame in which its density falls below a half, and as seen when from its centre the
+/// camera's eye of that frame can be seen past all bone but what was in touch with a burr then: what the frame itself
+/// removed, and voxels whose centres lie within a voxel's diagonal of a burr's head in a tick of the frame in which it
+/// removed bone. Of what is taken back by undo nothing is kept; what is removed again counts as it went the last time.
 class VisibilityMetric final : public Metric {
  public:
   enum class Seen : std::uint8_t { seen, hidden, unknown };
@@ -57,4 +57,4 @@ inline constexpr double kNearMm = 2;
 /// Bone: density of at least this.
 inline constexpr float kSolid = 0.5F;
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -1,5 +1,5 @@
-// A participant at the device: which page is shown, runs in the servo's thread, trials saved as they end. What the window shows and does,
-// without the window.
+// A participant at the device: which page is shown, runs in the servo's thread, trials saved as they end. What the
+// window shows and does, without the window.
 #pragma once
 #include <atomic>
 #include <filesystem>
@@ -18,8 +18,8 @@ enum class DeskPage : int { before_training, training, feedback, before_test, te
 class ForceSkillDesk {
  public:
   /// Goes on at the first trial that is not finished. Error as read_trials.
-  ForceSkillDesk(std::filesystem::path experiment, Protocol protocol, std::size_t participant, bool retention, Mover mover,
-                 std::string device, const DeviceTraits& traits);
+  ForceSkillDesk(std::filesystem::path experiment, Protocol protocol, std::size_t participant, bool retention,
+                 Mover mover, std::string device, const DeviceTraits& traits);
 
   /// The force for the hand. No allocation, no wait; nothing where no run is under way.
   Vec3 step(const DeviceSample& sample) noexcept;
@@ -66,4 +66,4 @@ class ForceSkillDesk {
   Seqlock<TaskView> view_;
 };
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

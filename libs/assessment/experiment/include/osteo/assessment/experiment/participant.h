@@ -9,23 +9,24 @@
 
 namespace osteo::inline assessment::experiment {
 
-/// Of people in general. Noise of memory: standard deviation of what is recalled, in share of the stimulus' mean force, after the first
-/// training; guesses, chosen so that the order of the dissertation's figure 28 is put in. Noise of force: L. Jones 2000 (10.5 % by feel
-/// alone, 6 % with sight of it).
+/// Of people in general. Noise of memory: standard deviation of what is recalled, in share of the stimulus' mean force,
+/// after the first training; guesses, chosen so that the order of the dissertation's figure 28 is put in. Noise of
+/// force: L. Jones 2000 (10.5 % by feel alone, 6 % with sight of it).
 struct ParticipantModel {
   std::array<double, kTrainings> memory{0.44, 0.38, 0.32};  ///< H, V, V+H
-  double timing_s = 0.25;                                   ///< standard deviation of when a moment of the pattern is recalled
-  double learning = 0.85;                                   ///< of both, with each repetition
-  double person = 0.15;                                     ///< how people differ in both: standard deviation of the logarithm
-  double person_by_training = 0.1;                          ///< and how what suits them differs, likewise
-  double force_blind = 0.105, force_seen = 0.06;            ///< of the force pressed
+  double timing_s = 0.25;                         ///< standard deviation of when a moment of the pattern is recalled
+  double learning = 0.85;                         ///< of both, with each repetition
+  double person = 0.15;                           ///< how people differ in both: standard deviation of the logarithm
+  double person_by_training = 0.1;                ///< and how what suits them differs, likewise
+  double force_blind = 0.105, force_seen = 0.06;  ///< of the force pressed
   double reaction_s = 0.2;
   double most_n = 40;  ///< a person's own limit
 };
 /// Nothing put in: all trainings alike.
 [[nodiscard]] ParticipantModel null_model();
 
-/// One of them. Presses down on a simulated device (mass and damping of arm and hand) that the task pulls. Not a thread's.
+/// One of them. Presses down on a simulated device (mass and damping of arm and hand) that the task pulls. Not a
+/// thread's.
 class SimulatedParticipant {
  public:
   SimulatedParticipant(const ParticipantModel& model, std::uint64_t seed);
@@ -58,4 +59,4 @@ class SimulatedParticipant {
   std::vector<double> plan_n_;
 };
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

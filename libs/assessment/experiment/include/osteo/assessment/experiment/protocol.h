@@ -1,11 +1,12 @@
-// An experiment as a folder of plain files: protocol.json, and a folder for each participant with a session and a score for each trial.
+// An experiment as a folder of plain files: protocol.json, and a folder for each participant with a session and a score
+// for each trial.
 #pragma once
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "osteo/core/base/param.h"
 #include "osteo/assessment/experiment/stimulus.h"
+#include "osteo/core/base/param.h"
 
 namespace osteo::inline assessment::experiment {
 
@@ -27,9 +28,9 @@ struct Protocol {
   using Params = Protocol;
   std::string title = "Force-skill training";
   std::vector<std::string> participants;  ///< codes: letters, digits, '-', each once
-  int trials = 72;                        ///< of each participant: blocks times repetitions, all trainings equally often
-  int repetitions = 3;                    ///< of a block: the same stimulus, the same training
-  int break_after = 36;                   ///< trials; 0: none
+  int trials = 72;       ///< of each participant: blocks times repetitions, all trainings equally often
+  int repetitions = 3;   ///< of a block: the same stimulus, the same training
+  int break_after = 36;  ///< trials; 0: none
   double break_min = 10;
   int seed = 1;
   double device_n = 8;  ///< what the device can hold for the length of a trial
@@ -50,7 +51,8 @@ struct Protocol {
     visit({"seed", "of stimuli and orders", "", 0, 1e9}, p.seed);
     visit({"device_n", "force that the device can hold", "N", 0.5, 50}, p.device_n);
     visit({"peak_n", "force that it gives for a moment, where it is saturated", "N", 0.5, 60}, p.peak_n);
-    visit({"scale", "make forces smaller to what the device can hold; else as printed, and saturation is marked"}, p.scale);
+    visit({"scale", "make forces smaller to what the device can hold; else as printed, and saturation is marked"},
+          p.scale);
     visit({"rate_hz", "of the servo and of the recording", "Hz", 100, 5000}, p.rate_hz);
     visit({"feedback", "of the own force: while it is pressed, or behind the run"}, p.feedback);
     visit({"amplification", "of the error as it is shown (1: as it is)", "", 0, 10}, p.amplification);
@@ -76,8 +78,9 @@ void check(const Protocol& protocol);
 /// Error(cannot_write) where the folder holds one already.
 void write_protocol(const std::filesystem::path& folder, const Protocol& protocol);
 
-/// What a participant does, in order. Three blocks in a row have all trainings; over six participants each of the six orders stands at each
-/// place once, and every stimulus is learned under each training by two of them. Depends on seed and place in the list alone.
+/// What a participant does, in order. Three blocks in a row have all trainings; over six participants each of the six
+/// orders stands at each place once, and every stimulus is learned under each training by two of them. Depends on seed
+/// and place in the list alone.
 [[nodiscard]] std::vector<Trial> trials_of(const Protocol& protocol, std::size_t participant);
 /// The stimuli again, once each and without aid: what is left on another day.
 [[nodiscard]] std::vector<Trial> retention_of(const Protocol& protocol, std::size_t participant);
@@ -85,4 +88,4 @@ void write_protocol(const std::filesystem::path& folder, const Protocol& protoco
 /// Error(usage) names those there are.
 [[nodiscard]] std::size_t participant_number(const Protocol& protocol, const std::string& code);
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

@@ -6,7 +6,8 @@
 
 namespace osteo::inline assessment::experiment {
 
-/// The dissertation's constants. x: to the right, y: up, z: towards the person; the path lies in y = 0, the force is pressed downwards.
+/// The dissertation's constants. x: to the right, y: up, z: towards the person; the path lies in y = 0, the force is
+/// pressed downwards.
 struct StimulusParams {
   double length_mm = 100, width_mm = 60;  ///< of the path, in x and z
   double speed_mm_s = 16;                 ///< along the path
@@ -19,7 +20,8 @@ struct StimulusParams {
   int bumps = 3;          ///< parabolas; number and width are not printed
   double bump_s = 0.6;    ///< half width
   double ramp_s = 1;      ///< at both ends
-  /// What the device can hold, in N. Forces are made smaller so that `bump_n` is just that; else what is above it is saturated.
+  /// What the device can hold, in N. Forces are made smaller so that `bump_n` is just that; else what is above it is
+  /// saturated.
   double device_n = 8;
   bool scale = true;
 };
@@ -48,4 +50,4 @@ struct Stimulus {
 /// The same with the constants that it was made by.
 [[nodiscard]] std::string stimulus_json(const Stimulus& stimulus, double rate_hz = 100);
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

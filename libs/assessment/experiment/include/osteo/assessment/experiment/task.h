@@ -11,8 +11,8 @@
 
 namespace osteo::inline assessment::experiment {
 
-/// As printed (its damping in N/mm lacks the second). What the device cannot bear is made smaller: springs by safe_stiffness_n_per_mm,
-/// dampers to half of what a mass moves by in a tick, since the velocity comes a tick late.
+/// As printed (its damping in N/mm lacks the second). What the device cannot bear is made smaller: springs by
+/// safe_stiffness_n_per_mm, dampers to half of what a mass moves by in a tick, since the velocity comes a tick late.
 struct TaskGains {
   double path_n_per_mm = 0.9, path_n_s_per_mm = 0.1;
   double plane_n_per_mm = 2.0, plane_n_s_per_mm = 0.3;
@@ -37,10 +37,10 @@ struct TaskView {
 class ForceTask {
  public:
   /// `stimulus` must outlive it. `lead_s`: time in which the hand is brought from where it is to the path's beginning.
-  ForceTask(const Stimulus& stimulus, const Trial& trial, RunKind kind, const TaskGains& gains, const DeviceTraits& device, double limit_n,
-            double lead_s = 1);
-  /// The force of this tick on the hand and what is recorded. depth_mm: below the plane; normal_force_n: the force that the hand is taken
-  /// to apply downwards; flags: kForceCapped where the device was at its limit.
+  ForceTask(const Stimulus& stimulus, const Trial& trial, RunKind kind, const TaskGains& gains,
+            const DeviceTraits& device, double limit_n, double lead_s = 1);
+  /// The force of this tick on the hand and what is recorded. depth_mm: below the plane; normal_force_n: the force that
+  /// the hand is taken to apply downwards; flags: kForceCapped where the device was at its limit.
   TickRecord step(std::uint64_t tick, const DeviceSample& sample) noexcept;
   [[nodiscard]] bool done() const { return view_.done; }
   [[nodiscard]] const TaskView& view() const { return view_; }
@@ -65,4 +65,4 @@ class ForceTask {
 /// No passivity control: the path pulls by itself, so it is meant to put energy in.
 [[nodiscard]] GuardParams task_guard(double limit_n);
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

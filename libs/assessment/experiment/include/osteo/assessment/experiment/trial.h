@@ -5,13 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "osteo/core/base/context.h"
 #include "osteo/assessment/experiment/participant.h"
 #include "osteo/assessment/experiment/recall.h"
+#include "osteo/core/base/context.h"
 
 namespace osteo::inline assessment::experiment {
 
-/// What moved the hand, as data are labelled. By mouse and keys the force is a number that the person sets: it is not felt.
+/// What moved the hand, as data are labelled. By mouse and keys the force is a number that the person sets: it is not
+/// felt.
 enum class Mover : int { simulated, mouse, keys, device };
 
 /// What was done in a trial. Ticks of the training first, then those of the test; each begins with its lead.
@@ -38,12 +39,14 @@ struct TrialScore {
 };
 
 /// The test of a trial, scored. Error(usage) as score_recall.
-[[nodiscard]] TrialScore score_trial(const std::string& participant, const Stimulus& stimulus, const TrialRecord& record,
-                                     const RecallSettings& settings = {});
+[[nodiscard]] TrialScore score_trial(const std::string& participant, const Stimulus& stimulus,
+                                     const TrialRecord& record, const RecallSettings& settings = {});
 
 /// The folder of a participant's trials; `retention`: those of another day.
-[[nodiscard]] std::filesystem::path trials_folder(const std::filesystem::path& experiment, const std::string& participant, bool retention);
-/// Writes trial-NN.oss, and when that is whole trial-NN.json: a trial without the latter was not finished and is done again.
+[[nodiscard]] std::filesystem::path trials_folder(const std::filesystem::path& experiment,
+                                                  const std::string& participant, bool retention);
+/// Writes trial-NN.oss, and when that is whole trial-NN.json: a trial without the latter was not finished and is done
+/// again.
 TrialScore save_trial(const std::filesystem::path& folder, const std::string& participant, const Stimulus& stimulus,
                       const TrialRecord& record);
 /// Those that are finished, by number. Error(corrupt) for a file that is no such score.
@@ -56,12 +59,14 @@ inline constexpr double kLeadS = 1;
 /// A whole trial by a program, as fast as the machine can.
 [[nodiscard]] TrialRecord simulate_trial(const Protocol& protocol, const Trial& trial, const Stimulus& stimulus,
                                          SimulatedParticipant& participant);
-/// All trials of a participant that are not finished yet. Returns how many those were. Error(cancelled) between two of them.
-std::size_t simulate_participant(const std::filesystem::path& experiment, const Protocol& protocol, std::size_t participant, bool retention,
-                                 const ParticipantModel& model, const Context& context, const std::function<void()>& after_each = {});
+/// All trials of a participant that are not finished yet. Returns how many those were. Error(cancelled) between two of
+/// them.
+std::size_t simulate_participant(const std::filesystem::path& experiment, const Protocol& protocol,
+                                 std::size_t participant, bool retention, const ParticipantModel& model,
+                                 const Context& context, const std::function<void()>& after_each = {});
 
 [[nodiscard]] constexpr std::array<std::string_view, 4> enum_names(Mover) {
   return {"simulated", "mouse", "keys", "device"};
 }
 
-}  // namespace osteo::assessment::experiment
+}  // namespace osteo::inline assessment::experiment

@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
+#include "osteo/assessment/ground_truth/measure.h"
 #include "osteo/core/base/context.h"
 #include "osteo/core/base/param.h"
-#include "osteo/assessment/ground_truth/measure.h"
 #include "osteo/core/report/sheet.h"
 
 namespace osteo::inline assessment::truth {
@@ -37,7 +37,8 @@ struct Experiment {
     visit({"plot_by_size", "a curve for each kind of renderer over the number after its colon"}, e.plot_by_size);
   }
 };
-/// { "osteotome_ground_truth": 1, fields of Experiment, "solids", "renderers", "frictions", "printed" }. Error(usage) with the line.
+/// { "osteotome_ground_truth": 1, fields of Experiment, "solids", "renderers", "frictions", "printed" }. Error(usage)
+/// with the line.
 [[nodiscard]] Experiment parse_experiment(std::string_view json, const std::string& name);
 
 /// One table; `cells` are texts, ready to print.
@@ -89,9 +90,9 @@ struct GroundTruthOptions {
 [[nodiscard]] Sheet leaderboard_sheet(const GroundTruthResult& result, const GroundTruthOptions& options);
 /// Error(cannot_write) where the folder holds something that is not to be replaced.
 void require_result_folder(const std::filesystem::path& folder, bool replace);
-/// FOLDER/results.json, tables.md, costs.md, leaderboard.html and .pdf, and trajectories/SOLID.{probe,out,in}.traj and .csv of 20 s each.
-/// Written whole or not at all. Errors as of require_result_folder.
-void write_ground_truth(const GroundTruthResult& result, const GroundTruthOptions& options, const std::filesystem::path& folder,
-                        bool replace);
+/// FOLDER/results.json, tables.md, costs.md, leaderboard.html and .pdf, and trajectories/SOLID.{probe,out,in}.traj and
+/// .csv of 20 s each. Written whole or not at all. Errors as of require_result_folder.
+void write_ground_truth(const GroundTruthResult& result, const GroundTruthOptions& options,
+                        const std::filesystem::path& folder, bool replace);
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

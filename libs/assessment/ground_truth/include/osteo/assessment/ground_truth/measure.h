@@ -8,7 +8,8 @@
 
 namespace osteo::inline assessment::truth {
 
-/// Over the moments after the first tenth of a second, where a renderer finds its place. Forces in N, whatever the unit.
+/// Over the moments after the first tenth of a second, where a renderer finds its place. Forces in N, whatever the
+/// unit.
 struct Accuracy {
   std::size_t moments = 0;
   double mean_n = 0;  ///< of |rendered - true|: equation 3 of D. Morris 2006, which calls it RMS
@@ -35,24 +36,26 @@ struct Played {
 };
 
 /// The in-trajectory through the renderer, which was made with `settings`.
-[[nodiscard]] Played play(const Trajectory& trajectory, PointRenderer& renderer, const RenderSettings& settings, bool keep = false,
-                          const Context& context = {});
+[[nodiscard]] Played play(const Trajectory& trajectory, PointRenderer& renderer, const RenderSettings& settings,
+                          bool keep = false, const Context& context = {});
 
-/// What a closed way gives: the work done on the hand in its second round, mJ, without friction. The truth is 0; positive: the renderer
-/// makes energy. `kept` (may be null): the energy that went back and forth in that round, to compare with.
-[[nodiscard]] double energy_per_cycle_mj(const Solid& solid, const std::string& what, double rate_hz, double* kept = nullptr,
-                                         const Context& context = {});
+/// What a closed way gives: the work done on the hand in its second round, mJ, without friction. The truth is 0;
+/// positive: the renderer makes energy. `kept` (may be null): the energy that went back and forth in that round, to
+/// compare with.
+[[nodiscard]] double energy_per_cycle_mj(const Solid& solid, const std::string& what, double rate_hz,
+                                         double* kept = nullptr, const Context& context = {});
 
-/// The largest change of force between positions a 1/50 of the renderer's grain apart, over ten grains along the surface at a depth of
-/// 1 N of the solid's spring, less the truth's own: N.
+/// The largest change of force between positions a 1/50 of the renderer's grain apart, over ten grains along the
+/// surface at a depth of 1 N of the solid's spring, less the truth's own: N.
 [[nodiscard]] double step_n(const Solid& solid, PointRenderer& renderer, double stiffness_n_per_mm);
 
-/// The coefficient of friction with which the renderer comes nearest to the forces, by golden section to 1e-4; and the mean error there.
+/// The coefficient of friction with which the renderer comes nearest to the forces, by golden section to 1e-4; and the
+/// mean error there.
 struct Identified {
   double friction = 0, mean_n = 0;
   int runs = 0;
 };
-[[nodiscard]] Identified identify_friction(const Trajectory& trajectory, const Solid& solid, const std::string& what, double lo = 0,
-                                           double hi = 1, const Context& context = {});
+[[nodiscard]] Identified identify_friction(const Trajectory& trajectory, const Solid& solid, const std::string& what,
+                                           double lo = 0, double hi = 1, const Context& context = {});
 
-}  // namespace osteo::assessment::truth
+}  // namespace osteo::inline assessment::truth

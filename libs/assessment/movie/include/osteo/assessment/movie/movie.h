@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "osteo/core/base/context.h"
-#include "osteo/simulation/camera/microscope.h"
 #include "osteo/assessment/movie/movie_options.h"
-#include "osteo/session/scene/operation.h"
+#include "osteo/core/base/context.h"
 #include "osteo/session/recording/session_reader.h"
+#include "osteo/session/scene/operation.h"
+#include "osteo/simulation/camera/microscope.h"
 
 namespace osteo::inline assessment {
 
@@ -18,11 +18,12 @@ namespace osteo::inline assessment {
 struct SessionSurvey {
   double rate_hz = 1000;
   std::uint64_t end_tick = 0;  ///< behind the last one known
-  std::vector<bool> idle;      ///< by tenths of a second: no pedal down, nothing done, neither hand nor camera moved (2 mm/s)
+  std::vector<bool>
+      idle;  ///< by tenths of a second: no pedal down, nothing done, neither hand nor camera moved (2 mm/s)
   std::vector<std::pair<std::uint64_t, ScopeView>> views;  ///< of "camera" notes, each from its tick on
   std::size_t unreadable_views = 0;
   std::optional<std::pair<Vec3, Vec3>> drilled_mm;  ///< box of the burrs' places while they removed bone
-  Vec3 handle;                                      ///< unit, from there to the hand, on the average; zero where nothing was drilled
+  Vec3 handle;  ///< unit, from there to the hand, on the average; zero where nothing was drilled
   [[nodiscard]] double seconds() const { return static_cast<double>(end_tick) / rate_hz; }
 };
 /// One pass through the file.
@@ -33,10 +34,11 @@ struct MovieTimes {
   std::vector<std::uint64_t> ticks;    ///< of each frame: all before it has happened
   double shown_s = 0, left_out_s = 0;  ///< of the session
 };
-/// round(shown * fps / speed) frames, at least one; each shows the end of its share, so that the last one shows the end. `to_s` below 0: to
-/// the session's end. With `skip_idle` what is idle for more than kIdleS is left out but for kRestS at either end. Error(usage) for a range
-/// that holds nothing of the session, or more than kMostFrames.
-[[nodiscard]] MovieTimes movie_times(const SessionSurvey& survey, double from_s, double to_s, double speed, int fps, bool skip_idle);
+/// round(shown * fps / speed) frames, at least one; each shows the end of its share, so that the last one shows the
+/// end. `to_s` below 0: to the session's end. With `skip_idle` what is idle for more than kIdleS is left out but for
+/// kRestS at either end. Error(usage) for a range that holds nothing of the session, or more than kMostFrames.
+[[nodiscard]] MovieTimes movie_times(const SessionSurvey& survey, double from_s, double to_s, double speed, int fps,
+                                     bool skip_idle);
 inline constexpr double kIdleS = 2, kRestS = 0.4;
 inline constexpr std::uint64_t kMostFrames = 10'000'000;
 
@@ -50,11 +52,11 @@ struct MovieFacts {
   std::vector<std::string> words;  ///< what is otherwise than asked, or than it was, each a sentence
 };
 
-/// Draws and writes it; `path` as MovieFile takes it, written over. The session is run again where it can be (replay), so that bone and
-/// dust are those of each frame's tick; where it cannot (a gap, another version, other structures), as tell_recorded() tells it, which
-/// `words` says. `begin`: the scene it began with. Progress says how long it will take. Errors: as MovieFile, movie_times, replay;
-/// Error(failed) when there is no OpenGL.
-MovieFacts make_movie(const SessionReader& session, const World& begin, const Anatomy& anatomy, const MovieOptions& options,
-                      const std::filesystem::path& path, const Context& context = {});
+/// Draws and writes it; `path` as MovieFile takes it, written over. The session is run again where it can be (replay),
+/// so that bone and dust are those of each frame's tick; where it cannot (a gap, another version, other structures), as
+/// tell_recorded() tells it, which `words` says. `begin`: the scene it began with. Progress says how long it will take.
+/// Errors: as MovieFile, movie_times, replay; Error(failed) when there is no OpenGL.
+MovieFacts make_movie(const SessionReader& session, const World& begin, const Anatomy& anatomy,
+                      const MovieOptions& options, const std::filesystem::path& path, const Context& context = {});
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -9,15 +9,17 @@
 
 namespace osteo::inline assessment {
 
-/// .mp4: H.264 (libx264, else libopenh264), 4:2:0, its index in front so that it plays while it loads; .webm: VP9 (libvpx).
-/// The file holds pictures and their times and nothing else: no date, no name, no word on what made it. One thread encodes, so that the
-/// same pictures give the same bytes with the same libraries (pictures of two runs need not be the same: docs/movie.md).
+/// .mp4: H.264 (libx264, else libopenh264), 4:2:0, its index in front so that it plays while it loads; .webm: VP9
+/// (libvpx). The file holds pictures and their times and nothing else: no date, no name, no word on what made it. One
+/// thread encodes, so that the same pictures give the same bytes with the same libraries (pictures of two runs need not
+/// be the same: docs/movie.md).
 class MovieFile {
  public:
   static constexpr int kLeastEdge = 64, kMostEdge = 7680, kMostFps = 120;
 
-  /// Writes over `path`. `width`, `height`: even, kLeastEdge to kMostEdge; `fps`: 1 to kMostFps; else Error(usage), as for another ending
-  /// than .mp4 and .webm. Error(failed) where this machine's libav has no encoder for it (says which would do). Error(cannot_write).
+  /// Writes over `path`. `width`, `height`: even, kLeastEdge to kMostEdge; `fps`: 1 to kMostFps; else Error(usage), as
+  /// for another ending than .mp4 and .webm. Error(failed) where this machine's libav has no encoder for it (says which
+  /// would do). Error(cannot_write).
   MovieFile(const std::filesystem::path& path, int width, int height, int fps);
   ~MovieFile();
   MovieFile(const MovieFile&) = delete;
@@ -50,4 +52,4 @@ struct MovieFileFacts {
 /// The licence that libav was built under, as it says itself: "GPL version 2 or later", "LGPL version 2.1 or later".
 [[nodiscard]] std::string movie_encoder_licence();
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -18,4 +18,4 @@ struct MovieOptions {
   bool deep = false;    ///< creases shaded and edges smoothed (PictureStyle::effects)
 };
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

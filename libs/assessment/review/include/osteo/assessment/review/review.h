@@ -1,4 +1,5 @@
-// A session as a page that a person reads: what was found, where it can be seen, how it went over time, and beside whom it stands.
+// A session as a page that a person reads: what was found, where it can be seen, how it went over time, and beside whom
+// it stands.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -6,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "osteo/core/base/context.h"
 #include "osteo/assessment/evidence/findings.h"
 #include "osteo/assessment/evidence/timeline.h"
+#include "osteo/core/base/context.h"
 #include "osteo/core/report/sheet.h"
 #include "osteo/session/scene/session_folder.h"
 
@@ -38,7 +39,7 @@ struct ForceProfile {
   double drilled_s = 0;                                               ///< near it
   std::vector<IsotonicQuantile::Point> middle, most;                  ///< half of the samples are below, nine in ten
   std::vector<IsotonicQuantile::Point> experts_middle, experts_most;  ///< empty: no reference
-  std::vector<std::array<float, 2>> samples;                          ///< distance, force; at most kMostSamples, evenly chosen
+  std::vector<std::array<float, 2>> samples;  ///< distance, force; at most kMostSamples, evenly chosen
   static constexpr std::size_t kMostSamples = 1500;
 };
 
@@ -57,7 +58,8 @@ struct ReviewPicture {
 
 /// All that the page, the PDF and the JSON say.
 struct Review {
-  std::vector<std::string> labels;  ///< what has to be known before all else: made by a script, under guidance, cut short, ...
+  std::vector<std::string>
+      labels;  ///< what has to be known before all else: made by a script, under guidance, cut short, ...
   std::string procedure;
   Score score;
   Findings findings;
@@ -76,8 +78,8 @@ struct Review {
   std::shared_ptr<const Procedure> of_procedure;  ///< that the items of the score refer to; null: none
 };
 
-/// Reads, scores, compares and draws. Errors: as open_session_folder, load_case, score_session, load_reference; failed without OpenGL.
-/// Cost: docs/review.md.
+/// Reads, scores, compares and draws. Errors: as open_session_folder, load_case, score_session, load_reference; failed
+/// without OpenGL. Cost: docs/review.md.
 [[nodiscard]] Review make_review(const ReviewRequest& request, const Context& context = {});
 
 /// "osteotome_review": 1. All that the page says, and the voxels and places that prove it.
@@ -86,9 +88,9 @@ struct Review {
 [[nodiscard]] std::string review_html(const Review& review);
 [[nodiscard]] Sheet review_sheet(const Review& review);
 
-/// review.html, review.pdf and review.json into a folder that is made for them, whole or not at all. Error(cannot_write) where it exists
-/// and is not empty, unless `force` and it holds nothing but an earlier review.
+/// review.html, review.pdf and review.json into a folder that is made for them, whole or not at all.
+/// Error(cannot_write) where it exists and is not empty, unless `force` and it holds nothing but an earlier review.
 void may_write_review(const std::filesystem::path& folder, bool force);  ///< throws as write_review would
 void write_review(const Review& review, const std::filesystem::path& folder, bool force);
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -7,8 +7,8 @@
 
 namespace osteo::inline assessment {
 
-/// What a heat reader that followed the whole session knows: heat_bone_c, and for each structure heat_peak_c and heat_cem43_min (the body's
-/// temperature and no dose where nothing warmed it). `structures` may be null.
+/// What a heat reader that followed the whole session knows: heat_bone_c, and for each structure heat_peak_c and
+/// heat_cem43_min (the body's temperature and no dose where nothing warmed it). `structures` may be null.
 [[nodiscard]] std::vector<Measured> heat_values(const HeatReader& heat, const StructureMap* structures);
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -9,8 +9,8 @@
 
 namespace osteo::inline assessment {
 
-/// Whether the burr can be seen is asked ten times a second while it drills: a ray from the eye to the burr through the bone as it is then,
-/// voxels in touch with the burr left out. Cost: 20 ns a tick and some 5 us a ray.
+/// Whether the burr can be seen is asked ten times a second while it drills: a ray from the eye to the burr through the
+/// bone as it is then, voxels in touch with the burr left out. Cost: 20 ns a tick and some 5 us a ray.
 class HintReader final : public Reader {
  public:
   static constexpr double kLookHz = 10;
@@ -39,4 +39,4 @@ class HintReader final : public Reader {
   std::optional<Hint> hint_;
 };
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -8,9 +8,9 @@
 
 namespace osteo::inline assessment {
 
-/// Makes the same frames as the session's file will have, and keeps the score of them: what it tells after end() is what `osteo score`
-/// tells of the file, to the bit, where it joined before the first tick and nothing was lost. Takes a copy of the bone. After ticks were
-/// lost it goes on from the scene as it is.
+/// Makes the same frames as the session's file will have, and keeps the score of them: what it tells after end() is
+/// what `osteo score` tells of the file, to the bit, where it joined before the first tick and nothing was lost. Takes
+/// a copy of the bone. After ticks were lost it goes on from the scene as it is.
 class ScoreReader final : public Reader {
  public:
   /// What `scene` refers to must outlive this.
@@ -19,7 +19,8 @@ class ScoreReader final : public Reader {
   void action(const SceneAction& action) override;
   void tick(const TickRecord& record, std::span<const VoxelChange> changes) override;
 
-  /// From any thread: where one looks from since a tick; in the order of ticks. The same as the "camera" notes of the session.
+  /// From any thread: where one looks from since a tick; in the order of ticks. The same as the "camera" notes of the
+  /// session.
   void camera(const CameraPose& pose);
   /// The session is over.
   void end();
@@ -39,4 +40,4 @@ class ScoreReader final : public Reader {
   std::vector<CameraPose> waiting_;
 };
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

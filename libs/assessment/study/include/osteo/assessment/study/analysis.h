@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "osteo/assessment/study/study.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/report/sheet.h"
-#include "osteo/assessment/study/study.h"
 
 namespace osteo::inline assessment::study {
 
@@ -23,4 +23,4 @@ struct Analysis {
 /// where what is given is no metric of the study. Same study, same bytes.
 [[nodiscard]] Analysis analyse(const Study& study, const AnalysisSettings& settings = {});
 
-}  // namespace osteo::assessment::study
+}  // namespace osteo::inline assessment::study

@@ -1,4 +1,5 @@
-// A study as a folder of plain files: who takes part (by code), what each does in which order, what came out, what raters said.
+// A study as a folder of plain files: who takes part (by code), what each does in which order, what came out, what
+// raters said.
 //
 //   study.json          title, procedure, groups, cases, attempts, items and scale of the ratings, seed
 //   participants.csv    participant,group
@@ -61,28 +62,35 @@ struct Study {
   std::vector<RaterSheet> raters;    ///< by name
 };
 
-/// Writes a new folder with its study.json and an empty participants.csv. Error(cannot_write) where there is something already.
+/// Writes a new folder with its study.json and an empty participants.csv. Error(cannot_write) where there is something
+/// already.
 void new_study(const std::filesystem::path& folder, const Plan& plan);
 /// Error(no_input) where there is no study.json; Error(usage) for what is wrong in a file.
 [[nodiscard]] Study read_study(const std::filesystem::path& folder);
 
-/// Appends to participants.csv. An empty code gets the next free one of P01, P02, ... Returns the code. Codes are up to 16 letters, digits,
+/// Appends to participants.csv. An empty code gets the next free one of P01, P02, ... Returns the code. Codes are up to
+/// 16 letters, digits,
 /// '-' and '_': they are not the place for names.
 std::string add_participant(const std::filesystem::path& folder, std::string code, const std::string& group);
-/// Appends to sessions.csv: `file` is JSON ({"NAME": 1.5, ...} or {"metrics": {...}}, or a list of {"name", "value"}) or CSV (a line of
-/// names and one of values); what is no number is left out and told in `notes`. Returns the blind code.
-std::string add_session(const std::filesystem::path& folder, const std::string& participant, const std::string& case_name, int attempt,
-                        const std::filesystem::path& file, std::vector<std::string>& notes);
+/// Appends to sessions.csv: `file` is JSON ({"NAME": 1.5, ...} or {"metrics": {...}}, or a list of {"name", "value"})
+/// or CSV (a line of names and one of values); what is no number is left out and told in `notes`. Returns the blind
+/// code.
+std::string add_session(const std::filesystem::path& folder, const std::string& participant,
+                        const std::string& case_name, int attempt, const std::filesystem::path& file,
+                        std::vector<std::string>& notes);
 
-/// Who does which case when: Williams' balanced squares (1949), whose rows are dealt at random inside each group, so that each case comes
-/// as often at each place. Those who are in order.csv keep their rows. Returns how many people were added.
+/// Who does which case when: Williams' balanced squares (1949), whose rows are dealt at random inside each group, so
+/// that each case comes as often at each place. Those who are in order.csv keep their rows. Returns how many people
+/// were added.
 std::size_t make_order(const std::filesystem::path& folder);
-/// The square itself: n rows for even n, 2 n for odd; each case as often at each place, and as often after each other one.
+/// The square itself: n rows for even n, 2 n for odd; each case as often at each place, and as often after each other
+/// one.
 [[nodiscard]] std::vector<std::vector<int>> williams(int n);
 
 /// By which a form and what it saves know their study.
 [[nodiscard]] std::string study_id(const Plan& plan);
-/// Blind codes of all sessions, in the order in which this rater sees them; it follows from the study's seed and the rater's code.
+/// Blind codes of all sessions, in the order in which this rater sees them; it follows from the study's seed and the
+/// rater's code.
 [[nodiscard]] std::vector<std::string> rating_order(const Study& study, const std::string& rater);
 /// One page with everything in it. Sessions in rating_order(), by blind codes only.
 [[nodiscard]] std::string form_html(const Study& study, const std::string& rater);
@@ -93,4 +101,4 @@ std::size_t make_order(const std::filesystem::path& folder);
 /// Error(usage) for what cannot be a code.
 void need_code(const std::string& code, const std::string& called);
 
-}  // namespace osteo::assessment::study
+}  // namespace osteo::inline assessment::study

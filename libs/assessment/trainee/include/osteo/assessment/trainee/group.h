@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "osteo/core/base/param.h"
 #include "osteo/assessment/trainee/skill.h"
+#include "osteo/core/base/param.h"
 
 namespace osteo::inline assessment {
 
@@ -13,14 +13,15 @@ enum class TraineeGroup : int { novice, expert };
   return {"novice", "expert"};
 }
 
-/// Each skill uniform in its group's range; both ranges overlap. The ranges are ours, not measured on people. Same seed, same skill.
+/// Each skill uniform in its group's range; both ranges overlap. The ranges are ours, not measured on people. Same
+/// seed, same skill.
 [[nodiscard]] TraineeSkill person_skill(TraineeGroup group, std::uint64_t seed);
 
-/// `n` trainees in which every skill but force_n (the same for all) goes through its whole range in n equal steps, each skill in an order
-/// of its own: McKay, Beckman, Conover 1979.
+/// `n` trainees in which every skill but force_n (the same for all) goes through its whole range in n equal steps, each
+/// skill in an order of its own: McKay, Beckman, Conover 1979.
 [[nodiscard]] std::vector<TraineeSkill> latin_hypercube(std::size_t n, std::uint64_t seed);
 
 /// 0 to 1, the mean of how good each skill is: what a simulated rater goes by.
 [[nodiscard]] double overall(const TraineeSkill& skill);
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "osteo/session/scene/session_folder.h"
 #include "osteo/assessment/trainee/skill.h"
 #include "osteo/assessment/trainee/truth.h"
 #include "osteo/assessment/trainee/work_plan.h"
+#include "osteo/session/scene/session_folder.h"
 
 namespace osteo::inline assessment {
 
@@ -20,7 +20,8 @@ struct TraineeScene {
   Procedure procedure;
 };
 /// With the case's own haptic settings. Error(usage) where it has no structures; else as load_case.
-[[nodiscard]] TraineeScene trainee_scene(const std::filesystem::path& case_folder, Procedure procedure, const Context& context = {});
+[[nodiscard]] TraineeScene trainee_scene(const std::filesystem::path& case_folder, Procedure procedure,
+                                         const Context& context = {});
 
 struct TraineeOptions {
   TraineeSkill skill;
@@ -37,11 +38,12 @@ struct SimulatedSession {
   double seconds = 0;     ///< of the session, not of the machine
 };
 
-/// `begin`: the bone, as world_of() gives it. Runs as fast as possible in this thread and writes the session into `folder`: stream,
-/// summary, and trainee.json with skill, seed, plan and what the trainee itself knows of what it left. The stream has a note of kind
-/// `simulated`, the summary a key of that name. Same arguments, same bits of the stream but for the times that the machine took. Several
-/// may run at a time on one scene. Errors: as plan_work and Rehearsal.
-SimulatedSession simulate_trainee(const TraineeScene& scene, World begin, const TraineeOptions& options, const SessionFolder& folder,
-                                  const Context& context = {});
+/// `begin`: the bone, as world_of() gives it. Runs as fast as possible in this thread and writes the session into
+/// `folder`: stream, summary, and trainee.json with skill, seed, plan and what the trainee itself knows of what it
+/// left. The stream has a note of kind `simulated`, the summary a key of that name. Same arguments, same bits of the
+/// stream but for the times that the machine took. Several may run at a time on one scene. Errors: as plan_work and
+/// Rehearsal.
+SimulatedSession simulate_trainee(const TraineeScene& scene, World begin, const TraineeOptions& options,
+                                  const SessionFolder& folder, const Context& context = {});
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

@@ -1,23 +1,25 @@
-// What a simulated trainee means to do: a window through bone to what the procedure's target regions surround, column by column.
+// What a simulated trainee means to do: a window through bone to what the procedure's target regions surround, column
+// by column.
 #pragma once
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "osteo/simulation/bone/structure_map.h"
-#include "osteo/simulation/bone/world.h"
 #include "osteo/assessment/evidence/procedure.h"
 #include "osteo/assessment/trainee/skill.h"
+#include "osteo/simulation/bone/structure_map.h"
+#include "osteo/simulation/bone/world.h"
 
 namespace osteo::inline assessment {
 
 /// A stroke of the hand: its places one after the other, of the burr's centre.
 struct TraineeStroke {
   struct Point {
-    Vec3 at_mm;           ///< as deep as it wants to come
-    Vec3 axis;            ///< unit, from tip to handle
-    double press_mm = 0;  ///< so much deeper the burr may be pressed until that bone is gone: a layer's floor stops no hand
+    Vec3 at_mm;  ///< as deep as it wants to come
+    Vec3 axis;   ///< unit, from tip to handle
+    double press_mm =
+        0;  ///< so much deeper the burr may be pressed until that bone is gone: a layer's floor stops no hand
   };
   std::uint8_t tool = 0;  ///< index in instrument_library()
   bool drilling = true;   ///< presses; else it moves freely, the pedal up
@@ -25,8 +27,9 @@ struct TraineeStroke {
   std::vector<Point> points;
 };
 
-/// Where it drills, from the surface inwards in layers. Coarse layers with a large cutting burr stay clear of what the procedure's
-/// instrument rules protect; fine ones go on with a small diamond to the margin that each structure's role asks for.
+/// Where it drills, from the surface inwards in layers. Coarse layers with a large cutting burr stay clear of what the
+/// procedure's instrument rules protect; fine ones go on with a small diamond to the margin that each structure's role
+/// asks for.
 struct WorkPlan {
   Vec3 centre_mm;        ///< middle of the window, at the bone's surface
   Vec3 toward;           ///< unit, from the bone to who drills
@@ -46,10 +49,10 @@ struct WorkPlanOptions {
 /// Kept between a structure's face and the burr by one who knows it.
 [[nodiscard]] double kept_mm(ProcedureRole role);
 
-/// The window is put where its columns have the longest ways in target regions before they come too near to a structure. Errors: usage
-/// where the procedure has no target region, none of its structures is in the map, no item says from where, or no column reaches the
-/// target. Same arguments, same plan on any machine.
-[[nodiscard]] WorkPlan plan_work(const World& world, const StructureMap& structures, const Procedure& procedure, const TraineeSkill& skill,
-                                 std::uint64_t seed, const WorkPlanOptions& options = {});
+/// The window is put where its columns have the longest ways in target regions before they come too near to a
+/// structure. Errors: usage where the procedure has no target region, none of its structures is in the map, no item
+/// says from where, or no column reaches the target. Same arguments, same plan on any machine.
+[[nodiscard]] WorkPlan plan_work(const World& world, const StructureMap& structures, const Procedure& procedure,
+                                 const TraineeSkill& skill, std::uint64_t seed, const WorkPlanOptions& options = {});
 
-}  // namespace osteo::assessment
+}  // namespace osteo::inline assessment

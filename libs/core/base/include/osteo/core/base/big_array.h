@@ -10,8 +10,8 @@
 
 namespace osteo {
 
-/// Leaves new elements as they are in memory (resize costs nothing before the first write) and asks for 2 MB pages, which
-/// makes first writes several times cheaper. For types without constructors only.
+/// Leaves new elements as they are in memory (resize costs nothing before the first write) and asks for 2 MB pages,
+/// which makes first writes several times cheaper. For types without constructors only.
 template <class T>
 struct BigAllocator {
   using value_type = T;

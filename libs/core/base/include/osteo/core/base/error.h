@@ -38,7 +38,8 @@ inline constexpr ExitCodeDoc exit_code_table[] = {
     {ExitCode::cannot_write, "cannot_write", "the output cannot be written, or exists already"},
     {ExitCode::failed, "failed", "the method failed or its result is not valid; the input could be read"},
     {ExitCode::partial, "partial",
-     "part of it could not be done: some cases of a batch failed, actions of a script were refused, or ticks of a session were not "
+     "part of it could not be done: some cases of a batch failed, actions of a script were refused, or ticks of a "
+     "session were not "
      "recorded"},
     {ExitCode::resources, "resources", "out of memory or time"},
     {ExitCode::cancelled, "cancelled", "interrupted by the user; nothing half-written was left behind"},

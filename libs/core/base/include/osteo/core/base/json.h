@@ -33,12 +33,12 @@ struct JsonMember {
   JsonValue value;
 };
 
-/// A file of settings or of things to do, read strictly: a key that is not known, one that is there twice, a value of another kind or out
-/// of range is an error with file and line.
+/// A file of settings or of things to do, read strictly: a key that is not known, one that is there twice, a value of
+/// another kind or out of range is an error with file and line.
 class JsonFile {
  public:
-  /// `name` as errors call it. Comments as in C++ are taken. All errors are of `code`: usage for what people write, corrupt for what the
-  /// program wrote itself; and with the line.
+  /// `name` as errors call it. Comments as in C++ are taken. All errors are of `code`: usage for what people write,
+  /// corrupt for what the program wrote itself; and with the line.
   JsonFile(std::string_view text, std::string name, ExitCode code = ExitCode::usage);
 
   [[nodiscard]] const JsonValue& root() const { return root_; }
@@ -46,8 +46,8 @@ class JsonFile {
   [[nodiscard]] Error wrong(const JsonValue& at, const std::string& what, const std::string& advice = {}) const;
   /// An error unless `object` is one and all its keys are among `known`. `where` goes before what is wrong: "action 2".
   void allow(const JsonValue& object, const std::string& where, std::span<const std::string> known) const;
-  /// Gives each field that the object names its value; the others stay as they are, unless they are needed. Keys of `besides` are the
-  /// caller's.
+  /// Gives each field that the object names its value; the others stay as they are, unless they are needed. Keys of
+  /// `besides` are the caller's.
   void read(const JsonValue& object, const std::string& where, std::span<const FieldRef> fields,
             std::span<const std::string> besides = {}) const;
   /// The same for one field.
@@ -56,11 +56,13 @@ class JsonFile {
   // What is no field of a struct. An error when it is missing, of another kind or out of range.
   [[nodiscard]] const JsonValue& need(const JsonValue& object, const std::string& where, std::string_view key) const;
   /// `called` as in "band_hz"; NaN and infinity cannot be written in JSON.
-  [[nodiscard]] double number(const JsonValue& value, const std::string& called, double lo = -std::numeric_limits<double>::max(),
+  [[nodiscard]] double number(const JsonValue& value, const std::string& called,
+                              double lo = -std::numeric_limits<double>::max(),
                               double hi = std::numeric_limits<double>::max()) const;
   [[nodiscard]] const std::string& text(const JsonValue& value, const std::string& called) const;
   /// Of `count` items, when that is not 0.
-  [[nodiscard]] const std::vector<JsonValue>& list(const JsonValue& value, const std::string& called, std::size_t count = 0) const;
+  [[nodiscard]] const std::vector<JsonValue>& list(const JsonValue& value, const std::string& called,
+                                                   std::size_t count = 0) const;
   /// The file must say "`format`": 1.
   void require_format(std::string_view format) const;
 

@@ -1,4 +1,5 @@
-// JSON that the program writes: a tree of values, built in place, and its text. What people write is read by json.h, with lines.
+// JSON that the program writes: a tree of values, built in place, and its text. What people write is read by json.h,
+// with lines.
 #pragma once
 #include <concepts>
 #include <cstdint>
@@ -15,9 +16,11 @@
 namespace osteo {
 
 /// One value: null, flag, whole number, number, text, list, or object whose members keep the order in which they came.
-///   Json j{{"osteotome_case", 1}, {"names", names}};   j["size_mm"] = {1.5, 2.5};   j["steps"].push_back({{"id", id}});
-/// In braces, pairs that all begin with a text make an object, everything else a list. Numbers keep whether they are whole; others are
-/// written with as few digits as give the same double back, NaN and infinity as null. Bytes that are not UTF-8 are written as U+FFFD.
+///   Json j{{"osteotome_case", 1}, {"names", names}};   j["size_mm"] = {1.5, 2.5};   j["steps"].push_back({{"id",
+///   id}});
+/// In braces, pairs that all begin with a text make an object, everything else a list. Numbers keep whether they are
+/// whole; others are written with as few digits as give the same double back, NaN and infinity as null. Bytes that are
+/// not UTF-8 are written as U+FFFD.
 class Json {
  public:
   struct Member;
@@ -40,7 +43,8 @@ class Json {
   /// A list of what else Json is made from.
   template <std::ranges::input_range R>
   requires(!std::convertible_to<R, std::string_view> && !std::same_as<std::remove_cvref_t<R>, List> &&
-           !std::same_as<std::remove_cvref_t<R>, Json> && std::constructible_from<Json, std::ranges::range_value_t<R>>) Json(const R& range)
+           !std::same_as<std::remove_cvref_t<R>, Json> && std::constructible_from<Json, std::ranges::range_value_t<R>>)
+      Json(const R& range)
       : Json(List()) {
     for (const auto& v : range) push_back(Json(v));
   }

@@ -1,5 +1,6 @@
 // One declaration per parameter. A Params struct keeps its defaults in place and names each field once in
-//   static void describe(Params& p, auto& visit) { visit({"lower", "keep voxels at or above", "HU", -1024, 3071}, p.lower); }
+//   static void describe(Params& p, auto& visit) { visit({"lower", "keep voxels at or above", "HU", -1024, 3071},
+//   p.lower); }
 // From the list of FieldRef made of that come flags, help, pipeline keys, schema, reference pages and provenance.
 #pragma once
 #include <array>
@@ -43,7 +44,8 @@ struct FieldRef {
 
   [[nodiscard]] std::string_view kind() const;  ///< "flag", "int", "number", "text", "triple", "list" or "choice"
   [[nodiscard]] std::string to_text() const;    ///< round-trips through from_text
-  /// Throws Error(usage) that names the field (as its flag, unless it is `called` otherwise), the range and the choices.
+  /// Throws Error(usage) that names the field (as its flag, unless it is `called` otherwise), the range and the
+  /// choices.
   void from_text(std::string_view text, std::string_view called = {}) const;
   [[nodiscard]] std::string flag() const;  ///< "--half-width"
 };

@@ -1,7 +1,8 @@
-// Functions of the mathematics library whose last bits differ between its versions and, in one version, between processors with and without
-// FMA. These are made of additions, multiplications, divisions and roots alone, each of which IEEE 754 rounds in one way, so they give the
-// same bits everywhere. All that the servo, a replay or what they start from is computed with uses these; the test same-bits.symbols checks
-// it. Errors are absolute, measured by the tests against a wider type. What is not finite gives what is not finite.
+// Functions of the mathematics library whose last bits differ between its versions and, in one version, between
+// processors with and without FMA. These are made of additions, multiplications, divisions and roots alone, each of
+// which IEEE 754 rounds in one way, so they give the same bits everywhere. All that the servo, a replay or what they
+// start from is computed with uses these; the test same-bits.symbols checks it. Errors are absolute, measured by the
+// tests against a wider type. What is not finite gives what is not finite.
 #pragma once
 #include <cmath>
 
@@ -15,8 +16,8 @@ struct SinCos {
 /// Of an angle in whole turns, from -1e6 to 1e6: off by at most 3e-16. Exact at quarters of a turn.
 [[nodiscard]] SinCos sin_cos_turns(double turns) noexcept;
 
-/// The angle of the direction (x, y), -pi to pi: off by at most 6e-16. 0 for (0, 0). Where |x| and |y| lie between 1e-150 and 1e150, or are
-/// 0.
+/// The angle of the direction (x, y), -pi to pi: off by at most 6e-16. 0 for (0, 0). Where |x| and |y| lie between
+/// 1e-150 and 1e150, or are 0.
 [[nodiscard]] double atan2(double y, double x) noexcept;
 /// 0 to pi, x in [-1, 1]: off by at most 1e-15.
 [[nodiscard]] double acos(double x) noexcept;

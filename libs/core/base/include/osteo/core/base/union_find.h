@@ -1,5 +1,6 @@
-// Sets of numbers that grow together. The caller holds an array (or map) in which each number points to one nearer its set's root, at first
-// to itself. The least number of a set is its root, so that what comes out does not depend on the order of joining. Almost O(1) a call.
+// Sets of numbers that grow together. The caller holds an array (or map) in which each number points to one nearer its
+// set's root, at first to itself. The least number of a set is its root, so that what comes out does not depend on the
+// order of joining. Almost O(1) a call.
 #pragma once
 
 namespace osteo {

@@ -41,7 +41,8 @@ enum class DataKind : int { none, source, image, labels, grid, surface, picture,
   return static_cast<DataKind>(data.index());
 }
 [[nodiscard]] constexpr std::string_view kind_name(DataKind kind) {
-  constexpr std::string_view names[] = {"none", "source", "image", "labels", "grid", "surface", "picture", "document", "tets"};
+  constexpr std::string_view names[] = {"none",    "source",  "image",    "labels", "grid",
+                                        "surface", "picture", "document", "tets"};
   return names[static_cast<int>(kind)];
 }
 

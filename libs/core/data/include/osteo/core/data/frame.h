@@ -27,12 +27,14 @@ struct Frame {
     const Vec3 v = inverse(direction) * (world_mm - origin_mm);
     return {v.x / spacing_mm.x, v.y / spacing_mm.y, v.z / spacing_mm.z};
   }
-  [[nodiscard]] Vec3 centre_mm() const { return world_from_index({(dims[0] - 1) / 2.0, (dims[1] - 1) / 2.0, (dims[2] - 1) / 2.0}); }
+  [[nodiscard]] Vec3 centre_mm() const {
+    return world_from_index({(dims[0] - 1) / 2.0, (dims[1] - 1) / 2.0, (dims[2] - 1) / 2.0});
+  }
   friend bool operator==(const Frame&, const Frame&) = default;
 };
 
-/// Throws Error(corrupt) that says what is wrong: no voxels, more than 1e18, spacing not positive and finite, direction not orthonormal
-/// (beyond 1e-3; smaller deviations are accepted).
+/// Throws Error(corrupt) that says what is wrong: no voxels, more than 1e18, spacing not positive and finite, direction
+/// not orthonormal (beyond 1e-3; smaller deviations are accepted).
 void require_valid(const Frame& frame);
 
 /// True when both put every voxel at the same place to within `tolerance_mm`.

@@ -24,7 +24,8 @@ struct RigidTransform {
 /// About an axis (unit) through a point.
 [[nodiscard]] RigidTransform rotation_about(Vec3 point_mm, Vec3 axis, double angle_rad);
 
-/// A frame with its z axis along `axis` (unit), turned from the world's by the shortest way; for -z about x. Continuous but there.
+/// A frame with its z axis along `axis` (unit), turned from the world's by the shortest way; for -z about x. Continuous
+/// but there.
 [[nodiscard]] Mat3 frame_of_axis(Vec3 axis);
 
 }  // namespace osteo

@@ -19,7 +19,8 @@ struct TetMesh {
 using Tets = std::shared_ptr<const TetMesh>;
 
 /// The triangles that only one tetrahedron has, facing out, over the same points as far as they are used.
-/// `point_of` (when given) becomes: point of the surface -> point of the mesh. O(tets) and about 40 bytes a tetrahedron.
+/// `point_of` (when given) becomes: point of the surface -> point of the mesh. O(tets) and about 40 bytes a
+/// tetrahedron.
 [[nodiscard]] TriMesh boundary_of(const TetMesh& mesh, std::vector<std::uint32_t>* point_of = nullptr);
 
 [[nodiscard]] double volume_mm3(const TetMesh& mesh);

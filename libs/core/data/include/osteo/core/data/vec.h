@@ -53,7 +53,9 @@ inline Vec3 from_floats(const std::array<float, 3>& f) {
 struct Mat3 {
   std::array<Vec3, 3> column{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
 
-  friend constexpr Vec3 operator*(const Mat3& m, Vec3 v) { return m.column[0] * v.x + m.column[1] * v.y + m.column[2] * v.z; }
+  friend constexpr Vec3 operator*(const Mat3& m, Vec3 v) {
+    return m.column[0] * v.x + m.column[1] * v.y + m.column[2] * v.z;
+  }
   friend constexpr bool operator==(const Mat3&, const Mat3&) = default;
 };
 

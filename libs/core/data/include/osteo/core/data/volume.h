@@ -30,8 +30,8 @@ using Image = Volume<std::int16_t>;
 /// What a value of a label map stands for.
 struct Structure {
   std::uint8_t value = 1;
-  std::string name;                            ///< "facial nerve"; never empty
-  std::array<std::uint8_t, 3> rgb{0, 0, 0};    ///< black: none was given
+  std::string name;                          ///< "facial nerve"; never empty
+  std::array<std::uint8_t, 3> rgb{0, 0, 0};  ///< black: none was given
   friend bool operator==(const Structure&, const Structure&) = default;
 };
 /// 0 is background; a mask has only 1 besides; a label map has one value a structure.

@@ -1,4 +1,5 @@
-// A printed report as plain values: what it says, in the order in which it is read. Written once as HTML and once as PDF.
+// A printed report as plain values: what it says, in the order in which it is read. Written once as HTML and once as
+// PDF.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -107,7 +108,8 @@ struct Plot {
   std::vector<Points> points;
   double height_mm = 48;
 };
-/// The line to sign: empty texts are lines to write on. Always of the same height, so that what is signed looks as before.
+/// The line to sign: empty texts are lines to write on. Always of the same height, so that what is signed looks as
+/// before.
 struct Signature {
   std::string by, date, note;
   std::string state;  ///< "not approved", "approved", "approved before the last change: no longer valid"
@@ -156,24 +158,26 @@ struct PageBreak {};
 }  // namespace sheet
 
 struct SheetBlock {
-  std::variant<sheet::Heading, sheet::Paragraph, sheet::Band, sheet::Facts, sheet::Table, sheet::Pictures, sheet::Bars, sheet::Signature,
-               sheet::Drawing, sheet::Plot, sheet::Columns, sheet::PageBreak>
+  std::variant<sheet::Heading, sheet::Paragraph, sheet::Band, sheet::Facts, sheet::Table, sheet::Pictures, sheet::Bars,
+               sheet::Signature, sheet::Drawing, sheet::Plot, sheet::Columns, sheet::PageBreak>
       is;
 };
 
 /// A4, upright. Texts are UTF-8; what is not is shown as U+FFFD.
 struct Sheet {
   std::string title, code;
-  std::string footer;                        ///< at the foot of each page, left of its number
-  std::map<std::string, std::string> marks;  ///< for programs: kept in the HTML as <meta name="osteotome-KEY">, not shown
+  std::string footer;  ///< at the foot of each page, left of its number
+  std::map<std::string, std::string>
+      marks;  ///< for programs: kept in the HTML as <meta name="osteotome-KEY">, not shown
   SheetBlocks blocks;
-  int pages = 2;  ///< made smaller, down to seven tenths, until it fits on so many; longer only where that is not enough
+  int pages =
+      2;  ///< made smaller, down to seven tenths, until it fits on so many; longer only where that is not enough
 };
 
 /// Self-contained: pictures inside, no scripts, nothing from elsewhere. Same sheet, same bytes.
 [[nodiscard]] std::string sheet_html(const Sheet& sheet);
-/// PDF 1.5 with the fonts it uses and text that can be selected. Same sheet and same fonts on the machine, same bytes: it holds no date.
-/// Error(failed) where the machine has no font at all.
+/// PDF 1.5 with the fonts it uses and text that can be selected. Same sheet and same fonts on the machine, same bytes:
+/// it holds no date. Error(failed) where the machine has no font at all.
 [[nodiscard]] std::string sheet_pdf(const Sheet& sheet);
 
 /// Parts of pages that are not sheets. A drawing as SVG, as wide as what it stands in; with its caption below it.

@@ -15,17 +15,20 @@ struct LoopStats {
   Histogram work;      ///< time spent in the function
   Histogram lateness;  ///< wake-up after the planned time: the machine's share
   std::uint64_t ticks = 0;
-  std::uint64_t missed_by_work = 0;     ///< periods lost because the function itself ran longer than a period (by its thread's CPU time)
-  std::uint64_t missed_by_machine = 0;  ///< periods lost because the wake-up came late, or the thread was taken off its core meanwhile
+  std::uint64_t missed_by_work =
+      0;  ///< periods lost because the function itself ran longer than a period (by its thread's CPU time)
+  std::uint64_t missed_by_machine =
+      0;  ///< periods lost because the wake-up came late, or the thread was taken off its core meanwhile
   bool realtime_granted = false;
-  bool memory_locked = false;    ///< what is there at the start; what comes later too where no limit (RLIMIT_MEMLOCK) forbids it
+  bool memory_locked =
+      false;  ///< what is there at the start; what comes later too where no limit (RLIMIT_MEMLOCK) forbids it
   bool idle_states_off = false;  ///< /dev/cpu_dma_latency held at 0 while the loop runs
   std::string realtime_refusal;  ///< empty, or why
 };
 
-/// SCHED_FIFO priority 80, memory locked, stack touched beforehand, processor kept from deep sleep, absolute sleeps (clock_nanosleep). When
-/// real-time priority is refused the loop runs all the same with the smallest timer slack, and says so. A late tick does not shift the
-/// later ones; periods that passed meanwhile are skipped and counted.
+/// SCHED_FIFO priority 80, memory locked, stack touched beforehand, processor kept from deep sleep, absolute sleeps
+/// (clock_nanosleep). When real-time priority is refused the loop runs all the same with the smallest timer slack, and
+/// says so. A late tick does not shift the later ones; periods that passed meanwhile are skipped and counted.
 class FixedRateLoop {
  public:
   /// `tick` returns false to end the loop. It must not allocate or lock. What it throws ends the loop; see failure().

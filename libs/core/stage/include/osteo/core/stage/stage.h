@@ -38,8 +38,8 @@ struct StageInfo {
   std::string example;                  ///< a command line that works
 };
 
-/// An Error of a stage that still has something to show: the runner saves it to the port, if that is wanted, and throws on. A picture (SVG)
-/// goes beside it, with .svg in place of .json.
+/// An Error of a stage that still has something to show: the runner saves it to the port, if that is wanted, and throws
+/// on. A picture (SVG) goes beside it, with .svg in place of .json.
 class ErrorWithDocument : public Error {
  public:
   ErrorWithDocument(const Error& error, std::string port, Document document, std::string picture = {})

@@ -1,7 +1,9 @@
-// What all statistics here share: intervals, how a value that is not defined is told, random numbers that are the same everywhere.
+// What all statistics here share: intervals, how a value that is not defined is told, random numbers that are the same
+// everywhere.
 //
-// Convention of the whole library: a call that cannot mean anything (sizes that do not fit, a value that is not finite, a level outside
-// 0 to 1) throws Error(usage). A statistic that these numbers do not define, such as a correlation with what never varies, is NaN.
+// Convention of the whole library: a call that cannot mean anything (sizes that do not fit, a value that is not finite,
+// a level outside 0 to 1) throws Error(usage). A statistic that these numbers do not define, such as a correlation with
+// what never varies, is NaN.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -25,10 +27,12 @@ struct Estimate {
   Interval interval;
 };
 
-/// Sample standard deviation (n - 1); quartiles as type 7 of Hyndman and Fan (1996), as NumPy and R have them by default.
+/// Sample standard deviation (n - 1); quartiles as type 7 of Hyndman and Fan (1996), as NumPy and R have them by
+/// default.
 struct Summary {
   std::size_t n = 0;
-  double mean = kUndefined, sd = kUndefined, median = kUndefined, q1 = kUndefined, q3 = kUndefined, least = kUndefined, most = kUndefined;
+  double mean = kUndefined, sd = kUndefined, median = kUndefined, q1 = kUndefined, q3 = kUndefined, least = kUndefined,
+         most = kUndefined;
 };
 [[nodiscard]] Summary summarise(std::span<const double> values);
 /// Type 7; `share` from 0 to 1. NaN of nothing.
@@ -43,10 +47,12 @@ struct Summary {
 /// Wilson's score interval of a share: 0 <= successes <= n. NaN where n is 0.
 [[nodiscard]] Interval wilson(double successes, double n, double level = 0.95);
 
-/// Holm's step-down: p values so that the chance of any false alarm among them is held. NaN stays NaN and does not count.
+/// Holm's step-down: p values so that the chance of any false alarm among them is held. NaN stays NaN and does not
+/// count.
 [[nodiscard]] std::vector<double> holm(std::span<const double> p);
 
-/// SplitMix64 (Steele, Lea, Flood 2014): the same numbers on every machine and with every library, unlike the distributions of <random>.
+/// SplitMix64 (Steele, Lea, Flood 2014): the same numbers on every machine and with every library, unlike the
+/// distributions of <random>.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(seed) {}
@@ -72,13 +78,15 @@ struct Resampling {
   double level = 0.95;
   std::uint64_t seed = 1;
 };
-/// Percentile bootstrap over `people`, who are drawn with all that they did: `statistic` gets the indices of those drawn, some several
-/// times. Resamples whose statistic is NaN are left out and counted; where they are more than a tenth, there is no interval.
+/// Percentile bootstrap over `people`, who are drawn with all that they did: `statistic` gets the indices of those
+/// drawn, some several times. Resamples whose statistic is NaN are left out and counted; where they are more than a
+/// tenth, there is no interval.
 struct Bootstrap {
   Interval interval;
   int left_out = 0;
 };
-[[nodiscard]] Bootstrap bootstrap(std::size_t people, const std::function<double(std::span<const std::size_t>)>& statistic,
+[[nodiscard]] Bootstrap bootstrap(std::size_t people,
+                                  const std::function<double(std::span<const std::size_t>)>& statistic,
                                   const Resampling& resampling = {});
 
 }  // namespace osteo::statistics

@@ -3,10 +3,10 @@
 #include <vtkSmartPointer.h>
 
 #include "osteo/core/data/rigid_transform.h"
-#include "osteo/simulation/bone/round_cone.h"
 #include "osteo/core/data/tri_mesh.h"
 #include "osteo/core/data/vec.h"
 #include "osteo/display/view/quality.h"
+#include "osteo/simulation/bone/round_cone.h"
 
 class vtkActor;
 class vtkMatrix4x4;
@@ -19,20 +19,23 @@ namespace osteo::inline display {
 inline constexpr double kBoneAmbient = 0.16;
 /// Dry bone under soft light. The data may be replaced later through the actor's mapper.
 [[nodiscard]] vtkSmartPointer<vtkActor> make_bone_actor(vtkPolyData* data);
-/// Wet: the fourth component of its colours says how dry a point is (255: dry); wet bone is darker, and mirrors the lamp. It stays opaque.
+/// Wet: the fourth component of its colours says how dry a point is (255: dry); wet bone is darker, and mirrors the
+/// lamp. It stays opaque.
 void set_bone_wet(vtkActor* bone, bool wet);
 /// For what one sees through: drawn when all else is, in the order in which they are added, blended over it.
 enum class Late {
-  nearest,     ///< where nothing is in front; of itself, and of what is added later, only what is in front shows: water, which comes first
-  all,         ///< where nothing is in front; all of it, in any order
+  nearest,  ///< where nothing is in front; of itself, and of what is added later, only what is in front shows: water,
+            ///< which comes first
+  all,      ///< where nothing is in front; all of it, in any order
   through_all  ///< whatever is in front
 };
 [[nodiscard]] vtkSmartPointer<vtkActor> make_late_actor(Late how);
 /// The surface of a round cone, its axis along +z; with normals.
 [[nodiscard]] vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape);
 void set_matrix(vtkMatrix4x4* matrix, const RigidTransform& transform);
-/// Dark blue background; the lamp of a microscope, at the eyes and a little above and to the left, so that what lies deep is lit and relief
-/// still shows; a weak fill from the other side. On bone of any colour no highlight burns out: at most 250 of 255.
+/// Dark blue background; the lamp of a microscope, at the eyes and a little above and to the left, so that what lies
+/// deep is lit and relief still shows; a weak fill from the other side. On bone of any colour no highlight burns out:
+/// at most 250 of 255.
 void set_up_scene(vtkRenderer* renderer);
 /// Ambient occlusion and smooth edges, by the renderer's own flags; occlusion reaches 3.5 % of the height
 /// that is seen at the focus, 0.5 to 8 mm: the creases; what is deeper BonePaint shows. Without effects both are off.
@@ -42,4 +45,4 @@ void set_depth(vtkRenderer* renderer, const PictureStyle& style);
 /// Camera that sees a ball of `radius_mm` around `centre_mm` from `eye` (unit, LPS), head up.
 void look_at(vtkRenderer* renderer, Vec3 centre_mm, double radius_mm, Vec3 eye);
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -6,20 +6,21 @@
 #include <span>
 #include <vector>
 
+#include "osteo/display/view/openness.h"
+#include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/simulation/bone/hardness.h"
 #include "osteo/simulation/bone/structure_map.h"
-#include "osteo/geometry/mesh/bone_surface.h"
-#include "osteo/display/view/openness.h"
 
 namespace osteo::inline display {
 
 using Rgb = std::array<std::uint8_t, 3>;
 
-/// Dense bone is ivory. Where the millimetre below the surface is hardly denser than marrow, as on a cut through the diploe, it is redder
-/// and speckled; the speckle belongs to the place, not to the triangles. What is less than kShownThroughMm below shines through in its
-/// structure's colour, the more the thinner the bone is: the bone left above it is measured to the structure's face, so the colour has no
-/// steps. All of it is darker where little light gets in (Openness), but never below kDarkest of itself. Colours are such that under
-/// set_up_scene's lights no channel reaches 250. Not thread-safe while renew() runs.
+/// Dense bone is ivory. Where the millimetre below the surface is hardly denser than marrow, as on a cut through the
+/// diploe, it is redder and speckled; the speckle belongs to the place, not to the triangles. What is less than
+/// kShownThroughMm below shines through in its structure's colour, the more the thinner the bone is: the bone left
+/// above it is measured to the structure's face, so the colour has no steps. All of it is darker where little light
+/// gets in (Openness), but never below kDarkest of itself. Colours are such that under set_up_scene's lights no channel
+/// reaches 250. Not thread-safe while renew() runs.
 class BonePaint {
  public:
   static constexpr double kShownThroughMm = 2.5;
@@ -44,12 +45,12 @@ class BonePaint {
   std::vector<std::shared_ptr<const Openness>> others_;
 };
 
-/// How much of a structure's colour comes through the bone above it, 0 to 1, along the way `inwards` from a point of the surface, and
-/// whose.
+/// How much of a structure's colour comes through the bone above it, 0 to 1, along the way `inwards` from a point of
+/// the surface, and whose.
 struct Shine {
   double share = 0;
   std::uint8_t structure = 0;
 };
 [[nodiscard]] Shine shine_through(const StructureMap& structures, Vec3 at_mm, Vec3 inwards);
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

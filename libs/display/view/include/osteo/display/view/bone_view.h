@@ -9,10 +9,10 @@
 
 #include <vtkSmartPointer.h>
 
-#include "osteo/simulation/bone/live_surface.h"
 #include "osteo/core/data/rigid_transform.h"
 #include "osteo/display/view/bone_paint.h"
 #include "osteo/display/view/wet_film.h"
+#include "osteo/simulation/bone/live_surface.h"
 
 class vtkActor;
 class vtkFloatArray;
@@ -26,7 +26,8 @@ namespace osteo::inline display {
 class BoneView {
  public:
   /// Coloured as BonePaint says; `structures` and `hardness` may be null.
-  explicit BoneView(vtkRenderer* renderer, const StructureMap* structures = nullptr, std::shared_ptr<const Hardness> hardness = nullptr)
+  explicit BoneView(vtkRenderer* renderer, const StructureMap* structures = nullptr,
+                    std::shared_ptr<const Hardness> hardness = nullptr)
       : renderer_(renderer), structures_(structures), hardness_(std::move(hardness)) {}
   ~BoneView();
   BoneView(const BoneView&) = delete;
@@ -34,25 +35,30 @@ class BoneView {
 
   /// Shows all of a surface, in place of what was shown before.
   void show(const LiveSurface& surface);
-  /// Renews the chunks that hold these bricks. Farther bone, which may get more light now, keeps its colours until refresh().
+  /// Renews the chunks that hold these bricks. Farther bone, which may get more light now, keeps its colours until
+  /// refresh().
   void update(const LiveSurface& surface, std::span<const std::uint32_t> bricks);
-  /// Colours as if shown anew. 0.3 us for each vertex within Openness::kReachMm of what was updated since, here or in bone that shades it.
+  /// Colours as if shown anew. 0.3 us for each vertex within Openness::kReachMm of what was updated since, here or in
+  /// bone that shades it.
   void refresh(const LiveSurface& surface);
-  /// Views of bone that always moves with this one and stands in its light, as this in theirs: a finer region and what is around it. They
-  /// must outlive this, or another call. refresh() of each must be called, in any order, when all have their updates.
+  /// Views of bone that always moves with this one and stands in its light, as this in theirs: a finer region and what
+  /// is around it. They must outlive this, or another call. refresh() of each must be called, in any order, when all
+  /// have their updates.
   void shade_with(const std::vector<BoneView*>& others);
   /// Where the bone is now.
   void place(const RigidTransform& world_from_body);
   void highlight(bool on);
   /// Where there is water on it, which must outlive this (null: nowhere). Bricks that change are wet at once.
   void set_film(const WetFilm* film) { film_ = film; }
-  /// Wet bone is darker and mirrors the lamp: looks again at bricks near which the film's last update changed something, or at all of them
-  /// where this has been moved since. Of chunks that look otherwise, the colours are made again. 0.2 us a vertex.
+  /// Wet bone is darker and mirrors the lamp: looks again at bricks near which the film's last update changed
+  /// something, or at all of them where this has been moved since. Of chunks that look otherwise, the colours are made
+  /// again. 0.2 us a vertex.
   void wet(const LiveSurface& surface);
 
-  /// Bone that drilling has warmed is seen from 42 C on, amber, from 57 C on red, in steps of a kelvin. Looks at bricks that touch one of
-  /// `near` (centre, radius in mm) and at those that glowed. 0.3 us a vertex of these.
-  void warm(const LiveSurface& surface, std::span<const std::pair<Vec3, double>> near, const std::function<double(Vec3)>& celsius_at);
+  /// Bone that drilling has warmed is seen from 42 C on, amber, from 57 C on red, in steps of a kelvin. Looks at bricks
+  /// that touch one of `near` (centre, radius in mm) and at those that glowed. 0.3 us a vertex of these.
+  void warm(const LiveSurface& surface, std::span<const std::pair<Vec3, double>> near,
+            const std::function<double(Vec3)>& celsius_at);
 
   /// A chunk's triangles as they were at some version; they stay when the chunk is made again.
   struct Arrays {
@@ -68,7 +74,9 @@ class BoneView {
   void draw_only(std::size_t chunk, std::uint64_t version, std::span<const std::uint32_t> triangles);
   /// Fewer triangles that stand for a chunk of that version while the camera moves.
   void keep_coarse(std::size_t chunk, std::uint64_t version, std::vector<std::uint32_t> triangles);
-  [[nodiscard]] bool has_coarse(std::size_t chunk) const { return chunks_[chunk].coarse_version == chunks_[chunk].complete.version; }
+  [[nodiscard]] bool has_coarse(std::size_t chunk) const {
+    return chunks_[chunk].coarse_version == chunks_[chunk].complete.version;
+  }
   /// Whole; with `coarse` those fewer triangles where they are known.
   void draw_all(bool coarse = false);
   /// Where it was placed, as VTK has it.
@@ -119,9 +127,9 @@ class BoneView {
   double voxel_mm_ = 1;
 };
 
-/// At most a quarter of a chunk's triangles, or as few as keep its surface to `error_mm` (as meshoptimizer measures it) and its border to
-/// the last point, on the same points.
-[[nodiscard]] std::vector<std::uint32_t> coarse_triangles(std::span<const float> points_mm, std::span<const int> triangles,
-                                                          double error_mm);
+/// At most a quarter of a chunk's triangles, or as few as keep its surface to `error_mm` (as meshoptimizer measures it)
+/// and its border to the last point, on the same points.
+[[nodiscard]] std::vector<std::uint32_t> coarse_triangles(std::span<const float> points_mm,
+                                                          std::span<const int> triangles, double error_mm);
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -9,9 +9,10 @@ class vtkRenderer;
 
 namespace osteo::inline display {
 
-/// Dry dust as grains of their own sizes and shades at places of their own in each cell (by the cell's coordinates, so that what lies
-/// still looks still), spread so that nothing of the lattice of cells shows; water as a surface, drops where it falls. Nothing is seen
-/// through dust; water is drawn over what is below it in one layer, without sorting. At most kMostGrains grains: of more, fewer larger.
+/// Dry dust as grains of their own sizes and shades at places of their own in each cell (by the cell's coordinates, so
+/// that what lies still looks still), spread so that nothing of the lattice of cells shows; water as a surface, drops
+/// where it falls. Nothing is seen through dust; water is drawn over what is below it in one layer, without sorting. At
+/// most kMostGrains grains: of more, fewer larger.
 class DustView {
  public:
   static constexpr std::size_t kMostGrains = 60000;
@@ -27,4 +28,4 @@ class DustView {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

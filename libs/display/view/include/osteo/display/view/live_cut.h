@@ -5,10 +5,10 @@
 #include <optional>
 #include <vector>
 
-#include "osteo/simulation/bone/world.h"
 #include "osteo/core/data/volume.h"
-#include "osteo/geometry/grid/sampler.h"
 #include "osteo/display/view/slices.h"
+#include "osteo/geometry/grid/sampler.h"
+#include "osteo/simulation/bone/world.h"
 
 namespace osteo::inline display {
 
@@ -30,8 +30,9 @@ class CtValues {
   std::optional<Image> scan_;
 };
 
-/// How far a scan's values are from those that a case keeps, in the middle of at most 20,000 of its voxels, HU; infinite where more than a
-/// twentieth of them lie outside the scan. The case's own scan: below 30 (they were resampled).
+/// How far a scan's values are from those that a case keeps, in the middle of at most 20,000 of its voxels, HU;
+/// infinite where more than a twentieth of them lie outside the scan. The case's own scan: below 30 (they were
+/// resampled).
 [[nodiscard]] double difference_hu(const SparseGrid& kept, const Image& scan);
 
 struct LiveCut {
@@ -45,8 +46,8 @@ struct LiveCut {
   };
   std::vector<Part> parts;
   const CtValues* ct = nullptr;  ///< none: bone is as bright as it is dense
-  /// Density as the case has it, the finest first: a place belongs to the first in whose box it lies. Empty: nothing is told of what was
-  /// removed.
+  /// Density as the case has it, the finest first: a place belongs to the first in whose box it lies. Empty: nothing is
+  /// told of what was removed.
   std::vector<const GridSampler*> before;
   HuWindow hu;
   bool tint_removed = true;
@@ -54,10 +55,10 @@ struct LiveCut {
 
 inline constexpr std::array<std::uint8_t, 3> kRemovedColour{40, 110, 255};
 
-/// The bone's parts as they are, where they are, each with the CT value of the place it came from; what bone the case has there and the
-/// scene has not any more is tinted by as much as is missing. Black where nothing is known. RGBA, top row first. Bone may be drilled
-/// meanwhile: each voxel is shown as it was or as it is. 0.1 to 0.2 us a pixel with
-/// one body.
+/// The bone's parts as they are, where they are, each with the CT value of the place it came from; what bone the case
+/// has there and the scene has not any more is tinted by as much as is missing. Black where nothing is known. RGBA, top
+/// row first. Bone may be drilled meanwhile: each voxel is shown as it was or as it is. 0.1 to 0.2 us a pixel with one
+/// body.
 void draw_live_cut(const SliceView& view, const LiveCut& cut, std::vector<std::uint32_t>& rgba);
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -32,4 +32,4 @@ class OffscreenWindow {
 /// What the window shows now, as a picture.
 [[nodiscard]] Picture grab(vtkGenericOpenGLRenderWindow* window);
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

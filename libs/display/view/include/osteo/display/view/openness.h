@@ -11,11 +11,12 @@
 
 namespace osteo::inline display {
 
-/// The share of the sky above a face that bone leaves free, weighted by the cosine to the face's normal, as far as kReachMm: 1 on a flat or
-/// bulging face, small at the bottom of a drilled hole. By five cones through the bone's density, averaged over cells of about 1, 2 and 4
-/// mm (cone tracing: Crassin and others 2011). It depends on the bone alone, not on the eye, so a picture costs nothing for it. Against the
-/// exact share at the bottom of round holes: docs/accuracy.md. Memory: about 1.2 bytes for each mm3 of the bone's box. For drawing only;
-/// not thread-safe while renew() runs; it may read the bone while the servo writes it.
+/// The share of the sky above a face that bone leaves free, weighted by the cosine to the face's normal, as far as
+/// kReachMm: 1 on a flat or bulging face, small at the bottom of a drilled hole. By five cones through the bone's
+/// density, averaged over cells of about 1, 2 and 4 mm (cone tracing: Crassin and others 2011). It depends on the bone
+/// alone, not on the eye, so a picture costs nothing for it. Against the exact share at the bottom of round holes:
+/// docs/accuracy.md. Memory: about 1.2 bytes for each mm3 of the bone's box. For drawing only; not thread-safe while
+/// renew() runs; it may read the bone while the servo writes it.
 class Openness {
  public:
   static constexpr double kReachMm = 8;
@@ -23,8 +24,8 @@ class Openness {
   explicit Openness(const BrickGrid& bone, int threads = 0);
   /// Voxels of these bricks have changed. About 1 us a brick and 512 voxels.
   void renew(const BrickGrid& bone, std::span<const std::uint32_t> bricks);
-  /// At a point of the surface in voxel indices, with its unit normal out of the bone along the index axes. 0.3 us. Other bone of the same
-  /// world stands in the light too: where it is within reach, as long again for each.
+  /// At a point of the surface in voxel indices, with its unit normal out of the bone along the index axes. 0.3 us.
+  /// Other bone of the same world stands in the light too: where it is within reach, as long again for each.
   [[nodiscard]] double at(const std::array<float, 3>& index, const std::array<float, 3>& normal,
                           std::span<const std::shared_ptr<const Openness>> others = {}) const;
 
@@ -44,4 +45,4 @@ class Openness {
   std::array<Level, 3> levels_;
 };
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -14,12 +14,13 @@ namespace osteo::inline display {
 /// What is deeper than this in bone is tinted and told.
 inline constexpr double kPlateCollisionMm = 0.2;
 
-/// How deep a plate's underside lies in bone at most, along its screws, by plate_gaps() at 150 points; 0 where it lies on it. 0.2 ms.
-[[nodiscard]] double plate_in_bone_mm(const World& world, const PlateModel& plate, const RigidTransform& world_from_plate,
-                                      double opening_mm = 0);
+/// How deep a plate's underside lies in bone at most, along its screws, by plate_gaps() at 150 points; 0 where it lies
+/// on it. 0.2 ms.
+[[nodiscard]] double plate_in_bone_mm(const World& world, const PlateModel& plate,
+                                      const RigidTransform& world_from_plate, double opening_mm = 0);
 
-/// Metal, shaded, edges crisp; both feet of a distractor. Fixed plates have a screw in each hole: its head on the plate, threads below.
-/// Red from kPlateCollisionMm on, full at a millimetre.
+/// Metal, shaded, edges crisp; both feet of a distractor. Fixed plates have a screw in each hole: its head on the
+/// plate, threads below. Red from kPlateCollisionMm on, full at a millimetre.
 class PlateView {
  public:
   explicit PlateView(vtkRenderer* renderer);
@@ -27,7 +28,8 @@ class PlateView {
   PlateView(const PlateView&) = delete;
   PlateView& operator=(const PlateView&) = delete;
 
-  /// The plates that are fixed. What lies in bone is looked for when one has come or moved, and each second: 1 us a point of it.
+  /// The plates that are fixed. What lies in bone is looked for when one has come or moved, and each second: 1 us a
+  /// point of it.
   void update(const World& world);
   /// One in a hand, without screws; looked at each time.
   void show_in_hand(const World& world, std::uint32_t plate, const RigidTransform& world_from_plate);
@@ -40,4 +42,4 @@ class PlateView {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

@@ -7,8 +7,9 @@
 
 namespace osteo::inline display {
 
-/// plain: light and the shade of cavities that the bone's colours hold, nothing else. calm: while something moves as plain; occlusion and
-/// smooth edges are added when the picture rests. deep: both always, for graphics cards. automatic: by measured time.
+/// plain: light and the shade of cavities that the bone's colours hold, nothing else. calm: while something moves as
+/// plain; occlusion and smooth edges are added when the picture rests. deep: both always, for graphics cards.
+/// automatic: by measured time.
 enum class Quality : int { automatic, plain, calm, deep };
 [[nodiscard]] constexpr std::array<std::string_view, 4> enum_names(Quality) {
   return {"auto", "plain", "calm", "deep"};
@@ -21,11 +22,11 @@ struct PictureStyle {
   friend bool operator==(const PictureStyle&, const PictureStyle&) = default;
 };
 
-/// Chooses style by times of pictures. A moving picture is to take at most kMovingMs: where three in a row take more, the next has fewer
-/// pixels (of kScales), until eight in a row would take less than 0.8 of that with more. Effects: a resting picture's time tells what they
-/// cost. At or below kDeepMs automatic goes from calm to deep, and back where eight moving pictures in a row take more than kTooDeepMs;
-/// where a resting picture takes more than kTooCalmMs, automatic goes on as plain, until the picture has half as many pixels.
-/// Deterministic.
+/// Chooses style by times of pictures. A moving picture is to take at most kMovingMs: where three in a row take more,
+/// the next has fewer pixels (of kScales), until eight in a row would take less than 0.8 of that with more. Effects: a
+/// resting picture's time tells what they cost. At or below kDeepMs automatic goes from calm to deep, and back where
+/// eight moving pictures in a row take more than kTooDeepMs; where a resting picture takes more than kTooCalmMs,
+/// automatic goes on as plain, until the picture has half as many pixels. Deterministic.
 class QualityChoice {
  public:
   static constexpr double kMovingMs = 50, kDeepMs = 20, kTooDeepMs = 40, kTooCalmMs = 2500;
@@ -51,4 +52,4 @@ class QualityChoice {
   double moving_ms_ = 0, resting_ms_ = 0, plain_from_pixels_ = 0;
 };
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

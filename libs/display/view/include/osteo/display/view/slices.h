@@ -11,8 +11,8 @@
 
 namespace osteo::inline display {
 
-/// The three cuts as a radiologist expects them. axial: seen from the feet, the patient's left on the right of the picture.
-/// coronal: seen from the front, left on the right. sagittal: front to the left.
+/// The three cuts as a radiologist expects them. axial: seen from the feet, the patient's left on the right of the
+/// picture. coronal: seen from the front, left on the right. sagittal: front to the left.
 enum class Plane : int { axial, coronal, sagittal };
 
 /// Directions of a picture, unit and at right angles. What is farther from who looks lies along cross(right, down).
@@ -45,8 +45,8 @@ struct SliceView {
   void resize(int new_width, int new_height);
 };
 
-/// The sides of the body that a cut's left, right, top and bottom edge lie on: "R", of an oblique cut up to three letters, the nearest
-/// direction first ("AR"). R L A P H F.
+/// The sides of the body that a cut's left, right, top and bottom edge lie on: "R", of an oblique cut up to three
+/// letters, the nearest direction first ("AR"). R L A P H F.
 [[nodiscard]] std::array<std::string, 4> edge_letters(const SliceView& view);
 /// "L 12.3  P 4.0  H 31.5": the sides that LPS coordinates lie on.
 [[nodiscard]] std::string place_text(Vec3 lps_mm);
@@ -56,8 +56,8 @@ struct HuWindow {
   double width = 1000, level = 400;
   /// 0 to 255.
   [[nodiscard]] double grey(double hu) const;
-  /// Of a mouse that is dragged: to the right wider, upwards brighter things come into view (a higher level). 4 HU a pixel; width 1 to
-  /// 10000, level -2000 to 8000.
+  /// Of a mouse that is dragged: to the right wider, upwards brighter things come into view (a higher level). 4 HU a
+  /// pixel; width 1 to 10000, level -2000 to 8000.
   void drag(double dx, double dy);
   friend bool operator==(const HuWindow&, const HuWindow&) = default;
 };
@@ -87,4 +87,4 @@ void write_text(Picture& onto, std::string_view text, int x, int y, int size, st
 /// The letters at the edges of a slice: L R A P H F.
 void write_directions(Picture& onto, const SliceView& view, int x, int y);
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

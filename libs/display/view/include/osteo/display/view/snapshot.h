@@ -24,11 +24,13 @@ struct SnapshotParams {
 
 struct SnapshotSubjects {
   Data subject;  ///< image, labels, grid, surface or tets
-  Data mask;     ///< labels or grid, tinted over the cuts; optional. Labels with structures: in their colours, in 3D inside clear bone
+  Data mask;     ///< labels or grid, tinted over the cuts; optional. Labels with structures: in their colours, in 3D
+                 ///< inside clear bone
   Data surface;  ///< shown in 3D instead of one made here; optional
 };
 
 /// Works without a display. Error(failed) when there is no OpenGL.
-[[nodiscard]] Picture snapshot(const SnapshotSubjects& subjects, const SnapshotParams& params, const Context& context = {});
+[[nodiscard]] Picture snapshot(const SnapshotSubjects& subjects, const SnapshotParams& params,
+                               const Context& context = {});
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

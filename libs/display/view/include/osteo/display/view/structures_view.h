@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "osteo/core/base/param.h"
-#include "osteo/simulation/bone/structure_map.h"
 #include "osteo/core/data/tri_mesh.h"
+#include "osteo/simulation/bone/structure_map.h"
 
 class vtkActor;
 class vtkRenderer;
@@ -22,16 +22,17 @@ enum class StructureLook : int { solid, clear, hidden };
   return {"solid", "clear", "hidden"};
 }
 
-/// The face of a structure without the steps of its voxels, with normals: a windowed sinc (G. Taubin, T. Zhang, G. Golub, Optimal surface
-/// smoothing as filter design, 1996; VTK's filter) in rounds, after each of which what the surface lost is given back evenly, so that tubes
-/// two voxels thick stay as thick as they were. No point moves farther than `most_mm`; parts
-/// of fewer than 60 points, two voxels or so, stay as they are. Distances are measured from the face itself. Errors:
-/// docs/accuracy.md.
+/// The face of a structure without the steps of its voxels, with normals: a windowed sinc (G. Taubin, T. Zhang, G.
+/// Golub, Optimal surface smoothing as filter design, 1996; VTK's filter) in rounds, after each of which what the
+/// surface lost is given back evenly, so that tubes two voxels thick stay as thick as they were. No point moves farther
+/// than `most_mm`; parts of fewer than 60 points, two voxels or so, stay as they are. Distances are measured from the
+/// face itself. Errors: docs/accuracy.md.
 [[nodiscard]] TriMesh smooth_surface(const TriMesh& face, double most_mm);
 
 class StructuresView {
  public:
-  /// Smooths every structure of the map, half a label voxel at most, in parallel. All are solid at first. The renderer must outlive this.
+  /// Smooths every structure of the map, half a label voxel at most, in parallel. All are solid at first. The renderer
+  /// must outlive this.
   StructuresView(vtkRenderer* renderer, const StructureMap& map);
   ~StructuresView();
   StructuresView(const StructuresView&) = delete;
@@ -45,8 +46,8 @@ class StructuresView {
   };
   /// In the order of the map's values().
   [[nodiscard]] const std::vector<One>& all() const { return all_; }
-  /// A clear one is screen-door: every other pixel of it is left out, in one of four patterns by its number, so nothing has to be sorted,
-  /// peeled or drawn twice. `number` in all().
+  /// A clear one is screen-door: every other pixel of it is left out, in one of four patterns by its number, so nothing
+  /// has to be sorted, peeled or drawn twice. `number` in all().
   void show(std::size_t number, StructureLook look);
 
  private:
@@ -54,4 +55,4 @@ class StructuresView {
   std::vector<One> all_;
 };
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

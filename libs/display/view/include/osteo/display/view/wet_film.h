@@ -10,13 +10,15 @@
 
 namespace osteo::inline display {
 
-/// Keeps a byte a cell of bricks that hold water, in sixteenths of a film, so that what dries slowly changes its looks seldom. Where there
-/// is no water it costs nothing. The dust and its bone must not change between update() and the calls that follow it.
+/// Keeps a byte a cell of bricks that hold water, in sixteenths of a film, so that what dries slowly changes its looks
+/// seldom. Where there is no water it costs nothing. The dust and its bone must not change between update() and the
+/// calls that follow it.
 class WetFilm {
  public:
   /// Looks again; true where something is drier or wetter than it was. About 20 ns a wet cell.
   bool update(const Dust& dust);
-  /// 0: dry, 1: a whole film or more, of the free cells around a place, linear between their middles. Just outside of the bone. 0.2 us.
+  /// 0: dry, 1: a whole film or more, of the free cells around a place, linear between their middles. Just outside of
+  /// the bone. 0.2 us.
   [[nodiscard]] double at(Vec3 world_mm) const;
   /// The last update() that was true changed something within a brick of dust of this place.
   [[nodiscard]] bool changed_near(Vec3 world_mm) const;
@@ -30,4 +32,4 @@ class WetFilm {
   const BrickGrid* bone_ = nullptr;
 };
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

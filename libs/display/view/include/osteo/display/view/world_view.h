@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "osteo/core/data/data.h"
-#include "osteo/session/scene/scene_readers.h"
-#include "osteo/session/scene/soft_tissue.h"
 #include "osteo/display/view/bone_view.h"
 #include "osteo/display/view/dust_view.h"
 #include "osteo/display/view/plate_view.h"
+#include "osteo/session/scene/scene_readers.h"
+#include "osteo/session/scene/soft_tissue.h"
 
 namespace osteo::inline display {
 
@@ -24,7 +24,8 @@ class WorldView {
   WorldView(const WorldView&) = delete;
   WorldView& operator=(const WorldView&) = delete;
 
-  /// What is done in an update: what can wait a quarter of a second waits, by the clock; or all, so that a picture follows from the scene.
+  /// What is done in an update: what can wait a quarter of a second waits, by the clock; or all, so that a picture
+  /// follows from the scene.
   enum class Work { urgent, all };
   /// Shows the scene as it is; after the first time only what changed is made again.
   void update(const World& world, SceneReaders& readers, Work work = Work::urgent);
@@ -33,9 +34,10 @@ class WorldView {
   /// One body stands out; kNobody: none.
   void highlight(std::uint32_t body);
   [[nodiscard]] std::size_t triangles() const;
-  /// Before each frame of a window: while the camera rests, a thread finds what can be seen, and only that is drawn until camera or pieces
-  /// move. Bone that changes meanwhile is drawn whole. With `coarse`, while the camera moves a quarter of the triangles stand for the bone,
-  /// off by at most kCoarse of a voxel, once another thread has made them. True: nothing is to come but by a change of scene or camera.
+  /// Before each frame of a window: while the camera rests, a thread finds what can be seen, and only that is drawn
+  /// until camera or pieces move. Bone that changes meanwhile is drawn whole. With `coarse`, while the camera moves a
+  /// quarter of the triangles stand for the bone, off by at most kCoarse of a voxel, once another thread has made them.
+  /// True: nothing is to come but by a change of scene or camera.
   bool rest(int width, int height, bool coarse = true);
   static constexpr double kCoarse = 0.35;
   /// All is drawn again, for pictures from elsewhere than the camera rests.
@@ -91,7 +93,7 @@ struct WorldPicture {
   int width = 900, height = 700;
 };
 /// Works without a display. Error(failed) when there is no OpenGL.
-[[nodiscard]] Picture draw_world(const World& world, SceneReaders& readers, const StructureMap* structures, const WorldPicture& picture,
-                                 SoftTissue* soft = nullptr);
+[[nodiscard]] Picture draw_world(const World& world, SceneReaders& readers, const StructureMap* structures,
+                                 const WorldPicture& picture, SoftTissue* soft = nullptr);
 
-}  // namespace osteo::display
+}  // namespace osteo::inline display

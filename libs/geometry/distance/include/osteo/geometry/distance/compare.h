@@ -21,9 +21,10 @@ struct SurfaceComparison {
     return a_to_b.max_bound_mm > b_to_a.max_bound_mm ? a_to_b.max_bound_mm : b_to_a.max_bound_mm;
   }
 };
-/// The maximum by branch and bound over triangles: distance changes by no more than one moves, so a triangle whose centre is near
-/// cannot hold the maximum. Stops when bound and maximum agree to 1e-4 of the extents, or after 200,000 questions; then the
-/// bound says so. Same result for any thread count. Errors: as of TriangleTree.
-[[nodiscard]] SurfaceComparison compare_surfaces(const TriangleSoup& a, const TriangleSoup& b, const Context& context = {});
+/// The maximum by branch and bound over triangles: distance changes by no more than one moves, so a triangle whose
+/// centre is near cannot hold the maximum. Stops when bound and maximum agree to 1e-4 of the extents, or after 200,000
+/// questions; then the bound says so. Same result for any thread count. Errors: as of TriangleTree.
+[[nodiscard]] SurfaceComparison compare_surfaces(const TriangleSoup& a, const TriangleSoup& b,
+                                                 const Context& context = {});
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -42,21 +42,22 @@ struct DistanceMapOptions {
   double band_inside_mm = 1.5, band_outside_mm = 1.5;
 };
 
-/// Exact: for each voxel the nearest of all triangles, measured in double precision; see TriangleTree for the error. Of equally
-/// near triangles always the same one. Same bytes for any thread count and instruction set.
+/// Exact: for each voxel the nearest of all triangles, measured in double precision; see TriangleTree for the error. Of
+/// equally near triangles always the same one. Same bytes for any thread count and instruction set.
 ///
-/// Method: cubes of voxels hand lists of triangles down to their eight children. For a cube with centre c, half extents h
-/// and nearest triangle T* at distance m in direction g*, a triangle (or box) T at distance d in direction g is left out when
+/// Method: cubes of voxels hand lists of triangles down to their eight children. For a cube with centre c, half extents
+/// h and nearest triangle T* at distance m in direction g*, a triangle (or box) T at distance d in direction g is left
+/// out when
 ///   d - m > min(2|h|, sum |g_i - g*_i| h_i + |h|^2 / 2m):
-/// distance to a convex set is convex, so d(x,T) >= d + g.(x-c), while d(x,T*) <= |x - p*|. Lists shrink to the few triangles
-/// that some voxel of the cube is nearest to.
-/// O(voxels) times the length of the last lists (about 10) for surfaces with triangles about as large as voxels.
+/// distance to a convex set is convex, so d(x,T) >= d + g.(x-c), while d(x,T*) <= |x - p*|. Lists shrink to the few
+/// triangles that some voxel of the cube is nearest to. O(voxels) times the length of the last lists (about 10) for
+/// surfaces with triangles about as large as voxels.
 class DistanceMapper {
  public:
   /// Builds the tree and tells inside from outside. Errors as of TriangleTree.
   DistanceMapper(const TriangleSoup& soup, const Frame& frame, const Context& context = {});
-  /// With a tree of the soup in the axes of the frame (`TriangleTree(soup, frame.direction, ...)`): one serves several frames.
-  /// Error(usage) where its axes are others.
+  /// With a tree of the soup in the axes of the frame (`TriangleTree(soup, frame.direction, ...)`): one serves several
+  /// frames. Error(usage) where its axes are others.
   DistanceMapper(const TriangleSoup& soup, TriangleTree tree, const Frame& frame, const Context& context = {});
   [[nodiscard]] DistanceMap map(const DistanceMapOptions& options = {}, const Context& context = {}) const;
   /// Of those voxels of a set in the same frame that are within `reach_mm`.
@@ -84,7 +85,8 @@ class SignedDistance {
     ClosestPoint closest;
     double signed_mm = 0;  ///< negative inside
   };
-  /// O(log n); where a point's winding number is within rounding of one half, also O(openings). Any number of threads may ask at once.
+  /// O(log n); where a point's winding number is within rounding of one half, also O(openings). Any number of threads
+  /// may ask at once.
   [[nodiscard]] Answer at(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone) const;
   /// As of TriangleTree.
   [[nodiscard]] ClosestPoint closest(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone,
@@ -105,4 +107,4 @@ class SignedDistance {
 /// "distance_mm", for .vdb files; what is not stored has the background value (the largest stored distance outside).
 [[nodiscard]] SparseGrid to_sparse(const DistanceMap& map);
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -9,4 +9,4 @@ struct Fan {
   int weight = 1;  ///< how often it counts
 };
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -12,18 +12,20 @@ namespace osteo::inline geometry {
 /// Says of a voxel whether it is inside now: the voxels themselves know, when it is their surface.
 using InsideAt = std::function<bool(int i, int j, int k)>;
 
-/// Exact signed distances of all voxels within `reach_mm` of a surface, which stay exact when triangles are taken away and others
-/// come: after an update every voxel has what a new map of the whole would have. Work is in proportion to the voxels whose
-/// nearest triangle went, or to which a new one may be nearer; for a 3 mm burr's bite well below a millisecond.
-/// One thread at a time.
+/// Exact signed distances of all voxels within `reach_mm` of a surface, which stay exact when triangles are taken away
+/// and others come: after an update every voxel has what a new map of the whole would have. Work is in proportion to
+/// the voxels whose nearest triangle went, or to which a new one may be nearer; for a 3 mm burr's bite well below a
+/// millisecond. One thread at a time.
 class LiveDistance {
  public:
   /// `frame`: isotropic or not, any axes. Errors as of TriangleTree (a surface without triangles is allowed here).
-  LiveDistance(const TriangleSoup& surface, const Frame& frame, double reach_mm, const InsideAt& inside, const Context& context = {});
+  LiveDistance(const TriangleSoup& surface, const Frame& frame, double reach_mm, const InsideAt& inside,
+               const Context& context = {});
 
-  /// Takes triangles away (by the numbers that `add`ing gave; the first surface has 0, 1, ...) and adds others. Returns the
-  /// number of the first one added; the others follow. Error usage for a number that is not there.
-  std::uint32_t update(std::span<const std::uint32_t> removed, std::span<const std::array<Vec3, 3>> added, const InsideAt& inside);
+  /// Takes triangles away (by the numbers that `add`ing gave; the first surface has 0, 1, ...) and adds others. Returns
+  /// the number of the first one added; the others follow. Error usage for a number that is not there.
+  std::uint32_t update(std::span<const std::uint32_t> removed, std::span<const std::array<Vec3, 3>> added,
+                       const InsideAt& inside);
 
   struct Sample {
     double distance_mm = 0;  ///< negative inside
@@ -62,4 +64,4 @@ class LiveDistance {
   std::uint64_t touched_ = 0;
 };
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -17,16 +17,15 @@ enum class Feature : std::uint8_t { face, edge_ab, edge_bc, edge_ca, corner_a, c
 struct ClosestPoint {
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   double distance_mm = std::numeric_limits<double>::infinity();  ///< unsigned
-  std::uint32_t triangle = kNone;                                ///< index in the soup; of equally near ones always the same
+  std::uint32_t triangle = kNone;  ///< index in the soup; of equally near ones always the same
   Feature feature = Feature::face;
   Vec3 point_mm;
 };
 
-/// A tree of boxes, sixteen to a node, over triangles sorted along a Morton curve; no pointers. Immutable; any number of
-/// threads may ask at once.
-/// Distances are exact to rounding in double precision (about 1e-15 of the extents), for needles and zero-area triangles too:
-/// single precision only decides, with a proven margin, which triangles are measured. Memory: 240 bytes a triangle.
-/// Build O(n): a radix sort.
+/// A tree of boxes, sixteen to a node, over triangles sorted along a Morton curve; no pointers. Immutable; any number
+/// of threads may ask at once. Distances are exact to rounding in double precision (about 1e-15 of the extents), for
+/// needles and zero-area triangles too: single precision only decides, with a proven margin, which triangles are
+/// measured. Memory: 240 bytes a triangle. Build O(n): a radix sort.
 class TriangleTree {
  public:
   TriangleTree() = default;
@@ -36,7 +35,8 @@ class TriangleTree {
   TriangleTree(const TriangleSoup& soup, const Mat3& axes, const Context& context);
 
   [[nodiscard]] std::size_t triangle_count() const;
-  /// O(log n). `hint`: a triangle probably near, e.g. the answer for a neighbouring point. Only what is nearer than `limit_mm`.
+  /// O(log n). `hint`: a triangle probably near, e.g. the answer for a neighbouring point. Only what is nearer than
+  /// `limit_mm`.
   [[nodiscard]] ClosestPoint closest(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone,
                                      double limit_mm = std::numeric_limits<double>::infinity()) const;
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -51,4 +51,4 @@ class TriangleTree {
 /// The point of one triangle nearest to p, by the same arithmetic.
 [[nodiscard]] ClosestPoint closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c);
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -22,21 +22,22 @@ struct Ijk {
 using VoxelKey = std::uint32_t;
 
 /// The set of bricks is fixed when the grid is made; values may change. A voxel outside every brick reads as 0.
-/// Limits: kMostBricks bricks, since names are 32 bits wide (17 GB of densities), in a box of at most kMostCells bricks (a table of 0.5 GB:
-/// 0.2 mm over 820 mm each way), 2^17 - 1 of them along an axis.
-/// One thread writes (`set`), others may read at the same time (`at`): each value is a relaxed atomic, so a reader sees old
-/// or new values, never torn ones.
-/// A copy has values of its own; sharing() gives a grid that has all bricks in common with this one, until one of the two takes some for
-/// itself (own_brick, empty_bricks) or from elsewhere (share_brick). What is written into a brick is seen in all grids that have it.
-/// Memory: 4 bytes a voxel of each brick, shared ones once, 28 bytes a brick, and 4 for each brick of the bounding box. Bricks that are
-/// made empty cost no memory until something is written into them. What a grid was made with is given back when none of its bricks is in
-/// use any more; bricks that were made its own one by one.
+/// Limits: kMostBricks bricks, since names are 32 bits wide (17 GB of densities), in a box of at most kMostCells bricks
+/// (a table of 0.5 GB: 0.2 mm over 820 mm each way), 2^17 - 1 of them along an axis. One thread writes (`set`), others
+/// may read at the same time (`at`): each value is a relaxed atomic, so a reader sees old or new values, never torn
+/// ones. A copy has values of its own; sharing() gives a grid that has all bricks in common with this one, until one of
+/// the two takes some for itself (own_brick, empty_bricks) or from elsewhere (share_brick). What is written into a
+/// brick is seen in all grids that have it. Memory: 4 bytes a voxel of each brick, shared ones once, 28 bytes a brick,
+/// and 4 for each brick of the bounding box. Bricks that are made empty cost no memory until something is written into
+/// them. What a grid was made with is given back when none of its bricks is in use any more; bricks that were made its
+/// own one by one.
 class BrickGrid {
  public:
   static constexpr int kEdge = 8;
   static constexpr int kVoxels = kEdge * kEdge * kEdge;
   static constexpr std::uint32_t kNone = 0xffffffffU;
-  static constexpr std::uint32_t kMostBricks = (1U << 23) - 1;  ///< one less than there are numbers: kNone is the last voxel's name
+  static constexpr std::uint32_t kMostBricks =
+      (1U << 23) - 1;  ///< one less than there are numbers: kNone is the last voxel's name
   static constexpr std::uint64_t kMostCells = 1ULL << 27;
 
   BrickGrid() = default;
@@ -52,9 +53,11 @@ class BrickGrid {
   [[nodiscard]] Ijk brick_coordinate(std::uint32_t brick) const { return origins_[brick]; }
   /// kNone when there is no such brick.
   [[nodiscard]] std::uint32_t find_brick(int bi, int bj, int bk) const {
-    if (static_cast<unsigned>(bi) >= extent_[0] || static_cast<unsigned>(bj) >= extent_[1] || static_cast<unsigned>(bk) >= extent_[2])
+    if (static_cast<unsigned>(bi) >= extent_[0] || static_cast<unsigned>(bj) >= extent_[1] ||
+        static_cast<unsigned>(bk) >= extent_[2])
       return kNone;
-    return table_[(static_cast<std::size_t>(bk) * extent_[1] + static_cast<std::size_t>(bj)) * extent_[0] + static_cast<std::size_t>(bi)];
+    return table_[(static_cast<std::size_t>(bk) * extent_[1] + static_cast<std::size_t>(bj)) * extent_[0] +
+                  static_cast<std::size_t>(bi)];
   }
   [[nodiscard]] static constexpr std::uint32_t offset_in_brick(int i, int j, int k) {
     return static_cast<std::uint32_t>((i & 7) | (j & 7) << 3 | (k & 7) << 6);
@@ -90,12 +93,14 @@ class BrickGrid {
 
   /// The same voxels, none of them copied. O(bricks).
   [[nodiscard]] BrickGrid sharing() const;
-  /// From now on this grid has the brick for itself, with the values it had; or, of empty_bricks, with zeros. While another thread reads
-  /// or writes this grid, call it on a grid that shares with it, not on this one.
+  /// From now on this grid has the brick for itself, with the values it had; or, of empty_bricks, with zeros. While
+  /// another thread reads or writes this grid, call it on a grid that shares with it, not on this one.
   void own_brick(std::uint32_t brick);
   void empty_bricks(std::span<const std::uint32_t> bricks);
   /// From now on the brick is the same as brick `from` of `other`.
-  void share_brick(std::uint32_t brick, const BrickGrid& other, std::uint32_t from) { bricks_[brick] = other.bricks_[from]; }
+  void share_brick(std::uint32_t brick, const BrickGrid& other, std::uint32_t from) {
+    bricks_[brick] = other.bricks_[from];
+  }
   [[nodiscard]] bool shares_brick(std::uint32_t brick, const BrickGrid& other, std::uint32_t from) const {
     return bricks_[brick] == other.bricks_[from];
   }
@@ -112,8 +117,9 @@ class BrickGrid {
   Frame frame_;
   std::array<std::uint32_t, 3> extent_{0, 0, 0};  // bricks along each axis
   std::vector<std::uint32_t> table_;
-  std::vector<Ijk> origins_;                    // in bricks
-  std::vector<std::shared_ptr<float>> bricks_;  // kVoxels values each; those that were made together keep one block alive
+  std::vector<Ijk> origins_;  // in bricks
+  std::vector<std::shared_ptr<float>>
+      bricks_;  // kVoxels values each; those that were made together keep one block alive
 };
 
 /// Whether so many bricks, or bricks within a box of so many along each axis, are more than a BrickGrid takes.
@@ -121,14 +127,15 @@ class BrickGrid {
   return bricks > BrickGrid::kMostBricks;
 }
 [[nodiscard]] constexpr bool too_wide_for_bricks(std::array<std::uint64_t, 3> n) {
-  // Along an axis 2^20 voxels less a brick: surfaces name a cell by 20 bits an axis. That also keeps the products from overflowing.
+  // Along an axis 2^20 voxels less a brick: surfaces name a cell by 20 bits an axis. That also keeps the products from
+  // overflowing.
   constexpr std::uint64_t most = BrickGrid::kMostCells, along = (std::uint64_t{1} << 17) - 1;
   return n[0] > along || n[1] > along || n[2] > along || n[0] * n[1] > most || n[0] * n[1] * n[2] > most;
 }
-/// All leaves that hold a value > 0, or with `all` every leaf that stores anything. O(stored voxels). Error(corrupt) where the grid is
-/// beyond the limits of a BrickGrid.
+/// All leaves that hold a value > 0, or with `all` every leaf that stores anything. O(stored voxels). Error(corrupt)
+/// where the grid is beyond the limits of a BrickGrid.
 [[nodiscard]] BrickGrid to_bricks(const SparseGrid& grid, bool all = false);
 /// Bricks with only zeros are left out; equal values come back bit for bit.
 [[nodiscard]] SparseGrid to_sparse(const BrickGrid& bricks, const std::string& name);
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

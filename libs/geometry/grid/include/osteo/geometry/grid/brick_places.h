@@ -19,4 +19,4 @@ namespace osteo::inline geometry {
       {at.i * BrickGrid::kEdge + kMiddle, at.j * BrickGrid::kEdge + kMiddle, at.k * BrickGrid::kEdge + kMiddle});
 }
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

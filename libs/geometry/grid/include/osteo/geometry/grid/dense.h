@@ -7,12 +7,13 @@
 
 namespace osteo::inline geometry {
 
-/// The voxels of the box [lo, lo + n) in index coordinates, with their place in the world. The box may reach beyond what is stored, and
-/// begin below 0: there is the grid's background. O(voxels of the box); values are those of the grid, bit for bit. Error(usage) where n is
-/// not positive, or the box lies beyond 32-bit indices.
+/// The voxels of the box [lo, lo + n) in index coordinates, with their place in the world. The box may reach beyond
+/// what is stored, and begin below 0: there is the grid's background. O(voxels of the box); values are those of the
+/// grid, bit for bit. Error(usage) where n is not positive, or the box lies beyond 32-bit indices.
 [[nodiscard]] Volume<float> to_dense(const SparseGrid& grid, std::array<int, 3> lo, std::array<int, 3> n);
 
-/// What differs from `background` is stored; frame and index are the volume's. Error(usage) for a value that is no number. O(voxels).
+/// What differs from `background` is stored; frame and index are the volume's. Error(usage) for a value that is no
+/// number. O(voxels).
 [[nodiscard]] SparseGrid to_sparse(const Volume<float>& volume, const std::string& name, double background);
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

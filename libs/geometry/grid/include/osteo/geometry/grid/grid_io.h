@@ -11,4 +11,4 @@ void save_grid(const SparseGrid& grid, const std::filesystem::path& path);
 /// The first float grid of the file. Errors: no_input, cannot_read, corrupt.
 [[nodiscard]] SparseGrid load_grid(const std::filesystem::path& path);
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -27,4 +27,4 @@ class GridSampler {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -17,11 +17,11 @@ struct CurvePoint {
   Vec3 point_mm;
 };
 
-/// A polyline with a tree of boxes over runs of sixteen segments, which need no sorting as the curve has an order; a box
-/// also knows its stretch of arc, so that the penalised minimum is found by branch and bound over all segments: exact, where the
-/// k nearest sample points (D. Morris 2006, section 6.2) may all lie on another branch. The penalty is per mm of arc, so it
-/// does not depend on units or on the curve's length.
-/// Immutable; any number of threads may ask; asking never allocates. Memory about 60 bytes a point.
+/// A polyline with a tree of boxes over runs of sixteen segments, which need no sorting as the curve has an order; a
+/// box also knows its stretch of arc, so that the penalised minimum is found by branch and bound over all segments:
+/// exact, where the k nearest sample points (D. Morris 2006, section 6.2) may all lie on another branch. The penalty is
+/// per mm of arc, so it does not depend on units or on the curve's length. Immutable; any number of threads may ask;
+/// asking never allocates. Memory about 60 bytes a point.
 class Curve {
  public:
   Curve() = default;
@@ -59,4 +59,4 @@ class Curve {
   double rounding_ = 0, arc_rounding_ = 0;  // of single-precision bounds, mm
 };
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -10,10 +10,11 @@ namespace osteo::inline geometry {
 
 struct MeshSummary {
   std::uint64_t points = 0, triangles = 0;
-  std::uint64_t non_finite_points = 0, unused_points = 0, equal_points = 0;  ///< equal: points that have another's coordinates
-  std::uint64_t bad_indices = 0;                                             ///< triangles that name a point that is not there
-  std::uint64_t degenerate = 0;                                              ///< two corners at one point
-  std::uint64_t duplicates = 0;                                              ///< the same three points as an earlier one
+  std::uint64_t non_finite_points = 0, unused_points = 0,
+                equal_points = 0;       ///< equal: points that have another's coordinates
+  std::uint64_t bad_indices = 0;        ///< triangles that name a point that is not there
+  std::uint64_t degenerate = 0;         ///< two corners at one point
+  std::uint64_t duplicates = 0;         ///< the same three points as an earlier one
   std::uint64_t zero_area = 0;          ///< area below 1e-12 of the longest edge squared, degenerate ones not counted
   std::uint64_t needles = 0, caps = 0;  ///< smallest angle below 1 degree; largest above 179
   std::uint64_t open_edges = 0, nonmanifold_edges = 0, nonmanifold_points = 0, disagreeing_edges = 0;
@@ -27,7 +28,8 @@ struct MeshSummary {
   double min_edge_mm = 0, max_edge_mm = 0, mean_edge_mm = 0;
   std::array<std::uint64_t, 12> min_angle_histogram{};  ///< triangles by smallest angle, 5 degrees each
 };
-/// Never throws for a bad surface: that is what it is for. Counts are after welding points with equal coordinates. O(n log n).
+/// Never throws for a bad surface: that is what it is for. Counts are after welding points with equal coordinates. O(n
+/// log n).
 [[nodiscard]] MeshSummary summarize(const TriMesh& mesh, const Context& context = {});
 
 struct RepairOptions {
@@ -38,10 +40,13 @@ struct RepairOptions {
   bool turn_bodies = true;       ///< closed bodies that face inward and are no cavities are turned round
 };
 struct RepairReport {
-  std::uint64_t unsound = 0, welded = 0, degenerate = 0, duplicates = 0, flipped = 0, turned_bodies = 0, dropped_bodies = 0;
+  std::uint64_t unsound = 0, welded = 0, degenerate = 0, duplicates = 0, flipped = 0, turned_bodies = 0,
+                dropped_bodies = 0;
 };
-/// What can be mended without new triangles: unsound, degenerate and duplicate triangles out, points welded, neighbours made to agree;
-/// closed bodies face outward, those inside another inward when they did. Errors: failed when nothing is left.
-[[nodiscard]] TriangleSoup repaired(const TriMesh& mesh, const RepairOptions& options, RepairReport& report, const Context& context = {});
+/// What can be mended without new triangles: unsound, degenerate and duplicate triangles out, points welded, neighbours
+/// made to agree; closed bodies face outward, those inside another inward when they did. Errors: failed when nothing is
+/// left.
+[[nodiscard]] TriangleSoup repaired(const TriMesh& mesh, const RepairOptions& options, RepairReport& report,
+                                    const Context& context = {});
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -43,8 +43,8 @@ struct OpenEdge {
   int count = 1;
 };
 
-/// Every edge is used as often one way as the other, by index (equal points with two indices count as two). O(triangles):
-/// compares fingerprints of 64 bits, so a surface that is not closed passes with probability 2^-64.
+/// Every edge is used as often one way as the other, by index (equal points with two indices count as two).
+/// O(triangles): compares fingerprints of 64 bits, so a surface that is not closed passes with probability 2^-64.
 [[nodiscard]] bool is_closed(const TriangleSoup& soup);
 
 /// The same triangles over points of which no two are equal; the others stay, unused. O(points).
@@ -60,8 +60,9 @@ struct Ordered {
   std::uint64_t flipped = 0;          ///< triangles turned round to agree with their neighbours
   std::vector<OpenEdge> open;         ///< empty: closed, the winding number is whole everywhere
 };
-/// Welds points with equal coordinates, drops degenerate and duplicate triangles, turns triangles round so that neighbours across
-/// edges of two agree (each patch keeps the direction that most of its area had). O(n log n); same result whatever the threads.
+/// Welds points with equal coordinates, drops degenerate and duplicate triangles, turns triangles round so that
+/// neighbours across edges of two agree (each patch keeps the direction that most of its area had). O(n log n); same
+/// result whatever the threads.
 [[nodiscard]] Ordered ordered(const TriangleSoup& soup, const Context& context = {});
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -14,10 +14,12 @@ struct TetgenOptions {
   double most_tets = 5e7;       ///< more are refused before anything is done: volume over max_volume_mm3
   GuardLimits limits{};
 };
-/// Constrained Delaunay tetrahedra of a closed surface without self-intersections; the surface's triangles are kept or split, never
-/// moved. H. Si, TetGen, ACM Trans. Math. Softw. 2015. Inside is where the winding number is not zero (solid_surface): cavities stay empty,
-/// a body within another changes nothing. In a process of its own (run_guarded), so that what crashes TetGen or never ends is an error.
-/// Errors: failed otherwise, with TetGen's reason; resources beyond the limits.
-[[nodiscard]] TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options, const Context& context = {});
+/// Constrained Delaunay tetrahedra of a closed surface without self-intersections; the surface's triangles are kept or
+/// split, never moved. H. Si, TetGen, ACM Trans. Math. Softw. 2015. Inside is where the winding number is not zero
+/// (solid_surface): cavities stay empty, a body within another changes nothing. In a process of its own (run_guarded),
+/// so that what crashes TetGen or never ends is an error. Errors: failed otherwise, with TetGen's reason; resources
+/// beyond the limits.
+[[nodiscard]] TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options,
+                                     const Context& context = {});
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

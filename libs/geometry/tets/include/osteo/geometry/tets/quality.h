@@ -21,7 +21,8 @@ struct TetQuality {
   std::uint64_t faces_of_three_or_more = 0;            ///< 0 in a conforming mesh
   std::uint64_t boundary_triangles = 0;
   bool boundary_closed = false, boundary_manifold = false;
-  std::uint64_t buried_triangles = 0;  ///< boundary triangles with other tetrahedra right before them (of up to 50,000 tried)
+  std::uint64_t buried_triangles =
+      0;  ///< boundary triangles with other tetrahedra right before them (of up to 50,000 tried)
   [[nodiscard]] bool conforming() const { return faces_of_three_or_more == 0 && buried_triangles == 0; }
   double min_edge_mm = 0, max_edge_mm = 0;
 };
@@ -37,4 +38,4 @@ struct Dihedrals {
 };
 [[nodiscard]] Dihedrals dihedral_angles(Vec3 a, Vec3 b, Vec3 c, Vec3 d, double* all_deg = nullptr);
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

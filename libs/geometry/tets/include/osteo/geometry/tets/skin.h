@@ -22,15 +22,16 @@ struct SkinOptions {
 };
 
 /// Binds the points of a surface to a mesh at rest, then moves them with it.
-/// embedded: each point keeps its barycentric coordinates in its tetrahedron (outside the mesh: in the nearest one). Exact for
-/// affine motion, stretch and shear included.
-/// frames: D. Morris 2006, section 5.4.2, with its errata mended: each point keeps its offsets in orthonormal frames on the n nearest
-/// points of the mesh's surface, weighted by inverse squared distance so that the weights of one point sum to 1; each vote is
-/// v_s' plus the turned offset. Exact at rest and for rigid motion; frames cannot carry stretch.
+/// embedded: each point keeps its barycentric coordinates in its tetrahedron (outside the mesh: in the nearest one).
+/// Exact for affine motion, stretch and shear included. frames: D. Morris 2006, section 5.4.2, with its errata mended:
+/// each point keeps its offsets in orthonormal frames on the n nearest points of the mesh's surface, weighted by
+/// inverse squared distance so that the weights of one point sum to 1; each vote is v_s' plus the turned offset. Exact
+/// at rest and for rigid motion; frames cannot carry stretch.
 class Skin {
  public:
   Skin(const TriMesh& surface, const TetMesh& rest, const SkinOptions& options = {}, const Context& context = {});
-  /// New positions of the surface's points. `points_mm`: the mesh's points, moved, as many as at rest. O(points of the surface).
+  /// New positions of the surface's points. `points_mm`: the mesh's points, moved, as many as at rest. O(points of the
+  /// surface).
   void apply(std::span<const std::array<float, 3>> points_mm, std::span<std::array<float, 3>> out_mm) const;
   [[nodiscard]] std::size_t point_count() const { return count_; }
   [[nodiscard]] std::size_t mesh_point_count() const { return mesh_points_; }
@@ -67,4 +68,4 @@ class Skin {
   int neighbours_ = 0;
 };
 
-}  // namespace osteo::geometry
+}  // namespace osteo::inline geometry

@@ -1,5 +1,5 @@
-// Many cases, each in a process of its own: one that fails, hangs or eats memory never stops the others, and what was done is not done
-// again. The folder OUT holds
+// Many cases, each in a process of its own: one that fails, hangs or eats memory never stops the others, and what was
+// done is not done again. The folder OUT holds
 //   batch.json            what makes it a batch; another batch into it at once is refused
 //   cases/CODE/           the cases, as the work made them, and what it wrote beside them
 //   records/CODE.json     how each went, written whole when it ended
@@ -67,24 +67,27 @@ struct BatchResult {
   std::string stopped;        ///< why not all were tried; empty when all were
 };
 
-/// Makes one case at `folder` (OUT/cases/CODE); runs in a child process, so what it leaves in memory is lost. Gives the exit code, and
-/// writes to standard output what a command writes with --json: "stages" with their reports, or "error" and "verdict".
+/// Makes one case at `folder` (OUT/cases/CODE); runs in a child process, so what it leaves in memory is lost. Gives the
+/// exit code, and writes to standard output what a command writes with --json: "stages" with their reports, or "error"
+/// and "verdict".
 using CaseWork = std::function<int(const BatchCase& row, const std::filesystem::path& folder)>;
 
-/// Runs what is not done yet, in the order of the table, and writes the report. Cancelled through the context it asks the running cases
-/// to end, writes the report and throws Error(cancelled). Memory does not grow with the number of cases but for their rows.
-/// Errors: cannot_write where OUT holds something that is no batch, or another run is at work in it; usage for codes in `only` that
-/// the table does not have.
-BatchResult run_batch(const std::vector<BatchCase>& table, const BatchOptions& options, const CaseWork& work, const Context& context);
+/// Runs what is not done yet, in the order of the table, and writes the report. Cancelled through the context it asks
+/// the running cases to end, writes the report and throws Error(cancelled). Memory does not grow with the number of
+/// cases but for their rows. Errors: cannot_write where OUT holds something that is no batch, or another run is at work
+/// in it; usage for codes in `only` that the table does not have.
+BatchResult run_batch(const std::vector<BatchCase>& table, const BatchOptions& options, const CaseWork& work,
+                      const Context& context);
 
 /// OUT/report.html, .json and .csv of what the records say. A record that cannot be read counts as waiting.
 BatchResult write_batch_report(const std::vector<BatchCase>& table, const std::filesystem::path& out);
 
 /// What became of a case whose child has ended; `folder` is where the case is.
-[[nodiscard]] CaseRecord record_of(const BatchCase& row, const std::string& key, const ChildEnd& end, int tries, const ChildLimits& limits,
-                                   const std::filesystem::path& folder);
+[[nodiscard]] CaseRecord record_of(const BatchCase& row, const std::string& key, const ChildEnd& end, int tries,
+                                   const ChildLimits& limits, const std::filesystem::path& folder);
 
-/// A message without names of files: of what is in quotation marks, that which looks like a path or a file's name, or is one in `source`.
+/// A message without names of files: of what is in quotation marks, that which looks like a path or a file's name, or
+/// is one in `source`.
 [[nodiscard]] std::string without_names(const std::string& text, const std::filesystem::path& source);
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -1,4 +1,5 @@
-// Pieces of work that each run in a process of their own, with bounds on memory and time, so that none can take another with it.
+// Pieces of work that each run in a process of their own, with bounds on memory and time, so that none can take another
+// with it.
 #pragma once
 #include <cstddef>
 #include <functional>
@@ -10,9 +11,9 @@ namespace osteo::inline hospital {
 
 /// 0: no bound.
 struct ChildLimits {
-  double memory_mb =
-      0;  ///< 10^6 bytes: of memory asked for (RLIMIT_DATA) and of memory of its own that is in use, looked at 10 times a second
-  double seconds = 0;  ///< by the clock
+  double memory_mb = 0;  ///< 10^6 bytes: of memory asked for (RLIMIT_DATA) and of memory of its own that is in use,
+                         ///< looked at 10 times a second
+  double seconds = 0;    ///< by the clock
 };
 
 struct ChildEnd {
@@ -26,8 +27,9 @@ struct ChildEnd {
   std::string out, err;  ///< what it wrote: the first 4 MB to standard output, the last 64 kB to standard error
 };
 
-/// Forks this process: the work runs in a copy of it, which costs milliseconds where starting the program anew costs a quarter of a second.
-/// So the caller may have no other threads (nor have used TBB). A child is asked to end (SIGTERM) by the kernel when its parent is gone.
+/// Forks this process: the work runs in a copy of it, which costs milliseconds where starting the program anew costs a
+/// quarter of a second. So the caller may have no other threads (nor have used TBB). A child is asked to end (SIGTERM)
+/// by the kernel when its parent is gone.
 class Children {
  public:
   Children();
@@ -35,8 +37,8 @@ class Children {
   Children(const Children&) = delete;
   Children& operator=(const Children&) = delete;
 
-  /// `work` gives the exit code. Its standard output and error are collected, its input is empty. Error(resources) when no process can be
-  /// started.
+  /// `work` gives the exit code. Its standard output and error are collected, its input is empty. Error(resources) when
+  /// no process can be started.
   void start(std::size_t id, const std::function<int()>& work, const ChildLimits& limits);
   /// The next one that has ended; none when none did within this time, or a signal came.
   [[nodiscard]] std::optional<ChildEnd> wait(double at_most_s);
@@ -49,4 +51,4 @@ class Children {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

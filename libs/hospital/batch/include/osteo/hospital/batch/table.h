@@ -11,9 +11,9 @@
 namespace osteo::inline hospital {
 
 struct BatchCase {
-  std::size_t line = 1;                         ///< in the table
-  std::string code;                             ///< letters, digits, - and _, beginning with a letter or digit; at most 64
-  std::filesystem::path source;                 ///< of the scan; relative ones are resolved by the table's folder
+  std::size_t line = 1;          ///< in the table
+  std::string code;              ///< letters, digits, - and _, beginning with a letter or digit; at most 64
+  std::filesystem::path source;  ///< of the scan; relative ones are resolved by the table's folder
   std::map<std::string, std::string> settings;  ///< what else its row says, by column; an empty field is not in it
 };
 
@@ -30,11 +30,12 @@ struct BatchCase {
 /// read_csv() refuses, a column or code that is missing, not known, there twice or no code, no rows. Nothing is looked
 /// up on the disk.
 [[nodiscard]] std::vector<BatchCase> read_batch_table(std::string_view text, const std::filesystem::path& file,
-                                                      std::span<const std::string> known, std::span<const std::string> paths);
+                                                      std::span<const std::string> known,
+                                                      std::span<const std::string> paths);
 
 /// Asks `check` about the settings of each row before anything is begun; equal settings once. What it throws (usage) is
 /// told with file and line of the first row that it is wrong for, and how many others are wrong: Error(usage).
 void check_batch_table(std::span<const BatchCase> cases, const std::filesystem::path& file,
                        const std::function<void(const std::map<std::string, std::string>& settings)>& check);
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -1,4 +1,5 @@
-// Objects without what identifies a person: the Basic Application Level Confidentiality Profile of PS3.15 Annex E, edition 2026c.
+// Objects without what identifies a person: the Basic Application Level Confidentiality Profile of PS3.15 Annex E,
+// edition 2026c.
 #pragma once
 #include <cstddef>
 #include <string>
@@ -11,8 +12,8 @@
 namespace osteo::inline hospital {
 
 struct DeidentifyOptions {
-  /// File of 32 to 4,096 bytes that nobody else may read. The same key gives the same codes and UIDs, today and next year; who has it can
-  /// test a guess. Empty: a key of this run, which is forgotten.
+  /// File of 32 to 4,096 bytes that nobody else may read. The same key gives the same codes and UIDs, today and next
+  /// year; who has it can test a guess. Empty: a key of this run, which is forgotten.
   fs::path key;
 };
 
@@ -34,17 +35,19 @@ struct DeidentifyReport {
   std::vector<DeidentifiedStudy> studies;  ///< by code and UID
 };
 
-/// Writes what may leave of each object into `out` (a folder that is there), as study-x/series-x/x.dcm by hashes of the new UIDs. Where the
-/// table leaves a choice the value that keeps an object valid is taken: X/Z empties, X/D, Z/D and X/Z/D put a dummy. Besides the table:
-/// private attributes, attributes of no known kind, overlays and curves are removed, names of persons anywhere are emptied, and UIDs that
-/// are not the standard's own are replaced, all of it within sequences too. Pixels stay: a head's scan shows a face.
-/// Refused, not written: what is no image of CT, MR, PET or 3D X-ray nor a segmentation (reports, documents, photographs of screens hold
-/// words that no table knows); where words are said or likely to be burned in; where a kept text has the patient's name or a number of
-/// theirs; damaged files. Holds one object in memory at a time. Errors: usage (key), no_input, cannot_read, cannot_write, cancelled.
+/// Writes what may leave of each object into `out` (a folder that is there), as study-x/series-x/x.dcm by hashes of the
+/// new UIDs. Where the table leaves a choice the value that keeps an object valid is taken: X/Z empties, X/D, Z/D and
+/// X/Z/D put a dummy. Besides the table: private attributes, attributes of no known kind, overlays and curves are
+/// removed, names of persons anywhere are emptied, and UIDs that are not the standard's own are replaced, all of it
+/// within sequences too. Pixels stay: a head's scan shows a face. Refused, not written: what is no image of CT, MR, PET
+/// or 3D X-ray nor a segmentation (reports, documents, photographs of screens hold words that no table knows); where
+/// words are said or likely to be burned in; where a kept text has the patient's name or a number of theirs; damaged
+/// files. Holds one object in memory at a time. Errors: usage (key), no_input, cannot_read, cannot_write, cancelled.
 [[nodiscard]] DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, const fs::path& out,
                                                   const DeidentifyOptions& options, const Context& context = {});
 
-/// From codes and new UIDs back to the originals, as JSON, in a file that is for this user only. Error(cannot_write) where there is one.
+/// From codes and new UIDs back to the originals, as JSON, in a file that is for this user only. Error(cannot_write)
+/// where there is one.
 void write_deidentify_map(const fs::path& file, const DeidentifyReport& report);
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

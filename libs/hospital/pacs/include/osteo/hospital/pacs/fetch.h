@@ -24,9 +24,10 @@ struct RemoteSeries {
   int images = -1;  ///< -1: the node does not say
 };
 
-/// Series that match, by study and number; at most 10,000 (Error usage: ask for less). Errors: usage when nothing is asked for or a UID is
-/// none; failed.
-[[nodiscard]] std::vector<RemoteSeries> find_series(const DicomPeer& peer, const SeriesKeys& keys, const Context& context = {});
+/// Series that match, by study and number; at most 10,000 (Error usage: ask for less). Errors: usage when nothing is
+/// asked for or a UID is none; failed.
+[[nodiscard]] std::vector<RemoteSeries> find_series(const DicomPeer& peer, const SeriesKeys& keys,
+                                                    const Context& context = {});
 
 struct FetchLimits {
   double object_gb = 4;   ///< no object may be larger
@@ -39,9 +40,10 @@ struct FetchReport {
   std::uint64_t bytes = 0;
 };
 
-/// The objects of a series into `folder` (which must exist and be empty), as they come, bit for bit, named by their order. Errors: failed
-/// when the node says that some could not be sent, or sends another number than it said; resources past a limit; cannot_write.
+/// The objects of a series into `folder` (which must exist and be empty), as they come, bit for bit, named by their
+/// order. Errors: failed when the node says that some could not be sent, or sends another number than it said;
+/// resources past a limit; cannot_write.
 [[nodiscard]] FetchReport fetch_series(const DicomPeer& peer, const RemoteSeries& series, const fs::path& folder,
                                        const FetchLimits& limits = {}, const Context& context = {});
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

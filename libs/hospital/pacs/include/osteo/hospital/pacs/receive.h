@@ -1,8 +1,8 @@
 // A DICOM node that takes what is sent to it (C-STORE, C-ECHO) into a folder.
 //
-// The parent only accepts connections; each association is served by a child process of its own with limits on memory, file size and time,
-// so that what a peer sends can end that child and nothing else. Nothing is decoded: an object is written as it came, its head is read for
-// its UIDs, and it is renamed into place whole, or refused with a status.
+// The parent only accepts connections; each association is served by a child process of its own with limits on memory,
+// file size and time, so that what a peer sends can end that child and nothing else. Nothing is decoded: an object is
+// written as it came, its head is read for its UIDs, and it is renamed into place whole, or refused with a status.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -24,12 +24,12 @@ struct ReceiveOptions {
   int port = 11112;                   ///< 0: any free one (told to `listening`)
   std::vector<std::string> allowed;   ///< titles that may send; empty: anybody, which must be asked for
   bool anybody = false;
-  DicomTls tls;                 ///< when `ca` is named, all three are needed, and who has no certificate from it is not let in
-  int most_associations = 20;   ///< at once; more are refused ("local limit exceeded")
-  double object_gb = 2;         ///< a larger object is refused
-  double folder_gb = 100;       ///< all series that are there now; beyond it objects are refused (A700)
-  double keep_free_gb = 1;      ///< of the disk
-  double memory_mb = 512;       ///< of an association's process
+  DicomTls tls;  ///< when `ca` is named, all three are needed, and who has no certificate from it is not let in
+  int most_associations = 20;  ///< at once; more are refused ("local limit exceeded")
+  double object_gb = 2;        ///< a larger object is refused
+  double folder_gb = 100;      ///< all series that are there now; beyond it objects are refused (A700)
+  double keep_free_gb = 1;     ///< of the disk
+  double memory_mb = 512;      ///< of an association's process
   double timeout_s = 30;  ///< for a peer to say something, and for a message to be whole: an object's may take a second
                           ///< more for each kReceiveBytesPerS of it that have come
   double association_s = 3600;  ///< longest
@@ -52,7 +52,8 @@ struct ClosedSeries {
 
 struct ReceiveEvents {
   std::function<void(int port)> listening;
-  std::function<void(const ClosedSeries&)> closed;       ///< called between connections: what takes long belongs into another process
+  std::function<void(const ClosedSeries&)>
+      closed;  ///< called between connections: what takes long belongs into another process
   std::function<void(const ReceiveCounters&)> counters;  ///< at most once a second, when they changed, and at the end
 };
 
@@ -60,9 +61,10 @@ struct ReceiveEvents {
 /// what is in the folder and has no CLOSED file counts as having just come). Whatever is moved, deleted or filled in
 /// the folder meanwhile is warned of once and ends nothing. Must be called while the process has one thread. Errors:
 /// usage, cannot_write (also where another node receives into the folder), failed (port taken).
-void receive_objects(const fs::path& folder, const ReceiveOptions& options, const ReceiveEvents& events, const Context& context);
+void receive_objects(const fs::path& folder, const ReceiveOptions& options, const ReceiveEvents& events,
+                     const Context& context);
 
 /// What a monitoring system reads (Prometheus' text form, version 0.0.4).
 [[nodiscard]] std::string metrics_text(const ReceiveCounters& counters);
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -13,8 +13,9 @@ namespace osteo::inline hospital {
 struct DicomObject {
   fs::path file;
   std::uint64_t bytes = 0;
-  std::string kind;                                            ///< "CT Image Storage", or the UID of a class without a name here
-  std::string sop_class, sop_instance, study, series, syntax;  ///< UIDs: they can identify a person, so nothing prints them
+  std::string kind;  ///< "CT Image Storage", or the UID of a class without a name here
+  std::string sop_class, sop_instance, study, series,
+      syntax;  ///< UIDs: they can identify a person, so nothing prints them
 };
 
 struct DicomObjects {
@@ -40,10 +41,11 @@ struct SendReport {
   [[nodiscard]] std::size_t safe() const;
 };
 
-/// Sends each object as it is, in its own transfer syntax, under a presentation context of its class: what the node does not take is told,
-/// and the rest is sent. With `check`, the node is asked by C-FIND (study root, image level) which of them it has.
-/// Errors: failed when there is no connection or the node refuses us (which side, which title, why); cancelled.
+/// Sends each object as it is, in its own transfer syntax, under a presentation context of its class: what the node
+/// does not take is told, and the rest is sent. With `check`, the node is asked by C-FIND (study root, image level)
+/// which of them it has. Errors: failed when there is no connection or the node refuses us (which side, which title,
+/// why); cancelled.
 [[nodiscard]] SendReport send_objects(const DicomPeer& peer, const std::vector<DicomObject>& objects, bool check = true,
                                       const Context& context = {});
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -39,9 +39,9 @@ struct ServerSetup {
   double memory_mb = 4000;  ///< that a case may have
 };
 
-/// Reads, and writes only a small file of its own into each folder, which it takes away again. Nothing that is wrong throws: it is a
-/// finding. Rules and pictures are looked at by who can read the first and draw the second. Takes the services' units as systemctl tells
-/// them, and speaks to no other machine.
+/// Reads, and writes only a small file of its own into each folder, which it takes away again. Nothing that is wrong
+/// throws: it is a finding. Rules and pictures are looked at by who can read the first and draw the second. Takes the
+/// services' units as systemctl tells them, and speaks to no other machine.
 [[nodiscard]] std::vector<ServerFinding> check_server(const ServerSetup& setup);
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

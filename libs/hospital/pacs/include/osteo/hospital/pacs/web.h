@@ -7,10 +7,10 @@
 namespace osteo::inline hospital {
 
 struct WebServer {
-  std::string url;             ///< http:// or https://, without user, query and fragment; what is asked for is put behind it
-  std::string login;           ///< USER:PASSWORD; empty: none is asked for. Never told.
-  fs::path ca;                 ///< certificates that are trusted (PEM); empty: those of the system
-  double timeout_s = 30;       ///< for the connection, and for less than 1000 bytes a second
+  std::string url;        ///< http:// or https://, without user, query and fragment; what is asked for is put behind it
+  std::string login;      ///< USER:PASSWORD; empty: none is asked for. Never told.
+  fs::path ca;            ///< certificates that are trusted (PEM); empty: those of the system
+  double timeout_s = 30;  ///< for the connection, and for less than 1000 bytes a second
   std::string flag = "--url";  ///< by which a person names it: errors say it, and that with -login behind it
 };
 
@@ -20,4 +20,4 @@ struct WebServer {
 /// A login from a file that only its owner may read: one line, USER:PASSWORD. Errors: usage, no_input, cannot_read.
 [[nodiscard]] std::string read_login(const fs::path& file);
 
-}  // namespace osteo::hospital
+}  // namespace osteo::inline hospital

@@ -25,12 +25,12 @@ struct ImportedBone {
   Verdict verdict;
 };
 
-/// One pass from the slices to isotropic voxels: linear in each slice and between slices along their true positions, each
-/// slice where its file says (tilt, uneven distances, holes as in place.h). Density is the share of the voxel above `lower`,
-/// from the HU distance to it over the local change, as in resample. A bone voxel has itself or a face neighbour at or above
-/// `lower`. Pieces are of 26-connected voxels.
-/// Memory: the result and a few slices; never the volume. Same bytes for any thread count.
-/// Errors as of import_ct; failed when no bone is left.
-[[nodiscard]] ImportedBone import_bone(const std::filesystem::path& source, const ImportBoneParams& params, const Context& context = {});
+/// One pass from the slices to isotropic voxels: linear in each slice and between slices along their true positions,
+/// each slice where its file says (tilt, uneven distances, holes as in place.h). Density is the share of the voxel
+/// above `lower`, from the HU distance to it over the local change, as in resample. A bone voxel has itself or a face
+/// neighbour at or above `lower`. Pieces are of 26-connected voxels. Memory: the result and a few slices; never the
+/// volume. Same bytes for any thread count. Errors as of import_ct; failed when no bone is left.
+[[nodiscard]] ImportedBone import_bone(const std::filesystem::path& source, const ImportBoneParams& params,
+                                       const Context& context = {});
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -20,8 +20,11 @@ struct ImportParams {
 };
 
 [[nodiscard]] inline PlaceOptions place_options(const ImportParams& p) {
-  return {
-      .max_gap_mm = p.max_gap_mm, .max_hole_mm = p.max_hole_mm, .stack = p.stack, .any_modality = p.any_modality, .hu_offset = p.hu_offset};
+  return {.max_gap_mm = p.max_gap_mm,
+          .max_hole_mm = p.max_hole_mm,
+          .stack = p.stack,
+          .any_modality = p.any_modality,
+          .hu_offset = p.hu_offset};
 }
 
 struct Imported {
@@ -30,11 +33,12 @@ struct Imported {
 };
 
 /// A DICOM folder, DICOMDIR, file or archive, or a volume file.
-/// Throws Refused (with the verdict) for a series that cannot be placed rightly; else errors as of scan_dicom, choose_series and
-/// load_image.
-[[nodiscard]] Imported import_ct(const std::filesystem::path& source, const ImportParams& params, const Context& context = {});
+/// Throws Refused (with the verdict) for a series that cannot be placed rightly; else errors as of scan_dicom,
+/// choose_series and load_image.
+[[nodiscard]] Imported import_ct(const std::filesystem::path& source, const ImportParams& params,
+                                 const Context& context = {});
 
 /// Warnings and facts of a verdict to log and report.
 void tell_verdict(const Verdict& verdict, const Context& context);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -12,43 +12,45 @@
 namespace osteo::inline imaging {
 
 struct DicomObjectOptions {
-  /// The series it was made from. Patient, study and frame of reference are taken over from it, and its slices are referred to. Without
-  /// one the object has a made-up identity ("OSTEOTOME^ANONYMOUS") and names nobody. Values that DICOM does not allow, as careless
-  /// anonymisation leaves them, are not taken over: an invalid UID becomes a valid one made from it (the same for all files), any other
-  /// such value is left empty; a warning names them.
+  /// The series it was made from. Patient, study and frame of reference are taken over from it, and its slices are
+  /// referred to. Without one the object has a made-up identity ("OSTEOTOME^ANONYMOUS") and names nobody. Values that
+  /// DICOM does not allow, as careless anonymisation leaves them, are not taken over: an invalid UID becomes a valid
+  /// one made from it (the same for all files), any other such value is left empty; a warning names them.
   const DicomSeries* source = nullptr;
   std::string description = "Bone";
 };
 
-/// Binary DICOM SEG (PS3.3 A.51), a segment a structure, a frame a slice that holds any of it. Frames lie on the slices of `labels`:
-/// after tilt repair an upright stack of its own, in the frame of reference of the source. A frame refers to the source slice it lies
-/// on, or to the two it lies between at its centre. Atomic. Errors: usage for a label map without a voxel, cannot_write.
+/// Binary DICOM SEG (PS3.3 A.51), a segment a structure, a frame a slice that holds any of it. Frames lie on the slices
+/// of `labels`: after tilt repair an upright stack of its own, in the frame of reference of the source. A frame refers
+/// to the source slice it lies on, or to the two it lies between at its centre. Atomic. Errors: usage for a label map
+/// without a voxel, cannot_write.
 void save_segmentation(const Labels& labels, const std::filesystem::path& path, const DicomObjectOptions& options = {},
                        const Context& context = {});
 
-/// The label map on the slices of the series as they are (tilted, uneven), nearest voxel: for viewers that show a segmentation only on
-/// the pictures it was made from.
-void save_segmentation_on_source(const Labels& labels, const std::filesystem::path& path, const DicomObjectOptions& options,
-                                 const Context& context = {});
+/// The label map on the slices of the series as they are (tilted, uneven), nearest voxel: for viewers that show a
+/// segmentation only on the pictures it was made from.
+void save_segmentation_on_source(const Labels& labels, const std::filesystem::path& path,
+                                 const DicomObjectOptions& options, const Context& context = {});
 
-/// A DICOM SEG as a label map on its own slices, plain, deflated, or compressed by RLE, JPEG-LS, JPEG or JPEG 2000; fractional ones are cut
-/// at half. Slices that hold nothing may be absent from the file, and frames may stand in any order: layers lie SpacingBetweenSlices apart
-/// where all frames fit that, and the layers of absent frames are empty. Where the file states no such distance, the frames' own decides, or
-/// the file is refused when the thickness of its slices says that frames may be absent. Where segments overlap, the later one stays (a
-/// warning says how much). Errors: corrupt for what is no SEG, has no even, parallel frames or more than 255 segments.
+/// A DICOM SEG as a label map on its own slices, plain, deflated, or compressed by RLE, JPEG-LS, JPEG or JPEG 2000;
+/// fractional ones are cut at half. Slices that hold nothing may be absent from the file, and frames may stand in any
+/// order: layers lie SpacingBetweenSlices apart where all frames fit that, and the layers of absent frames are empty.
+/// Where the file states no such distance, the frames' own decides, or the file is refused when the thickness of its
+/// slices says that frames may be absent. Where segments overlap, the later one stays (a warning says how much).
+/// Errors: corrupt for what is no SEG, has no even, parallel frames or more than 255 segments.
 [[nodiscard]] Labels load_segmentation(const std::filesystem::path& path, const Context& context = {});
 
 /// True when the file says it is a DICOM SEG.
 [[nodiscard]] bool is_segmentation(const std::filesystem::path& path);
 
 /// Encapsulated STL (PS3.3 A.85.1): the surface as binary STL in LPS mm inside a DICOM file. Atomic.
-void save_encapsulated_stl(const TriMesh& mesh, const std::filesystem::path& path, const DicomObjectOptions& options = {},
-                           const Context& context = {});
+void save_encapsulated_stl(const TriMesh& mesh, const std::filesystem::path& path,
+                           const DicomObjectOptions& options = {}, const Context& context = {});
 
-/// Encapsulated PDF (PS3.3 A.45.1): the bytes of a PDF, in a series of its own of the source's study, modality DOC, not verified. `title`
-/// names the document. It has no frame of reference. Atomic. Same pages, same study: same UIDs. Errors: usage for what does not begin
-/// as a PDF or is over 4 GB, cannot_write.
+/// Encapsulated PDF (PS3.3 A.45.1): the bytes of a PDF, in a series of its own of the source's study, modality DOC, not
+/// verified. `title` names the document. It has no frame of reference. Atomic. Same pages, same study: same UIDs.
+/// Errors: usage for what does not begin as a PDF or is over 4 GB, cannot_write.
 void save_encapsulated_pdf(std::string_view pdf, const std::string& title, const std::filesystem::path& path,
                            const DicomObjectOptions& options = {}, const Context& context = {});
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

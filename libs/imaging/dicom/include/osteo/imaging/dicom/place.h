@@ -35,8 +35,8 @@ struct Placement {
 /// Slices nearer than this lie at one place; deviations below it are none: the promise is 0.01 mm.
 inline constexpr double kSamePlaceMm = 0.01;
 
-/// Chooses the stack, sorts it, judges it. `excluded` (one a header, may be empty) leaves files out, with the reason to show.
-/// `same_pixels` is asked only where two slices lie at one place. O(n log n). Refusals are errors in the verdict.
+/// Chooses the stack, sorts it, judges it. `excluded` (one a header, may be empty) leaves files out, with the reason to
+/// show. `same_pixels` is asked only where two slices lie at one place. O(n log n). Refusals are errors in the verdict.
 ///
 /// Slices belong to one stack when size and pixel spacing agree and the corners that their orientation gives agree to
 /// kSamePlaceMm. The normal is the cross product of the stated axes, positions along it come from ImagePositionPatient
@@ -45,4 +45,4 @@ inline constexpr double kSamePlaceMm = 0.01;
                                      const std::vector<FileSetAside>& excluded = {},
                                      const std::function<bool(std::size_t, std::size_t)>& same_pixels = {});
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -16,8 +16,8 @@ namespace osteo::inline imaging {
 struct DicomSeries {
   int number = 0;   ///< SeriesNumber as the scanner gave it
   std::string uid;  ///< to ask for it by; never written to a file
-  /// Which patient (A, B, ...), which of their studies (1, 2, ...) and which frame of reference in it (a, b, ...): "A1a". Series of
-  /// different scans do not lie in one space.
+  /// Which patient (A, B, ...), which of their studies (1, 2, ...) and which frame of reference in it (a, b, ...):
+  /// "A1a". Series of different scans do not lie in one space.
   std::string scan;
   std::string study_date, study_description;  ///< can identify a person: shown on request only
   std::string modality, kernel;
@@ -30,8 +30,10 @@ struct DicomSeries {
   bool recommended = false;  ///< the best of its scan: taken when nothing is asked for and there is no other scan
   std::string why;           ///< why it is recommended
   std::vector<DicomHeader> headers;
-  std::shared_ptr<const std::vector<FileSetAside>> strays;  ///< the scan's set_aside: part of every verdict on it; may be null
-  std::vector<std::string> foreign;  ///< slices under the same series UID that are of another patient, study or frame of reference
+  std::shared_ptr<const std::vector<FileSetAside>>
+      strays;  ///< the scan's set_aside: part of every verdict on it; may be null
+  std::vector<std::string>
+      foreign;  ///< slices under the same series UID that are of another patient, study or frame of reference
 };
 
 struct DicomScan {
@@ -49,13 +51,16 @@ struct DicomScan {
 /// Names shown hold no value that identifies the patient: such a folder becomes "*",
 /// such a file "file-000012".
 /// Errors: no_input when there is no DICOM image at all, cannot_read, resources when an archive does not fit the disk.
-[[nodiscard]] DicomScan scan_dicom(const std::filesystem::path& source, const PlaceOptions& options = {}, const Context& context = {});
+[[nodiscard]] DicomScan scan_dicom(const std::filesystem::path& source, const PlaceOptions& options = {},
+                                   const Context& context = {});
 
-/// The recommended series, or the one asked for by number, UID, scan ("A1a": the recommended one of it) or both ("A1a:203"). Errors,
-/// each with a list of what there is: corrupt when nothing is asked for but there are several scans, usage, no_input.
-[[nodiscard]] const DicomSeries& choose_series(const DicomScan& scan, const std::string& wanted, const std::string& source_name);
+/// The recommended series, or the one asked for by number, UID, scan ("A1a": the recommended one of it) or both
+/// ("A1a:203"). Errors, each with a list of what there is: corrupt when nothing is asked for but there are several
+/// scans, usage, no_input.
+[[nodiscard]] const DicomSeries& choose_series(const DicomScan& scan, const std::string& wanted,
+                                               const std::string& source_name);
 
 /// True by name or by first bytes.
 [[nodiscard]] bool is_archive(const std::filesystem::path& file);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

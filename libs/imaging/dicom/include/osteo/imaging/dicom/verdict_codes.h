@@ -8,15 +8,16 @@
 namespace osteo::inline imaging {
 
 /// Sizes from which on something is told; each stands here only.
-inline constexpr double kTiltDeg = 0.05;               ///< slices that lean by less are straight: 0.2 mm over a head
-inline constexpr double kShiftMm = 0.05;               ///< of a slice, sideways against the others
-inline constexpr double kMaxBoneCm2 = 80;              ///< of bone in each slice on average: a skull has up to 45, a pelvis 60
-inline constexpr double kShiftedHu = 200;              ///< values shifted by as much are refused
-inline constexpr double kSliceBlankEndMm2PerMm = 1700;  ///< a body that ends between two slices: three times what a head's vault does
-inline constexpr double kSlicePartShare = 0.15;        ///< of the body in a slice that is of one value
-inline constexpr double kSliceStepHu = 30;             ///< of air or soft tissue from a slice to the next
-inline constexpr double kSliceMirrorRatio = 1.25;      ///< how much better a slice fits the next when turned over
-inline constexpr double kSliceOrderRatio = 1.2;        ///< how much better two slices fit in each other's place
+inline constexpr double kTiltDeg = 0.05;   ///< slices that lean by less are straight: 0.2 mm over a head
+inline constexpr double kShiftMm = 0.05;   ///< of a slice, sideways against the others
+inline constexpr double kMaxBoneCm2 = 80;  ///< of bone in each slice on average: a skull has up to 45, a pelvis 60
+inline constexpr double kShiftedHu = 200;  ///< values shifted by as much are refused
+inline constexpr double kSliceBlankEndMm2PerMm =
+    1700;  ///< a body that ends between two slices: three times what a head's vault does
+inline constexpr double kSlicePartShare = 0.15;    ///< of the body in a slice that is of one value
+inline constexpr double kSliceStepHu = 30;         ///< of air or soft tissue from a slice to the next
+inline constexpr double kSliceMirrorRatio = 1.25;  ///< how much better a slice fits the next when turned over
+inline constexpr double kSliceOrderRatio = 1.2;    ///< how much better two slices fit in each other's place
 
 enum class Refuses {
   no,
@@ -44,4 +45,4 @@ struct VerdictCode {
 /// The row of the page: "| `TILTED` | info | no | 0.05 degrees | ... | ... |".
 [[nodiscard]] std::string table_row(const VerdictCode& code);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

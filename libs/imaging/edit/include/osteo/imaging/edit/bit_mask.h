@@ -22,15 +22,22 @@ class BitMask {
   BitMask(const Image& ct, double lower_hu, double upper_hu, int threads = 0);
 
   [[nodiscard]] const std::array<int, 3>& dims() const { return dims_; }
-  [[nodiscard]] std::size_t rows() const { return static_cast<std::size_t>(dims_[1]) * static_cast<std::size_t>(dims_[2]); }
+  [[nodiscard]] std::size_t rows() const {
+    return static_cast<std::size_t>(dims_[1]) * static_cast<std::size_t>(dims_[2]);
+  }
   [[nodiscard]] std::size_t words_per_row() const { return words_per_row_; }
   [[nodiscard]] std::span<std::uint64_t> words() { return words_; }
   [[nodiscard]] std::span<const std::uint64_t> words() const { return words_; }
-  [[nodiscard]] std::span<std::uint64_t> row(std::size_t row) { return {words_.data() + row * words_per_row_, words_per_row_}; }
-  [[nodiscard]] std::span<const std::uint64_t> row(std::size_t row) const { return {words_.data() + row * words_per_row_, words_per_row_}; }
+  [[nodiscard]] std::span<std::uint64_t> row(std::size_t row) {
+    return {words_.data() + row * words_per_row_, words_per_row_};
+  }
+  [[nodiscard]] std::span<const std::uint64_t> row(std::size_t row) const {
+    return {words_.data() + row * words_per_row_, words_per_row_};
+  }
   /// Within the volume only.
   [[nodiscard]] bool at(int i, int j, int k) const {
-    const std::size_t r = static_cast<std::size_t>(k) * static_cast<std::size_t>(dims_[1]) + static_cast<std::size_t>(j);
+    const std::size_t r =
+        static_cast<std::size_t>(k) * static_cast<std::size_t>(dims_[1]) + static_cast<std::size_t>(j);
     return (words_[r * words_per_row_ + static_cast<std::size_t>(i >> 6)] >> (i & 63) & 1) != 0;
   }
   /// Voxels [begin, end) of a row.
@@ -64,9 +71,10 @@ struct CoarseMask {
   Frame frame;
   std::vector<float> filled;
 };
-/// Whole voxels are put together so that they are about as long as wide and no more than `most` remain. Same bytes for any threads.
+/// Whole voxels are put together so that they are about as long as wide and no more than `most` remain. Same bytes for
+/// any threads.
 [[nodiscard]] CoarseMask coarse(const BitMask& mask, const Frame& frame, std::size_t most, int threads = 0);
 /// The same of the voxels between two HU values.
 [[nodiscard]] CoarseMask coarse(const Image& ct, double lower_hu, double upper_hu, std::size_t most, int threads = 0);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -1,5 +1,5 @@
-// A case under correction: its CT, the bone mask and the structures as they are now, and every step that led there, to be undone and
-// done again. No window; the CT is never changed.
+// A case under correction: its CT, the bone mask and the structures as they are now, and every step that led there, to
+// be undone and done again. No window; the CT is never changed.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -16,7 +16,8 @@
 
 namespace osteo::inline imaging {
 
-/// A structure as the editor knows it: what the case will know (value, name, colour), its role, and whether it is drawn.
+/// A structure as the editor knows it: what the case will know (value, name, colour), its role, and whether it is
+/// drawn.
 struct EditStructure {
   Structure is;
   StructureRole role = StructureRole::at_risk;
@@ -37,18 +38,18 @@ struct BonePlan;
 class WordChanges;  // private to libs/imaging/edit
 
 struct EditLimits {
-  /// Of the history. Above it the largest old steps forget what they changed; undoing one of those makes all before it again, from the
-  /// start, which takes as long as they took.
+  /// Of the history. Above it the largest old steps forget what they changed; undoing one of those makes all before it
+  /// again, from the start, which takes as long as they took.
   std::size_t history_bytes = 256U << 20;
 };
 
-/// Memory: the CT (2 bytes a voxel), 1 bit for bone, 1 byte for structures in those pages of memory that hold any, and the history: some
-/// 100 bytes for a dab of the brush, a few MB for a new threshold of a noisy 512 x 512 x 600. One thread changes it; while none does, any
-/// may read, and `plan` counts as reading.
+/// Memory: the CT (2 bytes a voxel), 1 bit for bone, 1 byte for structures in those pages of memory that hold any, and
+/// the history: some 100 bytes for a dab of the brush, a few MB for a new threshold of a noisy 512 x 512 x 600. One
+/// thread changes it; while none does, any may read, and `plan` counts as reading.
 class EditDocument {
  public:
-  /// `bone` (1 is bone) and `structures` as the case begins. Structures on another grid than the CT's are taken over by the voxel that
-  /// holds each centre. Error(usage) when `bone` is on another grid.
+  /// `bone` (1 is bone) and `structures` as the case begins. Structures on another grid than the CT's are taken over by
+  /// the voxel that holds each centre. Error(usage) when `bone` is on another grid.
   EditDocument(Image ct, const Labels& bone, const Labels* structures = nullptr, EditLimits limits = {});
   ~EditDocument();
   EditDocument(EditDocument&&) noexcept;
@@ -71,17 +72,19 @@ class EditDocument {
   [[nodiscard]] Bounds bounds(int value) const;
   [[nodiscard]] double volume_mm3(int value) const;  ///< 0: bone
 
-  /// One step of one operation. Errors: usage for values out of range or a structure that is not there; cancelled, and then nothing is
-  /// done.
+  /// One step of one operation. Errors: usage for values out of range or a structure that is not there; cancelled, and
+  /// then nothing is done.
   EditOutcome apply(const EditOperation& operation, const Context& context = {});
-  /// One step of several operations on bone, worked out beside the document, which others may read meanwhile. Made true by `commit`, which
-  /// takes no time, unless the document was changed since (Error(failed)).
+  /// One step of several operations on bone, worked out beside the document, which others may read meanwhile. Made true
+  /// by `commit`, which takes no time, unless the document was changed since (Error(failed)).
   [[nodiscard]] BonePlan plan(std::vector<EditOperation> operations, const Context& context = {}) const;
   EditOutcome commit(BonePlan plan);
-  /// A threshold, and after it all that was done to bone since the last one, or since the beginning: what a new threshold would forget.
+  /// A threshold, and after it all that was done to bone since the last one, or since the beginning: what a new
+  /// threshold would forget.
   [[nodiscard]] std::vector<EditOperation> with_later_steps(const ThresholdEdit& threshold) const;
 
-  // A brush stroke while it is drawn: it shows at once, and is one step when it ends. Nothing else may be done meanwhile.
+  // A brush stroke while it is drawn: it shows at once, and is one step when it ends. Nothing else may be done
+  // meanwhile.
   /// `stroke` without points.
   void begin_stroke(BrushEdit stroke);
   void add_point(Vec3 world_mm);
@@ -132,4 +135,4 @@ struct BonePlan {
 /// The voxels of one value as an operation; empty runs when there are none.
 [[nodiscard]] VoxelsEdit voxels_of(const Labels& labels, std::uint8_t value, int structure);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

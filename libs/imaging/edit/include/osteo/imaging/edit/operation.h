@@ -1,4 +1,5 @@
-// What can be done to the bone mask and the structures of a case: plain values, one struct a kind, each field named once.
+// What can be done to the bone mask and the structures of a case: plain values, one struct a kind, each field named
+// once.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -73,10 +74,13 @@ struct BoxEdit {
 struct FillEdit {
   static constexpr std::string_view kName = "fill";
   double max_volume_mm3 = 50;
-  static void describe(FillEdit& p, auto& visit) { visit({"max_volume_mm3", "larger cavities stay", "mm3", 0, 1e9}, p.max_volume_mm3); }
+  static void describe(FillEdit& p, auto& visit) {
+    visit({"max_volume_mm3", "larger cavities stay", "mm3", 0, 1e9}, p.max_volume_mm3);
+  }
 };
-/// Each voxel becomes what most of its neighbourhood is, by binomial weights that reach floor(radius / spacing) voxels along each axis, 5
-/// at most: nothing changes that is farther than the radius, along an axis, from the surface as it was. Walls thinner than that may go.
+/// Each voxel becomes what most of its neighbourhood is, by binomial weights that reach floor(radius / spacing) voxels
+/// along each axis, 5 at most: nothing changes that is farther than the radius, along an axis, from the surface as it
+/// was. Walls thinner than that may go.
 struct SmoothEdit {
   static constexpr std::string_view kName = "smooth";
   double radius_mm = 1;
@@ -97,8 +101,8 @@ struct BrushEdit {
     visit({"radius_mm", "of the ball", "mm", 0.05, 50}, p.radius_mm);
   }
 };
-/// Voxels of a structure that something else has found: a tube, a region, a label map of another program. They take the place of what
-/// was there. The place for tools that add a structure: `voxels_of` makes it from a label map.
+/// Voxels of a structure that something else has found: a tube, a region, a label map of another program. They take the
+/// place of what was there. The place for tools that add a structure: `voxels_of` makes it from a label map.
 struct VoxelsEdit {
   static constexpr std::string_view kName = "voxels";
   int structure = 1;
@@ -137,11 +141,13 @@ struct ChangeStructureEdit {
 struct DeleteStructureEdit {
   static constexpr std::string_view kName = "delete_structure";
   int structure = 1;
-  static void describe(DeleteStructureEdit& p, auto& visit) { visit({"structure", "its value", "", 1, 255}, p.structure); }
+  static void describe(DeleteStructureEdit& p, auto& visit) {
+    visit({"structure", "its value", "", 1, 255}, p.structure);
+  }
 };
 
-using EditOperation = std::variant<ThresholdEdit, IslandEdit, IslandSizeEdit, BoxEdit, FillEdit, SmoothEdit, BrushEdit, VoxelsEdit,
-                               AddStructureEdit, ChangeStructureEdit, DeleteStructureEdit>;
+using EditOperation = std::variant<ThresholdEdit, IslandEdit, IslandSizeEdit, BoxEdit, FillEdit, SmoothEdit, BrushEdit,
+                                   VoxelsEdit, AddStructureEdit, ChangeStructureEdit, DeleteStructureEdit>;
 
 /// As files call it: "threshold".
 [[nodiscard]] std::string_view operation_name(const EditOperation& operation);
@@ -154,4 +160,4 @@ using EditOperation = std::variant<ThresholdEdit, IslandEdit, IslandSizeEdit, Bo
 /// Error(usage) for values out of range: no points, corners in the wrong order, no name, no colour.
 void require_valid(const EditOperation& operation);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

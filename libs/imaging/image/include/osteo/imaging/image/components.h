@@ -27,13 +27,15 @@ struct Components {
 };
 
 /// Components of the voxels equal to `value` (0: background, 1: mask). O(voxels); memory O(runs).
-[[nodiscard]] Components connected_components(std::span<const std::uint8_t> mask, std::array<int, 3> dims, std::uint8_t value,
-                                              Connectivity connectivity);
+[[nodiscard]] Components connected_components(std::span<const std::uint8_t> mask, std::array<int, 3> dims,
+                                              std::uint8_t value, Connectivity connectivity);
 
 /// The same for runs that are at hand, in scan order.
-[[nodiscard]] Components connected_components(std::vector<Run> runs, std::array<int, 3> dims, Connectivity connectivity);
+[[nodiscard]] Components connected_components(std::vector<Run> runs, std::array<int, 3> dims,
+                                              Connectivity connectivity);
 
-/// Which components to drop: those below `min_voxels`, and those beyond the `keep_largest` largest (0 keeps all). One a component.
+/// Which components to drop: those below `min_voxels`, and those beyond the `keep_largest` largest (0 keeps all). One a
+/// component.
 [[nodiscard]] std::vector<bool> components_to_drop(const Components& components, double min_voxels, int keep_largest);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

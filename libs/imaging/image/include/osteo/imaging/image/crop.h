@@ -22,13 +22,14 @@ struct Box {
   Vec3 lo_mm, hi_mm;  ///< along the body's axes, LPS
 };
 
-/// Where the region lies. Named regions go by the largest piece of bone: its top, its sides, its middle; the distances are those of an
-/// adult head (ear canal 122 mm below the vertex). A first box, to be moved by hand: `centre_mm` and `size_mm` that are not all zero
-/// take the place of what was found. Errors: usage for a box without size; failed when the scan does not reach the top of the head.
+/// Where the region lies. Named regions go by the largest piece of bone: its top, its sides, its middle; the distances
+/// are those of an adult head (ear canal 122 mm below the vertex). A first box, to be moved by hand: `centre_mm` and
+/// `size_mm` that are not all zero take the place of what was found. Errors: usage for a box without size; failed when
+/// the scan does not reach the top of the head.
 [[nodiscard]] Box find_region(const Image& ct, const CropParams& params);
 
 /// The smallest block of whole voxels that covers the box. Error(usage) when the box lies outside.
 [[nodiscard]] Image crop(const Image& ct, const Box& box);
 [[nodiscard]] Labels crop(const Labels& labels, const Box& box);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -1,9 +1,10 @@
 // The anatomy of the phantom: a head as smooth solids whose every surface, centre line and wall is known at any point.
 //
-// Sizes are means of published anatomy; docs/phantom.md has the table with sources. In short (mm): cranium 180 x 142, vault 6.5 of
-// cortex, diploe, cortex; bony ear canal 16 long, 7 x 9 wide; tympanic cavity 15 high, 2 to 6 deep; facial nerve's labyrinthine,
-// tympanic and mastoid segments 4, 11 and 14 long; canals of the labyrinth 3 in radius, cochlea of 2.5 turns, 9 at its base; sigmoid
-// sinus 10 wide, 13.7 behind the canal; nerve 7 before the sinus and 3.7 behind the canal's wall; tegmen and sinus plate about 1.
+// Sizes are means of published anatomy; docs/phantom.md has the table with sources. In short (mm): cranium 180 x 142,
+// vault 6.5 of cortex, diploe, cortex; bony ear canal 16 long, 7 x 9 wide; tympanic cavity 15 high, 2 to 6 deep; facial
+// nerve's labyrinthine, tympanic and mastoid segments 4, 11 and 14 long; canals of the labyrinth 3 in radius, cochlea
+// of 2.5 turns, 9 at its base; sigmoid sinus 10 wide, 13.7 behind the canal; nerve 7 before the sinus and 3.7 behind
+// the canal's wall; tegmen and sinus plate about 1.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -64,8 +65,8 @@ struct TubePoint {
   double radius_mm = 0;
 };
 
-/// A cell of the mastoid: a ball that the cell fills until it meets the walls to its neighbours, half as far from the one as from the
-/// other.
+/// A cell of the mastoid: a ball that the cell fills until it meets the walls to its neighbours, half as far from the
+/// one as from the other.
 struct AirCell {
   Vec3 centre_mm;
   double radius_mm = 0;
@@ -76,20 +77,24 @@ struct AirCell {
 /// Immutable; copies share the data; safe from any thread.
 class HeadAnatomy {
  public:
-  /// `individual` 0 has mean sizes; another number varies them within the published spread and places other air cells. About 50 ms.
+  /// `individual` 0 has mean sizes; another number varies them within the published spread and places other air cells.
+  /// About 50 ms.
   explicit HeadAnatomy(std::uint64_t individual = 0);
 
   struct Sample {
     Tissue tissue = Tissue::air;
     double margin_mm = 0;  ///< every point nearer than this has the same tissue
   };
-  /// Exact. LPS mm, the head's centre is the origin, the Frankfurt plane level. 0.1 us in the brain, 3 us among air cells.
+  /// Exact. LPS mm, the head's centre is the origin, the Frankfurt plane level. 0.1 us in the brain, 3 us among air
+  /// cells.
   [[nodiscard]] Sample sample(Vec3 lps_mm) const;
   [[nodiscard]] Tissue tissue(Vec3 lps_mm) const { return sample(lps_mm).tissue; }
 
-  /// From the brain's side of the internal auditory canal, by the geniculate ganglion and the second genu, to the parotid gland.
+  /// From the brain's side of the internal auditory canal, by the geniculate ganglion and the second genu, to the
+  /// parotid gland.
   [[nodiscard]] std::span<const TubePoint> facial_nerve() const;
-  /// Arc length in mm along `facial_nerve()` where a segment ends: fundus, geniculate ganglion, second genu, stylomastoid foramen.
+  /// Arc length in mm along `facial_nerve()` where a segment ends: fundus, geniculate ganglion, second genu,
+  /// stylomastoid foramen.
   struct NerveMarks {
     double fundus_mm, geniculate_mm, second_genu_mm, foramen_mm;
   };
@@ -107,4 +112,4 @@ class HeadAnatomy {
   std::shared_ptr<const Model> model_;
 };
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -25,12 +25,12 @@ struct PhantomParams {
 };
 
 struct Phantom {
-  Image ct;             ///< mean HU over the voxel, the scanner's point spread (1 4 1)/6 along each axis, Gaussian noise
-  Labels labels;        ///< exact tissue at the voxel centre
+  Image ct;       ///< mean HU over the voxel, the scanner's point spread (1 4 1)/6 along each axis, Gaussian noise
+  Labels labels;  ///< exact tissue at the voxel centre
   double bone_mm3 = 0;  ///< by the same 27 samples a voxel
 };
-/// A CT of `HeadAnatomy(params.individual)`. Same parameters and context.seed (of the noise), same bytes, for any number of threads.
-/// Voxels that one tissue fills, which its margin tells, cost one sample for all of a block.
+/// A CT of `HeadAnatomy(params.individual)`. Same parameters and context.seed (of the noise), same bytes, for any
+/// number of threads. Voxels that one tissue fills, which its margin tells, cost one sample for all of a block.
 [[nodiscard]] Phantom make_phantom(const PhantomParams& params, const Context& context = {});
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

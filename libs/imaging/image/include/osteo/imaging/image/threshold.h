@@ -25,11 +25,12 @@ struct ThresholdParams {
   Connectivity connectivity = Connectivity::full;
 };
 
-/// 1 where lower <= HU <= upper (lower as the preset says, see bone_threshold.h), then in this order: table and head holder cleared where
-/// they are so for certain (with remove_table all that lies outside the body, with keep_table nothing; libs/imaging/image/src/clean.h), voxels
-/// below metal_lower within metal_mm of metal cleared (streaks), pieces without a voxel of at least `core` HU dropped (hysteresis), gaps up
-/// to twice close_mm closed (ball in mm), enclosed cavities up to fill_mm3 filled, pieces below min_volume_mm3 or beyond the keep_largest
-/// largest dropped. O(voxels). Error(failed) when nothing is left.
+/// 1 where lower <= HU <= upper (lower as the preset says, see bone_threshold.h), then in this order: table and head
+/// holder cleared where they are so for certain (with remove_table all that lies outside the body, with keep_table
+/// nothing; libs/imaging/image/src/clean.h), voxels below metal_lower within metal_mm of metal cleared (streaks),
+/// pieces without a voxel of at least `core` HU dropped (hysteresis), gaps up to twice close_mm closed (ball in mm),
+/// enclosed cavities up to fill_mm3 filled, pieces below min_volume_mm3 or beyond the keep_largest largest dropped.
+/// O(voxels). Error(failed) when nothing is left.
 [[nodiscard]] Labels threshold(const Image& ct, const ThresholdParams& params, const Context& context = {});
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

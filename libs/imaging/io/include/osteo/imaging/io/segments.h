@@ -1,4 +1,5 @@
-// Segments of 3D Slicer (.seg.nrrd) one by one, as they may overlap; load_labels of volume_io.h makes one label map of them.
+// Segments of 3D Slicer (.seg.nrrd) one by one, as they may overlap; load_labels of volume_io.h makes one label map of
+// them.
 #pragma once
 #include <filesystem>
 #include <map>
@@ -26,12 +27,13 @@ struct Segment {
   std::optional<Volume<std::uint8_t>> mask;
 };
 
-/// In the order of the file. Memory: a byte for each voxel of each box. Errors: no_input, cannot_read, corrupt (also when the file names no
-/// segment).
+/// In the order of the file. Memory: a byte for each voxel of each box. Errors: no_input, cannot_read, corrupt (also
+/// when the file names no segment).
 [[nodiscard]] std::vector<Segment> load_segments(const std::filesystem::path& path, const Context& context = {});
 
-/// A label map as .seg.nrrd whose segments carry `tags` and kStructureTag, which Slicer writes back as they are. Keys without ':' and '|',
-/// values without '|'. Atomic. Errors: usage for another suffix, cannot_write.
-void save_segments(const Labels& labels, const std::filesystem::path& path, const std::map<std::string, std::string>& tags);
+/// A label map as .seg.nrrd whose segments carry `tags` and kStructureTag, which Slicer writes back as they are. Keys
+/// without ':' and '|', values without '|'. Atomic. Errors: usage for another suffix, cannot_write.
+void save_segments(const Labels& labels, const std::filesystem::path& path,
+                   const std::map<std::string, std::string>& tags);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

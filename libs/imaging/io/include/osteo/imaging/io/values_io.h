@@ -9,4 +9,4 @@ namespace osteo::inline imaging {
 /// In single precision, as .nrrd or .vti, written atomically. Errors: usage for another suffix, cannot_write.
 void save_values(const Volume<float>& values, const std::filesystem::path& path);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

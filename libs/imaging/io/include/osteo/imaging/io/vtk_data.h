@@ -27,7 +27,8 @@ namespace osteo::inline imaging {
 /// Errors: corrupt when there are no scalars, several components, or values that do not fit.
 [[nodiscard]] Image image_from_vtk(vtkImageData* data);
 [[nodiscard]] Labels labels_from_vtk(vtkImageData* data);
-/// Polygons of more than three points are cut into triangles; strips and lines are ignored. Error corrupt for indices without a point.
+/// Polygons of more than three points are cut into triangles; strips and lines are ignored. Error corrupt for indices
+/// without a point.
 [[nodiscard]] TriMesh mesh_from_vtk(vtkPolyData* data);
 /// Cells must be tetrahedra (Error corrupt); those of negative volume are turned round.
 [[nodiscard]] TetMesh tets_from_vtk(vtkUnstructuredGrid* data);
@@ -50,4 +51,4 @@ class QuietVtk {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

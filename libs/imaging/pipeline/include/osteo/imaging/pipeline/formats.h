@@ -11,10 +11,11 @@ namespace osteo::inline imaging {
 
 /// The value in `path`, of one of the accepted kinds. A port that accepts `source` gets the path itself.
 /// Errors: as of the readers; usage when the file is of a kind that is not accepted.
-[[nodiscard]] Data load_data(const std::filesystem::path& path, std::span<const DataKind> accepted, const Context& context = {});
+[[nodiscard]] Data load_data(const std::filesystem::path& path, std::span<const DataKind> accepted,
+                             const Context& context = {});
 
-/// Writes by suffix, atomically. An image saved under a name without suffix becomes a folder of DICOM files; a folder that is there
-/// already is replaced only when `may_replace` lets it pass (see write_folder_atomically).
+/// Writes by suffix, atomically. An image saved under a name without suffix becomes a folder of DICOM files; a folder
+/// that is there already is replaced only when `may_replace` lets it pass (see write_folder_atomically).
 void save_data(const Data& data, const std::filesystem::path& path, const Context& context = {},
                const std::function<void(const std::filesystem::path& old)>& may_replace = {});
 
@@ -27,4 +28,4 @@ void require_savable(DataKind kind, const std::filesystem::path& path);
 /// "image: .nrrd .nii.gz ..." for help texts.
 [[nodiscard]] std::string suffixes_of(DataKind kind);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -55,11 +55,13 @@ void validate(Pipeline& pipeline, const Registry& registry);
 struct RunOptions {
   bool overwrite = false;  ///< replace outputs that exist
   bool reuse = false;      ///< keep outputs that exist and would come out the same; make the others again
-  /// Where an output is written before the caller moves it to its place, once all are made. Empty: straight to its place.
+  /// Where an output is written before the caller moves it to its place, once all are made. Empty: straight to its
+  /// place.
   std::function<std::filesystem::path(const std::filesystem::path& output)> place = {};
   /// Ids of nodes that are run even if all their outputs are there, or they write none.
   std::set<std::string> always = {};
-  /// Called with each output of each node that was run, as soon as it is made. Whoever keeps the value keeps its memory.
+  /// Called with each output of each node that was run, as soon as it is made. Whoever keeps the value keeps its
+  /// memory.
   std::function<void(const std::string& id, const std::string& port, const Data& value)> seen = {};
 };
 
@@ -73,13 +75,14 @@ struct NodeResult {
   std::map<std::string, std::string> output_hashes{};
 };
 
-/// Validates and runs. Beside each output FILE it writes FILE.prov.json: program, stage, parameters, hashes of inputs and
-/// output, report, duration, peak memory. No names of inputs, since names of files may name patients.
-/// An error names the stage; outputs finished before stay. A folder is replaced only when require_replaceable lets it pass.
-std::vector<NodeResult> run_pipeline(Pipeline pipeline, const Registry& registry, const RunOptions& options, const Context& context);
+/// Validates and runs. Beside each output FILE it writes FILE.prov.json: program, stage, parameters, hashes of inputs
+/// and output, report, duration, peak memory. No names of inputs, since names of files may name patients. An error
+/// names the stage; outputs finished before stay. A folder is replaced only when require_replaceable lets it pass.
+std::vector<NodeResult> run_pipeline(Pipeline pipeline, const Registry& registry, const RunOptions& options,
+                                     const Context& context);
 
-/// Throws Error(cannot_write), with names, unless every file in `folder` is as the record beside `output` says: what the program has not
-/// made, or what was changed since, is never replaced. (`output` may be a link to the folder.)
+/// Throws Error(cannot_write), with names, unless every file in `folder` is as the record beside `output` says: what
+/// the program has not made, or what was changed since, is never replaced. (`output` may be a link to the folder.)
 void require_replaceable(const std::filesystem::path& folder, const std::filesystem::path& output);
 /// The text, or "(UID)" for a DICOM UID, which names a scan of a patient and must not reach a record.
 [[nodiscard]] std::string without_uid(const std::string& text);
@@ -87,7 +90,8 @@ void require_replaceable(const std::filesystem::path& folder, const std::filesys
 [[nodiscard]] std::string list_names(const std::vector<std::string>& names);
 
 [[nodiscard]] std::filesystem::path provenance_path(const std::filesystem::path& output);
-/// "0.1.0 (commit c8d6ef5d1b2a)", with ", changed" where the sources differed from it, or "(unknown commit)" without git.
+/// "0.1.0 (commit c8d6ef5d1b2a)", with ", changed" where the sources differed from it, or "(unknown commit)" without
+/// git.
 [[nodiscard]] std::string_view program_version();
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -10,4 +10,4 @@ namespace osteo::inline imaging {
 /// What report_to_json wrote; values of other kinds are left out.
 [[nodiscard]] Report report_from_json(const JsonValue& object);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

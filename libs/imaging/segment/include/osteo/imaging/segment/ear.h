@@ -1,7 +1,9 @@
-// Structures of the ear and its neighbourhood found in a CT, without a model that was learnt: by what bone, air and soft tissue bound.
+// Structures of the ear and its neighbourhood found in a CT, without a model that was learnt: by what bone, air and
+// soft tissue bound.
 //
-// World is LPS. The external ear canal is found first, from the air outside; the others are looked for by their place to its inner end.
-// docs/structures.md says of each what is labelled, how it is found, what its quality means, and how far from the truth it is.
+// World is LPS. The external ear canal is found first, from the air outside; the others are looked for by their place
+// to its inner end. docs/structures.md says of each what is labelled, how it is found, what its quality means, and how
+// far from the truth it is.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -29,9 +31,10 @@ inline constexpr int kEarStructures = 6;
 
 struct EarParams {
   Side side = Side::left;
-  std::string what = "ear_canal,air_cells,sigmoid_sinus,tegmen,dura";  ///< names of EarStructure, with commas; "all" for all
-  std::array<double, 3> labyrinth_mm{0, 0, 0};                         ///< a point within the labyrinth, LPS; needed for it
-  double least_quality = 0.3;                                          ///< what is below is not found
+  std::string what =
+      "ear_canal,air_cells,sigmoid_sinus,tegmen,dura";  ///< names of EarStructure, with commas; "all" for all
+  std::array<double, 3> labyrinth_mm{0, 0, 0};          ///< a point within the labyrinth, LPS; needed for it
+  double least_quality = 0.3;                           ///< what is below is not found
 };
 
 struct EarFinding {
@@ -48,9 +51,9 @@ struct EarFindings {
   Vec3 drum_mm;                      ///< inner end of the ear canal; meaningless when no canal was found
 };
 
-/// Time and memory go by the volume around the ear (80 x 105 x 87 mm at most), not by the CT's; a whole head is first searched at 1 mm.
-/// What is not there, or cannot be told, is a finding with found = false and a reason. Errors: usage for names that do not exist, a
-/// labyrinth without its point or with one outside the CT.
+/// Time and memory go by the volume around the ear (80 x 105 x 87 mm at most), not by the CT's; a whole head is first
+/// searched at 1 mm. What is not there, or cannot be told, is a finding with found = false and a reason. Errors: usage
+/// for names that do not exist, a labyrinth without its point or with one outside the CT.
 [[nodiscard]] EarFindings find_ear_structures(const Image& ct, const EarParams& params, const Context& context = {});
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -1,4 +1,5 @@
-// Thin tubes in a CT: a nerve in its canal, a vessel full of contrast medium. From a few points on it to centre line, radius and mask.
+// Thin tubes in a CT: a nerve in its canal, a vessel full of contrast medium. From a few points on it to centre line,
+// radius and mask.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -43,19 +44,23 @@ struct Tube {
   std::vector<std::array<double, 2>> unsure_mm;  ///< from, to along the line, where confidence is below one half
 };
 
-/// The cheapest way through `points_mm` (LPS, two or more, in order; within the CT), where a place costs little if across some direction
-/// the CT curves like a tube of up to max_radius_mm: lines by the second derivatives at five scales, the way by A*. Then the line is moved
-/// to the middle of the walls that 24 rays meet across it (edges half-way up, circle by least squares), five times, smoothed over 0.4 mm.
-/// Where no walls are met a spline bridges, through the given points: the CT shows nothing there, and `unsure_mm` says so.
-/// The radius is that of what is missing from the wall's level, which the scanner's blur does not change.
-/// O(volume around the points). Errors: usage for fewer than two points or a point outside; failed when a stretch longer than
-/// max_unsure_mm has no walls, or three quarters of the line: the points are not joined by a tube.
-/// Y. Sato et al., Three-dimensional multi-scale line filter, Med. Image Anal. 1998; half-way edges: S. Prevrhal et al. 1999.
-[[nodiscard]] Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubeParams& params, const Context& context = {});
+/// The cheapest way through `points_mm` (LPS, two or more, in order; within the CT), where a place costs little if
+/// across some direction the CT curves like a tube of up to max_radius_mm: lines by the second derivatives at five
+/// scales, the way by A*. Then the line is moved to the middle of the walls that 24 rays meet across it (edges half-way
+/// up, circle by least squares), five times, smoothed over 0.4 mm. Where no walls are met a spline bridges, through the
+/// given points: the CT shows nothing there, and `unsure_mm` says so. The radius is that of what is missing from the
+/// wall's level, which the scanner's blur does not change. O(volume around the points). Errors: usage for fewer than
+/// two points or a point outside; failed when a stretch longer than max_unsure_mm has no walls, or three quarters of
+/// the line: the points are not joined by a tube. Y. Sato et al., Three-dimensional multi-scale line filter, Med. Image
+/// Anal. 1998; half-way edges: S. Prevrhal et al. 1999.
+[[nodiscard]] Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubeParams& params,
+                              const Context& context = {});
 
-/// Adds the tube to a label map (or makes one in `frame` when `onto` is null) as a new structure called `name`, or in place of one of that
-/// name. A voxel belongs to it when its centre does, or the centre line goes through it: a tube thinner than a voxel stays in one piece.
-/// Error(usage) when 255 structures are there already, or `onto` lies elsewhere than `frame`.
-[[nodiscard]] Labels draw_tube(const Tube& tube, const Frame& frame, const std::string& name, const Labels* onto = nullptr);
+/// Adds the tube to a label map (or makes one in `frame` when `onto` is null) as a new structure called `name`, or in
+/// place of one of that name. A voxel belongs to it when its centre does, or the centre line goes through it: a tube
+/// thinner than a voxel stays in one piece. Error(usage) when 255 structures are there already, or `onto` lies
+/// elsewhere than `frame`.
+[[nodiscard]] Labels draw_tube(const Tube& tube, const Frame& frame, const std::string& name,
+                               const Labels* onto = nullptr);
 
-}  // namespace osteo::imaging
+}  // namespace osteo::inline imaging

@@ -5,13 +5,14 @@
 #include <span>
 #include <vector>
 
+#include "osteo/session/recording/session_reader.h"
 #include "osteo/simulation/haptics/haptic_setup.h"
 #include "osteo/simulation/haptics/stream.h"
-#include "osteo/session/recording/session_reader.h"
 
 namespace osteo::inline network {
 
-/// Part of a session, in memory: 28 bytes for each tick and hand, and 20 for each fifth of a millimetre of the way. Never changed.
+/// Part of a session, in memory: 28 bytes for each tick and hand, and 20 for each fifth of a millimetre of the way.
+/// Never changed.
 struct Lesson {
   static constexpr double kStepMm = 0.2;
   /// A place on the way of the first hand, kStepMm of way after the one before: jitter of a resting hand is no way.
@@ -31,16 +32,17 @@ struct Lesson {
   [[nodiscard]] double seconds() const { return static_cast<double>(size()) / rate_hz; }
 };
 
-/// From `from_s` to `to_s` (0: the end). Errors: corrupt, where this version cannot repeat the session, or ticks are missing there; usage,
-/// where the part is empty, where something is done in it that other bone follows from than from hands alone (saw, split, move, plates,
-/// undo, soft tissue, another guide), where a curve holds the first hand, or where it has more than kMostHands - 1 hands. Each says when.
+/// From `from_s` to `to_s` (0: the end). Errors: corrupt, where this version cannot repeat the session, or ticks are
+/// missing there; usage, where the part is empty, where something is done in it that other bone follows from than from
+/// hands alone (saw, split, move, plates, undo, soft tissue, another guide), where a curve holds the first hand, or
+/// where it has more than kMostHands - 1 hands. Each says when.
 [[nodiscard]] Lesson read_lesson(const SessionReader& session, double from_s, double to_s);
 
 /// The way of samples: points, not of resting.
 [[nodiscard]] std::vector<Lesson::Point> way_of(std::span<const DeviceSample> samples);
 
-/// How far apart experts' ways are: of the distances from each point of `lesson`'s way to the nearest of each other, the given share (0.75
-/// is where a learner's error counts as one). 0 without others. Time: points of both, multiplied.
+/// How far apart experts' ways are: of the distances from each point of `lesson`'s way to the nearest of each other,
+/// the given share (0.75 is where a learner's error counts as one). 0 without others. Time: points of both, multiplied.
 [[nodiscard]] double spread_mm(const Lesson& lesson, std::span<const Lesson> others, double share = 0.75);
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

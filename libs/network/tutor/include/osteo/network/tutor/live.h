@@ -1,5 +1,6 @@
-// Live tutoring: one session, run by a host, that others take part in or watch. What travels is poses and actions with their ticks, never
-// forces: each side has the same bone and feels it without delay. No socket and no clock here: whoever has them gives packets and time.
+// Live tutoring: one session, run by a host, that others take part in or watch. What travels is poses and actions with
+// their ticks, never forces: each side has the same bone and feels it without delay. No socket and no clock here:
+// whoever has them gives packets and time.
 #pragma once
 #include <array>
 #include <atomic>
@@ -12,20 +13,20 @@
 #include <string>
 #include <vector>
 
-#include "osteo/simulation/haptics/device.h"
-#include "osteo/simulation/haptics/guide.h"
 #include "osteo/core/rt/ring.h"
 #include "osteo/core/rt/seqlock.h"
-#include "osteo/session/scene/reader.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/network/tutor/pairing.h"
 #include "osteo/network/tutor/secure.h"
 #include "osteo/network/tutor/wire.h"
+#include "osteo/session/scene/reader.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/haptics/device.h"
+#include "osteo/simulation/haptics/guide.h"
 
 namespace osteo::inline network {
 
-/// Delay and difference of two clocks by NTP's exchange: of the last 64 the one with the shortest way counts. Drift by the offsets of ten
-/// seconds and more.
+/// Delay and difference of two clocks by NTP's exchange: of the last 64 the one with the shortest way counts. Drift by
+/// the offsets of ten seconds and more.
 class ClockSync {
  public:
   /// A packet has come.
@@ -33,8 +34,10 @@ class ClockSync {
   /// For a packet that goes out now.
   [[nodiscard]] WireTimes stamp(std::int64_t now_us) const;
   [[nodiscard]] bool known() const { return count_ > 0; }
-  [[nodiscard]] double rtt_ms() const { return rtt_us_ / 1000; }        ///< there and back, the shortest lately
-  [[nodiscard]] double offset_ms() const { return offset_us_ / 1000; }  ///< their clock less ours; known within half of the way's asymmetry
+  [[nodiscard]] double rtt_ms() const { return rtt_us_ / 1000; }  ///< there and back, the shortest lately
+  [[nodiscard]] double offset_ms() const {
+    return offset_us_ / 1000;
+  }  ///< their clock less ours; known within half of the way's asymmetry
   [[nodiscard]] double drift_ppm() const { return drift_ppm_; }
 
  private:
@@ -54,18 +57,22 @@ struct FarSample {
   DeviceSample sample;
 };
 
-/// Samples that come late, twice, out of order or not at all, as a hand that moves evenly: each is played a fixed time after it was made,
-/// which is what all but a hundredth of them need, and changes by a tick in twenty. When nothing was heard for kSilenceTicks the strength
-/// of the pull goes to 0 within another 30, and the pose is told as old as it is. No allocation.
+/// Samples that come late, twice, out of order or not at all, as a hand that moves evenly: each is played a fixed time
+/// after it was made, which is what all but a hundredth of them need, and changes by a tick in twenty. When nothing was
+/// heard for kSilenceTicks the strength of the pull goes to 0 within another 30, and the pose is told as old as it is.
+/// No allocation.
 class Playout {
  public:
   static constexpr std::uint64_t kSilenceTicks = 20, kFadeTicks = 30, kRampTicks = 500;
   /// `newest`: the last of its packet, by which delay is measured.
   void put(const FarSample& s, std::uint64_t now_tick, bool newest) noexcept;
-  /// For this tick. Before anything was heard: far away, silent. `pulls` false: the strength fades within kFadeTicks, whoever is heard.
+  /// For this tick. Before anything was heard: far away, silent. `pulls` false: the strength fades within kFadeTicks,
+  /// whoever is heard.
   [[nodiscard]] DeviceSample read(std::uint64_t now_tick, bool pulls = true) noexcept;
-  [[nodiscard]] std::uint64_t played_tick() const { return played_; }                   ///< of the sender's, last read
-  [[nodiscard]] int buffer_ticks() const { return static_cast<int>(delay_ - least_); }  ///< held beyond the quickest way
+  [[nodiscard]] std::uint64_t played_tick() const { return played_; }  ///< of the sender's, last read
+  [[nodiscard]] int buffer_ticks() const {
+    return static_cast<int>(delay_ - least_);
+  }  ///< held beyond the quickest way
 
  private:
   static constexpr std::size_t kSlots = 512, kDelays = 256;
@@ -80,8 +87,8 @@ class Playout {
   DeviceSample held_;
 };
 
-/// A hand far away as one of the session's. put() from one other thread, read() the servo's: at most 64 samples a tick are taken, whatever
-/// comes.
+/// A hand far away as one of the session's. put() from one other thread, read() the servo's: at most 64 samples a tick
+/// are taken, whatever comes.
 class FarDevice final : public Device {
  public:
   void put(const FarSample& s, bool newest) noexcept { inbox_.push({s, newest}); }
@@ -109,18 +116,19 @@ class FarDevice final : public Device {
   Seqlock<DeviceSample> shown_;
 };
 
-/// How stiff a spring to a hand that is heard of late may be: two equal devices of `mass_kg` with damping B each, spring K on the other's
-/// delayed position, m s2 + B s + K (1 + e^-st) = 0. For every delay stable up to B2 / 2m; for delays up to tau, up to about B / tau, of
-/// which half is taken. The larger of both. N/mm.
+/// How stiff a spring to a hand that is heard of late may be: two equal devices of `mass_kg` with damping B each,
+/// spring K on the other's delayed position, m s2 + B s + K (1 + e^-st) = 0. For every delay stable up to B2 / 2m; for
+/// delays up to tau, up to about B / tau, of which half is taken. The larger of both. N/mm.
 [[nodiscard]] double delayed_stiffness_n_per_mm(double damping_n_s_per_m, double mass_kg, double delay_s);
-/// A guide that bears any delay: a brake of kFarBrake besides the device's own damping, and the stiffness that goes with it for hands of
-/// kFarMassKg and less.
+/// A guide that bears any delay: a brake of kFarBrake besides the device's own damping, and the stiffness that goes
+/// with it for hands of kFarMassKg and less.
 inline constexpr double kFarBrake = 12, kFarMassKg = 0.25;
-[[nodiscard]] HandGuide far_guide(std::uint32_t hand, std::uint32_t leader, const DeviceTraits& device, double wanted_n_per_mm,
-                                  double most_n);
+[[nodiscard]] HandGuide far_guide(std::uint32_t hand, std::uint32_t leader, const DeviceTraits& device,
+                                  double wanted_n_per_mm, double most_n);
 
 /// Adds a change of bone to a running hash of all of them.
-[[nodiscard]] std::uint64_t mixed(std::uint64_t hash, std::uint64_t tick, std::span<const VoxelChange> changes) noexcept;
+[[nodiscard]] std::uint64_t mixed(std::uint64_t hash, std::uint64_t tick,
+                                  std::span<const VoxelChange> changes) noexcept;
 
 struct OutgoingPacket {
   UdpPeer to;  ///< as receive() was told
@@ -251,7 +259,8 @@ class LiveGuest {
   [[nodiscard]] std::uint64_t marks_same() const { return same_; }        ///< compared with the host's, and the same
   [[nodiscard]] std::int64_t heard_us() const { return last_heard_us_; }  ///< when the host was heard of last
   [[nodiscard]] double lost() const { return channel_ ? channel_->lost() : 0; }
-  /// What the copy has become; where the host's mark differs, differs() says since when, and begin_again() asks for all ticks once more.
+  /// What the copy has become; where the host's mark differs, differs() says since when, and begin_again() asks for all
+  /// ticks once more.
   void mark(const BoneMark& mine);
   [[nodiscard]] std::uint64_t differs() const { return differs_; }
   void begin_again();
@@ -283,7 +292,8 @@ class LiveGuest {
   std::deque<FarSample> recent_;
 };
 
-/// The session once more, from its ticks: the same bone to the bit, in a Rehearsal that can be looked at, followed and recorded.
+/// The session once more, from its ticks: the same bone to the bit, in a Rehearsal that can be looked at, followed and
+/// recorded.
 class LiveCopy {
  public:
   /// `begin` and `options` (haptics, anatomy, rate) as the host's; its actions come with the ticks.
@@ -315,12 +325,12 @@ class LiveCopy {
   std::uint64_t ticks_ = 0;
 };
 
-/// What the own hand feels of the copy, without delay: bone as it is there, the brake, the spring to the host's hand. Takes no bone: that
-/// happens when the host has heard of it. Made again when the copy's pieces change.
+/// What the own hand feels of the copy, without delay: bone as it is there, the brake, the spring to the host's hand.
+/// Takes no bone: that happens when the host has heard of it. Made again when the copy's pieces change.
 class LiveFeel {
  public:
-  LiveFeel(const World& copy, const HapticSetup& session, const Anatomy& anatomy, const DeviceTraits& own, const HandGuide& guide,
-           double rate_hz);
+  LiveFeel(const World& copy, const HapticSetup& session, const Anatomy& anatomy, const DeviceTraits& own,
+           const HandGuide& guide, double rate_hz);
   /// A tick: own pose, the host's hand as far as heard.
   [[nodiscard]] TickRecord step(const DeviceSample& own, const DeviceSample& host) noexcept;
   /// What Device::feel() is told.
@@ -333,4 +343,4 @@ class LiveFeel {
   HapticScene scene_;
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -6,13 +6,14 @@
 #include <string>
 #include <thread>
 
-#include "osteo/session/recording/session_file.h"
 #include "osteo/network/tutor/live.h"
 #include "osteo/network/tutor/udp.h"
+#include "osteo/session/recording/session_file.h"
 
 namespace osteo::inline network {
 
-/// What a copy needs to know of a session before its first tick, as bytes, and back: its settings, and past_bytes(). Error(corrupt).
+/// What a copy needs to know of a session before its first tick, as bytes, and back: its settings, and past_bytes().
+/// Error(corrupt).
 [[nodiscard]] Bytes settings_bytes(const SessionHeader& header, const Bytes& past = {});
 [[nodiscard]] SessionHeader settings_of(const Bytes& bytes);
 
@@ -20,7 +21,9 @@ namespace osteo::inline network {
 class FarHand final : public Device {
  public:
   explicit FarHand(std::shared_ptr<FarDevice> far) : far_(std::move(far)) {}
-  DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override { return far_->read(tick, dt_s, force_n); }
+  DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override {
+    return far_->read(tick, dt_s, force_n);
+  }
   [[nodiscard]] DeviceTraits traits() const override { return far_->traits(); }
   [[nodiscard]] bool active(std::uint64_t) const noexcept override { return false; }
 
@@ -28,9 +31,9 @@ class FarHand final : public Device {
   std::shared_ptr<FarDevice> far_;
 };
 
-/// Takes packets and sends them in a thread of its own, at most kMostPackets between two looks at what is to be sent: a flood costs this
-/// thread, and what the system's buffer does not hold, but no other. The same thread follows the session's stream, beside its other
-/// readers, which may take longer.
+/// Takes packets and sends them in a thread of its own, at most kMostPackets between two looks at what is to be sent: a
+/// flood costs this thread, and what the system's buffer does not hold, but no other. The same thread follows the
+/// session's stream, beside its other readers, which may take longer.
 class HostThread {
  public:
   static constexpr int kMostPackets = 2000;
@@ -60,4 +63,4 @@ void wait_for_all(const LiveHost& host, double most_s);
 /// Microseconds since some beginning, steadily.
 [[nodiscard]] std::int64_t steady_us() noexcept;
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -6,14 +6,14 @@
 #include <string>
 #include <thread>
 
-#include "osteo/simulation/haptics/simulated_device.h"
 #include "osteo/core/rt/loop.h"
 #include "osteo/network/tutor/live_run.h"
+#include "osteo/simulation/haptics/simulated_device.h"
 
 namespace osteo::inline network {
 
-/// A hand without a will that is led from where the instructor's is when it is first heard of: it holds a device of 0.1 kg, and its grip
-/// (N/m) gives way within 0.1 s.
+/// A hand without a will that is led from where the instructor's is when it is first heard of: it holds a device of 0.1
+/// kg, and its grip (N/m) gives way within 0.1 s.
 class YieldingHand final : public Device {
  public:
   YieldingHand(double stiffness_n_per_m, std::shared_ptr<const FarDevice> leader);
@@ -49,14 +49,15 @@ struct SeatStatus {
   bool host_lost = false;                     ///< the host could not follow its own session: there is no more of it
   bool another = false;                       ///< it has begun another session than the one that was begun here
   std::uint64_t marks_same = 0;               ///< comparisons of the bone, one a second, that came out the same
-  std::uint64_t bone_differs_since = 0;       ///< tick; 0: it does not. The copy is worth nothing from there: begin() once more
+  std::uint64_t bone_differs_since =
+      0;  ///< tick; 0: it does not. The copy is worth nothing from there: begin() once more
   std::uint64_t packets_refused = 0;
-  double apart_mm = 0, strength = 0;                      ///< trainee: from the instructor's hand as heard of; of the pull, 0 to 1
+  double apart_mm = 0, strength = 0;  ///< trainee: from the instructor's hand as heard of; of the pull, 0 to 1
   double apart_rms_mm = 0, apart_most_mm = 0, led_s = 0;  ///< while it was led
 };
 
-/// Threads: one for packets; one that does the session's ticks on the copy; the trainee's hand in one at the session's rate, which feels
-/// the copy without delay, whatever the others do. All functions from one thread.
+/// Threads: one for packets; one that does the session's ticks on the copy; the trainee's hand in one at the session's
+/// rate, which feels the copy without delay, whatever the others do. All functions from one thread.
 class LiveSeat {
  public:
   /// Asks from now on. Errors: of UdpSocket.
@@ -65,19 +66,19 @@ class LiveSeat {
   LiveSeat(const LiveSeat&) = delete;
   LiveSeat& operator=(const LiveSeat&) = delete;
 
-  /// What the session is. Waits at most `most_s` for an answer, and as long again while no more of it comes. Errors: failed, where it is
-  /// refused or nobody answers; corrupt; cancelled.
+  /// What the session is. Waits at most `most_s` for an answer, and as long again while no more of it comes. Errors:
+  /// failed, where it is refused or nobody answers; corrupt; cancelled.
   [[nodiscard]] SessionHeader wait_for_session(double most_s, const Context& context);
   /// After that: what the session goes on from (live_past.h); empty: nothing.
   [[nodiscard]] Bytes past() const;
   /// The instructor's hand as it is heard of.
   [[nodiscard]] const std::shared_ptr<FarDevice>& leader() const { return leader_; }
 
-  /// Takes part from the session's first tick; again: all of it once more, or another session. `begin`: the bone it began with. What is
-  /// recorded (`options.session_file`) is the session as it is there. `own`: the trainee's hand; null: none. `context` lives as long.
-  /// Errors: usage, where that bone is another than the host's; of Rehearsal.
-  std::shared_ptr<Rehearsal> begin(const SessionHeader& header, World begin, RehearsalOptions options, std::unique_ptr<Device> own,
-                                   const Context& context);
+  /// Takes part from the session's first tick; again: all of it once more, or another session. `begin`: the bone it
+  /// began with. What is recorded (`options.session_file`) is the session as it is there. `own`: the trainee's hand;
+  /// null: none. `context` lives as long. Errors: usage, where that bone is another than the host's; of Rehearsal.
+  std::shared_ptr<Rehearsal> begin(const SessionHeader& header, World begin, RehearsalOptions options,
+                                   std::unique_ptr<Device> own, const Context& context);
   /// No tick is done any more; before the rehearsal is stopped. Throws what ended the copy, where something did.
   void leave();
   /// Since the host was heard of.
@@ -113,4 +114,4 @@ class LiveSeat {
   std::thread packets_, copying_;
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -135,4 +135,4 @@ class PairingGuest {
   std::int64_t heard_us_ = 0;  // proving: since then nothing
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -6,20 +6,21 @@
 #include <memory>
 #include <vector>
 
+#include "osteo/network/tutor/lesson.h"
+#include "osteo/network/tutor/playback_params.h"
 #include "osteo/simulation/haptics/device.h"
 #include "osteo/simulation/haptics/guide.h"
 #include "osteo/simulation/haptics/simulated_device.h"
-#include "osteo/network/tutor/lesson.h"
-#include "osteo/network/tutor/playback_params.h"
 
 namespace osteo::inline network {
 
 /// What the session begins with: hand 0 led by hand 1, in feel and graphics without a pull.
 [[nodiscard]] HandGuide guide_of(const PlaybackParams& p);
 
-/// Help as needed: after each trial K = forget K + gain w(error), between 0 and 1, with w = 0 in the dead zone. It forgets faster than one
-/// learns when forget is below what errors fall by from trial to trial; without the dead zone it would never come to 0 (J. Emken, D.
-/// Reinkensmeyer 2007). The gain is such that an error of kWorstMm asks for all of it. An error is the 90th percentile of a trial.
+/// Help as needed: after each trial K = forget K + gain w(error), between 0 and 1, with w = 0 in the dead zone. It
+/// forgets faster than one learns when forget is below what errors fall by from trial to trial; without the dead zone
+/// it would never come to 0 (J. Emken, D. Reinkensmeyer 2007). The gain is such that an error of kWorstMm asks for all
+/// of it. An error is the 90th percentile of a trial.
 class FadingGuide {
  public:
   static constexpr double kWorstMm = 5;
@@ -39,8 +40,9 @@ class FadingGuide {
   std::array<std::uint32_t, 512> bins_{};  // the last holds all that is farther
 };
 
-/// Which sample of the lesson is now. Pure: follows from where the hand is, tick by tick. First the target goes from the hand to the
-/// lesson's beginning, at kApproachMmPerS, and waits for the hand; where nothing leads it is there at once and time begins.
+/// Which sample of the lesson is now. Pure: follows from where the hand is, tick by tick. First the target goes from
+/// the hand to the lesson's beginning, at kApproachMmPerS, and waits for the hand; where nothing leads it is there at
+/// once and time begins.
 class LessonClock {
  public:
   static constexpr double kApproachMmPerS = 30, kStartMm = 1;
@@ -88,11 +90,12 @@ struct Playback {
   std::atomic<bool> over{false};   ///< for any thread: the lesson has ended
 };
 
-/// Stands before the device of who learns: where the hand is, is told to the lesson; its pedal is up where the expert's burr drills, and
-/// its instrument the expert's then.
+/// Stands before the device of who learns: where the hand is, is told to the lesson; its pedal is up where the expert's
+/// burr drills, and its instrument the expert's then.
 class LedDevice final : public Device {
  public:
-  LedDevice(std::unique_ptr<Device> held, std::shared_ptr<Playback> playback) : held_(std::move(held)), playback_(std::move(playback)) {}
+  LedDevice(std::unique_ptr<Device> held, std::shared_ptr<Playback> playback)
+      : held_(std::move(held)), playback_(std::move(playback)) {}
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
   void set_tool(std::uint8_t tool) noexcept override { held_->set_tool(tool); }
   bool lead(const HandWay& way) noexcept override { return held_->lead(way); }
@@ -114,7 +117,9 @@ class RecordedDevice final : public Device {
   RecordedDevice(std::shared_ptr<Playback> playback, std::size_t hand) : playback_(std::move(playback)), hand_(hand) {}
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
   [[nodiscard]] DeviceTraits traits() const override { return playback_->lesson->setup.device_of(hand_); }
-  [[nodiscard]] bool active(std::uint64_t) const noexcept override { return !playback_->over.load(std::memory_order_relaxed); }
+  [[nodiscard]] bool active(std::uint64_t) const noexcept override {
+    return !playback_->over.load(std::memory_order_relaxed);
+  }
 
  private:
   std::shared_ptr<Playback> playback_;
@@ -123,13 +128,15 @@ class RecordedDevice final : public Device {
 
 /// The devices of a playback: who learns, then the lesson's hands; and the setup that goes with them (their traits).
 [[nodiscard]] std::vector<std::unique_ptr<Device>> playback_devices(std::unique_ptr<Device> learner,
-                                                                    const std::shared_ptr<Playback>& playback, HapticSetup& setup);
-/// The lesson's actions with the guide before them, for RehearsalOptions::actions. Where time may wait, settings within the lesson are an
-/// Error(usage), and what moves dust is left out.
+                                                                    const std::shared_ptr<Playback>& playback,
+                                                                    HapticSetup& setup);
+/// The lesson's actions with the guide before them, for RehearsalOptions::actions. Where time may wait, settings within
+/// the lesson are an Error(usage), and what moves dust is left out.
 [[nodiscard]] std::vector<SceneAction> playback_actions(const Playback& playback);
 
-/// A hand without a will that holds a device of 0.1 kg: a spring (N/m) to a place that gives way with kYieldS. 100 to 500 N/m are a grip's.
-/// Its damping at slow motion is stiffness x kYieldS. Its pedal and instrument are the recorded ones of `playback`.
+/// A hand without a will that holds a device of 0.1 kg: a spring (N/m) to a place that gives way with kYieldS. 100 to
+/// 500 N/m are a grip's. Its damping at slow motion is stiffness x kYieldS. Its pedal and instrument are the recorded
+/// ones of `playback`.
 class FollowingHand final : public Device {
  public:
   static constexpr double kYieldS = 0.1;
@@ -159,4 +166,4 @@ struct GuidedFacts {
 /// From `begin_tick` on, hand 0 and hand 1. Error(corrupt).
 [[nodiscard]] GuidedFacts measure_guided(const SessionReader& session, std::uint64_t begin_tick);
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

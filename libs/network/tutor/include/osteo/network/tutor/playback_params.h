@@ -44,22 +44,30 @@ struct PlaybackParams {
 
   static void describe(PlaybackParams& p, auto& visit) {
     visit({"mode",
-           "show: led, with the expert's forces; feel: bone alone; guide: led, and bone; fading: led less the better it goes; amplify: "
+           "show: led, with the expert's forces; feel: bone alone; guide: led, and bone; fading: led less the better "
+           "it goes; amplify: "
            "pushed away from the way; graphics: the way is drawn, and nothing else"},
           p.mode);
-    visit({"drills", "whose burr takes bone away; usual: the expert's in show, feel and guide, so that bone is as it was recorded"},
-          p.drills);
+    visit(
+        {"drills",
+         "whose burr takes bone away; usual: the expert's in show, feel and guide, so that bone is as it was recorded"},
+        p.drills);
     visit({"pace",
-           "clock: as it was recorded, but who is led and farther away than the leash is waited for; way: time waits and goes back with who "
+           "clock: as it was recorded, but who is led and farther away than the leash is waited for; way: time waits "
+           "and goes back with who "
            "learns; usual: clock in show and feel"},
           p.pace);
     visit({"stiffness_n_per_mm", "of the spring to the expert's hand; less where the device bears less", "N/mm", 0, 10},
           p.stiffness_n_per_mm);
     visit({"damping_n_s_per_m", "between the two hands", "N s/m", 0, 100}, p.damping_n_s_per_m);
-    visit({"forward", "show: share of the expert's force that is felt (0: none), less the farther the hand is away", "", 0, 2}, p.forward);
+    visit({"forward", "show: share of the expert's force that is felt (0: none), less the farther the hand is away", "",
+           0, 2},
+          p.forward);
     visit({"most_n", "all that leads the hand is no more", "N", 0, 20}, p.most_n);
-    visit({"dead_zone_mm", "fading, amplify: apart so far counts as right; with --experts it is measured", "mm", 0, 20}, p.dead_zone_mm);
-    visit({"leash_mm", "farther from who is led time waits; pace way: twice as far behind it goes back", "mm", 0.2, 50}, p.leash_mm);
+    visit({"dead_zone_mm", "fading, amplify: apart so far counts as right; with --experts it is measured", "mm", 0, 20},
+          p.dead_zone_mm);
+    visit({"leash_mm", "farther from who is led time waits; pace way: twice as far behind it goes back", "mm", 0.2, 50},
+          p.leash_mm);
     visit({"ramp_s", "over which the pull comes and goes", "s", 0.01, 10}, p.ramp_s);
     visit({"forget", "fading: of the pull, what is left after a trial without errors", "", 0, 0.99}, p.forget);
     visit({"trial_s", "fading: length of a trial, in the lesson's time", "s", 0.5, 600}, p.trial_s);
@@ -71,4 +79,4 @@ struct PlaybackParams {
 [[nodiscard]] bool expert_drills(const PlaybackParams& p);
 [[nodiscard]] bool by_clock(const PlaybackParams& p);
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -12,7 +12,8 @@
 
 namespace osteo::inline network {
 
-/// Eight letters and digits that are not mistaken for each other, 40 bits: "K7MX-2QPA". Error(failed) where there is no randomness.
+/// Eight letters and digits that are not mistaken for each other, 40 bits: "K7MX-2QPA". Error(failed) where there is no
+/// randomness.
 [[nodiscard]] std::string make_pairing_code();
 /// Small letters, blanks and dashes are as good; empty: it is none.
 [[nodiscard]] std::string tidy_code(std::string_view typed);
@@ -58,7 +59,8 @@ class Pairing {
 class SecureChannel {
  public:
   static constexpr std::size_t kOverhead = 28;
-  SecureChannel(std::uint32_t connection, const std::array<std::uint8_t, 32>& send, const std::array<std::uint8_t, 32>& receive)
+  SecureChannel(std::uint32_t connection, const std::array<std::uint8_t, 32>& send,
+                const std::array<std::uint8_t, 32>& receive)
       : connection_(connection), send_(send), receive_(receive) {}
   ~SecureChannel();
   [[nodiscard]] Bytes seal(std::span<const std::uint8_t> plain);
@@ -85,4 +87,4 @@ class SecureChannel {
 /// In a time that does not depend on where they differ.
 [[nodiscard]] bool same_proof(const std::array<std::uint8_t, 16>& a, std::span<const std::uint8_t> b);
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

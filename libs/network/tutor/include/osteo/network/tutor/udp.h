@@ -9,16 +9,16 @@
 
 namespace osteo::inline network {
 
-/// "192.0.2.7:18950", "[2001:db8::7]:18950", or a name before the colon. Error(usage) where there is no such address, with what is
-/// expected.
+/// "192.0.2.7:18950", "[2001:db8::7]:18950", or a name before the colon. Error(usage) where there is no such address,
+/// with what is expected.
 [[nodiscard]] UdpPeer udp_peer(const std::string& host_and_port);
 [[nodiscard]] std::string udp_name(const UdpPeer& peer);
 
 /// Owned by one thread.
 class UdpSocket {
  public:
-  /// Listens there; port 0: any that is free. "": at any address, of IPv6 where the machine has it, and of IPv4. Errors: usage, no such
-  /// address on this machine; failed, the port is taken.
+  /// Listens there; port 0: any that is free. "": at any address, of IPv6 where the machine has it, and of IPv4.
+  /// Errors: usage, no such address on this machine; failed, the port is taken.
   UdpSocket(const std::string& address, int port);
   ~UdpSocket();
   UdpSocket(const UdpSocket&) = delete;
@@ -26,7 +26,8 @@ class UdpSocket {
   [[nodiscard]] int port() const;
   /// What cannot be sent is lost, as on the way; false: it was lost here.
   bool send(const UdpPeer& to, std::span<const std::uint8_t> bytes) noexcept;
-  /// The next packet, where one is here; longer ones than kMostPacketBytes and 64 are cut, which whoever opens them finds.
+  /// The next packet, where one is here; longer ones than kMostPacketBytes and 64 are cut, which whoever opens them
+  /// finds.
   [[nodiscard]] std::optional<std::span<const std::uint8_t>> receive(UdpPeer& from) noexcept;
   /// Until a packet is here, at most so long.
   void wait_ms(int most) noexcept;
@@ -36,4 +37,4 @@ class UdpSocket {
   std::array<std::uint8_t, kMostPacketBytes + 64> buffer_{};
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -26,7 +26,8 @@ struct UdpPeer {
   friend bool operator==(const UdpPeer&, const UdpPeer&) = default;
 };
 
-/// When it was sent by the sender's clock, and what was last heard: enough for both to know delay and offset (NTP's four times).
+/// When it was sent by the sender's clock, and what was last heard: enough for both to know delay and offset (NTP's
+/// four times).
 struct WireTimes {
   std::int64_t sent_us = 0;
   std::int64_t echo_us = 0;  ///< `sent_us` of the last packet heard; 0: none yet
@@ -51,7 +52,8 @@ struct HandPacket {
   std::vector<DeviceSample> samples;
 };
 
-/// How far a session is: it runs; its last tick was `now_tick` less one; its host could not follow it and can say no more of it.
+/// How far a session is: it runs; its last tick was `now_tick` less one; its host could not follow it and can say no
+/// more of it.
 enum class LogState : std::uint8_t { runs, over, lost };
 
 /// From who runs the session: ticks as they were, with what was done at their beginnings.
@@ -81,10 +83,10 @@ struct BlobPacket {
 [[nodiscard]] Bytes encode(const HandPacket& p);
 [[nodiscard]] Bytes encode(const LogPacket& p);
 [[nodiscard]] Bytes encode(const BlobPacket& p);
-/// Nothing for what is too short, too long, of another kind, or says of itself what is not so. Poses may be anything: the servo's checks
-/// are for those.
+/// Nothing for what is too short, too long, of another kind, or says of itself what is not so. Poses may be anything:
+/// the servo's checks are for those.
 [[nodiscard]] std::optional<HandPacket> decode_hand(std::span<const std::uint8_t> bytes);
 [[nodiscard]] std::optional<LogPacket> decode_log(std::span<const std::uint8_t> bytes);
 [[nodiscard]] std::optional<BlobPacket> decode_blob(std::span<const std::uint8_t> bytes);
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -11,9 +11,9 @@
 
 namespace osteo::inline network {
 
-/// In a thread of its own: connects, and again twice a second where there is no server or it went; cuts what comes into messages. Reads no
-/// faster than kMostBytes a second, so that a server that floods fills its own queue. Sends what it is told to, at most kMostWaiting bytes
-/// at a time. Memory: most_body and kMostWaiting.
+/// In a thread of its own: connects, and again twice a second where there is no server or it went; cuts what comes into
+/// messages. Reads no faster than kMostBytes a second, so that a server that floods fills its own queue. Sends what it
+/// is told to, at most kMostWaiting bytes at a time. Memory: most_body and kMostWaiting.
 class WireClient {
  public:
   static constexpr std::size_t kMostBytes = 32 << 20, kMostWaiting = 64 << 10;
@@ -25,8 +25,8 @@ class WireClient {
   WireClient(const WireClient&) = delete;
   WireClient& operator=(const WireClient&) = delete;
 
-  /// From any thread: to the server, when there is room, within about 10 ms. What does not fit, or is left when the connection goes, is
-  /// dropped.
+  /// From any thread: to the server, when there is room, within about 10 ms. What does not fit, or is left when the
+  /// connection goes, is dropped.
   void send(std::span<const std::uint8_t> message);
   [[nodiscard]] bool connected() const { return connected_; }
   struct Counts {
@@ -56,4 +56,4 @@ class WireClient {
   std::thread thread_;  // last: it uses all the others
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -15,8 +15,8 @@ namespace osteo::inline network {
 
 using WireBytes = std::vector<std::uint8_t>;
 
-/// Where something is, as OpenIGTLink and 3D Slicer count: mm to the patient's right, front and top (RAS). Columns are the thing's own
-/// axes.
+/// Where something is, as OpenIGTLink and 3D Slicer count: mm to the patient's right, front and top (RAS). Columns are
+/// the thing's own axes.
 struct IgtlPose {
   Mat3 axes;
   Vec3 at_mm;
@@ -33,9 +33,11 @@ inline constexpr std::uint64_t kIgtlHertz = std::uint64_t{0x0284} << 48;
 
 enum class IgtlStatus : std::uint16_t { ok = 1, overflow = 8, shut_down = 19 };
 
-/// One message. `type` at most 12 bytes, `device` at most 20, the rest is cut off. The header's time is seconds of the sender's own count
-/// (a session's own time, here), to 2^-32 s; negative becomes 0. Without extended header (version 1), which every reader knows.
-[[nodiscard]] WireBytes igtl_message(std::string_view type, std::string_view device, double time_s, std::span<const std::uint8_t> body);
+/// One message. `type` at most 12 bytes, `device` at most 20, the rest is cut off. The header's time is seconds of the
+/// sender's own count (a session's own time, here), to 2^-32 s; negative becomes 0. Without extended header (version
+/// 1), which every reader knows.
+[[nodiscard]] WireBytes igtl_message(std::string_view type, std::string_view device, double time_s,
+                                     std::span<const std::uint8_t> body);
 [[nodiscard]] WireBytes igtl_transform(std::string_view device, double time_s, const IgtlPose& pose);
 struct IgtlTool {
   std::string name;
@@ -43,13 +45,15 @@ struct IgtlTool {
 };
 /// TDATA: tools of 6 degrees of freedom.
 [[nodiscard]] WireBytes igtl_tracking(std::string_view device, double time_s, std::span<const IgtlTool> tools);
-[[nodiscard]] WireBytes igtl_sensor(std::string_view device, double time_s, std::uint64_t unit, std::span<const double> values);
+[[nodiscard]] WireBytes igtl_sensor(std::string_view device, double time_s, std::uint64_t unit,
+                                    std::span<const double> values);
 /// NDARRAY of int16, samples by channels: all channels of a sample, then the next sample.
-[[nodiscard]] WireBytes igtl_samples(std::string_view device, double time_s, std::size_t channels, std::span<const std::int16_t> values);
+[[nodiscard]] WireBytes igtl_samples(std::string_view device, double time_s, std::size_t channels,
+                                     std::span<const std::int16_t> values);
 /// At most 65,535 bytes; the rest is cut off.
 [[nodiscard]] WireBytes igtl_string(std::string_view device, double time_s, std::string_view text);
-[[nodiscard]] WireBytes igtl_status(std::string_view device, double time_s, IgtlStatus code, std::int64_t sub_code, std::string_view name,
-                                    std::string_view text);
+[[nodiscard]] WireBytes igtl_status(std::string_view device, double time_s, IgtlStatus code, std::int64_t sub_code,
+                                    std::string_view name, std::string_view text);
 
 /// CRC-64 of ECMA-182, not reflected, from 0, as OpenIGTLink has it.
 [[nodiscard]] std::uint64_t igtl_crc64(std::span<const std::uint8_t> bytes);
@@ -72,14 +76,15 @@ struct IgtlSamples {
 /// Axes of unit length at right angles, right-handed, to 1 %; place within 10 m: what a tracker may say of a tool.
 [[nodiscard]] bool is_rigid(const IgtlPose& pose);
 
-/// Cuts what comes over a connection into messages. Memory: at most most_body and a header. What is longer is passed over; a body whose
-/// checksum is wrong, or whose extended header lies, is dropped. All of it is counted.
+/// Cuts what comes over a connection into messages. Memory: at most most_body and a header. What is longer is passed
+/// over; a body whose checksum is wrong, or whose extended header lies, is dropped. All of it is counted.
 class IgtlParser {
  public:
   static constexpr std::size_t kHeader = 58;
   explicit IgtlParser(std::size_t most_body) : most_body_(most_body) {}
 
-  /// The next bytes; calls `take` for each message that is whole. False: what comes is no OpenIGTLink, and nothing more will be.
+  /// The next bytes; calls `take` for each message that is whole. False: what comes is no OpenIGTLink, and nothing more
+  /// will be.
   bool feed(std::span<const std::uint8_t> bytes, const std::function<void(const IgtlMessage&)>& take);
 
   [[nodiscard]] std::uint64_t messages() const { return messages_; }
@@ -98,4 +103,4 @@ class IgtlParser {
   std::uint64_t messages_ = 0, damaged_ = 0, passed_over_ = 0;
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -1,19 +1,20 @@
 // A rehearsal that runs, told over the network.
 #pragma once
-#include "osteo/session/scene/monitor_notes.h"
-#include "osteo/session/scene/rehearsal.h"
 #include "osteo/network/wire/stimulator_link.h"
 #include "osteo/network/wire/stream_feed.h"
+#include "osteo/session/scene/monitor_notes.h"
+#include "osteo/session/scene/rehearsal.h"
 
 namespace osteo::inline network {
 
-/// Follows it from before it starts until this goes, which is after it has ended. The servo knows nothing of it; the follower's thread
-/// waits for no network.
+/// Follows it from before it starts until this goes, which is after it has ended. The servo knows nothing of it; the
+/// follower's thread waits for no network.
 class RehearsalStream {
  public:
-  /// `monitor`: of the rehearsal, where it has one, before its first tick; null: one of `options`, of its own. Where a target has a
-  /// stimulator, who has the code of invitation() may set it; the settings become notes of the session.
-  RehearsalStream(Rehearsal& rehearsal, std::span<const StreamTarget> targets, MonitorReader* monitor, const MonitorOptions& options);
+  /// `monitor`: of the rehearsal, where it has one, before its first tick; null: one of `options`, of its own. Where a
+  /// target has a stimulator, who has the code of invitation() may set it; the settings become notes of the session.
+  RehearsalStream(Rehearsal& rehearsal, std::span<const StreamTarget> targets, MonitorReader* monitor,
+                  const MonitorOptions& options);
   ~RehearsalStream();
   RehearsalStream(const RehearsalStream&) = delete;
   RehearsalStream& operator=(const RehearsalStream&) = delete;
@@ -38,4 +39,4 @@ class RehearsalStream {
 /// Of a rehearsal or replay: the monitor of `setup_file` (empty: the built-in one).
 [[nodiscard]] MonitorOptions monitor_options_of(const std::string& setup_file);
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

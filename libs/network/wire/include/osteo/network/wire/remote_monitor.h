@@ -12,8 +12,9 @@
 
 namespace osteo::inline network {
 
-/// Listens to a server that StreamFeed fills. Sinks are made when it has said which channels there are, and anew when it says otherwise or
-/// another session begins; they are told in the client's thread. What the network lost between two blocks is told as an event `lost`.
+/// Listens to a server that StreamFeed fills. Sinks are made when it has said which channels there are, and anew when
+/// it says otherwise or another session begins; they are told in the client's thread. What the network lost between two
+/// blocks is told as an event `lost`.
 class RemoteMonitor {
  public:
   /// What a monitor that begins is shown by.
@@ -54,4 +55,4 @@ class RemoteMonitor {
   WireClient client_;  // last: its thread uses all the others
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -33,10 +33,10 @@ struct WireCounts {
   std::uint64_t heard = 0;        ///< bytes of clients, most of which mean nothing here
 };
 
-/// In a thread of its own. A client has a queue of its own: what does not fit is dropped, as whole messages, for this client alone, and
-/// counted; when there is room again `notice` tells it how many. A client that takes nothing for kMostSilentS with a full queue is cut off.
-/// Whatever clients send is read no faster than kMostHeard a second and forgotten, but for what answer() is for. Memory: kMostClients times
-/// kMostQueued at most.
+/// In a thread of its own. A client has a queue of its own: what does not fit is dropped, as whole messages, for this
+/// client alone, and counted; when there is room again `notice` tells it how many. A client that takes nothing for
+/// kMostSilentS with a full queue is cut off. Whatever clients send is read no faster than kMostHeard a second and
+/// forgotten, but for what answer() is for. Memory: kMostClients times kMostQueued at most.
 class WireServer {
  public:
   static constexpr std::size_t kMostClients = 8, kMostQueued = 4 << 20, kMostHeard = 256 << 10;
@@ -102,4 +102,4 @@ class WireServer {
   std::thread thread_;  // last: it uses all the others
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

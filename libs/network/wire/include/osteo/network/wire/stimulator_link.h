@@ -1,5 +1,6 @@
-// The nerve monitor's stimulator, set from a console elsewhere: who has the code that the rehearsal shows. Pairing and secrecy as of live
-// tutoring (osteo/network/tutor/secure.h), in OpenIGTLink messages of a type of their own, which other readers pass over. No socket, no clock.
+// The nerve monitor's stimulator, set from a console elsewhere: who has the code that the rehearsal shows. Pairing and
+// secrecy as of live tutoring (osteo/network/tutor/secure.h), in OpenIGTLink messages of a type of their own, which
+// other readers pass over. No socket, no clock.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -11,16 +12,17 @@
 #include <string_view>
 #include <vector>
 
-#include "osteo/simulation/nerve/stimulator.h"
 #include "osteo/network/tutor/secure.h"
 #include "osteo/network/wire/igtl.h"
+#include "osteo/simulation/nerve/stimulator.h"
 
 namespace osteo::inline network {
 
 inline constexpr std::string_view kStimulatorType = "OSTEO_STIM";
 
-/// The rehearsal's side, for all who are connected. Three wrong codes close it. At most kMostMessagesS messages of each client a second are
-/// looked at, and kMostPairingsS pairings of all. Memory: about 300 bytes a client. hear() and gone() from one thread, the rest from any.
+/// The rehearsal's side, for all who are connected. Three wrong codes close it. At most kMostMessagesS messages of each
+/// client a second are looked at, and kMostPairingsS pairings of all. Memory: about 300 bytes a client. hear() and
+/// gone() from one thread, the rest from any.
 class StimulatorDoor {
  public:
   static constexpr int kTries = 3;
@@ -87,4 +89,4 @@ class StimulatorLink {
   State state_;
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "osteo/session/scene/monitor_reader.h"
 #include "osteo/network/wire/igtl.h"
+#include "osteo/session/scene/monitor_reader.h"
 
 namespace osteo::inline network {
 
@@ -21,7 +21,8 @@ struct StreamTarget {
   std::string version = "4.1";  ///< cerebus: 3.11, 4.0, 4.1 or 4.2
   bool stimulator = false;      ///< igtl: who has the code may set the nerve monitor's stimulator
 };
-/// "igtl:18944, igtl:18945/stimulator, cerebus:127.0.0.1:51002/4.1, lsl". Error(usage) tells what is expected; empty text: none.
+/// "igtl:18944, igtl:18945/stimulator, cerebus:127.0.0.1:51002/4.1, lsl". Error(usage) tells what is expected; empty
+/// text: none.
 [[nodiscard]] std::vector<StreamTarget> stream_targets(const std::string& text);
 
 /// A tool at a tick, in the scene (LPS).
@@ -92,8 +93,8 @@ class WireOutlet {
 /// Error(usage, failed) where it cannot be.
 [[nodiscard]] std::unique_ptr<WireOutlet> make_outlet(const StreamTarget& target);
 
-/// Follows a rehearsal or a replay and tells all outlets. Tools at kPoseHz of the session's time, the monitor's blocks as they come. Times
-/// are the session's own, from its beginning: no date leaves. Memory: what the outlets hold.
+/// Follows a rehearsal or a replay and tells all outlets. Tools at kPoseHz of the session's time, the monitor's blocks
+/// as they come. Times are the session's own, from its beginning: no date leaves. Memory: what the outlets hold.
 class StreamFeed final : public Reader, public MonitorSink {
  public:
   static constexpr double kPoseHz = 60;
@@ -133,4 +134,4 @@ class StreamFeed final : public Reader, public MonitorSink {
   Counts counts_;
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

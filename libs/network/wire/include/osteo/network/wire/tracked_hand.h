@@ -6,9 +6,9 @@
 #include <mutex>
 #include <string>
 
-#include "osteo/simulation/devices/devices.h"
 #include "osteo/core/rt/seqlock.h"
 #include "osteo/network/wire/client.h"
+#include "osteo/simulation/devices/devices.h"
 
 namespace osteo::inline network {
 
@@ -19,8 +19,9 @@ struct TrackerAddress {
 };
 [[nodiscard]] TrackerAddress tracker_address(const std::string& text);
 
-/// Follows one TRANSFORM: in mm, RAS, origin at the tip, third axis from tip to handle; the tracker's side has registered it to the
-/// patient. A SENSOR of the same name with "Pedal" behind it is the pedal, 0 to 1. Matrices that are no poses are left out.
+/// Follows one TRANSFORM: in mm, RAS, origin at the tip, third axis from tip to handle; the tracker's side has
+/// registered it to the patient. A SENSOR of the same name with "Pedal" behind it is the pedal, 0 to 1. Matrices that
+/// are no poses are left out.
 class TrackedLink {
  public:
   static constexpr double kStaleMs = 100;  ///< without a pose for so long the tool is out of sight
@@ -52,9 +53,9 @@ class TrackedLink {
   WireClient client_;    // last: its thread uses all the others
 };
 
-/// The tip is the goal of a spring hand, so that the drill rests on bone although nothing holds the tracked tool back. The first pose puts
-/// the tool there; out of sight it rests where it is, the pedal up, and the force fades; in sight again it goes there by the spring, and
-/// the pedal counts once it is within kTakesHoldMm.
+/// The tip is the goal of a spring hand, so that the drill rests on bone although nothing holds the tracked tool back.
+/// The first pose puts the tool there; out of sight it rests where it is, the pedal up, and the force fades; in sight
+/// again it goes there by the spring, and the pedal counts once it is within kTakesHoldMm.
 class TrackedHand final : public Device, public TunedHand {
  public:
   static constexpr double kTakesHoldMm = 3;
@@ -76,4 +77,4 @@ class TrackedHand final : public Device, public TunedHand {
   bool begun_ = false, holds_ = false;
 };
 
-}  // namespace osteo::network
+}  // namespace osteo::inline network

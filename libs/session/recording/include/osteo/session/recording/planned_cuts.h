@@ -23,10 +23,11 @@ struct PlannedCut {
 inline constexpr std::string_view kPlannedCutsFile = "planned-cuts.json";
 
 /// { "osteotome_planned_cuts": 1, "about": "...",
-///   "cuts": [ {"name": "left body", "at_mm": [x, y, z], "normal": [1, 0, 0], "along": [0, 0, 1], "kerf_mm": 1, "length_mm": 0,
+///   "cuts": [ {"name": "left body", "at_mm": [x, y, z], "normal": [1, 0, 0], "along": [0, 0, 1], "kerf_mm": 1,
+///   "length_mm": 0,
 ///              "depth_mm": 0, "within_mm": 2} ] }
-/// LPS mm of the case at rest; a name, a place and a normal are needed, 0 of length and depth: through. Errors: usage, with file and line:
-/// unknown keys, ranges, directions without length, two of one name, none; no_input.
+/// LPS mm of the case at rest; a name, a place and a normal are needed, 0 of length and depth: through. Errors: usage,
+/// with file and line: unknown keys, ranges, directions without length, two of one name, none; no_input.
 [[nodiscard]] std::vector<PlannedCut> load_planned_cuts(const std::filesystem::path& file);
 /// Of a case; none where it has no such file.
 [[nodiscard]] std::vector<PlannedCut> planned_cuts_of(const std::filesystem::path& case_folder);
@@ -35,4 +36,4 @@ inline constexpr std::string_view kPlannedCutsFile = "planned-cuts.json";
 /// The one of that name. Error(usage) with the names there are.
 [[nodiscard]] const PlannedCut& planned_cut(std::span<const PlannedCut> cuts, std::string_view name);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -19,10 +19,10 @@ namespace osteo::inline session {
 
 class Backlog;
 
-/// One thread takes from the stream and makes frames, each of a tenth of a second; another waits for the disk. Between them frames pile up
-/// while the disk stalls: 32 MiB, which is a minute at 1 kHz with 0.5 KB a tick (0.05 to 0.1 KB are usual). When that is full, ticks are
-/// left out and counted until half of it is written again: a RecordingGap. Of such a time only what bone became and what was done is kept,
-/// 8 bytes for each voxel that changed and 128 for each action.
+/// One thread takes from the stream and makes frames, each of a tenth of a second; another waits for the disk. Between
+/// them frames pile up while the disk stalls: 32 MiB, which is a minute at 1 kHz with 0.5 KB a tick (0.05 to 0.1 KB are
+/// usual). When that is full, ticks are left out and counted until half of it is written again: a RecordingGap. Of such
+/// a time only what bone became and what was done is kept, 8 bytes for each voxel that changed and 128 for each action.
 class Recorder {
  public:
   static constexpr std::size_t kMostWaitingBytes = std::size_t{32} << 20;
@@ -30,7 +30,8 @@ class Recorder {
   static constexpr double kFrameS = 0.1;
   /// Notes that wait for their frame.
   static constexpr std::size_t kMostNotes = 4096, kLongestNote = 64 << 10;
-  /// Room in the reader's ring for the time in which even the first thread does not come to run: half a minute at 1 kHz.
+  /// Room in the reader's ring for the time in which even the first thread does not come to run: half a minute at 1
+  /// kHz.
   static constexpr std::size_t kTickCapacity = 1 << 15;
 
   /// `reader` belongs to the recorder from now on. Errors: cannot_write.
@@ -44,20 +45,23 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   void start();
-  /// Takes what the stream holds now, and when it was not started writes it: called by the thread, or by hand instead of it.
+  /// Takes what the stream holds now, and when it was not started writes it: called by the thread, or by hand instead
+  /// of it.
   std::size_t drain();
-  /// From any thread but the servo's: it takes a lock, never waits for the disk. What finds no room, or is longer than kLongestNote, is
-  /// counted and left out.
+  /// From any thread but the servo's: it takes a lock, never waits for the disk. What finds no room, or is longer than
+  /// kLongestNote, is counted and left out.
   void note(Note note);
   /// After the servo has stopped: takes the rest. Again: nothing.
   void stop();
-  /// stop(), and closes the file; waits for the disk. `bone` is asked for all densities of the scene as it is now, when changes were lost.
-  /// What was lost behind the last tick is known from `end.ticks`; `end.ticks_lost` is filled in. Again: nothing.
+  /// stop(), and closes the file; waits for the disk. `bone` is asked for all densities of the scene as it is now, when
+  /// changes were lost. What was lost behind the last tick is known from `end.ticks`; `end.ticks_lost` is filled in.
+  /// Again: nothing.
   void finish(const SessionEnd& end, const std::function<void(std::vector<VoxelChange>&)>& bone = {});
 
   /// From any thread.
   struct Status {
-    std::uint64_t ticks = 0;  ///< the last that is in a frame, and one: what comes before is written when nothing waits, or lost
+    std::uint64_t ticks =
+        0;  ///< the last that is in a frame, and one: what comes before is written when nothing waits, or lost
     std::uint64_t ticks_lost = 0, notes_lost = 0;
     double behind_s = 0;  ///< since what the disk has not taken yet was ready
     std::size_t waiting_bytes = 0;
@@ -114,4 +118,4 @@ class Recorder {
   std::thread thread_;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

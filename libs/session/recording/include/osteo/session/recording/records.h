@@ -1,5 +1,5 @@
-// What the records of a session are made of, field by field: the one source for a file's header, for reading it by name, for what a replay
-// compares, and for the columns of exports.
+// What the records of a session are made of, field by field: the one source for a file's header, for reading it by
+// name, for what a replay compares, and for the columns of exports.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -51,7 +51,9 @@ inline constexpr std::uint32_t kNotesPart = 4;
 }
 /// The value of a field of a record. Exact below 2^53.
 [[nodiscard]] double value_of(const RecordField& field, const void* record);
-/// Bytes, not numbers: the same bits or not. Null: all that are a result are the same in both; else the first that differs.
-[[nodiscard]] const RecordField* first_difference(std::span<const RecordField* const> fields, const void* a, const void* b);
+/// Bytes, not numbers: the same bits or not. Null: all that are a result are the same in both; else the first that
+/// differs.
+[[nodiscard]] const RecordField* first_difference(std::span<const RecordField* const> fields, const void* a,
+                                                  const void* b);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

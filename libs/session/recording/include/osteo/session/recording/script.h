@@ -38,4 +38,4 @@ struct Script : Strokes {
 /// A device for each hand, in their order; the first is active until the tick of the last action has been.
 [[nodiscard]] std::vector<std::unique_ptr<Device>> devices_of(const Script& script, double rate_hz);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -1,5 +1,5 @@
-// The file of a rehearsal: the stream of the servo, in frames with a checksum each, only ever appended to. Whatever was written before a
-// crash can be read. Format: docs/session-format.md. Reading: session_reader.h.
+// The file of a rehearsal: the stream of the servo, in frames with a checksum each, only ever appended to. Whatever was
+// written before a crash can be read. Format: docs/session-format.md. Reading: session_reader.h.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -13,8 +13,8 @@
 
 namespace osteo::inline session {
 
-/// What a replay repeats with: the same poses come out the same only where all of these are equal. Raise a number when what it stands for
-/// gives other bits.
+/// What a replay repeats with: the same poses come out the same only where all of these are equal. Raise a number when
+/// what it stands for gives other bits.
 struct Kernels {
   int burrs = kBurrLibraryVersion;
   int contact = 2;  ///< forces, guard and removal
@@ -44,22 +44,23 @@ struct SessionEnd {
   std::uint64_t notes_lost = 0;
 };
 
-/// Ticks that could not be recorded, at the place where they would be. What they changed and what was done meanwhile follows it (the last
-/// density of each voxel), so that bone behind it is right; but not where `bone_lost`.
+/// Ticks that could not be recorded, at the place where they would be. What they changed and what was done meanwhile
+/// follows it (the last density of each voxel), so that bone behind it is right; but not where `bone_lost`.
 struct RecordingGap {
   std::uint64_t first_tick = 0, ticks = 0;
   bool bone_lost = false;  ///< changes or actions of that time are lost as well
 };
 
-/// Something that does not touch physics: where the camera is, what was chosen or shown, a mark. Whoever does not know a kind ignores it.
+/// Something that does not touch physics: where the camera is, what was chosen or shown, a mark. Whoever does not know
+/// a kind ignores it.
 struct Note {
   std::uint64_t tick = 0;
   std::string kind;  ///< one word
   std::string json;  ///< its value; what is no JSON is kept as a text
 };
 
-/// A piece of the stream: first the actions, then the ticks, then what these changed. An action that looks at densities may not stand
-/// behind changes of its own batch: it begins a new one.
+/// A piece of the stream: first the actions, then the ticks, then what these changed. An action that looks at densities
+/// may not stand behind changes of its own batch: it begins a new one.
 struct SessionBatch {
   std::vector<SceneAction> actions;
   std::vector<TickRecord> ticks;
@@ -80,14 +81,15 @@ class SessionSink {
 /// Creates the file. Errors: cannot_write, also when it exists.
 [[nodiscard]] std::unique_ptr<SessionSink> session_file(const std::filesystem::path& path);
 
-/// Makes frames, each in one write, compressed. Keeps what it takes to write a checkpoint each minute: 8 bytes for each voxel that changed
-/// since the last in each tenth of a second. Errors of all: what the sink throws.
+/// Makes frames, each in one write, compressed. Keeps what it takes to write a checkpoint each minute: 8 bytes for each
+/// voxel that changed since the last in each tenth of a second. Errors of all: what the sink throws.
 class SessionWriter {
  public:
   static constexpr double kCheckpointEveryS = 60;
 
   SessionWriter(std::unique_ptr<SessionSink> sink, const SessionHeader& header);
-  SessionWriter(const std::filesystem::path& path, const SessionHeader& header) : SessionWriter(session_file(path), header) {}
+  SessionWriter(const std::filesystem::path& path, const SessionHeader& header)
+      : SessionWriter(session_file(path), header) {}
 
   /// Ticks in order, going on from those before.
   void append(const SessionBatch& batch);
@@ -113,4 +115,4 @@ class SessionWriter {
   std::vector<std::byte> raw_, out_;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

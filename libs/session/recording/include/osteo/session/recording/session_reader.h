@@ -16,8 +16,9 @@ namespace osteo::inline session {
 /// What is missing in the middle of a session.
 struct Gap {
   std::uint64_t first_tick = 0, ticks = 0;  ///< 0 ticks: only changes or actions
-  bool bone_lost = false;                   ///< changes or actions are missing too: bone behind it is not known until the end
-  std::uint64_t at_byte = 0, bytes = 0;     ///< of the file, where it is damaged; 0: the recorder could not keep up and said so
+  bool bone_lost = false;  ///< changes or actions are missing too: bone behind it is not known until the end
+  std::uint64_t at_byte = 0,
+                bytes = 0;  ///< of the file, where it is damaged; 0: the recorder could not keep up and said so
 };
 
 /// What is known of a session before its records are read.
@@ -35,15 +36,15 @@ struct SessionOutline {
   /// record that tells of it is refused.
   std::vector<std::string> tools, plates;
   bool numbered_alike = true;  ///< the file has the same numbers for what both know
-  /// Of its settings, under the numbers that its `setting` actions carry in the file; read, they carry the numbers of this build, kNobody
-  /// where it has no such setting (then it is not replayable).
+  /// Of its settings, under the numbers that its `setting` actions carry in the file; read, they carry the numbers of
+  /// this build, kNobody where it has no such setting (then it is not replayable).
   std::vector<std::string> setting_names;
-  std::string not_replayable;                         ///< why this build's servo cannot repeat it; empty: it can
-  std::vector<std::string> newer;                     ///< what it holds that this build does not know and leaves out, each in a line
+  std::string not_replayable;      ///< why this build's servo cannot repeat it; empty: it can
+  std::vector<std::string> newer;  ///< what it holds that this build does not know and leaves out, each in a line
 
   [[nodiscard]] bool damaged() const;
-  /// The gap behind which changes and actions do not give the bone any more; null: they give it to the end. (Bone that the recorder lost on
-  /// the way stands at the end of a session that was closed.)
+  /// The gap behind which changes and actions do not give the bone any more; null: they give it to the end. (Bone that
+  /// the recorder lost on the way stands at the end of a session that was closed.)
   [[nodiscard]] const Gap* bone_known_until() const;
 };
 
@@ -69,10 +70,10 @@ struct SessionPart {
 /// An open session. Holds an index of its frames, 32 bytes for each tenth of a second, and no records.
 class SessionReader {
  public:
-  /// Looks through the whole file: all checksums, none of the records. Behind damage it looks for the next whole frame. Errors: no_input,
-  /// cannot_read; corrupt when it is of another format (says which), the header is damaged, a frame in the middle is (Damage::refuse), or
-  /// ticks are missing without anything that says so. A cut or damaged last frame is left out without error: `end` is then absent, and
-  /// `torn_bytes` not 0.
+  /// Looks through the whole file: all checksums, none of the records. Behind damage it looks for the next whole frame.
+  /// Errors: no_input, cannot_read; corrupt when it is of another format (says which), the header is damaged, a frame
+  /// in the middle is (Damage::refuse), or ticks are missing without anything that says so. A cut or damaged last frame
+  /// is left out without error: `end` is then absent, and `torn_bytes` not 0.
   explicit SessionReader(const std::filesystem::path& path, Damage damage = Damage::refuse);
   ~SessionReader();
   SessionReader(SessionReader&&) noexcept;
@@ -99,9 +100,9 @@ class SessionReader {
   [[nodiscard]] Parts parts() const;
   /// The contents of the checkpoints: actions and changes that give the same scene at each.
   [[nodiscard]] Parts checkpoints() const;
-  /// The fewest actions and changes that give the scene in which `tick` begins, and nothing else. They give it at `reached`: where the
-  /// frame ends that holds the tick before, so at most a tenth of a second later. Error(corrupt) where that scene is not known, since
-  /// something is missing before.
+  /// The fewest actions and changes that give the scene in which `tick` begins, and nothing else. They give it at
+  /// `reached`: where the frame ends that holds the tick before, so at most a tenth of a second later. Error(corrupt)
+  /// where that scene is not known, since something is missing before.
   [[nodiscard]] Parts scene_at(std::uint64_t tick, std::uint64_t& reached) const;
 
  private:
@@ -126,4 +127,4 @@ struct Session : SessionOutline {
 /// Errors: as SessionReader.
 [[nodiscard]] Session read_session(const std::filesystem::path& path, Damage damage = Damage::refuse);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -21,7 +21,8 @@ struct ApprovalNow {
   ApprovalState state = ApprovalState::none;
   std::optional<Approval> approval;
   std::string changed;  ///< what was changed since; empty unless outdated
-  /// "not approved", "approved by NAME on DATE", "approved by NAME on DATE, before the last change (the bone): no longer valid".
+  /// "not approved", "approved by NAME on DATE", "approved by NAME on DATE, before the last change (the bone): no
+  /// longer valid".
   [[nodiscard]] std::string words() const;
 };
 
@@ -31,11 +32,11 @@ struct ApprovalNow {
 /// Content of all files that the manifest names, as they lie there now. Error(no_input, corrupt) where it is no case.
 [[nodiscard]] std::string case_hash(const std::filesystem::path& case_folder);
 
-/// Reads every file of the case to compare. A report that is not there does not end an approval: the case may have been copied without it.
-/// A record that cannot be read counts as outdated. Errors: as of case_hash.
+/// Reads every file of the case to compare. A report that is not there does not end an approval: the case may have been
+/// copied without it. A record that cannot be read counts as outdated. Errors: as of case_hash.
 [[nodiscard]] ApprovalNow approval_of(const std::filesystem::path& case_folder);
-/// Of today. Written whole or not at all into approval.json of the case. Errors: usage for an empty name, control characters, or texts
-/// beyond 80 and 300 bytes; no_input where there is no report to sign; cannot_write.
+/// Of today. Written whole or not at all into approval.json of the case. Errors: usage for an empty name, control
+/// characters, or texts beyond 80 and 300 bytes; no_input where there is no report to sign; cannot_write.
 void approve(const std::filesystem::path& case_folder, const std::string& by, const std::string& note);
 /// Whether there was one.
 bool withdraw_approval(const std::filesystem::path& case_folder);
@@ -46,4 +47,4 @@ void require_approval(const ApprovalNow& now, const std::filesystem::path& case_
 /// For session.json: { "state": "valid", "by", "date", "note" }.
 [[nodiscard]] Json approval_json(const ApprovalNow& now);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -13,7 +13,8 @@ struct ChangedBricks {
   std::vector<std::uint32_t> bricks;
   std::vector<float> values;
 };
-/// Of all bodies that an action changed, as the world has them now; at once in Reader::scene_changed(), before the servo writes there.
+/// Of all bodies that an action changed, as the world has them now; at once in Reader::scene_changed(), before the
+/// servo writes there.
 [[nodiscard]] std::vector<ChangedBricks> changed_bricks(const World& world, const World::Effect& effect);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -5,16 +5,16 @@
 #include <memory>
 #include <vector>
 
-#include "osteo/simulation/bone/dust.h"
 #include "osteo/session/scene/changed_bricks.h"
 #include "osteo/session/scene/reader.h"
+#include "osteo/simulation/bone/dust.h"
 
 namespace osteo::inline session {
 
-/// Moves in tick(), a hundred steps a second, so that a replay ends with the same dust to the bit. What a stroke or a saw left stays dust
-/// when it is taken back. After ticks were lost: what is gone since has become dust, later than it was made. One that joins a scene whose
-/// pieces it does not know begins without dust.
-/// Memory: a copy of the bone as of the tick reached, and 2 to 6 KB for each brick that holds dust or water.
+/// Moves in tick(), a hundred steps a second, so that a replay ends with the same dust to the bit. What a stroke or a
+/// saw left stays dust when it is taken back. After ticks were lost: what is gone since has become dust, later than it
+/// was made. One that joins a scene whose pieces it does not know begins without dust. Memory: a copy of the bone as of
+/// the tick reached, and 2 to 6 KB for each brick that holds dust or water.
 class DustReader final : public Reader {
  public:
   DustReader(const World& world, double rate_hz);
@@ -58,4 +58,4 @@ class DustReader final : public Reader {
   std::size_t applied_early_ = 0;  // pending when ticks were lost, whose action is still to be told
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

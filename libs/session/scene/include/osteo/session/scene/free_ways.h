@@ -27,9 +27,9 @@ struct ToolSkin {
 /// A plate as it is gripped.
 [[nodiscard]] ToolSkin skin_of_plate(std::size_t plate, const RigidTransform& grip);
 
-/// Looks at bone as it is now; bodies that change meanwhile are seen in part as they were. Structures at risk are in the way like bone,
-/// with kClearOfStructuresMm between them and the tool; where a tool is nearer at the beginning it may not come nearer. Soft tissue is not
-/// looked at. One thread.
+/// Looks at bone as it is now; bodies that change meanwhile are seen in part as they were. Structures at risk are in
+/// the way like bone, with kClearOfStructuresMm between them and the tool; where a tool is nearer at the beginning it
+/// may not come nearer. Soft tissue is not looked at. One thread.
 class FreeWays {
  public:
   /// More than the error of the structures' faces (StructureMap) with voxels of a millimetre.
@@ -42,11 +42,12 @@ class FreeWays {
   [[nodiscard]] Vec3 centre_mm() const { return centre_mm_; }
   [[nodiscard]] double radius_mm() const { return radius_mm_; }
 
-  /// No bone within `margin_mm` of the tool's surface, a negative margin lets it be that deep; and no structure within that, or within
-  /// kClearOfStructuresMm where that is more.
+  /// No bone within `margin_mm` of the tool's surface, a negative margin lets it be that deep; and no structure within
+  /// that, or within kClearOfStructuresMm where that is more.
   [[nodiscard]] bool free(const HandPose& pose, double margin_mm) const;
 
-  /// Beside the bone, on the side of `eye` (unit, from the bone towards who looks); `axis` should not point away from there.
+  /// Beside the bone, on the side of `eye` (unit, from the bone towards who looks); `axis` should not point away from
+  /// there.
   [[nodiscard]] HandPose waiting(Vec3 eye, Vec3 axis) const;
 
   struct Found {
@@ -55,16 +56,17 @@ class FreeWays {
     /// No way keeps clear of the structures; this one is clear of bone only, and may touch them.
     bool past_structures = false;
   };
-  /// Out of the bone, across free air, to a place that is free. `put` where the tool is shut in, so that no way was found.
+  /// Out of the bone, across free air, to a place that is free. `put` where the tool is shut in, so that no way was
+  /// found.
   [[nodiscard]] Found way(const HandPose& from, const HandPose& to) const;
 
-  /// To bone that is seen along `forward` (unit) at `seen_mm`: the nearest place before it on that line of sight where the tool is free by
-  /// half a millimetre and gets to from outside. Held along `axis`, or where it does not fit so, leaning to another side or towards who
-  /// looks.
+  /// To bone that is seen along `forward` (unit) at `seen_mm`: the nearest place before it on that line of sight where
+  /// the tool is free by half a millimetre and gets to from outside. Held along `axis`, or where it does not fit so,
+  /// leaning to another side or towards who looks.
   [[nodiscard]] Found approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const;
 
-  /// `axis` turned towards `wanted`, by `most_rad` at most and only as far as the tool touches no more bone than it does, nor comes nearer
-  /// to a structure that it is close to.
+  /// `axis` turned towards `wanted`, by `most_rad` at most and only as far as the tool touches no more bone than it
+  /// does, nor comes nearer to a structure that it is close to.
   [[nodiscard]] Vec3 turned(const HandPose& pose, Vec3 wanted, double most_rad) const;
 
  private:
@@ -79,8 +81,10 @@ class FreeWays {
   [[nodiscard]] bool in_bone(Vec3 at_mm) const;
   [[nodiscard]] std::optional<Poses> straight_out(const HandPose& from, Vec3 rather) const;
   [[nodiscard]] std::optional<Poses> way_out(const HandPose& from, Vec3 rather) const;
-  [[nodiscard]] bool leaves(const HandPose& from, Vec3 direction, double near_margin_mm, double margin_mm, HandPose& end) const;
-  [[nodiscard]] std::optional<Poses> search_out(const HandPose& from, double near_margin_mm, double far_margin_mm) const;
+  [[nodiscard]] bool leaves(const HandPose& from, Vec3 direction, double near_margin_mm, double margin_mm,
+                            HandPose& end) const;
+  [[nodiscard]] std::optional<Poses> search_out(const HandPose& from, double near_margin_mm,
+                                                double far_margin_mm) const;
   [[nodiscard]] std::optional<Poses> across(const HandPose& from, const HandPose& to) const;
   [[nodiscard]] std::optional<Poses> over(const HandPose& from, const HandPose& to, Vec3 lift) const;
   [[nodiscard]] bool free_leg(const HandPose& a, const HandPose& b, double margin_mm) const;
@@ -100,4 +104,4 @@ class FreeWays {
   double radius_mm_ = 0;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -9,16 +9,17 @@
 #include <string>
 #include <vector>
 
+#include "osteo/session/scene/changed_bricks.h"
+#include "osteo/session/scene/reader.h"
 #include "osteo/simulation/bone/structure_map.h"
 #include "osteo/simulation/heat/heat_field.h"
 #include "osteo/simulation/heat/thermal_dose.h"
-#include "osteo/session/scene/changed_bricks.h"
-#include "osteo/session/scene/reader.h"
 
 namespace osteo::inline session {
 
-/// How much of a burr's work becomes heat in bone, and what water does. Known within a factor of ten at best: chosen so that a third of a
-/// watt for 30 s gives 13 K at 3 mm, as reported for grinding (docs/heat.md); temperatures follow it in proportion.
+/// How much of a burr's work becomes heat in bone, and what water does. Known within a factor of ten at best: chosen so
+/// that a third of a watt for 30 s gives 13 K at 3 mm, as reported for grinding (docs/heat.md); temperatures follow it
+/// in proportion.
 struct HeatOfCutting {
   /// Of force times speed of the burr's surface, cutting burrs: friction times the share that stays in bone.
   double cutting_share = 0.03;
@@ -26,13 +27,14 @@ struct HeatOfCutting {
   double diamond_w_per_n = 0.5;
   double body_c = 37, water_c = 22;
   double film_w_per_m2_k = 3000;  ///< of running water
-  double cell_mm = 0.5;           ///< cells are 1, 2, 4 or 8 voxels wide: the fewest that make at least three quarters of this
+  double cell_mm = 0.5;  ///< cells are 1, 2, 4 or 8 voxels wide: the fewest that make at least three quarters of this
 };
 
-/// Heat of all burrs of all hands, at their points of contact; conduction in each body by itself (not across a saw cut, nor across the
-/// border of a finer region); water from irrigators and from the action `irrigate`. What is cut off begins cold, and so does everything
-/// after ticks were lost: told by restarts(). In steps of whole ticks, from the stream alone: a replay gives the same to the bit.
-/// Memory: a copy of the bone as of the tick reached, and 22 KB for each 8^3 cells that are warm.
+/// Heat of all burrs of all hands, at their points of contact; conduction in each body by itself (not across a saw cut,
+/// nor across the border of a finer region); water from irrigators and from the action `irrigate`. What is cut off
+/// begins cold, and so does everything after ticks were lost: told by restarts(). In steps of whole ticks, from the
+/// stream alone: a replay gives the same to the bit. Memory: a copy of the bone as of the tick reached, and 22 KB for
+/// each 8^3 cells that are warm.
 class HeatReader final : public Reader {
  public:
   /// `structures` (null: none) must outlive it.
@@ -60,10 +62,12 @@ class HeatReader final : public Reader {
   [[nodiscard]] double stored_j() const;
   [[nodiscard]] std::size_t warm_bricks() const;
 
-  /// From now on: the highest temperature that each cell has, and the course of each structure. Before the first tick. Nothing of it
-  /// without this. Memory: 4 KB for each 8^3 cells that were ever warm, 8 bytes a step and structure. Forgotten where ticks are lost.
+  /// From now on: the highest temperature that each cell has, and the course of each structure. Before the first tick.
+  /// Nothing of it without this. Memory: 4 KB for each 8^3 cells that were ever warm, 8 bytes a step and structure.
+  /// Forgotten where ticks are lost.
   void keep_history();
-  /// Of the bone that is still there, linear between the centres of its cells; the body's where none was warm, or nothing is kept.
+  /// Of the bone that is still there, linear between the centres of its cells; the body's where none was warm, or
+  /// nothing is kept.
   [[nodiscard]] double peak_c_at(Vec3 world_mm) const;
   /// Share of bone of the voxel at a point of the world, as of the tick reached.
   [[nodiscard]] double bone_at(Vec3 world_mm) const;
@@ -73,7 +77,8 @@ class HeatReader final : public Reader {
   };
   /// Of cells that still hold at least half of their bone; none where no such cell was warm.
   [[nodiscard]] std::optional<Warmest> warmest_left() const;
-  /// The warmest place of each structure after each step (step_s() apart), C, by value in the label map: of those whose face became warm.
+  /// The warmest place of each structure after each step (step_s() apart), C, by value in the label map: of those whose
+  /// face became warm.
   [[nodiscard]] const std::map<std::uint8_t, std::vector<double>>& courses() const { return courses_; }
   [[nodiscard]] std::uint64_t steps() const { return steps_; }  ///< that the history tells of
 
@@ -121,7 +126,8 @@ class HeatReader final : public Reader {
   std::map<std::uint8_t, std::vector<double>> courses_;
 };
 
-/// What it found, a line each: warmest bone and where its heat went; each structure that became warm; none at risk. For people.
+/// What it found, a line each: warmest bone and where its heat went; each structure that became warm; none at risk. For
+/// people.
 [[nodiscard]] std::vector<std::string> told(const HeatReader& heat, const StructureMap* structures);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

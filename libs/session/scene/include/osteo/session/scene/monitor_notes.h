@@ -5,8 +5,8 @@
 
 namespace osteo::inline session {
 
-/// Settings of the stimulator as stimulator_notes() reads them; bursts, trains, answers, thresholds as notes "monitor". In the thread that
-/// follows the stream, which may leave notes. `rehearsal` and `wiring` must outlive it.
+/// Settings of the stimulator as stimulator_notes() reads them; bursts, trains, answers, thresholds as notes "monitor".
+/// In the thread that follows the stream, which may leave notes. `rehearsal` and `wiring` must outlive it.
 class MonitorNotes final : public MonitorSink {
  public:
   MonitorNotes(Rehearsal& rehearsal, const MonitorWiring& wiring) : rehearsal_(rehearsal), wiring_(wiring) {}
@@ -17,4 +17,4 @@ class MonitorNotes final : public MonitorSink {
   const MonitorWiring& wiring_;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

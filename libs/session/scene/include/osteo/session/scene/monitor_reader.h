@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "osteo/session/recording/session_reader.h"
+#include "osteo/session/scene/heat_reader.h"
+#include "osteo/session/scene/reader.h"
 #include "osteo/simulation/bone/structure_map.h"
 #include "osteo/simulation/nerve/activity.h"
 #include "osteo/simulation/nerve/electromyogram.h"
 #include "osteo/simulation/nerve/stimulator.h"
-#include "osteo/session/scene/heat_reader.h"
-#include "osteo/session/scene/reader.h"
-#include "osteo/session/recording/session_reader.h"
 
 namespace osteo::inline session {
 
@@ -22,10 +22,11 @@ struct MonitorWiring {
   std::vector<NerveCourse> courses;
   std::vector<std::uint8_t> structures;           ///< of each course, its value in the label map
   std::vector<Electromyogram::Channel> channels;  ///< `nerve` counts courses
-  std::vector<std::string> left_out;              ///< nerves of the setup that the case does not have, by their first names
+  std::vector<std::string> left_out;  ///< nerves of the setup that the case does not have, by their first names
   [[nodiscard]] std::vector<std::string> labels() const;
 };
-/// Structures are found by name (letters' case does not count; the first of a setup's names that a structure has). `map` null: none.
+/// Structures are found by name (letters' case does not count; the first of a setup's names that a structure has).
+/// `map` null: none.
 [[nodiscard]] MonitorWiring wire_monitor(const MonitorSetup& setup, const StructureMap* map);
 
 struct MonitorOptions {
@@ -33,15 +34,16 @@ struct MonitorOptions {
   bool heat = true;  ///< nerves feel the heat of burrs: costs what HeatReader costs
 };
 
-/// Steps of 5 ms of the stream, from it and the stimulator's settings alone: in a replay that is told the same settings at the same ticks
-/// (stimulator_notes) signal and events are the same to the bit. Waves are told to sinks as blocks of 5 ms, events behind the block they
-/// are found in. Memory: a copy of the bone (two with heat). After ticks were lost nerves and stimulator go on as they were, bone and
-/// heat from the scene as it is, and an event tells of it.
-/// Cost: docs/monitor.md. In the thread that follows the stream, sinks too.
+/// Steps of 5 ms of the stream, from it and the stimulator's settings alone: in a replay that is told the same settings
+/// at the same ticks (stimulator_notes) signal and events are the same to the bit. Waves are told to sinks as blocks of
+/// 5 ms, events behind the block they are found in. Memory: a copy of the bone (two with heat). After ticks were lost
+/// nerves and stimulator go on as they were, bone and heat from the scene as it is, and an event tells of it. Cost:
+/// docs/monitor.md. In the thread that follows the stream, sinks too.
 class MonitorReader final : public Reader {
  public:
   static constexpr double kStepS = 0.005;
-  /// `structures` (null: no nerves, and no channels) must outlive it. Error(usage) where more channels are wired than a monitor has.
+  /// `structures` (null: no nerves, and no channels) must outlive it. Error(usage) where more channels are wired than a
+  /// monitor has.
   MonitorReader(const MonitorOptions& options, const StructureMap* structures, double rate_hz);
   ~MonitorReader() override;
 
@@ -109,7 +111,8 @@ class MonitorReader final : public Reader {
   std::deque<std::pair<std::uint64_t, StimulatorSetting>> settings_;
   std::mutex mutex_;
   std::vector<StimulatorSetting> waiting_;
-  std::uint64_t sample_ = 0, step_tick_ = 0, next_tick_ = 0, steps_ = 0, restarts_ = 0, applied_early_ = 0, pending_ = 0;
+  std::uint64_t sample_ = 0, step_tick_ = 0, next_tick_ = 0, steps_ = 0, restarts_ = 0, applied_early_ = 0,
+                pending_ = 0;
   bool begun_ = false;
 };
 
@@ -124,4 +127,4 @@ inline constexpr const char* kStimulatorNote = "stimulator";
 /// An event for people and for notes: "burst, orbicularis oris, 180 ms, 340 uV".
 [[nodiscard]] std::string words_of(const MonitorEvent& event, const MonitorWiring& wiring);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -3,14 +3,14 @@
 #include <atomic>
 #include <vector>
 
-#include "osteo/simulation/nerve/activity.h"
 #include "osteo/core/rt/ring.h"
+#include "osteo/simulation/nerve/activity.h"
 
 namespace osteo::inline session {
 
-/// Between the thread that follows the stream and that of the sound card. Silent while a stimulus' artefact lasts, and where it is muted.
-/// Latency, behind the block that a monitor tells: the tone begins with the next mix(), the signal at most kMostWaitingS later; what waits
-/// for longer is left out. Memory: fixed.
+/// Between the thread that follows the stream and that of the sound card. Silent while a stimulus' artefact lasts, and
+/// where it is muted. Latency, behind the block that a monitor tells: the tone begins with the next mix(), the signal
+/// at most kMostWaitingS later; what waits for longer is left out. Memory: fixed.
 class MonitorSound final : public MonitorSink {
  public:
   static constexpr double kMostWaitingS = 0.04, kToneS = 0.15, kBlankingS = 0.004;
@@ -49,4 +49,4 @@ class MonitorSound final : public MonitorSink {
   std::size_t taken_at_ = 0, taken_size_ = 0;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

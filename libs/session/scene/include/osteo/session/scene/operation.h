@@ -4,21 +4,23 @@
 #include <memory>
 #include <optional>
 
-#include "osteo/simulation/haptics/servo.h"
 #include "osteo/session/scene/stroke_reader.h"
+#include "osteo/simulation/haptics/servo.h"
 
 namespace osteo::inline session {
 
-/// Between a world, which is changed step by step, and a servo, which must never wait. An action makes the next world, then what the servo
-/// keeps of the bodies that are new, and hands that over; it happens at the beginning of the next tick. While that is prepared by the
-/// clock, nothing is removed (an action of its own in the stream, ActionKind::hold), so the outcome follows from the stream alone.
+/// Between a world, which is changed step by step, and a servo, which must never wait. An action makes the next world,
+/// then what the servo keeps of the bodies that are new, and hands that over; it happens at the beginning of the next
+/// tick. While that is prepared by the clock, nothing is removed (an action of its own in the stream,
+/// ActionKind::hold), so the outcome follows from the stream alone.
 class Operation {
  public:
   /// What is given by reference must outlive this. As many devices as the setup has hands.
-  Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, std::span<Device* const> devices, Stream& stream,
-            double rate_hz);
+  Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, std::span<Device* const> devices,
+            Stream& stream, double rate_hz);
   /// Of one hand.
-  Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, Device& device, Stream& stream, double rate_hz);
+  Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, Device& device, Stream& stream,
+            double rate_hz);
 
   bool step(std::int64_t lateness_ns) noexcept { return servo_.step(lateness_ns); }
   /// After the last step: the stream tells of what was done and not yet taken up.
@@ -35,16 +37,17 @@ class Operation {
   /// The servo has taken up all that was done.
   [[nodiscard]] bool taken() const noexcept { return servo_.taken(); }
 
-  /// Called when the world was changed (ActionRow::changes_world) and the servo does not know it yet: bodies that are new are still as they
-  /// were made.
+  /// Called when the world was changed (ActionRow::changes_world) and the servo does not know it yet: bodies that are
+  /// new are still as they were made.
   using Done = std::function<void(const World::Effect&)>;
   /// In the thread that also steps; at most one action a tick. Who drains strokes() does so before.
   World::Effect act(const SceneAction& action, const Done& done = {}, const World::ComponentsOf& components = {});
-  /// In one other thread, while the servo runs by the clock. `running` false: the servo has ended, and nothing is waited for; none when it
-  /// did before the action was tried. `held`: called while nothing is removed and before anything changes, for those that have to be up to
-  /// date.
-  std::optional<World::Effect> act_live(const SceneAction& action, const std::function<bool()>& running, const std::function<void()>& held,
-                                        const Done& done = {}, const World::ComponentsOf& components = {});
+  /// In one other thread, while the servo runs by the clock. `running` false: the servo has ended, and nothing is
+  /// waited for; none when it did before the action was tried. `held`: called while nothing is removed and before
+  /// anything changes, for those that have to be up to date.
+  std::optional<World::Effect> act_live(const SceneAction& action, const std::function<bool()>& running,
+                                        const std::function<void()>& held, const Done& done = {},
+                                        const World::ComponentsOf& components = {});
 
  private:
   void hand_over(const SceneAction& action, std::unique_ptr<HapticScene> scene);
@@ -61,4 +64,4 @@ class Operation {
   Handover handover_;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -4,12 +4,13 @@
 #include <memory>
 #include <vector>
 
-#include "osteo/simulation/bone/live_components.h"
 #include "osteo/session/scene/reader.h"
+#include "osteo/simulation/bone/live_components.h"
 
 namespace osteo::inline session {
 
-/// 10 us for each changed brick and 1 ms for the joining in a whole head, in update(). Memory: that of LiveComponents for each body.
+/// 10 us for each changed brick and 1 ms for the joining in a whole head, in update(). Memory: that of LiveComponents
+/// for each body.
 class PiecesReader final : public Reader {
  public:
   /// Labels all bodies.
@@ -38,4 +39,4 @@ class PiecesReader final : public Reader {
   std::map<std::uint32_t, Followed> bodies_;  // by id
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

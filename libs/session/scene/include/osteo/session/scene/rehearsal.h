@@ -12,26 +12,27 @@
 #include <span>
 #include <string>
 
-#include "osteo/simulation/bone/structure_cut.h"
 #include "osteo/core/rt/loop.h"
-#include "osteo/session/scene/operation.h"
-#include "osteo/session/scene/scene_readers.h"
-#include "osteo/session/scene/soft_tissue.h"
 #include "osteo/session/recording/recorder.h"
 #include "osteo/session/recording/script.h"
 #include "osteo/session/recording/session_reader.h"
+#include "osteo/session/scene/operation.h"
+#include "osteo/session/scene/scene_readers.h"
+#include "osteo/session/scene/soft_tissue.h"
+#include "osteo/simulation/bone/structure_cut.h"
 
 namespace osteo::inline session {
 
 struct RehearsalOptions {
   double rate_hz = 1000;
   HapticSetup haptics;
-  Anatomy anatomy;                     ///< hardness where haptics.hardness is set; structures at risk where the case has them
+  Anatomy anatomy;  ///< hardness where haptics.hardness is set; structures at risk where the case has them
   std::filesystem::path session_file;  ///< empty: not recorded
   ReaderList follow;                   ///< what is kept up beside the servo
   std::vector<SceneAction> actions;    ///< done when their tick has come, in order
   std::shared_ptr<SoftTissue> soft;    ///< soft tissue that the hands' tools meet; null: none
-  std::function<void(const std::string& kind, const std::string& json)> heard;  ///< each note too, in the thread that leaves it
+  std::function<void(const std::string& kind, const std::string& json)>
+      heard;  ///< each note too, in the thread that leaves it
 };
 
 /// An action that was refused, or done otherwise than asked.
@@ -60,9 +61,9 @@ struct RehearsalSummary {
   std::uint64_t ticks_not_recorded = 0;  ///< in the gaps
   std::vector<RecordingGap> gaps;
   std::uint64_t notes_not_recorded = 0;
-  std::uint64_t ticks_not_followed =
-      0;                     ///< surface and pieces caught up with them from the bone itself; dust lies a little elsewhere than in a replay
-  bool interrupted = false;  ///< run_to_end() was asked to stop
+  std::uint64_t ticks_not_followed = 0;  ///< surface and pieces caught up with them from the bone itself; dust lies a
+                                         ///< little elsewhere than in a replay
+  bool interrupted = false;              ///< run_to_end() was asked to stop
   std::uint64_t session_bytes = 0;
   std::map<std::uint32_t, StructureEvents> structures;  ///< by their value; empty where the scene has none
   std::vector<StructureCutEvent> structure_cuts;        ///< by planes, in their order; what was taken back too
@@ -81,12 +82,15 @@ struct RehearsalSummary {
   }
 };
 
-/// Owns the world while it runs. The servo's thread writes densities; the recorder and the readers are told through the stream; the
-/// follower's thread drains it for all readers and changes the scene. Who holds which lock: docs/threads.md.
+/// Owns the world while it runs. The servo's thread writes densities; the recorder and the readers are told through the
+/// stream; the follower's thread drains it for all readers and changes the scene. Who holds which lock:
+/// docs/threads.md.
 class Rehearsal {
  public:
-  /// As many devices as options.haptics has hands, in their order. Error(usage) when they are not as many; cannot_write.
-  Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, const RehearsalOptions& options, const Context& context);
+  /// As many devices as options.haptics has hands, in their order. Error(usage) when they are not as many;
+  /// cannot_write.
+  Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, const RehearsalOptions& options,
+            const Context& context);
   /// Of one hand.
   Rehearsal(World world, std::unique_ptr<Device> device, const RehearsalOptions& options, const Context& context);
   ~Rehearsal();
@@ -94,38 +98,42 @@ class Rehearsal {
   /// By the clock, in threads of its own.
   void start();
   [[nodiscard]] bool running() const;
-  /// Ends the threads, takes the rest of the stream, does what was due and waits, closes the session file (which may wait for the disk),
-  /// and then throws what a thread threw, if one did. Error(cannot_write) when it could not be recorded to the end. Again: the same
-  /// summary.
+  /// Ends the threads, takes the rest of the stream, does what was due and waits, closes the session file (which may
+  /// wait for the disk), and then throws what a thread threw, if one did. Error(cannot_write) when it could not be
+  /// recorded to the end. Again: the same summary.
   RehearsalSummary stop();
 
-  /// As fast as possible in this thread, up to the device's end, or until the context is cancelled or nothing can be recorded any more.
-  /// Same bone, surface and session as by the clock. Errors as stop().
+  /// As fast as possible in this thread, up to the device's end, or until the context is cancelled or nothing can be
+  /// recorded any more. Same bone, surface and session as by the clock. Errors as stop().
   RehearsalSummary run_to_end(const Context& context);
 
-  /// In place of start() and run_to_end(), for a session that runs elsewhere: its next tick is done here, with what was done at its
-  /// beginning, and the devices have its samples. From one thread, until stop(), which comes after its last call. The same bits as there.
+  /// In place of start() and run_to_end(), for a session that runs elsewhere: its next tick is done here, with what was
+  /// done at its beginning, and the devices have its samples. From one thread, until stop(), which comes after its last
+  /// call. The same bits as there.
   void step_elsewhere(std::span<const SceneAction> actions);
   /// What was done behind its last tick; stop() comes next.
   void end_elsewhere(std::span<const SceneAction> behind);
-  /// Readers are told what they were not told yet; from the thread of step_elsewhere(), which does so every 16 ticks by itself.
+  /// Readers are told what they were not told yet; from the thread of step_elsewhere(), which does so every 16 ticks by
+  /// itself.
   void catch_up();
-  /// Where it runs elsewhere: who sits here is shown first, by what `now` tells of the hand; in place of `hand`, which is told in its
-  /// place. `device` is what this hand is moved by. All must outlive this, or the next call; null: the hands as they are.
+  /// Where it runs elsewhere: who sits here is shown first, by what `now` tells of the hand; in place of `hand`, which
+  /// is told in its place. `device` is what this hand is moved by. All must outlive this, or the next call; null: the
+  /// hands as they are.
   void seat(Device* device, const Seqlock<TickRecord>* now, std::size_t hand);
 
-  /// From any thread: soon, in the order they were asked for. One that waits is replaced by the next where that is enough
-  /// (ActionRow::last_counts). What runs elsewhere is changed there alone: refused.
+  /// From any thread: soon, in the order they were asked for. One that waits is replaced by the next where that is
+  /// enough (ActionRow::last_counts). What runs elsewhere is changed there alone: refused.
   void act(const SceneAction& action);
-  /// From any thread but the servo's: something that does not touch physics, at the tick that comes next. Counted where it is not kept.
+  /// From any thread but the servo's: something that does not touch physics, at the tick that comes next. Counted where
+  /// it is not kept.
   void note(const std::string& kind, const std::string& json);
   /// Why the last action that could not be done was not, or which structures the last cut went through; once.
   std::string take_refusal();
 
   /// From any thread, while it runs: how the recording does (nothing lost, where none was asked for).
   [[nodiscard]] Recorder::Status recording() const { return recorder_ ? recorder_->status() : Recorder::Status{}; }
-  /// For people, in a line: recording that has ended, that lost ticks or lags by more than 3 s, a device's thread in trouble. Empty: all
-  /// well.
+  /// For people, in a line: recording that has ended, that lost ticks or lags by more than 3 s, a device's thread in
+  /// trouble. Empty: all well.
   [[nodiscard]] std::string trouble() const;
 
   /// Latest tick of a hand, for display.
@@ -142,7 +150,9 @@ class Rehearsal {
   /// Edge of the finest voxels in the scene.
   [[nodiscard]] double finest_voxel_mm() const { return finest_voxel_mm_; }
   [[nodiscard]] std::size_t hands() const { return devices_.size(); }
-  [[nodiscard]] Device& device(std::size_t hand = 0) { return hand == 0 && seat_ != nullptr ? seat_->held() : devices_[hand]->held(); }
+  [[nodiscard]] Device& device(std::size_t hand = 0) {
+    return hand == 0 && seat_ != nullptr ? seat_->held() : devices_[hand]->held();
+  }
   /// The settings as the last action has left them.
   [[nodiscard]] HapticsParams settings() const;
   /// Null where the scene has none; under look() only.
@@ -151,11 +161,13 @@ class Rehearsal {
   [[nodiscard]] std::vector<SoftTissue::Facts> tissue() const {
     return options_.soft ? options_.soft->facts() : std::vector<SoftTissue::Facts>{};
   }
-  /// Calls f under the lock that keeps the follower away: bodies, plates, surfaces and dust do not change meanwhile, densities may.
+  /// Calls f under the lock that keeps the follower away: bodies, plates, surfaces and dust do not change meanwhile,
+  /// densities may.
   void look(const std::function<void(const World&, SceneReaders&)>& f);
 
-  /// From any thread but a reader's own calls, before it starts or while it runs: from now on the follower's thread calls it, first
-  /// resync() with the scene as it is. It must live until remove_reader() has returned, or as long as this. Waits for the lock of look().
+  /// From any thread but a reader's own calls, before it starts or while it runs: from now on the follower's thread
+  /// calls it, first resync() with the scene as it is. It must live until remove_reader() has returned, or as long as
+  /// this. Waits for the lock of look().
   void add_reader(Reader& reader);
   /// When it returns, the reader is not called any more.
   void remove_reader(Reader& reader);
@@ -205,12 +217,13 @@ class Rehearsal {
 /// What a replay found.
 struct ReplayResult {
   std::uint64_t ticks = 0, actions = 0;
-  /// That were run again. Behind the first gap nothing can be: the servo's own state there is not known. Bone, surface and dust at the end
-  /// are then compared as the recorded changes give them.
+  /// That were run again. Behind the first gap nothing can be: the servo's own state there is not known. Bone, surface
+  /// and dust at the end are then compared as the recorded changes give them.
   std::uint64_t ticks_repeated = 0;
   std::vector<std::string> losses;  ///< what the session lacks; see losses()
   bool complete = false;            ///< the session was closed properly
-  bool identical = false;  ///< every tick that could be repeated, and (when complete) bone, surface and dust, came out bit for bit the same
+  bool identical = false;  ///< every tick that could be repeated, and (when complete) bone, surface and dust, came out
+                           ///< bit for bit the same
   std::string difference;  ///< the first one, and between which checkpoints it came
   std::optional<double> difference_since_s;  ///< the last checkpoint where all was the same; 0: the beginning
   std::string bone_hash, surface_hash, dust_hash;
@@ -220,24 +233,26 @@ struct ReplayResult {
   double seconds = 0;
 };
 
-/// Runs the recorded poses and actions through the same servo, a frame at a time: memory does not grow with the session. At each checkpoint
-/// the scene is compared three ways: by poses, by changes, by checkpoints. `start` and `anatomy` as the session had them: Error(corrupt),
-/// Error(usage) when they are not; Error(corrupt) also where this build's servo cannot repeat it (SessionOutline::not_replayable).
-/// `readers` are told as they would have been while it was recorded, up to the first gap: resync() with the scene it began with, then every
-/// action and tick. A score needs no more than to be one.
-[[nodiscard]] ReplayResult replay(const SessionReader& session, World start, const Anatomy& anatomy, const Context& context,
-                                  std::span<Reader* const> readers = {});
+/// Runs the recorded poses and actions through the same servo, a frame at a time: memory does not grow with the
+/// session. At each checkpoint the scene is compared three ways: by poses, by changes, by checkpoints. `start` and
+/// `anatomy` as the session had them: Error(corrupt), Error(usage) when they are not; Error(corrupt) also where this
+/// build's servo cannot repeat it (SessionOutline::not_replayable). `readers` are told as they would have been while it
+/// was recorded, up to the first gap: resync() with the scene it began with, then every action and tick. A score needs
+/// no more than to be one.
+[[nodiscard]] ReplayResult replay(const SessionReader& session, World start, const Anatomy& anatomy,
+                                  const Context& context, std::span<Reader* const> readers = {});
 /// Applies the changes and actions of a session, in their order, to the world it began with. Error(corrupt).
 void apply_recorded(const SessionReader& session, World& world);
-/// The same up to a tick, by way of the checkpoints: the tick that it gives the scene of (SessionReader::scene_at). Error(corrupt).
+/// The same up to a tick, by way of the checkpoints: the tick that it gives the scene of (SessionReader::scene_at).
+/// Error(corrupt).
 std::uint64_t apply_recorded_until(const SessionReader& session, World& world, std::uint64_t tick);
 
-/// What speaks against a script for this scene, each in a sentence: strokes that stay far from bone, points that look like metres, a sucker
-/// or water where there is no dust.
+/// What speaks against a script for this scene, each in a sentence: strokes that stay far from bone, points that look
+/// like metres, a sucker or water where there is no dust.
 [[nodiscard]] std::vector<std::string> doubts_about(const Script& script, const World& world, bool dust);
 
-/// A drilling that fits most heads: from behind and below the middle of the bone outwards to the patient's left (or right)
-/// until the outside is reached, there a cavity in circles, deeper with time. Error(failed) when no bone is met.
+/// A drilling that fits most heads: from behind and below the middle of the bone outwards to the patient's left (or
+/// right) until the outside is reached, there a cavity in circles, deeper with time. Error(failed) when no bone is met.
 [[nodiscard]] Script make_default_script(const World& world, bool left, int tool, double seconds);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -36,4 +36,4 @@ struct SceneReaders {
   [[nodiscard]] std::vector<LiveComponents::Component> large_pieces() const;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

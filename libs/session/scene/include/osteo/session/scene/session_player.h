@@ -9,19 +9,22 @@
 
 namespace osteo::inline session {
 
-/// Times are of the session, in seconds; bone is known to the tenth of a second, hands to the fiftieth. Dust is left out. Memory: two
-/// copies of the bone, 12 bytes a voxel for each tenth of a second in which it changed, 7 KB a second for each hand.
+/// Times are of the session, in seconds; bone is known to the tenth of a second, hands to the fiftieth. Dust is left
+/// out. Memory: two copies of the bone, 12 bytes a voxel for each tenth of a second in which it changed, 7 KB a second
+/// for each hand.
 class SessionPlayer {
  public:
   static constexpr double kHandRateHz = 50;
 
-  /// Reads all of it, up to where its bone is known, and is at its end. Error(corrupt) when the session is of another bone.
+  /// Reads all of it, up to where its bone is known, and is at its end. Error(corrupt) when the session is of another
+  /// bone.
   SessionPlayer(const SessionReader& session, World begin, const Context& context = {});
 
   [[nodiscard]] double end_s() const { return end_s_; }
   [[nodiscard]] double now_s() const { return now_s_; }
-  /// Cost: that of the voxels that changed in between, either way. Where an action that changes the world lies in between (undo, a saw cut,
-  /// a piece that is moved), all is told again from the beginning: seconds in a long session. Clamped to the session.
+  /// Cost: that of the voxels that changed in between, either way. Where an action that changes the world lies in
+  /// between (undo, a saw cut, a piece that is moved), all is told again from the beginning: seconds in a long session.
+  /// Clamped to the session.
   void go_to(double t_s);
 
   [[nodiscard]] SessionScene& scene() { return scene_; }
@@ -53,4 +56,4 @@ class SessionPlayer {
   std::size_t done_ = 0;  // steps
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -1,4 +1,5 @@
-// The scene of a session as of a tick, for whoever draws it: bone, surfaces and dust, told by a replay or by what was recorded.
+// The scene of a session as of a tick, for whoever draws it: bone, surfaces and dust, told by a replay or by what was
+// recorded.
 #pragma once
 #include <array>
 #include <memory>
@@ -6,15 +7,17 @@
 #include <span>
 #include <vector>
 
-#include "osteo/session/scene/scene_readers.h"
 #include "osteo/session/recording/session_reader.h"
+#include "osteo/session/scene/scene_readers.h"
 
 namespace osteo::inline session {
 
-/// Keeps a world of its own (memory: a copy of the bone), so that densities are never ahead of the ticks that were told.
+/// Keeps a world of its own (memory: a copy of the bone), so that densities are never ahead of the ticks that were
+/// told.
 class SessionScene final : public Reader {
  public:
-  SessionScene(const ReaderList& follow, double rate_hz, const Context& context) : follow_(follow), rate_hz_(rate_hz), context_(context) {}
+  SessionScene(const ReaderList& follow, double rate_hz, const Context& context)
+      : follow_(follow), rate_hz_(rate_hz), context_(context) {}
 
   /// The scene it begins with; again: it begins anew.
   void resync(const World& world) override;
@@ -28,8 +31,8 @@ class SessionScene final : public Reader {
   /// Null before resync().
   [[nodiscard]] const World* world() const { return world_ ? &*world_ : nullptr; }
   [[nodiscard]] SceneReaders& readers() { return *readers_; }
-  /// A hand (below kMostHands) that is to be drawn: the first from its first tick on, others once they have pressed a pedal or touched
-  /// bone. What waits beside the drill for keys that nobody pressed is not.
+  /// A hand (below kMostHands) that is to be drawn: the first from its first tick on, others once they have pressed a
+  /// pedal or touched bone. What waits beside the drill for keys that nobody pressed is not.
   [[nodiscard]] bool in_use(std::size_t hand) const { return in_use_[hand]; }
   /// The last record told of it.
   [[nodiscard]] const TickRecord& latest(std::size_t hand = 0) const { return latest_[hand]; }
@@ -48,9 +51,10 @@ class SessionScene final : public Reader {
   double removed_mm3_ = 0;
 };
 
-/// Tells a reader what was recorded, without running it again: over gaps too, and of sessions that this build cannot repeat. Files keep
-/// what a tenth of a second changed, so all of that comes with its last tick. First resync() with `begin`; where the bone is not known any
-/// more (SessionOutline::bone_known_until) it ends. Error(corrupt) when the session is of another bone.
+/// Tells a reader what was recorded, without running it again: over gaps too, and of sessions that this build cannot
+/// repeat. Files keep what a tenth of a second changed, so all of that comes with its last tick. First resync() with
+/// `begin`; where the bone is not known any more (SessionOutline::bone_known_until) it ends. Error(corrupt) when the
+/// session is of another bone.
 void tell_recorded(const SessionReader& session, const World& begin, Reader& reader, const Context& context = {});
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

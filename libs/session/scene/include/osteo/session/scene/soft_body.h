@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "osteo/simulation/bone/world.h"
 #include "osteo/core/data/tet_mesh.h"
+#include "osteo/simulation/bone/world.h"
 
 namespace osteo::inline session {
 
@@ -27,29 +27,30 @@ struct SoftPush {
   double stiffness_n_per_mm = 0;  ///< by so much more for each mm deeper
 };
 
-/// A body of voxels by the fast model (libs/simulation/tissue). Its steps in time run a hundred times a second beside the servo. It meets the heads of
-/// instruments in their own shape, and the bone as it is now: where it lies in bone at rest it has grown on it, until the bone there is
-/// drilled away. A tool at work that cuts takes voxels off (VoxelCutting); what comes loose is gone with them. What has been still for half
-/// a second with no tool near goes to sleep, and costs nothing until a tool comes near or it is woken.
+/// A body of voxels by the fast model (libs/simulation/tissue). Its steps in time run a hundred times a second beside
+/// the servo. It meets the heads of instruments in their own shape, and the bone as it is now: where it lies in bone at
+/// rest it has grown on it, until the bone there is drilled away. A tool at work that cuts takes voxels off
+/// (VoxelCutting); what comes loose is gone with them. What has been still for half a second with no tool near goes to
+/// sleep, and costs nothing until a tool comes near or it is woken.
 class SoftBody {
  public:
-  /// From mesh, problem and perhaps constants, as the stages of tissue take them; `skin`: a finer surface that is drawn instead of the
-  /// voxels' own. Errors: as of those.
-  SoftBody(const TetMesh& mesh, std::string_view problem_json, const std::optional<std::string>& constants_json = std::nullopt,
-           const TriMesh* skin = nullptr);
+  /// From mesh, problem and perhaps constants, as the stages of tissue take them; `skin`: a finer surface that is drawn
+  /// instead of the voxels' own. Errors: as of those.
+  SoftBody(const TetMesh& mesh, std::string_view problem_json,
+           const std::optional<std::string>& constants_json = std::nullopt, const TriMesh* skin = nullptr);
   ~SoftBody();
 
   static constexpr double kUpdatesPerS = 100;
-  /// What an update may take, in steps times tetrahedra: 4 to 10 ms of a core. Not measured by the clock, or two runs of one script would
-  /// differ.
+  /// What an update may take, in steps times tetrahedra: 4 to 10 ms of a core. Not measured by the clock, or two runs
+  /// of one script would differ.
   static constexpr double kMostWork = 250'000;
   static constexpr double kNearMm = 10;  ///< a tool is near whose head comes within this of the body's box
 
   /// The bone that it meets from now on, as it lies at rest; null: none. The world must stay until another is set.
   void meet(const World* world);
-  /// Goes on by one update with the tools there, by number the same ones as before. What it pushes each with; all nothing while it sleeps.
-  /// Simulated time goes slower than the clock's when a hundredth of a second needs more than `most_work`: see slow_motion(); at a quarter
-  /// of real time it is as if it were sixteen times as heavy.
+  /// Goes on by one update with the tools there, by number the same ones as before. What it pushes each with; all
+  /// nothing while it sleeps. Simulated time goes slower than the clock's when a hundredth of a second needs more than
+  /// `most_work`: see slow_motion(); at a quarter of real time it is as if it were sixteen times as heavy.
   std::vector<SoftPush> update(std::span<const SoftTool> tools, double most_work = kMostWork);
   /// Whether the next update with these tools costs nothing.
   [[nodiscard]] bool sleeps_with(std::span<const SoftTool> tools) const;
@@ -64,7 +65,8 @@ class SoftBody {
   /// The surface as it is now. Its triangles change only with version(), when something was cut off.
   [[nodiscard]] const TriMesh& drawn();
   [[nodiscard]] std::uint64_t version() const;
-  [[nodiscard]] std::uint64_t updates() const;  ///< that it was not asleep in: as long as this stays, all of it is where it was
+  [[nodiscard]] std::uint64_t updates()
+      const;  ///< that it was not asleep in: as long as this stays, all of it is where it was
   [[nodiscard]] double cut_off_mm3() const;
   /// Simulated over real time in the last update that it was not asleep in, at most 1.
   [[nodiscard]] double slow_motion() const;
@@ -75,4 +77,4 @@ class SoftBody {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

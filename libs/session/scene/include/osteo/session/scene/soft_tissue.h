@@ -12,9 +12,10 @@
 
 namespace osteo::inline session {
 
-/// Bodies share what an update may take (SoftBody::kMostWork): those that need less than their part leave it to the others, and those that
-/// sleep need none. They do not feel each other. What a hand feels between two updates is a plane: the forces of all bodies on its tool
-/// together, rising with depth. Each such plane is an action of the stream, so a replay needs no tissue.
+/// Bodies share what an update may take (SoftBody::kMostWork): those that need less than their part leave it to the
+/// others, and those that sleep need none. They do not feel each other. What a hand feels between two updates is a
+/// plane: the forces of all bodies on its tool together, rising with depth. Each such plane is an action of the stream,
+/// so a replay needs no tissue.
 class SoftTissue final : public Reader {
  public:
   /// Error(usage) for a name twice, or none.
@@ -25,7 +26,8 @@ class SoftTissue final : public Reader {
   [[nodiscard]] const std::string& name(std::size_t n) const { return facts_[n].name; }
 
   void meet(const World* world);
-  /// One update; `tools`: one a hand, at most kMostHands. For each hand whose tool is pushed, or was until now, its plane.
+  /// One update; `tools`: one a hand, at most kMostHands. For each hand whose tool is pushed, or was until now, its
+  /// plane.
   std::vector<SceneAction> update(std::span<const SoftTool> tools);
 
   [[nodiscard]] double cut_off_mm3() const;
@@ -54,10 +56,11 @@ class SoftTissue final : public Reader {
   std::vector<Facts> facts_;
 };
 
-/// What a case lists; null without. In its folder tissue.vtu and tissue.json, and where they are tissue-constants.json and tissue.ply, the
-/// surface that is drawn: the body "tissue". Under the same names in tissue/NAME: the body NAME; in the order of their names.
-/// Errors: no_input, with the file's name, for one of these files without those it needs; usage for a file in tissue/, for two bodies of a
-/// name, and for what is no name; as of SoftBody, with the body's name.
+/// What a case lists; null without. In its folder tissue.vtu and tissue.json, and where they are tissue-constants.json
+/// and tissue.ply, the surface that is drawn: the body "tissue". Under the same names in tissue/NAME: the body NAME; in
+/// the order of their names. Errors: no_input, with the file's name, for one of these files without those it needs;
+/// usage for a file in tissue/, for two bodies of a name, and for what is no name; as of SoftBody, with the body's
+/// name.
 [[nodiscard]] std::shared_ptr<SoftTissue> soft_tissue_of(const std::filesystem::path& case_folder);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "osteo/core/data/volume.h"
-#include "osteo/simulation/haptics/stream.h"
 #include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/haptics/stream.h"
 #include "osteo/simulation/sound/synthesizer.h"
 
 namespace osteo::inline session {
 
-/// Which structures are soft under the drill, so that bone over them sounds duller: values of those whose names speak of a sinus, dura,
-/// vein, artery or bulb.
+/// Which structures are soft under the drill, so that bone over them sounds duller: values of those whose names speak
+/// of a sinus, dura, vein, artery or bulb.
 [[nodiscard]] std::set<std::uint32_t> soft_structures(std::span<const Structure> structures);
 
 /// Goes along with ticks and actions; neither allocates, locks nor throws in take().
@@ -43,8 +43,8 @@ class SoundTracker {
   bool touching_ = false;
 };
 
-/// The sound of a rehearsal while it runs: an end of its stream for itself, drained by whoever asks for samples, such as the thread of a
-/// sound card. Latency: what happened before the call is in its samples.
+/// The sound of a rehearsal while it runs: an end of its stream for itself, drained by whoever asks for samples, such
+/// as the thread of a sound card. Latency: what happened before the call is in its samples.
 class LiveSound {
  public:
   /// The rehearsal must outlive it.
@@ -53,8 +53,8 @@ class LiveSound {
   LiveSound(const LiveSound&) = delete;
   LiveSound& operator=(const LiveSound&) = delete;
 
-  /// The next samples at Synthesizer::kRateHz, from one thread at a time: neither allocates, locks nor throws. Where no ticks come any
-  /// more it fades to silence.
+  /// The next samples at Synthesizer::kRateHz, from one thread at a time: neither allocates, locks nor throws. Where no
+  /// ticks come any more it fades to silence.
   void fill(std::span<float> out) noexcept;
   /// 0 to 1, from any thread; each as it was until the next fill().
   void set_volume(double volume) { volume_ = volume; }
@@ -79,9 +79,9 @@ struct SoundFileFacts {
   double most_held_down_db = 0;  ///< by SafeLevel
   std::uint64_t gaps = 0;        ///< of the session: silent
 };
-/// The sound of a recorded session as a WAV file (48 kHz, 16 bits, one channel): a function of its records alone. O(its length); memory of
-/// a frame. Errors: those of SessionReader and of write_atomically.
-SoundFileFacts write_session_sound(const SessionReader& session, const std::set<std::uint32_t>& soft, double volume, bool alarms,
-                                   const std::filesystem::path& out, const Context& context);
+/// The sound of a recorded session as a WAV file (48 kHz, 16 bits, one channel): a function of its records alone. O(its
+/// length); memory of a frame. Errors: those of SessionReader and of write_atomically.
+SoundFileFacts write_session_sound(const SessionReader& session, const std::set<std::uint32_t>& soft, double volume,
+                                   bool alarms, const std::filesystem::path& out, const Context& context);
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

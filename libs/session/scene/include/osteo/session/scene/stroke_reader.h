@@ -4,9 +4,9 @@
 
 namespace osteo::inline session {
 
-/// Whoever changes a world by actions while a servo drills it needs one of these on the servo's stream, drained before each action that
-/// looks at densities: a session's undo then takes back the same in every replay. Where ticks were lost it forgets what came before, and
-/// undo is refused rather than wrong.
+/// Whoever changes a world by actions while a servo drills it needs one of these on the servo's stream, drained before
+/// each action that looks at densities: a session's undo then takes back the same in every replay. Where ticks were
+/// lost it forgets what came before, and undo is refused rather than wrong.
 class StrokeReader final : public Reader {
  public:
   explicit StrokeReader(World& world) : world_(world) {}
@@ -18,4 +18,4 @@ class StrokeReader final : public Reader {
   World& world_;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "osteo/simulation/bone/live_surface.h"
 #include "osteo/session/scene/reader.h"
+#include "osteo/simulation/bone/live_surface.h"
 
 namespace osteo::inline session {
 
@@ -22,14 +22,16 @@ class SurfaceReader final : public Reader {
   void tick(const TickRecord& record, std::span<const VoxelChange> changes) override;
   void update() override;
 
-  /// From now on with normals to light by (LiveSurface::shade): whoever draws them asks for it. update() then takes half as long again.
+  /// From now on with normals to light by (LiveSurface::shade): whoever draws them asks for it. update() then takes
+  /// half as long again.
   void shade();
   /// What update() left of those normals (LiveSurface::settle): now and then.
   void settle();
 
   /// Null where there is no such body.
   [[nodiscard]] const LiveSurface* surface(std::uint32_t body) const;
-  /// Bricks of a body whose surface is another since they were last asked for, ascending; bodies that were not there before, all.
+  /// Bricks of a body whose surface is another since they were last asked for, ascending; bodies that were not there
+  /// before, all.
   std::vector<std::uint32_t> take_changed_bricks(std::uint32_t body);
   /// Over all bodies in their order; of a single body its surface's.
   [[nodiscard]] std::string hash() const;
@@ -49,4 +51,4 @@ class SurfaceReader final : public Reader {
   std::map<std::uint32_t, Followed> bodies_;  // by id: also their order in the world, but for regions
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

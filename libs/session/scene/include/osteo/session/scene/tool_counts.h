@@ -34,4 +34,4 @@ class ToolCounts final : public Reader {
   std::uint64_t undone_ = 0, ticks_without_room_ = 0, unusable_poses_ = 0;
 };
 
-}  // namespace osteo::session
+}  // namespace osteo::inline session

@@ -5,8 +5,8 @@
 #include <span>
 #include <string_view>
 
-#include "osteo/simulation/bone/cutting_guide.h"
 #include "osteo/core/data/rigid_transform.h"
+#include "osteo/simulation/bone/cutting_guide.h"
 #include "osteo/simulation/bone/saw.h"
 
 namespace osteo::inline simulation {
@@ -37,12 +37,14 @@ enum class ActionKind : std::uint32_t {
   behind_last
 };
 
-/// One of them, at the beginning of a tick, as it is written to session files. What follows from it follows from it and the scene alone.
+/// One of them, at the beginning of a tick, as it is written to session files. What follows from it follows from it and
+/// the scene alone.
 struct SceneAction {
   static constexpr std::uint32_t kNobody = 0xffffffffU;
   static constexpr double kMostReachMm = 50;  ///< of a sucker and of water
   static constexpr double kMostSlotMm = 10;   ///< that a saw slips into a cutting guide from
-  static constexpr double kPlateReachMm = 5;  ///< attach: bone of each piece begins within this below the plate's underside
+  static constexpr double kPlateReachMm =
+      5;  ///< attach: bone of each piece begins within this below the plate's underside
 
   std::uint64_t tick = 0;
   std::uint32_t kind = 0;         ///< ActionKind
@@ -59,13 +61,15 @@ struct SceneAction {
   static SceneAction split(double least_mm3);
   static SceneAction move(std::uint32_t body, const RigidTransform& world_from_body);
   static SceneAction grip(std::uint32_t plate, const RigidTransform& hand_from_plate = {}, std::uint32_t hand = 0);
-  static SceneAction attach(std::uint32_t plate, const RigidTransform& world_from_plate, std::uint32_t body, std::uint32_t other = kNobody);
+  static SceneAction attach(std::uint32_t plate, const RigidTransform& world_from_plate, std::uint32_t body,
+                            std::uint32_t other = kNobody);
   static SceneAction detach(std::uint32_t fixture);
   static SceneAction open(std::uint32_t fixture, double opening_mm);
   static SceneAction suction(Vec3 nozzle_mm, double radius_mm, double mm3_per_s);
   static SceneAction irrigate(Vec3 at_mm, double radius_mm, double mm3_per_s);
   static SceneAction posture(Vec3 down);  ///< unit, LPS of the case: down_of()
-  /// A plane through `at`, pushing along `normal` (unit) with `force_n` there and more by `stiffness` for each mm deeper.
+  /// A plane through `at`, pushing along `normal` (unit) with `force_n` there and more by `stiffness` for each mm
+  /// deeper.
   static SceneAction soft_push(Vec3 at_mm, Vec3 normal, double force_n, double stiffness_n_per_mm);
   static SceneAction setting(std::uint32_t number, double value);
   static SceneAction cutting_guide(const CuttingGuide& guide, std::uint32_t hand = 0);  ///< its normal need not be unit
@@ -80,26 +84,30 @@ struct ActionValue {
   std::string_view name, unit;
 };
 
-/// All that others need to know of a kind of action. Whoever decides by kind asks here; only what an action does is elsewhere (World::act,
-/// HapticRenderer::take, Dust).
+/// All that others need to know of a kind of action. Whoever decides by kind asks here; only what an action does is
+/// elsewhere (World::act, HapticRenderer::take, Dust).
 struct ActionRow {
   ActionKind kind;
   std::string_view name;  ///< "saw": in session files, scripts and messages
   std::string_view help;
   bool changes_world = false;  ///< bodies, their poses, fixtures or densities may differ afterwards
   bool changes_touch = false;  ///< and what the servo touches: a new HapticScene goes with it
-  bool reads_bone = false;   ///< what it does depends on densities, or it takes long: a hold comes before, so that a replay finds the same
-  bool last_counts = false;  ///< of several in a row that wait, with the same body, other, item and hand, the last one is enough
-  bool moves_dust = false;   ///< the dust acts on it
-  bool ends_hold = false;    ///< after it, done or not, bone may be removed again
-  bool by_servo = false;     ///< the servo tells of it by itself: nobody asks for it, and a replay does not do it but gets it again
-  bool made_often = false;   ///< follows from what else is done, many times a second: not reported when it fails, and not kept for later
+  bool reads_bone = false;     ///< what it does depends on densities, or it takes long: a hold comes before, so that a
+                               ///< replay finds the same
+  bool last_counts =
+      false;  ///< of several in a row that wait, with the same body, other, item and hand, the last one is enough
+  bool moves_dust = false;  ///< the dust acts on it
+  bool ends_hold = false;   ///< after it, done or not, bone may be removed again
+  bool by_servo =
+      false;  ///< the servo tells of it by itself: nobody asks for it, and a replay does not do it but gets it again
+  bool made_often = false;  ///< follows from what else is done, many times a second: not reported when it fails, and
+                            ///< not kept for later
   std::string_view body = {}, other = {}, item = {}, hand = {};  ///< what those name; empty: they mean nothing
   std::span<const ActionValue> values = {};                      ///< from the first on; the rest mean nothing
 };
 
-/// Changes of densities before it and after it have to be kept apart wherever only the last of each voxel is kept: it depends on them, or
-/// it is a step of undo and so parts the burr's strokes.
+/// Changes of densities before it and after it have to be kept apart wherever only the last of each voxel is kept: it
+/// depends on them, or it is a step of undo and so parts the burr's strokes.
 [[nodiscard]] constexpr bool parts_changes(const ActionRow& row) {
   return row.reads_bone || row.changes_world;
 }
@@ -115,4 +123,4 @@ struct ActionRow {
 }
 [[nodiscard]] std::string_view name_of(ActionKind kind);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "osteo/core/base/param.h"
+#include "osteo/core/data/vec.h"
 #include "osteo/simulation/bone/burr_kind.h"
 #include "osteo/simulation/bone/round_cone.h"
-#include "osteo/core/data/vec.h"
 
 namespace osteo::inline simulation {
 
@@ -19,17 +19,18 @@ enum class BurrShape : int { ball, cylinder, taper };
 
 /// Removal at latitude L (angle from the equator seen along the burr's axis), at the nominal speed:
 ///   rate = force * max(0, rate_mm3_per_s_per_n - falloff * |L|)   (D. Morris 2006, section 3.2.3.6)
-/// The two constants are guesses ordered as the thesis says (cutting burrs: faster, more dependent on angle); no measured
-/// values were found. A burr of another diameter scales the rate with its diameter, as the speed of its surface does; so
-/// does another speed. The proportions of cylinders (1.5 diameters between the centres of their domes) and tapers (half the
-/// diameter at the tip, 2 diameters long) are those usual in catalogues, not of one make.
+/// The two constants are guesses ordered as the thesis says (cutting burrs: faster, more dependent on angle); no
+/// measured values were found. A burr of another diameter scales the rate with its diameter, as the speed of its
+/// surface does; so does another speed. The proportions of cylinders (1.5 diameters between the centres of their domes)
+/// and tapers (half the diameter at the tip, 2 diameters long) are those usual in catalogues, not of one make.
 struct Burr {
   BurrKind kind = BurrKind::cutting;
   double diameter_mm = 4;
   double rate_mm3_per_s_per_n = 6;
   double falloff_mm3_per_s_per_n_per_rad = 3;
   BurrShape shape = BurrShape::ball;
-  double length_mm = 0;  ///< of a saw's edge, a cylinder, between the centres of its domes; 0: a burr's, as its diameter has it
+  double length_mm =
+      0;  ///< of a saw's edge, a cylinder, between the centres of its domes; 0: a burr's, as its diameter has it
   static constexpr double kNominalRpm = 60000;
 
   [[nodiscard]] std::string name() const;  ///< "cutting 4 mm", "diamond taper 3 mm", "saw 25 mm"
@@ -66,4 +67,4 @@ struct BurrSurface {
 };
 [[nodiscard]] BurrSurface sample_head_surface(const RoundCone& head, double falloff_per_rad, int samples);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

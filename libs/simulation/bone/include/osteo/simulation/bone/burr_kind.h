@@ -26,8 +26,8 @@ struct BurrKindRow {
   /// May work where a procedure or a hint wants no cutting burr: beside structures at risk.
   bool near_structures = false;
 
-  /// Vibration: the kind whose peaks it has where a file of vibrations (libs/simulation/haptics/vibration.json) names none for it;
-  /// its own name: a file has to.
+  /// Vibration: the kind whose peaks it has where a file of vibrations (libs/simulation/haptics/vibration.json) names
+  /// none for it; its own name: a file has to.
   std::string_view vibrates_as;
   /// Sound on bone, in dB against a cutting burr (sound_model.h), and the share of its power that is in the lines of
   /// its teeth, 0 to 1.
@@ -100,4 +100,4 @@ struct EnumNames<BurrKind> {
   }();
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

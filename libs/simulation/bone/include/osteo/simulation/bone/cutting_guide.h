@@ -17,4 +17,4 @@ struct CuttingGuide {
   friend bool operator==(const CuttingGuide&, const CuttingGuide&) = default;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -8,10 +8,11 @@
 
 namespace osteo::inline simulation {
 
-/// For each block of 4^3 voxels that is bone, the nearest block that is not (mean density below a half, or outside the grid). For the
-/// deepest cases only, where a burr has no direction of its own; so blocks are fine enough: the answer is right to a block's diagonal.
-/// Bone only goes away, so distances only fall: a block that empties sends its news outwards through a queue, some blocks a tick.
-/// Memory: 9 bytes a block of the box around the bricks, at most 1022 blocks along each axis. Made in O(blocks).
+/// For each block of 4^3 voxels that is bone, the nearest block that is not (mean density below a half, or outside the
+/// grid). For the deepest cases only, where a burr has no direction of its own; so blocks are fine enough: the answer
+/// is right to a block's diagonal. Bone only goes away, so distances only fall: a block that empties sends its news
+/// outwards through a queue, some blocks a tick. Memory: 9 bytes a block of the box around the bricks, at most 1022
+/// blocks along each axis. Made in O(blocks).
 class DepthMap {
  public:
   static constexpr int kBlock = 4;
@@ -37,19 +38,21 @@ class DepthMap {
     return static_cast<std::uint32_t>(i) | static_cast<std::uint32_t>(j) << 10 | static_cast<std::uint32_t>(k) << 20;
   }
   [[nodiscard]] static int distance2(std::uint32_t a, std::uint32_t b) noexcept {
-    const auto off = [&](int shift) { return static_cast<int>(a >> shift & 1023) - static_cast<int>(b >> shift & 1023); };
+    const auto off = [&](int shift) {
+      return static_cast<int>(a >> shift & 1023) - static_cast<int>(b >> shift & 1023);
+    };
     return off(0) * off(0) + off(10) * off(10) + off(20) * off(20);
   }
   void push(std::int32_t block) noexcept;
   void relax(std::int32_t block) noexcept;
 
   Frame frame_;
-  int first_[3] = {};                  // block of the grid that is number 0 here, along each axis: one of air before the bricks
-  int dims_[3] = {};                   // blocks, with one of air around
+  int first_[3] = {};  // block of the grid that is number 0 here, along each axis: one of air before the bricks
+  int dims_[3] = {};   // blocks, with one of air around
   std::vector<std::uint32_t> nearest_;  // place of the nearest empty block; its own when empty
   std::vector<std::uint8_t> queued_;
   std::vector<std::int32_t> queue_;  // a ring
   std::size_t head_ = 0, waiting_ = 0;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -8,8 +8,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "osteo/simulation/bone/round_cone.h"
 #include "osteo/geometry/grid/brick_grid.h"
+#include "osteo/simulation/bone/round_cone.h"
 
 namespace osteo::inline simulation {
 
@@ -18,19 +18,21 @@ struct DustParams {
   double packing = 0.35;  ///< mm3 of bone that a mm3 of loose chips holds
 };
 
-/// Raise it whenever the same calls come to lie elsewhere: sessions keep it, and a replay compares dust of its own model only.
+/// Raise it whenever the same calls come to lie elsewhere: sessions keep it, and a replay compares dust of its own
+/// model only.
 inline constexpr int kDustModel = 2;
 
-/// Density of dust on cells as large as the bone's voxels, in hashed bricks, not particles (D. Morris 2006, section 3.2.8): a step lets it
-/// fall by a cell along gravity, whose direction no axis need follow, slide to neighbours that lie steeper than 40 degrees below, and
-/// spread where a cell is too full. Water falls faster into any lower neighbour, takes dust along (slurry, up to kMostSolid of its volume),
-/// leaves a film where it ran, which dries within kDrySeconds and drops what it carried, and stands level where it collects: ten times a
-/// second what hangs together and rests on something is filled again from below. Tools go through water without displacing it.
-/// Amounts are whole numbers of a 65,536th of a voxel, so nothing is lost or made: bone that was added lies there, is in slurry, was
-/// sucked off or ran out of reach; water likewise. Bricks in which nothing moves sleep and cost nothing. The same calls give the same
-/// dust. Reads the bone while the servo writes it. Cost: about 15 ns a cell of bricks that are awake, 130 where all of them are water in
-/// motion; suck and push a few ns a cell of the bricks they meet, however large their radius. Memory: 2 KB a brick that holds dust, 6 with
-/// water.
+/// Density of dust on cells as large as the bone's voxels, in hashed bricks, not particles (D. Morris 2006,
+/// section 3.2.8): a step lets it fall by a cell along gravity, whose direction no axis need follow, slide to
+/// neighbours that lie steeper than 40 degrees below, and spread where a cell is too full. Water falls faster into any
+/// lower neighbour, takes dust along (slurry, up to kMostSolid of its volume), leaves a film where it ran, which dries
+/// within kDrySeconds and drops what it carried, and stands level where it collects: ten times a second what hangs
+/// together and rests on something is filled again from below. Tools go through water without displacing it. Amounts
+/// are whole numbers of a 65,536th of a voxel, so nothing is lost or made: bone that was added lies there, is in
+/// slurry, was sucked off or ran out of reach; water likewise. Bricks in which nothing moves sleep and cost nothing.
+/// The same calls give the same dust. Reads the bone while the servo writes it. Cost: about 15 ns a cell of bricks that
+/// are awake, 130 where all of them are water in motion; suck and push a few ns a cell of the bricks they meet, however
+/// large their radius. Memory: 2 KB a brick that holds dust, 6 with water.
 class Dust {
  public:
   static constexpr double kMostSolid = 0.3;     ///< bone in slurry, by volume: above it no longer pours (a guess)
@@ -52,10 +54,11 @@ class Dust {
   void step();
   /// Dust out of the tool's way, along its surface's normals.
   void push(const RoundCone& tool, Vec3 start_mm, Vec3 axis);
-  /// Takes up to `mm3` of dry dust and kLiquidForDust times as much of slurry from within the radius, nearest cells first; returns how
-  /// much bone that was.
+  /// Takes up to `mm3` of dry dust and kLiquidForDust times as much of slurry from within the radius, nearest cells
+  /// first; returns how much bone that was.
   double suck(Vec3 nozzle_mm, double radius_mm, double mm3);
-  /// A jet of water from the nozzle: onto the first bone in this direction (unit; zero: gravity's), or down from where it ends.
+  /// A jet of water from the nozzle: onto the first bone in this direction (unit; zero: gravity's), or down from where
+  /// it ends.
   void irrigate(Vec3 nozzle_mm, Vec3 direction, double reach_mm, double mm3);
 
   struct Totals {
@@ -69,8 +72,8 @@ class Dust {
   [[nodiscard]] std::string hash() const;
   /// Cells that hold dry dust, in a fixed order: middle of the cell in mm and how full it is (1: packed).
   void visit(const std::function<void(Vec3, double)>& cell) const;
-  /// Cells that hold water: place in the bone's grid, how full (1: to the brim), and how much of that is bone (0 to kMostSolid, more only
-  /// in a film that dries).
+  /// Cells that hold water: place in the bone's grid, how full (1: to the brim), and how much of that is bone (0 to
+  /// kMostSolid, more only in a film that dries).
   void visit_liquid(const std::function<void(Ijk, double, double)>& cell) const;
   /// Grows whenever anything moved, came or went.
   [[nodiscard]] std::uint64_t version() const { return version_; }
@@ -141,4 +144,4 @@ class Dust {
   bool wet_ = false;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

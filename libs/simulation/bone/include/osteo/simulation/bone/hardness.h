@@ -12,8 +12,8 @@
 
 namespace osteo::inline simulation {
 
-/// Energy to remove a volume of bone of some HU over that of dense cortical bone. Form, sources and the built-in constants:
-/// libs/simulation/bone/hardness.json.
+/// Energy to remove a volume of bone of some HU over that of dense cortical bone. Form, sources and the built-in
+/// constants: libs/simulation/bone/hardness.json.
 struct HardnessLaw {
   using Params = HardnessLaw;
   double cortical_hu = 1500, zero_hu = 0, exponent = 1, least = 0.125, most = 3;
@@ -27,8 +27,8 @@ struct HardnessLaw {
   }
   [[nodiscard]] double at(double hu) const;
 };
-/// { "osteotome_hardness": 1, "source": "...", and any field of HardnessLaw; what is not named is as built in }. Error(usage), with line
-/// and key; `name` of the text.
+/// { "osteotome_hardness": 1, "source": "...", and any field of HardnessLaw; what is not named is as built in }.
+/// Error(usage), with line and key; `name` of the text.
 [[nodiscard]] HardnessLaw parse_hardness(std::string_view json, const std::string& name);
 /// libs/simulation/bone/hardness.json.
 [[nodiscard]] std::string_view default_hardness_json();
@@ -49,4 +49,4 @@ class Hardness {
   std::vector<std::uint8_t> steps_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -20,9 +20,9 @@ enum class InstrumentKind : int { burr, sucker, irrigator, probe, saw };
 /// All of them are felt when they touch bone; what they do besides needs the pedal.
 struct Instrument {
   InstrumentKind kind = InstrumentKind::burr;
-  std::string name;            ///< "cutting 4 mm", "sucker 8 Fr", "irrigator 2 mm", "probe 1 mm", "hook 2 mm", "saw 25 mm"
-  RoundCone head;              ///< its tip's centre at the origin, handle along +z
-  RoundCone shaft;             ///< behind it, in the same frame
+  std::string name;  ///< "cutting 4 mm", "sucker 8 Fr", "irrigator 2 mm", "probe 1 mm", "hook 2 mm", "saw 25 mm"
+  RoundCone head;    ///< its tip's centre at the origin, handle along +z
+  RoundCone shaft;   ///< behind it, in the same frame
   std::optional<Burr> edge;    ///< what removes bone with it: a burr, or the teeth of a saw; none: it removes nothing
   double rate = 0;             ///< sucker: mm3 of dry dust a second; irrigator: mm3 of water a second; pedal down
   double reach_mm = 0;         ///< sucker: around the tip's centre; irrigator: how far its jet goes on
@@ -54,4 +54,4 @@ struct Instrument {
 [[nodiscard]] const CutDepth& head_cut_depth(std::size_t tool);
 [[nodiscard]] const CutDepth& shaft_cut_depth(std::size_t tool);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -12,15 +12,17 @@ namespace osteo::inline simulation {
 
 /// How a piece's bricks relate to those of the bone it came from.
 struct PieceOrigin {
-  std::vector<std::uint32_t> brick;      ///< piece's brick -> brick of the whole
-  std::vector<std::uint8_t> unchanged;  ///< piece's brick -> 1 where it and all bricks around it are as they were in the whole
+  std::vector<std::uint32_t> brick;  ///< piece's brick -> brick of the whole
+  std::vector<std::uint8_t>
+      unchanged;  ///< piece's brick -> 1 where it and all bricks around it are as they were in the whole
 };
 
-/// Connected parts of the voxels with density of at least a half, kept up to date while bone is removed: labels within each brick, links
-/// between bricks, both made again only where voxels changed; then all joined by union-find. About 10 us for a changed brick and 1 ms for
-/// the joining in a whole head. Reads the bone while the servo writes it; what it misses is marked and seen in the next update. `face`:
-/// voxels that share a face hang together (so does the surface's triangle mesh, nearly); `full`: an edge or a corner is enough. Memory: 576
-/// bytes a brick and about 100 a part of a brick.
+/// Connected parts of the voxels with density of at least a half, kept up to date while bone is removed: labels within
+/// each brick, links between bricks, both made again only where voxels changed; then all joined by union-find. About 10
+/// us for a changed brick and 1 ms for the joining in a whole head. Reads the bone while the servo writes it; what it
+/// misses is marked and seen in the next update. `face`: voxels that share a face hang together (so does the surface's
+/// triangle mesh, nearly); `full`: an edge or a corner is enough. Memory: 576 bytes a brick and about 100 a part of a
+/// brick.
 class LiveComponents {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffU;
@@ -28,8 +30,8 @@ class LiveComponents {
   /// Labels everything. The bone must outlive this.
   explicit LiveComponents(const BrickGrid& bone, Connectivity connectivity = Connectivity::face);
 
-  /// A piece of a bone whose labels are known: takes over those of bricks that went to it as they were, which the whole then counts as
-  /// empty. Equals the labelling of the piece.
+  /// A piece of a bone whose labels are known: takes over those of bricks that went to it as they were, which the whole
+  /// then counts as empty. Equals the labelling of the piece.
   LiveComponents(const BrickGrid& piece, LiveComponents& whole, const PieceOrigin& origin);
   /// The other way round: a piece is part of the whole again.
   void take_back(LiveComponents& piece, const PieceOrigin& origin);
@@ -42,12 +44,15 @@ class LiveComponents {
 
   struct Component {
     std::uint64_t voxels = 0;
-    VoxelKey first = BrickGrid::kNone;    ///< its first voxel in brick order: a name that stays while the part is not cut there
-    double mass = 0;                      ///< sum of densities; times the voxel's volume: mm3 of bone
-    Vec3 centre_mm;                       ///< of mass
-    std::array<double, 6> inertia_mm2{};  ///< about the centre along the world's axes, for mass 1 a voxel: xx, yy, zz, xy, xz, yz
+    VoxelKey first =
+        BrickGrid::kNone;  ///< its first voxel in brick order: a name that stays while the part is not cut there
+    double mass = 0;       ///< sum of densities; times the voxel's volume: mm3 of bone
+    Vec3 centre_mm;        ///< of mass
+    std::array<double, 6>
+        inertia_mm2{};  ///< about the centre along the world's axes, for mass 1 a voxel: xx, yy, zz, xy, xz, yz
   };
-  /// Brings labels up to date; components ascending by first voxel, the same as labelling anew. Valid until the next update.
+  /// Brings labels up to date; components ascending by first voxel, the same as labelling anew. Valid until the next
+  /// update.
   std::span<const Component> update();
   /// Index into what update() gave; kNone for a voxel that is not solid.
   [[nodiscard]] std::uint32_t component_of(VoxelKey voxel) const;
@@ -92,4 +97,4 @@ class LiveComponents {
   std::vector<Component> components_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/simulation/bone/live_components.h"
 #include "osteo/simulation/bone/shading.h"
-#include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo::inline simulation {
 
@@ -17,8 +17,8 @@ class LiveSurface {
   /// Extracts every brick. The bone must outlive this.
   LiveSurface(const BrickGrid& bone, const Context& context);
 
-  /// A piece of a bone whose surface is known: takes over what went to it as it was, where the whole then has none; the rest is made.
-  /// `whole` as it was before the piece was taken out.
+  /// A piece of a bone whose surface is known: takes over what went to it as it was, where the whole then has none; the
+  /// rest is made. `whole` as it was before the piece was taken out.
   LiveSurface(const BrickGrid& piece, LiveSurface& whole, const PieceOrigin& origin);
   /// The other way round: a piece is part of the whole again.
   void take_back(LiveSurface& piece, const PieceOrigin& origin);
@@ -34,10 +34,12 @@ class LiveSurface {
   void mark(VoxelKey voxel);
   /// Notes that a brick changed, anywhere in it.
   void mark_brick(std::uint32_t brick);
-  /// Makes the patches of the marked bricks again; returns those bricks, ascending. Cost: about 30 us a brick, shaded 45.
+  /// Makes the patches of the marked bricks again; returns those bricks, ascending. Cost: about 30 us a brick,
+  /// shaded 45.
   std::span<const std::uint32_t> update();  // valid until the next update() or settle()
-  /// Shaded: makes the patches again whose points stayed when something a few bricks away was marked, but whose normals may be others;
-  /// returns those bricks, ascending. After it all is as if made anew. What update() left for it can wait: it is hardly seen.
+  /// Shaded: makes the patches again whose points stayed when something a few bricks away was marked, but whose normals
+  /// may be others; returns those bricks, ascending. After it all is as if made anew. What update() left for it can
+  /// wait: it is hardly seen.
   std::span<const std::uint32_t> settle();  // valid until the next update() or settle()
   [[nodiscard]] bool settled() const { return stale_.empty(); }
 
@@ -64,4 +66,4 @@ class LiveSurface {
 /// Content hash of points and triangles.
 [[nodiscard]] std::string surface_hash(const TriMesh& mesh);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -7,31 +7,34 @@
 
 namespace osteo::inline simulation {
 
-/// A plate in a frame of its own: x along it, z away from the bone, its underside at z = 0, the origin in its middle (of a distractor: where
-/// the two feet meet).
+/// A plate in a frame of its own: x along it, z away from the bone, its underside at z = 0, the origin in its middle
+/// (of a distractor: where the two feet meet).
 struct PlateModel {
   std::string name;
-  std::string about;   ///< what it stands for, with its dimensions
-  TriMesh mesh;        ///< closed; of a distractor the part that stays
-  TriMesh moving;      ///< of a distractor: what goes with the second piece, along x; else empty
+  std::string about;           ///< what it stands for, with its dimensions
+  TriMesh mesh;                ///< closed; of a distractor the part that stays
+  TriMesh moving;              ///< of a distractor: what goes with the second piece, along x; else empty
   std::vector<Vec3> holes_mm;  ///< middles of the screw holes, at the underside; those with x > 0 of a distractor move
   double thickness_mm = 0;
-  double screw_mm = 0;  ///< diameter of its screws
+  double screw_mm = 0;         ///< diameter of its screws
   double most_opening_mm = 0;  ///< 0: no distractor
 };
 
-/// Made when first asked for, 0.1 s. Generated shapes with dimensions as they are usual for such plates; none copies a product.
+/// Made when first asked for, 0.1 s. Generated shapes with dimensions as they are usual for such plates; none copies a
+/// product.
 [[nodiscard]] const std::vector<PlateModel>& plate_library();
 /// Index in the library. Error(usage) that lists the names.
 [[nodiscard]] int plate_index(const std::string& name);
 
-/// Points spread evenly over a plate's surface, each with the area it stands for, moved outwards a little: plates are thin next to voxels
-/// (D. Morris 2006, section 3.2.5).
+/// Points spread evenly over a plate's surface, each with the area it stands for, moved outwards a little: plates are
+/// thin next to voxels (D. Morris 2006, section 3.2.5).
 struct PlateSample {
   Vec3 at_mm, outwards;
   double area_mm2;
 };
-/// About `count` points, the same ones for the same arguments. With `moving` those of the part that moves, at opening 0.
-[[nodiscard]] std::vector<PlateSample> sample_plate(const PlateModel& plate, int count, double extrude_mm, bool moving = false);
+/// About `count` points, the same ones for the same arguments. With `moving` those of the part that moves, at opening
+/// 0.
+[[nodiscard]] std::vector<PlateSample> sample_plate(const PlateModel& plate, int count, double extrude_mm,
+                                                    bool moving = false);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -7,8 +7,8 @@
 
 namespace osteo::inline simulation {
 
-/// The convex hull of a ball around `start_mm` on the z axis and one `length_mm` further up. Length 0: a ball; equal radii: a
-/// cylinder with domes. Needs |end radius - start radius| < length where the length is not 0.
+/// The convex hull of a ball around `start_mm` on the z axis and one `length_mm` further up. Length 0: a ball; equal
+/// radii: a cylinder with domes. Needs |end radius - start radius| < length where the length is not 0.
 struct RoundCone {
   double start_mm = 0;
   double length_mm = 0;
@@ -16,18 +16,21 @@ struct RoundCone {
 
   /// Sine of the half angle: how fast the radius shrinks along the axis.
   [[nodiscard]] double slope() const { return length_mm > 0 ? (start_radius_mm - end_radius_mm) / length_mm : 0; }
-  /// The place on the axis, from the start, whose ball is nearest to a point `axial_mm` up from the start and `radial_mm` off the axis.
+  /// The place on the axis, from the start, whose ball is nearest to a point `axial_mm` up from the start and
+  /// `radial_mm` off the axis.
   [[nodiscard]] double foot_mm(double radial_mm, double axial_mm) const;
   [[nodiscard]] double radius_at_mm(double foot_mm) const { return start_radius_mm - slope() * foot_mm; }
   /// Signed distance of a point from the surface, negative inside; exact.
   [[nodiscard]] double distance_mm(Vec3 point_mm) const;
   [[nodiscard]] double volume_mm3() const;
-  [[nodiscard]] double largest_radius_mm() const { return start_radius_mm > end_radius_mm ? start_radius_mm : end_radius_mm; }
+  [[nodiscard]] double largest_radius_mm() const {
+    return start_radius_mm > end_radius_mm ? start_radius_mm : end_radius_mm;
+  }
 };
 
-/// How deep a plane cuts into a shape when it cuts off a given volume: the depth of a flat cut of the same volume, which is what
-/// stiffness in N/mm is measured against. A table over the angle between the plane's normal and the axis and over the volume, made by
-/// quadrature; within 0.2 % of the depth (balls: in closed form, to rounding). Immutable.
+/// How deep a plane cuts into a shape when it cuts off a given volume: the depth of a flat cut of the same volume,
+/// which is what stiffness in N/mm is measured against. A table over the angle between the plane's normal and the axis
+/// and over the volume, made by quadrature; within 0.2 % of the depth (balls: in closed form, to rounding). Immutable.
 class CutDepth {
  public:
   explicit CutDepth(const RoundCone& shape);
@@ -46,4 +49,4 @@ class CutDepth {
 /// d in [0, 2r] such that a plane at depth d cuts the volume from a ball of radius r.
 [[nodiscard]] double cap_depth_mm(double volume_mm3, double radius_mm) noexcept;
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -8,12 +8,13 @@
 
 namespace osteo::inline simulation {
 
-/// The gradient of the bone's own density, smoothed: unlike the CT's it holds while the bone is drilled. Points of a surface stay where
-/// they are, so what is felt and measured is untouched. Two widths: where the surface is flat over a millimetre the wide one, whose
-/// gradient noise and terraces do not reach; near edges, thin walls and small cuts, which it would round, one of a voxel; where even that
-/// sees both sides of a wall, the triangles' own normal. How it decides: below a flat face half of what the wide kernel sees is bone, and
-/// its gradient has the height of a whole step. A face that is curved, near an edge or backed by another face differs from that. Values are
-/// sums over cells of 1, 2, 4 or 8 voxels along an edge, about as wide as the kernel. A normal depends on voxels up to reach() away.
+/// The gradient of the bone's own density, smoothed: unlike the CT's it holds while the bone is drilled. Points of a
+/// surface stay where they are, so what is felt and measured is untouched. Two widths: where the surface is flat over a
+/// millimetre the wide one, whose gradient noise and terraces do not reach; near edges, thin walls and small cuts,
+/// which it would round, one of a voxel; where even that sees both sides of a wall, the triangles' own normal. How it
+/// decides: below a flat face half of what the wide kernel sees is bone, and its gradient has the height of a whole
+/// step. A face that is curved, near an edge or backed by another face differs from that. Values are sums over cells of
+/// 1, 2, 4 or 8 voxels along an edge, about as wide as the kernel. A normal depends on voxels up to reach() away.
 /// Memory: 4 bytes a cell. Not thread-safe itself; it may read the bone while the servo writes it.
 class ShadingField {
  public:
@@ -26,8 +27,8 @@ class ShadingField {
 
   /// The voxels of this brick have changed. O(512).
   void renew(std::uint32_t brick);
-  /// Puts new normals into a patch as extract_patch made it; a pure function of the voxels as of the last renew() and as they are now.
-  /// About 10 us, and 0.5 us for each vertex that is not flat.
+  /// Puts new normals into a patch as extract_patch made it; a pure function of the voxels as of the last renew() and
+  /// as they are now. About 10 us, and 0.5 us for each vertex that is not flat.
   void shade(std::uint32_t brick, SurfacePatch& patch) const;
 
   /// In bricks: a change in one may change normals in those around it.
@@ -51,4 +52,4 @@ class ShadingField {
   std::vector<float> cells_;  // mean density, x fastest, brick after brick
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -46,4 +46,4 @@ struct StructureCut {
 /// "the facial nerve (2.4 mm3) and the sigmoid sinus (31 mm3)"; empty: none is cut.
 [[nodiscard]] std::string told_structures_cut(const StructureMap& map, std::span<const StructureCut> cuts);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "osteo/core/base/context.h"
-#include "osteo/simulation/bone/round_cone.h"
 #include "osteo/core/data/tri_mesh.h"
 #include "osteo/core/data/volume.h"
 #include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/geometry/mesh/soup.h"
+#include "osteo/simulation/bone/round_cone.h"
 
 namespace osteo::inline geometry {
 class TriangleTree;
@@ -20,14 +20,14 @@ class TriangleTree;
 
 namespace osteo::inline simulation {
 
-/// Signed distances to the face of each structure of a label map, structure by structure: at any depth inside, and outside as far as
-/// `reach_mm` beyond the surface of any burr of the library.
-/// The face lies between the voxels of the structure and the others, smoothed so that it does not follow their steps, but never across a
-/// voxel's centre: what the map names is inside, however thin. Distances to it are exact at the points of two lattices, as fine as the
+/// Signed distances to the face of each structure of a label map, structure by structure: at any depth inside, and
+/// outside as far as `reach_mm` beyond the surface of any burr of the library. The face lies between the voxels of the
+/// structure and the others, smoothed so that it does not follow their steps, but never across a voxel's centre: what
+/// the map names is inside, however thin. Distances to it are exact at the points of two lattices, as fine as the
 /// labels within two voxels of the face, else twice as coarse (at least 0.3 mm), and linear between them.
-/// Error outside planes, balls and cylinders, in label voxels: mean below 0.08, 0.12 rms, 0.36 at most; of a nerve one voxel thin 0.12,
-/// 0.16, 0.6. Inside up to a lattice step where distances have their ridge.
-/// Memory: 4 bytes a point, so about 4 a label voxel near the face and 4 / 8 elsewhere; made in O(voxels of the map). Immutable.
+/// Error outside planes, balls and cylinders, in label voxels: mean below 0.08, 0.12 rms, 0.36 at most; of a nerve one
+/// voxel thin 0.12, 0.16, 0.6. Inside up to a lattice step where distances have their ridge. Memory: 4 bytes a point,
+/// so about 4 a label voxel near the face and 4 / 8 elsewhere; made in O(voxels of the map). Immutable.
 class StructureMap {
  public:
   /// Error(failed) when the map holds no structure.
@@ -41,16 +41,17 @@ class StructureMap {
   [[nodiscard]] Answer at(Vec3 world_mm) const noexcept;
   /// To one structure, by its number in values(): as at(), whatever else is near; reach_mm() where it is farther.
   [[nodiscard]] double distance_mm(std::size_t number, Vec3 world_mm) const noexcept;
-  /// Between a tool's surface and the nearest structure; negative when it reaches into one. `each`, where not empty, gets the same for
-  /// every structure in the order of values(), reach_mm() where it is farther. Cost: an at() for each half radius along the tool's axis and
-  /// eight more; one for a ball.
+  /// Between a tool's surface and the nearest structure; negative when it reaches into one. `each`, where not empty,
+  /// gets the same for every structure in the order of values(), reach_mm() where it is farther. Cost: an at() for each
+  /// half radius along the tool's axis and eight more; one for a ball.
   Answer clearance(const RoundCone& tool, Vec3 start_mm, Vec3 axis, std::span<double> each = {}) const noexcept;
 
   [[nodiscard]] double reach_mm() const { return reach_mm_; }
   /// Of the structures that have voxels, ascending.
   [[nodiscard]] const std::vector<std::uint8_t>& values() const { return values_; }
   [[nodiscard]] const std::vector<Structure>& structures() const { return structures_; }
-  /// The face that distances are measured from, closed; `number` in values(). What is drawn is smoother (view/structures_view.h).
+  /// The face that distances are measured from, closed; `number` in values(). What is drawn is smoother
+  /// (view/structures_view.h).
   [[nodiscard]] const TriMesh& face(std::size_t number) const { return parts_[number].face; }
   /// Of the labels, the finest and the coarsest of the three.
   [[nodiscard]] std::array<double, 2> label_spacing_mm() const { return spacing_mm_; }
@@ -74,10 +75,10 @@ class StructureMap {
     [[nodiscard]] double at(Vec3 world_mm) const noexcept;
     [[nodiscard]] double clearance(const RoundCone& tool, Vec3 start_mm, Vec3 axis) const noexcept;
   };
-  [[nodiscard]] static Part part_of(const Labels& labels, std::uint8_t value, std::array<std::array<int, 2>, 3> box, double far_mm,
-                                    const Context& context);
-  static Field field_of(const TriangleSoup& face, const TriangleTree& tree, const Frame& frame, double inside_mm, double outside_mm,
-                        const Context& context);
+  [[nodiscard]] static Part part_of(const Labels& labels, std::uint8_t value, std::array<std::array<int, 2>, 3> box,
+                                    double far_mm, const Context& context);
+  static Field field_of(const TriangleSoup& face, const TriangleTree& tree, const Frame& frame, double inside_mm,
+                        double outside_mm, const Context& context);
   std::vector<Part> parts_;  // in the order of values_
   std::vector<std::uint8_t> values_;
   double reach_mm_;
@@ -85,4 +86,4 @@ class StructureMap {
   std::vector<Structure> structures_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

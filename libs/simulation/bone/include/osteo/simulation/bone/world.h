@@ -19,7 +19,8 @@
 
 namespace osteo::inline simulation {
 
-/// A voxel's new density; the name is that of the stream (Body::name_of). Session files keep the two, not what it was before.
+/// A voxel's new density; the name is that of the stream (Body::name_of). Session files keep the two, not what it was
+/// before.
 struct VoxelChange {
   VoxelKey voxel = 0;
   float density = 0;
@@ -30,7 +31,8 @@ static_assert(sizeof(VoxelChange) == 12);
 /// A piece of bone and where it is. The grid never moves: a pose carries it into the world.
 struct Body {
   std::uint32_t id = 0;
-  std::uint32_t first_brick = 0;  ///< its bricks are numbered from here in the stream, so that a voxel has one name in all pieces
+  std::uint32_t first_brick =
+      0;  ///< its bricks are numbered from here in the stream, so that a voxel has one name in all pieces
   BrickGrid bone;
   std::shared_ptr<const Hardness> hardness;  ///< null where the scene does not go by it
   [[nodiscard]] VoxelKey name_of(VoxelKey own) const { return own + first_brick * BrickGrid::kVoxels; }
@@ -51,16 +53,18 @@ struct Fixture {
   double opening_mm = 0;
 };
 
-/// Bodies and fixtures change by act() alone; densities of bodies also by the servo. act() never writes into a body that is there: where
-/// density changes it puts a new one in its place, so that whoever still reads the old is not disturbed. The two have the bricks that did
-/// not change in common: what is removed from the new afterwards is seen in the old there.
+/// Bodies and fixtures change by act() alone; densities of bodies also by the servo. act() never writes into a body
+/// that is there: where density changes it puts a new one in its place, so that whoever still reads the old is not
+/// disturbed. The two have the bricks that did not change in common: what is removed from the new afterwards is seen in
+/// the old there.
 class World {
  public:
-  /// Names are 32 bits wide: room for BrickGrid::kMostBricks over all that the scene ever held; names are not given twice.
+  /// Names are 32 bits wide: room for BrickGrid::kMostBricks over all that the scene ever held; names are not given
+  /// twice.
   explicit World(BrickGrid bone, std::shared_ptr<const Hardness> hardness = nullptr);
-  /// A part of the first body in finer voxels: in its box the coarse bone is taken out, so that each place belongs to one of them. A world
-  /// with a region is sawn and moved, but not taken apart. Error(usage) unless its box lies along faces of the first body's voxels (to
-  /// a hundredth); Error(resources) where names run out.
+  /// A part of the first body in finer voxels: in its box the coarse bone is taken out, so that each place belongs to
+  /// one of them. A world with a region is sawn and moved, but not taken apart. Error(usage) unless its box lies along
+  /// faces of the first body's voxels (to a hundredth); Error(resources) where names run out.
   void add_region(BrickGrid fine, std::shared_ptr<const Hardness> hardness = nullptr);
 
   /// With bodies of its own (a copy by value would share them).
@@ -106,19 +110,22 @@ class World {
     std::vector<std::pair<VoxelKey, float>> dust;  ///< names of voxels and the density that became dust there
   };
   /// Cost: moves nothing; plates under a millisecond; saw, split and undo O(bricks): they copy only those that
-  /// change otherwise than by going from one body to another. `components` of a body (by id), up to date; where it is empty or gives null,
-  /// split finds them itself. Never throws for what cannot be done: done is false, and nothing changed.
+  /// change otherwise than by going from one body to another. `components` of a body (by id), up to date; where it is
+  /// empty or gives null, split finds them itself. Never throws for what cannot be done: done is false, and nothing
+  /// changed.
   using ComponentsOf = std::function<const LiveComponents*(std::uint32_t body)>;
   Effect act(const SceneAction& action, const ComponentsOf& components = {});
 
-  /// What the servo's stream tells, in its order, so that undo knows the strokes of the burr and which of them came before an action. Who
-  /// changes densities without a servo (from a session file) tells the same. A stroke goes from the first voxel changed to
-  /// ActionKind::stroke or to the next action that undo can take back, whichever comes first.
-  /// Memory: 12 bytes for each voxel of a stroke, and about 50 while it goes on; when strokes together need more than kMostStrokeBytes, the
-  /// oldest is forgotten, with all that came before it: undo goes back to there and no farther, and says so.
+  /// What the servo's stream tells, in its order, so that undo knows the strokes of the burr and which of them came
+  /// before an action. Who changes densities without a servo (from a session file) tells the same. A stroke goes from
+  /// the first voxel changed to ActionKind::stroke or to the next action that undo can take back, whichever comes
+  /// first. Memory: 12 bytes for each voxel of a stroke, and about 50 while it goes on; when strokes together need more
+  /// than kMostStrokeBytes, the oldest is forgotten, with all that came before it: undo goes back to there and no
+  /// farther, and says so.
   void tell(std::span<const VoxelChange> changes);
   void tell(const SceneAction& action);
-  /// Changes or actions of the stream were missed: nothing that came before can be taken back any more, nor the stroke that goes on.
+  /// Changes or actions of the stream were missed: nothing that came before can be taken back any more, nor the stroke
+  /// that goes on.
   void forget();
   static constexpr std::size_t kMostStrokeBytes = std::size_t{64} << 20;
 
@@ -136,7 +143,8 @@ class World {
     VoxelKey voxel;
     float before, after;
   };
-  // What it takes to go back: places and plates as they were; densities as differences, so that what was drilled since stays drilled.
+  // What it takes to go back: places and plates as they were; densities as differences, so that what was drilled since
+  // stays drilled.
   struct Done {
     ActionKind kind;
     std::uint32_t of = 0;         // move: the piece; open: the fixture
@@ -163,7 +171,8 @@ class World {
 
   std::vector<PlacedBody> bodies_;
   std::vector<Fixture> fixtures_;
-  // Actions are done before the stream tells of them: the first told_ of these it has told of, and strokes come in behind those.
+  // Actions are done before the stream tells of them: the first told_ of these it has told of, and strokes come in
+  // behind those.
   std::vector<Done> done_;
   std::size_t told_ = 0;
   std::vector<Change> stroke_;  // that goes on, by names
@@ -177,4 +186,4 @@ class World {
   bool held_ = false;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "osteo/core/base/context.h"
-#include "osteo/simulation/bone/world.h"
 #include "osteo/core/data/tri_mesh.h"
+#include "osteo/simulation/bone/world.h"
 
 namespace osteo::inline simulation {
 
@@ -21,4 +21,4 @@ void append(TriMesh& a, const TriMesh& b);
 [[nodiscard]] TriMesh plate_of(const World& world, const Fixture& fixture);
 [[nodiscard]] RigidTransform pose_of(const World& world, const Fixture& fixture);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -1,5 +1,6 @@
-// How long it takes to bring the camera to a given view, by mode of control: the same targets and the same measure for a person in the
-// window and for a simulated one. The thesis (8.2.2) saw surgeons lose most time there and hoped for such a study.
+// How long it takes to bring the camera to a given view, by mode of control: the same targets and the same measure for
+// a person in the window and for a simulated one. The thesis (8.2.2) saw surgeons lose most time there and hoped for
+// such a study.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -18,8 +19,8 @@ struct TrialTolerance {
 };
 [[nodiscard]] bool close_to(const ScopeView& view, const ScopeView& target, const TrialTolerance& tolerance);
 
-/// Views such as an operation asks for: upright, the focus up to 25 mm from where `start` has it, seen from up to 45 degrees off, at 4, 6
-/// or 10 times. The same for the same seed, on any machine.
+/// Views such as an operation asks for: upright, the focus up to 25 mm from where `start` has it, seen from up to 45
+/// degrees off, at 4, 6 or 10 times. The same for the same seed, on any machine.
 [[nodiscard]] std::vector<ScopeView> camera_targets(const ScopeView& start, std::size_t count, std::uint64_t seed);
 
 struct TrialResult {
@@ -32,9 +33,12 @@ struct TrialResult {
 /// Target after target, in real time.
 class CameraTrial {
  public:
-  CameraTrial(std::vector<ScopeView> targets, const TrialTolerance& tolerance = {}) : targets_(std::move(targets)), tolerance_(tolerance) {}
+  CameraTrial(std::vector<ScopeView> targets, const TrialTolerance& tolerance = {})
+      : targets_(std::move(targets)), tolerance_(tolerance) {}
   /// Null when all were reached.
-  [[nodiscard]] const ScopeView* target() const { return results_.size() < targets_.size() ? &targets_[results_.size()] : nullptr; }
+  [[nodiscard]] const ScopeView* target() const {
+    return results_.size() < targets_.size() ? &targets_[results_.size()] : nullptr;
+  }
   [[nodiscard]] std::size_t count() const { return targets_.size(); }
   /// Each frame. True when the target was reached with it; the time to hold it does not count.
   bool advance(const ScopeControl& control, double seconds);
@@ -57,10 +61,10 @@ enum class CameraMode : int { mouse, point, device, six, rate, bookmarks };
   return {"mouse", "point", "device", "six", "rate", "bookmarks"};
 }
 
-/// A model of a person, not a person. Moves come one after the other (sub-movements): each aims at the whole of the error in what the hand
-/// has hold of, ends off by a share of its length, and is followed by a look; another grip takes time. Velocity of a move: minimum jerk.
-/// The numbers are of the order that the literature has for hands (keystroke level: key 0.2 s, pointing 1.1 s, deciding 1.35 s; choice
-/// reaction about 0.25 s), but chosen, not fitted to anybody.
+/// A model of a person, not a person. Moves come one after the other (sub-movements): each aims at the whole of the
+/// error in what the hand has hold of, ends off by a share of its length, and is followed by a look; another grip takes
+/// time. Velocity of a move: minimum jerk. The numbers are of the order that the literature has for hands (keystroke
+/// level: key 0.2 s, pointing 1.1 s, deciding 1.35 s; choice reaction about 0.25 s), but chosen, not fitted to anybody.
 struct SimulatedPerson {
   double reaction_s = 0.25;  ///< look, before each move
   double grip_s = 0.35;      ///< another button, key, mode
@@ -76,8 +80,10 @@ struct SimulatedPerson {
   double most_s = 60;  ///< then it is given up
 };
 
-/// One mode, all targets one after the other, each from where the last ended; 60 pictures a second through the window's own ScopeControl.
-[[nodiscard]] std::vector<TrialResult> simulate_trial(CameraMode mode, const ScopeView& start, const std::vector<ScopeView>& targets,
+/// One mode, all targets one after the other, each from where the last ended; 60 pictures a second through the window's
+/// own ScopeControl.
+[[nodiscard]] std::vector<TrialResult> simulate_trial(CameraMode mode, const ScopeView& start,
+                                                      const std::vector<ScopeView>& targets,
                                                       const SimulatedPerson& person, std::uint64_t seed,
                                                       const TrialTolerance& tolerance = {});
 
@@ -91,4 +97,4 @@ struct TrialSummary {
 /// A header and a line for each: target, reached, seconds, moves by kind.
 [[nodiscard]] std::string trial_csv(const std::vector<TrialResult>& results);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

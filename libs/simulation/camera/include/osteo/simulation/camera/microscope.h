@@ -1,9 +1,11 @@
-// The camera as an operating microscope: a focus on the bone, a working distance, a magnification. Plain values, no VTK, no screen.
+// The camera as an operating microscope: a focus on the bone, a working distance, a magnification. Plain values, no
+// VTK, no screen.
 //
-// Model: field of view = field number of the eyepieces / magnification, 200 mm here (10x eyepieces with a field number of 20;
-// magnifications of 4 to 25 then show 50 to 8 mm, as operating microscopes do at an objective of 250 mm). Magnification says what is seen
-// on the bone, not how large the screen is. It is parfocal: another magnification changes the angle of view, neither the eye nor the focus.
-// Lengths in mm, LPS; angles in radians where a name does not say otherwise. Every call is O(1).
+// Model: field of view = field number of the eyepieces / magnification, 200 mm here (10x eyepieces with a field number
+// of 20; magnifications of 4 to 25 then show 50 to 8 mm, as operating microscopes do at an objective of 250 mm).
+// Magnification says what is seen on the bone, not how large the screen is. It is parfocal: another magnification
+// changes the angle of view, neither the eye nor the focus. Lengths in mm, LPS; angles in radians where a name does not
+// say otherwise. Every call is O(1).
 #pragma once
 #include <array>
 #include <optional>
@@ -53,17 +55,19 @@ struct ScopeView {
   friend bool operator==(const ScopeView&, const ScopeView&) = default;
 };
 
-/// A motion in the axes of the view: right, up, towards the eye. Turns are right-handed about these axes through the focus.
+/// A motion in the axes of the view: right, up, towards the eye. Turns are right-handed about these axes through the
+/// focus.
 struct ScopeMotion {
   Vec3 shift_mm, turn_rad;
 };
 
-/// All that can be done to a view. Each keeps what it does not name; magnification and working distance are kept in their ranges.
-/// The focus stays in the middle whatever is done.
+/// All that can be done to a view. Each keeps what it does not name; magnification and working distance are kept in
+/// their ranges. The focus stays in the middle whatever is done.
 void magnify(ScopeView& view, double magnification);
 /// The next click of the changer, up (+1) or down (-1); the last one stays.
 void step_magnification(ScopeView& view, int direction);
-/// The eye goes around the focus, to its right and up. Upright: about the axis of the head, and never over its top (89 degrees).
+/// The eye goes around the focus, to its right and up. Upright: about the axis of the head, and never over its top (89
+/// degrees).
 void orbit(ScopeView& view, double right_rad, double up_rad);
 /// About the axis of the view, counter-clockwise as one sees it; it is not upright any more.
 void roll(ScopeView& view, double angle_rad);
@@ -71,7 +75,8 @@ void roll(ScopeView& view, double angle_rad);
 void pan(ScopeView& view, double right_mm, double up_mm);
 /// Eye and focus together along the view: what is in focus is so much deeper.
 void focus_deeper(ScopeView& view, double deeper_mm);
-/// Along the view until the plane of the focus holds this place: autofocus, when the place is the bone in the middle of the picture.
+/// Along the view until the plane of the focus holds this place: autofocus, when the place is the bone in the middle of
+/// the picture.
 void focus_on_depth_of(ScopeView& view, Vec3 place_mm);
 /// Another objective: the eye goes, the focus stays, and so does what is seen of its plane.
 void set_working_distance(ScopeView& view, double working_distance_mm);
@@ -85,8 +90,8 @@ void level(ScopeView& view);
 /// The whole of a ball, as the naked eye sees it.
 [[nodiscard]] ScopeView overview(Vec3 centre_mm, double radius_mm, Vec3 towards_eye);
 
-/// Part of the way from one view to another, 0 to 1: straight, turning about one axis, magnification evenly in its logarithm. Exact at both
-/// ends.
+/// Part of the way from one view to another, 0 to 1: straight, turning about one axis, magnification evenly in its
+/// logarithm. Exact at both ends.
 [[nodiscard]] ScopeView between(const ScopeView& from, const ScopeView& to, double share);
 
 /// A length of 1, 2 or 5 times a power of ten, at most `most_px` long in the plane of the focus.
@@ -105,4 +110,4 @@ struct ViewError {
 /// The turn from `from` to `to` in the axes of `from`: its axis times its angle.
 [[nodiscard]] Vec3 turn_between(const ScopeView& from, const ScopeView& to);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

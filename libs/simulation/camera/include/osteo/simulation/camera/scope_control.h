@@ -1,6 +1,6 @@
-// What a hand does to the microscope: moves that can be taken back, flights to views that were kept, an arm with friction and inertia, a
-// device that moves the camera while its brake is released. No VTK, no screen, no clock: time is given. Used by the window and by
-// 'osteo experiment camera' alike.
+// What a hand does to the microscope: moves that can be taken back, flights to views that were kept, an arm with
+// friction and inertia, a device that moves the camera while its brake is released. No VTK, no screen, no clock: time
+// is given. Used by the window and by 'osteo experiment camera' alike.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -18,9 +18,10 @@ struct ScopeRates {
   Vec3 move_mm_s, turn_rad_s;
 };
 
-/// The arm that carries the microscope. Driven, its velocity comes up to the drive's with a time constant (inertia); left alone it runs out
-/// by the same time constant and by dry friction, which brings it to rest for good. Both are integrated in closed form, so that the way is
-/// the same however many pictures a second there are (as long as the drive is).
+/// The arm that carries the microscope. Driven, its velocity comes up to the drive's with a time constant (inertia);
+/// left alone it runs out by the same time constant and by dry friction, which brings it to rest for good. Both are
+/// integrated in closed form, so that the way is the same however many pictures a second there are (as long as the
+/// drive is).
 class ScopeArm {
  public:
   struct Params {
@@ -51,8 +52,8 @@ enum class ScopeMove : int { orbit, pan, zoom, focus, roll, working_distance, gu
   return {"orbit", "pan", "zoom", "focus", "roll", "working_distance", "guide", "flight"};
 }
 
-/// What the motion of a device means to the camera (thesis 8.2.2): its translation moves the camera, or turns it, or all six degrees of the
-/// device count at once.
+/// What the motion of a device means to the camera (thesis 8.2.2): its translation moves the camera, or turns it, or
+/// all six degrees of the device count at once.
 enum class CameraGuide : int { shift, turn, six };
 [[nodiscard]] constexpr std::array<std::string_view, 3> enum_names(CameraGuide) {
   return {"shift", "turn", "six"};
@@ -88,8 +89,9 @@ class ScopeControl {
   void set_working_distance(double mm);
   void set_upright(bool on);
 
-  // --- by a device. Each frame while the brake is released: the hand's motion since the frame before, in the device's own right, up and
-  // towards the user. Where the hand is does not matter, only how it moves: letting go and taking up again is the clutch.
+  // --- by a device. Each frame while the brake is released: the hand's motion since the frame before, in the device's
+  // own right, up and towards the user. Where the hand is does not matter, only how it moves: letting go and taking up
+  // again is the clutch.
   void guide(CameraGuide mode, const ScopeMotion& device, double seconds);
   /// The same by rates: a device that is pushed, not moved; deflection 1 is one field, or half a radian, a second.
   void drive(Vec3 shift, Vec3 turn, double seconds);
@@ -136,4 +138,4 @@ class ScopeControl {
   Moves moves_{};
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -1,5 +1,6 @@
-// Two eyes at one microscope: parallel axes, frusta set off so that both show the same of one plane, the convergence. Turning the eyes
-// towards each other instead (toe-in) would tilt the two pictures against each other, which hurts. And how the two pictures reach the eyes.
+// Two eyes at one microscope: parallel axes, frusta set off so that both show the same of one plane, the convergence.
+// Turning the eyes towards each other instead (toe-in) would tilt the two pictures against each other, which hurts. And
+// how the two pictures reach the eyes.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -31,9 +32,11 @@ struct StereoEye {
 };
 [[nodiscard]] StereoEye stereo_eye(const ScopeView& view, const StereoParams& stereo, const PictureArea& area, int eye);
 
-/// Pixels by which a place lies further to the right for the left eye than for the right one: 0 in the plane of convergence, more in front
-/// of it. base (C - Z) / Z times the pixels of a mm at C, with C and Z the distances of convergence and place from the eyes.
-[[nodiscard]] double disparity_px(const ScopeView& view, const StereoParams& stereo, const PictureArea& area, Vec3 place_mm);
+/// Pixels by which a place lies further to the right for the left eye than for the right one: 0 in the plane of
+/// convergence, more in front of it. base (C - Z) / Z times the pixels of a mm at C, with C and Z the distances of
+/// convergence and place from the eyes.
+[[nodiscard]] double disparity_px(const ScopeView& view, const StereoParams& stereo, const PictureArea& area,
+                                  Vec3 place_mm);
 
 /// A part of an eye's picture and where it goes; parts of 0 to 1 of the picture, y downwards.
 struct StereoPiece {
@@ -42,12 +45,13 @@ struct StereoPiece {
   std::array<double, 4> to{0, 0, 1, 1};            ///< left, top, right, bottom
   std::array<double, 4> from{0, 0, 1, 1};
 };
-/// How the two pictures are put together for a screen. side_by_side and top_bottom squeeze each to half, as such screens expect; anaglyph:
-/// left eye red, right eye green and blue; interlaced: even rows of the screen are the left eye's. quad_buffer and off: the whole of the
-/// left eye (the right one goes to its own buffer). `rows` of the picture, `first_row` of it on the screen.
+/// How the two pictures are put together for a screen. side_by_side and top_bottom squeeze each to half, as such
+/// screens expect; anaglyph: left eye red, right eye green and blue; interlaced: even rows of the screen are the left
+/// eye's. quad_buffer and off: the whole of the left eye (the right one goes to its own buffer). `rows` of the picture,
+/// `first_row` of it on the screen.
 [[nodiscard]] std::vector<StereoPiece> stereo_pieces(const StereoParams& stereo, int rows, int first_row);
 
 /// Where a pixel of the screen lies in the picture of an eye: mouse over a squeezed picture.
 [[nodiscard]] std::array<double, 2> unsqueezed(StereoMode mode, const PictureArea& area, double x, double y);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -7,20 +7,21 @@
 #include <string>
 #include <utility>
 
+#include "osteo/core/rt/seqlock.h"
 #include "osteo/simulation/devices/hid_link.h"
 #include "osteo/simulation/devices/woodenhaptics.h"
 #include "osteo/simulation/haptics/device.h"
 #include "osteo/simulation/haptics/hand_tuning.h"
-#include "osteo/core/rt/seqlock.h"
 
 namespace osteo::inline simulation {
 
-/// From the device's workspace to the scene: scene = place + rotation * scale * (device - anchor). Holding the clutch moves the device
-/// alone.
+/// From the device's workspace to the scene: scene = place + rotation * scale * (device - anchor). Holding the clutch
+/// moves the device alone.
 class WorkspaceMap {
  public:
   /// `rotation`: columns are the device's axes in the scene. `scale` > 0: scene mm a device mm.
-  WorkspaceMap(Vec3 place_mm, const Mat3& rotation, double scale) : place_mm_(place_mm), rotation_(rotation), scale_(scale) {}
+  WorkspaceMap(Vec3 place_mm, const Mat3& rotation, double scale)
+      : place_mm_(place_mm), rotation_(rotation), scale_(scale) {}
   /// From the next tick on, which begins where the tool is. `share` > 0: of the scale it was made with.
   void rescale(double share) noexcept {
     if (share == share_) return;
@@ -50,15 +51,15 @@ class WorkspaceMap {
   bool started_ = false, rescaled_ = false;
 };
 
-/// A force that goes on by itself for a while: what the servo last said, with the plane of contact beside it, so that a late servo is
-/// bridged.
+/// A force that goes on by itself for a while: what the servo last said, with the plane of contact beside it, so that a
+/// late servo is bridged.
 struct ForcePlane {
   Vec3 force_n, position_mm, normal;  ///< in the device's frame; of the servo's tick
   double stiffness_n_per_mm = 0;
   std::int64_t time_ns = 0;
 };
-/// Up to `hold_ms` after the tick the contact is the plane, so that the force follows the hand; then it fades to nothing within `fade_ms`.
-/// Never more than twice the last force plus half a newton.
+/// Up to `hold_ms` after the tick the contact is the plane, so that the force follows the hand; then it fades to
+/// nothing within `fade_ms`. Never more than twice the last force plus half a newton.
 [[nodiscard]] Vec3 extrapolate(const ForcePlane& plane, Vec3 position_mm, std::int64_t now_ns, double hold_ms = 5,
                                double fade_ms = 20) noexcept;
 
@@ -71,13 +72,15 @@ class FootPedal final : HidHandler {
     const std::uint64_t s = state_;
     return static_cast<std::uint32_t>(s) & ~static_cast<std::uint32_t>(s >> 32);
   }
-  /// While it is on no switch counts; after that those that were down count once they have come up. From any one thread.
+  /// While it is on no switch counts; after that those that were down count once they have come up. From any one
+  /// thread.
   void hold_back(bool on) noexcept {
     if (on == held_back_) return;
     held_back_ = on;
     change([on](std::uint32_t down, std::uint32_t) { return std::pair(down, on ? ~0U : down); });
   }
-  /// Those that are down now or were since this was last asked: who looks seldom misses no short press. From any one thread.
+  /// Those that are down now or were since this was last asked: who looks seldom misses no short press. From any one
+  /// thread.
   [[nodiscard]] std::uint32_t pressed_since() noexcept { return pressed() | since_.exchange(0); }
   [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
   [[nodiscard]] std::string trouble() const { return link_.trouble(); }
@@ -125,8 +128,8 @@ struct DeviceMotion {
   Vec3 turn;                          ///< its twist, right-handed
 };
 
-/// A device whose hand can be lent to the camera: meanwhile its samples rest where they are, the pedal up, and motors rest. From any
-/// thread.
+/// A device whose hand can be lent to the camera: meanwhile its samples rest where they are, the pedal up, and motors
+/// rest. From any thread.
 class LendsHand {
  public:
   virtual ~LendsHand() = default;
@@ -152,7 +155,8 @@ class TunedHand {
     return own_;
   }
   /// What its own button and a pedal's switches press, with the window's keys.
-  [[nodiscard]] static std::uint8_t pedal_of(const HandTuning& t, std::uint32_t buttons, std::uint32_t switches) noexcept {
+  [[nodiscard]] static std::uint8_t pedal_of(const HandTuning& t, std::uint32_t buttons,
+                                             std::uint32_t switches) noexcept {
     const bool own = (buttons & t.drill_buttons) != 0 || (switches & t.drill_switches) != 0;
     return own ? std::max(t.full, t.pedal) : t.pedal;
   }
@@ -182,12 +186,14 @@ class CameraPuck final : HidHandler {
   HidLink link_;
 };
 
-/// Isometric: the cap's deflection is a velocity, of the goal of a spring hand. Button 1 presses the pedal; so does a real one, by its
-/// switch pedal_bit(); unless tuned otherwise.
+/// Isometric: the cap's deflection is a velocity, of the goal of a spring hand. Button 1 presses the pedal; so does a
+/// real one, by its switch pedal_bit(); unless tuned otherwise.
 class SpaceMouseDevice final : public Device, public LendsHand, public TunedHand, HidHandler {
  public:
-  /// `rotation`: columns are the desk's right, away and up in the scene. Full deflection moves 60 mm/s and turns 1.5 rad/s.
-  SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal, std::size_t hand = 0);
+  /// `rotation`: columns are the desk's right, away and up in the scene. Full deflection moves 60 mm/s and turns 1.5
+  /// rad/s.
+  SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal,
+                   std::size_t hand = 0);
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
   void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
   bool lead(const HandWay& way) noexcept override {
@@ -217,13 +223,14 @@ class SpaceMouseDevice final : public Device, public LendsHand, public TunedHand
   HidLink link_;
 };
 
-/// Pose and force by a WoodenHaptics or Polhem. The link's thread answers each report with motor currents for the latest force, bridged by
-/// its plane of contact when the servo is late; the servo reads the latest pose. Motors rest until the servo speaks, and when it falls
-/// silent. Its button or pedal_bit() of a pedal is the pedal, bit 1 the clutch of every arm; unless tuned otherwise.
+/// Pose and force by a WoodenHaptics or Polhem. The link's thread answers each report with motor currents for the
+/// latest force, bridged by its plane of contact when the servo is late; the servo reads the latest pose. Motors rest
+/// until the servo speaks, and when it falls silent. Its button or pedal_bit() of a pedal is the pedal, bit 1 the
+/// clutch of every arm; unless tuned otherwise.
 class WoodenHapticsDevice final : public Device, public LendsHand, public TunedHand, HidHandler {
  public:
-  WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool, const FootPedal* pedal,
-                      std::size_t hand = 0);
+  WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool,
+                      const FootPedal* pedal, std::size_t hand = 0);
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
   void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
   void feel(Vec3 force_n, Vec3 normal, double stiffness_n_per_mm) noexcept override;
@@ -273,4 +280,4 @@ struct FoundDevice {
 /// Devices known here, each opened for a moment.
 [[nodiscard]] std::vector<FoundDevice> find_devices();
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -23,7 +23,8 @@ struct HidInfo {
 class HidPort {
  public:
   virtual ~HidPort() = default;
-  /// A report (with its id where the device numbers them), 0 when none came within the time, -1 when the device is gone.
+  /// A report (with its id where the device numbers them), 0 when none came within the time, -1 when the device is
+  /// gone.
   virtual int read(std::span<std::byte> report, int timeout_ms) = 0;
   /// The first byte is the report's id, 0 where they are not numbered. False when the device is gone.
   virtual bool write(std::span<const std::byte> report) = 0;
@@ -36,7 +37,8 @@ class HidPort {
 /// One end of a connected AF_UNIX SOCK_SEQPACKET pair; takes it over.
 [[nodiscard]] std::unique_ptr<HidPort> open_socket(int fd);
 
-/// A recording in the text format of hid-recorder: lines "N: name", "I: bus vendor product", "E: seconds.microseconds length bytes".
+/// A recording in the text format of hid-recorder: lines "N: name", "I: bus vendor product", "E: seconds.microseconds
+/// length bytes".
 struct HidRecording {
   struct Event {
     double time_s = 0;
@@ -48,4 +50,4 @@ struct HidRecording {
 /// Errors: corrupt, with the line; no_input.
 [[nodiscard]] HidRecording load_hid_recording(const std::filesystem::path& path);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

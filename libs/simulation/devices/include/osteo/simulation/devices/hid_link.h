@@ -24,8 +24,8 @@ class HidHandler {
   [[nodiscard]] virtual bool newest_only() const { return false; }
 };
 
-/// Opens, reads, and after an unplug tries again every 50 ms. Reports pile up in the kernel when nobody reads: so one thread does nothing
-/// else.
+/// Opens, reads, and after an unplug tries again every 50 ms. Reports pile up in the kernel when nobody reads: so one
+/// thread does nothing else.
 class HidLink {
  public:
   using Open = std::function<std::unique_ptr<HidPort>(std::string& why)>;
@@ -52,8 +52,8 @@ class HidLink {
   std::thread thread_;
 };
 
-/// Opens the first device of the kernel for which `wanted` holds, or with `before` the first behind as many of those: two alike are told
-/// apart by the order of their paths.
+/// Opens the first device of the kernel for which `wanted` holds, or with `before` the first behind as many of those:
+/// two alike are told apart by the order of their paths.
 [[nodiscard]] HidLink::Open open_first(std::function<bool(const HidInfo&)> wanted, int before = 0);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -10,9 +10,10 @@
 
 namespace osteo::inline simulation {
 
-/// Geometry and motors. Links, capstans, encoders, torque constants and limits of the Polhem v3 as its driver's header gives them
-/// (haptikfabrikenapi.h); the diameters of the driven bodies, the workspace's origin and the gimbal's directions are not there: those are
-/// guesses after the WoodenHaptics, to be replaced by what one's own device has, in a file.
+/// Geometry and motors. Links, capstans, encoders, torque constants and limits of the Polhem v3 as its driver's header
+/// gives them (haptikfabrikenapi.h); the diameters of the driven bodies, the workspace's origin and the gimbal's
+/// directions are not there: those are guesses after the WoodenHaptics, to be replaced by what one's own device has, in
+/// a file.
 struct WoodenHapticsGeometry {
   using Params = WoodenHapticsGeometry;
   std::array<double, 3> capstan_diameter_mm{28.8, 13, 10};
@@ -68,8 +69,10 @@ class WoodenHapticsKinematics {
   [[nodiscard]] double resolution_mm() const;
 
  private:
-  [[nodiscard]] double gear(std::size_t joint) const { return g_.body_diameter_mm[joint] / g_.capstan_diameter_mm[joint]; }
+  [[nodiscard]] double gear(std::size_t joint) const {
+    return g_.body_diameter_mm[joint] / g_.capstan_diameter_mm[joint];
+  }
   WoodenHapticsGeometry g_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

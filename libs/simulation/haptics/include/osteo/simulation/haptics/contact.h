@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "osteo/core/base/param.h"
+#include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/simulation/bone/hardness.h"
 #include "osteo/simulation/bone/instrument.h"
-#include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/simulation/haptics/grains.h"
 #include "osteo/simulation/haptics/overlap.h"
 #include "osteo/simulation/haptics/stream.h"
@@ -22,7 +22,7 @@ enum class ContactMethod : int { rays, volume, overlap, proxy };
 
 struct ContactParams {
   ContactMethod method = ContactMethod::overlap;
-  double stiffness_n_per_mm = 4.0;       ///< beyond the soft start; the virtual device bears it, hand-held devices about 0.5
+  double stiffness_n_per_mm = 4.0;  ///< beyond the soft start; the virtual device bears it, hand-held devices about 0.5
   double soft_stiffness_n_per_mm = 1.5;  ///< in the first soft_depth_mm of penetration
   double soft_depth_mm = 0.1;
   double max_force_n = 8;
@@ -31,7 +31,8 @@ struct ContactParams {
 
   static void describe(ContactParams& p, auto& visit) {
     visit({"method",
-           "rays: surface samples traced inwards; volume: samples of the volume (thesis); overlap: exact; proxy: rigid, with friction"},
+           "rays: surface samples traced inwards; volume: samples of the volume (thesis); overlap: exact; proxy: "
+           "rigid, with friction"},
           p.method);
     visit({"stiffness_n_per_mm", "of bone, beyond the soft start", "N/mm", 0, 100}, p.stiffness_n_per_mm);
     visit({"soft_stiffness_n_per_mm", "of bone, at first touch", "N/mm", 0, 100}, p.soft_stiffness_n_per_mm);
@@ -49,11 +50,12 @@ struct ContactParams {
 };
 
 struct ContactResult {
-  Vec3 force_n;                ///< on the tool
-  Vec3 torque_n_mm;            ///< on the tool, about its position
-  Vec3 normal;                 ///< unit, out of the bone; zero without contact or where there is no direction
-  double normal_force_n = 0;   ///< along the normal: what presses the burr into bone
-  double depth_mm = 0;         ///< depth of a flat cut of the burr that holds as much bone; proxy: how far the hand is behind the surface
+  Vec3 force_n;               ///< on the tool
+  Vec3 torque_n_mm;           ///< on the tool, about its position
+  Vec3 normal;                ///< unit, out of the bone; zero without contact or where there is no direction
+  double normal_force_n = 0;  ///< along the normal: what presses the burr into bone
+  double depth_mm =
+      0;  ///< depth of a flat cut of the burr that holds as much bone; proxy: how far the hand is behind the surface
   double bone_mm3 = 0;         ///< bone inside the burr
   std::uint32_t immersed = 0;  ///< samples, or voxels that will be cut
   Vec3 shown_offset_mm;        ///< from the pose to where the tool is shown: at the surface
@@ -66,16 +68,16 @@ struct Cut {
   bool in_turns = false;  ///< only some of the voxels under the burr are listed, others the next time
 };
 
-/// A contact model is one way from pose to force; scenes choose one. It remembers one hand's contact with one bone. Everything is allocated
-/// when it is made.
+/// A contact model is one way from pose to force; scenes choose one. It remembers one hand's contact with one bone.
+/// Everything is allocated when it is made.
 class ContactModel {
  public:
   explicit ContactModel(const ContactParams& params) : params_(params) {}
   virtual ~ContactModel() = default;
   /// The law of force from the next contact() on; `method` is that of the model, whatever it says here.
   void set(const ContactParams& params) noexcept { params_ = params; }
-  /// Where burrs have been in the bone of the contact()s to come; null: nowhere. Must outlive them. With it a burr is pressed by what it may
-  /// still take, and by no bone that it can never reach.
+  /// Where burrs have been in the bone of the contact()s to come; null: nowhere. Must outlive them. With it a burr is
+  /// pressed by what it may still take, and by no bone that it can never reach.
   void know(const Grains* known) noexcept { known_ = known; }
   /// Force for this pose. A pose that is not finite gives none. No allocation, no exception.
   virtual ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept = 0;
@@ -83,7 +85,8 @@ class ContactModel {
   [[nodiscard]] virtual Cut cut(const BrickGrid& bone) noexcept = 0;
   /// Another model is in use now: what this one remembers of the hand is out of date.
   virtual void rest() noexcept {}
-  /// What the last contact() overlapped, where that is all that matters: of several bones it may be added up. Null: it may not.
+  /// What the last contact() overlapped, where that is all that matters: of several bones it may be added up. Null: it
+  /// may not.
   [[nodiscard]] virtual const OverlapResult* overlapped() const noexcept { return nullptr; }
 
  protected:
@@ -91,27 +94,29 @@ class ContactModel {
   const Grains* known_ = nullptr;
 };
 
-/// `spacing_mm` of the bone it will meet: sizes its buffers. `tools`: of instrument_library(), that it is for; none: all. (A proxy makes a
-/// table for each, 2 ms.)
+/// `spacing_mm` of the bone it will meet: sizes its buffers. `tools`: of instrument_library(), that it is for; none:
+/// all. (A proxy makes a table for each, 2 ms.)
 [[nodiscard]] std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm,
                                                                std::span<const std::size_t> tools = {});
 
-/// Below this many voxels of radius a burr is too small for them: flat bone is felt with errors of 10 % of the force and more.
+/// Below this many voxels of radius a burr is too small for them: flat bone is felt with errors of 10 % of the force
+/// and more.
 inline constexpr double kLeastRadiusVoxels = 2;
 /// What to say of such a burr, and what to do about it; empty for the others.
 [[nodiscard]] std::string too_small_for_voxels(const Burr& burr, double spacing_mm);
 
-/// Takes bone away: rate * force * time * speed / hardness, spread over the voxels of a cut by the bone that may go there and by efficiency,
-/// but nowhere more than what the burr has ever covered (Grains). What voxels cannot give is carried to the next call, so that the rate
-/// depends on neither voxels nor ticks.
-/// Remembers where burrs have been: one for each bone, whichever hand holds them.
+/// Takes bone away: rate * force * time * speed / hardness, spread over the voxels of a cut by the bone that may go
+/// there and by efficiency, but nowhere more than what the burr has ever covered (Grains). What voxels cannot give is
+/// carried to the next call, so that the rate depends on neither voxels nor ticks. Remembers where burrs have been: one
+/// for each bone, whichever hand holds them.
 class Removal {
  public:
   explicit Removal(const BrickGrid& bone);
-  /// `hardness` may be null; `hand` below kMostHands. Without force nothing goes, but what the burr covers is known from then on. Returns
-  /// the changed voxels (valid until the next call) and sets what was removed.
-  std::span<const VoxelChange> remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n, double speed_rpm, double dt_s,
-                                      const Hardness* hardness, double& removed_mm3, std::size_t hand = 0) noexcept;
+  /// `hardness` may be null; `hand` below kMostHands. Without force nothing goes, but what the burr covers is known
+  /// from then on. Returns the changed voxels (valid until the next call) and sets what was removed.
+  std::span<const VoxelChange> remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n,
+                                      double speed_rpm, double dt_s, const Hardness* hardness, double& removed_mm3,
+                                      std::size_t hand = 0) noexcept;
   [[nodiscard]] Grains& grains() { return grains_; }
   [[nodiscard]] const Grains& grains() const { return grains_; }
 
@@ -128,4 +133,4 @@ inline constexpr std::size_t kMostCutPerTick = 1024;
 /// Room for the hits of any instrument of the library at this spacing.
 [[nodiscard]] std::size_t most_hits(double spacing_mm);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

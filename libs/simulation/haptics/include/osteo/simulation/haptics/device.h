@@ -7,13 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "osteo/core/rt/seqlock.h"
 #include "osteo/simulation/haptics/guard.h"
 #include "osteo/simulation/haptics/stream.h"
-#include "osteo/core/rt/seqlock.h"
 
 namespace osteo::inline simulation {
 
-/// A way that a hand takes by itself, the pedal up: straight from point to point, from wherever it is. FreeWays finds them.
+/// A way that a hand takes by itself, the pedal up: straight from point to point, from wherever it is. FreeWays finds
+/// them.
 struct HandWay {
   static constexpr std::size_t kMost = 96;
   struct Point {
@@ -37,11 +38,13 @@ class Device {
   virtual DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept = 0;
   /// Another tool is taken up; from any thread. Devices whose samples name their tool themselves ignore it.
   virtual void set_tool(std::uint8_t) noexcept {}
-  /// The hand is to go a way by itself; false where it cannot, since a person holds it. From the one thread that also asks led().
+  /// The hand is to go a way by itself; false where it cannot, since a person holds it. From the one thread that also
+  /// asks led().
   virtual bool lead(const HandWay&) noexcept { return false; }
   /// Of the last way; `no` where there was none.
   virtual Led led() noexcept { return Led::no; }
-  /// The force of this tick and the plane of contact it stems from (normal zero without), for devices that hold it longer than a tick.
+  /// The force of this tick and the plane of contact it stems from (normal zero without), for devices that hold it
+  /// longer than a tick.
   virtual void feel(Vec3 /*force_n*/, Vec3 /*normal*/, double /*stiffness_n_per_mm*/) noexcept {}
   /// The device that a person holds, where this one only stands before it (LedDevice); else itself.
   [[nodiscard]] virtual Device& held() noexcept { return *this; }
@@ -61,8 +64,8 @@ struct HandGoal {
   std::uint8_t tool = 0;
 };
 
-/// A hand that holds the drill on a damped spring to its goal, so that a mouse or a script rests on bone instead of passing
-/// through it: mass 0.15 kg, 0.8 N/mm, critically damped, at most 6 N. Semi-implicit Euler.
+/// A hand that holds the drill on a damped spring to its goal, so that a mouse or a script rests on bone instead of
+/// passing through it: mass 0.15 kg, 0.8 N/mm, critically damped, at most 6 N. Semi-implicit Euler.
 class SpringHand {
  public:
   static DeviceTraits traits() { return {.damping_n_s_per_m = 21, .delay_s = 0, .encoder_mm = 0, .max_force_n = 100}; }
@@ -81,14 +84,16 @@ class SpringHand {
   Vec3 position_mm_, velocity_mm_s_;
 };
 
-/// A spring hand that can be led along a way: its goal goes ahead by no more than pulls gently, and waits where the hand cannot follow.
-/// Near bone 30 mm/s and 0.8 mm ahead (0.64 N), else 200 mm/s. Without headway for a second the way is given up, where the hand is.
+/// A spring hand that can be led along a way: its goal goes ahead by no more than pulls gently, and waits where the
+/// hand cannot follow. Near bone 30 mm/s and 0.8 mm ahead (0.64 N), else 200 mm/s. Without headway for a second the way
+/// is given up, where the hand is.
 class GuidedHand {
  public:
   /// From one other thread, which also asks led().
   void lead(const HandWay& way) noexcept;
   [[nodiscard]] Led led() const noexcept;
-  /// The servo's: moves on by dt, along the way or to the goal. While it is led `goal` becomes the way's, and stays so at its end.
+  /// The servo's: moves on by dt, along the way or to the goal. While it is led `goal` becomes the way's, and stays so
+  /// at its end.
   DeviceSample step(HandGoal& goal, double dt_s, Vec3 force_n) noexcept;
   /// How many ways have come to an end.
   [[nodiscard]] std::uint32_t ended() const noexcept { return ended_.load(std::memory_order_acquire) >> 1; }
@@ -148,8 +153,8 @@ struct Strokes {
   std::vector<Waypoint> waypoints;  ///< at least one, times rising
 };
 
-/// Follows strokes by tick number, not by the clock: the same ticks on every run. Behind the last waypoint the hand rests there, the pedal
-/// up; it is active until then, and until `end_tick` where that is later.
+/// Follows strokes by tick number, not by the clock: the same ticks on every run. Behind the last waypoint the hand
+/// rests there, the pedal up; it is active until then, and until `end_tick` where that is later.
 class ScriptedDevice final : public Device {
  public:
   ScriptedDevice(Strokes strokes, double rate_hz, std::uint64_t end_tick = 0)
@@ -179,4 +184,4 @@ class ReplayDevice final : public Device {
   std::vector<DeviceSample> samples_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

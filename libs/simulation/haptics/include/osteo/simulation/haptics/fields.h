@@ -14,13 +14,15 @@ namespace osteo::inline simulation {
 
 /// How a CubicField joins its values. Both go through them.
 enum class FieldCurve : int {
-  catmull_rom,  ///< from the nearest 4^3 alone: once differentiable, slopes right to O(h^2); a kink is felt two voxels far
-  spline        ///< the cubic spline (M. Unser, IEEE Signal Process Mag 16(6), 1999): twice differentiable, slopes right to O(h^3); a kink
-                ///< rings on, by 0.27 a voxel
+  catmull_rom,  ///< from the nearest 4^3 alone: once differentiable, slopes right to O(h^2); a kink is felt two voxels
+                ///< far
+  spline  ///< the cubic spline (M. Unser, IEEE Signal Process Mag 16(6), 1999): twice differentiable, slopes right to
+          ///< O(h^3); a kink rings on, by 0.27 a voxel
 };
 
-/// Clearance from values at the points of a dense grid (a distance map, or any smooth function that is 0 at the surface and rises
-/// outwards with a slope near 1), by tricubic interpolation. 4 bytes a voxel. About 40 ns a call. Outside the grid everything is free.
+/// Clearance from values at the points of a dense grid (a distance map, or any smooth function that is 0 at the surface
+/// and rises outwards with a slope near 1), by tricubic interpolation. 4 bytes a voxel. About 40 ns a call. Outside the
+/// grid everything is free.
 class CubicField {
  public:
   /// `values` x fastest, one for each voxel of the frame; at least 4 along each axis. Voxels must be cubes.
@@ -44,12 +46,13 @@ class CubicField {
   double radius_mm_ = 0;
 };
 
-/// Clearance from a closed triangle mesh, exact distances; the sign by angle-weighted normals of the nearest face, edge or corner
-/// (J. Baerentzen, H. Aanaes, IEEE TVCG 11(3), 2005), which is right for closed surfaces without self-intersections.
+/// Clearance from a closed triangle mesh, exact distances; the sign by angle-weighted normals of the nearest face, edge
+/// or corner (J. Baerentzen, H. Aanaes, IEEE TVCG 11(3), 2005), which is right for closed surfaces without
+/// self-intersections.
 class MeshField {
  public:
-  /// With `shading`, forces act along normals interpolated over each triangle (D. Ruspini et al., SIGGRAPH 1997) instead of its own.
-  /// Errors as of TriangleTree.
+  /// With `shading`, forces act along normals interpolated over each triangle (D. Ruspini et al., SIGGRAPH 1997)
+  /// instead of its own. Errors as of TriangleTree.
   MeshField(const TriangleSoup& soup, bool shading, const Context& context = {});
   void set_radius_mm(double radius) { radius_mm_ = radius; }
   /// Remembers the last triangle, so that the next call is quick; one field for each thread.
@@ -67,4 +70,4 @@ class MeshField {
   mutable std::uint32_t hint_ = ClosestPoint::kNone;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

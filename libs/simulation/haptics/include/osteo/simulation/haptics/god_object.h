@@ -1,4 +1,5 @@
-// A point that follows the device but stays outside: rigid contact with friction, on any field that tells clearance and its gradient.
+// A point that follows the device but stays outside: rigid contact with friction, on any field that tells clearance and
+// its gradient.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -9,24 +10,28 @@ namespace osteo::inline simulation {
 
 /// What a field says of a point.
 struct Clearance {
-  double value_mm = 0;  ///< distance to what may not be entered, negative inside; may be an approximation with slope about 1
-  Vec3 gradient;        ///< of the value; any length but 0
-  Vec3 normal;          ///< unit; where forces act along: the gradient's direction, or a shaded one
+  double value_mm =
+      0;          ///< distance to what may not be entered, negative inside; may be an approximation with slope about 1
+  Vec3 gradient;  ///< of the value; any length but 0
+  Vec3 normal;    ///< unit; where forces act along: the gradient's direction, or a shaded one
 };
 
 struct GodObjectParams {
   double friction = 0;         ///< dynamic
   double static_friction = 0;  ///< until it slips; taken as `friction` when smaller
-  double feature_mm = 1;       ///< moves along the surface in steps no longer than this: the voxel, or the radius of what is felt
-  double tolerance_mm = 1e-6;  ///< contact and convergence; scale it with the object, so that metres and micrometres work alike
-  int evaluations = 96;        ///< of the field in an update, at most (and a few more); what is left is done in the next
+  double feature_mm =
+      1;  ///< moves along the surface in steps no longer than this: the voxel, or the radius of what is felt
+  double tolerance_mm =
+      1e-6;  ///< contact and convergence; scale it with the object, so that metres and micrometres work alike
+  int evaluations = 96;  ///< of the field in an update, at most (and a few more); what is left is done in the next
 };
 
-/// C. Zilles, J. Salisbury, IROS 1995, without triangles: the proxy minimises the distance to the device subject to clearance >= 0. In free
-/// space it walks to the device no farther than the clearance allows, so it cannot pass a wall; on the surface it projects the way to the
-/// device onto the tangent plane, moves, and corrects by Newton's method along the gradient. Friction: the device's offset stays inside
-/// the cone; when it leaves, the proxy is drawn along the surface until the offset lies on the dynamic cone, so that it slips in the
-/// direction of motion. No allocation. Field: Clearance operator()(Vec3) const; about 4 evaluations an update in steady contact.
+/// C. Zilles, J. Salisbury, IROS 1995, without triangles: the proxy minimises the distance to the device subject to
+/// clearance >= 0. In free space it walks to the device no farther than the clearance allows, so it cannot pass a wall;
+/// on the surface it projects the way to the device onto the tangent plane, moves, and corrects by Newton's method
+/// along the gradient. Friction: the device's offset stays inside the cone; when it leaves, the proxy is drawn along
+/// the surface until the offset lies on the dynamic cone, so that it slips in the direction of motion. No allocation.
+/// Field: Clearance operator()(Vec3) const; about 4 evaluations an update in steady contact.
 class GodObject {
  public:
   struct Answer {
@@ -63,7 +68,8 @@ class GodObject {
       if (distance <= 1e-3 * tolerance) break;
       if (c.value_mm > tolerance || dot(way, c.normal) >= 0) {
         // Free, or leaving: straight to the device, but not beyond what is known to be free.
-        const double step = std::min(distance, std::max(c.value_mm, 0.25 * p.feature_mm * (dot(way, c.normal) >= 0 ? 1 : 0)));
+        const double step =
+            std::min(distance, std::max(c.value_mm, 0.25 * p.feature_mm * (dot(way, c.normal) >= 0 ? 1 : 0)));
         x_ += way * (step / distance);
         a.contact = false;
         slipping_ = false;
@@ -113,8 +119,9 @@ class GodObject {
     ++a.evaluations;
     return field(x_);
   }
-  /// Back onto the surface from near it, from either side. `slid`: the normal of the wall it slid along. Where another wall is met, the
-  /// way out of that one leads along the walls already kept, so that corners are reached in a few steps however sharp they are.
+  /// Back onto the surface from near it, from either side. `slid`: the normal of the wall it slid along. Where another
+  /// wall is met, the way out of that one leads along the walls already kept, so that corners are reached in a few
+  /// steps however sharp they are.
   template <class Field>
   Clearance settle(const Field& field, Clearance c, Vec3 slid, double longest, double tolerance, Answer& a) {
     Vec3 kept[3] = {slid};
@@ -154,4 +161,4 @@ class GodObject {
   bool placed_ = false, slipping_ = false;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

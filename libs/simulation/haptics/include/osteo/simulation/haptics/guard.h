@@ -31,24 +31,30 @@ struct GuardParams {
     visit({"limit_force_n", "the hand never feels more", "N", 0, 100}, p.max_force_n);
     visit({"limit_rate_n_per_s", "nor a faster change", "N/s", 0, 1e9}, p.max_rate_n_per_s);
     visit({"passivity", "take out energy that sampling puts in"}, p.passivity);
-    visit({"limit_damping_n_s_per_m", "the passivity controller damps no more than this", "N s/m", 0, 1000}, p.max_damping_n_s_per_m);
-    visit({"contact_damping_n_s_per_m", "along the normal while in contact", "N s/m", 0, 100}, p.contact_damping_n_s_per_m);
-    visit({"jump_mm", "a pose farther away than this after one tick is a jump: force begins again from nothing", "mm", 0, 1e9}, p.jump_mm);
+    visit({"limit_damping_n_s_per_m", "the passivity controller damps no more than this", "N s/m", 0, 1000},
+          p.max_damping_n_s_per_m);
+    visit({"contact_damping_n_s_per_m", "along the normal while in contact", "N s/m", 0, 100},
+          p.contact_damping_n_s_per_m);
+    visit({"jump_mm", "a pose farther away than this after one tick is a jump: force begins again from nothing", "mm",
+           0, 1e9},
+          p.jump_mm);
     visit({"resume_s", "time over which it comes back", "s", 0, 10}, p.resume_s);
     visit({"stale_ms", "without a report for longer than this the force fades", "ms", 1, 250}, p.stale_ms);
     visit({"fade_ms", "time over which it does", "ms", 1, 250}, p.fade_ms);
   }
 };
 
-/// The stiffness that a sampled wall may have in front of a device: (b + B) / (T / 2 + delay) with half of it in reserve, since that bound
-/// is of stability, not of comfort, and three quarters where positions come in encoder steps, which feed small cycles that only friction
-/// would end (J. Gil et al. 2004, N. Diolaiti et al. 2006; without delay and B the passivity condition of J. Colgate, G. Schenkel 1997),
-/// and no more than the device's own limit.
-[[nodiscard]] double safe_stiffness_n_per_mm(const DeviceTraits& device, double contact_damping_n_s_per_m, double tick_s);
+/// The stiffness that a sampled wall may have in front of a device: (b + B) / (T / 2 + delay) with half of it in
+/// reserve, since that bound is of stability, not of comfort, and three quarters where positions come in encoder steps,
+/// which feed small cycles that only friction would end (J. Gil et al. 2004, N. Diolaiti et al. 2006; without delay and
+/// B the passivity condition of J. Colgate, G. Schenkel 1997), and no more than the device's own limit.
+[[nodiscard]] double safe_stiffness_n_per_mm(const DeviceTraits& device, double contact_damping_n_s_per_m,
+                                             double tick_s);
 
-/// Passivity observer and controller (B. Hannaford, J. Ryu, IEEE T-RA 18(1), 2002) over the elastic part of a force that is held constant
-/// between ticks: the energy given is exactly the sum of F(n-1) . (x(n) - x(n-1)). When more was given than taken, damping takes the rest
-/// out. Quantised positions: what less than an encoder step can feign is let pass. Energy left over is forgotten when contact ends.
+/// Passivity observer and controller (B. Hannaford, J. Ryu, IEEE T-RA 18(1), 2002) over the elastic part of a force
+/// that is held constant between ticks: the energy given is exactly the sum of F(n-1) . (x(n) - x(n-1)). When more was
+/// given than taken, damping takes the rest out. Quantised positions: what less than an encoder step can feign is let
+/// pass. Energy left over is forgotten when contact ends.
 class PassivityControl {
  public:
   /// The damping to add now, N s/m; 0 when nothing is to be done. `x_mm` of this tick, `elastic_n` about to be applied.
@@ -64,8 +70,8 @@ class PassivityControl {
   bool started_ = false;
 };
 
-/// All limits in one place, in this order: fading and resuming, damping and passivity, force cap, rate cap. The last thing between whatever
-/// went wrong before and a hand. No allocation. The same input gives the same bits.
+/// All limits in one place, in this order: fading and resuming, damping and passivity, force cap, rate cap. The last
+/// thing between whatever went wrong before and a hand. No allocation. The same input gives the same bits.
 class Guard {
  public:
   /// A limit that is negative or not a number counts as 0: no force, or none that changes.
@@ -85,8 +91,9 @@ class Guard {
     Vec3 force_n;
     std::uint32_t flags = 0;
   };
-  /// Whatever comes in, the force that goes out is finite and within the limits of force and rate. What is not finite counts as none:
-  /// force, normal; a position, as a jump; an age, as stale; a `dt_s` that is not positive and finite stands for a millisecond.
+  /// Whatever comes in, the force that goes out is finite and within the limits of force and rate. What is not finite
+  /// counts as none: force, normal; a position, as a jump; an age, as stale; a `dt_s` that is not positive and finite
+  /// stands for a millisecond.
   Output limit(const Input& in, double dt_s) noexcept;
   [[nodiscard]] double energy_mj() const { return passivity_.energy_mj(); }
   [[nodiscard]] Vec3 velocity_mm_s() const { return velocity_; }
@@ -101,4 +108,4 @@ class Guard {
   double resume_ = 1;    // 0 right after a jump, 1 when the force is back
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -10,15 +10,18 @@ namespace osteo::inline simulation {
 
 /// Who leads whom, and how. Without a limit, a share of force, and with contact of its own: nobody is led.
 struct HandGuide {
-  std::uint32_t hand = 0;         ///< that is led
-  std::uint32_t leader = 1;       ///< another
-  double stiffness_n_per_mm = 0;  ///< of the spring between them; negative: it pushes away, which amplifies an error. -10 to 10
-  double damping_n_s_per_m = 0;   ///< of their velocities' difference; where it pushes away, of the hand's own velocity. 0 to 100
-  double forward = 0;             ///< share of the leader's force that the hand feels too, less the farther they are apart
-  double most_n = 0;              ///< all that leads it together. 0 to 20
-  double dead_zone_mm = 0;        ///< so far apart they may be
-  bool own_contact = true;        ///< the hand meets bone itself; false: it feels nothing but what leads it
-  double brake_n_s_per_m = 0;     ///< of the hand's own velocity: what bears a spring to a leader that is heard of late. 0 to 100
+  std::uint32_t hand = 0;    ///< that is led
+  std::uint32_t leader = 1;  ///< another
+  double stiffness_n_per_mm =
+      0;  ///< of the spring between them; negative: it pushes away, which amplifies an error. -10 to 10
+  double damping_n_s_per_m =
+      0;               ///< of their velocities' difference; where it pushes away, of the hand's own velocity. 0 to 100
+  double forward = 0;  ///< share of the leader's force that the hand feels too, less the farther they are apart
+  double most_n = 0;   ///< all that leads it together. 0 to 20
+  double dead_zone_mm = 0;  ///< so far apart they may be
+  bool own_contact = true;  ///< the hand meets bone itself; false: it feels nothing but what leads it
+  double brake_n_s_per_m =
+      0;  ///< of the hand's own velocity: what bears a spring to a leader that is heard of late. 0 to 100
 
   [[nodiscard]] bool on() const { return most_n > 0 || forward != 0 || !own_contact; }
   friend bool operator==(const HandGuide&, const HandGuide&) = default;
@@ -28,14 +31,16 @@ struct HandGuide {
 [[nodiscard]] SceneAction action_of(const HandGuide& guide);
 [[nodiscard]] HandGuide guide_of(const SceneAction& action);
 
-/// F = Kp (x_leader - x) + Bp (v_leader - v) + g F_leader. (D. Morris 2006, section 3.4.1 has the first and the last term, the spring with
-/// a sign that repels.) Kp is at most half of what a sampled wall may have before this device, so that a wall and the spring together stay
-/// within what is stable. Velocities by differences, smoothed over kSmoothS. The leader's sample says how much of it there is (LeadBits),
-/// so ramps, fading and a lost link follow from recorded samples. The brake is within the limit too, and so is the leader's force: of that no
-/// more is forwarded than a spring as stiff as the device bears has at kNearMm, and it is gone where hand and leader are kNearMm apart
-/// (beyond the dead zone): a force that does not give way would carry the hand off, since position and force cannot both be given. While the
-/// leader's time stands still, its force fades over kFadeS. Pushing away: at most kAwayN and kAwayStiffness, no more than 5/s of the damping, not within
-/// kAwayClearanceMm of a structure at risk, not above kAwayMmPerS. No allocation. The same input gives the same bits.
+/// F = Kp (x_leader - x) + Bp (v_leader - v) + g F_leader. (D. Morris 2006, section 3.4.1 has the first and the last
+/// term, the spring with a sign that repels.) Kp is at most half of what a sampled wall may have before this device, so
+/// that a wall and the spring together stay within what is stable. Velocities by differences, smoothed over kSmoothS.
+/// The leader's sample says how much of it there is (LeadBits), so ramps, fading and a lost link follow from recorded
+/// samples. The brake is within the limit too, and so is the leader's force: of that no more is forwarded than a spring
+/// as stiff as the device bears has at kNearMm, and it is gone where hand and leader are kNearMm apart (beyond the dead
+/// zone): a force that does not give way would carry the hand off, since position and force cannot both be given. While
+/// the leader's time stands still, its force fades over kFadeS. Pushing away: at most kAwayN and kAwayStiffness, no
+/// more than 5/s of the damping, not within kAwayClearanceMm of a structure at risk, not above kAwayMmPerS. No
+/// allocation. The same input gives the same bits.
 class GuideLaw {
  public:
   static constexpr double kSmoothS = 0.003, kFadeS = 0.05, kNearMm = 0.8;
@@ -45,7 +50,8 @@ class GuideLaw {
     float clearance_mm = 1e9F;  ///< to the nearest structure at risk, in the tick before; far where there is none
   };
   /// `device`: of the hand that is led.
-  void set(const HandGuide& guide, const DeviceTraits& device, double contact_damping_n_s_per_m, double tick_s) noexcept;
+  void set(const HandGuide& guide, const DeviceTraits& device, double contact_damping_n_s_per_m,
+           double tick_s) noexcept;
   [[nodiscard]] const HandGuide& guide() const { return guide_; }
   /// The force on the hand at `at_mm`. A leader that is not a number, or was not heard of for long (age_ms 255): none.
   Vec3 step(Vec3 at_mm, const Hand& hand, const DeviceSample& leader, Vec3 leader_force_n, double dt_s) noexcept;
@@ -55,8 +61,8 @@ class GuideLaw {
  private:
   HandGuide guide_;
   double stiffness_ = 0, borne_ = 0, share_ = 0;  // borne: N/mm, of what leads a hand by this device
-  Vec3 last_apart_, last_at_, rate_, speed_;  // apart: from the hand to its leader
+  Vec3 last_apart_, last_at_, rate_, speed_;      // apart: from the hand to its leader
   bool started_ = false;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -4,7 +4,8 @@
 
 namespace osteo::inline simulation {
 
-/// For a device that moves by itself; what it says goes into the stream as the device's samples, so a replay knows nothing of this.
+/// For a device that moves by itself; what it says goes into the stream as the device's samples, so a replay knows
+/// nothing of this.
 struct HandTuning {
   double scale = 1;                   ///< mm of the tool for a mm of the hand; 0 < scale <= 1
   bool clutch = false;                ///< the hand moves without its tool
@@ -15,4 +16,4 @@ struct HandTuning {
   std::uint32_t clutch_switches = 2;  ///< and which of them are the clutch
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

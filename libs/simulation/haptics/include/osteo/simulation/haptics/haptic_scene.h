@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/simulation/bone/depth_map.h"
 #include "osteo/simulation/bone/plates.h"
-#include "osteo/core/data/rigid_transform.h"
 #include "osteo/simulation/bone/world.h"
 #include "osteo/simulation/haptics/haptic_setup.h"
 #include "osteo/simulation/haptics/held_shaft.h"
@@ -53,7 +53,7 @@ struct HandContact {
 
   std::array<std::shared_ptr<ContactModel>, EnumNames<ContactMethod>::values.size()> models;
   std::array<std::vector<std::size_t>, EnumNames<ContactMethod>::values.size()> tools;  ///< that each model is for
-  ContactModel* in_use = nullptr;                                                       ///< of the instrument in the hand
+  ContactModel* in_use = nullptr;  ///< of the instrument in the hand
   HeldShaft shaft;
 };
 
@@ -85,30 +85,32 @@ struct HapticScene {
 
   /// One more body there.
   void add(std::shared_ptr<TouchedBone> bone, const RigidTransform& world_from_body, const HapticSetup& setup);
-  /// Of a world. Bodies that `before` has already keep what the servo knows of them; new ones know where burrs have been in the old. Depth
-  /// maps that were not there before are made of the bone as it is: nothing may be removed meanwhile (needs_bone_held).
+  /// Of a world. Bodies that `before` has already keep what the servo knows of them; new ones know where burrs have
+  /// been in the old. Depth maps that were not there before are made of the bone as it is: nothing may be removed
+  /// meanwhile (needs_bone_held).
   static HapticScene of(const World& world, const HapticSetup& setup, const HapticScene* before = nullptr);
   /// Whether of() with this setup would measure bone that the servo is drilling in.
   [[nodiscard]] bool needs_bone_held(const HapticSetup& setup) const;
 };
 
-/// The method of contact by instrument, as the setup has it; a saw that nothing is said of goes by its proxy, since a hand would push so
-/// thin a blade through the bone otherwise, and so does what cannot cut: its tip has no business behind bone. `usual`: the method in force,
-/// which settings may change.
+/// The method of contact by instrument, as the setup has it; a saw that nothing is said of goes by its proxy, since a
+/// hand would push so thin a blade through the bone otherwise, and so does what cannot cut: its tip has no business
+/// behind bone. `usual`: the method in force, which settings may change.
 [[nodiscard]] ContactMethod method_of(const HapticSetup& setup, ContactMethod usual, std::size_t tool) noexcept;
 [[nodiscard]] inline ContactMethod method_of(const HapticSetup& setup, std::size_t tool) noexcept {
   return method_of(setup, setup.params.contact.method, tool);
 }
 
-/// Each sample that lies in bone is traced along its normal back out of the bone; the mean of the ways, weighted by area, is the depth and
-/// direction of the push (D. Morris 2006, section 3.2.5, after the ray tracing of section 3.2.3.4). About 30 ns a sample outside bone, 0.2
-/// us inside.
+/// Each sample that lies in bone is traced along its normal back out of the bone; the mean of the ways, weighted by
+/// area, is the depth and direction of the push (D. Morris 2006, section 3.2.5, after the ray tracing of
+/// section 3.2.3.4). About 30 ns a sample outside bone, 0.2 us inside.
 [[nodiscard]] ContactResult plate_contact(const PlateInHand& plate, const RigidTransform& world_from_plate,
-                                          std::span<const HapticScene::Item> items, const ContactParams& params) noexcept;
+                                          std::span<const HapticScene::Item> items,
+                                          const ContactParams& params) noexcept;
 
 /// Where a plate is for a device's position and axis.
 [[nodiscard]] inline RigidTransform plate_pose(Vec3 position_mm, Vec3 axis, const RigidTransform& grip) {
   return RigidTransform{frame_of_axis(axis), position_mm} * grip;
 }
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -25,11 +25,14 @@ struct EffectParams {
 
   static void describe(EffectParams& p, auto& visit) {
     visit({"shaft", "the shaft collides too"}, p.shaft);
-    visit({"fail_safe", "deep in bone, where the burr has no direction of its own, push along a distance map"}, p.fail_safe);
-    visit({"drag", "pull of the teeth along the surface, for each newton pressed, at the equator (a guess)", "", 0, 2}, p.drag);
+    visit({"fail_safe", "deep in bone, where the burr has no direction of its own, push along a distance map"},
+          p.fail_safe);
+    visit({"drag", "pull of the teeth along the surface, for each newton pressed, at the equator (a guess)", "", 0, 2},
+          p.drag);
     visit({"left_handed", "the burr turns the other way"}, p.left_handed);
     visit({"speed_rpm", "of the burr with the pedal down; removal is in proportion", "rpm", 0, 200000}, p.speed_rpm);
-    visit({"spin_up_s", "time constant with which the burr's speed follows the pedal upwards (a guess)", "s", 0, 10}, p.spin_up_s);
+    visit({"spin_up_s", "time constant with which the burr's speed follows the pedal upwards (a guess)", "s", 0, 10},
+          p.spin_up_s);
     visit({"spin_down_s", "and downwards (a guess)", "s", 0, 10}, p.spin_down_s);
     visit({"vibration", "the running drill shakes the hand"}, p.vibration);
   }
@@ -52,27 +55,35 @@ struct HapticsParams {
 /// Everything that decides what a rehearsal feels like; a session's header holds it. An empty part costs nothing.
 struct HapticSetup {
   HapticsParams params;
-  DeviceTraits device;                        ///< of hand 0
-  std::vector<DeviceTraits> more_devices;     ///< of hands 1, 2, ...: as many as there are hands besides, at most kMostHands - 1
-  std::map<int, ContactMethod> tool_methods;  ///< index in instrument_library() -> another method than params.contact.method for that tool
-  std::optional<bool> hardness;  ///< removal goes by the HU of the case; empty: where it keeps them, which anatomy_of() settles
-  std::string hardness_json;     ///< the law, as parse_hardness reads it; empty: the built-in one
-  std::string structures;        ///< hash of the structures at risk that are watched; empty: none
-  std::vector<Vec3> curve;       ///< points of a virtual fixture for hand 0, in mm; fewer than 2: none
+  DeviceTraits device;  ///< of hand 0
+  std::vector<DeviceTraits>
+      more_devices;  ///< of hands 1, 2, ...: as many as there are hands besides, at most kMostHands - 1
+  std::map<int, ContactMethod>
+      tool_methods;  ///< index in instrument_library() -> another method than params.contact.method for that tool
+  std::optional<bool>
+      hardness;  ///< removal goes by the HU of the case; empty: where it keeps them, which anatomy_of() settles
+  std::string hardness_json;  ///< the law, as parse_hardness reads it; empty: the built-in one
+  std::string structures;     ///< hash of the structures at risk that are watched; empty: none
+  std::vector<Vec3> curve;    ///< points of a virtual fixture for hand 0, in mm; fewer than 2: none
   CurveConstraintParams curve_params;
-  std::string texture_json;    ///< of what tools slide over, as parse_texture reads it; empty: none, and nothing is spent on it
+  std::string
+      texture_json;  ///< of what tools slide over, as parse_texture reads it; empty: none, and nothing is spent on it
   std::string vibration_json;  ///< a spectrum as parse_vibration reads it; empty: the built-in model
 
   [[nodiscard]] std::size_t hands() const { return 1 + more_devices.size(); }
-  [[nodiscard]] const DeviceTraits& device_of(std::size_t hand) const { return hand == 0 ? device : more_devices[hand - 1]; }
+  [[nodiscard]] const DeviceTraits& device_of(std::size_t hand) const {
+    return hand == 0 ? device : more_devices[hand - 1];
+  }
 };
 
-/// Settings by name: the fields of HapticsParams, in the order of their declaration. Their numbers (SceneAction::item of a `setting`) are
-/// those of this build; a session's header lists names in order, so that a reader of another build finds its own.
+/// Settings by name: the fields of HapticsParams, in the order of their declaration. Their numbers (SceneAction::item
+/// of a `setting`) are those of this build; a session's header lists names in order, so that a reader of another build
+/// finds its own.
 [[nodiscard]] const std::vector<std::string>& setting_names();
 /// -1: there is none of that name.
 [[nodiscard]] int setting_number(std::string_view name);
-/// The value that an action carries: of a flag 0 or 1, of a choice its index. Error(usage), as FieldRef::from_text, for text that is none.
+/// The value that an action carries: of a flag 0 or 1, of a choice its index. Error(usage), as FieldRef::from_text, for
+/// text that is none.
 [[nodiscard]] double setting_value(int number, std::string_view text);
 /// Now. `number` is one of setting_names().
 [[nodiscard]] double setting_value(int number, const HapticsParams& params);
@@ -86,4 +97,4 @@ struct Anatomy {
   std::shared_ptr<const StructureMap> structures;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -18,8 +18,8 @@ struct SimulatedDeviceParams {
   std::uint64_t seed = 1;  ///< of which ticks are late
 };
 
-/// A body in three dimensions, driven by the force of the servo and that of a hand, integrated in steps of 20 us (semi-implicit Euler,
-/// friction that can stop but not reverse). The same seed and ticks give the same bits.
+/// A body in three dimensions, driven by the force of the servo and that of a hand, integrated in steps of 20 us
+/// (semi-implicit Euler, friction that can stop but not reverse). The same seed and ticks give the same bits.
 class SimulatedDevice final : public Device {
  public:
   explicit SimulatedDevice(const SimulatedDeviceParams& params, Vec3 start_mm) : params_(params), x_mm_(start_mm) {}
@@ -37,7 +37,9 @@ class SimulatedDevice final : public Device {
   }
 
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
-  [[nodiscard]] DeviceTraits traits() const override { return {params_.damping_n_s_per_m, params_.delay_s, params_.encoder_mm, 100, 1e9}; }
+  [[nodiscard]] DeviceTraits traits() const override {
+    return {params_.damping_n_s_per_m, params_.delay_s, params_.encoder_mm, 100, 1e9};
+  }
 
   [[nodiscard]] Vec3 position_mm() const { return x_mm_; }
   [[nodiscard]] Vec3 velocity_mm_s() const { return v_mm_s_; }
@@ -59,4 +61,4 @@ class SimulatedDevice final : public Device {
   std::uint64_t random_ = 0;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

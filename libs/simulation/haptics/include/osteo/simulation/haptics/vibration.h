@@ -10,7 +10,8 @@
 
 namespace osteo::inline simulation {
 
-/// Peaks of a spectrum: amplitude = idle + per newton pressed on bone. Frequencies outside the haptic band are left out.
+/// Peaks of a spectrum: amplitude = idle + per newton pressed on bone. Frequencies outside the haptic band are left
+/// out.
 struct VibrationSpectrum {
   struct Peak {
     double frequency_hz = 0, idle_n = 0, per_n = 0;
@@ -32,8 +33,8 @@ struct VibrationSpectrum {
 class Vibration {
  public:
   explicit Vibration(VibrationSpectrum spectrum) : spectrum_(std::move(spectrum)) {}
-  /// Components along two directions at right angles to the axis, N. `speed`: of the burr, as a share of the one that the spectrum was
-  /// taken at: frequencies and amplitudes go with it (the amplitudes: a guess).
+  /// Components along two directions at right angles to the axis, N. `speed`: of the burr, as a share of the one that
+  /// the spectrum was taken at: frequencies and amplitudes go with it (the amplitudes: a guess).
   std::array<double, 2> step(BurrKind kind, double pressed_n, double dt_s, double speed = 1) noexcept;
 
  private:
@@ -41,4 +42,4 @@ class Vibration {
   std::array<std::array<double, VibrationSpectrum::kMostPeaks>, kBurrKinds.size()> phase_{};
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

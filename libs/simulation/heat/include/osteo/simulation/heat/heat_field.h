@@ -13,8 +13,8 @@
 
 namespace osteo::inline simulation {
 
-/// What conducts. Cortical bone as measured by several (0.3 to 0.8 W/(m K); the default is bovine, 0.55); wet soft tissue from tables.
-/// Blood carries nothing off: its time constant in bone is above half an hour.
+/// What conducts. Cortical bone as measured by several (0.3 to 0.8 W/(m K); the default is bovine, 0.55); wet soft
+/// tissue from tables. Blood carries nothing off: its time constant in bone is above half an hour.
 struct HeatMaterials {
   double bone_w_per_m_k = 0.55, bone_kg_per_m3 = 1900, bone_j_per_kg_k = 1300;
   double tissue_w_per_m_k = 0.5, tissue_kg_per_m3 = 1050, tissue_j_per_kg_k = 3600;
@@ -33,16 +33,19 @@ struct HeatLedger {
   double forgotten_j = 0;  ///< of bricks that had become as cool as the rest
 };
 
-/// Finite volumes in cubes of `cell_mm`, explicit in time. Each cell exchanges heat with its 6 neighbours at faces and 12 at edges, 2 to 1
-/// (the 19-point Laplacian, whose error has no direction); at a sixth of h2 / alpha a step's own error takes that one away, so that inside
-/// one material the method is of fourth order in space. Where one of the four cells about an edge is emptier, that much goes through faces
-/// only: a wall inside the lattice is exact for heat along it. Between two cells heat goes through as much matter as the emptier one has,
-/// so a boundary inside cells needs no smaller step, and what one loses the other gains to the last bit. Bricks of 8^3 cells are made where
-/// heat comes and forgotten where nothing is warmer or cooler than kLeastK, so the cost follows what is warm. Deterministic: the same calls
-/// give the same bits. Temperatures are differences to the body's, K. Error against analytic solutions and cost, at 0.25 mm: docs/heat.md.
+/// Finite volumes in cubes of `cell_mm`, explicit in time. Each cell exchanges heat with its 6 neighbours at faces and
+/// 12 at edges, 2 to 1 (the 19-point Laplacian, whose error has no direction); at a sixth of h2 / alpha a step's own
+/// error takes that one away, so that inside one material the method is of fourth order in space. Where one of the four
+/// cells about an edge is emptier, that much goes through faces only: a wall inside the lattice is exact for heat along
+/// it. Between two cells heat goes through as much matter as the emptier one has, so a boundary inside cells needs no
+/// smaller step, and what one loses the other gains to the last bit. Bricks of 8^3 cells are made where heat comes and
+/// forgotten where nothing is warmer or cooler than kLeastK, so the cost follows what is warm. Deterministic: the same
+/// calls give the same bits. Temperatures are differences to the body's, K. Error against analytic solutions and cost,
+/// at 0.25 mm: docs/heat.md.
 class HeatField {
  public:
-  /// `matter` is asked once for each cell of a brick that is made; it must answer for any cell and see what set_matter() told.
+  /// `matter` is asked once for each cell of a brick that is made; it must answer for any cell and see what
+  /// set_matter() told.
   using MatterAt = std::function<HeatMatter(Ijk cell)>;
   HeatField(double cell_mm, const HeatMaterials& materials, MatterAt matter);
 
@@ -51,18 +54,19 @@ class HeatField {
     Vec3 centre;
     double radius = 0;
   };
-  /// Heat that comes evenly during the next step(), into the cells of a ball, to each by what it holds. Returns what found matter: nothing
-  /// where there is none.
+  /// Heat that comes evenly during the next step(), into the cells of a ball, to each by what it holds. Returns what
+  /// found matter: nothing where there is none.
   double add(const Ball& where, double joules);
   /// What the cells of a ball hold, J/K.
   [[nodiscard]] double holds(const Ball& where);
   [[nodiscard]] double full_cell_j_per_k() const { return bone_j_per_k_; }
-  /// Water on the open faces within a ball, for the next step() only; between a cell's centre and its face lies bone. Colder or warmer than
-  /// the body it makes bricks there.
+  /// Water on the open faces within a ball, for the next step() only; between a cell's centre and its face lies bone.
+  /// Colder or warmer than the body it makes bricks there.
   void cool(const Ball& where, double film_w_per_m2_k, double water_k);
   /// Bone went (or came, by undo, cool): it takes its heat along.
   void set_matter(Ijk cell, HeatMatter now);
-  /// On by seconds, in as many equal steps as stability asks for. Most exact when that is a whole number of longest_step_s().
+  /// On by seconds, in as many equal steps as stability asks for. Most exact when that is a whole number of
+  /// longest_step_s().
   void step(double seconds);
 
   /// Over the body's temperature; 0 where nothing is warm.
@@ -119,4 +123,4 @@ class HeatField {
   HeatLedger ledger_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -3,8 +3,9 @@
 
 namespace osteo::inline simulation {
 
-/// Cumulative equivalent minutes at 43 C (Sapareto and Dewey 1984): minutes of dose a second at a temperature. R = 0.5 from 43 C on, 0.25
-/// below, nothing below 39 C. Trusted to about 52 C only: above kCoagulatedC tissue is coagulated, whatever the minutes.
+/// Cumulative equivalent minutes at 43 C (Sapareto and Dewey 1984): minutes of dose a second at a temperature. R = 0.5
+/// from 43 C on, 0.25 below, nothing below 39 C. Trusted to about 52 C only: above kCoagulatedC tissue is coagulated,
+/// whatever the minutes.
 [[nodiscard]] double cem43_per_s(double celsius) noexcept;
 inline constexpr double kCoagulatedC = 57;
 /// 47 C for a minute, the classic limit of bone (Eriksson and Albrektsson 1983), as such minutes.
@@ -18,4 +19,4 @@ struct ThermalDose {
   void stay(double celsius, double seconds) noexcept;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -17,17 +17,19 @@ struct CameraModel {
   int width = 0, height = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;
   std::array<double, 5> distortion{};
-  bool mirrored = false;   ///< the camera delivers mirrored pictures: they are turned before anything else
-  double fps = 30;         ///< asked of the camera
-  double latency_ms = -1;  ///< from the middle of an exposure until the picture is here; below 0: not known, one period is taken
-  double rms_px = 0;       ///< of its calibration
+  bool mirrored = false;  ///< the camera delivers mirrored pictures: they are turned before anything else
+  double fps = 30;        ///< asked of the camera
+  double latency_ms =
+      -1;  ///< from the middle of an exposure until the picture is here; below 0: not known, one period is taken
+  double rms_px = 0;  ///< of its calibration
   int views = 0;
 
   [[nodiscard]] double period_ms() const { return 1000 / fps; }
   [[nodiscard]] double delay_ms() const { return latency_ms < 0 ? period_ms() : latency_ms; }
 };
 
-/// Error(no_input), Error(usage) with the line for a key that is not known, a value out of range, or a lens that cannot be.
+/// Error(no_input), Error(usage) with the line for a key that is not known, a value out of range, or a lens that cannot
+/// be.
 [[nodiscard]] CameraModel load_camera(const std::filesystem::path& path);
 [[nodiscard]] std::string camera_json(const CameraModel& camera);
 
@@ -50,8 +52,8 @@ class CameraCalibration {
     double seen_width = 0, seen_height = 0;  ///< share of the picture over which corners were seen
     std::vector<std::string> doubts;
   };
-  /// Error(failed), saying what to do, with fewer than kLeastViews views, an RMS above kMostRmsPx, or views so alike that the focal length
-  /// stays open: a plate that is hardly ever tilted, or kMostFocalSpread.
+  /// Error(failed), saying what to do, with fewer than kLeastViews views, an RMS above kMostRmsPx, or views so alike
+  /// that the focal length stays open: a plate that is hardly ever tilted, or kMostFocalSpread.
   [[nodiscard]] Result solve() const;
 
  private:
@@ -64,4 +66,4 @@ class CameraCalibration {
   int width_ = 0, height_ = 0, pictures_ = 0, with_plate_ = 0, mirrored_ = 0;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -8,11 +8,11 @@
 #include <string>
 #include <thread>
 
+#include "osteo/core/rt/seqlock.h"
 #include "osteo/simulation/devices/devices.h"
 #include "osteo/simulation/marker/filter.h"
 #include "osteo/simulation/marker/pen.h"
 #include "osteo/simulation/marker/picture.h"
-#include "osteo/core/rt/seqlock.h"
 
 namespace osteo::inline simulation {
 
@@ -21,12 +21,12 @@ enum class CameraPlace : int { facing, above, behind };
 [[nodiscard]] constexpr std::array<std::string_view, 3> enum_names(CameraPlace) {
   return {"facing", "above", "behind"};
 }
-/// Columns are the camera's axes (x right, y down, z ahead) on the desk: right, away, up. Facing: on the screen, looking at the user;
-/// above: looking down, its picture's top away from the user; behind: over the user's shoulder.
+/// Columns are the camera's axes (x right, y down, z ahead) on the desk: right, away, up. Facing: on the screen,
+/// looking at the user; above: looking down, its picture's top away from the user; behind: over the user's shoulder.
 [[nodiscard]] Mat3 desk_from_camera(CameraPlace place);
 
-/// Reads a camera in a thread of its own and follows one pen: sees it, smooths, hands the motion on. A camera that is not there, or goes,
-/// is looked for again twice a second; a video ends.
+/// Reads a camera in a thread of its own and follows one pen: sees it, smooths, hands the motion on. A camera that is
+/// not there, or goes, is looked for again twice a second; a video ends.
 class PenLink {
  public:
   using Open = std::function<std::unique_ptr<PictureSource>()>;
@@ -66,16 +66,17 @@ class PenLink {
   std::thread thread_;        // last: it uses all the others
 };
 
-/// The pen's tip is the goal of a spring hand, so that the drill rests on bone although nothing holds the pen back: a device of pose only.
-/// While the pen is out of sight for longer than two and a half pictures (and the camera's delay) the drill stops, force fades, nothing
-/// pulls; seen again, it takes hold where the tool is, and the handle turns to the pen's at no more than 2 rad/s. Bit 1 of a pedal (the
-/// middle one) is the clutch: the pen moves alone. pedal_bit() of a pedal is the drill; keys of the window, and other switches, as tuned.
+/// The pen's tip is the goal of a spring hand, so that the drill rests on bone although nothing holds the pen back: a
+/// device of pose only. While the pen is out of sight for longer than two and a half pictures (and the camera's delay)
+/// the drill stops, force fades, nothing pulls; seen again, it takes hold where the tool is, and the handle turns to
+/// the pen's at no more than 2 rad/s. Bit 1 of a pedal (the middle one) is the clutch: the pen moves alone. pedal_bit()
+/// of a pedal is the drill; keys of the window, and other switches, as tuned.
 class MarkerDevice final : public Device, public TunedHand {
  public:
-  /// `scene_from_camera`: columns are the camera's axes in the scene. `scale`: scene mm for a mm of the hand. `start`: where the drill
-  /// waits until the pen is seen. `pedal` may be null.
-  MarkerDevice(std::shared_ptr<PenLink> link, const CameraModel& camera, const HandGoal& start, const Mat3& scene_from_camera, double scale,
-               const FootPedal* pedal, std::size_t hand = 0);
+  /// `scene_from_camera`: columns are the camera's axes in the scene. `scale`: scene mm for a mm of the hand. `start`:
+  /// where the drill waits until the pen is seen. `pedal` may be null.
+  MarkerDevice(std::shared_ptr<PenLink> link, const CameraModel& camera, const HandGoal& start,
+               const Mat3& scene_from_camera, double scale, const FootPedal* pedal, std::size_t hand = 0);
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
   void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
   [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
@@ -99,4 +100,4 @@ class MarkerDevice final : public Device, public TunedHand {
   bool out_of_sight_ = true, turning_ = true;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -20,8 +20,8 @@ struct PenMotion {
   [[nodiscard]] Mat3 rotation_at(double time_s) const;
 };
 
-/// How lively a hand is taken to be: the spectral density of its acceleration, less while it rests. More follows quicker and lets more
-/// noise through; chosen by measured error while moving and jitter at rest (docs/marker.md).
+/// How lively a hand is taken to be: the spectral density of its acceleration, less while it rests. More follows
+/// quicker and lets more noise through; chosen by measured error while moving and jitter at rest (docs/marker.md).
 struct PenFilterParams {
   double acceleration_mm2_s3 = 2e5;
   double turning_rad2_s3 = 60;
@@ -30,8 +30,8 @@ struct PenFilterParams {
   double corner_px = 0.1;  ///< corners are never taken to be known better
 };
 
-/// Kalman filters of constant velocity, of tip and rotation, each measured with the covariance that the picture gives: across the view
-/// a pen is known well, along it ten times worse. Starts anew after a gap of 0.3 s.
+/// Kalman filters of constant velocity, of tip and rotation, each measured with the covariance that the picture gives:
+/// across the view a pen is known well, along it ten times worse. Starts anew after a gap of 0.3 s.
 class PenFilter {
  public:
   explicit PenFilter(Vec3 tip_mm, const PenFilterParams& params = {});
@@ -51,4 +51,4 @@ class PenFilter {
   bool started_ = false;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -28,8 +28,9 @@ class PictureSource {
   [[nodiscard]] virtual bool live() const { return false; }
 };
 
-/// "/dev/video0" or "0": a camera, asked for `width` x `height` at `fps` where they are not 0. A folder: its pictures by name. Else a
-/// video. Error(no_input) where there is nothing, cannot_read, corrupt where it holds no picture.
-[[nodiscard]] std::unique_ptr<PictureSource> open_pictures(const std::string& from, int width = 0, int height = 0, double fps = 0);
+/// "/dev/video0" or "0": a camera, asked for `width` x `height` at `fps` where they are not 0. A folder: its pictures
+/// by name. Else a video. Error(no_input) where there is nothing, cannot_read, corrupt where it holds no picture.
+[[nodiscard]] std::unique_ptr<PictureSource> open_pictures(const std::string& from, int width = 0, int height = 0,
+                                                           double fps = 0);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -14,8 +14,8 @@ enum class Paper : int { a4, letter };
 
 /// Pages: first the pen's net, then the plate. Both have a line of 100 mm to hold a ruler to.
 inline constexpr int kMarkerPages = 2;
-/// Of the right size when it is printed at 100 %. Error(failed) where the machine has no font, or where the page, drawn and looked at
-/// as a camera would, does not show each marker once, at its place, to a tenth of a millimetre.
+/// Of the right size when it is printed at 100 %. Error(failed) where the machine has no font, or where the page, drawn
+/// and looked at as a camera would, does not show each marker once, at its place, to a tenth of a millimetre.
 [[nodiscard]] std::string marker_pages_pdf(Paper paper, int pen);
 /// One page, from 0, as a picture.
 [[nodiscard]] GrayPicture marker_page(Paper paper, int pen, int page, double dots_per_inch = 300);
@@ -27,4 +27,4 @@ struct PageCheck {
 };
 [[nodiscard]] PageCheck check_page(Paper paper, int pen, int page);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

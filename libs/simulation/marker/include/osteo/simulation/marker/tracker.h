@@ -14,7 +14,8 @@ struct PenSight {
   enum class State {
     seen,
     nothing,    ///< no marker of this pen
-    ambiguous,  ///< one marker, or one flat side from afar: more than one pose explains it, and nothing before says which
+    ambiguous,  ///< one marker, or one flat side from afar: more than one pose explains it, and nothing before says
+                ///< which
     doubled,    ///< a marker twice, and nothing before says whose: two pens with the same print
     unlike,     ///< markers, but no pose of this body explains them: another print, or another camera
   };
@@ -27,13 +28,14 @@ struct PenSight {
   bool other_pen = false;           ///< markers of another pen are in the picture
   bool dark = false;                ///< too dark to see markers in
   bool mirrored = false;            ///< the picture came mirrored, and was turned
-  /// Of a turn by a small vector (about the camera's axes, around the body's origin, rad) and a shift (mm), for corners known to one pixel
-  /// in each direction; row by row.
+  /// Of a turn by a small vector (about the camera's axes, around the body's origin, rad) and a shift (mm), for corners
+  /// known to one pixel in each direction; row by row.
   std::array<double, 36> covariance_a_px2{};
 };
 
-/// Finds markers (OpenCV's ArUco), their corners by straight lines through the edges' gradients, and the pose that explains all corners.
-/// Where the pen was seen just before, only there. About 2 ms a picture then, 15 without (1280 x 720). Used by one thread.
+/// Finds markers (OpenCV's ArUco), their corners by straight lines through the edges' gradients, and the pose that
+/// explains all corners. Where the pen was seen just before, only there. About 2 ms a picture then, 15 without (1280 x
+/// 720). Used by one thread.
 class PenTracker {
  public:
   /// `scale`: printed mm for a drawn one.
@@ -51,14 +53,15 @@ class PenTracker {
   std::unique_ptr<Inside> inside_;
 };
 
-/// The pose by corners alone: `pixels` four of each patch, in order. Exact corners give the pose to rounding. Without a guess all poses
-/// that a flat marker may have are tried. State seen, ambiguous, unlike.
+/// The pose by corners alone: `pixels` four of each patch, in order. Exact corners give the pose to rounding. Without a
+/// guess all poses that a flat marker may have are tried. State seen, ambiguous, unlike.
 struct MarkerCorners {
   MarkerPatch patch;
   std::array<std::array<double, 2>, 4> pixel;
 };
-[[nodiscard]] PenSight pose_of(const CameraModel& camera, const std::vector<MarkerCorners>& seen, const RigidTransform* guess = nullptr);
+[[nodiscard]] PenSight pose_of(const CameraModel& camera, const std::vector<MarkerCorners>& seen,
+                               const RigidTransform* guess = nullptr);
 /// Where a point of the camera's frame is seen.
 [[nodiscard]] std::array<double, 2> project(const CameraModel& camera, Vec3 point_mm);
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

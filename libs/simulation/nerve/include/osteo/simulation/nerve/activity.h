@@ -59,7 +59,8 @@ class ActivityDetector {
 
   /// Before the block that holds it; rising.
   void stimulus(std::uint64_t sample, double current_ma);
-  /// The next samples, channel after channel; `first` is where they lie. What was found is in events() and spikes() until the next call.
+  /// The next samples, channel after channel; `first` is where they lie. What was found is in events() and spikes()
+  /// until the next call.
   void take(std::uint64_t first, std::span<const std::int16_t> block);
   /// Nothing more comes: events that go on are closed.
   void end();
@@ -117,4 +118,4 @@ class MonitorSink {
   virtual void spike(const MonitorSpike& spike) { static_cast<void>(spike); }
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

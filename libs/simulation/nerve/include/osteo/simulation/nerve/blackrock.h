@@ -1,4 +1,5 @@
-// The monitor's signal and events in the files of Blackrock's recorders: .ns5 (30 kHz, specification 2.3) and .nev (2.3).
+// The monitor's signal and events in the files of Blackrock's recorders: .ns5 (30 kHz, specification 2.3) and .nev
+// (2.3).
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -10,9 +11,9 @@
 
 namespace osteo::inline simulation {
 
-/// Writes NAME.ns5 and NAME.nev while the monitor runs. Electrodes are numbered from 1; spikes have 48 samples, the crossing at the 11th;
-/// a stimulus is a digital event whose value is its current in uA, a response one with the highest bit set. Dates in headers are
-/// 2000-01-01: sessions have none. Memory does not grow.
+/// Writes NAME.ns5 and NAME.nev while the monitor runs. Electrodes are numbered from 1; spikes have 48 samples, the
+/// crossing at the 11th; a stimulus is a digital event whose value is its current in uA, a response one with the
+/// highest bit set. Dates in headers are 2000-01-01: sessions have none. Memory does not grow.
 class BlackrockFiles final : public MonitorSink {
  public:
   /// `labels` of the channels, cut off at 15 bytes. Error(cannot_write).
@@ -33,4 +34,4 @@ class BlackrockFiles final : public MonitorSink {
   std::unique_ptr<Files> files_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -15,9 +15,10 @@ struct DrillNoise {
   double press_n = 0;      ///< on bone
 };
 
-/// Makes samples at MonitorSetup::kRateHz, 0.25 uV a bit, of at most a block at a time. Impulses of a burst are triphasic waves that arrive
-/// by conduction and latency; trains are sines that begin at once; an answer to a stimulus is a longer wave behind the artefact. The same
-/// calls give the same bits on any machine. About 0.7 % of a core for 16 channels (docs/monitor.md).
+/// Makes samples at MonitorSetup::kRateHz, 0.25 uV a bit, of at most a block at a time. Impulses of a burst are
+/// triphasic waves that arrive by conduction and latency; trains are sines that begin at once; an answer to a stimulus
+/// is a longer wave behind the artefact. The same calls give the same bits on any machine. About 0.7 % of a core for 16
+/// channels (docs/monitor.md).
 class Electromyogram {
  public:
   struct Channel {
@@ -33,7 +34,8 @@ class Electromyogram {
   void stimulate(std::size_t at, double current_ma);
   void answer(std::size_t at, const NerveModel& model, std::size_t nerve, std::size_t point, double share);
 
-  /// The next block: `out` holds channel after channel of each sample. Size: samples (at most kMostSamples) times channels.
+  /// The next block: `out` holds channel after channel of each sample. Size: samples (at most kMostSamples) times
+  /// channels.
   void render(const NerveModel& model, const DrillNoise& drill, std::span<std::int16_t> out);
 
   [[nodiscard]] const std::vector<Channel>& channels() const { return channels_; }
@@ -60,4 +62,4 @@ class Electromyogram {
   std::vector<float> block_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -9,21 +9,22 @@
 
 namespace osteo::inline simulation {
 
-/// All illustrative; meaning, unit and source of each stand in monitor.json and docs/monitor.md. None has a default here.
+/// All illustrative; meaning, unit and source of each stand in monitor.json and docs/monitor.md. None has a default
+/// here.
 struct MonitorConstants {
   using Params = MonitorConstants;
   // A stimulus and its response.
-  double bare_ma = 0, soft_ma = 0, soft_ma_per_mm2 = 0, contact_mm = 0, bone_ma_per_mm2 = 0, chronaxie_ms = 0, recruit_ma = 0,
-         trial_spread = 0, conduction_m_per_s = 0, evoked_ms = 0;
+  double bare_ma = 0, soft_ma = 0, soft_ma_per_mm2 = 0, contact_mm = 0, bone_ma_per_mm2 = 0, chronaxie_ms = 0,
+         recruit_ma = 0, trial_spread = 0, conduction_m_per_s = 0, evoked_ms = 0;
   // What a nerve does by itself.
-  double burst_cover_mm = 0, bursts_per_s = 0, burst_least_s = 0, burst_most_s = 0, burst_least_hz = 0, burst_most_hz = 0,
-         burst_least_uv = 0, burst_most_uv = 0;
-  double sheath_mm = 0, sheath_n_per_mm = 0, train_n = 0, train_c = 0, trains_per_s = 0, train_least_s = 0, train_most_s = 0,
-         train_least_hz = 0, train_most_hz = 0, train_least_uv = 0, train_most_uv = 0;
+  double burst_cover_mm = 0, bursts_per_s = 0, burst_least_s = 0, burst_most_s = 0, burst_least_hz = 0,
+         burst_most_hz = 0, burst_least_uv = 0, burst_most_uv = 0;
+  double sheath_mm = 0, sheath_n_per_mm = 0, train_n = 0, train_c = 0, trains_per_s = 0, train_least_s = 0,
+         train_most_s = 0, train_least_hz = 0, train_most_hz = 0, train_least_uv = 0, train_most_uv = 0;
   double injury_s = 0, dose_from_min = 0, dose_to_min = 0;
   // What else is in the signal.
-  double noise_uv = 0, noise_hz = 0, mains_hz = 0, mains_uv = 0, drill_uv = 0, drill_uv_per_n = 0, drill_most_uv = 0, artefact_uv = 0,
-         artefact_ms = 0;
+  double noise_uv = 0, noise_hz = 0, mains_hz = 0, mains_uv = 0, drill_uv = 0, drill_uv_per_n = 0, drill_most_uv = 0,
+         artefact_uv = 0, artefact_ms = 0;
   // What counts as an event.
   double event_uv = 0, event_gap_ms = 0, train_from_s = 0, response_uv = 0, response_from_ms = 0, response_to_ms = 0;
   static void describe(Params& p, auto& visit) {
@@ -103,10 +104,10 @@ struct MonitorSetup {
   std::uint64_t seed = 1;
 };
 
-/// Strict: every constant once, each as { "value", "unit", "source" } with the unit that it has here; a source for each nerve. `name` as
-/// errors call the file. Error(usage), with the line.
+/// Strict: every constant once, each as { "value", "unit", "source" } with the unit that it has here; a source for each
+/// nerve. `name` as errors call the file. Error(usage), with the line.
 [[nodiscard]] MonitorSetup parse_monitor(std::string_view json, const std::string& name);
 /// libs/simulation/nerve/monitor.json.
 [[nodiscard]] std::string_view default_monitor_json();
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

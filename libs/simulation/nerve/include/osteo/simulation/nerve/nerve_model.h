@@ -49,11 +49,14 @@ struct NerveStress {
   bool cuts = false;        ///< it turns: what it reaches of the nerve is gone
 };
 
-/// Current that reaches half of nothing: below it nothing answers. mA; through so much soft tissue and bone, by a pulse so long.
-/// I(d) = [soft + soft_per_mm2 d2 - (soft - bare) exp(-d / contact)] + bone_per_mm2 b2, times (1 + c / w) / (1 + c / 0.1 ms).
-[[nodiscard]] double stimulus_threshold_ma(const MonitorConstants& constants, double soft_mm, double bone_mm, double width_ms) noexcept;
+/// Current that reaches half of nothing: below it nothing answers. mA; through so much soft tissue and bone, by a pulse
+/// so long. I(d) = [soft + soft_per_mm2 d2 - (soft - bare) exp(-d / contact)] + bone_per_mm2 b2, times (1 + c / w) / (1
+/// + c / 0.1 ms).
+[[nodiscard]] double stimulus_threshold_ma(const MonitorConstants& constants, double soft_mm, double bone_mm,
+                                           double width_ms) noexcept;
 
-/// The state of all nerves of a case, in steps. The same stresses and temperatures in the same order give the same, on any machine.
+/// The state of all nerves of a case, in steps. The same stresses and temperatures in the same order give the same, on
+/// any machine.
 class NerveModel {
  public:
   /// `setup` with the nerves of `courses`, one for each, in order.
@@ -75,8 +78,8 @@ class NerveModel {
     double integrity = 1;  ///< of the nerve there
   };
 
-  /// One step of dt_s. `warm`: for each nerve, temperatures in C and doses (CEM43, minutes; infinite where coagulated) of its points; empty
-  /// where nothing is warm.
+  /// One step of dt_s. `warm`: for each nerve, temperatures in C and doses (CEM43, minutes; infinite where coagulated)
+  /// of its points; empty where nothing is warm.
   struct Warmth {
     std::vector<double> celsius, cem43_min;
   };
@@ -109,4 +112,4 @@ class NerveModel {
   std::uint64_t next_id_ = 1;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -5,7 +5,8 @@
 
 namespace osteo::inline simulation {
 
-/// As the technician has set it. The tip of a hand's tool is its electrode, whatever that tool is: a probe, or an insulated burr.
+/// As the technician has set it. The tip of a hand's tool is its electrode, whatever that tool is: a probe, or an
+/// insulated burr.
 struct StimulatorSetting {
   std::uint32_t hand = 0;
   double current_ma = 0;    ///< 0: off; at most kMostMa
@@ -18,8 +19,8 @@ struct StimulatorSetting {
 /// Each number as the nearest it may be.
 [[nodiscard]] StimulatorSetting within_range(StimulatorSetting setting);
 
-/// Twice the current until most of kTrials pulses answer, half of it until they do not, then the middle (geometric) of what is between
-/// until the two are within a tenth.
+/// Twice the current until most of kTrials pulses answer, half of it until they do not, then the middle (geometric) of
+/// what is between until the two are within a tenth.
 class ThresholdSearch {
  public:
   static constexpr int kTrials = 3;
@@ -59,4 +60,4 @@ class Stimulator {
   std::uint64_t next_ = 0;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

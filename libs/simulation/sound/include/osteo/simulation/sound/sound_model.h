@@ -8,7 +8,8 @@ namespace osteo::inline simulation {
 
 enum class SoundKind : std::uint8_t { silent, burr, sucker, irrigator };
 
-/// What one instrument does, as far as it is heard. Numbers outside their ranges are taken as the nearest inside; what is not finite as 0.
+/// What one instrument does, as far as it is heard. Numbers outside their ranges are taken as the nearest inside; what
+/// is not finite as 0.
 struct SoundVoice {
   SoundKind kind = SoundKind::silent;
   double speed_rpm = 0;     ///< burr: 0 to 200,000
@@ -38,29 +39,31 @@ struct SoundState {
   friend bool operator==(const SoundState&, const SoundState&) = default;
 };
 
-/// The model's constants. Levels are dB at the surgeon's ear; where publications measure in the patient's ear or at the bone, only their
-/// differences are taken. `designed`: chosen for the ear, no measurement was found.
+/// The model's constants. Levels are dB at the surgeon's ear; where publications measure in the patient's ear or at the
+/// bone, only their differences are taken. `designed`: chosen for the ear, no measurement was found.
 struct SoundModel {
-  /// A root mean square of 1 in samples. What comes out of a loudspeaker depends on it and on the volume: see SafeLevel.
+  /// A root mean square of 1 in samples. What comes out of a loudspeaker depends on it and on the volume: see
+  /// SafeLevel.
   double full_scale_db = 105;
 
-  // Burr on bone. Level of a 6 mm cutting burr at 1 N and 60,000 rpm: designed, between the 65 and 96 dBA that were measured in air in the
-  // ear canal while drilling (Arch. Otolaryngol. 106:92, 1980).
+  // Burr on bone. Level of a 6 mm cutting burr at 1 N and 60,000 rpm: designed, between the 65 and 96 dBA that were
+  // measured in air in the ear canal while drilling (Arch. Otolaryngol. 106:92, 1980).
   double contact_db = 80;
   /// By diameter, in mm, against 6 mm; linear between: 4 mm -1 to -6, 2 mm -5 to -16 dB (Kylen 1977), their middles.
   std::array<std::array<double, 2>, 4> size_db{{{2, -10.5}, {4, -3.5}, {6, 0}, {7, 1.75}}};
-  double speed_db = 5;              ///< from 20,000 to 80,000 rpm, by the logarithm: 0 to 5 dB (Kylen 1977). Below: falls by 40 dB a decade
+  double speed_db =
+      5;  ///< from 20,000 to 80,000 rpm, by the logarithm: 0 to 5 dB (Kylen 1977). Below: falls by 40 dB a decade
   double press_db_per_decade = 10;  ///< designed; from 0.01 N (-20 dB) to 5 N (+7 dB)
   double free_db = 58;              ///< running free: designed
   int teeth = 8;                    ///< flutes of a cutting burr, which have 6 to 12
-  /// The frequencies rise by this share where the bone is thin, from thin_mm to nothing (D. Morris 2006, section 3.2.9 lets the pitch rise;
-  /// no measured value was found): designed.
+  /// The frequencies rise by this share where the bone is thin, from thin_mm to nothing (D. Morris 2006, section 3.2.9
+  /// lets the pitch rise; no measured value was found): designed.
   double thin_pitch = 0.25, thin_mm = 2;
   double press_pitch_per_n = -0.008;  ///< and fall under load, up to 5 N: designed
   double soft_db = -12;               ///< above 4 kHz, falling from 2 kHz, where softness is 1: designed
 
-  // Sucker, dry, of 2.7 mm (8 Fr). 3 to 7 Fr gave 68 to 97 dB in the ear canal, larger and wetter ones more; designed for the surgeon's
-  // ear.
+  // Sucker, dry, of 2.7 mm (8 Fr). 3 to 7 Fr gave 68 to 97 dB in the ear canal, larger and wetter ones more; designed
+  // for the surgeon's ear.
   double suction_db = 62;
   double suction_db_per_mm = 4.5, suction_wet_db = 8;
   double gurgles_per_s = 14;  ///< at half water, none at 0 and 1: designed
@@ -84,8 +87,8 @@ struct BurrSpectrum {
 [[nodiscard]] BurrSpectrum burr_spectrum(const SoundVoice& voice, const SoundModel& model) noexcept;
 /// Of a sucker that is on, its noise; -200 when it is off.
 [[nodiscard]] double suction_db(const SoundVoice& voice, double water, const SoundModel& model) noexcept;
-/// The weight of a burr's sound at a frequency: 0 from 2 to 4 kHz, at least -24 dB at 8 and -60 at 16 kHz; measured near burrs, where the
-/// most lay at 4 kHz and 24 dB less at 8, 68 at 16.
+/// The weight of a burr's sound at a frequency: 0 from 2 to 4 kHz, at least -24 dB at 8 and -60 at 16 kHz; measured
+/// near burrs, where the most lay at 4 kHz and 24 dB less at 8, 68 at 16.
 [[nodiscard]] double envelope_db(double hz) noexcept;
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -9,19 +9,19 @@
 
 namespace osteo::inline simulation {
 
-/// Keeps what one hears over minutes below a level, and every sample below 1. A loudspeaker's own volume is not known to a program. For
-/// head-phones EN 50332-1 measures players with a programme of -10 dB of full scale, which may reach 100 dBA: the same pair then gives 85
-/// dBA at -25 dB, which is where long sounds are held.
+/// Keeps what one hears over minutes below a level, and every sample below 1. A loudspeaker's own volume is not known
+/// to a program. For head-phones EN 50332-1 measures players with a programme of -10 dB of full scale, which may reach
+/// 100 dBA: the same pair then gives 85 dBA at -25 dB, which is where long sounds are held.
 struct SafeLevel {
   double most_db = -25;  ///< of full scale, root mean square over `over_s`
   double over_s = 10;
 };
 
-/// From the states, one after the other, to samples: the same states, lengths and seed give the same samples, on any machine. Allocates in
-/// its constructor only; render() takes no lock and throws nothing, and takes about 1 % of a core for one burr. What changes is faded from
-/// one state to the next over the samples asked for, phases go on: nothing clicks.
-/// Sound of burrs: lines at multiples of rotation and teeth, noise that the rotation modulates (D. Morris 2006, section 3.2.9: noisy
-/// harmonics whose frequency follows the force), levels by SoundModel.
+/// From the states, one after the other, to samples: the same states, lengths and seed give the same samples, on any
+/// machine. Allocates in its constructor only; render() takes no lock and throws nothing, and takes about 1 % of a core
+/// for one burr. What changes is faded from one state to the next over the samples asked for, phases go on: nothing
+/// clicks. Sound of burrs: lines at multiples of rotation and teeth, noise that the rotation modulates (D. Morris 2006,
+/// section 3.2.9: noisy harmonics whose frequency follows the force), levels by SoundModel.
 class Synthesizer {
  public:
   static constexpr int kRateHz = 48000;
@@ -102,4 +102,4 @@ class Synthesizer {
   double power_ = 0;  // of what went out before it was held down, over safe_.over_s
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

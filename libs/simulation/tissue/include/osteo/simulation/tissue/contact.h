@@ -18,20 +18,24 @@ class RigidShape {
   virtual ~RigidShape() = default;
   /// A ball that holds it.
   [[nodiscard]] virtual Ball bounds() const = 0;
-  /// Signed distance, negative inside, and its gradient (of length about 1, 0 where it has none). Beyond its bounds any number above 0 will
-  /// do.
+  /// Signed distance, negative inside, and its gradient (of length about 1, 0 where it has none). Beyond its bounds any
+  /// number above 0 will do.
   virtual double distance_mm(Vec3 at, Vec3& outwards) const = 0;
-  /// Balls that together are nearly the shape; none where that is not known. With them a tool meets triangles, not only points.
+  /// Balls that together are nearly the shape; none where that is not known. With them a tool meets triangles, not only
+  /// points.
   [[nodiscard]] virtual std::vector<Ball> balls() const { return {}; }
 };
 
 class BallShape final : public RigidShape {
  public:
   /// `triangles` false: points alone meet it.
-  BallShape(Vec3 centre_mm, double radius_mm, bool triangles = true) : ball_{centre_mm, radius_mm}, triangles_(triangles) {}
+  BallShape(Vec3 centre_mm, double radius_mm, bool triangles = true)
+      : ball_{centre_mm, radius_mm}, triangles_(triangles) {}
   [[nodiscard]] Ball bounds() const override { return ball_; }
   double distance_mm(Vec3 at, Vec3& outwards) const override;
-  [[nodiscard]] std::vector<Ball> balls() const override { return triangles_ ? std::vector{ball_} : std::vector<Ball>{}; }
+  [[nodiscard]] std::vector<Ball> balls() const override {
+    return triangles_ ? std::vector{ball_} : std::vector<Ball>{};
+  }
 
  private:
   Ball ball_;
@@ -55,7 +59,8 @@ class PlaneShape final : public RigidShape {
   Vec3 at_, normal_;
 };
 
-/// A closed surface by its distance map (exact at the map's points, linear between) over a box; outside the box it is not felt.
+/// A closed surface by its distance map (exact at the map's points, linear between) over a box; outside the box it is
+/// not felt.
 class SurfaceShape final : public RigidShape {
  public:
   /// O(voxels of the box). Errors: usage for a box of more than 200 million voxels, and as of DistanceMapper.
@@ -74,9 +79,9 @@ class SurfaceShape final : public RigidShape {
 struct RigidContact {
   std::shared_ptr<const RigidShape> shape;  ///< null: none
   double stiffness_n_per_mm = 1;
-  /// Coulomb's coefficient of what has dug in: from one radius past where it met a triangle on, whole from one and a half. Without it a
-  /// surface slips round a tool that is pressed two radii deep. Of tools of TissueDynamics alone.
+  /// Coulomb's coefficient of what has dug in: from one radius past where it met a triangle on, whole from one and a
+  /// half. Without it a surface slips round a tool that is pressed two radii deep. Of tools of TissueDynamics alone.
   double grip = 0;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

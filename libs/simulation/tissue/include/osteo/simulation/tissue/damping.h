@@ -23,14 +23,15 @@ struct MeasuredMotion {
   std::vector<Channel> channels;
 };
 
-/// Reads a table (CSV): a column time_s; ux_mm, uy_mm, uz_mm (one or more), or u_mm along `along`; perhaps point, the number of a point of
-/// the mesh from 0, else all are of `point`. Times rise, of each point by itself. Errors: usage with the line for a value that is no
-/// finite number, a time that does not rise, a point of `points` or more, a column of another name.
-[[nodiscard]] MeasuredMotion read_motion(std::string_view csv, const std::string& name, std::uint32_t points, std::uint32_t point,
-                                         Vec3 along);
+/// Reads a table (CSV): a column time_s; ux_mm, uy_mm, uz_mm (one or more), or u_mm along `along`; perhaps point, the
+/// number of a point of the mesh from 0, else all are of `point`. Times rise, of each point by itself. Errors: usage
+/// with the line for a value that is no finite number, a time that does not rise, a point of `points` or more, a column
+/// of another name.
+[[nodiscard]] MeasuredMotion read_motion(std::string_view csv, const std::string& name, std::uint32_t points,
+                                         std::uint32_t point, Vec3 along);
 
-/// A single swing that dies down, fitted to channels without any model of the body: exp(-decay t) (a cos wt + b sin wt) + c + d t, with
-/// one decay and one frequency for all. The decrement of textbooks is decay / hz.
+/// A single swing that dies down, fitted to channels without any model of the body: exp(-decay t) (a cos wt + b sin wt)
+/// + c + d t, with one decay and one frequency for all. The decrement of textbooks is decay / hz.
 struct Swing {
   double decay_per_s = 0, hz = 0;
   double residual_share = 0;  ///< RMS of what it leaves over the RMS of the channels without mean and trend
@@ -62,31 +63,34 @@ struct DampingFit {
   Estimate damping_per_s;  ///< as DynamicsOptions and ImplicitOptions have it
   Estimate stiffness_times;
   Estimate release_s;
-  double amplitude_times = 1;       ///< how far it was plucked, over the load's own equilibrium
-  double step_s = 0;                ///< of the steps it holds for
-  double model_hz = 0;              ///< of the body as the problem has it, without damping
-  Swing measured, model, undamped;  ///< of the table; of the fitted model; and of that without damping: all of its decay is numerical
-  bool undamped_swings = true;      ///< `undamped` says something
-  double residual_share = 0;        ///< RMS of what the fit leaves over the RMS of the channels without their trends
-  double correlation = 0;           ///< of each left residual with the next, by which intervals were widened
+  double amplitude_times = 1;  ///< how far it was plucked, over the load's own equilibrium
+  double step_s = 0;           ///< of the steps it holds for
+  double model_hz = 0;         ///< of the body as the problem has it, without damping
+  Swing measured, model,
+      undamped;  ///< of the table; of the fitted model; and of that without damping: all of its decay is numerical
+  bool undamped_swings = true;  ///< `undamped` says something
+  double residual_share = 0;    ///< RMS of what the fit leaves over the RMS of the channels without their trends
+  double correlation = 0;       ///< of each left residual with the next, by which intervals were widened
   std::vector<double> drift_mm_per_s, drift_error_mm_per_s;  ///< of each channel, and its standard error
   std::vector<double> largest_mm;                            ///< of each channel
   std::vector<std::vector<double>> fitted_mm;                ///< beside used values
   MeasuredMotion used;                                       ///< from the release on
-  double span_s = 0, interval_s = 0;                         ///< from the release to the last value; median between values
+  double span_s = 0, interval_s = 0;  ///< from the release to the last value; median between values
   int simulations = 0;
 };
 
-/// Fits damping (and stiffness, moment of release, amplitude, and of each channel where its rest is and how it drifts) by least squares
-/// (Ceres), the model being the fast one in the very steps that it is for: what these take away by themselves is not counted as damping.
-/// The body begins at rest under `pluck`, whose loads and movements then end; `fixed` and `sliders` hold it throughout. Derivatives by
-/// damping and stiffness are central differences of simulations. Intervals assume that what is left is noise without memory, and are
-/// widened by its correlation with the next value where there is one.
-/// Errors: usage with what to do for fewer than 12 values, nothing that moves, under one and a half swings, fewer than two values a swing
-/// (by the model's frequency, since the table's own would be another), motion that does not swing while stiffness is fitted too, steps
-/// that take away more than was measured; as of EquilibriumSolver; failed in a build without Ceres.
-[[nodiscard]] DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::span<const std::uint32_t> fixed,
-                                     std::span<const Slider> sliders, const MeasuredMotion& motion, const DampingOptions& options = {},
+/// Fits damping (and stiffness, moment of release, amplitude, and of each channel where its rest is and how it drifts)
+/// by least squares (Ceres), the model being the fast one in the very steps that it is for: what these take away by
+/// themselves is not counted as damping. The body begins at rest under `pluck`, whose loads and movements then end;
+/// `fixed` and `sliders` hold it throughout. Derivatives by damping and stiffness are central differences of
+/// simulations. Intervals assume that what is left is noise without memory, and are widened by its correlation with the
+/// next value where there is one. Errors: usage with what to do for fewer than 12 values, nothing that moves, under one
+/// and a half swings, fewer than two values a swing (by the model's frequency, since the table's own would be another),
+/// motion that does not swing while stiffness is fitted too, steps that take away more than was measured; as of
+/// EquilibriumSolver; failed in a build without Ceres.
+[[nodiscard]] DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck,
+                                     std::span<const std::uint32_t> fixed, std::span<const Slider> sliders,
+                                     const MeasuredMotion& motion, const DampingOptions& options = {},
                                      const Context& context = {});
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -1,4 +1,5 @@
-// The fast model in time: explicit steps, vectorised, with a time step that is known to be stable; or long ones with a factor made once.
+// The fast model in time: explicit steps, vectorised, with a time step that is known to be stable; or long ones with a
+// factor made once.
 #pragma once
 #include <array>
 #include <memory>
@@ -15,20 +16,23 @@ struct DynamicsOptions {
   double density_kg_m3 = 1000;
   double damping_per_s = 0;  ///< viscous: forces of -damping * mass * velocity; 0: energy is kept
   double step_share = 0.9;   ///< of the certified limit
-  double least_step_s = 0;   ///< a step may be this long at least: points are then made heavier until it is stable, which is counted
-  /// Above 0: factorised steps of this length, whatever the certified limit; step_share and least_step_s say nothing then.
+  double least_step_s =
+      0;  ///< a step may be this long at least: points are then made heavier until it is stable, which is counted
+  /// Above 0: factorised steps of this length, whatever the certified limit; step_share and least_step_s say nothing
+  /// then.
   double factorised_step_s = 0;
   int iterations = 3;  ///< of each factorised step
 };
 
-/// Verlet's method with implicit viscous damping (D. Morris 2006, section 5.4.1). The step is certified by Gershgorin's bound on the
-/// highest frequency at rest, with a quarter more for stretch; what is stretched further is looked for every hundred steps. Lumped masses.
-/// Factorised steps are backward Euler's, taken so far as a fixed number of conjugate gradients gets, preconditioned by the Cholesky factor
-/// of the model's stiffness at rest: the law stays the model's own, at large strains too, and what is not converged is seen as slower
-/// motion. They take more motion away than `damping` asks for, the longer the more. The factor is made at the first step, and again when
-/// what the obstacle holds is another; cutting leaves it as it is. Memory: 40 bytes a block of it (10,000 tetrahedra: 13 MB). A place that
-/// is no number is not taken, and counted. `Real` float: the quick one; double: the exact one, momentum kept to rounding. The same bits for
-/// any instruction set.
+/// Verlet's method with implicit viscous damping (D. Morris 2006, section 5.4.1). The step is certified by Gershgorin's
+/// bound on the highest frequency at rest, with a quarter more for stretch; what is stretched further is looked for
+/// every hundred steps. Lumped masses. Factorised steps are backward Euler's, taken so far as a fixed number of
+/// conjugate gradients gets, preconditioned by the Cholesky factor of the model's stiffness at rest: the law stays the
+/// model's own, at large strains too, and what is not converged is seen as slower motion. They take more motion away
+/// than `damping` asks for, the longer the more. The factor is made at the first step, and again when what the obstacle
+/// holds is another; cutting leaves it as it is. Memory: 40 bytes a block of it (10,000 tetrahedra: 13 MB). A place
+/// that is no number is not taken, and counted. `Real` float: the quick one; double: the exact one, momentum kept to
+/// rounding. The same bits for any instruction set.
 template <class Real>
 class TissueDynamics {
  public:
@@ -38,18 +42,18 @@ class TissueDynamics {
   ~TissueDynamics();
 
   void set_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n);
-  /// Pushes, at each step, the surface's triangles where they are nearest to it (a shape without balls: points only), and points inside the
-  /// body that it meets. Its stiffness is that of each triangle or point; where several tools are near, each has its part of what the step
-  /// leaves room for. `number`: of several tools, from 0.
+  /// Pushes, at each step, the surface's triangles where they are nearest to it (a shape without balls: points only),
+  /// and points inside the body that it meets. Its stiffness is that of each triangle or point; where several tools are
+  /// near, each has its part of what the step leaves room for. `number`: of several tools, from 0.
   void set_tool(RigidContact tool, std::size_t number = 0);
-  /// Pushes points of the surface; where it is is looked up every tenth step, in between it is a plane for each point. Points that lie in
-  /// it at rest may stay as deep.
+  /// Pushes points of the surface; where it is is looked up every tenth step, in between it is a plane for each point.
+  /// Points that lie in it at rest may stay as deep.
   void set_obstacle(RigidContact obstacle);
   /// The next step looks where the obstacle is and what of it is gone, which it does every so many steps otherwise.
   void look_at_obstacle();
   void set_position(std::uint32_t point, Vec3 at_mm);
-  /// Cuts off tetrahedra (their numbers in the model), without a restart: what they held goes, what they shared gets weaker. A point of
-  /// which nothing is left stays where it is and meets nothing. O(constraints).
+  /// Cuts off tetrahedra (their numbers in the model), without a restart: what they held goes, what they shared gets
+  /// weaker. A point of which nothing is left stays where it is and meets nothing. O(constraints).
   void cut_off(std::span<const std::uint32_t> tets);
   /// Tetrahedra of parts that nothing holds: no fixed or sliding point, nothing tied to the obstacle. O(tets).
   [[nodiscard]] std::vector<std::uint32_t> loose() const;
@@ -68,7 +72,8 @@ class TissueDynamics {
   [[nodiscard]] std::vector<Vec3> positions_mm() const;
   [[nodiscard]] Vec3 position_mm(std::uint32_t point) const;
   [[nodiscard]] std::size_t point_count() const;
-  /// Largest unbalanced force on a free point over the largest load (or 1 N): at rest when small and kinetic energy is too.
+  /// Largest unbalanced force on a free point over the largest load (or 1 N): at rest when small and kinetic energy is
+  /// too.
   [[nodiscard]] double residual() const;
   [[nodiscard]] double kinetic_mj() const;
   [[nodiscard]] double elastic_mj() const;
@@ -77,8 +82,9 @@ class TissueDynamics {
   struct Counts {
     std::uint64_t not_finite = 0;    ///< points put back where they were because their place was no number
     std::uint64_t made_heavier = 0;  ///< points, for least_step_s
-    std::uint64_t stretched = 0;     ///< points, at each check, that were moved as if heavier since what they belong to was stretched far
-    std::uint64_t softened = 0;      ///< pushes of tool or obstacle that the step allowed less stiffness than asked for
+    std::uint64_t stretched =
+        0;  ///< points, at each check, that were moved as if heavier since what they belong to was stretched far
+    std::uint64_t softened = 0;  ///< pushes of tool or obstacle that the step allowed less stiffness than asked for
   };
   [[nodiscard]] const Counts& counts() const;
 
@@ -87,4 +93,4 @@ class TissueDynamics {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

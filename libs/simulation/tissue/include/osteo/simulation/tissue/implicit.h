@@ -18,9 +18,10 @@ struct ImplicitOptions {
   int iterations = 30;       ///< of Newton's method in a step
 };
 
-/// Backward Euler as a minimum of energy (m/2h^2 |x - x^|^2 + E(x), T. Gast et al., Optimization Integrator for Large Time Steps, 2015),
-/// found by Newton's method with exact Hessians: stable for steps of any length, contact with tools and obstacles in it, first order in
-/// time, and so more damped the longer the step. Each iteration costs a sparse factorisation. In double precision, deterministic.
+/// Backward Euler as a minimum of energy (m/2h^2 |x - x^|^2 + E(x), T. Gast et al., Optimization Integrator for Large
+/// Time Steps, 2015), found by Newton's method with exact Hessians: stable for steps of any length, contact with tools
+/// and obstacles in it, first order in time, and so more damped the longer the step. Each iteration costs a sparse
+/// factorisation. In double precision, deterministic.
 class ImplicitDynamics {
  public:
   /// Errors: usage for a density, or a step, not above 0; as of EquilibriumSolver, but parts may move freely.
@@ -54,4 +55,4 @@ class ImplicitDynamics {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -13,10 +13,11 @@ namespace osteo::inline simulation {
 enum class TissueClass : std::uint8_t { axis_edge, diagonal_edge, face, volume };
 inline constexpr std::size_t kTissueClasses = 4;
 
-/// E = sum of k/2 C^2 with C = q / q0 - 1, q the length of an edge, the area of a face, the volume of a tetrahedron or of the five of a
-/// voxel; k in N mm. M. Teschner et al. 2004; D. Morris 2006, section 5.4.1, whose printed forces are not the gradients of these energies:
-/// here they are, to rounding, so that forces and torques sum to zero. Where a direction is undefined (an edge of no length) its force is
-/// zero. Inverted tetrahedra are pushed back by the signed volume.
+/// E = sum of k/2 C^2 with C = q / q0 - 1, q the length of an edge, the area of a face, the volume of a tetrahedron or
+/// of the five of a voxel; k in N mm. M. Teschner et al. 2004; D. Morris 2006, section 5.4.1, whose printed forces are
+/// not the gradients of these energies: here they are, to rounding, so that forces and torques sum to zero. Where a
+/// direction is undefined (an edge of no length) its force is zero. Inverted tetrahedra are pushed back by the signed
+/// volume.
 class TissueModel final : public Energy {
  public:
   struct Constraint {
@@ -28,17 +29,19 @@ class TissueModel final : public Energy {
     std::uint32_t voxel = 0;  ///< of volumes of 8 nodes: which of the splits (0 or 1); else unused
   };
 
-  /// Of a mesh of grid_tets(): five tetrahedra a voxel in alternating ways. In closed form, without any simulation, from a material for
-  /// each voxel (or one for all): with edge h, each voxel gives mu h^3 / 4 to each of its 12 edges, 2 mu h^3 to each of its 6 diagonals and
-  /// (lambda - mu) h^3 to its volume. The sum is exactly isotropic linear elasticity for small strains; Poisson's ratio at least 1/4
-  /// (below, the volume's share would be negative). One volume constraint a voxel, not one a tetrahedron, so nothing locks near a half.
-  /// With `faces` area constraints are there too, of stiffness 0 until calibration gives them some. Errors: usage when the mesh is not of
-  /// that kind, or for materials out of range.
+  /// Of a mesh of grid_tets(): five tetrahedra a voxel in alternating ways. In closed form, without any simulation,
+  /// from a material for each voxel (or one for all): with edge h, each voxel gives mu h^3 / 4 to each of its 12 edges,
+  /// 2 mu h^3 to each of its 6 diagonals and (lambda - mu) h^3 to its volume. The sum is exactly isotropic linear
+  /// elasticity for small strains; Poisson's ratio at least 1/4 (below, the volume's share would be negative). One
+  /// volume constraint a voxel, not one a tetrahedron, so nothing locks near a half. With `faces` area constraints are
+  /// there too, of stiffness 0 until calibration gives them some. Errors: usage when the mesh is not of that kind, or
+  /// for materials out of range.
   static TissueModel of_voxels(std::span<const Vec3> points_mm, std::span<const std::array<std::uint32_t, 4>> tets,
                                std::span<const Material> materials, bool faces = true);
-  /// Of any mesh, with the thesis' three constants for all constraints (per unit of rest volume share where `by_volume`).
-  static TissueModel uniform(std::span<const Vec3> points_mm, std::span<const std::array<std::uint32_t, 4>> tets, double distance_n_mm,
-                             double area_n_mm, double volume_n_mm);
+  /// Of any mesh, with the thesis' three constants for all constraints (per unit of rest volume share where
+  /// `by_volume`).
+  static TissueModel uniform(std::span<const Vec3> points_mm, std::span<const std::array<std::uint32_t, 4>> tets,
+                             double distance_n_mm, double area_n_mm, double volume_n_mm);
 
   [[nodiscard]] std::size_t point_count() const override { return rest_.size(); }
   [[nodiscard]] std::size_t element_count() const override { return constraints_.size(); }
@@ -69,4 +72,4 @@ class TissueModel final : public Energy {
   std::vector<double> base_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation

@@ -10,13 +10,13 @@
 
 namespace osteo::inline simulation {
 
-/// Whole voxels (five tetrahedra one after the other, as grid_tets makes them), by force and time as in bone: what the tool is allowed adds
-/// up until a voxel's worth is there, and then the voxel whose corners lie deepest in the tool goes. What comes loose goes with it.
-/// Same calls, same voxels. One thread.
+/// Whole voxels (five tetrahedra one after the other, as grid_tets makes them), by force and time as in bone: what the
+/// tool is allowed adds up until a voxel's worth is there, and then the voxel whose corners lie deepest in the tool
+/// goes. What comes loose goes with it. Same calls, same voxels. One thread.
 class VoxelCutting {
  public:
-  /// Guesses, no measured rates were found: a twentieth of a newton cuts some tens of mm3 a second, and no burr more than powered shavers
-  /// do.
+  /// Guesses, no measured rates were found: a twentieth of a newton cuts some tens of mm3 a second, and no burr more
+  /// than powered shavers do.
   static constexpr double kEasierThanBone = 200, kMostMm3PerS = 100;
   /// So many voxels at most are saved up while the tool meets none.
   static constexpr double kMostSaved = 8;
@@ -26,8 +26,8 @@ class VoxelCutting {
   /// `model` must outlive it; all voxels are of `voxel_mm3`.
   VoxelCutting(const TissueModel& model, double voxel_mm3);
 
-  /// The tool may take `mm3` more; `number`: of several, each with what it has saved. True when something was cut off `body`, whose
-  /// tetrahedra are the model's. O(voxels), and O(constraints) when something goes.
+  /// The tool may take `mm3` more; `number`: of several, each with what it has saved. True when something was cut off
+  /// `body`, whose tetrahedra are the model's. O(voxels), and O(constraints) when something goes.
   bool cut(TissueDynamics<float>& body, const RigidShape& tool, double mm3, std::size_t number = 0);
 
   [[nodiscard]] const std::vector<bool>& gone() const { return gone_; }  ///< one a tetrahedron
@@ -42,4 +42,4 @@ class VoxelCutting {
   std::vector<bool> gone_;
 };
 
-}  // namespace osteo::simulation
+}  // namespace osteo::inline simulation
