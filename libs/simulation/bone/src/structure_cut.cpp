@@ -6,6 +6,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/portable_math.h"
 
 namespace osteo::inline simulation {
 namespace {
@@ -88,7 +89,7 @@ class Search {
       return;
     }
     if (std::max(du, dv) <= kCellMm) {
-      const double layer = blade_.kerf_mm / layers_, volume = du * dv * layer, size = std::cbrt(volume);
+      const double layer = blade_.kerf_mm / layers_, volume = du * dv * layer, size = portable::cbrt(volume);
       for (int n = 0; n < layers_; ++n) take(place(u, v, (n + 0.5) * layer - blade_.kerf_mm / 2), volume, size);
       return;
     }

@@ -91,13 +91,10 @@ static_assert([] {
   return true;
 }());
 
-template <>
-struct EnumNames<BurrKind> {
-  static constexpr auto values = [] {
-    std::array<std::string_view, kBurrKinds.size()> names;
-    for (std::size_t n = 0; n < names.size(); ++n) names[n] = kBurrKinds[n].name;
-    return names;
-  }();
-};
+[[nodiscard]] constexpr std::array<std::string_view, kBurrKinds.size()> enum_names(BurrKind) {
+  std::array<std::string_view, kBurrKinds.size()> names;
+  for (std::size_t n = 0; n < names.size(); ++n) names[n] = kBurrKinds[n].name;
+  return names;
+}
 
 }  // namespace osteo::inline simulation
