@@ -29,6 +29,10 @@ struct LoopStats {
 /// SCHED_FIFO priority 80, memory locked, stack touched beforehand, processor kept from deep sleep, absolute sleeps
 /// (clock_nanosleep). When real-time priority is refused the loop runs all the same with the smallest timer slack, and
 /// says so. A late tick does not shift the later ones; periods that passed meanwhile are skipped and counted.
+///
+/// The servo thread of a rehearsal is one of these, at 1 kHz. Once it ticks, neither the loop nor `tick` may allocate,
+/// lock, throw, log or block; the loop itself only sleeps until the next period. The test robust.no-alloc counts
+/// allocations and locks of the servo's ticks.
 class FixedRateLoop {
  public:
   /// `tick` returns false to end the loop. It must not allocate or lock. What it throws ends the loop; see failure().

@@ -34,6 +34,9 @@ class HandRenderer;
 /// where the guide has it, which shown_offset_mm tells (SawSlot). Several bodies: what the burr overlaps in each is
 /// added up before the law of force is applied, so that a cut through bone that nobody has opened cannot be felt (other
 /// methods than overlap: forces are added). At most kMostTouched bodies in a tick, the first in order.
+///
+/// All that is noexcept here runs at 1 kHz in the servo thread and may not allocate, lock, throw, log or block; the test
+/// robust.no-alloc counts allocations and locks. Only the constructors and structure_events() may allocate.
 class HapticRenderer {
  public:
   static constexpr std::size_t kMostTouched = 4;

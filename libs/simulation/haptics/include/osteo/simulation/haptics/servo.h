@@ -21,6 +21,8 @@ struct Handover {
   const HapticsParams* settings = nullptr;  ///< null: as before. Belongs to whoever posts, read while it is taken up
 };
 
+/// step() runs at 1 kHz in the servo thread and may not allocate, lock, throw, log or block; the same holds for all that
+/// it calls. The test robust.no-alloc counts allocations and locks of whole ticks. Only the constructors may allocate.
 class Servo {
  public:
   /// All must outlive the servo. As many devices as the renderer has hands, in their order. `rate_hz` fixes the time
