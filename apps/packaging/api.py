@@ -87,8 +87,11 @@ def stage(into):
             lines[:top] = [("/// @file\n" if i == 0 else "") + "/" + l for i, l in enumerate(lines[:top])]
         for i, line in enumerate(lines):
             if re.match(r"namespace osteo(::inline \w+)?(::\w+)* \{$", line):
-                lines[i] = line + f"\n/** @addtogroup lib_{lib}\n * @{{ */"
-            elif re.match(r"\}  // namespace osteo(::\w+)*$", line):
+                # One that only declares types of another area holds nothing.
+                holds = not re.match(r"(?:\s*(?:class|struct) \w+;)+\s*\}$", "\n".join(lines[i + 1:i + 6]).split("}")[0] + "}")
+                if holds:
+                    lines[i] = line + f"\n/** @addtogroup lib_{lib}\n * @{{ */"
+            elif re.match(r"\}  // namespace osteo(::inline \w+|::\w+)*$", line) and holds:
                 lines[i] = "/** @} */\n" + line
             elif m := re.match(r"/// @class (vtk\w+)", line):
                 lines[i] = f"{line}\n/// @ingroup lib_{lib}"
@@ -103,8 +106,8 @@ def stage(into):
 
 
 def check(site, components):
-    # Of a class whose only inner one is private Doxygen links a list that it then leaves out: nested-classes.
-    bad, pages, links = check_pages(site, lambda _, target, lost: not lost and target.endswith("#nested-classes"))
+    # Of a class whose only inner one is private Doxygen links a list that it then leaves out: nested-classes; of a group with an enum without a name likewise enumval-members.
+    bad, pages, links = check_pages(site, lambda _, target, lost: not lost and target.endswith(("#nested-classes", "#enumval-members")))
     # What the headers declare, against what has a page or a place in one.
     tags = xml.etree.ElementTree.parse(site / "osteo.tag").getroot()
     known = {c.findtext("name").split("::")[-1].split("<")[0].strip() for c in tags.iter("compound") if c.get("kind") in ("class", "struct", "union")

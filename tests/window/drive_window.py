@@ -337,7 +337,7 @@ def keys():
     assert "length_mm" in notes and "spine" in notes, notes
     assert 'width: 1000' in osteo("info", "first/screenshot-1.png"), osteo("info", "first/screenshot-1.png")
     # Each key of the table was pressed above.
-    named = {"kSpace": "space", "kEscape": "Escape", "kEnter": "Return", "kKeypadEnter": "KP_Enter"}
+    named = {"kSpace": "space", "kKeyEscape": "Escape", "kEnter": "Return", "kKeypadEnter": "KP_Enter"}
     table = re.findall(r"^    \{('.'|k\w+), Command::(\w+)(.*)\},$", (source / "libs/app/window/src/keys.cpp").read_text(), re.M)
     with_ctrl = {k[1].lower() for k, command, rest in table if "kWithCtrl" in rest}
     assert {f"ctrl+{k}" for k in with_ctrl} == {k for k in pressed if k.startswith("ctrl+")}, (with_ctrl, pressed)

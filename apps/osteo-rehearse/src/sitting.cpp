@@ -73,6 +73,7 @@ Sitting::Sitting(const WindowFlags& flags, const Case& the_case, const Procedure
     const std::lock_guard lock(stream_mutex_);
     if (stream_) stream_->feed().note(kind, json);
   };
+  options_.haptics.params.effects.held_shaft = true;  // a hand meets it; settings may say otherwise
   apply_haptic_settings(case_.folder, flags.settings, options_.haptics);
   if (!flags.playback.empty()) learn(flags);
   if (!flags.review.empty()) past_.emplace(flags.review, case_.folder);

@@ -102,7 +102,7 @@ TEST(Findings, ASawIsCalledASaw) {
   EXPECT_EQ(findings_of(s, nullptr, nullptr).find("injury-dura")->times_s, std::vector<double>{8});
   s.moments.push_back({9, {}, "reached by a turning burr", "dura", -0.1, 0});
   EXPECT_EQ(findings_of(s, nullptr, nullptr).find("injury-dura")->text,
-            "A turning burr and the running saw reached the dura twice, for 0.2 s in all.");
+            "A turning burr reached the dura once and the running saw once, for 0.2 s in all.");
 }
 
 TEST(Findings, ItemsSayWhatWasAsked) {

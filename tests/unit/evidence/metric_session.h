@@ -169,7 +169,7 @@ class MetricSession {
       for (const double x : {0.25, 2.25}) gone({x, -5.25, 7.75});
     }
     if (n == 500) note(R"({"eye_mm":[0,0,200],"target_mm":[0,0,0]})");
-    if (n == 2600) action(SceneAction::saw({{-7.25, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1}));
+    if (n == 2600) action(SceneAction::saw({{-7.5, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1}));
     if (n == 2700) {
       for (int k = 0; k < 4; ++k)
         for (int j = 0; j < 6; ++j)

@@ -104,7 +104,8 @@ const Row kRows[] = {
     {"touched_s[nerve]", 0.28 + 0.28 + 0.18, 0.28 + 0.28 + 0.18, 0.05},
     {"injured_s[nerve]", 0.18, 0.18, 0.02},
     {"cut_mm3[nerve]", 0, 0},
-    {"saw_clearance_mm[nerve]", 7.25 - 0.5 - 2, 7.25 - 0.5 - 2, 0.15},
+    // 5 mm away is too far to be told here: Sessions.ASawThroughAStructureIsTold has its value by hand.
+    {"saw_clearance_mm[nerve]", NAN, NAN},
     {"near_05_s[nerve]", 2, 2},
     {"near_1_s[nerve]", 4, 4},
     {"near_s[nerve]", 6, 6},

@@ -141,6 +141,7 @@ TEST(HeldShaft, AHandDoesNotPushItThroughCortex) {
           h, 12, [](Vec3 p) { return std::abs(p.z) < 1.75 && std::hypot(p.x, p.y) > 3; }, {}, 2);
       HapticSetup setup;
       setup.params.effects.vibration = false;
+      setup.params.effects.held_shaft = true;
       SimulatedDeviceParams held;
       held.hand_damping_n_s_per_m = 5;
       SimulatedDevice device(held, {0, 0, -8});

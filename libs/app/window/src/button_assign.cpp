@@ -5,7 +5,7 @@
 namespace osteo::inline app {
 namespace {
 
-enum : int { kEscape = 256, kDelete = 261, kF1 = 290, kF10 = 299, kFirstModifier = 340, kLastModifier = 347 };
+enum : int { kKeyEscape = 256, kDelete = 261, kF1 = 290, kF10 = 299, kFirstModifier = 340, kLastModifier = 347 };
 
 }  // namespace
 
@@ -18,7 +18,7 @@ std::string words_of(HandFunction function) {
 std::string ButtonAssign::take(int button, HandButtons& buttons) {
   if (!for_) return {};
   const std::string does = words_of(*for_), name = button_name(button);
-  if (button == kEscape) {
+  if (button == kKeyEscape) {
     cancel();
     return "no button was given";
   }

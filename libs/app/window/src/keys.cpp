@@ -11,7 +11,7 @@ namespace {
 // GLFW's numbers for keys without a letter (GLFW 3, stable): letters and digits are their ASCII capitals.
 enum : int {
   kSpace = 32,
-  kEscape = 256,
+  kKeyEscape = 256,
   kEnter = 257,
   kTab = 258,
   kBackspace = 259,
@@ -72,7 +72,7 @@ constexpr Key kFixedKeys[] = {
     {kEnter, Command::perform},
     {kKeypadEnter, Command::perform},
     {'Z', Command::undo},
-    {kEscape, Command::put_away},
+    {kKeyEscape, Command::put_away},
     {'M', Command::mark},
     {'S', Command::screenshot},
     {kF5, Command::save},
@@ -171,7 +171,7 @@ const Key* find_key(int code, int modifiers) {
 
 std::string key_word(int code) {
   static const std::pair<int, const char*> kNames[] = {{kSpace, "Space"},
-                                                       {kEscape, "Esc"},
+                                                       {kKeyEscape, "Esc"},
                                                        {kEnter, "Enter"},
                                                        {kTab, "Tab"},
                                                        {kBackspace, "Backspace"},

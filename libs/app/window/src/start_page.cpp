@@ -17,7 +17,7 @@ namespace {
 
 // GLFW's numbers.
 enum : int {
-  kEscape = 256,
+  kKeyEscape = 256,
   kEnter = 257,
   kBackspace = 259,
   kDown = 264,
@@ -96,7 +96,7 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
       person.values.full_screen = shell.full_screen();
     }
     if (key == 'O' && dialogs) ask = true;
-    if (key == 'Q' || key == kEscape) close = true;
+    if (key == 'Q' || key == kKeyEscape) close = true;
     follow = true;
   };
   ImGui::GetIO().ConfigFlags &= ~ImGuiConfigFlags_NavEnableKeyboard;

@@ -28,11 +28,11 @@ double kept_mm(ProcedureRole role) {
 
 namespace {
 
-constexpr double kPitch = 1, kStep = 0.25;       // mm: of columns, and along them
-constexpr double kClosed = 0.7;                  // of the window's radius
-constexpr double kPressMm = 1;                   // into the next layer
-constexpr double kShiftMm = 7, kBeliefMm = 2.5;  // at no skill at all
-constexpr double kLeanDeg = 40;                  // so that not the burr's slow pole does the work
+constexpr double kPitch = 1, kStep = 0.25;           // mm: of columns, and along them
+constexpr double kClosed = 0.7;                      // of the window's radius
+constexpr double kPressMm = 1;                       // into the next layer
+constexpr double kGridShiftMm = 7, kBeliefMm = 2.5;  // at no skill at all
+constexpr double kLeanDeg = 40;                      // so that not the burr's slow pole does the work
 
 // A burr that goes straight down: by the depth of its lowest point along the way from the surgeon.
 struct Column {
@@ -219,7 +219,7 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
   // Where this one drills instead, and how deep it thinks it may.
   statistics::Random random(seed ^ 0x706c616eULL);
   const auto way = portable::sin_cos_turns(random.uniform());
-  const double shift = (1 - skill.region) * kShiftMm, du = shift * way.cos, dv = shift * way.sin;
+  const double shift = (1 - skill.region) * kGridShiftMm, du = shift * way.cos, dv = shift * way.sin;
   const double belief = (1 - skill.knowledge) * kBeliefMm;
   const double open = o.radius_mm * (1 - kClosed * skill.undercut), roof = 2 * coarse + 1;
   plan.open_mm = open;

@@ -267,6 +267,9 @@ void make_output_folder(const fs::path& path) {
 }
 
 Error error_of(const fs::filesystem_error& error) {
+  // To open a folder takes memory too.
+  if (error.code() == std::errc::not_enough_memory)
+    return {ExitCode::resources, "out of memory", "use larger voxels or a smaller region"};
   std::error_code ec;
   const fs::path path = error.path2().empty() ? error.path1() : error.path2();
   const bool there = fs::exists(fs::symlink_status(path, ec));

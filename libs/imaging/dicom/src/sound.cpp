@@ -12,7 +12,7 @@
 namespace osteo::inline imaging::dicom {
 namespace {
 
-constexpr std::uint32_t kUndefined = 0xFFFFFFFFU;
+constexpr std::uint32_t kUndefinedLength = 0xFFFFFFFFU;
 constexpr std::uint32_t kItem = 0xFFFEE000U, kItemEnd = 0xFFFEE00DU, kSequenceEnd = 0xFFFEE0DDU, kPixels = 0x7FE00010U;
 
 class Walker {
@@ -105,7 +105,7 @@ class Walker {
       if (!u16(at, group)) return at == size_;
       if (group != 2) return true;
       Element e;
-      if (!read(at, e) || e.length == kUndefined || e.value_at + e.length > size_) return false;
+      if (!read(at, e) || e.length == kUndefinedLength || e.value_at + e.length > size_) return false;
       if (e.tag == 0x00020010U && e.length > 0 && e.length < 65) {
         std::string uid(e.length, '\0');
         copy(e.value_at, uid.data(), uid.size());
@@ -144,9 +144,9 @@ class Walker {
         at += 8;
         return delimited;
       }
-      if (depth == 0 && e.tag == kPixels) return e.length == kUndefined || e.value_at <= size_;
+      if (depth == 0 && e.tag == kPixels) return e.length == kUndefinedLength || e.value_at <= size_;
       at = e.value_at;
-      if (e.length == kUndefined) {
+      if (e.length == kUndefinedLength) {
         // Only sequences may be open; unknown ones are implicit little endian inside (PS3.5 6.2.2).
         const bool was_explicit = explicit_;
         if (explicit_ && !e.sequence && !e.unknown) return false;
@@ -170,7 +170,7 @@ class Walker {
       at += 8;
       if (e.tag == kSequenceEnd) return delimited;
       if (e.tag != kItem) return false;
-      if (e.length == kUndefined) {
+      if (e.length == kUndefinedLength) {
         if (!elements(at, end, true, depth + 1)) return false;
       } else {
         if (at + e.length > end) return false;

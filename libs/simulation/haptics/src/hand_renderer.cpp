@@ -98,12 +98,15 @@ void HandRenderer::feel(const DeviceSample& sample) noexcept {
   const bool meets = !led || guide_.guide().own_contact;
   Vec3 elastic, torque;
   // A jump has no way that a shaft could have been stopped on; another tool was not there before.
-  if (!common_.params.effects.shaft || !has_head() || !meets || in.jumped || pose_.tool != held_tool_) let_shaft_go();
+  const bool shaft = common_.params.effects.shaft && has_head() && meets;
+  const bool held = shaft && common_.params.effects.held_shaft;
+  if (!held || in.jumped || pose_.tool != held_tool_) let_shaft_go();
   held_tool_ = pose_.tool;
-  if (common_.params.effects.shaft && has_head() && meets) hold_shaft(elastic, torque);
+  if (held) hold_shaft(elastic, torque);
   if (meets) meet();
   elastic += contact_.force_n;
   torque += contact_.torque_n_mm;
+  if (shaft && !held) press_shaft(elastic, torque);
   if (usable_ && !(soft_.normal == Vec3{})) {
     const double push = std::clamp(soft_.force_n + soft_.stiffness_n_per_mm * dot(soft_.at_mm - at_, soft_.normal), 0.0,
                                    law_.max_force_n);
@@ -320,6 +323,29 @@ void HandRenderer::hold_shaft(Vec3& elastic, Vec3& torque) noexcept {
     if (push > 0) flags_ |= kShaftContact;
   }
   at_ += farthest;
+}
+
+// By what of the shaft lies in bone: areas on opposite sides cancel, so it goes through what is thinner than it.
+void HandRenderer::press_shaft(Vec3& elastic, Vec3& torque) noexcept {
+  const RoundCone& shape = instrument_->shaft;
+  HapticScene& scene = *common_.scene;
+  OverlapResult o;
+  for (const HapticScene::Item& item : scene.items) {
+    const Vec3 own = item.body_from_world(at_), own_axis = item.body_from_world.rotation * axis_;
+    if (scene.items.size() > 1 && !item.bone->near(own + own_axis * (shape.start_mm + 0.5 * shape.length_mm),
+                                                   0.5 * shape.length_mm + shape.largest_radius_mm() + 1))
+      continue;
+    add(o, turned(item.hands[number_]->pressed_shaft.measure(item.bone->bone(), shape, own, own_axis),
+                  item.world_from_body.rotation));
+  }
+  const double pressed = length(o.area_mm2);
+  if (!(pressed > 0)) return;
+  const Vec3 normal = o.area_mm2 * (-1 / pressed);
+  const double depth = shaft_cut_depth(pose_.tool)(o.sharp_mm3, -dot(normal, axis_));
+  const double push = push_left(o, depth, shape) * law_.force_n(depth);
+  elastic += normal * push;
+  torque += cross(axis_, o.area_foot_mm3) * (-push / pressed);
+  if (push > 0) flags_ |= kShaftContact;
 }
 
 // Of a burr that turns; of all else what it slides over.

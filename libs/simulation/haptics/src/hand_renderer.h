@@ -68,6 +68,7 @@ class HandRenderer {
   void escape() noexcept;
   void hold_shaft(Vec3& elastic, Vec3& torque) noexcept;
   void let_shaft_go() noexcept;
+  void press_shaft(Vec3& elastic, Vec3& torque) noexcept;
   [[nodiscard]] Vec3 effects() noexcept;
   [[nodiscard]] double thickness() const noexcept;
 

@@ -82,6 +82,8 @@ void fit(HapticScene::Item& item, const HapticSetup& setup, const HapticScene::I
 }
 
 void make_room(HapticScene& scene, const HapticSetup& setup) {
+  if (setup.params.effects.shaft && !setup.params.effects.held_shaft)
+    static_cast<void>(shaft_cut_depth(0));  // not in the servo
   std::size_t room = 0;
   for (const HapticScene::Item& i : scene.items) room = std::max(room, most_hits(i.bone->bone().frame().spacing_mm.x));
   scene.changes.resize(room * std::min(HapticRenderer::kMostTouched, scene.items.size()) * setup.hands());

@@ -55,6 +55,7 @@ struct HandContact {
   std::array<std::vector<std::size_t>, EnumNames<ContactMethod>::values.size()> tools;  ///< that each model is for
   ContactModel* in_use = nullptr;  ///< of the instrument in the hand
   HeldShaft shaft;
+  Overlap pressed_shaft{0};  ///< of one that is not held
 };
 
 /// A plate as the hand feels it.

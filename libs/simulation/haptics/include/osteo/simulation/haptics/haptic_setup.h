@@ -15,6 +15,9 @@ namespace osteo::inline simulation {
 
 struct EffectParams {
   bool shaft = true;
+  /// Bone holds the shaft: it stops at a rim. Otherwise it presses there and a hand can push it through thin bone.
+  /// Windows turn it on; a script, whose path nobody corrects, has it off unless its settings say so.
+  bool held_shaft = false;
   bool fail_safe = true;
   double drag = 0.15;
   bool left_handed = false;
@@ -25,6 +28,8 @@ struct EffectParams {
 
   static void describe(EffectParams& p, auto& visit) {
     visit({"shaft", "the shaft collides too"}, p.shaft);
+    visit({"held_shaft", "bone holds the shaft at a rim, so that it cannot be pushed through; windows turn this on"},
+          p.held_shaft);
     visit({"fail_safe", "deep in bone, where the burr has no direction of its own, push along a distance map"},
           p.fail_safe);
     visit({"drag", "pull of the teeth along the surface, for each newton pressed, at the equator (a guess)", "", 0, 2},
