@@ -81,8 +81,9 @@ class Technician final : public Witness {
   void event(const MonitorEvent& e) override {
     Witness::event(e);
     if (e.kind == MonitorEventKind::stimulator) rehearsal_.note(kStimulatorNote, stimulator_note(e));
-    if (e.kind == MonitorEventKind::burst && !asked_) reader_.stimulate({0, 0.4, 20, 0.1, true});
-    asked_ = asked_ || e.kind == MonitorEventKind::burst;
+    // At the first that is heard, a burst or a train.
+    if (e.kind == MonitorEventKind::activity && !asked_) reader_.stimulate({0, 0.4, 20, 0.1, true});
+    asked_ = asked_ || e.kind == MonitorEventKind::activity;
   }
 
  private:

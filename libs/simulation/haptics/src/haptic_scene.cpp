@@ -94,7 +94,9 @@ void make_room(HapticScene& scene, const HapticSetup& setup) {
 ContactMethod method_of(const HapticSetup& setup, ContactMethod usual, std::size_t tool) noexcept {
   const auto it = setup.tool_methods.find(static_cast<int>(tool));
   if (it != setup.tool_methods.end()) return it->second;
-  return instrument_library()[tool].kind != InstrumentKind::burr ? ContactMethod::proxy : usual;
+  const InstrumentKind kind = instrument_library()[tool].kind;
+  const bool held = setup.params.effects.held_shaft && kind != InstrumentKind::burr;
+  return kind == InstrumentKind::saw || held ? ContactMethod::proxy : usual;
 }
 
 HandContact::HandContact(const HapticSetup& setup, double spacing_mm, const HandContact* before)

@@ -95,8 +95,8 @@ struct HapticScene {
 };
 
 /// The method of contact by instrument, as the setup has it; a saw that nothing is said of goes by its proxy, since a
-/// hand would push so thin a blade through the bone otherwise, and so does what cannot cut: its tip has no business
-/// behind bone. `usual`: the method in force, which settings may change.
+/// hand would push so thin a blade through the bone otherwise. Where shafts are held so does what cannot cut: its tip
+/// has no business behind bone. `usual`: the method in force, which settings may change.
 [[nodiscard]] ContactMethod method_of(const HapticSetup& setup, ContactMethod usual, std::size_t tool) noexcept;
 [[nodiscard]] inline ContactMethod method_of(const HapticSetup& setup, std::size_t tool) noexcept {
   return method_of(setup, setup.params.contact.method, tool);
