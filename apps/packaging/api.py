@@ -89,6 +89,7 @@ def stage(into):
             if re.match(r"namespace osteo(::inline \w+)?(::\w+)* \{$", line):
                 # One that only declares types of another area holds nothing.
                 holds = not re.match(r"(?:\s*(?:class|struct) \w+;)+\s*\}$", "\n".join(lines[i + 1:i + 6]).split("}")[0] + "}")
+                lines[i] = line = line.replace("::inline ", "::")  # which Doxygen does not know
                 if holds:
                     lines[i] = line + f"\n/** @addtogroup lib_{lib}\n * @{{ */"
             elif re.match(r"\}  // namespace osteo(::inline \w+|::\w+)*$", line) and holds:
