@@ -345,6 +345,10 @@ def keys():
     table = [k for k, command, rest in table if command not in CAMERA | HAND and "kWithCtrl" not in rest]
     assert len(table) > 30, table
     wanted = {k[1].lower() if k[0] == "'" else named.get(k, k[1:]) for k in table}
+    # And those of the burr kinds, each in its row of the table.
+    kinds = re.findall(r"^ +\.key = '(.)',$", (source / "libs/simulation/bone/include/osteo/simulation/bone/burr_kind.h").read_text(), re.M)
+    assert len(kinds) > 1, kinds
+    wanted |= {k.lower() for k in kinds}
     assert wanted == pressed, (wanted - pressed, pressed - wanted)
 
 
