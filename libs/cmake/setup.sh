@@ -101,7 +101,7 @@ ensure_readers() {
   fi
 }
 
-# Processor time of a first build, as measured (CONTRIBUTING.md), in seconds. cost TARGET
+# Processor time of a first build, roughly, in seconds: for what is told before it. cost TARGET
 cost() {
   case $1 in
     osteo) echo 660 ;;
