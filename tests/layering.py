@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Who includes whom is what libs/layers.txt says of areas and libraries, no more and no less; architecture.md shows the same; no public header has a
-heavy one, no two types have one name."""
+heavy one, at most 200 are public, no two types have one name."""
 import pathlib, re, sys
 
 root = pathlib.Path(sys.argv[1])
@@ -15,7 +15,7 @@ json_still = {"libs/session/scene/src/session_folder.cpp", "libs/session/recordi
 bad = []
 
 # The table: area -> areas it may use; library -> (may be included by its headers, by its sources only).
-table, areas, area_of, area = {}, {}, {}, None
+table, areas, area_of, area, kinds = {}, {}, {}, None, {}
 for line in (root / "libs/layers.txt").read_text().splitlines():
     if not line or line.startswith("#"):
         continue
@@ -23,6 +23,10 @@ for line in (root / "libs/layers.txt").read_text().splitlines():
         area = m[1]
         areas[area] = m[2].split()
         bad += [f"libs/layers.txt: {area} may use {a}, which does not stand above it" for a in areas[area] if a not in areas]
+        continue
+    if m := re.fullmatch(r"(programs|research): ([\w ]+)", line):
+        kinds[m[1]] = m[2].split()
+        bad += [f"libs/layers.txt: {m[1]} lists {lib}, which has no row" for lib in kinds[m[1]] if lib not in table]
         continue
     m = re.fullmatch(r"(\w+) +([\w ]*)\|([\w ]*)", line)
     if not m or not area:
@@ -39,6 +43,27 @@ for line in (root / "libs/layers.txt").read_text().splitlines():
 for area, others in areas.items():
     used = {area_of[o] for lib, (public, private) in table.items() if area_of[lib] == area for o in public | private if o in area_of}
     bad += [f"libs/layers.txt: nothing of {area} uses {other}" for other in others if other not in used]
+
+# What other projects get takes nothing that belongs to the programs alone.
+programs = set(kinds["programs"])
+for lib, (public, private) in table.items():
+    bad += [f"libs/layers.txt: {lib} is for other projects and lists {o}, which is the programs' own" for o in (public | private) & programs if lib not in programs]
+bad += [f"libs/layers.txt: research lists {lib}, programs does not" for lib in kinds["research"] if lib not in programs]
+for lib, (public, private) in table.items():
+    bad += [f"libs/layers.txt: {lib} lists {o}, which a build may leave out" for o in (public | private) & set(kinds["research"]) if lib not in kinds["research"]]
+
+# Public headers: what other projects may include. Those in detail/ come along with one of them and are for their own library and for tests.
+kMostPublicHeaders = 200
+public_headers = [p for p in sorted((root / "libs").glob("*/*/include/osteo/*/*/*.h")) if p.parent.name not in programs]
+if len(public_headers) > kMostPublicHeaders:
+    bad.append(f"{len(public_headers)} public headers, where {kMostPublicHeaders} are allowed: is the new one private (src/), detail/, or part of one that is there?")
+for p in public_headers:
+    if not re.match(r"// \w|/// @class", p.read_text()):
+        bad.append(f"{p.relative_to(root)} does not say in its first line what it is for")
+for p in sorted([*(root / "libs").rglob("*"), *(root / "apps").rglob("*")]):
+    if p.suffix in (".h", ".cpp"):
+        own = p.relative_to(root).parts[2:3]
+        bad += [f"{p.relative_to(root)}: {m[0]}: detail/ is for {m[1]} alone" for m in re.finditer(r'#include "osteo/\w+/(\w+)/detail/\w+\.h"', p.read_text()) if [m[1]] != list(own)]
 
 # The includes, and the namespace of each file: `osteo::inline AREA`, of core `osteo`.
 for folder in sorted(p for p in (root / "libs").glob("*/*") if p.is_dir() and p.parent.name != "cmake"):
@@ -141,5 +166,5 @@ for name, where in sorted(defined.items()):
     if len(where) > 1:
         bad.append(f"{name} is defined in {' and in '.join(sorted(where))}: one of them needs another name")
 
-print("\n".join(bad) or f"{len(areas)} areas, {len(table)} libraries, each includes and links what libs/layers.txt says")
+print("\n".join(bad) or f"{len(areas)} areas, {len(table)} libraries, {len(public_headers)} public headers, each includes and links what libs/layers.txt says")
 sys.exit(bool(bad))

@@ -30,15 +30,24 @@ def plain(text):
     return text.replace("`", "").replace("()", "")
 
 
+layers = (root / "libs/layers.txt").read_text()
+# Their headers are for Osteotome's programs and have no pages.
+programs = re.search(r"^programs: (.*)$", layers, re.M)[1].split()
+
+
+def headers():
+    return [h for h in sorted(root.glob("libs/*/*/include/**/*.h")) if h.relative_to(root / "libs").parts[1] not in programs]
+
+
 def groups():
     """Components with what they hold, as Doxygen's groups."""
     holds = {r[0]: plain(r[2]) for r in rows("docs/architecture.md", "library")}
     libraries, of = [], {}
-    for line in (root / "libs/layers.txt").read_text().splitlines():
+    for line in layers.splitlines():
         if line.startswith("== "):
             area = line.split()[1]
             of[area] = []
-        elif line and line[0] != "#":
+        elif line and line[0] != "#" and ":" not in line and line.split()[0] not in programs:
             libraries.append(line.split()[0])
             of[area].append(libraries[-1])
     components = []  # name, what its example shows, its file, libraries
@@ -57,7 +66,7 @@ def groups():
         if name == "others":
             text.append("/// @defgroup component_others Libraries by their own name\n"
                         "/// What no component has is asked for by its own name: `find_package(osteo COMPONENTS base)`. "
-                        "But for `window`: that is the programs' own and not installed.")
+                        "What belongs to the programs (libs/layers.txt) is not installed.")
         else:
             text.append(f"/// @defgroup component_{name} Component {name}\n/// Component `{name}`, target `osteo::{name}`. "
                         f"An example, which the test `install` compiles and runs: {shows}.\n/// @include {file}")
@@ -78,7 +87,7 @@ def groups():
 
 def stage(into):
     """The headers, each in the group of its library: its first comment is what the file holds, what is in the namespace is in the group."""
-    for header in sorted(root.glob("libs/*/*/include/**/*.h")):
+    for header in headers():
         area, lib = header.relative_to(root / "libs").parts[:2]
         to = into / header.relative_to(root / "libs" / area / lib / "include")
         lines = header.read_text().splitlines()
@@ -116,7 +125,7 @@ def check(site, components):
     known |= {m.findtext("name") for m in tags.iter("member") if m.get("kind") == "enumeration"}
     grouped = {c.findtext("name"): c for c in tags.iter("compound") if c.get("kind") == "group"}
     declared = 0
-    for header in root.glob("libs/*/*/include/**/*.h"):
+    for header in headers():
         for name in re.findall(r"^(?:class|struct|enum class|enum)\s+(\w+)[^;<]*?\{", header.read_text(), re.M):
             declared += 1
             if name not in known:

@@ -7,7 +7,7 @@
 
 #include "arrays.h"
 #include "osteo/app/stages/registry.h"
-#include "osteo/geometry/grid/dense.h"
+#include "osteo/geometry/grid/grid_io.h"
 #include "osteo/imaging/pipeline/formats.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 

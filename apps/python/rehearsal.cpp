@@ -10,11 +10,11 @@
 #include "arrays.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/session/recording/haptic_settings.h"
-#include "osteo/session/recording/script_file.h"
+#include "osteo/session/recording/script.h"
 #include "osteo/session/scene/session_folder.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/bone/world_mesh.h"
-#include "osteo/simulation/haptics/stroke_goal.h"
+#include "osteo/simulation/haptics/guide.h"
 
 namespace osteo::python {
 namespace {

@@ -23,11 +23,11 @@
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/threshold.h"
 #include "osteo/imaging/io/vtk_data.h"
+#include "osteo/simulation/bone/depth_map.h"
 #include "osteo/simulation/bone/dust.h"
 #include "osteo/simulation/bone/live_surface.h"
 #include "osteo/simulation/bone/pieces.h"
 #include "osteo/simulation/bone/saw.h"
-#include "osteo/simulation/bone/thickness.h"
 
 namespace osteo {
 namespace {

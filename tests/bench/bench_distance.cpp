@@ -6,10 +6,8 @@
 #include "bench_geometry_peers.h"
 #include "osteo/core/base/simd.h"
 #include "osteo/geometry/distance/binary_distance.h"
-#include "osteo/geometry/distance/live_distance.h"
-#include "osteo/geometry/distance/mask_distance.h"
-#include "osteo/geometry/distance/swept_distance.h"
-#include "osteo/geometry/distance/thesis_distance.h"
+#include "osteo/geometry/distance/detail/live_distance.h"
+#include "osteo/geometry/distance/distance_methods.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo::bench {

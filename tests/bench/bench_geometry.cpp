@@ -11,11 +11,9 @@
 #include "osteo/geometry/cgal/mesh_cgal.h"
 #include "osteo/geometry/distance/compare.h"
 #include "osteo/geometry/tetgen/mesh_tetgen.h"
-#include "osteo/geometry/tets/graded_tets.h"
-#include "osteo/geometry/tets/grid_tets.h"
+#include "osteo/geometry/tets/lattice_tets.h"
 #include "osteo/geometry/tets/quality.h"
 #include "osteo/geometry/tets/skin.h"
-#include "osteo/geometry/tets/stuffing.h"
 
 namespace osteo {
 namespace bench {

@@ -9,8 +9,8 @@
 #include <string>
 
 #include "marker/render.h"
-#include "osteo/simulation/marker/filter.h"
-#include "osteo/simulation/marker/pen.h"
+#include "osteo/simulation/marker/detail/filter.h"
+#include "osteo/simulation/marker/detail/pen.h"
 
 namespace osteo {
 namespace {

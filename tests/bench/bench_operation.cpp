@@ -15,7 +15,7 @@
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/threshold.h"
 #include "osteo/session/scene/rehearsal.h"
-#include "osteo/simulation/bone/plate_fit.h"
+#include "osteo/simulation/bone/plates.h"
 
 namespace osteo {
 namespace {

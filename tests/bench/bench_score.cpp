@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <iostream>
 
-#include "osteo/assessment/evidence/product.h"
+#include "osteo/assessment/evidence/detail/product.h"
 #include "osteo/assessment/evidence/score.h"
 #include "osteo/assessment/scoring/hint_reader.h"
 #include "osteo/session/scene/session_folder.h"

@@ -1,7 +1,7 @@
 // DICOM headers and pixels: our check of lengths, our splitting of fragments, and what the libraries make of the rest.
 #include "file_target.h"
 #include "osteo/core/base/files.h"
-#include "osteo/imaging/dicom/header.h"
+#include "osteo/imaging/dicom/detail/header.h"
 #include "pixels.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

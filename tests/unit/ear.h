@@ -5,7 +5,7 @@
 
 #include "osteo/core/data/volume.h"
 #include "osteo/geometry/grid/brick_grid.h"
-#include "osteo/imaging/image/head_anatomy.h"
+#include "osteo/imaging/image/detail/head_anatomy.h"
 
 namespace osteo::test {
 

@@ -6,7 +6,7 @@
 
 #include "osteo/core/data/rigid_transform.h"
 #include "osteo/core/data/volume.h"
-#include "osteo/imaging/image/head_anatomy.h"
+#include "osteo/imaging/image/detail/head_anatomy.h"
 
 namespace osteo::test {
 

@@ -11,7 +11,7 @@
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/dicom/import.h"
-#include "osteo/imaging/image/bone_threshold.h"
+#include "osteo/imaging/image/threshold.h"
 
 namespace osteo {
 

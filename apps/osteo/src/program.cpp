@@ -11,9 +11,7 @@
 #include "commands/devices.h"
 #include "commands/docs.h"
 #include "commands/edit.h"
-#include "commands/experiment.h"
 #include "commands/export.h"
-#include "commands/ground_truth.h"
 #include "commands/guide.h"
 #include "commands/hand_over.h"
 #include "commands/heat.h"
@@ -33,7 +31,6 @@
 #include "commands/scene.h"
 #include "commands/score.h"
 #include "commands/series.h"
-#include "commands/simulate_trainee.h"
 #include "commands/sound.h"
 #include "commands/stream.h"
 #include "commands/study.h"
@@ -43,6 +40,11 @@
 #include "licence.h"
 #include "osteo/app/stages/registry.h"
 #include "pacs_commands.h"
+#ifdef OSTEO_WITH_RESEARCH
+#include "commands/experiment.h"
+#include "commands/ground_truth.h"
+#include "commands/simulate_trainee.h"
+#endif
 #ifdef OSTEO_WITH_MOVIE
 #include "commands/movie.h"
 #include "osteo/assessment/movie/movie_file.h"
@@ -90,10 +92,14 @@ cli::Program make_osteo_program() {
   p.add<MonitorCommand>();
   p.add<StreamCommand>();
   p.add<ConsoleCommand>();
+#ifdef OSTEO_WITH_RESEARCH
   p.add<ExperimentCommand>();
   p.add<GroundTruthCommand>();
+#endif
   p.add<StudyCommand>();
+#ifdef OSTEO_WITH_RESEARCH
   p.add<SimulateTraineeCommand>();
+#endif
   p.add<DevicesCommand>();
   p.add<MarkersCommand>();
   p.add<CalibrateCameraCommand>();

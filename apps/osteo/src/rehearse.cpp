@@ -16,7 +16,7 @@
 #include "osteo/network/wire/rehearsal_stream.h"
 #include "osteo/network/wire/tracked_hand.h"
 #include "osteo/session/recording/haptic_settings.h"
-#include "osteo/session/recording/script_file.h"
+#include "osteo/session/recording/script.h"
 #include "osteo/session/scene/approval.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/rehearsal.h"

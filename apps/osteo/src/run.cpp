@@ -10,7 +10,7 @@
 #include "osteo/core/base/json_document.h"
 #include "osteo/imaging/pipeline/engine.h"
 #include "osteo/imaging/pipeline/pipeline.h"
-#include "osteo/session/recording/script_file.h"
+#include "osteo/session/recording/script.h"
 #include "program.h"
 
 namespace osteo {

@@ -9,7 +9,7 @@
 #include "osteo/core/base/json_document.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/session/recording/haptic_settings.h"
-#include "osteo/session/recording/script_file.h"
+#include "osteo/session/recording/script.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"

@@ -111,7 +111,12 @@ int StudyCommand::run(const Params& p, cli::Invocation& io) {
       throw Error(ExitCode::usage, "the demo's folder is given twice", "leave -o out");
     if (io.arguments.size() < 2 && p.out.empty())
       throw Error(ExitCode::usage, "the demo needs a folder", "osteo study demo -o FOLDER");
+#ifdef OSTEO_WITH_RESEARCH
     return run_study_demo(io.arguments.size() > 1 ? io.arguments[1] : p.out, p.resamples, p.level, !p.no_movies, io);
+#else
+    throw Error(ExitCode::usage, "this build has no simulated trainees, by whom the demo's sessions are made",
+                "build with -DOSTEO_RESEARCH=ON");
+#endif
   }
   if (io.arguments.size() < 2)
     throw Error(ExitCode::usage, "'study " + action + "' needs the study's folder", "osteo study " + action + " STUDY");

@@ -15,7 +15,7 @@
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/network/tutor/live_past.h"
 #include "osteo/network/tutor/live_seat.h"
-#include "osteo/session/recording/script_file.h"
+#include "osteo/session/recording/script.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"

@@ -1,7 +1,7 @@
 // Component pictures: cuts and a lit view of a CT, without a display.
 #include <cstdio>
 
-#include "osteo/display/view/snapshot.h"
+#include "osteo/display/view/pictures.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/io/surface_io.h"
 

@@ -4,7 +4,7 @@
 
 #include "osteo/geometry/distance/triangle_tree.h"
 #include "osteo/geometry/distance/voxelize.h"
-#include "osteo/geometry/tets/grid_tets.h"
+#include "osteo/geometry/tets/lattice_tets.h"
 
 int main() {
   osteo::TriangleSoup corner;  // of a cube of 6 mm, cut off: a sixth of it

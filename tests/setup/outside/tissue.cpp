@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/geometry/tets/grid_tets.h"
+#include "osteo/geometry/tets/lattice_tets.h"
 #include "osteo/simulation/tissue/statics.h"
 
 int main() {

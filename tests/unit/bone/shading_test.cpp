@@ -1,6 +1,6 @@
 // Normals to light by, against the true ones of bodies whose CT is noisy and sliced, of cuts and edges; and local
 // updates against a rebuild.
-#include "osteo/simulation/bone/shading.h"
+#include "osteo/simulation/bone/detail/shading.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "osteo/core/base/error.h"
-#include "osteo/simulation/bone/structure_cut.h"
+#include "osteo/simulation/bone/structure_map.h"
 #include "soft_solid.h"
 
 namespace osteo {

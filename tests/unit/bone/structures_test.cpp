@@ -7,8 +7,8 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/simulation/bone/burr.h"
+#include "osteo/simulation/bone/depth_map.h"
 #include "osteo/simulation/bone/structure_map.h"
-#include "osteo/simulation/bone/thickness.h"
 #include "solid.h"
 
 namespace osteo {

@@ -14,7 +14,6 @@
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/mesh/mesh_info.h"
 #include "osteo/simulation/bone/live_surface.h"
-#include "osteo/simulation/bone/plate_fit.h"
 #include "osteo/simulation/bone/plates.h"
 
 namespace osteo {

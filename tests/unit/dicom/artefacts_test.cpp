@@ -7,7 +7,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/dicom/import.h"
 #include "osteo/imaging/dicom/volume.h"
-#include "osteo/imaging/image/bone_threshold.h"
+#include "osteo/imaging/image/threshold.h"
 #include "osteo/imaging/io/volume_io.h"
 
 namespace osteo {

@@ -7,8 +7,8 @@
 
 #include "edit.h"
 #include "osteo/core/base/error.h"
+#include "osteo/imaging/dicom/detail/verdict_codes.h"
 #include "osteo/imaging/dicom/import.h"
-#include "osteo/imaging/dicom/verdict_codes.h"
 #include "osteo/imaging/dicom/volume.h"
 #include "osteo/imaging/io/volume_io.h"
 

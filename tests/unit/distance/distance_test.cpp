@@ -9,8 +9,7 @@
 #include "meshes.h"
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/distance/distance_map.h"
-#include "osteo/geometry/distance/swept_distance.h"
-#include "osteo/geometry/distance/thesis_distance.h"
+#include "osteo/geometry/distance/distance_methods.h"
 
 namespace osteo {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "meshes.h"
 #include "osteo/core/base/error.h"
-#include "osteo/geometry/distance/live_distance.h"
+#include "osteo/geometry/distance/detail/live_distance.h"
 
 namespace osteo {
 namespace {

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "osteo/core/base/error.h"
-#include "osteo/geometry/distance/mask_distance.h"
+#include "osteo/geometry/distance/distance_methods.h"
 #include "osteo/geometry/grid/sampler.h"
 
 namespace osteo {

@@ -1,5 +1,5 @@
 // Hands at rest and on their way as devices tell them: ideal, trembling, and in an encoder's steps.
-#include "osteo/assessment/evidence/hand_motion.h"
+#include "osteo/assessment/evidence/detail/hand_motion.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <map>
 #include <numbers>
 
-#include "osteo/assessment/evidence/product.h"
+#include "osteo/assessment/evidence/detail/product.h"
 #include "scene.h"
 
 namespace osteo {

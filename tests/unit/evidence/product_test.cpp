@@ -1,5 +1,5 @@
 // The primitives of the end product against bodies whose answer is known.
-#include "osteo/assessment/evidence/product.h"
+#include "osteo/assessment/evidence/detail/product.h"
 
 #include <gtest/gtest.h>
 

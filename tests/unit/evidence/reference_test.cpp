@@ -1,5 +1,5 @@
 // Regions, conditional quantiles, strokes: against formulas.
-#include "osteo/assessment/evidence/reference.h"
+#include "osteo/assessment/evidence/detail/reference.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "osteo/assessment/evidence/strokes.h"
+#include "osteo/assessment/evidence/detail/strokes.h"
 
 namespace osteo {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "osteo/assessment/evidence/product.h"
+#include "osteo/assessment/evidence/detail/product.h"
 #include "scene.h"
 
 namespace osteo {

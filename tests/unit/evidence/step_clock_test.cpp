@@ -1,5 +1,5 @@
 // Time for each step, from distances made by hand: sums are known exactly.
-#include "osteo/assessment/evidence/step_clock.h"
+#include "osteo/assessment/evidence/detail/step_clock.h"
 
 #include <gtest/gtest.h>
 

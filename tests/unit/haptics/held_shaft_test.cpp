@@ -1,5 +1,5 @@
 // A shaft stays on the side of bone where it is: against closed forms, and in the servo's step.
-#include "osteo/simulation/haptics/held_shaft.h"
+#include "osteo/simulation/haptics/detail/held_shaft.h"
 
 #include <gtest/gtest.h>
 

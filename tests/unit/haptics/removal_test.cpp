@@ -3,7 +3,7 @@
 
 #include <numbers>
 
-#include "osteo/simulation/haptics/grains.h"
+#include "osteo/simulation/haptics/detail/grains.h"
 #include "overlap_kernel.h"
 #include "sweep.h"
 

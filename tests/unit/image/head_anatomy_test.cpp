@@ -1,6 +1,6 @@
 // The anatomy against what is published of sizes and distances (docs/phantom.md names the sources), for ten
 // individuals.
-#include "osteo/imaging/image/head_anatomy.h"
+#include "osteo/imaging/image/detail/head_anatomy.h"
 
 #include <gtest/gtest.h>
 

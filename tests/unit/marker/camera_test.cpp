@@ -1,5 +1,5 @@
 // Calibration by rendered views of the plate; the printed pages.
-#include "osteo/simulation/marker/camera.h"
+#include "osteo/simulation/marker/detail/camera.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // The tip of a pen, the filter behind the pictures, cameras and pens as files.
-#include "osteo/simulation/marker/pen.h"
+#include "osteo/simulation/marker/detail/pen.h"
 
 #include <gtest/gtest.h>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/simulation/marker/camera.h"
-#include "osteo/simulation/marker/filter.h"
+#include "osteo/simulation/marker/detail/camera.h"
+#include "osteo/simulation/marker/detail/filter.h"
 #include "render.h"
 
 namespace osteo {

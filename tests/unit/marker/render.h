@@ -11,7 +11,7 @@
 #include <random>
 #include <vector>
 
-#include "osteo/simulation/marker/tracker.h"
+#include "osteo/simulation/marker/detail/tracker.h"
 
 namespace osteo::test {
 

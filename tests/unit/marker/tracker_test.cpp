@@ -1,4 +1,4 @@
-#include "osteo/simulation/marker/tracker.h"
+#include "osteo/simulation/marker/detail/tracker.h"
 
 #include <gtest/gtest.h>
 

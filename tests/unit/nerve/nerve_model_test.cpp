@@ -1,5 +1,5 @@
 // Nerves alone: thresholds against the published fit, what silences, what fires, the middle line of a tube.
-#include "osteo/simulation/nerve/nerve_model.h"
+#include "osteo/simulation/nerve/detail/nerve_model.h"
 
 #include <gtest/gtest.h>
 

@@ -11,7 +11,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/session/recording/haptic_settings.h"
 #include "osteo/session/recording/recorder.h"
-#include "osteo/session/recording/script_file.h"
+#include "osteo/session/recording/script.h"
 #include "osteo/session/recording/session_reader.h"
 #include "osteo/simulation/bone/burr.h"
 #include "osteo/simulation/haptics/texture.h"

@@ -9,7 +9,7 @@
 #include "osteo/assessment/review/heat_sheet.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/display/view/stills.h"
+#include "osteo/display/view/pictures.h"
 #include "osteo/geometry/grid/brick_places.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "scene_parts.h"

@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "osteo/core/rt/histogram.h"
+#include "osteo/core/rt/detail/histogram.h"
 #include "osteo/core/rt/loop.h"
 #include "osteo/core/rt/ring.h"
 #include "osteo/core/rt/seqlock.h"

@@ -8,7 +8,7 @@
 
 #include "bar.h"
 #include "osteo/core/base/files.h"
-#include "osteo/session/recording/script_file.h"
+#include "osteo/session/recording/script.h"
 #include "osteo/session/recording/session_file.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"

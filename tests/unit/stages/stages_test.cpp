@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "meshes.h"
-#include "osteo/app/stages/segment.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/data/tet_mesh.h"
+#include "segment.h"
 
 namespace osteo {
 namespace {

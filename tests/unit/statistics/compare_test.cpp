@@ -2,7 +2,7 @@
 #include "osteo/core/statistics/compare.h"
 
 #include "osteo/core/base/error.h"
-#include "osteo/core/statistics/correlation.h"
+#include "osteo/core/statistics/curves.h"
 #include "osteo/core/statistics/decide.h"
 #include "reference.h"
 

@@ -1,5 +1,5 @@
 // Intervals that are drawn, against the formulas in NumPy with Student's quantiles from tables.
-#include "osteo/core/statistics/line.h"
+#include "osteo/core/statistics/curves.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 #include "osteo/core/statistics/repeated.h"
 
 #include "osteo/core/base/error.h"
-#include "osteo/core/statistics/isotonic.h"
+#include "osteo/core/statistics/curves.h"
 #include "reference.h"
 
 namespace osteo::statistics {

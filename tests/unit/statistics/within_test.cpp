@@ -1,5 +1,5 @@
 // The same people under several conditions, beside statsmodels, pingouin and SciPy.
-#include "osteo/core/statistics/within.h"
+#include "osteo/core/statistics/repeated.h"
 
 #include "osteo/core/base/error.h"
 #include "reference.h"

@@ -6,7 +6,7 @@
 
 #include "meshes.h"
 #include "osteo/core/base/error.h"
-#include "osteo/core/data/tet_check.h"
+#include "osteo/core/data/tet_mesh.h"
 
 namespace osteo {
 namespace {

@@ -9,13 +9,11 @@
 
 #include "meshes.h"
 #include "osteo/core/base/error.h"
-#include "osteo/core/data/tet_check.h"
+#include "osteo/core/data/tet_mesh.h"
 #include "osteo/geometry/distance/compare.h"
-#include "osteo/geometry/tets/graded_tets.h"
-#include "osteo/geometry/tets/grid_tets.h"
+#include "osteo/geometry/tets/lattice_tets.h"
 #include "osteo/geometry/tets/quality.h"
 #include "osteo/geometry/tets/skin.h"
-#include "osteo/geometry/tets/stuffing.h"
 #include "osteo/imaging/io/tet_io.h"
 
 namespace osteo {

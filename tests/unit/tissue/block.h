@@ -4,7 +4,7 @@
 #include <functional>
 #include <map>
 
-#include "osteo/geometry/tets/grid_tets.h"
+#include "osteo/geometry/tets/lattice_tets.h"
 #include "osteo/simulation/tissue/fem.h"
 
 namespace osteo::test {

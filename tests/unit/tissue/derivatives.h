@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "osteo/simulation/tissue/energy.h"
+#include "osteo/simulation/tissue/detail/energy.h"
 
 namespace osteo::test {
 

@@ -7,7 +7,7 @@
 
 #include "block.h"
 #include "osteo/core/base/error.h"
-#include "osteo/simulation/tissue/equilibrium.h"
+#include "osteo/simulation/tissue/detail/equilibrium.h"
 
 namespace osteo {
 namespace {

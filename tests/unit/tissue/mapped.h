@@ -3,7 +3,7 @@
 #include <functional>
 
 #include "block.h"
-#include "osteo/simulation/tissue/equilibrium.h"
+#include "osteo/simulation/tissue/detail/equilibrium.h"
 
 namespace osteo::test {
 

@@ -1,4 +1,4 @@
-#include "osteo/simulation/tissue/tissue_model.h"
+#include "osteo/simulation/tissue/detail/tissue_model.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "block.h"
 #include "derivatives.h"
 #include "osteo/core/base/error.h"
-#include "osteo/simulation/tissue/equilibrium.h"
+#include "osteo/simulation/tissue/detail/equilibrium.h"
 
 namespace osteo {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "block.h"
 #include "osteo/core/base/error.h"
+#include "osteo/simulation/tissue/detail/equilibrium.h"
 #include "osteo/simulation/tissue/dynamics.h"
-#include "osteo/simulation/tissue/equilibrium.h"
 
 namespace osteo {
 namespace {

@@ -12,7 +12,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/io/inp_io.h"
 #include "osteo/imaging/io/tet_io.h"
-#include "osteo/simulation/tissue/nodes_vtu.h"
+#include "osteo/simulation/tissue/fem.h"
 #include "osteo/simulation/tissue/problem.h"
 #include "scratch.h"
 

@@ -10,8 +10,8 @@
 #include <cstdlib>
 
 #include "osteo/display/view/actors.h"
-#include "osteo/display/view/bone_view.h"
-#include "osteo/display/view/dust_view.h"
+#include "osteo/display/view/detail/bone_view.h"
+#include "osteo/display/view/detail/dust_view.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/simulation/bone/live_surface.h"

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <numbers>
 
-#include "osteo/display/view/cut_outline.h"
 #include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/simulation/bone/instrument.h"

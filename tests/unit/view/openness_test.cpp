@@ -1,5 +1,5 @@
 // Light that gets into cavities, against the exact share of the sky.
-#include "osteo/display/view/openness.h"
+#include "osteo/display/view/detail/openness.h"
 
 #include <gtest/gtest.h>
 

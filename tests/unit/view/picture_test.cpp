@@ -15,10 +15,10 @@
 #include <thread>
 
 #include "osteo/display/view/actors.h"
-#include "osteo/display/view/bone_view.h"
-#include "osteo/display/view/changes.h"
+#include "osteo/display/view/detail/bone_view.h"
+#include "osteo/display/view/detail/wet_film.h"
 #include "osteo/display/view/offscreen.h"
-#include "osteo/display/view/wet_film.h"
+#include "osteo/display/view/world_view.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/imaging/io/vtk_data.h"
 #include "solid.h"

@@ -10,7 +10,7 @@
 #include <cstdio>
 
 #include "osteo/display/view/actors.h"
-#include "osteo/display/view/bone_view.h"
+#include "osteo/display/view/detail/bone_view.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/simulation/bone/live_surface.h"
 #include "solid.h"

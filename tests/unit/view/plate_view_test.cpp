@@ -6,8 +6,8 @@
 #include <cstdlib>
 
 #include "osteo/display/view/actors.h"
+#include "osteo/display/view/instrument_view.h"
 #include "osteo/display/view/offscreen.h"
-#include "osteo/display/view/plate_view.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "slab.h"
 

@@ -14,7 +14,6 @@
 
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/offscreen.h"
-#include "osteo/display/view/scope_camera.h"
 
 namespace osteo {
 namespace {

@@ -12,7 +12,7 @@
 #include <numbers>
 
 #include "osteo/display/view/actors.h"
-#include "osteo/display/view/cut_outline.h"
+#include "osteo/display/view/live_cut.h"
 #include "osteo/display/view/offscreen.h"
 
 namespace osteo {

@@ -1,4 +1,4 @@
-#include "osteo/display/view/visible.h"
+#include "osteo/display/view/detail/visible.h"
 
 #include <gtest/gtest.h>
 

@@ -8,9 +8,9 @@
 #include <array>
 
 #include "osteo/display/view/actors.h"
-#include "osteo/display/view/bone_view.h"
-#include "osteo/display/view/changes.h"
+#include "osteo/display/view/detail/bone_view.h"
 #include "osteo/display/view/offscreen.h"
+#include "osteo/display/view/world_view.h"
 #include "osteo/simulation/bone/live_surface.h"
 #include "solid.h"
 

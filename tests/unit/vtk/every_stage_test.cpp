@@ -16,7 +16,7 @@
 
 #include <fstream>
 
-#include "osteo/app/stages/edit.h"
+#include "edit.h"
 #include "osteo/app/stages/mesh.h"
 #include "osteo/app/stages/registry.h"
 #include "osteo/app/vtk/vtkOsteoDataObject.h"

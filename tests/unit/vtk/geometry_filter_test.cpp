@@ -6,7 +6,7 @@
 #include <vtkSphereSource.h>
 #include <vtkUnstructuredGrid.h>
 
-#include "osteo/app/stages/distance.h"
+#include "distance.h"
 #include "osteo/app/stages/mesh.h"
 #include "osteo/app/vtk/vtkOsteoDataObject.h"
 #include "osteo/app/vtk/vtkOsteoStage.h"

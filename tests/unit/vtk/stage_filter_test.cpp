@@ -9,9 +9,9 @@
 #include <vtkPolyData.h>
 #include <vtkPolyDataNormals.h>
 
-#include "osteo/app/stages/bone.h"
-#include "osteo/app/stages/image.h"
-#include "osteo/app/stages/import.h"
+#include "bone.h"
+#include "image.h"
+#include "import.h"
 #include "osteo/app/vtk/vtkOsteoDataObject.h"
 #include "osteo/app/vtk/vtkOsteoStage.h"
 #include "osteo/geometry/grid/resample.h"

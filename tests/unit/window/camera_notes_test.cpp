@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "camera_notes.h"
-#include "osteo/simulation/camera/view_note.h"
+#include "osteo/simulation/camera/microscope.h"
 
 namespace osteo {
 namespace {

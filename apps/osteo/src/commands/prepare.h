@@ -3,8 +3,8 @@
 #include <string>
 
 #include "osteo/app/cli/command.h"
-#include "osteo/imaging/image/bone_threshold.h"
 #include "osteo/imaging/image/crop.h"
+#include "osteo/imaging/image/threshold.h"
 
 namespace osteo {
 

@@ -1,4 +1,4 @@
-#include "osteo/app/stages/bone.h"
+#include "bone.h"
 
 #include <algorithm>
 #include <cmath>

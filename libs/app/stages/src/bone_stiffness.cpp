@@ -1,4 +1,4 @@
-#include "osteo/app/stages/bone_stiffness.h"
+#include "bone_stiffness.h"
 
 #include <algorithm>
 #include <bit>

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "osteo/app/stages/tissue.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/simulation/tissue/problem.h"
+#include "tissue.h"
 
 namespace osteo::inline app::tissue {
 

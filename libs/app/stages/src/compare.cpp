@@ -1,4 +1,4 @@
-#include "osteo/app/stages/distance.h"
+#include "distance.h"
 
 #include "osteo/core/base/json_document.h"
 #include "osteo/geometry/distance/compare.h"

@@ -1,4 +1,4 @@
-#include "osteo/app/stages/curve.h"
+#include "curve.h"
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"

@@ -1,4 +1,4 @@
-#include "osteo/app/stages/distance.h"
+#include "distance.h"
 
 #include <algorithm>
 #include <charconv>
@@ -9,10 +9,8 @@
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/data/points_io.h"
-#include "osteo/geometry/distance/mask_distance.h"
-#include "osteo/geometry/distance/swept_distance.h"
-#include "osteo/geometry/distance/thesis_distance.h"
-#include "osteo/geometry/grid/brick_values.h"
+#include "osteo/geometry/distance/distance_methods.h"
+#include "osteo/geometry/grid/brick_places.h"
 
 namespace osteo::inline app {
 

@@ -1,4 +1,4 @@
-#include "osteo/app/stages/edit.h"
+#include "edit.h"
 
 namespace osteo::inline app {
 

@@ -1,4 +1,4 @@
-#include "osteo/app/stages/enhance.h"
+#include "enhance.h"
 
 namespace osteo::inline app {
 

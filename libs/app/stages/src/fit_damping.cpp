@@ -1,4 +1,4 @@
-#include "osteo/app/stages/fit_damping.h"
+#include "fit_damping.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,4 +1,4 @@
-#include "osteo/app/stages/image.h"
+#include "image.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "osteo/app/stages/import.h"
+#include "import.h"
 
 #include "osteo/imaging/dicom/volume.h"
 

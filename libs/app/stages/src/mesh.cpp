@@ -6,15 +6,13 @@
 #include "osteo/core/base/guarded.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/param.h"
-#include "osteo/core/data/tet_check.h"
+#include "osteo/core/data/tet_mesh.h"
 #include "osteo/geometry/distance/compare.h"
 #include "osteo/geometry/distance/solid.h"
 #include "osteo/geometry/distance/voxelize.h"
 #include "osteo/geometry/mesh/mesh_info.h"
-#include "osteo/geometry/tets/graded_tets.h"
-#include "osteo/geometry/tets/grid_tets.h"
+#include "osteo/geometry/tets/lattice_tets.h"
 #include "osteo/geometry/tets/quality.h"
-#include "osteo/geometry/tets/stuffing.h"
 #ifdef OSTEO_WITH_CGAL
 #include "osteo/geometry/cgal/mesh_cgal.h"
 #endif

@@ -1,4 +1,4 @@
-#include "osteo/app/stages/register.h"
+#include "register.h"
 
 #include "osteo/core/base/json_document.h"
 

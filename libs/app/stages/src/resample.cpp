@@ -1,6 +1,6 @@
 #include "osteo/geometry/grid/resample.h"
 
-#include "osteo/app/stages/bone.h"
+#include "bone.h"
 
 namespace osteo::inline app {
 

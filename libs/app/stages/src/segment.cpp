@@ -1,4 +1,4 @@
-#include "osteo/app/stages/segment.h"
+#include "segment.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "osteo/app/stages/snapshot.h"
+#include "snapshot.h"
 
 namespace osteo::inline app {
 

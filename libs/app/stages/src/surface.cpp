@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/app/stages/bone.h"
+#include "bone.h"
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 

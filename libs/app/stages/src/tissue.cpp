@@ -1,4 +1,4 @@
-#include "osteo/app/stages/tissue.h"
+#include "tissue.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/param.h"
 #include "osteo/simulation/tissue/dynamics.h"
+#include "osteo/simulation/tissue/fem.h"
 #include "osteo/simulation/tissue/implicit.h"
-#include "osteo/simulation/tissue/nodes_vtu.h"
 #include "osteo/simulation/tissue/statics.h"
 #include "tissue_parts.h"
 

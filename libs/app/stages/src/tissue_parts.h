@@ -3,9 +3,9 @@
 #include <span>
 #include <string>
 
-#include "osteo/app/stages/tissue.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/simulation/tissue/problem.h"
+#include "tissue.h"
 
 namespace osteo::inline app::tissue {
 

@@ -1,4 +1,4 @@
-#include "osteo/app/window/audio_out.h"
+#include "audio_out.h"
 
 #include <SDL.h>
 #include <dlfcn.h>

@@ -6,9 +6,9 @@
 #include <fstream>
 #include <optional>
 
+#include "audio_out.h"
 #include "monitor_panel.h"
 #include "monitor_screen.h"
-#include "osteo/app/window/audio_out.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
 #include "ui_style.h"

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "osteo/simulation/bone/structure_cut.h"
+#include "osteo/simulation/bone/structure_map.h"
 
 namespace osteo::inline app {
 

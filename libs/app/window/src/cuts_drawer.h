@@ -8,7 +8,6 @@
 #include <optional>
 #include <vector>
 
-#include "osteo/display/view/cut_outline.h"
 #include "osteo/display/view/live_cut.h"
 
 namespace osteo::inline app {

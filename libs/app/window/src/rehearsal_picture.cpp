@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "osteo/core/base/error.h"
+#include "osteo/display/view/actors.h"
 #include "osteo/display/view/offscreen.h"
-#include "osteo/display/view/scope_camera.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/simulation/bone/world_mesh.h"
 #include "rehearsal_parts.h"

@@ -11,7 +11,7 @@
 
 #include <algorithm>
 
-#include "osteo/simulation/camera/view_note.h"
+#include "osteo/simulation/camera/microscope.h"
 #include "palette.h"
 #include "review_panel.h"
 

@@ -15,7 +15,7 @@
 #include <cstdio>
 
 #include "osteo/display/view/actors.h"
-#include "osteo/display/view/changes.h"
+#include "osteo/display/view/world_view.h"
 
 namespace osteo::inline app {
 namespace {

@@ -13,7 +13,7 @@
 #include <vtkRenderer.h>
 
 #include "osteo/display/view/actors.h"
-#include "osteo/display/view/plate_view.h"
+#include "osteo/display/view/instrument_view.h"
 #include "osteo/simulation/bone/plates.h"
 #include "osteo/simulation/bone/world_mesh.h"
 #include "ui_style.h"

@@ -8,7 +8,7 @@
 
 #include "cut_preview.h"
 #include "hand_tools.h"
-#include "osteo/display/view/plate_view.h"
+#include "osteo/display/view/instrument_view.h"
 #include "room_layout.h"
 
 struct ImDrawList;

@@ -5,7 +5,7 @@
 #include <array>
 #include <string>
 
-#include "osteo/display/view/cut_outline.h"
+#include "osteo/display/view/live_cut.h"
 #include "osteo/display/view/slices.h"
 
 namespace osteo::inline app {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/app/window/audio_out.h"
+#include "audio_out.h"
 #include "osteo/core/base/error.h"
 #include "osteo/session/scene/sound.h"
 

@@ -13,7 +13,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "osteo/display/view/scope_camera.h"
+#include "osteo/display/view/actors.h"
 
 namespace osteo::inline app {
 namespace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "osteo/simulation/bone/instrument_gap.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/haptics/stream.h"
 
 namespace osteo::inline app {

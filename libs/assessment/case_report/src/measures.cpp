@@ -9,7 +9,7 @@
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/image/components.h"
-#include "osteo/simulation/bone/thickness.h"
+#include "osteo/simulation/bone/depth_map.h"
 
 namespace osteo::inline assessment::case_report {
 namespace {

@@ -5,10 +5,8 @@
 
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
-#include "osteo/display/view/sides.h"
+#include "osteo/display/view/pictures.h"
 #include "osteo/display/view/slices.h"
-#include "osteo/display/view/snapshot.h"
-#include "osteo/geometry/grid/brick_linear.h"
 #include "osteo/geometry/grid/sampler.h"
 
 namespace osteo::inline assessment::case_report {

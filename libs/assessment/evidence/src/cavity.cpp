@@ -5,7 +5,7 @@
 
 #include "osteo/assessment/evidence/visibility.h"
 #include "osteo/core/base/parallel.h"
-#include "osteo/geometry/grid/brick_linear.h"
+#include "osteo/geometry/grid/sampler.h"
 
 namespace osteo::inline assessment {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/session/recording/apply.h"
 #include "osteo/session/recording/recorder.h"
+#include "osteo/session/recording/records.h"
 
 namespace osteo::inline assessment {
 namespace {

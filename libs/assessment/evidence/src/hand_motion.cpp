@@ -1,4 +1,4 @@
-#include "osteo/assessment/evidence/hand_motion.h"
+#include "osteo/assessment/evidence/detail/hand_motion.h"
 
 namespace osteo::inline assessment {
 

@@ -4,7 +4,7 @@
 #include <set>
 
 #include "hints_json.h"
-#include "osteo/assessment/evidence/process.h"
+#include "osteo/assessment/evidence/detail/process.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"

@@ -1,4 +1,4 @@
-#include "osteo/assessment/evidence/process.h"
+#include "osteo/assessment/evidence/detail/process.h"
 
 #include <algorithm>
 #include <cmath>

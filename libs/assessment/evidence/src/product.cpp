@@ -1,4 +1,4 @@
-#include "osteo/assessment/evidence/product.h"
+#include "osteo/assessment/evidence/detail/product.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "osteo/assessment/evidence/product.h"
+#include "osteo/assessment/evidence/detail/product.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/geometry/distance/binary_distance.h"
 #include "product_lattice.h"

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <queue>
 
-#include "osteo/assessment/evidence/product.h"
+#include "osteo/assessment/evidence/detail/product.h"
 #include "product_lattice.h"
 
 namespace osteo::inline assessment {

@@ -6,7 +6,7 @@
 
 #include "osteo/core/base/parallel.h"
 #include "osteo/geometry/distance/binary_distance.h"
-#include "osteo/geometry/grid/brick_linear.h"
+#include "osteo/geometry/grid/sampler.h"
 
 namespace osteo::inline assessment {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "osteo/assessment/evidence/product.h"
+#include "osteo/assessment/evidence/detail/product.h"
 #include "osteo/core/base/context.h"
 #include "osteo/imaging/edit/bit_mask.h"
 #include "osteo/simulation/bone/structure_map.h"

@@ -1,4 +1,4 @@
-#include "osteo/assessment/evidence/reference.h"
+#include "osteo/assessment/evidence/detail/reference.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
-#include "osteo/core/statistics/isotonic.h"
+#include "osteo/core/statistics/curves.h"
 
 namespace osteo::inline assessment {
 

@@ -1,4 +1,4 @@
-#include "osteo/assessment/evidence/saw_cuts.h"
+#include "osteo/assessment/evidence/detail/saw_cuts.h"
 
 #include <algorithm>
 

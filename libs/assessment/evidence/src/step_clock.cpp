@@ -1,4 +1,4 @@
-#include "osteo/assessment/evidence/step_clock.h"
+#include "osteo/assessment/evidence/detail/step_clock.h"
 
 #include <algorithm>
 #include <cmath>

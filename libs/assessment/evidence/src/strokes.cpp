@@ -1,4 +1,4 @@
-#include "osteo/assessment/evidence/strokes.h"
+#include "osteo/assessment/evidence/detail/strokes.h"
 
 #include <algorithm>
 #include <array>

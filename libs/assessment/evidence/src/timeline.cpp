@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "osteo/assessment/evidence/detail/process.h"
 #include "osteo/assessment/evidence/frames.h"
-#include "osteo/assessment/evidence/process.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/haptics/saw_slot.h"
 

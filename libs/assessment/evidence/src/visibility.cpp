@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "osteo/assessment/evidence/hand_motion.h"
+#include "osteo/assessment/evidence/detail/hand_motion.h"
 #include "osteo/geometry/grid/brick_places.h"
 #include "osteo/simulation/bone/instrument.h"
 

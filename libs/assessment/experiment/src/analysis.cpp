@@ -6,9 +6,8 @@
 
 #include "figures.h"
 #include "osteo/core/base/files.h"
-#include "osteo/core/statistics/line.h"
+#include "osteo/core/statistics/curves.h"
 #include "osteo/core/statistics/repeated.h"
-#include "osteo/core/statistics/within.h"
 
 namespace osteo::inline assessment::experiment {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "osteo/assessment/experiment/analysis.h"
 #include "osteo/core/base/portable_math.h"
-#include "osteo/core/statistics/line.h"
+#include "osteo/core/statistics/curves.h"
 
 namespace osteo::inline assessment::experiment {
 namespace {

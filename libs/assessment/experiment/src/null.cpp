@@ -3,7 +3,7 @@
 #include "osteo/assessment/experiment/analysis.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
-#include "osteo/core/statistics/within.h"
+#include "osteo/core/statistics/repeated.h"
 
 namespace osteo::inline assessment::experiment {
 namespace {

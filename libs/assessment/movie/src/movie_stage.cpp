@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "osteo/display/view/actors.h"
-#include "osteo/display/view/scope_camera.h"
 #include "osteo/display/view/slices.h"
 
 namespace osteo::inline assessment {

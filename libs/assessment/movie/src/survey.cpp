@@ -5,7 +5,7 @@
 
 #include "osteo/assessment/movie/movie.h"
 #include "osteo/core/base/error.h"
-#include "osteo/simulation/camera/view_note.h"
+#include "osteo/simulation/camera/microscope.h"
 
 namespace osteo::inline assessment {
 namespace {

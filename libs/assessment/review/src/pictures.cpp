@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/display/view/snapshot.h"
-#include "osteo/display/view/stills.h"
+#include "osteo/display/view/pictures.h"
 #include "osteo/display/view/structures_view.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "scene_parts.h"

@@ -1,4 +1,4 @@
-#include "osteo/assessment/scoring/score_reader.h"
+#include "osteo/assessment/scoring/detail/score_reader.h"
 
 namespace osteo::inline assessment {
 

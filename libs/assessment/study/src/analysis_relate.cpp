@@ -1,7 +1,7 @@
 // Do raters agree, do metrics follow them, and can a value tell who is who?
 #include "analyst.h"
 #include "charts.h"
-#include "osteo/core/statistics/correlation.h"
+#include "osteo/core/statistics/curves.h"
 #include "osteo/core/statistics/decide.h"
 
 namespace osteo::inline assessment::study {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/core/statistics/line.h"
+#include "osteo/core/statistics/curves.h"
 
 namespace osteo::inline assessment::study {
 namespace {

@@ -1,4 +1,4 @@
-#include "osteo/core/data/tet_check.h"
+#include "osteo/core/data/tet_mesh.h"
 
 #include <algorithm>
 #include <cmath>

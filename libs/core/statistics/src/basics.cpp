@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "check.h"
-#include "osteo/core/statistics/distributions.h"
 
 namespace osteo::statistics {
 

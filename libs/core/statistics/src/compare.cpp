@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "check.h"
-#include "osteo/core/statistics/distributions.h"
+#include "osteo/core/statistics/basics.h"
 #include "permute.h"
 
 namespace osteo::statistics {

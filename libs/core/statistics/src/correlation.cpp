@@ -1,4 +1,4 @@
-#include "osteo/core/statistics/correlation.h"
+#include "osteo/core/statistics/curves.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <Eigen/Dense>
 
 #include "check.h"
-#include "osteo/core/statistics/distributions.h"
+#include "osteo/core/statistics/basics.h"
 
 namespace osteo::statistics {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "check.h"
-#include "osteo/core/statistics/distributions.h"
+#include "osteo/core/statistics/basics.h"
 
 namespace osteo::statistics {
 

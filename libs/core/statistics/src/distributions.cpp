@@ -1,4 +1,4 @@
-#include "osteo/core/statistics/distributions.h"
+#include "osteo/core/statistics/basics.h"
 
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/fisher_f.hpp>

@@ -1,9 +1,9 @@
-#include "osteo/core/statistics/line.h"
+#include "osteo/core/statistics/curves.h"
 
 #include <cmath>
 
 #include "check.h"
-#include "osteo/core/statistics/distributions.h"
+#include "osteo/core/statistics/basics.h"
 
 namespace osteo::statistics {
 

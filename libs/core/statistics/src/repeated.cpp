@@ -10,7 +10,7 @@
 #include <numbers>
 
 #include "check.h"
-#include "osteo/core/statistics/distributions.h"
+#include "osteo/core/statistics/basics.h"
 #include "permute.h"
 
 namespace osteo::statistics {

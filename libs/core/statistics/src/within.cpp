@@ -1,10 +1,10 @@
-#include "osteo/core/statistics/within.h"
+#include "osteo/core/statistics/repeated.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "check.h"
-#include "osteo/core/statistics/distributions.h"
+#include "osteo/core/statistics/basics.h"
 
 namespace osteo::statistics {
 

@@ -1,4 +1,4 @@
-#include "osteo/display/view/bone_paint.h"
+#include "osteo/display/view/detail/bone_paint.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "osteo/display/view/bone_view.h"
+#include "osteo/display/view/detail/bone_view.h"
 
 #include <vtkActor.h>
 #include <vtkCellArray.h>

@@ -1,4 +1,4 @@
-#include "osteo/display/view/changes.h"
+#include "osteo/display/view/world_view.h"
 
 #include <vtkCamera.h>
 #include <vtkLight.h>

@@ -1,4 +1,4 @@
-#include "osteo/display/view/cut_outline.h"
+#include "osteo/display/view/live_cut.h"
 
 #include <algorithm>
 #include <cmath>

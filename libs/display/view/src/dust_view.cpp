@@ -1,4 +1,4 @@
-#include "osteo/display/view/dust_view.h"
+#include "osteo/display/view/detail/dust_view.h"
 
 #include <vtkActor.h>
 #include <vtkCellArray.h>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "osteo/geometry/grid/brick_linear.h"
+#include "osteo/geometry/grid/sampler.h"
 
 namespace osteo::inline display {
 namespace {

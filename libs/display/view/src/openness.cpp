@@ -1,4 +1,4 @@
-#include "osteo/display/view/openness.h"
+#include "osteo/display/view/detail/openness.h"
 
 #include <algorithm>
 #include <cmath>

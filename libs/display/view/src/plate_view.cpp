@@ -1,4 +1,4 @@
-#include "osteo/display/view/plate_view.h"
+#include "osteo/display/view/instrument_view.h"
 
 #include <vtkActor.h>
 #include <vtkCellArray.h>
@@ -21,9 +21,8 @@
 #include <optional>
 
 #include "osteo/display/view/actors.h"
-#include "osteo/display/view/instrument_view.h"
 #include "osteo/imaging/io/vtk_data.h"
-#include "osteo/simulation/bone/plate_fit.h"
+#include "osteo/simulation/bone/plates.h"
 #include "osteo/simulation/bone/world_mesh.h"
 
 namespace osteo::inline display {

@@ -1,4 +1,4 @@
-#include "osteo/display/view/scope_camera.h"
+#include "osteo/display/view/actors.h"
 
 #include <vtkCamera.h>
 #include <vtkRenderer.h>

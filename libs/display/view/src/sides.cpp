@@ -1,4 +1,4 @@
-#include "osteo/display/view/sides.h"
+#include "osteo/display/view/pictures.h"
 
 #include <vtkActor.h>
 #include <vtkCamera.h>

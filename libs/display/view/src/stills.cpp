@@ -1,4 +1,4 @@
-#include "osteo/display/view/stills.h"
+#include "osteo/display/view/pictures.h"
 
 #include <vtkActor.h>
 #include <vtkCamera.h>
@@ -16,7 +16,6 @@
 
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/offscreen.h"
-#include "osteo/display/view/sides.h"
 #include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo::inline display {

@@ -1,4 +1,4 @@
-#include "osteo/display/view/wet_film.h"
+#include "osteo/display/view/detail/wet_film.h"
 
 #include <algorithm>
 #include <cmath>

@@ -19,9 +19,9 @@
 #include <optional>
 
 #include "osteo/display/view/actors.h"
+#include "osteo/display/view/detail/visible.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/display/view/structures_view.h"
-#include "osteo/display/view/visible.h"
 #include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo::inline display {

@@ -9,7 +9,7 @@
 #include "block_mapper.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
-#include "osteo/geometry/grid/brick_values.h"
+#include "osteo/geometry/grid/brick_places.h"
 
 namespace osteo::inline geometry {
 namespace {

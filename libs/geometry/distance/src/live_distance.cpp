@@ -1,4 +1,4 @@
-#include "osteo/geometry/distance/live_distance.h"
+#include "osteo/geometry/distance/detail/live_distance.h"
 
 #include <algorithm>
 #include <cmath>

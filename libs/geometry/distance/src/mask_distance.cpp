@@ -1,4 +1,4 @@
-#include "osteo/geometry/distance/mask_distance.h"
+#include "osteo/geometry/distance/distance_methods.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/geometry/distance/binary_distance.h"
-#include "osteo/geometry/grid/brick_values.h"
+#include "osteo/geometry/grid/brick_places.h"
 
 namespace osteo::inline geometry {
 

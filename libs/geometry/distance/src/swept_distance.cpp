@@ -1,4 +1,4 @@
-#include "osteo/geometry/distance/swept_distance.h"
+#include "osteo/geometry/distance/distance_methods.h"
 
 #include <algorithm>
 #include <cmath>

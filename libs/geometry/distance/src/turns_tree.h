@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "osteo/geometry/distance/fan.h"
+#include "osteo/geometry/distance/detail/fan.h"
 
 namespace osteo::inline geometry {
 

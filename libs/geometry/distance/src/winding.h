@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "osteo/core/base/portable_math.h"
-#include "osteo/geometry/distance/fan.h"
+#include "osteo/geometry/distance/detail/fan.h"
 #include "osteo/geometry/mesh/soup.h"
 
 namespace osteo::inline geometry {

@@ -1,4 +1,4 @@
-#include "osteo/geometry/grid/brick_values.h"
+#include "osteo/geometry/grid/brick_places.h"
 
 #include "osteo/geometry/grid/vdb.h"
 

@@ -1,4 +1,4 @@
-#include "osteo/geometry/grid/dense.h"
+#include "osteo/geometry/grid/grid_io.h"
 
 #include <openvdb/tools/Dense.h>
 

@@ -1,4 +1,4 @@
-#include "osteo/geometry/tets/graded_tets.h"
+#include "osteo/geometry/tets/lattice_tets.h"
 
 #include <algorithm>
 #include <cmath>

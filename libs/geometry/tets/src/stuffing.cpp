@@ -1,4 +1,4 @@
-#include "osteo/geometry/tets/stuffing.h"
+#include "osteo/geometry/tets/lattice_tets.h"
 
 #include <algorithm>
 #include <cmath>

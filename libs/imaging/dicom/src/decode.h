@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "osteo/imaging/dicom/header.h"
+#include "osteo/imaging/dicom/detail/header.h"
 
 namespace osteo::inline imaging::dicom {
 

@@ -1,4 +1,4 @@
-#include "osteo/imaging/dicom/header.h"
+#include "osteo/imaging/dicom/detail/header.h"
 
 #include <vtkDICOMMetaData.h>
 #include <vtkDICOMParser.h>

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "osteo/core/base/param.h"
-#include "osteo/imaging/dicom/verdict_codes.h"
+#include "osteo/imaging/dicom/detail/verdict_codes.h"
 #include "place_parts.h"
 
 namespace osteo::inline imaging::dicom {

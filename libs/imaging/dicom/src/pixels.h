@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "osteo/imaging/dicom/header.h"
+#include "osteo/imaging/dicom/detail/header.h"
 
 namespace osteo::inline imaging::dicom {
 

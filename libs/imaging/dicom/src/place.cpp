@@ -1,4 +1,4 @@
-#include "osteo/imaging/dicom/place.h"
+#include "osteo/imaging/dicom/detail/place.h"
 
 #include <algorithm>
 #include <array>

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "osteo/imaging/dicom/place.h"
+#include "osteo/imaging/dicom/detail/place.h"
 
 namespace osteo::inline imaging::dicom {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/imaging/dicom/place.h"
+#include "osteo/imaging/dicom/detail/place.h"
 #include "place_parts.h"
 
 namespace osteo::inline imaging::dicom {

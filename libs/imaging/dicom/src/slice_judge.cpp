@@ -6,7 +6,7 @@
 #include <map>
 
 #include "osteo/core/base/param.h"
-#include "osteo/imaging/dicom/verdict_codes.h"
+#include "osteo/imaging/dicom/detail/verdict_codes.h"
 #include "pixels.h"
 
 namespace osteo::inline imaging::dicom {

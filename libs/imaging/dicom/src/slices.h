@@ -6,7 +6,7 @@
 
 #include "osteo/core/base/context.h"
 #include "osteo/core/data/frame.h"
-#include "osteo/imaging/dicom/place.h"
+#include "osteo/imaging/dicom/detail/place.h"
 #include "pixels.h"
 #include "slice_judge.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "osteo/core/base/param.h"
-#include "osteo/imaging/dicom/verdict_codes.h"
+#include "osteo/imaging/dicom/detail/verdict_codes.h"
 
 namespace osteo::inline imaging::dicom {
 namespace {

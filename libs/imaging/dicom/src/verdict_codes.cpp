@@ -1,10 +1,10 @@
-#include "osteo/imaging/dicom/verdict_codes.h"
+#include "osteo/imaging/dicom/detail/verdict_codes.h"
 
 #include <algorithm>
 #include <array>
 
 #include "osteo/core/base/param.h"
-#include "osteo/imaging/dicom/place.h"
+#include "osteo/imaging/dicom/detail/place.h"
 #include "osteo/imaging/dicom/verdict.h"
 
 namespace osteo::inline imaging {

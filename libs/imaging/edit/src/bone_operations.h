@@ -5,7 +5,7 @@
 
 #include "osteo/core/base/context.h"
 #include "osteo/imaging/edit/bit_mask.h"
-#include "osteo/imaging/edit/operation.h"
+#include "osteo/imaging/edit/detail/operation.h"
 
 namespace osteo::inline imaging {
 

@@ -1,4 +1,4 @@
-#include "osteo/imaging/edit/operation.h"
+#include "osteo/imaging/edit/detail/operation.h"
 
 #include <algorithm>
 #include <cmath>

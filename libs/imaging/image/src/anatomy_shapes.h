@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "osteo/core/base/portable_math.h"
-#include "osteo/imaging/image/head_anatomy.h"
+#include "osteo/imaging/image/detail/head_anatomy.h"
 
 namespace osteo::inline imaging::anatomy {
 

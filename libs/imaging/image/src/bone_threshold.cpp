@@ -1,4 +1,4 @@
-#include "osteo/imaging/image/bone_threshold.h"
+#include "osteo/imaging/image/threshold.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "osteo/imaging/image/head_anatomy.h"
+#include "osteo/imaging/image/detail/head_anatomy.h"
 
 #include <algorithm>
 #include <array>

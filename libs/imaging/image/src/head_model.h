@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "anatomy_shapes.h"
-#include "osteo/imaging/image/head_anatomy.h"
+#include "osteo/imaging/image/detail/head_anatomy.h"
 
 namespace osteo::inline imaging {
 namespace anatomy {

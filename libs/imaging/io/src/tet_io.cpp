@@ -17,7 +17,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/param.h"
-#include "osteo/core/data/tet_check.h"
+#include "osteo/core/data/tet_mesh.h"
 #include "osteo/imaging/io/inp_io.h"
 #include "osteo/imaging/io/vtk_data.h"
 

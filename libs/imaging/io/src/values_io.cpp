@@ -1,4 +1,4 @@
-#include "osteo/imaging/io/values_io.h"
+#include "osteo/imaging/io/tet_io.h"
 
 #include "osteo/core/base/error.h"
 #include "raw_volume.h"

@@ -12,7 +12,6 @@
 #include "osteo/imaging/dicom/save_series.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/imaging/io/tet_io.h"
-#include "osteo/imaging/io/values_io.h"
 #include "osteo/imaging/io/volume_io.h"
 
 namespace osteo::inline imaging {

@@ -8,7 +8,7 @@
 #include "ear_parts.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
-#include "osteo/imaging/image/bone_threshold.h"
+#include "osteo/imaging/image/threshold.h"
 
 namespace osteo::inline imaging {
 namespace {

@@ -1,4 +1,4 @@
-#include "osteo/session/recording/script_file.h"
+#include "osteo/session/recording/script.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "osteo/session/scene/changed_bricks.h"
+#include "osteo/session/scene/detail/changed_bricks.h"
 
 namespace osteo::inline session {
 

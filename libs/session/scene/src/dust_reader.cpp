@@ -1,4 +1,4 @@
-#include "osteo/session/scene/dust_reader.h"
+#include "osteo/session/scene/detail/dust_reader.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "osteo/session/scene/pieces_reader.h"
+#include "osteo/session/scene/detail/pieces_reader.h"
 
 #include <algorithm>
 

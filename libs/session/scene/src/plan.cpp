@@ -9,7 +9,7 @@
 #include "osteo/core/base/param.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/imaging/io/surface_io.h"
-#include "osteo/simulation/bone/plate_fit.h"
+#include "osteo/simulation/bone/plates.h"
 #include "osteo/simulation/bone/world_mesh.h"
 
 namespace osteo::inline session {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/geometry/grid/brick_linear.h"
+#include "osteo/geometry/grid/sampler.h"
 
 namespace osteo::inline session {
 

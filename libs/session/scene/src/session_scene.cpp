@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "osteo/core/base/error.h"
-#include "osteo/session/recording/apply.h"
+#include "osteo/session/recording/records.h"
 
 namespace osteo::inline session {
 

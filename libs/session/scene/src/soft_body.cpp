@@ -1,4 +1,4 @@
-#include "osteo/session/scene/soft_body.h"
+#include "osteo/session/scene/detail/soft_body.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/portable_math.h"
-#include "osteo/simulation/bone/instrument_gap.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/sound/wav.h"
 
 namespace osteo::inline session {

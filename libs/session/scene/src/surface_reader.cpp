@@ -1,4 +1,4 @@
-#include "osteo/session/scene/surface_reader.h"
+#include "osteo/session/scene/detail/surface_reader.h"
 
 #include <utility>
 

@@ -1,4 +1,4 @@
-#include "osteo/session/scene/tool_counts.h"
+#include "osteo/session/scene/detail/tool_counts.h"
 
 namespace osteo::inline session {
 

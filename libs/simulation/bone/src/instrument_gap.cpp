@@ -1,4 +1,4 @@
-#include "osteo/simulation/bone/instrument_gap.h"
+#include "osteo/simulation/bone/instrument.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
-#include "osteo/simulation/bone/plate_fit.h"
+#include "osteo/simulation/bone/plates.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
-#include "osteo/geometry/grid/brick_linear.h"
+#include "osteo/geometry/grid/sampler.h"
 
 namespace osteo::inline simulation {
 namespace {

@@ -1,4 +1,4 @@
-#include "osteo/simulation/bone/shading.h"
+#include "osteo/simulation/bone/detail/shading.h"
 
 #include <algorithm>
 #include <array>

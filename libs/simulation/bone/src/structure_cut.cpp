@@ -1,4 +1,4 @@
-#include "osteo/simulation/bone/structure_cut.h"
+#include "osteo/simulation/bone/structure_map.h"
 
 #include <algorithm>
 #include <array>

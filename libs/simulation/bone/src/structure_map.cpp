@@ -10,7 +10,7 @@
 #include "osteo/core/base/parallel.h"
 #include "osteo/geometry/distance/binary_distance.h"
 #include "osteo/geometry/distance/distance_map.h"
-#include "osteo/geometry/grid/brick_linear.h"
+#include "osteo/geometry/grid/sampler.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/simulation/bone/burr.h"
 

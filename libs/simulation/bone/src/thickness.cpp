@@ -1,4 +1,4 @@
-#include "osteo/simulation/bone/thickness.h"
+#include "osteo/simulation/bone/depth_map.h"
 
 #include <cmath>
 

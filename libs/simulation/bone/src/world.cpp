@@ -7,7 +7,6 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/param.h"
-#include "osteo/simulation/bone/plate_fit.h"
 #include "osteo/simulation/bone/plates.h"
 
 namespace osteo::inline simulation {

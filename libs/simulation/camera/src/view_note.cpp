@@ -1,4 +1,4 @@
-#include "osteo/simulation/camera/view_note.h"
+#include "osteo/simulation/camera/microscope.h"
 
 #include <algorithm>
 #include <cmath>

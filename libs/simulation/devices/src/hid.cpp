@@ -1,4 +1,4 @@
-#include "osteo/simulation/devices/hid.h"
+#include "osteo/simulation/devices/detail/hid.h"
 
 #include <hidapi/hidapi.h>
 #include <poll.h>

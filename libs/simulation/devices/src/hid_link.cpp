@@ -1,4 +1,4 @@
-#include "osteo/simulation/devices/hid_link.h"
+#include "osteo/simulation/devices/detail/hid_link.h"
 
 #include <pthread.h>
 

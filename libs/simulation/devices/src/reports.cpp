@@ -1,4 +1,4 @@
-#include "osteo/simulation/devices/reports.h"
+#include "osteo/simulation/devices/detail/reports.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "osteo/simulation/devices/woodenhaptics.h"
+#include "osteo/simulation/devices/detail/woodenhaptics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "osteo/core/base/portable_math.h"
-#include "osteo/simulation/haptics/stroke_goal.h"
+#include "osteo/simulation/haptics/guide.h"
 
 namespace osteo::inline simulation {
 namespace {

@@ -1,4 +1,4 @@
-#include "osteo/simulation/haptics/grains.h"
+#include "osteo/simulation/haptics/detail/grains.h"
 
 #include <algorithm>
 #include <bit>

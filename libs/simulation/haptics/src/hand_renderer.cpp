@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/simulation/bone/thickness.h"
+#include "osteo/simulation/bone/depth_map.h"
 
 namespace osteo::inline simulation {
 namespace {

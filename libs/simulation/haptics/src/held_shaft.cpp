@@ -1,4 +1,4 @@
-#include "osteo/simulation/haptics/held_shaft.h"
+#include "osteo/simulation/haptics/detail/held_shaft.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
-#include "osteo/simulation/haptics/overlap.h"
+#include "osteo/simulation/haptics/detail/overlap.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "osteo/core/base/simd.h"
-#include "osteo/simulation/haptics/grains.h"
+#include "osteo/simulation/haptics/detail/grains.h"
 #include "overlap_kernel.h"
 
 namespace osteo::inline simulation {

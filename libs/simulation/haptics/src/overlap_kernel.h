@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "osteo/simulation/haptics/overlap.h"
+#include "osteo/simulation/haptics/detail/overlap.h"
 
 namespace osteo::inline simulation::overlap {
 

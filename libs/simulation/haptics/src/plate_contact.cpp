@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/geometry/grid/brick_linear.h"
+#include "osteo/geometry/grid/sampler.h"
 #include "osteo/simulation/haptics/haptic_scene.h"
 
 namespace osteo::inline simulation {

@@ -1,4 +1,4 @@
-#include "osteo/simulation/heat/thermal_dose.h"
+#include "osteo/simulation/heat/heat_field.h"
 
 #include <algorithm>
 

@@ -4,7 +4,7 @@
 #include <opencv2/aruco/charuco.hpp>
 
 #include "osteo/simulation/marker/body.h"
-#include "osteo/simulation/marker/picture.h"
+#include "osteo/simulation/marker/detail/picture.h"
 
 namespace osteo::inline simulation::marker {
 

@@ -1,4 +1,4 @@
-#include "osteo/simulation/marker/camera.h"
+#include "osteo/simulation/marker/detail/camera.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "osteo/simulation/marker/filter.h"
+#include "osteo/simulation/marker/detail/filter.h"
 
 #include <Eigen/Dense>
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "osteo/simulation/marker/pen.h"
+#include "osteo/simulation/marker/detail/pen.h"
 
 #include <Eigen/Dense>
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "osteo/simulation/marker/picture.h"
+#include "osteo/simulation/marker/detail/picture.h"
 
 #include <dlfcn.h>
 

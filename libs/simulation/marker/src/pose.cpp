@@ -7,7 +7,7 @@
 #include <optional>
 #include <set>
 
-#include "osteo/simulation/marker/tracker.h"
+#include "osteo/simulation/marker/detail/tracker.h"
 
 namespace osteo::inline simulation {
 namespace {

@@ -2,7 +2,7 @@
 // opened: with it come 140 shared libraries (codecs, GDAL, poppler), some of them under the GPL, that nothing else
 // needs. Both sides are made of one tree; names are in C.
 #pragma once
-#include "osteo/simulation/marker/picture.h"
+#include "osteo/simulation/marker/detail/picture.h"
 
 namespace osteo::inline simulation::video {
 

@@ -1,4 +1,4 @@
-#include "osteo/simulation/nerve/monitor_setup.h"
+#include "osteo/simulation/nerve/detail/monitor_setup.h"
 
 #include <cmath>
 #include <set>

@@ -1,4 +1,4 @@
-#include "osteo/simulation/nerve/nerve_course.h"
+#include "osteo/simulation/nerve/detail/nerve_course.h"
 
 #include <algorithm>
 #include <cmath>

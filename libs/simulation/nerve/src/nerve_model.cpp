@@ -1,4 +1,4 @@
-#include "osteo/simulation/nerve/nerve_model.h"
+#include "osteo/simulation/nerve/detail/nerve_model.h"
 
 #include <algorithm>
 #include <array>

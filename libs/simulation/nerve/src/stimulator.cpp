@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/simulation/nerve/monitor_setup.h"
+#include "osteo/simulation/nerve/detail/monitor_setup.h"
 
 namespace osteo::inline simulation {
 

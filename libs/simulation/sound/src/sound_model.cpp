@@ -1,4 +1,4 @@
-#include "osteo/simulation/sound/sound_model.h"
+#include "osteo/simulation/sound/detail/sound_model.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 
 #include "cutter.h"
 #include "osteo/simulation/tissue/contact.h"
-#include "osteo/simulation/tissue/tissue_model.h"
+#include "osteo/simulation/tissue/detail/tissue_model.h"
 
 namespace osteo::inline simulation::tissue {
 

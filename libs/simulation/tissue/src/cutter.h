@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "osteo/simulation/tissue/tissue_model.h"
+#include "osteo/simulation/tissue/detail/tissue_model.h"
 
 namespace osteo::inline simulation::tissue {
 

@@ -14,7 +14,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
-#include "osteo/core/statistics/distributions.h"
+#include "osteo/core/statistics/basics.h"
 #include "osteo/simulation/tissue/dynamics.h"
 #include "osteo/simulation/tissue/implicit.h"
 

@@ -1,4 +1,4 @@
-#include "osteo/simulation/tissue/energy.h"
+#include "osteo/simulation/tissue/detail/energy.h"
 
 #include <algorithm>
 

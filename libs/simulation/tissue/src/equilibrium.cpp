@@ -1,4 +1,4 @@
-#include "osteo/simulation/tissue/equilibrium.h"
+#include "osteo/simulation/tissue/detail/equilibrium.h"
 
 #include <Eigen/Eigenvalues>
 #ifdef OSTEO_WITH_CHOLMOD

@@ -1,4 +1,4 @@
-#include "osteo/simulation/tissue/nodes_vtu.h"
+#include "osteo/simulation/tissue/fem.h"
 
 #include "osteo/core/base/param.h"
 

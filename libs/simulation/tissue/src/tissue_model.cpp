@@ -1,4 +1,4 @@
-#include "osteo/simulation/tissue/tissue_model.h"
+#include "osteo/simulation/tissue/detail/tissue_model.h"
 
 #include <algorithm>
 #include <cmath>

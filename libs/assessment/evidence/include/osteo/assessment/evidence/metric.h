@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "osteo/assessment/evidence/metric_table.h"
+#include "osteo/assessment/evidence/detail/metric_table.h"
 #include "osteo/assessment/evidence/procedure.h"
 #include "osteo/session/recording/session_file.h"
 #include "osteo/simulation/bone/structure_map.h"

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "osteo/assessment/evidence/detail/process.h"
+#include "osteo/assessment/evidence/detail/product.h"
+#include "osteo/assessment/evidence/detail/reference.h"
+#include "osteo/assessment/evidence/detail/saw_cuts.h"
 #include "osteo/assessment/evidence/frames.h"
 #include "osteo/assessment/evidence/metric.h"
-#include "osteo/assessment/evidence/process.h"
-#include "osteo/assessment/evidence/product.h"
-#include "osteo/assessment/evidence/reference.h"
-#include "osteo/assessment/evidence/saw_cuts.h"
 #include "osteo/assessment/evidence/visibility.h"
 #include "osteo/core/base/json_document.h"
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "osteo/assessment/evidence/hand_motion.h"
+#include "osteo/assessment/evidence/detail/hand_motion.h"
 #include "osteo/assessment/evidence/metric.h"
 #include "osteo/assessment/evidence/visibility.h"
 #include "osteo/core/base/json_document.h"

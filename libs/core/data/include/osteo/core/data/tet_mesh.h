@@ -25,4 +25,10 @@ using Tets = std::shared_ptr<const TetMesh>;
 
 [[nodiscard]] double volume_mm3(const TetMesh& mesh);
 
+// -- What a tetrahedral mesh must satisfy to be written.
+
+/// Coordinates are finite, tetrahedra name points that are there and have a volume above 0 (in double precision, from
+/// the coordinates as they are kept). Error(failed) with how many do not and the first; O(tets).
+void require_sound(const TetMesh& mesh);
+
 }  // namespace osteo

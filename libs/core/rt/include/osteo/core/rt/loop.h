@@ -7,7 +7,7 @@
 #include <string>
 #include <thread>
 
-#include "osteo/core/rt/histogram.h"
+#include "osteo/core/rt/detail/histogram.h"
 
 namespace osteo {
 

@@ -7,6 +7,7 @@
 #include "osteo/core/data/vec.h"
 #include "osteo/display/view/quality.h"
 #include "osteo/simulation/bone/round_cone.h"
+#include "osteo/simulation/camera/stereo.h"
 
 class vtkActor;
 class vtkMatrix4x4;
@@ -44,5 +45,13 @@ void set_depth(vtkRenderer* renderer, const PictureStyle& style);
 [[nodiscard]] double seen_height_mm(vtkRenderer* renderer);
 /// Camera that sees a ball of `radius_mm` around `centre_mm` from `eye` (unit, LPS), head up.
 void look_at(vtkRenderer* renderer, Vec3 centre_mm, double radius_mm, Vec3 eye);
+
+// -- The microscope's view as VTK's camera.
+
+/// The renderer's camera looks as `view` says into a viewport of that size. Clipping planes are left as they were.
+void aim(vtkRenderer* renderer, const ScopeView& view, const PictureArea& area);
+/// The same for one eye of two (0: left).
+void aim_eye(vtkRenderer* renderer, const ScopeView& view, const StereoParams& stereo, const PictureArea& area,
+             int eye);
 
 }  // namespace osteo::inline display

@@ -2,17 +2,20 @@
 #pragma once
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <future>
 #include <map>
 #include <memory>
 #include <vector>
 
 #include "osteo/core/data/data.h"
-#include "osteo/display/view/bone_view.h"
-#include "osteo/display/view/dust_view.h"
-#include "osteo/display/view/plate_view.h"
+#include "osteo/display/view/detail/bone_view.h"
+#include "osteo/display/view/detail/dust_view.h"
+#include "osteo/display/view/instrument_view.h"
 #include "osteo/session/scene/scene_readers.h"
 #include "osteo/session/scene/soft_tissue.h"
+
+class vtkRenderer;
 
 namespace osteo::inline display {
 
@@ -95,5 +98,12 @@ struct WorldPicture {
 /// Works without a display. Error(failed) when there is no OpenGL.
 [[nodiscard]] Picture draw_world(const World& world, SceneReaders& readers, const StructureMap* structures,
                                  const WorldPicture& picture, SoftTissue* soft = nullptr);
+
+// -- Whether a scene would look different if it were drawn again.
+
+/// Another number whenever camera, lights, or anything in the scene was changed, put in or taken out since; the same
+/// while nothing was, however often it is drawn in the same way; the first drawing with other effects changes it once.
+/// Clipping planes do not count: they follow the scene. About 0.2 us a prop.
+[[nodiscard]] std::uint64_t scene_stamp(vtkRenderer* renderer);
 
 }  // namespace osteo::inline display

@@ -10,7 +10,7 @@
 #include "osteo/core/base/context.h"
 #include "osteo/core/data/frame.h"
 #include "osteo/core/data/sparse_grid.h"
-#include "osteo/geometry/distance/fan.h"
+#include "osteo/geometry/distance/detail/fan.h"
 #include "osteo/geometry/distance/triangle_tree.h"
 #include "osteo/geometry/distance/voxelize.h"
 #include "osteo/geometry/grid/brick_grid.h"

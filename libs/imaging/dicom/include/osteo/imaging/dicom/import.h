@@ -5,7 +5,7 @@
 #include "osteo/core/base/context.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/data/volume.h"
-#include "osteo/imaging/dicom/place.h"
+#include "osteo/imaging/dicom/detail/place.h"
 
 namespace osteo::inline imaging {
 

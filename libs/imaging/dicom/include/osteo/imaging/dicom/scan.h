@@ -7,8 +7,8 @@
 
 #include "osteo/core/base/context.h"
 #include "osteo/core/base/files.h"
-#include "osteo/imaging/dicom/header.h"
-#include "osteo/imaging/dicom/place.h"
+#include "osteo/imaging/dicom/detail/header.h"
+#include "osteo/imaging/dicom/detail/place.h"
 
 namespace osteo::inline imaging {
 

@@ -7,7 +7,7 @@
 #include "osteo/core/base/context.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/data/volume.h"
-#include "osteo/imaging/image/head_anatomy.h"
+#include "osteo/imaging/image/detail/head_anatomy.h"
 
 namespace osteo::inline imaging {
 

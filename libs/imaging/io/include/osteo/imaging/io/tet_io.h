@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "osteo/core/data/tet_mesh.h"
+#include "osteo/core/data/volume.h"
 
 namespace osteo::inline imaging {
 
@@ -17,5 +18,10 @@ namespace osteo::inline imaging {
 /// .vtu, binary and compressed, with values. .node or .ele: both are written, numbered from 0, coordinates so that they
 /// read back equal.
 void save_tets(const TetMesh& mesh, const std::filesystem::path& path);
+
+// -- Volumes of real numbers, such as distance maps, for other programs.
+
+/// In single precision, as .nrrd or .vti, written atomically. Errors: usage for another suffix, cannot_write.
+void save_values(const Volume<float>& values, const std::filesystem::path& path);
 
 }  // namespace osteo::inline imaging

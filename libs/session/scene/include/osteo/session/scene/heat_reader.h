@@ -9,11 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "osteo/session/scene/changed_bricks.h"
+#include "osteo/session/scene/detail/changed_bricks.h"
 #include "osteo/session/scene/reader.h"
 #include "osteo/simulation/bone/structure_map.h"
 #include "osteo/simulation/heat/heat_field.h"
-#include "osteo/simulation/heat/thermal_dose.h"
 
 namespace osteo::inline session {
 

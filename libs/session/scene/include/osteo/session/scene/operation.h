@@ -4,7 +4,7 @@
 #include <memory>
 #include <optional>
 
-#include "osteo/session/scene/stroke_reader.h"
+#include "osteo/session/scene/detail/stroke_reader.h"
 #include "osteo/simulation/haptics/servo.h"
 
 namespace osteo::inline session {

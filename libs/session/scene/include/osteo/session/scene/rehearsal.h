@@ -19,7 +19,7 @@
 #include "osteo/session/scene/operation.h"
 #include "osteo/session/scene/scene_readers.h"
 #include "osteo/session/scene/soft_tissue.h"
-#include "osteo/simulation/bone/structure_cut.h"
+#include "osteo/simulation/bone/structure_map.h"
 
 namespace osteo::inline session {
 

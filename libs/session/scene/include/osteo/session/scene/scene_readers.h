@@ -2,11 +2,11 @@
 #pragma once
 #include <memory>
 
-#include "osteo/session/scene/dust_reader.h"
+#include "osteo/session/scene/detail/dust_reader.h"
+#include "osteo/session/scene/detail/pieces_reader.h"
+#include "osteo/session/scene/detail/surface_reader.h"
+#include "osteo/session/scene/detail/tool_counts.h"
 #include "osteo/session/scene/heat_reader.h"
-#include "osteo/session/scene/pieces_reader.h"
-#include "osteo/session/scene/surface_reader.h"
-#include "osteo/session/scene/tool_counts.h"
 
 namespace osteo::inline session {
 

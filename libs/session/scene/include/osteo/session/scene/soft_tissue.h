@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "osteo/session/scene/detail/soft_body.h"
 #include "osteo/session/scene/reader.h"
-#include "osteo/session/scene/soft_body.h"
 
 namespace osteo::inline session {
 

@@ -6,7 +6,6 @@
 #include <string_view>
 
 #include "osteo/core/data/rigid_transform.h"
-#include "osteo/simulation/bone/cutting_guide.h"
 #include "osteo/simulation/bone/saw.h"
 
 namespace osteo::inline simulation {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/simulation/bone/detail/shading.h"
 #include "osteo/simulation/bone/live_components.h"
-#include "osteo/simulation/bone/shading.h"
 
 namespace osteo::inline simulation {
 

@@ -1,10 +1,13 @@
-// A cut by a thin blade.
+// A cut by a thin blade, and the guide that holds the blade in a plane.
 #pragma once
 #include <vector>
 
+#include "osteo/core/data/vec.h"
 #include "osteo/geometry/grid/brick_grid.h"
 
 namespace osteo::inline simulation {
+
+// -- A cut by a thin blade.
 
 /// A box: the blade's thickness along `normal`, its size across. With a size of 0 the cut goes through everything in
 /// that direction.
@@ -23,5 +26,20 @@ struct SawCut {
 double apply_saw(BrickGrid& bone, const SawCut& cut, std::vector<VoxelKey>& changed);
 /// The voxels that it would change; nothing is. Cost: the same.
 [[nodiscard]] std::vector<VoxelKey> voxels_sawn(const BrickGrid& bone, const SawCut& cut);
+
+// -- A cutting guide: a slot that holds a saw in a plane which was planned before.
+
+/// A plane of the world, without extent. Not fixed to a piece: it stays where it is when bone is moved.
+struct CuttingGuide {
+  Vec3 at_mm, normal{0, 0, 1};  ///< normal: unit
+  double within_mm = 0;         ///< a saw this near slips in; 0: there is no guide
+
+  [[nodiscard]] bool on() const { return within_mm > 0; }
+  /// Of what lies in the plane 0; signed.
+  [[nodiscard]] double offset_mm(Vec3 at) const { return dot(at - at_mm, normal); }
+  /// A direction (unit) without its part across the plane; unit.
+  [[nodiscard]] Vec3 along(Vec3 axis) const { return normalized(axis - normal * dot(axis, normal)); }
+  friend bool operator==(const CuttingGuide&, const CuttingGuide&) = default;
+};
 
 }  // namespace osteo::inline simulation

@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "osteo/simulation/bone/action.h"
-#include "osteo/simulation/bone/cutting_guide.h"
 #include "osteo/simulation/bone/hardness.h"
 #include "osteo/simulation/bone/live_components.h"
 #include "osteo/simulation/bone/pieces.h"
+#include "osteo/simulation/bone/saw.h"
 
 namespace osteo::inline simulation {
 

@@ -9,6 +9,7 @@
 #pragma once
 #include <array>
 #include <optional>
+#include <string_view>
 
 #include "osteo/core/data/vec.h"
 
@@ -109,5 +110,12 @@ struct ViewError {
 [[nodiscard]] ViewError view_error(const ScopeView& a, const ScopeView& b);
 /// The turn from `from` to `to` in the axes of `from`: its axis times its angle.
 [[nodiscard]] Vec3 turn_between(const ScopeView& from, const ScopeView& to);
+
+// -- Where one looked from, as sessions keep it: the value of a "camera" note.
+
+/// The view of a "camera" note. Where it names no magnification, from its angle of view (30 degrees where that is
+/// missing too); where it names no upward direction, head up. Nothing for what is no such note: no JSON, no eye or
+/// target, both in one place.
+[[nodiscard]] std::optional<ScopeView> view_of_note(std::string_view json);
 
 }  // namespace osteo::inline simulation

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "osteo/core/rt/seqlock.h"
-#include "osteo/simulation/devices/hid_link.h"
-#include "osteo/simulation/devices/woodenhaptics.h"
+#include "osteo/simulation/devices/detail/hid_link.h"
+#include "osteo/simulation/devices/detail/woodenhaptics.h"
 #include "osteo/simulation/haptics/device.h"
 #include "osteo/simulation/haptics/hand_tuning.h"
 

@@ -9,8 +9,8 @@
 #include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/simulation/bone/hardness.h"
 #include "osteo/simulation/bone/instrument.h"
-#include "osteo/simulation/haptics/grains.h"
-#include "osteo/simulation/haptics/overlap.h"
+#include "osteo/simulation/haptics/detail/grains.h"
+#include "osteo/simulation/haptics/detail/overlap.h"
 #include "osteo/simulation/haptics/stream.h"
 
 namespace osteo::inline simulation {

@@ -1,8 +1,10 @@
 // One hand led by another: what a teacher's hand, recorded or far away, does to the hand of who learns.
 #pragma once
+#include <cstddef>
 #include <cstdint>
 
 #include "osteo/simulation/bone/action.h"
+#include "osteo/simulation/haptics/device.h"
 #include "osteo/simulation/haptics/guard.h"
 #include "osteo/simulation/haptics/stream.h"
 
@@ -64,5 +66,11 @@ class GuideLaw {
   Vec3 last_apart_, last_at_, rate_, speed_;      // apart: from the hand to its leader
   bool started_ = false;
 };
+
+// -- Where a scripted hand wants to be at a time: what ScriptedDevice follows, for those that follow it otherwise.
+
+/// On the straight way between waypoints; behind the last, there with the pedal up. `leg`: 0 at the first call, kept
+/// for the next, whose time is not earlier. O(1) from tick to tick.
+[[nodiscard]] HandGoal goal_at(const Strokes& strokes, double t_s, std::size_t& leg) noexcept;
 
 }  // namespace osteo::inline simulation

@@ -9,8 +9,8 @@
 #include "osteo/simulation/bone/depth_map.h"
 #include "osteo/simulation/bone/plates.h"
 #include "osteo/simulation/bone/world.h"
+#include "osteo/simulation/haptics/detail/held_shaft.h"
 #include "osteo/simulation/haptics/haptic_setup.h"
-#include "osteo/simulation/haptics/held_shaft.h"
 
 namespace osteo::inline simulation {
 

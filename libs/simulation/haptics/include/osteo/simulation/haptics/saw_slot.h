@@ -1,6 +1,6 @@
 // A saw in a cutting guide.
 #pragma once
-#include "osteo/simulation/bone/cutting_guide.h"
+#include "osteo/simulation/bone/saw.h"
 #include "osteo/simulation/haptics/stream.h"
 
 namespace osteo::inline simulation {

@@ -10,9 +10,9 @@
 
 #include "osteo/core/rt/seqlock.h"
 #include "osteo/simulation/devices/devices.h"
-#include "osteo/simulation/marker/filter.h"
-#include "osteo/simulation/marker/pen.h"
-#include "osteo/simulation/marker/picture.h"
+#include "osteo/simulation/marker/detail/filter.h"
+#include "osteo/simulation/marker/detail/pen.h"
+#include "osteo/simulation/marker/detail/picture.h"
 
 namespace osteo::inline simulation {
 

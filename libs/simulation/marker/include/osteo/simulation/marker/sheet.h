@@ -3,7 +3,7 @@
 #include <string>
 
 #include "osteo/core/base/param.h"
-#include "osteo/simulation/marker/picture.h"
+#include "osteo/simulation/marker/detail/picture.h"
 
 namespace osteo::inline simulation {
 

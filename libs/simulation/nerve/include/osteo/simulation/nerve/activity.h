@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "osteo/simulation/nerve/nerve_model.h"
+#include "osteo/simulation/nerve/detail/nerve_model.h"
 
 namespace osteo::inline simulation {
 

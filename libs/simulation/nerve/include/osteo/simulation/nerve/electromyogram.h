@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "osteo/simulation/nerve/nerve_model.h"
+#include "osteo/simulation/nerve/detail/nerve_model.h"
 
 namespace osteo::inline simulation {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "osteo/simulation/sound/sound_model.h"
+#include "osteo/simulation/sound/detail/sound_model.h"
 
 namespace osteo::inline simulation {
 

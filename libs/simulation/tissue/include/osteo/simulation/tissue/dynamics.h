@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "osteo/simulation/tissue/contact.h"
-#include "osteo/simulation/tissue/equilibrium.h"
-#include "osteo/simulation/tissue/tissue_model.h"
+#include "osteo/simulation/tissue/detail/equilibrium.h"
+#include "osteo/simulation/tissue/detail/tissue_model.h"
 
 namespace osteo::inline simulation {
 

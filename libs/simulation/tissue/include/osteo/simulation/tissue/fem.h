@@ -1,12 +1,13 @@
 // Finite elements: what a deformable body really does, as far as its mesh allows.
 #pragma once
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "osteo/core/data/tet_mesh.h"
-#include "osteo/simulation/tissue/energy.h"
-#include "osteo/simulation/tissue/equilibrium.h"
+#include "osteo/simulation/tissue/detail/energy.h"
+#include "osteo/simulation/tissue/detail/equilibrium.h"
 
 namespace osteo::inline simulation {
 
@@ -104,5 +105,12 @@ class FemBody final : public Energy {
 /// Points in mm and tetrahedra of a mesh, for both models.
 [[nodiscard]] std::vector<Vec3> points_of(const TetMesh& mesh);
 [[nodiscard]] std::vector<std::array<std::uint32_t, 4>> tets_of(const TetMesh& mesh);
+
+// -- All that finite elements found, for programs that draw it.
+
+/// A .vtu file in text (VTK's XML, read by ParaView and 3D Slicer): every node of the body where it is under the load,
+/// in double precision, of t10 the middles of edges too, as cells of VTK_TETRA or VTK_QUADRATIC_TETRA;
+/// "displacement_mm" at the nodes, "young_mpa" and "poisson" in the cells. `x`: places of all nodes, finite.
+[[nodiscard]] std::string nodes_vtu(const FemBody& body, std::span<const Vec3> x);
 
 }  // namespace osteo::inline simulation

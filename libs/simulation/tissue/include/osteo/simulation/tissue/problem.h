@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "osteo/core/data/tet_mesh.h"
+#include "osteo/simulation/tissue/detail/tissue_model.h"
 #include "osteo/simulation/tissue/fem.h"
-#include "osteo/simulation/tissue/tissue_model.h"
 
 namespace osteo::inline simulation {
 
