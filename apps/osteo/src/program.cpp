@@ -51,6 +51,31 @@
 #endif
 
 namespace osteo {
+namespace {
+
+// Who uses what. A name that stands in none of these is listed last; a test wants that list short.
+std::vector<cli::Group> command_groups() {
+  return {
+      {"Prepare a case", {"prepare",  "series",      "info",        "report",     "edit",      "approve",
+                          "import",   "crop",        "denoise",     "guide",      "threshold", "reduce-metal",
+                          "resample", "surface",     "import-bone", "structures", "tube",      "find-structures",
+                          "register", "apply-edits", "hand-over",   "take-back",  "snapshot",  "convert",
+                          "run"}},
+      {"Rehearse",
+       {"rehearse", "scene", "plan", "replay", "playback", "tutor", "join", "devices", "markers", "calibrate-camera",
+        "calibrate-pen", "track-pen", "stream", "console"}},
+      {"Review and teach", {"review", "score", "study", "movie", "export", "heat", "sound", "monitor"}},
+      {"Server and PACS", {"batch", "receive", "watch", "send", "fetch", "deidentify", "doctor"}},
+      {"Geometry",
+       {"mesh-info", "mesh-repair", "voxelize", "distance", "distance-at", "compare", "curve", "saw", "pieces",
+        "tetrahedralize", "skin"}},
+      {"Tissue", {"simulate", "fem", "bone-stiffness", "calibrate", "fit-damping"}},
+      {"Research", {"experiment", "ground-truth", "simulate-trainee", "phantom", "bench"}},
+      {"Osteotome itself", {"demo", "list", "docs"}},
+  };
+}
+
+}  // namespace
 
 cli::Program make_osteo_program() {
   cli::Program p;
@@ -61,6 +86,13 @@ cli::Program make_osteo_program() {
   p.licence = licence_of_all_stages();
 #endif
   p.registry = osteo_stages();
+  p.tasks = {{"Prepare a case from a CT", "osteo prepare DICOM_FOLDER -o CASE"},
+             {"Correct and approve it", "osteo edit CASE    osteo approve CASE --by NAME"},
+             {"Rehearse the operation", "osteo rehearse CASE"},
+             {"Review a session, or score it", "osteo review SESSION    osteo score SESSION"},
+             {"Prepare many scans on a server", "osteo batch TABLE.csv -o FOLDER"},
+             {"Try it without a scan", "osteo demo"}};
+  p.groups = command_groups();
   p.add<ListCommand>();
   p.add<InfoCommand>();
   p.add<SeriesCommand>();

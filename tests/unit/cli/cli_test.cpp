@@ -114,6 +114,25 @@ TEST(Cli, FlagsReachTheCommandAndItKnowsWhichWereGiven) {
   EXPECT_EQ(run({"echo", "--", "--size"}).json()["arguments"], nlohmann::json{"--size"});
 }
 
+TEST(Cli, NamesStandInTheirGroupsAndTheRestLast) {
+  cli::Program program;
+  program.registry.add<FailStage>();
+  program.add<EchoCommand>();
+  const auto titles = [&] {
+    std::vector<std::string> all;
+    for (const cli::Group& g : program.grouped()) {
+      for (const std::string& name : g.members) all.push_back(g.title + ": " + name);
+    }
+    return all;
+  };
+  const std::string stage = program.registry.names().front();
+  EXPECT_EQ(titles(), (std::vector<std::string>{"Commands: " + stage, "Commands: echo"}));
+  program.groups = {{"Sounds", {"not-in-this-build", "echo"}}, {"Empty", {"gone"}}};
+  EXPECT_EQ(titles(), (std::vector<std::string>{"Sounds: echo", "Others: " + stage}));
+  program.groups.push_back({"Again", {"echo"}});
+  EXPECT_THROW(static_cast<void>(program.grouped()), Error);
+}
+
 TEST(Cli, MistakesAreUsageAndNameTheRightWord) {
   for (const auto& [args, text] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"echo", "--sise", "1"}, "did you mean --size?"},

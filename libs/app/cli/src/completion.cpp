@@ -111,17 +111,22 @@ std::string bash_completion(const Program& program) {
 std::string zsh_completion(const Program& program) {
   std::ostringstream out;
   out << "#compdef osteo\n# completion of zsh for osteo: a file _osteo in a folder of $fpath\n_osteo() {\n  local -a "
-         "words_\n  if (( "
-         "CURRENT == 2 )); "
-         "then\n    words_=(\n";
+         "words_\n  if (( CURRENT == 2 )); then\n";
   const auto words = words_of(program);
   // A colon parts a word from its description.
   const auto plain = [](std::string text) {
     for (char& c : text) c = c == ':' || c == '[' || c == ']' ? ' ' : c;
     return text;
   };
-  for (const Word& w : words) out << "      " << shell_word(w.name + ":" + plain(w.synopsis)) << '\n';
-  out << "    )\n    _describe command words_\n    return\n  fi\n  case $words[2] in\n";
+  // The same groups as in the help, each with its title.
+  int number = 0;
+  for (const Group& g : program.grouped()) {
+    out << "    words_=(\n";
+    for (const std::string& name : g.members)
+      out << "      " << shell_word(name + ":" + plain(program.synopsis_of(name))) << '\n';
+    out << "    )\n    _describe -t group" << ++number << ' ' << shell_word(g.title) << " words_\n";
+  }
+  out << "    return\n  fi\n  case $words[2] in\n";
   for (const Word& w : words) {
     out << "    " << w.name << ")\n      _arguments '1: ' '*:file:_files'";
     for (const Flag& f : w.flags) {

@@ -1,5 +1,6 @@
 #include "describe.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -146,17 +147,31 @@ std::string output_flag(const Port& port) {
   return "--" + port.name + "-out";
 }
 
-std::string program_help(const Program& program) {
+std::string group_of(const Program& program, const std::string& name) {
+  for (const Group& g : program.groups) {
+    if (std::find(g.members.begin(), g.members.end(), name) != g.members.end()) return g.title;
+  }
+  return {};
+}
+
+std::string program_help(const Program& program, bool all) {
   std::ostringstream out;
   out << program.about << '\n';
-  if (!program.registry.names().empty()) out << "\nStages (each also a node of a pipeline file and a VTK filter):\n";
-  for (const auto& name : program.registry.names()) row(out, name, program.registry.make(name)->info().synopsis);
-  out << "\nCommands:\n";
-  for (const auto& c : program.commands) row(out, c->info().name, c->info().synopsis);
-  row(out, "help", "this text, or the help of a stage or command");
-  out << "\n'osteo help NAME' tells all of a stage or command. First steps:\n  osteo prepare DICOM_FOLDER -o CASE    "
-         "then    osteo "
-         "rehearse CASE\n";
+  const std::vector<Group> groups = program.grouped();
+  if (!all && !program.tasks.empty()) {
+    for (const Task& task : program.tasks) out << '\n' << task.what << ":\n  " << task.command << '\n';
+    out << "\nosteo help NAME   a command in full\nosteo help --all  all commands: ";
+    std::string titles;
+    for (const Group& g : groups) titles += (titles.empty() ? "" : ", ") + g.title;
+    wrap(out, titles, 18);
+    return out.str();
+  }
+  for (const Group& g : groups) {
+    out << '\n' << g.title << ":\n";
+    for (const std::string& name : g.members) row(out, name, program.synopsis_of(name));
+  }
+  row(out, "help", "this text, or the help of a command");
+  out << "\n'osteo help NAME' shows a command in full.\n";
   return out.str();
 }
 
@@ -288,11 +303,20 @@ std::string pipeline_schema(const Program& program) {
 std::map<std::string, std::string> reference_pages(const Program& program) {
   std::map<std::string, std::string> pages;
   const std::string note = "<!-- Made by `osteo docs`; a test fails when it is stale. -->\n\n";
-  std::string index = note + "# Reference\n\n## Stages\n\n| stage | what it does |\n|---|---|\n";
+  std::string index = note +
+                      "# Reference\n\nCommands by who uses them. A command that is also a node of pipeline files "
+                      "and a VTK filter is called a stage.\n";
+  for (const Group& g : program.grouped()) {
+    index += "\n## " + g.title + "\n\n| command | what it does |\n|---|---|\n";
+    for (const std::string& name : g.members) {
+      const bool stage = program.registry.has(name);
+      index += "| [" + name + "](" + (stage ? "stage-" : "command-") + name + ".md)" + (stage ? ", stage" : "") +
+               " | " + program.synopsis_of(name) + " |\n";
+    }
+  }
   for (const auto& name : program.registry.names()) {
     const auto stage = program.registry.make(name);
     const StageInfo& info = stage->info();
-    index += "| [" + name + "](stage-" + name + ".md) | " + info.synopsis + " |\n";
     std::string page = note + "# " + info.name + "\n\n" + info.synopsis + "\n\n```\n" + usage_line(info) + "\n```\n\n" +
                        info.description + "\n\n## Inputs\n\n";
     if (info.inputs.empty()) page += "None.\n";
@@ -311,10 +335,8 @@ std::map<std::string, std::string> reference_pages(const Program& program) {
     page += "\n## Example\n\n```\n" + info.example + "\n```\n\nStage version " + std::to_string(info.version) + ".\n";
     pages["stage-" + name + ".md"] = page;
   }
-  index += "\n## Commands\n\n| command | what it does |\n|---|---|\n";
   for (const auto& c : program.commands) {
     const CommandInfo& info = c->info();
-    index += "| [" + info.name + "](command-" + info.name + ".md) | " + info.synopsis + " |\n";
     std::string page = note + "# " + info.name + "\n\n" + info.synopsis + "\n\n```\n" + usage_line(info) + "\n```\n\n" +
                        info.description + "\n\n";
     if (!info.positionals.empty()) {

@@ -9,10 +9,14 @@
 
 namespace osteo::inline app::cli {
 
-[[nodiscard]] std::string program_help(const Program& program);
+/// The first screen; `all`: every stage and command.
+[[nodiscard]] std::string program_help(const Program& program, bool all = false);
 [[nodiscard]] std::string stage_help(Stage& stage);
 [[nodiscard]] std::string command_help(Command& command);
-[[nodiscard]] std::string stage_xml(Stage& stage);
+/// `group`: below "Osteotome" in Slicer's list of modules.
+[[nodiscard]] std::string stage_xml(Stage& stage, const std::string& group);
+/// The title of a name's group; empty where the program has no groups.
+[[nodiscard]] std::string group_of(const Program& program, const std::string& name);
 /// "fill-holes" -> "OsteoFillHoles": a file without a dot in its name, as Slicer wants it; and its content.
 [[nodiscard]] std::string slicer_module_name(const std::string& stage);
 [[nodiscard]] std::string slicer_module_script(const std::string& stage);

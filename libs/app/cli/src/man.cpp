@@ -41,7 +41,7 @@ std::string man_page(const Program& program, const std::string& subject) {
   if (subject.empty()) {
     const std::size_t colon = program.about.find(": ");
     synopsis = colon == std::string::npos ? program.about : program.about.substr(colon + 2);
-    help = program_help(program);
+    help = program_help(program, true);
   } else if (Command* const command = program.find(subject); command != nullptr) {
     synopsis = command->info().synopsis;
     help = command_help(*command);
@@ -88,7 +88,7 @@ std::map<std::string, std::string> shared_files(const Program& program) {
     files["man/man1/osteo-" + name + ".1"] = man_page(program, name);
     const std::string module = "osteo/slicer/" + slicer_module_name(name);
     files[module] = slicer_module_script(name);
-    files[module + ".xml"] = stage_xml(*program.registry.make(name));
+    files[module + ".xml"] = stage_xml(*program.registry.make(name), group_of(program, name));
   }
   for (const auto& c : program.commands)
     files["man/man1/osteo-" + c->info().name + ".1"] = man_page(program, c->info().name);

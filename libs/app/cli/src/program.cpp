@@ -198,6 +198,32 @@ Command* Program::find(std::string_view name) const {
   return nullptr;
 }
 
+std::vector<Group> Program::grouped() const {
+  std::vector<std::string> names = registry.names();
+  for (const auto& c : commands) names.push_back(c->info().name);
+  std::vector<Group> result;
+  std::set<std::string> placed;
+  for (const Group& g : groups) {
+    Group there{g.title, {}};
+    for (const std::string& name : g.members) {
+      if (!placed.insert(name).second) throw Error(ExitCode::failed, "'" + name + "' stands in two groups of commands");
+      if (std::find(names.begin(), names.end(), name) != names.end()) there.members.push_back(name);
+    }
+    if (!there.members.empty()) result.push_back(std::move(there));
+  }
+  Group rest{groups.empty() ? "Commands" : "Others", {}};
+  for (const std::string& name : names) {
+    if (!placed.contains(name)) rest.members.push_back(name);
+  }
+  if (!rest.members.empty()) result.push_back(std::move(rest));
+  return result;
+}
+
+std::string Program::synopsis_of(std::string_view name) const {
+  if (const Command* const command = find(name); command != nullptr) return command->info().synopsis;
+  return registry.make(std::string(name))->info().synopsis;
+}
+
 namespace {
 
 // Throws what went wrong; `printer` is the caller's, so that it can clear the bar before it prints an error.
@@ -211,8 +237,9 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
   args.erase(args.begin());
   const bool wants_help = std::find(args.begin(), args.end(), "--help") != args.end() ||
                           std::find(args.begin(), args.end(), "-h") != args.end();
-  if (name == "--help" || name == "-h" || (name == "help" && args.empty())) {
-    out << program_help(program);
+  const bool all = std::find(args.begin(), args.end(), "--all") != args.end();
+  if (name == "--help" || name == "-h" || (name == "help" && (args.empty() || all))) {
+    out << program_help(program, all);
     return 0;
   }
   if (name == "--version") {
@@ -227,7 +254,7 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
     known.emplace_back("help");
     const std::string near = nearest_name(subject, known);
     throw Error(ExitCode::usage, "there is no stage or command '" + subject + "'",
-                near.empty() ? "'osteo help' shows them all" : "did you mean '" + near + "'?");
+                near.empty() ? "'osteo help --all' shows them all" : "did you mean '" + near + "'?");
   }
   if (name == "help" || wants_help) {
     out << (command != nullptr ? command_help(*command) : stage_help(*program.registry.make(subject)));
@@ -235,7 +262,8 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
   }
   if (command == nullptr) {
     const auto stage = program.registry.make(subject);
-    if (std::find(args.begin(), args.end(), "--xml") != args.end()) return out << stage_xml(*stage), 0;
+    if (std::find(args.begin(), args.end(), "--xml") != args.end())
+      return out << stage_xml(*stage, group_of(program, subject)), 0;
     if (std::find(args.begin(), args.end(), "--describe") != args.end()) return out << stage_json(*stage), 0;
   }
 

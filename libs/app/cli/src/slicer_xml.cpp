@@ -110,11 +110,11 @@ void field_xml(std::ostream& out, const FieldRef& f) {
 
 }  // namespace
 
-std::string stage_xml(Stage& stage) {
+std::string stage_xml(Stage& stage, const std::string& group) {
   const StageInfo& info = stage.info();
   std::ostringstream out;
   out << "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<executable>\n";
-  element(out, 2, "category", "Osteotome");
+  element(out, 2, "category", group.empty() ? "Osteotome" : "Osteotome." + group);
   element(out, 2, "title", title_case(info.name));
   element(out, 2, "description", info.description);
   element(out, 2, "version", std::to_string(info.version));

@@ -92,16 +92,33 @@ class CommandOf final : public Command {
   typename C::Params params_;
 };
 
+/// Stages and commands that one kind of user needs, in the order in which they are needed.
+struct Group {
+  std::string title;
+  std::vector<std::string> members;
+};
+
+/// What most people want to do, and the one command that does it: the first screen of the help.
+struct Task {
+  std::string what, command;
+};
+
 struct Program {
   Registry registry;
   std::vector<std::unique_ptr<Command>> commands;
-  std::string about;    ///< one line
-  std::string licence;  ///< for --version
+  std::string about;        ///< one line
+  std::string licence;      ///< for --version
+  std::vector<Task> tasks;  ///< none: the help lists all names at once
+  std::vector<Group>
+      groups;  ///< none: one list. Else each name is in exactly one; names that the build lacks are passed over
   template <class C>
   void add() {
     commands.push_back(std::make_unique<CommandOf<C>>());
   }
   [[nodiscard]] Command* find(std::string_view name) const;
+  /// The groups with the names that this build has, those of no group last. Error(failed) for a name in two groups.
+  [[nodiscard]] std::vector<Group> grouped() const;
+  [[nodiscard]] std::string synopsis_of(std::string_view name) const;
 };
 
 /// The whole of a command-line program: parses, runs, reports errors, returns the exit code. stdout carries data only.
