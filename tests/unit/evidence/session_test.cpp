@@ -9,7 +9,7 @@
 #include "osteo/assessment/scoring/detail/score_reader.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/session/recording/records.h"
+#include "osteo/session/recording/session_reader.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "scene.h"

@@ -6,7 +6,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/session/recording/recorder.h"
-#include "osteo/session/recording/records.h"
+#include "osteo/session/recording/session_reader.h"
 
 namespace osteo::inline assessment {
 namespace {

@@ -8,7 +8,6 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/network/tutor/live_run.h"
-#include "osteo/session/recording/records.h"
 #include "osteo/session/recording/session_reader.h"
 
 namespace osteo::inline network {

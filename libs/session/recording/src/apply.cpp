@@ -1,4 +1,4 @@
-#include "osteo/session/recording/records.h"
+#include "osteo/session/recording/session_reader.h"
 
 #include "osteo/core/base/error.h"
 

@@ -4,7 +4,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/param.h"
-#include "osteo/session/recording/records.h"
+#include "osteo/session/recording/session_reader.h"
 #include "osteo/session/scene/rehearsal.h"
 
 namespace osteo::inline session {

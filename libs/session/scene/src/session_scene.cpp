@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "osteo/core/base/error.h"
-#include "osteo/session/recording/records.h"
+#include "osteo/session/recording/session_reader.h"
 
 namespace osteo::inline session {
 

@@ -3,13 +3,10 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
 
-#include "osteo/session/recording/session_reader.h"
-#include "osteo/simulation/bone/world.h"
 #include "osteo/simulation/haptics/stream.h"
 
 namespace osteo::inline session {
@@ -58,20 +55,5 @@ inline constexpr std::uint32_t kNotesPart = 4;
 /// differs.
 [[nodiscard]] const RecordField* first_difference(std::span<const RecordField* const> fields, const void* a,
                                                   const void* b);
-
-// -- What a session's records do to a scene: one stepping for whoever follows one, from its file or while it runs.
-
-/// Does what the scene's owner did; of what the servo did by itself only the scene's strokes are told (its changes of
-/// bone are records).
-World::Effect apply_action(const SceneAction& action, World& world);
-
-/// Gives a voxel its recorded density, and tells the change with the density before. Nothing where the bone has no such
-/// voxel.
-std::optional<VoxelChange> apply_change(const VoxelChange& change, World& world);
-
-/// A part of a session file, in order. The last density of a voxel before each action that parts changes
-/// (parts_changes) is enough: strokes end there, and what was before is in the bone. Error(corrupt) where it changes a
-/// voxel that the bone does not have.
-void apply_part(const SessionPart& part, World& world);
 
 }  // namespace osteo::inline session
