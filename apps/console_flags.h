@@ -19,13 +19,13 @@ struct ConsoleFlags {
            "the loudest channel, and a tone when activity begins, on the machine's sound card where there is one"},
           p.sound);
     visit({"code",
-           "that a rehearsal with --stream igtl:PORT/stimulator shows: the stimulator is set from here, by S and T and "
-           "in the panel (empty: "
-           "the console only listens)"},
+           "code shown by a rehearsal with --stream igtl:PORT/stimulator: the stimulator is set from here, by S and T "
+           "and in the panel (empty: the console only listens)"},
           p.code);
-    visit({"width", "of the window; no more than the screen has", "pixels", 480, 8192}, p.width);
-    visit({"height", "of the window; no more than the screen has", "pixels", 320, 8192}, p.height);
-    visit({"scale", "of text and panels (0: by the monitor); Ctrl + and Ctrl - in the window", "", 0, 4}, p.scale);
+    visit({"width", "width of the window, at most the screen's", "pixels", 480, 8192}, p.width);
+    visit({"height", "height of the window, at most the screen's", "pixels", 320, 8192}, p.height);
+    visit({"scale", "size of text and panels (0: by the monitor); Ctrl + and Ctrl - change it in the window", "", 0, 4},
+          p.scale);
     visit(
         {"state_file", "what the window shows is written there as JSON after each picture, for tests (empty: nowhere)"},
         p.state_file);

@@ -14,8 +14,8 @@ struct EditFlags {
   std::string state_file;
   static void describe(EditFlags& p, auto& visit) {
     visit({"scan", "the scan that the case was made from (empty: where it was seen last on this machine)"}, p.scan);
-    visit({"width", "of the window", "pixels", 640, 16384}, p.width);
-    visit({"height", "of the window", "pixels", 480, 16384}, p.height);
+    visit({"width", "width of the window", "pixels", 640, 16384}, p.width);
+    visit({"height", "height of the window", "pixels", 480, 16384}, p.height);
     visit({"state_file", "what the window shows is written there as JSON after each picture, for tests"}, p.state_file);
   }
 };

@@ -88,35 +88,38 @@ struct WindowFlags {
   static void describe(WindowFlags& p, auto& visit) {
     visit({"out", "folder for the session (empty: a new one in CASE/sessions; also -o)"}, p.out);
     visit({"burr", "kind of burr at the start"}, p.burr);
-    visit({"diameter_mm", "of the burr at the start: 1, 2, 3, 4, 5, 6 or 7", "mm", 1, 7}, p.diameter_mm);
-    visit({"shape", "of the burr at the start"}, p.shape);
+    visit({"diameter_mm", "diameter of the burr at the start: 1, 2, 3, 4, 5, 6 or 7", "mm", 1, 7}, p.diameter_mm);
+    visit({"shape", "shape of the burr at the start"}, p.shape);
     visit({"contact", "how the burr feels bone: rays, volume, overlap or proxy; docs/haptics.md compares them"},
           p.contact);
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
     visit({"device",
-           "in the window, what moves the drill; auto takes the best that is plugged in ('osteo devices'); marker is a "
-           "pen before a "
-           "camera, of pose "
-           "only (docs/marker.md); igtl is a tool that somebody else tracks (docs/network.md), also with --headless"},
+           "device that moves the drill; auto takes the best that is plugged in ('osteo devices'); marker is a pen "
+           "before a camera, of pose only (docs/marker.md); igtl is a tool that somebody else tracks "
+           "(docs/network.md), also with --headless"},
           p.device);
-    visit({"tracker", "of igtl: HOST:PORT or HOST:PORT/NAME of an OpenIGTLink server that tells where the tool is"},
+    visit({"tracker", "OpenIGTLink server that tracks the tool with --device igtl: HOST:PORT or HOST:PORT/NAME"},
           p.tracker);
-    visit({"arm", "in the window, geometry and motors of a WoodenHaptics arm, as JSON (empty: Polhem v3)"}, p.arm);
-    visit({"camera", "of the marker: its lens, made by calibrate-camera"}, p.camera);
-    visit({"pen", "of the marker: made by calibrate-pen (empty: pen 1, its tip 100 mm below the middle of the prism)"},
+    visit({"arm", "geometry and motors of a WoodenHaptics arm, as JSON (empty: Polhem v3)"}, p.arm);
+    visit({"camera", "lens of the marker's camera, made by calibrate-camera"}, p.camera);
+    visit({"pen",
+           "pen that carries the markers, made by calibrate-pen (empty: pen 1, its tip 100 mm below the middle of the "
+           "prism)"},
           p.pen);
-    visit({"video", "of the marker: where its camera is; a video stands for one"}, p.video);
+    visit({"video", "camera that sees the markers; a video file stands for one"}, p.video);
     visit(
         {"camera_place",
          "of the marker: facing you from the screen, above the desk (its picture's top away from you), or behind you"},
         p.camera_place);
-    visit({"hand_scale", "of the marker: mm in the scene for a mm of the hand", "", 0.05, 10}, p.hand_scale);
+    visit({"hand_scale", "movement in the scene for 1 mm of the hand, with --device marker", "", 0.05, 10},
+          p.hand_scale);
     visit({"second_device",
-           "in the window, what moves the second hand; keys: a sucker and water come beside the drill while V and I "
-           "are held, with --dust"},
+           "device that moves the second hand; keys: a sucker and water come beside the drill while V and I are held, "
+           "with --dust"},
           p.second_device);
     visit({"second_instrument",
-           "that the second hand holds, with a device of its own: sucker 10 Fr, irrigator 2 mm, probe 1 mm, a burr"},
+           "instrument of the second hand where it has a device of its own: sucker 10 Fr, irrigator 2 mm, probe 1 mm, "
+           "a burr"},
           p.second_instrument);
     visit(
         {"dust", "bone dust: falls, piles up and hides the bone until it is sucked off; with water it becomes slurry"},
@@ -128,64 +131,59 @@ struct WindowFlags {
            "on the bone from 42 C on and at the nearest structure"},
           p.heat);
     visit({"position", "how the patient lies: where dust and water fall to"}, p.position);
-    visit({"head_turned_deg", "with it: positive where the face turns towards the left shoulder", "deg", -180, 180},
+    visit({"head_turned_deg", "rotation of the head, positive where the face turns towards the left shoulder", "deg",
+           -180, 180},
           p.head_turned_deg);
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
     visit({"resume", "go on from the end of this session"}, p.resume);
-    visit({"playback", "in the window, a session whose hand leads yours; 'osteo playback' has all about it"},
-          p.playback);
-    visit({"playback_as", "with it, its flags: mode=guide,pace=way,from_s=2"}, p.playback_as);
-    visit({"tutor",
-           "in the window, others may join: as the trainee, whose hand is a second one here, or to watch; "
-           "docs/tutoring.md"},
+    visit({"playback", "session whose hand guides yours; see 'osteo playback'"}, p.playback);
+    visit({"playback_as", "flags of --playback, like mode=guide,pace=way,from_s=2"}, p.playback_as);
+    visit({"tutor", "let others join: as the trainee, whose hand is a second one here, or to watch; docs/tutoring.md"},
           p.tutor);
     visit({"listen",
-           "with it, address to be heard on; 127.0.0.1 or ::1: by this machine alone, 0.0.0.0 or :: : by all that can "
-           "reach it"},
+           "address to accept connections on with --tutor; 127.0.0.1 or ::1: this machine alone, 0.0.0.0 or :: : "
+           "everybody who can reach it"},
           p.listen);
-    visit({"port", "with it, UDP; 0: any that is free", "", 0, 65535}, p.port);
-    visit({"two_way", "with it, your hand is pulled by the trainee's too"}, p.two_way);
-    visit({"join", "in the window, take part in a session that runs elsewhere: HOST:PORT, as it is shown there"},
-          p.join);
+    visit({"port", "UDP port for --tutor (0: any that is free)", "", 0, 65535}, p.port);
+    visit({"two_way", "couple both ways with --tutor: the trainee's hand pulls yours, too"}, p.two_way);
+    visit({"join", "join a session that runs elsewhere: HOST:PORT, as it is shown there"}, p.join);
     visit({"code",
-           "with it, the code that is shown there (empty: the window asks; here others can see it in the list of "
-           "processes)"},
+           "code for --join that is shown there (empty: the window asks; on the command line others can see it in the "
+           "list of processes)"},
           p.code);
-    visit({"role", "with it, trainee: your hand is led by the instructor's; watcher: no hand"}, p.role);
+    visit({"role", "role for --join. trainee: the instructor's hand guides yours; watcher: no hand"}, p.role);
     visit({"review",
-           "in the window, a session that is over, to be looked at again: findings, its course over time, the bone as "
-           "of any moment; nothing "
-           "is written into it"},
+           "session to review in the window: findings, its course over time, the bone as of any moment; nothing is "
+           "written into it"},
           p.review);
     visit({"scan",
-           "in the window, the case's CT as a volume file: cuts then show soft tissue too (empty: the bone's values, "
-           "which the case keeps)"},
+           "the case's CT as a volume file, so that cuts show soft tissue, too (empty: the bone's values, which the "
+           "case keeps)"},
           p.scan);
     visit({"procedure",
-           "in the window, what is to be done, as JSON (pipelines/procedures): its regions are outlined in bone and "
-           "cuts, the page at the "
-           "end has its findings (empty: none)"},
+           "procedure to follow, as JSON (pipelines/procedures): its regions are outlined in bone and cuts, the page "
+           "at the end has its findings (empty: none)"},
           p.procedure);
-    visit({"sound",
-           "in the window, what drilling sounds like (a model, docs/sound.md), on the machine's sound card where there "
-           "is one"},
-          p.sound);
-    visit({"volume", "of that sound; long loud parts are held below the level that is safe with head-phones", "", 0, 1},
+    visit({"sound", "play the sound of drilling (a model, docs/sound.md)"}, p.sound);
+    visit({"volume", "volume of the sound; long loud parts are held below the level that is safe with headphones", "",
+           0, 1},
           p.volume);
-    visit({"alarms", "with it, beeps where a structure at risk is touched, two tones where it is injured"}, p.alarms);
+    visit({"alarms", "alarm tones: a beep on contact with a critical structure, two tones on a violation"}, p.alarms);
     visit({"monitor",
-           "in the window, a nerve monitor: what drilling near the case's nerves would be heard of (a model for "
-           "practice, docs/monitor.md)"},
+           "play a nerve monitor: what it would show of drilling near the case's nerves (a model for practice, "
+           "docs/monitor.md)"},
           p.monitor);
-    visit({"monitor_setup", "its constants and channels, as JSON (empty: the built-in ones)"}, p.monitor_setup);
+    visit({"monitor_setup", "constants and channels of the nerve monitor, as JSON (empty: the built-in ones)"},
+          p.monitor_setup);
     visit({"stream",
            "tells the network what happens while it does: igtl:PORT, igtl:HOST:PORT, igtl:PORT/stimulator, "
            "cerebus:HOST:PORT/VERSION, lsl, "
            "with commas "
            "between (empty: nobody; docs/network.md)"},
           p.stream);
-    visit({"stereo", "in the window, a picture for each eye, put together for the screen; docs/camera.md"}, p.stereo);
-    visit({"stereo_base", "between the eyes; they agree on what lies in the focus", "mm", 0, 65}, p.stereo_base);
+    visit({"stereo", "stereo display: how the pictures of both eyes share the screen; docs/camera.md"}, p.stereo);
+    visit({"stereo_base", "distance between the eyes, whose pictures agree on what lies in the focus", "mm", 0, 65},
+          p.stereo_base);
     visit(
         {"experiment",
          "in the window, 'camera': views to bring the camera to, timed, as CSV in the session's folder (empty: none)"},
@@ -198,10 +196,11 @@ struct WindowFlags {
            "measured "
            "time"},
           p.quality);
-    visit({"width", "of the window; no more than the screen has", "pixels", 640, 8192}, p.width);
-    visit({"height", "of the window; no more than the screen has", "pixels", 480, 8192}, p.height);
-    visit({"scale", "of text and panels (0: by the monitor); Ctrl + and Ctrl - in the window", "", 0, 4}, p.scale);
-    visit({"layout", "of the window at the start; last: as it was left. F2 in the window"}, p.layout);
+    visit({"width", "width of the window, at most the screen's", "pixels", 640, 8192}, p.width);
+    visit({"height", "height of the window, at most the screen's", "pixels", 480, 8192}, p.height);
+    visit({"scale", "size of text and panels (0: by the monitor); Ctrl + and Ctrl - change it in the window", "", 0, 4},
+          p.scale);
+    visit({"layout", "layout of the window at the start; last: as it was left. F2 changes it"}, p.layout);
     visit({"full_screen", "the window fills the screen; F11 in the window"}, p.full_screen);
     visit({"end_page", "when the person ends the session (Q), what was done is shown; without, the window closes"},
           p.end_page);

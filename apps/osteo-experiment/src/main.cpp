@@ -77,9 +77,9 @@ struct ExperimentWindowCommand {
     visit(
         {"device", "what the hand holds; by mouse and keys the force is set on an axis, not felt, and the data say so"},
         p.device);
-    visit({"retention", "on another day: every stimulus once, without aid"}, p.retention);
-    visit({"width", "of the window", "px", 640, 7680}, p.width);
-    visit({"height", "of the window", "px", 480, 4320}, p.height);
+    visit({"retention", "retention test on another day: every stimulus once, without aid"}, p.retention);
+    visit({"width", "width of the window", "px", 640, 7680}, p.width);
+    visit({"height", "height of the window", "px", 480, 4320}, p.height);
     visit({"state_file", "writes here what it shows, for tests"}, p.state_file);
   }
   static cli::CommandInfo info() {

@@ -17,7 +17,8 @@ struct TlsFlags {
     visit({"tls_ca", "speak TLS, and trust certificates that these have signed (PEM; empty: nothing is encrypted)"},
           p.tls_ca);
     visit({"tls_certificate", "our own certificate (PEM)"}, p.tls_certificate);
-    visit({"tls_key", "its key, in a file that only we may read (PEM, without a password)"}, p.tls_key);
+    visit({"tls_key", "private key of the TLS certificate, in a file that only we may read (PEM, without a password)"},
+          p.tls_key);
   }
   [[nodiscard]] DicomTls tls() const { return {tls_ca, tls_certificate, tls_key}; }
 };
@@ -29,7 +30,7 @@ struct PeerFlags : TlsFlags {
   static void describe(PeerFlags& p, auto& visit) {
     visit({"peer", "the node, as TITLE@HOST:PORT, like ORTHANC@127.0.0.1:4242"}, p.peer);
     visit({"ae", "our own title, which the node must know"}, p.ae);
-    visit({"timeout_s", "for the connection and for each answer", "s", 1, 3600}, p.timeout_s);
+    visit({"timeout_s", "time limit of the connection and of each answer", "s", 1, 3600}, p.timeout_s);
     TlsFlags::describe(p, visit);
   }
 };
@@ -39,7 +40,7 @@ struct PeerOrWebFlags : PeerFlags {
   std::string dicomweb, dicomweb_login, dicomweb_ca;
   static void describe(PeerOrWebFlags& p, auto& visit) {
     PeerFlags::describe(p, visit);
-    visit({"dicomweb", "in place of --peer: root of a DICOMweb server, like https://pacs.example/dicom-web"},
+    visit({"dicomweb", "root of a DICOMweb server, used instead of --peer, like https://pacs.example/dicom-web"},
           p.dicomweb);
     visit({"dicomweb_login",
            "file, mode 600, with USER:PASSWORD (empty: OSTEO_DICOMWEB_LOGIN of the environment, or none)"},
@@ -61,7 +62,7 @@ struct SendCommand {
     visit({"check", "ask afterwards which of the objects the node has (--no-check: believe its answers)"}, p.check);
     visit({"deidentify", "send copies as 'osteo deidentify' makes them; what it leaves out does not leave"},
           p.deidentify);
-    visit({"key", "with --deidentify: as there"}, p.key);
+    visit({"key", "key of the pseudonyms, as in 'deidentify', with --deidentify"}, p.key);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);
@@ -98,7 +99,7 @@ struct FetchCommand {
     visit({"series", "UID of a series, or its number as listed"}, p.series);
     visit({"accession", "number of a request"}, p.accession);
     visit({"patient_id", "others on this machine can see what a command is called with"}, p.patient_id);
-    visit({"date", "of the study, like 20240131 or 20240101-20240131"}, p.date);
+    visit({"date", "date of the study, like 20240131 or 20240101-20240131"}, p.date);
     visit({"modality", "like CT (empty: any)"}, p.modality);
     visit({"series_gb", "a series may not be larger", "GB", 0.000001, 1000}, p.series_gb);
   }
@@ -118,15 +119,16 @@ struct ReceiveCommand {
   static void describe(Params& p, auto& visit) {
     visit({"ae", "our title: who calls another is refused"}, p.ae);
     visit({"bind", "IPv4 address to listen on (0.0.0.0: every network this machine is in)"}, p.bind);
-    visit({"port", "to listen on (0: any free one)", "", 0, 65535}, p.port);
+    visit({"port", "port to listen on (0: any free one)", "", 0, 65535}, p.port);
     visit({"allow", "titles of the nodes that may send, with commas"}, p.allow);
     visit({"anybody", "let every node send"}, p.anybody);
-    visit({"associations", "at once; more are refused", "", 1, 1000}, p.associations);
+    visit({"associations", "associations that are accepted at the same time", "", 1, 1000}, p.associations);
     visit({"object_gb", "a larger object is refused", "GB", 0.000001, 100}, p.object_gb);
     visit({"folder_gb", "all of the folder; what would be beyond is refused", "GB", 0.000001, 1e6}, p.folder_gb);
-    visit({"keep_free_gb", "of the disk; below it everything is refused", "GB", 0, 1e6}, p.keep_free_gb);
-    visit({"memory_mb", "that an association may make its process take", "MB", 16, 100000}, p.memory_mb);
-    visit({"timeout_s", "for each message of a node", "s", 1, 3600}, p.timeout_s);
+    visit({"keep_free_gb", "free space to keep on the disk; with less, everything is rejected", "GB", 0, 1e6},
+          p.keep_free_gb);
+    visit({"memory_mb", "memory that an association's process may take", "MB", 16, 100000}, p.memory_mb);
+    visit({"timeout_s", "time limit of each message of a node", "s", 1, 3600}, p.timeout_s);
     visit({"association_s", "longest that a node may stay", "s", 1, 86400}, p.association_s);
     visit({"quiet_s", "a series is closed when nothing of it came for so long", "s", 0.1, 86400}, p.quiet_s);
     visit({"metrics", "file for counters, in Prometheus' text form (empty: none)"}, p.metrics);
@@ -153,7 +155,7 @@ struct WatchCommand {
     visit({"out", "folder for cases and journal, made when it is not there (also -o)"}, p.out);
     visit({"quiet_s", "a series is taken when none of its files has come or changed for so long", "s", 0.1, 86400},
           p.quiet_s);
-    visit({"poll_s", "between looks into the folder", "s", 0.1, 3600}, p.poll_s);
+    visit({"poll_s", "time between two looks into the folder", "s", 0.1, 3600}, p.poll_s);
     visit({"jobs", "cases at a time", "", 1, 1024}, p.jobs);
     visit({"memory_mb", "memory that a case may have; one that needs more is ended (0: no bound)", "MB", 0, 10000000},
           p.memory_mb);
@@ -169,7 +171,8 @@ struct WatchCommand {
            "file, mode 600, with USER:PASSWORD (empty: OSTEO_ORTHANC_LOGIN of the environment, or none)"},
           p.orthanc_login);
     visit({"orthanc_ca", "certificates to trust (PEM; empty: those of the system)"}, p.orthanc_ca);
-    visit({"timeout_s", "for the connection to it, and for less than 1000 bytes a second", "s", 1, 3600}, p.timeout_s);
+    visit({"timeout_s", "time limit of the connection, and of a rate below 1000 bytes a second", "s", 1, 3600},
+          p.timeout_s);
     visit({"object_gb", "a series with a larger object is not taken from it", "GB", 0.000001, 100}, p.object_gb);
     visit({"once", "end when all that is there is done, instead of waiting for more"}, p.once);
     visit({"no_report", "write no report of each case: its cuts are pictures of the patient"}, p.no_report);
@@ -190,22 +193,22 @@ struct DoctorCommand {
     double memory_mb = 4000, keep_free_gb = 1;
   };
   static void describe(Params& p, auto& visit) {
-    visit({"seconds", "for which the loop's lateness is measured", "s", 0.1, 600}, p.seconds);
-    visit({"rate_hz", "of that loop", "Hz", 100, 10000}, p.rate_hz);
+    visit({"seconds", "how long the lateness of the 1 kHz loop is measured", "s", 0.1, 600}, p.seconds);
+    visit({"rate_hz", "rate of the measured loop", "Hz", 100, 10000}, p.rate_hz);
     visit({"server",
            "look at what receive, watch and batch need instead; the flags that follow are theirs, and are for this "
            "alone"},
           p.server);
     visit({"inbox", "folder of receive (empty: none is looked at)"}, p.inbox);
     visit({"cases", "folder of watch's cases (empty: none)"}, p.cases);
-    visit({"rules", "of watch (empty: none)"}, p.rules);
+    visit({"rules", "rules file of 'watch' (empty: none)"}, p.rules);
     visit({"metrics", "files for counters, with commas (empty: none)"}, p.metrics);
     visit({"login", "files with USER:PASSWORD, with commas (empty: none)"}, p.login);
     visit({"ae", "our title"}, p.ae);
     visit({"allow", "titles of the nodes that may send, with commas"}, p.allow);
     visit({"bind", "IPv4 address to listen on"}, p.bind);
-    visit({"port", "to listen on", "", 1, 65535}, p.port);
-    visit({"keep_free_gb", "of the disks of inbox and cases", "GB", 0, 1e6}, p.keep_free_gb);
+    visit({"port", "port to listen on", "", 1, 65535}, p.port);
+    visit({"keep_free_gb", "free space to keep on the disks of inbox and cases", "GB", 0, 1e6}, p.keep_free_gb);
     visit({"jobs", "cases at a time", "", 1, 1024}, p.jobs);
     visit({"memory_mb", "memory that a case may have", "MB", 0, 10000000}, p.memory_mb);
     visit({"no_report", "cases get no reports, so pictures need not be drawn"}, p.no_report);

@@ -17,12 +17,13 @@ struct CalibrateCameraCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "the camera as JSON (also -o)"}, p.out);
-    visit({"seconds", "from a camera: for this long", "s", 1, 3600}, p.seconds);
+    visit({"seconds", "how long to record from a camera", "s", 1, 3600}, p.seconds);
     visit({"width", "asked of a camera; files have their own", "pixels", 160, 8192}, p.width);
     visit({"height", "asked of a camera; files have their own", "pixels", 120, 8192}, p.height);
     visit({"fps", "pictures a second that it is asked for, here and later", "Hz", 1, 240}, p.fps);
     visit({"latency_ms",
-           "from the middle of an exposure until the picture is here, where it is known (-1: one period is taken)",
+           "camera latency, from the middle of an exposure until the picture is here (-1: not known, one period is "
+           "taken)",
            "ms", -1, 500},
           p.latency_ms);
   }

@@ -20,7 +20,7 @@ struct CalibratePenCommand {
     visit({"out", "the pen as JSON (also -o)"}, p.out);
     visit({"pen", "which set of markers it carries", "", 1, PenBody::kMostPens}, p.pen);
     visit({"ruler_mm", "how long the line of 100 mm on its page came out", "mm", 80, 120}, p.ruler_mm);
-    visit({"seconds", "from a camera: for this long", "s", 1, 3600}, p.seconds);
+    visit({"seconds", "how long to record from a camera", "s", 1, 3600}, p.seconds);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

@@ -21,7 +21,7 @@ struct ConvertCommand {
           p.series);
     visit({"onto_source", "a label map as .dcm: on the source's own slices, tilted and uneven as they are"},
           p.onto_source);
-    visit({"description", "of a .dcm output, as a PACS lists it"}, p.description);
+    visit({"description", "series description of a .dcm output, as a PACS lists it"}, p.description);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

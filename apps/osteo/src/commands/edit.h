@@ -12,7 +12,7 @@ struct EditCommand {
     std::string apply;
   };
   static void describe(Params& p, auto& visit) {
-    visit({"apply", "without a window: make the corrections of this file (edits.json) again on the case"}, p.apply);
+    visit({"apply", "apply the corrections of this file (edits.json) to the case again, without a window"}, p.apply);
     EditFlags::describe(p, visit);
   }
   static cli::CommandInfo info();

@@ -29,7 +29,7 @@ struct ExperimentCommand {
     visit({"reaction_s", "a look before each move", "s", 0, 2}, p.reaction_s);
     visit({"participant", "force-skill: whose trials, by code"}, p.participant);
     visit({"people", "codes of a new experiment's participants, as 'P01, P02' (empty: twelve)"}, p.people);
-    visit({"trials", "of each participant of a new experiment: a multiple of 9", "", 9, 999}, p.trials);
+    visit({"trials", "trials of each participant in a new experiment, a multiple of 9", "", 9, 999}, p.trials);
     visit({"device", "force-skill: what the hand holds: mouse, keys, woodenhaptics or spacemouse"}, p.device);
     visit({"headless", "force-skill: without a window"}, p.headless);
     visit({"simulated", "force-skill: a program takes part, and everything says so"}, p.simulated);
@@ -39,7 +39,7 @@ struct ExperimentCommand {
     visit({"chain",
            "null: small experiments by programs, run and scored, instead of drawn scores; 0.3 s of one core each"},
           p.chain);
-    visit({"level", "of intervals", "", 0.5, 0.999}, p.level);
+    visit({"level", "level of confidence intervals", "", 0.5, 0.999}, p.level);
     visit({"state_file", "force-skill: the window writes here what it shows, for tests"}, p.state_file);
   }
   static cli::CommandInfo info();

@@ -25,11 +25,11 @@ struct GroundTruthCommand {
     visit({"trajectory", "a recorded out-trajectory with its forces to play instead, as text (needs --surface)"},
           p.trajectory);
     visit({"surface", "closed surface of what was probed, in the trajectory's own coordinates, mm"}, p.surface);
-    visit({"columns", "of the trajectory: t, x, y, z, fx, fy, fz in their order, '-' for what is not wanted; s, mm, N"},
+    visit({"columns", "columns of the trajectory in their order: t (s), x, y, z (mm), fx, fy, fz (N); '-' skips one"},
           p.columns);
-    visit({"stiffness_n_per_mm", "of the spring that the recorded forces are taken for", "N/mm", 0.01, 100},
+    visit({"stiffness_n_per_mm", "stiffness of the spring by which recorded forces are read", "N/mm", 0.01, 100},
           p.stiffness_n_per_mm);
-    visit({"share", "of each trajectory's length: less is quicker, and less is seen", "", 0.02, 10}, p.share);
+    visit({"share", "share of each trajectory that is used: less is quicker and shows less", "", 0.02, 10}, p.share);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

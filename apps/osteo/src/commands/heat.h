@@ -12,10 +12,11 @@ struct HeatCommand {
     std::string report, case_folder;
   };
   static void describe(Params& p, auto& visit) {
-    visit({"cutting_share", "of force times surface speed of a cutting burr that becomes heat in bone", "", 0, 1},
+    visit({"cutting_share", "share of a cutting burr's power (force times surface speed) that becomes heat in bone", "",
+           0, 1},
           p.cutting_share);
     visit({"diamond_w_per_n", "heat of a diamond burr in bone, for each newton", "W/N", 0, 20}, p.diamond_w_per_n);
-    visit({"water_c", "of the water that is poured", "C", 0, 60}, p.water_c);
+    visit({"water_c", "temperature of the irrigation water", "C", 0, 60}, p.water_c);
     visit({"film", "how well running water cools", "W/(m2 K)", 0, 100000}, p.film);
     visit({"cell_mm", "wanted width of the cells that heat is computed in", "mm", 0.1, 2}, p.cell_mm);
     visit({"report",

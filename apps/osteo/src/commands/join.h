@@ -18,14 +18,14 @@ struct JoinCommand {
         {"out", "folder for the session as it comes here: the host's, to the bit (empty: it is not recorded; also -o)"},
         p.out);
     visit({"case_folder", "the same case as the host's"}, p.case_folder);
-    visit({"code", "that the host shows (empty: asked for)"}, p.code);
+    visit({"code", "code that the host shows (empty: asked for)"}, p.code);
     visit({"role", "trainee: the second hand; watcher: a copy of the bone, and no hand"}, p.role);
     visit({"hand", "trainee: simulated:STIFFNESS, in N/m; it has no will of its own"}, p.hand);
-    visit({"stiffness_n_per_mm", "of the pull to the instructor's hand; less where the delay would not bear it", "N/mm",
-           0, 10},
+    visit({"stiffness_n_per_mm", "stiffness of the spring to the instructor's hand, lowered where the delay demands it",
+           "N/mm", 0, 10},
           p.stiffness_n_per_mm);
-    visit({"most_n", "of that pull, at most", "N", 0, 20}, p.most_n);
-    visit({"wait_s", "for the host to answer, at most", "s", 0, 3600}, p.wait_s);
+    visit({"most_n", "maximum force of the spring to the instructor's hand", "N", 0, 20}, p.most_n);
+    visit({"wait_s", "maximum time to wait for the host's answer", "s", 0, 3600}, p.wait_s);
     visit({"patience_s",
            "the session counts as over when nothing was heard of the host for so long; else when the host says so", "s",
            0.5, 600},

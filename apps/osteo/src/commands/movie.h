@@ -21,12 +21,12 @@ struct MovieCommand {
            "surgeon: from where was looked (notes of the session); fixed: from one place, all that was drilled"},
           p.camera);
     visit({"speed", "times as fast as it was", "", 0.1, 100}, p.speed);
-    visit({"from_s", "of the session", "s", 0, 1e6}, p.from_s);
-    visit({"to_s", "of the session (-1: its end)", "s", -1, 1e6}, p.to_s);
+    visit({"from_s", "start in the session", "s", 0, 1e6}, p.from_s);
+    visit({"to_s", "end in the session (-1: the session's end)", "s", -1, 1e6}, p.to_s);
     visit({"skip_idle", "leave out where for over 2 s neither hand nor camera moves and no pedal is down"},
           p.skip_idle);
-    visit({"no_overlay", "without time, force, nearest structure and volume removed"}, p.no_overlay);
-    visit({"blind", "for raters: no overlay, and with a folder as output a random name"}, p.blind);
+    visit({"no_overlay", "leave out time, force, nearest structure and volume removed"}, p.no_overlay);
+    visit({"blind", "blinded movie for raters: no overlay, and a random name where the output is a folder"}, p.blind);
     visit({"size", "pixels, width and height, both even"}, p.size);
     visit({"fps", "frames a second", "Hz", 1, 120}, p.fps);
     visit({"deep", "creases shaded and edges smoothed, which without a graphics card takes several times as long"},

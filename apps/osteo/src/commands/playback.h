@@ -22,18 +22,19 @@ struct PlaybackCommand {
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder for the guided session (empty: a new one in CASE/sessions; also -o)"}, p.out);
     PlaybackParams::describe(p, visit);
-    visit({"from_s", "of the session: where the lesson begins; bone is as it was then", "s", 0, 1e6}, p.from_s);
+    visit({"from_s", "start of the lesson in the session; the bone is as it was then", "s", 0, 1e6}, p.from_s);
     visit({"to_s", "and where it ends (0: with the session)", "s", 0, 1e6}, p.to_s);
     visit({"experts",
            "fading, amplify: more sessions of the same step, by commas; three quarters of the distances between their "
            "ways and the lesson's "
            "are the dead zone"},
           p.experts);
-    visit({"headless", "without a window and as fast as possible: a simulated hand is led"}, p.headless);
+    visit({"headless", "run without a window, as fast as possible: a simulated hand is guided"}, p.headless);
     visit({"hand", "headless: simulated:STIFFNESS, in N/m (100 to 500 is a grip); it has no will of its own"}, p.hand);
-    visit({"device", "in the window, what moves the drill, as in 'rehearse'"}, p.device);
+    visit({"device", "device that moves the drill, as in 'rehearse'"}, p.device);
     visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
-    visit({"state_file", "as in 'rehearse'"}, p.state_file);
+    visit({"state_file", "file to which the window writes its state as JSON after each picture, for tests"},
+          p.state_file);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

@@ -19,7 +19,7 @@ struct RehearseCommand {
     bool pieces = false;
   };
   static void describe(Params& p, auto& visit) {
-    visit({"headless", "without a window: a scripted hand in front of the same servo"}, p.headless);
+    visit({"headless", "run without a window: a scripted hand moves the drill in the same servo"}, p.headless);
     visit({"script", "headless: strokes as JSON (empty: a cavity on one side of any head)"}, p.script);
     WindowFlags::describe(p, visit);
     visit({"show_settings", "print the settings that would be used, as a file to start from, and stop"},

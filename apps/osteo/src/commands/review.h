@@ -31,7 +31,7 @@ struct ReviewCommand {
         p.subject);
     visit({"earlier", "earlier sessions of the same person in their order, with commas between (empty: none)"},
           p.earlier);
-    visit({"no_pictures", "without pictures and the view in 3D: needs no OpenGL"}, p.no_pictures);
+    visit({"no_pictures", "leave out pictures and the view in 3D; needs no OpenGL"}, p.no_pictures);
     visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
   }
   static cli::CommandInfo info();

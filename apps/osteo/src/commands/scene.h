@@ -17,8 +17,8 @@ struct SceneCommand {
   static void describe(Params& p, auto& visit) {
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
     visit({"contact", "how the burr feels bone"}, p.contact);
-    visit({"dust", "with bone dust"}, p.dust);
-    visit({"heat", "with heat of drilling"}, p.heat);
+    visit({"dust", "include bone dust"}, p.dust);
+    visit({"heat", "include heat of drilling"}, p.heat);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

@@ -29,7 +29,7 @@ struct ScoreCommand {
         {"subject", "who this is, by the reference's code: sessions of the same person are left out of the comparison"},
         p.subject);
     visit({"csv", "also write a header and a row of all values (.csv)"}, p.csv);
-    visit({"evidence", "with --json: also the places that prove each item, and all bone removed unseen"}, p.evidence);
+    visit({"evidence", "add to --json the places that prove each item, and all bone removed unseen"}, p.evidence);
     visit(
         {"heat", "also how warm bone and structures became: runs the session again, which takes several times as long"},
         p.heat);

@@ -27,7 +27,8 @@ struct SimulateTraineeCommand {
            "the procedure is written for the other side of the body: its directions and curves turn about x = 0"},
           p.mirror);
     visit({"minutes", "then it stops, wherever it is", "min", 0.05, 60}, p.minutes);
-    visit({"approach", "from the bone to who drills, LPS (0,0,0: as the procedure's items have it)", "", -1e4, 1e4},
+    visit({"approach", "direction from the bone to the surgeon, LPS (0,0,0: as the procedure's items have it)", "",
+           -1e4, 1e4},
           p.approach);
     visit({"window_mm", "radius of what it opens, for the burr's middle", "mm", 1, 20}, p.window_mm);
   }

@@ -20,12 +20,13 @@ struct StreamCommand {
            "lsl; several with "
            "commas between"},
           p.to);
-    visit({"setup", "of the nerve monitor, as JSON (empty: as the session was recorded with, or the built-in one)"},
-          p.setup);
+    visit(
+        {"setup", "setup of the nerve monitor, as JSON (empty: as the session was recorded with, or the built-in one)"},
+        p.setup);
     visit({"speed", "times real time", "", 0.05, 20}, p.speed);
-    visit({"listeners", "it begins when so many are there (0: at once); Cerebus packets have none", "", 0, 8},
+    visit({"listeners", "listeners to wait for before it begins (0: none); Cerebus packets have none", "", 0, 8},
           p.listeners);
-    visit({"wait_s", "for them, at most", "s", 1, 86400}, p.wait_s);
+    visit({"wait_s", "maximum time to wait for listeners", "s", 1, 86400}, p.wait_s);
     visit({"case_folder", "where the case is now, when it was moved"}, p.case_folder);
   }
   static cli::CommandInfo info();

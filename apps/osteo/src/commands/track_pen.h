@@ -15,7 +15,7 @@ struct TrackPenCommand {
   static void describe(Params& p, auto& visit) {
     visit({"camera", "made by calibrate-camera"}, p.camera);
     visit({"pen", "made by calibrate-pen (empty: pen 1, its tip 100 mm below the middle of the prism)"}, p.pen);
-    visit({"seconds", "from a camera: for this long", "s", 0.1, 86400}, p.seconds);
+    visit({"seconds", "how long to record from a camera", "s", 0.1, 86400}, p.seconds);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

@@ -28,12 +28,15 @@ struct TutorCommand {
           p.listen);
     visit({"port", "UDP; 0: any that is free", "", 0, 65535}, p.port);
     visit({"two_way", "the instructor's hand is pulled by the trainee's too"}, p.two_way);
-    visit({"stiffness_n_per_mm", "with --two-way, of that pull; less where the delay would not bear it", "N/mm", 0, 10},
+    visit({"stiffness_n_per_mm",
+           "stiffness of the spring to the trainee's hand with --two-way, lowered where the delay demands it", "N/mm",
+           0, 10},
           p.stiffness_n_per_mm);
-    visit({"most_n", "with --two-way, at most", "N", 0, 20}, p.most_n);
+    visit({"most_n", "maximum force of the spring to the trainee's hand with --two-way", "N", 0, 20}, p.most_n);
     visit({"attend", "so many are to have joined, with their copies made, when the session begins", "", 0, 9},
           p.attend);
-    visit({"wait_s", "for them at most; then it begins with those who are there", "s", 0, 3600}, p.wait_s);
+    visit({"wait_s", "maximum time to wait for participants; then it begins with those who are there", "s", 0, 3600},
+          p.wait_s);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

@@ -69,8 +69,8 @@ struct SawStage {
     visit({"normal", "across the blade, LPS"}, p.normal);
     visit({"along", "where the blade's length lies, LPS"}, p.along);
     visit({"kerf_mm", "thickness of what is removed", "mm", 0.01, 100}, p.kerf_mm);
-    visit({"length_mm", "of the blade (0: endless)", "mm", 0, 10000}, p.length_mm);
-    visit({"depth_mm", "of the blade, at right angles to its length (0: endless)", "mm", 0, 10000}, p.depth_mm);
+    visit({"length_mm", "length of the blade (0: endless)", "mm", 0, 10000}, p.length_mm);
+    visit({"depth_mm", "depth of the blade, at right angles to its length (0: endless)", "mm", 0, 10000}, p.depth_mm);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

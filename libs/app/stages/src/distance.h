@@ -52,8 +52,8 @@ struct DistanceStage {
           p.tree_ascend_n);
     visit({"breadth_first", "thesis: search breadth first"}, p.breadth_first);
     visit({"bound_as_printed", "thesis: the lower bound as printed, which loses nearer triangles"}, p.bound_as_printed);
-    visit({"structure", "of labels: the structure by name or value (empty: all together)"}, p.structure);
-    visit({"name_nearest", "of labels: say in the second grid which structure is the nearest"}, p.name_nearest);
+    visit({"structure", "structure of a label map by name or value (empty: all together)"}, p.structure);
+    visit({"name_nearest", "write into the second grid which structure of a label map is nearest"}, p.name_nearest);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

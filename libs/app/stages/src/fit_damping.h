@@ -31,14 +31,14 @@ struct FitDampingStage {
     visit({"along", "direction of a column u_mm", "", -1e6, 1e6}, p.along);
     visit({"method", "steps that the damping is for, as of simulate"}, p.method);
     visit({"step_ms", "implicit: length of a step, as simulate will have it", "ms", 1e-4, 1e5}, p.step_ms);
-    visit({"density_kg_m3", "of the tissue", "kg/m3", 1, 30000}, p.density_kg_m3);
+    visit({"density_kg_m3", "density of the tissue", "kg/m3", 1, 30000}, p.density_kg_m3);
     visit(
         {"fit_stiffness", "one factor on all of the body's stiffness too; without, the problem's is taken to be right"},
         p.fit_stiffness);
     visit(
         {"release_s", "when it was let go, by the table's clock; what was measured before is not used", "s", -1e6, 1e6},
         p.release_s);
-    visit({"fit_release", "that moment too, within a quarter of a swing"}, p.fit_release);
+    visit({"fit_release", "fit the moment of release, too, within a quarter of a swing"}, p.fit_release);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

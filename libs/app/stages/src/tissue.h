@@ -74,8 +74,8 @@ struct CalibrateStage {
            "names of the loads to fit, like 'A,B' (empty: the first; measured: all that were); the others show how it "
            "carries over"},
           p.fit);
-    visit({"law", "of the truth, by finite elements"}, p.law);
-    visit({"order", "of the truth's tetrahedra"}, p.order);
+    visit({"law", "material law of the true solution, by finite elements"}, p.law);
+    visit({"order", "order of the true solution's tetrahedra"}, p.order);
     visit({"grid_x", "points of the map of stiffness along x (1, 1, 1: one material)", "", 1, 20}, p.grid_x);
     visit({"grid_y", "along y", "", 1, 20}, p.grid_y);
     visit({"grid_z", "along z", "", 1, 20}, p.grid_z);
@@ -86,10 +86,10 @@ struct CalibrateStage {
     visit(
         {"smooth", "what differences in a shared map cost; borders between tissues cost less than ripples", "", 0, 10},
         p.smooth);
-    visit({"starts", "from other mixtures too; the best counts", "", 1, 3}, p.starts);
+    visit({"starts", "starting points of the fit; the best result counts", "", 1, 3}, p.starts);
     visit({"samples", "coarse search before: so many mixtures are tried, the best is a start too", "", 0, 10000},
           p.samples);
-    visit({"iterations", "of the trust region, at most", "", 1, 1000}, p.iterations);
+    visit({"iterations", "maximum iterations of the trust region", "", 1, 1000}, p.iterations);
     visit({"check_truth",
            "solve finite elements half as large too (eight times as many): how far the truth is off itself"},
           p.check_truth);
@@ -129,8 +129,8 @@ struct SimulateStage {
     visit({"load", "name of the load (empty: the first; none: no load)"}, p.load);
     visit({"method", "explicit: many quick steps of a certified length; implicit: few long ones, for stiff bodies"},
           p.method);
-    visit({"seconds", "of simulated time, at most", "s", 1e-4, 1000}, p.seconds);
-    visit({"density_kg_m3", "of the tissue", "kg/m3", 1, 30000}, p.density_kg_m3);
+    visit({"seconds", "maximum simulated time", "s", 1e-4, 1000}, p.seconds);
+    visit({"density_kg_m3", "density of the tissue", "kg/m3", 1, 30000}, p.density_kg_m3);
     visit({"damping_per_s", "how fast motion dies down", "1/s", 0, 1e5}, p.damping_per_s);
     visit({"least_step_ms", "steps at least this long: points are made heavier for it (0: as long as is stable)", "ms",
            0, 100},
@@ -140,8 +140,10 @@ struct SimulateStage {
     visit({"tool_radius_mm", "a ball that is pushed into the body (0: none)", "mm", 0, 1e6}, p.tool_radius_mm);
     visit({"tool_from_mm", "where its centre begins, LPS", "mm", -1e6, 1e6}, p.tool_from_mm);
     visit({"tool_to_mm", "where it is after half of the time, and stays", "mm", -1e6, 1e6}, p.tool_to_mm);
-    visit({"tool_stiffness_n_per_mm", "of each point that it meets", "N/mm", 1e-9, 1e9}, p.tool_stiffness_n_per_mm);
-    visit({"obstacle_stiffness_n_per_mm", "of each point of the surface that meets the obstacle", "N/mm", 1e-9, 1e9},
+    visit({"tool_stiffness_n_per_mm", "stiffness at each point that the tool meets", "N/mm", 1e-9, 1e9},
+          p.tool_stiffness_n_per_mm);
+    visit({"obstacle_stiffness_n_per_mm", "stiffness at each point of the surface that meets the obstacle", "N/mm",
+           1e-9, 1e9},
           p.obstacle_stiffness_n_per_mm);
   }
   static StageInfo info();

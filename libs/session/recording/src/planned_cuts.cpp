@@ -23,7 +23,7 @@ struct Entry {
   SawFields saw;
   double within_mm = PlannedCut{}.within_mm;
   static void describe(Entry& p, auto& visit) {
-    visit({"name", "that a script and the window call it by", "", 0, 0, true}, p.name);
+    visit({"name", "name that scripts and the window use", "", 0, 0, true}, p.name);
     visit({"about", "what it is for"}, p.about);
     SawFields::describe(p.saw, visit, true);
     visit({"within_mm", "as a cutting guide: a saw this near slips in", "mm", 0.1, SceneAction::kMostSlotMm},

@@ -44,7 +44,7 @@ struct SawFields {
     visit({"normal", "across the blade", "", -kFarMm, kFarMm, needed}, p.normal);
     visit({"along", "where its length lies", "", -kFarMm, kFarMm}, p.along);
     visit({"kerf_mm", "thickness of what it takes", "mm", 0.05, 10}, p.kerf_mm);
-    visit({"length_mm", "of the cut; 0: through", "mm", 0, 2000}, p.length_mm);
+    visit({"length_mm", "length of the cut (0: through)", "mm", 0, 2000}, p.length_mm);
     visit({"depth_mm", "across normal and length; 0: through", "mm", 0, 2000}, p.depth_mm);
   }
   /// The cut, its directions as they are written (a cut takes any length). Error(usage) with its line: what is no

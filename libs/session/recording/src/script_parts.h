@@ -22,8 +22,8 @@ struct Head {
     visit({"osteotome_strokes", "version of the format", "", 1, 1, true}, p.version);
     visit({"$schema", "where its schema lies, for editors"}, p.schema);
     visit({"about", "what it shows"}, p.about);
-    visit({"instrument", "by name, in place of a burr, as saw 25 mm"}, p.instrument);
-    visit({"axis", "from the burr to the handle, LPS", "", -kFarMm, kFarMm, true}, p.axis);
+    visit({"instrument", "name of the instrument in place of a burr, like saw 25 mm"}, p.instrument);
+    visit({"axis", "direction from the burr to the handle, LPS", "", -kFarMm, kFarMm, true}, p.axis);
   }
 };
 
@@ -32,9 +32,9 @@ struct BurrPart {
   double diameter_mm = 4;
   BurrShape shape = BurrShape::ball;
   static void describe(BurrPart& p, auto& visit) {
-    visit({"kind", "of its edges", "", 0, 0, true}, p.kind);
+    visit({"kind", "kind of the burr's edges", "", 0, 0, true}, p.kind);
     visit({"diameter_mm", "1, 2, 3, 4, 5, 6 or 7", "mm", 1, 7, true}, p.diameter_mm);
-    visit({"shape", "of its head"}, p.shape);
+    visit({"shape", "shape of the burr's head"}, p.shape);
   }
 };
 
@@ -43,8 +43,8 @@ struct CameraPart {
   double radius_mm = 32;
   static void describe(CameraPart& p, auto& visit) {
     visit({"centre_mm", "middle of the pictures, LPS", "mm", -kFarMm, kFarMm, true}, p.centre_mm);
-    visit({"radius_mm", "of what they show", "mm", 1, 1000, true}, p.radius_mm);
-    visit({"eye", "from there towards who looks", "", -kFarMm, kFarMm, true}, p.eye);
+    visit({"radius_mm", "radius of what is shown", "mm", 1, 1000, true}, p.radius_mm);
+    visit({"eye", "direction from there towards the viewer", "", -kFarMm, kFarMm, true}, p.eye);
   }
 };
 
@@ -71,8 +71,8 @@ struct HandPart {
   std::string instrument;
   Triple axis{0, 0, 1};
   static void describe(HandPart& p, auto& visit) {
-    visit({"instrument", "by name, as sucker 8 Fr or cutting 4 mm", "", 0, 0, true}, p.instrument);
-    visit({"axis", "from the tip to the handle, LPS", "", -kFarMm, kFarMm, true}, p.axis);
+    visit({"instrument", "name of the instrument, like sucker 8 Fr or cutting 4 mm", "", 0, 0, true}, p.instrument);
+    visit({"axis", "direction from the tip to the handle, LPS", "", -kFarMm, kFarMm, true}, p.axis);
   }
 };
 
@@ -82,7 +82,7 @@ struct Cavity {
   static void describe(Cavity& p, auto& visit) {
     visit({"centre_mm", "middle of its rim, LPS", "mm", -kFarMm, kFarMm, true}, p.centre_mm);
     visit({"towards", "into the bone", "", -kFarMm, kFarMm, true}, p.towards);
-    visit({"radius_mm", "of the burr's circles at the rim", "mm", 0.1, 100, true}, p.radius_mm);
+    visit({"radius_mm", "radius of the burr's circles at the rim", "mm", 0.1, 100, true}, p.radius_mm);
     visit({"depth_mm", "in the middle, at the end", "mm", 0, 200, true}, p.depth_mm);
     visit({"over_s", "how long it takes", "s", 0.1, 3600, true}, p.over_s);
     visit({"turns_per_s", "circles a second", "1/s", 0.01, 20}, p.turns_per_s);
@@ -138,7 +138,7 @@ struct Move {
           p.shift_mm);
     visit({"turn_deg", "about axis through about_mm; left out: as far as it was turned before", "deg", -360, 360},
           p.turn_deg);
-    visit({"axis", "of the turn", "", -kFarMm, kFarMm}, p.axis);
+    visit({"axis", "axis of the rotation", "", -kFarMm, kFarMm}, p.axis);
     visit({"about_mm", "a point of that axis, LPS", "mm", -kFarMm, kFarMm}, p.about_mm);
     visit({"over_s", "how long it takes", "s", 0, 3600}, p.over_s);
   }
@@ -152,7 +152,7 @@ struct Grip {
     visit({"plate", "which; left out: the drill again"}, p.plate);
     visit({"x", "along the plate, in the hand's frame", "", -kFarMm, kFarMm}, p.x);
     visit({"z", "away from the bone, in the hand's frame", "", -kFarMm, kFarMm}, p.z);
-    visit({"shift_mm", "of its middle, in the hand's frame", "mm", -1000, 1000}, p.shift_mm);
+    visit({"shift_mm", "shift of the middle, in the hand's frame", "mm", -1000, 1000}, p.shift_mm);
   }
 };
 
@@ -174,7 +174,7 @@ struct Detach {
   static constexpr const char *kName = "detach", *kHelp = "take a plate off";
   int number = 1;
   static void describe(Detach& p, auto& visit) {
-    visit({"number", "of the plate, in the order of fixing, from 1", "", 1, kMostPieces, true}, p.number);
+    visit({"number", "number of the plate in the order of fixing, from 1", "", 1, kMostPieces, true}, p.number);
   }
 };
 
@@ -183,8 +183,8 @@ struct Open {
   int number = 1;
   double opening_mm = 0, over_s = 0;
   static void describe(Open& p, auto& visit) {
-    visit({"number", "of the plate, in the order of fixing, from 1", "", 1, kMostPieces, true}, p.number);
-    visit({"opening_mm", "of the gap, at the end", "mm", 0, 100, true}, p.opening_mm);
+    visit({"number", "number of the plate in the order of fixing, from 1", "", 1, kMostPieces, true}, p.number);
+    visit({"opening_mm", "opening of the gap at the end", "mm", 0, 100, true}, p.opening_mm);
     visit({"over_s", "how long it takes", "s", 0, 3600}, p.over_s);
   }
 };
@@ -209,7 +209,7 @@ struct Irrigate {
     visit({"at_mm", "where, LPS", "mm", -kFarMm, kFarMm}, p.at_mm);
     visit({"radius_mm", "how far it falls at most before it spreads", "mm", 0.1, SceneAction::kMostReachMm},
           p.radius_mm);
-    visit({"mm3_per_s", "of water; 0: away", "mm3/s", 0, 1e5}, p.mm3_per_s);
+    visit({"mm3_per_s", "water per second (0: none)", "mm3/s", 0, 1e5}, p.mm3_per_s);
   }
 };
 
@@ -218,7 +218,7 @@ struct Patient {
   Posture position = Posture::supine;
   double head_turned_deg = 0;
   static void describe(Patient& p, auto& visit) {
-    visit({"position", "of the patient"}, p.position);
+    visit({"position", "position of the patient"}, p.position);
     visit({"head_turned_deg", "positive: the face towards the left shoulder", "deg", -180, 180}, p.head_turned_deg);
   }
 };

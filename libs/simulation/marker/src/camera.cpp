@@ -25,8 +25,8 @@ struct CameraFields {
   static void describe(CameraFields& f, auto& visit) {
     CameraModel& c = f.camera;
     visit({"osteotome_camera", "version of the format", "", 1, 1, true}, f.version);
-    visit({"width", "of its pictures", "pixels", 64, 16384, true}, c.width);
-    visit({"height", "of its pictures", "pixels", 64, 16384, true}, c.height);
+    visit({"width", "width of the camera's pictures", "pixels", 64, 16384, true}, c.width);
+    visit({"height", "height of the camera's pictures", "pixels", 64, 16384, true}, c.height);
     visit({"fx", "focal length, across", "pixels", 10, 1e6, true}, c.fx);
     visit({"fy", "focal length, down", "pixels", 10, 1e6, true}, c.fy);
     visit({"cx", "where the axis of the lens is seen, from the left", "pixels", -16384, 32768, true}, c.cx);
@@ -37,11 +37,12 @@ struct CameraFields {
     visit({"mirrored", "the camera delivers mirrored pictures"}, c.mirrored);
     visit({"fps", "pictures a second that it is asked for", "Hz", 1, 1000}, c.fps);
     visit({"latency_ms",
-           "from the middle of an exposure until the picture is here (below 0: not known, one period is taken)", "ms",
-           -1, 1000},
+           "camera latency, from the middle of an exposure until the picture is here (below 0: not known, one period "
+           "is taken)",
+           "ms", -1, 1000},
           c.latency_ms);
-    visit({"rms_px", "of its calibration", "pixels", 0, 1000}, c.rms_px);
-    visit({"views", "of its calibration", "", 0, 100000}, c.views);
+    visit({"rms_px", "root mean square error of the calibration", "pixels", 0, 1000}, c.rms_px);
+    visit({"views", "views of the calibration", "", 0, 100000}, c.views);
   }
 };
 

@@ -26,7 +26,8 @@ struct PenFields {
     visit({"osteotome_pen", "version of the format", "", 1, 1, true}, f.version);
     visit({"pen", "which print it carries", "", 1, PenBody::kMostPens}, f.pen.pen);
     visit({"scale", "printed mm for a drawn one", "", 0.5, 2}, f.pen.scale);
-    visit({"tip_mm", "its tip, from the middle of the prism, z along the pen to its upper end", "mm", -500, 500, true},
+    visit({"tip_mm", "tip of the pen, from the middle of the prism, z along the pen to its upper end", "mm", -500, 500,
+           true},
           f.tip_mm);
     visit({"rms_mm", "how far the tip seemed to wander while the pen was turned on it (below 0: it was not)", "mm", -1,
            1000},

@@ -38,7 +38,7 @@ struct Common {
            "bar or JSON lines on standard error, Slicer's form on standard output and all notes with it; auto: a bar "
            "on a terminal"},
           p.progress);
-    visit({"seed", "of random choices", "", 0, 2147483647}, p.seed);
+    visit({"seed", "seed of random numbers", "", 0, 2147483647}, p.seed);
   }
 };
 

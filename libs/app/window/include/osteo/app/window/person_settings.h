@@ -27,16 +27,17 @@ struct PersonValues {
   bool left_handed = false, mirror_mouse = false;
   static void describe(PersonValues& p, auto& visit) {
     visit({"scale", "size of text and panels, times the monitor's", "", 0.6, 2.5}, p.scale);
-    visit({"layout", "beside, operate or plan"}, p.layout);
+    visit({"layout", "layout of the window: beside, operate or plan"}, p.layout);
     visit({"full_screen", "the window fills the screen"}, p.full_screen);
     visit({"sound", "what drilling sounds like"}, p.sound);
-    visit({"volume", "of that sound", "", 0, 1}, p.volume);
+    visit({"volume", "volume of the sound", "", 0, 1}, p.volume);
     visit({"alarms", "beeps where a structure at risk is touched"}, p.alarms);
     visit({"remember_cases", "the start page lists the cases opened last"}, p.remember_cases);
     visit({"first_steps", "the list of first steps is shown"}, p.first_steps);
     visit({"motion_one_to", "mm of the hand for a mm of the tool: 1, 2, 4 or 8", "", 1, 8}, p.motion_one_to);
     visit({"wrist_rest", "share of that motion while the wrist rests", "", 0.05, 1}, p.wrist_rest);
-    visit({"burr_share", "of the burr's full speed at a pedal that is all the way down", "", 0.25, 1}, p.burr_share);
+    visit({"burr_share", "share of the burr's full speed when the pedal is all the way down", "", 0.25, 1},
+          p.burr_share);
     visit({"left_handed", "the drill is held from the left, the second hand comes from the right"}, p.left_handed);
     visit({"mirror_mouse", "the mouse's right and left button change places"}, p.mirror_mouse);
     visit({"hints", "words while one drills: not seen, press less, ..."}, p.hints);

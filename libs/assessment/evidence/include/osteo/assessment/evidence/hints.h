@@ -31,14 +31,14 @@ struct HintRule {
   HintKind kind = HintKind::unseen;
   double within_mm = 2, limit = 1, for_s = 0.5, quiet_s = 15;
   static void describe(Params& p, auto& visit) {
-    visit({"id", "to turn it off by; also in the session's note", "", 0, 0, true}, p.id);
+    visit({"id", "name by which a person turns the hint off; also in the session's note", "", 0, 0, true}, p.id);
     visit({"kind", "what is watched", "", 0, 0, true}, p.kind);
     visit({"words", "what is said; {structure} stands for its name", "", 0, 0, true}, p.words);
     visit({"structure", "which alone counts (empty: any)"}, p.structure);
     visit({"within_mm", "how near: from the burr's surface", "mm", 0, 8}, p.within_mm);
     visit({"limit", "force in N, or diameter in mm", "", 0, 100}, p.limit);
-    visit({"for_s", "it has to hold for so long, but for pauses of up to 0.3 s", "s", 0, 600}, p.for_s);
-    visit({"quiet_s", "it is not said again for so long", "s", 1, 3600}, p.quiet_s);
+    visit({"for_s", "time for which the condition must hold, but for pauses of up to 0.3 s", "s", 0, 600}, p.for_s);
+    visit({"quiet_s", "time before the hint is given again", "s", 1, 3600}, p.quiet_s);
   }
 };
 

@@ -67,8 +67,8 @@ struct ProcedureRegion {
   double within_mm = 1;
   std::size_t line = 0;
   static void describe(Params& p, auto& visit) {
-    visit({"name", "of the region", "", 0, 0, true}, p.name);
-    visit({"kind", "to be removed, or to be left", "", 0, 0, true}, p.kind);
+    visit({"name", "name of the region", "", 0, 0, true}, p.name);
+    visit({"kind", "whether it is to be removed or to be left", "", 0, 0, true}, p.kind);
     visit({"structure", "around which it lies", "", 0, 0, true}, p.structure);
     visit({"within_mm", "bone at most so far from it", "mm", 0, 8}, p.within_mm);
   }
@@ -115,7 +115,7 @@ struct ScaleItem {
   static void describe(Params& p, auto& visit) {
     visit({"name", "in words of our own", "", 0, 0, true}, p.name);
     visit({"kind", "what is asked", "", 0, 0, true}, p.kind);
-    visit({"structure", "of what"}, p.structure);
+    visit({"structure", "structure that the region surrounds"}, p.structure);
     visit({"second", "sharp_angle: the other plate"}, p.second);
     visit({"cells", "no_cells_left: the structure that is cells"}, p.cells);
     visit({"towards", "only the part of its face that looks this way, LPS (0,0,0: all of it)", "", -1e4, 1e4},
@@ -129,7 +129,7 @@ struct ScaleItem {
     visit({"most", "thinned: 90 % of the wall is at most so thick; margin: not beyond; pieces: at most so many", "", 0,
            1e6},
           p.most);
-    visit({"spread", "of the value among good results: the unit of the margin", "", 1e-6, 1e6}, p.spread);
+    visit({"spread", "spread of the value among good results: the unit of the margin", "", 1e-6, 1e6}, p.spread);
   }
 };
 

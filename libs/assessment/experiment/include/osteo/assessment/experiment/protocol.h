@@ -44,18 +44,18 @@ struct Protocol {
 
   static void describe(Protocol& p, auto& visit) {
     visit({"title", "what it is called in the report"}, p.title);
-    visit({"trials", "of each participant", "", 3, 1000}, p.trials);
-    visit({"repetitions", "of a block: the same stimulus and training", "", 1, 100}, p.repetitions);
+    visit({"trials", "trials of each participant", "", 3, 1000}, p.trials);
+    visit({"repetitions", "repetitions of a block: the same stimulus and training", "", 1, 100}, p.repetitions);
     visit({"break_after", "trials before a break (0: none)", "", 0, 1000}, p.break_after);
     visit({"break_min", "length of the break", "min", 0, 120}, p.break_min);
-    visit({"seed", "of stimuli and orders", "", 0, 1e9}, p.seed);
+    visit({"seed", "seed of stimuli and orders", "", 0, 1e9}, p.seed);
     visit({"device_n", "force that the device can hold", "N", 0.5, 50}, p.device_n);
     visit({"peak_n", "force that it gives for a moment, where it is saturated", "N", 0.5, 60}, p.peak_n);
     visit({"scale", "make forces smaller to what the device can hold; else as printed, and saturation is marked"},
           p.scale);
-    visit({"rate_hz", "of the servo and of the recording", "Hz", 100, 5000}, p.rate_hz);
-    visit({"feedback", "of the own force: while it is pressed, or behind the run"}, p.feedback);
-    visit({"amplification", "of the error as it is shown (1: as it is)", "", 0, 10}, p.amplification);
+    visit({"rate_hz", "rate of the servo and of the recording", "Hz", 100, 5000}, p.rate_hz);
+    visit({"feedback", "when the own force is shown: while pressing, or after the run"}, p.feedback);
+    visit({"amplification", "amplification of the error as it is shown (1: as it is)", "", 0, 10}, p.amplification);
     visit({"fading", "show less of the target with each repetition"}, p.fading);
     visit({"simulated", "participants are programs"}, p.simulated);
   }

@@ -24,13 +24,13 @@ struct Experiment {
   bool lifts = false, instruments = false, normal_force_only = false, plot_by_size = false;
 
   static void describe(Experiment& e, auto& visit) {
-    visit({"id", "of letters, digits and '-'"}, e.id);
+    visit({"id", "name, of letters, digits and '-'"}, e.id);
     visit({"title", "heading of its table"}, e.title);
     visit({"note", "what to think of when reading it"}, e.note);
-    visit({"seconds", "of each trajectory", "s", 0.5, 600}, e.seconds);
-    visit({"rate_hz", "of each trajectory", "Hz", 50, 20000}, e.rate_hz);
+    visit({"seconds", "seconds of each trajectory", "s", 0.5, 600}, e.seconds);
+    visit({"rate_hz", "rate of each trajectory", "Hz", 50, 20000}, e.rate_hz);
     visit({"stiffness_n_per_mm", "0: each solid's own", "N/mm", 0, 100}, e.stiffness_n_per_mm);
-    visit({"probe_radius_mm", "of the probe; burrs need 2", "mm", 0, 10}, e.probe_radius_mm);
+    visit({"probe_radius_mm", "radius of the probe; burrs need 2", "mm", 0, 10}, e.probe_radius_mm);
     visit({"lifts", "half a second in the air every 5 s"}, e.lifts);
     visit({"instruments", "positions and forces with the noise of the instruments of 2006"}, e.instruments);
     visit({"normal_force_only", "p_in = p_out - F_n / k, without friction's share"}, e.normal_force_only);

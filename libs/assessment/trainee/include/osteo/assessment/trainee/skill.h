@@ -29,14 +29,16 @@ struct TraineeSkill {
     visit({"force_n", "how hard it means to press", "N", 0.2, 5}, p.force_n);
     visit({"force_control", "how well it holds that force, and how much it eases off near structures", "", 0, 1},
           p.force_control);
-    visit({"tremor_mm", "of its hand, 8 to 12 Hz, root mean square in each direction", "mm", 0, 2}, p.tremor_mm);
-    visit({"speed_mm_s", "of its strokes", "mm/s", 2, 100}, p.speed_mm_s);
-    visit({"knowledge", "of structures: 1 it keeps clear of them, 0 it believes them 2.5 mm deeper than they are", "",
-           0, 1},
-          p.knowledge);
-    visit({"instruments", "of the strokes near a structure, the share with a burr that the procedure allows there", "",
-           0, 1},
-          p.instruments);
+    visit({"tremor_mm", "tremor of the hand, 8 to 12 Hz, root mean square in each direction", "mm", 0, 2}, p.tremor_mm);
+    visit({"speed_mm_s", "speed of the strokes", "mm/s", 2, 100}, p.speed_mm_s);
+    visit(
+        {"knowledge",
+         "knowledge of structures: 1 it keeps clear of them, 0 it believes them 2.5 mm deeper than they are", "", 0, 1},
+        p.knowledge);
+    visit(
+        {"instruments",
+         "share of the strokes near a structure that are made with a burr which the procedure allows there", "", 0, 1},
+        p.instruments);
     visit({"camera", "how often it moves its view to where it works: 1 every 4 s, 0 every 40 s", "", 0, 1}, p.camera);
   }
 };

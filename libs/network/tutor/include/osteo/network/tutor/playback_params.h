@@ -57,9 +57,10 @@ struct PlaybackParams {
            "and goes back with who "
            "learns; usual: clock in show and feel"},
           p.pace);
-    visit({"stiffness_n_per_mm", "of the spring to the expert's hand; less where the device bears less", "N/mm", 0, 10},
+    visit({"stiffness_n_per_mm", "stiffness of the spring to the expert's hand, lowered where the device bears less",
+           "N/mm", 0, 10},
           p.stiffness_n_per_mm);
-    visit({"damping_n_s_per_m", "between the two hands", "N s/m", 0, 100}, p.damping_n_s_per_m);
+    visit({"damping_n_s_per_m", "damping between the two hands", "N s/m", 0, 100}, p.damping_n_s_per_m);
     visit({"forward", "show: share of the expert's force that is felt (0: none), less the farther the hand is away", "",
            0, 2},
           p.forward);

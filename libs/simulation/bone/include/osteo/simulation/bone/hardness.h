@@ -21,7 +21,7 @@ struct HardnessLaw {
   static void describe(HardnessLaw& p, auto& visit) {
     visit({"cortical_hu", "bone that counts as 1", "HU", 1, 30000}, p.cortical_hu);
     visit({"zero_hu", "what would resist not at all", "HU", -1024, 29999}, p.zero_hu);
-    visit({"exponent", "of the density between the two", "", 0, 4}, p.exponent);
+    visit({"exponent", "exponent of the density between the two", "", 0, 4}, p.exponent);
     visit({"least", "no bone resists less", "", 0.02, 1}, p.least);
     visit({"most", "nor more", "", 1, 3.9}, p.most);
   }

@@ -34,11 +34,11 @@ struct ContactParams {
            "rays: surface samples traced inwards; volume: samples of the volume (thesis); overlap: exact; proxy: "
            "rigid, with friction"},
           p.method);
-    visit({"stiffness_n_per_mm", "of bone, beyond the soft start", "N/mm", 0, 100}, p.stiffness_n_per_mm);
-    visit({"soft_stiffness_n_per_mm", "of bone, at first touch", "N/mm", 0, 100}, p.soft_stiffness_n_per_mm);
+    visit({"stiffness_n_per_mm", "stiffness of bone, beyond the soft start", "N/mm", 0, 100}, p.stiffness_n_per_mm);
+    visit({"soft_stiffness_n_per_mm", "stiffness of bone at first contact", "N/mm", 0, 100}, p.soft_stiffness_n_per_mm);
     visit({"soft_depth_mm", "how deep the soft start reaches", "mm", 0, 5}, p.soft_depth_mm);
     visit({"max_force_n", "the contact pushes no harder", "N", 0, 100}, p.max_force_n);
-    visit({"friction", "of the resting drill on bone, while it slides (proxy)", "", 0, 3}, p.friction);
+    visit({"friction", "friction of the resting drill on bone, while it slides (proxy)", "", 0, 3}, p.friction);
     visit({"static_friction", "until it slides (proxy)", "", 0, 3}, p.static_friction);
   }
   /// Force at a depth: two slopes, continuous, capped.

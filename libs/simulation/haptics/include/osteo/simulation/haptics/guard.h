@@ -39,7 +39,7 @@ struct GuardParams {
            0, 1e9},
           p.jump_mm);
     visit({"resume_s", "time over which it comes back", "s", 0, 10}, p.resume_s);
-    visit({"stale_ms", "without a report for longer than this the force fades", "ms", 1, 250}, p.stale_ms);
+    visit({"stale_ms", "time without a report after which the force fades", "ms", 1, 250}, p.stale_ms);
     visit({"fade_ms", "time over which it does", "ms", 1, 250}, p.fade_ms);
   }
 };

@@ -35,7 +35,8 @@ struct EffectParams {
     visit({"drag", "pull of the teeth along the surface, for each newton pressed, at the equator (a guess)", "", 0, 2},
           p.drag);
     visit({"left_handed", "the burr turns the other way"}, p.left_handed);
-    visit({"speed_rpm", "of the burr with the pedal down; removal is in proportion", "rpm", 0, 200000}, p.speed_rpm);
+    visit({"speed_rpm", "speed of the burr with the pedal down; removal is in proportion", "rpm", 0, 200000},
+          p.speed_rpm);
     visit({"spin_up_s", "time constant with which the burr's speed follows the pedal upwards (a guess)", "s", 0, 10},
           p.spin_up_s);
     visit({"spin_down_s", "and downwards (a guess)", "s", 0, 10}, p.spin_down_s);

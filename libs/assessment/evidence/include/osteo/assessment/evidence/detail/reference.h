@@ -23,7 +23,7 @@ struct ReferenceSession {
   std::string subject;  ///< a code, not a name
   ReferenceGroup group = ReferenceGroup::expert;
   static void describe(Params& p, auto& visit) {
-    visit({"session", "its folder, from here", "", 0, 0, true}, p.session);
+    visit({"session", "folder of the session, from here", "", 0, 0, true}, p.session);
     visit({"subject", "who, by a code", "", 0, 0, true}, p.subject);
     visit({"group", "how good", "", 0, 0, true}, p.group);
   }

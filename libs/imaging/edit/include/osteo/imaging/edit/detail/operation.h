@@ -98,7 +98,7 @@ struct BrushEdit {
   static void describe(BrushEdit& p, auto& visit) {
     visit({"structure", "value of the structure (0: bone)", "", 0, 255}, p.structure);
     visit({"erase", "takes away instead of adding; from a structure only what is that structure"}, p.erase);
-    visit({"radius_mm", "of the ball", "mm", 0.05, 50}, p.radius_mm);
+    visit({"radius_mm", "radius of the ball", "mm", 0.05, 50}, p.radius_mm);
   }
 };
 /// Voxels of a structure that something else has found: a tube, a region, a label map of another program. They take the
@@ -119,8 +119,8 @@ struct AddStructureEdit {
   std::vector<int> rgb{255, 200, 60};
   StructureRole role = StructureRole::at_risk;
   static void describe(AddStructureEdit& p, auto& visit) {
-    visit({"structure", "its value, that no other has", "", 1, 255}, p.structure);
-    visit({"name", "that no other has"}, p.name);
+    visit({"structure", "value of the structure, which no other has", "", 1, 255}, p.structure);
+    visit({"name", "name, which no other has"}, p.name);
     visit({"rgb", "colour, three numbers from 0 to 255", "", 0, 255}, p.rgb);
     visit({"role", "at_risk goes into the case, landmark stays in the edits"}, p.role);
   }
@@ -132,8 +132,8 @@ struct ChangeStructureEdit {
   std::vector<int> rgb{255, 200, 60};
   StructureRole role = StructureRole::at_risk;
   static void describe(ChangeStructureEdit& p, auto& visit) {
-    visit({"structure", "its value", "", 1, 255}, p.structure);
-    visit({"name", "that no other has"}, p.name);
+    visit({"structure", "value of the structure", "", 1, 255}, p.structure);
+    visit({"name", "name, which no other has"}, p.name);
     visit({"rgb", "colour, three numbers from 0 to 255", "", 0, 255}, p.rgb);
     visit({"role", "at_risk goes into the case, landmark stays in the edits"}, p.role);
   }
@@ -142,7 +142,7 @@ struct DeleteStructureEdit {
   static constexpr std::string_view kName = "delete_structure";
   int structure = 1;
   static void describe(DeleteStructureEdit& p, auto& visit) {
-    visit({"structure", "its value", "", 1, 255}, p.structure);
+    visit({"structure", "value of the structure", "", 1, 255}, p.structure);
   }
 };
 

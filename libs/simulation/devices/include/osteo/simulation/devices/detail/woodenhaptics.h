@@ -30,18 +30,19 @@ struct WoodenHapticsGeometry {
   double damping_n_s_per_m = 0.5;
 
   static void describe(WoodenHapticsGeometry& p, auto& visit) {
-    visit({"capstan_diameter_mm", "on the motors of joints a, b, c", "mm"}, p.capstan_diameter_mm);
-    visit({"body_diameter_mm", "that the capstans drive", "mm"}, p.body_diameter_mm);
+    visit({"capstan_diameter_mm", "capstan diameters on the motors of joints a, b, c", "mm"}, p.capstan_diameter_mm);
+    visit({"body_diameter_mm", "diameters of the bodies that the capstans drive", "mm"}, p.body_diameter_mm);
     visit({"link_mm", "column, upper arm, forearm", "mm"}, p.link_mm);
-    visit({"origin_mm", "of the workspace", "mm"}, p.origin_mm);
+    visit({"origin_mm", "origin of the workspace", "mm"}, p.origin_mm);
     visit({"zero_angle_rad", "joint angles where the encoders count 0", "rad"}, p.zero_angle_rad);
-    visit({"counts_a_turn", "of the motors' encoders"}, p.counts_a_turn);
-    visit({"gimbal_counts_a_turn", "of the gimbal's encoders"}, p.gimbal_counts_a_turn);
-    visit({"torque_constant_nm_per_a", "of the motors", "N m/A"}, p.torque_constant_nm_per_a);
+    visit({"counts_a_turn", "counts a turn of the motors' encoders"}, p.counts_a_turn);
+    visit({"gimbal_counts_a_turn", "counts a turn of the gimbal's encoders"}, p.gimbal_counts_a_turn);
+    visit({"torque_constant_nm_per_a", "torque constant of the motors", "N m/A"}, p.torque_constant_nm_per_a);
     visit({"max_current_a", "through a motor", "A", 0, 20}, p.max_current_a);
     visit({"max_force_n", "at the tip", "N", 0, 50}, p.max_force_n);
-    visit({"max_stiffness_n_per_mm", "that it can show", "N/mm", 0, 100}, p.max_stiffness_n_per_mm);
-    visit({"damping_n_s_per_m", "its own, at the tip", "N s/m", 0, 100}, p.damping_n_s_per_m);
+    visit({"max_stiffness_n_per_mm", "maximum stiffness that the arm can render", "N/mm", 0, 100},
+          p.max_stiffness_n_per_mm);
+    visit({"damping_n_s_per_m", "damping of the arm itself, at the tip", "N s/m", 0, 100}, p.damping_n_s_per_m);
   }
 };
 
