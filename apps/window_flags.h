@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "osteo/app/cli/command.h"
 #include "osteo/display/view/quality.h"
 #include "osteo/simulation/bone/action.h"
 #include "osteo/simulation/bone/burr.h"
@@ -214,6 +215,27 @@ struct WindowFlags {
 inline std::vector<SceneAction> first_actions(const WindowFlags& flags) {
   if (!flags.dust || (flags.position == Posture::supine && flags.head_turned_deg == 0)) return {};
   return {SceneAction::posture(down_of(flags.position, flags.head_turned_deg))};
+}
+
+/// The titles of these flags in the help. `first`: fields of the command itself that most people need.
+inline std::vector<cli::FlagGroup> window_flag_groups(const std::vector<std::string>& first = {}) {
+  std::vector<cli::FlagGroup> groups{
+      {"Most used", first},
+      {"Devices",
+       {"second_device", "second_instrument", "tracker", "arm", "camera", "pen", "video", "camera_place", "hand_scale",
+        "rate_hz"}},
+      {"Patient and scene", {"position", "head_turned_deg", "heat", "scan", "require_approved"}},
+      {"Instrument and force", {"shape", "contact", "settings"}},
+      {"Sound and nerve monitor", {"sound", "volume", "alarms", "monitor", "monitor_setup"}},
+      {"Sessions and teaching",
+       {"resume", "review", "playback", "playback_as", "tutor", "listen", "port", "two_way", "join", "code", "role",
+        "stream", "experiment"}},
+      {"Window",
+       {"layout", "full_screen", "quality", "stereo", "stereo_base", "width", "height", "scale", "end_page",
+        "state_file"}}};
+  for (const char* const name : {"out", "burr", "diameter_mm", "device", "dust", "procedure"})
+    groups.front().fields.emplace_back(name);
+  return groups;
 }
 
 }  // namespace osteo

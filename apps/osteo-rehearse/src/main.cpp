@@ -84,7 +84,9 @@ struct WindowCommand {
             "not recorded, since the "
             "disk did not keep up.",
             {{"case", "a folder made by prepare", true}},
-            "osteo-rehearse CASE"};
+            "osteo-rehearse CASE",
+            false,
+            window_flag_groups()};
   }
 
   // What was given beats what the person chose last.

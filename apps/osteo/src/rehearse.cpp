@@ -40,6 +40,9 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
 }  // namespace
 
 cli::CommandInfo RehearseCommand::info() {
+  std::vector<cli::FlagGroup> groups = window_flag_groups({"headless", "script"});
+  groups.push_back({"Without a window", {"seconds", "side", "fast", "pieces"}});
+  groups.push_back({"Settings", {"show_settings"}});
   return {"rehearse",
           "drill the bone of a case, in a window or by script",
           "Opens the window: the bone beside three cuts, a drill moved by the mouse. With --headless a scripted hand "
@@ -52,7 +55,9 @@ cli::CommandInfo RehearseCommand::info() {
           "that the case keeps "
           "(\"hardness\": false in --settings turns that off).",
           {{"case", "a folder made by prepare; without one the window opens with a page to choose on", true}},
-          "osteo rehearse CASE --headless --seconds 20 -o SESSION"};
+          "osteo rehearse CASE --headless --seconds 20 -o SESSION",
+          false,
+          std::move(groups)};
 }
 
 namespace {

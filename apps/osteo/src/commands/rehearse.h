@@ -20,16 +20,14 @@ struct RehearseCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"headless", "run without a window: a scripted hand moves the drill in the same servo"}, p.headless);
-    visit({"script", "headless: strokes as JSON (empty: a cavity on one side of any head)"}, p.script);
+    visit({"script", "strokes of the scripted hand as JSON (empty: a cavity on one side of any head)"}, p.script);
     WindowFlags::describe(p, visit);
     visit({"show_settings", "print the settings that would be used, as a file to start from, and stop"},
           p.show_settings);
-    visit({"side", "headless: of the patient, for the built-in strokes"}, p.side);
-    visit({"seconds", "headless: length of the built-in strokes", "s", 1, 3600}, p.seconds);
-    visit({"fast", "headless: as fast as possible instead of by the clock; the result is the same"}, p.fast);
-    visit({"pieces",
-           "watch whether the bone still hangs together; the summary lists the pieces (the window always does)"},
-          p.pieces);
+    visit({"side", "side of the patient for the built-in strokes"}, p.side);
+    visit({"seconds", "length of the built-in strokes", "s", 1, 3600}, p.seconds);
+    visit({"fast", "run as fast as possible instead of in real time; the result is the same"}, p.fast);
+    visit({"pieces", "watch for separate fragments; the summary lists them (the window always does)"}, p.pieces);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

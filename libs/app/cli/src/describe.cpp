@@ -80,6 +80,24 @@ void field_rows(std::ostream& out, const std::vector<FieldRef>& fields) {
   }
 }
 
+// A command's flags under their titles. Names of fields that it has not are an error of ours.
+std::vector<std::pair<std::string, std::vector<FieldRef>>> flags_in_groups(Command& command) {
+  std::vector<FieldRef> left = command.fields();
+  std::vector<std::pair<std::string, std::vector<FieldRef>>> groups;
+  for (const FlagGroup& g : command.info().flag_groups) {
+    groups.emplace_back(g.title, std::vector<FieldRef>{});
+    for (const std::string& name : g.fields) {
+      const auto at = std::find_if(left.begin(), left.end(), [&](const FieldRef& f) { return f.doc.name == name; });
+      if (at == left.end())
+        throw Error(ExitCode::failed, command.info().name + " has no field '" + name + "' for '" + g.title + "'");
+      groups.back().second.push_back(*at);
+      left.erase(at);
+    }
+  }
+  if (!left.empty()) groups.emplace_back(groups.empty() ? "Flags" : "Other flags", std::move(left));
+  return groups;
+}
+
 std::string usage_line(const StageInfo& info) {
   std::string text = "osteo " + info.name;
   for (const Port& p : info.inputs) {
@@ -217,9 +235,8 @@ std::string command_help(Command& command) {
     out << "\nArguments:\n";
     for (const auto& p : info.positionals) row(out, p.optional ? "[" + p.name + "]" : "<" + p.name + ">", p.help);
   }
-  const auto fields = command.fields();
-  if (!fields.empty()) {
-    out << "\nFlags:\n";
+  for (const auto& [title, fields] : flags_in_groups(command)) {
+    out << '\n' << title << ":\n";
     field_rows(out, fields);
   }
   out << "\nCommon flags:\n";
@@ -345,7 +362,10 @@ std::map<std::string, std::string> reference_pages(const Program& program) {
         page += "- `" + p.name + "`: " + p.help + (p.optional ? " (optional)" : "") + "\n";
       page += "\n";
     }
-    page += "## Flags\n\n" + markdown_fields(c->fields());
+    const auto flags = flags_in_groups(*c);
+    if (flags.empty()) page += "## Flags\n\nIt has no flags of its own.\n";
+    for (const auto& [title, fields] : flags)
+      page += (title == flags.front().first ? "## " : "\n## ") + title + "\n\n" + markdown_fields(fields);
     if (!info.example.empty()) page += "\n## Example\n\n```\n" + info.example + "\n```\n";
     pages["command-" + info.name + ".md"] = page;
   }

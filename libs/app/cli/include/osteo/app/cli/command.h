@@ -47,11 +47,18 @@ struct Positional {
   bool optional = false;
 };
 
+/// Flags of a long command under a title, by the names of their fields; the flags that most people need come first.
+struct FlagGroup {
+  std::string title;
+  std::vector<std::string> fields;
+};
+
 struct CommandInfo {
   std::string name, synopsis, description;
   std::vector<Positional> positionals;
   std::string example;
-  bool takes_settings = false;  ///< --set NAME=VALUE
+  bool takes_settings = false;         ///< --set NAME=VALUE
+  std::vector<FlagGroup> flag_groups;  ///< none: one list. Fields of no group come last
 };
 
 /// What a verb gets to work with.
