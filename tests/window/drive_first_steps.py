@@ -95,7 +95,7 @@ def first_steps():
 
         step("Drill", drill)
         step("Undo", undo)
-        step("Suck", suck)
+        step("Suction", suck)
         step("Zoom", zoom)
         step("Cut", cut)
         s = step("Plate", plate)

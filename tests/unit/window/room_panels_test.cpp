@@ -111,8 +111,7 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
       const auto six_steps = [&] { draw_first_steps(list, true); };
       frames([&] {
         help.draw(s.width, s.height, six_steps);
-        EXPECT_EQ(
-            draw_question(s.width, s.height, "Bone whole again?", "This session is saved and ends.", "whole again"), 0);
+        EXPECT_EQ(draw_question(s.width, s.height, "Reset bone?", "This session is saved and ends.", "Reset bone"), 0);
       });
       const ScreenBox whole{0, 0, static_cast<float>(s.width), static_cast<float>(s.height)};
       // The help is never scrolled: what one page cannot hold is on the next.
@@ -123,7 +122,7 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
         EXPECT_EQ(ImGui::FindWindowByName("Mouse and keys")->ScrollMax.y, 0);
         help.turn(1);
       }
-      expect_nothing_outside("Bone whole again?", whole, false);
+      expect_nothing_outside("Reset bone?", whole, false);
       if (s.width >= 1360 && by_hand <= 1) {
         EXPECT_EQ(help.pages(), 1) << "all keys at one look";
       } else if (by_hand <= 1) {

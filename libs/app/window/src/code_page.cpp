@@ -23,7 +23,7 @@ std::optional<std::string> ask_for_code(WindowShell& shell, const std::string& h
     begin_fixed("code", {std::floor((w - wide) / 2), std::floor((h - high) / 2), wide, high},
                 ImGuiWindowFlags_NoScrollbar);
     ImGui::TextWrapped("Join the session at %s", host.c_str());
-    ImGui::TextWrapped("Type the code that it shows there: eight letters and digits.");
+    ImGui::TextWrapped("Type the code that it shows there: eight characters.");
     ImGui::Dummy({0, 0.4F * e});
     if (!told) ImGui::SetKeyboardFocusHere();
     ImGui::SetNextItemWidth(16 * e);

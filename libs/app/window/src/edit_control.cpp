@@ -445,7 +445,7 @@ std::string EditControl::hint() const {
     case EditTool::piece:
       return "Click: that piece of bone goes. Shift-click: it alone stays.";
     case EditTool::pieces:
-      return "Enter: small pieces of bone go.";
+      return "Enter: removes small fragments.";
     case EditTool::box:
       return "Drag: sets the box in this view. Enter clears the bone inside.";
     case EditTool::fill:

@@ -79,7 +79,7 @@ constexpr EditKeyRow kRows[] = {
 }  // namespace
 
 const char* edit_tool_name(EditTool tool) {
-  static constexpr const char* names[kEditTools] = {"Look", "Ruler", "Threshold", "Piece", "Small pieces",
+  static constexpr const char* names[kEditTools] = {"Look", "Ruler", "Threshold", "Piece", "Small fragments",
                                                     "Box",  "Fill",  "Smooth",    "Brush", "Eraser"};
   return names[static_cast<int>(tool)];
 }
@@ -115,7 +115,7 @@ const std::vector<EditHelpLine>& edit_help_lines() {
        {from_front, from_left, from_above}},
       {"C", "crosshair on and off", {cross}},
       {"O", "outlines on and off", {outline}},
-      {"1 to 9, 0", "tool: look, ruler, threshold, piece, small pieces, box, fill, smooth, brush, eraser", {tool}},
+      {"1 to 9, 0", "tool: look, ruler, threshold, piece, small fragments, box, fill, smooth, brush, eraser", {tool}},
       {"left button", "what the line at the bottom says", {}},
       {"[ ], - =, Shift-wheel", "brush smaller and larger", {larger, smaller}},
       {"Enter", "applies the tool", {apply}},

@@ -140,7 +140,7 @@ void EditPanel::options(EditControl& control) {
       ImGui::SetNextItemWidth(ImGui::GetFontSize() * 6);
       ImGui::InputInt("largest stay (0: all)", &control.pieces_largest);
       control.pieces_largest = std::clamp(control.pieces_largest, 0, 1000);
-      if (wide_button("Remove small pieces (Enter)", free)) control.apply();
+      if (wide_button("Remove small fragments (Enter)", free)) control.apply();
       return;
     case EditTool::box:
       heading(title.c_str());
@@ -158,7 +158,7 @@ void EditPanel::options(EditControl& control) {
       heading(title.c_str());
       slider("##smooth", control.smooth_mm, 0.1, 5, "within %.1f mm");
       ImGui::TextWrapped(
-          "Nothing farther from the surface changes; walls thinner than this may go. The volume is told.");
+          "Nothing farther from the surface changes; walls thinner than this may go. The volume is reported.");
       if (wide_button("Smooth (Enter)", free)) control.apply();
       return;
     case EditTool::brush:

@@ -354,7 +354,7 @@ class EditWindow {
     if (control_.document().in_stroke()) return;
     saving_ = true;
     saving_version_ = control_.document().version();
-    control_.say("saving: the bone of the case is made anew ...");
+    control_.say("saving: rebuilding the bone of the case ...");
     actions_.save(edits_text(recipe_of(control_.document())));
   }
 

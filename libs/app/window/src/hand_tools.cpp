@@ -172,7 +172,7 @@ void HandTools::attach(Rehearsal& rehearsal) {
   }
   rehearsal.act(SceneAction::attach(static_cast<std::uint32_t>(plate_), pose, under[0],
                                     under.size() > 1 ? under[1] : SceneAction::kNobody));
-  note_ = under.size() > 1 ? "fixed to two pieces" : "fixed to one piece";
+  note_ = under.size() > 1 ? "fixed to two fragments" : "fixed to one fragment";
   tool_ = Tool::drill;
 }
 
@@ -217,7 +217,7 @@ std::string HandTools::how() const {
       return "saw: drag moves it, " + key_name(Command::perform) + " cuts, " + key_name(Command::put_away) +
              " puts it away";
     case Tool::piece:
-      return "pieces: " + key_name(Command::perform) + " takes apart, drag moves one";
+      return "fragments: " + key_name(Command::perform) + " separates them, drag moves one";
     case Tool::plate:
       return "plate: " + key_name(Command::bring) + " brings it, wheel presses it on, " + key_name(Command::perform) +
              " fixes it";

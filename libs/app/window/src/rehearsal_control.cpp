@@ -74,7 +74,7 @@ void RehearsalControl::save() {
 }
 
 void RehearsalControl::reset() {
-  if (begin(true, true)) say("the bone is whole again; the session before was saved");
+  if (begin(true, true)) say("bone reset; the session before was saved");
 }
 
 bool RehearsalControl::end() {
@@ -231,7 +231,7 @@ std::optional<BoneHit> RehearsalControl::bone_seen(Vec3 direction) const {
 }
 
 // No way was free of structures at risk.
-static constexpr const char* kPastStructures = "; past a structure at risk, since no other way was free";
+static constexpr const char* kPastStructures = "; past a critical structure, since no other path was free";
 
 void RehearsalControl::go_on_leading() {
   if (!leading_) return;

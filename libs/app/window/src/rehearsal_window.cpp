@@ -218,7 +218,7 @@ void RehearsalWindow::show_before(bool on) {
   }
   try {
     TriMesh mesh;
-    shell_.while_working("the bone as it was is made", {},
+    shell_.while_working("rebuilding the bone at the start", {},
                          [&](const Context& context) { mesh = surface_of(actions_.world_at_begin(context), context); });
     before_view_ = std::make_unique<BeforeView>(render_window_, mesh);
   } catch (const Error& e) {
@@ -261,7 +261,7 @@ void RehearsalWindow::begin_again(bool from_case) {
   ImGui::EndFrame();
   const bool begun = control_.begin(from_case, false);
   ended_.reset();  // failure() speaks for itself
-  if (begun) control_.say(from_case ? "the bone is whole again" : "a new session goes on from what was recorded");
+  if (begun) control_.say(from_case ? "bone reset" : "a new session continues from what was recorded");
   shell_.new_frame();
 }
 
@@ -278,7 +278,7 @@ void RehearsalWindow::tell_failure() {
   if (const auto folder = actions_.folder(); !folder.empty())
     ImGui::TextWrapped("What was recorded is kept: %s", folder.string().c_str());
   bool go_on = ImGui::Button("Go on from there (F5)", {-1, 0});
-  bool anew = ImGui::Button("Begin anew from the case (R)", {-1, 0});
+  bool anew = ImGui::Button("Begin again from the case (R)", {-1, 0});
   if (ImGui::Button("Close (Q)", {-1, 0})) quit_ = true;
   ImGui::End();
   for (const Keyboard::Press& press : keyboard_.frame(ImGui::GetIO().WantTextInput)) {

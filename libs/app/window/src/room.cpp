@@ -259,9 +259,9 @@ void Room::draw(const RoomScene& scene) {
   }
   if (asking_) {
     // As if it were a key, at the next frame: what the answer begins shows pictures of its own.
-    const int said = draw_question(
-        shell_.width(), shell_.height(), "Bone whole again?",
-        "This session is saved and ends. Another one begins with the bone as the case has it.", "whole again");
+    const int said =
+        draw_question(shell_.width(), shell_.height(), "Reset bone?",
+                      "This session is saved and ends. A new one begins with the bone of the case.", "Reset bone");
     if (said != 0) pressed_.press(said > 0 ? Command::perform : Command::put_away);
   }
 }

@@ -86,7 +86,7 @@ void draw_state(const ScreenBox& box, const StateFacts& f, const std::string& me
 
   const ScreenBox near = column(3);
   const NearnessLook& look = look_of(f.nearness);
-  head(near, (f.distance.empty() ? std::string("structures at risk") : f.structure) +
+  head(near, (f.distance.empty() ? std::string("critical structures") : f.structure) +
                  (f.warmth.empty() ? "" : ", " + f.warmth));
   if (f.nearness == Nearness::touched)  // as large as it can be
     draw->AddRectFilled({near.x - pad / 2, near.y}, {near.right(), near.bottom()}, im_colour32(look.colour));
@@ -120,26 +120,26 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, Pressed& pressed) {
     std::optional<int> value = {};  // where one command has several buttons
   };
   const Burr& burr = burr_library()[static_cast<std::size_t>(hand.burr)];
-  std::vector<Row> rows{{"help", Command::help, false, false},
-                        {"tools", Command::wheel, false, false},
-                        {"to bone", Command::bring, false, false},
-                        {"out", Command::lift, false, false},
-                        {"on, off", Command::drill, hand.latched, false}};
+  std::vector<Row> rows{{"Help", Command::help, false, false},
+                        {"Tools", Command::wheel, false, false},
+                        {"Approach", Command::bring, false, false},
+                        {"Retract", Command::lift, false, false},
+                        {"Drill", Command::drill, hand.latched, false}};
   for (std::size_t n = 0; n < kBurrKinds.size(); ++n)
     rows.push_back({kBurrKinds[n].name.data(), Command::burr_kind,
                     hand.tool == 0 && !hand.saw && static_cast<std::size_t>(burr.kind) == n, false,
                     static_cast<int>(n)});
-  rows.insert(rows.end(), {{"saw", Command::saw, hand.tool == 1 || hand.saw, false},
-                           {"pieces", Command::pieces, hand.tool == 2, false},
-                           {"plate", Command::plates, hand.tool == 3, false},
-                           {"suck", Command::suck, hand.sucking, true},
-                           {"water", Command::wash, hand.washing, true},
-                           {"undo", Command::undo, false, false},
-                           {"was", Command::before, hand.before, false},
-                           {"ruler", Command::ruler, hand.ruler, false},
-                           {"note", Command::mark, false, false},
-                           {"layout", Command::layout, false, false},
-                           {"end", Command::quit, false, false}});
+  rows.insert(rows.end(), {{"Saw", Command::saw, hand.tool == 1 || hand.saw, false},
+                           {"Fragments", Command::pieces, hand.tool == 2, false},
+                           {"Plate", Command::plates, hand.tool == 3, false},
+                           {"Suction", Command::suck, hand.sucking, true},
+                           {"Irrigate", Command::wash, hand.washing, true},
+                           {"Undo", Command::undo, false, false},
+                           {"Compare", Command::before, hand.before, false},
+                           {"Ruler", Command::ruler, hand.ruler, false},
+                           {"Note", Command::mark, false, false},
+                           {"Layout", Command::layout, false, false},
+                           {"End", Command::quit, false, false}});
   const float gap = ImGui::GetStyle().ItemSpacing.y;
   const auto count = static_cast<float>(rows.size());
   const float high = std::clamp(std::floor(ImGui::GetContentRegionAvail().y / count - gap), em() * 1.05F, em() * 2.5F);
@@ -188,7 +188,7 @@ void draw_burr(const HandFacts& hand, Pressed& pressed) {
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
   if (ImGui::SliderInt("##diameter", &diameter, 1, 7, "%d mm (1 to 7)")) pressed.press(Command::diameter, diameter);
   bool on = hand.latched;
-  if (ImGui::Checkbox("drill on (left button, Space)", &on)) pressed.press(Command::drill);
+  if (ImGui::Checkbox("Drill on (left button, Space)", &on)) pressed.press(Command::drill);
 }
 
 void draw_deeds(const HandFacts& hand, Pressed& pressed) {
@@ -198,30 +198,30 @@ void draw_deeds(const HandFacts& hand, Pressed& pressed) {
     if (tool_button(with_key(word, command), {half, 0}, used)) pressed.press(command);
     ImGui::EndDisabled();
   };
-  deed("to the bone", Command::bring);
+  deed("Approach", Command::bring);
   ImGui::SameLine();
-  deed("out", Command::lift);
-  deed("undo", Command::undo, hand.undo_steps > 0);
+  deed("Retract", Command::lift);
+  deed("Undo", Command::undo, hand.undo_steps > 0);
   ImGui::SameLine();
-  deed("as it was", Command::before, true, hand.before);
-  deed("ruler", Command::ruler, true, hand.ruler);
+  deed("Compare", Command::before, true, hand.before);
+  deed("Ruler", Command::ruler, true, hand.ruler);
   ImGui::SameLine();
-  deed("note", Command::mark);
-  deed("picture", Command::screenshot);
+  deed("Note", Command::mark);
+  deed("Picture", Command::screenshot);
   ImGui::SameLine();
-  deed("wheel", Command::wheel);
-  deed("layout", Command::layout);
+  deed("Tool wheel", Command::wheel);
+  deed("Layout", Command::layout);
   ImGui::SameLine();
-  deed("help", Command::help);
+  deed("Help", Command::help);
 }
 
 void draw_apart(Pressed& pressed) {
   ImGui::Separator();
-  if (ImGui::Button(with_key("save and go on", Command::save).c_str(), {-1, 0})) pressed.press(Command::save);
+  if (ImGui::Button(with_key("Save and continue", Command::save).c_str(), {-1, 0})) pressed.press(Command::save);
   ImGui::PushStyleColor(ImGuiCol_Border, im_colour(palette::kVermillion));
   ImGui::PushStyleVar(ImGuiStyleVar_FrameBorderSize, std::max(1.0F, std::round(em() / 10)));
-  if (ImGui::Button(with_key("bone whole again ...", Command::reset).c_str(), {-1, 0})) pressed.press(Command::reset);
-  if (ImGui::Button(with_key("end the session", Command::quit).c_str(), {-1, 0})) pressed.press(Command::quit);
+  if (ImGui::Button(with_key("Reset bone ...", Command::reset).c_str(), {-1, 0})) pressed.press(Command::reset);
+  if (ImGui::Button(with_key("End session", Command::quit).c_str(), {-1, 0})) pressed.press(Command::quit);
   ImGui::PopStyleVar();
   ImGui::PopStyleColor();
 }

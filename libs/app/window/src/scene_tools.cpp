@@ -151,7 +151,7 @@ SceneTools::~SceneTools() {
 
 void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view) {
   static constexpr std::pair<const char*, Tool> kTools[] = {
-      {"drill", Tool::drill}, {"saw (X)", Tool::saw}, {"pieces (P)", Tool::piece}, {"plates (L)", Tool::plate}};
+      {"Drill", Tool::drill}, {"Saw (X)", Tool::saw}, {"Fragments (P)", Tool::piece}, {"Plates (L)", Tool::plate}};
   for (const auto& [name, tool] : kTools) {
     if (tool != Tool::drill && tool != Tool::piece) ImGui::SameLine();
     const bool held = tools.tool() == tool && !tools.saw_in_hand();

@@ -101,7 +101,8 @@ StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const
   const Burr* const edge = instrument_of(tick.device.tool).cutter();
   f.lasts = true;
   if (edge != nullptr) f.warning = too_small_for_voxels(*edge, rehearsal.finest_voxel_mm());
-  if (f.warning.empty() && rehearsal.pieces() > 1) f.warning = text_of("the bone is in %d pieces", rehearsal.pieces());
+  if (f.warning.empty() && rehearsal.pieces() > 1)
+    f.warning = text_of("the bone is in %d fragments", rehearsal.pieces());
   return f;
 }
 

@@ -17,7 +17,8 @@ FirstSteps::FirstSteps() {
   steps_ = {{"Drill: point at the bone, " + key(Command::bring) +
              " brings the drill; hold the left button, wheel away from you: deeper"},
             {"Undo: " + key(Command::undo) + " takes the last stroke back"},
-            {"Suck: drill on, and hold " + key(Command::suck) + ": a sucker beside the burr takes the dust"},
+            {"Suction: keep drilling, and hold " + key(Command::suck) +
+             ": the suction tube beside the burr removes the dust"},
             {"Zoom: Ctrl-wheel; right drag turns the view"},
             {"Cut: " + key(Command::saw) + " sets the saw where you point, drag moves it, " + key(Command::perform) +
              " cuts"},

@@ -17,7 +17,7 @@ std::span<const WheelItem> wheel_items() {
                            {"taper", Command::taper},
                            {"cylinder", Command::cylinder},
                            {"plate", Command::plates},
-                           {"pieces", Command::pieces},
+                           {"Fragments", Command::pieces},
                            {"saw", Command::saw},
                            {"drill", Command::put_away}});
     return all;

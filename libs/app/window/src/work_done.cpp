@@ -51,9 +51,9 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
   if (work.undone() > 0) add("taken back", text_of("%zu", work.undone()));
   if (work.cuts() > 0 || session.sawn_mm3 > 0) add("saw cuts", text_of("%zu, %.1f mm³", work.cuts(), session.sawn_mm3));
   if (session.tissue_mm3 > 0) add("soft tissue cut off", text_of("%.1f mm³", session.tissue_mm3));
-  if (session.bodies > 1) add("pieces of bone", text_of("%zu", session.bodies));
+  if (session.bodies > 1) add("fragments of bone", text_of("%zu", session.bodies));
   for (const std::string& p : session.plates) add("plate", p);
-  if (session.has_structures && session.structures.empty()) add("structures at risk", "none came near", Nearness::far);
+  if (session.has_structures && session.structures.empty()) add("critical structures", "none came near", Nearness::far);
   for (const SessionFacts::Structure& s : session.structures) {
     if (s.cut_mm3 > 0) {
       add(s.name, text_of("INJURED: cut through by the saw, %.2g mm3 of it", s.cut_mm3), Nearness::touched);

@@ -31,7 +31,7 @@ struct PersonValues {
     visit({"full_screen", "the window fills the screen"}, p.full_screen);
     visit({"sound", "what drilling sounds like"}, p.sound);
     visit({"volume", "volume of the sound", "", 0, 1}, p.volume);
-    visit({"alarms", "beeps where a structure at risk is touched"}, p.alarms);
+    visit({"alarms", "a beep on contact with a critical structure"}, p.alarms);
     visit({"remember_cases", "the start page lists the cases opened last"}, p.remember_cases);
     visit({"first_steps", "the list of first steps is shown"}, p.first_steps);
     visit({"motion_one_to", "mm of the hand for a mm of the tool: 1, 2, 4 or 8", "", 1, 8}, p.motion_one_to);
