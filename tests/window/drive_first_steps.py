@@ -59,9 +59,9 @@ def first_steps():
             # In the air it sucks nothing, and nothing is ticked off.
             w.x("keydown", "v")
             w.until("sucks", lambda s: s["sucking"])
-            assert "Suck" not in w.next(5)["steps_done"]
+            assert "Suction" not in w.next(5)["steps_done"]
             w.x("mousedown", 1)
-            wheel(60, lambda s: "Suck" in s["steps_done"])
+            wheel(60, lambda s: "Suction" in s["steps_done"])
             w.x("mouseup", 1)
             w.x("keyup", "v")
             return "V and the left button, wheel"
@@ -112,7 +112,7 @@ def first_steps():
         step("Drill", drill)
         step("Undo", undo)
         s = step("Zoom", zoom)
-        assert s["next_step"] == "Cut" and "Suck" not in s["steps_done"], s
+        assert s["next_step"] == "Cut" and "Suction" not in s["steps_done"], s
         w.close()
     for folder in ("first", "second"):
         closed(folder)

@@ -318,7 +318,7 @@ TEST(FirstSteps, WithoutDustNothingIsAskedOfTheSucker) {
   StepFacts now;
   now.magnification = 2;
   list.see(now);
-  EXPECT_EQ(list.steps()[2].name(), "Suck");
+  EXPECT_EQ(list.steps()[2].name(), "Suction");
   EXPECT_FALSE(list.steps()[2].possible);
   now.removed_mm3 = 1;
   now.undone = true;
