@@ -14,7 +14,7 @@ inline std::string guided_words(const PlaybackParams& p) {
   return "led by a recorded session: " +
          std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(p.mode)]) + ", " +
          (expert_drills(p) ? "the recorded burr drills" : "the learner's burr drills") + ", time goes " +
-         (by_clock(p) ? "by the clock" : "along the way");
+         (by_clock(p) ? "in real time" : "along the way");
 }
 
 /// The scene when the lesson begins.

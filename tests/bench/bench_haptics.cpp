@@ -452,7 +452,7 @@ void bench_stability() {
 
 void bench_real_time() {
   std::printf(
-      "\n### Ticks by the clock\n\nThe servo with recorder on flat bone at 0.5 mm, a 6 mm burr by overlap, 10 s each; "
+      "\n### Ticks in real time\n\nThe servo with recorder on flat bone at 0.5 mm, a 6 mm burr by overlap, 10 s each; "
       "loaded: four threads "
       "that compute "
       "without pause.\n\n| Hz | load | work p50 us | p99.9 | max | late p50 us | p99 | p99.9 | max | missed by work | "

@@ -112,7 +112,7 @@ bool row(Listed listed, double seconds) {
 
 void bench_network(const Context&) {
   std::printf(
-      "\n## Who listens to the network, flooded\n\nDrilling towards the facial nerve, ten seconds by the clock each, "
+      "\n## Who listens to the network, flooded\n\nDrilling towards the facial nerve, ten seconds in real time each, "
       "in turns.\n\n"
       "| listed | packets/s | servo late p50, p99, p99.9 us | work p50, p99.9 us | memory | taken in | refused | "
       "settings |\n"

@@ -41,10 +41,10 @@ BrickGrid head(double spacing_mm, const Context& context) {
   return to_bricks(resample_bone(phantom.ct, threshold(phantom.ct, t), r, context).density);
 }
 
-// By the clock: from the moment a tick's removal is in the stream to the moment its triangles are made.
+// In real time: from the moment a tick's removal is in the stream to the moment its triangles are made.
 void latency(const BrickGrid& bone, const Context& context) {
   std::printf(
-      "## From bone removed to triangles ready: by the clock, 1 kHz, head at 0.5 mm, the follower's thread beside the "
+      "## From bone removed to triangles ready: in real time, 1 kHz, head at 0.5 mm, the follower's thread beside the "
       "servo's\n\n"
       "| burr | followed | p50 ms | p99 ms | p99.9 ms | worst ms | ticks that removed bone "
       "|\n|---|---|---|---|---|---|---|\n");
@@ -97,7 +97,7 @@ void latency(const BrickGrid& bone, const Context& context) {
 // What it takes from "take it apart" to bodies that are drilled on their own.
 void pieces(const BrickGrid& bone, const Context& context) {
   std::printf(
-      "## A head sawn and taken apart: stages of the live split\n\n| step | ms by the clock | ms of processors "
+      "## A head sawn and taken apart: stages of the live split\n\n| step | ms in real time | ms of processors "
       "|\n|---|---|---|\n");
   World world{BrickGrid(bone)};
   SceneReaders readers(world, {true, true, false}, 1000, context);
@@ -128,7 +128,7 @@ void pieces(const BrickGrid& bone, const Context& context) {
     scene = std::move(next);
   }
   std::printf(
-      "\nThe same by the clock, from the hold (nothing is removed) to the tick where the new bodies are touched:\n\n| "
+      "\nThe same in real time, from the hold (nothing is removed) to the tick where the new bodies are touched:\n\n| "
       "action | ms, five "
       "runs |\n|---|---|\n");
   std::map<std::string, std::vector<std::uint64_t>> held;

@@ -86,7 +86,7 @@ int main(int argc, char** argv) {
               << " % of a core while it ran\n"
               << "the same with frames made and the file read: " << least_all << " s, " << share(least_all) << " %\n"
               << "hints: " << least_hints << " s, " << share(least_hints) << " %\n"
-              << "end product: " << least_product << " s\n";
+              << "final product: " << least_product << " s\n";
   } catch (const std::exception& e) {
     std::cerr << e.what() << '\n';
     return 1;

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Rehearsals by the clock on disks that stall, fill up, or do not know how large they are. usage: check_slow_disk.sh BIN_DIR FIXTURES SLOW_DISK WORK_DIR
+# Rehearsals in real time on disks that stall, fill up, or do not know how large they are. usage: check_slow_disk.sh BIN_DIR FIXTURES SLOW_DISK WORK_DIR
 set -euo pipefail
 bin=$1 fixtures=$2 slow=$3 work=$4
 rm -rf "$work" && mkdir -p "$work" && cd "$work"
@@ -15,7 +15,7 @@ OSTEO_NO_BLOCKS=1 LD_PRELOAD=$slow osteo phantom p.nrrd --spacing-mm 4 --quiet
 test -s p.nrrd
 echo "a disk that stalls: nothing lost"
 
-# A full disk ends a rehearsal by the clock at once, long before its two minutes are over, and what was written replays.
+# A full disk ends a rehearsal in real time at once, long before its two minutes are over, and what was written replays.
 unshare -rm true 2>/dev/null || { echo "no name spaces here: full disk not tried"; exit 0; }
 mkdir -p d
 unshare -rm bash -c '

@@ -45,7 +45,7 @@ void repeat(const osteo::SessionReader& session, double minutes, const std::file
               static_cast<double>(writer.bytes()) / 1e6 / (static_cast<double>(next) / header.rate_hz / 60));
 }
 
-// By the clock, and of this process alone: other programs take their share of a busy machine.
+// In real time, and of this process alone: other programs take their share of a busy machine.
 struct Times {
   std::vector<double> wall_s, own_s;
   template <class F>

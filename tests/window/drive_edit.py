@@ -229,7 +229,7 @@ with Screen("1024x700") as screen:
     none["start_hash"] = "another"  # so that the result is told to be another one
     pathlib.Path("none.json").write_text(json.dumps(none))
     assert "look at it" in osteo("edit", "copy", "--apply", "none.json")
-    osteo("scene", "copy")  # structures at risk: none
+    osteo("scene", "copy")  # critical structures: none
     osteo("edit", "copy", "--apply", "case/edits.json", "--quiet")
     # To 3D Slicer and back: what was corrected here goes along, and is not done again on top of what comes back.
     osteo("hand-over", "copy", "handed", "--quiet")

@@ -48,7 +48,7 @@ def turned(flags, keys):
 def plain(wide, high):
     said = subprocess.run([bin_dir / "picture_bench", case, "--size", f"{wide}x{high}", "--rounds", "5", "--plain"], capture_output=True, text=True, check=True).stdout
     row = next(line for line in said.splitlines() if line.startswith("plain VTK viewer"))
-    return float(row.split()[-2])  # the median by the clock
+    return float(row.split()[-2])  # the median in real time
 
 
 rows, viewer, loads = {name: [] for name in OPEN}, {}, []

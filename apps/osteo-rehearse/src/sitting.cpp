@@ -216,7 +216,7 @@ HandGoal Sitting::begin_led() {
 HandGoal Sitting::begin_joined(const HandView& view) {
   const auto [header, past] = live_.wait(io_.context);
   if (options_.haptics.structures != header.haptics.structures)
-    throw Error(ExitCode::usage, "the host's case has other structures at risk", "both need the same case, unchanged");
+    throw Error(ExitCode::usage, "the host's case has other critical structures", "both need the same case, unchanged");
   World world = world_of_past(past, case_, options_.anatomy);
   const HandPose pose =
       FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);

@@ -19,7 +19,7 @@ namespace osteo {
 cli::CommandInfo DemoCommand::info() {
   return {"demo",
           "the whole way once: CT, case, drilled session, pictures",
-          "With no CT given it makes one (a phantom head, as DICOM). Then prepare, a headless rehearsal by the clock, "
+          "With no CT given it makes one (a phantom head, as DICOM). Then prepare, a headless rehearsal in real time, "
           "and a replay that "
           "must come out the same.",
           {{"source", "DICOM folder or volume file", true}},

@@ -15,7 +15,7 @@ namespace osteo {
 
 cli::CommandInfo HeatCommand::info() {
   return {"heat",
-          "how warm a session made bone and structures at risk",
+          "how warm a session made bone and critical structures",
           "Runs the session again and computes the heat of its burrs: conduction in bone, water that cools, the dose "
           "at each structure. The "
           "share of a burr's work that becomes heat in bone is known within a factor of ten at best, and temperatures "

@@ -19,7 +19,7 @@ namespace osteo {
 cli::CommandInfo MovieCommand::info() {
   return {"movie",
           "a session as a movie that browsers play",
-          "As the window drew it: bone, tools, dust, structures at risk, from where the surgeon looked or from one "
+          "As the window drew it: bone, tools, dust, critical structures, from where the surgeon looked or from one "
           "place. .mp4 (H.264) or "
           ".webm "
           "(VP9), no sound. With --blind for raters: nothing is written into the picture or the file that tells who, "

@@ -112,7 +112,7 @@ class SceneCosts {
   }
 
   void build_anatomy() {
-    timed("hardness and structures at risk", "nobody: they do not change", [&] {
+    timed("hardness and critical structures", "nobody: they do not change", [&] {
       anatomy_ = anatomy_of(case_, setup_, context_);
       return (anatomy_.hardness ? anatomy_.hardness->memory_bytes() : 0) +
              (anatomy_.structures ? anatomy_.structures->memory_bytes() : 0);

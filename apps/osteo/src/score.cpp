@@ -125,7 +125,7 @@ int ScoreCommand::run(const Params& p, cli::Invocation& io) {
   if (!io.common.quiet) {
     const auto s = [](double x) { return format_number(std::round(x * 100) / 100) + " s"; };
     io.err << "scored in " << s(score.seconds_frames + score.seconds_product) << ", " << s(score.seconds_product)
-           << " of it for the end product\n";
+           << " of it for the final product\n";
   }
   return session.outline().damaged() ? static_cast<int>(ExitCode::corrupt) : 0;
 }

@@ -16,7 +16,7 @@ namespace osteo {
 cli::CommandInfo StreamCommand::info() {
   return {"stream",
           "a finished session over the network, as it went",
-          "Runs the session again, by the clock, and tells whoever listens: tools, camera, forces and the signal of a "
+          "Runs the session again, in real time, and tells whoever listens: tools, camera, forces and the signal of a "
           "nerve monitor "
           "(OpenIGTLink, Cerebus packets, Lab Streaming Layer). Listens on this machine alone unless --to names an "
           "address. No date, name "

@@ -46,7 +46,7 @@ Json status_json(const PeerStatus& p) {
 cli::CommandInfo TutorCommand::info() {
   return {"tutor",
           "a session that others join from their machines: the instructor's side",
-          "Runs a session by the clock, its first hand by a script, its second by who joins as the trainee, and shows "
+          "Runs a session in real time, its first hand by a script, its second by who joins as the trainee, and shows "
           "the code to join with. "
           "Listens on this machine alone unless --listen names another address. What travels is poses, encrypted; each "
           "side feels its own copy "
@@ -176,7 +176,7 @@ int JoinCommand::run(const Params& p, cli::Invocation& io) {
   options.follow.surface = !p.out.empty();
   options.anatomy = anatomy_of(the_case, setup, io.context);
   if (setup.structures != header.haptics.structures)
-    throw Error(ExitCode::usage, "the host's case has other structures at risk", "both need the same case, unchanged");
+    throw Error(ExitCode::usage, "the host's case has other critical structures", "both need the same case, unchanged");
   const auto begin = [&](const fs::path& out) {
     std::optional<SessionFolder> session;
     if (!out.empty()) {

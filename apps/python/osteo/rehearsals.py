@@ -78,7 +78,7 @@ def load_script(path: _Path, rate_hz: float = 1000) -> Script:
 
 
 class Rehearsal:
-    """A rehearsal that runs when it is told to: run() takes a goal for each tick and gives a record for each. Not by the clock, without threads:
+    """A rehearsal that runs when it is told to: run() takes a goal for each tick and gives a record for each. Not in real time, without threads:
     the same goals give the same bits.
 
     bone: the folder of a case, or a Grid of densities by itself (nothing else is known of it then, and nothing recorded)

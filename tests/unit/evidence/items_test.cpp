@@ -1,4 +1,4 @@
-// Items of a scale where they fail: end products planted so that each item is violated in some and kept in others, by
+// Items of a scale where they fail: final products planted so that each item is violated in some and kept in others, by
 // closed forms that know nothing of how the item is computed. Sensitivity: of the violated, those that fail.
 // Specificity: of the kept, those that pass.
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What the end product makes only in part, against the same made of all of the lattice.
+// What the final product makes only in part, against the same made of all of the lattice.
 #include "product_lattice.h"
 
 #include <gtest/gtest.h>

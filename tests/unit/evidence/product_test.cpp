@@ -1,4 +1,4 @@
-// The primitives of the end product against bodies whose answer is known.
+// The primitives of the final product against bodies whose answer is known.
 #include "osteo/assessment/evidence/detail/product.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Every primitive of the end product on another lattice: shifted, turned, finer. Pass may change only where the margin
-// is below 0.2.
+// Every primitive of the final product on another lattice: shifted, turned, finer. Pass may change only where the
+// margin is below 0.2.
 #include <gtest/gtest.h>
 
 #include <cstdio>

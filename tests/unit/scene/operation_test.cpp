@@ -1,4 +1,4 @@
-// Scenes that are operated on: by the clock and without it, and the same again from the stream.
+// Scenes that are operated on: in real time and without it, and the same again from the stream.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -102,7 +102,7 @@ TEST(Operation, EverythingComesOutTheSameFromTheStream) {
       const Session session = read_session(file);
       EXPECT_GE(session.actions.size(), everything().size());
       const ReplayResult again = replay(SessionReader(file), start.copy(), {}, {});
-      EXPECT_TRUE(again.identical) << again.difference << (by_the_clock ? " by the clock" : "");
+      EXPECT_TRUE(again.identical) << again.difference << (by_the_clock ? " in real time" : "");
       EXPECT_TRUE(again.complete);
       EXPECT_EQ(again.bone_hash, s.bone_hash);
     }

@@ -261,7 +261,7 @@ TEST(Strokes, AreTakenBackLiveAndInAReplay) {
       at(5860, kUndo),  // ... back to the first
       at(5870, kUndo),
       at(5880, kUndo),
-      at(5890, kUndo),  // by the clock a stroke may have come apart; else nothing is left
+      at(5890, kUndo),  // in real time a stroke may have come apart; else nothing is left
   };
   for (const bool by_the_clock : {false, true}) {
     const test::ScratchFolder scratch;
@@ -276,7 +276,7 @@ TEST(Strokes, AreTakenBackLiveAndInAReplay) {
     } else {
       s = r.run_to_end({});
     }
-    // By the clock nothing is removed while a scene is prepared, on a busy machine for the length of whole holes.
+    // In real time nothing is removed while a scene is prepared, on a busy machine for the length of whole holes.
     EXPECT_GT(s.removed_mm3, by_the_clock ? 0.0 : 2.0);
     EXPECT_EQ(s.bone_hash, world.hash()) << "all of it was taken back, to the bit";
     EXPECT_EQ(s.surface_hash, SurfaceReader(world, {}).hash());
@@ -288,7 +288,7 @@ TEST(Strokes, AreTakenBackLiveAndInAReplay) {
     for (const RecordedAction& a : session.actions) strokes += a.action.is(ActionKind::stroke) ? 1 : 0;
     EXPECT_GE(strokes, by_the_clock ? 1u : 4u);
     const ReplayResult again = replay(SessionReader(o.session_file), world.copy(), {}, {});
-    EXPECT_TRUE(again.identical) << again.difference << (by_the_clock ? " by the clock" : "");
+    EXPECT_TRUE(again.identical) << again.difference << (by_the_clock ? " in real time" : "");
     EXPECT_EQ(again.bone_hash, s.bone_hash);
     World applied = world.copy();
     apply_recorded(SessionReader(o.session_file), applied);

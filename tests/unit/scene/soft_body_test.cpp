@@ -73,7 +73,7 @@ TEST(SoftBody, PushesBackAndIsReplayedToTheBit) {
     double most = 0, sideways = 0, jump = 0, last = 0;
     std::size_t pushes = 0;
     for (const auto& a : session.actions) pushes += a.action.is(ActionKind::soft_push) ? 1 : 0;
-    // A hundred a second; by the clock fewer, and so coarser, where other programs have the machine.
+    // A hundred a second; in real time fewer, and so coarser, where other programs have the machine.
     EXPECT_GT(pushes, by_the_clock ? 0u : 80u);
     for (const TickRecord& t : session.ticks) {
       const Vec3 f = from_floats(t.force_n);

@@ -366,7 +366,7 @@ TEST(SoftTissue, EachHandFeelsItsOwn) {
       most[t.hand] = std::max(most[t.hand], from_floats(t.force_n).z);
       last[t.hand] = length(from_floats(t.force_n));
     }
-    // By the clock planes are fewer where other programs have the machine, and so coarser.
+    // In real time planes are fewer where other programs have the machine, and so coarser.
     EXPECT_GT(most[0], by_the_clock ? 0 : 0.1);
     EXPECT_GT(most[1], by_the_clock ? 0 : 0.02);
     EXPECT_LT(last[0], 1e-3) << "it has left";

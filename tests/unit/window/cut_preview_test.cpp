@@ -81,7 +81,7 @@ TEST(CutPreview, TheEndPageTellsOfACut) {
   EXPECT_EQ(line("facial nerve").value, "INJURED: cut through by the saw, 0.5 mm3 of it");
   EXPECT_EQ(line("facial nerve").nearness, Nearness::touched);
   EXPECT_EQ(line("sigmoid sinus").value, "never nearer than 1.5 mm");
-  EXPECT_TRUE(line("structures at risk").value.empty());
+  EXPECT_TRUE(line("critical structures").value.empty());
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ StageInfo ApplyEditsStage::info() {
                      {"edits", {DataKind::document}, "edits.json of 'osteo edit'"},
                      {"labels", {DataKind::labels}, "structures to begin with", true}},
           .outputs = {{"mask", {DataKind::labels}, "1 in bone, 0 elsewhere"},
-                      {"structures", {DataKind::labels}, "structures at risk, with names and colours", true},
+                      {"structures", {DataKind::labels}, "critical structures, with names and colours", true},
                       {"edits", {DataKind::document}, "the edits as they were read", true}},
           .references = {},
           .example = "osteo apply-edits ct.nrrd mask.nrrd edits.json corrected.nrrd"};

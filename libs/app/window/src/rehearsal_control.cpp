@@ -230,7 +230,7 @@ std::optional<BoneHit> RehearsalControl::bone_seen(Vec3 direction) const {
   return hit;
 }
 
-// No way was free of structures at risk.
+// No way was free of critical structures.
 static constexpr const char* kPastStructures = "; past a critical structure, since no other path was free";
 
 void RehearsalControl::go_on_leading() {

@@ -135,7 +135,7 @@ void Product::lay_lattice(const World& before) {
   };
   if (count(h) > static_cast<double>(kMostCells)) {
     while (count(h) > static_cast<double>(kMostCells)) h *= 1.05;
-    word_ = "the end product was measured on cubes of " + format_number(std::round(h * 1000) / 1000) +
+    word_ = "the final product was measured on cubes of " + format_number(std::round(h * 1000) / 1000) +
             " mm, to keep memory in bounds";
   }
   frame_ = bone;

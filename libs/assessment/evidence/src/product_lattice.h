@@ -1,4 +1,4 @@
-// What the end product asks of its lattice, made no farther than it is asked for.
+// What the final product asks of its lattice, made no farther than it is asked for.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -270,13 +270,13 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
     score.words.push_back(
         (undone == 1 ? "a step was taken back" : std::to_string(undone) + " steps were taken back") +
         std::string(
-            ": what was seen and the end product go by what is gone at the end; all else counts the work done"));
+            ": what was seen and the final product go by what is gone at the end; all else counts the work done"));
   const auto count = [](const World& w, bool of_region) {
     return std::count_if(w.bodies().begin(), w.bodies().end(),
                          [&](const PlacedBody& b) { return b.of_region == of_region; });
   };
   if (count(first, false) > 1 || count(end, false) > 1)
-    score.words.push_back("bone in pieces: the end product is measured with each where it lay at the beginning");
+    score.words.push_back("bone in pieces: the final product is measured with each where it lay at the beginning");
   if (count(first, true) > 0)
     score.words.push_back("the case has a finer region: volumes and what was seen go by each voxel's own size");
   if (!keeper.removed().empty() && no_bone(end)) score.words.push_back("no bone is left");

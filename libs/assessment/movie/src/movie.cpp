@@ -161,7 +161,7 @@ std::string why_not_repeated(const SessionOutline& outline, const Anatomy& anato
   if (outline.header.haptics.hardness.value_or(false) != (anatomy.hardness != nullptr))
     return "the case does not tell the hardness it went by";
   if (outline.header.haptics.structures != (anatomy.structures ? anatomy.structures->hash() : ""))
-    return "it watched other structures at risk than the case has now";
+    return "it watched other critical structures than the case has now";
   return {};
 }
 

@@ -154,7 +154,7 @@ Sheet heat_sheet(const HeatReader& heat, const StructureMap* structures, const H
   }
   if (structures != nullptr) {
     const auto found = heat.structures();
-    add(sheet::Heading{"Structures at risk"});
+    add(sheet::Heading{"Critical structures"});
     if (found.empty()) {
       add(sheet::Paragraph{"None became warm."});
     } else {

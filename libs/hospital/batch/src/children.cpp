@@ -115,7 +115,7 @@ bool read_some(int& fd, std::string& text, std::size_t most, bool keep_last) {
 struct Children::Impl {
   std::vector<Child> children;
 
-  // What is due by the clock.
+  // What is due by now.
   static void look_after(Child& c) {
     const double ran = seconds_since(c.start);
     if (c.told && seconds_since(c.asked) > kGrace) ::kill(-c.pid, SIGKILL);

@@ -102,7 +102,7 @@ void LessonClock::step(Vec3 hand_mm, double dt_s) noexcept {
   }
   const std::size_t last = lesson_.size() - 1;
   int go = 1;
-  // Nobody is led on who is not there; by the clock time waits without going back, and not at all where nothing leads.
+  // Nobody is led on who is not there; in real time time waits without going back, and not at all where nothing leads.
   if ((!by_clock_ || waits_) && length(hand_mm - target_) > leash_mm_)
     go = !by_clock_ && behind_mm(hand_mm) >= 2 * leash_mm_ && sample_ > 0 ? -1 : 0;
   if (go > 0 && sample_ == last) {

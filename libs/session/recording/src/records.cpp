@@ -62,7 +62,7 @@ constexpr RecordField kTickFields[] = {
     {"thickness_mm", f32, offsetof(TickRecord, thickness_mm), "mm",
      "of bone under the burr along its push; 0 without contact, at most 10"},
     {"clearance_mm", f32, offsetof(TickRecord, clearance_mm), "mm",
-     "to the nearest structure at risk; negative inside"},
+     "to the nearest critical structure; negative inside"},
     {"structure", u32, offsetof(TickRecord, structure), "label value", "which structure that is; 0: none within reach"},
     {"work_us", f32, offsetof(TickRecord, work_us), "us", "time the tick took", machine},
     {"lateness_us", f32, offsetof(TickRecord, lateness_us), "us", "how late it was woken", machine},

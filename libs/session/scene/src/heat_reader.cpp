@@ -424,7 +424,7 @@ std::vector<std::string> told(const HeatReader& heat, const StructureMap* struct
                                  " J into bone, of which " + tenths(l.chips_j) + " left with chips, " +
                                  tenths(l.cooled_j) + " into water"};
   if (structures == nullptr) {
-    lines.emplace_back("the case lists no structures at risk");
+    lines.emplace_back("the case lists no critical structures");
     return lines;
   }
   for (const auto& [value, s] : heat.structures()) {

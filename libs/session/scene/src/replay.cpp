@@ -33,7 +33,7 @@ void check_same_case(const SessionReader& session, const World& start, const Ana
                 "the case needs its hu.vdb");
   }
   if (header.haptics.structures != (anatomy.structures ? anatomy.structures->hash() : "")) {
-    throw Error(ExitCode::corrupt, "the session watched other structures at risk than this case has",
+    throw Error(ExitCode::corrupt, "the session watched other critical structures than this case has",
                 "give the case it was recorded on, unchanged");
   }
 }

@@ -67,7 +67,7 @@ struct SessionFacts {
   double seconds = 0, rate_hz = 1000, removed_mm3 = 0, sawn_mm3 = 0, tissue_mm3 = 0;
   std::size_t bodies = 1;
   std::vector<std::string> plates;    ///< in words
-  bool has_structures = false;        ///< the case knows structures at risk
+  bool has_structures = false;        ///< the case knows critical structures
   std::vector<Structure> structures;  ///< those that came near
   /// A saw cut went through one.
   void add_cut(const std::string& structure, double mm3);

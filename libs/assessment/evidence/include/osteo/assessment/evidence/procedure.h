@@ -22,7 +22,7 @@ enum class ProcedureRole : int {
   return {"expose", "keep", "thin", "never_touch", "enter"};
 }
 
-/// What an item of the scale asks of the end product. What each computes: docs/evidence.md, and the fields of
+/// What an item of the scale asks of the final product. What each computes: docs/evidence.md, and the fields of
 /// ScaleItem.
 enum class ItemKind : int {
   exposed,

@@ -1,4 +1,4 @@
-// Structures at risk as one sees them: smooth, each in its colour, shown, clear or hidden.
+// Critical structures as one sees them: smooth, each in its colour, shown, clear or hidden.
 #pragma once
 #include <vtkSmartPointer.h>
 

@@ -27,8 +27,8 @@ class WorldView {
   WorldView(const WorldView&) = delete;
   WorldView& operator=(const WorldView&) = delete;
 
-  /// What is done in an update: what can wait a quarter of a second waits, by the clock; or all, so that a picture
-  /// follows from the scene.
+  /// What is done in an update: what can wait a quarter of a second waits, when it runs in real time; or all, so that a
+  /// picture follows from the scene.
   enum class Work { urgent, all };
   /// Shows the scene as it is; after the first time only what changed is made again.
   void update(const World& world, SceneReaders& readers, Work work = Work::urgent);

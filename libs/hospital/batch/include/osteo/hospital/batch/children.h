@@ -13,7 +13,7 @@ namespace osteo::inline hospital {
 struct ChildLimits {
   double memory_mb = 0;  ///< 10^6 bytes: of memory asked for (RLIMIT_DATA) and of memory of its own that is in use,
                          ///< looked at 10 times a second
-  double seconds = 0;    ///< by the clock
+  double seconds = 0;    ///< in real time
 };
 
 struct ChildEnd {

@@ -1,4 +1,4 @@
-// Live tutoring by the clock: the threads and sockets around LiveHost and LiveGuest.
+// Live tutoring in real time: the threads and sockets around LiveHost and LiveGuest.
 #pragma once
 #include <atomic>
 #include <functional>

@@ -21,7 +21,7 @@ enum class WhoDrills : int { usual, expert, learner };
 [[nodiscard]] constexpr std::array<std::string_view, 3> enum_names(WhoDrills) {
   return {"usual", "expert", "learner"};
 }
-/// How time goes; `usual`: by the clock in show and feel, along the way in the others.
+/// How time goes; `usual`: in real time in show and feel, along the way in the others.
 enum class Pace : int { usual, clock, way };
 [[nodiscard]] constexpr std::array<std::string_view, 3> enum_names(Pace) {
   return {"usual", "clock", "way"};

@@ -1,4 +1,4 @@
-// A script: what hands do, and what is done besides, by the clock of the servo.
+// A script: what hands do, and what is done besides, by the servo's clock.
 #pragma once
 #include <algorithm>
 #include <cmath>

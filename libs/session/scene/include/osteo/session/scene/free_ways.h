@@ -27,7 +27,7 @@ struct ToolSkin {
 /// A plate as it is gripped.
 [[nodiscard]] ToolSkin skin_of_plate(std::size_t plate, const RigidTransform& grip);
 
-/// Looks at bone as it is now; bodies that change meanwhile are seen in part as they were. Structures at risk are in
+/// Looks at bone as it is now; bodies that change meanwhile are seen in part as they were. Critical structures are in
 /// the way like bone, with kClearOfStructuresMm between them and the tool; where a tool is nearer at the beginning it
 /// may not come nearer. Soft tissue is not looked at. One thread.
 class FreeWays {

@@ -1,4 +1,4 @@
-// How warm drilling makes bone, and what that does to structures at risk.
+// How warm drilling makes bone, and what that does to critical structures.
 #pragma once
 #include <cstdint>
 #include <deque>

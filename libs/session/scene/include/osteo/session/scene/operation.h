@@ -11,7 +11,7 @@ namespace osteo::inline session {
 
 /// Between a world, which is changed step by step, and a servo, which must never wait. An action makes the next world,
 /// then what the servo keeps of the bodies that are new, and hands that over; it happens at the beginning of the next
-/// tick. While that is prepared by the clock, nothing is removed (an action of its own in the stream,
+/// tick. While that is prepared in real time, nothing is removed (an action of its own in the stream,
 /// ActionKind::hold), so the outcome follows from the stream alone.
 class Operation {
  public:
@@ -42,7 +42,7 @@ class Operation {
   using Done = std::function<void(const World::Effect&)>;
   /// In the thread that also steps; at most one action a tick. Who drains strokes() does so before.
   World::Effect act(const SceneAction& action, const Done& done = {}, const World::ComponentsOf& components = {});
-  /// In one other thread, while the servo runs by the clock. `running` false: the servo has ended, and nothing is
+  /// In one other thread, while the servo runs in real time. `running` false: the servo has ended, and nothing is
   /// waited for; none when it did before the action was tried. `held`: called while nothing is removed and before
   /// anything changes, for those that have to be up to date.
   std::optional<World::Effect> act_live(const SceneAction& action, const std::function<bool()>& running,

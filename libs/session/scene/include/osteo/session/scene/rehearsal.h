@@ -26,7 +26,7 @@ namespace osteo::inline session {
 struct RehearsalOptions {
   double rate_hz = 1000;
   HapticSetup haptics;
-  Anatomy anatomy;  ///< hardness where haptics.hardness is set; structures at risk where the case has them
+  Anatomy anatomy;  ///< hardness where haptics.hardness is set; critical structures where the case has them
   std::filesystem::path session_file;  ///< empty: not recorded
   ReaderList follow;                   ///< what is kept up beside the servo
   std::vector<SceneAction> actions;    ///< done when their tick has come, in order
@@ -44,7 +44,7 @@ struct ActionNote {
   std::uint64_t times = 1;  ///< in a row
 };
 
-/// A structure at risk that a cut by a plane went through.
+/// A critical structure that a cut by a plane went through.
 struct StructureCutEvent {
   std::uint64_t tick = 0;
   StructureCut cut;  ///< where, in the frame of the first body
@@ -73,7 +73,7 @@ struct RehearsalSummary {
       pieces;              ///< of at least PiecesReader::kLeastPieceMm3, largest first; empty unless they were followed
   std::size_t bodies = 1;  ///< that move on their own
   std::vector<Fixture> fixtures;
-  std::optional<LoopStats> loop;      ///< only when it ran by the clock
+  std::optional<LoopStats> loop;      ///< only when it ran in real time
   std::vector<std::string> warnings;  ///< what makes it less true than it looks, and what to do about it
   std::vector<ActionNote> notes;
   std::uint64_t unusable_poses = 0;  ///< ticks in which the device gave none that could be used
@@ -95,7 +95,7 @@ class Rehearsal {
   Rehearsal(World world, std::unique_ptr<Device> device, const RehearsalOptions& options, const Context& context);
   ~Rehearsal();
 
-  /// By the clock, in threads of its own.
+  /// In real time, in threads of its own.
   void start();
   [[nodiscard]] bool running() const;
   /// Ends the threads, takes the rest of the stream, does what was due and waits, closes the session file (which may
@@ -104,7 +104,7 @@ class Rehearsal {
   RehearsalSummary stop();
 
   /// As fast as possible in this thread, up to the device's end, or until the context is cancelled or nothing can be
-  /// recorded any more. Same bone, surface and session as by the clock. Errors as stop().
+  /// recorded any more. Same bone, surface and session as in real time. Errors as stop().
   RehearsalSummary run_to_end(const Context& context);
 
   /// In place of start() and run_to_end(), for a session that runs elsewhere: its next tick is done here, with what was

@@ -72,7 +72,7 @@ void apply_haptic_settings(const std::filesystem::path& case_folder, const std::
 [[nodiscard]] std::string hardness_json(const Anatomy& anatomy);
 /// The same in a sentence, with how to turn it off.
 [[nodiscard]] std::string told_hardness(const Anatomy& anatomy);
-/// What the burr did near each structure at risk, as summary.json lists it: seconds, not ticks; what was never within
+/// What the burr did near each critical structure, as summary.json lists it: seconds, not ticks; what was never within
 /// reach is not there.
 [[nodiscard]] std::string structures_json(const std::map<std::uint32_t, StructureEvents>& structures,
                                           const StructureMap& map, double rate_hz);

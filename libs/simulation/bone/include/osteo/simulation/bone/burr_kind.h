@@ -23,7 +23,7 @@ struct BurrKindRow {
   /// Of a ball of 4 mm at its equator, at the nominal speed; and what of it is lost for each radian of latitude (struct
   /// Burr).
   double rate_mm3_per_s_per_n = 0, falloff_mm3_per_s_per_n_per_rad = 0;
-  /// May work where a procedure or a hint wants no cutting burr: beside structures at risk.
+  /// May work where a procedure or a hint wants no cutting burr: beside critical structures.
   bool near_structures = false;
 
   /// Vibration: the kind whose peaks it has where a file of vibrations (libs/simulation/haptics/vibration.json) names

@@ -1,4 +1,4 @@
-// Structures at risk: how far a tool is from nerves, vessels and membranes.
+// Critical structures: how far a tool is from nerves, vessels and membranes.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -89,7 +89,7 @@ class StructureMap {
   std::vector<Structure> structures_;
 };
 
-// -- What a cut by a plane takes of structures at risk. They need no bone to be cut: a nerve lies in a canal, a sinus
+// -- What a cut by a plane takes of critical structures. They need no bone to be cut: a nerve lies in a canal, a sinus
 // beneath the bone.
 
 /// What a blade does to one structure.

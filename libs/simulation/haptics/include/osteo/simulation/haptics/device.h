@@ -153,7 +153,7 @@ struct Strokes {
   std::vector<Waypoint> waypoints;  ///< at least one, times rising
 };
 
-/// Follows strokes by tick number, not by the clock: the same ticks on every run. Behind the last waypoint the hand
+/// Follows strokes by tick number, not by wall clock: the same ticks on every run. Behind the last waypoint the hand
 /// rests there, the pedal up; it is active until then, and until `end_tick` where that is later.
 class ScriptedDevice final : public Device {
  public:

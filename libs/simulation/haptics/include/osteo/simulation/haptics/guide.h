@@ -41,7 +41,7 @@ struct HandGuide {
 /// as stiff as the device bears has at kNearMm, and it is gone where hand and leader are kNearMm apart (beyond the dead
 /// zone): a force that does not give way would carry the hand off, since position and force cannot both be given. While
 /// the leader's time stands still, its force fades over kFadeS. Pushing away: at most kAwayN and kAwayStiffness, no
-/// more than 5/s of the damping, not within kAwayClearanceMm of a structure at risk, not above kAwayMmPerS. No
+/// more than 5/s of the damping, not within kAwayClearanceMm of a critical structure, not above kAwayMmPerS. No
 /// allocation. The same input gives the same bits.
 class GuideLaw {
  public:
@@ -49,7 +49,7 @@ class GuideLaw {
   static constexpr double kAwayN = 1, kAwayStiffness = 0.05, kAwayClearanceMm = 3, kAwayMmPerS = 50;
 
   struct Hand {
-    float clearance_mm = 1e9F;  ///< to the nearest structure at risk, in the tick before; far where there is none
+    float clearance_mm = 1e9F;  ///< to the nearest critical structure, in the tick before; far where there is none
   };
   /// `device`: of the hand that is led.
   void set(const HandGuide& guide, const DeviceTraits& device, double contact_damping_n_s_per_m,

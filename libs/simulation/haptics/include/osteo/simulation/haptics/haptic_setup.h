@@ -69,7 +69,7 @@ struct HapticSetup {
   std::optional<bool>
       hardness;  ///< removal goes by the HU of the case; empty: where it keeps them, which anatomy_of() settles
   std::string hardness_json;  ///< the law, as parse_hardness reads it; empty: the built-in one
-  std::string structures;     ///< hash of the structures at risk that are watched; empty: none
+  std::string structures;     ///< hash of the critical structures that are watched; empty: none
   std::vector<Vec3> curve;    ///< points of a virtual fixture for hand 0, in mm; fewer than 2: none
   CurveConstraintParams curve_params;
   std::string

@@ -42,7 +42,7 @@ enum TickFlag : std::uint32_t {
   kShaftContact = 64,        ///< the shaft touches bone
   kEscape = 128,             ///< too deep for a direction of its own: pushed along the distance map
   kCurveHeld = 256,          ///< the curve constraint holds
-  kStructureTouched = 512,   ///< the burr reaches a structure at risk
+  kStructureTouched = 512,   ///< the burr reaches a critical structure
   kStructureInjured = 1024,  ///< and it turns: it may cut in this tick
   kHeld = 2048,              ///< nothing was removed, since the scene is being changed
   kPlateInHand = 4096,       ///< the hand holds a plate, not its instrument
@@ -68,7 +68,7 @@ struct TickRecord {
   std::uint32_t flags = 0;     ///< TickFlag
   float energy_mj = 0;         ///< the passivity observer's: positive, the contact gave more than it took
   float thickness_mm = 0;      ///< of the bone that the burr presses on, along the push; 0 without contact, at most 10
-  float clearance_mm = 0;      ///< to the nearest structure at risk; negative inside; 0 where the scene has none
+  float clearance_mm = 0;      ///< to the nearest critical structure; negative inside; 0 where the scene has none
   std::uint32_t structure =
       0;                   ///< which that is: its value in the label map; 0: none within reach of the burr's surface
   std::uint32_t hand = 0;  ///< whose: from 0

@@ -41,7 +41,7 @@ class SoftBody {
   ~SoftBody();
 
   static constexpr double kUpdatesPerS = 100;
-  /// What an update may take, in steps times tetrahedra: 4 to 10 ms of a core. Not measured by the clock, or two runs
+  /// What an update may take, in steps times tetrahedra: 4 to 10 ms of a core. Not measured by wall clock, or two runs
   /// of one script would differ.
   static constexpr double kMostWork = 250'000;
   static constexpr double kNearMm = 10;  ///< a tool is near whose head comes within this of the body's box
