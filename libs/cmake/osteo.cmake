@@ -143,6 +143,7 @@ function(osteo_library name)
   target_compile_options(osteo_${name} PRIVATE $<$<CONFIG:Release>:${optimisation}>)
   if(OSTEO_UNITY AND NOT ARG_ALONE)
     set_target_properties(osteo_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${OSTEO_UNITY})
+    target_compile_options(osteo_${name} PRIVATE -Wno-subobject-linkage)  # what is a source's own looks like a header's there
   endif()
   if(ARG_HEAVY)
     set_property(TARGET osteo_${name} PROPERTY JOB_POOL_COMPILE osteo_heavy)

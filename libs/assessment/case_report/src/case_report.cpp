@@ -407,7 +407,7 @@ bool has_full_report(const fs::path& folder) {
 
 CaseReport write_case_report(const fs::path& folder, const std::string& asked_for, const std::optional<CaseScan>& scan,
                              const Context& context) {
-  CaseReport report{report_file(folder, ".html"), report_file(folder, ".pdf"), false, {}};
+  CaseReport report{report_file(folder, ".html"), report_file(folder, ".pdf"), false, {}, {}};
   context.progress(0, "report");
   if (approval_of(folder).state == ApprovalState::valid && has_full_report(folder) &&
       earlier_html(folder).find("class=\"signature good\"") != std::string::npos) {

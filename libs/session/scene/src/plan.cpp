@@ -32,8 +32,8 @@ Json gaps_of(const World& world, const Fixture& f, const fs::path& csv) {
   std::vector<double> gaps;
   std::string text = "x_mm,y_mm,z_mm,gap_mm,piece\n";
   std::size_t none = 0;
-  constexpr double kReachMm = 5;
-  for (const PlateGap& g : plate_gaps(world, plate, pose, f.opening_mm, 400, kReachMm)) {
+  constexpr double kPlateReachMm = 5;
+  for (const PlateGap& g : plate_gaps(world, plate, pose, f.opening_mm, 400, kPlateReachMm)) {
     const Vec3 p = pose(g.at_mm);
     const bool met = g.body != SceneAction::kNobody;
     text += format_number(p.x) + "," + format_number(p.y) + "," + format_number(p.z) + "," +
