@@ -29,8 +29,9 @@ TEST(BurrKinds, AreNotComparedOutsideTheirTable) {
       std::ifstream file(e.path());
       std::string line;
       for (int n = 1; std::getline(file, line); ++n) {
-        if (line.find("BurrKind") != line.npos)
+        if (line.find("BurrKind") != line.npos) {
           EXPECT_FALSE(std::regex_search(line, compared)) << e.path() << ":" << n << ": " << line;
+        }
       }
       ++files;
     }

@@ -95,7 +95,8 @@ struct ActionRow {
                                ///< replay finds the same
   bool last_counts =
       false;  ///< of several in a row that wait, with the same body, other, item and hand, the last one is enough
-  bool moves_dust = false;  ///< the dust acts on it
+  bool moves_dust = false;  ///< a state that dust and water obey until the next of its kind (position, suction), so
+                            ///< readers that join later are told it again; not for what is done once
   bool ends_hold = false;   ///< after it, done or not, bone may be removed again
   bool by_servo =
       false;  ///< the servo tells of it by itself: nobody asks for it, and a replay does not do it but gets it again

@@ -13,8 +13,8 @@ namespace osteo::inline simulation {
 enum class BurrKind : int { cutting, diamond };
 
 /// What a kind of burr is. Whoever decides by kind asks here: nothing else may compare kinds with each other (the test
-/// BurrKinds reads the sources for that). To add a kind: a row at the end of kBurrKinds, and for replays the number
-/// kBurrLibraryVersion.
+/// BurrKinds reads the sources for that). To add a kind: a row at the end of kBurrKinds.
+/// kBurrLibraryVersion stays, unless what older kinds remove changes.
 struct BurrKindRow {
   std::string_view
       name;      ///< "cutting": in names of burrs, flags, scripts, session files, buttons; ends with a zero character
