@@ -11,6 +11,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/data/json_vec.h"
 #include "osteo/display/view/world_view.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/network/wire/rehearsal_stream.h"
@@ -214,10 +215,9 @@ class HeadlessSession {
   void note_camera() {
     if (!script_.camera) return;
     const Vec3 eye_mm = view_.centre_mm + view_.eye * (view_.radius_mm / 0.24);
-    const auto triple = [](Vec3 v) { return Json{v.x, v.y, v.z}; };
     rehearsal_->note(
         "camera",
-        Json{{"eye_mm", triple(eye_mm)}, {"target_mm", triple(view_.centre_mm)}, {"view_angle_deg", 30}}.dump());
+        Json{{"eye_mm", json_of(eye_mm)}, {"target_mm", json_of(view_.centre_mm)}, {"view_angle_deg", 30}}.dump());
   }
 
   void drill() {
