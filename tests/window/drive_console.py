@@ -4,10 +4,13 @@ waits for a server, shows every sample, goes on when the server went and came ag
 usage: drive_console.py BIN_DIR WORK_DIR [PICTURES]    with PICTURES it keeps pictures there, at three sizes"""
 import csv, json, os, pathlib, shutil, signal, socket, subprocess, sys, time
 
+from driver import *
+
 bin_dir, work = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
 pictures = pathlib.Path(sys.argv[3]).resolve() if len(sys.argv) > 3 else None
 shutil.rmtree(work, ignore_errors=True)
 work.mkdir(parents=True)
+os.chdir(work)
 os.environ.update(SDL_AUDIODRIVER="dummy", XDG_CONFIG_HOME=str(work / "config"), XDG_STATE_HOME=str(work / "state"))
 sizes = [(1100, 640), (1024, 700), (1920, 1080), (3840, 2160)] if pictures else [(1100, 640)]
 
@@ -32,39 +35,20 @@ strokes = {"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 3}
 port = free_port()
 
 
-class Console:
+class Console(Program):
     def __init__(self, width, height, *more):
-        self.file = work / "state.json"
-        self.file.unlink(missing_ok=True)
-        self.app = subprocess.Popen([bin_dir / "osteo", "console", str(port), "--state-file", str(self.file), "--width", str(width), "--height",
-                                     str(height), *more], cwd=work, stderr=subprocess.PIPE, text=True)
+        super().__init__([bin_dir / "osteo", "console", port, "--width", width, "--height", height, *more], "Osteotome nerve monitor")
         self.until("it shows something", lambda s: s["pictures"] > 2)
-        self.id = subprocess.run(["xdotool", "search", "--sync", "--onlyvisible", "--name", "Osteotome nerve monitor"], capture_output=True, text=True,
-                                 check=True).stdout.split()[-1]
-        subprocess.run(["xdotool", "windowfocus", "--sync", self.id], check=True)
+        self.x("windowfocus", "--sync", self.id)
 
-    def state(self):
-        try:
-            return json.loads(self.file.read_text())
-        except (FileNotFoundError, json.JSONDecodeError):
-            return {"pictures": 0}
-
-    def until(self, what, condition, most_s=300):
-        until = time.time() + most_s
-        while time.time() < until:
-            assert self.app.poll() is None, self.app.stderr.read()
-            s = self.state()
+    def until(self, what, condition):
+        def holds(state):
             try:
-                if condition(s):
-                    return s
-            except KeyError:
-                pass
-            time.sleep(0.03)
-        raise AssertionError(f"never: {what}: {self.state()}")
+                return condition(state)
+            except KeyError:  # told from when there is something to tell
+                return False
 
-    def key(self, name, what, condition):
-        subprocess.run(["xdotool", "key", name], check=True)
-        return self.until(what, condition)
+        return super().until(what, holds)
 
     def picture(self, name):
         if pictures:
@@ -74,18 +58,12 @@ class Console:
                             str(pictures / name)], check=True)
 
     def close(self):
-        subprocess.run(["xdotool", "key", "q"], check=True)
-        assert self.app.wait(timeout=120) == 0, self.app.stderr.read()
+        self.x("key", "q")
+        self.end()
 
 
-display = 90
-while pathlib.Path(f"/tmp/.X{display}-lock").exists():
-    display += 1
 largest = max(sizes)
-server = subprocess.Popen(["Xvfb", f":{display}", "-screen", "0", f"{largest[0]}x{largest[1]}x24"], stderr=subprocess.DEVNULL)
-os.environ["DISPLAY"] = f":{display}"
-time.sleep(1)
-try:
+with Screen("%dx%d" % largest):
     for width, height in sizes:
         c = Console(width, height)
         assert "not connected" in c.until("told that nobody is there", lambda s: s["trouble"])["trouble"]
@@ -150,6 +128,3 @@ try:
     assert len(current("threshold")) == 1 and abs(current("threshold")[0] - found) < 1e-9, (found, current("threshold"))
     assert current("stimulator") == [0.5, 0.5, 0], current("stimulator")
     print(f"ok  the stimulator from the console: threshold {found:.2f} mA")
-finally:
-    server.terminate()
-    server.wait()

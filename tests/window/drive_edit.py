@@ -3,8 +3,9 @@
 usage: drive_edit.py BIN_DIR WORK_DIR"""
 import array, gzip, json, os, pathlib, re, shutil, subprocess, sys, time
 
+from driver import *
+
 bin_dir, work = pathlib.Path(sys.argv[1]).absolute(), pathlib.Path(sys.argv[2]).absolute()
-PATIENCE_S = 240
 
 
 def osteo(*args, code=0):
@@ -13,71 +14,11 @@ def osteo(*args, code=0):
     return done.stdout + done.stderr
 
 
-def wait(what, condition):
-    end = time.monotonic() + PATIENCE_S
-    while True:
-        found = condition()
-        if found:
-            return found
-        assert time.monotonic() < end, f"waited in vain: {what}"
-        time.sleep(0.03)
-
-
-class Screen:
-    def __init__(self, size):
-        self.size = size
-
-    def __enter__(self):
-        read, write = os.pipe()
-        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", f"{self.size}x24", "-nolisten", "tcp"], pass_fds=[write], stderr=subprocess.DEVNULL)
-        os.close(write)
-        with os.fdopen(read) as f:
-            os.environ["DISPLAY"] = ":" + f.readline().strip()
-        return self
-
-    def __exit__(self, *_):
-        self.server.kill()
-        self.server.wait()
-
-
-class Window:
+class Window(Program):
     def __init__(self, *args, case="case"):
-        self.file = pathlib.Path(f"state-{time.monotonic_ns()}.json")
-        self.log = open(f"{self.file}.log", "w+")
-        self.app = subprocess.Popen([bin_dir / "osteo-edit", case, "--state-file", self.file, *map(str, args)], stderr=self.log)
-        wait("the first picture", lambda: self.file.exists() or self.app.poll() is not None)
-        assert self.app.poll() is None, (self.app.returncode, self.said())
-        wait("the window", lambda: self.x("search", "--name", "^Osteotome edit").split())
+        super().__init__([bin_dir / "osteo-edit", case, *args], "Osteotome edit")
         self.x("mousemove", *self.place(0, 0.5, 0.5))
         self.until("3D", lambda s: s["triangles"] > 0 and not s["previewing"])
-
-    def x(self, *args):
-        return subprocess.run(["xdotool", *map(str, args)], capture_output=True, text=True).stdout
-
-    def said(self):
-        self.log.flush()
-        return pathlib.Path(self.log.name).read_text()
-
-    def state(self):
-        return json.loads(self.file.read_text())
-
-    def until(self, what, condition):
-        last = {}
-
-        def look():
-            nonlocal last
-            assert self.app.poll() is None, (what, self.app.returncode, self.said())
-            last = self.state()
-            return condition(last) and last
-
-        try:
-            return wait(what, look)
-        except AssertionError as e:
-            raise AssertionError(f"{e}; {last}; {self.said()}") from None
-
-    def key(self, key, what, condition):
-        self.x("key", key)
-        return self.until(f"{key}: {what}", condition)
 
     def place(self, view, across, down):
         v = self.state()["views"][view]
@@ -108,10 +49,6 @@ class Window:
             return condition(self.shown())
 
         wait(what, clicked)
-
-    def end(self, code=0):
-        self.app.wait(PATIENCE_S)
-        assert self.app.returncode == code, (self.app.returncode, self.said())
 
 
 def nrrd(path):

@@ -3,9 +3,10 @@
 is done again. usage: drive_experiment.py BIN_DIR WORK_DIR [PICTURES_DIR]"""
 import json, os, pathlib, shutil, subprocess, sys, time
 
+from driver import *
+
 bin_dir, work = pathlib.Path(sys.argv[1]).absolute(), pathlib.Path(sys.argv[2]).absolute()
 pictures = pathlib.Path(sys.argv[3]).absolute() if len(sys.argv) > 3 else None
-PATIENCE_S = 240
 shutil.rmtree(work, ignore_errors=True)
 work.mkdir(parents=True)
 os.chdir(work)
@@ -13,79 +14,24 @@ os.environ["XDG_CONFIG_HOME"] = str(work / "config")
 os.environ["XDG_STATE_HOME"] = str(work / "state-home")
 
 
-def wait(what, condition, patience=PATIENCE_S):
-    end = time.monotonic() + patience
-    while True:
-        found = condition()
-        if found:
-            return found
-        assert time.monotonic() < end, f"waited in vain: {what}"
-        time.sleep(0.03)
-
-
-class Screen:
-    def __init__(self, size):
-        self.size = size
-
-    def __enter__(self):
-        read, write = os.pipe()
-        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", f"{self.size}x24", "-nolisten", "tcp"], pass_fds=[write], stderr=subprocess.DEVNULL)
-        os.close(write)
-        with os.fdopen(read) as f:
-            os.environ["DISPLAY"] = ":" + f.readline().strip()
-        return self
-
-    def __exit__(self, *_):
-        self.server.kill()
-        self.server.wait()
-
-
-def x(*args):
-    return subprocess.run(["xdotool", *map(str, args)], capture_output=True, text=True).stdout
-
-
-class Window:
+class Window(Program):
     def __init__(self, device, size, *args):
-        self.file = pathlib.Path(f"state-{time.monotonic_ns()}.json")
         self.size = size
-        self.log = open(f"{self.file}.log", "w+")
-        self.app = subprocess.Popen([bin_dir / "osteo-experiment", "study", "--participant", "P01", "--device", device, "--state-file", self.file, "--width", str(size[0]), "--height", str(size[1]), *args], stderr=self.log)
-        wait("the first picture", lambda: self.file.exists() or self.app.poll() is not None)
-        assert self.app.poll() is None, self.said()
-        wait("the window", lambda: x("search", "--name", "^Osteotome experiment").split())
+        super().__init__([bin_dir / "osteo-experiment", "study", "--participant", "P01", "--device", device, "--width", size[0], "--height", size[1], *args],
+                         "Osteotome experiment")
         x("mousemove", size[0] // 2, int(0.2 * size[1]))
-
-    def said(self):
-        self.log.flush()
-        return pathlib.Path(self.log.name).read_text()
-
-    def until(self, what, condition):
-        last = {}
-
-        def look():
-            nonlocal last
-            assert self.app.poll() is None, (what, self.app.returncode, self.said())
-            last = json.loads(self.file.read_text())
-            return condition(last) and last
-
-        try:
-            return wait(what, look)
-        except AssertionError as e:
-            raise AssertionError(f"{e}; {last}; {self.said()}") from None
 
     def press_space(self, page):
         """The page that the space bar leads to; pressed again where it was not heard."""
         end = time.monotonic() + PATIENCE_S
-        while json.loads(self.file.read_text())["page"] != page:
-            assert time.monotonic() < end, (page, self.file.read_text())
+        while self.state()["page"] != page:
+            assert time.monotonic() < end, (page, self.state())
             x("key", "space")
             time.sleep(0.5)
 
     def leave(self):
         x("key", "Escape")
-        code = self.app.wait(PATIENCE_S)
-        assert code == 0, self.said()
-        return self.said()
+        return self.end()
 
     def picture(self, name):
         if pictures:

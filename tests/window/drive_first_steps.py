@@ -10,7 +10,7 @@ BONE = (730, 450)  # in the window: the mastoid, where one begins
 
 def first_steps():
     make_case()
-    with Screen("1360x860x24"):
+    with Screen("1360x860"):
         table = []
         w = Window(*SIZE, "--dust", "--no-sound", "-o", "first")
 

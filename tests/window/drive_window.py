@@ -3,8 +3,9 @@
 usage: drive_window.py keys|room|hand|signals|failures BIN_DIR WORK_DIR SOURCE_DIR"""
 import array, csv, json, math, os, pathlib, re, resource, shutil, signal, subprocess, sys, time
 
+from driver import *
+
 part, bin_dir, work, source = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3]), pathlib.Path(sys.argv[4])
-PATIENCE_S = 240  # of a wait; on a machine at rest most take a second
 # Keys of these commands are pressed by drive_camera.py.
 CAMERA = {"magnify", "focus", "autofocus", "look_there", "look_at_drill", "guide_camera", "bookmark", "camera_back",
           "orbit_left", "orbit_right", "orbit_up", "orbit_down"}
@@ -18,16 +19,6 @@ def osteo(*args, code=0):
     return done.stdout
 
 
-def wait(what, condition):
-    end = time.monotonic() + PATIENCE_S
-    while True:
-        found = condition()
-        if found:
-            return found
-        assert time.monotonic() < end, f"waited in vain: {what}"
-        time.sleep(0.03)
-
-
 def dot(a, b):
     return sum(x * y for x, y in zip(a, b))
 
@@ -36,70 +27,20 @@ def apart(a, b):
     return math.dist(a, b)
 
 
-class Screen:
-    def __init__(self, size="1000x700x24"):
-        self.size = size
-
-    def __enter__(self):
-        read, write = os.pipe()
-        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", self.size, "-nolisten", "tcp"], pass_fds=[write], stderr=subprocess.DEVNULL)
-        os.close(write)
-        with os.fdopen(read) as f:
-            os.environ["DISPLAY"] = ":" + f.readline().strip()
-        return self
-
-    def __exit__(self, *_):
-        self.server.kill()
-        self.server.wait()
-
-
-class Window:
+class Window(Program):
     def __init__(self, *args, case="case", before=None, end_page=False):
-        self.file = pathlib.Path(f"state-{time.monotonic_ns()}.json")
-        self.log = open(f"{self.file}.log", "w+")
         # Straight to the window's program, so that signals go to it whoever starts it.
-        self.app = subprocess.Popen([bin_dir / "osteo-rehearse", *([case] if case else []), "--state-file", self.file, *([] if end_page else ["--no-end-page"]), *map(str, args)], stderr=self.log, preexec_fn=before)
-        wait("the window's first picture", lambda: self.file.exists() or self.app.poll() is not None)
-        assert self.app.poll() is None, (self.app.returncode, self.said())
-        self.id = wait("the window", lambda: self.x("search", "--name", "^Osteotome").split())[-1]
+        super().__init__([bin_dir / "osteo-rehearse", *([case] if case else []), *([] if end_page else ["--no-end-page"]), *args], "Osteotome", before)
         if not case or "--review" in args:  # the start page, or one at the end: nothing ticks
             return
         wait("the first tick", lambda: self.state()["tick"] > 0)
         self.x("mousemove", 480, 330)
         self.next()
 
-    def x(self, *args):
-        return subprocess.run(["xdotool", *map(str, args)], capture_output=True, text=True).stdout
-
-    def said(self):
-        self.log.flush()
-        return pathlib.Path(self.log.name).read_text()
-
-    def state(self):
-        return json.loads(self.file.read_text())
-
     def next(self, pictures=2):
         """So many pictures later."""
         after = self.state()["pictures"] + pictures
         return wait("the next picture", lambda: (s := self.state())["pictures"] >= after and s)
-
-    def until(self, what, condition):
-        last = {}
-
-        def look():
-            nonlocal last
-            assert self.app.poll() is None, (what, self.app.returncode, self.said())
-            last = self.state()
-            return condition(last) and last
-
-        try:
-            return wait(what, look)
-        except AssertionError as e:
-            raise AssertionError(f"{e}; {last}; {self.said()}") from None
-
-    def key(self, key, what, condition):
-        self.x("key", key)
-        return self.until(f"{key}: {what}", condition)
 
     def drag(self, button, dx, dy):
         self.x("mousedown", button)
@@ -108,11 +49,6 @@ class Window:
         self.next()
         self.x("mouseup", button)
         return self.next()
-
-    def end(self, code):
-        self.app.wait(PATIENCE_S)
-        assert self.app.returncode == code, (self.app.returncode, self.said())
-        return self.said()
 
     def close(self, code=0):
         self.x("key", "q")

@@ -52,7 +52,7 @@ def plain(wide, high):
 
 
 rows, viewer, loads = {name: [] for name in OPEN}, {}, []
-with Screen("1360x860x24"):
+with Screen("1360x860"):
     for turn in range(rounds):
         for name, (flags, keys) in OPEN.items():
             got = turned(flags, keys)

@@ -7,6 +7,7 @@
 #include "osteo/app/window/console_window.h"
 #include "osteo/core/base/error.h"
 #include "osteo/network/wire/remote_monitor.h"
+#include "window_main.h"
 
 namespace osteo {
 namespace {
@@ -66,9 +67,7 @@ struct ConsoleWindowCommand {
     if (!io.common.quiet)
       io.err << remote.samples() << " samples, " << remote.lost() << " lost on the way, " << remote.events()
              << " events" << std::endl;
-    if (shell.gl_errors() > 0)
-      throw Error(ExitCode::failed, std::to_string(shell.gl_errors()) + " OpenGL errors were seen",
-                  "please report this with the name of the graphics card");
+    require_no_gl_errors(shell.gl_errors());
     return 0;
   }
 };
@@ -77,15 +76,6 @@ struct ConsoleWindowCommand {
 }  // namespace osteo
 
 int main(int argc, char** argv) {
-  osteo::cli::Program program;
-  program.about = "osteo-console: the nerve monitor's console, over the network";
-  program.licence = "Osteotome's own sources: Apache-2.0. Not a medical device.";
-  program.add<osteo::ConsoleWindowCommand>();
-  // The only command needs no name.
-  std::vector<char*> args{argv[0]};
-  static char name[] = "console";
-  const std::string_view first = argc > 1 ? argv[1] : "";
-  if (first != "--version" && first != "help") args.push_back(name);
-  args.insert(args.end(), argv + 1, argv + argc);
-  return osteo::cli::run_program(program, static_cast<int>(args.size()), args.data(), std::cout, std::cerr);
+  return osteo::run_window_program<osteo::ConsoleWindowCommand>(
+      argc, argv, "osteo-console: the nerve monitor's console, over the network", std::string(osteo::kOwnLicence));
 }

@@ -16,6 +16,7 @@
 #include "osteo/app/window/edit_window.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "window_main.h"
 
 extern char** environ;
 
@@ -128,10 +129,7 @@ struct EditWindowCommand {
     actions.stop = [&] { return io.context.cancelled(); };
     const int gl_errors = run_edit_window(document, options, actions);
     if (io.context.cancelled()) throw Error(ExitCode::cancelled, "ended from outside; what was not saved is lost");
-    if (gl_errors > 0) {
-      throw Error(ExitCode::failed, std::to_string(gl_errors) + " OpenGL errors were seen",
-                  "please report this with the name of the graphics card");
-    }
+    require_no_gl_errors(gl_errors);
     return 0;
   }
 };
@@ -140,15 +138,6 @@ struct EditWindowCommand {
 }  // namespace osteo
 
 int main(int argc, char** argv) {
-  osteo::cli::Program program;
-  program.about = "osteo-edit: correct the bone and the structures of a case by hand";
-  program.licence = osteo::licence_of_all_stages();
-  program.add<osteo::EditWindowCommand>();
-  // The only command needs no name.
-  std::vector<char*> args{argv[0]};
-  static char name[] = "edit";
-  const std::string_view first = argc > 1 ? argv[1] : "";
-  if (first != "--version" && first != "help") args.push_back(name);
-  args.insert(args.end(), argv + 1, argv + argc);
-  return osteo::cli::run_program(program, static_cast<int>(args.size()), args.data(), std::cout, std::cerr);
+  return osteo::run_window_program<osteo::EditWindowCommand>(
+      argc, argv, "osteo-edit: correct the bone and the structures of a case by hand", osteo::licence_of_all_stages());
 }

@@ -7,6 +7,7 @@
 #include "osteo/core/rt/loop.h"
 #include "osteo/simulation/devices/devices.h"
 #include "run_screen.h"
+#include "window_main.h"
 
 namespace osteo {
 
@@ -136,9 +137,7 @@ struct ExperimentWindowCommand {
     if (!io.common.quiet)
       io.err << p.participant << ": " << desk.done() << " of " << desk.trials() << " trials are done"
              << (desk.done() < desk.trials() ? "; the same command goes on there" : "") << '\n';
-    if (gl_errors > 0)
-      throw Error(ExitCode::failed, std::to_string(gl_errors) + " OpenGL errors were seen",
-                  "please report this with the name of the graphics card");
+    require_no_gl_errors(gl_errors);
     return 0;
   }
 };
@@ -147,19 +146,9 @@ struct ExperimentWindowCommand {
 }  // namespace osteo
 
 int main(int argc, char** argv) {
-  osteo::cli::Program program;
-  program.about = "osteo-experiment: force-skill training at a haptic device";
-  program.licence =
+  return osteo::run_window_program<osteo::ExperimentWindowCommand>(
+      argc, argv, "osteo-experiment: force-skill training at a haptic device",
       "Osteotome's own sources: Apache-2.0. This binary links what osteo-rehearse links, copyleft libraries too where "
-      "that does: 'osteo "
-      "--version' says which.\n"
-      "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.";
-  program.add<osteo::ExperimentWindowCommand>();
-  // The only command needs no name.
-  std::vector<char*> args{argv[0]};
-  static char name[] = "experiment";
-  const std::string_view first = argc > 1 ? argv[1] : "";
-  if (first != "--version" && first != "help") args.push_back(name);
-  args.insert(args.end(), argv + 1, argv + argc);
-  return osteo::cli::run_program(program, static_cast<int>(args.size()), args.data(), std::cout, std::cerr);
+      "that does: 'osteo --version' says which.\n"
+      "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.");
 }

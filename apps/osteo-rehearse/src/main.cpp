@@ -16,6 +16,7 @@
 #include "osteo/simulation/bone/burr.h"
 #include "sitting.h"
 #include "window_flags.h"
+#include "window_main.h"
 
 namespace osteo {
 namespace {
@@ -274,10 +275,7 @@ struct WindowCommand {
     if (const std::string not_kept = person.save(); !not_kept.empty()) io.context.warn(not_kept);
     if (io.context.cancelled())
       throw Error(ExitCode::cancelled, sat ? "ended from outside; the session is saved" : "ended from outside");
-    if (shell.gl_errors() > 0)
-      throw Error(ExitCode::failed,
-                  std::to_string(shell.gl_errors()) + " OpenGL errors were seen; the session is saved",
-                  "please report this with the name of the graphics card");
+    require_no_gl_errors(shell.gl_errors(), "; the session is saved");
     return static_cast<int>(lost_ticks ? ExitCode::partial : ExitCode::ok);
   }
 };
@@ -286,15 +284,6 @@ struct WindowCommand {
 }  // namespace osteo
 
 int main(int argc, char** argv) {
-  osteo::cli::Program program;
-  program.about = "osteo-rehearse: drill the bone of a case in a window";
-  program.licence = "Osteotome's own sources: Apache-2.0. Not a medical device.";
-  program.add<osteo::WindowCommand>();
-  // The only command needs no name.
-  std::vector<char*> args{argv[0]};
-  static char name[] = "rehearse";
-  const std::string_view first = argc > 1 ? argv[1] : "";
-  if (first != "--version" && first != "help") args.push_back(name);
-  args.insert(args.end(), argv + 1, argv + argc);
-  return osteo::cli::run_program(program, static_cast<int>(args.size()), args.data(), std::cout, std::cerr);
+  return osteo::run_window_program<osteo::WindowCommand>(
+      argc, argv, "osteo-rehearse: drill the bone of a case in a window", std::string(osteo::kOwnLicence));
 }

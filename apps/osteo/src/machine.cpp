@@ -189,27 +189,17 @@ cli::CommandInfo DoctorCommand::info() {
           "osteo doctor --seconds 10"};
 }
 
-int DoctorCommand::run(const Params& p, cli::Invocation& io) {
-  if (p.server) return doctor_of_server(p, io);
-  if (p.no_report) throw Error(ExitCode::usage, "--no-report is for --server", "osteo doctor --server ...");
-  for (const std::string* const given :
-       {&p.inbox, &p.cases, &p.rules, &p.metrics, &p.login, &p.allow, &p.tls_ca, &p.tls_certificate, &p.tls_key})
-    if (!given->empty())
-      throw Error(ExitCode::usage, "'" + *given + "' is looked at with --server alone", "osteo doctor --server ...");
-  Json j;
-  std::vector<std::string> advice;
-  utsname u{};
-  ::uname(&u);
-  j["processor"] = processor();
-  j["cores"] = std::thread::hardware_concurrency();
-  j["kernel"] = std::string(u.sysname) + " " + u.release;
-  const bool realtime_kernel = fs::exists("/sys/kernel/realtime");
-  j["kernel_is_realtime"] = realtime_kernel;
-  j["vector_instructions"] = simd_name(simd());
+namespace {
 
-  io.context.progress(0.1, "measuring the loop");
-  FixedRateLoop loop(p.rate_hz, [end = monotonic_ns() + static_cast<std::int64_t>(p.seconds * 1e9)](std::int64_t) {
-    // As much work as a tick of drilling.
+// What this machine can do, as JSON; and what could be changed.
+struct Examination {
+  Json found;
+  std::vector<std::string> advice;
+};
+
+// As much work as a tick of drilling, for a while.
+LoopStats try_loop(double rate_hz, double seconds) {
+  FixedRateLoop loop(rate_hz, [end = monotonic_ns() + static_cast<std::int64_t>(seconds * 1e9)](std::int64_t) {
     const std::int64_t until = monotonic_ns() + 50'000;
     while (monotonic_ns() < until) {
     }
@@ -217,79 +207,117 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
   });
   loop.start();
   loop.join();
-  const LoopStats& s = loop.stats();
-  rlimit lock{};
-  ::getrlimit(RLIMIT_MEMLOCK, &lock);
-  j["realtime_priority"] = s.realtime_granted;
+  return loop.stats();
+}
+
+void judge_loop(const LoopStats& s, double rate_hz, bool realtime_kernel, Examination& e) {
+  e.found["realtime_priority"] = s.realtime_granted;
   if (!s.realtime_granted) {
-    j["realtime_refusal"] = s.realtime_refusal;
-    advice.push_back(
+    e.found["realtime_refusal"] = s.realtime_refusal;
+    e.advice.push_back(
         "give your user 'rtprio 80' in /etc/security/limits.conf and log in again: forces stutter without real-time "
         "priority");
   }
-  j["memory_locked"] = s.memory_locked;
+  e.found["memory_locked"] = s.memory_locked;
   if (!s.memory_locked)
-    advice.push_back("give your user 'memlock unlimited' in /etc/security/limits.conf: paging makes ticks late");
-  j["processor_sleep_held_off"] = s.idle_states_off;
+    e.advice.push_back("give your user 'memlock unlimited' in /etc/security/limits.conf: paging makes ticks late");
+  e.found["processor_sleep_held_off"] = s.idle_states_off;
   if (!s.idle_states_off)
-    advice.push_back(
+    e.advice.push_back(
         "let your user write /dev/cpu_dma_latency (a udev rule): waking from deep sleep costs up to 0.1 ms");
-  j["loop"] = {{"rate_hz", p.rate_hz},
-               {"ticks", s.ticks},
-               {"lateness", quantiles(s.lateness)},
-               {"missed_by_work", s.missed_by_work},
-               {"missed_by_machine", s.missed_by_machine}};
+  e.found["loop"] = {{"rate_hz", rate_hz},
+                     {"ticks", s.ticks},
+                     {"lateness", quantiles(s.lateness)},
+                     {"missed_by_work", s.missed_by_work},
+                     {"missed_by_machine", s.missed_by_machine}};
   if (s.lateness.quantile_us(0.99) > 350)
-    advice.push_back(
+    e.advice.push_back(
         "a hundredth of the ticks is later than 0.35 ms: close other programs, or take a machine that is not shared");
   if (s.missed_by_machine > 0 && !realtime_kernel)
-    advice.push_back(
+    e.advice.push_back(
         "ticks were lost to the machine: on a machine of your own, the package linux-image-rt-amd64 helps");
+}
 
-  j["devices"] = Json::list();
+void judge_devices(Examination& e) {
+  Json& devices = e.found["devices"] = Json::list();
   for (const FoundDevice& f : find_devices()) {
-    j["devices"].push_back(std::string(name_of(f.model)) + " " + f.info.path + (f.readable ? "" : " (" + f.why + ")"));
+    devices.push_back(std::string(name_of(f.model)) + " " + f.info.path + (f.readable ? "" : " (" + f.why + ")"));
     if (!f.readable)
-      advice.push_back("allow " + f.info.path + " for your user: KERNEL==\"hidraw*\", ATTRS{idVendor}==\"" +
-                       hex4(f.info.vendor) + "\", TAG+=\"uaccess\" in /etc/udev/rules.d/70-osteotome.rules");
+      e.advice.push_back("allow " + f.info.path + " for your user: KERNEL==\"hidraw*\", ATTRS{idVendor}==\"" +
+                         hex4(f.info.vendor) + "\", TAG+=\"uaccess\" in /etc/udev/rules.d/70-osteotome.rules");
   }
+}
+
+void judge_picture_and_sound(Examination& e) {
   std::string opengl = opengl_here();
   if (opengl.empty()) {
     opengl = "none";
-    advice.push_back("there is no OpenGL: install libegl1 and libgl1-mesa-dri");
+    e.advice.push_back("there is no OpenGL: install libegl1 and libgl1-mesa-dri");
   } else if (opengl.find("llvmpipe") != std::string::npos) {
-    advice.push_back("OpenGL is drawn by the processor: a graphics card makes the picture smooth");
+    e.advice.push_back("OpenGL is drawn by the processor: a graphics card makes the picture smooth");
   }
-  j["opengl"] = opengl;
-  const bool display = std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr,
-             audio = fs::exists("/dev/snd");
-  j["display"] = display;
-  j["audio"] = audio;
-  if (!audio) advice.push_back("there is no sound device");
-  j["advice"] = advice;
+  e.found["opengl"] = opengl;
+  e.found["display"] = std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr;
+  const bool audio = fs::exists("/dev/snd");
+  e.found["audio"] = audio;
+  if (!audio) e.advice.push_back("there is no sound device");
+}
+
+void tell_examination(const Examination& e, const LoopStats& s, const utsname& u, bool realtime_kernel, double rate_hz,
+                      std::ostream& out) {
+  const Json& j = e.found;
+  const auto yes = [](bool v) { return v ? "yes" : "NO"; };
+  const auto is = [&](const char* what) { return yes(*j.find(what)->flag()); };
+  const Json& late = *j.find("loop")->find("lateness");
+  const auto us = [&](const char* quantile) { return late.find(quantile)->dump(); };
+  out << processor() << ", " << j.find("cores")->dump() << " cores, " << u.sysname << " " << u.release
+      << (realtime_kernel ? " (real-time)" : "") << ", vectors: " << simd_name(simd()) << '\n'
+      << "real-time priority  " << yes(s.realtime_granted)
+      << (s.realtime_refusal.empty() ? "" : "  (" + s.realtime_refusal + ")") << '\n'
+      << "memory locked       " << yes(s.memory_locked) << '\n'
+      << "deep sleep held off " << yes(s.idle_states_off) << '\n'
+      << "loop at " << format_number(rate_hz) << " Hz    wake-up late p50 " << us("p50_us") << ", p99 " << us("p99_us")
+      << ", p99.9 " << us("p99_9_us") << ", max " << us("max_us") << " us over " << s.ticks
+      << " ticks; periods missed by work " << s.missed_by_work << ", by the machine " << s.missed_by_machine << '\n'
+      << "devices             " << (j.find("devices")->empty() ? "none" : "") << '\n';
+  for (const Json& d : j.find("devices")->items()) out << "  " << *d.text() << '\n';
+  out << "OpenGL              " << *j.find("opengl")->text() << '\n'
+      << "display             " << is("display") << '\n'
+      << "sound               " << is("audio") << '\n';
+  for (const auto& a : e.advice) out << "- " << a << '\n';
+  if (e.advice.empty()) out << "nothing to change\n";
+}
+
+}  // namespace
+
+int DoctorCommand::run(const Params& p, cli::Invocation& io) {
+  if (p.server) return doctor_of_server(p, io);
+  if (p.no_report) throw Error(ExitCode::usage, "--no-report is for --server", "osteo doctor --server ...");
+  for (const std::string* const given :
+       {&p.inbox, &p.cases, &p.rules, &p.metrics, &p.login, &p.allow, &p.tls_ca, &p.tls_certificate, &p.tls_key})
+    if (!given->empty())
+      throw Error(ExitCode::usage, "'" + *given + "' is looked at with --server alone", "osteo doctor --server ...");
+  Examination e;
+  utsname u{};
+  ::uname(&u);
+  e.found["processor"] = processor();
+  e.found["cores"] = std::thread::hardware_concurrency();
+  e.found["kernel"] = std::string(u.sysname) + " " + u.release;
+  const bool realtime_kernel = fs::exists("/sys/kernel/realtime");
+  e.found["kernel_is_realtime"] = realtime_kernel;
+  e.found["vector_instructions"] = simd_name(simd());
+  io.context.progress(0.1, "measuring the loop");
+  const LoopStats s = try_loop(p.rate_hz, p.seconds);
+  judge_loop(s, p.rate_hz, realtime_kernel, e);
+  judge_devices(e);
+  judge_picture_and_sound(e);
+  e.found["advice"] = e.advice;
   io.end_progress();
   if (io.common.json) {
-    io.out << j.dump(2) << '\n';
-    return 0;
+    io.out << e.found.dump(2) << '\n';
+  } else {
+    tell_examination(e, s, u, realtime_kernel, p.rate_hz, io.out);
   }
-  const auto yes = [](bool v) { return v ? "yes" : "NO"; };
-  Json& late = j["loop"]["lateness"];
-  io.out << processor() << ", " << j["cores"] << " cores, " << u.sysname << " " << u.release
-         << (realtime_kernel ? " (real-time)" : "") << ", vectors: " << simd_name(simd()) << '\n'
-         << "real-time priority  " << yes(s.realtime_granted)
-         << (s.realtime_refusal.empty() ? "" : "  (" + s.realtime_refusal + ")") << '\n'
-         << "memory locked       " << yes(s.memory_locked) << '\n'
-         << "deep sleep held off " << yes(s.idle_states_off) << '\n'
-         << "loop at " << format_number(p.rate_hz) << " Hz    wake-up late p50 " << late["p50_us"] << ", p99 "
-         << late["p99_us"] << ", p99.9 " << late["p99_9_us"] << ", max " << late["max_us"] << " us over " << s.ticks
-         << " ticks; periods missed by work " << s.missed_by_work << ", by the machine " << s.missed_by_machine << '\n'
-         << "devices             " << (j["devices"].empty() ? "none" : "") << '\n';
-  for (const Json& d : j["devices"].items()) io.out << "  " << *d.text() << '\n';
-  io.out << "OpenGL              " << opengl << '\n'
-         << "display             " << yes(display) << '\n'
-         << "sound               " << yes(audio) << '\n';
-  for (const auto& a : advice) io.out << "- " << a << '\n';
-  if (advice.empty()) io.out << "nothing to change\n";
   return 0;
 }
 

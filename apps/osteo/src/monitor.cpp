@@ -84,28 +84,83 @@ void write_channel(const fs::path& ns5, std::size_t channel, std::size_t channel
   });
 }
 
+// A folder of an earlier monitor, and nothing else, may be replaced.
+void require_ours(const fs::path& old, bool force) {
+  if (!force) throw Error(ExitCode::cannot_write, "'" + old.string() + "' exists already", "--force replaces it");
+  static const std::set<std::string> ours{"monitor.ns5", "monitor.nev", "events.csv", "channel.wav", "monitor.json"};
+  for (const auto& entry : fs::directory_iterator(old)) {
+    if (!ours.contains(entry.path().filename().string()))
+      throw Error(ExitCode::cannot_write,
+                  "'" + old.string() + "' holds '" + entry.path().filename().string() + "', which is not of a monitor",
+                  "name another folder");
+  }
+}
+
+std::string in_a_row(const std::vector<std::string>& names) {
+  std::string all;
+  for (const std::string& n : names) all += (all.empty() ? "" : ", ") + n;
+  return all;
+}
+
+// By its label; empty: the first.
+std::size_t channel_named(const std::string& name, const std::vector<std::string>& labels) {
+  if (name.empty()) return 0;
+  const auto at = std::find(labels.begin(), labels.end(), name);
+  if (at == labels.end())
+    throw Error(ExitCode::usage, "there is no channel '" + name + "'", "there are: " + in_a_row(labels));
+  return static_cast<std::size_t>(at - labels.begin());
+}
+
+// As the flags say, or as it was set in the session.
+void set_stimulator(MonitorReader& monitor, const MonitorCommand::Params& p, const SessionReader& session,
+                    const Context& context) {
+  std::size_t unreadable = 0;
+  if (p.stimulator_ma > 0) {
+    monitor.stimulate_at(0,
+                         {static_cast<std::uint32_t>(p.hand), p.stimulator_ma, p.pulses_per_s, p.width_ms, p.search});
+  } else {
+    for (const auto& [tick, setting] : stimulator_notes(session, unreadable)) monitor.stimulate_at(tick, setting);
+  }
+  if (unreadable > 0) context.warn(std::to_string(unreadable) + " settings of the stimulator cannot be read: left out");
+}
+
+Json nerves_json(const MonitorReader& monitor) {
+  Json nerves = Json::list();
+  const auto& courses = monitor.wiring().courses;
+  for (std::size_t n = 0; n < courses.size(); ++n) {
+    double whole = 1;
+    for (std::size_t point = 0; point < courses[n].points.size(); ++point)
+      whole = std::min(whole, monitor.model().integrity(n, point));
+    nerves.push_back({{"nerve", courses[n].name},
+                      {"length_mm", std::round(10 * (courses[n].points.front().to_distal_mm)) / 10},
+                      {"least_integrity", whole}});
+  }
+  return nerves;
+}
+
+void tell_monitor(const Json& j, const MonitorWiring& wiring, const std::string& folder, std::ostream& err) {
+  const auto count = [&](const char* kind) {
+    const Json* const n = j.find("events")->find(kind);
+    return n == nullptr ? std::string("0") : n->dump();
+  };
+  err << count("burst") << " bursts, " << count("train") << " trains, " << count("stimulus") << " stimuli, "
+      << count("response") << " of them answered: " << folder << '\n';
+  for (const Json& n : j.find("nerves")->items())
+    err << *n.find("nerve")->text() << ": " << std::lround(100 * n.find("least_integrity")->number().value_or(0))
+        << " % whole\n";
+  for (const std::string& name : wiring.left_out) err << "not in the case, so not heard: " << name << '\n';
+  err << "illustrative, not clinical (docs/monitor.md)\n";
+}
+
 }  // namespace
 
 int MonitorCommand::run(const Params& p, cli::Invocation& io) {
   if (p.out.empty()) throw Error(ExitCode::usage, "osteo monitor needs a folder for what it writes", "add -o FOLDER");
-  const auto refuse = [&](const char* name, bool without) {
+  for (const char* const name : {"pulses_per_s", "width_ms", "hand", "search"}) {
     FieldRef field{{name, ""}, static_cast<bool*>(nullptr)};
-    if (io.given.contains(name) && without)
+    if (io.given.contains(name) && p.stimulator_ma <= 0)
       throw Error(ExitCode::usage, field.flag() + " has no effect without --stimulator-ma", "leave it out");
-  };
-  for (const char* const name : {"pulses_per_s", "width_ms", "hand", "search"}) refuse(name, p.stimulator_ma <= 0);
-  const auto may_replace = [&](const fs::path& old) {
-    if (!io.common.force)
-      throw Error(ExitCode::cannot_write, "'" + old.string() + "' exists already", "--force replaces it");
-    static const std::set<std::string> ours{"monitor.ns5", "monitor.nev", "events.csv", "channel.wav", "monitor.json"};
-    for (const auto& entry : fs::directory_iterator(old)) {
-      if (!ours.contains(entry.path().filename().string()))
-        throw Error(
-            ExitCode::cannot_write,
-            "'" + old.string() + "' holds '" + entry.path().filename().string() + "', which is not of a monitor",
-            "name another folder");
-    }
-  };
+  }
   const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
   const SessionReader session(folder.stream(), Damage::keep);
   const SessionOutline& outline = session.outline();
@@ -122,35 +177,16 @@ int MonitorCommand::run(const Params& p, cli::Invocation& io) {
   options.heat = p.heat;
   MonitorReader monitor(options, anatomy.structures.get(), outline.header.rate_hz);
   const MonitorWiring& wiring = monitor.wiring();
-  if (wiring.courses.empty()) {
-    std::string names;
-    for (const std::string& n : wiring.left_out) names += (names.empty() ? "" : ", ") + n;
-    throw Error(ExitCode::usage, "the case lists none of the nerves that the monitor knows (" + names + ")",
+  if (wiring.courses.empty())
+    throw Error(ExitCode::usage,
+                "the case lists none of the nerves that the monitor knows (" + in_a_row(wiring.left_out) + ")",
                 "prepare it with --structures and --names, like '6=facial nerve'");
-  }
-  std::size_t channel = 0;
-  if (!p.channel.empty()) {
-    const std::vector<std::string> labels = wiring.labels();
-    const auto at = std::find(labels.begin(), labels.end(), p.channel);
-    if (at == labels.end()) {
-      std::string names;
-      for (const std::string& l : labels) names += (names.empty() ? "" : ", ") + l;
-      throw Error(ExitCode::usage, "there is no channel '" + p.channel + "'", "there are: " + names);
-    }
-    channel = static_cast<std::size_t>(at - labels.begin());
-  }
-  std::size_t unreadable = 0;
-  if (p.stimulator_ma > 0) {
-    monitor.stimulate_at(0,
-                         {static_cast<std::uint32_t>(p.hand), p.stimulator_ma, p.pulses_per_s, p.width_ms, p.search});
-  } else {
-    for (const auto& [tick, setting] : stimulator_notes(session, unreadable)) monitor.stimulate_at(tick, setting);
-  }
-  if (unreadable > 0)
-    io.context.warn(std::to_string(unreadable) + " settings of the stimulator cannot be read: left out");
+  const std::size_t channel = channel_named(p.channel, wiring.labels());
+  set_stimulator(monitor, p, session, io.context);
 
   Json j;
   ReplayResult r;
+  const auto may_replace = [&](const fs::path& old) { require_ours(old, io.common.force); };
   write_folder_atomically(p.out, may_replace, [&](const fs::path& to) {
     BlackrockFiles files(to, "monitor", wiring.labels(), options.setup.constants);
     EventTable table(to / "events.csv", wiring);
@@ -174,34 +210,14 @@ int MonitorCommand::run(const Params& p, cli::Invocation& io) {
              {"heat", p.heat},
              {"ticks", r.ticks_repeated},
              {"same_as_recorded", r.identical}};
-    j["nerves"] = Json::list();
-    for (std::size_t n = 0; n < wiring.courses.size(); ++n) {
-      double whole = 1;
-      for (std::size_t point = 0; point < wiring.courses[n].points.size(); ++point)
-        whole = std::min(whole, monitor.model().integrity(n, point));
-      j["nerves"].push_back({{"nerve", wiring.courses[n].name},
-                             {"length_mm", std::round(10 * (wiring.courses[n].points.front().to_distal_mm)) / 10},
-                             {"least_integrity", whole}});
-    }
+    j["nerves"] = nerves_json(monitor);
   });
   io.end_progress();
   if (io.common.json) io.out << j.dump(2) << '\n';
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
   if (!r.identical)
     io.err << "session: it did not come out as it was recorded (" << r.difference << "): neither may its monitor\n";
-  if (!io.common.quiet) {
-    const auto count = [&](const char* kind) {
-      const Json* const n = j.find("events")->find(kind);
-      return n == nullptr ? std::string("0") : n->dump();
-    };
-    io.err << count("burst") << " bursts, " << count("train") << " trains, " << count("stimulus") << " stimuli, "
-           << count("response") << " of them answered: " << p.out << '\n';
-    for (const Json& n : j.find("nerves")->items())
-      io.err << *n.find("nerve")->text() << ": " << std::lround(100 * n.find("least_integrity")->number().value_or(0))
-             << " % whole\n";
-    for (const std::string& name : wiring.left_out) io.err << "not in the case, so not heard: " << name << '\n';
-    io.err << "illustrative, not clinical (docs/monitor.md)\n";
-  }
+  if (!io.common.quiet) tell_monitor(j, wiring, p.out, io.err);
   return static_cast<int>(!outline.gaps.empty() ? ExitCode::partial
                           : outline.damaged()   ? ExitCode::corrupt
                                                 : ExitCode::ok);

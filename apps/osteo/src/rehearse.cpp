@@ -11,6 +11,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/data/json_vec.h"
 #include "osteo/display/view/world_view.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/network/wire/rehearsal_stream.h"
@@ -102,6 +103,245 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
   if (p.device != Hand::igtl) refuse("tracker", "without --device igtl", "add it, or leave it out");
 }
 
+// A session without a window: a scripted hand, or one that is tracked, from the case to its summary.
+class HeadlessSession {
+ public:
+  HeadlessSession(const RehearseCommand::Params& p, cli::Invocation& io) : p_(p), io_(io) {}
+  int run(int tool) {
+    open_case();
+    World world = first_world();
+    read_script(world, tool);
+    begin_folder();
+    set_options();
+    const std::vector<StreamTarget> targets = stream_targets(p_.stream);
+    std::vector<std::unique_ptr<Device>> devices = open_devices();
+    rehearsal_ = std::make_unique<Rehearsal>(std::move(world), std::move(devices), options_, io_.context);
+    if (!targets.empty()) open_stream(targets);
+    draw("before.png");
+    note_camera();
+    drill();
+    const std::string summary = end_session();
+    tell_what_failed();
+    if (s_.interrupted) {  // closed all the same; what takes time is left out
+      if (!io_.common.quiet)
+        io_.err << "stopped after " << s_.ticks << " ticks; session: " << session_.folder.string()
+                << "  (summary.json)\n";
+      io_.context.check_cancelled();
+    }
+    write_pictures();
+    if (!io_.common.quiet) tell_result();
+    if (io_.common.json) io_.out << summary;
+    return static_cast<int>(s_.refused() || !s_.gaps.empty() ? ExitCode::partial : ExitCode::ok);
+  }
+
+ private:
+  [[nodiscard]] bool tracked() const { return p_.device == Hand::igtl; }
+  [[nodiscard]] std::string seconds_text(std::uint64_t ticks) const {
+    return format_number(static_cast<double>(ticks) / p_.rate_hz);
+  }
+
+  void open_case() {
+    case_ = load_case(io_.arguments[0]);
+    approval_ = approval_of(case_.folder);
+    if (p_.require_approved) require_approval(approval_, case_.folder);
+    io_.context.progress(0, "loading");
+    options_.haptics.params.contact.method = p_.contact;
+    options_.haptics.device = SpringHand::traits();
+    apply_haptic_settings(case_.folder, p_.settings, options_.haptics);
+    options_.anatomy = anatomy_of(case_, options_.haptics, io_.context);
+  }
+
+  [[nodiscard]] World first_world() const {
+    return p_.resume.empty()
+               ? world_of(case_, options_.anatomy)
+               : world_at_end(open_session_folder(p_.resume, case_.folder), case_, options_.anatomy, io_.context);
+  }
+
+  void read_script(const World& world, int tool) {
+    script_ = p_.script.empty() ? make_default_script(world, p_.side == Side::left, tool, p_.seconds)
+                                : load_script(p_.script, planned_cuts_of(case_.folder));
+    doubts_ = doubts_about(script_, world, p_.dust);
+    for (const std::string& d : doubts_) io_.context.warn(d);
+    if (!p_.dust && (p_.position != Posture::supine || p_.head_turned_deg != 0))
+      io_.context.warn("how the patient lies moves dust and water alone, and there are none: add --dust");
+  }
+
+  void begin_folder() {
+    session_ = create_session_folder(p_.out, case_.folder, p_.resume);
+    // Before and after are seen from where the drill came, around the middle of its strokes.
+    Vec3 site{};
+    for (const auto& w : script_.waypoints) site += w.at_mm / static_cast<double>(script_.waypoints.size());
+    const Vec3 eye = normalized(script_.axis + Vec3{0, -0.2, 0.15});
+    const Script::Camera camera = script_.camera.value_or(Script::Camera{site, 32, eye});
+    view_ = {camera.centre_mm, camera.radius_mm, camera.eye, 900, 700};
+    write_file(session_.folder / "strokes.json", p_.script.empty() ? script_json(script_) : read_text(p_.script));
+  }
+
+  void set_options() {
+    options_.rate_hz = p_.rate_hz;
+    options_.session_file = session_.stream();
+    options_.follow = {true, p_.pieces, p_.dust, p_.heat};
+    options_.actions = first_actions(p_);
+    for (SceneAction& a : actions_of(script_, p_.rate_hz)) options_.actions.push_back(a);
+    options_.soft = soft_tissue_of(case_.folder);
+    options_.haptics.more_devices.assign(script_.more_hands.size(), SpringHand::traits());
+    options_.heard = [this](const std::string& kind, const std::string& json) {
+      if (feed_ != nullptr) feed_->note(kind, json);
+    };
+  }
+
+  [[nodiscard]] std::vector<std::unique_ptr<Device>> open_devices() {
+    std::vector<std::unique_ptr<Device>> devices = devices_of(script_, p_.rate_hz);
+    if (tracked()) {
+      tracker_ = std::make_shared<TrackedLink>(tracker_address(p_.tracker));
+      const HandGoal start{script_.waypoints.front().at_mm, to_floats(script_.axis), 0,
+                           static_cast<std::uint8_t>(script_.tool)};
+      devices.front() = std::make_unique<TrackedHand>(tracker_, start, nullptr);
+    }
+    return devices;
+  }
+
+  void open_stream(const std::vector<StreamTarget>& targets) {
+    stream_ = std::make_unique<RehearsalStream>(*rehearsal_, targets, nullptr, monitor_options_of(p_.monitor_setup));
+    feed_ = &stream_->feed();
+    if (!io_.common.quiet) {
+      for (const std::string& line : stream_->feed().told()) io_.err << line << std::endl;
+    }
+    if (!stream_->invitation().empty()) io_.err << stream_->invitation() << std::endl;
+  }
+
+  void draw(const char* name) {
+    rehearsal_->look([&](const World& w, SceneReaders& f) {
+      save_picture(draw_world(w, f, rehearsal_->structures(), view_, rehearsal_->soft()), session_.folder / name);
+    });
+  }
+
+  // A script that says from where it is looked at tells the session, as the window does.
+  void note_camera() {
+    if (!script_.camera) return;
+    const Vec3 eye_mm = view_.centre_mm + view_.eye * (view_.radius_mm / 0.24);
+    rehearsal_->note(
+        "camera",
+        Json{{"eye_mm", json_of(eye_mm)}, {"target_mm", json_of(view_.centre_mm)}, {"view_angle_deg", 30}}.dump());
+  }
+
+  void drill() {
+    if (p_.fast) {
+      s_ = rehearsal_->run_to_end(io_.context);
+      return;
+    }
+    rehearsal_->start();
+    // A script whose strokes nobody records is worth nothing: a full disk ends it at once.
+    bool told_behind = false, told_lost = false;
+    while (rehearsal_->running() && !rehearsal_->recording().failure) {
+      const double t = static_cast<double>(rehearsal_->latest().tick) / p_.rate_hz;
+      if (tracked() && t >= p_.seconds) break;
+      try {
+        io_.context.progress(0.1 + 0.8 * std::min(1.0, t / script_.seconds()), "drilling");
+      } catch (const Error&) {
+        break;
+      }
+      const std::string trouble = rehearsal_->trouble();
+      if (!trouble.empty() && !std::exchange(rehearsal_->recording().ticks_lost > 0 ? told_lost : told_behind, true))
+        io_.context.warn(trouble);
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    const bool interrupted = rehearsal_->running() && io_.context.cancelled();
+    s_ = rehearsal_->stop();
+    if (stream_) {
+      stream_->feed().end();
+      if (!io_.common.quiet) {
+        for (const std::string& line : stream_->feed().told()) io_.err << line << '\n';
+      }
+    }
+    if (tracker_ && !io_.common.quiet)
+      io_.err << "tracker: " << tracker_->poses() << " poses, " << tracker_->refused() << " refused\n";
+    s_.interrupted = interrupted;
+  }
+
+  // Writes its summary, before what takes time and may be interrupted or find the disk full.
+  std::string end_session() {
+    for (const std::string& w : s_.warnings) io_.context.warn(w);
+    s_.warnings.insert(s_.warnings.begin(), doubts_.begin(), doubts_.end());
+    std::string summary = write_summary(
+        session_, s_, p_.rate_hz, instrument_library()[static_cast<std::size_t>(script_.tool)].name, options_.anatomy);
+    io_.end_progress();
+    return summary;
+  }
+
+  // Told even when quiet: the exit code is about them.
+  void tell_what_failed() const {
+    for (const ActionNote& n : s_.notes) {
+      if (n.done && io_.common.quiet) continue;
+      io_.err << (n.done ? "done otherwise" : "NOT DONE") << " at " << seconds_text(n.tick) << " s: " << name_of(n.kind)
+              << ": " << n.why << (n.times > 1 ? " (" + std::to_string(n.times) + " times)" : "") << '\n';
+    }
+    for (const StructureCutEvent& e : s_.structure_cuts) {
+      if (options_.anatomy.structures)
+        io_.err << "INJURED at " << seconds_text(e.tick) << " s: the saw cut through "
+                << told_structures_cut(*options_.anatomy.structures, std::span(&e.cut, 1)) << '\n';
+    }
+    if (s_.unusable_poses > 0)
+      io_.err << "the pose could not be used for " << seconds_text(s_.unusable_poses)
+              << " s: not finite, or beyond all reach\n";
+    if (!s_.gaps.empty())
+      io_.err << "NOT RECORDED: " << s_.ticks_not_recorded << " ticks in " << s_.gaps.size()
+              << " gaps, since the disk did not keep up; what bone became is recorded, and a replay repeats what comes "
+                 "before the first\n";
+  }
+
+  void write_pictures() {
+    draw("after.png");
+    TriMesh after;
+    rehearsal_->look([&](const World& w, SceneReaders&) { after = surface_of(w, io_.context); });
+    save_surface(after, session_.folder / "surface.ply");
+    io_.end_progress();
+  }
+
+  void tell_result() {
+    io_.err << "case: " << approval_.words() << '\n' << told_hardness(options_.anatomy) << '\n';
+    io_.err << "drilled " << s_.ticks << " ticks; removed " << format_number(std::round(s_.removed_mm3 * 10) / 10)
+            << " mm3\n";
+    for (const SoftTissue::Facts& f : s_.tissue)
+      io_.err << "soft tissue '" << f.name << "': " << format_number(std::round(f.cut_off_mm3 * 10) / 10)
+              << " mm3 cut off\n";
+    rehearsal_->look([&](const World&, SceneReaders& readers) {
+      if (!readers.heat) return;
+      for (const std::string& line : told(*readers.heat, rehearsal_->structures())) io_.err << line << '\n';
+    });
+    if (s_.ticks_not_followed > 0)
+      io_.err << "surface, pieces and dust missed " << s_.ticks_not_followed
+              << " ticks, since the machine did not keep up; they caught up from the bone itself\n";
+    if (s_.loop) tell_loop(*s_.loop);
+    io_.err << "session: " << session_.folder.string()
+            << "  (before.png, after.png, surface.ply, summary.json)\n  again: osteo replay "
+            << session_.folder.string() << '\n';
+  }
+
+  void tell_loop(const LoopStats& l) const {
+    io_.err << "servo: work p50 " << std::lround(l.work.quantile_us(0.5)) << " us, p99.9 "
+            << std::lround(l.work.quantile_us(0.999)) << " us; wake-up late p99 "
+            << std::lround(l.lateness.quantile_us(0.99)) << " us; periods missed by our work " << l.missed_by_work
+            << ", by the machine " << l.missed_by_machine << "; real-time priority "
+            << (l.realtime_granted ? "granted" : "refused (" + l.realtime_refusal + ")") << '\n';
+  }
+
+  const RehearseCommand::Params& p_;
+  cli::Invocation& io_;
+  Case case_;
+  ApprovalNow approval_;
+  RehearsalOptions options_;
+  Script script_;
+  std::vector<std::string> doubts_;
+  SessionFolder session_;
+  WorldPicture view_;
+  std::shared_ptr<TrackedLink> tracker_;  // null: no hand is tracked
+  StreamFeed* feed_ = nullptr;            // set before the first note comes
+  std::unique_ptr<Rehearsal> rehearsal_;
+  std::unique_ptr<RehearsalStream> stream_;  // null: to nobody
+  RehearsalSummary s_;
+};
+
 }  // namespace
 
 int RehearseCommand::run(const Params& p, cli::Invocation& io) {
@@ -118,174 +358,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
     return 0;
   }
   if (!p.headless) return open_window(p, io);
-  const Case the_case = load_case(io.arguments[0]);
-  const ApprovalNow approval = approval_of(the_case.folder);
-  if (p.require_approved) require_approval(approval, the_case.folder);
-  io.context.progress(0, "loading");
-  RehearsalOptions options;
-  options.haptics.params.contact.method = p.contact;
-  options.haptics.device = SpringHand::traits();
-  apply_haptic_settings(the_case.folder, p.settings, options.haptics);
-  options.anatomy = anatomy_of(the_case, options.haptics, io.context);
-  World world = p.resume.empty() ? world_of(the_case, options.anatomy)
-                                 : world_at_end(open_session_folder(p.resume, the_case.folder), the_case,
-                                                options.anatomy, io.context);
-  const Script script = p.script.empty() ? make_default_script(world, p.side == Side::left, tool, p.seconds)
-                                         : load_script(p.script, planned_cuts_of(the_case.folder));
-  const std::vector<std::string> doubts = doubts_about(script, world, p.dust);
-  for (const std::string& d : doubts) io.context.warn(d);
-  if (!p.dust && (p.position != Posture::supine || p.head_turned_deg != 0))
-    io.context.warn("how the patient lies moves dust and water alone, and there are none: add --dust");
-  const SessionFolder session = create_session_folder(p.out, the_case.folder, p.resume);
-  const fs::path& folder = session.folder;
-
-  // Before and after are seen from where the drill came, around the middle of its strokes.
-  Vec3 site{};
-  for (const auto& w : script.waypoints) site += w.at_mm / static_cast<double>(script.waypoints.size());
-  const Vec3 eye = normalized(script.axis + Vec3{0, -0.2, 0.15});
-  const Script::Camera camera = script.camera.value_or(Script::Camera{site, 32, eye});
-  const WorldPicture view{camera.centre_mm, camera.radius_mm, camera.eye, 900, 700};
-  write_file(folder / "strokes.json", p.script.empty() ? script_json(script) : read_text(p.script));
-
-  options.rate_hz = p.rate_hz;
-  options.session_file = session.stream();
-  options.follow = {true, p.pieces, p.dust, p.heat};
-  options.actions = first_actions(p);
-  for (SceneAction& a : actions_of(script, p.rate_hz)) options.actions.push_back(a);
-  options.soft = soft_tissue_of(the_case.folder);
-  options.haptics.more_devices.assign(script.more_hands.size(), SpringHand::traits());
-  const bool tracked = p.device == Hand::igtl;
-  std::vector<std::unique_ptr<Device>> devices = devices_of(script, p.rate_hz);
-  std::shared_ptr<TrackedLink> tracker;
-  if (tracked) {
-    tracker = std::make_shared<TrackedLink>(tracker_address(p.tracker));
-    const HandGoal start{script.waypoints.front().at_mm, to_floats(script.axis), 0,
-                         static_cast<std::uint8_t>(script.tool)};
-    devices.front() = std::make_unique<TrackedHand>(tracker, start, nullptr);
-  }
-  const std::vector<StreamTarget> targets = stream_targets(p.stream);
-  StreamFeed* feed = nullptr;  // set before the first note comes
-  options.heard = [&](const std::string& kind, const std::string& json) {
-    if (feed != nullptr) feed->note(kind, json);
-  };
-  Rehearsal rehearsal(std::move(world), std::move(devices), options, io.context);
-  std::unique_ptr<RehearsalStream> stream;
-  if (!targets.empty()) {
-    stream = std::make_unique<RehearsalStream>(rehearsal, targets, nullptr, monitor_options_of(p.monitor_setup));
-    feed = &stream->feed();
-    if (!io.common.quiet) {
-      for (const std::string& line : stream->feed().told()) io.err << line << std::endl;
-    }
-    if (!stream->invitation().empty()) io.err << stream->invitation() << std::endl;
-  }
-  const auto draw = [&](const char* name) {
-    rehearsal.look([&](const World& w, SceneReaders& f) {
-      save_picture(draw_world(w, f, rehearsal.structures(), view, rehearsal.soft()), folder / name);
-    });
-  };
-  draw("before.png");
-  // A script that says from where it is looked at tells the session, as the window does.
-  if (script.camera) {
-    const Vec3 eye_mm = view.centre_mm + view.eye * (view.radius_mm / 0.24);
-    const auto triple = [](Vec3 v) { return Json{v.x, v.y, v.z}; };
-    rehearsal.note(
-        "camera",
-        Json{{"eye_mm", triple(eye_mm)}, {"target_mm", triple(view.centre_mm)}, {"view_angle_deg", 30}}.dump());
-  }
-  RehearsalSummary s;
-  if (p.fast) {
-    s = rehearsal.run_to_end(io.context);
-  } else {
-    rehearsal.start();
-    // A script whose strokes nobody records is worth nothing: a full disk ends it at once.
-    bool told_behind = false, told_lost = false;
-    while (rehearsal.running() && !rehearsal.recording().failure) {
-      const double t = static_cast<double>(rehearsal.latest().tick) / p.rate_hz;
-      if (tracked && t >= p.seconds) break;
-      try {
-        io.context.progress(0.1 + 0.8 * std::min(1.0, t / script.seconds()), "drilling");
-      } catch (const Error&) {
-        break;
-      }
-      const std::string trouble = rehearsal.trouble();
-      if (!trouble.empty() && !std::exchange(rehearsal.recording().ticks_lost > 0 ? told_lost : told_behind, true))
-        io.context.warn(trouble);
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
-    const bool interrupted = rehearsal.running() && io.context.cancelled();
-    s = rehearsal.stop();
-    if (stream) {
-      stream->feed().end();
-      if (!io.common.quiet) {
-        for (const std::string& line : stream->feed().told()) io.err << line << '\n';
-      }
-    }
-    if (tracker && !io.common.quiet)
-      io.err << "tracker: " << tracker->poses() << " poses, " << tracker->refused() << " refused\n";
-    s.interrupted = interrupted;
-  }
-  for (const std::string& w : s.warnings) io.context.warn(w);
-  s.warnings.insert(s.warnings.begin(), doubts.begin(), doubts.end());
-  // Before what takes time and may be interrupted or find the disk full.
-  const std::string summary = write_summary(
-      session, s, p.rate_hz, instrument_library()[static_cast<std::size_t>(script.tool)].name, options.anatomy);
-  io.end_progress();
-  // Told even when quiet: the exit code is about them.
-  for (const ActionNote& n : s.notes) {
-    if (n.done && io.common.quiet) continue;
-    io.err << (n.done ? "done otherwise" : "NOT DONE") << " at "
-           << format_number(static_cast<double>(n.tick) / p.rate_hz) << " s: " << name_of(n.kind) << ": " << n.why
-           << (n.times > 1 ? " (" + std::to_string(n.times) + " times)" : "") << '\n';
-  }
-  for (const StructureCutEvent& e : s.structure_cuts) {
-    if (options.anatomy.structures)
-      io.err << "INJURED at " << format_number(static_cast<double>(e.tick) / p.rate_hz) << " s: the saw cut through "
-             << told_structures_cut(*options.anatomy.structures, std::span(&e.cut, 1)) << '\n';
-  }
-  if (s.unusable_poses > 0)
-    io.err << "the pose could not be used for " << format_number(static_cast<double>(s.unusable_poses) / p.rate_hz)
-           << " s: not finite, or beyond all reach\n";
-  if (!s.gaps.empty())
-    io.err << "NOT RECORDED: " << s.ticks_not_recorded << " ticks in " << s.gaps.size()
-           << " gaps, since the disk did not keep up; what bone became is recorded, and a replay repeats what comes "
-              "before the first\n";
-  if (s.interrupted) {  // closed all the same; what takes time is left out
-    if (!io.common.quiet)
-      io.err << "stopped after " << s.ticks << " ticks; session: " << folder.string() << "  (summary.json)\n";
-    io.context.check_cancelled();
-  }
-  TriMesh after;
-  draw("after.png");
-  rehearsal.look([&](const World& w, SceneReaders&) { after = surface_of(w, io.context); });
-  save_surface(after, folder / "surface.ply");
-  io.end_progress();
-  if (!io.common.quiet) {
-    io.err << "case: " << approval.words() << '\n' << told_hardness(options.anatomy) << '\n';
-    io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10)
-           << " mm3\n";
-    for (const SoftTissue::Facts& f : s.tissue)
-      io.err << "soft tissue '" << f.name << "': " << format_number(std::round(f.cut_off_mm3 * 10) / 10)
-             << " mm3 cut off\n";
-    rehearsal.look([&](const World&, SceneReaders& readers) {
-      if (!readers.heat) return;
-      for (const std::string& line : told(*readers.heat, rehearsal.structures())) io.err << line << '\n';
-    });
-    if (s.ticks_not_followed > 0)
-      io.err << "surface, pieces and dust missed " << s.ticks_not_followed
-             << " ticks, since the machine did not keep up; they caught up from the bone itself\n";
-    if (s.loop) {
-      const LoopStats& l = *s.loop;
-      io.err << "servo: work p50 " << std::lround(l.work.quantile_us(0.5)) << " us, p99.9 "
-             << std::lround(l.work.quantile_us(0.999)) << " us; wake-up late p99 "
-             << std::lround(l.lateness.quantile_us(0.99)) << " us; periods missed by our work " << l.missed_by_work
-             << ", by the machine " << l.missed_by_machine << "; real-time priority "
-             << (l.realtime_granted ? "granted" : "refused (" + l.realtime_refusal + ")") << '\n';
-    }
-    io.err << "session: " << folder.string()
-           << "  (before.png, after.png, surface.ply, summary.json)\n  again: osteo replay " << folder.string() << '\n';
-  }
-  if (io.common.json) io.out << summary;
-  return static_cast<int>(s.refused() || !s.gaps.empty() ? ExitCode::partial : ExitCode::ok);
+  return HeadlessSession(p, io).run(tool);
 }
 
 }  // namespace osteo

@@ -101,6 +101,82 @@ std::vector<double> volumes_mm3(const TetMesh& mesh) {
   return volume;
 }
 
+// Of each tetrahedron: by the CT, but in the problem's regions their own.
+struct Graded {
+  std::vector<Material> materials;
+  std::size_t of_regions = 0, weightless = 0;  // weightless: of those, without a density
+};
+
+Graded graded_materials(const TissueProblem& problem, const BoneStiffness& bone, std::size_t tets) {
+  Graded g;
+  g.materials.resize(tets);
+  for (std::size_t t = 0; t < tets; ++t) {
+    const Material& own = problem.materials[problem.materials.size() == 1 ? 0 : t];
+    const bool region = !problem.in_region.empty() && problem.in_region[t] != 0;
+    g.of_regions += region ? 1 : 0;
+    g.materials[t] = region ? own : Material{bone.young_mpa[t], own.poisson, bone.density_kg_m3[t]};
+    g.weightless += region && own.density_kg_m3 == 0 ? 1 : 0;
+  }
+  return g;
+}
+
+// Sums over the volume.
+struct Sums {
+  double young = 0, hu = 0;  // times mm3
+  double kg = 0;
+  Json young_by_volume;
+};
+
+Sums sums_of(const std::vector<double>& volume, const std::vector<Material>& materials, const BoneStiffness& bone) {
+  Sums s;
+  std::vector<double> young(volume.size());
+  for (std::size_t t = 0; t < volume.size(); ++t) {
+    s.young += volume[t] * materials[t].young_mpa;
+    young[t] = materials[t].young_mpa;
+    s.hu += volume[t] * static_cast<double>(bone.hu[t]);
+    s.kg += volume[t] * materials[t].density_kg_m3 * 1e-9;
+  }
+  const std::vector<double> shares{0, 0.05, 0.25, 0.5, 0.75, 0.95, 1}, q = quantiles(young, volume, shares);
+  for (std::size_t i = 0; i < shares.size(); ++i)
+    s.young_by_volume.push_back({{"share", shares[i]}, {"young_mpa", q[i]}});
+  return s;
+}
+
+// Young's modulus at each point: the mean of its tetrahedra by volume.
+TetMesh map_of(const TetMesh& mesh, const std::vector<double>& volume, const std::vector<Material>& materials) {
+  std::vector<double> at_point(mesh.points_mm.size()), shared(mesh.points_mm.size());
+  for (std::size_t t = 0; t < volume.size(); ++t) {
+    for (const std::uint32_t v : mesh.tets[t]) {
+      at_point[v] += volume[t] * materials[t].young_mpa;
+      shared[v] += volume[t];
+    }
+  }
+  TetMesh map = mesh;
+  map.values_name = "young_mpa";
+  map.values.resize(at_point.size());
+  for (std::size_t v = 0; v < at_point.size(); ++v)
+    map.values[v] = shared[v] > 0 ? static_cast<float>(at_point[v] / shared[v]) : 0.0F;
+  return map;
+}
+
+void warn_of_doubts(const BoneDensity& density, const BoneStiffness& bone, const Context& context) {
+  const BoneDensity guess;
+  if (density.per_1000_hu == guess.per_1000_hu && density.at_0_hu == guess.at_0_hu)
+    context.warn("density by a guess of " + format_number(guess.per_1000_hu) +
+                 " g/cm3 at 1000 HU, which may be 15 % off (stiffness 20 to 40 %): give --density-per-1000-hu and "
+                 "--density-at-0-hu of the scanner's calibration phantom");
+  const auto limited = [&](double share, const char* than, double limit) {
+    if (share > 0.01)
+      context.warn(format_number(std::round(1000 * share) / 10) + " % of the volume came out " + than + ' ' +
+                   format_number(limit) + " MPa and was set to it");
+  };
+  limited(bone.share_below, "softer than", density.least_mpa);
+  limited(bone.share_above, "stiffer than", density.most_mpa);
+  if (bone.share_outside > 0)
+    context.warn(format_number(std::round(1e5 * bone.share_outside) / 1e3) +
+                 " % of the volume lies outside of the CT: the values at its border were taken there");
+}
+
 }  // namespace
 
 StageInfo BoneStiffnessStage::info() {
@@ -158,59 +234,36 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
                 "leave \"law\" out: linear");
   const BoneStiffness bone =
       bone_stiffness(mesh, std::get<Image>(inputs[1]), p.density, p.step_percent / 100, context.sub(0, 0.7));
-  std::vector<Material> materials(mesh.tets.size());
-  std::size_t of_regions = 0, weightless = 0;
-  for (std::size_t t = 0; t < materials.size(); ++t) {
-    const Material& own = problem.materials[problem.materials.size() == 1 ? 0 : t];
-    const bool region = !problem.in_region.empty() && problem.in_region[t] != 0;
-    of_regions += region ? 1 : 0;
-    materials[t] = region ? own : Material{bone.young_mpa[t], own.poisson, bone.density_kg_m3[t]};
-    weightless += region && own.density_kg_m3 == 0 ? 1 : 0;
-  }
+  const Graded graded = graded_materials(problem, bone, mesh.tets.size());
   const double pull = length(problem.loads[n].gravity_m_s2);
-  if (weightless > 0 && pull > 0)
+  if (graded.weightless > 0 && pull > 0)
     throw Error(ExitCode::usage,
-                std::to_string(weightless) +
+                std::to_string(graded.weightless) +
                     " tetrahedra of the problem's regions have no \"density_kg_m3\", and the load has gravity",
                 "give each region one; titanium has 4430");
-  problem.materials = materials;
+  problem.materials = graded.materials;
   const Elements elements = elements_for(LawChoice::automatic, p.order, problem, mesh);
-  const FemBody body(points_of(mesh), tets_of(mesh), materials, elements.law, elements.order);
+  const FemBody body(points_of(mesh), tets_of(mesh), graded.materials, elements.law, elements.order);
   context.progress(0.8, "writing the problem");
 
   const std::vector<double> volume = volumes_mm3(mesh);
-  std::vector<double> at_point(mesh.points_mm.size()), shared(mesh.points_mm.size());
-  std::vector<double> young(mesh.tets.size());
-  double sum = 0, sum_hu = 0, kg = 0;
-  for (std::size_t t = 0; t < volume.size(); ++t) {
-    sum += volume[t] * materials[t].young_mpa;
-    young[t] = materials[t].young_mpa;
-    sum_hu += volume[t] * static_cast<double>(bone.hu[t]);
-    kg += volume[t] * materials[t].density_kg_m3 * 1e-9;
-    for (const std::uint32_t v : mesh.tets[t]) {
-      at_point[v] += volume[t] * materials[t].young_mpa;
-      shared[v] += volume[t];
-    }
-  }
-  const std::vector<double> shares{0, 0.05, 0.25, 0.5, 0.75, 0.95, 1}, q = quantiles(young, volume, shares);
-  Json of_volume;
-  for (std::size_t i = 0; i < shares.size(); ++i) of_volume.push_back({{"share", shares[i]}, {"young_mpa", q[i]}});
+  Sums sums = sums_of(volume, graded.materials, bone);
   Json j{{"law", EnumNames<StiffnessLaw>::values[static_cast<std::size_t>(p.density.law)]},
          {"density_per_1000_hu", p.density.per_1000_hu},
          {"density_at_0_hu", p.density.at_0_hu},
          {"ash_correction", p.density.ash_correction},
          {"tetrahedra", mesh.tets.size()},
-         {"tetrahedra_of_regions", of_regions},
+         {"tetrahedra_of_regions", graded.of_regions},
          {"loose_parts_left_out", held.loose_parts},
          {"loose_mm3_left_out", held.loose_mm3},
          {"materials", bone.materials},
          {"volume_mm3", bone.volume_mm3},
-         {"mass_g", 1000 * kg},
+         {"mass_g", 1000 * sums.kg},
          {"weight", EnumNames<BoneWeight>::values[static_cast<std::size_t>(p.density.weight)]},
-         {"gravity_n", pull * kg},
-         {"mean_hu", sum_hu / bone.volume_mm3},
-         {"mean_young_mpa", sum / bone.volume_mm3},
-         {"young_mpa_by_volume", std::move(of_volume)},
+         {"gravity_n", pull * sums.kg},
+         {"mean_hu", sums.hu / bone.volume_mm3},
+         {"mean_young_mpa", sums.young / bone.volume_mm3},
+         {"young_mpa_by_volume", std::move(sums.young_by_volume)},
          {"least_mpa", p.density.least_mpa},
          {"most_mpa", p.density.most_mpa},
          {"volume_share_below_least", bone.share_below},
@@ -220,33 +273,14 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
          {"load", problem.load_names[n]},
          {"order", name_of(elements.order)},
          {"order_because", elements.because}};
-  context.report("mean_young_mpa", sum / bone.volume_mm3);
+  context.report("mean_young_mpa", sums.young / bone.volume_mm3);
   context.report("materials", static_cast<std::int64_t>(bone.materials));
-  context.report("mass_g", 1000 * kg);
-  const BoneDensity guess;
-  if (p.density.per_1000_hu == guess.per_1000_hu && p.density.at_0_hu == guess.at_0_hu)
-    context.warn("density by a guess of " + format_number(guess.per_1000_hu) +
-                 " g/cm3 at 1000 HU, which may be 15 % off (stiffness 20 to 40 %): give --density-per-1000-hu and "
-                 "--density-at-0-hu of the "
-                 "scanner's calibration phantom");
-  const auto limited = [&](double share, const char* than, double limit) {
-    if (share > 0.01)
-      context.warn(format_number(std::round(1000 * share) / 10) + " % of the volume came out " + than + ' ' +
-                   format_number(limit) + " MPa and was set to it");
-  };
-  limited(bone.share_below, "softer than", p.density.least_mpa);
-  limited(bone.share_above, "stiffer than", p.density.most_mpa);
-  if (bone.share_outside > 0)
-    context.warn(format_number(std::round(1e5 * bone.share_outside) / 1e3) +
-                 " % of the volume lies outside of the CT: the values at its border were taken there");
-  TetMesh map = mesh;
-  map.values_name = "young_mpa";
-  map.values.resize(at_point.size());
-  for (std::size_t v = 0; v < at_point.size(); ++v)
-    map.values[v] = shared[v] > 0 ? static_cast<float>(at_point[v] / shared[v]) : 0.0F;
+  context.report("mass_g", 1000 * sums.kg);
+  warn_of_doubts(p.density, bone, context);
   Document inp{inp_text(body, body.on_all_points(problem.loads[n]))};
   context.progress(1);
-  return {std::move(inp), std::make_shared<const TetMesh>(std::move(map)), Document{written(j)}};
+  return {std::move(inp), std::make_shared<const TetMesh>(map_of(mesh, volume, graded.materials)),
+          Document{written(j)}};
 }
 
 }  // namespace osteo::inline app

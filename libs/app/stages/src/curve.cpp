@@ -2,6 +2,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/data/json_vec.h"
 #include "osteo/core/data/points_io.h"
 
 namespace osteo::inline app {
@@ -32,14 +33,13 @@ std::vector<Data> CurveStage::run(const Params& p, std::span<const Data> inputs,
   Json places = Json::list();
   double farthest = 0, jump = 0, before = 0;
   bool held = false;
-  const auto triple = [](Vec3 v) { return Json{v.x, v.y, v.z}; };
   for (const Vec3 x : path) {
     const auto a = constraint.update(x);
     places.push_back({{"engaged", a.engaged},
-                      {"place_mm", triple(a.place.point_mm)},
+                      {"place_mm", json_of(a.place.point_mm)},
                       {"arc_mm", a.place.arc_mm},
                       {"distance_mm", a.place.distance_mm},
-                      {"force_n", triple(a.force_n)}});
+                      {"force_n", json_of(a.force_n)}});
     farthest = std::max(farthest, a.place.distance_mm);
     if (held && a.engaged) jump = std::max(jump, std::abs(a.place.arc_mm - before));
     held = a.engaged;

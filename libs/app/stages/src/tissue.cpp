@@ -128,18 +128,25 @@ struct Course {
   double tool_now_n = 0, tool_most_n = 0;
 };
 
+// Box of the points.
+struct Box {
+  Vec3 lo, hi;
+  explicit Box(std::span<const Vec3> x) : lo(x.front()), hi(lo) {
+    for (const Vec3& q : x) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        lo[a] = std::min(lo[a], q[a]);
+        hi[a] = std::max(hi[a], q[a]);
+      }
+    }
+  }
+};
+
 // A body that has left this many times its size is torn apart, not deformed.
 constexpr double kFarthest = 100;
 
 void require_together(std::span<const Vec3> x, std::span<const Vec3> rest, double seconds) {
-  Vec3 lo = rest.front(), hi = lo;
-  for (const Vec3& q : rest) {
-    for (std::size_t a = 0; a < 3; ++a) {
-      lo[a] = std::min(lo[a], q[a]);
-      hi[a] = std::max(hi[a], q[a]);
-    }
-  }
-  const double size = length(hi - lo);
+  const Box box(rest);
+  const double size = length(box.hi - box.lo);
   for (std::size_t p = 0; p < x.size(); ++p) {
     const double far = length(x[p] - rest[p]);
     if (!(far <= kFarthest * size))
@@ -189,6 +196,104 @@ Course go_on(Dynamics& dynamics, const SimulateParams& p, int batch, const Tissu
   return c;
 }
 
+// What the body does not enter, as far as it can reach.
+RigidContact obstacle_of(const TriMesh& surface, const TissueModel& model, double stiffness_n_per_mm,
+                         const Context& context) {
+  const Box box(model.rest());
+  const Vec3 size = box.hi - box.lo;
+  const double around = 0.25 * std::max({size.x, size.y, size.z});
+  const Vec3 margin{around, around, around};
+  const auto& t = model.tets().front();
+  RigidContact obstacle{nullptr, stiffness_n_per_mm};
+  obstacle.shape = std::make_shared<SurfaceShape>(surface, box.lo - margin, box.hi + margin,
+                                                  length(model.rest()[t[1]] - model.rest()[t[0]]) / 4, context);
+  return obstacle;
+}
+
+// A load as both ways of going on take it.
+struct LoadInTime {
+  std::string name = "none";
+  std::vector<std::pair<std::uint32_t, Vec3>> forces_n;
+  std::vector<TissueLoad::Moved> moved;
+  std::vector<std::uint32_t> fixed;
+  std::vector<Slider> sliders;
+};
+
+LoadInTime load_in_time(const TissueProblem& problem, const std::string& asked) {
+  LoadInTime l;
+  l.fixed = problem.fixed;
+  l.sliders = problem.sliders;
+  if (asked != "none" && !problem.loads.empty()) {
+    const std::size_t n = load_named(problem, asked);
+    l.forces_n = problem.loads[n].forces_n;
+    l.moved = problem.loads[n].moved;
+    for (const TissueLoad::Moved& m : l.moved) {
+      if (m.held == 7) l.fixed.push_back(m.point);
+      if (m.held != 7) l.sliders.push_back({m.point, m.held});
+    }
+    if (!problem.loads[n].contacts.empty())
+      throw Error(ExitCode::usage, "simulate does not read a load's contacts",
+                  "give it the rigid thing as --obstacle, or use fem");
+    l.name = problem.load_names[n];
+  } else if (asked != "none" && !asked.empty()) {
+    load_named(problem, asked);
+  }
+  return l;
+}
+
+// Where the body is after its course, and what there is to say of that.
+template <class Dynamics>
+std::vector<Vec3> report_course(const Dynamics& dynamics, const Course& c, const SimulateParams& p,
+                                const TissueModel& model, Json& j, const Context& context) {
+  std::vector<Vec3> x = dynamics.positions_mm();
+  j["steps"] = c.done;
+  j["step_ms"] = 1000 * dynamics.step_s();
+  j["simulated_s"] = static_cast<double>(c.done) * dynamics.step_s();
+  j["at_rest"] = c.at_rest;
+  j["residual"] = dynamics.residual();
+  j["elastic_mj"] = dynamics.elastic_mj();
+  j["kinetic_mj"] = dynamics.kinetic_mj();
+  if (p.tool_radius_mm > 0) {
+    j["tool_n"] = c.tool_now_n;
+    j["tool_most_n"] = c.tool_most_n;
+  }
+  j["displacement"] = displacement(model.rest(), x);
+  j["inverted_tetrahedra"] = model.inverted(x);
+  if (p.until_rest && !c.at_rest)
+    context.warn("not at rest after " + format_number(p.seconds) + " s: residual " +
+                 format_number(dynamics.residual()));
+  context.report("step_ms", 1000 * dynamics.step_s());
+  return x;
+}
+
+void report_counts(const ImplicitDynamics& dynamics, Json& j, const Context& context) {
+  const auto& counts = dynamics.counts();
+  j["newton_iterations"] = counts.iterations;
+  j["steps_unfinished"] = counts.unfinished;
+  if (counts.unfinished > 0)
+    context.warn(std::to_string(counts.unfinished) + " steps ended before their residual was small");
+}
+
+void report_counts(const TissueDynamics<double>& dynamics, const SimulateParams& p, Json& j, const Context& context) {
+  const auto& counts = dynamics.counts();
+  if (counts.not_finite > 0)
+    throw Error(ExitCode::failed,
+                std::to_string(counts.not_finite) +
+                    " times a point was to go to a place that is no number: the load is too large",
+                "make it smaller, or take --method implicit");
+  j["places_not_finite"] = counts.not_finite;
+  j["points_made_heavier"] = counts.made_heavier;
+  j["points_made_heavier_by_stretch"] = counts.stretched;
+  j["pushes_softened"] = counts.softened;
+  if (counts.made_heavier > 0)
+    context.warn(std::to_string(counts.made_heavier) + " points were made heavier for steps of " +
+                 format_number(p.least_step_ms) + " ms: motion is slower than it would be");
+  if (counts.softened > 0)
+    context.warn(
+        std::to_string(counts.softened) +
+        " pushes were softer than asked for, so that steps stay stable; --method implicit needs no such limit");
+}
+
 }  // namespace
 
 std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
@@ -198,104 +303,33 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
   const TissueModel model =
       model_of_problem(mesh, problem, constants != nullptr ? std::optional(constants->json) : std::nullopt);
   RigidContact obstacle{nullptr, p.obstacle_stiffness_n_per_mm};
-  if (const auto* const surface = std::get_if<Surface>(&inputs[3])) {
-    Vec3 lo = model.rest().front(), hi = lo;
-    for (const Vec3& q : model.rest()) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        lo[a] = std::min(lo[a], q[a]);
-        hi[a] = std::max(hi[a], q[a]);
-      }
-    }
-    const Vec3 size = hi - lo;
-    const double around = 0.25 * std::max({size.x, size.y, size.z});
-    const auto& t = model.tets().front();
-    obstacle.shape =
-        std::make_shared<SurfaceShape>(**surface, lo - Vec3{around, around, around}, hi + Vec3{around, around, around},
-                                       length(model.rest()[t[1]] - model.rest()[t[0]]) / 4, context.sub(0, 0.1));
-  }
-  std::vector<std::pair<std::uint32_t, Vec3>> load;
-  std::vector<TissueLoad::Moved> moved;
-  std::vector<std::uint32_t> fixed = problem.fixed;
-  std::vector<Slider> sliders = problem.sliders;
-  std::string name = "none";
-  if (p.load != "none" && !problem.loads.empty()) {
-    const std::size_t n = load_named(problem, p.load);
-    load = problem.loads[n].forces_n;
-    moved = problem.loads[n].moved;
-    for (const TissueLoad::Moved& m : moved) {
-      if (m.held == 7) fixed.push_back(m.point);
-      if (m.held != 7) sliders.push_back({m.point, m.held});
-    }
-    if (!problem.loads[n].contacts.empty())
-      throw Error(ExitCode::usage, "simulate does not read a load's contacts",
-                  "give it the rigid thing as --obstacle, or use fem");
-    name = problem.load_names[n];
-  } else if (p.load != "none" && !p.load.empty()) {
-    load_named(problem, p.load);
-  }
+  if (const auto* const surface = std::get_if<Surface>(&inputs[3]))
+    obstacle = obstacle_of(**surface, model, p.obstacle_stiffness_n_per_mm, context.sub(0, 0.1));
+  const LoadInTime load = load_in_time(problem, p.load);
   // Forces on what nothing holds: it would be gone.
-  if (!load.empty() && obstacle.shape == nullptr) require_held(model, model.rest(), fixed, sliders);
-  Json j{{"load", name}};
+  if (!load.forces_n.empty() && obstacle.shape == nullptr) require_held(model, model.rest(), load.fixed, load.sliders);
+  Json j{{"load", load.name}};
   Course c;
   std::vector<Vec3> x;
-  const auto report = [&](const auto& dynamics) {
-    x = dynamics.positions_mm();
-    j["steps"] = c.done;
-    j["step_ms"] = 1000 * dynamics.step_s();
-    j["simulated_s"] = static_cast<double>(c.done) * dynamics.step_s();
-    j["at_rest"] = c.at_rest;
-    j["residual"] = dynamics.residual();
-    j["elastic_mj"] = dynamics.elastic_mj();
-    j["kinetic_mj"] = dynamics.kinetic_mj();
-    if (p.tool_radius_mm > 0) {
-      j["tool_n"] = c.tool_now_n;
-      j["tool_most_n"] = c.tool_most_n;
-    }
-    j["displacement"] = displacement(model.rest(), x);
-    j["inverted_tetrahedra"] = model.inverted(x);
-    if (p.until_rest && !c.at_rest)
-      context.warn("not at rest after " + format_number(p.seconds) + " s: residual " +
-                   format_number(dynamics.residual()));
-    context.report("step_ms", 1000 * dynamics.step_s());
-  };
   if (p.method == TimeMethod::implicit_steps) {
-    ImplicitDynamics dynamics(model, fixed, {p.density_kg_m3, p.damping_per_s, p.step_ms / 1000}, sliders);
-    dynamics.set_load(load);
+    ImplicitDynamics dynamics(model, load.fixed, {p.density_kg_m3, p.damping_per_s, p.step_ms / 1000}, load.sliders);
+    dynamics.set_load(load.forces_n);
     dynamics.set_obstacle(obstacle);
-    c = go_on(dynamics, p, 1, model, moved, context);
-    report(dynamics);
-    j["newton_iterations"] = dynamics.counts().iterations;
-    j["steps_unfinished"] = dynamics.counts().unfinished;
-    if (dynamics.counts().unfinished > 0)
-      context.warn(std::to_string(dynamics.counts().unfinished) + " steps ended before their residual was small");
+    c = go_on(dynamics, p, 1, model, load.moved, context);
+    x = report_course(dynamics, c, p, model, j, context);
+    report_counts(dynamics, j, context);
   } else {
     DynamicsOptions options;
     options.density_kg_m3 = p.density_kg_m3;
     options.damping_per_s = p.damping_per_s;
     options.least_step_s = p.least_step_ms / 1000;
     // As quick as floats, which never balance to a thousandth.
-    TissueDynamics<double> dynamics(model, fixed, options, sliders);
-    dynamics.set_load(load);
+    TissueDynamics<double> dynamics(model, load.fixed, options, load.sliders);
+    dynamics.set_load(load.forces_n);
     dynamics.set_obstacle(obstacle);
-    c = go_on(dynamics, p, 200, model, moved, context);
-    report(dynamics);
-    const auto& counts = dynamics.counts();
-    if (counts.not_finite > 0)
-      throw Error(ExitCode::failed,
-                  std::to_string(counts.not_finite) +
-                      " times a point was to go to a place that is no number: the load is too large",
-                  "make it smaller, or take --method implicit");
-    j["places_not_finite"] = counts.not_finite;
-    j["points_made_heavier"] = counts.made_heavier;
-    j["points_made_heavier_by_stretch"] = counts.stretched;
-    j["pushes_softened"] = counts.softened;
-    if (counts.made_heavier > 0)
-      context.warn(std::to_string(counts.made_heavier) + " points were made heavier for steps of " +
-                   format_number(p.least_step_ms) + " ms: motion is slower than it would be");
-    if (counts.softened > 0)
-      context.warn(
-          std::to_string(counts.softened) +
-          " pushes were softer than asked for, so that steps stay stable; --method implicit needs no such limit");
+    c = go_on(dynamics, p, 200, model, load.moved, context);
+    x = report_course(dynamics, c, p, model, j, context);
+    report_counts(dynamics, p, j, context);
   }
   context.report("steps", static_cast<std::int64_t>(c.done));
   if (p.tool_radius_mm > 0) context.report("tool_n", c.tool_now_n);

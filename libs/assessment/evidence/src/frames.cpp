@@ -5,25 +5,11 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/data/json_vec.h"
 #include "osteo/session/recording/recorder.h"
 #include "osteo/session/recording/session_reader.h"
 
 namespace osteo::inline assessment {
-namespace {
-
-std::optional<Vec3> vec_of(const Json* j) {
-  if (j == nullptr || j->items().size() != 3) return std::nullopt;
-  Vec3 v;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const auto n = j->items()[a].number();
-    if (!n || !std::isfinite(*n)) return std::nullopt;
-    v[a] = *n;
-  }
-  return v;
-}
-
-}  // namespace
-
 std::vector<CameraPose> camera_poses(std::span<const Note> notes, std::size_t& unreadable) {
   std::vector<CameraPose> poses;
   for (const Note& n : notes) {

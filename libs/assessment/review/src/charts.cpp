@@ -41,151 +41,203 @@ std::string clock(double s) {
   return std::to_string(min) + two;
 }
 
+namespace {
+
+// Lanes below each other over one axis of time.
+class TimelineChart {
+ public:
+  explicit TimelineChart(const Timeline& line) : line_(line) {
+    d_.id = "timeline-still";
+    d_.alt = "Force, distance to the nearest structure, bone removed and speed over " + told_seconds(line.duration_s());
+    d_.width = 720;
+    w_ = d_.width - kLeft - kRight;
+    duration_ = std::max(1.0, line.duration_s());
+    columns_ = std::max<std::size_t>(1, std::min<std::size_t>(line.size(), 648));
+    column_ = w_ / static_cast<double>(columns_);
+  }
+  sheet::Drawing draw() {
+    mark_events();
+    draw_force();
+    y_ += kLane + kGap;
+    draw_distance();
+    y_ += kLane + kGap;
+    draw_bone();
+    y_ += kLane + kGap;
+    draw_speed();
+    y_ += kLane + 8;
+    draw_instruments();
+    y_ += 12;
+    draw_clock();
+    d_.height = y_ + 20;
+    return std::move(d_);
+  }
+
+ private:
+  static constexpr double kLeft = 100, kRight = 12, kLane = 44, kGap = 15;
+
+  [[nodiscard]] double px(double s) const { return kLeft + w_ * std::clamp(s / duration_, 0.0, 1.0); }
+  // take(x, from, to) for each column of the picture with the steps of time in it.
+  template <typename Take>
+  void each(const Take& take) const {
+    for (std::size_t c = 0; c < columns_; ++c) {
+      const std::size_t from = c * line_.size() / columns_, to = std::max(from + 1, (c + 1) * line_.size() / columns_);
+      if (from < line_.size())
+        take(kLeft + w_ * static_cast<double>(c) / static_cast<double>(columns_), from, std::min(to, line_.size()));
+    }
+  }
+  // `most` of a lane and the step of its lines, both round.
+  struct Scale {
+    double most, step;
+  };
+  static Scale scale_of(double most) {
+    const double step = nice_step(most, 2);
+    return {std::ceil(most / step) * step, step};
+  }
+  void lane(const std::string& name, const std::string& unit, const Scale& scale) {
+    d_.text(0, y_ + 10, name, 9.5, kInk, -1, true);
+    d_.text(0, y_ + 21, unit, 8.5, kQuiet);
+    for (double v = 0; v <= scale.most * 1.0001; v += scale.step) {
+      const double at = height_of(v / scale.most);
+      d_.line({{kLeft, at}, {kLeft + w_, at}}, kRule, 0.6);
+      d_.text(kLeft - 4, at + 3, format_number(std::round(v * 100) / 100), 8, kQuiet, 1);
+    }
+  }
+  // Of a share of the lane's most.
+  [[nodiscard]] double height_of(double share) const { return y_ + kLane * (1 - share); }
+
+  // An area on the lane's floor, a step for each column.
+  using Steps = std::vector<std::array<double, 2>>;
+  [[nodiscard]] Steps begin_area() const { return {{kLeft, y_ + kLane}}; }
+  void add_step(Steps& area, double x, double at) const {
+    area.push_back({x, at});
+    area.push_back({x + column_, at});
+  }
+  void end_area(Steps& area, Colour colour, double opacity) {
+    area.push_back({kLeft + w_, y_ + kLane});
+    d_.area(area, colour, opacity);
+  }
+
+  // Above all lanes; gaps of the recording behind them.
+  void mark_events() {
+    for (const TimelineEvent& e : line_.events) {
+      if (e.kind == EventKind::gap)
+        d_.box(px(e.t_s), y_, std::max(0.8, px(e.end_s) - px(e.t_s)), 4 * (kLane + kGap), kRule, 0.8);
+    }
+    for (const TimelineEvent& e : line_.events) {
+      const bool bad = e.kind == EventKind::injury;
+      if (e.kind == EventKind::instrument || e.kind == EventKind::gap) continue;
+      d_.line({{px(e.t_s), 2}, {px(e.t_s), 10}}, bad ? kAccent : kQuiet, bad ? 1.6 : 0.8);
+    }
+  }
+
+  void draw_force() {
+    const auto& force = line_.force_n;
+    const double peak = force.empty() ? 0.0 : static_cast<double>(*std::max_element(force.begin(), force.end()));
+    const Scale scale = scale_of(std::max(0.5, peak));
+    lane("Force", "N, of the burr", scale);
+    Steps shape = begin_area();
+    each([&](double x, std::size_t from, std::size_t to) {
+      const double v = static_cast<double>(*std::max_element(force.begin() + static_cast<std::ptrdiff_t>(from),
+                                                             force.begin() + static_cast<std::ptrdiff_t>(to)));
+      add_step(shape, x, height_of(v / scale.most));
+    });
+    end_area(shape, kForce, 0.75);
+  }
+
+  // The least of each column; where none is known the line ends.
+  void draw_distance() {
+    lane("Distance", "mm, nearest structure", {8, 4});
+    d_.box(kLeft, y_ + kLane * 0.75, w_, kLane * 0.25, kAccent, 0.10);
+    Steps run;
+    const auto end_run = [&] {
+      if (run.size() > 1) d_.line(run, kInk, 1);
+      run.clear();
+    };
+    each([&](double x, std::size_t from, std::size_t to) {
+      float least = std::numeric_limits<float>::quiet_NaN();
+      for (std::size_t n = from; n < to; ++n) {
+        if (!(least <= line_.distance_mm[n])) least = line_.distance_mm[n];
+      }
+      if (!std::isfinite(least)) return end_run();
+      add_step(run, x, height_of(std::clamp(static_cast<double>(least), -0.5, 8.0) / 8));
+    });
+    end_run();
+  }
+
+  void draw_bone() {
+    std::vector<std::array<double, 3>> bars;  // x, seen (and unknown), hidden: mm3 a second
+    double most_mm3 = 0.1;
+    each([&](double x, std::size_t from, std::size_t to) {
+      double seen = 0, hidden = 0;
+      for (std::size_t n = from; n < to; ++n) {
+        seen += static_cast<double>(line_.seen_mm3[n] + line_.unknown_mm3[n]);
+        hidden += static_cast<double>(line_.hidden_mm3[n]);
+      }
+      const double per_s = Timeline::kRateHz / static_cast<double>(to - from);
+      bars.push_back({x, seen * per_s, hidden * per_s});
+      most_mm3 = std::max(most_mm3, (seen + hidden) * per_s);
+    });
+    const Scale scale = scale_of(most_mm3);
+    lane("Bone", "mm³/s; orange unseen", scale);
+    for (const bool all : {true, false}) {
+      Steps shape = begin_area();
+      for (const auto& [x, seen, hidden] : bars)
+        add_step(shape, x, height_of((hidden + (all ? seen : 0)) / scale.most));
+      end_area(shape, all ? kSeen : kAccent, 1);
+    }
+  }
+
+  void draw_speed() {
+    // A few jumps must not flatten all the rest.
+    std::vector<float> sorted = line_.speed_mm_s;
+    std::sort(sorted.begin(), sorted.end());
+    const Scale scale =
+        scale_of(sorted.empty() ? 1 : std::max(1.0, 1.2 * static_cast<double>(sorted[(sorted.size() - 1) * 98 / 100])));
+    lane("Speed", "mm/s, of the tip", scale);
+    Steps shape = begin_area();
+    each([&](double x, std::size_t from, std::size_t to) {
+      double v = 0;
+      for (std::size_t n = from; n < to; ++n)
+        v += static_cast<double>(line_.speed_mm_s[n]) / static_cast<double>(to - from);
+      add_step(shape, x, height_of(std::min(1.0, v / scale.most)));
+    });
+    end_area(shape, kForce, 0.4);
+  }
+
+  void draw_instruments() {
+    d_.text(0, y_ + 9, "In hand", 9.5, kInk, -1, true);
+    std::size_t from = 0;
+    int shade = 0;
+    for (std::size_t n = 1; n <= line_.size(); ++n) {
+      if (n < line_.size() && line_.tool[n] == line_.tool[from]) continue;
+      const double x = px(static_cast<double>(from) / Timeline::kRateHz),
+                   x1 = px(static_cast<double>(n) / Timeline::kRateHz);
+      d_.box(x, y_, std::max(0.5, x1 - x), 12, shade++ % 2 == 0 ? kBand : kRule);
+      const std::string name = line_.tool[from] == Timeline::kPlate ? "a plate" : instrument_of(line_.tool[from]).name;
+      if (x1 - x > 4.6 * static_cast<double>(name.size()) + 4) d_.text(x + 3, y_ + 9, name, 8.5, kInk);
+      from = n;
+    }
+  }
+
+  void draw_clock() {
+    const double tick = clock_step(duration_, 10);
+    for (double s = 0; s <= duration_ * 1.0001; s += tick) {
+      d_.line({{px(s), y_ + 2}, {px(s), y_ + 5}}, kQuiet, 0.8);
+      d_.text(px(s), y_ + 15, clock(s), 8.5, kQuiet, 0);
+    }
+  }
+
+  const Timeline& line_;
+  sheet::Drawing d_;
+  double w_, duration_, column_;
+  std::size_t columns_;
+  double y_ = 14;  // the top of the lane that is drawn
+};
+
+}  // namespace
+
 sheet::Drawing timeline_chart(const Review& r) {
-  const Timeline& line = r.timeline;
-  sheet::Drawing d;
-  d.id = "timeline-still";
-  d.alt = "Force, distance to the nearest structure, bone removed and speed over " + told_seconds(line.duration_s());
-  d.width = 720;
-  constexpr double kLeft = 100, kRight = 12, kLane = 44, kGap = 15;
-  const double w = d.width - kLeft - kRight, duration = std::max(1.0, line.duration_s());
-  const auto px = [&](double s) { return kLeft + w * std::clamp(s / duration, 0.0, 1.0); };
-  const std::size_t columns = std::max<std::size_t>(1, std::min<std::size_t>(line.size(), 648));
-  const auto each = [&](const auto& take) {
-    for (std::size_t c = 0; c < columns; ++c) {
-      const std::size_t from = c * line.size() / columns, to = std::max(from + 1, (c + 1) * line.size() / columns);
-      if (from < line.size())
-        take(kLeft + w * static_cast<double>(c) / static_cast<double>(columns), from, std::min(to, line.size()));
-    }
-  };
-  const double column = w / static_cast<double>(columns);
-  double y = 14;
-  const auto lane = [&](const std::string& name, const std::string& unit, double most, double step) {
-    d.text(0, y + 10, name, 9.5, kInk, -1, true);
-    d.text(0, y + 21, unit, 8.5, kQuiet);
-    for (double v = 0; v <= most * 1.0001; v += step) {
-      const double at = y + kLane * (1 - v / most);
-      d.line({{kLeft, at}, {kLeft + w, at}}, kRule, 0.6);
-      d.text(kLeft - 4, at + 3, format_number(std::round(v * 100) / 100), 8, kQuiet, 1);
-    }
-  };
-  const auto peak = [](const std::vector<float>& v) {
-    return v.empty() ? 0.0 : static_cast<double>(*std::max_element(v.begin(), v.end()));
-  };
-
-  // Events: marks above all.
-  for (const TimelineEvent& e : line.events) {
-    if (e.kind == EventKind::gap)
-      d.box(px(e.t_s), y, std::max(0.8, px(e.end_s) - px(e.t_s)), 4 * (kLane + kGap), kRule, 0.8);
-  }
-  for (const TimelineEvent& e : line.events) {
-    const bool bad = e.kind == EventKind::injury;
-    if (e.kind == EventKind::instrument || e.kind == EventKind::gap) continue;
-    d.line({{px(e.t_s), 2}, {px(e.t_s), 10}}, bad ? kAccent : kQuiet, bad ? 1.6 : 0.8);
-  }
-
-  double most = std::max(0.5, peak(line.force_n));
-  double step = nice_step(most, 2);
-  most = std::ceil(most / step) * step;
-  lane("Force", "N, of the burr", most, step);
-  std::vector<std::array<double, 2>> shape{{kLeft, y + kLane}};
-  each([&](double x, std::size_t from, std::size_t to) {
-    const double v = static_cast<double>(*std::max_element(line.force_n.begin() + static_cast<std::ptrdiff_t>(from),
-                                                           line.force_n.begin() + static_cast<std::ptrdiff_t>(to)));
-    shape.push_back({x, y + kLane * (1 - v / most)});
-    shape.push_back({x + column, y + kLane * (1 - v / most)});
-  });
-  shape.push_back({kLeft + w, y + kLane});
-  d.area(shape, kForce, 0.75);
-
-  y += kLane + kGap;
-  lane("Distance", "mm, nearest structure", 8, 4);
-  d.box(kLeft, y + kLane * 0.75, w, kLane * 0.25, kAccent, 0.10);
-  std::vector<std::array<double, 2>> run;
-  const auto end_run = [&] {
-    if (run.size() > 1) d.line(run, kInk, 1);
-    run.clear();
-  };
-  each([&](double x, std::size_t from, std::size_t to) {
-    float least = std::numeric_limits<float>::quiet_NaN();
-    for (std::size_t n = from; n < to; ++n) {
-      if (!(least <= line.distance_mm[n])) least = line.distance_mm[n];
-    }
-    if (!std::isfinite(least)) return end_run();
-    const double at = y + kLane * (1 - std::clamp(static_cast<double>(least), -0.5, 8.0) / 8);
-    run.push_back({x, at});
-    run.push_back({x + column, at});
-  });
-  end_run();
-
-  y += kLane + kGap;
-  std::vector<std::array<double, 3>> bars;  // x, seen (and unknown), hidden: mm3 a second
-  double most_mm3 = 0.1;
-  each([&](double x, std::size_t from, std::size_t to) {
-    double seen = 0, hidden = 0;
-    for (std::size_t n = from; n < to; ++n) {
-      seen += static_cast<double>(line.seen_mm3[n] + line.unknown_mm3[n]);
-      hidden += static_cast<double>(line.hidden_mm3[n]);
-    }
-    const double per_s = Timeline::kRateHz / static_cast<double>(to - from);
-    bars.push_back({x, seen * per_s, hidden * per_s});
-    most_mm3 = std::max(most_mm3, (seen + hidden) * per_s);
-  });
-  step = nice_step(most_mm3, 2);
-  most_mm3 = std::ceil(most_mm3 / step) * step;
-  lane("Bone", "mm³/s; orange unseen", most_mm3, step);
-  for (const bool all : {true, false}) {
-    shape.assign({{kLeft, y + kLane}});
-    for (const auto& [x, seen, hidden] : bars) {
-      const double at = y + kLane * (1 - (hidden + (all ? seen : 0)) / most_mm3);
-      shape.push_back({x, at});
-      shape.push_back({x + column, at});
-    }
-    shape.push_back({kLeft + w, y + kLane});
-    d.area(shape, all ? kSeen : kAccent);
-  }
-
-  y += kLane + kGap;
-  // A few jumps must not flatten all the rest.
-  std::vector<float> sorted = line.speed_mm_s;
-  std::sort(sorted.begin(), sorted.end());
-  double fast = sorted.empty() ? 1 : std::max(1.0, 1.2 * static_cast<double>(sorted[(sorted.size() - 1) * 98 / 100]));
-  step = nice_step(fast, 2);
-  fast = std::ceil(fast / step) * step;
-  lane("Speed", "mm/s, of the tip", fast, step);
-  shape.assign({{kLeft, y + kLane}});
-  each([&](double x, std::size_t from, std::size_t to) {
-    double v = 0;
-    for (std::size_t n = from; n < to; ++n)
-      v += static_cast<double>(line.speed_mm_s[n]) / static_cast<double>(to - from);
-    const double at = y + kLane * (1 - std::min(1.0, v / fast));
-    shape.push_back({x, at});
-    shape.push_back({x + column, at});
-  });
-  shape.push_back({kLeft + w, y + kLane});
-  d.area(shape, kForce, 0.4);
-
-  y += kLane + 8;
-  d.text(0, y + 9, "In hand", 9.5, kInk, -1, true);
-  std::size_t from = 0;
-  int shade = 0;
-  for (std::size_t n = 1; n <= line.size(); ++n) {
-    if (n < line.size() && line.tool[n] == line.tool[from]) continue;
-    const double x = px(static_cast<double>(from) / Timeline::kRateHz),
-                 x1 = px(static_cast<double>(n) / Timeline::kRateHz);
-    d.box(x, y, std::max(0.5, x1 - x), 12, shade++ % 2 == 0 ? kBand : kRule);
-    const std::string name = line.tool[from] == Timeline::kPlate ? "a plate" : instrument_of(line.tool[from]).name;
-    if (x1 - x > 4.6 * static_cast<double>(name.size()) + 4) d.text(x + 3, y + 9, name, 8.5, kInk);
-    from = n;
-  }
-  y += 12;
-  const double tick = clock_step(duration, 10);
-  for (double s = 0; s <= duration * 1.0001; s += tick) {
-    d.line({{px(s), y + 2}, {px(s), y + 5}}, kQuiet, 0.8);
-    d.text(px(s), y + 15, clock(s), 8.5, kQuiet, 0);
-  }
-  d.height = y + 20;
-  return d;
+  return TimelineChart(r.timeline).draw();
 }
 
 sheet::Drawing profile_chart(const ForceProfile& p, bool reference) {

@@ -351,40 +351,37 @@ double find_offset(const Resampler& resampler, double wanted_mm3, const Context&
   return wanted_mm3 > total[0] ? static_cast<double>(kOffsets.front()) : static_cast<double>(kOffsets.back());
 }
 
-}  // namespace
+// `lower` of the parameters, or what the mask says of it where they leave that open.
+double lower_for(const Image& ct, const Labels& mask, double asked, const Context& context) {
+  if (asked != 0) return asked;
+  const auto [from, to] = lower_of_mask(ct, mask);
+  // Where no value lies in between, half way is where blur would have put the boundary.
+  const bool open = to - from > kOpenHu;
+  const double lower = open ? (from + to) / 2 : to;
+  if (open) {
+    context.warn("every threshold from " + format_number(from) + " to " + format_number(to) +
+                 " HU gives this mask: the boundary of bone is put half way, at " + format_number(lower) +
+                 " HU; 'resample --lower' puts it elsewhere");
+  }
+  return lower;
+}
 
-ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleParams& given, const Context& context) {
-  if (!same_place(ct.frame, mask.frame)) {
-    throw Error(ExitCode::usage, "the mask does not lie on the voxels of the CT",
-                "make the mask from this CT with 'osteo threshold'");
-  }
-  ResampleParams p = given;
-  if (p.lower == 0) {
-    const auto [from, to] = lower_of_mask(ct, mask);
-    // Where no value lies in between, half way is where blur would have put the boundary.
-    const bool open = to - from > kOpenHu;
-    p.lower = open ? (from + to) / 2 : to;
-    if (open) {
-      context.warn("every threshold from " + format_number(from) + " to " + format_number(to) +
-                   " HU gives this mask: the boundary of bone is put half way, at " + format_number(p.lower) +
-                   " HU; 'resample --lower' puts it elsewhere");
-    }
-  }
-  context.report("lower_hu", p.lower);
+void require_not_too_wide(const Frame& frame, double spacing_mm) {
   std::array<std::uint64_t, 3> cells{};
   for (std::size_t a = 0; a < 3; ++a)
-    cells[a] = static_cast<std::uint64_t>(
-        std::ceil(ct.frame.dims[a] * ct.frame.spacing_mm[a] / p.spacing_mm / BrickGrid::kEdge));
+    cells[a] =
+        static_cast<std::uint64_t>(std::ceil(frame.dims[a] * frame.spacing_mm[a] / spacing_mm / BrickGrid::kEdge));
   if (too_wide_for_bricks(cells)) {
     throw Error(ExitCode::resources,
-                "voxels of " + format_number(p.spacing_mm) + " mm make a grid of more than " +
+                "voxels of " + format_number(spacing_mm) + " mm make a grid of more than " +
                     std::to_string(BrickGrid::kMostCells) + " bricks of 8^3",
                 "choose a larger --spacing-mm, or a smaller region");
   }
-  ResampledBone result;
-  result.volume_before_mm3 =
-      static_cast<double>(std::count_if(mask.span().begin(), mask.span().end(), [](auto v) { return v != 0; })) *
-      ct.frame.voxel_volume_mm3();
+}
+
+// The field whose zero is the boundary of bone, between slices as asked.
+std::vector<float> boundary_field(const Image& ct, const Labels& mask, const ResampleParams& p,
+                                  const Context& context) {
   std::vector<float> field = signed_field(ct, mask, p.lower);
   const grid::SliceAxis slices = grid::slice_axis(ct.frame);
   const bool outlines =
@@ -393,20 +390,19 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   if (outlines)
     grid::limit_by_outlines(field, ct.frame, slices.axis, kHuPerSlice / ct.frame.spacing_mm[slices.axis], context);
   context.report("between_slices", std::string(outlines ? "outlines" : "values"));
-  const Resampler resampler(ct, field, p);
-  const auto& bricks = resampler.bricks();
-  context.progress(0.1, "boundary");
-  double unshifted = 0;
-  ResampleParams whole = p;
-  whole.spacing_mm = p.align_mm;
-  whole.box_mm = {0, 0, 0};
-  const bool boxed = Resampler::boxed(p);
-  const std::unique_ptr<const Resampler> all = boxed ? std::make_unique<const Resampler>(ct, field, whole) : nullptr;
-  const auto offset =
-      static_cast<float>(find_offset(all ? *all : resampler, result.volume_before_mm3, context, unshifted));
-  context.progress(0.5, "voxels");
+  return field;
+}
 
-  std::vector<std::unique_ptr<float[]>> densities(bricks.size()), values(bricks.size());
+// Of each brick; null where there is no bone.
+struct Sampled {
+  std::vector<std::unique_ptr<float[]>> densities, hu;
+};
+
+Sampled sample(const Resampler& resampler, float offset, const Context& context) {
+  const auto& bricks = resampler.bricks();
+  Sampled s;
+  s.densities.resize(bricks.size());
+  s.hu.resize(bricks.size());
   parallel_for(bricks.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
     context.check_cancelled();
     Scratch scratch;
@@ -418,46 +414,55 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
       // Traces are not worth a brick, nor is what a trace lacks to solid bone.
       for (float& x : d) x = x < kTrace ? 0 : x > 1 - kTrace ? 1 : x;
       if (std::none_of(d.begin(), d.end(), [](float x) { return x > 0; })) continue;
-      densities[b] = std::make_unique_for_overwrite<float[]>(kVoxels);
-      values[b] = std::make_unique<float[]>(kVoxels);
+      s.densities[b] = std::make_unique_for_overwrite<float[]>(kVoxels);
+      s.hu[b] = std::make_unique<float[]>(kVoxels);
       for (std::uint32_t v = 0; v < kVoxels; ++v) {
-        densities[b][v] = d[v];
-        if (d[v] > 0) values[b][v] = resampler.hu_at(bricks[b], v);
+        s.densities[b][v] = d[v];
+        if (d[v] > 0) s.hu[b][v] = resampler.hu_at(bricks[b], v);
       }
     }
   });
-  context.progress(0.8, "sparse grid");
+  return s;
+}
 
+// Fills density, hu and the volume afterwards.
+void write_grids(const Resampler& resampler, Sampled sampled, ResampledBone& result) {
   grid::initialize_vdb();
   auto density = openvdb::FloatGrid::create(0.0F);
   auto hu = openvdb::FloatGrid::create(-1024.0F);
   double total = 0;
+  const auto& bricks = resampler.bricks();
   for (std::size_t b = 0; b < bricks.size(); ++b) {
-    if (!densities[b]) continue;
+    auto &densities = sampled.densities[b], &values = sampled.hu[b];
+    if (!densities) continue;
     const openvdb::Coord origin(bricks[b].i * kEdge, bricks[b].j * kEdge, bricks[b].k * kEdge);
     auto* const density_leaf = density->tree().touchLeaf(origin);
     auto* const hu_leaf = hu->tree().touchLeaf(origin);
     for (std::uint32_t v = 0; v < kVoxels; ++v) {
-      if (densities[b][v] <= 0) continue;
+      if (densities[v] <= 0) continue;
       const openvdb::Coord c =
           origin.offsetBy(static_cast<int>(v & 7), static_cast<int>(v >> 3 & 7), static_cast<int>(v >> 6));
-      density_leaf->setValueOn(c, densities[b][v]);
-      hu_leaf->setValueOn(c, values[b][v]);
-      total += static_cast<double>(densities[b][v]);
+      density_leaf->setValueOn(c, densities[v]);
+      hu_leaf->setValueOn(c, values[v]);
+      total += static_cast<double>(densities[v]);
     }
-    densities[b].reset();
-    values[b].reset();
+    densities.reset();
+    values.reset();
   }
   hu->setSaveFloatAsHalf(true);
   result.volume_after_mm3 = total * resampler.frame().voxel_volume_mm3();
   result.density = grid::wrap(density, resampler.frame(), "density");
   result.hu = grid::wrap(hu, resampler.frame(), "hu");
+}
 
+void report_volume(const ResampledBone& result, const ResampleParams& p, double unshifted_mm3, float offset,
+                   const Context& context) {
+  const bool boxed = Resampler::boxed(p);
   const double change = boxed ? 0 : 100 * (result.volume_after_mm3 / result.volume_before_mm3 - 1);
   context.report("volume_before_mm3", result.volume_before_mm3);
   context.report("volume_after_mm3", result.volume_after_mm3);
   if (!boxed) context.report("volume_change_percent", change);
-  context.report("volume_change_unshifted_percent", 100 * (unshifted / result.volume_before_mm3 - 1));
+  context.report("volume_change_unshifted_percent", 100 * (unshifted_mm3 / result.volume_before_mm3 - 1));
   context.report("boundary_offset_hu", static_cast<double>(offset));
   context.report("bone_voxels", static_cast<std::int64_t>(result.density.active_voxels));
   context.report("grid_memory_mb", static_cast<double>(result.density.memory_bytes) / 1e6);
@@ -467,6 +472,39 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
                  (far ? "a boundary at " + format_number(p.lower) + " HU is far from half way between tissue and bone"
                       : "the bone is thinner than the voxels of " + format_number(p.spacing_mm) + " mm can hold"));
   }
+}
+
+}  // namespace
+
+ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleParams& given, const Context& context) {
+  if (!same_place(ct.frame, mask.frame)) {
+    throw Error(ExitCode::usage, "the mask does not lie on the voxels of the CT",
+                "make the mask from this CT with 'osteo threshold'");
+  }
+  ResampleParams p = given;
+  p.lower = lower_for(ct, mask, given.lower, context);
+  context.report("lower_hu", p.lower);
+  require_not_too_wide(ct.frame, p.spacing_mm);
+  ResampledBone result;
+  result.volume_before_mm3 =
+      static_cast<double>(std::count_if(mask.span().begin(), mask.span().end(), [](auto v) { return v != 0; })) *
+      ct.frame.voxel_volume_mm3();
+  const std::vector<float> field = boundary_field(ct, mask, p, context);
+  const Resampler resampler(ct, field, p);
+  context.progress(0.1, "boundary");
+  // Of a box the boundary is shifted as of the whole.
+  double unshifted = 0;
+  ResampleParams whole = p;
+  whole.spacing_mm = p.align_mm;
+  whole.box_mm = {0, 0, 0};
+  const auto all = Resampler::boxed(p) ? std::make_unique<const Resampler>(ct, field, whole) : nullptr;
+  const auto offset =
+      static_cast<float>(find_offset(all ? *all : resampler, result.volume_before_mm3, context, unshifted));
+  context.progress(0.5, "voxels");
+  Sampled sampled = sample(resampler, offset, context);
+  context.progress(0.8, "sparse grid");
+  write_grids(resampler, std::move(sampled), result);
+  report_volume(result, p, unshifted, offset, context);
   context.progress(1.0);
   return result;
 }

@@ -60,26 +60,19 @@ double signed_volume(const TriangleSoup& soup, const std::array<std::uint32_t, 3
   return dot(soup.points_mm[t[0]] - about, cross(soup.points_mm[t[1]] - about, soup.points_mm[t[2]] - about)) / 6;
 }
 
-}  // namespace
-
-MeshSummary summarize(const TriMesh& mesh, const Context& context) {
-  MeshSummary s;
-  s.points = mesh.points_mm.size();
-  s.triangles = mesh.triangles.size();
-  const TriangleSoup sound = sound_part(mesh, s.bad_indices, s.non_finite_points);
-  std::vector<std::uint8_t> used(s.points, 0);
+std::uint64_t unused_points(const TriMesh& mesh) {
+  std::vector<std::uint8_t> used(mesh.points_mm.size(), 0);
   for (const auto& t : mesh.triangles) {
     for (const auto v : t) {
       if (v < used.size()) used[v] = 1;
     }
   }
-  s.unused_points = static_cast<std::uint64_t>(std::count(used.begin(), used.end(), 0));
-  context.progress(0.2);
-  // As the file orients them: edges are judged before neighbours are made to agree.
-  const Ordered o = ordered(sound, context);
-  s.equal_points = o.welded_points;
-  s.degenerate = o.degenerate;
-  s.duplicates = o.duplicates;
+  return static_cast<std::uint64_t>(std::count(used.begin(), used.end(), 0));
+}
+
+// Of a part whose equal points are one, as the file orients its triangles: edges are judged before neighbours are made
+// to agree.
+TriMesh welded_as_given(const TriangleSoup& sound, const Ordered& o) {
   TriMesh welded;
   welded.points_mm.resize(o.soup.points_mm.size());
   for (std::size_t i = 0; i < o.source.size(); ++i) {
@@ -90,28 +83,23 @@ MeshSummary summarize(const TriMesh& mesh, const Context& context) {
     if (!same(t[1], from[1])) std::swap(t[1], t[2]);
     welded.triangles.push_back(t);
   }
-  const MeshCheck c = check(welded);
-  s.open_edges = c.open_edges;
-  s.nonmanifold_edges = c.nonmanifold_edges;
-  s.nonmanifold_points = c.nonmanifold_points;
-  s.disagreeing_edges = c.misoriented_edges;
-  s.watertight = c.watertight() && !welded.triangles.empty();
-  s.manifold = c.manifold();
-  context.progress(0.6);
-  // Edges, for lengths, Euler's number and holes.
-  std::unordered_map<std::uint64_t, int> edges;
-  edges.reserve(welded.triangles.size() * 2);
-  s.min_edge_mm = welded.triangles.empty() ? 0 : 1e300;
+  return welded;
+}
+
+// How many triangles have each edge, by its two points.
+using Edges = std::unordered_map<std::uint64_t, int>;
+
+// Edges and angles of all triangles.
+Edges measure_triangles(const std::vector<Vec3>& points, const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                        MeshSummary& s) {
+  Edges edges;
+  edges.reserve(triangles.size() * 2);
+  s.min_edge_mm = triangles.empty() ? 0 : 1e300;
   double edge_sum = 0;
-  const auto [lo, hi] = bounds_of({o.soup.points_mm, welded.triangles});
-  s.lo_mm = lo;
-  s.hi_mm = hi;
-  for (const auto& t : welded.triangles) {
+  for (const auto& t : triangles) {
     Vec3 p[3];
     double l[3];
-    for (std::size_t i = 0; i < 3; ++i) {
-      p[i] = o.soup.points_mm[t[i]];
-    }
+    for (std::size_t i = 0; i < 3; ++i) p[i] = points[t[i]];
     for (std::size_t i = 0; i < 3; ++i) {
       l[i] = length(p[(i + 1) % 3] - p[i]);
       const std::uint32_t u = t[i], v = t[(i + 1) % 3];
@@ -139,13 +127,11 @@ MeshSummary summarize(const TriMesh& mesh, const Context& context) {
     ++s.min_angle_histogram[static_cast<std::size_t>(std::clamp(smallest / 5, 0.0, 11.0))];
   }
   if (!edges.empty()) s.mean_edge_mm = edge_sum / static_cast<double>(edges.size());
-  std::vector<std::uint8_t> corner(o.soup.points_mm.size(), 0);
-  for (const auto& t : welded.triangles) {
-    for (const auto v : t) corner[v] = 1;
-  }
-  s.euler = std::count(corner.begin(), corner.end(), 1) - static_cast<std::int64_t>(edges.size()) +
-            static_cast<std::int64_t>(welded.triangles.size());
-  // Holes: connected sets of edges that one triangle has.
+  return edges;
+}
+
+// Connected sets of edges that one triangle has.
+std::uint64_t holes_of(const Edges& edges) {
   std::map<std::uint32_t, std::uint32_t> parent;
   for (const auto& [key, n] : edges) {
     if (n != 1) continue;
@@ -154,20 +140,60 @@ MeshSummary summarize(const TriMesh& mesh, const Context& context) {
     parent.try_emplace(v, v);
     join_sets(parent, u, v);
   }
-  for (const auto& [v, p] : parent) s.holes += v == p ? 1 : 0;
+  std::uint64_t holes = 0;
+  for (const auto& [v, p] : parent) holes += v == p ? 1 : 0;
+  return holes;
+}
+
+void measure_bodies(const TriangleSoup& soup, MeshSummary& s) {
   std::uint32_t count = 0;
-  const TriangleSoup as_given{o.soup.points_mm, welded.triangles};
-  const std::vector<std::uint32_t> body = bodies_of(as_given, count);
+  const std::vector<std::uint32_t> body = bodies_of(soup, count);
   s.bodies = count;
   std::vector<double> volume(count, 0);
   for (std::size_t t = 0; t < body.size(); ++t)
-    volume[body[t]] += signed_volume(as_given, as_given.triangles[t], (s.lo_mm + s.hi_mm) * 0.5);
-  if (s.watertight) {
-    for (const double v : volume) {
-      s.volume_mm3 += v;
-      s.inward_bodies += v < 0 ? 1 : 0;
-    }
+    volume[body[t]] += signed_volume(soup, soup.triangles[t], (s.lo_mm + s.hi_mm) * 0.5);
+  if (!s.watertight) return;
+  for (const double v : volume) {
+    s.volume_mm3 += v;
+    s.inward_bodies += v < 0 ? 1 : 0;
   }
+}
+
+}  // namespace
+
+MeshSummary summarize(const TriMesh& mesh, const Context& context) {
+  MeshSummary s;
+  s.points = mesh.points_mm.size();
+  s.triangles = mesh.triangles.size();
+  const TriangleSoup sound = sound_part(mesh, s.bad_indices, s.non_finite_points);
+  s.unused_points = unused_points(mesh);
+  context.progress(0.2);
+  const Ordered o = ordered(sound, context);
+  s.equal_points = o.welded_points;
+  s.degenerate = o.degenerate;
+  s.duplicates = o.duplicates;
+  const TriMesh welded = welded_as_given(sound, o);
+  const MeshCheck c = check(welded);
+  s.open_edges = c.open_edges;
+  s.nonmanifold_edges = c.nonmanifold_edges;
+  s.nonmanifold_points = c.nonmanifold_points;
+  s.disagreeing_edges = c.misoriented_edges;
+  s.watertight = c.watertight() && !welded.triangles.empty();
+  s.manifold = c.manifold();
+  context.progress(0.6);
+  const TriangleSoup as_given{o.soup.points_mm, welded.triangles};
+  const auto [lo, hi] = bounds_of(as_given);
+  s.lo_mm = lo;
+  s.hi_mm = hi;
+  const Edges edges = measure_triangles(as_given.points_mm, as_given.triangles, s);
+  std::vector<std::uint8_t> corner(as_given.points_mm.size(), 0);
+  for (const auto& t : as_given.triangles) {
+    for (const auto v : t) corner[v] = 1;
+  }
+  s.euler = std::count(corner.begin(), corner.end(), 1) - static_cast<std::int64_t>(edges.size()) +
+            static_cast<std::int64_t>(as_given.triangles.size());
+  s.holes = holes_of(edges);
+  measure_bodies(as_given, s);
   if (welded.triangles.empty()) s.lo_mm = s.hi_mm = {};
   context.progress(1.0);
   return s;

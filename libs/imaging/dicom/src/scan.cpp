@@ -300,53 +300,74 @@ bool is_archive(const fs::path& file) {
   return head[0] == 'P' && head[1] == 'K' && head[2] == 3 && head[3] == 4;
 }
 
-DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const Context& context) {
-  require_readable(source);
-  const QuietVtk quiet;
-  DicomScan scan;
-  scan.scratch = std::make_shared<TemporaryFolder>();
-  std::vector<Found> found;
-  std::string only_series;
+namespace {
+
+bool by_name(const Found& a, const Found& b) {
+  return a.name < b.name;
+}
+
+// What is to be read of a source, in the order of names.
+struct ToRead {
+  std::vector<Found> files;
+  std::string only_series;  // empty: all of them
+};
+
+ToRead files_of(const fs::path& source, DicomScan& scan, const Context& context) {
+  ToRead r;
   if (fs::is_directory(source)) {
-    found = files_below(source, scan.set_aside);
+    r.files = files_below(source, scan.set_aside);
   } else if (is_archive(source)) {
-    for (auto& u : dicom::unpack(source, scan.scratch->path(), context.sub(0, 0.4))) found.push_back({u.file, u.name});
-    std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
+    for (auto& u : dicom::unpack(source, scan.scratch->path(), context.sub(0, 0.4)))
+      r.files.push_back({u.file, u.name});
+    std::sort(r.files.begin(), r.files.end(), by_name);
   } else {
     const DicomHeader one = read_dicom_header(source, scan.scratch->path());
-    if (one.sop_class == kIndex) found = files_of_index(source, scan.set_aside);
+    if (one.sop_class == kIndex) r.files = files_of_index(source, scan.set_aside);
     if (one.usable() && one.frames.size() == 1 && !one.series_uid.empty()) {
       // One slice stands for its series: the files beside it that belong to it.
-      only_series = one.series_uid;
+      r.only_series = one.series_uid;
       const fs::path folder = source.has_parent_path() ? source.parent_path() : fs::path(".");
       std::error_code ec;
       for (const auto& e : fs::directory_iterator(folder, ec)) {
-        if (e.is_regular_file(ec)) found.push_back({e.path(), e.path().filename().string()});
+        if (e.is_regular_file(ec)) r.files.push_back({e.path(), e.path().filename().string()});
       }
-      std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
+      std::sort(r.files.begin(), r.files.end(), by_name);
     }
-    if (found.empty()) found.push_back({source, source.filename().string()});
+    if (r.files.empty()) r.files.push_back({source, source.filename().string()});
   }
-  scan.files = found.size();
+  return r;
+}
 
-  std::vector<DicomHeader> headers(found.size());
+std::vector<DicomHeader> read_headers(const std::vector<Found>& files, const fs::path& scratch, double hu_offset,
+                                      const Context& context) {
+  std::vector<DicomHeader> headers(files.size());
   std::atomic<std::size_t> done{0};
-  parallel_for(found.size(), 16, context.threads, [&](std::size_t begin, std::size_t end) {
+  parallel_for(files.size(), 16, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      headers[i] = read_dicom_header(found[i].file, scan.scratch->path());
-      headers[i].name = found[i].name;
-      for (DicomFrame& f : headers[i].frames) f.intercept += options.hu_offset;
+      headers[i] = read_dicom_header(files[i].file, scratch);
+      headers[i].name = files[i].name;
+      for (DicomFrame& f : headers[i].frames) f.intercept += hu_offset;
     }
     done += end - begin;
-    context.progress(0.4 + 0.5 * static_cast<double>(done) / static_cast<double>(found.size()), "reading headers");
+    context.progress(0.4 + 0.5 * static_cast<double>(done) / static_cast<double>(files.size()), "reading headers");
   });
+  return headers;
+}
 
+// What identifies the patient, in any of them; they do not keep it.
+std::set<std::string> take_identifying(std::vector<DicomHeader>& headers) {
   std::set<std::string> identifying;
   for (DicomHeader& h : headers) {
     identifying.insert(h.identifying.begin(), h.identifying.end());
     h.identifying.clear();
     h.identifying.shrink_to_fit();
   }
+  return identifying;
+}
+
+// Into the scan's series, or aside; names that identify the patient become numbers.
+void sort_headers(std::vector<DicomHeader> headers, const std::string& only_series,
+                  const std::set<std::string>& identifying, DicomScan& scan) {
   const auto number_of = [](std::size_t i) {
     const std::string n = std::to_string(i + 1);
     return "file-" + std::string(n.size() < 6 ? 6 - n.size() : 0, '0') + n;
@@ -370,26 +391,45 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
   for (FileSetAside& f : scan.set_aside) {
     f.file = without_identity(f.file, identifying, "(name removed)");
   }
+}
+
+// From the first of its headers that can be used.
+void describe(DicomSeries& s, const std::set<std::string>& identifying) {
+  const auto good = std::find_if(s.headers.begin(), s.headers.end(), [](const auto& h) { return h.usable(); });
+  const DicomHeader& h = good == s.headers.end() ? s.headers.front() : *good;
+  s.number = h.series_number;
+  s.uid = h.series_uid;
+  s.modality = h.modality;
+  s.description = identifies(h.description, identifying) ? "(removed)" : h.description;
+  s.study_date = h.study_date;
+  s.study_description = identifies(h.study_description, identifying) ? "(removed)" : h.study_description;
+  s.kernel = h.kernel;
+  s.columns = h.columns;
+  s.rows = h.rows;
+  s.pixel_mm = h.frames.empty() ? 0 : h.frames.front().column_spacing_mm;
+  s.thickness_mm = h.thickness_mm;
+  for (const auto& each : s.headers) s.images += static_cast<int>(each.frames.size());
+}
+
+}  // namespace
+
+DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const Context& context) {
+  require_readable(source);
+  const QuietVtk quiet;
+  DicomScan scan;
+  scan.scratch = std::make_shared<TemporaryFolder>();
+  const ToRead found = files_of(source, scan, context);
+  scan.files = found.files.size();
+  std::vector<DicomHeader> headers = read_headers(found.files, scan.scratch->path(), options.hu_offset, context);
+  const std::set<std::string> identifying = take_identifying(headers);
+  sort_headers(std::move(headers), found.only_series, identifying, scan);
   scan.series = part_by_scan(std::move(scan.series));
   const auto strays = std::make_shared<const std::vector<FileSetAside>>(scan.set_aside);
   // Pictures that could be of no volume go by name: a whole series of them is still worth a line.
   std::vector<double> price(scan.series.size(), 1e30);
   for (std::size_t i = 0; i < scan.series.size(); ++i) {
     DicomSeries& s = scan.series[i];
-    const auto good = std::find_if(s.headers.begin(), s.headers.end(), [](const auto& h) { return h.usable(); });
-    const DicomHeader& h = good == s.headers.end() ? s.headers.front() : *good;
-    s.number = h.series_number;
-    s.uid = h.series_uid;
-    s.modality = h.modality;
-    s.description = identifies(h.description, identifying) ? "(removed)" : h.description;
-    s.study_date = h.study_date;
-    s.study_description = identifies(h.study_description, identifying) ? "(removed)" : h.study_description;
-    s.kernel = h.kernel;
-    s.columns = h.columns;
-    s.rows = h.rows;
-    s.pixel_mm = h.frames.empty() ? 0 : h.frames.front().column_spacing_mm;
-    s.thickness_mm = h.thickness_mm;
-    for (const auto& each : s.headers) s.images += static_cast<int>(each.frames.size());
+    describe(s, identifying);
     s.strays = strays;
     judge(s, options, price[i]);
     context.progress(0.9 + 0.1 * static_cast<double>(i + 1) / static_cast<double>(scan.series.size()), "sorting");

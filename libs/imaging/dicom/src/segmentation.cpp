@@ -329,113 +329,158 @@ bool is_segmentation(const fs::path& path) {
          (file.getDataset()->findAndGetOFString(DCM_SOPClassUID, uid).good() && uid == UID_SegmentationStorage);
 }
 
+namespace {
+
+// A segmentation that is read, step by step; errors name its file.
+class SegmentationReader {
+ public:
+  SegmentationReader(const fs::path& path, const Context& context) : path_(path), context_(context) {}
+  Labels read() {
+    load();
+    place_frames();
+    read_segments();
+    fill_voxels();
+    return std::move(labels_);
+  }
+
+ private:
+  [[nodiscard]] Error fail(const std::string& why) const {
+    return Error(ExitCode::corrupt, "'" + path_.string() + "': " + why);
+  }
+
+  void load() {
+    OFCondition status = file_.loadFile(path_.c_str());
+    if (status.bad()) throw fail(std::string("it cannot be read: ") + status.text());
+    if (DcmXfer(file_.getDataset()->getOriginalXfer()).isEncapsulated()) {
+      try {
+        unpack_pixels(path_, *file_.getDataset());
+      } catch (const dicom::PixelError& e) {
+        throw fail(e.what());
+      }
+    }
+    DcmSegmentation* loaded = nullptr;
+    status = DcmSegmentation::loadDataset(*file_.getDataset(), loaded);
+    seg_.reset(loaded);
+    if (status.bad() || !seg_) throw fail(std::string("it cannot be read as a DICOM segmentation: ") + status.text());
+    frames_ = static_cast<Uint32>(seg_->getNumberOfFrames());
+    if (frames_ == 0 || seg_->getNumberOfSegments() == 0) throw fail("the segmentation is empty");
+    if (seg_->getNumberOfSegments() > 255)
+      throw fail("it holds " + std::to_string(seg_->getNumberOfSegments()) + " segments; up to 255 are supported");
+    file_.getDataset()->findAndGetUint16(DCM_Rows, rows_);
+    file_.getDataset()->findAndGetUint16(DCM_Columns, columns_);
+    file_.getDataset()->findAndGetUint8Array(DCM_PixelData, pixels_, &pixel_bytes_);
+  }
+
+  // Makes the frame of the volume, and finds each picture's layer in it.
+  void place_frames() {
+    auto* const orientation = OFstatic_cast(FGPlaneOrientationPatient*,
+                                            seg_->getFunctionalGroups().get(0, DcmFGTypes::EFG_PLANEORIENTPATIENT));
+    auto* const measures =
+        OFstatic_cast(FGPixelMeasures*, seg_->getFunctionalGroups().get(0, DcmFGTypes::EFG_PIXELMEASURES));
+    Frame& f = labels_.frame;
+    Vec3 &u = f.direction.column[0], &v = f.direction.column[1];
+    Float64 row_mm = 0, column_mm = 0;
+    if (orientation == nullptr || orientation->getImageOrientationPatient(u.x, u.y, u.z, v.x, v.y, v.z).bad() ||
+        measures == nullptr || measures->getPixelSpacing(row_mm, 0).bad() ||
+        measures->getPixelSpacing(column_mm, 1).bad()) {
+      throw fail("it does not say where its frames lie in the patient");
+    }
+    u = normalized(u);
+    v = normalized(v - u * dot(u, v));
+    f.direction.column[2] = cross(u, v);
+    std::vector<Vec3> at(frames_);
+    std::vector<double> along;
+    for (Uint32 i = 0; i < frames_; ++i) {
+      if (!read_position(*seg_, i, at[i])) throw fail("frame " + std::to_string(i + 1) + " states no position");
+      if (!lies_as(*seg_, i, u, v, row_mm, column_mm))
+        throw fail("frame " + std::to_string(i + 1) +
+                   " is turned against the first, or has other pixels: the frames make no one volume");
+      along.push_back(dot(at[i], f.direction.column[2]));
+    }
+    Float64 spacing_mm = 0, thickness_mm = 0;
+    if (measures->getSpacingBetweenSlices(spacing_mm).bad()) spacing_mm = 0;
+    if (measures->getSliceThickness(thickness_mm).bad()) thickness_mm = 0;
+    layers_ = dicom::place_seg_frames(along, spacing_mm, thickness_mm);
+    if (!layers_.problem.empty()) throw fail(layers_.problem);
+    if (!layers_.warning.empty()) context_.warn("'" + path_.string() + "': " + layers_.warning);
+    f.origin_mm = at[static_cast<std::size_t>(std::min_element(along.begin(), along.end()) - along.begin())];
+    f.spacing_mm = {column_mm, row_mm, layers_.pitch_mm};
+    f.dims = {columns_, rows_, layers_.count};
+    require_valid(f);
+    for (Uint32 i = 0; i < frames_; ++i) {
+      const Vec3 off = at[i] - f.world_from_index({0, 0, static_cast<double>(layers_.layer[i])});
+      if (length(off) > 0.05) throw fail("its frames do not lie straight above each other");
+    }
+  }
+
+  void read_segments() {
+    for (std::size_t s = 1; s <= seg_->getNumberOfSegments(); ++s) {
+      const DcmSegment* const segment = seg_->getSegment(s);
+      OFString name;
+      if (segment != nullptr) const_cast<DcmSegment*>(segment)->getSegmentLabel(name);
+      labels_.structures.push_back({static_cast<std::uint8_t>(s),
+                                    name.empty() ? "Segment " + std::to_string(s) : std::string(name.c_str()),
+                                    {}});
+    }
+  }
+
+  [[nodiscard]] Uint16 segment_of(Uint32 frame) const {
+    auto* const group =
+        OFstatic_cast(FGSegmentation*, seg_->getFunctionalGroups().get(frame, DcmFGTypes::EFG_SEGMENTATION));
+    Uint16 number = 0;
+    if (group == nullptr || group->getReferencedSegmentNumber(number).bad() || number < 1 ||
+        number > labels_.structures.size()) {
+      throw fail("frame " + std::to_string(frame + 1) + " does not say which segment it shows");
+    }
+    return number;
+  }
+
+  void fill_voxels() {
+    Uint16 allocated = 1, full = 255;
+    file_.getDataset()->findAndGetUint16(DCM_BitsAllocated, allocated);
+    file_.getDataset()->findAndGetUint16(DCM_MaximumFractionalValue, full);
+    const bool bits = allocated == 1, binary = seg_->getSegmentationType() == DcmSegTypes::ST_BINARY;
+    const int half = binary ? 1 : (full + 1) / 2;
+    const std::size_t area = static_cast<std::size_t>(rows_) * columns_;
+    const auto voxels = make_voxels<std::uint8_t>(labels_.frame.voxel_count());
+    std::fill_n(voxels.get(), labels_.frame.voxel_count(), std::uint8_t{0});
+    std::size_t overlap = 0;
+    for (Uint32 i = 0; i < frames_; ++i) {
+      const Uint16 number = segment_of(i);
+      std::uint8_t* const out = voxels.get() + static_cast<std::size_t>(layers_.layer[i]) * area;
+      const auto mark = [&](std::size_t p) {
+        overlap += out[p] != 0 ? 1 : 0;
+        out[p] = static_cast<std::uint8_t>(number);
+      };
+      if (pixels_ == nullptr || pixel_bytes_ * (bits ? 8 : 1) < (i + 1) * area)
+        throw fail("frame " + std::to_string(i + 1) + " is cut short");
+      for (std::size_t p = 0, bit = i * area; p < area; ++p, ++bit) {
+        if (bits ? (pixels_[bit / 8] >> (bit % 8) & 1) != 0 : pixels_[bit] >= half) mark(p);
+      }
+    }
+    if (overlap > 0)
+      context_.warn(std::to_string(overlap) + " voxels belong to several segments; the last one keeps them");
+    labels_.voxels = voxels;
+  }
+
+  const fs::path& path_;
+  const Context& context_;
+  DcmFileFormat file_;
+  std::unique_ptr<DcmSegmentation> seg_;
+  Uint32 frames_ = 0;
+  Uint16 rows_ = 0, columns_ = 0;
+  const Uint8* pixels_ = nullptr;  // read here: DCMTK 3.6.7 shifts frames of bits that are no multiple of 8
+  unsigned long pixel_bytes_ = 0;
+  dicom::SegLayers layers_;
+  Labels labels_;
+};
+
+}  // namespace
+
 Labels load_segmentation(const fs::path& path, const Context& context) {
   require_readable(path);
   dicom::quiet_dcmtk();
-  const auto fail = [&](const std::string& why) { return Error(ExitCode::corrupt, "'" + path.string() + "': " + why); };
-  DcmSegmentation* loaded = nullptr;
-  DcmFileFormat file;
-  OFCondition status = file.loadFile(path.c_str());
-  if (status.bad()) throw fail(std::string("it cannot be read: ") + status.text());
-  if (DcmXfer(file.getDataset()->getOriginalXfer()).isEncapsulated()) {
-    try {
-      unpack_pixels(path, *file.getDataset());
-    } catch (const dicom::PixelError& e) {
-      throw fail(e.what());
-    }
-  }
-  status = DcmSegmentation::loadDataset(*file.getDataset(), loaded);
-  const std::unique_ptr<DcmSegmentation> seg(loaded);
-  if (status.bad() || !seg) throw fail(std::string("it cannot be read as a DICOM segmentation: ") + status.text());
-  const auto frames = static_cast<Uint32>(seg->getNumberOfFrames());
-  if (frames == 0 || seg->getNumberOfSegments() == 0) throw fail("the segmentation is empty");
-  if (seg->getNumberOfSegments() > 255)
-    throw fail("it holds " + std::to_string(seg->getNumberOfSegments()) + " segments; up to 255 are supported");
-
-  Uint16 rows = 0, columns = 0;
-  const Uint8* pixels = nullptr;  // read here: DCMTK 3.6.7 shifts frames of bits that are no multiple of 8
-  unsigned long pixel_bytes = 0;
-  file.getDataset()->findAndGetUint16(DCM_Rows, rows);
-  file.getDataset()->findAndGetUint16(DCM_Columns, columns);
-  file.getDataset()->findAndGetUint8Array(DCM_PixelData, pixels, &pixel_bytes);
-  auto* const orientation =
-      OFstatic_cast(FGPlaneOrientationPatient*, seg->getFunctionalGroups().get(0, DcmFGTypes::EFG_PLANEORIENTPATIENT));
-  auto* const measures =
-      OFstatic_cast(FGPixelMeasures*, seg->getFunctionalGroups().get(0, DcmFGTypes::EFG_PIXELMEASURES));
-  Labels labels;
-  Frame& f = labels.frame;
-  Vec3 &u = f.direction.column[0], &v = f.direction.column[1];
-  Float64 row_mm = 0, column_mm = 0;
-  if (orientation == nullptr || orientation->getImageOrientationPatient(u.x, u.y, u.z, v.x, v.y, v.z).bad() ||
-      measures == nullptr || measures->getPixelSpacing(row_mm, 0).bad() ||
-      measures->getPixelSpacing(column_mm, 1).bad()) {
-    throw fail("it does not say where its frames lie in the patient");
-  }
-  u = normalized(u);
-  v = normalized(v - u * dot(u, v));
-  f.direction.column[2] = cross(u, v);
-  std::vector<Vec3> at(frames);
-  std::vector<double> along;
-  for (Uint32 i = 0; i < frames; ++i) {
-    if (!read_position(*seg, i, at[i])) throw fail("frame " + std::to_string(i + 1) + " states no position");
-    if (!lies_as(*seg, i, u, v, row_mm, column_mm))
-      throw fail("frame " + std::to_string(i + 1) +
-                 " is turned against the first, or has other pixels: the frames make no one volume");
-    along.push_back(dot(at[i], f.direction.column[2]));
-  }
-  Float64 spacing_mm = 0, thickness_mm = 0;
-  if (measures->getSpacingBetweenSlices(spacing_mm).bad()) spacing_mm = 0;
-  if (measures->getSliceThickness(thickness_mm).bad()) thickness_mm = 0;
-  const dicom::SegLayers layers = dicom::place_seg_frames(along, spacing_mm, thickness_mm);
-  if (!layers.problem.empty()) throw fail(layers.problem);
-  if (!layers.warning.empty()) context.warn("'" + path.string() + "': " + layers.warning);
-  f.origin_mm = at[static_cast<std::size_t>(std::min_element(along.begin(), along.end()) - along.begin())];
-  f.spacing_mm = {column_mm, row_mm, layers.pitch_mm};
-  f.dims = {columns, rows, layers.count};
-  require_valid(f);
-  for (Uint32 i = 0; i < frames; ++i) {
-    const Vec3 off = at[i] - f.world_from_index({0, 0, static_cast<double>(layers.layer[i])});
-    if (length(off) > 0.05) throw fail("its frames do not lie straight above each other");
-  }
-
-  for (std::size_t s = 1; s <= seg->getNumberOfSegments(); ++s) {
-    const DcmSegment* const segment = seg->getSegment(s);
-    OFString name;
-    if (segment != nullptr) const_cast<DcmSegment*>(segment)->getSegmentLabel(name);
-    labels.structures.push_back(
-        {static_cast<std::uint8_t>(s), name.empty() ? "Segment " + std::to_string(s) : std::string(name.c_str()), {}});
-  }
-  Uint16 allocated = 1, full = 255;
-  file.getDataset()->findAndGetUint16(DCM_BitsAllocated, allocated);
-  file.getDataset()->findAndGetUint16(DCM_MaximumFractionalValue, full);
-  const bool bits = allocated == 1, binary = seg->getSegmentationType() == DcmSegTypes::ST_BINARY;
-  const int half = binary ? 1 : (full + 1) / 2;
-  const std::size_t area = static_cast<std::size_t>(rows) * columns;
-  const auto voxels = make_voxels<std::uint8_t>(f.voxel_count());
-  std::fill_n(voxels.get(), f.voxel_count(), std::uint8_t{0});
-  std::size_t overlap = 0;
-  for (Uint32 i = 0; i < frames; ++i) {
-    auto* const group = OFstatic_cast(FGSegmentation*, seg->getFunctionalGroups().get(i, DcmFGTypes::EFG_SEGMENTATION));
-    Uint16 number = 0;
-    if (group == nullptr || group->getReferencedSegmentNumber(number).bad() || number < 1 ||
-        number > labels.structures.size()) {
-      throw fail("frame " + std::to_string(i + 1) + " does not say which segment it shows");
-    }
-    std::uint8_t* const out = voxels.get() + static_cast<std::size_t>(layers.layer[i]) * area;
-    const auto mark = [&](std::size_t p) {
-      overlap += out[p] != 0 ? 1 : 0;
-      out[p] = static_cast<std::uint8_t>(number);
-    };
-    if (pixels == nullptr || pixel_bytes * (bits ? 8 : 1) < (i + 1) * area)
-      throw fail("frame " + std::to_string(i + 1) + " is cut short");
-    for (std::size_t p = 0, bit = i * area; p < area; ++p, ++bit) {
-      if (bits ? (pixels[bit / 8] >> (bit % 8) & 1) != 0 : pixels[bit] >= half) mark(p);
-    }
-  }
-  if (overlap > 0)
-    context.warn(std::to_string(overlap) + " voxels belong to several segments; the last one keeps them");
-  labels.voxels = voxels;
-  return labels;
+  return SegmentationReader(path, context).read();
 }
 
 }  // namespace osteo::inline imaging

@@ -100,144 +100,203 @@ std::vector<Hull> hulls_of(const std::vector<std::uint8_t>& core, const Frame& f
   return hulls;
 }
 
-}  // namespace
+constexpr float kThin = 3, kGrow = 5, kReach = (kThin + kGrow) * (kThin + kGrow);
+constexpr float kCover = 2;
+constexpr double kSpeck_mm3 = 10;
 
-Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& context) {
-  constexpr float kThin = 3, kGrow = 5, kReach = (kThin + kGrow) * (kThin + kGrow);
-  constexpr float kCover = 2;
-  constexpr double kSpeck_mm3 = 10;
-  Outside result;
-  Coarse c = coarse_matter(ct);
-  const std::size_t n = c.matter.size();
-  const auto to_air = squared_distance_mm2(c.matter, c.frame, 0, context);
-  std::vector<std::uint8_t>& core = c.matter;  // its memory is not needed any more
-  for (std::size_t i = 0; i < n; ++i) core[i] = to_air[i] > kThin * kThin ? 1 : 0;
-  const Components parts = connected_components(core, c.frame.dims, 1, Connectivity::face);
-  const Components pieces = connected_components({mask, ct.frame.voxel_count()}, ct.frame.dims, 1, Connectivity::full);
-  if (pieces.voxels.empty()) return result;
-  const auto nx = static_cast<std::size_t>(ct.frame.dims[0]);
-  const std::size_t up = up_axis(ct.frame);
-  const auto largest_of = [](const Components& all) {
-    return static_cast<std::uint32_t>(std::max_element(all.voxels.begin(), all.voxels.end()) - all.voxels.begin());
-  };
-  const auto each_voxel = [&](const auto& take) {
-    for (std::size_t r = 0; r < pieces.runs.size(); ++r) {
-      const Run& run = pieces.runs[r];
-      const int j = static_cast<int>(run.row) % ct.frame.dims[1], k = static_cast<int>(run.row) / ct.frame.dims[1];
-      for (std::uint32_t i = run.begin; i < run.end; ++i)
-        take(pieces.component[r], static_cast<int>(i), j, k, run.row * nx + i);
-    }
-  };
-  const auto coarse_at = [&](int i, int j, int k) {
-    return (static_cast<std::size_t>(k / c.step[2]) * static_cast<std::size_t>(c.frame.dims[1]) +
-            static_cast<std::size_t>(j / c.step[1])) *
-               static_cast<std::size_t>(c.frame.dims[0]) +
-           static_cast<std::size_t>(i / c.step[0]);
-  };
-
-  // Matter by parts: the body, and other soft ones.
-  std::vector<std::size_t> soft(parts.voxels.size());
-  for (std::size_t r = 0; r < parts.runs.size(); ++r) {
-    const Run& run = parts.runs[r];
-    const int j = static_cast<int>(run.row) % c.frame.dims[1], k = static_cast<int>(run.row) / c.frame.dims[1];
-    for (std::uint32_t i = run.begin; i < run.end; ++i) {
-      const std::int16_t hu = ct.at(static_cast<int>(i) * c.step[0], j * c.step[1], k * c.step[2]);
-      soft[parts.component[r]] += hu >= -150 && hu <= 150 ? 1 : 0;
-    }
+// take(component, i, j, k, voxel) for all voxels of all components.
+template <typename Take>
+void each_voxel(const Components& all, const std::array<int, 3>& dims, const Take& take) {
+  const auto nx = static_cast<std::size_t>(dims[0]);
+  for (std::size_t r = 0; r < all.runs.size(); ++r) {
+    const Run& run = all.runs[r];
+    const int j = static_cast<int>(run.row) % dims[1], k = static_cast<int>(run.row) / dims[1];
+    for (std::uint32_t i = run.begin; i < run.end; ++i)
+      take(all.component[r], static_cast<int>(i), j, k, run.row * nx + i);
   }
-  const auto is_soft = [&](std::uint32_t part, double share) {
-    return static_cast<double>(soft[part]) >= share * static_cast<double>(parts.voxels[part]);
-  };
-  const auto of_parts = [&](const auto& chosen) {
-    std::vector<std::uint8_t> map(n);
-    for (std::size_t r = 0; r < parts.runs.size(); ++r) {
-      const Run& run = parts.runs[r];
-      const std::size_t row = static_cast<std::size_t>(run.row) * static_cast<std::size_t>(c.frame.dims[0]);
-      if (chosen(parts.component[r]))
+}
+
+std::uint32_t largest_of(const Components& all) {
+  return static_cast<std::uint32_t>(std::max_element(all.voxels.begin(), all.voxels.end()) - all.voxels.begin());
+}
+
+// Matter by parts, without what is as thin as a table's cover: the body, and other soft ones.
+class Matter {
+ public:
+  Matter(const Image& ct, const Context& context) : c_(coarse_matter(ct)) {
+    to_air_ = squared_distance_mm2(c_.matter, c_.frame, 0, context);
+    std::vector<std::uint8_t>& core = c_.matter;  // its memory is not needed any more
+    for (std::size_t i = 0; i < core.size(); ++i) core[i] = to_air_[i] > kThin * kThin ? 1 : 0;
+    parts_ = connected_components(core, c_.frame.dims, 1, Connectivity::face);
+    soft_.resize(parts_.voxels.size());
+    each_voxel(parts_, c_.frame.dims, [&](std::uint32_t part, int i, int j, int k, std::size_t) {
+      const std::int16_t hu = ct.at(i * c_.step[0], j * c_.step[1], k * c_.step[2]);
+      soft_[part] += hu >= -150 && hu <= 150 ? 1 : 0;
+    });
+  }
+  [[nodiscard]] const Frame& frame() const { return c_.frame; }
+  [[nodiscard]] const std::array<int, 3>& step() const { return c_.step; }
+  [[nodiscard]] const Components& parts() const { return parts_; }
+  [[nodiscard]] bool is_soft(std::uint32_t part, double share) const {
+    return static_cast<double>(soft_[part]) >= share * static_cast<double>(parts_.voxels[part]);
+  }
+  // Where a voxel of the CT lies in it.
+  [[nodiscard]] std::size_t at(int i, int j, int k) const {
+    return (static_cast<std::size_t>(k / c_.step[2]) * static_cast<std::size_t>(c_.frame.dims[1]) +
+            static_cast<std::size_t>(j / c_.step[1])) *
+               static_cast<std::size_t>(c_.frame.dims[0]) +
+           static_cast<std::size_t>(i / c_.step[0]);
+  }
+  [[nodiscard]] bool covered(int i, int j, int k) const { return to_air_[at(i, j, k)] > kCover * kCover; }
+  // The chosen parts as a map.
+  template <typename Chosen>
+  [[nodiscard]] std::vector<std::uint8_t> of_parts(const Chosen& chosen) const {
+    std::vector<std::uint8_t> map(c_.matter.size());
+    for (std::size_t r = 0; r < parts_.runs.size(); ++r) {
+      const Run& run = parts_.runs[r];
+      const std::size_t row = static_cast<std::size_t>(run.row) * static_cast<std::size_t>(c_.frame.dims[0]);
+      if (chosen(parts_.component[r]))
         std::fill(map.begin() + static_cast<std::ptrdiff_t>(row + run.begin),
                   map.begin() + static_cast<std::ptrdiff_t>(row + run.end), std::uint8_t{1});
     }
     return map;
-  };
-  std::vector<float> to_body;
-  std::vector<Hull> hulls;
-  const auto is_outside = [&](int i, int j, int k) {
-    if (to_body[coarse_at(i, j, k)] <= kReach) return false;
-    const std::array<int, 3> x{i / c.step[0], j / c.step[1], k / c.step[2]};
-    return !hulls[static_cast<std::size_t>(x[up])].holds(x[(up + 1) % 3], x[(up + 2) % 3]);
-  };
-  std::vector<std::uint64_t> beyond(pieces.voxels.size());
-  std::uint64_t outside = 0, all = 0,
-                covered = 0;  // voxels of the mask; covered: not outside, and with matter around them
-  const auto look_around = [&](const std::vector<std::uint8_t>& body) {
-    to_body = squared_distance_mm2(body, c.frame, 1, context);
-    hulls = hulls_of(body, c.frame);
-    std::fill(beyond.begin(), beyond.end(), 0);
-    outside = all = covered = 0;
-    each_voxel([&](std::uint32_t p, int i, int j, int k, std::size_t) {
-      const bool is = is_outside(i, j, k);
-      beyond[p] += is ? 1 : 0;
-      outside += is ? 1 : 0;
-      covered += !is && to_air[coarse_at(i, j, k)] > kCover * kCover ? 1 : 0;
-      ++all;
-    });
-  };
-  std::uint32_t body_part = 0;
-  if (!parts.voxels.empty() && is_soft(body_part = largest_of(parts), 0.5)) {
-    look_around(of_parts([&](std::uint32_t part) { return part == body_part; }));
-    result.body = 3 * outside <= 2 * all && 20 * covered >= 17 * (all - outside);
   }
-  if (!result.body) {
-    const std::uint32_t skull = largest_of(pieces);
-    std::vector<std::uint8_t> bone(n);
-    each_voxel([&](std::uint32_t p, int i, int j, int k, std::size_t) {
-      if (p == skull) bone[coarse_at(i, j, k)] = 1;
+
+ private:
+  Coarse c_;
+  std::vector<float> to_air_;
+  Components parts_;
+  std::vector<std::size_t> soft_;  // voxels of soft tissue, of each part
+};
+
+// Pieces of the mask beside a body: what lies beyond its reach and out of its hull.
+class Surroundings {
+ public:
+  Surroundings(const std::uint8_t* mask, const Image& ct, const Context& context)
+      : ct_(ct),
+        context_(context),
+        matter_(ct, context),
+        pieces_(connected_components({mask, ct.frame.voxel_count()}, ct.frame.dims, 1, Connectivity::full)),
+        up_(up_axis(ct.frame)),
+        beyond_(pieces_.voxels.size()) {}
+  Outside find() {
+    Outside result;
+    if (pieces_.voxels.empty()) return result;
+    result.body = find_body();
+    if (!result.body) take_skull_for_body();
+    if (outside_ == 0) return result;
+    const std::vector<Near> near = what_is_near(result.body);
+    const auto is_certain = [&](std::uint32_t p) { return result.body && apart(p) && !near[p].limb; };
+    bool reaches = false, tissue = false;
+    float least = std::numeric_limits<float>::infinity();
+    for (std::uint32_t p = 0; p < pieces_.voxels.size(); ++p) {
+      if (beyond_[p] == 0 || is_speck(p)) continue;
+      if (is_certain(p)) {
+        ++result.pieces;
+        least = std::min(least, near[p].body_mm2);
+      } else {
+        (apart(p) ? tissue : reaches) = true;
+      }
+    }
+    if (result.pieces > 0) result.nearest_mm = static_cast<double>(std::sqrt(least) - kThin);
+    each_of_mask([&](std::uint32_t p, int i, int j, int k, std::size_t v) {
+      // Of a dry skull only what stands apart as a whole.
+      if (beyond_[p] == 0 || is_speck(p) || (!result.body && !apart(p)) || !is_outside(i, j, k)) return;
+      (is_certain(p) ? result.certain : result.doubtful).push_back(v);
+    });
+    result.doubt = !result.body ? "there is no soft tissue around the bone (a dry skull?), so it may be a part of it"
+                   : reaches && tissue ? "it touches bone of the body, or has tissue near it as a limb has"
+                   : reaches           ? "it touches bone of the body"
+                                       : "it has tissue near it, as a limb has";
+    return result;
+  }
+
+ private:
+  template <typename Take>
+  void each_of_mask(const Take& take) const {
+    each_voxel(pieces_, ct_.frame.dims, take);
+  }
+  [[nodiscard]] bool apart(std::uint32_t piece) const { return beyond_[piece] == pieces_.voxels[piece]; }
+  [[nodiscard]] bool is_speck(std::uint32_t piece) const {
+    return static_cast<double>(pieces_.voxels[piece]) * ct_.frame.voxel_volume_mm3() < kSpeck_mm3;
+  }
+  [[nodiscard]] bool is_outside(int i, int j, int k) const {
+    if (to_body_[matter_.at(i, j, k)] <= kReach) return false;
+    const auto& step = matter_.step();
+    const std::array<int, 3> x{i / step[0], j / step[1], k / step[2]};
+    return !hulls_[static_cast<std::size_t>(x[up_])].holds(x[(up_ + 1) % 3], x[(up_ + 2) % 3]);
+  }
+
+  // The largest part of matter, where it is soft and most of the mask lies in it.
+  bool find_body() {
+    const Components& parts = matter_.parts();
+    if (parts.voxels.empty()) return false;
+    body_part_ = largest_of(parts);
+    if (!matter_.is_soft(body_part_, 0.5)) return false;
+    look_around(matter_.of_parts([&](std::uint32_t part) { return part == body_part_; }));
+    return 3 * outside_ <= 2 * all_ && 20 * covered_ >= 17 * (all_ - outside_);
+  }
+  void take_skull_for_body() {
+    const std::uint32_t skull = largest_of(pieces_);
+    std::vector<std::uint8_t> bone(matter_.frame().voxel_count());
+    each_of_mask([&](std::uint32_t p, int i, int j, int k, std::size_t) {
+      if (p == skull) bone[matter_.at(i, j, k)] = 1;
     });
     look_around(bone);
   }
-  if (outside == 0) return result;
-
-  std::vector<float> to_limb;
-  if (result.body)
-    to_limb = squared_distance_mm2(of_parts([&](std::uint32_t part) {
-                                     return part != body_part && is_soft(part, 0.25);  // a wrist is half bone
-                                   }),
-                                   c.frame, 1, context);
-  std::vector<std::uint8_t> limb(pieces.voxels.size());
-  std::vector<float> nearest(pieces.voxels.size(), std::numeric_limits<float>::infinity());
-  each_voxel([&](std::uint32_t p, int i, int j, int k, std::size_t) {
-    if (beyond[p] != pieces.voxels[p]) return;
-    const std::size_t at = coarse_at(i, j, k);
-    nearest[p] = std::min(nearest[p], to_body[at]);
-    if (!to_limb.empty() && to_limb[at] <= kReach) limb[p] = 1;
-  });
-  const auto is_speck = [&](std::uint32_t p) {
-    return static_cast<double>(pieces.voxels[p]) * ct.frame.voxel_volume_mm3() < kSpeck_mm3;
-  };
-  const auto is_certain = [&](std::uint32_t p) { return result.body && beyond[p] == pieces.voxels[p] && limb[p] == 0; };
-  bool reaches = false, tissue = false;
-  float least = std::numeric_limits<float>::infinity();
-  for (std::uint32_t p = 0; p < pieces.voxels.size(); ++p) {
-    if (beyond[p] == 0 || is_speck(p)) continue;
-    if (is_certain(p)) {
-      ++result.pieces;
-      least = std::min(least, nearest[p]);
-    } else {
-      (beyond[p] == pieces.voxels[p] ? tissue : reaches) = true;
-    }
+  void look_around(const std::vector<std::uint8_t>& body) {
+    to_body_ = squared_distance_mm2(body, matter_.frame(), 1, context_);
+    hulls_ = hulls_of(body, matter_.frame());
+    std::fill(beyond_.begin(), beyond_.end(), 0);
+    outside_ = all_ = covered_ = 0;
+    each_of_mask([&](std::uint32_t p, int i, int j, int k, std::size_t) {
+      const bool is = is_outside(i, j, k);
+      beyond_[p] += is ? 1 : 0;
+      outside_ += is ? 1 : 0;
+      covered_ += !is && matter_.covered(i, j, k) ? 1 : 0;
+      ++all_;
+    });
   }
-  if (result.pieces > 0) result.nearest_mm = static_cast<double>(std::sqrt(least) - kThin);
-  each_voxel([&](std::uint32_t p, int i, int j, int k, std::size_t v) {
-    // Of a dry skull only what stands apart as a whole.
-    if (beyond[p] == 0 || is_speck(p) || (!result.body && beyond[p] != pieces.voxels[p]) || !is_outside(i, j, k))
-      return;
-    (is_certain(p) ? result.certain : result.doubtful).push_back(v);
-  });
-  result.doubt = !result.body ? "there is no soft tissue around the bone (a dry skull?), so it may be a part of it"
-                 : reaches && tissue ? "it touches bone of the body, or has tissue near it as a limb has"
-                 : reaches           ? "it touches bone of the body"
-                                     : "it has tissue near it, as a limb has";
-  return result;
+
+  // Of each piece that stands apart as a whole.
+  struct Near {
+    float body_mm2 = std::numeric_limits<float>::infinity();  // squared distance
+    bool limb = false;                                        // there is tissue near it that is not the body
+  };
+  [[nodiscard]] std::vector<Near> what_is_near(bool body) const {
+    std::vector<float> to_limb;
+    if (body)
+      to_limb = squared_distance_mm2(matter_.of_parts([&](std::uint32_t part) {
+        return part != body_part_ && matter_.is_soft(part, 0.25);  // a wrist is half bone
+      }),
+                                     matter_.frame(), 1, context_);
+    std::vector<Near> near(pieces_.voxels.size());
+    each_of_mask([&](std::uint32_t p, int i, int j, int k, std::size_t) {
+      if (!apart(p)) return;
+      const std::size_t at = matter_.at(i, j, k);
+      near[p].body_mm2 = std::min(near[p].body_mm2, to_body_[at]);
+      if (!to_limb.empty() && to_limb[at] <= kReach) near[p].limb = true;
+    });
+    return near;
+  }
+
+  const Image& ct_;
+  const Context& context_;
+  Matter matter_;
+  Components pieces_;  // of the mask
+  std::size_t up_;
+  std::uint32_t body_part_ = 0;
+  std::vector<float> to_body_;  // squared, mm2
+  std::vector<Hull> hulls_;
+  std::vector<std::uint64_t> beyond_;  // voxels of each piece that are outside
+  // Voxels of the mask; covered: not outside, and with matter around them.
+  std::uint64_t outside_ = 0, all_ = 0, covered_ = 0;
+};
+
+}  // namespace
+
+Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& context) {
+  return Surroundings(mask, ct, context).find();
 }
 
 std::size_t clear_streaks(std::uint8_t* mask, const Image& ct, double radius_mm, double metal_hu, double lower_hu,

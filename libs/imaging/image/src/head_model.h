@@ -71,6 +71,12 @@ struct HeadAnatomy::Model {
   [[nodiscard]] std::optional<std::size_t> lattice_index(Vec3 p) const;
   [[nodiscard]] double skull(Vec3 p, double vault, double brain, double orbit, double nasal, double air, double sinus,
                              const Ear& e) const;
+  void place_canal();
+  void place_nerves();
+  void place_vessels();
+  void place_jaw();
+  void place_cochlea();
+  void place_teeth(int row);
   void place_cells(std::uint64_t seed);
 
   // Cells that can matter in each box of a lattice, and the openings between them.

@@ -397,6 +397,127 @@ class Hdf5 {
   hid_t file_ = -1;
 };
 
+// The data sets of a session. The order in which they are made is part of the file.
+class Hdf5Session {
+ public:
+  Hdf5Session(const Hdf5& file, const SessionOutline& o)
+      : file_(file),
+        time_(real("/ticks/time_s", "s")),
+        tick_columns_(columns_of_ticks(o)),
+        lost_(integer("/ticks/ticks_lost_before", "ticks")),
+        voxels_(file, "/voxel_changes/voxel", "name"),
+        densities_(file, "/voxel_changes/density", "share of a voxel"),
+        action_time_(real("/actions/time_s", "s")),
+        action_columns_(columns_of_actions()),
+        before_(integer("/actions/voxel_changes_before", "rows of /voxel_changes")),
+        gap_first_(integer("/gaps/first_tick", "1")),
+        gap_ticks_(integer("/gaps/ticks", "ticks")),
+        gap_bytes_(integer("/gaps/bytes", "bytes of the file")),
+        gap_lost_(integer("/gaps/bone_lost", "0 or 1")),
+        note_time_(real("/notes/time_s", "s")),
+        note_tick_(integer("/notes/tick", "1")),
+        note_kind_(text("/notes/kind")),
+        note_json_(text("/notes/json")) {}
+
+  void add(const TickRecord& t, Rows& rows) {
+    time_->add(rows.seconds(t.tick));
+    for (const Field& c : tick_columns_) {
+      const double value = value_of(*c.field, &t);
+      c.real != nullptr ? c.real->add(value) : c.integer->add(static_cast<std::int64_t>(value));
+    }
+    lost_->add(static_cast<std::int64_t>(rows.lost_before(t)));
+  }
+  void add(const SceneAction& a, const Rows& rows) {
+    action_time_->add(rows.seconds(a.tick));
+    for (const Field& c : action_columns_) {
+      const double value = value_of(*c.field, &a);
+      if (c.text != nullptr)
+        c.text->add(rows.action_name(a));
+      else if (c.real != nullptr)
+        c.real->add(value);
+      else if (told(*c.field) == Told::nobody_or_number)
+        c.integer->add(who(*c.field, a) ? static_cast<std::int64_t>(value) : -1);
+      else
+        c.integer->add(static_cast<std::int64_t>(value));
+    }
+    before_->add(changes_);
+  }
+  void add(const VoxelChange& c) {
+    voxels_.add(c.voxel);
+    densities_.add(c.density);
+    ++changes_;
+  }
+  void add(const Gap& g) {
+    gap_first_->add(static_cast<std::int64_t>(g.first_tick));
+    gap_ticks_->add(static_cast<std::int64_t>(g.ticks));
+    gap_bytes_->add(static_cast<std::int64_t>(g.bytes));
+    gap_lost_->add(g.bone_lost ? 1 : 0);
+  }
+  void add(const Note& n, const Rows& rows) {
+    note_time_->add(rows.seconds(n.tick));
+    note_tick_->add(static_cast<std::int64_t>(n.tick));
+    note_kind_->add(n.kind);
+    note_json_->add(n.json);
+  }
+  void flush() {
+    for (auto& c : doubles_) c.flush();
+    for (auto& c : whole_) c.flush();
+    for (auto& c : texts_) c.flush();
+    voxels_.flush();
+    densities_.flush();
+  }
+
+ private:
+  using Real = Hdf5::Numbers<double>;
+  using Integer = Hdf5::Numbers<std::int64_t>;
+  // What takes a field of a record.
+  struct Field {
+    const RecordField* field;
+    Real* real = nullptr;
+    Integer* integer = nullptr;
+    Hdf5::Texts* text = nullptr;
+  };
+  Real* real(const std::string& name, std::string_view unit) { return &doubles_.emplace_back(file_, name, unit); }
+  Integer* integer(const std::string& name, std::string_view unit) { return &whole_.emplace_back(file_, name, unit); }
+  Hdf5::Texts* text(const std::string& name) { return &texts_.emplace_back(file_, name); }
+  Field column_of(const std::string& group, const RecordField& f, bool as_text) {
+    const std::string name = group + "/" + std::string(f.name);
+    if (as_text) return Field{&f, nullptr, nullptr, text(name)};
+    std::string unit(f.unit);
+    if (const auto at = unit.find("4294967295"); at != std::string::npos) unit.replace(at, 10, "-1");
+    if (is_whole(f.type)) return Field{&f, nullptr, integer(name, unit), nullptr};
+    return Field{&f, real(name, f.unit), nullptr, nullptr};
+  }
+  std::vector<Field> columns_of_ticks(const SessionOutline& o) {
+    std::vector<Field> columns;
+    for (const RecordField* const f : o.tick_fields) columns.push_back(column_of("/ticks", *f, false));
+    return columns;
+  }
+  std::vector<Field> columns_of_actions() {
+    std::vector<Field> columns;
+    for (const RecordField& f : action_record_table().fields)
+      columns.push_back(column_of("/actions", f, told(f) == Told::kind));
+    return columns;
+  }
+
+  const Hdf5& file_;
+  std::deque<Real> doubles_;
+  std::deque<Integer> whole_;
+  std::deque<Hdf5::Texts> texts_;
+  Real* time_;
+  std::vector<Field> tick_columns_;
+  Integer* lost_;
+  Hdf5::Numbers<std::uint32_t> voxels_;
+  Hdf5::Numbers<float> densities_;
+  Real* action_time_;
+  std::vector<Field> action_columns_;
+  Integer *before_, *gap_first_, *gap_ticks_, *gap_bytes_, *gap_lost_;
+  Real* note_time_;
+  Integer* note_tick_;
+  Hdf5::Texts *note_kind_, *note_json_;
+  std::int64_t changes_ = 0;
+};
+
 void hdf5(Rows rows, const fs::path& path) {
   const SessionOutline& o = rows.outline();
   Hdf5 file(path);
@@ -409,98 +530,15 @@ void hdf5(Rows rows, const fs::path& path) {
   file.text("tools", burrs);
   for (const char* const group : {"/ticks", "/voxel_changes", "/actions", "/gaps", "/notes"}) file.group(group);
   {
-    std::deque<Hdf5::Numbers<double>> doubles;
-    std::deque<Hdf5::Numbers<std::int64_t>> whole;
-    std::deque<Hdf5::Texts> texts;
-    const auto real = [&](const std::string& name, std::string_view unit) {
-      return &doubles.emplace_back(file, name, unit);
-    };
-    const auto integer = [&](const std::string& name, std::string_view unit) {
-      return &whole.emplace_back(file, name, unit);
-    };
-    const auto text = [&](const std::string& name) { return &texts.emplace_back(file, name); };
-    // What takes a field of a record.
-    struct Field {
-      const RecordField* field;
-      Hdf5::Numbers<double>* real = nullptr;
-      Hdf5::Numbers<std::int64_t>* integer = nullptr;
-      Hdf5::Texts* text = nullptr;
-    };
-    const auto column_of = [&](const std::string& group, const RecordField& f, bool as_text) {
-      const std::string name = group + "/" + std::string(f.name);
-      if (as_text) return Field{&f, nullptr, nullptr, text(name)};
-      std::string unit(f.unit);
-      if (const auto at = unit.find("4294967295"); at != std::string::npos) unit.replace(at, 10, "-1");
-      if (is_whole(f.type)) return Field{&f, nullptr, integer(name, unit), nullptr};
-      return Field{&f, real(name, f.unit), nullptr, nullptr};
-    };
-    std::vector<Field> tick_columns, action_columns;
-    auto* const time = real("/ticks/time_s", "s");
-    for (const RecordField* const f : o.tick_fields) tick_columns.push_back(column_of("/ticks", *f, false));
-    auto* const lost = integer("/ticks/ticks_lost_before", "ticks");
-    Hdf5::Numbers<std::uint32_t> voxels(file, "/voxel_changes/voxel", "name");
-    Hdf5::Numbers<float> densities(file, "/voxel_changes/density", "share of a voxel");
-    auto* const action_time = real("/actions/time_s", "s");
-    for (const RecordField& f : action_record_table().fields) {
-      action_columns.push_back(column_of("/actions", f, told(f) == Told::kind));
-    }
-    auto* const before = integer("/actions/voxel_changes_before", "rows of /voxel_changes");
-    auto* const gap_first = integer("/gaps/first_tick", "1");
-    auto* const gap_ticks = integer("/gaps/ticks", "ticks");
-    auto* const gap_bytes = integer("/gaps/bytes", "bytes of the file");
-    auto* const gap_lost = integer("/gaps/bone_lost", "0 or 1");
-    auto* const note_time = real("/notes/time_s", "s");
-    auto* const note_tick = integer("/notes/tick", "1");
-    auto* const note_kind = text("/notes/kind");
-    auto* const note_json = text("/notes/json");
-    std::int64_t changes = 0;
+    Hdf5Session to(file, o);
     while (const SessionPart* const p = rows.next()) {
-      for (const TickRecord& t : p->ticks) {
-        time->add(rows.seconds(t.tick));
-        for (const Field& c : tick_columns) {
-          const double value = value_of(*c.field, &t);
-          c.real != nullptr ? c.real->add(value) : c.integer->add(static_cast<std::int64_t>(value));
-        }
-        lost->add(static_cast<std::int64_t>(rows.lost_before(t)));
-      }
-      for (const SceneAction& a : p->actions) {
-        action_time->add(rows.seconds(a.tick));
-        for (const Field& c : action_columns) {
-          const double value = value_of(*c.field, &a);
-          if (c.text != nullptr)
-            c.text->add(rows.action_name(a));
-          else if (c.real != nullptr)
-            c.real->add(value);
-          else if (told(*c.field) == Told::nobody_or_number)
-            c.integer->add(who(*c.field, a) ? static_cast<std::int64_t>(value) : -1);
-          else
-            c.integer->add(static_cast<std::int64_t>(value));
-        }
-        before->add(changes);
-      }
-      for (const VoxelChange& c : p->changes) {
-        voxels.add(c.voxel);
-        densities.add(c.density);
-        ++changes;
-      }
-      if (const Gap* const g = p->gap) {
-        gap_first->add(static_cast<std::int64_t>(g->first_tick));
-        gap_ticks->add(static_cast<std::int64_t>(g->ticks));
-        gap_bytes->add(static_cast<std::int64_t>(g->bytes));
-        gap_lost->add(g->bone_lost ? 1 : 0);
-      }
-      for (const Note& n : p->notes) {
-        note_time->add(rows.seconds(n.tick));
-        note_tick->add(static_cast<std::int64_t>(n.tick));
-        note_kind->add(n.kind);
-        note_json->add(n.json);
-      }
+      for (const TickRecord& t : p->ticks) to.add(t, rows);
+      for (const SceneAction& a : p->actions) to.add(a, rows);
+      for (const VoxelChange& c : p->changes) to.add(c);
+      if (const Gap* const g = p->gap) to.add(*g);
+      for (const Note& n : p->notes) to.add(n, rows);
     }
-    for (auto& c : doubles) c.flush();
-    for (auto& c : whole) c.flush();
-    for (auto& c : texts) c.flush();
-    voxels.flush();
-    densities.flush();
+    to.flush();
   }
   file.close();
 }

@@ -34,6 +34,193 @@ float length_of(const std::array<float, 3>& v) {
   return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
+// Where a brick's wide view is made: nodes from -1 to `cells` of each axis, whose gradients are then interpolated; it
+// takes cells from -1 - radius to cells + radius.
+struct WideGrid {
+  int cells, radius;  // along a brick's edge; of the kernel
+  [[nodiscard]] int nodes() const { return cells + 2; }
+  [[nodiscard]] int side() const { return nodes() + 2 * radius; }
+};
+
+// The cells that the brick at `at` takes, x fastest; `all` brick after brick.
+void gather_cells(const BrickGrid& bone, const std::vector<float>& all, Ijk at, const WideGrid& grid,
+                  std::vector<float>& block) {
+  const int m = grid.cells, r = grid.radius, side = grid.side();
+  block.assign(static_cast<std::size_t>(side * side * side), 0.0F);
+  // Brick by brick, what of it lies in the block.
+  const int lo = -1 - r, hi = m + r;
+  const auto brick_of = [&](int cell) { return (cell + 64 * m) / m - 64; };
+  for (int bk = brick_of(lo); bk <= brick_of(hi); ++bk) {
+    for (int bj = brick_of(lo); bj <= brick_of(hi); ++bj) {
+      for (int bi = brick_of(lo); bi <= brick_of(hi); ++bi) {
+        const std::uint32_t other = bone.find_brick(at.i + bi, at.j + bj, at.k + bk);
+        if (other == BrickGrid::kNone) continue;
+        const float* const from = all.data() + static_cast<std::size_t>(other) * static_cast<std::size_t>(m * m * m);
+        for (int k = std::max(lo, bk * m); k <= std::min(hi, bk * m + m - 1); ++k) {
+          for (int j = std::max(lo, bj * m); j <= std::min(hi, bj * m + m - 1); ++j) {
+            const int i0 = std::max(lo, bi * m), i1 = std::min(hi, bi * m + m - 1);
+            const float* const row = from + ((k - bk * m) * m + j - bj * m) * m - bi * m;
+            std::copy(row + i0, row + i1 + 1,
+                      &block[static_cast<std::size_t>(((k - lo) * side + j - lo) * side + i0 - lo)]);
+          }
+        }
+      }
+    }
+  }
+}
+
+// A kernel along one axis: `nodes` results from each of `outer` slabs, each a run of `inner` values.
+struct Pass {
+  int nodes, stride;               // from a value to the next along the axis
+  int outer, outer_in, outer_out;  // slabs, and from one to the next
+  int inner, out_stride;
+  void operator()(const std::vector<float>& in, std::vector<float>& out, const std::vector<float>& taps) const {
+    for (int o = 0; o < outer; ++o) {
+      for (int n = 0; n < nodes; ++n) {
+        float* const to = &out[static_cast<std::size_t>(o * outer_out + n * out_stride)];
+        const float* const source = &in[static_cast<std::size_t>(o * outer_in + n * stride)];
+        std::fill_n(to, inner, 0.0F);
+        for (std::size_t t = 0; t < taps.size(); ++t) {
+          const float w = taps[t];
+          const float* const s = source + static_cast<int>(t) * stride;
+          for (int x = 0; x < inner; ++x) to[x] += w * s[x];
+        }
+      }
+    }
+  }
+};
+
+// Value and gradient at each node. Separable: along z, then y, then x. Of the four that are wanted (value and three
+// slopes) each pass makes what the next ones need.
+void see_wide(const std::vector<float>& block, const std::vector<float>& value, const std::vector<float>& slope,
+              const WideGrid& grid, std::vector<Sight>& sight) {
+  const int nodes = grid.nodes(), side = grid.side(), plane = side * side, small = nodes * side;
+  thread_local std::vector<float> zv, zs, yvv, ysv, yvs;
+  zv.resize(static_cast<std::size_t>(nodes * plane));
+  zs.resize(zv.size());
+  const Pass along_z{nodes, plane, 1, 0, 0, plane, plane};
+  along_z(block, zv, value);
+  along_z(block, zs, slope);
+  yvv.resize(static_cast<std::size_t>(nodes * small));
+  ysv.resize(yvv.size());
+  yvs.resize(yvv.size());
+  const Pass along_y{nodes, side, nodes, plane, small, side, side};
+  along_y(zv, yvv, value);
+  along_y(zv, ysv, slope);
+  along_y(zs, yvs, value);
+  sight.assign(static_cast<std::size_t>(nodes * nodes * nodes), {});
+  for (int row = 0; row < nodes * nodes; ++row) {
+    const auto from = static_cast<std::size_t>(row * side);
+    for (int n = 0; n < nodes; ++n) {
+      Sight& s = sight[static_cast<std::size_t>(row * nodes + n)];
+      for (std::size_t t = 0; t < value.size(); ++t) {
+        const std::size_t x = from + static_cast<std::size_t>(n) + t;
+        s.value += value[t] * yvv[x];
+        s.gradient[0] += slope[t] * yvv[x];
+        s.gradient[1] += value[t] * ysv[x];
+        s.gradient[2] += value[t] * yvs[x];
+      }
+    }
+  }
+}
+
+// Between the nodes; `place` in voxels from the brick's first, `cells_a_voxel` along an edge.
+Sight between_nodes(const std::vector<Sight>& sight, int nodes, const std::array<float, 3>& place,
+                    float cells_a_voxel) {
+  std::array<int, 3> n{};
+  std::array<float, 3> f{};
+  for (std::size_t x = 0; x < 3; ++x) {
+    const float u = std::clamp((place[x] + 0.5F) * cells_a_voxel + 0.5F, 0.0F, static_cast<float>(nodes) - 1.001F);
+    n[x] = static_cast<int>(u);
+    f[x] = u - static_cast<float>(n[x]);
+  }
+  Sight s;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int di = corner & 1, dj = corner >> 1 & 1, dk = corner >> 2;
+    const float w = (di != 0 ? f[0] : 1 - f[0]) * (dj != 0 ? f[1] : 1 - f[1]) * (dk != 0 ? f[2] : 1 - f[2]);
+    const Sight& q = sight[static_cast<std::size_t>(((n[2] + dk) * nodes + n[1] + dj) * nodes + n[0] + di)];
+    s.value += w * q.value;
+    for (std::size_t x = 0; x < 3; ++x) s.gradient[x] += w * q.gradient[x];
+  }
+  return s;
+}
+
+// Voxels around a brick, read only when a vertex is not flat.
+class NarrowView {
+ public:
+  // `memory` is its own while it lives.
+  NarrowView(const BrickGrid& bone, const std::array<int, 3>& origin, int radius, double voxel_mm,
+             std::vector<float>& memory)
+      : bone_(bone),
+        origin_(origin),
+        radius_(radius),
+        fine_(8 + 2 * (radius + 2)),
+        voxel_mm_(voxel_mm),
+        voxels_(memory) {}
+
+  // Around the voxel that is nearest to the place, by kernels moved to it.
+  std::array<float, 3> gradient_at(const std::array<float, 3>& place) {
+    read();
+    std::array<std::array<float, 16>, 3> value{}, slope{};
+    std::array<int, 3> first{};
+    const int taps = 2 * radius_ + 1;
+    for (std::size_t x = 0; x < 3; ++x) first[x] = kernel_at(place[x], value[x], slope[x]);
+    std::array<float, 3> g{};
+    for (int k = 0; k < taps; ++k) {
+      for (int j = 0; j < taps; ++j) {
+        const float* const row =
+            &voxels_[static_cast<std::size_t>(((first[2] + k) * fine_ + first[1] + j) * fine_ + first[0])];
+        float along = 0, slopes = 0;
+        for (int i = 0; i < taps; ++i) {
+          along += value[0][static_cast<std::size_t>(i)] * row[i];
+          slopes += slope[0][static_cast<std::size_t>(i)] * row[i];
+        }
+        const auto kk = static_cast<std::size_t>(k), jj = static_cast<std::size_t>(j);
+        g[0] += value[2][kk] * value[1][jj] * slopes;
+        g[1] += value[2][kk] * slope[1][jj] * along;
+        g[2] += slope[2][kk] * value[1][jj] * along;
+      }
+    }
+    return g;
+  }
+
+ private:
+  void read() {
+    if (have_) return;
+    voxels_.resize(static_cast<std::size_t>(fine_ * fine_ * fine_));
+    bone_.read_block({origin_[0] - radius_ - 2, origin_[1] - radius_ - 2, origin_[2] - radius_ - 2},
+                     {fine_, fine_, fine_}, voxels_.data());
+    have_ = true;
+  }
+  // Returns the first voxel that it takes.
+  int kernel_at(float u, std::array<float, 16>& value, std::array<float, 16>& slope) const {
+    const int taps = 2 * radius_ + 1;
+    const int nearest = std::clamp(static_cast<int>(std::floor(u + 0.5F)), -2, 9);
+    float sum = 0, moment = 0;
+    for (int t = 0; t < taps; ++t) {
+      const float d = static_cast<float>(nearest - radius_ + t) - u;
+      const auto g =
+          static_cast<float>(portable::exp(-0.5 * static_cast<double>(d * d) / (kNarrowVoxels * kNarrowVoxels)));
+      value[static_cast<std::size_t>(t)] = g;
+      slope[static_cast<std::size_t>(t)] = d * g;
+      sum += g;
+      moment += d * d * g;
+    }
+    for (int t = 0; t < taps; ++t) {
+      value[static_cast<std::size_t>(t)] /= sum;
+      slope[static_cast<std::size_t>(t)] /= moment * static_cast<float>(voxel_mm_);
+    }
+    return nearest + 2;
+  }
+
+  const BrickGrid& bone_;
+  std::array<int, 3> origin_;
+  int radius_, fine_;
+  double voxel_mm_;
+  bool have_ = false;
+  std::vector<float>& voxels_;
+};
+
 }  // namespace
 
 ShadingField::Kernel ShadingField::kernel_of(double sigma_mm, double cell_mm) {
@@ -90,102 +277,21 @@ void ShadingField::sum_cells(std::uint32_t brick) {
 void ShadingField::shade(std::uint32_t brick, SurfacePatch& patch) const {
   if (patch.vertices.empty()) return;
   const Ijk at = bone_->brick_coordinate(brick);
-  const int m = per_brick_, r = wide_.radius;
-  // Nodes from -1 to m of each axis, whose gradients are then interpolated; cells from -1 - r to m + r.
-  const int nodes = m + 2, side = nodes + 2 * r;
+  const WideGrid grid{per_brick_, wide_.radius};
   thread_local std::vector<float> block;
-  block.assign(static_cast<std::size_t>(side * side * side), 0.0F);
-  // Brick by brick, what of it lies in the block.
-  const int lo = -1 - r, hi = m + r;
-  const auto brick_of = [&](int cell) { return (cell + 64 * m) / m - 64; };
-  for (int bk = brick_of(lo); bk <= brick_of(hi); ++bk) {
-    for (int bj = brick_of(lo); bj <= brick_of(hi); ++bj) {
-      for (int bi = brick_of(lo); bi <= brick_of(hi); ++bi) {
-        const std::uint32_t other = bone_->find_brick(at.i + bi, at.j + bj, at.k + bk);
-        if (other == BrickGrid::kNone) continue;
-        const float* const from = cells_.data() + static_cast<std::size_t>(other) * static_cast<std::size_t>(m * m * m);
-        for (int k = std::max(lo, bk * m); k <= std::min(hi, bk * m + m - 1); ++k) {
-          for (int j = std::max(lo, bj * m); j <= std::min(hi, bj * m + m - 1); ++j) {
-            const int i0 = std::max(lo, bi * m), i1 = std::min(hi, bi * m + m - 1);
-            const float* const row = from + ((k - bk * m) * m + j - bj * m) * m - bi * m;
-            std::copy(row + i0, row + i1 + 1,
-                      &block[static_cast<std::size_t>(((k - lo) * side + j - lo) * side + i0 - lo)]);
-          }
-        }
-      }
-    }
-  }
-  // Separable: along z, then y, then x. Of the four that are wanted (value and three slopes) each pass makes what the
-  // next ones need.
-  const auto pass = [&](const std::vector<float>& in, std::vector<float>& out, const std::vector<float>& taps,
-                        int stride, int outer, int outer_stride_in, int outer_stride_out, int inner, int out_stride) {
-    for (int o = 0; o < outer; ++o) {
-      for (int n = 0; n < nodes; ++n) {
-        float* const to = &out[static_cast<std::size_t>(o * outer_stride_out + n * out_stride)];
-        const float* const source = &in[static_cast<std::size_t>(o * outer_stride_in + n * stride)];
-        std::fill_n(to, inner, 0.0F);
-        for (std::size_t t = 0; t < taps.size(); ++t) {
-          const float w = taps[t];
-          const float* const s = source + static_cast<int>(t) * stride;
-          for (int x = 0; x < inner; ++x) to[x] += w * s[x];
-        }
-      }
-    }
-  };
-  const int plane = side * side;
-  thread_local std::vector<float> zv, zs, yvv, ysv, yvs;
-  zv.resize(static_cast<std::size_t>(nodes * plane));
-  zs.resize(zv.size());
-  pass(block, zv, wide_.value, plane, 1, 0, 0, plane, plane);
-  pass(block, zs, wide_.slope, plane, 1, 0, 0, plane, plane);
-  const int small = nodes * side;
-  yvv.resize(static_cast<std::size_t>(nodes * small));
-  ysv.resize(yvv.size());
-  yvs.resize(yvv.size());
-  pass(zv, yvv, wide_.value, side, nodes, plane, small, side, side);
-  pass(zv, ysv, wide_.slope, side, nodes, plane, small, side, side);
-  pass(zs, yvs, wide_.value, side, nodes, plane, small, side, side);
+  gather_cells(*bone_, cells_, at, grid, block);
   thread_local std::vector<Sight> sight;
-  sight.assign(static_cast<std::size_t>(nodes * nodes * nodes), {});
-  for (int row = 0; row < nodes * nodes; ++row) {
-    const auto from = static_cast<std::size_t>(row * side);
-    for (int n = 0; n < nodes; ++n) {
-      Sight& s = sight[static_cast<std::size_t>(row * nodes + n)];
-      for (std::size_t t = 0; t < wide_.value.size(); ++t) {
-        const std::size_t x = from + static_cast<std::size_t>(n) + t;
-        s.value += wide_.value[t] * yvv[x];
-        s.gradient[0] += wide_.slope[t] * yvv[x];
-        s.gradient[1] += wide_.value[t] * ysv[x];
-        s.gradient[2] += wide_.value[t] * yvs[x];
-      }
-    }
-  }
+  see_wide(block, wide_.value, wide_.slope, grid, sight);
   const float whole_wide = static_cast<float>(kWideMm * std::sqrt(2 * std::numbers::pi));
   const float whole_narrow = static_cast<float>(kNarrowVoxels * voxel_mm_ * std::sqrt(2 * std::numbers::pi));
   const float scale = 1 / static_cast<float>(edge_);
-  // Voxels around the brick, read only when a vertex is not flat.
-  const int rn = narrow_.radius, fine = 8 + 2 * (rn + 2);
+  const std::array<int, 3> origin{at.i * 8, at.j * 8, at.k * 8};
   thread_local std::vector<float> voxels;
-  bool have_voxels = false;
+  NarrowView narrow(*bone_, origin, narrow_.radius, voxel_mm_, voxels);
   for (SurfacePatch::Vertex& v : patch.vertices) {
-    // Wide.
-    std::array<int, 3> n{};
-    std::array<float, 3> f{};
-    const std::array<int, 3> origin{at.i * 8, at.j * 8, at.k * 8};
-    for (std::size_t x = 0; x < 3; ++x) {
-      const float u = std::clamp((v.index[x] - static_cast<float>(origin[x]) + 0.5F) * scale + 0.5F, 0.0F,
-                                 static_cast<float>(nodes) - 1.001F);
-      n[x] = static_cast<int>(u);
-      f[x] = u - static_cast<float>(n[x]);
-    }
-    Sight s;
-    for (int corner = 0; corner < 8; ++corner) {
-      const int di = corner & 1, dj = corner >> 1 & 1, dk = corner >> 2;
-      const float w = (di != 0 ? f[0] : 1 - f[0]) * (dj != 0 ? f[1] : 1 - f[1]) * (dk != 0 ? f[2] : 1 - f[2]);
-      const Sight& q = sight[static_cast<std::size_t>(((n[2] + dk) * nodes + n[1] + dj) * nodes + n[0] + di)];
-      s.value += w * q.value;
-      for (std::size_t x = 0; x < 3; ++x) s.gradient[x] += w * q.gradient[x];
-    }
+    std::array<float, 3> place{};
+    for (std::size_t x = 0; x < 3; ++x) place[x] = v.index[x] - static_cast<float>(origin[x]);
+    const Sight s = between_nodes(sight, grid.nodes(), place, scale);
     const float height = length_of(s.gradient), step = height * whole_wide;
     const float bent = std::abs(s.value - 0.5F) + std::max(0.0F, kWholeStep - step);
     const float flat = height > 0 ? 1 - smooth_step(kFlat, kNotFlat, bent) : 0;
@@ -195,51 +301,7 @@ void ShadingField::shade(std::uint32_t brick, SurfacePatch& patch) const {
       for (std::size_t x = 0; x < 3; ++x) normal[x] = flat * u[x];
     }
     if (flat < 1) {
-      if (!have_voxels) {
-        voxels.resize(static_cast<std::size_t>(fine * fine * fine));
-        bone_->read_block({origin[0] - rn - 2, origin[1] - rn - 2, origin[2] - rn - 2}, {fine, fine, fine},
-                          voxels.data());
-        have_voxels = true;
-      }
-      // Around the voxel that is nearest to the vertex, by kernels moved to it.
-      std::array<std::array<float, 16>, 3> value{}, slope{};
-      std::array<int, 3> first{};
-      const int taps = 2 * rn + 1;
-      for (std::size_t x = 0; x < 3; ++x) {
-        const float u = v.index[x] - static_cast<float>(origin[x]);
-        const int nearest = std::clamp(static_cast<int>(std::floor(u + 0.5F)), -2, 9);
-        first[x] = nearest + 2;
-        float sum = 0, moment = 0;
-        for (int t = 0; t < taps; ++t) {
-          const float d = static_cast<float>(nearest - rn + t) - u;
-          const auto g =
-              static_cast<float>(portable::exp(-0.5 * static_cast<double>(d * d) / (kNarrowVoxels * kNarrowVoxels)));
-          value[x][static_cast<std::size_t>(t)] = g;
-          slope[x][static_cast<std::size_t>(t)] = d * g;
-          sum += g;
-          moment += d * d * g;
-        }
-        for (int t = 0; t < taps; ++t) {
-          value[x][static_cast<std::size_t>(t)] /= sum;
-          slope[x][static_cast<std::size_t>(t)] /= moment * static_cast<float>(voxel_mm_);
-        }
-      }
-      std::array<float, 3> g{};
-      for (int k = 0; k < taps; ++k) {
-        for (int j = 0; j < taps; ++j) {
-          const float* const row =
-              &voxels[static_cast<std::size_t>(((first[2] + k) * fine + first[1] + j) * fine + first[0])];
-          float along = 0, slopes = 0;
-          for (int i = 0; i < taps; ++i) {
-            along += value[0][static_cast<std::size_t>(i)] * row[i];
-            slopes += slope[0][static_cast<std::size_t>(i)] * row[i];
-          }
-          const auto kk = static_cast<std::size_t>(k), jj = static_cast<std::size_t>(j);
-          g[0] += value[2][kk] * value[1][jj] * slopes;
-          g[1] += value[2][kk] * slope[1][jj] * along;
-          g[2] += slope[2][kk] * value[1][jj] * along;
-        }
-      }
+      const std::array<float, 3> g = narrow.gradient_at(place);
       const float tall = length_of(g);
       const float seen = tall > 0 ? smooth_step(kStepSeen, kStepSure, tall * whole_narrow) : 0;
       for (std::size_t x = 0; x < 3; ++x)

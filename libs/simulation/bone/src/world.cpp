@@ -30,6 +30,44 @@ bool is_rigid(const RigidTransform& t) {
   return determinant(t.rotation) > 0 && std::isfinite(dot(t.shift_mm, t.shift_mm)) && length(t.shift_mm) < 1e6;
 }
 
+// Why the numbers of an action make no sense, whatever the scene; empty: they do.
+std::string senseless(const SceneAction& a) {
+  const auto& v = a.values;
+  for (const double x : v) {
+    if (!std::isfinite(x)) return "a number of the action is not finite";
+  }
+  if (a.hand >= kMostHands) return "there is no hand " + std::to_string(a.hand);
+  switch (static_cast<ActionKind>(a.kind)) {
+    case ActionKind::guide:
+      if (!(v[0] >= 0 && v[0] < kMostHands && v[0] == std::floor(v[0])) || a.item >= kMostHands ||
+          static_cast<double>(a.item) == v[0])
+        return "one hand is led by another, both below " + std::to_string(kMostHands);
+      if (!(v[1] >= -10 && v[1] <= 10 && v[2] >= 0 && v[2] <= 100 && std::abs(v[3]) <= 2 && v[4] >= 0 && v[4] <= 20 &&
+            v[5] >= 0 && (v[6] == 0 || v[6] == 1) && v[7] >= 0 && v[7] <= 100))
+        return "a guide pulls with -10 to 10 N/mm, 0 to 100 N s/m, up to 20 N and twice the leader's force";
+      break;
+    case ActionKind::cutting_guide:
+      if (!(v[6] >= 0 && v[6] <= SceneAction::kMostSlotMm))
+        return "a saw slips into a cutting guide from 0 to " + format_number(SceneAction::kMostSlotMm) + " mm away";
+      if (v[6] > 0 && !(length(Vec3{v[3], v[4], v[5]}) > 1e-9))
+        return "the plane of a cutting guide has no direction across it";
+      break;
+    case ActionKind::suction:
+    case ActionKind::irrigate:
+      if (v[4] > 0 && !(v[3] > 0 && v[3] <= SceneAction::kMostReachMm))
+        return "it reaches " + format_number(v[3]) + " mm, but at most " + format_number(SceneAction::kMostReachMm) +
+               " mm make sense";
+      break;
+    case ActionKind::posture:
+      if (const double n = length(Vec3{v[0], v[1], v[2]}); !(n > 0.99 && n < 1.01))
+        return "what is down must be a unit direction";
+      break;
+    default:
+      break;
+  }
+  return {};
+}
+
 }  // namespace
 
 World::World(BrickGrid bone, std::shared_ptr<const Hardness> hardness) {
@@ -241,10 +279,7 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
   Effect effect;
   const ActionRow& row = row_of(a);
   if (a.is(ActionKind::hold) || row.ends_hold) held_ = a.is(ActionKind::hold);
-  for (const double v : a.values) {
-    if (!std::isfinite(v)) return nothing("a number of the action is not finite");
-  }
-  if (a.hand >= kMostHands) return nothing("there is no hand " + std::to_string(a.hand));
+  if (std::string why = senseless(a); !why.empty()) return nothing(std::move(why));
   const auto known = [&](std::uint32_t id) { return find(id) != nullptr; };
   const auto fixture =
       std::find_if(fixtures_.begin(), fixtures_.end(), [&](const Fixture& f) { return f.id == a.item; });
@@ -253,22 +288,12 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
     case ActionKind::resume:
     case ActionKind::soft_push:
     case ActionKind::setting:
-      break;
     case ActionKind::guide:
-      if (!(a.values[0] >= 0 && a.values[0] < kMostHands && a.values[0] == std::floor(a.values[0])) ||
-          a.item >= kMostHands || static_cast<double>(a.item) == a.values[0])
-        return nothing("one hand is led by another, both below " + std::to_string(kMostHands));
-      if (!(a.values[1] >= -10 && a.values[1] <= 10 && a.values[2] >= 0 && a.values[2] <= 100 &&
-            std::abs(a.values[3]) <= 2 && a.values[4] >= 0 && a.values[4] <= 20 && a.values[5] >= 0 &&
-            (a.values[6] == 0 || a.values[6] == 1) && a.values[7] >= 0 && a.values[7] <= 100))
-        return nothing("a guide pulls with -10 to 10 N/mm, 0 to 100 N s/m, up to 20 N and twice the leader's force");
+    case ActionKind::suction:
+    case ActionKind::irrigate:
+    case ActionKind::posture:
       break;
     case ActionKind::cutting_guide:
-      if (!(a.values[6] >= 0 && a.values[6] <= SceneAction::kMostSlotMm))
-        return nothing("a saw slips into a cutting guide from 0 to " + format_number(SceneAction::kMostSlotMm) +
-                       " mm away");
-      if (a.values[6] > 0 && !(length(Vec3{a.values[3], a.values[4], a.values[5]}) > 1e-9))
-        return nothing("the plane of a cutting guide has no direction across it");
       guides_[a.hand] = a.guide();
       break;
     case ActionKind::saw:
@@ -279,16 +304,6 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       return undo();
     case ActionKind::stroke:
       return nothing("a stroke ends by itself, when the burr takes no more bone");
-    case ActionKind::suction:
-    case ActionKind::irrigate:
-      if (a.values[4] > 0 && !(a.values[3] > 0 && a.values[3] <= SceneAction::kMostReachMm))
-        return nothing("it reaches " + format_number(a.values[3]) + " mm, but at most " +
-                       format_number(SceneAction::kMostReachMm) + " mm make sense");
-      break;
-    case ActionKind::posture:
-      if (const double n = length(Vec3{a.values[0], a.values[1], a.values[2]}); !(n > 0.99 && n < 1.01))
-        return nothing("what is down must be a unit direction");
-      break;
     case ActionKind::grip:
       if (!is_rigid(a.transform())) return nothing("this is no rigid motion");
       if (a.item != SceneAction::kNobody && a.item >= plate_library().size())

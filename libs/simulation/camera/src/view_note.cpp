@@ -5,20 +5,10 @@
 #include <numbers>
 
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/data/json_vec.h"
 
 namespace osteo::inline simulation {
 namespace {
-
-std::optional<Vec3> vec_of(const Json* j) {
-  if (j == nullptr || j->items().size() != 3) return std::nullopt;
-  Vec3 v;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const auto n = j->items()[a].number();
-    if (!n || !std::isfinite(*n)) return std::nullopt;
-    v[a] = *n;
-  }
-  return v;
-}
 
 double number_of(const Json* j, double otherwise) {
   const auto n = j == nullptr ? std::nullopt : j->number();

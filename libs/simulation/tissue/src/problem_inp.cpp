@@ -8,6 +8,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/io/inp_io.h"
+#include "tet_faces.h"
 
 namespace osteo::inline simulation {
 namespace tissue {
@@ -238,7 +239,6 @@ class Reader {
     }
   }
   void dload(const InpCard& card, TissueLoad& load) {
-    constexpr std::size_t kFaces[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
     for (const auto& row : card.rows) {
       if (row.size() >= 6 && row[1] == "GRAV") {
         const Vec3 along{number_of(card, row[3]), number_of(card, row[4]), number_of(card, row[5])};
@@ -253,7 +253,7 @@ class Reader {
         const auto found = file_.corners_of.find(element);
         if (found == file_.corners_of.end()) throw fail(card, "there is no element " + std::to_string(element));
         std::array<std::uint32_t, 3> face{};
-        const auto& own = kFaces[row[1][1] - '1'];
+        const auto& own = kTetFaces[row[1][1] - '1'];
         for (std::size_t i = 0; i < 3; ++i) face[i] = found->second[own[i]];
         const auto at = [&](std::uint32_t p) { return from_floats(file_.mesh.points_mm[p]); };
         Vec3 area = cross(at(face[1]) - at(face[0]), at(face[2]) - at(face[0])) * 0.5, middle{};
@@ -334,7 +334,6 @@ std::string field(double v) {
 }
 
 constexpr int kBallHalvings = 4;  // of an icosahedron: 5120 triangles, off by 0.1 % of the radius
-constexpr std::size_t kFaces[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};  // S1 to S4
 
 // A rigid thing as tetrahedra that do not move, one behind each triangle of its surface; the first point is the common
 // one inside.
@@ -402,8 +401,8 @@ std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& 
   std::map<std::array<std::uint32_t, 3>, std::pair<std::size_t, std::size_t>> faces;  // element, face; those of two go
   for (std::size_t e = 0; e < body.tet_count(); ++e) {
     for (std::size_t f = 0; f < 4; ++f) {
-      std::array<std::uint32_t, 3> face{body.nodes(e)[kFaces[f][0]], body.nodes(e)[kFaces[f][1]],
-                                        body.nodes(e)[kFaces[f][2]]};
+      std::array<std::uint32_t, 3> face{body.nodes(e)[kTetFaces[f][0]], body.nodes(e)[kTetFaces[f][1]],
+                                        body.nodes(e)[kTetFaces[f][2]]};
       std::sort(face.begin(), face.end());
       if (!faces.try_emplace(face, e, f).second) faces.erase(face);
     }
@@ -417,7 +416,7 @@ std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& 
       double area = 0;
       std::vector<std::array<std::uint32_t, 2>> points;  // corners twice the same, middles by their ends
       for (const auto& [face, where] : faces) {
-        const auto& own = kFaces[where.second];
+        const auto& own = kTetFaces[where.second];
         const auto at = [&](std::size_t i) { return body.rest()[body.nodes(where.first)[own[i]]]; };
         const auto others = 6 - own[0] - own[1] - own[2];
         Vec3 out = cross(at(1) - at(0), at(2) - at(0)) * 0.5;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "osteo/core/base/error.h"
+#include "tet_faces.h"
 
 namespace osteo::inline simulation {
 namespace {
@@ -15,10 +16,9 @@ class Touching final : public Energy {
     if (contacts.empty()) return;
     // Corners of faces that one tetrahedron has, and what lies between two of them.
     std::vector<std::array<std::uint32_t, 3>> faces;
-    constexpr std::size_t kFaces[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
     for (std::size_t e = 0; e < body.tet_count(); ++e) {
       const auto n = body.nodes(e);
-      for (const auto& f : kFaces) {
+      for (const auto& f : kTetFaces) {
         faces.push_back({n[f[0]], n[f[1]], n[f[2]]});
         std::sort(faces.back().begin(), faces.back().end());
       }
