@@ -9,12 +9,27 @@
 #include <string>
 #include <vector>
 
+#include "osteo/core/base/error.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/data/frame.h"
 
 namespace osteo::python {
 
 namespace py = pybind11;
+
+/// An argument of a type that is not taken: in Python also a TypeError. What asks for what there is not (exit code
+/// usage) and WrongValue are also a ValueError.
+struct WrongType : Error {
+  explicit WrongType(const std::string& what, std::string advice = {})
+      : Error(ExitCode::usage, what, std::move(advice)) {}
+};
+struct WrongValue : Error {
+  explicit WrongValue(const Error& e) : Error(e) {}
+};
+
+/// A text of the programs as a script of Python reads it: --spacing-mm is spacing_mm, --no-fill is fill=False. Commands
+/// in quotes ('osteo info FILE') are left.
+[[nodiscard]] std::string python_words(std::string_view text);
 
 /// Memory of numpy for as long as a value of ours needs it. The last owner may be any thread.
 template <class T>

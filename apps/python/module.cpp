@@ -1,12 +1,17 @@
 // The Python module osteo._osteo: values and stages. Everything that is made from declarations is made in
 // osteo/__init__.py.
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <fstream>
 #include <mutex>
 #include <optional>
 
 #include "arrays.h"
 #include "osteo/app/stages/registry.h"
+#include "osteo/core/base/files.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/imaging/pipeline/formats.h"
 #include "osteo/imaging/pipeline/pipeline.h"
@@ -16,24 +21,110 @@ namespace {
 
 using Rows = std::array<std::array<double, 3>, 3>;
 
+template <class T>
+std::string name_of() {
+  return py::str(py::dtype::of<T>());
+}
+
 /// Takes the voxels of `array` as they lie. Another type or order of memory is refused: a copy is the caller's to make.
 template <class T, class V>
 V volume_of(const py::array& array, std::array<double, 3> spacing_mm, std::array<double, 3> origin_mm, Rows direction) {
-  if (!py::isinstance<py::array_t<T>>(array) || array.ndim() != 3 || !(array.flags() & py::array::c_style) ||
-      !(array.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_)) {
-    const std::string name = py::str(py::dtype::of<T>());
-    throw Error(ExitCode::usage,
-                "voxels must be an aligned, C-contiguous array of " + name + " with three axes (z, y, x)",
-                "numpy.ascontiguousarray(voxels, dtype='" + name + "') makes one");
-  }
+  const std::string name = name_of<T>();
+  const auto refused = [&] {
+    return WrongType("voxels must be an aligned, C-contiguous array of " + name + " with three axes (z, y, x)",
+                     "numpy.ascontiguousarray(voxels, dtype='" + name + "') makes one");
+  };
+  if (!py::isinstance<py::array_t<T>>(array)) throw refused();
+  if (array.ndim() != 3 || !(array.flags() & py::array::c_style) ||
+      !(array.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_))
+    throw WrongValue(refused());
   V v;
   for (int i = 0; i < 3; ++i) v.frame.dims[static_cast<std::size_t>(i)] = static_cast<int>(array.shape(2 - i));
   v.frame.spacing_mm = vec(spacing_mm);
   v.frame.origin_mm = vec(origin_mm);
   for (std::size_t c = 0; c < 3; ++c) v.frame.direction.column[c] = {direction[0][c], direction[1][c], direction[2][c]};
-  require_valid(v.frame);
+  try {
+    require_valid(v.frame);
+  } catch (const Error& e) {
+    throw WrongValue(e);
+  }
   v.voxels = borrowed<T>(array);
   return v;
+}
+
+// DLPack 1.0: the only form that can say that memory may not be written.
+// https://dmlc.github.io/dlpack/latest/c_api.html
+struct DlTensor {
+  void* data;
+  std::int32_t device_type, device_id;
+  std::int32_t ndim;
+  std::uint8_t code, bits;
+  std::uint16_t lanes;
+  std::int64_t *shape, *strides;
+  std::uint64_t byte_offset;
+};
+struct DlManagedVersioned {
+  std::uint32_t major, minor;
+  void* context;
+  void (*deleter)(DlManagedVersioned*);
+  std::uint64_t flags;
+  DlTensor tensor;
+};
+template <class T>
+struct DlOwner {
+  DlManagedVersioned managed{};
+  std::shared_ptr<const T[]> voxels;
+  std::array<std::int64_t, 3> shape{}, strides{};
+};
+
+// Whoever takes the capsule renames it; only one that nobody took is freed with it.
+constexpr const char* kDlName = "dltensor_versioned";
+
+template <class T, class V>
+py::capsule dlpack_of(const V& v) {
+  auto* const owner = new DlOwner<T>;
+  owner->voxels = v.voxels;
+  const auto& d = v.frame.dims;
+  owner->shape = {d[2], d[1], d[0]};
+  owner->strides = {std::int64_t{d[1]} * d[0], d[0], 1};
+  constexpr std::uint8_t kInt = 0, kUnsigned = 1, kFloat = 2;
+  const std::uint8_t code = std::is_floating_point_v<T> ? kFloat : std::is_signed_v<T> ? kInt : kUnsigned;
+  constexpr std::int32_t kCpu = 1;
+  constexpr std::uint64_t kReadOnly = 1;
+  owner->managed = {1,
+                    0,
+                    owner,
+                    [](DlManagedVersioned* m) { delete static_cast<DlOwner<T>*>(m->context); },
+                    kReadOnly,
+                    {const_cast<T*>(v.voxels.get()), kCpu, 0, 3, code, 8 * sizeof(T), 1, owner->shape.data(),
+                     owner->strides.data(), 0}};
+  return py::capsule(&owner->managed, kDlName, [](PyObject* capsule) {
+    if (PyCapsule_IsValid(capsule, kDlName) == 0) return;
+    auto* const m = static_cast<DlManagedVersioned*>(PyCapsule_GetPointer(capsule, kDlName));
+    m->deleter(m);
+  });
+}
+
+std::string triple_text(Vec3 v) {
+  return "(" + format_number(v.x) + ", " + format_number(v.y) + ", " + format_number(v.z) + ")";
+}
+std::string placed_text(const Frame& f) {
+  return "shape (" + std::to_string(f.dims[2]) + ", " + std::to_string(f.dims[1]) + ", " + std::to_string(f.dims[0]) +
+         "), spacing_mm " + triple_text(f.spacing_mm) + ", origin_mm " + triple_text(f.origin_mm);
+}
+
+// What nobody can write needs no copy.
+template <class C, class... Of>
+void copies_are_itself(py::class_<C, Of...>& c) {
+  c.def("__copy__", [](const py::object& self) { return self; });
+  c.def(
+      "__deepcopy__", [](const py::object& self, const py::dict&) { return self; }, py::arg("memo"));
+}
+// numpy would make an array of one object of it.
+template <class C, class... Of>
+void no_array(py::class_<C, Of...>& c, const char* instead) {
+  c.def("__array__",
+        [instead](const py::object&, const py::args&, const py::kwargs&) -> py::object { throw WrongType(instead); });
 }
 
 template <class C>
@@ -73,18 +164,69 @@ py::class_<V> volume(py::module_& m, const char* name, const char* doc) {
       },
       "(z, y, x), read-only, the value's own memory");
   frame_members(c);
+  c.def("__repr__", [name](const V& v) {
+    return std::string("<osteo.") + name + ": " + name_of<T>() + ", " + placed_text(v.frame) + ">";
+  });
+  c.def(
+      "__array__",
+      [](const py::object& self, const py::object& dtype, const py::object& copy) -> py::object {
+        const py::object voxels = self.attr("voxels");
+        const bool other = !dtype.is_none() && !py::dtype::from_args(dtype).equal(voxels.attr("dtype"));
+        if (other && !copy.is_none() && !copy.cast<bool>())
+          throw WrongValue(Error(ExitCode::usage, "voxels of another type are a copy, and copy=False wants none"));
+        if (other) return voxels.attr("astype")(dtype);
+        return !copy.is_none() && copy.cast<bool>() ? voxels.attr("copy")() : voxels;
+      },
+      py::arg("dtype") = py::none(), py::arg("copy") = py::none(),
+      "The voxels: read-only and no copy, unless another type or copy=True is asked for");
+  c.def("__dlpack_device__", [](const V&) { return py::make_tuple(1, 0); });
+  c.def(
+      "__dlpack__",
+      [](const py::object& self, const py::object& stream, const py::object& max_version, const py::object& dl_device,
+         const py::object& copy) -> py::object {
+        if (!stream.is_none()) throw WrongValue(Error(ExitCode::usage, "voxels are in main memory and have no stream"));
+        if (!dl_device.is_none() && !dl_device.equal(py::make_tuple(1, 0)))
+          throw py::buffer_error("voxels are in main memory, and are not sent to another device");
+        const bool copied = !copy.is_none() && copy.cast<bool>();
+        if (!copied && !max_version.is_none() && py::cast<py::tuple>(max_version)[0].cast<int>() >= 1)
+          return dlpack_of<T>(self.cast<const V&>());
+        // Before version 1 nothing says that memory may not be written, so others get memory of their own.
+        if (!copy.is_none() && !copied)
+          throw py::buffer_error(
+              "only DLPack 1.0 can say that voxels may not be written; without copy=False they are "
+              "copied");
+        return self.attr("voxels").attr("copy")().attr("__dlpack__")();
+      },
+      py::kw_only(), py::arg("stream") = py::none(), py::arg("max_version") = py::none(),
+      py::arg("dl_device") = py::none(), py::arg("copy") = py::none(),
+      "Read-only and no copy by DLPack 1.0 (max_version), else a copy");
+  const auto parts = [](const py::object& self, const py::object& voxels) {
+    return py::make_tuple(voxels, self.attr("spacing_mm"), self.attr("origin_mm"), self.attr("direction"));
+  };
+  c.def("__reduce__", [parts](const py::object& self) {
+    return py::make_tuple(py::type::of(self), parts(self, self.attr("voxels")));
+  });
+  // The array it was made of is somebody else's: a deep copy has voxels of its own.
+  c.def("__copy__", [](const V& v) { return v; });
+  c.def(
+      "__deepcopy__",
+      [parts](const py::object& self, const py::dict&) {
+        return py::type::of(self)(*parts(self, self.attr("voxels").attr("copy")()));
+      },
+      py::arg("memo"));
   return c;
 }
 
 // Rows of three from numpy. Copied: a mesh owns its points.
 template <class T>
 std::vector<std::array<T, 3>> rows_of(const py::array& array, const char* what) {
-  if (!py::isinstance<py::array_t<T>>(array) || array.ndim() != 2 || array.shape(1) != 3 ||
-      !(array.flags() & py::array::c_style)) {
-    const std::string name = py::str(py::dtype::of<T>());
-    throw Error(ExitCode::usage, std::string(what) + " must be a C-contiguous array of " + name + ", (n, 3)",
-                "numpy.ascontiguousarray(" + std::string(what) + ", dtype='" + name + "') makes one");
-  }
+  const std::string name = name_of<T>();
+  const auto refused = [&] {
+    return WrongType(std::string(what) + " must be a C-contiguous array of " + name + ", (n, 3)",
+                     "numpy.ascontiguousarray(" + std::string(what) + ", dtype='" + name + "') makes one");
+  };
+  if (!py::isinstance<py::array_t<T>>(array)) throw refused();
+  if (array.ndim() != 2 || array.shape(1) != 3 || !(array.flags() & py::array::c_style)) throw WrongValue(refused());
   const auto* const first = reinterpret_cast<const std::array<T, 3>*>(array.data());
   return {first, first + array.shape(0)};
 }
@@ -127,6 +269,64 @@ SparseGrid grid_of(const py::array& voxels, std::array<double, 3> spacing_mm, st
   return to_sparse(v, name, background);
 }
 
+// A grid as the bytes of its .vdb file, by way of a file: nothing else writes and reads all that a grid holds.
+struct PassingFile {
+  std::string folder = (fs::temp_directory_path() / "osteo-grid-XXXXXX").string();
+  PassingFile() {
+    if (::mkdtemp(folder.data()) == nullptr)
+      throw Error(ExitCode::cannot_write, "no folder can be made in '" + fs::temp_directory_path().string() + "'");
+  }
+  PassingFile(const PassingFile&) = delete;
+  PassingFile& operator=(const PassingFile&) = delete;
+  ~PassingFile() {
+    std::error_code ignored;
+    fs::remove_all(folder, ignored);
+  }
+  [[nodiscard]] fs::path path() const { return fs::path(folder) / "grid.vdb"; }
+};
+py::tuple packed_grid(const SparseGrid& g) {
+  std::vector<std::byte> bytes;
+  {
+    const py::gil_scoped_release free;
+    const PassingFile file;
+    save_data(Data(g), file.path());
+    bytes = read_file(file.path());
+  }
+  return py::make_tuple(py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
+SparseGrid unpacked_grid(const py::tuple& state) {
+  const std::string bytes = state[0].cast<std::string>();
+  const py::gil_scoped_release free;
+  const PassingFile file;
+  {
+    std::ofstream out(file.path(), std::ios::binary);
+    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    if (!out) throw Error(ExitCode::cannot_write, "'" + file.path().string() + "' cannot be written");
+  }
+  return std::get<SparseGrid>(load_data(file.path(), std::array{DataKind::grid}));
+}
+
+std::shared_ptr<TetMesh> unpacked_tets(const py::tuple& state) {
+  auto mesh = std::make_shared<TetMesh>();
+  const auto take = [](const py::handle& from, auto& into) {
+    using Of = typename std::decay_t<decltype(into)>::value_type;
+    const std::string bytes = from.cast<std::string>();
+    into.resize(bytes.size() / sizeof(Of));
+    std::memcpy(into.data(), bytes.data(), into.size() * sizeof(Of));
+  };
+  take(state[0], mesh->points_mm);
+  take(state[1], mesh->tets);
+  take(state[2], mesh->values);
+  mesh->values_name = state[3].cast<std::string>();
+  return mesh;
+}
+py::tuple packed_tets(const std::shared_ptr<TetMesh>& mesh) {
+  const auto bytes = [](const auto& of) {
+    return py::bytes(reinterpret_cast<const char*>(of.data()), of.size() * sizeof(*of.data()));
+  };
+  return py::make_tuple(bytes(mesh->points_mm), bytes(mesh->tets), bytes(mesh->values), mesh->values_name);
+}
+
 // Memory of a value for VTK, whose arrays take none that may not be written; nobody writes it.
 py::object shared_with_vtk(const py::object& value) {
   if (py::isinstance<Labels>(value)) {
@@ -163,8 +363,8 @@ Data data_of(const py::handle& h, const Port& port) {
     const std::string path = py::str(py::module_::import("os").attr("fspath")(h));
     return load_data(path, port.kinds);
   }
-  throw Error(ExitCode::usage, "'" + port.name + "' takes " + kinds_text(port.kinds) + " or a path, not " +
-                                   std::string(py::str(py::type::handle_of(h).attr("__name__"))));
+  throw WrongType("'" + port.name + "' takes " + kinds_text(port.kinds) + " or a path, not " +
+                  std::string(py::str(py::type::handle_of(h).attr("__name__"))));
 }
 
 py::object object_of(const Data& data) {
@@ -201,10 +401,38 @@ py::object object_of(const Data& data) {
 
 }  // namespace
 
+std::string python_words(std::string_view text) {
+  const auto name_char = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-'; };
+  std::string out;
+  for (std::size_t i = 0; i < text.size();) {
+    if (text.substr(i).starts_with("'osteo ")) {
+      const std::size_t end = std::min(text.find('\'', i + 1), text.size() - 1) + 1;
+      out += text.substr(i, end - i);
+      i = end;
+      continue;
+    }
+    const bool begins = i == 0 || (!name_char(text[i - 1]) && text[i - 1] != '<');
+    if (!begins || !text.substr(i).starts_with("--") || i + 2 >= text.size() || text[i + 2] < 'a' ||
+        text[i + 2] > 'z') {
+      out += text[i++];
+      continue;
+    }
+    std::size_t end = i + 2;
+    while (end < text.size() && name_char(text[end])) ++end;
+    std::string name(text.substr(i + 2, end - i - 2));
+    const bool off = name.starts_with("no-");
+    if (off) name.erase(0, 3);
+    std::ranges::replace(name, '-', '_');
+    out += name + (off ? "=False" : "");
+    i = end;
+  }
+  return out;
+}
+
 void set_value(const FieldRef& f, const py::handle& value) {
   const std::string name(f.doc.name);
   const auto wrong = [&](const char* what) {
-    throw Error(ExitCode::usage, name + " takes " + what + ", not " + std::string(py::repr(value)));
+    throw WrongType(name + " takes " + what + ", not " + std::string(py::repr(value)));
   };
   if (auto* const* flag = std::get_if<bool*>(&f.target)) {
     if (!py::isinstance<py::bool_>(value)) wrong("True or False");
@@ -243,13 +471,16 @@ py::object load(const std::string& path, const std::string& kind) {
   return object_of(data);
 }
 
-void save(const py::object& value, const std::string& path) {
+void save(const py::object& value, const std::string& path, bool force) {
+  if (!force && fs::exists(path))
+    throw Error(ExitCode::cannot_write, "'" + path + "' exists already",
+                "choose another name, or force=True replaces it");
   Data data;
   if (py::isinstance<py::array>(value)) {
     const py::array rgb = value.cast<py::array>();
     if (!py::isinstance<py::array_t<std::uint8_t>>(rgb) || rgb.ndim() != 3 || rgb.shape(2) != 3 || rgb.size() == 0 ||
         !(rgb.flags() & py::array::c_style))
-      throw Error(ExitCode::usage, "a picture is a C-contiguous array of uint8, (rows, columns, 3)");
+      throw WrongType("a picture is a C-contiguous array of uint8, (rows, columns, 3)");
     Picture picture;
     picture.height = static_cast<int>(rgb.shape(0));
     picture.width = static_cast<int>(rgb.shape(1));
@@ -260,7 +491,7 @@ void save(const py::object& value, const std::string& path) {
     static const Port any{
         "value", {DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::tets}, "", false};
     if (py::isinstance<py::str>(value) || value.is_none())
-      throw Error(ExitCode::usage, "there is nothing to save in " + std::string(py::repr(value)));
+      throw WrongType("there is nothing to save in " + std::string(py::repr(value)));
     data = data_of(value, any);
   }
   require_savable(kind_of(data), path);
@@ -322,7 +553,7 @@ py::tuple run(const std::string& name, const py::sequence& inputs, const py::dic
   context.on_log([&](LogLevel level, std::string_view text) {
     if (level != LogLevel::warning) return;
     const std::lock_guard lock(mutex);
-    warnings.emplace_back(text);
+    warnings.emplace_back(python_words(text));
   });
   std::vector<Data> in;
   for (std::size_t i = 0; i < stage->info().inputs.size(); ++i)
@@ -368,12 +599,31 @@ PYBIND11_MODULE(_osteo, m) {
            "is not stored is "
            "background");
   frame_members(grid);
+  copies_are_itself(grid);
+  no_array(grid, "a grid is sparse and no array: dense() makes a Field of it, or of a part");
+  grid.def("__repr__", [](const osteo::SparseGrid& g) {
+    return "<osteo.Grid '" + g.name + "': " + placed_text(g.frame) + ", " + std::to_string(g.active_voxels) +
+           " voxels stored>";
+  });
+  grid.def(py::pickle(&packed_grid, &unpacked_grid));
   grid.def_property_readonly("name", [](const osteo::SparseGrid& g) { return g.name; });
   grid.def_property_readonly("background", [](const osteo::SparseGrid& g) { return g.background; });
   grid.def_property_readonly("active_voxels", [](const osteo::SparseGrid& g) { return g.active_voxels; });
 
   using Mesh = std::shared_ptr<osteo::TriMesh>;
-  py::class_<osteo::TriMesh, Mesh>(m, "Surface", "Triangles in LPS millimetres")
+  py::class_<osteo::TriMesh, Mesh> surface(m, "Surface", "Triangles in LPS millimetres");
+  copies_are_itself(surface);
+  no_array(surface, "a surface is no array: it has points_mm, triangles and normals");
+  surface.def("__repr__", [](const Mesh& s) {
+    return "<osteo.Surface: " + std::to_string(s->points_mm.size()) + " points, " +
+           std::to_string(s->triangles.size()) + " triangles" + (s->normals.empty() ? "" : ", normals") + ">";
+  });
+  surface.def("__reduce__", [](const py::object& self) {
+    const py::object normals = self.attr("normals");
+    return py::make_tuple(py::type::of(self), py::make_tuple(self.attr("points_mm"), self.attr("triangles"),
+                                                             py::len(normals) == 0 ? py::none() : normals));
+  });
+  surface
       .def(py::init(&mesh_of), py::arg("points_mm"), py::arg("triangles"), py::arg("normals") = py::none(),
            "Of float32 points and uint32 triangles, counter-clockwise seen from outside; copied")
       .def_property_readonly("points_mm",
@@ -391,8 +641,15 @@ PYBIND11_MODULE(_osteo, m) {
                                    {static_cast<py::ssize_t>(s->triangles.size()), 3});
       });
   using Tetrahedra = std::shared_ptr<osteo::TetMesh>;
-  py::class_<osteo::TetMesh, Tetrahedra>(m, "Tets", "Tetrahedra in LPS millimetres")
-      .def_property_readonly("points_mm",
+  py::class_<osteo::TetMesh, Tetrahedra> tets(m, "Tets", "Tetrahedra in LPS millimetres");
+  copies_are_itself(tets);
+  no_array(tets, "a mesh is no array: it has points_mm and tets");
+  tets.def("__repr__", [](const Tetrahedra& t) {
+    return "<osteo.Tets: " + std::to_string(t->points_mm.size()) + " points, " + std::to_string(t->tets.size()) +
+           " tetrahedra>";
+  });
+  tets.def(py::pickle(&packed_tets, &unpacked_tets));
+  tets.def_property_readonly("points_mm",
                              [](const Tetrahedra& t) {
                                return view<float>(t, reinterpret_cast<const float*>(t->points_mm.data()),
                                                   {static_cast<py::ssize_t>(t->points_mm.size()), 3});
@@ -403,6 +660,7 @@ PYBIND11_MODULE(_osteo, m) {
       });
 
   m.attr("__version__") = OSTEO_VERSION;
+  m.def("python_words", &python_words);
   m.def("program_version", [] { return std::string(osteo::program_version()); });
   m.def("load", &load);
   m.def("save", &save);
@@ -412,18 +670,33 @@ PYBIND11_MODULE(_osteo, m) {
   m.def("declarations", &declarations);
   m.def("run", &run);
 
-  // An error as the programs know it: message, exit code, advice.
-  static const py::object error =
-      py::reinterpret_borrow<py::object>(PyErr_NewException("osteo.Error", PyExc_RuntimeError, nullptr));
-  m.attr("Error") = error;
+  // An error as the programs know it: message, exit code, advice. Those of arguments are also Python's own.
+  const auto error_class = [&m](const char* name, py::object bases) {
+    const auto c = py::reinterpret_steal<py::object>(
+        PyErr_NewException((std::string("osteo.") + name).c_str(), bases.ptr(), nullptr));
+    m.attr(name) = c;
+    return c;
+  };
+  const auto builtin = [](PyObject* type) { return py::reinterpret_borrow<py::object>(type); };
+  static const py::object error = error_class("Error", builtin(PyExc_RuntimeError));
+  static const py::object wrong_value = error_class("WrongValue", py::make_tuple(error, builtin(PyExc_ValueError)));
+  static const py::object wrong_type = error_class("WrongType", py::make_tuple(error, builtin(PyExc_TypeError)));
   py::register_exception_translator([](std::exception_ptr p) {
+    const auto raise = [](const py::object& type, const osteo::Error& e) {
+      const std::string advice = python_words(e.advice());
+      const py::object value = type(python_words(e.what()) + (advice.empty() ? "" : ". " + advice));
+      value.attr("code") = static_cast<int>(e.code());
+      value.attr("advice") = advice;
+      PyErr_SetObject(type.ptr(), value.ptr());
+    };
     try {
       if (p) std::rethrow_exception(p);
+    } catch (const WrongType& e) {
+      raise(wrong_type, e);
+    } catch (const WrongValue& e) {
+      raise(wrong_value, e);
     } catch (const osteo::Error& e) {
-      const py::object value = error(std::string(e.what()) + (e.advice().empty() ? "" : ". " + e.advice()));
-      value.attr("code") = static_cast<int>(e.code());
-      value.attr("advice") = e.advice();
-      PyErr_SetObject(error.ptr(), value.ptr());
+      raise(e.code() == osteo::ExitCode::usage ? wrong_value : error, e);
     }
   });
 }

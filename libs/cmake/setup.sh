@@ -72,7 +72,11 @@ ensure_packages() {
   if [ ${#missing[@]} -gt 0 ]; then
     local sudo=
     if [ "$(id -u)" -ne 0 ]; then
-      command -v sudo >/dev/null || { say "These packages are missing, and there is neither root nor sudo to install them: ${missing[*]}"; exit 9; }
+      command -v sudo >/dev/null || {
+        say "${#missing[@]} packages are missing, and there is neither root nor sudo to install them. As root:"
+        say "  apt-get install --no-install-recommends ${missing[*]}"
+        exit 9
+      }
       sudo=sudo
     fi
     mkdir -p "$root/build"
@@ -81,8 +85,9 @@ ensure_packages() {
     $sudo apt-get update -qq >"$log" 2>&1 || say "apt-get update failed; trying with what is known"
     $sudo env LC_ALL=C DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends -o APT::Status-Fd=1 "${missing[@]}" </dev/null 2>&1 |
       tee -a "$log" | show_apt "Installing packages" || {
-      tail -n 15 "$log" >&2
-      say "The packages could not be installed (${missing[*]}). Is there a network? All of it is in $log"
+      sed -E '/^(dl|pm)status:/d' "$log" | tail -n 15 >&2
+      say "${#missing[@]} packages could not be installed. Is there a network? All of it is in $log"
+      say "By hand: apt-get install --no-install-recommends \$(grep -v '^#' $list)"
       exit 9
     }
   fi

@@ -197,6 +197,17 @@ for name in ("good", "screen", "words", "person"): os.remove(f"mixed/{name}.dcm"
 run("deidentify", "mixed", "-o", "none", rc=7)
 assert not pathlib.Path("none").exists()
 
+# However it is written: the name without its marks, the day of birth in words, the telephone with another prefix.
+for n, (charset, text) in enumerate((("ISO_IR 100", "Mueller special"), ("ISO_IR 192", "MULLER"), ("ISO_IR 100", "M\u00fcller"), ("ISO_IR 100", "4 May 1961"),
+                                     ("ISO_IR 100", "04.05.1961"), ("ISO_IR 100", "call 030/90182066"), ("ISO_IR 100", "kernel H40, 4.5.6"))):
+    d = base(n=40 + n)
+    d.SpecificCharacterSet, d.PatientName, d.PatientBirthDate, d.PatientTelephoneNumbers = charset, "M\u00fcller^Hans", "19610504", "+49 (30) 9018-2066"
+    d.ManufacturerModelName = text
+    save(d, f"written-{n}/x.dcm")
+    r = run("deidentify", f"written-{n}", "-o", f"written-{n}-out", rc=0 if "kernel" in text else 7)
+    assert "kernel" in text or "(0008,1090)" in r.stdout + r.stderr, (text, r.stdout, r.stderr)
+    assert text not in r.stdout + r.stderr
+
 # Someone else has been there before.
 d = base(n=20)
 d.PatientID = d.PatientName = "Removed"

@@ -975,7 +975,13 @@ def tls():
     run(osteo, "receive", "x", "--anybody", "--port", "0", "--tls-ca", "nowhere.pem", "--tls-certificate", "node.pem", "--tls-key", "node.key", rc=3)
     for pair in (("node.pem", "ours.key"), ("node.key", "node.key"), ("node.pem", files[0])):
         run(osteo, "receive", "x", "--anybody", "--port", "0", "--tls-ca", "ca.pem", "--tls-certificate", pair[0], "--tls-key", pair[1], rc=5)
-    node = Receiver("inbox", "--allow", "PEER", "--quiet-s", "1", "--timeout-s", "5", *with_tls("node"))
+    # A key that others may read is told, and only that.
+    for mode, told in ((0o644, True), (0o640, True), (0o600, False)):
+        os.chmod("node.key", mode)
+        node = Receiver("inbox", "--allow", "PEER", "--quiet-s", "1", "--timeout-s", "5", *with_tls("node"))
+        assert ("others may read the key 'node.key'" in (work / "inbox.log").read_text()) == told, (oct(mode), (work / "inbox.log").read_text())
+        if told:
+            node.stop()
     send = lambda *flags, rc=0: run(osteo, "send", "ct", "--peer", f"OSTEOTOME@127.0.0.1:{node.port}", "--ae", "PEER", "--no-check", "--timeout-s", "5", "--quiet", *flags, rc=rc)
     # Nobody without a certificate of ours, and none from elsewhere; nor do we speak to a node that has another.
     send(rc=7)
@@ -988,7 +994,10 @@ def tls():
     silent = socket.create_connection(("127.0.0.1", node.port))
     assert node.objects() == []
     begin = time.monotonic()
-    send(*with_tls("ours"))
+    os.chmod("ours.key", 0o604)
+    loud = run(osteo, "send", "ct", "--peer", f"OSTEOTOME@127.0.0.1:{node.port}", "--ae", "PEER", "--no-check", *with_tls("ours"))
+    assert "others may read the key 'ours.key'" in loud.stderr, loud.stderr
+    os.chmod("ours.key", 0o600)
     print(f"send over TLS: {len(files)} slices in {time.monotonic() - begin:.2f} s")
     assert sorted(map(data_set, node.objects())) == sorted(map(data_set, files)), "bit for bit"
     assert node.closed()["objects"] == len(files)

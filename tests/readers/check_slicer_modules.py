@@ -24,6 +24,7 @@ PARAMETERS = {
     "boolean": {"hidden": BOOL}, "integer-vector": {}, "float-vector": {}, "double-vector": {}, "string-vector": {},
     "string-enumeration": {"hidden": BOOL}, "integer-enumeration": {"hidden": BOOL}, "float-enumeration": {"hidden": BOOL}, "double-enumeration": {"hidden": BOOL},
     "point": {"multiple": BOOL, "coordinateSystem": {"ijk", "lps", "ras"}}, "region": {"multiple": BOOL, "coordinateSystem": {"ijk", "lps", "ras"}},
+    "pointfile": {"multiple": BOOL, "fileExtensions": ANY, "coordinateSystem": {"ijk", "lps", "ras"}},
     "file": {"multiple": BOOL, "fileExtensions": ANY},
     "image": {"multiple": BOOL, "hidden": BOOL, "reference": ANY, "fileExtensions": ANY,
               "type": {"scalar", "label", "vector", "tensor", "diffusion-weighted", "dynamic-contrast-enhanced"}},
@@ -77,7 +78,7 @@ def refusals(text):
             if (index is None) == (long is None and short is None):
                 wrong.append(here + "must have either an index or a flag")
             wrong += [here + f"no <{t}>" for t in ("label", "description") if not (p.findtext(t) or "").strip()]
-            if p.tag in ("image", "geometry", "file", "directory", "transform", "table") and p.findtext("channel") not in ("input", "output"):
+            if p.tag in ("image", "geometry", "file", "pointfile", "directory", "transform", "table") and p.findtext("channel") not in ("input", "output"):
                 wrong.append(here + "no <channel>")
             default, choices = p.findtext("default"), [e.text for e in p.findall("element")]
             if p.tag.endswith("-enumeration") and (not choices or default not in choices or len(set(choices)) < len(choices)):
@@ -121,6 +122,21 @@ bad = {s: r for s in scripts if (r := refusals((modules / (s + ".xml")).read_tex
 assert not bad, json.dumps(bad, indent=1)
 print(f"ok  {len(scripts)} modules have nothing that Slicer's parser refuses")
 
+# What Slicer chooses in its scene: nothing of it is typed as text.
+chosen = {}
+for s in scripts:
+    for p in tree.fromstring((modules / (s + ".xml")).read_text()).iter():
+        if p.tag in ("transform", "point", "pointfile", "region"):
+            chosen.setdefault(s[5:], {})[p.findtext("name")] = p
+assert {m: {n: p.tag for n, p in c.items()} for m, c in chosen.items()} == {
+    "Register": {"transform_out": "transform"}, "Tube": {"points_mm": "point", "points": "pointfile"}, "DistanceAt": {"points": "pointfile"},
+    "Curve": {"curve": "pointfile", "path": "pointfile"}, "FindStructures": {"labyrinth_mm": "point"}, "Snapshot": {"centre_mm": "point"},
+    "Saw": {"at_mm": "point"}, "Simulate": {"tool_from_mm": "point", "tool_to_mm": "point"}, "FitDamping": {"at_mm": "point"},
+    "Crop": {"box": "region"}, "Resample": {"box": "region"}}, chosen
+assert chosen["Register"]["transform_out"].attrib == {"type": "linear", "fileExtensions": ".tfm"}
+assert chosen["Tube"]["points_mm"].attrib["multiple"] == "true"
+assert all(p.get("coordinateSystem") == "lps" for c in chosen.values() for p in c.values() if p.tag != "transform")
+
 
 def run(module, *args, code=0):
     r = subprocess.run([modules / module, *map(str, args)], cwd="/", capture_output=True, text=True)
@@ -144,3 +160,50 @@ run("OsteoResample", "--spacing_mm", "1.5", "--lower", "500", fixtures / "ct.nrr
 run("OsteoSurface", work / "b.vdb", work / "b.vtp")
 assert (work / "b.vtp").stat().st_size > 10000
 print("ok  modules run as Slicer runs them")
+
+# A transform is one that Slicer loads: its own suffix, ITK's text.
+run("OsteoRegister", fixtures / "ct.nrrd", fixtures / "ct.nrrd", work / "t.tfm")
+assert (work / "t.tfm").read_text().startswith("#Insight Transform File"), "not ITK's text"
+
+
+def plain(*args):
+    subprocess.run([osteo, *map(str, args), "--quiet"], cwd=work, check=True)
+
+
+def same(a, b):
+    assert (work / a).read_bytes() == (work / b).read_bytes(), (a, b)
+
+
+# A box of the scene goes as centre and half edges.
+run("OsteoCrop", "--region", "whole", "--box", "60,10,-5,15,10,5", fixtures / "ct.nrrd", work / "box.nrrd")
+plain("crop", fixtures / "ct.nrrd", "box2.nrrd", "--region", "box", "--centre-mm", "60,10,-5", "--size-mm", "30,20,10")
+same("box.nrrd", "box2.nrrd")
+run("OsteoResample", "--spacing_mm", "1.5", "--lower", "500", "--box", "60,10,-5,15,10,5", fixtures / "ct.nrrd", work / "m.nrrd", work / "rb.vdb")
+plain("resample", fixtures / "ct.nrrd", "m.nrrd", "rb2.vdb", "--spacing-mm", "1.5", "--lower", "500", "--centre-mm", "60,10,-5", "--box-mm", "30,20,10")
+for v in ("rb", "rb2"):
+    plain("surface", f"{v}.vdb", f"{v}.stl")
+same("rb.stl", "rb2.stl")
+assert "three half edges" in run("OsteoCrop", "--box", "60,10,-5,15", fixtures / "ct.nrrd", work / "n.nrrd", code=2).stderr
+# A point of the scene is where the scene has it; of several the flag is repeated.
+run("OsteoSaw", "--at_mm", "60,10,-5", "--kerf_mm", "2", work / "b.vdb", work / "cut.vdb")
+plain("saw", "b.vdb", "cut2.vdb", "--at-mm", "60,10,-5", "--no-from-centre", "--kerf-mm", "2")
+for v in ("cut", "cut2"):
+    plain("surface", f"{v}.vdb", f"{v}.stl")
+same("cut.stl", "cut2.stl")
+run("OsteoPhantom", "--region", "temporal", "--spacing_mm", "1", work / "ear.nrrd")
+run("OsteoTube", "--points_mm", "53.4,25.9,-15.6", "--max_radius_mm", "5", "--points_mm", "48,24,-28", work / "ear.nrrd", work / "a.nrrd")
+plain("tube", "ear.nrrd", "a2.nrrd", "--points-mm", "53.4,25.9,-15.6; 48,24,-28", "--max-radius-mm", "5")
+same("a.nrrd", "a2.nrrd")
+# Points as Slicer writes them to a file, in LPS as asked, or in RAS as older versions do.
+plain("surface", "b.vdb", "b.ply")
+(work / "p.csv").write_text("53.4,25.9,-15.6\n48,24,-28\n")
+HEAD = "# Markups fiducial file version = 4.10\n# CoordinateSystem = {}\n# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n"
+for name, sign in (("LPS", 1), ("1", 1), ("RAS", -1), ("0", -1)):
+    rows = "".join(f"vtkMRMLMarkupsFiducialNode_{i},{sign * x},{sign * y},{z},0,0,0,1,1,1,0,F-{i},,\n" for i, (x, y, z) in enumerate(((53.4, 25.9, -15.6), (48, 24, -28))))
+    (work / "p.fcsv").write_text(HEAD.format(name) + rows)
+    run("OsteoDistanceAt", work / "b.vtp", work / "p.fcsv", work / "d.json")
+    plain("distance-at", "b.vtp", "p.csv", "d2.json", "--force")
+    assert json.loads((work / "d.json").read_text())["points"] == json.loads((work / "d2.json").read_text())["points"], name
+(work / "p.fcsv").write_text(HEAD.format("IJK") + "1,2,3,4\n")
+assert "IJK" in run("OsteoDistanceAt", work / "b.vtp", work / "p.fcsv", work / "d.json", code=4).stderr
+print("ok  transform, points and boxes go as Slicer's own")

@@ -41,7 +41,12 @@ expect "Installing packages: 50 %" && expect "Unpacking libvtk9-dev" && lines 14
 grep -q 'Reading database' build/packages.log
 rm build/.packages
 ! APT_FAILS=100 setup ensure_packages 2>"$work/said" || { echo "a failed installation passes"; exit 1; }
-expect "could not be installed" && test ! -e build/.packages
+expect "packages could not be installed. Is there a network?" && expect "By hand: apt-get install" && test ! -e build/.packages
+lines 32
+# A user who is neither root nor has sudo is told the line for who is.
+nobody() { setup eval 'id() { echo 1000; }; command() { [ "$2" != sudo ] && builtin command "$@"; }; ensure_packages'; }
+! nobody 2>"$work/said" || { echo "no packages and no root passes"; exit 1; }
+expect "As root:" && expect "  apt-get install --no-install-recommends " && lines 2
 
 setup ensure_built release osteo 2>"$work/said"
 expect "Building: 300 steps" && expect "[150/300]" && expect "100 %" && lines 14
@@ -59,3 +64,33 @@ if command -v script >/dev/null; then
   script -qec "bash -c 'set -euo pipefail; source libs/cmake/setup.sh; ensure_built release osteo'" /dev/null >"$work/said" </dev/null
   expect "[299/300]" && lines 3
 fi
+# In a clone used as the pages say each command builds the program that it starts, and then starts it.
+cp "$1/osteo" .
+sed -i 's|--build)|--build) shift 3; echo "$*" >>"$OSTEO_ASKED"; mkdir -p build/release/bin; printf "#!/bin/sh\\n" >build/release/bin/osteo; chmod +x build/release/bin/osteo|' "$work/bin/cmake"
+export OSTEO_ASKED=$work/asked
+builds() { # PROGRAM COMMAND...
+  local program=$1
+  shift
+  rm -rf build/release && mkdir -p build && touch build/.packages && : >"$OSTEO_ASKED"
+  ./osteo "$@" 2>"$work/said" || { echo "./osteo $* fails:"; cat "$work/said"; exit 1; }
+  [ "$(cat "$OSTEO_ASKED")" = "osteo${program:+ $program}" ] || { echo "./osteo $* builds '$(cat "$OSTEO_ASKED")', not '$program'"; exit 1; }
+}
+builds osteo-edit edit CASE
+builds osteo-rehearse rehearse CASE
+builds osteo-rehearse playback SESSION --mode guide
+builds osteo-console console 18944
+builds osteo-experiment experiment force-skill study
+builds "" edit CASE --apply edits.json
+builds "" rehearse CASE --headless -o SESSION
+builds "" prepare SCAN -o CASE
+grep -hoE '^(\./)?osteo [a-z][^#`]*' "$1/README.md" "$1"/docs/*.md | sed 's/^[^ ]* //; s/ *$//' | sort -u >"$work/lines"
+[ "$(wc -l <"$work/lines")" -gt 100 ]
+while read -r command rest; do
+  program=
+  case " $rest " in
+    *" --headless "* | *" --apply "* | *" --simulated "*) ;;
+    *) case $command in edit | console) program=osteo-$command ;; rehearse | playback) program=osteo-rehearse ;; esac ;;
+  esac
+  [ "$command" != experiment ] || case $rest in force-skill*) program=osteo-experiment ;; *) continue ;; esac
+  [ -z "$program" ] || builds "$program" $command $rest
+done <"$work/lines"

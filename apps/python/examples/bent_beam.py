@@ -38,4 +38,4 @@ for spacing, order in (3, "t4"), (3, "t10"), (1.5, "t10"):
 at = np.linspace(0, LONG, 61)
 osteo.save(chart.beside(
     osteo.snapshot(bent, view="front", width=440, height=360),
-    chart.plot([("formula", at, formula_mm(at)), *reversed(curves)], "along the strip, mm", "sunk, mm", 520, 360, dots=[c[0] for c in curves])), "bent-beam.png")
+    chart.plot([("formula", at, formula_mm(at)), *reversed(curves)], "along the strip, mm", "sunk, mm", 520, 360, dots=[c[0] for c in curves])), "bent-beam.png", force=True)

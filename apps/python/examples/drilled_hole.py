@@ -35,4 +35,4 @@ print(f"removed {removed:.3f} mm3 by the servo, {gone * 0.5 ** 3:.3f} mm3 by the
 # %% The picture
 osteo.save(chart.beside(
     osteo.snapshot(surface, view="left", width=440, height=360),
-    chart.plot([("force on the hand", t_s, force_n)], "time, s", "force, N", 460, 360)), "drilled-hole.png")
+    chart.plot([("force on the hand", t_s, force_n)], "time, s", "force, N", 460, 360)), "drilled-hole.png", force=True)

@@ -36,4 +36,4 @@ picture[(ring != np.roll(ring, 1, 0)) | (ring != np.roll(ring, 1, 1))] = 255
 picture[is_nerve > 0.5] = [255, 220, 40]
 
 # %% Beside it the bone in 3D
-osteo.save(chart.beside(picture.astype(np.uint8), osteo.snapshot(surface, view="left", width=400, height=len(picture))), "nerve-distance.png")
+osteo.save(chart.beside(picture.astype(np.uint8), osteo.snapshot(surface, view="left", width=400, height=len(picture))), "nerve-distance.png", force=True)

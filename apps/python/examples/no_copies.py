@@ -41,4 +41,4 @@ print(f"outside {np.count_nonzero(outside.voxels) / 8:.0f} mm3")
 
 # %% The picture
 osteo.save(chart.plot([("into osteo", megabytes, np.array(over) * 1e6), ("back to numpy", megabytes, np.array(back) * 1e6),
-                       ("a copy", megabytes, np.array(copied) * 1e6)], "voxels, MB", "microseconds", log=True), "no-copies.png")
+                       ("a copy", megabytes, np.array(copied) * 1e6)], "voxels, MB", "microseconds", log=True), "no-copies.png", force=True)

@@ -11,7 +11,7 @@ import warnings as _warnings
 from collections import namedtuple as _namedtuple
 
 from . import _osteo
-from ._osteo import Error, Field, Grid, Image, Labels, Surface, Tets, __version__
+from ._osteo import Error, Field, Grid, Image, Labels, Surface, Tets, WrongType, WrongValue, __version__
 from .rehearsals import Rehearsal, Script, action_dtype, goal_dtype, goals, load_script, tick_dtype, tools
 from .sessions import Session
 from .vtk import from_vtk, to_vtk
@@ -71,7 +71,7 @@ def _help(stage, fields):
     lines += ["threads: 0 takes all cores; the result never depends on it", "seed: for every random choice",
               "report: a dict that is filled with what the stage measured", ""]
     lines += [f"Returns {_identifier(p['name'])}: {p['help']}" for p in stage["outputs"]]
-    return "\n".join(lines)
+    return _osteo.python_words("\n".join(lines))
 
 
 def _function(stage):
@@ -79,7 +79,9 @@ def _function(stage):
     name = stage["name"]
     ports = [_identifier(p["name"]) for p in stage["inputs"]]
     outputs = [_identifier(p["name"]) for p in stage["outputs"]]
-    result = _namedtuple(_identifier(name) + "_result", outputs, rename=True) if len(outputs) > 1 else None
+    result = _namedtuple(f"_{_identifier(name)}_result", outputs, rename=True, module=__name__) if len(outputs) > 1 else None
+    if result is not None:
+        globals()[result.__name__] = result  # where pickle looks for it
 
     def function(*args, **kwargs):
         given = signature.bind(*args, **kwargs).arguments
@@ -103,9 +105,10 @@ def load(path, kind=""):
     return _osteo.load(_os.fspath(path), kind)
 
 
-def save(value, path):
-    """Writes a value, or a picture (uint8, rows, columns, 3), whole or not at all; the suffix says as what."""
-    _osteo.save(value, _os.fspath(path))
+def save(value, path, *, force=False):
+    """Writes a value, or a picture (uint8, rows, columns, 3), whole or not at all; the suffix says as what. A file that is there is an Error (code 6)
+    unless force is True."""
+    _osteo.save(value, _os.fspath(path), force)
 
 
 stages = []
@@ -115,5 +118,5 @@ for _stage in _osteo.declarations():
         raise ImportError(f"stage {_stage['name']} has the name of another thing in this module")
     globals()[_f.__name__] = _f
     stages.append(_f.__name__)
-__all__ = ["Error", "Field", "Grid", "Image", "Labels", "Rehearsal", "Script", "Session", "Surface", "Tets", "action_dtype", "from_vtk", "goal_dtype", "goals",
-           "load", "load_script", "save", "stages", "tick_dtype", "to_vtk", "tools", *stages]
+__all__ = ["Error", "Field", "Grid", "Image", "Labels", "Rehearsal", "Script", "Session", "Surface", "Tets", "WrongType", "WrongValue", "action_dtype",
+           "from_vtk", "goal_dtype", "goals", "load", "load_script", "save", "stages", "tick_dtype", "to_vtk", "tools", *stages]

@@ -20,6 +20,9 @@ namespace osteo::inline app::cli {
 /// "fill-holes" -> "OsteoFillHoles": a file without a dot in its name, as Slicer wants it; and its content.
 [[nodiscard]] std::string slicer_module_name(const std::string& stage);
 [[nodiscard]] std::string slicer_module_script(const std::string& stage);
+/// Arguments of a stage as Slicer writes points and boxes of its scene, as the stage takes them. Error(usage) for a box
+/// that is not six numbers.
+[[nodiscard]] std::vector<std::string> from_slicer(const std::string& stage, const std::vector<std::string>& args);
 /// The declaration as JSON, for other programs.
 [[nodiscard]] std::string stage_json(Stage& stage);
 [[nodiscard]] std::string pipeline_schema(const Program& program);

@@ -227,7 +227,7 @@ std::string Program::synopsis_of(std::string_view name) const {
 namespace {
 
 // Throws what went wrong; `printer` is the caller's, so that it can clear the bar before it prints an error.
-int dispatch(Program& program, std::vector<std::string> args, std::ostream& out, std::ostream& err,
+int dispatch(Program& program, std::vector<std::string> args, std::ostream& out, std::ostream& err, bool slicer,
              std::unique_ptr<ProgressPrinter>& printer) {
   if (args.empty()) {
     err << program_help(program);
@@ -297,6 +297,7 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
     ready();
     code = series->run(invocation);
   } else if (command == nullptr) {
+    if (slicer) args = from_slicer(subject, args);
     code = run_stage(program.registry, *program.registry.make(subject), args, invocation, common, ready);
   } else {
     auto fields = command->fields();
@@ -345,7 +346,7 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
   };
   try {
     static_cast<void>(simd());  // an unknown OSTEO_SIMD is told by every command
-    const int code = dispatch(program, args, out, slicer ? out : err, printer);
+    const int code = dispatch(program, args, out, slicer ? out : err, slicer, printer);
     if (printer) printer->clear();
     out.flush();
     if (!out) throw Error(ExitCode::cannot_write, "standard output cannot be written");

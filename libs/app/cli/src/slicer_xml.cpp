@@ -2,10 +2,12 @@
 // What Slicer's own parser refuses is in docs/slicer.md; names of parameters and flags are letters, digits and
 // underscores there.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <sstream>
 
 #include "describe.h"
+#include "osteo/core/base/error.h"
 #include "osteo/imaging/pipeline/formats.h"
 
 namespace osteo::inline app::cli {
@@ -47,6 +49,55 @@ struct Tag {
   std::string name, attributes;
 };
 
+// Where a port or field is more to Slicer than its kind says: what is chosen in the scene and not typed, or a text file
+// of its own suffix. A point goes as "x,y,z", of several the flag is repeated (vtkSlicerCLIModuleLogic).
+struct SlicerType {
+  std::string_view stage, name, tag, attributes;
+};
+constexpr std::string_view kPoint = " multiple=\"false\" coordinateSystem=\"lps\"";
+constexpr std::string_view kPointFile = " fileExtensions=\".fcsv\" coordinateSystem=\"lps\"";
+constexpr SlicerType kSlicerTypes[] = {
+    {"register", "transform", "transform", " type=\"linear\" fileExtensions=\".tfm\""},
+    {"tube", "points_mm", "point", " multiple=\"true\" coordinateSystem=\"lps\""},
+    {"tube", "points", "pointfile", kPointFile},
+    {"tube", "line", "file", " fileExtensions=\".csv\""},
+    {"distance-at", "points", "pointfile", kPointFile},
+    {"curve", "curve", "pointfile", kPointFile},
+    {"curve", "path", "pointfile", kPointFile},
+    {"find-structures", "labyrinth_mm", "point", kPoint},
+    {"snapshot", "centre_mm", "point", kPoint},
+    {"saw", "at_mm", "point", kPoint},
+    {"simulate", "tool_from_mm", "point", kPoint},
+    {"simulate", "tool_to_mm", "point", kPoint},
+    {"fit-damping", "at_mm", "point", kPoint},
+    {"fit-damping", "motion", "file", " fileExtensions=\".csv\""},
+    {"fit-damping", "fitted", "file", " fileExtensions=\".csv\""},
+    {"calibrate", "course", "file", " fileExtensions=\".svg\""},
+    {"fem", "inp", "file", " fileExtensions=\".inp\""},
+    {"fem", "nodes", "file", " fileExtensions=\".vtu\""},
+    {"bone-stiffness", "inp", "file", " fileExtensions=\".inp\""},
+};
+const SlicerType* slicer_type(std::string_view stage, std::string_view name) {
+  const auto* const row = std::find_if(std::begin(kSlicerTypes), std::end(kSlicerTypes),
+                                       [&](const SlicerType& t) { return t.stage == stage && t.name == name; });
+  return row == std::end(kSlicerTypes) ? nullptr : row;
+}
+
+// A box is one thing in Slicer's scene and goes as centre and half edges, "x,y,z,a,b,c"; here it is two fields.
+struct SlicerRegion {
+  std::string_view stage, centre, size;
+  std::string_view also, value;  // a flag that the box implies, or none
+};
+constexpr SlicerRegion kSlicerRegions[] = {
+    {"crop", "centre_mm", "size_mm", "--region", "box"},
+    {"resample", "centre_mm", "box_mm", "", ""},
+};
+const SlicerRegion* slicer_region(std::string_view stage) {
+  const auto* const row = std::find_if(std::begin(kSlicerRegions), std::end(kSlicerRegions),
+                                       [&](const SlicerRegion& r) { return r.stage == stage; });
+  return row == std::end(kSlicerRegions) ? nullptr : row;
+}
+
 Tag tag_of(DataKind kind, bool output) {
   switch (kind) {
     case DataKind::image:
@@ -73,7 +124,7 @@ void element(std::ostream& out, int indent, const char* tag, std::string_view te
       << ">\n";
 }
 
-void field_xml(std::ostream& out, const FieldRef& f) {
+void field_xml(std::ostream& out, const FieldRef& f, const SlicerType* type = nullptr) {
   const std::string_view kind = f.kind();
   // Slicer names a flag only where it is wanted, so what is on by default is offered the other way round.
   const bool inverted = kind == "flag" && f.to_text() == "true";
@@ -87,11 +138,16 @@ void field_xml(std::ostream& out, const FieldRef& f) {
   std::string help(f.doc.help);
   if (inverted) help = "not: " + help;
   if (!f.doc.unit.empty()) help += " (" + std::string(f.doc.unit) + ")";
-  out << "    <" << tag << ">\n";
+  const std::string chosen(type != nullptr ? type->tag : tag);
+  out << "    <" << chosen << (type != nullptr ? type->attributes : "") << ">\n";
   element(out, 6, "name", name);
   element(out, 6, "longflag", "--" + name);
   element(out, 6, "label", title_case(name));
   element(out, 6, "description", help);
+  if (type != nullptr) {  // nothing is chosen until the user does
+    out << "    </" << chosen << ">\n";
+    return;
+  }
   element(out, 6, "default", inverted ? "false" : f.to_text());
   if (const auto* c = std::get_if<FieldRef::Choice>(&f.target)) {
     for (const auto n : c->names) element(out, 6, "element", n);
@@ -124,7 +180,10 @@ std::string stage_xml(Stage& stage, const std::string& group) {
   element(out, 4, "description", "What is read and written");
   int index = 0;
   const auto port = [&](const Port& p, bool output) {
-    const Tag tag = tag_of(p.kinds.front(), output);
+    Tag tag = tag_of(p.kinds.front(), output);
+    if (const SlicerType* const type = slicer_type(info.name, p.name);
+        type != nullptr && (output || p.kinds.front() == DataKind::source))
+      tag = {std::string(type->tag), std::string(type->attributes)};
     const std::string name = underscored(p.name) + (output ? "_out" : "");
     out << "    <" << tag.name << tag.attributes << ">\n";
     element(out, 6, "name", name);
@@ -145,7 +204,19 @@ std::string stage_xml(Stage& stage, const std::string& group) {
     out << "  <parameters>\n";
     element(out, 4, "label", "Parameters");
     element(out, 4, "description", "How it is done");
-    for (const FieldRef& f : fields) field_xml(out, f);
+    const SlicerRegion* const region = slicer_region(info.name);
+    if (region != nullptr) {
+      out << "    <region multiple=\"false\" coordinateSystem=\"lps\">\n";
+      element(out, 6, "name", "box");
+      element(out, 6, "longflag", "--box");
+      element(out, 6, "label", "Box (optional)");
+      element(out, 6, "description", "Only this box of the scan");
+      out << "    </region>\n";
+    }
+    for (const FieldRef& f : fields) {
+      if (region == nullptr || (f.doc.name != region->centre && f.doc.name != region->size))
+        field_xml(out, f, slicer_type(info.name, f.doc.name));
+    }
     out << "  </parameters>\n";
   }
   // Slicer does not ask before it replaces its own temporary files.
@@ -157,6 +228,48 @@ std::string stage_xml(Stage& stage, const std::string& group) {
   }
   out << "  </parameters>\n</executable>\n";
   return out.str();
+}
+
+std::vector<std::string> from_slicer(const std::string& stage, const std::vector<std::string>& args) {
+  std::vector<std::string> out;
+  std::map<std::string, std::size_t> at;  // flag of points -> where its value stands in `out`
+  for (std::size_t i = 0; i < args.size(); ++i) {
+    const bool has_value = i + 1 < args.size();
+    if (const SlicerRegion* const region = slicer_region(stage); region != nullptr && args[i] == "--box" && has_value) {
+      std::array<double, 6> v{};
+      std::stringstream words(args[++i]);
+      std::string word;
+      std::size_t n = 0;
+      while (std::getline(words, word, ',')) {
+        const double x = parse_number(word, "--box");
+        if (n < 6) v[n] = x;
+        ++n;
+      }
+      if (n != 6) throw Error(ExitCode::usage, "--box: '" + args[i] + "' is not x,y,z and three half edges");
+      const auto triple = [](double x, double y, double z) {
+        return format_number(x) + "," + format_number(y) + "," + format_number(z);
+      };
+      out.insert(out.end(), {"--" + std::string(region->centre), triple(v[0], v[1], v[2]),
+                             "--" + std::string(region->size), triple(2 * v[3], 2 * v[4], 2 * v[5])});
+      if (!region->also.empty()) out.insert(out.end(), {std::string(region->also), std::string(region->value)});
+      continue;
+    }
+    const SlicerType* const type = args[i].starts_with("--") ? slicer_type(stage, args[i].substr(2)) : nullptr;
+    if (type == nullptr || type->tag != "point" || !has_value) {
+      out.push_back(args[i]);
+      continue;
+    }
+    const auto [known, first] = at.emplace(args[i], out.size() + 1);
+    if (!first && type->attributes.find("\"true\"") != std::string_view::npos) {
+      out[known->second] += "; " + args[++i];
+      continue;
+    }
+    out.insert(out.end(), {args[i], args[i + 1]});
+    ++i;
+    // A point of the scene counts from where the scene does.
+    if (stage == "saw") out.emplace_back("--no-from-centre");
+  }
+  return out;
 }
 
 std::string slicer_module_name(const std::string& stage) {

@@ -1,5 +1,6 @@
 #include "osteo/core/data/points_io.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <string>
@@ -7,12 +8,35 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/param.h"
 
 namespace osteo {
+namespace {
+
+// 3D Slicer's points (.fcsv): "# CoordinateSystem = LPS" (or its number), then rows of id,x,y,z,... What older versions
+// write without a word is RAS.
+enum class Fcsv { none, lps, ras };
+Fcsv fcsv_of(const fs::path& path, std::string_view text) {
+  if (lower_case(path.extension().string()) != ".fcsv") return Fcsv::none;
+  constexpr std::string_view kKey = "# CoordinateSystem = ";
+  const std::size_t at = text.find(kKey);
+  if (at == std::string_view::npos) return Fcsv::ras;
+  std::string_view value = text.substr(at + kKey.size());
+  value = value.substr(0, value.find_first_of("\r\n"));
+  if (value == "LPS" || value == "1") return Fcsv::lps;
+  if (value == "RAS" || value == "0") return Fcsv::ras;
+  throw Error(
+      ExitCode::corrupt,
+      "'" + path.string() + "' has its points in the coordinates '" + std::string(value) + "', not in LPS or RAS",
+      "save them anew in Slicer");
+}
+
+}  // namespace
 
 std::vector<Vec3> load_points(const fs::path& path) {
   const std::vector<std::byte> bytes = read_file(path);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const Fcsv fcsv = fcsv_of(path, text);
   std::vector<Vec3> points;
   std::size_t line = 0;
   for (std::size_t at = 0; at < text.size();) {
@@ -26,7 +50,7 @@ std::vector<Vec3> load_points(const fs::path& path) {
     }
     if (row.find_first_not_of(' ') == std::string::npos || row[row.find_first_not_of(' ')] == '#') continue;
     Vec3 p;
-    const char* s = row.data();
+    const char* s = row.data() + (fcsv == Fcsv::none ? 0 : std::min(row.find(' '), row.size()));
     const char* const last = row.data() + row.size();
     bool good = true;
     for (std::size_t a = 0; a < 3 && good; ++a) {
@@ -40,6 +64,7 @@ std::vector<Vec3> load_points(const fs::path& path) {
       throw Error(ExitCode::corrupt, "'" + path.string() + "', line " + std::to_string(line) +
                                          ": three finite numbers x, y, z are wanted");
     }
+    if (fcsv == Fcsv::ras) p = {-p.x, -p.y, p.z};
     points.push_back(p);
   }
   if (points.empty())

@@ -9,12 +9,12 @@
 #include <array>
 #include <cctype>
 #include <map>
-#include <set>
 
 #include "association.h"
 #include "deidentify_table.h"
 #include "node.h"
 #include "osteo/core/base/json_document.h"
+#include "telling.h"
 
 namespace osteo::inline hospital {
 namespace {
@@ -36,6 +36,9 @@ constexpr std::string_view kTakenClasses[] = {
     UID_SegmentationStorage,
     UID_SurfaceSegmentationStorage,
 };
+
+const DcmTagKey kTelephones[] = {DCM_PatientTelephoneNumbers, DCM_ReferringPhysicianTelephoneNumbers,
+                                 DCM_PersonTelephoneNumbers, DCM_OrderCallbackPhoneNumber};
 
 Key key_of(const fs::path& file) {
   if (::sodium_init() < 0)
@@ -247,30 +250,17 @@ void visit(DcmItem& item, const Visit& what) {
   }
 }
 
-// Words in small letters; bytes beyond ASCII are parts of words.
-std::set<std::string> words_of(const std::string& text, std::size_t least) {
-  std::set<std::string> words;
-  std::string word;
-  for (std::size_t n = 0; n <= text.size(); ++n) {
-    const unsigned char c = n < text.size() ? static_cast<unsigned char>(text[n]) : ' ';
-    if (std::isalnum(c) != 0 || c >= 0x80) {
-      word += static_cast<char>(std::tolower(c));
-    } else {
-      if (word.size() >= least) words.insert(word);
-      word.clear();
-    }
-  }
-  return words;
-}
-
-std::set<std::string> telling_words(DcmItem& data) {
-  std::set<std::string> telling;
+pacs::Telling telling_of(DcmItem& data) {
+  pacs::Telling telling;
   visit(data, [&](DcmElement& e) {
     const DcmTagKey tag = e.getTag().getXTag();
-    if (e.ident() == EVR_PN || tag == DCM_PatientID || tag == DCM_AccessionNumber || tag == DCM_OtherPatientNames)
-      telling.merge(words_of(value_of(e), 4));
+    if (e.ident() == EVR_PN || tag == DCM_PatientID || tag == DCM_AccessionNumber || tag == DCM_RETIRED_OtherPatientIDs)
+      telling.add_name(value_of(e));
+    else if (tag == DCM_PatientBirthDate)
+      telling.add_birth_date(value_of(e));
+    else if (std::ranges::find(kTelephones, tag) != std::end(kTelephones))
+      telling.add_telephone(value_of(e));
   });
-  telling.erase("removed");  // our own dummy, and what others have put there before
   return telling;
 }
 
@@ -334,7 +324,7 @@ DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, con
       refuse(why);
       continue;
     }
-    const std::set<std::string> telling = telling_words(data);
+    const pacs::Telling telling = telling_of(data);
     DeidentifiedStudy study{
         code_of(key, data), {}, pacs::text_of(data, DCM_PatientID), pacs::text_of(data, DCM_StudyInstanceUID)};
     for (char& c : study.patient_id)
@@ -349,11 +339,11 @@ DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, con
     std::string left;
     visit(data, [&](DcmElement& e) {
       if (!left.empty() || !is_words(e.ident())) return;
-      for (const std::string& word : words_of(value_of(e), 4))
-        if (telling.contains(word)) left = e.getTag().toString().c_str();
+      if (const std::string_view what = telling.found_in(value_of(e)); !what.empty())
+        left = std::string(e.getTag().toString().c_str()) + ", which is kept, has " + std::string(what);
     });
     if (!left.empty()) {
-      refuse("attribute " + left + ", which is kept, has a word of a person's name or number");
+      refuse("attribute " + left);
       continue;
     }
     mark(data, study.code);

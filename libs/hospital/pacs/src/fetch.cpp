@@ -129,6 +129,7 @@ void pacs::check_keys(const SeriesKeys& keys) {
 
 std::vector<RemoteSeries> find_series(const DicomPeer& peer, const SeriesKeys& keys, const Context& context) {
   pacs::check_keys(keys);
+  pacs::warn_of_open_key(peer.tls, context);
   pacs::Query query(peer);
   // Studies first: the study root asks for series of one study at a time (PS3.4 C.6.2).
   DcmDataset studies;

@@ -2,6 +2,7 @@
 
 #include <dcmtk/dcmdata/dcuid.h>
 #include <dcmtk/oflog/oflog.h>
+#include <sys/stat.h>
 
 #include <charconv>
 #include <cmath>
@@ -56,6 +57,12 @@ void quiet_dcmtk(double timeout_s) {
   dcmSocketReceiveTimeout.set(static_cast<Sint32>(std::ceil(timeout_s)));
   dcmSocketSendTimeout.set(static_cast<Sint32>(std::ceil(timeout_s)));
   dcmDisableGethostbyaddr.set(OFTrue);  // nobody needs to know the peer's name, and asking can take long
+}
+
+void warn_of_open_key(const DicomTls& tls, const Context& context) {
+  struct stat facts {};
+  if (!tls.key.empty() && ::stat(tls.key.c_str(), &facts) == 0 && (facts.st_mode & 077) != 0)
+    context.warn("others may read the key '" + tls.key + "': chmod 600 " + tls.key);
 }
 
 std::unique_ptr<DcmTLSTransportLayer> tls_layer(const DicomTls& tls, T_ASC_NetworkRole role) {

@@ -9,6 +9,7 @@
 #include "dcmtk/dcmnet/dimse.h"
 #include "dcmtk/dcmnet/scu.h"
 #include "dcmtk/dcmtls/tlslayer.h"
+#include "osteo/core/base/context.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/hospital/pacs/peer.h"
@@ -18,6 +19,8 @@ namespace osteo::inline hospital::pacs {
 /// DCMTK's messages go nowhere, and a connection may not wait for ever.
 void quiet_dcmtk(double timeout_s);
 
+/// Warns where others than the owner may read the private key.
+void warn_of_open_key(const DicomTls& tls, const Context& context);
 /// What speaks TLS; none where `tls` names no trusted certificates. Errors: usage, no_input, cannot_read.
 [[nodiscard]] std::unique_ptr<DcmTLSTransportLayer> tls_layer(const DicomTls& tls, T_ASC_NetworkRole role);
 

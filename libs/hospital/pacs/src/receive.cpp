@@ -283,6 +283,7 @@ class Node {
 void receive_objects(const fs::path& folder, const ReceiveOptions& options, const ReceiveEvents& events,
                      const Context& context) {
   check(options);
+  pacs::warn_of_open_key(options.tls, context);
   try {
     Node(folder, options, events, context).run();
   } catch (const fs::filesystem_error& e) {

@@ -92,6 +92,7 @@ DicomObjects list_objects(const std::vector<fs::path>& sources, const Context& c
 
 SendReport send_objects(const DicomPeer& peer, const std::vector<DicomObject>& objects, bool check_after,
                         const Context& context) {
+  pacs::warn_of_open_key(peer.tls, context);
   SendReport report;
   std::map<std::pair<std::string, std::string>, std::vector<std::size_t>> by_context;
   for (const DicomObject& o : objects) {
