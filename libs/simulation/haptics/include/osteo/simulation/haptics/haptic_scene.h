@@ -10,7 +10,7 @@
 #include "osteo/simulation/bone/plates.h"
 #include "osteo/simulation/bone/world.h"
 #include "osteo/simulation/haptics/haptic_setup.h"
-#include "osteo/simulation/haptics/held_shaft.h"
+#include "osteo/simulation/haptics/overlap.h"
 
 namespace osteo::inline simulation {
 
@@ -54,7 +54,6 @@ struct HandContact {
   std::array<std::shared_ptr<ContactModel>, EnumNames<ContactMethod>::values.size()> models;
   std::array<std::vector<std::size_t>, EnumNames<ContactMethod>::values.size()> tools;  ///< that each model is for
   ContactModel* in_use = nullptr;  ///< of the instrument in the hand
-  HeldShaft shaft;
   Overlap pressed_shaft{0};  ///< of one that is not held
 };
 
