@@ -25,6 +25,7 @@ struct Mover {
   HeldShaft held = {};
   Vec3 at = {}, offset = {};
   int most = 0;
+  double most_jump = 0;  // of the offset in a tick, beyond twice what the hand moved
   bool begun = false;
 
   Vec3 go(Vec3 to, double mm_per_s, double hz = 1000) {
@@ -33,8 +34,10 @@ struct Mover {
     const int n = std::max(1, static_cast<int>(std::ceil(length(to - from) / mm_per_s * hz)));
     for (int i = 1; i <= n; ++i) {
       at = from + (to - from) * (static_cast<double>(i) / n);
-      const auto a = held.follow(bone, nullptr, shape, 0.5 * bone.frame().spacing_mm.x, at, axis);
+      const HeldShaft::Body body{&bone};
+      const auto a = held.follow({&body, 1}, shape, 0.5 * bone.frame().spacing_mm.x, at, axis);
       most = std::max(most, a.evaluations);
+      most_jump = std::max(most_jump, length(a.offset_mm - offset) - 2 * length(to - from) / n);
       offset = a.offset_mm;
       EXPECT_TRUE(std::isfinite(dot(offset, offset)));
     }
@@ -122,13 +125,39 @@ TEST(HeldShaft, InAHoleItGoesToTheWall) {
   }
 }
 
+// Onto a rim, along it, off its end and back, and drawn out: what pulls the hand goes with the offset, which changes by
+// what the hand moves and by what a shaft that is free again comes back. (It left the offset without a force, or the
+// force without an offset, for a tick: 1.6 N.)
+TEST(HeldShaft, ItsOffsetNeverJumps) {
+  for (const double h : kVoxels) {
+    const auto plate = test::solid(
+        h, 8, [&](Vec3 p) { return p.x > 0.07 && std::abs(p.z - 0.13) < 1 && p.y > -2; }, {}, 3);
+    for (const double speed : {1.0, 5.0, 25.0, 100.0, 300.0}) {
+      const double far = speed < 5 ? 0.3 : 3;
+      Mover m{plate, {0, 0, 1}};
+      m.go({-kRadius - 0.3, 0, -30}, speed);
+      m.go({-kRadius + far, 0.2, -30}, speed);
+      m.go({-kRadius + far, -0.4 - far, -30}, speed);
+      m.go({-kRadius + far, 0.2, -30}, speed);
+      m.go({-kRadius - 0.3, 0.2, -30}, speed);
+      EXPECT_LT(m.most_jump, HeldShaft::kReturnMm + 1e-9) << h << " " << speed;
+      Mover out{plate, normalized({1, 0, 0.05})};
+      out.go({-20, 1.5, -2.8}, speed);
+      out.go({-20, 1.5, -2.8 + 1 + far}, speed);
+      out.go({-20, 1.5, -2.8}, speed);
+      EXPECT_LT(out.most_jump, HeldShaft::kReturnMm + 1e-9) << h << " " << speed;
+    }
+  }
+}
+
 TEST(HeldShaft, InBoneAllAroundItIsLetBe) {
   const auto solid = test::solid(
       0.5, 8, [](Vec3) { return true; }, {}, 1);
   Mover m{solid, {0, 0, 1}};
   for (int n = 0; n < 5; ++n) EXPECT_EQ(length(m.go({0.1 * n, 0, -30}, 25) - m.at), 0);
   Mover nowhere{solid, {0, 0, 1}};
-  EXPECT_EQ(nowhere.held.follow(solid, nullptr, kShaft, 0.25, {NAN, 0, 0}, {0, 0, 1}).offset_mm, Vec3{});
+  const HeldShaft::Body body{&solid};
+  EXPECT_EQ(nowhere.held.follow({&body, 1}, kShaft, 0.25, {NAN, 0, 0}, {0, 0, 1}).offset_mm, Vec3{});
 }
 
 // Through a hole in a plate, the hand pushes to the side with a constant force, drill off and on: the tool stays in the

@@ -83,6 +83,7 @@ class Hand {
   static HapticSetup setup() {
     HapticSetup s;
     s.device = SpringHand::traits();
+    s.params.effects.held_shaft = true;  // as in a window, where tools are led
     return s;
   }
   void tick() {
@@ -151,7 +152,7 @@ void from_six_views(const char* name, const World& world, const StructureMap* st
       if (!at) continue;
       EXPECT_EQ(hand.walk({}), Led::arrived);
       const auto began = std::chrono::steady_clock::now();
-      const FreeWays::Found a = ways.approach(hand.pose(), *at, normalized(aim - eye), view.axis());
+      const FreeWays::Found a = ways.approach(hand.shown(), *at, normalized(aim - eye), view.axis());
       plan_s = std::max(plan_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
       const double from_s = hand.seconds();
       EXPECT_EQ(hand.walk(a.way), Led::arrived) << name << ", " << view.name << " " << across;
@@ -172,7 +173,7 @@ void from_six_views(const char* name, const World& world, const StructureMap* st
   // Whatever the hand is in, it gets out.
   const View& last = kViews[5];
   hand.walk({});
-  const HandWay out = ways.way(hand.pose(), ways.waiting(normalized(last.eye), last.axis())).way;
+  const HandWay out = ways.way(hand.shown(), ways.waiting(normalized(last.eye), last.axis())).way;
   EXPECT_EQ(hand.walk(out), Led::arrived) << name;
   EXPECT_EQ(hand.force_n(), 0);
   std::printf(
@@ -276,7 +277,9 @@ TEST(FreeWays, LiftsOutOfACavityWhileItDrills) {
   EXPECT_GT(hand.removed_mm3(), 5);
   const double before = hand.force_n();
   hand.walk({});
-  hand.device().lead(ways.way(hand.pose(), ways.waiting({0, 0, 1}, axis)).way);
+  const FreeWays::Found out = ways.way(hand.shown(), ways.waiting({0, 0, 1}, axis));
+  EXPECT_FALSE(out.way.put) << "nothing is put aside";
+  hand.device().lead(out.way);
   double last = before, removed = hand.removed_mm3();
   hand.tick();
   for (int t = 0; hand.device().led() == Led::on_the_way && t < 20000; ++t) {

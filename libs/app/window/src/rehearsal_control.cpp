@@ -121,11 +121,11 @@ int RehearsalControl::instrument() const {
   return tools_.saw_in_hand() ? saw : tool_;
 }
 
-// Where the hand is; before the first tick, where it will be.
+// Where the tool is: bone may hold it back from the hand. Before the first tick, where it will be.
 HandPose RehearsalControl::hand_pose() const {
   const TickRecord tick = rehearsal().latest();
   if (tick.tick == 0) return {goal_.position_mm, from_floats(goal_.axis)};
-  return {from_floats(tick.device.position_mm), from_floats(tick.device.axis)};
+  return {from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm), from_floats(tick.device.axis)};
 }
 
 FreeWays RehearsalControl::free_ways(bool whole_tool) const {
@@ -201,7 +201,7 @@ void RehearsalControl::lead(std::optional<Vec3> seen_mm, Vec3 forward) {
     say("the drill is in your own hand");
     return;
   }
-  leading_ = Leading{Leading::Stage::letting_go, {}, seen_mm, forward, {}};
+  leading_ = Leading{Leading::Stage::letting_go, 0, {}, seen_mm, forward, {}};
   tools_.loosen_saw(true, rehearsal());
   // Pulled aside it would not get there.
   if (lead_pause_.begin()) say("the drill finds its way: your hand is let go until it is there");
@@ -234,6 +234,8 @@ std::optional<BoneHit> RehearsalControl::bone_seen(Vec3 direction) const {
 static constexpr const char* kPastStructures = "; past a critical structure, since no other path was free";
 
 void RehearsalControl::go_on_leading() {
+  constexpr double kBackMm = 0.3;
+  constexpr int kLetGo = 3;
   if (!leading_) return;
   Device& device = rehearsal().device();
   const Led led = device.led();
@@ -250,9 +252,16 @@ void RehearsalControl::go_on_leading() {
   const auto waiting = [&](const FreeWays& ways) { return ways.waiting(towards_eye(), wanted_axis()); };
   if (leading_->stage == Leading::Stage::letting_go) {
     if (lead_pause_.pulled()) return;
-    const std::uint64_t tick = rehearsal().latest().tick;
-    if (!leading_->quiet_tick) leading_->quiet_tick = tick;
-    if (tick <= *leading_->quiet_tick) return;
+    const TickRecord now = rehearsal().latest();
+    if (!leading_->quiet_tick) leading_->quiet_tick = now.tick;
+    if (now.tick <= *leading_->quiet_tick) return;
+    // The way is the tool's: it has to be back at the hand, which is pulled to it while it is let go.
+    if (length(from_floats(now.shown_offset_mm)) > kBackMm && leading_->let_go < kLetGo) {
+      ++leading_->let_go;
+      leading_->quiet_tick.reset();
+      device.lead({});
+      return;
+    }
     const FreeWays ways = free_ways(true);
     const HandPose from = hand_pose();
     if (leading_->seen_mm) {

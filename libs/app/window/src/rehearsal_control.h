@@ -122,6 +122,7 @@ class RehearsalControl {
   // First it lets go of the bone; then the way is found from where it is.
   struct Leading {
     enum class Stage { letting_go, on_the_way, put } stage = Stage::letting_go;
+    int let_go = 0;                           // how often more, since the tool was not back at the hand
     std::optional<std::uint64_t> quiet_tick;  // when it had let go: what is known of the hand may be older
     std::optional<Vec3> seen_mm;              // bone to come down at; none: out
     Vec3 forward;

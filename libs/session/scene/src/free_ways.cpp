@@ -9,6 +9,7 @@
 
 #include "osteo/core/base/portable_math.h"
 #include "osteo/geometry/grid/brick_places.h"
+#include "osteo/geometry/grid/sampler.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/haptics/haptic_scene.h"
 
@@ -190,7 +191,10 @@ std::size_t FreeWays::touching_bone(const HandPose& pose, double margin_mm, std:
     for (const ToolSkin::Point& p : tool_.points) {
       const Vec3 x = origin + index_from_hand * (p.at_mm + p.outwards * margin_mm);
       const auto round = [](double v) { return static_cast<int>(std::floor(v + 0.5)); };
-      if (bone.at(round(x.x), round(x.y), round(x.z)) >= least && ++count > most) return count;
+      if (!(bone.at(round(x.x), round(x.y), round(x.z)) >= least)) continue;
+      // Without room to keep it matters where in the voxel: a bore is as narrow as what drilled it.
+      if (margin_mm > 0 || linear_beside(bone, x) >= least) ++count;
+      if (count > most) return count;
     }
   }
   return count;
@@ -253,8 +257,9 @@ bool FreeWays::leaves(const HandPose& from, Vec3 direction, double near_margin, 
   }
 }
 
-// Where no straight way leads out: a lattice of a millimetre, places farther out first.
-std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double near_margin, double far_margin) const {
+// Where no straight way leads out: on a lattice, places farther out first.
+std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double near_margin, double far_margin,
+                                                    double step_mm) const {
   constexpr int kMostLooks = 40000;
   constexpr double kBeginningMm = 3;
   // At the beginning the tool may touch, but never more than it does.
@@ -268,8 +273,9 @@ std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double
     return (static_cast<std::int64_t>(i + kHalf) << 40) | (static_cast<std::int64_t>(j + kHalf) << 20) | (k + kHalf);
   };
   const auto place = [&](std::int64_t n) {
-    return from.at_mm + Vec3{static_cast<double>((n >> 40) - kHalf), static_cast<double>((n >> 20 & 0xfffff) - kHalf),
-                             static_cast<double>((n & 0xfffff) - kHalf)};
+    return from.at_mm + step_mm * Vec3{static_cast<double>((n >> 40) - kHalf),
+                                       static_cast<double>((n >> 20 & 0xfffff) - kHalf),
+                                       static_cast<double>((n & 0xfffff) - kHalf)};
   };
   std::unordered_map<std::int64_t, std::int64_t> seen;  // place -> the one it was reached from
   std::priority_queue<std::pair<double, std::int64_t>> open;
@@ -309,12 +315,13 @@ std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double
   return std::nullopt;
 }
 
-std::optional<FreeWays::Poses> FreeWays::straight_out(const HandPose& from, Vec3 rather) const {
+std::optional<FreeWays::Poses> FreeWays::straight_out(const HandPose& from, Vec3 rather, double least_margin) const {
   if (outside(from.at_mm)) return Poses{};
   const double here = margin_at(from);
   const std::vector<Vec3> all = directions(from.axis, rather);
   HandPose end;
   for (const double margin : {kClearMm, 0.0, kPressedMm}) {
+    if (margin < least_margin) break;
     for (const Vec3 d : all) {
       if (leaves(from, d, std::min(here, margin), margin, end)) return Poses{end};
     }
@@ -323,10 +330,12 @@ std::optional<FreeWays::Poses> FreeWays::straight_out(const HandPose& from, Vec3
 }
 
 std::optional<FreeWays::Poses> FreeWays::way_out(const HandPose& from, Vec3 rather) const {
-  if (auto straight = straight_out(from, rather)) return straight;
+  if (auto straight = straight_out(from, rather, kPressedMm)) return straight;
   const double here = std::min(0.0, margin_at(from));
-  auto roomy = search_out(from, here, kClearMm);
-  return roomy ? roomy : search_out(from, here, here);
+  auto roomy = search_out(from, here, kClearMm, 1);
+  if (!roomy) roomy = search_out(from, here, here, 1);
+  // A channel that is little wider than the tool, and leads between the lattice's places.
+  return roomy ? roomy : search_out(from, here, here, 0.5);
 }
 
 // Round the ball, from outside it to outside it, no farther off than needed.
@@ -442,7 +451,8 @@ FreeWays::Found FreeWays::found_approach(const HandPose& from, Vec3 seen_mm, Vec
     for (const Vec3 a : axes) {
       const HandPose end{at, a};
       if (!free(end, kGapMm)) continue;
-      const auto down = straight_out(end, back);
+      // It got out of where it drilled itself in; into a gap without room bone would not let its shaft.
+      const auto down = straight_out(end, back, kClearMm);
       if (!down) continue;
       if (const auto near = over(from, end, back)) {
         if (const auto way = finished(from, *near)) return {*way, end};

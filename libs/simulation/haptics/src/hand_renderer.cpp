@@ -97,16 +97,15 @@ void HandRenderer::feel(const DeviceSample& sample) noexcept {
   loaded_ = nullptr;
   const bool meets = !led || guide_.guide().own_contact;
   Vec3 elastic, torque;
-  // A jump has no way that a shaft could have been stopped on; another tool was not there before.
+  // A jump has no way that a shaft could have been stopped on. Another tool is where the one before was let be.
   const bool shaft = common_.params.effects.shaft && has_head() && meets;
-  const bool held = shaft && common_.params.effects.held_shaft;
-  if (!held || in.jumped || pose_.tool != held_tool_) let_shaft_go();
-  held_tool_ = pose_.tool;
-  if (held) hold_shaft(elastic, torque);
+  const bool keeps = shaft && common_.params.effects.held_shaft;
+  if (!keeps || in.jumped) shaft_.forget();
+  if (keeps) hold_shaft(elastic, torque);
   if (meets) meet();
   elastic += contact_.force_n;
   torque += contact_.torque_n_mm;
-  if (shaft && !held) press_shaft(elastic, torque);
+  if (shaft && !keeps) press_shaft(elastic, torque);
   if (usable_ && !(soft_.normal == Vec3{})) {
     const double push = std::clamp(soft_.force_n + soft_.stiffness_n_per_mm * dot(soft_.at_mm - at_, soft_.normal), 0.0,
                                    law_.max_force_n);
@@ -289,40 +288,34 @@ void HandRenderer::escape() noexcept {
   flags_ |= kEscape;
 }
 
-void HandRenderer::let_shaft_go() noexcept {
-  for (const HapticScene::Item& item : common_.scene->items) item.hands[number_]->shaft.forget();
-}
-
-// The tool is where its shaft can be: behind bone the hand pulls at it, but what is at its tip goes by where it is.
+// The tool is where its shaft can be, and the hand is pulled there: no offset is without its force. Behind bone the
+// hand pulls at it, but what is at its tip goes by where it is.
 void HandRenderer::hold_shaft(Vec3& elastic, Vec3& torque) noexcept {
   const RoundCone& shape = instrument_->shaft;
-  HapticScene& scene = *common_.scene;
+  const HapticScene& scene = *common_.scene;
+  std::array<HeldShaft::Body, HeldShaft::kMostBodies> bodies;
+  std::size_t count = 0;
   // A burr's shaft follows it into what it cuts, so its shell must not touch the walls.
   const double gap = instrument_->head.end_radius_mm - shape.start_radius_mm;
-  Vec3 farthest;
+  double shell = instrument_->kind == InstrumentKind::burr && gap > 0 ? 0.5 * gap : 1e9;
   for (const HapticScene::Item& item : scene.items) {
-    HeldShaft& shaft = item.hands[number_]->shaft;
-    const Vec3 own = item.body_from_world(at_), own_axis = item.body_from_world.rotation * axis_;
-    if (scene.items.size() > 1 && !item.bone->near(own + own_axis * (shape.start_mm + 0.5 * shape.length_mm),
-                                                   0.5 * shape.length_mm + shape.largest_radius_mm() + 1)) {
-      shaft.forget();
+    if (count == bodies.size()) break;
+    if (scene.items.size() > 1 &&
+        !item.bone->near(item.body_from_world(at_ + axis_ * (shape.start_mm + 0.5 * shape.length_mm)),
+                         0.5 * shape.length_mm + shape.largest_radius_mm() + 2 + length(shaft_.offset_mm())))
       continue;
-    }
-    const BrickGrid& bone = item.bone->bone();
-    double shell = 0.5 * bone.frame().spacing_mm.x;
-    if (instrument_->kind == InstrumentKind::burr && gap > 0) shell = std::min(shell, 0.5 * gap);
-    const HeldShaft::Answer held = shaft.follow(bone, &item.bone->grains(), shape, shell, own, own_axis);
-    const double far = length(held.offset_mm);
-    if (!(far > 0)) continue;
-    const Vec3 offset = item.world_from_body.rotation * held.offset_mm;
-    if (far > length(farthest)) farthest = offset;
-    if (!held.contact) continue;
-    const double push = law_.force_n(far);
-    elastic += offset * (push / far);
-    torque += item.world_from_body.rotation * held.torque_mm * push;
-    if (push > 0) flags_ |= kShaftContact;
+    bodies[count++] = {&item.bone->bone(), &item.bone->grains(), item.bone->first_name(), item.world_from_body,
+                       item.body_from_world};
+    shell = std::min(shell, 0.5 * item.bone->bone().frame().spacing_mm.x);
   }
-  at_ += farthest;
+  const HeldShaft::Answer held = shaft_.follow({bodies.data(), count}, shape, shell, at_, axis_);
+  const double far = length(held.offset_mm);
+  if (!(far > 0)) return;
+  const double push = law_.force_n(far);
+  elastic += held.offset_mm * (push / far);
+  torque += held.torque_mm * push;
+  flags_ |= kShaftContact;
+  at_ += held.offset_mm;
 }
 
 // By what of the shaft lies in bone: areas on opposite sides cancel, so it goes through what is thinner than it.

@@ -1,6 +1,7 @@
 // What one hand feels and what its burr takes away.
 #pragma once
 #include "contact_models.h"
+#include "osteo/simulation/haptics/detail/held_shaft.h"
 #include "osteo/simulation/haptics/guide.h"
 #include "osteo/simulation/haptics/renderer.h"
 #include "osteo/simulation/haptics/saw_slot.h"
@@ -67,7 +68,6 @@ class HandRenderer {
   void combine() noexcept;
   void escape() noexcept;
   void hold_shaft(Vec3& elastic, Vec3& torque) noexcept;
-  void let_shaft_go() noexcept;
   void press_shaft(Vec3& elastic, Vec3& torque) noexcept;
   [[nodiscard]] Vec3 effects() noexcept;
   [[nodiscard]] double thickness() const noexcept;
@@ -86,13 +86,14 @@ class HandRenderer {
   } soft_;
   GuideLaw guide_;
   SawSlot slot_;
+  HeldShaft shaft_;
   DeviceSample leader_;
   Vec3 leader_force_n_;
   bool leads_ = false, resting_ = false;
   // What it remembers of the tick before.
   DeviceSample last_good_;
   bool has_last_ = false;
-  std::uint8_t last_tool_ = 0, held_tool_ = 0;
+  std::uint8_t last_tool_ = 0;
   double speed_rpm_ = 0;
   // Of this tick.
   DeviceSample pose_;

@@ -7,16 +7,15 @@ namespace osteo::inline simulation {
 namespace {
 
 constexpr int kMostEvaluations = 8;
-// A way no longer than this is looked at as a whole.
-constexpr double kOneLookMm = 8;
+// So far around the shaft bone is looked for, in stretches of so much of it, and so many calls it is relied on.
+constexpr double kLookMm = 1.5, kStretchMm = 4;
+constexpr int kLookEvery = 64;
 // With less bone before its surface than this share of a voxel's face, what is met is a crumb.
 constexpr double kCrumb = 0.2;
 // Of the bone at its surface so much must be pushed one way for it to have a direction.
 constexpr double kOneWay = 0.1;
 // So that small doubts about where a rim faces do not make it wander: a shaft has more.
 constexpr double kFriction = 0.05;
-// No farther off the surface than this share of its shell it rests on it.
-constexpr double kOnIt = 0.5;
 
 RoundCone grown(RoundCone shape, double by_mm) {
   shape.start_radius_mm += by_mm;
@@ -24,33 +23,110 @@ RoundCone grown(RoundCone shape, double by_mm) {
   return shape;
 }
 
+// Part of it: its balls from `from_mm` to `to_mm` of its axis.
+RoundCone stretch_of(const RoundCone& shape, double from_mm, double to_mm) {
+  return {shape.start_mm + from_mm, to_mm - from_mm, shape.radius_at_mm(from_mm), shape.radius_at_mm(to_mm)};
+}
+
+bool same(const RigidTransform& a, const RigidTransform& b) {
+  return a.rotation == b.rotation && a.shift_mm == b.shift_mm;
+}
+bool same(const RoundCone& a, const RoundCone& b) {
+  return a.start_mm == b.start_mm && a.length_mm == b.length_mm && a.start_radius_mm == b.start_radius_mm &&
+         a.end_radius_mm == b.end_radius_mm;
+}
+
 }  // namespace
 
-HeldShaft::Answer HeldShaft::follow(const BrickGrid& bone, const Grains* known, const RoundCone& shaft, double shell_mm,
-                                    Vec3 at_mm, Vec3 axis) noexcept {
+void HeldShaft::forget() noexcept {
+  proxy_.forget();
+  offset_mm_ = torque_mm_ = {};
+}
+
+// Other bodies, or elsewhere, or another shaft: what is near is looked for again.
+void HeldShaft::take(std::span<const Body> bodies, const RoundCone& shaft) noexcept {
+  const std::size_t n = std::min(bodies.size(), kMostBodies);
+  bool known = n == count_ && same(shaft, shape_);
+  for (std::size_t i = 0; i < n; ++i) {
+    known = known && bodies_[i].name == bodies[i].name && same(bodies_[i].world_from_body, bodies[i].world_from_body);
+    bodies_[i] = bodies[i];
+  }
+  count_ = n;
+  shape_ = shaft;
+  if (!known || ++looked_ago_ >= kLookEvery) looked_mm_ = -1;
+}
+
+void HeldShaft::look(const RoundCone& shaft, double within_mm, Vec3 at_mm, Vec3 axis) noexcept {
+  const int n = std::max(1, static_cast<int>(std::ceil(shaft.length_mm / kStretchMm)));
+  for (std::size_t b = 0; b < count_; ++b) {
+    const Body& body = bodies_[b];
+    Stretch& near = near_[b];
+    near = {};
+    const Vec3 at = body.body_from_world(at_mm), along = body.body_from_world.rotation * axis;
+    for (int i = 0; i < n; ++i) {
+      const double from = shaft.length_mm * i / n, to = shaft.length_mm * (i + 1) / n;
+      // Grains only take bone away.
+      const RoundCone part = grown(stretch_of(shaft, from, to), within_mm);
+      if (!(overlap_.measure(*body.bone, part, at, along).bone_mm3 > 0)) continue;
+      if (!near.any) near = {from, to, true};
+      near.to_mm = to;
+    }
+  }
+  looked_at_mm_ = at_mm;
+  looked_axis_ = axis;
+  looked_mm_ = within_mm;
+  looked_ago_ = 0;
+}
+
+// Of the stretches that are near bone: elsewhere there is none.
+OverlapResult HeldShaft::measure(const RoundCone& shaft, double grown_mm, Vec3 at_mm, Vec3 axis) noexcept {
+  const double turned = (shaft.start_mm + shaft.length_mm) * length(axis - looked_axis_);
+  if (!(length(at_mm - looked_at_mm_) + turned + grown_mm <= looked_mm_))
+    look(shaft, std::max(kLookMm, 1.5 * grown_mm), at_mm, axis);
+  OverlapResult sum;
+  for (std::size_t b = 0; b < count_; ++b) {
+    const Stretch& near = near_[b];
+    if (!near.any) continue;
+    const Body& body = bodies_[b];
+    const OverlapResult o =
+        overlap_.measure(*body.bone, grown(stretch_of(shaft, near.from_mm, near.to_mm), grown_mm),
+                         body.body_from_world(at_mm), body.body_from_world.rotation * axis, body.known);
+    sum.bone_mm3 += o.bone_mm3;
+    sum.sharp_mm3 += o.sharp_mm3;
+    sum.surface_mm2 += o.surface_mm2;
+    sum.area_mm2 += body.world_from_body.rotation * o.area_mm2;
+    sum.area_foot_mm3 += body.world_from_body.rotation * o.area_foot_mm3;
+  }
+  return sum;
+}
+
+HeldShaft::Answer HeldShaft::follow(std::span<const Body> bodies, const RoundCone& shaft, double shell_mm, Vec3 at_mm,
+                                    Vec3 axis) noexcept {
   Answer a;
-  if (!std::isfinite(dot(at_mm, at_mm))) {
+  if (!std::isfinite(dot(at_mm, at_mm)) || !std::isfinite(dot(axis, axis))) {
     forget();
     return a;
   }
-  const double h = bone.frame().spacing_mm.x;
-  // Away from bone: all that the shaft can touch on its way is looked at once.
-  const double way = proxy_.placed() ? length(at_mm - proxy_.position_mm()) : 0;
-  if (!touched_ && way < kOneLookMm) {
-    const Vec3 from = proxy_.placed() ? proxy_.position_mm() : at_mm;
+  take(bodies, shaft);
+  double h = 1e9;
+  for (std::size_t b = 0; b < count_; ++b) h = std::min(h, bodies_[b].bone->frame().spacing_mm.x);
+  const bool first = !proxy_.placed();
+  const double moved =
+      first ? 0 : length(at_mm - last_at_mm_) + (shaft.start_mm + shaft.length_mm) * length(axis - last_axis_);
+  last_at_mm_ = at_mm;
+  last_axis_ = axis;
+  // Held by nothing: all that the shaft can touch on its way is looked at once.
+  if (first || offset_mm_ == Vec3{}) {
     ++a.evaluations;
-    if (!(overlap_.measure(bone, grown(shaft, shell_mm + way), from, axis, known).bone_mm3 > 0)) {
+    if (!(measure(shaft, shell_mm + moved, first ? at_mm : proxy_.position_mm(), axis).bone_mm3 > 0)) {
       proxy_.place(at_mm);
       return a;
     }
   }
-  const RoundCone shell = grown(shaft, shell_mm);
   OverlapResult there;
-  Vec3 where;
   bool one_way = true;
   const auto field = [&](Vec3 x) {
-    there = overlap_.measure(bone, shell, x, axis, known);
-    where = x;
+    there = measure(shaft, shell_mm, x, axis);
     one_way = true;
     Clearance c;
     c.value_mm = shell_mm;
@@ -75,7 +151,7 @@ HeldShaft::Answer HeldShaft::follow(const BrickGrid& bone, const Grains* known, 
     }
     return c;
   };
-  if (!proxy_.placed()) {
+  if (first) {
     const Clearance c = field(at_mm);
     ++a.evaluations;
     if (c.value_mm < 0 && !one_way) return a;
@@ -85,20 +161,27 @@ HeldShaft::Answer HeldShaft::follow(const BrickGrid& bone, const Grains* known, 
   g.tolerance_mm = 2e-2 * h;
   g.friction = g.static_friction = kFriction;
   g.evaluations = kMostEvaluations - a.evaluations;
+  g.travel_mm = moved + kReturnMm;
   const GodObject::Answer answer = proxy_.update(field, at_mm, g);
   a.evaluations += answer.evaluations;
-  a.offset_mm = answer.proxy_mm - at_mm;
-  a.contact = touched_ = answer.contact;
-  if (!a.contact && !(length(a.offset_mm) > g.tolerance_mm)) return a;
-  if (!a.contact || !(where == answer.proxy_mm)) {
-    const Clearance c = field(answer.proxy_mm);
-    ++a.evaluations;
-    // All that was looked at may be used up just off the surface: it is held all the same.
-    a.contact = touched_ = a.contact || (c.value_mm < kOnIt * shell_mm && dot(a.offset_mm, c.normal) > 0);
-    if (!a.contact) return a;
+  Vec3 offset = answer.proxy_mm - at_mm;
+  if (!answer.contact && !(length(offset) > g.tolerance_mm)) {
+    proxy_.place(at_mm);
+    offset = {};
   }
+  // Where a voxel's step puts it aside at once, it gets there in a few calls.
+  const Vec3 change = offset - offset_mm_;
+  const double most = 2 * moved + kReturnMm, n = length(change);
+  offset_mm_ = n > most ? offset_mm_ + change * (most / n) : offset;
+  if (offset_mm_ == Vec3{}) {
+    torque_mm_ = {};
+    return a;
+  }
+  // Off the bone for a moment it is pulled as it was.
   if (const double pressed = length(there.area_mm2); pressed > 0)
-    a.torque_mm = cross(axis, there.area_foot_mm3) * (-1 / pressed);
+    torque_mm_ = cross(axis, there.area_foot_mm3) * (-1 / pressed);
+  a.offset_mm = offset_mm_;
+  a.torque_mm = torque_mm_;
   return a;
 }
 

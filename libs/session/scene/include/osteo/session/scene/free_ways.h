@@ -9,7 +9,8 @@
 
 namespace osteo::inline session {
 
-/// A tool and where it is held. `axis` is a unit vector, from the tool to the handle.
+/// A tool and where it is held. `axis` is a unit vector, from the tool to the handle. Ways begin where the tool is
+/// shown: where bone holds a shaft the hand may be elsewhere.
 struct HandPose {
   Vec3 at_mm, axis{0, 0, 1};
 };
@@ -61,8 +62,8 @@ class FreeWays {
   [[nodiscard]] Found way(const HandPose& from, const HandPose& to) const;
 
   /// To bone that is seen along `forward` (unit) at `seen_mm`: the nearest place before it on that line of sight where
-  /// the tool is free by half a millimetre and gets to from outside. Held along `axis`, or where it does not fit so,
-  /// leaning to another side or towards who looks.
+  /// the tool is free by half a millimetre and gets to from outside with room all the way. Held along `axis`, or where
+  /// it does not fit so, leaning to another side or towards who looks.
   [[nodiscard]] Found approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const;
 
   /// `axis` turned towards `wanted`, by `most_rad` at most and only as far as the tool touches no more bone than it
@@ -79,12 +80,12 @@ class FreeWays {
   using Poses = std::vector<HandPose>;  // the ones after the first
   [[nodiscard]] bool outside(Vec3 at_mm) const;
   [[nodiscard]] bool in_bone(Vec3 at_mm) const;
-  [[nodiscard]] std::optional<Poses> straight_out(const HandPose& from, Vec3 rather) const;
+  [[nodiscard]] std::optional<Poses> straight_out(const HandPose& from, Vec3 rather, double least_margin_mm) const;
   [[nodiscard]] std::optional<Poses> way_out(const HandPose& from, Vec3 rather) const;
   [[nodiscard]] bool leaves(const HandPose& from, Vec3 direction, double near_margin_mm, double margin_mm,
                             HandPose& end) const;
-  [[nodiscard]] std::optional<Poses> search_out(const HandPose& from, double near_margin_mm,
-                                                double far_margin_mm) const;
+  [[nodiscard]] std::optional<Poses> search_out(const HandPose& from, double near_margin_mm, double far_margin_mm,
+                                                double step_mm) const;
   [[nodiscard]] std::optional<Poses> across(const HandPose& from, const HandPose& to) const;
   [[nodiscard]] std::optional<Poses> over(const HandPose& from, const HandPose& to, Vec3 lift) const;
   [[nodiscard]] bool free_leg(const HandPose& a, const HandPose& b, double margin_mm) const;

@@ -23,7 +23,8 @@ struct GodObjectParams {
       1;  ///< moves along the surface in steps no longer than this: the voxel, or the radius of what is felt
   double tolerance_mm =
       1e-6;  ///< contact and convergence; scale it with the object, so that metres and micrometres work alike
-  int evaluations = 96;  ///< of the field in an update, at most (and a few more); what is left is done in the next
+  int evaluations = 96;    ///< of the field in an update, at most (and a few more); what is left is done in the next
+  double travel_mm = 1e9;  ///< it walks no farther in an update, but for corrections; what is left is done in the next
 };
 
 /// C. Zilles, J. Salisbury, IROS 1995, without triangles: the proxy minimises the distance to the device subject to
@@ -59,18 +60,24 @@ class GodObject {
     const double tolerance = p.tolerance_mm;
     Clearance c = field(x_);
     a.evaluations = 1;
+    double left = p.travel_mm;
     // The surface may have moved over the proxy, or the proxy was put inside: out along the gradient.
-    while (c.value_mm < -tolerance && a.evaluations < p.evaluations) c = step_out(field, c, p.feature_mm, a);
+    while (c.value_mm < -tolerance && a.evaluations < p.evaluations && left > 0) {
+      const Vec3 before = x_;
+      c = step_out(field, c, std::min(p.feature_mm, left), a);
+      left -= length(x_ - before);
+    }
     bool stopped_by_friction = false;
-    while (a.evaluations < p.evaluations) {
+    while (a.evaluations < p.evaluations && left > 0) {
       const Vec3 way = device_mm - x_;
       const double distance = length(way);
       if (distance <= 1e-3 * tolerance) break;
       if (c.value_mm > tolerance || dot(way, c.normal) >= 0) {
         // Free, or leaving: straight to the device, but not beyond what is known to be free.
         const double step =
-            std::min(distance, std::max(c.value_mm, 0.25 * p.feature_mm * (dot(way, c.normal) >= 0 ? 1 : 0)));
+            std::min({distance, left, std::max(c.value_mm, 0.25 * p.feature_mm * (dot(way, c.normal) >= 0 ? 1 : 0))});
         x_ += way * (step / distance);
+        left -= step;
         a.contact = false;
         slipping_ = false;
         c = field(x_);
@@ -88,7 +95,8 @@ class GodObject {
         break;
       }
       slipping_ = true;
-      const double move = std::min(off - drag, p.feature_mm);
+      const double move = std::min({off - drag, p.feature_mm, left});
+      left -= move;
       const Vec3 before = x_, wall = c.normal;
       x_ += tangent * (move / off);
       c = field(x_);

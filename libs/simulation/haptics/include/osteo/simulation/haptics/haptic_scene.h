@@ -10,6 +10,7 @@
 #include "osteo/simulation/bone/plates.h"
 #include "osteo/simulation/bone/world.h"
 #include "osteo/simulation/haptics/detail/held_shaft.h"
+#include "osteo/simulation/haptics/detail/overlap.h"
 #include "osteo/simulation/haptics/haptic_setup.h"
 
 namespace osteo::inline simulation {
@@ -54,8 +55,7 @@ struct HandContact {
   std::array<std::shared_ptr<ContactModel>, EnumNames<ContactMethod>::values.size()> models;
   std::array<std::vector<std::size_t>, EnumNames<ContactMethod>::values.size()> tools;  ///< that each model is for
   ContactModel* in_use = nullptr;  ///< of the instrument in the hand
-  HeldShaft shaft;
-  Overlap pressed_shaft{0};  ///< of one that is not held
+  Overlap pressed_shaft{0};        ///< of one that is not held
 };
 
 /// A plate as the hand feels it.

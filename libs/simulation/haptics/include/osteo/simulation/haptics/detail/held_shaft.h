@@ -1,38 +1,66 @@
 // A tool's shaft as a rigid body on the side of bone where it is.
 #pragma once
+#include <array>
+#include <span>
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/simulation/haptics/detail/overlap.h"
 #include "osteo/simulation/haptics/god_object.h"
 
 namespace osteo::inline simulation {
 
-/// God-object of a shaft, turned as the hand has it: it stops where it meets bone, at the rim of a hole, at a plate's
-/// face or in a slot too narrow for it, however far the hand goes on or draws back, and slides along what stops it with
-/// little friction. Of one hand and one body of bone, in the body's frame. A shaft that is in bone all around when it
-/// is first asked for (or after forget()) is let be until it is free of it. No allocation after it was made; the same
-/// input gives the same bits.
+/// God-object of one hand's shaft, turned as the hand has it: it stops where it meets bone, at the rim of a hole, at a
+/// plate's face or in a slot too narrow for it, however far the hand goes on or draws back, and slides along what stops
+/// it with little friction. All bodies of bone hold it together: their overlaps are added before it is asked where it
+/// may be. A shaft that is in bone all around when it is first asked for (or after forget()) is let be until it is free
+/// of it. No allocation after it was made; the same input gives the same bits.
 class HeldShaft {
  public:
+  static constexpr std::size_t kMostBodies = 8;
+  /// From call to call the offset changes by no more than this and twice what the hand moved: who pulls by a law of the
+  /// offset has a force that never jumps.
+  static constexpr double kReturnMm = 0.1;
+
+  struct Body {
+    const BrickGrid* bone = nullptr;
+    const Grains* known = nullptr;  ///< where burrs have been in it; may be null
+    VoxelKey name = 0;              ///< of its own: by it a body is told from another
+    RigidTransform world_from_body{}, body_from_world{};
+  };
   struct Answer {
-    Vec3 offset_mm;  ///< from the hand's pose to where the shaft lets the tool be
-    Vec3 torque_mm;  ///< about the tool's position, for a newton of push along the offset
-    bool contact = false;
+    Vec3 offset_mm;       ///< from the hand's pose to where the shaft lets the tool be; zero: nothing holds it
+    Vec3 torque_mm;       ///< about the tool's position, for a newton of push along the offset
     int evaluations = 0;  ///< of the overlap of the shaft with bone
   };
-  /// `shell_mm`: so much room it keeps beside bone that it lies flat on, less where it touches in a point; also the
-  /// farthest that it goes between two looks, so half a voxel or less. `at_mm`, `axis` (unit) as of the instrument. A
-  /// place that is not a number forgets. Cost: one overlap of the shaft away from bone, mostly 2 to 4 in contact, 16 at
-  /// most.
-  Answer follow(const BrickGrid& bone, const Grains* known, const RoundCone& shaft, double shell_mm, Vec3 at_mm,
-                Vec3 axis) noexcept;
-  void forget() noexcept {
-    proxy_.forget();
-    touched_ = false;
-  }
+  /// At most kMostBodies bodies count, the first ones. `shell_mm`: so much room it keeps beside bone that it lies flat
+  /// on, less where it touches in a point; also the farthest that it goes between two looks, so half a voxel or less.
+  /// `at_mm`, `axis` (unit) as of the instrument, in the world. A place that is not a number forgets. Cost: nothing
+  /// while no bone is within a millimetre and a half, else an overlap of the part of the shaft that is near bone,
+  /// mostly 2 to 4 in contact, 16 at most. Bone that comes back beside the shaft may be noticed 64 calls later.
+  Answer follow(std::span<const Body> bodies, const RoundCone& shaft, double shell_mm, Vec3 at_mm, Vec3 axis) noexcept;
+  void forget() noexcept;
+  [[nodiscard]] Vec3 offset_mm() const { return offset_mm_; }  ///< of the last call
 
  private:
+  struct Stretch {  // of the shaft, along its axis from its start
+    double from_mm = 0, to_mm = 0;
+    bool any = false;
+  };
+  OverlapResult measure(const RoundCone& shaft, double grown_mm, Vec3 at_mm, Vec3 axis) noexcept;
+  void look(const RoundCone& shaft, double within_mm, Vec3 at_mm, Vec3 axis) noexcept;
+  void take(std::span<const Body> bodies, const RoundCone& shaft) noexcept;
+
   Overlap overlap_{0};
   GodObject proxy_;
-  bool touched_ = false;  // when it was last asked for
+  Vec3 offset_mm_, torque_mm_;
+  Vec3 last_at_mm_, last_axis_;
+  // What is near: which stretch of the shaft has bone within looked_mm_ of it, seen from looked_at_mm_.
+  std::array<Body, kMostBodies> bodies_;
+  std::array<Stretch, kMostBodies> near_;
+  std::size_t count_ = 0;
+  RoundCone shape_{0, 0, 0, 0};
+  Vec3 looked_at_mm_, looked_axis_;
+  double looked_mm_ = -1;  // negative: not yet
+  int looked_ago_ = 0;
 };
 
 }  // namespace osteo::inline simulation
