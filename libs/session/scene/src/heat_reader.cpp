@@ -228,12 +228,16 @@ void HeatReader::heat(const TickRecord& record) {
   const BurrKindRow& kind = row_of(edge->kind);
   const double watt = kind.heat_by_work * params_.cutting_share * press_n * speed_ms +
                       kind.heat_by_force * params_.diamond_w_per_n * press_n;
+  // Of the step that comes next: it ends with the first hand's tick, so those of others there begin another.
+  const std::uint64_t into = record.tick % every_;
+  const double when = into == 0 ? (record.hand == 0 ? 1 - 0.5 / static_cast<double>(every_) : 0)
+                                : (static_cast<double>(into) - 0.5) / static_cast<double>(every_);
   // Bone pushes the hand away from where it is pressed.
   const Vec3 force = from_floats(record.force_n);
   const double radius = held.head.start_radius_mm;
   const Vec3 contact = length(force) > 0 ? tip - normalized(force) * radius : tip;
   if (!saw) {
-    heat(contact, radius, watt);
+    heat(contact, radius, watt, when);
     return;
   }
   // Along the blade, wherever there is bone at it.
@@ -249,18 +253,18 @@ void HeatReader::heat(const TickRecord& record) {
     });
   const auto met = std::count(in.begin(), in.end(), true);
   for (int n = 0; n < kPlaces; ++n) {
-    if (in[static_cast<std::size_t>(n)]) heat(contact + along * n, radius, watt / static_cast<double>(met));
+    if (in[static_cast<std::size_t>(n)]) heat(contact + along * n, radius, watt / static_cast<double>(met), when);
   }
 }
 
 // Where the edge has left but crumbs they cannot take it all: the bone around them does.
-void HeatReader::heat(Vec3 contact_mm, double radius_mm, double watt) {
+void HeatReader::heat(Vec3 contact_mm, double radius_mm, double watt, double when) {
   for (const double wider : {1.0, 1.5, 2.2}) {
     for (const auto& b : bodies_) {
       const HeatField::Ball ball{b->cells_from_world(contact_mm),
                                  wider * std::max(0.9, 0.5 * radius_mm / b->field->cell_mm())};
       if (b->field->holds(ball) < (wider < 2 ? 3 * b->field->full_cell_j_per_k() : 0)) continue;
-      if (b->field->add(ball, watt / rate_hz_) > 0) return;
+      if (b->field->add(ball, watt / rate_hz_, when) > 0) return;
     }
   }
 }

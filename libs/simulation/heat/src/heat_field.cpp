@@ -180,13 +180,14 @@ void HeatField::for_ball(const Ball& ball, bool make_bricks, F&& f) {
   }
 }
 
-double HeatField::add(const Ball& where, double joules) {
-  if (!std::isfinite(joules) || joules == 0) return 0;
+double HeatField::add(const Ball& where, double joules, double when) {
+  if (!std::isfinite(joules) || joules == 0 || !(when >= 0 && when <= 1)) return 0;
   const double capacity = holds(where);
   if (!(capacity > 0)) return 0;
   for_ball(where, true, [&](Brick& b, int c, Ijk) {
-    b.source[static_cast<std::size_t>(c)] +=
-        joules * static_cast<double>(b.capacity[static_cast<std::size_t>(c)]) / capacity;
+    const double share = joules * static_cast<double>(b.capacity[static_cast<std::size_t>(c)]) / capacity;
+    b.source[static_cast<std::size_t>(c)] += share;
+    b.late[static_cast<std::size_t>(c)] += share * when;
     b.heated = true;
   });
   ledger_.added_j += joules;
@@ -234,6 +235,7 @@ void HeatField::set_matter(Ijk cell, HeatMatter now) {
     ledger_.chips_j += (before - after) * b.kelvin[c];
     if (after <= 0) {
       ledger_.chips_j += std::exchange(b.source[c], 0);
+      b.late[c] = 0;
       b.kelvin[c] = 0;
     }
   } else if (after > 0) {
@@ -251,24 +253,30 @@ void HeatField::step(double seconds) {
   // A whole number of steps stays one, whatever the last bit of a quotient says.
   const int steps = std::max(1, static_cast<int>(std::ceil(seconds / longest_step_s() * (1 - 1e-9))));
   for (int s = 0; s < steps; ++s) {
-    // Half of a step's heat before it, half behind: of second order like the rest.
-    heat(0.5 / steps);
+    // What comes in the middle of a step half before it and half behind, what comes sooner more before it: each spreads
+    // for as long as it is there, on average, and that is of second order like the rest.
+    const bool one = steps == 1;
+    heat(one ? 1 : 0.5 / steps, one ? -1 : 0);
     wake_and_forget();
     conduct(seconds / steps);
-    heat(0.5 / steps);
+    heat(one ? 0 : 0.5 / steps, one ? 1 : 0);
   }
   for (auto& [key, b] : bricks_) {
-    if (b->heated) b->source.fill(0);
+    if (b->heated) {
+      b->source.fill(0);
+      b->late.fill(0);
+    }
     if (b->cooled) b->film.fill(0);
     b->heated = b->cooled = false;
   }
 }
 
-void HeatField::heat(double share) {
+void HeatField::heat(double all, double late) {
   for (auto& [key, b] : bricks_) {
     if (!b->heated) continue;
     for (std::size_t c = 0; c < kCells; ++c) {
-      if (b->source[c] != 0) b->kelvin[c] += share * b->source[c] / static_cast<double>(b->capacity[c]);
+      if (b->source[c] != 0)
+        b->kelvin[c] += (all * b->source[c] + late * b->late[c]) / static_cast<double>(b->capacity[c]);
     }
   }
 }

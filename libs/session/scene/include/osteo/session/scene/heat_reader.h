@@ -97,7 +97,7 @@ class HeatReader final : public Reader {
   void place_structures();
   void retire(Body& body);
   void heat(const TickRecord& record);
-  void heat(Vec3 contact_mm, double radius_mm, double watt);
+  void heat(Vec3 contact_mm, double radius_mm, double watt, double when);
   void cool(Vec3 at_mm, double radius_mm, double share);
   void step();
   void keep_course();

@@ -54,9 +54,11 @@ class HeatField {
     Vec3 centre;
     double radius = 0;
   };
-  /// Heat that comes evenly during the next step(), into the cells of a ball, to each by what it holds. Returns what
-  /// found matter: nothing where there is none.
-  double add(const Ball& where, double joules);
+  /// Heat that comes during the next step(), into the cells of a ball, to each by what it holds. `when`: in the middle
+  /// of which time, 0 the step's beginning, 1 its end, as a share of it; a source that moves is told place by place,
+  /// each with its own, and is then as exact as one that stands. Where step() has to make more than one of it, heat
+  /// comes evenly. Returns what found matter: nothing where there is none.
+  double add(const Ball& where, double joules, double when = 0.5);
   /// What the cells of a ball hold, J/K.
   [[nodiscard]] double holds(const Ball& where);
   [[nodiscard]] double full_cell_j_per_k() const { return bone_j_per_k_; }
@@ -99,6 +101,7 @@ class HeatField {
     std::array<float, kCells> conducts{};       // W/K through a whole face
     std::array<float, kCells> share{};          // of the cell that is matter
     std::array<double, kCells> source{};        // J, during the next step
+    std::array<double, kCells> late{};          // of which so much comes behind it
     std::array<float, kCells> film{}, water{};  // W/K; K: of the next step
     // W/K to the cell at +x, +y, +z, and along both diagonals of the square that begins there, normal to x, y, z.
     std::array<std::array<float, kLinks>, 3> face{}, diagonal{};
@@ -111,7 +114,7 @@ class HeatField {
   void fill(Brick& b, int cell, HeatMatter m) const;
   static void link(Brick& b);
   static void links_are_old_around(Brick& b);
-  void heat(double share);
+  void heat(double all, double late);
   void conduct(double seconds);
   void wake_and_forget();
   template <class F>
