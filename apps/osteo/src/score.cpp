@@ -8,8 +8,10 @@
 #include "osteo/assessment/scoring/heat_score.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/session/recording/simulated.h"
 #include "osteo/session/scene/session_folder.h"
+#include "scoring.h"
 
 namespace osteo {
 
@@ -69,43 +71,36 @@ void add_heat(const SessionReader& session, World begin, const Anatomy& anatomy,
 
 }  // namespace
 
-int ScoreCommand::run(const Params& p, cli::Invocation& io) {
-  const auto refuse = [&](bool given, const char* flag, const char* without) {
-    if (given) throw Error(ExitCode::usage, std::string(flag) + " has no effect without " + without, "leave it out");
-  };
-  refuse(p.mirror && p.procedure.empty(), "--mirror", "--procedure");
-  refuse(!p.subject.empty() && p.reference.empty(), "--subject", "--reference");
-  refuse(p.evidence && !io.common.json, "--evidence", "--json");
-  std::optional<Procedure> procedure;
-  if (!p.procedure.empty()) {
-    procedure = load_procedure(p.procedure);
-    if (p.mirror) procedure = mirrored(std::move(*procedure));
-  }
-  if (!p.csv.empty() && fs::exists(p.csv) && !io.common.force)
-    throw Error(ExitCode::cannot_write, "'" + p.csv + "' exists already", "--force replaces it");
-  const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
-  // Scores of guided sessions never stand among those of unaided ones: neither compared nor in a table.
-  if (!folder.guided.empty() && (!p.reference.empty() || !p.csv.empty()))
+Scored score_folder(const fs::path& session_folder, const ScoreAsked& asked, const Context& context) {
+  const SessionFolder folder = open_session_folder(session_folder, asked.case_folder);
+  // Scores of guided sessions never stand among those of unaided ones.
+  if (!folder.guided.empty() && !asked.reference.empty())
     throw Error(ExitCode::usage, "this session is no work of its own: " + folder.guided,
-                "score it without --reference and --csv; sessions that nobody guided may be compared");
+                "score it without --reference; sessions that nobody guided may be compared");
   const Case the_case = load_case(folder.case_folder);
   const SessionReader session(folder.stream(), Damage::keep);
   // Hardness matters to who runs it again.
   HapticSetup setup;
   setup.hardness = false;
-  if (p.heat) setup = session.header().haptics;
-  const Anatomy anatomy = anatomy_of(the_case, setup, io.context);
-  World begin = world_at_begin(folder, the_case, anatomy, io.context);
+  if (asked.heat) setup = session.header().haptics;
+  const Anatomy anatomy = anatomy_of(the_case, setup, context);
+  World begin = world_at_begin(folder, the_case, anatomy, context);
   std::optional<World> again;
-  if (p.heat) again = begin.copy();
+  if (asked.heat) again = begin.copy();
   std::optional<Reference> reference;
-  if (!p.reference.empty())
+  const bool compares = !asked.reference.empty();
+  if (compares)
     reference =
-        load_sessions(p.reference, folder, the_case, anatomy, session.header().bone_hash, io.context.sub(0, 0.5));
-  Score score = score_session(session, std::move(begin), anatomy.structures.get(), procedure ? &*procedure : nullptr,
-                              reference ? &*reference : nullptr, p.subject,
-                              io.context.sub(p.reference.empty() ? 0 : 0.5, p.heat ? 0.6 : 1));
-  if (again) add_heat(session, std::move(*again), anatomy, score, io.context.sub(0.6, 1));
+        load_sessions(asked.reference, folder, the_case, anatomy, session.header().bone_hash, context.sub(0, 0.5));
+  Scored scored{score_session(session, std::move(begin), anatomy.structures.get(),
+                              asked.procedure ? &*asked.procedure : nullptr, reference ? &*reference : nullptr,
+                              asked.subject, context.sub(compares ? 0.5 : 0, asked.heat ? 0.6 : 1)),
+                folder.folder.filename().string(), folder.guided, session.outline().damaged()};
+  Score& score = scored.score;
+  score.source.stream = hash_path(folder.stream()).substr(0, 16);
+  score.source.scored_by = program_version();
+  score.source.guided = !folder.guided.empty();
+  if (again) add_heat(session, std::move(*again), anatomy, score, context.sub(0.6, 1));
   if (session.header().haptics.structures != setup.structures)
     score.words.push_back(
         "the case's structures are not those that the session watched: they are measured as the case has them now");
@@ -113,12 +108,40 @@ int ScoreCommand::run(const Params& p, cli::Invocation& io) {
     score.words.push_back("guided: " + folder.guided + "; not to be compared with unaided sessions");
   if (std::string words = simulated_words(session); !words.empty())
     score.words.insert(score.words.begin(), std::move(words));
+  return scored;
+}
+
+Json json_of(const Scored& scored, bool evidence) {
+  Json j = score_json(scored.score, evidence);
+  if (!scored.guided.empty()) j["guided"] = scored.guided;
+  return j;
+}
+
+int ScoreCommand::run(const Params& p, cli::Invocation& io) {
+  const auto refuse = [&](bool given, const char* flag, const char* without) {
+    if (given) throw Error(ExitCode::usage, std::string(flag) + " has no effect without " + without, "leave it out");
+  };
+  refuse(p.mirror && p.procedure.empty(), "--mirror", "--procedure");
+  refuse(!p.subject.empty() && p.reference.empty(), "--subject", "--reference");
+  refuse(p.evidence && !io.common.json, "--evidence", "--json");
+  ScoreAsked asked{{}, p.reference, p.subject, p.heat, p.case_folder};
+  if (!p.procedure.empty()) {
+    asked.procedure = load_procedure(p.procedure);
+    if (p.mirror) asked.procedure = mirrored(std::move(*asked.procedure));
+  }
+  if (!p.csv.empty() && fs::exists(p.csv) && !io.common.force)
+    throw Error(ExitCode::cannot_write, "'" + p.csv + "' exists already", "--force replaces it");
+  // Nor in a table.
+  if (const std::string guided = open_session_folder(io.arguments[0], p.case_folder).guided;
+      !guided.empty() && !p.csv.empty())
+    throw Error(ExitCode::usage, "this session is no work of its own: " + guided,
+                "score it without --csv; sessions that nobody guided may be compared");
+  const Scored scored = score_folder(io.arguments[0], asked, io.context);
   io.end_progress();
-  if (!p.csv.empty()) write_file(p.csv, score_csv(score, folder.folder.filename().string()));
+  const Score& score = scored.score;
+  if (!p.csv.empty()) write_file(p.csv, score_csv(score, scored.name));
   if (io.common.json) {
-    Json j = score_json(score, p.evidence);
-    if (!folder.guided.empty()) j["guided"] = folder.guided;
-    io.out << j.dump(2) << '\n';
+    io.out << json_of(scored, p.evidence).dump(2) << '\n';
   } else {
     io.out << score_lines(score);
   }
@@ -127,7 +150,7 @@ int ScoreCommand::run(const Params& p, cli::Invocation& io) {
     io.err << "scored in " << s(score.seconds_frames + score.seconds_product) << ", " << s(score.seconds_product)
            << " of it for the final product\n";
   }
-  return session.outline().damaged() ? static_cast<int>(ExitCode::corrupt) : 0;
+  return scored.damaged ? static_cast<int>(ExitCode::corrupt) : 0;
 }
 
 }  // namespace osteo

@@ -11,6 +11,7 @@
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/report/sheet.h"
+#include "scoring.h"
 #include "study_demo.h"
 
 namespace osteo {
@@ -35,7 +36,9 @@ std::vector<std::string> names_in(const std::string& text) {
 const std::map<std::string, std::set<std::string>>& flags_of_actions() {
   static const std::map<std::string, std::set<std::string>> flags{
       {"new", {"title", "procedure", "groups", "competent", "cases", "items", "attempts", "lowest", "highest"}},
-      {"add", {"participant", "group", "case_name", "attempt"}},
+      {"plan", {"primary"}},
+      {"add", {"participant", "group", "case_name", "attempt", "mirror", "accept"}},
+      {"remove", {"participant", "case_name", "attempt"}},
       {"order", {}},
       {"form", {"rater"}},
       {"rate", {}},
@@ -54,9 +57,10 @@ void need_known(const cli::Invocation& io, const std::string& action) {
   }
   if (!flags_of_actions().contains(action)) {
     const std::string near = nearest_name(action, actions);
-    throw Error(ExitCode::usage,
-                "'" + action + "' is nothing that a study can do: new, add, order, form, rate, analyse or demo",
-                near.empty() ? "" : "did you mean '" + near + "'?");
+    throw Error(
+        ExitCode::usage,
+        "'" + action + "' is nothing that a study can do: new, plan, add, remove, order, form, rate, analyse or demo",
+        near.empty() ? "" : "did you mean '" + near + "'?");
   }
   for (const std::string& flag : io.given) {
     if (!any.contains(flag) || flags_of_actions().at(action).contains(flag)) continue;
@@ -71,6 +75,9 @@ void need_known(const cli::Invocation& io, const std::string& action) {
     throw Error(ExitCode::usage, "'study rate' needs the file that the form saved", "osteo study rate STUDY R1.json");
 }
 
+// In a study's folder.
+constexpr const char* kProcedure = "procedure.json";
+
 void write_new(const fs::path& path, const std::string& content, bool force) {
   if (output_exists(path) && !force)
     throw Error(ExitCode::cannot_write, "'" + path.string() + "' is there already", "--force replaces it");
@@ -83,9 +90,11 @@ cli::CommandInfo StudyCommand::info() {
   return {
       "study",
       "a study: people by code, order of cases, sessions, ratings, analysis",
-      "Keeps a study as a folder of plain files. 'new' makes it; 'add' takes a participant (--group), or with a file "
-      "(JSON or a CSV row) "
-      "the metrics of a session; 'order' draws who does which case when; 'form' writes a page to rate sessions with, "
+      "Keeps a study as a folder of plain files. 'new' makes it; 'plan' names the primary outcomes and says what so "
+      "many people can find; 'add' takes a participant (--group), or a session, which it scores and keeps with what "
+      "tells it from others (also what 'osteo score' wrote of one, as JSON or CSV); 'remove' takes a person or a "
+      "session out, ratings and movies too; 'order' draws who does which case when; 'form' writes a page to rate "
+      "sessions with, "
       "in any browser and "
       "without a network; 'rate' takes what it saved; 'analyse' writes what the study shows: agreement of raters, "
       "differences of groups "
@@ -97,9 +106,9 @@ cli::CommandInfo StudyCommand::info() {
       "blinded movies and forms for raters (--no-movies leaves the movies out, as does a build without them); "
       "stopped and begun again it goes on where it was. Random choices follow the study's own seed, given to 'new'. "
       "docs/study.md defines every number and says what may not be concluded.",
-      {{"action", "new, add, order, form, rate, analyse or demo"},
+      {{"action", "new, plan, add, remove, order, form, rate, analyse or demo"},
        {"study", "its folder; of a demo also by -o", true},
-       {"file", "add: metrics of a session (.json, .csv); rate: ratings that the form saved", true}},
+       {"file", "add: a session's folder, or its metrics (.json, .csv); rate: ratings that the form saved", true}},
       "osteo study analyse STUDY"};
 }
 
@@ -139,27 +148,82 @@ int StudyCommand::run(const Params& p, cli::Invocation& io) {
     plan.lowest = p.lowest;
     plan.highest = p.highest;
     plan.seed = static_cast<std::uint64_t>(io.common.seed);
+    std::string file;
+    if (p.procedure.ends_with(".json")) {
+      plan.procedure = load_procedure(p.procedure).name;
+      file = read_text(p.procedure);
+    }
     study::new_study(folder, plan);
+    if (!file.empty()) write_file(folder / kProcedure, file);
     said = "made '" + folder.string() + "'; meant to pass: " + plan.competent + " (--competent says otherwise)";
   } else if (action == "add" && io.arguments.size() < 3) {
-    for (const char* const flag : {"case_name", "attempt"}) {
+    for (const char* const flag : {"case_name", "attempt", "mirror", "accept"}) {
       if (io.given.contains(flag))
-        throw Error(ExitCode::usage, "a session needs the file of its metrics",
-                    "osteo study add STUDY metrics.json ...");
+        throw Error(ExitCode::usage, "which session, or file of its metrics?", "osteo study add STUDY SESSION ...");
     }
     const std::string code = study::add_participant(folder, p.participant, p.group);
     done["participant"] = code;
     said = code + " is in " + p.group;
   } else if (action == "add") {
     if (io.given.contains("group")) throw Error(ExitCode::usage, "--group is of a participant, not of a session");
-    // What score --json says of a session that another hand led.
-    if (const auto metrics = Json::parse(read_text(io.arguments[2])); metrics && metrics->find("guided") != nullptr)
-      throw Error(ExitCode::usage, "'" + io.arguments[2] + "' is of a guided session",
-                  "a study compares sessions that nobody guided");
-    const std::string blind = study::add_session(folder, p.participant, p.case_name, p.attempt, io.arguments[2], notes);
+    const fs::path file = io.arguments[2];
+    const bool session = fs::is_directory(file);
+    if (p.mirror && !session)
+      throw Error(ExitCode::usage, "--mirror is of a session that is scored here, not of a file of metrics");
+    study::Measurements measured;
+    if (session) {
+      ScoreAsked asked;
+      if (fs::exists(folder / kProcedure)) asked.procedure = load_procedure(folder / kProcedure);
+      if (p.mirror) {
+        if (!asked.procedure)
+          throw Error(ExitCode::usage, "--mirror has no effect: the study has no procedure's file",
+                      "osteo study new ... --procedure FILE.json keeps one");
+        asked.procedure = mirrored(std::move(*asked.procedure));
+      }
+      const Scored scored = score_folder(file, asked, io.context);
+      io.end_progress();
+      // The same text as 'osteo score --json' writes: one way in.
+      measured = study::read_measurements(json_of(scored, false).dump(), file.string() + " (scored)", notes);
+      for (const std::string& word : scored.score.words) notes.push_back("note: " + word);
+    } else {
+      measured = study::read_measurements(read_text(file), file.string(), notes);
+    }
+    const std::string blind =
+        study::add_session(folder, p.participant, p.case_name, p.attempt, measured, names_in(p.accept), notes);
     done["blind"] = blind;
     said = "raters know the session as " + blind + ": its movie goes to " +
            (folder / "movies" / (blind + ".mp4")).string();
+  } else if (action == "remove") {
+    if (p.participant.empty())
+      throw Error(ExitCode::usage, "nobody was named", "osteo study remove STUDY --participant CODE");
+    if (io.given.contains("attempt") && p.case_name.empty())
+      throw Error(ExitCode::usage, "--attempt is of a session: give its --case-name too");
+    const study::Removed r = study::remove(folder, p.participant, p.case_name, p.attempt);
+    done["sessions"] = r.sessions;
+    done["ratings"] = r.ratings;
+    done["movies"] = r.movies;
+    done["forms"] = Json(r.forms);
+    said = p.participant + (p.case_name.empty() ? " is out, with " : ": taken out ") + std::to_string(r.sessions) +
+           (r.sessions == 1 ? " session, " : " sessions, ") + std::to_string(r.ratings) + " ratings and " +
+           std::to_string(r.movies) + " movies";
+    if (!r.forms.empty())
+      notes.push_back(
+          "forms were written anew: whoever has an old one opens the new one and loads what was saved; the "
+          "order is another");
+    notes.push_back("the report is of before until it is made again; sessions' own folders are not touched");
+  } else if (action == "plan") {
+    if (!p.primary.empty()) study::set_primary(folder, names_in(p.primary));
+    const study::Study study = study::read_study(folder);
+    done["primary"] = Json(study.plan.primary);
+    done["primary_after"] = study.plan.primary_after;
+    done["reach"] = Json::list();
+    if (study.plan.primary.empty())
+      notes.emplace_back("no primary outcome is named: all columns will be corrected together");
+    for (const study::Reach& r : study::reach_of(study)) {
+      done["reach"].push_back(study::json_of(r));
+      notes.push_back(study::told(r));
+    }
+    said = "study.json: " + std::to_string(study.plan.primary.size()) + " primary outcomes";
   } else if (action == "order") {
     const std::size_t added = study::make_order(folder);
     done["added"] = added;

@@ -21,6 +21,7 @@
 #include "osteo/imaging/image/crop.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/io/volume_io.h"
+#include "osteo/imaging/pipeline/pipeline.h"
 #include "study_demo.h"
 
 #ifdef OSTEO_WITH_MOVIE
@@ -266,8 +267,14 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
     const Score score = score_session(SessionReader(place(j) / "stream.oss"), world_of(scene.the_case, scene.anatomy),
                                       scene.anatomy.structures.get(), &scene.procedure, &reference, j.participant);
     const fs::path file = place(j) / "metrics.json";
-    write_file(file, Json{{"simulated", "yes"}, {"metrics", metrics_of(score)}}.dump(2) + "\n");
-    study::add_session(folder, j.participant, kCase, j.attempt, file, notes);
+    Json source = *score_json(score, false).find("source");
+    source["stream"] = hash_path(place(j) / "stream.oss").substr(0, 16);
+    source["scored_by"] = program_version();
+    const std::string text = Json{{"source", source}, {"metrics", metrics_of(score)}}.dump(2) + "\n";
+    write_file(file, text);
+    // A demo that goes on may have been begun by another version.
+    study::add_session(folder, j.participant, kCase, j.attempt, study::read_measurements(text, file.string(), notes),
+                       {"program"}, notes);
   }
 
   // Ratings by programs that know the skill: each has a severity of its own, and errs.

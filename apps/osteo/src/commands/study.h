@@ -13,6 +13,8 @@ struct StudyCommand {
     int attempts = 1, lowest = 1, highest = 5;
     std::string participant, group, case_name;
     int attempt = 1;
+    bool mirror = false;
+    std::string accept, primary;
     std::string rater;
     std::string out, given;
     int resamples = 2000;
@@ -21,7 +23,10 @@ struct StudyCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"title", "new: what the study is called"}, p.title);
-    visit({"procedure", "new: what is done on each case"}, p.procedure);
+    visit({"procedure",
+           "new: what is done on each case, in words, or a procedure's file (.json), which is kept in the study and by "
+           "which its sessions are scored"},
+          p.procedure);
     visit({"groups", "new: groups of people, like 'novice, expert'"}, p.groups);
     visit({"competent", "new: the group that is meant to pass (empty: the last)"}, p.competent);
     visit({"cases", "new: cases that everybody does, like 'left-1, right-1'"}, p.cases);
@@ -29,10 +34,20 @@ struct StudyCommand {
     visit({"attempts", "new: of each case by each participant", "", 1, 100}, p.attempts);
     visit({"lowest", "new: of the scale of each item", "", -1000, 1000}, p.lowest);
     visit({"highest", "new: of the scale of each item", "", -1000, 1000}, p.highest);
-    visit({"participant", "add: a code, never a name (empty, for a person: the next free one)"}, p.participant);
+    visit({"participant", "add, remove: a code, never a name (empty, for a new person: the next free one)"},
+          p.participant);
     visit({"group", "add: of a new participant"}, p.group);
-    visit({"case_name", "add: of the session"}, p.case_name);
-    visit({"attempt", "add: of the session", "", 1, 100}, p.attempt);
+    visit({"case_name", "add: of the session; remove: only this one (empty: the person with all that is kept)"},
+          p.case_name);
+    visit({"attempt", "add, remove: of the session", "", 1, 100}, p.attempt);
+    visit({"mirror", "add: a session on the other side of the body than the study's procedure is written for"},
+          p.mirror);
+    visit({"accept",
+           "add: differences from the study's other sessions that are meant to be: cut-short, other-bone, procedure, "
+           "program"},
+          p.accept);
+    visit({"primary", "plan: outcomes that the study is about, like 'force_p95_n, seen_share, rating: overall'"},
+          p.primary);
     visit({"rater", "form: a code of who rates"}, p.rater);
     visit({"out", "analyse: files OUT.json, OUT.html and OUT.pdf (empty: STUDY/report; also -o)"}, p.out);
     visit({"resamples", "analyse: of each bootstrap", "", 100, 1000000}, p.resamples);

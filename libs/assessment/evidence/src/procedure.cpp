@@ -177,7 +177,9 @@ const ProcedureStructure* Procedure::find(std::string_view structure) const {
 }
 
 Procedure parse_procedure(std::string_view json, const std::string& name) {
-  return Reading(json, name).read();
+  Procedure p = Reading(json, name).read();
+  p.hash = hash_text(json).substr(0, 16);
+  return p;
 }
 
 Procedure load_procedure(const std::filesystem::path& file) {
@@ -185,6 +187,8 @@ Procedure load_procedure(const std::filesystem::path& file) {
 }
 
 Procedure mirrored(Procedure p) {
+  const std::size_t side = p.hash.find(' ');
+  p.hash = side == std::string::npos ? p.hash + " mirrored" : p.hash.substr(0, side);
   for (ScaleItem& i : p.items) {
     i.towards[0] = -i.towards[0];
     for (Vec3& q : i.curve_mm) q.x = -q.x;

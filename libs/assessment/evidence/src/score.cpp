@@ -7,6 +7,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/geometry/grid/brick_places.h"
+#include "osteo/session/recording/simulated.h"
 #include "osteo/simulation/bone/instrument.h"
 
 namespace osteo::inline assessment {
@@ -245,6 +246,11 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
     check_procedure(*procedure, structures, score.words);
   }
   const SessionOutline& o = session.outline();
+  score.source.bone = session.header().bone_hash.substr(0, 16);
+  score.source.procedure = procedure != nullptr ? procedure->hash : "none";
+  score.source.recorded_by = session.header().program_version;
+  score.source.simulated = !simulated_words(session).empty();
+  score.source.cut_short = !o.end || o.damaged() || !losses(o).empty();
   if (!o.end) score.words.push_back("the session was cut short: it is scored as far as it goes");
   for (const std::string& line : losses(o)) score.words.push_back(line);
   if (o.bone_known_until() != nullptr) score.words.push_back("behind the first gap that lost bone nothing is scored");

@@ -28,7 +28,8 @@ std::string padded(std::string s, std::size_t n) {
   return s;
 }
 
-std::string csv_text(const std::string& s) {
+std::string csv_text(std::string s) {
+  if (!s.empty() && std::string_view("=+-@\t\r").find(s[0]) != std::string_view::npos) s = "'" + s;
   if (s.find_first_of(",\"\n") == std::string::npos) return s;
   std::string out = "\"";
   for (const char c : s) {
@@ -40,10 +41,22 @@ std::string csv_text(const std::string& s) {
 
 }  // namespace
 
+std::string ScoreSource::marks() const {
+  std::string words;
+  for (const auto& [is, word] :
+       {std::pair{simulated, "simulated"}, std::pair{guided, "guided"}, std::pair{cut_short, "cut-short"}})
+    if (is) words += (words.empty() ? "" : " ") + std::string(word);
+  return words;
+}
+
 Json score_json(const Score& score, bool evidence) {
   Json j{{"osteotome_score", 1},
          {"procedure", score.procedure.empty() ? Json() : Json(score.procedure)},
          {"words", score.words}};
+  const ScoreSource& source = score.source;
+  j["source"] =
+      Json{{"stream", source.stream},           {"bone", source.bone},           {"procedure", source.procedure},
+           {"recorded_by", source.recorded_by}, {"scored_by", source.scored_by}, {"marks", source.marks()}};
   j["metrics"] = Json::list();
   for (const Measured& m : score.values) {
     Json v{
@@ -104,6 +117,12 @@ std::string score_csv(const Score& score, const std::string& session) {
     header += "," + csv_text(name);
     row += "," + value;
   };
+  const ScoreSource& source = score.source;
+  for (const auto& [name, value] :
+       {std::pair{"stream", source.stream}, std::pair{"bone", source.bone}, std::pair{"procedure", source.procedure},
+        std::pair{"recorded_by", source.recorded_by}, std::pair{"scored_by", source.scored_by},
+        std::pair{"marks", source.marks()}})
+    put(name, csv_text(value));
   for (const Measured& m : score.values) put(m.name(), m.value ? format_number(*m.value) : "");
   for (const Product::Result& r : score.items) {
     put("item[" + r.item->name + "]", r.measured ? format_number(r.value) : "");

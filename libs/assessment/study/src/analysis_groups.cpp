@@ -30,18 +30,24 @@ void Analyst::compare() {
     }
   }
   json_["groups"] = groups;
-  const std::vector<double> adjusted = holm(p);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    rows[i]["p_holm"] = adjusted[i];
-    table.rows[i][7].text = p_text(adjusted[i]);
+  std::vector<double> together;
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (*rows[i].find("primary")->flag()) together.push_back(p[i]);
+  const std::vector<double> adjusted = holm(together);
+  for (std::size_t i = 0, n = 0; i < rows.size(); ++i) {
+    const bool primary = *rows[i].find("primary")->flag();
+    rows[i]["p_holm"] = primary ? Json(adjusted[n]) : Json();
+    table.rows[i][7].text = primary ? p_text(adjusted[n]) : "explores";
+    n += primary ? 1 : 0;
     json_["comparisons"].push_back(rows[i]);
   }
   if (rows.empty()) return;
   add(std::move(table));
   say("One value a person: the mean of that person's sessions. p (exact): of the difference of means, by exchanging "
       "people between "
-      "groups. "
-      "Holm: the latter, for all rows of this table together.",
+      "groups. Holm: the latter, for all " +
+          std::string(study_.plan.primary.empty() ? "rows of this table" : "primary outcomes") + " together" +
+          (study_.plan.primary.empty() ? "." : "; a row that explores can give an idea for another study, no finding."),
       Tone::quiet);
   std::vector<sheet::Plot> charts;
   for (const Outcome& o : outcomes_) {
@@ -60,6 +66,17 @@ void Analyst::compare() {
   repeated_table();
 }
 
+std::size_t Analyst::family() const {
+  std::size_t n = 0;
+  for (const Outcome& o : outcomes_) {
+    if (!counts(o)) continue;
+    std::size_t able = 0;
+    for (const std::string& g : study_.plan.groups) able += means_of_people(study_, o, g).size() >= kPeopleToCompare;
+    n += able * (able - std::min<std::size_t>(able, 1)) / 2;
+  }
+  return std::max<std::size_t>(1, n);
+}
+
 void Analyst::compare_two(const Outcome& o, const std::string& first, const std::string& second,
                           std::vector<Json>& rows, std::vector<double>& p, sheet::Table& table,
                           std::set<std::string>& said) {
@@ -74,7 +91,9 @@ void Analyst::compare_two(const Outcome& o, const std::string& first, const std:
   }
   const Welch w = welch(a, b, settings_.level);
   const MannWhitney u = mann_whitney(a, b);
-  const Permutation exact = permutation_of_means(a, b, {200000, 20000, study_.plan.seed});
+  const bool named = !study_.plan.primary.empty();
+  const Permutation exact =
+      permutation_of_means(a, b, permutations(counts(o) ? family() : 1, named && counts(o), study_.plan.seed));
   const Estimate g = hedges_g(a, b, settings_.level), d = cliffs_delta(a, b, settings_.level);
   Json row{{"outcome", o.name},
            {"a", first},
@@ -89,6 +108,7 @@ void Analyst::compare_two(const Outcome& o, const std::string& first, const std:
            {"mann_whitney_u", u.u},
            {"mann_whitney_p", u.p},
            {"mann_whitney_exact", u.exact},
+           {"primary", counts(o)},
            {"permutation_p", exact.p},
            {"permutation_exact", exact.exact},
            {"permutation_smallest_p", exact.smallest_p},

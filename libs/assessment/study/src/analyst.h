@@ -50,6 +50,13 @@ inline Json json_of(const Summary& s) {
               {"q1", s.q1},    {"q3", s.q3},     {"least", s.least}, {"most", s.most}};
 }
 
+inline constexpr double kAlpha = 0.05, kPower = 0.8;
+/// All ways to exchange people up to so many are counted: of 12 and 12 they are 2.7 million.
+inline constexpr double kMostWays = 3'000'000, kMostWaysOfMany = 200'000;
+/// As many as a test that is one of `comparisons` needs: the smallest p that so many draws can give is then a tenth
+/// of what the first to be found needs.
+[[nodiscard]] PermutationSettings permutations(std::size_t comparisons, bool primary, std::uint64_t seed);
+
 // Of each kind; a table has them all.
 inline constexpr std::size_t kMostCharts = 12;
 
@@ -95,6 +102,15 @@ class Analyst {
 
   void check() const;
   void opening();
+  void primary();
+  void sources();
+  /// Whether it is corrected together with others: all are where none is primary.
+  [[nodiscard]] bool counts(const Outcome& o) const {
+    const auto& names = study_.plan.primary;
+    return names.empty() || std::find(names.begin(), names.end(), o.name) != names.end();
+  }
+  /// How many comparisons that is.
+  [[nodiscard]] std::size_t family() const;
   void agreement();
   void compare();
   void compare_two(const Outcome& o, const std::string& first, const std::string& second, std::vector<Json>& rows,
@@ -105,6 +121,7 @@ class Analyst {
   void hold(const Outcome& metric, const Outcome& rating, std::vector<sheet::Cell>& row);
   void decide();
   void power();
+  void not_found();
   void closing();
 };
 

@@ -140,6 +140,7 @@ struct ProcedureStep {
 
 struct Procedure {
   std::string name, about, file;
+  std::string hash;    ///< of the text, its first 16 digits; of mirrored() with " mirrored" behind it
   double usual_s = 0;  ///< 0: nothing is said about time
   std::vector<ProcedureStructure> structures;
   std::vector<ProcedureRegion> regions;

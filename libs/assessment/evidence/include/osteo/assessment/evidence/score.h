@@ -60,8 +60,21 @@ class ScoreKeeper {
   std::vector<Moment> moments_;
 };
 
+/// What a score is of: by it a row of a table is held against others. Hashes are their first 16 digits.
+struct ScoreSource {
+  std::string stream;                  ///< of the session's file; empty where whoever scores does not set it
+  std::string bone;                    ///< World::hash() before the first tick
+  std::string procedure;               ///< Procedure::hash, or "none"
+  std::string recorded_by, scored_by;  ///< versions of the program; the second is set by whoever scores
+  /// `cut_short`: or something of it is lost. `guided` is set by whoever scores.
+  bool simulated = false, guided = false, cut_short = false;
+  /// The words of those that are, with spaces: "simulated cut-short".
+  [[nodiscard]] std::string marks() const;
+};
+
 struct Score {
   std::string procedure;           ///< its name; empty: none
+  ScoreSource source;
   std::vector<std::string> words;  ///< what limits it, each a sentence
   std::vector<Measured> values;
   std::vector<Product::Result> items;
@@ -97,7 +110,8 @@ struct ScoreDetail {
 
 /// "osteotome_score": 1. `evidence`: with the places of each item and the hidden voxels.
 [[nodiscard]] Json score_json(const Score& score, bool evidence);
-/// A header and a row; the columns are the names of all values and items there are, empty where not measured.
+/// A header and a row: the session's name, the source, then the names of all values and items there are, empty where
+/// not measured. A name that a spreadsheet would take for a formula has an apostrophe before it.
 [[nodiscard]] std::string score_csv(const Score& score, const std::string& session);
 /// One line a metric, with its word where it has no value.
 [[nodiscard]] std::string score_lines(const Score& score);

@@ -1,10 +1,11 @@
 // A study as a folder of plain files: who takes part (by code), what each does in which order, what came out, what
 // raters said.
 //
-//   study.json          title, procedure, groups, cases, attempts, items and scale of the ratings, seed
-//   participants.csv    participant,group
+//   study.json          title, procedure, groups, cases, attempts, items and scale of the ratings, primary outcomes,
+//   seed procedure.json      by which sessions are scored, where there is one participants.csv    participant,group
 //   order.csv           participant,position,case
-//   sessions.csv        blind,participant,case,attempt and a column for each metric; an empty field is a missing value
+//   sessions.csv        blind,participant,case,attempt, what the row is of (Source), and a column for each metric; an
+//                       empty field is a missing value
 //   forms/RATER.html    to rate with, in any browser, without a network
 //   ratings/RATER.json  what the form saves
 //   movies/BLIND.mp4    what the form shows, put there by hand
@@ -13,7 +14,10 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "osteo/core/base/error.h"
@@ -30,6 +34,10 @@ struct Plan {
   int lowest = 1, highest = 5;  ///< of the scale of each item
   std::uint64_t seed = 1;
   bool simulated = false;  ///< sessions and ratings are by programs: the report says so on every page
+  /// Outcomes that the study is about, by the names that the report has; empty: none was named. Only these are
+  /// corrected together (Holm).
+  std::vector<std::string> primary{};
+  int primary_after = 0;  ///< so many sessions were there already when they were named
 };
 struct Participant {
   std::string code, group;
@@ -39,11 +47,27 @@ struct OrderRow {
   int position = 1;
   std::string case_name;
 };
+/// What a row's numbers are of. A text that is empty is not known: numbers that came from elsewhere.
+struct Source {
+  std::string stream;                  ///< hash of the session's file: one session is one row
+  std::string bone;                    ///< hash of the bone before the first tick: one case is one bone
+  std::string procedure;               ///< hash of the procedure's file, with " mirrored" for the other side; "none"
+  std::string recorded_by, scored_by;  ///< versions of the program
+  bool simulated = false, guided = false, cut_short = false;
+  bool other_bone = false;  ///< taken though its bone is not the case's
+  [[nodiscard]] bool known() const { return !stream.empty(); }
+};
 struct Session {
   std::string blind;  ///< by which raters know it
   std::string participant, case_name;
   int attempt = 1;
   std::map<std::string, double> metrics;  ///< those that it has
+  Source source{};
+};
+/// A session's numbers, as a file has them.
+struct Measurements {
+  std::vector<std::pair<std::string, double>> metrics;
+  Source source;
 };
 /// Item -> value, nothing where the rater could not tell.
 using SessionRating = std::map<std::string, std::optional<double>>;
@@ -69,15 +93,38 @@ void new_study(const std::filesystem::path& folder, const Plan& plan);
 [[nodiscard]] Study read_study(const std::filesystem::path& folder);
 
 /// Appends to participants.csv. An empty code gets the next free one of P01, P02, ... Returns the code. Codes are up to
-/// 16 letters, digits,
-/// '-' and '_': they are not the place for names.
+/// 16 letters, digits, '-' and '_', and differ in more than capitals: they are not the place for names.
 std::string add_participant(const std::filesystem::path& folder, std::string code, const std::string& group);
-/// Appends to sessions.csv: `file` is JSON ({"NAME": 1.5, ...} or {"metrics": {...}}, or a list of {"name", "value"})
-/// or CSV (a line of names and one of values); what is no number is left out and told in `notes`. Returns the blind
-/// code.
+
+/// What `osteo score` writes, as JSON or as a row of CSV (the same names and source by both), or any numbers: JSON
+/// ({"NAME": 1.5, ...}, {"metrics": {...}}, a list of {"name", "of", "value"}) or CSV (a line of names and one of
+/// values). `name` as errors call it; CSV where it ends so. A value that is empty or null is missing; other words than
+/// numbers are left out and told in `notes`. Error(usage): a name twice, one that a spreadsheet takes for a formula.
+[[nodiscard]] Measurements read_measurements(const std::string& text, const std::string& name,
+                                             std::vector<std::string>& notes);
+/// Differences from the rest of the study with which a row is taken only where they are named: "cut-short";
+/// "other-bone" (not that of the case's other rows, or that of another case); "procedure" (another file, or other side
+/// on the same case); "program" (another version recorded or scored it).
+[[nodiscard]] std::span<const std::string_view> acceptable_differences();
+/// Appends to sessions.csv; returns the blind code. Error(usage): a session that was guided; one by a simulated trainee
+/// in a study of people, or by a person in a simulated one; one that is there already; a difference that `accepted`
+/// does not name. Of numbers whose source is not known nothing of this can be said: told in `notes`.
 std::string add_session(const std::filesystem::path& folder, const std::string& participant,
-                        const std::string& case_name, int attempt, const std::filesystem::path& file,
-                        std::vector<std::string>& notes);
+                        const std::string& case_name, int attempt, const Measurements& measured,
+                        const std::vector<std::string>& accepted, std::vector<std::string>& notes);
+
+struct Removed {
+  std::size_t sessions = 0, ratings = 0, movies = 0;
+  std::vector<std::string> forms;  ///< by rater: written anew, without them
+};
+/// Takes a person out with all that is kept of them: sessions, ratings, movies, order, forms; with a `case_name` only
+/// that session. Ratings of sessions that are no longer in sessions.csv go too. Error(usage) where there is no such.
+Removed remove(const std::filesystem::path& folder, const std::string& participant, const std::string& case_name = {},
+               int attempt = 1);
+
+/// Names the primary outcomes; those of before are replaced. Error(usage): none, one twice, or one that none of the
+/// sessions has, where there are any.
+void set_primary(const std::filesystem::path& folder, const std::vector<std::string>& outcomes);
 
 /// Who does which case when: Williams' balanced squares (1949), whose rows are dealt at random inside each group, so
 /// that each case comes as often at each place. Those who are in order.csv keep their rows. Returns how many people
