@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <span>
+
 #include "osteo/core/data/rigid_transform.h"
 #include "osteo/simulation/haptics/detail/overlap.h"
 #include "osteo/simulation/haptics/god_object.h"
