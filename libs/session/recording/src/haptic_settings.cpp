@@ -1,5 +1,7 @@
 #include "osteo/session/recording/haptic_settings.h"
 
+#include <cctype>
+#include <set>
 #include <sstream>
 
 #include "osteo/core/base/error.h"
@@ -31,6 +33,21 @@ std::vector<FieldRef> all_fields(HapticSetup& setup) {
   return fields;
 }
 
+// "cutting, cylinder, diamond, ...": what instruments are called, but for numbers and units.
+std::string words_of_instruments() {
+  std::set<std::string> words;
+  for (const Instrument& i : instrument_library()) {
+    std::istringstream in(i.name);
+    for (std::string word; in >> word;) {
+      if (std::isdigit(static_cast<unsigned char>(word.front())) == 0 && word != "mm" && word != "Fr")
+        words.insert(std::move(word));
+    }
+  }
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
 // { "diamond": "proxy", "cutting taper": "volume", "sucker": "overlap" }: an instrument is meant when its name holds
 // all of the words.
 void set_tool_methods(const JsonValue& tools, const JsonFile& file, HapticSetup& setup) {
@@ -56,7 +73,7 @@ void set_tool_methods(const JsonValue& tools, const JsonFile& file, HapticSetup&
     if (!any)
       throw file.wrong(
           method_name, "tools: no instrument is a \"" + words + "\"",
-          "words are cutting, diamond, ball, cylinder, taper, 1 mm to 7 mm, sucker, irrigator, probe, hook, saw");
+          "words are ball, a diameter like 4 mm, and those of the instruments' names: " + words_of_instruments());
   }
 }
 

@@ -50,13 +50,21 @@ DeviceModel model_of(std::uint16_t vendor, std::uint16_t product) {
 }
 
 std::string_view name_of(DeviceModel model) {
-  constexpr std::string_view kNames[] = {"unknown",
-                                         "WoodenHaptics or Polhem",
-                                         "3Dconnexion SpaceMouse",
-                                         "3Dconnexion SpaceMouse (wireless)",
-                                         "Infinity foot pedal",
-                                         "PCsensor foot pedal"};
-  return kNames[static_cast<std::size_t>(model)];
+  switch (model) {
+    case DeviceModel::unknown:
+      break;
+    case DeviceModel::woodenhaptics:
+      return "WoodenHaptics or Polhem";
+    case DeviceModel::space_mouse:
+      return "3Dconnexion SpaceMouse";
+    case DeviceModel::space_mouse_wireless:
+      return "3Dconnexion SpaceMouse (wireless)";
+    case DeviceModel::pedal_infinity:
+      return "Infinity foot pedal";
+    case DeviceModel::pedal_pcsensor:
+      return "PCsensor foot pedal";
+  }
+  return "unknown";
 }
 
 bool decode_space_mouse(std::span<const std::byte> r, SpaceMouseState& state) {
