@@ -113,8 +113,8 @@ class HeadlessSession {
     read_script(world, tool);
     begin_folder();
     set_options();
-    const std::vector<StreamTarget> targets = stream_targets(p_.stream);
     std::vector<std::unique_ptr<Device>> devices = open_devices();
+    const std::vector<StreamTarget> targets = stream_targets(p_.stream);
     rehearsal_ = std::make_unique<Rehearsal>(std::move(world), std::move(devices), options_, io_.context);
     if (!targets.empty()) open_stream(targets);
     draw("before.png");

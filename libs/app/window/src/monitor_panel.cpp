@@ -48,26 +48,46 @@ ScreenBox lane_head(MonitorScreen& screen, std::size_t channel, const std::strin
   return {lane.x + wide, lane.y, lane.width - wide, lane.height};
 }
 
-}  // namespace
+// A channel's part of the panel.
+struct ChannelLane {
+  std::size_t channel;
+  bool last;  // the lowest
+  ScreenBox box;
+  float gain_uv;
+  // Down from the top of the screen; what is beyond the gain at its edge.
+  [[nodiscard]] float y_of(float uv) const {
+    const float middle = box.y + box.height / 2, half = box.height / 2;
+    return middle - std::clamp(uv / gain_uv, -1.0F, 1.0F) * half;
+  }
+};
 
-void MonitorPanel::draw_sweep(MonitorDesk& desk, float height) {
-  MonitorScreen& screen = desk.screen();
+// One below the other, each with its head and an empty screen, that draw(view, lane, list) fills.
+template <typename Draw>
+void draw_lanes(MonitorScreen& screen, float height, const Draw& draw) {
   const MonitorScreen::View view = screen.view();
   if (view.labels.empty()) return;
-  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  ImDrawList* const list = ImGui::GetWindowDrawList();
   const ImVec2 corner = ImGui::GetCursorScreenPos();
   const float wide = ImGui::GetContentRegionAvail().x, lane_high = height / static_cast<float>(view.labels.size());
   for (std::size_t ch = 0; ch < view.labels.size(); ++ch) {
-    const ScreenBox lane{corner.x, corner.y + static_cast<float>(ch) * lane_high, wide, lane_high - 2};
-    const ScreenBox box = lane_head(screen, ch, view.labels[ch], lane);
-    const float middle = box.y + box.height / 2, half = box.height / 2;
-    const auto gain = static_cast<float>(screen.gain_uv(ch));
-    const auto y_of = [&](float uv) { return middle - std::clamp(uv / gain, -1.0F, 1.0F) * half; };
-    draw->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32({0.02F, 0.03F, 0.03F}, 0.9F));
+    const ScreenBox all{corner.x, corner.y + static_cast<float>(ch) * lane_high, wide, lane_high - 2};
+    const ScreenBox box = lane_head(screen, ch, view.labels[ch], all);
+    list->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32({0.02F, 0.03F, 0.03F}, 0.9F));
+    draw(view, ChannelLane{ch, ch + 1 == view.labels.size(), box, static_cast<float>(screen.gain_uv(ch))}, list);
+  }
+  ImGui::SetCursorScreenPos({corner.x, corner.y + height});
+  ImGui::Dummy({1, 1});
+}
+
+}  // namespace
+
+void MonitorPanel::draw_sweep(MonitorDesk& desk, float height) {
+  draw_lanes(desk.screen(), height, [](const MonitorScreen::View& view, const ChannelLane& lane, ImDrawList* draw) {
+    const ScreenBox& box = lane.box;
     for (const float sign : {-1.0F, 1.0F}) {
       const auto uv = sign * static_cast<float>(view.event_uv);
-      if (std::abs(uv) < gain)
-        draw->AddLine({box.x, y_of(uv)}, {box.right(), y_of(uv)}, im_colour32(palette::kOrange, 0.5F));
+      if (std::abs(uv) < lane.gain_uv)
+        draw->AddLine({box.x, lane.y_of(uv)}, {box.right(), lane.y_of(uv)}, im_colour32(palette::kOrange, 0.5F));
     }
     // As wide as the screen has pixels: a column is all that falls into it, and reaches to the one before.
     const auto columns =
@@ -76,11 +96,11 @@ void MonitorPanel::draw_sweep(MonitorDesk& desk, float height) {
     for (std::size_t c = 0; c < columns; ++c) {
       const std::size_t from = c * MonitorScreen::kBins / columns,
                         to = std::max(from + 1, (c + 1) * MonitorScreen::kBins / columns);
-      float least = view.sweep[ch][from].least_uv, most = view.sweep[ch][from].most_uv;
+      float least = view.sweep[lane.channel][from].least_uv, most = view.sweep[lane.channel][from].most_uv;
       bool gap = false;
       for (std::size_t b = from; b < to; ++b) {
-        least = std::min(least, view.sweep[ch][b].least_uv);
-        most = std::max(most, view.sweep[ch][b].most_uv);
+        least = std::min(least, view.sweep[lane.channel][b].least_uv);
+        most = std::max(most, view.sweep[lane.channel][b].most_uv);
         // Behind the place that is written now lies the oldest: a gap between them.
         gap = gap || (b + MonitorScreen::kBins - view.at) % MonitorScreen::kBins < 8;
       }
@@ -89,51 +109,37 @@ void MonitorPanel::draw_sweep(MonitorDesk& desk, float height) {
       const float joined_least = c > 0 ? std::min(least, last_most) : least,
                   joined_most = c > 0 ? std::max(most, last_least) : most;
       if (!gap)
-        draw->AddLine({x, y_of(joined_most)}, {x, std::max(y_of(joined_least), y_of(joined_most) + 1)},
+        draw->AddLine({x, lane.y_of(joined_most)}, {x, std::max(lane.y_of(joined_least), lane.y_of(joined_most) + 1)},
                       im_colour32(over ? palette::kYellow : palette::kGreen),
                       std::max(1.0F, box.width / static_cast<float>(columns)));
       last_least = least;
       last_most = most;
     }
-  }
-  ImGui::SetCursorScreenPos({corner.x, corner.y + height});
-  ImGui::Dummy({1, 1});
+  });
 }
 
 void MonitorPanel::draw_answers(MonitorDesk& desk, float height) {
-  MonitorScreen& screen = desk.screen();
-  const MonitorScreen::View view = screen.view();
-  if (view.labels.empty()) return;
-  ImDrawList* const draw = ImGui::GetWindowDrawList();
-  const ImVec2 corner = ImGui::GetCursorScreenPos();
-  const float wide = ImGui::GetContentRegionAvail().x, lane_high = height / static_cast<float>(view.labels.size());
-  for (std::size_t ch = 0; ch < view.labels.size(); ++ch) {
-    const ScreenBox lane{corner.x, corner.y + static_cast<float>(ch) * lane_high, wide, lane_high - 2};
-    const ScreenBox box = lane_head(screen, ch, view.labels[ch], lane);
-    const float middle = box.y + box.height / 2, half = box.height / 2;
-    const auto gain = static_cast<float>(screen.gain_uv(ch));
-    draw->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32({0.02F, 0.03F, 0.03F}, 0.9F));
+  draw_lanes(desk.screen(), height, [](const MonitorScreen::View& view, const ChannelLane& lane, ImDrawList* draw) {
+    const ScreenBox& box = lane.box;
     for (int ms = 5; ms < 20; ms += 5) {
       const float x = box.x + box.width * static_cast<float>(ms) / 20;
       draw->AddLine({x, box.y}, {x, box.bottom()}, im_colour32(palette::kRaised));
-      if (ch + 1 == view.labels.size())
+      if (lane.last)
         fitted_text(draw, {x + 2, box.bottom() - em(), 4 * em(), em()}, em() * 0.75F, palette::kFaint,
                     std::to_string(ms) + " ms");
     }
-    const auto& traces = view.traces[ch];
+    const auto& traces = view.traces[lane.channel];
     for (std::size_t t = 0; t < traces.size(); ++t) {
       std::vector<ImVec2> line;
       for (std::size_t i = 0; i < traces[t].uv.size(); ++i)
-        line.push_back({box.x + box.width * static_cast<float>(i) / MonitorScreen::kTraceSamples,
-                        middle - std::clamp(traces[t].uv[i] / gain, -1.0F, 1.0F) * half});
+        line.push_back(
+            {box.x + box.width * static_cast<float>(i) / MonitorScreen::kTraceSamples, lane.y_of(traces[t].uv[i])});
       const bool newest = t + 1 == traces.size();
       draw->AddPolyline(line.data(), static_cast<int>(line.size()),
                         im_colour32(traces[t].answered ? palette::kYellow : palette::kSkyBlue, newest ? 1 : 0.35F),
                         ImDrawFlags_None, newest ? 1.6F : 1);
     }
-  }
-  ImGui::SetCursorScreenPos({corner.x, corner.y + height});
-  ImGui::Dummy({1, 1});
+  });
 }
 
 void MonitorPanel::draw_stimulator(MonitorDesk& desk) {

@@ -5,6 +5,7 @@
 
 #include "osteo/geometry/distance/triangle_tree.h"
 #include "osteo/geometry/tets/quality.h"
+#include "point_tets.h"
 
 namespace osteo::inline geometry {
 
@@ -29,16 +30,8 @@ double improve_tets(TetMesh& mesh, const TriangleSoup& surface, double target_de
   double worst = 180;
   for (const float q : now) worst = std::min(worst, static_cast<double>(q));
   if (bad.empty()) return worst;
-  // Tetrahedra of each point.
-  std::vector<std::uint32_t> first(mesh.points_mm.size() + 1, 0);
-  for (const auto& t : mesh.tets) {
-    for (const auto v : t) ++first[v + 1];
-  }
-  for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
-  std::vector<std::uint32_t> around(mesh.tets.size() * 4), fill(first.begin(), first.end() - 1);
-  for (std::uint32_t t = 0; t < mesh.tets.size(); ++t) {
-    for (const auto v : mesh.tets[t]) around[fill[v]++] = t;
-  }
+  const PointTets of_points(mesh);
+  const auto &first = of_points.first, &around = of_points.tets;
   std::vector<std::uint32_t> on_boundary;
   (void)boundary_of(mesh, &on_boundary);
   std::vector<std::uint8_t> boundary(mesh.points_mm.size(), 0);

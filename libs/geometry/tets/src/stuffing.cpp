@@ -9,6 +9,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/union_find.h"
 #include "osteo/geometry/distance/distance_map.h"
+#include "point_tets.h"
 
 namespace osteo::inline geometry {
 namespace {
@@ -353,16 +354,9 @@ TetMesh stuffed_tets(const TriangleSoup& surface, const StuffingOptions& options
 }
 
 std::uint64_t open_hinges(TetMesh& mesh) {
-  // Tetrahedra of each point; two of them belong together when they share a face at it.
-  std::vector<std::uint32_t> first(mesh.points_mm.size() + 1, 0);
-  for (const auto& t : mesh.tets) {
-    for (const auto v : t) ++first[v + 1];
-  }
-  for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
-  std::vector<std::uint32_t> around(mesh.tets.size() * 4), fill(first.begin(), first.end() - 1);
-  for (std::uint32_t t = 0; t < mesh.tets.size(); ++t) {
-    for (const auto v : mesh.tets[t]) around[fill[v]++] = t;
-  }
+  // Two tetrahedra of a point belong together when they share a face at it.
+  const PointTets of_points(mesh);
+  const auto &first = of_points.first, &around = of_points.tets;
   struct Side {
     std::uint32_t a, b, local;  // the face's other two points; which of the point's tetrahedra
   };
