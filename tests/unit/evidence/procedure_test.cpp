@@ -87,8 +87,8 @@ TEST(Procedures, PatchesAreNamedAndOfTheItemsStructure) {
            ", \"within_mm\": " + std::to_string(within) + "} ],\n";
   };
   const auto item = [](const std::string& kind, const std::string& named = "window") {
-    return "\"items\": [ {\"name\": \"a\", \"kind\": \"" + kind + "\", \"structure\": \"nerve\", \"patch\": \"" + named +
-           "\"} ]";
+    return "\"items\": [ {\"name\": \"a\", \"kind\": \"" + kind + "\", \"structure\": \"nerve\", \"patch\": \"" +
+           named + "\"} ]";
   };
   for (const char* const kind : {"exposed", "thinned", "no_hole"}) {
     const std::string text = with(patch("[[1, 2, 3]]") + item(kind));
@@ -115,7 +115,8 @@ TEST(Procedures, PatchesAreNamedAndOfTheItemsStructure) {
   std::string two = patch("[[1, 2, 3]]");
   two.insert(two.find(" ],"), ", " + two.substr(two.find('{'), two.find('}') - two.find('{') + 1));
   has(wrong(with(two + item("exposed"))), "two of this name");
-  has(wrong("{ \"osteotome_procedure\": 1, \"name\": \"n\",\n\"structures\": [ {\"name\": \"nerve\", \"role\": \"keep\"}, "
+  has(wrong("{ \"osteotome_procedure\": 1, \"name\": \"n\",\n\"structures\": [ {\"name\": \"nerve\", \"role\": "
+            "\"keep\"}, "
             "{\"name\": \"vein\", \"role\": \"keep\"} ],\n" +
             patch("[[1, 2, 3]]", "vein") + item("exposed") + "}"),
       "is of 'vein'");

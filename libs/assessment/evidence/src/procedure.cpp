@@ -50,7 +50,7 @@ class Reading {
   Procedure read() {
     const JsonValue& root = file_.root();
     file_.require_format("osteotome_procedure");
-    const Keys known{"osteotome_procedure", "$schema",      "name",  "about", "usual_s", "structures", "regions",
+    const Keys known{"osteotome_procedure", "$schema",      "name",    "about", "usual_s", "structures", "regions",
                      "instruments",         "force_limits", "patches", "items", "steps"};
     file_.allow(root, "", known);
     out_.name = file_.text(file_.need(root, "", "name"), "name");
@@ -107,7 +107,8 @@ class Reading {
     std::vector<Vec3> all;
     for (const JsonValue& p : file_.list(list, key)) {
       Vec3 at;
-      for (std::size_t a = 0; a < 3; ++a) at[a] = file_.number(file_.list(p, "a point of " + key, 3)[a], key, -1e4, 1e4);
+      for (std::size_t a = 0; a < 3; ++a)
+        at[a] = file_.number(file_.list(p, "a point of " + key, 3)[a], key, -1e4, 1e4);
       all.push_back(at);
     }
     return all;
@@ -239,10 +240,9 @@ bool FacePart::has(Vec3 at_mm, Vec3 normal) const {
 }
 
 std::string FacePart::nothing() const {
-  return patch_ != nullptr
-             ? "no part of the structure's face lies in the patch '" + patch_->name + "'" +
-                   (all_sides_ ? "" : " and looks that way")
-             : "no part of the structure's face looks that way";
+  return patch_ != nullptr ? "no part of the structure's face lies in the patch '" + patch_->name + "'" +
+                                 (all_sides_ ? "" : " and looks that way")
+                           : "no part of the structure's face looks that way";
 }
 
 Procedure parse_procedure(std::string_view json, const std::string& name) {

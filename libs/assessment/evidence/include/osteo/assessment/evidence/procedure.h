@@ -102,8 +102,8 @@ struct ForceLimit {
   }
 };
 
-/// A part of a structure's face, by place: all of it at most `within_mm` from a point, or from the line through several.
-/// What a burr hole or a window is about, where the whole face is far larger.
+/// A part of a structure's face, by place: all of it at most `within_mm` from a point, or from the line through
+/// several. What a burr hole or a window is about, where the whole face is far larger.
 struct FacePatch {
   using Params = FacePatch;
   std::string name, structure;
@@ -193,7 +193,8 @@ class FacePart {
 [[nodiscard]] Procedure parse_procedure(std::string_view json, const std::string& name);
 /// Errors as above; no_input.
 [[nodiscard]] Procedure load_procedure(const std::filesystem::path& file);
-/// The same for the other side of the body: x of all directions, curves and patches turns its sign (about the plane x = 0).
+/// The same for the other side of the body: x of all directions, curves and patches turns its sign (about the plane x =
+/// 0).
 [[nodiscard]] Procedure mirrored(Procedure procedure);
 /// Value and spread of an item's kind where the file gives none.
 [[nodiscard]] double usual_threshold(ItemKind kind);
