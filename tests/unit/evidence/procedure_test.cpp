@@ -81,6 +81,77 @@ TEST(Procedures, ErrorsNameFileItemAndLine) {
       std::string::npos);
 }
 
+TEST(Procedures, PatchesAreNamedAndOfTheItemsStructure) {
+  const auto patch = [](const std::string& points, const std::string& structure = "nerve", double within = 3) {
+    return "\"patches\": [ {\"name\": \"window\", \"structure\": \"" + structure + "\", \"points_mm\": " + points +
+           ", \"within_mm\": " + std::to_string(within) + "} ],\n";
+  };
+  const auto item = [](const std::string& kind, const std::string& named = "window") {
+    return "\"items\": [ {\"name\": \"a\", \"kind\": \"" + kind + "\", \"structure\": \"nerve\", \"patch\": \"" +
+           named + "\"} ]";
+  };
+  for (const char* const kind : {"exposed", "thinned", "no_hole"}) {
+    const std::string text = with(patch("[[1, 2, 3]]") + item(kind));
+    const Procedure p = parse_procedure(text, "p.json");
+    EXPECT_EQ(p.items[0].patch, "window");
+    EXPECT_EQ(p.patches[0].points_mm, (std::vector<Vec3>{{1, 2, 3}}));
+    // Another text is another procedure, and so is its other side; twice turned it is itself.
+    EXPECT_EQ(p.hash.size(), 16U);
+    EXPECT_NE(p.hash, parse_procedure(text + " ", "p.json").hash);
+    EXPECT_EQ(p.hash, parse_procedure(text, "q.json").hash);
+    EXPECT_EQ(mirrored(p).patches[0].points_mm, (std::vector<Vec3>{{-1, 2, 3}}));
+    EXPECT_EQ(mirrored(p).hash, p.hash + " mirrored");
+    EXPECT_EQ(mirrored(mirrored(p)).hash, p.hash);
+  }
+  const auto has = [](const std::string& said, const std::string& what) {
+    EXPECT_NE(said.find(what), std::string::npos) << said;
+  };
+  has(wrong(with(patch("[[1, 2, 3]]") + item("exposed", "windw"))), "did you mean 'window'?");
+  has(wrong(with(patch("[[1, 2, 3]]") + item("followed"))), "'patch' says nothing");
+  has(wrong(with(patch("[]") + item("exposed"))), "needs one point");
+  has(wrong(with(patch("[[1, 2]]") + item("exposed"))), "points_mm");
+  has(wrong(with(patch("[[1, 2, 3]]", "nerv") + item("exposed"))), "did you mean 'nerve'?");
+  has(wrong(with(patch("[[1, 2, 3]]", "nerve", 0.1) + item("exposed"))), "within_mm");
+  std::string two = patch("[[1, 2, 3]]");
+  two.insert(two.find(" ],"), ", " + two.substr(two.find('{'), two.find('}') - two.find('{') + 1));
+  has(wrong(with(two + item("exposed"))), "two of this name");
+  has(wrong("{ \"osteotome_procedure\": 1, \"name\": \"n\",\n\"structures\": [ {\"name\": \"nerve\", \"role\": "
+            "\"keep\"}, "
+            "{\"name\": \"vein\", \"role\": \"keep\"} ],\n" +
+            patch("[[1, 2, 3]]", "vein") + item("exposed") + "}"),
+      "is of 'vein'");
+}
+
+TEST(FacePart, IsByPlaceAlongTheLineAndByWhereItLooks) {
+  Procedure p;
+  p.patches.push_back({"line", "s", {{0, 0, 0}, {10, 0, 0}}, 2, 0});
+  ScaleItem item;
+  item.patch = "line";
+  const FacePart part(p, item);
+  const Vec3 up{0, 0, 1};
+  EXPECT_FALSE(part.whole());
+  EXPECT_TRUE(part.has({5, 1.9, 0}, up));
+  EXPECT_FALSE(part.has({5, 2.1, 0}, up));
+  EXPECT_TRUE(part.has({-1.9, 0, 0}, up));
+  EXPECT_FALSE(part.has({-1.5, 1.5, 0}, up));
+  EXPECT_TRUE(part.has({11.9, 0, 0}, up));
+  EXPECT_FALSE(part.has({12.1, 0, 0}, up));
+  item.towards = {0, 0, 2};
+  item.within_deg = 30;
+  const FacePart looks(p, item);
+  EXPECT_TRUE(looks.has({5, 0, 0}, {0, 0.5, 1}));
+  EXPECT_FALSE(looks.has({5, 0, 0}, {0, 0.7, 1}));
+  item.patch.clear();
+  EXPECT_TRUE(FacePart(p, item).has({99, 0, 0}, up));
+  EXPECT_FALSE(FacePart(p, item).whole());
+  EXPECT_TRUE(FacePart(p, {}).whole());
+  // One point alone is a ball around it.
+  p.patches[0].points_mm = {{1, 0, 0}};
+  item.patch = "line";
+  EXPECT_TRUE(FacePart(p, item).has({1, 1.9, 0}, up));
+  EXPECT_FALSE(FacePart(p, item).has({-1.1, 0, 0}, up));
+}
+
 TEST(Metrics, TheTableInTheDocsIsTheirDeclaration) {
   const std::string docs = read_text(std::filesystem::path(OSTEO_SOURCE) / "docs/evidence.md");
   EXPECT_NE(docs.find(metric_table_markdown()), std::string::npos) << metric_table_markdown();

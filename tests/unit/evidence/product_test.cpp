@@ -102,7 +102,48 @@ TEST(Product, AWallIsAsThickAsItIs) {
   ASSERT_TRUE(r.measured);
   EXPECT_NEAR(r.value, 1.85, 0.3);
   EXPECT_TRUE(r.pass);
-  EXPECT_EQ(judge(drilled([](Vec3) { return 1e3; }), p).word, "nothing was opened");
+  EXPECT_EQ(judge(drilled([](Vec3) { return 1e3; }), p).word, "nothing was removed: bone is as it was");
+  // A groove that no ball of 0.5 mm enters opens nothing either, and that is another reason.
+  const auto groove = judge(drilled([](Vec3 q) { return std::max(std::abs(q.x) - 0.3, 6 - q.z); }), p);
+  EXPECT_FALSE(groove.measured);
+  EXPECT_NE(groove.word.find("no ball of 0.5 mm comes in"), std::string::npos) << groove.word;
+}
+
+TEST(Product, APatchIsAPartOfAFaceByPlace) {
+  const auto item = [&](const std::string& kind, const std::string& points, const std::string& more = "") {
+    Procedure p = procedure("{\"name\": \"i\", \"kind\": \"" + kind + "\", \"structure\": \"ball\"" + more + "}");
+    FacePatch patch{"window", "ball", {}, 2};
+    const auto at = Json::parse(points);
+    for (const Json& q : at->items())
+      patch.points_mm.push_back({*q.items()[0].number(), *q.items()[1].number(), *q.items()[2].number()});
+    p.patches.push_back(patch);
+    p.items[0].patch = "window";
+    return p;
+  };
+  // A shaft down to the ball's top: all of the patch there is shown, a tenth of the whole ball at most.
+  const auto c = drilled(test::shaft(3.0, 3));
+  const std::string top = "[[0, 0, 3]]", side = "[[0, 3, 0]]", seam = "[[0, 0, 3], [0, 3, 0]]", nowhere = "[[0, 0, 9]]";
+  EXPECT_GT(judge(c, item("exposed", top)).value, 0.95);
+  EXPECT_EQ(judge(c, item("exposed", side)).value, 0);
+  const double whole = judge(c, procedure("{\"name\": \"i\", \"kind\": \"exposed\", \"structure\": \"ball\"}")).value;
+  EXPECT_LT(whole, 0.4);
+  // The line through both points holds what lies between them as well.
+  const double both = judge(c, item("exposed", seam)).value;
+  EXPECT_GT(both, 0.2);
+  EXPECT_LT(both, 0.7);
+  // A direction takes its part of the patch.
+  EXPECT_GT(judge(c, item("exposed", seam, ", \"towards\": [0, 0, 1], \"within_deg\": 25")).value, 0.95);
+  EXPECT_LT(judge(c, item("thinned", top)).value, 0.4);
+  EXPECT_GT(judge(c, item("thinned", side)).value, 1);
+  EXPECT_EQ(judge(drilled(test::shaft(2.0, 3)), item("no_hole", side)).value, 0);
+  EXPECT_GT(judge(drilled(test::shaft(2.0, 3)), item("no_hole", top)).value, 3);
+  for (const char* const kind : {"exposed", "thinned", "no_hole"}) {
+    const auto r = judge(c, item(kind, nowhere));
+    EXPECT_FALSE(r.measured);
+    EXPECT_EQ(r.word, "no part of the structure's face lies in the patch 'window'");
+  }
+  EXPECT_FALSE(judge(c, procedure("{\"name\": \"i\", \"kind\": \"exposed\", \"structure\": \"ball\"}")).word.empty())
+      << "that it is over all of the face is said";
 }
 
 TEST(Product, FollowedIsTheShareOfTheTubesLength) {

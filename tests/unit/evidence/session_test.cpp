@@ -7,6 +7,7 @@
 #include "osteo/assessment/evidence/findings.h"
 #include "osteo/assessment/evidence/score.h"
 #include "osteo/assessment/scoring/detail/score_reader.h"
+#include "osteo/core/base/csv.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/session/recording/session_reader.h"
@@ -210,10 +211,19 @@ TEST(Sessions, ItemsRulesAndSteps) {
   ASSERT_TRUE(json);
   EXPECT_EQ(*json->find("osteotome_score")->number(), 1);
   EXPECT_EQ(json->find("items")->items().size(), 2U);
-  const std::string csv = score_csv(s, "s");
-  const auto commas = [](const std::string& line) { return std::count(line.begin(), line.end(), ','); };
-  const std::size_t end = csv.find('\n');
-  EXPECT_EQ(commas(csv.substr(0, end)), commas(csv.substr(end)));
+  // A row of CSV has a field for each name, and begins with what it is of, as the JSON has it.
+  const Csv csv = read_csv(score_csv(s, "s"), "row");
+  ASSERT_EQ(csv.rows.size(), 1U);
+  EXPECT_EQ(csv.rows[0].fields[0], "s");
+  const Json& source = *json->find("source");
+  for (std::size_t n = 1; n < 7; ++n)
+    EXPECT_EQ(csv.rows[0].fields[n], *source.find(csv.columns[n])->text()) << csv.columns[n];
+  EXPECT_EQ(s.source.bone.size(), 16U);
+  EXPECT_EQ(s.source.procedure, p.hash);
+  EXPECT_EQ(s.source.marks(), "");
+  // A spreadsheet works nothing out.
+  for (const char* const name : {"=1+1", "+1", "-1", "@a", "\t=1"})
+    EXPECT_EQ(read_csv(score_csv(s, name), "row").rows[0].fields[0], "'" + std::string(name));
 }
 
 TEST(Sessions, HardCasesHaveAWordEach) {
@@ -225,6 +235,7 @@ TEST(Sessions, HardCasesHaveAWordEach) {
   std::filesystem::copy_file(whole, cut);
   std::filesystem::resize_file(cut, std::filesystem::file_size(whole) * 2 / 3);
   EXPECT_TRUE(says(score(cut), "cut short"));
+  EXPECT_EQ(score(cut).source.marks(), "cut-short");
   // A damaged frame in the middle.
   const auto hurt = scratch / "hurt.oss";
   std::string bytes = read_text(whole);

@@ -590,6 +590,14 @@ TEST(Analyse, MissingRatingsAndMetrics) {
   ASSERT_EQ(missing.size(), 2U);
   EXPECT_EQ(number(missing[0], {"sessions_without"}), 1);
   EXPECT_EQ(number(a.json.find("correlations")->items()[0], {"sessions"}), 18);
+  // What one rater left out alone is told too, though each of these sessions has a mean.
+  const auto& ratings = a.json.find("ratings")->items();
+  ASSERT_EQ(ratings.size(), 3U);
+  EXPECT_EQ(number(ratings[0], {"given"}), 18);
+  EXPECT_EQ(number(ratings[1], {"given"}), 18);
+  EXPECT_EQ(number(ratings[2], {"given"}), 19);
+  EXPECT_EQ(number(ratings[2], {"of"}), 20);
+  EXPECT_NE(sheet_html(a.sheet).find("R1: 2 of 20 ratings were not given"), std::string::npos);
 }
 
 TEST(Analyse, OneGroup) {

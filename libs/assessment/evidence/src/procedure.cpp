@@ -1,6 +1,8 @@
 #include "osteo/assessment/evidence/procedure.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <set>
 
 #include "osteo/core/base/error.h"
@@ -16,17 +18,17 @@ using Keys = std::vector<std::string>;
 Keys keys_of(ItemKind kind) {
   switch (kind) {
     case ItemKind::exposed:
-      return {"structure", "towards", "within_deg", "cover_mm"};
+      return {"structure", "patch", "towards", "within_deg", "cover_mm"};
     case ItemKind::not_violated:
       return {"structure"};
     case ItemKind::no_hole:
-      return {"structure", "towards", "within_deg"};
+      return {"structure", "patch", "towards", "within_deg"};
     case ItemKind::no_cells_left:
       return {"structure", "cells", "within_mm"};
     case ItemKind::no_overhang:
       return {"structure", "towards", "within_deg", "within_mm"};
     case ItemKind::thinned:
-      return {"structure", "towards", "within_deg", "most"};
+      return {"structure", "patch", "towards", "within_deg", "most"};
     case ItemKind::sharp_angle:
       return {"structure", "second", "within_mm"};
     case ItemKind::followed:
@@ -48,8 +50,8 @@ class Reading {
   Procedure read() {
     const JsonValue& root = file_.root();
     file_.require_format("osteotome_procedure");
-    const Keys known{"osteotome_procedure", "$schema",      "name",  "about", "usual_s", "structures", "regions",
-                     "instruments",         "force_limits", "items", "steps"};
+    const Keys known{"osteotome_procedure", "$schema",      "name",    "about", "usual_s", "structures", "regions",
+                     "instruments",         "force_limits", "patches", "items", "steps"};
     file_.allow(root, "", known);
     out_.name = file_.text(file_.need(root, "", "name"), "name");
     if (const JsonValue* v = root.find("about")) out_.about = file_.text(*v, "about");
@@ -63,6 +65,7 @@ class Reading {
     list(root, "regions", out_.regions, of_structure);
     list(root, "instruments", out_.instruments, of_structure);
     list(root, "force_limits", out_.force_limits, of_structure);
+    patches(root);
     items(root);
     steps(root);
     return std::move(out_);
@@ -100,6 +103,38 @@ class Reading {
       into.push_back(std::move(t));
     }
   }
+  std::vector<Vec3> points(const JsonValue& list, const std::string& key) {
+    std::vector<Vec3> all;
+    for (const JsonValue& p : file_.list(list, key)) {
+      Vec3 at;
+      for (std::size_t a = 0; a < 3; ++a)
+        at[a] = file_.number(file_.list(p, "a point of " + key, 3)[a], key, -1e4, 1e4);
+      all.push_back(at);
+    }
+    return all;
+  }
+  void patches(const JsonValue& root) {
+    const JsonValue* const all = root.find("patches");
+    if (all == nullptr) return;
+    for (std::size_t n = 0; n < file_.list(*all, "patches").size(); ++n) {
+      const JsonValue& v = all->items[n];
+      const std::string where = called("patch", n, v);
+      FacePatch patch;
+      const Keys extra{"points_mm"};
+      file_.read(v, where, fields_of<FacePatch>(patch), extra);
+      patch.line = v.line;
+      known_structure(patch.structure, where, v);
+      if (patch_of(patch.name) != nullptr) throw file_.wrong(v, where + ": there are two of this name");
+      patch.points_mm = points(file_.need(v, where, "points_mm"), "points_mm");
+      if (patch.points_mm.empty()) throw file_.wrong(v, where + ": 'points_mm' needs one point at least");
+      out_.patches.push_back(std::move(patch));
+    }
+  }
+  const FacePatch* patch_of(const std::string& name) const {
+    for (const FacePatch& p : out_.patches)
+      if (p.name == name) return &p;
+    return nullptr;
+  }
   void items(const JsonValue& root) {
     const JsonValue* const all = root.find("items");
     if (all == nullptr) return;
@@ -127,13 +162,20 @@ class Reading {
       for (const std::string& s : {item.structure, item.second, item.cells}) {
         if (!s.empty()) known_structure(s, where, v);
       }
-      if (const JsonValue* const c = v.find("curve_mm")) {
-        for (const JsonValue& p : file_.list(*c, "curve_mm")) {
-          Vec3 at;
-          for (std::size_t a = 0; a < 3; ++a)
-            at[a] = file_.number(file_.list(p, "a point of curve_mm", 3)[a], "curve_mm", -1e4, 1e4);
-          item.curve_mm.push_back(at);
+      if (const JsonValue* const named = v.find("patch")) {
+        const FacePatch* const patch = patch_of(item.patch);
+        if (patch == nullptr) {
+          Keys known;
+          for (const FacePatch& p : out_.patches) known.push_back(p.name);
+          const std::string near = nearest_name(item.patch, known);
+          throw file_.wrong(*named, where + ": '" + item.patch + "' is not among the patches",
+                            near.empty() ? "list it under \"patches\"" : "did you mean '" + near + "'?");
         }
+        if (patch->structure != item.structure)
+          throw file_.wrong(*named, where + ": the patch '" + item.patch + "' is of '" + patch->structure + "'");
+      }
+      if (const JsonValue* const c = v.find("curve_mm")) {
+        item.curve_mm = points(*c, "curve_mm");
         if (item.curve_mm.size() < 2) throw file_.wrong(*c, where + ": 'curve_mm' needs two points at least");
       }
       if (v.find("threshold") == nullptr) item.threshold = usual_threshold(item.kind);
@@ -176,6 +218,33 @@ const ProcedureStructure* Procedure::find(std::string_view structure) const {
   return s == structures.end() ? nullptr : &*s;
 }
 
+FacePart::FacePart(const Procedure& procedure, const ScaleItem& item)
+    : towards_(normalized({item.towards[0], item.towards[1], item.towards[2]})),
+      all_sides_(length(towards_) == 0),
+      least_(std::cos(item.within_deg * std::numbers::pi / 180)) {
+  for (const FacePatch& p : procedure.patches)
+    if (p.name == item.patch) patch_ = &p;
+}
+
+bool FacePart::has(Vec3 at_mm, Vec3 normal) const {
+  if (!all_sides_ && dot(normalized(normal), towards_) < least_) return false;
+  if (patch_ == nullptr) return true;
+  const auto& line = patch_->points_mm;
+  const double within = patch_->within_mm;
+  for (std::size_t n = 0; n + 1 < std::max<std::size_t>(2, line.size()); ++n) {
+    const Vec3 from = line[n], way = line[std::min(n + 1, line.size() - 1)] - from;
+    const double all = dot(way, way), t = all > 0 ? std::clamp(dot(at_mm - from, way) / all, 0.0, 1.0) : 0;
+    if (length(at_mm - from - way * t) <= within) return true;
+  }
+  return false;
+}
+
+std::string FacePart::nothing() const {
+  return patch_ != nullptr ? "no part of the structure's face lies in the patch '" + patch_->name + "'" +
+                                 (all_sides_ ? "" : " and looks that way")
+                           : "no part of the structure's face looks that way";
+}
+
 Procedure parse_procedure(std::string_view json, const std::string& name) {
   Procedure p = Reading(json, name).read();
   p.hash = hash_text(json).substr(0, 16);
@@ -193,6 +262,8 @@ Procedure mirrored(Procedure p) {
     i.towards[0] = -i.towards[0];
     for (Vec3& q : i.curve_mm) q.x = -q.x;
   }
+  for (FacePatch& f : p.patches)
+    for (Vec3& q : f.points_mm) q.x = -q.x;
   return p;
 }
 

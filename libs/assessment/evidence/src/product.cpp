@@ -228,6 +228,12 @@ void Product::settle(Result& r, bool passes_at_worst, bool passes_at_best) const
                               format_number(std::round(frame_.spacing_mm.x * 1000) / 1000) + " mm can tell");
 }
 
+std::string Product::no_cavity() const {
+  return removed_.empty() ? "nothing was removed: bone is as it was"
+                          : "nothing was opened: no ball of " + format_number(kBallMm) +
+                                " mm comes in where bone was removed, so there is no cavity to measure from";
+}
+
 std::string Product::joined(const std::string& a, const std::string& b) {
   return a.empty() ? b : a + "; " + b;
 }

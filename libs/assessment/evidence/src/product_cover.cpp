@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <numeric>
 #include <queue>
 
@@ -11,10 +10,13 @@
 
 namespace osteo::inline assessment {
 
+namespace {
+// A share of a face says little where the face is far larger than what was to be done on it.
+const char* const kWholeFace = "over all of its face: no patch, no direction";
+}  // namespace
+
 std::vector<Product::Patch> Product::patch_of(std::uint8_t value, const ScaleItem& item) const {
-  const Vec3 towards = normalized({item.towards[0], item.towards[1], item.towards[2]});
-  const bool all = length(towards) == 0;
-  const double least = std::cos(item.within_deg * std::numbers::pi / 180);
+  const FacePart part(procedure_, item);
   std::vector<Patch> patch;
   const TriMesh& face = structures_.face(number_[value]);
   for (const auto& t : face.triangles) {
@@ -22,8 +24,8 @@ std::vector<Product::Patch> Product::patch_of(std::uint8_t value, const ScaleIte
                c = from_floats(face.points_mm[t[2]]);
     const Vec3 n = cross(b - a, c - a);
     const double area = length(n) / 2;
-    if (area <= 0 || (!all && dot(normalized(n), towards) < least)) continue;
     const Vec3 at = (a + b + c) / 3;
+    if (area <= 0 || !part.has(at, n)) continue;
     // What lies outside the lattice is far from all that was done.
     patch.push_back({at, normalized(n), area, cell(at) == frame_.voxel_count() ? 1e9 : cavity_distance_mm(at)});
   }
@@ -38,9 +40,10 @@ void Product::exposed(const ScaleItem& item, std::uint8_t s, Result& r) const {
     if (p.cover_mm <= item.cover_mm) keep(r, p.at_mm);
   }
   if (all <= 0) {
-    r.word = "no part of the structure's face looks that way";
+    r.word = FacePart(procedure_, item).nothing();
     return;
   }
+  if (FacePart(procedure_, item).whole()) r.word = kWholeFace;
   const auto share = [&](double cover_mm) {
     double shown = 0;
     for (const Patch& p : patch) shown += p.cover_mm <= cover_mm ? p.area_mm2 : 0;
@@ -56,9 +59,9 @@ void Product::exposed(const ScaleItem& item, std::uint8_t s, Result& r) const {
 
 // Triangles that share a point hang together.
 void Product::hole(const ScaleItem& item, std::uint8_t s, Result& r) const {
-  const Vec3 towards = normalized({item.towards[0], item.towards[1], item.towards[2]});
-  const bool all = length(towards) == 0;
-  const double least = std::cos(item.within_deg * std::numbers::pi / 180), bare_mm = frame_.spacing_mm.x / 2;
+  const FacePart looked_at(procedure_, item);
+  const double bare_mm = frame_.spacing_mm.x / 2;
+  bool any = false;
   struct Bare {
     std::array<std::uint32_t, 3> points;
     double cover_mm, mm2;
@@ -70,10 +73,15 @@ void Product::hole(const ScaleItem& item, std::uint8_t s, Result& r) const {
     const Vec3 a = from_floats(face.points_mm[t[0]]), b = from_floats(face.points_mm[t[1]]),
                c = from_floats(face.points_mm[t[2]]);
     const Vec3 n = cross(b - a, c - a), at = (a + b + c) / 3;
-    if (!all && dot(normalized(n), towards) < least) continue;
+    if (length(n) <= 0 || !looked_at.has(at, n)) continue;
+    any = true;
     if (cell(at) == frame_.voxel_count()) continue;
     const double cover_mm = cavity_distance_mm(at);
     if (cover_mm <= 1.5 * bare_mm) bare.push_back({{t[0], t[1], t[2]}, cover_mm, length(n) / 2, at});
+  }
+  if (!any) {
+    r.word = looked_at.nothing();
+    return;
   }
   // The points of bare triangles alone, numbered anew.
   std::vector<std::uint32_t> points;
@@ -128,9 +136,10 @@ void Product::thinned(const ScaleItem& item, std::uint8_t s, Result& r) const {
     if (p.cover_mm > item.threshold) keep(r, p.at_mm);
   }
   if (all <= 0 || cells_->to_cavity.empty()) {
-    r.word = all <= 0 ? "no part of the structure's face looks that way" : "nothing was opened";
+    r.word = all <= 0 ? FacePart(procedure_, item).nothing() : no_cavity();
     return;
   }
+  if (FacePart(procedure_, item).whole()) r.word = kWholeFace;
   std::sort(wall.begin(), wall.end());
   const auto quantile = [&](double q) {
     double sum = 0;
@@ -239,7 +248,7 @@ void Product::followed(const ScaleItem& item, std::uint8_t s, Result& r) const {
 // from it.
 void Product::margin(const ScaleItem& item, Vec3 approach, Result& r) const {
   if (cells_->to_cavity.empty()) {
-    r.word = "nothing was opened";
+    r.word = no_cavity();
     return;
   }
   Vec3 middle;

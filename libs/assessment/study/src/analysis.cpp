@@ -92,6 +92,23 @@ void Analyst::opening() {
         Tone::caution);
   }
   json_["missing"] = missing;
+  // A session that one rater left out still has a value, of the others.
+  Json by_rater = Json::list();
+  const std::size_t all = study_.sessions.size() * p.items.size();
+  for (const RaterSheet& r : study_.raters) {
+    std::size_t given = 0;
+    for (const Session& s : study_.sessions) {
+      const auto sheet = r.sessions.find(s.blind);
+      if (sheet == r.sessions.end()) continue;
+      for (const auto& [item, value] : sheet->second) given += value ? 1 : 0;
+    }
+    by_rater.push_back({{"rater", r.rater}, {"given", given}, {"of", all}});
+    if (given < all)
+      say(r.rater + ": " + std::to_string(all - given) + " of " + counted(all, "rating", "ratings") +
+              " were not given; agreement is of what more than one rater gave.",
+          Tone::caution);
+  }
+  json_["ratings"] = by_rater;
 }
 
 // What the study is about was to be said before it began.

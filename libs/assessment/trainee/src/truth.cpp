@@ -37,17 +37,15 @@ double largest_bare_mm2(const std::vector<Place>& places, std::size_t points, do
   return most;
 }
 
-std::vector<Place> places_of(const TriMesh& face, const ScaleItem& item, bool all_sides) {
-  const Vec3 towards = normalized({item.towards[0], item.towards[1], item.towards[2]});
-  const bool all = all_sides || length(towards) == 0;
-  const double least = std::cos(item.within_deg * 3.14159265358979323846 / 180);
+std::vector<Place> places_of(const TriMesh& face, const Procedure& procedure, const ScaleItem& item, bool all_sides) {
+  const FacePart part(procedure, item);
   std::vector<Place> places;
   for (const auto& t : face.triangles) {
     const Vec3 a = from_floats(face.points_mm[t[0]]), b = from_floats(face.points_mm[t[1]]),
                c = from_floats(face.points_mm[t[2]]);
     const Vec3 n = cross(b - a, c - a);
     const double area = length(n) / 2;
-    if (area <= 0 || (!all && dot(normalized(n), towards) < least)) continue;
+    if (area <= 0 || (!all_sides && !part.has((a + b + c) / 3, n))) continue;
     places.push_back({(a + b + c) / 3, area, kFarMm, {t[0], t[1], t[2]}});
   }
   return places;
@@ -69,7 +67,7 @@ std::vector<OwnTruth> own_truth(const Procedure& procedure, const StructureMap& 
     if (named != nullptr && named->role == ProcedureRole::enter) continue;
     if (!known || number == structures.values().size()) continue;
     const TriMesh& face = structures.face(number);
-    std::vector<Place> places = places_of(face, item, item.kind == ItemKind::not_violated);
+    std::vector<Place> places = places_of(face, procedure, item, item.kind == ItemKind::not_violated);
     if (places.empty()) continue;
     BoxMm box;
     for (const Place& p : places) box.include(p.at_mm);

@@ -102,10 +102,25 @@ struct ForceLimit {
   }
 };
 
+/// A part of a structure's face, by place: all of it at most `within_mm` from a point, or from the line through
+/// several. What a burr hole or a window is about, where the whole face is far larger.
+struct FacePatch {
+  using Params = FacePatch;
+  std::string name, structure;
+  std::vector<Vec3> points_mm;  ///< one at least; where the bone lay at the beginning
+  double within_mm = 5;
+  std::size_t line = 0;
+  static void describe(Params& p, auto& visit) {
+    visit({"name", "of the patch", "", 0, 0, true}, p.name);
+    visit({"structure", "of whose face it is a part", "", 0, 0, true}, p.structure);
+    visit({"within_mm", "from its points, or the line through them", "mm", 0.5, 200, true}, p.within_mm);
+  }
+};
+
 /// An item of the scale. Which fields it goes by depends on its kind; the others are refused in files.
 struct ScaleItem {
   using Params = ScaleItem;
-  std::string name, structure, second, cells;
+  std::string name, structure, second, cells, patch;
   ItemKind kind = ItemKind::exposed;
   std::array<double, 3> towards{0, 0, 0};
   double within_deg = 90, within_mm = 3, cover_mm = 1, threshold = 0, most = 0, spread = 0;
@@ -118,6 +133,7 @@ struct ScaleItem {
     visit({"structure", "structure that the region surrounds"}, p.structure);
     visit({"second", "sharp_angle: the other plate"}, p.second);
     visit({"cells", "no_cells_left: the structure that is cells"}, p.cells);
+    visit({"patch", "only this part of its face (empty: all of it)"}, p.patch);
     visit({"towards", "only the part of its face that looks this way, LPS (0,0,0: all of it)", "", -1e4, 1e4},
           p.towards);
     visit({"within_deg", "and at most so far off", "deg", 1, 180}, p.within_deg);
@@ -146,6 +162,7 @@ struct Procedure {
   std::vector<ProcedureRegion> regions;
   std::vector<InstrumentRule> instruments;
   std::vector<ForceLimit> force_limits;
+  std::vector<FacePatch> patches;
   std::vector<ScaleItem> items;
   std::vector<ProcedureStep> steps;
 
@@ -153,12 +170,31 @@ struct Procedure {
   [[nodiscard]] const ProcedureStructure* find(std::string_view structure) const;
 };
 
+/// The part of a structure's face that an item is about: by place (its patch), and by where it looks. Both must outlive
+/// it.
+class FacePart {
+ public:
+  FacePart(const Procedure& procedure, const ScaleItem& item);
+  /// A place on the face and its normal, of any length but 0.
+  [[nodiscard]] bool has(Vec3 at_mm, Vec3 normal) const;
+  [[nodiscard]] bool whole() const { return patch_ == nullptr && all_sides_; }
+  /// Why nothing of the face is in it.
+  [[nodiscard]] std::string nothing() const;
+
+ private:
+  const FacePatch* patch_ = nullptr;
+  Vec3 towards_;
+  bool all_sides_ = true;
+  double least_ = -1;
+};
+
 /// `name` as errors call it. Strict: Error(usage) with file, item and line for a key that is not known or says nothing
 /// for its kind, a structure or an item that is not declared, two of one name, what is out of range.
 [[nodiscard]] Procedure parse_procedure(std::string_view json, const std::string& name);
 /// Errors as above; no_input.
 [[nodiscard]] Procedure load_procedure(const std::filesystem::path& file);
-/// The same for the other side of the body: x of all directions and curves turns its sign (about the plane x = 0).
+/// The same for the other side of the body: x of all directions, curves and patches turns its sign (about the plane x =
+/// 0).
 [[nodiscard]] Procedure mirrored(Procedure procedure);
 /// Value and spread of an item's kind where the file gives none.
 [[nodiscard]] double usual_threshold(ItemKind kind);

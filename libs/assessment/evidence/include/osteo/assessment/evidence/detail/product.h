@@ -92,6 +92,8 @@ class Product {
   // What a distance may be off by because of the lattice.
   [[nodiscard]] double off_mm() const;
   void settle(Result& r, bool passes_at_worst, bool passes_at_best) const;
+  // Why there is no cavity to measure from.
+  [[nodiscard]] std::string no_cavity() const;
   static std::string joined(const std::string& a, const std::string& b);
   void exposed(const ScaleItem& item, std::uint8_t s, Result& r) const;
   void violated(const ScaleItem& item, std::uint8_t s, const std::vector<std::string>& injured, Result& r) const;
