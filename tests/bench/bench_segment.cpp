@@ -1,5 +1,6 @@
 // Tubes and structures of the ear against their truth: the tables of docs/structures.md. Not a test.
 //   osteo_bench_segment tubes
+//   osteo_bench_segment shapes [FIRST LAST MAX_RADIUS MAX_UNSURE]
 //   osteo_bench_segment nerves|ears [FIRST LAST SPACING SLICE NOISE SCALE]
 #include <sys/resource.h>
 
@@ -14,6 +15,7 @@
 #include "osteo/imaging/segment/ear.h"
 #include "osteo/imaging/segment/tube.h"
 #include "segment/ear_truth.h"
+#include "segment/nerve_shapes.h"
 #include "segment/tube_ct.h"
 
 using namespace osteo;
@@ -141,6 +143,69 @@ void nerves(int first, int last, double spacing, double slice, double noise) {
   }
 }
 
+/// Calibration of the confidence on nerves by seed: of the places that say so much, how many are right.
+void shapes(int first, int last, double max_radius_mm, double max_unsure_mm) {
+  constexpr int kBins = 10;
+  std::array<int, kBins> n{}, right{}, outside{};
+  std::array<double, kBins> said{};
+  std::vector<double> volume_ratio;
+  int refused = 0, traced = 0, walled = 0, walled_right = 0, walled_out = 0;
+  double seconds = 0;
+  for (int seed = first; seed <= last; ++seed) {
+    const NerveShape s = make_nerve_shape(static_cast<std::uint64_t>(seed));
+    TubeParams p;
+    p.max_radius_mm = max_radius_mm;
+    p.max_unsure_mm = max_unsure_mm;
+    const double c = cpu();
+    try {
+      const Tube t = trace_tube(s.ct, s.clicks, p);
+      seconds += cpu() - c;
+      ++traced;
+      for (const TubeStation& x : t.stations) {
+        const auto b = static_cast<std::size_t>(std::clamp(x.confidence * kBins, 0.0, kBins - 1.0));
+        const std::size_t at = nearest_on(s, x.at_mm);
+        if (x.walls >= 0.5) {
+          ++walled;
+          walled_right += is_right(s, x) ? 1 : 0;
+          walled_out += length(s.line[at] - x.at_mm) > s.radius[at] + 1 ? 1 : 0;
+        }
+        ++n[b];
+        said[b] += x.confidence;
+        right[b] += is_right(s, x) ? 1 : 0;
+        outside[b] += length(s.line[at] - x.at_mm) > s.radius[at] + 1 ? 1 : 0;
+      }
+      double drawn = 0;
+      const Labels labels = draw_tube(t, s.ct.frame, "facial nerve");
+      for (const std::uint8_t v : labels.span()) drawn += v != 0 ? s.ct.frame.voxel_volume_mm3() : 0;
+      volume_ratio.push_back(drawn / s.volume_mm3);
+    } catch (const Error&) {
+      ++refused;
+    }
+  }
+  std::printf("| confidence | places | mean of it | right | more than 1 mm outside |\n|---|---|---|---|---|\n");
+  int sure = 0, sure_right = 0, sure_out = 0;
+  for (std::size_t b = 0; b < kBins; ++b) {
+    if (n[b] == 0) continue;
+    std::printf("| %.1f to %.1f | %d | %.2f | %.2f | %.3f |\n", 0.1 * static_cast<double>(b),
+                0.1 * static_cast<double>(b + 1), n[b], said[b] / n[b], static_cast<double>(right[b]) / n[b],
+                static_cast<double>(outside[b]) / n[b]);
+    if (b >= kBins / 2) sure += n[b], sure_right += right[b], sure_out += outside[b];
+  }
+  std::sort(volume_ratio.begin(), volume_ratio.end());
+  const auto part = [&](double q) {
+    return volume_ratio.empty()
+               ? 0
+               : volume_ratio[static_cast<std::size_t>(q * static_cast<double>(volume_ratio.size() - 1))];
+  };
+  std::printf("0.5 and more: %d places, %.3f right, %.3f more than 1 mm outside\n", sure,
+              static_cast<double>(sure_right) / std::max(1, sure), static_cast<double>(sure_out) / std::max(1, sure));
+  std::printf("by walls alone, 0.5 and more: %d places, %.3f right, %.3f more than 1 mm outside\n", walled,
+              static_cast<double>(walled_right) / std::max(1, walled),
+              static_cast<double>(walled_out) / std::max(1, walled));
+  std::printf("volume drawn by true: 5 %% %.2f, median %.2f, 95 %% %.2f; traced %d, refused %d; %.2f s of CPU each\n",
+              part(0.05), part(0.5), part(0.95), traced, refused, seconds / std::max(1, traced));
+}
+
 void ears(int first, int last, double spacing, double slice, double noise, double scale) {
   std::printf(
       "| individual | structure | Dice | surface distance, mean mm | 95 %% mm | quality | mm3 | true mm3 "
@@ -207,6 +272,8 @@ int main(int argc, char** argv) {
   const double t = now();
   if (what == "tubes") {
     tubes();
+  } else if (what == "shapes") {
+    shapes(static_cast<int>(arg(2, 1001)), static_cast<int>(arg(3, 1200)), arg(4, 1.5), arg(5, 4));
   } else if (what == "nerves") {
     nerves(static_cast<int>(arg(2, 6)), static_cast<int>(arg(3, 15)), arg(4, 0.5), arg(5, 0), arg(6, 30));
   } else if (what == "ears") {
@@ -214,7 +281,7 @@ int main(int argc, char** argv) {
   } else {
     std::fprintf(stderr,
                  "osteo_bench_segment ears [FIRST LAST SPACING SLICE NOISE SCALE] | tubes | nerves [FIRST LAST SPACING "
-                 "SLICE NOISE]\n");
+                 "SLICE NOISE] | shapes [FIRST LAST MAX_RADIUS MAX_UNSURE]\n");
     return 2;
   }
   rusage u{};

@@ -3,6 +3,7 @@
 #include <dcmtk/dcmjpls/djencode.h>
 
 #include <cmath>
+#include <fstream>
 #include <optional>
 
 #include "edit.h"
@@ -978,6 +979,111 @@ TEST(HardCase, C32_PicturesOfOneFileAreToldApart) {
     ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size()).good());
   });
   refusal(s.folder, code::hole_too_wide, "between '000 (picture 6)' and '000 (picture 7)'");
+}
+
+// The reason names the comma: the tag is there.
+TEST(HardCase, DecimalCommasAreNamed) {
+  struct Case {
+    const char* name;
+    DcmTagKey tag;
+    const char* value;
+    std::string_view code;
+  };
+  for (const Case& c : {Case{"spacing", DCM_PixelSpacing, "0,488\\0,488", code::spacing_missing},
+                        Case{"slope", DCM_RescaleSlope, "1,0", code::slope_invalid}}) {
+    Series s(std::string("comma-") + c.name, slices(0, 3));
+    s.edit_all([&](DcmDataset& d, int) { put(d, c.tag, c.value); });
+    refusal(s.folder, c.code, "decimal comma");
+  }
+}
+
+// A way of compressing pixels that is not read is named. DCMTK cannot write it: the meta header is changed by hand.
+TEST(HardCase, UnreadCompressionIsNamed) {
+  Series s("htj2k", slices(0, 3));
+  for (const auto& f : test::files_in(s.folder)) {
+    s.edit(
+        f.filename().string(), [](DcmDataset&) {}, {}, EXS_LittleEndianExplicit);
+    std::string bytes = read_text(f);
+    const std::size_t at = bytes.find(std::string("\x02\x00\x10\x00UI", 6));
+    ASSERT_NE(at, std::string::npos);
+    const auto old = static_cast<std::size_t>(static_cast<unsigned char>(bytes[at + 6]));
+    const std::string uid = std::string("1.2.840.10008.1.2.4.201") + '\0';
+    bytes.replace(at + 6, 2 + old, std::string{static_cast<char>(uid.size()), '\0'} + uid);
+    bytes[140] = static_cast<char>(static_cast<unsigned char>(bytes[140]) + uid.size() - old);  // length of group 2
+    std::ofstream(f, std::ios::binary) << bytes;
+  }
+  refusal(s.folder, code::no_pixels, "HTJ2K");
+}
+
+// Around a round picture some scanners write their brightest value: no bone, whether a tag names it, or a range, or
+// none. A clip of the same value inside stays.
+TEST(HardCase, ARingOfTheBrightestValueIsPadding) {
+  const std::int16_t clip = 3071;
+  const auto make = [&](const char* name, int tags) {
+    Series s(name, slices(0, 12));
+    s.edit_all([&](DcmDataset& d, int i) {
+      Uint16 rows = 0, columns = 0;
+      Float64 slope = 1, intercept = 0;
+      d.findAndGetUint16(DCM_Rows, rows);
+      d.findAndGetUint16(DCM_Columns, columns);
+      d.findAndGetFloat64(DCM_RescaleSlope, slope);
+      d.findAndGetFloat64(DCM_RescaleIntercept, intercept);
+      const auto bright = static_cast<Uint16>((clip - intercept) / slope);
+      Uint16* pixels = nullptr;
+      ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, const_cast<const Uint16*&>(pixels)).good());
+      for (int y = 0; y < rows; ++y)
+        for (int x = 0; x < columns; ++x)
+          if (std::hypot(2.0 * x / columns - 1, 2.0 * y / rows - 1) > 1) pixels[y * columns + x] = bright;
+      if (i == 6) pixels[rows / 2 * columns + columns / 2] = bright;
+      if (tags > 0) {
+        ASSERT_TRUE(d.putAndInsertUint16(DCM_PixelPaddingValue, bright).good());
+      }
+      if (tags > 1) {
+        ASSERT_TRUE(d.putAndInsertUint16(DCM_PixelPaddingRangeLimit, static_cast<Uint16>(bright - 5)).good());
+      }
+    });
+    return load(s.folder);
+  };
+  for (int tags = 0; tags < 3; ++tags) {
+    const Imported r = make(("ring" + std::to_string(tags)).c_str(), tags);
+    EXPECT_TRUE(r.verdict.has(code::padding_found)) << tags;
+    EXPECT_FALSE(r.verdict.has(code::bone_implausible)) << tags;
+    EXPECT_FALSE(r.verdict.has(code::padding_tag_wrong) && tags < 2) << tags;
+    EXPECT_GT(r.verdict.values.padding_share, 0.2);
+    const Frame& f = r.image.frame;
+    EXPECT_LT(r.image.at(0, 0, 0), -900) << tags;
+    EXPECT_LT(r.image.at(f.dims[0] - 1, f.dims[1] - 1, 5), -900) << tags;
+    std::int16_t most = -32768;
+    for (std::size_t i = 0; i < f.voxel_count(); ++i) most = std::max(most, r.image.voxels[i]);
+    EXPECT_GE(most, 3070) << "the clip stays";
+  }
+}
+
+// Half of the slices at half the size: as many of each, so the finer ones are taken.
+TEST(HardCase, OfStacksOfAsManySlicesTheFinerIsTaken) {
+  Series s("coarse-half", slices(0, 24));
+  Uint16 full = 0;
+  s.edit_all([&](DcmDataset& d, int i) {
+    if (i % 2 != 0) return;
+    Uint16 rows = 0, columns = 0;
+    d.findAndGetUint16(DCM_Rows, rows);
+    d.findAndGetUint16(DCM_Columns, columns);
+    full = std::max(full, columns);
+    const Uint16* read = nullptr;
+    ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, read).good());
+    std::vector<Uint16> half;
+    for (int y = 0; y < rows / 2; ++y)
+      for (int x = 0; x < columns / 2; ++x) half.push_back(read[2 * y * columns + 2 * x]);
+    Float64 mm = 1;
+    d.findAndGetFloat64(DCM_PixelSpacing, mm);
+    put(d, DCM_PixelSpacing, std::to_string(2 * mm) + "\\" + std::to_string(2 * mm));
+    ASSERT_TRUE(d.putAndInsertUint16(DCM_Rows, static_cast<Uint16>(rows / 2)).good());
+    ASSERT_TRUE(d.putAndInsertUint16(DCM_Columns, static_cast<Uint16>(columns / 2)).good());
+    ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, half.data(), half.size()).good());
+  });
+  const Imported r = load(s.folder);
+  EXPECT_TRUE(r.verdict.has(code::several_stacks));
+  EXPECT_EQ(r.image.frame.dims[0], full);
 }
 
 }  // namespace

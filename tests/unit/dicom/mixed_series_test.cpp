@@ -294,5 +294,12 @@ TEST(MixedSeries, TheLastSliceIsInTheVolume) {
   test::expect_every_slice_in_its_place(r.image, s.folder);
 }
 
+// Two times at each place, and no tag that says so.
+TEST(MixedSeries, ASeriesOverTimeIsCalledOne) {
+  Series s("over-time", slices(0, 12));
+  second_scan(s, [](DcmDataset&, int) {});
+  expect_refused(s.folder, code::slices_at_one_place, "each of 12 places is shown 2 times");
+}
+
 }  // namespace
 }  // namespace osteo

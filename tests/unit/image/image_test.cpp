@@ -8,6 +8,7 @@
 #include "osteo/geometry/distance/binary_distance.h"
 #include "osteo/imaging/image/components.h"
 #include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/structures.h"
 #include "osteo/imaging/image/threshold.h"
 
 namespace osteo {
@@ -283,6 +284,24 @@ TEST(Phantom, AnotherIndividualIsAnotherHead) {
   const auto b = make_phantom(p);
   EXPECT_TRUE(std::equal(a.labels.span().begin(), a.labels.span().end(), again.labels.span().begin()));
   EXPECT_FALSE(std::equal(a.labels.span().begin(), a.labels.span().end(), b.labels.span().begin()));
+}
+
+TEST(Structures, AVolumeThatItsNameCannotHaveIsTold) {
+  EXPECT_EQ(implausible_volume("facial nerve", 80), "");
+  EXPECT_NE(implausible_volume("Left Facial_Nerve", 4000).find("look at it"), std::string::npos);
+  EXPECT_EQ(implausible_volume("sigmoid sinus", 4000), "");
+  EXPECT_EQ(structure_limits("facial nerve")->radius_mm, 1.5);
+  EXPECT_FALSE(structure_limits("tumour").has_value());
+  Labels l;
+  l.frame.dims = {20, 20, 20};
+  const auto v = make_voxels<std::uint8_t>(8000);
+  std::fill(v.get(), v.get() + 8000, std::uint8_t{1});
+  l.voxels = v;
+  std::string warned;
+  Context context;
+  context.on_log([&](LogLevel, std::string_view text) { warned += text; });
+  (void)name_structures(l, {.names = "1=facial nerve"}, nullptr, context);
+  EXPECT_NE(warned.find("8000 mm3"), std::string::npos) << warned;
 }
 
 }  // namespace

@@ -146,6 +146,29 @@ TEST(Ear, AClosedCanalAndAFilledMastoidAreNotFound) {
   EXPECT_LT(of(f, EarStructure::air_cells).volume_mm3, 2500);
 }
 
+TEST(Ear, WithoutAVisibleDrumNothingIsPlacedByTheCanal) {
+  // The drum's plane is air: canal, middle ear and cells are one.
+  const auto& labels = ear().labels;
+  const Image open = changed(ear().ct, [&](std::size_t at, Vec3 p, int hu) {
+    const auto t = static_cast<Tissue>(labels.voxels[at]);
+    return length(p - kTrueDrum) < 5.5 && !is_bone(t) && hu < 300 ? -1000 : hu;
+  });
+  for (const EarFinding& f : find(open, "ear_canal,air_cells,tegmen").findings) {
+    EXPECT_FALSE(f.found) << EnumNames<EarStructure>::values[static_cast<std::size_t>(f.what)] << " of quality "
+                          << f.quality;
+    EXPECT_NE(f.why.find("drum"), std::string::npos) << f.why;
+  }
+}
+
+// What lies above is there, but the image ends before it could be told: no dry skull.
+TEST(Ear, AFieldThatEndsAboveTheEarIsTheReasonForNoBrain) {
+  const auto why = [](const Image& ct) { return of(find(ct, "dura"), EarStructure::dura).why; };
+  const Frame& f = ear().ct.frame;
+  Image low = ear().ct;
+  low.frame.dims[2] = static_cast<int>((-12 - f.origin_mm.z) / f.spacing_mm.z);
+  EXPECT_NE(why(low).find("the image ends"), std::string::npos) << why(low);
+}
+
 TEST(Ear, NoiseMakesItUnsureRatherThanWrong) {
   PhantomParams p;
   p.region = PhantomRegion::temporal;

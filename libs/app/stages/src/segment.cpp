@@ -51,8 +51,9 @@ StageInfo TubeStage::info() {
       .description =
           "Finds the cheapest way between the points through what looks like a tube, moves it to the middle of the "
           "walls across it, "
-          "measures its radius, and draws it into a label map. Says where no walls are seen: there the line is a "
-          "smooth curve through "
+          "measures its radius, and draws it into a label map. Each place has a confidence: the chance that it "
+          "lies in the tube. Says where that is below one half; where no walls are seen the line is a smooth curve "
+          "through "
           "the points. Points that no tube joins are refused. docs/structures.md has how far off it is.",
       .inputs =
           {{"image", {DataKind::image}, "CT in HU"},
@@ -102,7 +103,14 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
   if ((file != nullptr) == !p.points_mm.empty())
     throw Error(ExitCode::usage, "give the tube's points by --points-mm or by --points FILE, not both");
   const std::vector<Vec3> points = file != nullptr ? load_points(file->path) : parse_points(p.points_mm);
-  const Tube tube = trace_tube(ct, points, p.tube, context);
+  // A tube of this name is not wider than any such structure is.
+  TubeParams params = p.tube;
+  const auto limits = structure_limits(p.name);
+  if (limits && limits->radius_mm > 0 && params.max_radius_mm > limits->radius_mm) {
+    params.max_radius_mm = limits->radius_mm;
+    context.report("max_radius_mm", params.max_radius_mm);
+  }
+  const Tube tube = trace_tube(ct, points, params, context);
   context.report("length_mm", rounded(tube.length_mm, 10));
   context.report("radius_mean_mm", rounded(tube.radius_mean_mm, 100));
   context.report("radius_min_mm", rounded(tube.radius_min_mm, 100));
@@ -115,7 +123,8 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
   }
   if (!unsure.empty()) {
     context.report("unsure_mm", unsure);
-    context.warn("not sure of the " + p.name + " from " + unsure + " mm: no walls are seen there");
+    context.warn("not sure of the " + p.name + " from " + unsure +
+                 " mm: walls are not seen there, or are as likely those of something else");
   }
   warn_of_detours(tube, points, context);
   std::string csv = "x_mm,y_mm,z_mm,radius_mm,along_mm,confidence\n";
@@ -124,7 +133,14 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
       csv += format_number(rounded(v, 1000)) + ",";
     csv += format_number(rounded(s.confidence, 100)) + "\n";
   }
-  return {with_colours(draw_tube(tube, ct.frame, p.name, onto)), Document{csv}};
+  Labels drawn = draw_tube(tube, ct.frame, p.name, onto);
+  double volume = 0;
+  for (const Structure& s : drawn.structures) {
+    if (s.name != p.name) continue;
+    for (const std::uint8_t v : drawn.span()) volume += v == s.value ? ct.frame.voxel_volume_mm3() : 0;
+  }
+  if (const std::string why = implausible_volume(p.name, volume); !why.empty()) context.warn(why);
+  return {with_colours(drawn), Document{csv}};
 }
 
 StageInfo FindStructuresStage::info() {

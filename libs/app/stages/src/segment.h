@@ -22,7 +22,9 @@ struct TubeStage {
     visit({"name", "what it is called in the label map; one of that name there is replaced"}, p.name);
     visit({"kind", "nerve: soft tissue in bone, or a strand in air; vessel: brighter than what is around it"},
           p.tube.kind);
-    visit({"max_radius_mm", "wider tubes are not looked for: 2.5 for nerves, 0.6 for the chorda tympani, 5 for vessels",
+    visit({"max_radius_mm",
+           "wider tubes are not looked for; a facial nerve is held to 1.5, a chorda tympani to 0.6, an alveolar "
+           "nerve to 2.5",
            "mm", 0.2, 5},
           p.tube.max_radius_mm);
     visit({"content_hu", "what fills a nerve's canal; the radius of thin ones goes by it", "HU", -200, 500},

@@ -171,6 +171,26 @@ void set_problem(DicomHeader& h, std::string_view code, std::string why) {
   h.problem = std::move(why);
 }
 
+/// What a way of compressing pixels is called that is not read; empty for all others.
+std::string_view unread_compression(std::string_view syntax) {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kUnread{{
+      {"1.2.840.10008.1.2.4.20", "HTJ2K (High-Throughput JPEG 2000)"},
+      {"1.2.840.10008.1.2.4.11", "JPEG XL"},
+      {"1.2.840.10008.1.2.4.10", "a video (MPEG, H.264, H.265)"},
+      {"1.2.840.10008.1.2.7.", "a video (SMPTE ST 2110)"},
+      {"1.2.840.10008.1.2.8.", "Deflated Image Frame Compression"},
+  }};
+  for (const auto& [begin, name] : kUnread)
+    if (syntax.starts_with(begin) && syntax.size() == begin.size() + 1) return name;
+  return {};
+}
+
+/// A number of the tag as it stands in the file when it has a decimal comma, which DICOM has not.
+std::string with_comma(vtkDICOMMetaData* meta, vtkDICOMTag tag) {
+  const std::string text = trimmed(meta->Get(tag).AsString());
+  return text.find(',') != std::string::npos ? text : std::string();
+}
+
 void judge(DicomHeader& h, bool has_pixels) {
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kOthers{{
       {"1.2.840.10008.1.3.10", "a DICOMDIR, the index of a medium"},
@@ -209,6 +229,8 @@ void judge(DicomHeader& h, bool has_pixels) {
   // A slice image whose SOP class says screen shot: its numbers are for the eye.
   if (h.sop_class.starts_with("1.2.840.10008.5.1.4.1.1.7"))
     return set_problem(h, code::not_an_image, "a secondary capture, not a scan");
+  if (const std::string_view name = unread_compression(h.transfer_syntax); !name.empty())
+    return set_problem(h, code::no_pixels, "its pixels are compressed as " + std::string(name) + ", which is not read");
   const std::uint64_t wanted = h.bytes_per_frame() * h.frames.size();
   if (!h.compressed && h.pixel_offset + wanted > h.file_bytes) {
     return set_problem(
@@ -305,6 +327,19 @@ bool parse(const fs::path& file, DicomHeader& h) {
   const int count = std::clamp(meta->Get(DC::NumberOfFrames).AsInt(), 1, 100000);
   if (h.samples == 1 && parser->GetPixelDataFound()) {
     for (int i = 0; i < count; ++i) h.frames.push_back(read_frame(meta, i));
+  }
+  // Said before judge() would say that the tag is missing.
+  for (const auto tag : {DC::ImagePositionPatient, DC::ImageOrientationPatient, DC::PixelSpacing, DC::RescaleSlope,
+                         DC::RescaleIntercept}) {
+    const std::string text = with_comma(meta, tag);
+    if (text.empty() || !parser->GetPixelDataFound()) continue;
+    const bool rescale = tag == DC::RescaleSlope || tag == DC::RescaleIntercept;
+    const std::string_view code = tag == DC::PixelSpacing           ? code::spacing_missing
+                                  : tag == DC::ImagePositionPatient ? code::position_missing
+                                  : rescale                         ? code::slope_invalid
+                                                                    : code::orientation_missing;
+    set_problem(h, code, "its numbers have a decimal comma where DICOM has a point ('" + text + "')");
+    break;
   }
   judge(h, parser->GetPixelDataFound());
   return true;

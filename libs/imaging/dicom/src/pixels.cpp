@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -22,6 +23,7 @@ constexpr double kSamePaddingHu = 8;
 // A padding tag that names a value above this names tissue.
 constexpr double kTissueFromHu = -900;
 constexpr std::int16_t kMetalHu = 3000;
+constexpr double kRingAboveHu = 1500;  // no corner of a picture of a head is as bright
 
 // The values of words: BitsStored bits up to HighBit, with their sign extended; what lies around them is no part of a
 // pixel, and a file need not extend the sign (PS3.5 8.1.1, C.7.6.3.1.2). Two errors of files are told from that by the
@@ -122,8 +124,12 @@ class Converter {
   template <class T>
   void run(const T* in, std::int16_t* out, std::size_t columns, std::size_t rows) {
     find_padding(in, columns * rows);
+    find_ring(in, columns, rows);
     if (count_.histogram.empty()) count_.histogram.assign(ValueCount::kBins, 0);
-    for (std::size_t y = 0; y < rows; ++y) row(in + y * columns, out + y * columns, columns, y % 4 == 0);
+    for (std::size_t y = 0; y < rows; ++y) {
+      ring_row_ = ring_.empty() ? nullptr : ring_.data() + y * columns;
+      row(in + y * columns, out + y * columns, columns, y % 4 == 0);
+    }
     count_.pixels += columns * rows;
   }
 
@@ -156,10 +162,39 @@ class Converter {
     }
   }
 
+  // Around the round picture of some scanners the corners hold one value brighter than bone, whether a tag names it or
+  // not. What of it hangs together with a corner is padding; a clip of metal of that value is not.
+  template <class T>
+  void find_ring(const T* in, std::size_t columns, std::size_t rows) {
+    ring_.clear();
+    if (columns < 2 || rows < 2) return;
+    const std::size_t n = columns * rows;
+    const std::array<std::size_t, 4> corners{0, columns - 1, n - columns, n - 1};
+    const T value = in[0];
+    if (hounsfield(static_cast<double>(value), f_) < kRingAboveHu) return;
+    for (const std::size_t c : corners)
+      if (in[c] != value) return;
+    ring_.assign(n, 0);
+    std::vector<std::size_t> open(corners.begin(), corners.end());
+    for (const std::size_t c : corners) ring_[c] = 1;
+    while (!open.empty()) {
+      const std::size_t at = open.back();
+      open.pop_back();
+      const std::size_t x = at % columns, y = at / columns;
+      const auto go = [&](bool there, std::size_t to) {
+        if (!there || ring_[to] != 0 || in[to] != value) return;
+        ring_[to] = 1;
+        open.push_back(to);
+      };
+      go(x > 0, at - 1), go(x + 1 < columns, at + 1), go(y > 0, at - columns), go(y + 1 < rows, at + columns);
+    }
+  }
+
   template <class T>
   void row(const T* in, std::int16_t* out, std::size_t n, bool sample) {
     std::int64_t lo = 1 << 30, hi = -(1 << 30);
     for (std::size_t i = 0; i < n; ++i) {
+      if (ring_row_ != nullptr && ring_row_[i] != 0) continue;
       const std::int64_t v = in[i];
       lo = std::min(lo, v);
       hi = std::max(hi, v);
@@ -168,7 +203,9 @@ class Converter {
     const bool whole = f_.slope == 1 && f_.intercept == std::floor(f_.intercept);
     const bool padded = pad_lo_ <= pad_hi_ && lo <= pad_hi_ && hi >= pad_lo_;
     const bool tissue = tissue_lo_ <= tissue_hi_ && lo <= tissue_hi_ && hi >= tissue_lo_;
-    if (whole && !padded && !tissue && lo > found_ && low >= kPaddingBelowHu && high <= 32767) {
+    if (ring_row_ != nullptr) {
+      careful_row(in, out, n);
+    } else if (whole && !padded && !tissue && lo > found_ && low >= kPaddingBelowHu && high <= 32767) {
       const auto shift = static_cast<int>(f_.intercept);
       for (std::size_t i = 0; i < n; ++i) out[i] = static_cast<std::int16_t>(static_cast<int>(in[i]) + shift);
       count_.hu_min = std::min(count_.hu_min, static_cast<std::int64_t>(low));
@@ -197,6 +234,12 @@ class Converter {
     for (std::size_t i = 0; i < n; ++i) {
       const std::int64_t stored = in[i];
       const double hu = hounsfield(static_cast<double>(stored), f_);
+      if (ring_row_ != nullptr && ring_row_[i] != 0) {
+        ++count_.ring;
+        count_.ring_hu = hu;
+        out[i] = kNoValue;
+        continue;
+      }
       if (stored >= pad_lo_ && stored <= pad_hi_) {
         ++count_.by_tag;
         count_.padding_hu = std::min(count_.padding_hu, hu);
@@ -220,6 +263,8 @@ class Converter {
   const DicomHeader& h_;
   const DicomFrame& f_;
   ValueCount& count_;
+  std::vector<std::uint8_t> ring_;          // of the picture: 1 where find_ring() found padding; empty without
+  const std::uint8_t* ring_row_ = nullptr;  // of the row that is converted
   std::int64_t pad_lo_ = 1, pad_hi_ = 0, tissue_lo_ = 1, tissue_hi_ = 0, top_ = 0;
   std::int64_t found_ =
       std::numeric_limits<std::int64_t>::min();  // stored values up to this are padding that no tag names
@@ -249,6 +294,8 @@ void ValueCount::add(const ValueCount& o) {
   pixels += o.pixels;
   by_tag += o.by_tag;
   found += o.found;
+  ring += o.ring;
+  ring_hu = std::max(ring_hu, o.ring_hu);
   declared_tissue += o.declared_tissue;
   out_of_range += o.out_of_range;
   saturated += o.saturated;

@@ -161,6 +161,19 @@ class StackChooser {
     return std::adjacent_find(sorted.begin(), sorted.end(), same_place) != sorted.end();
   }
 
+  /// How often each place is shown; 0 when not all are as often.
+  static std::size_t times_at_each_place(const std::vector<Candidate>& sorted) {
+    std::size_t times = 0;
+    for (std::size_t begin = 0; begin < sorted.size();) {
+      std::size_t end = begin + 1;
+      while (end < sorted.size() && same_place(sorted[begin], sorted[end])) ++end;
+      if (times != 0 && end - begin != times) return 0;
+      times = end - begin;
+      begin = end;
+    }
+    return times;
+  }
+
   // Leaves out what is there twice, then parts what does not belong together: acquisitions, times, tube voltages,
   // kinds, kernels and thicknesses that share places or take turns. A stack that still has two different slices at one
   // place comes back as it is; choose() refuses it.
@@ -264,9 +277,14 @@ class StackChooser {
 
   std::vector<Candidate> choose(std::vector<std::vector<Candidate>>& stacks) {
     if (stacks.empty()) return {};
+    // Of as many slices the finer pixels.
+    const auto fineness = [&](const std::vector<Candidate>& stack) {
+      const DicomFrame& f = frame_of(stack.front());
+      return -f.column_spacing_mm * f.row_spacing_mm;
+    };
     std::stable_sort(stacks.begin(), stacks.end(), [&](const auto& a, const auto& b) {
-      return std::tuple(a.size() > 1 && axial(a) && a.size() * 2 > b.size(), a.size()) >
-             std::tuple(b.size() > 1 && axial(b) && b.size() * 2 > a.size(), b.size());
+      return std::tuple(a.size() > 1 && axial(a) && a.size() * 2 > b.size(), a.size(), fineness(a)) >
+             std::tuple(b.size() > 1 && axial(b) && b.size() * 2 > a.size(), b.size(), fineness(b));
     });
     std::size_t volumes = 0;
     while (volumes < stacks.size() && stacks[volumes].size() > 1) ++volumes;
@@ -308,6 +326,14 @@ class StackChooser {
     if (has_conflict(chosen)) {
       const auto at = std::adjacent_find(chosen.begin(), chosen.end(), same_place);
       const bool all = same_place(chosen.front(), chosen.back());
+      if (const std::size_t times = all ? 0 : times_at_each_place(chosen); times > 1) {
+        const std::size_t places = chosen.size() / times;
+        verdict_.add(code::slices_at_one_place, Severity::error,
+                     "each of " + std::to_string(places) + " places is shown " + std::to_string(times) +
+                         " times with different pictures: a series over time, or of several phases",
+                     "export one of its times as a series of its own", {name_of(at[0]), name_of(at[1])});
+        return {};
+      }
       verdict_.add(
           all ? code::not_a_volume : code::slices_at_one_place, Severity::error,
           all ? "all " + std::to_string(chosen.size()) + " slices lie at one place ('" + name_of(chosen.front()) +

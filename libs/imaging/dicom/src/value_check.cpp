@@ -112,11 +112,11 @@ void tell_bits(Verdict& v, const ValueCount& count) {
 
 void tell_padding(Verdict& v, const ValueCount& count, double pixels) {
   ValueCheck& c = v.values;
-  c.padding_share = static_cast<double>(count.by_tag + count.found) / pixels;
+  c.padding_share = static_cast<double>(count.by_tag + count.found + count.ring) / pixels;
   c.padding_hu = count.padding_hu;
-  c.padding_source = count.by_tag > 0  ? (count.found > 0 ? "tag and found" : "tag")
-                     : count.found > 0 ? "found"
-                                       : "none";
+  c.padding_source = count.by_tag > 0               ? (count.found + count.ring > 0 ? "tag and found" : "tag")
+                     : count.found + count.ring > 0 ? "found"
+                                                    : "none";
   const std::string share = format_number(std::round(c.padding_share * 1000) / 10) + " % of the pixels";
   if (count.by_tag > 0)
     v.add(code::padding_tag, Severity::info,
@@ -126,6 +126,12 @@ void tell_padding(Verdict& v, const ValueCount& count, double pixels) {
           "values down to " + whole(c.padding_hu) + " HU" +
               (count.by_tag > 0 ? " besides those of the padding tag" : ", " + share + ", no tag names them") +
               ", are taken for padding and become air");
+  }
+  if (count.ring > 0) {
+    v.add(code::padding_found, Severity::info,
+          format_number(std::round(static_cast<double>(count.ring) / pixels * 1000) / 10) +
+              " % of the pixels hang together with the pictures' corners and hold one value (" + whole(count.ring_hu) +
+              " HU); they are taken for padding and become air");
   }
   if (static_cast<double>(count.declared_tissue) > 0.001 * pixels) {
     v.add(code::padding_tag_wrong, Severity::warning,

@@ -104,11 +104,11 @@ constexpr auto kTable = std::to_array<VerdictCode>({
      "left out"},
     {code::padding_tag, "info", Refuses::no, 0, "",
      "a value that marks \"not measured\", by tag, or by being shared by many pixels below -1200 HU and all "
-     "others",
+     "others, or by filling the corners of a picture above 1500 HU",
      "air, before interpolation"},
     {code::padding_found, "info", Refuses::no, 0, "",
      "a value that marks \"not measured\", by tag, or by being shared by many pixels below -1200 HU and all "
-     "others",
+     "others, or by filling the corners of a picture above 1500 HU",
      "air, before interpolation"},
     {code::below_air, "info, warning off the scale", Refuses::no, 0, "",
      "other values below -1200 HU: dark streaks beside metal, noise of sharp kernels", "kept"},

@@ -17,9 +17,12 @@ namespace reg = registration;
 
 constexpr double kLeastOverlap = 0.25, kMostInverseMm = 1, kManyOff = 1.3, kLike = 0.8;
 constexpr int kLeastEdges = 300;
-// Scans of one head meet to 0.03 to 0.1 mm at half of all edges; from here on a mirror is tried, and believed when it
-// halves that.
-constexpr double kDoubtMm = 0.15, kMirrorBetter = 0.5;
+// Thin slices of one head meet to 0.03 to 0.05 mm at half of all edges; from here on a mirror is tried, and believed
+// when it halves that. Trying it costs time and refuses no pair of one head: in a mirror that never fits better.
+constexpr double kDoubtMm = 0.06, kMirrorBetter = 0.5;
+// Of one head a tenth of all edges lies more than 0.07 (1 mm voxels) to 0.34 (5 mm slices) of the coarser scan's
+// spacing off; another head's do from here on.
+constexpr double kManyOffOfSpacing = 0.45, kManyOffLeastMm = 0.4;
 
 double extent_mm3(const Frame& f) {
   return f.voxel_volume_mm3() * static_cast<double>(f.voxel_count());
@@ -67,6 +70,13 @@ Image in_a_mirror(const Image& image) {
 
 std::string mm(double v) {
   return format_number(std::round(v * 100) / 100) + " mm";
+}
+
+// What a tenth of all edges may be off without a word.
+double many_off_mm(const RegisterParams& p, const Frame& first, const Frame& second) {
+  const auto coarsest = [](const Frame& f) { return std::max({f.spacing_mm.x, f.spacing_mm.y, f.spacing_mm.z}); };
+  const double own = kManyOffOfSpacing * std::max({coarsest(first), coarsest(second), p.finest_mm});
+  return std::min(kManyOff * p.max_residual_mm, std::max(kManyOffLeastMm, own));
 }
 
 // Empty when the two belong together.
@@ -140,7 +150,7 @@ Registration register_scans(const Image& first, const Image& second, const Regis
   if (seen) r.inverse_mm = there_and_back(r.second_from_first, back, first.frame, second.frame);
   context.progress(0.9, "residual");
   r.residual = reg::edge_residual(a, b, r.second_from_first, context);
-  if (seen && (r.residual.median_mm > kDoubtMm || r.residual.p90_mm > kManyOff * p.max_residual_mm)) {
+  if (seen && (r.residual.median_mm > kDoubtMm || r.residual.p90_mm > many_off_mm(p, first.frame, second.frame))) {
     context.progress(0.92, "in a mirror");
     const reg::Levels c = reg::make_levels(in_a_mirror(second), h, context);
     const reg::Match other =
@@ -170,7 +180,7 @@ Registration register_scans(const Image& first, const Image& second, const Regis
   }
   context.report("rotation_deg", r.rotation_deg);
   context.report("shift_at_centre_mm", r.shift_mm);
-  if (r.residual.p90_mm > kManyOff * p.max_residual_mm) {
+  if (r.residual.p90_mm > many_off_mm(p, first.frame, second.frame)) {
     context.warn("at a tenth of all edges the other scan's edge is " + mm(r.residual.p90_mm) +
                  " off or missing: drilled, swollen, a jaw or neck that moved, thick slices, or another patient; look "
                  "at --checkerboard-out");

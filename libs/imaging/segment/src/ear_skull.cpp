@@ -9,8 +9,9 @@ namespace osteo::inline imaging::segment {
 namespace {
 
 constexpr double kBrainBallMm = 7;  // wider than the sinus, the canals of nerves and the muscles between bone
-constexpr double kDuraMm = 2;       // labelled on the brain's side
-constexpr double kPlateMm = 4;      // of the tegmen, where no air ends it before
+constexpr double kAboveDrumMm = 8, kLeastBrainMm3 = 300;
+constexpr double kDuraMm = 2;   // labelled on the brain's side
+constexpr double kPlateMm = 4;  // of the tegmen, where no air ends it before
 
 /// Closing of a mask in the plane by a disc.
 Mask closed2(const Mask& m, int nx, int ny, double radius) {
@@ -30,6 +31,21 @@ Mask closed2(const Mask& m, int nx, int ny, double radius) {
     return to;
   };
   return grow(grow(m, 1), 0);
+}
+
+/// Which of the conditions fails: the image ends too low, nothing soft is there, or it is too small a part of a head.
+std::string why_no_brain(const Field& f, const Mask& soft, const Canal& canal) {
+  const double from = canal.drum_mm.z + kAboveDrumMm, to = f.world(0, 0, f.n[2] - 1).z;
+  const auto mm = [](double x) { return std::to_string(std::max(0, static_cast<int>(std::lround(x)))); };
+  if (to < from + kBrainBallMm)
+    return "the image ends " + mm(to - canal.drum_mm.z) + " mm above the ear canal's inner end, " +
+           mm(kAboveDrumMm + kBrainBallMm) + " mm are needed to tell the brain's side";
+  double volume = 0;
+  for (std::size_t i = 0; i < f.size(); ++i)
+    if (soft[i] != 0 && f.world(0, 0, f.place(i)[2]).z > from) volume += f.h_mm * f.h_mm * f.h_mm;
+  if (volume < kLeastBrainMm3) return "no soft tissue above the ear: a dry skull, or cropped away";
+  return "above the ear no soft tissue as wide as " + mm(2 * kBrainBallMm) +
+         " mm with bone outward of it lies within the image: too small a field, or the skull's outer side is cut off";
 }
 
 }  // namespace
@@ -55,7 +71,7 @@ Brain find_brain(const Field& f, const Levels& levels, const Canal& canal, const
       for (int i = f.n[0] - 1; i >= 0; --i) {
         const std::size_t at = f.at(i, j, k);
         bones += static_cast<double>(f.v[at]) > levels.bone_above ? 1 : 0;
-        if (pieces.of[at] == 0 || f.world(i, j, k).z < canal.drum_mm.z + 8) continue;
+        if (pieces.of[at] == 0 || f.world(i, j, k).z < canal.drum_mm.z + kAboveDrumMm) continue;
         high[pieces.of[at]] += 1;
         covered[pieces.of[at]] += bones * f.h_mm > 1 ? 1 : 0;
       }
@@ -64,11 +80,11 @@ Brain find_brain(const Field& f, const Levels& levels, const Canal& canal, const
   const double voxel = f.h_mm * f.h_mm * f.h_mm;
   std::vector<std::uint8_t> inside(pieces.size.size());
   for (std::size_t p = 1; p < inside.size(); ++p) {
-    inside[p] = high[p] * voxel > 300 && covered[p] > 0.8 * high[p] ? 1 : 0;
+    inside[p] = high[p] * voxel > kLeastBrainMm3 && covered[p] > 0.8 * high[p] ? 1 : 0;
     b.found = b.found || inside[p] != 0;
   }
   if (!b.found) {
-    b.why = "no soft tissue within the skull above the ear: cropped away, or a dry skull";
+    b.why = why_no_brain(f, soft, canal);
     return b;
   }
   for (std::size_t i = 0; i < n; ++i) core[i] = inside[pieces.of[i]];

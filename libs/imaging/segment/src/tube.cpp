@@ -40,9 +40,16 @@ std::vector<std::size_t> nearest_stations(const std::vector<Vec3>& line, std::sp
   return at;
 }
 
+/// What one section shows.
 struct Cross {
   Vec3 centre;
-  double radius = 0, confidence = 0;
+  double radius = 0;
+  double walls = 0;   ///< share of the directions in which a wall is met
+  double open = 1;    ///< the widest run of directions without one, as a share of the round
+  double rough = 1;   ///< of the walls about their circle, as a share of its radius
+  double filled = 0;  ///< how far the middle's value is from the content's to the wall's: 0 is content, below 0 air
+  double thin = 1;    ///< share of the walls that are lower than 0.6 of the usual one
+  double level = 0;   ///< of the wall above the content
 };
 
 /// What the CT shows across the line at a point.
@@ -143,6 +150,26 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
   const double wall = walls[walls.size() / 2];
   // A vessel's content is what its middle shows, which is too little when it is thin.
   const double content = nerve ? sign * params.content_hu : sign * middle;
+  {
+    double square = 0;
+    int low = 0, run = 0, widest = 0;
+    for (std::size_t q = 0; q < 2 * kRays; ++q) {
+      run = edges[q % kRays].met ? 0 : run + 1;
+      widest = std::max(widest, run);
+    }
+    for (std::size_t q = 0; q < kRays; ++q) {
+      if (!edges[q].met) continue;
+      const double a = 2 * std::numbers::pi * static_cast<double>(q) / kRays;
+      const double d = std::hypot(edges[q].distance * std::cos(a) - mx, edges[q].distance * std::sin(a) - my) - usual;
+      square += d * d;
+      low += edges[q].level - content < 0.6 * (wall - content) ? 1 : 0;
+    }
+    c.open = std::min(widest, kRays) / static_cast<double>(kRays);
+    c.rough = std::sqrt(square / std::max(1, met)) / std::max(0.2, usual);
+    c.thin = low / static_cast<double>(std::max(1, met));
+    c.level = wall - content;
+    c.filled = (sign * middle - content) / std::max(100.0, c.level);
+  }
   // From the mean of the rays, whose noise is less: the highest of a noisy ray is above its wall.
   std::vector<double> mean(static_cast<std::size_t>(n));
   double used = 0;
@@ -153,7 +180,10 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
     reached += static_cast<int>(std::lround(edges[q].wall / kRayStepMm));
     for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += sign * ray[q][i];
   }
-  if (used == 0) return {c.centre, usual, c.confidence};
+  if (used == 0) {
+    c.radius = usual;
+    return c;
+  }
   reached = static_cast<int>(reached / used) + 1;
   int top = 0;
   for (int i = 1; i <= std::min(reached, n - 1); ++i)
@@ -167,6 +197,79 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
   }
   c.radius = std::sqrt(std::max(0.0, area));
   return c;
+}
+
+// What a section shows and where it lies, as numbers of about 0 to 1.
+constexpr std::size_t kSigns = 16;
+using Signs = std::array<double, kSigns>;
+
+// How much each sign counts, by logistic regression: that a place lies in the nerve with its radius. Made on nerves by
+// seed (osteo_bench_segment shapes), judged on others: docs/structures.md has the curve.
+constexpr Signs kWeights{1.30,  2.12,  0.48,  -1.74, 0.01,  -2.01, -0.66, -1.06,
+                         -0.35, -4.87, -1.90, -1.04, -3.31, -1.69, -0.97, 2.16};
+
+/// Of each station the chance that it is right.
+std::vector<double> trust_along(const std::vector<Cross>& crosses, const std::vector<Vec3>& line,
+                                std::span<const Vec3> points, const std::vector<std::size_t>& given, double noise,
+                                const TubeParams& params) {
+  const std::size_t n = line.size();
+  std::vector<double> radii, trust(n);
+  double walls = 0;
+  for (const Cross& c : crosses) {
+    walls += c.walls / static_cast<double>(n);
+    if (c.walls >= 0.5) radii.push_back(c.radius);
+  }
+  std::sort(radii.begin(), radii.end());
+  const double usual = std::max(0.1, radii.empty() ? 0.5 * params.max_radius_mm : radii[radii.size() / 2]);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t a = i > 2 ? i - 2 : 0, b = std::min(i + 2, n - 1);
+    const auto mean = [&](const auto& of) {
+      double sum = 0;
+      for (std::size_t q = a; q <= b; ++q) sum += of(q);
+      return sum / static_cast<double>(b - a + 1);
+    };
+    const double radius = mean([&](std::size_t q) { return crosses[q].radius; });
+    const double spread = std::sqrt(mean([&](std::size_t q) {
+      const double d = crosses[q].radius - radius;
+      return d * d;
+    }));
+    const double met = mean([&](std::size_t q) { return crosses[q].walls; });
+    const double filled = std::clamp(mean([&](std::size_t q) { return crosses[q].filled; }), -1.0, 1.0);
+    double near = 1e9;  // along the line to a given point
+    std::size_t leg = 1;
+    for (std::size_t g = 0; g < given.size(); ++g) {
+      near = std::min(near, kStepMm * std::abs(static_cast<double>(given[g]) - static_cast<double>(i)));
+      if (g > 0 && i > given[g - 1]) leg = g;
+    }
+    const double way = kStepMm * static_cast<double>(given[leg] - given[leg - 1]);
+    const double longer = way / std::max(0.5, length(points[leg] - points[leg - 1])) - 1;
+    const std::size_t back = i > 4 ? i - 4 : 0, on = std::min(i + 4, n - 1);
+    const double bent =
+        1 - length(line[on] - line[back]) / (kStepMm * static_cast<double>(std::max<std::size_t>(1, on - back)));
+    const Signs x{
+        1,
+        met,
+        mean([&](std::size_t q) { return crosses[q].open; }),
+        mean([&](std::size_t q) { return std::min(crosses[q].rough, 1.0); }),
+        std::max(0.0, filled),
+        std::max(0.0, -filled),
+        mean([&](std::size_t q) { return crosses[q].thin; }),
+        std::min(1.0, mean([&](std::size_t q) { return crosses[q].level; }) / std::max(noise, 10.0) / 40),
+        std::min(1.0, mean([&](std::size_t q) { return length(crosses[q].centre - line[q]); }) / std::max(0.2, radius)),
+        std::max(0.0, radius / params.max_radius_mm - 0.7),
+        std::min(1.0, spread / std::max(0.2, radius)),
+        std::min(1.0, std::abs(std::log(std::max(0.1, radius) / usual))),
+        std::min(near, 8.0) / 8,
+        std::clamp(longer, 0.0, 2.0),
+        std::max(0.0, bent),
+        walls};
+    double sum = 0;
+    for (std::size_t s = 0; s < kSigns; ++s) sum += kWeights[s] * x[s];
+    trust[i] = 1 / (1 + std::exp(-sum));
+    // Where most of the round has no wall, the CT shows nothing to be sure by.
+    if (crosses[i].walls < 0.5 || met < 0.5) trust[i] = std::min(trust[i], 0.49);
+  }
+  return trust;
 }
 
 }  // namespace
@@ -218,9 +321,9 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
     std::vector<Vec3> moved(line);
     weight.assign(line.size(), 0.0);
     for (std::size_t i = 0; i < line.size(); ++i) {
-      if (crosses[i].confidence < 0.5) continue;
+      if (crosses[i].walls < 0.5) continue;
       moved[i] = crosses[i].centre;
-      weight[i] = crosses[i].confidence;
+      weight[i] = crosses[i].walls;
     }
     const auto given = nearest_stations(line, points_mm);
     for (std::size_t q = 0; q < given.size(); ++q) {
@@ -237,20 +340,30 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
     // Of radius and confidence the median of five neighbours: single sections mislead.
     std::vector<double> r, c;
     for (std::size_t q = i > 2 ? i - 2 : 0; q <= std::min(i + 2, n - 1); ++q) {
-      if (crosses[q].radius > 0) r.push_back(crosses[q].radius);
-      c.push_back(crosses[q].confidence);
+      if (crosses[q].radius > 0) r.push_back(std::min(crosses[q].radius, params.max_radius_mm));
+      c.push_back(crosses[q].walls);
     }
     std::sort(r.begin(), r.end());
     std::sort(c.begin(), c.end());
     const double arc = i == 0 ? 0 : tube.stations.back().arc_mm + length(line[i] - line[i - 1]);
-    tube.stations.push_back({line[i], arc, r.empty() ? 0 : r[r.size() / 2], c[c.size() / 2]});
+    tube.stations.push_back({line[i], arc, r.empty() ? 0 : r[r.size() / 2], 0, c[c.size() / 2]});
   }
-  // Without walls the radius is that of the nearest place that has some.
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t away = 1; tube.stations[i].radius_mm <= 0 && away < n; ++away) {
-      if (i >= away && crosses[i - away].radius > 0) tube.stations[i].radius_mm = crosses[i - away].radius;
-      if (i + away < n && crosses[i + away].radius > 0) tube.stations[i].radius_mm = crosses[i + away].radius;
-    }
+  const std::vector<double> trust =
+      trust_along(crosses, line, points_mm, nearest_stations(line, points_mm), noise, params);
+  for (std::size_t i = 0; i < n; ++i) tube.stations[i].confidence = trust[i];
+  // Where it is not sure the radius is that of the nearest place that is, or that has walls.
+  std::vector<std::size_t> good;
+  for (std::size_t i = 0; i < n; ++i)
+    if (trust[i] >= 0.5 && tube.stations[i].radius_mm > 0) good.push_back(i);
+  for (std::size_t i = 0; i < n && good.empty(); ++i)
+    if (tube.stations[i].radius_mm > 0) good.push_back(i);
+  const std::vector<TubeStation> own = tube.stations;
+  for (std::size_t i = 0; i < n && !good.empty(); ++i) {
+    const auto after = std::lower_bound(good.begin(), good.end(), i);
+    std::size_t from = after != good.end() ? *after : good.back();
+    if (after != good.begin() && i - *(after - 1) <= (from > i ? from - i : i - from)) from = *(after - 1);
+    if (after != good.end() && *after == i) from = i;
+    tube.stations[i].radius_mm = own[from].radius_mm;
   }
   tube.length_mm = tube.stations.back().arc_mm;
   std::vector<bool> given(n);
@@ -258,24 +371,30 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
   double sure = 0;
   tube.radius_min_mm = 1e9;
   double worst = 0, since = 0;  // without walls and without a given point
+  std::vector<std::array<double, 2>> open_mm;
   for (std::size_t i = 0; i < n; ++i) {
     const TubeStation& t = tube.stations[i];
     tube.confidence += t.confidence / static_cast<double>(n);
-    if (t.confidence >= 0.5) {
+    if (t.confidence < 0.5) {
+      const bool goes_on = i > 0 && tube.stations[i - 1].confidence < 0.5;
+      if (!goes_on) tube.unsure_mm.push_back({t.arc_mm, t.arc_mm});
+      tube.unsure_mm.back()[1] = t.arc_mm;
+    }
+    if (t.walls >= 0.5) {
       sure += 1;
       tube.radius_mean_mm += t.radius_mm;
       tube.radius_min_mm = std::min(tube.radius_min_mm, t.radius_mm);
       tube.radius_max_mm = std::max(tube.radius_max_mm, t.radius_mm);
       continue;
     }
-    const bool goes_on = i > 0 && tube.stations[i - 1].confidence < 0.5;
-    if (!goes_on) tube.unsure_mm.push_back({t.arc_mm, t.arc_mm});
+    const bool goes_on = i > 0 && tube.stations[i - 1].walls < 0.5;
+    if (!goes_on) open_mm.push_back({t.arc_mm, t.arc_mm});
     if (!goes_on || given[i]) since = t.arc_mm;
-    tube.unsure_mm.back()[1] = t.arc_mm;
+    open_mm.back()[1] = t.arc_mm;
     worst = std::max(worst, t.arc_mm - since);
   }
   if (worst > params.max_unsure_mm || sure < 0.25 * static_cast<double>(n)) {
-    const auto bad = std::max_element(tube.unsure_mm.begin(), tube.unsure_mm.end(),
+    const auto bad = std::max_element(open_mm.begin(), open_mm.end(),
                                       [](const auto& a, const auto& b) { return a[1] - a[0] < b[1] - b[0]; });
     const auto mm = [](double x) { return format_number(std::round(x * 10) / 10); };
     throw Error(ExitCode::failed,

@@ -34,7 +34,9 @@ struct TubeStation {
   Vec3 at_mm;
   double arc_mm = 0;      ///< from the first given point
   double radius_mm = 0;   ///< of the circle of equal area
-  double confidence = 0;  ///< 0 to 1: the share of directions across the tube in which its wall is met
+  double confidence = 0;  ///< 0 to 1: the chance that the place lies within the nerve and the radius is right to half a
+                          ///< millimetre; below 0.5 where fewer than half of the directions across it meet a wall
+  double walls = 0;       ///< share of the directions across the tube in which its wall is met
 };
 
 struct Tube {
@@ -48,11 +50,13 @@ struct Tube {
 /// across some direction the CT curves like a tube of up to max_radius_mm: lines by the second derivatives at five
 /// scales, the way by A*. Then the line is moved to the middle of the walls that 24 rays meet across it (edges half-way
 /// up, circle by least squares), five times, smoothed over 0.4 mm. Where no walls are met a spline bridges, through the
-/// given points: the CT shows nothing there, and `unsure_mm` says so. The radius is that of what is missing from the
-/// wall's level, which the scanner's blur does not change. O(volume around the points). Errors: usage for fewer than
-/// two points or a point outside; failed when a stretch longer than max_unsure_mm has no walls, or three quarters of
-/// the line: the points are not joined by a tube. Y. Sato et al., Three-dimensional multi-scale line filter, Med. Image
-/// Anal. 1998; half-way edges: S. Prevrhal et al. 1999.
+/// given points: the CT shows nothing there. The radius is that of what is missing from the wall's level, which the
+/// scanner's blur does not change, at most max_radius_mm, and where it is not sure that of the nearest place that is.
+/// Confidence comes from walls, roundness, evenness along the line and the way's length by weights that were fitted on
+/// nerves whose truth is known; docs/structures.md has how often it is true. Vessels were not among them. O(volume
+/// around the points). Errors: usage for fewer than two points or a point outside; failed when a stretch longer than
+/// max_unsure_mm has no walls, or three quarters of the line: the points are not joined by a tube. Y. Sato et al.,
+/// Three-dimensional multi-scale line filter, Med. Image Anal. 1998; half-way edges: S. Prevrhal et al. 1999.
 [[nodiscard]] Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubeParams& params,
                               const Context& context = {});
 
