@@ -14,6 +14,7 @@
 #include "osteo/network/tutor/live_run.h"
 #include "osteo/network/tutor/playback.h"
 #include "osteo/session/recording/script.h"
+#include "tutor/firm_hand.h"
 #include "tutor/live_pair.h"
 
 namespace osteo {
@@ -99,6 +100,30 @@ void live_row(double rtt_ms, double loss, bool two_way) {
   std::fflush(stdout);
 }
 
+// Grips of who is led, at 12 mm/s, 25 +- 5 ms each way, one in twenty lost, by the brake of both hands.
+void grip_row(double grip_n_per_m, double brake_n_s_per_m) {
+  test::LiveParams p;
+  p.faults = {20, 10, 0.05, 0.01};
+  p.brake = brake_n_s_per_m;
+  p.stiffness_n_per_mm = delayed_stiffness_n_per_mm(brake_n_s_per_m + 1, kFarMassKg, 1e9);
+  test::LivePair pair(p);
+  std::vector<double> apart;
+  Vec3 place{-5, 0, 9};
+  for (int t = 0; t < 12000; ++t) {
+    const double at = t * 1e-3;
+    pair.host_hand_.device().set_hand(
+        {}, {-6 * std::cos(2 * M_PI * at / 3.3), 2 * std::sin(2 * M_PI * at / 3.1), at < 0.3 ? 9.0 - 15 * at : 4.6},
+        0.6);
+    place += (pair.guest_hand_.device().position_mm() - place) * 0.01;
+    pair.guest_hand_.device().set_hand({}, place, grip_n_per_m / 1000);
+    pair.step();
+    if (t > 1500) apart.push_back(pair.apart_mm());
+  }
+  std::printf("| %.0f N/m | %.0f N s/m, %.2f N/mm | %.2f, %.2f, %.2f |\n", grip_n_per_m, brake_n_s_per_m,
+              p.stiffness_n_per_mm, quantile(apart, 0.5), quantile(apart, 0.95), quantile(apart, 1));
+  std::fflush(stdout);
+}
+
 // The groove of the unit test in `seconds`, played back.
 void playback_row(const std::filesystem::path& folder, double seconds, double stiffness, PlaybackMode mode, Pace pace,
                   double leash_mm) {
@@ -144,6 +169,52 @@ void playback_row(const std::filesystem::path& folder, double seconds, double st
               pace == Pace::clock ? "clock" : "way, leash", pace == Pace::clock ? 0 : leash_mm, f.rms_mm, f.p95_mm,
               f.most_mm, static_cast<double>(sum.ticks - playback->begun) / 1000, f.most_pull_n, f.most_work_mj);
   std::fflush(stdout);
+}
+
+// A lesson that presses, on arms that are not alike.
+void arm_rows(const std::filesystem::path& folder, double press_n) {
+  const auto expert = folder / "firm.oss", led = folder / "firm_led.oss";
+  std::filesystem::remove(expert);
+  RehearsalOptions o;
+  o.follow.surface = false;
+  o.session_file = expert;
+  auto firm = std::make_unique<test::FirmHand>(press_n, 3.6);
+  o.haptics.device = firm->traits();
+  static_cast<void>(Rehearsal(World(test::bar(0.5, 0.3)), std::move(firm), o, {}).run_to_end({}));
+  const auto lesson = std::make_shared<Lesson>(read_lesson(SessionReader(expert), 0, 0));
+  double most_n = 0;
+  const Session recorded = read_session(expert);
+  for (const TickRecord& t : recorded.ticks) most_n = std::max(most_n, length(from_floats(t.force_n)));
+  for (const test::Arm& arm : test::kArms) {
+    for (const PlaybackMode mode : {PlaybackMode::show, PlaybackMode::guide}) {
+      double rms = 0, p95 = 0, most = 0, pull = 0, work = 0;
+      for (const double grip : {100.0, 250.0, 500.0}) {
+        std::filesystem::remove(led);
+        PlaybackParams params;
+        params.mode = mode;
+        auto playback = std::make_shared<Playback>(lesson, params);
+        playback->patience_s = 20;
+        RehearsalOptions l;
+        l.follow.surface = false;
+        l.session_file = led;
+        auto devices =
+            playback_devices(std::make_unique<FollowingHand>(
+                                 grip, from_floats(lesson->hands.front().front().position_mm), playback, arm.params),
+                             playback, l.haptics);
+        l.actions = playback_actions(*playback);
+        static_cast<void>(Rehearsal(World(test::bar(0.5, 0.3)), std::move(devices), l, {}).run_to_end({}));
+        const GuidedFacts f = measure_guided(SessionReader(led), playback->begun);
+        rms = std::max(rms, f.rms_mm);
+        p95 = std::max(p95, f.p95_mm);
+        most = std::max(most, f.most_mm);
+        pull = std::max(pull, f.most_pull_n);
+        work = std::max(work, f.most_work_mj);
+      }
+      std::printf("| %.1f N | %s | %s | %.2f, %.2f, %.2f mm | %.2f N | %.1f mJ |\n", most_n, arm.name,
+                  mode == PlaybackMode::show ? "show" : "guide", rms, p95, most, pull, work);
+      std::fflush(stdout);
+    }
+  }
 }
 
 void flood_row(double packets_a_s, double seconds) {
@@ -225,6 +296,10 @@ void bench_tutoring(const Context&) {
       for (const bool two_way : {false, true}) live_row(rtt, loss, two_way);
     }
   }
+  std::printf("\n## Grips at an RTT of 50 ms\n\n| grip | brake, spring | apart p50, p95, most mm |\n|---|---|---|\n");
+  for (const double grip : {100.0, 250.0, 500.0}) {
+    for (const double brake : {12.0, kFarBrake}) grip_row(grip, brake);
+  }
   std::printf(
       "\n## Playback\n\n| groove | grip | mode, time | RMS mm | 95 %% | most | took | most pull | most work "
       "|\n|---|---|---|---|---|---|---|---|---|\n");
@@ -237,6 +312,11 @@ void bench_tutoring(const Context&) {
       }
     }
   }
+  std::printf(
+      "\n## Playback of a lesson that presses, worst of three grips\n\n| most of the lesson | arm | mode | RMS, 95 %%, "
+      "most "
+      "| most pull | most work |\n|---|---|---|---|---|---|\n");
+  for (const double press_n : {2.0, 5.0, 9.6}) arm_rows(folder.path(), press_n);
   std::printf(
       "\n## A flood\n\n| packets/s asked | sent | servo late p50, p99, p99.9 us | work p50, p99.9 us | memory | "
       "refused "

@@ -152,6 +152,89 @@ TEST(Readers, JoinAndLeaveAThousandTimesWhileOthersLoseNothing) {
   EXPECT_EQ(again.bone_hash, s.bone_hash);
 }
 
+// A picture that takes longer than a ring lasts: surfaces catch up, and undo, counts and summary are as without it.
+TEST(Readers, APictureOfManySecondsTakesNoUndoAway) {
+  class Counter final : public Reader {
+   public:
+    void tick(const TickRecord& record, std::span<const VoxelChange>) override {
+      removed_mm3 += static_cast<double>(record.removed_mm3);
+    }
+    double removed_mm3 = 0;
+  };
+  const std::string whole = test::bar(0.5, 0.2).hash();
+  for (const int hands : {1, 2}) {
+    const double rate = 36000.0 / hands;  // so that a third of a second is more than the ring holds
+    const auto bone_after = [&](bool slow, int undos) {
+      RehearsalOptions o;
+      o.rate_hz = rate;
+      o.haptics.device = SpringHand::traits();
+      std::vector<std::unique_ptr<Device>> devices;
+      for (int h = 0; h < hands; ++h) {
+        Script hole = holes(1);
+        for (auto& w : hole.waypoints) {
+          w.t_s /= 3;
+          w.at_mm.x += 12.0 * h;
+        }
+        devices.push_back(std::make_unique<ScriptedDevice>(hole, rate));
+        if (h > 0) o.haptics.more_devices.push_back(SpringHand::traits());
+      }
+      Rehearsal r(World(test::bar(0.5, 0.2)), std::move(devices), o, {});
+      Counter counter;
+      r.add_counter(counter);
+      if (slow) {
+        r.start();
+        r.look([&](const World&, SceneReaders&) {
+          while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        });
+      }
+      for (int n = 0; n < undos; ++n) r.act(kUndo);
+      const RehearsalSummary s = slow ? r.stop() : r.run_to_end({});
+      EXPECT_EQ(s.ticks_not_followed > 1000, slow) << s.ticks_not_followed << " of " << s.ticks;
+      EXPECT_FALSE(s.refused());
+      EXPECT_TRUE(s.warnings.empty());
+      EXPECT_EQ(r.trouble(), "");
+      EXPECT_NEAR(counter.removed_mm3, s.removed_mm3, 1e-9);
+      EXPECT_GT(s.removed_mm3, 0.1);
+      return s.bone_hash;
+    };
+    EXPECT_NE(bone_after(false, 0), whole);
+    EXPECT_EQ(bone_after(false, 1), whole);
+    EXPECT_EQ(bone_after(true, 1), whole);
+  }
+}
+
+// The keeper itself kept from its work for longer than its ring lasts, which nothing but a machine at its end does.
+TEST(Readers, WhereStrokesAreLostAllTheSameItIsTold) {
+  class Sleeper final : public Reader {
+   public:
+    void tick(const TickRecord&, std::span<const VoxelChange>) override {
+      while (rehearsal->running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    Rehearsal* rehearsal = nullptr;
+  };
+  RehearsalOptions o;
+  o.rate_hz = 12000;
+  o.haptics.device = SpringHand::traits();
+  std::vector<std::unique_ptr<Device>> devices;
+  for (int h = 0; h < 4; ++h) {  // so that the ring is full soon
+    devices.push_back(std::make_unique<ScriptedDevice>(test::holes(1, -10.0 + 4 * h, 4.6), o.rate_hz));
+    if (h > 0) o.haptics.more_devices.push_back(SpringHand::traits());
+  }
+  Rehearsal r(World(test::bar(0.5, 0.2)), std::move(devices), o, {});
+  Sleeper sleeper;
+  sleeper.rehearsal = &r;
+  r.add_counter(sleeper);
+  r.start();
+  while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  r.act(kUndo);
+  const RehearsalSummary s = r.stop();
+  EXPECT_NE(r.trouble().find("undo history lost"), std::string::npos);
+  ASSERT_EQ(s.warnings.size(), 1u);
+  EXPECT_EQ(s.warnings.front(), r.trouble());
+  ASSERT_TRUE(s.refused());
+  EXPECT_NE(s.bone_hash, test::bar(0.5, 0.2).hash()) << "nothing else was taken back in its place";
+}
+
 // A reader that joins behind a split, with a sucker at work: it is right from there on.
 TEST(Readers, ALateReaderIsRightFromThereOn) {
   World world(test::bar(0.5, 0.2));

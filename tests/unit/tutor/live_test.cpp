@@ -4,7 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <vector>
 
 #include "live_pair.h"
 
@@ -16,33 +19,37 @@ using test::LiveParams;
 
 // The instructor strokes along the bar; the guest has no will but a soft grip that gives way.
 struct Stroke {
-  double rms_mm = 0, most_mm = 0;
+  double rms_mm = 0, p95_mm = 0, most_mm = 0;
   bool same_bone = false;
   std::uint64_t differs = 0;
   double changed = 0;
 };
-Stroke stroke(const LiveParams& p) {
+Stroke stroke(const LiveParams& p, double grip_n_per_mm = 0.1, double round_s = 2.4) {
   LivePair pair(p);
   Stroke s;
   double squares = 0;
   int n = 0;
+  std::vector<double> apart;
   Vec3 place{-5, 0, 9};
   for (int t = 0; t < p.seconds * 1000; ++t) {
     const double at = t * 1e-3;
     // 12 mm there and back in 2.4 s, pressing into the bar: 16 mm/s at most.
     pair.host_hand_.device().set_hand(
-        {}, {-6 * std::cos(2 * M_PI * at / 2.4), 2 * std::sin(2 * M_PI * at / 3.1), at < 0.3 ? 9.0 - 15 * at : 4.6},
+        {}, {-6 * std::cos(2 * M_PI * at / round_s), 2 * std::sin(2 * M_PI * at / 3.1), at < 0.3 ? 9.0 - 15 * at : 4.6},
         0.6);
     place += (pair.guest_hand_.device().position_mm() - place) * 0.01;
-    pair.guest_hand_.device().set_hand({}, place, 0.1);
+    pair.guest_hand_.device().set_hand({}, place, grip_n_per_mm);
     pair.step();
     if (t > 1500) {
+      apart.push_back(pair.apart_mm());
       squares += pair.apart_mm() * pair.apart_mm();
       s.most_mm = std::max(s.most_mm, pair.apart_mm());
       ++n;
     }
   }
   s.rms_mm = std::sqrt(squares / n);
+  std::sort(apart.begin(), apart.end());
+  s.p95_mm = apart[apart.size() * 95 / 100];
   pair.settle();
   s.same_bone = pair.operation_->world().hash() == pair.copy_->bone_hash() && pair.copy_->mark() == pair.host_->mark();
   s.differs = pair.guest_->differs();
@@ -60,6 +67,21 @@ TEST(Live, HandsStayTogetherAndBoneIsTheSameOverABadNetwork) {
     EXPECT_TRUE(s.same_bone) << rtt;
     EXPECT_EQ(s.differs, 0U);
     EXPECT_GT(s.changed, 5);
+  }
+}
+
+// Grips from soft to firm at 12 mm/s, 25 +- 5 ms each way, one packet in twenty lost: two millimetres are kept.
+TEST(Live, GripsThatResistStayWithinTwoMillimetres) {
+  for (const double grip : {0.1, 0.25}) {
+    LiveParams p;
+    p.faults = {20, 10, 0.05, 0.01};
+    p.seconds = 5;
+    const Stroke s = stroke(p, grip, 3.3);
+    std::printf("grip %.0f N/m: apart RMS %.2f, 95 %% %.2f, most %.2f mm\n", 1000 * grip, s.rms_mm, s.p95_mm,
+                s.most_mm);
+    EXPECT_LT(s.p95_mm, 1.8) << grip;
+    EXPECT_LT(s.most_mm, 2) << grip;
+    EXPECT_TRUE(s.same_bone);
   }
 }
 
@@ -167,7 +189,7 @@ TEST(Live, TheSpringThatIsStableForEveryDelay) {
   // B = 5, m = 0.1: 125 N/m always; B / 2 tau at 10 ms: 250.
   EXPECT_NEAR(delayed_stiffness_n_per_mm(5, 0.1, 1), 0.125, 1e-9);
   EXPECT_NEAR(delayed_stiffness_n_per_mm(5, 0.1, 0.01), 0.25, 1e-9);
-  EXPECT_LE(far_guide(0, 1, {.damping_n_s_per_m = 21}, 10, 6).stiffness_n_per_mm, 17.0 * 17 / 0.5 / 1000);
+  EXPECT_LE(far_guide(0, 1, {.damping_n_s_per_m = 21}, 10, 6).stiffness_n_per_mm, 23.0 * 23 / 0.5 / 1000);
 }
 
 TEST(Playout, PlaysEvenlyWhatComesUnevenly) {
@@ -198,6 +220,24 @@ TEST(Playout, PlaysEvenlyWhatComesUnevenly) {
   EXPECT_EQ(backwards, 0U);
   EXPECT_LT(jumps, 20U);
   EXPECT_NEAR(playout.buffer_ticks(), 29, 3);
+}
+
+// A machine that is busy for a moment: the pull comes back as it went, not within half a second.
+TEST(Playout, AMomentOfSilenceTakesThePullForAMomentOnly) {
+  const auto ticks_below = [](std::uint64_t silent) {
+    Playout playout;
+    int below = 0;
+    for (std::uint64_t t = 0; t < 3000; ++t) {
+      if (t % 4 == 0 && (t < 1000 || t >= 1000 + silent)) playout.put({t, {}}, t, true);
+      const DeviceSample s = playout.read(t);
+      if (t >= 1000) below += (s.buttons & kLeadStrength) < kLeadStrength ? 1 : 0;
+    }
+    return below;
+  };
+  EXPECT_EQ(ticks_below(16), 0);
+  EXPECT_NEAR(ticks_below(36), 36 - 20 + 16, 10);
+  EXPECT_NEAR(ticks_below(100), 100 - 20 + 30, 10);
+  EXPECT_GT(ticks_below(400), 400 - 20 + 400) << "who was away is led softly again";
 }
 
 }  // namespace

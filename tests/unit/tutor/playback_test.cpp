@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 
 #include "bar.h"
+#include "firm_hand.h"
 #include "osteo/core/base/error.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/simulation/bone/instrument.h"
@@ -47,15 +49,15 @@ struct Played {
 };
 
 Played play(const fs::path& expert, const PlaybackParams& params, double hand_n_per_m, const fs::path& file,
-            Vec3 off = {0, 0, 2}) {
+            Vec3 off = {0, 0, 2}, const SimulatedDeviceParams& arm = {}) {
   const SessionReader session(expert);
   auto playback = std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(session, 0, 0)), params);
   const DeviceSample& first = playback->lesson->hands.front().front();
   RehearsalOptions o;
   o.session_file = file;
-  auto devices =
-      playback_devices(std::make_unique<FollowingHand>(hand_n_per_m, from_floats(first.position_mm) + off, playback),
-                       playback, o.haptics);
+  auto devices = playback_devices(
+      std::make_unique<FollowingHand>(hand_n_per_m, from_floats(first.position_mm) + off, playback, arm), playback,
+      o.haptics);
   o.actions = playback_actions(*playback);
   Rehearsal r(bar(), std::move(devices), o, {});
   Played p{r.run_to_end({}), {}, playback};
@@ -90,6 +92,102 @@ TEST_F(Playbacks, HandsOfThreeStiffnessesFollowWithinAMillimetre) {
                 8);  // what it takes to carry the hand along, and no more: twice as much would be swinging
       EXPECT_EQ(p.summary.bone_hash, bone);  // to the bit, though another hand was there
       EXPECT_TRUE(replays(file));
+    }
+  }
+}
+
+fs::path press(double press_n, double seconds, const fs::path& file) {
+  RehearsalOptions o;
+  o.session_file = file;
+  auto hand = std::make_unique<test::FirmHand>(press_n, seconds);
+  o.haptics.device = hand->traits();
+  Rehearsal(bar(), std::move(hand), o, {}).run_to_end({});
+  return file;
+}
+
+// In the mode that is the default a lesson of many newtons carries no hand off, whatever it holds. Guided, the
+// learner's own bone pushes him out where the expert pressed into it.
+TEST_F(Playbacks, ALessonOfEightNewtonsCarriesNoArmAway) {
+  const fs::path firm = press(9.6, 2.6, at / "firm.oss");
+  double most_n = 0;
+  const Session recorded = read_session(firm);
+  for (const TickRecord& t : recorded.ticks) most_n = std::max(most_n, length(from_floats(t.force_n)));
+  EXPECT_GT(most_n, 7.8);
+  std::printf("presses with %.1f N\n", most_n);
+  for (const test::Arm& arm : test::kArms) {
+    for (const PlaybackMode mode : {PlaybackMode::show, PlaybackMode::guide}) {
+      PlaybackParams params;
+      params.mode = mode;
+      const bool shown = mode == PlaybackMode::show;
+      const Played p = play(firm, params, 250, at / ("led" + std::to_string(arm.params.mass_kg) + (shown ? "s" : "g")),
+                            {0, 0, 2}, arm.params);
+      std::printf("%s, %s: RMS %.2f, 95 %% %.2f, most %.2f mm, pull %.2f N, work %.1f, most %.1f mJ\n",
+                  shown ? "show" : "guide", arm.name, p.facts.rms_mm, p.facts.p95_mm, p.facts.most_mm,
+                  p.facts.most_pull_n, p.facts.work_mj, p.facts.most_work_mj);
+      EXPECT_TRUE(p.playback->over);
+      EXPECT_FALSE(p.playback->given_up);
+      EXPECT_LT(p.facts.rms_mm, shown ? 0.5 : 1.5);
+      EXPECT_LT(p.facts.p95_mm, shown ? 0.7 : 2);
+      EXPECT_LE(p.facts.most_pull_n, params.most_n);
+      EXPECT_LT(p.facts.most_work_mj, 4);
+    }
+  }
+}
+
+// Whoever is held off farther than the leash: in every mode that leads time stops, nothing of the expert's force is
+// left, and what pulls back is no more than it may be; by the clock too. Then let go: no arm swings up.
+TEST_F(Playbacks, BeyondTheLeashEveryModeStopsAndNoArmGainsEnergy) {
+  const fs::path firm = press(9.6, 2.6, at / "firm.oss");
+  const auto lesson = std::make_shared<Lesson>(read_lesson(SessionReader(firm), 0, 0));
+  for (const test::Arm& arm : test::kArms) {
+    for (const PlaybackMode mode : {PlaybackMode::show, PlaybackMode::guide, PlaybackMode::fading}) {
+      for (const Pace pace : {Pace::clock, Pace::way}) {
+        PlaybackParams params;
+        params.mode = mode;
+        params.pace = pace;
+        params.ramp_s = 0.2;
+        auto playback = std::make_shared<Playback>(lesson, params);
+        RehearsalOptions o;
+        auto hand = std::make_unique<FollowingHand>(100, from_floats(lesson->hands.front().front().position_mm),
+                                                    playback, arm.params);
+        FollowingHand* const held = hand.get();
+        auto devices = playback_devices(std::move(hand), playback, o.haptics);
+        std::vector<Device*> all;
+        for (auto& d : devices) all.push_back(d.get());
+        Stream stream;
+        StreamReader& out = stream.add_reader(1 << 14, 1 << 20);
+        Operation operation(bar(), o.haptics, {}, all, stream, 1000);
+        operation.act(playback_actions(*playback).front());
+        const auto run = [&](int ticks) {
+          double most_n = 0;
+          std::array<TickRecord, 2> t;
+          for (int n = 0; n < ticks; ++n) {
+            operation.step(0);
+            while (out.ticks.pop(t) == 2) most_n = std::max(most_n, length(from_floats(t[0].force_n)));
+          }
+          return most_n;
+        };
+        const auto energy_mj = [&] {
+          return 0.5 * arm.params.mass_kg * dot(held->velocity_mm_s(), held->velocity_mm_s()) / 1000;
+        };
+        run(1400);
+        ASSERT_TRUE(playback->clock.started());
+        held->push_n = {0, 0, 6};  // away, off the bone
+        run(700);
+        const std::size_t then = playback->clock.sample();
+        EXPECT_GT(length(playback->hand_mm - playback->clock.target_mm()), params.leash_mm);
+        EXPECT_LE(run(200), params.most_n + 0.1);
+        EXPECT_LE(playback->clock.sample(), then) << "time goes on without the hand";
+        held->push_n = {};
+        playback->on = false;  // nothing but what is stored
+        double most = 0;
+        for (int n = 0; n < 200; ++n) {
+          run(1);
+          most = std::max(most, energy_mj());
+        }
+        run(1300);
+        EXPECT_LT(energy_mj(), 0.02 * std::max(most, 0.05)) << arm.name << static_cast<int>(mode);
+      }
     }
   }
 }

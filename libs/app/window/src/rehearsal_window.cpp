@@ -51,7 +51,7 @@ RehearsalWindow::~RehearsalWindow() {
   if (actions_.rehearsal() != nullptr) hints_.leave();
   // The session is the caller's to save, and goes on until then.
   if (Rehearsal* const rehearsal = actions_.rehearsal(); rehearsal != nullptr && work_)
-    rehearsal->remove_reader(*work_);
+    rehearsal->remove_counter(*work_);
   cuts_.release();
   structures_.reset();
   regions_.reset();
@@ -121,7 +121,7 @@ void RehearsalWindow::show_bone(Rehearsal& rehearsal) {
   before_view_.reset();
   room_.renew();
   work_ = std::make_unique<WorkDone>();  // the session that the last one followed is over
-  rehearsal.add_reader(*work_);
+  rehearsal.add_counter(*work_);
   hints_.follow(rehearsal);
   ended_.reset();
 }

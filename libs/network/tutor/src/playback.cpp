@@ -200,15 +200,16 @@ std::vector<SceneAction> playback_actions(const Playback& playback) {
   return all;
 }
 
-FollowingHand::FollowingHand(double stiffness_n_per_m, Vec3 start_mm, std::shared_ptr<const Playback> playback)
-    : device_(SimulatedDeviceParams{}, start_mm),
+FollowingHand::FollowingHand(double stiffness_n_per_m, Vec3 start_mm, std::shared_ptr<const Playback> playback,
+                             const SimulatedDeviceParams& arm)
+    : device_(arm, start_mm),
       stiffness_n_per_mm_(stiffness_n_per_m / 1000),
       place_(start_mm),
       playback_(std::move(playback)) {}
 
 DeviceSample FollowingHand::read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept {
   place_ += (device_.position_mm() - place_) * (dt_s / kYieldS);
-  device_.set_hand({}, place_, stiffness_n_per_mm_);
+  device_.set_hand(push_n, place_, stiffness_n_per_mm_);
   DeviceSample sample = device_.read(tick, dt_s, force_n);
   const DeviceSample& recorded = playback_->lesson->hands.front()[playback_->clock.sample()];
   sample.tool = recorded.tool;

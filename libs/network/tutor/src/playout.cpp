@@ -87,11 +87,15 @@ DeviceSample Playout::read(std::uint64_t now, bool pulls) noexcept {
   }
   const std::uint64_t silent = now > last_heard_ ? now - last_heard_ : 0;
   strength_ = pulls ? std::min(1.0, strength_ + 1.0 / kRampTicks) : std::max(0.0, strength_ - 1.0 / kFadeTicks);
-  if (silent > kSilenceTicks)
-    strength_ = std::min(strength_, std::max(0.0, 1 - static_cast<double>(silent - kSilenceTicks) / kFadeTicks));
+  // What a moment of silence takes comes back as it went; a hand that is led by half for as long as a ramp is far off.
+  heard_ = silent > kSilenceTicks
+               ? std::min(heard_, std::max(0.0, 1 - static_cast<double>(silent - kSilenceTicks) / kFadeTicks))
+               : std::min(1.0, heard_ + 1.0 / kFadeTicks);
+  if (silent > kMomentTicks) strength_ = 0;
+  const double strength = strength_ * heard_;
   DeviceSample s = held_;
   s.age_ms = static_cast<std::uint8_t>(std::min<std::uint64_t>(silent > kSilenceTicks ? silent : 0, 255));
-  s.buttons = static_cast<std::uint8_t>(std::lround(strength_ * double{kLeadStrength}));
+  s.buttons = static_cast<std::uint8_t>(std::lround(strength * double{kLeadStrength}));
   return s;
 }
 

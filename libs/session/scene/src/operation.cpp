@@ -38,6 +38,7 @@ void Operation::hand_over(const SceneAction& action, std::unique_ptr<HapticScene
 
 // The settings are the operation's own; all else is the world's.
 World::Effect Operation::apply(const SceneAction& action, const World::ComponentsOf& components) {
+  take_strokes();
   World::Effect effect = world_.act(action, components);
   if (!effect.done || !action.is(ActionKind::setting)) return effect;
   try {

@@ -25,6 +25,9 @@ std::vector<Device*> pointers(const std::vector<std::unique_ptr<Device>>& device
   return all;
 }
 
+constexpr const char* kUndoLost =
+    "undo history lost: the machine did not keep up, and what was done before that cannot be undone";
+
 }  // namespace
 
 Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const RehearsalOptions& options,
@@ -39,6 +42,8 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
       finest_voxel_mm_(world.finest_voxel_mm()),
       operation_(std::move(world), options.haptics, options.anatomy, pointers(devices_), stream_, options.rate_hz),
       hub_(stream_.add_reader(), operation_.world()),
+      keeper_end_(stream_.add_reader(Recorder::kTickCapacity)),
+      keeper_(keeper_end_, operation_.world()),
       timed_(options.actions.begin(), options.actions.end()) {
   if (!options_.session_file.empty()) {
     SessionHeader header;
@@ -49,10 +54,10 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
     header.dust = options_.follow.dust;
     recorder_ = std::make_unique<Recorder>(stream_.add_reader(Recorder::kTickCapacity), options_.session_file, header);
   }
-  hub_.add(operation_.strokes(), false);
+  keeper_.add(operation_.strokes(), false);
   readers_ =
       std::make_unique<SceneReaders>(operation_.world(), options_.follow, options_.rate_hz, context, structures());
-  readers_->add_to(hub_);
+  readers_->add_to(hub_, &keeper_);
   pieces_ = static_cast<int>(readers_->large_pieces().size());
   if (options_.soft) {
     options_.soft->meet(&operation_.world());
@@ -65,6 +70,7 @@ Rehearsal::~Rehearsal() {
   if (loop_) loop_->join();
   stop_ = true;
   if (thread_.joinable()) thread_.join();
+  if (keeper_thread_.joinable()) keeper_thread_.join();
   if (options_.soft) options_.soft->meet(nullptr);
 }
 
@@ -117,11 +123,34 @@ void Rehearsal::catch_up() {
 }
 
 std::size_t Rehearsal::drain(std::optional<double> about_ms) {
+  drain_keeper();
+  operation_.take_strokes();
   const std::size_t total = hub_.drain(about_ms);
   if (total == 0) return 0;
   for (std::size_t hand = 0; hand < devices_.size(); ++hand) latest_[hand].store(hub_.latest(hand));
   if (options_.follow.pieces) pieces_ = static_cast<int>(readers_->large_pieces().size());
   return total;
+}
+
+void Rehearsal::drain_keeper() {
+  const std::lock_guard lock(keeper_mutex_);
+  keeper_.drain();
+  // Not when the next tick shows the gap: undo may come before that.
+  const std::uint64_t dropped =
+      keeper_end_.dropped.load(std::memory_order_relaxed) + keeper_end_.actions_dropped.load(std::memory_order_relaxed);
+  if (dropped == std::exchange(strokes_dropped_, dropped)) return;
+  operation_.strokes().resync(operation_.world());
+  strokes_lost_ = true;
+}
+
+void Rehearsal::add_counter(Reader& reader) {
+  const std::lock_guard lock(keeper_mutex_);
+  keeper_.add(reader, false);
+}
+
+void Rehearsal::remove_counter(Reader& reader) {
+  const std::lock_guard lock(keeper_mutex_);
+  keeper_.remove(reader);
 }
 
 void Rehearsal::add_reader(Reader& reader) {
@@ -142,7 +171,11 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
   const World::ComponentsOf components = [&](std::uint32_t body) {
     return readers_->pieces ? readers_->pieces->components(body) : nullptr;
   };
-  const Operation::Done done = [&](const World::Effect& e) { hub_.scene_changed(e); };
+  const Operation::Done done = [&](const World::Effect& e) {
+    hub_.scene_changed(e);
+    const std::lock_guard lock(keeper_mutex_);
+    keeper_.scene_changed(e);
+  };
   World::Effect effect;
   std::unique_lock scene(mutex_, std::defer_lock);
   if (live) {
@@ -250,6 +283,7 @@ std::string Rehearsal::trouble() const {
   const Recorder::Status s = recording();
   if (s.failure) return std::string("recording has ended: ") + s.failure->what();
   if (s.ticks_lost > 0) return "the disk does not keep up: " + std::to_string(s.ticks_lost) + " ticks are not recorded";
+  if (strokes_lost_) return kUndoLost;
   if (s.notes_lost > 0)
     return std::to_string(s.notes_lost) + " notes (camera, marks) are not recorded: they came too fast";
   if (s.behind_s > 3)
@@ -267,6 +301,20 @@ void Rehearsal::follow() {
     follow_on();
   } catch (...) {
     failure_ = std::current_exception();
+    loop_->request_stop();
+  }
+}
+
+// The lock of the scene may be held by a picture for longer than a ring lasts: what must not be lost needs none.
+void Rehearsal::keep() {
+  ::pthread_setname_np(::pthread_self(), "osteo-keeper");
+  try {
+    while (!stop_) {
+      drain_keeper();
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  } catch (...) {
+    keeper_failure_ = std::current_exception();
     loop_->request_stop();
   }
 }
@@ -310,6 +358,7 @@ void Rehearsal::start() {
   if (recorder_) recorder_->start();
   loop_->start();
   thread_ = std::thread([this] { follow(); });
+  keeper_thread_ = std::thread([this] { keep(); });
 }
 
 RehearsalSummary Rehearsal::stop() {
@@ -319,6 +368,7 @@ RehearsalSummary Rehearsal::stop() {
   }
   stop_ = true;
   if (thread_.joinable()) thread_.join();
+  if (keeper_thread_.joinable()) keeper_thread_.join();
   elsewhere_ = false;
   return finish();
 }
@@ -368,6 +418,7 @@ bool Rehearsal::run_on(const Context& context) {
 RehearsalSummary Rehearsal::finish() {
   if (summary_) return *summary_;
   if (loop_ && loop_->failure() && !failure_) failure_ = loop_->failure();
+  if (!failure_) failure_ = keeper_failure_;
   RehearsalSummary s;
   std::string dust_hash;
   operation_.finish();  // what was handed over belongs to the stream, whatever failed
@@ -390,6 +441,8 @@ RehearsalSummary Rehearsal::finish() {
         drain();
       }
       hub_.end(operation_.ticks());
+      const std::lock_guard keeper_lock(keeper_mutex_);
+      keeper_.end(operation_.ticks());
       s.surface_hash = readers_->surface_hash();
       s.pieces = readers_->large_pieces();
       if (readers_->dust) {
@@ -411,6 +464,7 @@ RehearsalSummary Rehearsal::finish() {
   // After a failure nobody knows whether all of it went into the stream.
   if (!failure_) s.bone_hash = operation_.world().hash();
   s.ticks_not_followed = hub_.ticks_lost();
+  if (strokes_lost_) s.warnings.emplace_back(kUndoLost);
   s.voxel_mm3 = voxel_mm3_;
   s.bodies = operation_.world().bodies().size();
   s.fixtures = operation_.world().fixtures();

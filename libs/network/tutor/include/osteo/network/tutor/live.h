@@ -60,10 +60,10 @@ struct FarSample {
 /// Samples that come late, twice, out of order or not at all, as a hand that moves evenly: each is played a fixed time
 /// after it was made, which is what all but a hundredth of them need, and changes by a tick in twenty. When nothing was
 /// heard for kSilenceTicks the strength of the pull goes to 0 within another 30, and the pose is told as old as it is.
-/// No allocation.
+/// It comes back as soon when it was but a moment (kMomentTicks), else within kRampTicks. No allocation.
 class Playout {
  public:
-  static constexpr std::uint64_t kSilenceTicks = 20, kFadeTicks = 30, kRampTicks = 500;
+  static constexpr std::uint64_t kSilenceTicks = 20, kFadeTicks = 30, kMomentTicks = 250, kRampTicks = 500;
   /// `newest`: the last of its packet, by which delay is measured.
   void put(const FarSample& s, std::uint64_t now_tick, bool newest) noexcept;
   /// For this tick. Before anything was heard: far away, silent. `pulls` false: the strength fades within kFadeTicks,
@@ -82,7 +82,7 @@ class Playout {
   std::int64_t delay_ = 0, target_ = 0, least_ = 0;
   std::uint64_t last_heard_ = 0, played_ = 0, newest_ = 0;
   int slew_ = 0;
-  double strength_ = 0;
+  double strength_ = 0, heard_ = 1;
   bool any_ = false;
   DeviceSample held_;
 };
@@ -121,8 +121,9 @@ class FarDevice final : public Device {
 /// delays up to tau, up to about B / tau, of which half is taken. The larger of both. N/mm.
 [[nodiscard]] double delayed_stiffness_n_per_mm(double damping_n_s_per_m, double mass_kg, double delay_s);
 /// A guide that bears any delay: a brake of kFarBrake besides the device's own damping, and the stiffness that goes
-/// with it for hands of kFarMassKg and less.
-inline constexpr double kFarBrake = 12, kFarMassKg = 0.25;
+/// with it for hands of kFarMassKg and less. Apart at a speed v: the brake's v kFarBrake / K, the grip's force / K, and
+/// v times how old the other's place is.
+inline constexpr double kFarBrake = 18, kFarMassKg = 0.25;
 [[nodiscard]] HandGuide far_guide(std::uint32_t hand, std::uint32_t leader, const DeviceTraits& device,
                                   double wanted_n_per_mm, double most_n);
 

@@ -134,19 +134,21 @@ class RecordedDevice final : public Device {
 /// the lesson are an Error(usage), and what moves dust is left out.
 [[nodiscard]] std::vector<SceneAction> playback_actions(const Playback& playback);
 
-/// A hand without a will that holds a device of 0.1 kg: a spring (N/m) to a place that gives way with kYieldS. 100 to
-/// 500 N/m are a grip's. Its damping at slow motion is stiffness x kYieldS. Its pedal and instrument are the recorded
-/// ones of `playback`.
+/// A hand without a will that holds a simulated device (`arm`; of 0.1 kg unless told): a spring (N/m) to a place that
+/// gives way with kYieldS. 100 to 500 N/m are a grip's. Its damping at slow motion is stiffness x kYieldS. Its pedal
+/// and instrument are the recorded ones of `playback`.
 class FollowingHand final : public Device {
  public:
   static constexpr double kYieldS = 0.1;
-  FollowingHand(double stiffness_n_per_m, Vec3 start_mm, std::shared_ptr<const Playback> playback);
+  FollowingHand(double stiffness_n_per_m, Vec3 start_mm, std::shared_ptr<const Playback> playback,
+                const SimulatedDeviceParams& arm = {});
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
   [[nodiscard]] DeviceTraits traits() const override { return device_.traits(); }
   [[nodiscard]] bool active(std::uint64_t) const noexcept override { return stays; }
   [[nodiscard]] Vec3 velocity_mm_s() const { return device_.velocity_mm_s(); }
 
   bool stays = false;  ///< the session goes on when the lesson has ended
+  Vec3 push_n;         ///< of somebody else, besides
 
  private:
   SimulatedDevice device_;

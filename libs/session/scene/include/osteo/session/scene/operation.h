@@ -32,8 +32,10 @@ class Operation {
   /// With the settings as the last action has left them; in the thread that acts.
   [[nodiscard]] const HapticSetup& setup() const { return setup_; }
   [[nodiscard]] const HapticRenderer& renderer() const { return renderer_; }
-  /// To be told of the stream by whoever acts, in the same thread; without it undo knows nothing of the burr's strokes.
+  /// To be told of the stream, in any one thread; without it undo knows nothing of the burr's strokes.
   [[nodiscard]] Reader& strokes() { return strokes_; }
+  /// In the thread that acts: the world knows of the strokes that strokes() was told of; before each action by itself.
+  void take_strokes() { strokes_.tell_to(world_); }
   /// The servo has taken up all that was done.
   [[nodiscard]] bool taken() const noexcept { return servo_.taken(); }
 
@@ -55,7 +57,7 @@ class Operation {
   [[nodiscard]] bool needs_hold(const SceneAction& action) const;
 
   World world_;
-  StrokeReader strokes_{world_};
+  StrokeReader strokes_;
   HapticSetup setup_;
   HapticsParams given_;  // to the servo, until it has taken them
   HapticRenderer renderer_;

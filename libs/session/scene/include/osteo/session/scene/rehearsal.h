@@ -171,12 +171,18 @@ class Rehearsal {
   void add_reader(Reader& reader);
   /// When it returns, the reader is not called any more.
   void remove_reader(Reader& reader);
+  /// The same for one that only counts, whatever a picture takes: it is called in a thread of its own, may not take
+  /// long, and is not told the scene. What it keeps is its own to guard while that runs.
+  void add_counter(Reader& reader);
+  void remove_counter(Reader& reader);
   /// For whoever reads in a thread of its own, and does not hold up the others then: Stream::add_reader().
   [[nodiscard]] Stream& stream() { return stream_; }
 
  private:
   void follow();
   void follow_on();
+  void keep();
+  void drain_keeper();
   std::size_t drain(std::optional<double> about_ms = {});
   bool perform(const SceneAction& action, bool live);
   void move_soft();
@@ -190,6 +196,11 @@ class Rehearsal {
   std::unique_ptr<Recorder> recorder_;
   Operation operation_;
   ReaderHub hub_;
+  std::mutex keeper_mutex_;
+  StreamReader& keeper_end_;
+  ReaderHub keeper_;  // strokes and counts: drained beside the others, however long those are kept from it
+  std::uint64_t strokes_dropped_ = 0;
+  std::atomic<bool> strokes_lost_{false};
   std::array<Seqlock<TickRecord>, kMostHands> latest_;
   std::atomic<double> tissue_mm3_{0};
   std::atomic<int> pieces_{0};
@@ -209,9 +220,10 @@ class Rehearsal {
   const Seqlock<TickRecord>* seat_now_ = nullptr;
   std::size_t seat_hand_ = 0;
   void look_at_cut(const SceneAction& action, const World::Effect& effect);
-  std::exception_ptr failure_;  // of the follower's thread, or of what ran in this one
+  std::exception_ptr failure_;         // of the follower's thread, or of what ran in this one
+  std::exception_ptr keeper_failure_;  // of the keeper's
   std::optional<RehearsalSummary> summary_;
-  std::thread thread_;
+  std::thread thread_, keeper_thread_;
 };
 
 /// What a replay found.
