@@ -1,4 +1,4 @@
-#include "osteo/session/scene/stroke_reader.h"
+#include "osteo/session/scene/detail/stroke_reader.h"
 
 #include <utility>
 
