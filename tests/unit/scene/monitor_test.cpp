@@ -75,7 +75,7 @@ std::string told(const Witness& w) {
 }
 
 // As the window does: settings go into the session; at the first burst the threshold is looked for.
-class Technicia final : public Witness {
+class Technician final : public Witness {
  public:
   Technician(MonitorReader& reader, Rehearsal& rehearsal) : reader_(reader), rehearsal_(rehearsal) {}
   void event(const MonitorEvent& e) override {
