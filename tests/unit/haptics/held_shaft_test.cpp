@@ -133,7 +133,7 @@ TEST(HeldShaft, ItsOffsetNeverJumps) {
   for (const double h : kVoxels) {
     const auto plate = test::solid(
         h, 8, [&](Vec3 p) { return p.x > 0.07 && std::abs(p.z - 0.13) < 1 && p.y > -2; }, {}, 3);
-    for (const double speed : {1.0, 5.0, 25.0, 100.0, 300.0}) {
+    for (const double speed : {1.0, 25.0, 300.0}) {
       const double far = speed < 5 ? 0.3 : 3;
       Mover m{plate, {0, 0, 1}};
       m.go({-kRadius - 0.3, 0, -30}, speed);
@@ -309,6 +309,32 @@ TEST(HeldShaft, TwoHandsAreHeldEachByItself) {
     const double room = 5 - instrument_library()[r.device.tool].shaft.start_radius_mm;
     EXPECT_NE(r.flags & kShaftContact, 0U);
     EXPECT_NEAR(std::abs(r.device.position_mm[0] + r.shown_offset_mm[0]), room, 0.3);
+  }
+}
+
+// Whoever changes the burr while its shaft is pressed to a rim does not get through with the next one.
+TEST(HeldShaft, AnotherToolIsHeldWhereTheOneBeforeWas) {
+  auto plate = test::solid(
+      0.5, 12, [](Vec3 p) { return std::abs(p.z) < 1.75 && std::hypot(p.x, p.y) > 5; }, {}, 2);
+  HapticSetup setup;
+  setup.params.effects.held_shaft = true;
+  setup.device = SpringHand::traits();
+  HapticRenderer r(setup, plate, {}, 1e-3);
+  Vec3 last;
+  for (int t = 0; t < 900; ++t) {
+    DeviceSample d;
+    d.position_mm = {static_cast<float>(0.01 * std::min(t, 550)), 0.1F, -8};
+    d.axis = {0, 0, 1};
+    d.tool = static_cast<std::uint8_t>(instrument_index(t < 700 ? "cutting 4 mm" : "sucker 12 Fr"));
+    const TickRecord record = r.step(d).record;
+    const Vec3 force = from_floats(record.force_n);
+    if (t > 550) {
+      EXPECT_LT(length(force - last), 4 * HeldShaft::kReturnMm + 0.01) << t;
+    }
+    last = force;
+    if (t < 650) continue;
+    const double room = 5 - instrument_library()[d.tool].shaft.start_radius_mm;
+    EXPECT_LT(record.device.position_mm[0] + record.shown_offset_mm[0], room + (t < 720 ? 1.0 : 0.3)) << t;
   }
 }
 
