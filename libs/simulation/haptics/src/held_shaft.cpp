@@ -6,10 +6,11 @@
 namespace osteo::inline simulation {
 namespace {
 
-constexpr int kMostEvaluations = 8;
-// So far around the shaft bone is looked for, in stretches of so much of it, and so many calls it is relied on.
-constexpr double kLookMm = 1.5, kStretchMm = 4;
-constexpr int kLookEvery = 64;
+constexpr int kMostEvaluations = 5;
+// So far around the shaft bone is looked for, in stretches of about so much of it, each again when it has moved so far
+// or after so many calls.
+constexpr double kLookMm = 1.5, kStretchMm = 4, kAgainMm = 0.5;
+constexpr int kAgainCalls = 64;
 // With less bone before its surface than this share of a voxel's face, what is met is a crumb.
 constexpr double kCrumb = 0.2;
 // Of the bone at its surface so much must be pushed one way for it to have a direction.
@@ -43,54 +44,65 @@ void HeldShaft::forget() noexcept {
   offset_mm_ = torque_mm_ = {};
 }
 
-// Other bodies, or elsewhere, or another shaft: what is near is looked for again.
+// Other bodies, or elsewhere, or another shaft: nothing is known of what is near.
 void HeldShaft::take(std::span<const Body> bodies, const RoundCone& shaft) noexcept {
   const std::size_t n = std::min(bodies.size(), kMostBodies);
   bool known = n == count_ && same(shaft, shape_);
-  for (std::size_t i = 0; i < n; ++i) {
-    known = known && bodies_[i].name == bodies[i].name && same(bodies_[i].world_from_body, bodies[i].world_from_body);
-    bodies_[i] = bodies[i];
+  for (std::size_t b = 0; b < n; ++b) {
+    known = known && bodies_[b].name == bodies[b].name && same(bodies_[b].world_from_body, bodies[b].world_from_body);
+    bodies_[b] = bodies[b];
   }
   count_ = n;
   shape_ = shaft;
-  if (!known || ++looked_ago_ >= kLookEvery) looked_mm_ = -1;
+  stretch_count_ = std::clamp(static_cast<int>(std::ceil(shaft.length_mm / kStretchMm)), 1, kMostStretches);
+  if (!known) stretches_.fill({});
 }
 
-void HeldShaft::look(const RoundCone& shaft, double within_mm, Vec3 at_mm, Vec3 axis) noexcept {
-  const int n = std::max(1, static_cast<int>(std::ceil(shaft.length_mm / kStretchMm)));
-  for (std::size_t b = 0; b < count_; ++b) {
-    const Body& body = bodies_[b];
-    Stretch& near = near_[b];
-    near = {};
-    const Vec3 at = body.body_from_world(at_mm), along = body.body_from_world.rotation * axis;
-    for (int i = 0; i < n; ++i) {
-      const double from = shaft.length_mm * i / n, to = shaft.length_mm * (i + 1) / n;
-      // Grains only take bone away.
-      const RoundCone part = grown(stretch_of(shaft, from, to), within_mm);
-      if (!(overlap_.measure(*body.bone, part, at, along).bone_mm3 > 0)) continue;
-      if (!near.any) near = {from, to, true};
-      near.to_mm = to;
-    }
+// How far any of the shaft has moved.
+double HeldShaft::moved_mm(const Stretch& since, Vec3 at_mm, Vec3 axis) const noexcept {
+  return length(at_mm - since.at_mm) + (shape_.start_mm + shape_.length_mm) * length(axis - since.axis);
+}
+
+// At one stretch in a call, in turn, so that no call costs much.
+void HeldShaft::look(const RoundCone& shaft, Vec3 at_mm, Vec3 axis) noexcept {
+  const auto n = static_cast<std::size_t>(stretch_count_), all = n * count_;
+  bool looked = false;
+  std::size_t chosen = next_;
+  for (std::size_t k = 0; k < all; ++k) {
+    const std::size_t one = (next_ + k) % all;
+    Stretch& s = stretches_[one / n][one % n];
+    ++s.ago;
+    if (looked || (s.looked_mm >= 0 && s.ago < kAgainCalls && moved_mm(s, at_mm, axis) < kAgainMm)) continue;
+    const Body& body = bodies_[one / n];
+    const double from = shaft.length_mm * static_cast<double>(one % n) / stretch_count_,
+                 to = shaft.length_mm * static_cast<double>(one % n + 1) / stretch_count_;
+    // Grains only take bone away.
+    const OverlapResult o = overlap_.measure(*body.bone, grown(stretch_of(shaft, from, to), kLookMm),
+                                             body.body_from_world(at_mm), body.body_from_world.rotation * axis);
+    s = {at_mm, axis, kLookMm, 0, o.bone_mm3 > 0};
+    looked = true;
+    chosen = one;
   }
-  looked_at_mm_ = at_mm;
-  looked_axis_ = axis;
-  looked_mm_ = within_mm;
-  looked_ago_ = 0;
+  if (all > 0) next_ = (chosen + 1) % all;
 }
 
-// Of the stretches that are near bone: elsewhere there is none.
+// From the first stretch to the last that may be near bone: elsewhere there is none.
 OverlapResult HeldShaft::measure(const RoundCone& shaft, double grown_mm, Vec3 at_mm, Vec3 axis) noexcept {
-  const double turned = (shaft.start_mm + shaft.length_mm) * length(axis - looked_axis_);
-  if (!(length(at_mm - looked_at_mm_) + turned + grown_mm <= looked_mm_))
-    look(shaft, std::max(kLookMm, 1.5 * grown_mm), at_mm, axis);
   OverlapResult sum;
   for (std::size_t b = 0; b < count_; ++b) {
-    const Stretch& near = near_[b];
-    if (!near.any) continue;
+    int first = stretch_count_, last = -1;
+    for (int i = 0; i < stretch_count_; ++i) {
+      const Stretch& s = stretches_[b][static_cast<std::size_t>(i)];
+      if (!s.near && moved_mm(s, at_mm, axis) + grown_mm <= s.looked_mm) continue;
+      first = std::min(first, i);
+      last = i;
+    }
+    if (last < 0) continue;
     const Body& body = bodies_[b];
-    const OverlapResult o =
-        overlap_.measure(*body.bone, grown(stretch_of(shaft, near.from_mm, near.to_mm), grown_mm),
-                         body.body_from_world(at_mm), body.body_from_world.rotation * axis, body.known);
+    const RoundCone part =
+        stretch_of(shaft, shaft.length_mm * first / stretch_count_, shaft.length_mm * (last + 1) / stretch_count_);
+    const OverlapResult o = overlap_.measure(*body.bone, grown(part, grown_mm), body.body_from_world(at_mm),
+                                             body.body_from_world.rotation * axis, body.known);
     sum.bone_mm3 += o.bone_mm3;
     sum.sharp_mm3 += o.sharp_mm3;
     sum.surface_mm2 += o.surface_mm2;
@@ -115,6 +127,7 @@ HeldShaft::Answer HeldShaft::follow(std::span<const Body> bodies, const RoundCon
       first ? 0 : length(at_mm - last_at_mm_) + (shaft.start_mm + shaft.length_mm) * length(axis - last_axis_);
   last_at_mm_ = at_mm;
   last_axis_ = axis;
+  look(shaft, first ? at_mm : proxy_.position_mm(), axis);
   // Held by nothing: all that the shaft can touch on its way is looked at once.
   if (first || offset_mm_ == Vec3{}) {
     ++a.evaluations;
@@ -161,7 +174,7 @@ HeldShaft::Answer HeldShaft::follow(std::span<const Body> bodies, const RoundCon
   g.tolerance_mm = 2e-2 * h;
   g.friction = g.static_friction = kFriction;
   g.evaluations = kMostEvaluations - a.evaluations;
-  g.travel_mm = moved + kReturnMm;
+  g.travel_mm = std::max(moved + kReturnMm, g.feature_mm);
   const GodObject::Answer answer = proxy_.update(field, at_mm, g);
   a.evaluations += answer.evaluations;
   Vec3 offset = answer.proxy_mm - at_mm;

@@ -34,34 +34,42 @@ class HeldShaft {
   };
   /// At most kMostBodies bodies count, the first ones. `shell_mm`: so much room it keeps beside bone that it lies flat
   /// on, less where it touches in a point; also the farthest that it goes between two looks, so half a voxel or less.
+<<<<<<< HEAD:libs/simulation/haptics/include/osteo/simulation/haptics/detail/held_shaft.h
   /// `at_mm`, `axis` (unit) as of the instrument, in the world. A place that is not a number forgets. Cost: nothing
   /// while no bone is within a millimetre and a half, else an overlap of the part of the shaft that is near bone,
   /// mostly 2 to 4 in contact, 16 at most. Bone that comes back beside the shaft may be noticed 64 calls later.
+=======
+  /// `at_mm`, `axis` (unit) as of the instrument, in the world. A place that is not a number forgets. Cost: next
+  /// to nothing while no bone is within a millimetre and a half, else an overlap of the part of the shaft that is near
+  /// bone, mostly 2 to 4 in contact, 16 at most. Bone that comes back beside the shaft may be noticed 200 calls later.
+>>>>>>> h-shaft:libs/simulation/haptics/include/osteo/simulation/haptics/detail/held_shaft.h
   Answer follow(std::span<const Body> bodies, const RoundCone& shaft, double shell_mm, Vec3 at_mm, Vec3 axis) noexcept;
   void forget() noexcept;
   [[nodiscard]] Vec3 offset_mm() const { return offset_mm_; }  ///< of the last call
 
  private:
-  struct Stretch {  // of the shaft, along its axis from its start
-    double from_mm = 0, to_mm = 0;
-    bool any = false;
+  static constexpr int kMostStretches = 16;
+  // A stretch of the shaft beside a body: whether bone was within looked_mm of it, from where it was looked at.
+  struct Stretch {
+    Vec3 at_mm, axis;
+    double looked_mm = -1;  // negative: not yet
+    int ago = 0;            // in calls
+    bool near = true;
   };
   OverlapResult measure(const RoundCone& shaft, double grown_mm, Vec3 at_mm, Vec3 axis) noexcept;
-  void look(const RoundCone& shaft, double within_mm, Vec3 at_mm, Vec3 axis) noexcept;
+  void look(const RoundCone& shaft, Vec3 at_mm, Vec3 axis) noexcept;
   void take(std::span<const Body> bodies, const RoundCone& shaft) noexcept;
+  [[nodiscard]] double moved_mm(const Stretch& since, Vec3 at_mm, Vec3 axis) const noexcept;
 
   Overlap overlap_{0};
   GodObject proxy_;
   Vec3 offset_mm_, torque_mm_;
   Vec3 last_at_mm_, last_axis_;
-  // What is near: which stretch of the shaft has bone within looked_mm_ of it, seen from looked_at_mm_.
   std::array<Body, kMostBodies> bodies_;
-  std::array<Stretch, kMostBodies> near_;
-  std::size_t count_ = 0;
+  std::array<std::array<Stretch, kMostStretches>, kMostBodies> stretches_;
+  std::size_t count_ = 0, next_ = 0;  // of bodies; the stretch that is looked at next
+  int stretch_count_ = 1;
   RoundCone shape_{0, 0, 0, 0};
-  Vec3 looked_at_mm_, looked_axis_;
-  double looked_mm_ = -1;  // negative: not yet
-  int looked_ago_ = 0;
 };
 
 }  // namespace osteo::inline simulation
