@@ -34,15 +34,9 @@ class HeldShaft {
   };
   /// At most kMostBodies bodies count, the first ones. `shell_mm`: so much room it keeps beside bone that it lies flat
   /// on, less where it touches in a point; also the farthest that it goes between two looks, so half a voxel or less.
-<<<<<<< HEAD:libs/simulation/haptics/include/osteo/simulation/haptics/detail/held_shaft.h
-  /// `at_mm`, `axis` (unit) as of the instrument, in the world. A place that is not a number forgets. Cost: nothing
-  /// while no bone is within a millimetre and a half, else an overlap of the part of the shaft that is near bone,
-  /// mostly 2 to 4 in contact, 16 at most. Bone that comes back beside the shaft may be noticed 64 calls later.
-=======
   /// `at_mm`, `axis` (unit) as of the instrument, in the world. A place that is not a number forgets. Cost: next
   /// to nothing while no bone is within a millimetre and a half, else an overlap of the part of the shaft that is near
   /// bone, mostly 2 to 4 in contact, 16 at most. Bone that comes back beside the shaft may be noticed 200 calls later.
->>>>>>> h-shaft:libs/simulation/haptics/include/osteo/simulation/haptics/detail/held_shaft.h
   Answer follow(std::span<const Body> bodies, const RoundCone& shaft, double shell_mm, Vec3 at_mm, Vec3 axis) noexcept;
   void forget() noexcept;
   [[nodiscard]] Vec3 offset_mm() const { return offset_mm_; }  ///< of the last call
