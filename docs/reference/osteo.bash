@@ -119,7 +119,7 @@ _osteo() {
     console) flags="$flags --sound --code --width --height --scale --state-file" ;;
     experiment) flags="$flags --out --targets --noise --crosstalk --reaction-s --participant --people --trials --device --headless --simulated --retention --null --experiments --chain --level --state-file" ;;
     ground-truth) flags="$flags --out --program --experiment --bone --trajectory --surface --columns --stiffness-n-per-mm --share" ;;
-    study) flags="$flags --title --procedure --groups --competent --cases --items --attempts --lowest --highest --participant --group --case-name --attempt --rater --out --resamples --level --given --no-movies" ;;
+    study) flags="$flags --title --procedure --groups --competent --cases --items --attempts --lowest --highest --participant --group --case-name --attempt --mirror --accept --primary --rater --out --resamples --level --given --no-movies" ;;
     simulate-trainee) flags="$flags --out --skill --procedure --mirror --minutes --approach --window-mm" ;;
     devices) flags="$flags --watch --recording" ;;
     markers) flags="$flags --paper --pen --page" ;;
