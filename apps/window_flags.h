@@ -108,10 +108,10 @@ struct WindowFlags {
            "prism)"},
           p.pen);
     visit({"video", "camera that sees the markers; a video file stands for one"}, p.video);
-    visit(
-        {"camera_place",
-         "of the marker: facing you from the screen, above the desk (its picture's top away from you), or behind you"},
-        p.camera_place);
+    visit({"camera_place",
+           "place of the marker's camera: facing you from the screen, above the desk (its picture's top away from "
+           "you), or behind you"},
+          p.camera_place);
     visit({"hand_scale", "movement in the scene for 1 mm of the hand, with --device marker", "", 0.05, 10},
           p.hand_scale);
     visit({"second_device",
@@ -185,10 +185,10 @@ struct WindowFlags {
     visit({"stereo", "stereo display: how the pictures of both eyes share the screen; docs/camera.md"}, p.stereo);
     visit({"stereo_base", "distance between the eyes, whose pictures agree on what lies in the focus", "mm", 0, 65},
           p.stereo_base);
-    visit(
-        {"experiment",
-         "in the window, 'camera': views to bring the camera to, timed, as CSV in the session's folder (empty: none)"},
-        p.experiment);
+    visit({"experiment",
+           "experiment in the window; 'camera': views to bring the camera to, timed, as CSV in the session's folder "
+           "(empty: none)"},
+          p.experiment);
     visit({"require_approved", "refuse a case that nobody has approved as it is ('osteo approve')"},
           p.require_approved);
     visit({"quality",
