@@ -18,7 +18,7 @@ except ImportError as e:
 HEAD = '''# Made from the stages' declarations.
 import os
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, NoReturn, TypeVar
 
 import numpy
 import numpy.typing
@@ -43,7 +43,13 @@ class Error(RuntimeError):
 class WrongValue(Error, ValueError): ...
 class WrongType(Error, TypeError): ...
 
-class _Placed:
+_Value = TypeVar("_Value", bound="_Copied")
+
+class _Copied:
+    def __copy__(self: _Value) -> _Value: ...
+    def __deepcopy__(self: _Value, memo: dict[int, Any]) -> _Value: ...
+
+class _Placed(_Copied):
     @property
     def spacing_mm(self) -> list[float]: ...
     @property
@@ -64,6 +70,7 @@ VOLUME = '''class {name}(_Placed):
 
 '''
 REST = '''class Grid(_Placed):
+    def __array__(self, *args: Any, **kwargs: Any) -> NoReturn: ...
     def __init__(self, voxels: numpy.typing.NDArray[numpy.float32], spacing_mm: _Triple = ..., origin_mm: _Triple = ..., direction: _Rows = ..., background: float = ..., name: str = ...) -> None: ...
     def dense(self, lo: Sequence[int] = ..., shape: Sequence[int] | None = ...) -> Field: ...
     @property
@@ -73,7 +80,8 @@ REST = '''class Grid(_Placed):
     @property
     def active_voxels(self) -> int: ...
 
-class Surface:
+class Surface(_Copied):
+    def __array__(self, *args: Any, **kwargs: Any) -> NoReturn: ...
     def __init__(self, points_mm: numpy.typing.NDArray[numpy.float32], triangles: numpy.typing.NDArray[numpy.uint32], normals: numpy.typing.NDArray[numpy.float32] | None = ...) -> None: ...
     @property
     def points_mm(self) -> numpy.typing.NDArray[numpy.float32]: ...
@@ -82,7 +90,8 @@ class Surface:
     @property
     def triangles(self) -> numpy.typing.NDArray[numpy.uint32]: ...
 
-class Tets:
+class Tets(_Copied):
+    def __array__(self, *args: Any, **kwargs: Any) -> NoReturn: ...
     @property
     def points_mm(self) -> numpy.typing.NDArray[numpy.float32]: ...
     @property
