@@ -191,8 +191,8 @@ for v in ("cut", "cut2"):
     plain("surface", f"{v}.vdb", f"{v}.stl")
 same("cut.stl", "cut2.stl")
 run("OsteoPhantom", "--region", "temporal", "--spacing_mm", "1", work / "ear.nrrd")
-run("OsteoTube", "--points_mm", "53.4,25.9,-15.6", "--max_radius_mm", "5", "--points_mm", "48,24,-28", work / "ear.nrrd", work / "a.nrrd")
-plain("tube", "ear.nrrd", "a2.nrrd", "--points-mm", "53.4,25.9,-15.6; 48,24,-28", "--max-radius-mm", "5")
+run("OsteoTube", "--points_mm", "53.4,25.9,-15.6", "--max_radius_mm", "5", "--max_unsure_mm", "20", "--points_mm", "48,24,-28", work / "ear.nrrd", work / "a.nrrd")
+plain("tube", "ear.nrrd", "a2.nrrd", "--points-mm", "53.4,25.9,-15.6; 48,24,-28", "--max-radius-mm", "5", "--max-unsure-mm", "20")
 same("a.nrrd", "a2.nrrd")
 # Points as Slicer writes them to a file, in LPS as asked, or in RAS as older versions do.
 plain("surface", "b.vdb", "b.ply")
