@@ -31,6 +31,7 @@ GIVEN = {
     "docs/pacs.md": {"CT": SCAN, "mask.nrrd": MASK},
     "docs/registration.md": {"before.nrrd": "ct", "after.nrrd": "ct", "ct.nrrd": "ct", "mr.nrrd": "ct", "mr-labels.seg.nrrd": "structures"},
     "docs/review.md": {"SESSION": SESSION, "EXPERTS": "sessions", "MONDAY": SESSION, "TUESDAY": SESSION},
+    "docs/study.md": {"SESSION": SESSION},
     "docs/tissue.md": {"FOLDER": "folder"},
     "docs/tutoring.md": {"SESSION": SESSION, "CASE": CASE, "lesson.json": "script"},
     "docs/vtk.md": {"CT_FOLDER": SCAN, "CASE": "folder"},

@@ -5,7 +5,7 @@
 #include <ostream>
 
 #include "commands/score.h"
-#include "osteo/assessment/scoring/heat_score.h"
+#include "osteo/assessment/scoring/hint_reader.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/pipeline/pipeline.h"

@@ -9,7 +9,7 @@
 #include "metric_session.h"
 #include "osteo/assessment/evidence/score.h"
 #include "osteo/assessment/evidence/timeline.h"
-#include "osteo/assessment/scoring/heat_score.h"
+#include "osteo/assessment/scoring/hint_reader.h"
 #include "scratch.h"
 
 namespace osteo {

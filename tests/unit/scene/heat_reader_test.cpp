@@ -5,7 +5,7 @@
 
 #include "bar.h"
 #include "evidence/scene.h"
-#include "osteo/assessment/scoring/heat_score.h"
+#include "osteo/assessment/scoring/hint_reader.h"
 #include "osteo/session/recording/session_reader.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "scratch.h"

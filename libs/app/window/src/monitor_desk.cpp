@@ -1,7 +1,7 @@
 #include "osteo/app/window/monitor_desk.h"
 
 #include "monitor_screen.h"
-#include "osteo/session/scene/monitor_notes.h"
+#include "osteo/session/scene/monitor_sound.h"
 
 namespace osteo::inline app {
 struct MonitorDesk::Parts {

@@ -1,4 +1,4 @@
-#include "osteo/assessment/scoring/heat_score.h"
+#include "osteo/assessment/scoring/hint_reader.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "osteo/session/scene/monitor_notes.h"
+#include "osteo/session/scene/monitor_sound.h"
 
 #include "osteo/core/base/json_document.h"
 

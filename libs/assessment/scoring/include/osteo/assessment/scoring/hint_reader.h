@@ -1,13 +1,17 @@
-// Hints that are watched for while a session runs.
+// Readers beside a score: hints as the window would have given them, and heat among the metrics.
 #pragma once
 #include <mutex>
 #include <optional>
 #include <vector>
 
 #include "osteo/assessment/evidence/hints.h"
+#include "osteo/assessment/evidence/metric.h"
+#include "osteo/session/scene/heat_reader.h"
 #include "osteo/session/scene/reader.h"
 
 namespace osteo::inline assessment {
+
+// -- Hints that are watched for while a session runs.
 
 /// Whether the burr can be seen is asked ten times a second while it drills: a ray from the eye to the burr through the
 /// bone as it is then, voxels in touch with the burr left out. Cost: 20 ns a tick and some 5 us a ray.
@@ -38,5 +42,11 @@ class HintReader final : public Reader {
   std::optional<Vec3> eye_mm_;
   std::optional<Hint> hint_;
 };
+
+// -- Heat among the metrics of a score: only for who asks, since the session has to be run again for it.
+
+/// What a heat reader that followed the whole session knows: heat_bone_c, and for each structure heat_peak_c and
+/// heat_cem43_min (the body's temperature and no dose where nothing warmed it). `structures` may be null.
+[[nodiscard]] std::vector<Measured> heat_values(const HeatReader& heat, const StructureMap* structures);
 
 }  // namespace osteo::inline assessment

@@ -2,7 +2,7 @@
 #pragma once
 #include "osteo/network/wire/stimulator_link.h"
 #include "osteo/network/wire/stream_feed.h"
-#include "osteo/session/scene/monitor_notes.h"
+#include "osteo/session/scene/monitor_sound.h"
 #include "osteo/session/scene/rehearsal.h"
 
 namespace osteo::inline network {

@@ -1,12 +1,30 @@
-// What a nerve monitor sounds like: the signal itself, and a tone where it crosses its threshold.
+// What a nerve monitor writes down and what it sounds like.
 #pragma once
 #include <atomic>
 #include <vector>
 
 #include "osteo/core/rt/ring.h"
+#include "osteo/session/scene/monitor_reader.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "osteo/simulation/nerve/activity.h"
 
 namespace osteo::inline session {
+
+// -- What a nerve monitor would have written down, as notes of the session.
+
+/// Settings of the stimulator as stimulator_notes() reads them; bursts, trains, answers, thresholds as notes "monitor".
+/// In the thread that follows the stream, which may leave notes. `rehearsal` and `wiring` must outlive it.
+class MonitorNotes final : public MonitorSink {
+ public:
+  MonitorNotes(Rehearsal& rehearsal, const MonitorWiring& wiring) : rehearsal_(rehearsal), wiring_(wiring) {}
+  void event(const MonitorEvent& event) override;
+
+ private:
+  Rehearsal& rehearsal_;
+  const MonitorWiring& wiring_;
+};
+
+// -- What a nerve monitor sounds like: the signal itself, and a tone where it crosses its threshold.
 
 /// Between the thread that follows the stream and that of the sound card. Silent while a stimulus' artefact lasts, and
 /// where it is muted. Latency, behind the block that a monitor tells: the tone begins with the next mix(), the signal
