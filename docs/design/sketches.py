@@ -16,7 +16,7 @@ ICONS |= {
     "suction": ["M3 20c5 0 7 -4 9 -8l4 -8", "M19 5l-4 -2", "M4 15v.01m3 -4v.01m-4 0v.01"],
     "probe": ["M5 20a1 1 0 1 0 0 -.01", "M6 19l13 -15"],
 }
-DARK = dict(ground="#10151C", surface="#171E27", raised="#212A35", line="#5F6E7D", text="#EDF1F5", quiet="#A9B4C0", accent="#8C8CFF")
+DARK = dict(ground="#10151C", surface="#171E27", raised="#212A35", line="#6C7B8A", text="#EDF1F5", quiet="#A9B4C0", accent="#8C8CFF")
 LIGHT = dict(ground="#F1F4F7", surface="#FFFFFF", raised="#E3E8ED", line="#75828F", text="#141C24", quiet="#47535F", accent="#4A3FC4")
 HIGH = dict(ground="#000000", surface="#000000", raised="#1A1A1A", line="#FFFFFF", text="#FFFFFF", quiet="#FFFFFF", accent="#B9B0FF")
 STATUS = dict(note="#56B4E9", near="#F0E442", close="#E69F00", contact="#D55E00", good="#009E73")
@@ -45,8 +45,8 @@ def picture(name, box, size, quality=64):
 PICTURES = {
     "cavity": (("window.png", (288, 20, 1088, 500), (1000, 600)), 5 / 3),
     "whole": (("session-mastoid.png", (0, 60, 530, 560), (636, 600)), 1.06),
-    "axial": (("window.png", (1096, 116, 1352, 330), (307, 257)), 1.2),
-    "coronal": (("window.png", (1096, 352, 1352, 566), (307, 257)), 1.2),
+    "axial": (("window.png", (1132, 126, 1302, 296), (306, 306)), 1),
+    "coronal": (("window.png", (1132, 362, 1302, 532), (306, 306)), 1),
     "sagittal": (("structures-ear.png", (130, 560, 560, 920), (307, 257)), 1.2),
     "plan_axial": (("structures-ear.png", (150, 10, 560, 490), (410, 480)), .854),
     "plan_coronal": (("structures-ear.png", (810, 20, 1220, 490), (410, 470)), .872),
@@ -99,7 +99,10 @@ class Sketch:
 
     # Components, once each.
     def tile(self, x, y, name, key="", on=False, off=False, size=40):
-        if on:
+        if on == "lit":
+            self.rect(x, y, size, size, C["raised"], 8)
+            self.rect(x + 12, y + size - 6, size - 24, 3, C["text"], 1.5)
+        elif on:
             self.rect(x, y, size, size, C["raised"], 8, C["accent"], 2)
             self.rect(x, y + 8, 4, size - 16, C["accent"], 2)
         self.icon(name, x + (size - 24) / 2, y + (size - 24) / 2, 24, C["line"] if off else C["text"] if on else "#CFD7DF" if C is DARK else C["text"])
@@ -122,6 +125,14 @@ class Sketch:
 
     def sign(self, x, y, state, r=9):
         c = STATUS[state]
+        if C is LIGHT:  # yellow and orange alone would be too faint on white
+            k = len(self.out)
+            self.shape(x, y, state, r, c)
+            self.out[k:] = [part.replace('stroke="none" stroke-width="2"', 'stroke="#141C24" stroke-width="1.5"').replace("/>", ' stroke="#141C24" stroke-width="1.5"/>') if "circle" in part else part.replace('stroke="none" stroke-width="2"', 'stroke="#141C24" stroke-width="1.5"') for part in self.out[k:]]
+        else:
+            self.shape(x, y, state, r, c)
+
+    def shape(self, x, y, state, r, c):
         if state == "near":
             self.path(f"M{x} {y - r}l{r} {1.8 * r}h{-2 * r}z", fill=c)
         elif state == "close":
@@ -197,7 +208,7 @@ def strip(s, on="drill", held=()):
         s.rect(12, y, 32, 1, C["line"])
         y += 4 if tight else 8
         for name in group:
-            s.tile(8, y, name, on=name == on or name in held)
+            s.tile(8, y, name, on="lit" if name in held else name == on)
             y += 40 if tight else 44
         y += 4
     s.tile(8, s.h - 48, "command")
@@ -210,7 +221,7 @@ def state(s, near=("near", "sigmoid sinus", "1.4 mm", .72), message=None, time="
     wide = s.w >= 1200
     col = [(88, "Force", "1.2 N", 24), (88, "Speed", "60 000/min", 24), (128, "Bone below", "1.7 mm", 24)]
     x = x0 + 16
-    for w, name, value, size in zip((88, 152, 104), ("Force", "Burr, per min", "Bone below"), ("1.2 N", "60 000", "1.7 mm"), (24, 24, 24)):
+    for w, name, value, size in zip((88, 128, 128), ("Force", "Burr, per min", "Bone below"), ("1.2 N", "60 000", "1.7 mm"), (24, 24, 24)):
         s.text(x, y + 22, name, 14, C["quiet"])
         s.text(x, y + 50, value, size, weight=600)
         x += w if wide else w - 16
@@ -250,10 +261,6 @@ def cut(s, x, y, w, h, key, name, letters="", cross=True, field=True):
     s.text(x + 12, y + 23, name, 14, "#EDF1F5")
 
 
-def drill_over(s, x, y, k=1):
-    """The shaft as it could look: turned metal, drawn over today's."""
-
-
 def operate(w, h, name, extra=None, near=("near", "sigmoid sinus", "1.4 mm", .72), message=("near", "Thin bone over the sinus"), on="drill"):
     s = Sketch(w, h, "Operate", "The bone fills the picture; tools at the left, the state below, three cuts at the right or one cut on a small screen.")
     s.image("cavity", STRIP, 0, w - STRIP, h - STATE)
@@ -266,9 +273,9 @@ def operate(w, h, name, extra=None, near=("near", "sigmoid sinus", "1.4 mm", .72
         s.text(w - 16 - side, 16 + 3 * (side + 8) + 16, "", 14)
         bx = w - side - 232
     else:
-        side = 216
+        side = 200
         cut(s, w - side - 16, 16, side, side, "axial", "Axial")
-        s.segments(w - side - 16, 16 + side + 8, ("A", "C", "S", "Drill"), 0, (48, 48, 48, 72), 32)
+        s.segments(w - side - 16, 16 + side + 8, ("A", "C", "S", "Drill"), 0, (44, 44, 44, 68), 32)
         bx = w - 128
     y = h - STATE - 24
     s.rect(bx - 12, y - 28, 120, 40, "#000", 8, op=.6)
@@ -310,7 +317,7 @@ def palette(s):
     s.icon("search", x + 26, y + 24, 24, C["quiet"])
     s.text(x + 62, y + 42, "pat", 20)
     s.path(f"M{x + 94} {y + 24}v24", C["text"], 2)
-    rows = (("hand-stop", "Patient position: supine", "", True), ("rotate-clockwise", "Patient position: head turned 30°", "", False), ("layout-grid", "Plan: regions to remove and keep", "Ctrl-L", False), ("bone", "Plates: take one", "L", False), ("drill", "Drill path: show", "", False))
+    rows = (("hand-stop", "Patient position: supine", "", True), ("rotate-clockwise", "Patient position: head turned 30°", "", False), ("layout-grid", "Plan: regions to remove and keep", "Ctrl-L", False), ("bone", "Plates: take one", "L", False), ("drill", "Haptics: path to follow", "", False))
     for n, (i, t, k, on) in enumerate(rows):
         yy = y + 72 + n * 52
         if on:
@@ -321,7 +328,7 @@ def palette(s):
             kw = 64
             s.key(x + w - 28 - kw, yy + 12, k, kw)
     s.rect(x + 12, y + h - 48, w - 24, 1, C["line"])
-    s.text(x + 28, y + h - 18, "↑ ↓ choose     Enter runs it     Esc closes", 14, C["quiet"])
+    s.text(x + 28, y + h - 18, "↑ ↓ choose,  Enter runs it,  Esc closes", 14, C["quiet"])
     s.text(x + w - 28, y + h - 18, "5 of 96", 14, C["quiet"], anchor="end")
 
 
@@ -369,7 +376,7 @@ def open_(w, h, name):
     cw = (gw - 16 * (cols - 1)) / cols
     ch = 248 if wide else 264
     cards = [("ear", "Demo ear", "comes with Osteotome", ("info-circle", "try it: no patient"), False, None),
-             ("whole", "Temporal bone, left", "0.3 mm · today 9:40", ("shield-check", "approved 21 Nov"), True, None),
+             ("cavity", "Temporal bone, left", "0.3 mm · today 9:40", ("shield-check", "approved 21 Nov"), True, None),
              ("jaw", "Jaw", "0.5 mm · 2 sessions", ("shield-check", "approved 3 Nov"), False, None),
              ("head", "Head, UNC", "0.5 mm · public CT", ("clock", "not approved"), False, None),
              ("skull", "Skull phantom", "0.5 mm · 1 session", ("clock", "not approved"), False, None),
@@ -426,7 +433,7 @@ def plan(w, h, name):
         s.icon("arrows-maximize", x + gw - 32, y + 8, 24, "#CFD7DF")
     # The plane, red with its words: in 3D and in a cut.
     x, y = pane, top
-    s.path(f"M{x + gw * .36:.0f} {y + gh * .30:.0f}l{gw * .13:.0f} {gh * .05:.0f}v{gh * .52:.0f}l{-gw * .13:.0f} {-gh * .05:.0f}z", STATUS["contact"], 2, STATUS["contact"], 'fill-opacity=".45"')
+    s.path(f"M{x + gw * .60:.0f} {y + gh * .34:.0f}l{gw * .13:.0f} {gh * .05:.0f}v{gh * .52:.0f}l{-gw * .13:.0f} {-gh * .05:.0f}z", STATUS["contact"], 2, STATUS["contact"], 'fill-opacity=".45"')
     s.path(f"M{pane + gw + 8 + gw * .45:.0f} {top + 44}V{top + gh - 12:.0f}", STATUS["contact"], 3)
     s.rect(0, top, pane, h - top, C["surface"])
     px, pw = 16, pane - 32
@@ -471,7 +478,7 @@ def review(w, h, name):
     s = Sketch(w, h, "Review", "Three findings with a picture each, the place in 3D, a player below with the course of the session.")
     head(s, "Review", "Review")
     wide = w >= 1200
-    pane = 392 if wide else 320
+    pane = 416 if wide else 336
     foot = 184 if wide else 160
     s.image("cavity", pane, 56, w - pane, h - 56 - foot)
     cx, cy = pane + (w - pane) * .33, 56 + (h - 56 - foot) * .62
@@ -483,15 +490,15 @@ def review(w, h, name):
     x, pw = 16, pane - 32
     s.text(x + 8, 96, "Session saved", 24, weight=600)
     s.text(x + 8, 122, "Cortical mastoidectomy, 24 min, 1 820 mm³", 14, C["quiet"])
-    finds = [("close", "Close to the sigmoid sinus", "0.4 mm, cutting burr, 11:32", True, "cavity"), ("near", "Pressed hard near the nerve", "3.1 N at 0.9 mm, 17:05", False, "axial"), ("good", "Sinus plate skeletonised", "82 % shown, limit 40 %", False, "coronal")]
+    finds = [("close", "Close to the sinus", "0.4 mm, cutting burr, 11:32", True, "cavity"), ("near", "Pressed hard near nerve", "3.1 N at 0.9 mm, 17:05", False, "axial"), ("good", "Sinus plate shown", "82 % shown, limit 40 %", False, "coronal")]
     rh = 96 if wide else 80
     for n, (st, t, u, on, pic) in enumerate(finds):
         yy = 140 + n * (rh + 8)
         s.rect(x, yy, pw, rh, C["raised"], 12, C["accent"] if on else None, 2)
-        iw = rh + 8 if wide else rh - 16
+        iw = rh - 8 if wide else rh - 24
         s.image(pic, x + 8, yy + 8, iw, rh - 16, 6)
         s.sign(x + iw + 30, yy + 28, st, 9)
-        s.text(x + iw + 48, yy + 34, t, 16 if wide else 15, weight=600)
+        s.text(x + iw + 46, yy + 34, t, 16, weight=600)
         s.text(x + iw + 22, yy + (60 if wide else 58), u, 14, C["quiet"])
     y = 140 + 3 * (rh + 8) + 8
     s.text(x + 8, y + 16, "All 14 figures", 16, C["text"])
@@ -516,7 +523,7 @@ def review(w, h, name):
         s.switch(472, yb + 16, 200, "Surgeon's view", True)
     else:
         s.icon("eye", 464, yb + 20, 24)
-    lanes = (("Force", [.2, .3, .25, .5, .4, .6, .3, .2, .5, .7, .4, .3, .35, .2, .9, .4, .3, .2, .3, .4]), ("Clearance", [.1, .1, .2, .2, .3, .4, .3, .4, .9, .7, .5, .4, .3, .5, .7, .6, .4, .3, .2, .2]))
+    lanes = (("Force", [.2, .3, .25, .5, .4, .6, .3, .2, .5, .7, .4, .3, .35, .2, .9, .4, .3, .2, .3, .4]), ("Nearness", [.1, .1, .2, .2, .3, .4, .3, .4, .9, .7, .5, .4, .3, .5, .7, .6, .4, .3, .2, .2]))
     lx, lw, lh = 112, w - 128, (foot - 88) / 2
     for n, (t, v) in enumerate(lanes):
         yy = yb + 64 + n * (lh + 4)
@@ -544,7 +551,7 @@ def teach(w, h, name):
     s.text(lp + 50, 96, "Trainee 1, live, 24 ms", 16)
     s.rect(0, 56, lp, h - 56, C["surface"])
     s.text(16, 96, "Cortical mastoidectomy" if wide else "Mastoidectomy", 20, weight=600)
-    steps = (("Cortex opened", 2), ("Sinus plate skeletonised", 1), ("Tegmen followed", 0), ("Antrum opened", 0), ("Canal wall thinned", 0), ("Facial recess", 0))
+    steps = (("Cortex opened", 2), ("Sinus plate shown", 1), ("Tegmen followed", 0), ("Antrum opened", 0), ("Canal wall thinned", 0), ("Facial recess", 0))
     for n, (t, st) in enumerate(steps):
         yy = 116 + n * 48
         if st == 1:
@@ -614,7 +621,7 @@ def components(name):
         s.text(x0 + 24, y + 16, "Tool tile: usual, selected, on, off", 14, C["quiet"])
         s.tile(x0 + 24, y + 28, "saw")
         s.tile(x0 + 80, y + 28, "drill", on=True)
-        s.tile(x0 + 136, y + 28, "droplet", on=True)
+        s.tile(x0 + 136, y + 28, "droplet", on="lit")
         s.tile(x0 + 192, y + 28, "plate", off=True)
         s.rect(x0 + 256, y + 28, 200, 40, C["raised"], 8, C["line"])
         s.text(x0 + 270, y + 54, "Suction, while held", 16)
@@ -655,7 +662,7 @@ def components(name):
         s.text(x0 + 492, y + 84, "Show in folder", 16, C["text"], 600)
         s.text(x0 + 448, y + 132, "Type: 14, 16, 20, 24", 14, C["quiet"])
         for n, z in enumerate((14, 16, 20, 24)):
-            s.text(x0 + 448 + (0, 52, 112, 180)[n], y + 168, "1.4 mm"[: 6], z, weight=600 if z > 16 else 400)
+            s.text(x0 + 448 + (0, 52, 110, 172)[n], y + 168, "1.4 mm"[: 6 if z < 20 else 3], z, weight=600 if z > 16 else 400)
         y = 720
         s.text(x0 + 24, y + 8, "Burrs at 3.78 pixels a mm (96 a inch): cutting, diamond; instruments", 14, C["quiet"])
         for mm in range(1, 8):
