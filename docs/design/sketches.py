@@ -267,7 +267,7 @@ def operate(w, h, name, extra=None, near=("near", "sigmoid sinus", "1.4 mm", .72
     strip(s, on, ("droplet",))
     drill_card(s, STRIP + 16, 16)
     if w >= 1200:
-        side = 192
+        side = 200
         for n, (k, t) in enumerate((("axial", "Axial"), ("coronal", "Coronal"), ("sagittal", "Sagittal"))):
             cut(s, w - side - 16, 16 + n * (side + 8), side, side, k, t)
         s.text(w - 16 - side, 16 + 3 * (side + 8) + 16, "", 14)
