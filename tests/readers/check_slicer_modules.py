@@ -191,8 +191,10 @@ for v in ("cut", "cut2"):
     plain("surface", f"{v}.vdb", f"{v}.stl")
 same("cut.stl", "cut2.stl")
 run("OsteoPhantom", "--region", "temporal", "--spacing_mm", "1", work / "ear.nrrd")
-run("OsteoTube", "--points_mm", "53.4,25.9,-15.6", "--max_radius_mm", "5", "--max_unsure_mm", "20", "--points_mm", "48,24,-28", work / "ear.nrrd", work / "a.nrrd")
-plain("tube", "ear.nrrd", "a2.nrrd", "--points-mm", "53.4,25.9,-15.6; 48,24,-28", "--max-radius-mm", "5", "--max-unsure-mm", "20")
+NERVE = ["36,-2,-12", "38.5,1.5,-14", "41,5.5,-16", "42.5,7.5,-19", "44.5,9.3,-31"]
+each = [w for p in NERVE for w in ("--points_mm", p)]
+run("OsteoTube", *each[:4], "--max_unsure_mm", "40", *each[4:], work / "ear.nrrd", work / "a.nrrd")
+plain("tube", "ear.nrrd", "a2.nrrd", "--points-mm", "; ".join(NERVE), "--max-unsure-mm", "40")
 same("a.nrrd", "a2.nrrd")
 # Points as Slicer writes them to a file, in LPS as asked, or in RAS as older versions do.
 plain("surface", "b.vdb", "b.ply")
