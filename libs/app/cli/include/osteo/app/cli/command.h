@@ -57,8 +57,8 @@ struct CommandInfo {
   std::string name, synopsis, description;
   std::vector<Positional> positionals;
   std::string example;
-  bool takes_settings = false;         ///< --set NAME=VALUE
-  std::vector<FlagGroup> flag_groups;  ///< none: one list. Fields of no group come last
+  bool takes_settings = false;              ///< --set NAME=VALUE
+  std::vector<FlagGroup> flag_groups = {};  ///< none: one list. Fields of no group come last
 };
 
 /// What a verb gets to work with.
