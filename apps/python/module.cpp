@@ -1,11 +1,9 @@
 // The Python module osteo._osteo: values and stages. Everything that is made from declarations is made in
 // osteo/__init__.py.
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <mutex>
 #include <optional>
 
@@ -270,40 +268,23 @@ SparseGrid grid_of(const py::array& voxels, std::array<double, 3> spacing_mm, st
 }
 
 // A grid as the bytes of its .vdb file, by way of a file: nothing else writes and reads all that a grid holds.
-struct PassingFile {
-  std::string folder = (fs::temp_directory_path() / "osteo-grid-XXXXXX").string();
-  PassingFile() {
-    if (::mkdtemp(folder.data()) == nullptr)
-      throw Error(ExitCode::cannot_write, "no folder can be made in '" + fs::temp_directory_path().string() + "'");
-  }
-  PassingFile(const PassingFile&) = delete;
-  PassingFile& operator=(const PassingFile&) = delete;
-  ~PassingFile() {
-    std::error_code ignored;
-    fs::remove_all(folder, ignored);
-  }
-  [[nodiscard]] fs::path path() const { return fs::path(folder) / "grid.vdb"; }
-};
+constexpr const char* kPassingFile = "grid.vdb";
 py::tuple packed_grid(const SparseGrid& g) {
   std::vector<std::byte> bytes;
   {
     const py::gil_scoped_release free;
-    const PassingFile file;
-    save_data(Data(g), file.path());
-    bytes = read_file(file.path());
+    const TemporaryFolder folder;
+    save_data(Data(g), folder.path() / kPassingFile);
+    bytes = read_file(folder.path() / kPassingFile);
   }
   return py::make_tuple(py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 SparseGrid unpacked_grid(const py::tuple& state) {
   const std::string bytes = state[0].cast<std::string>();
   const py::gil_scoped_release free;
-  const PassingFile file;
-  {
-    std::ofstream out(file.path(), std::ios::binary);
-    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    if (!out) throw Error(ExitCode::cannot_write, "'" + file.path().string() + "' cannot be written");
-  }
-  return std::get<SparseGrid>(load_data(file.path(), std::array{DataKind::grid}));
+  const TemporaryFolder folder;
+  write_file(folder.path() / kPassingFile, bytes);
+  return std::get<SparseGrid>(load_data(folder.path() / kPassingFile, std::array{DataKind::grid}));
 }
 
 std::shared_ptr<TetMesh> unpacked_tets(const py::tuple& state) {

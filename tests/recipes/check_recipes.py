@@ -5,29 +5,24 @@ Each NAME.patch beside this file follows one recipe. It is applied to a copy of 
 of its library or test, layering.py is run, and it is taken back. A recipe whose library the build leaves out (window) is applied, not compiled.
 A patch that no longer applies or compiles: something that the recipe names has changed. Mend the recipe's text, then the patch (edit the files as
 the recipe says, `git diff > tests/recipes/NAME.patch`, `git checkout` what was edited). 0 if all work, 1 if not."""
-import concurrent.futures, json, os, pathlib, re, shlex, shutil, subprocess, sys, tempfile
+import concurrent.futures, json, os, pathlib, re, shutil, subprocess, sys, tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from compile_options import options
 
 source, build = (pathlib.Path(p).resolve() for p in sys.argv[1:3])
 recipes = sorted((source / "tests/recipes").glob("*.patch"))
 contributing = (source / "CONTRIBUTING.md").read_text()
 
 
-def options(command, copy):
-    """Of a compile command: the compiler and what decides how a file reads, with the folders of the copy in place of the tree's."""
-    words, kept, skip = shlex.split(command), [], False
-    while pathlib.Path(words[0]).name in ("ccache", "sccache", "distcc"):
-        words.pop(0)
-    for word in words:
-        if skip:
-            skip = False
-        elif word in ("-o", "-MF", "-MT", "-MQ", "-c"):
-            skip = True
-        elif word not in ("-MD", "-MMD") and not word.startswith(("-O", "-W")):
-            if str(source) in word and str(build) not in word:
-                moved = word.replace(str(source), str(copy))
-                word = moved if not word.startswith("-I") or pathlib.Path(moved[2:]).exists() else word
-            kept.append(word)
-    return [*kept, "-Werror=switch"]
+def options_in(copy, command):
+    """The options, with the folders of the copy in place of the tree's."""
+    def moved(word):
+        if str(source) not in word or str(build) in word:
+            return word
+        there = word.replace(str(source), str(copy))
+        return there if not word.startswith("-I") or pathlib.Path(there[2:]).exists() else word
+    return [*map(moved, options(command)), "-Werror=switch"]
 
 
 # Source file, relative to the tree -> its command. Sources that the build compiles together share the command of their unity file.
@@ -55,7 +50,7 @@ def compiles(file, copy):
     if entry is None:
         return None
     what = ["-include", str(where), "/dev/null"] if file.suffix == ".h" else [str(where)]
-    said = subprocess.run([*options(entry["command"], copy), "-fsyntax-only", "-x", "c++", *what], cwd=entry["directory"], capture_output=True, text=True)
+    said = subprocess.run([*options_in(copy, entry["command"]), "-fsyntax-only", "-x", "c++", *what], cwd=entry["directory"], capture_output=True, text=True)
     return said.stderr if said.returncode else None
 
 

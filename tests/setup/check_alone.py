@@ -4,7 +4,10 @@
 The build compiles several sources of a library as one, which hides an include that one of them lacks. Here each is compiled alone, syntax only,
 with the options of its library. A header that a source includes before anything else is proved by that source; the others are compiled here too.
 Libraries that the build leaves out (copyleft, window) are named and not judged. 0 if all compile, 1 if not."""
-import concurrent.futures, json, os, pathlib, re, shlex, subprocess, sys, tempfile
+import concurrent.futures, json, os, pathlib, re, subprocess, sys, tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from compile_options import options
 
 source, build = (pathlib.Path(p).resolve() for p in sys.argv[1:3])
 INCLUDE = re.compile(r'\s*#\s*include\s+[<"]([^>"]+)')
@@ -16,21 +19,6 @@ def first_include(path):
         if found:
             return found[1]
     return None
-
-
-def options(command):
-    """Of a compile command: the compiler and what decides how a file reads, without input, output and dependency files."""
-    words, kept, skip = shlex.split(command), [], False
-    while words and pathlib.Path(words[0]).name in ("ccache", "sccache", "distcc"):
-        words.pop(0)
-    for word in words:
-        if skip:
-            skip = False
-        elif word in ("-o", "-MF", "-MT", "-MQ", "-c"):
-            skip = True
-        elif word not in ("-MD", "-MMD") and not word.startswith(("-O", "-W")):
-            kept.append(word)
-    return [*kept, "-w"]
 
 
 def compiles(command, cwd, file):
@@ -50,7 +38,7 @@ for entry in json.loads((build / "compile_commands.json").read_text()):
         together += [(found[1], p) for p in own]
         first.update(first_include(p) for p in own)
     if found:
-        library_of.setdefault(found[1], (options(entry["command"]), entry["directory"]))
+        library_of.setdefault(found[1], ([*options(entry["command"]), "-w"], entry["directory"]))
 if not library_of:
     sys.exit(f"{build}/compile_commands.json names no source of {source}/libs")
 

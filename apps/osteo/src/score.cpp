@@ -73,10 +73,10 @@ void add_heat(const SessionReader& session, World begin, const Anatomy& anatomy,
 
 Scored score_folder(const fs::path& session_folder, const ScoreAsked& asked, const Context& context) {
   const SessionFolder folder = open_session_folder(session_folder, asked.case_folder);
-  // Scores of guided sessions never stand among those of unaided ones.
-  if (!folder.guided.empty() && !asked.reference.empty())
+  // Scores of guided sessions never stand among those of unaided ones: neither compared nor in a table.
+  if (!folder.guided.empty() && (!asked.reference.empty() || asked.for_table))
     throw Error(ExitCode::usage, "this session is no work of its own: " + folder.guided,
-                "score it without --reference; sessions that nobody guided may be compared");
+                "score it without --reference and --csv; sessions that nobody guided may be compared");
   const Case the_case = load_case(folder.case_folder);
   const SessionReader session(folder.stream(), Damage::keep);
   // Hardness matters to who runs it again.
@@ -124,18 +124,13 @@ int ScoreCommand::run(const Params& p, cli::Invocation& io) {
   refuse(p.mirror && p.procedure.empty(), "--mirror", "--procedure");
   refuse(!p.subject.empty() && p.reference.empty(), "--subject", "--reference");
   refuse(p.evidence && !io.common.json, "--evidence", "--json");
-  ScoreAsked asked{{}, p.reference, p.subject, p.heat, p.case_folder};
+  ScoreAsked asked{{}, p.reference, p.subject, p.heat, p.case_folder, !p.csv.empty()};
   if (!p.procedure.empty()) {
     asked.procedure = load_procedure(p.procedure);
     if (p.mirror) asked.procedure = mirrored(std::move(*asked.procedure));
   }
   if (!p.csv.empty() && fs::exists(p.csv) && !io.common.force)
     throw Error(ExitCode::cannot_write, "'" + p.csv + "' exists already", "--force replaces it");
-  // Nor in a table.
-  if (const std::string guided = open_session_folder(io.arguments[0], p.case_folder).guided;
-      !guided.empty() && !p.csv.empty())
-    throw Error(ExitCode::usage, "this session is no work of its own: " + guided,
-                "score it without --csv; sessions that nobody guided may be compared");
   const Scored scored = score_folder(io.arguments[0], asked, io.context);
   io.end_progress();
   const Score& score = scored.score;

@@ -198,21 +198,26 @@ Command* Program::find(std::string_view name) const {
   return nullptr;
 }
 
+std::vector<std::string> Program::names() const {
+  std::vector<std::string> all = registry.names();
+  for (const auto& c : commands) all.push_back(c->info().name);
+  return all;
+}
+
 std::vector<Group> Program::grouped() const {
-  std::vector<std::string> names = registry.names();
-  for (const auto& c : commands) names.push_back(c->info().name);
+  const std::vector<std::string> all = names();
   std::vector<Group> result;
   std::set<std::string> placed;
   for (const Group& g : groups) {
     Group there{g.title, {}};
     for (const std::string& name : g.members) {
       if (!placed.insert(name).second) throw Error(ExitCode::failed, "'" + name + "' stands in two groups of commands");
-      if (std::find(names.begin(), names.end(), name) != names.end()) there.members.push_back(name);
+      if (std::find(all.begin(), all.end(), name) != all.end()) there.members.push_back(name);
     }
     if (!there.members.empty()) result.push_back(std::move(there));
   }
   Group rest{groups.empty() ? "Commands" : "Others", {}};
-  for (const std::string& name : names) {
+  for (const std::string& name : all) {
     if (!placed.contains(name)) rest.members.push_back(name);
   }
   if (!rest.members.empty()) result.push_back(std::move(rest));
@@ -249,8 +254,7 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
   const std::string subject = name == "help" ? args.front() : name;
   Command* const command = program.find(subject);
   if (command == nullptr && !program.registry.has(subject)) {
-    std::vector<std::string> known = program.registry.names();
-    for (const auto& c : program.commands) known.push_back(c->info().name);
+    std::vector<std::string> known = program.names();
     known.emplace_back("help");
     const std::string near = nearest_name(subject, known);
     throw Error(ExitCode::usage, "there is no stage or command '" + subject + "'",

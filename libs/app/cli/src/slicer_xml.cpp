@@ -53,12 +53,14 @@ struct Tag {
 // of its own suffix. A point goes as "x,y,z", of several the flag is repeated (vtkSlicerCLIModuleLogic).
 struct SlicerType {
   std::string_view stage, name, tag, attributes;
+  std::string_view also = {};  // a flag that it implies, or none
 };
+constexpr std::string_view kPoints = " multiple=\"true\" coordinateSystem=\"lps\"";
 constexpr std::string_view kPoint = " multiple=\"false\" coordinateSystem=\"lps\"";
 constexpr std::string_view kPointFile = " fileExtensions=\".fcsv\" coordinateSystem=\"lps\"";
 constexpr SlicerType kSlicerTypes[] = {
     {"register", "transform", "transform", " type=\"linear\" fileExtensions=\".tfm\""},
-    {"tube", "points_mm", "point", " multiple=\"true\" coordinateSystem=\"lps\""},
+    {"tube", "points_mm", "point", kPoints},
     {"tube", "points", "pointfile", kPointFile},
     {"tube", "line", "file", " fileExtensions=\".csv\""},
     {"distance-at", "points", "pointfile", kPointFile},
@@ -66,7 +68,7 @@ constexpr SlicerType kSlicerTypes[] = {
     {"curve", "path", "pointfile", kPointFile},
     {"find-structures", "labyrinth_mm", "point", kPoint},
     {"snapshot", "centre_mm", "point", kPoint},
-    {"saw", "at_mm", "point", kPoint},
+    {"saw", "at_mm", "point", kPoint, "--no-from-centre"},  // it counts from where the scene does
     {"simulate", "tool_from_mm", "point", kPoint},
     {"simulate", "tool_to_mm", "point", kPoint},
     {"fit-damping", "at_mm", "point", kPoint},
@@ -260,14 +262,13 @@ std::vector<std::string> from_slicer(const std::string& stage, const std::vector
       continue;
     }
     const auto [known, first] = at.emplace(args[i], out.size() + 1);
-    if (!first && type->attributes.find("\"true\"") != std::string_view::npos) {
+    if (!first && type->attributes == kPoints) {
       out[known->second] += "; " + args[++i];
       continue;
     }
     out.insert(out.end(), {args[i], args[i + 1]});
     ++i;
-    // A point of the scene counts from where the scene does.
-    if (stage == "saw") out.emplace_back("--no-from-centre");
+    if (!type->also.empty()) out.emplace_back(type->also);
   }
   return out;
 }

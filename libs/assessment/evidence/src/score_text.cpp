@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "osteo/assessment/evidence/score.h"
+#include "osteo/core/base/csv.h"
 
 namespace osteo::inline assessment {
 namespace {
@@ -28,15 +29,9 @@ std::string padded(std::string s, std::size_t n) {
   return s;
 }
 
-std::string csv_text(std::string s) {
-  if (!s.empty() && std::string_view("=+-@\t\r").find(s[0]) != std::string_view::npos) s = "'" + s;
-  if (s.find_first_of(",\"\n") == std::string::npos) return s;
-  std::string out = "\"";
-  for (const char c : s) {
-    if (c == '"') out += '"';
-    out += c;
-  }
-  return out + "\"";
+// A name, which a spreadsheet shall show and not work out.
+std::string no_formula(const std::string& name) {
+  return is_formula(name) ? "'" + name : name;
 }
 
 }  // namespace
@@ -112,23 +107,23 @@ Json score_json(const Score& score, bool evidence) {
 }
 
 std::string score_csv(const Score& score, const std::string& session) {
-  std::string header = "session", row = csv_text(session);
+  std::vector<std::string> header{"session"}, row{no_formula(session)};
   const auto put = [&](const std::string& name, const std::string& value) {
-    header += "," + csv_text(name);
-    row += "," + value;
+    header.push_back(no_formula(name));
+    row.push_back(value);
   };
   const ScoreSource& source = score.source;
   for (const auto& [name, value] :
        {std::pair{"stream", source.stream}, std::pair{"bone", source.bone}, std::pair{"procedure", source.procedure},
         std::pair{"recorded_by", source.recorded_by}, std::pair{"scored_by", source.scored_by},
         std::pair{"marks", source.marks()}})
-    put(name, csv_text(value));
+    put(name, no_formula(value));
   for (const Measured& m : score.values) put(m.name(), m.value ? format_number(*m.value) : "");
   for (const Product::Result& r : score.items) {
     put("item[" + r.item->name + "]", r.measured ? format_number(r.value) : "");
     put("pass[" + r.item->name + "]", r.measured ? (r.pass ? "1" : "0") : "");
   }
-  return header + "\n" + row + "\n";
+  return csv_line(header) + csv_line(row);
 }
 
 std::string score_lines(const Score& score) {

@@ -33,11 +33,6 @@ std::string listed(const std::vector<std::string>& names) {
   return all;
 }
 
-// What a spreadsheet takes for a formula, and works out, when it opens a table.
-bool is_formula(const std::string& text) {
-  return !text.empty() && std::string_view("=+-@\t\r").find(text[0]) != std::string_view::npos;
-}
-
 std::string* text_of(Source& s, const std::string& column) {
   return column == "stream"        ? &s.stream
          : column == "bone"        ? &s.bone

@@ -73,6 +73,10 @@ Csv read_csv(std::string_view text, const std::string& name) {
   return csv;
 }
 
+bool is_formula(std::string_view field) {
+  return !field.empty() && std::string_view("=+-@\t\r").find(field[0]) != std::string_view::npos;
+}
+
 std::string csv_line(const std::vector<std::string>& fields) {
   std::string line;
   for (std::size_t i = 0; i < fields.size(); ++i) {

@@ -372,14 +372,14 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
   tube.radius_min_mm = 1e9;
   double worst = 0, since = 0;  // without walls and without a given point
   std::vector<std::array<double, 2>> open_mm;
+  const auto extend = [](std::vector<std::array<double, 2>>& stretches, bool goes_on, double arc_mm) {
+    if (!goes_on) stretches.push_back({arc_mm, arc_mm});
+    stretches.back()[1] = arc_mm;
+  };
   for (std::size_t i = 0; i < n; ++i) {
     const TubeStation& t = tube.stations[i];
     tube.confidence += t.confidence / static_cast<double>(n);
-    if (t.confidence < 0.5) {
-      const bool goes_on = i > 0 && tube.stations[i - 1].confidence < 0.5;
-      if (!goes_on) tube.unsure_mm.push_back({t.arc_mm, t.arc_mm});
-      tube.unsure_mm.back()[1] = t.arc_mm;
-    }
+    if (t.confidence < 0.5) extend(tube.unsure_mm, i > 0 && tube.stations[i - 1].confidence < 0.5, t.arc_mm);
     if (t.walls >= 0.5) {
       sure += 1;
       tube.radius_mean_mm += t.radius_mm;
@@ -388,9 +388,8 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
       continue;
     }
     const bool goes_on = i > 0 && tube.stations[i - 1].walls < 0.5;
-    if (!goes_on) open_mm.push_back({t.arc_mm, t.arc_mm});
+    extend(open_mm, goes_on, t.arc_mm);
     if (!goes_on || given[i]) since = t.arc_mm;
-    open_mm.back()[1] = t.arc_mm;
     worst = std::max(worst, t.arc_mm - since);
   }
   if (worst > params.max_unsure_mm || sure < 0.25 * static_cast<double>(n)) {

@@ -123,6 +123,8 @@ struct Program {
     commands.push_back(std::make_unique<CommandOf<C>>());
   }
   [[nodiscard]] Command* find(std::string_view name) const;
+  /// Of all stages, then of all commands.
+  [[nodiscard]] std::vector<std::string> names() const;
   /// The groups with the names that this build has, those of no group last. Error(failed) for a name in two groups.
   [[nodiscard]] std::vector<Group> grouped() const;
   [[nodiscard]] std::string synopsis_of(std::string_view name) const;

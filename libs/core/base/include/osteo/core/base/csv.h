@@ -23,6 +23,8 @@ struct Csv {
 };
 /// Error(usage) with file and line: a quote that is not closed, a row of another length, a column that is there twice.
 [[nodiscard]] Csv read_csv(std::string_view text, const std::string& name);
+/// What a spreadsheet takes for a formula, and works out, when it opens a table.
+[[nodiscard]] bool is_formula(std::string_view field);
 [[nodiscard]] std::string csv_line(const std::vector<std::string>& fields);
 
 }  // namespace osteo
