@@ -141,6 +141,28 @@ void bench_contact() {
                                     std::uniform_real_distribution<double> u(-4, 4);
                                     return Vec3{0.15 * u(r), u(r), 1 / s3};
                                   }},
+                                 // Where a surgeon drills most: concave bone, and a rim.
+                                 {"pit of 2.5 mm",
+                                  [](Vec3 p) { return p.z > 2 ? p.z : 2.5 - length(p); },
+                                  {},
+                                  [](std::mt19937& r) {
+                                    std::uniform_real_distribution<double> u(-0.5, 0.5);
+                                    return normalized({u(r), u(r), -1}) * 2.5;
+                                  }},
+                                 {"groove of 120 degrees",
+                                  [s3, c3](Vec3 p) { return std::min(p.z * c3 - p.x * s3, p.z * c3 + p.x * s3); },
+                                  {},
+                                  [](std::mt19937& r) {  // where the ball touches both sides
+                                    std::uniform_real_distribution<double> u(-4, 4);
+                                    return Vec3{0.05 * u(r), u(r), 2 / std::cos(M_PI / 6) - 2};
+                                  }},
+                                 {"edge of 90 degrees",
+                                  [](Vec3 p) { return std::max(p.x, p.z); },
+                                  {},
+                                  [](std::mt19937& r) {
+                                    std::uniform_real_distribution<double> u(-4, 4);
+                                    return Vec3{-0.25 + 0.05 * u(r), u(r), 0};
+                                  }},
                                  {"closed smooth shape",
                                   [](Vec3 p) { return test::duck(p) / std::max(length(slope_of(test::duck, p)), 0.5); },
                                   {30, 0, 0},
@@ -162,7 +184,7 @@ void bench_contact() {
     std::vector<Pose> poses;
     while (poses.size() < 200) {
       const Vec3 p = body.place(random), n = normalized(slope_of(body.distance, p + Vec3{1e-3, 2e-3, 3e-3}));
-      const Vec3 away = std::strcmp(body.name, "wedge of 60 degrees") == 0 ? Vec3{0, 0, 1} : n;
+      const Vec3 away = std::strcmp(body.name, "wedge of 60 degrees") == 0 || body.name[0] == 'g' ? Vec3{0, 0, 1} : n;
       const double d = deep(random);
       const Vec3 x = p + away * (r - d);
       // The float pose is the true one.
@@ -180,6 +202,13 @@ void bench_contact() {
         if (edge) {
           sd = length(q);
           out = normalized(q);
+        }
+      } else if (body.name[0] == 'g') {
+        // Pressed against both sides it rests where it touches both.
+        const Vec3 back = Vec3{0, exact.y, r / c3} - exact;
+        if (std::abs(back.x) < back.z * s3 / c3) {
+          sd = r - length(back);
+          out = normalized(back);
         }
       } else if (body.name[0] == 'c') {
         for (int i = 0; i < 20; ++i) {  // foot of the perpendicular

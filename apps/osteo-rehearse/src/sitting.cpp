@@ -3,9 +3,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
+#include <thread>
 #include <utility>
 
 #include "osteo/core/base/error.h"
@@ -14,6 +16,7 @@
 #include "osteo/session/recording/session_reader.h"
 #include "osteo/session/scene/free_ways.h"
 #include "osteo/simulation/bone/plates.h"
+#include "osteo/simulation/haptics/device_measure.h"
 #include "playback_words.h"
 
 namespace osteo {
@@ -26,6 +29,17 @@ Vec3 near_the_bone(const World& world, const HandGoal& start) {
   } catch (const Error&) {
     return start.position_mm;
   }
+}
+
+// What the guard goes by; of an arm with motors, as its loop really is. The session's header keeps it.
+DeviceTraits measured(Device& device, double rate_hz, cli::Invocation& io) {
+  if (!device.held().has_motors()) return device.traits();
+  auto next = std::chrono::steady_clock::now();
+  const auto tick = std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(1 / rate_hz));
+  const MeasuredDevice m =
+      measure_device(device.held(), 1 / rate_hz, [&] { std::this_thread::sleep_until(next += tick); });
+  if (!m.delay_measured || !io.common.quiet) io.err << m.told << std::endl;
+  return m.traits;
 }
 
 // When the display goes away Xlib ends the program, by exit(): the session is closed first.
@@ -119,9 +133,10 @@ HandGoal Sitting::begin(bool from_case, const HandView& view) {
   const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
   auto devices = hands_.make(start, near_the_bone(world, start));
   if (live_.hosts()) live_.add_hand(devices, options_);
-  options_.haptics.device = devices.front()->traits();
+  options_.haptics.device = measured(*devices.front(), options_.rate_hz, io_);
   options_.haptics.more_devices.clear();
-  for (std::size_t h = 1; h < devices.size(); ++h) options_.haptics.more_devices.push_back(devices[h]->traits());
+  for (std::size_t h = 1; h < devices.size(); ++h)
+    options_.haptics.more_devices.push_back(measured(*devices[h], options_.rate_hz, io_));
   options_.soft = soft_tissue_of(case_.folder);
   run(std::move(world), std::move(devices), session.resumed_from,
       live_.hosts() ? "live tutoring: the second hand is a trainee's, far away" : "");

@@ -103,6 +103,15 @@ TEST(Operation, EverythingComesOutTheSameFromTheStream) {
       EXPECT_GE(session.actions.size(), everything().size());
       const ReplayResult again = replay(SessionReader(file), start.copy(), {}, {});
       EXPECT_TRUE(again.identical) << again.difference << (by_the_clock ? " in real time" : "");
+      // What undo gave back is not gone; nor is what was moved.
+      const auto bone_mm3 = [](const World& world) {
+        double mm3 = 0;
+        for (const PlacedBody& b : world.bodies()) mm3 += b.body->bone.sum() * 0.5 * 0.5 * 0.5;
+        return mm3;
+      };
+      EXPECT_NEAR(s.gone_mm3, bone_mm3(start) - bone_mm3(*again.world), 1e-6);
+      EXPECT_GT(s.gone_mm3, 60);
+      EXPECT_LT(s.gone_mm3, s.removed_mm3 + s.sawn_mm3 + s.crumbs_mm3 + 1e-3);
       EXPECT_TRUE(again.complete);
       EXPECT_EQ(again.bone_hash, s.bone_hash);
     }

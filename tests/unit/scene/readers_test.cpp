@@ -362,6 +362,7 @@ TEST(Strokes, AreTakenBackLiveAndInAReplay) {
     // In real time nothing is removed while a scene is prepared, on a busy machine for the length of whole holes.
     EXPECT_GT(s.removed_mm3, by_the_clock ? 0.0 : 2.0);
     EXPECT_EQ(s.bone_hash, world.hash()) << "all of it was taken back, to the bit";
+    EXPECT_EQ(s.gone_mm3, 0) << "though " << s.removed_mm3 << " were drilled";
     EXPECT_EQ(s.surface_hash, SurfaceReader(world, {}).hash());
     EXPECT_EQ(s.bodies, 1u);
     ASSERT_TRUE(s.dust);

@@ -12,6 +12,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
+// Kernel of contact whose guard forgot at the end of each contact; only in that does it differ from today's.
+constexpr int kForgetfulGuard = 2;
+
 const char* const kRoles[] = {"input", "result", "machine"};
 
 ordered_json record_json(const RecordTable& table) {
@@ -253,7 +256,9 @@ std::string header_json(const SessionHeader& h) {
   j["hands"] = h.haptics.hands();
   j["dust"] = h.dust;
   if (h.dust) j["dust_model"] = h.dust_model;
-  j["kernels"] = {{"burrs", h.kernels.burrs}, {"contact", h.kernels.contact}, {"scene", h.kernels.scene}};
+  // Where an older session goes on under its own settings, it is told by them.
+  const int contact = h.haptics.params.guard.law == 1 ? kForgetfulGuard : h.kernels.contact;
+  j["kernels"] = {{"burrs", h.kernels.burrs}, {"contact", contact}, {"scene", h.kernels.scene}};
   for (const RecordTable* const t : {&tick_table(), &change_table(), &action_record_table()})
     j["records"][std::string(t->name)] = record_json(*t);
   j["records"]["note"] = {{"part", kNotesPart}, {"text", true}, {"meaning", "a line of JSON each: tick, kind, value"}};
@@ -284,7 +289,9 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   if (!(h.rate_hz > 0)) throw Error(ExitCode::corrupt, name + " tells of no rate");
   const auto& k = j.at("kernels");
   h.kernels = {k.at("burrs"), k.at("contact"), k.at("scene")};
-  if (h.kernels != Kernels{})
+  Kernels repeated = h.kernels;
+  if (repeated.contact == kForgetfulGuard) repeated.contact = Kernels{}.contact;
+  if (repeated != Kernels{})
     say_not_replayable(o, "burrs, contact or scene of " + h.program_version + " give other bits than this version's");
   for (const auto& [kind, record] : j.at("records").items()) tables.push_back(table_of(kind, record, name, o));
   const auto has = [&](std::uint32_t part) {
@@ -314,6 +321,7 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   if (j.at("hands") != h.haptics.hands())
     throw Error(ExitCode::corrupt, name + " does not tell of a device for each hand");
   if (h.haptics.hands() > kMostHands) say_not_replayable(o, "it has " + std::to_string(h.haptics.hands()) + " hands");
+  if (h.kernels.contact == kForgetfulGuard) h.haptics.params.guard.law = 1;
   for (const auto& [setting, value] : j.at("haptics").at("params").items()) o.setting_names.push_back(setting);
   for (const std::string& u : unknown) {
     o.newer.push_back("the setting '" + u + "'");

@@ -28,6 +28,12 @@ std::vector<Device*> pointers(const std::vector<std::unique_ptr<Device>>& device
 constexpr const char* kUndoLost =
     "undo history lost: the machine did not keep up, and what was done before that cannot be undone";
 
+double bone_mm3_of(const World& world) {
+  double mm3 = 0;
+  for (const PlacedBody& b : world.bodies()) mm3 += b.body->bone.sum() * b.body->bone.frame().voxel_volume_mm3();
+  return mm3;
+}
+
 }  // namespace
 
 Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const RehearsalOptions& options,
@@ -40,6 +46,7 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
       options_(options),
       voxel_mm3_(world.bodies().front().body->bone.frame().voxel_volume_mm3()),
       finest_voxel_mm_(world.finest_voxel_mm()),
+      bone_mm3_(bone_mm3_of(world)),
       operation_(std::move(world), options.haptics, options.anatomy, pointers(devices_), stream_, options.rate_hz),
       hub_(stream_.add_reader(), operation_.world()),
       keeper_end_(stream_.add_reader(Recorder::kTickCapacity)),
@@ -462,7 +469,12 @@ RehearsalSummary Rehearsal::finish() {
   s.tissue_mm3 = tissue_mm3_;
   s.tissue = tissue();
   // After a failure nobody knows whether all of it went into the stream.
-  if (!failure_) s.bone_hash = operation_.world().hash();
+  if (!failure_) {
+    s.bone_hash = operation_.world().hash();
+    // Bodies may be summed in another order than at the beginning.
+    const double gone = bone_mm3_ - bone_mm3_of(operation_.world());
+    s.gone_mm3 = gone > 1e-9 * bone_mm3_ ? gone : 0;
+  }
   s.ticks_not_followed = hub_.ticks_lost();
   if (strokes_lost_) s.warnings.emplace_back(kUndoLost);
   s.voxel_mm3 = voxel_mm3_;

@@ -285,6 +285,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   j["hardness"] = hardness_of(anatomy);
   if (s.sawn_mm3 > 0) j["sawn_mm3"] = s.sawn_mm3;
   if (s.crumbs_mm3 > 0) j["crumbs_mm3"] = s.crumbs_mm3;
+  j["gone_mm3"] = s.gone_mm3;
   if (s.tissue_mm3 > 0) j["tissue_cut_off_mm3"] = s.tissue_mm3;
   for (const SoftTissue::Facts& f : s.tissue) j["tissue"].push_back({{"name", f.name}, {"cut_off_mm3", f.cut_off_mm3}});
   if (s.bodies > 1) j["bodies"] = s.bodies;

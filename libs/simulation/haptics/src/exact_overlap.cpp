@@ -95,6 +95,12 @@ ContactResult contact_of_overlap(const ContactParams& params, std::size_t tool, 
   r.normal_force_n = left * params.force_n(r.depth_mm);
   r.force_n = r.normal * r.normal_force_n;
   r.torque_n_mm = cross(axis, overlap.area_foot_mm3) * (-r.normal_force_n / pressed);
+  // In a hollow there is more area than in the flat cut, so on the way out the depth changes by as much more than the
+  // way. Volumes go with a power of the way: on flat bone the second, in a hollow of the burr's own shape the first;
+  // rather too little is told than too much, which would dull the way out.
+  const double against = head_cut_depth(tool).area_mm2(overlap.sharp_mm3, cosine) / pressed,
+               power = std::clamp(2 * against, 1.0, 2.0);
+  r.stored_mj = left * params.energy_mj(r.depth_mm) * against * 2 * power / (2 + power);
   // Where a rigid tool would be: the hand's depth back along the push.
   r.shown_offset_mm = r.normal * (r.depth_mm * left);
   return r;
@@ -180,6 +186,7 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   if (cutting_) r.depth_mm = std::min(r.depth_mm, teeth(bone, answer.proxy_mm, -offset, normal));
   const double law = params_.force_n(r.depth_mm);
   r.force_n = normalized(offset) * law;
+  r.stored_mj = params_.energy_mj(r.depth_mm);
   // A burr that turns has no friction: all walls that it rests on together push against the hand, and all of that
   // presses on it.
   r.normal = cutting_ ? normalized(offset) : normal;

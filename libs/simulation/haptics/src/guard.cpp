@@ -16,6 +16,13 @@ Vec3 direction(Vec3 v) {
   const double n2 = dot(v, v);
   return std::abs(n2 - 1) < 1e-6 ? v : normalized(finite_or_zero(v));
 }
+// What strokes with the drag may get back of what strokes against it have cost, mJ.
+constexpr double kDragCreditMj = 0.1;
+// Energy put in beyond what contact would give back (bone taken away, damping) buys no gains later, but for this.
+constexpr double kCreditShare = 0.5, kCreditMj = 0.1;
+// The way over which the share of the force follows.
+constexpr double kShareMm = 0.02;
+
 // A limit that is not a number is the strictest.
 double limit_of(double value) {
   return value > 0 ? value : 0;
@@ -46,6 +53,40 @@ double PassivityControl::update(Vec3 x_mm, Vec3 elastic_n, Vec3 velocity_mm_s, d
   return std::min((energy_mj_ - feigned) / (speed2 * dt_s) * 1000, most);
 }
 
+double EnergyDebt::update(Vec3 x_mm, Vec3 elastic_n, double stored_mj, Vec3 velocity_mm_s, double dt_s,
+                          double encoder_mm) noexcept {
+  const double stored = stored_mj > 0 && std::isfinite(stored_mj) ? stored_mj : 0;
+  if (started_)
+    given_mj_ += dot(last_force_n_, x_mm - last_x_mm_);
+  else
+    given_mj_ = std::min(given_mj_, -stored);
+  started_ = true;
+  last_x_mm_ = x_mm;
+  if (!std::isfinite(given_mj_)) given_mj_ = 0;
+  if (elastic_n == Vec3{}) {
+    // As much may encoder steps feign.
+    given_mj_ = std::clamp(given_mj_ - limit_of(encoder_mm) * most_n_, 0.0, kMostOwedMj);
+    owed_mj_ = given_mj_;
+    most_n_ = out_mm_ = 0;
+    fits_ = 1;
+    return share_ = 1;
+  }
+  most_n_ = std::max(most_n_, length(elastic_n));
+  double wanted = 1;
+  const double way_mm = length(velocity_mm_s) * dt_s, reach_mm = kShareMm + 4 * limit_of(encoder_mm);
+  if (stored > 0) {
+    given_mj_ = std::max(given_mj_, -(1 + kCreditShare) * stored - kCreditMj);
+    if (dot(elastic_n, velocity_mm_s) > 0) {
+      out_mm_ += way_mm;
+      wanted = std::clamp((limit_of(encoder_mm) * most_n_ - given_mj_) / (fits_ * stored), kLeastShare, 1.0);
+    } else if (out_mm_ < reach_mm) {
+      fits_ = std::clamp((owed_mj_ - given_mj_) / stored, kLeastShare, 1.0);
+    }
+  }
+  share_ += (wanted - share_) * std::min(1.0, way_mm / reach_mm);
+  return share_;
+}
+
 Guard::Guard(const GuardParams& params, const DeviceTraits& device) : device_(device) {
   set(params);
 }
@@ -62,6 +103,8 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
   if (in.jumped || !placed) {
     moving_ = false;
     passivity_.reset();
+    drag_.reset();
+    debt_.jumped();
     resume_ = 0;
     out.flags |= kPoseJumped;
   }
@@ -81,8 +124,10 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
     resume_ = params_.resume_s > 0 ? std::min(1.0, resume_ + dt / params_.resume_s) : 1.0;
     share = resume_;
   }
-  const Vec3 elastic = finite_or_zero(in.elastic_n) * share;
-  Vec3 force = elastic;
+  Vec3 elastic = finite_or_zero(in.elastic_n) * share;
+  const bool owes = params_.passivity && params_.law > 1;
+  if (owes) elastic = elastic * debt_.update(at, elastic, in.stored_mj, velocity_, dt, device_.encoder_mm);
+  Vec3 force = elastic, effects = finite_or_zero(in.effects_n) * share;
   if (!(elastic == Vec3{})) {
     // Damping may slow the hand's way out, but never hold it.
     const Vec3 normal = direction(in.normal);
@@ -97,7 +142,17 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
       out.flags |= kPassivity;
     }
   }
-  const Vec3 effects = finite_or_zero(in.effects_n) * share;
+  if (owes) {
+    const Vec3 drag = finite_or_zero(in.drag_n) * share;
+    const double alpha = drag_.update(at, drag, velocity_, dt, device_.encoder_mm, params_.max_damping_n_s_per_m);
+    drag_.keep_at_most(kDragCreditMj);
+    const Vec3 damping = alpha > 0 ? velocity_ * (-alpha / 1000) : Vec3{};
+    if (alpha > 0) {
+      effects += damping;
+      out.flags |= kPassivity;
+    }
+    drag_.applied(drag + damping);
+  }
   force = finite_or_zero(force + effects);
   if (const double n = length(force); n > most_n_) {
     force = force * (most_n_ / n);
@@ -111,6 +166,7 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
   }
   last_force_n_ = force;
   passivity_.applied(force - effects);
+  debt_.applied(force - effects);
   out.force_n = force;
   return out;
 }

@@ -132,6 +132,8 @@ void HandRenderer::feel(const DeviceSample& sample) noexcept {
   in.elastic_n = elastic;
   in.normal = contact_.normal == Vec3{} ? normalized(elastic) : contact_.normal;
   in.effects_n = driven;
+  in.drag_n = drag_n_;
+  in.stored_mj = elastic == contact_.force_n ? contact_.stored_mj : 0;
   const Guard::Output out = guard_.limit(in, common_.dt_s);
   flags_ |= out.flags;
   if (common_.held) flags_ |= kHeld;
@@ -248,7 +250,7 @@ void HandRenderer::combine() noexcept {
   bool may_add = true;
   std::uint32_t immersed = 0;
   Vec3 force{}, torque{};
-  double bone_mm3 = 0;
+  double bone_mm3 = 0, stored_mj = 0;
   for (std::size_t i = 0; i < touched_count_; ++i) {
     const Touch& t = touched_[i];
     const OverlapResult* const o = t.model->overlapped();
@@ -258,6 +260,7 @@ void HandRenderer::combine() noexcept {
     force += t.contact.force_n;
     torque += t.contact.torque_n_mm;
     bone_mm3 += t.contact.bone_mm3;
+    stored_mj += t.contact.stored_mj;
   }
   if (may_add) {
     contact_ = contact_of_overlap(law_, pose_.tool, sum, axis_);
@@ -265,6 +268,7 @@ void HandRenderer::combine() noexcept {
     contact_.force_n = force;
     contact_.torque_n_mm = torque;
     contact_.bone_mm3 = bone_mm3;
+    contact_.stored_mj = stored_mj;
     contact_.normal = normalized(force);
     contact_.normal_force_n = length(force);
   }
@@ -285,6 +289,7 @@ void HandRenderer::escape() noexcept {
   contact_.shown_offset_mm =
       contact_.shown_offset_mm * (1 - share) + out.outwards * (share * (out.depth_mm + radius_mm));
   contact_.normal_force_n = std::max(0.0, dot(contact_.force_n, contact_.normal));
+  contact_.stored_mj = 0;
   contact_.depth_mm = std::max(contact_.depth_mm, share * (out.depth_mm + radius_mm));
   flags_ |= kEscape;
 }
@@ -348,6 +353,7 @@ void HandRenderer::press_shaft(Vec3& elastic, Vec3& torque) noexcept {
 Vec3 HandRenderer::effects() noexcept {
   const Burr* const edge = instrument_->cutter();
   const bool turns = pose_.pedal != 0 && edge != nullptr;
+  drag_n_ = {};
   Vec3 shaken{};
   if (texture_ && usable_)
     shaken = texture_->step(at_, contact_.normal, turns || plate() ? 0 : contact_.normal_force_n);
@@ -358,6 +364,7 @@ Vec3 HandRenderer::effects() noexcept {
   Vec3 driven;
   if (instrument_->kind == InstrumentKind::burr)
     driven = cross(contact_.normal, axis_) * (turn * std::min(1.0, speed) * with.drag * contact_.normal_force_n);
+  drag_n_ = driven;
   if (with.vibration) {
     const auto v = vibration_.step(edge->kind, contact_.normal_force_n, common_.dt_s, speed * instrument_->speed_share);
     const Vec3 u = any_perpendicular(axis_);

@@ -106,6 +106,7 @@ class HandRenderer {
   std::size_t touched_count_ = 0;
   const HapticScene::Item* loaded_ = nullptr;  // that the tool presses on most
   ContactResult contact_;
+  Vec3 drag_n_;  // of the teeth, before limits
   TickRecord record_;
 };
 

@@ -55,6 +55,8 @@ struct RehearsalSummary {
   double removed_mm3 = 0;                 ///< by the burr
   double sawn_mm3 = 0;                    ///< by the saw
   double crumbs_mm3 = 0;                  ///< crumbs of splits
+  double gone_mm3 = 0;                    ///< of the bone at the beginning, what is not there at the end: without what
+                                          ///< undo gave back, which the three above count; 0 after a failure
   double tissue_mm3 = 0;                  ///< soft tissue cut off, as at rest
   std::vector<SoftTissue::Facts> tissue;  ///< each body; empty where the scene has none
   std::string bone_hash, surface_hash;
@@ -192,6 +194,7 @@ class Rehearsal {
   std::vector<std::unique_ptr<Device>> devices_;
   RehearsalOptions options_;
   double voxel_mm3_, finest_voxel_mm_;
+  const double bone_mm3_;  // at the beginning
   Stream stream_;
   std::unique_ptr<Recorder> recorder_;
   Operation operation_;

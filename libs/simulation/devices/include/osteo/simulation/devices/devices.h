@@ -235,6 +235,7 @@ class WoodenHapticsDevice final : public Device, public LendsHand, public TunedH
   void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
   void feel(Vec3 force_n, Vec3 normal, double stiffness_n_per_mm) noexcept override;
   [[nodiscard]] DeviceTraits traits() const override;
+  [[nodiscard]] bool has_motors() const override { return true; }
   [[nodiscard]] DeviceMotion motion() const noexcept override;
   [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
   [[nodiscard]] std::string trouble() const override { return trouble_of(link_, pedal_); }

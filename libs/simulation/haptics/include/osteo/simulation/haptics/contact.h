@@ -47,6 +47,15 @@ struct ContactParams {
     const double f = soft_stiffness_n_per_mm * soft + stiffness_n_per_mm * (depth_mm - soft);
     return f < max_force_n ? f : max_force_n;
   }
+  /// What a wall of this law gives back from a depth, mJ.
+  [[nodiscard]] double energy_mj(double depth_mm) const noexcept {
+    const auto under = [most = max_force_n](double from, double slope, double to_go) {
+      const double rising = from + slope * to_go <= most ? to_go : (most - from) / slope;
+      return (from + 0.5 * slope * rising) * rising + most * (to_go - rising);
+    };
+    const double soft = depth_mm < soft_depth_mm ? depth_mm : soft_depth_mm;
+    return under(0, soft_stiffness_n_per_mm, soft) + under(force_n(soft), stiffness_n_per_mm, depth_mm - soft);
+  }
 };
 
 struct ContactResult {
@@ -59,6 +68,7 @@ struct ContactResult {
   double bone_mm3 = 0;         ///< bone inside the burr
   std::uint32_t immersed = 0;  ///< samples, or voxels that will be cut
   Vec3 shown_offset_mm;        ///< from the pose to where the tool is shown: at the surface
+  double stored_mj = 0;        ///< about what it would give back on the way out, by its law; 0: the method cannot tell
 };
 
 /// What a model hands over for removal: every voxel once.

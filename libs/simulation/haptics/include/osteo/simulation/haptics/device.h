@@ -50,6 +50,8 @@ class Device {
   [[nodiscard]] virtual Device& held() noexcept { return *this; }
   /// What the guard needs to know of it.
   [[nodiscard]] virtual DeviceTraits traits() const { return {}; }
+  /// It pushes the hand, so its loop can be measured (measure_device). Only then.
+  [[nodiscard]] virtual bool has_motors() const { return false; }
   /// What went wrong in threads of its own, in words; empty: nothing. From any thread.
   [[nodiscard]] virtual std::string trouble() const { return {}; }
   /// False when the device has no more to say (end of a script).

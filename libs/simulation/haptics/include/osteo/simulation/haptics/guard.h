@@ -26,6 +26,9 @@ struct GuardParams {
   double resume_s = 0.1;
   double stale_ms = 10;
   double fade_ms = 40;
+  /// Which arithmetic; no setting. 2, or 1 for the replay of sessions whose kernel of contact is 2: nothing is owed
+  /// from one contact to the next, and drag may give energy.
+  int law = 2;
 
   static void describe(GuardParams& p, auto& visit) {
     visit({"limit_force_n", "the hand never feels more", "N", 0, 100}, p.max_force_n);
@@ -62,6 +65,8 @@ class PassivityControl {
   [[nodiscard]] double energy_mj() const { return energy_mj_; }  ///< positive: given, not yet taken out
   /// What the controller really applied, so that the sum stays true.
   void applied(Vec3 force_n) noexcept { last_force_n_ = force_n; }
+  /// Of energy that was taken, no more than this may be given back before damping begins.
+  void keep_at_most(double mj) noexcept { energy_mj_ = energy_mj_ < -mj ? -mj : energy_mj_; }
   void reset() noexcept { *this = {}; }
 
  private:
@@ -70,8 +75,37 @@ class PassivityControl {
   bool started_ = false;
 };
 
-/// All limits in one place, in this order: fading and resuming, damping and passivity, force cap, rate cap. The last
-/// thing between whatever went wrong before and a hand. No allocation. The same input gives the same bits.
+/// What a law of force gives on closed ways that no energy stands behind. Damping does not take it out: it comes by and
+/// by, and the sum turns positive at the release, where no force is left to damp with. So what the hand has put in is
+/// compared with what contact would still give back by its law: where that is more, the force on the way out, and only
+/// there, is reduced in proportion, and both end together. What was given all the same is owed, and paid on the way out
+/// of the next contacts. It goes by ways and not by speeds: nothing happens at rest, and it cannot stick. Bone taken
+/// away is energy put in, so that a drilling stroke owes nothing; a hand that starts within bone owes nothing either.
+class EnergyDebt {
+ public:
+  static constexpr double kLeastShare = 0.5;  ///< no force is reduced further
+  static constexpr double kMostOwedMj = 0.5;  ///< no more is held against a hand
+  /// The share of `elastic_n` to apply now. `stored_mj`: what contact would give on the way out; 0: not known, the
+  /// share goes to 1.
+  double update(Vec3 x_mm, Vec3 elastic_n, double stored_mj, Vec3 velocity_mm_s, double dt_s,
+                double encoder_mm) noexcept;
+  void applied(Vec3 force_n) noexcept { last_force_n_ = force_n; }
+  /// Given since first touch and owed from before; negative: the hand has put in more.
+  [[nodiscard]] double given_mj() const { return given_mj_; }
+  /// The hand is somewhere else: the way there was none.
+  void jumped() noexcept { started_ = false; }
+
+ private:
+  Vec3 last_x_mm_, last_force_n_;
+  double given_mj_ = 0, share_ = 1, most_n_ = 0;
+  // What is said to be stored is known roughly in hollows. The first way in tells it: what went in then comes out again.
+  double owed_mj_ = 0, fits_ = 1, out_mm_ = 0;
+  bool started_ = false;
+};
+
+/// All limits in one place, in this order: fading and resuming, debt, damping and passivity, force
+/// cap, rate cap. The last thing between whatever went wrong before and a hand. No allocation. The same input gives the
+/// same bits.
 class Guard {
  public:
   /// A limit that is negative or not a number counts as 0: no force, or none that changes.
@@ -83,9 +117,11 @@ class Guard {
     Vec3 position_mm;
     Vec3 elastic_n;     ///< of contact and constraints: what must not create energy
     Vec3 normal;        ///< unit, of the contact; zero without
-    Vec3 effects_n;     ///< drag and vibration: a motor drives them, they may
+    Vec3 effects_n;     ///< drag, vibration, what leads the hand: a motor drives them, they may
     double age_ms = 0;  ///< of the pose
     bool jumped = false;
+    Vec3 drag_n{};         ///< of effects_n, the pull of the teeth: it pulls, but does not drive a hand that yields
+    double stored_mj = 0;  ///< what contact would give back from here (EnergyDebt); 0: not known
   };
   struct Output {
     Vec3 force_n;
@@ -102,7 +138,8 @@ class Guard {
   GuardParams params_;
   DeviceTraits device_;
   double most_n_ = 0;
-  PassivityControl passivity_;
+  PassivityControl passivity_, drag_;
+  EnergyDebt debt_;
   Vec3 velocity_, last_x_mm_, last_force_n_;
   bool moving_ = false;  // last_x_mm_ is of the tick before
   double resume_ = 1;    // 0 right after a jump, 1 when the force is back
