@@ -1,4 +1,4 @@
-// Flags of the nerve monitor's console: declared once, for 'osteo console', which passes them on, and for
+// Flags of the nerve monitor's console: declared once, for 'osteo nerve-console', which passes them on, and for
 // osteo-console.
 #pragma once
 #include <string>

@@ -53,10 +53,10 @@ for lib, (public, private) in table.items():
     bad += [f"libs/layers.txt: {lib} lists {o}, which a build may leave out" for o in (public | private) & set(kinds["research"]) if lib not in kinds["research"]]
 
 # Public headers: what other projects may include. Those in detail/ come along with one of them and are for their own library and for tests.
-kMostPublicHeaders = 200
+kMaxPublicHeaders = 200
 public_headers = [p for p in sorted((root / "libs").glob("*/*/include/osteo/*/*/*.h")) if p.parent.name not in programs]
-if len(public_headers) > kMostPublicHeaders:
-    bad.append(f"{len(public_headers)} public headers, where {kMostPublicHeaders} are allowed: is the new one private (src/), detail/, or part of one that is there?")
+if len(public_headers) > kMaxPublicHeaders:
+    bad.append(f"{len(public_headers)} public headers, where {kMaxPublicHeaders} are allowed: is the new one private (src/), detail/, or part of one that is there?")
 for p in public_headers:
     if not re.match(r"// \w|/// @class", p.read_text()):
         bad.append(f"{p.relative_to(root)} does not say in its first line what it is for")

@@ -521,9 +521,8 @@ py::tuple run(const std::string& name, const py::sequence& inputs, const py::dic
   const auto fields = stage->fields();
   for (const auto& [key, value] : params) {
     const std::string wanted = py::str(key);
-    const auto field =
-        std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == wanted; });
-    if (field == fields.end()) throw Error(ExitCode::usage, "stage '" + name + "' has no parameter '" + wanted + "'");
+    const FieldRef* const field = find_field(fields, wanted);
+    if (field == nullptr) throw Error(ExitCode::usage, "stage '" + name + "' has no parameter '" + wanted + "'");
     set_value(*field, value);
   }
   Context context;
@@ -649,6 +648,14 @@ PYBIND11_MODULE(_osteo, m) {
   add_sessions(m);
   add_rehearsal(m);
   m.def("declarations", &declarations);
+  m.def("old_names", [] {
+    const auto of = [](std::span<const OldName> names) {
+      py::dict d;
+      for (const OldName& n : names) d[py::str(std::string(n.old))] = std::string(n.current);
+      return d;
+    };
+    return py::make_tuple(of(old_command_names()), of(old_field_names()));
+  });
   m.def("run", &run);
 
   // An error as the programs know it: message, exit code, advice. Those of arguments are also Python's own.

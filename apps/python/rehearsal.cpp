@@ -87,8 +87,8 @@ class Stepped {
           const py::object& settings, const std::string& out, const std::string& resume, double rate_hz, bool surface,
           int threads)
       : hands_(hands), rate_hz_(rate_hz) {
-    if (hands < 1 || hands > kMostHands)
-      refuse("hands must be 1 to " + std::to_string(kMostHands) + ", not " + std::to_string(hands));
+    if (hands < 1 || hands > kMaxHands)
+      refuse("hands must be 1 to " + std::to_string(kMaxHands) + ", not " + std::to_string(hands));
     if (!(rate_hz >= 100 && rate_hz <= 5000)) refuse("rate_hz must be 100 to 5000 Hz");
     context_.threads = threads;
     context_.on_log([this](LogLevel level, std::string_view text) {
@@ -118,9 +118,8 @@ class Stepped {
       auto fields = fields_of<HapticsParams>(haptics.params);
       for (const auto& [key, value] : settings.cast<py::dict>()) {
         const std::string name = py::str(key);
-        const auto f =
-            std::find_if(fields.begin(), fields.end(), [&](const FieldRef& r) { return r.doc.name == name; });
-        if (f == fields.end())
+        const FieldRef* const f = find_field(fields, name);
+        if (f == nullptr)
           refuse("there is no setting '" + name + "'", "'osteo rehearse CASE --show-settings' lists them");
         set_value(*f, value);
       }

@@ -91,7 +91,7 @@ picture("scene.nrrd", "guide-metal-before.png", "--mask", "table.nrrd", "--view"
 picture("scene.nrrd", "guide-metal-after.png", "--mask", "clean.nrrd", "--view", "front", "--centre-mm", at)
 # There and back: the holder erased outside, as Slicer's segment editor would, in what was handed over.
 osteo("prepare", "scene.nrrd", "-o", "case", "--lower", 500, "--spacing-mm", 1)
-osteo("hand-over", "case", "slicer")
+osteo("export-slicer", "case", "slicer")
 mask = sitk.ReadImage(str(work / "slicer/bone.seg.nrrd"))
 kept = sitk.GetArrayFromImage(mask)
 kept[holder & (wy > wy.max() - 45)] = 0
@@ -101,7 +101,7 @@ for key in mask.GetMetaDataKeys():
     edited.SetMetaData(key, mask.GetMetaData(key))
 sitk.WriteImage(edited, str(work / "slicer/bone.seg.nrrd"), useCompression=True)
 shutil.copy(work / "case/preview.png", here / "guide-slicer-out.png")
-osteo("take-back", "case", "slicer")
+osteo("import-slicer", "case", "slicer")
 shutil.copy(work / "case/preview.png", here / "guide-slicer-back.png")
 
 # A refusal with its picture: the same head without its offset.

@@ -48,11 +48,11 @@ def ear():
 if "watch" in wanted:
     ear()
     osteo("rehearse", "case", "--headless", "--fast", "--seconds", 60, "-o", "lesson", "--quiet")
-    host = subprocess.Popen([bin_dir / "osteo", "tutor", "case", "--script", "lesson/strokes.json", "--two-way", "--attend", "2", "--wait-s", "600", "-o", "taught"],
+    host = subprocess.Popen([bin_dir / "osteo", "tutor", "case", "--script", "lesson/strokes.json", "--two-way", "--min-trainees", "2", "--wait-s", "600", "-o", "taught"],
                             stderr=open("host.txt", "w"))
     wait("the code", lambda: "--code" in pathlib.Path("host.txt").read_text())
     address, code = re.search(r"osteo join (\S+) .*--code (\S+)", pathlib.Path("host.txt").read_text()).groups()
-    trainee = subprocess.Popen([bin_dir / "osteo", "join", address, "--case-folder", "case", "--code", code, "--patience-s", "300", "--quiet"])
+    trainee = subprocess.Popen([bin_dir / "osteo", "join", address, "--case-folder", "case", "--code", code, "--silence-s", "300", "--quiet"])
     all_sizes = [(1360, 860)] + ([(1920, 1080), (1024, 700)] if sizes else [])
     for width, height in all_sizes:
         with Screen(f"{width}x{height}x24"):

@@ -592,7 +592,7 @@ void bench_hands() {
     }
     for (int t = 0; t < 4000; ++t) {
       for (Run& r : runs) {
-        std::array<DeviceSample, kMostHands> samples;
+        std::array<DeviceSample, kMaxHands> samples;
         for (std::size_t n = 0; n < r.hands; ++n) {
           const double a = t / 150.0;
           samples[n].position_mm = to_floats(

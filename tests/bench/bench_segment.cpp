@@ -144,7 +144,7 @@ void nerves(int first, int last, double spacing, double slice, double noise) {
 }
 
 /// Calibration of the confidence on nerves by seed: of the places that say so much, how many are right.
-void shapes(int first, int last, double max_radius_mm, double max_unsure_mm) {
+void shapes(int first, int last, double max_radius_mm, double max_uncertain_mm) {
   constexpr int kBins = 10;
   std::array<int, kBins> n{}, right{}, outside{};
   std::array<double, kBins> said{};
@@ -155,7 +155,7 @@ void shapes(int first, int last, double max_radius_mm, double max_unsure_mm) {
     const NerveShape s = make_nerve_shape(static_cast<std::uint64_t>(seed));
     TubeParams p;
     p.max_radius_mm = max_radius_mm;
-    p.max_unsure_mm = max_unsure_mm;
+    p.max_uncertain_mm = max_uncertain_mm;
     const double c = cpu();
     try {
       const Tube t = trace_tube(s.ct, s.clicks, p);

@@ -126,7 +126,7 @@ void grip_row(double grip_n_per_m, double brake_n_s_per_m) {
 
 // The groove of the unit test in `seconds`, played back.
 void playback_row(const std::filesystem::path& folder, double seconds, double stiffness, PlaybackMode mode, Pace pace,
-                  double leash_mm) {
+                  double tolerance_radius_mm) {
   Script s;
   s.tool = burr_index(BurrKind::cutting, 4);
   for (const auto& [t, at, on] : std::initializer_list<std::tuple<double, Vec3, bool>>{{0, {-6, 0, 8}, true},
@@ -147,7 +147,7 @@ void playback_row(const std::filesystem::path& folder, double seconds, double st
   PlaybackParams params;
   params.mode = mode;
   params.pace = pace;
-  params.leash_mm = leash_mm;
+  params.tolerance_radius_mm = tolerance_radius_mm;
   auto playback =
       std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(SessionReader(expert), 0, 0)), params);
   RehearsalOptions l;
@@ -163,11 +163,11 @@ void playback_row(const std::filesystem::path& folder, double seconds, double st
   const GuidedFacts f = measure_guided(SessionReader(led), playback->begun);
   double way = 0;
   for (std::size_t i = 1; i < s.waypoints.size(); ++i) way += length(s.waypoints[i].at_mm - s.waypoints[i - 1].at_mm);
-  std::printf("| %.1f s (%.0f mm/s) | %.0f N/m | %s, %s %.1f mm | %.2f | %.2f | %.2f | %.1f s | %.2f N | %.1f mJ |\n",
-              seconds, way / seconds, stiffness,
-              std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(mode)]).c_str(),
-              pace == Pace::clock ? "clock" : "way, leash", pace == Pace::clock ? 0 : leash_mm, f.rms_mm, f.p95_mm,
-              f.most_mm, static_cast<double>(sum.ticks - playback->begun) / 1000, f.most_pull_n, f.most_work_mj);
+  std::printf(
+      "| %.1f s (%.0f mm/s) | %.0f N/m | %s, %s %.1f mm | %.2f | %.2f | %.2f | %.1f s | %.2f N | %.1f mJ |\n", seconds,
+      way / seconds, stiffness, std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(mode)]).c_str(),
+      pace == Pace::clock ? "clock" : "way, leash", pace == Pace::clock ? 0 : tolerance_radius_mm, f.rms_mm, f.p95_mm,
+      f.most_mm, static_cast<double>(sum.ticks - playback->begun) / 1000, f.most_pull_n, f.most_work_mj);
   std::fflush(stdout);
 }
 

@@ -188,7 +188,7 @@ def round_trip():
         # Our own work comes back from there with the scan: none of it runs, or results would make results without end.
         moved = ask("/modalities/osteotome/store", ask("/studies")[0])
         assert moved["FailedInstancesCount"] == 0, moved
-        told = [json.loads(text) for text in run(osteo, "watch", "inbox", "--rules", pathlib.Path(__file__).resolve().parents[2] / "pipelines" / "rules.json", "-o", "watched",
+        told = [json.loads(text) for text in run(osteo, "watch-folder", "inbox", "--rules", pathlib.Path(__file__).resolve().parents[2] / "pipelines" / "rules.json", "-o", "watched",
                                                  "--once", "--quiet-s", "0.1", "--json", "--quiet").stdout.splitlines()]
         assert sorted((e["what"], e["objects"]) for e in told) == [("unmatched", 1), ("unmatched", 1), ("unmatched", n + 1)], told
     receiver.stop()
@@ -202,7 +202,7 @@ def hostile():
     r = run(osteo, "receive", "x", rc=2)
     assert "nobody may send" in r.stderr, r.stderr
     run(osteo, "receive", "x", "--allow", "A\\B", rc=2)
-    run(osteo, "receive", "x", "--anybody", "--bind", "localhost", rc=2)
+    run(osteo, "receive", "x", "--allow-all", "--bind", "localhost", rc=2)
     node = Receiver("inbox", "--allow", "PEER", "--quiet-s", "1", "--associations", "8", "--object-gb", "0.002", "--timeout-s", "3", "--metrics", "metrics.txt")
     counter = lambda name: next((int(line.split()[1]) for line in pathlib.Path("metrics.txt").read_text().splitlines() if line.startswith(f"osteotome_receive_{name}_total ")), 0) if pathlib.Path("metrics.txt").exists() else 0
     memory = lambda: int(next(line for line in pathlib.Path(f"/proc/{node.process.pid}/status").read_text().splitlines() if line.startswith("VmRSS")).split()[1])
@@ -319,7 +319,7 @@ def hostile():
     for closed in node.folder.glob("study-*/series-*/CLOSED"):
         closed.unlink()
     (node.folder / ".incoming" / "1-0").write_bytes(b"half")
-    again = Receiver("inbox", "--anybody", "--quiet-s", "1", "--folder-gb", "0.00001")
+    again = Receiver("inbox", "--allow-all", "--quiet-s", "1", "--folder-gb", "0.00001")
     assert again.incoming() == [] and again.closed()["objects"] == kept
     storescu(again.port, files[9])
     assert len(again.objects()) == kept, "the folder is as large as it may be"
@@ -346,19 +346,19 @@ def watch():
             d.PatientName = "WATCHED^PERSON"
             d.save_as(inbox / folder / f"{uid}-{n}.dcm")
 
-    line = [osteo, "watch", inbox, "--rules", "rules.json", "-o", out, "--quiet-s", "0.5", "--poll-s", "0.2", "--json", "--no-report", "--keep-free-mb", "0"]
+    line = [osteo, "watch-folder", inbox, "--rules", "rules.json", "-o", out, "--quiet-s", "0.5", "--poll-s", "0.2", "--json", "--no-report", "--keep-free-mb", "0"]
     events = lambda *more, rc=0: [json.loads(text) for text in run(*line, "--once", "--quiet", *more, rc=rc).stdout.splitlines()]
     what = lambda told: sorted(e["what"] for e in told)
     # What is wrong is told before anything is made.
-    r = run(osteo, "watch", inbox, "--rules", "wrong.json", "-o", out, rc=2)
+    r = run(osteo, "watch-folder", inbox, "--rules", "wrong.json", "-o", out, rc=2)
     assert "spacing_m" in r.stderr and "spacing_mm" in r.stderr and not out.exists(), r.stderr
     (work / "value.json").write_text(json.dumps(rules).replace('"spacing_mm": "3"', '"spacing_mm": "many"'))
-    r = run(osteo, "watch", inbox, "--rules", "value.json", "-o", out, rc=2)
+    r = run(osteo, "watch-folder", inbox, "--rules", "value.json", "-o", out, rc=2)
     assert "rule 'ear': spacing_mm" in r.stderr and not out.exists(), r.stderr
-    run(osteo, "watch", inbox, "-o", out, rc=2)
-    run(osteo, "watch", inbox, "--rules", "rules.json", "-o", inbox / "out", rc=2)
-    run(osteo, "watch", work / "nowhere", "--rules", "rules.json", "-o", out, rc=3)
-    run(osteo, "watch", inbox, "--rules", "rules.json", "-o", work / "ct", rc=6)
+    run(osteo, "watch-folder", inbox, "-o", out, rc=2)
+    run(osteo, "watch-folder", inbox, "--rules", "rules.json", "-o", inbox / "out", rc=2)
+    run(osteo, "watch-folder", work / "nowhere", "--rules", "rules.json", "-o", out, rc=3)
+    run(osteo, "watch-folder", inbox, "--rules", "rules.json", "-o", work / "ct", rc=6)
     # A good one; one to ignore, one without a rule, our own, a file that is no object, and a hidden one.
     series("a", "1.2.3.1", of=files[:-1])
     series("b", "1.2.3.2", "Topogram", of=files[:1])
@@ -442,7 +442,7 @@ def doors():
     (work / "bad").chmod(0o600)
     dicom, http_port = free_port(), free_port()
     url = f"http://127.0.0.1:{http_port}"
-    line = lambda folder, out, address=url, login="login": [osteo, "watch", work / folder, "--rules", "rules.json", "-o", work / out, "--orthanc", address, "--orthanc-login", login,
+    line = lambda folder, out, address=url, login="login": [osteo, "watch-folder", work / folder, "--rules", "rules.json", "-o", work / out, "--orthanc", address, "--orthanc-login", login,
                                                             "--quiet-s", "0.5", "--poll-s", "0.2", "--json", "--no-report", "--keep-free-mb", "0", "--timeout-s", "2"]
     said = []
 
@@ -971,10 +971,10 @@ def tls():
             "-addext", "basicConstraints=critical,CA:" + ("FALSE" if issuer else "TRUE"), *signed)
     with_tls = lambda name, ca="ca": ["--tls-ca", f"{ca}.pem", "--tls-certificate", f"{name}.pem", "--tls-key", f"{name}.key"]
     for flags in (["--tls-ca", "ca.pem"], ["--tls-ca", "ca.pem", "--tls-certificate", "node.pem"], ["--tls-certificate", "node.pem", "--tls-key", "node.key"]):
-        run(osteo, "receive", "x", "--anybody", "--port", "0", *flags, rc=2)
-    run(osteo, "receive", "x", "--anybody", "--port", "0", "--tls-ca", "nowhere.pem", "--tls-certificate", "node.pem", "--tls-key", "node.key", rc=3)
+        run(osteo, "receive", "x", "--allow-all", "--port", "0", *flags, rc=2)
+    run(osteo, "receive", "x", "--allow-all", "--port", "0", "--tls-ca", "nowhere.pem", "--tls-certificate", "node.pem", "--tls-key", "node.key", rc=3)
     for pair in (("node.pem", "ours.key"), ("node.key", "node.key"), ("node.pem", files[0])):
-        run(osteo, "receive", "x", "--anybody", "--port", "0", "--tls-ca", "ca.pem", "--tls-certificate", pair[0], "--tls-key", pair[1], rc=5)
+        run(osteo, "receive", "x", "--allow-all", "--port", "0", "--tls-ca", "ca.pem", "--tls-certificate", pair[0], "--tls-key", pair[1], rc=5)
     # A key that others may read is told, and only that.
     for mode, told in ((0o644, True), (0o640, True), (0o600, False)):
         os.chmod("node.key", mode)

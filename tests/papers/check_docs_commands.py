@@ -60,7 +60,7 @@ def judge(command):
         return None  # osteo --version, osteo STAGE
     if said[1] == "help":
         return None if len(said) < 3 or said[2] == "--all" or not said[2].islower() or flags_of(said[2]) is not None else f"no command {said[2]}"
-    flags = flags_of("series" if said[1] == "import" and "--list" in said else said[1])
+    flags = flags_of("list-series" if said[1] == "import" and "--list" in said else said[1])
     if flags is not None:
         flags = flags | {"--list"} if said[1] == "import" else flags
     if flags is None:

@@ -28,17 +28,17 @@ strokes = {"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 3}
            "waypoints": [{"t_s": t, "at_mm": [x, 9.5, -33.5], "drill": on} for t, x, on in path]}
 (work / "s.json").write_text(json.dumps(strokes))
 osteo("rehearse", "case", "--headless", "--fast", "--script", "s.json", "-o", "session")
-told = json.loads(osteo("monitor", "session", "-o", "out", "--json"))
+told = json.loads(osteo("nerve-monitor", "session", "-o", "out", "--json"))
 assert told["same_as_recorded"] and told["samples"] == 6500 * 30, told
 assert told["events"].get("activity", 0) > 0 and told["spikes"] > 10, told["events"]
 assert "inferior alveolar nerve" in told["left_out"]
 
 # Once more, and with a stimulator: the same bytes where nothing else was asked, others where it was.
-osteo("monitor", "session", "-o", "again")
+osteo("nerve-monitor", "session", "-o", "again")
 digest = lambda f: hashlib.sha256((work / f).read_bytes()).hexdigest()
 for f in ("monitor.ns5", "monitor.nev", "events.csv", "channel.wav"):
     assert digest(f"out/{f}") == digest(f"again/{f}"), f
-stimulated = json.loads(osteo("monitor", "session", "-o", "stimulated", "--json", "--stimulator-ma", 5, "--pulses-per-s", 10))
+stimulated = json.loads(osteo("nerve-monitor", "session", "-o", "stimulated", "--json", "--stimulator-ma", 5, "--pulses-per-s", 10))
 assert stimulated["events"]["stimulus"] > 20 and stimulated["events"]["response"] > 5, stimulated["events"]
 assert digest("stimulated/monitor.ns5") != digest("out/monitor.ns5")
 

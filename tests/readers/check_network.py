@@ -125,7 +125,7 @@ run = subprocess.Popen([bin_dir / "osteo", "rehearse", "case", "--headless", "--
 live = [l.stop() for l in listeners]
 out, err = run.communicate(timeout=600)
 assert run.returncode in (0, 8), (run.returncode, err)
-told = json.loads(osteo("monitor", "session", "-o", "out", "--json"))
+told = json.loads(osteo("nerve-monitor", "session", "-o", "out", "--json"))
 channels = len(told["channels"])
 own = own_samples("out", channels)
 for messages in live:
@@ -138,7 +138,7 @@ for messages in live:
     if not lost:
         assert first + len(signal) == end["samples"], (first, len(signal), end)
         assert (signal == own[first:first + len(signal)]).all()
-print(f"ok  live: {len(live)} listeners of pyigtl, {end['samples']} samples of {channels} channels, bit for bit those of 'osteo monitor'")
+print(f"ok  live: {len(live)} listeners of pyigtl, {end['samples']} samples of {channels} channels, bit for bit those of 'osteo nerve-monitor'")
 
 # 2. The finished session, from its first sample on.
 port = free_port()

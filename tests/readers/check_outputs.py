@@ -167,7 +167,7 @@ script = {"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 4},
           "waypoints": [{"t_s": 0, "at_mm": [reference.bounds[1][0] + 9.0, *at[1:]], "drill": False}, {"t_s": 3.5, "at_mm": at}]}
 (work / "parts.json").write_text(json.dumps(script))
 osteo("rehearse", fixtures / "case", "--headless", "--fast", "--script", "parts.json", "-o", "parts")
-osteo("plan", "parts", "-o", "parts-plan")
+osteo("export-result", "parts", "-o", "parts-plan")
 pieces = json.loads((work / "parts-plan/plan.json").read_text())["pieces"]
 assert len(pieces) >= 8, len(pieces)
 worst = 0

@@ -108,13 +108,13 @@ def changes(text):
 
 
 def back(folder, *flags, code=0):
-    return osteo("take-back", "CASE", folder, "--check", "--json", *flags, code=code)
+    return osteo("import-slicer", "CASE", folder, "--check", "--json", *flags, code=code)
 
 
 # Out.
 osteo("phantom", "ct.nrrd", "--labels-out", "labels.nrrd", "--region", "temporal", "--spacing-mm", 2, "--quiet")
 osteo("prepare", "ct.nrrd", "-o", "CASE", "--structures", "labels.nrrd", "--names", "3=sigmoid sinus, 4=labyrinth, 7=dura: upper|part", "--quiet")
-osteo("hand-over", "CASE", "OUT", "--quiet")
+osteo("export-slicer", "CASE", "OUT", "--quiet")
 bone, origin, directions = segments_of(work / "OUT/bone.seg.nrrd")
 parts, origin2, _ = segments_of(work / "OUT/structures.seg.nrrd")
 names = [s.name for s in parts]
@@ -131,7 +131,7 @@ except ImportError:
     print("slicerio is not at hand: our own reader of the format alone has read what goes out")
 
 # Back as it was.
-assert "nothing changed" in osteo("take-back", "CASE", "OUT")
+assert "nothing changed" in osteo("import-slicer", "CASE", "OUT")
 forms = {
     "cropped, renumbered, turned round": dict(labels=[9, 200, 31]),
     "RAS": dict(ras=True),
@@ -176,25 +176,25 @@ assert said["tumour"]["was"] == "" and abs(said["tumour"]["after_mm3"] - 24 * vo
 gone = [c for c in said.values() if not c["name"]]
 assert len(gone) == 1 and gone[0]["after_mm3"] == 0, said
 assert before == (work / "CASE/manifest.json").read_text()
-assert "left out" not in osteo("take-back", "CASE", folder)  # the report has its cuts, with the corrected bone
+assert "left out" not in osteo("import-slicer", "CASE", folder)  # the report has its cuts, with the corrected bone
 after, _, _ = segments_of(work / "CASE/structures.seg.nrrd")
 assert sorted(s.name for s in after) == sorted(["tumour", "sinus", parts[1].name]), [s.name for s in after]
-osteo("hand-over", "CASE", "OUT2", "--quiet")
+osteo("export-slicer", "CASE", "OUT2", "--quiet")
 again, _, _ = segments_of(work / "OUT2/bone.seg.nrrd")
 assert np.array_equal(again[0].mask, edited), "the corrected bone is not what goes out the next time"
-assert "nothing changed" in osteo("take-back", "CASE", "OUT2")
+assert "nothing changed" in osteo("import-slicer", "CASE", "OUT2")
 osteo("prepare", "-o", "CASE", "--spacing-mm", 1, "--quiet")  # keeps the correction
-osteo("hand-over", "CASE", "OUT3", "--quiet")
+osteo("export-slicer", "CASE", "OUT3", "--quiet")
 assert np.array_equal(segments_of(work / "OUT3/bone.seg.nrrd")[0][0].mask, edited)
 text = (work / "CASE/corrected-pipeline.json").read_text()
 assert str(work) not in text, "the case holds the name of its folder"
 (work / "CASE").rename(work / "MOVED")  # a case may be moved
-osteo("hand-over", "MOVED", "OUT-MOVED", "--quiet")
+osteo("export-slicer", "MOVED", "OUT-MOVED", "--quiet")
 assert np.array_equal(segments_of(work / "OUT-MOVED/bone.seg.nrrd")[0][0].mask, edited)
 osteo("prepare", "-o", "MOVED", "--spacing-mm", 1.5, "--quiet")
 (work / "MOVED").rename(work / "CASE")
 osteo("prepare", "-o", "CASE", "--no-pipeline", "--quiet")  # back to the threshold
-osteo("hand-over", "CASE", "OUT4", "--quiet")
+osteo("export-slicer", "CASE", "OUT4", "--quiet")
 assert np.array_equal(segments_of(work / "OUT4/bone.seg.nrrd")[0][0].mask, bone[0].mask)
 print("ok  edited bone and structures are in the case, stay there, and go again when asked")
 
@@ -214,14 +214,14 @@ def refused(reason, segments, *flags, ct_file=None, code=4, shift=(0, 0, 0)):
     folder.mkdir()
     if segments: write(folder / "s.seg.nrrd", segments, origin + np.array(shift), directions, layers=list(range(len(segments))), labels=[1] * len(segments))
     if ct_file: shutil.copy(ct_file, folder / "ct.nrrd")
-    text = osteo("take-back", "CASE", folder, *flags, code=code)
+    text = osteo("import-slicer", "CASE", folder, *flags, code=code)
     assert reason in text, text
     print(f"ok  refused: {reason}")
 
 
 osteo("phantom", "other.nrrd", "--region", "temporal", "--spacing-mm", 2, "--seed", 77, "--quiet")
 osteo("prepare", "other.nrrd", "-o", "OTHER", "--quiet")
-osteo("hand-over", "OTHER", "OUT-OTHER", "--quiet")
+osteo("export-slicer", "OTHER", "OUT-OTHER", "--quiet")
 manifest = (work / "CASE/manifest.json").read_bytes()
 foreign, _, _ = segments_of(work / "OUT-OTHER/bone.seg.nrrd")
 bare = Seg("bone", edited)
@@ -241,9 +241,9 @@ assert (work / "CASE/manifest.json").read_bytes() == manifest, "a refusal has ch
 folder = work / "bare"
 folder.mkdir()
 write(folder / "bone.seg.nrrd", [bare], origin, directions)
-assert changes(back(folder, "--by-place"))["bone"]["added_mm3"] == won * voxel
+assert changes(back(folder, "--match-by-position"))["bone"]["added_mm3"] == won * voxel
 shutil.copy(work / "OUT/ct.nrrd", folder)
 assert changes(back(folder))["bone"]["added_mm3"] == won * voxel
 print("ok  without a mark: by the CT beside it, or by place when asked for")
-osteo("hand-over", "CASE", "OUT", code=6)
+osteo("export-slicer", "CASE", "OUT", code=6)
 print("ok  what was handed over is never written over")

@@ -130,7 +130,7 @@ for s in scripts:
             chosen.setdefault(s[5:], {})[p.findtext("name")] = p
 assert {m: {n: p.tag for n, p in c.items()} for m, c in chosen.items()} == {
     "Register": {"transform_out": "transform"}, "Tube": {"points_mm": "point", "points": "pointfile"}, "DistanceAt": {"points": "pointfile"},
-    "Curve": {"curve": "pointfile", "path": "pointfile"}, "FindStructures": {"labyrinth_mm": "point"}, "Snapshot": {"centre_mm": "point"},
+    "VirtualFixture": {"curve": "pointfile", "path": "pointfile"}, "FindStructures": {"labyrinth_mm": "point"}, "Snapshot": {"centre_mm": "point"},
     "Saw": {"at_mm": "point"}, "Simulate": {"tool_from_mm": "point", "tool_to_mm": "point"}, "FitDamping": {"at_mm": "point"},
     "Crop": {"box": "region"}, "Resample": {"box": "region"}}, chosen
 assert chosen["Register"]["transform_out"].attrib == {"type": "linear", "fileExtensions": ".tfm"}
@@ -194,7 +194,7 @@ run("OsteoPhantom", "--region", "temporal", "--spacing_mm", "1", work / "ear.nrr
 NERVE = ["36,-2,-12", "38.5,1.5,-14", "41,5.5,-16", "42.5,7.5,-19", "44.5,9.3,-31"]
 each = [w for p in NERVE for w in ("--points_mm", p)]
 run("OsteoTube", *each[:4], "--max_unsure_mm", "40", *each[4:], work / "ear.nrrd", work / "a.nrrd")
-plain("tube", "ear.nrrd", "a2.nrrd", "--points-mm", "; ".join(NERVE), "--max-unsure-mm", "40")
+plain("tube", "ear.nrrd", "a2.nrrd", "--points-mm", "; ".join(NERVE), "--max-uncertain-mm", "40")
 same("a.nrrd", "a2.nrrd")
 # Points as Slicer writes them to a file, in LPS as asked, or in RAS as older versions do.
 plain("surface", "b.vdb", "b.ply")

@@ -101,7 +101,7 @@ with socket.socket() as s:
     s.bind(("127.0.0.1", 0))
     s.listen()
     told(doctor("--port", s.getsockname()[1], rc=7), "port", "bad", f"process {os.getpid()}")
-node = subprocess.Popen([osteo, "receive", work / "other", "--port", "0", "--json", "--anybody", "--keep-free-gb", "0"], stdout=subprocess.PIPE,
+node = subprocess.Popen([osteo, "receive", work / "other", "--port", "0", "--json", "--allow-all", "--keep-free-gb", "0"], stdout=subprocess.PIPE,
                         stderr=subprocess.DEVNULL, text=True)
 try:
     told(doctor("--port", json.loads(node.stdout.readline())["listening"], rc=0), "port", "good", f"osteo (process {node.pid})")

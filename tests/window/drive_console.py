@@ -37,7 +37,7 @@ port = free_port()
 
 class Console(Program):
     def __init__(self, width, height, *more):
-        super().__init__([bin_dir / "osteo", "console", port, "--width", width, "--height", height, *more], "Osteotome nerve monitor")
+        super().__init__([bin_dir / "osteo", "nerve-console", port, "--width", width, "--height", height, *more], "Osteotome nerve monitor")
         self.until("it shows something", lambda s: s["pictures"] > 2)
         self.x("windowfocus", "--sync", self.id)
 
@@ -121,7 +121,7 @@ with Screen("%dx%d" % largest):
     c.close()
     run.send_signal(signal.SIGINT)
     run.wait(timeout=300)
-    osteo("monitor", "held", "-o", "heard")
+    osteo("nerve-monitor", "held", "-o", "heard")
     with open(work / "heard" / "events.csv") as f:
         events = list(csv.DictReader(f))
     current = lambda kind: [float(e["current_ma"]) for e in events if e["kind"] == kind]

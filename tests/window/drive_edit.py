@@ -150,7 +150,7 @@ with Screen("1024x700") as screen:
     assert all(bone(p) for p in kept) and all(hu(p) < lower for p in kept), (kept, [hu(p) for p in kept])
     assert hu(undone) >= lower or not bone(undone), undone
     assert pathlib.Path("case/bone.vdb").read_bytes() != bone_before
-    osteo("scene", "case")
+    osteo("estimate-cost", "case")
 
     # prepare keeps them; a threshold that would have no say is refused; they can be taken to a copy, and dropped.
     saved = {p.name: p.read_bytes() for p in pathlib.Path("case").iterdir() if p.suffix in (".vdb", ".ply", ".nrrd", ".json") and "prov" not in p.name and p.name != "manifest.json"}
@@ -166,10 +166,10 @@ with Screen("1024x700") as screen:
     none["start_hash"] = "another"  # so that the result is told to be another one
     pathlib.Path("none.json").write_text(json.dumps(none))
     assert "look at it" in osteo("edit", "copy", "--apply", "none.json")
-    osteo("scene", "copy")  # critical structures: none
+    osteo("estimate-cost", "copy")  # critical structures: none
     osteo("edit", "copy", "--apply", "case/edits.json", "--quiet")
     # To 3D Slicer and back: what was corrected here goes along, and is not done again on top of what comes back.
-    osteo("hand-over", "copy", "handed", "--quiet")
+    osteo("export-slicer", "copy", "handed", "--quiet")
     segment = pathlib.Path("handed/bone.seg.nrrd")
     head, body = segment.read_bytes().split(b"\n\n", 1)
     voxels = bytearray(gzip.decompress(body))
@@ -178,9 +178,9 @@ with Screen("1024x700") as screen:
     first = voxels.index(1)
     voxels[first] = 0
     segment.write_bytes(head + b"\n\n" + gzip.compress(bytes(voxels)))
-    osteo("take-back", "returned", "handed", "--quiet")
+    osteo("import-slicer", "returned", "handed", "--quiet")
     assert not pathlib.Path("returned/edits.json").exists() and pathlib.Path("returned/edits-dropped.json").exists()
-    osteo("hand-over", "returned", "again", "--quiet")
+    osteo("export-slicer", "returned", "again", "--quiet")
     assert gzip.decompress(pathlib.Path("again/bone.seg.nrrd").read_bytes().split(b"\n\n", 1)[1]) == bytes(voxels)
     osteo("prepare", "-o", "copy", "--no-edits", "--quiet")
     assert pathlib.Path("copy/bone.vdb").read_bytes() == bone_before and not pathlib.Path("copy/edits.json").exists()

@@ -30,7 +30,7 @@ def live():
         w = Window("--tutor", "--two-way", "--no-sound", "-o", "taught")
         assert w.state()["tutor"]["title"].startswith("You teach"), w.state()["tutor"]
         address, code = invited(w)
-        guest = subprocess.Popen([bin_dir / "osteo", "join", address, "--case-folder", "case", "--code", code, "--patience-s", "300", "--json"],
+        guest = subprocess.Popen([bin_dir / "osteo", "join", address, "--case-folder", "case", "--code", code, "--silence-s", "300", "--json"],
                                  stdout=open("guest.json", "w"), stderr=open("guest.txt", "w"))
         w.until("the trainee is there, and pulls", lambda s: s["tutor"]["heard"] == 1 and s["tutor"]["pull"] == 1 and s["tutor"]["guiding"])
         # The drill finds its way with nobody at it: the hand is let go by itself, and led again when it is there.

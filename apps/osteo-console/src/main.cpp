@@ -1,4 +1,4 @@
-// The nerve monitor's console of 'osteo console', a program of its own.
+// The nerve monitor's console of 'osteo nerve-console', a program of its own.
 #include <iostream>
 #include <mutex>
 
@@ -18,7 +18,7 @@ struct ConsoleWindowCommand {
   static cli::CommandInfo info() {
     return {"console",
             "the nerve monitor's console, over the network",
-            "What 'osteo console SERVER' opens.",
+            "What 'osteo nerve-console SERVER' opens.",
             {{"server", "PORT or HOST:PORT of a rehearsal that streams"}},
             "osteo-console 18944"};
   }

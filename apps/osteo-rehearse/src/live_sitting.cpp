@@ -7,8 +7,8 @@
 namespace osteo {
 namespace {
 
-constexpr double kPullNPerMm = 1, kMostPullN = 3;
-constexpr int kMostAgain = 3;
+constexpr double kPullNPerMm = 1, kMaxPullN = 3;
+constexpr int kMaxAgain = 3;
 
 }  // namespace
 
@@ -52,7 +52,7 @@ void LiveSitting::add_hand(std::vector<std::unique_ptr<Device>>& devices, Rehear
   devices.push_back(std::make_unique<FarHand>(far_));
   std::erase_if(options.actions, [](const SceneAction& a) { return a.is(ActionKind::guide); });
   if (two_way_)
-    options.actions.push_back(action_of(far_guide(0, 1, devices.front()->traits(), kPullNPerMm, kMostPullN)));
+    options.actions.push_back(action_of(far_guide(0, 1, devices.front()->traits(), kPullNPerMm, kMaxPullN)));
 }
 
 void LiveSitting::open(Rehearsal& rehearsal, const SessionHeader& header, const SessionFolder& session) {
@@ -83,7 +83,7 @@ std::pair<SessionHeader, Bytes> LiveSitting::wait(const Context& context) {
   if (!seat_) {
     const UdpPeer host = udp_peer(join_);
     host_name_ = udp_name(host);
-    seat_ = std::make_unique<LiveSeat>(SeatOptions{host, code_, role_, kPullNPerMm, kMostPullN});
+    seat_ = std::make_unique<LiveSeat>(SeatOptions{host, code_, role_, kPullNPerMm, kMaxPullN});
   }
   SessionHeader header = seat_->wait_for_session(60, context);
   return {std::move(header), seat_->past()};
@@ -147,7 +147,7 @@ TutorNow LiveSitting::now(const Rehearsal* rehearsal) const {
     if (s.over) n.trouble = "the instructor's session is over";
     if (s.host_lost) n.trouble = "the instructor's machine gives no more of this session";
     if (s.state == JoinState::refused) n.trouble = "the host refuses: " + s.why;
-    n.begin_again = s.another || (s.bone_differs_since > 0 && again_ < kMostAgain);
+    n.begin_again = s.another || (s.bone_differs_since > 0 && again_ < kMaxAgain);
     if (s.bone_differs_since > 0 && !n.begin_again) n.trouble = "this copy's bone is another than the instructor's";
   }
   return n;

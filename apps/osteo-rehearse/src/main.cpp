@@ -56,7 +56,7 @@ std::unique_ptr<OpenCase> open_case(const fs::path& folder, const WindowFlags& f
       context.warn("this case keeps no CT values, so whether --scan is its scan could not be checked");
     } else if (!(difference_hu(*open->hu, *open->ct) < kOwnHu)) {
       throw Error(ExitCode::usage, "--scan is not the scan of this case, or does not lie where it lay",
-                  "'osteo hand-over CASE FOLDER' writes the case's own as ct.nrrd");
+                  "'osteo export-slicer CASE FOLDER' writes the case's own as ct.nrrd");
     }
   }
   return open;

@@ -191,9 +191,8 @@ void Sitting::learn(const WindowFlags& flags) {
     const std::size_t comma = std::min(flags.playback_as.find(',', at), flags.playback_as.size());
     const std::string one = flags.playback_as.substr(at, comma - at);
     const std::size_t equals = one.find('=');
-    const auto field = std::find_if(fields.begin(), fields.end(),
-                                    [&](const FieldRef& f) { return f.doc.name == one.substr(0, equals); });
-    if (equals == std::string::npos || field == fields.end())
+    const FieldRef* const field = find_field(fields, std::string_view(one).substr(0, equals));
+    if (equals == std::string::npos || field == nullptr)
       throw Error(ExitCode::usage, "--playback-as: '" + one + "' is no flag of 'osteo playback'",
                   "mode=guide,pace=way");
     field->from_text(one.substr(equals + 1), "--playback-as");

@@ -111,11 +111,10 @@ void check_case_settings(const std::string& text, const std::map<std::string, st
   const auto fields = case_fields(prepare);
   Recipe recipe;
   for (const auto& [name, value] : settings) {
-    const auto field =
-        std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == name; });
-    if (field != fields.end()) field->from_text(value, name);
+    const FieldRef* const field = find_field(fields, name);
+    if (field != nullptr) field->from_text(value, name);
     if (name == "structures" || name == "edits" || value.empty()) continue;
-    recipe.settings[name] = field != fields.end() ? field->to_text() : value;
+    recipe.settings[name] = field != nullptr ? field->to_text() : value;
   }
   const bool has_lower = recipe.settings.contains("lower"), has_preset = recipe.settings.contains("preset");
   if (prepare.preset != BonePreset::fixed && has_lower)
@@ -134,9 +133,8 @@ int make_case(std::vector<std::string> arguments, const std::map<std::string, st
   PrepareCommand::Params prepare;
   const auto fields = case_fields(prepare);
   for (const auto& [name, value] : settings) {
-    const auto field =
-        std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == name; });
-    if (field != fields.end())
+    const FieldRef* const field = find_field(fields, name);
+    if (field != nullptr)
       arguments.push_back(field->flag() + "=" + value);
     else
       arguments.insert(arguments.end(), {"--set", name + "=" + value});

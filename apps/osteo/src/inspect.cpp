@@ -7,7 +7,7 @@
 #include "case_pipeline.h"
 #include "commands/info.h"
 #include "commands/list.h"
-#include "commands/series.h"
+#include "commands/list_series.h"
 #include "osteo/assessment/case_report/case_report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -169,7 +169,7 @@ cli::CommandInfo InfoCommand::info() {
 int InfoCommand::run(const Params&, cli::Invocation& io) {
   const fs::path path = io.arguments[0];
   require_readable(path);
-  if (fs::is_directory(path) && !fs::exists(path / "manifest.json")) return SeriesCommand::run({}, io);
+  if (fs::is_directory(path) && !fs::exists(path / "manifest.json")) return ListSeriesCommand::run({}, io);
   Json j;
   if (fs::is_directory(path)) {
     const auto manifest = Json::parse(read_text(path / "manifest.json"));
@@ -201,15 +201,15 @@ int InfoCommand::run(const Params&, cli::Invocation& io) {
   return 0;
 }
 
-cli::CommandInfo SeriesCommand::info() {
-  return {"series",
+cli::CommandInfo ListSeriesCommand::info() {
+  return {"list-series",
           "the DICOM series of a folder and what each is",
           "Also as 'osteo import --list'. The one marked * is taken when none is asked for. The scan says what belongs "
           "together: a letter "
           "for the patient, a number for the study, a letter for the frame of reference. Of several scans one must be "
           "asked for.",
           {{"folder", "folder with DICOM files at any depth"}},
-          "osteo series DICOM_FOLDER"};
+          "osteo list-series DICOM_FOLDER"};
 }
 
 namespace {
@@ -252,7 +252,7 @@ void write_thumbnails(const DicomScan& scan, const fs::path& source, const fs::p
 
 }  // namespace
 
-int SeriesCommand::run(const Params& p, cli::Invocation& io) {
+int ListSeriesCommand::run(const Params& p, cli::Invocation& io) {
   if (io.arguments.size() != 1) throw Error(ExitCode::usage, "which folder? osteo import --list FOLDER");
   const DicomScan scan = scan_dicom(io.arguments[0], {}, io.context);
   if (!p.thumbnails.empty()) write_thumbnails(scan, io.arguments[0], p.thumbnails, io);

@@ -174,19 +174,20 @@ int DevicesCommand::run(const Params& p, cli::Invocation& io) {
 }
 
 cli::CommandInfo DoctorCommand::info() {
-  return {"doctor",
-          "what this machine can do for a rehearsal or as a server, and what to change",
-          "Real-time priority, memory lock, lateness of a loop as the servo runs it, devices, OpenGL, audio. Exit code "
-          "0 also when "
-          "something is missing: the advice says what. With --server what 'osteo receive', 'osteo watch' and 'osteo "
-          "batch' need, a line "
-          "each: memory, clock, folders and room in them, title, port, TLS and login files, counters, rules, pictures, "
-          "systemd's units, "
-          "Slurm. What is not named is not looked at. 'good', 'none' (not there, not needed), 'care' (works, but), "
-          "'bad' (will not work): "
-          "with a 'bad' the exit code is 7. To be run as the user of the services.",
-          {},
-          "osteo doctor --seconds 10"};
+  return {
+      "doctor",
+      "what this machine can do for a rehearsal or as a server, and what to change",
+      "Real-time priority, memory lock, lateness of a loop as the servo runs it, devices, OpenGL, audio. Exit code "
+      "0 also when "
+      "something is missing: the advice says what. With --server what 'osteo receive', 'osteo watch-folder' and 'osteo "
+      "batch' need, a line "
+      "each: memory, clock, folders and room in them, title, port, TLS and login files, counters, rules, pictures, "
+      "systemd's units, "
+      "Slurm. What is not named is not looked at. 'good', 'none' (not there, not needed), 'care' (works, but), "
+      "'bad' (will not work): "
+      "with a 'bad' the exit code is 7. To be run as the user of the services.",
+      {},
+      "osteo doctor --seconds 10"};
 }
 
 namespace {

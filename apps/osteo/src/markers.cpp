@@ -113,10 +113,10 @@ int CalibrateCameraCommand::run(const Params& p, cli::Invocation& io) {
   look_at_all(io.arguments[0], wish, p.seconds, io, [&](const GrayPicture& picture, double, std::uint64_t) {
     if (calibration.add(picture) == CameraCalibration::Look::taken && !io.common.quiet && !io.common.json) {
       io.end_progress();
-      io.err << "view " << calibration.views() << " of at least " << CameraCalibration::kLeastViews
+      io.err << "view " << calibration.views() << " of at least " << CameraCalibration::kMinViews
              << " taken: move the plate\n";
     }
-    return calibration.views() < CameraCalibration::kMostViews;
+    return calibration.views() < CameraCalibration::kMaxViews;
   });
   CameraCalibration::Result r = calibration.solve();
   r.camera.fps = p.fps;

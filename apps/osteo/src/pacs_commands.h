@@ -121,7 +121,7 @@ struct ReceiveCommand {
     visit({"bind", "IPv4 address to listen on (0.0.0.0: every network this machine is in)"}, p.bind);
     visit({"port", "port to listen on (0: any free one)", "", 0, 65535}, p.port);
     visit({"allow", "titles of the nodes that may send, with commas"}, p.allow);
-    visit({"anybody", "let every node send"}, p.anybody);
+    visit({"allow_all", "let every node send"}, p.anybody);
     visit({"associations", "associations that are accepted at the same time", "", 1, 1000}, p.associations);
     visit({"object_gb", "a larger object is refused", "GB", 0.000001, 100}, p.object_gb);
     visit({"folder_gb", "all of the folder; what would be beyond is refused", "GB", 0.000001, 1e6}, p.folder_gb);
@@ -141,7 +141,7 @@ struct ReceiveCommand {
 /// Rules whose pipelines can be read and whose settings are known. Error(usage) and those of reading otherwise.
 std::vector<SeriesRule> checked_rules(const fs::path& file);
 
-struct WatchCommand {
+struct WatchFolderCommand {
   struct Params {
     std::string rules, out, metrics, orthanc, orthanc_login, orthanc_ca;
     double quiet_s = 30, poll_s = 2, timeout_s = 30, object_gb = 2;
@@ -201,7 +201,7 @@ struct DoctorCommand {
           p.server);
     visit({"inbox", "folder of receive (empty: none is looked at)"}, p.inbox);
     visit({"cases", "folder of watch's cases (empty: none)"}, p.cases);
-    visit({"rules", "rules file of 'watch' (empty: none)"}, p.rules);
+    visit({"rules", "rules file of 'watch-folder' (empty: none)"}, p.rules);
     visit({"metrics", "files for counters, with commas (empty: none)"}, p.metrics);
     visit({"login", "files with USER:PASSWORD, with commas (empty: none)"}, p.login);
     visit({"ae", "our title"}, p.ae);

@@ -5,22 +5,24 @@
 #include "commands/bench.h"
 #include "commands/calibrate_camera.h"
 #include "commands/calibrate_pen.h"
-#include "commands/console.h"
 #include "commands/convert.h"
 #include "commands/demo.h"
 #include "commands/devices.h"
 #include "commands/docs.h"
 #include "commands/edit.h"
+#include "commands/estimate_cost.h"
 #include "commands/export.h"
-#include "commands/guide.h"
-#include "commands/hand_over.h"
+#include "commands/export_result.h"
+#include "commands/export_slicer.h"
 #include "commands/heat.h"
+#include "commands/import_slicer.h"
 #include "commands/info.h"
 #include "commands/join.h"
 #include "commands/list.h"
+#include "commands/list_series.h"
 #include "commands/markers.h"
-#include "commands/monitor.h"
-#include "commands/plan.h"
+#include "commands/nerve_console.h"
+#include "commands/nerve_monitor.h"
 #include "commands/playback.h"
 #include "commands/prepare.h"
 #include "commands/rehearse.h"
@@ -28,13 +30,11 @@
 #include "commands/report.h"
 #include "commands/review.h"
 #include "commands/run.h"
-#include "commands/scene.h"
 #include "commands/score.h"
-#include "commands/series.h"
 #include "commands/sound.h"
 #include "commands/stream.h"
 #include "commands/study.h"
-#include "commands/take_back.h"
+#include "commands/suggest_threshold.h"
 #include "commands/track_pen.h"
 #include "commands/tutor.h"
 #include "licence.h"
@@ -56,19 +56,40 @@ namespace {
 // Who uses what. A name that stands in none of these is listed last; a test wants that list short.
 std::vector<cli::Group> command_groups() {
   return {
-      {"Prepare a case", {"prepare",  "series",      "info",        "report",     "edit",      "approve",
-                          "import",   "crop",        "denoise",     "guide",      "threshold", "reduce-metal",
-                          "resample", "surface",     "import-bone", "structures", "tube",      "find-structures",
-                          "register", "apply-edits", "hand-over",   "take-back",  "snapshot",  "convert",
-                          "run"}},
+      {"Prepare a case",
+       {"prepare",
+        "list-series",
+        "info",
+        "report",
+        "edit",
+        "approve",
+        "import",
+        "crop",
+        "denoise",
+        "suggest-threshold",
+        "threshold",
+        "reduce-metal",
+        "resample",
+        "surface",
+        "import-bone",
+        "structures",
+        "tube",
+        "find-structures",
+        "register",
+        "apply-edits",
+        "export-slicer",
+        "import-slicer",
+        "snapshot",
+        "convert",
+        "run"}},
       {"Rehearse",
-       {"rehearse", "scene", "plan", "replay", "playback", "tutor", "join", "devices", "markers", "calibrate-camera",
-        "calibrate-pen", "track-pen", "stream", "console"}},
-      {"Review and teach", {"review", "score", "study", "movie", "export", "heat", "sound", "monitor"}},
-      {"Server and PACS", {"batch", "receive", "watch", "send", "fetch", "deidentify", "doctor"}},
+       {"rehearse", "estimate-cost", "export-result", "replay", "playback", "tutor", "join", "devices", "markers",
+        "calibrate-camera", "calibrate-pen", "track-pen", "stream", "nerve-console"}},
+      {"Review and teach", {"review", "score", "study", "movie", "export", "heat", "sound", "nerve-monitor"}},
+      {"Server and PACS", {"batch", "receive", "watch-folder", "send", "fetch", "deidentify", "doctor"}},
       {"Geometry",
-       {"mesh-info", "mesh-repair", "voxelize", "distance", "distance-at", "compare", "curve", "saw", "pieces",
-        "tetrahedralize", "skin"}},
+       {"mesh-info", "mesh-repair", "voxelize", "distance", "distance-at", "compare", "virtual-fixture", "saw",
+        "separate-fragments", "tetrahedralize", "embed-surface"}},
       {"Tissue", {"simulate", "fem", "bone-stiffness", "calibrate", "fit-damping"}},
       {"Research", {"experiment", "ground-truth", "simulate-trainee", "phantom", "bench"}},
       {"Osteotome itself", {"demo", "list", "docs"}},
@@ -95,8 +116,8 @@ cli::Program make_osteo_program() {
   p.groups = command_groups();
   p.add<ListCommand>();
   p.add<InfoCommand>();
-  p.add<SeriesCommand>();
-  p.add<GuideCommand>();
+  p.add<ListSeriesCommand>();
+  p.add<SuggestThresholdCommand>();
   p.add<ConvertCommand>();
   p.add<RunCommand>();
   p.add<PrepareCommand>();
@@ -104,10 +125,10 @@ cli::Program make_osteo_program() {
   p.add<ReportCommand>();
   p.add<ApproveCommand>();
   p.add<EditCommand>();
-  p.add<HandOverCommand>();
-  p.add<TakeBackCommand>();
-  p.add<SceneCommand>();
-  p.add<PlanCommand>();
+  p.add<ExportSlicerCommand>();
+  p.add<ImportSlicerCommand>();
+  p.add<EstimateCostCommand>();
+  p.add<ExportResultCommand>();
   p.add<RehearseCommand>();
   p.add<ReplayCommand>();
   p.add<PlaybackCommand>();
@@ -121,9 +142,9 @@ cli::Program make_osteo_program() {
   p.add<ExportCommand>();
   p.add<SoundCommand>();
   p.add<HeatCommand>();
-  p.add<MonitorCommand>();
+  p.add<NerveMonitorCommand>();
   p.add<StreamCommand>();
-  p.add<ConsoleCommand>();
+  p.add<NerveConsoleCommand>();
 #ifdef OSTEO_WITH_RESEARCH
   p.add<ExperimentCommand>();
   p.add<GroundTruthCommand>();
@@ -141,7 +162,7 @@ cli::Program make_osteo_program() {
   p.add<SendCommand>();
   p.add<FetchCommand>();
   p.add<ReceiveCommand>();
-  p.add<WatchCommand>();
+  p.add<WatchFolderCommand>();
   p.add<DoctorCommand>();
   p.add<DemoCommand>();
   p.add<BenchCommand>();

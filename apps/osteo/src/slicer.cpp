@@ -5,9 +5,9 @@
 
 #include "built_in_pipelines.h"
 #include "case_edits.h"
-#include "commands/hand_over.h"
+#include "commands/export_slicer.h"
+#include "commands/import_slicer.h"
 #include "commands/prepare.h"
-#include "commands/take_back.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
@@ -113,19 +113,19 @@ Json changes_json(const TakenBack& back) {
 
 }  // namespace
 
-cli::CommandInfo HandOverCommand::info() {
-  return {"hand-over",
+cli::CommandInfo ExportSlicerCommand::info() {
+  return {"export-slicer",
           "a case's CT, bone and structures as files for 3D Slicer",
           "Writes ct.nrrd, bone.seg.nrrd and structures.seg.nrrd (with names and colours) into a new folder. Edit them "
           "in 3D Slicer, save them "
-          "there under the same names, and 'osteo take-back' makes the case from them. Names of the patient are in "
+          "there under the same names, and 'osteo import-slicer' makes the case from them. Names of the patient are in "
           "none of them, but the CT "
           "of a head shows a face.",
           {{"case", "a prepared case"}, {"folder", "new folder for the files"}},
-          "osteo hand-over CASE FOLDER"};
+          "osteo export-slicer CASE FOLDER"};
 }
 
-int HandOverCommand::run(const Params& p, cli::Invocation& io) {
+int ExportSlicerCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[1];
   if (output_exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
     throw Error(ExitCode::cannot_write, "'" + folder.string() + "' exists already",
@@ -141,30 +141,30 @@ int HandOverCommand::run(const Params& p, cli::Invocation& io) {
     io.err << (folder / "structures.seg.nrrd").string() << "  (" << images.structures->structures.size()
            << " structures)\n";
   io.err << "  in 3D Slicer: drag the folder onto the window, edit in Segment Editor, save all into the same folder\n  "
-            "then: osteo take-back "
+            "then: osteo import-slicer "
          << io.arguments[0] << ' ' << folder.string() << '\n';
   return 0;
 }
 
-cli::CommandInfo TakeBackCommand::info() {
+cli::CommandInfo ImportSlicerCommand::info() {
   return {
-      "take-back",
+      "import-slicer",
       "bone and structures that were edited in 3D Slicer, into their case",
       "Reads each .seg.nrrd of the folder, checks that it is of the scan of the case (by a mark that Slicer keeps in "
       "the segments, else "
       "by the CT beside them, and by where it lies), says what changed, and makes the case anew from it. What belongs "
       "to another scan is "
       "refused. --check only looks. Corrected bone stays with the case until 'osteo prepare -o CASE --no-pipeline'.",
-      {{"case", "the case that was handed over"}, {"folder", "the folder of 'osteo hand-over', or one .seg.nrrd"}},
-      "osteo take-back CASE FOLDER"};
+      {{"case", "the case that was handed over"}, {"folder", "the folder of 'osteo export-slicer', or one .seg.nrrd"}},
+      "osteo import-slicer CASE FOLDER"};
 }
 
-int TakeBackCommand::run(const Params& p, cli::Invocation& io) {
+int ImportSlicerCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0], from = io.arguments[1];
   const CasePipeline pipeline = pipeline_of(folder, p.source);
   std::optional<CaseEdits> edits;
   const CaseImages images = images_now(pipeline, folder, edits, io);
-  TakenBack back = take_back(images, from, {p.by_place}, io.context);
+  TakenBack back = take_back(images, from, {p.match_by_position}, io.context);
   io.end_progress();
   if (io.common.json) {
     io.out << changes_json(back).dump(2) << '\n';

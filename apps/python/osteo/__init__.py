@@ -23,6 +23,13 @@ _made = {**_types, "document": "dict | str"}
 _params = {"flag": "bool", "int": "int", "number": "float", "text": "str", "triple": "Sequence[float]", "list": "Sequence[int]", "choice": "str"}
 
 
+_old_stages, _old_fields = _osteo.old_names()
+
+
+def _renamed(old, current):
+    _warnings.warn(f"{old} is now called {current}; the old name is accepted until version 0.3", DeprecationWarning, stacklevel=3)
+
+
 def _identifier(name):
     name = name.replace("-", "_").replace(" ", "_")
     return name + "_" if _keyword.iskeyword(name) else name
@@ -84,6 +91,9 @@ def _function(stage):
         globals()[result.__name__] = result  # where pickle looks for it
 
     def function(*args, **kwargs):
+        for old in [k for k in kwargs if k not in fields and _old_fields.get(k) in fields]:
+            _renamed(old, _old_fields[old])
+            kwargs[_old_fields[old]] = kwargs.pop(old)
         given = signature.bind(*args, **kwargs).arguments
         params = {fields[k]: v for k, v in given.items() if k in fields}
         values, measured, warned = _osteo.run(name, [given.get(p) for p in ports], params, given.get("threads", 0), given.get("seed", 1))
@@ -120,3 +130,11 @@ for _stage in _osteo.declarations():
     stages.append(_f.__name__)
 __all__ = ["Error", "Field", "Grid", "Image", "Labels", "Rehearsal", "Script", "Session", "Surface", "Tets", "WrongType", "WrongValue", "action_dtype",
            "from_vtk", "goal_dtype", "goals", "load", "load_script", "save", "stages", "tick_dtype", "to_vtk", "tools", *stages]
+
+
+def __getattr__(name):
+    for old, current in _old_stages.items():
+        if _identifier(old) == name and _identifier(current) in stages:
+            _renamed(name, _identifier(current))
+            return globals()[_identifier(current)]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

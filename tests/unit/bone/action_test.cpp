@@ -106,7 +106,7 @@ TEST(Action, HandsHoldTheirOwnPlates) {
   ASSERT_TRUE(w.act(SceneAction::grip(2, {}, 1)).done);
   EXPECT_EQ(w.grip(0).plate, SceneAction::kNobody);
   EXPECT_EQ(w.grip(1).plate, 2u);
-  EXPECT_FALSE(w.act(SceneAction::grip(2, {}, kMostHands)).done);
+  EXPECT_FALSE(w.act(SceneAction::grip(2, {}, kMaxHands)).done);
   SceneAction attach = SceneAction::attach(2, {{}, {-8, 0, 4}}, 0);
   ASSERT_TRUE(w.act(attach).done);
   EXPECT_EQ(w.grip(1).plate, 2u) << "it was another hand's";

@@ -167,7 +167,7 @@ TEST(Strokes, MemoryIsBounded) {
   ASSERT_GT(voxels, 1000000u);
   // Half a million voxels a stroke, 6 MB: ten of them are known, then the oldest goes.
   constexpr std::uint32_t kVoxels = 500000;
-  const std::size_t most = World::kMostStrokeBytes / (12 * kVoxels);
+  const std::size_t most = World::kMaxStrokeBytes / (12 * kVoxels);
   std::vector<VoxelChange> changes(kVoxels);
   std::vector<std::string> hashes;
   done(w, SceneAction::move(0, {{}, {1, 0, 0}}));

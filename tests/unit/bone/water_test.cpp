@@ -110,7 +110,7 @@ TEST(Water, TakesDustAlongAndIsSuckedOffWithIt) {
   EXPECT_GT(stirred.slurry_mm3, 8) << "of 10 mm3 of dust under 120 of water";
   dust.visit_liquid([](Ijk, double full, double solid) {
     if (full > 3 * Dust::kFilm) {
-      EXPECT_LE(solid, Dust::kMostSolid + 1e-3);
+      EXPECT_LE(solid, Dust::kMaxSolid + 1e-3);
     }
   });
   // By a nozzle at the floor; half a litre a minute.

@@ -195,16 +195,16 @@ TEST(World, NamesAreCountedAsTheyAreGivenAndARefusalTakesNone) {
   ASSERT_LT(piece, bricks);
   // All but one of the names that it takes.
   const std::string before = w.hash();
-  WorldProbe::next_brick(w) = BrickGrid::kMostBricks - piece + 1;
+  WorldProbe::next_brick(w) = BrickGrid::kMaxBricks - piece + 1;
   const auto refused = w.act(SceneAction::split(1));
   EXPECT_FALSE(refused.done);
   EXPECT_NE(refused.message.find("names"), std::string::npos);
   EXPECT_EQ(w.hash(), before);
-  EXPECT_EQ(WorldProbe::next_brick(w), BrickGrid::kMostBricks - piece + 1);
+  EXPECT_EQ(WorldProbe::next_brick(w), BrickGrid::kMaxBricks - piece + 1);
   EXPECT_EQ(WorldProbe::next_body(w), 1u);
   EXPECT_EQ(w.undo_steps(), 1u);
   // The very last ones.
-  WorldProbe::next_brick(w) = BrickGrid::kMostBricks - piece;
+  WorldProbe::next_brick(w) = BrickGrid::kMaxBricks - piece;
   ASSERT_TRUE(w.act(SceneAction::split(1)).done);
   EXPECT_EQ(w.bodies()[1].body->id, 1u);
   const VoxelKey last = w.bodies()[1].body->name_of(piece * BrickGrid::kVoxels - 1);
@@ -385,7 +385,7 @@ TEST(World, SuckerAndWaterReachAsFarAsMakesSense) {
     EXPECT_FALSE(w.act(SceneAction::suction({}, r, 60)).done) << r;
     EXPECT_FALSE(w.act(SceneAction::irrigate({}, r, 0.5)).done) << r;
   }
-  EXPECT_TRUE(w.act(SceneAction::suction({}, SceneAction::kMostReachMm, 60)).done);
+  EXPECT_TRUE(w.act(SceneAction::suction({}, SceneAction::kMaxReachMm, 60)).done);
   EXPECT_TRUE(w.act(SceneAction::suction({}, 0, 0)).done);  // away
 }
 
@@ -539,7 +539,7 @@ TEST(World, ARegionOfInterestTakesThePlaceOfTheCoarseBone) {
   turned.direction = rotation_about({}, {0, 0, 1}, 0.01).rotation;
   EXPECT_NE(refused(bad, turned).find("axes"), std::string::npos);
   EXPECT_NE(refused(w, f).find("there is one already"), std::string::npos);
-  WorldProbe::next_brick(bad) = BrickGrid::kMostBricks - 124;
+  WorldProbe::next_brick(bad) = BrickGrid::kMaxBricks - 124;
   try {
     bad.add_region(BrickGrid(f, bricks));
     FAIL() << "names given twice";

@@ -53,7 +53,7 @@ TEST(Microscope, FieldOfViewIsTheFieldNumberOverTheMagnification) {
     EXPECT_NEAR((*left)[0], kArea.x, 1e-8);
   }
   magnify(v, 1000);
-  EXPECT_EQ(v.magnification, kMostMagnification);
+  EXPECT_EQ(v.magnification, kMaxMagnification);
 }
 
 TEST(Microscope, ParfocalZoomKeepsEyeFocusAndDirections) {

@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <fstream>
 #include <sstream>
 
 #include "osteo/app/cli/command.h"
@@ -213,6 +214,49 @@ TEST(AllStages, NoFlagHidesACommonOne) {
       EXPECT_TRUE(own.emplace(f.doc.name).second) << name << " has --" << f.doc.name << " twice";
     }
     for (const Port& p : stage->info().inputs) EXPECT_FALSE(own.contains(p.name)) << name << " " << p.name;
+  }
+}
+
+// Of version 0.1: still accepted, said, and never a name that is in use.
+TEST(AllStages, OldNamesAreAcceptedAndSaid) {
+  const auto said = [](std::vector<std::string> args) {
+    cli::Program program;
+    program.registry = osteo_stages();
+    args.insert(args.begin(), "osteo");
+    std::vector<char*> argv;
+    for (auto& a : args) argv.push_back(a.data());
+    std::ostringstream out, err;
+    Said s;
+    s.code = cli::run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
+    s.out = out.str();
+    s.err = err.str();
+    return s;
+  };
+  const Folder at;
+  const std::string curve = (at.path() / "c.csv").string(), path = (at.path() / "p.csv").string();
+  std::ofstream(curve) << "0 0 0\n10 0 0\n";
+  std::ofstream(path) << "1 1 0\n9 1 0\n";
+  const Said old = said({"curve", curve, path, (at.path() / "a.json").string()});
+  EXPECT_EQ(old.code, 0) << old.err;
+  EXPECT_NE(old.err.find("'curve' is now called 'virtual-fixture'"), std::string::npos) << old.err;
+  const Said now = said({"virtual-fixture", curve, path, (at.path() / "b.json").string()});
+  EXPECT_EQ(now.code, 0) << now.err;
+  EXPECT_EQ(now.err.find("now called"), std::string::npos);
+  EXPECT_EQ(read_text(at.path() / "a.json"), read_text(at.path() / "b.json"));
+  EXPECT_EQ(said({"help", "skin"}).out, said({"help", "embed-surface"}).out);
+
+  const Said flag = said({"pieces", "none.vdb", "p.json", "--least-mm3", "-1"});
+  EXPECT_EQ(flag.code, 2);
+  EXPECT_NE(flag.err.find("--min-volume-mm3 is -1"), std::string::npos) << flag.err;
+  EXPECT_NE(said({"pieces", "none.vdb", "p.json", "--least-mm3", "5"}).err.find("'--least-mm3' is now called"),
+            std::string::npos);
+  EXPECT_NE(said({"mesh-info", "--least-mm3", "5"}).err.find("there is no flag --least-mm3"), std::string::npos);
+
+  const Registry registry = osteo_stages();
+  const auto names = registry.names();
+  for (const OldName& n : old_command_names()) {
+    EXPECT_EQ(std::count(names.begin(), names.end(), n.old), 0) << n.old;
+    EXPECT_EQ(current_command(n.current), n.current) << "renamed twice";
   }
 }
 

@@ -148,9 +148,9 @@ TEST(TimelineKeeper, ActionsNotesAndGapsAreEvents) {
 TEST(TimelineKeeper, EventsHaveABound) {
   const World world = block();
   TimelineKeeper keeper({1000, nullptr, nullptr});
-  for (std::uint64_t n = 0; n < Timeline::kMostEvents + 7; ++n) keeper.note({n, "mark", "{}"});
+  for (std::uint64_t n = 0; n < Timeline::kMaxEvents + 7; ++n) keeper.note({n, "mark", "{}"});
   const Timeline line = keeper.timeline({});
-  EXPECT_EQ(line.events.size(), Timeline::kMostEvents);
+  EXPECT_EQ(line.events.size(), Timeline::kMaxEvents);
   EXPECT_EQ(line.events_left_out, 7U);
 }
 

@@ -38,9 +38,9 @@ void expect_refused(ExitCode code, const std::string& word, F&& f) {
   }
 }
 
-static_assert(!too_many_bricks(BrickGrid::kMostBricks) && too_many_bricks(BrickGrid::kMostBricks + 1ULL));
+static_assert(!too_many_bricks(BrickGrid::kMaxBricks) && too_many_bricks(BrickGrid::kMaxBricks + 1ULL));
 // The last voxel of the last brick is not the name that stands for none.
-static_assert((static_cast<std::uint64_t>(BrickGrid::kMostBricks) - 1) * BrickGrid::kVoxels + BrickGrid::kVoxels - 1 <
+static_assert((static_cast<std::uint64_t>(BrickGrid::kMaxBricks) - 1) * BrickGrid::kVoxels + BrickGrid::kVoxels - 1 <
               BrickGrid::kNone);
 static_assert(!too_wide_for_bricks({512, 512, 512}) && too_wide_for_bricks({512, 512, 513}) &&
               too_wide_for_bricks({1ULL << 28, 1, 1}));

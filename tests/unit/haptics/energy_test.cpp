@@ -241,7 +241,7 @@ TEST(EnergyDebt, IsPaidOnTheWayOutOfTheNextContactsAndNotAtRest) {
     EXPECT_EQ(force, share);
   }
   EXPECT_LT(given, 0.01 * turned);
-  EXPECT_LE(debt.given_mj(), EnergyDebt::kMostOwedMj);
+  EXPECT_LE(debt.given_mj(), EnergyDebt::kMaxOwedMj);
 }
 
 TEST(ContactParams, TheEnergyIsTheAreaUnderTheLaw) {

@@ -133,7 +133,7 @@ TEST(Hands, EachHasItsOwnDevice) {
 
 TEST(Hands, AsManyAsThereAreDevices) {
   auto bone = test::slab(1);
-  EXPECT_THROW(HapticRenderer(hands(kMostHands + 1), bone, {}, 1e-3), Error);
+  EXPECT_THROW(HapticRenderer(hands(kMaxHands + 1), bone, {}, 1e-3), Error);
   HapticRenderer r(hands(2), bone, {}, 1e-3);
   MouseDevice mouse{HandGoal{}};
   Stream stream;

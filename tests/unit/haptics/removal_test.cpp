@@ -18,7 +18,7 @@ using test::Path;
 using test::removed_mm3;
 using test::swept_mm3;
 
-constexpr double kMost = 1.01, kLeast = 0.97;
+constexpr double kMax = 1.01, kMin = 0.97;
 
 // The counting of sweep.h itself: a cap, and a capsule's part below a plane.
 TEST(Sweep, IsThatOfClosedForms) {
@@ -39,8 +39,8 @@ TEST(Removal, ARestingBurrTakesItsCapAndNoMore) {
       path.legs[0].to_mm.z += high;
       auto bone = block(h, face);
       const double ratio = removed_mm3(path, bone, method, 500) / (std::numbers::pi * 0.46 * 0.46 * (2 - 0.46 / 3));
-      EXPECT_LT(ratio, kMost) << h;
-      EXPECT_GT(ratio, kLeast) << h;
+      EXPECT_LT(ratio, kMax) << h;
+      EXPECT_GT(ratio, kMin) << h;
     }
   }
 }
@@ -62,8 +62,8 @@ TEST(Removal, EveryBurrTakesWhatItSweptAndNoMore) {
             4.06 * 0.015 * burr_library()[static_cast<std::size_t>(tool)].rate_mm3_per_s_per_n / swept;
         auto bone = block(0.5, face);
         const double ratio = removed_mm3(path, bone, ContactMethod::overlap, 250) / swept;
-        EXPECT_LT(ratio, kMost) << burr_library()[static_cast<std::size_t>(tool)].name();
-        EXPECT_GT(ratio, kLeast) << burr_library()[static_cast<std::size_t>(tool)].name();
+        EXPECT_LT(ratio, kMax) << burr_library()[static_cast<std::size_t>(tool)].name();
+        EXPECT_GT(ratio, kMin) << burr_library()[static_cast<std::size_t>(tool)].name();
       }
     }
   }
@@ -77,8 +77,8 @@ TEST(Removal, PassesSideBySideLeaveNoRidges) {
   for (const auto& [h, hz] : {std::pair{0.5, 1000.0}, {0.5, 5000.0}, {0.6, 500.0}, {0.28, 500.0}}) {
     auto bone = block(h, face);
     const double ratio = removed_mm3(path, bone, ContactMethod::overlap, hz) / swept;
-    EXPECT_LT(ratio, kMost) << h << " " << hz;
-    EXPECT_GT(ratio, kLeast) << h << " " << hz;
+    EXPECT_LT(ratio, kMax) << h << " " << hz;
+    EXPECT_GT(ratio, kMin) << h << " " << hz;
   }
 }
 
@@ -92,8 +92,8 @@ TEST(Removal, AFastHandLeavesBoneAndTakesItTheNextTime) {
   auto again = block(0.5, {});
   for (int n = 0; n < 80; ++n) path.legs.push_back({path.legs[1].to_mm + Vec3{n % 2 == 0 ? -4.06 : 0, 0, 0}, 40});
   const double ratio = removed_mm3(path, again, ContactMethod::overlap, 1000) / swept;
-  EXPECT_LT(ratio, kMost);
-  EXPECT_GT(ratio, kLeast);
+  EXPECT_LT(ratio, kMax);
+  EXPECT_GT(ratio, kMin);
 }
 
 TEST(Grains, SameBitsForEveryInstructionSet) {

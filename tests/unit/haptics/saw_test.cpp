@@ -203,7 +203,7 @@ TEST(HandSaw, AGuideIsCheckedBeforeItIsThere) {
   EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, -1})).done);
   EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 11})).done);
   EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {0, 0, 0}, 2})).done);
-  EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 2}, kMostHands)).done);
+  EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 2}, kMaxHands)).done);
   EXPECT_FALSE(w.cutting_guide().on());
   ASSERT_TRUE(w.act(SceneAction::cutting_guide({{1, 2, 3}, {0, 0, 5}, 2}, 1)).done);
   EXPECT_FALSE(w.cutting_guide(0).on());

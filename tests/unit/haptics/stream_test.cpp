@@ -95,7 +95,7 @@ TEST(Stream, ReadersJoinAndLeaveAThousandTimesAndNobodyElseLosesAnything) {
 TEST(Stream, HasRoomForSoManyReadersAndForOthersWhenTheyLeave) {
   Stream stream;
   std::vector<StreamReader*> readers;
-  for (std::size_t n = 0; n < Stream::kMostReaders; ++n) readers.push_back(&stream.add_reader(16, 16));
+  for (std::size_t n = 0; n < Stream::kMaxReaders; ++n) readers.push_back(&stream.add_reader(16, 16));
   EXPECT_THROW(stream.add_reader(16, 16), Error);
   stream.remove_reader(*readers[3]);
   StreamReader& another = stream.add_reader(16, 16);

@@ -80,7 +80,7 @@ TEST_F(Calibration, RefusesTooFewViewsAndViewsThatDoNotVary) {
   for (int i = 0; i < 11; ++i)
     calibration_.add(
         renderer_.picture(plate_pose(480, 0, 0, 90, {-60 + 40.0 * (i % 4), -40 + 40.0 * (i / 4), 0}), look_));
-  ASSERT_GE(calibration_.views(), CameraCalibration::kLeastViews);
+  ASSERT_GE(calibration_.views(), CameraCalibration::kMinViews);
   try {
     static_cast<void>(calibration_.solve());
     const auto r = calibration_.solve();

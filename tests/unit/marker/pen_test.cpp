@@ -110,7 +110,7 @@ TEST(Filter, AtRestItSmoothsAndInEvenMotionItDoesNotLag) {
   EXPECT_LT(length(moving.motion().tip_at(1.03) - later(tip)), 0.1);
   EXPECT_LT(test::angle_deg(moving.motion().rotation_at(1.03), later.rotation), 0.1);
   // No farther than it may.
-  EXPECT_NEAR(length(moving.motion().tip_at(9) - moving.motion().tip_mm), PenMotion::kMostAheadS * length(velocity),
+  EXPECT_NEAR(length(moving.motion().tip_at(9) - moving.motion().tip_mm), PenMotion::kMaxAheadS * length(velocity),
               0.5);
 }
 

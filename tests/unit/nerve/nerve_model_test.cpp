@@ -95,7 +95,7 @@ TEST(Threshold, SearchFindsIt) {
   ThresholdSearch loud(1);
   for (int i = 0; i < 100 && !loud.done(); ++i) loud.take(true);
   EXPECT_TRUE(loud.done());
-  EXPECT_DOUBLE_EQ(*loud.threshold_ma(), StimulatorSetting::kLeastMa);
+  EXPECT_DOUBLE_EQ(*loud.threshold_ma(), StimulatorSetting::kMinMa);
 }
 
 TEST(Stimulator, GivesPulsesWhileItTouches) {

@@ -97,7 +97,7 @@ TEST(Recorder, AMinuteOfStallingDiskLosesNothing) {
     servo.run(60000, 60);  // 60 s at 1 kHz: 36 MB before they are compressed
     servo.wait_until_taken();
     EXPECT_GT(recorder.status().waiting_bytes, 8u << 20);
-    EXPECT_LT(recorder.status().waiting_bytes, Recorder::kMostWaitingBytes);
+    EXPECT_LT(recorder.status().waiting_bytes, Recorder::kMaxWaitingBytes);
     EXPECT_GT(recorder.status().behind_s, 0);
     EXPECT_EQ(recorder.status().ticks_lost, 0u);
     disk.stall(false);
@@ -122,9 +122,9 @@ TEST(Recorder, ALongerStallIsAGapThatIsCountedAndBoneBehindItIsRight) {
   StreamReader reader(Recorder::kTickCapacity, 1 << 21);
   Servo servo(reader);
   std::vector<RecordingGap> gaps;
-  constexpr std::size_t kMost = 1 << 20;
+  constexpr std::size_t kMax = 1 << 20;
   {
-    Recorder recorder(reader, std::make_unique<StallingSink>(disk, path), header(), kMost);
+    Recorder recorder(reader, std::make_unique<StallingSink>(disk, path), header(), kMax);
     recorder.start();
     for (int stall = 0; stall < 2; ++stall) {
       servo.run(2000, 40);
@@ -133,7 +133,7 @@ TEST(Recorder, ALongerStallIsAGapThatIsCountedAndBoneBehindItIsRight) {
       servo.run(stall == 0 ? 300000 : 60000, 4);  // 300 s at 1 kHz
       servo.wait_until_taken();
       EXPECT_GT(recorder.status().ticks_lost, 1000u);
-      EXPECT_LT(recorder.status().waiting_bytes, kMost + (1 << 18)) << "memory is bounded";
+      EXPECT_LT(recorder.status().waiting_bytes, kMax + (1 << 18)) << "memory is bounded";
       disk.stall(false);
       while (recorder.status().waiting_bytes > 0) std::this_thread::sleep_for(std::chrono::microseconds(200));
       servo.run(3000, 40);
@@ -377,7 +377,7 @@ TEST(Recorder, NotesWaitWhileTheDiskStalls) {
   Servo servo(reader);
   {
     Recorder recorder(reader, path, header());
-    for (std::size_t n = 0; n < Recorder::kMostNotes + 7; ++n) recorder.note({n, "n", "{}"});
+    for (std::size_t n = 0; n < Recorder::kMaxNotes + 7; ++n) recorder.note({n, "n", "{}"});
     EXPECT_EQ(recorder.status().notes_lost, 7u);
     servo.run(250, 1);
     recorder.drain();
@@ -385,7 +385,7 @@ TEST(Recorder, NotesWaitWhileTheDiskStalls) {
     EXPECT_EQ(recorder.status().notes_lost, 7u) << "there is room again";
     recorder.finish({servo.next, "", "", 0, {}, 0, 0});
   }
-  EXPECT_EQ(read_session(path).notes.size(), Recorder::kMostNotes + 1);
+  EXPECT_EQ(read_session(path).notes.size(), Recorder::kMaxNotes + 1);
   fs::remove(path);
 }
 

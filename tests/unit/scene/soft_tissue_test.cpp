@@ -293,7 +293,7 @@ TEST(SoftTissue, BodiesShareWhatAnUpdateMayTake) {
   const auto facts = tissue.facts();
   EXPECT_EQ(facts[2].of_real_time, small);
   EXPECT_EQ(facts[0].of_real_time, facts[1].of_real_time);
-  const double rest = (SoftBody::kMostWork - tissue.body(2).work()) / SoftBody::kMostWork;
+  const double rest = (SoftBody::kMaxWork - tissue.body(2).work()) / SoftBody::kMaxWork;
   EXPECT_NEAR(facts[0].of_real_time, alone * rest / 2, 0.05 * alone);
   // The others asleep, the first has all of it.
   const SoftTool tool{{12, 12, 72.2}, {0, 0, 1}, diamond(6), false};

@@ -82,7 +82,7 @@ TEST(Tube, ConfidenceIsTheShareThatIsRight) {
     const NerveShape s = make_nerve_shape(seed);
     TubeParams p;
     p.max_radius_mm = 1.5;
-    p.max_unsure_mm = 1000;
+    p.max_uncertain_mm = 1000;
     try {
       for (const TubeStation& t : trace_tube(s.ct, s.clicks, p).stations) {
         const bool good = is_right(s, t);
@@ -138,7 +138,7 @@ TEST(Tube, SaysWhereTheWallsAreMissing) {
   EXPECT_NEAR(tube.unsure_mm[0][0], half - 2, 1.5);
   EXPECT_NEAR(tube.unsure_mm[0][1], half + 2, 1.5);
   TubeParams strict;
-  strict.max_unsure_mm = 1;
+  strict.max_uncertain_mm = 1;
   EXPECT_THROW((void)trace_tube({ct.frame, v}, ends_of(line), strict), Error);
 }
 

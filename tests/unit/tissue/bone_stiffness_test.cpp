@@ -274,12 +274,12 @@ TEST(BoneStiffness, SaysWhatItLimitsAndRefuses) {
   const BoneStiffness s = bone_stiffness(mesh_of(b), ct, d);
   EXPECT_GT(s.share_above, 0.1);
   EXPECT_LT(s.share_above, 0.5);
-  EXPECT_NEAR(*std::max_element(s.young_mpa.begin(), s.young_mpa.end()), d.most_mpa, 1e-6);
+  EXPECT_NEAR(*std::max_element(s.young_mpa.begin(), s.young_mpa.end()), d.max_mpa, 1e-6);
   const Image air = ct_of({4, 4, 4}, {0.5, 0.5, 0.5}, [](Vec3) { return -1000; });
   const BoneStiffness soft = bone_stiffness(mesh_of(b), air, d);
   EXPECT_EQ(soft.share_below, 1);
   EXPECT_EQ(soft.materials, 1U);
-  EXPECT_NEAR(soft.young_mpa.front(), d.least_mpa, 1e-12);
+  EXPECT_NEAR(soft.young_mpa.front(), d.min_mpa, 1e-12);
 
   const auto message = [&](const TetMesh& m, const BoneDensity& density, double step) {
     try {
@@ -305,7 +305,7 @@ TEST(BoneStiffness, SaysWhatItLimitsAndRefuses) {
   bad.per_1000_hu = 0;
   EXPECT_NE(message(mesh_of(b), bad, 0), "accepted");
   bad = d;
-  bad.most_mpa = 0.5;
+  bad.max_mpa = 0.5;
   EXPECT_NE(message(mesh_of(b), bad, 0), "accepted");
   EXPECT_NE(message(mesh_of(b), d, -0.1), "accepted");
 }

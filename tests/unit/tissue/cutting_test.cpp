@@ -58,7 +58,7 @@ TEST(VoxelCutting, SavesNoMoreThanItMay) {
   const BallShape beside({50, 0, 0}, 3, false), all({6, 6, 6}, 100, false);
   EXPECT_FALSE(cutting.cut(body, beside, 1000));  // meets nothing
   EXPECT_TRUE(cutting.cut(body, all, 0));
-  EXPECT_EQ(count(cutting.gone()), 5 * static_cast<std::size_t>(VoxelCutting::kMostSaved));
+  EXPECT_EQ(count(cutting.gone()), 5 * static_cast<std::size_t>(VoxelCutting::kMaxSaved));
 }
 
 TEST(VoxelCutting, WhatComesLooseGoesToo) {
@@ -77,7 +77,7 @@ TEST(VoxelCutting, WhatComesLooseGoesToo) {
 
 TEST(VoxelCutting, NoBurrCutsFasterThanAShaver) {
   EXPECT_DOUBLE_EQ(VoxelCutting::rate_mm3_per_s(0.01, 10), 0.01 * 10 * VoxelCutting::kEasierThanBone);
-  EXPECT_EQ(VoxelCutting::rate_mm3_per_s(5, 10), VoxelCutting::kMostMm3PerS);
+  EXPECT_EQ(VoxelCutting::rate_mm3_per_s(5, 10), VoxelCutting::kMaxMm3PerS);
 }
 
 }  // namespace

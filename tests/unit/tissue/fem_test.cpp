@@ -391,7 +391,7 @@ TEST(Fem, PatchesOfMeanVolumes) {
       ++seen[t];
       EXPECT_EQ(materials[t].young_mpa, materials[patch.front()].young_mpa);
     }
-    EXPECT_LE(body.nodes(b.tets.size() + p).size(), Energy::kMostNodes);
+    EXPECT_LE(body.nodes(b.tets.size() + p).size(), Energy::kMaxNodes);
   }
   EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), static_cast<std::ptrdiff_t>(b.tets.size()));
   EXPECT_LE(small * 20, body.patch_count());

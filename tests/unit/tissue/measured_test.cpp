@@ -142,7 +142,7 @@ TEST(Measured, StiffnessFromHalfOfANoisySurface) {
   EXPECT_GT(w.views[0].rejected, 200U);
   // Of 1500 points 300 are drawn, the same each time, and do as well.
   MeasuredOptions few;
-  few.most_points = 300;
+  few.max_points = 300;
   TissueModel thinned = post.model(0.05), again = post.model(0.05);
   const MeasuredCalibration t = calibrate_measured(thinned, boundary_surface(model), std::span(&c, 1), few);
   EXPECT_EQ(t.views[0].drawn, 300U);

@@ -167,7 +167,7 @@ TEST(Attack, WhateverComesNothingBreaks) {
     }
   }
   EXPECT_GT(understood, 100U);  // changed poses are packets all the same
-  EXPECT_LE(m.host.status(m.now).size(), LiveHost::kMostPeers);
+  EXPECT_LE(m.host.status(m.now).size(), LiveHost::kMaxPeers);
   // And the two still hear each other.
   m.talk(guest, 50);
   EXPECT_EQ(guest.state(), JoinState::joined);

@@ -175,7 +175,7 @@ TEST_F(Playbacks, BeyondTheLeashEveryModeStopsAndNoArmGainsEnergy) {
         held->push_n = {0, 0, 6};  // away, off the bone
         run(700);
         const std::size_t then = playback->clock.sample();
-        EXPECT_GT(length(playback->hand_mm - playback->clock.target_mm()), params.leash_mm);
+        EXPECT_GT(length(playback->hand_mm - playback->clock.target_mm()), params.tolerance_radius_mm);
         EXPECT_LE(run(200), params.most_n + 0.1);
         EXPECT_LE(playback->clock.sample(), then) << "time goes on without the hand";
         held->push_n = {};
@@ -196,7 +196,7 @@ TEST_F(Playbacks, TimeAlongTheWayWaitsAndBoneIsStillTheRecordedOne) {
   PlaybackParams params;
   params.mode = PlaybackMode::show;
   params.pace = Pace::way;
-  params.leash_mm = 0.6;  // a firm hand is behind farther than that
+  params.tolerance_radius_mm = 0.6;  // a firm hand is behind farther than that
   const fs::path file = at / "way.oss";
   const Played p = play(expert, params, 500, file);
   EXPECT_TRUE(p.playback->over);
@@ -351,12 +351,12 @@ TEST(LessonClock, GoesWithTheHandWaitsAndGoesBack) {
   // The hand stays: a leash on, time waits.
   hand = clock.target_mm();
   for (int t = 0; t < 1000; ++t) clock.step(hand, 1e-3);
-  EXPECT_NEAR(clock.target_mm().x - hand.x, params.leash_mm, 0.05);
+  EXPECT_NEAR(clock.target_mm().x - hand.x, params.tolerance_radius_mm, 0.05);
   EXPECT_FALSE(clock.goes_on());
   // It goes back six millimetres: so does time, to two leashes.
   hand.x -= 6;
   for (int t = 0; t < 2000; ++t) clock.step(hand, 1e-3);
-  EXPECT_NEAR(clock.target_mm().x - hand.x, 2 * params.leash_mm, 0.25);
+  EXPECT_NEAR(clock.target_mm().x - hand.x, 2 * params.tolerance_radius_mm, 0.25);
   EXPECT_FALSE(clock.goes_on());
   // And on again: what was there before is not new.
   int again = 0, fresh = 0;

@@ -69,7 +69,7 @@ const std::map<std::string, Recipe>& table() {
       {"fit-damping", {{{"at_mm", "0,0,10"}}, {{"problem", kProblem}, {"motion", plucked()}}, {}}},
       {"register", {{{"finest_mm", "4"}}, {}, {"labels"}}},
       {"saw", {{{"normal", "0,0,1"}}, {}, {}}},
-      {"curve", {{}, {{"curve", "0 0 0\n10 0 0\n10 10 0\n"}, {"path", "1 1 0\n9 1 0\n9 8 0\n"}}, {}}},
+      {"virtual-fixture", {{}, {{"curve", "0 0 0\n10 0 0\n10 10 0\n"}, {"path", "1 1 0\n9 1 0\n9 8 0\n"}}, {}}},
       {"tube",
        {{{"points_mm", "53.4,25.9,-15.6; 48,24,-28"}, {"max_radius_mm", "5"}, {"name", "sigmoid sinus"}},
         {},

@@ -19,7 +19,7 @@ const Registry& geometry() {
   static const Registry value = [] {
     Registry r;
     r.add<TetrahedralizeStage>();
-    r.add<SkinStage>();
+    r.add<EmbedSurfaceStage>();
     r.add<VoxelizeStage>();
     r.add<DistanceStage>();
     return r;
@@ -40,7 +40,7 @@ TEST(VtkGeometry, SphereToTetrahedraToSkin) {
   auto* const grid = vtkUnstructuredGrid::SafeDownCast(tets->GetOutputDataObject(0));
   ASSERT_NE(grid, nullptr);
   EXPECT_GT(grid->GetNumberOfCells(), 1000);
-  ASSERT_TRUE(skin->SetStage(geometry(), "skin"));
+  ASSERT_TRUE(skin->SetStage(geometry(), "embed-surface"));
   skin->SetInputConnection(skin->GetInputPortIndex("surface"), sphere->GetOutputPort());
   skin->SetInputConnection(skin->GetInputPortIndex("rest"), tets->GetOutputPort());
   skin->SetInputConnection(skin->GetInputPortIndex("deformed"), tets->GetOutputPort());

@@ -148,7 +148,7 @@ TEST(PersonSettings, OnlySoManyCasesAreRemembered) {
   const test::ScratchFolder scratch;
   PersonSettings p(scratch / "settings.json");
   for (int n = 0; n < 30; ++n) p.opened(scratch / std::to_string(n));
-  ASSERT_EQ(p.cases().size(), PersonSettings::kMostCases);
+  ASSERT_EQ(p.cases().size(), PersonSettings::kMaxCases);
   EXPECT_EQ(p.cases().front().filename(), "29");
 }
 

@@ -259,7 +259,7 @@ TEST(PinnedNotes, AreNumberedAndKeepWhatWasWritten) {
   const auto second = notes.pin({}, "x" + umlauts);
   ASSERT_TRUE(second);
   EXPECT_EQ(notes.all().back().number, 2);
-  EXPECT_EQ(notes.all().back().text.size(), PinnedNotes::kMostBytes - 1);
+  EXPECT_EQ(notes.all().back().text.size(), PinnedNotes::kMaxBytes - 1);
   EXPECT_FALSE(nlohmann::json::parse(*second, nullptr, false).is_discarded());
   notes.clear();
   ASSERT_TRUE(notes.pin({}, "again"));

@@ -155,13 +155,13 @@ TEST(WireServer, FloodsVanishingClientsAndTooManyOfThem) {
   const std::uint64_t heard = server.counts().heard;
   const double took_s = static_cast<double>(monotonic_ns() - begin) / 1e9;
   // A second's worth, and what one read takes beyond it, in each second that has begun.
-  EXPECT_LE(static_cast<double>(heard), (took_s + 1) * (WireServer::kMostHeard + 16384))
+  EXPECT_LE(static_cast<double>(heard), (took_s + 1) * (WireServer::kMaxHeard + 16384))
       << "it is read no faster than that";
   stop = true;
   flood.join();
   EXPECT_TRUE(soon([&] { return server.counts().clients == 1; }));
   std::vector<int> many;
-  for (std::size_t i = 0; i < WireServer::kMostClients + 2; ++i) many.push_back(connected_to(server.port()));
+  for (std::size_t i = 0; i < WireServer::kMaxClients + 2; ++i) many.push_back(connected_to(server.port()));
   EXPECT_TRUE(soon([&] { return server.counts().turned_away == 3; }));
   for (const int fd : many) ::close(fd);
 }

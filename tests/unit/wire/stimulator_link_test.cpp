@@ -22,7 +22,7 @@ constexpr const char* kCode = "K7MX2QPA";
 
 // A message as it was made, read once more.
 void with(const WireBytes& bytes, const std::function<void(const IgtlMessage&)>& take) {
-  IgtlParser parser(WireServer::kMostAsked);
+  IgtlParser parser(WireServer::kMaxAsked);
   EXPECT_TRUE(parser.feed(bytes, take));
 }
 
@@ -86,7 +86,7 @@ TEST(StimulatorLink, WhoHasTheCodeSetsCurrentPulsesAndSearch) {
   // Out of range is the nearest; a hand that is not there is nothing.
   room.talk(link, 1, *link.set({0, 500, 1000, 9, false}));
   ASSERT_EQ(room.set.size(), 2U);
-  EXPECT_EQ(room.set[1], (StimulatorSetting{0, StimulatorSetting::kMostMa, 30, 1, false}));
+  EXPECT_EQ(room.set[1], (StimulatorSetting{0, StimulatorSetting::kMaxMa, 30, 1, false}));
   room.talk(link, 1, *link.set({2, 1, 4, 0.1, false}));
   EXPECT_EQ(room.set.size(), 2U);
   EXPECT_EQ(room.door.counts().settings, 2U);

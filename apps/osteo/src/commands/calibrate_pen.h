@@ -18,7 +18,7 @@ struct CalibratePenCommand {
   static void describe(Params& p, auto& visit) {
     visit({"camera", "made by calibrate-camera"}, p.camera);
     visit({"out", "the pen as JSON (also -o)"}, p.out);
-    visit({"pen", "which set of markers it carries", "", 1, PenBody::kMostPens}, p.pen);
+    visit({"pen", "which set of markers it carries", "", 1, PenBody::kMaxPens}, p.pen);
     visit({"ruler_mm", "how long the line of 100 mm on its page came out", "mm", 80, 120}, p.ruler_mm);
     visit({"seconds", "how long to record from a camera", "s", 1, 3600}, p.seconds);
   }

@@ -24,9 +24,9 @@ struct JoinCommand {
     visit({"stiffness_n_per_mm", "stiffness of the spring to the instructor's hand, lowered where the delay demands it",
            "N/mm", 0, 10},
           p.stiffness_n_per_mm);
-    visit({"most_n", "maximum force of the spring to the instructor's hand", "N", 0, 20}, p.most_n);
+    visit({"max_force_n", "maximum force of the spring to the instructor's hand", "N", 0, 20}, p.most_n);
     visit({"wait_s", "maximum time to wait for the host's answer", "s", 0, 3600}, p.wait_s);
-    visit({"patience_s",
+    visit({"silence_s",
            "the session counts as over when nothing was heard of the host for so long; else when the host says so", "s",
            0.5, 600},
           p.patience_s);

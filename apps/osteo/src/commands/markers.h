@@ -17,7 +17,7 @@ struct MarkersCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"paper", "a4 or letter"}, p.paper);
-    visit({"pen", "which set of markers: another for each pen that one camera sees", "", 1, PenBody::kMostPens}, p.pen);
+    visit({"pen", "which set of markers: another for each pen that one camera sees", "", 1, PenBody::kMaxPens}, p.pen);
     visit({"page", "page of the sheet in a .png: 1 for the pen, 2 for the plate", "", 1, kMarkerPages}, p.page);
   }
   static cli::CommandInfo info();

@@ -29,8 +29,10 @@ struct PrepareCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder of the case, made when it is not there (also -o)"}, p.out);
-    visit({"preset", "how the bone threshold is found: fixed takes --lower, the others go by the scan ('osteo guide')"},
-          p.preset);
+    visit(
+        {"preset",
+         "how the bone threshold is found: fixed takes --lower, the others go by the scan ('osteo suggest-threshold')"},
+        p.preset);
     visit({"lower", "bone threshold", "HU", -1024, 30000}, p.lower);
     visit({"spacing_mm", "edge of the voxels", "mm", 0.05, 10}, p.spacing_mm);
     visit({"region", "part of the head to keep; 'osteo crop' tells more"}, p.region);

@@ -32,8 +32,8 @@ struct TutorCommand {
            "stiffness of the spring to the trainee's hand with --two-way, lowered where the delay demands it", "N/mm",
            0, 10},
           p.stiffness_n_per_mm);
-    visit({"most_n", "maximum force of the spring to the trainee's hand with --two-way", "N", 0, 20}, p.most_n);
-    visit({"attend", "so many are to have joined, with their copies made, when the session begins", "", 0, 9},
+    visit({"max_force_n", "maximum force of the spring to the trainee's hand with --two-way", "N", 0, 20}, p.most_n);
+    visit({"min_trainees", "so many are to have joined, with their copies made, when the session begins", "", 0, 9},
           p.attend);
     visit({"wait_s", "maximum time to wait for participants; then it begins with those who are there", "s", 0, 3600},
           p.wait_s);

@@ -32,6 +32,7 @@ struct Parsed {
   std::map<std::string, std::string> files;  // --mask FILE, --labels-out FILE: flag without dashes -> file
   std::vector<std::pair<std::string, std::string>> settings;
   std::set<std::string> given;
+  std::vector<std::string> renamed;  // what was written by an old name, for people
 };
 
 // Flags may be written with underscores, as other programs (3D Slicer) must: --spacing_mm is --spacing-mm.
@@ -83,8 +84,10 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
       parsed.files[*it] = take_value();
       continue;
     }
-    const auto field = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.flag() == name; });
-    if (field != fields.end()) {
+    std::string key = name.substr(std::min<std::size_t>(2, name.size()));
+    std::replace(key.begin(), key.end(), '-', '_');
+    if (const FieldRef* const field = find_field(fields, key); field != nullptr) {
+      if (field->doc.name != key) parsed.renamed.push_back(renamed_text(written, field->flag()));
       parsed.given.emplace(field->doc.name);
       if (field->kind() == "flag") {
         field->from_text(value.value_or("true"));
@@ -95,10 +98,8 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
     }
     // --no-fill for a flag that is on by default; --no-structures for a text: left empty.
     if (name.starts_with("--no-") && !value) {
-      const auto off = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) {
-        return (f.kind() == "flag" || f.kind() == "text") && f.flag() == "--" + name.substr(5);
-      });
-      if (off != fields.end()) {
+      const FieldRef* const off = find_field(fields, std::string_view(key).substr(3));
+      if (off != nullptr && (off->kind() == "flag" || off->kind() == "text")) {
         parsed.given.emplace(off->doc.name);
         off->from_text(off->kind() == "flag" ? "false" : "");
         continue;
@@ -150,6 +151,7 @@ int run_stage(const Registry& registry, Stage& stage, const std::vector<std::str
                 "'osteo help " + info.name + "' tells more");
   }
   ready();
+  for (const std::string& text : parsed.renamed) invocation.context.info(text);
   // The same code path as a pipeline file with one node.
   PipelineNode node;
   node.id = node.stage = info.name;
@@ -251,7 +253,8 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
     out << "osteo " << program_version() << "\n" << program.licence << "\n";
     return 0;
   }
-  const std::string subject = name == "help" ? args.front() : name;
+  const std::string written = name == "help" ? args.front() : name;
+  const std::string subject(current_command(written));
   Command* const command = program.find(subject);
   if (command == nullptr && !program.registry.has(subject)) {
     std::vector<std::string> known = program.names();
@@ -272,6 +275,8 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
   }
 
   Common::Params common;
+  std::vector<std::string> renamed;
+  if (subject != written) renamed.push_back(renamed_text(written, subject));
   Invocation invocation{program.registry, {}, {}, {}, {}, {}, out, err, [] {}};
   const auto ready = [&] {
     if (common.json && common.progress == ProgressStyle::slicer)
@@ -286,16 +291,18 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
       printer->message(level == LogLevel::warning ? "warning: " + std::string(text) : std::string(text));
     });
     invocation.end_progress = [&] { printer->clear(); };
+    for (const std::string& text : renamed) invocation.context.info(text);
   };
   int code = 0;
-  // 'osteo import --list FOLDER' asks what is there; that is the verb 'series'.
+  // 'osteo import --list FOLDER' asks what is there; that is the verb 'list-series'.
   if (command == nullptr && subject == "import" && std::find(args.begin(), args.end(), "--list") != args.end() &&
-      program.find("series") != nullptr) {
+      program.find("list-series") != nullptr) {
     args.erase(std::find(args.begin(), args.end(), "--list"));
-    Command* const series = program.find("series");
+    Command* const series = program.find("list-series");
     auto fields = series->fields();
     for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
     Parsed parsed = parse(args, fields, {}, false);
+    renamed.insert(renamed.end(), parsed.renamed.begin(), parsed.renamed.end());
     invocation.arguments = std::move(parsed.positionals);
     invocation.given = std::move(parsed.given);
     ready();
@@ -318,6 +325,7 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
     }
     invocation.arguments = std::move(parsed.positionals);
     invocation.settings = std::move(parsed.settings);
+    renamed.insert(renamed.end(), parsed.renamed.begin(), parsed.renamed.end());
     invocation.given = std::move(parsed.given);
     ready();
     code = command->run(invocation);

@@ -64,8 +64,8 @@ constexpr SlicerType kSlicerTypes[] = {
     {"tube", "points", "pointfile", kPointFile},
     {"tube", "line", "file", " fileExtensions=\".csv\""},
     {"distance-at", "points", "pointfile", kPointFile},
-    {"curve", "curve", "pointfile", kPointFile},
-    {"curve", "path", "pointfile", kPointFile},
+    {"virtual-fixture", "curve", "pointfile", kPointFile},
+    {"virtual-fixture", "path", "pointfile", kPointFile},
     {"find-structures", "labyrinth_mm", "point", kPoint},
     {"snapshot", "centre_mm", "point", kPoint},
     {"saw", "at_mm", "point", kPoint, "--no-from-centre"},  // it counts from where the scene does

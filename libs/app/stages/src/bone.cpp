@@ -39,7 +39,7 @@ StageInfo SawStage::info() {
           .description =
               "Removes what a box of the blade's thickness covers, voxels in part where it covers them in part. With "
               "no length and depth the "
-              "cut goes all through. What falls apart is told by 'pieces'.",
+              "cut goes all through. 'separate-fragments' lists what is no longer connected.",
           .inputs = {{"bone", {DataKind::grid}, "density, as resample makes it"}},
           .outputs = {{"cut", {DataKind::grid}, "the same with the cut"}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.5"},
@@ -61,9 +61,9 @@ std::vector<Data> SawStage::run(const Params& p, std::span<const Data> inputs, c
   return {to_sparse(bone, grid.name)};
 }
 
-StageInfo PiecesStage::info() {
+StageInfo SeparateFragmentsStage::info() {
   return {
-      .name = "pieces",
+      .name = "separate-fragments",
       .version = 2,
       .synopsis = "bone taken apart into what hangs together",
       .description =
@@ -76,16 +76,16 @@ StageInfo PiecesStage::info() {
                   {"surface", {DataKind::surface}, "closed, one body or more a piece", true},
                   {"kept", {DataKind::grid}, "density of the piece that --keep names, or of all but the crumbs", true}},
       .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.6"},
-      .example = "osteo pieces cut.vdb pieces.json --surface-out pieces.ply --apart-mm 15"};
+      .example = "osteo separate-fragments cut.vdb pieces.json --surface-out pieces.ply --apart-mm 15"};
 }
 
-std::vector<Data> PiecesStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
+std::vector<Data> SeparateFragmentsStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
   const auto& grid = std::get<SparseGrid>(inputs[0]);
   const BrickGrid bone = to_bricks(grid);
   const Split split = split_bone(bone, p.least_mm3, p.connectivity);
   const double voxel = bone.frame().voxel_volume_mm3();
   if (split.pieces.empty())
-    throw Error(ExitCode::failed, "no part is as large as --least-mm3", "is this a grid of bone density?");
+    throw Error(ExitCode::failed, "no part is as large as --min-volume-mm3", "is this a grid of bone density?");
   if (p.keep > static_cast<int>(split.pieces.size()))
     throw Error(ExitCode::usage, "--keep " + std::to_string(p.keep) + ": there are only " +
                                      std::to_string(split.pieces.size()) + " pieces");

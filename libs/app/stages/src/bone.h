@@ -82,10 +82,10 @@ struct PiecesParams {
   double apart_mm = 0;
   int keep = 0;
 };
-struct PiecesStage {
+struct SeparateFragmentsStage {
   using Params = PiecesParams;
   static void describe(Params& p, auto& visit) {
-    visit({"least_mm3", "smaller parts are crumbs", "mm3", 0, 1e9}, p.least_mm3);
+    visit({"min_volume_mm3", "smaller parts are crumbs", "mm3", 0, 1e9}, p.least_mm3);
     visit({"connectivity", "face: voxels that share a face hang together; full: an edge or a corner is enough"},
           p.connectivity);
     visit({"apart_mm", "move the pieces away from their common middle, to look at them", "mm", 0, 1000}, p.apart_mm);

@@ -72,7 +72,7 @@ Held held_parts(const TetMesh& mesh, const std::vector<double>& volume, const Ti
                       format_number(mesh.points_mm[p][0]) + ", " + format_number(mesh.points_mm[p][1]) + ", " +
                       format_number(mesh.points_mm[p][2]) + " mm, of " + format_number(std::round(all)) + " mm3 in all",
                   "let a place of \"fixed\" reach it, or leave it out of the mesh (threshold --keep-largest); "
-                  "--keep-loose writes it as it is");
+                  "--keep-floating writes it as it is");
     ++held.loose_parts;
     held.loose_mm3 += size[p];
   }
@@ -170,8 +170,8 @@ void warn_of_doubts(const BoneDensity& density, const BoneStiffness& bone, const
       context.warn(format_number(std::round(1000 * share) / 10) + " % of the volume came out " + than + ' ' +
                    format_number(limit) + " MPa and was set to it");
   };
-  limited(bone.share_below, "softer than", density.least_mpa);
-  limited(bone.share_above, "stiffer than", density.most_mpa);
+  limited(bone.share_below, "softer than", density.min_mpa);
+  limited(bone.share_above, "stiffer than", density.max_mpa);
   if (bone.share_outside > 0)
     context.warn(format_number(std::round(1e5 * bone.share_outside) / 1e3) +
                  " % of the volume lies outside of the CT: the values at its border were taken there");
@@ -218,12 +218,12 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
   TissueProblem problem = parse_tissue_problem(text, *given, true, Weight::apart);
   const std::size_t n = load_named(problem, p.load);
   Held held;
-  if (!p.keep_loose) {
+  if (!p.keep_floating) {
     held = held_parts(*given, volumes_mm3(*given), problem.loads[n]);
     if (held.loose_parts > 0) {
       context.warn(std::to_string(held.loose_parts) + " parts of " +
                    format_number(std::round(100 * held.loose_mm3) / 100) +
-                   " mm3 in all, which nothing holds, were left out; --keep-loose keeps them");
+                   " mm3 in all, which nothing holds, were left out; --keep-floating keeps them");
       problem = parse_tissue_problem(text, held.mesh, true, Weight::apart);
     }
   }
@@ -264,8 +264,8 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
          {"mean_hu", sums.hu / bone.volume_mm3},
          {"mean_young_mpa", sums.young / bone.volume_mm3},
          {"young_mpa_by_volume", std::move(sums.young_by_volume)},
-         {"least_mpa", p.density.least_mpa},
-         {"most_mpa", p.density.most_mpa},
+         {"min_mpa", p.density.min_mpa},
+         {"max_mpa", p.density.max_mpa},
          {"volume_share_below_least", bone.share_below},
          {"volume_share_above_most", bone.share_above},
          {"volume_share_outside_ct", bone.share_outside},

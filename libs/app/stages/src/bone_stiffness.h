@@ -11,7 +11,7 @@ namespace osteo::inline app {
 struct BoneStiffnessParams {
   BoneDensity density;
   double step_percent = 2;
-  bool keep_loose = false;
+  bool keep_floating = false;
   std::string load;
   OrderChoice order = OrderChoice::automatic;
 };
@@ -40,17 +40,17 @@ struct BoneStiffnessStage {
            "in_situ: "
            "with the marrow in its pores, 1.017 + 0.000592 HU g/cm3 above 100 HU"},
           p.density.weight);
-    visit({"least_mpa", "softer places are made so stiff, which is counted", "MPa", 1e-6, 1e6}, p.density.least_mpa);
-    visit({"most_mpa", "stiffer places (metal) are made so soft, which is counted", "MPa", 1e-6, 1e6},
-          p.density.most_mpa);
+    visit({"min_mpa", "softer places are made so stiff, which is counted", "MPa", 1e-6, 1e6}, p.density.min_mpa);
+    visit({"max_mpa", "stiffer places (metal) are made so soft, which is counted", "MPa", 1e-6, 1e6},
+          p.density.max_mpa);
     visit(
         {"step_percent",
          "materials are so far apart, each with the mean of its tetrahedra (0: each tetrahedron its own)", "%", 0, 100},
         p.step_percent);
-    visit({"keep_loose",
+    visit({"keep_floating",
            "parts of the mesh that nothing holds are written too; without, small ones are left out and large ones "
            "refused"},
-          p.keep_loose);
+          p.keep_floating);
     visit({"load", "name of the load (empty: the first)"}, p.load);
     visit({"order",
            "t4: linear tetrahedra; t10: quadratic; auto: what the problem says, else quadratic, but for large meshes "

@@ -311,8 +311,8 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
     return calibrate_to_measured(p, mesh, problem, std::move(model), measured->path,
                                  surface != nullptr ? surface->get() : nullptr, std::move(fitted), context);
   }
-  if (std::get_if<Surface>(&inputs[3]) != nullptr || p.find_pose || p.most_points != CalibrateParams{}.most_points)
-    throw Error(ExitCode::usage, "--surface, --find-pose and --most-points have no effect without --measured",
+  if (std::get_if<Surface>(&inputs[3]) != nullptr || p.find_pose || p.max_points != CalibrateParams{}.max_points)
+    throw Error(ExitCode::usage, "--surface, --find-pose and --max-points have no effect without --measured",
                 "finite elements are compared point by point");
   return calibrate_to_elements(p, mesh, problem, std::move(model), std::move(fitted), context);
 }

@@ -129,7 +129,7 @@ std::vector<Data> calibrate_to_measured(const CalibrateParams& p, const TetMesh&
   options.calibrate.smooth = p.smooth;
   options.calibrate.iterations = p.iterations;
   options.find_pose = p.find_pose;
-  options.most_points = static_cast<std::size_t>(p.most_points);
+  options.max_points = static_cast<std::size_t>(p.max_points);
   options.group_of = edges.of;
   TissueModel plain = model;
   plain.scale({1, 1, 0, 1});

@@ -20,7 +20,7 @@ struct ReduceMetalStage {
   using Params = MetalParams;
   static void describe(Params& p, auto& visit) {
     visit({"metal_hu", "metal is what is at or above this value", "HU", 500, 32767}, p.metal_hu);
-    visit({"least_mm2", "a slice with less metal than this stays as it is", "mm2", 0, 10000}, p.least_mm2);
+    visit({"min_area_mm2", "a slice with less metal than this stays as it is", "mm2", 0, 10000}, p.min_area_mm2);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

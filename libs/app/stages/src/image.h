@@ -23,8 +23,10 @@ struct CropStage {
 struct ThresholdStage {
   using Params = ThresholdParams;
   static void describe(Params& p, auto& visit) {
-    visit({"preset", "how the threshold is found: fixed takes --lower, the others go by this scan (see 'osteo guide')"},
-          p.preset);
+    visit(
+        {"preset",
+         "how the threshold is found: fixed takes --lower, the others go by this scan (see 'osteo suggest-threshold')"},
+        p.preset);
     visit({"lower", "keep voxels at or above this value", "HU", -32768, 32767}, p.lower);
     visit({"upper", "keep voxels at or below this value", "HU", -32768, 32767}, p.upper);
     visit({"core", "hysteresis: keep only pieces that hold a voxel at or above this value (off at or below lower)",

@@ -29,7 +29,7 @@ Error not_built(const std::string& what, const std::string& option) {
 }
 #endif
 
-[[maybe_unused]] constexpr double kMostTets = 5e7;
+[[maybe_unused]] constexpr double kMaxTets = 5e7;
 
 // Beyond this share of the surface's volume a mesh is another body.
 constexpr double kVolumeOff = 0.05;
@@ -67,12 +67,12 @@ class StepCost {
     context_.report(name + "_area_percent", percent(area > 0 ? area_of(after) / area - 1 : 0));
     context_.report(name + "_hausdorff_mm", compare_surfaces(after, before_, context_).hausdorff_mm());
     said_ = format_number(percent(off)) + " % of the volume";
-    return off < -kMostLost || (!may_grow && off > kMostLost);
+    return off < -kMaxLost || (!may_grow && off > kMaxLost);
   }
   [[nodiscard]] const std::string& said() const { return said_; }
 
  private:
-  static constexpr double kMostLost = 0.03;
+  static constexpr double kMaxLost = 0.03;
   TriangleSoup before_;
   double volume_;
   const Context& context_;
@@ -338,7 +338,7 @@ std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data
       // A regular tetrahedron's volume is 0.118 of its edge's cube.
       mesh = tets_by_tetgen(
           soup,
-          {p.max_volume_mm3 > 0 ? p.max_volume_mm3 : 0.118 * spacing * spacing * spacing, 1.414, 0, kMostTets, limits},
+          {p.max_volume_mm3 > 0 ? p.max_volume_mm3 : 0.118 * spacing * spacing * spacing, 1.414, 0, kMaxTets, limits},
           work);
       break;
 #else
@@ -346,7 +346,7 @@ std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data
 #endif
     case TetMethod::cgal:
 #ifdef OSTEO_WITH_CGAL
-      mesh = tets_by_cgal(soup, {spacing, 0, p.surface_spacing_mm, true, kMostTets, limits}, work);
+      mesh = tets_by_cgal(soup, {spacing, 0, p.surface_spacing_mm, true, kMaxTets, limits}, work);
       break;
 #else
       throw not_built("CGAL", "OSTEO_CGAL");

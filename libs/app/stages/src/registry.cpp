@@ -2,7 +2,6 @@
 
 #include "bone.h"
 #include "bone_stiffness.h"
-#include "curve.h"
 #include "distance.h"
 #include "edit.h"
 #include "enhance.h"
@@ -14,6 +13,7 @@
 #include "segment.h"
 #include "snapshot.h"
 #include "tissue.h"
+#include "virtual_fixture.h"
 
 namespace osteo::inline app {
 
@@ -35,15 +35,15 @@ Registry osteo_stages() {
   registry.add<DistanceAtStage>();
   registry.add<VoxelizeStage>();
   registry.add<TetrahedralizeStage>();
-  registry.add<SkinStage>();
+  registry.add<EmbedSurfaceStage>();
   registry.add<BoneStiffnessStage>();
   registry.add<FemStage>();
   registry.add<CalibrateStage>();
   registry.add<SimulateStage>();
   registry.add<FitDampingStage>();
   registry.add<SawStage>();
-  registry.add<PiecesStage>();
-  registry.add<CurveStage>();
+  registry.add<SeparateFragmentsStage>();
+  registry.add<VirtualFixtureStage>();
   registry.add<SnapshotStage>();
   registry.add<StructuresStage>();
   registry.add<TubeStage>();

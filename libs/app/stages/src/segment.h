@@ -27,14 +27,14 @@ struct TubeStage {
            "nerve to 2.5",
            "mm", 0.2, 5},
           p.tube.max_radius_mm);
-    visit({"content_hu", "what fills a nerve's canal; the radius of thin ones goes by it", "HU", -200, 500},
-          p.tube.content_hu);
+    visit({"lumen_hu", "what fills a nerve's canal; the radius of thin ones goes by it", "HU", -200, 500},
+          p.tube.lumen_hu);
     visit({"snap_mm",
            "a point moves this far to what looks most like a tube (0: stays), but not farther than max_radius_mm", "mm",
            0, 5},
           p.tube.snap_mm);
-    visit({"max_unsure_mm", "a longer stretch without walls and without a point is an error", "mm", 0, 1000},
-          p.tube.max_unsure_mm);
+    visit({"max_uncertain_mm", "a longer stretch without walls and without a point is an error", "mm", 0, 1000},
+          p.tube.max_uncertain_mm);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
@@ -48,7 +48,7 @@ struct FindStructuresStage {
           p.what);
     visit({"labyrinth_mm", "a point within the labyrinth, in its vestibule, LPS (0,0,0: none given)", "mm"},
           p.labyrinth_mm);
-    visit({"least_quality", "what is found with less is not written (0: everything is)", "", 0, 1}, p.least_quality);
+    visit({"min_quality", "what is found with less is not written (0: everything is)", "", 0, 1}, p.min_quality);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

@@ -287,7 +287,7 @@ void report_counts(const TissueDynamics<double>& dynamics, const SimulateParams&
   j["pushes_softened"] = counts.softened;
   if (counts.made_heavier > 0)
     context.warn(std::to_string(counts.made_heavier) + " points were made heavier for steps of " +
-                 format_number(p.least_step_ms) + " ms: motion is slower than it would be");
+                 format_number(p.min_step_ms) + " ms: motion is slower than it would be");
   if (counts.softened > 0)
     context.warn(
         std::to_string(counts.softened) +
@@ -322,7 +322,7 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
     DynamicsOptions options;
     options.density_kg_m3 = p.density_kg_m3;
     options.damping_per_s = p.damping_per_s;
-    options.least_step_s = p.least_step_ms / 1000;
+    options.least_step_s = p.min_step_ms / 1000;
     // As quick as floats, which never balance to a thousandth.
     TissueDynamics<double> dynamics(model, load.fixed, options, load.sliders);
     dynamics.set_load(load.forces_n);

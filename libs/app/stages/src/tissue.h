@@ -65,7 +65,7 @@ struct CalibrateParams {
   int iterations = 60;
   bool check_truth = false;
   bool find_pose = false;
-  int most_points = 5000;
+  int max_points = 5000;
 };
 struct CalibrateStage {
   using Params = CalibrateParams;
@@ -97,8 +97,8 @@ struct CalibrateStage {
            "measured: each file may lie elsewhere by a small rigid motion, which is found too; else it is in the "
            "mesh's frame"},
           p.find_pose);
-    visit({"most_points", "measured: of a larger cloud so many points are drawn at random", "", 20, 100000},
-          p.most_points);
+    visit({"max_points", "measured: of a larger cloud so many points are drawn at random", "", 20, 100000},
+          p.max_points);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
@@ -115,7 +115,7 @@ struct SimulateParams {
   double seconds = 3;
   double density_kg_m3 = 1000;
   double damping_per_s = 60;
-  double least_step_ms = 0;
+  double min_step_ms = 0;
   double step_ms = 10;
   bool until_rest = true;
   double tool_radius_mm = 0;
@@ -132,9 +132,9 @@ struct SimulateStage {
     visit({"seconds", "maximum simulated time", "s", 1e-4, 1000}, p.seconds);
     visit({"density_kg_m3", "density of the tissue", "kg/m3", 1, 30000}, p.density_kg_m3);
     visit({"damping_per_s", "how fast motion dies down", "1/s", 0, 1e5}, p.damping_per_s);
-    visit({"least_step_ms", "steps at least this long: points are made heavier for it (0: as long as is stable)", "ms",
-           0, 100},
-          p.least_step_ms);
+    visit({"min_step_ms", "steps at least this long: points are made heavier for it (0: as long as is stable)", "ms", 0,
+           100},
+          p.min_step_ms);
     visit({"step_ms", "implicit: length of a step, any", "ms", 1e-4, 1e5}, p.step_ms);
     visit({"until_rest", "ends when the forces balance to a thousandth of the load and little moves"}, p.until_rest);
     visit({"tool_radius_mm", "a ball that is pushed into the body (0: none)", "mm", 0, 1e6}, p.tool_radius_mm);

@@ -59,27 +59,25 @@ bool vtkOsteoStage::SetStage(const osteo::Registry& registry, const std::string&
 bool vtkOsteoStage::SetParameter(const std::string& name, const std::string& value) {
   this->LastError = "there is no parameter '" + name + "'";
   if (!this->Stage) return false;
-  for (const auto& f : this->Stage->fields()) {
-    if (f.doc.name != name) continue;
-    const std::string before = f.to_text();
-    try {
-      f.from_text(value);
-    } catch (const osteo::Error& e) {
-      this->LastError = e.what();
-      return false;
-    }
-    this->LastError.clear();
-    if (f.to_text() != before) this->Modified();
-    return true;
+  const auto fields = this->Stage->fields();
+  const osteo::FieldRef* const field = osteo::find_field(fields, name);
+  if (field == nullptr) return false;
+  const std::string before = field->to_text();
+  try {
+    field->from_text(value);
+  } catch (const osteo::Error& e) {
+    this->LastError = e.what();
+    return false;
   }
-  return false;
+  this->LastError.clear();
+  if (field->to_text() != before) this->Modified();
+  return true;
 }
 
 std::string vtkOsteoStage::GetParameter(const std::string& name) {
   if (this->Stage) {
-    for (const auto& f : this->Stage->fields()) {
-      if (f.doc.name == name) return f.to_text();
-    }
+    const auto fields = this->Stage->fields();
+    if (const osteo::FieldRef* const field = osteo::find_field(fields, name); field != nullptr) return field->to_text();
   }
   return {};
 }

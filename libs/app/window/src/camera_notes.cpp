@@ -14,9 +14,9 @@ std::string triple(Vec3 v) {
 }  // namespace
 
 std::optional<std::string> CameraNotes::next(const CameraView& view, double now_s, const void* session) {
-  constexpr double kLeastS = 0.99 / 60;  // pictures come at 60 Hz, more or less
+  constexpr double kMinS = 0.99 / 60;  // pictures come at 60 Hz, more or less
   if (std::exchange(session_, session) != session) noted_.reset();
-  if (noted_ && (*noted_ == view || now_s - noted_s_ < kLeastS)) return std::nullopt;
+  if (noted_ && (*noted_ == view || now_s - noted_s_ < kMinS)) return std::nullopt;
   noted_ = view;
   noted_s_ = now_s;
   return "{\"eye_mm\":" + triple(view.eye_mm) + ",\"target_mm\":" + triple(view.target_mm) +

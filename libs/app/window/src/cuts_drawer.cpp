@@ -57,8 +57,8 @@ std::vector<DrawnCut> CutsDrawer::next(const std::array<std::optional<SliceView>
     Done done = drawing_.get();
     last_ms_ = done.ms;
     drawn = std::move(done.cuts);
-    constexpr double kLeastPauseMs = 30, kPauses = 2;
-    not_before_ = now + std::chrono::microseconds(static_cast<long>(1000 * std::max(kLeastPauseMs, kPauses * done.ms)));
+    constexpr double kMinPauseMs = 30, kPauses = 2;
+    not_before_ = now + std::chrono::microseconds(static_cast<long>(1000 * std::max(kMinPauseMs, kPauses * done.ms)));
   }
   if (now < not_before_) return drawn;
   std::vector<std::pair<int, SliceView>> wanted;

@@ -20,7 +20,7 @@ namespace osteo::inline app {
 namespace {
 
 constexpr const char* kProgram = "zenity";
-constexpr std::size_t kMostSaid = 1 << 16;  // a path is shorter
+constexpr std::size_t kMaxSaid = 1 << 16;  // a path is shorter
 
 }  // namespace
 
@@ -68,7 +68,7 @@ bool FileDialog::read_on() {
   std::array<char, 4096> some;
   for (ssize_t n = 0; (n = ::read(from_, some.data(), some.size())) > 0;) {
     said_.append(some.data(), static_cast<std::size_t>(n));
-    if (said_.size() > kMostSaid) return false;
+    if (said_.size() > kMaxSaid) return false;
   }
   return true;
 }

@@ -14,8 +14,8 @@ namespace {
 
 // In heights of text. What a column needs at least to be read without a break in each second word, and what more would
 // only part keys and words.
-constexpr float kLeastColumnEm = 25, kMostColumnEm = 34, kKeysEm = 9.6F, kGapEm = 1.2F;
-constexpr int kMostColumns = 4;
+constexpr float kMinColumnEm = 25, kMaxColumnEm = 34, kKeysEm = 9.6F, kGapEm = 1.2F;
+constexpr int kMaxColumns = 4;
 
 float high(const char* text, float wide) {
   return ImGui::CalcTextSize(text, nullptr, false, wide).y;
@@ -56,10 +56,9 @@ void HelpPage::draw(int width, int height, const std::function<void()>& steps) {
   const float e = em(), line = 0.25F * e;
   const ImVec2 pad = ImGui::GetStyle().WindowPadding;
   const float room = w - e - 2 * pad.x;
-  const int columns =
-      std::clamp(static_cast<int>((room + kGapEm * e) / ((kLeastColumnEm + kGapEm) * e)), 1, kMostColumns);
+  const int columns = std::clamp(static_cast<int>((room + kGapEm * e) / ((kMinColumnEm + kGapEm) * e)), 1, kMaxColumns);
   const auto count = static_cast<float>(columns);
-  const float column = std::min((room - (count - 1) * kGapEm * e) / count, kMostColumnEm * e);
+  const float column = std::min((room - (count - 1) * kGapEm * e) / count, kMaxColumnEm * e);
   const float keys_wide = std::min(kKeysEm * e, column / 2), text_wide = column - keys_wide - 0.5F * e;
 
   const std::vector<HelpLine>& lines = help_lines();

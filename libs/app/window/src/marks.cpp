@@ -39,8 +39,8 @@ std::optional<std::string> PinnedNotes::pin(Vec3 at_mm, std::string text) {
   const auto first = text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) return std::nullopt;
   text = text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
-  if (text.size() > kMostBytes) {
-    std::size_t end = kMostBytes;
+  if (text.size() > kMaxBytes) {
+    std::size_t end = kMaxBytes;
     while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;  // within a letter of UTF-8
     text.resize(end);
   }

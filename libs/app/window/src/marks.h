@@ -34,9 +34,9 @@ struct PinnedNote {
 /// Numbered from 1 within a session.
 class PinnedNotes {
  public:
-  static constexpr std::size_t kMostBytes = 300;
+  static constexpr std::size_t kMaxBytes = 300;
   /// The value of a "note" note. Blanks at the ends are dropped; empty text: nothing is pinned, nothing returned.
-  /// Beyond kMostBytes it is cut at a letter's end.
+  /// Beyond kMaxBytes it is cut at a letter's end.
   std::optional<std::string> pin(Vec3 at_mm, std::string text);
   [[nodiscard]] const std::vector<PinnedNote>& all() const { return notes_; }
   /// Another session.

@@ -12,7 +12,7 @@ namespace osteo::inline app {
 namespace {
 
 // In heights of text.
-constexpr float kLeastLaneEm = 1.7F, kLeastEm = 13, kMostEm = 18, kSwitchesEm = 24;
+constexpr float kMinLaneEm = 1.7F, kMinEm = 13, kMaxEm = 18, kSwitchesEm = 24;
 
 float button_wide(const char* words) {
   return ImGui::CalcTextSize(words).x + 2 * ImGui::GetStyle().FramePadding.x;
@@ -148,8 +148,8 @@ void MonitorPanel::draw_stimulator(MonitorDesk& desk) {
   auto ma = static_cast<float>(wanted_.current_ma);
   ImGui::SetNextItemWidth(std::min(9 * em(), ImGui::GetContentRegionAvail().x));
   const bool moved =
-      ImGui::SliderFloat("##ma", &ma, static_cast<float>(StimulatorSetting::kLeastMa),
-                         static_cast<float>(StimulatorSetting::kMostMa), "%.2f mA", ImGuiSliderFlags_Logarithmic);
+      ImGui::SliderFloat("##ma", &ma, static_cast<float>(StimulatorSetting::kMinMa),
+                         static_cast<float>(StimulatorSetting::kMaxMa), "%.2f mA", ImGuiSliderFlags_Logarithmic);
   wanted_.current_ma = static_cast<double>(ma);
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("current of the stimulator: the tip of the tool is its electrode");
   const char* const turn = on ? "stimulator on" : "stimulator off";
@@ -229,7 +229,7 @@ void MonitorPanel::draw_switches(MonitorDesk& desk) {
 void MonitorPanel::lay_out(RoomLayout& room, float em_pixels, bool there) {
   box_ = {};
   if (there && shown_)
-    box_ = take_strip(room, std::clamp(room.view.height * 0.28F, kLeastEm * em_pixels, kMostEm * em_pixels));
+    box_ = take_strip(room, std::clamp(room.view.height * 0.28F, kMinEm * em_pixels, kMaxEm * em_pixels));
 }
 
 void MonitorPanel::draw(MonitorDesk& desk) {
@@ -272,7 +272,7 @@ void MonitorPanel::draw(MonitorDesk& desk) {
   } else {
     draw_switches(desk);
     const float left = ImGui::GetContentRegionAvail().y,
-                least = kLeastLaneEm * e * static_cast<float>(desk.wiring().channels.size());
+                least = kMinLaneEm * e * static_cast<float>(desk.wiring().channels.size());
     const float log_high = std::min(left - least, 5 * e);
     const bool told = log_high > 1.2F * e;
     lanes(told ? left - log_high - ImGui::GetStyle().ItemSpacing.y : left);

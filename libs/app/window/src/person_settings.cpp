@@ -81,7 +81,7 @@ PersonSettings::PersonSettings(std::filesystem::path file) : file_(std::move(fil
     cases_.clear();
   }
   if (!values.remember_cases) cases_.clear();
-  if (cases_.size() > kMostCases) cases_.resize(kMostCases);
+  if (cases_.size() > kMaxCases) cases_.resize(kMaxCases);
   read_ = values;
   read_buttons_ = buttons;
   read_cases_ = cases_;
@@ -120,7 +120,7 @@ void PersonSettings::opened(const std::filesystem::path& the_case) {
   if (failed) path = std::filesystem::absolute(the_case);
   std::erase(cases_, path);
   cases_.insert(cases_.begin(), path);
-  if (cases_.size() > kMostCases) cases_.resize(kMostCases);
+  if (cases_.size() > kMaxCases) cases_.resize(kMaxCases);
 }
 
 std::string PersonSettings::text() const {

@@ -161,7 +161,7 @@ class RehearsalWindow {
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkNew<vtkRenderer> renderer_;
   std::unique_ptr<WayView> way_view_;
-  std::array<std::unique_ptr<InstrumentView>, kMostHands> hands_;
+  std::array<std::unique_ptr<InstrumentView>, kMaxHands> hands_;
   std::unique_ptr<ScenePainter> painter_;
   std::unique_ptr<WorldView> world_view_;
   std::unique_ptr<StructuresView> structures_;

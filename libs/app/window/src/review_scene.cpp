@@ -43,7 +43,7 @@ void ReviewScene::draw_findings() {
 }
 
 void ReviewScene::show(vtkRenderer* renderer, std::unique_ptr<WorldView>& world,
-                       std::array<std::unique_ptr<InstrumentView>, kMostHands>& hands, ScopeInput& scope,
+                       std::array<std::unique_ptr<InstrumentView>, kMaxHands>& hands, ScopeInput& scope,
                        double seconds) {
   renderer_ = renderer;
   if (control_.poll() != ReviewControl::State::ready) return;
@@ -65,7 +65,7 @@ void ReviewScene::show(vtkRenderer* renderer, std::unique_ptr<WorldView>& world,
   if (control_.shown() && !course_.empty()) draw_course(course_, control_);
 }
 
-void ReviewScene::show_hands(std::array<std::unique_ptr<InstrumentView>, kMostHands>& hands) {
+void ReviewScene::show_hands(std::array<std::unique_ptr<InstrumentView>, kMaxHands>& hands) {
   SessionPlayer& player = *control_.review().player;
   const World& world = *player.scene().world();
   for (std::size_t h = 0; h < hands.size(); ++h) {

@@ -34,12 +34,12 @@ class ReviewScene {
   [[nodiscard]] bool key(const Keyboard::Press& press) { return control_.key(press); }
   /// `world` is replaced by a view of the session's own scene as soon as that is there.
   void show(vtkRenderer* renderer, std::unique_ptr<WorldView>& world,
-            std::array<std::unique_ptr<InstrumentView>, kMostHands>& hands, ScopeInput& scope, double seconds);
+            std::array<std::unique_ptr<InstrumentView>, kMaxHands>& hands, ScopeInput& scope, double seconds);
   void state(RoomState& state) const;
 
  private:
   void show_places(vtkRenderer* renderer, const std::vector<Vec3>& places_mm);
-  void show_hands(std::array<std::unique_ptr<InstrumentView>, kMostHands>& hands);
+  void show_hands(std::array<std::unique_ptr<InstrumentView>, kMaxHands>& hands);
 
   ReviewControl control_;
   ScreenBox course_;

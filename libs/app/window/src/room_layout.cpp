@@ -10,7 +10,7 @@ namespace {
 constexpr float kPanelEm = 18, kColumnEm = 17, kTrayEm = 5.5F, kStateEm = 5.4F, kPageEm = 34;
 constexpr float kBesideEm = 60, kPlanWideEm = 52, kPlanHighEm = 34;
 // Of the smallest window that operate fits: its state needs the width, its tray the height.
-constexpr double kLeastWideEm = 40, kLeastHighEm = 26;
+constexpr double kMinWideEm = 40, kMinHighEm = 26;
 
 }  // namespace
 
@@ -97,7 +97,7 @@ double automatic_scale(double told_by_monitor, int width, int height) {
 }
 
 double scale_that_fits(double automatic, double by_hand, int width, int height) {
-  const double most = std::min(width / (kLeastWideEm * kTextPixels), height / (kLeastHighEm * kTextPixels));
+  const double most = std::min(width / (kMinWideEm * kTextPixels), height / (kMinHighEm * kTextPixels));
   return std::max(0.7, std::min(automatic * by_hand, most));
 }
 

@@ -99,10 +99,10 @@ void StartList::list() {
     }
   }
   std::sort(below.begin(), below.end(), before_in_order);
-  if (below.size() > kMostListed) {
+  if (below.size() > kMaxListed) {
     message_ =
-        "of " + std::to_string(below.size()) + " folders the first " + std::to_string(kMostListed) + " are listed";
-    below.resize(kMostListed);
+        "of " + std::to_string(below.size()) + " folders the first " + std::to_string(kMaxListed) + " are listed";
+    below.resize(kMaxListed);
   }
   if (inside) entries_.push_back({Group::browse, FolderKind::the_case, folder_, "this case: " + name_of(folder_)});
   for (const fs::path& b : below) {

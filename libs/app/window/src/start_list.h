@@ -29,7 +29,7 @@ struct StartEntry {
 
 class StartList {
  public:
-  static constexpr std::size_t kMostListed = 500;
+  static constexpr std::size_t kMaxListed = 500;
   /// `from`: the folder that the browser begins in; one that cannot be read is told in message().
   StartList(std::vector<std::filesystem::path> recent, std::filesystem::path from);
 

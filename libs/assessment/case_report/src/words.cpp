@@ -103,9 +103,9 @@ sheet::Band verdict_band(const CaseFacts& f) {
     }
   }
   // Less than any table has, and teeth and the tip of a nose reach so far (libs/imaging/image, threshold).
-  constexpr double kLeastHolderMm3 = 1000;
+  constexpr double kMinHolderMm3 = 1000;
   if (const auto left = f.reported("threshold", "outside_body_left_mm3");
-      status == "good" && left.value_or(0) >= kLeastHolderMm3) {
+      status == "good" && left.value_or(0) >= kMinHolderMm3) {
     const std::string said =
         volume_text(*left) + " outside the body are left in the bone, which may be table or head holder";
     return {"Look", said + "; 'osteo prepare --remove-table' takes them off.", Tone::caution};
@@ -135,11 +135,11 @@ std::vector<sheet::Paragraph> verdict_notes(const CaseFacts& f) {
   const Json* const findings = f.verdict("findings");
   if (findings == nullptr) return notes;
   bool first = true;
-  constexpr std::size_t kMost = 8;
+  constexpr std::size_t kMax = 8;
   for (const char* const wanted : {"warning", "info"}) {
     for (const Json& e : findings->items()) {
       const std::string severity = text(e.find("severity")), advice = text(e.find("advice"));
-      if (severity != wanted || notes.size() >= kMost) continue;
+      if (severity != wanted || notes.size() >= kMax) continue;
       const bool in_band = severity == "warning" && std::exchange(first, false);
       if (in_band && advice.empty()) continue;
       notes.push_back({(in_band ? std::string() : text(e.find("message")) + (advice.empty() ? "" : " ")) + advice,

@@ -102,8 +102,8 @@ class Finder {
   void moments(ScoreFinding& f, std::string_view what, const std::string& structure) const {
     for (const Moment& m : score_.moments) {
       if (m.what != what || m.structure != structure) continue;
-      if (f.times_s.size() < ScoreFinding::kMostTimes) f.times_s.push_back(m.t_s);
-      if (f.places_mm.size() < ScoreFinding::kMostPlaces) f.places_mm.push_back(m.at_mm);
+      if (f.times_s.size() < ScoreFinding::kMaxTimes) f.times_s.push_back(m.t_s);
+      if (f.places_mm.size() < ScoreFinding::kMaxPlaces) f.places_mm.push_back(m.at_mm);
       ++f.places_count;
       if (!f.at_mm) f.at_mm = m.at_mm;
     }
@@ -113,7 +113,7 @@ class Finder {
     f.places_count = count;
     f.places_each = each;
     if (all.empty()) return;
-    const std::size_t keep = std::min(all.size(), ScoreFinding::kMostPlaces);
+    const std::size_t keep = std::min(all.size(), ScoreFinding::kMaxPlaces);
     Vec3 middle;
     for (std::size_t n = 0; n < keep; ++n) f.places_mm.push_back(all[n * all.size() / keep]);
     for (const Vec3 p : f.places_mm) middle += p / static_cast<double>(keep);
@@ -270,7 +270,7 @@ class Finder {
                                   [&](Vec3 a, Vec3 b) { return length(a - middle) < length(b - middle); });
     }
     for (const Moment& m : score_.moments) {
-      if (m.what == "removed unseen" && !to_be_opened(m.structure) && f.times_s.size() < ScoreFinding::kMostTimes)
+      if (m.what == "removed unseen" && !to_be_opened(m.structure) && f.times_s.size() < ScoreFinding::kMaxTimes)
         f.times_s.push_back(m.t_s);
     }
   }

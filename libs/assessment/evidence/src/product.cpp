@@ -133,8 +133,8 @@ void Product::lay_lattice(const World& before) {
     for (std::size_t a = 0; a < 3; ++a) n *= std::floor((hi[a] - lo[a]) / edge) + 2;
     return n;
   };
-  if (count(h) > static_cast<double>(kMostCells)) {
-    while (count(h) > static_cast<double>(kMostCells)) h *= 1.05;
+  if (count(h) > static_cast<double>(kMaxCells)) {
+    while (count(h) > static_cast<double>(kMaxCells)) h *= 1.05;
     word_ = "the final product was measured on cubes of " + format_number(std::round(h * 1000) / 1000) +
             " mm, to keep memory in bounds";
   }
@@ -212,9 +212,9 @@ double Product::distance_to(std::uint8_t value, Vec3 own_mm) const {
 }
 
 void Product::keep(Result& r, Vec3 at) const {
-  constexpr std::size_t kMost = 20000;
+  constexpr std::size_t kMax = 20000;
   ++r.evidence_count;
-  if (r.evidence_mm.size() < kMost) r.evidence_mm.push_back(at);
+  if (r.evidence_mm.size() < kMax) r.evidence_mm.push_back(at);
 }
 
 double Product::off_mm() const {

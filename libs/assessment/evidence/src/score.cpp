@@ -148,7 +148,7 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
     no(MetricWhen::bands, "the case has no structures");
     return;
   }
-  constexpr std::size_t kLeast = 100;  // samples: a second
+  constexpr std::size_t kMin = 100;  // samples: a second
   for (const auto& [value, samples] : keeper.near().samples()) {
     const std::string name = structures->name_of(value);
     std::vector<IsotonicQuantile::Point> force, speed;
@@ -161,7 +161,7 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
           speed.push_back({static_cast<double>(s.distance_mm), static_cast<double>(s.speed_mm_s)});
       }
     }
-    if (force.size() < kLeast) {
+    if (force.size() < kMin) {
       no(MetricWhen::bands, "experts drilled less than a second near it", name);
       continue;
     }

@@ -54,7 +54,7 @@ void StrokeFinder::end_period() {
       from = i;
     }
     s.direction = normalized(period_[end].at_mm - period_[begin].at_mm);
-    if (s.length_mm >= kLeastMm && s.end_s - s.begin_s >= kLeastS - 1e-9) strokes_.push_back(s);
+    if (s.length_mm >= kMinMm && s.end_s - s.begin_s >= kMinS - 1e-9) strokes_.push_back(s);
     begin = end;
   };
   for (std::size_t i = kReach; i + kReach < n; ++i) {

@@ -75,9 +75,9 @@ std::size_t TimelineKeeper::sample_at(std::uint64_t tick) {
 }
 
 std::size_t TimelineKeeper::add(TimelineEvent event) {
-  if (line_.events.size() >= Timeline::kMostEvents) {
+  if (line_.events.size() >= Timeline::kMaxEvents) {
     ++line_.events_left_out;
-    return Timeline::kMostEvents;
+    return Timeline::kMaxEvents;
   }
   line_.events.push_back(std::move(event));
   return line_.events.size() - 1;

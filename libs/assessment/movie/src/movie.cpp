@@ -35,11 +35,11 @@ std::string clock(double s) {
 ScopeView fixed_view(const SessionSurvey& survey, const World& begin) {
   if (survey.drilled_mm) {
     const auto& [lo, hi] = *survey.drilled_mm;
-    constexpr double kAroundMm = 12, kLeastMm = 20;
+    constexpr double kAroundMm = 12, kMinMm = 20;
     const Vec3 eye = length(survey.handle) > 0 ? survey.handle : Vec3{1, 0, 0};
     // From a little aside, so that the shaft does not hide what its burr does.
     const Vec3 aside = std::abs(eye.z) < 0.8 ? Vec3{0, 0, 1} : Vec3{0, -1, 0};
-    return overview((lo + hi) * 0.5, std::max(kLeastMm, 0.5 * length(hi - lo) + kAroundMm),
+    return overview((lo + hi) * 0.5, std::max(kMinMm, 0.5 * length(hi - lo) + kAroundMm),
                     normalized(eye + aside * 0.7));
   }
   Vec3 lo{1e9, 1e9, 1e9}, hi = lo * -1;

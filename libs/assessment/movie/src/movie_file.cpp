@@ -107,15 +107,15 @@ MovieFile::MovieFile(const std::filesystem::path& path, int width, int height, i
   if (ending != ".mp4" && ending != ".webm")
     throw Error(ExitCode::usage, "'" + path.filename().string() + "' is no movie that can be written",
                 "name it NAME.mp4 or NAME.webm");
-  const auto fits = [](int edge) { return edge >= kLeastEdge && edge <= kMostEdge && edge % 2 == 0; };
+  const auto fits = [](int edge) { return edge >= kMinEdge && edge <= kMaxEdge && edge % 2 == 0; };
   if (!fits(width) || !fits(height))
     throw Error(ExitCode::usage,
                 "a movie of " + std::to_string(width) + "x" + std::to_string(height) + " pixels cannot be made",
-                "give even numbers from " + std::to_string(kLeastEdge) + " to " + std::to_string(kMostEdge) +
+                "give even numbers from " + std::to_string(kMinEdge) + " to " + std::to_string(kMaxEdge) +
                     ", such as 1280x720");
-  if (fps < 1 || fps > kMostFps)
+  if (fps < 1 || fps > kMaxFps)
     throw Error(ExitCode::usage, std::to_string(fps) + " frames a second cannot be made",
-                "give 1 to " + std::to_string(kMostFps));
+                "give 1 to " + std::to_string(kMaxFps));
   const AVCodec* const encoder = encoder_for(ending);
   if (encoder == nullptr)
     throw Error(ExitCode::failed, "this machine's libav has no encoder for " + ending,

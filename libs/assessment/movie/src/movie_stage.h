@@ -34,7 +34,7 @@ class MovieStage {
   vtkNew<vtkRenderer> renderer_;
   std::unique_ptr<WorldView> world_view_;
   std::unique_ptr<StructuresView> structures_;
-  std::array<std::unique_ptr<InstrumentView>, kMostHands> hands_;
+  std::array<std::unique_ptr<InstrumentView>, kMaxHands> hands_;
   bool deep_ = false;
 };
 

@@ -59,7 +59,7 @@ SessionSurvey survey_of(const SessionReader& session) {
     if (b >= s.idle.size()) s.idle.resize(b + 1, true);
     s.idle[b] = false;
   };
-  std::array<std::optional<std::pair<std::size_t, Vec3>>, kMostHands> began;  // bin, and where the hand was in it first
+  std::array<std::optional<std::pair<std::size_t, Vec3>>, kMaxHands> began;  // bin, and where the hand was in it first
   Vec3 axes;
   auto parts = session.parts();
   while (const SessionPart* const p = parts.next()) {
@@ -71,7 +71,7 @@ SessionSurvey survey_of(const SessionReader& session) {
       const std::size_t bin = bin_of(t.tick);
       if (bin >= s.idle.size()) s.idle.resize(bin + 1, true);
       const Vec3 at = from_floats(t.device.position_mm);
-      auto& from = began[std::min<std::size_t>(t.hand, kMostHands - 1)];
+      auto& from = began[std::min<std::size_t>(t.hand, kMaxHands - 1)];
       if (!from || from->first != bin) from.emplace(bin, at);
       if (t.device.pedal > 0 || t.voxels_changed > 0 || length(at - from->second) > kStillMmPerS * kBinS)
         s.idle[bin] = false;
@@ -108,8 +108,8 @@ MovieTimes movie_times(const SessionSurvey& survey, double from_s, double to_s, 
   for (const auto& [a, b] : parts) times.shown_s += b - a;
   times.left_out_s = last_s - from_s - times.shown_s;
   const double wanted = times.shown_s * fps / speed;
-  if (wanted > static_cast<double>(kMostFrames))
-    throw Error(ExitCode::usage, "a movie of more than " + std::to_string(kMostFrames) + " frames is asked for",
+  if (wanted > static_cast<double>(kMaxFrames))
+    throw Error(ExitCode::usage, "a movie of more than " + std::to_string(kMaxFrames) + " frames is asked for",
                 "raise --speed, lower --fps, or name a part with --from-s and --to-s");
   const auto frames = static_cast<std::uint64_t>(std::max(1LL, std::llround(wanted)));
   times.ticks.reserve(frames);

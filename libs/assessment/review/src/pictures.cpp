@@ -11,8 +11,8 @@
 namespace osteo::inline assessment::review {
 namespace {
 
-constexpr std::size_t kMostEvidencePictures = 12;
-constexpr double kContextMm = 25, kMostSeenMm = 75;
+constexpr std::size_t kMaxEvidencePictures = 12;
+constexpr double kContextMm = 25, kMaxSeenMm = 75;
 
 std::array<double, 3> shares(std::array<std::uint8_t, 3> rgb) {
   return {rgb[0] / 255.0, rgb[1] / 255.0, rgb[2] / 255.0};
@@ -87,7 +87,7 @@ class Drawer {
   }
 
   void meshes() {
-    const double around_mm = std::min(work_.radius_mm + kContextMm, std::max(kMostSeenMm, work_.radius_mm));
+    const double around_mm = std::min(work_.radius_mm + kContextMm, std::max(kMaxSeenMm, work_.radius_mm));
     const std::array<double, 3> bone = shares(kBoneRgb);
     const auto crop = [&](TriMesh mesh) {
       constexpr std::size_t kMany = 900'000;
@@ -131,7 +131,7 @@ class Drawer {
   }
 
   void overviews() {
-    const double radius = std::min(work_.radius_mm * 1.15 + 6, kMostSeenMm);
+    const double radius = std::min(work_.radius_mm * 1.15 + 6, kMaxSeenMm);
     // Who took nothing held no shaft that would tell the side.
     const bool nothing = by_[0].empty() && by_[1].empty() && by_[2].empty();
     still("before",
@@ -158,7 +158,7 @@ class Drawer {
     for (const ScoreFinding& f : r_.findings.list) {
       if (f.places_mm.empty() || !f.at_mm || (f.severity == FindingSeverity::good && f.kind != "hidden")) continue;
       ++wanted;
-      if (drawn == kMostEvidencePictures) continue;
+      if (drawn == kMaxEvidencePictures) continue;
       ++drawn;
       const bool hidden = f.id == "hidden";
       Ball ball = close_to(*f.at_mm, f.places_mm);
@@ -218,7 +218,7 @@ class Drawer {
     context_.progress(0.95, "meshes");
     r_.view_centre_mm = work_.centre_mm;
     r_.view_eye = eye_;
-    r_.view_radius_mm = std::min(work_.radius_mm * 1.15 + 6, kMostSeenMm);
+    r_.view_radius_mm = std::min(work_.radius_mm * 1.15 + 6, kMaxSeenMm);
     const double voxel = begin_.finest_voxel_mm();
     const auto add = [&](std::string id, std::string name, std::array<std::uint8_t, 3> rgb, std::size_t part,
                          std::size_t most, double error) {

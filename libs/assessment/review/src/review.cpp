@@ -71,8 +71,8 @@ std::optional<double> one_value(const Score& score, const MetricRow& row) {
 }
 
 std::vector<IsotonicQuantile::Point> quantile(const std::vector<IsotonicQuantile::Point>& points, double q) {
-  constexpr std::size_t kLeast = 100;  // a second of drilling, as for bands of the score
-  if (points.size() < kLeast) return {};
+  constexpr std::size_t kMin = 100;  // a second of drilling, as for bands of the score
+  if (points.size() < kMin) return {};
   return IsotonicQuantile(points, q).steps();
 }
 
@@ -101,7 +101,7 @@ std::vector<ForceProfile> profiles_of(const ScoreDetail& detail, const Reference
     p.most = quantile(mine, 0.9);
     p.experts_middle = quantile(theirs, 0.5);
     p.experts_most = quantile(theirs, 0.9);
-    const std::size_t keep = std::min(ForceProfile::kMostSamples, samples.size());
+    const std::size_t keep = std::min(ForceProfile::kMaxSamples, samples.size());
     for (std::size_t n = 0; n < keep; ++n) {
       const NearMetric::Sample& v = samples[n * samples.size() / keep];
       p.samples.push_back({v.distance_mm, v.force_n});

@@ -179,7 +179,7 @@ void Analyst::sources() {
 
 PermutationSettings permutations(std::size_t comparisons, bool primary, std::uint64_t seed) {
   const double draws = 20 * static_cast<double>(comparisons) / kAlpha;
-  return {static_cast<std::size_t>(primary ? kMostWays : kMostWaysOfMany),
+  return {static_cast<std::size_t>(primary ? kMaxWays : kMaxWaysOfMany),
           static_cast<int>(std::clamp(draws, 20000.0, 1e6)), seed};
 }
 

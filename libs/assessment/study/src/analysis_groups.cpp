@@ -57,7 +57,7 @@ void Analyst::compare() {
       people.push_back(means_of_people(study_, o, g));
       enough = enough || people.back().size() >= kPeopleToCompare;
     }
-    if (enough && charts.size() < kMostCharts)
+    if (enough && charts.size() < kMaxCharts)
       charts.push_back(groups_chart("groups-" + std::to_string(charts.size() + 1), o.name, study_.plan.groups, people,
                                     settings_.level));
   }

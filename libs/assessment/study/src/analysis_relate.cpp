@@ -180,7 +180,7 @@ void Analyst::correlate() {
                           {text(c.pearson.r * c.pearson.r, 2)},
                           {with({c.spearman.r, c.spearman_by_people.interval})}});
     if (holds) hold(o, *rating, table.rows.back());
-    if (charts.size() < kMostCharts)
+    if (charts.size() < kMaxCharts)
       charts.push_back(scatter_chart("scatter-" + std::to_string(charts.size() + 1), o.name, rating->name, x, y, able,
                                      settings_.level));
   }
@@ -269,7 +269,7 @@ void Analyst::decide() {
       }
     }
     table.rows.push_back(std::move(row));
-    if (charts.size() < kMostCharts)
+    if (charts.size() < kMaxCharts)
       charts.push_back(roc_chart("roc-" + std::to_string(charts.size() + 1), o.name + ": " + with(r.area), r));
   }
   if (table.rows.empty()) return;

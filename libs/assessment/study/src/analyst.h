@@ -52,13 +52,13 @@ inline Json json_of(const Summary& s) {
 
 inline constexpr double kAlpha = 0.05, kPower = 0.8;
 /// All ways to exchange people up to so many are counted: of 12 and 12 they are 2.7 million.
-inline constexpr double kMostWays = 3'000'000, kMostWaysOfMany = 200'000;
+inline constexpr double kMaxWays = 3'000'000, kMaxWaysOfMany = 200'000;
 /// As many as a test that is one of `comparisons` needs: the smallest p that so many draws can give is then a tenth
 /// of what the first to be found needs.
 [[nodiscard]] PermutationSettings permutations(std::size_t comparisons, bool primary, std::uint64_t seed);
 
 // Of each kind; a table has them all.
-inline constexpr std::size_t kMostCharts = 12;
+inline constexpr std::size_t kMaxCharts = 12;
 
 class Analyst {
  public:

@@ -17,15 +17,15 @@ namespace osteo::inline assessment {
 namespace {
 
 constexpr double kClearMm = 6;  // above the bone, where burrs are changed
-constexpr double kHopMm = 1.3, kLeastStrokeMm = 12, kShortMm = 1.2;
+constexpr double kHopMm = 1.3, kMinStrokeMm = 12, kShortMm = 1.2;
 // What lies within a burr's rim, or is less, is not worth a stroke; in a layer with others below it that is more than
 // in the last.
 constexpr double kRimMm = 0.45, kSeenMm3 = 2, kWorthMm3 = 6;
 // Of a layer: what is left then is met again in the next, but for the last ones.
-constexpr int kMostRepeats = 5, kMostLastRepeats = 25;
+constexpr int kMaxRepeats = 5, kMaxLastRepeats = 25;
 // How it learns by how much its hand goes below the burr that it sees: from ticks with so much force, so much of each,
 // at most mm/N.
-constexpr double kFeltN = 0.3, kNoticed = 0.02, kMostYields = 0.5;
+constexpr double kFeltN = 0.3, kNoticed = 0.02, kMaxYields = 0.5;
 constexpr double kEyeMm = 180, kViewDeg = 30;
 
 Json triple(Vec3 v) {
@@ -57,7 +57,7 @@ class TraineeMind final : public Reader {
     const double pushed_n = dot(from_floats(record.force_n), plan_.toward);
     if (pushed_n > kFeltN) {
       yields_ += (dot(from_floats(record.shown_offset_mm), plan_.toward) / pushed_n - yields_) * kNoticed;
-      hand_.sees(std::clamp(yields_, 0.0, kMostYields));
+      hand_.sees(std::clamp(yields_, 0.0, kMaxYields));
     }
     // Where it is shown: at the bone's surface, not in bone that it has not taken yet.
     const Vec3 at = from_floats(record.device.position_mm) + from_floats(record.shown_offset_mm);
@@ -129,12 +129,12 @@ class TraineeMind final : public Reader {
     if (length(row[last].at_mm - row[first].at_mm) < kShortMm) {
       // Around a single place it goes in small crosses.
       const Vec3 u = any_perpendicular(plan_.toward) * (kShortMm / 2), v = cross(plan_.toward, u);
-      for (; way < kLeastStrokeMm; way += 4 * kShortMm)
+      for (; way < kMinStrokeMm; way += 4 * kShortMm)
         for (std::size_t n = first; n <= last; ++n)
           for (const Vec3 off : {u, -u, v, -v}) points.push_back({row[n].at_mm + off, row[n].axis, row[n].press_mm});
       return;
     }
-    for (bool back = false; way < kLeastStrokeMm; back = !back) {
+    for (bool back = false; way < kMinStrokeMm; back = !back) {
       for (std::size_t n = 0; n <= last - first; ++n) points.push_back(row[back ? last - n : first + n]);
       way += std::max(1.0, length(row[last].at_mm - row[first].at_mm));
     }
@@ -157,7 +157,7 @@ class TraineeMind final : public Reader {
       if (!s.points.empty()) left_in_layer_ = true;
       if (ends_layer) {
         // Again, as long as bone is seen in it.
-        if (left_in_layer_ && ++repeats_ < (last_layers() ? kMostLastRepeats : kMostRepeats)) {
+        if (left_in_layer_ && ++repeats_ < (last_layers() ? kMaxLastRepeats : kMaxRepeats)) {
           stroke_ = layers_[layer_];
         } else {
           ++layer_;

@@ -17,7 +17,7 @@ constexpr double kRampNPerS = 60, kFeltS = 0.02, kCorrectPerS = 5, kAxisS = 0.15
 constexpr std::size_t kLagPoints = 5;  // of its stroke, by which the hand may be behind the place it pulls towards
 constexpr double kTravelSidewaysMm = 2.5;
 constexpr double kSidewaysShare = 0.8,
-                 kLeastSidewaysMm = 0.5;  // it pulls sideways by no more than this share of what it presses
+                 kMinSidewaysMm = 0.5;  // it pulls sideways by no more than this share of what it presses
 constexpr double kComeDownS = 1.5;
 constexpr double kStallS = 0.4;  // then it goes on to the next place
 constexpr double kTooHard = 1, kWavering = 0.9, kEasedShare = 0.75;
@@ -150,7 +150,7 @@ DeviceSample TraineeHand::read(std::uint64_t tick, double dt_s, Vec3 force_n) no
   const bool drilling = stroke_.drilling && !done();
   const double press_n = drilling ? wanted_n(t_s, dt_s) : 0;
   const double most_sideways_mm =
-      drilling ? std::max(kLeastSidewaysMm, kSidewaysShare * press_n / kSpringNPerMm) : kTravelSidewaysMm;
+      drilling ? std::max(kMinSidewaysMm, kSidewaysShare * press_n / kSpringNPerMm) : kTravelSidewaysMm;
   go_on(dt_s, most_sideways_mm);
   if (stroke_.drilling && !done()) carrot_mm_ += toward_ * (wanted_height_mm() - dot(carrot_mm_, toward_));
   const Vec3 ahead = carrot_mm_ - at_mm_;

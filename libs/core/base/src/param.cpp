@@ -37,7 +37,66 @@ void check_range(const FieldRef& field, std::string_view name, double value) {
   throw Error(ExitCode::usage, std::string(name) + " is " + format_number(value) + " but must be " + range);
 }
 
+constexpr std::array<OldName, 12> kOldCommands = {{{"console", "nerve-console"},
+                                                   {"curve", "virtual-fixture"},
+                                                   {"guide", "suggest-threshold"},
+                                                   {"hand-over", "export-slicer"},
+                                                   {"monitor", "nerve-monitor"},
+                                                   {"pieces", "separate-fragments"},
+                                                   {"plan", "export-result"},
+                                                   {"scene", "estimate-cost"},
+                                                   {"series", "list-series"},
+                                                   {"skin", "embed-surface"},
+                                                   {"take-back", "import-slicer"},
+                                                   {"watch", "watch-folder"}}};
+
+constexpr std::array<OldName, 16> kOldFields = {{{"anybody", "allow_all"},
+                                                 {"attend", "min_trainees"},
+                                                 {"by_place", "match_by_position"},
+                                                 {"content_hu", "lumen_hu"},
+                                                 {"keep_loose", "keep_floating"},
+                                                 {"leash_mm", "tolerance_radius_mm"},
+                                                 {"least_mm2", "min_area_mm2"},
+                                                 {"least_mm3", "min_volume_mm3"},
+                                                 {"least_mpa", "min_mpa"},
+                                                 {"least_quality", "min_quality"},
+                                                 {"least_step_ms", "min_step_ms"},
+                                                 {"max_unsure_mm", "max_uncertain_mm"},
+                                                 {"most_mpa", "max_mpa"},
+                                                 {"most_n", "max_force_n"},
+                                                 {"most_points", "max_points"},
+                                                 {"patience_s", "silence_s"}}};
+
 }  // namespace
+
+std::span<const OldName> old_command_names() {
+  return kOldCommands;
+}
+
+std::span<const OldName> old_field_names() {
+  return kOldFields;
+}
+
+std::string_view current_command(std::string_view name) {
+  const auto it =
+      std::find_if(kOldCommands.begin(), kOldCommands.end(), [&](const OldName& n) { return n.old == name; });
+  return it == kOldCommands.end() ? name : it->current;
+}
+
+std::string renamed_text(std::string_view old, std::string_view current) {
+  return "'" + std::string(old) + "' is now called '" + std::string(current) +
+         "'; the old name is accepted until version 0.3";
+}
+
+const FieldRef* find_field(std::span<const FieldRef> fields, std::string_view name) {
+  const auto of = [&](std::string_view wanted) -> const FieldRef* {
+    const auto it = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == wanted; });
+    return it == fields.end() ? nullptr : &*it;
+  };
+  if (const FieldRef* const field = of(name); field != nullptr) return field;
+  const auto old = std::find_if(kOldFields.begin(), kOldFields.end(), [&](const OldName& n) { return n.old == name; });
+  return old == kOldFields.end() ? nullptr : of(old->current);
+}
 
 std::string lower_case(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),

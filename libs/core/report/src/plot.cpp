@@ -55,11 +55,11 @@ sheet::Drawing drawing_of(const sheet::Plot& p, double width) {
   const auto ticks = [](const sheet::Plot::Axis& axis) {
     std::vector<std::pair<double, std::string>> all = axis.named;
     if (all.empty() && axis.tick > 0) {
-      constexpr int kMost = 50;
+      constexpr int kMax = 50;
       const double first = std::ceil(axis.from / axis.tick - 1e-9);
       // As many decimals as tell one tick from the next.
       const double digits = std::pow(10, std::max(0.0, std::ceil(-std::log10(axis.tick) - 1e-9) + 1));
-      for (int n = 0; n < kMost && (first + n) * axis.tick <= axis.to + 1e-9 * axis.tick; ++n) {
+      for (int n = 0; n < kMax && (first + n) * axis.tick <= axis.to + 1e-9 * axis.tick; ++n) {
         const double at = (first + n) * axis.tick;
         all.emplace_back(at, format_number(std::round(at * digits) / digits));
       }

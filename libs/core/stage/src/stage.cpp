@@ -36,9 +36,10 @@ std::vector<Data> Stage::run(std::span<const Data> inputs, const Context& contex
 }
 
 std::unique_ptr<Stage> Registry::make(std::string_view name) const {
+  const std::string_view wanted = current_command(name);
   for (const auto maker : makers_) {
     auto stage = maker();
-    if (stage->info().name == name) return stage;
+    if (stage->info().name == wanted) return stage;
   }
   const std::string near = nearest_name(name, names());
   throw Error(ExitCode::usage, "there is no stage '" + std::string(name) + "'",
@@ -47,7 +48,7 @@ std::unique_ptr<Stage> Registry::make(std::string_view name) const {
 
 bool Registry::has(std::string_view name) const {
   const auto all = names();
-  return std::find(all.begin(), all.end(), name) != all.end();
+  return std::find(all.begin(), all.end(), current_command(name)) != all.end();
 }
 
 std::vector<std::string> Registry::names() const {

@@ -129,9 +129,9 @@ double power_paired(std::size_t people, double dz, double alpha) {
 
 double people_needed_paired(double dz, double power, double alpha) {
   need_level(power);
-  constexpr std::size_t kMost = 100000;
-  if (!(std::abs(dz) > 0) || power_paired(kMost, dz, alpha) < power) return kUndefined;
-  std::size_t lo = 1, hi = kMost;  // lo is too few, hi is enough
+  constexpr std::size_t kMax = 100000;
+  if (!(std::abs(dz) > 0) || power_paired(kMax, dz, alpha) < power) return kUndefined;
+  std::size_t lo = 1, hi = kMax;  // lo is too few, hi is enough
   while (hi - lo > 1) {
     const std::size_t middle = lo + (hi - lo) / 2;
     (power_paired(middle, dz, alpha) >= power ? hi : lo) = middle;

@@ -52,12 +52,12 @@ double speckle(Vec3 p) {
 }  // namespace
 
 Shine shine_through(const StructureMap& structures, Vec3 p, Vec3 inwards) {
-  constexpr double kMost = BonePaint::kShownThroughMm, kStep = 0.25;
-  const double none = std::exp(-kMost / kFadeMm);  // taken off, so that it ends without a step
+  constexpr double kMax = BonePaint::kShownThroughMm, kStep = 0.25;
+  const double none = std::exp(-kMax / kFadeMm);  // taken off, so that it ends without a step
   auto last = structures.at(p);
-  if (last.structure == 0 || last.distance_mm >= kMost) return {};
+  if (last.structure == 0 || last.distance_mm >= kMax) return {};
   if (last.distance_mm <= 0) return {1, last.structure};
-  for (double t = kStep; t < kMost + kStep; t += kStep) {
+  for (double t = kStep; t < kMax + kStep; t += kStep) {
     const auto there = structures.at(p + inwards * t);
     if (there.structure != 0 && there.distance_mm <= 0) {
       // Where between the two the face lies.

@@ -38,10 +38,10 @@ constexpr std::size_t kLargeFromBricks = 12'000;
 // Chosen to be seen on ivory and by the colour-blind; below where nothing happens to bone, at the end what coagulates
 // at once.
 constexpr double kSeenFromC = 42, kRedFromC = 57;
-constexpr std::uint8_t kMostSteps = static_cast<std::uint8_t>(kRedFromC - kSeenFromC);
+constexpr std::uint8_t kMaxSteps = static_cast<std::uint8_t>(kRedFromC - kSeenFromC);
 
 Rgb glowing(Rgb colour, std::uint8_t steps) {
-  const double share = static_cast<double>(steps) / kMostSteps, cover = 0.35 + 0.45 * share;
+  const double share = static_cast<double>(steps) / kMaxSteps, cover = 0.35 + 0.45 * share;
   const Vec3 heat = Vec3{236, 170, 40} * (1 - share) + Vec3{200, 40, 20} * share;
   const double lit = static_cast<double>(std::max({colour[0], colour[1], colour[2]})) / 242;  // creases stay dark
   for (std::size_t c = 0; c < 3; ++c)
@@ -212,7 +212,7 @@ bool BoneView::warm_brick(const LiveSurface& surface, std::uint32_t brick,
     const double over = celsius_at(placed_(frame.world_from_index(from_floats(patch.vertices[n].index)))) - kSeenFromC;
     if (!(over >= 0.5)) continue;
     if (now.empty()) now.assign(patch.vertices.size(), 0);
-    now[n] = static_cast<std::uint8_t>(std::lround(std::min(over, static_cast<double>(kMostSteps))));
+    now[n] = static_cast<std::uint8_t>(std::lround(std::min(over, static_cast<double>(kMaxSteps))));
   }
   if (now == warm_[brick]) return false;
   warm_[brick] = std::move(now);

@@ -95,8 +95,8 @@ struct DustView::Impl {
     std::size_t cells = 0;
     dust.visit([&](Vec3, double full) { cells += full >= 0.02 ? 1 : 0; });
     // A haze nobody would see is left out; of too many, every so many-th cell stands for its neighbours.
-    const int each = 3 * cells <= kMostGrains ? 3 : 2 * cells <= kMostGrains ? 2 : 1;
-    const float kept = cells <= kMostGrains ? 1.0F : static_cast<float>(kMostGrains) / static_cast<float>(cells);
+    const int each = 3 * cells <= kMaxGrains ? 3 : 2 * cells <= kMaxGrains ? 2 : 1;
+    const float kept = cells <= kMaxGrains ? 1.0F : static_cast<float>(kMaxGrains) / static_cast<float>(cells);
     dust.visit([&](Vec3 p, double full) {
       if (full < 0.02) return;
       const Vec3 x = frame.index_from_world(p);

@@ -10,7 +10,7 @@
 namespace osteo::inline display {
 namespace {
 
-constexpr float kLeastDrop = 0.004F;  // of a cell: a mist nobody would see
+constexpr float kMinDrop = 0.004F;  // of a cell: a mist nobody would see
 
 struct Cell {
   float full = 0, solid = 0;
@@ -113,7 +113,7 @@ Field field_of(const Dust& dust) {
   const double most = std::max({std::abs(down.x), std::abs(down.y), std::abs(down.z)});
   for (const Wet& w : wet) {
     const Ijk at{w.at.i - f.shift.i, w.at.j - f.shift.j, w.at.k - f.shift.k};
-    if (w.cell.full >= kLeastDrop && !(most > 0 && stands(f, bone, at, down / most)))
+    if (w.cell.full >= kMinDrop && !(most > 0 && stands(f, bone, at, down / most)))
       f.falling.push_back(f.grid.find(at.i, at.j, at.k));
   }
   for (const VoxelKey v : f.falling) f.grid.set(v, std::max(0.0F, f.grid.value(v) - f.cells[v].full));

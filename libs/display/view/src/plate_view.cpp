@@ -119,16 +119,16 @@ struct Part {
   }
   // Along the screws out of the bone again; what is seen from above by the underside below it.
   void tint(const World& world, const RigidTransform& pose, double thickness_mm) {
-    constexpr double kStepMm = 0.1, kMostMm = 1;
+    constexpr double kStepMm = 0.1, kMaxMm = 1;
     tinted = 0;
     for (vtkIdType n = 0; n < data->GetNumberOfPoints(); ++n) {
       double at[3];
       data->GetPoint(n, at);
       const Vec3 p = pose({at[0], at[1], at[2] < thickness_mm + 0.2 ? 0.02 : at[2]}), up = pose.rotation.column[2];
       double deep = 0;
-      while (deep < kMostMm && is_bone(world, p + up * deep)) deep += kStepMm;
+      while (deep < kMaxMm && is_bone(world, p + up * deep)) deep += kStepMm;
       const double red = deep > kPlateCollisionMm
-                             ? 0.35 + 0.65 * std::min(1.0, (deep - kPlateCollisionMm) / (kMostMm - kPlateCollisionMm))
+                             ? 0.35 + 0.65 * std::min(1.0, (deep - kPlateCollisionMm) / (kMaxMm - kPlateCollisionMm))
                              : 0;
       tinted += red > 0 ? 1 : 0;
       colours->SetTuple3(n, 164 + (230 - 164) * red, 172 + (50 - 172) * red, 190 + (40 - 190) * red);

@@ -41,7 +41,7 @@ BrickGrid::BrickGrid(Frame frame, std::vector<Ijk> bricks) : frame_(frame), orig
   if (too_many_bricks(origins_.size()))
     throw Error(ExitCode::corrupt,
                 "the sparse grid has " + std::to_string(origins_.size()) + " bricks of 8^3 voxels; " +
-                    std::to_string(kMostBricks) + " can be numbered",
+                    std::to_string(kMaxBricks) + " can be numbered",
                 "make it with larger voxels, or of a smaller region");
   for (const Ijk b : origins_) {
     if (b.i < 0 || b.j < 0 || b.k < 0)

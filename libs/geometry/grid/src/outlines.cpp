@@ -20,7 +20,7 @@ struct Slice {
 };
 
 // Farther than this no outline is looked for, however thick the slices: the cost grows with the square.
-constexpr double kMostPixels = 24;
+constexpr double kMaxPixels = 24;
 
 struct Point {
   float u, v;  // in pixels
@@ -143,7 +143,7 @@ void limit_by_outlines(std::vector<float>& field, const Frame& f, std::size_t ax
              nk = static_cast<std::size_t>(f.dims[axis]);
   const auto slice_mm = static_cast<float>(f.spacing_mm[axis]);
   const auto reach_mm =
-      static_cast<float>(std::min(5 * f.spacing_mm[axis], kMostPixels * std::max(f.spacing_mm[u], f.spacing_mm[v])));
+      static_cast<float>(std::min(5 * f.spacing_mm[axis], kMaxPixels * std::max(f.spacing_mm[u], f.spacing_mm[v])));
   const auto slope = static_cast<float>(per_mm);
   // A batch of slices at a time, with the distances of one slice more at each end.
   constexpr std::size_t kBatch = 16;

@@ -293,7 +293,7 @@ class Resampler {
           if (too_many_bricks(bricks_.size()))
             throw Error(ExitCode::resources,
                         "voxels of " + format_number(h_) + " mm make more than " +
-                            std::to_string(BrickGrid::kMostBricks) +
+                            std::to_string(BrickGrid::kMaxBricks) +
                             " bricks of 8^3 that may hold bone, which is all that can be numbered",
                         "choose a larger --spacing-mm, or a smaller region");
         }
@@ -374,7 +374,7 @@ void require_not_too_wide(const Frame& frame, double spacing_mm) {
   if (too_wide_for_bricks(cells)) {
     throw Error(ExitCode::resources,
                 "voxels of " + format_number(spacing_mm) + " mm make a grid of more than " +
-                    std::to_string(BrickGrid::kMostCells) + " bricks of 8^3",
+                    std::to_string(BrickGrid::kMaxCells) + " bricks of 8^3",
                 "choose a larger --spacing-mm, or a smaller region");
   }
 }

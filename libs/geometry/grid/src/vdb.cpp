@@ -89,7 +89,7 @@ BrickGrid to_bricks(const SparseGrid& sparse, bool all) {
   if (too_many_bricks(tiles))
     throw Error(ExitCode::corrupt,
                 "the sparse grid is solid over " + std::to_string(tiles) + " bricks of 8^3 voxels; " +
-                    std::to_string(BrickGrid::kMostBricks) + " can be numbered",
+                    std::to_string(BrickGrid::kMaxBricks) + " can be numbered",
                 "make it with larger voxels, or of a smaller region");
   openvdb::FloatTree tree(stored);
   tree.voxelizeActiveTiles();

@@ -442,7 +442,7 @@ Extent extent_at(const BrickGrid& bone, float iso, const Context& context) {
 
 VolumeSurface surface_of_volume(const BrickGrid& bone, const Context& context) {
   constexpr double kEnough = 1e-4, kGood = 1e-3;  // of the volume
-  constexpr float kHalf = 0.5F, kLeast = 0.05F;
+  constexpr float kHalf = 0.5F, kMin = 0.05F;
   const double wanted = bone.sum(), voxel_mm3 = bone.frame().voxel_volume_mm3(), h = portable::cbrt(voxel_mm3);
   float densest = 0;
   for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
@@ -459,7 +459,7 @@ VolumeSurface surface_of_volume(const BrickGrid& bone, const Context& context) {
     float iso;
     double off;
   };
-  const float low = std::min(kLeast, densest / 2), high = 1 - kLeast;
+  const float low = std::min(kMin, densest / 2), high = 1 - kMin;
   double best_off = 0, area_at_half = 0;
   const auto look = [&](float iso) -> Point {
     const Extent e = extent_at(bone, iso, context);

@@ -25,7 +25,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr double kGrace = 10;  // seconds from being asked to end to being killed
 constexpr double kLook = 0.1;  // seconds between looks at memory
-constexpr std::size_t kMostOut = 4'000'000, kMostErr = 64'000;
+constexpr std::size_t kMaxOut = 4'000'000, kMaxErr = 64'000;
 
 double seconds_since(Clock::time_point t) {
   return std::chrono::duration<double>(Clock::now() - t).count();
@@ -145,14 +145,14 @@ struct Children::Impl {
       const pid_t got = ::wait4(c.pid, &status, WNOHANG, &usage);
       if (got == 0 || (got < 0 && errno == EINTR)) continue;
       ::kill(-c.pid, SIGKILL);  // what it may have left behind
-      while (c.out >= 0 && read_some(c.out, c.end.out, kMostOut, false)) {
+      while (c.out >= 0 && read_some(c.out, c.end.out, kMaxOut, false)) {
       }
-      while (c.err >= 0 && read_some(c.err, c.end.err, kMostErr, true)) {
+      while (c.err >= 0 && read_some(c.err, c.end.err, kMaxErr, true)) {
       }
       close_fd(c.out);
       close_fd(c.err);
       ChildEnd end = std::move(c.end);
-      if (end.err.size() > kMostErr) end.err.erase(0, end.err.size() - kMostErr);
+      if (end.err.size() > kMaxErr) end.err.erase(0, end.err.size() - kMaxErr);
       end.id = c.id;
       end.seconds = seconds_since(c.start);
       end.peak_mb = static_cast<double>(usage.ru_maxrss) * 1024 / 1e6;
@@ -236,8 +236,8 @@ std::optional<ChildEnd> Children::wait(double at_most_s) {
     const int ready = ::poll(fds.data(), fds.size(), static_cast<int>(nap * 1000) + 1);
     if (ready < 0 && errno == EINTR) return impl_->take_ended();
     for (Child& c : impl_->children) {
-      if (c.out >= 0) static_cast<void>(read_some(c.out, c.end.out, kMostOut, false));
-      if (c.err >= 0) static_cast<void>(read_some(c.err, c.end.err, kMostErr, true));
+      if (c.out >= 0) static_cast<void>(read_some(c.out, c.end.out, kMaxOut, false));
+      if (c.err >= 0) static_cast<void>(read_some(c.err, c.end.err, kMaxErr, true));
     }
   }
   return std::nullopt;

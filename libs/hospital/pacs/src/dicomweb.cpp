@@ -25,11 +25,11 @@
 namespace osteo::inline hospital {
 namespace {
 
-constexpr std::size_t kMostText = 8'000'000;  // bytes of an answer in JSON
-constexpr std::size_t kPage = 500;            // matches that are asked for at once
-constexpr std::size_t kMostPages = 2'000;     // a server may always give one more
-constexpr std::size_t kMostSeries = 10'000;
-constexpr std::size_t kMostInstances = 1'000'000;
+constexpr std::size_t kMaxText = 8'000'000;  // bytes of an answer in JSON
+constexpr std::size_t kPage = 500;           // matches that are asked for at once
+constexpr std::size_t kMaxPages = 2'000;     // a server may always give one more
+constexpr std::size_t kMaxSeries = 10'000;
+constexpr std::size_t kMaxInstances = 1'000'000;
 constexpr std::uint64_t kBatchBytes = 32'000'000;
 constexpr std::size_t kBatchObjects = 100;
 constexpr ChildLimits kReader{1000, 3600};  // of the process that reads what came
@@ -112,12 +112,12 @@ class Web {
              const std::function<void(const Json&, const std::string& uid)>& take) {
     std::set<std::string> seen;
     for (std::size_t offset = 0, page = 0;; ++page) {
-      if (page == kMostPages)
+      if (page == kMaxPages)
         throw http_.wrong("does not come to the end of a list", "ask for less: a date, a modality, a study");
       const pacs::Reply reply =
           http_.ask({.path = path + keys + "limit=" + std::to_string(kPage) + "&offset=" + std::to_string(offset),
                      .accept = "application/dicom+json",
-                     .most = kMostText});
+                     .most = kMaxText});
       if (reply.status == 204) return;
       if (reply.status != 200)
         throw http_.wrong("answers with status " + std::to_string(reply.status),
@@ -143,7 +143,7 @@ class Web {
   /// UIDs of a series' objects.
   std::set<std::string> instances(const std::string& study, const std::string& series) {
     std::set<std::string> uids;
-    query("/studies/" + study + "/series/" + series + "/instances", "?", kInstance, kMostInstances,
+    query("/studies/" + study + "/series/" + series + "/instances", "?", kInstance, kMaxInstances,
           [&](const Json&, const std::string& uid) { uids.insert(uid); });
     return uids;
   }
@@ -491,7 +491,7 @@ SendReport send_objects(const WebServer& server, const std::vector<DicomObject>&
         judge(
             batch,
             web.http().ask(
-                {.path = "/studies", .accept = "application/dicom+json", .most = kMostText, .upload = &body.upload()}));
+                {.path = "/studies", .accept = "application/dicom+json", .most = kMaxText, .upload = &body.upload()}));
         ++answers;
       } catch (const Error& e) {
         if (e.code() == ExitCode::cancelled || (answers == 0 && e.code() != ExitCode::cannot_read)) throw;
@@ -519,7 +519,7 @@ std::vector<RemoteSeries> find_series(const WebServer& server, const SeriesKeys&
   const auto ask = [&](const std::string& path, const std::string& study, const std::string& date) {
     const std::string what = "?" + key("SeriesInstanceUID", keys.series) + key("Modality", keys.modality) +
                              "includefield=" + kSeriesDescription + "&includefield=" + kImages + "&";
-    web.query(path, what, kSeries, kMostSeries, [&](const Json& match, const std::string& uid) {
+    web.query(path, what, kSeries, kMaxSeries, [&](const Json& match, const std::string& uid) {
       RemoteSeries r{text_in(match, kStudy),
                      uid,
                      text_in(match, kModality),
@@ -532,8 +532,8 @@ std::vector<RemoteSeries> find_series(const WebServer& server, const SeriesKeys&
       if ((!study.empty() && r.study != study) || !agrees(match, kSeries, keys.series) ||
           !agrees(match, kModality, keys.modality))
         throw web.strange("series");
-      if (all.size() == kMostSeries)
-        throw Error(ExitCode::usage, "more than " + std::to_string(kMostSeries) + " match",
+      if (all.size() == kMaxSeries)
+        throw Error(ExitCode::usage, "more than " + std::to_string(kMaxSeries) + " match",
                     "ask for less: a date, a modality, a study");
       all.push_back(std::move(r));
     });
@@ -545,7 +545,7 @@ std::vector<RemoteSeries> find_series(const WebServer& server, const SeriesKeys&
     web.query("/studies",
               "?" + key("StudyInstanceUID", keys.study) + key("StudyDate", keys.study_date) +
                   key("AccessionNumber", keys.accession) + key("PatientID", keys.patient_id),
-              kStudy, kMostSeries, [&](const Json& match, const std::string& uid) {
+              kStudy, kMaxSeries, [&](const Json& match, const std::string& uid) {
                 if (!agrees(match, kStudy, keys.study) || !agrees(match, kAccession, keys.accession) ||
                     !agrees(match, kPatientId, keys.patient_id))
                   throw web.strange("study");
@@ -577,7 +577,7 @@ FetchReport fetch_series(const WebServer& server, const RemoteSeries& series, co
   const pacs::Reply reply = web.http().ask(
       {.path = "/studies/" + series.study + "/series/" + series.series,
        .accept = R"(multipart/related; type="application/dicom"; transfer-syntax=*)",
-       .most = kMostText,
+       .most = kMaxText,
        .take = [&](const pacs::Reply& head, std::string_view piece) { parts.take(web.http(), head, piece); }});
   if (reply.status != 200)
     throw web.http().wrong("does not give the series (status " + std::to_string(reply.status) + ")");

@@ -9,7 +9,7 @@
 namespace osteo::inline hospital {
 namespace {
 
-constexpr std::size_t kMostHead = 65'536;  // bytes before an answer's body
+constexpr std::size_t kMaxHead = 65'536;  // bytes before an answer's body
 
 }  // namespace
 
@@ -163,7 +163,7 @@ Reply Http::ask(const Question& question) {
       CURLOPT_HEADERFUNCTION, +[](char*, std::size_t, std::size_t n, void* t) -> std::size_t {
         auto& to = *static_cast<Transfer*>(t);
         to.head += n;
-        to.endless_head = to.head > kMostHead;
+        to.endless_head = to.head > kMaxHead;
         return to.endless_head ? 0 : n;
       });
   set(CURLOPT_WRITEDATA, &transfer);

@@ -7,7 +7,7 @@
 namespace osteo::inline hospital::pacs {
 namespace {
 
-constexpr std::size_t kMostHead = 16'384;  // bytes of a part's head, and before the first part
+constexpr std::size_t kMaxHead = 16'384;  // bytes of a part's head, and before the first part
 
 Error bad(const std::string& what) {
   return {ExitCode::failed, "an answer in several parts is damaged: " + what};
@@ -94,7 +94,7 @@ bool MultipartReader::step() {
         if (sure > 0) events_.data(std::string_view(buffer_).substr(0, sure));
         buffer_.erase(0, sure);
         if (found != std::string::npos) events_.end();
-      } else if (sure > kMostHead) {
+      } else if (sure > kMaxHead) {
         throw bad("it does not begin with its boundary");
       }
       if (found == std::string::npos) return false;
@@ -111,7 +111,7 @@ bool MultipartReader::step() {
       }
       const std::size_t end = buffer_.find("\r\n");
       const std::size_t blanks = std::min(buffer_.find_first_not_of(" \t"), buffer_.size());
-      if (blanks > kMostHead || (end != blanks && blanks < buffer_.size() && buffer_.substr(blanks) != "\r"))
+      if (blanks > kMaxHead || (end != blanks && blanks < buffer_.size() && buffer_.substr(blanks) != "\r"))
         throw bad("something stands behind a boundary");
       if (end == std::string::npos) return false;
       buffer_.erase(0, end);  // the line's end may also be that of an empty head
@@ -120,7 +120,7 @@ bool MultipartReader::step() {
     }
     case State::head: {
       const std::size_t end = buffer_.find("\r\n\r\n");
-      if (std::min(end, buffer_.size()) > kMostHead) throw bad("the head of a part does not end");
+      if (std::min(end, buffer_.size()) > kMaxHead) throw bad("the head of a part does not end");
       if (end == std::string::npos) return false;
       std::map<std::string, std::string> head;
       std::string_view rest = std::string_view(buffer_).substr(0, end);

@@ -86,7 +86,7 @@ void check(const ReceiveOptions& o) {
   for (const std::string& title : o.allowed) static_cast<void>(checked_ae(title));
   if (o.allowed.empty() && !o.anybody)
     throw Error(ExitCode::usage, "nobody may send",
-                "--allow TITLE,TITLE names the nodes that may; --anybody lets all in");
+                "--allow TITLE,TITLE names the nodes that may; --allow-all lets all in");
   static_cast<void>(pacs::tls_layer(o.tls, NET_ACCEPTOR));  // what is wrong with its files is told now
 }
 

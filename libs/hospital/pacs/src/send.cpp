@@ -11,8 +11,8 @@ namespace {
 
 using pacs::text_of;
 
-constexpr std::size_t kMostContexts = 120;         // of 128 that an association has
-constexpr std::size_t kMostInstances = 1'000'000;  // of a series: a node may answer without end
+constexpr std::size_t kMaxContexts = 120;         // of 128 that an association has
+constexpr std::size_t kMaxInstances = 1'000'000;  // of a series: a node may answer without end
 
 OFList<OFString> syntax_list(const std::string& syntax) {
   OFList<OFString> list;
@@ -35,7 +35,7 @@ std::string check(const DicomPeer& peer, SendReport& report, const Context& cont
       keys.putAndInsertString(DCM_SeriesInstanceUID, uids.second.c_str());
       keys.putAndInsertString(DCM_SOPInstanceUID, "");
       std::set<std::string> have;
-      for (const auto& answer : query.ask(keys, kMostInstances)) have.insert(text_of(*answer, DCM_SOPInstanceUID));
+      for (const auto& answer : query.ask(keys, kMaxInstances)) have.insert(text_of(*answer, DCM_SOPInstanceUID));
       for (SentObject* const s : objects) s->found = have.contains(s->object.sop_instance);
     }
   } catch (const Error& e) {
@@ -104,7 +104,7 @@ SendReport send_objects(const DicomPeer& peer, const std::vector<DicomObject>& o
     auto last = first;
     pacs::Scu scu;
     scu.prepare(peer);
-    for (std::size_t n = 0; n < kMostContexts && last != by_context.end(); ++n, ++last)
+    for (std::size_t n = 0; n < kMaxContexts && last != by_context.end(); ++n, ++last)
       scu.addPresentationContext(last->first.first.c_str(), syntax_list(last->first.second));
     scu.connect(peer);
     for (; first != last; ++first) {

@@ -43,7 +43,7 @@ constexpr std::time_t kMadeAfter = 1767225600;  // 1 January 2026: before it thi
 constexpr double kClocksApart = 5;              // seconds between ours and a file server's
 constexpr rlim_t kFewFiles = 256;               // free, of a file system that counts them
 constexpr int kSystemctlMs = 10'000;            // a manager that hangs
-constexpr std::size_t kMostSaid = 65'536;       // bytes of its answer
+constexpr std::size_t kMaxSaid = 65'536;        // bytes of its answer
 constexpr std::array kUnits{"osteo-receive.service", "osteo-watch.service"};
 constexpr const char* kInstances = "osteo-watch-orthanc@";  // one for each Orthanc
 
@@ -307,7 +307,7 @@ bool answer_of(std::vector<std::string> words, std::string& said) {
   ::close(ends[1]);
   bool ended = false;
   std::array<char, 4096> some;
-  for (pollfd p{ends[0], POLLIN, 0}; failed == 0 && said.size() < kMostSaid && ::poll(&p, 1, kSystemctlMs) > 0;) {
+  for (pollfd p{ends[0], POLLIN, 0}; failed == 0 && said.size() < kMaxSaid && ::poll(&p, 1, kSystemctlMs) > 0;) {
     const ssize_t n = ::read(ends[0], some.data(), some.size());
     if (n <= 0) {
       ended = n == 0;
@@ -358,7 +358,7 @@ void check_units(Findings& all) {
   for (const std::string unit : kUnits) {
     if (!in_path("systemctl") || !check_unit(all, unit)) {
       all.push_back({"systemd", FindingState::none, "no systemd runs here",
-                     "start 'osteo receive' and 'osteo watch' by what starts services here"});
+                     "start 'osteo receive' and 'osteo watch-folder' by what starts services here"});
       return;
     }
   }

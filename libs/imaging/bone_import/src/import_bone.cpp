@@ -184,12 +184,12 @@ ImportedBone import_bone(const fs::path& source, const ImportBoneParams& p, cons
   for (std::size_t a = 0; a < 3; ++a)
     cells[a] = static_cast<std::uint64_t>(slabs.frame().dims[a]) / BrickGrid::kEdge + 1;
   if (too_wide_for_bricks(cells))
-    throw refuse("a grid of more than " + std::to_string(BrickGrid::kMostCells) + " bricks of 8^3");
+    throw refuse("a grid of more than " + std::to_string(BrickGrid::kMaxCells) + " bricks of 8^3");
   slabs.run(kLayers, context.sub(0.1, 0.95), [&](int first, int layers, const std::int16_t* slab) {
     if (first == 0) builder.begin(slabs.frame());
     builder.take(first, layers, slab);
     if (too_many_bricks(builder.density_grid->tree().leafCount()))
-      throw refuse("more than " + std::to_string(BrickGrid::kMostBricks) +
+      throw refuse("more than " + std::to_string(BrickGrid::kMaxBricks) +
                    " bricks of 8^3 that hold bone, which is all that can be numbered");
   });
   const Frame& frame = slabs.frame();

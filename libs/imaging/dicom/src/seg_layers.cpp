@@ -9,14 +9,14 @@
 namespace osteo::inline imaging::dicom {
 namespace {
 
-constexpr double kOffMm = 0.05;         // a frame may lie this far off its layer: positions are rounded
-constexpr double kLeastPitchMm = 0.02;  // two slices are never nearer
+constexpr double kOffMm = 0.05;       // a frame may lie this far off its layer: positions are rounded
+constexpr double kMinPitchMm = 0.02;  // two slices are never nearer
 constexpr int kMaxLayers = 65535;
 
 // Whether places lie on whole multiples of the pitch; the pitch is then fitted to the first and last, for it may be
 // rounded.
 bool fits(const std::vector<double>& places, double& pitch) {
-  if (!(pitch >= kLeastPitchMm)) return false;
+  if (!(pitch >= kMinPitchMm)) return false;
   std::vector<double> at{0};
   for (std::size_t i = 1; i < places.size(); ++i) {
     const double steps = std::round((places[i] - places[i - 1]) / pitch);

@@ -12,11 +12,11 @@
 namespace osteo::inline imaging::dicom {
 namespace {
 
-constexpr std::size_t kLeastSlices = 4;
-constexpr int kLeastSide = 12;
+constexpr std::size_t kMinSlices = 4;
+constexpr int kMinSide = 12;
 constexpr float kObjectHu = -500, kAirBelowHu = -800;
 // Fewer blocks than this show too little of a body to compare.
-constexpr int kLeastBlocks = 16;
+constexpr int kMinBlocks = 16;
 // Of a line of blocks from edge to edge that is of one value.
 constexpr int kLostInLine = 8;
 
@@ -41,7 +41,7 @@ double difference(const SliceFigure& a, const SliceFigure& b, int turned_over = 
       ++n;
     }
   }
-  return n < kLeastBlocks ? 0 : sum / n;
+  return n < kMinBlocks ? 0 : sum / n;
 }
 
 class SliceJudge {
@@ -57,7 +57,7 @@ class SliceJudge {
     for (std::size_t k = 0; k < figures_.size(); ++k) {
       if (!odd_[k]) sound_.push_back(k);
     }
-    if (sound_.size() < kLeastSlices) return;
+    if (sound_.size() < kMinSlices) return;
     steps_.resize(sound_.size() - 1);
     for (std::size_t s = 0; s + 1 < sound_.size(); ++s) steps_[s] = difference(figure(s), figure(s + 1));
     judge_order();
@@ -96,7 +96,7 @@ class SliceJudge {
                          : end < n ? slices_[end].along_mm - slices_[end - 1].along_mm
                                    : 0;
       const double beside_mm2 = std::max(before, after) * block_mm2_;
-      const bool within = before >= kLeastBlocks && after >= kLeastBlocks;
+      const bool within = before >= kMinBlocks && after >= kMinBlocks;
       if (within || beside_mm2 > kSliceBlankEndMm2PerMm * std::max(gap, 0.5)) {
         for (std::size_t i = k; i < end; ++i) {
           names.push_back(slices_[i].name);
@@ -168,7 +168,7 @@ class SliceJudge {
       const int of_rows = lines(rows, columns, [&](int l, int i) { return static_cast<std::size_t>(l * columns + i); });
       const int of_columns =
           lines(columns, rows, [&](int l, int i) { return static_cast<std::size_t>(i * columns + l); });
-      if (of_rows == 0 && of_columns == 0 && (gone < kLeastBlocks || gone < kSlicePartShare * (all + gone))) continue;
+      if (of_rows == 0 && of_columns == 0 && (gone < kMinBlocks || gone < kSlicePartShare * (all + gone))) continue;
       names.push_back(slices_[k].name);
       odd_[k] = true;
     }
@@ -185,7 +185,7 @@ class SliceJudge {
     double hu = 0, least = 0;  ///< median; and what three quarters of the blocks step by at least, the same way
   };
   static Step step_of(std::vector<double> steps) {
-    if (steps.size() < 2 * kLeastBlocks) return {};
+    if (steps.size() < 2 * kMinBlocks) return {};
     std::sort(steps.begin(), steps.end());
     const double middle = steps[steps.size() / 2];
     return {true, middle, middle > 0 ? steps[steps.size() / 4] : steps[steps.size() * 3 / 4]};
@@ -402,7 +402,7 @@ void judge_slices(Verdict& verdict, const std::vector<JudgedSlice>& slices, cons
   const auto end =
       std::find_if(figures.begin(), figures.end(), [](const SliceFigure& f) { return f.blocks().empty(); });
   const auto n = static_cast<std::size_t>(end - figures.begin());
-  if (n < kLeastSlices || figures.front().columns() < kLeastSide || figures.front().rows() < kLeastSide) return;
+  if (n < kMinSlices || figures.front().columns() < kMinSide || figures.front().rows() < kMinSide) return;
   const double block_mm2 = picture_mm2 / static_cast<double>(figures.front().blocks().size());
   if (n == figures.size()) return SliceJudge(verdict, slices, figures, block_mm2).run();
   const std::vector<JudgedSlice> read_slices(slices.begin(), slices.begin() + static_cast<std::ptrdiff_t>(n));

@@ -238,7 +238,7 @@ void tell_other_scale(Verdict& v, const Histogram& h, const ValueCount& count, c
     v.add(code::hu_shifted, small ? Severity::warning : grave,
           "the values (" + range + ") look like HU shifted by " + whole(low + 1000) + ": air at " + whole(low) +
               ", tissue at " + whole(low + apart) + "; " + whole(offset) + " HU added to each would put them right",
-          "--hu-offset " + whole(offset) + " adds it; 'osteo guide SCAN --hu-offset " + whole(offset) +
+          "--hu-offset " + whole(offset) + " adds it; 'osteo suggest-threshold SCAN --hu-offset " + whole(offset) +
               " --picture histogram.svg' shows the result first; or ask for the original export");
   } else if (second.share > 0.02 && apart > 400 && c.has_air) {
     v.add(code::hu_scaled, Severity::warning,

@@ -123,17 +123,17 @@ std::string run(const FillEdit& o, const Image& ct, BitMask& bone, const Context
          " larger left";
 }
 
-constexpr int kMostReach = 5;  // the weights' product fits 32 bits
+constexpr int kMaxReach = 5;  // the weights' product fits 32 bits
 
 std::string run(const SmoothEdit& o, const Image& ct, BitMask& bone, const Context& context) {
   std::array<int, 3> reach{};
   for (std::size_t a = 0; a < 3; ++a)
-    reach[a] = std::clamp(static_cast<int>(std::floor(o.radius_mm / ct.frame.spacing_mm[a] + 1e-9)), 0, kMostReach);
+    reach[a] = std::clamp(static_cast<int>(std::floor(o.radius_mm / ct.frame.spacing_mm[a] + 1e-9)), 0, kMaxReach);
   if (reach[0] + reach[1] + reach[2] == 0)
     throw Error(ExitCode::usage, "smoothing within less than a voxel does nothing",
                 "take at least the distance of two voxels");
   // Binomial weights: 1 2 1, 1 4 6 4 1, ...
-  std::array<std::array<std::uint32_t, 2 * kMostReach + 1>, 3> weight{};
+  std::array<std::array<std::uint32_t, 2 * kMaxReach + 1>, 3> weight{};
   std::uint32_t total = 1;
   for (std::size_t a = 0; a < 3; ++a) {
     const int n = 2 * reach[a];
@@ -149,7 +149,7 @@ std::string run(const SmoothEdit& o, const Image& ct, BitMask& bone, const Conte
   const std::size_t words = bone.words_per_row();
   parallel_for(bone.rows(), 512, context.threads, [&](std::size_t first, std::size_t last) {
     context.check_cancelled();
-    std::array<std::uint32_t, 64 + 2 * kMostReach> column{};
+    std::array<std::uint32_t, 64 + 2 * kMaxReach> column{};
     for (std::size_t r = first; r < last; ++r) {
       const int j = static_cast<int>(r % static_cast<std::size_t>(ny)),
                 k = static_cast<int>(r / static_cast<std::size_t>(ny));
@@ -169,7 +169,7 @@ std::string run(const SmoothEdit& o, const Image& ct, BitMask& bone, const Conte
             const std::uint64_t left = w > 0 ? row[w - 1] >> 58 : 0, right = w + 1 < words ? row[w + 1] & 63 : 0;
             any |= here | left | right;
             all &= full & (w > 0 ? left | ~std::uint64_t{63} : ~std::uint64_t{0}) &
-                   (w + 1 < words ? (row[w + 1] | ~bits_of_word(0, 0, std::min(nx - x0 - 64, kMostReach)))
+                   (w + 1 < words ? (row[w + 1] | ~bits_of_word(0, 0, std::min(nx - x0 - 64, kMaxReach)))
                                   : ~std::uint64_t{0});
           }
         }
@@ -184,19 +184,19 @@ std::string run(const SmoothEdit& o, const Image& ct, BitMask& bone, const Conte
               const int c = std::clamp(x, 0, nx - 1);
               return static_cast<std::uint32_t>(row[static_cast<std::size_t>(c) / 64] >> (c % 64) & 1);
             };
-            for (int x = -reach[0]; x < 0; ++x) column[static_cast<std::size_t>(x + kMostReach)] += v * bit(x0 + x);
+            for (int x = -reach[0]; x < 0; ++x) column[static_cast<std::size_t>(x + kMaxReach)] += v * bit(x0 + x);
             const std::uint64_t here = row[w];
             for (int x = 0; x < n; ++x)
-              column[static_cast<std::size_t>(x + kMostReach)] += v * static_cast<std::uint32_t>(here >> x & 1);
-            for (int x = n; x < n + reach[0]; ++x) column[static_cast<std::size_t>(x + kMostReach)] += v * bit(x0 + x);
+              column[static_cast<std::size_t>(x + kMaxReach)] += v * static_cast<std::uint32_t>(here >> x & 1);
+            for (int x = n; x < n + reach[0]; ++x) column[static_cast<std::size_t>(x + kMaxReach)] += v * bit(x0 + x);
           }
         }
         std::uint64_t out = before.row(r)[w];
         for (int x = 0; x < n; ++x) {
           std::uint32_t sum = 0;
           for (int d = -reach[0]; d <= reach[0]; ++d)
-            sum += weight[0][static_cast<std::size_t>(d + reach[0])] *
-                   column[static_cast<std::size_t>(x + d + kMostReach)];
+            sum +=
+                weight[0][static_cast<std::size_t>(d + reach[0])] * column[static_cast<std::size_t>(x + d + kMaxReach)];
           const std::uint64_t mask = std::uint64_t{1} << x;
           if (2 * static_cast<std::uint64_t>(sum) > total) out |= mask;
           if (2 * static_cast<std::uint64_t>(sum) < total) out &= ~mask;

@@ -124,18 +124,18 @@ BoneGuide guide_threshold(const Image& ct, int threads) {
 
   // A skull fills up to 45 cm2 of each slice on average, a pelvis 60, and no part of a body is bone almost alone: else
   // tissue passes for bone and air for tissue, as where the values lack their offset.
-  constexpr double kMostCm2 = 80, kMostShare = 0.85;
+  constexpr double kMaxCm2 = 80, kMaxShare = 0.85;
   double height_mm = 0;
   for (std::size_t a = 0; a < 3; ++a)
     height_mm += std::abs(ct.frame.direction.column[a].z) * ct.frame.spacing_mm[a] * ct.frame.dims[a];
   const double cm2 = g.presets[0].volume_mm3 / std::max(height_mm, 1e-6) / 100;
   const double share =
       at_or_above(all, g.presets[0].lower_hu) / std::max(1.0, at_or_above(all, g.soft_tissue_hu - 150));
-  if (cm2 > kMostCm2 || share > kMostShare) {
+  if (cm2 > kMaxCm2 || share > kMaxShare) {
     g.confidence = 0;
     g.doubt = format_number(std::round(g.presets[0].volume_mm3 / 1000)) + " cm3 would be bone, " +
-              (cm2 > kMostCm2 ? format_number(std::round(cm2)) + " cm2 of each slice on average"
-                              : format_number(std::round(100 * share)) + " % of all that is no air") +
+              (cm2 > kMaxCm2 ? format_number(std::round(cm2)) + " cm2 of each slice on average"
+                             : format_number(std::round(100 * share)) + " % of all that is no air") +
               ": more than a body has; see whether the values are Hounsfield units";
   }
   return g;

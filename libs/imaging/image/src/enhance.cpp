@@ -184,9 +184,9 @@ Image denoise(const Image& image, const DenoiseParams& params, const Context& co
 }
 
 Image reduce_metal(const Image& image, const MetalParams& params, const Context& context) {
-  constexpr int kMostPixels = 256;
+  constexpr int kMaxPixels = 256;
   const Frame& f = image.frame;
-  const double least = params.least_mm2 / (f.spacing_mm.x * f.spacing_mm.y);
+  const double least = params.min_area_mm2 / (f.spacing_mm.x * f.spacing_mm.y);
   const auto slices = static_cast<std::size_t>(f.dims[2]);
   std::vector<std::int64_t> changed(slices);
   std::vector<double> by(slices);
@@ -196,7 +196,7 @@ Image reduce_metal(const Image& image, const MetalParams& params, const Context&
     // A square of square pixels, in which air outside is 0.
     const double width = f.dims[0] * f.spacing_mm.x, height = f.dims[1] * f.spacing_mm.y,
                  edge = std::max(width, height);
-    const double pixel = std::max(edge / kMostPixels, std::min(f.spacing_mm.x, f.spacing_mm.y));
+    const double pixel = std::max(edge / kMaxPixels, std::min(f.spacing_mm.x, f.spacing_mm.y));
     const cv::Size size(std::max(1, static_cast<int>(std::lround(width / pixel))),
                         std::max(1, static_cast<int>(std::lround(height / pixel))));
     const int n = std::max(size.width, size.height), left = (n - size.width) / 2, top = (n - size.height) / 2;

@@ -35,9 +35,9 @@ bool accepts(std::span<const DataKind> kinds, DataKind kind) {
 
 // All voxels of the box that holds the stored ones; the others have the background's value.
 Volume<float> dense(const SparseGrid& grid, const Context& context) {
-  constexpr double kMostVoxels = 2e9;
+  constexpr double kMaxVoxels = 2e9;
   const auto& n = grid.frame.dims;
-  if (1.0 * n[0] * n[1] * n[2] > kMostVoxels)
+  if (1.0 * n[0] * n[1] * n[2] > kMaxVoxels)
     throw Error(ExitCode::resources, "the box around the grid has over 2e9 voxels",
                 "write it as .vdb, which is sparse");
   Volume<float> all;

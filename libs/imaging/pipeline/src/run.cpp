@@ -44,8 +44,8 @@ void set_params(Stage& stage, const PipelineNode& node) {
   auto fields = stage.fields();
   for (const auto& param : node.params) {
     const std::string &name = param.first, &text = param.second;
-    const auto it = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == name; });
-    if (it == fields.end()) {
+    const FieldRef* const it = find_field(fields, name);
+    if (it == nullptr) {
       std::vector<std::string> known;
       for (const auto& f : fields) known.emplace_back(f.doc.name);
       unknown("stage '" + node.id + "'", "parameter", name, known);
@@ -64,6 +64,8 @@ class Runner {
       : pipeline_(pipeline), options_(options), context_(context) {
     for (const PipelineNode& node : pipeline.nodes) {
       auto stage = registry.make(node.stage);
+      if (const std::string& name = stage->info().name; name != node.stage)
+        context.info("stage '" + node.id + "': " + renamed_text(node.stage, name));
       set_params(*stage, node);
       stages_.push_back(std::move(stage));
       index_[node.id] = stages_.size() - 1;

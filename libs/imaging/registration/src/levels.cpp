@@ -10,7 +10,7 @@ namespace osteo::inline imaging::registration {
 namespace {
 
 constexpr double kCoarsestMm = 8;
-constexpr double kMostVoxels = 4e7;
+constexpr double kMaxVoxels = 4e7;
 
 // Of one output voxel along an axis: the input voxels it is the weighted mean of.
 struct Taps {
@@ -122,7 +122,7 @@ Level halved(const Level& in) {
 double finest_of(const Frame& a, const Frame& b, double wanted_mm) {
   for (const Frame* f : {&a, &b})
     wanted_mm = std::max({wanted_mm, std::min({f->spacing_mm.x, f->spacing_mm.y, f->spacing_mm.z}), wanted_mm,
-                          std::cbrt(f->voxel_volume_mm3() * static_cast<double>(f->voxel_count()) / kMostVoxels)});
+                          std::cbrt(f->voxel_volume_mm3() * static_cast<double>(f->voxel_count()) / kMaxVoxels)});
   return wanted_mm;
 }
 

@@ -13,8 +13,8 @@
 namespace osteo::inline imaging::registration {
 namespace {
 
-constexpr int kMostBins = 48;
-constexpr double kLeastOverlap = 0.25;
+constexpr int kMaxBins = 48;
+constexpr double kMinOverlap = 0.25;
 
 // Points of one scan, around the middle of them, and the bin of the value there.
 struct Samples {
@@ -105,7 +105,7 @@ Samples take_samples(const Levels& from, std::size_t level, std::size_t count, i
   return s;
 }
 
-using Joint = std::array<float, static_cast<std::size_t>(kMostBins* kMostBins)>;
+using Joint = std::array<float, static_cast<std::size_t>(kMaxBins* kMaxBins)>;
 
 std::size_t fill(const Samples& s, const Levels& to, const Level& level, const IndexMap& m, std::size_t begin,
                  std::size_t end, Joint& joint) {
@@ -130,7 +130,7 @@ std::size_t fill(const Samples& s, const Levels& to, const Level& level, const I
 
 double normalized_information(const Joint& joint, int bins, std::size_t inside) {
   const auto n = static_cast<std::size_t>(bins);
-  std::array<double, kMostBins> a{}, b{};
+  std::array<double, kMaxBins> a{}, b{};
   double both = 0, one = 0, other = 0;
   const auto entropy = [&](double c) {
     const double p = c / static_cast<double>(inside);
@@ -181,8 +181,8 @@ Match evaluate(const Samples& s, const Levels& to, std::size_t level, const Rigi
   }
   match.overlap = static_cast<double>(inside) / static_cast<double>(s.x.size());
   // Little overlap is no match, however well it fits; the way back must still lead uphill.
-  match.score = match.overlap < kLeastOverlap ? match.overlap - kLeastOverlap + 0.9
-                                              : normalized_information(joint, s.bins, inside);
+  match.score =
+      match.overlap < kMinOverlap ? match.overlap - kMinOverlap + 0.9 : normalized_information(joint, s.bins, inside);
   return match;
 }
 
@@ -382,7 +382,7 @@ Plan plan_of(double h) {
   if (h > 6) return {3000, 24, 32, 160};
   if (h > 3) return {8000, 32, 6, 200};
   if (h > 1.5) return {24000, 40, 2, 250};
-  return {80000, kMostBins, 1, 300};
+  return {80000, kMaxBins, 1, 300};
 }
 
 }  // namespace
@@ -435,7 +435,7 @@ Match refine(const Levels& from, const Levels& to, const RigidTransform& guess, 
 
 double likeness(const Levels& from, const Levels& to, const RigidTransform& to_from, const Context& context) {
   const std::size_t level = std::min({std::size_t{1}, from.levels.size() - 1, to.levels.size() - 1});
-  const Samples s = take_samples(from, level, 20000, kMostBins, context.seed);
+  const Samples s = take_samples(from, level, 20000, kMaxBins, context.seed);
   const IndexMap m = index_map(to.levels[level].frame, to_from, s.centre_mm);
   double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
   for (std::size_t i = 0; i < s.x.size(); ++i) {

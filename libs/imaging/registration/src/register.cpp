@@ -15,8 +15,8 @@ namespace {
 
 namespace reg = registration;
 
-constexpr double kLeastOverlap = 0.25, kMostInverseMm = 1, kManyOff = 1.3, kLike = 0.8;
-constexpr int kLeastEdges = 300;
+constexpr double kMinOverlap = 0.25, kMaxInverseMm = 1, kManyOff = 1.3, kLike = 0.8;
+constexpr int kMinEdges = 300;
 // Thin slices of one head meet to 0.03 to 0.05 mm at half of all edges; from here on a mirror is tried, and believed
 // when it halves that. Trying it costs time and refuses no pair of one head: in a mirror that never fits better.
 constexpr double kDoubtMm = 0.06, kMirrorBetter = 0.5;
@@ -81,13 +81,13 @@ double many_off_mm(const RegisterParams& p, const Frame& first, const Frame& sec
 
 // Empty when the two belong together.
 std::string doubt(const Registration& r, const RegisterParams& p) {
-  if (r.overlap < kLeastOverlap)
+  if (r.overlap < kMinOverlap)
     return "only " + std::to_string(static_cast<int>(std::lround(100 * r.overlap))) +
            " % of the smaller scan lies inside the other";
-  if (r.residual.points < kLeastEdges)
+  if (r.residual.points < kMinEdges)
     return "both scans show only " + std::to_string(r.residual.points) +
            " points of an edge in the same place: too little to go by";
-  if (r.mirror_tried && r.mirror.points >= kLeastEdges && r.mirror.median_mm < kMirrorBetter * r.residual.median_mm)
+  if (r.mirror_tried && r.mirror.points >= kMinEdges && r.mirror.median_mm < kMirrorBetter * r.residual.median_mm)
     return "the second scan fits better in a mirror, with left and right exchanged: half of all edges then meet to " +
            mm(r.mirror.median_mm) + " instead of " + mm(r.residual.median_mm) +
            "; one of the two files is mirrored, or shows the other side";
@@ -95,7 +95,7 @@ std::string doubt(const Registration& r, const RegisterParams& p) {
     return "at half of all edges the other scan's edge is " + mm(r.residual.median_mm) +
            " off or missing, allowed are " + mm(p.max_residual_mm) +
            ": another patient, the other side, or a body that has changed its shape";
-  if (r.inverse_mm > kMostInverseMm)
+  if (r.inverse_mm > kMaxInverseMm)
     return "registered back by itself, a corner of the region ends up " + mm(r.inverse_mm) +
            " from where it began: there is no one best place";
   return {};
@@ -125,7 +125,7 @@ Registration register_scans(const Image& first, const Image& second, const Regis
   r.overlap = match.overlap;
   r.second_from_first = swapped ? match.to_from.inverse() : match.to_from;
   RigidTransform back;  // from the second to the first
-  const bool seen = r.overlap >= kLeastOverlap;
+  const bool seen = r.overlap >= kMinOverlap;
   if (by_surface && seen) {
     const reg::BoneOf bone = reg::bone_surface_of(first, p.bone_hu, "first", context),
                       other = reg::bone_surface_of(second, p.bone_hu, "second", context);

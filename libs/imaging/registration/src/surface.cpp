@@ -17,8 +17,8 @@
 namespace osteo::inline imaging::registration {
 namespace {
 
-constexpr double kVoxelMm = 0.75, kBorderMm = 4, kReachMm = 8, kLeastBoneMm3 = 2000;
-constexpr std::size_t kMostPoints = 12000;
+constexpr double kVoxelMm = 0.75, kBorderMm = 4, kReachMm = 8, kMinBoneMm3 = 2000;
+constexpr std::size_t kMaxPoints = 12000;
 
 // Cut faces at a scan's border are no bone's surface.
 bool well_inside(const Frame& f, Vec3 p) {
@@ -56,7 +56,7 @@ BoneOf bone_surface_of(const Image& ct, double bone_hu, const char* which, const
     throw too_little(0);
   }
   const ResampledBone bone = resample_bone(ct, *mask, {.spacing_mm = kVoxelMm, .lower = bone_hu}, quiet);
-  if (bone.volume_after_mm3 < kLeastBoneMm3) throw too_little(bone.volume_after_mm3);
+  if (bone.volume_after_mm3 < kMinBoneMm3) throw too_little(bone.volume_after_mm3);
   return {surface_nets(to_bricks(bone.density), 0.5F, quiet).mesh, ct.frame};
 }
 
@@ -101,7 +101,7 @@ SurfaceFit fit_surfaces(const BoneOf& first, const BoneOf& second, const RigidTr
     return d[static_cast<std::size_t>(share * static_cast<double>(d.size() - 1))];
   };
   SurfaceFit fit;
-  const std::size_t step = std::max<std::size_t>(1, b.points_mm.size() / kMostPoints);
+  const std::size_t step = std::max<std::size_t>(1, b.points_mm.size() / kMaxPoints);
   std::vector<std::uint32_t> hints;
   for (int n = 0; n < 60; ++n) {
     const std::vector<Pair> pairs = pairs_of(step, hints);

@@ -111,7 +111,7 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
                                                                 EarStructure::labyrinth, EarStructure::sigmoid_sinus};
       for (const EarStructure s : kOrder) {
         const Part& part = parts[static_cast<std::size_t>(s)];
-        if (!wants(s) || !part.found || part.quality < params.least_quality) continue;
+        if (!wants(s) || !part.found || part.quality < params.min_quality) continue;
         Field mask = *f;
         for (std::size_t i = 0; i < mask.v.size(); ++i) mask.v[i] = part.mask[i] != 0 ? 1.0F : 0.0F;
         Vec3 lo, hi;
@@ -134,10 +134,10 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
     for (const EarStructure s : asked) {
       const auto at = static_cast<std::size_t>(s);
       const Part& part = parts[at];
-      EarFinding finding{s, part.found && part.quality >= params.least_quality, part.quality, part.why, volume[at]};
+      EarFinding finding{s, part.found && part.quality >= params.min_quality, part.quality, part.why, volume[at]};
       if (part.found && !finding.found)
         finding.why =
-            "quality " + format_number(std::round(part.quality * 100) / 100) + " is below --least-quality; " + part.why;
+            "quality " + format_number(std::round(part.quality * 100) / 100) + " is below --min-quality; " + part.why;
       if (finding.found)
         result.labels.structures.push_back({static_cast<std::uint8_t>(1 + at), std::string(kTitles[at]), kColours[at]});
       result.findings.push_back(finding);

@@ -10,16 +10,16 @@
 namespace osteo::inline imaging::segment {
 namespace {
 
-constexpr double kLeastBony = 0.5;
+constexpr double kMinBony = 0.5;
 constexpr double kOutsideBallMm = 8;                     // wider than the canal, narrower than what is outside
 constexpr double kCanalEnclosed = 0.75, kMouthMm = 2.5;  // where less of the round is wall, its mouth begins
 constexpr double kCavityMm3 =
     60;  // the tympanic cavity below its ossicles has more; behind wax or a bend there is less
 
-constexpr double kMostBesideMm3 = 250;  // of air beside the tube that no pass parts from it: folds of a canal have less
+constexpr double kMaxBesideMm3 = 250;  // of air beside the tube that no pass parts from it: folds of a canal have less
 // Twice the most that nine in ten adults have in front of the drum (0.63 to 1.46 mL: R. Margolis, J. Heller, Screening
 // tympanometry, Audiology 1987).
-constexpr double kMostCanalMm3 = 3000;
+constexpr double kMaxCanalMm3 = 3000;
 
 /// Of air that runs inward, what is a tube: shells of equal way from its inner end have about the same area. Where they
 /// widen it opens into a fold of the skin; from there on only what lies straight on is kept.
@@ -244,13 +244,13 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
     backed += static_cast<double>(to_bone[i]) < 1.5 + f.h_mm ? 1 : 0;
   }
   c.quality = wall > 0 ? backed / wall : 0;
-  if (reached_mm3 - tube_mm3 > kMostBesideMm3 && reached_mm3 > 1.3 * tube_mm3) {
+  if (reached_mm3 - tube_mm3 > kMaxBesideMm3 && reached_mm3 > 1.3 * tube_mm3) {
     c.why = "no drum is seen between the ear canal and the air behind it, so the two cannot be told apart";
   } else if (c.length_mm < 8 || volume < 150) {
     c.why = "the air that goes inward is too short for a canal";
-  } else if (c.length_mm > 50 || volume > kMostCanalMm3) {
+  } else if (c.length_mm > 50 || volume > kMaxCanalMm3) {
     c.why = "the air that goes inward is no canal: no drum ends it";
-  } else if (c.quality < kLeastBony) {
+  } else if (c.quality < kMinBony) {
     // A fold, the mouth or the nose: what would be placed by it would be wrong.
     c.why = "the air that goes inward has bone behind only " +
             std::to_string(static_cast<int>(std::lround(100 * c.quality))) + " % of its wall";

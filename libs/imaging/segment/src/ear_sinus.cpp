@@ -17,7 +17,7 @@
 namespace osteo::inline imaging::segment {
 namespace {
 
-constexpr double kLeastRadiusMm = 2.5, kMostRadiusMm = 7.5;
+constexpr double kMinRadiusMm = 2.5, kMaxRadiusMm = 7.5;
 constexpr double kMarchStepMm = 0.5;
 constexpr int kRays = 48;
 constexpr double kHeld = 0.5;  // share of the round
@@ -39,7 +39,7 @@ Round fit_round(const Field& f, const Levels& levels, Vec3 at, Vec3 along, doubl
     const double a = 2 * std::numbers::pi * q / kRays;
     const Vec3 d = u * std::cos(a) + v * std::sin(a);
     double before = f.sample(at);
-    for (double l = 0.25; l < kMostRadiusMm + 2.5; l += 0.25) {
+    for (double l = 0.25; l < kMaxRadiusMm + 2.5; l += 0.25) {
       const double here = f.sample(at + d * l);
       const double level = here > levels.bone_above ? levels.bone_above : levels.air_below;
       if (here > levels.bone_above || here < levels.air_below) {
@@ -80,8 +80,8 @@ Round fit_round(const Field& f, const Levels& levels, Vec3 at, Vec3 along, doubl
     my = (by * cxx - bx * cxy) / det;
     r = std::sqrt(std::max(0.0, (sz - 2 * mx * sx - 2 * my * sy) / s + mx * mx + my * my));
     // An arc that is too flat or too narrow says nothing of a vessel's size.
-    const double kept = std::clamp(r, std::max(kLeastRadiusMm, radius > 0 ? radius - 0.7 : 0),
-                                   std::min(kMostRadiusMm, radius > 0 ? radius + 0.7 : 10));
+    const double kept = std::clamp(r, std::max(kMinRadiusMm, radius > 0 ? radius - 0.7 : 0),
+                                   std::min(kMaxRadiusMm, radius > 0 ? radius + 0.7 : 10));
     if (kept != r) {
       // The middle moves along the normal of the arc's middle, so that the wall stays where it is.
       const double ax = sx / s - mx, ay = sy / s - my, l = std::hypot(ax, ay);
@@ -158,8 +158,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
   for (std::size_t i = 0; i < g.size(); ++i) {
     const auto p = g.place(i);
     const Vec3 x = g.world(p[0], p[1], p[2]) - canal.drum_mm;
-    deep[i] =
-        g.v[i] > 0.62F && static_cast<double>(wide[i]) > kLeastRadiusMm && x.y > 5 && x.z > -20 && x.z < 16 ? 1 : 0;
+    deep[i] = g.v[i] > 0.62F && static_cast<double>(wide[i]) > kMinRadiusMm && x.y > 5 && x.z > -20 && x.z < 16 ? 1 : 0;
   }
   const Pieces pieces = pieces_of(g, deep, true);
   std::vector<double> most_z(pieces.size.size(), -1e9), least_z(pieces.size.size(), 1e9);
@@ -210,7 +209,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
         for (int i = -1; i <= 1; ++i) {
           if ((i == 0 && j == 0 && k == 0) || !g.inside(p[0] + i, p[1] + j, p[2] + k)) continue;
           const std::size_t to = g.at(p[0] + i, p[1] + j, p[2] + k);
-          if (g.v[to] < 0.52F || static_cast<double>(wide[to]) < kLeastRadiusMm || g.world(0, 0, p[2] + k).z < lowest)
+          if (g.v[to] < 0.52F || static_cast<double>(wide[to]) < kMinRadiusMm || g.world(0, 0, p[2] + k).z < lowest)
             continue;
           const double step = std::sqrt(static_cast<double>(i * i + j * j + k * k));
           const auto cost = static_cast<float>(static_cast<double>(c) + step / (0.03 + worth(to) * worth(to)));

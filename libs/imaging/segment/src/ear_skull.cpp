@@ -9,7 +9,7 @@ namespace osteo::inline imaging::segment {
 namespace {
 
 constexpr double kBrainBallMm = 7;  // wider than the sinus, the canals of nerves and the muscles between bone
-constexpr double kAboveDrumMm = 8, kLeastBrainMm3 = 300;
+constexpr double kAboveDrumMm = 8, kMinBrainMm3 = 300;
 constexpr double kDuraMm = 2;   // labelled on the brain's side
 constexpr double kPlateMm = 4;  // of the tegmen, where no air ends it before
 
@@ -43,7 +43,7 @@ std::string why_no_brain(const Field& f, const Mask& soft, const Canal& canal) {
   double volume = 0;
   for (std::size_t i = 0; i < f.size(); ++i)
     if (soft[i] != 0 && f.world(0, 0, f.place(i)[2]).z > from) volume += f.h_mm * f.h_mm * f.h_mm;
-  if (volume < kLeastBrainMm3) return "no soft tissue above the ear: a dry skull, or cropped away";
+  if (volume < kMinBrainMm3) return "no soft tissue above the ear: a dry skull, or cropped away";
   return "above the ear no soft tissue as wide as " + mm(2 * kBrainBallMm) +
          " mm with bone outward of it lies within the image: too small a field, or the skull's outer side is cut off";
 }
@@ -80,7 +80,7 @@ Brain find_brain(const Field& f, const Levels& levels, const Canal& canal, const
   const double voxel = f.h_mm * f.h_mm * f.h_mm;
   std::vector<std::uint8_t> inside(pieces.size.size());
   for (std::size_t p = 1; p < inside.size(); ++p) {
-    inside[p] = high[p] * voxel > kLeastBrainMm3 && covered[p] > 0.8 * high[p] ? 1 : 0;
+    inside[p] = high[p] * voxel > kMinBrainMm3 && covered[p] > 0.8 * high[p] ? 1 : 0;
     b.found = b.found || inside[p] != 0;
   }
   if (!b.found) {

@@ -22,7 +22,7 @@ constexpr int kRays = 24;         // across
 constexpr double kRayStepMm = 0.1;
 constexpr double kSmoothMm = 0.4;  // along, standard deviation
 constexpr int kRounds = 5;
-constexpr double kLeastWallHu = 150;  // a wall stands out by this much, and by four times the noise
+constexpr double kMinWallHu = 150;  // a wall stands out by this much, and by four times the noise
 
 std::vector<std::size_t> nearest_stations(const std::vector<Vec3>& line, std::span<const Vec3> points) {
   // In order along the line: a line that comes near itself must not take a later point for an earlier one.
@@ -81,7 +81,7 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
   const double sign = nerve && !in_air ? 1 : -1;             // which way the wall differs from the content
   if (nerve && !in_air && middle < -350) return {at, 0, 0};  // an air cell
   // The wall of each ray: where the value is farthest from the middle's before it comes back by half.
-  const double least = std::max(kLeastWallHu, 4 * noise);
+  const double least = std::max(kMinWallHu, 4 * noise);
   struct Edge {
     double distance, wall, level;
     bool met;
@@ -149,7 +149,7 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
   std::nth_element(walls.begin(), walls.begin() + static_cast<std::ptrdiff_t>(walls.size() / 2), walls.end());
   const double wall = walls[walls.size() / 2];
   // A vessel's content is what its middle shows, which is too little when it is thin.
-  const double content = nerve ? sign * params.content_hu : sign * middle;
+  const double content = nerve ? sign * params.lumen_hu : sign * middle;
   {
     double square = 0;
     int low = 0, run = 0, widest = 0;
@@ -392,14 +392,14 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
     if (!goes_on || given[i]) since = t.arc_mm;
     worst = std::max(worst, t.arc_mm - since);
   }
-  if (worst > params.max_unsure_mm || sure < 0.25 * static_cast<double>(n)) {
+  if (worst > params.max_uncertain_mm || sure < 0.25 * static_cast<double>(n)) {
     const auto bad = std::max_element(open_mm.begin(), open_mm.end(),
                                       [](const auto& a, const auto& b) { return a[1] - a[0] < b[1] - b[0]; });
     const auto mm = [](double x) { return format_number(std::round(x * 10) / 10); };
     throw Error(ExitCode::failed,
                 "the points are not joined by a tube: no walls from " + mm((*bad)[0]) + " to " + mm((*bad)[1]) +
                     " mm of " + mm(tube.length_mm) + " mm along the way",
-                "give a point on it there, check --kind, or allow it with --max-unsure-mm");
+                "give a point on it there, check --kind, or allow it with --max-uncertain-mm");
   }
   tube.radius_mean_mm /= sure;
   context.progress(1.0);

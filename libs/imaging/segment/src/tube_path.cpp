@@ -35,10 +35,10 @@ std::vector<float> tubeness(const Field& f, const TubeParams& params, const Cont
   std::vector<float> best(f.size(), 0.0F);
   const double contrast = params.kind == TubeKind::nerve ? kBoneContrastHu : kVesselContrastHu;
   // A tube answers best to a Gaussian of its radius by the root of 2. Its peak is then the contrast by e.
-  constexpr double kLeast = 0.42;
-  const double most = std::max(kLeast, params.max_radius_mm / std::numbers::sqrt2);
+  constexpr double kMin = 0.42;
+  const double most = std::max(kMin, params.max_radius_mm / std::numbers::sqrt2);
   std::vector<double> sigmas;
-  for (double s = kLeast; s < most * 1.2; s *= 1.45) sigmas.push_back(s);
+  for (double s = kMin; s < most * 1.2; s *= 1.45) sigmas.push_back(s);
   const auto nx = static_cast<std::ptrdiff_t>(f.n[0]), nxy = nx * f.n[1];
   double done = 0;
   for (const double sigma : sigmas) {

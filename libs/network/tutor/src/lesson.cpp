@@ -41,10 +41,10 @@ Lesson read_lesson(const SessionReader& session, double from_s, double to_s) {
   lesson.rate_hz = o.header.rate_hz;
   lesson.setup = o.header.haptics;
   const std::size_t hands = lesson.setup.hands();
-  if (hands >= kMostHands)
+  if (hands >= kMaxHands)
     throw Error(ExitCode::usage,
                 "the session has " + std::to_string(hands) + " hands, and who learns needs one more than there can be",
-                "record it with at most " + std::to_string(kMostHands - 1));
+                "record it with at most " + std::to_string(kMaxHands - 1));
   if (lesson.setup.curve.size() >= 2)
     throw Error(ExitCode::usage,
                 "a curve of the settings holds the first hand of this session, and would hold who learns",

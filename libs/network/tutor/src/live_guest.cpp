@@ -80,7 +80,7 @@ void LiveGuest::hear(const LogPacket& p, std::int64_t) {
     t.tick = tick;
     for (std::size_t h = 0; h < p.hands; ++h) t.hands[h] = p.samples[i * p.hands + h];
     for (; action != p.actions.end() && action->tick == tick; ++action) t.actions.push_back(*action);
-    if (tick >= taken_ && tick < taken_ + kMostWaiting) waiting_.try_emplace(tick, std::move(t));
+    if (tick >= taken_ && tick < taken_ + kMaxWaiting) waiting_.try_emplace(tick, std::move(t));
   }
   if (action != p.actions.end()) behind_.assign(action, p.actions.end());
   if (ticks > 0) newest_shown_ = std::max(newest_shown_, p.first_tick + ticks - 1);
@@ -124,7 +124,7 @@ std::vector<Bytes> LiveGuest::poll(std::int64_t now_us) {
   std::array<FarSample, 256> items;
   const std::size_t n = own_.pop(items);
   recent_.insert(recent_.end(), items.begin(), items.begin() + static_cast<std::ptrdiff_t>(n));
-  while (recent_.size() > HandPacket::kMost) recent_.pop_front();
+  while (recent_.size() > HandPacket::kMax) recent_.pop_front();
   if (state_ == JoinState::joined && now_us - last_heard_us_ > kLostUs) {
     // Dropped: the session goes on here alone, and it is asked for again.
     state_ = JoinState::asking;

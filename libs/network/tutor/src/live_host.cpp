@@ -46,7 +46,7 @@ void LiveHost::tick(const TickRecord& record, std::span<const VoxelChange> chang
     state_ = LogState::lost;
     return;
   }
-  if (log_.size() >= kMostTicks * hands_) {
+  if (log_.size() >= kMaxTicks * hands_) {
     state_ = LogState::lost;
     return;
   }
@@ -118,15 +118,15 @@ PairingSeats::Answer LiveHost::seat(const UdpPeer& from, JoinRole role, std::int
     ++others;
     sure += surely_there(*p) ? 1 : 0;
   }
-  if (others < kMostPeers) return Answer::free;
-  return sure < kMostPeers ? Answer::wait : Answer::taken;
+  if (others < kMaxPeers) return Answer::free;
+  return sure < kMaxPeers ? Answer::wait : Answer::taken;
 }
 
 std::uint32_t LiveHost::take(const UdpPeer& from, JoinRole role, const PairKeys& keys, std::int64_t now_us) {
   std::erase_if(peers_, [&](const auto& p) {
     return p->from == from || (role == JoinRole::trainee && p->role == JoinRole::trainee);
   });
-  if (peers_.size() >= kMostPeers) {
+  if (peers_.size() >= kMaxPeers) {
     peers_.erase(std::min_element(peers_.begin(), peers_.end(),
                                   [](const auto& a, const auto& b) { return a->last_heard_us < b->last_heard_us; }));
   }
@@ -200,11 +200,11 @@ LogPacket LiveHost::log_from(std::uint64_t tick) const {
   p.now_tick = log_.size() / hands_;
   p.hands = static_cast<std::uint8_t>(hands_);
   std::uint64_t end =
-      std::min<std::uint64_t>(p.now_tick, tick + (hands_ <= 2 ? LogPacket::kMostTicks : LogPacket::kMostTicks / 2));
+      std::min<std::uint64_t>(p.now_tick, tick + (hands_ <= 2 ? LogPacket::kMaxTicks : LogPacket::kMaxTicks / 2));
   const auto from = std::lower_bound(actions_.begin(), actions_.end(), tick,
                                      [](const SceneAction& a, std::uint64_t t) { return a.tick < t; });
   for (auto a = from; a != actions_.end() && a->tick < end; ++a) {
-    if (p.actions.size() == LogPacket::kMostActions) {
+    if (p.actions.size() == LogPacket::kMaxActions) {
       end = std::max(a->tick, tick + 1);  // more in one tick than fit are none that people do
       break;
     }
@@ -214,7 +214,7 @@ LogPacket LiveHost::log_from(std::uint64_t tick) const {
   if (state_ == LogState::over && end == p.now_tick) {  // and those behind the last tick
     const auto behind = std::lower_bound(actions_.begin(), actions_.end(), end,
                                          [](const SceneAction& a, std::uint64_t t) { return a.tick < t; });
-    for (auto a = behind; a != actions_.end() && a->tick == end && p.actions.size() < LogPacket::kMostActions; ++a)
+    for (auto a = behind; a != actions_.end() && a->tick == end && p.actions.size() < LogPacket::kMaxActions; ++a)
       p.actions.push_back(*a);
   }
   p.samples.assign(log_.begin() + static_cast<std::ptrdiff_t>(tick * hands_),
@@ -248,7 +248,7 @@ std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
         b.session = session_;
         b.total = static_cast<std::uint32_t>(settings_.size());
         b.offset = static_cast<std::uint32_t>(at);
-        const std::size_t end = std::min(settings_.size(), at + BlobPacket::kMost);
+        const std::size_t end = std::min(settings_.size(), at + BlobPacket::kMax);
         b.bytes.assign(settings_.begin() + static_cast<std::ptrdiff_t>(at),
                        settings_.begin() + static_cast<std::ptrdiff_t>(end));
         send(b);
@@ -264,14 +264,13 @@ std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
     }
     p.sent_to = std::max(p.sent_to, p.next_tick);
     int sent = 0;
-    while (p.sent_to + LogPacket::kMostTicks < ticks && p.sent_to < p.next_tick + kWindowTicks &&
-           sent < kPacketsAPoll) {
+    while (p.sent_to + LogPacket::kMaxTicks < ticks && p.sent_to < p.next_tick + kWindowTicks && sent < kPacketsAPoll) {
       const LogPacket log = log_from(p.sent_to);
       p.sent_to += log.samples.size() / hands_;
       send(log);
       ++sent;
     }
-    if (p.sent_to + LogPacket::kMostTicks >= ticks) {
+    if (p.sent_to + LogPacket::kMaxTicks >= ticks) {
       // The newest, with those before them once more.
       const LogPacket log = log_from(std::min(p.sent_to, ticks > kOverlap ? ticks - kOverlap : 0));
       p.sent_to = std::max(p.sent_to, log.first_tick + log.samples.size() / hands_);

@@ -91,7 +91,7 @@ Bytes past_bytes(const SessionFolder& session) {
   const auto flush = [&] {
     writer->append(batch);
     batch = {};
-    if (bytes.size() > kMostPastBytes)
+    if (bytes.size() > kMaxPastBytes)
       throw Error(ExitCode::failed, "the sessions that this one goes on from are too long to be sent",
                   "begin with the case's bone");
   };

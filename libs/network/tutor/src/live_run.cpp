@@ -27,7 +27,7 @@ void HostThread::run() {
   while (!stop_) {
     socket_.wait_ms(1);
     UdpPeer from;
-    for (int n = 0; n < kMostPackets; ++n) {
+    for (int n = 0; n < kMaxPackets; ++n) {
       const auto packet = socket_.receive(from);
       if (!packet) break;
       host_.receive(from, *packet, steady_us());

@@ -88,7 +88,7 @@ LiveSeat::~LiveSeat() {
 
 void LiveSeat::exchange() {
   UdpPeer from;
-  for (int n = 0; n < HostThread::kMostPackets; ++n) {
+  for (int n = 0; n < HostThread::kMaxPackets; ++n) {
     const auto packet = socket_.receive(from);
     if (!packet) break;
     if (from != options_.host) continue;

@@ -104,7 +104,7 @@ std::optional<Bytes> PairingHost::receive(const UdpPeer& from, std::span<const s
     }
     if (tries_ <= 0) return answer(refusal(nonce, PairingRefusal::locked));
     if (!asks_.take(kPairingsPerS, now_us)) return of_no_use();
-    if (attempts_.size() >= kMostAttempts) attempts_.pop_front();
+    if (attempts_.size() >= kMaxAttempts) attempts_.pop_front();
     Attempt& a = attempts_.emplace_back();
     a.from = from;
     a.role = role;

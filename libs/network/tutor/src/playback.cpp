@@ -55,7 +55,7 @@ void FadingGuide::end_trial() noexcept {
 }
 
 LessonClock::LessonClock(const Lesson& lesson, const PlaybackParams& params)
-    : lesson_(lesson), waits_(leads(params)), by_clock_(by_clock(params)), leash_mm_(params.leash_mm) {
+    : lesson_(lesson), waits_(leads(params)), by_clock_(by_clock(params)), leash_mm_(params.tolerance_radius_mm) {
   target_ = from_floats(lesson.way.front().at_mm);
 }
 

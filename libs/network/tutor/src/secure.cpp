@@ -148,7 +148,7 @@ Bytes SecureChannel::seal(std::span<const std::uint8_t> plain) {
 }
 
 std::optional<Bytes> SecureChannel::open(std::span<const std::uint8_t> packet) {
-  if (packet.size() < kOverhead || packet.size() > kMostPacketBytes + kOverhead) return std::nullopt;
+  if (packet.size() < kOverhead || packet.size() > kMaxPacketBytes + kOverhead) return std::nullopt;
   std::uint32_t connection = 0;
   std::uint64_t counter = 0;
   std::memcpy(&connection, packet.data(), 4);

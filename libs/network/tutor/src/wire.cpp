@@ -37,7 +37,7 @@ class PacketWriter {
 class PacketReader {
  public:
   PacketReader(std::span<const std::uint8_t> bytes, std::uint8_t kind) : left_(bytes) {
-    good_ = bytes.size() <= kMostPacketBytes && take<std::uint8_t>() == kind && take<std::uint8_t>() == kTutorProtocol;
+    good_ = bytes.size() <= kMaxPacketBytes && take<std::uint8_t>() == kind && take<std::uint8_t>() == kTutorProtocol;
   }
   template <class T>
   T take() {
@@ -136,7 +136,7 @@ std::optional<HandPacket> decode_hand(std::span<const std::uint8_t> bytes) {
   p.mark = r.mark();
   p.newest = r.take<std::uint64_t>();
   const auto count = r.take<std::uint8_t>();
-  p.samples = r.list<DeviceSample>(count, HandPacket::kMost);
+  p.samples = r.list<DeviceSample>(count, HandPacket::kMax);
   if (count > 0) r.need(p.newest + 1 >= count);
   if (!r.whole()) return std::nullopt;
   return p;
@@ -154,10 +154,10 @@ std::optional<LogPacket> decode_log(std::span<const std::uint8_t> bytes) {
   p.mark = r.mark();
   p.hands = r.take<std::uint8_t>();
   const auto ticks = r.take<std::uint8_t>(), actions = r.take<std::uint8_t>();
-  r.need(p.hands >= 1 && p.hands <= kMostHands && ticks <= LogPacket::kMostTicks && p.state <= LogState::lost);
+  r.need(p.hands >= 1 && p.hands <= kMaxHands && ticks <= LogPacket::kMaxTicks && p.state <= LogState::lost);
   if (!r.good()) return std::nullopt;
-  p.samples = r.list<DeviceSample>(std::size_t{ticks} * p.hands, LogPacket::kMostTicks * kMostHands);
-  p.actions = r.list<SceneAction>(actions, LogPacket::kMostActions);
+  p.samples = r.list<DeviceSample>(std::size_t{ticks} * p.hands, LogPacket::kMaxTicks * kMaxHands);
+  p.actions = r.list<SceneAction>(actions, LogPacket::kMaxActions);
   const std::uint64_t behind = p.first_tick + ticks + (p.state == LogState::over ? 1 : 0);
   for (const SceneAction& a : p.actions)
     r.need(a.tick >= p.first_tick && a.tick < behind && find_row(a.kind) != nullptr);
@@ -173,7 +173,7 @@ std::optional<BlobPacket> decode_blob(std::span<const std::uint8_t> bytes) {
   p.session = r.take<std::uint64_t>();
   p.total = r.take<std::uint32_t>();
   p.offset = r.take<std::uint32_t>();
-  r.need(p.total <= BlobPacket::kMostTotal && p.offset <= p.total && r.rest().size() <= BlobPacket::kMost &&
+  r.need(p.total <= BlobPacket::kMaxTotal && p.offset <= p.total && r.rest().size() <= BlobPacket::kMax &&
          r.rest().size() <= p.total - p.offset);
   if (!r.good()) return std::nullopt;
   p.bytes.assign(r.rest().begin(), r.rest().end());

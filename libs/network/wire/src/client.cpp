@@ -18,7 +18,7 @@ namespace osteo::inline network {
 namespace {
 
 constexpr int kSliceMs = 10;
-constexpr std::size_t kSliceBytes = WireClient::kMostBytes / (1000 / kSliceMs);
+constexpr std::size_t kSliceBytes = WireClient::kMaxBytes / (1000 / kSliceMs);
 
 }  // namespace
 
@@ -49,7 +49,7 @@ void WireClient::say(const std::string& words) {
 
 void WireClient::send(std::span<const std::uint8_t> message) {
   const std::lock_guard lock(mutex_);
-  if (waiting_.size() + message.size() <= kMostWaiting) waiting_.insert(waiting_.end(), message.begin(), message.end());
+  if (waiting_.size() + message.size() <= kMaxWaiting) waiting_.insert(waiting_.end(), message.begin(), message.end());
 }
 
 void WireClient::send_waiting(int fd) {

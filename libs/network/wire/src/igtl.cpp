@@ -8,7 +8,7 @@ namespace osteo::inline network {
 namespace {
 
 constexpr std::size_t kType = 12, kDevice = 20, kToolName = 20, kStatusName = 20;
-constexpr std::uint64_t kMostPassedOver = std::uint64_t{1} << 32;  // of a message; nobody sends longer ones
+constexpr std::uint64_t kMaxPassedOver = std::uint64_t{1} << 32;  // of a message; nobody sends longer ones
 constexpr std::uint8_t kTracker6D = 2, kInt16 = 4;
 constexpr std::uint16_t kAscii = 3, kUtf8 = 106;  // IANA MIBenum
 
@@ -236,7 +236,7 @@ bool IgtlParser::header() {
   crc_ = in.number<std::uint64_t>();
   const bool words =
       !now_.type.empty() && std::all_of(now_.type.begin(), now_.type.end(), [](char c) { return c >= ' ' && c < 127; });
-  return version_ >= 1 && version_ <= 3 && words && body_bytes_ <= kMostPassedOver;
+  return version_ >= 1 && version_ <= 3 && words && body_bytes_ <= kMaxPassedOver;
 }
 
 void IgtlParser::body(const std::function<void(const IgtlMessage&)>& take) {

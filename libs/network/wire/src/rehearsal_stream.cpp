@@ -30,7 +30,7 @@ RehearsalStream::RehearsalStream(Rehearsal& rehearsal, std::span<const StreamTar
           return std::pair(now, static_cast<std::uint32_t>(rehearsal_.hands()));
         });
     feed_->let_stimulate(door_);
-    invitation_ = "to set the stimulator: osteo console " + place->address + " --code " + code;
+    invitation_ = "to set the stimulator: osteo nerve-console " + place->address + " --code " + code;
   }
   if (own_) rehearsal.add_reader(*own_);
   rehearsal.add_reader(*feed_);

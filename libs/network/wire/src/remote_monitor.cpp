@@ -5,14 +5,14 @@
 namespace osteo::inline network {
 namespace {
 
-constexpr std::size_t kMostBody = 1 << 17;  // a text is at most 64 KiB, a block of 16 channels less
+constexpr std::size_t kMaxBody = 1 << 17;  // a text is at most 64 KiB, a block of 16 channels less
 
 }  // namespace
 
 RemoteMonitor::RemoteMonitor(const WireAddress& server, Begin begin, std::string_view tidy_code)
     : begin_(std::move(begin)),
       link_(tidy_code.empty() ? nullptr : std::make_unique<StimulatorLink>(tidy_code)),
-      client_(server, kMostBody, [this](const IgtlMessage& m) { take(m); }) {}
+      client_(server, kMaxBody, [this](const IgtlMessage& m) { take(m); }) {}
 
 void RemoteMonitor::stimulate(const StimulatorSetting& setting) {
   if (!link_) return;

@@ -64,13 +64,13 @@ WireServer::~WireServer() {
 
 void WireServer::queue(Client& client, const Shared& message) {
   // What is told of drops comes behind what the client still gets of before.
-  if (client.dropped > 0 && client.queued + message->size() <= kMostQueued / 2 && notice_) {
+  if (client.dropped > 0 && client.queued + message->size() <= kMaxQueued / 2 && notice_) {
     const auto notice = std::make_shared<const WireBytes>(notice_(client.dropped));
     client.dropped = 0;
     client.queued += notice->size();
     client.queue.push_back(notice);
   }
-  if (client.dropped > 0 || client.queued + message->size() > kMostQueued) {
+  if (client.dropped > 0 || client.queued + message->size() > kMaxQueued) {
     ++client.dropped;
     ++counts_.dropped;
     return;
@@ -139,7 +139,7 @@ void WireServer::accept_one() {
   const int fd = ::accept4(listen_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (fd < 0) return;
   const std::lock_guard lock(mutex_);
-  if (clients_.size() >= kMostClients) {
+  if (clients_.size() >= kMaxClients) {
     ++counts_.turned_away;
     ::close(fd);
     return;
@@ -220,7 +220,7 @@ void WireServer::run() {
       const std::lock_guard lock(mutex_);
       for (const auto& c : clients_) {
         // Who talks too much is not listened to until the next second.
-        const bool listens = c->heard < kMostHeard || before_s - c->second_s >= 1;
+        const bool listens = c->heard < kMaxHeard || before_s - c->second_s >= 1;
         polled.push_back({c->fd, static_cast<short>((listens ? POLLIN : 0) | (c->queue.empty() ? 0 : POLLOUT)), 0});
       }
     }

@@ -78,8 +78,8 @@ void StimulatorDoor::gone(std::uint64_t client) {
 std::vector<WireBytes> StimulatorDoor::hear(std::uint64_t client, const IgtlMessage& m, double now_s) {
   if (m.type != kStimulatorType) return {};
   Client& c = clients_[client];
-  c.messages = std::min(kMostMessagesS, c.messages + std::max(0.0, now_s - c.last_s) * kMostMessagesS);
-  pairings_ = std::min(kMostPairingsS, pairings_ + std::max(0.0, now_s - last_s_) * kMostPairingsS);
+  c.messages = std::min(kMaxMessagesS, c.messages + std::max(0.0, now_s - c.last_s) * kMaxMessagesS);
+  pairings_ = std::min(kMaxPairingsS, pairings_ + std::max(0.0, now_s - last_s_) * kMaxPairingsS);
   c.last_s = last_s_ = now_s;
   std::vector<WireBytes> answers;
   if (c.messages >= 1) {

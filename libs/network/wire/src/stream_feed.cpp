@@ -100,7 +100,7 @@ std::optional<WireMonitor> monitor_in(const std::string& json) {
   const auto event_uv = number("event_uv");
   if (number("osteotome_wire") != kWireVersion || number("rate_hz") != MonitorSetup::kRateHz ||
       number("uv_per_bit") != MonitorSetup::kMicrovoltsPerBit || !event_uv || !(*event_uv > 0 && *event_uv < 1e5) ||
-      channels == nullptr || channels->items().size() > MonitorSetup::kMostChannels)
+      channels == nullptr || channels->items().size() > MonitorSetup::kMaxChannels)
     return std::nullopt;
   WireMonitor m;
   m.event_uv = *event_uv;
@@ -144,7 +144,7 @@ std::optional<MonitorEvent> event_in(const std::string& json) {
   const double sample = number("sample", 9e15);
   if (!found || sample < 0) return std::nullopt;
   e.sample = static_cast<std::uint64_t>(sample);
-  e.channel = static_cast<int>(number("channel", MonitorSetup::kMostChannels - 1));
+  e.channel = static_cast<int>(number("channel", MonitorSetup::kMaxChannels - 1));
   e.seconds = std::max(0.0, number("seconds", 1e6));
   e.uv = std::max(0.0, number("uv", 1e6));
   e.ms = std::max(0.0, number("ms", 1e6));

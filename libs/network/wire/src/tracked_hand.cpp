@@ -9,7 +9,7 @@
 namespace osteo::inline network {
 namespace {
 
-constexpr std::size_t kMostBody = 4096;  // of what is understood; longer messages (pictures) are passed over
+constexpr std::size_t kMaxBody = 4096;  // of what is understood; longer messages (pictures) are passed over
 
 }  // namespace
 
@@ -29,7 +29,7 @@ TrackerAddress tracker_address(const std::string& text) {
 TrackedLink::TrackedLink(const TrackerAddress& tracker)
     : tracker_(tracker),
       follows_(tracker.tool),
-      client_(tracker.server, kMostBody, [this](const IgtlMessage& m) { take(m); }) {}
+      client_(tracker.server, kMaxBody, [this](const IgtlMessage& m) { take(m); }) {}
 
 void TrackedLink::take(const IgtlMessage& m) {
   if (m.type == "TRANSFORM") {

@@ -26,7 +26,7 @@ struct Entry {
     visit({"name", "name that scripts and the window use", "", 0, 0, true}, p.name);
     visit({"about", "what it is for"}, p.about);
     SawFields::describe(p.saw, visit, true);
-    visit({"within_mm", "as a cutting guide: a saw this near slips in", "mm", 0.1, SceneAction::kMostSlotMm},
+    visit({"within_mm", "as a cutting guide: a saw this near slips in", "mm", 0.1, SceneAction::kMaxSlotMm},
           p.within_mm);
   }
 };

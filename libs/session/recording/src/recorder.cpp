@@ -160,7 +160,7 @@ void Recorder::end_frame() {
 
 void Recorder::note(Note note) {
   const std::lock_guard lock(notes_mutex_);
-  if (notes_.size() >= kMostNotes || note.json.size() > kLongestNote || stopped_notes_) {
+  if (notes_.size() >= kMaxNotes || note.json.size() > kLongestNote || stopped_notes_) {
     ++notes_lost_;
   } else {
     notes_.push_back(std::move(note));

@@ -115,9 +115,9 @@ class ScriptReader {
     const JsonValue* const hands = root.find("hands");
     if (hands == nullptr) return;
     if (hands->kind != JsonValue::Kind::list) throw file_.wrong(*hands, "\"hands\" must be a list");
-    if (hands->items.size() >= kMostHands)
+    if (hands->items.size() >= kMaxHands)
       throw file_.wrong(*hands, "there are " + std::to_string(hands->items.size()) + " hands besides the first",
-                        "at most " + std::to_string(kMostHands - 1));
+                        "at most " + std::to_string(kMaxHands - 1));
     int number = 0;
     for (const JsonValue& h : hands->items) {
       const std::string where = "hand " + std::to_string(++number);
@@ -385,7 +385,7 @@ std::string script_schema() {
   ordered_json hand = object_schema<HandPart>();
   hand["properties"]["waypoints"] = s["properties"]["waypoints"];
   hand["required"].push_back("waypoints");
-  s["properties"]["hands"] = {{"type", "array"}, {"maxItems", kMostHands - 1}, {"items", hand}};
+  s["properties"]["hands"] = {{"type", "array"}, {"maxItems", kMaxHands - 1}, {"items", hand}};
   ordered_json any = ordered_json::array();
   const auto add = [&]<class F>(const F&) {
     ordered_json entry = object_schema<When>();

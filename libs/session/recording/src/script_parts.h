@@ -12,7 +12,7 @@ namespace osteo::inline session::script {
 
 // Of what a script may hold each part is declared once: name, help, unit, range. Reading and the schema both go by
 // that.
-inline constexpr double kLongestS = 21600, kMostPieces = 1e6;
+inline constexpr double kLongestS = 21600, kMaxPieces = 1e6;
 
 struct Head {
   int version = 1;
@@ -97,7 +97,7 @@ struct Saw {
   static void describe(Saw& p, auto& visit) {
     visit({"planned", "a planned cut of the case by its name, in place of what follows but the piece"}, p.planned);
     SawFields::describe(p.blade, visit, false);
-    visit({"piece", "only this one; -1: all", "", -1, kMostPieces}, p.piece);
+    visit({"piece", "only this one; -1: all", "", -1, kMaxPieces}, p.piece);
   }
 };
 
@@ -112,9 +112,9 @@ struct GuidePart {
     visit({"planned", "a planned cut of the case by its name, in place of what follows but the hand"}, p.planned);
     visit({"at_mm", "a point of the plane, LPS", "mm", -kFarMm, kFarMm}, p.at_mm);
     visit({"normal", "across the plane", "", -kFarMm, kFarMm}, p.normal);
-    visit({"within_mm", "a saw this near slips in; 0: the guide is taken away", "mm", 0, SceneAction::kMostSlotMm},
+    visit({"within_mm", "a saw this near slips in; 0: the guide is taken away", "mm", 0, SceneAction::kMaxSlotMm},
           p.within_mm);
-    visit({"hand", "whose saw", "", 0, kMostHands - 1}, p.hand);
+    visit({"hand", "whose saw", "", 0, kMaxHands - 1}, p.hand);
   }
 };
 
@@ -133,7 +133,7 @@ struct Move {
   Triple shift_mm{}, axis{0, 0, 1}, about_mm{};
   double turn_deg = 0, over_s = 0;
   static void describe(Move& p, auto& visit) {
-    visit({"piece", "which", "", 0, kMostPieces, true}, p.piece);
+    visit({"piece", "which", "", 0, kMaxPieces, true}, p.piece);
     visit({"shift_mm", "where to, after the turn; left out: as far as it was shifted before", "mm", -kFarMm, kFarMm},
           p.shift_mm);
     visit({"turn_deg", "about axis through about_mm; left out: as far as it was turned before", "deg", -360, 360},
@@ -166,7 +166,7 @@ struct Attach {
     visit({"at_mm", "middle of its underside, LPS", "mm", -kFarMm, kFarMm, true}, p.at_mm);
     visit({"x", "along the plate", "", -kFarMm, kFarMm}, p.x);
     visit({"z", "away from the bone", "", -kFarMm, kFarMm}, p.z);
-    visit({"pieces", "one or two; the plate stays with the first", "", 0, kMostPieces, true}, p.pieces);
+    visit({"pieces", "one or two; the plate stays with the first", "", 0, kMaxPieces, true}, p.pieces);
   }
 };
 
@@ -174,7 +174,7 @@ struct Detach {
   static constexpr const char *kName = "detach", *kHelp = "take a plate off";
   int number = 1;
   static void describe(Detach& p, auto& visit) {
-    visit({"number", "number of the plate in the order of fixing, from 1", "", 1, kMostPieces, true}, p.number);
+    visit({"number", "number of the plate in the order of fixing, from 1", "", 1, kMaxPieces, true}, p.number);
   }
 };
 
@@ -183,7 +183,7 @@ struct Open {
   int number = 1;
   double opening_mm = 0, over_s = 0;
   static void describe(Open& p, auto& visit) {
-    visit({"number", "number of the plate in the order of fixing, from 1", "", 1, kMostPieces, true}, p.number);
+    visit({"number", "number of the plate in the order of fixing, from 1", "", 1, kMaxPieces, true}, p.number);
     visit({"opening_mm", "opening of the gap at the end", "mm", 0, 100, true}, p.opening_mm);
     visit({"over_s", "how long it takes", "s", 0, 3600}, p.over_s);
   }
@@ -195,7 +195,7 @@ struct Suction {
   double radius_mm = 4, mm3_per_s = 60, over_s = 0;
   static void describe(Suction& p, auto& visit) {
     visit({"at_mm", "where it comes to, LPS", "mm", -kFarMm, kFarMm}, p.at_mm);
-    visit({"radius_mm", "how far it reaches", "mm", 0.1, SceneAction::kMostReachMm}, p.radius_mm);
+    visit({"radius_mm", "how far it reaches", "mm", 0.1, SceneAction::kMaxReachMm}, p.radius_mm);
     visit({"mm3_per_s", "what it takes; 0: away", "mm3/s", 0, 1e5}, p.mm3_per_s);
     visit({"over_s", "how long it is on the way", "s", 0, 3600}, p.over_s);
   }
@@ -207,7 +207,7 @@ struct Irrigate {
   double radius_mm = 15, mm3_per_s = 400;
   static void describe(Irrigate& p, auto& visit) {
     visit({"at_mm", "where, LPS", "mm", -kFarMm, kFarMm}, p.at_mm);
-    visit({"radius_mm", "how far it falls at most before it spreads", "mm", 0.1, SceneAction::kMostReachMm},
+    visit({"radius_mm", "how far it falls at most before it spreads", "mm", 0.1, SceneAction::kMaxReachMm},
           p.radius_mm);
     visit({"mm3_per_s", "water per second (0: none)", "mm3/s", 0, 1e5}, p.mm3_per_s);
   }

@@ -67,9 +67,9 @@ HapticSetup setup_of(const ordered_json& j, const NamedNumbers& tools, std::vect
   HapticSetup h;
   const auto fields = fields_of<HapticsParams>(h.params);
   for (const auto& [key, value] : j.at("params").items()) {
-    const auto field = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == key; });
+    const FieldRef* const field = find_field(fields, key);
     try {
-      if (field == fields.end())
+      if (field == nullptr)
         unknown.push_back(key);
       else
         field->from_text(value.get<std::string>());
@@ -320,7 +320,7 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   h.haptics = setup_of(j.at("haptics"), numbers.tools, unknown);
   if (j.at("hands") != h.haptics.hands())
     throw Error(ExitCode::corrupt, name + " does not tell of a device for each hand");
-  if (h.haptics.hands() > kMostHands) say_not_replayable(o, "it has " + std::to_string(h.haptics.hands()) + " hands");
+  if (h.haptics.hands() > kMaxHands) say_not_replayable(o, "it has " + std::to_string(h.haptics.hands()) + " hands");
   if (h.kernels.contact == kForgetfulGuard) h.haptics.params.guard.law = 1;
   for (const auto& [setting, value] : j.at("haptics").at("params").items()) o.setting_names.push_back(setting);
   for (const std::string& u : unknown) {

@@ -20,7 +20,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::size_t kMostChanges = 1U << 20;  // in a frame
+constexpr std::size_t kMaxChanges = 1U << 20;  // in a frame
 // Whose coalescing is worth its time.
 constexpr std::size_t kManyChanges = 1U << 21;
 
@@ -141,8 +141,8 @@ void SessionWriter::records(std::uint32_t type, std::uint64_t first_tick, std::u
   }
   // More than fit go into frames behind it.
   for (std::span<const VoxelChange> left = segment.changes;; first_tick = end_tick) {
-    put_part(raw_, change_table(), left.first(std::min(kMostChanges, left.size())));
-    left = left.subspan(std::min(kMostChanges, left.size()));
+    put_part(raw_, change_table(), left.first(std::min(kMaxChanges, left.size())));
+    left = left.subspan(std::min(kMaxChanges, left.size()));
     frame(type, first_tick, end_tick, compressed(raw_));
     if (left.empty()) return;
     raw_.clear();

@@ -260,7 +260,7 @@ bool FreeWays::leaves(const HandPose& from, Vec3 direction, double near_margin, 
 // Where no straight way leads out: on a lattice, places farther out first.
 std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double near_margin, double far_margin,
                                                     double step_mm) const {
-  constexpr int kMostLooks = 40000;
+  constexpr int kMaxLooks = 40000;
   constexpr double kBeginningMm = 3;
   // At the beginning the tool may touch, but never more than it does.
   const std::size_t touched = touching(from, near_margin, tool_.points.size());
@@ -282,7 +282,7 @@ std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double
   seen.emplace(name(0, 0, 0), -1);
   open.emplace(0, name(0, 0, 0));
   int looks = 0;
-  while (!open.empty() && looks < kMostLooks) {
+  while (!open.empty() && looks < kMaxLooks) {
     const std::int64_t here = open.top().second;
     open.pop();
     const Vec3 at = place(here);
@@ -396,7 +396,7 @@ std::optional<HandWay> FreeWays::finished(const HandPose& from, const Poses& pos
       end = std::max(end, i + 1);
       // Slow stretches side by side are one.
       if (near_bone && last_end > 0 && way.points[way.count - 1].near_bone) --way.count;
-      if (way.count >= HandWay::kMost) return std::nullopt;
+      if (way.count >= HandWay::kMax) return std::nullopt;
       const HandPose p = on_leg(a, b, static_cast<double>(end) / n);
       way.points[way.count++] = {p.at_mm, to_floats(p.axis), near_bone};
       last_end = i = end;
@@ -472,7 +472,7 @@ FreeWays::Found FreeWays::found_approach(const HandPose& from, Vec3 seen_mm, Vec
       }
       // Shut in: put above the place, and down from there.
       HandWay way = put_at(top);
-      if (const auto last = finished(top, rest); last && last->count < HandWay::kMost) {
+      if (const auto last = finished(top, rest); last && last->count < HandWay::kMax) {
         std::copy_n(last->points.begin(), last->count, way.points.begin() + 1);
         way.count += last->count;
         return {way, end};

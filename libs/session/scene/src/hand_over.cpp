@@ -199,11 +199,11 @@ class Taker {
       throw Error(ExitCode::corrupt, "'ct.nrrd' beside the segments holds other voxels than the scan of the case",
                   "take it back into the case that was handed over");
     }
-    if (!options_.by_place || bone_ == nullptr) {
-      throw Error(
-          ExitCode::corrupt,
-          "nothing tells of which scan these segments are: they bear no mark, and no ct.nrrd lies beside them",
-          "put the ct.nrrd of 'osteo hand-over' beside them, or give --by-place, which goes by where the bone lies");
+    if (!options_.match_by_position || bone_ == nullptr) {
+      throw Error(ExitCode::corrupt,
+                  "nothing tells of which scan these segments are: they bear no mark, and no ct.nrrd lies beside them",
+                  "put the ct.nrrd of 'osteo export-slicer' beside them, or give --match-by-position, which goes by "
+                  "where the bone lies");
     }
   }
 

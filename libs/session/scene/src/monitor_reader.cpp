@@ -56,8 +56,8 @@ MonitorReader::MonitorReader(const MonitorOptions& options, const StructureMap* 
       model_(options.setup.constants, wiring_.courses, options.setup.seed),
       signal_(options.setup.constants, wiring_.channels, options.setup.seed),
       detector_(options.setup.constants, wiring_.channels.size()) {
-  if (wiring_.channels.size() > MonitorSetup::kMostChannels)
-    throw Error(ExitCode::usage, "a monitor has at most " + std::to_string(MonitorSetup::kMostChannels) + " channels");
+  if (wiring_.channels.size() > MonitorSetup::kMaxChannels)
+    throw Error(ExitCode::usage, "a monitor has at most " + std::to_string(MonitorSetup::kMaxChannels) + " channels");
   for (const NerveCourse& c : wiring_.courses) doses_.emplace_back(c.points.size());
 }
 
@@ -128,7 +128,7 @@ void MonitorReader::tick(const TickRecord& record, std::span<const VoxelChange> 
     }
     world_->tell(changes);
   }
-  if (record.hand >= kMostHands) return;
+  if (record.hand >= kMaxHands) return;
   Hand& hand = hands_[record.hand];
   hand.seen = (record.flags & (kPlateInHand | kPoseInvalid)) == 0;
   const bool cutter = instrument_of(record.device.tool).cutter() != nullptr;
@@ -243,7 +243,7 @@ void MonitorReader::tell(MonitorEvent event) {
 
 void MonitorReader::pulse(std::uint64_t first, std::size_t samples) {
   const StimulatorSetting& s = stimulator_.setting();
-  if (s.hand >= kMostHands) return;
+  if (s.hand >= kMaxHands) return;
   Hand& hand = hands_[s.hand];
   bool touches = hand.touches;
   for (const Nearest& n : nearest_[s.hand]) touches = touches || n.clearance_mm <= kTouchesMm;
@@ -272,7 +272,7 @@ void MonitorReader::step(std::uint64_t until_tick) {
   take_settings();
   stresses_.clear();
   DrillNoise drill;
-  for (std::size_t h = 0; h < kMostHands; ++h) {
+  for (std::size_t h = 0; h < kMaxHands; ++h) {
     Hand& hand = hands_[h];
     nearest_[h].clear();
     if (!hand.seen) continue;
@@ -322,7 +322,7 @@ void MonitorReader::step(std::uint64_t until_tick) {
       MonitorEvent e;
       e.kind = found->threshold_ma ? MonitorEventKind::threshold : MonitorEventKind::no_threshold;
       e.sample = end;
-      e.ma = found->threshold_ma.value_or(StimulatorSetting::kMostMa);
+      e.ma = found->threshold_ma.value_or(StimulatorSetting::kMaxMa);
       tell(e);
     }
   }
@@ -359,7 +359,7 @@ std::vector<std::pair<std::uint64_t, StimulatorSetting>> stimulator_notes(const 
                  rate = number("pulses_per_s"), width = number("width_ms");
       const Json* const search = j ? j->find("search") : nullptr;
       if (!tick || !hand || !ma || !rate || !width || search == nullptr || !(*tick >= 0 && *tick < 1e15) ||
-          !(*hand >= 0 && *hand < kMostHands)) {
+          !(*hand >= 0 && *hand < kMaxHands)) {
         ++unreadable;
         continue;
       }

@@ -12,10 +12,10 @@ namespace {
 
 constexpr auto kBegins =
     static_cast<std::size_t>(0.01 * MonitorSetup::kRateHz);  // waits before it is played: blocks come every 5 ms
-constexpr auto kMost = static_cast<std::size_t>(MonitorSound::kMostWaitingS * MonitorSetup::kRateHz);
+constexpr auto kMax = static_cast<std::size_t>(MonitorSound::kMaxWaitingS * MonitorSetup::kRateHz);
 
 constexpr std::size_t kRing = 8192;  // a power of two: then a ring has exactly that room
-static_assert(kRing >= 4 * kMost);
+static_assert(kRing >= 4 * kMax);
 
 }  // namespace
 
@@ -74,7 +74,7 @@ void MonitorSound::mix(std::span<float> out) noexcept {
   };
   const auto waits = [&] { return kRing - waiting_.room(); };
   // What came while nobody asked is old.
-  while (waits() > kMost) {
+  while (waits() > kMax) {
     taken_at_ = 0;
     taken_size_ = waiting_.pop(taken_);
     if (taken_size_ == 0) break;

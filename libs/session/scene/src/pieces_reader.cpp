@@ -81,7 +81,7 @@ std::vector<LiveComponents::Component> PiecesReader::large_pieces() const {
     if (f.of_region) continue;
     const double voxel_mm3 = f.body->bone.frame().voxel_volume_mm3();
     for (LiveComponents::Component c : f.components->components()) {
-      if (c.mass * voxel_mm3 < kLeastPieceMm3) continue;
+      if (c.mass * voxel_mm3 < kMinPieceMm3) continue;
       c.centre_mm = f.world_from_body(c.centre_mm);
       large.push_back(c);
     }

@@ -33,7 +33,7 @@ void ReaderHub::tell(const SceneAction& action) {
 
 std::size_t ReaderHub::drain(std::optional<double> about_ms) {
   // So few that one of them may take its time.
-  const std::size_t at_once = about_ms ? 16 * kMostHands : ticks_.size();
+  const std::size_t at_once = about_ms ? 16 * kMaxHands : ticks_.size();
   const auto begin = std::chrono::steady_clock::now();
   std::size_t total = 0;
   bool lost = false;

@@ -21,9 +21,9 @@ class RecordedHand final : public Device {
 void check_same_case(const SessionReader& session, const World& start, const Anatomy& anatomy) {
   const SessionHeader& header = session.header();
   if (const std::string& why = session.outline().not_replayable; !why.empty())
-    throw Error(
-        ExitCode::corrupt, "the session cannot be repeated by this version: " + why,
-        "replay it with " + header.program_version + "; 'osteo export', 'osteo plan' and --resume use it all the same");
+    throw Error(ExitCode::corrupt, "the session cannot be repeated by this version: " + why,
+                "replay it with " + header.program_version +
+                    "; 'osteo export', 'osteo export-result' and --resume use it all the same");
   if (start.hash() != header.bone_hash) {
     throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's",
                 "give the case it was recorded on, unchanged");
@@ -170,7 +170,7 @@ class Replaying {
       act();
     for (std::size_t h = 0; h < recorded.size(); ++h) hands_[h].sample = recorded[h].device;
     operation_.step(0);
-    std::array<TickRecord, kMostHands> now;
+    std::array<TickRecord, kMaxHands> now;
     reader_.ticks.pop({now.data(), recorded.size()});
     while (reader_.changes.pop(changes_) > 0) {
     }

@@ -14,10 +14,10 @@
 namespace osteo::inline session {
 namespace {
 
-constexpr int kMostSteps = 200;         // of an update: beside SoftBody::kMostWork
+constexpr int kMaxSteps = 200;          // of an update: beside SoftBody::kMaxWork
 constexpr double kToolStiffness = 0.1;  // N/mm of each place that the tool meets
 constexpr double kBoneStiffness = 0.3;  // and of each point that meets bone
-constexpr double kLeastPushN = 1e-4;
+constexpr double kMinPushN = 1e-4;
 constexpr double kFeltStiffness =
     0.05;  // N/mm for each place that the tool meets: in series with what gives way behind it
 constexpr double kDampingPerS = 150;  // tissue does not ring
@@ -73,13 +73,13 @@ struct SoftBody::Impl {
       drawn = boundary_of(mesh, &point_of);
     }
     wanted_steps = 1 / kUpdatesPerS / dynamics.step_s();
-    steps = steps_within(kMostWork);
+    steps = steps_within(kMaxWork);
     still_at = dynamics.positions_mm();
     box_in(still_at);
   }
 
   [[nodiscard]] int steps_within(double work) const {
-    const double most = std::min<double>(kMostSteps, work / static_cast<double>(model.tets().size()));
+    const double most = std::min<double>(kMaxSteps, work / static_cast<double>(model.tets().size()));
     return static_cast<int>(std::max(1.0, std::round(std::min(wanted_steps, most))));
   }
   void box_in(std::span<const Vec3> points) {
@@ -178,7 +178,7 @@ std::vector<SoftPush> SoftBody::update(std::span<const SoftTool> tools, double m
   ++m.updates;
   for (std::size_t n = 0; n < tools.size(); ++n) {
     const Vec3 force = m.dynamics.force_on_tool_n(n);
-    if (!(length(force) > kLeastPushN)) continue;
+    if (!(length(force) > kMinPushN)) continue;
     pushes[n] = {force, kFeltStiffness * std::max(1, m.dynamics.met_by_tool(n))};
   }
   bool cut = false;
@@ -233,7 +233,7 @@ bool SoftBody::asleep() const {
   return impl_->asleep;
 }
 double SoftBody::work() const {
-  return std::min<double>(impl_->wanted_steps, kMostSteps) * static_cast<double>(impl_->model.tets().size());
+  return std::min<double>(impl_->wanted_steps, kMaxSteps) * static_cast<double>(impl_->model.tets().size());
 }
 std::vector<Vec3> SoftBody::points_mm() const {
   return impl_->dynamics.positions_mm();

@@ -68,7 +68,7 @@ std::vector<SceneAction> SoftTissue::update(std::span<const SoftTool> tools) {
   std::stable_sort(awake.begin(), awake.end(),
                    [&](std::size_t a, std::size_t b) { return bodies_[a]->work() < bodies_[b]->work(); });
   std::vector<std::vector<SoftPush>> pushes(bodies_.size(), std::vector<SoftPush>(tools.size()));
-  double left = SoftBody::kMostWork;
+  double left = SoftBody::kMaxWork;
   for (std::size_t n = 0; n < awake.size(); ++n) {
     const double share = left / static_cast<double>(awake.size() - n);
     pushes[awake[n]] = bodies_[awake[n]]->update(tools, share);

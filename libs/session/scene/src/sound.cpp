@@ -13,7 +13,7 @@
 namespace osteo::inline session {
 namespace {
 
-static_assert(kMostHands == SoundState::kMostVoices);
+static_assert(kMaxHands == SoundState::kMaxVoices);
 
 // How long water takes to fill a cavity, to be sucked off, and to run off by itself: designed for the ear.
 constexpr double kFillS = 1, kSuckS = 1.5, kRunOffS = 20;
@@ -60,8 +60,8 @@ bool SoundTracker::instruments_touch(std::uint64_t tick) noexcept {
                            from_floats(t.device.position_mm) + from_floats(t.shown_offset_mm),
                            normalized(from_floats(t.device.axis))};
   };
-  for (std::size_t a = 0; a < kMostHands; ++a) {
-    for (std::size_t b = a + 1; b < kMostHands; ++b) {
+  for (std::size_t a = 0; a < kMaxHands; ++a) {
+    for (std::size_t b = a + 1; b < kMaxHands; ++b) {
       if (has_[a] && has_[b] && gap_between(place(a), place(b)).gap_mm < 0) touching_ = true;
     }
   }
@@ -69,7 +69,7 @@ bool SoundTracker::instruments_touch(std::uint64_t tick) noexcept {
 }
 
 void SoundTracker::take(const TickRecord& record) noexcept {
-  if (record.hand >= kMostHands) return;
+  if (record.hand >= kMaxHands) return;
   const Instrument& instrument = instrument_of(record.device.tool);
   SoundVoice& voice = state_.voices[record.hand];
   double& thickness = thickness_mm_[record.hand];
@@ -102,8 +102,8 @@ void SoundTracker::take(const TickRecord& record) noexcept {
   }
   if (record.hand == 0) {
     // A sucker and water without a hand stand beside the burr: heard in the last voices, where no hand is.
-    SoundVoice& beside = state_.voices[kMostHands - 1];
-    SoundVoice& water = state_.voices[kMostHands - 2];
+    SoundVoice& beside = state_.voices[kMaxHands - 1];
+    SoundVoice& water = state_.voices[kMaxHands - 2];
     if (beside.kind == SoundKind::silent || beside.kind == SoundKind::sucker) beside = {};
     if (standing_suction_) beside = {SoundKind::sucker, 0, 8.0 / 3, 0, 0, 0, 1};
     if (water.kind == SoundKind::irrigator) water = {};

@@ -103,7 +103,7 @@ void Dust::step_water(Brick& brick, Hood& hood, Ijk down) {
       // Dust that it meets, until it is as thick as it pours.
       bool moved = false;
       if (std::uint32_t& lying = brick.units[at]; lying > 0) {
-        static_assert(kMostSolid == 0.3);
+        static_assert(kMaxSolid == 0.3);
         const std::int64_t takes = (3 * std::int64_t{l} - 10 * std::int64_t{w.solid[at]}) / 7;
         const auto taken = static_cast<std::uint32_t>(std::clamp<std::int64_t>(takes, 0, lying));
         lying -= taken;

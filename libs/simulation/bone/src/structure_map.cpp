@@ -29,8 +29,8 @@ BrickGrid face_field(const Labels& crop, const Context& context) {
   const Vec3 h = f.spacing_mm;
   const auto [nx, ny, nz] = f.dims;
   const float unit = static_cast<float>(std::min({h.x, h.y, h.z}));
-  constexpr float kLeast = 0.2F, kDeep = 4;  // so near a voxel's centre may the face come
-  constexpr int kSmooth = 2;                 // voxels to each side that the smoothing looks at
+  constexpr float kMin = 0.2F, kDeep = 4;  // so near a voxel's centre may the face come
+  constexpr int kSmooth = 2;               // voxels to each side that the smoothing looks at
   constexpr std::array<float, 5> kOnce{0, 0.25F, 0.5F, 0.25F, 0}, kTwice{1 / 16.0F, 0.25F, 0.375F, 0.25F, 1 / 16.0F};
   // From a voxel of the smoothing to the one beside the face, and a step on across it.
   const double within_mm = 1.001 * std::max({length({3 * h.x, 2 * h.y, 2 * h.z}), length({2 * h.x, 3 * h.y, 2 * h.z}),
@@ -98,7 +98,7 @@ BrickGrid face_field(const Labels& crop, const Context& context) {
             }
           }
           const float smooth = 2 * s1 - s2;
-          out.beside.emplace_back(v, inside ? std::max(smooth, kLeast) : std::min(smooth, -kLeast));
+          out.beside.emplace_back(v, inside ? std::max(smooth, kMin) : std::min(smooth, -kMin));
         }
       }
     }

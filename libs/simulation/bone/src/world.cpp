@@ -36,26 +36,26 @@ std::string senseless(const SceneAction& a) {
   for (const double x : v) {
     if (!std::isfinite(x)) return "a number of the action is not finite";
   }
-  if (a.hand >= kMostHands) return "there is no hand " + std::to_string(a.hand);
+  if (a.hand >= kMaxHands) return "there is no hand " + std::to_string(a.hand);
   switch (static_cast<ActionKind>(a.kind)) {
     case ActionKind::guide:
-      if (!(v[0] >= 0 && v[0] < kMostHands && v[0] == std::floor(v[0])) || a.item >= kMostHands ||
+      if (!(v[0] >= 0 && v[0] < kMaxHands && v[0] == std::floor(v[0])) || a.item >= kMaxHands ||
           static_cast<double>(a.item) == v[0])
-        return "one hand is led by another, both below " + std::to_string(kMostHands);
+        return "one hand is led by another, both below " + std::to_string(kMaxHands);
       if (!(v[1] >= -10 && v[1] <= 10 && v[2] >= 0 && v[2] <= 100 && std::abs(v[3]) <= 2 && v[4] >= 0 && v[4] <= 20 &&
             v[5] >= 0 && (v[6] == 0 || v[6] == 1) && v[7] >= 0 && v[7] <= 100))
         return "a guide pulls with -10 to 10 N/mm, 0 to 100 N s/m, up to 20 N and twice the leader's force";
       break;
     case ActionKind::cutting_guide:
-      if (!(v[6] >= 0 && v[6] <= SceneAction::kMostSlotMm))
-        return "a saw slips into a cutting guide from 0 to " + format_number(SceneAction::kMostSlotMm) + " mm away";
+      if (!(v[6] >= 0 && v[6] <= SceneAction::kMaxSlotMm))
+        return "a saw slips into a cutting guide from 0 to " + format_number(SceneAction::kMaxSlotMm) + " mm away";
       if (v[6] > 0 && !(length(Vec3{v[3], v[4], v[5]}) > 1e-9))
         return "the plane of a cutting guide has no direction across it";
       break;
     case ActionKind::suction:
     case ActionKind::irrigate:
-      if (v[4] > 0 && !(v[3] > 0 && v[3] <= SceneAction::kMostReachMm))
-        return "it reaches " + format_number(v[3]) + " mm, but at most " + format_number(SceneAction::kMostReachMm) +
+      if (v[4] > 0 && !(v[3] > 0 && v[3] <= SceneAction::kMaxReachMm))
+        return "it reaches " + format_number(v[3]) + " mm, but at most " + format_number(SceneAction::kMaxReachMm) +
                " mm make sense";
       break;
     case ActionKind::posture:
@@ -190,7 +190,7 @@ void World::end_stroke() {
   done_.insert(done_.begin() + static_cast<std::ptrdiff_t>(told_), std::move(stroke));
   ++told_;
   // With what came before it: undo leaves nothing out on its way back.
-  while (stroke_bytes_ > kMostStrokeBytes) {
+  while (stroke_bytes_ > kMaxStrokeBytes) {
     const auto oldest =
         std::find_if(done_.begin(), done_.end(), [](const Done& d) { return d.kind == ActionKind::stroke; });
     const auto steps = oldest + 1 - done_.begin();

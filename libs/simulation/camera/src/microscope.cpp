@@ -66,7 +66,7 @@ std::optional<std::array<double, 2>> ScopeView::pixel(Vec3 place_mm, const Pictu
 }
 
 void magnify(ScopeView& view, double magnification) {
-  view.magnification = std::clamp(magnification, kLeastMagnification, kMostMagnification);
+  view.magnification = std::clamp(magnification, kMinMagnification, kMaxMagnification);
 }
 
 void step_magnification(ScopeView& view, int direction) {
@@ -131,7 +131,7 @@ void focus_on_depth_of(ScopeView& view, Vec3 place_mm) {
 }
 
 void set_working_distance(ScopeView& view, double working_distance_mm) {
-  view.working_distance_mm = std::clamp(working_distance_mm, kLeastWorkingMm, kMostWorkingMm);
+  view.working_distance_mm = std::clamp(working_distance_mm, kMinWorkingMm, kMaxWorkingMm);
 }
 
 void move(ScopeView& view, const ScopeMotion& motion) {

@@ -6,7 +6,7 @@
 namespace osteo::inline simulation {
 namespace {
 
-constexpr std::size_t kMostUndo = 64;
+constexpr std::size_t kMaxUndo = 64;
 
 Vec3 limited(Vec3 v, double most) {
   const double n = length(v);
@@ -49,7 +49,7 @@ ScopeMotion ScopeArm::advance(const std::optional<ScopeRates>& drive, double sec
 
 void ScopeControl::keep() {
   undo_.push_back(view_);
-  if (undo_.size() > kMostUndo) undo_.pop_front();
+  if (undo_.size() > kMaxUndo) undo_.pop_front();
 }
 
 // A hand that takes hold ends a flight where it is.

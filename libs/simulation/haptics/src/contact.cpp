@@ -15,8 +15,7 @@ std::size_t most_hits(double spacing_mm) {
     const double r = head.largest_radius_mm() + spacing_mm;
     most = std::max(most, RoundCone{0, head.length_mm, r, r}.volume_mm3());
   }
-  return static_cast<std::size_t>(std::min(most / (spacing_mm * spacing_mm * spacing_mm), 4.0 * kMostCutPerTick)) +
-         1024;
+  return static_cast<std::size_t>(std::min(most / (spacing_mm * spacing_mm * spacing_mm), 4.0 * kMaxCutPerTick)) + 1024;
 }
 
 std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm,
@@ -36,11 +35,11 @@ std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, do
 std::string too_small_for_voxels(const Burr& burr, double spacing_mm) {
   const RoundCone head = burr.head();
   const double voxels = std::min(head.start_radius_mm, head.end_radius_mm) / spacing_mm;
-  if (voxels >= kLeastRadiusVoxels) return {};
+  if (voxels >= kMinRadiusVoxels) return {};
   return "the " + burr.name() + (burr.length_mm > 0 ? " is small for" : " burr is small for") + " voxels of " +
          format_number(std::round(spacing_mm * 1000) / 1000) + " mm (radius " +
          format_number(std::round(voxels * 10) / 10) + " voxels): force and its direction are coarse; from " +
-         format_number(std::floor(spacing_mm * voxels / kLeastRadiusVoxels * 100 + 1e-6) / 100) +
+         format_number(std::floor(spacing_mm * voxels / kMinRadiusVoxels * 100 + 1e-6) / 100) +
          " mm they are true: prepare with a smaller --spacing, or a finer region of interest where it drills";
 }
 

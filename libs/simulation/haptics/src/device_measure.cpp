@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kStillS = 0.03, kSeenS = 0.02, kLatestS = 0.012,
                  kFirstWordS = 0.3;  // before a pulse; fitted after it; and when it begins
-constexpr double kLeastN = 0.5, kMostN = 4, kAgreeS = 1.5e-4;
+constexpr double kMinN = 0.5, kMaxN = 4, kAgreeS = 1.5e-4;
 constexpr int kPulses = 12, kTries = 16;
 
 /// Free motion of a mass with damping, before and after a pulse at t0: c + m e^(-t / tau) + p (1 - e^(-(t - t0) / tau))
@@ -175,8 +175,8 @@ MeasuredDevice measure_device(Device& device, double dt_s, const std::function<v
   MeasuredDevice m;
   const DeviceTraits by_driver = m.traits = device.traits();
   Measurement loop(device, dt_s, tick);
-  const double most_n = std::min(kMostN, 0.5 * by_driver.max_force_n);
-  double force_n = std::min(kLeastN, most_n);
+  const double most_n = std::min(kMaxN, 0.5 * by_driver.max_force_n);
+  double force_n = std::min(kMinN, most_n);
   std::vector<Pulse> seen;
   loop.meet();
   for (int i = 0; i < kTries && seen.size() < kPulses && !loop.silent(); ++i) {

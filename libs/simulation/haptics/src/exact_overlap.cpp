@@ -40,7 +40,7 @@ std::vector<std::uint32_t> strides_for(double spacing_mm) {
   std::vector<std::uint32_t> strides;
   for (const Instrument& i : instrument_library()) {
     const double voxels = i.head.volume_mm3() / (spacing_mm * spacing_mm * spacing_mm);
-    strides.push_back(static_cast<std::uint32_t>(std::max(1.0, std::ceil(voxels / kMostCutPerTick))));
+    strides.push_back(static_cast<std::uint32_t>(std::max(1.0, std::ceil(voxels / kMaxCutPerTick))));
   }
   return strides;
 }

@@ -20,7 +20,7 @@ constexpr double kSpareMm = 0.0015;
 // leaves between two places is an eighth of the square of their distance over its radius. But every fourth tick at
 // least.
 constexpr double kTurnMm = 0.1;
-constexpr std::uint32_t kMostTurns = 4;
+constexpr std::uint32_t kMaxTurns = 4;
 // Cosine between two normals up to which they are of the same side of a voxel.
 constexpr float kAlike = 0.5F;
 
@@ -155,7 +155,7 @@ void Grains::place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, 
   const double moved_mm = length(start - last.start) * h + length(axis - last.axis) * head.length_mm;
   last.start = start_ = start;
   last.axis = axis;
-  turns_ = every ? 1 : moved_mm * kMostTurns < kTurnMm ? kMostTurns : moved_mm * 2 < kTurnMm ? 2 : 1;
+  turns_ = every ? 1 : moved_mm * kMaxTurns < kTurnMm ? kMaxTurns : moved_mm * 2 < kTurnMm ? 2 : 1;
   turn_ = ++last.turn;
   const Vec3 along = transposed(frame.direction) * axis;
   for (std::size_t a = 0; a < 3; ++a) head_.axis[a] = static_cast<float>(along[a]);

@@ -65,7 +65,7 @@ double EnergyDebt::update(Vec3 x_mm, Vec3 elastic_n, double stored_mj, Vec3 velo
   if (!std::isfinite(given_mj_)) given_mj_ = 0;
   if (elastic_n == Vec3{}) {
     // As much may encoder steps feign.
-    given_mj_ = std::clamp(given_mj_ - limit_of(encoder_mm) * most_n_, 0.0, kMostOwedMj);
+    given_mj_ = std::clamp(given_mj_ - limit_of(encoder_mm) * most_n_, 0.0, kMaxOwedMj);
     owed_mj_ = given_mj_;
     most_n_ = out_mm_ = 0;
     fits_ = 1;
@@ -78,9 +78,9 @@ double EnergyDebt::update(Vec3 x_mm, Vec3 elastic_n, double stored_mj, Vec3 velo
     given_mj_ = std::max(given_mj_, -(1 + kCreditShare) * stored - kCreditMj);
     if (dot(elastic_n, velocity_mm_s) > 0) {
       out_mm_ += way_mm;
-      wanted = std::clamp((limit_of(encoder_mm) * most_n_ - given_mj_) / (fits_ * stored), kLeastShare, 1.0);
+      wanted = std::clamp((limit_of(encoder_mm) * most_n_ - given_mj_) / (fits_ * stored), kMinShare, 1.0);
     } else if (out_mm_ < reach_mm) {
-      fits_ = std::clamp((owed_mj_ - given_mj_) / stored, kLeastShare, 1.0);
+      fits_ = std::clamp((owed_mj_ - given_mj_) / stored, kMinShare, 1.0);
     }
   }
   share_ += (wanted - share_) * std::min(1.0, way_mm / reach_mm);

@@ -10,9 +10,9 @@ namespace {
 
 // Above this share of the head in bone the pushes begin to cancel; at the second the map alone gives the direction.
 constexpr double kEscapeFrom = 0.6, kEscapeAll = 0.9;
-constexpr double kFarthestMm = 1e6;    // no pose of a hand: broken, as is what is not a number
-constexpr double kMostShellMm = 0.25;  // of a held shaft
-constexpr double kThereRpm = 60;       // a lag never ends: so near, the burr has the pedal's speed
+constexpr double kFarthestMm = 1e6;   // no pose of a hand: broken, as is what is not a number
+constexpr double kMaxShellMm = 0.25;  // of a held shaft
+constexpr double kThereRpm = 60;      // a lag never ends: so near, the burr has the pedal's speed
 
 OverlapResult turned(const OverlapResult& o, const Mat3& r) {
   OverlapResult t = o;
@@ -299,13 +299,12 @@ void HandRenderer::escape() noexcept {
 void HandRenderer::hold_shaft(Vec3& elastic, Vec3& torque) noexcept {
   const RoundCone& shape = instrument_->shaft;
   const HapticScene& scene = *common_.scene;
-  std::array<HeldShaft::Body, HeldShaft::kMostBodies> bodies;
+  std::array<HeldShaft::Body, HeldShaft::kMaxBodies> bodies;
   std::size_t count = 0;
   // A burr's shaft follows it into what it cuts, so its shell must not touch the walls; and coarse voxels make no wide
   // gap a narrow one.
   const double gap = instrument_->head.end_radius_mm - shape.start_radius_mm;
-  double shell =
-      instrument_->kind == InstrumentKind::burr && gap > 0 ? std::min(kMostShellMm, 0.5 * gap) : kMostShellMm;
+  double shell = instrument_->kind == InstrumentKind::burr && gap > 0 ? std::min(kMaxShellMm, 0.5 * gap) : kMaxShellMm;
   for (const HapticScene::Item& item : scene.items) {
     if (count == bodies.size()) break;
     if (scene.items.size() > 1 &&

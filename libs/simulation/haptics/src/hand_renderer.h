@@ -102,7 +102,7 @@ class HandRenderer {
   Vec3 at_, axis_;  // where the tool is: elsewhere in a cutting guide, and where bone holds its shaft
   bool usable_ = false, cuts_ = false;
   std::uint32_t flags_ = 0;
-  std::array<Touch, HapticRenderer::kMostTouched> touched_;
+  std::array<Touch, HapticRenderer::kMaxTouched> touched_;
   std::size_t touched_count_ = 0;
   const HapticScene::Item* loaded_ = nullptr;  // that the tool presses on most
   ContactResult contact_;

@@ -86,7 +86,7 @@ void make_room(HapticScene& scene, const HapticSetup& setup) {
     static_cast<void>(shaft_cut_depth(0));  // not in the servo
   std::size_t room = 0;
   for (const HapticScene::Item& i : scene.items) room = std::max(room, most_hits(i.bone->bone().frame().spacing_mm.x));
-  scene.changes.resize(room * std::min(HapticRenderer::kMostTouched, scene.items.size()) * setup.hands());
+  scene.changes.resize(room * std::min(HapticRenderer::kMaxTouched, scene.items.size()) * setup.hands());
 }
 
 }  // namespace
@@ -162,7 +162,7 @@ HapticScene HapticScene::of(const World& world, const HapticSetup& setup, const 
     fit(item, setup, same != known.end() ? &*same : nullptr);
     scene.items.push_back(std::move(item));
   }
-  for (std::uint32_t hand = 0; hand < kMostHands; ++hand) {
+  for (std::uint32_t hand = 0; hand < kMaxHands; ++hand) {
     const World::Grip& grip = world.grip(hand);
     if (grip.plate != SceneAction::kNobody)
       scene.held[hand].plate = std::make_shared<const PlateInHand>(plate_library()[grip.plate]);

@@ -6,7 +6,7 @@
 namespace osteo::inline simulation {
 namespace {
 
-constexpr int kMostEvaluations = 5;
+constexpr int kMaxEvaluations = 5;
 // So far around the shaft bone is looked for, in stretches of about so much of it, each again when it has moved so far
 // or after so many calls.
 constexpr double kLookMm = 1.5, kStretchMm = 4, kAgainMm = 0.5;
@@ -46,7 +46,7 @@ void HeldShaft::forget() noexcept {
 
 // Other bodies, or elsewhere, or another shaft: nothing is known of what is near.
 void HeldShaft::take(std::span<const Body> bodies, const RoundCone& shaft) noexcept {
-  const std::size_t n = std::min(bodies.size(), kMostBodies);
+  const std::size_t n = std::min(bodies.size(), kMaxBodies);
   bool known = n == count_ && same(shaft, shape_);
   for (std::size_t b = 0; b < n; ++b) {
     known = known && bodies_[b].name == bodies[b].name && same(bodies_[b].world_from_body, bodies[b].world_from_body);
@@ -54,7 +54,7 @@ void HeldShaft::take(std::span<const Body> bodies, const RoundCone& shaft) noexc
   }
   count_ = n;
   shape_ = shaft;
-  stretch_count_ = std::clamp(static_cast<int>(std::ceil(shaft.length_mm / kStretchMm)), 1, kMostStretches);
+  stretch_count_ = std::clamp(static_cast<int>(std::ceil(shaft.length_mm / kStretchMm)), 1, kMaxStretches);
   if (!known) stretches_.fill({});
 }
 
@@ -173,7 +173,7 @@ HeldShaft::Answer HeldShaft::follow(std::span<const Body> bodies, const RoundCon
   g.feature_mm = std::max(shell_mm, 0.25 * h);
   g.tolerance_mm = 2e-2 * h;
   g.friction = g.static_friction = kFriction;
-  g.evaluations = kMostEvaluations - a.evaluations;
+  g.evaluations = kMaxEvaluations - a.evaluations;
   g.travel_mm = std::max(moved + kReturnMm, g.feature_mm);
   const GodObject::Answer answer = proxy_.update(field, at_mm, g);
   a.evaluations += answer.evaluations;

@@ -22,9 +22,9 @@ double share_of(double time_constant_s, double dt_s) {
 HapticRenderer::HapticRenderer(const HapticSetup& setup, const Anatomy& anatomy, double dt_s)
     : setup_(setup), anatomy_(anatomy), common_(std::make_unique<Common>()) {
   if (!(dt_s > 0) || !(dt_s <= 1)) throw Error(ExitCode::usage, "the servo's rate must be a number from 1 Hz on");
-  if (setup.hands() > kMostHands)
+  if (setup.hands() > kMaxHands)
     throw Error(ExitCode::usage, std::to_string(setup.hands()) + " hands are too many",
-                "at most " + std::to_string(kMostHands));
+                "at most " + std::to_string(kMaxHands));
   if (anatomy_.structures) {
     clearances_.resize(anatomy_.structures->values().size());
     met_.resize(clearances_.size());

@@ -9,7 +9,7 @@ namespace osteo::inline simulation {
 namespace {
 
 // Less bone than this in the burr gives no contact: half a sample.
-constexpr double kLeastSamples = 0.5;
+constexpr double kMinSamples = 0.5;
 
 Mat3 world_from_tool(Vec3 axis) {
   const Vec3 u = any_perpendicular(axis);
@@ -96,7 +96,7 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
     density_sum += static_cast<double>(density);
     ++r.immersed;
   }
-  if (density_sum < kLeastSamples) return r;
+  if (density_sum < kMinSamples) return r;
   r.bone_mm3 = density_sum * tool.samples.sample_volume_mm3 * head_.share(bone, known_);
   if (!(r.bone_mm3 > 0)) return r;
   const Vec3 sum{static_cast<double>(sx), static_cast<double>(sy), static_cast<double>(sz)};

@@ -67,7 +67,7 @@ bool Servo::step(std::int64_t lateness_ns) noexcept {
   const std::uint64_t tick = ticks();
   const std::int64_t begin = monotonic_ns();
   take_up(tick);
-  std::array<DeviceSample, kMostHands> samples;
+  std::array<DeviceSample, kMaxHands> samples;
   const std::size_t hands = devices_.size();
   for (std::size_t h = 0; h < hands; ++h) samples[h] = devices_[h]->read(tick, dt_s_, force_n_[h]);
   const auto [records, changes] = renderer_.step({samples.data(), hands});

@@ -13,7 +13,7 @@ StreamReader& Stream::add_reader(std::size_t tick_capacity, std::size_t change_c
   const auto slot = std::find_if(slots_.begin(), slots_.end(),
                                  [](const auto& s) { return s.load(std::memory_order_relaxed) == nullptr; });
   if (slot == slots_.end())
-    throw Error(ExitCode::resources, "the stream has " + std::to_string(kMostReaders) + " readers already",
+    throw Error(ExitCode::resources, "the stream has " + std::to_string(kMaxReaders) + " readers already",
                 "let one of them leave");
   readers_.push_back(std::move(made));
   slot->store(readers_.back().get(), std::memory_order_seq_cst);

@@ -96,7 +96,7 @@ TextureModel parse_texture(std::string_view text, const std::string& name) {
     for (const JsonValue& v : file.list(list, where + ": \"ar\""))
       ar.push_back(file.number(v, where + ": an item of \"ar\""));
     if (number == 1) order = ar.size();
-    if (ar.size() != order || ar.size() > TextureModel::kMostOrder)
+    if (ar.size() != order || ar.size() > TextureModel::kMaxOrder)
       throw file.wrong(list, where + ": \"ar\" must have as many coefficients as the first, at most 64");
     if (!to_reflection(ar, t.nodes[at].reflection))
       throw file.wrong(list, where + " is not stable: what rings would grow");
@@ -133,7 +133,7 @@ TextureModel load_texture(const std::filesystem::path& path, double mass_kg) {
 }
 
 TextureModel::Node node_of_spectrum(const std::vector<double>& power, double rate, std::size_t order) {
-  if (order < 1 || order > TextureModel::kMostOrder || power.size() < 17 || power.size() <= order || !(rate > 0))
+  if (order < 1 || order > TextureModel::kMaxOrder || power.size() < 17 || power.size() <= order || !(rate > 0))
     throw Error(ExitCode::usage,
                 "a texture's model takes 1 to 64 coefficients, and a spectrum of more values than that");
   // Autocorrelation: the trapezoid of power times cosine.
@@ -185,13 +185,13 @@ TextureModel at_rate(const TextureModel& model, double rate) {
     }
     for (double& v : power)
       v = std::max(v, 1e-4 * most);  // 40 dB below the loudest: what a model of so few numbers can hold
-    node = node_of_spectrum(power, rate, TextureModel::kMostOrder);
+    node = node_of_spectrum(power, rate, TextureModel::kMaxOrder);
   }
   return out;
 }
 
 TextureModel::Node texture_node(const std::vector<double>& samples, std::size_t order) {
-  if (order < 1 || order > TextureModel::kMostOrder || samples.size() <= 4 * order)
+  if (order < 1 || order > TextureModel::kMaxOrder || samples.size() <= 4 * order)
     throw Error(ExitCode::usage, "a texture's model takes 1 to 64 coefficients and more than four samples for each");
   TextureModel::Node node;
   std::vector<double> forward = samples, backward = samples;
@@ -229,7 +229,7 @@ double spectrum_n2_per_hz(const TextureModel::Node& node, double hz, double rate
 
 Texture::Texture(TextureModel model, std::uint64_t seed) : model_(std::move(model)), state_(seed) {
   const std::size_t count = model_.forces_n.size() * model_.speeds_mm_s.size();
-  bool sound = count > 0 && model_.nodes.size() == count && model_.order() <= TextureModel::kMostOrder;
+  bool sound = count > 0 && model_.nodes.size() == count && model_.order() <= TextureModel::kMaxOrder;
   for (const auto& n : model_.nodes) sound = sound && n.reflection.size() == model_.order();
   if (!sound) throw Error(ExitCode::usage, "a texture needs a model of one order for each force and speed");
 }

@@ -44,7 +44,7 @@ VibrationSpectrum parse_vibration(std::string_view text, const std::string& name
                                          value("per_n", 0, 1)};
       if (peak.frequency_hz >= lo && peak.frequency_hz <= hi) s.by_kind[index].push_back(peak);
     }
-    if (s.by_kind[index].size() > VibrationSpectrum::kMostPeaks)
+    if (s.by_kind[index].size() > VibrationSpectrum::kMaxPeaks)
       throw file.wrong(peaks, key + " has more than 16 peaks in the band");
   }
   return s;

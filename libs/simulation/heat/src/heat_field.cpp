@@ -209,7 +209,7 @@ void HeatField::cool(const Ball& where, double film_w_per_m2_k, double water_k) 
     const HeatMatter m = matter_(c);
     return std::clamp(m.bone + m.tissue, 0.0F, 1.0F);
   };
-  for_ball(where, std::abs(water_k) >= kLeastK, [&](Brick& b, int cell, Ijk at) {
+  for_ball(where, std::abs(water_k) >= kMinK, [&](Brick& b, int cell, Ijk at) {
     const auto c = static_cast<std::size_t>(cell);
     double open = 0;
     for (int d = 0; d < 6; ++d) open += std::max(0.0, static_cast<double>(b.share[c] - share_at(beside(at, d))));
@@ -338,7 +338,7 @@ void HeatField::wake_and_forget() {
     const int axis = d / 2, at = d % 2 == 0 ? 0 : 7;
     for (int n = 0; n < 64; ++n) {
       const int c = axis == 0 ? 8 * n + at : axis == 1 ? (n >> 3) * 64 + 8 * at + (n & 7) : 64 * at + n;
-      if (std::abs(b.kelvin[static_cast<std::size_t>(c)]) >= kLeastK && b.conducts[static_cast<std::size_t>(c)] > 0)
+      if (std::abs(b.kelvin[static_cast<std::size_t>(c)]) >= kMinK && b.conducts[static_cast<std::size_t>(c)] > 0)
         return true;
     }
     return false;
@@ -355,7 +355,7 @@ void HeatField::wake_and_forget() {
     }
     if (fed) continue;
     const auto [low, high] = std::minmax_element(b->kelvin.begin(), b->kelvin.end());
-    if (std::max(-*low, *high) < kLeastK / 2) done.push_back(key);
+    if (std::max(-*low, *high) < kMinK / 2) done.push_back(key);
   }
   for (const Key key : done) {
     const auto it = bricks_.find(key);

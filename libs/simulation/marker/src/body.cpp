@@ -26,9 +26,9 @@ const cv::Ptr<cv::aruco::CharucoBoard>& plate_board() {
 }  // namespace marker
 
 std::vector<MarkerPatch> pen_markers(int pen, double scale) {
-  if (pen < 1 || pen > PenBody::kMostPens)
+  if (pen < 1 || pen > PenBody::kMaxPens)
     throw Error(ExitCode::usage, "there is no pen " + std::to_string(pen),
-                "pens are 1 to " + std::to_string(PenBody::kMostPens));
+                "pens are 1 to " + std::to_string(PenBody::kMaxPens));
   std::vector<MarkerPatch> all;
   const int first = (pen - 1) * PenBody::kMarkers;
   for (int row = 0; row < 2; ++row) {

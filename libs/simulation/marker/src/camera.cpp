@@ -151,7 +151,7 @@ Look CameraCalibration::add(const GrayPicture& picture) {
     for (std::size_t i = 0; i < 8; ++i) most = std::max(most, std::abs(v.hull[i] - view.hull[i]));
     if (most < 0.05) return Look::like_another;
   }
-  if (views() >= kMostViews) return Look::like_another;
+  if (views() >= kMaxViews) return Look::like_another;
   // Corners that the plane of the others does not explain were moved by blur. A lens bends the plane by a few pixels
   // only.
   std::vector<cv::Point2f> expected;
@@ -164,10 +164,10 @@ Look CameraCalibration::add(const GrayPicture& picture) {
 }
 
 CameraCalibration::Result CameraCalibration::solve() const {
-  if (views() < kLeastViews)
+  if (views() < kMinViews)
     throw Error(ExitCode::failed,
                 "only " + std::to_string(views()) + " of " + std::to_string(pictures_) +
-                    " pictures show the plate from another side; " + std::to_string(kLeastViews) + " are needed",
+                    " pictures show the plate from another side; " + std::to_string(kMinViews) + " are needed",
                 with_plate_ == 0 ? "is it the plate of 'osteo markers', flat, well lit, whole in the picture?"
                                  : "turn and tilt the plate, near and far, into all corners of the picture");
   std::vector<std::vector<cv::Point3f>> object;
@@ -219,7 +219,7 @@ CameraCalibration::Result CameraCalibration::solve() const {
     std::snprintf(text, sizeof text, "%.1f %%", 100 * share);
     return std::string(text);
   };
-  if (!(rms <= kMostRmsPx)) {
+  if (!(rms <= kMaxRmsPx)) {
     char text[64];
     std::snprintf(text, sizeof text, "%.2f", rms);
     throw Error(
@@ -238,7 +238,7 @@ CameraCalibration::Result CameraCalibration::solve() const {
     const double ratio[2] = {edge(0, 1) / edge(3, 2), edge(0, 3) / edge(1, 2)};
     if (std::max(std::abs(std::log(ratio[0])), std::abs(std::log(ratio[1]))) > 0.1) ++tilted;
   }
-  if (3 * tilted < views() || !(r.focal_spread <= kMostFocalSpread) || !(c.fx > 0))
+  if (3 * tilted < views() || !(r.focal_spread <= kMaxFocalSpread) || !(c.fx > 0))
     throw Error(ExitCode::failed,
                 "the views are too much alike to tell the focal length: the plate is tilted in " +
                     std::to_string(tilted) + " of " + std::to_string(views()) + "; it is open by " +

@@ -183,7 +183,7 @@ DeviceSample MarkerDevice::read(std::uint64_t, double dt_s, Vec3 force_n) noexce
     goal_.position_mm = hand_.position_mm();
     goal_.pedal = 0;
   } else {
-    const double ahead_s = std::min(since_ms / 1e3, PenMotion::kMostAheadS);
+    const double ahead_s = std::min(since_ms / 1e3, PenMotion::kMaxAheadS);
     if (out_of_sight_) {
       hand_.start(goal_.position_mm);
       map_ = WorkspaceMap(hand_.position_mm(), scene_from_camera_, scale_);

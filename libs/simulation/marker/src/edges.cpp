@@ -7,7 +7,7 @@
 namespace osteo::inline simulation::marker {
 namespace {
 
-constexpr double kLeastContrast = 14, kStepPx = 0.5;
+constexpr double kMinContrast = 14, kStepPx = 0.5;
 
 double bilinear(const cv::Mat& g, double x, double y) {
   const int ix = static_cast<int>(std::floor(x)), iy = static_cast<int>(std::floor(y));
@@ -90,7 +90,7 @@ bool refine_corners(const cv::Mat& gray, Quad& quad, int cells) {
           }
           before = v;
         }
-        if (inside && sum > kLeastContrast) points.push_back({t, moment / sum, sum});
+        if (inside && sum > kMinContrast) points.push_back({t, moment / sum, sum});
       }
       if (points.size() < static_cast<std::size_t>(0.6 * count)) return false;
       Line line;

@@ -65,10 +65,10 @@ Eigen::Matrix<double, 6, 1> correct(StateMatrix& p, const Eigen::Matrix3d& measu
 }  // namespace
 
 Vec3 PenMotion::tip_at(double t) const {
-  return tip_mm + velocity_mm_s * std::clamp(t - time_s, 0.0, kMostAheadS);
+  return tip_mm + velocity_mm_s * std::clamp(t - time_s, 0.0, kMaxAheadS);
 }
 Mat3 PenMotion::rotation_at(double t) const {
-  return product(small_turn(turning_rad_s * std::clamp(t - time_s, 0.0, kMostAheadS)), rotation);
+  return product(small_turn(turning_rad_s * std::clamp(t - time_s, 0.0, kMaxAheadS)), rotation);
 }
 
 PenFilter::PenFilter(Vec3 tip_mm, const PenFilterParams& params) : tip_mm_(tip_mm), params_(params) {}

@@ -14,8 +14,8 @@
 namespace osteo::inline simulation {
 namespace {
 
-constexpr std::size_t kLeastPoses = 20;
-constexpr double kLeastTiltDeg = 20;
+constexpr std::size_t kMinPoses = 20;
+constexpr double kMinTiltDeg = 20;
 
 struct PenFields {
   using Params = PenFields;
@@ -24,7 +24,7 @@ struct PenFields {
   std::array<double, 3> tip_mm{PenBody::kUsualTipMm.x, PenBody::kUsualTipMm.y, PenBody::kUsualTipMm.z};
   static void describe(PenFields& f, auto& visit) {
     visit({"osteotome_pen", "version of the format", "", 1, 1, true}, f.version);
-    visit({"pen", "which print it carries", "", 1, PenBody::kMostPens}, f.pen.pen);
+    visit({"pen", "which print it carries", "", 1, PenBody::kMaxPens}, f.pen.pen);
     visit({"scale", "printed mm for a drawn one", "", 0.5, 2}, f.pen.scale);
     visit({"tip_mm", "tip of the pen, from the middle of the prism, z along the pen to its upper end", "mm", -500, 500,
            true},
@@ -86,18 +86,18 @@ std::string pen_json(const Pen& p) {
 }
 
 PivotFit fit_pivot(std::span<const RigidTransform> all, double most_rms_mm) {
-  if (all.size() < kLeastPoses)
-    throw Error(ExitCode::failed,
-                "the pen was seen in " + std::to_string(all.size()) + " pictures; " + std::to_string(kLeastPoses) +
-                    " are needed",
-                "turn it on its tip for ten seconds, its markers towards the camera, in good light");
+  if (all.size() < kMinPoses)
+    throw Error(
+        ExitCode::failed,
+        "the pen was seen in " + std::to_string(all.size()) + " pictures; " + std::to_string(kMinPoses) + " are needed",
+        "turn it on its tip for ten seconds, its markers towards the camera, in good light");
   double least = 1;
   for (const RigidTransform& a : all) {
     for (const RigidTransform& b : all) least = std::min(least, dot(a.rotation.column[2], b.rotation.column[2]));
   }
   const double tilt_deg = std::acos(std::clamp(least, -1.0, 1.0)) * 180 / std::numbers::pi;
   char text[200];
-  if (tilt_deg < kLeastTiltDeg) {
+  if (tilt_deg < kMinTiltDeg) {
     std::snprintf(text, sizeof text, "the pen was tilted by %.0f degrees only; its tip cannot be told from that",
                   tilt_deg);
     throw Error(ExitCode::failed, text, "keep the tip in a small dent and lean the pen by 30 degrees to all sides");
@@ -114,7 +114,7 @@ PivotFit fit_pivot(std::span<const RigidTransform> all, double most_rms_mm) {
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (off[i] <= most) kept.push_back(poses[i]);
   }
-  if (kept.size() < poses.size() && kept.size() >= kLeastPoses) {
+  if (kept.size() < poses.size() && kept.size() >= kMinPoses) {
     fit = solve(kept);
     fit.left_out = static_cast<int>(poses.size() - kept.size());
   }

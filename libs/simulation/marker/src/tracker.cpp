@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kPicturesRemembered = 10;  // a pose is a guess for so many pictures
 constexpr int kMirrorAfter = 8;          // pictures without a pen before a mirrored one is looked for
-constexpr double kLeastSidePx = 11;
+constexpr double kMinSidePx = 11;
 
 using marker::Quad;
 
@@ -33,7 +33,7 @@ Vec3 middle_of(const Quad& q) {
 std::vector<Detected> detect(const cv::Mat& gray) {
   const auto p = cv::aruco::DetectorParameters::create();
   const double size = std::max(gray.cols, gray.rows);
-  p->minMarkerPerimeterRate = 4 * kLeastSidePx / size;
+  p->minMarkerPerimeterRate = 4 * kMinSidePx / size;
   p->adaptiveThreshWinSizeMin = 5;
   p->adaptiveThreshWinSizeMax = 25;
   p->adaptiveThreshWinSizeStep = 10;

@@ -89,7 +89,7 @@ BlackrockFiles::BlackrockFiles(const std::filesystem::path& folder, const std::s
   f.channels = labels.size();
   const auto n = static_cast<std::uint32_t>(labels.size());
   constexpr auto kRate = static_cast<std::uint32_t>(MonitorSetup::kRateHz);
-  constexpr std::int16_t kMost = 32764, kMostUv = 8191;  // 0.25 uV a bit
+  constexpr std::int16_t kMax = 32764, kMaxUv = 8191;  // 0.25 uV a bit
   const auto low_pass_mhz = static_cast<std::uint32_t>(constants.noise_hz * 1000);
 
   f.ns5.open(folder / (name + ".ns5"));
@@ -107,7 +107,7 @@ BlackrockFiles::BlackrockFiles(const std::filesystem::path& folder, const std::s
         .text(labels[ch], 16)
         .put<std::uint8_t>(1)
         .put(static_cast<std::uint8_t>(ch + 1));
-    h.put<std::int16_t>(-kMost).put(kMost).put<std::int16_t>(-kMostUv).put(kMostUv).text("uV", 16);
+    h.put<std::int16_t>(-kMax).put(kMax).put<std::int16_t>(-kMaxUv).put(kMaxUv).text("uV", 16);
     h.put<std::uint32_t>(0).put<std::uint32_t>(0).put<std::uint16_t>(0);  // high-pass: none
     h.put(low_pass_mhz).put<std::uint32_t>(1).put<std::uint16_t>(1);      // low-pass, order, kind
   }

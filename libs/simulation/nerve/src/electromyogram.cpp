@@ -53,7 +53,7 @@ Electromyogram::Electromyogram(const MonitorConstants& constants, std::vector<Ch
 // `at` in samples from the next block's first.
 void Electromyogram::add_wave(std::size_t channel, double at, const std::vector<float>& wave, double uv) {
   const auto first = static_cast<std::size_t>(std::max(0.0, at));
-  if (first + wave.size() + kMostSamples > kRing) return;
+  if (first + wave.size() + kMaxSamples > kRing) return;
   std::vector<float>& ring = coming_[channel];
   const auto gain = static_cast<float>(uv);
   for (std::size_t i = 0; i < wave.size(); ++i) ring[(now_ + first + i) % kRing] += gain * wave[i];
@@ -82,7 +82,7 @@ void Electromyogram::answer(std::size_t at, const NerveModel& model, std::size_t
 
 void Electromyogram::render(const NerveModel& model, const DrillNoise& drill, std::span<std::int16_t> out) {
   const std::size_t n = channels_.empty() ? 0 : out.size() / channels_.size();
-  if (n == 0 || n > kMostSamples) return;
+  if (n == 0 || n > kMaxSamples) return;
   block_.assign(out.size(), 0.0F);  // channel by channel
 
   for (auto& [id, voice] : voices_) voice.seen = false;

@@ -100,8 +100,8 @@ MonitorSetup parse_monitor(std::string_view json, const std::string& name) {
       if (!names.insert(c.name).second) throw file.wrong(n, "two channels are called '" + c.name + "'");
     }
     channels += setup.nerves.back().channels.size();
-    if (channels > MonitorSetup::kMostChannels)
-      throw file.wrong(n, "there are more than " + std::to_string(MonitorSetup::kMostChannels) + " channels");
+    if (channels > MonitorSetup::kMaxChannels)
+      throw file.wrong(n, "there are more than " + std::to_string(MonitorSetup::kMaxChannels) + " channels");
   }
   return setup;
 }

@@ -10,7 +10,7 @@ namespace osteo::inline simulation {
 namespace {
 
 // Discharges at once, of each nerve: more sound the same.
-constexpr std::ptrdiff_t kMostOfANerve = 4;
+constexpr std::ptrdiff_t kMaxOfANerve = 4;
 constexpr double kGone = 0.05;        // what is left of a nerve is then taken as nothing
 constexpr double kTrainHoldsS = 0.1;  // a train outlasts the end of its cause at least so long
 
@@ -55,7 +55,7 @@ void NerveModel::begin(NerveCause cause, bool train, std::size_t nerve, std::siz
                        double uv) {
   const auto of_it =
       std::count_if(discharges_.begin(), discharges_.end(), [&](const Discharge& d) { return d.nerve == nerve; });
-  if (of_it < kMostOfANerve) {
+  if (of_it < kMaxOfANerve) {
     discharges_.push_back({next_id_++, cause, train, nerve, point, hz, uv, seconds});
     happenings_.push_back({cause, nerve, point, integrity_[nerve][point]});
   }

@@ -9,14 +9,14 @@ namespace osteo::inline simulation {
 
 StimulatorSetting within_range(StimulatorSetting s) {
   const auto finite = [](double x, double lo, double hi) { return std::isfinite(x) ? std::clamp(x, lo, hi) : lo; };
-  s.current_ma = s.current_ma > 0 ? finite(s.current_ma, StimulatorSetting::kLeastMa, StimulatorSetting::kMostMa) : 0;
+  s.current_ma = s.current_ma > 0 ? finite(s.current_ma, StimulatorSetting::kMinMa, StimulatorSetting::kMaxMa) : 0;
   s.pulses_per_s = finite(s.pulses_per_s, 1, 30);
   s.width_ms = finite(s.width_ms, 0.05, 1);
   return s;
 }
 
 ThresholdSearch::ThresholdSearch(double begin_ma)
-    : current_ma_(std::clamp(begin_ma, StimulatorSetting::kLeastMa, StimulatorSetting::kMostMa)) {}
+    : current_ma_(std::clamp(begin_ma, StimulatorSetting::kMinMa, StimulatorSetting::kMaxMa)) {}
 
 void ThresholdSearch::take(bool response) {
   if (done_) return;
@@ -29,11 +29,11 @@ void ThresholdSearch::take(bool response) {
     done_ = *answers_ma_ <= 1.1 * *silent_ma_;
     current_ma_ = std::sqrt(*silent_ma_ * *answers_ma_);
   } else if (answers_ma_) {
-    done_ = current_ma_ <= StimulatorSetting::kLeastMa;
-    current_ma_ = std::max(StimulatorSetting::kLeastMa, current_ma_ / 2);
+    done_ = current_ma_ <= StimulatorSetting::kMinMa;
+    current_ma_ = std::max(StimulatorSetting::kMinMa, current_ma_ / 2);
   } else {
-    done_ = current_ma_ >= StimulatorSetting::kMostMa;
-    current_ma_ = std::min(StimulatorSetting::kMostMa, current_ma_ * 2);
+    done_ = current_ma_ >= StimulatorSetting::kMaxMa;
+    current_ma_ = std::min(StimulatorSetting::kMaxMa, current_ma_ * 2);
   }
 }
 

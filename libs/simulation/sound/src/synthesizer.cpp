@@ -74,7 +74,7 @@ Synthesizer::Synthesizer(const SoundModel& model, std::uint64_t seed, const Safe
     b.dull_filter.low_pass(1600, 6);
     b.dull_filter.settle();
   }
-  for (std::size_t i = 0; i < SoundState::kMostVoices; ++i) {
+  for (std::size_t i = 0; i < SoundState::kMaxVoices; ++i) {
     suckers_[i].filter.high_pass(400, 2);
     suckers_[i].filter.low_pass(6000, 2);
     suckers_[i].filter.settle();
@@ -108,7 +108,7 @@ void Synthesizer::start_ring(double hz, double rise, double level, double decay_
 void Synthesizer::plan(const SoundState& to, double samples) noexcept {
   gurgles_per_sample_ = gurgle_level_ = 0;
   const double water = std::isfinite(to.water) ? std::clamp(to.water, 0.0, 1.0) : 0;
-  for (std::size_t v = 0; v < SoundState::kMostVoices; ++v) {
+  for (std::size_t v = 0; v < SoundState::kMaxVoices; ++v) {
     const SoundVoice& voice = to.voices[v];
     const BurrSpectrum s = burr_spectrum(voice, model_);
     Burr& b = burrs_[v];

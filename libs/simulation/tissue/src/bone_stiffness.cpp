@@ -11,14 +11,14 @@ namespace osteo::inline simulation {
 namespace {
 
 constexpr double kAshOfApparent = 0.598;
-constexpr double kMostOutside = 0.05;  // of the volume: more is another CT
-constexpr double kLeastDensity = 1;    // kg/m3, of air: all that has a volume has a weight
-constexpr int kMostAlongEdge = 64;     // samples: a tetrahedron of 32 voxels is no longer resolved finer
+constexpr double kMaxOutside = 0.05;  // of the volume: more is another CT
+constexpr double kMinDensity = 1;     // kg/m3, of air: all that has a volume has a weight
+constexpr int kMaxAlongEdge = 64;     // samples: a tetrahedron of 32 voxels is no longer resolved finer
 
 void require_usable(const BoneDensity& d, double step) {
   if (!(d.per_1000_hu > 0) || !std::isfinite(d.per_1000_hu) || !std::isfinite(d.at_0_hu))
     throw Error(ExitCode::usage, "density rises with HU: its slope is above 0, and both are finite");
-  if (!(d.least_mpa > 0 && d.most_mpa > d.least_mpa && std::isfinite(d.most_mpa)))
+  if (!(d.min_mpa > 0 && d.max_mpa > d.min_mpa && std::isfinite(d.max_mpa)))
     throw Error(ExitCode::usage, "the least modulus is above 0 and below the most");
   if (!(step >= 0 && step <= 1)) throw Error(ExitCode::usage, "materials are 0 to 1 (100 %) apart");
 }
@@ -90,7 +90,7 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
       }
       // Middles of the n^3 small tetrahedra that stand like the whole: their mean is that of the whole for anything
       // linear.
-      const int n = std::clamp(static_cast<int>(std::ceil(longest / apart_mm)), 2, kMostAlongEdge);
+      const int n = std::clamp(static_cast<int>(std::ceil(longest / apart_mm)), 2, kMaxAlongEdge);
       double sum = 0, sum_hu = 0, sum_density = 0;
       int samples = 0, beyond = 0;
       for (int i = 0; i < n; ++i) {
@@ -121,16 +121,16 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
     s.volume_mm3 += volume[t];
     s.mass_g += grams[t];
     s.share_outside += outside[t];
-    below += s.young_mpa[t] < density.least_mpa ? volume[t] : 0;
-    above += s.young_mpa[t] > density.most_mpa ? volume[t] : 0;
-    s.young_mpa[t] = std::clamp(s.young_mpa[t], density.least_mpa, density.most_mpa);
+    below += s.young_mpa[t] < density.min_mpa ? volume[t] : 0;
+    above += s.young_mpa[t] > density.max_mpa ? volume[t] : 0;
+    s.young_mpa[t] = std::clamp(s.young_mpa[t], density.min_mpa, density.max_mpa);
   }
   if (s.volume_mm3 > 0) {
     s.share_outside /= s.volume_mm3;
     s.share_below = below / s.volume_mm3;
     s.share_above = above / s.volume_mm3;
   }
-  if (s.share_outside > kMostOutside)
+  if (s.share_outside > kMaxOutside)
     throw Error(
         ExitCode::usage,
         format_number(std::round(1000 * s.share_outside) / 10) + " % of the mesh lies outside of the CT",
@@ -139,7 +139,7 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
     double volume = 0, sum = 0, grams = 0;
   };
   const auto group_of = [&](double e) {
-    return step > 0 ? std::round(std::log(e / density.least_mpa) / std::log1p(step)) : e;
+    return step > 0 ? std::round(std::log(e / density.min_mpa) / std::log1p(step)) : e;
   };
   std::map<double, Group> groups;
   for (std::size_t t = 0; t < count; ++t) {
@@ -153,7 +153,7 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
   for (std::size_t t = 0; t < count; ++t) {
     const Group& g = groups[group_of(s.young_mpa[t])];
     if (!(g.volume > 0)) continue;
-    s.density_kg_m3[t] = std::max(kLeastDensity, 1e6 * g.grams / g.volume);
+    s.density_kg_m3[t] = std::max(kMinDensity, 1e6 * g.grams / g.volume);
     if (step > 0) s.young_mpa[t] = g.sum / g.volume;
   }
   return s;

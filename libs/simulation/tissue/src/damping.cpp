@@ -35,9 +35,9 @@ DampingFit fit_damping(const TissueModel&, const TissueLoad&, std::span<const st
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
-constexpr std::size_t kFewestValues = 12;
-constexpr double kFewestSwings = 1.5;
-constexpr double kMostSteps = 5e7;
+constexpr std::size_t kMinValues = 12;
+constexpr double kMinSwings = 1.5;
+constexpr double kMaxSteps = 5e7;
 
 std::string shown(double v) {  // to four digits
   if (v == 0 || !std::isfinite(v)) return format_number(v);
@@ -91,7 +91,7 @@ class Release {
     for (std::uint32_t p = 0; p < start.size(); ++p) d.set_position(p, start[p]);
     Trace trace{d.step_s(), std::vector<std::vector<double> >(channels_.size()), true};
     const double steps = std::ceil(seconds / d.step_s()) + 3;
-    if (!(steps < kMostSteps))
+    if (!(steps < kMaxSteps))
       throw Error(ExitCode::usage,
                   shown(seconds) + " s are " + shown(steps) + " steps of " + shown(1000 * d.step_s()) + " ms, too many",
                   "cut the table to the swings that are seen, or take longer, implicit steps");
@@ -291,10 +291,10 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
   std::size_t values = 0;
   double squares = 0, farthest = 0;
   for (const auto& c : used.channels) {
-    if (c.mm.size() < kFewestValues)
+    if (c.mm.size() < kMinValues)
       throw Error(ExitCode::usage,
                   c.name + ": " + std::to_string(c.mm.size()) + " values from " + shown(options.release_s) +
-                      " s on, at least " + std::to_string(kFewestValues) + " are needed",
+                      " s on, at least " + std::to_string(kMinValues) + " are needed",
                   "measure longer or more often, or let the release be earlier");
     values += c.mm.size();
     fit.span_s = std::max(fit.span_s, c.time_s.back());
@@ -370,10 +370,10 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
                     shown(0.5 / fit.interval_s) + " Hz, the body swings with " + shown(fit.model_hz) +
                     " Hz (by the problem's stiffness and density)",
                 "measure more often, or mend young_kpa and the density where they are far off");
-  if (options.fit_stiffness && fit.span_s * fit.model_hz < kFewestSwings)
+  if (options.fit_stiffness && fit.span_s * fit.model_hz < kMinSwings)
     throw Error(ExitCode::usage,
                 "the table holds " + shown(fit.span_s) + " s from the release on, " + shown(fit.span_s * fit.model_hz) +
-                    " swings of the body's " + shown(fit.model_hz) + " Hz; " + format_number(kFewestSwings) +
+                    " swings of the body's " + shown(fit.model_hz) + " Hz; " + format_number(kMinSwings) +
                     " are needed",
                 "measure longer, or mend young_kpa and the density where they are far off");
   // Not slower than half a swing in the table, where a drift would be taken for one.
@@ -386,10 +386,10 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
           "what was measured does not swing (or not above its noise): damping and stiffness cannot be told from each "
           "other",
           "if the stiffness is known, leave it as it is: --no-fit-stiffness; else measure something that swings");
-    if (fit.measured.hz * fit.span_s < kFewestSwings)
+    if (fit.measured.hz * fit.span_s < kMinSwings)
       throw Error(ExitCode::usage,
                   "the table holds " + shown(fit.measured.hz * fit.span_s) + " swings (" + shown(fit.measured.hz) +
-                      " Hz in " + shown(fit.span_s) + " s); " + format_number(kFewestSwings) + " are needed",
+                      " Hz in " + shown(fit.span_s) + " s); " + format_number(kMinSwings) + " are needed",
                   "measure longer");
   }
 

@@ -53,12 +53,12 @@ void TissueDynamics<Real>::Impl::factorise() {
     const double own = (mass[p] > 0 ? inertia(p) : 1) + (!tied.empty() && tied[p] ? obstacle.stiffness_n_per_mm : 0);
     blocks.push_back({p, p, {own, 0, 0, 0, own, 0, 0, 0, own}});
   }
-  double hessian[9 * Energy::kMostNodes * Energy::kMostNodes], gradient_here[3 * Energy::kMostNodes];
+  double hessian[9 * Energy::kMaxNodes * Energy::kMaxNodes], gradient_here[3 * Energy::kMaxNodes];
   for (std::size_t e = 0; e < model.element_count(); ++e) {
     const auto& c = model.constraints()[e];
     if (c.stiffness == 0 || c.rest == 0) continue;
     const auto nodes = model.nodes(e);
-    Vec3 at_rest[Energy::kMostNodes];
+    Vec3 at_rest[Energy::kMaxNodes];
     for (std::size_t a = 0; a < nodes.size(); ++a) at_rest[a] = model.rest()[nodes[a]];
     model.element(e, at_rest, gradient_here, hessian);
     const std::size_t row = 3 * nodes.size();

@@ -209,8 +209,8 @@ bool EquilibriumSolver::Impl::factorise(Equilibrium& counts) {
 void EquilibriumSolver::Impl::assemble(const Energy& energy, std::span<const Vec3> x, std::vector<Vec3>& gradient) {
   std::fill(h.valuePtr(), h.valuePtr() + h.nonZeros(), 0.0);
   std::fill(gradient.begin(), gradient.end(), Vec3{});
-  Vec3 local[Energy::kMostNodes];
-  double g[3 * Energy::kMostNodes], k[9 * Energy::kMostNodes * Energy::kMostNodes];
+  Vec3 local[Energy::kMaxNodes];
+  double g[3 * Energy::kMaxNodes], k[9 * Energy::kMaxNodes * Energy::kMaxNodes];
   for (std::size_t e = 0; e < energy.element_count(); ++e) {
     const auto nodes = energy.nodes(e);
     const std::size_t n = nodes.size();

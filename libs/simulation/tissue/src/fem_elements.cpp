@@ -242,7 +242,7 @@ void add_linear_hessian(const Moduli& of, std::span<const Vec3> gradients, doubl
 
 void add_stvk_hessian(const M3& f, const Response& r, const Moduli& of, std::span<const Vec3> gradients, double w,
                       double* hessian) {
-  Vec3 turned[Energy::kMostNodes];  // F grad
+  Vec3 turned[Energy::kMaxNodes];  // F grad
   map_gradients(f, gradients, turned);
   M3 left;  // F F^T
   for (int i = 0; i < 3; ++i)
@@ -261,7 +261,7 @@ void add_stvk_hessian(const M3& f, const Response& r, const Moduli& of, std::spa
 }
 
 void add_neo_hooke_hessian(const M3& f, const Response& r, std::span<const Vec3> gradients, double w, double* hessian) {
-  Vec3 turned[Energy::kMostNodes], back[Energy::kMostNodes];  // F grad, F^-T grad
+  Vec3 turned[Energy::kMaxNodes], back[Energy::kMaxNodes];  // F grad, F^-T grad
   if (r.mixed != 0) map_gradients(f, gradients, turned);
   map_gradients(r.inverse, gradients, back);
   add_pairs(gradients.size(), w, hessian,
@@ -278,9 +278,9 @@ void add_neo_hooke_hessian(const M3& f, const Response& r, std::span<const Vec3>
 
 void add_corotated_hessian(const Response& r, const Moduli& of, std::span<const Vec3> gradients, double w,
                            double* hessian) {
-  Vec3 turned[Energy::kMostNodes];  // R grad
+  Vec3 turned[Energy::kMaxNodes];  // R grad
   map_gradients(r.polar.r, gradients, turned);
-  Vec3 twist[3][Energy::kMostNodes];
+  Vec3 twist[3][Energy::kMaxNodes];
   for (std::size_t t = 0; t < 3; ++t) twists(r.polar, t, gradients, twist[t]);
   const double along[3] = {r.along_turn * r.polar.bend[0], r.along_turn * r.polar.bend[1],
                            r.along_turn * r.polar.bend[2]};
@@ -413,7 +413,7 @@ double FemBody::patch_element(const Patch& patch, const Vec3* x, double* gradien
   const auto deformed = [&](std::size_t t) {
     return deformation(gradients(t), [&](std::size_t a) -> const Vec3& { return x[patch.local[t][a]]; });
   };
-  double q = 0, by_q[3 * kMostNodes] = {};
+  double q = 0, by_q[3 * kMaxNodes] = {};
   for (std::size_t t = 0; t < patch.tets.size(); ++t) {
     const double share = gauss_[patch.tets[t]].weight_mm3 / patch.mm3;
     M3 slope{};

@@ -108,7 +108,7 @@ class Patching {
     for (const std::uint32_t e : groups_[g]) {
       for (const std::uint32_t n : near_[e]) {
         const std::uint32_t other = of_[n];
-        if (other == g || nodes_of(groups_[g], groups_[other]).size() > Energy::kMostNodes) continue;
+        if (other == g || nodes_of(groups_[g], groups_[other]).size() > Energy::kMaxNodes) continue;
         if (smallest.second == kNoPatch || std::pair{groups_[other].size(), other} < smallest)
           smallest = {groups_[other].size(), other};
       }

@@ -58,7 +58,7 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 using Clock = std::chrono::steady_clock;
 
 constexpr double kUsed = 0.8;  // share of the points, the nearest, that the level is found by: the others may be astray
-constexpr int kMostRounds = 6;
+constexpr int kMaxRounds = 6;
 constexpr double kStray = 4;                 // noises
 const double kFactorBefore = std::log(5.0);  // what nobody knows of a body's stiffness, one standard deviation
 const double kClassBefore = std::log(1.5);   // and of one kind of constraint over another
@@ -245,7 +245,7 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
     if (c.load.forces_n.empty())
       throw Error(ExitCode::usage,
                   "a load of the calibration has no force: without one no stiffness follows from how far a body moves");
-    auto goal = std::make_unique<SurfaceGoal>(model, surface, c.views, options.find_pose, options.most_points, context);
+    auto goal = std::make_unique<SurfaceGoal>(model, surface, c.views, options.find_pose, options.max_points, context);
     goals.push_back(goal.get());
     owned.push_back(std::move(goal));
     loads.push_back(c.load);
@@ -339,7 +339,7 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
       for (std::size_t k = 0; k < before.size(); ++k)
         stays = stays && std::abs(goal->views()[k].sigma_mm - before[k]) < 0.1 * before[k];
     }
-    if (stays || result.rounds == kMostRounds) break;
+    if (stays || result.rounds == kMaxRounds) break;
   }
   evaluate();
 

@@ -197,13 +197,13 @@ class ProblemReader {
   }
 
   void add_surface(TissueLoad& load, const JsonValue& s, const std::string& where) {
-    constexpr double kMostKpa = 1e6;
+    constexpr double kMaxKpa = 1e6;
     if (boundary_.triangles.empty()) boundary_ = boundary_of(mesh_, &point_of_);
     const Place in = place(s, where, {"kpa"});
     const JsonValue& kpa = file_.need(s, where, "kpa");
     const bool directed = kpa.kind == JsonValue::Kind::list;
-    const Vec3 over_area = directed ? triple(kpa, where + ": \"kpa\"", kMostKpa) : Vec3{};
-    const double pressure = directed ? 0 : file_.number(kpa, where + ": \"kpa\"", -kMostKpa, kMostKpa);
+    const Vec3 over_area = directed ? triple(kpa, where + ": \"kpa\"", kMaxKpa) : Vec3{};
+    const double pressure = directed ? 0 : file_.number(kpa, where + ": \"kpa\"", -kMaxKpa, kMaxKpa);
     std::size_t hit = 0;
     for (const auto& t : boundary_.triangles) {
       const Vec3 a = from_floats(boundary_.points_mm[t[0]]), b = from_floats(boundary_.points_mm[t[1]]),

@@ -14,13 +14,13 @@
 namespace osteo::inline simulation::tissue {
 namespace {
 
-constexpr std::size_t kFewestPoints = 20, kFewestMarkers = 4;
+constexpr std::size_t kMinPoints = 20, kMinMarkers = 4;
 constexpr double kCauchy = 2.385;  // widths of noise: 95 % as good as squares where there are no stray points
 // Two thirds of all distances lie below the standard deviation along a line, and below so many of an axis's in space.
 // Not the median: what hardly moves is hardly off, and would pass for all of the noise.
 constexpr double kTwoThirds = 0.6827, kOfThree = 1.878;
 constexpr double kStray = 4;
-constexpr double kLeastNoise = 0.005;  // of the RMS movement: no fast model is nearer to a body than that
+constexpr double kMinNoise = 0.005;  // of the RMS movement: no fast model is nearer to a body than that
 
 std::string shown(double v) {
   return format_number(std::round(v * 1000) / 1000);
@@ -114,7 +114,7 @@ SurfaceGoal::SurfaceGoal(const TissueModel& model, const BodySurface& surface, s
 
 void SurfaceGoal::check(const MeasuredPoints& v, Vec3 lo, Vec3 hi) const {
   const bool markers = !v.rest_mm.empty();
-  const std::size_t fewest = markers ? kFewestMarkers : kFewestPoints;
+  const std::size_t fewest = markers ? kMinMarkers : kMinPoints;
   if (v.points_mm.size() < fewest)
     throw Error(ExitCode::usage, v.name + ": it holds " + std::to_string(v.points_mm.size()) +
                                      (markers ? " markers, " : " points, ") + std::to_string(fewest) + " are needed");
@@ -313,7 +313,7 @@ void SurfaceGoal::widen_by_noise(std::span<const Vec3> shape) {
     most = std::max(most, by[p]);
     sum += by[p] * by[p];
   }
-  const double least = std::max(1e-4 * views_[0].shift, kLeastNoise * std::sqrt(sum / static_cast<double>(x.size())));
+  const double least = std::max(1e-4 * views_[0].shift, kMinNoise * std::sqrt(sum / static_cast<double>(x.size())));
   for (std::size_t k = 0; k < views_.size(); ++k) {
     View& v = views_[k];
     std::vector<double> off, anywhere;

@@ -5,7 +5,7 @@
 namespace osteo::inline simulation {
 
 double VoxelCutting::rate_mm3_per_s(double force_n, double bone_mm3_per_s_per_n) {
-  return std::min(force_n * bone_mm3_per_s_per_n * kEasierThanBone, kMostMm3PerS);
+  return std::min(force_n * bone_mm3_per_s_per_n * kEasierThanBone, kMaxMm3PerS);
 }
 
 VoxelCutting::VoxelCutting(const TissueModel& model, double voxel_mm3)
@@ -14,7 +14,7 @@ VoxelCutting::VoxelCutting(const TissueModel& model, double voxel_mm3)
 bool VoxelCutting::cut(TissueDynamics<float>& body, const RigidShape& tool, double mm3, std::size_t number) {
   if (number >= saved_mm3_.size()) saved_mm3_.resize(number + 1);
   double& saved_mm3 = saved_mm3_[number];
-  saved_mm3 = std::min(saved_mm3 + mm3, kMostSaved * voxel_mm3_);
+  saved_mm3 = std::min(saved_mm3 + mm3, kMaxSaved * voxel_mm3_);
   if (saved_mm3 < voxel_mm3_) return false;
   const auto x = body.positions_mm();
   const RigidShape::Ball near = tool.bounds();

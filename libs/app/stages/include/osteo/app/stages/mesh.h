@@ -96,7 +96,7 @@ struct SkinParams {
   SkinMethod method = SkinMethod::embedded;
   int neighbours = 5;
 };
-struct SkinStage {
+struct EmbedSurfaceStage {
   using Params = SkinParams;
   static void describe(Params& p, auto& visit) {
     visit(

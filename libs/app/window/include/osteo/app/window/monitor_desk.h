@@ -21,8 +21,8 @@ struct RemoteStimulator {
   std::function<std::size_t()> hands;  ///< of the rehearsal there
 };
 
-/// Follows one rehearsal: events become notes of its session ("monitor"; settings of the stimulator as `osteo monitor`
-/// reads them). Or shows what is told of a monitor that runs somewhere else.
+/// Follows one rehearsal: events become notes of its session ("monitor"; settings of the stimulator as `osteo
+/// nerve-monitor` reads them). Or shows what is told of a monitor that runs somewhere else.
 class MonitorDesk {
  public:
   /// Before it starts; it must outlive this.

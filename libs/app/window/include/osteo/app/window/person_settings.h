@@ -48,7 +48,7 @@ struct PersonValues {
 
 class PersonSettings {
  public:
-  static constexpr std::size_t kMostCases = 12;
+  static constexpr std::size_t kMaxCases = 12;
   /// Reads the file where there is one. Never throws: what is wrong with it is told in complaints(), and the rest is
   /// taken.
   explicit PersonSettings(std::filesystem::path file);

@@ -31,12 +31,12 @@ struct ScoreFinding {
   std::string structure;
   std::optional<double> value, limit;  ///< limit: what it is held against
   std::string unit;
-  std::vector<double> times_s;   ///< moments to look at, by time; at most kMostTimes
+  std::vector<double> times_s;   ///< moments to look at, by time; at most kMaxTimes
   std::optional<Vec3> at_mm;     ///< where to look; in the frame of the bone as it lay at the beginning
-  std::vector<Vec3> places_mm;   ///< voxels or places that prove it; at most kMostPlaces, evenly chosen
+  std::vector<Vec3> places_mm;   ///< voxels or places that prove it; at most kMaxPlaces, evenly chosen
   std::size_t places_count = 0;  ///< of all
   double places_each = 0;        ///< mm2 or mm3 that one of all stands for, 0 where they are no amounts
-  static constexpr std::size_t kMostTimes = 200, kMostPlaces = 20'000;
+  static constexpr std::size_t kMaxTimes = 200, kMaxPlaces = 20'000;
 };
 
 /// Where the score alone says nothing of good or bad. Proposals, fitted to nothing.

@@ -42,7 +42,7 @@ struct TimelineEvent {
 /// Arrays of one length; sample n stands for [n, n + 1) tenths of a second. What is not known is not a number.
 struct Timeline {
   static constexpr double kRateHz = 10;
-  static constexpr std::size_t kMostEvents = 20'000;
+  static constexpr std::size_t kMaxEvents = 20'000;
 
   std::vector<std::uint8_t> known;     ///< 1: recorded at least in part
   std::vector<std::uint8_t> drilling;  ///< 1: a burr turns and presses on bone at some tick of it
@@ -59,7 +59,7 @@ struct Timeline {
   static constexpr std::uint8_t kPlate = 255;
 
   std::vector<TimelineEvent> events;  ///< by time
-  std::size_t events_left_out = 0;    ///< behind the first kMostEvents
+  std::size_t events_left_out = 0;    ///< behind the first kMaxEvents
   std::map<std::uint8_t, std::string> structure_names;
 
   [[nodiscard]] std::size_t size() const { return known.size(); }
@@ -89,7 +89,7 @@ class TimelineKeeper {
     std::vector<Near> touch, injury;  // by number in values()
   };
   std::size_t sample_at(std::uint64_t tick);
-  std::size_t add(TimelineEvent event);  // its number; kMostEvents where there is no room
+  std::size_t add(TimelineEvent event);  // its number; kMaxEvents where there is no room
   void near(const EvidenceFrame& frame, const TickRecord& tick, std::size_t sample);
   void act(const SceneAction& action, double rate_hz);
 

@@ -36,11 +36,11 @@ struct MovieTimes {
 };
 /// round(shown * fps / speed) frames, at least one; each shows the end of its share, so that the last one shows the
 /// end. `to_s` below 0: to the session's end. With `skip_idle` what is idle for more than kIdleS is left out but for
-/// kRestS at either end. Error(usage) for a range that holds nothing of the session, or more than kMostFrames.
+/// kRestS at either end. Error(usage) for a range that holds nothing of the session, or more than kMaxFrames.
 [[nodiscard]] MovieTimes movie_times(const SessionSurvey& survey, double from_s, double to_s, double speed, int fps,
                                      bool skip_idle);
 inline constexpr double kIdleS = 2, kRestS = 0.4;
-inline constexpr std::uint64_t kMostFrames = 10'000'000;
+inline constexpr std::uint64_t kMaxFrames = 10'000'000;
 
 struct MovieFacts {
   std::uint64_t frames = 0;

@@ -15,9 +15,9 @@ namespace osteo::inline assessment {
 /// be the same: docs/movie.md).
 class MovieFile {
  public:
-  static constexpr int kLeastEdge = 64, kMostEdge = 7680, kMostFps = 120;
+  static constexpr int kMinEdge = 64, kMaxEdge = 7680, kMaxFps = 120;
 
-  /// Writes over `path`. `width`, `height`: even, kLeastEdge to kMostEdge; `fps`: 1 to kMostFps; else Error(usage), as
+  /// Writes over `path`. `width`, `height`: even, kMinEdge to kMaxEdge; `fps`: 1 to kMaxFps; else Error(usage), as
   /// for another ending than .mp4 and .webm. Error(failed) where this machine's libav has no encoder for it (says which
   /// would do). Error(cannot_write).
   MovieFile(const std::filesystem::path& path, int width, int height, int fps);

@@ -39,8 +39,8 @@ struct ForceProfile {
   double drilled_s = 0;                                               ///< near it
   std::vector<IsotonicQuantile::Point> middle, most;                  ///< half of the samples are below, nine in ten
   std::vector<IsotonicQuantile::Point> experts_middle, experts_most;  ///< empty: no reference
-  std::vector<std::array<float, 2>> samples;  ///< distance, force; at most kMostSamples, evenly chosen
-  static constexpr std::size_t kMostSamples = 1500;
+  std::vector<std::array<float, 2>> samples;  ///< distance, force; at most kMaxSamples, evenly chosen
+  static constexpr std::size_t kMaxSamples = 1500;
 };
 
 /// Triangles in 16 bits a coordinate, for the 3D view of the page.

@@ -73,6 +73,20 @@ template <class S>
   return std::move(collect.fields);
 }
 
+/// A name that a command, stage or field had in version 0.1, and the one that it has now. The old one is accepted
+/// until version 0.3.
+struct OldName {
+  std::string_view old, current;
+};
+[[nodiscard]] std::span<const OldName> old_command_names();
+[[nodiscard]] std::span<const OldName> old_field_names();
+/// The current name of a command or stage: `name` itself when that is not an old one.
+[[nodiscard]] std::string_view current_command(std::string_view name);
+/// "'series' is now called 'list-series'; the old name is accepted until version 0.3".
+[[nodiscard]] std::string renamed_text(std::string_view old, std::string_view current);
+/// The field of this name, or of this old name; null when there is none.
+[[nodiscard]] const FieldRef* find_field(std::span<const FieldRef> fields, std::string_view name);
+
 /// The entry of `known` nearest to `word` by edit distance, or empty when nothing is near.
 [[nodiscard]] std::string nearest_name(std::string_view word, std::span<const std::string> known);
 

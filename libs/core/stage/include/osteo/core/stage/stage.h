@@ -94,7 +94,7 @@ class Registry {
   void add() {
     makers_.push_back([]() -> std::unique_ptr<Stage> { return std::make_unique<StageOf<S>>(); });
   }
-  /// Error(usage), with the nearest right name, when there is none of that name.
+  /// By its name, or by the one it had in version 0.1. Error(usage), with the nearest right name, when there is none.
   [[nodiscard]] std::unique_ptr<Stage> make(std::string_view name) const;
   [[nodiscard]] bool has(std::string_view name) const;
   [[nodiscard]] std::vector<std::string> names() const;

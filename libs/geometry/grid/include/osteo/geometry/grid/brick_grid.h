@@ -22,7 +22,7 @@ struct Ijk {
 using VoxelKey = std::uint32_t;
 
 /// The set of bricks is fixed when the grid is made; values may change. A voxel outside every brick reads as 0.
-/// Limits: kMostBricks bricks, since names are 32 bits wide (17 GB of densities), in a box of at most kMostCells bricks
+/// Limits: kMaxBricks bricks, since names are 32 bits wide (17 GB of densities), in a box of at most kMaxCells bricks
 /// (a table of 0.5 GB: 0.2 mm over 820 mm each way), 2^17 - 1 of them along an axis. One thread writes (`set`), others
 /// may read at the same time (`at`): each value is a relaxed atomic, so a reader sees old or new values, never torn
 /// ones. A copy has values of its own; sharing() gives a grid that has all bricks in common with this one, until one of
@@ -36,9 +36,9 @@ class BrickGrid {
   static constexpr int kEdge = 8;
   static constexpr int kVoxels = kEdge * kEdge * kEdge;
   static constexpr std::uint32_t kNone = 0xffffffffU;
-  static constexpr std::uint32_t kMostBricks =
+  static constexpr std::uint32_t kMaxBricks =
       (1U << 23) - 1;  ///< one less than there are numbers: kNone is the last voxel's name
-  static constexpr std::uint64_t kMostCells = 1ULL << 27;
+  static constexpr std::uint64_t kMaxCells = 1ULL << 27;
 
   BrickGrid() = default;
   /// All-zero bricks at the given brick coordinates (>= 0, each at most once, any order; they are sorted z, y, x).
@@ -124,12 +124,12 @@ class BrickGrid {
 
 /// Whether so many bricks, or bricks within a box of so many along each axis, are more than a BrickGrid takes.
 [[nodiscard]] constexpr bool too_many_bricks(std::uint64_t bricks) {
-  return bricks > BrickGrid::kMostBricks;
+  return bricks > BrickGrid::kMaxBricks;
 }
 [[nodiscard]] constexpr bool too_wide_for_bricks(std::array<std::uint64_t, 3> n) {
   // Along an axis 2^20 voxels less a brick: surfaces name a cell by 20 bits an axis. That also keeps the products from
   // overflowing.
-  constexpr std::uint64_t most = BrickGrid::kMostCells, along = (std::uint64_t{1} << 17) - 1;
+  constexpr std::uint64_t most = BrickGrid::kMaxCells, along = (std::uint64_t{1} << 17) - 1;
   return n[0] > along || n[1] > along || n[2] > along || n[0] * n[1] > most || n[0] * n[1] * n[2] > most;
 }
 /// All leaves that hold a value > 0, or with `all` every leaf that stores anything. O(stored voxels). Error(corrupt)

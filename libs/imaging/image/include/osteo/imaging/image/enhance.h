@@ -28,9 +28,9 @@ struct Sharpness {
 
 struct MetalParams {
   double metal_hu = 2500;
-  double least_mm2 = 3;
+  double min_area_mm2 = 3;
 };
-/// On slices that hold metal (at or above `metal_hu`, at least `least_mm2` of it) the sums along lines through the
+/// On slices that hold metal (at or above `metal_hu`, at least `min_area_mm2` of it) the sums along lines through the
 /// metal are taken from the lines beside it, and the difference is projected back (W. Kalender et al., Reduction of CT
 /// artifacts caused by metallic implants, Radiology 1987); then again, what a picture of tissue classes explains taken
 /// off before (after E. Meyer et al., Normalized metal artifact reduction, Medical Physics 2010). On at most 256 x 256

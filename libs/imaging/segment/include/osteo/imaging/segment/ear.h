@@ -34,7 +34,7 @@ struct EarParams {
   std::string what =
       "ear_canal,air_cells,sigmoid_sinus,tegmen,dura";  ///< names of EarStructure, with commas; "all" for all
   std::array<double, 3> labyrinth_mm{0, 0, 0};          ///< a point within the labyrinth, LPS; needed for it
-  double least_quality = 0.3;                           ///< what is below is not found
+  double min_quality = 0.3;                             ///< what is below is not found
 };
 
 struct EarFinding {

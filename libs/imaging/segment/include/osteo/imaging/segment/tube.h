@@ -23,10 +23,10 @@ enum class TubeKind : int { nerve, vessel };
 
 struct TubeParams {
   TubeKind kind = TubeKind::nerve;
-  double max_radius_mm = 2.5;  ///< 0.2 to 5
-  double content_hu = 40;      ///< what fills a nerve's canal; thin canals show less of it. Vessels: not used
-  double snap_mm = 1;          ///< a given point may move this far to the nearest tube
-  double max_unsure_mm = 4;    ///< a longer stretch without walls and without a given point is an error
+  double max_radius_mm = 2.5;   ///< 0.2 to 5
+  double lumen_hu = 40;         ///< what fills a nerve's canal; thin canals show less of it. Vessels: not used
+  double snap_mm = 1;           ///< a given point may move this far to the nearest tube
+  double max_uncertain_mm = 4;  ///< a longer stretch without walls and without a given point is an error
 };
 
 /// A place along the centre line.
@@ -55,7 +55,7 @@ struct Tube {
 /// Confidence comes from walls, roundness, evenness along the line and the way's length by weights that were fitted on
 /// nerves whose truth is known; docs/structures.md has how often it is true. Vessels were not among them. O(volume
 /// around the points). Errors: usage for fewer than two points or a point outside; failed when a stretch longer than
-/// max_unsure_mm has no walls, or three quarters of the line: the points are not joined by a tube. Y. Sato et al.,
+/// max_uncertain_mm has no walls, or three quarters of the line: the points are not joined by a tube. Y. Sato et al.,
 /// Three-dimensional multi-scale line filter, Med. Image Anal. 1998; half-way edges: S. Prevrhal et al. 1999.
 [[nodiscard]] Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubeParams& params,
                               const Context& context = {});

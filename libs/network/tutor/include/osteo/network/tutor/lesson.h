@@ -35,7 +35,7 @@ struct Lesson {
 /// From `from_s` to `to_s` (0: the end). Errors: corrupt, where this version cannot repeat the session, or ticks are
 /// missing there; usage, where the part is empty, where something is done in it that other bone follows from than from
 /// hands alone (saw, split, move, plates, undo, soft tissue, another guide), where a curve holds the first hand, or
-/// where it has more than kMostHands - 1 hands. Each says when.
+/// where it has more than kMaxHands - 1 hands. Each says when.
 [[nodiscard]] Lesson read_lesson(const SessionReader& session, double from_s, double to_s);
 
 /// The way of samples: points, not of resting.

@@ -148,17 +148,17 @@ struct PeerStatus {
 };
 
 /// The side that runs the session. As a reader of its stream it keeps all ticks, in 28 bytes a hand, and gives them to
-/// whoever has joined. After kMostTicks (half an hour at 1 kHz) there is no room for more: lost(), all who have joined
+/// whoever has joined. After kMaxTicks (half an hour at 1 kHz) there is no room for more: lost(), all who have joined
 /// are told that there is no more of it, and each keeps the copy that it has. receive(), poll() and status() from one
 /// thread each; memory is bounded whatever comes in.
 ///
-/// Who joins is found out by PairingHost. Seats: one trainee and at most kMostPeers in all. Whoever comes back from the
+/// Who joins is found out by PairingHost. Seats: one trainee and at most kMaxPeers in all. Whoever comes back from the
 /// same address takes its own seat again; one that has been silent for a second gives its seat to who has proved to
 /// know the code, and whether it is silent is waited for. While a trainee's seat waits for one that has dropped,
 /// watchers are let in 2 s later: the trainee comes first.
 class LiveHost final : public Reader, private PairingSeats {
  public:
-  static constexpr std::size_t kMostPeers = 9, kMostTicks = 1'800'000;
+  static constexpr std::size_t kMaxPeers = 9, kMaxTicks = 1'800'000;
 
   /// `settings`: what a copy needs before the first tick. `hands` of the session.
   LiveHost(std::string_view tidy_code, Bytes settings, std::size_t hands, std::shared_ptr<FarDevice> far);
@@ -221,7 +221,7 @@ inline constexpr std::uint64_t kMarkTicks = 1000;
 /// A tick of the session, as the host had it.
 struct LiveTick {
   std::uint64_t tick = 0;
-  std::array<DeviceSample, kMostHands> hands;
+  std::array<DeviceSample, kMaxHands> hands;
   std::vector<SceneAction> actions;
 };
 
@@ -271,7 +271,7 @@ class LiveGuest {
   void hear(const LogPacket& p, std::int64_t now_us);
   void hear(const BlobPacket& p);
   void take_session(std::uint64_t session);
-  static constexpr std::size_t kMostWaiting = 8192;
+  static constexpr std::size_t kMaxWaiting = 8192;
   const JoinRole role_;
   std::shared_ptr<FarDevice> host_hand_;
   JoinState state_ = JoinState::asking;

@@ -7,9 +7,9 @@ namespace osteo::inline network {
 
 /// All that the sessions before `session` have done to the case's bone, as a session file of no ticks: actions and
 /// changes in their order, so that undo goes back in the copy as it does in the original. Empty where it goes on from
-/// none. Errors: corrupt; failed, where one of them lacks ticks, or all are more than kMostPastBytes.
+/// none. Errors: corrupt; failed, where one of them lacks ticks, or all are more than kMaxPastBytes.
 [[nodiscard]] Bytes past_bytes(const SessionFolder& session);
-inline constexpr std::size_t kMostPastBytes = std::size_t{15} << 20;
+inline constexpr std::size_t kMaxPastBytes = std::size_t{15} << 20;
 
 /// That of a session's settings (settings_bytes()). Error(corrupt).
 [[nodiscard]] Bytes past_of(const Bytes& settings);

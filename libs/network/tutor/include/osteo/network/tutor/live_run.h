@@ -31,12 +31,12 @@ class FarHand final : public Device {
   std::shared_ptr<FarDevice> far_;
 };
 
-/// Takes packets and sends them in a thread of its own, at most kMostPackets between two looks at what is to be sent: a
+/// Takes packets and sends them in a thread of its own, at most kMaxPackets between two looks at what is to be sent: a
 /// flood costs this thread, and what the system's buffer does not hold, but no other. The same thread follows the
 /// session's stream, beside its other readers, which may take longer.
 class HostThread {
  public:
-  static constexpr int kMostPackets = 2000;
+  static constexpr int kMaxPackets = 2000;
   /// Before `rehearsal` starts, and gone before it. Errors: of UdpSocket.
   HostThread(LiveHost& host, Rehearsal& rehearsal, const std::string& address, int port);
   ~HostThread();

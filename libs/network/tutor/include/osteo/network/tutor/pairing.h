@@ -45,15 +45,15 @@ class PairingSeats {
                                            std::int64_t now_us) = 0;
 };
 
-/// The host's side, for all who ask. Memory: at most kMostAttempts entries of about 300 bytes. Cost: a packet about 1
+/// The host's side, for all who ask. Memory: at most kMaxAttempts entries of about 300 bytes. Cost: a packet about 1
 /// us; the group's operations (0.2 ms) at most kPairingsPerS times a second for those who ask and as often for those
 /// who prove, so that strangers who ask keep nobody from proving; other answers at most kAnswersPerS times. Not
 /// thread-safe.
 class PairingHost {
  public:
   static constexpr int kTries = 3, kPairingsPerS = 20, kAnswersPerS = 400;
-  /// An attempt is not pushed out by others before kMostAttempts / kPairingsPerS = 3.2 s, longer than a proof takes.
-  static constexpr std::size_t kMostAttempts = 64;
+  /// An attempt is not pushed out by others before kMaxAttempts / kPairingsPerS = 3.2 s, longer than a proof takes.
+  static constexpr std::size_t kMaxAttempts = 64;
   static constexpr std::int64_t kForgetUs = 10'000'000;  ///< after the last packet of an attempt
 
   explicit PairingHost(std::string_view tidy_code) : code_(tidy_code) {}

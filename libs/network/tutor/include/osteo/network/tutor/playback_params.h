@@ -37,7 +37,7 @@ struct PlaybackParams {
   double forward = 1;
   double most_n = 3;
   double dead_zone_mm = 1;
-  double leash_mm = 2;
+  double tolerance_radius_mm = 2;
   double ramp_s = 1;
   double forget = 0.85;
   double trial_s = 5;
@@ -64,11 +64,12 @@ struct PlaybackParams {
     visit({"forward", "show: share of the expert's force that is felt (0: none), less the farther the hand is away", "",
            0, 2},
           p.forward);
-    visit({"most_n", "all that leads the hand is no more", "N", 0, 20}, p.most_n);
+    visit({"max_force_n", "all that leads the hand is no more", "N", 0, 20}, p.most_n);
     visit({"dead_zone_mm", "fading, amplify: apart so far counts as right; with --experts it is measured", "mm", 0, 20},
           p.dead_zone_mm);
-    visit({"leash_mm", "farther from who is led time waits; pace way: twice as far behind it goes back", "mm", 0.2, 50},
-          p.leash_mm);
+    visit({"tolerance_radius_mm", "farther from who is led time waits; pace way: twice as far behind it goes back",
+           "mm", 0.2, 50},
+          p.tolerance_radius_mm);
     visit({"ramp_s", "over which the pull comes and goes", "s", 0.01, 10}, p.ramp_s);
     visit({"forget", "fading: of the pull, what is left after a trial without errors", "", 0, 0.99}, p.forget);
     visit({"trial_s", "fading: length of a trial, in the lesson's time", "s", 0.5, 600}, p.trial_s);

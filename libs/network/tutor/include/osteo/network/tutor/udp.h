@@ -26,7 +26,7 @@ class UdpSocket {
   [[nodiscard]] int port() const;
   /// What cannot be sent is lost, as on the way; false: it was lost here.
   bool send(const UdpPeer& to, std::span<const std::uint8_t> bytes) noexcept;
-  /// The next packet, where one is here; longer ones than kMostPacketBytes and 64 are cut, which whoever opens them
+  /// The next packet, where one is here; longer ones than kMaxPacketBytes and 64 are cut, which whoever opens them
   /// finds.
   [[nodiscard]] std::optional<std::span<const std::uint8_t>> receive(UdpPeer& from) noexcept;
   /// Until a packet is here, at most so long.
@@ -34,7 +34,7 @@ class UdpSocket {
 
  private:
   int fd_ = -1, family_ = 0;
-  std::array<std::uint8_t, kMostPacketBytes + 64> buffer_{};
+  std::array<std::uint8_t, kMaxPacketBytes + 64> buffer_{};
 };
 
 }  // namespace osteo::inline network

@@ -15,7 +15,7 @@ namespace osteo::inline network {
 /// Raised when a packet means something else: others are not understood, and say so.
 inline constexpr std::uint8_t kTutorProtocol = 4;
 /// With what encryption adds it stays under the usual 1280 bytes of a path.
-inline constexpr std::size_t kMostPacketBytes = 1200;
+inline constexpr std::size_t kMaxPacketBytes = 1200;
 using Bytes = std::vector<std::uint8_t>;
 
 /// Where a packet comes from or goes to. IPv4 as IPv6 has it (mapped, RFC 4291).
@@ -42,7 +42,7 @@ struct BoneMark {
 
 /// From who joined: the newest samples of the hand (none from a watcher), and how far its copy is.
 struct HandPacket {
-  static constexpr std::size_t kMost = 16;
+  static constexpr std::size_t kMax = 16;
   WireTimes times;
   std::uint64_t next_tick = 0;   ///< of the log: the first that it lacks
   std::uint32_t blob_bytes = 0;  ///< of the settings: so many it has
@@ -58,7 +58,7 @@ enum class LogState : std::uint8_t { runs, over, lost };
 
 /// From who runs the session: ticks as they were, with what was done at their beginnings.
 struct LogPacket {
-  static constexpr std::size_t kMostTicks = 12, kMostActions = 3;
+  static constexpr std::size_t kMaxTicks = 12, kMaxActions = 3;
   WireTimes times;
   std::uint64_t session = 0;  ///< another number, another session
   std::uint64_t first_tick = 0;
@@ -72,8 +72,8 @@ struct LogPacket {
 
 /// A piece of what a copy has to know before the first tick.
 struct BlobPacket {
-  static constexpr std::size_t kMost = 1000;
-  static constexpr std::uint32_t kMostTotal = 1U << 24;
+  static constexpr std::size_t kMax = 1000;
+  static constexpr std::uint32_t kMaxTotal = 1U << 24;
   WireTimes times;
   std::uint64_t session = 0;
   std::uint32_t total = 0, offset = 0;

@@ -12,11 +12,11 @@
 namespace osteo::inline network {
 
 /// In a thread of its own: connects, and again twice a second where there is no server or it went; cuts what comes into
-/// messages. Reads no faster than kMostBytes a second, so that a server that floods fills its own queue. Sends what it
-/// is told to, at most kMostWaiting bytes at a time. Memory: most_body and kMostWaiting.
+/// messages. Reads no faster than kMaxBytes a second, so that a server that floods fills its own queue. Sends what it
+/// is told to, at most kMaxWaiting bytes at a time. Memory: most_body and kMaxWaiting.
 class WireClient {
  public:
-  static constexpr std::size_t kMostBytes = 32 << 20, kMostWaiting = 64 << 10;
+  static constexpr std::size_t kMaxBytes = 32 << 20, kMaxWaiting = 64 << 10;
   using Take = std::function<void(const IgtlMessage&)>;
 
   /// `take` is called in its thread, `idle` there too, about every 10 ms. A name is looked up at each attempt.

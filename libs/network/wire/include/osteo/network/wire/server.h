@@ -26,7 +26,7 @@ struct WireAddress {
 struct WireCounts {
   std::size_t clients = 0;        ///< there now
   std::uint64_t accepted = 0;     ///< came
-  std::uint64_t turned_away = 0;  ///< since kMostClients were there
+  std::uint64_t turned_away = 0;  ///< since kMaxClients were there
   std::uint64_t messages = 0;     ///< sent whole, to all of them together
   std::uint64_t dropped = 0;      ///< since a client did not keep up, counted for each
   std::uint64_t bytes = 0;        ///< sent
@@ -35,14 +35,14 @@ struct WireCounts {
 
 /// In a thread of its own. A client has a queue of its own: what does not fit is dropped, as whole messages, for this
 /// client alone, and counted; when there is room again `notice` tells it how many. A client that takes nothing for
-/// kMostSilentS with a full queue is cut off. Whatever clients send is read no faster than kMostHeard a second and
-/// forgotten, but for what answer() is for. Memory: kMostClients times kMostQueued at most.
+/// kMaxSilentS with a full queue is cut off. Whatever clients send is read no faster than kMaxHeard a second and
+/// forgotten, but for what answer() is for. Memory: kMaxClients times kMaxQueued at most.
 class WireServer {
  public:
-  static constexpr std::size_t kMostClients = 8, kMostQueued = 4 << 20, kMostHeard = 256 << 10;
-  static constexpr double kMostSilentS = 10;
+  static constexpr std::size_t kMaxClients = 8, kMaxQueued = 4 << 20, kMaxHeard = 256 << 10;
+  static constexpr double kMaxSilentS = 10;
   using Notice = std::function<WireBytes(std::uint64_t dropped)>;
-  static constexpr std::size_t kMostAsked = 1024;  ///< bytes of a message that is heard
+  static constexpr std::size_t kMaxAsked = 1024;  ///< bytes of a message that is heard
   /// In the server's thread: what a client has said, and what it alone is answered; that it has gone.
   struct Answer {
     std::function<std::vector<WireBytes>(std::uint64_t client, const IgtlMessage& message)> hear;
@@ -50,7 +50,7 @@ class WireServer {
   };
 
   /// Port 0: any that is free. Errors: usage, no such address on this machine; failed, the port is taken.
-  WireServer(const WireAddress& address, Notice notice, double most_silent_s = kMostSilentS);
+  WireServer(const WireAddress& address, Notice notice, double most_silent_s = kMaxSilentS);
   ~WireServer();
   WireServer(const WireServer&) = delete;
   WireServer& operator=(const WireServer&) = delete;
@@ -59,7 +59,7 @@ class WireServer {
   void send(WireBytes message);
   /// What each client is told first; those who are there already, now.
   void greet(std::vector<WireBytes> messages);
-  /// From now on messages of clients are heard; what is no OpenIGTLink, or longer than kMostAsked, is not.
+  /// From now on messages of clients are heard; what is no OpenIGTLink, or longer than kMaxAsked, is not.
   void answer(Answer answer);
   /// Until so many clients are there, at most so long, or `stop` says so. False: they are not.
   bool wait_for_clients(std::size_t clients, double most_s, const std::function<bool()>& stop = {}) const;
@@ -74,7 +74,7 @@ class WireServer {
   struct Client {
     int fd = -1;
     std::uint64_t number = 0;
-    IgtlParser parser{kMostAsked};
+    IgtlParser parser{kMaxAsked};
     bool understood = true;
     std::deque<Shared> queue;
     std::size_t queued = 0;     // bytes

@@ -20,13 +20,13 @@ namespace osteo::inline network {
 
 inline constexpr std::string_view kStimulatorType = "OSTEO_STIM";
 
-/// The rehearsal's side, for all who are connected. Three wrong codes close it. At most kMostMessagesS messages of each
-/// client a second are looked at, and kMostPairingsS pairings of all. Memory: about 300 bytes a client. hear() and
+/// The rehearsal's side, for all who are connected. Three wrong codes close it. At most kMaxMessagesS messages of each
+/// client a second are looked at, and kMaxPairingsS pairings of all. Memory: about 300 bytes a client. hear() and
 /// gone() from one thread, the rest from any.
 class StimulatorDoor {
  public:
   static constexpr int kTries = 3;
-  static constexpr double kMostMessagesS = 100, kMostPairingsS = 20;
+  static constexpr double kMaxMessagesS = 100, kMaxPairingsS = 20;
   using Set = std::function<void(const StimulatorSetting&)>;
   /// As it is set now, and how many hands there are.
   using Now = std::function<std::pair<StimulatorSetting, std::uint32_t>()>;
@@ -46,14 +46,14 @@ class StimulatorDoor {
     Pairing::Nonce guest{}, host{};
     std::optional<Pairing> pairing;
     std::optional<SecureChannel> channel;
-    double messages = kMostMessagesS, last_s = 0;
+    double messages = kMaxMessagesS, last_s = 0;
   };
   [[nodiscard]] std::vector<WireBytes> take(Client& client, std::span<const std::uint8_t> body);
   const std::string code_;
   const Set set_;
   const Now now_;
   std::map<std::uint64_t, Client> clients_;
-  double pairings_ = kMostPairingsS, last_s_ = 0;
+  double pairings_ = kMaxPairingsS, last_s_ = 0;
   mutable std::mutex mutex_;
   Counts counts_;
 };

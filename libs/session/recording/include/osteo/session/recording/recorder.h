@@ -25,11 +25,11 @@ class Backlog;
 /// a time only what bone became and what was done is kept, 8 bytes for each voxel that changed and 128 for each action.
 class Recorder {
  public:
-  static constexpr std::size_t kMostWaitingBytes = std::size_t{32} << 20;
+  static constexpr std::size_t kMaxWaitingBytes = std::size_t{32} << 20;
   /// Of a frame: what a kill may lose, and how exactly a session is opened at a time.
   static constexpr double kFrameS = 0.1;
   /// Notes that wait for their frame.
-  static constexpr std::size_t kMostNotes = 4096, kLongestNote = 64 << 10;
+  static constexpr std::size_t kMaxNotes = 4096, kLongestNote = 64 << 10;
   /// Room in the reader's ring for the time in which even the first thread does not come to run: half a minute at 1
   /// kHz.
   static constexpr std::size_t kTickCapacity = 1 << 15;
@@ -38,7 +38,7 @@ class Recorder {
   Recorder(StreamReader& reader, const std::filesystem::path& path, const SessionHeader& header)
       : Recorder(reader, session_file(path), header) {}
   Recorder(StreamReader& reader, std::unique_ptr<SessionSink> sink, const SessionHeader& header,
-           std::size_t most_waiting_bytes = kMostWaitingBytes);
+           std::size_t most_waiting_bytes = kMaxWaitingBytes);
   /// Waits for the disk.
   ~Recorder();
   Recorder(const Recorder&) = delete;

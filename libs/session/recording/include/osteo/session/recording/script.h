@@ -18,7 +18,7 @@ namespace osteo::inline session {
 
 /// The strokes of hand 0, and what else a session needs.
 struct Script : Strokes {
-  std::vector<Strokes> more_hands;  ///< hands 1, 2, ...: at most kMostHands - 1
+  std::vector<Strokes> more_hands;  ///< hands 1, 2, ...: at most kMaxHands - 1
   struct TimedAction {
     double t_s = 0;
     SceneAction action;

@@ -58,7 +58,7 @@ struct TakenBack {
 };
 
 struct TakeBackOptions {
-  bool by_place = false;  ///< also what bears no mark, if it lies where the case's bone lies
+  bool match_by_position = false;  ///< also what bears no mark, if it lies where the case's bone lies
 };
 
 /// Reads all .seg.nrrd of `folder` (or the file itself). Segments are told by kStructureTag, else by name; "bone" is

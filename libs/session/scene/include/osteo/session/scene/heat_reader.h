@@ -110,7 +110,7 @@ class HeatReader final : public Reader {
   std::size_t applied_early_ = 0;  // pending when ticks were lost, whose action is still to be told
   std::uint64_t every_ = 1, restarts_ = 0;
   SceneAction water_;
-  std::array<CuttingGuide, kMostHands> guides_{};
+  std::array<CuttingGuide, kMaxHands> guides_{};
   HeatLedger retired_;
   double hottest_c_;
   // Of each place on a face: whose, and what it has been through.

@@ -102,8 +102,8 @@ class MonitorReader final : public Reader {
   std::unique_ptr<HeatReader> heat_;
   std::optional<World> world_;
   std::vector<MonitorSink*> sinks_;
-  std::array<Hand, kMostHands> hands_;
-  std::array<std::vector<Nearest>, kMostHands> nearest_;
+  std::array<Hand, kMaxHands> hands_;
+  std::array<std::vector<Nearest>, kMaxHands> nearest_;
   std::vector<NerveStress> stresses_;
   std::vector<NerveModel::Warmth> warmth_;
   std::vector<std::vector<ThermalDose>> doses_;

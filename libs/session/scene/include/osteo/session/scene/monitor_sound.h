@@ -28,10 +28,10 @@ class MonitorNotes final : public MonitorSink {
 
 /// Between the thread that follows the stream and that of the sound card. Silent while a stimulus' artefact lasts, and
 /// where it is muted. Latency, behind the block that a monitor tells: the tone begins with the next mix(), the signal
-/// at most kMostWaitingS later; what waits for longer is left out. Memory: fixed.
+/// at most kMaxWaitingS later; what waits for longer is left out. Memory: fixed.
 class MonitorSound final : public MonitorSink {
  public:
-  static constexpr double kMostWaitingS = 0.04, kToneS = 0.15, kBlankingS = 0.004;
+  static constexpr double kMaxWaitingS = 0.04, kToneS = 0.15, kBlankingS = 0.004;
   static constexpr float kToneHz = 1000, kFullScaleUv = 500;
 
   MonitorSound();

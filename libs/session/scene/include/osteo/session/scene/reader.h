@@ -63,7 +63,7 @@ class ReaderHub {
   void end(std::uint64_t ticks);
 
   [[nodiscard]] std::uint64_t ticks_lost() const { return ticks_lost_; }
-  /// The last record taken of a hand (below kMostHands).
+  /// The last record taken of a hand (below kMaxHands).
   [[nodiscard]] const TickRecord& latest(std::size_t hand = 0) const { return latest_[hand]; }
 
  private:
@@ -78,7 +78,7 @@ class ReaderHub {
   std::map<std::uint32_t, SceneAction> standing_;  // by kind: what goes on until the next of its kind: sucker, water
   std::vector<TickRecord> ticks_;
   std::vector<VoxelChange> changes_;
-  std::array<TickRecord, kMostHands> latest_;
+  std::array<TickRecord, kMaxHands> latest_;
   std::optional<std::uint64_t> next_tick_;
   std::uint64_t ticks_lost_ = 0, actions_dropped_ = 0;
 };

@@ -72,7 +72,7 @@ struct RehearsalSummary {
   std::optional<Dust::Totals> dust;                     ///< where the scene has dust
   double voxel_mm3 = 0;                                 ///< turns the mass of a piece into a volume
   std::vector<LiveComponents::Component>
-      pieces;              ///< of at least PiecesReader::kLeastPieceMm3, largest first; empty unless they were followed
+      pieces;              ///< of at least PiecesReader::kMinPieceMm3, largest first; empty unless they were followed
   std::size_t bodies = 1;  ///< that move on their own
   std::vector<Fixture> fixtures;
   std::optional<LoopStats> loop;      ///< only when it ran in real time
@@ -144,7 +144,7 @@ class Rehearsal {
   /// Soft tissue cut off; 0 where the scene has none.
   [[nodiscard]] double tissue_mm3() const { return tissue_mm3_; }
   [[nodiscard]] bool realtime() const { return loop_ && loop_->realtime(); }
-  /// Parts that hang together, of at least PiecesReader::kLeastPieceMm3, as last seen; 0 unless they are followed.
+  /// Parts that hang together, of at least PiecesReader::kMinPieceMm3, as last seen; 0 unless they are followed.
   [[nodiscard]] int pieces() const { return pieces_; }
   /// Null where the scene has none.
   [[nodiscard]] const StructureMap* structures() const { return options_.anatomy.structures.get(); }
@@ -204,7 +204,7 @@ class Rehearsal {
   ReaderHub keeper_;  // strokes and counts: drained beside the others, however long those are kept from it
   std::uint64_t strokes_dropped_ = 0;
   std::atomic<bool> strokes_lost_{false};
-  std::array<Seqlock<TickRecord>, kMostHands> latest_;
+  std::array<Seqlock<TickRecord>, kMaxHands> latest_;
   std::atomic<double> tissue_mm3_{0};
   std::atomic<int> pieces_{0};
   std::unique_ptr<FixedRateLoop> loop_;

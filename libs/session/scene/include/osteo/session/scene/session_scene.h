@@ -31,7 +31,7 @@ class SessionScene final : public Reader {
   /// Null before resync().
   [[nodiscard]] const World* world() const { return world_ ? &*world_ : nullptr; }
   [[nodiscard]] SceneReaders& readers() { return *readers_; }
-  /// A hand (below kMostHands) that is to be drawn: the first from its first tick on, others once they have pressed a
+  /// A hand (below kMaxHands) that is to be drawn: the first from its first tick on, others once they have pressed a
   /// pedal or touched bone. What waits beside the drill for keys that nobody pressed is not.
   [[nodiscard]] bool in_use(std::size_t hand) const { return in_use_[hand]; }
   /// The last record told of it.
@@ -45,8 +45,8 @@ class SessionScene final : public Reader {
   Context context_;
   std::optional<World> world_;
   std::unique_ptr<SceneReaders> readers_;
-  std::array<TickRecord, kMostHands> latest_{};
-  std::array<bool, kMostHands> in_use_{};
+  std::array<TickRecord, kMaxHands> latest_{};
+  std::array<bool, kMaxHands> in_use_{};
   std::vector<VoxelChange> told_changes_;
   double removed_mm3_ = 0;
 };

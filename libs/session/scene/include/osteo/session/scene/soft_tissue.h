@@ -12,7 +12,7 @@
 
 namespace osteo::inline session {
 
-/// Bodies share what an update may take (SoftBody::kMostWork): those that need less than their part leave it to the
+/// Bodies share what an update may take (SoftBody::kMaxWork): those that need less than their part leave it to the
 /// others, and those that sleep need none. They do not feel each other. What a hand feels between two updates is a
 /// plane: the forces of all bodies on its tool together, rising with depth. Each such plane is an action of the stream,
 /// so a replay needs no tissue.
@@ -26,7 +26,7 @@ class SoftTissue final : public Reader {
   [[nodiscard]] const std::string& name(std::size_t n) const { return facts_[n].name; }
 
   void meet(const World* world);
-  /// One update; `tools`: one a hand, at most kMostHands. For each hand whose tool is pushed, or was until now, its
+  /// One update; `tools`: one a hand, at most kMaxHands. For each hand whose tool is pushed, or was until now, its
   /// plane.
   std::vector<SceneAction> update(std::span<const SoftTool> tools);
 
@@ -51,7 +51,7 @@ class SoftTissue final : public Reader {
   void keep_facts();
 
   std::vector<std::unique_ptr<SoftBody>> bodies_;
-  std::array<bool, kMostHands> pushed_{};
+  std::array<bool, kMaxHands> pushed_{};
   mutable std::mutex mutex_;
   std::vector<Facts> facts_;
 };

@@ -37,9 +37,9 @@ class SoundTracker {
   SoundState state_;
   bool standing_suction_ = false, standing_water_ = false;  // by action, beside the burr
   std::uint64_t injured_until_ = 0, touched_until_ = 0;
-  double thickness_mm_[kMostHands] = {};
-  TickRecord last_[kMostHands];  // of each hand that holds an instrument
-  bool has_[kMostHands] = {};
+  double thickness_mm_[kMaxHands] = {};
+  TickRecord last_[kMaxHands];  // of each hand that holds an instrument
+  bool has_[kMaxHands] = {};
   bool touching_ = false;
 };
 

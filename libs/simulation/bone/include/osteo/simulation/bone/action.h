@@ -11,7 +11,7 @@
 namespace osteo::inline simulation {
 
 /// Hands in a scene, at most.
-inline constexpr std::uint32_t kMostHands = 4;
+inline constexpr std::uint32_t kMaxHands = 4;
 
 /// Numbers are those of session files: a new kind goes to the end, with its row in action_table().
 enum class ActionKind : std::uint32_t {
@@ -40,8 +40,8 @@ enum class ActionKind : std::uint32_t {
 /// the scene alone.
 struct SceneAction {
   static constexpr std::uint32_t kNobody = 0xffffffffU;
-  static constexpr double kMostReachMm = 50;  ///< of a sucker and of water
-  static constexpr double kMostSlotMm = 10;   ///< that a saw slips into a cutting guide from
+  static constexpr double kMaxReachMm = 50;  ///< of a sucker and of water
+  static constexpr double kMaxSlotMm = 10;   ///< that a saw slips into a cutting guide from
   static constexpr double kPlateReachMm =
       5;  ///< attach: bone of each piece begins within this below the plate's underside
 

@@ -25,7 +25,7 @@ inline constexpr int kDustModel = 2;
 /// Density of dust on cells as large as the bone's voxels, in hashed bricks, not particles (D. Morris 2006,
 /// section 3.2.8): a step lets it fall by a cell along gravity, whose direction no axis need follow, slide to
 /// neighbours that lie steeper than 40 degrees below, and spread where a cell is too full. Water falls faster into any
-/// lower neighbour, takes dust along (slurry, up to kMostSolid of its volume), leaves a film where it ran, which dries
+/// lower neighbour, takes dust along (slurry, up to kMaxSolid of its volume), leaves a film where it ran, which dries
 /// within kDrySeconds and drops what it carried, and stands level where it collects: ten times a second what hangs
 /// together and rests on something is filled again from below. Tools go through water without displacing it. Amounts
 /// are whole numbers of a 65,536th of a voxel, so nothing is lost or made: bone that was added lies there, is in
@@ -35,7 +35,7 @@ inline constexpr int kDustModel = 2;
 /// large their radius. Memory: 2 KB a brick that holds dust, 6 with water.
 class Dust {
  public:
-  static constexpr double kMostSolid = 0.3;     ///< bone in slurry, by volume: above it no longer pours (a guess)
+  static constexpr double kMaxSolid = 0.3;      ///< bone in slurry, by volume: above it no longer pours (a guess)
   static constexpr double kFilm = 1.0 / 16;     ///< of a cell, that stays on wet bone: 0.03 mm at 0.5 mm
   static constexpr double kDrySeconds = 90;     ///< of a hundred steps, until a film is gone (a guess)
   static constexpr double kLiquidForDust = 25;  ///< a sucker takes so many times as much liquid as dry dust (a guess)
@@ -73,7 +73,7 @@ class Dust {
   /// Cells that hold dry dust, in a fixed order: middle of the cell in mm and how full it is (1: packed).
   void visit(const std::function<void(Vec3, double)>& cell) const;
   /// Cells that hold water: place in the bone's grid, how full (1: to the brim), and how much of that is bone (0 to
-  /// kMostSolid, more only in a film that dries).
+  /// kMaxSolid, more only in a film that dries).
   void visit_liquid(const std::function<void(Ijk, double, double)>& cell) const;
   /// Grows whenever anything moved, came or went.
   [[nodiscard]] std::uint64_t version() const { return version_; }

@@ -59,7 +59,7 @@ struct Fixture {
 /// the old there.
 class World {
  public:
-  /// Names are 32 bits wide: room for BrickGrid::kMostBricks over all that the scene ever held; names are not given
+  /// Names are 32 bits wide: room for BrickGrid::kMaxBricks over all that the scene ever held; names are not given
   /// twice.
   explicit World(BrickGrid bone, std::shared_ptr<const Hardness> hardness = nullptr);
   /// A part of the first body in finer voxels: in its box the coarse bone is taken out, so that each place belongs to
@@ -83,9 +83,9 @@ class World {
     /// The hand's frame has its origin at the device's position and z along its axis (frame_of_axis).
     RigidTransform hand_from_plate;
   };
-  /// `hand` below kMostHands. attach() leaves its hand without a plate.
+  /// `hand` below kMaxHands. attach() leaves its hand without a plate.
   [[nodiscard]] const Grip& grip(std::uint32_t hand = 0) const { return grips_[hand]; }
-  /// That holds a hand's saw. `hand` below kMostHands.
+  /// That holds a hand's saw. `hand` below kMaxHands.
   [[nodiscard]] const CuttingGuide& cutting_guide(std::uint32_t hand = 0) const { return guides_[hand]; }
   [[nodiscard]] bool held() const { return held_; }
   /// How many steps undo can take back.
@@ -120,14 +120,14 @@ class World {
   /// before an action. Who changes densities without a servo (from a session file) tells the same. A stroke goes from
   /// the first voxel changed to ActionKind::stroke or to the next action that undo can take back, whichever comes
   /// first. Memory: 12 bytes for each voxel of a stroke, and about 50 while it goes on; when strokes together need more
-  /// than kMostStrokeBytes, the oldest is forgotten, with all that came before it: undo goes back to there and no
+  /// than kMaxStrokeBytes, the oldest is forgotten, with all that came before it: undo goes back to there and no
   /// farther, and says so.
   void tell(std::span<const VoxelChange> changes);
   void tell(const SceneAction& action);
   /// Changes or actions of the stream were missed: nothing that came before can be taken back any more, nor the stroke
   /// that goes on.
   void forget();
-  static constexpr std::size_t kMostStrokeBytes = std::size_t{64} << 20;
+  static constexpr std::size_t kMaxStrokeBytes = std::size_t{64} << 20;
 
   /// Of bodies, poses and fixtures; the bone's own hash where there is one body, unmoved, and nothing on it.
   [[nodiscard]] std::string hash() const;
@@ -180,8 +180,8 @@ class World {
   bool missed_ = false;  // since something was missed, nothing has come that surely begins a new step
   std::size_t stroke_bytes_ = 0;
   std::uint64_t steps_forgotten_ = 0;
-  std::array<Grip, kMostHands> grips_;
-  std::array<CuttingGuide, kMostHands> guides_;
+  std::array<Grip, kMaxHands> grips_;
+  std::array<CuttingGuide, kMaxHands> guides_;
   std::uint32_t next_body_ = 1, next_fixture_ = 1, next_brick_ = 0;
   bool held_ = false;
 };

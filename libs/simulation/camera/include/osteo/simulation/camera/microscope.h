@@ -19,8 +19,8 @@ inline constexpr double kFieldNumberMm = 200;
 /// Where the magnification changer clicks in.
 inline constexpr std::array<double, 5> kMagnifications{4, 6, 10, 16, 25};
 /// Below 4 it is the naked eye: a whole head at 0.8.
-inline constexpr double kLeastMagnification = 0.2, kMostMagnification = 40;
-inline constexpr double kLeastWorkingMm = 100, kMostWorkingMm = 1500;
+inline constexpr double kMinMagnification = 0.2, kMaxMagnification = 40;
+inline constexpr double kMinWorkingMm = 100, kMaxWorkingMm = 1500;
 
 /// A rectangle of a window in pixels, y downwards.
 struct PictureArea {

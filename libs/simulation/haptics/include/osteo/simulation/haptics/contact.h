@@ -111,7 +111,7 @@ class ContactModel {
 
 /// Below this many voxels of radius a burr is too small for them: flat bone is felt with errors of 10 % of the force
 /// and more.
-inline constexpr double kLeastRadiusVoxels = 2;
+inline constexpr double kMinRadiusVoxels = 2;
 /// What to say of such a burr, and what to do about it; empty for the others.
 [[nodiscard]] std::string too_small_for_voxels(const Burr& burr, double spacing_mm);
 
@@ -122,7 +122,7 @@ inline constexpr double kLeastRadiusVoxels = 2;
 class Removal {
  public:
   explicit Removal(const BrickGrid& bone);
-  /// `hardness` may be null; `hand` below kMostHands. Without force nothing goes, but what the burr covers is known
+  /// `hardness` may be null; `hand` below kMaxHands. Without force nothing goes, but what the burr covers is known
   /// from then on. Returns the changed voxels (valid until the next call) and sets what was removed.
   std::span<const VoxelChange> remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n,
                                       double speed_rpm, double dt_s, const Hardness* hardness, double& removed_mm3,
@@ -131,7 +131,7 @@ class Removal {
   [[nodiscard]] const Grains& grains() const { return grains_; }
 
  private:
-  std::array<double, kMostHands> carry_mm3_{};
+  std::array<double, kMaxHands> carry_mm3_{};
   Grains grains_;
   std::vector<float> reached_;   // of each hit, how much density the burr may still take
   std::vector<double> weights_;  // and its part in what goes
@@ -139,7 +139,7 @@ class Removal {
 };
 
 /// At most about this many voxels change in a tick: with more under the burr, their rows take turns.
-inline constexpr std::size_t kMostCutPerTick = 1024;
+inline constexpr std::size_t kMaxCutPerTick = 1024;
 /// Room for the hits of any instrument of the library at this spacing.
 [[nodiscard]] std::size_t most_hits(double spacing_mm);
 

@@ -16,13 +16,13 @@ namespace osteo::inline simulation {
 /// A way that a hand takes by itself, the pedal up: straight from point to point, from wherever it is. FreeWays finds
 /// them.
 struct HandWay {
-  static constexpr std::size_t kMost = 96;
+  static constexpr std::size_t kMax = 96;
   struct Point {
     Vec3 at_mm;
     std::array<float, 3> axis{0, 0, 1};
     bool near_bone = false;  ///< on the way here bone is near: slowly, and with hardly any pull
   };
-  std::array<Point, kMost> points;
+  std::array<Point, kMax> points;
   std::uint32_t count = 0;  ///< 0: it only lets go, until bone has pushed it out
   bool put = false;         ///< no free way leads to the first point: the tool is taken away and put there
 };

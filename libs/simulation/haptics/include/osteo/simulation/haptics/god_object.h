@@ -116,7 +116,7 @@ class GodObject {
 
  private:
   static constexpr int kSettles = 8;
-  static constexpr double kSameWall = 0.95, kLeastRise = 0.02;
+  static constexpr double kSameWall = 0.95, kMinRise = 0.02;
 
   template <class Field>
   Clearance step_out(const Field& field, const Clearance& c, double longest, Answer& a) {
@@ -151,7 +151,7 @@ class GodObject {
         used = other;
       }
       const double rise = dot(along, g);
-      if (c.value_mm < 0 && slope > 0 && rise > kLeastRise && !(used == Vec3{})) {
+      if (c.value_mm < 0 && slope > 0 && rise > kMinRise && !(used == Vec3{})) {
         Vec3 step = along * (-c.value_mm / (slope * rise));
         if (const double n = length(step); n > longest) step = step * (longest / n);
         x_ += step;

@@ -83,8 +83,8 @@ class PassivityControl {
 /// away is energy put in, so that a drilling stroke owes nothing; a hand that starts within bone owes nothing either.
 class EnergyDebt {
  public:
-  static constexpr double kLeastShare = 0.5;  ///< no force is reduced further
-  static constexpr double kMostOwedMj = 0.5;  ///< no more is held against a hand
+  static constexpr double kMinShare = 0.5;   ///< no force is reduced further
+  static constexpr double kMaxOwedMj = 0.5;  ///< no more is held against a hand
   /// The share of `elastic_n` to apply now. `stored_mj`: what contact would give on the way out; 0: not known, the
   /// share goes to 1.
   double update(Vec3 x_mm, Vec3 elastic_n, double stored_mj, Vec3 velocity_mm_s, double dt_s,
@@ -98,7 +98,8 @@ class EnergyDebt {
  private:
   Vec3 last_x_mm_, last_force_n_;
   double given_mj_ = 0, share_ = 1, most_n_ = 0;
-  // What is said to be stored is known roughly in hollows. The first way in tells it: what went in then comes out again.
+  // What is said to be stored is known roughly in hollows. The first way in tells it: what went in then comes out
+  // again.
   double owed_mj_ = 0, fits_ = 1, out_mm_ = 0;
   bool started_ = false;
 };

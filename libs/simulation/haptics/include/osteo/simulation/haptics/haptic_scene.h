@@ -80,9 +80,9 @@ struct HapticScene {
     RigidTransform grip;
   };
   std::vector<Item> items;
-  std::array<Held, kMostHands> held;
-  std::array<CuttingGuide, kMostHands> guides;  ///< of the hands' saws
-  std::vector<VoxelChange> changes;             ///< room for those of a tick
+  std::array<Held, kMaxHands> held;
+  std::array<CuttingGuide, kMaxHands> guides;  ///< of the hands' saws
+  std::vector<VoxelChange> changes;            ///< room for those of a tick
 
   /// One more body there.
   void add(std::shared_ptr<TouchedBone> bone, const RigidTransform& world_from_body, const HapticSetup& setup);

@@ -63,7 +63,7 @@ struct HapticSetup {
   HapticsParams params;
   DeviceTraits device;  ///< of hand 0
   std::vector<DeviceTraits>
-      more_devices;  ///< of hands 1, 2, ...: as many as there are hands besides, at most kMostHands - 1
+      more_devices;  ///< of hands 1, 2, ...: as many as there are hands besides, at most kMaxHands - 1
   std::map<int, ContactMethod>
       tool_methods;  ///< index in instrument_library() -> another method than params.contact.method for that tool
   std::optional<bool>

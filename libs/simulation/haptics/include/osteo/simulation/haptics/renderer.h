@@ -21,7 +21,7 @@ struct StructureEvents {
 
 class HandRenderer;
 
-/// Poses to forces and removal, for 1 to kMostHands hands. Owns all buffers but those of the scene. step() neither
+/// Poses to forces and removal, for 1 to kMaxHands hands. Owns all buffers but those of the scene. step() neither
 /// allocates nor locks nor throws, and the same sequence of samples, settings and scenes gives the same bits. In a tick
 /// all hands feel the bone as it was at its beginning, each by itself; then burrs take bone away in the order of the
 /// hands. The tool is where its shaft can be (HeldShaft). The force: contact of the head by the chosen method, pull of
@@ -33,13 +33,13 @@ class HandRenderer;
 /// Another instrument taken up stands still. A saw in a cutting guide (HapticScene::guides) touches, cuts and injures
 /// where the guide has it, which shown_offset_mm tells (SawSlot). Several bodies: what the burr overlaps in each is
 /// added up before the law of force is applied, so that a cut through bone that nobody has opened cannot be felt (other
-/// methods than overlap: forces are added). At most kMostTouched bodies in a tick, the first in order.
+/// methods than overlap: forces are added). At most kMaxTouched bodies in a tick, the first in order.
 ///
-/// All that is noexcept here runs at 1 kHz in the servo thread and may not allocate, lock, throw, log or block; the test
-/// robust.no-alloc counts allocations and locks. Only the constructors and structure_events() may allocate.
+/// All that is noexcept here runs at 1 kHz in the servo thread and may not allocate, lock, throw, log or block; the
+/// test robust.no-alloc counts allocations and locks. Only the constructors and structure_events() may allocate.
 class HapticRenderer {
  public:
-  static constexpr std::size_t kMostTouched = 4;
+  static constexpr std::size_t kMaxTouched = 4;
 
   /// What the scene knows of the patient besides bone may be null. Errors: usage, when the vibration's text is not
   /// valid or there are too many hands.

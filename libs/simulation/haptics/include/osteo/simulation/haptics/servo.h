@@ -21,8 +21,9 @@ struct Handover {
   const HapticsParams* settings = nullptr;  ///< null: as before. Belongs to whoever posts, read while it is taken up
 };
 
-/// step() runs at 1 kHz in the servo thread and may not allocate, lock, throw, log or block; the same holds for all that
-/// it calls. The test robust.no-alloc counts allocations and locks of whole ticks. Only the constructors may allocate.
+/// step() runs at 1 kHz in the servo thread and may not allocate, lock, throw, log or block; the same holds for all
+/// that it calls. The test robust.no-alloc counts allocations and locks of whole ticks. Only the constructors may
+/// allocate.
 class Servo {
  public:
   /// All must outlive the servo. As many devices as the renderer has hands, in their order. `rate_hz` fixes the time
@@ -63,7 +64,7 @@ class Servo {
   std::atomic<double> removed_mm3_{0};
   std::atomic<const Handover*> inbox_{nullptr};
   void tell_stroke(std::uint64_t tick, bool removes) noexcept;
-  std::array<Vec3, kMostHands> force_n_;
+  std::array<Vec3, kMaxHands> force_n_;
   std::uint64_t pause_ticks_, last_removal_ = 0;
   bool in_stroke_ = false;
 };

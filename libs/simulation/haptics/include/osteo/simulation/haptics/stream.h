@@ -98,14 +98,14 @@ struct StreamReader {
 /// takes no lock, waits for nobody and allocates nothing.
 class Stream {
  public:
-  static constexpr std::size_t kMostReaders = 16;
+  static constexpr std::size_t kMaxReaders = 16;
 
   Stream() = default;
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
 
   /// Told of what is published from now on; belongs to the stream until it leaves. Allocates: never in the servo.
-  /// Error(resources) where kMostReaders are there.
+  /// Error(resources) where kMaxReaders are there.
   StreamReader& add_reader(std::size_t tick_capacity = 1 << 13, std::size_t change_capacity = 1 << 21);
   /// Waits for the end of a publish() that may still use it (microseconds), then it is gone. Others notice nothing.
   void remove_reader(StreamReader& reader);
@@ -145,7 +145,7 @@ class Stream {
     publishes_.store(n + 2, std::memory_order_release);
   }
 
-  std::array<std::atomic<StreamReader*>, kMostReaders> slots_{};
+  std::array<std::atomic<StreamReader*>, kMaxReaders> slots_{};
   std::atomic<std::uint64_t> publishes_{0};
   std::mutex mutex_;  // of those who join and leave, among themselves
   std::vector<std::unique_ptr<StreamReader>> readers_;

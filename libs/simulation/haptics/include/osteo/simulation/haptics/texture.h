@@ -15,7 +15,7 @@ namespace osteo::inline simulation {
 /// Romano, K. Kuchenbecker, IEEE Trans Haptics 5(2), 2012): x(i) = -a1 x(i-1) - ... - aN x(i-N) + noise. Kept as
 /// reflection coefficients, which can be interpolated without becoming unstable.
 struct TextureModel {
-  static constexpr std::size_t kMostOrder = 64;
+  static constexpr std::size_t kMaxOrder = 64;
   struct Node {
     std::vector<double> reflection;  ///< each in (-1, 1)
     double noise_n2 = 0;             ///< variance of the noise, N^2
@@ -38,7 +38,7 @@ inline constexpr double kTextureMassKg = 0.05;
 /// Of either layout: JSON as above, or XML of the Penn toolkit, told by its first character.
 [[nodiscard]] TextureModel load_texture(const std::filesystem::path& path, double mass_kg = kTextureMassKg);
 
-/// The model of a recording, by Burg's method: `order` coefficients, 1 to kMostOrder, of samples at an even rate, N
+/// The model of a recording, by Burg's method: `order` coefficients, 1 to kMaxOrder, of samples at an even rate, N
 /// (more than 4 order of them). Error(usage) otherwise.
 [[nodiscard]] TextureModel::Node texture_node(const std::vector<double>& samples_n, std::size_t order);
 /// The model of a spectrum: `power_n2_per_hz` one-sided, at even steps from 0 Hz to half the rate, both ends (17 at
@@ -76,7 +76,7 @@ class Texture {
   std::uint64_t state_;
   bool spare_ = false;
   double spare_value_ = 0;
-  std::array<double, TextureModel::kMostOrder + 1> back_{};
+  std::array<double, TextureModel::kMaxOrder + 1> back_{};
 };
 
 /// A texture under what slides: a force along the surface and across the motion, so that on average it neither drives

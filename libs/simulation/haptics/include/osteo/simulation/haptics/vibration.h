@@ -16,7 +16,7 @@ struct VibrationSpectrum {
   struct Peak {
     double frequency_hz = 0, idle_n = 0, per_n = 0;
   };
-  static constexpr std::size_t kMostPeaks = 16;
+  static constexpr std::size_t kMaxPeaks = 16;
   std::array<std::vector<Peak>, kBurrKinds.size()> by_kind;  ///< in the order of BurrKind
 };
 
@@ -39,7 +39,7 @@ class Vibration {
 
  private:
   VibrationSpectrum spectrum_;
-  std::array<std::array<double, VibrationSpectrum::kMostPeaks>, kBurrKinds.size()> phase_{};
+  std::array<std::array<double, VibrationSpectrum::kMaxPeaks>, kBurrKinds.size()> phase_{};
 };
 
 }  // namespace osteo::inline simulation

@@ -39,7 +39,7 @@ struct HeatLedger {
 /// cells about an edge is emptier, that much goes through faces only: a wall inside the lattice is exact for heat along
 /// it. Between two cells heat goes through as much matter as the emptier one has, so a boundary inside cells needs no
 /// smaller step, and what one loses the other gains to the last bit. Bricks of 8^3 cells are made where heat comes and
-/// forgotten where nothing is warmer or cooler than kLeastK, so the cost follows what is warm. Deterministic: the same
+/// forgotten where nothing is warmer or cooler than kMinK, so the cost follows what is warm. Deterministic: the same
 /// calls give the same bits. Temperatures are differences to the body's, K. Error against analytic solutions and cost,
 /// at 0.25 mm: docs/heat.md.
 class HeatField {
@@ -88,7 +88,7 @@ class HeatField {
   /// The 512 temperatures of a kept brick, x fastest; 0 in air. Until the next call that changes anything.
   [[nodiscard]] std::span<const double> brick(Ijk at) const;
 
-  static constexpr double kLeastK = 1e-3;
+  static constexpr double kMinK = 1e-3;
 
  private:
   static constexpr int kCells = 512;

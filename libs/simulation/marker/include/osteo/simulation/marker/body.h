@@ -24,7 +24,7 @@ struct MarkerPatch {
 /// to be told apart for long. Origin in its middle, z along the pen away from the tip.
 struct PenBody {
   static constexpr double kFaceMm = 28, kHeightMm = 56, kMarkerMm = 24, kCapMarkerMm = 28;
-  static constexpr int kMarkers = 13, kMostPens = 3;
+  static constexpr int kMarkers = 13, kMaxPens = 3;
   /// From the axis to a face.
   static constexpr double kApothemMm = kFaceMm * 0.8660254037844386;
   /// Where the tip is unless it was found by turning the pen on it.

@@ -25,8 +25,8 @@ class Electromyogram {
     std::size_t nerve;
     MonitorChannel electrode;
   };
-  static constexpr std::size_t kMostSamples = 1024;  ///< of a block
-  static constexpr int kLargest = 32764;             ///< where the amplifier ends
+  static constexpr std::size_t kMaxSamples = 1024;  ///< of a block
+  static constexpr int kLargest = 32764;            ///< where the amplifier ends
 
   Electromyogram(const MonitorConstants& constants, std::vector<Channel> channels, std::uint64_t seed);
 
@@ -34,7 +34,7 @@ class Electromyogram {
   void stimulate(std::size_t at, double current_ma);
   void answer(std::size_t at, const NerveModel& model, std::size_t nerve, std::size_t point, double share);
 
-  /// The next block: `out` holds channel after channel of each sample. Size: samples (at most kMostSamples) times
+  /// The next block: `out` holds channel after channel of each sample. Size: samples (at most kMaxSamples) times
   /// channels.
   void render(const NerveModel& model, const DrillNoise& drill, std::span<std::int16_t> out);
 

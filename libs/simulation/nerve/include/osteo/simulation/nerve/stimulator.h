@@ -9,11 +9,11 @@ namespace osteo::inline simulation {
 /// insulated burr.
 struct StimulatorSetting {
   std::uint32_t hand = 0;
-  double current_ma = 0;    ///< 0: off; at most kMostMa
+  double current_ma = 0;    ///< 0: off; at most kMaxMa
   double pulses_per_s = 4;  ///< 1 to 30
   double width_ms = 0.1;    ///< 0.05 to 1
   bool search = false;      ///< it looks for the threshold by itself, from current_ma on
-  static constexpr double kLeastMa = 0.02, kMostMa = 5;
+  static constexpr double kMinMa = 0.02, kMaxMa = 5;
   friend bool operator==(const StimulatorSetting&, const StimulatorSetting&) = default;
 };
 /// Each number as the nearest it may be.

@@ -90,8 +90,8 @@ class Synthesizer {
   SoundModel model_;
   SafeLevel safe_;
   std::uint64_t random_;
-  std::array<Burr, SoundState::kMostVoices> burrs_;
-  std::array<Water, SoundState::kMostVoices> suckers_, irrigators_;
+  std::array<Burr, SoundState::kMaxVoices> burrs_;
+  std::array<Water, SoundState::kMaxVoices> suckers_, irrigators_;
   std::array<Ring, 12> rings_;
   std::size_t next_ring_ = 0;
   double gurgles_per_sample_ = 0, gurgle_level_ = 0, metal_n_ = 0, water_ = 0;

@@ -40,7 +40,7 @@ struct BoneDensity {
   /// else the same.
   bool ash_correction = true;
   BoneWeight weight = BoneWeight::apparent;
-  double least_mpa = 1, most_mpa = 30'000;  ///< what comes out beyond is set to these
+  double min_mpa = 1, max_mpa = 30'000;  ///< what comes out beyond is set to these
 };
 
 /// g/cm3; never below 0.

@@ -57,8 +57,8 @@ struct MeasuredCase {
 struct MeasuredOptions {
   CalibrateOptions
       calibrate;  ///< `starts` and `samples` are not used; `pull` and `smooth` are shares of the surface's RMS movement
-  bool find_pose = false;          ///< each view may lie elsewhere by a small rigid motion, which is found too
-  std::size_t most_points = 5000;  ///< of a cloud: of more, so many are drawn at random
+  bool find_pose = false;         ///< each view may lie elsewhere by a small rigid motion, which is found too
+  std::size_t max_points = 5000;  ///< of a cloud: of more, so many are drawn at random
   /// Of each constraint, which group it is in (-1: none): groups get a mean stiffness with its interval.
   std::vector<int> group_of;
 };

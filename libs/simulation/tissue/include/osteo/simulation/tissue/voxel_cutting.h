@@ -17,9 +17,9 @@ class VoxelCutting {
  public:
   /// Guesses, no measured rates were found: a twentieth of a newton cuts some tens of mm3 a second, and no burr more
   /// than powered shavers do.
-  static constexpr double kEasierThanBone = 200, kMostMm3PerS = 100;
+  static constexpr double kEasierThanBone = 200, kMaxMm3PerS = 100;
   /// So many voxels at most are saved up while the tool meets none.
-  static constexpr double kMostSaved = 8;
+  static constexpr double kMaxSaved = 8;
   /// Of a tool that removes `bone_mm3_per_s_per_n` of bone.
   [[nodiscard]] static double rate_mm3_per_s(double force_n, double bone_mm3_per_s_per_n);
 

@@ -19,8 +19,8 @@ template <class T>
 class PerHand {
  public:
   PerHand() : of_{} {}
-  explicit PerHand(const T& each) : PerHand(each, std::make_index_sequence<kMostHands>()) {}
-  /// Hands from kMostHands on share the last one: no session has them.
+  explicit PerHand(const T& each) : PerHand(each, std::make_index_sequence<kMaxHands>()) {}
+  /// Hands from kMaxHands on share the last one: no session has them.
   [[nodiscard]] T& operator[](std::uint32_t hand) { return of_[std::min<std::size_t>(hand, of_.size() - 1)]; }
   [[nodiscard]] auto begin() { return of_.begin(); }
   [[nodiscard]] auto end() { return of_.end(); }
@@ -30,7 +30,7 @@ class PerHand {
  private:
   template <std::size_t... n>
   PerHand(const T& each, std::index_sequence<n...>) : of_{(static_cast<void>(n), each)...} {}
-  std::array<T, kMostHands> of_;
+  std::array<T, kMaxHands> of_;
 };
 
 /// Says when something begins that comes and goes: what comes again soon is the same.

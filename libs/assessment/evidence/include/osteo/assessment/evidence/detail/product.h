@@ -21,7 +21,7 @@ struct RemovedVoxel {
 
 /// Bone before and after on one lattice, in the frame of the first body, with all pieces where they lay at the
 /// beginning. All distances in mm. The lattice: cubes of the bone's voxel, of 0.5 mm where that is larger, around all
-/// that was removed and all structures named, with 5 mm around; more than kMostCells cubes make it coarser, which it
+/// that was removed and all structures named, with 5 mm around; more than kMaxCells cubes make it coarser, which it
 /// says (`word`). Solid: density of at least a half, between voxels linear. Structures but those to be opened are solid
 /// too: a cavity ends at them. Cavity: what a ball of kBallMm reaches from the lattice's faces through bone that is
 /// gone, and on through spaces that were closed (those to be opened, and all that nothing else led to).
@@ -32,7 +32,7 @@ class Product {
   /// has such a margin, and says so.
   static constexpr double kDraw = 0.2;
   static constexpr double kBallMm = 0.5, kOpenedMm = 2, kAroundMm = 5, kCoarsestMm = 0.5;
-  static constexpr std::size_t kMostCells = 24'000'000;
+  static constexpr std::size_t kMaxCells = 24'000'000;
 
   /// All but `removed` must outlive this. O(cells): a few bits each; distances to the cavity only where an item of the
   /// procedure asks for them.

@@ -22,7 +22,7 @@ struct Stroke {
 /// places that went through a zero-phase low-pass of 20 Hz: jerk of raw places measures their noise.
 class StrokeFinder {
  public:
-  static constexpr double kRateHz = 100, kTurnDeg = 60, kLeastMm = 1, kLeastS = 0.08, kPauseS = 0.1, kStillMm = 0.05,
+  static constexpr double kRateHz = 100, kTurnDeg = 60, kMinMm = 1, kMinS = 0.08, kPauseS = 0.1, kStillMm = 0.05,
                           kSmoothHz = 20, kSmoothLeastS = 0.1;
   static constexpr std::size_t kReach = 3;  ///< samples, 30 ms
   /// In order of time. Not called while the burr does not drill.

@@ -12,10 +12,10 @@ namespace osteo::inline display {
 /// Dry dust as grains of their own sizes and shades at places of their own in each cell (by the cell's coordinates, so
 /// that what lies still looks still), spread so that nothing of the lattice of cells shows; water as a surface, drops
 /// where it falls. Nothing is seen through dust; water is drawn over what is below it in one layer, without sorting. At
-/// most kMostGrains grains: of more, fewer larger.
+/// most kMaxGrains grains: of more, fewer larger.
 class DustView {
  public:
-  static constexpr std::size_t kMostGrains = 60000;
+  static constexpr std::size_t kMaxGrains = 60000;
   DustView(vtkRenderer* renderer, double cell_mm);
   ~DustView();
   DustView(const DustView&) = delete;

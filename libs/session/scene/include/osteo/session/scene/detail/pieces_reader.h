@@ -23,9 +23,9 @@ class PiecesReader final : public Reader {
 
   /// Null where there is no such body.
   [[nodiscard]] const LiveComponents* components(std::uint32_t body) const;
-  /// Parts that hang together, of at least kLeastPieceMm3, largest first, over all bodies; centres in the world.
+  /// Parts that hang together, of at least kMinPieceMm3, largest first, over all bodies; centres in the world.
   [[nodiscard]] std::vector<LiveComponents::Component> large_pieces() const;
-  static constexpr double kLeastPieceMm3 = 50;
+  static constexpr double kMinPieceMm3 = 50;
 
  private:
   struct Followed {

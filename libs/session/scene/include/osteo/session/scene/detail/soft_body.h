@@ -43,7 +43,7 @@ class SoftBody {
   static constexpr double kUpdatesPerS = 100;
   /// What an update may take, in steps times tetrahedra: 4 to 10 ms of a core. Not measured by wall clock, or two runs
   /// of one script would differ.
-  static constexpr double kMostWork = 250'000;
+  static constexpr double kMaxWork = 250'000;
   static constexpr double kNearMm = 10;  ///< a tool is near whose head comes within this of the body's box
 
   /// The bone that it meets from now on, as it lies at rest; null: none. The world must stay until another is set.
@@ -51,7 +51,7 @@ class SoftBody {
   /// Goes on by one update with the tools there, by number the same ones as before. What it pushes each with; all
   /// nothing while it sleeps. Simulated time goes slower than the clock's when a hundredth of a second needs more than
   /// `most_work`: see slow_motion(); at a quarter of real time it is as if it were sixteen times as heavy.
-  std::vector<SoftPush> update(std::span<const SoftTool> tools, double most_work = kMostWork);
+  std::vector<SoftPush> update(std::span<const SoftTool> tools, double most_work = kMaxWork);
   /// Whether the next update with these tools costs nothing.
   [[nodiscard]] bool sleeps_with(std::span<const SoftTool> tools) const;
   /// For whoever changed the bone that it lies on.
@@ -60,7 +60,7 @@ class SoftBody {
   void wake_near(Vec3 at_mm, std::uint8_t tool);
   [[nodiscard]] bool asleep() const;
 
-  [[nodiscard]] double work() const;  ///< what an update in real time would take, as kMostWork
+  [[nodiscard]] double work() const;  ///< what an update in real time would take, as kMaxWork
   [[nodiscard]] std::vector<Vec3> points_mm() const;
   /// The surface as it is now. Its triangles change only with version(), when something was cut off.
   [[nodiscard]] const TriMesh& drawn();

@@ -93,8 +93,8 @@ class Grains {
     Vec3 start, axis;
     std::uint32_t turn = 0;
   };
-  std::array<Place, kMostHands> places_;  // of each hand's burr when it was last placed
-  Vec3 start_;                            // of the one placed now
+  std::array<Place, kMaxHands> places_;  // of each hand's burr when it was last placed
+  Vec3 start_;                           // of the one placed now
   std::uint32_t turns_ = 1, turn_ = 0;
 };
 

@@ -16,7 +16,7 @@ namespace osteo::inline simulation {
 /// of it. No allocation after it was made; the same input gives the same bits.
 class HeldShaft {
  public:
-  static constexpr std::size_t kMostBodies = 8;
+  static constexpr std::size_t kMaxBodies = 8;
   /// From call to call the offset changes by no more than this and twice what the hand moved: who pulls by a law of the
   /// offset has a force that never jumps.
   static constexpr double kReturnMm = 0.1;
@@ -32,7 +32,7 @@ class HeldShaft {
     Vec3 torque_mm;       ///< about the tool's position, for a newton of push along the offset
     int evaluations = 0;  ///< of the overlap of the shaft with bone
   };
-  /// At most kMostBodies bodies count, the first ones. `shell_mm`: so much room it keeps beside bone that it lies flat
+  /// At most kMaxBodies bodies count, the first ones. `shell_mm`: so much room it keeps beside bone that it lies flat
   /// on, less where it touches in a point; also the farthest that it goes between two looks, so half a voxel or less.
   /// `at_mm`, `axis` (unit) as of the instrument, in the world. A place that is not a number forgets. Cost: next
   /// to nothing while no bone is within a millimetre and a half, else an overlap of the part of the shaft that is near
@@ -42,7 +42,7 @@ class HeldShaft {
   [[nodiscard]] Vec3 offset_mm() const { return offset_mm_; }  ///< of the last call
 
  private:
-  static constexpr int kMostStretches = 16;
+  static constexpr int kMaxStretches = 16;
   // A stretch of the shaft beside a body: whether bone was within looked_mm of it, from where it was looked at.
   struct Stretch {
     Vec3 at_mm, axis;
@@ -59,8 +59,8 @@ class HeldShaft {
   GodObject proxy_;
   Vec3 offset_mm_, torque_mm_;
   Vec3 last_at_mm_, last_axis_;
-  std::array<Body, kMostBodies> bodies_;
-  std::array<std::array<Stretch, kMostStretches>, kMostBodies> stretches_;
+  std::array<Body, kMaxBodies> bodies_;
+  std::array<std::array<Stretch, kMaxStretches>, kMaxBodies> stretches_;
   std::size_t count_ = 0, next_ = 0;  // of bodies; the stretch that is looked at next
   int stretch_count_ = 1;
   RoundCone shape_{0, 0, 0, 0};

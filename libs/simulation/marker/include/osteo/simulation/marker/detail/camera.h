@@ -36,8 +36,8 @@ struct CameraModel {
 /// Gathers views of the plate and calibrates by those that differ: Z. Zhang, IEEE TPAMI 22(11), 2000, by OpenCV.
 class CameraCalibration {
  public:
-  static constexpr int kLeastViews = 10, kMostViews = 60;
-  static constexpr double kMostRmsPx = 1.0, kMostFocalSpread = 0.01;
+  static constexpr int kMinViews = 10, kMaxViews = 60;
+  static constexpr double kMaxRmsPx = 1.0, kMaxFocalSpread = 0.01;
 
   /// What became of a picture.
   enum class Look { taken, no_plate, like_another, blurred };
@@ -52,8 +52,8 @@ class CameraCalibration {
     double seen_width = 0, seen_height = 0;  ///< share of the picture over which corners were seen
     std::vector<std::string> doubts;
   };
-  /// Error(failed), saying what to do, with fewer than kLeastViews views, an RMS above kMostRmsPx, or views so alike
-  /// that the focal length stays open: a plate that is hardly ever tilted, or kMostFocalSpread.
+  /// Error(failed), saying what to do, with fewer than kMinViews views, an RMS above kMaxRmsPx, or views so alike
+  /// that the focal length stays open: a plate that is hardly ever tilted, or kMaxFocalSpread.
   [[nodiscard]] Result solve() const;
 
  private:

@@ -14,8 +14,8 @@ struct PenMotion {
   Vec3 tip_mm, velocity_mm_s;
   Mat3 rotation;  ///< camera_from_body
   Vec3 turning_rad_s;
-  /// At constant velocity; no farther than `kMostAheadS` after the last picture.
-  static constexpr double kMostAheadS = 0.1;
+  /// At constant velocity; no farther than `kMaxAheadS` after the last picture.
+  static constexpr double kMaxAheadS = 0.1;
   [[nodiscard]] Vec3 tip_at(double time_s) const;
   [[nodiscard]] Mat3 rotation_at(double time_s) const;
 };

@@ -97,7 +97,7 @@ struct MonitoredNerve {
 
 struct MonitorSetup {
   static constexpr int kRateHz = 30000;
-  static constexpr std::size_t kMostChannels = 16;  ///< over all nerves
+  static constexpr std::size_t kMaxChannels = 16;  ///< over all nerves
   static constexpr double kMicrovoltsPerBit = 0.25;
   MonitorConstants constants;
   std::vector<MonitoredNerve> nerves;

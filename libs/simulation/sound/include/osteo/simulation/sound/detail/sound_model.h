@@ -30,8 +30,8 @@ enum class SoundAlarm : std::uint8_t { none, touched, injured };
 
 /// All that is heard follows from the sequence of these.
 struct SoundState {
-  static constexpr std::size_t kMostVoices = 4;
-  std::array<SoundVoice, kMostVoices> voices;
+  static constexpr std::size_t kMaxVoices = 4;
+  std::array<SoundVoice, kMaxVoices> voices;
   double water = 0;    ///< 0 to 1: the share of what a sucker draws that is water
   double metal_n = 0;  ///< with which a plate meets bone, or two instruments each other; each beginning of it is heard
   SoundAlarm alarm = SoundAlarm::none;

@@ -8,11 +8,11 @@
 
 namespace osteo::inline simulation {
 
-/// Units throughout: mm, N, MPa (N/mm2), so energies are N mm = mJ. Elements of at most kMostNodes points each.
+/// Units throughout: mm, N, MPa (N/mm2), so energies are N mm = mJ. Elements of at most kMaxNodes points each.
 /// Implementations are immutable as far as threads see them.
 class Energy {
  public:
-  static constexpr std::size_t kMostNodes = 16;
+  static constexpr std::size_t kMaxNodes = 16;
 
   virtual ~Energy() = default;
   [[nodiscard]] virtual std::size_t point_count() const = 0;

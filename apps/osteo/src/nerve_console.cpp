@@ -1,10 +1,10 @@
-// osteo console: the nerve monitor in a window of its own.
+// osteo nerve-console: the nerve monitor in a window of its own.
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 
-#include "commands/console.h"
+#include "commands/nerve_console.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/network/wire/server.h"
@@ -12,8 +12,8 @@
 
 namespace osteo {
 
-cli::CommandInfo ConsoleCommand::info() {
-  return {"console",
+cli::CommandInfo NerveConsoleCommand::info() {
+  return {"nerve-console",
           "the nerve monitor's console, over the network",
           "A window that shows the nerve monitor of a rehearsal elsewhere, which streams by OpenIGTLink (--stream "
           "igtl:PORT, or osteo stream): "
@@ -23,10 +23,10 @@ cli::CommandInfo ConsoleCommand::info() {
           "given the code of a rehearsal that lets it. It looks for the "
           "server until it is there, and again when it went.",
           {{"server", "PORT, for this machine, or HOST:PORT"}},
-          "osteo console 18944"};
+          "osteo nerve-console 18944"};
 }
 
-int ConsoleCommand::run(const Params& p, cli::Invocation& io) {
+int NerveConsoleCommand::run(const Params& p, cli::Invocation& io) {
   static_cast<void>(wire_address(io.arguments[0]));
   std::vector<std::string> args{window_program("osteo-console", ""), io.arguments[0]};
   ConsoleFlags flags = p, defaults;

@@ -14,8 +14,8 @@ Vec3 vec(const std::array<float, 3>& p) {
 
 }  // namespace
 
-StageInfo SkinStage::info() {
-  return {.name = "skin",
+StageInfo EmbedSurfaceStage::info() {
+  return {.name = "embed-surface",
           .version = 1,
           .synopsis = "a surface that follows a tetrahedral mesh when it deforms",
           .description =
@@ -26,10 +26,10 @@ StageInfo SkinStage::info() {
                      {"deformed", {DataKind::tets}, "the same mesh, its points moved"}},
           .outputs = {{"skinned", {DataKind::surface}, "the surface, moved"}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.4.2"},
-          .example = "osteo skin bone.ply rest.vtu deformed.vtu moved.ply"};
+          .example = "osteo embed-surface bone.ply rest.vtu deformed.vtu moved.ply"};
 }
 
-std::vector<Data> SkinStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
+std::vector<Data> EmbedSurfaceStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
   const TriMesh& surface = *std::get<Surface>(inputs[0]);
   const TetMesh &rest = *std::get<Tets>(inputs[1]), &deformed = *std::get<Tets>(inputs[2]);
   const Skin skin(surface, rest, {p.method, p.neighbours}, context);

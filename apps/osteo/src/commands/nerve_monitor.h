@@ -1,4 +1,4 @@
-// osteo monitor
+// osteo nerve-monitor
 #pragma once
 #include <string>
 
@@ -6,7 +6,7 @@
 
 namespace osteo {
 
-struct MonitorCommand {
+struct NerveMonitorCommand {
   struct Params {
     std::string out, setup, channel;
     double stimulator_ma = 0, pulses_per_s = 4, width_ms = 0.1;

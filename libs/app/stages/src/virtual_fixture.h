@@ -5,7 +5,7 @@
 
 namespace osteo::inline app {
 
-struct CurveStage {
+struct VirtualFixtureStage {
   using Params = CurveConstraintParams;
   static void describe(Params& p, auto& visit) {
     visit({"stiffness_n_per_mm", "pull for a mm of distance", "N/mm", 0, 100}, p.stiffness_n_per_mm);

@@ -1,4 +1,4 @@
-// osteo series
+// osteo list-series
 #pragma once
 #include <string>
 
@@ -6,7 +6,7 @@
 
 namespace osteo {
 
-struct SeriesCommand {
+struct ListSeriesCommand {
   struct Params {
     bool studies = false;
     std::string thumbnails;

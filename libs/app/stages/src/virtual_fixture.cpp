@@ -1,4 +1,4 @@
-#include "curve.h"
+#include "virtual_fixture.h"
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
@@ -7,8 +7,8 @@
 
 namespace osteo::inline app {
 
-StageInfo CurveStage::info() {
-  return {.name = "curve",
+StageInfo VirtualFixtureStage::info() {
+  return {.name = "virtual-fixture",
           .version = 1,
           .synopsis = "where a curve holds a moving hand, and with what force",
           .description =
@@ -20,10 +20,10 @@ StageInfo CurveStage::info() {
                      {"path", {DataKind::source}, "text file of the hand's positions in order"}},
           .outputs = {{"places", {DataKind::document}, "one entry a position, in JSON"}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.2"},
-          .example = "osteo curve incision.csv hand.csv places.json --arc-penalty 0.3"};
+          .example = "osteo virtual-fixture incision.csv hand.csv places.json --arc-penalty 0.3"};
 }
 
-std::vector<Data> CurveStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
+std::vector<Data> VirtualFixtureStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
   if (p.release_mm < p.engage_mm)
     throw Error(ExitCode::usage, "--release-mm is smaller than --engage-mm: the constraint would flutter");
   const std::vector<Vec3> points = load_points(std::get<Source>(inputs[0]).path),

@@ -1,9 +1,9 @@
-// osteo monitor: what a nerve monitor would have shown of a session.
+// osteo nerve-monitor: what a nerve monitor would have shown of a session.
 #include <cmath>
 #include <fstream>
 #include <ostream>
 
-#include "commands/monitor.h"
+#include "commands/nerve_monitor.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
@@ -14,8 +14,8 @@
 
 namespace osteo {
 
-cli::CommandInfo MonitorCommand::info() {
-  return {"monitor",
+cli::CommandInfo NerveMonitorCommand::info() {
+  return {"nerve-monitor",
           "what a nerve monitor would have shown of a session, as files",
           "Runs the session again with a model of the nerves that its case lists: monitor.ns5 (30 kHz, all channels) "
           "and monitor.nev "
@@ -26,7 +26,7 @@ cli::CommandInfo MonitorCommand::info() {
           "clinical: docs/monitor.md tells every constant and its source. Exit code 8 when ticks are missing: it goes "
           "up to there.",
           {{"session", "a session folder"}},
-          "osteo monitor SESSION -o out"};
+          "osteo nerve-monitor SESSION -o out"};
 }
 
 namespace {
@@ -112,7 +112,7 @@ std::size_t channel_named(const std::string& name, const std::vector<std::string
 }
 
 // As the flags say, or as it was set in the session.
-void set_stimulator(MonitorReader& monitor, const MonitorCommand::Params& p, const SessionReader& session,
+void set_stimulator(MonitorReader& monitor, const NerveMonitorCommand::Params& p, const SessionReader& session,
                     const Context& context) {
   std::size_t unreadable = 0;
   if (p.stimulator_ma > 0) {
@@ -154,8 +154,9 @@ void tell_monitor(const Json& j, const MonitorWiring& wiring, const std::string&
 
 }  // namespace
 
-int MonitorCommand::run(const Params& p, cli::Invocation& io) {
-  if (p.out.empty()) throw Error(ExitCode::usage, "osteo monitor needs a folder for what it writes", "add -o FOLDER");
+int NerveMonitorCommand::run(const Params& p, cli::Invocation& io) {
+  if (p.out.empty())
+    throw Error(ExitCode::usage, "osteo nerve-monitor needs a folder for what it writes", "add -o FOLDER");
   for (const char* const name : {"pulses_per_s", "width_ms", "hand", "search"}) {
     FieldRef field{{name, ""}, static_cast<bool*>(nullptr)};
     if (io.given.contains(name) && p.stimulator_ma <= 0)

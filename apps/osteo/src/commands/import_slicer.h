@@ -1,4 +1,4 @@
-// osteo take-back
+// osteo import-slicer
 #pragma once
 #include <string>
 
@@ -6,16 +6,16 @@
 
 namespace osteo {
 
-struct TakeBackCommand {
+struct ImportSlicerCommand {
   struct Params {
     std::string source;
-    bool by_place = false;
+    bool match_by_position = false;
     bool check = false;
   };
   static void describe(Params& p, auto& visit) {
     visit({"source", "the scan of the case, where it is not known on this machine"}, p.source);
-    visit({"by_place", "take segments that bear no mark of the scan, when most of the bone lies where it was"},
-          p.by_place);
+    visit({"match_by_position", "take segments that bear no mark of the scan, when most of the bone lies where it was"},
+          p.match_by_position);
     visit({"check", "say what changed, and leave the case as it is"}, p.check);
   }
   static cli::CommandInfo info();

@@ -1,4 +1,4 @@
-// osteo plan
+// osteo export-result
 #pragma once
 #include <string>
 
@@ -6,7 +6,7 @@
 
 namespace osteo {
 
-struct PlanCommand {
+struct ExportResultCommand {
   struct Params {
     std::string out;
     std::string case_folder;

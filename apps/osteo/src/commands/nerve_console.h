@@ -1,4 +1,4 @@
-// osteo console
+// osteo nerve-console
 #pragma once
 #include <string>
 
@@ -7,7 +7,7 @@
 
 namespace osteo {
 
-struct ConsoleCommand {
+struct NerveConsoleCommand {
   using Params = ConsoleFlags;
   static void describe(Params& p, auto& visit) { ConsoleFlags::describe(p, visit); }
   static cli::CommandInfo info();

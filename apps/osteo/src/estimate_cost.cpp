@@ -1,8 +1,8 @@
-// osteo scene: what a rehearsal will build, and what each part costs.
+// osteo estimate-cost: what a rehearsal will build, and what each part costs.
 #include <cmath>
 #include <ostream>
 
-#include "commands/scene.h"
+#include "commands/estimate_cost.h"
 #include "osteo/app/cli/report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -18,15 +18,15 @@
 
 namespace osteo {
 
-cli::CommandInfo SceneCommand::info() {
-  return {"scene",
+cli::CommandInfo EstimateCostCommand::info() {
+  return {"estimate-cost",
           "what a rehearsal of a case will build, and what each part costs",
           "Memory and time to make of every part that the case and the settings list, and the time of a tick while "
           "drilling. What is not "
           "listed is not "
           "built and costs nothing.",
           {{"case", "a folder made by prepare"}},
-          "osteo scene CASE"};
+          "osteo estimate-cost CASE"};
 }
 
 namespace {
@@ -41,7 +41,7 @@ double rounded(double value, double steps_per_unit) {
 // Builds the parts of a scene one after the other, and notes what each costs.
 class SceneCosts {
  public:
-  SceneCosts(const Case& the_case, const SceneCommand::Params& params, const Context& context)
+  SceneCosts(const Case& the_case, const EstimateCostCommand::Params& params, const Context& context)
       : case_(the_case), params_(params), context_(context) {
     j_["parts"] = Json::list();
   }
@@ -217,7 +217,7 @@ class SceneCosts {
     }
     if (small.empty()) return;
     j_["burrs_too_small"] = small;
-    const double least_mm = 2 * kLeastRadiusVoxels * voxel_mm;
+    const double least_mm = 2 * kMinRadiusVoxels * voxel_mm;
     context_.warn(
         "balls and cylinders of less than " + format_number(std::ceil(least_mm * 10 - 1e-6) / 10) +
         " mm, tapers of less than " + format_number(std::ceil(2 * least_mm * 10 - 1e-6) / 10) +
@@ -242,7 +242,7 @@ class SceneCosts {
   }
 
   const Case& case_;
-  const SceneCommand::Params& params_;
+  const EstimateCostCommand::Params& params_;
   const Context& context_;
   Json j_;
   std::vector<Part> parts_;
@@ -258,7 +258,7 @@ class SceneCosts {
 
 }  // namespace
 
-int SceneCommand::run(const Params& p, cli::Invocation& io) {
+int EstimateCostCommand::run(const Params& p, cli::Invocation& io) {
   const Case the_case = load_case(io.arguments[0]);
   SceneCosts costs(the_case, p, io.context);
   costs.build();

@@ -1,4 +1,4 @@
-// osteo hand-over
+// osteo export-slicer
 #pragma once
 #include <string>
 
@@ -6,7 +6,7 @@
 
 namespace osteo {
 
-struct HandOverCommand {
+struct ExportSlicerCommand {
   struct Params {
     std::string source;
   };

@@ -1,4 +1,4 @@
-// osteo guide
+// osteo suggest-threshold
 #pragma once
 #include <string>
 
@@ -6,7 +6,7 @@
 
 namespace osteo {
 
-struct GuideCommand {
+struct SuggestThresholdCommand {
   struct Params {
     std::string series;
     double hu_offset = 0;

@@ -1,4 +1,4 @@
-// osteo scene
+// osteo estimate-cost
 #pragma once
 #include <string>
 
@@ -7,7 +7,7 @@
 
 namespace osteo {
 
-struct SceneCommand {
+struct EstimateCostCommand {
   struct Params {
     std::string settings;
     ContactMethod contact = ContactMethod::overlap;

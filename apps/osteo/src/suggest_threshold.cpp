@@ -5,7 +5,7 @@
 #include <sstream>
 #include <vector>
 
-#include "commands/guide.h"
+#include "commands/suggest_threshold.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
@@ -58,18 +58,18 @@ std::string histogram_svg(const Image& ct, const BoneGuide& g) {
 
 }  // namespace
 
-cli::CommandInfo GuideCommand::info() {
-  return {"guide",
+cli::CommandInfo SuggestThresholdCommand::info() {
+  return {"suggest-threshold",
           "which bone threshold suits a scan",
           "Finds soft tissue and dense bone in the values and proposes a threshold for thick bone (cortical), for the "
           "walls of air cells "
           "(cellular) and for thin plates (thin), with the volume of bone each gives and how much that depends on the "
           "exact number.",
           {{"source", "DICOM folder or zip, or a volume file"}},
-          "osteo guide DICOM_FOLDER"};
+          "osteo suggest-threshold DICOM_FOLDER"};
 }
 
-int GuideCommand::run(const Params& p, cli::Invocation& io) {
+int SuggestThresholdCommand::run(const Params& p, cli::Invocation& io) {
   if (!p.picture.empty() && fs::path(p.picture).extension() != ".svg")
     throw Error(ExitCode::usage, "--picture '" + p.picture + "': the histogram is written as .svg");
   if (!p.picture.empty() && output_exists(p.picture) && !io.common.force)

@@ -46,9 +46,9 @@ std::vector<SeriesRule> checked_rules(const fs::path& file) {
   return rules;
 }
 
-cli::CommandInfo WatchCommand::info() {
+cli::CommandInfo WatchFolderCommand::info() {
   return {
-      "watch",
+      "watch-folder",
       "scans that come into a folder become cases, by rules",
       "Looks into FOLDER (that of 'osteo receive', or any other) and below it. When none of a series' files has come "
       "or changed for "
@@ -65,13 +65,13 @@ cli::CommandInfo WatchCommand::info() {
       "into FOLDER first. A "
       "case that was refused or failed is tried again when more of its series comes.",
       {{"folder", "where scans come in; nothing in it is changed (with --orthanc: where its series are copied to)"}},
-      "osteo watch INBOX --rules pipelines/rules.json -o CASES"};
+      "osteo watch-folder INBOX --rules pipelines/rules.json -o CASES"};
 }
 
-int WatchCommand::run(const Params& p, cli::Invocation& io) {
+int WatchFolderCommand::run(const Params& p, cli::Invocation& io) {
   if (p.rules.empty())
     throw Error(ExitCode::usage, "by which rules?", "--rules FILE; pipelines/rules.json is one to begin with");
-  if (p.out.empty()) throw Error(ExitCode::usage, "where to? osteo watch " + io.arguments[0] + " -o CASES");
+  if (p.out.empty()) throw Error(ExitCode::usage, "where to? osteo watch-folder " + io.arguments[0] + " -o CASES");
   const std::vector<SeriesRule> rules = checked_rules(p.rules);
   WatchOptions o;
   o.folder = fs::absolute(io.arguments[0]);

@@ -1,7 +1,7 @@
-// osteo plan: where a session left pieces and plates, for whoever operates.
+// osteo export-result: where a session left pieces and plates, for whoever operates.
 #include <ostream>
 
-#include "commands/plan.h"
+#include "commands/export_result.h"
 #include "osteo/app/cli/report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -17,17 +17,17 @@
 
 namespace osteo {
 
-cli::CommandInfo PlanCommand::info() {
-  return {"plan",
+cli::CommandInfo ExportResultCommand::info() {
+  return {"export-result",
           "where a session left pieces and plates: transforms, STL, gaps between plate and bone",
           "Writes plan.json, an STL of each piece and plate where it is, and for each plate how far bone lies below "
           "its underside; a picture "
           "too. With --at-s as it was at that time.",
           {{"session", "a session folder"}},
-          "osteo plan SESSION -o plan"};
+          "osteo export-result SESSION -o plan"};
 }
 
-int PlanCommand::run(const Params& p, cli::Invocation& io) {
+int ExportResultCommand::run(const Params& p, cli::Invocation& io) {
   const SessionFolder session = open_session_folder(io.arguments[0], p.case_folder);
   const Case the_case = load_case(session.case_folder);
   const World world = p.at_s < 0 ? world_at_end(session, the_case, {}, io.context)
