@@ -91,13 +91,13 @@ struct WindowFlags {
     visit({"burr", "kind of burr at the start"}, p.burr);
     visit({"diameter_mm", "diameter of the burr at the start: 1, 2, 3, 4, 5, 6 or 7", "mm", 1, 7}, p.diameter_mm);
     visit({"shape", "shape of the burr at the start"}, p.shape);
-    visit({"contact", "how the burr feels bone: rays, volume, overlap or proxy; docs/haptics.md compares them"},
+    visit({"contact", "how the burr feels bone: rays, volume, overlap or proxy; docs/validation/haptics.md compares them"},
           p.contact);
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
     visit({"device",
            "device that moves the drill; auto takes the best that is plugged in ('osteo devices'); marker is a pen "
-           "before a camera, of pose only (docs/marker.md); igtl is a tool that somebody else tracks "
-           "(docs/network.md), also with --headless"},
+           "before a camera, of pose only (docs/how-to/marker.md); igtl is a tool that somebody else tracks "
+           "(docs/how-to/network.md), also with --headless"},
           p.device);
     visit({"tracker", "OpenIGTLink server that tracks the tool with --device igtl: HOST:PORT or HOST:PORT/NAME"},
           p.tracker);
@@ -127,7 +127,7 @@ struct WindowFlags {
         p.dust);
     visit({"heat",
            "how warm drilling makes bone and structures, on a guess of what share of a burr's work heats bone "
-           "(docs/heat.md; nothing "
+           "(docs/validation/heat.md; nothing "
            "clinical): shown "
            "on the bone from 42 C on and at the nearest structure"},
           p.heat);
@@ -139,7 +139,7 @@ struct WindowFlags {
     visit({"resume", "go on from the end of this session"}, p.resume);
     visit({"playback", "session whose hand guides yours; see 'osteo playback'"}, p.playback);
     visit({"playback_as", "flags of --playback, like mode=guide,pace=way,from_s=2"}, p.playback_as);
-    visit({"tutor", "let others join: as the trainee, whose hand is a second one here, or to watch; docs/tutoring.md"},
+    visit({"tutor", "let others join: as the trainee, whose hand is a second one here, or to watch; docs/guides/tutoring.md"},
           p.tutor);
     visit({"listen",
            "address to accept connections on with --tutor; 127.0.0.1 or ::1: this machine alone, 0.0.0.0 or :: : "
@@ -165,14 +165,14 @@ struct WindowFlags {
            "procedure to follow, as JSON (pipelines/procedures): its regions are outlined in bone and cuts, the page "
            "at the end has its findings (empty: none)"},
           p.procedure);
-    visit({"sound", "play the sound of drilling (a model, docs/sound.md)"}, p.sound);
+    visit({"sound", "play the sound of drilling (a model, docs/validation/sound.md)"}, p.sound);
     visit({"volume", "volume of the sound; long loud parts are held below the level that is safe with headphones", "",
            0, 1},
           p.volume);
     visit({"alarms", "alarm tones: a beep on contact with a critical structure, two tones on a violation"}, p.alarms);
     visit({"monitor",
            "play a nerve monitor: what it would show of drilling near the case's nerves (a model for practice, "
-           "docs/monitor.md)"},
+           "docs/validation/monitor.md)"},
           p.monitor);
     visit({"monitor_setup", "constants and channels of the nerve monitor, as JSON (empty: the built-in ones)"},
           p.monitor_setup);
@@ -180,9 +180,9 @@ struct WindowFlags {
            "tells the network what happens while it does: igtl:PORT, igtl:HOST:PORT, igtl:PORT/stimulator, "
            "cerebus:HOST:PORT/VERSION, lsl, "
            "with commas "
-           "between (empty: nobody; docs/network.md)"},
+           "between (empty: nobody; docs/how-to/network.md)"},
           p.stream);
-    visit({"stereo", "stereo display: how the pictures of both eyes share the screen; docs/camera.md"}, p.stereo);
+    visit({"stereo", "stereo display: how the pictures of both eyes share the screen; docs/how-to/camera.md"}, p.stereo);
     visit({"stereo_base", "distance between the eyes, whose pictures agree on what lies in the focus", "mm", 0, 65},
           p.stereo_base);
     visit({"experiment",

@@ -131,17 +131,17 @@ for area in areas:
         bad += [f"libs/{area}/README.md does not name {lib}" for lib in rows if f"`{lib}`" not in readme.read_text()]
 
 # The page that shows it: | library | includes | holds |
-page = (root / "docs/architecture.md").read_text()
+page = (root / "docs/developer/architecture.md").read_text()
 shown = {m[1]: m[2].split() for m in re.finditer(r"^\| (\w+) \| ([\w ]*) ?\| [^|]+ \|$", page, re.M) if m[1] in table or m[1] != "library"}
 for lib, (public, private) in table.items():
     if lib not in shown:
-        bad.append(f"docs/architecture.md: no row for {lib}")
+        bad.append(f"docs/developer/architecture.md: no row for {lib}")
     elif set(shown[lib]) != public | private:
-        bad.append(f"docs/architecture.md: {lib} includes {' '.join(shown[lib])}; libs/layers.txt says {' '.join(sorted(public | private))}")
+        bad.append(f"docs/developer/architecture.md: {lib} includes {' '.join(shown[lib])}; libs/layers.txt says {' '.join(sorted(public | private))}")
 if [lib for lib in shown if lib in table] != list(table):
-    bad.append("docs/architecture.md: the rooms stand in another order than in libs/layers.txt")
+    bad.append("docs/developer/architecture.md: the rooms stand in another order than in libs/layers.txt")
 for lib in shown.keys() - table.keys() - {"library", "area"}:
-    bad.append(f"docs/architecture.md: there is no library {lib}")
+    bad.append(f"docs/developer/architecture.md: there is no library {lib}")
 
 # One name, one type: two of the same name in different files of a namespace are one to the linker, which takes either's functions.
 token = re.compile(r'R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|(?<!\w)\'(?:\\.|[^\'\\\n])*\'|//[^\n]*|/\*.*?\*/|[{};]|'

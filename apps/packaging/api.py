@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The public headers as pages, by Doxygen, without network, and checked. apps/packaging/api.py OUT
 
-Grouped by component and library as libs/layers.txt and docs/library.md have them. Every class, struct and enum of a public header must have a page,
+Grouped by component and library as libs/layers.txt and docs/how-to/library.md have them. Every class, struct and enum of a public header must have a page,
 every example be shown, links inside lead somewhere and nothing be fetched from elsewhere: else it fails. OUT/osteo.tag is for the Doxygen of others."""
 import os, pathlib, re, shutil, subprocess, sys, tempfile
 import xml.etree.ElementTree
@@ -41,7 +41,7 @@ def headers():
 
 def groups():
     """Components with what they hold, as Doxygen's groups."""
-    holds = {r[0]: plain(r[2]) for r in rows("docs/architecture.md", "library")}
+    holds = {r[0]: plain(r[2]) for r in rows("docs/developer/architecture.md", "library")}
     libraries, of = [], {}
     for line in layers.splitlines():
         if line.startswith("== "):
@@ -51,7 +51,7 @@ def groups():
             libraries.append(line.split()[0])
             of[area].append(libraries[-1])
     components = []  # name, what its example shows, its file, libraries
-    for name, _, example in rows("docs/library.md", "component"):
+    for name, _, example in rows("docs/how-to/library.md", "component"):
         name = name.strip("`")
         file, shows = re.sub(r"^\[([^\]]*)\]\([^)]*\)", r"\1", example).split(": ", 1)
         components.append((name, shows, file, of.get(name, [name])))
@@ -73,7 +73,7 @@ def groups():
         text += [f"/// @defgroup lib_{lib} {lib}\n/// @ingroup component_{name}\n/// Holds: {holds.get(lib, '')}.\n///\n"
                  f"/// Target `osteo::{lib}`, headers `osteo/{area_of[lib]}/{lib}/`." for lib in held]
     main = ["@mainpage The libraries of Osteotome", "",
-            "C++20; lengths are millimetres, coordinates LPS, and names carry units. How a program comes by the libraries is in docs/library.md:",
+            "C++20; lengths are millimetres, coordinates LPS, and names carry units. How a program comes by the libraries is in docs/how-to/library.md:",
             "@code{.cmake}", "find_package(osteo REQUIRED COMPONENTS imaging haptics)", "target_link_libraries(mine PRIVATE osteo::imaging osteo::haptics)",
             "@endcode", "", "| component | libraries |", "|---|---|"]
     for name, _, _, held in components:

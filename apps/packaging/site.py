@@ -68,7 +68,7 @@ def main():
         staged = {p.relative_to(work / "pages").as_posix() for p in stage(work / "pages")}
         shutil.copy(root / "apps/packaging/mkdocs.yml", work)
         nav = set(re.findall(r"[\w/-]+\.md", (work / "mkdocs.yml").read_text()))
-        lost = sorted(p for p in staged - nav if not p.startswith(("reference/", "adr/")))
+        lost = sorted(p for p in staged - nav if not p.startswith(("reference/", "developer/adr/")))
         if lost:
             sys.exit("no line in apps/packaging/mkdocs.yml leads to " + ", ".join(lost))
         said = subprocess.run(["mkdocs", "build", "--quiet", "--strict", "--config-file", work / "mkdocs.yml"], capture_output=True, text=True)

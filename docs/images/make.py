@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the pictures of docs/hard-cases.md and docs/guide-imaging.md from the project's own phantom.
+"""Makes the pictures of docs/validation/hard-cases.md and docs/guides/imaging.md from the project's own phantom.
 
 usage: build/readers/bin/python3 docs/images/make.py build/release/bin
 """
@@ -128,7 +128,7 @@ osteo("threshold", "ear-ct.nrrd", "ear-bone.nrrd", "--lower", 500)
 osteo("resample", "ear-ct.nrrd", "ear-bone.nrrd", "ear.vdb")
 osteo("surface", "ear.vdb", "ear.ply")
 picture("ear-ct.nrrd", "guide-structures.png", "--mask", "inside.seg.nrrd", "--surface", "ear.ply", "--view", "left")
-# The phantom itself (docs/phantom.md, README).
+# The phantom itself (docs/validation/phantom.md, README).
 osteo("phantom", "fine-ear.nrrd", "--region", "temporal", "--spacing-mm", 0.4, "--noise-hu", 5)
 osteo("snapshot", "fine-ear.nrrd", here / "phantom-ear.png", "--force", "--centre-mm", "42.6,3,-15.5", "--view", "left", "--bone-hu", 500)
 osteo("snapshot", "ct.nrrd", here / "phantom-head.png", "--force", "--centre-mm", "50,10,-19", "--view", "front", "--bone-hu", 500)

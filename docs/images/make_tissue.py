@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the pictures of docs/tissue.md: the thesis' cube, soft tissue on the phantom's bone pressed and cut, and a flap that a second hand holds aside.
+"""Makes the pictures of docs/validation/tissue.md: the thesis' cube, soft tissue on the phantom's bone pressed and cut, and a flap that a second hand holds aside.
 
 usage: build/peers/bin/python3 docs/images/make_tissue.py build/release/bin
 """

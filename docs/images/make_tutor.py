@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the pictures of docs/tutoring.md and docs/monitor.md from the project's own phantom: live tutoring as a watcher sees
+"""Makes the pictures of docs/guides/tutoring.md and docs/validation/monitor.md from the project's own phantom: live tutoring as a watcher sees
 it, the nerve monitor's console with its stimulator.
 
 usage: build/readers/bin/python3 docs/images/make_tutor.py build/release/bin [watch] [console] [SIZES_DIR]

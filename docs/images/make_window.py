@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the pictures of the window and of the three sessions in docs/guide-surgeon.md, docs/phantom.md and README, from the project's own
+"""Makes the pictures of the window and of the three sessions in docs/guides/surgeon.md, docs/validation/phantom.md and README, from the project's own
 phantom: bone only, nobody's.
 
 usage: build/readers/bin/python3 docs/images/make_window.py build/release/bin [window] [pieces] [mandible] [mastoid]

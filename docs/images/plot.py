@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws the plots of docs/geometry.md from the tables that 'osteo bench geometry' prints.
+"""Draws the plots of docs/validation/geometry.md from the tables that 'osteo bench geometry' prints.
 
 usage: build/peers/bin/python3 docs/images/plot.py TABLES.md
 """

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws the plots of docs/haptics.md from the tables that 'osteo bench haptics' prints.
+"""Draws the plots of docs/validation/haptics.md from the tables that 'osteo bench haptics' prints.
 
 usage: build/peers/bin/python3 docs/images/plot_haptics.py TABLES.md
 """

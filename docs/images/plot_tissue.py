@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws the plots of docs/tissue.md from the tables that 'osteo bench tissue' prints.
+"""Draws the plots of docs/validation/tissue.md from the tables that 'osteo bench tissue' prints.
 
 usage: build/peers/bin/python3 docs/images/plot_tissue.py TABLES.md
 """

@@ -1,5 +1,5 @@
 // Speed against error of the approximate methods, beside their peers in the same run. Prints Markdown for
-// docs/accuracy.md. usage: osteo_bench [threads]
+// docs/validation/accuracy.md. usage: osteo_bench [threads]
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
 #include <openvdb/tools/VolumeToMesh.h>

@@ -1,4 +1,4 @@
-// Time and memory of each correction at 512 x 512 x 600, for docs/accuracy.md; not a test. usage: edit_bench [NX NY NZ]
+// Time and memory of each correction at 512 x 512 x 600, for docs/validation/accuracy.md; not a test. usage: edit_bench [NX NY NZ]
 #include <chrono>
 #include <cmath>
 #include <cstdio>

@@ -1,4 +1,4 @@
-// Haptic renderers against solids of which everything is known: the tables of docs/ground-truth.md, and the files
+// Haptic renderers against solids of which everything is known: the tables of docs/validation/ground-truth.md, and the files
 // beside them.
 #include <cstdio>
 

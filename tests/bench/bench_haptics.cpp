@@ -1,4 +1,4 @@
-// Haptic rendering: speed against error, stability, removal, real time. Prints Markdown for docs/haptics.md.
+// Haptic rendering: speed against error, stability, removal, real time. Prints Markdown for docs/validation/haptics.md.
 #include <unistd.h>
 
 #include <algorithm>

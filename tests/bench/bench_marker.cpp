@@ -1,4 +1,4 @@
-// A pen before a camera: how true, how steady, how late. Prints what docs/marker.md holds.
+// A pen before a camera: how true, how steady, how late. Prints what docs/how-to/marker.md holds.
 //   bench_marker places     still poses by distance, picture size and light
 //   bench_marker motion     a hand that moves and rests, by filter
 //   bench_marker write DIR  a rendered session: plate/, pivot/, pen/ (pictures), for the commands

@@ -1,5 +1,5 @@
 // What a session costs that is told to the network, and what the servo feels of who floods its listeners. Tables of
-// docs/network.md.
+// docs/how-to/network.md.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>

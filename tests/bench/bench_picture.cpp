@@ -1,5 +1,5 @@
 // What a picture of bone costs, by level, beside a plain VTK viewer of the same triangles; not a test. Prints what
-// docs/accuracy.md holds. usage: picture_bench CASE [--pictures FOLDER] [--size WxH] [--rounds N]
+// docs/validation/accuracy.md holds. usage: picture_bench CASE [--pictures FOLDER] [--size WxH] [--rounds N]
 #include <sys/resource.h>
 
 #include <vtkActor.h>

@@ -1,4 +1,4 @@
-// What is removed against what the burr swept. Prints Markdown for docs/haptics.md.
+// What is removed against what the burr swept. Prints Markdown for docs/validation/haptics.md.
 #include <algorithm>
 #include <cstdio>
 

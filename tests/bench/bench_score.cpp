@@ -1,4 +1,4 @@
-// What it costs to keep the score of a session, and to judge what it left: what docs/evidence.md holds. Not a test.
+// What it costs to keep the score of a session, and to judge what it left: what docs/validation/evidence.md holds. Not a test.
 //   build/release/bin/score_bench SESSION PROCEDURE
 // Processor time, so that it tells the same on a machine that is busy otherwise; the best of three.
 #include <ctime>

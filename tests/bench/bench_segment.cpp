@@ -1,4 +1,4 @@
-// Tubes and structures of the ear against their truth: the tables of docs/structures.md. Not a test.
+// Tubes and structures of the ear against their truth: the tables of docs/validation/structures.md. Not a test.
 //   osteo_bench_segment tubes
 //   osteo_bench_segment shapes [FIRST LAST MAX_RADIUS MAX_UNSURE]
 //   osteo_bench_segment nerves|ears [FIRST LAST SPACING SLICE NOISE SCALE]

@@ -1,5 +1,5 @@
 // Simulated trainees of drawn skill, each scored against sessions of simulated experts and novices: what
-// docs/trainee.md holds. Not a test.
+// docs/validation/trainee.md holds. Not a test.
 //   build/release/bin/trainee_bench CASE PROCEDURE FOLDER RUNS PEOPLE ALONE
 // RUNS sessions with every skill drawn by itself (Latin hypercube), PEOPLE people in each of two groups with two
 // sessions each, and of each of kAlone ALONE sessions in which it alone goes through its range, the rest an expert's.

@@ -1,5 +1,5 @@
 // Live tutoring and playback: how near hands stay, energy, what a bad network and a flood cost. Tables of
-// docs/tutoring.md.
+// docs/guides/tutoring.md.
 #include <algorithm>
 #include <chrono>
 #include <cmath>

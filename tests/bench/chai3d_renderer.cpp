@@ -1,4 +1,4 @@
-// CHAI3D's finger proxy as a renderer of 'osteo ground-truth --program': see docs/ground-truth.md. Built where
+// CHAI3D's finger proxy as a renderer of 'osteo ground-truth --program': see docs/validation/ground-truth.md. Built where
 // CHAI3D 3.2 or 3.3 is found (cmake -DCHAI3D_ROOT=FOLDER), and elsewhere compiled against declarations of what it calls
 // (chai3d_declared). Never run with CHAI3D.
 //   chai3d_renderer [EPSILON_MM] [shaded]

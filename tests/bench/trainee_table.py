@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The tables of docs/trainee.md from what trainee_bench wrote: trainee_table.py FOLDER. Needs numpy."""
+"""The tables of docs/validation/trainee.md from what trainee_bench wrote: trainee_table.py FOLDER. Needs numpy."""
 import itertools, json, sys
 import numpy as np
 

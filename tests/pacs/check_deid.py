@@ -218,7 +218,7 @@ run("deidentify", "before", "-o", "before-out")
 assert "left out" in run("send", "mixed", "--peer", "A@127.0.0.1:1", "--deidentify", "--dry-run", rc=7).stderr
 assert json.loads(run("send", "two", "--peer", "A@127.0.0.1:1", "--deidentify", "--dry-run", "--json").stdout)["kinds"][0]["objects"] == 2
 assert "--deidentify" in run("send", "two", "--peer", "A@127.0.0.1:1", "--key", "key", "--dry-run", rc=2).stderr
-# 5. What docs/pacs.md says of the standard's options, each row of its table: removed (None), emptied (""), a dummy, or kept (as it was).
+# 5. What docs/how-to/pacs.md says of the standard's options, each row of its table: removed (None), emptied (""), a dummy, or kept (as it was).
 code = Dataset()
 code.CodeValue, code.CodingSchemeDesignator, code.CodeMeaning = "C1", "99X", "Clinic"
 KEPT = object()
@@ -263,7 +263,7 @@ assert json.load(open("options.json"))["studies"][0]["original_study"] == d.Stud
 for n, sop in enumerate(("1.2.840.10008.5.1.4.1.1.88.33", "1.2.840.10008.5.1.4.1.1.11.1")):
     save(base(sop, 40 + n), f"options-{n}/a.dcm")
     run("deidentify", f"options-{n}", "-o", f"options-{n}-out", rc=7)
-page = (pathlib.Path(__file__).resolve().parents[2] / "docs/pacs.md").read_text()
+page = (pathlib.Path(__file__).resolve().parents[2] / "docs/how-to/pacs.md").read_text()
 named = re.findall(r"^\| .* \| (1131\d\d) \|", page, re.M)
 assert sorted(named) == [str(c) for c in range(113101, 113113)], named
 

@@ -78,7 +78,7 @@ def judge(command):
 
 
 wrong, checked = [], 0
-pages = sorted((root / "docs").glob("*.md")) + [root / "README.md", root / "CONTRIBUTING.md"]
+pages = [p for p in sorted((root / "docs").rglob("*.md")) if "reference" not in p.parts] + [root / "README.md", root / "CONTRIBUTING.md"]
 for page in pages:
     name = page.relative_to(root).as_posix()
     for number, command in lines(page):

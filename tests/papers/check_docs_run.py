@@ -18,51 +18,51 @@ root, build, fixtures = (pathlib.Path(a).resolve() for a in args[:3])
 CASE, SESSION, SCAN, LABELS, MASK, TABLE = "case", "session", "dicom", "labels.nrrd", "mask.nrrd", "table"
 GIVEN = {
     "README.md": {"DICOM_FOLDER": SCAN, "DICOM_DIR_OR_FILE": SCAN},
-    "docs/batch.md": {"TABLE.csv": TABLE, "P.json": "pipeline"},
-    "docs/edit.md": {"CASE": "prepared"},  # where its scan is is known to whom prepared it
-    "docs/evidence.md": {"SESSION": SESSION, "EXPERTS": "sessions"},
-    "docs/guide-imaging.md": {"DICOM_FOLDER": SCAN, "mask.nrrd": MASK, "tumour.stl": "body", "surface.stl": "body", "ct.nrrd": "ct",
+    "docs/how-to/batch.md": {"TABLE.csv": TABLE, "P.json": "pipeline"},
+    "docs/guides/edit.md": {"CASE": "prepared"},  # where its scan is is known to whom prepared it
+    "docs/validation/evidence.md": {"SESSION": SESSION, "EXPERTS": "sessions"},
+    "docs/guides/imaging.md": {"DICOM_FOLDER": SCAN, "mask.nrrd": MASK, "tumour.stl": "body", "surface.stl": "body", "ct.nrrd": "ct",
                               "structures.seg.nrrd": "structures", "jaw.nrrd": "ct", "problem.json": "pressed", "JAW": "folder"},
-    "docs/guide-server.md": {"CT": SCAN, "INBOX": "folder", "CASES": "folder"},
-    "docs/guide-surgeon.md": {"CASE": CASE},
-    "docs/monitor.md": {"ct.nrrd": "ct", "labels.nrrd": LABELS},
-    "docs/movie.md": {"SESSION": SESSION},
-    "docs/network.md": {"CASE": CASE, "SESSION": SESSION},
-    "docs/pacs.md": {"CT": SCAN, "mask.nrrd": MASK},
-    "docs/registration.md": {"before.nrrd": "ct", "after.nrrd": "ct", "ct.nrrd": "ct", "mr.nrrd": "ct", "mr-labels.seg.nrrd": "structures"},
-    "docs/review.md": {"SESSION": SESSION, "EXPERTS": "sessions", "MONDAY": SESSION, "TUESDAY": SESSION},
-    "docs/study.md": {"SESSION": SESSION},
-    "docs/tissue.md": {"FOLDER": "folder"},
-    "docs/tutoring.md": {"SESSION": SESSION, "CASE": CASE, "lesson.json": "script"},
-    "docs/vtk.md": {"CT_FOLDER": SCAN, "CASE": "folder"},
+    "docs/guides/server.md": {"CT": SCAN, "INBOX": "folder", "CASES": "folder"},
+    "docs/guides/surgeon.md": {"CASE": CASE},
+    "docs/validation/monitor.md": {"ct.nrrd": "ct", "labels.nrrd": LABELS},
+    "docs/how-to/movie.md": {"SESSION": SESSION},
+    "docs/how-to/network.md": {"CASE": CASE, "SESSION": SESSION},
+    "docs/how-to/pacs.md": {"CT": SCAN, "mask.nrrd": MASK},
+    "docs/validation/registration.md": {"before.nrrd": "ct", "after.nrrd": "ct", "ct.nrrd": "ct", "mr.nrrd": "ct", "mr-labels.seg.nrrd": "structures"},
+    "docs/how-to/review.md": {"SESSION": SESSION, "EXPERTS": "sessions", "MONDAY": SESSION, "TUESDAY": SESSION},
+    "docs/guides/study.md": {"SESSION": SESSION},
+    "docs/validation/tissue.md": {"FOLDER": "folder"},
+    "docs/guides/tutoring.md": {"SESSION": SESSION, "CASE": CASE, "lesson.json": "script"},
+    "docs/how-to/vtk.md": {"CT_FOLDER": SCAN, "CASE": "folder"},
 }
 # (page or "", what the line begins with or holds, why it is not run here)
 NOT_RUN = [
     ("", r"^(cmake|ninja) |osteo bench", "builds osteo_bench, and takes minutes"),
-    ("docs/haptics.md", r"tables.md", "draws what osteo bench printed"),
-    ("docs/python.md", r"^(apt-get|pip) ", "installs packages: the test python.pip"),
-    ("docs/python.md", r"examples/", "the test python.examples"),
-    ("docs/cluster.md", r"", "the tests readers.batch and readers.batch_slurm"),
-    ("docs/packages.md", r"", "builds packages: the test setup.debs"),
-    ("docs/hard-cases.md", r"scoreboard", "gets other readers from PyPI"),
-    ("docs/robustness.md", r"", "hours, by hand"),
-    ("docs/guide-surgeon.md", r"/etc/udev", "is root's"),
-    ("docs/ground-truth.md", r"mine.py|probe.traj", "another's program, another's recording"),
-    ("docs/pacs.md", r"--peer|--dicomweb|--orthanc|osteo (receive|watch)", "needs a PACS, or waits for one: the tests pacs"),
-    ("docs/tutoring.md", r"osteo (tutor|join)", "two machines: the tests of tutor"),
+    ("docs/validation/haptics.md", r"tables.md", "draws what osteo bench printed"),
+    ("docs/how-to/python.md", r"^(apt-get|pip) ", "installs packages: the test python.pip"),
+    ("docs/how-to/python.md", r"examples/", "the test python.examples"),
+    ("docs/how-to/cluster.md", r"", "the tests readers.batch and readers.batch_slurm"),
+    ("docs/how-to/packages.md", r"", "builds packages: the test setup.debs"),
+    ("docs/validation/hard-cases.md", r"scoreboard", "gets other readers from PyPI"),
+    ("docs/validation/robustness.md", r"", "hours, by hand"),
+    ("docs/guides/surgeon.md", r"/etc/udev", "is root's"),
+    ("docs/validation/ground-truth.md", r"mine.py|probe.traj", "another's program, another's recording"),
+    ("docs/how-to/pacs.md", r"--peer|--dicomweb|--orthanc|osteo (receive|watch)", "needs a PACS, or waits for one: the tests pacs"),
+    ("docs/guides/tutoring.md", r"osteo (tutor|join)", "two machines: the tests of tutor"),
     ("", r"osteo stream .*igtl", "waits for who listens: the test readers.network"),
-    ("docs/edit.md", r"--apply", "corrections that somebody made in the window: the test window.edit"),
-    ("docs/study.md", r"metrics.json|study (form|rate|analyse)", "sessions and ratings of people; LONG's demo does all of it"),
-    ("docs/structures.md", r"SCAN", "a scan of one's own"),
-    ("docs/tissue.md", r"mesh.vtu|fem bone.inp|tissue.vtu", "a mesh, a problem and measurements of one's own"),
-    ("docs/trainee.md", r"CASE|score", "a case with structures: stages.works runs simulate-trainee"),
+    ("docs/guides/edit.md", r"--apply", "corrections that somebody made in the window: the test window.edit"),
+    ("docs/guides/study.md", r"metrics.json|study (form|rate|analyse)", "sessions and ratings of people; LONG's demo does all of it"),
+    ("docs/validation/structures.md", r"SCAN", "a scan of one's own"),
+    ("docs/validation/tissue.md", r"mesh.vtu|fem bone.inp|tissue.vtu", "a mesh, a problem and measurements of one's own"),
+    ("docs/validation/trainee.md", r"CASE|score", "a case with structures: stages.works runs simulate-trainee"),
 ]
 LONG = [
-    ("README.md", r"demo"), ("docs/guide-surgeon.md", r"jaw|session|phantom"), ("docs/guide-teacher.md", r""), ("docs/phantom.md", r""),
-    ("docs/ground-truth.md", r""), ("docs/experiments.md", r"demo|null"), ("docs/study.md", r"demo"), ("docs/trainee.md", r"demo"),
-    ("docs/movie.md", r"--camera|raters"), ("docs/structures.md", r""),
+    ("README.md", r"demo"), ("docs/guides/surgeon.md", r"jaw|session|phantom"), ("docs/guides/teacher.md", r""), ("docs/validation/phantom.md", r""),
+    ("docs/validation/ground-truth.md", r""), ("docs/guides/experiments.md", r"demo|null"), ("docs/guides/study.md", r"demo"), ("docs/validation/trainee.md", r"demo"),
+    ("docs/how-to/movie.md", r"--camera|raters"), ("docs/validation/structures.md", r""),
 ]
-WINDOW = r"(^|/)osteo (edit|console|experiment force-skill|rehearse|playback) (?!.*(--headless|--apply|--simulated|--fast))"
+WINDOW = r"(^|/)osteo (edit|nerve-console|experiment force-skill|rehearse|playback) (?!.*(--headless|--apply|--simulated|--fast))"
 
 
 def blocks(page):
@@ -83,7 +83,7 @@ def blocks(page):
                 yield first, text
 
 
-pages = [p for p in [root / "README.md", *sorted((root / "docs").glob("*.md"))]]
+pages = [p for p in [root / "README.md", *(p for p in sorted((root / "docs").rglob("*.md")) if "reference" not in p.parts)]]
 todo = []
 for page in pages:
     name = page.relative_to(root).as_posix()

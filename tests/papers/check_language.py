@@ -30,7 +30,7 @@ def strings(folders):
 def pages(folder):
     for path in sorted((root / folder).rglob("*.md")):
         name = path.relative_to(root).as_posix()
-        if name == "docs/glossary.md" or (folder == "docs" and name.startswith(("docs/reference", "docs/adr"))):
+        if name == "docs/glossary.md" or (folder == "docs" and name.startswith(("docs/reference", "docs/developer/adr"))):
             continue
         yield re.sub(r"```.*?```|`[^`]*`|\]\([^)]*\)", "", path.read_text(), flags=re.S)
 

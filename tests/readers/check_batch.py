@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """The same table through 'osteo batch' and through the Snakemake workflow: the same records and reports, broken cases recorded and no other
-lost, a case killed in the middle done again. The workflow is run by the very line of docs/cluster.md, in a folder as it is installed: read only, and
+lost, a case killed in the middle done again. The workflow is run by the very line of docs/how-to/cluster.md, in a folder as it is installed: read only, and
 nothing in it executable. Snakemake must be at hand.
 
 usage: check_batch.py BIN_DIR FIXTURES WORK_DIR      exits 77 (skipped) without snakemake
@@ -42,7 +42,7 @@ shutil.copytree(source / "pipelines/snakemake", installed)
 for p in [installed, *installed.rglob("*")]:
     p.chmod(0o555 if p.is_dir() else 0o444)
 files_before = sorted(installed.rglob("*"))
-page = re.search(r"```\n(.*?)```", (source / "docs/cluster.md").read_text(), re.DOTALL)[1].splitlines()
+page = re.search(r"```\n(.*?)```", (source / "docs/how-to/cluster.md").read_text(), re.DOTALL)[1].splitlines()
 (line,) = (text for text in page if f"--profile profiles/{profile} " in text)
 assert page[0] == "cd pipelines/snakemake" and "/data/OUT" in line and "/data/TABLE.csv" in line, page
 line = line.replace("/data/TABLE.csv", f"{work}/t.csv").replace("/data/OUT", f"{work}/s")

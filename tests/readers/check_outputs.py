@@ -199,8 +199,8 @@ reader.SetFileNames(reader.GetGDCMSeriesFileNames(str(fixtures / "dicom")))
 series = reader.Execute()
 same("DICOM series in SimpleITK, origin", series.GetOrigin(), ct_affine[:3, 3], 1e-3)
 same("DICOM series in SimpleITK, values", sitk.GetArrayFromImage(series).transpose(2, 1, 0), ct, 0)
-# Verdicts have the shape that docs/verdict.schema.json promises.
-schema = json.loads((pathlib.Path(__file__).parents[2] / "docs/verdict.schema.json").read_text())
+# Verdicts have the shape that docs/formats/verdict.schema.json promises.
+schema = json.loads((pathlib.Path(__file__).parents[2] / "docs/formats/verdict.schema.json").read_text())
 broken = work / "broken"
 shutil.copytree(tilted, broken)
 for name in ("0010.dcm", "0011.dcm", "0012.dcm"):

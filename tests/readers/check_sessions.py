@@ -5,7 +5,7 @@ usage: check_sessions.py BIN_DIR FIXTURES WORK_DIR      exits 77 (skipped) when 
 """
 import csv, json, pathlib, shutil, struct, subprocess, sys, zlib
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "docs"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "docs" / "formats"))
 
 try:
     import h5py, numpy as np

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""docs/tissue-problem.schema.json and the program say the same of a problem: what is right, and what is wrong with one change.
+"""docs/formats/tissue-problem.schema.json and the program say the same of a problem: what is right, and what is wrong with one change.
 The program is asked by its module for Python, where all of it is one process. usage: PYTHONPATH=MODULE check_tissue_schema.py SOURCE_DIR"""
 import copy, json, pathlib, re, sys
 
@@ -12,7 +12,7 @@ except ImportError as e:
     sys.exit(77)
 
 root = pathlib.Path(sys.argv[1])
-schema = json.loads((root / "docs/tissue-problem.schema.json").read_text())
+schema = json.loads((root / "docs/formats/tissue-problem.schema.json").read_text())
 jsonschema.Draft202012Validator.check_schema(schema)
 validator = jsonschema.Draft202012Validator(schema)
 
@@ -99,12 +99,12 @@ for file in examples:
     text = re.sub(r"^\s*//.*$", "", file.read_text(), flags=re.M)
     for e in validator.iter_errors(json.loads(text)):
         failures.append(f"{file.name}: {e.message}")
-page = (root / "docs/tissue-problem.md").read_text()
+page = (root / "docs/formats/tissue-problem.md").read_text()
 first = json.loads(re.search(r"```json\n(.*?)```", page, re.S)[1])
-failures += [f"docs/tissue-problem.md: {e.message}" for e in validator.iter_errors(first)]
+failures += [f"docs/formats/tissue-problem.md: {e.message}" for e in validator.iter_errors(first)]
 lines = [json.loads(l) for l in re.findall(r"^(\{ \"name\".*\})$", page, re.M)]
 for load in lines:
-    failures += [f"docs/tissue-problem.md, {load['name']}: {e.message}" for e in validator.iter_errors({**first, "loads": [load]})]
+    failures += [f"docs/formats/tissue-problem.md, {load['name']}: {e.message}" for e in validator.iter_errors({**first, "loads": [load]})]
 if len(lines) < 6 or len(examples) < 3:
     failures.append(f"only {len(lines)} loads in the page and {len(examples)} examples found: is this still read right?")
 print(f"{len(right)} right and {len(wrong)} wrong problems, {len(examples)} files, {len(lines) + 1} examples of the page: {len(failures)} differences")

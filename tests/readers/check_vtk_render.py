@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""docs/vtk_render.cpp draws what it says, under Xvfb: its picture shows bone where the surface, projected here pixel by pixel by what VTK says its first
+"""docs/how-to/vtk_render.cpp draws what it says, under Xvfb: its picture shows bone where the surface, projected here pixel by pixel by what VTK says its first
 camera is, lies, and black elsewhere; a wrong file is told with line and step, and no picture is made. usage: check_vtk_render.py PROGRAM OSTEO_BIN FIXTURES SCRATCH SOURCE"""
 import os, pathlib, shutil, subprocess, sys
 

@@ -89,7 +89,7 @@ builds osteo-experiment experiment force-skill study
 builds "" edit CASE --apply edits.json
 builds "" rehearse CASE --headless -o SESSION
 builds "" prepare SCAN -o CASE
-grep -hoE '^(\./)?osteo [a-z][^#`]*' "$1/README.md" "$1"/docs/*.md | sed 's/^[^ ]* //; s/ *$//' | sort -u >"$work/lines"
+grep -hoE '^(\./)?osteo [a-z][^#`]*' -r --include='*.md' --exclude-dir=reference "$1/README.md" "$1/docs" | sed 's/^[^ ]* //; s/ *$//' | sort -u >"$work/lines"
 [ "$(wc -l <"$work/lines")" -gt 100 ]
 while read -r command rest; do
   program=

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Pictures a second of the window under Xvfb while the camera is turned, by what is open, beside a plain VTK viewer
-of the same bone (picture_bench) in turns with it. Not a test: prints rows for docs/accuracy.md.
+of the same bone (picture_bench) in turns with it. Not a test: prints rows for docs/validation/accuracy.md.
 usage: frame_times.py BIN_DIR CASE [ROUNDS]      CASE: a prepared case with structures; BIN_DIR holds picture_bench (ninja picture_bench)"""
 import os, pathlib, statistics, subprocess, sys, tempfile, time
 

@@ -24,10 +24,10 @@ cli::CommandInfo ExperimentCommand::info() {
           "compares trainings within "
           "people and writes report.html, .pdf and .json; 'stimuli' writes paths and forces as CSV and JSON; 'demo' is "
           "all of it by simulated "
-          "participants; 'null' counts what tests find where nothing is. docs/experiments.md defines every number.\n"
+          "participants; 'null' counts what tests find where nothing is. docs/guides/experiments.md defines every number.\n"
           "camera: a model of a person moves the window's own camera from view to view, one move after the other, each "
           "off by a share of its "
-          "length, with times for looking, another grip and keys (docs/camera.md has the numbers). What follows for "
+          "length, with times for looking, another grip and keys (docs/how-to/camera.md has the numbers). What follows for "
           "people is for people to "
           "show: 'osteo rehearse CASE --experiment camera' times yours on the same kind of views.",
           {{"which", "force-skill, analyse, stimuli, demo, null or camera"},

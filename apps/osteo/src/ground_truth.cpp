@@ -20,7 +20,7 @@ cli::CommandInfo GroundTruthCommand::info() {
           "a friction "
           "cone), and with --program through anyone's, and writes tables, plots and a leaderboard. Without "
           "--experiment: all that "
-          "docs/ground-truth.md "
+          "docs/validation/ground-truth.md "
           "describes, in minutes. Same seed, same numbers, to the bit; times are kept apart, in costs.md.",
           {},
           "osteo ground-truth -o truth --program 'python3 mine.py'"};

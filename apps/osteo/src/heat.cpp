@@ -20,7 +20,7 @@ cli::CommandInfo HeatCommand::info() {
           "at each structure. The "
           "share of a burr's work that becomes heat in bone is known within a factor of ten at best, and temperatures "
           "follow it in "
-          "proportion: nothing clinical follows from them (docs/heat.md). Exit code 8 when ticks are missing: heat is "
+          "proportion: nothing clinical follows from them (docs/validation/heat.md). Exit code 8 when ticks are missing: heat is "
           "computed up to "
           "there.",
           {{"session", "a session folder"}},

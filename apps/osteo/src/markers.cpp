@@ -58,7 +58,7 @@ cli::CommandInfo MarkersCommand::info() {
           "pages to print: markers for a pen that becomes the drill, and a plate to calibrate a camera by",
           "A PDF of two pages, of true size when printed at 100 %; each is drawn, looked at as a camera would, and "
           "refused unless all its "
-          "markers are read where they are to be. Or .png: one page (--page). docs/marker.md says how to fold, glue "
+          "markers are read where they are to be. Or .png: one page (--page). docs/how-to/marker.md says how to fold, glue "
           "and calibrate.",
           {{"output", "a .pdf, or a .png of one page"}},
           "osteo markers markers.pdf --paper letter"};
@@ -277,7 +277,7 @@ int TrackPenCommand::run(const Params& p, cli::Invocation& io) {
   if (seen == 0)
     throw Error(ExitCode::failed,
                 "pen " + std::to_string(pen.pen) + " was not seen in any of " + std::to_string(pictures) + " pictures",
-                "more light, nearer, its markers towards the camera; docs/marker.md");
+                "more light, nearer, its markers towards the camera; docs/how-to/marker.md");
   return 0;
 }
 

@@ -23,7 +23,7 @@ cli::CommandInfo NerveMonitorCommand::info() {
           "setup. The same to the bit "
           "as it was live. With --stimulator-ma a what-if: the tip of a hand's tool stimulates all the time it "
           "touches. Illustrative, not "
-          "clinical: docs/monitor.md tells every constant and its source. Exit code 8 when ticks are missing: it goes "
+          "clinical: docs/validation/monitor.md tells every constant and its source. Exit code 8 when ticks are missing: it goes "
           "up to there.",
           {{"session", "a session folder"}},
           "osteo nerve-monitor SESSION -o out"};
@@ -149,7 +149,7 @@ void tell_monitor(const Json& j, const MonitorWiring& wiring, const std::string&
     err << *n.find("nerve")->text() << ": " << std::lround(100 * n.find("least_integrity")->number().value_or(0))
         << " % whole\n";
   for (const std::string& name : wiring.left_out) err << "not in the case, so not heard: " << name << '\n';
-  err << "illustrative, not clinical (docs/monitor.md)\n";
+  err << "illustrative, not clinical (docs/validation/monitor.md)\n";
 }
 
 }  // namespace

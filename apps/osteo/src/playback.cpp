@@ -76,7 +76,7 @@ cli::CommandInfo PlaybackCommand::info() {
           "in 'show' with the "
           "forces that it felt. Bone is drilled by the recorded hand, and comes out as it was recorded to the bit, or "
           "by yours (--drills). "
-          "What is recorded says that it was guided; scores never mix it with unaided sessions. docs/tutoring.md.",
+          "What is recorded says that it was guided; scores never mix it with unaided sessions. docs/guides/tutoring.md.",
           {{"session", "the expert's, a session folder"}},
           "osteo playback SESSION --mode guide --pace way"};
 }

@@ -22,7 +22,7 @@ cli::CommandInfo ScoreCommand::info() {
           "measured says why. "
           "With --procedure also the items of its scale, each with value, threshold and margin; with --reference "
           "compared with sessions of "
-          "others on the same case. Thresholds are starting values, not fitted to rated sessions (docs/evidence.md "
+          "others on the same case. Thresholds are starting values, not fitted to rated sessions (docs/validation/evidence.md "
           "says what may not be "
           "concluded). Of a damaged session what is there is scored, and the exit code is 4.",
           {{"session", "a session folder"}},

@@ -23,7 +23,7 @@ cli::CommandInfo SimulateTraineeCommand::info() {
           "sees which bone is "
           "left, and is as good as --skill says. The same seed gives the same session. It is labelled simulated "
           "wherever it is shown, and "
-          "says nothing about people (docs/trainee.md). Skills, with an expert's values: " +
+          "says nothing about people (docs/validation/trainee.md). Skills, with an expert's values: " +
               skills + ".",
           {{"case", "a folder made by prepare, with structures"}},
           "osteo simulate-trainee CASE --skill 'novice, undercut=0.8' --procedure "

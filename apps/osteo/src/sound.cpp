@@ -22,7 +22,7 @@ cli::CommandInfo SoundCommand::info() {
           "Burrs by their rotation, teeth, size, force and the bone under them; suckers, water, plates on bone. A "
           "model by published levels "
           "and "
-          "spectra, designed by ear where there are none (docs/sound.md), not a recording. 48 kHz, 16 bits, one "
+          "spectra, designed by ear where there are none (docs/validation/sound.md), not a recording. 48 kHz, 16 bits, one "
           "channel. The bone over sinus, "
           "dura and vessels sounds duller where the case names its structures. Of a damaged session what is missing is "
           "silent, and the exit "

@@ -20,7 +20,7 @@ cli::CommandInfo StreamCommand::info() {
           "nerve monitor "
           "(OpenIGTLink, Cerebus packets, Lab Streaming Layer). Listens on this machine alone unless --to names an "
           "address. No date, name "
-          "or file leaves: docs/network.md says what does. Exit code 8 when messages were dropped, since a listener "
+          "or file leaves: docs/how-to/network.md says what does. Exit code 8 when messages were dropped, since a listener "
           "did not keep up, or "
           "ticks of the session are missing.",
           {{"session", "a session folder"}},

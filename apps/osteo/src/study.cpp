@@ -105,7 +105,7 @@ cli::CommandInfo StudyCommand::info() {
       "with "
       "blinded movies and forms for raters (--no-movies leaves the movies out, as does a build without them); "
       "stopped and begun again it goes on where it was. Random choices follow the study's own seed, given to 'new'. "
-      "docs/study.md defines every number and says what may not be concluded.",
+      "docs/guides/study.md defines every number and says what may not be concluded.",
       {{"action", "new, plan, add, remove, order, form, rate, analyse or demo"},
        {"study", "its folder; of a demo also by -o", true},
        {"file", "add: a session's folder, or its metrics (.json, .csv); rate: ratings that the form saved", true}},

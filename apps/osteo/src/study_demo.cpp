@@ -180,7 +180,7 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
   make_case(folder, io);
 
   std::vector<Job> jobs;
-  // As many others are the reference: fewer say too little of where experts drill (docs/trainee.md).
+  // As many others are the reference: fewer say too little of where experts drill (docs/validation/trainee.md).
   for (int n = 0; n < kExperts + kNovices; ++n) {
     const TraineeGroup group = n < kExperts ? TraineeGroup::expert : TraineeGroup::novice;
     const std::string code = (n < kExperts ? "RE" : "RN") + std::to_string(n < kExperts ? n + 1 : n + 1 - kExperts);

@@ -50,7 +50,7 @@ cli::CommandInfo TutorCommand::info() {
           "the code to join with. "
           "Listens on this machine alone unless --listen names another address. What travels is poses, encrypted; each "
           "side feels its own copy "
-          "of the same bone (docs/tutoring.md says what it withstands). Without --two-way the instructor's hand is not "
+          "of the same bone (docs/guides/tutoring.md says what it withstands). Without --two-way the instructor's hand is not "
           "pulled.",
           {{"case", "a folder made by prepare"}},
           "osteo tutor CASE --script lesson.json --listen 0.0.0.0"};

@@ -14,7 +14,7 @@ Records = _npt.NDArray[_t.Any]
 class Session:
     """A session in memory: a folder that `osteo rehearse` or Rehearsal made, or its stream.oss.
 
-    ticks: one record for each tick and hand, fields as in docs/session-format.md; those of three coordinates are one field: position_mm, axis,
+    ticks: one record for each tick and hand, fields as in docs/formats/session-format.md; those of three coordinates are one field: position_mm, axis,
         force_n, torque_n_mm, shown_offset_mm
     changes: voxel and its density from then on, in the order written
     actions: what else was done; values as docs/reference/actions.md says for each kind, changes_before: how many of changes came before it

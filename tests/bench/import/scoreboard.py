@@ -1,5 +1,5 @@
 # The hard cases of an import beside the readers of the field, on the same files, in one run. scoreboard.sh gets the readers and starts it.
-# usage: scoreboard.py OSTEO SHARED_DATA [NUMBER...]     prints the table of docs/hard-cases.md; with numbers only those cases
+# usage: scoreboard.py OSTEO SHARED_DATA [NUMBER...]     prints the table of docs/validation/hard-cases.md; with numbers only those cases
 #
 # How it is judged, alike for all: what a reader writes is looked at in the patient's space. The centres of the true pixels are carried into
 # the volume by its own matrix. Where they fall on voxels, the values must be those of the files (to half a HU). Where they fall between

@@ -1,5 +1,5 @@
 // Series that hold more than one scan, and values that are no Hounsfield units by what their header says (42 to 71 of
-// docs/hard-cases.md).
+// docs/validation/hard-cases.md).
 #include <cmath>
 
 #include "edit.h"

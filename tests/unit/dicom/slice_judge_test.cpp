@@ -275,7 +275,7 @@ TEST(SliceJudge, RealSeriesHaveNoFault) {
 // Every code has its row, and the page holds the same rows.
 TEST(VerdictCodes, TableAndPageAgree) {
   std::vector<std::string> rows;
-  std::ifstream page(fs::path(OSTEO_SOURCE) / "docs" / "verdict.md");
+  std::ifstream page(fs::path(OSTEO_SOURCE) / "docs" / "formats" / "verdict.md");
   for (std::string line; std::getline(page, line);) {
     if (line.starts_with("| `") && line.find_first_of("abcdefghijklmnopqrstuvwxyz") > line.find('`', 3))
       rows.push_back(line);

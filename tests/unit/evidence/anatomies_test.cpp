@@ -1,7 +1,7 @@
 // Each kind of item on three anatomies, where it is violated and where it is kept: cuts are planted by a seed, and what
 // is true is sampled from the planted bodies themselves, points a third of a millimetre apart, with no lattice of
 // densities and no cavity found by a ball. OSTEO_PLANTED=N plants N in each anatomy, and prints the table that
-// docs/evidence.md has.
+// docs/validation/evidence.md has.
 #include <gtest/gtest.h>
 
 #include <cstdio>

@@ -153,7 +153,7 @@ TEST(FacePart, IsByPlaceAlongTheLineAndByWhereItLooks) {
 }
 
 TEST(Metrics, TheTableInTheDocsIsTheirDeclaration) {
-  const std::string docs = read_text(std::filesystem::path(OSTEO_SOURCE) / "docs/evidence.md");
+  const std::string docs = read_text(std::filesystem::path(OSTEO_SOURCE) / "docs/validation/evidence.md");
   EXPECT_NE(docs.find(metric_table_markdown()), std::string::npos) << metric_table_markdown();
 }
 

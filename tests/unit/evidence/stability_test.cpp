@@ -94,7 +94,7 @@ TEST(Product, EveryPrimitiveIsStableUnderShiftTurnAndResampling) {
   }
   // Edges are among them: the test would see a margin that promises too much.
   EXPECT_GT(changed, 0);
-  // As docs/evidence.md says, in units of the item's spread (not violated: mm3).
+  // As docs/validation/evidence.md says, in units of the item's spread (not violated: mm3).
   const std::vector<double> at_most{0.3, 2.5, 6, 0.4, 0.5, 0.8, 0.6, 0.8, 0.7};
   for (std::size_t n = 0; n < worst.size(); ++n) {
     EXPECT_LE(worst[n], at_most[n]) << procedure().items[n].name;

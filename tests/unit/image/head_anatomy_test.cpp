@@ -1,4 +1,4 @@
-// The anatomy against what is published of sizes and distances (docs/phantom.md names the sources), for ten
+// The anatomy against what is published of sizes and distances (docs/validation/phantom.md names the sources), for ten
 // individuals.
 #include "osteo/imaging/image/detail/head_anatomy.h"
 

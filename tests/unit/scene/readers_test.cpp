@@ -37,7 +37,7 @@ RehearsalOptions options(const std::filesystem::path& file) {
 
 const SceneAction kUndo = SceneAction::plain(ActionKind::undo);
 
-// The page on readers (docs/readers.md) tells how to write one; this is its example: how long the burr pressed harder
+// The page on readers (docs/developer/readers.md) tells how to write one; this is its example: how long the burr pressed harder
 // than it should.
 class PressureScore final : public Reader {
  public:

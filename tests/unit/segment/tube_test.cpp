@@ -75,7 +75,7 @@ TEST(Tube, AVesselIsBrightInSoftTissue) {
 }
 
 // On nerves by seed, none of which the confidence was made on: what says 0.9 is right nine times in ten, and the whole
-// is as often right as it says. docs/structures.md has the curve over a hundred.
+// is as often right as it says. docs/validation/structures.md has the curve over a hundred.
 TEST(Tube, ConfidenceIsTheShareThatIsRight) {
   double said = 0, right = 0, n = 0, sure = 0, sure_right = 0, outside = 0;
   for (const std::uint64_t seed : {2001U, 2002U, 2003U, 2004U, 2005U, 2006U}) {

@@ -137,7 +137,7 @@ TEST(Damping, ASwingIsFoundWithoutAModel) {
   }
 }
 
-// Known truth in closed form, three dampings and three noises; the table of docs/tissue.md.
+// Known truth in closed form, three dampings and three noises; the table of docs/validation/tissue.md.
 TEST(Damping, AKnownTruthIsFoundAgain) {
   if (!has_ceres()) GTEST_SKIP() << "built without Ceres";
   const double w = bar().w;

@@ -142,7 +142,7 @@ TEST(Attack, WhateverComesNothingBreaks) {
   ASSERT_TRUE(decode_log(good[1]));
   ASSERT_TRUE(decode_blob(good[2]));
   std::size_t understood = 0;
-  const char* const asked = std::getenv("OSTEO_TUTOR_PACKETS");  // 1000000 for docs/tutoring.md
+  const char* const asked = std::getenv("OSTEO_TUTOR_PACKETS");  // 1000000 for docs/guides/tutoring.md
   const int packets = asked != nullptr ? std::atoi(asked) : 30000;
   for (int i = 0; i < packets; ++i) {
     Bytes b;

@@ -85,7 +85,7 @@ TEST(Live, GripsThatResistStayWithinTwoMillimetres) {
   }
 }
 
-// As long as it is asked for: OSTEO_TUTOR_SECONDS=600 for docs/tutoring.md.
+// As long as it is asked for: OSTEO_TUTOR_SECONDS=600 for docs/guides/tutoring.md.
 TEST(Live, BoneIsTheSameAfterALongTime) {
   LiveParams p;
   p.faults = {20, 10, 0.05, 0.02};

@@ -67,7 +67,7 @@ TEST(EditControl, TheGuideHasTheTableOfKeys) {
   std::ifstream in(std::string(OSTEO_SOURCE) + "/docs/edit.md");
   std::stringstream text;
   text << in.rdbuf();
-  EXPECT_NE(text.str().find(edit_help_table()), std::string::npos) << "docs/edit.md lacks this table:\n"
+  EXPECT_NE(text.str().find(edit_help_table()), std::string::npos) << "docs/guides/edit.md lacks this table:\n"
                                                                    << edit_help_table();
 }
 

@@ -43,14 +43,14 @@ struct EditKeyRow {
 /// Null for a key, or a key with others held, that does nothing.
 [[nodiscard]] const EditKeyRow* find_edit_key(int code, bool control, bool shift);
 
-/// A line of the help and of docs/edit.md, and the commands it tells of; none: of the mouse.
+/// A line of the help and of docs/guides/edit.md, and the commands it tells of; none: of the mouse.
 struct EditHelpLine {
   const char* keys;
   const char* text;
   std::vector<EditKey> commands;
 };
 [[nodiscard]] const std::vector<EditHelpLine>& edit_help_lines();
-/// The help as a table in Markdown, as docs/edit.md has it.
+/// The help as a table in Markdown, as docs/guides/edit.md has it.
 [[nodiscard]] std::string edit_help_table();
 
 }  // namespace osteo::inline app

@@ -267,7 +267,7 @@ Procedure mirrored(Procedure p) {
   return p;
 }
 
-// Starting values, to be fitted on rated cases: docs/evidence.md says where they are from.
+// Starting values, to be fitted on rated cases: docs/validation/evidence.md says where they are from.
 double usual_threshold(ItemKind kind) {
   switch (kind) {
     case ItemKind::exposed:

@@ -324,7 +324,7 @@ void run_delay(const RunAll& run) {
                     "The force of a while ago against the force that is due: what the truth itself changes by in that "
                     "time, and what each "
                     "renderer is off by. What "
-                    "it does to stability is in docs/haptics.md.",
+                    "it does to stability is in docs/validation/haptics.md.",
                     {"delay ms", "the truth's own change N"},
                     {},
                     {}};

@@ -89,7 +89,7 @@ class ProcessRenderer final : public PointRenderer {
   }
   [[noreturn]] void fail(const std::string& what) {
     stop();
-    throw Error(ExitCode::failed, "the renderer '" + command_ + "' " + what, "docs/ground-truth.md has the protocol");
+    throw Error(ExitCode::failed, "the renderer '" + command_ + "' " + what, "docs/validation/ground-truth.md has the protocol");
   }
   void start() {
     // A program that has ended must be an error here, not the end of this one.

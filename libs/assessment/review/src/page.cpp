@@ -405,7 +405,7 @@ std::string review_html(const Review& r) {
   out << "<footer class=\"small\">Osteotome. Thresholds are starting values, fitted to no rated session; near means "
          "within 2 mm; what each "
          "figure "
-         "means and may not be used for: docs/review.md and docs/evidence.md. A rehearsal is no proof of "
+         "means and may not be used for: docs/how-to/review.md and docs/validation/evidence.md. A rehearsal is no proof of "
          "skill.</footer>\n"
          "<script type=\"application/json\" id=\"review-data\">"
       << page_data(r) << "</script>\n<script>\n"

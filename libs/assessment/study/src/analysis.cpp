@@ -40,7 +40,7 @@ void Analyst::opening() {
   const Plan& p = study_.plan;
   sheet_.title = p.title.empty() ? "Study" : p.title;
   sheet_.code = std::to_string(study_.participants.size()) + " people";
-  sheet_.footer = "Osteotome. Definitions, sources and limits of every number: docs/study.md";
+  sheet_.footer = "Osteotome. Definitions, sources and limits of every number: docs/guides/study.md";
   sheet_.pages = 5;
   // By a hand in sessions.csv too.
   const bool simulated = p.simulated || std::any_of(study_.sessions.begin(), study_.sessions.end(),

@@ -22,7 +22,7 @@ constexpr int kVoxels = BrickGrid::kVoxels;
 constexpr float kForcedHu = 100;
 
 constexpr float kTrace = 1.0F / 256;
-// Measured (docs/accuracy.md): from here on outlines are the better in nearly every body, and of a real skull; in finer
+// Measured (docs/validation/accuracy.md): from here on outlines are the better in nearly every body, and of a real skull; in finer
 // slices values are. And how much the field may grow over as far as slices lie apart: with less, ends of bodies suffer,
 // with more, flat slopes.
 constexpr double kThickSlices = 1.3, kThickMm = 1.5, kHuPerSlice = 200;

@@ -15,7 +15,7 @@ namespace osteo::inline imaging {
 namespace {
 
 constexpr int kLowestHu = -1024, kHighestHu = 3071;  // what is beyond is metal or padding, and stays
-constexpr double kStrength = 0.8;  // of OpenCV's filter, for each HU of noise: measured (docs/accuracy.md)
+constexpr double kStrength = 0.8;  // of OpenCV's filter, for each HU of noise: measured (docs/validation/accuracy.md)
 
 // Writes what `change` makes of each slice, which it gets as a copy in single precision, into a new volume.
 template <class F>

@@ -204,7 +204,7 @@ constexpr std::size_t kSigns = 16;
 using Signs = std::array<double, kSigns>;
 
 // How much each sign counts, by logistic regression: that a place lies in the nerve with its radius. Made on nerves by
-// seed (osteo_bench_segment shapes), judged on others: docs/structures.md has the curve.
+// seed (osteo_bench_segment shapes), judged on others: docs/validation/structures.md has the curve.
 constexpr Signs kWeights{1.30,  2.12,  0.48,  -1.74, 0.01,  -2.01, -0.66, -1.06,
                          -0.35, -4.87, -1.90, -1.04, -3.31, -1.69, -0.97, 2.16};
 

@@ -27,7 +27,7 @@ std::unique_ptr<SoftBody> body_in(const fs::path& folder, const std::string& nam
     throw Error(ExitCode::no_input,
                 "the case lists its soft tissue '" + name + "' by halves: '" + needed.string() + "' is missing" +
                     (there != files.end() ? ", '" + there->filename().string() + "' is there" : ""),
-                "'osteo tetrahedralize --method grid' makes tissue.vtu, docs/tissue.md describes tissue.json; or "
+                "'osteo tetrahedralize --method grid' makes tissue.vtu, docs/validation/tissue.md describes tissue.json; or "
                 "remove what is there");
   }
   try {

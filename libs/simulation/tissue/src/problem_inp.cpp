@@ -79,7 +79,7 @@ class Reader {
                  !card.name.ends_with("FILE") && !card.name.ends_with("OUTPUT") && card.name != "CONTROLS" &&
                  card.name != "PREPRINT" && card.name != "RESTART" && card.name != "ASSEMBLY" &&
                  card.name != "END ASSEMBLY") {
-        throw fail(card, "this card is not read, and might change the answer", "docs/tissue.md lists what is");
+        throw fail(card, "this card is not read, and might change the answer", "docs/validation/tissue.md lists what is");
       }
     }
     settle_boundary();

@@ -35,7 +35,7 @@ struct EditWindowActions {
 
 /// Opens a window and runs until it is closed; asks before it closes with corrections that were not saved. Nothing of
 /// the scan is written anywhere. Returns the number of OpenGL errors seen (0 when all is well). Error(failed) when no
-/// window can be opened. Mouse and keys: docs/edit.md, and F1 in the window.
+/// window can be opened. Mouse and keys: docs/guides/edit.md, and F1 in the window.
 int run_edit_window(EditDocument& document, const EditWindowOptions& options, const EditWindowActions& actions);
 
 }  // namespace osteo::inline app

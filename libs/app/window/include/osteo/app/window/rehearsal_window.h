@@ -144,7 +144,7 @@ struct WindowEnd {
 /// save. What fails meanwhile is shown in the window, which offers to begin anew; what was not put right, or was lost,
 /// is thrown at the end. `person`: what is changed in the window is changed there. `sound`: turned on and off, louder
 /// and softer in the window; whoever runs the rehearsal tells it which to follow. Mouse and keys:
-/// docs/guide-surgeon.md, and F1 in the window.
+/// docs/guides/surgeon.md, and F1 in the window.
 WindowEnd run_rehearsal_window(WindowShell& shell, PersonSettings& person, const WindowOptions& options,
                                const SparseGrid* hu, const WindowActions& actions, SoundOut& sound);
 

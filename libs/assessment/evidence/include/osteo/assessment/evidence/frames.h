@@ -18,7 +18,7 @@ class FrameMaker {
 
   /// A part of a session file, in order.
   void part(const SessionPart& part);
-  /// Live: what a reader is told (docs/readers.md), with densities as they were before and after each change.
+  /// Live: what a reader is told (docs/developer/readers.md), with densities as they were before and after each change.
   void action(const SceneAction& action);
   void tick(const TickRecord& record, std::span<const VoxelChange> changes);
   /// The last frame is whole.

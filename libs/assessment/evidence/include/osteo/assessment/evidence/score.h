@@ -115,7 +115,7 @@ struct ScoreDetail {
 [[nodiscard]] std::string score_csv(const Score& score, const std::string& session);
 /// One line a metric, with its word where it has no value.
 [[nodiscard]] std::string score_lines(const Score& score);
-/// All metrics with unit, direction, needs, source: docs/evidence.md has this table.
+/// All metrics with unit, direction, needs, source: docs/validation/evidence.md has this table.
 [[nodiscard]] std::string metric_table_markdown();
 
 }  // namespace osteo::inline assessment

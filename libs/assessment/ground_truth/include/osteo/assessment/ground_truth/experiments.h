@@ -79,7 +79,7 @@ struct GroundTruthOptions {
   std::vector<Experiment> only;  ///< these instead of all that is built in
   Recorded recorded;             ///< this instead of all that is built in
 };
-/// All experiments of docs/ground-truth.md. Independent rows run in threads; results do not depend on how many.
+/// All experiments of docs/validation/ground-truth.md. Independent rows run in threads; results do not depend on how many.
 [[nodiscard]] GroundTruthResult run_ground_truth(const GroundTruthOptions& options, const Context& context = {});
 /// Those that are files, in their order: pipelines/ground-truth.
 [[nodiscard]] const std::vector<Experiment>& built_in_experiments();

@@ -51,7 +51,7 @@ class PointRenderer {
 ///   interpolated normals voxel:N/M           D. Morris 2006, 7.4.1: the nearest of M triangles for each of N^3 voxels,
 ///   its plane the surface cone:M              a proxy held by up to three of M triangles, with a friction cone, as of
 ///   those days;  cone-shaded:M overlap:H, proxy:H, volume:H, rays:H   our contact models of a 4 mm burr on bone in
-///   voxels of H mm; settings.probe_radius_mm must be 2 process:COMMAND     another program: see docs/ground-truth.md;
+///   voxels of H mm; settings.probe_radius_mm must be 2 process:COMMAND     another program: see docs/validation/ground-truth.md;
 ///   gets the solid as process-mesh of 20,000 triangles
 /// Error(usage) with what is wrong.
 [[nodiscard]] std::unique_ptr<PointRenderer> make_point_renderer(const std::string& what, const Solid& solid,
@@ -64,7 +64,7 @@ class PointRenderer {
                                                                  const Context& context);
 [[nodiscard]] std::unique_ptr<PointRenderer> make_cone_renderer(const TriangleSoup& mesh, bool shaded,
                                                                 const RenderSettings& settings);
-/// Starts `command` by the shell and speaks the protocol of docs/ground-truth.md with it. Error(failed) where it ends,
+/// Starts `command` by the shell and speaks the protocol of docs/validation/ground-truth.md with it. Error(failed) where it ends,
 /// says something else or nothing for `patience_s`.
 [[nodiscard]] std::unique_ptr<PointRenderer> make_process_renderer(const std::string& command, const TriangleSoup& mesh,
                                                                    const RenderSettings& settings,

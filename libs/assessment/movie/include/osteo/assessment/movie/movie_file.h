@@ -12,7 +12,7 @@ namespace osteo::inline assessment {
 /// .mp4: H.264 (libx264, else libopenh264), 4:2:0, its index in front so that it plays while it loads; .webm: VP9
 /// (libvpx). The file holds pictures and their times and nothing else: no date, no name, no word on what made it. One
 /// thread encodes, so that the same pictures give the same bytes with the same libraries (pictures of two runs need not
-/// be the same: docs/movie.md).
+/// be the same: docs/how-to/movie.md).
 class MovieFile {
  public:
   static constexpr int kMinEdge = 64, kMaxEdge = 7680, kMaxFps = 120;

@@ -79,7 +79,7 @@ struct Review {
 };
 
 /// Reads, scores, compares and draws. Errors: as open_session_folder, load_case, score_session, load_reference; failed
-/// without OpenGL. Cost: docs/review.md.
+/// without OpenGL. Cost: docs/how-to/review.md.
 [[nodiscard]] Review make_review(const ReviewRequest& request, const Context& context = {});
 
 /// "osteotome_review": 1. All that the page says, and the voxels and places that prove it.

@@ -35,7 +35,7 @@ struct Reach {
 [[nodiscard]] std::string told(const Reach& reach);
 [[nodiscard]] Json json_of(const Reach& reach);
 
-/// Statistics as docs/study.md defines them. Error(no_input) where no session or no participant is there, Error(usage)
+/// Statistics as docs/guides/study.md defines them. Error(no_input) where no session or no participant is there, Error(usage)
 /// where what is given is no metric of the study. Same study, same bytes.
 [[nodiscard]] Analysis analyse(const Study& study, const AnalysisSettings& settings = {});
 

@@ -8,7 +8,7 @@
 
 namespace osteo::inline assessment {
 
-/// None of it is fitted to people. Each number acts in one place (docs/trainee.md), so that a metric can be held
+/// None of it is fitted to people. Each number acts in one place (docs/validation/trainee.md), so that a metric can be held
 /// against it.
 struct TraineeSkill {
   using Params = TraineeSkill;

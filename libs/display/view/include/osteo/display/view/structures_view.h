@@ -26,7 +26,7 @@ enum class StructureLook : int { solid, clear, hidden };
 /// Golub, Optimal surface smoothing as filter design, 1996; VTK's filter) in rounds, after each of which what the
 /// surface lost is given back evenly, so that tubes two voxels thick stay as thick as they were. No point moves farther
 /// than `most_mm`; parts of fewer than 60 points, two voxels or so, stay as they are. Distances are measured from the
-/// face itself. Errors: docs/accuracy.md.
+/// face itself. Errors: docs/validation/accuracy.md.
 [[nodiscard]] TriMesh smooth_surface(const TriMesh& face, double most_mm);
 
 class StructuresView {

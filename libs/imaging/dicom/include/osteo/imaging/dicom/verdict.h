@@ -1,4 +1,4 @@
-// What an import found, in words and stable codes. As JSON it is written beside every import (docs/verdict.md,
+// What an import found, in words and stable codes. As JSON it is written beside every import (docs/formats/verdict.md,
 // verdict.schema.json).
 #pragma once
 #include <array>

@@ -2,7 +2,7 @@
 // soft tissue bound.
 //
 // World is LPS. The external ear canal is found first, from the air outside; the others are looked for by their place
-// to its inner end. docs/structures.md says of each what is labelled, how it is found, what its quality means, and how
+// to its inner end. docs/validation/structures.md says of each what is labelled, how it is found, what its quality means, and how
 // far from the truth it is.
 #pragma once
 #include <array>

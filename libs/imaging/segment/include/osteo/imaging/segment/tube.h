@@ -53,7 +53,7 @@ struct Tube {
 /// given points: the CT shows nothing there. The radius is that of what is missing from the wall's level, which the
 /// scanner's blur does not change, at most max_radius_mm, and where it is not sure that of the nearest place that is.
 /// Confidence comes from walls, roundness, evenness along the line and the way's length by weights that were fitted on
-/// nerves whose truth is known; docs/structures.md has how often it is true. Vessels were not among them. O(volume
+/// nerves whose truth is known; docs/validation/structures.md has how often it is true. Vessels were not among them. O(volume
 /// around the points). Errors: usage for fewer than two points or a point outside; failed when a stretch longer than
 /// max_uncertain_mm has no walls, or three quarters of the line: the points are not joined by a tube. Y. Sato et al.,
 /// Three-dimensional multi-scale line filter, Med. Image Anal. 1998; half-way edges: S. Prevrhal et al. 1999.

@@ -1,5 +1,5 @@
 // The file of a rehearsal: the stream of the servo, in frames with a checksum each, only ever appended to. Whatever was
-// written before a crash can be read. Format: docs/session-format.md. Reading: session_reader.h.
+// written before a crash can be read. Format: docs/formats/session-format.md. Reading: session_reader.h.
 #pragma once
 #include <filesystem>
 #include <memory>

@@ -17,7 +17,7 @@
 namespace osteo::inline session {
 
 /// How much of a burr's work becomes heat in bone, and what water does. Known within a factor of ten at best: chosen so
-/// that a third of a watt for 30 s gives 13 K at 3 mm, as reported for grinding (docs/heat.md); temperatures follow it
+/// that a third of a watt for 30 s gives 13 K at 3 mm, as reported for grinding (docs/validation/heat.md); temperatures follow it
 /// in proportion.
 struct HeatOfCutting {
   /// Of force times speed of the burr's surface, cutting burrs: friction times the share that stays in bone.

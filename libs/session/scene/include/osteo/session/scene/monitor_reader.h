@@ -38,7 +38,7 @@ struct MonitorOptions {
 /// at the same ticks (stimulator_notes) signal and events are the same to the bit. Waves are told to sinks as blocks of
 /// 5 ms, events behind the block they are found in. Memory: a copy of the bone (two with heat). After ticks were lost
 /// nerves and stimulator go on as they were, bone and heat from the scene as it is, and an event tells of it. Cost:
-/// docs/monitor.md. In the thread that follows the stream, sinks too.
+/// docs/validation/monitor.md. In the thread that follows the stream, sinks too.
 class MonitorReader final : public Reader {
  public:
   static constexpr double kStepS = 0.005;

@@ -86,7 +86,7 @@ struct RehearsalSummary {
 
 /// Owns the world while it runs. The servo's thread writes densities; the recorder and the readers are told through the
 /// stream; the follower's thread drains it for all readers and changes the scene. Who holds which lock:
-/// docs/threads.md.
+/// docs/developer/threads.md.
 class Rehearsal {
  public:
   /// As many devices as options.haptics has hands, in their order. Error(usage) when they are not as many;

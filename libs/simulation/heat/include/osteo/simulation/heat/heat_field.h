@@ -41,7 +41,7 @@ struct HeatLedger {
 /// smaller step, and what one loses the other gains to the last bit. Bricks of 8^3 cells are made where heat comes and
 /// forgotten where nothing is warmer or cooler than kMinK, so the cost follows what is warm. Deterministic: the same
 /// calls give the same bits. Temperatures are differences to the body's, K. Error against analytic solutions and cost,
-/// at 0.25 mm: docs/heat.md.
+/// at 0.25 mm: docs/validation/heat.md.
 class HeatField {
  public:
   /// `matter` is asked once for each cell of a brick that is made; it must answer for any cell and see what

@@ -18,7 +18,7 @@ struct DrillNoise {
 /// Makes samples at MonitorSetup::kRateHz, 0.25 uV a bit, of at most a block at a time. Impulses of a burst are
 /// triphasic waves that arrive by conduction and latency; trains are sines that begin at once; an answer to a stimulus
 /// is a longer wave behind the artefact. The same calls give the same bits on any machine. About 0.7 % of a core for 16
-/// channels (docs/monitor.md).
+/// channels (docs/validation/monitor.md).
 class Electromyogram {
  public:
   struct Channel {

@@ -16,7 +16,7 @@ namespace osteo::inline simulation {
 ///   "fixed": [ {"box_mm": [[-1,-1,-1],[100,100,0.1]]}, {"box_mm": [[-1,-1,-1],[0.1,100,100]], "axes": "x"} ],
 ///   "loads": [ {"name": "pull", "forces": [ {"at_mm": [5,5,10], "radius_mm": 3, "total_n": [0,0,1]} ],
 ///                               "surfaces": [ {"box_mm": [[0,0,9.9],[10,10,10.1]], "kpa": 2} ]} ] }
-/// docs/tissue-problem.md has every key with its unit; beside these "law" and "order" may choose the elements by their
+/// docs/formats/tissue-problem.md has every key with its unit; beside these "law" and "order" may choose the elements by their
 /// names, and a load may also have
 ///   "volumes": [{place, "total_n": [0,0,1]}], "gravity_m_s2": [0,0,-9.81] (with "density_kg_m3" in the material),
 ///   "moved": [{place, "by_mm": [0,0,-1], "axes": "z"}],

@@ -34,7 +34,7 @@ enum class MetricWhen {
   regions,        ///< a reference with experts and novices
 };
 
-/// The declaration of a metric: all that lines, columns, JSON and the table in docs/evidence.md need to know of it.
+/// The declaration of a metric: all that lines, columns, JSON and the table in docs/validation/evidence.md need to know of it.
 struct MetricRow {
   std::string_view name;  ///< lower case; unit at its end where it has one
   std::string_view unit;  ///< "1": a share or a count
@@ -51,10 +51,10 @@ inline constexpr Better kUp = Better::higher, kDown = Better::lower, kNone = Bet
 inline constexpr std::string_view kThesis351 = "Morris 2006, 3.5.1", kThesis352 = "Morris 2006, 3.5.2",
                                   kThesis353 = "Morris 2006, 3.5.3", kProcess = "after Wan 2010, UWO thesis",
                                   kOurs = "this project", kStroke = "after FIVRS, mended",
-                                  kSmooth = "Balasubramanian 2015", kHeat = "docs/heat.md";
+                                  kSmooth = "Balasubramanian 2015", kHeat = "docs/validation/heat.md";
 
 // A new metric: a row here, its value where its place computes it, a row in tests/unit/evidence/metric_table_test.cpp,
-// and the table in docs/evidence.md as metric_table_markdown() has it. All but the first fail to compile or fail a test
+// and the table in docs/validation/evidence.md as metric_table_markdown() has it. All but the first fail to compile or fail a test
 // where they are forgotten.
 inline constexpr MetricRow kRows[] = {
     {"duration_s", "s", kDown, "", MetricPlace::process, MetricWhen::always, kProcess,

@@ -1,4 +1,4 @@
-// What is left at the end: the primitives of docs/evidence.md on a lattice, and the items of a scale built on them.
+// What is left at the end: the primitives of docs/validation/evidence.md on a lattice, and the items of a scale built on them.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -28,7 +28,7 @@ struct RemovedVoxel {
 class Product {
  public:
   /// A margin nearer to 0 than this is a draw: on a lattice laid otherwise the item may come out the other way. An item
-  /// whose places would have to be off by no more than the lattice can be (0.7 of a cube, docs/evidence.md) for that
+  /// whose places would have to be off by no more than the lattice can be (0.7 of a cube, docs/validation/evidence.md) for that
   /// has such a margin, and says so.
   static constexpr double kDraw = 0.2;
   static constexpr double kBallMm = 0.5, kOpenedMm = 2, kAroundMm = 5, kCoarsestMm = 0.5;

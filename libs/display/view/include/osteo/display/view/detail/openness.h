@@ -15,7 +15,7 @@ namespace osteo::inline display {
 /// kReachMm: 1 on a flat or bulging face, small at the bottom of a drilled hole. By five cones through the bone's
 /// density, averaged over cells of about 1, 2 and 4 mm (cone tracing: Crassin and others 2011). It depends on the bone
 /// alone, not on the eye, so a picture costs nothing for it. Against the exact share at the bottom of round holes:
-/// docs/accuracy.md. Memory: about 1.2 bytes for each mm3 of the bone's box. For drawing only; not thread-safe while
+/// docs/validation/accuracy.md. Memory: about 1.2 bytes for each mm3 of the bone's box. For drawing only; not thread-safe while
 /// renew() runs; it may read the bone while the servo writes it.
 class Openness {
  public:

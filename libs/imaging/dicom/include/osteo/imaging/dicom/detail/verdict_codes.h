@@ -1,5 +1,5 @@
 // The table of all codes of a verdict: how grave, whether it refuses the scan, from which size on it is told, and what
-// is done. docs/verdict.md holds the same table, and a test holds the two together.
+// is done. docs/formats/verdict.md holds the same table, and a test holds the two together.
 #pragma once
 #include <span>
 #include <string>

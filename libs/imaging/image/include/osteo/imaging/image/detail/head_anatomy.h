@@ -1,6 +1,6 @@
 // The anatomy of the phantom: a head as smooth solids whose every surface, centre line and wall is known at any point.
 //
-// Sizes are means of published anatomy; docs/phantom.md has the table with sources. In short (mm): cranium 180 x 142,
+// Sizes are means of published anatomy; docs/validation/phantom.md has the table with sources. In short (mm): cranium 180 x 142,
 // vault 6.5 of cortex, diploe, cortex; bony ear canal 16 long, 7 x 9 wide; tympanic cavity 15 high, 2 to 6 deep; facial
 // nerve's labyrinthine, tympanic and mastoid segments 4, 11 and 14 long; canals of the labyrinth 3 in radius, cochlea
 // of 2.5 turns, 9 at its base; sigmoid sinus 10 wide, 13.7 behind the canal; nerve 7 before the sinus and 3.7 behind

@@ -21,7 +21,7 @@ struct PenMotion {
 };
 
 /// How lively a hand is taken to be: the spectral density of its acceleration, less while it rests. More follows
-/// quicker and lets more noise through; chosen by measured error while moving and jitter at rest (docs/marker.md).
+/// quicker and lets more noise through; chosen by measured error while moving and jitter at rest (docs/how-to/marker.md).
 struct PenFilterParams {
   double acceleration_mm2_s3 = 2e5;
   double turning_rad2_s3 = 60;

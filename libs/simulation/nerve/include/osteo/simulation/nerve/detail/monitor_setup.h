@@ -9,7 +9,7 @@
 
 namespace osteo::inline simulation {
 
-/// All illustrative; meaning, unit and source of each stand in monitor.json and docs/monitor.md. None has a default
+/// All illustrative; meaning, unit and source of each stand in monitor.json and docs/validation/monitor.md. None has a default
 /// here.
 struct MonitorConstants {
   using Params = MonitorConstants;
