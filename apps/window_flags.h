@@ -91,7 +91,8 @@ struct WindowFlags {
     visit({"burr", "kind of burr at the start"}, p.burr);
     visit({"diameter_mm", "diameter of the burr at the start: 1, 2, 3, 4, 5, 6 or 7", "mm", 1, 7}, p.diameter_mm);
     visit({"shape", "shape of the burr at the start"}, p.shape);
-    visit({"contact", "how the burr feels bone: rays, volume, overlap or proxy; docs/validation/haptics.md compares them"},
+    visit({"contact",
+           "how the burr feels bone: rays, volume, overlap or proxy; docs/validation/haptics.md compares them"},
           p.contact);
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
     visit({"device",
@@ -115,7 +116,8 @@ struct WindowFlags {
     visit({"hand_scale", "movement in the scene for 1 mm of the hand, with --device marker", "", 0.05, 10},
           p.hand_scale);
     visit({"second_device",
-           "device that moves the second hand; keys: a sucker and water come beside the drill while V and I are held, "
+           "device that moves the second hand; keys: a suction tube and water come beside the drill while V and I are "
+           "held, "
            "with --dust"},
           p.second_device);
     visit({"second_instrument",
@@ -123,7 +125,7 @@ struct WindowFlags {
            "a burr"},
           p.second_instrument);
     visit(
-        {"dust", "bone dust: falls, piles up and hides the bone until it is sucked off; with water it becomes slurry"},
+        {"dust", "bone dust: falls, piles up and hides the bone until it is sucked off; with water it becomes a paste"},
         p.dust);
     visit({"heat",
            "how warm drilling makes bone and structures, on a guess of what share of a burr's work heats bone "
@@ -139,7 +141,8 @@ struct WindowFlags {
     visit({"resume", "go on from the end of this session"}, p.resume);
     visit({"playback", "session whose hand guides yours; see 'osteo playback'"}, p.playback);
     visit({"playback_as", "flags of --playback, like mode=guide,pace=way,from_s=2"}, p.playback_as);
-    visit({"tutor", "let others join: as the trainee, whose hand is a second one here, or to watch; docs/guides/tutoring.md"},
+    visit({"tutor",
+           "let others join: as the trainee, whose hand is a second one here, or to watch; docs/guides/tutoring.md"},
           p.tutor);
     visit({"listen",
            "address to accept connections on with --tutor; 127.0.0.1 or ::1: this machine alone, 0.0.0.0 or :: : "
@@ -177,19 +180,20 @@ struct WindowFlags {
     visit({"monitor_setup", "constants and channels of the nerve monitor, as JSON (empty: the built-in ones)"},
           p.monitor_setup);
     visit({"stream",
-           "tells the network what happens while it does: igtl:PORT, igtl:HOST:PORT, igtl:PORT/stimulator, "
+           "sends to the network what happens meanwhile: igtl:PORT, igtl:HOST:PORT, igtl:PORT/stimulator, "
            "cerebus:HOST:PORT/VERSION, lsl, "
            "with commas "
            "between (empty: nobody; docs/how-to/network.md)"},
           p.stream);
-    visit({"stereo", "stereo display: how the pictures of both eyes share the screen; docs/how-to/camera.md"}, p.stereo);
+    visit({"stereo", "stereo display: how the pictures of both eyes share the screen; docs/how-to/camera.md"},
+          p.stereo);
     visit({"stereo_base", "distance between the eyes, whose pictures agree on what lies in the focus", "mm", 0, 65},
           p.stereo_base);
     visit({"experiment",
            "experiment in the window; 'camera': views to bring the camera to, timed, as CSV in the session's folder "
            "(empty: none)"},
           p.experiment);
-    visit({"require_approved", "refuse a case that nobody has approved as it is ('osteo approve')"},
+    visit({"require_approved", "reject a case that nobody has approved as it is ('osteo approve')"},
           p.require_approved);
     visit({"quality",
            "how the picture is drawn: plain; calm, with shade in the creases and smooth edges when it rests; deep, "
@@ -201,7 +205,7 @@ struct WindowFlags {
     visit({"height", "height of the window, at most the screen's", "pixels", 480, 8192}, p.height);
     visit({"scale", "size of text and panels (0: by the monitor); Ctrl + and Ctrl - change it in the window", "", 0, 4},
           p.scale);
-    visit({"layout", "layout of the window at the start; last: as it was left. F2 changes it"}, p.layout);
+    visit({"layout", "layout of the window at the start; last: the one that was left. F2 changes it"}, p.layout);
     visit({"full_screen", "the window fills the screen; F11 in the window"}, p.full_screen);
     visit({"end_page", "when the person ends the session (Q), what was done is shown; without, the window closes"},
           p.end_page);

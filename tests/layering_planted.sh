@@ -3,9 +3,9 @@
 set -euo pipefail
 work=$(mktemp -d "${TMPDIR:-/tmp}/osteo-layering-XXXXXX")
 trap 'rm -rf "$work"' EXIT
-mkdir "$work/docs"
+mkdir -p "$work/docs/developer"
 cp -r "$1/libs" "$1/apps" "$work"
-cp "$1/docs/architecture.md" "$work/docs"
+cp "$1/docs/developer/architecture.md" "$work/docs/developer"
 python3 "$1/tests/layering.py" "$work" >/dev/null || { echo "the copy itself is refused"; exit 1; }
 refused() { # FILE LINE WORDS: with LINE as its first the file is refused in these words
   cp "$work/$1" "$work/kept"

@@ -61,9 +61,9 @@ class Saver {
       std::string text = read_text(said);
       while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
       for (char& c : text) c = c == '\n' ? ' ' : c;
-      return {false, "NOT SAVED, the case is as it was: " + text};
+      return {false, "NOT SAVED, the case is unchanged: " + text};
     } catch (const std::exception& e) {
-      return {false, std::string("NOT SAVED, the case is as it was: ") + e.what()};
+      return {false, std::string("NOT SAVED, the case is unchanged: ") + e.what()};
     }
   }
 

@@ -146,7 +146,7 @@ TutorNow LiveSitting::now(const Rehearsal* rehearsal) const {
     if (trainee && s.strength > 0) n.apart_mm = s.apart_mm;
     if (s.over) n.trouble = "the instructor's session is over";
     if (s.host_lost) n.trouble = "the instructor's machine gives no more of this session";
-    if (s.state == JoinState::refused) n.trouble = "the host refuses: " + s.why;
+    if (s.state == JoinState::refused) n.trouble = "the host rejects: " + s.why;
     n.begin_again = s.another || (s.bone_differs_since > 0 && again_ < kMaxAgain);
     if (s.bone_differs_since > 0 && !n.begin_again) n.trouble = "this copy's bone is another than the instructor's";
   }

@@ -82,7 +82,7 @@ Json counts_json(const BatchResult& r, const fs::path& out) {
 std::string counts_words(const BatchResult& r) {
   std::string text = std::to_string(r.done) + " of " + std::to_string(r.cases) + " cases done";
   for (const auto& [count, words] :
-       {std::pair{r.untouched, "known from before"}, std::pair{r.refused, "refused for their input"},
+       {std::pair{r.untouched, "known from before"}, std::pair{r.refused, "rejected for their input"},
         std::pair{r.failed, "failed"}, std::pair{r.resources, "out of memory or time"},
         std::pair{r.waiting, "waiting"}}) {
     if (count > 0) text += ", " + std::to_string(count) + " " + words;
@@ -149,26 +149,27 @@ int make_case(std::vector<std::string> arguments, const std::map<std::string, st
 }
 
 cli::CommandInfo BatchCommand::info() {
-  return {"batch",
-          "many scans become many cases",
-          "The table is CSV: its first line names the columns, 'source' (of the scan; from the table's folder on), "
-          "'case' (a code, which "
-          "becomes "
-          "the name of the case) and any flag or variable of prepare, such as lower or structures; an empty field is "
-          "not given. --set "
-          "NAME=VALUE is for all cases. Each case is made by 'osteo prepare' in a process of its own, with bounds on "
-          "memory and time; one that "
-          "fails never stops the others. Run again, the same line goes on where it was: what is done is not touched, "
-          "what was interrupted is "
-          "begun anew, what ended for memory, time or a signal is tried again, and so is a case whose row, pipeline or "
-          "source has changed. "
-          "OUT/report.html shows all cases, report.json and report.csv say the same; the cases are in OUT/cases. Exit "
-          "code 0: all are done; 8: "
-          "some are refused or failed; 9: some ended for memory or time, or the disk is full. Names of scans are in "
-          "none of it.",
-          {{"table", "a .csv file"}},
-          "osteo batch TABLE.csv -o OUT",
-          true};
+  return {
+      "batch",
+      "many scans become many cases",
+      "The table is CSV: its first line names the columns, 'source' (of the scan; from the table's folder on), "
+      "'case' (a code, which "
+      "becomes "
+      "the name of the case) and any flag or variable of prepare, such as lower or structures; an empty field is "
+      "not given. --set "
+      "NAME=VALUE is for all cases. Each case is made by 'osteo prepare' in a process of its own, with bounds on "
+      "memory and time; one that "
+      "fails never stops the others. Run again, the same line goes on where it was: what is done is not touched, "
+      "what was interrupted is "
+      "begun again, what ended for memory, time or a signal is tried again, and so is a case whose row, pipeline or "
+      "source has changed. "
+      "OUT/report.html shows all cases, report.json and report.csv say the same; the cases are in OUT/cases. Exit "
+      "code 0: all are done; 8: "
+      "some are rejected or failed; 9: some ended for memory or time, or the disk is full. Names of scans are in "
+      "none of it.",
+      {{"table", "a .csv file"}},
+      "osteo batch TABLE.csv -o OUT",
+      true};
 }
 
 int BatchCommand::run(const Params& p, cli::Invocation& io) {

@@ -46,7 +46,7 @@ struct BatchCommand {
     visit({"minutes", "time that a case may take; one that needs longer is ended (0: no bound)", "min", 0, 100000},
           p.minutes);
     visit({"retries", "further tries of a case that ended for memory, time or a signal", "", 0, 100}, p.retries);
-    visit({"retry_failed", "also try again what an earlier run refused or saw fail, though nothing has changed"},
+    visit({"retry_failed", "also try again what an earlier run rejected or saw fail, though nothing has changed"},
           p.retry_failed);
     visit({"keep_free_mb", "begin no case with less free on the disk of the batch", "MB", 0, 1e9}, p.keep_free_mb);
     visit({"only", "codes of the cases to do, with commas between them; the report is left alone (empty: all)"},

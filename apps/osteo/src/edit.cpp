@@ -14,16 +14,17 @@
 namespace osteo {
 
 cli::CommandInfo EditCommand::info() {
-  return {"edit",
-          "correct the bone and the structures of a case by hand",
-          "Opens a window with three slices and the bone in 3D: threshold, pieces, box, filling, smoothing, brush and "
-          "eraser, structures, with "
-          "undo. Saving writes edits.json into the case, which holds what was done and no voxel of the scan, and makes "
-          "the case's bone anew "
-          "from it; prepare keeps it from then on. With --apply the same without a window, from a file. The scan is "
-          "never changed.",
-          {{"case", "a folder made by prepare"}},
-          "osteo edit CASE"};
+  return {
+      "edit",
+      "correct the bone and the structures of a case by hand",
+      "Opens a window with three slices and the bone in 3D: threshold, components, box, filling, smoothing, brush and "
+      "eraser, structures, with "
+      "undo. Saving writes edits.json into the case, which holds what was done and no voxel of the scan, and makes "
+      "the case's bone again "
+      "from it; prepare keeps it from then on. With --apply the same without a window, from a file. The scan is "
+      "never changed.",
+      {{"case", "a folder made by prepare"}},
+      "osteo edit CASE"};
 }
 
 int EditCommand::run(const Params& p, cli::Invocation& io) {

@@ -57,7 +57,7 @@ class SceneCosts {
     build_renderer();
     find_burrs_too_small();
     drill();
-    j_["threads"] = {"servo (real time)", "recorder", "follower (surface, pieces)", "window"};
+    j_["threads"] = {"servo (real time)", "recorder", "follower (surface, fragments)", "window"};
     j_["memory_mb"] = rounded(megabytes_, 10);
   }
 
@@ -75,7 +75,7 @@ class SceneCosts {
         << format_number(ticks_.quantile_us(0.5)) << " us, p99 " << format_number(ticks_.quantile_us(0.99))
         << " us, p99.9 " << format_number(ticks_.quantile_us(0.999)) << " us\n"
         << told_hardness(anatomy_) << '\n'
-        << "threads: servo (real time), recorder, follower (surface, pieces), window\n";
+        << "threads: servo (real time), recorder, follower (surface, fragments), window\n";
   }
 
  private:
@@ -134,7 +134,7 @@ class SceneCosts {
         return bytes;
       });
     });
-    timed("pieces (window, or --pieces)", "follower",
+    timed("fragments (window, or --pieces)", "follower",
           [&] { return over_bodies([](const BrickGrid& b) { return LiveComponents(b).memory_bytes(); }); });
     if (params_.dust) {
       timed("bone dust (a copy of the bone; more where it lies)", "follower",

@@ -19,10 +19,10 @@ namespace osteo {
 
 cli::CommandInfo ExportResultCommand::info() {
   return {"export-result",
-          "where a session left pieces and plates: transforms, STL, gaps between plate and bone",
+          "where a session left fragments and plates: transforms, STL, gaps between plate and bone",
           "Writes plan.json, an STL of each piece and plate where it is, and for each plate how far bone lies below "
           "its underside; a picture "
-          "too. With --at-s as it was at that time.",
+          "too. With --at-s the state at that time.",
           {{"session", "a session folder"}},
           "osteo export-result SESSION -o plan"};
 }
@@ -51,7 +51,7 @@ int ExportResultCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   if (io.common.json) io.out << text;
   if (!io.common.quiet)
-    io.err << world.bodies().size() << (world.bodies().size() == 1 ? " piece and " : " pieces and ")
+    io.err << world.bodies().size() << (world.bodies().size() == 1 ? " fragment and " : " fragments and ")
            << world.fixtures().size() << (world.fixtures().size() == 1 ? " plate: " : " plates: ") << folder.string()
            << '\n';
   return 0;

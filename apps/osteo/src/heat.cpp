@@ -20,7 +20,8 @@ cli::CommandInfo HeatCommand::info() {
           "at each structure. The "
           "share of a burr's work that becomes heat in bone is known within a factor of ten at best, and temperatures "
           "follow it in "
-          "proportion: nothing clinical follows from them (docs/validation/heat.md). Exit code 8 when ticks are missing: heat is "
+          "proportion: nothing clinical follows from them (docs/validation/heat.md). Exit code 8 when ticks are "
+          "missing: heat is "
           "computed up to "
           "there.",
           {{"session", "a session folder"}},
@@ -78,7 +79,7 @@ int HeatCommand::run(const Params& p, cli::Invocation& io) {
   if (io.common.json) io.out << j.dump(2) << '\n';
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
   if (!r.identical)
-    io.err << "session: it did not come out as it was recorded (" << r.difference << "): neither may its heat\n";
+    io.err << "session: the replay differs from what was recorded (" << r.difference << "): neither may its heat\n";
   if (!io.common.quiet && !io.common.json) {
     for (const std::string& line : told(heat, anatomy.structures.get())) io.out << line << '\n';
     io.out << "by assumption: " << format_number(p.cutting_share) << " of a cutting burr's work, "

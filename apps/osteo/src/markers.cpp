@@ -54,14 +54,15 @@ void look_at_all(const std::string& from, const CameraModel& wish, double second
 }  // namespace
 
 cli::CommandInfo MarkersCommand::info() {
-  return {"markers",
-          "pages to print: markers for a pen that becomes the drill, and a plate to calibrate a camera by",
-          "A PDF of two pages, of true size when printed at 100 %; each is drawn, looked at as a camera would, and "
-          "refused unless all its "
-          "markers are read where they are to be. Or .png: one page (--page). docs/how-to/marker.md says how to fold, glue "
-          "and calibrate.",
-          {{"output", "a .pdf, or a .png of one page"}},
-          "osteo markers markers.pdf --paper letter"};
+  return {
+      "markers",
+      "pages to print: markers for a pen that becomes the drill, and a plate to calibrate a camera by",
+      "A PDF of two pages, of true size when printed at 100 %; each is drawn, looked at as a camera would, and "
+      "rejected unless all its "
+      "markers are read where they are to be. Or .png: one page (--page). docs/how-to/marker.md says how to fold, glue "
+      "and calibrate.",
+      {{"output", "a .pdf, or a .png of one page"}},
+      "osteo markers markers.pdf --paper letter"};
 }
 
 int MarkersCommand::run(const Params& p, cli::Invocation& io) {
@@ -94,7 +95,7 @@ cli::CommandInfo CalibrateCameraCommand::info() {
           "the lens of a webcam, from pictures of the printed plate",
           "Takes pictures of the plate of 'osteo markers' from a camera (for --seconds), a video or a folder, keeps "
           "those that differ, and "
-          "finds focal length, centre and distortion. Refused when fewer than 10 views differ, when the corners lie "
+          "finds focal length, centre and distortion. Rejected when fewer than 10 views differ, when the corners lie "
           "more than a pixel "
           "(RMS) from where the lens would show them, or when the plate was hardly ever tilted, since the focal length "
           "stays open then. A "
@@ -146,7 +147,7 @@ cli::CommandInfo CalibratePenCommand::info() {
   return {"calibrate-pen",
           "where the tip of a pen with markers is, by turning the pen on it",
           "Put the tip into a small dent, lean the pen by 30 degrees to all sides and turn it, its markers towards the "
-          "camera. Refused when "
+          "camera. Rejected when "
           "it was seen in fewer than 20 pictures, leant by less than 20 degrees, or when the tip wandered by more than "
           "2 mm (RMS).",
           {{"source", "/dev/video0, a video, or a folder of pictures"}},

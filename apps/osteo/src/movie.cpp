@@ -22,7 +22,7 @@ cli::CommandInfo MovieCommand::info() {
           "As the window drew it: bone, tools, dust, critical structures, from where the surgeon looked or from one "
           "place. .mp4 (H.264) or "
           ".webm "
-          "(VP9), no sound. With --blind for raters: nothing is written into the picture or the file that tells who, "
+          "(VP9), no sound. With --blind for raters: nothing is written into the picture or the file that says who, "
           "when, which case or how "
           "good, and where the output is a folder the file gets a random name. What the picture itself shows stays. Of "
           "a damaged session what "

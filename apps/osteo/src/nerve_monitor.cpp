@@ -21,9 +21,10 @@ cli::CommandInfo NerveMonitorCommand::info() {
           "and monitor.nev "
           "(spikes, stimuli) as Blackrock's recorders write them, events.csv, one channel as channel.wav, and the "
           "setup. The same to the bit "
-          "as it was live. With --stimulator-ma a what-if: the tip of a hand's tool stimulates all the time it "
+          "as in the live session. With --stimulator-ma a what-if: the tip of a hand's tool stimulates all the time it "
           "touches. Illustrative, not "
-          "clinical: docs/validation/monitor.md tells every constant and its source. Exit code 8 when ticks are missing: it goes "
+          "clinical: docs/validation/monitor.md lists every constant and its source. Exit code 8 when ticks are "
+          "missing: it goes "
           "up to there.",
           {{"session", "a session folder"}},
           "osteo nerve-monitor SESSION -o out"};
@@ -217,7 +218,7 @@ int NerveMonitorCommand::run(const Params& p, cli::Invocation& io) {
   if (io.common.json) io.out << j.dump(2) << '\n';
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
   if (!r.identical)
-    io.err << "session: it did not come out as it was recorded (" << r.difference << "): neither may its monitor\n";
+    io.err << "session: the replay differs from what was recorded (" << r.difference << "): neither may its monitor\n";
   if (!io.common.quiet) tell_monitor(j, wiring, p.out, io.err);
   return static_cast<int>(!outline.gaps.empty() ? ExitCode::partial
                           : outline.damaged()   ? ExitCode::corrupt

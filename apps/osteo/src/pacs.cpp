@@ -85,7 +85,7 @@ cli::CommandInfo SendCommand::info() {
           "is judged, and the node "
           "is then asked which of the objects it has. Nothing is taken out "
           "without --deidentify: what names a person in the files is sent with them. Exit code 8 when some were "
-          "refused or are not found "
+          "rejected or are not found "
           "afterwards.",
           {{"source", "a file or a folder"}},
           "osteo send CASE.seg.dcm --peer ORTHANC@127.0.0.1:4242 --dry-run"};
@@ -260,7 +260,7 @@ cli::CommandInfo ReceiveCommand::info() {
       "kept as they come, "
       "each in a folder of its study and series whose names are hashes; none is ever written over. A series is closed "
       "when nothing "
-      "of it has come for --quiet-s: a line on standard output tells its folder (with --json a JSON line), and a file "
+      "of it has come for --quiet-s: a line on standard output names its folder (with --json a JSON line), and a file "
       "CLOSED lies in it; "
       "slices that come later open it again. Each association has a process of its own with limits, so that no peer "
       "can harm another. "
@@ -306,13 +306,13 @@ int ReceiveCommand::run(const Params& p, cli::Invocation& io) {
   events.counters = [&](const ReceiveCounters& c) {
     if (!p.metrics.empty()) write_file(p.metrics, metrics_text(c));
     if (!io.common.quiet && (c.refused != last.refused || c.refused_associations != last.refused_associations))
-      io.err << c.refused << " objects and " << c.refused_associations << " associations refused so far" << std::endl;
+      io.err << c.refused << " objects and " << c.refused_associations << " associations rejected so far" << std::endl;
     last = c;
   };
   receive_objects(io.arguments[0], o, events, io.context);
   if (!io.common.quiet)
     io.err << "stopped: " << last.stored << " objects stored, " << last.again << " were there already, " << last.refused
-           << " refused\n";
+           << " rejected\n";
   return 0;
 }
 

@@ -117,14 +117,14 @@ struct ReceiveCommand {
            quiet_s = 30;
   };
   static void describe(Params& p, auto& visit) {
-    visit({"ae", "our title: who calls another is refused"}, p.ae);
+    visit({"ae", "our title: who calls another is rejected"}, p.ae);
     visit({"bind", "IPv4 address to listen on (0.0.0.0: every network this machine is in)"}, p.bind);
     visit({"port", "port to listen on (0: any free one)", "", 0, 65535}, p.port);
     visit({"allow", "titles of the nodes that may send, with commas"}, p.allow);
     visit({"allow_all", "let every node send"}, p.anybody);
     visit({"associations", "associations that are accepted at the same time", "", 1, 1000}, p.associations);
-    visit({"object_gb", "a larger object is refused", "GB", 0.000001, 100}, p.object_gb);
-    visit({"folder_gb", "all of the folder; what would be beyond is refused", "GB", 0.000001, 1e6}, p.folder_gb);
+    visit({"object_gb", "a larger object is rejected", "GB", 0.000001, 100}, p.object_gb);
+    visit({"folder_gb", "all of the folder; what would be beyond is rejected", "GB", 0.000001, 1e6}, p.folder_gb);
     visit({"keep_free_gb", "free space to keep on the disk; with less, everything is rejected", "GB", 0, 1e6},
           p.keep_free_gb);
     visit({"memory_mb", "memory that an association's process may take", "MB", 16, 100000}, p.memory_mb);

@@ -70,15 +70,16 @@ double simulated_stiffness(const std::string& hand) {
 }
 
 cli::CommandInfo PlaybackCommand::info() {
-  return {"playback",
-          "a recorded session led along: the expert's movements and forces in your hand",
-          "The hand of the session is one more hand of a new session, and leads yours: by a spring and a damper, and "
-          "in 'show' with the "
-          "forces that it felt. Bone is drilled by the recorded hand, and comes out as it was recorded to the bit, or "
-          "by yours (--drills). "
-          "What is recorded says that it was guided; scores never mix it with unaided sessions. docs/guides/tutoring.md.",
-          {{"session", "the expert's, a session folder"}},
-          "osteo playback SESSION --mode guide --pace way"};
+  return {
+      "playback",
+      "a recorded session led along: the expert's movements and forces in your hand",
+      "The hand of the session is one more hand of a new session, and leads yours: by a spring and a damper, and "
+      "in 'show' with the "
+      "forces that it felt. Bone is drilled by the recorded hand, and comes out as recorded to the bit, or "
+      "by yours (--drills). "
+      "What is recorded says that it was guided; scores never mix it with unaided sessions. docs/guides/tutoring.md.",
+      {{"session", "the expert's, a session folder"}},
+      "osteo playback SESSION --mode guide --pace way"};
 }
 
 int PlaybackCommand::run(const Params& p, cli::Invocation& io) {

@@ -105,7 +105,7 @@ cli::CommandInfo PrepareCommand::info() {
           "says what from and to. "
           "--fresh forgets them all, --no-structures (or another of the text flags) or an empty --set NAME= drops one. "
           "Until the new state is "
-          "whole the case stays as it was. Variables of the pipeline are also set with --set NAME=VALUE. Beside the "
+          "whole the case stays unchanged. Variables of the pipeline are also set with --set NAME=VALUE. Beside the "
           "case, not in it, a report "
           "to "
           "look at and print is written: CASE.report.html and CASE.report.pdf. Its cuts are pictures of the patient; "
@@ -192,7 +192,7 @@ class Preparation {
               ExitCode::cannot_write,
               "'" + folder_.string() + "' was made from another scan than '" + io_.arguments[0] +
                   "', or the scan was changed",
-              "give another name, or --force to make the case anew from this scan, without the flags it remembers");
+              "give another name, or --force to make the case again from this scan, without the flags it remembers");
         }
         notes_.push_back("another scan: forgotten is" + all_of(*before_));
         files_before_ = files_of_case();
@@ -410,7 +410,7 @@ class Preparation {
         write_file(picture, read_text(update_->place(picture)));
       if (!io_.common.quiet) io_.err << "what was found is in " << verdict.string() << '\n';
     } else if (!io_.common.quiet) {
-      io_.err << "the case is as it was; --json prints what was found\n";
+      io_.err << "the case is unchanged; --json prints what was found\n";
     }
   }
 

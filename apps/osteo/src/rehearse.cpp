@@ -52,7 +52,7 @@ cli::CommandInfo RehearseCommand::info() {
           "pictures from before and after, and a summary are written. Exit code 8 when ticks were not recorded, since "
           "the disk did not "
           "keep up, "
-          "or actions of the script were refused: the summary lists them. Dense bone resists the burr more, by the HU "
+          "or actions of the script were rejected: the summary lists them. Dense bone resists the burr more, by the HU "
           "that the case keeps "
           "(\"hardness\": false in --settings turns that off).",
           {{"case", "a folder made by prepare; without one the window opens with a page to choose on", true}},
@@ -255,7 +255,7 @@ class HeadlessSession {
       }
     }
     if (tracker_ && !io_.common.quiet)
-      io_.err << "tracker: " << tracker_->poses() << " poses, " << tracker_->refused() << " refused\n";
+      io_.err << "tracker: " << tracker_->poses() << " poses, " << tracker_->refused() << " rejected\n";
     s_.interrupted = interrupted;
   }
 
@@ -310,7 +310,7 @@ class HeadlessSession {
       for (const std::string& line : told(*readers.heat, rehearsal_->structures())) io_.err << line << '\n';
     });
     if (s_.ticks_not_followed > 0)
-      io_.err << "surface, pieces and dust missed " << s_.ticks_not_followed
+      io_.err << "surface, fragments and dust missed " << s_.ticks_not_followed
               << " ticks, since the machine did not keep up; they caught up from the bone itself\n";
     if (s_.loop) tell_loop(*s_.loop);
     io_.err << "session: " << session_.folder.string()
@@ -323,7 +323,7 @@ class HeadlessSession {
             << std::lround(l.work.quantile_us(0.999)) << " us; wake-up late p99 "
             << std::lround(l.lateness.quantile_us(0.99)) << " us; periods missed by our work " << l.missed_by_work
             << ", by the machine " << l.missed_by_machine << "; real-time priority "
-            << (l.realtime_granted ? "granted" : "refused (" + l.realtime_refusal + ")") << '\n';
+            << (l.realtime_granted ? "granted" : "rejected (" + l.realtime_refusal + ")") << '\n';
   }
 
   const RehearseCommand::Params& p_;

@@ -23,7 +23,7 @@ std::optional<Pipeline> pipeline_at_hand(const fs::path& folder, const std::opti
     if (!given.empty())
       throw Error(ExitCode::usage,
                   "'" + folder.string() + "' was made by an earlier version and does not know its scan",
-                  "make it anew, with prepare");
+                  "make it again, with prepare");
     return std::nullopt;
   }
   fs::path scan;
@@ -142,7 +142,7 @@ cli::CommandInfo ApproveCommand::info() {
           "'osteo info CASE', in the report, in the rehearsal's window and in each session. The name is kept as it is "
           "given: it is the "
           "only one in a "
-          "case. 'osteo rehearse --require-approved' refuses a case without.",
+          "case. 'osteo rehearse --require-approved' rejects a case without.",
           {{"case", "a folder made by prepare"}},
           "osteo approve CASE --by 'A. Miller' --note 'mastoid only'"};
 }
@@ -160,8 +160,7 @@ int ApproveCommand::run(const Params& p, cli::Invocation& io) {
   } else {
     // Looked at must have been the case as it is.
     if (output_exists(report_file(folder, ".html")) && !report_shows(folder)) {
-      throw Error(ExitCode::failed,
-                  "the report of '" + folder.string() + "' shows the case as it was before its last change",
+      throw Error(ExitCode::failed, "the report of '" + folder.string() + "' shows the case before its last change",
                   "make it again with 'osteo report " + folder.string() + "', look at it, then approve");
     }
     if (output_exists(report_file(folder, ".html")) && make_report(folder, io).says_other) {

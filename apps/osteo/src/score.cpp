@@ -22,7 +22,8 @@ cli::CommandInfo ScoreCommand::info() {
           "measured says why. "
           "With --procedure also the items of its scale, each with value, threshold and margin; with --reference "
           "compared with sessions of "
-          "others on the same case. Thresholds are starting values, not fitted to rated sessions (docs/validation/evidence.md "
+          "others on the same case. Thresholds are starting values, not fitted to rated sessions "
+          "(docs/validation/evidence.md "
           "says what may not be "
           "concluded). Of a damaged session what is there is scored, and the exit code is 4.",
           {{"session", "a session folder"}},
@@ -63,7 +64,7 @@ void add_heat(const SessionReader& session, World begin, const Anatomy& anatomy,
   const ReplayResult again = replay(session, std::move(begin), anatomy, context, readers);
   for (Measured& m : heat_values(heat, anatomy.structures.get())) score.values.push_back(std::move(m));
   if (!again.identical)
-    score.words.push_back("run again it did not come out as it was recorded (" + again.difference +
+    score.words.push_back("run again the replay differs from what was recorded (" + again.difference +
                           "): neither may its heat");
   if (again.ticks_repeated < again.ticks)
     score.words.push_back("heat is known only up to where the first ticks are missing");

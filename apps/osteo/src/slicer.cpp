@@ -152,9 +152,9 @@ cli::CommandInfo ImportSlicerCommand::info() {
       "bone and structures that were edited in 3D Slicer, into their case",
       "Reads each .seg.nrrd of the folder, checks that it is of the scan of the case (by a mark that Slicer keeps in "
       "the segments, else "
-      "by the CT beside them, and by where it lies), says what changed, and makes the case anew from it. What belongs "
+      "by the CT beside them, and by where it lies), says what changed, and makes the case again from it. What belongs "
       "to another scan is "
-      "refused. --check only looks. Corrected bone stays with the case until 'osteo prepare -o CASE --no-pipeline'.",
+      "rejected. --check only looks. Corrected bone stays with the case until 'osteo prepare -o CASE --no-pipeline'.",
       {{"case", "the case that was handed over"}, {"folder", "the folder of 'osteo export-slicer', or one .seg.nrrd"}},
       "osteo import-slicer CASE FOLDER"};
 }

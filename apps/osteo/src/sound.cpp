@@ -17,18 +17,19 @@
 namespace osteo {
 
 cli::CommandInfo SoundCommand::info() {
-  return {"sound",
-          "what a session sounded like, as a WAV file",
-          "Burrs by their rotation, teeth, size, force and the bone under them; suckers, water, plates on bone. A "
-          "model by published levels "
-          "and "
-          "spectra, designed by ear where there are none (docs/validation/sound.md), not a recording. 48 kHz, 16 bits, one "
-          "channel. The bone over sinus, "
-          "dura and vessels sounds duller where the case names its structures. Of a damaged session what is missing is "
-          "silent, and the exit "
-          "code is 4.",
-          {{"session", "a session folder"}, {"output", "file that ends in .wav"}},
-          "osteo sound SESSION out.wav"};
+  return {
+      "sound",
+      "what a session sounded like, as a WAV file",
+      "Burrs by their rotation, teeth, size, force and the bone under them; suction tubes, water, plates on bone. A "
+      "model by published levels "
+      "and "
+      "spectra, designed by ear where there are none (docs/validation/sound.md), not a recording. 48 kHz, 16 bits, one "
+      "channel. The bone over sinus, "
+      "dura and vessels sounds duller where the case names its structures. Of a damaged session what is missing is "
+      "silent, and the exit "
+      "code is 4.",
+      {{"session", "a session folder"}, {"output", "file that ends in .wav"}},
+      "osteo sound SESSION out.wav"};
 }
 
 int SoundCommand::run(const Params& p, cli::Invocation& io) {

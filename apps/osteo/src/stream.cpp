@@ -14,17 +14,18 @@
 namespace osteo {
 
 cli::CommandInfo StreamCommand::info() {
-  return {"stream",
-          "a finished session over the network, as it went",
-          "Runs the session again, in real time, and tells whoever listens: tools, camera, forces and the signal of a "
-          "nerve monitor "
-          "(OpenIGTLink, Cerebus packets, Lab Streaming Layer). Listens on this machine alone unless --to names an "
-          "address. No date, name "
-          "or file leaves: docs/how-to/network.md says what does. Exit code 8 when messages were dropped, since a listener "
-          "did not keep up, or "
-          "ticks of the session are missing.",
-          {{"session", "a session folder"}},
-          "osteo stream SESSION --to igtl:18944"};
+  return {
+      "stream",
+      "a finished session over the network, as it went",
+      "Runs the session again, in real time, and sends to listeners: tools, camera, forces and the signal of a "
+      "nerve monitor "
+      "(OpenIGTLink, Cerebus packets, Lab Streaming Layer). Listens on this machine alone unless --to names an "
+      "address. No date, name "
+      "or file leaves: docs/how-to/network.md says what does. Exit code 8 when messages were dropped, since a listener "
+      "did not keep up, or "
+      "ticks of the session are missing.",
+      {{"session", "a session folder"}},
+      "osteo stream SESSION --to igtl:18944"};
 }
 
 namespace {
@@ -145,7 +146,7 @@ int StreamCommand::run(const Params& p, cli::Invocation& io) {
            << c.events << " events; at most " << std::lround(pace.late_ms) << " ms late\n";
   }
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
-  if (!r.identical) io.err << "session: it did not come out as it was recorded (" << r.difference << ")\n";
+  if (!r.identical) io.err << "session: the replay differs from what was recorded (" << r.difference << ")\n";
   return static_cast<int>(feed.dropped() > 0 || !outline.gaps.empty() ? ExitCode::partial
                           : outline.damaged()                         ? ExitCode::corrupt
                                                                       : ExitCode::ok);

@@ -92,7 +92,8 @@ cli::CommandInfo StudyCommand::info() {
       "a study: people by code, order of cases, sessions, ratings, analysis",
       "Keeps a study as a folder of plain files. 'new' makes it; 'plan' names the primary outcomes and says what so "
       "many people can find; 'add' takes a participant (--group), or a session, which it scores and keeps with what "
-      "tells it from others (also what 'osteo score' wrote of one, as JSON or CSV); 'remove' takes a person or a "
+      "distinguishes it from others (also what 'osteo score' wrote of one, as JSON or CSV); 'remove' takes a person or "
+      "a "
       "session out, ratings and movies too; 'order' draws who does which case when; 'form' writes a page to rate "
       "sessions with, "
       "in any browser and "
@@ -208,7 +209,7 @@ int StudyCommand::run(const Params& p, cli::Invocation& io) {
            std::to_string(r.movies) + " movies";
     if (!r.forms.empty())
       notes.push_back(
-          "forms were written anew: whoever has an old one opens the new one and loads what was saved; the "
+          "forms were written again: who has an old one opens the new one and loads what was saved; the "
           "order is another");
     notes.push_back("the report is of before until it is made again; sessions' own folders are not touched");
   } else if (action == "plan") {

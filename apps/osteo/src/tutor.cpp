@@ -50,7 +50,8 @@ cli::CommandInfo TutorCommand::info() {
           "the code to join with. "
           "Listens on this machine alone unless --listen names another address. What travels is poses, encrypted; each "
           "side feels its own copy "
-          "of the same bone (docs/guides/tutoring.md says what it withstands). Without --two-way the instructor's hand is not "
+          "of the same bone (docs/guides/tutoring.md says what it withstands). Without --two-way the instructor's hand "
+          "is not "
           "pulled.",
           {{"case", "a folder made by prepare"}},
           "osteo tutor CASE --script lesson.json --listen 0.0.0.0"};
@@ -149,7 +150,7 @@ cli::CommandInfo JoinCommand::info() {
           "Needs the same case; the host's bone is checked against it. A simulated hand is led by the instructor's "
           "(--hand), or with --role "
           "watcher none. Bone is compared each second; where it differs the copy is made again from the beginning, and "
-          "that is told. Without a "
+          "that is said. Without a "
           "code it is asked for on standard input.",
           {{"host", "HOST:PORT as the host shows it"}},
           "osteo join 192.0.2.7:18950 --case-folder CASE"};

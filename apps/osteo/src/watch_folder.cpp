@@ -63,7 +63,7 @@ cli::CommandInfo WatchFolderCommand::info() {
       "run. CODE is a hash; "
       "no name is in records or on standard output. With --orthanc, series that an Orthanc calls stable are copied "
       "into FOLDER first. A "
-      "case that was refused or failed is tried again when more of its series comes.",
+      "case that was rejected or failed is tried again when more of its series comes.",
       {{"folder", "where scans come in; nothing in it is changed (with --orthanc: where its series are copied to)"}},
       "osteo watch-folder INBOX --rules pipelines/rules.json -o CASES"};
 }

@@ -72,7 +72,7 @@ class Script(_t.NamedTuple):
 
 
 def load_script(path: _Path, rate_hz: float = 1000) -> Script:
-    """A script of strokes (docs/guide-surgery.md) as goals and actions; followed on springs they give the session of
+    """A script of strokes (docs/formats/session-format.md) as goals and actions; followed on springs they give the session of
     `osteo rehearse --headless --script`, bit for bit."""
     return Script(*_osteo.script(_os.fspath(path), rate_hz))
 

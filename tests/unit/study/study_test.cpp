@@ -147,7 +147,7 @@ TEST_F(InAFolder, GrowsAndIsReadAgain) {
   EXPECT_THROW(add_participant(folder_, "", "nurse"), Error);
 }
 
-// A row of a session of its own: what tells it from others is in it.
+// A row of a session of its own: what distinguishes it from others is in it.
 Measurements scored(const std::string& stream) {
   Measurements m;
   m.metrics = {{"force_n", -1.5}};
@@ -385,7 +385,7 @@ TEST_F(InAFolder, EveryFaultNamesFileAndLine) {
     EXPECT_NE(said.find(what), std::string::npos) << said;
   };
   has(fault("participants.csv", "participant,group\nA,novice\nA,expert\n"), "line 3: 'A' is there twice");
-  has(fault("participants.csv", "participant,group\nA,nurse\n"), "line 2: 'nurse' is none of the groups");
+  has(fault("participants.csv", "participant,group\nA,nurse\n"), "line 2: 'nurse' is not one of the groups");
   has(fault("participants.csv", "participant,group\nA,novice,1\n"), "line 2: 3 fields");
   has(fault("participants.csv", "participant,group\nAnn B,novice\n"), "not a code");
   has(fault("participants.csv", "group,participant\n"), "line 1");

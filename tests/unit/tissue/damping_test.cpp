@@ -321,7 +321,7 @@ TEST(Damping, ATableIsReadOrSaysWhatIsWrong) {
   says("time_s,ux\n0,1\n", "a column 'ux'");
   says("u_mm\n0\n", "no column time_s");
   says("time_s\n0\n", "no displacement");
-  says("time_s,u_mm,point\n0,1,10\n", "line 2: point 10 is none of the mesh's 10");
+  says("time_s,u_mm,point\n0,1,10\n", "line 2: point 10 is not one of the mesh's 10");
   says("time_s,u_mm\n", "no line under the names");
 }
 

@@ -64,7 +64,7 @@ TEST(EditControl, EveryKeyIsToldAndEveryTellingHasAKey) {
 }
 
 TEST(EditControl, TheGuideHasTheTableOfKeys) {
-  std::ifstream in(std::string(OSTEO_SOURCE) + "/docs/edit.md");
+  std::ifstream in(std::string(OSTEO_SOURCE) + "/docs/guides/edit.md");
   std::stringstream text;
   text << in.rdbuf();
   EXPECT_NE(text.str().find(edit_help_table()), std::string::npos) << "docs/guides/edit.md lacks this table:\n"

@@ -59,7 +59,7 @@ TEST(Keys, HelpNamesTheKeysThemselves) {
 }
 
 TEST(Keys, TheGuideTellsOfEachKey) {
-  std::ifstream file(OSTEO_SOURCE "/docs/guide-surgeon.md");
+  std::ifstream file(OSTEO_SOURCE "/docs/guides/surgeon.md");
   std::stringstream text;
   text << file.rdbuf();
   // Of the table of keys the first column.

@@ -20,7 +20,7 @@ struct MovieCommand {
     visit({"camera",
            "surgeon: from where was looked (notes of the session); fixed: from one place, all that was drilled"},
           p.camera);
-    visit({"speed", "times as fast as it was", "", 0.1, 100}, p.speed);
+    visit({"speed", "speed in multiples of the recorded one", "", 0.1, 100}, p.speed);
     visit({"from_s", "start in the session", "s", 0, 1e6}, p.from_s);
     visit({"to_s", "end in the session (-1: the session's end)", "s", -1, 1e6}, p.to_s);
     visit({"skip_idle", "leave out where for over 2 s neither hand nor camera moves and no pedal is down"},

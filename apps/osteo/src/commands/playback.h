@@ -22,7 +22,7 @@ struct PlaybackCommand {
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder for the guided session (empty: a new one in CASE/sessions; also -o)"}, p.out);
     PlaybackParams::describe(p, visit);
-    visit({"from_s", "start of the lesson in the session; the bone is as it was then", "s", 0, 1e6}, p.from_s);
+    visit({"from_s", "start of the lesson in the session, with the bone of that time", "s", 0, 1e6}, p.from_s);
     visit({"to_s", "and where it ends (0: with the session)", "s", 0, 1e6}, p.to_s);
     visit({"experts",
            "fading, amplify: more sessions of the same step, by commas; three quarters of the distances between their "

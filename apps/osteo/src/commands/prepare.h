@@ -35,7 +35,7 @@ struct PrepareCommand {
         p.preset);
     visit({"lower", "bone threshold", "HU", -1024, 30000}, p.lower);
     visit({"spacing_mm", "edge of the voxels", "mm", 0.05, 10}, p.spacing_mm);
-    visit({"region", "part of the head to keep; 'osteo crop' tells more"}, p.region);
+    visit({"region", "part of the head to keep; see 'osteo help crop'"}, p.region);
     visit({"remove_table",
            "clear table and head holder also where it is not certain that they are; what is certain goes without it"},
           p.remove_table);

@@ -16,7 +16,7 @@ struct ReplayCommand {
     visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
     visit({"surface_out", "also write the surface at the end of the session (.ply, .stl, ...)"}, p.surface_out);
     visit({"bone_out",
-           "also write the bone at the end of the session (.vdb); of bone in pieces the first, where it was cut"},
+           "also write the bone at the end of the session (.vdb); of bone in fragments the first, where it was cut"},
           p.bone_out);
   }
   static cli::CommandInfo info();

@@ -53,7 +53,7 @@ struct StudyCommand {
     visit({"resamples", "analyse: of each bootstrap", "", 100, 1000000}, p.resamples);
     visit({"level", "analyse: of intervals", "", 0.5, 0.999}, p.level);
     visit({"given",
-           "analyse: metrics to hold, like 'duration_s, removed_mm3': correlations are told with and without them"},
+           "analyse: metrics to hold, like 'duration_s, removed_mm3': correlations are given with and without them"},
           p.given);
     visit({"no_movies",
            "demo: without the blinded movies (320x240, 15 times as fast, 10 frames a second, one a session)"},

@@ -148,7 +148,7 @@ int run_stage(const Registry& registry, Stage& stage, const std::vector<std::str
     for (const auto& n : names) wanted += " " + n;
     throw Error(ExitCode::usage,
                 "osteo " + info.name + " takes" + wanted + count_text(required, parsed.positionals.size()),
-                "'osteo help " + info.name + "' tells more");
+                "'osteo help " + info.name + "' says more");
   }
   ready();
   for (const std::string& text : parsed.renamed) invocation.context.info(text);
@@ -321,7 +321,7 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
       std::string list;
       for (const auto& p : wanted) list += p.optional ? " [" + p.name + "]" : " <" + p.name + ">";
       throw Error(ExitCode::usage, "osteo " + subject + " takes" + (list.empty() ? " no arguments" : list),
-                  "'osteo help " + subject + "' tells more");
+                  "'osteo help " + subject + "' says more");
     }
     invocation.arguments = std::move(parsed.positionals);
     invocation.settings = std::move(parsed.settings);

@@ -93,7 +93,7 @@ constexpr std::array<std::array<std::string_view, 3>, 19> kWords{
      {"change_percent_per_50_hu", "50 HU either way change bone by", "%"},
      {"table", "table, head holder", ""},
      {"outside_body_mm3", "taken off outside the body", ""},
-     {"small_pieces_mm3", "small pieces dropped", ""},
+     {"small_pieces_mm3", "small fragments dropped", ""},
      {"mask_volume_mm3", "bone by the mask", ""},
      {"volume_before_mm3", "bone by the mask", ""},
      {"volume_after_mm3", "bone in the case", ""},

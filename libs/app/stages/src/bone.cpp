@@ -65,14 +65,15 @@ StageInfo SeparateFragmentsStage::info() {
   return {
       .name = "separate-fragments",
       .version = 2,
-      .synopsis = "bone taken apart into what hangs together",
+      .synopsis = "the fragments of a bone: its connected components",
       .description =
-          "Finds the parts that no longer hang together, with mass (from density), centre and inertia; drops crumbs; "
+          "Finds the parts that are no longer connected, with mass (from density), centre and inertia; drops crumbs; "
           "writes the surface of "
-          "all pieces, each enclosing what its bone measures, moved apart for a look when asked, and the bone of one "
+          "all fragments, each enclosing what its bone measures, moved apart for a look when asked, and the bone of "
+          "one "
           "or all.",
       .inputs = {{"bone", {DataKind::grid}, "density, as resample or saw make it"}},
-      .outputs = {{"pieces", {DataKind::document}, "the pieces, largest first, in JSON"},
+      .outputs = {{"pieces", {DataKind::document}, "the fragments, largest first, in JSON"},
                   {"surface", {DataKind::surface}, "closed, one body or more a piece", true},
                   {"kept", {DataKind::grid}, "density of the piece that --keep names, or of all but the crumbs", true}},
       .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.6"},
@@ -88,7 +89,7 @@ std::vector<Data> SeparateFragmentsStage::run(const Params& p, std::span<const D
     throw Error(ExitCode::failed, "no part is as large as --min-volume-mm3", "is this a grid of bone density?");
   if (p.keep > static_cast<int>(split.pieces.size()))
     throw Error(ExitCode::usage, "--keep " + std::to_string(p.keep) + ": there are only " +
-                                     std::to_string(split.pieces.size()) + " pieces");
+                                     std::to_string(split.pieces.size()) + " fragments");
   Vec3 middle{};
   double mass = 0;
   for (const Piece& piece : split.pieces) {

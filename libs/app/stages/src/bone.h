@@ -86,9 +86,9 @@ struct SeparateFragmentsStage {
   using Params = PiecesParams;
   static void describe(Params& p, auto& visit) {
     visit({"min_volume_mm3", "smaller parts are crumbs", "mm3", 0, 1e9}, p.least_mm3);
-    visit({"connectivity", "face: voxels that share a face hang together; full: an edge or a corner is enough"},
+    visit({"connectivity", "face: voxels that share a face are connected; full: an edge or a corner is enough"},
           p.connectivity);
-    visit({"apart_mm", "move the pieces away from their common middle, to look at them", "mm", 0, 1000}, p.apart_mm);
+    visit({"apart_mm", "move the fragments away from their common middle, to look at them", "mm", 0, 1000}, p.apart_mm);
     visit({"keep", "which piece the output bone holds, largest first (0: all but the crumbs)", "", 0, 1000000}, p.keep);
   }
   static StageInfo info();

@@ -191,7 +191,8 @@ StageInfo BoneStiffnessStage::info() {
           "screw, a plate) "
           "keep their own stiffness. The file can be solved by CalculiX or Abaqus, and by 'osteo fem', given as mesh "
           "and as problem. "
-          "What nothing holds has no solution: crumbs of the mesh below 1 % of the volume are left out, which is told. "
+          "What nothing holds has no solution: crumbs of the mesh below 1 % of the volume are left out, with a "
+          "warning. "
           "The laws were "
           "measured on long bones, none on a skull, and the CT's blur makes thin cortex too soft. Density is "
           "written too (--weight), so that a load's gravity weighs by the CT; regions weigh by their density_kg_m3.",

@@ -272,7 +272,7 @@ StageInfo CalibrateStage::info() {
           "uncertain factors; the "
           "course of the fit. A map of stiffness (--grid-x, -y, -z) finds what the "
           "regions of "
-          "a body are made of, also without being told of them (--blind). With --measured the truth is what was "
+          "a body are made of, also without being given them (--blind). With --measured the truth is what was "
           "measured: clouds of points "
           "on the deformed surface (.ply .stl .obj .vtp .csv .xyz), with noise, stray points and only a part of it "
           "seen, or markers whose "

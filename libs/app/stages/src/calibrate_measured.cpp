@@ -59,7 +59,7 @@ void warn_of(const MeasuredCalibration& c, std::size_t weak, std::size_t points,
   for (const MeasuredView& v : c.views) distances += v.drawn * (v.markers ? 3 : 1);
   if (distances < 3 * static_cast<std::size_t>(c.fit.parameters))
     context.warn(std::to_string(distances) + " distances are few for " + std::to_string(c.fit.parameters) +
-                 " parameters: the fit follows the noise, which it then tells too small, and its intervals too narrow; "
+                 " parameters: the fit follows the noise, which it then gives too small, and its intervals too narrow; "
                  "take a coarser map");
   for (const MeasuredView& v : c.views) {
     const double rejected = static_cast<double>(v.rejected) / static_cast<double>(v.drawn);
@@ -83,7 +83,7 @@ void warn_of(const MeasuredCalibration& c, std::size_t weak, std::size_t points,
   }
   if (2 * weak > points && points > 1)
     context.warn(std::to_string(weak) + " of the map's " + std::to_string(points) +
-                 " points are not settled by what was measured: they keep to their neighbours and to the mean");
+                 " points are not determined by what was measured: they keep to their neighbours and to the mean");
 }
 
 }  // namespace
@@ -118,7 +118,7 @@ std::vector<Data> calibrate_to_measured(const CalibrateParams& p, const TetMesh&
       throw Error(
           ExitCode::usage,
           "the load '" + problem.load_names[f.load] + "' moves points or has contacts; calibrate fits to forces",
-          "a body of any stiffness follows where it is moved to: only a known force tells how stiff it is");
+          "a body of any stiffness follows where it is moved to: only a known force shows how stiff it is");
   }
   const BodySurface skin = surface != nullptr ? following(*surface, mesh, context) : boundary_surface(model);
   const MaterialEdges edges = material_edges(problem, model);

@@ -7,9 +7,9 @@ StageInfo ApplyEditsStage::info() {
           .version = 1,
           .synopsis = "corrections made by hand in 'osteo edit', done again on a mask",
           .description =
-              "Does what edits.json holds, in order and to the bit: thresholds, pieces, boxes, cavities, smoothing, "
+              "Does what edits.json holds, in order and to the bit: thresholds, fragments, boxes, cavities, smoothing, "
               "brush strokes, structures. "
-              "The edits belong to one CT, and another is refused; from another mask than they began with they go on, "
+              "The edits belong to one CT, and another is rejected; from another mask than they began with they go on, "
               "and it says so.",
           .inputs = {{"image", {DataKind::image}, "CT in HU"},
                      {"mask", {DataKind::labels}, "bone mask to begin with"},

@@ -114,7 +114,7 @@ StageInfo FitDampingStage::info() {
           "channel, each with its 95 % interval: least squares (Ceres) against simulate's own steps, so that "
           "what these take away of a motion by themselves is not taken for damping. The report says how much that is. "
           "Tables that are too "
-          "short, too coarse, that do not swing, that are not sorted or hold no number are refused with what to do.",
+          "short, too coarse, that do not swing, that are not sorted or hold no number are rejected with what to do.",
       .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
                  {"problem", {DataKind::document}, "materials, what is fixed, the load that plucks, in JSON"},
                  {"motion", {DataKind::source}, "displacement over time (CSV)"},
@@ -145,7 +145,7 @@ std::vector<Data> FitDampingStage::run(const Params& p, std::span<const Data> in
     throw Error(ExitCode::usage,
                 "the nearest point of the mesh to --at-mm lies " + format_number(rounded(off)) +
                     " mm from it: it was not measured on this body",
-                "places are LPS mm; mesh-info tells where the mesh is");
+                "places are LPS mm; mesh-info shows where the mesh is");
   DampingOptions options;
   options.density_kg_m3 = p.density_kg_m3;
   options.stepping = p.method == TimeMethod::implicit_steps ? Stepping::implicit_steps : Stepping::explicit_steps;

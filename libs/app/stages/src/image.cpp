@@ -51,10 +51,12 @@ StageInfo ThresholdStage::info() {
       .description =
           "Marks the voxels between two HU values, then cleans the mask: table and head holder, streaks near metal, "
           "hysteresis, closing, "
-          "filling of cavities, and removal of small pieces. Small pieces go (--min-volume-mm3 0 keeps them), and "
+          "filling of cavities, and removal of small components. Small components go (--min-volume-mm3 0 keeps them), "
+          "and "
           "table and holder where "
           "that is "
-          "certain (--keep-table leaves them on; what is left though it may be table is told); the rest is off unless "
+          "certain (--keep-table leaves them on; what is left though it may be table is listed); the rest is off "
+          "unless "
           "asked for. With "
           "--preset the lower value "
           "is found from the scan: cortical for thick bone, cellular for the mastoid's walls, thin for the orbit's.",

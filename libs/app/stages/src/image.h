@@ -29,7 +29,7 @@ struct ThresholdStage {
         p.preset);
     visit({"lower", "keep voxels at or above this value", "HU", -32768, 32767}, p.lower);
     visit({"upper", "keep voxels at or below this value", "HU", -32768, 32767}, p.upper);
-    visit({"core", "hysteresis: keep only pieces that hold a voxel at or above this value (off at or below lower)",
+    visit({"core", "hysteresis: keep only components that hold a voxel at or above this value (off at or below lower)",
            "HU", -32768, 32767},
           p.core);
     visit({"remove_table",
@@ -44,8 +44,9 @@ struct ThresholdStage {
     visit({"metal_lower", "near metal, bone must be at or above this value", "HU", -1024, 32767}, p.metal_lower);
     visit({"close_mm", "close gaps narrower than twice this radius", "mm", 0, 20}, p.close_mm);
     visit({"fill_mm3", "fill enclosed cavities up to this volume", "mm3", 0, 1e9}, p.fill_mm3);
-    visit({"min_volume_mm3", "drop pieces smaller than this volume", "mm3", 0, 1e9}, p.min_volume_mm3);
-    visit({"keep_largest", "keep only this many of the largest pieces (0 keeps all)", "", 0, 1000000}, p.keep_largest);
+    visit({"min_volume_mm3", "drop components smaller than this volume", "mm3", 0, 1e9}, p.min_volume_mm3);
+    visit({"keep_largest", "keep only this many of the largest components (0 keeps all)", "", 0, 1000000},
+          p.keep_largest);
     visit({"connectivity", "which neighbours belong to the same piece: face is 6, full is 26"}, p.connectivity);
   }
   static StageInfo info();

@@ -14,16 +14,19 @@ StageInfo ImportStage::info() {
           "voxel in LPS mm, "
           "each slice where its own position says. Even, straight slices are taken voxel for voxel; a tilted gantry or "
           "uneven distances "
-          "are resampled onto upright slices. What cannot be placed rightly is refused. Beside the output a verdict "
+          "are resampled onto upright slices. What cannot be placed rightly is rejected. Beside the output a verdict "
           "(JSON) says what was "
           "found, which slice came from which file, and what a person should do. 'osteo import --list FOLDER' shows "
           "the series.",
       .inputs = {{"source",
                   {DataKind::source},
                   "DICOM folder, DICOMDIR, zip, or one slice of a series, or a volume file"}},
-      .outputs =
-          {{"image", {DataKind::image}, "CT in HU"},
-           {"verdict", {DataKind::document}, "what was found, also when the series is refused", true, ".verdict.json"}},
+      .outputs = {{"image", {DataKind::image}, "CT in HU"},
+                  {"verdict",
+                   {DataKind::document},
+                   "what was found, also when the series is rejected",
+                   true,
+                   ".verdict.json"}},
       .references = {"DICOM PS3.3 C.7.6.2, Image Plane Module", "DICOM PS3.3 C.7.6.16, Multi-frame Functional Groups"},
       .example = "osteo import DICOM_FOLDER ct.nrrd"};
 }
@@ -47,13 +50,16 @@ StageInfo ImportBoneStage::info() {
           "one pass: a tilted "
           "or uneven series is interpolated once instead of twice, and a scan of any length needs little memory. "
           "Thresholds and drops "
-          "small pieces on the way. 'import', 'threshold' and 'resample' do the same in steps with more choices.",
+          "small components on the way. 'import', 'threshold' and 'resample' do the same in steps with more choices.",
       .inputs = {{"source", {DataKind::source}, "DICOM folder, DICOMDIR, file or zip"}},
-      .outputs =
-          {{"bone", {DataKind::grid}, "bone density, 0 to 1"},
-           {"hu", {DataKind::grid}, "CT value in the voxels that hold bone", true},
-           {"valid", {DataKind::grid}, "where the scan measured at all", true},
-           {"verdict", {DataKind::document}, "what was found, also when the series is refused", true, ".verdict.json"}},
+      .outputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"},
+                  {"hu", {DataKind::grid}, "CT value in the voxels that hold bone", true},
+                  {"valid", {DataKind::grid}, "where the scan measured at all", true},
+                  {"verdict",
+                   {DataKind::document},
+                   "what was found, also when the series is rejected",
+                   true,
+                   ".verdict.json"}},
       .references = {"DICOM PS3.3 C.7.6.2, Image Plane Module",
                      "K. Museth, VDB: High-Resolution Sparse Volumes with Dynamic Topology, ACM TOG 2013"},
       .example = "osteo import-bone DICOM_FOLDER bone.vdb --lower 300 --spacing-mm 0.5"};

@@ -32,8 +32,9 @@ struct ImportBoneStage {
   static void describe(Params& p, auto& visit) {
     visit({"lower", "HU at the boundary of bone", "HU", -32768, 32767}, p.lower);
     visit({"spacing_mm", "edge of the output voxels", "mm", 0.05, 10}, p.spacing_mm);
-    visit({"min_volume_mm3", "drop pieces smaller than this volume", "mm3", 0, 1e9}, p.min_volume_mm3);
-    visit({"keep_largest", "keep only this many of the largest pieces (0 keeps all)", "", 0, 1000000}, p.keep_largest);
+    visit({"min_volume_mm3", "drop components smaller than this volume", "mm3", 0, 1e9}, p.min_volume_mm3);
+    visit({"keep_largest", "keep only this many of the largest components (0 keeps all)", "", 0, 1000000},
+          p.keep_largest);
     visit({"series",
            "DICOM series to take, by number, UID, or scan as --list shows it, like A1a or A1a:203 (empty: the "
            "recommended one)"},

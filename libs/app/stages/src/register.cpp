@@ -5,40 +5,41 @@
 namespace osteo::inline app {
 
 StageInfo RegisterStage::info() {
-  return {.name = "register",
-          .version = 1,
-          .synopsis = "a second scan (CT after, MR) brought onto the case's, as a rigid body",
-          .description =
-              "Finds the turn and shift by which a second scan of the same head lies on the first, from wherever its "
-              "file puts it, turned by "
-              "up "
-              "to 40 degrees. It is refused, with the reason, where edges of the two do not meet (another patient, the "
-              "other side), less than "
-              "a "
-              "quarter of the smaller scan lies in the other, or registering back by itself leads elsewhere. The "
-              "residual is the distance "
-              "between like edges along their normals: blur and thresholds are in it, sliding along a smooth surface "
-              "is not. Look at the "
-              "checkerboard. The transform is for 3D Slicer and ITK, LPS mm, from the first scan to the second.",
-          .inputs = {{"first", {DataKind::image}, "the scan that stays, the case's"},
-                     {"second", {DataKind::image}, "the scan that is brought onto it"},
-                     {"labels", {DataKind::labels}, "label map of the second scan, to be carried over", true}},
-          .outputs = {{"transform", {DataKind::document}, "ITK transform (.tfm)"},
-                      {"findings", {DataKind::document}, "transform and residual in JSON", true, ".json"},
-                      {"moved",
-                       {DataKind::image},
-                       "the second scan on the first's voxels, trilinear; outside it its least value",
-                       true},
-                      {"labels", {DataKind::labels}, "the labels on the first's voxels, of the nearest voxel", true},
-                      {"checkerboard", {DataKind::picture}, "three cuts in squares of the one and the other", true}},
-          .references = {"C. Studholme et al., An overlap invariant entropy measure of 3D medical image alignment, "
-                         "Pattern Recognition 1999",
-                         "Y. Chen, G. Medioni, Object modelling by registration of multiple range images, Image and "
-                         "Vision Computing 1992",
-                         "D. Chetverikov et al., The trimmed iterative closest point algorithm, ICPR 2002"},
-          .example =
-              "osteo register before.nrrd after.nrrd after.tfm --moved-out after-on-before.nrrd --checkerboard-out "
-              "check.png"};
+  return {
+      .name = "register",
+      .version = 1,
+      .synopsis = "a second scan (CT after, MR) brought onto the case's, as a rigid body",
+      .description =
+          "Finds the turn and shift by which a second scan of the same head lies on the first, from wherever its "
+          "file puts it, turned by "
+          "up "
+          "to 40 degrees. It is rejected, with the reason, where edges of the two do not meet (another patient, the "
+          "other side), less than "
+          "a "
+          "quarter of the smaller scan lies in the other, or registering back by itself leads elsewhere. The "
+          "residual is the distance "
+          "between like edges along their normals: blur and thresholds are in it, sliding along a smooth surface "
+          "is not. Look at the "
+          "checkerboard. The transform is for 3D Slicer and ITK, LPS mm, from the first scan to the second.",
+      .inputs = {{"first", {DataKind::image}, "the scan that stays, the case's"},
+                 {"second", {DataKind::image}, "the scan that is brought onto it"},
+                 {"labels", {DataKind::labels}, "label map of the second scan, to be carried over", true}},
+      .outputs = {{"transform", {DataKind::document}, "ITK transform (.tfm)"},
+                  {"findings", {DataKind::document}, "transform and residual in JSON", true, ".json"},
+                  {"moved",
+                   {DataKind::image},
+                   "the second scan on the first's voxels, trilinear; outside it its least value",
+                   true},
+                  {"labels", {DataKind::labels}, "the labels on the first's voxels, of the nearest voxel", true},
+                  {"checkerboard", {DataKind::picture}, "three cuts in squares of the one and the other", true}},
+      .references = {"C. Studholme et al., An overlap invariant entropy measure of 3D medical image alignment, "
+                     "Pattern Recognition 1999",
+                     "Y. Chen, G. Medioni, Object modelling by registration of multiple range images, Image and "
+                     "Vision Computing 1992",
+                     "D. Chetverikov et al., The trimmed iterative closest point algorithm, ICPR 2002"},
+      .example =
+          "osteo register before.nrrd after.nrrd after.tfm --moved-out after-on-before.nrrd --checkerboard-out "
+          "check.png"};
 }
 
 std::vector<Data> RegisterStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {

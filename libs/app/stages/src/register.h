@@ -13,10 +13,10 @@ struct RegisterStage {
            8},
           p.finest_mm);
     visit({"bone_hu", "surface: bone is what is at or above this value", "HU", -1024, 32767}, p.bone_hu);
-    visit({"max_residual_mm", "refuse where at half of all edges the other scan's edge is farther off than this", "mm",
+    visit({"max_residual_mm", "reject where at half of all edges the other scan's edge is farther off than this", "mm",
            0.05, 4},
           p.max_residual_mm);
-    visit({"accept_poor", "write the transform even where it would be refused, with a warning"}, p.accept_poor);
+    visit({"accept_poor", "write the transform even where it would be rejected, with a warning"}, p.accept_poor);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

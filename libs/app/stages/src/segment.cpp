@@ -54,7 +54,7 @@ StageInfo TubeStage::info() {
           "measures its radius, and draws it into a label map. Each place has a confidence: the chance that it "
           "lies in the tube. Says where that is below one half; where no walls are seen the line is a smooth curve "
           "through "
-          "the points. Points that no tube joins are refused. docs/validation/structures.md has how far off it is.",
+          "the points. Points that no tube joins are rejected. docs/validation/structures.md has how far off it is.",
       .inputs =
           {{"image", {DataKind::image}, "CT in HU"},
            {"points", {DataKind::source}, "text file, a point x, y, z (LPS mm) a line; in place of --points-mm", true},
@@ -157,7 +157,8 @@ StageInfo FindStructuresStage::info() {
               "the skull's inner surface, and, from a point in it, the fluid of the labyrinth. Each has a quality from "
               "0 to 1 or a reason "
               "why it "
-              "was not found. A proposal to be looked at: docs/validation/structures.md says how far off it is and what it does "
+              "was not found. A proposal to be looked at: docs/validation/structures.md says how far off it is and "
+              "what it does "
               "not know.",
           .inputs = {{"image", {DataKind::image}, "CT in HU, of a head or around an ear"}},
           .outputs = {{"structures", {DataKind::labels}, "label map with names and colours of what was found"},

@@ -81,7 +81,7 @@ struct CalibrateStage {
     visit({"grid_z", "along z", "", 1, 20}, p.grid_z);
     visit({"shared_grid", "one map for all kinds of constraint, and one factor a kind; else a map for each kind"},
           p.shared_grid);
-    visit({"blind", "the model is not told of the problem's regions: a map has to find them"}, p.blind);
+    visit({"blind", "the model does not know the problem's regions: a map has to find them"}, p.blind);
     visit({"pull", "towards the closed form: what the loads do not tell stays there", "", 0, 10}, p.pull);
     visit(
         {"smooth", "what differences in a shared map cost; borders between tissues cost less than ripples", "", 0, 10},

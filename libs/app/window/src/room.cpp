@@ -298,9 +298,10 @@ void Room::draw_panel(const RoomScene& scene) {
     draw_approval(scene.machine.approval, scene.machine.approval_ended);
     if (scene.machine.scan != nullptr) draw_scan(*scene.machine.scan);
     ImGui::TextWrapped("hand: %s", scene.machine.device.c_str());
-    ImGui::TextWrapped("%s", rehearsal.realtime()
-                                 ? "real-time priority: yes"
-                                 : "real-time priority: REFUSED. The force may stutter: allow rtprio in limits.conf.");
+    ImGui::TextWrapped("%s",
+                       rehearsal.realtime()
+                           ? "real-time priority: yes"
+                           : "real-time priority: NOT GRANTED. The force may stutter: allow rtprio in limits.conf.");
     ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(scene.tick.work_us),
                 static_cast<double>(scene.tick.lateness_us));
     ImGui::Text("%.2f of %.2f M triangles", scene.machine.drawn_millions, scene.machine.triangles_millions);

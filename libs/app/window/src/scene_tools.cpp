@@ -61,7 +61,7 @@ void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, con
 }
 
 void piece_panel(HandTools& tools, Rehearsal& rehearsal) {
-  if (ImGui::Button("Take apart (Enter)", {-1, 0})) tools.perform(rehearsal);
+  if (ImGui::Button("Separate fragments (Enter)", {-1, 0})) tools.perform(rehearsal);
   if (tools.piece() == SceneAction::kNobody) {
     ImGui::TextWrapped("Press on a piece and drag it; with Shift it turns.");
     return;

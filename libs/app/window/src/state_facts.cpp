@@ -54,7 +54,7 @@ StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures,
   }
   f.time = clock_text(static_cast<double>(tick.tick) / rate_hz);
   if ((tick.flags & kStructureInjured) != 0) {
-    f.warning = "the turning burr touches " + f.structure;
+    f.warning = "the rotating burr touches " + f.structure;
     f.alarm = true;
   } else if ((tick.flags & kEscape) != 0) {
     f.warning = "the burr is buried in bone";

@@ -59,7 +59,7 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
       add(s.name, text_of("INJURED: cut through by the saw, %.2g mm3 of it", s.cut_mm3), Nearness::touched);
     }
     if (s.injured_s > 0) {
-      add(s.name, text_of("INJURED: touched by the turning burr for %.2f s", s.injured_s), Nearness::touched);
+      add(s.name, text_of("INJURED: touched by the rotating burr for %.2f s", s.injured_s), Nearness::touched);
     } else if (s.touched_s > 0) {
       add(s.name, text_of("touched for %.2f s, drill off", s.touched_s), Nearness::close);
     } else if (s.cut_mm3 <= 0) {

@@ -256,14 +256,14 @@ Plausibility plausibility_of(const StructureMeasure& m) {
     if (u.to_mm3 > 0)
       add(p.expected, u.to_mm3 >= 1000 ? whole(u.from_mm3 / 1000) + " to " + whole(u.to_mm3 / 1000) + " mL"
                                        : whole(u.from_mm3) + " to " + whole(u.to_mm3) + " mm3");
-    if (u.parts > 0) add(p.expected, u.parts == 1 ? "one piece" : "up to " + std::to_string(u.parts) + " pieces");
+    if (u.parts > 0) add(p.expected, u.parts == 1 ? "one piece" : "up to " + std::to_string(u.parts) + " fragments");
     if (sides == 2) p.expected += ", each side";
     const double volume = m.volume_mm3 / sides;
     if (volume < u.from_mm3) add(p.doubt, "small");
     if (u.to_mm3 > 0 && volume > u.to_mm3) add(p.doubt, "large");
     if (u.to_mm > 0 && m.length_mm > 0 && m.length_mm < u.from_mm) add(p.doubt, "short");
     if (u.to_mm > 0 && m.length_mm > u.to_mm) add(p.doubt, "long");
-    if (u.parts > 0 && m.parts > u.parts * sides) add(p.doubt, "in " + std::to_string(m.parts) + " pieces");
+    if (u.parts > 0 && m.parts > u.parts * sides) add(p.doubt, "in " + std::to_string(m.parts) + " fragments");
     p.fits = p.doubt.empty();
     break;
   }

@@ -270,7 +270,7 @@ Rows removed_rows(const CaseFacts& f) {
     const std::string least = f.param("threshold", "min_volume_mm3"), largest = f.param("threshold", "keep_largest");
     if (!least.empty()) said += "; each below " + least + " mm3";
     if (!largest.empty() && largest != "0") said += ", or not among the " + largest + " largest";
-    rows.emplace_back("Small pieces", said);
+    rows.emplace_back("Small components", said);
   }
   if (const Json* const metal = f.verdict("values", "metal_mm3")) {
     const double mm3 = number(metal);

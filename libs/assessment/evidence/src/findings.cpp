@@ -165,8 +165,8 @@ class Finder {
             return m.what == what && m.structure == of;
           }));
         };
-        const double burr = count("reached by a turning burr"), saw = count("reached by the running saw");
-        std::string text = burr == 0 && saw > 0 ? "The running saw reached the " : "A turning burr reached the ";
+        const double burr = count("reached by a rotating burr"), saw = count("reached by the running saw");
+        std::string text = burr == 0 && saw > 0 ? "The running saw reached the " : "A rotating burr reached the ";
         text += name;
         if (burr > 0 || saw > 0) text += " " + times(burr > 0 ? burr : saw);
         if (burr > 0 && saw > 0) text += " and the running saw " + times(saw);
@@ -174,7 +174,7 @@ class Finder {
             add("injury", name, FindingSeverity::serious, text + ", for " + told_seconds(injured) + " in all.",
                 "Reached: the tool's surface lay inside the structure's face.");
         from(f, "injured_s", name, injured, 0);
-        moments(f, "reached by a turning burr", name);
+        moments(f, "reached by a rotating burr", name);
         moments(f, "reached by the running saw", name);
         std::sort(f.times_s.begin(), f.times_s.end());
       } else if (n > 0) {

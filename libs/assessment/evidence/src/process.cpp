@@ -271,7 +271,7 @@ void NearMetric::frame(const EvidenceFrame& f) {
         count(o.injured, o.injured_until);
         if (hand.at[s].injury.begins(t.tick, f.rate_hz, kSameContactS))
           moments_.push_back(
-              {t_s, at, tool.kind == InstrumentKind::saw ? "reached by the running saw" : "reached by a turning burr",
+              {t_s, at, tool.kind == InstrumentKind::saw ? "reached by the running saw" : "reached by a rotating burr",
                scene_.structures->name_of(names[s]), d, 0});
       }
       for (std::size_t b = 0; b < kBandsMm.size(); ++b) {

@@ -229,7 +229,7 @@ void Product::settle(Result& r, bool passes_at_worst, bool passes_at_best) const
 }
 
 std::string Product::no_cavity() const {
-  return removed_.empty() ? "nothing was removed: bone is as it was"
+  return removed_.empty() ? "nothing was removed: the bone is unchanged"
                           : "nothing was opened: no ball of " + format_number(kBallMm) +
                                 " mm comes in where bone was removed, so there is no cavity to measure from";
 }

@@ -69,7 +69,7 @@ void Product::overhang(const ScaleItem& item, std::uint8_t s, Vec3 approach, Res
   const Vec3 given = normalized({item.towards[0], item.towards[1], item.towards[2]});
   const Vec3 axis = length(given) > 0 ? given : approach;
   if (length(axis) == 0) {
-    r.word = "nothing tells from where it is looked at: neither \"towards\" nor a burr that drilled";
+    r.word = "it is not known from where it is looked at: neither \"towards\" nor a burr that drilled";
     return;
   }
   // The axis and eight directions on the cone's mantle, 15 degrees off.

@@ -282,7 +282,7 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
                          [&](const PlacedBody& b) { return b.of_region == of_region; });
   };
   if (count(first, false) > 1 || count(end, false) > 1)
-    score.words.push_back("bone in pieces: the final product is measured with each where it lay at the beginning");
+    score.words.push_back("bone in fragments: the final product is measured with each where it lay at the beginning");
   if (count(first, true) > 0)
     score.words.push_back("the case has a finer region: volumes and what was seen go by each voxel's own size");
   if (!keeper.removed().empty() && no_bone(end)) score.words.push_back("no bone is left");

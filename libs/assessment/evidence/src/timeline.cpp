@@ -107,7 +107,7 @@ void TimelineKeeper::near(const EvidenceFrame& f, const TickRecord& t, std::size
     } else {
       const std::string name = scene_.structures->name_of(value);
       now.event = add({turns ? EventKind::injury : EventKind::touch, t_s, t_s,
-                       turns ? (saw ? "the running saw reached the " : "a turning burr reached the ") + name
+                       turns ? (saw ? "the running saw reached the " : "a rotating burr reached the ") + name
                              : (saw ? "the saw, at rest, touched the " : "the burr, at rest, touched the ") + name,
                        name, true, at});
     }
@@ -124,7 +124,7 @@ void TimelineKeeper::act(const SceneAction& a, double rate_hz) {
   } else if (a.is(ActionKind::saw)) {
     placed(EventKind::saw, "saw cut", a.saw_cut().at_mm);
   } else if (a.is(ActionKind::split)) {
-    add({EventKind::split, t_s, t_s, "what does not hang together was taken apart", {}, false, {}});
+    add({EventKind::split, t_s, t_s, "what is not connected was separated", {}, false, {}});
   } else if (a.is(ActionKind::attach)) {
     placed(EventKind::plate, "a plate was fixed", a.transform().shift_mm);
   } else if (a.is(ActionKind::detach)) {

@@ -38,7 +38,7 @@ Recall score_recall(std::span<const double> target_n, std::span<const double> ap
   if (target_n.size() != applied_n.size() || target_n.size() < 2 || s.samples < 2)
     throw Error(ExitCode::usage, "a recall needs target and applied force of the same length, two samples at least");
   if (!saturated.empty() && saturated.size() != target_n.size())
-    throw Error(ExitCode::usage, "saturation is told of another length");
+    throw Error(ExitCode::usage, "saturation is given for another length");
   if (!(rate_hz > 0)) throw Error(ExitCode::usage, "a recall needs a rate above 0");
   for (std::size_t i = 0; i < target_n.size(); ++i) {
     if (!std::isfinite(target_n[i]) || !std::isfinite(applied_n[i]))

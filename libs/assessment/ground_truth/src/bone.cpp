@@ -130,7 +130,7 @@ std::shared_ptr<const Solid> make_mesh_solid(const TriangleSoup& mesh, const Con
   TriangleSoup soup = welded(mesh);
   require_sound(soup);
   if (soup.triangles.empty() || !is_closed(soup))
-    throw Error(ExitCode::usage, "the surface is not closed: what is inside cannot be told",
+    throw Error(ExitCode::usage, "the surface is not closed: what is inside is not defined",
                 "'osteo repair' may close it");
   const BoxMm box = bounds_of(soup);
   double half = 0;
@@ -147,7 +147,7 @@ std::shared_ptr<const Solid> make_bone(const TriangleSoup& mesh, double spacing_
   TriangleSoup soup = welded(mesh);
   require_sound(soup);
   if (soup.triangles.empty() || !is_closed(soup))
-    throw Error(ExitCode::usage, "the mesh of the bone is not closed: what is inside cannot be told",
+    throw Error(ExitCode::usage, "the mesh of the bone is not closed: what is inside is not defined",
                 "'osteo repair' may close it");
   const BoxMm box = bounds_of(soup);
   const Vec3 middle = (box.lo + box.hi) * 0.5, size = box.hi - box.lo;

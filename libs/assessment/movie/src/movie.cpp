@@ -192,7 +192,8 @@ MovieFacts make_movie(const SessionReader& session, const World& begin, const An
       Reader* const readers[] = {&reader};
       const ReplayResult r = replay(session, begin.copy(), anatomy, {}, readers);
       if (!r.identical)
-        facts.words.push_back("it did not come out as it was recorded (" + r.difference + "): neither may the movie");
+        facts.words.push_back("the replay differs from what was recorded (" + r.difference +
+                              "): neither may the movie");
     } else {
       tell_recorded(session, begin, reader);
       facts.words.push_back(why + ": bone changes in steps of a tenth of a second" +

@@ -309,7 +309,7 @@ std::string_view plain_name(std::string_view metric) {
                                   {"hidden_mm3", "removed unseen"},
                                   {"hidden_near_mm3", "unseen, near structures"},
                                   {"touches", "touches of structures"},
-                                  {"injured_s", "turning burr in structures"},
+                                  {"injured_s", "rotating burr in structures"},
                                   {"clearance_mm", "nearest to any structure"},
                                   {"force_p95_n", "force, 95 % are below"},
                                   {"force_peak_n", "hardest press"},

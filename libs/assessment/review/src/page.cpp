@@ -361,7 +361,7 @@ void tables(std::ostream& out, const Review& r) {
   }
   out << "</tbody></table></details></section>\n";
   if (r.findings.not_measured.empty() && r.left_out.empty()) return;
-  out << "<section id=\"not-measured\"><h2>What could not be told</h2>\n";
+  out << "<section id=\"not-measured\"><h2>What could not be determined</h2>\n";
   for (const auto& [why, what] : r.findings.not_measured) {
     out << "<p class=\"small\"><b>" << e(why) << "</b>: ";
     for (std::size_t n = 0; n < what.size(); ++n) out << (n > 0 ? ", " : "") << e(what[n]);
@@ -405,7 +405,8 @@ std::string review_html(const Review& r) {
   out << "<footer class=\"small\">Osteotome. Thresholds are starting values, fitted to no rated session; near means "
          "within 2 mm; what each "
          "figure "
-         "means and may not be used for: docs/how-to/review.md and docs/validation/evidence.md. A rehearsal is no proof of "
+         "means and may not be used for: docs/how-to/review.md and docs/validation/evidence.md. A rehearsal is no "
+         "proof of "
          "skill.</footer>\n"
          "<script type=\"application/json\" id=\"review-data\">"
       << page_data(r) << "</script>\n<script>\n"

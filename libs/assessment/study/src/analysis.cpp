@@ -131,7 +131,7 @@ void Analyst::primary() {
   say("Primary outcomes: " + names + ". Only these are corrected together; all others are exploratory.");
   if (p.primary_after > 0)
     say("They were named when " + counted(static_cast<std::size_t>(p.primary_after), "session was", "sessions were") +
-            " in the study already: whoever knew these may have chosen what came out.",
+            " in the study already: who knew these may have chosen what came out.",
         Tone::caution);
 }
 
@@ -298,7 +298,7 @@ void Analyst::closing() {
   add(sheet::Heading{"What may not be concluded"});
   for (const char* const words :
        {"That two groups are equal, because a difference is not significant.",
-        "That whoever passes may operate: groups of unlike experience differ in much besides skill, and a pass mark is "
+        "That who passes may operate: groups of unlike experience differ in much besides skill, and a pass mark is "
         "only as good as "
         "those groups.",
         "That a metric measures skill, because it correlates with ratings here: both may follow time or experience.",

@@ -276,7 +276,7 @@ void Analyst::decide() {
   add(std::move(table));
   add_charts(std::move(charts), "The dot: the threshold with the most true less false positives (Youden).");
   say("An area below a half: " + study_.plan.competent +
-          " have the smaller values. Marks and areas were found on the very people they are told for; others will do "
+          " have the smaller values. Marks and areas were found on the very people they are given for; others will do "
           "worse.",
       Tone::quiet);
 }

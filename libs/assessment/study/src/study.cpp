@@ -92,7 +92,7 @@ std::string wrong_with(const Plan& p) {
   if (std::set<std::string>(p.primary.begin(), p.primary.end()).size() != p.primary.size())
     return "primary names one twice";
   if (!among(p.groups, p.competent))
-    return "competent is '" + p.competent + "', which is none of the groups " + listed(p.groups);
+    return "competent is '" + p.competent + "', which is not one of the groups " + listed(p.groups);
   if (p.attempts < 1 || p.attempts > 100) return "attempts is from 1 to 100";
   if (p.lowest >= p.highest || p.highest - p.lowest > 100)
     return "lowest is below highest, and not more than 100 below";
@@ -320,7 +320,7 @@ Study read_without_ratings(const fs::path& folder) {
     }
     if (find(s, row.fields[0]) != nullptr) throw people.wrong(row.line, "'" + row.fields[0] + "' is there twice");
     if (!among(s.plan.groups, row.fields[1]))
-      throw people.wrong(row.line, "'" + row.fields[1] + "' is none of the groups " + listed(s.plan.groups));
+      throw people.wrong(row.line, "'" + row.fields[1] + "' is not one of the groups " + listed(s.plan.groups));
     s.participants.push_back({row.fields[0], row.fields[1]});
   }
   const Csv order = read_table(folder / "order.csv", {"participant", "position", "case"});
@@ -328,7 +328,7 @@ Study read_without_ratings(const fs::path& folder) {
     if (find(s, row.fields[0]) == nullptr)
       throw order.wrong(row.line, "there is no participant '" + row.fields[0] + "'");
     if (!among(s.plan.cases, row.fields[2]))
-      throw order.wrong(row.line, "'" + row.fields[2] + "' is none of the cases " + listed(s.plan.cases));
+      throw order.wrong(row.line, "'" + row.fields[2] + "' is not one of the cases " + listed(s.plan.cases));
     s.order.push_back({row.fields[0], order.whole(row, 1), row.fields[2]});
   }
   const Csv sessions = read_table(folder / "sessions.csv", kSessionColumns);
@@ -346,7 +346,7 @@ Study read_without_ratings(const fs::path& folder) {
       throw wrong("the blind code '" + one.blind + "' is empty or there twice");
     if (find(s, one.participant) == nullptr) throw wrong("there is no participant '" + one.participant + "'");
     if (!among(s.plan.cases, one.case_name))
-      throw wrong("'" + one.case_name + "' is none of the cases " + listed(s.plan.cases));
+      throw wrong("'" + one.case_name + "' is not one of the cases " + listed(s.plan.cases));
     if (one.attempt < 1 || one.attempt > s.plan.attempts)
       throw wrong("attempt is from 1 to " + std::to_string(s.plan.attempts));
     if (!done.insert(one.participant + "\n" + one.case_name + "\n" + row.fields[3]).second)
@@ -405,7 +405,7 @@ void need_code(const std::string& code, const std::string& called) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
       });
   if (!good)
-    throw Error(ExitCode::usage, called + " is '" + code + "', not a code of up to 16 letters, digits, '-' and '_'",
+    throw Error(ExitCode::usage, called + " is '" + code + "', not a code of up to 16 characters, digits, '-' and '_'",
                 "use codes, not names");
 }
 
@@ -450,7 +450,7 @@ std::string add_participant(const fs::path& folder, std::string code, const std:
   if (const std::string same = there(code); !same.empty())
     throw Error(ExitCode::usage, "participant '" + same + "' is there already");
   if (!among(s.plan.groups, group))
-    throw Error(ExitCode::usage, "'" + group + "' is none of the groups " + listed(s.plan.groups),
+    throw Error(ExitCode::usage, "'" + group + "' is not one of the groups " + listed(s.plan.groups),
                 "give it with --group");
   s.participants.push_back({code, group});
   write_participants(folder, s);
@@ -491,7 +491,7 @@ std::string add_session(const fs::path& folder, const std::string& participant, 
   if (find(s, participant) == nullptr)
     throw Error(ExitCode::usage, "there is no participant '" + participant + "'", "add the participant first");
   if (!among(s.plan.cases, case_name))
-    throw Error(ExitCode::usage, "'" + case_name + "' is none of the cases " + listed(s.plan.cases));
+    throw Error(ExitCode::usage, "'" + case_name + "' is not one of the cases " + listed(s.plan.cases));
   if (attempt < 1 || attempt > s.plan.attempts)
     throw Error(ExitCode::usage, "--attempt is from 1 to " + std::to_string(s.plan.attempts));
   for (const std::string& a : accepted) {
@@ -680,7 +680,7 @@ RaterSheet read_ratings(const std::string& text, const std::string& name, const 
       throw json.wrong(session, "there is no session '" + blind + "' in sessions.csv",
                        "'osteo study remove' takes people and sessions out with their ratings");
     if (!among(study.plan.items, json.text(item, "item")))
-      throw json.wrong(item, "'" + item.text + "' is none of the items " + listed(study.plan.items));
+      throw json.wrong(item, "'" + item.text + "' is not one of the items " + listed(study.plan.items));
     std::optional<double> given;
     if (value.kind != JsonValue::Kind::null) {
       given = json.number(value, "value", study.plan.lowest, study.plan.highest);

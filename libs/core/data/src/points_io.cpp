@@ -28,7 +28,7 @@ Fcsv fcsv_of(const fs::path& path, std::string_view text) {
   throw Error(
       ExitCode::corrupt,
       "'" + path.string() + "' has its points in the coordinates '" + std::string(value) + "', not in LPS or RAS",
-      "save them anew in Slicer");
+      "save them again in Slicer");
 }
 
 }  // namespace

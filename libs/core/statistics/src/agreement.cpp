@@ -93,7 +93,7 @@ CategoryAgreement category_agreement(const Ratings& ratings, std::span<const dou
       const auto& given = ratings.at(t, r);
       if (!given) continue;
       const auto found = std::find(categories.begin(), categories.end(), *given);
-      if (found == categories.end()) refuse("a rating is none of the categories");
+      if (found == categories.end()) refuse("a rating is not one of the categories");
       category[r][t] = static_cast<int>(found - categories.begin());
       count[static_cast<std::size_t>(category[r][t])] += 1;
       all += 1;

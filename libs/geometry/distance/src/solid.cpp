@@ -146,7 +146,7 @@ SolidSurface solid_surface(const TriangleSoup& soup, const Context& context) {
   require_sound(soup);
   if (auto found = solid_of(soup, context)) return *std::move(found);
   throw Error(ExitCode::failed, "the surface encloses nothing: everywhere its winding number is the same on both sides",
-              "a sheet has no inside; 'osteo mesh-info' tells what the surface is");
+              "a sheet has no inside; 'osteo mesh-info' shows what the surface is");
 }
 
 double inside_volume_mm3(const TriangleSoup& soup, const Context& context) {

@@ -27,7 +27,7 @@ Volume<float> to_dense(const SparseGrid& grid, std::array<int, 3> lo, std::array
     constexpr std::int64_t most = std::numeric_limits<int>::max() - 4096;
     if (n[a] < 1 || lo[a] < -most || std::int64_t{lo[a]} + n[a] > most)
       throw Error(ExitCode::usage,
-                  "a box of " + std::to_string(n[a]) + " voxels from " + std::to_string(lo[a]) + " on is none",
+                  "a box of " + std::to_string(n[a]) + " voxels from " + std::to_string(lo[a]) + " on is not valid",
                   "give at least one voxel along each axis");
   }
   Volume<float> v;

@@ -73,7 +73,7 @@ void html_page(std::ostream& page, const std::vector<BatchCase>& table, const fs
           "decisions.</p></header>\n"
           "<div class=\"counts\">";
   count_box(page, sum.done, "done");
-  count_box(page, sum.refused, "refused for their input");
+  count_box(page, sum.refused, "rejected for their input");
   count_box(page, sum.failed, "failed");
   count_box(page, sum.resources, "out of memory or time");
   count_box(page, sum.waiting, "waiting");

@@ -243,7 +243,7 @@ class Body {
 
 std::string reason_text(const Json& item, const char* attribute) {
   const int reason = number_in(item, attribute, -1);
-  if (reason < 0 || reason > 0xFFFF) return "it refused it, and does not say why";
+  if (reason < 0 || reason > 0xFFFF) return "it rejected it, and does not say why";
   return reason == 0xC122 ? "it does not take this transfer syntax (status C122)"
                           : pacs::status_text(static_cast<unsigned>(reason));
 }
@@ -264,7 +264,7 @@ std::string status_words(long status) {
     case 503:
       return "the server is out of resources" + code;
     default:
-      return "the server refuses the request" + code;
+      return "the server rejects the request" + code;
   }
 }
 

@@ -201,7 +201,7 @@ Reply Http::ask(const Question& question) {
   transfer.look();
   const Reply& reply = transfer.reply;
   if (reply.status == 401 || reply.status == 403)
-    throw wrong(server_.login.empty() ? "asks for a login" : "refuses the login", server_.flag + "-login FILE");
+    throw wrong(server_.login.empty() ? "asks for a login" : "rejects the login", server_.flag + "-login FILE");
   if (transfer.endless_head) throw wrong("gives an answer whose head does not end");
   if (reply.status >= 300 && reply.status < 400)
     throw wrong("points elsewhere (status " + std::to_string(reply.status) + "), which is not followed",

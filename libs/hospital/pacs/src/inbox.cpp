@@ -123,7 +123,7 @@ std::vector<ClosedSeries> Inbox::close_quiet(Time now) {
     }
     if (series.objects == 0) {
       ++gone_;
-      warn_("the series " + name_of(at->first) + " was moved or deleted before it was closed: it is not told");
+      warn_("the series " + name_of(at->first) + " was moved or deleted before it was closed: it is not reported");
       at = open_.erase(at);
       continue;
     }

@@ -71,7 +71,7 @@ MultipartReader::MultipartReader(std::string boundary, PartEvents events)
                       return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
                              kAllowed.find(c) != std::string_view::npos;
                     });
-  if (!good) throw bad("its boundary is none");
+  if (!good) throw bad("its boundary is not valid");
 }
 
 void MultipartReader::feed(std::string_view piece) {

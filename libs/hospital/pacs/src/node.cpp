@@ -126,7 +126,7 @@ void Scu::connect(const DicomPeer& peer) {
     if (c == '\n') c = ' ';
   const bool rejected = done == DUL_ASSOCIATIONREJECTED || why.find("Reject") != std::string::npos;
   throw Error(ExitCode::failed,
-              peer_text(peer) + (rejected ? " refuses " + peer.own_ae : " cannot be reached") + ": " + why,
+              peer_text(peer) + (rejected ? " rejects " + peer.own_ae : " cannot be reached") + ": " + why,
               rejected ? "the node must know our title (--ae) and we must call it by its own"
                        : "check host, port and firewall");
 }
@@ -178,7 +178,7 @@ std::string status_text(unsigned status) {
                            : (status & 0xFF00U) == 0xA700 ? "it is out of resources"
                            : (status & 0xFF00U) == 0xA900 ? "the object does not match its kind"
                            : (status & 0xF000U) == 0xC000 ? "it cannot understand the object"
-                                                          : "it refused it";
+                                                          : "it rejected it";
   return std::string(what) + " (status " + code + ")";
 }
 

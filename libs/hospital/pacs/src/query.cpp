@@ -26,7 +26,7 @@ std::vector<std::unique_ptr<DcmDataset>> Query::ask(DcmDataset& keys, std::size_
     throw Error(ExitCode::usage, "more than " + std::to_string(most) + " match",
                 "ask for less: a date, a modality, a study");
   if (status_ != STATUS_Success)
-    throw Error(ExitCode::failed, peer_ + " refuses the question: " + status_text(status_));
+    throw Error(ExitCode::failed, peer_ + " rejects the question: " + status_text(status_));
   return std::move(found_);
 }
 

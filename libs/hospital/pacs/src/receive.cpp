@@ -170,7 +170,7 @@ class Node {
     measuring_took_ = measured_at_ - begin;
     std::error_code error;
     const bool there = fs::is_directory(folder_, error);
-    if (!there && folder_there_) context_.warn("the inbox is gone: objects are refused until it is there again");
+    if (!there && folder_there_) context_.warn("the inbox is gone: objects are rejected until it is there again");
     folder_there_ = there;
   }
 
@@ -304,7 +304,7 @@ std::string metrics_text(const ReceiveCounters& c) {
   row("timed_out", "associations ended because a message, or all of it, took too long", c.timed_out);
   row("stored", "objects stored", c.stored);
   row("again", "objects that were there already", c.again);
-  row("refused", "objects refused", c.refused);
+  row("refused", "objects rejected", c.refused);
   row("bytes", "bytes of data sets stored", c.bytes);
   row("closed_series", "series closed after quiet", c.closed);
   row("gone_series", "series moved or deleted before they were closed", c.gone);

@@ -529,7 +529,7 @@ std::string metrics_text(const WatchCounters& c) {
   };
   row("series", "gauge", "series in the folder", c.series);
   row("done_total", "counter", "cases made", c.done);
-  row("bad_total", "counter", "series refused, failed or out of resources", c.bad);
+  row("bad_total", "counter", "series rejected, failed or out of resources", c.bad);
   row("unmatched_total", "counter", "series that no rule matched", c.unmatched);
   row("unreadable_total", "counter", "files whose heads ended their process", c.unreadable);
   return text;

@@ -179,7 +179,7 @@ void judge(DicomSeries& s, const PlaceOptions& options, double& price) {
   s.gap_mm = p.verdict.gap_usual_mm;
   for (const Finding& f : p.verdict.findings) {
     if (f.severity != Severity::error) continue;
-    s.what = f.code == code::not_ct ? first.modality + ", not CT" : "refused: " + f.code;
+    s.what = f.code == code::not_ct ? first.modality + ", not CT" : "rejected: " + f.code;
     s.problem = f.message;
     return;
   }

@@ -87,7 +87,7 @@ SegLayers place_seg_frames(const std::vector<double>& along_mm, double spacing_m
       s.problem = "its frames lie " + mm(pitch) + " apart and its slices are " + mm(thickness_mm) +
                   " thick, but it does not state how far apart slices are (SpacingBetweenSlices): whether empty frames "
                   "were left out cannot "
-                  "be told";
+                  "be known";
       return s;
     }
   }

@@ -130,7 +130,7 @@ void tell_padding(Verdict& v, const ValueCount& count, double pixels) {
   if (count.ring > 0) {
     v.add(code::padding_found, Severity::info,
           format_number(std::round(static_cast<double>(count.ring) / pixels * 1000) / 10) +
-              " % of the pixels hang together with the pictures' corners and hold one value (" + whole(count.ring_hu) +
+              " % of the pixels are connected with the pictures' corners and hold one value (" + whole(count.ring_hu) +
               " HU); they are taken for padding and become air");
   }
   if (static_cast<double>(count.declared_tissue) > 0.001 * pixels) {
@@ -154,7 +154,7 @@ void tell_highest(Verdict& v, const ValueCount& count, double voxel_mm3, double 
   if (c.saturated_mm3 > 1) {
     v.add(code::saturated, Severity::info,
           whole(c.saturated_mm3) + " mm3 are at the top of the stored range (" + std::to_string(count.hu_max) +
-              " HU): denser matter is not told apart",
+              " HU): denser matter is not distinguished",
           "an extended CT scale shows metal better");
   }
   if (c.metal_mm3 > 20) {

@@ -27,7 +27,7 @@ const Finding& first_error(const Verdict& v) {
 
 std::string why(const Verdict& v) {
   std::string text =
-      v.source == "DICOM" ? "series " + std::to_string(v.series) + " is refused" : "the volume is refused";
+      v.source == "DICOM" ? "series " + std::to_string(v.series) + " is rejected" : "the volume is rejected";
   for (const Finding& f : v.findings) {
     if (f.severity == Severity::error) text += ": " + f.message + " [" + f.code + "]";
   }

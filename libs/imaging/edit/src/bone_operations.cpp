@@ -21,7 +21,7 @@ std::string run(const IslandEdit& o, const Image& ct, BitMask& bone, const Conte
   std::array<int, 3> at{};
   if (!voxel_at(ct.frame, {o.at_mm[0], o.at_mm[1], o.at_mm[2]}, at) || !bone.at(at[0], at[1], at[2]))
     return "there is no bone at that point";
-  context.progress(0.1, "finding pieces");
+  context.progress(0.1, "finding components");
   const Components pieces = connected_components(bone.runs(true), bone.dims(), Connectivity::full);
   context.progress(0.8, "marking");
   const std::uint32_t row = static_cast<std::uint32_t>(at[2]) * static_cast<std::uint32_t>(bone.dims()[1]) +
@@ -38,7 +38,7 @@ std::string run(const IslandEdit& o, const Image& ct, BitMask& bone, const Conte
 }
 
 std::string run(const IslandSizeEdit& o, const Image& ct, BitMask& bone, const Context& context) {
-  context.progress(0.1, "finding pieces");
+  context.progress(0.1, "finding components");
   const Components pieces = connected_components(bone.runs(true), bone.dims(), Connectivity::full);
   context.progress(0.8, "marking");
   const std::vector<bool> drop =
@@ -46,7 +46,7 @@ std::string run(const IslandSizeEdit& o, const Image& ct, BitMask& bone, const C
   clear_runs(
       bone, pieces, [&](std::uint32_t c) { return static_cast<bool>(drop[c]); }, false);
   const auto n = std::count(drop.begin(), drop.end(), true);
-  return std::to_string(n) + (n == 1 ? " piece" : " pieces") + " removed, " +
+  return std::to_string(n) + (n == 1 ? " component" : " components") + " removed, " +
          std::to_string(drop.size() - static_cast<std::size_t>(n)) + " left";
 }
 

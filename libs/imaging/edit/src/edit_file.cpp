@@ -137,7 +137,7 @@ EditRecipe parse_edits(std::string_view text, const std::string& name) {
 void apply_edits(EditDocument& document, const EditRecipe& recipe, const Context& context) {
   if (recipe.ct_hash != document.ct_hash()) {
     throw Error(ExitCode::usage, "the edits were made on another CT, or on another region of it, than this one",
-                "take the scan, series, region and offset they were made with, or edit this one anew");
+                "take the scan, series, region and offset they were made with, or edit this one again");
   }
   const bool same_start = document.start_hash() == recipe.start_hash;
   std::size_t vain = 0;

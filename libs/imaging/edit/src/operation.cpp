@@ -26,7 +26,7 @@ void require_colour(const std::vector<int>& rgb) {
 void require_name(const std::string& name) {
   if (name.empty()) throw Error(ExitCode::usage, "a structure needs a name");
   if (name.size() > 64 || name.find_first_of("\n\r\t\\\"") != std::string::npos)
-    throw Error(ExitCode::usage, "the name of a structure has at most 64 letters, no quotes, tabs and line ends");
+    throw Error(ExitCode::usage, "the name of a structure has at most 64 characters, no quotes, tabs and line ends");
 }
 
 struct Check {
@@ -74,8 +74,8 @@ std::string operation_text(const EditOperation& operation) {
       return o.choice == IslandChoice::remove ? "piece removed" : "one piece kept";
     }
     std::string operator()(const IslandSizeEdit& o) const {
-      return o.keep_largest > 0 ? "largest " + std::to_string(o.keep_largest) + " pieces kept"
-                                : "pieces below " + number(o.min_volume_mm3) + " mm3 removed";
+      return o.keep_largest > 0 ? "largest " + std::to_string(o.keep_largest) + " components kept"
+                                : "components below " + number(o.min_volume_mm3) + " mm3 removed";
     }
     std::string operator()(const BoxEdit& o) const {
       return o.choice == BoxChoice::keep_inside ? "kept inside a box" : "box cleared";

@@ -88,7 +88,7 @@ void take_table_off(std::uint8_t* mask, const Image& ct, const ThresholdParams& 
     clear(found.certain);
     if (!found.certain.empty()) {
       said = "taken off: " + volume(found.certain.size()) + " in " + std::to_string(found.pieces) +
-             (found.pieces == 1 ? " piece, " : " pieces, ") + std::to_string(std::lround(found.nearest_mm)) +
+             (found.pieces == 1 ? " component, " : " components, ") + std::to_string(std::lround(found.nearest_mm)) +
              " mm and more from the body";
       context.info("table or head holder " + said + " (--keep-table leaves it on)");
     }

@@ -241,7 +241,7 @@ RawVolume read_nifti(const fs::path& path) {
   if (unit == 1) convert_lengths(raw, 1000, "metres (xyzt_units)");
   if (unit == 3) convert_lengths(raw, 1e-3, "micrometres (xyzt_units)");
   if (unit > 3)
-    fail(path, "its unit of length (xyzt_units " + std::to_string(unit) + ") is none", "save it in millimetres");
+    fail(path, "its unit of length (xyzt_units " + std::to_string(unit) + ") is not known", "save it in millimetres");
   if (std::abs(reader->GetRescaleSlope()) > 0 &&
       (reader->GetRescaleSlope() != 1 || reader->GetRescaleIntercept() != 0)) {
     const double slope = reader->GetRescaleSlope(), intercept = reader->GetRescaleIntercept();

@@ -245,7 +245,7 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
   }
   c.quality = wall > 0 ? backed / wall : 0;
   if (reached_mm3 - tube_mm3 > kMaxBesideMm3 && reached_mm3 > 1.3 * tube_mm3) {
-    c.why = "no drum is seen between the ear canal and the air behind it, so the two cannot be told apart";
+    c.why = "no drum is seen between the ear canal and the air behind it, so the two cannot be distinguished";
   } else if (c.length_mm < 8 || volume < 150) {
     c.why = "the air that goes inward is too short for a canal";
   } else if (c.length_mm > 50 || volume > kMaxCanalMm3) {

@@ -111,7 +111,7 @@ SessionHeader LiveSeat::wait_for_session(double most_s, const Context& context) 
       const std::lock_guard lock(mutex_);
       if (const std::size_t now = guest_.settings_here(); std::exchange(here, now) != now) begin = steady_us();
       if (guest_.state() == JoinState::refused)
-        throw Error(ExitCode::failed, "the host refuses: " + guest_.why(), "ask for the code it shows now");
+        throw Error(ExitCode::failed, "the host rejects: " + guest_.why(), "ask for the code it shows now");
       if (!guest_.settings().empty()) return settings_of(guest_.settings());
     }
     context.check_cancelled();

@@ -22,7 +22,7 @@ void RemoteMonitor::stimulate(const StimulatorSetting& setting) {
 
 std::string RemoteMonitor::trouble() const {
   if (!client_.connected()) return client_.trouble();
-  if (!understood_) return "connected; it has not told of a nerve monitor";
+  if (!understood_) return "connected; it has not announced a nerve monitor";
   if (link_) {
     const StimulatorLink::State s = link_->state();
     if (!s.paired)

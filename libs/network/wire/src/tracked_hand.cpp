@@ -18,7 +18,7 @@ TrackerAddress tracker_address(const std::string& text) {
   const std::size_t slash = text.find('/');
   if (slash != std::string::npos) t.tool = text.substr(slash + 1);
   if (t.tool.size() > 20)
-    throw Error(ExitCode::usage, "'" + t.tool + "' is longer than OpenIGTLink's names", "at most 20 letters");
+    throw Error(ExitCode::usage, "'" + t.tool + "' is longer than OpenIGTLink's names", "at most 20 characters");
   t.server = wire_address(text.substr(0, slash));
   if (t.server.port == 0)
     throw Error(ExitCode::usage, "'" + text + "' names no port",

@@ -119,7 +119,7 @@ struct GuidePart {
 };
 
 struct SplitPart {
-  static constexpr const char *kName = "split", *kHelp = "take apart what does not hang together";
+  static constexpr const char *kName = "split", *kHelp = "separate what is not connected";
   double least_mm3 = 50;
   static void describe(SplitPart& p, auto& visit) {
     visit({"least_mm3", "what is smaller becomes dust", "mm3", 0, 1e6}, p.least_mm3);
@@ -190,7 +190,7 @@ struct Open {
 };
 
 struct Suction {
-  static constexpr const char *kName = "suction", *kHelp = "a sucker, until the next of these";
+  static constexpr const char *kName = "suction", *kHelp = "a suction tube, until the next of these";
   Triple at_mm{};
   double radius_mm = 4, mm3_per_s = 60, over_s = 0;
   static void describe(Suction& p, auto& visit) {

@@ -286,7 +286,7 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   h.rate_hz = j.at("rate_hz");
   h.dust = j.value("dust", false);
   h.dust_model = j.value("dust_model", 1);
-  if (!(h.rate_hz > 0)) throw Error(ExitCode::corrupt, name + " tells of no rate");
+  if (!(h.rate_hz > 0)) throw Error(ExitCode::corrupt, name + " gives no rate");
   const auto& k = j.at("kernels");
   h.kernels = {k.at("burrs"), k.at("contact"), k.at("scene")};
   Kernels repeated = h.kernels;

@@ -371,7 +371,7 @@ bool SessionReader::Parts::State::next_of_frame() {
         lines.remove_prefix(std::min(length + 1, lines.size()));
         if (!j.is_object() || !j.contains("value") || !j.contains("kind") || !j["kind"].is_string() ||
             !j.contains("tick") || !j["tick"].is_number_unsigned())
-          file.broken(*entry, "it holds a note that is none");
+          file.broken(*entry, "it holds a note that is not valid");
         notes.push_back(
             {j["tick"], j["kind"], j["value"].dump(-1, ' ', false, ordered_json::error_handler_t::replace)});
       }

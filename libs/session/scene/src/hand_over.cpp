@@ -200,10 +200,11 @@ class Taker {
                   "take it back into the case that was handed over");
     }
     if (!options_.match_by_position || bone_ == nullptr) {
-      throw Error(ExitCode::corrupt,
-                  "nothing tells of which scan these segments are: they bear no mark, and no ct.nrrd lies beside them",
-                  "put the ct.nrrd of 'osteo export-slicer' beside them, or give --match-by-position, which goes by "
-                  "where the bone lies");
+      throw Error(
+          ExitCode::corrupt,
+          "it is not known of which scan these segments are: they bear no mark, and no ct.nrrd lies beside them",
+          "put the ct.nrrd of 'osteo export-slicer' beside them, or give --match-by-position, which goes by "
+          "where the bone lies");
     }
   }
 

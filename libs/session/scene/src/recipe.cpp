@@ -105,7 +105,7 @@ std::optional<Recipe> read_recipe(const fs::path& case_folder) {
     });
     return r;
   } catch (const Error& e) {
-    throw Error(e.code(), e.what(), "make the case anew, with --fresh and all its flags");
+    throw Error(e.code(), e.what(), "make the case again, with --fresh and all its flags");
   }
 }
 

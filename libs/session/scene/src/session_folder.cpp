@@ -161,7 +161,7 @@ World until_end(const SessionFolder& session, World world, const Context& contex
     // It changes voxels of pieces that came to be while nothing was recorded.
   }
   context.warn("the session '" + session.folder.string() + "': what it did from tick " +
-               std::to_string(lost->first_tick) + " on cannot be used; the bone is as it was before");
+               std::to_string(lost->first_tick) + " on cannot be used; the bone is the one before");
   apply_recorded_until(recorded, before, lost->first_tick);
   return before;
 }
@@ -206,7 +206,7 @@ Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& cont
   }
   if (*setup.hardness) {
     if (hu == the_case.files.end()) {
-      throw Error(ExitCode::no_input, "the case keeps no HU, so that nothing tells how hard its bone is",
+      throw Error(ExitCode::no_input, "the case keeps no HU, so that the hardness of its bone is not known",
                   "set \"hardness\" to false, or prepare the case with its hu.vdb");
     }
     if (setup.hardness_json.empty()) setup.hardness_json = default_hardness_json();

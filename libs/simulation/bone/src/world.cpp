@@ -354,7 +354,7 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       if (opening != a.values[0]) effect.message = "opened to " + format_number(opening) + " mm: it goes no further";
       const std::vector<std::uint32_t> group = joined_to(fixture->other, fixture->id);
       if (std::find(group.begin(), group.end(), fixture->body) != group.end())
-        return nothing("another plate holds the two pieces together");
+        return nothing("another plate holds the two fragments together");
       const Vec3 along = (find(fixture->body)->world_from_body * fixture->body_from_plate).rotation.column[0];
       move_group(group, {Mat3{}, along * (opening - fixture->opening_mm)});
       fixture->opening_mm = opening;
@@ -406,7 +406,7 @@ World::Effect World::saw(const SceneAction& a) {
 
 World::Effect World::split(const SceneAction& a, const ComponentsOf& components) {
   if (std::any_of(bodies_.begin(), bodies_.end(), [](const PlacedBody& b) { return b.of_region; }))
-    return nothing("bone with a region of interest is not taken apart");
+    return nothing("bone with a region of interest is not separated");
   Effect effect;
   Done before = snapshot(ActionKind::split);
   // What is given out stays given only when all goes well.
@@ -436,7 +436,7 @@ World::Effect World::split(const SceneAction& a, const ComponentsOf& components)
     for (std::size_t p = 1; p < split.pieces.size(); ++p) {
       Piece& piece = split.pieces[p];
       if (too_many_bricks(next_brick + piece.bone.brick_count()))
-        return nothing("too many pieces: no names are left for their voxels");
+        return nothing("too many fragments: no names are left for their voxels");
       auto body = std::make_shared<Body>(Body{next_body++, next_brick, std::move(piece.bone), nullptr});
       next_brick += static_cast<std::uint32_t>(body->bone.brick_count());
       if (placed.body->hardness)
@@ -446,7 +446,7 @@ World::Effect World::split(const SceneAction& a, const ComponentsOf& components)
       made.push_back({std::move(body), placed.world_from_body, false});
     }
   }
-  if (effect.changed.empty()) return nothing("the bone hangs together");
+  if (effect.changed.empty()) return nothing("the bone is connected");
   bodies_ = std::move(bodies);
   bodies_.insert(bodies_.end(), made.begin(), made.end());
   next_body_ = next_body;

@@ -210,7 +210,8 @@ MeasuredDevice measure_device(Device& device, double dt_s, const std::function<v
     m.traits.encoder_mm = std::max(by_driver.encoder_mm, loop.step_mm());
     m.told = "the device answers after " + ms(m.traits.delay_s) + " (its driver says " + ms(by_driver.delay_s) +
              "), damps by " + format_number(std::round(100 * m.traits.damping_n_s_per_m) / 100) +
-             " N s/m at least and tells steps of " + format_number(std::round(1e4 * m.traits.encoder_mm) / 10) + " um";
+             " N s/m at least and reports steps of " + format_number(std::round(1e4 * m.traits.encoder_mm) / 10) +
+             " um";
   } else {
     m.traits.delay_s += kUnmeasuredDelayS;
     const char* const why = loop.silent()               ? "it is silent"

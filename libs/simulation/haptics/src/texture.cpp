@@ -85,7 +85,7 @@ TextureModel parse_texture(std::string_view text, const std::string& name) {
       const JsonValue& v = file.need(m, where, key);
       const double at = file.number(v, where + ": \"" + key + "\"");
       const auto found = std::find(values.begin(), values.end(), at);
-      if (found == values.end()) throw file.wrong(v, where + ": \"" + key + "\" is none of those at the top");
+      if (found == values.end()) throw file.wrong(v, where + ": \"" + key + "\" is not one of those at the top");
       return static_cast<std::size_t>(found - values.begin());
     };
     const std::size_t at = place("force_n", t.forces_n) * t.speeds_mm_s.size() + place("speed_mm_s", t.speeds_mm_s);

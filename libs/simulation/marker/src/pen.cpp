@@ -98,7 +98,7 @@ PivotFit fit_pivot(std::span<const RigidTransform> all, double most_rms_mm) {
   const double tilt_deg = std::acos(std::clamp(least, -1.0, 1.0)) * 180 / std::numbers::pi;
   char text[200];
   if (tilt_deg < kMinTiltDeg) {
-    std::snprintf(text, sizeof text, "the pen was tilted by %.0f degrees only; its tip cannot be told from that",
+    std::snprintf(text, sizeof text, "the pen was tilted by %.0f degrees only; its tip cannot be found from that",
                   tilt_deg);
     throw Error(ExitCode::failed, text, "keep the tip in a small dent and lean the pen by 30 degrees to all sides");
   }

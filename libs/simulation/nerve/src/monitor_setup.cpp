@@ -66,7 +66,7 @@ MonitoredNerve read_nerve(const JsonFile& file, const JsonValue& object, const s
     const JsonValue& name = file.need(c, where, "name");
     channel.name = file.text(name, "\"name\"");
     if (channel.name.empty() || channel.name.size() > 64)
-      throw file.wrong(name, "a channel's name has 1 to 64 letters");
+      throw file.wrong(name, "a channel's name has 1 to 64 characters");
     channel.evoked_uv = file.number(file.need(c, channel.name, "evoked_uv"), "\"evoked_uv\"", 0, 8000);
     channel.latency_ms = file.number(file.need(c, channel.name, "latency_ms"), "\"latency_ms\"", 0.5, 30);
     channel.share = file.number(file.need(c, channel.name, "share"), "\"share\"", 0, 1);

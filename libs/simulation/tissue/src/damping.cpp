@@ -383,7 +383,8 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
     if (!fit.measured.swings)
       throw Error(
           ExitCode::usage,
-          "what was measured does not swing (or not above its noise): damping and stiffness cannot be told from each "
+          "what was measured does not swing (or not above its noise): damping and stiffness cannot be separated from "
+          "each "
           "other",
           "if the stiffness is known, leave it as it is: --no-fit-stiffness; else measure something that swings");
     if (fit.measured.hz * fit.span_s < kMinSwings)

@@ -65,7 +65,7 @@ FemBody::FemBody(std::span<const Vec3> points, std::span<const std::array<std::u
     const double six = dot(d[0], cross(d[1], d[2]));
     if (!(six > 0))
       throw Error(ExitCode::corrupt, "tetrahedron " + std::to_string(t) + " has no volume, or is inside out",
-                  "mesh-info tells of all of them");
+                  "mesh-info lists all of them");
     Vec3 corner[4];  // gradients of the barycentric coordinates
     corner[1] = cross(d[1], d[2]) / six;
     corner[2] = cross(d[2], d[0]) / six;

@@ -124,7 +124,8 @@ MeasuredMotion read_motion(std::string_view text, const std::string& name, std::
     if (of_point) {
       const int given = csv.whole(row, *of_point);
       if (given < 0 || static_cast<std::uint32_t>(given) >= points)
-        throw csv.wrong(row.line, "point " + std::to_string(given) + " is none of the mesh's " + std::to_string(points),
+        throw csv.wrong(row.line,
+                        "point " + std::to_string(given) + " is not one of the mesh's " + std::to_string(points),
                         "points are numbered from 0");
       p = static_cast<std::uint32_t>(given);
     }

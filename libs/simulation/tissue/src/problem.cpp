@@ -15,7 +15,7 @@ using Place = std::function<bool(Vec3)>;
 using Names = std::vector<std::string>;
 
 constexpr double kFarMm = 1e6;
-constexpr const char* kWhere = "places are LPS mm; mesh-info tells where the mesh is";
+constexpr const char* kWhere = "places are LPS mm; mesh-info shows where the mesh is";
 
 Material material_of(const JsonFile& file, const JsonValue& at, const std::string& where) {
   // Finite elements bear any ratio between -1 and a half; the fast model asks for more and says so itself.

@@ -22,8 +22,8 @@ enum class ProcedureRole : int {
   return {"expose", "keep", "thin", "never_touch", "enter"};
 }
 
-/// What an item of the scale asks of the final product. What each computes: docs/validation/evidence.md, and the fields of
-/// ScaleItem.
+/// What an item of the scale asks of the final product. What each computes: docs/validation/evidence.md, and the fields
+/// of ScaleItem.
 enum class ItemKind : int {
   exposed,
   not_violated,
@@ -139,11 +139,12 @@ struct ScaleItem {
     visit({"within_deg", "and at most so far off", "deg", 1, 180}, p.within_deg);
     visit({"within_mm", "how far around the structure one looks", "mm", 0.5, 8}, p.within_mm);
     visit({"cover_mm", "what still counts as shown: bone between it and the cavity", "mm", 0, 8}, p.cover_mm);
-    visit({"threshold", "the item's value has to reach it, or stay below it; see docs/validation/evidence.md for each kind", "", 0,
+    visit({"threshold",
+           "the item's value has to reach it, or stay below it; see docs/validation/evidence.md for each kind", "", 0,
            1e6},
           p.threshold);
-    visit({"most", "thinned: 90 % of the wall is at most so thick; margin: not beyond; pieces: at most so many", "", 0,
-           1e6},
+    visit({"most", "thinned: 90 % of the wall is at most so thick; margin: not beyond; fragments: at most so many", "",
+           0, 1e6},
           p.most);
     visit({"spread", "spread of the value among good results: the unit of the margin", "", 1e-6, 1e6}, p.spread);
   }

@@ -33,12 +33,12 @@ inline constexpr ExitCodeDoc exit_code_table[] = {
     {ExitCode::usage, "usage", "the command line or a pipeline file asks for something that does not exist"},
     {ExitCode::no_input, "no_input", "the input does not exist or holds nothing that can be used"},
     {ExitCode::corrupt, "corrupt",
-     "the input is damaged, of a kind that is not supported, or a scan that is refused (its verdict says why)"},
+     "the input is damaged, of a kind that is not supported, or a scan that is rejected (its verdict says why)"},
     {ExitCode::cannot_read, "cannot_read", "the input exists but may not be read"},
     {ExitCode::cannot_write, "cannot_write", "the output cannot be written, or exists already"},
     {ExitCode::failed, "failed", "the method failed or its result is not valid; the input could be read"},
     {ExitCode::partial, "partial",
-     "part of it could not be done: some cases of a batch failed, actions of a script were refused, or ticks of a "
+     "part of it could not be done: some cases of a batch failed, actions of a script were rejected, or ticks of a "
      "session were not "
      "recorded"},
     {ExitCode::resources, "resources", "out of memory or time"},

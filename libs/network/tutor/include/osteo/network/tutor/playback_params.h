@@ -48,15 +48,15 @@ struct PlaybackParams {
            "it goes; amplify: "
            "pushed away from the way; graphics: the way is drawn, and nothing else"},
           p.mode);
+    visit({"drills",
+           "whose burr takes bone away; usual: the expert's in show, feel and guide, so that bone is as recorded"},
+          p.drills);
     visit(
-        {"drills",
-         "whose burr takes bone away; usual: the expert's in show, feel and guide, so that bone is as it was recorded"},
-        p.drills);
-    visit({"pace",
-           "clock: as it was recorded, but who is led and farther away than the leash is waited for; way: time waits "
-           "and goes back with who "
-           "learns; usual: clock in show and feel"},
-          p.pace);
+        {"pace",
+         "clock: as recorded, but who is led and farther away than the tolerance radius is waited for; way: time waits "
+         "and goes back with who "
+         "learns; usual: clock in show and feel"},
+        p.pace);
     visit({"stiffness_n_per_mm", "stiffness of the spring to the expert's hand, lowered where the device bears less",
            "N/mm", 0, 10},
           p.stiffness_n_per_mm);

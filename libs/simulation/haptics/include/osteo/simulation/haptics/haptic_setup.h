@@ -34,7 +34,7 @@ struct EffectParams {
           p.fail_safe);
     visit({"drag", "pull of the teeth along the surface, for each newton pressed, at the equator (a guess)", "", 0, 2},
           p.drag);
-    visit({"left_handed", "the burr turns the other way"}, p.left_handed);
+    visit({"left_handed", "the burr rotates the other way"}, p.left_handed);
     visit({"speed_rpm", "speed of the burr with the pedal down; removal is in proportion", "rpm", 0, 200000},
           p.speed_rpm);
     visit({"spin_up_s", "time constant with which the burr's speed follows the pedal upwards (a guess)", "s", 0, 10},

@@ -34,7 +34,8 @@ enum class MetricWhen {
   regions,        ///< a reference with experts and novices
 };
 
-/// The declaration of a metric: all that lines, columns, JSON and the table in docs/validation/evidence.md need to know of it.
+/// The declaration of a metric: all that lines, columns, JSON and the table in docs/validation/evidence.md need to know
+/// of it.
 struct MetricRow {
   std::string_view name;  ///< lower case; unit at its end where it has one
   std::string_view unit;  ///< "1": a share or a count
@@ -54,14 +55,14 @@ inline constexpr std::string_view kThesis351 = "Morris 2006, 3.5.1", kThesis352 
                                   kSmooth = "Balasubramanian 2015", kHeat = "docs/validation/heat.md";
 
 // A new metric: a row here, its value where its place computes it, a row in tests/unit/evidence/metric_table_test.cpp,
-// and the table in docs/validation/evidence.md as metric_table_markdown() has it. All but the first fail to compile or fail a test
-// where they are forgotten.
+// and the table in docs/validation/evidence.md as metric_table_markdown() has it. All but the first fail to compile or
+// fail a test where they are forgotten.
 inline constexpr MetricRow kRows[] = {
     {"duration_s", "s", kDown, "", MetricPlace::process, MetricWhen::always, kProcess,
      "time that is known of the session"},
     {"lost_s", "s", kDown, "", MetricPlace::process, MetricWhen::some, kOurs, "time that was not recorded"},
     {"drilling_s", "s", kNone, "", MetricPlace::process, MetricWhen::always, kProcess,
-     "a burr turns (over 1000 rpm) and presses on bone; each hand's counts"},
+     "a burr rotates (over 1000 rpm) and presses on bone; each hand's counts"},
     {"idle_s", "s", kDown, "", MetricPlace::process, MetricWhen::always, kOurs,
      "no pedal down and no hand faster than 2 mm/s (means of a tenth of a second), for a second or longer"},
     {"removed_mm3", "mm3", kNone, "", MetricPlace::process, MetricWhen::always, kProcess,
@@ -88,7 +89,7 @@ inline constexpr MetricRow kRows[] = {
     {"force_peak_n", "N", kDown, "", MetricPlace::process, MetricWhen::drilling, kProcess,
      "burr on bone while drilling, the most"},
     {"suction_share", "1", kUp, "", MetricPlace::process, MetricWhen::drilling, kProcess,
-     "of drilling, with a sucker at work"},
+     "of drilling, with a suction tube at work"},
     {"irrigation_share", "1", kUp, "", MetricPlace::process, MetricWhen::drilling, kProcess, "of drilling, with water"},
     {"burr_side_share", "1", kUp, "", MetricPlace::process, MetricWhen::drilling, kProcess,
      "of drilling, the shaft 30 to 90 degrees off the force: the burr's side works"},

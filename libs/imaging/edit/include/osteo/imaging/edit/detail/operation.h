@@ -55,7 +55,7 @@ struct IslandSizeEdit {
   double min_volume_mm3 = 10;
   int keep_largest = 0;
   static void describe(IslandSizeEdit& p, auto& visit) {
-    visit({"min_volume_mm3", "smaller pieces go", "mm3", 0, 1e9}, p.min_volume_mm3);
+    visit({"min_volume_mm3", "smaller components go", "mm3", 0, 1e9}, p.min_volume_mm3);
     visit({"keep_largest", "only so many of the largest stay (0: all)", "", 0, 1000000}, p.keep_largest);
   }
 };
