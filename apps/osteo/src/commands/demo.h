@@ -14,7 +14,7 @@ struct DemoCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder for everything that is made"}, p.out);
-    visit({"seconds", "seconds of drilling", "s", 1, 3600}, p.seconds);
+    visit({"seconds", "seconds of drilling on a CT of your own", "s", 1, 3600}, p.seconds);
     visit({"axes", "where the index axes point, for files that do not know: three letters like LPI"}, p.axes);
   }
   static cli::CommandInfo info();
