@@ -3,8 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <nlohmann/json.hpp>
 #include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "osteo/app/cli/command.h"
@@ -215,6 +216,49 @@ TEST(AllStages, NoFlagHidesACommonOne) {
     }
     for (const Port& p : stage->info().inputs) EXPECT_FALSE(own.contains(p.name)) << name << " " << p.name;
   }
+}
+
+TEST(Cli, ADocumentGoesToAPipeAndAMeshSaysWhyNot) {
+  const auto said = [](std::vector<std::string> args) {
+    cli::Program program;
+    program.registry = osteo_stages();
+    args.insert(args.begin(), "osteo");
+    std::vector<char*> argv;
+    for (auto& a : args) argv.push_back(a.data());
+    std::ostringstream out, err;
+    Said s;
+    s.code = cli::run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
+    s.out = out.str();
+    s.err = err.str();
+    return s;
+  };
+  const Folder at;
+  const std::string curve = (at.path() / "c.csv").string(), path = (at.path() / "p.csv").string();
+  std::ofstream(curve) << "0 0 0\n10 0 0\n";
+  std::ofstream(path) << "1 1 0\n9 1 0\n";
+  const Said file = said({"virtual-fixture", curve, path, (at.path() / "a.json").string()});
+  ASSERT_EQ(file.code, 0) << file.err;
+  const Said pipe = said({"virtual-fixture", curve, path, "-"});
+  ASSERT_EQ(pipe.code, 0) << pipe.err;
+  EXPECT_EQ(pipe.out, read_text(at.path() / "a.json"));
+
+  std::istringstream from("1 1 0\n9 1 0\n");
+  std::streambuf* const own = std::cin.rdbuf(from.rdbuf());
+  const Said through = said({"virtual-fixture", curve, "-", "-"});
+  std::istringstream two("0 0 0\n10 0 0\n");
+  std::cin.rdbuf(two.rdbuf());
+  const Said twice = said({"virtual-fixture", "-", "-", "-"});
+  std::cin.rdbuf(own);
+  EXPECT_EQ(through.out, pipe.out) << through.err;
+  EXPECT_NE(twice.err.find("one standard input"), std::string::npos) << twice.err;
+  EXPECT_NE(said({"virtual-fixture", curve, path, "-", "--json"}).err.find("both want standard output"),
+            std::string::npos);
+  const Said mesh = said({"mesh-repair", "in.ply", "-"});
+  EXPECT_EQ(mesh.code, 2);
+  EXPECT_NE(mesh.err.find("cannot go through a pipe"), std::string::npos) << mesh.err;
+  const Said volume = said({"threshold", "-", "m.nrrd"});
+  EXPECT_EQ(volume.code, 2);
+  EXPECT_NE(volume.err.find("cannot come through a pipe"), std::string::npos) << volume.err;
 }
 
 // Of version 0.1: still accepted, said, and never a name that is in use.

@@ -14,6 +14,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/simd.h"
 #include "osteo/imaging/pipeline/pipeline.h"
+#include "pipes.h"
 #include "progress.h"
 
 namespace osteo::inline app::cli {
@@ -152,33 +153,43 @@ int run_stage(const Registry& registry, Stage& stage, const std::vector<std::str
   }
   ready();
   for (const std::string& text : parsed.renamed) invocation.context.info(text);
+  Pipes pipes;
+  const auto read_from = [&](const Port& p, const std::string& file) {
+    return file == "-" ? pipes.input(p, std::cin) : fs::path(file);
+  };
+  const auto write_to = [&](const Port& p, const std::string& file) {
+    return file == "-" ? pipes.output(p) : fs::path(file);
+  };
   // The same code path as a pipeline file with one node.
   PipelineNode node;
   node.id = node.stage = info.name;
   std::size_t next = 0;
   for (const Port& p : info.inputs) {
     if (!p.optional) {
-      node.inputs[p.name].file = parsed.positionals[next++];
+      node.inputs[p.name].file = read_from(p, parsed.positionals[next++]);
     } else if (const auto it = parsed.files.find(p.name); it != parsed.files.end()) {
-      node.inputs[p.name].file = it->second;
+      node.inputs[p.name].file = read_from(p, it->second);
     }
   }
   for (const Port& p : info.outputs) {
     if (!p.optional) {
-      node.outputs[p.name] = parsed.positionals[next++];
+      node.outputs[p.name] = write_to(p, parsed.positionals[next++]);
     } else if (const auto it = parsed.files.find(p.name + "-out"); it != parsed.files.end()) {
-      node.outputs[p.name] = it->second;
+      node.outputs[p.name] = write_to(p, it->second);
     } else if (!p.beside.empty()) {
       fs::path first = node.outputs[info.outputs.front().name];
       if (first.filename().empty()) first = first.parent_path();
       node.outputs[p.name] = first += p.beside;
     }
   }
+  if (pipes.writes() && common.json)
+    throw Error(ExitCode::usage, "an output '-' and --json both want standard output", "give one of them");
   for (const FieldRef& f : stage.fields()) node.params[std::string(f.doc.name)] = f.to_text();
   const auto results =
       run_pipeline({info.name, "", {node}}, registry, {.overwrite = common.force, .reuse = false}, invocation.context);
   invocation.end_progress();
-  print_results(results, invocation);
+  pipes.flush(invocation.out);
+  if (!pipes.writes()) print_results(results, invocation);
   return 0;
 }
 
