@@ -10,7 +10,7 @@
 namespace osteo {
 
 /// Words for session.json: mode, who drills, pace.
-inline std::string guided_words(const PlaybackParams& p) {
+inline std::string guided_text(const PlaybackParams& p) {
   return "led by a recorded session: " +
          std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(p.mode)]) + ", " +
          (expert_drills(p) ? "the recorded burr drills" : "the learner's burr drills") + ", time goes " +
@@ -24,7 +24,7 @@ inline World world_of_lesson(const SessionFolder& lesson, double from_s, const C
                     : world_at_begin(lesson, the_case, anatomy, context);
 }
 
-inline std::string facts_words(const GuidedFacts& f) {
+inline std::string facts_text(const GuidedFacts& f) {
   const auto n = [](double x) { return format_number(std::round(x * 1000) / 1000); };
   return "hand beside the recorded one: RMS " + n(f.rms_mm) + " mm, 95 % within " + n(f.p95_mm) + " mm, at most " +
          n(f.most_mm) + " mm; led with at most " + n(f.most_pull_n) + " N; work of the guide on the hand " +
@@ -33,7 +33,7 @@ inline std::string facts_words(const GuidedFacts& f) {
 
 inline Json guided_json(const PlaybackParams& params, const GuidedFacts& f, const Playback& playback) {
   PlaybackParams copy = params;
-  Json j{{"osteotome_playback", 1}, {"words", guided_words(params)}};
+  Json j{{"osteotome_playback", 1}, {"words", guided_text(params)}};
   j["params"] = Json::object();
   for (const FieldRef& field : fields_of<PlaybackParams>(copy))
     j["params"][std::string(field.doc.name)] = field.to_text();

@@ -24,7 +24,8 @@ std::string name_of() {
   return py::str(py::dtype::of<T>());
 }
 
-/// Takes the voxels of `array` as they lie. Another type or order of memory is refused: a copy is the caller's to make.
+/// Takes the voxels of `array` as they lie. Another type or order of memory is rejected: a copy is the caller's to
+/// make.
 template <class T, class V>
 V volume_of(const py::array& array, std::array<double, 3> spacing_mm, std::array<double, 3> origin_mm, Rows direction) {
   const std::string name = name_of<T>();

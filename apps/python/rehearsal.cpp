@@ -187,8 +187,8 @@ class Stepped {
                       "use larger voxels");
         while (reader_->changes.pop(scratch_) > 0) {
         }
-        SceneAction told;
-        while (reader_->actions.pop({&told, 1}) > 0) {
+        SceneAction reported;
+        while (reader_->actions.pop({&reported, 1}) > 0) {
         }
         if (i % 256 == 255) {
           const py::gil_scoped_acquire gil;

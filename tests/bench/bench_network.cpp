@@ -41,8 +41,8 @@ struct Socket {
   }
 };
 
-int port_in(const std::string& told) {
-  return std::stoi(told.substr(told.find("port ") + 5));
+int port_in(const std::string& reported) {
+  return std::stoi(reported.substr(reported.find("port ") + 5));
 }
 
 // False: there is no liblsl.
@@ -85,7 +85,7 @@ bool row(Listed listed, double seconds) {
   std::optional<bench::Flood> flood;
   r.start();
   constexpr double kRate = 100'000;
-  if (listed == Listed::igtl) crowd.emplace(port_in(stream->feed().told().front()), 8, kRate, kinds);
+  if (listed == Listed::igtl) crowd.emplace(port_in(stream->feed().reported().front()), 8, kRate, kinds);
   if (listed == Listed::cerebus) flood.emplace(listener.sender(), kRate, kinds);
   if (listed == Listed::lsl) flood.emplace(16572, kRate, kinds);
   while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(20));

@@ -58,10 +58,10 @@ void latency(const BrickGrid& bone, const Context& context) {
       Stream stream;
       StreamReader& reader = stream.add_reader();
       Operation operation(World(BrickGrid(bone)), setup, {}, device, stream, 1000);
-      ReaderHub hub(reader, operation.world());
+      ReaderDispatcher dispatcher(reader, operation.world());
       SceneReaders readers(operation.world(), parts, 1000, context);
-      readers.add_to(hub);
-      hub.add(operation.strokes(), false);
+      readers.add_to(dispatcher);
+      dispatcher.add(operation.strokes(), false);
       std::vector<std::atomic<std::int64_t>> published(20000);
       FixedRateLoop loop(1000, [&](std::int64_t late) {
         const std::uint64_t t = operation.ticks();
@@ -75,7 +75,7 @@ void latency(const BrickGrid& bone, const Context& context) {
       StreamReader& watch = stream.add_reader(1 << 15, 1 << 22);
       loop.start();
       while (loop.running() || seen < operation.ticks()) {
-        const std::size_t n = hub.drain();
+        const std::size_t n = dispatcher.drain();
         const std::int64_t now = monotonic_ns();
         for (std::uint64_t t = seen; t < seen + n; ++t) {
           TickRecord r;

@@ -1,4 +1,5 @@
-// What it costs to keep the score of a session, and to judge what it left: what docs/validation/evidence.md holds. Not a test.
+// What it costs to keep the score of a session, and to judge what it left: what docs/validation/evidence.md holds. Not
+// a test.
 //   build/release/bin/score_bench SESSION PROCEDURE
 // Processor time, so that it tells the same on a machine that is busy otherwise; the best of three.
 #include <ctime>
@@ -48,7 +49,7 @@ int main(int argc, char** argv) {
       double in_keeper = 0, in_hints = 0;
       std::uint64_t ticks = 0;
       t = cpu_s(CLOCK_THREAD_CPUTIME_ID);
-      const World end = tell_frames(session, begin.copy(), [&](const EvidenceFrame& f) {
+      const World end = report_frames(session, begin.copy(), [&](const EvidenceFrame& f) {
         const double a = cpu_s(CLOCK_THREAD_CPUTIME_ID);
         keeper.frame(f);
         const double b = cpu_s(CLOCK_THREAD_CPUTIME_ID);

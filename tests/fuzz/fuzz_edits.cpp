@@ -1,4 +1,4 @@
-// Corrections by hand: read, and done on a small CT, they are refused or leave a state that can be saved and undone.
+// Corrections by hand: read, and done on a small CT, they are rejected or leave a state that can be saved and undone.
 #include <cstdlib>
 #include <string_view>
 

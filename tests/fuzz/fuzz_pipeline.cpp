@@ -1,4 +1,4 @@
-// Pipeline files: any text is read or refused with an Error.
+// Pipeline files: any text is read or rejected with an Error.
 #include <cstdint>
 #include <string_view>
 

@@ -95,12 +95,12 @@ int main(int argc, char** argv) {
     ::usleep(1500 + static_cast<unsigned>(random()) % 15000);
     ::kill(child, SIGKILL);
     ::waitpid(child, nullptr, 0);
-    const std::uint64_t told = written->load();
-    if (told == 0) continue;
+    const std::uint64_t reported = written->load();
+    if (reported == 0) continue;
     const osteo::Session session = osteo::read_session(path);
-    if (session.ticks.size() < told || session.end) {
-      std::printf("kill %d: %llu records were acknowledged, %zu are there\n", k, static_cast<unsigned long long>(told),
-                  session.ticks.size());
+    if (session.ticks.size() < reported || session.end) {
+      std::printf("kill %d: %llu records were acknowledged, %zu are there\n", k,
+                  static_cast<unsigned long long>(reported), session.ticks.size());
       return 1;
     }
     for (std::size_t t = 0; t < session.ticks.size(); ++t) {
@@ -109,7 +109,7 @@ int main(int argc, char** argv) {
         return 1;
       }
     }
-    acknowledged += told;
+    acknowledged += reported;
     recovered += session.ticks.size();
     // A frame cut in the middle leaves bytes behind the last whole one.
     torn += session.torn_bytes > 0 ? 1 : 0;

@@ -51,7 +51,7 @@ inline Labels start_of(const Image& ct, double lower_hu) {
   return out;
 }
 
-/// One thing that a person might do; with `history` also undo and redo. What is refused is no error here.
+/// One thing that a person might do; with `history` also undo and redo. What is rejected is no error here.
 inline void random_action(EditDocument& d, std::mt19937& random, bool history = true) {
   const Frame& f = d.ct().frame;
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };

@@ -35,17 +35,17 @@ struct ConsoleWindowCommand {
     shown.scale = p.scale;
     WindowShell shell(shown);
     std::mutex mutex;
-    std::shared_ptr<MonitorDesk> desk;  // the network's thread makes it, the window's shows it
-    RemoteMonitor* there = nullptr;     // of the window's thread
+    std::shared_ptr<MonitorController> controller;  // the network's thread makes it, the window's shows it
+    RemoteMonitor* there = nullptr;                 // of the window's thread
     const auto begin = [&](const WireMonitor& monitor) {
-      auto made = std::make_shared<MonitorDesk>(monitor.labels, monitor.event_uv);
+      auto made = std::make_shared<MonitorController>(monitor.labels, monitor.event_uv);
       if (!code.empty()) {
         made->lend({[&] { return there != nullptr && there->stimulator().paired; },
                     [&](const StimulatorSetting& s) { there->stimulate(s); }, [&] { return there->stimulator().now; },
                     [&] { return std::size_t{there->stimulator().hands}; }});
       }
       const std::lock_guard lock(mutex);
-      desk = made;
+      controller = made;
       return made->sinks();
     };
     RemoteMonitor remote(server, begin, code);
@@ -54,9 +54,9 @@ struct ConsoleWindowCommand {
     options.server = server.host + ":" + std::to_string(server.port);
     options.state_file = p.state_file;
     options.sound = p.sound;
-    options.desk = [&] {
+    options.controller = [&] {
       const std::lock_guard lock(mutex);
-      return desk;
+      return controller;
     };
     options.facts = [&] {
       return ConsoleFacts{remote.connected(), remote.ended(),  remote.samples(),

@@ -105,14 +105,14 @@ struct ExperimentWindowCommand {
     const Mover mover = p.device == ExperimentDevice::mouse  ? Mover::mouse
                         : p.device == ExperimentDevice::keys ? Mover::keys
                                                              : Mover::device;
-    ForceSkillDesk desk(folder, protocol, who, p.retention, mover,
-                        std::string(EnumNames<ExperimentDevice>::values[static_cast<std::size_t>(p.device)]),
-                        device->traits());
+    ForceSkillController controller(
+        folder, protocol, who, p.retention, mover,
+        std::string(EnumNames<ExperimentDevice>::values[static_cast<std::size_t>(p.device)]), device->traits());
     Vec3 force;
     std::uint64_t tick = 0;
     const double dt = 1 / protocol.rate_hz;
     FixedRateLoop loop(protocol.rate_hz, [&](std::int64_t) {
-      force = desk.step(device->read(tick++, dt, force));
+      force = controller.step(device->read(tick++, dt, force));
       device->feel(force, {}, 0);
       return true;
     });
@@ -125,7 +125,7 @@ struct ExperimentWindowCommand {
     options.state_file = p.state_file;
     int gl_errors = 0;
     try {
-      gl_errors = run_experiment_window(desk, pressed, options, io.context);
+      gl_errors = run_experiment_window(controller, pressed, options, io.context);
     } catch (...) {
       loop.request_stop();
       loop.join();
@@ -135,8 +135,8 @@ struct ExperimentWindowCommand {
     loop.join();
     if (const std::string trouble = device->trouble(); !trouble.empty() && !io.common.quiet) io.err << trouble << '\n';
     if (!io.common.quiet)
-      io.err << p.participant << ": " << desk.done() << " of " << desk.trials() << " trials are done"
-             << (desk.done() < desk.trials() ? "; the same command goes on there" : "") << '\n';
+      io.err << p.participant << ": " << controller.done() << " of " << controller.trials() << " trials are done"
+             << (controller.done() < controller.trials() ? "; the same command goes on there" : "") << '\n';
     require_no_gl_errors(gl_errors);
     return 0;
   }

@@ -75,11 +75,12 @@ void draw_force_axis(double pressed_n, double most_n, bool keys, float width, fl
 }
 
 // What was to be pressed and what was, over time, with axes in newtons and seconds.
-void draw_feedback(const experiment::ForceSkillDesk& desk, float width, float height) {
-  const auto [target, applied] = desk.last_training();
+void draw_feedback(const experiment::ForceSkillController& controller, float width, float height) {
+  const auto [target, applied] = controller.last_training();
   if (target.size() < 2 || applied.size() != target.size()) return;
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
-  const double most = desk.protocol().peak_n, seconds = static_cast<double>(target.size()) / desk.protocol().rate_hz;
+  const double most = controller.protocol().peak_n,
+               seconds = static_cast<double>(target.size()) / controller.protocol().rate_hz;
   const auto at = [&](double share, double newtons) {
     return ImVec2(static_cast<float>((0.1 + 0.8 * share) * width),
                   static_cast<float>((0.92 - 0.4 * std::clamp(newtons / most, 0.0, 1.0)) * height));
@@ -109,14 +110,14 @@ void draw_feedback(const experiment::ForceSkillDesk& desk, float width, float he
 
 }  // namespace
 
-int run_experiment_window(experiment::ForceSkillDesk& desk, PressedForce& pressed, const RunScreenOptions& options,
-                          const Context& context) {
+int run_experiment_window(experiment::ForceSkillController& controller, PressedForce& pressed,
+                          const RunScreenOptions& options, const Context& context) {
   ShellOptions shell_options;
   shell_options.width = options.width;
   shell_options.height = options.height;
   shell_options.title = "Osteotome experiment";
   WindowShell shell(shell_options);
-  const double most_n = desk.protocol().peak_n;
+  const double most_n = controller.protocol().peak_n;
   bool leave = false, go_on = false;
   float by_keys = 0;
   shell.on_key = [&](int key, int action, int) {
@@ -128,20 +129,20 @@ int run_experiment_window(experiment::ForceSkillDesk& desk, PressedForce& presse
   };
   std::uint64_t pictures = 0;
   std::chrono::steady_clock::time_point paused = std::chrono::steady_clock::now();
-  DeskPage last = desk.page();
+  DeskPage last = controller.page();
   while (!leave && !shell.closing() && !context.cancelled()) {
     if (!shell.poll()) continue;
-    if (std::exchange(go_on, false)) desk.go_on();
-    desk.update();
-    if (desk.page() != last) {
-      last = desk.page();
+    if (std::exchange(go_on, false)) controller.go_on();
+    controller.update();
+    if (controller.page() != last) {
+      last = controller.page();
       paused = std::chrono::steady_clock::now();
       by_keys = 0;
     }
     shell.new_frame();
     const auto width = static_cast<float>(shell.width()), height = static_cast<float>(shell.height()),
                em = static_cast<float>(shell.em_pixels());
-    const bool running = desk.page() == DeskPage::training || desk.page() == DeskPage::test;
+    const bool running = controller.page() == DeskPage::training || controller.page() == DeskPage::test;
     if (options.by_hand) {
       const float top = 0.2F * height, bottom = 0.85F * height, y = ImGui::GetIO().MousePos.y;
       const float mouse =
@@ -149,12 +150,12 @@ int run_experiment_window(experiment::ForceSkillDesk& desk, PressedForce& presse
       pressed.n.store(!running ? 0 : options.keys ? by_keys : mouse, std::memory_order_relaxed);
     }
     if (running) {
-      draw(desk.drawing(width, height));
+      draw(controller.drawing(width, height));
       if (options.by_hand) draw_force_axis(pressed.n.load(), most_n, options.keys, width, height, em);
     } else {
-      auto [title, words] = desk.words();
-      if (desk.page() == DeskPage::pause) {
-        const double left = 60 * desk.protocol().break_min -
+      auto [title, words] = controller.words();
+      if (controller.page() == DeskPage::pause) {
+        const double left = 60 * controller.protocol().break_min -
                             std::chrono::duration<double>(std::chrono::steady_clock::now() - paused).count();
         char line[64];
         const int s = static_cast<int>(std::max(0.0, std::ceil(left)));
@@ -162,17 +163,17 @@ int run_experiment_window(experiment::ForceSkillDesk& desk, PressedForce& presse
         words += line;
       }
       draw_page(title, words, width, height, em);
-      if (desk.page() == DeskPage::feedback) draw_feedback(desk, width, height);
+      if (controller.page() == DeskPage::feedback) draw_feedback(controller, width, height);
     }
     shell.show_page();
     ++pictures;
     if (!options.state_file.empty()) {
       static constexpr const char* kPages[] = {"before_training", "training", "feedback", "before_test", "test",
                                                "pause",           "done"};
-      const experiment::TaskView v = desk.view();
-      Json j{{"page", kPages[static_cast<std::size_t>(desk.page())]},
-             {"done", desk.done()},
-             {"trials", desk.trials()},
+      const experiment::TaskView v = controller.view();
+      Json j{{"page", kPages[static_cast<std::size_t>(controller.page())]},
+             {"done", controller.done()},
+             {"trials", controller.trials()},
              {"pictures", pictures},
              {"t_s", v.t_s},
              {"target_n", v.target_n},
@@ -181,7 +182,7 @@ int run_experiment_window(experiment::ForceSkillDesk& desk, PressedForce& presse
              {"pressed_n", static_cast<double>(pressed.n.load())},
              {"hand_mm", Json{v.hand_mm.x, v.hand_mm.y, v.hand_mm.z}},
              {"path_mm", Json{v.path_x_mm, v.path_z_mm}}};
-      if (desk.page() != DeskPage::done) j["training"] = experiment::short_name(desk.trial().training);
+      if (controller.page() != DeskPage::done) j["training"] = experiment::short_name(controller.trial().training);
       const std::filesystem::path beside = options.state_file.string() + ".new";
       std::ofstream(beside) << j.dump() << '\n';
       std::error_code ignored;

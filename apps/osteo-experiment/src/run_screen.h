@@ -20,7 +20,7 @@ struct PressedForce {
 };
 
 /// Until it is closed. Returns how many OpenGL errors were seen.
-int run_experiment_window(experiment::ForceSkillDesk& desk, PressedForce& pressed, const RunScreenOptions& options,
-                          const Context& context);
+int run_experiment_window(experiment::ForceSkillController& controller, PressedForce& pressed,
+                          const RunScreenOptions& options, const Context& context);
 
 }  // namespace osteo

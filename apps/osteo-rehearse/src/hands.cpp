@@ -107,9 +107,11 @@ std::unique_ptr<Device> Hands::make_one(Hand kind, std::size_t number, const Han
                                               number);
   }
   if (kind == Hand::marker) {
-    const Mat3 scene_from_desk{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, desk = desk_from_camera(camera_place_);
-    const Mat3 scene_from_camera{
-        {scene_from_desk * desk.column[0], scene_from_desk * desk.column[1], scene_from_desk * desk.column[2]}};
+    const Mat3 scene_from_controller{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}},
+        controller = controller_from_camera(camera_place_);
+    const Mat3 scene_from_camera{{scene_from_controller * controller.column[0],
+                                  scene_from_controller * controller.column[1],
+                                  scene_from_controller * controller.column[2]}};
     return std::make_unique<MarkerDevice>(link_, camera_, start, scene_from_camera, hand_scale_, pedal_.get(), number);
   }
   if (kind == Hand::igtl) return std::make_unique<TrackedHand>(tracker_, start, pedal_.get(), number);

@@ -12,7 +12,7 @@ constexpr int kMaxAgain = 3;
 
 }  // namespace
 
-LiveSitting::LiveSitting(const WindowFlags& flags)
+LiveSessionRunner::LiveSessionRunner(const WindowFlags& flags)
     : hosts_(flags.tutor),
       two_way_(flags.two_way),
       listen_(flags.listen),
@@ -45,7 +45,7 @@ LiveSitting::LiveSitting(const WindowFlags& flags)
   static_cast<void>(udp_peer(join_));
 }
 
-void LiveSitting::add_hand(std::vector<std::unique_ptr<Device>>& devices, RehearsalOptions& options) {
+void LiveSessionRunner::add_hand(std::vector<std::unique_ptr<Device>>& devices, RehearsalOptions& options) {
   devices.resize(1);
   far_ = std::make_shared<FarDevice>();
   far_->pull(pulls_);
@@ -55,7 +55,7 @@ void LiveSitting::add_hand(std::vector<std::unique_ptr<Device>>& devices, Rehear
     options.actions.push_back(action_of(far_guide(0, 1, devices.front()->traits(), kPullNPerMm, kMaxPullN)));
 }
 
-void LiveSitting::open(Rehearsal& rehearsal, const SessionHeader& header, const SessionFolder& session) {
+void LiveSessionRunner::open(Rehearsal& rehearsal, const SessionHeader& header, const SessionFolder& session) {
   closed_.clear();
   Bytes past;
   try {
@@ -69,7 +69,7 @@ void LiveSitting::open(Rehearsal& rehearsal, const SessionHeader& header, const 
   port_ = net_->port();  // those who have joined find the next session there
 }
 
-void LiveSitting::close(std::uint64_t ticks) {
+void LiveSessionRunner::close(std::uint64_t ticks) {
   if (!net_) return;
   if (ticks > 0) {
     net_->over(ticks);
@@ -79,7 +79,7 @@ void LiveSitting::close(std::uint64_t ticks) {
   host_.reset();
 }
 
-std::pair<SessionHeader, Bytes> LiveSitting::wait(const Context& context) {
+std::pair<SessionHeader, Bytes> LiveSessionRunner::wait(const Context& context) {
   if (!seat_) {
     const UdpPeer host = udp_peer(join_);
     host_name_ = udp_name(host);
@@ -89,23 +89,24 @@ std::pair<SessionHeader, Bytes> LiveSitting::wait(const Context& context) {
   return {std::move(header), seat_->past()};
 }
 
-std::shared_ptr<Rehearsal> LiveSitting::begin(const SessionHeader& header, World world, const RehearsalOptions& options,
-                                              std::unique_ptr<Device> own, const Context& context) {
+std::shared_ptr<Rehearsal> LiveSessionRunner::begin(const SessionHeader& header, World world,
+                                                    const RehearsalOptions& options, std::unique_ptr<Device> own,
+                                                    const Context& context) {
   if (seat_->status().bone_differs_since > 0) ++again_;
   return seat_->begin(header, std::move(world), options, std::move(own), context);
 }
 
-void LiveSitting::leave() {
+void LiveSessionRunner::leave() {
   if (seat_) seat_->leave();
 }
 
-void LiveSitting::guide(bool on) {
+void LiveSessionRunner::guide(bool on) {
   pulls_ = on;
   if (far_) far_->pull(on);
   if (seat_) seat_->leader()->pull(on);
 }
 
-TutorNow LiveSitting::now(const Rehearsal* rehearsal) const {
+TutorNow LiveSessionRunner::now(const Rehearsal* rehearsal) const {
   TutorNow n;
   if (hosts_ && host_ && net_) {
     n.title = two_way_ ? "You teach; hands pull each other" : "You teach; the trainee's hand is led by yours";

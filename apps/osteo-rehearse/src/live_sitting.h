@@ -13,10 +13,10 @@ namespace osteo {
 
 /// One for all sessions of a case, on one port and with one code. All functions but now() and guide() from one thread
 /// at a time.
-class LiveSitting {
+class LiveSessionRunner {
  public:
   /// Errors: usage, where flags have no effect on each other; a code that is none.
-  explicit LiveSitting(const WindowFlags& flags);
+  explicit LiveSessionRunner(const WindowFlags& flags);
 
   // --- the host
   [[nodiscard]] bool hosts() const { return hosts_; }
@@ -31,7 +31,7 @@ class LiveSitting {
   // --- who joins
   [[nodiscard]] bool joins() const { return !join_.empty(); }
   [[nodiscard]] bool has_hand() const { return role_ == JoinRole::trainee; }
-  [[nodiscard]] std::string words() const { return joined_words(role_); }
+  [[nodiscard]] std::string words() const { return joined_text(role_); }
   /// What the session is, and what it goes on from; asks on first use.
   [[nodiscard]] std::pair<SessionHeader, Bytes> wait(const Context& context);
   std::shared_ptr<Rehearsal> begin(const SessionHeader& header, World world, const RehearsalOptions& options,

@@ -146,44 +146,45 @@ struct WindowCommand {
     window.stereo.base_mm = p.stereo_base;
     window.camera_trial = p.experiment == "camera";
     shell.set_title("Osteotome - " + open.files.folder.filename().string());
-    Sitting sitting(p, open.files, procedure, person.values, io);
-    window.device = sitting.device();
-    window.way = sitting.way();
+    SessionRunner session_runner(p, open.files, procedure, person.values, io);
+    window.device = session_runner.device();
+    window.way = session_runner.way();
     io.end_progress();
 
     WindowActions actions;
-    actions.begin = [&](bool from_case, const HandView& view) { return sitting.begin(from_case, view); };
-    actions.save = [&] { sitting.save(); };
-    actions.rehearsal = [&] { return sitting.rehearsal(); };
+    actions.begin = [&](bool from_case, const HandView& view) { return session_runner.begin(from_case, view); };
+    actions.save = [&] { session_runner.save(); };
+    actions.rehearsal = [&] { return session_runner.rehearsal(); };
     if (!p.resume.empty()) actions.notes_before = [&] { return looks_noted_in(p.resume); };
-    actions.folder = [&] { return sitting.folder(); };
-    actions.failure = [&] { return sitting.rehearsal()->recording().failure; };
-    actions.camera = [&](bool lend) { return sitting.camera(lend); };
-    actions.tune = [&](const HandTuning& tuning) { sitting.tune(tuning); };
-    actions.switches = [&](bool attended) { return sitting.switches(attended); };
+    actions.folder = [&] { return session_runner.folder(); };
+    actions.failure = [&] { return session_runner.rehearsal()->recording().failure; };
+    actions.camera = [&](bool lend) { return session_runner.camera(lend); };
+    actions.tune = [&](const HandTuning& tuning) { session_runner.tune(tuning); };
+    actions.switches = [&](bool attended) { return session_runner.switches(attended); };
     actions.stop = [&] { return io.context.cancelled(); };
-    actions.monitor = [&] { return sitting.monitor(); };
+    actions.monitor = [&] { return session_runner.monitor(); };
     if (p.tutor || !p.join.empty() || !p.playback.empty()) {
-      actions.tutor = [&] { return sitting.tutor(); };
-      actions.lead = [&](bool on) { sitting.lead(on); };
+      actions.tutor = [&] { return session_runner.tutor(); };
+      actions.lead = [&](bool on) { session_runner.lead(on); };
     }
-    actions.facts = [&] { return sitting.facts(); };
-    actions.review = [&](const Context& context) { return sitting.review(context); };
-    actions.world_at_begin = [&](const Context& context) { return sitting.at_begin(context); };
-    sitting.save_at_exit(true);
+    actions.facts = [&] { return session_runner.facts(); };
+    actions.review = [&](const Context& context) { return session_runner.review(context); };
+    actions.world_at_begin = [&](const Context& context) { return session_runner.at_begin(context); };
+    session_runner.save_at_exit(true);
     try {
-      left = run_rehearsal_window(shell, person, window, open.hu ? &*open.hu : nullptr, actions, sitting.sound());
+      left =
+          run_rehearsal_window(shell, person, window, open.hu ? &*open.hu : nullptr, actions, session_runner.sound());
     } catch (...) {
-      sitting.save_at_exit(false);
-      sitting.save();
+      session_runner.save_at_exit(false);
+      session_runner.save();
       throw;
     }
-    sitting.save_at_exit(false);
-    person.values.sound = sitting.sound().on();
-    person.values.volume = sitting.sound().volume();
-    person.values.alarms = sitting.sound().alarms();
-    sitting.save();
-    return sitting.lost_ticks();
+    session_runner.save_at_exit(false);
+    person.values.sound = session_runner.sound().on();
+    person.values.volume = session_runner.sound().volume();
+    person.values.alarms = session_runner.sound().alarms();
+    session_runner.save();
+    return session_runner.lost_ticks();
   }
 
   static int run(const Params& p, cli::Invocation& io) {

@@ -48,7 +48,7 @@ SessionFacts PastSession::facts(const Anatomy& anatomy) const {
   if (!outline.end) f.warnings.push_back("the session was cut short: it is shown as far as it goes");
   for (const std::string& line : losses(outline)) f.warnings.push_back(line);
   if (!folder_.guided.empty()) f.warnings.push_back("guided: " + folder_.guided);
-  if (const std::string words = simulated_words(session); !words.empty()) f.warnings.push_back(words);
+  if (const std::string words = simulated_text(session); !words.empty()) f.warnings.push_back(words);
   const auto summary =
       std::filesystem::exists(folder_.summary()) ? Json::parse(read_text(folder_.summary())) : std::nullopt;
   if (!summary) {

@@ -33,7 +33,7 @@ SessionReview review_of(const SessionFolder& folder, const Case& the_case, const
   detail.frame = [&](const EvidenceFrame& f) { keeper.frame(f); };
   const Score score = score_session(session, begin.copy(), anatomy.structures.get(), procedure, nullptr, {},
                                     context.sub(0, 0.6), &detail);
-  tell_notes(session, keeper);
+  report_notes(session, keeper);
   const Findings findings = findings_of(score, anatomy.structures.get(), procedure);
   review.summary = findings.summary;
   review.words = findings.words;

@@ -38,18 +38,18 @@ DeviceTraits measured(Device& device, double rate_hz, cli::Invocation& io) {
   const auto tick = std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(1 / rate_hz));
   const MeasuredDevice m =
       measure_device(device.held(), 1 / rate_hz, [&] { std::this_thread::sleep_until(next += tick); });
-  if (!m.delay_measured || !io.common.quiet) io.err << m.told << std::endl;
+  if (!m.delay_measured || !io.common.quiet) io.err << m.reported << std::endl;
   return m.traits;
 }
 
 // When the display goes away Xlib ends the program, by exit(): the session is closed first.
-Sitting* g_sitting = nullptr;
+SessionRunner* g_session_runner = nullptr;
 
 void close_at_exit() {
-  if (g_sitting == nullptr) return;
+  if (g_session_runner == nullptr) return;
   int code = static_cast<int>(ExitCode::cancelled);
   try {
-    std::exchange(g_sitting, nullptr)->save();
+    std::exchange(g_session_runner, nullptr)->save();
     std::cerr << "osteo: the display is gone; the session is saved" << std::endl;
   } catch (const Error& e) {
     std::cerr << "osteo: the display is gone, and " << e.what() << std::endl;
@@ -62,8 +62,8 @@ void close_at_exit() {
 
 }  // namespace
 
-Sitting::Sitting(const WindowFlags& flags, const Case& the_case, const Procedure* procedure, const PersonValues& person,
-                 cli::Invocation& io)
+SessionRunner::SessionRunner(const WindowFlags& flags, const Case& the_case, const Procedure* procedure,
+                             const PersonValues& person, cli::Invocation& io)
     : case_(the_case),
       procedure_(procedure),
       io_(io),
@@ -95,19 +95,19 @@ Sitting::Sitting(const WindowFlags& flags, const Case& the_case, const Procedure
     throw Error(ExitCode::usage, "--playback-as has no effect without --playback", "leave it out");
 }
 
-Sitting::~Sitting() {
+SessionRunner::~SessionRunner() {
   save_at_exit(false);
 }
 
-void Sitting::save_at_exit(bool on) {
+void SessionRunner::save_at_exit(bool on) {
   if (on) {
-    g_sitting = this;
-  } else if (g_sitting == this) {
-    g_sitting = nullptr;
+    g_session_runner = this;
+  } else if (g_session_runner == this) {
+    g_session_runner = nullptr;
   }
 }
 
-HandGoal Sitting::begin(bool from_case, const HandView& view) {
+HandGoal SessionRunner::begin(bool from_case, const HandView& view) {
   const std::lock_guard lock(mutex_);
   leave_sound();
   live_.leave();
@@ -116,7 +116,7 @@ HandGoal Sitting::begin(bool from_case, const HandView& view) {
   if (!has_anatomy_) {  // the same for all sessions
     options_.anatomy = anatomy_of(case_, options_.haptics, io_.context);
     has_anatomy_ = true;
-    if (!io_.common.quiet) io_.err << told_hardness(options_.anatomy) << std::endl;
+    if (!io_.common.quiet) io_.err << reported_hardness(options_.anatomy) << std::endl;
   }
   if (past_) {
     rehearsal_ = past_->stage(case_, options_, view, io_.context);
@@ -143,12 +143,12 @@ HandGoal Sitting::begin(bool from_case, const HandView& view) {
   return start;
 }
 
-void Sitting::save() {
+void SessionRunner::save() {
   const std::lock_guard lock(mutex_);
   save_now();
 }
 
-TutorNow Sitting::tutor() const {
+TutorNow SessionRunner::tutor() const {
   if (!playback_) return live_.now(rehearsal_.get());
   TutorNow n;
   n.title = "Lesson: " + std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(playback_params_.mode)]) +
@@ -167,12 +167,12 @@ TutorNow Sitting::tutor() const {
   return n;
 }
 
-void Sitting::lead(bool on) {
+void SessionRunner::lead(bool on) {
   if (playback_) playback_->on = on;
   live_.guide(on);
 }
 
-std::vector<Vec3> Sitting::way() const {
+std::vector<Vec3> SessionRunner::way() const {
   std::vector<Vec3> all;
   if (lesson_) {
     for (const Lesson::Point& p : lesson_->way) all.push_back(from_floats(p.at_mm));
@@ -180,7 +180,7 @@ std::vector<Vec3> Sitting::way() const {
   return all;
 }
 
-void Sitting::learn(const WindowFlags& flags) {
+void SessionRunner::learn(const WindowFlags& flags) {
   if (!flags.resume.empty())
     throw Error(ExitCode::usage, "--resume has no effect with --playback", "a lesson begins with its own bone");
   std::vector<FieldRef> fields = fields_of<PlaybackParams>(playback_params_);
@@ -204,7 +204,7 @@ void Sitting::learn(const WindowFlags& flags) {
   options_.haptics = lesson_->setup;
 }
 
-HandGoal Sitting::begin_led() {
+HandGoal SessionRunner::begin_led() {
   const DeviceSample& first = lesson_->hands.front().front();
   const HandGoal start{from_floats(first.position_mm), first.axis, 0, first.tool};
   playback_ = std::make_shared<Playback>(lesson_, playback_params_);
@@ -222,12 +222,12 @@ HandGoal Sitting::begin_led() {
   options_.soft = nullptr;
   const bool within = lesson_from_s_ > 0;
   run(world_of_lesson(lesson_folder_, lesson_from_s_, case_, options_.anatomy, io_.context), std::move(led),
-      within ? lesson_folder_.folder : lesson_folder_.resumed_from, guided_words(playback_params_),
+      within ? lesson_folder_.folder : lesson_folder_.resumed_from, guided_text(playback_params_),
       within ? lesson_from_s_ : lesson_folder_.resumed_at_s);
   return start;
 }
 
-HandGoal Sitting::begin_joined(const HandView& view) {
+HandGoal SessionRunner::begin_joined(const HandView& view) {
   const auto [header, past] = live_.wait(io_.context);
   if (options_.haptics.structures != header.haptics.structures)
     throw Error(ExitCode::usage, "the host's case has other critical structures", "both need the same case, unchanged");
@@ -257,8 +257,8 @@ HandGoal Sitting::begin_joined(const HandView& view) {
   return start;
 }
 
-void Sitting::run(World world, std::vector<std::unique_ptr<Device>> devices, const std::filesystem::path& resumed_from,
-                  const std::string& guided, double resumed_at_s) {
+void SessionRunner::run(World world, std::vector<std::unique_ptr<Device>> devices,
+                        const std::filesystem::path& resumed_from, const std::string& guided, double resumed_at_s) {
   // Last, so that what fails before leaves no folder.
   const SessionFolder before = session_;
   session_ = create_session_folder(next_folder_, case_.folder, resumed_from, guided, resumed_at_s);
@@ -278,9 +278,9 @@ void Sitting::run(World world, std::vector<std::unique_ptr<Device>> devices, con
     if (!targets_.empty()) begin_stream();
     rehearsal_->start();
     sound_.follow(rehearsal_.get());
-    if (sound_.on() && !sound_.failure().empty() && !io_.common.quiet && !told_silence_) {
+    if (sound_.on() && !sound_.failure().empty() && !io_.common.quiet && !reported_silence_) {
       io_.err << sound_.failure() << "; --no-sound does not look for one" << std::endl;
-      told_silence_ = true;
+      reported_silence_ = true;
     }
     // Registered again: what the servo has made for itself by now must outlive it.
     static_cast<void>(plate_library());
@@ -296,13 +296,13 @@ void Sitting::run(World world, std::vector<std::unique_ptr<Device>> devices, con
   }
 }
 
-void Sitting::save_now() {
+void SessionRunner::save_now() {
   if (!rehearsal_) return;
   sound_.follow(nullptr);
   sound_.mix_in(nullptr);
   // Whatever comes of it, it is over; and what was recorded can be gone on from.
   const std::shared_ptr<Rehearsal> over = std::move(rehearsal_);
-  const std::unique_ptr<MonitorDesk> monitor = std::move(monitor_);  // hears it to its end, and goes before it
+  const std::unique_ptr<MonitorController> monitor = std::move(monitor_);  // hears it to its end, and goes before it
   last_ = session_.folder;
   RehearsalSummary s;
   try {
@@ -317,7 +317,7 @@ void Sitting::save_now() {
   if (const std::unique_ptr<RehearsalStream> stream = take_stream()) {
     stream->feed().end();
     if (!io_.common.quiet) {
-      for (const std::string& line : stream->feed().told()) io_.err << line << std::endl;
+      for (const std::string& line : stream->feed().reported()) io_.err << line << std::endl;
     }
   }
   if (past_) {  // nothing was done, and nothing is written
@@ -327,7 +327,7 @@ void Sitting::save_now() {
   write_summary(session_, s, options_.rate_hz, "window", options_.anatomy);
   facts_ = facts_of(s);
   for (const std::string& w : s.warnings) io_.context.warn(w);
-  // Told even when quiet: the exit code is about it.
+  // Reported even when quiet: the exit code is about it.
   if (!s.gaps.empty()) {
     lost_ticks_ = true;
     io_.err << "NOT RECORDED: " << s.ticks_not_recorded << " ticks in " << s.gaps.size()
@@ -338,31 +338,31 @@ void Sitting::save_now() {
             << std::endl;
 }
 
-void Sitting::leave_sound() {
+void SessionRunner::leave_sound() {
   sound_.follow(nullptr);
   sound_.mix_in(nullptr);
   take_stream().reset();
   monitor_.reset();
 }
 
-std::unique_ptr<RehearsalStream> Sitting::take_stream() {
+std::unique_ptr<RehearsalStream> SessionRunner::take_stream() {
   const std::lock_guard lock(stream_mutex_);
   return std::move(stream_);
 }
 
-void Sitting::begin_stream() {
+void SessionRunner::begin_stream() {
   stream_ = std::make_unique<RehearsalStream>(*rehearsal_, targets_, monitor_ ? &monitor_->reader() : nullptr,
                                               monitor_options_ ? *monitor_options_ : monitor_options_of({}));
   if (!io_.common.quiet) {
-    for (const std::string& line : stream_->feed().told()) io_.err << line << std::endl;
+    for (const std::string& line : stream_->feed().reported()) io_.err << line << std::endl;
   }
   if (monitor_) monitor_->invite(stream_->invitation());
   if (!stream_->invitation().empty()) io_.err << stream_->invitation() << std::endl;
 }
 
-void Sitting::begin_monitor() {
+void SessionRunner::begin_monitor() {
   if (!monitor_json_.empty()) write_file(session_.folder / kMonitorFile, monitor_json_);
-  monitor_ = std::make_unique<MonitorDesk>(*rehearsal_, *monitor_options_);
+  monitor_ = std::make_unique<MonitorController>(*rehearsal_, *monitor_options_);
   sound_.mix_in(&monitor_->sound());
   if (monitor_->wiring().channels.empty())
     io_.context.warn(
@@ -370,7 +370,7 @@ void Sitting::begin_monitor() {
         "'osteo prepare')");
 }
 
-SessionFacts Sitting::facts_of(const RehearsalSummary& s) const {
+SessionFacts SessionRunner::facts_of(const RehearsalSummary& s) const {
   SessionFacts f;
   f.folder = session_.folder;
   f.rate_hz = options_.rate_hz;

@@ -22,15 +22,15 @@
 namespace osteo {
 
 // One session after another on a case. Between them, and after whatever throws, none runs.
-class Sitting {
+class SessionRunner {
  public:
   /// `procedure`: what the session is scored by; null: no items are judged. It, the case and `io` must outlive the
   /// sitting.
-  Sitting(const WindowFlags& flags, const Case& the_case, const Procedure* procedure, const PersonValues& person,
-          cli::Invocation& io);
-  ~Sitting();
-  Sitting(const Sitting&) = delete;
-  Sitting& operator=(const Sitting&) = delete;
+  SessionRunner(const WindowFlags& flags, const Case& the_case, const Procedure* procedure, const PersonValues& person,
+                cli::Invocation& io);
+  ~SessionRunner();
+  SessionRunner(const SessionRunner&) = delete;
+  SessionRunner& operator=(const SessionRunner&) = delete;
 
   /// While this lives and `on`, it is saved when the program is ended by exit(), as Xlib does when the display goes
   /// away.
@@ -64,7 +64,7 @@ class Sitting {
     return past_ ? std::filesystem::current_path() : session_.folder;
   }
   [[nodiscard]] SoundOut& sound() { return sound_; }
-  [[nodiscard]] MonitorDesk* monitor() const { return monitor_.get(); }
+  [[nodiscard]] MonitorController* monitor() const { return monitor_.get(); }
   [[nodiscard]] std::string device() const { return hands_.name(); }
   [[nodiscard]] CameraDevices camera(bool lend) const {
     return hands_.camera(rehearsal_ ? &rehearsal_->device() : nullptr, lend);
@@ -114,13 +114,13 @@ class Sitting {
   std::string monitor_json_;                       // of the person's own file
   std::vector<StreamTarget> targets_;
   std::mutex stream_mutex_;
-  LiveSitting live_;
+  LiveSessionRunner live_;
   std::shared_ptr<Playback> playback_;  // of a lesson that is shown
   std::shared_ptr<Rehearsal> rehearsal_;
-  std::unique_ptr<MonitorDesk> monitor_;
+  std::unique_ptr<MonitorController> monitor_;
   std::unique_ptr<RehearsalStream> stream_;  // of the monitor: before it, it goes
   SoundOut sound_;                           // before the rehearsal it follows, it goes
-  bool has_anatomy_ = false, lost_ticks_ = false, told_silence_ = false;
+  bool has_anatomy_ = false, lost_ticks_ = false, reported_silence_ = false;
 };
 
 }  // namespace osteo

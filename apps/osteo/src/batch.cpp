@@ -79,7 +79,7 @@ Json counts_json(const BatchResult& r, const fs::path& out) {
   return j;
 }
 
-std::string counts_words(const BatchResult& r) {
+std::string counts_text(const BatchResult& r) {
   std::string text = std::to_string(r.done) + " of " + std::to_string(r.cases) + " cases done";
   for (const auto& [count, words] :
        {std::pair{r.untouched, "known from before"}, std::pair{r.refused, "rejected for their input"},
@@ -205,8 +205,7 @@ int BatchCommand::run(const Params& p, cli::Invocation& io) {
     if (!output_exists(out / "batch.json")) throw Error(ExitCode::no_input, "'" + p.out + "' is no batch");
     const BatchResult result = write_batch_report(table, out);
     if (io.common.json) io.out << counts_json(result, p.out).dump(2) << '\n';
-    if (!io.common.quiet)
-      io.err << counts_words(result) << "\n  " << (fs::path(p.out) / "report.html").string() << '\n';
+    if (!io.common.quiet) io.err << counts_text(result) << "\n  " << (fs::path(p.out) / "report.html").string() << '\n';
     return exit_code_of(result);
   }
 
@@ -263,7 +262,7 @@ int BatchCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   if (io.common.json) io.out << counts_json(result, p.out).dump(2) << '\n';
   if (!io.common.quiet) {
-    io.err << counts_words(result) << '\n';
+    io.err << counts_text(result) << '\n';
     if (options.only.empty()) io.err << "  " << (fs::path(p.out) / "report.html").string() << '\n';
   }
   if (!result.stopped.empty())

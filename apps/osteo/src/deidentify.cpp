@@ -9,7 +9,7 @@
 
 namespace osteo {
 
-std::map<std::string, std::size_t> told_refusals(const DeidentifyReport& report, cli::Invocation& io) {
+std::map<std::string, std::size_t> reported_refusals(const DeidentifyReport& report, cli::Invocation& io) {
   std::map<std::string, std::size_t> why;
   std::map<std::string, std::string> first;
   for (const NotDeidentified& r : report.refused)
@@ -60,7 +60,7 @@ int DeidentifyCommand::run(const Params& p, cli::Invocation& io) {
     if (!p.map.empty()) write_deidentify_map(p.map, report);
   });
   io.end_progress();
-  const auto why = told_refusals(report, io);
+  const auto why = reported_refusals(report, io);
   if (io.common.json) {
     Json refused = Json::list();
     for (const auto& [reason, n] : why) refused.push_back({{"why", reason}, {"objects", n}});

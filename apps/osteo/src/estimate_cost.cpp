@@ -74,7 +74,7 @@ class SceneCosts {
     out << "together " << format_number(rounded(megabytes_, 10)) << " MB; a tick while drilling takes "
         << format_number(ticks_.quantile_us(0.5)) << " us, p99 " << format_number(ticks_.quantile_us(0.99))
         << " us, p99.9 " << format_number(ticks_.quantile_us(0.999)) << " us\n"
-        << told_hardness(anatomy_) << '\n'
+        << reported_hardness(anatomy_) << '\n'
         << "threads: servo (real time), recorder, follower (surface, fragments), window\n";
   }
 

@@ -81,7 +81,7 @@ int HeatCommand::run(const Params& p, cli::Invocation& io) {
   if (!r.identical)
     io.err << "session: the replay differs from what was recorded (" << r.difference << "): neither may its heat\n";
   if (!io.common.quiet && !io.common.json) {
-    for (const std::string& line : told(heat, anatomy.structures.get())) io.out << line << '\n';
+    for (const std::string& line : reported(heat, anatomy.structures.get())) io.out << line << '\n';
     io.out << "by assumption: " << format_number(p.cutting_share) << " of a cutting burr's work, "
            << format_number(p.diamond_w_per_n) << " W per N of a diamond burr\n";
   }

@@ -266,8 +266,8 @@ void judge_picture_and_sound(Examination& e) {
   if (!audio) e.advice.push_back("there is no sound device");
 }
 
-void tell_examination(const Examination& e, const LoopStats& s, const utsname& u, bool realtime_kernel, double rate_hz,
-                      std::ostream& out) {
+void report_examination(const Examination& e, const LoopStats& s, const utsname& u, bool realtime_kernel,
+                        double rate_hz, std::ostream& out) {
   const Json& j = e.found;
   const auto yes = [](bool v) { return v ? "yes" : "NO"; };
   const auto is = [&](const char* what) { return yes(*j.find(what)->flag()); };
@@ -319,7 +319,7 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
   if (io.common.json) {
     io.out << e.found.dump(2) << '\n';
   } else {
-    tell_examination(e, s, u, realtime_kernel, p.rate_hz, io.out);
+    report_examination(e, s, u, realtime_kernel, p.rate_hz, io.out);
   }
   return 0;
 }

@@ -40,7 +40,7 @@ void parse_size(const std::string& text, int& width, int& height) {
     throw Error(ExitCode::usage, "--size: '" + text + "' is no size", "write it as 1280x720");
 }
 
-// Told by nothing but chance, so that it does not follow from the session.
+// Reported by nothing but chance, so that it does not follow from the session.
 std::string random_code() {
   static constexpr char kLetters[] = "abcdefghjkmnpqrstuvwxyz23456789";
   std::random_device chance;

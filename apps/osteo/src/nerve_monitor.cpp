@@ -139,7 +139,7 @@ Json nerves_json(const MonitorReader& monitor) {
   return nerves;
 }
 
-void tell_monitor(const Json& j, const MonitorWiring& wiring, const std::string& folder, std::ostream& err) {
+void report_monitor(const Json& j, const MonitorWiring& wiring, const std::string& folder, std::ostream& err) {
   const auto count = [&](const char* kind) {
     const Json* const n = j.find("events")->find(kind);
     return n == nullptr ? std::string("0") : n->dump();
@@ -219,7 +219,7 @@ int NerveMonitorCommand::run(const Params& p, cli::Invocation& io) {
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
   if (!r.identical)
     io.err << "session: the replay differs from what was recorded (" << r.difference << "): neither may its monitor\n";
-  if (!io.common.quiet) tell_monitor(j, wiring, p.out, io.err);
+  if (!io.common.quiet) report_monitor(j, wiring, p.out, io.err);
   return static_cast<int>(!outline.gaps.empty() ? ExitCode::partial
                           : outline.damaged()   ? ExitCode::corrupt
                                                 : ExitCode::ok);

@@ -104,7 +104,7 @@ int SendCommand::run(const Params& p, cli::Invocation& io) {
         deidentify_objects(all.objects, copies->path(), {p.key}, io.context.sub(0.05, p.dry_run ? 1 : 0.1));
     io.end_progress();
     left_out = made.refused.size();
-    told_refusals(made, io);
+    reported_refusals(made, io);
     if (made.written == 0) throw Error(ExitCode::failed, "nothing may leave: each object is left out");
     std::vector<fs::path> set_aside = std::move(all.set_aside);
     all = list_objects({copies->path()});

@@ -69,7 +69,7 @@ struct SendCommand {
 };
 
 /// Says on standard error why how many were left out, and counts them by reason.
-std::map<std::string, std::size_t> told_refusals(const DeidentifyReport& report, cli::Invocation& invocation);
+std::map<std::string, std::size_t> reported_refusals(const DeidentifyReport& report, cli::Invocation& invocation);
 
 struct DeidentifyCommand {
   struct Params {

@@ -126,7 +126,7 @@ int PlaybackCommand::run(const Params& p, cli::Invocation& io) {
   // within the lesson.
   const fs::path before = p.from_s > 0 ? lesson_folder.folder : lesson_folder.resumed_from;
   const double at_s = p.from_s > 0 ? p.from_s : lesson_folder.resumed_at_s;
-  const SessionFolder session = create_session_folder(p.out, the_case.folder, before, guided_words(params), at_s);
+  const SessionFolder session = create_session_folder(p.out, the_case.folder, before, guided_text(params), at_s);
   options.session_file = session.stream();
   Rehearsal rehearsal(std::move(world), std::move(devices), options, io.context);
   io.context.progress(0.1, "led along");
@@ -141,13 +141,13 @@ int PlaybackCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   if (io.common.json) io.out << j.dump(2) << '\n';
   if (!io.common.quiet) {
-    io.err << guided_words(params) << '\n' << facts_words(facts) << '\n';
+    io.err << guided_text(params) << '\n' << facts_text(facts) << '\n';
     if (expert_drills(params))
       io.err << (same_bone ? "bone at the end is the recorded one, to the bit\n"
                            : "bone at the end is not that of the session's end\n");
     io.err << "session: " << session.folder.string() << '\n';
   }
-  // Told even when quiet: the exit code is about it.
+  // Reported even when quiet: the exit code is about it.
   if (playback->given_up)
     io.err << "NOT LED TO THE END: the hand did not come on after " << format_number(playback->seconds + p.from_s)
            << " s of the session\n";

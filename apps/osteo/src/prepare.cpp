@@ -147,9 +147,9 @@ class Preparation {
                                       given_.contains("lower") || given_.contains("preset"));
     validate(pipeline, io_.registry);
     refuse_foreign_files(pipeline);
-    tell_changes();
+    report_changes();
     make(std::move(pipeline));
-    tell_end();
+    report_end();
     return 0;
   }
 
@@ -321,7 +321,7 @@ class Preparation {
     }
   }
 
-  void tell_changes() const {
+  void report_changes() const {
     for (const std::string& note : notes_) io_.context.info(note);
     if (!before_) return;
     for (const RecipeChange& c : changes_) {
@@ -400,7 +400,7 @@ class Preparation {
       remember(hash_text(recipe_.settings.at(setting)), recipe_.settings.at(setting));
   }
 
-  // The verdict on a refused scan stays, where there is no case yet.
+  // The verdict on a rejected scan stays, where there is no case yet.
   void keep_verdict() {
     const fs::path verdict = folder_ / "import.json";
     if (!is_case_ && output_exists(update_->place(verdict))) {
@@ -414,7 +414,7 @@ class Preparation {
     }
   }
 
-  void tell_end() const {
+  void report_end() const {
     if (io_.common.quiet) return;
     io_.err << "case: " << folder_.string() << "  " << case_code(folder_) << "  (peak memory "
             << std::lround(peak_memory_mb()) << " MB)\n";

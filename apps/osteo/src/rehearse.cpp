@@ -63,7 +63,7 @@ cli::CommandInfo RehearseCommand::info() {
 
 namespace {
 
-// What would have no say is refused, not ignored.
+// What would have no say is rejected, not ignored.
 void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocation& io) {
   const auto refuse = [&](std::string_view name, const std::string& beside, const std::string& advice) {
     if (!io.given.contains(std::string(name))) return;
@@ -121,7 +121,7 @@ class HeadlessSession {
     note_camera();
     drill();
     const std::string summary = end_session();
-    tell_what_failed();
+    report_what_failed();
     if (s_.interrupted) {  // closed all the same; what takes time is left out
       if (!io_.common.quiet)
         io_.err << "stopped after " << s_.ticks << " ticks; session: " << session_.folder.string()
@@ -129,7 +129,7 @@ class HeadlessSession {
       io_.context.check_cancelled();
     }
     write_pictures();
-    if (!io_.common.quiet) tell_result();
+    if (!io_.common.quiet) report_result();
     if (io_.common.json) io_.out << summary;
     return static_cast<int>(s_.refused() || !s_.gaps.empty() ? ExitCode::partial : ExitCode::ok);
   }
@@ -205,7 +205,7 @@ class HeadlessSession {
     stream_ = std::make_unique<RehearsalStream>(*rehearsal_, targets, nullptr, monitor_options_of(p_.monitor_setup));
     feed_ = &stream_->feed();
     if (!io_.common.quiet) {
-      for (const std::string& line : stream_->feed().told()) io_.err << line << std::endl;
+      for (const std::string& line : stream_->feed().reported()) io_.err << line << std::endl;
     }
     if (!stream_->invitation().empty()) io_.err << stream_->invitation() << std::endl;
   }
@@ -232,7 +232,7 @@ class HeadlessSession {
     }
     rehearsal_->start();
     // A script whose strokes nobody records is worth nothing: a full disk ends it at once.
-    bool told_behind = false, told_lost = false;
+    bool reported_behind = false, reported_lost = false;
     while (rehearsal_->running() && !rehearsal_->recording().failure) {
       const double t = static_cast<double>(rehearsal_->latest().tick) / p_.rate_hz;
       if (tracked() && t >= p_.seconds) break;
@@ -242,7 +242,8 @@ class HeadlessSession {
         break;
       }
       const std::string trouble = rehearsal_->trouble();
-      if (!trouble.empty() && !std::exchange(rehearsal_->recording().ticks_lost > 0 ? told_lost : told_behind, true))
+      if (!trouble.empty() &&
+          !std::exchange(rehearsal_->recording().ticks_lost > 0 ? reported_lost : reported_behind, true))
         io_.context.warn(trouble);
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
@@ -251,7 +252,7 @@ class HeadlessSession {
     if (stream_) {
       stream_->feed().end();
       if (!io_.common.quiet) {
-        for (const std::string& line : stream_->feed().told()) io_.err << line << '\n';
+        for (const std::string& line : stream_->feed().reported()) io_.err << line << '\n';
       }
     }
     if (tracker_ && !io_.common.quiet)
@@ -269,8 +270,8 @@ class HeadlessSession {
     return summary;
   }
 
-  // Told even when quiet: the exit code is about them.
-  void tell_what_failed() const {
+  // Reported even when quiet: the exit code is about them.
+  void report_what_failed() const {
     for (const ActionNote& n : s_.notes) {
       if (n.done && io_.common.quiet) continue;
       io_.err << (n.done ? "done otherwise" : "NOT DONE") << " at " << seconds_text(n.tick) << " s: " << name_of(n.kind)
@@ -279,7 +280,7 @@ class HeadlessSession {
     for (const StructureCutEvent& e : s_.structure_cuts) {
       if (options_.anatomy.structures)
         io_.err << "INJURED at " << seconds_text(e.tick) << " s: the saw cut through "
-                << told_structures_cut(*options_.anatomy.structures, std::span(&e.cut, 1)) << '\n';
+                << reported_structures_cut(*options_.anatomy.structures, std::span(&e.cut, 1)) << '\n';
     }
     if (s_.unusable_poses > 0)
       io_.err << "the pose could not be used for " << seconds_text(s_.unusable_poses)
@@ -298,8 +299,8 @@ class HeadlessSession {
     io_.end_progress();
   }
 
-  void tell_result() {
-    io_.err << "case: " << approval_.words() << '\n' << told_hardness(options_.anatomy) << '\n';
+  void report_result() {
+    io_.err << "case: " << approval_.words() << '\n' << reported_hardness(options_.anatomy) << '\n';
     io_.err << "drilled " << s_.ticks << " ticks; removed " << format_number(std::round(s_.removed_mm3 * 10) / 10)
             << " mm3\n";
     for (const SoftTissue::Facts& f : s_.tissue)
@@ -307,18 +308,18 @@ class HeadlessSession {
               << " mm3 cut off\n";
     rehearsal_->look([&](const World&, SceneReaders& readers) {
       if (!readers.heat) return;
-      for (const std::string& line : told(*readers.heat, rehearsal_->structures())) io_.err << line << '\n';
+      for (const std::string& line : reported(*readers.heat, rehearsal_->structures())) io_.err << line << '\n';
     });
     if (s_.ticks_not_followed > 0)
       io_.err << "surface, fragments and dust missed " << s_.ticks_not_followed
               << " ticks, since the machine did not keep up; they caught up from the bone itself\n";
-    if (s_.loop) tell_loop(*s_.loop);
+    if (s_.loop) report_loop(*s_.loop);
     io_.err << "session: " << session_.folder.string()
             << "  (before.png, after.png, surface.ply, summary.json)\n  again: osteo replay "
             << session_.folder.string() << '\n';
   }
 
-  void tell_loop(const LoopStats& l) const {
+  void report_loop(const LoopStats& l) const {
     io_.err << "servo: work p50 " << std::lround(l.work.quantile_us(0.5)) << " us, p99.9 "
             << std::lround(l.work.quantile_us(0.999)) << " us; wake-up late p99 "
             << std::lround(l.lateness.quantile_us(0.99)) << " us; periods missed by our work " << l.missed_by_work

@@ -64,7 +64,7 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
   if (io.common.json) io.out << j.dump(2) << '\n';
   // Losses are told even when quiet: they are no talk.
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
-  if (const std::string words = simulated_words(session); !words.empty() && !io.common.quiet)
+  if (const std::string words = simulated_text(session); !words.empty() && !io.common.quiet)
     io.err << "session: " << words << '\n';
   for (const std::string& line : outline.newer) io.err << "session: of a later version, left out: " << line << '\n';
   if (!folder.approval.empty() && !io.common.quiet) io.err << "case, when it was recorded: " << folder.approval << '\n';

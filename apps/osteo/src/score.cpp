@@ -107,7 +107,7 @@ Scored score_folder(const fs::path& session_folder, const ScoreAsked& asked, con
         "the case's structures are not those that the session watched: they are measured as the case has them now");
   if (!folder.guided.empty())
     score.words.push_back("guided: " + folder.guided + "; not to be compared with unaided sessions");
-  if (std::string words = simulated_words(session); !words.empty())
+  if (std::string words = simulated_text(session); !words.empty())
     score.words.insert(score.words.begin(), std::move(words));
   return scored;
 }

@@ -109,7 +109,7 @@ int StreamCommand::run(const Params& p, cli::Invocation& io) {
   monitor.add_sink(feed);
   World world = world_at_begin(folder, the_case, anatomy, io.context);
   if (!io.common.quiet) {
-    for (const std::string& line : feed.told()) io.err << line << '\n';
+    for (const std::string& line : feed.reported()) io.err << line << '\n';
     if (monitor.wiring().channels.empty())
       io.err << "the case lists none of the nerves that the monitor knows: no signal\n";
     if (p.listeners > 0)
@@ -141,7 +141,7 @@ int StreamCommand::run(const Params& p, cli::Invocation& io) {
                   .dump(2)
            << '\n';
   if (!io.common.quiet) {
-    for (const std::string& line : feed.told()) io.err << line << '\n';
+    for (const std::string& line : feed.reported()) io.err << line << '\n';
     io.err << c.samples << " samples of " << monitor.wiring().channels.size() << " channels, " << c.tools << " poses, "
            << c.events << " events; at most " << std::lround(pace.late_ms) << " ms late\n";
   }

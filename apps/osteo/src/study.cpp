@@ -222,7 +222,7 @@ int StudyCommand::run(const Params& p, cli::Invocation& io) {
       notes.emplace_back("no primary outcome is named: all columns will be corrected together");
     for (const study::Reach& r : study::reach_of(study)) {
       done["reach"].push_back(study::json_of(r));
-      notes.push_back(study::told(r));
+      notes.push_back(study::reported(r));
     }
     said = "study.json: " + std::to_string(study.plan.primary.size()) + " primary outcomes";
   } else if (action == "order") {

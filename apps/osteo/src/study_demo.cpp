@@ -211,7 +211,7 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
   const auto drilling = std::chrono::steady_clock::now();
   parallel_for(jobs.size(), 1, io.common.threads, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) {
-      // trainee.json is written last: a session without it was stopped half-way, and is made anew.
+      // trainee.json is written last: a session without it was stopped half-way, and is made again.
       const bool there = fs::exists(place(jobs[i]) / "trainee.json");
       if (!there) {
         io.context.check_cancelled();

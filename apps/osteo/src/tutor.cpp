@@ -108,7 +108,7 @@ int TutorCommand::run(const Params& p, cli::Invocation& io) {
                     format_number(p.wait_s) + " s; the session begins all the same");
   rehearsal.start();
   std::size_t seen = 0;
-  bool told_door = false, told_lost = false;
+  bool reported_door = false, reported_lost = false;
   while (rehearsal.running() && !io.context.cancelled()) {
     const auto all = host.status(steady_us());
     if (all.size() != seen && !io.common.quiet)
@@ -119,9 +119,9 @@ int TutorCommand::run(const Params& p, cli::Invocation& io) {
         io.context.warn("a copy's bone differs since tick " + std::to_string(s.bone_differs_since) +
                         "; it is made again");
     }
-    if (host.tries_left() == 0 && !std::exchange(told_door, true))
+    if (host.tries_left() == 0 && !std::exchange(reported_door, true))
       io.context.warn("three wrong codes: nobody else can join this session");
-    if (host.lost() && !std::exchange(told_lost, true))
+    if (host.lost() && !std::exchange(reported_lost, true))
       io.context.warn(
           "the machine does not keep up, or half an hour has passed: those who have joined get no more of it");
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -182,7 +182,7 @@ int JoinCommand::run(const Params& p, cli::Invocation& io) {
     std::optional<SessionFolder> session;
     if (!out.empty()) {
       session = create_joined_folder(out, the_case.folder, past,
-                                     joined_words(trainee ? JoinRole::trainee : JoinRole::watcher));
+                                     joined_text(trainee ? JoinRole::trainee : JoinRole::watcher));
       options.session_file = session->stream();
     } else {
       options.session_file.clear();
@@ -199,13 +199,13 @@ int JoinCommand::run(const Params& p, cli::Invocation& io) {
            << hundredths(seat.status().rtt_ms) << " ms" << std::endl;
   std::uint64_t again = 0;
   SeatStatus now = seat.status();
-  bool told_link = false;
+  bool reported_link = false;
   while (!io.context.cancelled() && !now.over && !now.another && now.state != JoinState::refused &&
          seat.silent_s() < p.patience_s) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
     now = seat.status();
-    if ((now.state != JoinState::joined) != std::exchange(told_link, now.state != JoinState::joined))
-      io.context.warn(told_link ? "the link has dropped; the host is asked again" : "the link is back");
+    if ((now.state != JoinState::joined) != std::exchange(reported_link, now.state != JoinState::joined))
+      io.context.warn(reported_link ? "the link has dropped; the host is asked again" : "the link is back");
     if (now.host_lost && now.behind_ticks == 0) break;
     if (now.bone_differs_since > 0 && again < 3) {
       ++again;

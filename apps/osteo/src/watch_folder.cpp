@@ -121,7 +121,7 @@ int WatchFolderCommand::run(const Params& p, cli::Invocation& io) {
     if (p.no_report) a.emplace_back("--no-report");
     return make_case(std::move(a), rule.set, folder);
   };
-  const auto tell = [&](const WatchEvent& e, const WatchCounters& c) {
+  const auto notify = [&](const WatchEvent& e, const WatchCounters& c) {
     if (io.common.json)
       io.out << Json{{"series", e.series},        {"what", e.what},      {"rule", e.rule}, {"why", e.why},
                      {"case", e.folder.string()}, {"objects", e.objects}}
@@ -135,7 +135,7 @@ int WatchFolderCommand::run(const Params& p, cli::Invocation& io) {
              << (e.rule.empty() ? "" : " by rule '" + e.rule + "'") << (e.why.empty() ? "" : ": " + e.why) << std::endl;
     if (!p.metrics.empty()) write_file(p.metrics, metrics_text(c));
   };
-  const WatchCounters c = watch_folder(rules, o, work, tell, io.context);
+  const WatchCounters c = watch_folder(rules, o, work, notify, io.context);
   if (!p.metrics.empty()) write_file(p.metrics, metrics_text(c));
   if (!io.common.quiet)
     io.err << c.done << " cases made, " << c.bad << " not, " << c.unmatched << " series without a rule\n";

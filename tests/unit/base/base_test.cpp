@@ -77,7 +77,7 @@ TEST(Param, ErrorsNameFlagRangeAndChoices) {
   EXPECT_EQ(error_of([&] { f[4].from_text("1,2"); }), "--at: '1,2' is not three numbers like 1,2,3");
   EXPECT_NE(error_of([&] { f[2].from_text("nan"); }), "");
   EXPECT_NE(error_of([&] { f[2].from_text("1e999"); }), "");
-  EXPECT_EQ(p.half_width, 1.5);  // a refused value changes nothing
+  EXPECT_EQ(p.half_width, 1.5);  // a rejected value changes nothing
 }
 
 TEST(Param, NearestName) {

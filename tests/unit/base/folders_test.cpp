@@ -200,14 +200,14 @@ TEST(Folders, WhereOneMayNotGoIsCannotWrite) {
   ASSERT_GE(child, 0);
   if (child == 0) {
     if (::geteuid() == 0 && ::setresuid(65534, 65534, 65534) != 0) ::_exit(99);
-    int told = 0;
+    int reported = 0;
     const auto code_of = [&](const std::function<void()>& f) {
       try {
         f();
       } catch (const Error& e) {
-        told += e.code() == ExitCode::cannot_write ? 1 : 0;
+        reported += e.code() == ExitCode::cannot_write ? 1 : 0;
       } catch (const fs::filesystem_error& e) {
-        told += error_of(e).code() == ExitCode::cannot_write ? 100 : 0;
+        reported += error_of(e).code() == ExitCode::cannot_write ? 100 : 0;
       }
     };
     code_of([&] { (void)output_exists(at.path() / "locked/x"); });
@@ -215,7 +215,7 @@ TEST(Folders, WhereOneMayNotGoIsCannotWrite) {
     code_of([&] { write_file(at.path() / "locked/x", ""); });
     code_of([&] { write_folder_atomically(at.path() / "locked/x", kAny, [](const auto&) {}); });
     code_of([&] { (void)fs::exists(at.path() / "locked/x"); });
-    ::_exit(told);
+    ::_exit(reported);
   }
   int status = 0;
   ::waitpid(child, &status, 0);

@@ -301,7 +301,7 @@ TEST_F(BatchRun, WhatIsDoneIsNotDoneAgain) {
   const auto flaky = work([](const std::string& code, int tries) { return code == "b" && tries < 2 ? 4 : 0; });
   EXPECT_EQ(run(rows, flaky).refused, 1U);
   BatchResult r = run(rows, flaky);
-  EXPECT_EQ(r.untouched, 3U);  // nothing has changed: what was refused would be refused again
+  EXPECT_EQ(r.untouched, 3U);  // nothing has changed: what was rejected would be rejected again
   EXPECT_EQ(tries_of("b"), 1);
   BatchOptions again;
   again.retry_failed = true;

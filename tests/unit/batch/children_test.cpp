@@ -79,7 +79,7 @@ TEST(Children, AreEndedForTheirTime) {
 }
 
 TEST(Children, CannotHaveMoreMemoryThanTheirBound) {
-  // The whole of it at once is refused; in a sanitizer's process, where only what is in use is bounded, it is ended
+  // The whole of it at once is rejected; in a sanitizer's process, where only what is in use is bounded, it is ended
   // instead.
   const ChildEnd end = end_of(
       [] {

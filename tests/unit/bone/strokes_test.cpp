@@ -21,12 +21,12 @@ void drill(World& w, std::mt19937& random, std::size_t voxels) {
     if (after == before) continue;
     bone.set(v, after);
     const VoxelChange change{body.body->name_of(v), after, before};
-    w.tell({&change, 1});
+    w.notify({&change, 1});
   }
 }
 
 void done(World& w, const SceneAction& a) {
-  if (w.act(a).done) w.tell(a);
+  if (w.act(a).done) w.notify(a);
 }
 
 TEST(Strokes, AreTakenBackBetweenAllElseInEveryOrderToTheBit) {
@@ -43,7 +43,7 @@ TEST(Strokes, AreTakenBackBetweenAllElseInEveryOrderToTheBit) {
       switch (code % 5) {
         case 0:
           drill(w, random, 3000);
-          w.tell(SceneAction::plain(ActionKind::stroke));
+          w.notify(SceneAction::plain(ActionKind::stroke));
           break;
         case 1:
           done(w, SceneAction::saw({{place += 4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1.5}));
@@ -58,7 +58,7 @@ TEST(Strokes, AreTakenBackBetweenAllElseInEveryOrderToTheBit) {
           drill(w, random, 1000);  // goes on until something else is done
           break;
       }
-      // A step more, or (refused, or the same piece moved on, or the stroke went on) the last one became another.
+      // A step more, or (rejected, or the same piece moved on, or the stroke went on) the last one became another.
       if (w.undo_steps() == steps) {
         hashes.back() = w.hash();
       } else {
@@ -88,7 +88,7 @@ TEST(Strokes, TheStreamTellsWhatCameFirst) {
   const SceneAction first = SceneAction::move(0, {{}, {1, 0, 0}}), second = SceneAction::move(0, {{}, {2, 0, 0}});
   const auto both = [&](const VoxelChange& c, bool write) {
     if (write) later.bodies()[0].body->bone.set(c.voxel, c.density);
-    later.tell({&c, 1});
+    later.notify({&c, 1});
   };
   BrickGrid& bone = live.bodies()[0].body->bone;
   std::vector<VoxelChange> changes;
@@ -100,17 +100,17 @@ TEST(Strokes, TheStreamTellsWhatCameFirst) {
   // Live: moved twice before anything is heard; then move, stroke, move.
   live.act(first);
   live.act(second);
-  live.tell({&changes[0], 1});
-  live.tell(first);
-  live.tell({&changes[1], 1});
-  live.tell(second);
+  live.notify({&changes[0], 1});
+  live.notify(first);
+  live.notify({&changes[1], 1});
+  live.notify(second);
   // The same from a recording.
   both(changes[0], true);
   later.act(first);
-  later.tell(first);
+  later.notify(first);
   both(changes[1], true);
   later.act(second);
-  later.tell(second);
+  later.notify(second);
   ASSERT_EQ(live.hash(), later.hash());
   ASSERT_EQ(live.undo_steps(), 4u);
   for (std::size_t steps = 4; steps > 0; --steps) {
@@ -130,7 +130,7 @@ TEST(Strokes, WhatWasMissedIsNotTakenBack) {
   const SceneAction ended = SceneAction::plain(ActionKind::stroke), undo = SceneAction::plain(kUndo);
   const SceneAction move = SceneAction::move(0, {{}, {1, 0, 0}}), on = SceneAction::move(0, {{}, {2, 0, 0}});
   drill(w, random, 1000);
-  w.tell(ended);
+  w.notify(ended);
   done(w, move);
   w.forget();
   EXPECT_EQ(w.undo_steps(), 0u);
@@ -142,12 +142,12 @@ TEST(Strokes, WhatWasMissedIsNotTakenBack) {
   EXPECT_FALSE(w.act(undo).done);
   drill(w, random, 1000);
   EXPECT_FALSE(w.act(undo).done);
-  w.tell(ended);
+  w.notify(ended);
   EXPECT_FALSE(w.act(undo).done);
   // From here on all is known again.
   const std::string before = w.hash();
   drill(w, random, 1000);
-  w.tell(ended);
+  w.notify(ended);
   EXPECT_NE(w.hash(), before);
   EXPECT_EQ(w.undo_steps(), 1u);
   ASSERT_TRUE(w.act(undo).done);
@@ -178,8 +178,8 @@ TEST(Strokes, MemoryIsBounded) {
       changes[i] = {v, bone.value(v) * 0.5F, bone.value(v)};
       bone.set(v, changes[i].density);
     }
-    w.tell(changes);
-    w.tell(SceneAction::plain(ActionKind::stroke));
+    w.notify(changes);
+    w.notify(SceneAction::plain(ActionKind::stroke));
     EXPECT_EQ(w.undo_steps(), n + 1 <= most ? n + 2 : most);
   }
   for (std::size_t n = 0; n < most; ++n) {

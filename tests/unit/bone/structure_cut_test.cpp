@@ -62,9 +62,9 @@ TEST(StructureCut, AcrossANerveItTakesADisc) {
   const auto both = structures_cut(map, blade({0, 0, 0}, {0, 0, 1}, 1));
   ASSERT_EQ(both.size(), 2U);
   EXPECT_NEAR(both[1].mm3, 6 * 18, 4) << "along the sinus' middle";
-  EXPECT_EQ(told_structures_cut(map, both).find("the facial nerve (0."), 0U) << told_structures_cut(map, both);
-  EXPECT_NE(told_structures_cut(map, both).find(") and the sigmoid sinus (1"), std::string::npos)
-      << told_structures_cut(map, both);
+  EXPECT_EQ(reported_structures_cut(map, both).find("the facial nerve (0."), 0U) << reported_structures_cut(map, both);
+  EXPECT_NE(reported_structures_cut(map, both).find(") and the sigmoid sinus (1"), std::string::npos)
+      << reported_structures_cut(map, both);
 }
 
 // Halves of a blade take what the whole takes, wherever it is parted.
@@ -86,7 +86,7 @@ TEST(StructureCut, MissedByHalfAMillimetreAndGrazed) {
   EXPECT_EQ(missed[0].structure, 2);
   EXPECT_EQ(missed[0].mm3, 0);
   EXPECT_NEAR(missed[0].distance_mm, 0.5, 0.12);
-  EXPECT_EQ(told_structures_cut(map, missed), "");
+  EXPECT_EQ(reported_structures_cut(map, missed), "");
   const auto grazed = structures_cut(map, blade({-0.6, 0, 0}, {1, 0, 0}, 0.6));
   ASSERT_FALSE(grazed.empty());
   EXPECT_EQ(grazed[0].distance_mm, 0);

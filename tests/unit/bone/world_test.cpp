@@ -245,7 +245,7 @@ TEST(World, APieceIsSplitAgainAndSawnWhereItLies) {
   EXPECT_EQ(w.hash(), World(bar(0.5, 0)).hash());
 }
 
-// What the follower keeps of a piece, made from what it knew of the whole, is what it would be made anew.
+// What the follower keeps of a piece, made from what it knew of the whole, is what it would be made again.
 TEST(World, LabelsAndSurfaceOfAPieceEqualNewOnes) {
   const auto surface_of = [](const BrickGrid& b) { return surface_hash(surface_nets(b).mesh); };
   const auto lit_as_if_new = [](LiveSurface& s) {

@@ -162,13 +162,14 @@ TEST(Cgal, SaysWhatItCannotMesh) {
   CgalMeshOptions brief;
   brief.cell_mm = 2;
   brief.limits.seconds = 2;
-  std::string told;
+  std::string reported;
   Context context;
-  context.on_log([&](LogLevel level, std::string_view message) { told += level == LogLevel::warning ? message : ""; });
+  context.on_log(
+      [&](LogLevel level, std::string_view message) { reported += level == LogLevel::warning ? message : ""; });
   EXPECT_THROW(static_cast<void>(
                    tets_by_cgal(test::joined(test::sphere(10, 3), test::sphere(10, 3, {20, 0, 0})), brief, context)),
                Error);
-  EXPECT_NE(told.find("touches itself at 1 points"), std::string::npos) << told;
+  EXPECT_NE(reported.find("touches itself at 1 points"), std::string::npos) << reported;
 }
 
 }  // namespace

@@ -323,7 +323,7 @@ TEST(Lending, ACapDrivesTheCamera) {
     SpaceMouseState state;
     ASSERT_TRUE(decode_space_mouse(report, state));
     const Vec3 wanted{state.move[0], state.move[2], -state.move[1]};
-    const auto told = [&](const auto& device) {
+    const auto reported = [&](const auto& device) {
       const DeviceMotion m = device.motion();
       return m.push && length(*m.push - wanted) < 1e-9;
     };
@@ -333,7 +333,7 @@ TEST(Lending, ACapDrivesTheCamera) {
         if (end >= 0) static_cast<void>(::send(end, report.data(), report.size(), MSG_NOSIGNAL));
       }
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      both = told(puck) && told(hand);
+      both = reported(puck) && reported(hand);
     }
     EXPECT_TRUE(both) << axis;
   }

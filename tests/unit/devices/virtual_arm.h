@@ -23,7 +23,7 @@ class VirtualArm {
   VirtualArm(const VirtualArm&) = delete;
   VirtualArm& operator=(const VirtualArm&) = delete;
 
-  /// For HidLink: each call plugs the cable in anew, while `plugged`.
+  /// For HidLink: each call plugs the cable in again, while `plugged`.
   HidLink::Open opener() {
     return [this](std::string& why) -> std::unique_ptr<HidPort> {
       why = "unplugged";

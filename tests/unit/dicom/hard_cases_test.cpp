@@ -32,7 +32,7 @@ Imported load(const fs::path& folder, ImportParams params = {}) {
   return import_ct(folder, params);
 }
 
-// Refused with this code; what() names the file or says why.
+// Rejected with this code; what() names the file or says why.
 Verdict refusal(const fs::path& folder, std::string_view code, const std::string& said = {}, ImportParams params = {}) {
   try {
     static_cast<void>(import_ct(folder, params));
@@ -274,7 +274,8 @@ TEST(HardCase, C11_TwoPicturesAtOnePlace) {
   s.edit("010-other", [](DcmDataset& d) { put(d, DCM_AcquisitionNumber, "99"); });
   const Imported r = load(s.folder);
   EXPECT_EQ(r.verdict.slices.size(), 20u);
-  // One slice alone may have been a slice of this scan: a warning. A whole stack of its own is told by several_stacks.
+  // One slice alone may have been a slice of this scan: a warning. A whole stack of its own is reported by
+  // several_stacks.
   EXPECT_EQ(severity_of(r.verdict, code::other_acquisition), Severity::warning);
 }
 
@@ -601,7 +602,7 @@ TEST(HardCase, C24_WithoutPreambleAndMeta) {
   }
 }
 
-// Each pixel stored anew as word(HU), with the tags that say how.
+// Each pixel stored again as word(HU), with the tags that say how.
 void store_as(Series& s, const std::function<Uint16(int hu, std::size_t at)>& word, int bits_stored, int high_bit,
               bool is_signed, int intercept) {
   s.edit_all([&](DcmDataset& d, int) {
@@ -787,7 +788,7 @@ TEST(HardCase, C27_OneScanThatLooksLikeSeveral) {
   EXPECT_EQ(r.verdict.slices.size(), 20u);
 }
 
-// Unsigned pixels that lack their intercept: everything 1024 HU too high, bone from fat on. Refused, with the offset
+// Unsigned pixels that lack their intercept: everything 1024 HU too high, bone from fat on. Rejected, with the offset
 // that mends it.
 TEST(HardCase, C28_WithoutTheOffset) {
   for (const bool thorough : {true, false}) {

@@ -249,7 +249,7 @@ TEST(Objects, SegmentationsAreReadHoweverTheyArePacked) {
   ASSERT_TRUE(file.saveFile((out / "bits-rle.dcm").c_str(), EXS_RLELossless).good());
   expect_read(out / "bits-rle.dcm");
 
-  // Damaged: refused, with the reason.
+  // Damaged: rejected, with the reason.
   fs::resize_file(out / "j2k.dcm", fs::file_size(out / "j2k.dcm") * 2 / 3);
   EXPECT_THROW(static_cast<void>(load_segmentation(out / "j2k.dcm")), Error);
 }

@@ -191,17 +191,17 @@ TEST(Findings, NothingRemovedIsSaid) {
 }
 
 TEST(Findings, NumbersAsPeopleSayThem) {
-  EXPECT_EQ(told_number(31.4), "31");
-  EXPECT_EQ(told_number(1234.4), "1234");
-  EXPECT_EQ(told_number(4.249), "4.2");
-  EXPECT_EQ(told_number(0.3456), "0.35");
-  EXPECT_EQ(told_number(0.012345), "0.012");
-  EXPECT_EQ(told_number(0), "0");
-  EXPECT_EQ(told_number(-2.96), "-3");
-  EXPECT_EQ(told_seconds(3723), "1 h 2 min");
-  EXPECT_EQ(told_seconds(60), "1 min");
-  EXPECT_EQ(told_seconds(59.6), "1 min");
-  EXPECT_EQ(told_seconds(0.41), "0.41 s");
+  EXPECT_EQ(reported_number(31.4), "31");
+  EXPECT_EQ(reported_number(1234.4), "1234");
+  EXPECT_EQ(reported_number(4.249), "4.2");
+  EXPECT_EQ(reported_number(0.3456), "0.35");
+  EXPECT_EQ(reported_number(0.012345), "0.012");
+  EXPECT_EQ(reported_number(0), "0");
+  EXPECT_EQ(reported_number(-2.96), "-3");
+  EXPECT_EQ(reported_seconds(3723), "1 h 2 min");
+  EXPECT_EQ(reported_seconds(60), "1 min");
+  EXPECT_EQ(reported_seconds(59.6), "1 min");
+  EXPECT_EQ(reported_seconds(0.41), "0.41 s");
 }
 
 TEST(Findings, AUnitIsWrittenOneWayForPeople) {

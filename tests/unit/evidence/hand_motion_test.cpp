@@ -21,7 +21,7 @@ constexpr double kHz = 1000;
 // How a device tells of a place at a time.
 struct Telling {
   std::string name;
-  std::function<Vec3(Vec3, double)> told;
+  std::function<Vec3(Vec3, double)> reported;
 };
 std::vector<Telling> tellings() {
   std::vector<Telling> all{{"ideal", [](Vec3 at, double) { return at; }}};
@@ -60,10 +60,11 @@ TEST(IdleClock, TenSecondsAtRestAreTenHoweverTheDeviceTells) {
   for (Telling& d : tellings()) {
     // All of it; and between two ways at 20 mm/s of a second each.
     IdleClock whole(kHz), between(kHz);
-    for (std::uint64_t n = 0; n < 10'000; ++n) whole.add(tick_at(n, d.told({1, 2, 3}, static_cast<double>(n) / kHz)));
+    for (std::uint64_t n = 0; n < 10'000; ++n)
+      whole.add(tick_at(n, d.reported({1, 2, 3}, static_cast<double>(n) / kHz)));
     for (std::uint64_t n = 0; n < 12'000; ++n) {
       const double s = static_cast<double>(n) / kHz;
-      between.add(tick_at(n, d.told({20 * (std::min(s, 1.0) + std::max(s - 11, 0.0)), 2, 3}, s)));
+      between.add(tick_at(n, d.reported({20 * (std::min(s, 1.0) + std::max(s - 11, 0.0)), 2, 3}, s)));
     }
     if (std::getenv("OSTEO_PRINT") != nullptr)
       std::printf("%-32s %.3f %.3f s\n", d.name.c_str(), idle_s(whole), idle_s(between));
@@ -76,7 +77,7 @@ TEST(IdleClock, AHandOnItsWayIsNotIdleHoweverTheDeviceTells) {
   for (Telling& d : tellings()) {
     IdleClock slow(kHz);
     for (std::uint64_t n = 0; n < 5000; ++n)
-      slow.add(tick_at(n, d.told({0.004 * static_cast<double>(n), 0, 0}, static_cast<double>(n) / kHz)));
+      slow.add(tick_at(n, d.reported({0.004 * static_cast<double>(n), 0, 0}, static_cast<double>(n) / kHz)));
     EXPECT_EQ(idle_s(slow), 0) << d.name;
   }
 }
@@ -115,7 +116,7 @@ TEST(HandMotion, SpeedIsTheHandsHoweverTheDeviceTells) {
     double most_off = 0;
     for (std::uint64_t n = 0; n < 2000; ++n) {
       const double s = static_cast<double>(n) / kHz;
-      motion.add(n, d.told({10 * s, 0, 0}, s));
+      motion.add(n, d.reported({10 * s, 0, 0}, s));
       if (const auto speed = motion.speed_mm_s()) most_off = std::max(most_off, std::abs(*speed - 10));
     }
     if (std::getenv("OSTEO_PRINT") != nullptr) std::printf("%-32s %.3f mm/s\n", d.name.c_str(), most_off);
@@ -156,7 +157,7 @@ TEST(HandMotion, PathAndSpeedsOfMetricsAreTheHands) {
       std::vector<TickRecord> ticks;
       for (std::uint64_t n = from; n < from + 100; ++n) {
         const double s = static_cast<double>(n) / kHz;
-        TickRecord t = tick_at(n, d.told({-5 + 10 * std::clamp(s - 1, 0.0, 1.0), 0, 5}, s));
+        TickRecord t = tick_at(n, d.reported({-5 + 10 * std::clamp(s - 1, 0.0, 1.0), 0, 5}, s));
         t.speed_rpm = 20'000;
         t.normal_force_n = 0.5F;
         ticks.push_back(t);
@@ -276,9 +277,9 @@ TEST(NearMetric, EachHandsPressAboveALimitIsTold) {
   std::vector<Measured> values;
   std::vector<Moment> moments;
   near.finish(world, values, moments);
-  std::vector<double> told_s;
-  for (const Moment& m : moments) told_s.push_back(m.t_s);
-  EXPECT_EQ(told_s, (std::vector<double>{0, 0.5, 2.5}));
+  std::vector<double> reported_s;
+  for (const Moment& m : moments) reported_s.push_back(m.t_s);
+  EXPECT_EQ(reported_s, (std::vector<double>{0, 0.5, 2.5}));
   for (const Measured& m : values) {
     if (m.is("excess_force_ns")) {
       EXPECT_NEAR(*m.value, 2.5, 1e-6);

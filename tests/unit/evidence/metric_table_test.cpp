@@ -213,12 +213,12 @@ TEST(MetricTable, ASecondBurrThatRestsChangesNoMetricNoMomentAndNoEvent) {
     EXPECT_EQ(one.score.values[n].name(), two.score.values[n].name());
     EXPECT_EQ(one.score.values[n].value, two.score.values[n].value) << one.score.values[n].name();
   }
-  const auto told = [](const Score& s) {
+  const auto reported = [](const Score& s) {
     std::vector<std::string> all;
     for (const Moment& m : s.moments) all.push_back(std::to_string(m.t_s) + " " + m.what);
     return all;
   };
-  EXPECT_EQ(told(one.score), told(two.score));
+  EXPECT_EQ(reported(one.score), reported(two.score));
   EXPECT_EQ(timeline_json(one.timeline).dump(), timeline_json(two.timeline).dump());
 }
 

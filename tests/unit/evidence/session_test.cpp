@@ -113,7 +113,8 @@ TEST(Sessions, LiveAndFromTheFileAreTheSameBits) {
   // One stepping: the scene that frames leave is that of a replay of the file's changes.
   World applied = block();
   apply_recorded(SessionReader(scratch / "s.oss"), applied);
-  EXPECT_EQ(tell_frames(SessionReader(scratch / "s.oss"), block(), [](const EvidenceFrame&) {}).hash(), applied.hash());
+  EXPECT_EQ(report_frames(SessionReader(scratch / "s.oss"), block(), [](const EvidenceFrame&) {}).hash(),
+            applied.hash());
   EXPECT_NEAR(value(file.values, "removed_mm3"), s.removed_mm3, 1e-3);
   EXPECT_NEAR(value(file.values, "sawn_mm3"), s.sawn_mm3, 1e-3);
   EXPECT_GT(value(file.values, "seen_share"), 0.5);
@@ -125,7 +126,7 @@ TEST(Sessions, LiveAndFromTheFileAreTheSameBits) {
 // The nerve cut through by a plane was told as "no structure was touched".
 TEST(Sessions, ASawThroughAStructureIsTold) {
   const test::ScratchFolder scratch;
-  const auto told = [&](const std::string& name, const SawCut& cut, const SceneAction& then) {
+  const auto reported = [&](const std::string& name, const SawCut& cut, const SceneAction& then) {
     const std::vector<SceneAction> actions{at(100, SceneAction::saw(cut)), at(200, then)};
     const RehearsalSummary summary = record(scratch / name, 1, actions);
     return std::pair(summary, score(scratch / name));
@@ -133,7 +134,7 @@ TEST(Sessions, ASawThroughAStructureIsTold) {
   const Procedure p = parse_procedure(kProcedure, "t.json");
   // Straight through the rod, at y 3; it was cut, though that is taken back.
   const auto [through, cut] =
-      told("through", {{0, 3, 0}, {0, 1, 0}, {1, 0, 0}, 0.8}, SceneAction::plain(ActionKind::undo));
+      reported("through", {{0, 3, 0}, {0, 1, 0}, {1, 0, 0}, 0.8}, SceneAction::plain(ActionKind::undo));
   // As its labels of 0.4 mm have it: sixteen voxels across.
   EXPECT_NEAR(value(cut.values, "cut_mm3[rod]") / (16 * 0.4 * 0.4 * 0.8), 1, 0.15);
   const Findings serious = findings_of(cut, rod().get(), nullptr);
@@ -149,8 +150,8 @@ TEST(Sessions, ASawThroughAStructureIsTold) {
   // An item that asks for it whole has failed, though no bone of it is gone.
   EXPECT_FALSE(score(scratch / "through", &p).items.at(0).pass);
   // Beside it: half a millimetre of the rod, 0.7 of its labels; and then one through the air, which is none.
-  const auto [beside, missed] = told("beside", {{1.9, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0.8},
-                                     SceneAction::saw({{0, 30, 0}, {0, 1, 0}, {1, 0, 0}, 0.8}));
+  const auto [beside, missed] = reported("beside", {{1.9, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0.8},
+                                         SceneAction::saw({{0, 30, 0}, {0, 1, 0}, {1, 0, 0}, 0.8}));
   EXPECT_TRUE(beside.structure_cuts.empty());
   EXPECT_EQ(value(missed.values, "cut_mm3[rod]"), 0);
   EXPECT_NEAR(value(missed.values, "saw_clearance_mm[rod]"), 0.7, 0.15);

@@ -77,7 +77,7 @@ TEST(TimelineKeeper, SamplesAreWhatTheirTicksSay) {
 TEST(TimelineKeeper, TouchesAndInjuriesAreEventsOfTheirLength) {
   const World world = block();
   const Procedure procedure = cells_to_be_opened();
-  const auto told = [&](const Procedure* p) {
+  const auto reported = [&](const Procedure* p) {
     TimelineKeeper keeper({1000, &two_balls(), p});
     std::vector<TickRecord> ticks;
     // Into the nerve for 50 ms turning, out for 200 ms, in again at rest for 20 ms; then into the cells.
@@ -94,7 +94,7 @@ TEST(TimelineKeeper, TouchesAndInjuriesAreEventsOfTheirLength) {
     std::erase_if(line.events, [](const TimelineEvent& e) { return e.kind == EventKind::instrument; });
     return line;
   };
-  const Timeline line = told(&procedure);
+  const Timeline line = reported(&procedure);
   ASSERT_EQ(line.events.size(), 2U);  // what is to be opened is not injured by that
   EXPECT_EQ(line.events[0].kind, EventKind::injury);
   EXPECT_EQ(line.events[0].structure, "nerve");
@@ -103,7 +103,7 @@ TEST(TimelineKeeper, TouchesAndInjuriesAreEventsOfTheirLength) {
   EXPECT_EQ(line.events[1].kind, EventKind::touch);
   EXPECT_NEAR(line.events[1].t_s, 0.260, 1e-9);
   EXPECT_EQ(line.structure[3], 1);  // and is not what one is near
-  const Timeline all = told(nullptr);
+  const Timeline all = reported(nullptr);
   ASSERT_EQ(all.events.size(), 3U);
   EXPECT_EQ(all.events[2].structure, "cells");
 }

@@ -252,18 +252,18 @@ TEST(Participant, MemoryIsWhatIsScored) {
   EXPECT_LT(last, 0.3);
 }
 
-TEST(Desk, GoesThroughATrialAndSavesIt) {
+TEST(Controller, GoesThroughATrialAndSavesIt) {
   const TemporaryFolder folder;
   Protocol p = small(1);
   p.simulated = false;
   p.feedback = Feedback::delayed;
   // The first block that is not by hand alone has feedback behind its training.
-  ForceSkillDesk desk(folder.path(), p, 0, false, Mover::keys, "keys", {.damping_n_s_per_m = 12});
-  const bool sees = desk.trial().training != Training::haptic;
-  EXPECT_EQ(desk.page(), DeskPage::before_training);
-  EXPECT_EQ(length(desk.step({})), 0);
-  desk.update();
-  EXPECT_EQ(desk.page(), DeskPage::before_training);
+  ForceSkillController controller(folder.path(), p, 0, false, Mover::keys, "keys", {.damping_n_s_per_m = 12});
+  const bool sees = controller.trial().training != Training::haptic;
+  EXPECT_EQ(controller.page(), DeskPage::before_training);
+  EXPECT_EQ(length(controller.step({})), 0);
+  controller.update();
+  EXPECT_EQ(controller.page(), DeskPage::before_training);
   const auto run = [&] {
     SimulatedDeviceParams arm;
     arm.mass_kg = 0.25;
@@ -271,32 +271,32 @@ TEST(Desk, GoesThroughATrialAndSavesIt) {
     SimulatedDevice device(arm, Vec3{});
     device.set_hand({0, -2, 0});
     Vec3 force;
-    for (std::uint64_t tick = 0; desk.running(); ++tick) {
-      force = desk.step(device.read(tick, 1 / p.rate_hz, force));
+    for (std::uint64_t tick = 0; controller.running(); ++tick) {
+      force = controller.step(device.read(tick, 1 / p.rate_hz, force));
       if (tick == 700) {
-        EXPECT_FALSE(desk.drawing(800, 600).marks.empty());
+        EXPECT_FALSE(controller.drawing(800, 600).marks.empty());
       }
-      desk.go_on();  // in a run the space bar does nothing
+      controller.go_on();  // in a run the space bar does nothing
     }
-    desk.update();
+    controller.update();
   };
-  desk.go_on();
-  EXPECT_EQ(desk.page(), DeskPage::training);
+  controller.go_on();
+  EXPECT_EQ(controller.page(), DeskPage::training);
   run();
   if (sees) {
-    EXPECT_EQ(desk.page(), DeskPage::feedback);
-    EXPECT_EQ(desk.last_training().first.size(), desk.last_training().second.size());
-    desk.go_on();
+    EXPECT_EQ(controller.page(), DeskPage::feedback);
+    EXPECT_EQ(controller.last_training().first.size(), controller.last_training().second.size());
+    controller.go_on();
   }
-  EXPECT_EQ(desk.page(), DeskPage::before_test);
-  desk.go_on();
+  EXPECT_EQ(controller.page(), DeskPage::before_test);
+  controller.go_on();
   run();
-  EXPECT_EQ(desk.done(), 1U);
+  EXPECT_EQ(controller.done(), 1U);
   const auto scores = read_trials(folder.path() / "S1");
   ASSERT_EQ(scores.size(), 1U);
   EXPECT_EQ(scores[0].mover, Mover::keys);
   // Another desk goes on there.
-  const ForceSkillDesk again(folder.path(), p, 0, false, Mover::keys, "keys", {});
+  const ForceSkillController again(folder.path(), p, 0, false, Mover::keys, "keys", {});
   EXPECT_EQ(again.done(), 1U);
 }
 

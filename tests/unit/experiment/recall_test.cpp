@@ -76,9 +76,9 @@ TEST(Recall, WhatWasSaturatedCountsNothing) {
     applied[i] = 0;
     saturated[i] = true;
   }
-  const Recall told = score(applied, saturated), untold = score(applied);
-  EXPECT_NEAR(told.saturated, 2.0 / stimulus().seconds(), 0.01);
-  EXPECT_LT(told.score, 0.2 * untold.score);
+  const Recall reported = score(applied, saturated), untold = score(applied);
+  EXPECT_NEAR(reported.saturated, 2.0 / stimulus().seconds(), 0.01);
+  EXPECT_LT(reported.score, 0.2 * untold.score);
   EXPECT_NEAR(score(std::vector<double>(applied.size(), 0), saturated).score, 1, 1e-12);
 }
 

@@ -1,4 +1,4 @@
-// What a grid of bricks cannot hold is refused, wherever it comes from.
+// What a grid of bricks cannot hold is rejected, wherever it comes from.
 #include <gtest/gtest.h>
 
 #include <unistd.h>

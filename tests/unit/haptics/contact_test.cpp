@@ -495,8 +495,8 @@ Layers fed(bool hard, double h, double hz, double mm_s = 1) {
   return {sum.cortex_n / in_cortex, sum.cancellous_n / in_cancellous};
 }
 
-// What a hand can tell apart: 7 % (X. Pang, H. Tan, N. Durlach, Percept Psychophys 49(6), 1991, from 2.5 to 10 N); 10 %
-// to be careful.
+// What a hand can distinguish: 7 % (X. Pang, H. Tan, N. Durlach, Percept Psychophys 49(6), 1991, from 2.5 to 10 N); 10
+// % to be careful.
 TEST(Hardness, TheStepFromCortexToCancellousBoneIsFelt) {
   constexpr double kNoticed = 0.10;
   const Layers alike = fed(false, 0.5, 1000), hard = fed(true, 0.5, 1000);

@@ -292,27 +292,27 @@ TEST(Removal, APieceThatWasMovedLosesWhatWasSweptInIt) {
   renderer.show(&scene);
   const Path path = dwell(3, 0.46, 2);
   const double before = bone.sum();
-  double told = 0;
+  double reported = 0;
   for (int t = 0; t < path.seconds() * 1000; ++t) {
     DeviceSample s = path.sample(t * 1e-3);
     s.position_mm = to_floats(pose(from_floats(s.position_mm)));
     s.axis = to_floats(pose.rotation * from_floats(s.axis));
-    told += static_cast<double>(renderer.step(s).record.removed_mm3);
+    reported += static_cast<double>(renderer.step(s).record.removed_mm3);
   }
   const double removed = (before - bone.sum()) * bone.frame().voxel_volume_mm3();
   EXPECT_NEAR(removed / (std::numbers::pi * 0.46 * 0.46 * (2 - 0.46 / 3)), 0.99, 0.02);
-  EXPECT_NEAR(told, removed, 1e-4 * removed);
+  EXPECT_NEAR(reported, removed, 1e-4 * removed);
 }
 
 TEST(Removal, BurrsTooSmallForTheirVoxelsAreTold) {
-  const auto told = [](double diameter, BurrShape shape, double h) {
+  const auto reported = [](double diameter, BurrShape shape, double h) {
     return too_small_for_voxels(
         burr_library()[static_cast<std::size_t>(burr_index(BurrKind::cutting, diameter, shape))], h);
   };
-  EXPECT_EQ(told(2, BurrShape::ball, 0.5), "");
-  EXPECT_EQ(told(4, BurrShape::taper, 0.5), "");
-  EXPECT_NE(told(2, BurrShape::taper, 0.5), "");
-  const std::string text = told(2, BurrShape::ball, 0.9);
+  EXPECT_EQ(reported(2, BurrShape::ball, 0.5), "");
+  EXPECT_EQ(reported(4, BurrShape::taper, 0.5), "");
+  EXPECT_NE(reported(2, BurrShape::taper, 0.5), "");
+  const std::string text = reported(2, BurrShape::ball, 0.9);
   for (const char* const part : {"cutting 2 mm", "0.9 mm", "1.1 voxels", "from 0.5 mm", "--spacing"})
     EXPECT_NE(text.find(part), std::string::npos) << text;
 }

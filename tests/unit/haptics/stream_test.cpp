@@ -58,7 +58,7 @@ TEST(Stream, ReadersJoinAndLeaveAThousandTimesAndNobodyElseLosesAnything) {
     }
   });
   std::thread others[2];
-  std::atomic<std::uint64_t> wrong{0}, told{0};
+  std::atomic<std::uint64_t> wrong{0}, reported{0};
   for (std::thread& other : others) {
     other = std::thread([&] {
       for (int n = 0; n < 1000; ++n) {
@@ -69,7 +69,7 @@ TEST(Stream, ReadersJoinAndLeaveAThousandTimesAndNobodyElseLosesAnything) {
           mine.drain(r);
         }
         wrong += mine.wrong;
-        told += mine.ticks > 0 ? 1 : 0;
+        reported += mine.ticks > 0 ? 1 : 0;
         stream.remove_reader(r);
       }
     });
@@ -89,7 +89,7 @@ TEST(Stream, ReadersJoinAndLeaveAThousandTimesAndNobodyElseLosesAnything) {
   EXPECT_EQ(stays.dropped, 0u);
   EXPECT_EQ(stays.actions_dropped, 0u);
   EXPECT_EQ(wrong, 0u);
-  EXPECT_GT(told, 200u);
+  EXPECT_GT(reported, 200u);
 }
 
 TEST(Stream, HasRoomForSoManyReadersAndForOthersWhenTheyLeave) {

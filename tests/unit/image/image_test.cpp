@@ -96,17 +96,17 @@ TEST(Distance, WithinAWindowItIsTheSame) {
       const auto whole = squared_distance_mm2(mask, f, value);
       for (const double within : {0.2, 0.5, 2.1, 3.9}) {
         const auto near = squared_distance_within_mm2(mask, f, value, within);
-        std::size_t told = 0;
+        std::size_t reported = 0;
         for (std::size_t v = 0; v < mask.size(); ++v) {
           if (whole[v] <= within * within) {
-            ++told;
+            ++reported;
             EXPECT_NEAR(near[v], whole[v], 1e-6 * whole[v]);
           } else {
             EXPECT_TRUE(near[v] == std::numeric_limits<float>::infinity() || whole[v] < within * within * (1 + 1e-5))
                 << near[v];
           }
         }
-        EXPECT_GT(told, 0U);
+        EXPECT_GT(reported, 0U);
       }
     }
   }

@@ -1,4 +1,5 @@
-// Table and head holder: what is certain goes, no voxel of the head does, and what is not certain stays and is told.
+// Table and head holder: what is certain goes, no voxel of the head does, and what is not certain stays and is
+// reported.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -192,13 +192,13 @@ TEST(Nifti, SeveralVolumesAreRefused) {
 }
 
 TEST(Nifti, FormsThatDisagreeAreTold) {
-  for (const auto& [degrees, told] : {std::pair{0.0, false}, {0.5, false}, {25.0, true}, {-90.0, true}}) {
+  for (const auto& [degrees, reported] : {std::pair{0.0, false}, {0.5, false}, {25.0, true}, {-90.0, true}}) {
     SCOPED_TRACE(degrees);
     Nifti n;
     n.qform(degrees);
     n.save(file("forms.nii"));
     const Loaded l = load(file("forms.nii"));
-    EXPECT_EQ(l.has(What::places_disagree), told);
+    EXPECT_EQ(l.has(What::places_disagree), reported);
     EXPECT_NEAR(length(l.image.frame.origin_mm - Vec3{10, 20, 30}), 0, 1e-4);
   }
   Nifti mirrored;
@@ -216,15 +216,15 @@ std::string nrrd(const std::string& more) {
 const std::string kDirections = "space directions: (2,0,0) (0,3,0) (0,0,4)\nspace origin: (10,20,30)\n";
 
 TEST(Nrrd, WithoutAnAnatomicalSpaceItsSidesAreNotKnown) {
-  for (const auto& [space, told] : {std::pair{"space dimension: 3\n", true},
-                                    {"space: scanner-xyz\n", true},
-                                    {"space: 3D-right-handed\n", true},
-                                    {"space: left-posterior-superior\n", false},
-                                    {"space: RAS\n", false},
-                                    {"space: LAS\n", false}}) {
+  for (const auto& [space, reported] : {std::pair{"space dimension: 3\n", true},
+                                        {"space: scanner-xyz\n", true},
+                                        {"space: 3D-right-handed\n", true},
+                                        {"space: left-posterior-superior\n", false},
+                                        {"space: RAS\n", false},
+                                        {"space: LAS\n", false}}) {
     SCOPED_TRACE(space);
     write(file("space.nrrd"), nrrd(space + kDirections));
-    EXPECT_EQ(load(file("space.nrrd")).has(What::axes_not_stated), told);
+    EXPECT_EQ(load(file("space.nrrd")).has(What::axes_not_stated), reported);
   }
   write(file("bare.nrrd"), nrrd("spacings: 2 3 4\n"));
   EXPECT_TRUE(load(file("bare.nrrd")).has(What::axes_not_stated));

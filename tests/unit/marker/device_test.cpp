@@ -103,7 +103,7 @@ class PenHand : public ::testing::Test {
   std::shared_ptr<Feed> feed_ = std::make_shared<Feed>();
   std::shared_ptr<PenLink> link_;
   HandGoal start_{{100, 20, 30}, {0, 0, 1}, 0, 4};
-  Mat3 to_scene_ = desk_from_camera(CameraPlace::facing);
+  Mat3 to_scene_ = controller_from_camera(CameraPlace::facing);
 };
 
 TEST_F(PenHand, WaitsUntilThePenIsSeenThenFollowsItAndDrills) {
@@ -125,7 +125,7 @@ TEST_F(PenHand, WaitsUntilThePenIsSeenThenFollowsItAndDrills) {
   EXPECT_LT(length(from_floats(s.position_mm) - start_.position_mm), 0.05);  // it takes hold where the tool is
   EXPECT_GT(dot(from_floats(s.axis), to_scene_ * here.rotation.column[2]), std::cos(0.03));
 
-  std::this_thread::sleep_for(std::chrono::milliseconds(350));  // a gap: the filter begins anew, without a speed
+  std::this_thread::sleep_for(std::chrono::milliseconds(350));  // a gap: the filter begins again, without a speed
   give(seen(there));
   s = run(*d, 3000);
   const Vec3 moved = from_floats(s.position_mm) - start_.position_mm;
@@ -230,7 +230,7 @@ TEST(Pictures, AVideoStandsForACamera) {
     EXPECT_NEAR(p.pixels[5000], 40 * pictures, 3);
   }
   EXPECT_EQ(pictures, 5);
-  // One that ends is not begun anew: the hand is gone, and it is said.
+  // One that ends is not begun again: the hand is gone, and it is said.
   PenLink link([&] { return open_pictures(path); }, test::webcam(320, 240), Pen{});
   for (int i = 0; i < 6000 && link.trouble() != "the video has ended"; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -246,13 +246,13 @@ TEST(Pictures, AVideoStandsForACamera) {
   EXPECT_THROW(static_cast<void>(open_pictures((folder.path()).string())), Error);  // no picture in it
 }
 
-TEST(Desk, TheCameraLiesOnItRightHanded) {
+TEST(Controller, TheCameraLiesOnItRightHanded) {
   for (const CameraPlace place : {CameraPlace::facing, CameraPlace::above, CameraPlace::behind})
-    EXPECT_EQ(determinant(desk_from_camera(place)), 1);
+    EXPECT_EQ(determinant(controller_from_camera(place)), 1);
   // What is up in the picture is up, away, up.
-  EXPECT_EQ(desk_from_camera(CameraPlace::facing) * (Vec3{0, -1, 0}), (Vec3{0, 0, 1}));
-  EXPECT_EQ(desk_from_camera(CameraPlace::above) * (Vec3{0, -1, 0}), (Vec3{0, 1, 0}));
-  EXPECT_EQ(desk_from_camera(CameraPlace::behind) * (Vec3{0, 0, 1}), (Vec3{0, 1, 0}));
+  EXPECT_EQ(controller_from_camera(CameraPlace::facing) * (Vec3{0, -1, 0}), (Vec3{0, 0, 1}));
+  EXPECT_EQ(controller_from_camera(CameraPlace::above) * (Vec3{0, -1, 0}), (Vec3{0, 1, 0}));
+  EXPECT_EQ(controller_from_camera(CameraPlace::behind) * (Vec3{0, 0, 1}), (Vec3{0, 1, 0}));
 }
 
 }  // namespace

@@ -212,10 +212,10 @@ TEST(Movie, WhatCannotBeRunAgainIsToldAsRecordedWithTheSameBone) {
         return length(p - Vec3{0, 0, -10}) < 1 ? 1 : 0;
       },
       {{1, "ball", {}}}, 0.5, 24));
-  const MovieFacts told = make_movie(SessionReader(scratch / "s.oss"), block(), other, o, scratch / "told.mp4");
-  EXPECT_FALSE(told.repeated);
-  ASSERT_EQ(told.words.size(), 1U);
-  EXPECT_NE(told.words[0].find("tenth of a second"), std::string::npos);
+  const MovieFacts reported = make_movie(SessionReader(scratch / "s.oss"), block(), other, o, scratch / "told.mp4");
+  EXPECT_FALSE(reported.repeated);
+  ASSERT_EQ(reported.words.size(), 1U);
+  EXPECT_NE(reported.words[0].find("tenth of a second"), std::string::npos);
   EXPECT_LT(difference(frames_of(scratch / "again.mp4").back(), frames_of(scratch / "told.mp4").back()), 3);
   // Cut short: what there is.
   std::filesystem::copy_file(scratch / "s.oss", scratch / "cut.oss");

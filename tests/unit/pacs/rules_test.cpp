@@ -1,4 +1,4 @@
-// Which rule a series gets, and what of rules is refused.
+// Which rule a series gets, and what of rules is rejected.
 #include "osteo/hospital/pacs/rules.h"
 
 #include <gtest/gtest.h>

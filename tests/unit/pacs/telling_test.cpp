@@ -10,13 +10,13 @@ constexpr std::string_view kWord = "a word of a person's name or number", kDay =
 
 TEST(Telling, NamesHoweverTheyAreWritten) {
   for (const char* name : {"M\xC3\xBCller^Hans", "M\xFCller^Hans", "Mueller^Hans", "MULLER^HANS", "Mu\xCC\x88ller"}) {
-    pacs::Telling telling;
-    telling.add_name(name);
+    pacs::Telling notifying;
+    notifying.add_name(name);
     for (const char* text :
          {"Mueller special", "MULLER", "for M\xC3\xBCller", "m\xFCller_2", "MUELLER2", "Mu\xCC\x88ller"})
-      EXPECT_EQ(telling.found_in(text), kWord) << name << " in " << text;
+      EXPECT_EQ(notifying.found_in(text), kWord) << name << " in " << text;
     for (const char* text : {"Miller", "Mill", "SOMATOM Force", "Hr40f", ""})
-      EXPECT_EQ(telling.found_in(text), "") << name << " in " << text;
+      EXPECT_EQ(notifying.found_in(text), "") << name << " in " << text;
   }
   for (const auto& [name, text] : {std::pair{"Wei\xC3\x9F", "WEISS"},
                                    {"Wei\xDF", "Weiss"},
@@ -26,9 +26,9 @@ TEST(Telling, NamesHoweverTheyAreWritten) {
                                    {"Dvo\xC5\x99\xC3\xA1k", "dvorak"},
                                    {"\xD0\x98\xD0\xB2\xD0\xB0\xD0\xBD", "xx \xD0\x98\xD0\xB2\xD0\xB0\xD0\xBD"},
                                    {"PID-471147", "471147"}}) {
-    pacs::Telling telling;
-    telling.add_name(name);
-    EXPECT_EQ(telling.found_in(text), kWord) << name << " in " << text;
+    pacs::Telling notifying;
+    notifying.add_name(name);
+    EXPECT_EQ(notifying.found_in(text), kWord) << name << " in " << text;
   }
   pacs::Telling none;
   none.add_name("REMOVED^Kim");  // our own dummy; words of three letters are in every text
@@ -36,14 +36,14 @@ TEST(Telling, NamesHoweverTheyAreWritten) {
 }
 
 TEST(Telling, TheDayOfBirthInAnyOrder) {
-  pacs::Telling telling;
-  telling.add_birth_date("19610504");
+  pacs::Telling notifying;
+  notifying.add_birth_date("19610504");
   for (const char* text :
        {"1961-05-04", "04.05.1961", "05/04/1961", "4.5.61", "19610504", "610504", "04051961", "born 4 May 1961",
         "May 4th, 1961", "4. Mai 1961", "4 de mayo de 1961", "4 mai 1961", "1961 May 4"})
-    EXPECT_EQ(telling.found_in(text), kDay) << text;
+    EXPECT_EQ(notifying.found_in(text), kDay) << text;
   for (const char* text : {"1961", "04.05.1962", "5.4.6", "4 June 1961", "1961 slices of 4 mm", "10.04.05", "4.5", ""})
-    EXPECT_EQ(telling.found_in(text), "") << text;
+    EXPECT_EQ(notifying.found_in(text), "") << text;
   // A version is no date, though its numbers are those of one.
   pacs::Telling young;
   young.add_birth_date("20040504");
@@ -67,11 +67,11 @@ TEST(Telling, TheDayOfBirthInAnyOrder) {
 }
 
 TEST(Telling, TheTelephoneWithAnyPrefix) {
-  pacs::Telling telling;
-  telling.add_telephone("+49 (30) 9018-2066");
+  pacs::Telling notifying;
+  notifying.add_telephone("+49 (30) 9018-2066");
   for (const char* text : {"030/90182066", "call 0049 30 90182066", "9018 2066", "+49-30-90.18.20.66"})
-    EXPECT_EQ(telling.found_in(text), kTelephone) << text;
-  for (const char* text : {"90182067", "2066", "9018 and 2066"}) EXPECT_EQ(telling.found_in(text), "") << text;
+    EXPECT_EQ(notifying.found_in(text), kTelephone) << text;
+  for (const char* text : {"90182067", "2066", "9018 and 2066"}) EXPECT_EQ(notifying.found_in(text), "") << text;
   pacs::Telling few;
   few.add_telephone("ext. 1234");
   EXPECT_EQ(few.found_in("1234"), "");

@@ -533,11 +533,11 @@ Parts small_session() {
   return p;
 }
 
-// Every bit of the file, one at a time: refused, or told.
+// Every bit of the file, one at a time: rejected, or told.
 TEST(SessionFile, NoFlippedBitIsOverlooked) {
   const Parts whole = small_session();
   const auto path = fresh("flips");
-  std::size_t refused = 0, told = 0, kept = 0;
+  std::size_t refused = 0, reported = 0, kept = 0;
   for (std::size_t at = 0; at < whole.bytes.size(); at += at < whole.frames[1].first ? 29 : 1) {  // of the header some
     for (int bit = static_cast<int>(at % 3); bit < 8; bit += 3) {
       std::string bytes = whole.bytes;
@@ -548,7 +548,7 @@ TEST(SessionFile, NoFlippedBitIsOverlooked) {
         ASSERT_GT(s.torn_bytes, 0u) << "byte " << at << " bit " << bit;
         ASSERT_FALSE(losses(s).empty());
         ASSERT_GE(at, whole.frames.back().first) << "only damage to the last frame looks like a cut";
-        ++told;
+        ++reported;
       } catch (const Error& e) {
         ASSERT_EQ(e.code(), ExitCode::corrupt);
         ++refused;
@@ -560,7 +560,7 @@ TEST(SessionFile, NoFlippedBitIsOverlooked) {
       }
     }
   }
-  EXPECT_GT(refused, told);
+  EXPECT_GT(refused, reported);
   EXPECT_GT(kept, 500u);
   fs::remove(path);
 }

@@ -425,7 +425,7 @@ TEST(Script, MovesGoOnFromWhereThePieceIs) {
 }
 
 // Schema and reader go by one declaration: every range that the schema tells is the reader's, every key it does not
-// know is refused.
+// know is rejected.
 TEST(Script, SchemaAndReaderAgree) {
   const auto schema = nlohmann::json::parse(script_schema());
   const auto path = fresh("schema.json");

@@ -327,7 +327,7 @@ TEST(Versions, OtherFormatsAreRefusedWithAdvice) {
   fs::remove(path);
 }
 
-// Frames whose checksum is right and whose contents are not: refused, whatever they hold.
+// Frames whose checksum is right and whose contents are not: rejected, whatever they hold.
 TEST(Versions, FramesThatDoNotHoldWhatTheySay) {
   const auto path = fresh("wrong.oss");
   const auto with = [&](const std::function<void(test::OtherWriter&)>& fill) {

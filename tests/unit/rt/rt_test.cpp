@@ -103,18 +103,18 @@ TEST(Histogram, QuantilesWithinAnEighth) {
 
 // The largest value that counts the same: buckets of an eighth of an octave, exact below 16 ns.
 TEST(Histogram, BucketsEndWhereTheyShould) {
-  const auto told_ns = [](std::int64_t value) {
+  const auto reported_ns = [](std::int64_t value) {
     Histogram h;
     h.add(value);
     h.add(1'000'000);
     return std::lround(h.quantile_us(0.5) * 1000);
   };
-  for (std::int64_t v = 0; v < 16; ++v) EXPECT_EQ(told_ns(v), v);
-  EXPECT_EQ(told_ns(16), 17);
-  EXPECT_EQ(told_ns(17), 17);
-  EXPECT_EQ(told_ns(18), 19);
-  EXPECT_EQ(told_ns(1000), 1023);
-  EXPECT_EQ(told_ns(1024), 1151);
+  for (std::int64_t v = 0; v < 16; ++v) EXPECT_EQ(reported_ns(v), v);
+  EXPECT_EQ(reported_ns(16), 17);
+  EXPECT_EQ(reported_ns(17), 17);
+  EXPECT_EQ(reported_ns(18), 19);
+  EXPECT_EQ(reported_ns(1000), 1023);
+  EXPECT_EQ(reported_ns(1024), 1151);
 }
 
 std::int64_t thread_cpu_ns() {

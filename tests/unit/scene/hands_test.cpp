@@ -179,7 +179,7 @@ TEST(LiveSettings, AllOfThemAreReplayedToTheBit) {
                                                        : 0.8 * now;
     script.actions.push_back({t, SceneAction::setting(static_cast<std::uint32_t>(n), next)});
   }
-  // And back: the distance map is made anew of the bone as it is then.
+  // And back: the distance map is made again of the bone as it is then.
   for (const char* name : {"method", "fail_safe", "shaft", "vibration"})
     script.actions.push_back(
         {t += 0.03, SceneAction::setting(setting(name), setting_value(setting_number(name), usual))});

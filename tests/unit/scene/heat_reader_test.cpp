@@ -36,7 +36,7 @@ struct Heated {
   std::uint64_t restarts = 0;
   friend bool operator==(const Heated&, const Heated&) = default;
 };
-Heated told(const HeatReader& h) {
+Heated reported(const HeatReader& h) {
   const HeatLedger l = h.ledger();
   return {h.hottest_c(),
           l.added_j,
@@ -65,9 +65,9 @@ Drilled run(bool pedal, std::vector<SceneAction> actions, int tool) {
   r.add_reader(live);
   static_cast<void>(r.run_to_end({}));
   r.look([&](const World&, SceneReaders& listed) {
-    Heated own = told(*listed.heat);
+    Heated own = reported(*listed.heat);
     ++own.restarts;  // who joins is told of the scene once more
-    EXPECT_EQ(own, told(live)) << "the scene's own";
+    EXPECT_EQ(own, reported(live)) << "the scene's own";
     std::size_t warm = 0;
     listed.heat->for_warm_places([&](Vec3 centre_mm, double radius_mm) {
       ++warm;
@@ -77,7 +77,7 @@ Drilled run(bool pedal, std::vector<SceneAction> actions, int tool) {
   });
   std::vector<Reader*> readers{&again};
   EXPECT_TRUE(replay(SessionReader(o.session_file), world.copy(), {}, {}, readers).identical);
-  return {told(live), told(again)};
+  return {reported(live), reported(again)};
 }
 
 TEST(HeatReader, IsInBalanceAndTheSameInAReplay) {

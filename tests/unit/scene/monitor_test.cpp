@@ -65,7 +65,7 @@ class Witness : public MonitorSink {
   Hasher hasher;
 };
 
-std::string told(const Witness& w) {
+std::string reported(const Witness& w) {
   std::string text = std::to_string(w.samples) + " " + w.hasher.hex();
   for (const MonitorEvent& e : w.events)
     text += "\n" + std::to_string(e.sample) + " " + std::string(name_of(e.kind)) + " " + std::to_string(e.channel) +
@@ -163,7 +163,7 @@ TEST(Monitor, BurstsBeforeTouchTrainsUnderPressureSilenceAfterTheCut) {
   std::vector<Reader*> readers{&again};
   ASSERT_TRUE(replay(session, world.copy(), o.anatomy, {}, readers).identical);
   again.end();
-  EXPECT_EQ(told(repeated), told(seen));
+  EXPECT_EQ(reported(repeated), reported(seen));
 
   // The course beside the phantom's own line, within the part of the ear that is here.
   double worst = 0;

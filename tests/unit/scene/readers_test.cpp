@@ -37,8 +37,8 @@ RehearsalOptions options(const std::filesystem::path& file) {
 
 const SceneAction kUndo = SceneAction::plain(ActionKind::undo);
 
-// The page on readers (docs/developer/readers.md) tells how to write one; this is its example: how long the burr pressed harder
-// than it should.
+// The page on readers (docs/developer/readers.md) tells how to write one; this is its example: how long the burr
+// pressed harder than it should.
 class PressureScore final : public Reader {
  public:
   PressureScore(double most_n, double rate_hz) : most_n_(most_n), rate_hz_(rate_hz) {}
@@ -110,7 +110,7 @@ TEST(Readers, JoinAndLeaveAThousandTimesWhileOthersLoseNothing) {
   Witness stays;
   r.add_reader(stays);
   r.start();
-  int wrong = 0, told = 0, joins = 0, streams = 0;
+  int wrong = 0, reported = 0, joins = 0, streams = 0;
   std::thread own([&] {
     // Ends of the stream itself, each read in this thread.
     for (; streams < 1000; ++streams) {
@@ -132,14 +132,14 @@ TEST(Readers, JoinAndLeaveAThousandTimesWhileOthersLoseNothing) {
       r.add_reader(*late);
     }
     wrong += w.wrong + (w.resyncs == 1 && w.bodies > 0 ? 0 : 1);
-    told += w.last ? 1 : 0;
+    reported += w.last ? 1 : 0;
   }
   own.join();
   while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
   const RehearsalSummary s = r.stop();
   EXPECT_EQ(joins, 1000);
   EXPECT_EQ(wrong, 0);
-  EXPECT_GT(told, 50);
+  EXPECT_GT(reported, 50);
   EXPECT_EQ(stays.wrong, 0);
   EXPECT_EQ(stays.last, s.ticks - 1);
   EXPECT_EQ(stays.resyncs, 1);
@@ -244,24 +244,24 @@ TEST(Readers, ALateReaderIsRightFromThereOn) {
   Stream stream;
   StreamReader& reader = stream.add_reader();
   Operation operation(std::move(world), setup, {}, device, stream, 1000);
-  ReaderHub hub(reader, operation.world());
-  hub.add(operation.strokes(), false);
+  ReaderDispatcher dispatcher(reader, operation.world());
+  dispatcher.add(operation.strokes(), false);
   // Made before anything was done, they join later all the same.
   SceneReaders late(operation.world(), {true, true, true}, 1000, {});
   double removed = 0;
   for (std::uint64_t t = 0; device.active(t); ++t) {
     const auto act = [&](const SceneAction& a) {
-      hub.drain();
-      ASSERT_TRUE(operation.act(a, [&](const World::Effect& e) { hub.scene_changed(e); }).done);
+      dispatcher.drain();
+      ASSERT_TRUE(operation.act(a, [&](const World::Effect& e) { dispatcher.scene_changed(e); }).done);
     };
     if (t == 100) act(SceneAction::suction({-6, 0, 4}, 6, 200));
     if (t == 900) act(SceneAction::saw({{2, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1}));
     if (t == 950) act(SceneAction::split(20));
     if (t == 1000) {
-      hub.drain();
+      dispatcher.drain();
       for (Reader* const r : {static_cast<Reader*>(late.surface.get()), static_cast<Reader*>(late.pieces.get()),
                               static_cast<Reader*>(late.dust.get())})
-        hub.add(*r);
+        dispatcher.add(*r);
       EXPECT_EQ(late.dust->dust().totals().added_mm3, 0);
       removed = operation.removed_mm3();
     }
@@ -269,11 +269,11 @@ TEST(Readers, ALateReaderIsRightFromThereOn) {
     if (t == 2950) act(kUndo);  // and of the second
     if (t == 2990) act(kUndo);  // and of the split, which it never saw
     operation.step(0);
-    if (t % 64 == 0) hub.drain();
+    if (t % 64 == 0) dispatcher.drain();
   }
   operation.finish();
-  hub.drain();
-  hub.end(operation.ticks());
+  dispatcher.drain();
+  dispatcher.end(operation.ticks());
   const SceneReaders fresh(operation.world(), {true, true, true}, 1000, {});
   EXPECT_EQ(operation.world().bodies().size(), 1u);
   EXPECT_EQ(late.surface_hash(), fresh.surface_hash());
@@ -294,14 +294,14 @@ TEST(Readers, ALittleAtATimeIsTheSame) {
   Stream stream;
   StreamReader &first = stream.add_reader(), &second = stream.add_reader();
   Operation operation(std::move(world), setup, {}, device, stream, 1000);
-  ReaderHub whole(first, operation.world()), parts(second, operation.world());
+  ReaderDispatcher whole(first, operation.world()), parts(second, operation.world());
   class Order final : public Reader {
    public:
-    void action(const SceneAction& a) override { told.push_back({a.tick, true}); }
+    void action(const SceneAction& a) override { reported.push_back({a.tick, true}); }
     void tick(const TickRecord& r, std::span<const VoxelChange> c) override {
-      told.push_back({r.tick, false}), changes += c.size();
+      reported.push_back({r.tick, false}), changes += c.size();
     }
-    std::vector<std::pair<std::uint64_t, bool>> told;
+    std::vector<std::pair<std::uint64_t, bool>> reported;
     std::size_t changes = 0;
   } at_once, by_and_by;
   whole.add(at_once, false);
@@ -319,9 +319,9 @@ TEST(Readers, ALittleAtATimeIsTheSame) {
   while (parts.drain(0) > 0) {
   }
   whole.drain();
-  EXPECT_EQ(by_and_by.told, at_once.told);
+  EXPECT_EQ(by_and_by.reported, at_once.reported);
   EXPECT_EQ(by_and_by.changes, at_once.changes);
-  EXPECT_EQ(at_once.told.size(), t + 14);
+  EXPECT_EQ(at_once.reported.size(), t + 14);
 }
 
 TEST(Strokes, AreTakenBackLiveAndInAReplay) {

@@ -65,7 +65,7 @@ TEST(Recipe, WhatBelongsToAChangedThingGoesWithItAndIsTold) {
   changes = change_settings(r, Given{}, true);
   EXPECT_FALSE(r.settings.contains("names"));
   r.settings["remove_table"] = "true";
-  changes = change_settings(r, Given{{"keep_table", "true"}}, false);  // both would be refused
+  changes = change_settings(r, Given{{"keep_table", "true"}}, false);  // both would be rejected
   EXPECT_FALSE(r.settings.contains("remove_table"));
   EXPECT_FALSE(find(changes, "remove_table")->why.empty());
   changes = change_settings(r, Given{{"remove_table", "true"}}, false);

@@ -117,7 +117,7 @@ TEST(Recording, NoActionIsLostByTheClock) {
   }
 }
 
-// What was posted and never taken up by a tick is told by the stream all the same (Servo::finish).
+// What was posted and never taken up by a tick is reported by the stream all the same (Servo::finish).
 TEST(Recording, TheLastActionIsRecorded) {
   const auto file = fresh("last.oss");
   World world(test::bar(1, 0));
@@ -166,10 +166,10 @@ TEST(Recording, AGapIsReplayedUpToItAndBoneBehindItIsKnown) {
     while (reader.ticks.room() < Recorder::kTickCapacity || (!closed && recorder->status().waiting_bytes > 0))
       std::this_thread::sleep_for(std::chrono::microseconds(200));
   };
-  ReaderHub hub(stream.add_reader(), operation.world());
-  hub.add(operation.strokes(), false);
+  ReaderDispatcher dispatcher(stream.add_reader(), operation.world());
+  dispatcher.add(operation.strokes(), false);
   const auto act = [&](const SceneAction& a) {
-    hub.drain();
+    dispatcher.drain();
     ASSERT_TRUE(operation.act(a).done);
   };
   for (std::uint64_t t = 0; t < 2000; ++t) {
@@ -241,12 +241,12 @@ TEST(Recording, AFollowerThatLostTicksCatchesUpWithTheBone) {
     StreamReader& reader = stream.add_reader(128, 1 << 21);
     const double before = world.volume_mm3();
     Operation operation(std::move(world), setup, {}, device, stream, 1000);
-    ReaderHub hub(reader, operation.world());
+    ReaderDispatcher dispatcher(reader, operation.world());
     SceneReaders readers(operation.world(), {true, true, true}, 1000, {});
-    readers.add_to(hub);
+    readers.add_to(dispatcher);
     const auto act = [&](const SceneAction& a) {
-      hub.drain();
-      ASSERT_TRUE(operation.act(a, [&](const World::Effect& e) { hub.scene_changed(e); }).done);
+      dispatcher.drain();
+      ASSERT_TRUE(operation.act(a, [&](const World::Effect& e) { dispatcher.scene_changed(e); }).done);
     };
     for (std::uint64_t t = 0; t < 2000; ++t) {
       const bool asleep = (t > 300 && t < 1500) || t > 1800;
@@ -254,13 +254,13 @@ TEST(Recording, AFollowerThatLostTicksCatchesUpWithTheBone) {
       if (t == 290 && apart) act(SceneAction::split(20));
       if (t == 1600) act(SceneAction::suction({4, 0, 4}, 2, 1));
       ASSERT_TRUE(operation.step(0));
-      if (!asleep && t % 16 == 0) hub.drain();
+      if (!asleep && t % 16 == 0) dispatcher.drain();
     }
     operation.finish();
-    hub.drain();
-    hub.end(2000);
-    EXPECT_GT(hub.ticks_lost(), 1000u);
-    EXPECT_EQ(hub.ticks_lost(), reader.dropped.load());
+    dispatcher.drain();
+    dispatcher.end(2000);
+    EXPECT_GT(dispatcher.ticks_lost(), 1000u);
+    EXPECT_EQ(dispatcher.ticks_lost(), reader.dropped.load());
     const SceneReaders fresh_one(operation.world(), {true, true, false}, 1000, {});
     EXPECT_EQ(readers.surface_hash(), fresh_one.surface_hash());
     EXPECT_EQ(readers.large_pieces().size(), fresh_one.large_pieces().size());

@@ -1,4 +1,4 @@
-// Scripts in front of a scene: what is late, refused, doubtful or no pose at all is done or told.
+// Scripts in front of a scene: what is late, rejected, doubtful or no pose at all is done or told.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -82,8 +82,8 @@ TEST(Sessions, OpenedAtAnyTimeTheyAreAsTheyWere) {
   ReplayDevice device(std::move(samples));
   Stream stream;
   Operation operation(start.copy(), s.header.haptics, {}, device, stream, kRate);
-  ReaderHub hub(stream.add_reader(), operation.world());
-  hub.add(operation.strokes(), false);
+  ReaderDispatcher dispatcher(stream.add_reader(), operation.world());
+  dispatcher.add(operation.strokes(), false);
   auto action = s.actions.begin();
   std::set<std::string> different;
   for (std::uint64_t t = 0; t <= last; ++t) {
@@ -94,10 +94,10 @@ TEST(Sessions, OpenedAtAnyTimeTheyAreAsTheyWere) {
     if (t == last) break;
     for (; action != s.actions.end() && action->action.tick == t; ++action) {
       if (row_of(action->action).by_servo) continue;
-      hub.drain();
+      dispatcher.drain();
       ASSERT_TRUE(operation.act(action->action).done);
     }
-    if (t % 256 == 0) hub.drain();
+    if (t % 256 == 0) dispatcher.drain();
     ASSERT_TRUE(operation.step(0));
   }
   EXPECT_EQ(action, s.actions.end());

@@ -253,7 +253,7 @@ TEST(SoftTissue, WakesWhenItsBoneIsDrilledAway) {
     if (drilled) {
       BrickGrid& bone = world.bodies().front().body->bone;
       for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) bone.set(v, 0);
-      // Told of elsewhere first.
+      // Reported of elsewhere first.
       TickRecord tick;
       tick.device.position_mm = to_floats({0, 0, -60});
       tick.device.tool = diamond(3);
@@ -497,7 +497,7 @@ class Listed : public testing::Test {
     save_tets(voxels(2, 2, 2, 3, {0, 0, 60}), where / "tissue.vtu");
     std::ofstream(where / "tissue.json") << problem(young_kpa);
   }
-  // Told with this word in it.
+  // Reported with this word in it.
   void refused(const std::string& word, ExitCode code) const {
     try {
       static_cast<void>(soft_tissue_of(folder()));

@@ -92,7 +92,7 @@ TEST(Tube, ConfidenceIsTheShareThatIsRight) {
         sure += 1, sure_right += good ? 1 : 0;
         outside += length(s.line[at] - t.at_mm) > s.radius[at] + 1 ? 1 : 0;
       }
-    } catch (const Error&) {  // refused as a whole
+    } catch (const Error&) {  // rejected as a whole
     }
   }
   ASSERT_GT(sure, 100);

@@ -1,4 +1,4 @@
-// A study from its first file to its report: what is written, what is refused and where, and what the analysis says of
+// A study from its first file to its report: what is written, what is rejected and where, and what the analysis says of
 // too little.
 #include "osteo/assessment/study/study.h"
 
@@ -729,12 +729,12 @@ TEST(Plan, BeforeTheFirstSessionItGoesByWhoTakesPart) {
   ASSERT_EQ(r.size(), 1U);
   EXPECT_EQ(r[0].people_a, 7U);
   EXPECT_EQ(r[0].comparisons, 2U);
-  EXPECT_NE(told(r[0]).find("2 comparisons together"), std::string::npos);
+  EXPECT_NE(reported(r[0]).find("2 comparisons together"), std::string::npos);
   // More than a hundred at once: none.
   s.plan.primary.clear();
   EXPECT_TRUE(std::isnan(reach_of(s, 134)[0].detectable_effect));
   s.participants.resize(3);
-  EXPECT_NE(told(reach_of(s)[0]).find("too few"), std::string::npos);
+  EXPECT_NE(reported(reach_of(s)[0]).find("too few"), std::string::npos);
 }
 
 TEST(Report, SaysWhereSessionsComeFromWhereTheyAreNotAlike) {

@@ -89,7 +89,7 @@ TEST(Tetgen, OutlivesWhatTetGenDoesNot) {
     }
   }
   EXPECT_GE(meshed, 3);
-  // Sizes that nobody has memory for are refused before anything is done.
+  // Sizes that nobody has memory for are rejected before anything is done.
   try {
     static_cast<void>(tets_by_tetgen(box({0, 0, 0}, {4, 4, 4}), {1e-60, 1.414, 0}));
     ADD_FAILURE();

@@ -112,7 +112,7 @@ TEST(TissueProblem, FactorsOfAGridAreAppliedAsTheyWereFitted) {
   EXPECT_THROW(with_log_factors(model, {2, 2, 2}, std::vector<double>(5)), Error);
 }
 
-// Which elements: by name, as the flags say it; what is not known is told with its line.
+// Which elements: by name, as the flags say it; what is not known is reported with its line.
 TEST(TissueProblem, NamesItsLawAndItsElements) {
   const TetMesh mesh = mesh_of(test::block(2, 1, 1, 5.0));
   const auto problem = [&](const std::string& keys) {
@@ -228,7 +228,7 @@ a tetrahedron, and one on it
   EXPECT_EQ(q.fixed, p.fixed);
   ASSERT_EQ(q.sliders.size(), 1u);
   EXPECT_EQ(q.sliders[0].held, 4);
-  // Damaged in any way it is read or refused, never anything else.
+  // Damaged in any way it is read or rejected, never anything else.
   std::mt19937 random(8);
   for (int n = 0; n < 20000; ++n) {
     std::string damaged = text;

@@ -306,7 +306,7 @@ TEST(Session, IsTheSameForTheSameSeedAndSaysThatItIsSimulated) {
   EXPECT_EQ(a.summary.bone_hash, b.summary.bone_hash);
   EXPECT_NE(a.summary.bone_hash, c.summary.bone_hash);
   const SessionReader reader(scratch / "a" / "stream.oss");
-  EXPECT_NE(simulated_words(reader), "");
+  EXPECT_NE(simulated_text(reader), "");
   const Session recorded = read_session(scratch / "a" / "stream.oss");
   EXPECT_EQ(recorded.notes.front().kind, kSimulatedNote);
   EXPECT_TRUE(

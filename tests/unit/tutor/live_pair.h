@@ -64,9 +64,9 @@ class LivePair {
     guest_.emplace(kCode, JoinRole::trainee, host_shown_);
     Device* const both[] = {&host_hand_, far_.get()};
     operation_.emplace(World(bar(0.5, 0.3)), setup_, Anatomy{}, both, stream_, 1000);
-    hub_.emplace(stream_.add_reader(), operation_->world());
-    hub_->add(operation_->strokes(), false);
-    hub_->add(*host_);
+    dispatcher_.emplace(stream_.add_reader(), operation_->world());
+    dispatcher_->add(operation_->strokes(), false);
+    dispatcher_->add(*host_);
     if (p.two_way) operation_->act(action_of(guide(0, 1)));
     copy_.emplace(World(bar(0.5, 0.3)), options(), Context{});
     make_feel();
@@ -100,7 +100,7 @@ class LivePair {
     for (const Bytes& b : to_host_.arrived(now)) host_->receive(kGuest, b, now);
     for (const Bytes& b : to_guest_.arrived(now)) guest_->receive(b, theirs);
     operation_->step(0);
-    hub_->drain();
+    dispatcher_->drain();
     for (auto& o : host_->poll(now)) to_guest_.send(o.bytes, now);
 
     const DeviceSample shown = host_shown_->read(tick_, 1e-3, {});
@@ -145,7 +145,7 @@ class LivePair {
   std::optional<LiveGuest> guest_;
   Stream stream_;
   std::optional<Operation> operation_;
-  std::optional<ReaderHub> hub_;
+  std::optional<ReaderDispatcher> dispatcher_;
   std::optional<LiveCopy> copy_;
   std::optional<LiveFeel> feel_;
   Vec3 felt_;

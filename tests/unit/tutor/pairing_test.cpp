@@ -1,4 +1,4 @@
-// Pairing over networks that lose, delay, reorder, damage and fall silent: each who asks ends joined, or refused for a
+// Pairing over networks that lose, delay, reorder, damage and fall silent: each who asks ends joined, or rejected for a
 // true reason.
 #include "osteo/network/tutor/pairing.h"
 
@@ -20,7 +20,7 @@ constexpr const char* kCode = "K7MX2QPA";
 constexpr std::int64_t kStepUs = 5000;
 
 // One host and many guests, each by a network of its own, in steps of 5 ms.
-class Room {
+class MainView {
  public:
   struct Seat {
     Seat(std::string_view code, JoinRole role, const NetworkFaults& faults, std::uint16_t at_port, std::uint64_t seed)
@@ -94,7 +94,7 @@ TEST(PairingRoom, EverybodyWhoAsksAtOnceIsIn) {
     for (const double loss : {0.0, 0.3}) {
       for (const double jitter : {0.0, 1.0}) {  // of the way, so that what is sent 100 ms apart is overtaken at 200 ms
         for (int n = 1; n <= 9; ++n) {
-          Room room;
+          MainView room;
           room.seed = static_cast<std::uint64_t>(one_way * 1000 + loss * 100 + jitter * 10 + n);
           const NetworkFaults faults{one_way, jitter * one_way, loss, jitter * 0.1};
           for (int i = 0; i < n; ++i) room.enter(i == 4 ? JoinRole::trainee : JoinRole::watcher, faults);
@@ -120,7 +120,7 @@ TEST(PairingRoom, AfterAnOutageTheTraineeIsInFirstAndAllComeBack) {
   for (const double one_way : {1.0, 60.0, 200.0}) {
     for (const double loss : {0.0, 0.2}) {
       for (const int n : {2, 5, 9}) {
-        Room room;
+        MainView room;
         room.seed = static_cast<std::uint64_t>(one_way * 10 + n);
         for (int i = 0; i < n; ++i)
           room.enter(i == n - 1 ? JoinRole::trainee : JoinRole::watcher, {one_way, one_way / 5, loss, 0});
@@ -143,7 +143,7 @@ TEST(PairingRoom, AfterAnOutageTheTraineeIsInFirstAndAllComeBack) {
 
 // A trainee that does not come back keeps nobody out.
 TEST(PairingRoom, WatchersComeBackWithoutTheTrainee) {
-  Room room;
+  MainView room;
   for (int i = 0; i < 3; ++i) room.enter(i == 0 ? JoinRole::trainee : JoinRole::watcher, {10, 2, 0, 0});
   ASSERT_GE(room.settle(5), 0);
   room.cut(true);
@@ -156,10 +156,10 @@ TEST(PairingRoom, WatchersComeBackWithoutTheTrainee) {
   EXPECT_EQ(room.seats[1]->guest.state(), JoinState::joined);
 }
 
-// The reason for which somebody is refused is the case.
+// The reason for which somebody is rejected is the case.
 TEST(PairingRoom, WhoIsRefusedIsToldATrueReason) {
   for (const double loss : {0.0, 0.4}) {
-    Room room;
+    MainView room;
     room.seed = 77;
     const NetworkFaults faults{20, 20, loss, 0.2};
     room.enter(JoinRole::trainee, faults);
@@ -189,7 +189,7 @@ TEST(PairingRoom, WhoIsRefusedIsToldATrueReason) {
 
 // A program that was ended and started again, at another port: it is no second trainee, and no tenth.
 TEST(PairingRoom, WhoStartsAgainElsewhereGetsTheSeat) {
-  Room room;
+  MainView room;
   const NetworkFaults faults{20, 5, 0, 0};
   for (int i = 0; i < 9; ++i) room.enter(i == 0 ? JoinRole::trainee : JoinRole::watcher, faults);
   ASSERT_GE(room.settle(5), 0);
@@ -206,7 +206,7 @@ TEST(PairingRoom, WhoStartsAgainElsewhereGetsTheSeat) {
 
 // Strangers who ask as fast as they like neither push out nor hold up who has been answered.
 TEST(PairingRoom, StrangersWhoAskKeepNobodyFromProving) {
-  Room room;
+  MainView room;
   for (int i = 0; i < 3; ++i) room.enter(JoinRole::watcher, {60, 0, 0, 0});
   room.run(0.07);
   for (int i = 0; i < 200 && room.joined() < 3; ++i) {
@@ -218,8 +218,8 @@ TEST(PairingRoom, StrangersWhoAskKeepNobodyFromProving) {
   EXPECT_EQ(room.host.tries_left(), 3);
 }
 
-// Of a packet on its way each bit may change, of each of the packets: no try is spent, nobody is refused, and the right
-// one still joins.
+// Of a packet on its way each bit may change, of each of the packets: no try is spent, nobody is rejected, and the
+// right one still joins.
 TEST(Pairing, ADamagedPacketIsNoWrongCode) {
   struct Seats final : PairingSeats {
     Answer seat(const UdpPeer&, JoinRole, std::int64_t, std::int64_t) override { return Answer::free; }
@@ -280,14 +280,14 @@ TEST(Pairing, ARepeatedConversationSpendsNoTry) {
   EXPECT_EQ(seats.taken, 1U);
 }
 
-// A host that knows nothing of a proof says so; a guest that hears nothing at all begins anew by itself.
+// A host that knows nothing of a proof says so; a guest that hears nothing at all begins again by itself.
 TEST(Pairing, AForgottenGuestAsksAgain) {
   struct Seats final : PairingSeats {
     Answer seat(const UdpPeer&, JoinRole, std::int64_t, std::int64_t) override { return Answer::free; }
     std::uint32_t take(const UdpPeer&, JoinRole, const PairKeys&, std::int64_t) override { return 1; }
   } seats;
   const UdpPeer from{{}, 0, 5};
-  for (const bool told : {true, false}) {
+  for (const bool reported : {true, false}) {
     PairingHost first(kCode), second(kCode);
     PairingGuest guest(kCode, JoinRole::watcher);
     std::int64_t now = 0;
@@ -296,14 +296,14 @@ TEST(Pairing, AForgottenGuestAsksAgain) {
     ASSERT_EQ(guest.state(), PairingGuest::State::proving);
     for (; now < 10'000'000 && guest.state() == PairingGuest::State::proving; now += 50'000) {
       const auto said = guest.poll(now);
-      if (!said || !told) continue;
-      const auto answer = second.receive(from, *said, now, seats);  // the host was started anew, with the same code
+      if (!said || !reported) continue;
+      const auto answer = second.receive(from, *said, now, seats);  // the host was started again, with the same code
       ASSERT_TRUE(answer);
       EXPECT_LE(answer->size(), said->size());
       guest.receive(*answer, now);
     }
     EXPECT_EQ(guest.state(), PairingGuest::State::asking);
-    EXPECT_LT(now, told ? 200'000 : 2'200'000);
+    EXPECT_LT(now, reported ? 200'000 : 2'200'000);
     EXPECT_EQ(second.tries_left(), PairingHost::kTries);
     for (; now < 15'000'000 && guest.state() != PairingGuest::State::joined; now += 50'000) {
       if (const auto said = guest.poll(now)) {

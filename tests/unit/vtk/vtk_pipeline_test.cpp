@@ -314,9 +314,9 @@ TEST_F(VtkPipelineTest, AFailureIsOverOnceItsCauseIs) {
 
 TEST_F(VtkPipelineTest, ProgressIsToldAndAbortLeavesNoFile) {
   VtkPipeline p = load();
-  std::vector<double> told;
+  std::vector<double> reported;
   vtkNew<vtkCallbackCommand> observer;
-  observer->SetClientData(&told);
+  observer->SetClientData(&reported);
   observer->SetCallback([](vtkObject* caller, unsigned long, void* data, void*) {
     auto& list = *static_cast<std::vector<double>*>(data);
     list.push_back(static_cast<vtkAlgorithm*>(caller)->GetProgress());
@@ -329,7 +329,7 @@ TEST_F(VtkPipelineTest, ProgressIsToldAndAbortLeavesNoFile) {
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::cancelled);
   }
-  EXPECT_EQ(told, (std::vector<double>{0, 0.25}));
+  EXPECT_EQ(reported, (std::vector<double>{0, 0.25}));
   EXPECT_TRUE(fs::exists(folder / "b.nrrd"));
   std::vector<std::string> left;
   for (const auto& entry : fs::directory_iterator(folder.path())) left.push_back(entry.path().filename().string());
@@ -407,9 +407,9 @@ TEST_F(VtkPipelineTest, TheEngineFailsAndStopsAsTheOther) {
     std::atomic<bool> stop{false};
     Context context;
     context.set_cancel_flag(&stop);
-    std::vector<double> told;
+    std::vector<double> reported;
     context.on_progress([&](double fraction, std::string_view) {
-      told.push_back(fraction);
+      reported.push_back(fraction);
       stop = fraction > 0.9;
     });
     try {
@@ -418,7 +418,7 @@ TEST_F(VtkPipelineTest, TheEngineFailsAndStopsAsTheOther) {
     } catch (const Error& e) {
       EXPECT_EQ(e.code(), ExitCode::cancelled);
     }
-    EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+    EXPECT_TRUE(std::is_sorted(reported.begin(), reported.end()));
     EXPECT_TRUE(fs::exists(folder / "b.nrrd"));
     EXPECT_FALSE(fs::exists(folder / "sum.nrrd"));
   }

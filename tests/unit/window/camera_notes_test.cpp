@@ -23,13 +23,13 @@ TEST(CameraNotes, ChangesAloneAndAtMostSixtyASecond) {
   EXPECT_EQ(j["magnification"], 6);
   EXPECT_FALSE(notes.next(view, 10, &first)) << "nothing changed";
   // A thousand pictures a second for a second.
-  int told = 0;
+  int reported = 0;
   for (int n = 0; n < 1000; ++n) {
     view.eye_mm.x = n;
-    told += notes.next(view, 20 + n / 1000.0, &first).has_value() ? 1 : 0;
+    reported += notes.next(view, 20 + n / 1000.0, &first).has_value() ? 1 : 0;
   }
-  EXPECT_LE(told, 61);
-  EXPECT_GE(told, 50);
+  EXPECT_LE(reported, 61);
+  EXPECT_GE(reported, 50);
   EXPECT_TRUE(notes.next(view, 21.1, &first)) << "what came too soon is not forgotten";
   EXPECT_TRUE(notes.next(view, 21.1, &second)) << "a new session knows no view yet";
 }

@@ -49,8 +49,8 @@ struct Editor {
 };
 
 TEST(EditControl, EveryKeyIsToldAndEveryTellingHasAKey) {
-  std::set<EditKey> told, has;
-  for (const EditHelpLine& l : edit_help_lines()) told.insert(l.commands.begin(), l.commands.end());
+  std::set<EditKey> reported, has;
+  for (const EditHelpLine& l : edit_help_lines()) reported.insert(l.commands.begin(), l.commands.end());
   for (const EditKeyRow& r : edit_key_table()) {
     has.insert(r.does);
     // Found by exactly its keys, and no two rows want the same.
@@ -59,7 +59,7 @@ TEST(EditControl, EveryKeyIsToldAndEveryTellingHasAKey) {
                       r.with == EditKeyRow::With::shift || r.with == EditKeyRow::With::control_shift);
     EXPECT_EQ(found, &r);
   }
-  EXPECT_EQ(told, has);
+  EXPECT_EQ(reported, has);
   EXPECT_EQ(find_edit_key('1', true, false), nullptr);
 }
 

@@ -33,11 +33,11 @@ TEST(Keys, EachKeyHasOneMeaning) {
 }
 
 TEST(Keys, HelpTellsOfEachCommandOnceAndOfNoOther) {
-  std::multiset<Command> told, bound;
-  for (const HelpLine& line : help_lines()) told.insert(line.commands.begin(), line.commands.end());
+  std::multiset<Command> reported, bound;
+  for (const HelpLine& line : help_lines()) reported.insert(line.commands.begin(), line.commands.end());
   for (const Key& k : key_table()) bound.insert(k.command);
-  for (const Command c : bound) EXPECT_EQ(told.count(c), 1U) << static_cast<int>(c);
-  for (const Command c : told) EXPECT_GE(bound.count(c), 1U) << static_cast<int>(c);
+  for (const Command c : bound) EXPECT_EQ(reported.count(c), 1U) << static_cast<int>(c);
+  for (const Command c : reported) EXPECT_GE(bound.count(c), 1U) << static_cast<int>(c);
 }
 
 // Letters in a line of the help are the ones that do it.
@@ -46,13 +46,13 @@ TEST(Keys, HelpNamesTheKeysThemselves) {
     const std::string keys = std::string(" ") + line.keys + ",";
     for (const Key& k : key_table()) {
       const bool letter = k.code >= 'A' && k.code <= 'Z';
-      const bool told = std::find(line.commands.begin(), line.commands.end(), k.command) != line.commands.end();
+      const bool reported = std::find(line.commands.begin(), line.commands.end(), k.command) != line.commands.end();
       const std::string name = std::string(k.with == kWithCtrl  ? "Ctrl-"
                                            : k.with == kWithAlt ? "Alt-"
                                                                 : "") +
                                static_cast<char>(k.code);
       if (letter) {
-        EXPECT_EQ(keys.find(" " + name + ",") != std::string::npos, told) << line.keys;
+        EXPECT_EQ(keys.find(" " + name + ",") != std::string::npos, reported) << line.keys;
       }
     }
   }

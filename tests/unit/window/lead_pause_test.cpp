@@ -30,7 +30,7 @@ class Leader final : public Device {
   std::shared_ptr<std::atomic<bool>> pulls_;
 };
 
-struct LedSitting {
+struct LedSessionRunner {
   std::shared_ptr<std::atomic<bool>> pulls = std::make_shared<std::atomic<bool>>(true);
   std::unique_ptr<Rehearsal> running;
   std::vector<bool> asked;  // of lead()
@@ -97,7 +97,7 @@ bool arrives(RehearsalControl& control) {
 }
 
 TEST(LeadPause, TheDrillGetsToTheBoneThoughAHandIsLed) {
-  LedSitting lesson;
+  LedSessionRunner lesson;
   RehearsalControl control(lesson.actions(), burr_index(BurrKind::cutting, 4, BurrShape::ball), [](Rehearsal&) {});
   control.look_from(kAbove);
   ASSERT_TRUE(control.begin(true, false));

@@ -14,7 +14,7 @@ namespace osteo {
 namespace {
 
 // Runs rehearsals of a bar of bone as the program does those of a case.
-struct Sitting {
+struct SessionRunner {
   test::ScratchFolder scratch;
   World first{test::bar(0.5, 0.2)}, last = first.copy();
   std::unique_ptr<Rehearsal> running;
@@ -93,11 +93,11 @@ std::size_t steps(RehearsalControl& control) {
 }
 
 TEST(RehearsalControl, ZTakesBackTheLastStrokeAndThenTheCut) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
-  EXPECT_EQ(sitting.shown, 1);
+  EXPECT_EQ(session_runner.shown, 1);
   EXPECT_GT(control.radius_mm(), 10);
   const auto hash = [&] { return of_world(control, [](const World& w) { return w.hash(); }); };
   const std::string whole = hash();
@@ -135,15 +135,15 @@ TEST(RehearsalControl, ZTakesBackTheLastStrokeAndThenTheCut) {
   std::string note;
   ASSERT_TRUE(frames_until(control, [&] { return !(note = control.tools().note(control.rehearsal())).empty(); }));
   EXPECT_EQ(note, "undo: there is nothing to take back");
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 TEST(RehearsalControl, APlannedCutIsChosenAndOneIsKept) {
   const test::ScratchFolder scratch;
   const auto file = scratch.path() / kPlannedCutsFile;
   write_file(file, planned_cuts_json(std::vector<PlannedCut>{{"body", {{8, 0, 0}, {2, 0, 0}, {0, 0, 1}, 1}, 1.5}}));
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   HandTools& tools = control.tools();
   tools.plan(planned_cuts_of(scratch.path()), file);
@@ -182,12 +182,12 @@ TEST(RehearsalControl, APlannedCutIsChosenAndOneIsKept) {
   tools.keep_planned("lost");
   EXPECT_NE(tools.note(control.rehearsal()).find("gone"), std::string::npos) << tools.note(control.rehearsal());
   EXPECT_TRUE(tools.planned().empty());
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 TEST(RehearsalControl, TheSawIsTakenIntoTheHandAndHeldInItsPlane) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
   press(control, Command::saw);
@@ -234,12 +234,12 @@ TEST(RehearsalControl, TheSawIsTakenIntoTheHandAndHeldInItsPlane) {
   press(control, Command::saw);
   EXPECT_FALSE(control.tools().saw_in_hand());
   EXPECT_EQ(control.tools().tool(), HandTools::Tool::drill);
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 TEST(RehearsalControl, KeysChooseTheBurrAndLatchTheDrill) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
   const auto burr = [&] { return burr_library()[static_cast<std::size_t>(control.tool())]; };
@@ -275,12 +275,12 @@ TEST(RehearsalControl, KeysChooseTheBurrAndLatchTheDrill) {
   // The window's own keys are not taken.
   EXPECT_FALSE(control.command({Command::quit, 0}, {}));
   EXPECT_FALSE(control.command({Command::screenshot, 0}, {}));
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 TEST(RehearsalControl, SuckerAndWaterGoWithTheirKeys) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
   const auto for_a_while = [&] {
@@ -298,8 +298,8 @@ TEST(RehearsalControl, SuckerAndWaterGoWithTheirKeys) {
   control.wash(false, false);
   control.wash(false, false);  // nothing more
   for_a_while();
-  sitting.running->stop();
-  const Session session = read_session(sitting.scratch / "1.oss");
+  session_runner.running->stop();
+  const Session session = read_session(session_runner.scratch / "1.oss");
   // What the second hand held with its pedal down, in turn.
   std::vector<InstrumentKind> held;
   for (const TickRecord& t : session.ticks) {
@@ -312,8 +312,8 @@ TEST(RehearsalControl, SuckerAndWaterGoWithTheirKeys) {
 }
 
 TEST(RehearsalControl, TheSecondHandTakesTheNextInstrumentAndPutsItAway) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
   control.wash(false, false);
@@ -334,21 +334,21 @@ TEST(RehearsalControl, TheSecondHandTakesTheNextInstrumentAndPutsItAway) {
   EXPECT_TRUE(control.second_hand_empty());
   control.wash(true, false);
   EXPECT_FALSE(control.second_hand_empty()) << "the sucker comes while it is asked for";
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 TEST(RehearsalControl, SavesGoesOnAndBeginsAnew) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
-  const double whole = sitting.first.volume_mm3();
+  const double whole = session_runner.first.volume_mm3();
   control.rehearsal().act(SceneAction::saw({{5, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1}));
   ASSERT_TRUE(frames_until(control, [&] { return steps(control) == 1; }));
   press(control, Command::saw);
   press(control, Command::save);
-  EXPECT_EQ(sitting.begun, 2);
-  EXPECT_EQ(sitting.shown, 2);
+  EXPECT_EQ(session_runner.begun, 2);
+  EXPECT_EQ(session_runner.shown, 2);
   EXPECT_EQ(control.tools().tool(), HandTools::Tool::drill);
   EXPECT_NE(control.message().find("saved"), std::string::npos);
   EXPECT_LT(of_world(control, [](const World& w) { return w.volume_mm3(); }), whole - 50);
@@ -356,24 +356,24 @@ TEST(RehearsalControl, SavesGoesOnAndBeginsAnew) {
   EXPECT_EQ(of_world(control, [](const World& w) { return w.volume_mm3(); }), whole);
   EXPECT_FALSE(control.failure());
   EXPECT_FALSE(control.lost());
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 TEST(RehearsalControl, EndsAndGoesOnFromThere) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
   control.latch(true);
   EXPECT_TRUE(control.end());
-  EXPECT_EQ(sitting.running, nullptr);
+  EXPECT_EQ(session_runner.running, nullptr);
   EXPECT_FALSE(control.latched());
   control.watch();  // that nothing runs is no failure
   EXPECT_FALSE(control.failure());
   ASSERT_TRUE(control.begin(false, false));
-  EXPECT_EQ(sitting.begun, 2);
+  EXPECT_EQ(session_runner.begun, 2);
   // What could not be saved is told, and lost.
-  sitting.fails_to_save = Error(ExitCode::cannot_write, "disk full");
+  session_runner.fails_to_save = Error(ExitCode::cannot_write, "disk full");
   EXPECT_FALSE(control.end());
   ASSERT_TRUE(control.failure());
   EXPECT_STREQ(control.failure()->what(), "disk full");
@@ -381,40 +381,40 @@ TEST(RehearsalControl, EndsAndGoesOnFromThere) {
 }
 
 TEST(RehearsalControl, WhatFailsIsToldAndCanBePutRight) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
-  sitting.fails_to_begin = Error(ExitCode::no_input, "no case");
+  session_runner.fails_to_begin = Error(ExitCode::no_input, "no case");
   EXPECT_FALSE(control.begin(true, false));
   ASSERT_TRUE(control.failure());
   EXPECT_STREQ(control.failure()->what(), "no case");
-  EXPECT_EQ(sitting.running, nullptr);
+  EXPECT_EQ(session_runner.running, nullptr);
   // What cannot be shown does not run on unseen.
-  sitting.fails_to_show = Error(ExitCode::resources, "no texture");
+  session_runner.fails_to_show = Error(ExitCode::resources, "no texture");
   EXPECT_FALSE(control.begin(true, false));
   EXPECT_STREQ(control.failure()->what(), "no texture");
-  EXPECT_EQ(sitting.running, nullptr);
+  EXPECT_EQ(session_runner.running, nullptr);
   EXPECT_FALSE(control.lost());
   ASSERT_TRUE(control.begin(true, false));
   EXPECT_FALSE(control.failure());
   // The recording fails: the session is closed, and that is lost.
-  sitting.failed = Error(ExitCode::cannot_write, "disk full");
+  session_runner.failed = Error(ExitCode::cannot_write, "disk full");
   control.watch();
   ASSERT_TRUE(control.failure());
   EXPECT_STREQ(control.failure()->what(), "disk full");
   EXPECT_TRUE(control.lost());
-  EXPECT_EQ(sitting.running, nullptr);
-  sitting.failed.reset();
+  EXPECT_EQ(session_runner.running, nullptr);
+  session_runner.failed.reset();
   ASSERT_TRUE(control.begin(false, false));
   // It cannot be saved: nothing new is begun before someone says so.
-  sitting.fails_to_save = Error(ExitCode::cannot_write, "still full");
+  session_runner.fails_to_save = Error(ExitCode::cannot_write, "still full");
   control.save();
   EXPECT_STREQ(control.failure()->what(), "still full");
-  EXPECT_EQ(sitting.begun, 3);
+  EXPECT_EQ(session_runner.begun, 3);
   ASSERT_TRUE(control.begin(true, false));
   // A rehearsal that ends by itself is told of.
-  ASSERT_TRUE(frames_until(control, [&] { return sitting.running->latest().tick > 10; }));
-  sitting.running->stop();
+  ASSERT_TRUE(frames_until(control, [&] { return session_runner.running->latest().tick > 10; }));
+  session_runner.running->stop();
   control.watch();
   ASSERT_TRUE(control.failure());
   EXPECT_NE(std::string(control.failure()->what()).find("ended by itself"), std::string::npos);
@@ -423,8 +423,8 @@ TEST(RehearsalControl, WhatFailsIsToldAndCanBePutRight) {
 // A tilt turns the handle about the burr's centre: the burr stays where it is. It stays tilted, and what was recorded
 // says so.
 TEST(RehearsalControl, ATiltLeavesTheBurrWhereItIs) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
   const auto tick = [&] { return control.rehearsal().latest(); };
@@ -444,12 +444,12 @@ TEST(RehearsalControl, ATiltLeavesTheBurrWhereItIs) {
   EXPECT_LT(length(from_floats(tick().device.position_mm) - at), 1e-3);
   press(control, Command::straight);
   ASSERT_TRUE(frames_until(control, [&] { return length(axis() - before) < 2e-3; }));
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 TEST(RehearsalControl, MotionsAreScaledAndTheClutchHoldsTheDrill) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
   HandInput input;
@@ -483,13 +483,13 @@ TEST(RehearsalControl, MotionsAreScaledAndTheClutchHoldsTheDrill) {
   frame();
   EXPECT_EQ(control.goal_mm(), held);
   EXPECT_EQ(control.handle().axis(kFromAbove), axis);
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 // How far a pedal is down, times what the person lets the burr have, is in the stream.
 TEST(RehearsalControl, APedalDrillsAsFarAsItIsDown) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
   HandInput input;
@@ -515,12 +515,12 @@ TEST(RehearsalControl, APedalDrillsAsFarAsItIsDown) {
   EXPECT_TRUE(frames_until(control, [&] { return pedal() == 0; }));
   EXPECT_TRUE(frames_until(
       control, [&] { return pedal() == 64; }, input));
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 TEST(RehearsalControl, TheBurrIsChangedStepByStep) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
   const auto burr = [&] { return burr_library()[static_cast<std::size_t>(control.tool())].name(); };
@@ -532,13 +532,13 @@ TEST(RehearsalControl, TheBurrIsChangedStepByStep) {
   EXPECT_EQ(burr(), "diamond 7 mm") << "behind the smallest comes the largest";
   press(control, Command::other_burr);
   EXPECT_EQ(burr(), "cutting 7 mm");
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 // The mouse takes the second hand along; it stays there, works there, and with nothing in it goes back to the burr.
 TEST(RehearsalControl, TheMouseMovesTheSecondHand) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
   const auto second = [&] { return from_floats(control.rehearsal().latest(1).device.position_mm); };
@@ -574,13 +574,13 @@ TEST(RehearsalControl, TheMouseMovesTheSecondHand) {
     return length(second() - there) > 15;
   };
   EXPECT_TRUE(frames_until(control, back));
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 // From the side where the drill's handle is not.
 TEST(RehearsalControl, ALeftHandHasTheSecondOneAtItsRight) {
-  Sitting sitting;
-  RehearsalControl control = sitting.control();
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
   for (const bool left : {false, true}) {
@@ -593,7 +593,7 @@ TEST(RehearsalControl, ALeftHandHasTheSecondOneAtItsRight) {
     };
     EXPECT_TRUE(frames_until(control, so)) << left;
   }
-  sitting.running->stop();
+  session_runner.running->stop();
 }
 
 }  // namespace

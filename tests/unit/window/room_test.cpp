@@ -338,33 +338,33 @@ TEST(StateFacts, TellHowWarmItIs) {
   const StructureMap map(labels);
   TickRecord tick;
   StateFacts far = state_of_tick(tick, &map, 1000), near = far, hot = far, worst = far;
-  tell_warmth(far, {41.7, {{6, 40.25}}}, tick, &map);
+  report_warmth(far, {41.7, {{6, 40.25}}}, tick, &map);
   EXPECT_EQ(far.warmth, "bone up to 42 C");
   EXPECT_EQ(far.warning, "");
   tick.structure = 6;
-  tell_warmth(near, {41.7, {{6, 40.25}}}, tick, &map);
+  report_warmth(near, {41.7, {{6, 40.25}}}, tick, &map);
   EXPECT_EQ(near.warmth, "40.2 C");
-  tell_warmth(hot, {70, {{6, 47.4}}}, tick, &map);
+  report_warmth(hot, {70, {{6, 47.4}}}, tick, &map);
   EXPECT_EQ(hot.warning, map.name_of(6) + " is at 47 C: stop, and rinse");
   EXPECT_FALSE(hot.alarm);
-  tell_warmth(worst, {70, {{6, 58}}}, tick, &map);
+  report_warmth(worst, {70, {{6, 58}}}, tick, &map);
   EXPECT_TRUE(worst.alarm);
   // A case without structures; a scene without heat.
   StateFacts none = state_of_tick({}, nullptr, 1000);
   EXPECT_EQ(none.warmth, "");
-  tell_warmth(none, {50, {}}, {}, nullptr);
+  report_warmth(none, {50, {}}, {}, nullptr);
   EXPECT_EQ(none.warmth, "bone up to 50 C");
 }
 
 TEST(StateFacts, AWarningThatLastsLetsPassWhatIsSaid) {
   StateFacts f;
-  EXPECT_FALSE(warning_is_told(f, ""));
+  EXPECT_FALSE(warning_is_reported(f, ""));
   f.warning = "the shaft touches bone";
-  EXPECT_TRUE(warning_is_told(f, "saved"));
+  EXPECT_TRUE(warning_is_reported(f, "saved"));
   f.warning = "the bone is in 2 pieces";
   f.lasts = true;
-  EXPECT_FALSE(warning_is_told(f, "saved"));
-  EXPECT_TRUE(warning_is_told(f, ""));
+  EXPECT_FALSE(warning_is_reported(f, "saved"));
+  EXPECT_TRUE(warning_is_reported(f, ""));
 }
 
 TEST(StateFacts, TellWhatTheTickTells) {

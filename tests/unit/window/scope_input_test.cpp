@@ -197,8 +197,8 @@ TEST(ScopeInput, APuckDrivesAndKeysTurn) {
 TEST(ScopeInput, WordsOfTheView) {
   ScopeView v;
   magnify(v, 10);
-  EXPECT_EQ(scope_words(v), "10.0x  field 20.0 mm  WD 250 mm");
-  EXPECT_EQ(scope_words(overview({}, 120, {1, 0, 0})), "eye 0.9x  field 214 mm  at 400 mm");
+  EXPECT_EQ(scope_text(v), "10.0x  field 20.0 mm  WD 250 mm");
+  EXPECT_EQ(scope_text(overview({}, 120, {1, 0, 0})), "eye 0.9x  field 214 mm  at 400 mm");
 }
 
 }  // namespace

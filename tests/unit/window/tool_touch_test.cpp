@@ -19,11 +19,11 @@ TEST(ToolTouch, IsToldOnceAndShownWhileItLasts) {
   };
   EXPECT_FALSE(look(8));
   EXPECT_FALSE(touch.at_mm());
-  const auto told = look(3);
-  ASSERT_TRUE(told);
-  EXPECT_EQ(told->words, "the sucker touches the drill");
-  EXPECT_EQ(told->note.find("{\"hands\":[0,1],\"tools\":[\"cutting 4 mm\",\"sucker 8 Fr\"],\"at_mm\":["), 0U)
-      << told->note;
+  const auto reported = look(3);
+  ASSERT_TRUE(reported);
+  EXPECT_EQ(reported->words, "the sucker touches the drill");
+  EXPECT_EQ(reported->note.find("{\"hands\":[0,1],\"tools\":[\"cutting 4 mm\",\"sucker 8 Fr\"],\"at_mm\":["), 0U)
+      << reported->note;
   ASSERT_TRUE(touch.at_mm());
   EXPECT_NEAR(touch.at_mm()->x, 1.83, 0.05);
   EXPECT_FALSE(look(3));  // once

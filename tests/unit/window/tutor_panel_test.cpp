@@ -8,13 +8,13 @@ namespace {
 
 TEST(TutorPanel, WordsOfALink) {
   TutorNow::Link l{"trainee", true, 12.34, -3.21, 20.4, 0.053, 0.1, false};
-  EXPECT_EQ(link_words(l), "trainee: there and back 12.3 ms, 5 % lost, clock -3.2 ms, +20 ppm");
+  EXPECT_EQ(link_text(l), "trainee: there and back 12.3 ms, 5 % lost, clock -3.2 ms, +20 ppm");
   l.behind_s = 2;
   l.differs = true;
-  EXPECT_NE(link_words(l).find("2.0 s behind"), std::string::npos);
-  EXPECT_NE(link_words(l).find("differs"), std::string::npos);
+  EXPECT_NE(link_text(l).find("2.0 s behind"), std::string::npos);
+  EXPECT_NE(link_text(l).find("differs"), std::string::npos);
   l.heard = false;
-  EXPECT_EQ(link_words(l), "trainee: not heard");
+  EXPECT_EQ(link_text(l), "trainee: not heard");
 }
 
 TEST(TutorPanel, WhoseBurrTakesBone) {

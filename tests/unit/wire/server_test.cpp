@@ -109,21 +109,21 @@ TEST(WireServer, WhoStallsLosesAloneAndIsTold) {
   EXPECT_GT(dropped, 100u);
   IgtlParser parser(1 << 17);
   std::uint64_t whole = 0;
-  std::int64_t told = 0;
+  std::int64_t reported = 0;
   std::array<std::uint8_t, 65536> bytes;
   timeval patience{20, 0};
   ::setsockopt(stalled, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-  while (told == 0) {
+  while (reported == 0) {
     if (whole > 20) server.send(igtl_string("n", 0, "small"));
     const ssize_t n = ::recv(stalled, bytes.data(), bytes.size(), 0);
     ASSERT_GT(n, 0);
     ASSERT_TRUE(parser.feed({bytes.data(), static_cast<std::size_t>(n)}, [&](const IgtlMessage& m) {
       ++whole;
       if (m.type == "STATUS")
-        for (std::size_t i = 0; i < 8; ++i) told = told << 8 | m.content[2 + i];
+        for (std::size_t i = 0; i < 8; ++i) reported = reported << 8 | m.content[2 + i];
     }));
   }
-  EXPECT_GE(static_cast<std::uint64_t>(told), dropped);
+  EXPECT_GE(static_cast<std::uint64_t>(reported), dropped);
   EXPECT_EQ(parser.damaged(), 0u);
   ::close(stalled);
 }
@@ -266,8 +266,8 @@ class Kept final : public MonitorSink {
 TEST(RemoteMonitor, HasEverySampleAndEvent) {
   auto outlet = make_outlet({StreamTarget::Kind::igtl, "127.0.0.1:0", ""});
   outlet->begin({{"oculi", "oris"}, 100});
-  const std::string told = outlet->told();
-  const int port = std::stoi(told.substr(told.find("port ") + 5));
+  const std::string reported = outlet->reported();
+  const int port = std::stoi(reported.substr(reported.find("port ") + 5));
   Kept kept;
   std::atomic<int> begun{0};
   RemoteMonitor remote({"127.0.0.1", port}, [&](const WireMonitor& m) {
@@ -309,7 +309,7 @@ TEST(RemoteMonitor, HasEverySampleAndEvent) {
   EXPECT_EQ(kept.events[1].channel, 1);
   EXPECT_EQ(kept.events[1].uv, 250.5);
   EXPECT_EQ(begun, 1);
-  // Another session of the same server begins before what was heard: nothing is lost, and it is shown anew.
+  // Another session of the same server begins before what was heard: nothing is lost, and it is shown again.
   const std::vector<std::int16_t> two{1, 2};
   outlet->block({0, 2, two});
   ASSERT_TRUE(soon([&] { return begun == 2; }));

@@ -36,7 +36,7 @@ int connected_to(int port) {
   return fd;
 }
 
-struct Room {
+struct MainView {
   std::vector<StimulatorSetting> set;
   StimulatorSetting now;
   StimulatorDoor door{kCode,
@@ -70,7 +70,7 @@ struct Room {
 };
 
 TEST(StimulatorLink, WhoHasTheCodeSetsCurrentPulsesAndSearch) {
-  Room room;
+  MainView room;
   room.now.current_ma = 0.7;
   StimulatorLink link("K7MX2QPA");
   EXPECT_FALSE(link.set({}));
@@ -90,12 +90,12 @@ TEST(StimulatorLink, WhoHasTheCodeSetsCurrentPulsesAndSearch) {
   room.talk(link, 1, *link.set({2, 1, 4, 0.1, false}));
   EXPECT_EQ(room.set.size(), 2U);
   EXPECT_EQ(room.door.counts().settings, 2U);
-  link.told(0, false);
+  link.reported(0, false);
   EXPECT_EQ(link.state().now.current_ma, 0);
 }
 
 TEST(StimulatorLink, AWrongCodeSetsNothingAndThreeCloseTheDoor) {
-  Room room;
+  MainView room;
   for (int i = 0; i < 3; ++i) {
     StimulatorLink wrong("AAAAAAAA");
     room.talk(wrong, 10 + static_cast<std::uint64_t>(i), wrong.begin());
@@ -112,7 +112,7 @@ TEST(StimulatorLink, AWrongCodeSetsNothingAndThreeCloseTheDoor) {
 }
 
 TEST(StimulatorLink, NothingIsTakenTwiceChangedOrFromSomebodyElse) {
-  Room room;
+  MainView room;
   StimulatorLink link(kCode);
   room.talk(link, 1, link.begin());
   const WireBytes good = *link.set({0, 1, 4, 0.1, false});
@@ -137,7 +137,7 @@ TEST(StimulatorLink, NothingIsTakenTwiceChangedOrFromSomebodyElse) {
 }
 
 TEST(StimulatorLink, WhateverComesNothingBreaksAndNothingIsSet) {
-  Room room;
+  MainView room;
   StimulatorLink link(kCode);
   room.talk(link, 1, link.begin());
   room.talk(link, 1, *link.set({0, 1, 4, 0.1, false}));
@@ -184,8 +184,8 @@ TEST(StimulatorLink, OverTheNetwork) {
       [] { return std::pair(StimulatorSetting{}, std::uint32_t{1}); });
   outlet->let_stimulate(door);
   outlet->begin({{"oculi"}, 100});
-  const std::string told = outlet->told();
-  const int port = std::stoi(told.substr(told.find("port ") + 5));
+  const std::string reported = outlet->reported();
+  const int port = std::stoi(reported.substr(reported.find("port ") + 5));
   const auto none = [](const WireMonitor&) { return std::vector<MonitorSink*>{}; };
   RemoteMonitor with_code({"127.0.0.1", port}, none, kCode), without({"127.0.0.1", port}, none),
       guesses({"127.0.0.1", port}, none, "AAAAAAAA");

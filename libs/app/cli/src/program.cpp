@@ -368,7 +368,7 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
     return fail(e, json, out, err);
   };
   try {
-    static_cast<void>(simd());  // an unknown OSTEO_SIMD is told by every command
+    static_cast<void>(simd());  // an unknown OSTEO_SIMD is reported by every command
     const int code = dispatch(program, args, out, slicer ? out : err, slicer, printer);
     if (printer) printer->clear();
     out.flush();

@@ -1,5 +1,5 @@
 // A stage as a module of 3D Slicer: its description (Slicer Execution Model) and what starts it.
-// What Slicer's own parser refuses is in docs/how-to/slicer.md; names of parameters and flags are letters, digits and
+// What Slicer's own parser rejects is in docs/how-to/slicer.md; names of parameters and flags are letters, digits and
 // underscores there.
 #include <algorithm>
 #include <array>

@@ -33,7 +33,7 @@ std::vector<double> quantiles(const std::vector<double>& values, const std::vect
   return found;
 }
 
-// What hangs together by its points, as far as the load holds it: a part that can move freely has no solution. Crumbs
+// What is connected by its points, as far as the load holds it: a part that can move freely has no solution. Crumbs
 // of the meshing are left out, larger ones are for a person to decide.
 struct Held {
   TetMesh mesh;

@@ -90,7 +90,7 @@ Answers solve_loads(const MeshedBody& of, const FemBody& body, const Context& co
 
 // Eight times as many elements: that much more to add up, and sparse Cholesky of a solid takes the square of its
 // unknowns.
-void tell_finer_estimate(const MeshedBody& of, const FemBody& body, double seconds, const Context& context) {
+void report_finer_estimate(const MeshedBody& of, const FemBody& body, double seconds, const Context& context) {
   const std::size_t loads = of.problem.loads.size();
   const double share = std::min(1.0, static_cast<double>(body.point_count()) / 2e4),
                estimate_s = seconds * (8 + 56 * share);
@@ -231,7 +231,7 @@ std::vector<Data> calibrate_to_elements(const CalibrateParams& p, const TetMesh&
   const FemBody body = of.fem(of.elements.order);
   Answers truth = solve_loads(of, body, context);
   if (p.check_truth) {
-    tell_finer_estimate(of, body, truth.seconds, context);
+    report_finer_estimate(of, body, truth.seconds, context);
     truth.off_finer = off_finer_elements(of, truth, context);
   }
   std::vector<CalibrationCase> cases;

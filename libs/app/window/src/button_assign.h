@@ -14,7 +14,7 @@ class ButtonAssign {
   [[nodiscard]] std::optional<HandFunction> listens() const { return for_; }
   void cancel() { for_.reset(); }
   /// A button went down while it listens: Esc gives up, Delete takes all buttons from it. Returns what there is to say:
-  /// what the button did before and no longer does, or why it was refused (then it goes on listening).
+  /// what the button did before and no longer does, or why it was rejected (then it goes on listening).
   std::string take(int button, HandButtons& buttons);
 
  private:

@@ -21,7 +21,7 @@ ButtonWatch::State& ButtonWatch::state_of(int button) {
 void ButtonWatch::frame(std::span<const ButtonLevel> levels, bool attended, const HandButtons& buttons,
                         Keyboard& keyboard) {
   pressed_.reset();
-  const auto tell = [&](int button, Keyboard::Event event) {
+  const auto notify = [&](int button, Keyboard::Event event) {
     // One that was given another thing to do while it was down is let go all the same.
     if (event == Keyboard::Event::pressed && buttons.function(button) == HandFunction::drill) return;
     keyboard.on(button, event);
@@ -29,7 +29,7 @@ void ButtonWatch::frame(std::span<const ButtonLevel> levels, bool attended, cons
   std::erase_if(all_, [&](const State& s) {
     const bool gone =
         std::none_of(levels.begin(), levels.end(), [&](const ButtonLevel& l) { return l.button == s.button; });
-    if (gone && s.down) tell(s.button, Keyboard::Event::released);
+    if (gone && s.down) notify(s.button, Keyboard::Event::released);
     return gone;
   });
   for (const ButtonLevel& l : levels) {
@@ -40,7 +40,7 @@ void ButtonWatch::frame(std::span<const ButtonLevel> levels, bool attended, cons
     if (!attended && level >= kUp) s.waits = true;
     s.down = !s.waits && attended && (was ? level >= kUp : level > kDown);
     s.level = s.down ? level : 0;
-    if (s.down != was) tell(s.button, s.down ? Keyboard::Event::pressed : Keyboard::Event::released);
+    if (s.down != was) notify(s.button, s.down ? Keyboard::Event::pressed : Keyboard::Event::released);
     if (s.down && !was) pressed_ = s.button;
   }
 }

@@ -13,7 +13,7 @@ std::optional<std::string> ask_for_code(WindowShell& shell, const std::string& h
   constexpr int kEscapeKey = 256;
   shell.set_title("Osteotome");
   std::array<char, 32> typed{};
-  bool close = false, done = false, told = false;
+  bool close = false, done = false, reported = false;
   shell.on_key = [&](int key, int action, int) { close = close || (action != 0 && key == kEscapeKey); };
   while (!done && !close && !shell.closing() && !(stop && stop())) {
     if (!shell.poll()) continue;
@@ -25,7 +25,7 @@ std::optional<std::string> ask_for_code(WindowShell& shell, const std::string& h
     ImGui::TextWrapped("Join the session at %s", host.c_str());
     ImGui::TextWrapped("Type the code that it shows there: eight characters.");
     ImGui::Dummy({0, 0.4F * e});
-    if (!told) ImGui::SetKeyboardFocusHere();
+    if (!reported) ImGui::SetKeyboardFocusHere();
     ImGui::SetNextItemWidth(16 * e);
     done = ImGui::InputText("##code", typed.data(), typed.size(),
                             ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_CharsUppercase);
@@ -35,9 +35,9 @@ std::optional<std::string> ask_for_code(WindowShell& shell, const std::string& h
     if (ImGui::Button("close (Esc)")) close = true;
     ImGui::End();
     shell.show_page();
-    if (!told && !state_file.empty())
+    if (!reported && !state_file.empty())
       write_atomically(state_file, [](const std::filesystem::path& to) { write_file(to, "{\"code_page\": true}"); });
-    told = true;
+    reported = true;
   }
   shell.on_key = nullptr;
   return done ? std::optional(std::string(typed.data())) : std::nullopt;

@@ -47,30 +47,30 @@ class ConsoleSound {
   std::optional<AudioOut> card_;
 };
 
-void write_state(const std::filesystem::path& file, const ConsoleFacts& facts, MonitorDesk* desk, bool answers,
-                 std::uint64_t pictures) {
+void write_state(const std::filesystem::path& file, const ConsoleFacts& facts, MonitorController* controller,
+                 bool answers, std::uint64_t pictures) {
   if (file.empty()) return;
   Json j{{"page", "console"},      {"pictures", pictures},     {"connected", facts.connected},
          {"ended", facts.ended},   {"samples", facts.samples}, {"lost", facts.lost},
          {"events", facts.events}, {"trouble", facts.trouble}};
-  if (desk != nullptr) {
-    j["channels"] = desk->wiring().labels();
+  if (controller != nullptr) {
+    j["channels"] = controller->wiring().labels();
     j["answers"] = answers;
-    j["seconds"] = desk->screen().view().now_s;
-    j["lines"] = desk->screen().events();
-    j["alarm"] = desk->screen().alarm();
-    j["frozen"] = desk->screen().frozen();
-    j["stimulates"] = desk->stimulates();
-    if (desk->stimulates()) {
-      const StimulatorSetting now = desk->stimulator();
+    j["seconds"] = controller->screen().view().now_s;
+    j["lines"] = controller->screen().events();
+    j["alarm"] = controller->screen().alarm();
+    j["frozen"] = controller->screen().frozen();
+    j["stimulates"] = controller->stimulates();
+    if (controller->stimulates()) {
+      const StimulatorSetting now = controller->stimulator();
       j["current_ma"] = now.current_ma;
       j["search"] = now.search;
     }
-    if (const auto found = desk->screen().threshold_ma()) j["threshold_ma"] = *found;
-    j["muted"] = desk->sound().muted();
+    if (const auto found = controller->screen().threshold_ma()) j["threshold_ma"] = *found;
+    j["muted"] = controller->sound().muted();
     j["gains_uv"] = Json::list();
-    for (std::size_t ch = 0; ch < desk->wiring().channels.size(); ++ch)
-      j["gains_uv"].push_back(desk->screen().gain_uv(ch));
+    for (std::size_t ch = 0; ch < controller->wiring().channels.size(); ++ch)
+      j["gains_uv"].push_back(controller->screen().gain_uv(ch));
   }
   const std::filesystem::path beside = file.string() + ".new";
   std::ofstream(beside) << j.dump() << '\n';
@@ -82,7 +82,7 @@ void write_state(const std::filesystem::path& file, const ConsoleFacts& facts, M
 
 void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
   shell.set_title("Osteotome nerve monitor - " + options.server);
-  std::shared_ptr<MonitorDesk> desk;
+  std::shared_ptr<MonitorController> controller;
   ConsoleSound sound(options.sound);
   MonitorPanel panel;
   bool close = false;
@@ -91,26 +91,26 @@ void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
     if (key == 'Q' || key == kEscapeKey) close = true;
     if (key == kF11Key) shell.toggle_full_screen();
     if (key == 'G') panel.show_answers(!panel.answers());
-    if (!desk) return;
-    if (key == 'F') desk->screen().freeze(!desk->screen().frozen());
-    if (key == 'M') desk->sound().mute(!desk->sound().muted());
-    if (key == 'S') panel.switch_stimulator(*desk);
-    if (key == 'T') panel.find_threshold(*desk);
+    if (!controller) return;
+    if (key == 'F') controller->screen().freeze(!controller->screen().frozen());
+    if (key == 'M') controller->sound().mute(!controller->sound().muted());
+    if (key == 'S') panel.switch_stimulator(*controller);
+    if (key == 'T') panel.find_threshold(*controller);
   };
   std::uint64_t pictures = 0;
   while (!close && !shell.closing() && !(options.stop && options.stop())) {
     if (!shell.poll()) continue;
-    if (std::shared_ptr<MonitorDesk> now = options.desk(); now != desk) {
+    if (std::shared_ptr<MonitorController> now = options.controller(); now != controller) {
       sound.follow(now ? &now->sound() : nullptr);
-      desk = std::move(now);
+      controller = std::move(now);
     }
     const ConsoleFacts facts = options.facts();
     shell.new_frame();
     const auto w = static_cast<float>(shell.width()), h = static_cast<float>(shell.height());
     const float e = em(), foot = ImGui::GetFrameHeight() + e * 0.9F;
-    if (desk) {
+    if (controller) {
       panel.fill({0, 0, w, h - foot});
-      panel.draw(*desk);
+      panel.draw(*controller);
     } else {
       begin_fixed("waiting", {0, 0, w, h - foot});
       ImGui::TextWrapped(
@@ -129,11 +129,11 @@ void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
           "%s  %s%s  %s  F freeze  M mute  G view%s  Q close", options.server.c_str(),
           facts.ended ? "the session has ended" : "connected",
           facts.lost > 0 ? (", " + std::to_string(facts.lost) + " samples lost on the way").c_str() : "",
-          sound.words().c_str(), desk && desk->stimulates() ? "  S stimulator  T threshold" : "");
+          sound.words().c_str(), controller && controller->stimulates() ? "  S stimulator  T threshold" : "");
     }
     ImGui::End();
     shell.show_page();
-    write_state(options.state_file, facts, desk.get(), panel.answers(), ++pictures);
+    write_state(options.state_file, facts, controller.get(), panel.answers(), ++pictures);
   }
   sound.follow(nullptr);
 }

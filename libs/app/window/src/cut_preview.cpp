@@ -26,9 +26,9 @@ void CutPreview::look(const World& world, const StructureMap* structures, const 
   const std::optional<SawCut> blade = blade_at_work(world, cut, voxels_sawn(world, cut));
   if (!blade) return;
   const std::vector<StructureCut> near = structures_cut(*structures, *blade);
-  if (const std::string told = told_structures_cut(*structures, near); !told.empty()) {
+  if (const std::string reported = reported_structures_cut(*structures, near); !reported.empty()) {
     cuts_ = true;
-    text_ = "would cut " + told;
+    text_ = "would cut " + reported;
     return;
   }
   const auto nearest = std::min_element(near.begin(), near.end(), [](const StructureCut& a, const StructureCut& b) {

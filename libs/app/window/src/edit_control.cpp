@@ -227,7 +227,7 @@ void EditControl::release(SlicePointer at, SliceButton button) {
   if (held_ != button) return;
   move(at);
   held_.reset();
-  if (document_.in_stroke()) told(document_.end_stroke());
+  if (document_.in_stroke()) reported(document_.end_stroke());
 }
 
 void EditControl::wheel(SlicePointer at, double notches) {
@@ -276,7 +276,7 @@ std::string EditControl::readout() const {
 // ----------------------------------------------------------------------------------------------------------------------------
 
 void EditControl::take(EditTool tool) {
-  if (document_.in_stroke()) told(document_.end_stroke());
+  if (document_.in_stroke()) reported(document_.end_stroke());
   held_.reset();
   tool_ = tool;
   redraw_ = true;
@@ -295,7 +295,7 @@ void EditControl::set_threshold(double lower, double upper) {
 
 void EditControl::start(std::vector<EditOperation> operations) {
   if (refuse_when_busy()) return;
-  if (document_.in_stroke()) told(document_.end_stroke());
+  if (document_.in_stroke()) reported(document_.end_stroke());
   message_ = operation_text(operations.front()) + " ...";
   worker_.plan(document_, std::move(operations));
 }
@@ -327,7 +327,7 @@ void EditControl::apply(BoxChoice choice) {
 bool EditControl::at_once(const EditOperation& operation) {
   if (refuse_when_busy()) return false;
   try {
-    told(document_.apply(operation));
+    reported(document_.apply(operation));
     redraw_ = true;
     return true;
   } catch (const Error& e) {
@@ -460,7 +460,7 @@ std::string EditControl::hint() const {
   return {};
 }
 
-void EditControl::told(const EditOutcome& o) {
+void EditControl::reported(const EditOutcome& o) {
   message_ = o.text;
   if (!o.changed) {
     message_ += ": " + (o.note.empty() ? "nothing changes" : o.note);
@@ -478,7 +478,7 @@ void EditControl::tick() {
       message_ = done->error->code() == ExitCode::cancelled ? "stopped; nothing was changed"
                                                             : std::string(done->error->what());
     } else {
-      told(document_.commit(std::move(*done->plan)));
+      reported(document_.commit(std::move(*done->plan)));
     }
     redraw_ = true;
   }

@@ -73,7 +73,7 @@ class EditControl {
   void apply(BoxChoice choice = BoxChoice::clear_inside);
   /// Something to be worked out beside the window.
   void start(std::vector<EditOperation> operations);
-  /// What is done at once: structures. False, with a message, where it is refused.
+  /// What is done at once: structures. False, with a message, where it is rejected.
   bool at_once(const EditOperation& operation);
   bool add_structure(const std::string& name);
   void undo();
@@ -114,7 +114,7 @@ class EditControl {
   void follow_cross();
   [[nodiscard]] bool refuse_when_busy();
   void ask_preview();
-  void told(const EditOutcome& outcome);
+  void reported(const EditOutcome& outcome);
 
   EditDocument& document_;
   EditWorker worker_;

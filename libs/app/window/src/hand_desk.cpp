@@ -4,15 +4,15 @@
 
 namespace osteo::inline app {
 
-bool HandDesk::key(int code, int action) {
+bool HandController::key(int code, int action) {
   if (!assign_.listens()) return false;
   if (action == 1) said_ = assign_.take(code, person_.buttons);
   // What was down before it listened must be able to come up.
   return action != 0;
 }
 
-void HandDesk::read(std::vector<ButtonLevel> levels, bool attended, const WindowActions& actions,
-                    RehearsalControl& control) {
+void HandController::read(std::vector<ButtonLevel> levels, bool attended, const WindowActions& actions,
+                          RehearsalControl& control) {
   if (attended_ && !attended) {
     keyboard_.let_go();
     if (control.latched()) control.say("another window has the keys: the drill is off");
@@ -42,7 +42,7 @@ void HandDesk::read(std::vector<ButtonLevel> levels, bool attended, const Window
   }
 }
 
-void HandDesk::give(RehearsalControl& control) const {
+void HandController::give(RehearsalControl& control) const {
   const PersonValues& v = person_.values;
   control.motion().one_to = static_cast<int>(v.motion_one_to);
   control.motion().rest_share = v.wrist_rest;
@@ -50,12 +50,12 @@ void HandDesk::give(RehearsalControl& control) const {
   control.burr_share = v.burr_share;
 }
 
-void HandDesk::take(const RehearsalControl& control) {
+void HandController::take(const RehearsalControl& control) {
   person_.values.motion_one_to = control.motion().one_to;
   person_.values.burr_share = control.burr_share;
 }
 
-HandInput HandDesk::input(const RehearsalControl& control) const {
+HandInput HandController::input(const RehearsalControl& control) const {
   HandInput in;
   in.drill =
       std::max(keyboard_.held(Command::pedal) ? 1.0 : 0.0, watch_.drill(person_.buttons, control.moves_by_itself()));
@@ -65,7 +65,7 @@ HandInput HandDesk::input(const RehearsalControl& control) const {
   return in;
 }
 
-HandTuning HandDesk::tuned(HandTuning t) const {
+HandTuning HandController::tuned(HandTuning t) const {
   const HandButtons& b = person_.buttons;
   t.drill_buttons = b.mask(button::kDevice, HandFunction::drill);
   t.drill_switches = b.mask(button::kPedal, HandFunction::drill);
@@ -73,7 +73,7 @@ HandTuning HandDesk::tuned(HandTuning t) const {
   return t;
 }
 
-bool HandDesk::there(int button) const {
+bool HandController::there(int button) const {
   if (button < button::kPedal || (button >= button::kMouse && button < button::kPad)) return true;
   if (button < button::kDevice) return pedal_there_;
   if (button < button::kMouse) return device_there_;

@@ -11,9 +11,9 @@
 
 namespace osteo::inline app {
 
-class HandDesk {
+class HandController {
  public:
-  HandDesk(PersonSettings& person, Keyboard& keyboard) : person_(person), keyboard_(keyboard) {
+  HandController(PersonSettings& person, Keyboard& keyboard) : person_(person), keyboard_(keyboard) {
     keyboard_.bind(&person_.buttons);
   }
 

@@ -30,7 +30,7 @@ std::string key_of(HandFunction function, const HandButtons& buttons) {
 
 }  // namespace
 
-void HandDesk::draw(RehearsalControl& control, bool show) {
+void HandController::draw(RehearsalControl& control, bool show) {
   if (show) {
     ImGui::SetNextItemOpen(true);
     ImGui::SetKeyboardFocusHere();
@@ -67,7 +67,7 @@ void HandDesk::draw(RehearsalControl& control, bool show) {
 }
 
 // What each thing is done by. One row for each; a press on it, then the button.
-void HandDesk::draw_buttons() {
+void HandController::draw_buttons() {
   ImGui::TextDisabled("pedals, buttons, keys");
   if (assign_.listens()) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));

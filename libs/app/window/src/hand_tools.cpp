@@ -15,7 +15,7 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kKeyTurn = 5 * kDegree;
 constexpr double kTurnPerMm = 0.6 * kDegree;
-constexpr double kCrumbMm3 = 30;  // what is smaller than that and hangs together with nothing becomes dust
+constexpr double kCrumbMm3 = 30;  // what is smaller than that and is connected with nothing becomes dust
 
 RigidTransform grip_of(float turn_deg, float tilt_deg) {
   return rotation_about({}, {1, 0, 0}, static_cast<double>(tilt_deg) * kDegree) *

@@ -80,7 +80,7 @@ class HandTools {
 
   /// Where the tool is: mouse motions are measured at this depth.
   [[nodiscard]] Vec3 position_mm() const { return tool_ == Tool::saw ? cut_.at_mm : handle_mm_; }
-  /// What there is to say about the last thing done; also why it was refused, which is asked for here.
+  /// What there is to say about the last thing done; also why it was rejected, which is asked for here.
   const std::string& note(Rehearsal& rehearsal);
   /// How the tool in the hand is used, in a few words; empty for the drill.
   [[nodiscard]] std::string how() const;

@@ -50,14 +50,14 @@ std::string hint_note(const Hint& hint) {
   return j.dump();
 }
 
-void HintDesk::follow(Rehearsal& rehearsal) {
+void HintController::follow(Rehearsal& rehearsal) {
   reader_.reset();  // of the one that is over
   rehearsal_ = &rehearsal;
   words_.clear();
   if (on()) join();
 }
 
-void HintDesk::join() {
+void HintController::join() {
   bool water = false;
   rehearsal_->look([&](const World&, SceneReaders& readers) { water = readers.dust != nullptr; });
   reader_ = std::make_unique<HintReader>(hints_left(usual_hints(), person_.values.hints_off), rehearsal_->rate_hz(),
@@ -65,13 +65,13 @@ void HintDesk::join() {
   rehearsal_->add_reader(*reader_);
 }
 
-void HintDesk::leave() {
+void HintController::leave() {
   if (reader_ && rehearsal_ != nullptr) rehearsal_->remove_reader(*reader_);
   reader_.reset();
   rehearsal_ = nullptr;
 }
 
-void HintDesk::turn(bool on) {
+void HintController::turn(bool on) {
   person_.values.hints = on;
   words_.clear();
   if (rehearsal_ == nullptr) return;
@@ -80,7 +80,7 @@ void HintDesk::turn(bool on) {
   if (on) join();
 }
 
-void HintDesk::frame(Vec3 eye_mm, double now_s) {
+void HintController::frame(Vec3 eye_mm, double now_s) {
   if (!reader_ || rehearsal_ == nullptr) return;
   reader_->look_from(eye_mm);
   if (const auto hint = reader_->take()) {
@@ -91,7 +91,7 @@ void HintDesk::frame(Vec3 eye_mm, double now_s) {
   if (now_s > until_s_) words_.clear();
 }
 
-void HintDesk::draw(const ScreenBox& view) const {
+void HintController::draw(const ScreenBox& view) const {
   if (words_.empty()) return;
   const float e = em(), high = 2.2F * e;
   const float wide = std::min(view.width - 2 * e, ImGui::CalcTextSize(words_.c_str()).x * 1.3F + 3 * e);
@@ -103,7 +103,7 @@ void HintDesk::draw(const ScreenBox& view) const {
   fitted_text(draw, {box.x + 2.0F * e, box.y, box.width - 2.5F * e, box.height}, 1.3F * e, palette::kText, words_);
 }
 
-void HintDesk::panel() {
+void HintController::panel() {
   if (!ImGui::CollapsingHeader("Hints while one drills")) return;
   bool all = on();
   if (ImGui::Checkbox("hints (Ctrl-H)", &all)) turn(all);

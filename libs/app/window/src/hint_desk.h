@@ -20,11 +20,11 @@ namespace osteo::inline app {
 [[nodiscard]] std::string hint_note(const Hint& hint);
 
 /// Off it is no reader of the rehearsal and costs nothing.
-class HintDesk {
+class HintController {
  public:
   /// How long a hint is shown.
   static constexpr double kShownS = 4;
-  explicit HintDesk(PersonSettings& person) : person_(person) {}
+  explicit HintController(PersonSettings& person) : person_(person) {}
 
   /// Another rehearsal runs; the one before has ended.
   void follow(Rehearsal& rehearsal);

@@ -269,7 +269,7 @@ const std::vector<HelpLine>& help_lines() {
     for (const BurrKindRow& kind : kBurrKinds) all += std::string(", ") + kind.key;
     return all;
   }();
-  static const std::string burr_words = [] {
+  static const std::string burr_text = [] {
     std::string all = "burr: diameter";
     for (const BurrKindRow& kind : kBurrKinds) all += ", " + std::string(kind.name);
     return all;
@@ -281,7 +281,7 @@ const std::vector<HelpLine>& help_lines() {
       {"U", "lifts the drill out of the bone, drill off", {lift}},
       {"wheel, Up, Down, Shift-drag", "moves it deeper (away from you) or back", {deeper, back}},
       {"left button, Space", "drills while held; Space: on and off", {drill}},
-      {burr_keys.c_str(), burr_words.c_str(), {diameter, burr_kind}},
+      {burr_keys.c_str(), burr_text.c_str(), {diameter, burr_kind}},
       {"B, Y, T", "ball, cylinder, taper", {ball, cylinder, taper}},
       {"9, 0", "burr slower, faster: 25 to 100 %", {burr_speed}},
       {"Tab", "wheel of tools: point or Up, Down; Tab, Enter or a click takes", {wheel}},

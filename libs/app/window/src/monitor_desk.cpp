@@ -4,7 +4,7 @@
 #include "osteo/session/scene/monitor_sound.h"
 
 namespace osteo::inline app {
-struct MonitorDesk::Parts {
+struct MonitorController::Parts {
   Parts(Rehearsal& r, const MonitorOptions& options)
       : rehearsal(&r),
         reader(std::make_unique<MonitorReader>(options, r.structures(), r.rate_hz())),
@@ -22,14 +22,14 @@ struct MonitorDesk::Parts {
   std::string invitation;
 };
 
-MonitorDesk::MonitorDesk(Rehearsal& rehearsal, const MonitorOptions& options)
+MonitorController::MonitorController(Rehearsal& rehearsal, const MonitorOptions& options)
     : parts_(std::make_unique<Parts>(rehearsal, options)) {
   for (MonitorSink* const s : sinks()) parts_->reader->add_sink(*s);
   parts_->reader->add_sink(*parts_->notes);
   rehearsal.add_reader(*parts_->reader);
 }
 
-MonitorDesk::MonitorDesk(const std::vector<std::string>& labels, double event_uv) {
+MonitorController::MonitorController(const std::vector<std::string>& labels, double event_uv) {
   MonitorSetup setup;
   setup.constants.event_uv = event_uv;
   MonitorWiring wiring;
@@ -37,51 +37,51 @@ MonitorDesk::MonitorDesk(const std::vector<std::string>& labels, double event_uv
   parts_ = std::make_unique<Parts>(setup, wiring);
 }
 
-MonitorDesk::~MonitorDesk() {
+MonitorController::~MonitorController() {
   if (parts_->rehearsal != nullptr) parts_->rehearsal->remove_reader(*parts_->reader);
 }
 
-MonitorScreen& MonitorDesk::screen() {
+MonitorScreen& MonitorController::screen() {
   return parts_->screen;
 }
-MonitorSound& MonitorDesk::sound() {
+MonitorSound& MonitorController::sound() {
   return parts_->sound;
 }
-MonitorReader& MonitorDesk::reader() {
+MonitorReader& MonitorController::reader() {
   return *parts_->reader;
 }
-const MonitorWiring& MonitorDesk::wiring() const {
+const MonitorWiring& MonitorController::wiring() const {
   return parts_->wiring;
 }
-std::size_t MonitorDesk::hands() const {
+std::size_t MonitorController::hands() const {
   if (parts_->far) return parts_->far->hands();
   return parts_->rehearsal == nullptr ? 0 : parts_->rehearsal->hands();
 }
 
-std::vector<MonitorSink*> MonitorDesk::sinks() {
+std::vector<MonitorSink*> MonitorController::sinks() {
   return {&parts_->screen, &parts_->sound};
 }
 
-void MonitorDesk::lend(RemoteStimulator stimulator) {
+void MonitorController::lend(RemoteStimulator stimulator) {
   parts_->far = std::move(stimulator);
 }
-void MonitorDesk::invite(std::string words) {
+void MonitorController::invite(std::string words) {
   parts_->invitation = std::move(words);
 }
-const std::string& MonitorDesk::invitation() const {
+const std::string& MonitorController::invitation() const {
   return parts_->invitation;
 }
 
-bool MonitorDesk::stimulates() const {
+bool MonitorController::stimulates() const {
   return parts_->reader != nullptr || (parts_->far && parts_->far->there());
 }
 
-void MonitorDesk::stimulate(const StimulatorSetting& setting) {
+void MonitorController::stimulate(const StimulatorSetting& setting) {
   if (parts_->far) return parts_->far->set(setting);
   if (parts_->reader) parts_->reader->stimulate(setting);
 }
 
-StimulatorSetting MonitorDesk::stimulator() const {
+StimulatorSetting MonitorController::stimulator() const {
   if (parts_->far) return parts_->far->now();
   StimulatorSetting now;
   if (parts_->rehearsal != nullptr)

@@ -81,69 +81,72 @@ void draw_lanes(MonitorScreen& screen, float height, const Draw& draw) {
 
 }  // namespace
 
-void MonitorPanel::draw_sweep(MonitorDesk& desk, float height) {
-  draw_lanes(desk.screen(), height, [](const MonitorScreen::View& view, const ChannelLane& lane, ImDrawList* draw) {
-    const ScreenBox& box = lane.box;
-    for (const float sign : {-1.0F, 1.0F}) {
-      const auto uv = sign * static_cast<float>(view.event_uv);
-      if (std::abs(uv) < lane.gain_uv)
-        draw->AddLine({box.x, lane.y_of(uv)}, {box.right(), lane.y_of(uv)}, im_colour32(palette::kOrange, 0.5F));
-    }
-    // As wide as the screen has pixels: a column is all that falls into it, and reaches to the one before.
-    const auto columns =
-        static_cast<std::size_t>(std::max(1.0F, std::min(box.width, static_cast<float>(MonitorScreen::kBins))));
-    float last_least = 0, last_most = 0;
-    for (std::size_t c = 0; c < columns; ++c) {
-      const std::size_t from = c * MonitorScreen::kBins / columns,
-                        to = std::max(from + 1, (c + 1) * MonitorScreen::kBins / columns);
-      float least = view.sweep[lane.channel][from].least_uv, most = view.sweep[lane.channel][from].most_uv;
-      bool gap = false;
-      for (std::size_t b = from; b < to; ++b) {
-        least = std::min(least, view.sweep[lane.channel][b].least_uv);
-        most = std::max(most, view.sweep[lane.channel][b].most_uv);
-        // Behind the place that is written now lies the oldest: a gap between them.
-        gap = gap || (b + MonitorScreen::kBins - view.at) % MonitorScreen::kBins < 8;
-      }
-      const bool over = most >= static_cast<float>(view.event_uv) || least <= -static_cast<float>(view.event_uv);
-      const float x = box.x + (static_cast<float>(c) + 0.5F) * box.width / static_cast<float>(columns);
-      const float joined_least = c > 0 ? std::min(least, last_most) : least,
-                  joined_most = c > 0 ? std::max(most, last_least) : most;
-      if (!gap)
-        draw->AddLine({x, lane.y_of(joined_most)}, {x, std::max(lane.y_of(joined_least), lane.y_of(joined_most) + 1)},
-                      im_colour32(over ? palette::kYellow : palette::kGreen),
-                      std::max(1.0F, box.width / static_cast<float>(columns)));
-      last_least = least;
-      last_most = most;
-    }
-  });
+void MonitorPanel::draw_sweep(MonitorController& controller, float height) {
+  draw_lanes(
+      controller.screen(), height, [](const MonitorScreen::View& view, const ChannelLane& lane, ImDrawList* draw) {
+        const ScreenBox& box = lane.box;
+        for (const float sign : {-1.0F, 1.0F}) {
+          const auto uv = sign * static_cast<float>(view.event_uv);
+          if (std::abs(uv) < lane.gain_uv)
+            draw->AddLine({box.x, lane.y_of(uv)}, {box.right(), lane.y_of(uv)}, im_colour32(palette::kOrange, 0.5F));
+        }
+        // As wide as the screen has pixels: a column is all that falls into it, and reaches to the one before.
+        const auto columns =
+            static_cast<std::size_t>(std::max(1.0F, std::min(box.width, static_cast<float>(MonitorScreen::kBins))));
+        float last_least = 0, last_most = 0;
+        for (std::size_t c = 0; c < columns; ++c) {
+          const std::size_t from = c * MonitorScreen::kBins / columns,
+                            to = std::max(from + 1, (c + 1) * MonitorScreen::kBins / columns);
+          float least = view.sweep[lane.channel][from].least_uv, most = view.sweep[lane.channel][from].most_uv;
+          bool gap = false;
+          for (std::size_t b = from; b < to; ++b) {
+            least = std::min(least, view.sweep[lane.channel][b].least_uv);
+            most = std::max(most, view.sweep[lane.channel][b].most_uv);
+            // Behind the place that is written now lies the oldest: a gap between them.
+            gap = gap || (b + MonitorScreen::kBins - view.at) % MonitorScreen::kBins < 8;
+          }
+          const bool over = most >= static_cast<float>(view.event_uv) || least <= -static_cast<float>(view.event_uv);
+          const float x = box.x + (static_cast<float>(c) + 0.5F) * box.width / static_cast<float>(columns);
+          const float joined_least = c > 0 ? std::min(least, last_most) : least,
+                      joined_most = c > 0 ? std::max(most, last_least) : most;
+          if (!gap)
+            draw->AddLine({x, lane.y_of(joined_most)},
+                          {x, std::max(lane.y_of(joined_least), lane.y_of(joined_most) + 1)},
+                          im_colour32(over ? palette::kYellow : palette::kGreen),
+                          std::max(1.0F, box.width / static_cast<float>(columns)));
+          last_least = least;
+          last_most = most;
+        }
+      });
 }
 
-void MonitorPanel::draw_answers(MonitorDesk& desk, float height) {
-  draw_lanes(desk.screen(), height, [](const MonitorScreen::View& view, const ChannelLane& lane, ImDrawList* draw) {
-    const ScreenBox& box = lane.box;
-    for (int ms = 5; ms < 20; ms += 5) {
-      const float x = box.x + box.width * static_cast<float>(ms) / 20;
-      draw->AddLine({x, box.y}, {x, box.bottom()}, im_colour32(palette::kRaised));
-      if (lane.last)
-        fitted_text(draw, {x + 2, box.bottom() - em(), 4 * em(), em()}, em() * 0.75F, palette::kFaint,
-                    std::to_string(ms) + " ms");
-    }
-    const auto& traces = view.traces[lane.channel];
-    for (std::size_t t = 0; t < traces.size(); ++t) {
-      std::vector<ImVec2> line;
-      for (std::size_t i = 0; i < traces[t].uv.size(); ++i)
-        line.push_back(
-            {box.x + box.width * static_cast<float>(i) / MonitorScreen::kTraceSamples, lane.y_of(traces[t].uv[i])});
-      const bool newest = t + 1 == traces.size();
-      draw->AddPolyline(line.data(), static_cast<int>(line.size()),
-                        im_colour32(traces[t].answered ? palette::kYellow : palette::kSkyBlue, newest ? 1 : 0.35F),
-                        ImDrawFlags_None, newest ? 1.6F : 1);
-    }
-  });
+void MonitorPanel::draw_answers(MonitorController& controller, float height) {
+  draw_lanes(
+      controller.screen(), height, [](const MonitorScreen::View& view, const ChannelLane& lane, ImDrawList* draw) {
+        const ScreenBox& box = lane.box;
+        for (int ms = 5; ms < 20; ms += 5) {
+          const float x = box.x + box.width * static_cast<float>(ms) / 20;
+          draw->AddLine({x, box.y}, {x, box.bottom()}, im_colour32(palette::kRaised));
+          if (lane.last)
+            fitted_text(draw, {x + 2, box.bottom() - em(), 4 * em(), em()}, em() * 0.75F, palette::kFaint,
+                        std::to_string(ms) + " ms");
+        }
+        const auto& traces = view.traces[lane.channel];
+        for (std::size_t t = 0; t < traces.size(); ++t) {
+          std::vector<ImVec2> line;
+          for (std::size_t i = 0; i < traces[t].uv.size(); ++i)
+            line.push_back(
+                {box.x + box.width * static_cast<float>(i) / MonitorScreen::kTraceSamples, lane.y_of(traces[t].uv[i])});
+          const bool newest = t + 1 == traces.size();
+          draw->AddPolyline(line.data(), static_cast<int>(line.size()),
+                            im_colour32(traces[t].answered ? palette::kYellow : palette::kSkyBlue, newest ? 1 : 0.35F),
+                            ImDrawFlags_None, newest ? 1.6F : 1);
+        }
+      });
 }
 
-void MonitorPanel::draw_stimulator(MonitorDesk& desk) {
-  const StimulatorSetting now = desk.stimulator();
+void MonitorPanel::draw_stimulator(MonitorController& controller) {
+  const StimulatorSetting now = controller.stimulator();
   const bool on = now.current_ma > 0;
   auto ma = static_cast<float>(wanted_.current_ma);
   ImGui::SetNextItemWidth(std::min(9 * em(), ImGui::GetContentRegionAvail().x));
@@ -161,43 +164,43 @@ void MonitorPanel::draw_stimulator(MonitorDesk& desk) {
   beside(button_wide(look));
   const bool search = ImGui::Button(look);
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("twice, half and between, three pulses each, while the tip touches");
-  if (desk.hands() > 1) {
+  if (controller.hands() > 1) {
     beside(box_wide("second hand"));
     bool second = wanted_.hand == 1;
     if (ImGui::Checkbox("second hand", &second)) wanted_.hand = second ? 1 : 0;
   }
-  if (const auto found = desk.screen().threshold_ma()) {
+  if (const auto found = controller.screen().threshold_ma()) {
     beside(10 * em());
     ImGui::Text("threshold %.2f mA", *found);
   }
   if (search) {
-    find_threshold(desk);
+    find_threshold(controller);
   } else if (turned) {
-    switch_stimulator(desk);
+    switch_stimulator(controller);
   } else if (moved && on && !now.search) {
-    desk.stimulate(wanted_);
+    controller.stimulate(wanted_);
   }
 }
 
-void MonitorPanel::switch_stimulator(MonitorDesk& desk) const {
-  if (!desk.stimulates()) return;
+void MonitorPanel::switch_stimulator(MonitorController& controller) const {
+  if (!controller.stimulates()) return;
   StimulatorSetting next = wanted_;
-  if (desk.stimulator().current_ma > 0) next.current_ma = 0;
-  desk.stimulate(next);
+  if (controller.stimulator().current_ma > 0) next.current_ma = 0;
+  controller.stimulate(next);
 }
 
-void MonitorPanel::find_threshold(MonitorDesk& desk) const {
-  if (!desk.stimulates()) return;
+void MonitorPanel::find_threshold(MonitorController& controller) const {
+  if (!controller.stimulates()) return;
   StimulatorSetting next = wanted_;
   next.search = true;
   next.pulses_per_s = 10;
-  desk.stimulate(next);
+  controller.stimulate(next);
 }
 
-void MonitorPanel::draw_switches(MonitorDesk& desk) {
+void MonitorPanel::draw_switches(MonitorController& controller) {
   const float e = em();
-  MonitorScreen& screen = desk.screen();
-  bool frozen = screen.frozen(), muted = desk.sound().muted();
+  MonitorScreen& screen = controller.screen();
+  bool frozen = screen.frozen(), muted = controller.sound().muted();
   // First what has to be seen: it stays in its place.
   const bool alarm = screen.alarm();
   const ImVec2 at = ImGui::GetCursorScreenPos();
@@ -217,13 +220,13 @@ void MonitorPanel::draw_switches(MonitorDesk& desk) {
   if (ImGui::Checkbox("freeze", &frozen)) screen.freeze(frozen);
   const char* const mute = own_window_ ? "mute (M)" : "mute (Ctrl-M)";
   beside(box_wide(mute));
-  if (ImGui::Checkbox(mute, &muted)) desk.sound().mute(muted);
+  if (ImGui::Checkbox(mute, &muted)) controller.sound().mute(muted);
   if (!own_window_) {
     beside(button_wide("hide (Ctrl-N)"));
     if (ImGui::SmallButton("hide (Ctrl-N)")) shown_ = false;
   }
-  if (desk.stimulates()) draw_stimulator(desk);
-  if (!desk.invitation().empty()) ImGui::TextWrapped("%s", desk.invitation().c_str());
+  if (controller.stimulates()) draw_stimulator(controller);
+  if (!controller.invitation().empty()) ImGui::TextWrapped("%s", controller.invitation().c_str());
 }
 
 void MonitorPanel::lay_out(RoomLayout& room, float em_pixels, bool there) {
@@ -232,11 +235,11 @@ void MonitorPanel::lay_out(RoomLayout& room, float em_pixels, bool there) {
     box_ = take_strip(room, std::clamp(room.view.height * 0.28F, kMinEm * em_pixels, kMaxEm * em_pixels));
 }
 
-void MonitorPanel::draw(MonitorDesk& desk) {
+void MonitorPanel::draw(MonitorController& controller) {
   if (box_.empty()) return;
   const float e = em();
   begin_fixed("monitor", box_, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
-  if (desk.wiring().channels.empty()) {
+  if (controller.wiring().channels.empty()) {
     ImGui::TextWrapped(
         "The case lists none of the nerves that the monitor knows: prepare it with --structures and --names.");
     ImGui::End();
@@ -244,7 +247,7 @@ void MonitorPanel::draw(MonitorDesk& desk) {
   }
   const auto log = [&](float high) {
     ImGui::BeginChild("log", {0, high});
-    const std::vector<MonitorScreen::Line> lines = desk.screen().log();
+    const std::vector<MonitorScreen::Line> lines = controller.screen().log();
     for (auto line = lines.rbegin(); line != lines.rend(); ++line) {
       if (line->alarm) ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kVermillion));
       ImGui::TextWrapped("%.2f s  %s", line->at_s, line->words.c_str());
@@ -254,15 +257,15 @@ void MonitorPanel::draw(MonitorDesk& desk) {
   };
   const auto lanes = [&](float high) {
     if (answers_) {
-      draw_answers(desk, high);
+      draw_answers(controller, high);
     } else {
-      draw_sweep(desk, high);
+      draw_sweep(controller, high);
     }
   };
   // Where it is wide enough the curves have all its height.
   if (box_.width >= 48 * e) {
     ImGui::BeginChild("switches", {kSwitchesEm * e, 0}, false, ImGuiWindowFlags_NoScrollbar);
-    draw_switches(desk);
+    draw_switches(controller);
     log(0);
     ImGui::EndChild();
     ImGui::SameLine();
@@ -270,13 +273,13 @@ void MonitorPanel::draw(MonitorDesk& desk) {
     lanes(ImGui::GetContentRegionAvail().y);
     ImGui::EndChild();
   } else {
-    draw_switches(desk);
+    draw_switches(controller);
     const float left = ImGui::GetContentRegionAvail().y,
-                least = kMinLaneEm * e * static_cast<float>(desk.wiring().channels.size());
+                least = kMinLaneEm * e * static_cast<float>(controller.wiring().channels.size());
     const float log_high = std::min(left - least, 5 * e);
-    const bool told = log_high > 1.2F * e;
-    lanes(told ? left - log_high - ImGui::GetStyle().ItemSpacing.y : left);
-    if (told) log(0);
+    const bool reported = log_high > 1.2F * e;
+    lanes(reported ? left - log_high - ImGui::GetStyle().ItemSpacing.y : left);
+    if (reported) log(0);
   }
   ImGui::End();
 }

@@ -21,16 +21,16 @@ class MonitorPanel {
   [[nodiscard]] bool answers() const { return answers_; }
   void show_answers(bool on) { answers_ = on; }
   /// Between ImGui::NewFrame and Render.
-  void draw(MonitorDesk& desk);
+  void draw(MonitorController& controller);
   /// As its buttons do, where there is a stimulator.
-  void switch_stimulator(MonitorDesk& desk) const;
-  void find_threshold(MonitorDesk& desk) const;
+  void switch_stimulator(MonitorController& controller) const;
+  void find_threshold(MonitorController& controller) const;
 
  private:
-  void draw_sweep(MonitorDesk& desk, float height);
-  void draw_answers(MonitorDesk& desk, float height);
-  void draw_switches(MonitorDesk& desk);
-  void draw_stimulator(MonitorDesk& desk);
+  void draw_sweep(MonitorController& controller, float height);
+  void draw_answers(MonitorController& controller, float height);
+  void draw_switches(MonitorController& controller);
+  void draw_stimulator(MonitorController& controller);
   ScreenBox box_;
   bool shown_ = true, answers_ = false, own_window_ = false;
   StimulatorSetting wanted_{0, 0.5, 4, 0.1, false};

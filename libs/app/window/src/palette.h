@@ -1,4 +1,4 @@
-// Colours of the window that people with any colour vision tell apart. Private to libs/app/window; no ImGui.
+// Colours of the window that people with any colour vision distinguish. Private to libs/app/window; no ImGui.
 // Okabe and Ito, "Color universal design", 2008: eight colours chosen for that. State is never told by colour alone: a
 // word and a sign too.
 #pragma once

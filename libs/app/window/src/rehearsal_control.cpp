@@ -443,14 +443,14 @@ void RehearsalControl::hold(const HandInput& input) {
   in_hand_ = in_hand;
   go_on_leading();
   send_goal(input.seconds);
-  tell_of_tools();
+  report_of_tools();
 }
 
 // What came of saw, pieces and plates, or why nothing did: once, wherever the panel is.
-void RehearsalControl::tell_of_tools() {
+void RehearsalControl::report_of_tools() {
   const std::string& note = tools_.note(rehearsal());
-  if (note == told_of_tools_) return;
-  told_of_tools_ = note;
+  if (note == reported_of_tools_) return;
+  reported_of_tools_ = note;
   if (!note.empty()) say(note);
 }
 
@@ -471,17 +471,17 @@ void RehearsalControl::wash(bool suck, bool wash) {
 
 // --- what is told
 
-void RehearsalControl::tell(const std::string& text) {
+void RehearsalControl::notify(const std::string& text) {
   message_ = text;
   message_until_ = std::chrono::steady_clock::now() + std::chrono::seconds(4);
 }
 
 void RehearsalControl::say(const std::string& text) {
-  tell(text);
+  notify(text);
   if (Rehearsal* const running = actions_.rehearsal()) running->note("message", text);
 }
 
-std::string RehearsalControl::told() const {
+std::string RehearsalControl::reported() const {
   if (leading_) return "the drill is on its way, off";
   return std::chrono::steady_clock::now() < message_until_ ? message_ : std::string();
 }

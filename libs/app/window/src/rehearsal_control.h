@@ -38,7 +38,7 @@ class RehearsalControl {
       : actions_(actions), show_(std::move(show)), tool_(tool) {}
 
   // --- sessions
-  /// Saves what runs, where asked, and begins anew. False: something failed, failure() says what, and nothing runs.
+  /// Saves what runs, where asked, and begins again. False: something failed, failure() says what, and nothing runs.
   bool begin(bool from_case, bool save_first);
   void save();   ///< and goes on from there
   void reset();  ///< saves, and begins with the case's bone
@@ -111,12 +111,12 @@ class RehearsalControl {
   [[nodiscard]] bool second_hand_empty() const { return second_.empty(); }
 
   // --- what is told
-  void say(const std::string& text);   ///< also a note of the session
-  void tell(const std::string& text);  ///< no note: it may name a file, and so a patient
+  void say(const std::string& text);     ///< also a note of the session
+  void notify(const std::string& text);  ///< no note: it may name a file, and so a patient
   /// The last thing said.
   [[nodiscard]] const std::string& message() const { return message_; }
   /// What to show now; empty: nothing.
-  [[nodiscard]] std::string told() const;
+  [[nodiscard]] std::string reported() const;
 
  private:
   // First it lets go of the bone; then the way is found from where it is.
@@ -142,7 +142,7 @@ class RehearsalControl {
   void send_goal(double seconds);
   void lead(std::optional<Vec3> seen_mm, Vec3 forward);
   void go_on_leading();
-  void tell_of_tools();
+  void report_of_tools();
   [[nodiscard]] const Burr& burr() const { return burr_library()[static_cast<std::size_t>(tool_)]; }
 
   WindowActions actions_;
@@ -163,7 +163,7 @@ class RehearsalControl {
   bool ran_ = false, latched_ = false, second_works_ = false;
   double held_ = 0;  // how far down
   bool wait_for_release_ = false, in_hand_ = true;
-  std::string message_, told_of_tools_;
+  std::string message_, reported_of_tools_;
   std::chrono::steady_clock::time_point message_until_{};
 };
 

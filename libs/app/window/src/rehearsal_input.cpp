@@ -56,8 +56,8 @@ void RehearsalWindow::mouse_and_keys() {
   if (const auto said = trial_.advance(scope_.control, seconds, actions_.folder() / "camera-trial.csv"))
     control_.say(*said);
   const bool may_drill = in_view && !io.WantCaptureMouse && !measured && !room_.ruler().on() && !room_.before();
-  desk_.take(control_);
-  HandInput hand = desk_.input(control_);
+  controller_.take(control_);
+  HandInput hand = controller_.input(control_);
   hand.seconds = seconds;
   hand.pressed = ImGui::IsMouseDown(ImGuiMouseButton_Left) && !scope_.lent();
   hand.on_bone = may_drill;
@@ -70,9 +70,9 @@ void RehearsalWindow::read_hand() {
   std::vector<ButtonLevel> levels;
   read_stick_buttons(levels);
   for (int n = 3; n < 5; ++n) levels.push_back({button::kMouse + n, ImGui::GetIO().MouseDown[n] ? 1.0 : 0.0});
-  shell_.mirror_mouse = desk_.mirror_mouse();
-  desk_.read(std::move(levels), shell_.attended(), actions_, control_);
-  desk_.give(control_);
+  shell_.mirror_mouse = controller_.mirror_mouse();
+  controller_.read(std::move(levels), shell_.attended(), actions_, control_);
+  controller_.give(control_);
 }
 
 bool RehearsalWindow::tilt_by_mouse(const ScopeMouse& m) {
@@ -187,12 +187,12 @@ void RehearsalWindow::switch_lead() {
 }
 
 void RehearsalWindow::monitor_command(Command command) {
-  MonitorDesk* const desk = monitor_desk();
-  if (desk == nullptr) return control_.say("there is no nerve monitor: begin with --monitor");
+  MonitorController* const controller = monitor_controller();
+  if (controller == nullptr) return control_.say("there is no nerve monitor: begin with --monitor");
   if (command == Command::monitor) monitor_.show(!monitor_.shown());
   if (command == Command::mute_monitor) {
-    desk->sound().mute(!desk->sound().muted());
-    control_.say(desk->sound().muted() ? "the nerve monitor is muted" : "the nerve monitor is heard");
+    controller->sound().mute(!controller->sound().muted());
+    control_.say(controller->sound().muted() ? "the nerve monitor is muted" : "the nerve monitor is heard");
   }
 }
 

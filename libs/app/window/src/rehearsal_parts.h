@@ -77,7 +77,7 @@ class RehearsalWindow {
   // ImGui's frame is put aside meanwhile: what shows that it works needs one of its own.
   void begin_again(bool from_case);
   // What failed, what is kept, and what can be done now. Nothing runs.
-  void tell_failure();
+  void report_failure();
 
   // --- the hand (rehearsal_input.cpp)
 
@@ -100,7 +100,9 @@ class RehearsalWindow {
   void use_mouse(const ScopeMouse& m);
   // Saw and pieces: what the mouse drags is not the hand.
   void use_tool(HandTools& tools, Rehearsal& rehearsal, const ScopeMouse& m);
-  [[nodiscard]] MonitorDesk* monitor_desk() const { return actions_.monitor ? actions_.monitor() : nullptr; }
+  [[nodiscard]] MonitorController* monitor_controller() const {
+    return actions_.monitor ? actions_.monitor() : nullptr;
+  }
   void monitor_command(Command command);
   // What is the window's own.
   void command(Command command);
@@ -120,7 +122,7 @@ class RehearsalWindow {
   void show();
   void show_instruments(Rehearsal& now);
   // That two instruments touch: told, shown, noted.
-  void tell_touch(Rehearsal& now);
+  void report_touch(Rehearsal& now);
   // Who teaches and who learns; once in a frame, before the hands are shown.
   void look_at_tutor();
   void show_tutor(Rehearsal& now);
@@ -141,7 +143,7 @@ class RehearsalWindow {
   [[nodiscard]] RoomState room_state() const;
 
   WindowShell& shell_;
-  Room room_;
+  MainView room_;
   RehearsalControl control_;
   WindowActions actions_;
   SoundOut& sound_;
@@ -151,12 +153,12 @@ class RehearsalWindow {
   const std::vector<PlannedRegion> planned_;
   std::filesystem::path state_file_;
   Keyboard keyboard_;
-  HandDesk desk_;
+  HandController controller_;
   std::unique_ptr<BeforeView> before_view_;
   std::unique_ptr<WorkDone> work_;
   std::optional<EndFacts> ended_;
   ReviewScene review_;
-  HintDesk hints_;
+  HintController hints_;
   WindowEnd end_;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkNew<vtkRenderer> renderer_;

@@ -44,7 +44,7 @@ void RehearsalWindow::show() {
   const RoomScene scene = room_scene(now);
   room_.draw(scene);
   if (screenshot_wanted_) room_.draw_caption(scene);
-  if (MonitorDesk* const desk = monitor_desk()) monitor_.draw(*desk);
+  if (MonitorController* const controller = monitor_controller()) monitor_.draw(*controller);
   cuts_.draw(now, control_.tools().tool() == HandTools::Tool::saw ? &control_.tools().cut() : nullptr);
   now.look([&](const World& world, SceneReaders& readers) {
     world_view_->update(world, readers);
@@ -55,7 +55,7 @@ void RehearsalWindow::show() {
   const TickRecord tick = now.latest();
   show_tutor(now);
   show_instruments(now);
-  tell_touch(now);
+  report_touch(now);
   now.look([&](const World& world, SceneReaders&) {
     tools_->show(control_.tools(), tick, world, now.structures(), ImGui::GetTime());
   });
@@ -107,22 +107,22 @@ void RehearsalWindow::show_tutor(Rehearsal& now) {
   for (std::size_t hand = 0; hand < now.hands(); ++hand) {
     hands.push_back(now.latest(hand));
     if (hand > 0)
-      hands_[hand]->tell_apart({kPartnerColour.red, kPartnerColour.green, kPartnerColour.blue},
-                               tutor_.ghosts ? 0.5 : 1);
+      hands_[hand]->report_apart({kPartnerColour.red, kPartnerColour.green, kPartnerColour.blue},
+                                 tutor_.ghosts ? 0.5 : 1);
   }
   TutorPanel::draw(tutor_, hands, cuts_.scene(), [this](Vec3 at) { return project(at); });
 }
 
-void RehearsalWindow::tell_touch(Rehearsal& now) {
+void RehearsalWindow::report_touch(Rehearsal& now) {
   if (!tutor_.title.empty()) return;  // hands that lead each other are where the other is
   std::vector<TickRecord> hands;
   for (std::size_t hand = 0; hand < now.hands(); ++hand) {
     const TickRecord tick = now.latest(hand);
     if (tick.tick != 0 && (hand == 0 || !control_.second_hand_empty())) hands.push_back(tick);
   }
-  if (const auto told = touch_.look(hands)) {
-    control_.say(told->words);
-    now.note("touch", told->note);
+  if (const auto reported = touch_.look(hands)) {
+    control_.say(reported->words);
+    now.note("touch", reported->note);
   }
   const auto at = touch_.at_mm() ? project(*touch_.at_mm()) : std::nullopt;
   if (!at) return;
@@ -163,7 +163,7 @@ RoomScene RehearsalWindow::room_scene(Rehearsal& now) {
             tools_->panel(control_.tools(), now, view_axes());
             hints_.panel();
           },
-          [this](bool show) { desk_.draw(control_, show); },
+          [this](bool show) { controller_.draw(control_, show); },
           warmth_};
 }
 

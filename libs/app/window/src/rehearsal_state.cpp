@@ -26,8 +26,8 @@ void RehearsalWindow::write_state() {
                   motion.clutch,
                   motion.rest,
                   control_.handle().left(),
-                  desk_.assign().listens() ? words_of(*desk_.assign().listens()) : std::string(),
-                  desk_.row(),
+                  controller_.assign().listens() ? words_of(*controller_.assign().listens()) : std::string(),
+                  controller_.row(),
                   control_.burr_share,
                   control_.handle().tilted_rad(),
                   {},
@@ -35,12 +35,12 @@ void RehearsalWindow::write_state() {
   state.sucking = control_.sucking();
   state.washing = control_.washing();
   state.sound = sound_.on();
-  if (MonitorDesk* const desk = monitor_desk()) {
-    state.monitor.channels = desk->wiring().channels.size();
+  if (MonitorController* const controller = monitor_controller()) {
+    state.monitor.channels = controller->wiring().channels.size();
     state.monitor.shown = monitor_.shown();
-    state.monitor.muted = desk->sound().muted();
-    state.monitor.seconds = desk->screen().view().now_s;
-    state.monitor.events = desk->screen().events();
+    state.monitor.muted = controller->sound().muted();
+    state.monitor.seconds = controller->screen().view().now_s;
+    state.monitor.events = controller->screen().events();
   }
   const auto heard =
       std::count_if(tutor_.links.begin(), tutor_.links.end(), [](const TutorNow::Link& l) { return l.heard; });

@@ -23,7 +23,7 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
       approval_ended_(options.approval_ended),
       planned_(options.regions),
       state_file_(options.state_file),
-      desk_(person, keyboard_),
+      controller_(person, keyboard_),
       hints_(person),
       device_name_(options.device),
       case_hash_(options.case_hash),
@@ -84,7 +84,7 @@ WindowActions RehearsalWindow::working(WindowActions actions) {
   actions.save = [this, save = actions.save, rehearsal = actions.rehearsal] {
     if (rehearsal() != nullptr) shell_.while_working("the session is saved", {}, [&](const Context&) { save(); });
   };
-  if (actions.tune) actions.tune = [this, tune = actions.tune](const HandTuning& t) { tune(desk_.tuned(t)); };
+  if (actions.tune) actions.tune = [this, tune = actions.tune](const HandTuning& t) { tune(controller_.tuned(t)); };
   return actions;
 }
 
@@ -97,7 +97,7 @@ void RehearsalWindow::open() {
   render_window_->OpenGLInitContext();
   render_window_->AddRenderer(renderer_);
   shell_.on_key = [this](int key, int action, int modifiers) {
-    if (desk_.key(key, action)) return;
+    if (controller_.key(key, action)) return;
     if (action == 1) room_.key(key);
     keyboard_.on(key, static_cast<Keyboard::Event>(action), modifiers);
   };
@@ -172,7 +172,7 @@ void RehearsalWindow::frame() {
   lay_out();
   shell_.new_frame();
   if (control_.failure()) {
-    tell_failure();
+    report_failure();
   } else if (ended_) {
     show_end();
   } else {
@@ -193,14 +193,14 @@ void RehearsalWindow::take_dropped() {
     end_ = {true, choice->resume.empty() ? choice->case_folder : choice->resume};
     quit_ = true;
   } else {
-    control_.tell(why);
+    control_.notify(why);
   }
 }
 
 void RehearsalWindow::lay_out() {
   RoomLayout room = room_.lay_out(ended_.has_value(), cuts_.wished_width());
   review_.lay_out(room, static_cast<float>(shell_.em_pixels()));
-  monitor_.lay_out(room, static_cast<float>(shell_.em_pixels()), !ended_ && monitor_desk() != nullptr);
+  monitor_.lay_out(room, static_cast<float>(shell_.em_pixels()), !ended_ && monitor_controller() != nullptr);
   cuts_.lay_out(room);
   const ScreenBox& scene = cuts_.scene();
   scope_.area = {static_cast<double>(scene.x), static_cast<double>(scene.y),
@@ -244,7 +244,7 @@ void RehearsalWindow::show_end() {
   EndChoice choice = room_.draw_end(*ended_, [this] { review_.draw_findings(); });
   for (const Keyboard::Press& press : keyboard_.frame(ImGui::GetIO().WantTextInput)) {
     if (review_.key(press)) continue;
-    if (choice == EndChoice::none) choice = Room::end_choice(press.command);
+    if (choice == EndChoice::none) choice = MainView::end_choice(press.command);
     if (press.command == Command::screenshot) screenshot_wanted_ = true;
     if (press.command == Command::full_screen) shell_.toggle_full_screen();
   }
@@ -266,7 +266,7 @@ void RehearsalWindow::begin_again(bool from_case) {
 }
 
 // What failed, what is kept, and what can be done now. Nothing runs.
-void RehearsalWindow::tell_failure() {
+void RehearsalWindow::report_failure() {
   const float wide = std::min(static_cast<float>(width_), 30 * ImGui::GetFontSize());
   ImGui::SetNextWindowPos({(static_cast<float>(width_) - wide) / 2, static_cast<float>(height_) / 3});
   ImGui::SetNextWindowSize({wide, 0});

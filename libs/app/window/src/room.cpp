@@ -24,18 +24,18 @@ Layout layout_named(const std::string& name) {
 
 }  // namespace
 
-Room::Room(WindowShell& shell, PersonSettings& person)
+MainView::MainView(WindowShell& shell, PersonSettings& person)
     : shell_(shell), person_(person), wanted_(layout_named(person.values.layout)) {
   lay_out(false, 0);
 }
 
-const RoomLayout& Room::lay_out(bool over, float column_width) {
+const RoomLayout& MainView::lay_out(bool over, float column_width) {
   layout_ = osteo::lay_out(over ? Layout::review : wanted_, shell_.width(), shell_.height(),
                            static_cast<float>(shell_.em_pixels()), column_width);
   return layout_;
 }
 
-void Room::renew() {
+void MainView::renew() {
   notes_.clear();
   ruler_.turn(false);
   steps_.renew();
@@ -44,7 +44,7 @@ void Room::renew() {
   wheel_.close();
 }
 
-void Room::key(int code) {
+void MainView::key(int code) {
   if (!writing_) return;
   const Key* const known = find_key(code);
   if (known == nullptr) return;
@@ -52,21 +52,21 @@ void Room::key(int code) {
   if (known->command == Command::put_away) note_answer_ = -1;
 }
 
-std::vector<Keyboard::Press> Room::take_presses() {
+std::vector<Keyboard::Press> MainView::take_presses() {
   return std::exchange(pressed_.presses, {});
 }
 
-bool Room::holds(Command command) const {
+bool MainView::holds(Command command) const {
   return std::find(pressed_.held.begin(), pressed_.held.end(), command) != pressed_.held.end();
 }
 
-void Room::answer(int answer, RehearsalControl& control) {
+void MainView::answer(int answer, RehearsalControl& control) {
   if (answer == 0) return;
   asking_ = false;
   if (answer > 0) control.reset();
 }
 
-bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const std::optional<Vec3>& bone) {
+bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, const std::optional<Vec3>& bone) {
   const Command c = press.command;
   if (asking_) {
     answer(c == Command::perform ? 1 : c == Command::put_away ? -1 : 0, control);
@@ -173,7 +173,7 @@ bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const 
   }
 }
 
-bool Room::click(std::optional<Vec3> bone, RehearsalControl& control) {
+bool MainView::click(std::optional<Vec3> bone, RehearsalControl& control) {
   if (!ruler_.on()) return false;
   if (!bone) {
     control.say("no bone under the mouse");
@@ -188,7 +188,7 @@ bool Room::click(std::optional<Vec3> bone, RehearsalControl& control) {
   return true;
 }
 
-HandFacts Room::hand_facts(const RehearsalControl& control, const SoundOut& sound, std::size_t undo_steps) const {
+HandFacts MainView::hand_facts(const RehearsalControl& control, const SoundOut& sound, std::size_t undo_steps) const {
   HandFacts f;
   f.burr = control.tool();
   f.tool = static_cast<int>(control.tools().tool());
@@ -204,7 +204,7 @@ HandFacts Room::hand_facts(const RehearsalControl& control, const SoundOut& soun
   return f;
 }
 
-void Room::see(const RoomScene& scene) {
+void MainView::see(const RoomScene& scene) {
   StepFacts facts;
   std::uint64_t undone = 0;
   Rehearsal& rehearsal = scene.control.rehearsal();
@@ -230,7 +230,7 @@ void Room::see(const RoomScene& scene) {
   steps_.see(facts);
 }
 
-void Room::draw(const RoomScene& scene) {
+void MainView::draw(const RoomScene& scene) {
   ImGuiIO& io = ImGui::GetIO();
   // ImGui moves its own cursor only while the keys are the panel's.
   if (keys_in_panel_) {
@@ -246,7 +246,7 @@ void Room::draw(const RoomScene& scene) {
   if (!layout_.panel.empty()) draw_panel(scene);
   if (!layout_.tray.empty()) draw_tray(layout_.tray, hand, pressed_);
   draw_state(layout_.state, state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr),
-             control.told());
+             control.reported());
   draw_marks(scene);
   if (writing_) draw_note_field(control);
   help_.draw(shell_.width(), shell_.height(), [&] { draw_first_steps(steps_, true); });
@@ -266,7 +266,7 @@ void Room::draw(const RoomScene& scene) {
   }
 }
 
-void Room::draw_panel(const RoomScene& scene) {
+void MainView::draw_panel(const RoomScene& scene) {
   RehearsalControl& control = scene.control;
   Rehearsal& rehearsal = control.rehearsal();
   const HandFacts hand = hand_facts(control, scene.sound, undo_steps_);
@@ -314,7 +314,7 @@ void Room::draw_panel(const RoomScene& scene) {
   ImGui::End();
 }
 
-void Room::draw_note_field(RehearsalControl& control) {
+void MainView::draw_note_field(RehearsalControl& control) {
   const float e = em(), wide = std::min(layout_.view.width - e, 26 * e);
   ImGui::SetNextWindowPos({layout_.view.x + (layout_.view.width - wide) / 2, layout_.view.y + e});
   ImGui::SetNextWindowSize({wide, 0});
@@ -339,7 +339,7 @@ void Room::draw_note_field(RehearsalControl& control) {
   if (answer != 0) writing_.reset();
 }
 
-void Room::draw_marks(const RoomScene& scene) {
+void MainView::draw_marks(const RoomScene& scene) {
   ImDrawList* const draw = ImGui::GetBackgroundDrawList();
   const float e = em();
   const ScreenBox& v = layout_.view;
@@ -378,7 +378,7 @@ void Room::draw_marks(const RoomScene& scene) {
   draw->PopClipRect();
 }
 
-void Room::draw_caption(const RoomScene& scene) {
+void MainView::draw_caption(const RoomScene& scene) {
   ImDrawList* const draw = ImGui::GetForegroundDrawList();
   const float e = em();
   const ScreenBox& v = layout_.view;
@@ -394,7 +394,7 @@ void Room::draw_caption(const RoomScene& scene) {
   fitted_text(draw, {v.x + e / 2, y, v.width - bar - 2.5F * e, 2 * e}, e, palette::kText, text);
 }
 
-EndChoice Room::end_choice(Command command) {
+EndChoice MainView::end_choice(Command command) {
   switch (command) {
     case Command::reset:
       return EndChoice::again;
@@ -409,7 +409,7 @@ EndChoice Room::end_choice(Command command) {
   }
 }
 
-EndChoice Room::draw_end(const EndFacts& facts, const std::function<void()>& findings) {
+EndChoice MainView::draw_end(const EndFacts& facts, const std::function<void()>& findings) {
   ImGuiIO& io = ImGui::GetIO();
   io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
   begin_fixed("end", layout_.page);

@@ -47,9 +47,9 @@ struct RoomScene {
 
 enum class EndChoice { none, again, resume, another, close };
 
-class Room {
+class MainView {
  public:
-  Room(WindowShell& shell, PersonSettings& person);
+  MainView(WindowShell& shell, PersonSettings& person);
 
   /// For the window as it is now; `over`: the session has ended; `column_width`: see lay_out().
   const RoomLayout& lay_out(bool over, float column_width);

@@ -92,8 +92,8 @@ ScreenBox take_strip(RoomLayout& room, float high) {
   return {left, bottom - high, right - left, high};
 }
 
-double automatic_scale(double told_by_monitor, int width, int height) {
-  return std::clamp(std::max(told_by_monitor, std::min(width / 1920.0, height / 1080.0)), 1.0, 4.0);
+double automatic_scale(double reported_by_monitor, int width, int height) {
+  return std::clamp(std::max(reported_by_monitor, std::min(width / 1920.0, height / 1080.0)), 1.0, 4.0);
 }
 
 double scale_that_fits(double automatic, double by_hand, int width, int height) {

@@ -51,7 +51,7 @@ struct RoomLayout {
 inline constexpr double kTextPixels = 16;
 /// A monitor's scale as the system tells it; where that is 1 on a large framebuffer, which many systems leave so, by
 /// its size: text keeps its share of a picture of 1920 x 1080. From 1 to 4.
-[[nodiscard]] double automatic_scale(double told_by_monitor, int width, int height);
+[[nodiscard]] double automatic_scale(double reported_by_monitor, int width, int height);
 /// Times what the person chose, as far as the smallest layout still fits; at least 0.7.
 [[nodiscard]] double scale_that_fits(double automatic, double by_hand, int width, int height);
 /// A step of Ctrl + or -: 10 %, between 0.6 and 2.5.

@@ -100,14 +100,14 @@ void draw_state(const ScreenBox& box, const StateFacts& f, const std::string& me
   const float below = box.bottom() - line - pad * 0.4F, small = std::min(e, below);
   const float time = all * 0.3F;
   fitted_text(draw, {box.x + pad, line, time - pad, below}, small, palette::kText, f.time + "   " + f.removed);
-  const bool warns = warning_is_told(f, message);
-  const std::string& told = warns ? f.warning : message;
+  const bool warns = warning_is_reported(f, message);
+  const std::string& reported = warns ? f.warning : message;
   const float at = box.x + pad + time;
   if (warns)
     draw_sign(draw, {at + small * 0.5F, line + below / 2}, small * 0.45F, f.alarm ? 8 : 3,
               f.alarm ? palette::kVermillion : palette::kYellow);
   fitted_text(draw, {at + small * 1.3F, line, box.right() - at - small * 1.3F - pad, below}, small,
-              warns ? (f.alarm ? palette::kVermillion : palette::kYellow) : palette::kText, told);
+              warns ? (f.alarm ? palette::kVermillion : palette::kYellow) : palette::kText, reported);
   ImGui::End();
 }
 

@@ -31,7 +31,7 @@ struct Pressed {
 
 /// Two rows whose fields never change places: tool and speed, force, bone under the burr, the nearest structure; below,
 /// what was removed, the time and a line of words. `message`: the last thing said, empty after a while; see
-/// warning_is_told().
+/// warning_is_reported().
 void draw_state(const ScreenBox& box, const StateFacts& facts, const std::string& message);
 /// Buttons of instruments one below the other.
 void draw_tray(const ScreenBox& box, const HandFacts& hand, Pressed& pressed);

@@ -92,7 +92,7 @@ void plate_panel(HandTools& tools, Rehearsal& rehearsal) {
 }
 
 // Where it should lie on bone.
-void tell_collision(double mm) {
+void report_collision(double mm) {
   if (mm > kPlateCollisionMm) ImGui::TextColored({1.0F, 0.45F, 0.35F, 1}, "%.1f mm deep in bone", mm);
 }
 
@@ -161,7 +161,7 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
   if (tools.tool() == Tool::piece) piece_panel(tools, rehearsal);
   if (tools.tool() == Tool::plate) {
     plate_panel(tools, rehearsal);
-    tell_collision(hand_in_bone_mm_);
+    report_collision(hand_in_bone_mm_);
   }
   std::vector<Fixture> fixtures;
   std::vector<double> in_bone_mm;
@@ -176,7 +176,7 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
     ImGui::Text("%u: %s", f.id, model.name.c_str());
     ImGui::SameLine();
     if (ImGui::SmallButton("take off")) rehearsal.act(SceneAction::detach(f.id));
-    tell_collision(in_bone_mm[static_cast<std::size_t>(&f - fixtures.data())]);
+    report_collision(in_bone_mm[static_cast<std::size_t>(&f - fixtures.data())]);
     if (model.most_opening_mm > 0 && f.other != SceneAction::kNobody) {
       float opening = static_cast<float>(f.opening_mm);
       if (ImGui::SliderFloat("open", &opening, 0, static_cast<float>(model.most_opening_mm), "%.1f mm"))

@@ -75,7 +75,7 @@ bool ScopeInput::mouse(const ScopeMouse& m, bool as_device, double seconds) {
 bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, const std::optional<Vec3>& under_mouse,
                      std::string& said) {
   const auto bone = [&](Vec3 direction) { return scene.bone ? scene.bone(view().eye_mm(), direction) : std::nullopt; };
-  const auto tell = [&](const char* format, auto... values) {
+  const auto notify = [&](const char* format, auto... values) {
     char text[96];
     std::snprintf(text, sizeof text, format, values...);
     said = text;
@@ -121,9 +121,9 @@ bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, cons
     case Command::bookmark:
       if (press.shift) {
         control.set_bookmark(static_cast<std::size_t>(press.value));
-        tell("view %d kept", press.value + 1);
+        notify("view %d kept", press.value + 1);
       } else if (!control.go_to_bookmark(static_cast<std::size_t>(press.value))) {
-        tell("no view %d is kept yet: Shift-F%d keeps this one", press.value + 1, press.value + 6);
+        notify("no view %d is kept yet: Shift-F%d keeps this one", press.value + 1, press.value + 6);
       }
       return true;
     case Command::camera_back:
@@ -177,7 +177,7 @@ void ScopeInput::advance(const Keyboard& keyboard, bool shift, const CameraDevic
   control.advance(seconds);
 }
 
-std::string scope_words(const ScopeView& view) {
+std::string scope_text(const ScopeView& view) {
   char text[96];
   std::snprintf(
       text, sizeof text,

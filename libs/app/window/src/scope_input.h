@@ -61,6 +61,6 @@ class ScopeInput {
 };
 
 /// "10x  field 20 mm  WD 250 mm"; the naked eye has no magnification to speak of.
-[[nodiscard]] std::string scope_words(const ScopeView& view);
+[[nodiscard]] std::string scope_text(const ScopeView& view);
 
 }  // namespace osteo::inline app

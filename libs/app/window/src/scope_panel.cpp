@@ -11,7 +11,7 @@ namespace osteo::inline app {
 
 void draw_scope(const ScopeView& view, const PictureArea& area, StereoMode stereo) {
   const ScaleBar bar = scale_bar(view.pixels_per_mm(area), 0.22 * area.width);
-  const std::string length = format_number(bar.length_mm) + " mm", words = scope_words(view);
+  const std::string length = format_number(bar.length_mm) + " mm", words = scope_text(view);
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
   const float line = ImGui::GetTextLineHeight();
   const auto draw = [&](double right, double up, double squeezed) {
@@ -68,7 +68,7 @@ void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene&
   if (ImGui::Button("drill (G)")) scope.control.look_at(scene.drill_mm);
   ImGui::SameLine();
   if (ImGui::Button("along it")) scope.control.look_along(scene.drill_mm, scene.handle);
-  ImGui::Text("%s", scope_words(scope.view()).c_str());
+  ImGui::Text("%s", scope_text(scope.view()).c_str());
   if (!ImGui::TreeNode("microscope", "Microscope")) return;
   ScopeControl& control = scope.control;
   ImGui::PushItemWidth(-5.5F * ImGui::GetFontSize());  // room for their names

@@ -67,11 +67,11 @@ StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures,
   return f;
 }
 
-bool warning_is_told(const StateFacts& facts, const std::string& message) {
+bool warning_is_reported(const StateFacts& facts, const std::string& message) {
   return !facts.warning.empty() && !(facts.lasts && !message.empty());
 }
 
-void tell_warmth(StateFacts& f, const WarmthNow& warmth, const TickRecord& tick, const StructureMap* structures) {
+void report_warmth(StateFacts& f, const WarmthNow& warmth, const TickRecord& tick, const StructureMap* structures) {
   const auto of = warmth.structures_c.find(static_cast<std::uint8_t>(tick.structure));
   if (tick.structure == 0 || structures == nullptr) {
     f.warmth = text_of("bone up to %.0f C", warmth.bone_c);
@@ -88,7 +88,7 @@ void tell_warmth(StateFacts& f, const WarmthNow& warmth, const TickRecord& tick,
 
 StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const WarmthNow* warmth) {
   StateFacts f = state_of_tick(tick, rehearsal.structures(), rehearsal.rate_hz());
-  if (warmth != nullptr) tell_warmth(f, *warmth, tick, rehearsal.structures());
+  if (warmth != nullptr) report_warmth(f, *warmth, tick, rehearsal.structures());
   f.removed = text_of("%.1f mm3", rehearsal.removed_mm3());
   if (rehearsal.soft() != nullptr) f.removed += text_of(", tissue %.1f", rehearsal.tissue_mm3());
   // A recording in trouble comes before everything: nothing of what follows would be kept.

@@ -36,7 +36,7 @@ struct WarmthNow {
 };
 /// Of the nearest structure; warns from 47 C on for any of them, which bone bears for a minute. `structures` may be
 /// null.
-void tell_warmth(StateFacts& facts, const WarmthNow& warmth, const TickRecord& tick, const StructureMap* structures);
+void report_warmth(StateFacts& facts, const WarmthNow& warmth, const TickRecord& tick, const StructureMap* structures);
 /// `warmth`: null where the scene has no heat.
 [[nodiscard]] StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick,
                                      const WarmthNow* warmth = nullptr);
@@ -44,7 +44,7 @@ void tell_warmth(StateFacts& facts, const WarmthNow& warmth, const TickRecord& t
 [[nodiscard]] StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures, double rate_hz);
 
 /// Rather than the last thing said, which is empty after a while: a warning that lasts lets it pass.
-[[nodiscard]] bool warning_is_told(const StateFacts& facts, const std::string& message);
+[[nodiscard]] bool warning_is_reported(const StateFacts& facts, const std::string& message);
 
 /// "3:07"; from an hour "1:03:07".
 [[nodiscard]] std::string clock_text(double seconds);

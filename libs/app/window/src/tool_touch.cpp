@@ -21,9 +21,9 @@ InstrumentPlace place_of(const TickRecord& t) {
 
 }  // namespace
 
-std::optional<ToolTouch::Told> ToolTouch::look(std::span<const TickRecord> hands) {
+std::optional<ToolTouch::Reported> ToolTouch::look(std::span<const TickRecord> hands) {
   double least = 1e9;
-  std::optional<Told> told;
+  std::optional<Reported> reported;
   at_mm_.reset();
   for (std::size_t a = 0; a < hands.size(); ++a) {
     for (std::size_t b = a + 1; b < hands.size(); ++b) {
@@ -35,17 +35,17 @@ std::optional<ToolTouch::Told> ToolTouch::look(std::span<const TickRecord> hands
       if (gap.gap_mm >= 0) continue;
       at_mm_ = gap.at_mm;
       const auto rounded = [](double x) { return std::round(x * 100) / 100; };
-      told = Told{name_of(*other.held, gap.other_head) + " touches " + name_of(*first.held, gap.first_head),
-                  Json{{"hands", Json{static_cast<int>(hands[a].hand), static_cast<int>(hands[b].hand)}},
-                       {"tools", Json{first.held->name, other.held->name}},
-                       {"at_mm", Json{rounded(gap.at_mm.x), rounded(gap.at_mm.y), rounded(gap.at_mm.z)}}}
-                      .dump()};
+      reported = Reported{name_of(*other.held, gap.other_head) + " touches " + name_of(*first.held, gap.first_head),
+                          Json{{"hands", Json{static_cast<int>(hands[a].hand), static_cast<int>(hands[b].hand)}},
+                               {"tools", Json{first.held->name, other.held->name}},
+                               {"at_mm", Json{rounded(gap.at_mm.x), rounded(gap.at_mm.y), rounded(gap.at_mm.z)}}}
+                              .dump()};
     }
   }
-  if (least > kApartMm) told_ = false;
-  if (!told || told_) return std::nullopt;
-  told_ = true;
-  return told;
+  if (least > kApartMm) reported_ = false;
+  if (!reported || reported_) return std::nullopt;
+  reported_ = true;
+  return reported;
 }
 
 }  // namespace osteo::inline app

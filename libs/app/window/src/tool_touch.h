@@ -14,18 +14,18 @@ class ToolTouch {
  public:
   /// Their gap must have been so wide since the last touch before another is told: a hand trembles.
   static constexpr double kApartMm = 0.5;
-  struct Told {
+  struct Reported {
     std::string words;  ///< "the sucker touches the drill's shaft"
     std::string note;   ///< the value of a "touch" note
   };
   /// The hands as they are, empty ones left out. Something when a touch begins.
-  std::optional<Told> look(std::span<const TickRecord> hands);
+  std::optional<Reported> look(std::span<const TickRecord> hands);
   /// Where they touch now.
   [[nodiscard]] std::optional<Vec3> at_mm() const { return at_mm_; }
 
  private:
   std::optional<Vec3> at_mm_;
-  bool told_ = false;
+  bool reported_ = false;
 };
 
 }  // namespace osteo::inline app

@@ -9,7 +9,7 @@
 
 namespace osteo::inline app {
 
-std::string link_words(const TutorNow::Link& link) {
+std::string link_text(const TutorNow::Link& link) {
   if (!link.heard) return link.who + ": not heard";
   char text[160];
   std::snprintf(text, sizeof text, "there and back %.1f ms, %.0f %% lost, clock %+.1f ms, %+.0f ppm", link.rtt_ms,
@@ -84,7 +84,7 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
   }
   for (const TutorNow::Link& l : now.links) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(l.heard && !l.differs ? palette::kText : palette::kYellow));
-    ImGui::TextWrapped("%s%s", l.heard ? "" : "! ", link_words(l).c_str());
+    ImGui::TextWrapped("%s%s", l.heard ? "" : "! ", link_text(l).c_str());
     ImGui::PopStyleColor();
   }
   if (hands.size() > 1) {

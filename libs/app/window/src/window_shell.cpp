@@ -48,11 +48,11 @@ WindowShell::WindowShell(const ShellOptions& options) : fixed_scale_(options.sca
     shell->dropped_.insert(shell->dropped_.end(), paths, paths + count);
   });
   glfwSetWindowContentScaleCallback(window_, [](GLFWwindow* w, float x, float y) {
-    static_cast<WindowShell*>(glfwGetWindowUserPointer(w))->told_scale_ = static_cast<double>(std::max(x, y));
+    static_cast<WindowShell*>(glfwGetWindowUserPointer(w))->reported_scale_ = static_cast<double>(std::max(x, y));
   });
   float x = 1, y = 1;
   glfwGetWindowContentScale(window_, &x, &y);
-  told_scale_ = static_cast<double>(std::max(x, y));
+  reported_scale_ = static_cast<double>(std::max(x, y));
   ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;
   ImGui_ImplGlfw_InitForOpenGL(window_, true);
@@ -87,7 +87,7 @@ std::vector<std::filesystem::path> WindowShell::take_dropped() {
 }
 
 void WindowShell::apply_scale() {
-  const double automatic = fixed_scale_ > 0 ? fixed_scale_ : automatic_scale(told_scale_, width_, height_);
+  const double automatic = fixed_scale_ > 0 ? fixed_scale_ : automatic_scale(reported_scale_, width_, height_);
   const int wanted = static_cast<int>(std::lround(kTextPixels * scale_that_fits(automatic, by_hand_, width_, height_)));
   if (wanted == em_) return;
   const bool had = em_ > 0;

@@ -24,7 +24,7 @@ namespace {
 
 using namespace case_report;
 
-// Raise it when pictures are drawn otherwise: those of an earlier report are then drawn anew.
+// Raise it when pictures are drawn otherwise: those of an earlier report are then drawn again.
 constexpr int kPicturesVersion = 2;
 
 // Same state, same pictures.

@@ -8,7 +8,7 @@ namespace {
 
 std::string in(double v, const std::string& unit) {
   const std::string u = unit_text(unit);
-  return told_number(v) + (u.empty() ? "" : " " + u);
+  return reported_number(v) + (u.empty() ? "" : " " + u);
 }
 std::string percent(double share) {
   const double p = 100 * share;
@@ -18,7 +18,7 @@ std::string percent(double share) {
   return format_number(std::round(p)) + " %";
 }
 std::string times(double n) {
-  return n == 1 ? "once" : n == 2 ? "twice" : told_number(n) + " times";
+  return n == 1 ? "once" : n == 2 ? "twice" : reported_number(n) + " times";
 }
 std::string slug(const std::string& text) {
   std::string out;
@@ -125,8 +125,8 @@ class Finder {
     const auto duration = value("duration_s"), drilling = value("drilling_s"), removed = value("removed_mm3"),
                sawn = value("sawn_mm3");
     if (duration) {
-      std::string s = "The session lasted " + told_seconds(*duration);
-      s += drilling && *drilling > 0 ? "; for " + told_seconds(*drilling) + " of it a burr was drilling."
+      std::string s = "The session lasted " + reported_seconds(*duration);
+      s += drilling && *drilling > 0 ? "; for " + reported_seconds(*drilling) + " of it a burr was drilling."
                                      : "; no burr drilled.";
       out_.summary.push_back(s);
     }
@@ -171,16 +171,16 @@ class Finder {
         if (burr > 0 || saw > 0) text += " " + times(burr > 0 ? burr : saw);
         if (burr > 0 && saw > 0) text += " and the running saw " + times(saw);
         ScoreFinding& f =
-            add("injury", name, FindingSeverity::serious, text + ", for " + told_seconds(injured) + " in all.",
+            add("injury", name, FindingSeverity::serious, text + ", for " + reported_seconds(injured) + " in all.",
                 "Reached: the tool's surface lay inside the structure's face.");
         from(f, "injured_s", name, injured, 0);
         moments(f, "reached by a rotating burr", name);
         moments(f, "reached by the running saw", name);
         std::sort(f.times_s.begin(), f.times_s.end());
       } else if (n > 0) {
-        ScoreFinding& f = add(
-            "touch", name, FindingSeverity::caution,
-            "The burr touched the " + name + " " + times(n) + ", for " + told_seconds(touched) + ", without turning.");
+        ScoreFinding& f = add("touch", name, FindingSeverity::caution,
+                              "The burr touched the " + name + " " + times(n) + ", for " + reported_seconds(touched) +
+                                  ", without turning.");
         from(f, "touches", name, n, 0);
         moments(f, "touched from the first tick on", name);
       }
@@ -203,7 +203,7 @@ class Finder {
       if (mm >= limits_.near_miss_mm) continue;
       ScoreFinding& f = add("saw-clearance", name, FindingSeverity::note,
                             "The saw's cut passed the " + name + " at " + in(mm, "mm") + ".",
-                            "Told below " + told_number(limits_.near_miss_mm) + " mm.");
+                            "Told below " + reported_number(limits_.near_miss_mm) + " mm.");
       f.kind = "clearance";
       from(f, "saw_clearance_mm", name, mm, limits_.near_miss_mm);
     }
@@ -211,7 +211,7 @@ class Finder {
       if (c <= 0 || c >= limits_.near_miss_mm || value("touches", name).value_or(0) > 0) continue;
       ScoreFinding& f =
           add("clearance", name, FindingSeverity::note, "The burr came within " + in(c, "mm") + " of the " + name + ".",
-              "Told below " + told_number(limits_.near_miss_mm) + " mm.");
+              "Told below " + reported_number(limits_.near_miss_mm) + " mm.");
       from(f, "clearance_mm", name, c, limits_.near_miss_mm);
     }
     if (any && nearest.second > 0 && !cut) {
@@ -246,7 +246,7 @@ class Finder {
     for (std::size_t n = 0; n < std::min<std::size_t>(near.size(), 3); ++n) {
       text += n == 0 ? ", " : n + 1 == std::min<std::size_t>(near.size(), 3) ? " and " : ", ";
       text += in(near[n].second, "mm3") +
-              (n == 0 ? " of it within " + told_number(kNearMm) + " mm of the " : " of the ") + near[n].first;
+              (n == 0 ? " of it within " + reported_number(kNearMm) + " mm of the " : " of the ") + near[n].first;
     }
     ScoreFinding& f = add(
         "hidden", {}, danger || *share < limits_.seen_well ? FindingSeverity::caution : FindingSeverity::good,
@@ -373,8 +373,8 @@ class Finder {
                             r.pass     ? FindingSeverity::good
                             : violated ? FindingSeverity::serious
                                        : FindingSeverity::caution,
-                            capital(r.item->name) + (r.pass ? ": passed, " : ": not passed, ") + told_item(r) + ".",
-                            told_item(r).ends_with(r.word) ? std::string() : r.word);
+                            capital(r.item->name) + (r.pass ? ": passed, " : ": not passed, ") + reported_item(r) + ".",
+                            reported_item(r).ends_with(r.word) ? std::string() : r.word);
       f.metric = r.item->name;
       f.structure = r.item->structure;
       f.value = r.value;
@@ -383,52 +383,52 @@ class Finder {
       places(f, r.evidence_mm, r.evidence_count, r.evidence_each);
     }
   }
-  static std::string told_item(const Product::Result& r) {
+  static std::string reported_item(const Product::Result& r) {
     const bool share = r.unit == "1" && r.item->kind != ItemKind::pieces && r.item->kind != ItemKind::fixed;
-    const auto tell = [&](double v) { return share ? percent(v) : in(v, r.unit); };
+    const auto notify = [&](double v) { return share ? percent(v) : in(v, r.unit); };
     switch (r.item->kind) {
       case ItemKind::exposed:
-        return tell(r.value) + " of it is laid open, at least " + tell(r.threshold) + " is asked";
+        return notify(r.value) + " of it is laid open, at least " + notify(r.threshold) + " is asked";
       case ItemKind::not_violated:
-        if (r.value > 0) return tell(r.value) + " of it is gone";
+        if (r.value > 0) return notify(r.value) + " of it is gone";
         return r.pass ? "none of it is gone" : "none of it is gone, but a running burr or saw reached into it";
       case ItemKind::no_hole:
-        return "the largest bare part has " + tell(r.value) + ", below " + tell(r.threshold) + " is asked";
+        return "the largest bare part has " + notify(r.value) + ", below " + notify(r.threshold) + " is asked";
       case ItemKind::no_cells_left:
-        return tell(r.value) + " of the cells near it are left, at most " + tell(r.threshold) + " is asked";
+        return notify(r.value) + " of the cells near it are left, at most " + notify(r.threshold) + " is asked";
       case ItemKind::no_overhang:
-        return tell(r.value) + " of the wall can be seen, at least " + tell(r.threshold) + " is asked";
+        return notify(r.value) + " of the wall can be seen, at least " + notify(r.threshold) + " is asked";
       case ItemKind::thinned:
-        return tell(r.value) + " of bone is left over it, at most " + tell(r.threshold) + " is asked";
+        return notify(r.value) + " of bone is left over it, at most " + notify(r.threshold) + " is asked";
       case ItemKind::sharp_angle:
-        return "a ball of " + tell(r.value) + " fits into what is left, at most " + tell(r.threshold) + " is asked";
+        return "a ball of " + notify(r.value) + " fits into what is left, at most " + notify(r.threshold) + " is asked";
       case ItemKind::followed:
-        return tell(r.value) + " of its length is shown, at least " + tell(r.threshold) + " is asked";
+        return notify(r.value) + " of its length is shown, at least " + notify(r.threshold) + " is asked";
       case ItemKind::margin:
-        return "it ends " + tell(r.value) + " off, at most " + tell(r.threshold) + " is asked";
+        return "it ends " + notify(r.value) + " off, at most " + notify(r.threshold) + " is asked";
       case ItemKind::pieces:
       case ItemKind::fixed:
         break;
     }
-    return told_number(r.value) + ", at least " + told_number(r.threshold) +
+    return reported_number(r.value) + ", at least " + reported_number(r.threshold) +
            (r.threshold == 1 ? " is asked" : " are asked");
   }
 
   void time() {
     const double duration = value("duration_s").value_or(0);
     if (const auto lost = value("lost_s"); lost && *lost > 0)
-      from(add("lost", {}, FindingSeverity::caution, told_seconds(*lost) + " of the session were not recorded.",
+      from(add("lost", {}, FindingSeverity::caution, reported_seconds(*lost) + " of the session were not recorded.",
                "What is said here is of the rest."),
            "lost_s", {}, *lost, 0);
     if (procedure_ != nullptr && procedure_->usual_s > 0 && duration > procedure_->usual_s) {
       ScoreFinding& f = add("time", {}, FindingSeverity::note,
-                            "It took " + told_seconds(duration) + "; " + told_seconds(procedure_->usual_s) +
+                            "It took " + reported_seconds(duration) + "; " + reported_seconds(procedure_->usual_s) +
                                 " are usual for this procedure.");
       from(f, "duration_s", {}, duration, procedure_->usual_s);
     }
     if (const auto idle = value("idle_s"); idle && duration > 0 && *idle > limits_.idle_share * duration)
       from(add("idle", {}, FindingSeverity::note,
-               "For " + told_seconds(*idle) + " (" + percent(*idle / duration) + ") neither hand moved."),
+               "For " + reported_seconds(*idle) + " (" + percent(*idle / duration) + ") neither hand moved."),
            "idle_s", {}, *idle, limits_.idle_share * duration);
     for (ScoreFinding& f : out_.list) {
       if (f.id == "idle") f.kind = "time";
@@ -477,7 +477,7 @@ std::string unit_text(std::string_view unit) {
   return text;
 }
 
-std::string told_number(double v) {
+std::string reported_number(double v) {
   if (!std::isfinite(v) || v == 0) return format_number(v);
   const double size = std::abs(v);
   const double step = size >= 10 ? 1 : size >= 1 ? 0.1 : std::pow(10, std::floor(std::log10(size)) - 1);
@@ -485,8 +485,8 @@ std::string told_number(double v) {
   return format_number(std::round(rounded * 1e6) / 1e6);
 }
 
-std::string told_seconds(double s) {
-  if (s < 59.5) return (s < 10 ? told_number(std::round(s * 1000) / 1000) : format_number(std::round(s))) + " s";
+std::string reported_seconds(double s) {
+  if (s < 59.5) return (s < 10 ? reported_number(std::round(s * 1000) / 1000) : format_number(std::round(s))) + " s";
   const auto whole = static_cast<long>(std::llround(s));
   const long h = whole / 3600, min = whole / 60 % 60, rest = whole % 60;
   if (h > 0) return std::to_string(h) + " h " + std::to_string(min) + " min";

@@ -92,12 +92,12 @@ void FrameMaker::take(const TickRecord& record) {
 }
 
 bool FrameMaker::take(const VoxelChange& change) {
-  const std::optional<VoxelChange> told = apply_change(change, world_);
-  if (!told) return false;
-  if (const auto [at, is_new] = in_frame_.try_emplace(told->voxel, changes_.size()); is_new) {
-    changes_.push_back(*told);
+  const std::optional<VoxelChange> reported = apply_change(change, world_);
+  if (!reported) return false;
+  if (const auto [at, is_new] = in_frame_.try_emplace(reported->voxel, changes_.size()); is_new) {
+    changes_.push_back(*reported);
   } else {
-    changes_[at->second].density = told->density;
+    changes_[at->second].density = reported->density;
   }
   return true;
 }
@@ -132,7 +132,7 @@ std::vector<CameraPose> cameras_of(const SessionReader& session, std::size_t& un
   return camera_poses(notes, unreadable);
 }
 
-World tell_frames(const SessionReader& session, World begin, const FrameMaker::Sink& sink, const Context& context) {
+World report_frames(const SessionReader& session, World begin, const FrameMaker::Sink& sink, const Context& context) {
   if (begin.hash() != session.header().bone_hash)
     throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's",
                 "give the case it was recorded on, unchanged");
@@ -143,12 +143,12 @@ World tell_frames(const SessionReader& session, World begin, const FrameMaker::S
   const double all = static_cast<double>(std::max<std::uint64_t>(1, session.outline().tick_records));
   FrameMaker maker(std::move(begin), session.header().rate_hz, cameras, sink);
   auto parts = session.parts();
-  double told = 0;
+  double reported = 0;
   while (const SessionPart* const p = parts.next()) {
     if (p->gap != nullptr && p->gap == known_until) break;
     maker.part(*p);
-    told += static_cast<double>(p->ticks.size());
-    context.progress(std::min(1.0, told / all), "reading the session");
+    reported += static_cast<double>(p->ticks.size());
+    context.progress(std::min(1.0, reported / all), "reading the session");
   }
   maker.end();
   return maker.world().copy();

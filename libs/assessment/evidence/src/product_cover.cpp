@@ -57,7 +57,7 @@ void Product::exposed(const ScaleItem& item, std::uint8_t s, Result& r) const {
          share(item.cover_mm + off_mm()) >= item.threshold);
 }
 
-// Triangles that share a point hang together.
+// Triangles that share a point are connected.
 void Product::hole(const ScaleItem& item, std::uint8_t s, Result& r) const {
   const FacePart looked_at(procedure_, item);
   const double bare_mm = frame_.spacing_mm.x / 2;
@@ -83,7 +83,7 @@ void Product::hole(const ScaleItem& item, std::uint8_t s, Result& r) const {
     r.word = looked_at.nothing();
     return;
   }
-  // The points of bare triangles alone, numbered anew.
+  // The points of bare triangles alone, numbered again.
   std::vector<std::uint32_t> points;
   for (const Bare& b : bare) points.insert(points.end(), b.points.begin(), b.points.end());
   std::sort(points.begin(), points.end());
@@ -94,7 +94,7 @@ void Product::hole(const ScaleItem& item, std::uint8_t s, Result& r) const {
   }
   std::vector<std::uint32_t> part(points.size());
   std::vector<double> area(points.size());
-  const auto largest = [&](double most_mm, Result* tell) {
+  const auto largest = [&](double most_mm, Result* notify) {
     std::iota(part.begin(), part.end(), 0U);
     std::fill(area.begin(), area.end(), 0.0);
     const auto root = [&](std::uint32_t p) {
@@ -113,9 +113,9 @@ void Product::hole(const ScaleItem& item, std::uint8_t s, Result& r) const {
       mm2 += b.mm2;
       most = std::max(most, mm2);
     }
-    if (tell != nullptr) {
+    if (notify != nullptr) {
       for (const Bare& b : bare) {
-        if (b.cover_mm <= most_mm && area[root(b.points[0])] == most) keep(*tell, b.at_mm);
+        if (b.cover_mm <= most_mm && area[root(b.points[0])] == most) keep(*notify, b.at_mm);
       }
     }
     return most;

@@ -167,7 +167,7 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
     }
     const IsotonicQuantile most_force(force, 0.9), most_speed(speed, 0.9);
     std::size_t harder = 0, faster = 0, moved = 0;
-    double last_told_s = -1e9;
+    double last_reported_s = -1e9;
     for (const NearMetric::Sample& s : samples) {
       const double d = static_cast<double>(s.distance_mm), limit = most_force.at(d);
       if (!std::isnan(s.speed_mm_s)) {
@@ -176,10 +176,10 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
       }
       if (static_cast<double>(s.force_n) <= limit) continue;
       ++harder;
-      if (d <= kNearMm && s.t_s - last_told_s > 1) {
+      if (d <= kNearMm && s.t_s - last_reported_s > 1) {
         score.moments.push_back(
             {s.t_s, s.at_mm, "pressed harder than experts do there", name, static_cast<double>(s.force_n), limit});
-        last_told_s = s.t_s;
+        last_reported_s = s.t_s;
       }
     }
     score.values.push_back(
@@ -249,7 +249,7 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
   score.source.bone = session.header().bone_hash.substr(0, 16);
   score.source.procedure = procedure != nullptr ? procedure->hash : "none";
   score.source.recorded_by = session.header().program_version;
-  score.source.simulated = !simulated_words(session).empty();
+  score.source.simulated = !simulated_text(session).empty();
   score.source.cut_short = !o.end || o.damaged() || !losses(o).empty();
   if (!o.end) score.words.push_back("the session was cut short: it is scored as far as it goes");
   for (const std::string& line : losses(o)) score.words.push_back(line);
@@ -258,7 +258,7 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
   ScoreKeeper keeper({session.header().rate_hz, structures, procedure});
   const World first = begin.copy();
   std::ptrdiff_t undone = 0;
-  World end = tell_frames(
+  World end = report_frames(
       session, std::move(begin),
       [&](const EvidenceFrame& f) {
         keeper.frame(f);
@@ -332,7 +332,7 @@ Reference::One read_reference(const SessionReader& session, World begin, const S
                               const ReferenceSession& which, const Context& context) {
   Reference::One one{which.subject, which.group, {}, {}};
   ScoreKeeper keeper({session.header().rate_hz, structures, nullptr});
-  const World end = tell_frames(
+  const World end = report_frames(
       session, std::move(begin), [&](const EvidenceFrame& f) { keeper.frame(f); }, context);
   keeper.finish(end);
   one.removed = keeper.removed_set();

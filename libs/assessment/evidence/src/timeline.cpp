@@ -254,7 +254,7 @@ Timeline TimelineKeeper::timeline(const std::map<VoxelKey, VisibilityMetric::Vox
   return line;
 }
 
-void tell_notes(const SessionReader& session, TimelineKeeper& keeper) {
+void report_notes(const SessionReader& session, TimelineKeeper& keeper) {
   auto parts = session.parts();
   while (const SessionPart* const p = parts.next()) {
     for (const Note& n : p->notes) keeper.note(n);
@@ -267,8 +267,8 @@ Timeline read_timeline(const SessionReader& session, World begin, const Structur
   const EvidenceScene scene{session.header().rate_hz, structures, procedure};
   TimelineKeeper keeper(scene);
   VisibilityMetric visibility(scene);
-  tell_notes(session, keeper);
-  const World end = tell_frames(
+  report_notes(session, keeper);
+  const World end = report_frames(
       session, std::move(begin),
       [&](const EvidenceFrame& f) {
         keeper.frame(f);

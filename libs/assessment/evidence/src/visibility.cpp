@@ -181,7 +181,7 @@ void VisibilityMetric::finish(const World& world, std::vector<Measured>& values,
   });
   double seen = 0, hidden = 0, unknown = 0;
   std::map<std::uint8_t, double> near;
-  std::map<std::uint8_t, std::uint64_t> last_told;
+  std::map<std::uint8_t, std::uint64_t> last_reported;
   for (const auto& [name, v] : voxels_) {
     (v.seen == Seen::seen ? seen : v.seen == Seen::hidden ? hidden : unknown) += static_cast<double>(v.mm3);
     if (v.seen != Seen::hidden || scene_.structures == nullptr) continue;
@@ -212,9 +212,10 @@ void VisibilityMetric::finish(const World& world, std::vector<Measured>& values,
   for (const auto* const v : in_time) {
     const StructureMap::Answer a = scene_.structures->at(v->second.own_mm);
     if (a.structure == 0 || a.distance_mm > kNearMm) continue;
-    const auto told = last_told.find(a.structure);
-    if (told != last_told.end() && static_cast<double>(v->second.tick - told->second) < scene_.rate_hz) continue;
-    last_told[a.structure] = v->second.tick;
+    const auto reported = last_reported.find(a.structure);
+    if (reported != last_reported.end() && static_cast<double>(v->second.tick - reported->second) < scene_.rate_hz)
+      continue;
+    last_reported[a.structure] = v->second.tick;
     moments.push_back({static_cast<double>(v->second.tick) / scene_.rate_hz, v->second.own_mm, "removed unseen",
                        scene_.structures->name_of(a.structure), a.distance_mm, kNearMm});
   }

@@ -355,7 +355,7 @@ class Analyst {
     row.columns.push_back({{alignment_plot(r)}});
     row.columns.push_back({{warped_plot(r)}});
     add(std::move(row));
-    say(synthetic_words() + " Figures 26 and 27 are the trial of middle score: " + middle.participant + ", trial " +
+    say(synthetic_text() + " Figures 26 and 27 are the trial of middle score: " + middle.participant + ", trial " +
             std::to_string(middle.trial.number) + " (" + short_name(middle.trial.training) + "), score " +
             text(middle.recall.score) + ".",
         Tone::quiet);

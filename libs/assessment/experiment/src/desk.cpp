@@ -6,8 +6,8 @@
 
 namespace osteo::inline assessment::experiment {
 
-ForceSkillDesk::ForceSkillDesk(std::filesystem::path experiment, Protocol protocol, std::size_t participant,
-                               bool retention, Mover mover, std::string device, const DeviceTraits& traits)
+ForceSkillController::ForceSkillController(std::filesystem::path experiment, Protocol protocol, std::size_t participant,
+                                           bool retention, Mover mover, std::string device, const DeviceTraits& traits)
     : protocol_(std::move(protocol)), participant_(protocol_.participants.at(participant)), retention_(retention) {
   folder_ = trials_folder(experiment, participant_, retention);
   trials_ = retention ? retention_of(protocol_, participant) : trials_of(protocol_, participant);
@@ -21,7 +21,7 @@ ForceSkillDesk::ForceSkillDesk(std::filesystem::path experiment, Protocol protoc
 }
 
 // The page before the next trial.
-void ForceSkillDesk::load() {
+void ForceSkillController::load() {
   if (next_ >= trials_.size()) {
     page_ = DeskPage::done;
     return;
@@ -33,7 +33,7 @@ void ForceSkillDesk::load() {
   page_ = trials_[next_].pause ? DeskPage::pause : retention_ ? DeskPage::before_test : DeskPage::before_training;
 }
 
-void ForceSkillDesk::begin(RunKind kind) {
+void ForceSkillController::begin(RunKind kind) {
   task_ = std::make_unique<ForceTask>(*stimulus_, trials_[next_], kind, TaskGains{}, record_.traits, protocol_.peak_n,
                                       kLeadS);
   record_.lead_ticks = task_->lead_ticks();
@@ -45,7 +45,7 @@ void ForceSkillDesk::begin(RunKind kind) {
   running_.store(true, std::memory_order_release);
 }
 
-Vec3 ForceSkillDesk::step(const DeviceSample& sample) noexcept {
+Vec3 ForceSkillController::step(const DeviceSample& sample) noexcept {
   if (!running_.load(std::memory_order_acquire)) return {};
   const TickRecord r = task_->step(tick_++, sample);
   ticks_->push_back(r);  // room was made for all of them
@@ -54,7 +54,7 @@ Vec3 ForceSkillDesk::step(const DeviceSample& sample) noexcept {
   return {r.force_n[0], r.force_n[1], r.force_n[2]};
 }
 
-void ForceSkillDesk::go_on() {
+void ForceSkillController::go_on() {
   switch (page_) {
     case DeskPage::pause:
       page_ = retention_ ? DeskPage::before_test : DeskPage::before_training;
@@ -75,7 +75,7 @@ void ForceSkillDesk::go_on() {
   }
 }
 
-void ForceSkillDesk::update() {
+void ForceSkillController::update() {
   if (running()) return;
   if (page_ == DeskPage::training) {
     // Sight of the own force behind the run, where it was not there in it.
@@ -89,11 +89,11 @@ void ForceSkillDesk::update() {
   }
 }
 
-TaskView ForceSkillDesk::view() const {
+TaskView ForceSkillController::view() const {
   return view_.load();
 }
 
-sheet::Drawing ForceSkillDesk::drawing(double width, double height) const {
+sheet::Drawing ForceSkillController::drawing(double width, double height) const {
   if (page_ != DeskPage::training && page_ != DeskPage::test) {
     sheet::Drawing nothing;
     nothing.width = width;
@@ -112,7 +112,7 @@ sheet::Drawing ForceSkillDesk::drawing(double width, double height) const {
   return run_drawing(*stimulus_, s, width, height);
 }
 
-std::pair<std::string, std::string> ForceSkillDesk::words() const {
+std::pair<std::string, std::string> ForceSkillController::words() const {
   if (page_ == DeskPage::done) return {"All trials are done.", "Thank you. Escape closes the window."};
   const Trial& t = trial();
   const std::string number = "Trial " + std::to_string(next_ + 1) + " of " + std::to_string(trials_.size());
@@ -137,7 +137,7 @@ std::pair<std::string, std::string> ForceSkillDesk::words() const {
   }
 }
 
-std::pair<std::vector<double>, std::vector<double>> ForceSkillDesk::last_training() const {
+std::pair<std::vector<double>, std::vector<double>> ForceSkillController::last_training() const {
   std::vector<double> applied;
   for (std::size_t i = record_.lead_ticks; i < record_.training.size(); ++i)
     applied.push_back(record_.training[i].normal_force_n);

@@ -108,7 +108,7 @@ sheet::Plot synthetic_plot() {
   return p;
 }
 
-std::string synthetic_words() {
+std::string synthetic_text() {
   char out[300];
   const Synthetic& s = synthetic();
   std::snprintf(out, sizeof out,

@@ -16,7 +16,7 @@ namespace osteo::inline assessment::experiment {
 [[nodiscard]] sheet::Drawing display_of(const Stimulus& stimulus, Training training, RunKind kind,
                                         const Protocol&);  // 24
 [[nodiscard]] sheet::Plot synthetic_plot();                // 25
-[[nodiscard]] std::string synthetic_words();
+[[nodiscard]] std::string synthetic_text();
 [[nodiscard]] sheet::Plot alignment_plot(const Recall& recall);                                                // 26
 [[nodiscard]] sheet::Plot warped_plot(const Recall& recall);                                                   // 27
 [[nodiscard]] sheet::Plot means_plot(const std::array<std::vector<double>, kTrainings>& means, double level);  // 28

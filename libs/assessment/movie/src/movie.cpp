@@ -83,8 +83,8 @@ class MovieReader final : public Reader {
     draw_until(record.tick);
     scene_.tick(record, changes);
     if (record.tick % 512 == 0) context_.check_cancelled();
-    if (record.tick >= first_told_) hardest_n_ = std::max(hardest_n_, static_cast<double>(record.normal_force_n));
-    told_tick_ = std::max(told_tick_, record.tick + 1);
+    if (record.tick >= first_reported_) hardest_n_ = std::max(hardest_n_, static_cast<double>(record.normal_force_n));
+    reported_tick_ = std::max(reported_tick_, record.tick + 1);
   }
   /// The rest of the frames show the scene as it was left.
   void end() { draw_until(~std::uint64_t{0}); }
@@ -119,7 +119,7 @@ class MovieReader final : public Reader {
   [[nodiscard]] std::vector<std::string> words_at(std::uint64_t tick) const {
     std::vector<std::string> words{clock(static_cast<double>(tick) / survey_.rate_hz)};
     const TickRecord& t = scene_.latest();
-    if (static_cast<double>(tick) > static_cast<double>(told_tick_) + 0.2 * survey_.rate_hz) {
+    if (static_cast<double>(tick) > static_cast<double>(reported_tick_) + 0.2 * survey_.rate_hz) {
       words.push_back("not recorded");
     } else {
       words.push_back(fixed(hardest_n_, 2) + " N");
@@ -143,9 +143,9 @@ class MovieReader final : public Reader {
   MovieFile& file_;
   const Context& context_;
   std::size_t next_ = 0;
-  std::uint64_t told_tick_ = 0;
+  std::uint64_t reported_tick_ = 0;
   // What lies before the movie is stepped through, but the first frame tells of its own time alone.
-  const std::uint64_t first_told_ =
+  const std::uint64_t first_reported_ =
       times_.ticks.size() < 2
           ? times_.ticks.front()
           : times_.ticks.front() - std::min(times_.ticks.front(), times_.ticks[1] - times_.ticks[0]);
@@ -195,7 +195,7 @@ MovieFacts make_movie(const SessionReader& session, const World& begin, const An
         facts.words.push_back("the replay differs from what was recorded (" + r.difference +
                               "): neither may the movie");
     } else {
-      tell_recorded(session, begin, reader);
+      report_recorded(session, begin, reader);
       facts.words.push_back(why + ": bone changes in steps of a tenth of a second" +
                             (session.header().dust ? ", and dust lies a little elsewhere than it did" : ""));
     }

@@ -48,7 +48,8 @@ class TimelineChart {
  public:
   explicit TimelineChart(const Timeline& line) : line_(line) {
     d_.id = "timeline-still";
-    d_.alt = "Force, distance to the nearest structure, bone removed and speed over " + told_seconds(line.duration_s());
+    d_.alt =
+        "Force, distance to the nearest structure, bone removed and speed over " + reported_seconds(line.duration_s());
     d_.width = 720;
     w_ = d_.width - kLeft - kRight;
     duration_ = std::max(1.0, line.duration_s());
@@ -258,7 +259,7 @@ sheet::Drawing profile_chart(const ForceProfile& p, bool reference) {
                                  kTop + kH * (1 - std::clamp(n / most, 0.0, 1.0))};
   };
   d.text(0, 12, p.structure, 11, kInk, -1, true);
-  d.text(kLeft + kW, 12, told_seconds(p.drilled_s) + " of drilling near it", 9, kQuiet, 1);
+  d.text(kLeft + kW, 12, reported_seconds(p.drilled_s) + " of drilling near it", 9, kQuiet, 1);
   for (double v = 0; v <= most * 1.0001; v += step) {
     d.line({at(0, v), at(kFar, v)}, kRule, 0.6);
     d.text(kLeft - 5, at(0, v)[1] + 3, format_number(std::round(v * 1000) / 1000), 8.5, kQuiet, 1);
@@ -324,11 +325,11 @@ std::string_view plain_name(std::string_view metric) {
   return metric;
 }
 
-std::string told_value(const MetricRow& row, double v) {
-  if (row.unit == "s") return told_seconds(v);
+std::string reported_value(const MetricRow& row, double v) {
+  if (row.unit == "s") return reported_seconds(v);
   if (row.name.ends_with("_share")) return format_number(std::round(1000 * v) / 10) + " %";
   const std::string unit = unit_text(row.unit);
-  return told_number(v) + (unit.empty() ? "" : " " + unit);
+  return reported_number(v) + (unit.empty() ? "" : " " + unit);
 }
 
 sheet::Drawing comparison_chart(const Comparison& c) {
@@ -359,7 +360,7 @@ sheet::Drawing comparison_chart(const Comparison& c) {
   if (!c.experts.empty()) {
     const auto [a, b] = std::minmax_element(c.experts.begin(), c.experts.end());
     d.box(std::min(px(*a), px(*b)) - 4, kMid - 7, std::abs(px(*b) - px(*a)) + 8, 14, kBand);
-    alt += "experts " + told_value(*c.row, *a) + " to " + told_value(*c.row, *b) + "; ";
+    alt += "experts " + reported_value(*c.row, *a) + " to " + reported_value(*c.row, *b) + "; ";
   }
   for (const double v : c.novices) d.line({{px(v), kMid - 4}, {px(v), kMid + 4}}, kQuiet, 1);
   for (const double v : c.experts) d.line({{px(v), kMid - 6}, {px(v), kMid + 6}}, kSeen, 1.4);
@@ -373,12 +374,12 @@ sheet::Drawing comparison_chart(const Comparison& c) {
   if (c.value) {
     const double x = px(*c.value);
     d.area({{x, kMid - 7}, {x + 7, kMid}, {x, kMid + 7}, {x - 7, kMid}}, kAccent);
-    alt += "this session " + told_value(*c.row, *c.value);
+    alt += "this session " + reported_value(*c.row, *c.value);
   } else {
     alt += "not measured in this session";
   }
-  d.text(kTo + 18, kMid + 3.5, c.value ? told_value(*c.row, *c.value) : "not measured", 11, c.value ? kInk : kQuiet, -1,
-         c.value.has_value());
+  d.text(kTo + 18, kMid + 3.5, c.value ? reported_value(*c.row, *c.value) : "not measured", 11, c.value ? kInk : kQuiet,
+         -1, c.value.has_value());
   d.text(720, kMid + 3, better, 8.5, kQuiet, 1);
   d.alt = alt;
   return d;

@@ -13,6 +13,6 @@ namespace osteo::inline assessment::review {
 [[nodiscard]] std::string clock(double seconds);
 /// For people: "share of bone seen", and its value as they say it.
 [[nodiscard]] std::string_view plain_name(std::string_view metric);
-[[nodiscard]] std::string told_value(const MetricRow& row, double value);
+[[nodiscard]] std::string reported_value(const MetricRow& row, double value);
 
 }  // namespace osteo::inline assessment::review

@@ -13,7 +13,7 @@ namespace osteo::inline assessment {
 namespace {
 
 using review::clock;
-using review::told_value;
+using review::reported_value;
 
 std::string e(std::string_view text) {
   return html_escaped(text);
@@ -65,7 +65,7 @@ std::string key_figures(const Review& r) {
   if (!r.score.items.empty() && r.score.judged() > 0)
     put(std::to_string(r.score.passed()) + " of " + std::to_string(r.score.judged()), "items passed");
   if (const auto v = value_of(r.score, "seen_share"))
-    put(told_value(MetricName("seen_share").row(), *v), "of the bone that is gone was seen as it went");
+    put(reported_value(MetricName("seen_share").row(), *v), "of the bone that is gone was seen as it went");
   double touches = 0;
   bool any = false;
   for (const Measured& m : r.score.values) {
@@ -73,10 +73,11 @@ std::string key_figures(const Review& r) {
     any = true;
     touches += *m.value;
   }
-  if (any) put(told_number(touches), touches == 1 ? "touch of a structure" : "touches of structures");
-  if (const auto v = value_of(r.score, "force_p95_n")) put(told_number(*v) + " N", "95 % of the pressing was below");
-  if (const auto v = value_of(r.score, "removed_mm3")) put(told_number(*v) + " mm³", "of bone taken by burrs");
-  if (const auto v = value_of(r.score, "duration_s")) put(told_seconds(*v), "in all");
+  if (any) put(reported_number(touches), touches == 1 ? "touch of a structure" : "touches of structures");
+  if (const auto v = value_of(r.score, "force_p95_n"))
+    put(reported_number(*v) + " N", "95 % of the pressing was below");
+  if (const auto v = value_of(r.score, "removed_mm3")) put(reported_number(*v) + " mm³", "of bone taken by burrs");
+  if (const auto v = value_of(r.score, "duration_s")) put(reported_seconds(*v), "in all");
   return out;
 }
 
@@ -224,11 +225,12 @@ void pictures(std::ostream& out, const Review& r) {
   const double known = r.seen_mm3 + r.hidden_mm3;
   std::string text = "<p class=\"legend\">";
   if (known > 0)
-    text += "<span class=\"swatch\" style=\"background:var(--seen);margin-left:0\"></span>" + told_number(r.seen_mm3) +
+    text += "<span class=\"swatch\" style=\"background:var(--seen);margin-left:0\"></span>" +
+            reported_number(r.seen_mm3) +
             " mm³ seen as it went <span class=\"swatch\" style=\"background:var(--accent)\"></span>" +
-            told_number(r.hidden_mm3) + " mm³ unseen";
+            reported_number(r.hidden_mm3) + " mm³ unseen";
   if (r.unknown_mm3 > 0)
-    text += " <span class=\"swatch\" style=\"background:#969696\"></span>" + told_number(r.unknown_mm3) +
+    text += " <span class=\"swatch\" style=\"background:#969696\"></span>" + reported_number(r.unknown_mm3) +
             " mm³ before it was known from where one looked";
   pair("seen-unseen", "What was removed, seen and unseen", text + "</p>\n", "unseen", "unseen-side");
 }
@@ -271,7 +273,7 @@ void over_time(std::ostream& out, const Review& r) {
   for (const TimelineEvent& ev : r.timeline.events) {
     out << "<tr" << (ev.kind == EventKind::injury ? " class=\"bad\"" : "") << "><td class=\"n\">" << clock(ev.t_s)
         << "</td><td>" << e(ev.what) << "</td><td class=\"n\">"
-        << (ev.end_s - ev.t_s > 0.05 ? told_seconds(ev.end_s - ev.t_s) : "") << "</td></tr>\n";
+        << (ev.end_s - ev.t_s > 0.05 ? reported_seconds(ev.end_s - ev.t_s) : "") << "</td></tr>\n";
     if (&ev - r.timeline.events.data() > 300) break;
   }
   out << "</tbody></table></div></section>\n";
@@ -326,9 +328,9 @@ void tables(std::ostream& out, const Review& r) {
       const std::string unit = unit_text(i.unit).empty() ? "" : " " + unit_text(i.unit);
       out << "<tr><td>" << e(i.item->name) << "</td>";
       if (i.measured) {
-        out << "<td class=\"n\">" << e(told_number(i.value) + unit) << "</td><td class=\"n\">"
-            << e(told_number(i.threshold) + unit) << "</td><td class=\"n\">" << e(told_number(i.margin)) << "</td><td"
-            << (i.pass ? ">&#10003; passed" : " class=\"bad\">not passed");
+        out << "<td class=\"n\">" << e(reported_number(i.value) + unit) << "</td><td class=\"n\">"
+            << e(reported_number(i.threshold) + unit) << "</td><td class=\"n\">" << e(reported_number(i.margin))
+            << "</td><td" << (i.pass ? ">&#10003; passed" : " class=\"bad\">not passed");
       } else {
         out << "<td colspan=\"3\">not judged: " << e(i.word) << "</td><td>";
       }
@@ -343,7 +345,8 @@ void tables(std::ostream& out, const Review& r) {
         const auto& [name, state] = r.score.steps[n];
         out << (n > 0 ? "; " : "") << e(name) << " &#8211; " << e(state);
         for (const Measured& m : r.score.values) {
-          if (m.is("step_s") && m.of == name && m.value && *m.value > 0) out << ", " << e(told_value(*m.row, *m.value));
+          if (m.is("step_s") && m.of == name && m.value && *m.value > 0)
+            out << ", " << e(reported_value(*m.row, *m.value));
         }
       }
       out << ".</p>\n";
@@ -356,7 +359,7 @@ void tables(std::ostream& out, const Review& r) {
          "is</th></tr></thead><tbody>\n";
   for (const Measured& m : r.score.values) {
     out << "<tr><td>" << m.row->name << "</td><td>" << e(m.of) << "</td><td class=\"n\">"
-        << (m.value ? e(told_value(*m.row, *m.value)) : "&#8211;") << "</td><td>" << e(m.row->help)
+        << (m.value ? e(reported_value(*m.row, *m.value)) : "&#8211;") << "</td><td>" << e(m.row->help)
         << (m.value ? "" : e("; not measured: " + m.word)) << "</td></tr>\n";
   }
   out << "</tbody></table></details></section>\n";

@@ -12,7 +12,7 @@
 namespace osteo::inline assessment {
 namespace {
 
-struct Told {
+struct Reported {
   Score score;
   ScoreDetail detail;
 };
@@ -39,9 +39,9 @@ struct Opened {
   }
 };
 
-Told told_of(const Opened& o, World begin, const Procedure* procedure, const Reference* reference,
-             const std::string& subject, const Context& context) {
-  Told t;
+Reported reported_of(const Opened& o, World begin, const Procedure* procedure, const Reference* reference,
+                     const std::string& subject, const Context& context) {
+  Reported t;
   t.score = score_session(o.session, std::move(begin), o.anatomy.structures.get(), procedure, reference, subject,
                           context, &t.detail);
   return t;
@@ -124,7 +124,7 @@ struct HandWasLed {
 
 std::vector<std::string> labels_of(const Opened& o, const HandWasLed& seen) {
   std::vector<std::string> all;
-  if (std::string words = simulated_words(o.session); !words.empty()) {
+  if (std::string words = simulated_text(o.session); !words.empty()) {
     all.push_back(std::move(words));
   } else if (output_exists(o.folder.folder / "strokes.json")) {
     all.emplace_back("Scripted: a file of strokes moved the hand, no person did.");
@@ -167,7 +167,7 @@ Review make_review(const ReviewRequest& q, const Context& context) {
         throw Error(ExitCode::usage,
                     "session '" + list[n].session + "' of the reference was recorded on another bone than this one",
                     "a reference is of one case: leave it out of reference.json");
-      Told t = told_of(one, std::move(its), procedure, nullptr, {}, Context());
+      Reported t = reported_of(one, std::move(its), procedure, nullptr, {}, Context());
       reference->sessions.push_back(
           {list[n].subject, list[n].group, std::move(t.detail.removed), std::move(t.detail.near)});
       if (q.subject.empty() || list[n].subject != q.subject)
@@ -178,11 +178,12 @@ Review make_review(const ReviewRequest& q, const Context& context) {
   for (const fs::path& path : q.earlier) {
     context.progress(0.3, "reading earlier sessions");
     const Opened one(path, {}, context);
-    others.push_back({told_of(one, one.begin(context), procedure, nullptr, {}, Context()).score, Other::Of::earlier});
+    others.push_back(
+        {reported_of(one, one.begin(context), procedure, nullptr, {}, Context()).score, Other::Of::earlier});
   }
 
   TimelineKeeper keeper({o.session.header().rate_hz, structures, procedure});
-  tell_notes(o.session, keeper);
+  report_notes(o.session, keeper);
   HandWasLed led;
   ScoreDetail detail;
   detail.frame = [&](const EvidenceFrame& f) {

@@ -10,7 +10,7 @@
 namespace osteo::inline assessment {
 namespace {
 
-using review::told_value;
+using review::reported_value;
 
 Tone tone_of(FindingSeverity s) {
   return s == FindingSeverity::serious   ? Tone::bad

@@ -222,7 +222,7 @@ std::vector<Reach> reach_of(const Study& study, std::size_t outcomes) {
   return all;
 }
 
-std::string told(const Reach& r) {
+std::string reported(const Reach& r) {
   std::string words = r.a + " and " + r.b + " (" + std::to_string(r.people_a) + ", " + std::to_string(r.people_b) +
                       " people, " + counted(r.comparisons, "comparison", "comparisons") + " together): ";
   const double level = r.alpha / static_cast<double>(r.comparisons);
@@ -260,7 +260,7 @@ void Analyst::power() {
       continue;
     }
     json_["power"].push_back(json_of(r));
-    say(told(r));
+    say(reported(r));
   }
   if (study_.plan.groups.size() < 2) refuse("Power", "There is one group.");
 }

@@ -108,12 +108,12 @@ void Analyst::hold(const Outcome& metric, const Outcome& rating, std::vector<she
   }
   const Correlation p = partial_pearson(x, y, given, settings_.level),
                     s = partial_spearman(x, y, given, settings_.level);
-  const auto told = [](const Correlation& c) {
+  const auto reported = [](const Correlation& c) {
     return Json{{"value", c.r}, {"p", c.p}, {"interval", json_of(c.interval)}};
   };
   j["sessions_with_all"] = x.size();
-  j["partial_pearson"] = told(p);
-  j["partial_spearman"] = told(s);
+  j["partial_pearson"] = reported(p);
+  j["partial_spearman"] = reported(s);
   if (std::isnan(p.r))
     refuse("Partial correlation of " + metric.name,
            std::find(settings_.given.begin(), settings_.given.end(), metric.name) != settings_.given.end()

@@ -29,7 +29,7 @@ const given = {};
 const at = (s, i) => s + "\n" + i;
 document.querySelector("h1").textContent = study.title + ": rater " + study.rater;
 const draft = "osteotome " + study.id + " " + study.rater;
-function tell() {
+function notify() {
   const all = study.sessions.length * study.items.length, n = Object.keys(given).length;
   document.getElementById("state").textContent = n + " of " + all + " given" + (n === all ? ": all done, save the file" : "");
   for (const s of study.sessions) document.getElementById(s).className = study.items.every(i => at(s, i) in given) ? "done" : "";
@@ -53,7 +53,7 @@ study.sessions.forEach((s, n) => {
       const label = make("label", "", field), input = make("input", "", label);
       input.type = "radio"; input.name = s + " " + k; input.value = v === null ? "none" : v;
       label.append(" " + (v === null ? "cannot judge" : v));
-      input.addEventListener("change", () => { given[at(s, item)] = v; keep(); tell(); });
+      input.addEventListener("change", () => { given[at(s, item)] = v; keep(); notify(); });
     }
   });
 });
@@ -63,7 +63,7 @@ function show() {
     const v = given[at(s, item)], want = v === null ? "none" : String(v);
     for (const input of document.getElementsByName(s + " " + k)) input.checked = input.value === want;
   }));
-  tell();
+  notify();
 }
 function result() {
   const ratings = [];

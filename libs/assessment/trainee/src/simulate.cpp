@@ -33,8 +33,8 @@ Json triple(Vec3 v) {
   return Json{micrometres(v.x), micrometres(v.y), micrometres(v.z)};
 }
 
-// What goes on behind the hand: it looks at what bone is left, and says what comes next. Told by the stream like any
-// reader, in the thread that steps the servo.
+// What goes on behind the hand: it looks at what bone is left, and says what comes next. Reported by the stream like
+// any reader, in the thread that steps the servo.
 class TraineeMind final : public Reader {
  public:
   using Note = std::function<void(const std::string& kind, const std::string& json)>;
@@ -45,7 +45,7 @@ class TraineeMind final : public Reader {
     layers_.push_back(plan.strokes.size());
   }
   /// Whom it tells what it looks at.
-  void tell(Note note) { note_ = std::move(note); }
+  void notify(Note note) { note_ = std::move(note); }
 
   void resync(const World& world) override { world_ = &world; }
 
@@ -300,7 +300,7 @@ SimulatedSession simulate_trainee(const TraineeScene& scene, World begin, const 
                  {"seed", options.seed},
                  {"procedure", procedure.name}};
   rehearsal.note(std::string(kSimulatedNote), simulated.dump());
-  mind.tell([&](const std::string& kind, const std::string& json) { rehearsal.note(kind, json); });
+  mind.notify([&](const std::string& kind, const std::string& json) { rehearsal.note(kind, json); });
   rehearsal.add_reader(mind);
   result.summary = rehearsal.run_to_end(context);
   rehearsal.remove_reader(mind);

@@ -17,7 +17,7 @@ struct Place {
   std::array<std::uint32_t, 3> points{};
 };
 
-// Of what lies barer than `bare_mm` the largest part that hangs together: triangles that share a point.
+// Of what lies barer than `bare_mm` the largest part that is connected: triangles that share a point.
 double largest_bare_mm2(const std::vector<Place>& places, std::size_t points, double bare_mm) {
   std::vector<std::uint32_t> part(points);
   std::iota(part.begin(), part.end(), 0U);

@@ -69,7 +69,7 @@ void sync_path(const fs::path& path, const fs::path& shown, int (*sync)(int) = :
 }
 
 // Some libraries do not notice that a disk filled up under them. A file that ends exactly with the disk's last block is
-// taken for cut: better a good file refused than a cut one accepted.
+// taken for cut: better a good file rejected than a cut one accepted.
 void require_space_left(const fs::path& path) {
   std::error_code ec;
   const auto space = fs::space(path.has_parent_path() ? path.parent_path() : fs::path("."), ec);
@@ -115,7 +115,7 @@ void require_readable(const fs::path& path) {
   }
   if (!fs::exists(status)) throw Error(ExitCode::no_input, "there is no file or folder '" + path.string() + "'");
   const int mode = fs::is_directory(status) ? R_OK | X_OK : R_OK;
-  // Root passes access() on files without any read bit. A file nobody may read is refused for root as well: the
+  // Root passes access() on files without any read bit. A file nobody may read is rejected for root as well: the
   // hospital server that runs as root should behave like the workstation where the case was tried.
   const bool no_read_bit =
       (status.permissions() & (fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read)) ==

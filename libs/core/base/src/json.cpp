@@ -284,7 +284,7 @@ std::string json_complaint(const std::exception& e) {
     const std::size_t end = text.find("] ");
     if (end != std::string_view::npos) text.remove_prefix(end + 2);
   }
-  // The line is told by who knows the file.
+  // The line is reported by who knows the file.
   if (text.starts_with("parse error")) {
     const std::size_t colon = text.find(": ");
     if (colon != std::string_view::npos) text.remove_prefix(colon + 2);

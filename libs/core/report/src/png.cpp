@@ -68,7 +68,7 @@ std::string valid_utf8(std::string_view text) {
   char* const made = g_utf8_make_valid(text.data(), static_cast<gssize>(text.size()));
   std::string result(made);
   g_free(made);
-  // Control characters are no text, and XML parsers refuse them.
+  // Control characters are no text, and XML parsers reject them.
   for (char& c : result) {
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
   }

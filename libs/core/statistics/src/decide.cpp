@@ -105,7 +105,7 @@ PassMark contrasting_groups(std::span<const double> competent, std::span<const d
   };
   r.competent_fail_counted = share(competent, false);
   r.other_pass_counted = share(others, true);
-  // Both groups are drawn anew, each as large as it is.
+  // Both groups are drawn again, each as large as it is.
   const std::size_t people = competent.size() + others.size();
   std::vector<double> a(competent.size()), b(others.size());
   r.mark.interval = bootstrap(

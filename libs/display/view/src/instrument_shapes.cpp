@@ -36,7 +36,7 @@ Colour mix(Colour a, Colour b, double t) {
 class Rings {
  public:
   explicit Rings(int around) : around_(around) { colours_->SetNumberOfComponents(3); }
-  // A ring begins anew, not joined to the one before.
+  // A ring begins again, not joined to the one before.
   void lift() { joined_ = false; }
   void ring(const std::function<Vec3(double)>& at, const std::function<Colour(double)>& colour) {
     for (int a = 0; a < around_; ++a) {

@@ -85,7 +85,7 @@ void InstrumentView::hide() {
   for (Impl::Part* const p : {&impl_->head, &impl_->shaft, &impl_->ghost}) p->actor->VisibilityOff();
 }
 
-void InstrumentView::tell_apart(Vec3 colour, double opacity) {
+void InstrumentView::report_apart(Vec3 colour, double opacity) {
   impl_->shaft.mapper->ScalarVisibilityOff();
   impl_->shaft.actor->GetProperty()->SetColor(colour.x, colour.y, colour.z);
   for (Impl::Part* const p : {&impl_->head, &impl_->shaft}) p->actor->GetProperty()->SetOpacity(opacity);

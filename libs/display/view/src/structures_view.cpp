@@ -54,7 +54,7 @@ void spread(const TriMesh& mesh, std::vector<T>& values, int times) {
   }
 }
 
-// For each point how many hang together with it.
+// For each point how many are connected with it.
 std::vector<std::uint32_t> sizes_of_parts(const TriMesh& mesh) {
   std::vector<std::uint32_t> root(mesh.points_mm.size()), size(root.size(), 0);
   std::iota(root.begin(), root.end(), 0U);

@@ -130,7 +130,7 @@ bool WorldView::look_at_heat(const SceneReaders& readers, std::chrono::steady_cl
 }
 
 void WorldView::update_soft(SoftTissue& soft) {
-  // Muscle, fat, dura, gland: bodies side by side are told apart.
+  // Muscle, fat, dura, gland: bodies side by side are distinguished.
   constexpr double kColours[][3] = {{0.80, 0.42, 0.40}, {0.84, 0.68, 0.42}, {0.72, 0.52, 0.62}, {0.62, 0.32, 0.28}};
   soft_.resize(soft.size());
   for (std::size_t n = 0; n < soft.size(); ++n) {

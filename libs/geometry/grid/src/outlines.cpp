@@ -94,7 +94,7 @@ void measure(const Slice& s, float reach_mm, std::vector<float>& square) {
       if (cut[3]) p[3] = along_v(s, u, v);
       const auto piece = [&](int i, int j) { mark(s, p[i], p[j], reach_u, reach_v, square); };
       if (kind == 5 || kind == 10) {
-        // A saddle: the middle tells whether the two corners of bone hang together.
+        // A saddle: the middle tells whether the two corners of bone are connected.
         const bool joined = bone(c[0] + c[1] + c[2] + c[3]) == (kind == 5);
         piece(0, joined ? 1 : 3);
         piece(2, joined ? 3 : 1);

@@ -28,7 +28,7 @@ class OutLock {
     const fs::path file = out / "batch.json";
     fd_ = ::open(file.c_str(), O_RDONLY);
     if (fd_ < 0) throw Error(ExitCode::cannot_write, "'" + file.string() + "': " + std::strerror(errno));
-    // A file system without locks (some of a network's) is taken as it is: the cases themselves refuse two writers.
+    // A file system without locks (some of a network's) is taken as it is: the cases themselves reject two writers.
     if (::flock(fd_, (shared ? LOCK_SH : LOCK_EX) | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
       ::close(fd_);
       throw Error(ExitCode::cannot_write, "another batch is at work in '" + out.string() + "'",
@@ -134,7 +134,7 @@ class Batch {
     result.untouched = untouched;
     result.stopped = std::move(stopped);
     if (cancelled)
-      throw Error(ExitCode::cancelled, "stopped: " + progress_words(), "the same line again goes on from here");
+      throw Error(ExitCode::cancelled, "stopped: " + progress_text(), "the same line again goes on from here");
     return result;
   }
 
@@ -217,7 +217,7 @@ class Batch {
     context_.warn(row.code + ": " + std::string(state_name(record.state)) + ": " + record.why);
   }
 
-  [[nodiscard]] std::string progress_words() const {
+  [[nodiscard]] std::string progress_text() const {
     return std::to_string(ended_) + " of " + std::to_string(to_do_) + " cases" +
            (bad_ > 0 ? ", " + std::to_string(bad_) + " not done" : "");
   }
@@ -230,7 +230,7 @@ class Batch {
     if (!context_.cancelled()) {
       try {
         context_.progress(to_do_ == 0 ? 1.0 : static_cast<double>(ended_) / static_cast<double>(to_do_),
-                          progress_words() + left);
+                          progress_text() + left);
       } catch (const Error&) {
       }
     }

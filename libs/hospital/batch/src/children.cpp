@@ -51,7 +51,7 @@ struct Child {
   int out = -1, err = -1;
   ChildLimits limits;
   Clock::time_point start, looked, asked;
-  bool told = false;  // asked to end
+  bool reported = false;  // asked to end
   ChildEnd end;
 };
 
@@ -118,8 +118,8 @@ struct Children::Impl {
   // What is due by now.
   static void look_after(Child& c) {
     const double ran = seconds_since(c.start);
-    if (c.told && seconds_since(c.asked) > kGrace) ::kill(-c.pid, SIGKILL);
-    if (!c.told && c.limits.seconds > 0 && ran > c.limits.seconds) {
+    if (c.reported && seconds_since(c.asked) > kGrace) ::kill(-c.pid, SIGKILL);
+    if (!c.reported && c.limits.seconds > 0 && ran > c.limits.seconds) {
       c.end.over_time = true;
       ask(c);
     }
@@ -131,8 +131,8 @@ struct Children::Impl {
     }
   }
   static void ask(Child& c) {
-    if (c.told) return;
-    c.told = true;
+    if (c.reported) return;
+    c.reported = true;
     c.asked = Clock::now();
     // Until the child has made its group there is only itself.
     if (::kill(-c.pid, SIGTERM) != 0) ::kill(c.pid, SIGTERM);

@@ -20,7 +20,7 @@ std::string number_text(double value, int places) {
   return format_number(std::round(value * scale) / scale);
 }
 
-std::string state_words(CaseState state) {
+std::string state_text(CaseState state) {
   return state == CaseState::resources ? "out of memory or time" : std::string(state_name(state));
 }
 
@@ -42,7 +42,7 @@ void html_row(std::ostream& page, const CaseRecord& r, const fs::path& out) {
   page << "</td><td class=\"pic\">";
   if (has_picture)
     page << "<img loading=\"lazy\" src=\"cases/" << r.code << ".thumbnail.png\" alt=\"bone of " << r.code << "\">";
-  page << "</td><td class=\"state\">" << state_words(r.state) << "</td><td>" << html_escaped(r.verdict);
+  page << "</td><td class=\"state\">" << state_text(r.state) << "</td><td>" << html_escaped(r.verdict);
   for (std::size_t i = 0; i < r.findings.size(); ++i)
     page << (i == 0 ? "<small>" : "<br>") << html_escaped(r.findings[i]);
   page << (r.findings.empty() ? "" : "</small>");

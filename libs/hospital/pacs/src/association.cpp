@@ -132,7 +132,7 @@ unsigned keep(Serving& s, const T_DIMSE_C_StoreRQ& request) {
   s.counts.bytes += s.bytes;
   ++s.counts.stored;
   const std::string line = place.parent_path().string() + "\n";
-  [[maybe_unused]] const auto told = ::write(s.pipe, line.data(), line.size());
+  [[maybe_unused]] const auto reported = ::write(s.pipe, line.data(), line.size());
   return STATUS_Success;
 }
 

@@ -94,7 +94,7 @@ std::string new_uid(const Key& key, const std::string& uid) {
 
 std::string code_of(const Key& key, DcmItem& data) {
   std::string who = pacs::text_of(data, DCM_PatientID);
-  // Who has no number is told apart by the study, so that no two persons become one.
+  // Who has no number is distinguished by the study, so that no two persons become one.
   who = who.empty() ? "s" + pacs::text_of(data, DCM_StudyInstanceUID)
                     : "p" + pacs::text_of(data, DCM_IssuerOfPatientID) + '\n' + who;
   const auto hash = keyed(key, 'c', who);
@@ -250,21 +250,21 @@ void visit(DcmItem& item, const Visit& what) {
   }
 }
 
-pacs::Telling telling_of(DcmItem& data) {
-  pacs::Telling telling;
+pacs::Telling notifying_of(DcmItem& data) {
+  pacs::Telling notifying;
   visit(data, [&](DcmElement& e) {
     const DcmTagKey tag = e.getTag().getXTag();
     if (e.ident() == EVR_PN || tag == DCM_PatientID || tag == DCM_AccessionNumber || tag == DCM_RETIRED_OtherPatientIDs)
-      telling.add_name(value_of(e));
+      notifying.add_name(value_of(e));
     else if (tag == DCM_PatientBirthDate)
-      telling.add_birth_date(value_of(e));
+      notifying.add_birth_date(value_of(e));
     else if (std::ranges::find(kTelephones, tag) != std::end(kTelephones))
-      telling.add_telephone(value_of(e));
+      notifying.add_telephone(value_of(e));
   });
-  return telling;
+  return notifying;
 }
 
-bool is_words(DcmEVR kind) {
+bool is_text(DcmEVR kind) {
   constexpr DcmEVR kWords[] = {EVR_LO, EVR_SH, EVR_ST, EVR_LT, EVR_UT, EVR_UC, EVR_PN, EVR_AE, EVR_CS, EVR_UR};
   return std::ranges::find(kWords, kind) != std::end(kWords);
 }
@@ -324,7 +324,7 @@ DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, con
       refuse(why);
       continue;
     }
-    const pacs::Telling telling = telling_of(data);
+    const pacs::Telling notifying = notifying_of(data);
     DeidentifiedStudy study{
         code_of(key, data), {}, pacs::text_of(data, DCM_PatientID), pacs::text_of(data, DCM_StudyInstanceUID)};
     for (char& c : study.patient_id)
@@ -338,8 +338,8 @@ DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, con
     }
     std::string left;
     visit(data, [&](DcmElement& e) {
-      if (!left.empty() || !is_words(e.ident())) return;
-      if (const std::string_view what = telling.found_in(value_of(e)); !what.empty())
+      if (!left.empty() || !is_text(e.ident())) return;
+      if (const std::string_view what = notifying.found_in(value_of(e)); !what.empty())
         left = std::string(e.getTag().toString().c_str()) + ", which is kept, has " + std::string(what);
     });
     if (!left.empty()) {

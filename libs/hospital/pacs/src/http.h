@@ -51,7 +51,7 @@ class Http {
   Http(const Http&) = delete;
   Http& operator=(const Http&) = delete;
 
-  /// Errors: failed when there is no connection, it stalls or breaks off, the login is refused, it points elsewhere or
+  /// Errors: failed when there is no connection, it stalls or breaks off, the login is rejected, it points elsewhere or
   /// says more than `most`; cancelled; what `take` and the upload throw.
   Reply ask(const Question& question);
 

@@ -1,6 +1,6 @@
 // The folder of a receiving node, as it is now: how much is in it, and which series are still coming. People and
-// programs move and delete in it at any time, so what is not there any more is never an error. Time is told by whoever
-// has a clock. Private to libs/hospital/pacs.
+// programs move and delete in it at any time, so what is not there any more is never an error. Time is reported by
+// whoever has a clock. Private to libs/hospital/pacs.
 #pragma once
 #include <chrono>
 #include <functional>

@@ -32,7 +32,7 @@ class Scu : private TlsHolder, public DcmSCU {
  public:
   /// Sets titles, address and limits of time; contexts are the caller's.
   void prepare(const DicomPeer& peer);
-  /// Connects and negotiates. Error(failed) in words that say whose title was refused.
+  /// Connects and negotiates. Error(failed) in words that say whose title was rejected.
   void connect(const DicomPeer& peer);
 };
 

@@ -188,7 +188,7 @@ class Follower {
     return static_cast<std::int64_t>(*seq);
   }
 
-  // A server that was set up anew counts from 1 again. Beginning again costs questions only: what is here is not
+  // A server that was set up again counts from 1 again. Beginning again costs questions only: what is here is not
   // fetched twice.
   void check_log() {
     if (state_.last == 0) return;

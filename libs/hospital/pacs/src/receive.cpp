@@ -135,9 +135,9 @@ class Node {
         if (events_.closed) events_.closed(closed);
       }
       if (Clock::now() - measured_at_ > kMeasureEvery) measure();
-      tell(false);
+      notify(false);
     }
-    tell(true);
+    notify(true);
   }
 
  private:
@@ -240,7 +240,7 @@ class Node {
     });
   }
 
-  void tell(bool last) {
+  void notify(bool last) {
     const SharedCounts& c = *counts_;
     ReceiveCounters now = seen_;
     now.refused_associations = c.refused_associations;
@@ -250,14 +250,14 @@ class Node {
     now.bytes = c.bytes;
     now.timed_out = c.timed_out;
     now.gone = inbox_.gone();
-    if (!last && (now == told_ || Clock::now() - told_at_ < std::chrono::seconds(1))) return;
-    told_ = now;
-    told_at_ = Clock::now();
+    if (!last && (now == reported_ || Clock::now() - reported_at_ < std::chrono::seconds(1))) return;
+    reported_ = now;
+    reported_at_ = Clock::now();
     if (!events_.counters) return;
     try {
       events_.counters(now);
       counters_failed_ = false;
-    } catch (const Error& e) {  // a full disk, say: no reason to refuse what still can be kept
+    } catch (const Error& e) {  // a full disk, say: no reason to reject what still can be kept
       if (!std::exchange(counters_failed_, true)) context_.warn(std::string("the counters: ") + e.what());
     }
   }
@@ -274,8 +274,8 @@ class Node {
   Clock::time_point measured_at_{};
   Clock::duration measuring_took_{};
   bool folder_there_ = true, counters_failed_ = false;
-  ReceiveCounters seen_, told_;
-  Clock::time_point told_at_{};
+  ReceiveCounters seen_, reported_;
+  Clock::time_point reported_at_{};
 };
 
 }  // namespace

@@ -33,7 +33,7 @@ constexpr std::string_view kPlain =
     "yyyzzzzzzs";
 static_assert(kPlain.size() == 0x180 - 0xC0);
 
-// In small letters without marks. Letters of other scripts stay told apart.
+// In small letters without marks. Letters of other scripts stay distinguished.
 std::string plain_letters(std::string_view text) {
   std::u32string letters;
   if (auto read = utf8(text)) {
@@ -160,7 +160,8 @@ std::string_view Telling::found_in(std::string_view text) const {
   if (days_.empty()) return {};
   constexpr std::string_view kDay = "a person's day of birth";
   const std::vector<std::string> runs = runs_of(plain_letters(text), true);
-  const auto tells = [&](std::string_view a, std::string_view b, std::string_view c) {  // in any order that people use
+  const auto notifies = [&](std::string_view a, std::string_view b,
+                            std::string_view c) {  // in any order that people use
     return std::ranges::any_of(days_, [&](const Day& born) {
       // "04" may be a year, the 4 of a version is none.
       const auto year = [&](std::string_view s) {
@@ -178,7 +179,8 @@ std::string_view Telling::found_in(std::string_view text) const {
     const std::string_view r = runs[n];
     if (is_digit(r[0]) && (r.size() == 8 || r.size() == 6)) {
       const std::size_t y = r.size() - 4;  // digits of the year
-      if (tells(r.substr(0, y), r.substr(y, 2), r.substr(y + 2)) || tells(r.substr(0, 2), r.substr(2, 2), r.substr(4)))
+      if (notifies(r.substr(0, y), r.substr(y, 2), r.substr(y + 2)) ||
+          notifies(r.substr(0, 2), r.substr(2, 2), r.substr(4)))
         return kDay;
     }
     // The month may be a word in any place; "4th" leaves "th" behind the day.
@@ -190,7 +192,7 @@ std::string_view Telling::found_in(std::string_view text) const {
       else if (k == n || std::ranges::find(kBetween, runs[k]) == kBetween.end())
         break;
     }
-    if (parts.size() == 3 && tells(parts[0], parts[1], parts[2])) return kDay;
+    if (parts.size() == 3 && notifies(parts[0], parts[1], parts[2])) return kDay;
   }
   return {};
 }

@@ -182,8 +182,8 @@ class Out {
 class Watcher {
  public:
   Watcher(const std::vector<SeriesRule>& rules, const WatchOptions& options, const WatchWork& work,
-          const std::function<void(const WatchEvent&, const WatchCounters&)>& tell, const Context& context)
-      : rules_(rules), o_(options), work_(work), tell_to_(tell), context_(context), lock_(options.out) {
+          const std::function<void(const WatchEvent&, const WatchCounters&)>& notify, const Context& context)
+      : rules_(rules), o_(options), work_(work), report_to_(notify), context_(context), lock_(options.out) {
     for (const auto& file : fs::directory_iterator(o_.out / "records")) {
       if (file.path().extension() != ".json") continue;
       try {
@@ -248,7 +248,7 @@ class Watcher {
     feed_at_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(feed_wait_));
   }
 
-  void tell(const WatchEvent& event) const { tell_to_(event, counters_); }
+  void notify(const WatchEvent& event) const { report_to_(event, counters_); }
 
   // What is there now; what is new or has changed is to be read.
   void look() {
@@ -306,7 +306,7 @@ class Watcher {
     if (n < reading_.size() && !context_.cancelled()) {
       take(n, {});
       ++counters_.unreadable;
-      tell({"", "unreadable", "", "reading the head of a file ended its process: it is left out", {}, 1});
+      notify({"", "unreadable", "", "reading the head of a file ended its process: it is left out", {}, 1});
     }
     reading_.clear();
     reading_time_.clear();
@@ -356,12 +356,12 @@ class Watcher {
       if (choice.rule == nullptr || choice.rule->ignore) {
         settled_[code] = g.objects.size();
         if (choice.rule == nullptr) ++counters_.unmatched;
-        tell({code,
-              choice.rule != nullptr ? "ignored" : "unmatched",
-              choice.rule != nullptr ? choice.rule->name : "",
-              choice.why,
-              {},
-              g.objects.size()});
+        notify({code,
+                choice.rule != nullptr ? "ignored" : "unmatched",
+                choice.rule != nullptr ? choice.rule->name : "",
+                choice.why,
+                {},
+                g.objects.size()});
         continue;
       }
       if (running_.size() >= static_cast<std::size_t>(std::max(1, o_.jobs)) || !has_room()) {
@@ -384,8 +384,8 @@ class Watcher {
     const bool room = ec || static_cast<double>(space.available) / 1e6 >= o_.keep_free_mb;
     if (!room && o_.once)
       throw Error(ExitCode::resources, "the disk of the cases is full", "make room, or lower --keep-free-mb");
-    if (!room && !told_full_) context_.warn("the disk of the cases is full: nothing is begun until there is room");
-    told_full_ = !room;
+    if (!room && !reported_full_) context_.warn("the disk of the cases is full: nothing is begun until there is room");
+    reported_full_ = !room;
     return room;
   }
 
@@ -443,7 +443,7 @@ class Watcher {
     children_.start(
         id, [this, &rule, source, folder] { return work_(rule, source, folder); },
         ChildLimits{o_.memory_mb, o_.seconds});
-    tell({code, "begun", rule.name, "", folder, g.objects.size()});
+    notify({code, "begun", rule.name, "", folder, g.objects.size()});
   }
 
   void finish(const ChildEnd& end) {
@@ -468,20 +468,20 @@ class Watcher {
     if (record.state == CaseState::waiting || (context_.cancelled() && record.state != CaseState::done)) return;
     if (record.state == CaseState::resources && e.tries <= o_.retries) {
       ++e.tries;
-      tell({code, "again", e.rule, record.why, folder, e.objects.size()});
+      notify({code, "again", e.rule, record.why, folder, e.objects.size()});
       return;
     }
     e.state = state_name(record.state);
     e.how = record.to_json();
     write_file(record_of_series(code), to_json(code, e).dump(2) + "\n");
     ++(record.state == CaseState::done ? counters_.done : counters_.bad);
-    tell({code, e.state, e.rule, record.why, folder, e.objects.size()});
+    notify({code, e.state, e.rule, record.why, folder, e.objects.size()});
   }
 
   const std::vector<SeriesRule>& rules_;
   const WatchOptions& o_;
   const WatchWork& work_;
-  const std::function<void(const WatchEvent&, const WatchCounters&)>& tell_to_;
+  const std::function<void(const WatchEvent&, const WatchCounters&)>& report_to_;
   const Context& context_;
   Out lock_;
   Children children_;
@@ -492,7 +492,7 @@ class Watcher {
   std::map<std::string, std::size_t> settled_;  // without a case: objects when that was decided
   std::map<std::size_t, std::pair<std::string, fs::path>> running_;
   std::size_t unread_ = 0, last_id_ = 0;
-  bool told_full_ = false, feeding_ = false, fed_ = false, feed_failed_ = false;
+  bool reported_full_ = false, feeding_ = false, fed_ = false, feed_failed_ = false;
   double feed_wait_ = 1;  // seconds
   Clock::time_point feed_at_{};
   WatchCounters counters_;
@@ -508,13 +508,13 @@ void check_watch_folders(const fs::path& folder, const fs::path& out) {
 }
 
 WatchCounters watch_folder(const std::vector<SeriesRule>& rules, const WatchOptions& options, const WatchWork& work,
-                           const std::function<void(const WatchEvent&, const WatchCounters&)>& tell,
+                           const std::function<void(const WatchEvent&, const WatchCounters&)>& notify,
                            const Context& context) {
   if (!fs::is_directory(options.folder))
     throw Error(ExitCode::no_input, "'" + options.folder.string() + "' is no folder to watch");
   check_watch_folders(options.folder, options.out);
   try {
-    return Watcher(rules, options, work, tell, context).run();
+    return Watcher(rules, options, work, notify, context).run();
   } catch (const fs::filesystem_error& e) {
     throw error_of(e);
   }

@@ -194,7 +194,7 @@ ImportedBone import_bone(const fs::path& source, const ImportBoneParams& p, cons
   });
   const Frame& frame = slabs.frame();
   result.verdict = slabs.verdict();
-  tell_verdict(result.verdict, context);
+  report_verdict(result.verdict, context);
   const auto [found, kept] = builder.drop_small_pieces();
   if (kept == 0) {
     throw Error(ExitCode::failed, "no bone is left at or above " + format_number(p.lower) + " HU",

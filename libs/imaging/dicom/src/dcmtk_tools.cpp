@@ -46,7 +46,7 @@ void load_identity(const DicomSeries& source, DcmFileFormat& file, const Context
   DcmDataset& d = *file.getDataset();
   delete d.remove(DCM_PixelData);
   std::string names;
-  const auto told = [&](const DcmElement& e) {
+  const auto reported = [&](const DcmElement& e) {
     names += (names.empty() ? "" : ", ") + std::string(DcmTag(e.getTag()).getTagName());
   };
   for (unsigned long i = 0; i < d.card(); ++i) {
@@ -55,10 +55,10 @@ void load_identity(const DicomSeries& source, DcmFileFormat& file, const Context
     OFString text;
     if (e->ident() == EVR_UI) {
       if (e->getOFStringArray(text).bad() || text.empty() || e->checkValue("1").good()) continue;
-      told(*e);
+      reported(*e);
       require(e->putString(valid_uid(text.c_str()).c_str()), first->file);
     } else if (e->getLength() > 0 && e->checkValue("1-n").bad()) {
-      told(*e);
+      reported(*e);
       require(e->putString(""), first->file);
     }
   }

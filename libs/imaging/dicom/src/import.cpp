@@ -37,7 +37,7 @@ Mat3 direction_of(const std::string& axes) {
 }
 
 // What the file leaves open; where the axes are given by hand, it need not state them.
-void tell_findings(Verdict& v, const std::vector<VolumeFinding>& findings, bool axes_given) {
+void report_findings(Verdict& v, const std::vector<VolumeFinding>& findings, bool axes_given) {
   for (const VolumeFinding& f : findings) {
     switch (f.what) {
       case VolumeFinding::What::axes_not_stated:
@@ -107,7 +107,7 @@ Verdict judge_file(Image& image, const ImportParams& params, const std::vector<V
           format_number(params.hu_offset) + " HU are added to all values, as asked for",
           "look at the mask before you rely on a threshold");
   }
-  tell_findings(v, findings, !params.axes.empty());
+  report_findings(v, findings, !params.axes.empty());
   dicom::check_values(v, count, image.frame.voxel_volume_mm3(), params.any_modality);
   std::vector<dicom::JudgedSlice> layers;
   for (int k = 0; k < image.frame.dims[2]; ++k)
@@ -120,7 +120,7 @@ Verdict judge_file(Image& image, const ImportParams& params, const std::vector<V
 
 }  // namespace
 
-void tell_verdict(const Verdict& v, const Context& context) {
+void report_verdict(const Verdict& v, const Context& context) {
   for (const Finding& f : v.findings) {
     if (f.severity == Severity::warning)
       context.warn(f.message + " [" + f.code + "]" + (f.advice.empty() ? "" : "; " + f.advice));
@@ -168,7 +168,7 @@ Imported import_ct(const fs::path& source, const ImportParams& params, const Con
     frame.origin_mm += centre - frame.centre_mm();
     result.verdict.output = frame;
   }
-  tell_verdict(result.verdict, context);
+  report_verdict(result.verdict, context);
   return result;
 }
 

@@ -76,7 +76,7 @@ void take_stored_bits(const DicomHeader& h, T* p, std::size_t n, ValueCount& cou
     return h.is_signed ? static_cast<double>(static_cast<std::make_signed_t<T>>(word)) : static_cast<double>(word);
   };
   // Pictures change less from pixel to pixel than bits that do not belong to them do.
-  double by_tags = 0, by_words = 0;
+  double by_tags = 0, by_text = 0;
   const auto columns = static_cast<std::size_t>(h.columns);
   std::uint64_t changed = 0, unextended = 0, too_low = 0;
   const std::size_t most = h.overlay_in_pixels ? 0 : n;
@@ -88,11 +88,11 @@ void take_stored_bits(const DicomHeader& h, T* p, std::size_t n, ValueCount& cou
     if (i % columns == 0 || (w == v && p[i - 1] == extended(p[i - 1])) || is_padding(w) || is_padding(p[i - 1]))
       continue;
     by_tags += std::abs(number(v) - number(extended(p[i - 1])));
-    by_words += std::abs(number(w) - number(p[i - 1]));
+    by_text += std::abs(number(w) - number(p[i - 1]));
   }
   // Negative numbers whose sign is extended, but from further up.
   const bool all_too_low = too_low > 0 && too_low == changed;
-  if (all_too_low || by_words < 0.5 * by_tags) {
+  if (all_too_low || by_text < 0.5 * by_tags) {
     count.bits_exceeded += changed;
     return;
   }
@@ -163,7 +163,7 @@ class Converter {
   }
 
   // Around the round picture of some scanners the corners hold one value brighter than bone, whether a tag names it or
-  // not. What of it hangs together with a corner is padding; a clip of metal of that value is not.
+  // not. What of it is connected with a corner is padding; a clip of metal of that value is not.
   template <class T>
   void find_ring(const T* in, std::size_t columns, std::size_t rows) {
     ring_.clear();

@@ -20,7 +20,7 @@ struct ValueCount {
   std::int64_t hu_min = 1 << 30, hu_max = -(1 << 30);
   std::uint64_t pixels = 0, by_tag = 0, found = 0, declared_tissue = 0, out_of_range = 0, saturated = 0, metal = 0,
                 below_air = 0;
-  std::uint64_t ring = 0;  // pixels of one bright value that hang together with the picture's corners: padding
+  std::uint64_t ring = 0;  // pixels of one bright value that are connected with the picture's corners: padding
   double ring_hu = 0;
   // Words whose bits are not as the header says; frames for high_bit_wrong.
   std::uint64_t high_bit_wrong = 0, sign_not_extended = 0, bits_foreign = 0, bits_exceeded = 0;

@@ -35,7 +35,7 @@ struct Pictures {
 
 using SamePixels = std::function<bool(std::size_t, std::size_t)>;
 
-/// The slices of the stack to take, sorted along the normal; none when the verdict refuses. What is left out and why
+/// The slices of the stack to take, sorted along the normal; none when the verdict rejects. What is left out and why
 /// goes into the verdict.
 [[nodiscard]] std::vector<Candidate> choose_stack(const Pictures& pictures, const PlaceOptions& options,
                                                   const std::vector<FileSetAside>& excluded,

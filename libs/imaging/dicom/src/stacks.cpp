@@ -63,7 +63,7 @@ class StackChooser {
       for (auto& stack : without_conflicts(std::move(cluster))) stacks.push_back(std::move(stack));
     }
     std::vector<Candidate> chosen = choose(stacks);
-    tell_what_was_left_out();
+    report_what_was_left_out();
     return chosen;
   }
 
@@ -176,7 +176,7 @@ class StackChooser {
 
   // Leaves out what is there twice, then parts what does not belong together: acquisitions, times, tube voltages,
   // kinds, kernels and thicknesses that share places or take turns. A stack that still has two different slices at one
-  // place comes back as it is; choose() refuses it.
+  // place comes back as it is; choose() rejects it.
   std::vector<std::vector<Candidate>> without_conflicts(std::vector<Candidate> cluster) {
     sort_along(cluster);
     drop_duplicates(cluster);
@@ -391,10 +391,10 @@ class StackChooser {
   }
 
   // One finding a reason, for slices that could have been taken for part of the stack.
-  void tell_what_was_left_out() {
-    static constexpr std::array kTold{code::other_size,        code::other_spacing,  code::other_orientation,
-                                      code::other_acquisition, code::duplicate_file, code::duplicate_slice};
-    for (const std::string_view kind : kTold) {
+  void report_what_was_left_out() {
+    static constexpr std::array kReported{code::other_size,        code::other_spacing,  code::other_orientation,
+                                          code::other_acquisition, code::duplicate_file, code::duplicate_slice};
+    for (const std::string_view kind : kReported) {
       std::vector<std::string> files;
       std::string why;
       for (const FileSetAside& f : verdict_.set_aside) {

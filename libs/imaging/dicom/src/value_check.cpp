@@ -79,7 +79,7 @@ void check_bone(Verdict& v, const std::vector<std::uint32_t>& histogram, double 
 }
 
 // What was done to the pixels' bits.
-void tell_bits(Verdict& v, const ValueCount& count) {
+void report_bits(Verdict& v, const ValueCount& count) {
   if (count.fractional) {
     v.add(code::values_rounded, Severity::info,
           "the HU scale is fractional; values are rounded to whole HU, at most 0.5 HU off");
@@ -110,7 +110,7 @@ void tell_bits(Verdict& v, const ValueCount& count) {
   }
 }
 
-void tell_padding(Verdict& v, const ValueCount& count, double pixels) {
+void report_padding(Verdict& v, const ValueCount& count, double pixels) {
   ValueCheck& c = v.values;
   c.padding_share = static_cast<double>(count.by_tag + count.found + count.ring) / pixels;
   c.padding_hu = count.padding_hu;
@@ -140,7 +140,7 @@ void tell_padding(Verdict& v, const ValueCount& count, double pixels) {
 }
 
 // What lies at the upper end, or above it.
-void tell_highest(Verdict& v, const ValueCount& count, double voxel_mm3, double pixels) {
+void report_highest(Verdict& v, const ValueCount& count, double voxel_mm3, double pixels) {
   ValueCheck& c = v.values;
   if (count.out_of_range > 0) {
     const bool many = static_cast<double>(count.out_of_range) > 1e-4 * pixels;
@@ -198,7 +198,7 @@ Scale judge_scale(ValueCheck& c, const Histogram& h, const ValueCount& count, do
   return s;
 }
 
-void tell_below_air(Verdict& v, const ValueCount& count) {
+void report_below_air(Verdict& v, const ValueCount& count) {
   const ValueCheck& c = v.values;
   if (count.below_air > 0) {
     v.add(code::below_air, c.plausible ? Severity::info : Severity::warning,
@@ -210,7 +210,7 @@ void tell_below_air(Verdict& v, const ValueCount& count) {
 }
 
 // What the values could be instead, with a word on what would put them right.
-void tell_other_scale(Verdict& v, const Histogram& h, const ValueCount& count, const Scale& scale, bool any_values) {
+void report_other_scale(Verdict& v, const Histogram& h, const ValueCount& count, const Scale& scale, bool any_values) {
   ValueCheck& c = v.values;
   const Severity grave = any_values ? Severity::warning : Severity::error;
   const std::string range = std::to_string(count.hu_min) + " to " + std::to_string(count.hu_max);
@@ -261,16 +261,16 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3, bool an
   c.hu_max = count.hu_max;
   c.rounding_error_hu = count.fractional ? 0.5 : 0;
   const double pixels = std::max<double>(1, static_cast<double>(count.pixels));
-  tell_bits(v, count);
-  tell_padding(v, count, pixels);
-  tell_highest(v, count, voxel_mm3, pixels);
+  report_bits(v, count);
+  report_padding(v, count, pixels);
+  report_highest(v, count, voxel_mm3, pixels);
   if (count.histogram.empty()) return;
   const Histogram h(count.histogram);
   const Scale scale = judge_scale(c, h, count, pixels);
   c.plausible = scale.plausible;
   check_bone(v, h.raw, h.total, voxel_mm3, pixels);
-  tell_below_air(v, count);
-  if (!c.plausible) return tell_other_scale(v, h, count, scale, any_values);
+  report_below_air(v, count);
+  if (!c.plausible) return report_other_scale(v, h, count, scale, any_values);
   // Outside the scan the scanner may have cut everything off at -1024.
   const bool cut_air = c.padding_share > 0.01 || count.hu_min <= kAirHu;
   if (!c.has_air && !cut_air)

@@ -37,7 +37,7 @@ std::string why(const Verdict& v) {
   return text;
 }
 
-// What a series with these files left out looks like; throws Refused.
+// What a series with these files left out looks like; throws Rejected.
 Placement place_or_refuse(const DicomSeries& series, const PlaceOptions& options,
                           const std::vector<FileSetAside>& excluded) {
   Placement p = place_slices(series.headers, options, excluded, [&](std::size_t a, std::size_t b) {

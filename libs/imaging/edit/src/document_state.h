@@ -22,9 +22,9 @@ namespace osteo::inline imaging {
 namespace edit_inside {
 
 // Zero, and taking no memory where nobody has written: pages come with the first write.
-class LabelWords {
+class LabelTexts {
  public:
-  explicit LabelWords(std::size_t voxels)
+  explicit LabelTexts(std::size_t voxels)
       : words_((voxels + 7) / 8), voxels_(voxels), at_(static_cast<std::uint64_t*>(std::calloc(words_ + 1, 8))) {
     if (!at_) throw std::bad_alloc();
   }
@@ -108,7 +108,7 @@ void each_run(const std::string& runs, std::size_t voxels, const Visit& visit) {
 }  // namespace edit_inside
 
 struct EditDocument::State {
-  using LabelWords = edit_inside::LabelWords;
+  using LabelTexts = edit_inside::LabelTexts;
   using Recorder = edit_inside::Recorder;
   using Structures = edit_inside::Structures;
   using Step = edit_inside::Step;
@@ -132,7 +132,7 @@ struct EditDocument::State {
 
   Image ct;
   BitMask bone;
-  LabelWords labels;
+  LabelTexts labels;
   Structures structures;
   std::array<Bounds, 256> bounds{};
   EditLimits limits;

@@ -348,7 +348,7 @@ RawVolume read_nrrd(const fs::path& path) {
     there += static_cast<double>(fs::file_size(f));
   }
   const bool packed = lower_case(header.get("encoding")) != "raw";
-  // A plain body that is short is told by how many bytes there are.
+  // A plain body that is short is reported by how many bytes there are.
   if (packed || size > (std::size_t{1} << 32))
     require_room(path, static_cast<double>(raw.frame.voxel_count()) * raw.layers, static_cast<double>(scalar),
                  files.empty() ? static_cast<double>(bytes.size() - *header.body) : there, packed);

@@ -11,7 +11,7 @@ namespace {
 using Names = std::vector<std::string>;
 using Variables = std::map<std::string, std::string>;
 
-// A pipeline file, part by part; whatever is wrong is told with its line.
+// A pipeline file, part by part; whatever is wrong is reported with its line.
 class PipelineReader {
  public:
   explicit PipelineReader(std::string_view text) : file_(text, "pipeline") {

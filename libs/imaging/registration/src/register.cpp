@@ -18,7 +18,7 @@ namespace reg = registration;
 constexpr double kMinOverlap = 0.25, kMaxInverseMm = 1, kManyOff = 1.3, kLike = 0.8;
 constexpr int kMinEdges = 300;
 // Thin slices of one head meet to 0.03 to 0.05 mm at half of all edges; from here on a mirror is tried, and believed
-// when it halves that. Trying it costs time and refuses no pair of one head: in a mirror that never fits better.
+// when it halves that. Trying it costs time and rejects no pair of one head: in a mirror that never fits better.
 constexpr double kDoubtMm = 0.06, kMirrorBetter = 0.5;
 // Of one head a tenth of all edges lies more than 0.07 (1 mm voxels) to 0.34 (5 mm slices) of the coarser scan's
 // spacing off; another head's do from here on.

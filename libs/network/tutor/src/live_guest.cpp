@@ -45,7 +45,7 @@ void LiveGuest::receive(std::span<const std::uint8_t> packet, std::int64_t now_u
   clock_ = {};
 }
 
-// A host that has begun anew: nothing of before counts.
+// A host that has begun again: nothing of before counts.
 void LiveGuest::take_session(std::uint64_t session) {
   if (session == session_) return;
   session_ = session;

@@ -17,13 +17,14 @@ HostThread::HostThread(LiveHost& host, Rehearsal& rehearsal, const std::string& 
       stream_(rehearsal.stream().add_reader(1 << 16)),
       socket_(address, port),
       port_(socket_.port()) {
-  rehearsal.look([&](const World& world, SceneReaders&) { hub_ = std::make_unique<ReaderHub>(stream_, world); });
-  hub_->add(host, false);
+  rehearsal.look(
+      [&](const World& world, SceneReaders&) { dispatcher_ = std::make_unique<ReaderDispatcher>(stream_, world); });
+  dispatcher_->add(host, false);
   thread_ = std::thread([this] { run(); });
 }
 
 void HostThread::run() {
-  bool told = false;
+  bool reported = false;
   while (!stop_) {
     socket_.wait_ms(1);
     UdpPeer from;
@@ -33,9 +34,9 @@ void HostThread::run() {
       host_.receive(from, *packet, steady_us());
     }
     const std::uint64_t ticks = ticks_;
-    hub_->drain();
-    if (ticks > 0 && !std::exchange(told, true)) {
-      hub_->end(ticks);
+    dispatcher_->drain();
+    if (ticks > 0 && !std::exchange(reported, true)) {
+      dispatcher_->end(ticks);
       host_.over(ticks);
     }
     for (const OutgoingPacket& o : host_.poll(steady_us())) socket_.send(o.to, o.bytes);

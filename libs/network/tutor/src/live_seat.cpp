@@ -59,7 +59,7 @@ class LiveSeat::Feeling final : public Reader {
   std::atomic<bool> runs_{false};
 };
 
-std::string joined_words(JoinRole role) {
+std::string joined_text(JoinRole role) {
   return role == JoinRole::trainee
              ? "live tutoring: the second hand is this trainee's, led by the instructor's, far away"
              : "live tutoring: watched from far away";

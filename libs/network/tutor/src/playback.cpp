@@ -55,7 +55,7 @@ void FadingGuide::end_trial() noexcept {
 }
 
 LessonClock::LessonClock(const Lesson& lesson, const PlaybackParams& params)
-    : lesson_(lesson), waits_(leads(params)), by_clock_(by_clock(params)), leash_mm_(params.tolerance_radius_mm) {
+    : lesson_(lesson), waits_(leads(params)), by_clock_(by_clock(params)), tolerance_mm_(params.tolerance_radius_mm) {
   target_ = from_floats(lesson.way.front().at_mm);
 }
 
@@ -91,7 +91,7 @@ void LessonClock::step(Vec3 hand_mm, double dt_s) noexcept {
       if (!begun_) target_ = hand_mm;
       const Vec3 left = start - target_;
       const double far = length(left), step = kApproachMmPerS * dt_s;
-      if (length(hand_mm - target_) <= std::max(leash_mm_, kStartMm))
+      if (length(hand_mm - target_) <= std::max(tolerance_mm_, kStartMm))
         target_ = far <= step ? start : target_ + left * (step / far);
       started_ = target_ == start && length(hand_mm - start) <= kStartMm;
     }
@@ -103,8 +103,8 @@ void LessonClock::step(Vec3 hand_mm, double dt_s) noexcept {
   const std::size_t last = lesson_.size() - 1;
   int go = 1;
   // Nobody is led on who is not there; in real time time waits without going back, and not at all where nothing leads.
-  if ((!by_clock_ || waits_) && length(hand_mm - target_) > leash_mm_)
-    go = !by_clock_ && behind_mm(hand_mm) >= 2 * leash_mm_ && sample_ > 0 ? -1 : 0;
+  if ((!by_clock_ || waits_) && length(hand_mm - target_) > tolerance_mm_)
+    go = !by_clock_ && behind_mm(hand_mm) >= 2 * tolerance_mm_ && sample_ > 0 ? -1 : 0;
   if (go > 0 && sample_ == last) {
     ended_ = true;
     return;

@@ -35,7 +35,7 @@ WireTimes ClockSync::stamp(std::int64_t now_us) const {
 
 void Playout::put(const FarSample& s, std::uint64_t now, bool newest) noexcept {
   const std::uint64_t back = any_ && s.tick < newest_ ? newest_ - s.tick : 0;
-  // What is far ahead of all before it begins anew; what is older than the buffer is of no use.
+  // What is far ahead of all before it begins again; what is older than the buffer is of no use.
   if (back >= kSlots / 2) return;
   slots_[s.tick % kSlots] = s;
   newest_ = std::max(newest_, s.tick);

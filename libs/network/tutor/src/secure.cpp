@@ -102,7 +102,7 @@ Pairing::Pairing(std::string_view tidy_code, const Nonce& guest, const Nonce& ho
 
 std::optional<PairKeys> Pairing::keys(const Share& theirs, bool i_am_host) const {
   std::array<std::uint8_t, kShare> shared;
-  // Refuses what is no point, and gives the neutral one back as a failure.
+  // Rejects what is no point, and gives the neutral one back as a failure.
   if (::crypto_scalarmult_ristretto255(shared.data(), secret_.data(), theirs.data()) != 0) return std::nullopt;
   PairKeys keys;
   const auto derive = [&](std::string_view label, std::array<std::uint8_t, 32>& out) {

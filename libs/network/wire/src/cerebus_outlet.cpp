@@ -73,7 +73,7 @@ class CerebusOutlet final : public WireOutlet {
     send();
     ++spikes_;
   }
-  [[nodiscard]] std::string told() const override {
+  [[nodiscard]] std::string reported() const override {
     return "Cerebus " + version_ + " to " + udp_name(peer_) + ": " + std::to_string(samples_) + " samples of " +
            std::to_string(channels_) + " channels, " + std::to_string(spikes_) + " spikes; " +
            std::to_string(dropped_) + " datagrams could not be sent";

@@ -67,7 +67,7 @@ class IgtlOutlet final : public WireOutlet {
   bool wait(std::size_t listeners, double most_s, const std::function<bool()>& stop) override {
     return server_.wait_for_clients(listeners, most_s, stop);
   }
-  [[nodiscard]] std::string told() const override {
+  [[nodiscard]] std::string reported() const override {
     const WireCounts c = server_.counts();
     return "OpenIGTLink on port " + std::to_string(server_.port()) + ": " + std::to_string(c.accepted) +
            " listeners, " + std::to_string(c.messages) + " messages sent, " + std::to_string(c.dropped) + " dropped" +

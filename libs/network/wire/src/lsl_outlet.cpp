@@ -118,7 +118,7 @@ class LslOutlet final : public WireOutlet {
     }
     return false;
   }
-  [[nodiscard]] std::string told() const override {
+  [[nodiscard]] std::string reported() const override {
     return "LSL: " + std::to_string(samples_) + " samples of " + std::to_string(channels_) + " channels";
   }
 

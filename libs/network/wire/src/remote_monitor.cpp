@@ -59,9 +59,9 @@ void RemoteMonitor::take(const IgtlMessage& m) {
       const auto event = event_in(*text);
       if (!event || event->channel >= static_cast<int>(monitor_->labels.size())) return;
       ++events_;
-      if (link_ && event->kind == MonitorEventKind::stimulator) link_->told(event->ma, event->search);
+      if (link_ && event->kind == MonitorEventKind::stimulator) link_->reported(event->ma, event->search);
       if (link_ && (event->kind == MonitorEventKind::threshold || event->kind == MonitorEventKind::no_threshold))
-        link_->told(0, false);
+        link_->reported(0, false);
       for (MonitorSink* const s : sinks_) s->event(*event);
     } else if (m.device == "SessionEnd") {
       ended_ = true;

@@ -203,13 +203,13 @@ std::vector<WireBytes> StimulatorLink::hear(const IgtlMessage& m) {
     }
     case Step::state: {
       const auto plain = channel_ ? channel_->open(body) : std::nullopt;
-      const auto told = plain ? setting_in(*plain) : std::nullopt;
-      if (!told) return {};
+      const auto reported = plain ? setting_in(*plain) : std::nullopt;
+      if (!reported) return {};
       const std::lock_guard lock(mutex_);
       state_.paired = true;
       state_.refused.clear();
-      state_.now = told->first;
-      state_.hands = std::clamp<std::uint32_t>(told->second, 1, 64);
+      state_.now = reported->first;
+      state_.hands = std::clamp<std::uint32_t>(reported->second, 1, 64);
       return {};
     }
     default:
@@ -222,7 +222,7 @@ std::optional<WireBytes> StimulatorLink::set(const StimulatorSetting& setting) {
   return message(Step::setting, channel_->seal(plain_of(within_range(setting), 0)));
 }
 
-void StimulatorLink::told(double current_ma, bool search) {
+void StimulatorLink::reported(double current_ma, bool search) {
   const std::lock_guard lock(mutex_);
   state_.now.current_ma = current_ma;
   state_.now.search = search;

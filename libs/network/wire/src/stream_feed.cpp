@@ -252,9 +252,9 @@ bool StreamFeed::wait_for(std::size_t listeners, double most_s, const std::funct
   return std::all_of(outlets_.begin(), outlets_.end(), [&](const auto& o) { return o->wait(listeners, most_s, stop); });
 }
 
-std::vector<std::string> StreamFeed::told() const {
+std::vector<std::string> StreamFeed::reported() const {
   std::vector<std::string> all;
-  for (const auto& o : outlets_) all.push_back(o->told());
+  for (const auto& o : outlets_) all.push_back(o->reported());
   return all;
 }
 

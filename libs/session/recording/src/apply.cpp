@@ -7,7 +7,7 @@ namespace osteo::inline session {
 World::Effect apply_action(const SceneAction& action, World& world) {
   World::Effect effect;
   if (!row_of(action).by_servo) effect = world.act(action);
-  world.tell(action);
+  world.notify(action);
   return effect;
 }
 
@@ -16,10 +16,10 @@ std::optional<VoxelChange> apply_change(const VoxelChange& change, World& world)
   if (b == nullptr) return std::nullopt;
   BrickGrid& bone = b->body->bone;
   const VoxelKey own = change.voxel - b->body->name_of(0);
-  const VoxelChange told{change.voxel, change.density, bone.value(own)};
+  const VoxelChange reported{change.voxel, change.density, bone.value(own)};
   bone.set(own, change.density);
-  world.tell({&told, 1});
-  return told;
+  world.notify({&reported, 1});
+  return reported;
 }
 
 void apply_part(const SessionPart& part, World& world) {

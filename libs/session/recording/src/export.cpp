@@ -112,10 +112,10 @@ class Rows {
 };
 
 // How a field of an action is told.
-enum class Told { number, kind, nobody_or_number };
-Told told(const RecordField& f) {
-  if (f.name == "action") return Told::kind;
-  return f.unit.find("4294967295") != std::string_view::npos ? Told::nobody_or_number : Told::number;
+enum class Reported { number, kind, nobody_or_number };
+Reported reported(const RecordField& f) {
+  if (f.name == "action") return Reported::kind;
+  return f.unit.find("4294967295") != std::string_view::npos ? Reported::nobody_or_number : Reported::number;
 }
 // Where an action has no plate or fixture its item says nothing.
 std::optional<std::uint32_t> who(const RecordField& f, const SceneAction& a) {
@@ -153,10 +153,10 @@ void csv(Rows rows, OutFile& ticks, OutFile& actions, OutFile& notes) {
       line = format_number(rows.seconds(a.tick));
       for (const RecordField& f : action_record_table().fields) {
         const auto id = who(f, a);
-        line += "," + (told(f) == Told::kind     ? rows.action_name(a)
-                       : told(f) == Told::number ? number(f, &a)
-                       : id                      ? std::to_string(*id)
-                                                 : "");
+        line += "," + (reported(f) == Reported::kind     ? rows.action_name(a)
+                       : reported(f) == Reported::number ? number(f, &a)
+                       : id                              ? std::to_string(*id)
+                                                         : "");
       }
       actions.write(line + "\n");
     }
@@ -187,8 +187,8 @@ void mcap(Rows rows, OutFile& out) {
   for (const RecordField& f : action_record_table().fields) {
     if (is_value(f)) continue;
     described(actions, f);
-    if (told(f) == Told::kind) actions["properties"][std::string(f.name)] = {{"type", "string"}};
-    if (told(f) == Told::nobody_or_number)
+    if (reported(f) == Reported::kind) actions["properties"][std::string(f.name)] = {{"type", "string"}};
+    if (reported(f) == Reported::nobody_or_number)
       actions["properties"][std::string(f.name)]["type"] = ordered_json::array({"integer", "null"});
   }
   actions["properties"]["values"] = {{"type", "array"}, {"items", {{"type", "number"}}}};
@@ -213,9 +213,9 @@ void mcap(Rows rows, OutFile& out) {
         if (is_value(f)) continue;
         const std::string name(f.name);
         const auto id = who(f, a);
-        if (told(f) == Told::kind)
+        if (reported(f) == Reported::kind)
           j[name] = rows.action_name(a);
-        else if (told(f) == Told::number)
+        else if (reported(f) == Reported::number)
           j[name] = static_cast<std::uint64_t>(value_of(f, &a));
         else
           j[name] = id ? ordered_json(*id) : ordered_json();
@@ -435,7 +435,7 @@ class Hdf5Session {
         c.text->add(rows.action_name(a));
       else if (c.real != nullptr)
         c.real->add(value);
-      else if (told(*c.field) == Told::nobody_or_number)
+      else if (reported(*c.field) == Reported::nobody_or_number)
         c.integer->add(who(*c.field, a) ? static_cast<std::int64_t>(value) : -1);
       else
         c.integer->add(static_cast<std::int64_t>(value));
@@ -496,7 +496,7 @@ class Hdf5Session {
   std::vector<Field> columns_of_actions() {
     std::vector<Field> columns;
     for (const RecordField& f : action_record_table().fields)
-      columns.push_back(column_of("/actions", f, told(f) == Told::kind));
+      columns.push_back(column_of("/actions", f, reported(f) == Reported::kind));
     return columns;
   }
 

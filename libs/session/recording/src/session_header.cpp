@@ -256,7 +256,7 @@ std::string header_json(const SessionHeader& h) {
   j["hands"] = h.haptics.hands();
   j["dust"] = h.dust;
   if (h.dust) j["dust_model"] = h.dust_model;
-  // Where an older session goes on under its own settings, it is told by them.
+  // Where an older session goes on under its own settings, it is reported by them.
   const int contact = h.haptics.params.guard.law == 1 ? kForgetfulGuard : h.kernels.contact;
   j["kernels"] = {{"burrs", h.kernels.burrs}, {"contact", contact}, {"scene", h.kernels.scene}};
   for (const RecordTable* const t : {&tick_table(), &change_table(), &action_record_table()})

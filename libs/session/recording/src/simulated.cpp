@@ -2,7 +2,7 @@
 
 namespace osteo::inline session {
 
-std::string simulated_words(const SessionReader& session) {
+std::string simulated_text(const SessionReader& session) {
   SessionReader::Parts parts = session.parts();
   // It is the first of all notes, before the first tick: what comes behind a second has none.
   while (const SessionPart* part = parts.next()) {

@@ -177,7 +177,7 @@ std::vector<std::string> foreign_files(const fs::path& folder, const std::vector
     for (const auto& entry : fs::directory_iterator(folder)) {
       const std::string name = entry.path().filename().string();
       if (name == kNext || name.starts_with(".osteo-tmp-")) continue;
-      // Outputs lie beside their records; the verdict on a refused scan, a damaged manifest and the record of a lost
+      // Outputs lie beside their records; the verdict on a rejected scan, a damaged manifest and the record of a lost
       // output stand alone.
       bool made = fs::exists(provenance_path(entry.path()));
       for (const auto& [ending, word] : {std::pair{"import.json", "\"osteotome_verdict\""},

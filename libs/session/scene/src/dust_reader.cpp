@@ -143,10 +143,10 @@ void DustReader::tick(const TickRecord& tick, std::span<const VoxelChange> chang
 void DustReader::resync(const World& world) {
   for (; !pending_.empty(); ++applied_early_) apply_next();
   // It was not told of pieces that came or went: it joined behind them, and where their bone is now is not dust.
-  const bool told =
+  const bool reported =
       bones_.size() == world.bodies().size() &&
       std::all_of(bones_.begin(), bones_.end(), [&](const auto& b) { return world.find(b.first) != nullptr; });
-  if (!told) return begin(world);
+  if (!reported) return begin(world);
   std::vector<VoxelChange> changes;
   for (const auto& [id, d] : bones_) {
     const BrickGrid& bone = world.find(id)->body->bone;

@@ -421,7 +421,7 @@ std::size_t HeatReader::warm_bricks() const {
   return sum;
 }
 
-std::vector<std::string> told(const HeatReader& heat, const StructureMap* structures) {
+std::vector<std::string> reported(const HeatReader& heat, const StructureMap* structures) {
   const auto tenths = [](double x) { return format_number(std::round(x * 10) / 10); };
   const HeatLedger l = heat.ledger();
   std::vector<std::string> lines{"warmest bone " + tenths(heat.hottest_c()) + " C; " + tenths(l.added_j) +

@@ -97,7 +97,7 @@ void MonitorReader::action(const SceneAction& action) {
     if (pending_ > 0) --pending_;
   }
   if (!row_of(action).by_servo) world_->act(action);
-  world_->tell(action);
+  world_->notify(action);
 }
 
 void MonitorReader::tick(const TickRecord& record, std::span<const VoxelChange> changes) {
@@ -113,7 +113,7 @@ void MonitorReader::tick(const TickRecord& record, std::span<const VoxelChange> 
       e.seconds = static_cast<double>(record.tick - next_tick_) / rate_hz_;
       if (next_tick_ > step_tick_) step(next_tick_);
       e.sample = sample_;
-      tell(e);
+      notify(e);
       step_tick_ = record.tick;
       sample_ = sample_of(record.tick);
     }
@@ -126,7 +126,7 @@ void MonitorReader::tick(const TickRecord& record, std::span<const VoxelChange> 
       if (const PlacedBody* const b = world_->owner(c.voxel))
         b->body->bone.set(c.voxel - b->body->name_of(0), c.density);
     }
-    world_->tell(changes);
+    world_->notify(changes);
   }
   if (record.hand >= kMaxHands) return;
   Hand& hand = hands_[record.hand];
@@ -163,7 +163,7 @@ void MonitorReader::take_settings() {
     e.pulses_per_s = s.pulses_per_s;
     e.width_ms = s.width_ms;
     e.search = s.search;
-    tell(e);
+    notify(e);
   }
 }
 
@@ -237,7 +237,7 @@ void MonitorReader::warm_up() {
   }
 }
 
-void MonitorReader::tell(MonitorEvent event) {
+void MonitorReader::notify(MonitorEvent event) {
   for (MonitorSink* const s : sinks_) s->event(event);
 }
 
@@ -262,7 +262,7 @@ void MonitorReader::pulse(std::uint64_t first, std::size_t samples) {
   e.kind = MonitorEventKind::stimulus;
   e.sample = *at;
   e.ma = ma;
-  tell(e);
+  notify(e);
 }
 
 void MonitorReader::step(std::uint64_t until_tick) {
@@ -301,7 +301,7 @@ void MonitorReader::step(std::uint64_t until_tick) {
     e.cause = happening.cause;
     e.integrity = happening.integrity;
     e.to_distal_mm = wiring_.courses[happening.nerve].points[happening.point].to_distal_mm;
-    tell(e);
+    notify(e);
   }
   pulse(sample_, samples);
   for (Hand& hand : hands_) {
@@ -323,7 +323,7 @@ void MonitorReader::step(std::uint64_t until_tick) {
       e.kind = found->threshold_ma ? MonitorEventKind::threshold : MonitorEventKind::no_threshold;
       e.sample = end;
       e.ma = found->threshold_ma.value_or(StimulatorSetting::kMaxMa);
-      tell(e);
+      notify(e);
     }
   }
   sample_ = end;
@@ -334,7 +334,7 @@ void MonitorReader::step(std::uint64_t until_tick) {
 void MonitorReader::end() {
   if (begun_ && next_tick_ > step_tick_) step(next_tick_);
   detector_.end();
-  for (const MonitorEvent& e : detector_.events()) tell(e);
+  for (const MonitorEvent& e : detector_.events()) notify(e);
 }
 
 std::string stimulator_note(const MonitorEvent& e) {

@@ -73,7 +73,7 @@ bool Operation::needs_hold(const SceneAction& action) const {
   try {
     change_setting(next.params, action.item, action.values[0]);
   } catch (const Error&) {
-    return false;  // apply() refuses it
+    return false;  // apply() rejects it
   }
   return scene_->needs_bone_held(next);
 }

@@ -6,10 +6,10 @@
 
 namespace osteo::inline session {
 
-ReaderHub::ReaderHub(StreamReader& from, const World& world)
+ReaderDispatcher::ReaderDispatcher(StreamReader& from, const World& world)
     : from_(from), world_(world), ticks_(1024), changes_(1 << 16) {}
 
-void ReaderHub::add(Reader& reader, bool resync) {
+void ReaderDispatcher::add(Reader& reader, bool resync) {
   readers_.push_back(&reader);
   if (!resync) return;
   reader.resync(world_);
@@ -17,21 +17,21 @@ void ReaderHub::add(Reader& reader, bool resync) {
   reader.update();
 }
 
-void ReaderHub::remove(Reader& reader) {
+void ReaderDispatcher::remove(Reader& reader) {
   std::erase(readers_, &reader);
 }
 
-std::size_t ReaderHub::take_actions() {
+std::size_t ReaderDispatcher::take_actions() {
   for (SceneAction a; from_.actions.pop({&a, 1}) == 1;) actions_.push_back(a);
   return actions_.size();
 }
 
-void ReaderHub::tell(const SceneAction& action) {
+void ReaderDispatcher::notify(const SceneAction& action) {
   if (row_of(action).moves_dust) standing_[action.kind] = action;
   for (Reader* const r : readers_) r->action(action);
 }
 
-std::size_t ReaderHub::drain(std::optional<double> about_ms) {
+std::size_t ReaderDispatcher::drain(std::optional<double> about_ms) {
   // So few that one of them may take its time.
   const std::size_t at_once = about_ms ? 16 * kMaxHands : ticks_.size();
   const auto begin = std::chrono::steady_clock::now();
@@ -59,7 +59,7 @@ std::size_t ReaderHub::drain(std::optional<double> about_ms) {
       // All hands of a tick are there or none.
       next_tick_ = std::max(*next_tick_, record.tick + 1);
       latest_[record.hand] = record;
-      for (; !actions_.empty() && actions_.front().tick <= record.tick; actions_.pop_front()) tell(actions_.front());
+      for (; !actions_.empty() && actions_.front().tick <= record.tick; actions_.pop_front()) notify(actions_.front());
       const std::size_t changed = std::min<std::size_t>(record.voxels_changed, got - used);
       for (Reader* const r : readers_) r->tick(record, {changes_.data() + used, changed});
       used += changed;
@@ -72,27 +72,27 @@ std::size_t ReaderHub::drain(std::optional<double> about_ms) {
     }
   }
   due = std::min(due, actions_.size());
-  for (std::size_t told = 0; told < due; ++told, actions_.pop_front()) tell(actions_.front());
+  for (std::size_t reported = 0; reported < due; ++reported, actions_.pop_front()) notify(actions_.front());
   const std::uint64_t dropped = from_.actions_dropped.load(std::memory_order_relaxed);
   lost = lost || dropped > std::exchange(actions_dropped_, dropped);
   if (lost || total > 0 || due > 0) resync_and_update(lost);
   return total;
 }
 
-void ReaderHub::resync_and_update(bool lost) {
+void ReaderDispatcher::resync_and_update(bool lost) {
   for (Reader* const r : readers_) {
     if (lost) r->resync(world_);
     r->update();
   }
 }
 
-void ReaderHub::scene_changed(const World::Effect& effect) {
+void ReaderDispatcher::scene_changed(const World::Effect& effect) {
   for (Reader* const r : readers_) r->scene_changed(world_, effect);
 }
 
-void ReaderHub::end(std::uint64_t ticks) {
+void ReaderDispatcher::end(std::uint64_t ticks) {
   take_actions();
-  for (; !actions_.empty(); actions_.pop_front()) tell(actions_.front());
+  for (; !actions_.empty(); actions_.pop_front()) notify(actions_.front());
   const std::uint64_t first = from_.first_tick.load(std::memory_order_relaxed);
   const std::uint64_t next = next_tick_.value_or(first == StreamReader::kNone ? ticks : first);
   const bool lost = ticks > next;

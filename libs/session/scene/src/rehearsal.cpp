@@ -48,7 +48,7 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
       finest_voxel_mm_(world.finest_voxel_mm()),
       bone_mm3_(bone_mm3_of(world)),
       operation_(std::move(world), options.haptics, options.anatomy, pointers(devices_), stream_, options.rate_hz),
-      hub_(stream_.add_reader(), operation_.world()),
+      dispatcher_(stream_.add_reader(), operation_.world()),
       keeper_end_(stream_.add_reader(Recorder::kTickCapacity)),
       keeper_(keeper_end_, operation_.world()),
       timed_(options.actions.begin(), options.actions.end()) {
@@ -64,11 +64,11 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
   keeper_.add(operation_.strokes(), false);
   readers_ =
       std::make_unique<SceneReaders>(operation_.world(), options_.follow, options_.rate_hz, context, structures());
-  readers_->add_to(hub_, &keeper_);
+  readers_->add_to(dispatcher_, &keeper_);
   pieces_ = static_cast<int>(readers_->large_pieces().size());
   if (options_.soft) {
     options_.soft->meet(&operation_.world());
-    hub_.add(*options_.soft, false);
+    dispatcher_.add(*options_.soft, false);
   }
 }
 
@@ -132,9 +132,9 @@ void Rehearsal::catch_up() {
 std::size_t Rehearsal::drain(std::optional<double> about_ms) {
   drain_keeper();
   operation_.take_strokes();
-  const std::size_t total = hub_.drain(about_ms);
+  const std::size_t total = dispatcher_.drain(about_ms);
   if (total == 0) return 0;
-  for (std::size_t hand = 0; hand < devices_.size(); ++hand) latest_[hand].store(hub_.latest(hand));
+  for (std::size_t hand = 0; hand < devices_.size(); ++hand) latest_[hand].store(dispatcher_.latest(hand));
   if (options_.follow.pieces) pieces_ = static_cast<int>(readers_->large_pieces().size());
   return total;
 }
@@ -165,12 +165,12 @@ void Rehearsal::add_reader(Reader& reader) {
   // What was done to the scene last is told to the others first: whoever joins sees the scene behind it.
   while (!operation_.taken() && running()) std::this_thread::sleep_for(std::chrono::microseconds(100));
   drain();
-  hub_.add(reader);
+  dispatcher_.add(reader);
 }
 
 void Rehearsal::remove_reader(Reader& reader) {
   const std::lock_guard lock(mutex_);
-  hub_.remove(reader);
+  dispatcher_.remove(reader);
 }
 
 // Under the lock unless live, which takes it. False: the servo had ended before.
@@ -179,7 +179,7 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
     return readers_->pieces ? readers_->pieces->components(body) : nullptr;
   };
   const Operation::Done done = [&](const World::Effect& e) {
-    hub_.scene_changed(e);
+    dispatcher_.scene_changed(e);
     const std::lock_guard lock(keeper_mutex_);
     keeper_.scene_changed(e);
   };
@@ -224,13 +224,13 @@ void Rehearsal::look_at_cut(const SceneAction& action, const World::Effect& effe
   const std::optional<SawCut> blade = blade_at_work(operation_.world(), action.saw_cut(), voxels);
   if (!blade) return;
   const std::vector<StructureCut> cuts = structures_cut(*structures(), *blade);
-  const std::string told = told_structures_cut(*structures(), cuts);
-  if (told.empty()) return;
+  const std::string reported = reported_structures_cut(*structures(), cuts);
+  if (reported.empty()) return;
   const std::lock_guard lock(queue_mutex_);
   for (const StructureCut& c : cuts) {
     if (c.mm3 > 0) structure_cuts_.push_back({operation_.ticks(), c});
   }
-  refused_ = "the saw cut through " + told;
+  refused_ = "the saw cut through " + reported;
 }
 
 // Soft tissue a hundredth of a second further, where the tools are now.
@@ -240,7 +240,7 @@ void Rehearsal::move_soft() {
   soft_tick_ = tick + static_cast<std::uint64_t>(std::max(1.0, options_.rate_hz / SoftBody::kUpdatesPerS));
   std::vector<SoftTool> tools;
   for (std::size_t hand = 0; hand < devices_.size(); ++hand) {
-    const TickRecord& now = hub_.latest(hand);
+    const TickRecord& now = dispatcher_.latest(hand);
     tools.push_back({from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool,
                      now.speed_rpm > 0});
   }
@@ -301,7 +301,7 @@ std::string Rehearsal::trouble() const {
   return {};
 }
 
-// What it throws is told by stop(); a scene that nobody follows is no use to a hand, so the servo ends too.
+// What it throws is reported by stop(); a scene that nobody follows is no use to a hand, so the servo ends too.
 void Rehearsal::follow() {
   ::pthread_setname_np(::pthread_self(), "osteo-follower");
   try {
@@ -447,7 +447,7 @@ RehearsalSummary Rehearsal::finish() {
         operation_.finish();
         drain();
       }
-      hub_.end(operation_.ticks());
+      dispatcher_.end(operation_.ticks());
       const std::lock_guard keeper_lock(keeper_mutex_);
       keeper_.end(operation_.ticks());
       s.surface_hash = readers_->surface_hash();
@@ -455,7 +455,7 @@ RehearsalSummary Rehearsal::finish() {
       if (readers_->dust) {
         const Dust& dust = readers_->dust->dust();
         s.dust = dust.totals();
-        if (hub_.ticks_lost() == 0)
+        if (dispatcher_.ticks_lost() == 0)
           dust_hash = dust.hash();  // else the same dust, but later: a replay's lies elsewhere
       }
     } catch (...) {
@@ -475,7 +475,7 @@ RehearsalSummary Rehearsal::finish() {
     const double gone = bone_mm3_ - bone_mm3_of(operation_.world());
     s.gone_mm3 = gone > 1e-9 * bone_mm3_ ? gone : 0;
   }
-  s.ticks_not_followed = hub_.ticks_lost();
+  s.ticks_not_followed = dispatcher_.ticks_lost();
   if (strokes_lost_) s.warnings.emplace_back(kUndoLost);
   s.voxel_mm3 = voxel_mm3_;
   s.bodies = operation_.world().bodies().size();

@@ -52,12 +52,12 @@ class Replaying {
         hands_(session.header().haptics.hands()),
         reader_(stream_.add_reader()),
         operation_(std::move(start), session.header().haptics, anatomy, devices(), stream_, session.header().rate_hz),
-        hub_(stream_.add_reader(), operation_.world()),
+        dispatcher_(stream_.add_reader(), operation_.world()),
         // Dust follows from the stream, so it has to come out the same as well.
         readers_(operation_.world(), {false, false, session.header().dust}, session.header().rate_hz, context) {
-    hub_.add(operation_.strokes(), false);
-    readers_.add_to(hub_);
-    for (Reader* const r : readers) hub_.add(*r);
+    dispatcher_.add(operation_.strokes(), false);
+    readers_.add_to(dispatcher_);
+    for (Reader* const r : readers) dispatcher_.add(*r);
   }
 
   void take(const SessionPart& part) {
@@ -141,8 +141,8 @@ class Replaying {
       }
       return;
     }
-    hub_.drain();
-    const World::Effect effect = operation_.act(action, [&](const World::Effect& e) { hub_.scene_changed(e); });
+    dispatcher_.drain();
+    const World::Effect effect = operation_.act(action, [&](const World::Effect& e) { dispatcher_.scene_changed(e); });
     if (!effect.done)
       differ("at tick " + std::to_string(action.tick) + " '" + std::string(name_of(action)) +
              "' could not be done: " + effect.message);
@@ -154,8 +154,8 @@ class Replaying {
       differ("a stroke ended at tick " + std::to_string(own_.front().second) + " that was not recorded");
   }
   void end_readers() {
-    hub_.drain();
-    hub_.end(result_.ticks_repeated);
+    dispatcher_.drain();
+    dispatcher_.end(result_.ticks_repeated);
   }
 
   // The records of all hands of a tick.
@@ -163,7 +163,7 @@ class Replaying {
     if (recorded.front().tick % 256 == 0) {
       const double ticks = static_cast<double>(session_.outline().tick_records) / static_cast<double>(hands_.size());
       context_.progress(0.9 * static_cast<double>(result_.ticks) / ticks, "replay");
-      hub_.drain();
+      dispatcher_.drain();
     }
     // At most one a tick is done; the servo's own come with its step.
     if (!actions_.empty() && actions_.front().tick <= recorded.front().tick && !row_of(actions_.front()).by_servo)
@@ -222,7 +222,7 @@ class Replaying {
   Stream stream_;
   StreamReader& reader_;
   Operation operation_;
-  ReaderHub hub_;
+  ReaderDispatcher dispatcher_;
   SceneReaders readers_;
   std::deque<SceneAction> actions_;  // whose tick has not come
   std::deque<std::pair<std::uint32_t, std::uint64_t>>

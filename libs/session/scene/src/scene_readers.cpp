@@ -10,12 +10,12 @@ SceneReaders::SceneReaders(const World& world, const ReaderList& list, double ra
   if (list.heat) heat = std::make_unique<HeatReader>(world, structures, rate_hz);
 }
 
-void SceneReaders::add_to(ReaderHub& hub, ReaderHub* counts) {
+void SceneReaders::add_to(ReaderDispatcher& dispatcher, ReaderDispatcher* counts) {
   for (Reader* const r : {static_cast<Reader*>(surface.get()), static_cast<Reader*>(pieces.get()),
                           static_cast<Reader*>(dust.get()), static_cast<Reader*>(heat.get())}) {
-    if (r != nullptr) hub.add(*r, false);
+    if (r != nullptr) dispatcher.add(*r, false);
   }
-  (counts != nullptr ? *counts : hub).add(tools, false);
+  (counts != nullptr ? *counts : dispatcher).add(tools, false);
 }
 
 std::vector<LiveComponents::Component> SceneReaders::large_pieces() const {

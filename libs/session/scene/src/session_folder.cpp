@@ -259,7 +259,7 @@ std::string hardness_json(const Anatomy& anatomy) {
   return hardness_of(anatomy).dump();
 }
 
-std::string told_hardness(const Anatomy& anatomy) {
+std::string reported_hardness(const Anatomy& anatomy) {
   if (!anatomy.hardness) return "all bone resists the burr alike";
   const HardnessLaw& law = anatomy.hardness->law();
   const double half = law.zero_hu + (law.cortical_hu - law.zero_hu) / 2;

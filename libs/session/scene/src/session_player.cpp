@@ -20,7 +20,7 @@ SessionPlayer::SessionPlayer(const SessionReader& session, World begin, const Co
   const auto every = static_cast<std::uint64_t>(std::max(1.0, std::round(rate_hz_ / kHandRateHz)));
   const Gap* const known_until = session.outline().bone_known_until();
   const double all = static_cast<double>(std::max<std::uint64_t>(1, session.outline().tick_records));
-  double told = 0;
+  double reported = 0;
   TickRecord last;
   SessionScene use({false, false, false}, rate_hz_, context);  // of hands alone
   use.resync(begin_);
@@ -37,8 +37,8 @@ SessionPlayer::SessionPlayer(const SessionReader& session, World begin, const Co
       if (use.in_use(t.hand)) hands_[t.hand].push_back(t);
     }
     if (!p->ticks.empty()) last = p->ticks.back();
-    told += static_cast<double>(p->ticks.size());
-    context.progress(std::min(1.0, told / all), "reading the session");
+    reported += static_cast<double>(p->ticks.size());
+    context.progress(std::min(1.0, reported / all), "reading the session");
     if (p->actions.empty() && p->changes.empty()) continue;
     Step step;
     step.actions.assign(p->actions.begin(), p->actions.end());
@@ -62,7 +62,7 @@ SessionPlayer::SessionPlayer(const SessionReader& session, World begin, const Co
   now_s_ = end_s_;
 }
 
-void SessionPlayer::tell(const Step& step) {
+void SessionPlayer::notify(const Step& step) {
   for (const SceneAction& a : step.actions) scene_.action(a);
   scene_.tick(step.last, step.changes);
 }
@@ -73,7 +73,7 @@ void SessionPlayer::go_to_step(std::size_t steps) {
   if (std::ranges::any_of(between, &Step::remakes)) {
     // What it does follows from all that was told before it.
     scene_.resync(begin_);
-    for (std::size_t n = 0; n < steps; ++n) tell(steps_[n]);
+    for (std::size_t n = 0; n < steps; ++n) notify(steps_[n]);
   } else if (steps > done_) {
     for (const Step& s : between) scene_.set(s.changes);
   } else {

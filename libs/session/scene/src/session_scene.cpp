@@ -13,7 +13,7 @@ void SessionScene::resync(const World& world) {
   world_.emplace(world.copy());
   removed_mm3_ = 0;
   in_use_ = {};
-  if (!again || follow_.dust) {  // dust begins anew
+  if (!again || follow_.dust) {  // dust begins again
     readers_ = std::make_unique<SceneReaders>(*world_, follow_, rate_hz_, context_);
     return;
   }
@@ -44,17 +44,17 @@ void SessionScene::set(std::span<const VoxelChange> changes) {
 }
 
 void SessionScene::tick(const TickRecord& record, std::span<const VoxelChange> changes) {
-  std::vector<VoxelChange>& told = told_changes_;
-  told.clear();
+  std::vector<VoxelChange>& reported = reported_changes_;
+  reported.clear();
   for (const VoxelChange& c : changes) {
     const auto applied = apply_change(c, *world_);  // with the density before: files do not keep it
     if (!applied) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
-    told.push_back(*applied);
+    reported.push_back(*applied);
   }
-  if (readers_->surface) readers_->surface->tick({}, told);
-  if (readers_->pieces) readers_->pieces->tick(record, told);
-  if (readers_->dust) readers_->dust->tick(record, told);
-  readers_->tools.tick(record, told);
+  if (readers_->surface) readers_->surface->tick({}, reported);
+  if (readers_->pieces) readers_->pieces->tick(record, reported);
+  if (readers_->dust) readers_->dust->tick(record, reported);
+  readers_->tools.tick(record, reported);
   if (record.hand < latest_.size()) {
     latest_[record.hand] = record;
     in_use_[record.hand] = in_use_[record.hand] || record.hand == 0 || record.device.pedal > 0 || record.immersed > 0;
@@ -67,14 +67,14 @@ void SessionScene::refresh() {
   if (readers_->pieces) readers_->pieces->update();
 }
 
-void tell_recorded(const SessionReader& session, const World& begin, Reader& reader, const Context& context) {
+void report_recorded(const SessionReader& session, const World& begin, Reader& reader, const Context& context) {
   if (begin.hash() != session.header().bone_hash)
     throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's",
                 "give the case it was recorded on, unchanged");
   reader.resync(begin);
   const Gap* const known_until = session.outline().bone_known_until();
   const double all = static_cast<double>(std::max<std::uint64_t>(1, session.outline().tick_records));
-  double told = 0;
+  double reported = 0;
   TickRecord last;
   auto parts = session.parts();
   while (const SessionPart* const p = parts.next()) {
@@ -88,8 +88,8 @@ void tell_recorded(const SessionReader& session, const World& begin, Reader& rea
     } else if (!p->changes.empty()) {
       reader.tick(last, p->changes);  // of ticks that are not there: with the last that is
     }
-    told += static_cast<double>(p->ticks.size());
-    context.progress(std::min(1.0, told / all), "reading the session");
+    reported += static_cast<double>(p->ticks.size());
+    context.progress(std::min(1.0, reported / all), "reading the session");
   }
   reader.update();
 }

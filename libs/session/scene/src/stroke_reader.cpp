@@ -34,17 +34,17 @@ void StrokeReader::tick(const TickRecord& /*record*/, std::span<const VoxelChang
   }
 }
 
-void StrokeReader::tell_to(World& world) {
+void StrokeReader::report_to(World& world) {
   const std::lock_guard lock(mutex_);
   for (const Part& p : std::exchange(parts_, {})) {
-    world.tell(p.changes);
+    world.notify(p.changes);
     if (p.action) {
-      world.tell(*p.action);
+      world.notify(*p.action);
     } else {
       world.forget();
     }
   }
-  world.tell(changes_);
+  world.notify(changes_);
   changes_.clear();
   at_.clear();
 }

@@ -192,7 +192,7 @@ bool Dust::rests(Brick& brick, std::uint32_t at) const {
   return true;
 }
 
-// What stands and hangs together is filled again from below, to one height; what it carries is mixed.
+// What stands and is connected is filled again from below, to one height; what it carries is mixed.
 void Dust::level_pools() {
   struct Filled {
     Brick* brick;

@@ -185,7 +185,7 @@ std::vector<StructureCut> structures_cut(const StructureMap& map, const SawCut& 
   return cuts;
 }
 
-std::string told_structures_cut(const StructureMap& map, std::span<const StructureCut> cuts) {
+std::string reported_structures_cut(const StructureMap& map, std::span<const StructureCut> cuts) {
   std::vector<std::string> parts;
   for (const StructureCut& c : cuts) {
     if (c.mm3 <= 0) continue;

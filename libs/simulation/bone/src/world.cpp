@@ -162,11 +162,11 @@ std::size_t World::undo_steps() const {
   std::size_t steps = 0;
   // The stroke that goes on stands between those that were told and the others.
   for (std::size_t d = 0; d < done_.size(); ++d)
-    steps += d > 0 && (d != told_ || stroke_.empty()) && goes_on(done_[d - 1], done_[d]) ? 0 : 1;
+    steps += d > 0 && (d != reported_ || stroke_.empty()) && goes_on(done_[d - 1], done_[d]) ? 0 : 1;
   return steps + (stroke_.empty() || missed_ ? 0 : 1);
 }
 
-void World::tell(std::span<const VoxelChange> changes) {
+void World::notify(std::span<const VoxelChange> changes) {
   for (const VoxelChange& c : changes) {
     const auto [known, is_new] = in_stroke_.try_emplace(c.voxel, static_cast<std::uint32_t>(stroke_.size()));
     if (is_new) {
@@ -187,8 +187,8 @@ void World::end_stroke() {
   Done stroke;
   stroke.kind = ActionKind::stroke;
   stroke.drilled = std::move(drilled);
-  done_.insert(done_.begin() + static_cast<std::ptrdiff_t>(told_), std::move(stroke));
-  ++told_;
+  done_.insert(done_.begin() + static_cast<std::ptrdiff_t>(reported_), std::move(stroke));
+  ++reported_;
   // With what came before it: undo leaves nothing out on its way back.
   while (stroke_bytes_ > kMaxStrokeBytes) {
     const auto oldest =
@@ -196,38 +196,38 @@ void World::end_stroke() {
     const auto steps = oldest + 1 - done_.begin();
     stroke_bytes_ -= oldest->drilled.size() * sizeof(Change);
     done_.erase(done_.begin(), oldest + 1);
-    told_ -= static_cast<std::size_t>(steps);
+    reported_ -= static_cast<std::size_t>(steps);
     steps_forgotten_ += static_cast<std::uint64_t>(steps);
   }
 }
 
-void World::tell(const SceneAction& action) {
+void World::notify(const SceneAction& action) {
   if (action.is(ActionKind::stroke)) return end_stroke();
   const bool is_step = row_of(action).changes_world && !action.is(ActionKind::undo);
-  if (!is_step || told_ == done_.size()) return;
+  if (!is_step || reported_ == done_.size()) return;
   if (missed_) {
     // Whatever was missed may belong to the same drag: then only its end is known.
     const bool may_go_on = action.is(ActionKind::move) || action.is(ActionKind::open);
     in_stroke_.clear();
     stroke_.clear();
     if (may_go_on) {
-      done_.erase(done_.begin() + static_cast<std::ptrdiff_t>(told_));
+      done_.erase(done_.begin() + static_cast<std::ptrdiff_t>(reported_));
       return;
     }
     missed_ = false;
   }
   end_stroke();
-  if (told_ > 0 && goes_on(done_[told_ - 1], done_[told_])) {
-    done_.erase(done_.begin() + static_cast<std::ptrdiff_t>(told_));  // where it began is known
+  if (reported_ > 0 && goes_on(done_[reported_ - 1], done_[reported_])) {
+    done_.erase(done_.begin() + static_cast<std::ptrdiff_t>(reported_));  // where it began is known
   } else {
-    ++told_;
+    ++reported_;
   }
 }
 
 void World::forget() {
-  steps_forgotten_ += told_ + (stroke_.empty() ? 0 : 1);
-  done_.erase(done_.begin(), done_.begin() + static_cast<std::ptrdiff_t>(told_));
-  told_ = 0;
+  steps_forgotten_ += reported_ + (stroke_.empty() ? 0 : 1);
+  done_.erase(done_.begin(), done_.begin() + static_cast<std::ptrdiff_t>(reported_));
+  reported_ = 0;
   stroke_bytes_ = 0;
   in_stroke_.clear();
   stroke_.clear();
@@ -464,7 +464,7 @@ World::Effect World::undo() {
   while (done_.size() > 1 && goes_on(done_[done_.size() - 2], done_.back())) done_.pop_back();  // where it began
   const Done last = std::move(done_.back());
   done_.pop_back();
-  told_ = std::min(told_, done_.size());
+  reported_ = std::min(reported_, done_.size());
   stroke_bytes_ -= last.drilled.size() * sizeof(Change);
   // New grids in place of those that get density back; what does not change they share with the old.
   struct Renewed {

@@ -20,7 +20,7 @@ HidLink::~HidLink() {
 
 void HidLink::run() {
   ::pthread_setname_np(::pthread_self(), "osteo-hid");
-  // Below the servo, above everything that may wait. Refused without the right: then it runs as it can.
+  // Below the servo, above everything that may wait. Rejected without the right: then it runs as it can.
   sched_param priority{};
   priority.sched_priority = 70;
   ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &priority);

@@ -208,18 +208,18 @@ MeasuredDevice measure_device(Device& device, double dt_s, const std::function<v
     const double surely = std::max(0.0, damping) + 2 * std::sqrt(damping_spread / n);
     m.traits.damping_n_s_per_m = std::min(by_driver.damping_n_s_per_m, surely);
     m.traits.encoder_mm = std::max(by_driver.encoder_mm, loop.step_mm());
-    m.told = "the device answers after " + ms(m.traits.delay_s) + " (its driver says " + ms(by_driver.delay_s) +
-             "), damps by " + format_number(std::round(100 * m.traits.damping_n_s_per_m) / 100) +
-             " N s/m at least and reports steps of " + format_number(std::round(1e4 * m.traits.encoder_mm) / 10) +
-             " um";
+    m.reported = "the device answers after " + ms(m.traits.delay_s) + " (its driver says " + ms(by_driver.delay_s) +
+                 "), damps by " + format_number(std::round(100 * m.traits.damping_n_s_per_m) / 100) +
+                 " N s/m at least and reports steps of " + format_number(std::round(1e4 * m.traits.encoder_mm) / 10) +
+                 " um";
   } else {
     m.traits.delay_s += kUnmeasuredDelayS;
     const char* const why = loop.silent()               ? "it is silent"
                             : seen.empty()              ? "pulses do not move it, or it is held or trembles"
                             : seen.size() < kPulses / 2 ? "most pulses do not show"
                                                         : "pulses do not agree";
-    m.told = std::string("the device's delay was not measured (") + why + "): taken as " + ms(m.traits.delay_s) + ", " +
-             ms(kUnmeasuredDelayS) + " more than its driver says";
+    m.reported = std::string("the device's delay was not measured (") + why + "): taken as " + ms(m.traits.delay_s) +
+                 ", " + ms(kUnmeasuredDelayS) + " more than its driver says";
   }
   return m;
 }

@@ -42,7 +42,7 @@ void Servo::take_up(std::uint64_t tick) noexcept {
 }
 
 // At the beginning of a tick that is the first after the pause.
-void Servo::tell_stroke(std::uint64_t tick, bool removes) noexcept {
+void Servo::report_stroke(std::uint64_t tick, bool removes) noexcept {
   if (in_stroke_ && tick - last_removal_ > pause_ticks_) {
     SceneAction ended = SceneAction::plain(ActionKind::stroke);
     ended.tick = tick;
@@ -82,7 +82,7 @@ bool Servo::step(std::int64_t lateness_ns) noexcept {
     removed_mm3 += static_cast<double>(r.removed_mm3);
   }
   removed_mm3_.store(removed_mm3_.load(std::memory_order_relaxed) + removed_mm3, std::memory_order_relaxed);
-  tell_stroke(tick, !changes.empty());
+  report_stroke(tick, !changes.empty());
   stream_.publish(records, changes);
   ticks_.store(tick + 1, std::memory_order_relaxed);
   return true;

@@ -18,7 +18,7 @@ constexpr double kQuietS = 1.5;  // without a pen before it is told
 
 }  // namespace
 
-Mat3 desk_from_camera(CameraPlace place) {
+Mat3 controller_from_camera(CameraPlace place) {
   switch (place) {
     case CameraPlace::above:
       return {{Vec3{1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, -1}}};
@@ -98,18 +98,18 @@ void PenLink::read_on() {
       s.motion.time_s = 0;
       state_.store(s);
     }
-    tell(sight, source->live());
+    notify(sight, source->live());
   }
   if (!stop_) {
     const bool live = source->live();
     say(live ? "the camera is gone; plugged in again, it goes on" : "the video has ended");
     state_.store({{}, 0, pictures_});
-    // A video does not begin anew: a pose that was is not a hand.
+    // A video does not begin again: a pose that was is not a hand.
     while (!stop_ && !live) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
 }
 
-void PenLink::tell(const PenSight& sight, bool) {
+void PenLink::notify(const PenSight& sight, bool) {
   using Sight = PenSight::State;
   const int quiet = std::max(3, static_cast<int>(kQuietS * camera_.fps));
   unseen_ = sight.state == Sight::seen ? 0 : unseen_ + 1;

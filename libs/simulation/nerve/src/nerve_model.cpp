@@ -77,10 +77,11 @@ void NerveModel::lose(std::size_t nerve, std::size_t point, double to) {
   to = to < kGone ? 0 : to;
   if (to >= g) return;
   // One discharge for a loss that goes on: at its beginning, and when the last fibres go.
-  const bool told = std::any_of(discharges_.begin(), discharges_.end(),
-                                [&](const Discharge& d) { return d.nerve == nerve && d.cause == NerveCause::injury; });
+  const bool reported = std::any_of(discharges_.begin(), discharges_.end(), [&](const Discharge& d) {
+    return d.nerve == nerve && d.cause == NerveCause::injury;
+  });
   const bool last = to == 0 && conducts(nerve, point) > 0;
-  if (!told && c_.injury_s > 0) {
+  if (!reported && c_.injury_s > 0) {
     begin(NerveCause::injury, false, nerve, point, c_.injury_s, c_.burst_most_hz, c_.burst_most_uv);
   } else if (last) {
     happenings_.push_back({NerveCause::injury, nerve, point, 0});

@@ -249,7 +249,7 @@ struct Held {
   std::vector<bool> used;          // by an element
 };
 
-// Parts that hang together must each be held.
+// Parts that are connected must each be held.
 Held held_of(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed,
              std::span<const Slider> sliders) {
   const std::size_t points = energy.point_count();

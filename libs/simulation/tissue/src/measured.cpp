@@ -305,13 +305,13 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
     const double steps = fit.parameters() > 8 ? 25 : 12;
     result.estimate_s =
         steps * (seconds_since(one) + level.solve_s + 2e-9 * static_cast<double>(residuals.size() * width * width));
-    const std::string told = std::to_string(rows) + " distances and " + std::to_string(width) +
-                             " parameters: the fit takes about " +
-                             format_number(std::max(1.0, std::round(result.estimate_s))) + " s";
+    const std::string reported = std::to_string(rows) + " distances and " + std::to_string(width) +
+                                 " parameters: the fit takes about " +
+                                 format_number(std::max(1.0, std::round(result.estimate_s))) + " s";
     if (result.estimate_s > 30) {
-      context.warn(told);
+      context.warn(reported);
     } else {
-      context.info(told);
+      context.info(reported);
     }
   }
   for (result.rounds = 1;; ++result.rounds) {

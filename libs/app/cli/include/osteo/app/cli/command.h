@@ -132,7 +132,7 @@ struct Program {
 
 /// The whole of a command-line program: parses, runs, reports errors, returns the exit code. stdout carries data only.
 /// With --json a failure is told there too: { "error": { "exit_code", "name", "message", "advice" } }, and beside it
-/// what the stage had to show of it, such as the "verdict" on a refused scan.
+/// what the stage had to show of it, such as the "verdict" on a rejected scan.
 int run_program(Program& program, int argc, char** argv, std::ostream& out, std::ostream& err);
 
 }  // namespace osteo::inline app::cli

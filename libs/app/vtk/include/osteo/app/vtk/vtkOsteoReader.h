@@ -2,7 +2,7 @@
 /// A file of any kind that Osteotome reads (by its suffix) as a VTK source: vtkImageData, vtkPolyData,
 /// vtkUnstructuredGrid or, for grids, pictures and documents, vtkOsteoDataObject. The file is read when its kind must
 /// be known, so already in UpdateInformation(), and again only after Modified(), as by VTK's own readers. A failure
-/// sets the error code, is told by vtkErrorMacro and tried again.
+/// sets the error code, is reported by vtkErrorMacro and tried again.
 #ifndef vtkOsteoReader_h
 #define vtkOsteoReader_h
 

@@ -1,9 +1,9 @@
 /// @class vtkOsteoStage
 /// Any Osteotome stage as a VTK filter. Images, masks and surfaces are VTK's own data sets, without copies of voxels;
 /// sparse grids and pictures travel as vtkOsteoDataObject. Progress and abort are VTK's; a failure sets the error code,
-/// is told by vtkErrorMacro, and keeps the filter modified, so that the next Update() tries again. A stage that makes
-/// an image does its work in UpdateInformation(), since only then its extent is known; Update() hands over the same
-/// result.
+/// is reported by vtkErrorMacro, and keeps the filter modified, so that the next Update() tries again. A stage that
+/// makes an image does its work in UpdateInformation(), since only then its extent is known; Update() hands over the
+/// same result.
 ///
 /// @code
 /// vtkNew<vtkOsteoStage> threshold;

@@ -2,7 +2,7 @@
 /// The end of a VTK pipeline: what comes in, from Osteotome or from VTK, is written to a file by its suffix, whole or
 /// not at all, and again only when it changed. Something that is there already is replaced only after
 /// SetOverwrite(true), except what this writer wrote itself and nobody changed since; of a folder with files that it
-/// has no record of, nothing is replaced at all. A failure sets the error code, is told by vtkErrorMacro and tried
+/// has no record of, nothing is replaced at all. A failure sets the error code, is reported by vtkErrorMacro and tried
 /// again. No record (FILE.prov.json) is written: `osteo run --engine vtk` does that.
 #ifndef vtkOsteoWriter_h
 #define vtkOsteoWriter_h

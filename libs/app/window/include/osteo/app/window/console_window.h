@@ -22,8 +22,8 @@ struct ConsoleOptions {
   std::string server;                ///< as it was named
   std::filesystem::path state_file;  ///< as of the rehearsal's window
   bool sound = true;
-  std::function<std::shared_ptr<MonitorDesk>()>
-      desk;  ///< of the monitor that is heard of; null: none yet. Another one: another monitor
+  std::function<std::shared_ptr<MonitorController>()>
+      controller;  ///< of the monitor that is heard of; null: none yet. Another one: another monitor
   std::function<ConsoleFacts()> facts;
   std::function<bool()> stop;  ///< asked before each picture
 };

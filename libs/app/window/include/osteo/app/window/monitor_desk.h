@@ -23,16 +23,16 @@ struct RemoteStimulator {
 
 /// Follows one rehearsal: events become notes of its session ("monitor"; settings of the stimulator as `osteo
 /// nerve-monitor` reads them). Or shows what is told of a monitor that runs somewhere else.
-class MonitorDesk {
+class MonitorController {
  public:
   /// Before it starts; it must outlive this.
-  MonitorDesk(Rehearsal& rehearsal, const MonitorOptions& options);
+  MonitorController(Rehearsal& rehearsal, const MonitorOptions& options);
   /// Of one elsewhere, with these channels: whoever hears of it tells the sinks. It stimulates with what it is lent.
-  MonitorDesk(const std::vector<std::string>& labels, double event_uv);
+  MonitorController(const std::vector<std::string>& labels, double event_uv);
   /// Leaves it.
-  ~MonitorDesk();
-  MonitorDesk(const MonitorDesk&) = delete;
-  MonitorDesk& operator=(const MonitorDesk&) = delete;
+  ~MonitorController();
+  MonitorController(const MonitorController&) = delete;
+  MonitorController& operator=(const MonitorController&) = delete;
 
   [[nodiscard]] MonitorScreen& screen();
   [[nodiscard]] MonitorSound& sound();

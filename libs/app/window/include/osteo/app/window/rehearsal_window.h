@@ -127,7 +127,7 @@ struct WindowActions {
   /// in which no session is begun meanwhile. Empty: nothing is shown.
   std::function<SessionReview(const Context&)> review = {};
   /// The nerve monitor of the rehearsal that runs; null: it has none. Empty: there never is one.
-  std::function<MonitorDesk*()> monitor = {};
+  std::function<MonitorController*()> monitor = {};
   /// Who leads the hand, and who takes part from elsewhere. Empty: nobody ever does.
   std::function<TutorNow()> tutor = {};
   /// The hand is to be led, or let go; softly. Empty: nobody leads it.
@@ -141,7 +141,7 @@ struct WindowEnd {
 };
 
 /// Begins a session in the window and runs until the person leaves it; the session that runs then is the caller's to
-/// save. What fails meanwhile is shown in the window, which offers to begin anew; what was not put right, or was lost,
+/// save. What fails meanwhile is shown in the window, which offers to begin again; what was not put right, or was lost,
 /// is thrown at the end. `person`: what is changed in the window is changed there. `sound`: turned on and off, louder
 /// and softer in the window; whoever runs the rehearsal tells it which to follow. Mouse and keys:
 /// docs/guides/surgeon.md, and F1 in the window.

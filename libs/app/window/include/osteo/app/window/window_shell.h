@@ -70,7 +70,7 @@ class WindowShell {
   void apply_scale();
   GLFWwindow* window_ = nullptr;
   int width_ = 0, height_ = 0, em_ = 0;
-  double told_scale_ = 1, fixed_scale_, by_hand_;
+  double reported_scale_ = 1, fixed_scale_, by_hand_;
   bool full_screen_ = false, attended_ = true;
   int windowed_[4] = {0, 0, 0, 0};
   int gl_errors_ = 0;

@@ -68,7 +68,7 @@ struct Findings {
 /// A unit as people read it, of its code in tables and JSON: "mm³" of "mm3", nothing of "1" (a share or a count).
 [[nodiscard]] std::string unit_text(std::string_view unit);
 /// For people: "31", "4.2", "0.35", "12 min 3 s".
-[[nodiscard]] std::string told_number(double value);
-[[nodiscard]] std::string told_seconds(double seconds);
+[[nodiscard]] std::string reported_number(double value);
+[[nodiscard]] std::string reported_seconds(double seconds);
 
 }  // namespace osteo::inline assessment

@@ -46,7 +46,8 @@ class FrameMaker {
 
 /// Tells the frames of a whole session up to where its bone is known. `begin`: the scene it began with (Error(corrupt)
 /// when it is another). Returns the scene as it was left.
-World tell_frames(const SessionReader& session, World begin, const FrameMaker::Sink& sink, const Context& context = {});
+World report_frames(const SessionReader& session, World begin, const FrameMaker::Sink& sink,
+                    const Context& context = {});
 /// The notes of a session that say where the camera was.
 [[nodiscard]] std::vector<CameraPose> cameras_of(const SessionReader& session, std::size_t& unreadable);
 

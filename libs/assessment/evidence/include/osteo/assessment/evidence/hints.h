@@ -19,7 +19,7 @@ enum class HintKind : int {
   force,         ///< it presses with more than `limit` N within `within_mm` of a structure
   large_burr,    ///< its diameter is over `limit` mm there
   cutting_burr,  ///< it is no diamond there
-  dry,           ///< no water; the time begins anew when there was some
+  dry,           ///< no water; the time begins again when there was some
 };
 [[nodiscard]] constexpr std::array<std::string_view, 5> enum_names(HintKind) {
   return {"unseen", "force", "large_burr", "cutting_burr", "dry"};

@@ -117,7 +117,7 @@ struct FacePatch {
   }
 };
 
-/// An item of the scale. Which fields it goes by depends on its kind; the others are refused in files.
+/// An item of the scale. Which fields it goes by depends on its kind; the others are rejected in files.
 struct ScaleItem {
   using Params = ScaleItem;
   std::string name, structure, second, cells, patch;

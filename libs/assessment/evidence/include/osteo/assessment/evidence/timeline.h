@@ -106,11 +106,11 @@ class TimelineKeeper {
 };
 
 /// Of a session file, streamed: notes, gaps, frames and what was seen; a pass more than score_session makes, which can
-/// keep one on the way (ScoreDetail). Errors: as tell_frames.
+/// keep one on the way (ScoreDetail). Errors: as report_frames.
 [[nodiscard]] Timeline read_timeline(const SessionReader& session, World begin, const StructureMap* structures,
                                      const Procedure* procedure = nullptr, const Context& context = {});
 /// Tells a keeper what is in a session besides its frames.
-void tell_notes(const SessionReader& session, TimelineKeeper& keeper);
+void report_notes(const SessionReader& session, TimelineKeeper& keeper);
 
 /// "osteotome_timeline": 1, rate, arrays (four digits that count, null where not known) and events.
 [[nodiscard]] Json timeline_json(const Timeline& timeline);

@@ -15,11 +15,11 @@ namespace osteo::inline assessment::experiment {
 enum class DeskPage : int { before_training, training, feedback, before_test, test, pause, done };
 
 /// Two threads: step() is the servo's, all else the window's.
-class ForceSkillDesk {
+class ForceSkillController {
  public:
   /// Goes on at the first trial that is not finished. Error as read_trials.
-  ForceSkillDesk(std::filesystem::path experiment, Protocol protocol, std::size_t participant, bool retention,
-                 Mover mover, std::string device, const DeviceTraits& traits);
+  ForceSkillController(std::filesystem::path experiment, Protocol protocol, std::size_t participant, bool retention,
+                       Mover mover, std::string device, const DeviceTraits& traits);
 
   /// The force for the hand. No allocation, no wait; nothing where no run is under way.
   Vec3 step(const DeviceSample& sample) noexcept;

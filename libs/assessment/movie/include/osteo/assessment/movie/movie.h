@@ -54,8 +54,8 @@ struct MovieFacts {
 
 /// Draws and writes it; `path` as MovieFile takes it, written over. The session is run again where it can be (replay),
 /// so that bone and dust are those of each frame's tick; where it cannot (a gap, another version, other structures), as
-/// tell_recorded() tells it, which `words` says. `begin`: the scene it began with. Progress says how long it will take.
-/// Errors: as MovieFile, movie_times, replay; Error(failed) when there is no OpenGL.
+/// report_recorded() tells it, which `words` says. `begin`: the scene it began with. Progress says how long it will
+/// take. Errors: as MovieFile, movie_times, replay; Error(failed) when there is no OpenGL.
 MovieFacts make_movie(const SessionReader& session, const World& begin, const Anatomy& anatomy,
                       const MovieOptions& options, const std::filesystem::path& path, const Context& context = {});
 

@@ -14,7 +14,7 @@ struct AnalysisSettings {
   int resamples = 2000;
   std::vector<std::string> given{};  ///< metrics that correlations are also told without: partial ones
 };
-/// Everything the report says is in `json`; what there is too little for is in it under "refused", with the reason.
+/// Everything the report says is in `json`; what there is too little for is in it under "rejected", with the reason.
 struct Analysis {
   Json json;
   Sheet sheet;
@@ -32,11 +32,11 @@ struct Reach {
 /// For each pair of groups, of all people with sessions, or, before there are sessions, of all participants.
 /// `outcomes`: how many there are where none is primary.
 [[nodiscard]] std::vector<Reach> reach_of(const Study& study, std::size_t outcomes = 1);
-[[nodiscard]] std::string told(const Reach& reach);
+[[nodiscard]] std::string reported(const Reach& reach);
 [[nodiscard]] Json json_of(const Reach& reach);
 
-/// Statistics as docs/guides/study.md defines them. Error(no_input) where no session or no participant is there, Error(usage)
-/// where what is given is no metric of the study. Same study, same bytes.
+/// Statistics as docs/guides/study.md defines them. Error(no_input) where no session or no participant is there,
+/// Error(usage) where what is given is no metric of the study. Same study, same bytes.
 [[nodiscard]] Analysis analyse(const Study& study, const AnalysisSettings& settings = {});
 
 }  // namespace osteo::inline assessment::study

@@ -115,7 +115,7 @@ std::string add_session(const std::filesystem::path& folder, const std::string& 
 
 struct Removed {
   std::size_t sessions = 0, ratings = 0, movies = 0;
-  std::vector<std::string> forms;  ///< by rater: written anew, without them
+  std::vector<std::string> forms;  ///< by rater: written again, without them
 };
 /// Takes a person out with all that is kept of them: sessions, ratings, movies, order, forms; with a `case_name` only
 /// that session. Ratings of sessions that are no longer in sessions.csv go too. Error(usage) where there is no such.

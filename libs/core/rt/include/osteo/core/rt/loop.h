@@ -27,7 +27,7 @@ struct LoopStats {
 };
 
 /// SCHED_FIFO priority 80, memory locked, stack touched beforehand, processor kept from deep sleep, absolute sleeps
-/// (clock_nanosleep). When real-time priority is refused the loop runs all the same with the smallest timer slack, and
+/// (clock_nanosleep). When real-time priority is rejected the loop runs all the same with the smallest timer slack, and
 /// says so. A late tick does not shift the later ones; periods that passed meanwhile are skipped and counted.
 ///
 /// The servo thread of a rehearsal is one of these, at 1 kHz. Once it ticks, neither the loop nor `tick` may allocate,

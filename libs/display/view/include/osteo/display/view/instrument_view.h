@@ -51,7 +51,7 @@ class InstrumentView {
   void hide();
   /// The handle in a colour of its own (red, green, blue, 0 to 1), which tells whose it is; `opacity` below 1: of one
   /// that is not there.
-  void tell_apart(Vec3 colour, double opacity);
+  void report_apart(Vec3 colour, double opacity);
   /// How much of the shaft is within bone: 0 to 1, of its rings; as of the last picture.
   [[nodiscard]] double shaft_in_bone() const;
   [[nodiscard]] bool ghost_shown() const;

@@ -57,7 +57,7 @@ class RegionsView {
   bool shown_ = true;
 };
 
-/// Red, green, blue, 0 to 1. Told apart by the colour-blind too.
+/// Red, green, blue, 0 to 1. Distinguished by the colour-blind too.
 [[nodiscard]] std::array<double, 3> region_colour(bool forbidden);
 
 }  // namespace osteo::inline display

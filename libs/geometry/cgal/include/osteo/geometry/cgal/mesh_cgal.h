@@ -37,7 +37,7 @@ struct CgalMeshOptions {
   double facet_distance_mm = 0;  ///< farthest the boundary may be from the surface; 0: a tenth of cell_mm
   double surface_cell_mm = 0;    ///< the same as cell_mm at the surface, from where it grows inward; 0: no grading
   bool optimise = true;          ///< perturb and exude, against slivers
-  double most_tets = 5e7;        ///< more are refused before anything is done, by the volume and cell_mm
+  double most_tets = 5e7;        ///< more are rejected before anything is done, by the volume and cell_mm
   GuardLimits limits{};
 };
 /// Delaunay refinement (CGAL Mesh_3) of a closed surface without self-intersections, in a process of its own

@@ -11,7 +11,7 @@ struct TetgenOptions {
   double max_volume_mm3 = 0;  ///< 0: no bound
   double radius_edge_ratio = 1.414;
   double min_dihedral_deg = 0;  ///< aimed at by adding points, often in vain and at a high price; 0: not
-  double most_tets = 5e7;       ///< more are refused before anything is done: volume over max_volume_mm3
+  double most_tets = 5e7;       ///< more are rejected before anything is done: volume over max_volume_mm3
   GuardLimits limits{};
 };
 /// Constrained Delaunay tetrahedra of a closed surface without self-intersections; the surface's triangles are kept or

@@ -51,7 +51,7 @@ struct StuffingOptions {
 [[nodiscard]] TetMesh stuffed_tets(const TriangleSoup& surface, const StuffingOptions& options,
                                    const Context& context = {});
 
-/// What hangs together by a point or an edge alone comes apart there: each of its parts gets a point of its own.
+/// What is connected by a point or an edge alone comes apart there: each of its parts gets a point of its own.
 /// Afterwards the boundary is a manifold. Returns how many points were made. O(tets).
 std::uint64_t open_hinges(TetMesh& mesh);
 

@@ -1,6 +1,6 @@
 // Many cases, each in a process of its own: one that fails, hangs or eats memory never stops the others, and what was
 // done is not done again. The folder OUT holds
-//   batch.json            what makes it a batch; another batch into it at once is refused
+//   batch.json            what makes it a batch; another batch into it at once is rejected
 //   cases/CODE/           the cases, as the work made them, and what it wrote beside them
 //   records/CODE.json     how each went, written whole when it ended
 //   report.html .json .csv
@@ -36,7 +36,7 @@ struct CaseRecord {
   int exit_code = 0;
   int tries = 0;
   double seconds = 0, peak_mb = 0;    ///< of the last try
-  std::string verdict;                ///< on the scan: good, repaired, refused; empty where none was given
+  std::string verdict;                ///< on the scan: good, repaired, rejected; empty where none was given
   std::vector<std::string> findings;  ///< their codes
   double volume_mm3 = 0;              ///< of bone; 0 where not known
   std::int64_t triangles = 0;         ///< of its surface
@@ -51,12 +51,12 @@ struct CaseRecord {
 struct BatchOptions {
   std::filesystem::path out;
   std::string program;         ///< version, for the records
-  std::string key;             ///< of all that the cases have in common: a change makes them all anew
+  std::string key;             ///< of all that the cases have in common: a change makes them all again
   int jobs = 1;                ///< cases at a time
   double memory_mb = 0;        ///< of each; 0: no bound
   double seconds = 0;          ///< of each try; 0: no bound
   int retries = 1;             ///< further tries of a case that ended for memory, time or a signal
-  bool retry_failed = false;   ///< also try again, once, what an earlier run has refused or seen fail
+  bool retry_failed = false;   ///< also try again, once, what an earlier run has rejected or seen fail
   double keep_free_mb = 0;     ///< on the disk of OUT; with less, no case is begun
   std::set<std::string> only;  ///< codes; empty: all
 };

@@ -27,7 +27,7 @@ struct ChildEnd {
   std::string out, err;  ///< what it wrote: the first 4 MB to standard output, the last 64 kB to standard error
 };
 
-/// Forks this process: the work runs in a copy of it, which costs milliseconds where starting the program anew costs a
+/// Forks this process: the work runs in a copy of it, which costs milliseconds where starting the program again costs a
 /// quarter of a second. So the caller may have no other threads (nor have used TBB). A child is asked to end (SIGTERM)
 /// by the kernel when its parent is gone.
 class Children {

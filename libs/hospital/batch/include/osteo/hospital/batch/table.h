@@ -27,7 +27,7 @@ struct BatchCase {
 /// `known` are the settings there are; a name with a dot in it (STAGE.PARAMETER) passes. `paths` are those whose values
 /// are files, resolved like `source`. Rows without a word in them are left out. Codes become names of folders, so two
 /// that differ in case alone are equal: not every disk can tell them apart. Error(usage) with file and line: what
-/// read_csv() refuses, a column or code that is missing, not known, there twice or no code, no rows. Nothing is looked
+/// read_csv() rejects, a column or code that is missing, not known, there twice or no code, no rows. Nothing is looked
 /// up on the disk.
 [[nodiscard]] std::vector<BatchCase> read_batch_table(std::string_view text, const std::filesystem::path& file,
                                                       std::span<const std::string> known,

@@ -39,10 +39,11 @@ struct DeidentifyReport {
 /// new UIDs. Where the table leaves a choice the value that keeps an object valid is taken: X/Z empties, X/D, Z/D and
 /// X/Z/D put a dummy. Besides the table: private attributes, attributes of no known kind, overlays and curves are
 /// removed, names of persons anywhere are emptied, and UIDs that are not the standard's own are replaced, all of it
-/// within sequences too. Pixels stay: a head's scan shows a face. Refused, not written: what is no image of CT, MR, PET
-/// or 3D X-ray nor a segmentation (reports, documents, photographs of screens hold words that no table knows); where
-/// words are said or likely to be burned in; where a kept text has the patient's name or a number of theirs; damaged
-/// files. Holds one object in memory at a time. Errors: usage (key), no_input, cannot_read, cannot_write, cancelled.
+/// within sequences too. Pixels stay: a head's scan shows a face. Rejected, not written: what is no image of CT, MR,
+/// PET or 3D X-ray nor a segmentation (reports, documents, photographs of screens hold words that no table knows);
+/// where words are said or likely to be burned in; where a kept text has the patient's name or a number of theirs;
+/// damaged files. Holds one object in memory at a time. Errors: usage (key), no_input, cannot_read, cannot_write,
+/// cancelled.
 [[nodiscard]] DeidentifyReport deidentify_objects(const std::vector<DicomObject>& objects, const fs::path& out,
                                                   const DeidentifyOptions& options, const Context& context = {});
 

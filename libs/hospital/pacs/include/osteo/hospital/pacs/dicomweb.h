@@ -18,10 +18,10 @@ namespace osteo::inline hospital {
 void check_dicomweb(const WebServer& server);
 
 /// Objects by STOW-RS, as they are, up to 32 MB or 100 of a study in a request. An object is accepted when the answer
-/// names it among those that were stored; what it says of those it refuses is told; where it says nothing of one, that
+/// names it among those that were stored; what it says of those it rejects is told; where it says nothing of one, that
 /// is a problem too. With `check` the server is asked by QIDO-RS which of them it has. A connection that is lost leaves
 /// the rest unsent, which is told of each. Errors: failed when nothing could be sent at all (no connection, login
-/// refused, redirect); cancelled.
+/// rejected, redirect); cancelled.
 [[nodiscard]] SendReport send_objects(const WebServer& server, const std::vector<DicomObject>& objects,
                                       bool check = true, const Context& context = {});
 

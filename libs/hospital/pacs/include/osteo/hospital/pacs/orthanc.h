@@ -28,7 +28,7 @@ void open_orthanc_folder(const fs::path& folder, const OrthancServer& server);
 /// or MR, the objects that are not there yet are fetched, checked (a DICOM object of the length that the server says)
 /// and synced; then the number is kept. So it can be ended at any moment, and called again. A series whose objects are
 /// wrong three times is left out. What to tell is given to `context` as warnings, without identities. Begins threads:
-/// call it in a process of its own. Errors: failed (the server is away, stalls, refuses, or says what cannot be),
+/// call it in a process of its own. Errors: failed (the server is away, stalls, rejects, or says what cannot be),
 /// resources (disk), cannot_write, cancelled.
 void follow_orthanc(const fs::path& folder, const OrthancServer& server, const Context& context);
 

@@ -5,7 +5,7 @@
 
 namespace osteo::inline hospital {
 
-/// DICOM over TLS (PS3.15 B, BCP 195: TLS 1.2 or later). Files in PEM form; a key with a password is refused.
+/// DICOM over TLS (PS3.15 B, BCP 195: TLS 1.2 or later). Files in PEM form; a key with a password is rejected.
 struct DicomTls {
   std::string ca;  ///< certificates that are trusted: the other side must have one that these sign. Empty: no TLS
   std::string certificate, key;  ///< our own; a client may do without, where the node does not ask for one

@@ -2,7 +2,7 @@
 //
 // The parent only accepts connections; each association is served by a child process of its own with limits on memory,
 // file size and time, so that what a peer sends can end that child and nothing else. Nothing is decoded: an object is
-// written as it came, its head is read for its UIDs, and it is renamed into place whole, or refused with a status.
+// written as it came, its head is read for its UIDs, and it is renamed into place whole, or rejected with a status.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -25,9 +25,9 @@ struct ReceiveOptions {
   std::vector<std::string> allowed;   ///< titles that may send; empty: anybody, which must be asked for
   bool anybody = false;
   DicomTls tls;  ///< when `ca` is named, all three are needed, and who has no certificate from it is not let in
-  int most_associations = 20;  ///< at once; more are refused ("local limit exceeded")
-  double object_gb = 2;        ///< a larger object is refused
-  double folder_gb = 100;      ///< all series that are there now; beyond it objects are refused (A700)
+  int most_associations = 20;  ///< at once; more are rejected ("local limit exceeded")
+  double object_gb = 2;        ///< a larger object is rejected
+  double folder_gb = 100;      ///< all series that are there now; beyond it objects are rejected (A700)
   double keep_free_gb = 1;     ///< of the disk
   double memory_mb = 512;      ///< of an association's process
   double timeout_s = 30;  ///< for a peer to say something, and for a message to be whole: an object's may take a second

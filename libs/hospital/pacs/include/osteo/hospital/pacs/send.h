@@ -43,7 +43,7 @@ struct SendReport {
 
 /// Sends each object as it is, in its own transfer syntax, under a presentation context of its class: what the node
 /// does not take is told, and the rest is sent. With `check`, the node is asked by C-FIND (study root, image level)
-/// which of them it has. Errors: failed when there is no connection or the node refuses us (which side, which title,
+/// which of them it has. Errors: failed when there is no connection or the node rejects us (which side, which title,
 /// why); cancelled.
 [[nodiscard]] SendReport send_objects(const DicomPeer& peer, const std::vector<DicomObject>& objects, bool check = true,
                                       const Context& context = {});

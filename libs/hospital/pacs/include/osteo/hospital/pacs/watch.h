@@ -1,8 +1,8 @@
 // A folder into which scans come: each series that a rule matches goes through its pipeline once, and again when slices
 // come late.
-//   OUT/watch.json          what makes it one; a second watcher into it is refused
+//   OUT/watch.json          what makes it one; a second watcher into it is rejected
 //   OUT/records/CODE.json   the journal: what was done with a series, and of which objects; CODE is a hash of the
-//   series' UID OUT/cases/CODE, CODE-2  the cases; a case is never made anew in place of one that is there
+//   series' UID OUT/cases/CODE, CODE-2  the cases; a case is never made again in place of one that is there
 //   OUT/sources/CODE        links to (or copies of) a series' files, where they lie among those of others
 // Records and events hold no identity.
 #pragma once
@@ -35,7 +35,7 @@ struct WatchOptions {
 
 struct WatchEvent {
   std::string series;  ///< its code
-  std::string what;    ///< begun, done, refused, failed, resources, again; ignored, unmatched; unreadable (a file)
+  std::string what;    ///< begun, done, rejected, failed, resources, again; ignored, unmatched; unreadable (a file)
   std::string rule;    ///< its name, where one matched
   std::string why;
   fs::path folder;  ///< of the case; empty where there is none
@@ -43,7 +43,8 @@ struct WatchEvent {
 };
 
 struct WatchCounters {
-  std::size_t series = 0, done = 0, bad = 0, unmatched = 0, unreadable = 0;  ///< bad: refused, failed, out of resources
+  std::size_t series = 0, done = 0, bad = 0, unmatched = 0,
+              unreadable = 0;  ///< bad: rejected, failed, out of resources
 };
 
 /// Makes the case at `folder` of the scan in `source`; as CaseWork.
@@ -52,13 +53,13 @@ using WatchWork = std::function<int(const SeriesRule& rule, const fs::path& sour
 /// Error(usage) where one would lie in the other. Neither needs to be there.
 void check_watch_folders(const fs::path& folder, const fs::path& out);
 
-/// Until the context is cancelled (what runs is asked to end, and begun anew at the next start), or with `once` until
+/// Until the context is cancelled (what runs is asked to end, and begun again at the next start), or with `once` until
 /// all is done. Heads of files are read in a process of their own: one that brings it down is set aside and told. Must
 /// be called while the process has one thread. Polls, so that it works on any file system; a look costs a stat() of
 /// each file. Errors: no_input; failed where `feed` failed and `once` is set; cannot_write where OUT holds something
 /// else or another watcher is at work.
 WatchCounters watch_folder(const std::vector<SeriesRule>& rules, const WatchOptions& options, const WatchWork& work,
-                           const std::function<void(const WatchEvent&, const WatchCounters&)>& tell,
+                           const std::function<void(const WatchEvent&, const WatchCounters&)>& notify,
                            const Context& context);
 
 /// As metrics_text() of receive.h.

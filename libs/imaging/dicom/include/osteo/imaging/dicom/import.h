@@ -33,12 +33,12 @@ struct Imported {
 };
 
 /// A DICOM folder, DICOMDIR, file or archive, or a volume file.
-/// Throws Refused (with the verdict) for a series that cannot be placed rightly; else errors as of scan_dicom,
+/// Throws Rejected (with the verdict) for a series that cannot be placed rightly; else errors as of scan_dicom,
 /// choose_series and load_image.
 [[nodiscard]] Imported import_ct(const std::filesystem::path& source, const ImportParams& params,
                                  const Context& context = {});
 
 /// Warnings and facts of a verdict to log and report.
-void tell_verdict(const Verdict& verdict, const Context& context);
+void report_verdict(const Verdict& verdict, const Context& context);
 
 }  // namespace osteo::inline imaging

@@ -35,7 +35,7 @@ void save_segmentation_on_source(const Labels& labels, const std::filesystem::pa
 /// A DICOM SEG as a label map on its own slices, plain, deflated, or compressed by RLE, JPEG-LS, JPEG or JPEG 2000;
 /// fractional ones are cut at half. Slices that hold nothing may be absent from the file, and frames may stand in any
 /// order: layers lie SpacingBetweenSlices apart where all frames fit that, and the layers of absent frames are empty.
-/// Where the file states no such distance, the frames' own decides, or the file is refused when the thickness of its
+/// Where the file states no such distance, the frames' own decides, or the file is rejected when the thickness of its
 /// slices says that frames may be absent. Where segments overlap, the later one stays (a warning says how much).
 /// Errors: corrupt for what is no SEG, has no even, parallel frames or more than 255 segments.
 [[nodiscard]] Labels load_segmentation(const std::filesystem::path& path, const Context& context = {});

@@ -24,7 +24,7 @@ struct DicomSeries {
   std::string description;  ///< the scanner's free text, without what identifies the patient
   int columns = 0, rows = 0, images = 0;
   double pixel_mm = 0, thickness_mm = 0, gap_mm = 0;
-  std::string what;     ///< "axial, 140 slices", "localizer", "refused: GAP_TOO_WIDE", ...
+  std::string what;     ///< "axial, 140 slices", "localizer", "rejected: GAP_TOO_WIDE", ...
   std::string problem;  ///< the first error, as a sentence; empty when usable
   bool usable = false;
   bool recommended = false;  ///< the best of its scan: taken when nothing is asked for and there is no other scan

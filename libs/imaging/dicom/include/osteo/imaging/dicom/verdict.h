@@ -12,7 +12,7 @@
 namespace osteo::inline imaging {
 
 /// Codes never change their meaning; new ones may come. verdict_codes.h says of each how grave it is and whether it
-/// refuses.
+/// rejects.
 namespace code {
 // Files that are not slices of a scan.
 inline constexpr std::string_view not_dicom = "NOT_DICOM", not_an_image = "NOT_AN_IMAGE", no_pixels = "NO_PIXELS",
@@ -128,20 +128,20 @@ struct Verdict {
            std::vector<std::string> files = {});
   [[nodiscard]] bool has(std::string_view code) const;
   [[nodiscard]] bool refused() const;
-  /// "good": taken as it is; "repaired": resampled or with something set aside; "refused".
+  /// "good": taken as it is; "repaired": resampled or with something set aside; "rejected".
   [[nodiscard]] std::string status() const;
 };
 
 /// Pretty-printed, keys in a fixed order. Says nothing that identifies the patient.
 [[nodiscard]] std::string to_json(const Verdict& verdict);
 
-/// The histogram of values that were refused for their scale, where air and tissue should be, and the values with the
+/// The histogram of values that were rejected for their scale, where air and tissue should be, and the values with the
 /// offset that is proposed, as SVG. Empty for a verdict without such a finding.
 [[nodiscard]] std::string picture_of(const Verdict& verdict);
 
 /// What a person wants to know of a verdict that was written before.
 struct VerdictSummary {
-  std::string status;     ///< "good", "repaired", "refused"
+  std::string status;     ///< "good", "repaired", "rejected"
   std::string scan_hash;  ///< as in Verdict
   std::vector<Finding> findings;
 };

@@ -33,14 +33,14 @@ struct DicomVolume {
 /// pixel; so that layers lie on the slices where these are as far apart as ever), without padding taking part. Where
 /// slices are only missing, those that are there stay voxel for voxel. Slices are read and decoded in parallel; a file
 /// whose pixels are damaged counts as missing. Memory: the volume (and, when resampled, the slices besides). Throws
-/// Refused for whatever cannot be placed rightly; see verdict.h for the codes.
+/// Rejected for whatever cannot be placed rightly; see verdict.h for the codes.
 [[nodiscard]] DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& options = {},
                                             const Context& context = {});
 
 /// The same series straight onto a lattice of `spacing_mm`, upright above the slices, a few layers at a time.
 class DicomSlabs {
  public:
-  /// Reads no pixels yet. Throws Refused.
+  /// Reads no pixels yet. Throws Rejected.
   DicomSlabs(const DicomSeries& series, const PlaceOptions& options, double spacing_mm);
   ~DicomSlabs();
   DicomSlabs(const DicomSlabs&) = delete;
@@ -51,7 +51,7 @@ class DicomSlabs {
   static constexpr std::int16_t kNoValue = -32768;
   /// Calls take(first layer, layers, voxels) from the first layer to the last, `layers_each` at a time (the last may
   /// have fewer). Memory: the slab and the slices it lies between. When a file turns out damaged it is left out and
-  /// everything starts again: take() then sees the first layer once more. Throws Refused.
+  /// everything starts again: take() then sees the first layer once more. Throws Rejected.
   void run(int layers_each, const Context& context, const std::function<void(int, int, const std::int16_t*)>& take);
   /// Complete after run().
   [[nodiscard]] const Verdict& verdict() const;

@@ -40,7 +40,7 @@ struct InpFile {
 [[nodiscard]] std::optional<double> inp_number(std::string_view field);
 
 /// Errors: corrupt, with `name` and line: what is no number, elements of other kinds, nodes that are not there;
-/// *INCLUDE and parts with instances are refused.
+/// *INCLUDE and parts with instances are rejected.
 [[nodiscard]] InpFile parse_inp(std::string_view text, const std::string& name);
 
 }  // namespace osteo::inline imaging

@@ -26,8 +26,8 @@ struct VolumeFinding {
 };
 
 /// By suffix. The frame comes out in LPS mm whatever the format's own axes and units are (NIfTI and some NRRD: RAS;
-/// xyzt_units, space units, DistanceUnits). NIfTI: sform when present, else qform; a sheared sform is refused, as are
-/// two forms of which one mirrors the other. A file of several volumes is refused. What the file leaves open goes into
+/// xyzt_units, space units, DistanceUnits). NIfTI: sform when present, else qform; a sheared sform is rejected, as are
+/// two forms of which one mirrors the other. A file of several volumes is rejected. What the file leaves open goes into
 /// `findings`, or to the log where that is null. Errors: no_input, cannot_read, corrupt.
 [[nodiscard]] Image load_image(const std::filesystem::path& path, const Context& context = {},
                                std::vector<VolumeFinding>* findings = nullptr);

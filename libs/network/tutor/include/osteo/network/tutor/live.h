@@ -237,7 +237,7 @@ class LiveGuest {
   void put(const FarSample& own) noexcept { own_.push(own); }
 
   [[nodiscard]] JoinState state() const { return state_; }
-  [[nodiscard]] const std::string& why() const { return pairing_.why(); }  ///< refused: in words
+  [[nodiscard]] const std::string& why() const { return pairing_.why(); }  ///< rejected: in words
   [[nodiscard]] bool answered() const { return pairing_.answered(); }      ///< a host has been heard of, joined or not
   [[nodiscard]] const ClockSync& clock() const { return clock_; }
   /// Whole settings of the session; empty until they are here.
@@ -247,7 +247,7 @@ class LiveGuest {
   [[nodiscard]] std::optional<LiveTick> next();
   [[nodiscard]] std::uint64_t next_tick() const { return next_tick_; }
   [[nodiscard]] std::uint64_t host_tick() const { return host_tick_; }
-  /// 0: none heard of. When it is another than before, settings and all ticks are asked for anew.
+  /// 0: none heard of. When it is another than before, settings and all ticks are asked for again.
   [[nodiscard]] std::uint64_t session() const { return session_; }
   /// The host's session has ended, and next() has given all of it.
   [[nodiscard]] bool over() const { return host_state_ == LogState::over && taken_ == host_tick_; }

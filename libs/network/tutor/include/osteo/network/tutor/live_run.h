@@ -49,7 +49,7 @@ class HostThread {
   LiveHost& host_;
   Rehearsal& rehearsal_;
   StreamReader& stream_;
-  std::unique_ptr<ReaderHub> hub_;
+  std::unique_ptr<ReaderDispatcher> dispatcher_;
   UdpSocket socket_;
   const int port_;
   std::atomic<bool> stop_{false};

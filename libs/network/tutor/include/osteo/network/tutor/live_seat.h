@@ -30,7 +30,7 @@ class YieldingHand final : public Device {
 };
 
 /// Words for session.json of who has joined.
-[[nodiscard]] std::string joined_words(JoinRole role);
+[[nodiscard]] std::string joined_text(JoinRole role);
 
 /// How someone takes part.
 struct SeatOptions {
@@ -42,7 +42,7 @@ struct SeatOptions {
 
 struct SeatStatus {
   JoinState state = JoinState::asking;
-  std::string why;  ///< it was refused
+  std::string why;  ///< it was rejected
   double rtt_ms = 0, offset_ms = 0, drift_ppm = 0, lost = 0;
   std::uint64_t ticks = 0, behind_ticks = 0;  ///< done here; known of beyond that
   bool over = false;                          ///< the host's session has ended, and all of it is here
@@ -67,7 +67,7 @@ class LiveSeat {
   LiveSeat& operator=(const LiveSeat&) = delete;
 
   /// What the session is. Waits at most `most_s` for an answer, and as long again while no more of it comes. Errors:
-  /// failed, where it is refused or nobody answers; corrupt; cancelled.
+  /// failed, where it is rejected or nobody answers; corrupt; cancelled.
   [[nodiscard]] SessionHeader wait_for_session(double most_s, const Context& context);
   /// After that: what the session goes on from (live_past.h); empty: nothing.
   [[nodiscard]] Bytes past() const;

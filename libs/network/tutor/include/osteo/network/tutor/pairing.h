@@ -5,10 +5,10 @@
 //   guest                                   host, an entry for each attempt (address, nonce)
 //   asking   -- ask(nonce, role) ------->   none -> challenged
 //            <- challenge(host nonce, share)
-//   proving  -- prove(host nonce, share, tag) -> challenged -> proved, or refused (wrong code)
+//   proving  -- prove(host nonce, share, tag) -> challenged -> proved, or rejected (wrong code)
 //            <- wait                        proved: a seat is not decided yet
 //            <- welcome(connection, tag)    proved -> welcomed
-//            <- refused(why)                proved -> refused (full)
+//            <- refused(why)                proved -> rejected (full)
 //            <- again                       no such entry: it was forgotten
 //
 // The guest repeats its packet every 100 ms until it is answered; each attempt has a nonce of its own. `again`, or 2 s
@@ -80,7 +80,7 @@ class PairingHost {
     std::optional<Pairing> pairing;  // challenged
     std::optional<PairKeys> keys;    // proved
     std::int64_t proved_us = 0, last_us = 0;
-    Bytes outcome;  // welcomed, refused: the answer
+    Bytes outcome;  // welcomed, rejected: the answer
   };
   struct Budget {
     double left = 0;
@@ -114,7 +114,7 @@ class PairingGuest {
   [[nodiscard]] std::optional<Bytes> poll(std::int64_t now_us);
 
   [[nodiscard]] State state() const { return state_; }
-  [[nodiscard]] const std::string& why() const { return why_; }  ///< refused: in words
+  [[nodiscard]] const std::string& why() const { return why_; }  ///< rejected: in words
   [[nodiscard]] bool answered() const { return answered_; }      ///< a host has been heard of
   [[nodiscard]] std::uint32_t connection() const { return connection_; }
   /// Joined: the keys, once; they are wiped here.

@@ -61,7 +61,7 @@ class LessonClock {
   [[nodiscard]] double behind_mm(Vec3 hand_mm) noexcept;
   const Lesson& lesson_;
   const bool waits_, by_clock_;
-  const double leash_mm_;
+  const double tolerance_mm_;
   bool begun_ = false, started_ = false, ended_ = false, goes_on_ = false;
   std::size_t sample_ = 0, furthest_ = 0, point_ = 0;
   Vec3 target_;

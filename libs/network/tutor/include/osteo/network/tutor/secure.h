@@ -35,7 +35,7 @@ void wipe(std::string& secret) noexcept;
 /// generator", code and both nonces, each text with its length; there it is that of SHA-512 over "CPaceRistretto255",
 /// padding, password, channel and session id. Keys are BLAKE2b over labels, nonces and shares, not the draft's ISK. So
 /// none of its published test vectors of generators or keys can be run against this; the group's operations behind them
-/// are libsodium's (RFC 9496), and a neutral or invalid share is refused as the draft demands.
+/// are libsodium's (RFC 9496), and a neutral or invalid share is rejected as the draft demands.
 class Pairing {
  public:
   static constexpr std::size_t kNonce = 16, kShare = 32;

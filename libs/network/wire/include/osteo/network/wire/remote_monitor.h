@@ -12,7 +12,7 @@
 
 namespace osteo::inline network {
 
-/// Listens to a server that StreamFeed fills. Sinks are made when it has said which channels there are, and anew when
+/// Listens to a server that StreamFeed fills. Sinks are made when it has said which channels there are, and again when
 /// it says otherwise or another session begins; they are told in the client's thread. What the network lost between two
 /// blocks is told as an event `lost`.
 class RemoteMonitor {

@@ -69,7 +69,7 @@ class StimulatorLink {
   /// Nothing until it is paired.
   [[nodiscard]] std::optional<WireBytes> set(const StimulatorSetting& setting);
   /// The monitor has told that it is so: by a search that ended, or whoever set it.
-  void told(double current_ma, bool search);
+  void reported(double current_ma, bool search);
   void lost();  ///< the connection
 
   struct State {

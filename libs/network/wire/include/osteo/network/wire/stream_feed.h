@@ -87,7 +87,7 @@ class WireOutlet {
     return true;
   }
   /// In a line, for people: where it is, who listened, what was dropped.
-  [[nodiscard]] virtual std::string told() const = 0;
+  [[nodiscard]] virtual std::string reported() const = 0;
   [[nodiscard]] virtual std::uint64_t dropped() const { return 0; }
 };
 /// Error(usage, failed) where it cannot be.
@@ -112,7 +112,7 @@ class StreamFeed final : public Reader, public MonitorSink {
 
   void let_stimulate(const std::shared_ptr<StimulatorDoor>& door);
   bool wait_for(std::size_t listeners, double most_s, const std::function<bool()>& stop);
-  [[nodiscard]] std::vector<std::string> told() const;
+  [[nodiscard]] std::vector<std::string> reported() const;
 
   struct Counts {
     std::uint64_t samples = 0, tools = 0, events = 0, cameras = 0, spikes = 0;

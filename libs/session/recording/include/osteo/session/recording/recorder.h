@@ -30,7 +30,7 @@ class Recorder {
   static constexpr double kFrameS = 0.1;
   /// Notes that wait for their frame.
   static constexpr std::size_t kMaxNotes = 4096, kLongestNote = 64 << 10;
-  /// Room in the reader's ring for the time in which even the first thread does not come to run: half a minute at 1
+  /// MainView in the reader's ring for the time in which even the first thread does not come to run: half a minute at 1
   /// kHz.
   static constexpr std::size_t kTickCapacity = 1 << 15;
 

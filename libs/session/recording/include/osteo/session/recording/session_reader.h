@@ -34,7 +34,7 @@ struct SessionOutline {
   std::map<std::uint32_t, std::string> action_names;  ///< as the file has them
   /// Instruments and plates by the numbers that its records carry as they are read: those of this build's libraries,
   /// whatever numbers the file has for the same names. What it lists and this build does not know has no number: a
-  /// record that tells of it is refused.
+  /// record that tells of it is rejected.
   std::vector<std::string> tools, plates;
   bool numbered_alike = true;  ///< the file has the same numbers for what both know
   /// Of its settings, under the numbers that its `setting` actions carry in the file; read, they carry the numbers of
@@ -73,7 +73,7 @@ class SessionReader {
  public:
   /// Looks through the whole file: all checksums, none of the records. Behind damage it looks for the next whole frame.
   /// Errors: no_input, cannot_read; corrupt when it is of another format (says which), the header is damaged, a frame
-  /// in the middle is (Damage::refuse), or ticks are missing without anything that says so. A cut or damaged last frame
+  /// in the middle is (Damage::reject), or ticks are missing without anything that says so. A cut or damaged last frame
   /// is left out without error: `end` is then absent, and `torn_bytes` not 0.
   explicit SessionReader(const std::filesystem::path& path, Damage damage = Damage::refuse);
   ~SessionReader();

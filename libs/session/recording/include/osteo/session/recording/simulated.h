@@ -11,6 +11,6 @@ namespace osteo::inline session {
 inline constexpr std::string_view kSimulatedNote = "simulated";
 
 /// For whoever shows a session, in a sentence; empty where a person drilled it. Reads until the first note at most.
-[[nodiscard]] std::string simulated_words(const SessionReader& session);
+[[nodiscard]] std::string simulated_text(const SessionReader& session);
 
 }  // namespace osteo::inline session

@@ -24,7 +24,7 @@ struct CaseImages {
   std::string mark;                  ///< scan_mark of the CT
 };
 
-/// Of dims and voxels: the same whatever program writes the file anew, in whatever order of fields, compression or
+/// Of dims and voxels: the same whatever program writes the file again, in whatever order of fields, compression or
 /// world axes.
 [[nodiscard]] std::string scan_mark(const Image& ct);
 

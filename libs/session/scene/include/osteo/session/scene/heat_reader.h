@@ -17,8 +17,8 @@
 namespace osteo::inline session {
 
 /// How much of a burr's work becomes heat in bone, and what water does. Known within a factor of ten at best: chosen so
-/// that a third of a watt for 30 s gives 13 K at 3 mm, as reported for grinding (docs/validation/heat.md); temperatures follow it
-/// in proportion.
+/// that a third of a watt for 30 s gives 13 K at 3 mm, as reported for grinding (docs/validation/heat.md); temperatures
+/// follow it in proportion.
 struct HeatOfCutting {
   /// Of force times speed of the burr's surface, cutting burrs: friction times the share that stays in bone.
   double cutting_share = 0.03;
@@ -127,6 +127,6 @@ class HeatReader final : public Reader {
 
 /// What it found, a line each: warmest bone and where its heat went; each structure that became warm; none at risk. For
 /// people.
-[[nodiscard]] std::vector<std::string> told(const HeatReader& heat, const StructureMap* structures);
+[[nodiscard]] std::vector<std::string> reported(const HeatReader& heat, const StructureMap* structures);
 
 }  // namespace osteo::inline session

@@ -87,7 +87,7 @@ class MonitorReader final : public Reader {
   [[nodiscard]] double bone_between(Vec3 from_mm, Vec3 to_mm) const;
   void warm_up();
   void pulse(std::uint64_t first, std::size_t samples);
-  void tell(MonitorEvent event);
+  void notify(MonitorEvent event);
   [[nodiscard]] std::uint64_t sample_of(std::uint64_t tick) const;
 
   MonitorOptions options_;

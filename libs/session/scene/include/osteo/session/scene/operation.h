@@ -35,7 +35,7 @@ class Operation {
   /// To be told of the stream, in any one thread; without it undo knows nothing of the burr's strokes.
   [[nodiscard]] Reader& strokes() { return strokes_; }
   /// In the thread that acts: the world knows of the strokes that strokes() was told of; before each action by itself.
-  void take_strokes() { strokes_.tell_to(world_); }
+  void take_strokes() { strokes_.report_to(world_); }
   /// The servo has taken up all that was done.
   [[nodiscard]] bool taken() const noexcept { return servo_.taken(); }
 

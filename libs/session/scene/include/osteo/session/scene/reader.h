@@ -19,7 +19,7 @@ class Reader {
  public:
   virtual ~Reader() = default;
   /// The scene as it is: the first call of all, unless the reader was made from that scene; and again after ticks or
-  /// actions were lost. What follows from the scene has to be made anew. Densities may be ahead of the ticks that come
+  /// actions were lost. What follows from the scene has to be made again. Densities may be ahead of the ticks that come
   /// next by what the stream holds.
   virtual void resync(const World& world) { static_cast<void>(world); }
   /// The world was changed by an action (ActionRow::changes_world) that the stream tells of later. Bodies that are new
@@ -42,10 +42,10 @@ class Reader {
 };
 
 /// Drains one end of a stream and tells its readers. One thread at a time.
-class ReaderHub {
+class ReaderDispatcher {
  public:
   /// `from` and `world` must outlive this. `world`: the scene that the stream is of.
-  ReaderHub(StreamReader& from, const World& world);
+  ReaderDispatcher(StreamReader& from, const World& world);
 
   /// From now on, until it is removed; it must live as long. A reader that was made from the scene as it is has no need
   /// of resync().
@@ -68,7 +68,7 @@ class ReaderHub {
 
  private:
   std::size_t take_actions();
-  void tell(const SceneAction& action);
+  void notify(const SceneAction& action);
   void resync_and_update(bool lost);
 
   StreamReader& from_;

@@ -35,7 +35,7 @@ struct RehearsalOptions {
       heard;  ///< each note too, in the thread that leaves it
 };
 
-/// An action that was refused, or done otherwise than asked.
+/// An action that was rejected, or done otherwise than asked.
 struct ActionNote {
   std::uint64_t tick = 0;
   ActionKind kind{};
@@ -124,7 +124,7 @@ class Rehearsal {
   void seat(Device* device, const Seqlock<TickRecord>* now, std::size_t hand);
 
   /// From any thread: soon, in the order they were asked for. One that waits is replaced by the next where that is
-  /// enough (ActionRow::last_counts). What runs elsewhere is changed there alone: refused.
+  /// enough (ActionRow::last_counts). What runs elsewhere is changed there alone: rejected.
   void act(const SceneAction& action);
   /// From any thread but the servo's: something that does not touch physics, at the tick that comes next. Counted where
   /// it is not kept.
@@ -144,7 +144,7 @@ class Rehearsal {
   /// Soft tissue cut off; 0 where the scene has none.
   [[nodiscard]] double tissue_mm3() const { return tissue_mm3_; }
   [[nodiscard]] bool realtime() const { return loop_ && loop_->realtime(); }
-  /// Parts that hang together, of at least PiecesReader::kMinPieceMm3, as last seen; 0 unless they are followed.
+  /// Parts that are connected, of at least PiecesReader::kMinPieceMm3, as last seen; 0 unless they are followed.
   [[nodiscard]] int pieces() const { return pieces_; }
   /// Null where the scene has none.
   [[nodiscard]] const StructureMap* structures() const { return options_.anatomy.structures.get(); }
@@ -198,10 +198,10 @@ class Rehearsal {
   Stream stream_;
   std::unique_ptr<Recorder> recorder_;
   Operation operation_;
-  ReaderHub hub_;
+  ReaderDispatcher dispatcher_;
   std::mutex keeper_mutex_;
   StreamReader& keeper_end_;
-  ReaderHub keeper_;  // strokes and counts: drained beside the others, however long those are kept from it
+  ReaderDispatcher keeper_;  // strokes and counts: drained beside the others, however long those are kept from it
   std::uint64_t strokes_dropped_ = 0;
   std::atomic<bool> strokes_lost_{false};
   std::array<Seqlock<TickRecord>, kMaxHands> latest_;

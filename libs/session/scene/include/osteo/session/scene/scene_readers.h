@@ -29,7 +29,7 @@ struct SceneReaders {
   SceneReaders(const World& world, const ReaderList& list, double rate_hz, const Context& context,
                const StructureMap* structures = nullptr);
   /// All of them, which are of the hub's scene as it is; counts to a hub of their own where there is one.
-  void add_to(ReaderHub& hub, ReaderHub* counts = nullptr);
+  void add_to(ReaderDispatcher& dispatcher, ReaderDispatcher* counts = nullptr);
   /// Empty where the surface is not listed.
   [[nodiscard]] std::string surface_hash() const { return surface ? surface->hash() : std::string(); }
   /// Empty where pieces are not listed.

@@ -71,7 +71,7 @@ void apply_haptic_settings(const std::filesystem::path& case_folder, const std::
 /// The constants of the law by which bone resists the burr, as summary.json has them, or null: all alike.
 [[nodiscard]] std::string hardness_json(const Anatomy& anatomy);
 /// The same in a sentence, with how to turn it off.
-[[nodiscard]] std::string told_hardness(const Anatomy& anatomy);
+[[nodiscard]] std::string reported_hardness(const Anatomy& anatomy);
 /// What the burr did near each critical structure, as summary.json lists it: seconds, not ticks; what was never within
 /// reach is not there.
 [[nodiscard]] std::string structures_json(const std::map<std::uint32_t, StructureEvents>& structures,

@@ -44,7 +44,7 @@ class SessionPlayer {
     std::vector<VoxelChange> changes;  // with the densities before
     TickRecord last;
   };
-  void tell(const Step& step);
+  void notify(const Step& step);
   void go_to_step(std::size_t steps);
 
   World begin_;

@@ -19,7 +19,7 @@ class SessionScene final : public Reader {
   SessionScene(const ReaderList& follow, double rate_hz, const Context& context)
       : follow_(follow), rate_hz_(rate_hz), context_(context) {}
 
-  /// The scene it begins with; again: it begins anew.
+  /// The scene it begins with; again: it begins again.
   void resync(const World& world) override;
   void action(const SceneAction& action) override;
   void tick(const TickRecord& record, std::span<const VoxelChange> changes) override;
@@ -47,7 +47,7 @@ class SessionScene final : public Reader {
   std::unique_ptr<SceneReaders> readers_;
   std::array<TickRecord, kMaxHands> latest_{};
   std::array<bool, kMaxHands> in_use_{};
-  std::vector<VoxelChange> told_changes_;
+  std::vector<VoxelChange> reported_changes_;
   double removed_mm3_ = 0;
 };
 
@@ -55,6 +55,6 @@ class SessionScene final : public Reader {
 /// repeat. Files keep what a tenth of a second changed, so all of that comes with its last tick. First resync() with
 /// `begin`; where the bone is not known any more (SessionOutline::bone_known_until) it ends. Error(corrupt) when the
 /// session is of another bone.
-void tell_recorded(const SessionReader& session, const World& begin, Reader& reader, const Context& context = {});
+void report_recorded(const SessionReader& session, const World& begin, Reader& reader, const Context& context = {});
 
 }  // namespace osteo::inline session

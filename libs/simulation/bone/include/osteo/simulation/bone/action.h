@@ -18,7 +18,7 @@ enum class ActionKind : std::uint32_t {
   hold = 1,       ///< nothing may be removed until the next action that ends it: something is being prepared
   resume,         ///< it may again
   saw,            ///< take out a blade's width
-  split,          ///< take apart what does not hang together
+  split,          ///< take apart what does not are connected
   move,           ///< put a piece somewhere, and all that is plated to it
   grip,           ///< take a plate into a hand, turn it, or put it away
   attach,         ///< fix a plate to one piece or two

@@ -26,7 +26,7 @@ class DepthMap {
 
   /// Notes removed voxels, then spreads the news for at most `budget` blocks. No allocation.
   void update(const BrickGrid& bone, std::span<const VoxelKey> changed, int budget) noexcept;
-  /// True when all news has spread; then the map equals one made anew, within a block.
+  /// True when all news has spread; then the map equals one made again, within a block.
   [[nodiscard]] bool settled() const { return waiting_ == 0; }
   [[nodiscard]] std::size_t memory_bytes() const { return nearest_.size() * 9; }
 

@@ -1,4 +1,4 @@
-// Which parts of live bone still hang together.
+// Which parts of live bone still are connected.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -20,7 +20,7 @@ struct PieceOrigin {
 /// Connected parts of the voxels with density of at least a half, kept up to date while bone is removed: labels within
 /// each brick, links between bricks, both made again only where voxels changed; then all joined by union-find. About 10
 /// us for a changed brick and 1 ms for the joining in a whole head. Reads the bone while the servo writes it; what it
-/// misses is marked and seen in the next update. `face`: voxels that share a face hang together (so does the surface's
+/// misses is marked and seen in the next update. `face`: voxels that share a face are connected (so does the surface's
 /// triangle mesh, nearly); `full`: an edge or a corner is enough. Memory: 576 bytes a brick and about 100 a part of a
 /// brick.
 class LiveComponents {
@@ -51,7 +51,7 @@ class LiveComponents {
     std::array<double, 6>
         inertia_mm2{};  ///< about the centre along the world's axes, for mass 1 a voxel: xx, yy, zz, xy, xz, yz
   };
-  /// Brings labels up to date; components ascending by first voxel, the same as labelling anew. Valid until the next
+  /// Brings labels up to date; components ascending by first voxel, the same as labelling again. Valid until the next
   /// update.
   std::span<const Component> update();
   /// Index into what update() gave; kNone for a voxel that is not solid.

@@ -38,7 +38,7 @@ class LiveSurface {
   /// shaded 45.
   std::span<const std::uint32_t> update();  // valid until the next update() or settle()
   /// Shaded: makes the patches again whose points stayed when something a few bricks away was marked, but whose normals
-  /// may be others; returns those bricks, ascending. After it all is as if made anew. What update() left for it can
+  /// may be others; returns those bricks, ascending. After it all is as if made again. What update() left for it can
   /// wait: it is hardly seen.
   std::span<const std::uint32_t> settle();  // valid until the next update() or settle()
   [[nodiscard]] bool settled() const { return stale_.empty(); }

@@ -123,6 +123,6 @@ struct StructureCut {
                                                        double within_mm = 5);
 
 /// "the facial nerve (2.4 mm3) and the sigmoid sinus (31 mm3)"; empty: none is cut.
-[[nodiscard]] std::string told_structures_cut(const StructureMap& map, std::span<const StructureCut> cuts);
+[[nodiscard]] std::string reported_structures_cut(const StructureMap& map, std::span<const StructureCut> cuts);
 
 }  // namespace osteo::inline simulation

@@ -122,8 +122,8 @@ class World {
   /// first. Memory: 12 bytes for each voxel of a stroke, and about 50 while it goes on; when strokes together need more
   /// than kMaxStrokeBytes, the oldest is forgotten, with all that came before it: undo goes back to there and no
   /// farther, and says so.
-  void tell(std::span<const VoxelChange> changes);
-  void tell(const SceneAction& action);
+  void notify(std::span<const VoxelChange> changes);
+  void notify(const SceneAction& action);
   /// Changes or actions of the stream were missed: nothing that came before can be taken back any more, nor the stroke
   /// that goes on.
   void forget();
@@ -171,10 +171,10 @@ class World {
 
   std::vector<PlacedBody> bodies_;
   std::vector<Fixture> fixtures_;
-  // Actions are done before the stream tells of them: the first told_ of these it has told of, and strokes come in
+  // Actions are done before the stream tells of them: the first reported_ of these it has told of, and strokes come in
   // behind those.
   std::vector<Done> done_;
-  std::size_t told_ = 0;
+  std::size_t reported_ = 0;
   std::vector<Change> stroke_;  // that goes on, by names
   std::unordered_map<VoxelKey, std::uint32_t> in_stroke_;
   bool missed_ = false;  // since something was missed, nothing has come that surely begins a new step

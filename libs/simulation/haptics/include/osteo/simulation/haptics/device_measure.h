@@ -13,7 +13,7 @@ struct MeasuredDevice {
   DeviceTraits traits;
   bool delay_measured = false;
   double delay_error_s = 0;  ///< standard error of the delay
-  std::string told;          ///< one line for people: what was measured, what was told, or why nothing could be
+  std::string reported;      ///< one line for people: what was measured, what was told, or why nothing could be
 };
 
 /// Added to a told delay that could not be confirmed: a frame of USB each way is easily overlooked.

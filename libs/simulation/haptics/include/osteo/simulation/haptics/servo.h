@@ -63,7 +63,7 @@ class Servo {
   std::atomic<std::uint64_t> ticks_{0};
   std::atomic<double> removed_mm3_{0};
   std::atomic<const Handover*> inbox_{nullptr};
-  void tell_stroke(std::uint64_t tick, bool removes) noexcept;
+  void report_stroke(std::uint64_t tick, bool removes) noexcept;
   std::array<Vec3, kMaxHands> force_n_;
   std::uint64_t pause_ticks_, last_removal_ = 0;
   bool in_stroke_ = false;

@@ -104,7 +104,7 @@ class Stream {
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
 
-  /// Told of what is published from now on; belongs to the stream until it leaves. Allocates: never in the servo.
+  /// Reported of what is published from now on; belongs to the stream until it leaves. Allocates: never in the servo.
   /// Error(resources) where kMaxReaders are there.
   StreamReader& add_reader(std::size_t tick_capacity = 1 << 13, std::size_t change_capacity = 1 << 21);
   /// Waits for the end of a publish() that may still use it (microseconds), then it is gone. Others notice nothing.

@@ -21,7 +21,7 @@ struct MarkerPatch {
 
 /// A hexagonal prism that a pen goes through: two rows of six markers and one on the upper end. From every side but
 /// below at least two faces that are 60 degrees apart are seen, so that one flat marker's two possible poses never have
-/// to be told apart for long. Origin in its middle, z along the pen away from the tip.
+/// to be distinguished for long. Origin in its middle, z along the pen away from the tip.
 struct PenBody {
   static constexpr double kFaceMm = 28, kHeightMm = 56, kMarkerMm = 24, kCapMarkerMm = 28;
   static constexpr int kMarkers = 13, kMaxPens = 3;

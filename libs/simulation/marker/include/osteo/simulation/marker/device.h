@@ -23,7 +23,7 @@ enum class CameraPlace : int { facing, above, behind };
 }
 /// Columns are the camera's axes (x right, y down, z ahead) on the desk: right, away, up. Facing: on the screen,
 /// looking at the user; above: looking down, its picture's top away from the user; behind: over the user's shoulder.
-[[nodiscard]] Mat3 desk_from_camera(CameraPlace place);
+[[nodiscard]] Mat3 controller_from_camera(CameraPlace place);
 
 /// Reads a camera in a thread of its own and follows one pen: sees it, smooths, hands the motion on. A camera that is
 /// not there, or goes, is looked for again twice a second; a video ends.
@@ -51,7 +51,7 @@ class PenLink {
  private:
   void run();
   void read_on();
-  void tell(const PenSight& sight, bool live);
+  void notify(const PenSight& sight, bool live);
   void say(const std::string& what);
   Open open_;
   CameraModel camera_;

@@ -107,7 +107,7 @@ struct MeasuredCalibration {
 };
 
 /// Fits `model` (which is left calibrated) to points measured on surfaces. The distance of each to the model's moved
-/// surface, along the normal of what is nearest, is found anew for every shape, with its exact derivative through the
+/// surface, along the normal of what is nearest, is found again for every shape, with its exact derivative through the
 /// equilibrium; of markers all three coordinates count. Losses are A. Cauchy's, their width from the median of what is
 /// left, so that stray points count little: fit, find the noise, fit again until it stays. It begins at the one factor
 /// on the closed form that explains most, from stiff to soft.

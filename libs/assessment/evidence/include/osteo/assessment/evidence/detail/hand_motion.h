@@ -67,7 +67,7 @@ class HandMotion {
         window_(static_cast<std::uint64_t>(std::max(1LL, std::llround(window_s * rate_hz)))),
         at_mm_(2 * window_) {}
 
-  /// Ticks in order; one that does not follow the last begins anew.
+  /// Ticks in order; one that does not follow the last begins again.
   void add(std::uint64_t tick, Vec3 at_mm) {
     if (count_ > 0 && tick != tick_ + 1) forget();
     tick_ = tick;
@@ -81,7 +81,7 @@ class HandMotion {
     if (count_ >= 2 * window_) before_sum_ = before_sum_ - oldest;
     ++count_;
   }
-  /// Nothing is known of the hand: what comes next begins anew.
+  /// Nothing is known of the hand: what comes next begins again.
   void forget() {
     count_ = 0;
     last_sum_ = before_sum_ = {};

@@ -38,7 +38,7 @@ class BoneView {
   /// Renews the chunks that hold these bricks. Farther bone, which may get more light now, keeps its colours until
   /// refresh().
   void update(const LiveSurface& surface, std::span<const std::uint32_t> bricks);
-  /// Colours as if shown anew. 0.3 us for each vertex within Openness::kReachMm of what was updated since, here or in
+  /// Colours as if shown again. 0.3 us for each vertex within Openness::kReachMm of what was updated since, here or in
   /// bone that shades it.
   void refresh(const LiveSurface& surface);
   /// Views of bone that always moves with this one and stands in its light, as this in theirs: a finer region and what

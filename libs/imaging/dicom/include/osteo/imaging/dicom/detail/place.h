@@ -25,7 +25,7 @@ struct PlacedSlice {
 };
 
 struct Placement {
-  std::vector<PlacedSlice> slices;  ///< at least two when the verdict is not "refused"
+  std::vector<PlacedSlice> slices;  ///< at least two when the verdict is not "rejected"
   Vec3 origin_mm, along_row, along_column, normal;
   double column_spacing_mm = 0, row_spacing_mm = 0;
   bool even = false;  ///< straight and evenly spaced to within kStraightMm: voxels can be taken as they are

@@ -1,4 +1,4 @@
-// The table of all codes of a verdict: how grave, whether it refuses the scan, from which size on it is told, and what
+// The table of all codes of a verdict: how grave, whether it rejects the scan, from which size on it is told, and what
 // is done. docs/formats/verdict.md holds the same table, and a test holds the two together.
 #pragma once
 #include <span>
@@ -11,7 +11,7 @@ namespace osteo::inline imaging {
 inline constexpr double kTiltDeg = 0.05;   ///< slices that lean by less are straight: 0.2 mm over a head
 inline constexpr double kShiftMm = 0.05;   ///< of a slice, sideways against the others
 inline constexpr double kMaxBoneCm2 = 80;  ///< of bone in each slice on average: a skull has up to 45, a pelvis 60
-inline constexpr double kShiftedHu = 200;  ///< values shifted by as much are refused
+inline constexpr double kShiftedHu = 200;  ///< values shifted by as much are rejected
 inline constexpr double kSliceBlankEndMm2PerMm =
     1700;  ///< a body that ends between two slices: three times what a head's vault does
 inline constexpr double kSlicePartShare = 0.15;    ///< of the body in a slice that is of one value
@@ -24,7 +24,7 @@ enum class Refuses {
   yes,
   unless_any_modality,  ///< --any-modality takes the scan all the same
   beyond_tolerance,
-  when_nothing_is_left,  ///< the file is left out; the scan is refused when none can be used
+  when_nothing_is_left,  ///< the file is left out; the scan is rejected when none can be used
 };
 
 struct VerdictCode {

@@ -1,4 +1,4 @@
-// Which parts of the bone hang together, body by body, while it is drilled.
+// Which parts of the bone are connected, body by body, while it is drilled.
 #pragma once
 #include <map>
 #include <memory>
@@ -23,7 +23,7 @@ class PiecesReader final : public Reader {
 
   /// Null where there is no such body.
   [[nodiscard]] const LiveComponents* components(std::uint32_t body) const;
-  /// Parts that hang together, of at least kMinPieceMm3, largest first, over all bodies; centres in the world.
+  /// Parts that are connected, of at least kMinPieceMm3, largest first, over all bodies; centres in the world.
   [[nodiscard]] std::vector<LiveComponents::Component> large_pieces() const;
   static constexpr double kMinPieceMm3 = 50;
 

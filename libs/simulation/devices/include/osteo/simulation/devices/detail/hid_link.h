@@ -53,7 +53,7 @@ class HidLink {
 };
 
 /// Opens the first device of the kernel for which `wanted` holds, or with `before` the first behind as many of those:
-/// two alike are told apart by the order of their paths.
+/// two alike are distinguished by the order of their paths.
 [[nodiscard]] HidLink::Open open_first(std::function<bool(const HidInfo&)> wanted, int before = 0);
 
 }  // namespace osteo::inline simulation

@@ -1,5 +1,5 @@
 // What is in the reports of the devices known here: bytes to values and back. Pure functions; short and garbled reports
-// are refused, long ones read up to what is known.
+// are rejected, long ones read up to what is known.
 #pragma once
 #include <array>
 #include <cstddef>

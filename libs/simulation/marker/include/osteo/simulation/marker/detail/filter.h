@@ -21,7 +21,8 @@ struct PenMotion {
 };
 
 /// How lively a hand is taken to be: the spectral density of its acceleration, less while it rests. More follows
-/// quicker and lets more noise through; chosen by measured error while moving and jitter at rest (docs/how-to/marker.md).
+/// quicker and lets more noise through; chosen by measured error while moving and jitter at rest
+/// (docs/how-to/marker.md).
 struct PenFilterParams {
   double acceleration_mm2_s3 = 2e5;
   double turning_rad2_s3 = 60;
@@ -31,7 +32,7 @@ struct PenFilterParams {
 };
 
 /// Kalman filters of constant velocity, of tip and rotation, each measured with the covariance that the picture gives:
-/// across the view a pen is known well, along it ten times worse. Starts anew after a gap of 0.3 s.
+/// across the view a pen is known well, along it ten times worse. Starts again after a gap of 0.3 s.
 class PenFilter {
  public:
   explicit PenFilter(Vec3 tip_mm, const PenFilterParams& params = {});

@@ -19,7 +19,7 @@ struct NerveCourse {
 };
 
 /// Middles of the rings that are equally far from one end over the surface (Dijkstra along its edges), straight on
-/// where at the ends rings are not closed. For every part that hangs together and is longer than 1 mm; parts are joined
+/// where at the ends rings are not closed. For every part that is connected and is longer than 1 mm; parts are joined
 /// in the order in which they lie along `distal` (unit). For tubes: measured on the phantom's facial nerve in
 /// docs/validation/accuracy.md. O(n log n) of its points; the same for the same surface.
 [[nodiscard]] NerveCourse course_of(const TriMesh& face, Vec3 distal, std::string name);

@@ -38,7 +38,7 @@ struct TissueLoad {
   std::vector<Moved> moved;
   /// Rigid things that points of the body's surface are pushed out of.
   std::vector<RigidContact> contacts;
-  /// Gravity whose weight is not among the forces: for inp_text(), which writes it as such. What solves refuses it.
+  /// Gravity whose weight is not among the forces: for inp_text(), which writes it as such. What solves rejects it.
   Vec3 gravity_m_s2{};
   /// Spreads a force over a tetrahedron as a body force (gravity) acts: a quarter a corner; of quadratic ones a fifth
   /// in the middle of each edge and less than nothing at the corners.
