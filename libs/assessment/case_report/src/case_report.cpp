@@ -139,7 +139,7 @@ void add_row(Sheet& s, const Pictures& pictures, double height_mm,
 
 sheet::Table structure_table(const std::vector<StructureMeasure>& measures) {
   sheet::Table t;
-  t.head = {"structure", "volume", "pieces", "length", "nearest to it", "usual", ""};
+  t.head = {"structure", "volume", "parts", "length", "nearest to it", "usual", ""};
   t.widths = {18, 12, 10, 11, 25, 30, 17};
   const auto name_of = [&](std::uint8_t value) {
     for (const auto& m : measures) {

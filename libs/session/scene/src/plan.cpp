@@ -77,7 +77,7 @@ std::string write_plan(const World& world, const fs::path& folder, const Context
   const double steps = static_cast<double>(world.bodies().size() + world.fixtures().size());
   double done = 0;
   for (const PlacedBody& b : world.bodies()) {
-    context.progress(done++ / steps, "pieces");
+    context.progress(done++ / steps, "fragments");
     const std::string name = "piece-" + std::to_string(b.body->id) + ".stl";
     const VolumeSurface surface = surface_of_volume(b.body->bone, context);
     if (surface.mesh.triangles.empty()) {

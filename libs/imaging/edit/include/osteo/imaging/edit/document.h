@@ -29,7 +29,7 @@ struct EditStructure {
 struct EditOutcome {
   bool changed = false;  ///< false: nothing was done, and there is no step
   std::string text;      ///< "threshold from 300 HU"
-  std::string note;      ///< "3 pieces removed, 1 left"; or why nothing changed
+  std::string note;      ///< "3 components removed, 1 left"; or why nothing changed
   double added_mm3 = 0, removed_mm3 = 0;
 };
 
