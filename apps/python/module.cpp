@@ -6,10 +6,12 @@
 #include <cstring>
 #include <mutex>
 #include <optional>
+#include <span>
 
 #include "arrays.h"
 #include "osteo/app/stages/registry.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/param.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/imaging/pipeline/formats.h"
 #include "osteo/imaging/pipeline/pipeline.h"
@@ -650,12 +652,12 @@ PYBIND11_MODULE(_osteo, m) {
   add_rehearsal(m);
   m.def("declarations", &declarations);
   m.def("old_names", [] {
-    const auto of = [](std::span<const OldName> names) {
+    const auto of = [](std::span<const osteo::OldName> names) {
       py::dict d;
-      for (const OldName& n : names) d[py::str(std::string(n.old))] = std::string(n.current);
+      for (const osteo::OldName& n : names) d[py::str(std::string(n.old))] = std::string(n.current);
       return d;
     };
-    return py::make_tuple(of(old_command_names()), of(old_field_names()));
+    return py::make_tuple(of(osteo::old_command_names()), of(osteo::old_field_names()));
   });
   m.def("run", &run);
 
