@@ -14,6 +14,7 @@
 #include "commands/export.h"
 #include "commands/export_result.h"
 #include "commands/export_slicer.h"
+#include "commands/goal_cavity.h"
 #include "commands/heat.h"
 #include "commands/import_slicer.h"
 #include "commands/info.h"
@@ -85,7 +86,8 @@ std::vector<cli::Group> command_groups() {
       {"Rehearse",
        {"rehearse", "estimate-cost", "export-result", "replay", "playback", "tutor", "join", "devices", "markers",
         "calibrate-camera", "calibrate-pen", "track-pen", "stream", "nerve-console"}},
-      {"Review and teach", {"review", "score", "study", "movie", "export", "heat", "sound", "nerve-monitor"}},
+      {"Review and teach",
+       {"review", "score", "goal-cavity", "study", "movie", "export", "heat", "sound", "nerve-monitor"}},
       {"Server and PACS", {"batch", "receive", "watch-folder", "send", "fetch", "deidentify", "doctor"}},
       {"Geometry",
        {"mesh-info", "mesh-repair", "voxelize", "distance", "distance-at", "compare", "virtual-fixture", "saw",
@@ -138,6 +140,7 @@ cli::Program make_osteo_program() {
 #ifdef OSTEO_WITH_MOVIE
   p.add<MovieCommand>();
 #endif
+  p.add<GoalCavityCommand>();
   p.add<ReviewCommand>();
   p.add<ExportCommand>();
   p.add<SoundCommand>();

@@ -39,6 +39,9 @@ int SimulateTraineeCommand::run(const Params& p, cli::Invocation& io) {
   options.seed = static_cast<std::uint64_t>(io.common.seed);
   options.most_s = p.minutes * 60;
   options.plan.radius_mm = p.window_mm;
+  options.plan.goal = p.goal;
+  if (p.goal && io.given.contains("window_mm"))
+    throw Error(ExitCode::usage, "--window-mm has no effect with --goal", "give one of them");
   if (io.given.contains("approach")) {
     options.plan.toward = Vec3{p.approach[0], p.approach[1], p.approach[2]};
     if (length(*options.plan.toward) == 0)

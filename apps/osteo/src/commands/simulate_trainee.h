@@ -16,6 +16,7 @@ struct SimulateTraineeCommand {
     double minutes = 3;
     std::array<double, 3> approach{0, 0, 0};
     double window_mm = 4.5;
+    bool goal = false;
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder of the session (empty: CASE/sessions/N; also -o)"}, p.out);
@@ -30,6 +31,7 @@ struct SimulateTraineeCommand {
     visit({"approach", "direction from the bone to the surgeon, LPS (0,0,0: as the procedure's items have it)", "",
            -1e4, 1e4},
           p.approach);
+    visit({"goal", "drill the whole goal cavity of the procedure ('osteo goal-cavity') and not a window"}, p.goal);
     visit({"window_mm", "radius of what it opens, for the burr's middle", "mm", 1, 20}, p.window_mm);
   }
   static cli::CommandInfo info();

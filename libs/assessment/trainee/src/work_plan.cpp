@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/portable_math.h"
@@ -11,146 +12,13 @@
 
 namespace osteo::inline assessment {
 
-double kept_mm(ProcedureRole role) {
-  switch (role) {
-    case ProcedureRole::expose:
-      return 0.4;
-    case ProcedureRole::thin:
-      return 1.2;
-    case ProcedureRole::enter:
-      return -1e9;
-    case ProcedureRole::keep:
-    case ProcedureRole::never_touch:
-      break;
-  }
-  return 1;
-}
-
 namespace {
 
-constexpr double kPitch = 1, kStep = 0.25;           // mm: of columns, and along them
+constexpr double kPitch = 1;                         // mm, of columns
 constexpr double kClosed = 0.7;                      // of the window's radius
 constexpr double kPressMm = 1;                       // into the next layer
 constexpr double kGridShiftMm = 7, kBeliefMm = 2.5;  // at no skill at all
 constexpr double kLeanDeg = 40;                      // so that not the burr's slow pole does the work
-
-// A burr that goes straight down: by the depth of its lowest point along the way from the surgeon.
-struct Column {
-  double top = 0;  ///< the bone's surface, mm along `toward`
-  bool bone = false;
-  double safe = 0;               ///< as deep as it may
-  std::optional<double> target;  ///< as deep as a target region goes, above what is not safe
-  double in_target_mm = 0;       ///< of the way, with the burr in a target region
-};
-
-class Columns {
- public:
-  Columns(const World& world, const StructureMap& structures, const Procedure& procedure, Vec3 toward,
-          double most_depth)
-      : bone_(world.bodies().front().body->bone),
-        structures_(structures),
-        toward_(toward),
-        across_(any_perpendicular(toward)),
-        along_(cross(toward, across_)),
-        most_depth_(most_depth),
-        each_(structures.values().size()) {
-    for (const std::uint8_t value : structures.values()) {
-      const ProcedureStructure* const s = procedure.find(structures.name_of(value));
-      role_.push_back(s != nullptr ? s->role : ProcedureRole::keep);
-      double within = -1;
-      for (const ProcedureRegion& r : procedure.regions)
-        if (r.kind == RegionKind::target && r.structure == structures.name_of(value))
-          within = std::max(within, r.within_mm);
-      within_.push_back(within);
-      double ruled = 0;
-      for (const InstrumentRule& r : procedure.instruments)
-        if (r.structure == structures.name_of(value)) ruled = std::max(ruled, r.within_mm);
-      ruled_.push_back(ruled);
-    }
-    // Above all bone near the targets.
-    BoxMm box;
-    for (std::size_t n = 0; n < within_.size(); ++n) {
-      if (within_[n] < 0) continue;
-      for (const auto& p : structures.face(n).points_mm) box.include(from_floats(p));
-    }
-    if (box.lo.x > box.hi.x) {
-      std::string names;
-      for (const ProcedureRegion& r : procedure.regions)
-        if (r.kind == RegionKind::target) names += (names.empty() ? "'" : ", '") + r.structure + "'";
-      throw Error(ExitCode::usage,
-                  names.empty() ? "the procedure has no target region, so there is nothing to drill towards"
-                                : "the case has none of the structures that the target regions lie around: " + names,
-                  names.empty() ? "add one of kind \"target\" to its \"regions\""
-                                : "prepare the case with --structures and --names");
-    }
-    for (int c = 0; c < 8; ++c) {
-      const Vec3 p{(c & 1) != 0 ? box.hi.x : box.lo.x, (c & 2) != 0 ? box.hi.y : box.lo.y,
-                   (c & 4) != 0 ? box.hi.z : box.lo.z};
-      flat_.include({dot(p, across_), dot(p, along_), dot(p, toward_)});
-    }
-    above_ = flat_.hi.z + 25;
-  }
-
-  [[nodiscard]] Vec3 place(double u, double v, double t) const { return across_ * u + along_ * v + toward_ * t; }
-  [[nodiscard]] const BoxMm& flat() const { return flat_; }
-  [[nodiscard]] Vec3 across() const { return across_; }
-  [[nodiscard]] Vec3 along() const { return along_; }
-
-  /// `belief`: by how much it thinks structures deeper. `ruled`: it keeps out of where only other instruments are
-  /// allowed.
-  [[nodiscard]] Column column(double u, double v, double radius, double belief, bool ruled) const {
-    Column c;
-    const RoundCone ball{0, 0, radius, radius};
-    double t = above_;
-    for (; t > flat_.lo.z && bone_.nearest(place(u, v, t)) < 0.5F; t -= kStep) {
-      // A hollow that is deeper than the burr is no surface to begin at.
-      if (t < flat_.hi.z - 30) return c;
-    }
-    if (t <= flat_.lo.z) return c;
-    c.top = t;
-    c.bone = true;
-    c.safe = t;
-    for (; t > c.top - most_depth_ - belief; t -= kStep) {
-      structures_.clearance(ball, place(u, v, t + radius), toward_, each_);
-      bool reaches = false;
-      for (std::size_t n = 0; n < each_.size(); ++n) {
-        const double kept =
-            std::max(kept_mm(role_[n]), ruled && role_[n] != ProcedureRole::enter ? ruled_[n] : -1e9) - belief;
-        if (each_[n] < kept) return c;
-        reaches = reaches || (within_[n] >= 0 && each_[n] <= within_[n]);
-      }
-      c.safe = t;
-      if (!reaches) continue;
-      c.target = t;
-      c.in_target_mm += kStep;
-    }
-    return c;
-  }
-
- private:
-  const BrickGrid& bone_;
-  const StructureMap& structures_;
-  Vec3 toward_, across_, along_;
-  double most_depth_, above_ = 0;
-  std::vector<ProcedureRole> role_;
-  std::vector<double> within_, ruled_;  // by number of structure
-  mutable std::vector<double> each_;
-  BoxMm flat_;
-};
-
-Vec3 toward_of(const Procedure& procedure) {
-  Vec3 view, shown;
-  for (const ScaleItem& i : procedure.items) {
-    const Vec3 towards = normalized({i.towards[0], i.towards[1], i.towards[2]});
-    if (i.kind == ItemKind::no_overhang) view += towards;
-    if (i.kind == ItemKind::exposed) shown += towards;
-  }
-  const Vec3 toward = normalized(length(view) > 0 ? view : shown);
-  if (length(toward) == 0)
-    throw Error(ExitCode::usage, "no item of the procedure says from where its structures are come to",
-                "give --approach, or \"towards\" of an item of kind no_overhang or exposed");
-  return toward;
-}
 
 // Leaning over the middle of the window, the more the farther from it, as far as the shaft finds room in the opening:
 // `room` around its middle, `depth` above the burr.
@@ -165,10 +33,118 @@ Vec3 lean(const Columns& c, Vec3 toward, double u, double v, double radius, doub
   return normalized(toward + side * tangent);
 }
 
+// Rows of a layer, to and fro. `low`: of a column the burr's lowest point in this layer, and as deep as it may be
+// pressed; nothing where there is no work.
+struct Low {
+  double at, most;
+};
+
+WorkPlan plan_goal(const World& world, const StructureMap& structures, const Procedure& procedure,
+                   const WorkPlanOptions& o) {
+  GoalOptions options;
+  options.burr_mm = o.fine_diameter_mm;
+  options.toward = o.toward;
+  const GoalCavity g = goal_cavity(world, structures, procedure, options);
+  WorkPlan plan;
+  plan.toward = g.toward;
+  plan.coarse_tool = static_cast<std::uint8_t>(burr_index(BurrKind::cutting, o.coarse_diameter_mm));
+  plan.fine_tool = static_cast<std::uint8_t>(burr_index(BurrKind::diamond, o.fine_diameter_mm));
+  const double coarse = o.coarse_diameter_mm / 2, fine = o.fine_diameter_mm / 2;
+  const Columns columns(world, structures, procedure, g.toward, options.most_depth_mm);
+  // The middle and the width of the opening; the highest and the lowest place.
+  double u0 = 0, v0 = 0, n = 0, highest = -1e300, lowest = 1e300;
+  for (int j = 0; j < g.nv; ++j)
+    for (int i = 0; i < g.nu; ++i) {
+      const std::size_t at = g.index(i, j);
+      if (std::isnan(g.bottom[at])) continue;
+      u0 += g.u0 + i * g.pitch_mm;
+      v0 += g.v0 + j * g.pitch_mm;
+      highest = std::max(highest, g.top[at]);
+      lowest = std::min(lowest, g.bottom[at]);
+      ++n;
+    }
+  u0 /= n;
+  v0 /= n;
+  for (int j = 0; j < g.nv; ++j)
+    for (int i = 0; i < g.nu; ++i)
+      if (!std::isnan(g.bottom[g.index(i, j)]))
+        plan.radius_mm =
+            std::max(plan.radius_mm, portable::hypot(g.u0 + i * g.pitch_mm - u0, g.v0 + j * g.pitch_mm - v0));
+  plan.open_mm = plan.radius_mm;
+  plan.centre_mm = g.place(u0, v0, highest);
+  // A coarse burr keeps within the floor, and out of where the procedure allows only other burrs.
+  const auto floor_of = [&](int i, int j) {
+    if (i < 0 || i >= g.nu || j < 0 || j >= g.nv) return highest;
+    const std::size_t at = g.index(i, j);
+    return !std::isnan(g.floor[at]) ? g.floor[at] : std::isnan(g.top[at]) ? -1e300 : g.top[at];
+  };
+  std::vector<double> coarse_low(g.bottom.size(), highest);
+  const int reach = static_cast<int>(coarse / g.pitch_mm), step = std::max(1, static_cast<int>(kPitch / g.pitch_mm));
+  for (int j = 0; j < g.nv; j += step)
+    for (int i = 0; i < g.nu; i += step) {
+      if (std::isnan(g.bottom[g.index(i, j)])) continue;
+      double low = -1e300;
+      for (int b = -reach; b <= reach; ++b)
+        for (int a = -reach; a <= reach; ++a) {
+          const double off = portable::hypot(a, b) * g.pitch_mm;
+          if (off <= coarse)
+            low = std::max(low, floor_of(i + a, j + b) - coarse + std::sqrt(coarse * coarse - off * off));
+        }
+      const Column c = columns.column(g.u0 + i * g.pitch_mm, g.v0 + j * g.pitch_mm, coarse, 0, true);
+      coarse_low[g.index(i, j)] = c.bone ? std::max(low, c.safe) : low;
+    }
+  int layer = 0;
+  const double room = plan.radius_mm + fine - 1.5;
+  const auto rows = [&](std::uint8_t tool, double radius, int row_step, const auto& low_of) {
+    const bool crosswise = layer % 2 == 1;
+    bool back = false, any = false;
+    for (int r = 0; r < (crosswise ? g.nu : g.nv); r += row_step) {
+      TraineeStroke s;
+      s.tool = tool;
+      s.layer = layer;
+      const int length_of = crosswise ? g.nv : g.nu, last = (length_of - 1) / step * step;
+      for (int q = 0; q <= last; q += step) {
+        const int at_q = back ? last - q : q, i = crosswise ? r : at_q, j = crosswise ? at_q : r;
+        const std::size_t at = g.index(i, j);
+        if (std::isnan(g.bottom[at])) continue;
+        const std::optional<Low> low = low_of(at);
+        const double u = g.u0 + i * g.pitch_mm, v = g.v0 + j * g.pitch_mm;
+        // A row goes on over what is nothing's, but not over what stands between.
+        if (!low) {
+          if (!s.points.empty()) plan.strokes.push_back(std::exchange(s, {tool, true, layer, {}}));
+          continue;
+        }
+        any = true;
+        s.points.push_back({g.place(u, v, low->at + radius),
+                            lean(columns, plan.toward, u - u0, v - v0, plan.radius_mm, room, highest - low->at),
+                            std::clamp(low->at - low->most, 0.0, kPressMm)});
+      }
+      if (s.points.empty()) continue;
+      back = !back;
+      plan.strokes.push_back(std::move(s));
+    }
+    if (any) ++layer;
+  };
+  for (double t = highest - o.layer_mm; t > lowest - o.layer_mm; t -= o.layer_mm)
+    rows(plan.coarse_tool, coarse, 2 * step, [&](std::size_t at) -> std::optional<Low> {
+      const double low = std::max(t, coarse_low[at]);
+      if (low > t + o.layer_mm || g.top[at] < low) return std::nullopt;
+      return Low{low, coarse_low[at]};
+    });
+  for (double t = highest - o.fine_layer_mm; t > lowest - o.fine_layer_mm; t -= o.fine_layer_mm)
+    rows(plan.fine_tool, fine, step, [&](std::size_t at) -> std::optional<Low> {
+      const double low = std::max(t, g.bottom[at]);
+      if (low > t + o.fine_layer_mm || low > coarse_low[at] + o.fine_layer_mm) return std::nullopt;
+      return Low{low, g.bottom[at]};
+    });
+  return plan;
+}
+
 }  // namespace
 
 WorkPlan plan_work(const World& world, const StructureMap& structures, const Procedure& procedure,
                    const TraineeSkill& skill, std::uint64_t seed, const WorkPlanOptions& o) {
+  if (o.goal) return plan_goal(world, structures, procedure, o);
   WorkPlan plan;
   plan.toward = o.toward ? normalized(*o.toward) : toward_of(procedure);
   plan.radius_mm = o.radius_mm;
@@ -276,9 +252,6 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
   // nothing where the cell has no part.
   int layer = 0;
   const double room = open + fine - 1.5;
-  struct Low {
-    double at, most;
-  };
   const auto rows = [&](const std::map<std::pair<int, int>, Cell>& of, bool crosswise, std::uint8_t tool, double radius,
                         int row_step, const auto& lowest) {
     bool back = false;

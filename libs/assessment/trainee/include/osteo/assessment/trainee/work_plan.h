@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "osteo/assessment/evidence/procedure.h"
+#include "osteo/assessment/goal/goal.h"
 #include "osteo/assessment/trainee/skill.h"
 #include "osteo/simulation/bone/structure_map.h"
 #include "osteo/simulation/bone/world.h"
@@ -44,12 +45,11 @@ struct WorkPlanOptions {
   double radius_mm = 4.5, most_depth_mm = 11, layer_mm = 3, fine_layer_mm = 0.8;
   double coarse_diameter_mm = 6, fine_diameter_mm = 4;
   std::optional<Vec3> toward;  ///< else from the directions that the procedure's items name
+  bool goal = false;           ///< the whole of the procedure's goal cavity, not a window of radius_mm
 };
 
-/// Kept between a structure's face and the burr by one who knows it.
-[[nodiscard]] double kept_mm(ProcedureRole role);
-
-/// The window is put where its columns have the longest ways in target regions before they come too near to a
+/// With `options.goal`: the goal cavity, in layers at right angles to its direction; skill.region, undercut and
+/// knowledge have no say. Else the window is put where its columns have the longest ways in target regions before they come too near to a
 /// structure. Errors: usage where the procedure has no target region, none of its structures is in the map, no item
 /// says from where, or no column reaches the target. Same arguments, same plan on any machine.
 [[nodiscard]] WorkPlan plan_work(const World& world, const StructureMap& structures, const Procedure& procedure,
