@@ -136,9 +136,9 @@ def round_trip():
         assert sorted(ask(f"/series/{i}")["MainDicomTags"]["Modality"] for i in ask("/series")) == ["CT", "M3D", "SEG"]
         # Titles: ours unknown to it, its own wrong.
         r = run(osteo, "send", "ct", "--peer", peer, "--ae", "NOBODY", rc=7)
-        assert "refuses NOBODY" in r.stderr, r.stderr
+        assert "rejects NOBODY" in r.stderr, r.stderr
         r = run(osteo, "send", "ct", "--peer", f"WRONG@127.0.0.1:{dicom}", rc=7)
-        assert "WRONG" in r.stderr and "refuses OSTEOTOME" in r.stderr, r.stderr
+        assert "WRONG" in r.stderr and "rejects OSTEOTOME" in r.stderr, r.stderr
         r = run(osteo, "send", "ct", "--peer", f"ORTHANC@127.0.0.1:{free_port()}", "--timeout-s", "5", rc=7)
         assert "cannot be reached" in r.stderr, r.stderr
         run(osteo, "send", "mask.nrrd", "--peer", peer, rc=3)
@@ -466,7 +466,7 @@ def doors():
             for data in objects(*a, **k):
                 ask("/instances", data)
         stable = lambda: [c for c in ask("/changes?limit=1000")["Changes"] if c["ChangeType"] == "StableSeries"]
-        assert "refuses the login" in events("spool", "cases", login="bad", rc=7)[1]
+        assert "rejects the login" in events("spool", "cases", login="bad", rc=7)[1]
         store("1.2.3.1", of=files[:-1])
         store("1.2.3.2", of=files[:1], own=True)
         store("1.2.3.3", of=files[:1], modality="MG")
@@ -674,7 +674,7 @@ def dicomweb():
     assert "would send to " + root[:-1] in web("send", "ct", "--dry-run"), "nobody is there, and nobody is asked"
     assert "onnect" in web("send", "ct", rc=7) and "onnect" in web("fetch", *study, rc=7)
     with orthanc(dicom, http_port, free_port(), SECRET, [plugin]) as ask:
-        assert "refuses the login" in web("send", "ct", login="bad", rc=7) and "asks for a login" in web("fetch", *study, login=None, rc=7)
+        assert "rejects the login" in web("send", "ct", login="bad", rc=7) and "asks for a login" in web("fetch", *study, login=None, rc=7)
         assert "root of a DICOMweb" in web("fetch", *study, at=root.replace("dicom-web/", ""), rc=7)
         assert "no STOW-RS" in json.dumps(web("send", "ct", "--json", "--quiet", at=root.replace("dicom-web/", "nothing"), rc=8))
         web("send", "ct", "--dry-run")
@@ -848,7 +848,7 @@ def dicomweb_lies():
         ("studies", (200, b"[" + b"{}," * 2_600_000 + b"{}]", {}), 7, "without a UID"), ("studies", (200, as_json([{}]), {}), 7, "without a UID"), ("studies", (200, as_json([1, "x", None]), {}), 7, "without a UID"),
         ("studies", (200, as_json([of_study | {"0020000D": text("../../../system")}]), {}), 7, "without a UID"),
         ("studies", (200, as_json([of_study | {"0020000D": text("1.2.840.2")}]), {}), 7, "not asked for"), ("studies", (200, as_json([of_study | {"00100020": text("ANOTHER", "LO")}]), {}), 7, "not asked for"),
-        ("studies", (302, b"", {"Location": "/web/elsewhere"}), 7, "points elsewhere"), ("studies", (500, b"no", {}), 7, "status 500"), ("studies", (401, b"", {"WWW-Authenticate": "Basic"}), 7, "refuses the login"),
+        ("studies", (302, b"", {"Location": "/web/elsewhere"}), 7, "points elsewhere"), ("studies", (500, b"no", {}), 7, "status 500"), ("studies", (401, b"", {"WWW-Authenticate": "Basic"}), 7, "rejects the login"),
         ("studies", "stall", 7, "imeout"), ("studies", "hang up", 7, ""), ("studies", (200, b"", "endless"), 7, ""), ("studies", (200, b"[]", {"Content-Length": "100"}), 7, ""),
         ("studies", new_ones("0020000D", {}), 7, "not asked for"), ("series", new_ones("0020000E", of_series), 2, "more than 10000"),
         ("series", (200, as_json([of_series | {"00080060": text("MR", "CS")}]), {}), 7, "not asked for"), ("series", (200, as_json([of_series | {"0020000D": text("1.2.840.2")}]), {}), 7, "not asked for"),
@@ -866,7 +866,7 @@ def dicomweb_lies():
         (series, (200, multi([good[0], good[1], instance(7)]), M), 7, "not asked for"), (series, (200, multi([deep, good[1], good[2]]), M), 7, ""),
         (series, (200, endless(b"x" * 65_536), M), 7, "boundary"), (series, (200, (p for head in [b"--b 0\r\n" + PART] for p in [head, *([b"x" * 65_536] * 100_000)]), M), 9, "larger than allowed"),
         (series, (302, b"", {"Location": f"/web/{series}"}), 7, "points elsewhere"), (series, (307, b"", {"Location": "http://127.0.0.1:1/"}), 7, "points elsewhere"),
-        (series, (206, whole, M), 7, "status 206"), (series, (404, b"", {}), 7, "status 404"), (series, (406, b" " * 20_000_000, {}), 7, "status 406"), (series, (500, b"no", {}), 7, "status 500"), (series, (403, b"", {}), 7, "refuses the login"),
+        (series, (206, whole, M), 7, "status 206"), (series, (404, b"", {}), 7, "status 404"), (series, (406, b" " * 20_000_000, {}), 7, "status 406"), (series, (500, b"no", {}), 7, "status 500"), (series, (403, b"", {}), 7, "rejects the login"),
         (series, "stall", 7, "imeout"), (series, "hang up", 7, ""), (series, (200, iter([whole[:2000]]), M), 7, "broke off")]
     before = set(work.iterdir())
     peak = 0

@@ -324,7 +324,7 @@ class HeadlessSession {
             << std::lround(l.work.quantile_us(0.999)) << " us; wake-up late p99 "
             << std::lround(l.lateness.quantile_us(0.99)) << " us; periods missed by our work " << l.missed_by_work
             << ", by the machine " << l.missed_by_machine << "; real-time priority "
-            << (l.realtime_granted ? "granted" : "rejected (" + l.realtime_refusal + ")") << '\n';
+            << (l.realtime_granted ? "granted" : "not granted (" + l.realtime_refusal + ")") << '\n';
   }
 
   const RehearseCommand::Params& p_;

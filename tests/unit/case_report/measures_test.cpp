@@ -79,7 +79,7 @@ TEST(Structures, LengthAlongABentTube) {
   const auto two = measure_structures(cut, {});
   const Plausibility doubt = plausibility_of(two[0]);
   EXPECT_FALSE(doubt.fits);
-  EXPECT_NE(doubt.doubt.find("in 2 pieces"), std::string::npos);
+  EXPECT_NE(doubt.doubt.find("in 2 fragments"), std::string::npos);
 }
 
 TEST(Structures, OnlyKnownNamesAreJudged) {

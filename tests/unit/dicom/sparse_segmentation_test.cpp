@@ -177,7 +177,7 @@ TEST(SparseSegmentation, WithoutAStatedDistanceThicknessDecides) {
   // Three times as far apart as thick: left out, or slices with space between them?
   save_segmentation(even, file);
   state(file, "", "0.5");
-  EXPECT_NE(load(file).refused.find("cannot be told"), std::string::npos);
+  EXPECT_NE(load(file).refused.find("cannot be known"), std::string::npos);
   // As thick as they lie apart: none is left out.
   const Labels wide = painted(stack(1.5), {{10, 1}, {11, 1}, {13, 1}});
   save_segmentation(wide, file);

@@ -70,10 +70,10 @@ TEST(Findings, InjuriesComeFirstAndTouchesAreNoInjuries) {
                    measured("touches", 0, "labyrinth"), measured("touched_s", 0, "labyrinth"),
                    measured("injured_s", 0, "labyrinth"), measured("clearance_mm", 0.34, "labyrinth")});
   for (const double t : {8.0, 20.0})
-    s.moments.push_back({t, {t, 0, 0}, "reached by a turning burr", "sigmoid sinus", -0.1, 0});
+    s.moments.push_back({t, {t, 0, 0}, "reached by a rotating burr", "sigmoid sinus", -0.1, 0});
   const Findings f = findings_of(s, nullptr, nullptr);
   EXPECT_EQ(f.list.front().id, "injury-sigmoid-sinus");
-  EXPECT_EQ(f.list.front().text, "A turning burr reached the sigmoid sinus twice, for 0.41 s in all.");
+  EXPECT_EQ(f.list.front().text, "A rotating burr reached the sigmoid sinus twice, for 0.41 s in all.");
   EXPECT_EQ(f.list.front().severity, FindingSeverity::serious);
   EXPECT_EQ(f.list.front().times_s, (std::vector<double>{8, 20}));
   EXPECT_EQ(*f.list.front().at_mm, (Vec3{8, 0, 0}));
@@ -84,7 +84,7 @@ TEST(Findings, InjuriesComeFirstAndTouchesAreNoInjuries) {
   // A saw is called a saw.
   s.moments.push_back({12, {}, "reached by the running saw", "sigmoid sinus", -0.1, 0});
   const ScoreFinding both = findings_of(s, nullptr, nullptr).list.front();
-  EXPECT_EQ(both.text, "A turning burr reached the sigmoid sinus twice and the running saw once, for 0.41 s in all.");
+  EXPECT_EQ(both.text, "A rotating burr reached the sigmoid sinus twice and the running saw once, for 0.41 s in all.");
   EXPECT_EQ(both.times_s, (std::vector<double>{8, 12, 20}));
   s.moments.erase(s.moments.begin(), s.moments.end() - 1);
   EXPECT_EQ(findings_of(s, nullptr, nullptr).list.front().text,
@@ -100,9 +100,9 @@ TEST(Findings, ASawIsCalledASaw) {
   EXPECT_EQ(findings_of(s, nullptr, nullptr).find("injury-dura")->text,
             "The running saw reached the dura once, for 0.2 s in all.");
   EXPECT_EQ(findings_of(s, nullptr, nullptr).find("injury-dura")->times_s, std::vector<double>{8});
-  s.moments.push_back({9, {}, "reached by a turning burr", "dura", -0.1, 0});
+  s.moments.push_back({9, {}, "reached by a rotating burr", "dura", -0.1, 0});
   EXPECT_EQ(findings_of(s, nullptr, nullptr).find("injury-dura")->text,
-            "A turning burr reached the dura once and the running saw once, for 0.2 s in all.");
+            "A rotating burr reached the dura once and the running saw once, for 0.2 s in all.");
 }
 
 TEST(Findings, ItemsSayWhatWasAsked) {

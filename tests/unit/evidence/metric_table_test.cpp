@@ -229,7 +229,7 @@ TEST(MetricTable, AnInjuryIsOneMomentAndContactsASecondApartAreEvents) {
       return std::count_if(r.score.moments.begin(), r.score.moments.end(),
                            [&](const Moment& m) { return m.what == what; });
     };
-    EXPECT_EQ(moments("reached by a turning burr"), 1);
+    EXPECT_EQ(moments("reached by a rotating burr"), 1);
     EXPECT_EQ(moments("pressed too hard near it"), 1);
     std::vector<double> touches_s, injuries_s;
     for (const TimelineEvent& e : r.timeline.events) {

@@ -304,7 +304,7 @@ TEST(Sessions, BonesInPiecesInRegionsAndGoneAltogether) {
   record(scratch / "two.oss", 2,
          {at(1200, SceneAction::saw({{3, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1300, SceneAction::split(5))});
   const Score two = score(scratch / "two.oss", &p);
-  EXPECT_TRUE(says(two, "bone in pieces"));
+  EXPECT_TRUE(says(two, "bone in fragments"));
   EXPECT_EQ(two.items[1].value, 2);
   EXPECT_FALSE(two.items[1].pass);  // one was asked for
   EXPECT_GT(value(two.values, "sawn_mm3"), 0);
@@ -327,7 +327,7 @@ TEST(Sessions, BonesInPiecesInRegionsAndGoneAltogether) {
   with_region.add_region(test::soft_solid(fine, slab));
   const Score region = other_bone("region.oss", std::move(with_region), test::holes(1, -6, 4.2));
   EXPECT_TRUE(says(region, "a finer region"));
-  EXPECT_FALSE(says(region, "bone in pieces"));
+  EXPECT_FALSE(says(region, "bone in fragments"));
   EXPECT_EQ(region.items[1].value, 1);  // a region is no piece
   const double gone = value(region.values, "hidden_mm3") / (1 - value(region.values, "seen_share") + 1e-12);
   if (value(region.values, "hidden_mm3") > 0) {

@@ -42,7 +42,7 @@ Review example() {
                     measured("injured_s", 0.4, "facial nerve"),
                     measured("force_p95_n", 1.5),
                     not_measured("region_per_voxel", "no reference")};
-  r.score.moments = {{3, {1, 2, 3}, "reached by a turning burr", "facial nerve", -0.1, 0}};
+  r.score.moments = {{3, {1, 2, 3}, "reached by a rotating burr", "facial nerve", -0.1, 0}};
   r.findings = findings_of(r.score, nullptr, nullptr);
   r.timeline.known.assign(120, 1);
   r.timeline.drilling.assign(120, 1);
@@ -68,12 +68,12 @@ Review example() {
 
 TEST(ReviewPage, SaysWhatWasFoundAndAsksForNothing) {
   const std::string html = review_html(example());
-  EXPECT_NE(html.find("A turning burr reached the facial nerve once, for 0.4 s in all."), std::string::npos);
+  EXPECT_NE(html.find("A rotating burr reached the facial nerve once, for 0.4 s in all."), std::string::npos);
   EXPECT_NE(html.find("31 mm³ of bone (30 %) was removed unseen."), std::string::npos);
   EXPECT_NE(html.find("<b>Scripted:</b>"), std::string::npos);
   EXPECT_NE(html.find("no reference"), std::string::npos);
   // The label comes before all that is said.
-  EXPECT_LT(html.find("Scripted"), html.find("A turning burr"));
+  EXPECT_LT(html.find("Scripted"), html.find("A rotating burr"));
   EXPECT_LT(html.find("id=\"finding-injury-facial-nerve\""), html.find("id=\"finding-hidden\""));
   EXPECT_EQ(count(html, "http"), 1U);  // http-equiv
   for (const char* const way : {"//cdn", "url(", "@import", "<link", "<iframe", "fetch(", "XMLHttpRequest", "import(",
