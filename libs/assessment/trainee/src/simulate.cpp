@@ -181,12 +181,12 @@ class TraineeMind final : public Reader {
     const bool change = s.tool != hand_.tool(), far = layer_at_ != s.layer || !in_hole_;
     layer_at_ = s.layer;
     const bool in_hole_before = std::exchange(in_hole_, true);
-    if (change || far || sideways > 2.5) {
+    if (change || far || sideways > (plan_.steep ? 0.3 : 2.5)) {
       TraineeStroke out, over;
       out.drilling = over.drilling = false;
       out.tool = hand_.tool();
       over.tool = s.tool;
-      const bool outside = change || above < -0.5 || sideways > 9 || !in_hole_before;
+      const bool outside = change || plan_.steep || above < -0.5 || sideways > 9 || !in_hole_before;
       const auto beside = [&](Vec3 p) {
         return p - plan_.centre_mm - plan_.toward * dot(p - plan_.centre_mm, plan_.toward);
       };

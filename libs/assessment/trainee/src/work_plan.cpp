@@ -18,6 +18,7 @@ constexpr double kPitch = 1;                         // mm, of columns
 constexpr double kClosed = 0.7;                      // of the window's radius
 constexpr double kPressMm = 1;                       // into the next layer
 constexpr double kGridShiftMm = 7, kBeliefMm = 2.5;  // at no skill at all
+constexpr double kStepMm = 0.3;                      // a floor's step that a stroke goes over, not through
 constexpr double kLeanDeg = 40;                      // so that not the burr's slow pole does the work
 
 // Leaning over the middle of the window, the more the farther from it, as far as the shaft finds room in the opening:
@@ -71,6 +72,7 @@ WorkPlan plan_goal(const World& world, const StructureMap& structures, const Pro
         plan.radius_mm =
             std::max(plan.radius_mm, portable::hypot(g.u0 + i * g.pitch_mm - u0, g.v0 + j * g.pitch_mm - v0));
   plan.open_mm = plan.radius_mm;
+  plan.steep = true;
   plan.centre_mm = g.place(u0, v0, highest);
   // A coarse burr keeps within the floor, and out of where the procedure allows only other burrs.
   const auto floor_of = [&](int i, int j) {
@@ -115,9 +117,29 @@ WorkPlan plan_goal(const World& world, const StructureMap& structures, const Pro
           continue;
         }
         any = true;
-        s.points.push_back({g.place(u, v, low->at + radius),
-                            lean(columns, plan.toward, u - u0, v - v0, plan.radius_mm, room, highest - low->at),
-                            std::clamp(low->at - low->most, 0.0, kPressMm)});
+        const TraineeStroke::Point here{
+            g.place(u, v, low->at + radius),
+            lean(columns, plan.toward, u - u0, v - v0, plan.radius_mm, room, highest - low->at),
+            std::clamp(low->at - low->most, 0.0, kPressMm)};
+        if (!s.points.empty()) {
+          // Across at the level of the highest floor on the way, then down: a straight line would cut a step's edge.
+          const TraineeStroke::Point before = s.points.back();
+          double level = std::max(dot(before.at_mm, plan.toward), low->at + radius);
+          for (int d = 1; d < step; ++d) {
+            const int q_between = at_q + (back ? d : -d);
+            const std::size_t between = crosswise ? g.index(r, q_between) : g.index(q_between, r);
+            level = std::max(level, (std::isnan(g.bottom[between]) ? highest : g.bottom[between]) + radius);
+          }
+          const auto lifted = [&](TraineeStroke::Point x) {
+            const double up = level - dot(x.at_mm, plan.toward);
+            x.at_mm += plan.toward * up;
+            x.press_mm = 0;
+            if (up > kStepMm) s.points.push_back(x);
+          };
+          lifted(before);
+          lifted(here);
+        }
+        s.points.push_back(here);
       }
       if (s.points.empty()) continue;
       back = !back;

@@ -37,6 +37,7 @@ struct WorkPlan {
   double radius_mm = 0;  ///< of the window, for the burr's centre
   double open_mm = 0;    ///< of what of it is opened at the surface
   Vec3 shifted_mm;       ///< by how much it lies beside the best place, for want of skill
+  bool steep = false;    ///< from stroke to stroke it goes by the outside: walls stand between
   std::vector<TraineeStroke> strokes;
   std::uint8_t coarse_tool = 0, fine_tool = 0;
 };
