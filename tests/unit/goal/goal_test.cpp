@@ -51,10 +51,10 @@ TEST(Goal, OpensWhatIsToBeOpened) {
   EXPECT_TRUE(g.has({0, 0, -3}));
   EXPECT_FALSE(g.has({0, 0, -6.5}));
   EXPECT_FALSE(g.has({10, 0, 7}));
-  // From above, columns of burrs of 2 mm radius whose ball comes within 1 mm of the ball: up to 7 mm from the middle,
+  // From above, columns of burrs whose lowest point comes within 1 mm of the ball: up to 5 mm from the middle,
   // and the burr's own radius beyond.
-  EXPECT_TRUE(g.has({6, 0, 7}));
-  const double least = M_PI * 7 * 7 * 6, most = M_PI * 9 * 9 * 14;
+  EXPECT_TRUE(g.has({4.5, 0, 7}));
+  const double least = M_PI * 5 * 5 * 8, most = M_PI * 7 * 7 * 13;
   EXPECT_GT(g.bone_mm3, least);
   EXPECT_LT(g.bone_mm3, most);
 }
@@ -86,7 +86,7 @@ TEST(Goal, TakesADirectionThatReachesMore) {
   const World world = slab();
   const StructureMap over = test::structure_map(
       [](Vec3 p) -> std::uint8_t {
-        if (std::abs(p.x - 1.5) < 2 && std::abs(p.z - 6) < 0.8 && std::abs(p.y) < 10) return 1;
+        if (std::abs(p.x - 2.5) < 1.5 && std::abs(p.z - 6) < 0.8 && std::abs(p.y) < 10) return 1;
         return length(p) < 4 ? 2 : 0;
       },
       {{1, "rod", {}}, {2, "cells", {}}}, 0.5, 30);

@@ -28,13 +28,14 @@ constexpr double kStep = 0.25;  // mm along a column
 }  // namespace
 
 Columns::Columns(const World& world, const StructureMap& structures, const Procedure& procedure, Vec3 toward,
-                 double most_depth)
+                 double most_depth, bool by_tip)
     : bone_(world.bodies().front().body->bone),
       structures_(structures),
       toward_(toward),
       across_(any_perpendicular(toward)),
       along_(cross(toward, across_)),
       most_depth_(most_depth),
+      by_tip_(by_tip),
       each_(structures.values().size()) {
   for (const std::uint8_t value : structures.values()) {
     const ProcedureStructure* const s = procedure.find(structures.name_of(value));
@@ -92,7 +93,9 @@ Column Columns::column(double u, double v, double radius, double belief, bool ru
       const double kept =
           std::max(kept_mm(role_[n]), ruled && role_[n] != ProcedureRole::enter ? ruled_[n] : -1e9) - belief;
       if (each_[n] < kept) return c;
-      reaches = reaches || (within_[n] >= 0 && each_[n] <= within_[n]);
+      if (within_[n] < 0) continue;
+      const double to = by_tip_ ? structures_.distance_mm(n, place(u, v, t)) : each_[n];
+      reaches = reaches || to <= within_[n];
     }
     c.safe = t;
     if (!reaches) continue;

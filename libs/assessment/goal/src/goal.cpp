@@ -42,7 +42,7 @@ Vec3 best_toward(const World& world, const StructureMap& structures, const Proce
   double most = -1;
   for (std::size_t n = 0; n < all.size(); ++n) {
     context.progress(0.6 * static_cast<double>(n) / static_cast<double>(all.size()), "directions");
-    const double gain = gain_of(Columns(world, structures, procedure, all[n], o.most_depth_mm), o.burr_mm / 2);
+    const double gain = gain_of(Columns(world, structures, procedure, all[n], o.most_depth_mm, true), o.burr_mm / 2);
     // The named one wins where another is hardly better.
     if (gain > most * (n == 0 ? 1 : 1.03)) {
       most = gain;
@@ -185,7 +185,7 @@ GoalCavity goal_cavity(const World& world, const StructureMap& structures, const
   g.toward = o.toward ? normalized(*o.toward) : best_toward(world, structures, procedure, o, context);
   g.pitch_mm = o.pitch_mm;
   g.burr_mm = o.burr_mm;
-  const Columns columns(world, structures, procedure, g.toward, o.most_depth_mm);
+  const Columns columns(world, structures, procedure, g.toward, o.most_depth_mm, true);
   g.across = columns.across();
   g.along = columns.along();
   const BoxMm& flat = columns.flat();

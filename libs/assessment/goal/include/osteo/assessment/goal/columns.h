@@ -31,9 +31,10 @@ struct Column {
 /// for several threads at once. A column costs a clearance of all structures each 0.25 mm of its depth.
 class Columns {
  public:
-  /// Error(usage) where the procedure has no target region, or the case none of their structures.
+  /// Error(usage) where the procedure has no target region, or the case none of their structures. `by_tip`: a target
+  /// region is reached by the burr's lowest point, so that nothing below it is wanted; else by any part of the burr.
   Columns(const World& world, const StructureMap& structures, const Procedure& procedure, Vec3 toward,
-          double most_depth_mm);
+          double most_depth_mm, bool by_tip = false);
   [[nodiscard]] Vec3 place(double u, double v, double t) const { return across_ * u + along_ * v + toward_ * t; }
   [[nodiscard]] Vec3 across() const { return across_; }
   [[nodiscard]] Vec3 along() const { return along_; }
@@ -48,6 +49,7 @@ class Columns {
   const StructureMap& structures_;
   Vec3 toward_, across_, along_;
   double most_depth_, above_ = 0;
+  bool by_tip_;
   std::vector<ProcedureRole> role_;
   std::vector<double> within_, ruled_;  // by number of structure
   mutable std::vector<double> each_;
