@@ -5,6 +5,7 @@
 #include <ostream>
 
 #include "osteo/core/base/json_document.h"
+#include "osteo/hospital/pacs/audit.h"
 #include "pacs_commands.h"
 
 namespace osteo {
@@ -49,6 +50,7 @@ int DeidentifyCommand::run(const Params& p, cli::Invocation& io) {
     if (!inside.empty() && *inside.begin() != "..")
       throw Error(ExitCode::usage, "the map would lie in the folder that leaves", "--map where only you can read");
   }
+  const AuditTrail trail;
   const DicomObjects all = list_objects({io.arguments[0]}, io.context.sub(0, 0.1));
   DeidentifyReport report;
   write_folder_atomically(p.out, unused, [&](const fs::path& folder) {
@@ -60,6 +62,13 @@ int DeidentifyCommand::run(const Params& p, cli::Invocation& io) {
     if (!p.map.empty()) write_deidentify_map(p.map, report);
   });
   io.end_progress();
+  if (trail.on()) {
+    AuditEvent event;
+    event.kind = AuditEvent::Kind::deidentify;
+    event.good = report.refused.empty();
+    event.studies = audit_studies(all.objects);
+    trail.notify(event, io.context);
+  }
   const auto why = reported_refusals(report, io);
   if (io.common.json) {
     Json refused = Json::list();

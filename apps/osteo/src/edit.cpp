@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "audit_case.h"
 #include "commands/edit.h"
 #include "commands/prepare.h"
 #include "osteo/core/base/error.h"
@@ -48,6 +49,7 @@ int EditCommand::run(const Params& p, cli::Invocation& io) {
     if (!p.scan.empty()) call.arguments.push_back(p.scan);
     return PrepareCommand::run(prepare, call);
   }
+  audit_case(AuditTrail(), AuditEvent::Kind::open, folder, io.context);
   std::vector<std::string> args{window_program("osteo-edit", "use --apply edits.json"), folder.string()};
   EditFlags flags = p, defaults;
   const auto usual = fields_of<EditFlags>(defaults), given = fields_of<EditFlags>(flags);

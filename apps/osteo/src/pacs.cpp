@@ -6,9 +6,11 @@
 #include <ostream>
 
 #include "osteo/core/base/json_document.h"
+#include "osteo/hospital/pacs/audit.h"
 #include "osteo/hospital/pacs/dicomweb.h"
 #include "osteo/hospital/pacs/fetch.h"
 #include "osteo/hospital/pacs/receive.h"
+#include "osteo/hospital/pacs/roles.h"
 #include "osteo/hospital/pacs/send.h"
 #include "pacs_commands.h"
 
@@ -93,6 +95,8 @@ cli::CommandInfo SendCommand::info() {
 
 int SendCommand::run(const Params& p, cli::Invocation& io) {
   const Door to = door_of(p, io);
+  const AuditTrail trail;
+  if (!p.dry_run) require_role("send", trail, io.context);
   if (!p.key.empty() && !p.deidentify)
     throw Error(ExitCode::usage, "--key is for --deidentify", "add it, or leave the key out");
   DicomObjects all = list_objects({io.arguments[0]}, io.context.sub(0, p.dry_run && !p.deidentify ? 1 : 0.05));
@@ -143,8 +147,21 @@ int SendCommand::run(const Params& p, cli::Invocation& io) {
     return static_cast<int>(left_out == 0 ? ExitCode::ok : ExitCode::partial);
   }
   const Context rest = io.context.sub(0.1, 1);
-  const SendReport report =
-      to.web ? send_objects(*to.web, all.objects, p.check, rest) : send_objects(*to.node, all.objects, p.check, rest);
+  AuditEvent event;
+  event.kind = AuditEvent::Kind::send;
+  event.peer = to.name;
+  if (trail.on()) event.studies = audit_studies(all.objects);
+  SendReport report;
+  try {
+    report =
+        to.web ? send_objects(*to.web, all.objects, p.check, rest) : send_objects(*to.node, all.objects, p.check, rest);
+  } catch (...) {  // some may have left before
+    event.good = false;
+    trail.notify(event, io.context);
+    throw;
+  }
+  event.good = report.safe() == report.objects.size();
+  trail.notify(event, io.context);
   io.end_progress();
   Json problems = Json::list();
   std::map<std::string, std::pair<int, std::string>> why;
@@ -270,6 +287,7 @@ cli::CommandInfo ReceiveCommand::info() {
 }
 
 int ReceiveCommand::run(const Params& p, cli::Invocation& io) {
+  const AuditTrail trail;
   ReceiveOptions o;
   o.ae = checked_ae(p.ae);
   o.address = p.bind;
@@ -294,6 +312,14 @@ int ReceiveCommand::run(const Params& p, cli::Invocation& io) {
              << (o.anybody ? ", anybody may send" : "") << std::endl;
   };
   events.closed = [&](const ClosedSeries& s) {
+    trail.report_apart(
+        [&] {
+          AuditEvent event;
+          for (const std::string& title : s.from) event.peer += (event.peer.empty() ? "" : ",") + title;
+          event.studies = audit_studies(list_objects({s.folder}).objects);
+          return event;
+        },
+        io.context);
     if (io.common.json)
       io.out << Json{{"closed", s.folder.string()}, {"objects", s.objects}, {"bytes", s.bytes}}.dump() << std::endl;
     else

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <ostream>
 
+#include "audit_case.h"
 #include "built_in_pipelines.h"
 #include "case_edits.h"
 #include "case_pipeline.h"
@@ -454,7 +455,13 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   if (p.out.empty())
     throw Error(ExitCode::usage,
                 "where to? osteo prepare " + (io.arguments.empty() ? "SCAN" : io.arguments[0]) + " -o CASE");
-  return Preparation(p, io).run();
+  const AuditTrail trail;
+  const int done = Preparation(p, io).run();
+  // What changes a case by hand ends here: 'edit' and its window, 'take-back', and who gives corrections.
+  if (done == 0 && (io.given.contains("edits") || io.given.contains("structures") ||
+                    fs::path(p.pipeline).filename() == kCorrectedPipeline))
+    audit_case(trail, AuditEvent::Kind::edit, p.out, io.context);
+  return done;
 }
 
 }  // namespace osteo

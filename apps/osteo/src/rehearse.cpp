@@ -6,6 +6,7 @@
 #include <ostream>
 #include <thread>
 
+#include "audit_case.h"
 #include "commands/rehearse.h"
 #include "osteo/app/cli/report.h"
 #include "osteo/core/base/error.h"
@@ -358,6 +359,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
     io.out << haptic_settings_json(setup);
     return 0;
   }
+  // Before it begins: the window becomes this process.
+  if (!io.arguments.empty()) audit_case(AuditTrail(), AuditEvent::Kind::open, io.arguments[0], io.context);
   if (!p.headless) return open_window(p, io);
   return HeadlessSession(p, io).run(tool);
 }

@@ -1,6 +1,7 @@
 // report, approve: a case that a person can look at and stand for.
 #include <ostream>
 
+#include "audit_case.h"
 #include "built_in_pipelines.h"
 #include "case_pipeline.h"
 #include "commands/approve.h"
@@ -8,6 +9,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/hospital/pacs/roles.h"
 #include "osteo/imaging/dicom/objects.h"
 #include "osteo/session/scene/approval.h"
 #include "osteo/session/scene/case.h"
@@ -104,6 +106,7 @@ cli::CommandInfo ReportCommand::info() {
 
 int ReportCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0], object = p.dicom;
+  const AuditTrail trail;
   if (!object.empty()) {
     if (object.extension() != ".dcm")
       throw Error(ExitCode::usage, "'" + p.dicom + "' does not end in .dcm",
@@ -121,6 +124,7 @@ int ReportCommand::run(const Params& p, cli::Invocation& io) {
     save_encapsulated_pdf(read_text(report.pdf), "Bone for rehearsal: " + case_code(folder), object,
                           {of->series, "Bone for rehearsal, not for diagnosis"}, io.context);
     io.end_progress();
+    audit_case(trail, AuditEvent::Kind::hand_over, folder, io.context);
     if (!io.common.quiet) io.err << "  " << p.dicom << " (names the patient)\n";
   }
   if (io.common.json) {
@@ -152,6 +156,8 @@ int ApproveCommand::run(const Params& p, cli::Invocation& io) {
   if (p.withdraw && (!p.by.empty() || !p.note.empty()))
     throw Error(ExitCode::usage, "--withdraw takes the approval back: --by and --note do nothing beside it",
                 "leave them out");
+  const AuditTrail trail;
+  require_role("approve", trail, io.context);
   // A case whose files are not what its manifest says is not to be approved.
   static_cast<void>(load_case(folder));
   if (p.withdraw) {
@@ -170,6 +176,7 @@ int ApproveCommand::run(const Params& p, cli::Invocation& io) {
     }
     approve(folder, p.by, p.note);
   }
+  audit_case(trail, p.withdraw ? AuditEvent::Kind::withdraw : AuditEvent::Kind::approve, folder, io.context);
   const CaseReport report = make_report(folder, io);
   const ApprovalNow now = approval_of(folder);
   if (io.common.json) {

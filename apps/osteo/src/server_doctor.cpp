@@ -6,6 +6,8 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/hospital/pacs/audit.h"
+#include "osteo/hospital/pacs/roles.h"
 #include "osteo/hospital/pacs/server.h"
 
 namespace osteo {
@@ -40,6 +42,8 @@ int doctor_of_server(const DoctorCommand::Params& p, cli::Invocation& io) {
   s.jobs = p.jobs;
   s.memory_mb = p.memory_mb;
   std::vector<ServerFinding> found = check_server(s);
+  found.push_back(check_audit());
+  found.push_back(check_roles());
   if (!p.rules.empty()) {
     try {
       const std::size_t n = checked_rules(p.rules).size();

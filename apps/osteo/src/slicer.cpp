@@ -3,6 +3,7 @@
 #include <cmath>
 #include <ostream>
 
+#include "audit_case.h"
 #include "built_in_pipelines.h"
 #include "case_edits.h"
 #include "commands/export_slicer.h"
@@ -132,8 +133,10 @@ int ExportSlicerCommand::run(const Params& p, cli::Invocation& io) {
                 "give a new folder: what was edited there is not written over");
   std::optional<CaseEdits> edits;
   const CaseImages images = images_now(pipeline_of(io.arguments[0], p.source), io.arguments[0], edits, io);
+  const AuditTrail trail;
   hand_over(images, folder);
   io.end_progress();
+  audit_case(trail, AuditEvent::Kind::hand_over, io.arguments[0], io.context);
   if (io.common.quiet) return 0;
   io.err << (folder / "ct.nrrd").string() << "  (anonymous, but shows the face)\n"
          << (folder / "bone.seg.nrrd").string() << '\n';

@@ -104,6 +104,7 @@ struct Serving {
   SharedCounts& counts;
   Deadline& deadline;
   int pipe;
+  std::string from;         // title of who sends
   fs::path file;            // that is coming in
   std::uint64_t bytes = 0;  // of its data set, so far
 };
@@ -131,7 +132,7 @@ unsigned keep(Serving& s, const T_DIMSE_C_StoreRQ& request) {
   }
   s.counts.bytes += s.bytes;
   ++s.counts.stored;
-  const std::string line = place.parent_path().string() + "\n";
+  const std::string line = place.parent_path().string() + "\t" + s.from + "\n";
   [[maybe_unused]] const auto reported = ::write(s.pipe, line.data(), line.size());
   return STATUS_Success;
 }
@@ -268,7 +269,9 @@ void serve(int connection, int pipe, const fs::path& folder, const ReceiveOption
     ::_exit(2);
   }
   if (!let_in(association, options, counts)) ::_exit(2);
-  Serving s{folder, options, counts, deadline, pipe, {}, 0};
+  char calling[65] = "", called[65] = "", responding[65] = "";
+  ASC_getAPTitles(association->params, calling, sizeof calling, called, sizeof called, responding, sizeof responding);
+  Serving s{folder, options, counts, deadline, pipe, checked_ae(calling), {}, 0};
   for (;;) {
     // Waiting for a message has its own time. What was read before may hold the next one, and nothing is on its way.
     deadline.none();

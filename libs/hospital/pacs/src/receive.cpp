@@ -15,7 +15,9 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <map>
 #include <new>
+#include <set>
 
 #include "association.h"
 #include "inbox.h"
@@ -130,7 +132,9 @@ class Node {
         if (watched[n + 1].revents != 0) hear(children_[n]);
       bury();
       if ((watched[0].revents & POLLIN) != 0) accept();
-      for (const ClosedSeries& closed : inbox_.close_quiet(Clock::now())) {
+      for (ClosedSeries closed : inbox_.close_quiet(Clock::now())) {
+        closed.from = std::exchange(from_[closed.folder], {});
+        from_.erase(closed.folder);
         ++seen_.closed;
         if (events_.closed) events_.closed(closed);
       }
@@ -219,7 +223,10 @@ class Node {
     // It has closed its end: it is going, and if it were stuck on its way nobody would come for it.
     if (n == 0) ::kill(child.pid, SIGKILL);
     for (std::size_t end = 0; (end = child.rest.find('\n')) != std::string::npos;) {
-      inbox_.came(child.rest.substr(0, end), Clock::now());
+      const std::string line = child.rest.substr(0, end);  // the series' folder and the sender's title
+      const std::size_t tab = line.find('\t');
+      inbox_.came(line.substr(0, tab), Clock::now());
+      from_[folder_ / line.substr(0, tab)].insert(line.substr(tab + 1));
       child.rest.erase(0, end + 1);
     }
   }
@@ -271,6 +278,7 @@ class Node {
   std::vector<Child> children_;
   Descriptor lock_;
   pacs::Inbox inbox_;
+  std::map<fs::path, std::set<std::string>> from_;  // of series that are open
   Clock::time_point measured_at_{};
   Clock::duration measuring_took_{};
   bool folder_there_ = true, counters_failed_ = false;

@@ -6,6 +6,7 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,8 @@ struct ReceiveCounters {
 struct ClosedSeries {
   fs::path folder;  ///< FOLDER/study-xxxxxxxxxxxx/series-xxxxxxxxxxxx: names from hashes of the UIDs
   std::uint64_t objects = 0, bytes = 0;
+  std::set<std::string>
+      from;  ///< titles of the nodes that have sent of it since it was open; not known after a restart
 };
 
 struct ReceiveEvents {
