@@ -18,6 +18,9 @@ LIBRARIES = {
     "bone": (["libs/simulation/bone/src/*.cpp"], ["test_bone", "test_haptics", "test_scene"]),
     "recording": (["libs/session/recording/src/*.cpp"], ["test_recording", "test_scene"]),
     "scene": (["libs/session/scene/src/*.cpp"], ["test_scene"]),
+    "tutor": (["libs/network/tutor/src/*.cpp"], ["test_tutor"]),
+    "evidence": (["libs/assessment/evidence/src/*.cpp"], ["test_evidence"]),
+    "pacs": (["libs/hospital/pacs/src/*.cpp"], ["test_pacs"]),
     "dicom": (["libs/imaging/dicom/src/plac*.cpp"], ["test_dicom"]),
 }
 # Texts only for people, and loops for one kind of processor.

@@ -80,8 +80,9 @@ SessionFacts PastSession::facts(const Anatomy& anatomy) const {
   }
   if (const Json* const cuts = summary->find("structures_cut")) {
     for (const Json& c : cuts->items()) {
+      const Json* const by = c.find("by");
       if (const Json* const name = c.find("name"); name != nullptr && name->text() != nullptr)
-        f.add_cut(*name->text(), number(c, "mm3"));
+        f.add_cut(*name->text(), by != nullptr && by->text() != nullptr ? *by->text() : "saw", number(c, "mm3"));
     }
   }
   return f;

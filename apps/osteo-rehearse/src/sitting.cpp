@@ -389,7 +389,7 @@ SessionFacts SessionRunner::facts_of(const RehearsalSummary& s) const {
                             static_cast<double>(e.ticks_injured) / options_.rate_hz});
   }
   for (const StructureCutEvent& e : s.structure_cuts) {
-    if (map != nullptr) f.add_cut(map->name_of(e.cut.structure), e.cut.mm3);
+    if (map != nullptr) f.add_cut(map->name_of(e.cut.structure), std::string(name_of(e.by)), e.cut.mm3);
   }
   f.warnings = s.warnings;
   if (!s.gaps.empty())

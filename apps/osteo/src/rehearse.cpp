@@ -280,8 +280,8 @@ class HeadlessSession {
     }
     for (const StructureCutEvent& e : s_.structure_cuts) {
       if (options_.anatomy.structures)
-        io_.err << "INJURED at " << seconds_text(e.tick) << " s: the saw cut through "
-                << reported_structures_cut(*options_.anatomy.structures, std::span(&e.cut, 1)) << '\n';
+        io_.err << (e.cut.mm3 > 0 ? "INJURED at " : "at ") << seconds_text(e.tick)
+                << " s: " << reported_cut(*options_.anatomy.structures, e.by, std::span(&e.cut, 1)) << '\n';
     }
     if (s_.unusable_poses > 0)
       io_.err << "the pose could not be used for " << seconds_text(s_.unusable_poses)

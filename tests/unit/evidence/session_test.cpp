@@ -12,6 +12,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/session/recording/session_reader.h"
 #include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/scene/session_folder.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "scene.h"
 #include "scratch.h"
@@ -160,6 +161,32 @@ TEST(Sessions, ASawThroughAStructureIsTold) {
   ASSERT_NE(good.find("untouched"), nullptr);
   EXPECT_NE(good.find("untouched")->text.find("The saw's cuts passed the rod at 0."), std::string::npos)
       << good.find("untouched")->text;
+}
+
+// A burr that drills into a structure: one volume, in the summary, in the score and in the words.
+TEST(Sessions, WhatABurrTakesOfAStructureIsOneNumber) {
+  const test::ScratchFolder scratch;
+  Script down;
+  down.tool = burr_index(BurrKind::cutting, 2);
+  down.waypoints = {{0, {0, 0, 8}, true}, {0.2, {0, 0, 5}, true}, {3.5, {0, 0, 0.5}, true}, {3.7, {0, 0, 8}, false}};
+  Rehearsal r(block(), std::make_unique<ScriptedDevice>(down, 1000), options(scratch / "s.oss"), {});
+  const RehearsalSummary summary = r.run_to_end({});
+  ASSERT_EQ(summary.structure_cuts.size(), 1U) << summary.structures.at(1).least_clearance_mm;
+  const StructureCutEvent& e = summary.structure_cuts[0];
+  EXPECT_EQ(e.by, CutBy::burr);
+  EXPECT_GT(e.cut.mm3, 0.03);
+  EXPECT_GT(summary.structures.at(1).ticks_injured, 0U);
+  const Score s = score(scratch / "s.oss");
+  EXPECT_NEAR(value(s.values, "cut_mm3[rod]"), e.cut.mm3, 1e-9);
+  const Findings reported = findings_of(s, rod().get(), nullptr);
+  ASSERT_NE(reported.find("injury-rod"), nullptr);
+  EXPECT_NE(reported.find("injury-rod")->text.find(" in all, and took "), std::string::npos)
+      << reported.find("injury-rod")->text;
+  EXPECT_EQ(reported.find("cut-rod"), nullptr);
+  SessionFolder folder;
+  folder.folder = scratch.path();
+  RehearsalOptions o = options({});
+  EXPECT_NE(write_summary(folder, summary, 1000, "burr", o.anatomy).find("\"by\": \"burr\""), std::string::npos);
 }
 
 // The saw takes 220 mm3 and leaves a slice of 110 mm3 at the edge, which goes as a crumb: no saw took that.

@@ -50,6 +50,33 @@ TEST(Recorder, EndsWithASyncOfAllThatWasWritten) {
   EXPECT_EQ(heard.back(), 's') << heard;
 }
 
+// A file that is deleted while it is written takes all of it, and nobody finds it again: the recording has failed. One
+// that is moved is whole where it is.
+TEST(Recorder, AFileThatIsDeletedMeanwhileIsToldAndAMovedOneIsWhole) {
+  for (const bool deleted : {true, false}) {
+    const test::ScratchFolder at;
+    std::filesystem::create_directory(at / "session");
+    StreamReader reader(1 << 10, 1 << 10);
+    Recorder recorder(reader, at / "session" / "stream.oss", header());
+    recorder.start();
+    if (deleted) {
+      std::filesystem::remove_all(at / "session");
+    } else {
+      std::filesystem::rename(at / "session", at / "elsewhere");
+    }
+    TickRecord t;
+    reader.ticks.push(t);
+    recorder.finish({1, "abc", "", 0, "", 0, 0});
+    const auto failure = recorder.status().failure;
+    ASSERT_EQ(failure.has_value(), deleted);
+    if (deleted) {
+      EXPECT_NE(std::string(failure->what()).find("was deleted while it was recorded"), std::string::npos);
+    } else {
+      EXPECT_EQ(SessionReader(at / "elsewhere" / "stream.oss").outline().tick_records, 1U);
+    }
+  }
+}
+
 // What was buffered goes to the disk last: that it does not fit is told then.
 TEST(Export, ADiskWithoutRoomIsToldByEveryFormat) {
   const test::ScratchFolder recorded;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "bar.h"
+#include "scratch.h"
 #include "work_done.h"
 
 namespace osteo {
@@ -69,8 +70,12 @@ TEST(CutPreview, TheEndPageTellsOfACut) {
   SessionFacts facts;
   facts.has_structures = true;
   facts.structures = {{"sigmoid sinus", 1.5, 0, 0}};
-  facts.add_cut("facial nerve", 0.25);
-  facts.add_cut("facial nerve", 0.25);
+  facts.structures.push_back({"dura", 0, 2, 1.5});
+  facts.add_cut("facial nerve", "saw", 0.25);
+  facts.add_cut("facial nerve", "saw", 0.25);
+  facts.add_cut("dura", "burr", 3.1);
+  facts.add_cut("chorda", "shaft", 1);
+  facts.add_cut("malleus", "shaft", 0);
   const EndFacts end = end_facts(facts, WorkDone());
   const auto line = [&](const std::string& what) {
     for (const EndLine& l : end.lines) {
@@ -78,10 +83,21 @@ TEST(CutPreview, TheEndPageTellsOfACut) {
     }
     return EndLine{};
   };
-  EXPECT_EQ(line("facial nerve").value, "INJURED: cut through by the saw, 0.5 mm3 of it");
+  EXPECT_EQ(line("facial nerve").value, "INJURED: cut through by the saw, 0.5 mm³ of it");
+  EXPECT_EQ(line("dura").value, "INJURED: touched by the turning burr for 1.50 s, 3.1 mm³ of it");
+  EXPECT_EQ(line("chorda").value, "INJURED: the shaft went through it, 1 mm³ of it");
+  EXPECT_EQ(line("malleus").value, "contact with the shaft");
+  EXPECT_EQ(line("malleus").nearness, Nearness::close);
   EXPECT_EQ(line("facial nerve").nearness, Nearness::touched);
   EXPECT_EQ(line("sigmoid sinus").value, "never nearer than 1.5 mm");
   EXPECT_TRUE(line("critical structures").value.empty());
+}
+
+// A folder that was deleted while the session ran was told as kept.
+TEST(EndPage, SaysKeptOnlyOfWhatIsThere) {
+  const test::ScratchFolder scratch;
+  EXPECT_EQ(kept_text(scratch.path()), "What was recorded is kept: " + scratch.path().string());
+  EXPECT_EQ(kept_text(scratch / "1"), "Nothing of it is kept: " + (scratch / "1").string() + " was deleted or moved");
 }
 
 }  // namespace

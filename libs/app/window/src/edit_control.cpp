@@ -42,7 +42,7 @@ constexpr std::array<std::array<int, 3>, 8> kColours{{{255, 220, 60},
 }  // namespace
 
 std::string volume_text(double mm3) {
-  return mm3 >= 1000 ? rounded(mm3 / 1000) + " cm3" : rounded(mm3) + " mm3";
+  return mm3 >= 1000 ? rounded(mm3 / 1000) + " cm³" : rounded(mm3) + " mm³";
 }
 
 EditControl::EditControl(EditDocument& document)

@@ -136,7 +136,7 @@ void EditPanel::options(EditControl& control) {
       return;
     case EditTool::pieces:
       heading(title.c_str());
-      slider("##mm3", control.pieces_mm3, 0, 5000, "smaller than %.0f mm3", true);
+      slider("##mm3", control.pieces_mm3, 0, 5000, "smaller than %.0f mm³", true);
       ImGui::SetNextItemWidth(ImGui::GetFontSize() * 6);
       ImGui::InputInt("largest stay (0: all)", &control.pieces_largest);
       control.pieces_largest = std::clamp(control.pieces_largest, 0, 1000);
@@ -151,7 +151,7 @@ void EditPanel::options(EditControl& control) {
       return;
     case EditTool::fill:
       heading(title.c_str());
-      slider("##fill", control.fill_mm3, 0, 20000, "cavities up to %.0f mm3", true);
+      slider("##fill", control.fill_mm3, 0, 20000, "cavities up to %.0f mm³", true);
       if (wide_button("Fill (Enter)", free)) control.apply();
       return;
     case EditTool::smooth:

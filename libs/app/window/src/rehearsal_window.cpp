@@ -8,6 +8,7 @@
 #include "osteo/display/view/actors.h"
 #include "osteo/simulation/bone/world_mesh.h"
 #include "rehearsal_parts.h"
+#include "work_done.h"
 
 namespace osteo::inline app {
 
@@ -275,8 +276,7 @@ void RehearsalWindow::report_failure() {
   ImGui::TextWrapped("%s", control_.failure()->what());
   if (!control_.failure()->advice().empty()) ImGui::TextWrapped("%s", control_.failure()->advice().c_str());
   ImGui::Separator();
-  if (const auto folder = actions_.folder(); !folder.empty())
-    ImGui::TextWrapped("What was recorded is kept: %s", folder.string().c_str());
+  if (const auto folder = actions_.folder(); !folder.empty()) ImGui::TextWrapped("%s", kept_text(folder).c_str());
   bool go_on = ImGui::Button("Go on from there (F5)", {-1, 0});
   bool anew = ImGui::Button("Begin again from the case (R)", {-1, 0});
   if (ImGui::Button("Close (Q)", {-1, 0})) quit_ = true;

@@ -63,9 +63,9 @@ void draw_tissue(const Rehearsal& rehearsal) {
     ImGui::TextUnformatted(body.name.c_str());
     ImGui::SameLine(6 * ImGui::GetFontSize());
     if (body.asleep) {
-      ImGui::Text("%.1f mm3 cut off, at rest", body.cut_off_mm3);
+      ImGui::Text("%.1f mm³ cut off, at rest", body.cut_off_mm3);
     } else {
-      ImGui::Text("%.1f mm3 cut off, %.0f %% of real time", body.cut_off_mm3, 100 * body.of_real_time);
+      ImGui::Text("%.1f mm³ cut off, %.0f %% of real time", body.cut_off_mm3, 100 * body.of_real_time);
     }
   }
 }

@@ -30,10 +30,16 @@ void WorkDone::tick(const TickRecord& record, std::span<const VoxelChange>) {
   tool.removed_mm3 += static_cast<double>(record.removed_mm3);
 }
 
-void SessionFacts::add_cut(const std::string& structure, double mm3) {
+void SessionFacts::add_cut(const std::string& structure, const std::string& by, double mm3) {
   auto at = std::find_if(structures.begin(), structures.end(), [&](const Structure& s) { return s.name == structure; });
   if (at == structures.end()) at = structures.insert(structures.end(), {structure});
-  at->cut_mm3 += mm3;
+  at->cut_mm3[by] += mm3;
+}
+
+std::string kept_text(const std::filesystem::path& folder) {
+  std::error_code ec;
+  return std::filesystem::exists(folder, ec) ? "What was recorded is kept: " + folder.string()
+                                             : "Nothing of it is kept: " + folder.string() + " was deleted or moved";
 }
 
 EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
@@ -55,14 +61,29 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
   for (const std::string& p : session.plates) add("plate", p);
   if (session.has_structures && session.structures.empty()) add("critical structures", "none came near", Nearness::far);
   for (const SessionFacts::Structure& s : session.structures) {
-    if (s.cut_mm3 > 0) {
-      add(s.name, text_of("INJURED: cut through by the saw, %.2g mm3 of it", s.cut_mm3), Nearness::touched);
+    std::string drilled;  // by a tool that turns: said where its time is
+    bool met = false;
+    for (const auto& [by, mm3] : s.cut_mm3) {
+      const std::string volume = text_of("%.2g mm³ of it", mm3);
+      if (by == "burr" || by == "hand saw") {
+        if (mm3 > 0) drilled += ", " + volume + (by == "burr" ? "" : " by the saw");
+        continue;
+      }
+      met = true;
+      if (mm3 <= 0) {
+        add(s.name, "contact with the " + by, Nearness::close);
+      } else {
+        add(s.name,
+            "INJURED: " + (by == "saw" ? "cut through by the saw, " : "the " + by + " went through it, ") + volume,
+            Nearness::touched);
+      }
     }
     if (s.injured_s > 0) {
-      add(s.name, text_of("INJURED: touched by the rotating burr for %.2f s", s.injured_s), Nearness::touched);
+      add(s.name, text_of("INJURED: touched by the rotating burr for %.2f s", s.injured_s) + drilled,
+          Nearness::touched);
     } else if (s.touched_s > 0) {
       add(s.name, text_of("touched for %.2f s, drill off", s.touched_s), Nearness::close);
-    } else if (s.cut_mm3 <= 0) {
+    } else if (!met) {
       add(s.name, text_of("never nearer than %.1f mm", s.least_clearance_mm),
           s.least_clearance_mm < StateFacts::kNearMm ? Nearness::near : Nearness::far);
     }

@@ -39,6 +39,8 @@ struct EndFacts {
   std::filesystem::path folder;
   bool past = false;  ///< it was over before the window opened
 };
+/// What became of a session's folder: kept, only where it is still there.
+[[nodiscard]] std::string kept_text(const std::filesystem::path& folder);
 [[nodiscard]] EndFacts end_facts(const SessionFacts& session, const WorkDone& work);
 
 }  // namespace osteo::inline app

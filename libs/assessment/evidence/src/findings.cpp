@@ -152,6 +152,41 @@ class Finder {
     }
   }
 
+  [[nodiscard]] double taken_by(CutBy by, const std::string& structure) const {
+    double mm3 = 0;
+    for (const Moment& m : score_.moments) {
+      if (m.what == CutMetric::moment_of(by, false) && m.structure == structure) mm3 += m.value;
+    }
+    return mm3;
+  }
+  // What no burr did: a finding of its own. False where nothing of the kind happened.
+  bool cut_by(CutBy by, const std::string& name) {
+    struct Words {
+      const char *id, *through, *touched, *why;
+    };
+    const Words words =
+        by == CutBy::saw ? Words{"cut", "The saw cut through the ", "The saw's cut was in contact with the ",
+                                 "Cut through: it lay in the path of the blade, as far as that was in bone."}
+        : by == CutBy::shaft
+            ? Words{"shaft", "A shaft went through the ", "A shaft was in contact with the ",
+                    "The part of it that lay inside the shaft, on its way."}
+            : Words{"screws", "Screws of a plate went through the ", "Screws of a plate were in contact with the ",
+                    "The part of it that lay inside the screws, as long as they are drawn."};
+    const double mm3 = taken_by(by, name);
+    const bool contact = std::any_of(score_.moments.begin(), score_.moments.end(), [&](const Moment& m) {
+      return m.what == CutMetric::moment_of(by, true) && m.structure == name;
+    });
+    if (mm3 <= 0 && !contact) return false;
+    ScoreFinding& f = add(words.id, name, mm3 > 0 ? FindingSeverity::serious : FindingSeverity::caution,
+                          mm3 > 0 ? words.through + name + ": " + in(mm3, "mm3") + " of it."
+                                  : words.touched + name + " and removed nothing of it that can be measured.",
+                          words.why);
+    f.kind = mm3 > 0 ? "injury" : "touch";
+    from(f, "cut_mm3", name, mm3, 0);
+    moments(f, CutMetric::moment_of(by, mm3 <= 0), name);
+    return true;
+  }
+
   void structures() {
     std::pair<std::string, double> nearest{"", 1e9};
     bool any = false;
@@ -170,9 +205,11 @@ class Finder {
         text += name;
         if (burr > 0 || saw > 0) text += " " + times(burr > 0 ? burr : saw);
         if (burr > 0 && saw > 0) text += " and the running saw " + times(saw);
-        ScoreFinding& f =
-            add("injury", name, FindingSeverity::serious, text + ", for " + reported_seconds(injured) + " in all.",
-                "Reached: the tool's surface lay inside the structure's face.");
+        const double taken = taken_by(CutBy::burr, name) + taken_by(CutBy::hand_saw, name);
+        ScoreFinding& f = add("injury", name, FindingSeverity::serious,
+                              text + ", for " + reported_seconds(injured) + " in all" +
+                                  (taken > 0 ? ", and took " + in(taken, "mm3") + " of it." : "."),
+                              "Reached: the tool's surface lay inside the structure's face.");
         from(f, "injured_s", name, injured, 0);
         moments(f, "reached by a rotating burr", name);
         moments(f, "reached by the running saw", name);
@@ -188,14 +225,8 @@ class Finder {
     bool cut = false;
     for (const auto& [name, mm3] : values("cut_mm3")) {
       any = true;
-      if (mm3 <= 0) continue;
-      cut = true;
-      ScoreFinding& f = add("cut", name, FindingSeverity::serious,
-                            "The saw cut through the " + name + ": " + in(mm3, "mm3") + " of it.",
-                            "Cut through: it lay in the path of the blade, as far as that was in bone.");
-      f.kind = "injury";
-      from(f, "cut_mm3", name, mm3, 0);
-      moments(f, SawCutMetric::kMoment, name);
+      for (const CutBy by : {CutBy::saw, CutBy::shaft, CutBy::plate_screws}) cut = cut_by(by, name) || cut;
+      cut = cut || mm3 > 0;
     }
     std::pair<std::string, double> by_saw{"", 1e9};
     for (const auto& [name, mm] : values("saw_clearance_mm")) {

@@ -10,14 +10,20 @@
 
 namespace osteo::inline assessment {
 
+namespace {
+constexpr double kFaceOff = 0.36;  // of a label voxel: by how much the face of a structure may be off, at most
+}
+
 void Product::violated(const ScaleItem& item, std::uint8_t s, const std::vector<std::string>& injured,
                        Result& r) const {
-  // What lies so near the face that another lattice would have put it on the other side.
+  // What lies so near the face that another lattice would have put it on the other side. Outside it the labels' own
+  // error counts too: a sheet of the structure that is thinner has no voxel's middle in it, and would count as nothing.
+  const double beyond = off_mm() + kFaceOff * structures_.label_spacing_mm()[1];
   double surely = 0, perhaps = 0;
   for (const RemovedVoxel& v : removed_) {
     const double d = distance_to(s, v.own_mm), mm3 = static_cast<double>(v.mm3);
     if (d < -off_mm()) surely += mm3;
-    if (d < off_mm()) perhaps += mm3;
+    if (d < beyond) perhaps += mm3;
     if (d >= 0) continue;
     const StructureMap::Answer a = structures_.at(v.own_mm);
     if (a.structure != s || a.distance_mm >= 0) continue;

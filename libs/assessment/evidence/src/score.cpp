@@ -13,13 +13,13 @@
 namespace osteo::inline assessment {
 
 ScoreKeeper::ScoreKeeper(const EvidenceScene& scene)
-    : scene_(scene), process_(scene), near_(scene), visibility_(scene), saw_cuts_(scene) {}
+    : scene_(scene), process_(scene), near_(scene), visibility_(scene), cuts_(scene) {}
 
 void ScoreKeeper::frame(const EvidenceFrame& f) {
   process_.frame(f);
   near_.frame(f);
   visibility_.frame(f);
-  saw_cuts_.frame(f);
+  cuts_.frame(f);
   for (const auto& changes : {f.changes, f.sawn}) {
     for (const VoxelChange& c : changes) {
       if (c.before < kSolid || c.density >= kSolid) continue;
@@ -42,7 +42,7 @@ void ScoreKeeper::finish(const World& end) {
   });
   process_.finish(end, values_, moments_);
   near_.finish(end, values_, moments_);
-  saw_cuts_.finish(end, values_, moments_);
+  cuts_.finish(end, values_, moments_);
   visibility_.finish(end, values_, moments_);
   std::stable_sort(moments_.begin(), moments_.end(), [](const Moment& a, const Moment& b) { return a.t_s < b.t_s; });
 }

@@ -1,4 +1,5 @@
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -46,6 +47,11 @@ class FileSink final : public SessionSink {
     }
   }
   void sync() override {
+    // A file that was deleted takes what is written for as long as it is open, and none of it can be found again.
+    struct stat now {};
+    if (::fstat(fd_, &now) == 0 && S_ISREG(now.st_mode) && now.st_nlink == 0)
+      throw Error(ExitCode::cannot_write, "'" + path_.string() + "' was deleted while it was recorded",
+                  "what was done in this session is lost: end it, and begin another in a folder that stays");
     // Some files cannot be synced (a pipe, a device); that is no loss.
     while (::fdatasync(fd_) != 0) {
       if (errno == EINVAL || errno == ENOTSUP || errno == EROFS) return;

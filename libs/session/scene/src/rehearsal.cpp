@@ -9,6 +9,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/pipeline/pipeline.h"
+#include "structure_reader.h"
 
 namespace osteo::inline session {
 
@@ -66,6 +67,10 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
       std::make_unique<SceneReaders>(operation_.world(), options_.follow, options_.rate_hz, context, structures());
   readers_->add_to(dispatcher_, &keeper_);
   pieces_ = static_cast<int>(readers_->large_pieces().size());
+  if (structures() != nullptr) {
+    cuts_ = std::make_unique<StructureReader>(*structures(), operation_.world(), options_.rate_hz);
+    keeper_.add(*cuts_, false);
+  }
   if (options_.soft) {
     options_.soft->meet(&operation_.world());
     dispatcher_.add(*options_.soft, false);
@@ -199,7 +204,7 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
   const bool other_bone = !effect.changed.empty() || !effect.made.empty() || !effect.gone.empty();
   if (options_.follow.pieces && other_bone) pieces_ = static_cast<int>(readers_->large_pieces().size());
   if (live) scene.unlock();
-  if (action.is(ActionKind::saw) && effect.done) look_at_cut(action, effect);
+  if (effect.done && cuts_) look_at_cut(action, effect);
   if (!effect.message.empty() && !row_of(action).made_often) {
     const std::lock_guard lock(queue_mutex_);
     const auto kind = static_cast<ActionKind>(action.kind);
@@ -214,23 +219,23 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
   return true;
 }
 
-// What a saw by its plane took of structures: the servo, which looks after touches, knows nothing of it. In the thread
-// that changes the scene, so that bodies stay where they are meanwhile.
+// What a saw by its plane or the screws of a plate took of structures: the servo, which looks after touches, knows
+// nothing of it. In the thread that changes the scene, so that bodies stay where they are meanwhile.
 void Rehearsal::look_at_cut(const SceneAction& action, const World::Effect& effect) {
-  if (structures() == nullptr) return;
-  std::vector<VoxelKey> voxels;
-  voxels.reserve(effect.dust.size());
-  for (const auto& [name, density] : effect.dust) voxels.push_back(name);
-  const std::optional<SawCut> blade = blade_at_work(operation_.world(), action.saw_cut(), voxels);
-  if (!blade) return;
-  const std::vector<StructureCut> cuts = structures_cut(*structures(), *blade);
-  const std::string reported = reported_structures_cut(*structures(), cuts);
+  std::vector<StructureCut> cuts;
+  const bool saw = action.is(ActionKind::saw);
+  if (saw) {
+    std::vector<VoxelKey> voxels;
+    voxels.reserve(effect.dust.size());
+    for (const auto& [name, density] : effect.dust) voxels.push_back(name);
+    cuts = cuts_->saw(operation_.ticks(), operation_.world(), action.saw_cut(), voxels);
+  } else if (action.is(ActionKind::attach)) {
+    cuts = cuts_->attach(operation_.ticks(), operation_.world(), action);
+  }
+  const std::string reported = reported_cut(*structures(), saw ? CutBy::saw : CutBy::plate_screws, cuts);
   if (reported.empty()) return;
   const std::lock_guard lock(queue_mutex_);
-  for (const StructureCut& c : cuts) {
-    if (c.mm3 > 0) structure_cuts_.push_back({operation_.ticks(), c});
-  }
-  refused_ = "the saw cut through " + reported;
+  refused_ = reported;
 }
 
 // Soft tissue a hundredth of a second further, where the tools are now.
@@ -482,7 +487,7 @@ RehearsalSummary Rehearsal::finish() {
   s.fixtures = operation_.world().fixtures();
   s.structures = operation_.renderer().structure_events();
   s.notes = notes_;
-  s.structure_cuts = structure_cuts_;
+  if (cuts_) s.structure_cuts = cuts_->events();
   s.unusable_poses = readers_->tools.unusable_poses();
   if (loop_) s.loop = loop_->stats();
   for (const std::uint8_t tool : readers_->tools.burrs_used()) {

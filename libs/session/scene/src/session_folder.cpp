@@ -340,7 +340,8 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
     if (!anatomy.structures) break;
     j["structures_cut"].push_back({{"name", anatomy.structures->name_of(e.cut.structure)},
                                    {"value", e.cut.structure},
-                                   {"by", "saw"},
+                                   {"by", name_of(e.by)},
+                                   {"hand", e.hand},
                                    {"tick", e.tick},
                                    {"t_s", static_cast<double>(e.tick) / rate_hz},
                                    {"mm3", e.cut.mm3},

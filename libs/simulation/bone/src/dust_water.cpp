@@ -61,113 +61,161 @@ void Dust::irrigate(Vec3 nozzle_mm, Vec3 direction, double reach_mm, double mm3)
   run_off_ += left;  // a nozzle within bone, or out of reach
 }
 
-void Dust::step_water(Brick& brick, Hood& hood, Ijk down) {
+class Dust::Flow {
+ public:
   using Place = Hood::Place;
-  Water& w = *brick.water;
-  const auto axis = static_cast<std::size_t>(axis_), side0 = (axis + 1) % 3, side1 = (axis + 2) % 3;
-  const double half = 0.5 * (std::abs(pull_.x) + std::abs(pull_.y) + std::abs(pull_.z));  // of a cell, along gravity
-  constexpr std::uint32_t kSlack = 256;  // differences too small to run for: 0.4 % of a cell
-  const auto pour = [&](std::uint32_t from, const Place& to, std::uint32_t most) {
-    Brick* const there = hood.brick_of(to);
-    std::uint32_t &l = w.units[from], &s = w.solid[from];
-    if (there == nullptr) {
-      const std::uint32_t with = share_of(s, most, l);
-      run_off_ += most - with;
-      fallen_ += with;
-      l -= most;
-      s -= with;
-      return;
-    }
-    if (!there->water) there->water = std::make_unique<Water>();
-    const std::uint32_t at = Hood::offset(to), with = share_of(s, most, l);
-    there->water->units[at] += most;
-    there->water->solid[at] += with;
-    l -= most;
-    s -= with;
-  };
-  const auto held_at = [&](const Place& p) {
-    const Brick* const there = hood.around[Hood::neighbour(p)].dust;
-    return there == nullptr || !there->water ? 0U : there->water->units[Hood::offset(p)];
-  };
-  const auto turn = static_cast<std::size_t>(steps_ % 12);
-  for (int layer = 0; layer < 8; ++layer) {
-    for (int n = 0; n < 64; ++n) {
-      const int place = steps_ % 2 == 0 ? n : 63 - n;
-      Place c{};
-      c[axis] = sign_ > 0 ? 7 - layer : layer;
-      c[side0] = place & 7;
-      c[side1] = place >> 3;
-      const std::uint32_t at = Hood::offset(c);
-      std::uint32_t& l = w.units[at];
-      if (l == 0) continue;
-      // Dust that it meets, until it is as thick as it pours.
-      bool moved = false;
-      if (std::uint32_t& lying = brick.units[at]; lying > 0) {
-        static_assert(kMaxSolid == 0.3);
-        const std::int64_t takes = (3 * std::int64_t{l} - 10 * std::int64_t{w.solid[at]}) / 7;
-        const auto taken = static_cast<std::uint32_t>(std::clamp<std::int64_t>(takes, 0, lying));
-        lying -= taken;
-        l += taken;
-        w.solid[at] += taken;
-        moved = taken > 0;
+  Flow(Dust& all, Brick& brick, Hood& hood, Ijk down)
+      : d_(all),
+        brick_(brick),
+        hood_(hood),
+        water_(*brick.water),
+        down_(down),
+        axis_(static_cast<std::size_t>(all.axis_)),
+        side0_((axis_ + 1) % 3),
+        side1_((axis_ + 2) % 3),
+        half_(0.5 * (std::abs(all.pull_.x) + std::abs(all.pull_.y) + std::abs(all.pull_.z))),
+        turn_(static_cast<std::size_t>(all.steps_ % 12)) {}
+  void step() {
+    for (int layer = 0; layer < 8; ++layer) {
+      for (int n = 0; n < 64; ++n) {
+        const int place = d_.steps_ % 2 == 0 ? n : 63 - n;
+        Place c{};
+        c[axis_] = d_.sign_ > 0 ? 7 - layer : layer;
+        c[side0_] = place & 7;
+        c[side1_] = place >> 3;
+        if (!step_cell(c)) continue;
+        brick_.stirred = true;
+        hood_.wake_around(c);
+        hood_.wake_around(Hood::moved(c, down_));
       }
-      const std::uint32_t room = room_of(hood.density(c));
-      std::uint32_t held = 0;  // by the bone that it wets
-      if (room > 0) {
-        for (int f = 0; f < 6 && held == 0; ++f) {
-          Place p = c;
-          p[static_cast<std::size_t>(f / 2)] += f % 2 == 0 ? 1 : -1;
-          if (hood.is_solid(p)) held = kFilmUnits;
-        }
-      }
-      const auto run = [&](Ijk by, std::uint32_t most) {
-        if (l <= held || most == 0) return;
-        const Place to = Hood::moved(c, by);
-        const std::uint32_t there = room_of(hood.density(to)), in_it = held_at(to);
-        if (there <= in_it || !hood.open(c, by)) return;
-        // Until both stand equally high: heights along gravity, in cells.
-        const double drop = by.i * pull_.x + by.j * pull_.y + by.k * pull_.z;
-        const double mine = room > 0 ? static_cast<double>(l) / room : 1, its = static_cast<double>(in_it) / there;
-        const double level = (drop / (2 * half) + mine - its) / 2 * std::min(room > 0 ? room : kFull, there);
-        if (level < kSlack) return;
-        const std::uint32_t amount =
-            std::min({most, l - held, there - in_it, static_cast<std::uint32_t>(std::min(level, 4e9))});
-        pour(at, to, amount);
-        moved = true;
-      };
-      run(down, l);
-      for (std::size_t first = 0; first < lower_.size() && l > held;) {
-        std::size_t end = first + 1;
-        while (end < lower_.size() && lower_[end].slope > lower_[first].slope - 1e-9) ++end;
-        const std::size_t of = end - first;
-        for (std::size_t s = 0; s < of && l > held; ++s)
-          run(lower_[first + (s + turn) % of].by, static_cast<std::uint32_t>((l - held + of - s - 1) / (of - s)));
-        first = end;
-      }
-      if (l > room) {  // bone came back, or more was poured than there is room for: aside and up, whatever the height
-        for (int s = 0; s < 5 && l > room; ++s) {
-          Place p = c;
-          if (s == 4) {
-            p[axis] -= sign_;
-          } else {
-            const std::size_t t = (static_cast<std::size_t>(s) + turn) % 4;
-            p[t < 2 ? side0 : side1] += t % 2 == 0 ? 1 : -1;
-          }
-          const std::uint32_t there = room_of(hood.density(p)), in_it = held_at(p);
-          if (there == 0) continue;
-          // Up without a limit, so that it ends above whatever is full.
-          const std::uint32_t most = s == 4 ? l - room : std::min(l - room, there > in_it ? there - in_it : 0U);
-          if (most == 0) continue;
-          pour(at, p, most);
-          moved = true;
-        }
-      }
-      if (!moved) continue;
-      brick.stirred = true;
-      hood.wake_around(c);
-      hood.wake_around(Hood::moved(c, down));
     }
   }
+
+ private:
+  static constexpr std::uint32_t kSlack = 256;  // differences too small to run for: 0.4 % of a cell
+
+  // Whether anything moved.
+  bool step_cell(const Place& c) {
+    const std::uint32_t at = Hood::offset(c);
+    const std::uint32_t& l = water_.units[at];
+    if (l == 0) return false;
+    bool moved = take_dust(at);
+    const std::uint32_t room = room_of(hood_.density(c)), held = film_at(c, room);
+    moved = run(c, down_, room, held, l) || moved;
+    const auto& lower = d_.lower_;
+    for (std::size_t first = 0; first < lower.size() && l > held;) {
+      std::size_t end = first + 1;
+      while (end < lower.size() && lower[end].slope > lower[first].slope - 1e-9) ++end;
+      const std::size_t of = end - first;
+      for (std::size_t s = 0; s < of && l > held; ++s) {
+        const auto most = static_cast<std::uint32_t>((l - held + of - s - 1) / (of - s));
+        moved = run(c, lower[first + (s + turn_) % of].by, room, held, most) || moved;
+      }
+      first = end;
+    }
+    if (l > room) moved = overflow(c, room) || moved;
+    return moved;
+  }
+
+  // Dust that it meets, until it is as thick as it pours.
+  bool take_dust(std::uint32_t at) {
+    std::uint32_t& lying = brick_.units[at];
+    if (lying == 0) return false;
+    static_assert(kMaxSolid == 0.3);
+    std::uint32_t& l = water_.units[at];
+    const std::int64_t takes = (3 * std::int64_t{l} - 10 * std::int64_t{water_.solid[at]}) / 7;
+    const auto taken = static_cast<std::uint32_t>(std::clamp<std::int64_t>(takes, 0, lying));
+    lying -= taken;
+    l += taken;
+    water_.solid[at] += taken;
+    return taken > 0;
+  }
+
+  // Held by the bone that it wets.
+  [[nodiscard]] std::uint32_t film_at(const Place& c, std::uint32_t room) const {
+    if (room == 0) return 0;
+    for (int f = 0; f < 6; ++f) {
+      Place p = c;
+      p[static_cast<std::size_t>(f / 2)] += f % 2 == 0 ? 1 : -1;
+      if (hood_.is_solid(p)) return kFilmUnits;
+    }
+    return 0;
+  }
+
+  [[nodiscard]] std::uint32_t held_at(const Place& p) const {
+    const Brick* const there = hood_.around[Hood::neighbour(p)].dust;
+    return there == nullptr || !there->water ? 0U : there->water->units[Hood::offset(p)];
+  }
+
+  // To the cell `by` away, until both stand equally high.
+  bool run(const Place& c, Ijk by, std::uint32_t room, std::uint32_t held, std::uint32_t most) {
+    const std::uint32_t at = Hood::offset(c), l = water_.units[at];
+    if (l <= held || most == 0) return false;
+    const Place to = Hood::moved(c, by);
+    const std::uint32_t there = room_of(hood_.density(to)), in_it = held_at(to);
+    if (there <= in_it || !hood_.open(c, by)) return false;
+    // Heights along gravity, in cells.
+    const double drop = by.i * d_.pull_.x + by.j * d_.pull_.y + by.k * d_.pull_.z;
+    const double mine = room > 0 ? static_cast<double>(l) / room : 1, its = static_cast<double>(in_it) / there;
+    const double level = (drop / (2 * half_) + mine - its) / 2 * std::min(room > 0 ? room : kFull, there);
+    if (level < kSlack) return false;
+    pour(at, to, std::min({most, l - held, there - in_it, static_cast<std::uint32_t>(std::min(level, 4e9))}));
+    return true;
+  }
+
+  // Bone came back, or more was poured than there is room for: aside and up, whatever the height.
+  bool overflow(const Place& c, std::uint32_t room) {
+    const std::uint32_t at = Hood::offset(c);
+    const std::uint32_t& l = water_.units[at];
+    bool moved = false;
+    for (int s = 0; s < 5 && l > room; ++s) {
+      Place p = c;
+      if (s == 4) {
+        p[axis_] -= d_.sign_;
+      } else {
+        const std::size_t t = (static_cast<std::size_t>(s) + turn_) % 4;
+        p[t < 2 ? side0_ : side1_] += t % 2 == 0 ? 1 : -1;
+      }
+      const std::uint32_t there = room_of(hood_.density(p)), in_it = held_at(p);
+      if (there == 0) continue;
+      // Up without a limit, so that it ends above whatever is full.
+      const std::uint32_t most = s == 4 ? l - room : std::min(l - room, there > in_it ? there - in_it : 0U);
+      if (most == 0) continue;
+      pour(at, p, most);
+      moved = true;
+    }
+    return moved;
+  }
+
+  void pour(std::uint32_t from, const Place& to, std::uint32_t most) {
+    Brick* const there = hood_.brick_of(to);
+    std::uint32_t &l = water_.units[from], &s = water_.solid[from];
+    const std::uint32_t with = share_of(s, most, l);
+    if (there == nullptr) {
+      d_.run_off_ += most - with;
+      d_.fallen_ += with;
+    } else {
+      if (!there->water) there->water = std::make_unique<Water>();
+      const std::uint32_t at = Hood::offset(to);
+      there->water->units[at] += most;
+      there->water->solid[at] += with;
+    }
+    l -= most;
+    s -= with;
+  }
+
+  Dust& d_;
+  Brick& brick_;
+  Hood& hood_;
+  Water& water_;
+  Ijk down_;
+  std::size_t axis_, side0_, side1_;
+  double half_;  // of a cell, along gravity
+  std::size_t turn_;
+};
+
+void Dust::step_water(Brick& brick, Hood& hood, Ijk down) {
+  Flow(*this, brick, hood, down).step();
 }
 
 // On bone, or on water that fills what is below: it stands, it does not fall.
@@ -192,8 +240,25 @@ bool Dust::rests(Brick& brick, std::uint32_t at) const {
   return true;
 }
 
-// What stands and is connected is filled again from below, to one height; what it carries is mixed.
-void Dust::level_pools() {
+class Dust::Pools {
+ public:
+  explicit Pools(Dust& all)
+      : d_(all), half_(0.5 * (std::abs(all.pull_.x) + std::abs(all.pull_.y) + std::abs(all.pull_.z))) {}
+  void level() {
+    for (Brick* const seed : take_stirred()) {
+      for (std::uint32_t v = 0; v < 512; ++v) {
+        find_pool(*seed, v);
+        if (pool_.size() < 2) continue;
+        const Amounts all = measure();
+        if (all.volume >= all.rooms) continue;  // fuller than full: first it spreads
+        const std::vector<std::uint32_t> units = units_of(all.volume);
+        fill(units, solids_of(units, all));
+      }
+    }
+    for (Brick* const b : touched_) b->marked = {};
+  }
+
+ private:
   struct Filled {
     Brick* brick;
     std::uint32_t at;
@@ -201,139 +266,176 @@ void Dust::level_pools() {
     double height = 0;
     std::uint32_t room = 0;
   };
-  const double half = 0.5 * (std::abs(pull_.x) + std::abs(pull_.y) + std::abs(pull_.z));
-  std::vector<Brick*> touched;
-  const auto is_marked = [](const Brick& b, std::uint32_t at) { return (b.marked[at >> 6] >> (at & 63) & 1) != 0; };
-  const auto density = [&](const Brick& b, std::uint32_t at) {
-    return b.bone == BrickGrid::kNone ? 0.0F : bone_.value(b.bone * BrickGrid::kVoxels + at);
+  struct Amounts {
+    std::uint64_t volume = 0, solids = 0, rooms = 0;
   };
-  const auto cell_of = [](const Brick& b, std::uint32_t at) {
+  static Ijk cell_of(const Brick& b, std::uint32_t at) {
     return Ijk{b.at.i * 8 + static_cast<int>(at & 7), b.at.j * 8 + static_cast<int>(at >> 3 & 7),
                b.at.k * 8 + static_cast<int>(at >> 6)};
-  };
-  std::vector<Filled> pool;
-  const auto meet = [&](Brick& b, std::uint32_t at, bool or_rim) {
-    if (is_marked(b, at)) return;
-    const bool stands = b.water && b.water->units[at] > 2 * kFilmUnits;
-    if ((!stands && (!or_rim || room_of(density(b, at)) == 0)) || !rests(b, at)) return;
-    if (std::all_of(b.marked.begin(), b.marked.end(), [](std::uint64_t m) { return m == 0; })) touched.push_back(&b);
-    b.marked[at >> 6] |= std::uint64_t{1} << (at & 63);
-    pool.push_back({&b, at, !stands});
-  };
-  std::vector<Brick*> seeds;
-  for (const auto& b : bricks_) {
-    if (b->stirred) seeds.push_back(b.get());
-    b->stirred = false;
   }
-  std::sort(seeds.begin(), seeds.end(), [](const Brick* a, const Brick* b) {
-    return key(a->at.i, a->at.j, a->at.k) < key(b->at.i, b->at.j, b->at.k);
-  });
-  std::vector<std::uint64_t> room_below;
-  for (Brick* const seed : seeds) {
-    for (std::uint32_t v = 0; v < 512; ++v) {
-      pool.clear();
-      meet(*seed, v, false);
-      for (std::size_t n = 0; n < pool.size(); ++n) {
-        if (pool[n].rim) continue;
-        Brick& b = *pool[n].brick;
-        const std::uint32_t at = pool[n].at;
-        for (std::uint32_t f = 0; f < 6; ++f) {
-          const std::uint32_t shift = 3 * (f / 2), x = at >> shift & 7;
-          const bool up = f % 2 == 1;
-          Brick* other = &b;
-          if (up ? x == 7 : x == 0) {
-            other = b.beside[f];
-            if (other == nullptr) {
-              Ijk c = cell_of(b, at);
-              (f < 2 ? c.i : f < 4 ? c.j : c.k) += up ? 1 : -1;
-              if (in_reach(c) && !solid(c)) other = brick_at(c, true);
-            }
+  [[nodiscard]] float density(const Brick& b, std::uint32_t at) const {
+    return b.bone == BrickGrid::kNone ? 0.0F : d_.bone_.value(b.bone * BrickGrid::kVoxels + at);
+  }
+
+  // Bricks in which water moved since, in a fixed order.
+  std::vector<Brick*> take_stirred() {
+    std::vector<Brick*> seeds;
+    for (const auto& b : d_.bricks_) {
+      if (b->stirred) seeds.push_back(b.get());
+      b->stirred = false;
+    }
+    std::sort(seeds.begin(), seeds.end(), [](const Brick* a, const Brick* b) {
+      return key(a->at.i, a->at.j, a->at.k) < key(b->at.i, b->at.j, b->at.k);
+    });
+    return seeds;
+  }
+
+  void meet(Brick& b, std::uint32_t at, bool or_rim) {
+    if ((b.marked[at >> 6] >> (at & 63) & 1) != 0) return;
+    const bool stands = b.water && b.water->units[at] > 2 * kFilmUnits;
+    if ((!stands && (!or_rim || room_of(density(b, at)) == 0)) || !d_.rests(b, at)) return;
+    if (std::all_of(b.marked.begin(), b.marked.end(), [](std::uint64_t m) { return m == 0; })) touched_.push_back(&b);
+    b.marked[at >> 6] |= std::uint64_t{1} << (at & 63);
+    pool_.push_back({&b, at, !stands});
+  }
+
+  // What is connected with this cell; nothing where a pool has it already.
+  void find_pool(Brick& seed, std::uint32_t v) {
+    pool_.clear();
+    meet(seed, v, false);
+    for (std::size_t n = 0; n < pool_.size(); ++n) {
+      if (pool_[n].rim) continue;
+      Brick& b = *pool_[n].brick;
+      const std::uint32_t at = pool_[n].at;
+      for (std::uint32_t f = 0; f < 6; ++f) {
+        const std::uint32_t shift = 3 * (f / 2), x = at >> shift & 7;
+        const bool up = f % 2 == 1;
+        Brick* other = &b;
+        if (up ? x == 7 : x == 0) {
+          other = b.beside[f];
+          if (other == nullptr) {
+            Ijk c = cell_of(b, at);
+            (f < 2 ? c.i : f < 4 ? c.j : c.k) += up ? 1 : -1;
+            if (d_.in_reach(c) && !d_.solid(c)) other = d_.brick_at(c, true);
           }
-          if (other != nullptr) meet(*other, (at & ~(7U << shift)) | ((up ? x + 1 : x + 7) & 7) << shift, true);
         }
-      }
-      if (pool.size() < 2) continue;
-      std::uint64_t volume = 0, solids = 0, rooms = 0;
-      for (Filled& p : pool) {
-        const Ijk c = cell_of(*p.brick, p.at);
-        p.height = -(pull_.x * c.i + pull_.y * c.j + pull_.z * c.k);
-        p.room = room_of(density(*p.brick, p.at));
-        if (p.rim) {
-          const std::uint32_t film = p.brick->water ? p.brick->water->units[p.at] : 0;
-          p.room -= std::min(p.room, film);
-        } else {
-          volume += p.brick->water->units[p.at];
-          solids += p.brick->water->solid[p.at];
-        }
-        rooms += p.room;
-      }
-      if (volume >= rooms) continue;  // fuller than full: first it spreads
-      std::stable_sort(pool.begin(), pool.end(), [](const Filled& a, const Filled& b) { return a.height < b.height; });
-      room_below.assign(1, 0);
-      for (const Filled& p : pool) room_below.push_back(room_below.back() + p.room);
-      const auto share = [&](const Filled& p, double level) {
-        return std::clamp((level - p.height + half) / (2 * half), 0.0, 1.0);
-      };
-      double lo = pool.front().height - half, hi = pool.back().height + half;
-      for (int step = 0; step < 50; ++step) {
-        const double level = 0.5 * (lo + hi);
-        const auto full =
-            std::partition_point(pool.begin(), pool.end(), [&](const Filled& p) { return p.height + half <= level; });
-        auto holds = static_cast<double>(room_below[static_cast<std::size_t>(full - pool.begin())]);
-        for (auto p = full; p != pool.end() && p->height - half < level; ++p) holds += p->room * share(*p, level);
-        (holds < static_cast<double>(volume) ? lo : hi) = level;
-      }
-      std::vector<std::uint32_t> units(pool.size());
-      std::uint64_t left = volume;
-      for (std::size_t n = 0; n < pool.size(); ++n) {
-        units[n] = static_cast<std::uint32_t>(
-            std::min<std::uint64_t>(left, static_cast<std::uint64_t>(pool[n].room * share(pool[n], lo))));
-        left -= units[n];
-      }
-      while (left > 0) {  // what rounding kept: a unit each
-        for (std::size_t n = 0; n < pool.size() && left > 0; ++n) {
-          if (units[n] == 0 || units[n] >= pool[n].room) continue;
-          ++units[n];
-          --left;
-        }
-        const bool some = std::any_of(pool.begin(), pool.end(), [&](const Filled& p) {
-          const std::uint32_t u = units[static_cast<std::size_t>(&p - pool.data())];
-          return u > 0 && u < p.room;
-        });
-        if (some || left == 0) continue;
-        for (std::size_t n = 0; n < pool.size() && left > 0; ++n) {
-          const auto more = static_cast<std::uint32_t>(std::min<std::uint64_t>(left, pool[n].room - units[n]));
-          units[n] += more;
-          left -= more;
-        }
-      }
-      std::uint64_t left_solid = solids;
-      std::vector<std::uint32_t> solid(pool.size());
-      for (std::size_t n = 0; n < pool.size(); ++n) {
-        solid[n] = static_cast<std::uint32_t>(solids * units[n] / volume);
-        left_solid -= solid[n];
-      }
-      for (std::size_t n = 0; n < pool.size() && left_solid > 0; ++n) {
-        const auto more = static_cast<std::uint32_t>(std::min<std::uint64_t>(left_solid, units[n] - solid[n]));
-        solid[n] += more;
-        left_solid -= more;
-      }
-      for (std::size_t n = 0; n < pool.size(); ++n) {
-        Brick& b = *pool[n].brick;
-        const std::uint32_t at = pool[n].at;
-        if (pool[n].rim && units[n] == 0) continue;
-        if (!b.water) b.water = std::make_unique<Water>();
-        const std::uint32_t before = b.water->units[at];
-        b.water->units[at] = units[n] + (pool[n].rim ? before : 0);
-        b.water->solid[at] = solid[n] + (pool[n].rim ? b.water->solid[at] : 0);
-        const std::uint32_t after = b.water->units[at];
-        if (std::max(before, after) - std::min(before, after) <= 64) continue;
-        b.stirred = true;
-        wake(cell_of(b, at));
+        if (other != nullptr) meet(*other, (at & ~(7U << shift)) | ((up ? x + 1 : x + 7) & 7) << shift, true);
       }
     }
   }
-  for (Brick* const b : touched) b->marked = {};
+
+  Amounts measure() {
+    Amounts all;
+    for (Filled& p : pool_) {
+      const Ijk c = cell_of(*p.brick, p.at);
+      p.height = -(d_.pull_.x * c.i + d_.pull_.y * c.j + d_.pull_.z * c.k);
+      p.room = room_of(density(*p.brick, p.at));
+      if (p.rim) {
+        const std::uint32_t film = p.brick->water ? p.brick->water->units[p.at] : 0;
+        p.room -= std::min(p.room, film);
+      } else {
+        all.volume += p.brick->water->units[p.at];
+        all.solids += p.brick->water->solid[p.at];
+      }
+      all.rooms += p.room;
+    }
+    return all;
+  }
+
+  // Of a cell, below a level.
+  [[nodiscard]] double share(const Filled& p, double level) const {
+    return std::clamp((level - p.height + half_) / (2 * half_), 0.0, 1.0);
+  }
+
+  // Sorts the pool by height; the level up to which it holds no more than the volume.
+  double find_level(std::uint64_t volume) {
+    std::stable_sort(pool_.begin(), pool_.end(), [](const Filled& a, const Filled& b) { return a.height < b.height; });
+    room_below_.assign(1, 0);
+    for (const Filled& p : pool_) room_below_.push_back(room_below_.back() + p.room);
+    double lo = pool_.front().height - half_, hi = pool_.back().height + half_;
+    for (int step = 0; step < 50; ++step) {
+      const double level = 0.5 * (lo + hi);
+      const auto full =
+          std::partition_point(pool_.begin(), pool_.end(), [&](const Filled& p) { return p.height + half_ <= level; });
+      auto holds = static_cast<double>(room_below_[static_cast<std::size_t>(full - pool_.begin())]);
+      for (auto p = full; p != pool_.end() && p->height - half_ < level; ++p) holds += p->room * share(*p, level);
+      (holds < static_cast<double>(volume) ? lo : hi) = level;
+    }
+    return lo;
+  }
+
+  std::vector<std::uint32_t> units_of(std::uint64_t volume) {
+    const double level = find_level(volume);
+    std::vector<std::uint32_t> units(pool_.size());
+    std::uint64_t left = volume;
+    for (std::size_t n = 0; n < pool_.size(); ++n) {
+      units[n] = static_cast<std::uint32_t>(
+          std::min<std::uint64_t>(left, static_cast<std::uint64_t>(pool_[n].room * share(pool_[n], level))));
+      left -= units[n];
+    }
+    while (left > 0) {  // what rounding kept: a unit each
+      for (std::size_t n = 0; n < pool_.size() && left > 0; ++n) {
+        if (units[n] == 0 || units[n] >= pool_[n].room) continue;
+        ++units[n];
+        --left;
+      }
+      const bool some = std::any_of(pool_.begin(), pool_.end(), [&](const Filled& p) {
+        const std::uint32_t u = units[static_cast<std::size_t>(&p - pool_.data())];
+        return u > 0 && u < p.room;
+      });
+      if (some || left == 0) continue;
+      for (std::size_t n = 0; n < pool_.size() && left > 0; ++n) {
+        const auto more = static_cast<std::uint32_t>(std::min<std::uint64_t>(left, pool_[n].room - units[n]));
+        units[n] += more;
+        left -= more;
+      }
+    }
+    return units;
+  }
+
+  // What it carries, mixed.
+  [[nodiscard]] static std::vector<std::uint32_t> solids_of(const std::vector<std::uint32_t>& units,
+                                                            const Amounts& all) {
+    std::uint64_t left = all.solids;
+    std::vector<std::uint32_t> solid(units.size());
+    for (std::size_t n = 0; n < units.size(); ++n) {
+      solid[n] = static_cast<std::uint32_t>(all.solids * units[n] / all.volume);
+      left -= solid[n];
+    }
+    for (std::size_t n = 0; n < units.size() && left > 0; ++n) {
+      const auto more = static_cast<std::uint32_t>(std::min<std::uint64_t>(left, units[n] - solid[n]));
+      solid[n] += more;
+      left -= more;
+    }
+    return solid;
+  }
+
+  void fill(const std::vector<std::uint32_t>& units, const std::vector<std::uint32_t>& solid) {
+    for (std::size_t n = 0; n < pool_.size(); ++n) {
+      Brick& b = *pool_[n].brick;
+      const std::uint32_t at = pool_[n].at;
+      if (pool_[n].rim && units[n] == 0) continue;
+      if (!b.water) b.water = std::make_unique<Water>();
+      const std::uint32_t before = b.water->units[at];
+      b.water->units[at] = units[n] + (pool_[n].rim ? before : 0);
+      b.water->solid[at] = solid[n] + (pool_[n].rim ? b.water->solid[at] : 0);
+      const std::uint32_t after = b.water->units[at];
+      if (std::max(before, after) - std::min(before, after) <= 64) continue;
+      b.stirred = true;
+      d_.wake(cell_of(b, at));
+    }
+  }
+
+  Dust& d_;
+  double half_;  // of a cell, along gravity
+  std::vector<Filled> pool_;
+  std::vector<Brick*> touched_;  // that have marks
+  std::vector<std::uint64_t> room_below_;
+};
+
+// What stands and is connected is filled again from below, to one height; what it carries is mixed.
+void Dust::level_pools() {
+  Pools(*this).level();
 }
 
 // Films: every half second of steps, a bit of each.

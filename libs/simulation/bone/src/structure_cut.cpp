@@ -52,7 +52,7 @@ class Search {
   [[nodiscard]] StructureCut result() const {
     StructureCut c;
     c.structure = map_.values()[number_];
-    c.mm3 = least_mm_ <= 0 ? mm3_ : 0;
+    c.mm3 = least_mm_ <= 0 && mm3_ >= StructureCut::kMinMm3 ? mm3_ : 0;
     c.distance_mm = std::max(0.0, least_mm_);
     c.at_mm = c.mm3 > 0 ? moment_ / mm3_ : at_mm_;
     return c;
@@ -192,7 +192,7 @@ std::string reported_structures_cut(const StructureMap& map, std::span<const Str
     // To two places below 10 mm3, else to whole ones.
     const double step = c.mm3 < 10 ? 0.01 : 1;
     parts.push_back("the " + map.name_of(c.structure) + " (" +
-                    format_number(std::max(step, std::round(c.mm3 / step) * step)) + " mm3)");
+                    format_number(std::max(step, std::round(c.mm3 / step) * step)) + " mm³)");
   }
   std::string all;
   for (std::size_t n = 0; n < parts.size(); ++n)

@@ -2,6 +2,7 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -59,8 +60,8 @@ struct SessionFacts {
   struct Structure {
     std::string name;
     double least_clearance_mm = 0, touched_s = 0, injured_s = 0;
-    double cut_mm3 =
-        0;  ///< of it, in the path of saw cuts by a plane; where it is not 0 the clearance is of burrs alone
+    /// Of it, by what took it ("saw": by its plane, "burr", "hand saw", "shaft", "plate screws"; 0: contact).
+    std::map<std::string, double> cut_mm3 = {};
   };
   bool past = false;  ///< it was over before the window opened, and is only looked at
   std::filesystem::path folder;
@@ -69,8 +70,8 @@ struct SessionFacts {
   std::vector<std::string> plates;    ///< in words
   bool has_structures = false;        ///< the case knows critical structures
   std::vector<Structure> structures;  ///< those that came near
-  /// A saw cut went through one.
-  void add_cut(const std::string& structure, double mm3);
+  /// Something went through one (StructureCutEvent), or touched it: 0 mm3.
+  void add_cut(const std::string& structure, const std::string& by, double mm3);
   std::vector<std::string> warnings;
   std::optional<std::string> score;  ///< in words, where somebody gives one
 };

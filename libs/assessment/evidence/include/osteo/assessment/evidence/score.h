@@ -53,7 +53,7 @@ class ScoreKeeper {
   ProcessMetric process_;
   NearMetric near_;
   VisibilityMetric visibility_;
-  SawCutMetric saw_cuts_;
+  CutMetric cuts_;
   std::map<VoxelKey, RemovedVoxel> removed_;
   Vec3 axes_;
   std::vector<Measured> values_;

@@ -19,9 +19,11 @@
 #include "osteo/session/scene/operation.h"
 #include "osteo/session/scene/scene_readers.h"
 #include "osteo/session/scene/soft_tissue.h"
-#include "osteo/simulation/bone/structure_map.h"
+#include "osteo/simulation/haptics/structure_judge.h"
 
 namespace osteo::inline session {
+
+class StructureReader;
 
 struct RehearsalOptions {
   double rate_hz = 1000;
@@ -44,12 +46,6 @@ struct ActionNote {
   std::uint64_t times = 1;  ///< in a row
 };
 
-/// A critical structure that a cut by a plane went through.
-struct StructureCutEvent {
-  std::uint64_t tick = 0;
-  StructureCut cut;  ///< where, in the frame of the first body
-};
-
 struct RehearsalSummary {
   std::uint64_t ticks = 0;
   double removed_mm3 = 0;                 ///< by the burr
@@ -68,7 +64,7 @@ struct RehearsalSummary {
   bool interrupted = false;              ///< run_to_end() was asked to stop
   std::uint64_t session_bytes = 0;
   std::map<std::uint32_t, StructureEvents> structures;  ///< by their value; empty where the scene has none
-  std::vector<StructureCutEvent> structure_cuts;        ///< by planes, in their order; what was taken back too
+  std::vector<StructureCutEvent> structure_cuts;        ///< in their order; what was taken back too
   std::optional<Dust::Totals> dust;                     ///< where the scene has dust
   double voxel_mm3 = 0;                                 ///< turns the mass of a piece into a volume
   std::vector<LiveComponents::Component>
@@ -129,7 +125,7 @@ class Rehearsal {
   /// From any thread but the servo's: something that does not touch physics, at the tick that comes next. Counted where
   /// it is not kept.
   void note(const std::string& kind, const std::string& json);
-  /// Why the last action that could not be done was not, or which structures the last cut went through; once.
+  /// Why the last action that could not be done was not, or which structures the last cut or screws went through; once.
   std::string take_refusal();
 
   /// From any thread, while it runs: how the recording does (nothing lost, where none was asked for).
@@ -214,9 +210,9 @@ class Rehearsal {
   std::deque<SceneAction> timed_, queue_;
   std::string refused_;
   std::vector<ActionNote> notes_;
-  std::vector<StructureCutEvent> structure_cuts_;
-  std::uint64_t soft_tick_ = 0;          // of the next update of soft tissue
-  std::deque<SceneAction> soft_pushes_;  // of the last one, that the servo has not got yet: one a tick
+  std::unique_ptr<StructureReader> cuts_;  // null: there are no structures
+  std::uint64_t soft_tick_ = 0;            // of the next update of soft tissue
+  std::deque<SceneAction> soft_pushes_;    // of the last one, that the servo has not got yet: one a tick
   std::atomic<bool> stop_{false}, elsewhere_{false};
   std::deque<SceneAction> done_elsewhere_;  // whose tick has come
   Device* seat_ = nullptr;

@@ -106,6 +106,8 @@ class Dust {
   };
   // A brick's 26 neighbours, looked up once: nothing reaches farther in a step.
   struct Hood;
+  class Flow;   // the water of a brick, in a step
+  class Pools;  // water that stands
   [[nodiscard]] static std::uint64_t key(int bi, int bj, int bk) {
     return (static_cast<std::uint64_t>(bi + 0x8000) << 32) | (static_cast<std::uint64_t>(bj + 0x8000) << 16) |
            static_cast<std::uint64_t>(bk + 0x8000);

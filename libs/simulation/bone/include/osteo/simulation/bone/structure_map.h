@@ -95,9 +95,10 @@ class StructureMap {
 /// What a blade does to one structure.
 struct StructureCut {
   std::uint8_t structure = 0;  ///< value in the label map
-  double mm3 = 0;              ///< of the structure, that lies in the blade's path; 0: it is not cut
-  double distance_mm = 0;      ///< of the blade's path to it; 0: it is cut
+  double mm3 = 0;              ///< of the structure, that lies in the blade's path, at least kMinMm3; 0: it is not cut
+  double distance_mm = 0;      ///< of the blade's path to it; 0: it is cut, or where mm3 is 0 touched
   Vec3 at_mm;  ///< the middle of what is cut; where it is not, the place of the path that is nearest to it
+  static constexpr double kMinMm3 = 0.01;      ///< less is below what labels and cells tell: contact, no cut
   static constexpr double kReachLessMm = 1.5;  ///< distances are told up to so much less than the map's reach
 };
 
@@ -122,7 +123,7 @@ struct StructureCut {
 [[nodiscard]] std::vector<StructureCut> structures_cut(const StructureMap& map, const SawCut& blade,
                                                        double within_mm = 5);
 
-/// "the facial nerve (2.4 mm3) and the sigmoid sinus (31 mm3)"; empty: none is cut.
+/// "the facial nerve (2.4 mm³) and the sigmoid sinus (31 mm³)"; empty: none is cut.
 [[nodiscard]] std::string reported_structures_cut(const StructureMap& map, std::span<const StructureCut> cuts);
 
 }  // namespace osteo::inline simulation

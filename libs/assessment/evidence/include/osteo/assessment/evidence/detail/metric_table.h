@@ -13,7 +13,7 @@ enum class MetricPlace {
   steps,      ///< StepClock
   sight,      ///< VisibilityMetric
   near,       ///< NearMetric
-  saw,        ///< SawCutMetric
+  saw,        ///< CutMetric
   product,    ///< score_session, from Product
   reference,  ///< score_session, from Reference
   heat,       ///< heat_values (library scene)
@@ -124,8 +124,8 @@ inline constexpr MetricRow kRows[] = {
      "how long, by whichever hand"},
     {"injured_s", "s", kDown, "structures", MetricPlace::near, MetricWhen::structures, kProcess,
      "how long while it turned"},
-    {"cut_mm3", "mm3", kDown, "structures", MetricPlace::saw, MetricWhen::some, kOurs,
-     "of it, in the path of cuts by a plane"},
+    {"cut_mm3", "mm3", kDown, "structures", MetricPlace::saw, MetricWhen::structures, kOurs,
+     "of it, taken by burrs and saws or gone through by shafts and screws"},
     {"saw_clearance_mm", "mm", kUp, "structures", MetricPlace::saw, MetricWhen::some, kOurs,
      "least distance of a cut by a plane, where it is below 5 mm and none went through it"},
     {"near_s", "s", kNone, "structures", MetricPlace::near, MetricWhen::structures, kProcess,

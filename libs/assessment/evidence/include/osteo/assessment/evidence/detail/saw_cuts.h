@@ -1,30 +1,29 @@
-// What cuts by a plane took of structures: no burr is near one when a saw goes through it.
+// What burrs, saws, shafts and screws took of structures.
 #pragma once
 #include <map>
 #include <vector>
 
 #include "osteo/assessment/evidence/metric.h"
-#include "osteo/simulation/bone/structure_map.h"
+#include "osteo/simulation/haptics/structure_judge.h"
 
 namespace osteo::inline assessment {
 
-/// Of each cut by a plane that was done, what of the structures lay in the blade's path (structure_cut.h). A cut that
-/// was taken back has been made all the same, as a burr's touch has. Sessions without such a cut have no values of it.
-class SawCutMetric final : public Metric {
+/// The events of the one judge (structure_judge.h), and how near cuts by a plane came. What was taken back has been
+/// done all the same, as a burr's touch has.
+class CutMetric final : public Metric {
  public:
-  /// The moment of a cut; its value is in mm3.
-  static constexpr std::string_view kMoment = "cut through by the saw";
+  /// The moment of an event; its value is in mm3.
+  [[nodiscard]] static std::string_view moment_of(CutBy by, bool contact);
 
-  explicit SawCutMetric(const EvidenceScene& scene) : scene_(scene) {}
+  explicit CutMetric(const EvidenceScene& scene);
   void frame(const EvidenceFrame& frame) override;
   void finish(const World& world, std::vector<Measured>& values, std::vector<Moment>& moments) override;
 
  private:
   EvidenceScene scene_;
-  bool any_ = false;
-  std::map<std::uint8_t, double> mm3_;       // by the structure's value
-  std::map<std::uint8_t, double> least_mm_;  // of those that were not cut, where a blade came near
-  std::vector<Moment> moments_;
+  std::optional<StructureJudge> judge_;  // where the scene has structures
+  std::map<std::uint8_t, double>
+      least_mm_;  // by the structure's value, of those that no plane cut, where one came near
 };
 
 }  // namespace osteo::inline assessment
