@@ -10,10 +10,11 @@ work=$(mktemp -d "${TMPDIR:-/tmp}/osteo-image-XXXXXX")
 storage=(--root "$work/store" --runroot "$work/run" --storage-driver vfs) # nothing is left on this machine but the archive
 b() { local verb=$1; shift; buildah "${storage[@]}" "$verb" "$@"; }
 trap 'rm -rf --one-file-system "$work"' EXIT
-base=${BASE:-docker.io/library/debian:bookworm-slim}
+suite=$(source /etc/os-release && echo "$VERSION_CODENAME") # packages are for the distribution that made them
+base=${BASE:-docker.io/library/debian:$suite-slim}
 if ! timeout 60 buildah "${storage[@]}" pull -q "$base" >/dev/null 2>"$work/pull"; then
   echo "no registry ($(tail -1 "$work/pull" | cut -c1-120)): a base is made by mmdebstrap" >&2
-  mmdebstrap --quiet --variant=apt --dpkgopt='path-exclude=/usr/share/man/*' --dpkgopt='path-exclude=/usr/share/locale/*' bookworm "$work/base.tar"
+  mmdebstrap --quiet --variant=apt --dpkgopt='path-exclude=/usr/share/man/*' --dpkgopt='path-exclude=/usr/share/locale/*' "$suite" "$work/base.tar"
   container=$(b from scratch)
   b add -q "$container" "$work/base.tar" /
   b commit -q "$container" localhost/osteo-base >/dev/null

@@ -57,18 +57,50 @@ show_apt() {
   end_progress
 }
 
-# Installs the Debian packages of a list (packages.txt) that are missing; asks nothing. Does nothing, quickly, when all are there.
+# Which distribution this is, by its own file: "debian-13". One without a number (Debian's testing) is "debian-".
+os_release=${OSTEO_OS_RELEASE:-/etc/os-release}
+distribution() {
+  [ -r "$os_release" ] || { echo unknown-; return; }
+  (ID=unknown VERSION_ID= && source "$os_release" && echo "$ID-$VERSION_ID")
+}
+
+# The distributions where a list's names mean the same packages: its line "# for: ...".
+named_distributions() { sed -n 's/^# for: //p' "$1"; }
+
+# needed_by_hand LIST: for who has another distribution, what is needed and what to do.
+needed_by_hand() {
+  local pretty
+  pretty=$( (source "$os_release" && echo "${PRETTY_NAME:-$ID}") 2>/dev/null) || pretty="a system without $os_release"
+  say "This is $pretty. Packages are known by name for $(named_distributions "$1" | sed 's/ /, /g'); here they are not installed for you."
+  say "What is needed, by Debian's names (NAME-dev is the library NAME with its headers); what follows '# tests' only tests need:"
+  sed '1,/^# for:/d' "$1" | paste -sd' ' | fold -s -w 118 | sed 's/^/  /' >&2
+  say "Lowest versions: g++ 12, CMake 3.25, VTK 9.1, OpenVDB 10, OpenCV 4.6 with aruco, CGAL 5.5, Ceres 2.1, DCMTK 3.6.7, GDCM 3.0, Python 3.11."
+}
+
+# Installs the packages of a list (packages.txt) that are missing; asks nothing. Does nothing, quickly, when all are there.
 ensure_packages() {
-  local list=${1:-$root/libs/cmake/packages.txt} missing=() package
+  local list=${1:-$root/libs/cmake/packages.txt} missing=() package here
   local stamp=$root/build/.$(basename "$list" .txt)
   [ "$stamp" -nt "$list" ] && return
+  here=$(distribution)
+  local known=1
+  [[ " $(named_distributions "$list") " == *" $here "* ]] || known=
   if ! command -v dpkg-query >/dev/null; then
-    say "This is not Debian: install what $list names, then build with cmake --preset release."
+    needed_by_hand "$list"
+    say "Install them by this system's own means; the build that follows says what it does not find."
     return
   fi
   for package in $(grep -v '^#' "$list"); do
     [[ $(dpkg-query -W -f '${Status}' "$package" 2>/dev/null) == *'ok installed'* ]] || missing+=("$package")
   done
+  if [ ${#missing[@]} -gt 0 ] && [ -z "$known" ]; then
+    # A name may stand for something else there: who owns the machine decides.
+    needed_by_hand "$list"
+    say "Missing here by these names: ${#missing[@]}. Install them, or what stands for them here, and run this again:"
+    say "  apt-get install --no-install-recommends ${missing[*]}"
+    say "If they have other names here, build without this script: cmake --preset release && ninja -C build/release osteo"
+    exit 9
+  fi
   if [ ${#missing[@]} -gt 0 ]; then
     local sudo=
     if [ "$(id -u)" -ne 0 ]; then
@@ -81,13 +113,13 @@ ensure_packages() {
     fi
     mkdir -p "$root/build"
     local log=$root/build/packages.log
-    say "Installing ${#missing[@]} Debian packages (2 to 4 minutes); what apt says goes to $log"
+    say "Installing ${#missing[@]} packages of $here (2 to 4 minutes); what apt says goes to $log"
     $sudo apt-get update -qq >"$log" 2>&1 || say "apt-get update failed; trying with what is known"
-    # What only tests need may be missing in another release of Debian: those tests are skipped.
+    # What only tests need may be missing in one of the distributions: those tests are skipped.
     local wanted=()
     for package in "${missing[@]}"; do
       if sed '1,/^# tests/d' "$list" | grep -qx "$package" && ! LC_ALL=C apt-cache policy "$package" 2>/dev/null | grep -q 'Candidate: [^(]'; then
-        say "There is no package $package in this Debian: what is tested with it is skipped"
+        say "There is no package $package in $here: what is tested with it is skipped"
       else
         wanted+=("$package")
       fi
@@ -97,7 +129,7 @@ ensure_packages() {
       tee -a "$log" | show_apt "Installing packages" || {
       sed -E '/^(dl|pm)status:/d' "$log" | tail -n 15 >&2
       say "${#missing[@]} packages could not be installed. Is there a network? All of it is in $log"
-      say "By hand: apt-get install --no-install-recommends \$(grep -v '^#' $list)"
+      say "By hand: apt-get install --no-install-recommends ${missing[*]}"
       exit 9
     }
   fi

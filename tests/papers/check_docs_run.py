@@ -44,6 +44,7 @@ NOT_RUN = [
     ("docs/how-to/python.md", r"examples/", "the test python.examples"),
     ("docs/how-to/cluster.md", r"", "the tests readers.batch and readers.batch_slurm"),
     ("docs/how-to/packages.md", r"", "builds packages: the test setup.debs"),
+    ("docs/platforms.md", r"", "builds all in a root of another distribution: by hand"),
     ("docs/validation/hard-cases.md", r"scoreboard", "gets other readers from PyPI"),
     ("docs/validation/robustness.md", r"", "hours, by hand"),
     ("docs/guides/surgeon.md", r"/etc/udev", "is root's"),

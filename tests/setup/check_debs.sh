@@ -12,12 +12,13 @@ done
 work=$(mktemp -d "${TMPDIR:-/tmp}/osteo-debs-XXXXXX")
 trap 'umount "$work/root/proc" 2>/dev/null || true; rm -rf --one-file-system "$work"' EXIT
 chmod 755 "$work"
+suite=$(source /etc/os-release && echo "$VERSION_CODENAME") # packages are for the distribution that made them
 for deb in "$debs"/*.deb; do
   echo "lintian: $(basename "$deb")"
   lintian --fail-on error --tag-display-limit 3 "$deb" >"$work/lintian" 2>&1 || { grep '^E:' "$work/lintian"; exit 1; }
   sed 's/ .*//' "$work/lintian" | sort | uniq -c | sed 's/^/  /'
 done
-mmdebstrap --quiet --variant=apt --aptopt='APT::Install-Recommends "false"' bookworm "$work/root"
+mmdebstrap --quiet --variant=apt --aptopt='APT::Install-Recommends "false"' "$suite" "$work/root"
 base=$(du -sxm "$work/root" | cut -f1)
 mkdir "$work/root/debs"
 cp "$debs"/*.deb "$work/root/debs"

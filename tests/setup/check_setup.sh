@@ -34,6 +34,9 @@ esac
 CMAKE
 echo 'echo "${HEAD_NOW:-aaaa}"' >>"$work/bin/git"
 export PATH=$work/bin:$PATH
+release() { printf '%s\n' "$@" >"$work/os-release"; } # what the machine says it is
+export OSTEO_OS_RELEASE=$work/os-release
+release 'PRETTY_NAME="Debian GNU/Linux 12 (bookworm)"' 'ID=debian' 'VERSION_ID="12"'
 setup() { bash -c 'set -euo pipefail; source libs/cmake/setup.sh; "$@"' bash "$@"; }
 expect() { grep -qF -- "$1" "$work/said" || { echo "it does not say '$1':"; cat "$work/said"; exit 1; }; }
 lines() { [ "$(wc -l <"$work/said")" -le "$1" ] || { echo "more than $1 lines:"; cat "$work/said"; exit 1; }; }
@@ -49,6 +52,42 @@ expect "There is no package calculix-ccx" && rm build/.packages
 ! APT_FAILS=100 setup ensure_packages 2>"$work/said" || { echo "a failed installation passes"; exit 1; }
 expect "packages could not be installed. Is there a network?" && expect "By hand: apt-get install" && test ! -e build/.packages
 lines 32
+# By its own file each distribution whose names are known is told from the others, and those are given the list instead of an installation.
+installs() { # NAME os-release lines...
+  local name=$1
+  shift
+  release "$@" && rm -f build/.packages
+  setup ensure_packages 2>"$work/said" || { echo "$name is refused:"; cat "$work/said"; exit 1; }
+  expect "packages of $name" && expect "100 %" && test -e build/.packages
+}
+installs debian-12 ID=debian VERSION_ID='"12"'
+installs debian-13 'PRETTY_NAME="Debian GNU/Linux 13 (trixie)"' VERSION_ID='"13"' VERSION_CODENAME=trixie ID=debian
+installs ubuntu-24.04 ID=ubuntu ID_LIKE=debian VERSION_ID='"24.04"'
+installs ubuntu-26.04 ID=ubuntu ID_LIKE=debian VERSION_ID="'26.04'"
+is_told() { # WHO os-release lines...
+  local who=$1
+  shift
+  release "$@" && rm -f build/.packages
+  ! setup ensure_packages 2>"$work/said" || { echo "packages are missing on $who, and it passes"; exit 1; }
+  expect "This is $who." && expect "debian-12, debian-13, ubuntu-24.04, ubuntu-26.04" && expect "libvtk9-dev" && expect "VTK 9.1"
+  expect "  apt-get install --no-install-recommends build-essential" && test ! -e build/.packages && lines 30
+  ! grep -q "Installing" "$work/said" || { echo "on $who it installs all the same"; exit 1; }
+}
+is_told "Debian GNU/Linux forky/sid" 'PRETTY_NAME="Debian GNU/Linux forky/sid"' ID=debian # testing has no number
+is_told "Debian GNU/Linux 11 (bullseye)" 'PRETTY_NAME="Debian GNU/Linux 11 (bullseye)"' ID=debian VERSION_ID='"11"'
+is_told "Linux Mint 22" 'PRETTY_NAME="Linux Mint 22"' ID=linuxmint 'ID_LIKE="ubuntu debian"' VERSION_ID='"22"'
+is_told "Ubuntu 4.10" 'PRETTY_NAME="Ubuntu 4.10"' ID=ubuntu VERSION_ID='"4.10"' # no part of a name is a name
+OSTEO_OS_RELEASE=$work/none is_told "a system without $work/none" ID=debian VERSION_ID=12
+# Where all is installed nobody is asked what it is.
+sed -i 's/^exit 1$/echo "install ok installed"/' "$work/bin/dpkg-query"
+release ID=linuxmint VERSION_ID=22
+setup ensure_packages 2>"$work/said" && lines 0 && test -e build/.packages && rm build/.packages
+# Without dpkg the list is given, and the build may find what it needs.
+release 'PRETTY_NAME="Fedora Linux 44"' ID=fedora VERSION_ID=44
+setup eval 'command() { [ "$2" != dpkg-query ] && builtin command "$@"; }; ensure_packages' 2>"$work/said" || { echo "without dpkg it stops"; exit 1; }
+expect "This is Fedora Linux 44." && expect "libvtk9-dev" && expect "by this system's own means" && lines 30 && test ! -e build/.packages
+sed -i 's/^echo "install ok installed"$/exit 1/' "$work/bin/dpkg-query"
+release ID=debian VERSION_ID=12
 # A user who is neither root nor has sudo is told the line for who is.
 nobody() { setup eval 'id() { echo 1000; }; command() { [ "$2" != sudo ] && builtin command "$@"; }; ensure_packages'; }
 ! nobody 2>"$work/said" || { echo "no packages and no root passes"; exit 1; }

@@ -3,9 +3,11 @@
 #include <CGAL/Constrained_Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_exact_constructions_kernel.h>
 #include <CGAL/intersections.h>
+#include <CGAL/version.h>
 
 #include <algorithm>
 #include <map>
+#include <variant>
 
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/cgal/mesh_cgal.h"
@@ -60,7 +62,11 @@ class Arrangement {
       if ((++done & 0xff) == 0) context_.check_cancelled();
       const auto found = CGAL::intersection(triangle(first.triangles[s]), triangle(first.triangles[t]));
       if (!found) continue;
+#if CGAL_VERSION_NR >= 1060000000
+      const Meeting m = std::visit(PointsOf(), *found);
+#else
       const Meeting m = boost::apply_visitor(PointsOf(), *found);
+#endif
       met[s].push_back(m);
       met[t].push_back(m);
     }
@@ -87,7 +93,9 @@ class Arrangement {
   }
 
  private:
-  [[nodiscard]] E::Triangle_3 triangle(const Triangle& t) const { return {exact_[t[0]], exact_[t[1]], exact_[t[2]]}; }
+  [[nodiscard]] E::Triangle_3 triangle(const Triangle& t) const {
+    return {exact_[t[0]], exact_[t[1]], exact_[t[2]]};
+  }
 
   std::uint32_t number(const E::Point_3& p) {
     const auto [at, made] = numbers_.try_emplace(p, static_cast<std::uint32_t>(exact_.size()));

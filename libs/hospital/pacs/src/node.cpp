@@ -65,6 +65,20 @@ void warn_of_open_key(const DicomTls& tls, const Context& context) {
     context.warn("others may read the key '" + tls.key + "': chmod 600 " + tls.key);
 }
 
+namespace {
+
+constexpr auto kTlsProfile = TSP_Profile_BCP195_ND;
+
+/// Later versions of DCMTK ask for the profile already here.
+auto set_certificate(auto& layer, const std::string& file, auto profile) {
+  if constexpr (requires { layer.setCertificateFile(file.c_str(), DCF_Filetype_PEM, profile); })
+    return layer.setCertificateFile(file.c_str(), DCF_Filetype_PEM, profile);
+  else
+    return layer.setCertificateFile(file.c_str(), DCF_Filetype_PEM);
+}
+
+}  // namespace
+
 std::unique_ptr<DcmTLSTransportLayer> tls_layer(const DicomTls& tls, T_ASC_NetworkRole role) {
   if (tls.ca.empty()) {
     if (!tls.certificate.empty() || !tls.key.empty())
@@ -87,12 +101,11 @@ std::unique_ptr<DcmTLSTransportLayer> tls_layer(const DicomTls& tls, T_ASC_Netwo
     require_readable(tls.certificate);
     require_readable(tls.key);
     need(layer->setPrivateKeyFile(tls.key.c_str(), DCF_Filetype_PEM).good(), tls.key, "holds no key that can be read");
-    need(layer->setCertificateFile(tls.certificate.c_str(), DCF_Filetype_PEM).good(), tls.certificate,
-         "holds no certificate");
+    need(set_certificate(*layer, tls.certificate, kTlsProfile).good(), tls.certificate, "holds no certificate");
     need(layer->checkPrivateKeyMatchesCertificate() == OFTrue, tls.key, "is not the key of the certificate");
   }
   layer->setCertificateVerification(DCV_requireCertificate);
-  if (layer->setTLSProfile(TSP_Profile_BCP195_ND).bad() || layer->activateCipherSuites().bad())
+  if (layer->setTLSProfile(kTlsProfile).bad() || layer->activateCipherSuites().bad())
     throw Error(ExitCode::failed, "this machine's OpenSSL knows none of the ciphers that DICOM asks for");
   return layer;
 }

@@ -7,23 +7,6 @@
 #include "osteo/core/base/error.h"
 
 namespace osteo::inline simulation {
-namespace marker {
-
-const cv::Ptr<cv::aruco::Dictionary>& dictionary_of(MarkerKind kind) {
-  // Few bits: large cells. Of the first, three pens take 39.
-  static const cv::Ptr<cv::aruco::Dictionary> pen = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50);
-  static const cv::Ptr<cv::aruco::Dictionary> plate = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_5X5_50);
-  return kind == MarkerKind::pen ? pen : plate;
-}
-
-const cv::Ptr<cv::aruco::CharucoBoard>& plate_board() {
-  static const cv::Ptr<cv::aruco::CharucoBoard> board =
-      cv::aruco::CharucoBoard::create(PlateBody::kAcross, PlateBody::kDown, static_cast<float>(PlateBody::kSquareMm),
-                                      static_cast<float>(PlateBody::kMarkerMm), dictionary_of(MarkerKind::plate));
-  return board;
-}
-
-}  // namespace marker
 
 std::vector<MarkerPatch> pen_markers(int pen, double scale) {
   if (pen < 1 || pen > PenBody::kMaxPens)
@@ -47,13 +30,12 @@ std::vector<MarkerPatch> pen_markers(int pen, double scale) {
 }
 
 int marker_cells_across(MarkerKind kind) {
-  return marker::dictionary_of(kind)->markerSize + 2;
+  return marker::bits_across(kind) + 2;
 }
 
 std::vector<std::uint8_t> marker_cells(MarkerKind kind, int id) {
   const int n = marker_cells_across(kind);
-  cv::Mat picture;
-  marker::dictionary_of(kind)->drawMarker(id, n, picture, 1);
+  const cv::Mat picture = marker::drawn_marker(kind, id, n);
   std::vector<std::uint8_t> cells;
   for (int y = 0; y < n; ++y) {
     for (int x = 0; x < n; ++x) cells.push_back(picture.at<std::uint8_t>(y, x) > 127 ? 1 : 0);
@@ -62,15 +44,14 @@ std::vector<std::uint8_t> marker_cells(MarkerKind kind, int id) {
 }
 
 std::vector<MarkerPatch> plate_markers() {
-  const auto& board = *marker::plate_board();
   std::vector<MarkerPatch> all;
-  for (std::size_t i = 0; i < board.ids.size(); ++i) {
+  for (const marker::PlateMarker& m : marker::markers_of_plate()) {
     const auto at = [&](std::size_t c) {
-      const cv::Point3f& p = board.objPoints[i][c];
+      const cv::Point3f& p = m.corners_mm[c];
       return Vec3{p.x, p.y, p.z};
     };
-    all.push_back({board.ids[i], (at(0) + at(2)) * 0.5, normalized(at(1) - at(0)), normalized(at(0) - at(3)),
-                   PlateBody::kMarkerMm});
+    all.push_back(
+        {m.id, (at(0) + at(2)) * 0.5, normalized(at(1) - at(0)), normalized(at(0) - at(3)), PlateBody::kMarkerMm});
   }
   return all;
 }

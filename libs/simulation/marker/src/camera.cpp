@@ -96,23 +96,20 @@ Look CameraCalibration::add(const GrayPicture& picture) {
                     std::to_string(picture.width) + " x " + std::to_string(picture.height),
                 "a camera is calibrated at one size");
   ++pictures_;
-  const auto& board = marker::plate_board();
   cv::Mat gray = marker::view_of(picture).clone();
   std::vector<std::vector<cv::Point2f>> corners;
   std::vector<int> ids;
   std::vector<cv::Point2f> crossings;
   std::vector<int> numbers;
   const auto find = [&] {
-    const auto p = cv::aruco::DetectorParameters::create();
-    p->cornerRefinementMethod = cv::aruco::CORNER_REFINE_NONE;
-    p->errorCorrectionRate = 0.4;
-    p->minMarkerDistanceRate = 0.02;  // the white squares around markers are no rivals of theirs
+    cv::aruco::DetectorParameters p;
+    p.cornerRefinementMethod = cv::aruco::CORNER_REFINE_NONE;
+    p.errorCorrectionRate = 0.4;
+    p.minMarkerDistanceRate = 0.02;  // the white squares around markers are no rivals of theirs
     corners.clear();
     ids.clear();
-    cv::aruco::detectMarkers(gray, marker::dictionary_of(MarkerKind::plate), corners, ids, p);
-    crossings.clear();
-    numbers.clear();
-    if (!ids.empty()) cv::aruco::interpolateCornersCharuco(corners, ids, gray, board, crossings, numbers);
+    marker::find_markers(gray, MarkerKind::plate, p, corners, ids);
+    marker::find_crossings(gray, p, corners, ids, crossings, numbers);
     return crossings.size() >= 8;
   };
   bool turned = mirrored_ > 0;
@@ -128,9 +125,10 @@ Look CameraCalibration::add(const GrayPicture& picture) {
   mirrored_ += turned ? 1 : 0;
 
   View view;
+  const std::vector<cv::Point3f> board = marker::crossings_of_plate();
   std::vector<cv::Point2f> flat, seen;
   for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const cv::Point3f& p = board->chessboardCorners[static_cast<std::size_t>(numbers[i])];
+    const cv::Point3f& p = board[static_cast<std::size_t>(numbers[i])];
     view.plate_mm.push_back({p.x, p.y, p.z});
     view.pixel.push_back({crossings[i].x, crossings[i].y});
     flat.emplace_back(p.x, p.y);

@@ -221,11 +221,11 @@ PageCheck check_page(Paper paper, int pen, int number) {
   const MarkerKind kind = number == 0 ? MarkerKind::pen : MarkerKind::plate;
   std::vector<std::vector<cv::Point2f>> corners;
   std::vector<int> ids;
-  const auto params = cv::aruco::DetectorParameters::create();
-  params->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
-  params->cornerRefinementWinSize = 4;
-  params->minMarkerDistanceRate = 0.02;  // the white squares around the plate's markers are no rivals
-  cv::aruco::detectMarkers(marker::view_of(page), marker::dictionary_of(kind), corners, ids, params);
+  cv::aruco::DetectorParameters params;
+  params.cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+  params.cornerRefinementWinSize = 4;
+  params.minMarkerDistanceRate = 0.02;  // the white squares around the plate's markers are no rivals
+  marker::find_markers(marker::view_of(page), kind, params, corners, ids);
   PageCheck check;
   check.expected = static_cast<int>(places.size());
   for (const Place& p : places) {

@@ -31,20 +31,20 @@ Vec3 middle_of(const Quad& q) {
 }
 
 std::vector<Detected> detect(const cv::Mat& gray) {
-  const auto p = cv::aruco::DetectorParameters::create();
+  cv::aruco::DetectorParameters p;
   const double size = std::max(gray.cols, gray.rows);
-  p->minMarkerPerimeterRate = 4 * kMinSidePx / size;
-  p->adaptiveThreshWinSizeMin = 5;
-  p->adaptiveThreshWinSizeMax = 25;
-  p->adaptiveThreshWinSizeStep = 10;
-  p->polygonalApproxAccuracyRate = 0.05;
-  p->minCornerDistanceRate = 0.03;
-  p->minDistanceToBorder = 1;
-  p->errorCorrectionRate = 0.4;  // a wrong marker is worse than none
-  p->cornerRefinementMethod = cv::aruco::CORNER_REFINE_NONE;
+  p.minMarkerPerimeterRate = 4 * kMinSidePx / size;
+  p.adaptiveThreshWinSizeMin = 5;
+  p.adaptiveThreshWinSizeMax = 25;
+  p.adaptiveThreshWinSizeStep = 10;
+  p.polygonalApproxAccuracyRate = 0.05;
+  p.minCornerDistanceRate = 0.03;
+  p.minDistanceToBorder = 1;
+  p.errorCorrectionRate = 0.4;  // a wrong marker is worse than none
+  p.cornerRefinementMethod = cv::aruco::CORNER_REFINE_NONE;
   std::vector<std::vector<cv::Point2f>> corners;
   std::vector<int> ids;
-  cv::aruco::detectMarkers(gray, marker::dictionary_of(MarkerKind::pen), corners, ids, p);
+  marker::find_markers(gray, MarkerKind::pen, p, corners, ids);
   std::vector<Detected> all;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     Detected d{ids[i], {}};
