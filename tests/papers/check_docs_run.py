@@ -54,6 +54,7 @@ NOT_RUN = [
     ("", r"osteo stream .*igtl", "waits for who listens: the test readers.network"),
     ("docs/guides/edit.md", r"--apply", "corrections that somebody made in the window: the test window.edit"),
     ("docs/guides/study.md", r"metrics.json|study (form|rate|analyse)", "sessions and ratings of people; LONG's demo does all of it"),
+    ("docs/planning.md", r"mandible.stl", "bones of one's own: stages.works runs plan-reconstruction"),
     ("docs/validation/structures.md", r"SCAN", "a scan of one's own"),
     ("docs/validation/tissue.md", r"mesh.vtu|fem bone.inp|tissue.vtu", "a mesh, a problem and measurements of one's own"),
     ("docs/validation/trainee.md", r"CASE|score", "a case with structures: stages.works runs simulate-trainee"),

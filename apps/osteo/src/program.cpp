@@ -93,7 +93,7 @@ std::vector<cli::Group> command_groups() {
        {"mesh-info", "mesh-repair", "voxelize", "distance", "distance-at", "compare", "virtual-fixture", "saw",
         "separate-fragments", "tetrahedralize", "embed-surface"}},
       {"Tissue", {"simulate", "fem", "bone-stiffness", "calibrate", "fit-damping"}},
-      {"Research", {"experiment", "ground-truth", "simulate-trainee", "phantom", "bench"}},
+      {"Research", {"experiment", "ground-truth", "simulate-trainee", "phantom", "plan-reconstruction", "bench"}},
       {"Osteotome itself", {"demo", "list", "docs"}},
   };
 }

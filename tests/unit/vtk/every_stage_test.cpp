@@ -75,6 +75,16 @@ const std::map<std::string, Recipe>& table() {
         {},
         {"line"}}},
       {"find-structures", {{{"what", "ear_canal,air_cells"}}, {}, {"findings"}}},
+      {"plan-reconstruction",
+       {{{"target", "own"},
+         {"a_mm", "-4,0,0"},
+         {"a_normal", "1,0,0"},
+         {"b_mm", "4,0,0"},
+         {"b_normal", "-1,0,0"},
+         {"min_length_mm", "5"},
+         {"reserve_mm", "5"}},
+        {},
+        {}}},
       {"phantom", {{{"region", "temporal"}, {"spacing_mm", "4"}}, {}, {}}},
   };
   return value;

@@ -9,6 +9,7 @@
 #include "image.h"
 #include "import.h"
 #include "osteo/app/stages/mesh.h"
+#include "planning.h"
 #include "register.h"
 #include "segment.h"
 #include "snapshot.h"
@@ -49,6 +50,7 @@ Registry osteo_stages() {
   registry.add<TubeStage>();
   registry.add<FindStructuresStage>();
   registry.add<RegisterStage>();
+  registry.add<PlanReconstructionStage>();
   registry.add<PhantomStage>();
   return registry;
 }

@@ -1,0 +1,29 @@
+// The stage plan-reconstruction.
+#pragma once
+#include "osteo/core/stage/stage.h"
+#include "osteo/session/planning/reconstruct.h"
+
+namespace osteo::inline app {
+
+struct PlanReconstructionStage {
+  using Params = ReconstructionParams;
+  static void describe(Params& p, auto& visit) {
+    visit({"target", "mirrored: the healthy side; own: the mandible as it is, where its outline is not changed"},
+          p.target);
+    visit({"a_mm", "place in resection plane a, in the bone", "mm"}, p.a_mm);
+    visit({"a_normal", "its normal, towards what is removed"}, p.a_normal);
+    visit({"b_mm", "place in resection plane b, in the bone", "mm"}, p.b_mm);
+    visit({"b_normal", "its normal, towards what is removed"}, p.b_normal);
+    visit({"down", "from the teeth to the lower border, roughly"}, p.down);
+    visit({"max_segments", "largest number of segments", "", 1, 6}, p.max_segments);
+    visit({"min_length_mm", "of the shortest line along a segment", "mm", 1, 100}, p.min_length_mm);
+    visit({"max_contour_mm", "fewer segments are taken while the mean error is not above this", "mm", 0.1, 10},
+          p.max_contour_mm);
+    visit({"kerf_mm", "width of each saw cut", "mm", 0, 5}, p.kerf_mm);
+    visit({"reserve_mm", "left at each end of the donor bone", "mm", 0, 200}, p.reserve_mm);
+  }
+  static StageInfo info();
+  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
+};
+
+}  // namespace osteo::inline app

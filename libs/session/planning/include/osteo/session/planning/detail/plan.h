@@ -1,0 +1,48 @@
+// What is planned before surgery, as values: cut planes, fragments and where each fragment goes.
+#pragma once
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "osteo/core/data/rigid_transform.h"
+
+namespace osteo::inline session {
+
+/// A plane in which a bone is sawn, in LPS mm of that bone's CT. Names of bones are the plan's own ("mandible").
+struct CutPlane {
+  std::string name, bone;
+  Vec3 at_mm;
+  Vec3 normal;              ///< unit, to 1e-9
+  double kerf_mm = 1;       ///< width of the saw's cut, removed on the side of `waste`
+  bool waste_ahead = true;  ///< what the normal points to is discarded, and the kerf with it
+  friend bool operator==(const CutPlane&, const CutPlane&) = default;
+};
+
+/// A part of a bone that keeps its shape: what lies behind (not on the waste side of) all planes named.
+struct PlannedFragment {
+  std::string name, bone;
+  std::vector<std::string> planes;  ///< by name; of the same bone
+  RigidTransform planned_from_ct;   ///< from where it lies in its CT to where it is wanted
+};
+
+struct SurgicalPlan {
+  std::vector<CutPlane> planes;
+  std::vector<PlannedFragment> fragments;
+  [[nodiscard]] const CutPlane& plane(std::string_view name) const;  ///< Error(usage) with the names there are
+};
+
+/// { "osteotome_surgical_plan": 1, "unit": "mm",
+///   "planes": [ {"name": "a", "bone": "mandible", "at_mm": [x, y, z], "normal": [0, 0, 1], "kerf_mm": 1,
+///                "waste_ahead": true} ],
+///   "fragments": [ {"name": "segment 1", "bone": "fibula", "planes": ["b", "c"],
+///                   "rotation_rows": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "shift_mm": [x, y, z]} ] }
+/// Errors: usage, with file and line: another unit, unknown keys, ranges, a normal that is not of unit length, a
+/// rotation that is not one (to 1e-9), two of one name, a plane that is not there or of another bone. `name`: the
+/// file, as errors call it.
+[[nodiscard]] SurgicalPlan plan_of(std::string_view text, const std::string& name);
+/// What plan_of reads as the same, to the last bit. Errors as of plan_of, so that no plan is written that cannot be
+/// read.
+[[nodiscard]] std::string plan_json(const SurgicalPlan& plan);
+
+}  // namespace osteo::inline session
