@@ -1,7 +1,10 @@
 # The hard cases as files: what each folder holds, what is right about it, and whether a refusal is.
-import copy, io, math, pathlib, shutil
+import copy, io, math, pathlib, shutil, zlib
+import imagecodecs
 import numpy as np
+from pydicom import dcmread
 from pydicom.dataset import Dataset
+from pydicom.encaps import encapsulate
 from pydicom.sequence import Sequence
 from pydicom.uid import (DeflatedExplicitVRLittleEndian, ExplicitVRBigEndian, JPEG2000Lossless, JPEGLSLossless, RLELossless,
                          SecondaryCaptureImageStorage)
@@ -23,6 +26,29 @@ def plain(parts, syntax=None):
     def fill(folder):
         for i, s in enumerate(parts): write(s.d, folder / f"{i:03}.dcm", *([syntax] if syntax else []))
     return fill
+
+
+def encoded(parts, uid, encode):
+    """Pixels by `encode`. pydicom does not write the name of each of these transfer syntaxes: RLE's stands in until the end."""
+    def fill(folder):
+        for i, s in enumerate(parts):
+            write(s.d, folder / f"{i:03}.dcm")
+            d = dcmread(folder / f"{i:03}.dcm")
+            d.PixelData = encapsulate([encode(np.ascontiguousarray(d.pixel_array))])
+            d["PixelData"].VR, d["PixelData"].is_undefined_length = "OB", True
+            d.file_meta.TransferSyntaxUID = RLELossless
+            d.save_as(folder / f"{i:03}.dcm")
+            b = (folder / f"{i:03}.dcm").read_bytes()
+            old, new = (bytes([2, 0, 16, 0]) + b"UI" + len(v).to_bytes(2, "little") + v
+                        for v in (RLELossless.encode() + b"\0", uid.encode() + b"\0" * (len(uid) % 2)))
+            length = int.from_bytes(b[140:144], "little") + len(new) - len(old)
+            (folder / f"{i:03}.dcm").write_bytes(b[:140] + length.to_bytes(4, "little") + b[144:].replace(old, new, 1))
+    return fill
+
+
+def deflate(pixels):
+    z = zlib.compressobj(9, zlib.DEFLATED, -15)
+    return z.compress(pixels.tobytes()) + z.flush()
 
 
 def made(hu):
@@ -105,6 +131,12 @@ def made(hu):
     for n, name, syntax in ((18, "deflated", DeflatedExplicitVRLittleEndian), (20, "JPEG 2000", JPEG2000Lossless), (20, "RLE", RLELossless)):
         s = base(12)
         yield Case(n, name, VOLUME, plain(s, syntax), [s])
+    for name, uid, encode in (("HTJ2K", "4.201", imagecodecs.htj2k_encode), ("HTJ2K, by resolution", "4.202", imagecodecs.htj2k_encode),
+                              ("JPEG XL", "4.110", lambda a: imagecodecs.jpegxl_encode(a, lossless=True)),
+                              ("each picture deflated", "8.1", deflate), ("uncompressed, encapsulated", "1.98", lambda a: a.tobytes())):
+        s = base(12)
+        for p in s: store(p, p.hu + 1024, 16, 16, 0, -1024)
+        yield Case(72, name, VOLUME, encoded(s, "1.2.840.10008.1.2." + uid, encode), [s])
     s = base(12)
     for p in s: store(p, p.hu, 16, 15, 1, 0)
     yield Case(19, "JPEG-LS of signed pixels", VOLUME, plain(s, JPEGLSLossless), [s])

@@ -57,6 +57,27 @@ std::string text_of(const fs::path& file, const DcmTagKey& tag) {
   return value.c_str();
 }
 
+// Each structure says in SNOMED what it is, where its name tells.
+TEST(Objects, StructuresHaveTheirCodes) {
+  Frame f;
+  f.dims = {9, 7, 4};
+  const auto v = make_voxels<std::uint8_t>(f.voxel_count());
+  for (std::size_t i = 0; i < f.voxel_count(); ++i) v[i] = static_cast<std::uint8_t>(1 + i % 3);
+  const fs::path file = scratch("codes") / "a.dcm";
+  save_segmentation({{f, v}, {{1, "Facial nerve, left", {}}, {2, "mandible", {}}, {3, "left marker", {}}}}, file);
+  DcmFileFormat read;
+  ASSERT_TRUE(read.loadFile(file.c_str()).good());
+  const std::vector<std::string> wanted{"56052001", "91609006", "85756007"};
+  for (std::size_t s = 0; s < wanted.size(); ++s) {
+    DcmItem *segment = nullptr, *code = nullptr;
+    OFString value;
+    ASSERT_TRUE(read.getDataset()->findAndGetSequenceItem(DCM_SegmentSequence, segment, static_cast<long>(s)).good());
+    ASSERT_TRUE(segment->findAndGetSequenceItem(DCM_SegmentedPropertyTypeCodeSequence, code).good());
+    ASSERT_TRUE(code->findAndGetOFString(DCM_CodeValue, value).good());
+    EXPECT_EQ(value, wanted[s].c_str());
+  }
+}
+
 // Careless anonymisation leaves hashes where dates and UIDs belong: what is not allowed is not taken over, by name.
 TEST(Objects, TagsOfTheSourceThatDicomDoesNotAllow) {
   Series s("bad-tags", slices(0, 12));

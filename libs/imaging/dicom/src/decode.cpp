@@ -9,15 +9,14 @@
 #include <vtkDICOMImageCodec.h>
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 
+#include "codecs.h"
+#include "encodings.h"
 #include "pixels.h"
 
 namespace osteo::inline imaging::dicom {
 namespace {
-
-constexpr std::string_view kRle = "1.2.840.10008.1.2.5";
 
 unsigned u16(const char* p) {
   return static_cast<unsigned>(static_cast<unsigned char>(p[0])) << 8 | static_cast<unsigned char>(p[1]);
@@ -75,12 +74,21 @@ Shape shape_of(std::span<const char> bytes, bool jpeg2000) {
 }
 
 bool starts_picture(const char* p, std::uint64_t length) {
-  return length > 3 && (u16(p) == 0xFFD8 || u16(p) == 0xFF4F || std::memcmp(p, "\0\0\0\x0C", 4) == 0);
+  return length > 3 &&
+         (u16(p) == 0xFFD8 || u16(p) == 0xFF4F || u16(p) == 0xFF0A || std::memcmp(p, "\0\0\0\x0C", 4) == 0);
+}
+
+void check_size(const DicomHeader& h, const Shape& shape) {
+  if (shape.width != static_cast<unsigned>(h.columns) || shape.height != static_cast<unsigned>(h.rows) ||
+      shape.components != 1 || shape.precision < (h.bits_allocated == 1 ? 1U : 2U) || shape.precision > 16) {
+    throw PixelError("its compressed pixels are damaged: they are no " + std::to_string(h.columns) + "x" +
+                     std::to_string(h.rows) + " grey picture");
+  }
 }
 
 // Hands the decoded bytes to take(pointer, count); false when the codec fails.
 template <class F>
-bool decode_with_gdcm(const DicomHeader& h, std::span<const char> in, F&& take) {
+bool decode_with_gdcm(const DicomHeader& h, Codec codec_of, std::span<const char> in, F&& take) {
   static const bool quiet = [] {
     gdcm::Trace::WarningOff();
     gdcm::Trace::ErrorOff();
@@ -88,15 +96,9 @@ bool decode_with_gdcm(const DicomHeader& h, std::span<const char> in, F&& take) 
     return true;
   }();
   static_cast<void>(quiet);
-  const std::string& ts = h.transfer_syntax;
-  const bool jpeg2000 = ts.ends_with(".4.90") || ts.ends_with(".4.91"),
-             jpeg_ls = ts.ends_with(".4.80") || ts.ends_with(".4.81");
+  const bool jpeg2000 = codec_of == Codec::jpeg_2000, jpeg_ls = codec_of == Codec::jpeg_ls;
   const Shape shape = shape_of(in, jpeg2000);
-  if (shape.width != static_cast<unsigned>(h.columns) || shape.height != static_cast<unsigned>(h.rows) ||
-      shape.components != 1 || shape.precision < (h.bits_allocated == 1 ? 1U : 2U) || shape.precision > 16) {
-    throw PixelError("its compressed pixels are damaged: they are no " + std::to_string(h.columns) + "x" +
-                     std::to_string(h.rows) + " grey picture");
-  }
+  check_size(h, shape);
   const unsigned short stored = static_cast<unsigned short>(shape.precision);
   // GDCM chooses its JPEG decoder (8, 12 or 16 bits) by this.
   const unsigned short allocated = static_cast<unsigned short>(jpeg2000 || jpeg_ls ? std::max(8, h.bits_allocated)
@@ -146,29 +148,13 @@ bool decode_with_gdcm(const DicomHeader& h, std::span<const char> in, F&& take) 
   }
 }
 
-bool supported(const std::string& ts) {
-  static constexpr std::array<std::string_view, 11> kSupported{
-      kRle,
-      "1.2.840.10008.1.2.4.50",
-      "1.2.840.10008.1.2.4.51",
-      "1.2.840.10008.1.2.4.53",
-      "1.2.840.10008.1.2.4.55",
-      "1.2.840.10008.1.2.4.57",
-      "1.2.840.10008.1.2.4.70",
-      "1.2.840.10008.1.2.4.80",
-      "1.2.840.10008.1.2.4.81",
-      "1.2.840.10008.1.2.4.90",
-      "1.2.840.10008.1.2.4.91",
-  };
-  return std::find(kSupported.begin(), kSupported.end(), ts) != kSupported.end();
-}
-
 }  // namespace
 
 // Items of a stated length, one after the other (PS3.5 A.4): a table of offsets, then the fragments.
 CompressedFrames::CompressedFrames(const DicomHeader& h) : header_(h) {
-  if (!supported(h.transfer_syntax))
-    throw PixelError("its pixels are encoded by " + h.transfer_syntax + ", which is not supported");
+  if (const std::string why = why_unread(h.transfer_syntax); !why.empty()) throw PixelError("its pixels " + why);
+  if (h.bits_allocated > 16)
+    throw PixelError("its compressed pixels have " + std::to_string(h.bits_allocated) + " bits, which is not read");
   if (h.pixel_offset >= h.file_bytes) throw PixelError("its compressed pixels are missing");
   bytes_.resize(static_cast<std::size_t>(h.file_bytes - h.pixel_offset));
   read_bytes(h, h.pixel_offset, bytes_.data(), bytes_.size());
@@ -230,7 +216,10 @@ std::span<const char> CompressedFrames::bytes_of(int frame, std::vector<char>& j
       joined.insert(joined.end(), piece(i).begin(), piece(i).end());
     all = joined;
   }
-  if (all.size() < 8) throw PixelError("its compressed pixels are cut short");
+  // Eight: what the other codecs look at. A black picture of bits deflates to less.
+  const Encoding* const encoding = find_encoding(header_.transfer_syntax);
+  if (all.size() < (encoding != nullptr && encoding->codec == Codec::deflated_frames ? 2U : 8U))
+    throw PixelError("its compressed pixels are cut short");
   return all;
 }
 
@@ -250,7 +239,28 @@ std::vector<std::uint16_t> CompressedFrames::decode(int frame) const {
     }
   };
   bool good = false;
-  if (h.transfer_syntax == kRle) {
+  const Encoding* const encoding = find_encoding(h.transfer_syntax);
+  const Codec codec_of = encoding == nullptr ? Codec::unread : encoding->codec;
+  // Bytes as they lie in an uncompressed file of one frame: bits are packed.
+  const auto take_bytes = [&](const std::vector<char>& bytes) {
+    if (h.bits_allocated != 1) return take(bytes.data(), bytes.size());
+    for (std::size_t i = 0; i < n; ++i) values[i] = static_cast<unsigned char>(bytes[i / 8]) >> (i % 8) & 1;
+  };
+  const std::size_t byte_count = h.bits_allocated == 1 ? (n + 7) / 8 : h.bytes_per_frame();
+  if (codec_of == Codec::none) {
+    good = in.size() == byte_count || in.size() == byte_count + byte_count % 2;
+    if (good) take_bytes({in.begin(), in.begin() + static_cast<std::ptrdiff_t>(byte_count)});
+  } else if (codec_of == Codec::deflated_frames) {
+    std::vector<char> bytes(byte_count);
+    good = inflate_frame(in, bytes);
+    if (good) take_bytes(bytes);
+  } else if (codec_of == Codec::htj2k) {
+    check_size(h, shape_of(in, true));
+    good = decode_htj2k(h, in, values);
+  } else if (codec_of == Codec::jpeg_xl) {
+    const std::vector<char> jpeg = encoding->always_lossy ? jpeg_inside(in) : std::vector<char>();
+    good = jpeg.empty() ? decode_jpeg_xl(h, in, values) : decode_with_gdcm(h, Codec::jpeg, jpeg, take);
+  } else if (codec_of == Codec::rle) {
     vtkDICOMImageCodec::ImageFormat format;
     format.Rows = static_cast<unsigned short>(h.rows);
     format.Columns = static_cast<unsigned short>(h.columns);
@@ -276,7 +286,7 @@ std::vector<std::uint16_t> CompressedFrames::decode(int frame) const {
       if (good) take(out.data(), out.size());
     }
   } else {
-    good = decode_with_gdcm(h, in, take);
+    good = decode_with_gdcm(h, codec_of, in, take);
   }
   if (!good) throw PixelError("its compressed pixels are damaged");
   return values;

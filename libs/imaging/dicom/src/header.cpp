@@ -14,6 +14,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "encodings.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/dicom/verdict.h"
 #include "rewrite.h"
@@ -171,20 +172,6 @@ void set_problem(DicomHeader& h, std::string_view code, std::string why) {
   h.problem = std::move(why);
 }
 
-/// What a way of compressing pixels is called that is not read; empty for all others.
-std::string_view unread_compression(std::string_view syntax) {
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kUnread{{
-      {"1.2.840.10008.1.2.4.20", "HTJ2K (High-Throughput JPEG 2000)"},
-      {"1.2.840.10008.1.2.4.11", "JPEG XL"},
-      {"1.2.840.10008.1.2.4.10", "a video (MPEG, H.264, H.265)"},
-      {"1.2.840.10008.1.2.7.", "a video (SMPTE ST 2110)"},
-      {"1.2.840.10008.1.2.8.", "Deflated Image Frame Compression"},
-  }};
-  for (const auto& [begin, name] : kUnread)
-    if (syntax.starts_with(begin) && syntax.size() == begin.size() + 1) return name;
-  return {};
-}
-
 /// A number of the tag as it stands in the file when it has a decimal comma, which DICOM has not.
 std::string with_comma(vtkDICOMMetaData* meta, vtkDICOMTag tag) {
   const std::string text = trimmed(meta->Get(tag).AsString());
@@ -192,9 +179,10 @@ std::string with_comma(vtkDICOMMetaData* meta, vtkDICOMTag tag) {
 }
 
 void judge(DicomHeader& h, bool has_pixels) {
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kOthers{{
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kOthers{{
       {"1.2.840.10008.1.3.10", "a DICOMDIR, the index of a medium"},
       {"1.2.840.10008.5.1.4.1.1.66.4", "a segmentation, not a CT; taken as structures by 'structures'"},
+      {"1.2.840.10008.5.1.4.1.1.66.7", "a segmentation, not a CT; taken as structures by 'structures'"},
       {"1.2.840.10008.5.1.4.1.1.481.3", "a radiotherapy structure set"},
       {"1.2.840.10008.5.1.4.1.1.481.5", "a radiotherapy plan"},
       {"1.2.840.10008.5.1.4.1.1.481.8", "a radiotherapy plan"},
@@ -229,8 +217,11 @@ void judge(DicomHeader& h, bool has_pixels) {
   // A slice image whose SOP class says screen shot: its numbers are for the eye.
   if (h.sop_class.starts_with("1.2.840.10008.5.1.4.1.1.7"))
     return set_problem(h, code::not_an_image, "a secondary capture, not a scan");
-  if (const std::string_view name = unread_compression(h.transfer_syntax); !name.empty())
-    return set_problem(h, code::no_pixels, "its pixels are compressed as " + std::string(name) + ", which is not read");
+  if (const std::string why = h.compressed ? dicom::why_unread(h.transfer_syntax) : ""; !why.empty())
+    return set_problem(h, code::unsupported_encoding, "its pixels " + why);
+  if (h.compressed && h.bits_allocated > 16)
+    return set_problem(h, code::unsupported_encoding,
+                       "its compressed pixels have " + std::to_string(h.bits_allocated) + " bits, which is not read");
   const std::uint64_t wanted = h.bytes_per_frame() * h.frames.size();
   if (!h.compressed && h.pixel_offset + wanted > h.file_bytes) {
     return set_problem(
@@ -318,11 +309,8 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.big_endian = h.transfer_syntax == kBigEndian;
   h.compressed =
       !(h.big_endian || h.transfer_syntax.empty() || h.transfer_syntax == kImplicit || h.transfer_syntax == kExplicit);
-  static constexpr std::array<std::string_view, 5> kLossy{"1.2.840.10008.1.2.4.50", "1.2.840.10008.1.2.4.51",
-                                                          "1.2.840.10008.1.2.4.53", "1.2.840.10008.1.2.4.55",
-                                                          "1.2.840.10008.1.2.4.81"};
-  h.lossy = text_of(meta, DC::LossyImageCompression) == "01" ||
-            std::find(kLossy.begin(), kLossy.end(), h.transfer_syntax) != kLossy.end();
+  const dicom::Encoding* const encoding = dicom::find_encoding(h.transfer_syntax);
+  h.lossy = text_of(meta, DC::LossyImageCompression) == "01" || (encoding != nullptr && encoding->always_lossy);
   h.pixel_offset = static_cast<std::uint64_t>(parser->GetFileOffset());
   const int count = std::clamp(meta->Get(DC::NumberOfFrames).AsInt(), 1, 100000);
   if (h.samples == 1 && parser->GetPixelDataFound()) {

@@ -97,4 +97,23 @@ SegLayers place_seg_frames(const std::vector<double>& along_mm, double spacing_m
   return s;
 }
 
+SegStack stack_seg_frames(Frame f, const std::vector<Vec3>& at_mm, double spacing_mm, double thickness_mm) {
+  Vec3 &u = f.direction.column[0], &v = f.direction.column[1];
+  u = normalized(u);
+  v = normalized(v - u * dot(u, v));
+  f.direction.column[2] = cross(u, v);
+  std::vector<double> along;
+  for (const Vec3& at : at_mm) along.push_back(dot(at, f.direction.column[2]));
+  SegLayers layers = place_seg_frames(along, spacing_mm, thickness_mm);
+  if (!layers.problem.empty()) return {f, std::move(layers)};
+  f.origin_mm = at_mm[static_cast<std::size_t>(std::min_element(along.begin(), along.end()) - along.begin())];
+  f.spacing_mm.z = layers.pitch_mm;
+  f.dims[2] = layers.count;
+  for (std::size_t i = 0; i < at_mm.size(); ++i) {
+    const Vec3 off = at_mm[i] - f.world_from_index({0, 0, static_cast<double>(layers.layer[i])});
+    if (length(off) > kOffMm) layers.problem = "its frames do not lie straight above each other";
+  }
+  return {f, std::move(layers)};
+}
+
 }  // namespace osteo::inline imaging::dicom

@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "osteo/core/data/frame.h"
+
 namespace osteo::inline imaging::dicom {
 
 struct SegLayers {
@@ -19,5 +21,15 @@ struct SegLayers {
 /// are multiples of is that of the slices. `along_mm`: of each frame along the normal, any order, several at one place
 /// (segments). 0: the file states none. O(n log n).
 [[nodiscard]] SegLayers place_seg_frames(const std::vector<double>& along_mm, double spacing_mm, double thickness_mm);
+
+/// The frame of the volume in which frames at these positions lie, all with the axes and pixels of `plane` (its first
+/// two axes and spacings, columns and rows; the rest is made here), and the layer of each. `layers.problem` tells why
+/// not.
+struct SegStack {
+  Frame frame;
+  SegLayers layers;
+};
+[[nodiscard]] SegStack stack_seg_frames(Frame plane, const std::vector<Vec3>& at_mm, double spacing_mm,
+                                        double thickness_mm);
 
 }  // namespace osteo::inline imaging::dicom

@@ -15,6 +15,7 @@
 
 #include "dcmtk_tools.h"
 #include "decode.h"
+#include "labelmap.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/dicom/objects.h"
 #include "pixels.h"
@@ -150,6 +151,36 @@ void refer_to_series(DcmSegmentation& seg, const DicomSeries& source) {
   seg.getCommonInstanceReference().getReferencedSeriesItems().push_back(item);
 }
 
+// What a structure is, by the words of its name; the first row that fits counts. Bone where it is the only one.
+struct StructureCode {
+  std::string_view word, code, meaning;
+};
+constexpr std::array kStructureCodes{
+    StructureCode{"facial nerve", "56052001", "Facial nerve"},
+    StructureCode{"marrow", "14016003", "Bone marrow"},
+    StructureCode{"mandible", "91609006", "Mandible"},
+    StructureCode{"maxilla", "70925003", "Maxilla"},
+    StructureCode{"tooth", "38199008", "Tooth"},
+    StructureCode{"teeth", "38199008", "Tooth"},
+    StructureCode{"air cells", "91716001", "Mastoid cells and antra"},
+    StructureCode{"labyrinth", "22945000", "Inner ear"},
+    StructureCode{"ear canal", "84301002", "External auditory canal"},
+    StructureCode{"dura", "18545000", "Dura mater"},
+    StructureCode{"carotid", "69105007", "Carotid artery"},
+    StructureCode{"temporal bone", "60911003", "Temporal bone"},
+    StructureCode{"skull", "89546000", "Skull"},
+    StructureCode{"bone", "272673000", "Bone"},
+};
+CodeSequenceMacro type_of(const std::string& name, bool alone) {
+  const std::string lower = lower_case(name);
+  for (const StructureCode& c : kStructureCodes) {
+    if (lower.find(c.word) != std::string::npos)
+      return {std::string(c.code).c_str(), "SCT", std::string(c.meaning).c_str()};
+  }
+  if (alone) return {"272673000", "SCT", "Bone"};
+  return {"85756007", "SCT", "Tissue"};
+}
+
 void write(const Stack& stack, const std::vector<Structure>& structures, const fs::path& path,
            const DicomObjectOptions& o, const Context& context) {
   if (stack.planes.empty())
@@ -173,10 +204,8 @@ void write(const Stack& stack, const std::vector<Structure>& structures, const f
   if (o.source != nullptr) refer_to_series(*seg, *o.source);
 
   for (const Structure& s : structures) {
-    const bool bone = s.name.find("one") != std::string::npos || structures.size() == 1;
     const CodeSequenceMacro category("123037004", "SCT", "Anatomical Structure");
-    const CodeSequenceMacro type =
-        bone ? CodeSequenceMacro("272673000", "SCT", "Bone") : CodeSequenceMacro("85756007", "SCT", "Tissue");
+    const CodeSequenceMacro type = type_of(s.name, structures.size() == 1);
     DcmSegment* segment = nullptr;
     require(DcmSegment::create(segment, s.name.substr(0, 64).c_str(), category, type, DcmSegTypes::SAT_SEMIAUTOMATIC,
                                "Osteotome threshold"),
@@ -305,6 +334,18 @@ void unpack_pixels(const fs::path& path, DcmDataset& d) {
   require(d.putAndInsertUint8Array(DCM_PixelData, pixels.data(), static_cast<unsigned long>(pixels.size())), path);
 }
 
+// What a file says it is; empty for what is no DICOM file.
+std::string class_of(const fs::path& path) {
+  dicom::quiet_dcmtk();
+  OFString uid;
+  DcmFileFormat file;
+  if (file.loadFile(path.c_str(), EXS_Unknown, EGL_noChange, 64, ERM_metaOnly).good() &&
+      file.getMetaInfo()->findAndGetOFString(DCM_MediaStorageSOPClassUID, uid).good() && !uid.empty())
+    return uid.c_str();
+  if (file.loadFile(path.c_str(), EXS_Unknown, EGL_noChange, 64, ERM_fileOnly).bad()) return {};
+  return file.getDataset()->findAndGetOFString(DCM_SOPClassUID, uid).good() ? std::string(uid.c_str()) : std::string();
+}
+
 }  // namespace
 
 void save_segmentation(const Labels& labels, const fs::path& path, const DicomObjectOptions& options,
@@ -320,13 +361,8 @@ void save_segmentation_on_source(const Labels& labels, const fs::path& path, con
 }
 
 bool is_segmentation(const fs::path& path) {
-  dicom::quiet_dcmtk();
-  OFString uid;
-  DcmFileFormat file;
-  if (file.loadFile(path.c_str(), EXS_Unknown, EGL_noChange, 64, ERM_fileOnly).bad()) return false;
-  return (file.getMetaInfo()->findAndGetOFString(DCM_MediaStorageSOPClassUID, uid).good() &&
-          uid == UID_SegmentationStorage) ||
-         (file.getDataset()->findAndGetOFString(DCM_SOPClassUID, uid).good() && uid == UID_SegmentationStorage);
+  const std::string uid = class_of(path);
+  return uid == UID_SegmentationStorage || uid == dicom::kLabelMapStorage;
 }
 
 namespace {
@@ -385,32 +421,25 @@ class SegmentationReader {
         measures->getPixelSpacing(column_mm, 1).bad()) {
       throw fail("it does not say where its frames lie in the patient");
     }
-    u = normalized(u);
-    v = normalized(v - u * dot(u, v));
-    f.direction.column[2] = cross(u, v);
+    const Vec3 along_row = normalized(u), along_column = normalized(v - along_row * dot(v, along_row));
     std::vector<Vec3> at(frames_);
-    std::vector<double> along;
     for (Uint32 i = 0; i < frames_; ++i) {
       if (!read_position(*seg_, i, at[i])) throw fail("frame " + std::to_string(i + 1) + " states no position");
-      if (!lies_as(*seg_, i, u, v, row_mm, column_mm))
+      if (!lies_as(*seg_, i, along_row, along_column, row_mm, column_mm))
         throw fail("frame " + std::to_string(i + 1) +
                    " is turned against the first, or has other pixels: the frames make no one volume");
-      along.push_back(dot(at[i], f.direction.column[2]));
     }
     Float64 spacing_mm = 0, thickness_mm = 0;
     if (measures->getSpacingBetweenSlices(spacing_mm).bad()) spacing_mm = 0;
     if (measures->getSliceThickness(thickness_mm).bad()) thickness_mm = 0;
-    layers_ = dicom::place_seg_frames(along, spacing_mm, thickness_mm);
+    f.spacing_mm = {column_mm, row_mm, 1};
+    f.dims = {columns_, rows_, 1};
+    auto [frame, layers] = dicom::stack_seg_frames(f, at, spacing_mm, thickness_mm);
+    layers_ = std::move(layers);
     if (!layers_.problem.empty()) throw fail(layers_.problem);
     if (!layers_.warning.empty()) context_.warn("'" + path_.string() + "': " + layers_.warning);
-    f.origin_mm = at[static_cast<std::size_t>(std::min_element(along.begin(), along.end()) - along.begin())];
-    f.spacing_mm = {column_mm, row_mm, layers_.pitch_mm};
-    f.dims = {columns_, rows_, layers_.count};
+    f = frame;
     require_valid(f);
-    for (Uint32 i = 0; i < frames_; ++i) {
-      const Vec3 off = at[i] - f.world_from_index({0, 0, static_cast<double>(layers_.layer[i])});
-      if (length(off) > 0.05) throw fail("its frames do not lie straight above each other");
-    }
   }
 
   void read_segments() {
@@ -480,6 +509,7 @@ class SegmentationReader {
 Labels load_segmentation(const fs::path& path, const Context& context) {
   require_readable(path);
   dicom::quiet_dcmtk();
+  if (class_of(path) == dicom::kLabelMapStorage) return dicom::load_labelmap(path, context);
   return SegmentationReader(path, context).read();
 }
 

@@ -9,6 +9,8 @@
 namespace osteo::inline imaging::dicom {
 namespace {
 
+constexpr const char* kTranscode =
+    "have the archive send it in another transfer syntax, such as Explicit VR Little Endian";
 constexpr double kDegrees = 180 / 3.14159265358979323846;
 
 // What tells two scans of one series apart. The last one takes all together.
@@ -101,14 +103,19 @@ class StackChooser {
                         ? "'" + files.front() + "' is left out: "
                         : std::to_string(files.size()) + " files are left out, the first '" + files.front() + "': ") +
                        why,
-                   "copy the files again from their source, or ask for the original export", files);
+                   code == code::unsupported_encoding ? kTranscode
+                                                      : "copy the files again from their source, or ask for the "
+                                                        "original export",
+                   files);
     }
     if (all.empty()) {
       verdict_.add(verdict_.set_aside.empty() ? code::not_a_volume : verdict_.set_aside.front().code, Severity::error,
                    verdict_.set_aside.empty() ? "there is no slice"
                                               : "no file can be used; '" + verdict_.set_aside.front().file +
                                                     "': " + verdict_.set_aside.front().why,
-                   "choose another series");
+                   !verdict_.set_aside.empty() && verdict_.set_aside.front().code == code::unsupported_encoding
+                       ? kTranscode
+                       : "choose another series");
     }
     return all;
   }

@@ -90,6 +90,8 @@ constexpr auto kTable = std::to_array<VerdictCode>({
      "left out; the hole counts"},
     {code::no_pixels, "warning", Refuses::when_nothing_is_left, 0, "", "a file that is cut, damaged, or not there",
      "left out; the hole counts"},
+    {code::unsupported_encoding, "warning", Refuses::when_nothing_is_left, 0, "",
+     "a transfer syntax that is not read, named, with what this build lacks for it", "left out; the hole counts"},
     {code::cannot_read, "warning", Refuses::when_nothing_is_left, 0, "", "a file that is cut, damaged, or not there",
      "left out; the hole counts"},
     {code::missing_file, "warning", Refuses::when_nothing_is_left, 0, "", "a file that is cut, damaged, or not there",

@@ -32,12 +32,14 @@ void save_segmentation(const Labels& labels, const std::filesystem::path& path, 
 void save_segmentation_on_source(const Labels& labels, const std::filesystem::path& path,
                                  const DicomObjectOptions& options, const Context& context = {});
 
-/// A DICOM SEG as a label map on its own slices, plain, deflated, or compressed by RLE, JPEG-LS, JPEG or JPEG 2000;
-/// fractional ones are cut at half. Slices that hold nothing may be absent from the file, and frames may stand in any
-/// order: layers lie SpacingBetweenSlices apart where all frames fit that, and the layers of absent frames are empty.
-/// Where the file states no such distance, the frames' own decides, or the file is rejected when the thickness of its
-/// slices says that frames may be absent. Where segments overlap, the later one stays (a warning says how much).
-/// Errors: corrupt for what is no SEG, has no even, parallel frames or more than 255 segments.
+/// A DICOM SEG (bits, fractions cut at half, or a LABELMAP of 8 or 16 bits) as a label map on its own slices, plain,
+/// deflated, or compressed by RLE, JPEG-LS, JPEG or JPEG 2000. Slices that hold nothing may be absent from the file,
+/// and frames may stand in any order: layers lie SpacingBetweenSlices apart where all frames fit that, and the layers
+/// of absent frames are empty. Where the file states no such distance, the frames' own decides, or the file is rejected
+/// when the thickness of its slices says that frames may be absent. Where segments overlap, the later one stays (a
+/// warning says how much). A LABELMAP keeps the numbers of its segments where all are at most 255; else they are
+/// numbered from 1 (a warning). Errors: corrupt for what is no SEG, has no even, parallel frames, more than 255
+/// segments or pixels of none of them.
 [[nodiscard]] Labels load_segmentation(const std::filesystem::path& path, const Context& context = {});
 
 /// True when the file says it is a DICOM SEG.

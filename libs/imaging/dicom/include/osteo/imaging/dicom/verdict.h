@@ -17,7 +17,7 @@ namespace code {
 // Files that are not slices of a scan.
 inline constexpr std::string_view not_dicom = "NOT_DICOM", not_an_image = "NOT_AN_IMAGE", no_pixels = "NO_PIXELS",
                                   colour = "COLOUR", localizer = "LOCALIZER", cannot_read = "CANNOT_READ",
-                                  missing_file = "MISSING_FILE";
+                                  missing_file = "MISSING_FILE", unsupported_encoding = "UNSUPPORTED_ENCODING";
 // Files that are damaged or say too little.
 inline constexpr std::string_view header_damaged = "HEADER_DAMAGED", pixels_damaged = "PIXELS_DAMAGED",
                                   position_missing = "POSITION_MISSING", orientation_missing = "ORIENTATION_MISSING",
