@@ -12,7 +12,7 @@ namespace osteo {
   std::string licence =
       "Osteotome's own sources: Apache-2.0. This binary links VTK, vtk-dicom, GDCM, DCMTK, libarchive, OpenVDB, "
       "oneTBB, hidapi, libsodium, "
-      "HDF5 and "
+      "HDF5, libdeflate and "
       "zlib (all "
       "permissive or MPL-2.0)";
   std::string parts(copyleft_parts());

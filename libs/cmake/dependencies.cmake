@@ -21,6 +21,7 @@ find_package(DCMTK CONFIG REQUIRED)
 # HTJ2K (from 2.5 on) and JPEG XL in DICOM; a build does without, and says so where it meets one.
 pkg_check_modules(OPENJPEG IMPORTED_TARGET QUIET libopenjp2>=2.5)
 pkg_check_modules(JXL IMPORTED_TARGET QUIET libjxl)
+pkg_check_modules(DEFLATE REQUIRED IMPORTED_TARGET libdeflate)
 pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd)
 pkg_check_modules(HDF5 REQUIRED IMPORTED_TARGET hdf5)
 pkg_check_modules(HIDAPI REQUIRED IMPORTED_TARGET hidapi-hidraw)

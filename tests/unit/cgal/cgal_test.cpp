@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "meshes.h"
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/distance/solid.h"
@@ -106,6 +108,55 @@ TEST(Cgal, ResolvesOverlapsWithoutLosingBodies) {
   EXPECT_NEAR(enclosed_volume_mm3(mesh_of(one)), 3 * 40 - 2 * 8, 1e-4);
   EXPECT_TRUE(check(mesh_of(one)).watertight());
   EXPECT_EQ(intersections_resolved(test::sphere(3, 2), r).triangles.size(), test::sphere(3, 2).triangles.size());
+}
+
+// Slabs through one middle, each turned by its own angles: every face is cut by all the others, and where three meet is
+// computed from cuts of cuts. What is counted in the end is what a file holds, in single precision.
+TEST(Cgal, ManyThroughOnePlaceEndAndAreCountedAsWritten) {
+  TriangleSoup all;
+  for (int i = 0; i < 6; ++i) {
+    TriangleSoup slab = test::box({-10, -8, -1}, {10, 8, 1});
+    const double a = 0.7 * i + 0.1, b = 1.1 * i + 0.3;
+    for (Vec3& p : slab.points_mm) {
+      p = {p.x * std::cos(a) - p.y * std::sin(a), p.x * std::sin(a) + p.y * std::cos(a), p.z};
+      p = {p.x, p.y * std::cos(b) - p.z * std::sin(b), p.y * std::sin(b) + p.z * std::cos(b)};
+    }
+    all = i == 0 ? slab : test::joined(all, slab);
+  }
+  all = soup_of(mesh_of(all));
+  const double volume = inside_volume_mm3(all);
+  CgalRepairReport r;
+  const TriangleSoup one = intersections_resolved(all, r);
+  EXPECT_GT(r.self_intersections_before, 100u);
+  const TriangleSoup written = soup_of(mesh_of(one));
+  EXPECT_EQ(self_intersections(written).size(), r.self_intersections_after);
+  EXPECT_EQ(r.self_intersections_after, 0u);
+  EXPECT_TRUE(check(mesh_of(one)).watertight());
+  EXPECT_NEAR(enclosed_volume_mm3(mesh_of(one)), volume, 0.01 * volume);
+}
+
+// Triangles that have nothing to do with each other: it ends, and either says that they enclose nothing or leaves what
+// it counts.
+TEST(Cgal, SoupOfTrianglesEnds) {
+  TriangleSoup soup;
+  std::uint32_t state = 7;
+  const auto next = [&] { return (state = state * 1664525U + 1013904223U) / 4294967296.0; };
+  for (std::uint32_t t = 0; t < 25; ++t) {
+    for (int i = 0; i < 3; ++i) {
+      const double x = next(), y = next(), z = next();
+      soup.points_mm.push_back({x, y, z});
+    }
+    soup.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  }
+  soup = soup_of(mesh_of(soup));
+  CgalRepairReport r;
+  try {
+    const TriangleSoup one = intersections_resolved(soup, r);
+    EXPECT_EQ(self_intersections(soup_of(mesh_of(one))).size(), r.self_intersections_after);
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::failed);
+  }
+  EXPECT_GT(r.self_intersections_before, 20u);
 }
 
 TEST(Cgal, MeshesABallWithinItsBounds) {

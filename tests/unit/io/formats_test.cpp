@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -65,6 +66,29 @@ TEST_P(EveryFormat, LeftStaysLeft) {
   EXPECT_EQ(right, 0);
 }
 
+// Larger than what is packed at once, of stretches that pack well, hardly and not at all, with a rest at the end.
+TEST_P(EveryFormat, PackedInManyPiecesIsOneVolume) {
+  Image image;
+  image.frame.dims = {129, 127, 45};
+  const std::size_t count = image.frame.voxel_count();
+  const auto voxels = make_voxels<std::int16_t>(count);
+  std::uint32_t state = 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    state = state * 1664525U + 1013904223U;
+    const auto noise = static_cast<std::int16_t>(state >> 16);
+    voxels[i] = i < 200'000   ? std::int16_t{-1000}
+                : i < 400'000 ? noise
+                : i < 600'000 ? static_cast<std::int16_t>(noise & 31)
+                              : static_cast<std::int16_t>(i % 3000);
+  }
+  image.voxels = voxels;
+  const auto path = folder() / (std::string("pieces") + GetParam());
+  save_image(image, path);
+  const Image back = load_image(path);
+  ASSERT_EQ(back.frame.dims, image.frame.dims);
+  EXPECT_TRUE(std::equal(back.span().begin(), back.span().end(), image.span().begin()));
+}
+
 TEST_P(EveryFormat, CutFileIsRefusedByName) {
   const auto whole = folder() / (std::string("whole") + GetParam()), cut = folder() / (std::string("cut") + GetParam());
   PhantomParams p;
@@ -91,6 +115,23 @@ INSTANTIATE_TEST_SUITE_P(Io, EveryFormat, testing::Values(".nrrd", ".nii", ".nii
                            std::erase(n, '.');
                            return n;
                          });
+
+// Files of others: packed by zlib, whole or in its own wrapping.
+TEST(Nrrd, PackedByOthersIsReadAlike) {
+  const std::string header =
+      "NRRD0004\ntype: uint8\ndimension: 3\nspace: LPS\nsizes: 2 2 1\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"
+      "encoding: gzip\n\n";
+  // Of the bytes 1, 2, 3, 40: a stored block, in gzip's wrapping and in zlib's.
+  const std::string block("\x01\x04\x00\xfb\xff\x01\x02\x03\x28", 9);
+  const std::string gzip = std::string("\x1f\x8b\x08\0\0\0\0\0\0\x03", 10) + block +
+                           std::string("\x2e\x97\xe4\x84", 4) + std::string("\x04\0\0\0", 4);
+  const std::string zlib = "\x78\x01" + block + std::string("\x00\x3c\x00\x2f", 4);
+  for (const std::string& packed : {gzip, zlib}) {
+    write_file(folder() / "others.nrrd", header + packed);
+    const Image image = load_image(folder() / "others.nrrd");
+    for (int i = 0; i < 4; ++i) EXPECT_EQ(image.voxels[static_cast<std::size_t>(i)], i < 3 ? i + 1 : 40);
+  }
+}
 
 TEST(Nrrd, RasBigEndianRawIsReadRight) {
   const auto path = folder() / "ras.nrrd";

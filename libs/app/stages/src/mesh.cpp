@@ -242,7 +242,7 @@ std::vector<Data> MeshInfoStage::run(const Params& p, std::span<const Data> inpu
 
 StageInfo MeshRepairStage::info() {
   return {.name = "mesh-repair",
-          .version = 2,
+          .version = 3,
           .synopsis = "mends a surface: holes, duplicates, orientation, degenerate triangles, self-intersections",
           .description =
               "Takes out unsound, degenerate and duplicate triangles, joins equal points, makes neighbours and bodies "
@@ -274,13 +274,15 @@ std::vector<Data> MeshRepairStage::run(const Params& p, std::span<const Data> in
 
 StageInfo TetrahedralizeStage::info() {
   return {.name = "tetrahedralize",
-          .version = 2,
+          .version = 3,
           .synopsis = "tetrahedra that fill a surface",
           .description =
               "Five methods. grid and graded make staircases of perfectly shaped tetrahedra, in no time; "
               "grid-conforming follows the surface "
               "with angles that "
-              "stay good, whatever the surface; tetgen and cgal need a closed surface that does not intersect itself, "
+              "stay good, whatever the surface; tetgen and cgal need a closed surface that does not intersect itself "
+              "(one that "
+              "does is repaired first, as by --clean), "
               "and run in a process of "
               "their own. Whatever the "
               "method, inside is where the winding number is not zero: a shell that faces inward is a cavity, a body "
@@ -300,10 +302,22 @@ StageInfo TetrahedralizeStage::info() {
 
 std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
   const Surface& surface = std::get<Surface>(inputs[0]);
-  const TriangleSoup soup = p.clean ? repair(*surface, {}, context.sub(0, 0.2)) : soup_of(*surface);
+  bool clean = p.clean;
+#ifdef OSTEO_WITH_CGAL
+  // These two reject what crosses itself: what their advice says is done at once.
+  if (!clean && (p.method == TetMethod::tetgen || p.method == TetMethod::cgal)) {
+    if (const std::size_t crossing = self_intersections(soup_of(*surface), context).size(); crossing > 0) {
+      context.warn("the surface intersects itself in " + std::to_string(crossing) +
+                   " places, which this method does not take: it was repaired first, as by --clean");
+      clean = true;
+    }
+  }
+#endif
+  const TriangleSoup soup = clean ? repair(*surface, {}, context.sub(0, 0.2)) : soup_of(*surface);
+  context.report("repaired_first", clean);
   const Frame around = frame_around(soup, p.resolution, 0);
   const double spacing = p.spacing_mm > 0 ? p.spacing_mm : around.spacing_mm.x;
-  const Context work = context.sub(p.clean ? 0.2 : 0.0, 0.8);
+  const Context work = context.sub(clean ? 0.2 : 0.0, 0.8);
   [[maybe_unused]] const GuardLimits limits{p.time_limit_s, p.memory_limit_gb};
   const double surface_mm3 = inside_volume_mm3(soup, context);
   TetMesh mesh;

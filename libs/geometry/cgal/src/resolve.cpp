@@ -1,6 +1,7 @@
 // Self-intersections resolved exactly: triangles are cut along each other, then the pieces that bound the inside are
 // kept.
 #include <CGAL/Constrained_Delaunay_triangulation_2.h>
+#include <CGAL/Constrained_triangulation_plus_2.h>
 #include <CGAL/Exact_predicates_exact_constructions_kernel.h>
 #include <CGAL/intersections.h>
 #include <CGAL/version.h>
@@ -17,7 +18,10 @@ namespace osteo::inline geometry {
 namespace {
 
 using E = CGAL::Exact_predicates_exact_constructions_kernel;
-using Cut = CGAL::Constrained_Delaunay_triangulation_2<E, CGAL::Default, CGAL::Exact_intersections_tag>;
+// Keeps whole constraints beside their parts: where two cross is computed from their own ends. From the parts' ends,
+// which are crossings themselves, exact numbers would grow with every further crossing, without end.
+using Cut = CGAL::Constrained_triangulation_plus_2<
+    CGAL::Constrained_Delaunay_triangulation_2<E, CGAL::Default, CGAL::Exact_intersections_tag>>;
 using Triangle = std::array<std::uint32_t, 3>;
 
 // Where two triangles meet: a point, a segment, or an outline; its points in their order.
@@ -84,9 +88,9 @@ class Arrangement {
         }
       }
     }
-    for (const E::Point_3& p : exact_)
-      result.points_mm.push_back({CGAL::to_double(CGAL::exact(p.x())), CGAL::to_double(CGAL::exact(p.y())),
-                                  CGAL::to_double(CGAL::exact(p.z()))});
+    // As surfaces are kept and written: what is counted afterwards is what a reader of the file finds.
+    const auto kept = [](const E::FT& x) { return double{static_cast<float>(CGAL::to_double(CGAL::exact(x)))}; };
+    for (const E::Point_3& p : exact_) result.points_mm.push_back({kept(p.x()), kept(p.y()), kept(p.z())});
     // What was a point of the surface stays where it was, to the bit.
     std::copy(soup_.points_mm.begin(), soup_.points_mm.end(), result.points_mm.begin());
     return result;

@@ -12,6 +12,7 @@
 #include "osteo/core/base/portable_math.h"
 #include "osteo/core/base/union_find.h"
 #include "osteo/geometry/distance/voxelize.h"
+#include "winding.h"
 
 namespace osteo::inline geometry {
 namespace {
@@ -155,11 +156,25 @@ double inside_volume_mm3(const TriangleSoup& soup, const Context& context) {
   const Vec3 size = hi - lo;
   const double extent = std::max({size.x, size.y, size.z});
   if (!(extent > 0)) return 0;
-  const Frame frame = frame_around(soup, 200, 1);
+  const TriangleSoup whole = welded(soup);
+  constexpr int kVoxels = 200;
+  if (!is_closed(whole)) {
+    // In a soup of triangles every voxel may need every opening's solid angle, for minutes: voxels are halved only
+    // while that is expected to stay below a bound, by how many it took before.
+    constexpr double kMaxAngles = 3e7;
+    int voxels = kVoxels / 8;
+    std::uint64_t angles = 0;
+    Frame frame = frame_around(soup, voxels, 1);
+    VoxelBits bits = voxels_inside_counted(soup, frame, context, nullptr, angles);
+    while (voxels < kVoxels && 8.0 * static_cast<double>(angles) <= kMaxAngles) {
+      frame = frame_around(soup, voxels *= 2, 1);
+      bits = voxels_inside_counted(soup, frame, context, nullptr, angles);
+    }
+    return static_cast<double>(bits.count()) * frame.voxel_volume_mm3();
+  }
+  const Frame frame = frame_around(soup, kVoxels, 1);
   InsideReport report;
   const VoxelBits bits = voxels_inside(soup, frame, context, &report);
-  const TriangleSoup whole = welded(soup);
-  if (!is_closed(whole)) return static_cast<double>(bits.count()) * frame.voxel_volume_mm3();
   const auto solid = solid_of(soup, context);
   if (!solid) return 0;
   // The divergence theorem counts a place as often as the surface winds about it. What that is too much is counted in

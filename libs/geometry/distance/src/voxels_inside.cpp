@@ -262,6 +262,12 @@ VoxelBits VoxelBits::dilated() const {
 }
 
 VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Context& context, InsideReport* report) {
+  std::uint64_t solid_angles = 0;
+  return voxels_inside_counted(soup, frame, context, report, solid_angles);
+}
+
+VoxelBits voxels_inside_counted(const TriangleSoup& soup, const Frame& frame, const Context& context,
+                                InsideReport* report, std::uint64_t& solid_angles) {
   require_sound(soup);
   if (static_cast<double>(frame.dims[1]) * frame.dims[2] > 4e9)
     throw Error(ExitCode::resources, "the grid has more than 4e9 rows");
@@ -303,6 +309,7 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
     }
   });
   std::uint64_t decided = 0;
+  solid_angles = 0;
   if (!fans.empty()) {
     // The fans matter where their turns may reach 1/2: blocks, then smaller blocks, then voxels.
     const Openings openings(fans, frame.spacing_mm);
@@ -314,7 +321,7 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
       const double h = (edge - 1) / 2.0;
       return openings.narrowed(from, {(i + h) * s.x, (j + h) * s.y, (k + h) * s.z}, h * length(s), most_far);
     };
-    std::vector<std::uint64_t> decided_in(blocks(1) * blocks(2), 0);
+    std::vector<std::uint64_t> decided_in(blocks(1) * blocks(2), 0), angles_in(decided_in.size(), 0);
     // A row of blocks along x is one work item: no word of bits is shared between two.
     parallel_for(blocks(1) * blocks(2), 1, context.threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t b = begin; b < end; ++b) {
@@ -341,6 +348,7 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
                   const std::uint64_t bit = 1ULL << (static_cast<unsigned>(i) % 64);
                   word = openings.inside(small, p, rows.winding(r, i)) ? word | bit : word & ~bit;
                   ++decided_in[b];
+                  angles_in[b] += small.fans.size();
                 }
               }
             }
@@ -349,6 +357,7 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
       }
     });
     for (const auto d : decided_in) decided += d;
+    for (const auto a : angles_in) solid_angles += a;
   }
   if (report != nullptr) {
     *report = {fans.empty(),

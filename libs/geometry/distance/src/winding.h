@@ -3,16 +3,22 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "osteo/core/base/portable_math.h"
 #include "osteo/geometry/distance/detail/fan.h"
+#include "osteo/geometry/distance/voxelize.h"
 #include "osteo/geometry/mesh/soup.h"
 
 namespace osteo::inline geometry {
 
 /// Triangles that close a surface, one fan for each connected set of open edges.
 [[nodiscard]] std::vector<Fan> closing_fans(const Ordered& surface, const std::vector<Vec3>& points);
+
+/// voxels_inside, which also tells how many solid angles it took: what an open surface costs.
+[[nodiscard]] VoxelBits voxels_inside_counted(const TriangleSoup& soup, const Frame& frame, const Context& context,
+                                              InsideReport* report, std::uint64_t& solid_angles);
 
 /// Solid angle of a triangle seen from p, positive from the side it faces away from.
 /// A. van Oosterom and J. Strackee, IEEE Trans. Biomed. Eng. 1983.

@@ -10,6 +10,7 @@
 #include <optional>
 #include <sstream>
 
+#include "gzip.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/param.h"
@@ -90,6 +91,8 @@ std::vector<double> numbers_in(std::string_view text) {
 }
 
 void inflate_into(std::span<const std::byte> packed, std::byte* out, std::size_t size, const fs::path& path) {
+  if (gunzip_exactly(packed, {out, size})) return;
+  // Whatever else zlib reads: its own wrapping, and of a damaged or cut file what there is.
   z_stream z{};
   if (inflateInit2(&z, 15 + 32) != Z_OK) fail(path, "cannot start decompression");
   std::size_t in_done = 0, out_done = 0;
@@ -389,25 +392,8 @@ void write_nrrd(const RawVolume& raw, const fs::path& path) {
   header << '\n';
   static_assert(std::endian::native == std::endian::little);
   const std::size_t size = f.voxel_count() * size_of(raw.type);
-  // Level 1: a CT shrinks nearly as much as at level 6, in a quarter of the time.
-  z_stream z{};
-  deflateInit2(&z, 1, Z_DEFLATED, 15 + 16, 9, Z_DEFAULT_STRATEGY);
   std::string packed = header.str();
-  std::vector<char> buffer(1 << 20);
-  const auto* const p = static_cast<const Bytef*>(raw.data.get());
-  for (std::size_t done = 0; done < size;) {
-    const std::size_t chunk = std::min<std::size_t>(1U << 28, size - done);
-    z.next_in = const_cast<Bytef*>(p + done);
-    z.avail_in = static_cast<uInt>(chunk);
-    done += chunk;
-    do {
-      z.next_out = reinterpret_cast<Bytef*>(buffer.data());
-      z.avail_out = static_cast<uInt>(buffer.size());
-      deflate(&z, done == size ? Z_FINISH : Z_NO_FLUSH);
-      packed.append(buffer.data(), buffer.size() - z.avail_out);
-    } while (z.avail_out == 0);
-  }
-  deflateEnd(&z);
+  packed += gzip({static_cast<const std::byte*>(raw.data.get()), size});
   write_file(path, packed);
 }
 

@@ -1,6 +1,7 @@
 // The formats that VTK and its MetaIO read and write for us.
 #include "vtk_volume.h"
 
+#include <libdeflate.h>
 #include <vtkDataArray.h>
 #include <vtkErrorCode.h>
 #include <vtkImageData.h>
@@ -10,17 +11,22 @@
 #include <vtkNIFTIImageReader.h>
 #include <vtkNIFTIImageWriter.h>
 #include <vtkNew.h>
+#include <vtkObjectFactory.h>
 #include <vtkPointData.h>
 #include <vtkXMLImageDataReader.h>
 #include <vtkXMLImageDataWriter.h>
+#include <vtkZLibDataCompressor.h>
 #include <vtkmetaio/metaImage.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <iostream>
+#include <memory>
 #include <sstream>
+#include <system_error>
 
+#include "gzip.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/param.h"
@@ -146,10 +152,35 @@ RawVolume read_vti(const fs::path& path) {
   return raw_from_vtk(reader->GetOutput());
 }
 
+namespace {
+
+// VTK's blocks of zlib, by a faster library: the same format, and so the same name in the file.
+class FastZlib : public vtkZLibDataCompressor {
+ public:
+  static FastZlib* New();
+  size_t GetMaximumCompressionSpace(size_t size) override {
+    return libdeflate_zlib_compress_bound(compressor_.get(), size);
+  }
+
+ protected:
+  size_t CompressBuffer(const unsigned char* in, size_t size, unsigned char* out, size_t room) override {
+    return libdeflate_zlib_compress(compressor_.get(), in, size, out, room);
+  }
+
+ private:
+  std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor_{
+      libdeflate_alloc_compressor(1), &libdeflate_free_compressor};
+};
+vtkStandardNewMacro(FastZlib)
+
+}  // namespace
+
 void write_vti(const RawVolume& raw, const fs::path& path) {
   write_atomically(path, [&](const fs::path& temporary) {
     const QuietVtk quiet;
     vtkNew<vtkXMLImageDataWriter> writer;
+    const vtkNew<FastZlib> compressor;
+    writer->SetCompressor(compressor);
     writer->SetFileName(temporary.c_str());
     writer->SetInputData(vtk_view(raw));
     if (writer->Write() == 0 || writer->GetErrorCode() != 0) throw vtk_write_error(path, writer->GetErrorCode());
@@ -276,6 +307,19 @@ RawVolume with_slices_reversed(const RawVolume& raw) {
   return out;
 }
 
+namespace {
+
+// A file that goes when this does.
+struct Removed {
+  fs::path path;
+  ~Removed() {
+    std::error_code ignored;
+    if (!path.empty()) fs::remove(path, ignored);
+  }
+};
+
+}  // namespace
+
 void write_nifti(const RawVolume& given, const fs::path& path) {
   // A qform holds only rotations: a left-handed volume is written with its slices in reverse order.
   const RawVolume raw = determinant(given.frame.direction) < 0 ? with_slices_reversed(given) : given;
@@ -296,14 +340,18 @@ void write_nifti(const RawVolume& given, const fs::path& path) {
     ras->SetElement(0, 3, -f.origin_mm.x);
     ras->SetElement(1, 3, -f.origin_mm.y);
     ras->SetElement(2, 3, f.origin_mm.z);
+    // VTK packs in one thread: it writes the plain file, which is packed here.
+    const bool packed = temporary.extension() == ".gz";
+    const Removed plain{packed ? fs::path(temporary).replace_extension() : fs::path()};
     vtkNew<vtkNIFTIImageWriter> writer;
-    writer->SetFileName(temporary.c_str());
+    writer->SetFileName(packed ? plain.path.c_str() : temporary.c_str());
     writer->SetInputData(image);
     writer->SetQFormMatrix(ras);
     writer->SetSFormMatrix(ras);
     writer->SetDescription("Osteotome");
     writer->Write();
     if (writer->GetErrorCode() != 0) throw vtk_write_error(path, writer->GetErrorCode());
+    if (packed) write_file(temporary, gzip(read_file(plain.path)));
   });
 }
 

@@ -26,9 +26,9 @@ struct CgalRepairReport {
                                         const Context& context = {});
 /// Triangles that meet are cut along each other in exact numbers; of the pieces those stay that bound the inside
 /// (solid_surface), facing out: overlapping bodies become one, what lay within is gone, nothing else moves. New points
-/// are rounded to double, which may leave intersections of that size; they are counted. The surface as it was when
-/// nothing intersects. (Q. Zhou et al., Mesh Arrangements for Solid Geometry, SIGGRAPH 2016.) Errors: as of
-/// solid_surface.
+/// are rounded to single precision, as TriMesh and files keep them. That may leave intersections of that size, which
+/// are cut again as long as they get fewer; the rest is counted. The surface as it was when nothing intersects. (Q.
+/// Zhou et al., Mesh Arrangements for Solid Geometry, SIGGRAPH 2016.) Errors: as of solid_surface.
 [[nodiscard]] TriangleSoup intersections_resolved(const TriangleSoup& surface, CgalRepairReport& report,
                                                   const Context& context = {});
 

@@ -25,7 +25,7 @@ struct SolidSurface {
 
 /// Volume inside by that rule, mm3. Where the surface closes by the divergence theorem (about a point of the surface),
 /// less what of it lies within more than once, which is counted in voxels of a two-hundredth of the extent: exact
-/// without overlap. Open surfaces: counted.
+/// without overlap. Open surfaces: counted, in larger voxels where those would take over 3e7 solid angles.
 [[nodiscard]] double inside_volume_mm3(const TriangleSoup& soup, const Context& context = {});
 
 }  // namespace osteo::inline geometry
