@@ -47,7 +47,7 @@ foreach(component ${deb_components})
   set(package ${deb_name_${component}})
   configure_file(apps/packaging/deb/changelog.in ${PROJECT_BINARY_DIR}/packaging/${package}/changelog @ONLY)
   execute_process(COMMAND gzip -9nfk ${PROJECT_BINARY_DIR}/packaging/${package}/changelog)
-  install(FILES apps/packaging/deb/copyright ${PROJECT_BINARY_DIR}/packaging/${package}/changelog.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package}
+  install(FILES apps/packaging/deb/copyright LICENSES/OFL-1.1.txt LICENSES/MIT-Tabler.txt ${PROJECT_BINARY_DIR}/packaging/${package}/changelog.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package}
     COMPONENT ${component} EXCLUDE_FROM_ALL)
   if(EXISTS ${PROJECT_SOURCE_DIR}/apps/packaging/deb/${package}.lintian-overrides)
     install(FILES apps/packaging/deb/${package}.lintian-overrides DESTINATION ${CMAKE_INSTALL_DATADIR}/lintian/overrides RENAME ${package}
@@ -119,7 +119,7 @@ set(CPACK_DEBIAN_SERVER_PACKAGE_DEPENDS "libegl1, libgl1-mesa-dri, fonts-liberat
 set(CPACK_DEBIAN_SERVER_PACKAGE_SUGGESTS "osteo-rehearse, osteo-camera, snakemake")
 set(CPACK_DEBIAN_WINDOW_PACKAGE_NAME osteo-rehearse)
 set(CPACK_DEBIAN_WINDOW_PACKAGE_SECTION science)
-set(CPACK_DEBIAN_WINDOW_PACKAGE_DEPENDS "osteo (= ${OSTEO_DEB_VERSION}) | osteo-full (= ${OSTEO_DEB_VERSION}), libegl1, libgl1-mesa-dri, fonts-dejavu-core")
+set(CPACK_DEBIAN_WINDOW_PACKAGE_DEPENDS "osteo (= ${OSTEO_DEB_VERSION}) | osteo-full (= ${OSTEO_DEB_VERSION}), libegl1, libgl1-mesa-dri")
 set(CPACK_DEBIAN_WINDOW_PACKAGE_RECOMMENDS osteo-camera)
 set(CPACK_DEBIAN_WINDOW_PACKAGE_SUGGESTS zenity)
 set(CPACK_DEBIAN_CAMERA_PACKAGE_NAME osteo-camera)

@@ -5,7 +5,7 @@ import pathlib, re, struct, zlib
 
 from drive_window import *  # what it drives with; the arguments are the same
 
-LEFT, RIGHT, HIGH = 288, 272, 614  # panel and cuts at its sides, and how high the picture is; pixels
+LEFT, WIDE, HIGH = 56, 944, 636  # of the picture, beside the strip of tools and above the state; pixels
 
 
 def png(path):
@@ -70,7 +70,7 @@ def camera():
             w.x("key", "period")
         w.next()
         key("slash", "autofocus", lambda s: apart(s["focus_mm"], eye["focus_mm"]) < 0.2)
-        w.x("mousemove", 520, 360)
+        w.x("mousemove", 540, 371)
         there = key("semicolon", "look there", lambda s: apart(s["focus_mm"], eye["focus_mm"]) > 1)
         key("f", "drill at the bone", lambda s: not s["leading"] and "bone" in s["message"])
         at = key("g", "look at the drill", lambda s: apart(s["focus_mm"], s["at_mm"]) < 1)
@@ -133,12 +133,12 @@ def camera():
             w = Window("--no-sound", "--stereo", mode, "--stereo-base", 30, "-o", mode)
             w.key("bracketright", "4 times", lambda s: s["magnification"] == 4 and not s["camera_moves"])
             # The drill to the same place, where the squeezed picture shows it; then the mouse away.
-            w.x("mousemove", LEFT + 130 // (2 if mode == "side_by_side" else 1), 100 // (2 if mode == "top_bottom" else 1))
+            w.x("mousemove", LEFT + 130 // (2 if mode == "side_by_side" else 1), 240 // (2 if mode == "top_bottom" else 1))
             w.next(3)  # it has been heard of
             w.until("the drill rests", lambda s: apart(s["at_mm"], s["goal_mm"]) < 1e-3)
             w.x("mousemove", 2, 2)
             w.next(3)
-            assert w.state()["view"] == [LEFT, 0, 1000 - LEFT - RIGHT, HIGH], w.state()["view"]
+            assert w.state()["view"] == [LEFT, 0, WIDE, HIGH], w.state()["view"]
             places.append(w.state()["at_mm"])
             w.key("s", "screenshot", lambda s: s["message"].startswith("saved"))
             assert w.state()["stereo"] > 0
@@ -146,7 +146,7 @@ def camera():
             pictures[mode] = png(f"{mode}/screenshot-1.png")
     assert all(apart(p, places[0]) < 0.01 for p in places), places
     red, blue = 0, 2
-    rows, columns = range(20, 560, 3), range(LEFT + 20, 1000 - RIGHT - 20, 5)
+    rows, columns = range(100, 460, 3), range(LEFT + 20, 760, 5)  # where no card and no cut lies on the picture, squeezed or not
     eyes = pictures["anaglyph"]
     differs = sum(eyes[y][red][x] != eyes[y][blue][x] for y in rows for x in columns)
     assert differs > 1000, "two eyes see two pictures"
@@ -158,14 +158,14 @@ def camera():
     wrong = sum(abs(lines[y][blue][x] - eyes[y][blue][x]) > 1 for y in rows if y % 2 == 0 for x in columns)
     assert wrong > 500, "and not the other's"
     # Squeezed to half: a pixel is the mean of two.
-    width = 1000 - LEFT - RIGHT
+    width = WIDE
     beside, above = pictures["side_by_side"], pictures["top_bottom"]
     for eye, channel in ((0, red), (1, blue)):
         off = [abs(beside[y][channel][LEFT + eye * width // 2 + x] - (eyes[y][channel][LEFT + 2 * x] + eyes[y][channel][LEFT + 2 * x + 1]) / 2)
-               for y in rows for x in range(20, width // 2 - 20, 3)]
+               for y in rows for x in range(20, 240, 3)]
         assert sum(d > 2 for d in off) < 0.002 * len(off), (eye, max(off))
         off = [abs(above[eye * (HIGH // 2) + y][channel][x] - (eyes[2 * y][channel][x] + eyes[2 * y + 1][channel][x]) / 2)
-               for y in range(20, 260, 3) for x in columns]
+               for y in range(85, 155, 3) for x in columns]
         assert sum(d > 2 for d in off) < 0.002 * len(off), (eye, max(off))
     # Notes of the camera carry the magnification.
     osteo("export", "first", "first.csv")

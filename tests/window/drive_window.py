@@ -147,9 +147,9 @@ def keys():
         w.key("ctrl+minus", "smaller text", lambda s: s["em_pixels"] < em)
         w.key("ctrl+0", "text as the monitor has it", lambda s: s["em_pixels"] == em)
         view = w.state()["view"]
-        key("F2", "operate", lambda s: s["layout"] == "operate" and s["view"][2] > view[2])
-        key("F2", "plan", lambda s: s["layout"] == "plan")
-        key("F2", "beside", lambda s: s["layout"] == "beside" and s["view"] == view)
+        assert view[2] * view[3] - 200 * 200 > 0.8 * 1000 * 700, view  # with its cut on it
+        key("F2", "plan", lambda s: s["layout"] == "plan" and s["view"][2] < view[2])
+        key("F2", "operate", lambda s: s["layout"] == "operate" and s["view"] == view)
         key("F11", "full screen", lambda s: s["full_screen"])
         key("F11", "a window again", lambda s: not s["full_screen"])
         key("F10", "keys in the panel", lambda s: s["panel_keys"])
@@ -315,8 +315,7 @@ def room():
         first = w.until("the first tick", lambda s: s.get("page") != "start" and s["tick"] > 0)
         assert first["layout"] == "operate", first
         # What is changed is kept.
-        w.key("F2", "plan, or what there is room for", lambda s: s["message"] != first["message"])
-        w.key("F2", "beside", lambda s: s["layout"] == "beside")
+        w.key("F2", "plan", lambda s: s["layout"] == "plan")
         ended = w.key("q", "the page at the end", lambda s: s["ended"])
         closed(ended["session"])
         last = w.until("what there is to say of it", lambda s: s["review_s"] > 0)
@@ -334,7 +333,7 @@ def room():
         w.x("key", "q")
         w.end(0)
     kept = json.loads(settings.read_text())
-    assert kept["layout"] == "beside" and kept["colour"] == "red" and len(kept["recent_cases"]) == 1, kept
+    assert kept["layout"] == "plan" and kept["colour"] == "red" and len(kept["recent_cases"]) == 1, kept
     sessions = sorted(p for p in pathlib.Path("case/sessions").iterdir())
     assert len(sessions) == 3, sessions
     assert json.loads((sessions[1] / "session.json").read_text()).get("resumed_from"), sessions

@@ -15,11 +15,11 @@ os.chdir(work)
 SECONDS = 4.0
 # What is open: how the window is started, and the keys pressed then.
 OPEN = {
-    "bone alone, tray (`operate`)": ((), ("F2",)),
-    "panel and three cuts (`beside`)": ((), ()),
+    "picture with three cuts on it (`operate`)": ((), ()),
     "the same, a cut in the middle (F3)": ((), ("F3",)),
-    "panel, three cuts, nerve monitor": (("--monitor",), ()),
-    "panel, a cut in the middle, nerve monitor": (("--monitor",), ("F3",)),
+    "four up (`plan`)": ((), ("F2",)),
+    "picture with three cuts, panel (F10)": ((), ("F10",)),
+    "picture with three cuts, nerve monitor": (("--monitor",), ()),
 }
 
 

@@ -248,5 +248,28 @@ TEST(CutsDrawer, DrawsAgainOnlyWhatHasChanged) {
   EXPECT_EQ(draw_all(drawer, views, scene).size(), 1u);
 }
 
+// They begin on bone, so that none is black, and follow the tool from its first contact on.
+TEST(CutsControl, BeginOnBoneAndFollowFromTheFirstContact) {
+  CutsControl c;
+  for (int v = 0; v < CutsControl::kCuts; ++v) c.resize(v, 200, 200);
+  c.set_bounds({-50, -50, -50}, {50, 50, 50}, 0.5);
+  c.begin_at({10, 5, -3});
+  c.tool_is({40, 40, 40}, {0, 0, 1}, false);
+  EXPECT_EQ(c.cross_mm(), (Vec3{10, 5, -3}));
+  EXPECT_TRUE(c.waits() && c.follows());
+  for (int v = 0; v < CutsControl::kCuts; ++v) EXPECT_NEAR(c.view(v).pixel({10, 5, -3})[0], 99.5, 1);
+  c.tool_is({20, 20, 20}, {0, 0, 1}, true);
+  EXPECT_EQ(c.cross_mm(), (Vec3{20, 20, 20}));
+  c.tool_is({21, 20, 20}, {0, 0, 1}, false);  // and then all the time
+  EXPECT_EQ(c.cross_mm(), (Vec3{21, 20, 20}));
+  // Asked to follow, they do not wait.
+  CutsControl d;
+  d.set_bounds({-50, -50, -50}, {50, 50, 50}, 0.5);
+  d.begin_at({0, 0, 0});
+  d.tool_is({1, 2, 3}, {0, 0, 1}, false);
+  d.follow(true);
+  EXPECT_EQ(d.cross_mm(), (Vec3{1, 2, 3}));
+}
+
 }  // namespace
 }  // namespace osteo

@@ -59,12 +59,27 @@ TEST(PersonSettings, WhatIsWrongIsToldWithItsLineAndTheRestIsTaken) {
   EXPECT_NE(p.complaints()[2].find("line 5"), std::string::npos) << p.complaints()[2];
   EXPECT_EQ(p.values.volume, 0.25);
   EXPECT_EQ(p.values.scale, 1);
-  EXPECT_EQ(p.values.layout, "beside");
+  EXPECT_EQ(p.values.layout, "operate");
   p.values.alarms = true;
   EXPECT_EQ(p.save(), "");
   const auto j = nlohmann::json::parse(read_text(file));
   EXPECT_EQ(j["colour"], "red");  // of a later version, perhaps
   EXPECT_EQ(j["alarms"], true);
+}
+
+TEST(PersonSettings, ThemeAndLayoutByName) {
+  const test::ScratchFolder scratch;
+  const fs::path file = scratch / "settings.json";
+  write(file, R"({"osteotome_settings": 1, "layout": "beside", "theme": "high_contrast"})");
+  PersonSettings p(file);
+  EXPECT_TRUE(p.complaints().empty());
+  EXPECT_EQ(p.values.layout, "operate") << "the layout that was called so is no more";
+  EXPECT_EQ(p.values.theme, "high_contrast");
+  write(file, R"({"osteotome_settings": 1, "theme": "pink"})");
+  PersonSettings q(file);
+  ASSERT_EQ(q.complaints().size(), 1U);
+  EXPECT_NE(q.complaints()[0].find("dark, light or high_contrast"), std::string::npos);
+  EXPECT_EQ(q.values.theme, "dark");
 }
 
 TEST(PersonSettings, AFileThatCannotBeReadIsLeftAlone) {

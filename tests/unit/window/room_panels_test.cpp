@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 #include <imgui_internal.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "help_page.h"
+#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo {
@@ -38,7 +40,7 @@ void frames(const std::function<void()>& draw) {
 void expect_nothing_outside(const char* window, const ScreenBox& box, bool may_scroll) {
   const ImGuiWindow* const w = ImGui::FindWindowByName(window);
   ASSERT_NE(w, nullptr) << window;
-  const ImVec2 pad = ImGui::GetStyle().WindowPadding;
+  const ImVec2 pad = w->WindowPadding;
   const float slack = 1.5F + ImGui::GetStyle().WindowBorderSize;  // its own frame, drawn smooth
   EXPECT_LE(w->ContentSize.x + 2 * pad.x, box.width + slack) << window;
   if (!may_scroll) {
@@ -81,25 +83,26 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
       const auto em_pixels = static_cast<int>(std::lround(kTextPixels * scale));
       SCOPED_TRACE(std::to_string(s.width) + " text " + std::to_string(em_pixels));
       const Memory memory(s.width, s.height, em_pixels);
-      for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan}) {
+      for (const Layout wanted : {Layout::operate, Layout::plan}) {
         const RoomLayout l = lay_out(wanted, s.width, s.height, static_cast<float>(em_pixels));
         HandFacts hand;
         hand.second_hand = true;
         Pressed pressed;
+        Latched latched;
+        bool unfolded = true;
+        ScreenBox card;
         frames([&] {
-          draw_state(l.state, longest(), "a message");
-          if (!l.tray.empty()) draw_tray(l.tray, hand, pressed);
-          if (l.panel.empty()) return;
-          begin_fixed("panel", l.panel);
-          draw_burr(hand, pressed);
-          draw_deeds(hand, pressed);
-          draw_apart(pressed);
-          ImGui::End();
+          draw_state(l.state, l.view, longest(), "a message", pressed);
+          draw_tray(l.tray, hand, true, latched, pressed);
+          card = draw_burr_card(l.view, l.view.width, hand, unfolded, pressed);
         });
         EXPECT_TRUE(pressed.presses.empty());
+        EXPECT_FALSE(latched.suction || latched.irrigation);
         expect_nothing_outside("state", l.state, false);
-        if (!l.tray.empty()) expect_nothing_outside("tray", l.tray, false);
-        if (!l.panel.empty()) expect_nothing_outside("panel", l.panel, false);
+        expect_nothing_outside("tray", l.tray, false);
+        if (card.empty()) continue;  // no room: the keys and the panel have it
+        EXPECT_LE(card.right(), l.view.right());
+        expect_nothing_outside("burr", card, false);
       }
       // Pages over the picture: within the window.
       HelpPage help;
@@ -108,7 +111,7 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
       StepFacts dusty;
       dusty.dust = true;
       list.see(dusty);
-      const auto six_steps = [&] { draw_first_steps(list, true); };
+      const auto six_steps = [&] { draw_first_steps(list); };
       frames([&] {
         help.draw(s.width, s.height, six_steps);
         EXPECT_EQ(draw_question(s.width, s.height, "Reset bone?", "This session is saved and ends.", "Reset bone"), 0);
@@ -149,16 +152,17 @@ TEST(Help, RowsStayInTheirOrderAndHeadingsWithTheirs) {
   EXPECT_TRUE(into_columns({}, 3, 10, 40).empty());
 }
 
-// While drilling only letters change: what is drawn where stays.
+// While drilling only letters and bars change: what is drawn where stays.
 TEST(Panels, NothingJumpsWhileDrilling) {
   const Memory memory(1280, 800, 16);
-  const RoomLayout l = lay_out(Layout::beside, 1280, 800, 16);
-  const auto first_x = [&](const StateFacts& f) {
-    frames([&] { draw_state(l.state, f, ""); });
+  const RoomLayout l = lay_out(Layout::operate, 1280, 800, 16);
+  Pressed pressed;
+  const auto grounds = [&](const StateFacts& f) {
+    frames([&] { draw_state(l.state, l.view, f, "", pressed); });
     const ImGuiWindow* const w = ImGui::FindWindowByName("state");
-    std::vector<ImVec2> fixed;  // the bar of the force begins where the field does
+    std::vector<ImVec2> fixed;  // of the bars
     for (const ImDrawVert& v : w->DrawList->VtxBuffer) {
-      if (v.col == im_colour32(palette::kRaised)) fixed.push_back(v.pos);
+      if (v.col == im_colour32(theme().raised)) fixed.push_back(v.pos);
     }
     return fixed;
   };
@@ -169,8 +173,10 @@ TEST(Panels, NothingJumpsWhileDrilling) {
   quiet.under = "-";
   quiet.structure = "none within 10 mm";
   quiet.nearness = Nearness::far;
-  const auto before = first_x(quiet), after = first_x(longest());
-  ASSERT_GE(before.size(), 4U);
+  StateFacts near = longest();
+  near.nearness = Nearness::near;
+  const auto before = grounds(quiet), after = grounds(near);
+  ASSERT_GE(before.size(), 8U);
   ASSERT_EQ(before.size(), after.size());
   for (std::size_t n = 0; n < before.size(); ++n) {
     EXPECT_EQ(before[n].x, after[n].x);
@@ -178,30 +184,155 @@ TEST(Panels, NothingJumpsWhileDrilling) {
   }
 }
 
-TEST(Panels, AButtonGivesTheCommandOfItsKey) {
+// The bar fills as the structure comes nearer, in its colour; a contact fills the field.
+TEST(Panels, TheBarOfTheNearestStructureFills) {
   const Memory memory(1280, 800, 16);
-  const ScreenBox box = lay_out(Layout::operate, 1280, 800, 16).tray;
-  std::vector<Command> seen;
-  // A click on every place of the tray.
-  for (float y = 4; y < box.height; y += 10) {
+  const RoomLayout l = lay_out(Layout::operate, 1280, 800, 16);
+  Pressed pressed;
+  const auto painted = [&](Nearness nearness, double share) {
+    StateFacts f = longest();
+    f.nearness = nearness;
+    f.near_share = share;
+    frames([&] { draw_state(l.state, l.view, f, "", pressed); });
+    float least = 1e9F, most = 0;
+    for (const ImDrawVert& v : ImGui::FindWindowByName("state")->DrawList->VtxBuffer) {
+      if (v.col != im_colour32(look_of(nearness).colour) || v.pos.y < l.state.y + 38) continue;
+      least = std::min(least, v.pos.x);
+      most = std::max(most, v.pos.x);
+    }
+    return std::max(0.0F, most - least);
+  };
+  const float half = painted(Nearness::near, 0.5), more = painted(Nearness::close, 0.9);
+  EXPECT_GT(half, 50);
+  EXPECT_NEAR(more / half, 0.9 / 0.5, 0.1);
+  EXPECT_GE(painted(Nearness::touched, 1), more);
+}
+
+// A click on every place of a strip.
+std::vector<Keyboard::Press> clicked(const ScreenBox& box, float x, const std::function<void(Pressed&)>& draw) {
+  std::vector<Keyboard::Press> seen;
+  for (float y = box.y + 4; y < box.bottom(); y += 10) {
     for (const bool down : {false, true, false}) {
       ImGuiIO& io = ImGui::GetIO();
-      io.MousePos = {box.x + box.width / 2, y};
+      io.MousePos = {x, y};
       io.MouseDown[0] = down;
       Pressed pressed;
       ImGui::NewFrame();
-      draw_tray(box, {}, pressed);
+      draw(pressed);
       ImGui::Render();
-      for (const Keyboard::Press& p : pressed.presses) seen.push_back(p.command);
+      seen.insert(seen.end(), pressed.presses.begin(), pressed.presses.end());
     }
   }
-  for (const Command c :
-       {Command::help, Command::wheel, Command::bring, Command::lift, Command::saw, Command::undo, Command::quit}) {
-    EXPECT_NE(std::find(seen.begin(), seen.end(), c), seen.end()) << key_name(c);
+  return seen;
+}
+
+TEST(Panels, AButtonGivesTheCommandOfItsKey) {
+  const Memory memory(1024, 700, 16);
+  const RoomLayout l = lay_out(Layout::operate, 1024, 700, 16);
+  const auto has = [](const std::vector<Keyboard::Press>& all, Command c) {
+    return std::any_of(all.begin(), all.end(), [&](const Keyboard::Press& p) { return p.command == c; });
+  };
+  HandFacts hand;
+  hand.undo_steps = 1;
+  Latched latched;
+  const float middle = l.tray.x + l.tray.width / 2;
+  auto seen = clicked(l.tray, middle, [&](Pressed& p) { draw_tray(l.tray, hand, false, latched, p); });
+  for (const Command c : {Command::help, Command::panel_keys, Command::bring, Command::lift, Command::saw,
+                          Command::plates, Command::pieces, Command::undo, Command::before, Command::ruler,
+                          Command::mark, Command::screenshot, Command::layout}) {
+    EXPECT_TRUE(has(seen, c)) << key_name(c);
     EXPECT_FALSE(key_name(c).empty());
   }
-  // There is no second hand: its buttons do nothing.
-  EXPECT_EQ(std::find(seen.begin(), seen.end(), Command::suck), seen.end());
+  // There is no second hand: its tiles do nothing. With one a click leaves them on, and the next off.
+  EXPECT_FALSE(latched.suction || latched.irrigation);
+  hand.second_hand = true;
+  hand.undo_steps = 0;
+  seen = clicked(l.tray, middle, [&](Pressed& p) {
+    draw_tray(l.tray, hand, false, latched, p);
+    latched.suction = false;  // each place is clicked several times: each turns it on
+  });
+  EXPECT_FALSE(has(seen, Command::suck));
+  EXPECT_FALSE(has(seen, Command::undo)) << "nothing to take back";
+  // What ends the session is in the state; sizes and kinds on the burr's card.
+  seen = clicked(l.state, l.state.right() - 40, [&](Pressed& p) { draw_state(l.state, l.view, longest(), "", p); });
+  EXPECT_TRUE(has(seen, Command::quit));
+  bool unfolded = false;
+  ScreenBox card;
+  std::vector<int> sizes;
+  for (float x = l.view.x; x < l.view.x + 560; x += 20) {
+    for (const Keyboard::Press& p :
+         clicked({x, 40, 1, 8}, x, [&](Pressed& q) { card = draw_burr_card(l.view, l.view.width, hand, unfolded, q); }))
+      if (p.command == Command::diameter) sizes.push_back(p.value);
+  }
+  for (int d = 1; d <= 7; ++d) EXPECT_NE(std::find(sizes.begin(), sizes.end(), d), sizes.end()) << d;
+}
+
+// --- components
+
+TEST(Kit, FiguresHaveOneWidthAndScriptsAreThere) {
+  const Memory memory(800, 600, 16);
+  for (ImFont* const font : {ImGui::GetIO().Fonts->Fonts[0], bold_font()}) {
+    const float zero = font->GetCharAdvance('0');
+    for (char c = '1'; c <= '9'; ++c) EXPECT_EQ(font->GetCharAdvance(static_cast<ImWchar>(c)), zero) << c;
+  }
+  // Latin, accents, Greek, Cyrillic, signs.
+  const ImFont* const font = ImGui::GetIO().Fonts->Fonts[0];
+  for (const ImWchar c : {0x41, 0xE9, 0x16F, 0x3B1, 0x416, 0xB3, 0xB0, 0x2026})
+    EXPECT_NE(font->FindGlyphNoFallback(c), nullptr) << static_cast<int>(c);
+}
+
+TEST(Kit, WhatIsTooLongLosesItsMiddle) {
+  const Memory memory(800, 600, 16);
+  frames([] {
+    const std::string name = "superior semicircular canal of the labyrinth, left side";
+    EXPECT_EQ(shortened(name, 1000, 16), name);
+    const std::string cut = shortened(name, 200, 16);
+    EXPECT_TRUE(cut.starts_with("super") && cut.ends_with("side")) << cut;
+    EXPECT_LE(ImGui::CalcTextSize(cut.c_str()).x, 200);
+    const std::string greek = shortened("\u03b1\u03b2\u03b3\u03b4\u03b5\u03b6\u03b7\u03b8", 60, 16);  // whole letters
+    for (std::size_t n = 0; n < greek.size(); ++n)
+      EXPECT_TRUE((static_cast<unsigned char>(greek[n]) & 0x80) == 0 || n + 1 < greek.size() ||
+                  (static_cast<unsigned char>(greek[n]) & 0xC0) == 0x80);
+    EXPECT_EQ(shortened("abc", 1, 16), "");
+  });
+}
+
+TEST(Kit, EveryIconThatIsUsedIsThere) {
+  for (const char* const name : {"menu-2",       "drill",
+                                 "saw",          "plate",
+                                 "fragments",    "suction",
+                                 "droplet",      "arrow-bar-to-down",
+                                 "arrow-bar-up", "arrow-back-up",
+                                 "versions",     "ruler-measure",
+                                 "note",         "camera",
+                                 "layout-grid",  "help",
+                                 "chevron-down", "x",
+                                 "check",        "settings"})
+    EXPECT_TRUE(has_icon(name)) << name;
+  EXPECT_FALSE(has_icon("nothing"));
+}
+
+TEST(Kit, ComponentsHaveTheirSizes) {
+  const Memory memory(800, 600, 16);
+  bool on = false;
+  frames([&] {
+    begin_fixed("kit", {0, 0, 800, 600});
+    static_cast<void>(tile("t", "drill", {}));
+    EXPECT_EQ(ImGui::GetItemRectSize().x, 40);
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
+    static_cast<void>(kit_button("Beenden und zur \u00dcbersicht"));
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
+    EXPECT_GE(ImGui::GetItemRectSize().x, ImGui::CalcTextSize("Beenden und zur \u00dcbersicht").x + 32);
+    static_cast<void>(list_row("a row", "3", true));
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 36);
+    static_cast<void>(kit_switch("Irrigation", on));
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
+    static const std::string kTwo[] = {"One", "Two"};
+    EXPECT_EQ(choice("c", kTwo, 0), -1);
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
+    ImGui::End();
+  });
+  EXPECT_FALSE(on);
 }
 
 }  // namespace

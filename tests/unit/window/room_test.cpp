@@ -23,7 +23,7 @@ constexpr Size kSizes[] = {{1024, 700}, {1280, 800}, {1920, 1080}, {2560, 1440},
 
 std::vector<ScreenBox> boxes_of(const RoomLayout& l) {
   std::vector<ScreenBox> all;
-  for (const ScreenBox& b : {l.panel, l.tray, l.view, l.state, l.column, l.cuts[0], l.cuts[1], l.cuts[2], l.page}) {
+  for (const ScreenBox& b : {l.tray, l.view, l.state, l.cuts[0], l.cuts[1], l.cuts[2], l.page}) {
     if (!b.empty()) all.push_back(b);
   }
   return all;
@@ -35,7 +35,7 @@ TEST(RoomLayout, BoxesTileTheWindow) {
     for (const double by_hand : {0.6, 1.0, 1.7, 2.5}) {
       const auto em = static_cast<float>(
           kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), by_hand, s.width, s.height));
-      for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan, Layout::review}) {
+      for (const Layout wanted : {Layout::operate, Layout::plan, Layout::review}) {
         const auto boxes = boxes_of(lay_out(wanted, s.width, s.height, em));
         float area = 0;
         for (std::size_t a = 0; a < boxes.size(); ++a) {
@@ -61,16 +61,15 @@ TEST(RoomLayout, AStripTakesFromThePicturesAlone) {
   for (const Size s : kSizes) {
     const auto em =
         static_cast<float>(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), 1, s.width, s.height));
-    for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan}) {
+    for (const Layout wanted : {Layout::operate, Layout::plan}) {
       for (const float high : {13.5F * em, 1e5F}) {
         const RoomLayout before = lay_out(wanted, s.width, s.height, em);
         RoomLayout l = before;
         const ScreenBox strip = take_strip(l, high);
         ASSERT_FALSE(strip.empty());
-        EXPECT_EQ(l.panel, before.panel);
         EXPECT_EQ(l.tray, before.tray);
         EXPECT_EQ(l.state, before.state);
-        EXPECT_EQ(l.column, before.column);
+        for (const ScreenBox& b : l.over) EXPECT_LE(b.bottom(), l.view.bottom());
         EXPECT_EQ(strip.bottom(), l.state.y);
         EXPECT_LE(strip.height, high);
         auto boxes = boxes_of(l);
@@ -99,36 +98,48 @@ TEST(RoomLayout, AllLayoutsFitTheSizesTheyAreFor) {
     const auto em = static_cast<float>(
         std::lround(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), 1, s.width, s.height)));
     EXPECT_GE(em, 16);
-    for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan}) {
+    for (const Layout wanted : {Layout::operate, Layout::plan}) {
       const RoomLayout l = lay_out(wanted, s.width, s.height, em);
       EXPECT_EQ(l.shown, wanted) << s.width << ": " << l.why;
       EXPECT_TRUE(l.why.empty());
     }
-    // On a large screen cuts are large too, and the picture is still the largest.
-    const RoomLayout beside = lay_out(Layout::beside, s.width, s.height, em);
-    EXPECT_GE(beside.column.width, std::min(0.22F * static_cast<float>(s.width), 0.28F * static_cast<float>(s.height)));
-    EXPECT_GT(beside.view.width, 0.44F * static_cast<float>(s.width));
-    // Operate is for the picture.
+    // Operate is for the picture, also with its cuts on it; and they are squares within it, apart from each other.
     const RoomLayout l = lay_out(Layout::operate, s.width, s.height, em);
-    EXPECT_GT(l.view.width * l.view.height, 0.78F * static_cast<float>(s.width) * static_cast<float>(s.height));
+    EXPECT_GE(l.picture_share(s.width, s.height), kPictureShare) << s.width;
+    EXPECT_LT(l.picture_share(s.width, s.height), 0.88) << s.width << ": cuts no smaller than they must be";
+    EXPECT_EQ(l.over[1].empty(), s.width < 1200);
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (l.over[c].empty()) continue;
+      EXPECT_EQ(l.over[c].width, l.over[c].height);
+      EXPECT_LE(l.over[c].right(), l.view.right());
+      EXPECT_LE(l.over[c].bottom(), l.view.bottom());
+      if (c > 0) EXPECT_GE(l.over[c].y, l.over[c - 1].bottom());
+    }
+    // As the person dragged them, within limits.
+    EXPECT_GT(lay_out(Layout::operate, s.width, s.height, em, l.over[0].width + 16).over[0].width, l.over[0].width);
+    EXPECT_LE(lay_out(Layout::operate, s.width, s.height, em, 1e5F).over[0].bottom(), l.view.bottom());
+    const ScreenBox panel = panel_of(l);
+    EXPECT_EQ(panel.x, l.tray.right());
+    EXPECT_EQ(panel.bottom(), l.state.y);
   }
 }
 
 TEST(RoomLayout, WithoutRoomItSaysWhy) {
-  const RoomLayout l = lay_out(Layout::beside, 1024, 700, 24);
+  const RoomLayout l = lay_out(Layout::plan, 1024, 500, 16);
   EXPECT_EQ(l.shown, Layout::operate);
   EXPECT_NE(l.why.find("no room"), std::string::npos);
   // However small: a window is dragged through all sizes.
   for (int w = 200; w < 700; w += 90) {
-    for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan, Layout::review}) {
+    for (const Layout wanted : {Layout::operate, Layout::plan, Layout::review}) {
       for (const ScreenBox& b : boxes_of(lay_out(wanted, w, 150, 16))) EXPECT_GE(b.width, 0);
     }
   }
 }
 
-TEST(RoomLayout, ThreeLayoutsInACircle) {
-  Layout at = Layout::beside;
-  for (const Layout next : {Layout::operate, Layout::plan, Layout::beside}) EXPECT_EQ(at = next_layout(at), next);
+TEST(RoomLayout, TwoLayoutsInTurns) {
+  EXPECT_EQ(next_layout(Layout::operate), Layout::plan);
+  EXPECT_EQ(next_layout(Layout::plan), Layout::operate);
+  EXPECT_EQ(next_layout(Layout::review), Layout::operate);
 }
 
 TEST(Scale, TextKeepsItsShareOfALargeScreen) {
@@ -154,19 +165,32 @@ std::array<double, 3> linear(Colour c) {
 double luminance(const std::array<double, 3>& l) {
   return 0.2126 * l[0] + 0.7152 * l[1] + 0.0722 * l[2];
 }
-double contrast(Colour a, Colour b) {
-  const double x = luminance(linear(a)), y = luminance(linear(b));
-  return (std::max(x, y) + 0.05) / (std::min(x, y) + 0.05);
-}
 
+// The table of docs/design/window.md, in every theme.
 TEST(Palette, WordsCanBeReadOnTheirGround) {
-  for (const Colour c :
-       {palette::kText, palette::kFaint, palette::kYellow, palette::kOrange, palette::kSkyBlue, palette::kVermillion}) {
-    EXPECT_GE(contrast(c, palette::kGround), 4.5);
+  for (const ThemeName name : {ThemeName::dark, ThemeName::light, ThemeName::high_contrast}) {
+    const Theme& t = theme_of(name);
+    for (const Colour ground : {t.ground, t.surface, t.raised}) {
+      EXPECT_GE(contrast(t.text, ground), 12);
+      EXPECT_GE(contrast(t.quiet, ground), 4.5);
+    }
+    for (const Colour ground : {t.surface, t.raised}) {
+      EXPECT_GE(contrast(t.accent, ground), 3);
+      EXPECT_GE(contrast(t.line, ground), 3);
+    }
+    // What is told in a status' colour is never fainter than a large text may be.
+    use_theme(name);
+    for (const Colour c :
+         {palette::kYellow, palette::kOrange, palette::kSkyBlue, palette::kVermillion, palette::kGreen})
+      EXPECT_GE(contrast(ink_of(c), t.surface), 4.2);
   }
-  EXPECT_GE(contrast(palette::kText, palette::kRaised), 4.5);
-  EXPECT_GE(contrast(palette::kText, palette::kBlue), 4.5);
-  EXPECT_GE(contrast({0, 0, 0}, palette::kVermillion), 4.5);  // "TOUCHED"
+  use_theme(ThemeName::light);
+  EXPECT_EQ(ink_of(palette::kYellow), theme().text);
+  use_theme(ThemeName::dark);
+  EXPECT_EQ(ink_of(palette::kYellow), palette::kYellow);
+  EXPECT_GE(contrast({0, 0, 0}, palette::kVermillion), 4.5);  // a contact
+  EXPECT_NEAR(contrast({0, 0, 0}, {1, 1, 1}), 21, 1e-6);
+  EXPECT_NEAR(contrast({0.5F, 0.5F, 0.5F}, {0.5F, 0.5F, 0.5F}), 1, 1e-9);
 }
 
 // Every two states differ for protanopes and deuteranopes too, and each has a word and a sign of its own.

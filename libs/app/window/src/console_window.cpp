@@ -121,7 +121,7 @@ void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
     }
     begin_fixed("foot", {0, h - foot, w, foot}, ImGuiWindowFlags_NoScrollbar);
     if (!facts.trouble.empty()) {
-      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
+      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
       ImGui::TextUnformatted(("! " + facts.trouble).c_str());
       ImGui::PopStyleColor();
     } else {

@@ -51,17 +51,27 @@ void CutsControl::go_to(Vec3 world_mm) {
   set_cross(world_mm);
 }
 
+void CutsControl::begin_at(Vec3 world_mm) {
+  waits_ = true;
+  set_cross(world_mm);
+  for (SliceView& v : views_) v.centre_mm = cross_mm_;
+  centred_ = true;
+}
+
 void CutsControl::follow(bool on) {
   follows_ = on;
+  waits_ = false;
   centred_ = !on;
   if (on) tool_is(tip_mm_, axis_);
 }
 
-void CutsControl::tool_is(Vec3 tip_mm, Vec3 axis) {
+void CutsControl::tool_is(Vec3 tip_mm, Vec3 axis, bool touches) {
   tip_mm_ = tip_mm;
   axis_ = axis;
+  waits_ = waits_ && !touches;
   if (!follows_) return;
   if (planes_ == Planes::tool) turn_to_tool();
+  if (waits_) return;
   set_cross(tip_mm);
   if (!centred_) {
     for (SliceView& v : views_) v.centre_mm = cross_mm_;

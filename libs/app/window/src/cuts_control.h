@@ -25,7 +25,10 @@ class CutsControl {
   void set_bounds(Vec3 lo_mm, Vec3 hi_mm, double step_mm);
   /// The tool in the hand: its tip and its axis (unit, along the handle). While the cuts follow it, they go through its
   /// tip (or the place of the bone's box nearest to it), and the picture stands still until that comes near its edge.
-  void tool_is(Vec3 tip_mm, Vec3 axis);
+  void tool_is(Vec3 tip_mm, Vec3 axis, bool touches = true);
+  /// Where the cuts begin: on bone, so that none is black. They follow the tool from its first contact on.
+  void begin_at(Vec3 world_mm);
+  [[nodiscard]] bool waits() const { return waits_; }
 
   [[nodiscard]] const SliceView& view(int cut) const { return views_[static_cast<std::size_t>(cut)]; }
   [[nodiscard]] const char* name(int cut) const;
@@ -74,7 +77,7 @@ class CutsControl {
   SliceAxes beside_{{1, 0, 0}, {0, 1, 0}};  // across the tool, carried along as it turns
   std::optional<std::array<Vec3, 2>> bounds_mm_;
   double step_mm_ = 0.5;
-  bool follows_ = true, centred_ = false;
+  bool follows_ = true, centred_ = false, waits_ = false;
   Planes planes_ = Planes::body;
   int enlarged_ = -1, last_ = 0, preset_ = 0;
   std::optional<Vec3> under_mouse_;

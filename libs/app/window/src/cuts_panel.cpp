@@ -7,8 +7,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "osteo/display/view/instrument_view.h"
 #include "slice_overlay.h"
+#include "ui_kit.h"
+#include "ui_style.h"
 
 namespace osteo::inline app {
 namespace {
@@ -37,6 +41,36 @@ TriMesh blade_of(const SawCut& cut) {
   box.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   return box;
+}
+
+// The middle of what the procedure wants removed, the first of it.
+std::optional<Vec3> target_of(const RegionsView* regions) {
+  if (regions == nullptr) return std::nullopt;
+  for (const auto& r : regions->all()) {
+    if (r.region.forbidden || r.surface == nullptr || r.surface->points_mm.empty()) continue;
+    Vec3 sum{};
+    for (const auto& p : r.surface->points_mm) sum += from_floats(p);
+    return sum / static_cast<double>(r.surface->points_mm.size());
+  }
+  return std::nullopt;
+}
+
+// Of the middles of blocks of 8 voxels, those in bone.
+std::optional<Vec3> bone_nearest(const World& world, Vec3 to) {
+  std::optional<Vec3> best;
+  double least = 1e30;
+  for (const PlacedBody& b : world.bodies()) {
+    const BrickGrid& bone = b.body->bone;
+    for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) {
+      const Ijk at = bone.brick_coordinate(brick);
+      const Vec3 p = b.world_from_body(bone.frame().world_from_index({at.i * 8 + 3.5, at.j * 8 + 3.5, at.k * 8 + 3.5}));
+      if (const double d = length(p - to); d < least && is_bone(world, p)) {
+        least = d;
+        best = p;
+      }
+    }
+  }
+  return best;
 }
 
 // Kept in the session: what could be seen is part of what was done.
@@ -129,6 +163,9 @@ void CutsPanel::begin(Rehearsal& rehearsal, StructuresView* structures, RegionsV
     }
     if (lo.x > hi.x) lo = hi = {};
     control_.set_bounds(lo, hi, voxel_mm);
+    Vec3 wanted = (lo + hi) * 0.5;
+    if (const auto target = target_of(regions)) wanted = *target;
+    if (const auto at = bone_nearest(world, wanted)) control_.begin_at(*at);
   });
   constexpr double kPixelsToAVoxel = 2.5;  // more would show nothing that a smooth enlargement does not
   drawer_.show(ct_, before_, std::move(outlined), voxel_mm / kPixelsToAVoxel);
@@ -143,14 +180,10 @@ void CutsPanel::lay_out(const RoomLayout& room) {
   const ImGuiStyle& style = ImGui::GetStyle();
   const float line = ImGui::GetFontSize() + style.ItemSpacing.y, pad = 2 * style.WindowPadding.y;
   const float top = 4 * (line + 2) + pad - style.ItemSpacing.y, bottom = 2 * line + pad - style.ItemSpacing.y;
-  if (!room.column.empty()) {
-    const ScreenBox& c = room.column;
-    header_ = {c.x, c.y, c.width, std::min(top, c.height)};
-    footer_ = {c.x, std::max(c.y, c.bottom() - bottom), c.width, std::min(bottom, c.height)};
-    const float each = std::floor((c.height - top - bottom) / CutsControl::kCuts);
-    for (std::size_t n = 0; n < boxes_.size(); ++n)
-      boxes_[n] = {c.x, c.y + top + static_cast<float>(n) * each, c.width, each - 2};
-  } else if (!room.cuts[0].empty()) {
+  foot_ = {};
+  any_ = true;
+  one_alone_ = false;
+  if (room.shown == Layout::plan) {
     boxes_ = room.cuts;
     ScreenBox& first = boxes_.front();
     header_ = {first.x, first.y, first.width, std::min(top, first.height)};
@@ -158,14 +191,28 @@ void CutsPanel::lay_out(const RoomLayout& room) {
     ScreenBox& last = boxes_.back();
     footer_ = {last.x, std::max(last.y, last.bottom() - bottom), last.width, std::min(bottom, last.height)};
     last.height -= footer_.height;
-  }
-  for (std::size_t c = 0; c < boxes_.size(); ++c) {
-    if (static_cast<int>(c) == control_.enlarged() && !header_.empty()) {
-      scene_ = boxes_[c];
-      boxes_[c] = middle_;
+  } else if (!room.over[0].empty()) {
+    const float u = room.unit, wide = std::min(344 * u, room.view.width);
+    one_alone_ = room.over[1].empty();
+    if (one_alone_) {
+      boxes_[static_cast<std::size_t>(chosen_)] = room.over[0];
+    } else {
+      boxes_ = room.over;
     }
-    control_.resize(static_cast<int>(c), static_cast<int>(boxes_[c].width), static_cast<int>(boxes_[c].height));
+    const ScreenBox& lowest = one_alone_ ? room.over[0] : room.over[2];
+    foot_ = {lowest.x, lowest.bottom() + kGap * u, lowest.width, kSmallControl * u};
+    if (settings_open_) header_ = {std::max(room.view.x, lowest.x - kGap * u - wide), room.over[0].y, wide, top};
+    footer_ = {std::max(room.view.x, lowest.right() - wide), foot_.bottom() + kGap * u, wide, bottom};
+  } else {
+    any_ = false;
   }
+  if (const int big = control_.enlarged(); big >= 0 && any_) {
+    ScreenBox& box = boxes_[static_cast<std::size_t>(big)];
+    scene_ = box.empty() ? std::exchange(boxes_[static_cast<std::size_t>(chosen_)], {}) : box;
+    box = middle_;
+  }
+  for (std::size_t c = 0; c < boxes_.size(); ++c)
+    control_.resize(static_cast<int>(c), static_cast<int>(boxes_[c].width), static_cast<int>(boxes_[c].height));
 }
 
 void CutsPanel::upload(DrawnCut cut) {
@@ -198,16 +245,18 @@ void CutsPanel::take(Rehearsal& rehearsal) {
 
 void CutsPanel::draw(Rehearsal& rehearsal, const SawCut* planned) {
   const TickRecord tick = rehearsal.latest();
+  constexpr double kContactN = 0.05;  // less is the weight of nothing
   control_.tool_is(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
-                   normalized(from_floats(tick.device.axis)));
+                   normalized(from_floats(tick.device.axis)), length(from_floats(tick.force_n)) > kContactN);
   if (const auto note = notes_.next(look(), ImGui::GetTime())) rehearsal.note("cuts", *note);
-  if (header_.empty()) return;
+  if (!any_) return;
   ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
-  header(rehearsal);
+  if (!header_.empty()) header(rehearsal);
+  if (!foot_.empty()) foot(rehearsal);
   mouse_in_ = false;
   for (int c = 0; c < CutsControl::kCuts; ++c) one_cut(c, rehearsal, planned);
   if (!mouse_in_) control_.move({});
-  readout(rehearsal);
+  if (foot_.empty() || mouse_in_) readout(rehearsal);
   ImGui::PopStyleVar();
   if (list_open_ && structures_ != nullptr) list_structures(rehearsal);
   take(rehearsal);
@@ -217,13 +266,6 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
   ImGui::SetNextWindowPos({header_.x, header_.y});
   ImGui::SetNextWindowSize({header_.width, header_.height});
   ImGui::Begin("Cuts", nullptr, kFixed);
-  // Its left edge moves.
-  const ImVec2 begins = ImGui::GetCursorPos();
-  ImGui::SetCursorPos({0, 0});
-  ImGui::InvisibleButton("edge", {5, ImGui::GetWindowHeight()});
-  if (ImGui::IsItemHovered() || ImGui::IsItemActive()) ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
-  if (ImGui::IsItemActive()) wished_width_ = header_.width - ImGui::GetIO().MouseDelta.x;
-  ImGui::SetCursorPos(begins);
   static constexpr const char* kShort[] = {"Bone", "Soft", "Temporal"};
   for (int p = 0; p < static_cast<int>(grey_presets().size()); ++p) {
     if (p > 0) ImGui::SameLine();
@@ -261,6 +303,30 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
   ImGui::End();
 }
 
+// Below cuts that lie on the picture: which, where there is room for one, and what else there is to set.
+void CutsPanel::foot(const Rehearsal& rehearsal) {
+  begin_card("cuts' foot", foot_, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
+  ImGui::SetCursorScreenPos({foot_.x, foot_.y});
+  const bool along = control_.planes() == CutsControl::Planes::tool;
+  if (one_alone_) {
+    static const std::string kBody[] = {"A", "C", "S"};
+    if (const int cut = choice("which", kBody, chosen_, kSmallControl); cut >= 0) chosen_ = cut;
+    ImGui::SameLine(0, 0);
+  } else {
+    static const std::string kPlanes[] = {"Body", "Drill"};
+    if (const int planes = choice("planes", kPlanes, along ? 1 : 0, kSmallControl); planes >= 0)
+      control_.take_planes(planes == 1 ? CutsControl::Planes::tool : CutsControl::Planes::body);
+  }
+  const float side = foot_.height;
+  ImGui::SetCursorScreenPos({foot_.right() - side, foot_.y});
+  if (tile("settings", "settings",
+           {false, settings_open_, true,
+            "Window, level, structures" + std::string(rehearsal.structures() != nullptr ? ", plan" : "")},
+           side))
+    settings_open_ = !settings_open_;
+  ImGui::End();
+}
+
 void CutsPanel::mouse_over(int cut, float corner_x, float corner_y) {
   const bool hovered = ImGui::IsItemHovered(), active = ImGui::IsItemActive();
   if (!hovered && !active) return;
@@ -288,13 +354,20 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
   const ScreenBox box = boxes_[n];
   if (box.width < 8 || box.height < 8) return;
   // Letters and lines grow with the cuts, also where the panels' text does not.
-  const float scale = std::max(scale_now(), header_.width / 360);
+  const float scale = scale_now();
   ImGui::SetNextWindowPos({box.x, box.y});
   ImGui::SetNextWindowSize({box.width, box.height});
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {0, 0});
   ImGui::PushStyleColor(ImGuiCol_WindowBg, {0, 0, 0, 1});
   ImGui::Begin(("cut " + std::to_string(cut)).c_str(), nullptr, kFixed | ImGuiWindowFlags_NoBringToFrontOnFocus);
   const ImVec2 lo = ImGui::GetCursorScreenPos();
+  if (!foot_.empty() && control_.enlarged() < 0) {
+    // Its left edge moves, and all of them with it.
+    ImGui::InvisibleButton("edge", {6 * unit(), box.height});
+    if (ImGui::IsItemHovered() || ImGui::IsItemActive()) ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
+    if (ImGui::IsItemActive()) wished_width_ = box.width - ImGui::GetIO().MouseDelta.x;
+    ImGui::SetCursorScreenPos(lo);
+  }
   ImGui::InvisibleButton(
       "picture", {box.width, box.height},
       ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight | ImGuiButtonFlags_MouseButtonMiddle);
@@ -351,6 +424,9 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
   on.letters();
   on.scale_bar();
   on.title(control_.name(cut));
+  if (!foot_.empty())
+    draw->AddRect(lo, {lo.x + box.width, lo.y + box.height}, im_colour32(theme().line), kRound * unit(), 0,
+                  std::max(1.0F, unit()));
   if (const auto& r = control_.ruler()) on.ruler({r->from_mm, r->to_mm});
   draw->PopClipRect();
   ImGui::End();

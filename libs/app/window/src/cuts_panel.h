@@ -28,10 +28,9 @@ class CutsPanel {
   /// As they looked in another session.
   void take(const CutsLook& look);
 
-  /// Before the rest of a frame: where things lie. In a column one below the other, four up, or, where there is room
-  /// for neither, not at all.
+  /// Before the rest of a frame: where things lie. On the picture, three or the one that is chosen, or four up.
   void lay_out(const RoomLayout& room);
-  /// Width of the column as the person dragged it; 0: as the layout has it.
+  /// Side of the cuts on the picture as the person dragged it; 0: as the layout has it.
   [[nodiscard]] float wished_width() const { return wished_width_; }
   /// Where the bone is drawn: the middle, or the place of the cut that has taken it.
   [[nodiscard]] const ScreenBox& scene() const { return scene_; }
@@ -42,6 +41,7 @@ class CutsPanel {
 
  private:
   void header(const Rehearsal& rehearsal);
+  void foot(const Rehearsal& rehearsal);
   void one_cut(int cut, const Rehearsal& rehearsal, const SawCut* planned);
   void mouse_over(int cut, float corner_x, float corner_y);
   void readout(const Rehearsal& rehearsal);
@@ -61,9 +61,10 @@ class CutsPanel {
   std::array<std::optional<DrawnCut>, CutsControl::kCuts> drawn_;
   CutsScene shown_;
   std::array<ScreenBox, CutsControl::kCuts> boxes_;
-  ScreenBox header_, footer_, middle_, scene_;
+  ScreenBox header_, footer_, middle_, scene_, foot_;  // foot_: below cuts that lie on the picture
   float wished_width_ = 0;
-  bool list_open_ = false, mouse_in_ = false;
+  int chosen_ = 0;  // where one alone has room
+  bool list_open_ = false, mouse_in_ = false, any_ = false, settings_open_ = false, one_alone_ = false;
 };
 
 }  // namespace osteo::inline app

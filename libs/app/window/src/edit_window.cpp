@@ -22,6 +22,7 @@
 #include "open_window.h"
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/edit/edit_file.h"
+#include "ui_style.h"
 
 namespace osteo::inline app {
 namespace {
@@ -137,35 +138,13 @@ class EditWindow {
     new_scale_ = sx;
   }
 
-  // Text of 17 pixels at 96 dots an inch, of any at the same size on the desk.
+  // Text of 16 pixels at 96 dots an inch, of any at the same size on the desk.
   void set_scale() {
     scale_ = std::clamp(std::exchange(new_scale_, 0.0F), 1.0F, 4.0F);
-    ImGuiIO& io = ImGui::GetIO();
-    io.Fonts->Clear();
-    const float size = std::round(17 * scale_);
-    const char* const fonts[] = {"/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
-                                 "/usr/share/fonts/truetype/liberation/LiberationSans-Regular.ttf",
-                                 "/usr/share/fonts/truetype/noto/NotoSans-Regular.ttf"};
-    ImFont* font = nullptr;
-    for (const char* const file : fonts) {
-      if (font == nullptr && std::filesystem::exists(file)) font = io.Fonts->AddFontFromFileTTF(file, size);
-    }
-    if (font == nullptr) {
-      ImFontConfig config;
-      config.SizePixels = size;
-      io.Fonts->AddFontDefault(&config);
-    }
+    set_ui_style(static_cast<int>(std::lround(kTextPixels * scale_)));
     ImGui_ImplOpenGL3_DestroyFontsTexture();
     ImGui_ImplOpenGL3_CreateFontsTexture();
-    ImGuiStyle style;
-    ImGui::StyleColorsDark(&style);
-    style.WindowRounding = 0;
-    style.FrameRounding = 3;
-    style.WindowBorderSize = 0;
-    style.Colors[ImGuiCol_WindowBg] = {0.10F, 0.11F, 0.13F, 1};
-    style.Colors[ImGuiCol_Button] = {0.22F, 0.25F, 0.30F, 1};
-    style.ScaleAllSizes(scale_);
-    ImGui::GetStyle() = style;
+    ImGui::GetStyle().WindowBorderSize = 0;
   }
 
   // --- one frame --------------------------------------------------------------------------------------------------

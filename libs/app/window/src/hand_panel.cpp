@@ -70,7 +70,7 @@ void HandController::draw(RehearsalControl& control, bool show) {
 void HandController::draw_buttons() {
   ImGui::TextDisabled("pedals, buttons, keys");
   if (assign_.listens()) {
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
     ImGui::TextWrapped("Press what is to do it: %s. Esc: nothing; Delete: none.", words_of(*assign_.listens()).c_str());
     ImGui::PopStyleColor();
   } else {

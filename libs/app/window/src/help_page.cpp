@@ -105,10 +105,10 @@ void HelpPage::draw(int width, int height, const std::function<void()>& steps) {
     ImVec2 at{corner.x + static_cast<float>(c) * (column + kGapEm * e), corner.y};
     for (std::size_t n = packed[which].from; n < packed[which].to; ++n) {
       if (rows[n].heading) {
-        wrapped(lines[n].text, {at.x, at.y + 0.6F * e}, column, palette::kFaint);
+        wrapped(lines[n].text, {at.x, at.y + 0.6F * e}, column, theme().quiet);
       } else {
         wrapped(lines[n].keys, at, keys_wide, palette::kSkyBlue);
-        wrapped(lines[n].text, {at.x + keys_wide + 0.5F * e, at.y}, text_wide, palette::kText);
+        wrapped(lines[n].text, {at.x + keys_wide + 0.5F * e, at.y}, text_wide, theme().text);
       }
       at.y += rows[n].height;
     }

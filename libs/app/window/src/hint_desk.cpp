@@ -98,9 +98,9 @@ void HintController::draw(const ScreenBox& view) const {
   if (wide < 4 * e) return;
   const ScreenBox box{view.x + (view.width - wide) / 2, view.y + 0.7F * e, wide, high};
   ImDrawList* const draw = ImGui::GetBackgroundDrawList();
-  draw->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32(palette::kGround, 0.8F), 0.4F * e);
+  draw->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32(theme().ground, 0.8F), 0.4F * e);
   draw_sign(draw, {box.x + 1.1F * e, box.y + high / 2}, 0.45F * e, 4, palette::kYellow);
-  fitted_text(draw, {box.x + 2.0F * e, box.y, box.width - 2.5F * e, box.height}, 1.3F * e, palette::kText, words_);
+  fitted_text(draw, {box.x + 2.0F * e, box.y, box.width - 2.5F * e, box.height}, 1.3F * e, theme().text, words_);
 }
 
 void HintController::panel() {

@@ -30,7 +30,7 @@ void beside(float wide) {
 ScreenBox lane_head(MonitorScreen& screen, std::size_t channel, const std::string& name, const ScreenBox& lane) {
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const float e = em(), wide = 8.2F * e;
-  fitted_text(draw, {lane.x, lane.y, wide - 0.4F * e, std::min(lane.height / 2, 1.1F * e)}, e * 0.85F, palette::kText,
+  fitted_text(draw, {lane.x, lane.y, wide - 0.4F * e, std::min(lane.height / 2, 1.1F * e)}, e * 0.85F, theme().text,
               name);
   ImGui::SetCursorScreenPos({lane.x, lane.y + lane.height / 2});
   ImGui::PushID(static_cast<int>(channel));
@@ -44,7 +44,7 @@ ScreenBox lane_head(MonitorScreen& screen, std::size_t channel, const std::strin
   ImGui::PopID();
   const ImVec2 at = ImGui::GetItemRectMax();
   fitted_text(draw, {at.x + e * 0.3F, lane.y + lane.height / 2, wide - 3 * e, std::min(lane.height / 2, 1.1F * e)},
-              e * 0.75F, palette::kFaint, std::to_string(screen.gain_uv(channel)) + " uV");
+              e * 0.75F, theme().quiet, std::to_string(screen.gain_uv(channel)) + " uV");
   return {lane.x + wide, lane.y, lane.width - wide, lane.height};
 }
 
@@ -126,9 +126,9 @@ void MonitorPanel::draw_answers(MonitorController& controller, float height) {
         const ScreenBox& box = lane.box;
         for (int ms = 5; ms < 20; ms += 5) {
           const float x = box.x + box.width * static_cast<float>(ms) / 20;
-          draw->AddLine({x, box.y}, {x, box.bottom()}, im_colour32(palette::kRaised));
+          draw->AddLine({x, box.y}, {x, box.bottom()}, im_colour32(theme().raised));
           if (lane.last)
-            fitted_text(draw, {x + 2, box.bottom() - em(), 4 * em(), em()}, em() * 0.75F, palette::kFaint,
+            fitted_text(draw, {x + 2, box.bottom() - em(), 4 * em(), em()}, em() * 0.75F, theme().quiet,
                         std::to_string(ms) + " ms");
         }
         const auto& traces = view.traces[lane.channel];
@@ -205,10 +205,10 @@ void MonitorPanel::draw_switches(MonitorController& controller) {
   const bool alarm = screen.alarm();
   const ImVec2 at = ImGui::GetCursorScreenPos();
   draw_sign(ImGui::GetWindowDrawList(), {at.x + e * 0.6F, at.y + e * 0.5F}, e * 0.45F, alarm ? 8 : 0,
-            alarm ? palette::kVermillion : palette::kFaint);
+            alarm ? ink_of(palette::kVermillion) : theme().quiet);
   ImGui::Dummy({e * 1.2F, 1});
   ImGui::SameLine();
-  ImGui::PushStyleColor(ImGuiCol_Text, im_colour(alarm ? palette::kVermillion : palette::kFaint));
+  ImGui::PushStyleColor(ImGuiCol_Text, im_colour(alarm ? ink_of(palette::kVermillion) : theme().quiet));
   ImGui::TextUnformatted(alarm ? "activity" : "quiet");
   ImGui::PopStyleColor();
   ImGui::SameLine(7 * e);
@@ -249,7 +249,7 @@ void MonitorPanel::draw(MonitorController& controller) {
     ImGui::BeginChild("log", {0, high});
     const std::vector<MonitorScreen::Line> lines = controller.screen().log();
     for (auto line = lines.rbegin(); line != lines.rend(); ++line) {
-      if (line->alarm) ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kVermillion));
+      if (line->alarm) ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kVermillion)));
       ImGui::TextWrapped("%.2f s  %s", line->at_s, line->words.c_str());
       if (line->alarm) ImGui::PopStyleColor();
     }

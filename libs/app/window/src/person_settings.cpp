@@ -55,9 +55,14 @@ PersonSettings::PersonSettings(std::filesystem::path file) : file_(std::move(fil
             std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == m.key; });
         if (at == fields.end()) throw json.wrong(m.value, "'" + m.key + "' is no setting", "it is left as it is");
         json.read(m.value, {}, *at);
-        if (m.key == "layout" && values.layout != "beside" && values.layout != "operate" && values.layout != "plan") {
+        if (m.key == "layout" && values.layout == "beside") values.layout = "operate";  // its earlier name
+        if (m.key == "layout" && values.layout != "operate" && values.layout != "plan") {
           values.layout = PersonValues{}.layout;
-          throw json.wrong(m.value, "'layout' is beside, operate or plan");
+          throw json.wrong(m.value, "'layout' is operate or plan");
+        }
+        if (m.key == "theme" && values.theme != "dark" && values.theme != "light" && values.theme != "high_contrast") {
+          values.theme = PersonValues{}.theme;
+          throw json.wrong(m.value, "'theme' is dark, light or high_contrast");
         }
         if (const double n = values.motion_one_to; n != 1 && n != 2 && n != 4 && n != 8) {
           values.motion_one_to = PersonValues{}.motion_one_to;

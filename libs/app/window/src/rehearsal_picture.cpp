@@ -159,11 +159,11 @@ RoomScene RehearsalWindow::room_scene(Rehearsal& now) {
           scope_.view().magnification,
           [this](Vec3 at) { return project(at); },
           [this] { draw_scope_panel(scope_, stereo_, scope_scene()); },
-          [this, &now] {
-            tools_->panel(control_.tools(), now, view_axes());
+          [this, &now] { tools_->panel(control_.tools(), now, view_axes()); },
+          [this](bool show) {
+            controller_.draw(control_, show);
             hints_.panel();
           },
-          [this](bool show) { controller_.draw(control_, show); },
           warmth_};
 }
 

@@ -26,7 +26,7 @@ WeightLook look_of(ReviewFinding::Weight weight) {
     case ReviewFinding::Weight::serious:
       return {palette::kVermillion, 8};
   }
-  return {palette::kText, 0};
+  return {theme().text, 0};
 }
 
 // The largest (or the least) value of the samples that a pixel stands for; not a number where none is known.
@@ -57,7 +57,7 @@ void draw_findings(ReviewControl& control) {
       return;
     case ReviewControl::State::failed:
       ImGui::TextDisabled("findings");
-      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
+      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
       ImGui::TextWrapped("! there are none: %s", control.failure().c_str());
       ImGui::PopStyleColor();
       return;
@@ -88,11 +88,11 @@ void draw_findings(ReviewControl& control) {
     }
     ImGui::PopID();
     draw_sign(ImGui::GetWindowDrawList(), {at.x + 0.5F * e, at.y + 0.6F * e}, 0.4F * e, look.corners, look.colour);
-    ImGui::GetWindowDrawList()->AddText(ImGui::GetFont(), e, {at.x + left, at.y}, im_colour32(palette::kText),
+    ImGui::GetWindowDrawList()->AddText(ImGui::GetFont(), e, {at.x + left, at.y}, im_colour32(theme().text),
                                         f.text.c_str(), nullptr, wide - left);
   }
   for (const std::string& w : r.words) {
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kFaint));
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
     ImGui::TextWrapped("%s", w.c_str());
     ImGui::PopStyleColor();
   }
@@ -125,8 +125,8 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
                         {"near, from 5 mm", at.y + lane, lane, 5},
                         {"bone: seen, unseen", at.y + 2 * lane, lane, 0}};
   for (const Lane& l : lanes) {
-    draw->AddRectFilled({left, l.top + 1}, {left + wide, l.top + l.height - 1}, im_colour32(palette::kRaised));
-    fitted_text(draw, {at.x, l.top, names - 0.5F * e, l.height}, 0.85F * e, palette::kFaint, l.name);
+    draw->AddRectFilled({left, l.top + 1}, {left + wide, l.top + l.height - 1}, im_colour32(theme().raised));
+    fitted_text(draw, {at.x, l.top, names - 0.5F * e, l.height}, 0.85F * e, theme().quiet, l.name);
   }
   float most_mm3 = 0;
   for (std::size_t n = 0; n < course.size(); ++n)
@@ -160,14 +160,14 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   }
   for (const ReviewCourse::Event& event : course.events)
     draw->AddLine({x_of(event.t_s), at.y}, {x_of(event.t_s), at.y + high},
-                  im_colour32(event.grave ? palette::kVermillion : palette::kFaint, event.grave ? 1.0F : 0.5F));
+                  im_colour32(event.grave ? palette::kVermillion : theme().quiet, event.grave ? 1.0F : 0.5F));
   if (control.chosen() >= 0) {
     for (const double t : control.review().findings[static_cast<std::size_t>(control.chosen())].times_s)
       draw->AddTriangleFilled({x_of(t) - 0.3F * e, at.y}, {x_of(t) + 0.3F * e, at.y}, {x_of(t), at.y + 0.5F * e},
-                              im_colour32(palette::kText));
+                              im_colour32(theme().text));
   }
   const float now = x_of(control.now_s());
-  draw->AddLine({now, at.y}, {now, at.y + high}, im_colour32(palette::kText), 2);
+  draw->AddLine({now, at.y}, {now, at.y + high}, im_colour32(theme().text), 2);
   ImGui::SetCursorScreenPos({left, at.y});
   ImGui::InvisibleButton("time", {wide, high});
   const double under_s =

@@ -10,28 +10,27 @@
 #include "settings_panel.h"
 #include "sound_panel.h"
 #include "status_panel.h"
+#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
 namespace {
 
 Layout layout_named(const std::string& name) {
-  for (const Layout l : {Layout::operate, Layout::plan}) {
-    if (EnumNames<Layout>::values[static_cast<std::size_t>(l)] == name) return l;
-  }
-  return Layout::beside;
+  return name == "plan" ? Layout::plan : Layout::operate;
 }
 
 }  // namespace
 
 MainView::MainView(WindowShell& shell, PersonSettings& person)
     : shell_(shell), person_(person), wanted_(layout_named(person.values.layout)) {
+  take_theme(person.values.theme);
   lay_out(false, 0);
 }
 
-const RoomLayout& MainView::lay_out(bool over, float column_width) {
+const RoomLayout& MainView::lay_out(bool over, float cut_side) {
   layout_ = osteo::lay_out(over ? Layout::review : wanted_, shell_.width(), shell_.height(),
-                           static_cast<float>(shell_.em_pixels()), column_width);
+                           static_cast<float>(shell_.em_pixels()), cut_side);
   return layout_;
 }
 
@@ -42,6 +41,7 @@ void MainView::renew() {
   before_ = asking_ = false;
   writing_.reset();
   wheel_.close();
+  latched_ = {};
 }
 
 void MainView::key(int code) {
@@ -57,6 +57,8 @@ std::vector<Keyboard::Press> MainView::take_presses() {
 }
 
 bool MainView::holds(Command command) const {
+  if (command == Command::suck && latched_.suction) return true;
+  if (command == Command::wash && latched_.irrigation) return true;
   return std::find(pressed_.held.begin(), pressed_.held.end(), command) != pressed_.held.end();
 }
 
@@ -122,12 +124,8 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
     case Command::hand_page:
     case Command::panel_keys:
       keys_in_panel_ = true;
-      if (layout_.panel.empty() && (layout_.tray.empty() || c == Command::hand_page)) keys_in_panel_ = false;
-      if (c == Command::hand_page) {
-        if (!keys_in_panel_) control.say("the panel is folded away: " + key_name(Command::layout) + " brings it");
-        hand_page_ = keys_in_panel_;
-      }
-      if (keys_in_panel_) control.say("keys move in the panel: arrows, Space; Esc gives them back");
+      hand_page_ = c == Command::hand_page;
+      control.say("keys move in the panel: arrows, Space; Esc gives them back");
       return true;
     case Command::wheel: {
       const ImVec2 m = ImGui::GetIO().MousePos;
@@ -242,14 +240,19 @@ void MainView::draw(const RoomScene& scene) {
   pressed_.held.clear();
   RehearsalControl& control = scene.control;
   const HandFacts hand = hand_facts(control, scene.sound, undo_steps_);
-  if (keys_in_panel_ && !ImGui::IsAnyItemActive() && !io.NavVisible) ImGui::SetNextWindowFocus();
-  if (!layout_.panel.empty()) draw_panel(scene);
-  if (!layout_.tray.empty()) draw_tray(layout_.tray, hand, pressed_);
-  draw_state(layout_.state, state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr),
-             control.reported());
+  draw_tray(layout_.tray, hand, keys_in_panel_, latched_, pressed_);
+  draw_state(layout_.state, layout_.view,
+             state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr), control.reported(),
+             pressed_);
+  if (keys_in_panel_) {
+    if (!ImGui::IsAnyItemActive() && !io.NavVisible) ImGui::SetNextWindowFocus();
+    draw_panel(scene);
+  } else {
+    draw_cards(scene, hand);
+  }
   draw_marks(scene);
   if (writing_) draw_note_field(control);
-  help_.draw(shell_.width(), shell_.height(), [&] { draw_first_steps(steps_, true); });
+  help_.draw(shell_.width(), shell_.height(), [&] { draw_first_steps(steps_); });
   if (wheel_.open()) {
     const float e = em();
     if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0)
@@ -266,30 +269,41 @@ void MainView::draw(const RoomScene& scene) {
   }
 }
 
+// What belongs to the instrument in hand, and what comes next for a new user.
+void MainView::draw_cards(const RoomScene& scene, const HandFacts& hand) {
+  const ScreenBox& view = layout_.view;
+  const float taken = layout_.over[0].empty() ? 0 : view.right() - layout_.over[0].x;
+  static constexpr const char* kTitles[] = {"Drill", "Saw", "Fragments", "Plate"};
+  if (hand.tool == 0) {
+    draw_burr_card(view, view.width - taken, hand, burr_unfolded_, pressed_);
+  } else {
+    draw_tool_card(view, kTitles[hand.tool], scene.draw_tools);
+  }
+  if (person_.values.first_steps && !help_.open()) person_.values.first_steps = draw_next_step(view, steps_);
+}
+
 void MainView::draw_panel(const RoomScene& scene) {
   RehearsalControl& control = scene.control;
   Rehearsal& rehearsal = control.rehearsal();
-  const HandFacts hand = hand_facts(control, scene.sound, undo_steps_);
-  begin_fixed("panel", layout_.panel, ImGuiWindowFlags_NoScrollbar);
+  const ScreenBox box = panel_of(layout_);
+  ImGui::SetNextWindowPos({box.x, box.y});
+  ImGui::SetNextWindowSize({box.width, box.height});
+  ImGui::Begin("panel", nullptr,
+               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
+                   ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoScrollbar);
   // What ends a session stays in its place at the bottom, apart from all else.
-  const float apart = 3 * ImGui::GetFrameHeightWithSpacing() + ImGui::GetStyle().ItemSpacing.y + 2;
+  const float apart = 2 * ImGui::GetFrameHeightWithSpacing() + ImGui::GetStyle().ItemSpacing.y + 2;
   ImGui::BeginChild("all", {0, std::max(4 * em(), ImGui::GetContentRegionAvail().y - apart)});
-  ImGui::TextDisabled("burr");
-  draw_burr(hand, pressed_);
-  ImGui::Separator();
-  ImGui::TextDisabled("what to do");
-  draw_deeds(hand, pressed_);
-  ImGui::Separator();
-  if (person_.values.first_steps && steps_.next() >= 0) {
-    draw_first_steps(steps_, false);
-    ImGui::Separator();
-  }
   scene.draw_camera();
   ImGui::Separator();
-  ImGui::TextDisabled("in the hand");
-  scene.draw_tools();
-  ImGui::Separator();
+  if (scene.control.tools().tool() == HandTools::Tool::drill) scene.draw_tools();  // plates that are fixed
   draw_sound(scene.sound);
+  ImGui::TextDisabled("Colours");
+  static const std::string kThemes[] = {"Dark", "Light", "High contrast"};
+  if (const int chosen = choice("theme", kThemes, static_cast<int>(theme_name()), kSmallControl); chosen >= 0) {
+    person_.values.theme = EnumNames<ThemeName>::values[static_cast<std::size_t>(chosen)];
+    take_theme(person_.values.theme);
+  }
   if (scene.draw_hand) scene.draw_hand(std::exchange(hand_page_, false));
   draw_settings(rehearsal);
   draw_posture(rehearsal);
@@ -306,7 +320,7 @@ void MainView::draw_panel(const RoomScene& scene) {
                 static_cast<double>(scene.tick.lateness_us));
     ImGui::Text("%.2f of %.2f M triangles", scene.machine.drawn_millions, scene.machine.triangles_millions);
     ImGui::TextWrapped("%s", scene.machine.pictures.c_str());
-    ImGui::Checkbox("list of first steps", &person_.values.first_steps);
+    ImGui::Checkbox("first steps", &person_.values.first_steps);
     ImGui::Checkbox("remember cases", &person_.values.remember_cases);
   }
   ImGui::EndChild();
@@ -348,7 +362,7 @@ void MainView::draw_marks(const RoomScene& scene) {
     const ImVec2 size = ImGui::CalcTextSize(text.c_str());
     x = std::clamp(x, v.x, std::max(v.x, v.right() - size.x - e / 2));
     y = std::clamp(y, v.y, std::max(v.y, v.bottom() - size.y));
-    draw->AddRectFilled({x - e / 4, y}, {x + size.x + e / 4, y + size.y}, im_colour32(palette::kGround, 0.8F));
+    draw->AddRectFilled({x - e / 4, y}, {x + size.x + e / 4, y + size.y}, im_colour32(theme().ground, 0.8F));
     draw->AddText({x, y}, im_colour32(colour), text.c_str());
   };
   for (const PinnedNote& note : notes_.all()) {
@@ -359,7 +373,7 @@ void MainView::draw_marks(const RoomScene& scene) {
     draw->AddRectFilled({x, y - 2 * e}, {x + 1.4F * e, y - e}, im_colour32(palette::kYellow));
     const std::string number = std::to_string(note.number);
     draw->AddText({x + 0.35F * e, y - 2 * e}, IM_COL32(0, 0, 0, 255), number.c_str());
-    words(x + 1.7F * e, y - 2 * e, note.text.size() > 40 ? note.text.substr(0, 40) + "..." : note.text, palette::kText);
+    words(x + 1.7F * e, y - 2 * e, note.text.size() > 40 ? note.text.substr(0, 40) + "..." : note.text, theme().text);
   }
   std::vector<std::array<float, 2>> ends;
   for (const Vec3 p : ruler_.points_mm()) {
@@ -388,10 +402,10 @@ void MainView::draw_caption(const RoomScene& scene) {
   std::snprintf(text, sizeof text, "case %s, %s, %s, %.4g mm", scene.machine.case_hash.substr(0, 8).c_str(),
                 state.tool.c_str(), state.time.c_str(), bar_mm);
   const float bar = static_cast<float>(bar_mm * scene.pixels_per_mm), y = v.bottom() - 2 * e;
-  draw->AddRectFilled({v.x, y}, {v.right(), v.bottom()}, im_colour32(palette::kGround, 0.85F));
+  draw->AddRectFilled({v.x, y}, {v.right(), v.bottom()}, im_colour32(theme().ground, 0.85F));
   const float x = v.right() - bar - e;
-  draw->AddRectFilled({x, y + e * 0.8F}, {x + bar, y + e * 1.2F}, im_colour32(palette::kText));
-  fitted_text(draw, {v.x + e / 2, y, v.width - bar - 2.5F * e, 2 * e}, e, palette::kText, text);
+  draw->AddRectFilled({x, y + e * 0.8F}, {x + bar, y + e * 1.2F}, im_colour32(theme().text));
+  fitted_text(draw, {v.x + e / 2, y, v.width - bar - 2.5F * e, 2 * e}, e, theme().text, text);
 }
 
 EndChoice MainView::end_choice(Command command) {
@@ -416,7 +430,7 @@ EndChoice MainView::draw_end(const EndFacts& facts, const std::function<void()>&
   const float e = em();
   fitted_text(ImGui::GetWindowDrawList(),
               {ImGui::GetCursorScreenPos().x, ImGui::GetCursorScreenPos().y, layout_.page.width - 2 * e, 1.6F * e},
-              1.6F * e, palette::kText, facts.past ? "A session, looked at again" : "The session is over, and saved");
+              1.6F * e, theme().text, facts.past ? "A session, looked at again" : "The session is over, and saved");
   ImGui::Dummy({0, 1.8F * e});
   EndChoice choice = EndChoice::none;
   const auto button = [&](const char* words, EndChoice of) {
@@ -445,7 +459,7 @@ EndChoice MainView::draw_end(const EndFacts& facts, const std::function<void()>&
         draw_sign(ImGui::GetWindowDrawList(), {at.x + e * 0.5F, at.y + e * 0.5F}, e * 0.4F, look.corners, look.colour);
         ImGui::SetCursorPosX(ImGui::GetCursorPosX() + 1.2F * e);
       }
-      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(plain ? palette::kText : look.colour));
+      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(plain ? theme().text : ink_of(look.colour)));
       ImGui::TextWrapped("%s", line.value.c_str());
       ImGui::PopStyleColor();
     }
@@ -456,7 +470,7 @@ EndChoice MainView::draw_end(const EndFacts& facts, const std::function<void()>&
   ImGui::TextWrapped("%s", facts.folder.string().c_str());
   ImGui::TextWrapped("summary.json has the numbers, stream.oss every tick: osteo replay SESSION");
   for (const std::string& w : facts.warnings) {
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
     ImGui::TextWrapped("! %s", w.c_str());
     ImGui::PopStyleColor();
   }

@@ -39,7 +39,7 @@ struct RoomScene {
   /// A point of the world in pixels of the window; nothing behind the eye.
   std::function<std::optional<std::array<float, 2>>(Vec3)> project;
   std::function<void()> draw_camera;  ///< the microscope: into the panel
-  std::function<void()> draw_tools;   ///< saw, pieces, plates: into the panel
+  std::function<void()> draw_tools;   ///< saw, fragments, plates: into their card, or the panel
   /// What is chosen for the hand: into the panel. `show`: opened, and the keys' cursor on it.
   std::function<void(bool show)> draw_hand;
   std::optional<WarmthNow> warmth;  ///< where the scene has heat
@@ -51,8 +51,8 @@ class MainView {
  public:
   MainView(WindowShell& shell, PersonSettings& person);
 
-  /// For the window as it is now; `over`: the session has ended; `column_width`: see lay_out().
-  const RoomLayout& lay_out(bool over, float column_width);
+  /// For the window as it is now; `over`: the session has ended; `cut_side`: see lay_out().
+  const RoomLayout& lay_out(bool over, float cut_side);
   [[nodiscard]] const RoomLayout& layout() const { return layout_; }
   [[nodiscard]] Layout wanted() const { return wanted_; }
   /// Mouse and keys are for something in front of the bone.
@@ -93,6 +93,7 @@ class MainView {
 
  private:
   void draw_panel(const RoomScene& scene);
+  void draw_cards(const RoomScene& scene, const HandFacts& hand);
   void draw_marks(const RoomScene& scene);
   void draw_note_field(RehearsalControl& control);
   void answer(int answer, RehearsalControl& control);
@@ -102,7 +103,7 @@ class MainView {
 
   WindowShell& shell_;
   PersonSettings& person_;
-  Layout wanted_ = Layout::beside;
+  Layout wanted_ = Layout::operate;
   RoomLayout layout_;
   Pressed pressed_;
   ToolWheel wheel_;
@@ -116,7 +117,8 @@ class MainView {
   std::optional<Vec3> writing_;  // where a note is pinned
   std::string note_text_;
   int note_answer_ = 0;  // 1: kept, -1: not
-  bool hand_page_ = false;
+  bool hand_page_ = false, burr_unfolded_ = false;
+  Latched latched_;
 };
 
 }  // namespace osteo::inline app

@@ -6,75 +6,81 @@
 namespace osteo::inline app {
 namespace {
 
-// In heights of text.
-constexpr float kPanelEm = 18, kColumnEm = 17, kTrayEm = 5.5F, kStateEm = 5.4F, kPageEm = 34;
-constexpr float kBesideEm = 60, kPlanWideEm = 52, kPlanHighEm = 34;
-// Of the smallest window that operate fits: its state needs the width, its tray the height.
+// Of the design, docs/design/window.md, in pixels at scale 1.
+constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPanel = 320, kPage = 544;
+constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kMinCut = 96, kMaxCut = 272;
+// Of the smallest window that operate fits: its state needs the width, its strip the height.
 constexpr double kMinWideEm = 40, kMinHighEm = 26;
+
+// In the view's upper right corner, no larger than it has room for.
+void stack_over(RoomLayout& room, float side, std::size_t count) {
+  const float u = room.unit, gap = std::round(kCutGap * u), inset = std::round(kInset * u);
+  const auto n = static_cast<float>(count);
+  side = std::min(side, (room.view.height - 2 * inset - gap * (n - 1) - kChoice * u) / n);
+  side = std::floor(std::min(side, 0.4F * room.view.width));
+  room.over = {};
+  if (side < 0.6F * kMinCut * u) return;
+  for (std::size_t c = 0; c < count; ++c)
+    room.over[c] = {room.view.right() - inset - side, room.view.y + inset + static_cast<float>(c) * (side + gap), side,
+                    side};
+}
 
 }  // namespace
 
 Layout next_layout(Layout layout) {
-  return layout == Layout::beside ? Layout::operate : layout == Layout::operate ? Layout::plan : Layout::beside;
+  return layout == Layout::operate ? Layout::plan : Layout::operate;
 }
 
-RoomLayout lay_out(Layout wanted, int width, int height, float em, float column_width) {
+double RoomLayout::picture_share(int width, int height) const {
+  float left = view.width * view.height;
+  for (const ScreenBox& b : over) left -= b.width * b.height;
+  return static_cast<double>(left) / (static_cast<double>(width) * height);
+}
+
+RoomLayout lay_out(Layout wanted, int width, int height, float em, float cut_side) {
   const auto w = static_cast<float>(width), h = static_cast<float>(height);
-  // Whole pixels: textures and viewports have no others.
-  const auto ems = [&](float n) { return std::round(n * em); };
   RoomLayout out;
+  const float u = out.unit = em / static_cast<float>(kTextPixels);
+  // Whole pixels: textures and viewports have no others.
+  const auto whole = [&](float n) { return std::round(n * u); };
   out.shown = wanted;
-  if (wanted == Layout::beside && w < ems(kBesideEm)) {
-    out.shown = Layout::operate;
-    out.why = "no room for panel and cuts: a wider window or smaller text (Ctrl -) shows them";
-  } else if (wanted == Layout::plan && (w < ems(kPlanWideEm) || h < ems(kPlanHighEm))) {
+  if (wanted == Layout::plan && (w < whole(kPlanWide) || h < whole(kPlanHigh))) {
     out.shown = Layout::operate;
     out.why = "no room for four pictures: a larger window or smaller text (Ctrl -) shows them";
   }
-  const float state = std::min(ems(kStateEm), h);
-  const float above = h - state;
-  switch (out.shown) {
-    case Layout::beside: {
-      // Squares one below the other use the column's height, where the picture can spare the width.
-      const float usual = std::max(kColumnEm * em, std::min(h / 3 - 2 * em, 0.24F * w));
-      const float panel = ems(kPanelEm),
-                  column = std::round(
-                      column_width > 0 ? std::clamp(column_width, std::min(12 * em, 0.3F * w), 0.45F * w) : usual);
-      out.panel = {0, 0, panel, h};
-      out.column = {w - column, 0, column, h};
-      out.view = {panel, 0, w - panel - column, above};
-      out.state = {panel, above, w - panel - column, state};
-      break;
-    }
-    case Layout::operate: {
-      const float tray = std::min(ems(kTrayEm), w);
-      out.tray = {0, 0, tray, h};
-      out.view = {tray, 0, w - tray, above};
-      out.state = {tray, above, w - tray, state};
-      break;
-    }
-    case Layout::plan: {
-      const float tray = ems(kTrayEm), left = std::floor((w - tray) / 2), top = std::floor(above / 2);
-      out.tray = {0, 0, tray, h};
-      out.view = {tray, 0, left, top};
-      out.cuts = {ScreenBox{tray + left, 0, w - tray - left, top}, ScreenBox{tray, top, left, above - top},
-                  ScreenBox{tray + left, top, w - tray - left, above - top}};
-      out.state = {tray, above, w - tray, state};
-      break;
-    }
-    case Layout::review: {
-      const float page = std::min(ems(kPageEm), w);
-      out.page = {0, 0, page, h};
-      out.view = {page, 0, w - page, h};
-      break;
-    }
+  if (out.shown == Layout::review) {
+    const float page = std::min(whole(kPage), w);
+    out.page = {0, 0, page, h};
+    out.view = {page, 0, w - page, h};
+    return out;
   }
+  const float tray = std::min(whole(kStrip), w), state = std::min(whole(kState), h), above = h - state;
+  out.tray = {0, 0, tray, h};
+  out.state = {tray, above, w - tray, state};
+  out.view = {tray, 0, w - tray, above};
+  if (out.shown == Layout::plan) {
+    const float left = std::floor((w - tray) / 2), top = std::floor(above / 2);
+    out.view = {tray, 0, left, top};
+    out.cuts = {ScreenBox{tray + left, 0, w - tray - left, top}, ScreenBox{tray, top, left, above - top},
+                ScreenBox{tray + left, top, w - tray - left, above - top}};
+    return out;
+  }
+  const std::size_t count = w >= kThreeCutsWide * u ? 3 : 1;
+  const float spare = out.view.width * out.view.height - static_cast<float>(kPictureShare) * w * h;
+  const float most = std::sqrt(std::max(0.0F, spare) / static_cast<float>(count)), grid = kGrid * u;
+  const float usual = std::clamp(std::floor(most / grid) * grid, kMinCut * u, kMaxCut * u);
+  stack_over(out, cut_side > 0 ? std::max(cut_side, kMinCut * u) : usual, count);
   return out;
+}
+
+ScreenBox panel_of(const RoomLayout& room) {
+  const float top = room.view.y, bottom = room.state.empty() ? room.view.bottom() : room.state.y;
+  return {room.tray.right(), top, std::min(std::round(kPanel * room.unit), room.state.width), bottom - top};
 }
 
 ScreenBox take_strip(RoomLayout& room, float high) {
   if (room.shown == Layout::review) return {};
-  const bool four = !room.cuts[0].empty();
+  const bool four = room.shown == Layout::plan;
   const float top = room.view.y, bottom = four ? room.cuts[1].bottom() : room.view.bottom();
   const float left = room.view.x, right = four ? room.cuts[0].right() : room.view.right();
   high = std::floor(std::min(high, (bottom - top) / 2));
@@ -88,6 +94,8 @@ ScreenBox take_strip(RoomLayout& room, float high) {
     }
   } else {
     room.view.height -= high;
+    const auto shown = std::count_if(room.over.begin(), room.over.end(), [](const ScreenBox& b) { return !b.empty(); });
+    if (shown > 0) stack_over(room, room.over[0].width, static_cast<std::size_t>(shown));
   }
   return {left, bottom - high, right - left, high};
 }

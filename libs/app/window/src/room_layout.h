@@ -18,30 +18,36 @@ struct ScreenBox {
   friend bool operator==(const ScreenBox&, const ScreenBox&) = default;
 };
 
-/// beside: panel, picture and cuts; operate: the picture fills the window; plan: picture and three cuts, four up;
-/// review: after the end.
-enum class Layout : int { beside, operate, plan, review };
-[[nodiscard]] constexpr std::array<std::string_view, 4> enum_names(Layout) {
-  return {"beside", "operate", "plan", "review"};
+/// operate: the picture fills the window, cuts lie on it; plan: picture and three cuts, four up; review: after the end.
+enum class Layout : int { operate, plan, review };
+[[nodiscard]] constexpr std::array<std::string_view, 3> enum_names(Layout) {
+  return {"operate", "plan", "review"};
 }
-/// The three that one works in, in a circle.
+/// The two that one works in, in turns.
 [[nodiscard]] Layout next_layout(Layout layout);
 
 struct RoomLayout {
-  Layout shown = Layout::beside;  ///< what there was room for
-  std::string why;                ///< when that is not what was asked for; else empty
-  ScreenBox panel;                ///< all that can be set; empty where it is folded to the tray
-  ScreenBox tray;                 ///< buttons of instruments; empty where the panel has them
-  ScreenBox view;                 ///< the bone
-  ScreenBox state;                ///< what the burr does now: always at the bottom of the view, of the same rows
-  ScreenBox column;               ///< of cuts, one below the other; empty in other layouts
-  std::array<ScreenBox, 3> cuts;  ///< four up; empty in other layouts
-  ScreenBox page;                 ///< of the end, in review; else empty
+  Layout shown = Layout::operate;  ///< what there was room for
+  std::string why;                 ///< when that is not what was asked for; else empty
+  ScreenBox tray;                  ///< the strip of tools
+  ScreenBox view;                  ///< the bone
+  ScreenBox state;                 ///< the strip of what the burr does now, at the bottom
+  std::array<ScreenBox, 3> cuts;   ///< four up; empty in other layouts
+  std::array<ScreenBox, 3> over;   ///< cuts that lie on the picture; those without room are empty
+  ScreenBox page;                  ///< of the end, in review; else empty
+  float unit = 1;                  ///< pixels for one of the design's
+  /// Of the window: what cuts on it leave to the picture.
+  [[nodiscard]] double picture_share(int width, int height) const;
 };
-/// `em_pixels`: height of text. The boxes tile the window. Any size; below the least that a layout needs (60 em wide
-/// beside, 52 x 34 plan) it is operate that is shown, and says why. `column_width`: as the person dragged it, within
-/// limits; 0: by the window.
-[[nodiscard]] RoomLayout lay_out(Layout wanted, int width, int height, float em_pixels, float column_width = 0);
+/// Of the window, in operate, at scale 1 from 1024 x 700 on.
+inline constexpr double kPictureShare = 0.8;
+/// `em_pixels`: height of text. The boxes but `over` tile the window. Any size; below the least that plan needs (52 x
+/// 34 em) it is operate that is shown, and says why. `cut_side`: of the cuts on the picture as the person dragged it,
+/// within limits; 0: the largest that leaves the picture its share, three where the window is 1200 of the design's
+/// pixels wide, else one.
+[[nodiscard]] RoomLayout lay_out(Layout wanted, int width, int height, float em_pixels, float cut_side = 0);
+/// The panel of all that can be set, over the picture.
+[[nodiscard]] ScreenBox panel_of(const RoomLayout& room);
 
 /// A strip above the state, as high as asked for but never more than half the pictures' height, for something that is
 /// shown for a while: the pictures make room, all else stays. Empty in review.

@@ -3,11 +3,14 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <numbers>
 #include <optional>
 #include <vector>
 
+#include "osteo/simulation/bone/burr_kind.h"
+#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -17,23 +20,10 @@ std::string with_key(const char* word, Command command, std::optional<int> value
   return std::string(word) + " (" + key_name(command, value) + ")";
 }
 
-// A button that shows that its tool is in use: filled, and with a bar at its side, so not by colour alone.
-bool tool_button(const std::string& text, ImVec2 size, bool used) {
-  if (used) ImGui::PushStyleColor(ImGuiCol_Button, im_colour(palette::kBlue));
-  const bool pressed = ImGui::Button(("##" + text).c_str(), size);
-  // Words that are too long for a narrow panel become smaller; ImGui would cut them off.
-  const ImVec2 at = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();
-  const float inset = em() * 0.3F;
-  if (!text.starts_with("##"))
-    fitted_text(ImGui::GetWindowDrawList(), {at.x + inset, at.y, to.x - at.x - 2 * inset, to.y - at.y}, em(),
-                palette::kText, text, true);
-  if (used) {
-    ImGui::PopStyleColor();
-    const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
-    ImGui::GetWindowDrawList()->AddRectFilled(lo, {lo.x + std::max(3.0F, em() / 5), hi.y},
-                                              im_colour32(palette::kYellow));
-  }
-  return pressed;
+// Name and key of a command.
+std::string words_of(const char* name, Command command) {
+  const std::string key = key_name(command);
+  return key.empty() ? name : std::string(name) + "   " + key;
 }
 
 // Of so many buttons in a row, each.
@@ -45,189 +35,319 @@ float share_of_row(int buttons) {
 
 }  // namespace
 
-void draw_state(const ScreenBox& box, const StateFacts& f, const std::string& message) {
-  begin_fixed("state", box, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoInputs);
+void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f, const std::string& message,
+                Pressed& pressed) {
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
+  begin_fixed("state", box, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
+  ImGui::PopStyleVar();
   ImDrawList* const draw = ImGui::GetWindowDrawList();
-  const float e = em(), pad = e * 0.5F, label = e * 0.8F, row = e * 1.9F;
-  const float top = box.y + pad * 0.6F, big_top = top + label + 1, line = big_top + row + 2;
-  // Shares of the width: a name of a structure is the longest.
-  static constexpr float kShares[] = {0.25F, 0.17F, 0.19F, 0.39F};
-  float x = box.x + pad;
-  const float all = box.width - 2 * pad;
-  const auto column = [&](int n) {
-    const ScreenBox b{x, big_top, all * kShares[n] - pad, row};
-    x += all * kShares[n];
-    return b;
+  const Theme& t = theme();
+  const float u = unit(), label = 0.875F * em();
+  const float top = box.y + 8 * u, big = box.y + 26 * u, row = 32 * u;
+  float x = box.x + 16 * u;
+  const auto figure = [&](const std::string& name, const std::string& value, float wide) {
+    fitted_text(draw, {x, top, wide - 8 * u, 18 * u}, label, t.quiet, name);
+    fitted_text(draw, {x, big, wide - 8 * u, row}, kBoldEm * em(), t.text, value, false, true);
+    x += wide;
   };
-  const auto head = [&](const ScreenBox& b, const std::string& text) {
-    fitted_text(draw, {b.x, top, b.width, label}, label, palette::kFaint, text);
+  figure("Force", f.force, 96 * u);
+  const float bar = 3 * u, force_x = box.x + 16 * u;
+  draw->AddRectFilled({force_x, box.bottom() - 2 * bar}, {force_x + 80 * u, box.bottom() - bar}, im_colour32(t.raised));
+  draw->AddRectFilled({force_x, box.bottom() - 2 * bar},
+                      {force_x + 80 * u * static_cast<float>(f.force_share), box.bottom() - bar},
+                      im_colour32(f.force_share < 1 ? t.text : palette::kVermillion));
+  figure("Burr, rpm", f.turning ? f.speed.substr(0, f.speed.find(' ')) : "0", 104 * u);
+  figure("Bone below", f.under, 112 * u);
+
+  // From the right: the button, time and volume. What is left is the structure's and the message's.
+  const float end_wide = std::max(72 * u, button_width("End")), right = box.right() - 16 * u;
+  const float time_wide = 96 * u, time_x = right - end_wide - 16 * u - time_wide;
+  const auto flush_right = [&](float y, float high, const std::string& words, Colour colour) {
+    const std::string shown = shortened(words, time_wide, label);
+    const float wide = ImGui::GetFont()->CalcTextSizeA(label, FLT_MAX, 0, shown.c_str()).x;
+    fitted_text(draw, {time_x + time_wide - wide, y, wide + 1, high}, label, colour, shown);
   };
+  flush_right(box.y + 12 * u, 18 * u, f.time, t.text);
+  flush_right(box.y + 34 * u, 18 * u, f.removed, t.quiet);
+  ImGui::SetCursorScreenPos({right - end_wide, box.y + 12 * u});
+  if (kit_button("End", ButtonLook::usual, end_wide)) pressed.press(Command::quit);
 
-  const ScreenBox tool = column(0);
-  head(tool, f.tool);
-  draw_sign(draw, {tool.x + e * 0.5F, tool.y + row / 2}, e * 0.5F, f.turning ? 3 : 4,
-            f.turning ? palette::kYellow : palette::kFaint);
-  fitted_text(draw, {tool.x + e * 1.3F, tool.y, tool.width - e * 1.3F, row}, row * 0.85F, palette::kText, f.speed);
-
-  const ScreenBox force = column(1);
-  head(force, "force");
-  fitted_text(draw, {force.x, force.y, force.width, row * 0.8F}, row * 0.8F, palette::kText, f.force);
-  const float bar = std::max(3.0F, e * 0.25F);
-  draw->AddRectFilled({force.x, force.bottom() - bar}, {force.right(), force.bottom()}, im_colour32(palette::kRaised));
-  draw->AddRectFilled({force.x, force.bottom() - bar},
-                      {force.x + force.width * static_cast<float>(f.force_share), force.bottom()},
-                      im_colour32(f.force_share < 0.5 ? palette::kSkyBlue
-                                  : f.force_share < 1 ? palette::kYellow
-                                                      : palette::kVermillion));
-
-  const ScreenBox under = column(2);
-  head(under, "bone under it");
-  fitted_text(draw, under, row * 0.85F, palette::kText, f.under);
-
-  const ScreenBox near = column(3);
+  const float rest = time_x - 16 * u - x, chip_least = 176 * u;
+  const bool inside = rest >= 264 * u + 24 * u + chip_least;
+  const float near_wide =
+      std::max(0.0F, std::min(inside ? 344 * u : 10000 * u, inside ? rest - 24 * u - chip_least : rest));
+  const ScreenBox near{x, box.y + 6 * u, std::min(near_wide, 400 * u), 52 * u};
   const NearnessLook& look = look_of(f.nearness);
-  head(near, (f.distance.empty() ? std::string("critical structures") : f.structure) +
-                 (f.warmth.empty() ? "" : ", " + f.warmth));
-  if (f.nearness == Nearness::touched)  // as large as it can be
-    draw->AddRectFilled({near.x - pad / 2, near.y}, {near.right(), near.bottom()}, im_colour32(look.colour));
-  const Colour ink = f.nearness == Nearness::touched ? Colour{0, 0, 0} : look.colour;
-  draw_sign(draw, {near.x + e * 0.5F, near.y + row / 2}, e * 0.5F, look.corners, ink);
-  const std::string words = f.distance.empty() ? f.structure : f.distance + "  " + look.word;
-  fitted_text(draw, {near.x + e * 1.3F, near.y, near.width - e * 1.3F, row}, f.distance.empty() ? e : row * 0.85F, ink,
-              words);
+  const bool contact = f.nearness == Nearness::touched;
+  if (contact)  // as large as it can be
+    draw->AddRectFilled({near.x - 8 * u, near.y - 2 * u}, {near.right() + 4 * u, near.bottom() + 2 * u},
+                        im_colour32(look.colour), kRound * u);
+  const Colour ink = contact ? Colour{0, 0, 0} : t.text;
+  const bool is_near = !f.distance.empty() && f.nearness != Nearness::far;
+  std::string words = is_near ? f.distance + " " + look.word : f.distance.empty() ? "" : f.distance;
+  ImFont* const bold = bold_font();
+  const float said = words.empty() ? 0 : bold->CalcTextSizeA(em(), FLT_MAX, 0, words.c_str()).x;
+  const float name_wide = near.width - said - (words.empty() ? 0 : 34 * u);
+  const std::string name = f.structure + (f.warmth.empty() ? "" : ", " + f.warmth);
+  if (name_wide > 24 * u)
+    fitted_text(draw, {near.x, near.y + 2 * u, name_wide, 22 * u}, em(), f.distance.empty() ? t.quiet : ink, name);
+  if (!words.empty()) {
+    if (is_near)
+      draw_sign(draw, {near.right() - said - 14 * u, near.y + 13 * u}, 8 * u, look.corners,
+                contact ? ink : look.colour);
+    draw->AddText(bold, em(), {near.right() - said, near.y + 2 * u}, im_colour32(ink), words.c_str());
+  }
+  const float bar_y = near.y + 34 * u;
+  draw->AddRectFilled({near.x, bar_y}, {near.right(), bar_y + 8 * u}, im_colour32(contact ? Colour{0, 0, 0} : t.raised),
+                      4 * u);
+  if (f.near_share > 0) {
+    const float full = near.x + std::max(8 * u, near.width * static_cast<float>(f.near_share));
+    draw->AddRectFilled({near.x, bar_y}, {full, bar_y + 8 * u}, im_colour32(is_near ? look.colour : t.quiet), 4 * u);
+    if (is_near && contrast(look.colour, t.surface) < 3)  // on a light ground it has a dark edge
+      draw->AddRect({near.x, bar_y}, {full, bar_y + 8 * u}, im_colour32(t.text), 4 * u, 0, 1.5F * u);
+  }
 
-  // The line below.
-  const float below = box.bottom() - line - pad * 0.4F, small = std::min(e, below);
-  const float time = all * 0.3F;
-  fitted_text(draw, {box.x + pad, line, time - pad, below}, small, palette::kText, f.time + "   " + f.removed);
+  // One place for words.
   const bool warns = warning_is_reported(f, message);
   const std::string& reported = warns ? f.warning : message;
-  const float at = box.x + pad + time;
-  if (warns)
-    draw_sign(draw, {at + small * 0.5F, line + below / 2}, small * 0.45F, f.alarm ? 8 : 3,
-              f.alarm ? palette::kVermillion : palette::kYellow);
-  fitted_text(draw, {at + small * 1.3F, line, box.right() - at - small * 1.3F - pad, below}, small,
-              warns ? (f.alarm ? palette::kVermillion : palette::kYellow) : palette::kText, reported);
-  ImGui::End();
-}
-
-void draw_tray(const ScreenBox& box, const HandFacts& hand, Pressed& pressed) {
-  begin_fixed("tray", box);
-  struct Row {
-    const char* word;
-    Command command;
-    bool used, held;
-    std::optional<int> value = {};  // where one command has several buttons
-  };
-  const Burr& burr = burr_library()[static_cast<std::size_t>(hand.burr)];
-  std::vector<Row> rows{{"Help", Command::help, false, false},
-                        {"Tools", Command::wheel, false, false},
-                        {"Approach", Command::bring, false, false},
-                        {"Retract", Command::lift, false, false},
-                        {"Drill", Command::drill, hand.latched, false}};
-  for (std::size_t n = 0; n < kBurrKinds.size(); ++n)
-    rows.push_back({kBurrKinds[n].name.data(), Command::burr_kind,
-                    hand.tool == 0 && !hand.saw && static_cast<std::size_t>(burr.kind) == n, false,
-                    static_cast<int>(n)});
-  rows.insert(rows.end(), {{"Saw", Command::saw, hand.tool == 1 || hand.saw, false},
-                           {"Fragments", Command::pieces, hand.tool == 2, false},
-                           {"Plate", Command::plates, hand.tool == 3, false},
-                           {"Suction", Command::suck, hand.sucking, true},
-                           {"Irrigate", Command::wash, hand.washing, true},
-                           {"Undo", Command::undo, false, false},
-                           {"Compare", Command::before, hand.before, false},
-                           {"Ruler", Command::ruler, hand.ruler, false},
-                           {"Note", Command::mark, false, false},
-                           {"Layout", Command::layout, false, false},
-                           {"End", Command::quit, false, false}});
-  const float gap = ImGui::GetStyle().ItemSpacing.y;
-  const auto count = static_cast<float>(rows.size());
-  const float high = std::clamp(std::floor(ImGui::GetContentRegionAvail().y / count - gap), em() * 1.05F, em() * 2.5F);
-  const float wide = ImGui::GetContentRegionAvail().x;
-  ImDrawList* const draw = ImGui::GetWindowDrawList();
-  for (const Row& r : rows) {
-    const bool off = r.held && !hand.second_hand;
-    if (off) ImGui::BeginDisabled();
-    const ImVec2 at = ImGui::GetCursorScreenPos();
-    const bool clicked = tool_button("##" + std::string(r.word), {wide, high}, r.used);
-    if (r.held && ImGui::IsItemActive()) pressed.held.push_back(r.command);
-    if (clicked && !r.held) pressed.press(r.command, r.value.value_or(0));
-    if (off) ImGui::EndDisabled();
-    const Colour ink = off ? palette::kFaint : palette::kText;
-    const std::string key = key_name(r.command, r.value);
-    const float inner = wide - em() * 0.5F;
-    if (high >= em() * 1.9F) {
-      fitted_text(draw, {at.x + em() * 0.25F, at.y, inner, high * 0.56F}, em(), ink, r.word, true);
-      fitted_text(draw, {at.x + em() * 0.25F, at.y + high * 0.52F, inner, high * 0.46F}, em() * 0.8F, palette::kFaint,
-                  key, true);
+  if (!reported.empty()) {
+    const ChipLook chip{warns ? (f.alarm ? palette::kVermillion : palette::kYellow) : palette::kSkyBlue,
+                        warns ? (f.alarm ? 8 : 3) : 0, warns && f.alarm};
+    const float wide = chip_width(reported);
+    const float room = time_x - 16 * u - near.right() - 24 * u;
+    if (inside && wide <= room) {
+      draw_chip(draw, {near.right() + 24 * u, box.y + 16 * u, wide, 32 * u}, reported, chip);
     } else {
-      fitted_text(draw, {at.x + em() * 0.25F, at.y, inner, high}, em() * 0.85F, ink, std::string(r.word) + " " + key,
-                  true);
+      const ScreenBox at{view.x + 16 * u, view.bottom() - 48 * u, std::min(wide, view.width - 32 * u), 32 * u};
+      if (at.width > 64 * u) draw_chip(ImGui::GetBackgroundDrawList(), at, reported, chip);
     }
   }
   ImGui::End();
 }
 
-void draw_burr(const HandFacts& hand, Pressed& pressed) {
-  const Burr& burr = burr_library()[static_cast<std::size_t>(hand.burr)];
-  const auto choice = [&](const char* word, Command command, bool used, float wide, std::optional<int> value = {}) {
-    if (tool_button(with_key(word, command, value), {wide, 0}, used)) pressed.press(command, value.value_or(0));
+void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& latched, Pressed& pressed) {
+  const float u = unit();
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {0, 0});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
+  begin_fixed("tray", box, ImGuiWindowFlags_NoScrollbar);
+  ImGui::PopStyleVar(2);
+  struct Row {
+    const char *icon, *name;
+    Command command;
+    bool selected = false, on = false, enabled = true, group = false;  ///< group: a line above
+    bool* latch = nullptr;
+    const char* why = "";
   };
-  for (std::size_t n = 0; n < kBurrKinds.size(); ++n) {
-    if (n % 2 == 1) ImGui::SameLine();
-    choice(kBurrKinds[n].name.data(), Command::burr_kind, static_cast<std::size_t>(burr.kind) == n, share_of_row(2),
-           static_cast<int>(n));
+  const bool drill = hand.tool == 0 && !hand.saw;
+  const char* const no_second = "no second hand: start with --dust";
+  const Row rows[] = {
+      {"menu-2", "Menu and settings", Command::panel_keys, false, menu},
+      {"drill", "Drill", Command::put_away, drill, hand.latched, true, true},
+      {"saw", "Saw", Command::saw, hand.tool == 1 || hand.saw},
+      {"plate", "Plate", Command::plates, hand.tool == 3},
+      {"fragments", "Fragments", Command::pieces, hand.tool == 2},
+      {"suction", "Suction", Command::suck, false, hand.sucking, hand.second_hand, true, &latched.suction, no_second},
+      {"droplet", "Irrigation", Command::wash, false, hand.washing, hand.second_hand, false, &latched.irrigation,
+       no_second},
+      {"arrow-bar-to-down", "Approach", Command::bring, false, false, true, true},
+      {"arrow-bar-up", "Retract", Command::lift},
+      {"arrow-back-up", "Undo", Command::undo, false, false, hand.undo_steps > 0, false, nullptr,
+       "nothing to take back"},
+      {"versions", "Compare", Command::before, false, hand.before, true, true},
+      {"ruler-measure", "Ruler", Command::ruler, false, hand.ruler},
+      {"note", "Note", Command::mark},
+      {"camera", "Picture", Command::screenshot},
+      {"layout-grid", "Operate or plan", Command::layout, false, false, true, true},
+      {"help", "Keys", Command::help}};
+  // As far apart as there is room; smaller only where a screen is very low.
+  const auto count = static_cast<float>(std::size(rows));
+  const float inset = 8 * u, most = box.height - 2 * inset, line = 9 * u;
+  float lines = 0;
+  for (const Row& r : rows) lines += r.group ? 1 : 0;
+  const float pitch = std::min(44 * u, (most - lines * line) / count);
+  // Below a tile's height they go in two columns, so that none is smaller than what a finger hits.
+  const bool two = pitch < 30 * u;
+  float y = box.y + inset;
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  int number = 0;
+  for (const Row& r : rows) {
+    if (r.group && !two) {
+      draw->AddLine({box.x + 12 * u, y + line / 2 - 2 * u}, {box.right() - 12 * u, y + line / 2 - 2 * u},
+                    im_colour32(theme().line, 0.6F), std::max(1.0F, u));
+      y += line;
+    }
+    TileLook look{r.selected, r.on || (r.latch != nullptr && *r.latch), r.enabled, {}};
+    look.words = r.enabled ? words_of(r.name, r.command) : std::string(r.name) + ": " + r.why;
+    const float side = two ? std::min(28 * u, box.width / 2) : std::min(40 * u, pitch);
+    const float x = two ? box.x + (number % 2 == 0 ? 0 : box.width / 2) : box.x + (box.width - side) / 2;
+    ImGui::SetCursorScreenPos({x, y});
+    if (tile(r.name, r.icon, look, side)) {
+      if (r.latch != nullptr) {
+        *r.latch = !*r.latch;
+      } else if (r.command != Command::put_away || !drill) {
+        pressed.press(r.command);
+      }
+    }
+    ++number;
+    if (!two || number % 2 == 0) y += two ? std::min(32 * u, 2 * most / (count + 1)) : pitch;
   }
-  const float third = share_of_row(3);
-  choice("ball", Command::ball, burr.shape == BurrShape::ball, third);
-  ImGui::SameLine();
-  choice("cyl.", Command::cylinder, burr.shape == BurrShape::cylinder, third);
-  ImGui::SameLine();
-  choice("taper", Command::taper, burr.shape == BurrShape::taper, third);
-  int diameter = static_cast<int>(burr.diameter_mm);
-  ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
-  if (ImGui::SliderInt("##diameter", &diameter, 1, 7, "%d mm (1 to 7)")) pressed.press(Command::diameter, diameter);
-  bool on = hand.latched;
-  if (ImGui::Checkbox("Drill on (left button, Space)", &on)) pressed.press(Command::drill);
+  ImGui::End();
 }
 
-void draw_deeds(const HandFacts& hand, Pressed& pressed) {
-  const float half = share_of_row(2);
-  const auto deed = [&](const char* word, Command command, bool possible = true, bool used = false) {
-    ImGui::BeginDisabled(!possible);
-    if (tool_button(with_key(word, command), {half, 0}, used)) pressed.press(command);
-    ImGui::EndDisabled();
+namespace {
+
+// A burr as it is: its diameter in the pixels of a screen of 96 dots an inch, with flutes or grit.
+void draw_burr(ImDrawList* draw, ImVec2 centre, float radius, const BurrKindRow& kind, float u) {
+  const auto ink = [](const std::array<double, 3>& c) {
+    return im_colour32({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])});
   };
-  deed("Approach", Command::bring);
-  ImGui::SameLine();
-  deed("Retract", Command::lift);
-  deed("Undo", Command::undo, hand.undo_steps > 0);
-  ImGui::SameLine();
-  deed("Compare", Command::before, true, hand.before);
-  deed("Ruler", Command::ruler, true, hand.ruler);
-  ImGui::SameLine();
-  deed("Note", Command::mark);
-  deed("Picture", Command::screenshot);
-  ImGui::SameLine();
-  deed("Tool wheel", Command::wheel);
-  deed("Layout", Command::layout);
-  ImGui::SameLine();
-  deed("Help", Command::help);
+  draw->AddLine({centre.x, centre.y - radius - 8 * u}, {centre.x, centre.y}, ink(kind.raised),
+                std::max(1.5F, radius / 3));
+  draw->AddCircleFilled(centre, radius, ink(kind.colour), 24);
+  if (radius < 3) return;
+  const int flutes = kind.flutes[radius < 6 * u ? 0 : radius < 10 * u ? 1 : 2];
+  if (flutes > 0) {
+    for (int n = 1; n < flutes / 2 + 1; ++n) {
+      const float at = radius * (2 * static_cast<float>(n) / static_cast<float>(flutes / 2 + 1) - 1);
+      const float high = std::sqrt(std::max(0.0F, radius * radius - at * at)) * 0.9F;
+      draw->AddBezierQuadratic({centre.x + at, centre.y - high}, {centre.x + at * 1.25F + radius * 0.2F, centre.y},
+                               {centre.x + at, centre.y + high}, ink(kind.sunk), std::max(1.0F, radius / 9));
+    }
+  } else {
+    for (int n = 0; n < 14; ++n) {
+      const float angle = 2.39996F * static_cast<float>(n), r = radius * 0.85F * std::sqrt(static_cast<float>(n) / 14);
+      draw->AddCircleFilled({centre.x + r * std::cos(angle), centre.y + r * std::sin(angle)},
+                            std::max(0.7F, radius / 9), ink(n % 2 == 0 ? kind.raised : kind.sunk), 6);
+    }
+  }
+  draw->AddCircleFilled({centre.x - radius * 0.35F, centre.y - radius * 0.35F}, radius * 0.22F,
+                        IM_COL32(255, 255, 255, 120), 12);
+}
+
+}  // namespace
+
+ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFacts& hand, bool& unfolded,
+                         Pressed& pressed) {
+  const float u = unit(), pad = 12 * u, size = 40 * u, line = 48 * u;
+  const Burr& burr = burr_library()[static_cast<std::size_t>(hand.burr)];
+  const bool held = hand.tool == 0 && !hand.saw;
+  std::vector<std::string> kinds;
+  for (const BurrKindRow& k : kBurrKinds) {
+    kinds.emplace_back(k.name.data());
+    kinds.back()[0] = static_cast<char>(std::toupper(kinds.back()[0]));
+  }
+  float kinds_wide = 0;
+  for (const std::string& k : kinds) kinds_wide += ImGui::CalcTextSize(k.c_str()).x + 24 * u;
+  const float sizes = 7 * size, chevron = 32 * u;
+  const float one_row = 2 * pad + kinds_wide + 12 * u + sizes + chevron;
+  const bool rows = one_row > std::min(free_width, view.width) - 32 * u;
+  const float wide = rows ? 2 * pad + std::max(sizes, kinds_wide + chevron) : one_row;
+  const ScreenBox box{view.x + 16 * u, view.y + 16 * u, wide,
+                      (rows ? 2 : 1) * line + 16 * u + (unfolded ? 2 * line : 0)};
+  if (box.width > view.width - 16 * u || box.height > view.height) return {};
+  begin_card("burr", box, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  ImGui::SetCursorScreenPos({box.x + pad, box.y + 12 * u});
+  if (const int kind = choice("kind", kinds, held ? static_cast<int>(burr.kind) : -1); kind >= 0)
+    pressed.press(Command::burr_kind, kind);
+  float x = rows ? box.x + pad : box.x + pad + kinds_wide + 12 * u;
+  const float y = rows ? box.y + 8 * u + line : box.y + 8 * u;
+  constexpr float kPixelsPerMm = 96 / 25.4F;
+  for (int d = 1; d <= 7; ++d, x += size) {
+    ImGui::SetCursorScreenPos({x, y});
+    const std::string name = std::to_string(d);
+    const bool clicked = ImGui::InvisibleButton(name.c_str(), {size, line});
+    const bool hovered = ImGui::IsItemHovered();
+    const ImVec2 lo{x, y}, hi{x + size, y + line};
+    const bool is = held && std::lround(burr.diameter_mm) == d;
+    if (is || hovered) draw->AddRectFilled(lo, hi, im_colour32(theme().raised), kRound * u);
+    if (is) draw->AddRect(lo, hi, im_colour32(theme().accent), kRound * u, 0, 2 * u);
+    const float radius = static_cast<float>(d) * kPixelsPerMm * u / 2;
+    draw_burr(draw, {x + size / 2, y + 18 * u}, radius, kBurrKinds[static_cast<std::size_t>(burr.kind)], u);
+    fitted_text(draw, {lo.x, y + line - 17 * u, size, 16 * u}, 0.875F * em(), is ? theme().text : theme().quiet, name,
+                true);
+    if (clicked) pressed.press(Command::diameter, d);
+    if (hovered) ImGui::SetTooltip("%d mm   %d", d, d);
+  }
+  ImGui::SetCursorScreenPos({box.right() - pad - chevron + 4 * u, rows ? box.y + 16 * u : box.y + 16 * u});
+  if (ImGui::InvisibleButton("more", {chevron, chevron})) unfolded = !unfolded;
+  draw_icon(draw, {box.right() - pad - 24 * u, box.y + 20 * u}, 24 * u, "chevron-down", im_colour32(theme().quiet));
+  if (unfolded) {
+    ImGui::SetCursorScreenPos({box.x + pad, y + line + 4 * u});
+    static const std::string kShapes[] = {"Ball", "Cylinder", "Taper"};
+    static constexpr Command kCommands[] = {Command::ball, Command::cylinder, Command::taper};
+    if (const int shape = choice("shape", kShapes, static_cast<int>(burr.shape)); shape >= 0)
+      pressed.press(kCommands[shape]);
+    ImGui::SetCursorScreenPos({box.x + pad, y + 2 * line});
+    bool on = hand.latched;
+    ImGui::PushClipRect({box.x, box.y}, {box.right(), box.bottom()}, true);
+    if (kit_switch("Drill on", on, box.width - 2 * pad)) pressed.press(Command::drill);
+    ImGui::PopClipRect();
+  }
+  ImGui::End();
+  return box;
+}
+
+void draw_tool_card(const ScreenBox& view, const std::string& title, const std::function<void()>& content) {
+  const float u = unit(), wide = std::min(312 * u, view.width - 32 * u);
+  if (wide < 160 * u) return;
+  ImGui::SetNextWindowPos({view.x + 16 * u, view.y + 16 * u});
+  ImGui::SetNextWindowSizeConstraints({wide, 0}, {wide, std::max(96 * u, view.height - 96 * u)});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, kCardRound * u);
+  ImVec4 ground = im_colour(theme().surface, 0.94F);
+  ImGui::PushStyleColor(ImGuiCol_WindowBg, ground);
+  ImGui::Begin("instrument", nullptr,
+               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
+                   ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoBringToFrontOnFocus);
+  ImGui::PopStyleColor();
+  ImGui::PopStyleVar();
+  ImGui::PushFont(bold_font());
+  ImGui::SetWindowFontScale(1 / kBoldEm);
+  ImGui::TextUnformatted(title.c_str());
+  ImGui::SetWindowFontScale(1);
+  ImGui::PopFont();
+  ImGui::PushItemWidth(ImGui::GetContentRegionAvail().x * 0.6F);
+  content();
+  ImGui::PopItemWidth();
+  ImGui::End();
 }
 
 void draw_apart(Pressed& pressed) {
   ImGui::Separator();
   if (ImGui::Button(with_key("Save and continue", Command::save).c_str(), {-1, 0})) pressed.press(Command::save);
-  ImGui::PushStyleColor(ImGuiCol_Border, im_colour(palette::kVermillion));
-  ImGui::PushStyleVar(ImGuiStyleVar_FrameBorderSize, std::max(1.0F, std::round(em() / 10)));
   if (ImGui::Button(with_key("Reset bone ...", Command::reset).c_str(), {-1, 0})) pressed.press(Command::reset);
-  if (ImGui::Button(with_key("End session", Command::quit).c_str(), {-1, 0})) pressed.press(Command::quit);
-  ImGui::PopStyleVar();
-  ImGui::PopStyleColor();
 }
 
-void draw_first_steps(const FirstSteps& steps, bool all_in_full) {
-  ImGui::TextDisabled("the first five minutes");
+bool draw_next_step(const ScreenBox& view, const FirstSteps& steps) {
+  const int next = steps.next();
+  const float u = unit(), wide = std::min(344 * u, view.width - 32 * u);
+  if (next < 0 || wide < 200 * u || view.height < 320 * u) return true;
+  const Step& step = steps.steps()[static_cast<std::size_t>(next)];
+  int possible = 0, number = 0;
+  for (int n = 0; n < static_cast<int>(steps.steps().size()); ++n) {
+    possible += steps.steps()[static_cast<std::size_t>(n)].possible ? 1 : 0;
+    if (n == next) number = possible;
+  }
+  const std::string name = step.name(), how = step.words.substr(std::min(step.words.size(), name.size() + 2));
+  const float high = 52 * u + ImGui::CalcTextSize(how.c_str(), nullptr, false, wide - 32 * u).y;
+  const ScreenBox box{view.x + 16 * u, view.bottom() - 64 * u - high, wide, high};
+  begin_card("first steps", box, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoFocusOnAppearing);
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  draw->AddText(bold_font(), em(), {box.x + 16 * u, box.y + 12 * u}, im_colour32(theme().text), name.c_str());
+  const std::string count = std::to_string(number) + " of " + std::to_string(possible);
+  const float count_wide = ImGui::CalcTextSize(count.c_str()).x;
+  draw->AddText({box.right() - 48 * u - count_wide, box.y + 12 * u}, im_colour32(theme().quiet), count.c_str());
+  ImGui::SetCursorScreenPos({box.right() - 40 * u, box.y + 6 * u});
+  const bool closed = ImGui::InvisibleButton("close", {32 * u, 32 * u});
+  draw_icon(draw, {box.right() - 34 * u, box.y + 12 * u}, 20 * u, "x", im_colour32(theme().quiet));
+  draw->AddText(ImGui::GetFont(), em(), {box.x + 16 * u, box.y + 38 * u}, im_colour32(theme().text), how.c_str(),
+                nullptr, wide - 32 * u);
+  ImGui::End();
+  return !closed;
+}
+
+void draw_first_steps(const FirstSteps& steps) {
+  ImGui::TextDisabled("the first minutes");
   const int next = steps.next();
   const bool beside = ImGui::GetContentRegionAvail().x > 70 * em();
   if (beside && !ImGui::BeginTable("steps", 2)) return;
@@ -238,18 +358,14 @@ void draw_first_steps(const FirstSteps& steps, bool all_in_full) {
     if (!step.possible) continue;  // is not asked for
     if (beside) ImGui::TableNextColumn();
     const ImVec2 at = ImGui::GetCursorScreenPos();
-    // A ticked box, or an empty one.
-    draw->AddRect({at.x + e * 0.1F, at.y + e * 0.15F}, {at.x + e * 0.8F, at.y + e * 0.85F},
-                  im_colour32(palette::kFaint), 0, 0, e / 12);
-    if (step.done) {
-      draw->AddLine({at.x + e * 0.2F, at.y + e * 0.5F}, {at.x + e * 0.4F, at.y + e * 0.75F},
-                    im_colour32(palette::kYellow), e / 6);
-      draw->AddLine({at.x + e * 0.4F, at.y + e * 0.75F}, {at.x + e * 0.85F, at.y + e * 0.1F},
-                    im_colour32(palette::kYellow), e / 6);
-    }
+    if (step.done)
+      draw_icon(draw, {at.x, at.y}, e, "check", im_colour32(theme().text));
+    else
+      draw->AddRect({at.x + e * 0.1F, at.y + e * 0.15F}, {at.x + e * 0.8F, at.y + e * 0.85F}, im_colour32(theme().line),
+                    0, 0, e / 12);
     ImGui::SetCursorPosX(ImGui::GetCursorPosX() + e * 1.2F);
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(n == next ? palette::kText : palette::kFaint));
-    ImGui::TextWrapped("%s", (n == next || all_in_full ? step.words : step.name()).c_str());
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(n == next ? theme().text : theme().quiet));
+    ImGui::TextWrapped("%s", step.words.c_str());
     ImGui::PopStyleColor();
   }
   if (beside) ImGui::EndTable();
@@ -262,27 +378,27 @@ void draw_wheel(const ToolWheel& wheel) {
   const ImVec2 middle{wheel.x(), wheel.y()};
   const auto items = wheel_items();
   const float step = 2 * std::numbers::pi_v<float> / static_cast<float>(items.size());
-  draw->AddCircleFilled(middle, outer, im_colour32(palette::kGround, 0.92F), 64);
+  draw->AddCircleFilled(middle, outer, im_colour32(theme().ground, 0.92F), 64);
   for (std::size_t n = 0; n < items.size(); ++n) {
     const float angle = step * static_cast<float>(n) - std::numbers::pi_v<float> / 2;
     const bool chosen = static_cast<int>(n) == wheel.chosen();
     if (chosen) {
       draw->PathArcTo(middle, (inner + outer) / 2, angle - step / 2, angle + step / 2, 24);
-      draw->PathStroke(im_colour32(palette::kBlue), ImDrawFlags_None, outer - inner);
+      draw->PathStroke(im_colour32(theme().accent, 0.5F), ImDrawFlags_None, outer - inner);
     }
     const float edge = angle + step / 2;
     draw->AddLine({middle.x + inner * std::cos(edge), middle.y + inner * std::sin(edge)},
-                  {middle.x + outer * std::cos(edge), middle.y + outer * std::sin(edge)}, im_colour32(palette::kFaint),
+                  {middle.x + outer * std::cos(edge), middle.y + outer * std::sin(edge)}, im_colour32(theme().quiet),
                   1);
     const float r = outer * 0.68F, wide = 4.4F * e;
     const ScreenBox box{middle.x + r * std::cos(angle) - wide / 2, middle.y + r * std::sin(angle) - e * 1.1F, wide,
                         e * 1.2F};
-    fitted_text(draw, box, e * (chosen ? 1.15F : 1), palette::kText, items[n].word, true);
-    fitted_text(draw, {box.x, box.bottom(), wide, e * 0.9F}, e * 0.8F, palette::kFaint,
+    fitted_text(draw, box, e * (chosen ? 1.15F : 1), theme().text, items[n].word, true);
+    fitted_text(draw, {box.x, box.bottom(), wide, e * 0.9F}, e * 0.8F, theme().quiet,
                 key_name(items[n].command, items[n].value), true);
   }
-  draw->AddCircle(middle, outer, im_colour32(palette::kFaint), 64, 1.5F);
-  draw->AddCircleFilled(middle, inner, im_colour32(palette::kRaised), 32);
+  draw->AddCircle(middle, outer, im_colour32(theme().quiet), 64, 1.5F);
+  draw->AddCircleFilled(middle, inner, im_colour32(theme().raised), 32);
 }
 
 int draw_question(int width, int height, const std::string& title, const std::string& text, const std::string& yes) {

@@ -1,6 +1,7 @@
 // What the window shows beside its pictures, drawn from plain values. Private to libs/app/window; ImGui, no GL. What a
 // button does is what its key does: it gives the same command.
 #pragma once
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -29,20 +30,28 @@ struct Pressed {
   void press(Command command, int value = 0) { presses.push_back({command, value}); }
 };
 
-/// Two rows whose fields never change places: tool and speed, force, bone under the burr, the nearest structure; below,
-/// what was removed, the time and a line of words. `message`: the last thing said, empty after a while; see
-/// warning_is_reported().
-void draw_state(const ScreenBox& box, const StateFacts& facts, const std::string& message);
-/// Buttons of instruments one below the other.
-void draw_tray(const ScreenBox& box, const HandFacts& hand, Pressed& pressed);
-/// Into the current window: the burr and the hand.
-void draw_burr(const HandFacts& hand, Pressed& pressed);
-/// Into the current window: what one does, and, apart from it, what cannot be taken back.
-void draw_deeds(const HandFacts& hand, Pressed& pressed);
+/// Fields that never change places: force, burr speed, bone below, the nearest structure with a bar that fills as it
+/// comes nearer; time, volume and the button that ends. `message`: the last thing said, empty after a while; see
+/// warning_is_reported(). It stands in the strip where that is wide enough, else at the foot of `view`.
+void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& facts, const std::string& message,
+                Pressed& pressed);
+/// The strip of tools: icons, each with its name and key on hovering. `menu`: the panel is open. `latched`: suction and
+/// irrigation, which a click leaves on.
+struct Latched {
+  bool suction = false, irrigation = false;
+};
+void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& latched, Pressed& pressed);
+/// What belongs to the burr, at the upper left of the view: kind, diameter; unfolded its shape and a switch. Its box.
+ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFacts& hand, bool& unfolded,
+                         Pressed& pressed);
+/// The same place for what belongs to another instrument, as high as it needs.
+void draw_tool_card(const ScreenBox& view, const std::string& title, const std::function<void()>& content);
+/// Into the current window: what ends or begins a session.
 void draw_apart(Pressed& pressed);
-/// Into the current window: the list of the first five minutes; the next of them in full, or all. Two beside each other
-/// where there is room.
-void draw_first_steps(const FirstSteps& steps, bool all_in_full);
+/// One step at a time at the foot of the view. False: the person has closed it.
+[[nodiscard]] bool draw_next_step(const ScreenBox& view, const FirstSteps& steps);
+/// Into the current window: the list of the first minutes, in full. Two beside each other where there is room.
+void draw_first_steps(const FirstSteps& steps);
 void draw_wheel(const ToolWheel& wheel);
 /// A question in the middle of the window. 1: yes, -1: no, 0: not yet.
 [[nodiscard]] int draw_question(int width, int height, const std::string& title, const std::string& text,

@@ -45,7 +45,7 @@ void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, con
   ImGui::SameLine();
   if (ImGui::Button("flat")) tools.aim_saw(view, true);
   if (!preview.text().empty()) {
-    ImGui::PushStyleColor(ImGuiCol_Text, preview.cuts() ? im_colour(palette::kVermillion) : im_colour(palette::kText));
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(preview.cuts() ? ink_of(palette::kVermillion) : theme().text));
     ImGui::TextWrapped("%s%s", preview.cuts() ? "! " : "", preview.text().c_str());
     ImGui::PopStyleColor();
   }
@@ -150,13 +150,6 @@ SceneTools::~SceneTools() {
 }
 
 void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view) {
-  static constexpr std::pair<const char*, Tool> kTools[] = {
-      {"Drill", Tool::drill}, {"Saw (X)", Tool::saw}, {"Fragments (P)", Tool::piece}, {"Plates (L)", Tool::plate}};
-  for (const auto& [name, tool] : kTools) {
-    if (tool != Tool::drill && tool != Tool::piece) ImGui::SameLine();
-    const bool held = tools.tool() == tool && !tools.saw_in_hand();
-    if (ImGui::RadioButton(name, held) && !held) tools.choose(tool, rehearsal, view);
-  }
   if (tools.tool() == Tool::saw) saw_panel(tools, rehearsal, view, preview_, plan_name_);
   if (tools.tool() == Tool::piece) piece_panel(tools, rehearsal);
   if (tools.tool() == Tool::plate) {

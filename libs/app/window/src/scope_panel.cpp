@@ -10,25 +10,31 @@
 namespace osteo::inline app {
 
 void draw_scope(const ScopeView& view, const PictureArea& area, StereoMode stereo) {
-  const ScaleBar bar = scale_bar(view.pixels_per_mm(area), 0.22 * area.width);
-  const std::string length = format_number(bar.length_mm) + " mm", words = scope_text(view);
+  const auto line = static_cast<double>(ImGui::GetTextLineHeight());
+  const ScaleBar bar = scale_bar(view.pixels_per_mm(area), std::min(0.12 * area.width, 12.0 * line));
+  constexpr double kMicroscope = 2;  // below, the bar says enough
+  const std::string length = format_number(bar.length_mm) + " mm",
+                    words = view.magnification < kMicroscope ? std::string() : scope_text(view);
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
-  const float line = ImGui::GetTextLineHeight();
+  // At the lower right, of each eye's picture.
   const auto draw = [&](double right, double up, double squeezed) {
-    const float x = static_cast<float>(area.x + right * area.width) + line,
-                y = static_cast<float>(area.y + area.height * (1 - up)) - line;
+    const auto e = static_cast<float>(line);
     const float wide = static_cast<float>(bar.length_px * squeezed);
+    const float most = std::max(wide, ImGui::CalcTextSize(words.empty() ? length.c_str() : words.c_str()).x);
+    const float x = static_cast<float>(area.x + right * area.width) - 1.75F * e - most,
+                y = static_cast<float>(area.y + area.height * (1 - up)) - 1.75F * e, high = words.empty() ? 1.6F : 2.6F;
     constexpr ImU32 kInk = IM_COL32(235, 235, 235, 255);
-    const float most = std::max(wide, ImGui::CalcTextSize(words.c_str()).x);
-    list->AddRectFilled({x - 8, y - 14 - 2 * line}, {x + most + 8, y + 8}, IM_COL32(10, 14, 20, 150),
-                        4);  // legible on white bone too
-    list->AddRectFilled({x, y - 3}, {x + wide, y}, kInk);
-    list->AddText({x, y - 5 - line}, kInk, length.c_str());
-    list->AddText({x, y - 7 - 2 * line}, kInk, words.c_str());
+    // Legible on white bone too.
+    list->AddRectFilled({x - 0.75F * e, y - high * e}, {x + most + 0.75F * e, y + 0.75F * e}, IM_COL32(10, 14, 20, 190),
+                        0.5F * e);
+    list->AddRectFilled({x + most - wide, y - 3}, {x + most, y}, kInk);
+    const float length_wide = ImGui::CalcTextSize(length.c_str()).x;
+    list->AddText({x + most - length_wide, y - 5 - e}, kInk, length.c_str());
+    if (!words.empty()) list->AddText({x, y - 7 - 2 * e}, kInk, words.c_str());
   };
-  draw(0, 0, stereo == StereoMode::side_by_side ? 0.5 : 1);
-  if (stereo == StereoMode::side_by_side) draw(0.5, 0, 0.5);
-  if (stereo == StereoMode::top_bottom) draw(0, 0.5, 1);
+  draw(stereo == StereoMode::side_by_side ? 0.5 : 1, 0, stereo == StereoMode::side_by_side ? 0.5 : 1);
+  if (stereo == StereoMode::side_by_side) draw(1, 0, 0.5);
+  if (stereo == StereoMode::top_bottom) draw(1, 0.5, 1);
 }
 
 namespace {

@@ -60,7 +60,7 @@ bool draw_entries(StartList& list, bool follow) {
     ImGui::PushID(n);
     const bool dull = e.kind == FolderKind::nothing || e.kind == FolderKind::folder;
     const bool selected = n == list.selected();
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(dull ? palette::kFaint : palette::kText));
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(dull ? theme().quiet : theme().text));
     if (ImGui::Selectable(((selected ? "> " : "   ") + e.words).c_str(), selected,
                           ImGuiSelectableFlags_AllowDoubleClick)) {
       list.select(n);
@@ -77,6 +77,7 @@ bool draw_entries(StartList& list, bool follow) {
 }  // namespace
 
 std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& person, const StartOptions& options) {
+  take_theme(person.values.theme);
   shell.set_title("Osteotome");
   StartList list(person.cases(), options.folder.empty() ? std::filesystem::current_path() : options.folder);
   list.say(options.message);
@@ -114,14 +115,13 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
     const float e = em(), wide = std::min(w, 60 * e);
     begin_fixed("start", {std::floor((w - wide) / 2), 0, wide, h}, ImGuiWindowFlags_NoScrollbar);
     const ImVec2 at = ImGui::GetCursorScreenPos();
-    fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, wide - 2 * e, 2.2F * e}, 2.2F * e, palette::kText,
-                "Osteotome");
+    fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, wide - 2 * e, 2.2F * e}, 2.2F * e, theme().text, "Osteotome");
     ImGui::Dummy({0, 2.4F * e});
     ImGui::TextWrapped(
         "Choose a case: a folder made by 'osteo prepare', or drop one here. Up, Down and Enter; Backspace: the folder "
         "above; Q: close.");
     if (!list.message().empty()) {
-      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
+      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
       ImGui::TextWrapped("! %s", list.message().c_str());
       ImGui::PopStyleColor();
     }

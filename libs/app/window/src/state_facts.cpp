@@ -51,6 +51,7 @@ StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures,
                  : mm < StateFacts::kNearMm  ? Nearness::near
                                              : Nearness::far;
     f.distance = text_of("%.1f mm", std::max(0.0, mm));
+    f.near_share = std::clamp(1 - mm / StateFacts::kClearMm, 0.0, 1.0);
   }
   f.time = clock_text(static_cast<double>(tick.tick) / rate_hz);
   if ((tick.flags & kStructureInjured) != 0) {
@@ -101,8 +102,6 @@ StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const
   const Burr* const edge = instrument_of(tick.device.tool).cutter();
   f.lasts = true;
   if (edge != nullptr) f.warning = too_small_for_voxels(*edge, rehearsal.finest_voxel_mm());
-  if (f.warning.empty() && rehearsal.pieces() > 1)
-    f.warning = text_of("the bone is in %d fragments", rehearsal.pieces());
   return f;
 }
 

@@ -21,13 +21,14 @@ struct StateFacts {
   Nearness nearness = Nearness::unknown;
   std::string structure;  ///< the nearest; "none within 10 mm"; "none in this case"
   std::string distance;   ///< "1.2 mm"; empty where none is near
+  double near_share = 0;  ///< how far the bar of nearness is full: 0 from kClearMm on, 1 on contact
   std::string warmth;     ///< of that structure, or of the warmest bone: "38.2 C"; empty where the scene has no heat
   std::string removed;    ///< "12.3 mm3"
   std::string time;       ///< "3:07"
   std::string warning;    ///< the most important that there is to say; empty: nothing
   bool alarm = false;     ///< and it is one to stop for
   bool lasts = false;     ///< and it stays so for long, as of a bone in pieces
-  static constexpr double kFullForceN = 4, kNearMm = 2, kCloseMm = 0.5;
+  static constexpr double kFullForceN = 4, kClearMm = 8, kNearMm = 2, kCloseMm = 0.5;
 };
 /// How warm drilling has made things, Celsius, now.
 struct WarmthNow {

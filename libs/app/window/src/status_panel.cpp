@@ -12,7 +12,7 @@ void draw_scan(const VerdictSummary& scan) {
       ImGui::TreeNode("scan", "Scan: %s (%d notes)", scan.status.c_str(), static_cast<int>(scan.findings.size()));
   if (!open) return;
   for (const Finding& f : scan.findings) {
-    const ImVec4 colour = f.severity == Severity::info ? im_colour(palette::kFaint) : im_colour(palette::kYellow);
+    const ImVec4 colour = f.severity == Severity::info ? im_colour(theme().quiet) : im_colour(ink_of(palette::kYellow));
     ImGui::PushStyleColor(ImGuiCol_Text, colour);
     ImGui::TextWrapped("%s [%s]", f.message.c_str(), f.code.c_str());
     ImGui::PopStyleColor();
@@ -24,7 +24,7 @@ void draw_scan(const VerdictSummary& scan) {
 
 void draw_approval(const std::string& words, bool ended) {
   if (words.empty()) return;
-  ImGui::PushStyleColor(ImGuiCol_Text, ended ? im_colour(palette::kYellow) : im_colour(palette::kFaint));
+  ImGui::PushStyleColor(ImGuiCol_Text, ended ? im_colour(ink_of(palette::kYellow)) : im_colour(theme().quiet));
   ImGui::TextWrapped("Case: %s", words.c_str());
   ImGui::PopStyleColor();
 }

@@ -65,7 +65,7 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
     const ImVec2 size = ImGui::CalcTextSize(now.hands[h].c_str());
     const ImVec2 from{(*p)[0] + 0.8F * em(), (*p)[1] - size.y / 2};
     list->AddRectFilled({from.x - 0.3F * em(), from.y - 1}, {from.x + size.x + 0.3F * em(), from.y + size.y + 1},
-                        im_colour32(palette::kGround, 0.75F), 0.2F * em());
+                        im_colour32(theme().ground, 0.75F), 0.2F * em());
     list->AddText(from, im_colour32(kPartnerColour), now.hands[h].c_str());
   }
   const float e = em(), wide = std::min(24 * e, area.width - e);
@@ -78,12 +78,12 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
   ImGui::TextWrapped("%s", now.title.c_str());
   if (!now.invitation.empty()) ImGui::TextWrapped("%s", now.invitation.c_str());
   if (!now.trouble.empty()) {
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
     ImGui::TextWrapped("! %s", now.trouble.c_str());
     ImGui::PopStyleColor();
   }
   for (const TutorNow::Link& l : now.links) {
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(l.heard && !l.differs ? palette::kText : palette::kYellow));
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(l.heard && !l.differs ? theme().text : ink_of(palette::kYellow)));
     ImGui::TextWrapped("%s%s", l.heard ? "" : "! ", link_text(l).c_str());
     ImGui::PopStyleColor();
   }

@@ -1,78 +1,85 @@
 #include "ui_style.h"
 
-#include <fontconfig/fontconfig.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "window_fonts.h"
+
 namespace osteo::inline app {
-namespace {
-
-UiFont find_font() {
-  UiFont found;
-  FcPattern* const wanted = FcNameParse(reinterpret_cast<const FcChar8*>("DejaVu Sans:scalable=true"));
-  if (wanted != nullptr && FcConfigSubstitute(nullptr, wanted, FcMatchPattern) == FcTrue) {
-    FcDefaultSubstitute(wanted);
-    FcResult result = FcResultNoMatch;
-    if (FcPattern* const match = FcFontMatch(nullptr, wanted, &result)) {
-      FcChar8* file = nullptr;
-      if (FcPatternGetString(match, FC_FILE, 0, &file) == FcResultMatch) {
-        const std::string name = reinterpret_cast<const char*>(file);
-        // ImGui reads outlines of TrueType alone.
-        if (name.ends_with(".ttf") || name.ends_with(".ttc")) found.file = name;
-      }
-      FcPatternDestroy(match);
-    }
-  }
-  if (wanted != nullptr) FcPatternDestroy(wanted);
-  if (found.file.empty()) found.missing = "no TrueType font was found, so text is coarse; fonts-dejavu-core brings one";
-  return found;
-}
-
-}  // namespace
-
-const UiFont& ui_font() {
-  static const UiFont font = find_font();
-  return font;
-}
 
 void set_ui_style(int em_pixels) {
   ImGuiIO& io = ImGui::GetIO();
   io.Fonts->Clear();
   io.FontGlobalScale = 1;
   const auto size = static_cast<float>(em_pixels);
-  // Latin with its accents, for folders and names, and Greek.
-  static constexpr ImWchar kLetters[] = {0x20, 0x17F, 0x370, 0x3FF, 0x2013, 0x2026, 0};
-  if (ui_font().file.empty() ||
-      io.Fonts->AddFontFromFileTTF(ui_font().file.c_str(), size, nullptr, kLetters) == nullptr) {
-    ImFontConfig config;
-    config.SizePixels = size;
-    io.Fonts->AddFontDefault(&config);
-  }
+  // Latin with its accents, Greek, Cyrillic, signs.
+  static constexpr ImWchar kLetters[] = {0x20,   0x24F,  0x370,  0x3FF,  0x400,  0x52F,  0x1E00,
+                                         0x1EFF, 0x2010, 0x205E, 0x2070, 0x209F, 0x20A0, 0x20BF,
+                                         0x2212, 0x2212, 0x2248, 0x2248, 0x2264, 0x2265, 0};
+  static constexpr ImWchar kLatin[] = {0x20, 0x17F, 0x2010, 0x205E, 0x2212, 0x2212, 0};
+  ImFontConfig config;
+  config.FontDataOwnedByAtlas = false;
+  config.OversampleH = 2;
+  const auto add = [&](const unsigned char* font, std::size_t bytes, float high, const ImWchar* letters) {
+    // ImGui asks for a pointer to what it may own; this it does not, and does not write to.
+    io.Fonts->AddFontFromMemoryTTF(const_cast<unsigned char*>(font), static_cast<int>(bytes), high, &config, letters);
+  };
+  add(kNotoSans, sizeof kNotoSans, size, kLetters);
+  add(kNotoSansBold, sizeof kNotoSansBold, std::round(kBoldEm * size), kLatin);
   ImGuiStyle style;
-  ImGui::StyleColorsDark(&style);
   style.WindowRounding = 0;
-  style.FrameRounding = 3;
-  style.WindowBorderSize = 1;
+  style.ChildRounding = 0;
+  style.FrameRounding = style.PopupRounding = style.GrabRounding = 8;
+  style.ScrollbarRounding = 8;
+  style.FramePadding = {8, 5};
+  style.ItemSpacing = {8, 8};
+  style.WindowPadding = {12, 12};
   style.ScaleAllSizes(size / 16);
   style.WindowBorderSize = style.FrameBorderSize = std::max(1.0F, std::round(size / 16));
-  using namespace palette;
-  style.Colors[ImGuiCol_Text] = im_colour(kText);
-  style.Colors[ImGuiCol_TextDisabled] = im_colour(kFaint);
-  style.Colors[ImGuiCol_WindowBg] = style.Colors[ImGuiCol_ChildBg] = im_colour(kGround);
-  style.Colors[ImGuiCol_PopupBg] = im_colour(kRaised);
-  style.Colors[ImGuiCol_FrameBg] = style.Colors[ImGuiCol_Button] = im_colour(kRaised);
-  style.Colors[ImGuiCol_Border] = {0.25F, 0.29F, 0.34F, 1};
-  style.Colors[ImGuiCol_ButtonHovered] = style.Colors[ImGuiCol_FrameBgHovered] = {0.20F, 0.27F, 0.35F, 1};
-  style.Colors[ImGuiCol_ButtonActive] = style.Colors[ImGuiCol_FrameBgActive] = im_colour(kBlue);
-  style.Colors[ImGuiCol_Header] = style.Colors[ImGuiCol_HeaderActive] =
-      im_colour(kBlue);  // what is chosen stands out, not the mouse
-  style.Colors[ImGuiCol_HeaderHovered] = {0.20F, 0.27F, 0.35F, 1};
-  style.Colors[ImGuiCol_CheckMark] = style.Colors[ImGuiCol_SliderGrab] = im_colour(kSkyBlue);
-  style.Colors[ImGuiCol_NavHighlight] = im_colour(kYellow);
-  style.Colors[ImGuiCol_PlotHistogram] = im_colour(kSkyBlue);
   ImGui::GetStyle() = style;
+  set_ui_colours();
+}
+
+void set_ui_colours() {
+  ImGuiStyle& style = ImGui::GetStyle();
+  const Theme& t = theme();
+  if (theme_name() == ThemeName::light) {
+    ImGui::StyleColorsLight(&style);
+  } else {
+    ImGui::StyleColorsDark(&style);
+  }
+  const ImVec4 hovered = im_colour(t.line, 0.35F), chosen = im_colour(t.accent, 0.45F);
+  style.Colors[ImGuiCol_Text] = im_colour(t.text);
+  style.Colors[ImGuiCol_TextDisabled] = im_colour(t.quiet);
+  style.Colors[ImGuiCol_WindowBg] = style.Colors[ImGuiCol_ChildBg] = im_colour(t.surface);
+  style.Colors[ImGuiCol_TitleBg] = style.Colors[ImGuiCol_TitleBgActive] = im_colour(t.raised);
+  style.Colors[ImGuiCol_PopupBg] = style.Colors[ImGuiCol_FrameBg] = style.Colors[ImGuiCol_Button] = im_colour(t.raised);
+  style.Colors[ImGuiCol_Border] = style.Colors[ImGuiCol_Separator] =
+      im_colour(t.line, theme_name() == ThemeName::high_contrast ? 1.0F : 0.5F);
+  style.Colors[ImGuiCol_ButtonHovered] = style.Colors[ImGuiCol_FrameBgHovered] = style.Colors[ImGuiCol_HeaderHovered] =
+      hovered;
+  style.Colors[ImGuiCol_ButtonActive] = style.Colors[ImGuiCol_FrameBgActive] = chosen;
+  // What is chosen stands out, not the mouse.
+  style.Colors[ImGuiCol_Header] = style.Colors[ImGuiCol_HeaderActive] = chosen;
+  style.Colors[ImGuiCol_CheckMark] = style.Colors[ImGuiCol_SliderGrab] = style.Colors[ImGuiCol_SliderGrabActive] =
+      im_colour(t.text);
+  style.Colors[ImGuiCol_ScrollbarBg] = im_colour(t.surface);
+  style.Colors[ImGuiCol_ScrollbarGrab] = im_colour(t.line, 0.6F);
+  style.Colors[ImGuiCol_NavHighlight] = im_colour(t.accent);
+  style.Colors[ImGuiCol_PlotHistogram] = im_colour(t.accent);
+}
+
+void take_theme(const std::string& name) {
+  const auto& all = EnumNames<ThemeName>::values;
+  const auto* const at = std::find(all.begin(), all.end(), name);
+  use_theme(at == all.end() ? ThemeName::dark : static_cast<ThemeName>(at - all.begin()));
+  set_ui_colours();
+}
+
+ImFont* bold_font() {
+  const ImFontAtlas& atlas = *ImGui::GetIO().Fonts;
+  return atlas.Fonts.size() > 1 ? atlas.Fonts[1] : ImGui::GetFont();
 }
 
 void begin_fixed(const char* name, const ScreenBox& box, ImGuiWindowFlags more) {
@@ -83,17 +90,38 @@ void begin_fixed(const char* name, const ScreenBox& box, ImGuiWindowFlags more) 
                    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoBringToFrontOnFocus | more);
 }
 
+std::string shortened(const std::string& text, float width, float size, ImFont* font) {
+  if (font == nullptr) font = ImGui::GetFont();
+  const auto wide = [&](const std::string& s) { return font->CalcTextSizeA(size, FLT_MAX, 0, s.c_str()).x; };
+  if (wide(text) <= width) return text;
+  // Whole characters: bytes that go on with one are not where it is parted.
+  const auto whole = [&](std::size_t n) {
+    while (n > 0 && n < text.size() && (static_cast<unsigned char>(text[n]) & 0xC0) == 0x80) --n;
+    return n;
+  };
+  for (std::size_t kept = text.size(); kept > 1; --kept) {
+    const std::size_t head = whole((kept + 1) / 2), tail = whole(text.size() - kept / 2);
+    std::string out = text.substr(0, head) + "\u2026" + text.substr(std::max(head, tail));
+    if (wide(out) <= width) return out;
+  }
+  return wide("\u2026") <= width ? "\u2026" : "";
+}
+
 void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour colour, const std::string& text,
-                 bool middle) {
+                 bool middle, bool bold) {
   if (text.empty() || box.empty()) return;
-  ImFont* const font = ImGui::GetFont();
+  ImFont* const font = bold ? bold_font() : ImGui::GetFont();
   float size = std::min(em_pixels, box.height);
   const float width = font->CalcTextSizeA(size, FLT_MAX, 0, text.c_str()).x;
-  if (width > box.width) size *= box.width / width;
-  const ImVec2 taken = font->CalcTextSizeA(size, FLT_MAX, 0, text.c_str());
+  const float least = std::min(size, 0.875F * em());  // 14 pixels of 16
+  if (width > box.width) size = std::max(least, size * box.width / width);
+  const std::string shown = shortened(text, box.width, size, font);
+  if (shown != text && ImGui::IsMouseHoveringRect({box.x, box.y}, {box.right(), box.bottom()}, false))
+    ImGui::SetTooltip("%s", text.c_str());
+  const ImVec2 taken = font->CalcTextSizeA(size, FLT_MAX, 0, shown.c_str());
   const float x = middle ? box.x + (box.width - taken.x) / 2 : box.x;
   draw->AddText(font, size, {std::floor(x), std::floor(box.y + (box.height - taken.y) / 2)},
-                im_colour32(colour, ImGui::GetStyle().Alpha), text.c_str());
+                im_colour32(colour, ImGui::GetStyle().Alpha), shown.c_str());
 }
 
 void draw_sign(ImDrawList* draw, ImVec2 centre, float radius, int corners, Colour colour) {

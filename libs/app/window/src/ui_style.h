@@ -9,16 +9,16 @@
 
 namespace osteo::inline app {
 
-struct UiFont {
-  std::string file;     ///< empty: ImGui's own small one, made larger
-  std::string missing;  ///< what to do about it then
-};
-/// DejaVu Sans, else the system's next best outline font without serifs; found by fontconfig, so that no path is built
-/// in. Once per process: 20 ms.
-[[nodiscard]] const UiFont& ui_font();
-/// Puts the font at this height into the context's atlas, in place of what is there, and sets sizes and colours that go
-/// with it. The atlas' texture has to be made again by whoever owns one.
+/// Puts Noto Sans at this height into the context's atlas, in place of what is there, and sets sizes and colours that
+/// go with it. It is part of the program: Latin, Greek and Cyrillic, no file is looked for. The atlas' texture has to
+/// be made again by whoever owns one.
 void set_ui_style(int em_pixels);
+/// Colours alone, as theme() has them now; and a person's theme by its name in the settings, into use.
+void set_ui_colours();
+void take_theme(const std::string& name);
+/// For figures and titles: digits of equal width, so that nothing moves while they change. Only Latin; kBoldEm em high.
+inline constexpr float kBoldEm = 1.5F;
+[[nodiscard]] ImFont* bold_font();
 
 [[nodiscard]] inline ImVec4 im_colour(Colour c, float alpha = 1) {
   return {c.red, c.green, c.blue, alpha};
@@ -33,10 +33,12 @@ void set_ui_style(int em_pixels);
 
 /// A window at a fixed place that only scrolls. End() follows as after ImGui::Begin.
 void begin_fixed(const char* name, const ScreenBox& box, ImGuiWindowFlags more = 0);
-/// One line of text in a box, as large as fits, at most `em_pixels` high; centred in height, from the left or in the
-/// middle.
+/// One line of text in a box, at most `em_pixels` high; centred in height, from the left or in the middle. Too long it
+/// is smaller, down to 14 pixels at scale 1; longer still it loses its middle, and is whole on hovering.
 void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour colour, const std::string& text,
-                 bool middle = false);
+                 bool middle = false, bool bold = false);
+/// Of a text that is too long for its place: without its middle, "superior ... left side".
+[[nodiscard]] std::string shortened(const std::string& text, float width, float size, ImFont* font = nullptr);
 /// The sign of a state: a disc for 0 corners.
 void draw_sign(ImDrawList* draw, ImVec2 centre, float radius, int corners, Colour colour);
 

@@ -18,7 +18,7 @@ namespace osteo::inline app {
 struct PersonValues {
   using Params = PersonValues;
   double scale = 1;  ///< of text and panels, times the monitor's
-  std::string layout = "beside";
+  std::string layout = "operate", theme = "dark";
   bool full_screen = false, sound = true, alarms = false, remember_cases = true, first_steps = true;
   bool hints = false;
   std::string hints_off;
@@ -27,13 +27,14 @@ struct PersonValues {
   bool left_handed = false, mirror_mouse = false;
   static void describe(PersonValues& p, auto& visit) {
     visit({"scale", "size of text and panels, times the monitor's", "", 0.6, 2.5}, p.scale);
-    visit({"layout", "layout of the window: beside, operate or plan"}, p.layout);
+    visit({"layout", "layout of the window: operate or plan"}, p.layout);
+    visit({"theme", "colours of the window: dark, light or high_contrast"}, p.theme);
     visit({"full_screen", "the window fills the screen"}, p.full_screen);
     visit({"sound", "what drilling sounds like"}, p.sound);
     visit({"volume", "volume of the sound", "", 0, 1}, p.volume);
     visit({"alarms", "a beep on contact with a critical structure"}, p.alarms);
     visit({"remember_cases", "the start page lists the cases opened last"}, p.remember_cases);
-    visit({"first_steps", "the list of first steps is shown"}, p.first_steps);
+    visit({"first_steps", "the first steps are shown, one at a time"}, p.first_steps);
     visit({"motion_one_to", "mm of the hand for a mm of the tool: 1, 2, 4 or 8", "", 1, 8}, p.motion_one_to);
     visit({"wrist_rest", "share of that motion while the wrist rests", "", 0.05, 1}, p.wrist_rest);
     visit({"burr_share", "share of the burr's full speed when the pedal is all the way down", "", 0.25, 1},

@@ -1,0 +1,62 @@
+// The window's components, each once: tile, button, choice, switch, row, chip, bar. Drawn by draw lists in the theme's
+// colours; ImGui keeps focus and clicks. Sizes are of docs/design/window.md, in pixels at scale 1. Private to
+// libs/app/window; ImGui, no GL.
+#pragma once
+#include <imgui.h>
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "palette.h"
+#include "room_layout.h"
+
+namespace osteo::inline app {
+
+/// Pixels of the screen for one of the design's.
+[[nodiscard]] inline float unit() {
+  return ImGui::GetFontSize() / static_cast<float>(kTextPixels);
+}
+inline constexpr float kTile = 40, kControl = 40, kSmallControl = 32, kRow = 36, kGap = 8, kRound = 8, kCardRound = 12;
+
+/// Outline of 24 x 24 in a square of `side` pixels; a name of icon_lines.h. No-op for a name that it lacks.
+void draw_icon(ImDrawList* draw, ImVec2 corner, float side, std::string_view name, ImU32 colour);
+[[nodiscard]] bool has_icon(std::string_view name);
+
+struct TileLook {
+  bool selected = false;  ///< in the hand: accent outline, bar at the left
+  bool on = false;        ///< works now: raised, bar below; not a selection
+  bool enabled = true;
+  std::string words;  ///< name and key, or why it is off: after 0.4 s
+};
+/// At the cursor. True: pressed. ImGui::IsItemActive() tells whether it is held.
+/// `side`: pixels; 0: kTile.
+[[nodiscard]] bool tile(const char* id, std::string_view icon, const TileLook& look, float side = 0);
+
+enum class ButtonLook { usual, main, quiet };
+/// As wide as its words need, at least `width`; 40 high.
+[[nodiscard]] bool kit_button(const std::string& words, ButtonLook look = ButtonLook::usual, float width = 0,
+                              float high = kControl);
+[[nodiscard]] float button_width(const std::string& words);
+/// One of several in a row; the one pressed, else -1.
+[[nodiscard]] int choice(const char* id, std::span<const std::string> words, int selected, float high = kControl);
+/// `width`: pixels; 0: as there is room.
+[[nodiscard]] bool kit_switch(const std::string& words, bool& on, float width = 0);
+/// A row of a list, as wide as there is room.
+[[nodiscard]] bool list_row(const std::string& words, const std::string& right, bool selected, float high = kRow);
+
+/// A chip as wide as its words, at most `width`; its sign says how serious, its words are never in that colour.
+struct ChipLook {
+  Colour colour;
+  int corners = 0;      ///< draw_sign()
+  bool filled = false;  ///< contact: black words on the colour
+};
+[[nodiscard]] float chip_width(const std::string& words);
+void draw_chip(ImDrawList* draw, const ScreenBox& box, const std::string& words, const ChipLook& look);
+
+/// The panel behind a card: nearly opaque, edges as lines.
+void draw_card(ImDrawList* draw, const ScreenBox& box);
+/// begin_fixed() without a frame and ground of its own, for a card of this box; `padding`: within it. End() follows.
+void begin_card(const char* name, const ScreenBox& box, ImVec2 padding, ImGuiWindowFlags more = 0);
+
+}  // namespace osteo::inline app
