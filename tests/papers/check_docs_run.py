@@ -31,6 +31,7 @@ GIVEN = {
     "docs/how-to/pacs.md": {"CT": SCAN, "mask.nrrd": MASK},
     "docs/validation/registration.md": {"before.nrrd": "ct", "after.nrrd": "ct", "ct.nrrd": "ct", "mr.nrrd": "ct", "mr-labels.seg.nrrd": "structures"},
     "docs/how-to/review.md": {"SESSION": SESSION, "EXPERTS": "sessions", "MONDAY": SESSION, "TUESDAY": SESSION},
+    "docs/segment-network.md": {"ct.nrrd": "network image", "MODEL_FOLDER": "network"},
     "docs/guides/study.md": {"SESSION": SESSION},
     "docs/validation/tissue.md": {"FOLDER": "folder"},
     "docs/guides/tutoring.md": {"SESSION": SESSION, "CASE": CASE, "lesson.json": "script"},
@@ -148,6 +149,10 @@ def make(kind, at):
         own(at.parent)
         done = run(f"osteo prepare {fixtures}/ct.nrrd -o {at.name} --lower 500 --spacing-mm 1 --quiet", at.parent)
         assert done.returncode == 0, done.stderr
+    elif kind == "network":
+        shutil.copytree(root / "testdata/neural/plain", at)
+    elif kind == "network image":
+        shutil.copy(root / "testdata/neural/plain/image.nrrd", at)
     elif kind == "ct":
         shutil.copy(fixtures / "ct.nrrd", at)
     elif kind == "body":  # a box of 20 mm

@@ -76,6 +76,7 @@ std::vector<cli::Group> command_groups() {
         "structures",
         "tube",
         "find-structures",
+        "segment-network",
         "register",
         "apply-edits",
         "export-slicer",

@@ -8,6 +8,7 @@
 #include "fit_damping.h"
 #include "image.h"
 #include "import.h"
+#include "neural.h"
 #include "osteo/app/stages/mesh.h"
 #include "planning.h"
 #include "register.h"
@@ -49,6 +50,7 @@ Registry osteo_stages() {
   registry.add<StructuresStage>();
   registry.add<TubeStage>();
   registry.add<FindStructuresStage>();
+  registry.add<SegmentNetworkStage>();
   registry.add<RegisterStage>();
   registry.add<PlanReconstructionStage>();
   registry.add<PhantomStage>();

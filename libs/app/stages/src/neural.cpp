@@ -1,0 +1,31 @@
+#include "neural.h"
+
+#include "osteo/imaging/image/structures.h"
+
+namespace osteo::inline app {
+
+StageInfo SegmentNetworkStage::info() {
+  return {.name = "segment-network",
+          .version = 1,
+          .synopsis = "a label map by a trained network: an nnU-Net v2 folder, without Python",
+          .description =
+              "Reads the folder that nnU-Net v2 leaves of a training (plans.json, dataset.json, "
+              "fold_*/checkpoint_final.pth) and runs it over the CT on this machine's processor: PlainConvUNet and "
+              "ResidualEncoderUNet, 2d and 3d, labels or regions, folds and mirrored passes averaged. No code runs "
+              "from a checkpoint. Memory is known before the first window. The result is a proposal to be looked at: "
+              "docs/segment-network.md says what may not be concluded from it.",
+          .inputs = {{"image", {DataKind::image}, "CT in HU, lying in memory as the training's images did"},
+                     {"model", {DataKind::source}, "nnU-Net's folder of one trained configuration"}},
+          .outputs = {{"structures", {DataKind::labels}, "label map with the names of dataset.json"}},
+          .references = {"F. Isensee et al., nnU-Net: a self-configuring method for deep learning-based biomedical "
+                         "image segmentation, Nat. Methods 18, 2021"},
+          .example = "osteo segment-network ct.nrrd nnUNetTrainer__nnUNetPlans__3d_fullres labels.seg.nrrd"};
+}
+
+std::vector<Data> SegmentNetworkStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
+  const auto& ct = std::get<Image>(inputs[0]);
+  const Labels labels = segment_with_network(ct, std::get<Source>(inputs[1]).path, params, context);
+  return {name_structures(labels, {}, nullptr, context)};
+}
+
+}  // namespace osteo::inline app

@@ -1,0 +1,32 @@
+// A label map from a CT by a trained network: an nnU-Net v2 result folder as it is, without Python.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "osteo/core/base/context.h"
+#include "osteo/core/data/volume.h"
+
+namespace osteo::inline imaging {
+
+struct NetworkParams {
+  std::vector<int> folds;    ///< which are averaged; empty: all that the folder has
+  bool mirror = true;        ///< average over mirrored passes, along the axes that the training allowed
+  double step = 0.5;         ///< windows overlap: a step is this part of a window; in (0, 1]
+  double max_memory_gb = 8;  ///< 10^9 bytes; what is needed is known before the first window
+};
+
+/// Runs the network of `model` (plans.json, dataset.json, fold_*/checkpoint_final.pth) over `ct`, which must be in HU
+/// and lie in memory as the training's images did: nothing is turned, except where the plans say so.
+/// Follows nnU-Net 2.x step by step, its 16-bit sums included: crop to what is not zero, normalise, resample, windows
+/// weighted by a Gaussian, mirrored passes, folds averaged, logits resampled, labels or regions.
+/// The result lies in the CT's frame; structures carry the names of dataset.json. Reports windows, memory and voxels.
+/// Same bits for any number of threads and any width of vectors. Cost: one pass of the network a window, mirrored pass
+/// and fold; memory: weights, one window's features, 2 bytes a voxel and class of the resampled grid.
+/// Errors: no_input (no such folder or file), corrupt (damaged, or of a kind that is not supported, named), usage,
+/// resources (needs more than max_memory_gb), cancelled.
+/// F. Isensee et al., nnU-Net: a self-configuring method ..., Nat. Methods 18, 2021.
+[[nodiscard]] Labels segment_with_network(const Image& ct, const std::filesystem::path& model,
+                                          const NetworkParams& params = {}, const Context& context = {});
+
+}  // namespace osteo::inline imaging

@@ -1,0 +1,227 @@
+// Against nnunetv2: what tests/neural/make_golden.py wrote.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <random>
+#include <set>
+
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/simd.h"
+#include "osteo/imaging/io/volume_io.h"
+#include "osteo/imaging/neural/detail/conv_kernel.h"
+#include "osteo/imaging/neural/detail/half.h"
+#include "osteo/imaging/neural/detail/predict.h"
+#include "osteo/imaging/neural/segment_network.h"
+
+namespace osteo {
+namespace {
+
+fs::path golden(const std::string& name) {
+  return fs::path(OSTEO_SOURCE) / "testdata/neural" / name;
+}
+
+struct Agreement {
+  double worst = 0, labels = 0, mean = 0, largest = 0;
+  int found = 0;
+};
+
+Agreement agreement(const std::string& name, const NetworkParams& params = {}) {
+  const fs::path folder = golden(name);
+  const Image ct = load_image(folder / "image.nrrd");
+  const Labels wanted = load_labels(folder / "labels.nrrd");
+  NetworkModel model;
+  const NetworkLogits logits = network_logits(ct, folder, model, params, {});
+  const auto bytes = read_file(folder / "logits.f16");
+  EXPECT_EQ(bytes.size(), 2 * logits.values.size());
+  Agreement a;
+  for (std::size_t n = 0; n < std::min(logits.values.size(), bytes.size() / 2); ++n) {
+    const auto half =
+        static_cast<std::uint16_t>(static_cast<unsigned>(bytes[2 * n]) | static_cast<unsigned>(bytes[2 * n + 1]) << 8);
+    const auto want = static_cast<double>(float_from_half(half)),
+               got = static_cast<double>(float_from_half(logits.values[n]));
+    a.worst = std::max(a.worst, std::abs(want - got));
+    a.mean += std::abs(want - got) / static_cast<double>(logits.values.size());
+    a.largest = std::max(a.largest, std::abs(want));
+  }
+  const Labels got = segment_with_network(ct, folder, params);
+  EXPECT_EQ(got.frame, ct.frame);
+  std::size_t same = 0;
+  std::set<int> found;
+  for (std::size_t n = 0; n < wanted.span().size(); ++n) {
+    same += got.span()[n] == wanted.span()[n] ? 1 : 0;
+    found.insert(wanted.span()[n]);
+  }
+  a.labels = static_cast<double>(same) / static_cast<double>(wanted.span().size());
+  a.found = static_cast<int>(found.size());
+  std::printf("%s: labels equal %.5f %%, logits differ by %.6f at most, %.8f on average, of %.3f\n", name.c_str(),
+              100 * a.labels, a.worst, a.mean, a.largest);
+  return a;
+}
+
+TEST(NetworkGolden, Plain) {
+  const Agreement a = agreement("plain");
+  EXPECT_GE(a.found, 3);
+  EXPECT_LE(a.worst, 1e-3);
+  EXPECT_LE(a.mean, 2e-6);
+  EXPECT_GE(a.labels, 0.9999);
+}
+
+TEST(NetworkGolden, Residual) {
+  const Agreement a = agreement("residual");
+  EXPECT_GE(a.found, 3);
+  EXPECT_LE(a.worst, 1e-3);
+  EXPECT_LE(a.mean, 2e-6);
+  EXPECT_GE(a.labels, 0.9999);
+}
+
+TEST(NetworkGolden, Flat) {
+  const Agreement a = agreement("flat");
+  EXPECT_GE(a.found, 2);
+  EXPECT_LE(a.worst, 1e-3);
+  EXPECT_LE(a.mean, 2e-6);
+  EXPECT_GE(a.labels, 0.9999);
+}
+
+TEST(NetworkBits, AreTheSameForAnyNumberOfThreads) {
+  NetworkModel model;
+  const Image ct = load_image(golden("residual") / "image.nrrd");
+  std::vector<std::uint16_t> first;
+  for (const int threads : {1, 2, 5}) {
+    Context context;
+    context.threads = threads;
+    NetworkParams p;
+    p.mirror = false;
+    const auto logits = network_logits(ct, golden("residual"), model, p, context).values;
+    if (first.empty()) first = logits;
+    EXPECT_EQ(logits, first) << threads;
+  }
+}
+
+TEST(NetworkBits, AreTheSameForAnyWidthOfVectors) {
+  std::mt19937 random(5);
+  const auto numbers = [&](std::size_t n) {
+    std::vector<float> v(n);
+    for (float& x : v) x = static_cast<float>(random() % 20000) / 1e4F - 1;
+    return v;
+  };
+  // Rows of 1 to 30 outputs, of one block or two, with a stride or none.
+  const auto in = numbers(3 * 3 * 64 * kChannels), weights = numbers(2 * 27 * kChannels * kChannels),
+             start = numbers(kChannels);
+  for (int width = 1; width <= 30; ++width) {
+    std::vector<std::vector<float>> results;
+    const ConvKernel* const kernels[] = {&conv_kernel_base(), &conv_kernel(),
+                                         simd() == Simd::avx512 ? &conv_kernel_avx2() : &conv_kernel()};
+    for (const ConvKernel* kernel : kernels) {
+      for (const int blocks : {1, 2}) {
+        for (const int step : {1, 2}) {
+          std::vector<float> out(2 * 30 * kChannels, 0.25F);
+          ConvRow r;
+          r.in = in.data();
+          r.in_step = step * kChannels;
+          r.in_pixel = kChannels;
+          r.in_row = 64 * kChannels;
+          r.in_plane = 3 * r.in_row;
+          r.channels = 11;
+          r.kernel[0] = r.kernel[1] = r.kernel[2] = 3;
+          for (int b = 0; b < blocks; ++b) {
+            r.weights[b] = weights.data() + b * 27 * kChannels * 11;
+            r.out[b] = out.data() + b * 30 * kChannels;
+          }
+          r.start[0] = start.data();
+          r.out_step = kChannels;
+          r.width = width;
+          kernel->row(r);
+          kernel->scale(out.data(), width, start.data(), weights.data(), nullptr, 0.01F);
+          std::vector<double> sum(kChannels, 0.0);
+          kernel->sum(out.data(), width, nullptr, sum.data());
+          kernel->sum(out.data(), width, start.data(), sum.data());
+          for (const double v : sum) out.push_back(static_cast<float>(v));
+          results.push_back(out);
+        }
+      }
+    }
+    for (std::size_t n = 4; n < results.size(); ++n) EXPECT_EQ(results[n], results[n % 4]) << width << " " << n;
+    // The first output by hand.
+    float by_hand = start[0];
+    for (int tap = 0; tap < 27; ++tap) {
+      for (int c = 0; c < 11; ++c)
+        by_hand += in[static_cast<std::size_t>(((tap / 9 * 3 + tap / 3 % 3) * 64 + tap % 3) * kChannels + c)] *
+                   weights[static_cast<std::size_t>((tap * 11 + c) * kChannels)];
+    }
+    by_hand = by_hand * start[0] + weights[0];
+    EXPECT_NEAR(results[0][0], by_hand > 0 ? by_hand : by_hand * 0.01F, 1e-4);
+  }
+}
+
+TEST(NetworkParams, AreFollowedOrRefused) {
+  const Image ct = load_image(golden("plain") / "image.nrrd");
+  NetworkModel model;
+  NetworkParams p;
+  p.mirror = false;
+  const auto logits = [&] { return network_logits(ct, golden("plain"), model, p, {}).values; };
+  const auto all = logits();
+  p.folds = {1};
+  const auto one = logits();
+  EXPECT_NE(one, all);
+  p.step = 1;
+  EXPECT_NE(logits(), one);
+  const auto code = [&](const fs::path& folder) {
+    try {
+      static_cast<void>(segment_with_network(ct, folder, p));
+    } catch (const Error& error) {
+      return error.code();
+    }
+    return ExitCode::ok;
+  };
+  EXPECT_EQ(code(golden("none")), ExitCode::no_input);
+  EXPECT_EQ(code(golden("plain") / "fold_0"), ExitCode::no_input);
+  p.max_memory_gb = 1e-4;
+  EXPECT_EQ(code(golden("plain")), ExitCode::resources);
+  p.folds = {7};
+  EXPECT_EQ(code(golden("plain")), ExitCode::usage);
+  p.folds = {};
+  p.step = 0;
+  EXPECT_EQ(code(golden("plain")), ExitCode::usage);
+}
+
+TEST(NetworkParams, CancelEndsIt) {
+  Context context;
+  std::atomic<bool> stop{true};
+  context.set_cancel_flag(&stop);
+  const Image ct = load_image(golden("flat") / "image.nrrd");
+  EXPECT_THROW(static_cast<void>(segment_with_network(ct, golden("flat"), {}, context)), Error);
+}
+
+std::string refusal(const std::string& from, const std::string& to, bool of_plans = true) {
+  std::string plans = read_text(golden("residual") / "plans.json"),
+              data = read_text(golden("residual") / "dataset.json");
+  std::string& text = of_plans ? plans : data;
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  if (at != std::string::npos) text.replace(at, from.size(), to);
+  try {
+    static_cast<void>(read_network_model(plans, data, "3d_lowres"));
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::corrupt);
+    return error.what();
+  }
+  return "";
+}
+
+TEST(NetworkPlans, WhatIsNotSupportedIsNamed) {
+  EXPECT_EQ(refusal("\"batch_size\": 2", "\"batch_size\": 3"), "");
+  EXPECT_NE(refusal("unet.ResidualEncoderUNet", "primus.Primus").find("Primus"), std::string::npos);
+  EXPECT_NE(refusal("torch.nn.LeakyReLU", "torch.nn.GELU").find("nonlin"), std::string::npos);
+  EXPECT_NE(refusal("\"batch_size\"", "\"previous_stage\": \"3d_fullres\", \"x\"").find("cascade"), std::string::npos);
+  EXPECT_NE(refusal("CTNormalization", "RGBTo01Normalization").find("RGB"), std::string::npos);
+  EXPECT_NE(refusal("SimpleITKIO", "NibabelIOWithReorient").find("Reorient"), std::string::npos);
+  EXPECT_NE(refusal("resample_data_or_seg_to_shape", "resample_torch_fornnunet").find("resampling of data"),
+            std::string::npos);
+  EXPECT_NE(refusal("\"n_stages\": 3", "\"n_stages\": 4").find("features_per_stage"), std::string::npos);
+  EXPECT_NE(refusal("\"patch_size\": [\n    8", "\"patch_size\": [\n    7").find("patch_size"), std::string::npos);
+  EXPECT_NE(refusal("regions_class_order", "regions", false).find("regions_class_order"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace osteo
