@@ -207,7 +207,7 @@ TEST(Reconstruct, WhatCannotBePlannedIsSaid) {
   EXPECT_NE(complaint([](auto& q) { q.reserve_mm = 190; }).find("too short"), std::string::npos);
 }
 
-// OSTEO_PLANNING_SEEDS=30 test_planning --gtest_filter=Reconstruct.Benchmark: the table of docs/planning.md.
+// OSTEO_PLANNING_SEEDS=30 test_planning --gtest_filter=Reconstruct.Benchmark: the table of docs/guides/planning.md.
 TEST(Reconstruct, Benchmark) {
   const char* seeds = std::getenv("OSTEO_PLANNING_SEEDS");
   if (seeds == nullptr) GTEST_SKIP() << "OSTEO_PLANNING_SEEDS is not set";

@@ -13,7 +13,7 @@ StageInfo SegmentNetworkStage::info() {
               "fold_*/checkpoint_final.pth) and runs it over the CT on this machine's processor: PlainConvUNet and "
               "ResidualEncoderUNet, 2d and 3d, labels or regions, folds and mirrored passes averaged. No code runs "
               "from a checkpoint. Memory is known before the first window. The result is a proposal to be looked at: "
-              "docs/segment-network.md says what may not be concluded from it.",
+              "docs/how-to/segment-network.md says what may not be concluded from it.",
           .inputs = {{"image", {DataKind::image}, "CT in HU, lying in memory as the training's images did"},
                      {"model", {DataKind::source}, "nnU-Net's folder of one trained configuration"}},
           .outputs = {{"structures", {DataKind::labels}, "label map with the names of dataset.json"}},

@@ -9,7 +9,7 @@
 namespace osteo::inline imaging {
 namespace {
 
-constexpr const char* kAdvice = "docs/segment-network.md says which networks can be run";
+constexpr const char* kAdvice = "docs/how-to/segment-network.md says which networks can be run";
 
 [[noreturn]] void refuse(const std::string& why) {
   throw Error(ExitCode::corrupt, why, kAdvice);
