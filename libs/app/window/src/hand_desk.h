@@ -6,7 +6,7 @@
 
 #include "button_assign.h"
 #include "button_watch.h"
-#include "osteo/simulation/haptics/hand_tuning.h"
+#include "osteo/simulation/haptics/device.h"
 #include "rehearsal_control.h"
 
 namespace osteo::inline app {

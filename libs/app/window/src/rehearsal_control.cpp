@@ -8,7 +8,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/grid/brick_places.h"
-#include "osteo/simulation/haptics/hand_tuning.h"
+#include "osteo/simulation/haptics/device.h"
 
 namespace osteo::inline app {
 

@@ -1,4 +1,4 @@
-#include "osteo/session/scene/plan.h"
+#include "osteo/session/scene/session_folder.h"
 
 #include <algorithm>
 #include <cmath>

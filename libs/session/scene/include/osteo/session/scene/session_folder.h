@@ -80,4 +80,10 @@ void apply_haptic_settings(const std::filesystem::path& case_folder, const std::
 std::string write_summary(const SessionFolder& session, const RehearsalSummary& summary, double rate_hz,
                           const std::string& burr, const Anatomy& anatomy = {});
 
+/// Writes into an empty or new folder: plan.json (each piece's volume, centre, inertia and transform as a 4 x 4 matrix
+/// in rows; each plate's pieces, transform, opening, screw places and gaps to bone), piece-N.stl and plate-N.stl where
+/// they are now, plate-N-gap.csv (points of the underside and how far below them bone begins). LPS mm. Returns the text
+/// of plan.json. Error(cannot_write).
+std::string write_plan(const World& world, const std::filesystem::path& folder, const Context& context);
+
 }  // namespace osteo::inline session

@@ -11,7 +11,6 @@
 #include "osteo/simulation/devices/detail/hid_link.h"
 #include "osteo/simulation/devices/detail/woodenhaptics.h"
 #include "osteo/simulation/haptics/device.h"
-#include "osteo/simulation/haptics/hand_tuning.h"
 
 namespace osteo::inline simulation {
 
