@@ -23,7 +23,6 @@ struct Memory {
     io.DisplaySize = {static_cast<float>(width), static_cast<float>(height)};
     io.DeltaTime = 1 / 60.0F;
     set_ui_style(em_pixels);
-    io.Fonts->Build();
   }
   ~Memory() { ImGui::DestroyContext(); }
 };

@@ -328,7 +328,9 @@ bool draw_next_step(const ScreenBox& view, const FirstSteps& steps) {
     possible += steps.steps()[static_cast<std::size_t>(n)].possible ? 1 : 0;
     if (n == next) number = possible;
   }
-  const std::string name = step.name(), how = step.words.substr(std::min(step.words.size(), name.size() + 2));
+  const std::string name = step.name();
+  std::string how = step.words.substr(std::min(step.words.size(), name.size() + 2));
+  if (!how.empty()) how[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(how[0])));
   const float high = 52 * u + ImGui::CalcTextSize(how.c_str(), nullptr, false, wide - 32 * u).y;
   const ScreenBox box{view.x + 16 * u, view.bottom() - 64 * u - high, wide, high};
   begin_card("first steps", box, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoFocusOnAppearing);

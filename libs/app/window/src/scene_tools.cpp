@@ -2,6 +2,8 @@
 
 #include <imgui.h>
 
+#include <algorithm>
+
 #include <vtkActor.h>
 #include <vtkCellArray.h>
 #include <vtkMatrix4x4.h>
@@ -201,29 +203,45 @@ void SceneTools::show(const HandTools& tools, const TickRecord& tick, const Worl
                across = cross(n, along);
     const double half_long = (cut.length_mm > 0 ? cut.length_mm : 1.4 * tools.size_mm()) / 2;
     const double half_deep = (cut.depth_mm > 0 ? cut.depth_mm : 1.4 * tools.size_mm()) / 2;
-    vtkNew<vtkPoints> points;
-    vtkNew<vtkCellArray> cells;
+    std::vector<Vec3> corners;
     // The blade's two faces.
     for (const double side : {-0.5, 0.5}) {
-      const vtkIdType first = points->GetNumberOfPoints();
-      for (const auto& [a, b] : {std::pair{-1.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {-1.0, 1.0}}) {
-        const Vec3 p = cut.at_mm + n * (side * cut.kerf_mm) + along * (a * half_long) + across * (b * half_deep);
-        points->InsertNextPoint(p.x, p.y, p.z);
-      }
-      const vtkIdType quad[4] = {first, first + 1, first + 2, first + 3};
-      cells->InsertNextCell(4, quad);
+      for (const auto& [a, b] : {std::pair{-1.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {-1.0, 1.0}})
+        corners.push_back(cut.at_mm + n * (side * cut.kerf_mm) + along * (a * half_long) + across * (b * half_deep));
     }
-    plane_data_->SetPoints(points);
-    plane_data_->SetPolys(cells);
-    plane_data_->Modified();
+    if (corners != blade_mm_) {
+      blade_mm_ = corners;
+      vtkNew<vtkPoints> points;
+      vtkNew<vtkCellArray> cells;
+      for (const Vec3 p : corners) points->InsertNextPoint(p.x, p.y, p.z);
+      for (const vtkIdType first : {0, 4}) {
+        const vtkIdType quad[4] = {first, first + 1, first + 2, first + 3};
+        cells->InsertNextCell(4, quad);
+      }
+      plane_data_->SetPoints(points);
+      plane_data_->SetPolys(cells);
+      plane_data_->Modified();
+    }
   }
-  const bool plate = (tick.flags & kPlateInHand) != 0;
-  hand_in_bone_mm_ = 0;
-  if (!plate) return hand_plate_.hide_in_hand();
-  const RigidTransform pose = plate_pose(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
-                                         normalized(from_floats(tick.device.axis)), tools.plate_grip());
-  hand_plate_.show_in_hand(world, static_cast<std::uint32_t>(tools.plate()), pose);
-  hand_in_bone_mm_ = plate_in_bone_mm(world, plate_library()[tools.plate()], pose);
+  if ((tick.flags & kPlateInHand) == 0) {
+    hand_in_bone_mm_ = 0;
+    held_.reset();
+    return hand_plate_.hide_in_hand();
+  }
+  const HeldPlate now{tools.plate(), world.undo_steps(),
+                      plate_pose(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
+                                 normalized(from_floats(tick.device.axis)), tools.plate_grip())};
+  // A hand that holds still is not drawn anew for what nobody sees.
+  constexpr double kUnseenMm = 0.005, kArmMm = 20;
+  if (held_ && held_->plate == now.plate && held_->undo_steps == now.undo_steps) {
+    double off = length(now.pose.shift_mm - held_->pose.shift_mm);
+    for (std::size_t c = 0; c < 3; ++c)
+      off = std::max(off, kArmMm * length(now.pose.rotation.column[c] - held_->pose.rotation.column[c]));
+    if (off < kUnseenMm) return;
+  }
+  held_ = now;
+  hand_plate_.show_in_hand(world, static_cast<std::uint32_t>(now.plate), now.pose);
+  hand_in_bone_mm_ = plate_in_bone_mm(world, plate_library()[now.plate], now.pose);
 }
 
 }  // namespace osteo::inline app

@@ -5,6 +5,8 @@
 #include <array>
 #include <functional>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "cut_preview.h"
 #include "hand_tools.h"
@@ -47,6 +49,13 @@ class SceneTools {
   vtkSmartPointer<vtkPolyData> plane_data_;
   PlateView hand_plate_;
   double hand_in_bone_mm_ = 0;
+  // What is shown now: a picture at rest is drawn again only when something moves.
+  std::vector<Vec3> blade_mm_;
+  struct HeldPlate {
+    std::size_t plate, undo_steps;
+    RigidTransform pose;
+  };
+  std::optional<HeldPlate> held_;
   CutPreview preview_;
   std::array<char, 64> plan_name_{};
 };
