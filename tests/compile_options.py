@@ -1,4 +1,5 @@
 """Of a compile command what decides how a file reads: for checks that compile single files, syntax only."""
+
 import pathlib, shlex
 
 

@@ -2,11 +2,16 @@
 """No source of a library hides a constant that a header of another area has. usage: hidden_names.py SOURCE_DIR
 
 Sources of a library are compiled several as one, in the namespace of their area. A name in an unnamed namespace of one of them is then found by the
-others before a name of an area above, without a word from the compiler where both are numbers. (Functions and types of one name do not compile.)"""
+others before a name of an area above, without a word from the compiler where both are numbers. (Functions and types of one name do not compile.)
+"""
+
 import pathlib, re, sys
 
 root = pathlib.Path(sys.argv[1])
-token = re.compile(r'R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|(?<!\w)\'(?:\\.|[^\'\\\n])*\'|//[^\n]*|/\*.*?\*/|^[ \t]*#(?:\\\n|[^\n])*', re.S | re.M)
+token = re.compile(
+    r'R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|(?<!\w)\'(?:\\.|[^\'\\\n])*\'|//[^\n]*|/\*.*?\*/|^[ \t]*#(?:\\\n|[^\n])*',
+    re.S | re.M,
+)
 
 
 def declared(text):
@@ -51,7 +56,10 @@ def name_of(head, unnamed, found):
     elif m := re.match(r"[\w:<>,&*\s\[\]]*?[\s&*>](\w+)\s*\(", head):
         if not re.search(r"::\s*%s\s*\($" % m[1], head[: m.end()]) and m[1] not in ("operator", "decltype", "noexcept"):
             found.append((m[1], unnamed))
-    elif m := re.match(r"\s*(?:inline\s+|static\s+|thread_local\s+|const\s+|constexpr\s+)*[\w:<>,&*\s]+?[\s&*>](\w+)\s*(?:=|\[|$)", head):
+    elif m := re.match(
+        r"\s*(?:inline\s+|static\s+|thread_local\s+|const\s+|constexpr\s+)*[\w:<>,&*\s]+?[\s&*>](\w+)\s*(?:=|\[|$)",
+        head,
+    ):
         found.append((m[1], unnamed))
 
 
@@ -74,7 +82,9 @@ for path in sorted(root.glob("libs/*/*/src/*")):
         looked += 1
         others = [a for a in public.get(name, {}) if a in areas[area]]
         if others:
-            bad.append(f"{path.relative_to(root)}: {name} hides that of {others[0]} ({public[name][others[0]]}): give it another name")
+            bad.append(
+                f"{path.relative_to(root)}: {name} hides that of {others[0]} ({public[name][others[0]]}): give it another name"
+            )
 if "kEscape" not in public or looked < 500:
     sys.exit(f"only {looked} names looked at: this test sees nothing")
 print("\n".join(bad) or f"{looked} constants of sources hide none of {len(public)} names of headers")

@@ -2,7 +2,9 @@
 """The public headers as pages, by Doxygen, without network, and checked. apps/packaging/api.py OUT
 
 Grouped by component and library as libs/layers.txt and docs/how-to/library.md have them. Every class, struct and enum of a public header must have a page,
-every example be shown, links inside lead somewhere and nothing be fetched from elsewhere: else it fails. OUT/osteo.tag is for the Doxygen of others."""
+every example be shown, links inside lead somewhere and nothing be fetched from elsewhere: else it fails. OUT/osteo.tag is for the Doxygen of others.
+"""
+
 import os, pathlib, re, shutil, subprocess, sys, tempfile
 import xml.etree.ElementTree
 
@@ -17,7 +19,7 @@ def rows(page, heading):
     """Of the table in a page of docs/ whose first column is called so."""
     lines = (root / page).read_text().splitlines()
     at = next(i for i, l in enumerate(lines) if l.startswith(f"| {heading} |"))
-    for line in lines[at + 2:]:
+    for line in lines[at + 2 :]:
         if not line.startswith("|"):
             return
         yield [c.strip() for c in line.split("|")[1:-1]]
@@ -36,7 +38,9 @@ programs = re.search(r"^programs: (.*)$", layers, re.M)[1].split()
 
 
 def headers():
-    return [h for h in sorted(root.glob("libs/*/*/include/**/*.h")) if h.relative_to(root / "libs").parts[1] not in programs]
+    return [
+        h for h in sorted(root.glob("libs/*/*/include/**/*.h")) if h.relative_to(root / "libs").parts[1] not in programs
+    ]
 
 
 def groups():
@@ -55,32 +59,55 @@ def groups():
         name = name.strip("`")
         file, shows = re.sub(r"^\[([^\]]*)\]\([^)]*\)", r"\1", example).split(": ", 1)
         components.append((name, shows, file, of.get(name, [name])))
-    own = {held[0] for name, *_, held in components if name not in of}  # a library that is a component stands there alone
+    own = {
+        held[0] for name, *_, held in components if name not in of
+    }  # a library that is a component stands there alone
     components = [(n, s, f, [l for l in held if n not in of or l not in own]) for n, s, f, held in components]
     placed = {l for *_, held in components for l in held}
     components.append(("others", "", "", [l for l in libraries if l not in placed]))
 
     area_of = {l: a for a, held in of.items() for l in held}
-    text = ["// Made by apps/packaging/api.py.", "/// @namespace osteo\n/// Everything; what stands in it is grouped by component and library."]
+    text = [
+        "// Made by apps/packaging/api.py.",
+        "/// @namespace osteo\n/// Everything; what stands in it is grouped by component and library.",
+    ]
     for name, shows, file, held in components:
         if name == "others":
-            text.append("/// @defgroup component_others Libraries by their own name\n"
-                        "/// What no component has is asked for by its own name: `find_package(osteo COMPONENTS base)`. "
-                        "What belongs to the programs (libs/layers.txt) is not installed.")
+            text.append(
+                "/// @defgroup component_others Libraries by their own name\n"
+                "/// What no component has is asked for by its own name: `find_package(osteo COMPONENTS base)`. "
+                "What belongs to the programs (libs/layers.txt) is not installed."
+            )
         else:
-            text.append(f"/// @defgroup component_{name} Component {name}\n/// Component `{name}`, target `osteo::{name}`. "
-                        f"An example, which the test `install` compiles and runs: {shows}.\n/// @include {file}")
-        text += [f"/// @defgroup lib_{lib} {lib}\n/// @ingroup component_{name}\n/// Holds: {holds.get(lib, '')}.\n///\n"
-                 f"/// Target `osteo::{lib}`, headers `osteo/{area_of[lib]}/{lib}/`." for lib in held]
-    main = ["@mainpage The libraries of Osteotome", "",
-            "C++20; lengths are millimetres, coordinates LPS, and names carry units. How a program comes by the libraries is in docs/how-to/library.md:",
-            "@code{.cmake}", "find_package(osteo REQUIRED COMPONENTS imaging haptics)", "target_link_libraries(mine PRIVATE osteo::imaging osteo::haptics)",
-            "@endcode", "", "| component | libraries |", "|---|---|"]
+            text.append(
+                f"/// @defgroup component_{name} Component {name}\n/// Component `{name}`, target `osteo::{name}`. "
+                f"An example, which the test `install` compiles and runs: {shows}.\n/// @include {file}"
+            )
+        text += [
+            f"/// @defgroup lib_{lib} {lib}\n/// @ingroup component_{name}\n/// Holds: {holds.get(lib, '')}.\n///\n"
+            f"/// Target `osteo::{lib}`, headers `osteo/{area_of[lib]}/{lib}/`."
+            for lib in held
+        ]
+    main = [
+        "@mainpage The libraries of Osteotome",
+        "",
+        "C++20; lengths are millimetres, coordinates LPS, and names carry units. How a program comes by the libraries is in docs/how-to/library.md:",
+        "@code{.cmake}",
+        "find_package(osteo REQUIRED COMPONENTS imaging haptics)",
+        "target_link_libraries(mine PRIVATE osteo::imaging osteo::haptics)",
+        "@endcode",
+        "",
+        "| component | libraries |",
+        "|---|---|",
+    ]
     for name, _, _, held in components:
         shown = "by their own names" if name == "others" else name
         main.append(f'| @ref component_{name} "{shown}" | ' + ", ".join(f"@ref lib_{l}" for l in held) + " |")
-    main += ["", "What a function may throw is osteo::Error, with the exit code of the programs and what to do about it. Values in osteo::Data do not change once "
-             "they are made, and are shared."]
+    main += [
+        "",
+        "What a function may throw is osteo::Error, with the exit code of the programs and what to do about it. Values in osteo::Data do not change once "
+        "they are made, and are shared.",
+    ]
     text.append("\n".join(f"/// {l}".rstrip() for l in main))
     return "\n\n".join(text) + "\n", components
 
@@ -97,7 +124,9 @@ def stage(into):
         for i, line in enumerate(lines):
             if re.match(r"namespace osteo(::inline \w+)?(::\w+)* \{$", line):
                 # One that only declares types of another area holds nothing.
-                holds = not re.match(r"(?:\s*(?:class|struct) \w+;)+\s*\}$", "\n".join(lines[i + 1:i + 6]).split("}")[0] + "}")
+                holds = not re.match(
+                    r"(?:\s*(?:class|struct) \w+;)+\s*\}$", "\n".join(lines[i + 1 : i + 6]).split("}")[0] + "}"
+                )
                 lines[i] = line = line.replace("::inline ", "::")  # which Doxygen does not know
                 if holds:
                     lines[i] = line + f"\n/** @addtogroup lib_{lib}\n * @{{ */"
@@ -109,7 +138,9 @@ def stage(into):
         for i, line in enumerate(lines):
             code, slashes, said = line.partition("///")
             if slashes:
-                said = re.sub(r"`[^`]*`|<(?=[A-Za-z]+[ >])|#(?=\w)", lambda m: m[0] if m[0][0] == "`" else "\\" + m[0], said)
+                said = re.sub(
+                    r"`[^`]*`|<(?=[A-Za-z]+[ >])|#(?=\w)", lambda m: m[0] if m[0][0] == "`" else "\\" + m[0], said
+                )
                 lines[i] = code + slashes + said
         to.parent.mkdir(parents=True, exist_ok=True)
         to.write_text("\n".join(lines) + "\n")
@@ -117,11 +148,16 @@ def stage(into):
 
 def check(site, components):
     # Of a class whose only inner one is private Doxygen links a list that it then leaves out: nested-classes; of a group with an enum without a name likewise enumval-members.
-    bad, pages, links = check_pages(site, lambda _, target, lost: not lost and target.endswith(("#nested-classes", "#enumval-members")))
+    bad, pages, links = check_pages(
+        site, lambda _, target, lost: not lost and target.endswith(("#nested-classes", "#enumval-members"))
+    )
     # What the headers declare, against what has a page or a place in one.
     tags = xml.etree.ElementTree.parse(site / "osteo.tag").getroot()
-    known = {c.findtext("name").split("::")[-1].split("<")[0].strip() for c in tags.iter("compound") if c.get("kind") in ("class", "struct", "union")
-             and (site / (c.findtext("filename") or "")).is_file()}
+    known = {
+        c.findtext("name").split("::")[-1].split("<")[0].strip()
+        for c in tags.iter("compound")
+        if c.get("kind") in ("class", "struct", "union") and (site / (c.findtext("filename") or "")).is_file()
+    }
     known |= {m.findtext("name") for m in tags.iter("member") if m.get("kind") == "enumeration"}
     grouped = {c.findtext("name"): c for c in tags.iter("compound") if c.get("kind") == "group"}
     declared = 0
@@ -144,7 +180,9 @@ def main():
     if len(sys.argv) != 2:
         sys.exit("usage: apps/packaging/api.py OUT")
     if shutil.which("doxygen") is None:
-        print("doxygen is not here: apt-get install --no-install-recommends doxygen doxygen-awesome-css", file=sys.stderr)
+        print(
+            "doxygen is not here: apt-get install --no-install-recommends doxygen doxygen-awesome-css", file=sys.stderr
+        )
         sys.exit(77)
     out = pathlib.Path(sys.argv[1]).resolve()
     if out.exists() and any(out.iterdir()) and not (out / "osteo.tag").exists():
@@ -168,7 +206,13 @@ GENERATE_TAGFILE = {work}/html/osteo.tag
 WARN_LOGFILE = {work}/warnings
 {more}""")
         (work / "html").mkdir()
-        said = subprocess.run(["doxygen", work / "Doxyfile"], capture_output=True, text=True, cwd=work, env={**os.environ, "LC_ALL": "C.UTF-8"})
+        said = subprocess.run(
+            ["doxygen", work / "Doxyfile"],
+            capture_output=True,
+            text=True,
+            cwd=work,
+            env={**os.environ, "LC_ALL": "C.UTF-8"},
+        )
         if said.returncode:
             sys.exit(said.stdout[-2000:] + said.stderr)
         warned = [l.replace(f"{work}/include/", "") for l in (work / "warnings").read_text().splitlines() if l.strip()]
@@ -178,8 +222,10 @@ WARN_LOGFILE = {work}/warnings
         if out.exists():
             shutil.rmtree(out)
         shutil.copytree(work / "html", out)
-    print(f"{out}/index.html: {declared} classes, structs and enums, {len(components) - 1} components, {pages} pages, {links} links inside, none broken, "
-          "nothing fetched from elsewhere")
+    print(
+        f"{out}/index.html: {declared} classes, structs and enums, {len(components) - 1} components, {pages} pages, {links} links inside, none broken, "
+        "nothing fetched from elsewhere"
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 """Pages of a site as their links see them, for what builds one: nothing may be fetched from elsewhere, and links inside lead somewhere."""
+
 import html.parser, re, urllib.parse
 
 

@@ -4,6 +4,7 @@
 Components and licences are the rows of apps/packaging/licences.txt. With --program the shared libraries that the program really loads are asked of
 the loader (ldd) and of dpkg: each becomes a component with its Debian package and version; those that no row declares are NOASSERTION, never a guess.
 The same inputs give the same bytes: the time is SOURCE_DATE_EPOCH or that of the commit."""
+
 import argparse, datetime, hashlib, json, os, pathlib, re, subprocess, sys
 
 root = pathlib.Path(__file__).resolve().parents[2]
@@ -35,14 +36,20 @@ def spdx_id(name):
 
 
 def created():
-    epoch = os.environ.get("SOURCE_DATE_EPOCH") or run("git", "-c", "safe.directory=*", "-C", str(root), "log", "-1", "--format=%ct").stdout.strip() or "0"
+    epoch = (
+        os.environ.get("SOURCE_DATE_EPOCH")
+        or run("git", "-c", "safe.directory=*", "-C", str(root), "log", "-1", "--format=%ct").stdout.strip()
+        or "0"
+    )
     return datetime.datetime.fromtimestamp(int(epoch), datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def dpkg(*names):
     """package -> (version, source package) of what is installed."""
     out = {}
-    for line in run("dpkg-query", "-W", "-f", "${Package}\t${Version}\t${source:Package}\n", *names).stdout.splitlines():
+    for line in run(
+        "dpkg-query", "-W", "-f", "${Package}\t${Version}\t${source:Package}\n", *names
+    ).stdout.splitlines():
         package, version, source = line.split("\t")
         if version:
             out[package] = (version, source)
@@ -61,7 +68,10 @@ def loaded_packages(program):
         elif m := re.search(r"=> (/\S+)", line):
             paths.add(m[1])
     # Debian 12 knows a library below /lib or below /usr/lib. All are asked for at once: dpkg reads its lists each time.
-    names = {path: {path, os.path.realpath(path), re.sub(r"^/usr", "", os.path.realpath(path)), "/usr" + path} for path in paths}
+    names = {
+        path: {path, os.path.realpath(path), re.sub(r"^/usr", "", os.path.realpath(path)), "/usr" + path}
+        for path in paths
+    }
     owner = {}
     for line in run("dpkg", "-S", *sorted(set().union(*names.values()))).stdout.splitlines():
         package, _, path = line.rpartition(": ")
@@ -74,8 +84,18 @@ def loaded_packages(program):
 
 
 def component(name, version, licence, comment, supplier="Organization: Debian"):
-    return {"SPDXID": spdx_id(name), "name": name, "versionInfo": version or "NOASSERTION", "supplier": supplier, "downloadLocation": "NOASSERTION",
-            "filesAnalyzed": False, "licenseConcluded": licence, "licenseDeclared": licence, "copyrightText": "NOASSERTION", "comment": comment}
+    return {
+        "SPDXID": spdx_id(name),
+        "name": name,
+        "versionInfo": version or "NOASSERTION",
+        "supplier": supplier,
+        "downloadLocation": "NOASSERTION",
+        "filesAnalyzed": False,
+        "licenseConcluded": licence,
+        "licenseDeclared": licence,
+        "copyrightText": "NOASSERTION",
+        "comment": comment,
+    }
 
 
 def main():
@@ -91,11 +111,27 @@ def main():
     whole = "Apache-2.0"
     if copyleft:
         whole = "AGPL-3.0-or-later" if any("AGPL" in r["licence"] for r in copyleft) else "GPL-3.0-or-later"
-    top = component(a.package, a.version, whole, "Own sources: Apache-2.0." + (" As a whole under " + whole + ", because of " +
-                    ", ".join(f"{r['package']} ({r['when']})" for r in copyleft) + "." if copyleft else ""), "Organization: Osteotome contributors")
+    top = component(
+        a.package,
+        a.version,
+        whole,
+        "Own sources: Apache-2.0."
+        + (
+            " As a whole under "
+            + whole
+            + ", because of "
+            + ", ".join(f"{r['package']} ({r['when']})" for r in copyleft)
+            + "."
+            if copyleft
+            else ""
+        ),
+        "Organization: Osteotome contributors",
+    )
     top["licenseDeclared"] = "Apache-2.0"
     installed = dpkg(*[r["package"] for r in used])
-    packages, relations = [top], [{"spdxElementId": "SPDXRef-DOCUMENT", "relationshipType": "DESCRIBES", "relatedSpdxElement": top["SPDXID"]}]
+    packages, relations = [top], [
+        {"spdxElementId": "SPDXRef-DOCUMENT", "relationshipType": "DESCRIBES", "relatedSpdxElement": top["SPDXID"]}
+    ]
     by_source = {source: r for r in used for _, source in [installed.get(r["package"], ("", ""))] if source}
     for source, package in SAME_SOURCE.items():
         row = [r for r in used if r["package"] == package]
@@ -107,9 +143,15 @@ def main():
         relations.append({"spdxElementId": top["SPDXID"], "relationshipType": kind, "relatedSpdxElement": c["SPDXID"]})
 
     for r in used:
-        brought = "in every build" if r["when"] == "always" else "loaded when the program runs" if r["when"] == "runtime" else f"brought by {r['when']}"
-        add(component(r["package"], installed.get(r["package"], ("",))[0], r["licence"], f"{r['purpose']}; {brought}"),
-            "DEPENDS_ON" if r["when"] == "runtime" else "BUILD_DEPENDENCY_OF")
+        brought = (
+            "in every build"
+            if r["when"] == "always"
+            else "loaded when the program runs" if r["when"] == "runtime" else f"brought by {r['when']}"
+        )
+        add(
+            component(r["package"], installed.get(r["package"], ("",))[0], r["licence"], f"{r['purpose']}; {brought}"),
+            "DEPENDS_ON" if r["when"] == "runtime" else "BUILD_DEPENDENCY_OF",
+        )
         if r["when"] != "runtime":  # x BUILD_DEPENDENCY_OF y reads from x to y
             relations[-1].update(spdxElementId=spdx_id(r["package"]), relatedSpdxElement=top["SPDXID"])
     libraries, strange = set(), set()
@@ -124,13 +166,28 @@ def main():
     for name in sorted(libraries - named):
         version, source = versions.get(name, ("", ""))
         row = by_source.get(source)
-        add(component(name, version, row["licence"] if row else "NOASSERTION",
-                      f"shared library that is loaded; of the source package {source}" + ("" if row else "; /usr/share/doc/" + name + "/copyright says its licence")), "DYNAMIC_LINK")
+        add(
+            component(
+                name,
+                version,
+                row["licence"] if row else "NOASSERTION",
+                f"shared library that is loaded; of the source package {source}"
+                + ("" if row else "; /usr/share/doc/" + name + "/copyright says its licence"),
+            ),
+            "DYNAMIC_LINK",
+        )
     body = json.dumps(packages, sort_keys=True)
-    document = {"spdxVersion": "SPDX-2.3", "dataLicense": "CC0-1.0", "SPDXID": "SPDXRef-DOCUMENT", "name": f"{a.package}-{a.version}",
-                "documentNamespace": f"https://spdx.org/spdxdocs/{a.package}-{a.version}-{hashlib.sha256(body.encode()).hexdigest()[:32]}",
-                "creationInfo": {"created": created(), "creators": ["Tool: osteotome-sbom"]}, "packages": packages, "relationships": relations,
-                "hasExtractedLicensingInfos": []}
+    document = {
+        "spdxVersion": "SPDX-2.3",
+        "dataLicense": "CC0-1.0",
+        "SPDXID": "SPDXRef-DOCUMENT",
+        "name": f"{a.package}-{a.version}",
+        "documentNamespace": f"https://spdx.org/spdxdocs/{a.package}-{a.version}-{hashlib.sha256(body.encode()).hexdigest()[:32]}",
+        "creationInfo": {"created": created(), "creators": ["Tool: osteotome-sbom"]},
+        "packages": packages,
+        "relationships": relations,
+        "hasExtractedLicensingInfos": [],
+    }
     text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
     if a.out == "-":
         sys.stdout.write(text)

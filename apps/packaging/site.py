@@ -1,13 +1,19 @@
 #!/usr/bin/env python3
 """Builds the pages of docs/ as a site by mkdocs, without network, and checks it. apps/packaging/site.py OUT
 
-Every page must be reachable from the navigation, every link and anchor must lead somewhere, and nothing may be fetched from elsewhere: else it fails."""
+Every page must be reachable from the navigation, every link and anchor must lead somewhere, and nothing may be fetched from elsewhere: else it fails.
+"""
+
 import pathlib, re, shutil, subprocess, sys, tempfile
 
 from html_pages import check_pages
 
 root = pathlib.Path(__file__).resolve().parents[2]
-BESIDE = {"CONTRIBUTING.md": "CONTRIBUTING.md", "CHANGELOG.md": "CHANGELOG.md", "README.md": "about.md"}  # pages from outside docs/
+BESIDE = {
+    "CONTRIBUTING.md": "CONTRIBUTING.md",
+    "CHANGELOG.md": "CHANGELOG.md",
+    "README.md": "about.md",
+}  # pages from outside docs/
 
 
 def stage(pages):
@@ -34,7 +40,7 @@ def stage(pages):
                 return f"[{text}]({up}{BESIDE[where]}{anchor})"
             if where == "docs" or not where.startswith("docs/"):
                 return f"{text} (`{where}` in the sources)"
-            inside = where[len("docs/"):]
+            inside = where[len("docs/") :]
             if (root / where).is_dir():
                 index = [n for n in ("README.md",) if (root / where / n).exists()]
                 return f"[{text}]({up}{inside}/{index[0]})" if index else f"{text} (`{where}` in the sources)"
@@ -71,7 +77,11 @@ def main():
         lost = sorted(p for p in staged - nav if not p.startswith(("reference/", "developer/adr/")))
         if lost:
             sys.exit("no line in apps/packaging/mkdocs.yml leads to " + ", ".join(lost))
-        said = subprocess.run(["mkdocs", "build", "--quiet", "--strict", "--config-file", work / "mkdocs.yml"], capture_output=True, text=True)
+        said = subprocess.run(
+            ["mkdocs", "build", "--quiet", "--strict", "--config-file", work / "mkdocs.yml"],
+            capture_output=True,
+            text=True,
+        )
         if "Unrecognised theme" in said.stdout + said.stderr:
             print("mkdocs' theme material is not here: apt install mkdocs-material")
             sys.exit(77)

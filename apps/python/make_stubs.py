@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Writes __init__.pyi of the built package: types of every stage, from the stages' declarations. usage: make_stubs.py PACKAGE_FOLDER"""
+
 import inspect
 import pathlib
 import sys
@@ -101,11 +102,17 @@ def load(path: str | os.PathLike[str], kind: str = ...) -> Any: ...
 def save(value: Image | Labels | Grid | Surface | Tets | numpy.typing.NDArray[numpy.uint8], path: str | os.PathLike[str], *, force: bool = ...) -> None: ...
 
 '''
-TYPES = {"os.PathLike | str": "os.PathLike[str] | str", "numpy.ndarray": "numpy.typing.NDArray[numpy.uint8]", "dict": "dict[str, Any]"}
+TYPES = {
+    "os.PathLike | str": "os.PathLike[str] | str",
+    "numpy.ndarray": "numpy.typing.NDArray[numpy.uint8]",
+    "dict": "dict[str, Any]",
+}
 
 
 def typed(annotation):
-    return " | ".join(TYPES.get(part, part) for part in annotation.replace("os.PathLike | str", "os.PathLike[str] | str").split(" | "))
+    return " | ".join(
+        TYPES.get(part, part) for part in annotation.replace("os.PathLike | str", "os.PathLike[str] | str").split(" | ")
+    )
 
 
 def stub_of(name, declaration):
@@ -131,7 +138,13 @@ def stub_of(name, declaration):
 
 
 declared = {osteo._identifier(d["name"]): d for d in _osteo.declarations()}
-text = HEAD + "".join(VOLUME.format(name=n, scalar=s) for n, s in (("Image", "int16"), ("Labels", "uint8"), ("Field", "float32"))) + REST
+text = (
+    HEAD
+    + "".join(
+        VOLUME.format(name=n, scalar=s) for n, s in (("Image", "int16"), ("Labels", "uint8"), ("Field", "float32"))
+    )
+    + REST
+)
 text += "".join(stub_of(name, declared[name]) for name in osteo.stages)
 (package / "__init__.pyi").write_text(text)
 # What lies below is not for others.

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Draws the sketches of window.md as SVG and prints the contrast table. usage: sketches.py (needs Pillow; reads ../images, tabler.json)
 
-Numbers and names in the sketches are invented. Bone and cuts are the project's own pictures of the phantom (../images)."""
+Numbers and names in the sketches are invented. Bone and cuts are the project's own pictures of the phantom (../images).
+"""
+
 import base64, io, json, pathlib
 from PIL import Image
 
@@ -11,28 +13,55 @@ ICONS = json.loads((here / "tabler.json").read_text())
 ICONS |= {
     "drill": ["M4 17a3 3 0 1 0 6 0a3 3 0 1 0 -6 0", "M9.5 14.5l5 -5", "M13 8l3 3l5 -5l-3 -3z"],
     "saw": ["M3 15h14v-4h-14z", "M4 15v2m3 -2v2m3 -2v2m3 -2v2", "M17 11l4 -2v8l-4 -2"],
-    "plate": ["M3 12a2.5 2.5 0 0 1 4.5 -1.5h1.5a2.5 2.5 0 0 1 6 0h1.500a2.500 2.500 0 1 1 0 3h-1.500a2.500 2.500 0 0 1 -6 0h-1.500a2.500 2.500 0 0 1 -4.500 -1.500", "M5.500 12h.01m6.490 0h.01m6.490 0h.01"],
+    "plate": [
+        "M3 12a2.5 2.5 0 0 1 4.5 -1.5h1.5a2.5 2.5 0 0 1 6 0h1.500a2.500 2.500 0 1 1 0 3h-1.500a2.500 2.500 0 0 1 -6 0h-1.500a2.500 2.500 0 0 1 -4.500 -1.500",
+        "M5.500 12h.01m6.490 0h.01m6.490 0h.01",
+    ],
     "fragments": ["M4 5l6 -1l1 6l-6 2z", "M14 4l6 2l-2 6l-4 -2z", "M7 15l7 -2l4 5l-7 3z"],
     "suction": ["M3 20c5 0 7 -4 9 -8l4 -8", "M19 5l-4 -2", "M4 15v.01m3 -4v.01m-4 0v.01"],
     "probe": ["M5 20a1 1 0 1 0 0 -.01", "M6 19l13 -15"],
 }
-DARK = dict(ground="#10151C", surface="#171E27", raised="#212A35", line="#6C7B8A", text="#EDF1F5", quiet="#A9B4C0", accent="#8C8CFF")
-LIGHT = dict(ground="#F1F4F7", surface="#FFFFFF", raised="#E3E8ED", line="#75828F", text="#141C24", quiet="#47535F", accent="#4A3FC4")
-HIGH = dict(ground="#000000", surface="#000000", raised="#1A1A1A", line="#FFFFFF", text="#FFFFFF", quiet="#FFFFFF", accent="#B9B0FF")
+DARK = dict(
+    ground="#10151C",
+    surface="#171E27",
+    raised="#212A35",
+    line="#6C7B8A",
+    text="#EDF1F5",
+    quiet="#A9B4C0",
+    accent="#8C8CFF",
+)
+LIGHT = dict(
+    ground="#F1F4F7",
+    surface="#FFFFFF",
+    raised="#E3E8ED",
+    line="#75828F",
+    text="#141C24",
+    quiet="#47535F",
+    accent="#4A3FC4",
+)
+HIGH = dict(
+    ground="#000000",
+    surface="#000000",
+    raised="#1A1A1A",
+    line="#FFFFFF",
+    text="#FFFFFF",
+    quiet="#FFFFFF",
+    accent="#B9B0FF",
+)
 STATUS = dict(note="#56B4E9", near="#F0E442", close="#E69F00", contact="#D55E00", good="#009E73")
 C = DARK
 FONT = "'Noto Sans','DejaVu Sans',sans-serif"
 
 
 def lum(h):
-    f = lambda c: c / 12.92 if c <= .04045 else ((c + .055) / 1.055) ** 2.4
-    r, g, b = (f(int(h[i:i + 2], 16) / 255) for i in (1, 3, 5))
-    return .2126 * r + .7152 * g + .0722 * b
+    f = lambda c: c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4
+    r, g, b = (f(int(h[i : i + 2], 16) / 255) for i in (1, 3, 5))
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b
 
 
 def ratio(a, b):
     hi, lo = sorted((lum(a), lum(b)), reverse=True)
-    return (hi + .05) / (lo + .05)
+    return (hi + 0.05) / (lo + 0.05)
 
 
 def picture(name, box, size, quality=64):
@@ -48,8 +77,8 @@ PICTURES = {
     "axial": (("window.png", (1132, 126, 1302, 296), (306, 306)), 1),
     "coronal": (("window.png", (1132, 362, 1302, 532), (306, 306)), 1),
     "sagittal": (("structures-ear.png", (130, 560, 560, 920), (307, 257)), 1.2),
-    "plan_axial": (("structures-ear.png", (150, 10, 560, 490), (410, 480)), .854),
-    "plan_coronal": (("structures-ear.png", (810, 20, 1220, 490), (410, 470)), .872),
+    "plan_axial": (("structures-ear.png", (150, 10, 560, 490), (410, 480)), 0.854),
+    "plan_coronal": (("structures-ear.png", (810, 20, 1220, 490), (410, 470)), 0.872),
     "plan_sagittal": (("structures-ear.png", (60, 505, 640, 985), (580, 480)), 1.208),
     "jaw": (("saw-by-hand.png", (0, 0, 760, 415), (440, 240)), 1.83),
     "ear": (("session-mastoid.png", (0, 40, 540, 580), (300, 300)), 1),
@@ -68,13 +97,21 @@ class Sketch:
         self.out.append(s)
 
     def rect(self, x, y, w, h, fill="none", r=0, stroke=None, sw=1, op=None):
-        self.add(f'<rect x="{x:g}" y="{y:g}" width="{w:g}" height="{h:g}" rx="{r}" fill="{fill}"' + (f' stroke="{stroke}" stroke-width="{sw}"' if stroke else "")
-                 + (f' fill-opacity="{op}"' if op is not None else "") + "/>")
+        self.add(
+            f'<rect x="{x:g}" y="{y:g}" width="{w:g}" height="{h:g}" rx="{r}" fill="{fill}"'
+            + (f' stroke="{stroke}" stroke-width="{sw}"' if stroke else "")
+            + (f' fill-opacity="{op}"' if op is not None else "")
+            + "/>"
+        )
 
     def text(self, x, y, s, size=16, fill=None, weight=400, anchor="start"):
         s = s.replace("&", "&amp;").replace("<", "&lt;")
-        self.add(f'<text x="{x:g}" y="{y:g}" font-size="{size}" fill="{fill or C["text"]}"' + (f' font-weight="{weight}"' if weight != 400 else "")
-                 + (f' text-anchor="{anchor}"' if anchor != "start" else "") + f">{s}</text>")
+        self.add(
+            f'<text x="{x:g}" y="{y:g}" font-size="{size}" fill="{fill or C["text"]}"'
+            + (f' font-weight="{weight}"' if weight != 400 else "")
+            + (f' text-anchor="{anchor}"' if anchor != "start" else "")
+            + f">{s}</text>"
+        )
 
     def lines(self, x, y, rows, size=16, fill=None, step=24):
         for n, row in enumerate(rows):
@@ -85,8 +122,11 @@ class Sketch:
 
     def icon(self, name, x, y, size=24, fill=None):
         k = size / 24
-        self.add(f'<g transform="translate({x:g} {y:g}) scale({k:g})" fill="none" stroke="{fill or C["text"]}" stroke-width="{2 if size > 20 else 2.2}" stroke-linecap="round" stroke-linejoin="round">'
-                 + "".join(f'<path d="{d}"/>' for d in ICONS[name]) + "</g>")
+        self.add(
+            f'<g transform="translate({x:g} {y:g}) scale({k:g})" fill="none" stroke="{fill or C["text"]}" stroke-width="{2 if size > 20 else 2.2}" stroke-linecap="round" stroke-linejoin="round">'
+            + "".join(f'<path d="{d}"/>' for d in ICONS[name])
+            + "</g>"
+        )
 
     def image(self, key, x, y, w, h, r=0):
         """Covers the box."""
@@ -94,8 +134,10 @@ class Sketch:
         self.used[key] = args
         iw, ih = (w, w / aspect) if w / h > aspect else (h * aspect, h)
         self.clips += 1
-        self.add(f'<clipPath id="c{self.clips}"><rect x="{x:g}" y="{y:g}" width="{w:g}" height="{h:g}" rx="{r}"/></clipPath>'
-                 f'<g clip-path="url(#c{self.clips})"><use href="#{key}" transform="translate({x + (w - iw) / 2:.1f} {y + (h - ih) / 2:.1f}) scale({iw / 1000:.4f} {ih / 1000:.4f})"/></g>')
+        self.add(
+            f'<clipPath id="c{self.clips}"><rect x="{x:g}" y="{y:g}" width="{w:g}" height="{h:g}" rx="{r}"/></clipPath>'
+            f'<g clip-path="url(#c{self.clips})"><use href="#{key}" transform="translate({x + (w - iw) / 2:.1f} {y + (h - ih) / 2:.1f}) scale({iw / 1000:.4f} {ih / 1000:.4f})"/></g>'
+        )
 
     # Components, once each.
     def tile(self, x, y, name, key="", on=False, off=False, size=40):
@@ -105,10 +147,18 @@ class Sketch:
         elif on:
             self.rect(x, y, size, size, C["raised"], 8, C["accent"], 2)
             self.rect(x, y + 8, 4, size - 16, C["accent"], 2)
-        self.icon(name, x + (size - 24) / 2, y + (size - 24) / 2, 24, C["line"] if off else C["text"] if on else "#CFD7DF" if C is DARK else C["text"])
+        self.icon(
+            name,
+            x + (size - 24) / 2,
+            y + (size - 24) / 2,
+            24,
+            C["line"] if off else C["text"] if on else "#CFD7DF" if C is DARK else C["text"],
+        )
 
     def button(self, x, y, w, s, name=None, main=False, quiet=False, h=40):
-        self.rect(x, y, w, h, C["text"] if main else "none" if quiet else C["raised"], 8, None if main or quiet else C["line"])
+        self.rect(
+            x, y, w, h, C["text"] if main else "none" if quiet else C["raised"], 8, None if main or quiet else C["line"]
+        )
         ink = C["ground"] if main else C["text"]
         dx = 32 if name else 0
         if name:
@@ -120,7 +170,9 @@ class Sketch:
         for n, (s, w) in enumerate(zip(items, widths)):
             if n == on:
                 self.rect(x + 2, y + 2, w - 4, h - 4, C["raised"], 6, C["accent"], 2)
-            self.text(x + w / 2, y + h / 2 + 6, s, 16, C["text"] if n == on else C["quiet"], 600 if n == on else 400, "middle")
+            self.text(
+                x + w / 2, y + h / 2 + 6, s, 16, C["text"] if n == on else C["quiet"], 600 if n == on else 400, "middle"
+            )
             x += w
 
     def sign(self, x, y, state, r=9):
@@ -128,7 +180,16 @@ class Sketch:
         if C is LIGHT:  # yellow and orange alone would be too faint on white
             k = len(self.out)
             self.shape(x, y, state, r, c)
-            self.out[k:] = [part.replace('stroke="none" stroke-width="2"', 'stroke="#141C24" stroke-width="1.5"').replace("/>", ' stroke="#141C24" stroke-width="1.5"/>') if "circle" in part else part.replace('stroke="none" stroke-width="2"', 'stroke="#141C24" stroke-width="1.5"') for part in self.out[k:]]
+            self.out[k:] = [
+                (
+                    part.replace('stroke="none" stroke-width="2"', 'stroke="#141C24" stroke-width="1.5"').replace(
+                        "/>", ' stroke="#141C24" stroke-width="1.5"/>'
+                    )
+                    if "circle" in part
+                    else part.replace('stroke="none" stroke-width="2"', 'stroke="#141C24" stroke-width="1.5"')
+                )
+                for part in self.out[k:]
+            ]
         else:
             self.shape(x, y, state, r, c)
 
@@ -138,8 +199,11 @@ class Sketch:
         elif state == "close":
             self.path(f"M{x} {y - r}l{r} {r}l{-r} {r}l{-r} {-r}z", fill=c)
         elif state == "contact":
-            k = r * .42
-            self.path(f"M{x - k} {y - r}h{2 * k}l{r - k} {r - k}v{2 * k}l{k - r} {r - k}h{-2 * k}l{k - r} {k - r}v{-2 * k}z", fill=c)
+            k = r * 0.42
+            self.path(
+                f"M{x - k} {y - r}h{2 * k}l{r - k} {r - k}v{2 * k}l{k - r} {r - k}h{-2 * k}l{k - r} {k - r}v{-2 * k}z",
+                fill=c,
+            )
         else:
             self.add(f'<circle cx="{x}" cy="{y}" r="{r * .8:g}" fill="{c}"/>')
 
@@ -163,7 +227,9 @@ class Sketch:
         if note:
             self.text(x, y + 41, note, 14, C["quiet"])
         self.rect(x + w - 40, y + 5, 40, 22, C["raised"] if not on else C["text"], 11, C["line"])
-        self.add(f'<circle cx="{x + w - (11 if on else 29)}" cy="{y + 16}" r="7" fill="{C["ground"] if on else C["quiet"]}"/>')
+        self.add(
+            f'<circle cx="{x + w - (11 if on else 29)}" cy="{y + 16}" r="7" fill="{C["ground"] if on else C["quiet"]}"/>'
+        )
 
     def key(self, x, y, s, w=None):
         w = w or max(28, 12 + 8.5 * len(s))
@@ -175,23 +241,32 @@ class Sketch:
         r = max(1.9, mm * px / 2)
         if on:
             self.rect(x - 19, y - 19, 38, 38, C["raised"], 8, C["accent"], 2)
-        self.path(f"M{x} {y - r}V{y - r - 8}", "#9AA5B1", max(1.5, r * .35))
+        self.path(f"M{x} {y - r}V{y - r - 8}", "#9AA5B1", max(1.5, r * 0.35))
         if shape == "ball":
             self.add(f'<circle cx="{x}" cy="{y}" r="{r:g}" fill="url(#{"grit" if diamond else "metal"})"/>')
             if not diamond and mm > 2:
-                for k in (-.5, 0, .5):
-                    self.path(f"M{x + k * r} {y - r * .85}q{r * .45} {r * .85} 0 {r * 1.7}", "#4B545D", .9)
+                for k in (-0.5, 0, 0.5):
+                    self.path(f"M{x + k * r} {y - r * .85}q{r * .45} {r * .85} 0 {r * 1.7}", "#4B545D", 0.9)
 
     def bar(self, x, y, w, share, state):
         self.rect(x, y, w, 8, C["raised"], 4)
         self.rect(x, y, max(8, w * share), 8, STATUS[state], 4)
 
     def save(self, name):
-        defs = "".join(f'<image id="{k}" width="1000" height="1000" preserveAspectRatio="none" href="{picture(*a)}"/>' for k, a in self.used.items())
-        defs += ('<radialGradient id="metal" cx=".35" cy=".3" r=".8"><stop offset="0" stop-color="#F7F9FB"/><stop offset=".5" stop-color="#A7B0BA"/><stop offset="1" stop-color="#4A535C"/></radialGradient>'
-                 '<radialGradient id="grit" cx=".35" cy=".3" r=".8"><stop offset="0" stop-color="#E8DDB8"/><stop offset=".6" stop-color="#A39468"/><stop offset="1" stop-color="#574D32"/></radialGradient>')
-        (here / name).write_text(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.w} {self.h}" width="{self.w}" height="{self.h}" font-family="{FONT}" role="img" aria-labelledby="t d">\n'
-                                 f'<title id="t">{self.title}</title><desc id="d">{self.words}</desc>\n<defs>{defs}</defs>\n' + "\n".join(self.out) + "\n</svg>\n")
+        defs = "".join(
+            f'<image id="{k}" width="1000" height="1000" preserveAspectRatio="none" href="{picture(*a)}"/>'
+            for k, a in self.used.items()
+        )
+        defs += (
+            '<radialGradient id="metal" cx=".35" cy=".3" r=".8"><stop offset="0" stop-color="#F7F9FB"/><stop offset=".5" stop-color="#A7B0BA"/><stop offset="1" stop-color="#4A535C"/></radialGradient>'
+            '<radialGradient id="grit" cx=".35" cy=".3" r=".8"><stop offset="0" stop-color="#E8DDB8"/><stop offset=".6" stop-color="#A39468"/><stop offset="1" stop-color="#574D32"/></radialGradient>'
+        )
+        (here / name).write_text(
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.w} {self.h}" width="{self.w}" height="{self.h}" font-family="{FONT}" role="img" aria-labelledby="t d">\n'
+            f'<title id="t">{self.title}</title><desc id="d">{self.words}</desc>\n<defs>{defs}</defs>\n'
+            + "\n".join(self.out)
+            + "\n</svg>\n"
+        )
 
 
 STRIP, STATE = 56, 64
@@ -202,7 +277,12 @@ def strip(s, on="drill", held=()):
     s.rect(0, 0, STRIP, s.h, C["surface"])
     s.tile(8, 8, "menu-2")
     y = 56
-    groups = [["drill", "saw", "plate", "fragments"], ["suction", "droplet"], ["arrow-bar-to-down", "arrow-bar-up", "arrow-back-up"], ["versions", "ruler-measure", "note", "camera"]]
+    groups = [
+        ["drill", "saw", "plate", "fragments"],
+        ["suction", "droplet"],
+        ["arrow-bar-to-down", "arrow-bar-up", "arrow-back-up"],
+        ["versions", "ruler-measure", "note", "camera"],
+    ]
     tight = s.h < 800
     for group in groups:
         s.rect(12, y, 32, 1, C["line"])
@@ -214,14 +294,16 @@ def strip(s, on="drill", held=()):
     s.tile(8, s.h - 48, "command")
 
 
-def state(s, near=("near", "sigmoid sinus", "1.4 mm", .72), message=None, time="1:46", volume="627 mm³"):
+def state(s, near=("near", "sigmoid sinus", "1.4 mm", 0.72), message=None, time="1:46", volume="627 mm³"):
     """What is going on, at the bottom; each number always in its place."""
     x0, y = STRIP, s.h - STATE
     s.rect(x0, y, s.w - x0, STATE, C["surface"])
     wide = s.w >= 1200
     col = [(88, "Force", "1.2 N", 24), (88, "Speed", "60 000/min", 24), (128, "Bone below", "1.7 mm", 24)]
     x = x0 + 16
-    for w, name, value, size in zip((88, 128, 128), ("Force", "Burr, per min", "Bone below"), ("1.2 N", "60 000", "1.7 mm"), (24, 24, 24)):
+    for w, name, value, size in zip(
+        (88, 128, 128), ("Force", "Burr, per min", "Bone below"), ("1.2 N", "60 000", "1.7 mm"), (24, 24, 24)
+    ):
         s.text(x, y + 22, name, 14, C["quiet"])
         s.text(x, y + 50, value, size, weight=600)
         x += w if wide else w - 16
@@ -242,7 +324,7 @@ def state(s, near=("near", "sigmoid sinus", "1.4 mm", .72), message=None, time="
 def drill_card(s, x, y, size=4):
     """Beside the instrument in hand: only what belongs to it. Burrs as large as they are."""
     w = 560 if s.w >= 1200 else 520
-    s.rect(x, y, w, 64, C["surface"], 12, op=.94)
+    s.rect(x, y, w, 64, C["surface"], 12, op=0.94)
     s.segments(x + 12, y + 12, ("Cutting", "Diamond"), 0, (88, 96) if s.w >= 1200 else (80, 88))
     bx = x + (228 if s.w >= 1200 else 208)
     for mm in range(1, 8):
@@ -257,12 +339,25 @@ def drill_card(s, x, y, size=4):
 def cut(s, x, y, w, h, key, name, letters="", cross=True, field=True):
     s.rect(x - 1, y - 1, w + 2, h + 2, "#000", 8, C["line"])
     s.image(key, x, y, w, h, 7)
-    s.rect(x + 6, y + 6, 12 + 8.6 * len(name), 24, "#000", 4, op=.75)
+    s.rect(x + 6, y + 6, 12 + 8.6 * len(name), 24, "#000", 4, op=0.75)
     s.text(x + 12, y + 23, name, 14, "#EDF1F5")
 
 
-def operate(w, h, name, extra=None, near=("near", "sigmoid sinus", "1.4 mm", .72), message=("near", "Thin bone over the sinus"), on="drill"):
-    s = Sketch(w, h, "Operate", "The bone fills the picture; tools at the left, the state below, three cuts at the right or one cut on a small screen.")
+def operate(
+    w,
+    h,
+    name,
+    extra=None,
+    near=("near", "sigmoid sinus", "1.4 mm", 0.72),
+    message=("near", "Thin bone over the sinus"),
+    on="drill",
+):
+    s = Sketch(
+        w,
+        h,
+        "Operate",
+        "The bone fills the picture; tools at the left, the state below, three cuts at the right or one cut on a small screen.",
+    )
     s.image("cavity", STRIP, 0, w - STRIP, h - STATE)
     strip(s, on, ("droplet",))
     drill_card(s, STRIP + 16, 16)
@@ -278,7 +373,7 @@ def operate(w, h, name, extra=None, near=("near", "sigmoid sinus", "1.4 mm", .72
         s.segments(w - side - 16, 16 + side + 8, ("A", "C", "S", "Drill"), 0, (44, 44, 44, 68), 32)
         bx = w - 128
     y = h - STATE - 24
-    s.rect(bx - 12, y - 28, 120, 40, "#000", 8, op=.6)
+    s.rect(bx - 12, y - 28, 120, 40, "#000", 8, op=0.6)
     s.text(bx + 48, y - 8, "5 mm", 14, "#EDF1F5", 400, "middle")
     s.path(f"M{bx} {y}h96", "#EDF1F5", 3)
     if w < 1200 and message:
@@ -291,16 +386,27 @@ def operate(w, h, name, extra=None, near=("near", "sigmoid sinus", "1.4 mm", .72
 
 def key_card(s):
     x, y, w = STRIP + 16, s.h - STATE - 16 - 320, 304
-    s.rect(x, y, w, 320, C["surface"], 12, C["line"], op=.96)
+    s.rect(x, y, w, 320, C["surface"], 12, C["line"], op=0.96)
     s.text(x + 16, y + 30, "Ten keys", 16, weight=600)
     s.icon("x", x + w - 36, y + 12, 20, C["quiet"])
-    rows = (("left button", "drill"), ("Shift-wheel", "deeper, back"), ("F", "approach"), ("U", "retract"), ("1 – 7", "burr size"), ("V", "suction, while held"), ("I", "irrigation on, off"), ("Z", "undo"), ("W", "compare with start"), ("Ctrl-K", "all commands"))
+    rows = (
+        ("left button", "drill"),
+        ("Shift-wheel", "deeper, back"),
+        ("F", "approach"),
+        ("U", "retract"),
+        ("1 – 7", "burr size"),
+        ("V", "suction, while held"),
+        ("I", "irrigation on, off"),
+        ("Z", "undo"),
+        ("W", "compare with start"),
+        ("Ctrl-K", "all commands"),
+    )
     for n, (k, t) in enumerate(rows):
         s.key(x + 16, y + 44 + n * 27, k, 104)
         s.text(x + 136, y + 62 + n * 27, t, 16)
     # The next step, where the eye is.
     px, py = STRIP + 616, 96
-    s.rect(px - 240, py + 4, 392, 112, C["surface"], 12, C["line"], op=.96)
+    s.rect(px - 240, py + 4, 392, 112, C["surface"], 12, C["line"], op=0.96)
     s.text(px - 224, py + 32, "2 of 11: take one stroke back", 16, weight=600)
     s.text(px - 224, py + 58, "Press Z. Again takes the stroke before.", 16)
     s.rect(px - 224, py + 72, 360, 4, C["raised"], 2)
@@ -317,7 +423,13 @@ def palette(s):
     s.icon("search", x + 26, y + 24, 24, C["quiet"])
     s.text(x + 62, y + 42, "pat", 20)
     s.path(f"M{x + 94} {y + 24}v24", C["text"], 2)
-    rows = (("hand-stop", "Patient position: supine", "", True), ("rotate-clockwise", "Patient position: head turned 30°", "", False), ("layout-grid", "Plan: regions to remove and keep", "Ctrl-L", False), ("bone", "Plates: take one", "L", False), ("drill", "Haptics: path to follow", "", False))
+    rows = (
+        ("hand-stop", "Patient position: supine", "", True),
+        ("rotate-clockwise", "Patient position: head turned 30°", "", False),
+        ("layout-grid", "Plan: regions to remove and keep", "Ctrl-L", False),
+        ("bone", "Plates: take one", "L", False),
+        ("drill", "Haptics: path to follow", "", False),
+    )
     for n, (i, t, k, on) in enumerate(rows):
         yy = y + 72 + n * 52
         if on:
@@ -363,7 +475,12 @@ def card(s, x, y, w, h, pic, title, sub, chip=None, on=False, bad=None):
 
 
 def open_(w, h, name):
-    s = Sketch(w, h, "Open", "Cases as pictures with approval and last session; the chosen case's switches and the button Operate at the right.")
+    s = Sketch(
+        w,
+        h,
+        "Open",
+        "Cases as pictures with approval and last session; the chosen case's switches and the button Operate at the right.",
+    )
     head(s, "Open", "Open")
     wide = w >= 1200
     pane = 376 if wide else 328
@@ -375,18 +492,26 @@ def open_(w, h, name):
     cols = 3 if wide else 2
     cw = (gw - 16 * (cols - 1)) / cols
     ch = 248 if wide else 264
-    cards = [("ear", "Demo ear", "comes with Osteotome", ("info-circle", "try it: no patient"), False, None),
-             ("cavity", "Temporal bone, left", "0.3 mm · today 9:40", ("shield-check", "approved 21 Nov"), True, None),
-             ("jaw", "Jaw", "0.5 mm · 2 sessions", ("shield-check", "approved 3 Nov"), False, None),
-             ("head", "Head, UNC", "0.5 mm · public CT", ("clock", "not approved"), False, None),
-             ("skull", "Skull phantom", "0.5 mm · 1 session", ("clock", "not approved"), False, None),
-             (None, "Temporal bone, right", "no grid: prepare stopped", None, False, "prepare it again")]
-    for n, c in enumerate(cards[:cols * 2 if wide else 4]):
+    cards = [
+        ("ear", "Demo ear", "comes with Osteotome", ("info-circle", "try it: no patient"), False, None),
+        ("cavity", "Temporal bone, left", "0.3 mm · today 9:40", ("shield-check", "approved 21 Nov"), True, None),
+        ("jaw", "Jaw", "0.5 mm · 2 sessions", ("shield-check", "approved 3 Nov"), False, None),
+        ("head", "Head, UNC", "0.5 mm · public CT", ("clock", "not approved"), False, None),
+        ("skull", "Skull phantom", "0.5 mm · 1 session", ("clock", "not approved"), False, None),
+        (None, "Temporal bone, right", "no grid: prepare stopped", None, False, "prepare it again"),
+    ]
+    for n, c in enumerate(cards[: cols * 2 if wide else 4]):
         card(s, 24 + (n % cols) * (cw + 16), 128 + (n // cols) * (ch + 16), cw, ch, c[0], c[1], c[2], c[3], c[4], c[5])
     yb = 128 + 2 * (ch + 16)
     if wide:
         s.text(24, yb + 24, "Last sessions", 20, weight=600)
-        for n, (t, u, v) in enumerate((("Temporal bone, left", "today 9:40 · 24 min", "nearest 0.4 mm, sinus"), ("Jaw", "yesterday · 11 min", "2 cuts, 1 plate"), ("Demo ear", "18 Nov · 6 min", "627 mm³ removed"))):
+        for n, (t, u, v) in enumerate(
+            (
+                ("Temporal bone, left", "today 9:40 · 24 min", "nearest 0.4 mm, sinus"),
+                ("Jaw", "yesterday · 11 min", "2 cuts, 1 plate"),
+                ("Demo ear", "18 Nov · 6 min", "627 mm³ removed"),
+            )
+        ):
             yy = yb + 40 + n * 48
             s.rect(24, yy, gw, 44, C["surface"], 8)
             s.icon("player-play", 36, yy + 12, 20, C["quiet"])
@@ -402,7 +527,14 @@ def open_(w, h, name):
     s.rect(x, 168, pw, 40, C["raised"], 8, C["line"])
     s.text(x + 12, 194, "Cortical mastoidectomy", 16)
     s.icon("chevron-down", x + pw - 36, 176, 24, C["quiet"])
-    rows = [("Bone dust and irrigation", True), ("Sound", True), ("Heat", False), ("Nerve monitor", False), ("Hints", False), ("Second device", False)]
+    rows = [
+        ("Bone dust and irrigation", True),
+        ("Sound", True),
+        ("Heat", False),
+        ("Nerve monitor", False),
+        ("Hints", False),
+        ("Second device", False),
+    ]
     step = 40 if wide else 36
     for n, (t, on) in enumerate(rows):
         s.switch(x, 224 + n * step, pw, t, on)
@@ -417,29 +549,51 @@ def open_(w, h, name):
 
 
 def plan(w, h, name):
-    s = Sketch(w, h, "Plan", "Four pictures of one size; structures, regions and planned cuts in a list; a red plane with its words before it cuts.")
+    s = Sketch(
+        w,
+        h,
+        "Plan",
+        "Four pictures of one size; structures, regions and planned cuts in a list; a red plane with its words before it cuts.",
+    )
     head(s, "Plan", "Plan")
     wide = w >= 1200
     pane = 320 if wide else 264
     top, foot = 56, 64
     gw, gh = (w - pane - 8) / 2, (h - top - foot - 8) / 2
-    pics = (("whole", "3D, from the left"), ("plan_axial", "Axial"), ("plan_coronal", "Coronal"), ("plan_sagittal", "Sagittal"))
+    pics = (
+        ("whole", "3D, from the left"),
+        ("plan_axial", "Axial"),
+        ("plan_coronal", "Coronal"),
+        ("plan_sagittal", "Sagittal"),
+    )
     for n, (k, t) in enumerate(pics):
         x, y = pane + (n % 2) * (gw + 8), top + (n // 2) * (gh + 8)
         s.rect(x, y, gw, gh, "#000")
         s.image(k, x, y, gw, gh)
-        s.rect(x + 8, y + 8, 16 + 8.4 * len(t), 28, "#000", 4, op=.75)
+        s.rect(x + 8, y + 8, 16 + 8.4 * len(t), 28, "#000", 4, op=0.75)
         s.text(x + 16, y + 28, t, 16, "#EDF1F5")
         s.icon("arrows-maximize", x + gw - 32, y + 8, 24, "#CFD7DF")
     # The plane, red with its words: in 3D and in a cut.
     x, y = pane, top
-    s.path(f"M{x + gw * .60:.0f} {y + gh * .34:.0f}l{gw * .13:.0f} {gh * .05:.0f}v{gh * .52:.0f}l{-gw * .13:.0f} {-gh * .05:.0f}z", STATUS["contact"], 2, STATUS["contact"], 'fill-opacity=".45"')
+    s.path(
+        f"M{x + gw * .60:.0f} {y + gh * .34:.0f}l{gw * .13:.0f} {gh * .05:.0f}v{gh * .52:.0f}l{-gw * .13:.0f} {-gh * .05:.0f}z",
+        STATUS["contact"],
+        2,
+        STATUS["contact"],
+        'fill-opacity=".45"',
+    )
     s.path(f"M{pane + gw + 8 + gw * .45:.0f} {top + 44}V{top + gh - 12:.0f}", STATUS["contact"], 3)
     s.rect(0, top, pane, h - top, C["surface"])
     px, pw = 16, pane - 32
     y = 72
     s.text(px, y + 20, "Structures", 16, weight=600)
-    names = [("facial nerve", "#F0E442", "eye"), ("sigmoid sinus", "#3764C8", "eye"), ("dura", "#C67B9C", "adjustments-horizontal"), ("air cells", "#7CA3C4", "eye-off"), ("ear canal", "#55919F", "eye")]
+    names = [
+        ("facial nerve", "#F0E442", "eye"),
+        ("sigmoid sinus", "#3764C8", "eye"),
+        ("dura", "#C67B9C", "adjustments-horizontal"),
+        ("air cells", "#7CA3C4", "eye-off"),
+        ("ear canal", "#55919F", "eye"),
+    ]
     for n, (t, c, i) in enumerate(names):
         yy = y + 32 + n * 36
         s.rect(px, yy + 8, 16, 16, c, 4)
@@ -455,7 +609,7 @@ def plan(w, h, name):
         s.text(px + 46, yy + 26, t, 16)
         s.text(px + pw - 12, yy + 26, "kerf 1.0 mm" if wide else "1.0 mm", 14, C["quiet"], anchor="end")
     y += 32 + 88 + 8
-    s.slider(px, y, pw, "Kerf", "1.0 mm", .4)
+    s.slider(px, y, pw, "Kerf", "1.0 mm", 0.4)
     s.slider(px, y + 48, pw, "Depth", "through", 1)
     y += 104
     if h > 800:
@@ -475,22 +629,33 @@ def plan(w, h, name):
 
 
 def review(w, h, name):
-    s = Sketch(w, h, "Review", "Three findings with a picture each, the place in 3D, a player below with the course of the session.")
+    s = Sketch(
+        w,
+        h,
+        "Review",
+        "Three findings with a picture each, the place in 3D, a player below with the course of the session.",
+    )
     head(s, "Review", "Review")
     wide = w >= 1200
     pane = 416 if wide else 336
     foot = 184 if wide else 160
     s.image("cavity", pane, 56, w - pane, h - 56 - foot)
-    cx, cy = pane + (w - pane) * .33, 56 + (h - 56 - foot) * .62
-    s.add(f'<circle cx="{cx:g}" cy="{cy:g}" r="34" fill="none" stroke="#000" stroke-width="6"/><circle cx="{cx:g}" cy="{cy:g}" r="34" fill="none" stroke="{STATUS["close"]}" stroke-width="3"/>')
-    s.rect(cx + 44, cy - 40, 248, 60, C["surface"], 8, op=.94)
+    cx, cy = pane + (w - pane) * 0.33, 56 + (h - 56 - foot) * 0.62
+    s.add(
+        f'<circle cx="{cx:g}" cy="{cy:g}" r="34" fill="none" stroke="#000" stroke-width="6"/><circle cx="{cx:g}" cy="{cy:g}" r="34" fill="none" stroke="{STATUS["close"]}" stroke-width="3"/>'
+    )
+    s.rect(cx + 44, cy - 40, 248, 60, C["surface"], 8, op=0.94)
     s.text(cx + 56, cy - 16, "0.4 mm from the sinus", 16, weight=600)
     s.text(cx + 56, cy + 8, "cutting 6 mm, at 11:32", 14, C["quiet"])
     s.rect(0, 56, pane, h - 56 - foot, C["surface"])
     x, pw = 16, pane - 32
     s.text(x + 8, 96, "Session saved", 24, weight=600)
     s.text(x + 8, 122, "Cortical mastoidectomy, 24 min, 1 820 mm³", 14, C["quiet"])
-    finds = [("close", "Close to the sinus", "0.4 mm, cutting burr, 11:32", True, "cavity"), ("near", "Pressed hard near nerve", "3.1 N at 0.9 mm, 17:05", False, "axial"), ("good", "Sinus plate shown", "82 % shown, limit 40 %", False, "coronal")]
+    finds = [
+        ("close", "Close to the sinus", "0.4 mm, cutting burr, 11:32", True, "cavity"),
+        ("near", "Pressed hard near nerve", "3.1 N at 0.9 mm, 17:05", False, "axial"),
+        ("good", "Sinus plate shown", "82 % shown, limit 40 %", False, "coronal"),
+    ]
     rh = 96 if wide else 80
     for n, (st, t, u, on, pic) in enumerate(finds):
         yy = 140 + n * (rh + 8)
@@ -523,17 +688,30 @@ def review(w, h, name):
         s.switch(472, yb + 16, 200, "Surgeon's view", True)
     else:
         s.icon("eye", 464, yb + 20, 24)
-    lanes = (("Force", [.2, .3, .25, .5, .4, .6, .3, .2, .5, .7, .4, .3, .35, .2, .9, .4, .3, .2, .3, .4]), ("Nearness", [.1, .1, .2, .2, .3, .4, .3, .4, .9, .7, .5, .4, .3, .5, .7, .6, .4, .3, .2, .2]))
+    lanes = (
+        (
+            "Force",
+            [0.2, 0.3, 0.25, 0.5, 0.4, 0.6, 0.3, 0.2, 0.5, 0.7, 0.4, 0.3, 0.35, 0.2, 0.9, 0.4, 0.3, 0.2, 0.3, 0.4],
+        ),
+        (
+            "Nearness",
+            [0.1, 0.1, 0.2, 0.2, 0.3, 0.4, 0.3, 0.4, 0.9, 0.7, 0.5, 0.4, 0.3, 0.5, 0.7, 0.6, 0.4, 0.3, 0.2, 0.2],
+        ),
+    )
     lx, lw, lh = 112, w - 128, (foot - 88) / 2
     for n, (t, v) in enumerate(lanes):
         yy = yb + 64 + n * (lh + 4)
         s.text(16, yy + lh / 2 + 6, t, 14, C["quiet"])
         s.rect(lx, yy, lw, lh, C["ground"], 4)
-        d = f"M{lx} {yy + lh}" + "".join(f"L{lx + lw * (k + .5) / 20:.0f} {yy + lh * (1 - a):.0f}" for k, a in enumerate(v)) + f"L{lx + lw} {yy + lh}z"
+        d = (
+            f"M{lx} {yy + lh}"
+            + "".join(f"L{lx + lw * (k + .5) / 20:.0f} {yy + lh * (1 - a):.0f}" for k, a in enumerate(v))
+            + f"L{lx + lw} {yy + lh}z"
+        )
         s.path(d, "#8FA0B2", 1.5, "#8FA0B2", 'fill-opacity=".35"')
-    at = lx + lw * .4792
-    for share, st in ((.4792, "close"), (.708, "near"), (.86, "good")):
-        s.sign(lx + lw * share, yb + 56 if share != .4792 else yb + 56, st, 7)
+    at = lx + lw * 0.4792
+    for share, st in ((0.4792, "close"), (0.708, "near"), (0.86, "good")):
+        s.sign(lx + lw * share, yb + 56 if share != 0.4792 else yb + 56, st, 7)
     s.path(f"M{at:.0f} {yb + 64}V{h - 12}", C["text"], 2)
     for k in range(0, 25, 4):
         s.text(lx + lw * k / 24.1, h - 4, "", 14)
@@ -541,17 +719,29 @@ def review(w, h, name):
 
 
 def teach(w, h, name):
-    s = Sketch(w, h, "Teach", "The trainee's picture live; steps of the procedure with what is done; guidance, note and who is connected.")
+    s = Sketch(
+        w,
+        h,
+        "Teach",
+        "The trainee's picture live; steps of the procedure with what is done; guidance, note and who is connected.",
+    )
     head(s, "Teach", "Teach")
     wide = w >= 1200
     lp, rp, foot = (304, 320, 72) if wide else (240, 264, 72)
     s.image("cavity", lp, 56, w - lp - rp, h - 56 - foot)
-    s.rect(lp + 16, 72, 208, 36, C["surface"], 8, op=.94)
+    s.rect(lp + 16, 72, 208, 36, C["surface"], 8, op=0.94)
     s.add(f'<circle cx="{lp + 34}" cy="90" r="6" fill="{STATUS["good"]}"/>')
     s.text(lp + 50, 96, "Trainee 1, live, 24 ms", 16)
     s.rect(0, 56, lp, h - 56, C["surface"])
     s.text(16, 96, "Cortical mastoidectomy" if wide else "Mastoidectomy", 20, weight=600)
-    steps = (("Cortex opened", 2), ("Sinus plate shown", 1), ("Tegmen followed", 0), ("Antrum opened", 0), ("Canal wall thinned", 0), ("Facial recess", 0))
+    steps = (
+        ("Cortex opened", 2),
+        ("Sinus plate shown", 1),
+        ("Tegmen followed", 0),
+        ("Antrum opened", 0),
+        ("Canal wall thinned", 0),
+        ("Facial recess", 0),
+    )
     for n, (t, st) in enumerate(steps):
         yy = 116 + n * 48
         if st == 1:
@@ -559,7 +749,9 @@ def teach(w, h, name):
         if st == 2:
             s.icon("circle-check", 20, yy + 10, 24, STATUS["good"])
         else:
-            s.add(f'<circle cx="32" cy="{yy + 22}" r="9" fill="none" stroke="{C["text"] if st == 1 else C["line"]}" stroke-width="2"/>')
+            s.add(
+                f'<circle cx="32" cy="{yy + 22}" r="9" fill="none" stroke="{C["text"] if st == 1 else C["line"]}" stroke-width="2"/>'
+            )
         s.text(56, yy + 28, t, 16, C["text"] if st else C["quiet"], 600 if st == 1 else 400)
         if st == 1 and wide:
             s.text(lp - 20, yy + 28, "46 %", 16, anchor="end")
@@ -583,9 +775,15 @@ def teach(w, h, name):
     s.text(x + 12, 304, "7 K 4 – 2 9 M", 20, weight=600)
     s.icon("lock", x + pw - 36, 272, 24, C["quiet"])
     s.text(x, 352, "Haptic guidance", 16, weight=600)
-    s.segments(x, 364, ("Off", "Show", "Guide", "Fade") if wide else ("Off", "Show", "Guide"), 2, (56, 72, 80, 80) if wide else (56, 80, 96))
-    s.slider(x, 416, pw, "Pull at most", "2.0 N", .33)
-    s.slider(x, 464, pw, "Tolerance radius", "5 mm", .5)
+    s.segments(
+        x,
+        364,
+        ("Off", "Show", "Guide", "Fade") if wide else ("Off", "Show", "Guide"),
+        2,
+        (56, 72, 80, 80) if wide else (56, 80, 96),
+    )
+    s.slider(x, 416, pw, "Pull at most", "2.0 N", 0.33)
+    s.slider(x, 464, pw, "Tolerance radius", "5 mm", 0.5)
     s.switch(x, 524, pw, "Hints for the trainee", False)
     if h > 800:
         s.switch(x, 568, pw, "Nerve monitor", True)
@@ -601,7 +799,12 @@ def teach(w, h, name):
 
 
 def components(name):
-    s = Sketch(1440, 900, "Components", "Each component once, with its states, in the dark and the light theme; instruments and burrs in true size.")
+    s = Sketch(
+        1440,
+        900,
+        "Components",
+        "Each component once, with its states, in the dark and the light theme; instruments and burrs in true size.",
+    )
     global C
     for k, theme in enumerate((DARK, LIGHT)):
         C = theme
@@ -629,7 +832,7 @@ def components(name):
         s.text(x0 + 504, y + 54, "what hovering shows", 14, C["quiet"])
         y = 264
         s.text(x0 + 24, y + 16, "Slider, its text beside it; switch; choice", 14, C["quiet"])
-        s.slider(x0 + 24, y + 24, 208, "Kerf", "1.0 mm", .4)
+        s.slider(x0 + 24, y + 24, 208, "Kerf", "1.0 mm", 0.4)
         s.switch(x0 + 264, y + 32, 160, "Bone dust", True)
         s.switch(x0 + 264, y + 68, 160, "Heat", False)
         s.segments(x0 + 456, y + 36, ("Cutting", "Diamond"), 0, (96, 104))
@@ -662,7 +865,13 @@ def components(name):
         s.text(x0 + 492, y + 84, "Show in folder", 16, C["text"], 600)
         s.text(x0 + 448, y + 132, "Type: 14, 16, 20, 24", 14, C["quiet"])
         for n, z in enumerate((14, 16, 20, 24)):
-            s.text(x0 + 448 + (0, 52, 110, 172)[n], y + 168, "1.4 mm"[: 6 if z < 20 else 3], z, weight=600 if z > 16 else 400)
+            s.text(
+                x0 + 448 + (0, 52, 110, 172)[n],
+                y + 168,
+                "1.4 mm"[: 6 if z < 20 else 3],
+                z,
+                weight=600 if z > 16 else 400,
+            )
         y = 720
         s.text(x0 + 24, y + 8, "Burrs at 3.78 pixels a mm (96 a inch): cutting, diamond; instruments", 14, C["quiet"])
         for mm in range(1, 8):
@@ -685,11 +894,32 @@ for w, h in ((1440, 900), (1024, 700)):
     review(w, h, f"review-{size}.svg")
     teach(w, h, f"teach-{size}.svg")
 operate(1440, 900, "operate-first.svg", key_card, message=None)
-operate(1440, 900, "operate-commands.svg", palette, near=("contact", "sigmoid sinus", "contact", 1), message=("contact", "Contact: sigmoid sinus", True))
+operate(
+    1440,
+    900,
+    "operate-commands.svg",
+    palette,
+    near=("contact", "sigmoid sinus", "contact", 1),
+    message=("contact", "Contact: sigmoid sinus", True),
+)
 components("components.svg")
 
 print("| pair | dark | light | high contrast | needs |\n|---|---|---|---|---|")
-for a, b, n in (("text", "ground", 4.5), ("text", "surface", 4.5), ("text", "raised", 4.5), ("quiet", "surface", 4.5), ("quiet", "raised", 4.5), ("accent", "surface", 3), ("accent", "raised", 3), ("line", "surface", 3), ("line", "raised", 3)):
+for a, b, n in (
+    ("text", "ground", 4.5),
+    ("text", "surface", 4.5),
+    ("text", "raised", 4.5),
+    ("quiet", "surface", 4.5),
+    ("quiet", "raised", 4.5),
+    ("accent", "surface", 3),
+    ("accent", "raised", 3),
+    ("line", "surface", 3),
+    ("line", "raised", 3),
+):
     print(f"| {a} on {b} | " + " | ".join(f"{ratio(t[a], t[b]):.1f}" for t in (DARK, LIGHT, HIGH)) + f" | {n} |")
 for k, v in STATUS.items():
-    print(f"| {k} on surface, sign | " + " | ".join(f"{ratio(v, t['surface']):.1f}" for t in (DARK, LIGHT, HIGH)) + f" | 3 |  black on it {ratio(v, '#000000'):.1f}")
+    print(
+        f"| {k} on surface, sign | "
+        + " | ".join(f"{ratio(v, t['surface']):.1f}" for t in (DARK, LIGHT, HIGH))
+        + f" | 3 |  black on it {ratio(v, '#000000'):.1f}"
+    )

@@ -3,6 +3,7 @@
 
 usage: build/readers/bin/python3 docs/images/make.py build/release/bin
 """
+
 import pathlib, shutil, subprocess, sys, tempfile
 
 import numpy as np, pydicom, SimpleITK as sitk
@@ -38,6 +39,7 @@ def variant(folder, change):
 osteo("phantom", "ct.nrrd", "--labels-out", "labels.nrrd", "--spacing-mm", 1)
 osteo("import", "ct.nrrd", "head")
 
+
 # Hard cases: what a plain stack of slices shows, and what import shows.
 def tilt(d, i):
     # The gantry leans, not the head: each slice sees the head further back, and says so in its position.
@@ -45,12 +47,14 @@ def tilt(d, i):
     rows = round(0.3346 * z / float(d.PixelSpacing[0]))
     p = np.full_like(d.pixel_array, d.pixel_array.min())
     n = p.shape[0]
-    p[max(0, -rows):n - max(0, rows)] = d.pixel_array[max(0, rows):n - max(0, -rows)]
+    p[max(0, -rows) : n - max(0, rows)] = d.pixel_array[max(0, rows) : n - max(0, -rows)]
     d.PixelData = p.tobytes()
     d.ImagePositionPatient = [x, y + rows * float(d.PixelSpacing[0]), z]
 
+
 def uneven(d, i):
     return i < 110 or i % 3 == 0
+
 
 for name, change in (("tilt", tilt), ("uneven", uneven)):
     variant(name, change)
@@ -77,11 +81,14 @@ for k in range(8):
     angle = k * np.pi / 8
     ray = np.abs(dx * np.sin(angle) - dy * np.cos(angle)) < 1
     scene[ray & (np.abs(dz) < 3) & (np.hypot(dx, dy) < 45) & (a > -500)] += 650
-scene[np.sqrt(dx ** 2 + dy ** 2 + dz ** 2) < 4] = 3500
+scene[np.sqrt(dx**2 + dy**2 + dz**2) < 4] = 3500
 out = sitk.GetImageFromArray(scene)
 out.CopyInformation(ct)
 sitk.WriteImage(out, str(work / "scene.nrrd"))
-at = ",".join(str(round(v, 1)) for v in ct.TransformContinuousIndexToPhysicalPoint([float(tooth[2]), float(tooth[1]) + 3, float(tooth[0])]))
+at = ",".join(
+    str(round(v, 1))
+    for v in ct.TransformContinuousIndexToPhysicalPoint([float(tooth[2]), float(tooth[1]) + 3, float(tooth[0])])
+)
 osteo("threshold", "scene.nrrd", "plain.nrrd", "--lower", 500)
 osteo("threshold", "scene.nrrd", "table.nrrd", "--lower", 500, "--remove-table")
 osteo("threshold", "scene.nrrd", "clean.nrrd", "--lower", 500, "--remove-table", "--metal-mm", 50, "--metal-lower", 900)
@@ -112,7 +119,18 @@ shutil.copy(work / "o.nrrd.verdict.svg", here / "guide-refused.svg")
 
 for preset in ("cortical", "thin"):
     osteo("threshold", "ct.nrrd", preset + ".nrrd", "--preset", preset)
-    osteo("crop", "ct.nrrd", "ear.nrrd", "--region", "left_temporal", "--labels", preset + ".nrrd", "--labels-out", "ear-mask.nrrd", "--force")
+    osteo(
+        "crop",
+        "ct.nrrd",
+        "ear.nrrd",
+        "--region",
+        "left_temporal",
+        "--labels",
+        preset + ".nrrd",
+        "--labels-out",
+        "ear-mask.nrrd",
+        "--force",
+    )
     picture("ear.nrrd", f"guide-preset-{preset}.png", "--mask", "ear-mask.nrrd", "--view", "left")
 
 # Structures: the phantom's own labels beside its bone.
@@ -123,15 +141,45 @@ inside[~np.isin(inside, (5, 6, 7))] = 0
 only = sitk.GetImageFromArray(inside)
 only.CopyInformation(labels)
 sitk.WriteImage(only, str(work / "inside.nrrd"))
-osteo("structures", "inside.nrrd", "inside.seg.nrrd", "--image", "ear-ct.nrrd", "--names", "5=ossicles, 6=facial nerve, 7=sigmoid sinus")
+osteo(
+    "structures",
+    "inside.nrrd",
+    "inside.seg.nrrd",
+    "--image",
+    "ear-ct.nrrd",
+    "--names",
+    "5=ossicles, 6=facial nerve, 7=sigmoid sinus",
+)
 osteo("threshold", "ear-ct.nrrd", "ear-bone.nrrd", "--lower", 500)
 osteo("resample", "ear-ct.nrrd", "ear-bone.nrrd", "ear.vdb")
 osteo("surface", "ear.vdb", "ear.ply")
 picture("ear-ct.nrrd", "guide-structures.png", "--mask", "inside.seg.nrrd", "--surface", "ear.ply", "--view", "left")
 # The phantom itself (docs/validation/phantom.md, README).
 osteo("phantom", "fine-ear.nrrd", "--region", "temporal", "--spacing-mm", 0.4, "--noise-hu", 5)
-osteo("snapshot", "fine-ear.nrrd", here / "phantom-ear.png", "--force", "--centre-mm", "42.6,3,-15.5", "--view", "left", "--bone-hu", 500)
-osteo("snapshot", "ct.nrrd", here / "phantom-head.png", "--force", "--centre-mm", "50,10,-19", "--view", "front", "--bone-hu", 500)
+osteo(
+    "snapshot",
+    "fine-ear.nrrd",
+    here / "phantom-ear.png",
+    "--force",
+    "--centre-mm",
+    "42.6,3,-15.5",
+    "--view",
+    "left",
+    "--bone-hu",
+    500,
+)
+osteo(
+    "snapshot",
+    "ct.nrrd",
+    here / "phantom-head.png",
+    "--force",
+    "--centre-mm",
+    "50,10,-19",
+    "--view",
+    "front",
+    "--bone-hu",
+    500,
+)
 osteo("snapshot", "ct.nrrd", here / "preview.png", "--force", "--bone-hu", 500)
 
 # A temporal bone's surface as tetrahedra that follow it.

@@ -4,6 +4,7 @@ phantom: bone only, nobody's.
 
 usage: build/readers/bin/python3 docs/images/make_window.py build/release/bin [window] [pieces] [mandible] [mastoid]
 """
+
 import pathlib, sys, tempfile
 
 here = pathlib.Path(__file__).resolve().parent
@@ -24,7 +25,9 @@ def keep(path, name):
     picture = Image.open(path).convert("RGB")
     picture.save(here / name, optimize=True)
     if (here / name).stat().st_size > 300_000:
-        picture.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.FLOYDSTEINBERG).save(here / name, optimize=True)
+        picture.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.FLOYDSTEINBERG).save(
+            here / name, optimize=True
+        )
     assert (here / name).stat().st_size < 300_000, (name, (here / name).stat().st_size)
 
 
@@ -45,8 +48,21 @@ def temporal():
     if pathlib.Path("ear").exists():
         return
     osteo("phantom", "ear.nrrd", "--labels-out", "labels.nrrd", "--region", "temporal", "--spacing-mm", 0.5, "--quiet")
-    osteo("prepare", "ear.nrrd", "-o", "ear", "--lower", 500, "--spacing-mm", 0.4, "--structures", "labels.nrrd", "--names",
-          "5=ossicles, 6=facial nerve, 7=sigmoid sinus", "--quiet")
+    osteo(
+        "prepare",
+        "ear.nrrd",
+        "-o",
+        "ear",
+        "--lower",
+        500,
+        "--spacing-mm",
+        0.4,
+        "--structures",
+        "labels.nrrd",
+        "--names",
+        "5=ossicles, 6=facial nerve, 7=sigmoid sinus",
+        "--quiet",
+    )
     session("ear", "mastoid.json", "cavity", "--dust")
 
 
@@ -73,7 +89,11 @@ if "window" in wanted:
             w.key("bracketright", "larger", lambda s: s["magnification"] > now and not s["camera_moves"])
         w.x("mousemove", 700, 400)
         w.next()
-        w.key("f", "at the bone, or as near as the cavity lets it", lambda s: not s["leading"] and ("brought" in s["message"] or "nearer" in s["message"]))
+        w.key(
+            "f",
+            "at the bone, or as near as the cavity lets it",
+            lambda s: not s["leading"] and ("brought" in s["message"] or "nearer" in s["message"]),
+        )
         shot(w, "seen", "window.png")
         w.close()
 if "pieces" in wanted:
@@ -83,7 +103,9 @@ if "pieces" in wanted:
         w.key("l", "a plate", lambda s: s["hand"] == "plate")
         w.x("mousemove", 690, 470)
         w.next()
-        w.key("f", "at the bone", lambda s: not s["leading"] and ("brought" in s["message"] or "nearer" in s["message"]))
+        w.key(
+            "f", "at the bone", lambda s: not s["leading"] and ("brought" in s["message"] or "nearer" in s["message"])
+        )
         for _ in range(60):
             if w.next()["force_n"] > 0.5:
                 break

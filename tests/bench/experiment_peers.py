@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """dtaidistance's warping path on the curves that experiment_bench wrote, in the same run. usage: experiment_peers.py BENCH FOLDER
 python3 -m venv build/peers-experiment && build/peers-experiment/bin/pip install dtaidistance==2.5.1 numpy"""
+
 import pathlib, subprocess, sys, time
 
 import numpy as np
@@ -13,7 +14,10 @@ for _ in range(5):
     for file in sorted(pathlib.Path(sys.argv[2]).glob("trial-*.csv")):
         a, b = np.ascontiguousarray(np.loadtxt(file, delimiter=",", skiprows=1).T)
         times = {"ours": [float(file.read_text().split("\n", 1)[0])]}
-        for name, call in {"warping_path_fast": lambda: dtw.warping_path_fast(a, b), "distance_fast (no path)": lambda: dtw.distance_fast(a, b)}.items():
+        for name, call in {
+            "warping_path_fast": lambda: dtw.warping_path_fast(a, b),
+            "distance_fast (no path)": lambda: dtw.distance_fast(a, b),
+        }.items():
             for _ in range(6):
                 begun = time.perf_counter()
                 call()
@@ -23,4 +27,8 @@ for _ in range(5):
 print(said)
 for trial in sorted({t for t, _ in best}):
     ours = best[trial, "ours"]
-    print(trial, f"ours {ours:.3f} ms,", ", ".join(f"{k} {v:.2f} ms ({v / ours:.0f} times)" for (t, k), v in best.items() if t == trial and k != "ours"))
+    print(
+        trial,
+        f"ours {ours:.3f} ms,",
+        ", ".join(f"{k} {v:.2f} ms ({v / ours:.0f} times)" for (t, k), v in best.items() if t == trial and k != "ours"),
+    )

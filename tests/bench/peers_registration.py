@@ -20,7 +20,9 @@ for who, start in (("moments", sitk.CenteredTransformInitializerFilter.MOMENTS),
     r.SetMetricSamplingPercentage(0.1, 1)
     r.SetInterpolator(sitk.sitkLinear)
     # Plain gradient descent, as in most examples, stops by its convergence window millimetres off.
-    r.SetOptimizerAsRegularStepGradientDescent(learningRate=2.0, minStep=1e-3, numberOfIterations=300, gradientMagnitudeTolerance=1e-8)
+    r.SetOptimizerAsRegularStepGradientDescent(
+        learningRate=2.0, minStep=1e-3, numberOfIterations=300, gradientMagnitudeTolerance=1e-8
+    )
     r.SetOptimizerScalesFromPhysicalShift()
     r.SetShrinkFactorsPerLevel([4, 2, 1])
     r.SetSmoothingSigmasPerLevel([2, 1, 0])

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The tables of docs/validation/trainee.md from what trainee_bench wrote: trainee_table.py FOLDER. Needs numpy."""
+
 import itertools, json, sys
 import numpy as np
 
@@ -80,35 +81,86 @@ skills = {s: np.array([d["skill"][s] for d in data]) for s in SKILLS}
 runs = [metrics_of(d) for d in data]
 print(f"## {len(runs)} runs, every skill by itself\n")
 print("| metric | runs | " + " | ".join(SKILLS) + " |\n|---|" + "---|" * (len(SKILLS) + 1))
-shown = ["seen_share", "hidden_mm3", "force_p95_n", "force_median_n", "force_peak_n", "force_above_band_share, mean", "excess_force_ns, all",
-         "region_log_ratio", "region_per_voxel", "region_thesis", "target_share[mastoid cells]", "outside_target_mm3", "path_mm", "duration_s",
-         "drilling_s", "removed_mm3", "rate_mm3_per_s", "stroke_mm", "stroke_s", "stroke_mm / stroke_s", "stroke_variance", "sparc",
-         "ldlj", "injured_s, all", "forbidden_mm3[wall of the ear canal]", "burr_choice_share", "camera_moves", "camera_s", "items_passed"]
-extra = sorted({k for r in runs for k in r if k.startswith(("sparc", "ldlj", "log_dimensionless", "tremor"))} - set(shown))
+shown = [
+    "seen_share",
+    "hidden_mm3",
+    "force_p95_n",
+    "force_median_n",
+    "force_peak_n",
+    "force_above_band_share, mean",
+    "excess_force_ns, all",
+    "region_log_ratio",
+    "region_per_voxel",
+    "region_thesis",
+    "target_share[mastoid cells]",
+    "outside_target_mm3",
+    "path_mm",
+    "duration_s",
+    "drilling_s",
+    "removed_mm3",
+    "rate_mm3_per_s",
+    "stroke_mm",
+    "stroke_s",
+    "stroke_mm / stroke_s",
+    "stroke_variance",
+    "sparc",
+    "ldlj",
+    "injured_s, all",
+    "forbidden_mm3[wall of the ear canal]",
+    "burr_choice_share",
+    "camera_moves",
+    "camera_s",
+    "items_passed",
+]
+extra = sorted(
+    {k for r in runs for k in r if k.startswith(("sparc", "ldlj", "log_dimensionless", "tremor"))} - set(shown)
+)
 for name in shown + extra:
     values = column(runs, name)
     if not np.isfinite(values).any():
         continue
     row = [rho(skills[s], values) for s in SKILLS]
-    print(f"| `{name}` | {row[0][1]} | " + " | ".join(("**%.2f**" if abs(r) >= 0.85 else "%.2f") % r if np.isfinite(r) else "-" for r, _ in row) + " |")
+    print(
+        f"| `{name}` | {row[0][1]} | "
+        + " | ".join(("**%.2f**" if abs(r) >= 0.85 else "%.2f") % r if np.isfinite(r) else "-" for r, _ in row)
+        + " |"
+    )
 
 print("\n## With the other skills held: partial rank correlation (interval of 95 %)\n")
 print("| metric | " + " | ".join(SKILLS) + " | explained by all |\n|---|" + "---|" * (len(SKILLS) + 1))
-for name in ["seen_share", "hidden_mm3", "force_p95_n", "force_median_n", "force_above_band_share, mean", "region_per_voxel", "items_passed"]:
+for name in [
+    "seen_share",
+    "hidden_mm3",
+    "force_p95_n",
+    "force_median_n",
+    "force_above_band_share, mean",
+    "region_per_voxel",
+    "items_passed",
+]:
     values = column(runs, name)
     if not np.isfinite(values).any():
         continue
     cells = []
     for s in SKILLS:
         r, lo, hi = partial(skills[s], values, [skills[o] for o in SKILLS if o != s])
-        cells.append("-" if not np.isfinite(r) else ("**%.2f** (%.2f, %.2f)" if lo * hi > 0 else "%.2f (%.2f, %.2f)") % (r, lo, hi))
+        cells.append(
+            "-"
+            if not np.isfinite(r)
+            else ("**%.2f** (%.2f, %.2f)" if lo * hi > 0 else "%.2f (%.2f, %.2f)") % (r, lo, hi)
+        )
     print(f"| `{name}` | " + " | ".join(cells) + f" | {explained(values, [skills[s] for s in SKILLS]):.2f} |")
 
 alone = json.load(open(folder + "/alone.json"))
 print("\n## Bars: all skills vary at once, and this one alone\n")
-for skill, name, bar in [("undercut", "seen_share", 0.9), ("force_control", "force_p95_n", 0.9), ("region", "region_per_voxel", 0.85),
-                         ("region", "region_log_ratio", 0.85), ("force_control", "force_peak_n", 0.9),
-                         ("force_control", "force_above_band_share, mean", 0.9), ("force_control", "excess_force_ns, all", 0.9)]:
+for skill, name, bar in [
+    ("undercut", "seen_share", 0.9),
+    ("force_control", "force_p95_n", 0.9),
+    ("region", "region_per_voxel", 0.85),
+    ("region", "region_log_ratio", 0.85),
+    ("force_control", "force_peak_n", 0.9),
+    ("force_control", "force_above_band_share, mean", 0.9),
+    ("force_control", "excess_force_ns, all", 0.9),
+]:
     r, n = rho(skills[skill], column(runs, name))
     mine = [d for d in alone if d["name"].rstrip("0123456789") == skill]
     a, m = rho(np.array([d["skill"][skill] for d in mine]), column([metrics_of(d) for d in mine], name))
@@ -129,7 +181,9 @@ for d in data + people + alone:
             judged += 1
             draws += (not ok) and abs(item["margin"]) < 0.2
             same += ok
-print(f"\n## Items against the trainee's own truth: {same} of {judged} agree ({same / max(1, judged):.3f}); {draws} of the others a draw\n")
+print(
+    f"\n## Items against the trainee's own truth: {same} of {judged} agree ({same / max(1, judged):.3f}); {draws} of the others a draw\n"
+)
 for name, (n, m, f) in by_item.items():
     print(f"| {name} | {n} | {f} failed by truth | {m / n:.3f} |")
 
@@ -138,10 +192,14 @@ names = sorted({d["name"].rsplit("-", 1)[0] for d in people})
 per = {n: [metrics_of(d) for d in people if d["name"].rsplit("-", 1)[0] == n] for n in names}
 experts, novices = [n for n in names if n[0] == "E"], [n for n in names if n[0] == "N"]
 rng = np.random.default_rng(1)
-print(f"\n## Separation: 200 draws of 8 of {len(experts)} experts and 7 of {len(novices)} novices, Mann-Whitney exact, two-sided, p < 0.05\n")
+print(
+    f"\n## Separation: 200 draws of 8 of {len(experts)} experts and 7 of {len(novices)} novices, Mann-Whitney exact, two-sided, p < 0.05\n"
+)
 draws = [(rng.choice(len(experts), 8, False), rng.choice(len(novices), 7, False)) for _ in range(200)]
 for name in ["seen_share", "region_per_voxel", "region_thesis", "force_p95_n", "items_passed", "path_mm", "duration_s"]:
-    value = lambda who: np.array([np.nanmean([np.nan if m.get(name) is None else m[name] for m in per[n]]) for n in who])
+    value = lambda who: np.array(
+        [np.nanmean([np.nan if m.get(name) is None else m[name] for m in per[n]]) for n in who]
+    )
     e, v = value(experts), value(novices)
     found = np.mean([exact_p(e[a], v[b]) < 0.05 for a, b in draws])
     print(f"| `{name}` | {np.mean(e):.3g} | {np.mean(v):.3g} | {100 * found:.1f} % |")

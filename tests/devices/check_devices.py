@@ -3,6 +3,7 @@
 
 usage: check_devices.py BIN_DIR WORK_DIR      exits 77 (skipped) where umockdev is missing
 """
+
 import json, os, pathlib, shutil, signal, struct, subprocess, sys, threading
 
 bin_dir, work = (pathlib.Path(a).resolve() for a in sys.argv[1:3])
@@ -13,7 +14,31 @@ shutil.rmtree(work, ignore_errors=True)
 work.mkdir(parents=True)
 
 # A vendor's page with one input of 64 bytes: enough for hidapi to tell page and usage.
-DESCRIPTOR = bytes([0x06, 0x00, 0xFF, 0x09, 0x01, 0xA1, 0x01, 0x15, 0x00, 0x26, 0xFF, 0x00, 0x75, 0x08, 0x95, 0x40, 0x09, 0x01, 0x81, 0x02, 0xC0])
+DESCRIPTOR = bytes(
+    [
+        0x06,
+        0x00,
+        0xFF,
+        0x09,
+        0x01,
+        0xA1,
+        0x01,
+        0x15,
+        0x00,
+        0x26,
+        0xFF,
+        0x00,
+        0x75,
+        0x08,
+        0x95,
+        0x40,
+        0x09,
+        0x01,
+        0x81,
+        0x02,
+        0xC0,
+    ]
+)
 
 
 def device(name, vendor, product, label):
@@ -59,7 +84,9 @@ A: bcdDevice=0100\\n
 """
     (work / f"{name}.umockdev").write_text(text)
     size, body = struct.pack("<i", len(DESCRIPTOR)), struct.pack("<I", len(DESCRIPTOR)) + DESCRIPTOR.ljust(4096, b"\0")
-    (work / f"{name}.ioctl").write_text(f"@DEV /dev/hidraw0\nHIDIOCGRDESCSIZE 0 {size.hex().upper()}\nHIDIOCGRDESC 0 {body.hex().upper()}\n")
+    (work / f"{name}.ioctl").write_text(
+        f"@DEV /dev/hidraw0\nHIDIOCGRDESCSIZE 0 {size.hex().upper()}\nHIDIOCGRDESC 0 {body.hex().upper()}\n"
+    )
 
 
 def script(name, reports):
@@ -86,7 +113,13 @@ def run(name, *args):
 
 def watch(name, *expected):
     """Watches until every expected text was printed, in lines as they come; returns all that was. Fails after two minutes without."""
-    process = subprocess.Popen(command(name, "devices", "--watch", "600"), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
+    process = subprocess.Popen(
+        command(name, "devices", "--watch", "600"),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
     stop = threading.Timer(120, lambda: os.killpg(process.pid, signal.SIGKILL))
     stop.start()
     out = ""
@@ -108,7 +141,9 @@ def watch(name, *expected):
 device("mouse", 0x046D, 0xC626, "SpaceNavigator")
 listed = json.loads(run("mouse", "devices", "--json"))
 assert len(listed) == 1 and listed[0]["device"] == "3Dconnexion SpaceMouse" and listed[0]["readable"], listed
-assert listed[0]["vendor"] == "046d" and listed[0]["product"] == "c626" and listed[0]["name"] == "SpaceNavigator", listed
+assert (
+    listed[0]["vendor"] == "046d" and listed[0]["product"] == "c626" and listed[0]["name"] == "SpaceNavigator"
+), listed
 print("ok  SpaceMouse: found, opened")
 
 move = struct.pack("<Bhhh", 1, 350, -175, 0)
@@ -122,7 +157,13 @@ watch("pedal", "pedals 1", "pedals 5", "pedals 0")
 print("ok  foot pedal")
 
 device("arm", 0x16C0, 0x0486, "Polhem")
-script("arm", [struct.pack("<7h", 100, -200, 300, 10044, 5, 6, 0).ljust(64, b"\1"), struct.pack("<7h", 101, -201, 301, 44, 5, 6, 0).ljust(64, b"\1")])
+script(
+    "arm",
+    [
+        struct.pack("<7h", 100, -200, 300, 10044, 5, 6, 0).ljust(64, b"\1"),
+        struct.pack("<7h", 101, -201, 301, 44, 5, 6, 0).ljust(64, b"\1"),
+    ],
+)
 watch("arm", "encoders 100 -200 300 44 5 6  button", "encoders 101 -201 301 44 5 6\n")
 print("ok  WoodenHaptics: encoders, button")
 

@@ -8,6 +8,7 @@ built in a copy of the sources and given to the unit tests named for its library
 anew. A mutant that computes the same as the original is listed in equivalent.txt with the reason, and counts for neither side.
 Exit code 1 when fewer than 80 % are caught.
 """
+
 import argparse, concurrent.futures, os, pathlib, random, re, resource, shutil, subprocess, sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -27,11 +28,24 @@ LIBRARIES = {
 SKIPPED = re.compile(r"/(overlap_avx\w*|default_script)\.cpp$")
 # What is written, what is written instead. Each acts on one match in a line.
 OPERATORS = [
-    (r"(?<= )<(?= )", ["<=", ">"]), (r"(?<= )<=(?= )", ["<", ">"]), (r"(?<= )>(?= )", [">=", "<"]), (r"(?<= )>=(?= )", [">", "<"]),
-    (r"(?<= )==(?= )", ["!="]), (r"(?<= )!=(?= )", ["=="]), (r"(?<= )&&(?= )", ["||"]), (r"(?<= )\|\|(?= )", ["&&"]),
-    (r"(?<=[\w)\]] )\+(?= [\w(])", ["-"]), (r"(?<=[\w)\]] )-(?= [\w(])", ["+"]), (r"(?<=[\w)\]] )\*(?= [\w(])", ["/"]),
-    (r"\+=", ["-="]), (r"-=", ["+="]), (r"\btrue\b", ["false"]), (r"\bfalse\b", ["true"]),
-    (r"(?<=if \()(?=!?\w)", ["false && "]), (r"\bstd::min\b", ["std::max"]), (r"\bstd::max\b", ["std::min"]),
+    (r"(?<= )<(?= )", ["<=", ">"]),
+    (r"(?<= )<=(?= )", ["<", ">"]),
+    (r"(?<= )>(?= )", [">=", "<"]),
+    (r"(?<= )>=(?= )", [">", "<"]),
+    (r"(?<= )==(?= )", ["!="]),
+    (r"(?<= )!=(?= )", ["=="]),
+    (r"(?<= )&&(?= )", ["||"]),
+    (r"(?<= )\|\|(?= )", ["&&"]),
+    (r"(?<=[\w)\]] )\+(?= [\w(])", ["-"]),
+    (r"(?<=[\w)\]] )-(?= [\w(])", ["+"]),
+    (r"(?<=[\w)\]] )\*(?= [\w(])", ["/"]),
+    (r"\+=", ["-="]),
+    (r"-=", ["+="]),
+    (r"\btrue\b", ["false"]),
+    (r"\bfalse\b", ["true"]),
+    (r"(?<=if \()(?=!?\w)", ["false && "]),
+    (r"\bstd::min\b", ["std::max"]),
+    (r"\bstd::max\b", ["std::min"]),
     (r"(?<![\w.])\d+\.\d+(?![\w.])", [lambda m: repr(float(m) * 1.5 + (float(m) == 0) * 0.5)]),
 ]
 STATEMENT = re.compile(r"^\s+(\+\+[\w.\->\[\]]+|[\w.\->]+\([^;{}]*\)|[\w.\->\[\]]+ (?:\+|-|\|)?= [^;{}]*);\s*(//.*)?$")
@@ -47,14 +61,23 @@ def sites(library):
             for number, line in enumerate(path.read_text().splitlines()):
                 code = line.split("//")[0]
                 # Messages, assertions and declarations are not behaviour.
-                if not line.startswith("  ") or code.strip().startswith(("#", "*", "static_assert", "using", "template", "throw", '"')) or '"' in code:
+                if (
+                    not line.startswith("  ")
+                    or code.strip().startswith(("#", "*", "static_assert", "using", "template", "throw", '"'))
+                    or '"' in code
+                ):
                     continue
                 for expression, replacements in OPERATORS:
                     for m in re.finditer(expression, code):
                         for r in replacements:
                             text = r(m.group()) if callable(r) else r
-                            found.append((path, number, line, line[: m.start()] + text + line[m.end():]))
-                if STATEMENT.match(code) and "return" not in code and ".reserve(" not in code and not re.match(r"\s+(const|auto|static)\b", code):
+                            found.append((path, number, line, line[: m.start()] + text + line[m.end() :]))
+                if (
+                    STATEMENT.match(code)
+                    and "return" not in code
+                    and ".reserve(" not in code
+                    and not re.match(r"\s+(const|auto|static)\b", code)
+                ):
                     found.append((path, number, line, re.match(r"\s*", line).group() + ";"))
     return found
 
@@ -65,7 +88,12 @@ class Worker:
     def __init__(self, folder):
         self.folder, self.build = folder, folder / "build/release"
         folder.mkdir(parents=True, exist_ok=True)
-        files = subprocess.run(["git", "-C", ROOT, "ls-files", "--cached", "--others", "--exclude-standard"], capture_output=True, text=True, check=True).stdout.split("\n")
+        files = subprocess.run(
+            ["git", "-C", ROOT, "ls-files", "--cached", "--others", "--exclude-standard"],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.split("\n")
         for name in filter(None, files):
             source, target = ROOT / name, folder / name
             if source.is_file() and not (target.exists() and target.read_bytes() == source.read_bytes()):
@@ -73,20 +101,36 @@ class Worker:
                 shutil.copy2(source, target)
         # Each source alone, so that one change is one small compilation.
         options = ["-DCMAKE_BUILD_TYPE=Release", "-DOSTEO_UNITY=0", f"-DOSTEO_SHARED_DATA={ROOT}/../shared/data"]
-        subprocess.run(["cmake", "-S", folder, "-B", self.build, "-G", "Ninja", *options], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(
+            ["cmake", "-S", folder, "-B", self.build, "-G", "Ninja", *options], check=True, stdout=subprocess.DEVNULL
+        )
 
     def make(self, targets):
         return subprocess.run(["ninja", "-C", self.build, *targets], capture_output=True, text=True)
 
     def test(self, name):
         """None when all pass, else the name of the first that fails."""
-        limit = lambda: (resource.setrlimit(resource.RLIMIT_CPU, (240, 240)), resource.setrlimit(resource.RLIMIT_CORE, (0, 0)))
+        limit = lambda: (
+            resource.setrlimit(resource.RLIMIT_CPU, (240, 240)),
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0)),
+        )
         env = dict(os.environ, OSTEO_EDITS="3000", TMPDIR=str(self.folder / "tmp"))
         (self.folder / "tmp").mkdir(exist_ok=True)
         try:
-            done = subprocess.run([self.build / "bin" / name, "--gtest_fail_fast"], capture_output=True, text=True, errors="replace", timeout=900, env=env, preexec_fn=limit)
+            done = subprocess.run(
+                [self.build / "bin" / name, "--gtest_fail_fast"],
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=900,
+                env=env,
+                preexec_fn=limit,
+            )
         except subprocess.TimeoutExpired as e:
-            return last_started(e.stdout.decode(errors="replace") if isinstance(e.stdout, bytes) else e.stdout or "") + " (hangs)"
+            return (
+                last_started(e.stdout.decode(errors="replace") if isinstance(e.stdout, bytes) else e.stdout or "")
+                + " (hangs)"
+            )
         if done.returncode == 0:
             return None
         failed = re.findall(r"\[  FAILED  \] ([\w./]+)", done.stdout)
@@ -170,7 +214,10 @@ def main():
             library = plan.pop(0)
             if row := run(worker, library):
                 rows.append(row)
-                print(f"{len(rows)}  {'caught by ' + row[4] if row[4] else 'SURVIVED'}  {row[1]}\n    {row[2]}\n    {row[3]}", flush=True)
+                print(
+                    f"{len(rows)}  {'caught by ' + row[4] if row[4] else 'SURVIVED'}  {row[1]}\n    {row[2]}\n    {row[3]}",
+                    flush=True,
+                )
 
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         for done in [pool.submit(loop, w) for w in workers]:
@@ -180,7 +227,9 @@ def main():
     text = f"Seed {options.seed}: {caught} of {len(rows)} caught.\n\n| where | was | became | caught by |\n|---|---|---|---|\n"
     cell = lambda s: "`" + s.replace("|", "\\|") + "`"
     for _, where, was, became, by in rows:
-        text += f"| {where} | {cell(was)} | {cell(became) if became != ';' else 'left out'} | {by or '**survived**'} |\n"
+        text += (
+            f"| {where} | {cell(was)} | {cell(became) if became != ';' else 'left out'} | {by or '**survived**'} |\n"
+        )
     print(text)
     if options.table:
         options.table.write_text(text)

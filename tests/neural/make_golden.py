@@ -7,6 +7,7 @@
 Writes per case: the model's folder, image.nrrd, labels.nrrd and logits.f16 (class by class, on the network's grid).
 The unit tests of `neural` compare with these; neither Python nor torch is wanted there.
 """
+
 import json
 import os
 import pathlib
@@ -21,69 +22,150 @@ from nnunetv2.inference.predict_from_raw_data import nnUNetPredictor
 from nnunetv2.utilities.get_network_from_plans import get_network_from_plans
 from nnunetv2.utilities.plans_handling.plans_handler import PlansManager
 
-CT = {"0": {"max": 3071.0, "mean": 312.5, "median": 250.0, "min": -1024.0, "percentile_00_5": -950.0,
-            "percentile_99_5": 1730.25, "std": 401.75}}
+CT = {
+    "0": {
+        "max": 3071.0,
+        "mean": 312.5,
+        "median": 250.0,
+        "min": -1024.0,
+        "percentile_00_5": -950.0,
+        "percentile_99_5": 1730.25,
+        "std": 401.75,
+    }
+}
 
 
 def architecture(kind, dim, features, kernels, strides, blocks, decoder, norm="Instance"):
-    return {"network_class_name": "dynamic_network_architectures.architectures.unet." + kind,
-            "arch_kwargs": {"n_stages": len(features), "features_per_stage": features,
-                            "conv_op": f"torch.nn.modules.conv.Conv{dim}d", "kernel_sizes": kernels,
-                            "strides": strides,
-                            ("n_conv_per_stage" if kind == "PlainConvUNet" else "n_blocks_per_stage"): blocks,
-                            "n_conv_per_stage_decoder": decoder, "conv_bias": True,
-                            "norm_op": f"torch.nn.modules.{norm.lower()}norm.{norm}Norm{dim}d",
-                            "norm_op_kwargs": {"eps": 1e-05, "affine": True}, "dropout_op": None,
-                            "dropout_op_kwargs": None, "nonlin": "torch.nn.LeakyReLU",
-                            "nonlin_kwargs": {"inplace": True}},
-            "_kw_requires_import": ["conv_op", "norm_op", "dropout_op", "nonlin"]}
+    return {
+        "network_class_name": "dynamic_network_architectures.architectures.unet." + kind,
+        "arch_kwargs": {
+            "n_stages": len(features),
+            "features_per_stage": features,
+            "conv_op": f"torch.nn.modules.conv.Conv{dim}d",
+            "kernel_sizes": kernels,
+            "strides": strides,
+            ("n_conv_per_stage" if kind == "PlainConvUNet" else "n_blocks_per_stage"): blocks,
+            "n_conv_per_stage_decoder": decoder,
+            "conv_bias": True,
+            "norm_op": f"torch.nn.modules.{norm.lower()}norm.{norm}Norm{dim}d",
+            "norm_op_kwargs": {"eps": 1e-05, "affine": True},
+            "dropout_op": None,
+            "dropout_op_kwargs": None,
+            "nonlin": "torch.nn.LeakyReLU",
+            "nonlin_kwargs": {"inplace": True},
+        },
+        "_kw_requires_import": ["conv_op", "norm_op", "dropout_op", "nonlin"],
+    }
 
 
 def plans_of(name, configuration, transpose=(0, 1, 2)):
-    configuration = dict({
-        "data_identifier": "nnUNetPlans_" + name, "preprocessor_name": "DefaultPreprocessor", "batch_size": 2,
-        "normalization_schemes": ["CTNormalization"], "use_mask_for_norm": [False],
-        "resampling_fn_data": "resample_data_or_seg_to_shape", "resampling_fn_seg": "resample_data_or_seg_to_shape",
-        "resampling_fn_data_kwargs": {"is_seg": False, "order": 3, "order_z": 0, "force_separate_z": None},
-        "resampling_fn_seg_kwargs": {"is_seg": True, "order": 1, "order_z": 0, "force_separate_z": None},
-        "resampling_fn_probabilities": "resample_data_or_seg_to_shape",
-        "resampling_fn_probabilities_kwargs": {"is_seg": False, "order": 1, "order_z": 0, "force_separate_z": None},
-        "batch_dice": True}, **configuration)
+    configuration = dict(
+        {
+            "data_identifier": "nnUNetPlans_" + name,
+            "preprocessor_name": "DefaultPreprocessor",
+            "batch_size": 2,
+            "normalization_schemes": ["CTNormalization"],
+            "use_mask_for_norm": [False],
+            "resampling_fn_data": "resample_data_or_seg_to_shape",
+            "resampling_fn_seg": "resample_data_or_seg_to_shape",
+            "resampling_fn_data_kwargs": {"is_seg": False, "order": 3, "order_z": 0, "force_separate_z": None},
+            "resampling_fn_seg_kwargs": {"is_seg": True, "order": 1, "order_z": 0, "force_separate_z": None},
+            "resampling_fn_probabilities": "resample_data_or_seg_to_shape",
+            "resampling_fn_probabilities_kwargs": {"is_seg": False, "order": 1, "order_z": 0, "force_separate_z": None},
+            "batch_dice": True,
+        },
+        **configuration,
+    )
     back = [int(i) for i in np.argsort(transpose)]
-    return {"dataset_name": "Dataset001_Seeded", "plans_name": "nnUNetPlans", "image_reader_writer": "SimpleITKIO",
-            "transpose_forward": list(transpose), "transpose_backward": back, "configurations": {name: configuration},
-            "foreground_intensity_properties_per_channel": CT, "experiment_planner_used": "ExperimentPlanner",
-            "label_manager": "LabelManager"}
+    return {
+        "dataset_name": "Dataset001_Seeded",
+        "plans_name": "nnUNetPlans",
+        "image_reader_writer": "SimpleITKIO",
+        "transpose_forward": list(transpose),
+        "transpose_backward": back,
+        "configurations": {name: configuration},
+        "foreground_intensity_properties_per_channel": CT,
+        "experiment_planner_used": "ExperimentPlanner",
+        "label_manager": "LabelManager",
+    }
 
 
 CASES = {
     # Plans of before 2.5; two folds, all axes mirrored, an ignore label.
     "plain": dict(
-        name="3d_fullres", folds=2, mirror=(0, 1, 2), spacing=(1.1, 0.9, 0.8), shape=(15, 20, 27), zeros=2,
-        plans=plans_of("3d_fullres", {
-            "patch_size": [8, 16, 16], "spacing": [1.3, 0.75, 0.75], "UNet_class_name": "PlainConvUNet",
-            "UNet_base_num_features": 5, "unet_max_num_features": 18, "n_conv_per_stage_encoder": [2, 2, 1],
-            "n_conv_per_stage_decoder": [1, 2], "num_pool_per_axis": [1, 2, 2],
-            "pool_op_kernel_sizes": [[1, 1, 1], [1, 2, 2], [2, 2, 2]],
-            "conv_kernel_sizes": [[1, 3, 3], [3, 3, 3], [3, 3, 3]]}),
-        dataset={"labels": {"background": 0, "nerve": 1, "sinus": 2, "canal": 3, "ignore": 4}}),
+        name="3d_fullres",
+        folds=2,
+        mirror=(0, 1, 2),
+        spacing=(1.1, 0.9, 0.8),
+        shape=(15, 20, 27),
+        zeros=2,
+        plans=plans_of(
+            "3d_fullres",
+            {
+                "patch_size": [8, 16, 16],
+                "spacing": [1.3, 0.75, 0.75],
+                "UNet_class_name": "PlainConvUNet",
+                "UNet_base_num_features": 5,
+                "unet_max_num_features": 18,
+                "n_conv_per_stage_encoder": [2, 2, 1],
+                "n_conv_per_stage_decoder": [1, 2],
+                "num_pool_per_axis": [1, 2, 2],
+                "pool_op_kernel_sizes": [[1, 1, 1], [1, 2, 2], [2, 2, 2]],
+                "conv_kernel_sizes": [[1, 3, 3], [3, 3, 3], [3, 3, 3]],
+            },
+        ),
+        dataset={"labels": {"background": 0, "nerve": 1, "sinus": 2, "canal": 3, "ignore": 4}},
+    ),
     # Regions, thick slices resampled each by itself, axes exchanged.
     "residual": dict(
-        name="3d_lowres", folds=1, mirror=(1, 2), spacing=(0.7, 2.5, 0.7), shape=(22, 9, 24), zeros=0,
-        plans=plans_of("3d_lowres", {
-            "patch_size": [8, 16, 16], "spacing": [2.2, 0.8, 0.75],
-            "architecture": architecture("ResidualEncoderUNet", 3, [6, 10, 17], [[1, 3, 3], [3, 3, 3], [3, 3, 3]],
-                                         [[1, 1, 1], [1, 2, 2], [2, 2, 2]], [1, 2, 1], [1, 1])}, (1, 0, 2)),
-        dataset={"labels": {"background": 0, "ear": [1, 2, 3], "ossicles": [2, 3], "stapes": 3},
-                 "regions_class_order": [1, 2, 3]}),
+        name="3d_lowres",
+        folds=1,
+        mirror=(1, 2),
+        spacing=(0.7, 2.5, 0.7),
+        shape=(22, 9, 24),
+        zeros=0,
+        plans=plans_of(
+            "3d_lowres",
+            {
+                "patch_size": [8, 16, 16],
+                "spacing": [2.2, 0.8, 0.75],
+                "architecture": architecture(
+                    "ResidualEncoderUNet",
+                    3,
+                    [6, 10, 17],
+                    [[1, 3, 3], [3, 3, 3], [3, 3, 3]],
+                    [[1, 1, 1], [1, 2, 2], [2, 2, 2]],
+                    [1, 2, 1],
+                    [1, 1],
+                ),
+            },
+            (1, 0, 2),
+        ),
+        dataset={
+            "labels": {"background": 0, "ear": [1, 2, 3], "ossicles": [2, 3], "stapes": 3},
+            "regions_class_order": [1, 2, 3],
+        },
+    ),
     # Slice by slice, batch norm, no resampling of slices.
     "flat": dict(
-        name="2d", folds=1, mirror=(0, 1), spacing=(2.0, 0.8, 0.8), shape=(4, 30, 25), zeros=0,
-        plans=plans_of("2d", {
-            "patch_size": [24, 16], "spacing": [0.9, 0.7],
-            "architecture": architecture("PlainConvUNet", 2, [8, 20], [[3, 3], [3, 3]], [[1, 1], [2, 2]], [2, 2], [2],
-                                         "Batch")}),
-        dataset={"labels": {"background": 0, "mandible": 1, "teeth": 2}}),
+        name="2d",
+        folds=1,
+        mirror=(0, 1),
+        spacing=(2.0, 0.8, 0.8),
+        shape=(4, 30, 25),
+        zeros=0,
+        plans=plans_of(
+            "2d",
+            {
+                "patch_size": [24, 16],
+                "spacing": [0.9, 0.7],
+                "architecture": architecture(
+                    "PlainConvUNet", 2, [8, 20], [[3, 3], [3, 3]], [[1, 1], [2, 2]], [2, 2], [2], "Batch"
+                ),
+            },
+        ),
+        dataset={"labels": {"background": 0, "mandible": 1, "teeth": 2}},
+    ),
 }
 
 
@@ -105,10 +187,12 @@ def image_of(shape, zeros, seed):
 def write_nrrd(path, image, spacing):
     kind = {np.dtype(np.int16): "short", np.dtype(np.uint8): "uchar"}[image.dtype]
     x, y, z = spacing[::-1]
-    head = (f"NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\n"
-            f"sizes: {' '.join(map(str, image.shape[::-1]))}\n"
-            f"space directions: ({x},0,0) (0,{y},0) (0,0,{z})\nkinds: domain domain domain\nendian: little\n"
-            "encoding: raw\nspace origin: (0,0,0)\n\n")
+    head = (
+        f"NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\n"
+        f"sizes: {' '.join(map(str, image.shape[::-1]))}\n"
+        f"space directions: ({x},0,0) (0,{y},0) (0,0,{z})\nkinds: domain domain domain\nendian: little\n"
+        "encoding: raw\nspace origin: (0,0,0)\n\n"
+    )
     path.write_bytes(head.encode() + np.ascontiguousarray(image).tobytes())
 
 
@@ -139,24 +223,48 @@ def make_model(folder, case, seed, bias=None):
     manager = PlansManager(json.loads(json.dumps(plans)))
     configuration = manager.get_configuration(case["name"])
     heads = manager.get_label_manager(dataset).num_segmentation_heads
-    network = get_network_from_plans(configuration.network_arch_class_name, configuration.network_arch_init_kwargs,
-                                     configuration.network_arch_init_kwargs_req_import, 1, heads,
-                                     deep_supervision=False)
+    network = get_network_from_plans(
+        configuration.network_arch_class_name,
+        configuration.network_arch_init_kwargs,
+        configuration.network_arch_init_kwargs_req_import,
+        1,
+        heads,
+        deep_supervision=False,
+    )
     for fold in range(case["folds"]):
         seed_weights(network, seed + fold, torch.zeros(heads) if bias is None else torch.from_numpy(bias))
         (folder / f"fold_{fold}").mkdir(exist_ok=True)
-        torch.save({"network_weights": network.state_dict(), "optimizer_state": {}, "grad_scaler_state": None,
-                    "logging": {"mean_fg_dice": [np.float32(0.5), 0.25]}, "_best_ema": np.float64(0.5),
-                    "current_epoch": 1,
-                    "init_args": {"plans": plans, "configuration": case["name"], "fold": fold, "dataset_json": dataset,
-                                  "device": torch.device("cpu")},
-                    "trainer_name": "nnUNetTrainer", "inference_allowed_mirroring_axes": case["mirror"]},
-                   folder / f"fold_{fold}" / "checkpoint_final.pth")
+        torch.save(
+            {
+                "network_weights": network.state_dict(),
+                "optimizer_state": {},
+                "grad_scaler_state": None,
+                "logging": {"mean_fg_dice": [np.float32(0.5), 0.25]},
+                "_best_ema": np.float64(0.5),
+                "current_epoch": 1,
+                "init_args": {
+                    "plans": plans,
+                    "configuration": case["name"],
+                    "fold": fold,
+                    "dataset_json": dataset,
+                    "device": torch.device("cpu"),
+                },
+                "trainer_name": "nnUNetTrainer",
+                "inference_allowed_mirroring_axes": case["mirror"],
+            },
+            folder / f"fold_{fold}" / "checkpoint_final.pth",
+        )
 
 
 def predict(folder, image, spacing):
-    predictor = nnUNetPredictor(tile_step_size=0.5, use_gaussian=True, use_mirroring=True,
-                                perform_everything_on_device=False, device=torch.device("cpu"), allow_tqdm=False)
+    predictor = nnUNetPredictor(
+        tile_step_size=0.5,
+        use_gaussian=True,
+        use_mirroring=True,
+        perform_everything_on_device=False,
+        device=torch.device("cpu"),
+        allow_tqdm=False,
+    )
     predictor.initialize_from_trained_model_folder(str(folder), None)
     kept = []
     plain = predictor.predict_logits_from_preprocessed_data

@@ -1,5 +1,6 @@
 """The audit trail of a patient's path: received, prepared, corrected, opened, approved, written, sent and de-identified, at a syslog server with TLS.
 usage: check_audit.py BIN WORK"""
+
 import gzip, json, os, pathlib, shutil, signal, socket, ssl, subprocess, sys, threading, time, xml.etree.ElementTree as xml
 
 if not shutil.which("openssl"):
@@ -57,11 +58,13 @@ class Syslog:
         out, rest = [], self.text
         while rest:
             n, rest = rest.split(b" ", 1)
-            frame, rest = rest[:int(n)], rest[int(n):]
+            frame, rest = rest[: int(n)], rest[int(n) :]
             assert len(frame) == int(n), "a frame is cut"
             head, body = frame.split(b"\xef\xbb\xbf", 1)
             words = head.split()
-            assert words[0] == b"<85>1" and words[3] == b"osteo" and words[5] == b"DICOM+RFC3881" and words[6] == b"-", head
+            assert (
+                words[0] == b"<85>1" and words[3] == b"osteo" and words[5] == b"DICOM+RFC3881" and words[6] == b"-"
+            ), head
             out.append(xml.fromstring(body))
         return out
 
@@ -77,8 +80,26 @@ def until(what, seconds=60):
         time.sleep(0.1)
 
 
-run("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2", "-subj", "/CN=log", "-addext",
-    "subjectAltName=IP:127.0.0.1", "-keyout", "key.pem", "-out", "cert.pem")
+run(
+    "openssl",
+    "req",
+    "-x509",
+    "-newkey",
+    "ec",
+    "-pkeyopt",
+    "ec_paramgen_curve:P-256",
+    "-nodes",
+    "-days",
+    "2",
+    "-subj",
+    "/CN=log",
+    "-addext",
+    "subjectAltName=IP:127.0.0.1",
+    "-keyout",
+    "key.pem",
+    "-out",
+    "cert.pem",
+)
 run(osteo, "phantom", "ct", "--region", "temporal", "--spacing-mm", "2", "--quiet")
 files = sorted(p for p in pathlib.Path("ct").rglob("*") if p.is_file())
 for f in files:
@@ -88,15 +109,35 @@ for f in files:
 study = str(d.StudyInstanceUID)
 
 server = Syslog()
-settings = {"osteotome_audit": 1, "to": f"tls://127.0.0.1:{server.port}", "ca": str(work / "cert.pem"), "certificate": str(work / "cert.pem"),
-            "key": str(work / "key.pem"), "queue": str(work / "queue"), "source": "ward"}
+settings = {
+    "osteotome_audit": 1,
+    "to": f"tls://127.0.0.1:{server.port}",
+    "ca": str(work / "cert.pem"),
+    "certificate": str(work / "cert.pem"),
+    "key": str(work / "key.pem"),
+    "queue": str(work / "queue"),
+    "source": "ward",
+}
 pathlib.Path("audit.json").write_text(json.dumps(settings))
 off = {"OSTEO_AUDIT": ""}
 on = {"OSTEO_AUDIT": str(work / "audit.json")}
-doctor = lambda rc, **env: next(c for c in json.loads(run(osteo, "doctor", "--server", "--json", "--no-report", "--port", "1", "--bind", "127.0.0.1", rc=rc, **env).stdout)["checks"] if c["what"] == "audit")
+doctor = lambda rc, **env: next(
+    c
+    for c in json.loads(
+        run(
+            osteo, "doctor", "--server", "--json", "--no-report", "--port", "1", "--bind", "127.0.0.1", rc=rc, **env
+        ).stdout
+    )["checks"]
+    if c["what"] == "audit"
+)
 
-node = subprocess.Popen([osteo, "receive", "inbox", "--allow", "SCANNER", "--port", "0", "--json", "--keep-free-gb", "0", "--quiet-s", "1"], stdout=subprocess.PIPE,
-                        stderr=open("node.log", "w"), text=True, env=os.environ | on)
+node = subprocess.Popen(
+    [osteo, "receive", "inbox", "--allow", "SCANNER", "--port", "0", "--json", "--keep-free-gb", "0", "--quiet-s", "1"],
+    stdout=subprocess.PIPE,
+    stderr=open("node.log", "w"),
+    text=True,
+    env=os.environ | on,
+)
 port = json.loads(node.stdout.readline())["listening"]
 peer = ["--peer", f"OSTEOTOME@127.0.0.1:{port}", "--ae", "SCANNER", "--no-check", "--quiet"]
 run(osteo, "send", "ct", *peer, **off)
@@ -116,7 +157,7 @@ run(osteo, "export-slicer", "case", "given", "--quiet", **on)
 head, voxels = pathlib.Path("given/bone.seg.nrrd").read_bytes().split(b"\n\n", 1)
 packed = b"encoding: gz" in head
 voxels = bytearray(gzip.decompress(voxels) if packed else voxels)
-voxels[:len(voxels) // 2] = bytes(len(voxels) // 2)
+voxels[: len(voxels) // 2] = bytes(len(voxels) // 2)
 pathlib.Path("given/bone.seg.nrrd").write_bytes(head + b"\n\n" + (gzip.compress(voxels) if packed else bytes(voxels)))
 run(osteo, "import-slicer", "case", "given", "--quiet", **on)
 late = Syslog(server.port)
@@ -127,7 +168,15 @@ node.send_signal(signal.SIGTERM)
 assert node.wait(60) in (0, 130)
 late.stop()
 got = kinds(late)
-assert [k for k in got if k != "receive"] == ["approve", "hand-over", "hand-over", "edit", "send", "deidentify", "withdraw"], got
+assert [k for k in got if k != "receive"] == [
+    "approve",
+    "hand-over",
+    "hand-over",
+    "edit",
+    "send",
+    "deidentify",
+    "withdraw",
+], got
 
 # What each says.
 all_of = server.messages() + late.messages()
@@ -136,9 +185,14 @@ assert by["receive"].find("ActiveParticipant").get("UserID") == "SCANNER"
 assert by["receive"].find("EventIdentification/EventID").get("csd-code") == "110104"
 for kind in ("receive", "send", "deidentify"):
     objects = {o.get("ParticipantObjectTypeCode"): o for o in by[kind].findall("ParticipantObjectIdentification")}
-    assert objects["2"].get("ParticipantObjectID") == study and objects["1"].get("ParticipantObjectID") == PID, xml.tostring(by[kind])
+    assert (
+        objects["2"].get("ParticipantObjectID") == study and objects["1"].get("ParticipantObjectID") == PID
+    ), xml.tostring(by[kind])
     assert sum(int(s.get("NumberOfInstances")) for s in objects["2"].iter("SOPClass")) == len(files)
-codes = {by[k].find("ParticipantObjectIdentification").get("ParticipantObjectID") for k in ("approve", "hand-over", "edit", "withdraw")}
+codes = {
+    by[k].find("ParticipantObjectIdentification").get("ParticipantObjectID")
+    for k in ("approve", "hand-over", "edit", "withdraw")
+}
 assert len(codes) == 1 and "case" not in codes, codes
 assert all(m.find("AuditSourceIdentification").get("AuditSourceID") == "ward" for m in all_of)
 everything = server.text + late.text
@@ -161,7 +215,9 @@ assert "approved by" not in run(osteo, "info", "case").stdout
 assert doctor(7, OSTEO_AUDIT=str(work / "bad.json"))["state"] == "bad"
 dead = doctor(7, **on)
 assert dead["state"] == "bad" and "0 messages wait" in dead["says"], dead
-pathlib.Path("roles.json").write_text('{"osteotome_roles": 1, "approve": ["nobody-of-here"], "send": ["nobody-of-here"]}')
+pathlib.Path("roles.json").write_text(
+    '{"osteotome_roles": 1, "approve": ["nobody-of-here"], "send": ["nobody-of-here"]}'
+)
 nobody = to_file | {"OSTEO_ROLES": str(work / "roles.json")}
 assert "may not approve" in run(osteo, "approve", *case, "--by", "X", rc=7, **nobody).stderr
 assert "approved by" not in run(osteo, "info", "case").stdout

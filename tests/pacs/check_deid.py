@@ -1,5 +1,6 @@
 """`osteo deidentify` read by pydicom: every attribute of the table, by its tag, with a canary in it.
 usage: check_deid.py BIN WORK TABLE, TABLE being libs/hospital/pacs/src/deidentify_table.h"""
+
 import json, os, pathlib, re, shutil, subprocess, sys, warnings
 
 try:
@@ -13,7 +14,11 @@ except ImportError as e:
     print(f"skipped: {e}")
     sys.exit(77)
 warnings.simplefilter("ignore")
-osteo, work, table = pathlib.Path(sys.argv[1]).resolve() / "osteo", pathlib.Path(sys.argv[2]).resolve(), pathlib.Path(sys.argv[3]).read_text()
+osteo, work, table = (
+    pathlib.Path(sys.argv[1]).resolve() / "osteo",
+    pathlib.Path(sys.argv[2]).resolve(),
+    pathlib.Path(sys.argv[3]).read_text(),
+)
 shutil.rmtree(work, ignore_errors=True)
 work.mkdir(parents=True)
 os.chdir(work)
@@ -32,12 +37,18 @@ def vr_of(tag):
 
 
 def fill(vr, n):
-    if vr in TEXT: return CANARY if vr not in ("CS", "AE") else CANARY.upper()
-    if vr in FIXED: return FIXED[vr]
-    if vr == "UI": return f"{UID}.{n}"
-    if vr in ("OB", "OW", "OF", "OD", "OL", "OV", "UN"): return (CANARY + "!!").encode() * 2 + b"pad-to-8"[: -len(CANARY + "!!") * 2 % 8]
-    if vr in ("FL", "FD"): return 7777.5
-    if vr == "AT": return 0x00107777
+    if vr in TEXT:
+        return CANARY if vr not in ("CS", "AE") else CANARY.upper()
+    if vr in FIXED:
+        return FIXED[vr]
+    if vr == "UI":
+        return f"{UID}.{n}"
+    if vr in ("OB", "OW", "OF", "OD", "OL", "OV", "UN"):
+        return (CANARY + "!!").encode() * 2 + b"pad-to-8"[: -len(CANARY + "!!") * 2 % 8]
+    if vr in ("FL", "FD"):
+        return 7777.5
+    if vr == "AT":
+        return 0x00107777
     return 7777
 
 
@@ -56,7 +67,11 @@ def base(sop="1.2.840.10008.5.1.4.1.1.2", n=1):
 
 def save(d, name, syntax=ExplicitVRLittleEndian):
     meta = FileMetaDataset()
-    meta.MediaStorageSOPClassUID, meta.MediaStorageSOPInstanceUID, meta.TransferSyntaxUID = d.SOPClassUID, d.SOPInstanceUID, syntax
+    meta.MediaStorageSOPClassUID, meta.MediaStorageSOPInstanceUID, meta.TransferSyntaxUID = (
+        d.SOPClassUID,
+        d.SOPInstanceUID,
+        syntax,
+    )
     meta.SourceApplicationEntityTitle = CANARY.upper()
     f = pydicom.dataset.FileDataset(None, d, file_meta=meta, preamble=(CANARY * 20).encode()[:128])
     f.is_little_endian, f.is_implicit_VR = True, syntax == ImplicitVRLittleEndian
@@ -81,13 +96,19 @@ d, tried = base(), []
 inner = Dataset()
 for n, (tag, action) in enumerate(rows.items()):
     vr = vr_of(tag)
-    if vr is None or tag >> 16 in (0, 2, 4) or tag in (0xFFFCFFFC,): continue
+    if vr is None or tag >> 16 in (0, 2, 4) or tag in (0xFFFCFFFC,):
+        continue
     tried.append(tag)
     for item in (d, inner):
-        if tag in d and item is d: continue
+        if tag in d and item is d:
+            continue
         if vr == "SQ":
             leaf = Dataset()
-            leaf.PatientName, leaf.CodeMeaning, leaf.ReferencedSOPInstanceUID = CANARY, "Harmless" if action == "XZU" else CANARY, f"{UID}.5"
+            leaf.PatientName, leaf.CodeMeaning, leaf.ReferencedSOPInstanceUID = (
+                CANARY,
+                "Harmless" if action == "XZU" else CANARY,
+                f"{UID}.5",
+            )
             item.add(DataElement(tag, "SQ", Sequence([leaf])))
         else:
             item.add(DataElement(tag, vr, fill(vr, n)))
@@ -118,7 +139,8 @@ for source in ("all", "implicit"):
 
     def look(was, now):
         for tag in tried:
-            if tag in (0x00100010, 0x00100020) and now is out: continue  # the code
+            if tag in (0x00100010, 0x00100020) and now is out:
+                continue  # the code
             action, vr = rows[tag], vr_of(tag)
             e = now.get(tag)
             where = (source, hex(tag), action, vr, str(e)[:200])
@@ -126,14 +148,19 @@ for source in ("all", "implicit"):
                 assert e is None, where
                 continue
             if e is None and (vr == "UN" or source == "implicit" and tag not in (0x0020000D, 0x0020000E, 0x00080018)):
-                unknown.add(tag)  # its kind is said neither by the file nor by DCMTK's dictionary, which is older than the table
+                unknown.add(
+                    tag
+                )  # its kind is said neither by the file nor by DCMTK's dictionary, which is older than the table
                 continue
             assert e is not None, where
             if action in ("Z", "XZ") or (vr == "SQ" and action == "XZD"):
                 assert not e.value and e.value != 0, where
                 continue
             assert e.value is not None and e.value != "" and e.value != was[tag].value, where
-            if vr == "UI": assert str(e.value).startswith("2.25.") and len(e.value) <= 64 and pydicom.uid.UID(e.value).is_valid, where
+            if vr == "UI":
+                assert (
+                    str(e.value).startswith("2.25.") and len(e.value) <= 64 and pydicom.uid.UID(e.value).is_valid
+                ), where
 
     look(original, out)
     look(original[kept_item].value[0], out[kept_item].value[0])
@@ -142,11 +169,23 @@ for source in ("all", "implicit"):
     assert out[kept_item].value[0].CodeMeaning != CANARY
     assert not [e for e in out.iterall() if e.tag.is_private or e.tag.group in (0x6000, 0x5000) or e.tag == 0x00187FF1]
     # What is no row stays, and the marks are there.
-    assert out.PixelData == bytes(range(8)) and out.SliceThickness == 0.5 and out.Rows == 2 and out.SOPClassUID == original.SOPClassUID
-    assert out.PatientIdentityRemoved == "YES" and out.DeidentificationMethod and out.LongitudinalTemporalInformationModified == "REMOVED"
+    assert (
+        out.PixelData == bytes(range(8))
+        and out.SliceThickness == 0.5
+        and out.Rows == 2
+        and out.SOPClassUID == original.SOPClassUID
+    )
+    assert (
+        out.PatientIdentityRemoved == "YES"
+        and out.DeidentificationMethod
+        and out.LongitudinalTemporalInformationModified == "REMOVED"
+    )
     assert [c.CodeValue for c in out.DeidentificationMethodCodeSequence] == ["113100"]
     assert out.PatientName == out.PatientID and re.fullmatch("CASE-[0-9A-F]{16}", out.PatientID)
-    assert out.file_meta.MediaStorageSOPInstanceUID == out.SOPInstanceUID and "SourceApplicationEntityTitle" not in out.file_meta
+    assert (
+        out.file_meta.MediaStorageSOPInstanceUID == out.SOPInstanceUID
+        and "SourceApplicationEntityTitle" not in out.file_meta
+    )
 
 # 2. A study stays one study, references follow; the same key says the same again, another or none does not; the map leads back.
 for n in (1, 2):
@@ -167,16 +206,27 @@ run("deidentify", "two", "-o", "k1", "--key", "key", "--map", "map.json")
 run("deidentify", "two", "-o", "k2", "--key", "key")
 run("deidentify", "two", "-o", "k3")
 k1, k2, k3 = read("k1"), read("k2"), read("k3")
-assert len({d.StudyInstanceUID for d in k1}) == len({d.SeriesInstanceUID for d in k1}) == len({d.FrameOfReferenceUID for d in k1}) == 1
-assert {d.SOPInstanceUID for d in k1} == {d.SourceImageSequence[0].ReferencedSOPInstanceUID for d in k1} and len(k1) == 2
+assert (
+    len({d.StudyInstanceUID for d in k1})
+    == len({d.SeriesInstanceUID for d in k1})
+    == len({d.FrameOfReferenceUID for d in k1})
+    == 1
+)
+assert {d.SOPInstanceUID for d in k1} == {d.SourceImageSequence[0].ReferencedSOPInstanceUID for d in k1} and len(
+    k1
+) == 2
 assert all(d.SourceImageSequence[0].ReferencedSOPInstanceUID != d.SOPInstanceUID for d in k1)
 assert {d.SOPInstanceUID for d in k1} == {d.SOPInstanceUID for d in k2} and k1[0].PatientID == k2[0].PatientID
 assert not {d.SOPInstanceUID for d in k1} & {d.SOPInstanceUID for d in k3} and k1[0].PatientID != k3[0].PatientID
 assert os.stat("map.json").st_mode & 0o777 == 0o600
-assert json.load(open("map.json"))["studies"] == [{"code": k1[0].PatientID, "patient_id": "PID-471147", "study": k1[0].StudyInstanceUID,
-                                                   "original_study": f"{UID}.1"}]
+assert json.load(open("map.json"))["studies"] == [
+    {"code": k1[0].PatientID, "patient_id": "PID-471147", "study": k1[0].StudyInstanceUID, "original_study": f"{UID}.1"}
+]
 before = pathlib.Path("map.json").read_bytes()
-assert "exists already" in run("deidentify", "two", "-o", "x", "--map", "map.json", rc=6).stderr and pathlib.Path("map.json").read_bytes() == before
+assert (
+    "exists already" in run("deidentify", "two", "-o", "x", "--map", "map.json", rc=6).stderr
+    and pathlib.Path("map.json").read_bytes() == before
+)
 assert "exists already" in run("deidentify", "two", "-o", "k1", rc=6).stderr and len(read("k1")) == 2
 assert "leaves" in run("deidentify", "two", "-o", "x", "--map", "x/map.json", rc=2).stderr
 assert not pathlib.Path("x").exists()
@@ -187,21 +237,40 @@ burned, screen, words, person = base(n=11), base(n=12), base("1.2.840.10008.5.1.
 burned.BurnedInAnnotation = "YES"
 screen.ImageType = ["DERIVED", "SECONDARY", "SCREEN SAVE"]
 person.FilterType = "of ZEBRAFINCH"  # kept by the table
-for name, d in (("good", good), ("burned", burned), ("screen", screen), ("words", words), ("person", person)): save(d, f"mixed/{name}.dcm")
+for name, d in (("good", good), ("burned", burned), ("screen", screen), ("words", words), ("person", person)):
+    save(d, f"mixed/{name}.dcm")
 r = run("deidentify", "mixed", "-o", "mixed-out", "--json", rc=8)
 why = " ".join(x["why"] for x in json.loads(r.stdout)["refused"])
-assert json.loads(r.stdout)["objects"] == 1 == len(read("mixed-out")) and len(json.loads(r.stdout)["refused"]) == 4, r.stdout
-for word in ("burned into", "picture of a screen", "Secondary Capture", "(0018,1160)"): assert word in why, (word, why)
+assert (
+    json.loads(r.stdout)["objects"] == 1 == len(read("mixed-out")) and len(json.loads(r.stdout)["refused"]) == 4
+), r.stdout
+for word in ("burned into", "picture of a screen", "Secondary Capture", "(0018,1160)"):
+    assert word in why, (word, why)
 assert CANARY.lower() not in (r.stdout + r.stderr).lower() and "PID-4711" not in r.stdout + r.stderr
-for name in ("good", "screen", "words", "person"): os.remove(f"mixed/{name}.dcm")
+for name in ("good", "screen", "words", "person"):
+    os.remove(f"mixed/{name}.dcm")
 run("deidentify", "mixed", "-o", "none", rc=7)
 assert not pathlib.Path("none").exists()
 
 # However it is written: the name without its marks, the day of birth in words, the telephone with another prefix.
-for n, (charset, text) in enumerate((("ISO_IR 100", "Mueller special"), ("ISO_IR 192", "MULLER"), ("ISO_IR 100", "M\u00fcller"), ("ISO_IR 100", "4 May 1961"),
-                                     ("ISO_IR 100", "04.05.1961"), ("ISO_IR 100", "call 030/90182066"), ("ISO_IR 100", "kernel H40, 4.5.6"))):
+for n, (charset, text) in enumerate(
+    (
+        ("ISO_IR 100", "Mueller special"),
+        ("ISO_IR 192", "MULLER"),
+        ("ISO_IR 100", "M\u00fcller"),
+        ("ISO_IR 100", "4 May 1961"),
+        ("ISO_IR 100", "04.05.1961"),
+        ("ISO_IR 100", "call 030/90182066"),
+        ("ISO_IR 100", "kernel H40, 4.5.6"),
+    )
+):
     d = base(n=40 + n)
-    d.SpecificCharacterSet, d.PatientName, d.PatientBirthDate, d.PatientTelephoneNumbers = charset, "M\u00fcller^Hans", "19610504", "+49 (30) 9018-2066"
+    d.SpecificCharacterSet, d.PatientName, d.PatientBirthDate, d.PatientTelephoneNumbers = (
+        charset,
+        "M\u00fcller^Hans",
+        "19610504",
+        "+49 (30) 9018-2066",
+    )
     d.ManufacturerModelName = text
     save(d, f"written-{n}/x.dcm")
     r = run("deidentify", f"written-{n}", "-o", f"written-{n}-out", rc=0 if "kernel" in text else 7)
@@ -216,22 +285,70 @@ run("deidentify", "before", "-o", "before-out")
 
 # 4. By send: the copies alone.
 assert "left out" in run("send", "mixed", "--peer", "A@127.0.0.1:1", "--deidentify", "--dry-run", rc=7).stderr
-assert json.loads(run("send", "two", "--peer", "A@127.0.0.1:1", "--deidentify", "--dry-run", "--json").stdout)["kinds"][0]["objects"] == 2
+assert (
+    json.loads(run("send", "two", "--peer", "A@127.0.0.1:1", "--deidentify", "--dry-run", "--json").stdout)["kinds"][0][
+        "objects"
+    ]
+    == 2
+)
 assert "--deidentify" in run("send", "two", "--peer", "A@127.0.0.1:1", "--key", "key", "--dry-run", rc=2).stderr
 # 5. What docs/how-to/pacs.md says of the standard's options, each row of its table: removed (None), emptied (""), a dummy, or kept (as it was).
 code = Dataset()
 code.CodeValue, code.CodingSchemeDesignator, code.CodeMeaning = "C1", "99X", "Clinic"
 KEPT = object()
 options = {
-    "113109": {"DeviceSerialNumber": "REMOVED", "StationName": "REMOVED", "DetectorID": "REMOVED", "GantryID": None, "PlateID": None, "CassetteID": None,
-               "GeneratorID": None, "DeviceDescription": None, "Manufacturer": KEPT, "ManufacturerModelName": KEPT, "SoftwareVersions": KEPT},
-    "113112": {"InstitutionName": "REMOVED", "InstitutionCodeSequence": "", "InstitutionAddress": None, "InstitutionalDepartmentName": None},
-    "113108": {"PatientSex": "", "PatientAge": None, "PatientSize": None, "PatientWeight": None, "EthnicGroup": None, "SmokingStatus": None,
-               "PregnancyStatus": None, "Allergies": None, "PatientState": None, "PreMedication": None},
-    "113106": {"StudyDate": "", "StudyTime": "", "AcquisitionDate": "", "AcquisitionTime": "", "PatientBirthDate": "", "SeriesDate": "19000101",
-               "ContentDate": "19000101", "SeriesTime": "000000", "ContentTime": "000000", "TimezoneOffsetFromUTC": None},
-    "113105": {"StudyDescription": None, "SeriesDescription": None, "ImageComments": None, "ReasonForStudy": None, "ProtocolName": "REMOVED",
-               "ContrastBolusAgent": "REMOVED", "ConvolutionKernel": KEPT},
+    "113109": {
+        "DeviceSerialNumber": "REMOVED",
+        "StationName": "REMOVED",
+        "DetectorID": "REMOVED",
+        "GantryID": None,
+        "PlateID": None,
+        "CassetteID": None,
+        "GeneratorID": None,
+        "DeviceDescription": None,
+        "Manufacturer": KEPT,
+        "ManufacturerModelName": KEPT,
+        "SoftwareVersions": KEPT,
+    },
+    "113112": {
+        "InstitutionName": "REMOVED",
+        "InstitutionCodeSequence": "",
+        "InstitutionAddress": None,
+        "InstitutionalDepartmentName": None,
+    },
+    "113108": {
+        "PatientSex": "",
+        "PatientAge": None,
+        "PatientSize": None,
+        "PatientWeight": None,
+        "EthnicGroup": None,
+        "SmokingStatus": None,
+        "PregnancyStatus": None,
+        "Allergies": None,
+        "PatientState": None,
+        "PreMedication": None,
+    },
+    "113106": {
+        "StudyDate": "",
+        "StudyTime": "",
+        "AcquisitionDate": "",
+        "AcquisitionTime": "",
+        "PatientBirthDate": "",
+        "SeriesDate": "19000101",
+        "ContentDate": "19000101",
+        "SeriesTime": "000000",
+        "ContentTime": "000000",
+        "TimezoneOffsetFromUTC": None,
+    },
+    "113105": {
+        "StudyDescription": None,
+        "SeriesDescription": None,
+        "ImageComments": None,
+        "ReasonForStudy": None,
+        "ProtocolName": "REMOVED",
+        "ContrastBolusAgent": "REMOVED",
+        "ConvolutionKernel": KEPT,
+    },
     "113104": {"AcquisitionContextSequence": ""},
     "113102": {"RecognizableVisualFeatures": KEPT},
 }
@@ -239,8 +356,21 @@ d = base(n=30)
 for fates in options.values():
     for keyword in fates:
         vr = dictionary_VR(keyword)
-        setattr(d, keyword, Sequence([code]) if vr == "SQ" else {"DA": "20200131", "TM": "101500", "AS": "040Y", "DS": "70", "US": 4, "CS": "YES"}.get(vr, "Plain"))
-d.PatientSex, d.TimezoneOffsetFromUTC, d.DeviceUID, d.LongitudinalTemporalInformationModified = "F", "+0100", f"{UID}.77", "UNMODIFIED"
+        setattr(
+            d,
+            keyword,
+            (
+                Sequence([code])
+                if vr == "SQ"
+                else {"DA": "20200131", "TM": "101500", "AS": "040Y", "DS": "70", "US": 4, "CS": "YES"}.get(vr, "Plain")
+            ),
+        )
+d.PatientSex, d.TimezoneOffsetFromUTC, d.DeviceUID, d.LongitudinalTemporalInformationModified = (
+    "F",
+    "+0100",
+    f"{UID}.77",
+    "UNMODIFIED",
+)
 d.add_new(0x00290010, "LO", "SIEMENS CSA HEADER")
 d.add_new(0x00291008, "CS", "IMAGE NUM 4")
 d.add_new(0x60000022, "LO", "A word")
@@ -251,11 +381,19 @@ run("deidentify", "options", "-o", "options-out", "--key", "key", "--map", "opti
 for option, fates in options.items():
     for keyword, fate in fates.items():
         e = out.get(keyword)
-        if fate is None: assert keyword not in out, (option, keyword, e)
-        elif fate == "": assert keyword in out and not e, (option, keyword, e)
-        elif fate is KEPT: assert e == d.get(keyword), (option, keyword, e)
-        else: assert e == fate, (option, keyword, e)
-assert out.DeviceUID.startswith("2.25.") and out.LongitudinalTemporalInformationModified == "REMOVED" and out.PixelData == d.PixelData
+        if fate is None:
+            assert keyword not in out, (option, keyword, e)
+        elif fate == "":
+            assert keyword in out and not e, (option, keyword, e)
+        elif fate is KEPT:
+            assert e == d.get(keyword), (option, keyword, e)
+        else:
+            assert e == fate, (option, keyword, e)
+assert (
+    out.DeviceUID.startswith("2.25.")
+    and out.LongitudinalTemporalInformationModified == "REMOVED"
+    and out.PixelData == d.PixelData
+)
 assert not [e for e in out if e.tag.is_private or e.tag.group in (0x5000, 0x6000)]
 assert [c.CodeValue for c in out.DeidentificationMethodCodeSequence] == ["113100"]
 assert json.load(open("options.json"))["studies"][0]["original_study"] == d.StudyInstanceUID

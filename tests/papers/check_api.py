@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The reference of the libraries builds and is whole (apps/packaging/api.py judges itself); what the components' examples use has pages that say where it
 stands; without Doxygen it says what to install. usage: check_api.py SOURCE_DIR OUT"""
+
 import os, pathlib, re, shutil, subprocess, sys, tempfile
 import xml.etree.ElementTree
 
@@ -21,7 +22,11 @@ print(said.stdout.strip())
 
 # Classes as examples name them: osteo::Name, in the language of the tag file.
 tags = xml.etree.ElementTree.parse(out / "osteo.tag").getroot()
-page = {c.findtext("name"): out / c.findtext("filename") for c in tags.iter("compound") if c.get("kind") in ("class", "struct")}
+page = {
+    c.findtext("name"): out / c.findtext("filename")
+    for c in tags.iter("compound")
+    if c.get("kind") in ("class", "struct")
+}
 # Namespaces of areas are inline: programs leave them out.
 areas = "|".join(p.parent.name for p in root.glob("libs/*/README.md"))
 page |= {re.sub(rf"^osteo::(?:{areas})::", "osteo::", name): file for name, file in page.items()}
@@ -33,7 +38,10 @@ for example in sorted((root / "tests/setup/outside").glob("*.cpp")):
         assert re.search(r'#include &lt;.*osteo/\w+/', text), f"{name}: its page does not say which header to include"
         assert re.search(r'class="ingroups".*group__lib__', text), f"{name}: its page is in no library's group"
     shown[example.stem] = names
-for component, least in ("haptics", {"osteo::BrickGrid", "osteo::HapticRenderer"}), ("geometry", {"osteo::TriangleTree"}):
+for component, least in ("haptics", {"osteo::BrickGrid", "osteo::HapticRenderer"}), (
+    "geometry",
+    {"osteo::TriangleTree"},
+):
     assert least <= set(shown[component]), (component, shown[component])
 # What a header says is on the page: words above a class, and behind a member.
 text = page["osteo::ContactModel"].read_text()
@@ -50,7 +58,9 @@ with tempfile.TemporaryDirectory() as scratch:
             shutil.rmtree(lib)
     header = next((copy / "libs/simulation/heat/include").rglob("*.h"))
     header.write_text(header.read_text() + "\nclass Lost {};\n/// @ref nowhere_at_all\nvoid lost();\n")
-    wrong = subprocess.run([sys.executable, copy / "apps/packaging/api.py", copy / "out"], capture_output=True, text=True)
+    wrong = subprocess.run(
+        [sys.executable, copy / "apps/packaging/api.py", copy / "out"], capture_output=True, text=True
+    )
     assert wrong.returncode not in (0, 77) and "nowhere_at_all" in wrong.stderr, wrong
 assert all(shown[e] for e in ("imaging", "geometry", "haptics", "tissue", "session", "assessment", "display")), shown
 print(", ".join(f"{c}: {len(n)}" for c, n in shown.items()), "classes of examples, each with its page")

@@ -3,6 +3,7 @@
 usage: check_docs_commands.py OSTEO SOURCE_DIR
 
 Read are fenced blocks and `code` of docs/*.md, README.md and CONTRIBUTING.md."""
+
 import pathlib, re, shlex, subprocess, sys
 
 osteo, root = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
@@ -39,14 +40,16 @@ def words(command):
 
 
 said = subprocess.run([osteo, "help", "docs"], capture_output=True, text=True).stdout
-common = set(re.findall(r"^  (--[a-z][a-z0-9-]*)", said[said.index("Common flags:"):], re.M))
+common = set(re.findall(r"^  (--[a-z][a-z0-9-]*)", said[said.index("Common flags:") :], re.M))
 known = {}  # command -> its flags
 
 
 def flags_of(name):
     if name not in known:  # the reference is what help says (a test of its own), and is read more quickly
         pages = [p for kind in ("command", "stage") if (p := root / f"docs/reference/{kind}-{name}.md").exists()]
-        known[name] = set(re.findall(r"--[a-z][a-z0-9-]*", "".join(p.read_text() for p in pages))) | common if pages else None
+        known[name] = (
+            set(re.findall(r"--[a-z][a-z0-9-]*", "".join(p.read_text() for p in pages))) | common if pages else None
+        )
     return known[name]
 
 
@@ -59,7 +62,11 @@ def judge(command):
     if len(said) < 2 or not re.fullmatch(r"[a-z][a-z-]*", said[1]):
         return None  # osteo --version, osteo STAGE
     if said[1] == "help":
-        return None if len(said) < 3 or said[2] == "--all" or not said[2].islower() or flags_of(said[2]) is not None else f"no command {said[2]}"
+        return (
+            None
+            if len(said) < 3 or said[2] == "--all" or not said[2].islower() or flags_of(said[2]) is not None
+            else f"no command {said[2]}"
+        )
     flags = flags_of("list-series" if said[1] == "import" and "--list" in said else said[1])
     if flags is not None:
         flags = flags | {"--list"} if said[1] == "import" else flags
@@ -71,14 +78,21 @@ def judge(command):
             if flag not in flags and flag != "--help" and flag.replace("--no-", "--", 1) not in flags:
                 # Commands within a command (osteo experiment camera --x) have help of their own.
                 inner = [w for w in said[2:] if re.fullmatch(r"[a-z][a-z-]*", w)]
-                deeper = subprocess.run([osteo, said[1], *inner[:1], "--help"], capture_output=True, text=True).stdout if inner else ""
+                deeper = (
+                    subprocess.run([osteo, said[1], *inner[:1], "--help"], capture_output=True, text=True).stdout
+                    if inner
+                    else ""
+                )
                 if flag not in set(re.findall(r"--[a-z][a-z0-9-]*", deeper)):
                     return f"{said[1]} has no flag {flag}"
     return None
 
 
 wrong, checked = [], 0
-pages = [p for p in sorted((root / "docs").rglob("*.md")) if "reference" not in p.parts] + [root / "README.md", root / "CONTRIBUTING.md"]
+pages = [p for p in sorted((root / "docs").rglob("*.md")) if "reference" not in p.parts] + [
+    root / "README.md",
+    root / "CONTRIBUTING.md",
+]
 for page in pages:
     name = page.relative_to(root).as_posix()
     for number, command in lines(page):

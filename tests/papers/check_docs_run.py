@@ -7,6 +7,7 @@ Each page has a folder of its own, in which its blocks run in order. What a page
 that the page calls it by, made of the fixtures (GIVEN). A line that is not run stands in NOT_RUN with its reason; `--list` prints them. Lines that take
 minutes are in LONG and run with --long. Lines that open a window are started without a screen: the program must be there, start, and say that it
 has no screen. Exits 77 where nothing is installed."""
+
 import json, os, pathlib, re, resource, shutil, subprocess, sys, tempfile, time
 
 args = sys.argv[1:]
@@ -21,15 +22,30 @@ GIVEN = {
     "docs/how-to/batch.md": {"TABLE.csv": TABLE, "P.json": "pipeline"},
     "docs/guides/edit.md": {"CASE": "prepared"},  # where its scan is is known to whom prepared it
     "docs/validation/evidence.md": {"SESSION": SESSION, "EXPERTS": "sessions"},
-    "docs/guides/imaging.md": {"DICOM_FOLDER": SCAN, "mask.nrrd": MASK, "tumour.stl": "body", "surface.stl": "body", "ct.nrrd": "ct",
-                              "structures.seg.nrrd": "structures", "jaw.nrrd": "ct", "problem.json": "pressed", "JAW": "folder"},
+    "docs/guides/imaging.md": {
+        "DICOM_FOLDER": SCAN,
+        "mask.nrrd": MASK,
+        "tumour.stl": "body",
+        "surface.stl": "body",
+        "ct.nrrd": "ct",
+        "structures.seg.nrrd": "structures",
+        "jaw.nrrd": "ct",
+        "problem.json": "pressed",
+        "JAW": "folder",
+    },
     "docs/guides/server.md": {"CT": SCAN, "INBOX": "folder", "CASES": "folder"},
     "docs/guides/surgeon.md": {"CASE": CASE},
     "docs/validation/monitor.md": {"ct.nrrd": "ct", "labels.nrrd": LABELS},
     "docs/how-to/movie.md": {"SESSION": SESSION},
     "docs/how-to/network.md": {"CASE": CASE, "SESSION": SESSION},
     "docs/how-to/pacs.md": {"CT": SCAN, "mask.nrrd": MASK},
-    "docs/validation/registration.md": {"before.nrrd": "ct", "after.nrrd": "ct", "ct.nrrd": "ct", "mr.nrrd": "ct", "mr-labels.seg.nrrd": "structures"},
+    "docs/validation/registration.md": {
+        "before.nrrd": "ct",
+        "after.nrrd": "ct",
+        "ct.nrrd": "ct",
+        "mr.nrrd": "ct",
+        "mr-labels.seg.nrrd": "structures",
+    },
     "docs/how-to/review.md": {"SESSION": SESSION, "EXPERTS": "sessions", "MONDAY": SESSION, "TUESDAY": SESSION},
     "docs/how-to/segment-network.md": {"ct.nrrd": "network image", "MODEL_FOLDER": "network"},
     "docs/guides/study.md": {"SESSION": SESSION},
@@ -50,20 +66,39 @@ NOT_RUN = [
     ("docs/validation/robustness.md", r"", "hours, by hand"),
     ("docs/guides/surgeon.md", r"/etc/udev", "is root's"),
     ("docs/validation/ground-truth.md", r"mine.py|probe.traj", "another's program, another's recording"),
-    ("docs/how-to/pacs.md", r"--peer|--dicomweb|--orthanc|osteo (receive|watch)", "needs a PACS, or waits for one: the tests pacs"),
+    (
+        "docs/how-to/pacs.md",
+        r"--peer|--dicomweb|--orthanc|osteo (receive|watch)",
+        "needs a PACS, or waits for one: the tests pacs",
+    ),
     ("docs/guides/tutoring.md", r"osteo (tutor|join)", "two machines: the tests of tutor"),
     ("", r"osteo stream .*igtl", "waits for who listens: the test readers.network"),
     ("docs/guides/edit.md", r"--apply", "corrections that somebody made in the window: the test window.edit"),
-    ("docs/guides/study.md", r"metrics.json|study (form|rate|analyse)", "sessions and ratings of people; LONG's demo does all of it"),
+    (
+        "docs/guides/study.md",
+        r"metrics.json|study (form|rate|analyse)",
+        "sessions and ratings of people; LONG's demo does all of it",
+    ),
     ("docs/guides/planning.md", r"mandible.stl", "bones of one's own: stages.works runs plan-reconstruction"),
     ("docs/validation/structures.md", r"SCAN", "a scan of one's own"),
-    ("docs/validation/tissue.md", r"mesh.vtu|fem bone.inp|tissue.vtu", "a mesh, a problem and measurements of one's own"),
+    (
+        "docs/validation/tissue.md",
+        r"mesh.vtu|fem bone.inp|tissue.vtu",
+        "a mesh, a problem and measurements of one's own",
+    ),
     ("docs/validation/trainee.md", r"CASE|score", "a case with structures: stages.works runs simulate-trainee"),
 ]
 LONG = [
-    ("README.md", r"demo"), ("docs/guides/surgeon.md", r"jaw|session|phantom"), ("docs/guides/teacher.md", r""), ("docs/validation/phantom.md", r""),
-    ("docs/validation/ground-truth.md", r""), ("docs/guides/experiments.md", r"demo|null"), ("docs/guides/study.md", r"demo"), ("docs/validation/trainee.md", r"demo"),
-    ("docs/how-to/movie.md", r"--camera|raters"), ("docs/validation/structures.md", r""),
+    ("README.md", r"demo"),
+    ("docs/guides/surgeon.md", r"jaw|session|phantom"),
+    ("docs/guides/teacher.md", r""),
+    ("docs/validation/phantom.md", r""),
+    ("docs/validation/ground-truth.md", r""),
+    ("docs/guides/experiments.md", r"demo|null"),
+    ("docs/guides/study.md", r"demo"),
+    ("docs/validation/trainee.md", r"demo"),
+    ("docs/how-to/movie.md", r"--camera|raters"),
+    ("docs/validation/structures.md", r""),
 ]
 WINDOW = r"(^|/)osteo (edit|nerve-console|experiment force-skill|rehearse|playback) (?!.*(--headless|--apply|--simulated|--fast))"
 
@@ -75,18 +110,25 @@ def blocks(page):
         if line.lstrip().startswith("```"):
             fenced, language = not fenced, line.strip()[3:]
             continue
-        inset = not fenced and re.match(r"    (?=(?:[A-Z_]+=\S+ )?(?:\./|osteo |cmake |pip |apt|/usr/bin/python3|snakemake |ninja ))", line)
+        inset = not fenced and re.match(
+            r"    (?=(?:[A-Z_]+=\S+ )?(?:\./|osteo |cmake |pip |apt|/usr/bin/python3|snakemake |ninja ))", line
+        )
         if (fenced and language in ("", "sh", "bash", "console")) or inset:
             first = number if not carried else first
             carried += line.strip().rstrip("\\") + (" " if line.endswith("\\") else "")
             if line.endswith("\\"):
                 continue
             text, carried = carried.strip(), ""
-            if re.match(r"(?:[A-Z_]+=\S+ )*(\./osteo|osteo|cmake|pip|apt|apt-get|python3|snakemake|ninja|cd|mkdir|apps/|tests/|/usr/bin/python3|echo|xvfb-run)\b", text):
+            if re.match(
+                r"(?:[A-Z_]+=\S+ )*(\./osteo|osteo|cmake|pip|apt|apt-get|python3|snakemake|ninja|cd|mkdir|apps/|tests/|/usr/bin/python3|echo|xvfb-run)\b",
+                text,
+            ):
                 yield first, text
 
 
-pages = [p for p in [root / "README.md", *(p for p in sorted((root / "docs").rglob("*.md")) if "reference" not in p.parts)]]
+pages = [
+    p for p in [root / "README.md", *(p for p in sorted((root / "docs").rglob("*.md")) if "reference" not in p.parts)]
+]
 todo = []
 for page in pages:
     name = page.relative_to(root).as_posix()
@@ -117,9 +159,23 @@ def as_user():
 
 
 def run(command, cwd, timeout=600):
-    env = {"PATH": f"{work}/prefix/bin:/usr/bin:/bin", "HOME": f"{work}/home", "LANG": "C.UTF-8", "TMPDIR": f"{work}/tmp"}
-    return subprocess.run(["bash", "-c", command], cwd=cwd, env=env, capture_output=True, text=True, errors="replace", timeout=timeout, preexec_fn=as_user,
-                          stdin=subprocess.DEVNULL)
+    env = {
+        "PATH": f"{work}/prefix/bin:/usr/bin:/bin",
+        "HOME": f"{work}/home",
+        "LANG": "C.UTF-8",
+        "TMPDIR": f"{work}/tmp",
+    }
+    return subprocess.run(
+        ["bash", "-c", command],
+        cwd=cwd,
+        env=env,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=timeout,
+        preexec_fn=as_user,
+        stdin=subprocess.DEVNULL,
+    )
 
 
 def own(path):
@@ -141,7 +197,10 @@ def make(kind, at):
         for name in ["session"] if kind == "session" else ["session", "other"]:
             shutil.copytree(fixtures / "session", beside / name)
         if kind == "sessions":
-            rows = [{"session": n, "subject": p, "group": g} for n, p, g in (("session", "P1", "expert"), ("other", "P2", "novice"))]
+            rows = [
+                {"session": n, "subject": p, "group": g}
+                for n, p, g in (("session", "P1", "expert"), ("other", "P2", "novice"))
+            ]
             (beside / "reference.json").write_text(json.dumps({"osteotome_reference": 1, "sessions": rows}))
         own(beside)
         at.symlink_to(beside / "session" if kind == "session" else beside)
@@ -157,11 +216,32 @@ def make(kind, at):
         shutil.copy(fixtures / "ct.nrrd", at)
     elif kind == "body":  # a box of 20 mm
         corner = lambda n: " ".join(str(20 * (n >> a & 1) - 10) for a in range(3))
-        faces = [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)]
-        at.write_text("solid box\n" + "".join("facet normal 0 0 0\nouter loop\n" + "".join(f"vertex {corner(n)}\n" for n in f) + "endloop\nendfacet\n"
-                                              for f in faces) + "endsolid box\n")
+        faces = [
+            (0, 2, 3),
+            (0, 3, 1),
+            (4, 5, 7),
+            (4, 7, 6),
+            (0, 1, 5),
+            (0, 5, 4),
+            (2, 6, 7),
+            (2, 7, 3),
+            (0, 4, 6),
+            (0, 6, 2),
+            (1, 3, 7),
+            (1, 7, 5),
+        ]
+        at.write_text(
+            "solid box\n"
+            + "".join(
+                "facet normal 0 0 0\nouter loop\n" + "".join(f"vertex {corner(n)}\n" for n in f) + "endloop\nendfacet\n"
+                for f in faces
+            )
+            + "endsolid box\n"
+        )
     elif kind == "table":
-        at.write_text(f"source,case,spacing_mm,lower\n{fixtures}/ct.nrrd,left-1,1,500\n{fixtures}/ct.nrrd,left-2,1,600\n")
+        at.write_text(
+            f"source,case,spacing_mm,lower\n{fixtures}/ct.nrrd,left-1,1,500\n{fixtures}/ct.nrrd,left-2,1,600\n"
+        )
     elif kind == "pipeline":
         shutil.copy(root / "pipelines/temporal-bone.json", at)
     elif (fixtures / kind).is_file():
@@ -174,7 +254,11 @@ wrong, ran, skipped, spent = [], 0, 0, []
 try:
     os.chmod(work, 0o755)
     for component in ("server", "window", "camera"):
-        done = subprocess.run(["cmake", "--install", build, "--prefix", work / "prefix", "--component", component], capture_output=True, text=True)
+        done = subprocess.run(
+            ["cmake", "--install", build, "--prefix", work / "prefix", "--component", component],
+            capture_output=True,
+            text=True,
+        )
         if done.returncode:
             print(f"nothing can be installed of this build: {done.stderr[-400:]}")
             sys.exit(77)
@@ -193,7 +277,10 @@ try:
 
     wanted = {k for name, _ in todo for k in GIVEN.get(name, {}).values()}
     if "structures" in wanted:
-        prepare("structures", f"osteo structures {fixtures}/labels.nrrd --names '6=facial nerve, 7=sigmoid sinus' --quiet structures.seg.nrrd")
+        prepare(
+            "structures",
+            f"osteo structures {fixtures}/labels.nrrd --names '6=facial nerve, 7=sigmoid sinus' --quiet structures.seg.nrrd",
+        )
     made["script"] = root / "pipelines/sessions/mastoid.json"
     made["pressed"] = root / "pipelines/tissue/pressed-bone.json"
     for name, rows in todo:
@@ -219,17 +306,23 @@ try:
                 continue
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
             ran += 1
-            spent.append((after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, f"{name}:{number}: {command}"))
+            spent.append(
+                (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, f"{name}:{number}: {command}")
+            )
             print(f"{spent[-1][0]:6.1f} s  {done.returncode}  {spent[-1][1]}"[:200], flush=True)
             said = (done.stdout + done.stderr)[-600:]
             if window:
                 if done.returncode == 0 or "display" not in said.lower():
-                    wrong.append(f"{name}:{number}: {command}\n    a window without a screen ends with {done.returncode} and says: {said}")
+                    wrong.append(
+                        f"{name}:{number}: {command}\n    a window without a screen ends with {done.returncode} and says: {said}"
+                    )
             elif done.returncode:
                 wrong.append(f"{name}:{number}: {command}\n    exit code {done.returncode}: {said}")
 finally:
     subprocess.run(["chmod", "-R", "u+w", work])
     shutil.rmtree(work, ignore_errors=True)
-print(f"{ran} lines of {len(todo)} pages ran in {sum(s for s, _ in spent):.0f} s of processor time, {skipped} are not run (--list)")
+print(
+    f"{ran} lines of {len(todo)} pages ran in {sum(s for s, _ in spent):.0f} s of processor time, {skipped} are not run (--list)"
+)
 print("\n".join(wrong) or "all of them did what the page says")
 sys.exit(bool(wrong))

@@ -1,18 +1,27 @@
 #!/usr/bin/env python3
 """The list of what Osteotome is made of: a row for each package that is installed to build, no other; an SPDX document that hangs together; copyleft
 only by its option; the same bytes twice. usage: check_sbom.py SOURCE_DIR [PROGRAM]"""
+
 import json, os, pathlib, re, subprocess, sys, tempfile
 
 root = pathlib.Path(sys.argv[1]).resolve()
 os.environ["SOURCE_DATE_EPOCH"] = "1767225600"
-rows = [[f.strip() for f in l.split("|")] for l in (root / "apps/packaging/licences.txt").read_text().splitlines() if l and l[0] != "#"]
+rows = [
+    [f.strip() for f in l.split("|")]
+    for l in (root / "apps/packaging/licences.txt").read_text().splitlines()
+    if l and l[0] != "#"
+]
 needed = [l for l in (root / "libs/cmake/packages.txt").read_text().split("\n") if l and l[0] != "#"]
 named = [r[0] for r in rows]
 bad = [f"apps/packaging/licences.txt has no row for {p}" for p in needed if p not in named]
 bad += [f"apps/packaging/licences.txt: {p} is not in libs/cmake/packages.txt" for p in named if p not in needed]
 bad += [f"apps/packaging/licences.txt: two rows for {p}" for p in set(named) if named.count(p) > 1]
 # What every build links may not be under the GPL: that is what the options are for.
-bad += [f"apps/packaging/licences.txt: {r[0]} is {r[1]} and in every build" for r in rows if r[2] in ("always", "OSTEO_WINDOW") and re.search(r"\bA?GPL", r[1])]
+bad += [
+    f"apps/packaging/licences.txt: {r[0]} is {r[1]} and in every build"
+    for r in rows
+    if r[2] in ("always", "OSTEO_WINDOW") and re.search(r"\bA?GPL", r[1])
+]
 # Each option of CMake that the licence depends on brings something.
 options = re.findall(r"option\((OSTEO_(?:CGAL|TETGEN|CERES|MOVIE))", (root / "CMakeLists.txt").read_text())
 bad += [f"no row of apps/packaging/licences.txt is brought by {o}" for o in options if o not in {r[2] for r in rows}]
@@ -21,7 +30,11 @@ bad += [f"no row of apps/packaging/licences.txt is brought by {o}" for o in opti
 def make(*flags, source=root):
     with tempfile.TemporaryDirectory() as work:
         out = pathlib.Path(work) / "s.json"
-        said = subprocess.run([sys.executable, source / "apps/packaging/sbom.py", out, "--version", "1.2.3", *flags], capture_output=True, text=True)
+        said = subprocess.run(
+            [sys.executable, source / "apps/packaging/sbom.py", out, "--version", "1.2.3", *flags],
+            capture_output=True,
+            text=True,
+        )
         return (out.read_bytes(), "") if said.returncode == 0 else (None, said.stderr)
 
 
@@ -61,12 +74,17 @@ if len(sys.argv) > 2:
     if out is None:
         bad.append(why)
     else:
-        linked = {r["relatedSpdxElement"] for r in json.loads(out)["relationships"] if r["relationshipType"] == "DYNAMIC_LINK"}
+        linked = {
+            r["relatedSpdxElement"] for r in json.loads(out)["relationships"] if r["relationshipType"] == "DYNAMIC_LINK"
+        }
         seen = {p["name"]: p for p in json.loads(out)["packages"] if p["SPDXID"] in linked}
         if "libc6" not in seen or not any(n.startswith("libvtk9") for n in seen):
             bad.append(f"of {sys.argv[2]} these were found: {' '.join(seen)}")
         vtk = [p for n, p in seen.items() if n.startswith("libvtk9")]
         if vtk and (vtk[0]["licenseConcluded"] != "BSD-3-Clause" or vtk[0]["versionInfo"] == "NOASSERTION"):
             bad.append("VTK's library has no licence or version")
-print("\n".join(bad) or f"{len(rows)} rows, {len(free['packages'])} components without options, {len(full['packages'])} with all")
+print(
+    "\n".join(bad)
+    or f"{len(rows)} rows, {len(free['packages'])} components without options, {len(full['packages'])} with all"
+)
 sys.exit(bool(bad))

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The examples of apps/python/examples, each run as a user runs it: what it prints is right, and its picture shows what it should.
 usage: check_examples.py EXAMPLES WORK (PYTHONPATH as for the module)"""
+
 import pathlib
 import re
 import shutil
@@ -24,8 +25,12 @@ work.mkdir(parents=True)
 def run(name):
     """What the example printed, and its picture; without a display, wherever the test runs."""
     begun = time.perf_counter()
-    done = subprocess.run(["env", "-u", "DISPLAY", "-u", "WAYLAND_DISPLAY", sys.executable, "-B", "-W", "error", examples / f"{name}.py"], cwd=work, text=True,
-                          capture_output=True)
+    done = subprocess.run(
+        ["env", "-u", "DISPLAY", "-u", "WAYLAND_DISPLAY", sys.executable, "-B", "-W", "error", examples / f"{name}.py"],
+        cwd=work,
+        text=True,
+        capture_output=True,
+    )
     assert done.returncode == 0, f"{name}: {done.stderr}"
     picture = osteo.load(work / (name.replace("_", "-") + ".png"))
     assert picture.dtype == np.uint8 and picture.shape[2] == 3, picture.shape
@@ -58,8 +63,8 @@ near = [numbers(said, rf"than {mm} mm: (\d+) mm3")[0] for mm in (1, 2, 4)]
 assert 0 < near[0] < near[1] < near[2] < 1000 * by_voxels, near
 count, apart = numbers(said, r"difference to (\d+) distances taken by numpy: (\S+) mm")
 assert count > 100 and apart < 1e-4, said
-assert bone_coloured(picture[:, picture.shape[1] // 2:]) > 0.2
-slice_ = picture[:, :picture.shape[1] // 3]
+assert bone_coloured(picture[:, picture.shape[1] // 2 :]) > 0.2
+slice_ = picture[:, : picture.shape[1] // 3]
 assert share(slice_, (255, 220, 40)) > 0.001, "the nerve"
 assert share(slice_, (255, 255, 255)) > 0.005, "lines of equal distance"
 r, g, b = np.moveaxis(slice_, 2, 0)
@@ -78,27 +83,40 @@ assert force_n[:250].max() < 0.1 < force_n[500:2000].mean(), "nothing is felt be
 assert bone_coloured(picture[:, :440]) > 0.15
 # The curve: as high above the axis as the force is, at its highest.
 columns, rows = np.nonzero((np.abs(picture[40:308, 514:883] - np.array(RED)).max(axis=2) < 60).T)
-assert rows.min() < 20 and abs(columns[rows.argmin()] / 369 - force_n.argmax() / len(ticks)) < 0.03, (rows.min(), columns[rows.argmin()])
+assert rows.min() < 20 and abs(columns[rows.argmin()] / 369 - force_n.argmax() / len(ticks)) < 0.03, (
+    rows.min(),
+    columns[rows.argmin()],
+)
 
 said, picture = run("bent_beam")
 length, edge, young, shear = 60.0, 6.0, 17000.0, 17000.0 / 2.6
-tip = -100 * (length ** 3 / (3 * young * edge ** 4 / 12) + length / (5 / 6 * shear * edge ** 2))
-for elements, lowest, highest in ("t4 of 3 mm", 0.55, 0.8), ("t10 of 3 mm", 0.98, 1.005), ("t10 of 1.5 mm", 0.985, 1.005):
+tip = -100 * (length**3 / (3 * young * edge**4 / 12) + length / (5 / 6 * shear * edge**2))
+for elements, lowest, highest in (
+    ("t4 of 3 mm", 0.55, 0.8),
+    ("t10 of 3 mm", 0.98, 1.005),
+    ("t10 of 1.5 mm", 0.985, 1.005),
+):
     found, formula = numbers(said, rf"{elements}: tip (-[\d.]+) mm, formula (-[\d.]+) mm")
     assert abs(formula - tip) < 1e-3 and lowest < found / tip < highest, said
 assert bone_coloured(picture[:, :440]) > 0.02
 strip = (picture[:, :440].sum(axis=2) > 300) & (np.arange(360) > 40)[:, None]
 middle = [np.nonzero(strip[:, c])[0].mean() for c in (40, 400)]
 assert middle[1] > middle[0] + 8, f"the strip sinks towards its end, {middle}"
-assert all(share(picture[:, 440:], colour) > 0.0008 for colour in (BLUE, GREEN, GREY)) and share(picture[:, 440:], RED, 60) > 0.0005
+assert (
+    all(share(picture[:, 440:], colour) > 0.0008 for colour in (BLUE, GREEN, GREY))
+    and share(picture[:, 440:], RED, 60) > 0.0005
+)
 
 said, picture = run("no_copies")
-times = [[float(v) for v in row] for row in re.findall(r"([\d.]+) MB: in +([\d.]+) us, out +([\d.]+) us, numpy's copy +([\d.]+) us", said)]
+times = [
+    [float(v) for v in row]
+    for row in re.findall(r"([\d.]+) MB: in +([\d.]+) us, out +([\d.]+) us, numpy's copy +([\d.]+) us", said)
+]
 assert len(times) == 5 and times[-1][0] == 128, said
 # 128 MB cannot be copied in a millisecond, nor does a call take one.
 assert times[-1][1] < 1000 and times[-1][2] < 1000 < times[-1][3], said
 assert "same memory in: True - read-only: True" in said and "found as numpy finds it: True" in said
 ball, formula = numbers(said, r"ball (\d+) mm3, formula (\d+) mm3")
-assert abs(ball / (4 / 3 * np.pi * 25 ** 3) - 1) < 0.002 and round(formula) == 65450, said
-assert numbers(said, r"outside (\d+) mm3")[0] + ball == 128 ** 3 / 8
+assert abs(ball / (4 / 3 * np.pi * 25**3) - 1) < 0.002 and round(formula) == 65450, said
+assert numbers(said, r"outside (\d+) mm3")[0] + ball == 128**3 / 8
 assert all(share(picture, colour, 60) > 0.001 for colour in (RED, BLUE, GREEN))

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """`pip install` from a clean clone into a new environment, with the libraries that were built already; then types, as mypy sees them.
 usage: check_pip.py SOURCE BUILD OUT. Skipped (77) without git or a network."""
+
 import os
 import pathlib
 import shutil
@@ -41,9 +42,20 @@ got = run(*pip, "install", "-q", "scikit-build-core>=0.10", "pybind11>=2.12", "n
 if got.returncode != 0:
     skip("the packages that build it cannot be had: " + got.stderr.strip().splitlines()[-1])
 # They are there now: an environment for building by itself would fetch them once more.
-run(*pip, "install", "-q", "--no-build-isolation", "--no-deps", f"--config-settings=cmake.define.OSTEO_BUILT={build}", clone)
+run(
+    *pip,
+    "install",
+    "-q",
+    "--no-build-isolation",
+    "--no-deps",
+    f"--config-settings=cmake.define.OSTEO_BUILT={build}",
+    clone,
+)
 
-said = run(python, "-c", """
+said = run(
+    python,
+    "-c",
+    """
 import importlib.metadata, numpy, osteo
 assert osteo.__version__ == importlib.metadata.version("osteotome"), osteo.__version__
 block = osteo.Grid(numpy.ones((20, 20, 20), numpy.float32))
@@ -51,7 +63,8 @@ with osteo.Rehearsal(block, hand="exact") as r:
     ticks = r.run(osteo.goals([[10, 10, 20.5 - 0.01 * i] for i in range(100)]))
 assert ticks["force_n"][-1, 2] > 0.1 and r.removed_mm3 > 0
 print(osteo.__file__)
-""").stdout.strip()
+""",
+).stdout.strip()
 assert said.startswith(str(out / "env")), said
 
 right = '''
@@ -65,17 +78,36 @@ with osteo.Rehearsal(osteo.Grid(np.zeros((8, 8, 8), np.float32)), hand="exact") 
     ticks = r.run(osteo.goals([[0, 0, 0]]))
 print(osteo.Session("session").ticks["force_n"].shape, r.bone().dense().voxels, highest, mask.voxels)
 '''
-wrong = {'osteo.phantom(region="knee")': "arg-type", "osteo.threshold(3, lower=500)": "arg-type", 'osteo.threshold("ct.nrrd", lowest=500)': "call-arg",
-         'osteo.Rehearsal("case", hand="left")': "arg-type", 'osteo.Session("session").tick': "attr-defined"}
+wrong = {
+    'osteo.phantom(region="knee")': "arg-type",
+    "osteo.threshold(3, lower=500)": "arg-type",
+    'osteo.threshold("ct.nrrd", lowest=500)': "call-arg",
+    'osteo.Rehearsal("case", hand="left")': "arg-type",
+    'osteo.Session("session").tick': "attr-defined",
+}
 (out / "right.py").write_text(right)
 run(python, "-m", "mypy", "--strict", "right.py")
 (out / "wrong.py").write_text("import osteo\n" + "\n".join(wrong) + "\n")
 found = run(python, "-m", "mypy", "--strict", "wrong.py", ok=False).stdout
 for number, (line, kind) in enumerate(wrong.items(), 2):
-    assert any(f"wrong.py:{number}: error" in f and f"[{kind}]" in f for f in found.splitlines()), f"mypy takes {line}\n{found}"
+    assert any(
+        f"wrong.py:{number}: error" in f and f"[{kind}]" in f for f in found.splitlines()
+    ), f"mypy takes {line}\n{found}"
 # Names, parameters and their order in the types are those of the module.
 # Classes of pybind11 have a metaclass of its own, and those that cannot be made a constructor that says so.
-(out / "allowed").write_text("osteo\\._.*\nosteo\\.Error.*\nosteo\\.(Field|Grid|Image|Labels|Surface|Tets)\nosteo\\.Tets\\.__init__\n")
-told = run(python, "-m", "mypy.stubtest", "osteo", "--allowlist", out / "allowed", "--ignore-unused-allowlist", "--concise", ok=False)
+(out / "allowed").write_text(
+    "osteo\\._.*\nosteo\\.Error.*\nosteo\\.(Field|Grid|Image|Labels|Surface|Tets)\nosteo\\.Tets\\.__init__\n"
+)
+told = run(
+    python,
+    "-m",
+    "mypy.stubtest",
+    "osteo",
+    "--allowlist",
+    out / "allowed",
+    "--ignore-unused-allowlist",
+    "--concise",
+    ok=False,
+)
 assert told.returncode == 0, told.stdout + told.stderr
 print(f"pip install from a clone, {said}; types agree with the module")

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The Python module as a script uses it: stages on arrays without copies, errors with codes, the same voxels as the program."""
+
 import copy
 import gc
 import inspect
@@ -38,7 +39,9 @@ assert len(osteo.stages) > 20, osteo.stages
 for name in osteo.stages:
     function = getattr(osteo, name)
     assert function.__doc__ and "Returns" in function.__doc__, name
-    assert not re.search("(^|[^a-z-])--[a-z]", re.sub("'osteo [^']*'", "", function.__doc__)), f"{name}: a flag of the command in the help"
+    assert not re.search(
+        "(^|[^a-z-])--[a-z]", re.sub("'osteo [^']*'", "", function.__doc__)
+    ), f"{name}: a flag of the command in the help"
     inspect.signature(function)
 assert inspect.signature(osteo.threshold).parameters["lower"].kind is inspect.Parameter.KEYWORD_ONLY
 
@@ -90,11 +93,19 @@ except TypeError as e:
 
 # As arrays of others, without copies where they can be had, never writable.
 for taken in (np.asarray(ct), np.asarray(ct, dtype=np.int16)):
-    assert taken.shape == (20, 24, 28) and taken.dtype == np.int16 and taken.ctypes.data == voxels.ctypes.data and not taken.flags.writeable
+    assert (
+        taken.shape == (20, 24, 28)
+        and taken.dtype == np.int16
+        and taken.ctypes.data == voxels.ctypes.data
+        and not taken.flags.writeable
+    )
 assert np.asarray(ct, dtype=np.float32).dtype == np.float32 and np.array_equal(np.asarray(ct, dtype=np.float32), voxels)
 own = np.array(ct)
 assert own.ctypes.data != voxels.ctypes.data and own.flags.writeable and np.array_equal(own, voxels)
-assert ct.__array__(copy=True).ctypes.data != voxels.ctypes.data and ct.__array__(np.int16, copy=False).ctypes.data == voxels.ctypes.data
+assert (
+    ct.__array__(copy=True).ctypes.data != voxels.ctypes.data
+    and ct.__array__(np.int16, copy=False).ctypes.data == voxels.ctypes.data
+)
 fails(lambda: ct.__array__(np.float32, copy=False), 2, "copy", ValueError)
 assert np.mean(ct) == voxels.mean() and (np.asarray(ct) > 500).sum() == 10 * 12 * 14
 legacy = np.from_dlpack(ct)  # of an older numpy a copy: it cannot be told that memory may not be written
@@ -103,7 +114,10 @@ if np.lib.NumpyVersion(np.__version__) >= "2.1.0":
     assert legacy.ctypes.data == voxels.ctypes.data and not legacy.flags.writeable
     assert np.from_dlpack(ct, copy=True).ctypes.data != voxels.ctypes.data
     field = osteo.Field(np.ones((2, 3, 4), np.float32))
-    assert np.from_dlpack(field).dtype == np.float32 and np.from_dlpack(osteo.Labels(np.ones((2, 3, 4), np.uint8))).dtype == np.uint8
+    assert (
+        np.from_dlpack(field).dtype == np.float32
+        and np.from_dlpack(osteo.Labels(np.ones((2, 3, 4), np.uint8))).dtype == np.uint8
+    )
 before = sys.getrefcount(voxels)
 for _ in range(3):
     ct.__dlpack__(max_version=(1, 0))  # taken by nobody
@@ -141,16 +155,33 @@ def goes_round(value):
 
 
 turned = osteo.Image(voxels, (0.5, 0.6, 0.7), (1, 2, 3), ((0, -1, 0), (1, 0, 0), (0, 0, 1)))
-for value in (ct, turned, osteo.Labels(np.arange(24, dtype=np.uint8).reshape(2, 3, 4)), osteo.Field(np.linspace(0, 1, 24, dtype=np.float32).reshape(2, 3, 4)),
-              osteo.Grid(np.linspace(0, 1, 24, dtype=np.float32).reshape(2, 3, 4), (0.5, 0.5, 0.5), (7, 8, 9), background=0.25, name="hu")):
+for value in (
+    ct,
+    turned,
+    osteo.Labels(np.arange(24, dtype=np.uint8).reshape(2, 3, 4)),
+    osteo.Field(np.linspace(0, 1, 24, dtype=np.float32).reshape(2, 3, 4)),
+    osteo.Grid(
+        np.linspace(0, 1, 24, dtype=np.float32).reshape(2, 3, 4), (0.5, 0.5, 0.5), (7, 8, 9), background=0.25, name="hu"
+    ),
+):
     goes_round(value)
-assert copy.copy(ct).voxels.ctypes.data == voxels.ctypes.data and copy.deepcopy(ct).voxels.ctypes.data != voxels.ctypes.data
+assert (
+    copy.copy(ct).voxels.ctypes.data == voxels.ctypes.data
+    and copy.deepcopy(ct).voxels.ctypes.data != voxels.ctypes.data
+)
 buffers = []
 pickle.dumps(ct, 5, buffer_callback=buffers.append)
-assert sum(b.raw().nbytes for b in buffers) == voxels.nbytes, "voxels go beside the pickle, where a reader takes them so"
+assert (
+    sum(b.raw().nbytes for b in buffers) == voxels.nbytes
+), "voxels go beside the pickle, where a reader takes them so"
 # In another process, as multiprocessing and joblib send work.
 worker = "import pickle, sys; call, a, k = pickle.load(sys.stdin.buffer); sys.stdout.buffer.write(pickle.dumps(call(*a, **k)))"
-done = subprocess.run([sys.executable, "-c", worker], input=pickle.dumps((osteo.threshold, (ct,), {"lower": 500})), stdout=subprocess.PIPE, check=True)
+done = subprocess.run(
+    [sys.executable, "-c", worker],
+    input=pickle.dumps((osteo.threshold, (ct,), {"lower": 500})),
+    stdout=subprocess.PIPE,
+    check=True,
+)
 same(pickle.loads(done.stdout), osteo.threshold(ct, lower=500))
 fails(lambda: np.asarray(osteo.Grid(np.ones((2, 2, 2), np.float32))), 2, "dense()", TypeError)
 
@@ -170,7 +201,9 @@ for _ in range(50):
     begun = time.perf_counter()
     osteo.threshold(small, lower=-500, threads=1)
     seconds.append(time.perf_counter() - begun)
-print(f"{len(osteo.stages)} stages; threshold of 64 voxels: {min(seconds) * 1e3:.3f} ms a call at best, {sorted(seconds)[25] * 1e3:.3f} ms the median")
+print(
+    f"{len(osteo.stages)} stages; threshold of 64 voxels: {min(seconds) * 1e3:.3f} ms a call at best, {sorted(seconds)[25] * 1e3:.3f} ms the median"
+)
 
 # From a phantom to a closed surface, all in memory.
 made = osteo.phantom(spacing_mm=2.0, seed=1)
@@ -201,20 +234,46 @@ assert osteo.__version__.count(".") == 2
 
 # Documents: a dict goes in; JSON comes out as one, an input file of CalculiX as text.
 corners = np.array([(x, y, z) for z in (-20, -10) for y in (20, 30) for x in (40, 50)], np.float32)
-box = osteo.Surface(corners, np.array([(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2),
-                                       (1, 3, 7), (1, 7, 5)], np.uint32))
+box = osteo.Surface(
+    corners,
+    np.array(
+        [
+            (0, 2, 3),
+            (0, 3, 1),
+            (4, 5, 7),
+            (4, 7, 6),
+            (0, 1, 5),
+            (0, 5, 4),
+            (2, 6, 7),
+            (2, 7, 3),
+            (0, 4, 6),
+            (0, 6, 2),
+            (1, 3, 7),
+            (1, 7, 5),
+        ],
+        np.uint32,
+    ),
+)
 mesh = osteo.tetrahedralize(box, method="grid", spacing_mm=2.5)
 goes_round(mesh)
 fails(lambda: np.asarray(mesh), 2, "tets", TypeError)
-pressed = {"osteotome_tissue": 1, "material": {"young_kpa": 1000, "poisson": 0.3}, "fixed": [{"box_mm": [[39, 19, -21], [51, 31, -19.9]]}],
-           "loads": [{"name": "press", "forces": [{"box_mm": [[39, 19, -10.1], [51, 31, -9]], "total_n": [0, 0, -1]}]}]}
+pressed = {
+    "osteotome_tissue": 1,
+    "material": {"young_kpa": 1000, "poisson": 0.3},
+    "fixed": [{"box_mm": [[39, 19, -21], [51, 31, -19.9]]}],
+    "loads": [{"name": "press", "forces": [{"box_mm": [[39, 19, -10.1], [51, 31, -9]], "total_n": [0, 0, -1]}]}],
+}
 solved = osteo.fem(mesh, pressed, law="linear")
 assert isinstance(solved.report, dict) and abs(solved.report["reaction_n"][2] - 1) < 1e-6, solved.report
 assert isinstance(solved.inp, str) and "*ELASTIC" in solved.inp and solved.nodes.startswith("<?xml")
 fails(lambda: osteo.fem(mesh, {**pressed, "gravity": 1}), 2, "gravity")
 fails(lambda: osteo.fem(box, pressed), 2, "mesh")
 stiff = osteo.bone_stiffness(mesh, ct, pressed, density_per_1000_hu=0.75)
-assert stiff.report["materials"] > 3 and abs(stiff.report["volume_mm3"] - 1000) < 1e-6 and "*MATERIAL, NAME=M3" in stiff.inp
+assert (
+    stiff.report["materials"] > 3
+    and abs(stiff.report["volume_mm3"] - 1000) < 1e-6
+    and "*MATERIAL, NAME=M3" in stiff.inp
+)
 
 # VTK's own module, where it is.
 try:
@@ -229,7 +288,9 @@ def address(array):
     return numpy_support.vtk_to_numpy(array).ctypes.data
 
 
-turned = osteo.Image(voxels, spacing_mm=(0.5, 0.6, 0.7), origin_mm=(1, 2, 3), direction=((0, -1, 0), (1, 0, 0), (0, 0, 1)))
+turned = osteo.Image(
+    voxels, spacing_mm=(0.5, 0.6, 0.7), origin_mm=(1, 2, 3), direction=((0, -1, 0), (1, 0, 0), (0, 0, 1))
+)
 image = osteo.to_vtk(turned)
 assert address(image.GetPointData().GetScalars()) == voxels.ctypes.data, "shared"
 assert image.GetDimensions() == (28, 24, 20) and image.GetScalarComponentAsDouble(7, 6, 5, 0) == 1200
@@ -249,8 +310,11 @@ points, triangles = surface.points_mm.copy(), surface.triangles.copy()
 del surface, bone
 gc.collect()
 back = osteo.from_vtk(poly)
-assert np.array_equal(back.points_mm, points) and np.array_equal(back.triangles, triangles), "the data set keeps the memory alive"
+assert np.array_equal(back.points_mm, points) and np.array_equal(
+    back.triangles, triangles
+), "the data set keeps the memory alive"
 from vtkmodules.vtkFiltersCore import vtkMassProperties
+
 mass = vtkMassProperties()
 mass.SetInputData(poly)
 p = points[triangles].astype(float)

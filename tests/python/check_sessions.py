@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Sessions as arrays, and a rehearsal that a script steps: the same bits as the program's. usage: check_sessions.py OSTEO FIXTURES OUT"""
+
 import csv
 import json
 import os
@@ -37,7 +38,9 @@ def same(a, b):
     for name in a.dtype.names:
         if name not in MACHINE:
             x, y = np.ascontiguousarray(a[name]), np.ascontiguousarray(b[name])
-            assert x.tobytes() == y.tobytes(), f"{name} differs first at {np.argwhere(x.view(np.uint8) != y.view(np.uint8))[0]}"
+            assert (
+                x.tobytes() == y.tobytes()
+            ), f"{name} differs first at {np.argwhere(x.view(np.uint8) != y.view(np.uint8))[0]}"
 
 
 def fails(call, code, word):
@@ -94,11 +97,35 @@ assert told["bone_hash"] == summary["bone_hash"]
 at = strokes["position_mm"][::100].tolist()
 script = json.loads((fixtures / "session/strokes.json").read_text())
 middle = np.array(at).mean(axis=0).tolist()
-script["hands"] = [{"instrument": "sucker 8 Fr", "axis": [0, 0, 1], "waypoints": [{"t_s": 0, "at_mm": [middle[0] + 30, middle[1], middle[2]], "drill": True},
-                                                                                      {"t_s": 2, "at_mm": middle}]}]
-script["actions"] = [{"t_s": 1.2, "undo": {}}, {"t_s": 1.5, "saw": {"at_mm": middle, "normal": [0, 0, 1]}}, {"t_s": 1.9, "undo": {}}]
+script["hands"] = [
+    {
+        "instrument": "sucker 8 Fr",
+        "axis": [0, 0, 1],
+        "waypoints": [
+            {"t_s": 0, "at_mm": [middle[0] + 30, middle[1], middle[2]], "drill": True},
+            {"t_s": 2, "at_mm": middle},
+        ],
+    }
+]
+script["actions"] = [
+    {"t_s": 1.2, "undo": {}},
+    {"t_s": 1.5, "saw": {"at_mm": middle, "normal": [0, 0, 1]}},
+    {"t_s": 1.9, "undo": {}},
+]
 (out / "script.json").write_text(json.dumps(script))
-run("rehearse", case, "--headless", "--fast", "--script", out / "script.json", "-o", out / "headless", "--contact", "proxy", "--quiet")
+run(
+    "rehearse",
+    case,
+    "--headless",
+    "--fast",
+    "--script",
+    out / "script.json",
+    "-o",
+    out / "headless",
+    "--contact",
+    "proxy",
+    "--quiet",
+)
 strokes, actions = osteo.load_script(out / "script.json")
 assert strokes.ndim == 2 and strokes.shape[1] == 2 and len(actions) == 3
 with warnings.catch_warnings():
@@ -125,7 +152,7 @@ assert {"tick": 0, "kind": "mark", "value": {"name": "here"}} in osteo.Session(o
 voxels = np.zeros((40, 40, 40), np.float32)
 voxels[5:35, 5:35, 5:35] = 1
 block = osteo.Grid(voxels, spacing_mm=(0.5, 0.5, 0.5))
-assert block.active_voxels == 27000 and np.array_equal(block.dense().voxels[: 40, : 40, : 40], voxels)
+assert block.active_voxels == 27000 and np.array_equal(block.dense().voxels[:40, :40, :40], voxels)
 padded = np.pad(voxels, 10)
 box = block.dense(lo=(-3, 2, 7), shape=(9, 45, 11))
 assert np.array_equal(box.voxels, padded[7:16, 12:57, 17:28]) and box.origin_mm == [3.5, 1, -1.5]
@@ -144,7 +171,9 @@ assert not ticks["normal_force_n"][:100].any() and ticks["force_n"][-1, 2] > 0.5
 held = osteo.Rehearsal(block, hand="spring").run(goals)
 assert held["position_mm"][-1][2] > down[-1][2] + 0.1, "a spring gives way"
 assert osteo.Rehearsal(block, hand="exact", settings={"limit_force_n": 0.5}).run(goals)["force_n"].max() <= 0.5 + 1e-6
-assert block.active_voxels == 27000 and np.array_equal(block.dense().voxels[: 40, : 40, : 40], voxels), "the grid itself stays as it is"
+assert block.active_voxels == 27000 and np.array_equal(
+    block.dense().voxels[:40, :40, :40], voxels
+), "the grid itself stays as it is"
 
 # Refused, before anything has moved.
 bad = goals[:3].copy()
@@ -174,8 +203,14 @@ fails(lambda: osteo.Rehearsal(case, out=out / "two"), 6, "two")
 exact.close()
 assert exact.close()["ticks"] == 800
 fails(lambda: exact.run(goals), 2, "closed")
-for wrong in (lambda: osteo.goals([1, 2, 3]), lambda: osteo.goals(down, pedal=2), lambda: osteo.goals(down, tool="spoon"), lambda: osteo.goals(down, axis=(0, 0, 0)),
-              lambda: osteo.Rehearsal(block, hand="left"), lambda: osteo.Session(fixtures / "session", damaged="maybe")):
+for wrong in (
+    lambda: osteo.goals([1, 2, 3]),
+    lambda: osteo.goals(down, pedal=2),
+    lambda: osteo.goals(down, tool="spoon"),
+    lambda: osteo.goals(down, axis=(0, 0, 0)),
+    lambda: osteo.Rehearsal(block, hand="left"),
+    lambda: osteo.Session(fixtures / "session", damaged="maybe"),
+):
     try:
         wrong()
     except ValueError:

@@ -5,6 +5,7 @@ nothing in it executable. Snakemake must be at hand.
 
 usage: check_batch.py BIN_DIR FIXTURES WORK_DIR      exits 77 (skipped) without snakemake
 """
+
 import json, os, pathlib, re, shutil, signal, subprocess, sys, time
 
 bin_dir, fixtures, work = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
@@ -19,11 +20,36 @@ work.mkdir(parents=True)
 osteo = bin_dir / "osteo"
 
 # Bone and no pictures: what is tried here is who does what, not how it looks.
-(work / "p.json").write_text(json.dumps({"osteotome": 1, "variables": {"source": {}, "case": {}, "lower": {"default": 500}}, "stages": [
-    {"id": "scan", "stage": "import", "in": {"source": {"file": "${source}"}}, "out": {"verdict": "${case}/import.json"}},
-    {"id": "mask", "stage": "threshold", "in": {"image": "scan"}, "params": {"lower": "${lower}"}},
-    {"id": "bone", "stage": "resample", "in": {"image": "scan", "mask": "mask"}, "params": {"spacing_mm": 3}, "out": {"bone": "${case}/bone.vdb", "hu": "${case}/hu.vdb"}},
-    {"id": "surface", "stage": "surface", "in": {"bone": "bone"}, "out": {"surface": "${case}/surface.ply"}}]}))
+(work / "p.json").write_text(
+    json.dumps(
+        {
+            "osteotome": 1,
+            "variables": {"source": {}, "case": {}, "lower": {"default": 500}},
+            "stages": [
+                {
+                    "id": "scan",
+                    "stage": "import",
+                    "in": {"source": {"file": "${source}"}},
+                    "out": {"verdict": "${case}/import.json"},
+                },
+                {"id": "mask", "stage": "threshold", "in": {"image": "scan"}, "params": {"lower": "${lower}"}},
+                {
+                    "id": "bone",
+                    "stage": "resample",
+                    "in": {"image": "scan", "mask": "mask"},
+                    "params": {"spacing_mm": 3},
+                    "out": {"bone": "${case}/bone.vdb", "hu": "${case}/hu.vdb"},
+                },
+                {
+                    "id": "surface",
+                    "stage": "surface",
+                    "in": {"bone": "bone"},
+                    "out": {"surface": "${case}/surface.ply"},
+                },
+            ],
+        }
+    )
+)
 (work / "torn.nrrd").write_text("torn")
 cases, broken = int(os.environ.get("OSTEO_BATCH_CASES", "8")), int(os.environ.get("OSTEO_BATCH_BROKEN", "2"))
 rows = [(f"C{i:03d}", "torn.nrrd" if i % (cases // broken) == 1 else fixtures / "ct.nrrd") for i in range(cases)]
@@ -52,7 +78,9 @@ os.environ["PATH"] = f"{bin_dir}:{os.environ['PATH']}"
 
 
 def snakemake():
-    return subprocess.Popen(["sh", "-c", line], cwd=installed, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    return subprocess.Popen(
+        ["sh", "-c", line], cwd=installed, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
 
 
 start = time.time()
@@ -70,7 +98,14 @@ while run.poll() is None and not killed:
             words = (p / "cmdline").read_bytes().split(b"\0")
         except (OSError, ValueError):
             continue
-        if p.name.isdigit() and len(words) > 3 and words[0] == b"osteo" and words[1] == b"batch" and b"--only" in words and f"{work}/s".encode() in words:
+        if (
+            p.name.isdigit()
+            and len(words) > 3
+            and words[0] == b"osteo"
+            and words[1] == b"batch"
+            and b"--only" in words
+            and f"{work}/s".encode() in words
+        ):
             os.kill(int(p.name), signal.SIGKILL)
             killed = int(p.name)
             break
@@ -96,6 +131,13 @@ for c, s in rows:
         assert (work / "b/cases" / c / "bone.vdb").read_bytes() == (work / "s/cases" / c / "bone.vdb").read_bytes(), c
 # Again: nothing is left to do, and nothing is touched.
 stamp = (work / "s/records/C000.json").stat().st_mtime_ns
-assert subprocess.run([osteo, "batch", "t.csv", "-o", "s", "--pipeline", "p.json", "--no-report", "--quiet"], cwd=work).returncode == 8
+assert (
+    subprocess.run(
+        [osteo, "batch", "t.csv", "-o", "s", "--pipeline", "p.json", "--no-report", "--quiet"], cwd=work
+    ).returncode
+    == 8
+)
 assert (work / "s/records/C000.json").stat().st_mtime_ns == stamp
-print(f"ok  {cases} cases, {len(bad)} broken, one worker killed: the same by both; osteo batch {alone:.1f} s, the workflow {workflow:.1f} s")
+print(
+    f"ok  {cases} cases, {len(bad)} broken, one worker killed: the same by both; osteo batch {alone:.1f} s, the workflow {workflow:.1f} s"
+)

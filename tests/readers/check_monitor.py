@@ -3,6 +3,7 @@
 
 usage: check_monitor.py BIN_DIR FIXTURES WORK_DIR      exits 77 (skipped) when a reader is missing
 """
+
 import csv, hashlib, json, pathlib, shutil, struct, subprocess, sys, wave
 
 try:
@@ -18,14 +19,32 @@ work.mkdir(parents=True)
 
 
 def osteo(*args, **more):
-    return subprocess.run([bin_dir / "osteo", *map(str, args), "--quiet"], check=True, cwd=work, capture_output=True, text=True, **more).stdout
+    return subprocess.run(
+        [bin_dir / "osteo", *map(str, args), "--quiet"], check=True, cwd=work, capture_output=True, text=True, **more
+    ).stdout
 
 
 osteo("phantom", "ct.nrrd", "--labels-out", "l.nrrd", "--region", "temporal", "--spacing-mm", 1)
-osteo("prepare", "ct.nrrd", "-o", "case", "--spacing-mm", 1, "--structures", "l.nrrd", "--names", "6=facial nerve, 13=chorda tympani", "--no-report")
+osteo(
+    "prepare",
+    "ct.nrrd",
+    "-o",
+    "case",
+    "--spacing-mm",
+    1,
+    "--structures",
+    "l.nrrd",
+    "--names",
+    "6=facial nerve, 13=chorda tympani",
+    "--no-report",
+)
 path = [(0, 62, True), (2, 50.3, True), (4, 47.8, True), (5, 47, True), (6, 45, True), (6.5, 52, False)]
-strokes = {"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 3}, "axis": [0.96, 0.2, 0.2],
-           "waypoints": [{"t_s": t, "at_mm": [x, 9.5, -33.5], "drill": on} for t, x, on in path]}
+strokes = {
+    "osteotome_strokes": 1,
+    "burr": {"kind": "cutting", "diameter_mm": 3},
+    "axis": [0.96, 0.2, 0.2],
+    "waypoints": [{"t_s": t, "at_mm": [x, 9.5, -33.5], "drill": on} for t, x, on in path],
+}
 (work / "s.json").write_text(json.dumps(strokes))
 osteo("rehearse", "case", "--headless", "--fast", "--script", "s.json", "-o", "session")
 told = json.loads(osteo("nerve-monitor", "session", "-o", "out", "--json"))
@@ -38,7 +57,9 @@ osteo("nerve-monitor", "session", "-o", "again")
 digest = lambda f: hashlib.sha256((work / f).read_bytes()).hexdigest()
 for f in ("monitor.ns5", "monitor.nev", "events.csv", "channel.wav"):
     assert digest(f"out/{f}") == digest(f"again/{f}"), f
-stimulated = json.loads(osteo("nerve-monitor", "session", "-o", "stimulated", "--json", "--stimulator-ma", 5, "--pulses-per-s", 10))
+stimulated = json.loads(
+    osteo("nerve-monitor", "session", "-o", "stimulated", "--json", "--stimulator-ma", 5, "--pulses-per-s", 10)
+)
 assert stimulated["events"]["stimulus"] > 20 and stimulated["events"]["response"] > 5, stimulated["events"]
 assert digest("stimulated/monitor.ns5") != digest("out/monitor.ns5")
 
@@ -63,7 +84,7 @@ for folder, j in (("out", told), ("stimulated", stimulated)):
     waves = reader.get_spike_raw_waveforms(0, 0, 0, None, None)
     channel = int(str(reader.header["spike_channels"][0]["name"]).removeprefix("ch").split("#")[0]) - 1
     for t, w in list(zip(times, waves))[:20]:
-        assert (w[0] == own[int(t) - 10:int(t) + 38, channel]).all()
+        assert (w[0] == own[int(t) - 10 : int(t) + 38, channel]).all()
     events = 0
     for c in range(reader.event_channels_count()):
         if "digital" in str(reader.header["event_channels"][c]["name"]):

@@ -5,6 +5,7 @@ against osteo's own files; a tool that pyigtl tracks drills.
 usage: check_network.py BIN_DIR FIXTURES WORK_DIR [SECONDS]     exits 77 (skipped) when pyigtl or neo is missing; pycbsdk and pylsl are left
 out with a word where they are. SECONDS: of the session (4).
 """
+
 import json, os, pathlib, shutil, socket, struct, subprocess, sys, threading, time
 
 try:
@@ -22,7 +23,9 @@ work.mkdir(parents=True)
 
 
 def osteo(*args, **more):
-    return subprocess.run([bin_dir / "osteo", *map(str, args), "--quiet"], check=True, cwd=work, capture_output=True, text=True, **more).stdout
+    return subprocess.run(
+        [bin_dir / "osteo", *map(str, args), "--quiet"], check=True, cwd=work, capture_output=True, text=True, **more
+    ).stdout
 
 
 def free_port(kind=socket.SOCK_STREAM):
@@ -58,8 +61,16 @@ def sensor(c):
 
 message("NDARRAY", ndarray)
 message("SENSOR", sensor)
-message("TDATA", lambda c: [(c[i:i + 20].rstrip(b"\0").decode(), c[i + 20], struct.unpack(">12f", c[i + 22:i + 70])) for i in range(0, len(c), 70)])
-message("STATUS", lambda c: (*struct.unpack(">Hq", c[:10]), c[10:30].rstrip(b"\0").decode(), c[30:].rstrip(b"\0").decode()))
+message(
+    "TDATA",
+    lambda c: [
+        (c[i : i + 20].rstrip(b"\0").decode(), c[i + 20], struct.unpack(">12f", c[i + 22 : i + 70]))
+        for i in range(0, len(c), 70)
+    ],
+)
+message(
+    "STATUS", lambda c: (*struct.unpack(">Hq", c[:10]), c[10:30].rstrip(b"\0").decode(), c[30:].rstrip(b"\0").decode())
+)
 
 
 class All(dict):
@@ -94,16 +105,34 @@ def of(messages, device, kind=None):
 
 
 osteo("phantom", "ct.nrrd", "--labels-out", "l.nrrd", "--region", "temporal", "--spacing-mm", 1)
-osteo("prepare", "ct.nrrd", "-o", "case", "--spacing-mm", 1, "--structures", "l.nrrd", "--names", "6=facial nerve, 13=chorda tympani", "--no-report")
+osteo(
+    "prepare",
+    "ct.nrrd",
+    "-o",
+    "case",
+    "--spacing-mm",
+    1,
+    "--structures",
+    "l.nrrd",
+    "--names",
+    "6=facial nerve, 13=chorda tympani",
+    "--no-report",
+)
 path = [(0, 62, True), (seconds / 2, 48.5, True), (seconds, 46, True)]
-strokes = {"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 3}, "axis": [0.96, 0.2, 0.2],
-           "camera": {"centre_mm": [50, 9, -33], "radius_mm": 30, "eye": [1, 0, 0]},
-           "waypoints": [{"t_s": t, "at_mm": [x, 9.5, -33.5], "drill": on} for t, x, on in path]}
+strokes = {
+    "osteotome_strokes": 1,
+    "burr": {"kind": "cutting", "diameter_mm": 3},
+    "axis": [0.96, 0.2, 0.2],
+    "camera": {"centre_mm": [50, 9, -33], "radius_mm": 30, "eye": [1, 0, 0]},
+    "waypoints": [{"t_s": t, "at_mm": [x, 9.5, -33.5], "drill": on} for t, x, on in path],
+}
 (work / "s.json").write_text(json.dumps(strokes))
 
 
 def own_samples(folder, channels):
-    return np.frombuffer((work / folder / "monitor.ns5").read_bytes()[314 + 66 * channels + 9:], "<i2").reshape(-1, channels)
+    return np.frombuffer((work / folder / "monitor.ns5").read_bytes()[314 + 66 * channels + 9 :], "<i2").reshape(
+        -1, channels
+    )
 
 
 def check_signal(messages, own, end, name):
@@ -113,15 +142,31 @@ def check_signal(messages, own, end, name):
         assert round(m.timestamp * 30000) == at, (m.timestamp, at)  # its first sample
         at += len(m.value)
     signal = np.concatenate([m.value for m in blocks])
-    assert len(signal) == end["samples"] and (signal == own[:len(signal)]).all(), name
+    assert len(signal) == end["samples"] and (signal == own[: len(signal)]).all(), name
     return len(signal)
 
 
 # 1. Live, without a window, two listeners.
 port = free_port()
 listeners = [Listener(port), Listener(port)]
-run = subprocess.Popen([bin_dir / "osteo", "rehearse", "case", "--headless", "--script", "s.json", "-o", "session", "--stream", f"igtl:{port}"],
-                       cwd=work, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+run = subprocess.Popen(
+    [
+        bin_dir / "osteo",
+        "rehearse",
+        "case",
+        "--headless",
+        "--script",
+        "s.json",
+        "-o",
+        "session",
+        "--stream",
+        f"igtl:{port}",
+    ],
+    cwd=work,
+    stdout=subprocess.PIPE,
+    stderr=subprocess.PIPE,
+    text=True,
+)
 live = [l.stop() for l in listeners]
 out, err = run.communicate(timeout=600)
 assert run.returncode in (0, 8), (run.returncode, err)
@@ -137,8 +182,10 @@ for messages in live:
     lost = [m for m in of(messages, "NerveEvent") if json.loads(m.string)["event"] == "lost"]
     if not lost:
         assert first + len(signal) == end["samples"], (first, len(signal), end)
-        assert (signal == own[first:first + len(signal)]).all()
-print(f"ok  live: {len(live)} listeners of pyigtl, {end['samples']} samples of {channels} channels, bit for bit those of 'osteo nerve-monitor'")
+        assert (signal == own[first : first + len(signal)]).all()
+print(
+    f"ok  live: {len(live)} listeners of pyigtl, {end['samples']} samples of {channels} channels, bit for bit those of 'osteo nerve-monitor'"
+)
 
 # 2. The finished session, from its first sample on.
 port = free_port()
@@ -153,9 +200,18 @@ setup = json.loads(of(messages, "NerveSetup")[0].string)
 assert setup["channels"] == told["channels"] and setup["uv_per_bit"] == 0.25, setup
 events = [json.loads(m.string) for m in of(messages, "NerveEvent")]
 expected = {k: v for k, v in told["events"].items() if k != "cause"}
-assert {k: sum(e["event"] == k for e in events) for k in expected} == expected and len(events) == end["events"], (expected, events)
+assert {k: sum(e["event"] == k for e in events) for k in expected} == expected and len(events) == end["events"], (
+    expected,
+    events,
+)
 tools = of(messages, "Tool", "TRANSFORM")
-assert len(tools) == len(of(messages, "Tools", "TDATA")) == len(of(messages, "Force")) == len(of(messages, "Pedal")) == end["tools"]
+assert (
+    len(tools)
+    == len(of(messages, "Tools", "TDATA"))
+    == len(of(messages, "Force"))
+    == len(of(messages, "Pedal"))
+    == end["tools"]
+)
 # The same poses as in the session, RAS instead of LPS.
 osteo("export", "session", "ticks.csv")
 rows = [line.split(",") for line in (work / "ticks.csv").read_text().splitlines()]
@@ -165,11 +221,13 @@ shown = next((columns[c] for c in columns if c.startswith("shown") and "x" in c)
 every = round(1000 / 60)
 for i, m in enumerate(tools):
     row = rows[1 + i * every]
-    at = np.array([float(v) for v in row[x:x + 3]])
+    at = np.array([float(v) for v in row[x : x + 3]])
     if shown is not None:
-        at += [float(v) for v in row[shown:shown + 3]]
+        at += [float(v) for v in row[shown : shown + 3]]
     assert np.abs(m.matrix[:3, 3] - at * [-1, -1, 1]).max() < 2e-3, (i, m.matrix, at)
-    assert np.abs(m.matrix[:3, :3].T @ m.matrix[:3, :3] - np.eye(3)).max() < 1e-5 and np.linalg.det(m.matrix[:3, :3]) > 0
+    assert (
+        np.abs(m.matrix[:3, :3].T @ m.matrix[:3, :3] - np.eye(3)).max() < 1e-5 and np.linalg.det(m.matrix[:3, :3]) > 0
+    )
     assert np.abs(m.matrix[:3, 2] - np.array([-0.96, -0.2, 0.2]) / np.linalg.norm([0.96, 0.2, 0.2])).max() < 1e-5
 force = max(np.linalg.norm(m.value[1]) for m in of(messages, "Force"))
 assert 0.05 < force < 50 and of(messages, "Force")[0].value[0] == 0x02C4 << 48, force
@@ -203,8 +261,26 @@ class Pedal(MessageBase):
         return struct.pack(">BBQd", 1, 0, 0, self.value)
 
 
-run = subprocess.Popen([bin_dir / "osteo", "rehearse", "case", "--headless", "--seconds", str(seconds + 3), "--device", "igtl", "--tracker",
-                        f"127.0.0.1:{port}/Drill", "-o", "tracked"], cwd=work, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+run = subprocess.Popen(
+    [
+        bin_dir / "osteo",
+        "rehearse",
+        "case",
+        "--headless",
+        "--seconds",
+        str(seconds + 3),
+        "--device",
+        "igtl",
+        "--tracker",
+        f"127.0.0.1:{port}/Drill",
+        "-o",
+        "tracked",
+    ],
+    cwd=work,
+    stdout=subprocess.PIPE,
+    stderr=subprocess.PIPE,
+    text=True,
+)
 begin, sent = None, 0
 while run.poll() is None:
     if tracker.is_connected():
@@ -233,7 +309,10 @@ tracker.stop()
 # 4. Cerebus packets.
 try:
     import importlib.metadata
-    cbsdk = importlib.metadata.version("pycbsdk").startswith("0.")  # from 9 on it is a library that wants a processor that answers
+
+    cbsdk = importlib.metadata.version("pycbsdk").startswith(
+        "0."
+    )  # from 9 on it is a library that wants a processor that answers
 except ImportError as e:
     print(f"left out: {e}")
     cbsdk = None
@@ -242,10 +321,24 @@ for version in versions if cbsdk else ():
     # UDP loses what a reader in Python on a busy machine does not fetch in time: slower, then. What comes is right at any speed.
     for speed in (0.5, 0.2, 0.05):
         port = free_port(socket.SOCK_DGRAM)
-        reader = subprocess.Popen([sys.executable, "-W", "ignore", pathlib.Path(__file__).with_name("read_cerebus.py"), version, str(port),
-                                   work / "cerebus.npz"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        reader = subprocess.Popen(
+            [
+                sys.executable,
+                "-W",
+                "ignore",
+                pathlib.Path(__file__).with_name("read_cerebus.py"),
+                version,
+                str(port),
+                work / "cerebus.npz",
+            ],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
         assert reader.stdout.readline().strip() == "listening"
-        streamed = json.loads(osteo("stream", "session", "--to", f"cerebus:127.0.0.1:{port}/{version}", "--json", "--speed", speed))
+        streamed = json.loads(
+            osteo("stream", "session", "--to", f"cerebus:127.0.0.1:{port}/{version}", "--json", "--speed", speed)
+        )
         assert reader.wait(timeout=600) == 0
         got = np.load(work / "cerebus.npz")
         times = got["times"]
@@ -260,6 +353,7 @@ for version in versions if cbsdk else ():
 try:
     import pylsl
     import pylsl.lib
+
     library = pathlib.Path(pylsl.lib.__file__).with_name("liblsl.so")
     if not library.exists():
         library = pathlib.Path(pylsl.lib.lib._name)
@@ -270,9 +364,15 @@ if pylsl:
     # This machine alone.
     (work / "lsl.cfg").write_text("[multicast]\nResolveScope = machine\n")
     os.environ["LSLAPICFG"] = str(work / "lsl.cfg")
-    reader = subprocess.Popen([sys.executable, pathlib.Path(__file__).with_name("read_lsl.py"), work / "lsl.npy"], stdout=subprocess.PIPE, text=True)
+    reader = subprocess.Popen(
+        [sys.executable, pathlib.Path(__file__).with_name("read_lsl.py"), work / "lsl.npy"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     assert reader.stdout.readline().strip() == "looking"
-    streamed = json.loads(osteo("stream", "session", "--to", "lsl", "--json", env={**os.environ, "OSTEO_LSL_LIBRARY": str(library)}))
+    streamed = json.loads(
+        osteo("stream", "session", "--to", "lsl", "--json", env={**os.environ, "OSTEO_LSL_LIBRARY": str(library)})
+    )
     out, _ = reader.communicate(timeout=300)
     assert reader.returncode == 0, out
     got = np.load(work / "lsl.npy")

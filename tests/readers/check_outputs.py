@@ -3,6 +3,7 @@
 
 usage: check_outputs.py BIN_DIR FIXTURES WORK_DIR      exits 77 (skipped) when a reader is missing
 """
+
 import io, json, pathlib, shutil, subprocess, sys
 
 try:
@@ -49,8 +50,14 @@ def seg_planes(path):
     spacing = np.array(shared.PixelMeasuresSequence[0].PixelSpacing, float)
     pixels = d.pixel_array.reshape(-1, d.Rows, d.Columns)
     for frame, picture in zip(d.PerFrameFunctionalGroupsSequence, pixels):
-        yield (frame.SegmentIdentificationSequence[0].ReferencedSegmentNumber,
-               np.array(frame.PlanePositionSequence[0].ImagePositionPatient, float), picture, iop, spacing, frame)
+        yield (
+            frame.SegmentIdentificationSequence[0].ReferencedSegmentNumber,
+            np.array(frame.PlanePositionSequence[0].ImagePositionPatient, float),
+            picture,
+            iop,
+            spacing,
+            frame,
+        )
 
 
 def seg_world(path):
@@ -83,7 +90,14 @@ for name in ("m.seg.nrrd", "m.mha"):
     assert n == count
     same(name + " in SimpleITK", c, centre, 1e-3)
 header = (work / "m.seg.nrrd").read_bytes().split(b"\n\n")[0].decode()
-for key in ("Segment0_ID:=", "Segment0_Name:=", "Segment0_LabelValue:=1", "Segment0_Layer:=0", "Segment0_Extent:=", "Segmentation_MasterRepresentation:="):
+for key in (
+    "Segment0_ID:=",
+    "Segment0_Name:=",
+    "Segment0_LabelValue:=1",
+    "Segment0_Layer:=0",
+    "Segment0_Extent:=",
+    "Segmentation_MasterRepresentation:=",
+):
     assert key in header, key
 nii = nibabel.load(work / "m.nii.gz")
 n, c = world_of(np.asarray(nii.dataobj), nii.affine)
@@ -121,7 +135,9 @@ both = missed = 0
 for _, position, picture, _, _, frame in seg_planes(work / "onto.dcm"):
     uid = frame.DerivationImageSequence[0].SourceImageSequence[0].ReferencedSOPInstanceUID
     same_slice = source[uid]
-    assert np.allclose(np.array(same_slice.ImagePositionPatient, float), position, atol=1e-4), "a frame lies elsewhere than its source slice"
+    assert np.allclose(
+        np.array(same_slice.ImagePositionPatient, float), position, atol=1e-4
+    ), "a frame lies elsewhere than its source slice"
     bone = same_slice.pixel_array * float(same_slice.RescaleSlope) + float(same_slice.RescaleIntercept) >= 500
     both += np.sum(bone & (picture > 0))
     missed += np.sum(bone ^ (picture > 0))
@@ -130,11 +146,16 @@ print(f"ok  SEG on the tilted slices: {100 * missed / both:.1f} % of its voxels 
 for name in ("own.dcm", "onto.dcm"):
     d = pydicom.dcmread(work / name)
     assert d.PatientID == "PAT-4711" and d.StudyInstanceUID == any_source.StudyInstanceUID
-    assert d.FrameOfReferenceUID == any_source.FrameOfReferenceUID and d.ReferencedSeriesSequence[0].SeriesInstanceUID == any_source.SeriesInstanceUID
+    assert (
+        d.FrameOfReferenceUID == any_source.FrameOfReferenceUID
+        and d.ReferencedSeriesSequence[0].SeriesInstanceUID == any_source.SeriesInstanceUID
+    )
     valid_dicom(work / name)
 
 # A surface: the same points everywhere.
-assert len(trimesh.load(fixtures / "bone.ply").vertices) == len(trimesh.load(fixtures / "bone.ply", process=False).vertices), "equal points"
+assert len(trimesh.load(fixtures / "bone.ply").vertices) == len(
+    trimesh.load(fixtures / "bone.ply", process=False).vertices
+), "equal points"
 reference = trimesh.load(fixtures / "bone.ply", process=False)
 for name in ("b.stl", "b.obj", "b.3mf", "b.glb"):
     osteo("convert", fixtures / "bone.ply", name)
@@ -153,18 +174,34 @@ for name, extra in (("b.dcm", ()), ("bs.dcm", ("--source", "tilted"))):
     d = pydicom.dcmread(work / name)
     assert d.SOPClassUID == "1.2.840.10008.5.1.4.1.1.104.3" and d.MIMETypeOfEncapsulatedDocument == "model/stl"
     assert d.MeasurementUnitsCodeSequence[0].CodeValue == "mm"
-    inside = trimesh.load(io.BytesIO(d.EncapsulatedDocument[:d.EncapsulatedDocumentLength]), file_type="stl", process=False)
+    inside = trimesh.load(
+        io.BytesIO(d.EncapsulatedDocument[: d.EncapsulatedDocumentLength]), file_type="stl", process=False
+    )
     same(name + " (encapsulated STL), bounds in mm", inside.bounds, reference.bounds, 1e-5)
     assert (str(d.PatientName) == "ROENTGEN^ANNA") == bool(extra)
     valid_dicom(work / name)
 
 # Pieces: each STL is whole once equal points are joined, which trimesh does as it reads, and encloses what plan.json says the bone measures.
 centre = reference.bounds.mean(0)
-saws = [{"at_mm": [float(c) for c in centre + off], "normal": n, "kerf_mm": 2.2} for off, n in ((0, [1, 0.2, 0.1]), ([3, 6, 1], [0.2, 1, 0.3]), ([0, -7, 5], [0.1, 0.4, 1]))]
-actions = [{"t_s": 0.2 + 0.5 * i, **a} for i, a in enumerate([a for s in saws for a in ({"saw": s}, {"split": {"least_mm3": 0.05}})])]
+saws = [
+    {"at_mm": [float(c) for c in centre + off], "normal": n, "kerf_mm": 2.2}
+    for off, n in ((0, [1, 0.2, 0.1]), ([3, 6, 1], [0.2, 1, 0.3]), ([0, -7, 5], [0.1, 0.4, 1]))
+]
+actions = [
+    {"t_s": 0.2 + 0.5 * i, **a}
+    for i, a in enumerate([a for s in saws for a in ({"saw": s}, {"split": {"least_mm3": 0.05}})])
+]
 at = [float(x) for x in centre + [0, 12, 8]]
-script = {"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 4}, "axis": [1, 0, 0.2], "actions": actions,
-          "waypoints": [{"t_s": 0, "at_mm": [reference.bounds[1][0] + 9.0, *at[1:]], "drill": False}, {"t_s": 3.5, "at_mm": at}]}
+script = {
+    "osteotome_strokes": 1,
+    "burr": {"kind": "cutting", "diameter_mm": 4},
+    "axis": [1, 0, 0.2],
+    "actions": actions,
+    "waypoints": [
+        {"t_s": 0, "at_mm": [reference.bounds[1][0] + 9.0, *at[1:]], "drill": False},
+        {"t_s": 3.5, "at_mm": at},
+    ],
+}
 (work / "parts.json").write_text(json.dumps(script))
 osteo("rehearse", fixtures / "case", "--headless", "--fast", "--script", "parts.json", "-o", "parts")
 osteo("export-result", "parts", "-o", "parts-plan")
@@ -183,7 +220,9 @@ for piece in pieces:
     assert abs(off - abs(piece["surface_volume_off_percent"])) < 0.02, piece
     worst = max(worst, off if piece["volume_mm3"] > 5 else 0)
 assert worst < 0.12, worst
-print(f"ok  {len(pieces)} pieces in STL are closed manifolds in trimesh; those over 5 mm3 enclose their bone within {worst:.3f} %")
+print(
+    f"ok  {len(pieces)} pieces in STL are closed manifolds in trimesh; those over 5 mm3 enclose their bone within {worst:.3f} %"
+)
 
 # A CT: every format, one voxel for voxel place.
 ct, ct_affine = itk_mask(fixtures / "ct.nrrd")

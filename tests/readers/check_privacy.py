@@ -4,6 +4,7 @@
 Fills every identifying tag of a series with a value of its own, names folders and files after the patient, runs what imaging staff run,
 and searches every byte that came out.    usage: check_privacy.py BIN_DIR FIXTURES WORK_DIR
 """
+
 import gzip, pathlib, re, shutil, subprocess, sys
 
 try:
@@ -20,22 +21,52 @@ out.mkdir(parents=True)
 
 # The 18 kinds of identifiers of HIPAA 164.514(b)(2), by the tags that carry them, and the UIDs.
 values = {
-    "PatientName": "Quxley^Zebedee^Marmaduke", "PatientID": "MRN7755331", "OtherPatientIDs": "ALT9911882", "OtherPatientNames": "Vandersnoot^Zeb",
-    "PatientBirthName": "Grimblewick", "PatientBirthDate": "19370411", "PatientMotherBirthName": "Snarkwell", "PatientAddress": "42 Wimpole Mews",
-    "PatientTelephoneNumbers": "+49 30 5550199", "MedicalRecordLocator": "LOC-88431", "AccessionNumber": "ACC4471199", "StudyID": "STUDY-3319",
-    "StudyDate": "20170523", "SeriesDate": "20170523", "InstitutionName": "Saint Ethelburga", "InstitutionAddress": "7 Quincunx Lane",
-    "InstitutionalDepartmentName": "Neuroradiology West", "ReferringPhysicianName": "Plumtree^Octavia", "PerformingPhysicianName": "Hasselblad^Igor",
-    "OperatorsName": "Tatterby^Noor", "PhysiciansOfRecord": "Underhill^Perpetua", "NameOfPhysiciansReadingStudy": "Birdwhistle^Ada", "RequestingPhysician": "Crumhorn^Leo",
-    "StationName": "CTSUITE77", "DeviceSerialNumber": "SN-0048217", "PatientComments": "collector of rare stamps", "IssuerOfPatientID": "EASTHOSP",
-    "SeriesDescription": "Petrous Quxley follow-up", "StudyDescription": "Head of Mr Quxley", "ProtocolName": "Zebedee protocol", "ImageComments": "call Grimblewick",
-    "Manufacturer": "Snarkwell Imaging, Wimpole", "StudyInstanceUID": "1.2.826.0.1.3680043.77.1001", "SeriesInstanceUID": "1.2.826.0.1.3680043.77.2002", "FrameOfReferenceUID": "1.2.826.0.1.3680043.77.3003",
+    "PatientName": "Quxley^Zebedee^Marmaduke",
+    "PatientID": "MRN7755331",
+    "OtherPatientIDs": "ALT9911882",
+    "OtherPatientNames": "Vandersnoot^Zeb",
+    "PatientBirthName": "Grimblewick",
+    "PatientBirthDate": "19370411",
+    "PatientMotherBirthName": "Snarkwell",
+    "PatientAddress": "42 Wimpole Mews",
+    "PatientTelephoneNumbers": "+49 30 5550199",
+    "MedicalRecordLocator": "LOC-88431",
+    "AccessionNumber": "ACC4471199",
+    "StudyID": "STUDY-3319",
+    "StudyDate": "20170523",
+    "SeriesDate": "20170523",
+    "InstitutionName": "Saint Ethelburga",
+    "InstitutionAddress": "7 Quincunx Lane",
+    "InstitutionalDepartmentName": "Neuroradiology West",
+    "ReferringPhysicianName": "Plumtree^Octavia",
+    "PerformingPhysicianName": "Hasselblad^Igor",
+    "OperatorsName": "Tatterby^Noor",
+    "PhysiciansOfRecord": "Underhill^Perpetua",
+    "NameOfPhysiciansReadingStudy": "Birdwhistle^Ada",
+    "RequestingPhysician": "Crumhorn^Leo",
+    "StationName": "CTSUITE77",
+    "DeviceSerialNumber": "SN-0048217",
+    "PatientComments": "collector of rare stamps",
+    "IssuerOfPatientID": "EASTHOSP",
+    "SeriesDescription": "Petrous Quxley follow-up",
+    "StudyDescription": "Head of Mr Quxley",
+    "ProtocolName": "Zebedee protocol",
+    "ImageComments": "call Grimblewick",
+    "Manufacturer": "Snarkwell Imaging, Wimpole",
+    "StudyInstanceUID": "1.2.826.0.1.3680043.77.1001",
+    "SeriesInstanceUID": "1.2.826.0.1.3680043.77.2002",
+    "FrameOfReferenceUID": "1.2.826.0.1.3680043.77.3003",
 }
 folder = source / "QUXLEY_ZEBEDEE" / "MRN7755331"
 folder.mkdir(parents=True)
 needles, files = set(), []
 for v in values.values():
     needles.add(v)
-    needles.update(part for part in v.replace("^", " ").split() if len(part) >= 5 and part.lower() not in ("petrous", "follow-up", "study", "protocol", "collector", "stamps"))
+    needles.update(
+        part
+        for part in v.replace("^", " ").split()
+        if len(part) >= 5 and part.lower() not in ("petrous", "follow-up", "study", "protocol", "collector", "stamps")
+    )
 for i, f in enumerate(sorted((fixtures / "dicom").iterdir())):
     d = pydicom.dcmread(f)
     for keyword, v in values.items():
@@ -48,10 +79,13 @@ needles -= {"Head", "rare"}
 low = [n.lower().encode() for n in needles]
 
 logs = []
+
+
 def osteo(*args, code=0):
     r = subprocess.run([bin_dir / "osteo", *map(str, args)], cwd=out, capture_output=True)
     logs.append((" ".join(map(str, args)), r.stdout + r.stderr))
     assert r.returncode == code, (args, r.returncode, r.stderr.decode())
+
 
 osteo("import", source, "ct.nrrd")
 osteo("import", source, "dicom-out", "--progress", "json")
@@ -84,10 +118,13 @@ osteo("import", source, "refused.nrrd", code=4)
 osteo("import", "--list", source)
 
 found = []
+
+
 def search(where, data):
     for n, needle in zip(needles, low):
         if needle in data.lower():
             found.append(f"{where} holds '{n}'")
+
 
 searched = 0
 for path in out.rglob("*"):
@@ -110,4 +147,6 @@ for path in out.rglob("*"):
 for command, said in logs:
     search(f"what 'osteo {command[:40]}...' said", said)
 assert not found, "\n".join(sorted(set(found)))
-print(f"{len(needles)} identifying values, none in {searched / 1e6:.1f} MB of outputs and {sum(len(s) for _, s in logs)} bytes of messages")
+print(
+    f"{len(needles)} identifying values, none in {searched / 1e6:.1f} MB of outputs and {sum(len(s) for _, s in logs)} bytes of messages"
+)

@@ -3,6 +3,7 @@
 
 usage: check_reports.py BIN_DIR FIXTURES WORK_DIR
 """
+
 import base64, html.parser, io, json, os, pathlib, re, resource, shutil, signal, subprocess, sys
 
 bin_dir, fixtures, work = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
@@ -55,11 +56,31 @@ def page_of(path):
 
 # With structures, from DICOM: everything there is.
 osteo("phantom", "ct", "--labels-out", "labels.nrrd", "--region", "temporal", "--spacing-mm", "1.5", "--quiet")
-osteo("prepare", "ct", "-o", "case", "--lower", "500", "--spacing-mm", "1", "--structures", "labels.nrrd", "--names", "6=facial nerve, 7=sigmoid sinus", "--quiet")
+osteo(
+    "prepare",
+    "ct",
+    "-o",
+    "case",
+    "--lower",
+    "500",
+    "--spacing-mm",
+    "1",
+    "--structures",
+    "labels.nrrd",
+    "--names",
+    "6=facial nerve, 7=sigmoid sinus",
+    "--quiet",
+)
 html_file, pdf_file = work / "case.report.html", work / "case.report.pdf"
 page = page_of(html_file)
-wanted = {f"{w}-{p}" for w in ("soft", "bone") for p in ("axial", "coronal", "sagittal")} | {f"slice-{n}" for n in range(1, 9)}
-wanted |= {f"side-{s}" for s in ("front", "back", "left", "right", "above", "below")} | {"thin-left-front", "thin-below", "structures"}
+wanted = {f"{w}-{p}" for w in ("soft", "bone") for p in ("axial", "coronal", "sagittal")} | {
+    f"slice-{n}" for n in range(1, 9)
+}
+wanted |= {f"side-{s}" for s in ("front", "back", "left", "right", "above", "below")} | {
+    "thin-left-front",
+    "thin-below",
+    "structures",
+}
 assert wanted <= set(page.pictures), wanted - set(page.pictures)
 text = " ".join(page.texts)
 for said in ("facial nerve", "sigmoid sinus", "Not approved", "500 HU", "Table, holder", "voxels across"):
@@ -160,13 +181,20 @@ osteo("rehearse", "full", "--headless", "--fast", "--seconds", "1", "-o", "s3", 
 for f in sorted((work / "plain").iterdir()):
     if not f.name.endswith((".prov.json", "manifest.json")):
         assert f.read_bytes() == (work / "full" / f.name).read_bytes(), f.name
+
+
 # A disk that is full by the time of the report: here a limit on the size of files, below the report's and above that of the case's.
 def small_files():
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, 500_000))
 
 
-r = subprocess.run([bin_dir / "osteo", "prepare", "ct", "-o", "tight", "--lower", "500", "--spacing-mm", "2.5"], cwd=work, capture_output=True, preexec_fn=small_files)
+r = subprocess.run(
+    [bin_dir / "osteo", "prepare", "ct", "-o", "tight", "--lower", "500", "--spacing-mm", "2.5"],
+    cwd=work,
+    capture_output=True,
+    preexec_fn=small_files,
+)
 assert r.returncode == 6 and b"the case is whole" in r.stderr, (r.returncode, r.stderr.decode())
 assert not list(work.glob("tight.report*")) and not list(work.glob(".osteo*")) and not list(work.glob("*tmp*"))
 osteo("rehearse", "tight", "--headless", "--fast", "--seconds", "1", "-o", "s4", "--quiet")

@@ -3,6 +3,7 @@
 
 usage: check_review.py BIN_DIR FIXTURES WORK_DIR
 """
+
 import html.parser, json, os, pathlib, re, resource, shutil, subprocess, sys
 
 bin_dir, fixtures, work = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
@@ -27,7 +28,11 @@ class Page(html.parser.HTMLParser):
     def handle_starttag(self, tag, attrs):
         a = dict(attrs)
         self.ids += [a["id"]] if "id" in a else []
-        self.asks += [(tag, k, a[k]) for k in ("src", "href", "data", "srcset", "poster", "action") if k in a and not a[k].startswith("data:")]
+        self.asks += [
+            (tag, k, a[k])
+            for k in ("src", "href", "data", "srcset", "poster", "action")
+            if k in a and not a[k].startswith("data:")
+        ]
         self.asks += [(tag, k) for k in a if k.startswith("on")]
         if tag == "img":
             assert a["alt"], "a picture that is not told"
@@ -60,7 +65,21 @@ def page_of(path):
 
 # A mastoid drilled under the camera, with structures, a procedure, a reference and an earlier session.
 osteo("phantom", "ct.nrrd", "--labels-out", "l.nrrd", "--region", "temporal", "--spacing-mm", "1.2", "--quiet")
-osteo("prepare", "ct.nrrd", "-o", "c", "--lower", "500", "--spacing-mm", "1.2", "--structures", "l.nrrd", "--names", "6=facial nerve, 7=sigmoid sinus", "--quiet")
+osteo(
+    "prepare",
+    "ct.nrrd",
+    "-o",
+    "c",
+    "--lower",
+    "500",
+    "--spacing-mm",
+    "1.2",
+    "--structures",
+    "l.nrrd",
+    "--names",
+    "6=facial nerve, 7=sigmoid sinus",
+    "--quiet",
+)
 script = json.loads((source / "pipelines/sessions/mastoid.json").read_text())
 del script["actions"]
 for w in script["waypoints"]:
@@ -72,20 +91,26 @@ script["waypoints"][2]["cavity"]["depth_mm"] = 8
 (work / "e.json").write_text(json.dumps(script))
 osteo("rehearse", "c", "--headless", "--fast", "--script", "e.json", "-o", "e", "--quiet")
 (work / "ref").mkdir()
-(work / "ref/reference.json").write_text(json.dumps({"osteotome_reference": 1, "sessions": [{"session": "../e", "subject": "P1", "group": "expert"}]}))
+(work / "ref/reference.json").write_text(
+    json.dumps({"osteotome_reference": 1, "sessions": [{"session": "../e", "subject": "P1", "group": "expert"}]})
+)
 procedure = source / "pipelines/procedures/mastoidectomy.json"
 out, _ = osteo("review", "s", "-o", "r", "--procedure", procedure, "--reference", "ref", "--earlier", "e")
 assert out.startswith("Scripted: "), out
 page, said = page_of(work / "r/review.html")
 j = json.loads((work / "r/review.json").read_text())
 score = json.loads(osteo("score", "s", "--procedure", procedure, "--reference", "ref", "--json")[0])
-assert j["score"]["metrics"] == score["metrics"] and j["score"]["items"] == score["items"], "the review is of another score"
+assert (
+    j["score"]["metrics"] == score["metrics"] and j["score"]["items"] == score["items"]
+), "the review is of another score"
 for f in j["findings"]["findings"]:
     assert f["text"] in said, f["text"]
 for p in j["pictures"]:
     assert "picture-" + p["id"] in page.pictures or p["id"] in ("before", "after", "unseen", "unseen-side"), p
 assert {"picture-before", "picture-after", "picture-unseen", "picture-unseen-side"} <= set(page.pictures), page.pictures
-assert {m["id"] for m in j["meshes"]} >= {"after", "before", "seen", "structure-6", "structure-7"}, [m["id"] for m in j["meshes"]]
+assert {m["id"] for m in j["meshes"]} >= {"after", "before", "seen", "structure-6", "structure-7"}, [
+    m["id"] for m in j["meshes"]
+]
 t = j["timeline"]
 assert t["samples"] == len(t["force_n"]) == len(t["at_mm"])
 metric = {(m["name"], m["of"]): m["value"] for m in score["metrics"]}
@@ -111,7 +136,9 @@ except ImportError:
     print("pictures not decoded: no Pillow")
 
 if shutil.which("pdftotext"):
-    pdf = subprocess.run(["pdftotext", "-layout", work / "r/review.pdf", "-"], capture_output=True, check=True).stdout.decode()
+    pdf = subprocess.run(
+        ["pdftotext", "-layout", work / "r/review.pdf", "-"], capture_output=True, check=True
+    ).stdout.decode()
     assert "Scripted" in pdf and "What was found" in pdf and "Force by distance" in pdf, pdf[:400]
 else:
     print("PDF not read: no poppler")
@@ -119,11 +146,30 @@ else:
 # The script: it draws the timeline, fills the table and makes the view, with no network at all, and says nothing on its console.
 chromium = shutil.which("chromium")
 if chromium:
-    alone = ["unshare", "-rn"] if subprocess.run(["unshare", "-rn", "true"], capture_output=True).returncode == 0 else []
+    alone = (
+        ["unshare", "-rn"] if subprocess.run(["unshare", "-rn", "true"], capture_output=True).returncode == 0 else []
+    )
     env = {**os.environ, "HOME": str(work)}
-    r = subprocess.run([*alone, chromium, "--headless", "--no-sandbox", "--disable-gpu-sandbox", "--enable-unsafe-swiftshader", "--use-gl=angle", "--use-angle=swiftshader",
-                        "--enable-logging=stderr", "--virtual-time-budget=4000", f"--user-data-dir={work}/chromium", "--dump-dom", f"file://{work}/r/review.html"],
-                       capture_output=True, env=env, timeout=600)
+    r = subprocess.run(
+        [
+            *alone,
+            chromium,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu-sandbox",
+            "--enable-unsafe-swiftshader",
+            "--use-gl=angle",
+            "--use-angle=swiftshader",
+            "--enable-logging=stderr",
+            "--virtual-time-budget=4000",
+            f"--user-data-dir={work}/chromium",
+            "--dump-dom",
+            f"file://{work}/r/review.html",
+        ],
+        capture_output=True,
+        env=env,
+        timeout=600,
+    )
     dom, log = r.stdout.decode(), r.stderr.decode()
     wrong = [line for line in log.splitlines() if ":CONSOLE" in line and ("rror" in line or "Refused" in line)]
     assert not wrong, wrong
@@ -135,10 +181,16 @@ else:
 
 # The disk is full: nothing is left, and what was there stays.
 before = (work / "r/review.html").read_bytes()
-r = subprocess.run([bin_dir / "osteo", "review", "s", "-o", "r", "--force", "--no-pictures", "--quiet"], cwd=work, capture_output=True,
-                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)))
+r = subprocess.run(
+    [bin_dir / "osteo", "review", "s", "-o", "r", "--force", "--no-pictures", "--quiet"],
+    cwd=work,
+    capture_output=True,
+    preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
+)
 assert r.returncode == 6, (r.returncode, r.stderr)
-assert (work / "r/review.html").read_bytes() == before and not [p for p in work.iterdir() if p.name.startswith((".r", "r.", ".osteo"))], list(work.iterdir())
+assert (work / "r/review.html").read_bytes() == before and not [
+    p for p in work.iterdir() if p.name.startswith((".r", "r.", ".osteo"))
+], list(work.iterdir())
 
 # Cut short: a label, and what there is.
 shutil.copytree(work / "s", work / "cut")

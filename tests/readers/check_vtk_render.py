@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """docs/how-to/vtk_render.cpp draws what it says, under Xvfb: its picture shows bone where the surface, projected here pixel by pixel by what VTK says its first
-camera is, lies, and black elsewhere; a wrong file is told with line and step, and no picture is made. usage: check_vtk_render.py PROGRAM OSTEO_BIN FIXTURES SCRATCH SOURCE"""
+camera is, lies, and black elsewhere; a wrong file is told with line and step, and no picture is made. usage: check_vtk_render.py PROGRAM OSTEO_BIN FIXTURES SCRATCH SOURCE
+"""
+
 import os, pathlib, shutil, subprocess, sys
 
 try:
@@ -17,13 +19,36 @@ osteo = str(bin_dir / "osteo")
 pipeline = source / "pipelines/temporal-bone.json"
 
 # What stands in the picture, as a mesh of the same steps.
-subprocess.run([osteo, "run", "--engine", "vtk", pipeline, "--set", f"source={fixtures}/ct.nrrd", "--set", "case=case", "--set", "lower=500", "--quiet"], cwd=scratch, check=True)
+subprocess.run(
+    [
+        osteo,
+        "run",
+        "--engine",
+        "vtk",
+        pipeline,
+        "--set",
+        f"source={fixtures}/ct.nrrd",
+        "--set",
+        "case=case",
+        "--set",
+        "lower=500",
+        "--quiet",
+    ],
+    cwd=scratch,
+    check=True,
+)
 subprocess.run([osteo, "surface", "case/bone.vdb", "bone.stl", "--quiet"], cwd=scratch, check=True)
-corners = np.frombuffer((scratch / "bone.stl").read_bytes()[84:], dtype=np.dtype([("n", "<3f4"), ("v", "<(3,3)f4"), ("a", "<u2")]))["v"].astype(float)
+corners = np.frombuffer(
+    (scratch / "bone.stl").read_bytes()[84:], dtype=np.dtype([("n", "<3f4"), ("v", "<(3,3)f4"), ("a", "<u2")])
+)["v"].astype(float)
 lo, hi = corners.reshape(-1, 3).min(0), corners.reshape(-1, 3).max(0)
 
 read, write = os.pipe()
-server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"], pass_fds=[write], stderr=subprocess.DEVNULL)
+server = subprocess.Popen(
+    ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"],
+    pass_fds=[write],
+    stderr=subprocess.DEVNULL,
+)
 try:
     os.close(write)
     display = os.read(read, 64).decode().strip()
@@ -32,7 +57,9 @@ try:
     subprocess.run([program, pipeline, fixtures / "ct.nrrd", "bone.png"], cwd=scratch, env=env, check=True)
     wrong = scratch / "wrong.json"
     wrong.write_text(pipeline.read_text().replace('"${source}"', '"nowhere/${source}"'))
-    failed = subprocess.run([program, wrong, "ct.nrrd", "none.png"], cwd=scratch, env=env, capture_output=True, text=True)
+    failed = subprocess.run(
+        [program, wrong, "ct.nrrd", "none.png"], cwd=scratch, env=env, capture_output=True, text=True
+    )
 finally:
     server.terminate()
     server.wait()
@@ -48,7 +75,16 @@ half = np.tan(np.radians(15))
 away = np.linalg.norm(hi - lo) / 2 / np.sin(np.radians(15))
 from_middle = corners - (lo + hi) / 2
 depth = away - from_middle[..., 2:]
-pixels = np.stack([320 + 240 / half * from_middle[..., 0] / depth[..., 0], 240 - 240 / half * from_middle[..., 1] / depth[..., 0]], -1) - 0.5
+pixels = (
+    np.stack(
+        [
+            320 + 240 / half * from_middle[..., 0] / depth[..., 0],
+            240 - 240 / half * from_middle[..., 1] / depth[..., 0],
+        ],
+        -1,
+    )
+    - 0.5
+)
 mask = Image.new("1", (640, 480))
 draw = ImageDraw.Draw(mask)
 for triangle in pixels.reshape(-1, 6):

@@ -1,4 +1,5 @@
 """Cerebus packets by pycbsdk: read_cerebus.py VERSION PORT OUT.npz writes every sample it is called with and its time, until none comes for 3 s."""
+
 import array, sys, time
 
 version, port, out = sys.argv[1], int(sys.argv[2]), sys.argv[3]
@@ -8,8 +9,16 @@ pycbsdk.cbhw.config.protocol = version
 import numpy as np
 from pycbsdk import cbsdk
 
-device = cbsdk.get_device(cbsdk.create_params(inst_addr="127.0.0.1", inst_port=9, client_addr="127.0.0.1", client_port=port,
-                                                 recv_bufsize=64 << 20, protocol=version))
+device = cbsdk.get_device(
+    cbsdk.create_params(
+        inst_addr="127.0.0.1",
+        inst_port=9,
+        client_addr="127.0.0.1",
+        client_port=port,
+        recv_bufsize=64 << 20,
+        protocol=version,
+    )
+)
 rows, times, last = bytearray(), array.array("q"), [0.0]  # ten minutes are 18 million of them
 
 
@@ -23,7 +32,9 @@ if version == "3.11":  # whose headers have no instrument, which pycbsdk's own h
     from pycbsdk.cbhw.packet.common import CBPacketType
 
     device.unregister_config_callback(CBPacketType.SYSREP, device._handle_sysrep)
-    device.register_config_callback(CBPacketType.SYSREP, lambda p: device.config.update(runlevel=p.runlevel, sysfreq=p.sysfreq))
+    device.register_config_callback(
+        CBPacketType.SYSREP, lambda p: device.config.update(runlevel=p.runlevel, sysfreq=p.sysfreq)
+    )
 cbsdk.register_group_callback(device, 6, take)
 cbsdk.connect(device, startup_sequence=False)  # nobody answers: what there is to know comes with the stream
 print("listening", flush=True)

@@ -1,4 +1,5 @@
 """A signal and its events by pylsl: read_lsl.py OUT.npy, until the events have said that the session has ended."""
+
 import sys, time
 
 import numpy as np

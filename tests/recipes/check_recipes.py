@@ -5,6 +5,7 @@ Each NAME.patch beside this file follows one recipe. It is applied to a copy of 
 of its library or test, layering.py is run, and it is taken back. A recipe whose library the build leaves out (window) is applied, not compiled.
 A patch that no longer applies or compiles: something that the recipe names has changed. Mend the recipe's text, then the patch (edit the files as
 the recipe says, `git diff > tests/recipes/NAME.patch`, `git checkout` what was edited). 0 if all work, 1 if not."""
+
 import concurrent.futures, json, os, pathlib, re, shutil, subprocess, sys, tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
@@ -17,11 +18,13 @@ contributing = (source / "CONTRIBUTING.md").read_text()
 
 def options_in(copy, command):
     """The options, with the folders of the copy in place of the tree's."""
+
     def moved(word):
         if str(source) not in word or str(build) in word:
             return word
         there = word.replace(str(source), str(copy))
         return there if not word.startswith("-I") or pathlib.Path(there[2:]).exists() else word
+
     return [*map(moved, options(command)), "-Werror=switch"]
 
 
@@ -31,7 +34,9 @@ for entry in json.loads((build / "compile_commands.json").read_text()):
     path = pathlib.Path(entry["directory"], entry["file"]).resolve()
     files = [path]
     if path.is_relative_to(build):
-        files = [pathlib.Path(f) for f in re.findall(r'#include "(/[^"]+)"', path.read_text())] if path.is_file() else []
+        files = (
+            [pathlib.Path(f) for f in re.findall(r'#include "(/[^"]+)"', path.read_text())] if path.is_file() else []
+        )
     command_of.update({f.relative_to(source): entry for f in files if f.is_relative_to(source)})
 
 
@@ -50,14 +55,24 @@ def compiles(file, copy):
     if entry is None:
         return None
     what = ["-include", str(where), "/dev/null"] if file.suffix == ".h" else [str(where)]
-    said = subprocess.run([*options_in(copy, entry["command"]), "-fsyntax-only", "-x", "c++", *what], cwd=entry["directory"], capture_output=True, text=True)
+    said = subprocess.run(
+        [*options_in(copy, entry["command"]), "-fsyntax-only", "-x", "c++", *what],
+        cwd=entry["directory"],
+        capture_output=True,
+        text=True,
+    )
     return said.stderr if said.returncode else None
 
 
 def apply(patch, copy, *back):
     """What git says, or None. The copy is no repository, and none around it counts."""
-    said = subprocess.run(["git", "apply", *back, str(patch)], cwd=copy, capture_output=True, text=True,
-                          env={**os.environ, "GIT_CEILING_DIRECTORIES": str(copy.parent)})
+    said = subprocess.run(
+        ["git", "apply", *back, str(patch)],
+        cwd=copy,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "GIT_CEILING_DIRECTORIES": str(copy.parent)},
+    )
     return said.stderr if said.returncode else None
 
 
@@ -72,10 +87,16 @@ def follow(patch, copy):
         return f"does not apply any more:{short(said)}", 0
     touched = [pathlib.Path(f) for f in re.findall(r"^\+\+\+ b/(\S+)", text, re.M) if f.endswith((".h", ".cpp"))]
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        layering = pool.submit(subprocess.run, [sys.executable, str(copy / "tests/layering.py"), str(copy)], capture_output=True, text=True)
+        layering = pool.submit(
+            subprocess.run, [sys.executable, str(copy / "tests/layering.py"), str(copy)], capture_output=True, text=True
+        )
         said = [s for s in pool.map(lambda f: compiles(f, copy), touched) if s]
         layers = layering.result()
-    wrong = f"does not compile:{short(said[0])}" if said else f"breaks the layers:{short(layers.stdout + layers.stderr)}" if layers.returncode else None
+    wrong = (
+        f"does not compile:{short(said[0])}"
+        if said
+        else f"breaks the layers:{short(layers.stdout + layers.stderr)}" if layers.returncode else None
+    )
     if said := apply(patch, copy, "--reverse"):
         sys.exit(f"{patch.stem}: cannot be taken back:{short(said)}")
     return wrong, sum(entry_for(f) is not None for f in touched)
@@ -95,15 +116,21 @@ for name in re.findall(r"`((?:libs|apps|tests|docs|pipelines)/[\w./-]+)`", secti
 with tempfile.TemporaryDirectory() as scratch:
     copy = pathlib.Path(scratch).resolve() / "tree"
     for folder in ("libs", "apps", "tests", "docs", "pipelines"):
-        shutil.copytree(source / folder, copy / folder, ignore=shutil.ignore_patterns("*.png", "*.jpg", "__pycache__", "build"))
+        shutil.copytree(
+            source / folder, copy / folder, ignore=shutil.ignore_patterns("*.png", "*.jpg", "__pycache__", "build")
+        )
 
     # The check itself: what does not fit, does not compile or breaks the layers is told.
     lame = pathlib.Path(scratch, "lame.patch")
     added = "libs/core/rt/include/osteo/core/rt/lame.h"
-    whole = "diff --git a/{0} b/{0}\nnew file mode 100644\n--- /dev/null\n+++ b/{0}\n@@ -0,0 +1,2 @@\n+#pragma once\n+{1}\n"
-    for text, wanted in (("--- a/CONTRIBUTING.md\n+++ b/CONTRIBUTING.md\n@@ -1,1 +1,1 @@\n-not its first line\n+no\n", "apply"),
-                         (whole.format(added, "inline NoSuchType lame;"), "compile"),
-                         (whole.format(added, '#include "osteo/simulation/haptics/servo.h"'), "")):
+    whole = (
+        "diff --git a/{0} b/{0}\nnew file mode 100644\n--- /dev/null\n+++ b/{0}\n@@ -0,0 +1,2 @@\n+#pragma once\n+{1}\n"
+    )
+    for text, wanted in (
+        ("--- a/CONTRIBUTING.md\n+++ b/CONTRIBUTING.md\n@@ -1,1 +1,1 @@\n-not its first line\n+no\n", "apply"),
+        (whole.format(added, "inline NoSuchType lame;"), "compile"),
+        (whole.format(added, '#include "osteo/simulation/haptics/servo.h"'), ""),
+    ):
         lame.write_text(text)
         told, _ = follow(lame, copy)
         if told is None or wanted not in told:

@@ -3,13 +3,20 @@
 
 usage: check_same_bits.py BIN_DIR FIXTURES WORK_DIR
 """
+
 import json, os, pathlib, shutil, subprocess, sys
 
 bin_dir, fixtures, work = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
 shutil.rmtree(work, ignore_errors=True)
 work.mkdir(parents=True)
-PLAIN = "glibc.cpu.hwcaps=" + ",".join("-" + f for f in ("AVX2", "FMA", "FMA4", "AVX", "AVX512F", "AVX512VL", "AVX512DQ", "AVX512BW"))
-machines = [{}] + [{"OSTEO_SIMD": s} for s in ("avx512", "avx2", "scalar")] + [{"GLIBC_TUNABLES": PLAIN}, {"GLIBC_TUNABLES": PLAIN, "OSTEO_SIMD": "scalar"}]
+PLAIN = "glibc.cpu.hwcaps=" + ",".join(
+    "-" + f for f in ("AVX2", "FMA", "FMA4", "AVX", "AVX512F", "AVX512VL", "AVX512DQ", "AVX512BW")
+)
+machines = (
+    [{}]
+    + [{"OSTEO_SIMD": s} for s in ("avx512", "avx2", "scalar")]
+    + [{"GLIBC_TUNABLES": PLAIN}, {"GLIBC_TUNABLES": PLAIN, "OSTEO_SIMD": "scalar"}]
+)
 told = lambda m: " ".join(f"{k}={v}" for k, v in m.items()) or "as it is"
 
 
@@ -29,12 +36,29 @@ for m in machines:
         if first.get(name) != lines.get(name):
             bad.append(f"{told(m)}: {name} differs")
 print(f"instruction sets met: {', '.join(sorted(used))}")
-print("the mathematics library itself gives other bits without FMA" if len(libraries) > 1 else "the mathematics library gives the same bits here either way")
+print(
+    "the mathematics library itself gives other bits without FMA"
+    if len(libraries) > 1
+    else "the mathematics library gives the same bits here either way"
+)
 
 # Whole sessions, made again from the script and replayed.
 sessions = []
 for n, m in enumerate(machines):
-    run(m, bin_dir / "osteo", "rehearse", fixtures / "case", "--headless", "--fast", "--seconds", 2, "--dust", "-o", f"s{n}", "--quiet")
+    run(
+        m,
+        bin_dir / "osteo",
+        "rehearse",
+        fixtures / "case",
+        "--headless",
+        "--fast",
+        "--seconds",
+        2,
+        "--dust",
+        "-o",
+        f"s{n}",
+        "--quiet",
+    )
     s = json.loads((work / f"s{n}/summary.json").read_text())
     sessions.append([s["bone_hash"], s["surface_hash"], s["removed_mm3"], s["dust_mm3"]])
     if sessions[n] != sessions[0]:

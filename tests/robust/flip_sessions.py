@@ -4,6 +4,7 @@ each is refused (exit code 4) or told, and never called the same without a word.
 
 usage: flip_sessions.py BIN_DIR CASE SESSION WORK_DIR [FLIPS]
 """
+
 import collections, pathlib, random, shutil, struct, subprocess, sys
 
 bin_dir, case, session, work = (pathlib.Path(a).resolve() for a in sys.argv[1:5])
@@ -22,7 +23,13 @@ random.seed(7)
 places = []  # (part, first byte, bytes)
 for f, (at, kind, size) in enumerate(frames):
     if kind not in ("header", "end"):
-        places += [("magic", at, 4), ("type", at + 4, 4), ("length", at + 8, 4), ("checksum", at + 12, 4), ("tick numbers", at + 16, 16)]
+        places += [
+            ("magic", at, 4),
+            ("type", at + 4, 4),
+            ("length", at + 8, 4),
+            ("checksum", at + 12, 4),
+            ("tick numbers", at + 16, 16),
+        ]
     places.append((f"payload of {kind}", at + 32, size) if kind not in ("header", "end") else (kind, at, 32 + size))
 parts = collections.defaultdict(list)
 for part, at, size in places:
@@ -38,9 +45,13 @@ for n in range(flips):
     damaged = bytearray(raw)
     damaged[byte] ^= 1 << bit
     (work / "stream.oss").write_bytes(damaged)
-    run = subprocess.run([bin_dir / "osteo", "replay", work, "--case-folder", case, "--quiet"], capture_output=True, text=True)
+    run = subprocess.run(
+        [bin_dir / "osteo", "replay", work, "--case-folder", case, "--quiet"], capture_output=True, text=True
+    )
     if run.returncode == 4:
-        outcome = "refused (4)" if "replay" not in run.stderr and "only the first" not in run.stderr else "used up to it (4)"
+        outcome = (
+            "refused (4)" if "replay" not in run.stderr and "only the first" not in run.stderr else "used up to it (4)"
+        )
     elif run.returncode == 0 and "left out" in run.stderr:
         outcome = "told as a cut (0)"
     else:

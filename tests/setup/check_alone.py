@@ -4,6 +4,7 @@
 The build compiles several sources of a library as one, which hides an include that one of them lacks. Here each is compiled alone, syntax only,
 with the options of its library. A header that a source includes before anything else is proved by that source; the others are compiled here too.
 Libraries that the build leaves out (copyleft, window) are named and not judged. 0 if all compile, 1 if not."""
+
 import concurrent.futures, json, os, pathlib, re, subprocess, sys, tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
@@ -31,9 +32,15 @@ def compiles(command, cwd, file):
 library_of, together, first = {}, [], set()  # together: sources that the build compiled with others
 for entry in json.loads((build / "compile_commands.json").read_text()):
     path = pathlib.Path(entry["directory"], entry["file"]).resolve()
-    if found := re.match(r"libs/[a-z]+/([a-z_]+)/src/", str(path.relative_to(source))) if path.is_relative_to(source) else None:
+    if found := (
+        re.match(r"libs/[a-z]+/([a-z_]+)/src/", str(path.relative_to(source))) if path.is_relative_to(source) else None
+    ):
         first.add(first_include(path))
-    elif found := re.match(r"libs/[a-z]+/CMakeFiles/osteo_([a-z_]+)\.dir/Unity/", str(path.relative_to(build))) if path.is_relative_to(build) else None:
+    elif found := (
+        re.match(r"libs/[a-z]+/CMakeFiles/osteo_([a-z_]+)\.dir/Unity/", str(path.relative_to(build)))
+        if path.is_relative_to(build)
+        else None
+    ):
         own = [pathlib.Path(m) for m in re.findall(r'#include "([^"]+)"', path.read_text())]
         together += [(found[1], p) for p in own]
         first.update(first_include(p) for p in own)
@@ -65,7 +72,11 @@ with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         if said:
             failed += 1
             print("\n".join([line for line in said.splitlines() if "error" in line][:3] or [said]), file=sys.stderr)
-            print(f"{file.relative_to(source)} does not compile by itself: let it include what it names", file=sys.stderr)
-print(f"{len(together)} sources and {len(work) - len(together)} headers compiled alone, {proved} headers are the first that such a source includes"
-      + (f"; not built: {' '.join(sorted(left_out))}" if left_out else ""))
+            print(
+                f"{file.relative_to(source)} does not compile by itself: let it include what it names", file=sys.stderr
+            )
+print(
+    f"{len(together)} sources and {len(work) - len(together)} headers compiled alone, {proved} headers are the first that such a source includes"
+    + (f"; not built: {' '.join(sorted(left_out))}" if left_out else "")
+)
 sys.exit(1 if failed else 0)

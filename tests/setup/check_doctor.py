@@ -1,5 +1,6 @@
 """osteo doctor --server: each thing that keeps a service from working is made, and must be told; and where all is well it must say so.
 usage: check_doctor.py BIN WORK SOURCE"""
+
 import json, os, pathlib, shutil, socket, subprocess, sys
 
 bin_dir, work, source = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
@@ -13,7 +14,21 @@ os.umask(0o022)
 def doctor(*flags, rc=None, path=None, before=(), pictures=("--no-report",)):
     """What is found, by what it is about; several findings of one kind are joined."""
     env = {**os.environ, **({"PATH": path} if path else {})}
-    command = [*before, osteo, "doctor", "--server", "--json", "--memory-mb", "10", "--keep-free-gb", "0", "--port", str(port), *pictures, *flags]
+    command = [
+        *before,
+        osteo,
+        "doctor",
+        "--server",
+        "--json",
+        "--memory-mb",
+        "10",
+        "--keep-free-gb",
+        "0",
+        "--port",
+        str(port),
+        *pictures,
+        *flags,
+    ]
     r = subprocess.run([str(c) for c in command], capture_output=True, text=True, env=env)
     assert rc is None or r.returncode == rc, (flags, r.returncode, r.stdout, r.stderr)
     j = json.loads(r.stdout)
@@ -26,7 +41,12 @@ def doctor(*flags, rc=None, path=None, before=(), pictures=("--no-report",)):
 
 
 def told(found, what, state, words, n=0):
-    assert what in found and found[what][n][0] == state and words in found[what][n][1], (what, state, words, found.get(what))
+    assert what in found and found[what][n][0] == state and words in found[what][n][1], (
+        what,
+        state,
+        words,
+        found.get(what),
+    )
 
 
 with socket.socket() as s:
@@ -38,7 +58,20 @@ pathlib.Path("login").write_text("doctor:tell-nobody\n")
 os.chmod("login", 0o600)
 pathlib.Path("receive.prom").write_text("as it was\n")
 rules = source / "pipelines/rules.json"
-given = ("--inbox", inbox, "--cases", cases, "--rules", rules, "--login", "login", "--metrics", "receive.prom", "--allow", "ORTHANC,CT_1")
+given = (
+    "--inbox",
+    inbox,
+    "--cases",
+    cases,
+    "--rules",
+    rules,
+    "--login",
+    "login",
+    "--metrics",
+    "receive.prom",
+    "--allow",
+    "ORTHANC,CT_1",
+)
 
 good = doctor(*given, rc=0, pictures=())
 for what in ("machine", "inbox", "cases", "temporary", "title", "port", "login", "counters", "rules", "pictures"):
@@ -49,22 +82,37 @@ told(good, "cases", good["cases"][0][0], "free")
 assert "tell-nobody" not in str(good)
 assert pathlib.Path("receive.prom").read_text() == "as it was\n" and not list(inbox.iterdir()) and not cases.exists()
 assert not list(work.glob(".osteo-doctor*"))
-text = subprocess.run([osteo, "doctor", "--server", "--port", str(port), "--memory-mb", "10", "--inbox", inbox, "--no-report"], capture_output=True, text=True).stdout
-assert len(text.splitlines()) in (10, 11) and all(line.split()[0] in ("good", "none", "care", "bad") for line in text.splitlines()), text
+text = subprocess.run(
+    [osteo, "doctor", "--server", "--port", str(port), "--memory-mb", "10", "--inbox", inbox, "--no-report"],
+    capture_output=True,
+    text=True,
+).stdout
+assert len(text.splitlines()) in (10, 11) and all(
+    line.split()[0] in ("good", "none", "care", "bad") for line in text.splitlines()
+), text
 print("ok  a machine that can be a server, and nothing on it is changed")
 
 # Folders: open to all, not to be written, full, one in the other, a file in their place.
 inbox.chmod(0o755)
 told(doctor("--inbox", inbox, rc=0), "inbox", "care", "names patients")
 inbox.chmod(0o700)
-closed = pathlib.Path("/proc") if os.geteuid() == 0 else work / "closed"  # root may write wherever a file system lets it
+closed = (
+    pathlib.Path("/proc") if os.geteuid() == 0 else work / "closed"
+)  # root may write wherever a file system lets it
 if os.geteuid() != 0:
     closed.mkdir(mode=0o555)
 told(doctor("--inbox", closed / "inbox", rc=7), "inbox", "bad", "cannot write")
 told(doctor("--cases", inbox / "cases", "--inbox", inbox, rc=7), "folders", "bad", "watched")
 told(doctor("--inbox", "login", "--cases", "login/deeper", rc=7), "inbox", "bad", "no folder")
 told(doctor("--inbox", inbox, "--keep-free-gb", "1000000", rc=7), "inbox", "bad", "to stay free")
-mounted = ["unshare", "-rm", "sh", "-c", "mkdir -p full && mount -t tmpfs -o size=64k none full && { head -c 1M /dev/zero > full/x 2>/dev/null; exec \"$@\"; }", "sh"]
+mounted = [
+    "unshare",
+    "-rm",
+    "sh",
+    "-c",
+    "mkdir -p full && mount -t tmpfs -o size=64k none full && { head -c 1M /dev/zero > full/x 2>/dev/null; exec \"$@\"; }",
+    "sh",
+]
 if subprocess.run([*mounted, "true"], capture_output=True).returncode == 0:
     told(doctor("--cases", "full", rc=7, before=mounted), "cases", "bad", "No space left")
 else:
@@ -85,14 +133,35 @@ print("ok  logins that others can read, that hold none, that are not there; coun
 
 # Titles, addresses, rules: several at a time, each told by itself.
 for name, rule, why, flags, more in (
-        ("cut", '{"osteotome_rules": 1,\n "rules": [', "cut.json", ("--ae", "SEVENTEEN_LETTERS", "--bind", "192.0.2.77"),
-         (("title", "bad", "no title"), ("port", "bad", "no address of this machine"))),
-        ("key", '{"osteotome_rules": 1, "rules": [{"name": "a", "modalty": "CT"}]}', "modalty", ("--ae", "BACK\\SLASH", "--bind", "pacs.example"),
-         (("title", "bad", "no title"), ("port", "bad", "no IPv4 address"))),
-        ("setting", '{"osteotome_rules": 1, "rules": [{"name": "a", "set": {"lowr": "3"}}]}', "did you mean", ("--allow", "ORTHANC,,CT", "--bind", "0.0.0.0"),
-         (("title", "bad", "no title"), ("port", "care", "not encrypted"))),
-        ("pipeline", '{"osteotome_rules": 1, "rules": [{"name": "a", "pipeline": "gone.json"}]}', "gone.json", ("--jobs", "1000", "--memory-mb", "1000000"),
-         (("machine", "bad", "fewer --jobs"),))):
+    (
+        "cut",
+        '{"osteotome_rules": 1,\n "rules": [',
+        "cut.json",
+        ("--ae", "SEVENTEEN_LETTERS", "--bind", "192.0.2.77"),
+        (("title", "bad", "no title"), ("port", "bad", "no address of this machine")),
+    ),
+    (
+        "key",
+        '{"osteotome_rules": 1, "rules": [{"name": "a", "modalty": "CT"}]}',
+        "modalty",
+        ("--ae", "BACK\\SLASH", "--bind", "pacs.example"),
+        (("title", "bad", "no title"), ("port", "bad", "no IPv4 address")),
+    ),
+    (
+        "setting",
+        '{"osteotome_rules": 1, "rules": [{"name": "a", "set": {"lowr": "3"}}]}',
+        "did you mean",
+        ("--allow", "ORTHANC,,CT", "--bind", "0.0.0.0"),
+        (("title", "bad", "no title"), ("port", "care", "not encrypted")),
+    ),
+    (
+        "pipeline",
+        '{"osteotome_rules": 1, "rules": [{"name": "a", "pipeline": "gone.json"}]}',
+        "gone.json",
+        ("--jobs", "1000", "--memory-mb", "1000000"),
+        (("machine", "bad", "fewer --jobs"),),
+    ),
+):
     pathlib.Path(f"{name}.json").write_text(rule)
     found = doctor("--rules", f"{name}.json", *flags, rc=7)
     for what, state, words in (("rules", "bad", why), *more):
@@ -101,10 +170,19 @@ with socket.socket() as s:
     s.bind(("127.0.0.1", 0))
     s.listen()
     told(doctor("--port", s.getsockname()[1], rc=7), "port", "bad", f"process {os.getpid()}")
-node = subprocess.Popen([osteo, "receive", work / "other", "--port", "0", "--json", "--allow-all", "--keep-free-gb", "0"], stdout=subprocess.PIPE,
-                        stderr=subprocess.DEVNULL, text=True)
+node = subprocess.Popen(
+    [osteo, "receive", work / "other", "--port", "0", "--json", "--allow-all", "--keep-free-gb", "0"],
+    stdout=subprocess.PIPE,
+    stderr=subprocess.DEVNULL,
+    text=True,
+)
 try:
-    told(doctor("--port", json.loads(node.stdout.readline())["listening"], rc=0), "port", "good", f"osteo (process {node.pid})")
+    told(
+        doctor("--port", json.loads(node.stdout.readline())["listening"], rc=0),
+        "port",
+        "good",
+        f"osteo (process {node.pid})",
+    )
 finally:
     node.terminate()
     node.wait()
@@ -113,8 +191,26 @@ print("ok  titles, addresses, rules, memory; a port that is taken, and one that 
 # TLS.
 if shutil.which("openssl"):
     for name in ("a", "b"):
-        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", f"{name}.key", "-out", f"{name}.pem", "-subj", "/CN=x", "-days", "2"],
-                       check=True, capture_output=True)
+        subprocess.run(
+            [
+                "openssl",
+                "req",
+                "-x509",
+                "-newkey",
+                "rsa:2048",
+                "-nodes",
+                "-keyout",
+                f"{name}.key",
+                "-out",
+                f"{name}.pem",
+                "-subj",
+                "/CN=x",
+                "-days",
+                "2",
+            ],
+            check=True,
+            capture_output=True,
+        )
     tls = lambda key: ("--tls-ca", "a.pem", "--tls-certificate", "a.pem", "--tls-key", key)
     os.chmod("a.key", 0o600)
     told(doctor(*tls("a.key"), "--bind", "0.0.0.0", rc=0), "TLS", "good", "belong together")
@@ -148,8 +244,11 @@ found = units("LoadState=not-found\\nActiveState=inactive")
 told(found, unit, "none", "not installed")
 told(found, "osteo-watch.service", "good", "runs")
 # Workers of Orthancs: each that systemd knows.
-fake("systemctl", "case \"$*\" in *list-units*) printf 'osteo-watch-orthanc@a.service loaded active running A\\nosteo-watch-orthanc@b.service loaded failed failed B\\n';; "
-     f"*@b*) printf '{state % ('failed', 'enabled', 'exit-code')}\\n';; *) printf '{state % ('active', 'enabled', 'success')}\\n';; esac\n")
+fake(
+    "systemctl",
+    "case \"$*\" in *list-units*) printf 'osteo-watch-orthanc@a.service loaded active running A\\nosteo-watch-orthanc@b.service loaded failed failed B\\n';; "
+    f"*@b*) printf '{state % ('failed', 'enabled', 'exit-code')}\\n';; *) printf '{state % ('active', 'enabled', 'success')}\\n';; esac\n",
+)
 found = doctor(path=f"{fakes}:{os.environ['PATH']}")
 told(found, "osteo-watch-orthanc@a.service", "good", "runs")
 told(found, "osteo-watch-orthanc@b.service", "bad", "exit-code -> journalctl -u osteo-watch-orthanc@b.service")

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """All public headers in one file: no name means two things. usage: check_headers_together.py SOURCE_DIR BUILD_DIR
 
-Headers of libraries that the build leaves out (copyleft, window) are left out too. OpenVDB's own (vdb.h) is for sources alone."""
+Headers of libraries that the build leaves out (copyleft, window) are left out too. OpenVDB's own (vdb.h) is for sources alone.
+"""
+
 import json, pathlib, re, shlex, subprocess, sys, tempfile
 
 source, build = (pathlib.Path(p).resolve() for p in sys.argv[1:3])
@@ -17,8 +19,11 @@ for entry in json.loads((build / "compile_commands.json").read_text()):
                 includes["-isystem " + words[i + 1]] = True
             elif word.startswith("-I") and "/include" in word:
                 includes[word] = True
-headers = [str(h).split("/include/", 1)[1] for h in sorted(source.glob("libs/*/*/include/**/*.h"))
-           if h.relative_to(source).parts[2] in built and h.name not in sources_only]
+headers = [
+    str(h).split("/include/", 1)[1]
+    for h in sorted(source.glob("libs/*/*/include/**/*.h"))
+    if h.relative_to(source).parts[2] in built and h.name not in sources_only
+]
 options = [w for i in includes for w in i.split(" ")]
 
 
@@ -43,9 +48,15 @@ for header in source.glob("libs/*/*/include/**/*.h"):
         if m := re.search(r"^namespace osteo(?:::inline \w+)? \{\n(.*)^\}", text, re.M | re.S):
             names |= set(re.findall(r"^(?:struct|class|enum class) (\w+)(?: final)?(?: :[^;{]*)? \{", m[1], re.M))
 # Those in a namespace of their own library, and templates, are not found or not named so; what counts is whether a name is ambiguous.
-said = compiles(everything + "namespace osteo {\n" + "".join(f"using check_{n} = {n}*;\n" for n in sorted(names)) + "}\n")
+said = compiles(
+    everything + "namespace osteo {\n" + "".join(f"using check_{n} = {n}*;\n" for n in sorted(names)) + "}\n"
+)
 if said:
-    errors = [line for line in said.splitlines() if "error" in line and not re.search(r"does not name a type|not allowed in alias|no type named", line)]
+    errors = [
+        line
+        for line in said.splitlines()
+        if "error" in line and not re.search(r"does not name a type|not allowed in alias|no type named", line)
+    ]
     if errors:
         print("\n".join(errors[:20]), file=sys.stderr)
         sys.exit(f"{len(errors)} errors with all headers in one file")

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Drives the microscope of the window under Xvfb: each of its keys, the mouse, stereo down to the pixels of the screen, a timed view.
 usage: drive_camera.py camera BIN_DIR WORK_DIR SOURCE_DIR"""
+
 import pathlib, re, struct, zlib
 
 from drive_window import *  # what it drives with; the arguments are the same
@@ -82,7 +83,11 @@ def camera():
             handle = now
         w.x("key", "shift+g")
         w.until("along the drill", lambda s: dot(s["view_back"], handle) > 0.9999 and not s["camera_moves"])
-        key("F6", "back to the view", lambda s: dot(s["view_back"], at["view_back"]) > 0.99999 and apart(s["focus_mm"], at["focus_mm"]) < 1e-9)
+        key(
+            "F6",
+            "back to the view",
+            lambda s: dot(s["view_back"], at["view_back"]) > 0.99999 and apart(s["focus_mm"], at["focus_mm"]) < 1e-9,
+        )
         for name, n in (("F7", 2), ("F8", 3)):
             key(name, "says that none is kept", lambda s: f"no view {n}" in s["message"])
         key("BackSpace", "along the drill again", lambda s: dot(s["view_back"], handle) > 0.9999)
@@ -133,7 +138,11 @@ def camera():
             w = Window("--no-sound", "--stereo", mode, "--stereo-base", 30, "-o", mode)
             w.key("bracketright", "4 times", lambda s: s["magnification"] == 4 and not s["camera_moves"])
             # The drill to the same place, where the squeezed picture shows it; then the mouse away.
-            w.x("mousemove", LEFT + 130 // (2 if mode == "side_by_side" else 1), 240 // (2 if mode == "top_bottom" else 1))
+            w.x(
+                "mousemove",
+                LEFT + 130 // (2 if mode == "side_by_side" else 1),
+                240 // (2 if mode == "top_bottom" else 1),
+            )
             w.next(3)  # it has been heard of
             w.until("the drill rests", lambda s: apart(s["at_mm"], s["goal_mm"]) < 1e-3)
             w.x("mousemove", 2, 2)
@@ -146,7 +155,9 @@ def camera():
             pictures[mode] = png(f"{mode}/screenshot-1.png")
     assert all(apart(p, places[0]) < 0.01 for p in places), places
     red, blue = 0, 2
-    rows, columns = range(100, 460, 3), range(LEFT + 20, 760, 5)  # where no card and no cut lies on the picture, squeezed or not
+    rows, columns = range(100, 460, 3), range(
+        LEFT + 20, 760, 5
+    )  # where no card and no cut lies on the picture, squeezed or not
     eyes = pictures["anaglyph"]
     differs = sum(eyes[y][red][x] != eyes[y][blue][x] for y in rows for x in columns)
     assert differs > 1000, "two eyes see two pictures"
@@ -161,20 +172,42 @@ def camera():
     width = WIDE
     beside, above = pictures["side_by_side"], pictures["top_bottom"]
     for eye, channel in ((0, red), (1, blue)):
-        off = [abs(beside[y][channel][LEFT + eye * width // 2 + x] - (eyes[y][channel][LEFT + 2 * x] + eyes[y][channel][LEFT + 2 * x + 1]) / 2)
-               for y in rows for x in range(20, 240, 3)]
+        off = [
+            abs(
+                beside[y][channel][LEFT + eye * width // 2 + x]
+                - (eyes[y][channel][LEFT + 2 * x] + eyes[y][channel][LEFT + 2 * x + 1]) / 2
+            )
+            for y in rows
+            for x in range(20, 240, 3)
+        ]
         assert sum(d > 2 for d in off) < 0.002 * len(off), (eye, max(off))
-        off = [abs(above[eye * (HIGH // 2) + y][channel][x] - (eyes[2 * y][channel][x] + eyes[2 * y + 1][channel][x]) / 2)
-               for y in range(85, 155, 3) for x in columns]
+        off = [
+            abs(above[eye * (HIGH // 2) + y][channel][x] - (eyes[2 * y][channel][x] + eyes[2 * y + 1][channel][x]) / 2)
+            for y in range(85, 155, 3)
+            for x in columns
+        ]
         assert sum(d > 2 for d in off) < 0.002 * len(off), (eye, max(off))
     # Notes of the camera carry the magnification.
     osteo("export", "first", "first.csv")
     notes = pathlib.Path("first-notes.csv").read_text()
     assert "magnification" in notes and "view 1 kept" in notes, notes[:400]
     # Each key of the camera was pressed.
-    named = {"kBackspace": "BackSpace", "kKeypad4": "KP_Left", "kKeypad6": "KP_Right", "kKeypad8": "KP_Up", "kKeypad2": "KP_Down",
-             "'['": "bracketleft", "']'": "bracketright", "','": "comma", "'.'": "period", "'/'": "slash", "';'": "semicolon"}
-    table = re.findall(r"^    \{('.'|k\w+), Command::(\w+)", (source / "libs/app/window/src/keys.cpp").read_text(), re.M)
+    named = {
+        "kBackspace": "BackSpace",
+        "kKeypad4": "KP_Left",
+        "kKeypad6": "KP_Right",
+        "kKeypad8": "KP_Up",
+        "kKeypad2": "KP_Down",
+        "'['": "bracketleft",
+        "']'": "bracketright",
+        "','": "comma",
+        "'.'": "period",
+        "'/'": "slash",
+        "';'": "semicolon",
+    }
+    table = re.findall(
+        r"^    \{('.'|k\w+), Command::(\w+)", (source / "libs/app/window/src/keys.cpp").read_text(), re.M
+    )
     wanted = {named.get(k, k[1].lower() if k[0] == "'" else k[1:]) for k, command in table if command in CAMERA}
     assert wanted == pressed - {"f"}, (wanted - pressed, pressed - wanted)
 

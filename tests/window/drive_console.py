@@ -2,6 +2,7 @@
 """The nerve monitor's console under Xvfb, a window of its own, beside a drilling that comes near the phantom's facial nerve and cuts it: it
 waits for a server, shows every sample, goes on when the server went and came again, and its keys do what they say.
 usage: drive_console.py BIN_DIR WORK_DIR [PICTURES]    with PICTURES it keeps pictures there, at three sizes"""
+
 import csv, json, os, pathlib, shutil, signal, socket, subprocess, sys, time
 
 from driver import *
@@ -16,7 +17,9 @@ sizes = [(1100, 640), (1024, 700), (1920, 1080), (3840, 2160)] if pictures else 
 
 
 def osteo(*args):
-    return subprocess.run([bin_dir / "osteo", *map(str, args), "--quiet"], check=True, cwd=work, capture_output=True, text=True).stdout
+    return subprocess.run(
+        [bin_dir / "osteo", *map(str, args), "--quiet"], check=True, cwd=work, capture_output=True, text=True
+    ).stdout
 
 
 def free_port():
@@ -26,18 +29,45 @@ def free_port():
 
 
 osteo("phantom", "ct.nrrd", "--labels-out", "l.nrrd", "--region", "temporal", "--spacing-mm", 1)
-osteo("prepare", "ct.nrrd", "-o", "case", "--spacing-mm", 1, "--structures", "l.nrrd", "--names", "6=facial nerve, 13=chorda tympani", "--no-report")
+osteo(
+    "prepare",
+    "ct.nrrd",
+    "-o",
+    "case",
+    "--spacing-mm",
+    1,
+    "--structures",
+    "l.nrrd",
+    "--names",
+    "6=facial nerve, 13=chorda tympani",
+    "--no-report",
+)
 # Near it, onto it, through it, away.
-path = [(0, 62, True), (1.5, 50.3, True), (3, 47.8, True), (5, 47, True), (6.5, 44, True), (8, 44, True), (8.5, 52, False)]
-strokes = {"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 3}, "axis": [0.96, 0.2, 0.2],
-           "waypoints": [{"t_s": t, "at_mm": [x, 9.5, -33.5], "drill": on} for t, x, on in path]}
+path = [
+    (0, 62, True),
+    (1.5, 50.3, True),
+    (3, 47.8, True),
+    (5, 47, True),
+    (6.5, 44, True),
+    (8, 44, True),
+    (8.5, 52, False),
+]
+strokes = {
+    "osteotome_strokes": 1,
+    "burr": {"kind": "cutting", "diameter_mm": 3},
+    "axis": [0.96, 0.2, 0.2],
+    "waypoints": [{"t_s": t, "at_mm": [x, 9.5, -33.5], "drill": on} for t, x, on in path],
+}
 (work / "s.json").write_text(json.dumps(strokes))
 port = free_port()
 
 
 class Console(Program):
     def __init__(self, width, height, *more):
-        super().__init__([bin_dir / "osteo", "nerve-console", port, "--width", width, "--height", height, *more], "Osteotome nerve monitor")
+        super().__init__(
+            [bin_dir / "osteo", "nerve-console", port, "--width", width, "--height", height, *more],
+            "Osteotome nerve monitor",
+        )
         self.until("it shows something", lambda s: s["pictures"] > 2)
         self.x("windowfocus", "--sync", self.id)
 
@@ -54,8 +84,24 @@ class Console(Program):
         if pictures:
             pictures.mkdir(parents=True, exist_ok=True)
             w, h = largest
-            subprocess.run(["ffmpeg", "-v", "error", "-y", "-f", "x11grab", "-video_size", f"{w}x{h}", "-i", os.environ["DISPLAY"], "-frames:v", "1",
-                            str(pictures / name)], check=True)
+            subprocess.run(
+                [
+                    "ffmpeg",
+                    "-v",
+                    "error",
+                    "-y",
+                    "-f",
+                    "x11grab",
+                    "-video_size",
+                    f"{w}x{h}",
+                    "-i",
+                    os.environ["DISPLAY"],
+                    "-frames:v",
+                    "1",
+                    str(pictures / name),
+                ],
+                check=True,
+            )
 
     def close(self):
         self.x("key", "q")
@@ -68,8 +114,22 @@ with Screen("%dx%d" % largest):
         c = Console(width, height)
         assert "not connected" in c.until("told that nobody is there", lambda s: s["trouble"])["trouble"]
         c.picture(f"console-waiting-{width}.png")
-        run = subprocess.Popen([bin_dir / "osteo", "rehearse", "case", "--headless", "--script", "s.json", "-o", f"live-{width}", "--stream",
-                                f"igtl:{port}", "--quiet"], cwd=work)
+        run = subprocess.Popen(
+            [
+                bin_dir / "osteo",
+                "rehearse",
+                "case",
+                "--headless",
+                "--script",
+                "s.json",
+                "-o",
+                f"live-{width}",
+                "--stream",
+                f"igtl:{port}",
+                "--quiet",
+            ],
+            cwd=work,
+        )
         s = c.until("connected", lambda s: s["connected"] and s["channels"])
         c.until("something is heard", lambda s: s["lines"] >= 1)
         c.until("an alarm", lambda s: s["alarm"])
@@ -97,13 +157,40 @@ with Screen("%dx%d" % largest):
         c.close()
         print(f"ok  {width}x{height}: {told['samples']} samples, {told['events']} events")
     # The stimulator, set from here by who has the code: a search, on, off; all of it is in the session, and comes out the same of it.
-    held = dict(strokes, waypoints=[{"t_s": t, "at_mm": [x, 9.5, -33.5], "drill": on}
-                                    for t, x, on in [(0, 62, True), (1.5, 50.3, True), (3, 47.8, True), (5, 47, True), (5.5, 47, False), (600, 47, False)]])
+    held = dict(
+        strokes,
+        waypoints=[
+            {"t_s": t, "at_mm": [x, 9.5, -33.5], "drill": on}
+            for t, x, on in [
+                (0, 62, True),
+                (1.5, 50.3, True),
+                (3, 47.8, True),
+                (5, 47, True),
+                (5.5, 47, False),
+                (600, 47, False),
+            ]
+        ],
+    )
     (work / "held.json").write_text(json.dumps(held))
     said = work / "rehearse.txt"
     with open(said, "w") as err:
-        run = subprocess.Popen([bin_dir / "osteo", "rehearse", "case", "--headless", "--script", "held.json", "-o", "held", "--stream",
-                                f"igtl:{port}/stimulator", "--quiet"], cwd=work, stderr=err)
+        run = subprocess.Popen(
+            [
+                bin_dir / "osteo",
+                "rehearse",
+                "case",
+                "--headless",
+                "--script",
+                "held.json",
+                "-o",
+                "held",
+                "--stream",
+                f"igtl:{port}/stimulator",
+                "--quiet",
+            ],
+            cwd=work,
+            stderr=err,
+        )
     until = time.time() + 300
     while "--code" not in said.read_text() and time.time() < until:
         assert run.poll() is None, said.read_text()

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Drives the editor under Xvfb and checks each effect, down to the voxels that the saved corrections give. Waits for what it wants to see.
 usage: drive_edit.py BIN_DIR WORK_DIR"""
+
 import array, gzip, json, os, pathlib, re, shutil, subprocess, sys, time
 
 from driver import *
@@ -64,7 +65,9 @@ def nrrd(path):
     origin, steps = numbers(fields["space origin"]), numbers(fields["space directions"])
     if "posterior" in fields["space"] and "left" in fields["space"]:
         spacing = [steps[0], steps[4], steps[8]]
-    at = lambda mm: values[sum(round((mm[a] - origin[a]) / spacing[a]) * (1, sizes[0], sizes[0] * sizes[1])[a] for a in range(3))]
+    at = lambda mm: values[
+        sum(round((mm[a] - origin[a]) / spacing[a]) * (1, sizes[0], sizes[0] * sizes[1])[a] for a in range(3))
+    ]
     return values, at
 
 
@@ -83,7 +86,21 @@ os.chdir(work)
 os.environ["LIBGL_ALWAYS_SOFTWARE"] = "1"
 os.environ["XDG_STATE_HOME"] = str(work / "state")
 osteo("phantom", "ct.nrrd", "--labels-out", "labels.nrrd", "--region", "temporal", "--spacing-mm", "1", "--quiet")
-osteo("prepare", "ct.nrrd", "-o", "case", "--lower", "400", "--spacing-mm", "1", "--structures", "labels.nrrd", "--names", "6=facial nerve", "--quiet")
+osteo(
+    "prepare",
+    "ct.nrrd",
+    "-o",
+    "case",
+    "--lower",
+    "400",
+    "--spacing-mm",
+    "1",
+    "--structures",
+    "labels.nrrd",
+    "--names",
+    "6=facial nerve",
+    "--quiet",
+)
 bone_before = pathlib.Path("case/bone.vdb").read_bytes()
 files_before = {p.name for p in work.iterdir()}
 
@@ -100,7 +117,9 @@ with Screen("1024x700") as screen:
     x, y = w.place(1, 0.4, 0.6)
     w.x("keydown", "shift", "mousemove", x, y)
     want = world(s, 1, x, y)
-    s = w.until("the crosshair follows", lambda t: abs(t["cross_mm"][0] - want[0]) < 1 and abs(t["cross_mm"][2] - want[2]) < 1)
+    s = w.until(
+        "the crosshair follows", lambda t: abs(t["cross_mm"][0] - want[0]) < 1 and abs(t["cross_mm"][2] - want[2]) < 1
+    )
     w.x("keyup", "shift")
     w.key("F4", "preset", lambda t: t["window_hu"] == 4000 and t["level_hu"] == 700)
     w.drag(w.place(0, 0.5, 0.5), w.place(0, 0.6, 0.5))
@@ -153,11 +172,29 @@ with Screen("1024x700") as screen:
     osteo("estimate-cost", "case")
 
     # prepare keeps them; a threshold that would have no say is refused; they can be taken to a copy, and dropped.
-    saved = {p.name: p.read_bytes() for p in pathlib.Path("case").iterdir() if p.suffix in (".vdb", ".ply", ".nrrd", ".json") and "prov" not in p.name and p.name != "manifest.json"}
+    saved = {
+        p.name: p.read_bytes()
+        for p in pathlib.Path("case").iterdir()
+        if p.suffix in (".vdb", ".ply", ".nrrd", ".json") and "prov" not in p.name and p.name != "manifest.json"
+    }
     assert "--edits" in osteo("prepare", "-o", "case")
     assert "has no say" in osteo("prepare", "-o", "case", "--lower", 300, code=2)
     assert all((pathlib.Path("case") / n).read_bytes() == b for n, b in saved.items())
-    osteo("prepare", "ct.nrrd", "-o", "copy", "--lower", "400", "--spacing-mm", "1", "--structures", "labels.nrrd", "--names", "6=facial nerve", "--quiet")
+    osteo(
+        "prepare",
+        "ct.nrrd",
+        "-o",
+        "copy",
+        "--lower",
+        "400",
+        "--spacing-mm",
+        "1",
+        "--structures",
+        "labels.nrrd",
+        "--names",
+        "6=facial nerve",
+        "--quiet",
+    )
     assert pathlib.Path("copy/bone.vdb").read_bytes() == bone_before
     osteo("edit", "copy", "--apply", "case/edits.json", "--quiet")
     assert all((pathlib.Path("copy") / n).read_bytes() == b for n, b in saved.items()), "the copy differs"
@@ -211,6 +248,10 @@ with Screen("1024x700") as screen:
     w.end()
 
 # Nothing of the scan lies about but in the reports, which say that they hold pictures of it.
-made = {p.name for p in work.iterdir()} - files_before - {"mask.nrrd", "corrected.nrrd", "copy", "other", "other.nrrd", "none.json", "handed", "returned", "again"}
+made = (
+    {p.name for p in work.iterdir()}
+    - files_before
+    - {"mask.nrrd", "corrected.nrrd", "copy", "other", "other.nrrd", "none.json", "handed", "returned", "again"}
+)
 assert all(n.startswith("state") or n.endswith(".prov.json") or ".report." in n for n in made), made
 print("window edit: all as it should be")

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Drives force-skill training under Xvfb: runs begin and end, what is pressed arrives, bars show where they should, a trial stopped half-way
 is done again. usage: drive_experiment.py BIN_DIR WORK_DIR [PICTURES_DIR]"""
+
 import json, os, pathlib, shutil, subprocess, sys, time
 
 from driver import *
@@ -17,8 +18,22 @@ os.environ["XDG_STATE_HOME"] = str(work / "state-home")
 class Window(Program):
     def __init__(self, device, size, *args):
         self.size = size
-        super().__init__([bin_dir / "osteo-experiment", "study", "--participant", "P01", "--device", device, "--width", size[0], "--height", size[1], *args],
-                         "Osteotome experiment")
+        super().__init__(
+            [
+                bin_dir / "osteo-experiment",
+                "study",
+                "--participant",
+                "P01",
+                "--device",
+                device,
+                "--width",
+                size[0],
+                "--height",
+                size[1],
+                *args,
+            ],
+            "Osteotome experiment",
+        )
         x("mousemove", size[0] // 2, int(0.2 * size[1]))
 
     def press_space(self, page):
@@ -36,6 +51,7 @@ class Window(Program):
     def picture(self, name):
         if pictures:
             from PIL import ImageGrab
+
             pictures.mkdir(parents=True, exist_ok=True)
             ImageGrab.grab(xdisplay=os.environ["DISPLAY"]).crop((0, 0, *self.size)).save(pictures / f"{name}.png")
 
@@ -58,7 +74,11 @@ def run(window, size, page, force_share=0.5):
 
 size = (1360, 860) if not pictures else tuple(map(int, os.environ.get("SIZE", "1360x860").split("x")))
 with Screen("%dx%d" % size):
-    done = subprocess.run([bin_dir / "osteo", "experiment", "stimuli", "study", "--people", "P01", "--trials", "9"], capture_output=True, text=True)
+    done = subprocess.run(
+        [bin_dir / "osteo", "experiment", "stimuli", "study", "--people", "P01", "--trials", "9"],
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     protocol()
     w = Window("mouse", size)

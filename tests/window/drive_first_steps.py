@@ -2,6 +2,7 @@
 """A new user's first five minutes in the window under Xvfb: what the list of first steps and F1 say is done, word for word, and each step
 ticks itself off by what came of it, not by its key. Prints the table of docs/guides/surgeon.md.
 usage: drive_first_steps.py first_steps BIN_DIR WORK_DIR SOURCE_DIR"""
+
 from drive_window import *  # what it drives with; the arguments are the same
 
 SIZE = ("--width", 1360, "--height", 860, "--quality", "plain")

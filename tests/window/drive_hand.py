@@ -2,6 +2,7 @@
 """A mouse user's hand in the window under Xvfb: each of its keys, tilt by mouse, second hand, buttons given something to do, the keys lost to
 another window, cases dropped and chosen in a dialog.
 usage: drive_hand.py mouse_hand BIN_DIR WORK_DIR SOURCE_DIR"""
+
 import json, os, pathlib, re, stat
 
 from drive_window import *  # what it drives with; the arguments are the same
@@ -132,10 +133,28 @@ def hand():
     kept = json.loads(SETTINGS.read_text())
     assert kept["buttons"] == {"key F12": "undo"} and kept["motion_one_to"] == 1 and kept["burr_share"] == 1, kept
     # Each key of the hand was pressed.
-    named = {"'\\''": "apostrophe", "'\\\\'": "backslash", "'`'": "grave", "'-'": "minus", "'='": "equal", "kKeypad0": "KP_Insert", "kKeypadPoint": "KP_Delete",
-             "kKeypad5": "KP_Begin", "kKeypad7": "KP_Home", "kKeypad9": "KP_Prior", "kPageUp": "Prior", "kPageDown": "Next"}
-    rows = re.findall(r"^    \{('\\?.'|k\w+), Command::(\w+)(.*)\}", (source / "libs/app/window/src/keys.cpp").read_text(), re.M)
-    wanted = {("alt+" if "kWithAlt" in rest else "") + named.get(k, k[1].lower() if k[0] == "'" else k[1:]) for k, command, rest in rows if command in HAND}
+    named = {
+        "'\\''": "apostrophe",
+        "'\\\\'": "backslash",
+        "'`'": "grave",
+        "'-'": "minus",
+        "'='": "equal",
+        "kKeypad0": "KP_Insert",
+        "kKeypadPoint": "KP_Delete",
+        "kKeypad5": "KP_Begin",
+        "kKeypad7": "KP_Home",
+        "kKeypad9": "KP_Prior",
+        "kPageUp": "Prior",
+        "kPageDown": "Next",
+    }
+    rows = re.findall(
+        r"^    \{('\\?.'|k\w+), Command::(\w+)(.*)\}", (source / "libs/app/window/src/keys.cpp").read_text(), re.M
+    )
+    wanted = {
+        ("alt+" if "kWithAlt" in rest else "") + named.get(k, k[1].lower() if k[0] == "'" else k[1:])
+        for k, command, rest in rows
+        if command in HAND
+    }
     assert len(wanted) > 15 and wanted == pressed, (wanted - pressed, pressed - wanted)
 
 
@@ -172,13 +191,18 @@ def drops():
         now = s["tick"]
         w.until("it runs on", lambda s: s["tick"] > now)
         assert drop(wid, [work / "scan.txt", work / "other"])
-        second = w.until("the other case", lambda s: s.get("page") != "start" and s.get("session") != first["session"] and s["tick"] > 0)
+        second = w.until(
+            "the other case",
+            lambda s: s.get("page") != "start" and s.get("session") != first["session"] and s["tick"] > 0,
+        )
         assert "other" in second["session"], second
         w.close()
     closed(first["session"])
     closed(second["session"])
     notes = subprocess.run([bin_dir / "osteo", "export", first["session"], "notes.csv"], capture_output=True, text=True)
-    assert notes.returncode == 0 and "scan.txt" not in pathlib.Path("notes-notes.csv").read_text(), "no name of a file in a session"
+    assert (
+        notes.returncode == 0 and "scan.txt" not in pathlib.Path("notes-notes.csv").read_text()
+    ), "no name of a file in a session"
 
 
 def mouse_hand():

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Live tutoring and a lesson in the window under Xvfb: others join, hands are led and let go, a link drops and comes back.
 usage: drive_tutor.py lesson|live|follow|asked BIN_DIR WORK_DIR SOURCE_DIR"""
+
 import re, signal
 
 from drive_window import *  # what it drives with; the arguments are the same
@@ -30,11 +31,34 @@ def live():
         w = Window("--tutor", "--two-way", "--no-sound", "-o", "taught")
         assert w.state()["tutor"]["title"].startswith("You teach"), w.state()["tutor"]
         address, code = invited(w)
-        guest = subprocess.Popen([bin_dir / "osteo", "join", address, "--case-folder", "case", "--code", code, "--silence-s", "300", "--json"],
-                                 stdout=open("guest.json", "w"), stderr=open("guest.txt", "w"))
-        w.until("the trainee is there, and pulls", lambda s: s["tutor"]["heard"] == 1 and s["tutor"]["pull"] == 1 and s["tutor"]["guiding"])
+        guest = subprocess.Popen(
+            [
+                bin_dir / "osteo",
+                "join",
+                address,
+                "--case-folder",
+                "case",
+                "--code",
+                code,
+                "--silence-s",
+                "300",
+                "--json",
+            ],
+            stdout=open("guest.json", "w"),
+            stderr=open("guest.txt", "w"),
+        )
+        w.until(
+            "the trainee is there, and pulls",
+            lambda s: s["tutor"]["heard"] == 1 and s["tutor"]["pull"] == 1 and s["tutor"]["guiding"],
+        )
         # The drill finds its way with nobody at it: the hand is let go by itself, and led again when it is there.
-        w.key("f", "at the bone, led again", lambda s: not s["leading"] and s["message"].startswith("drill brought to the bone") and s["message"].endswith("your hand is led again"))
+        w.key(
+            "f",
+            "at the bone, led again",
+            lambda s: not s["leading"]
+            and s["message"].startswith("drill brought to the bone")
+            and s["message"].endswith("your hand is led again"),
+        )
         w.until("it pulls", lambda s: s["tutor"]["guiding"] and s["tutor"]["pull"] == 1)
         w.key("ctrl+g", "let go", lambda s: not s["tutor"]["guiding"] and s["tutor"]["pull"] == 0)
         w.key("f", "at the bone", lambda s: not s["leading"] and s["message"].startswith("drill brought to the bone"))
@@ -77,8 +101,11 @@ def live():
 
 def follow():
     """Who has joined goes on with the host when it saves and goes on (F5) and when it begins anew (R); and one who comes later joins too."""
+
     def drill(host, mm3):
-        host.key("f", "at the bone", lambda s: not s["leading"] and s["message"].startswith("drill brought to the bone"))
+        host.key(
+            "f", "at the bone", lambda s: not s["leading"] and s["message"].startswith("drill brought to the bone")
+        )
         host.x("mousedown", 1)
         for _ in range(40):
             host.x("key", "Down")
@@ -102,9 +129,14 @@ def follow():
         drill(host, 0.5)
         watcher.until("sees it", lambda s: s["removed_mm3"] > 0.5)
         begun = watcher.state()["session"]
-        two = host.key("F5", "goes on", lambda s: s["session"] != "one" and s["tick"] > 0 and s["tutor"]["invitation"])["session"]
+        two = host.key("F5", "goes on", lambda s: s["session"] != "one" and s["tick"] > 0 and s["tutor"]["invitation"])[
+            "session"
+        ]
         assert invited(host) == (address, code), "the same place and code"
-        followed = watcher.until("follows", lambda s: s["session"] != begun and s["tick"] > 0 and s["tutor"]["heard"] == 1 and not s["failure"])["session"]
+        followed = watcher.until(
+            "follows",
+            lambda s: s["session"] != begun and s["tick"] > 0 and s["tutor"]["heard"] == 1 and not s["failure"],
+        )["session"]
         front(host)
         drill(host, 0.5)
         watcher.until("sees it", lambda s: s["session"] == followed and s["removed_mm3"] > 0.5)
@@ -116,8 +148,16 @@ def follow():
         late.close()
         front(host)
         host.key("r", "asks", lambda s: s["asking"])
-        three = host.key("Return", "begins anew", lambda s: s["session"] not in ("one", two) and s["tick"] > 0 and not s["asking"])["session"]
-        watcher.until("follows", lambda s: s["session"] not in (begun, followed) and s["tick"] > 0 and s["tutor"]["heard"] == 1 and not s["failure"])
+        three = host.key(
+            "Return", "begins anew", lambda s: s["session"] not in ("one", two) and s["tick"] > 0 and not s["asking"]
+        )["session"]
+        watcher.until(
+            "follows",
+            lambda s: s["session"] not in (begun, followed)
+            and s["tick"] > 0
+            and s["tutor"]["heard"] == 1
+            and not s["failure"],
+        )
         front(watcher)
         watcher.close()
         front(host)
@@ -145,7 +185,23 @@ def asked():
     with Screen():
         host = Window("--tutor", "--no-sound", "-o", "asked")
         address, code = invited(host)
-        app = subprocess.Popen([bin_dir / "osteo-rehearse", "case", "--join", address, "--role", "watcher", "--state-file", "asking.json", "--no-end-page", "--no-sound", "-o", "typed"], stderr=open("typed.txt", "w"))
+        app = subprocess.Popen(
+            [
+                bin_dir / "osteo-rehearse",
+                "case",
+                "--join",
+                address,
+                "--role",
+                "watcher",
+                "--state-file",
+                "asking.json",
+                "--no-end-page",
+                "--no-sound",
+                "-o",
+                "typed",
+            ],
+            stderr=open("typed.txt", "w"),
+        )
         wait("it asks", lambda: pathlib.Path("asking.json").exists())
         wid = wait("its window", lambda: [i for i in host.x("search", "--name", "^Osteotome$").split()])[-1]
         host.x("windowraise", wid)
@@ -154,7 +210,9 @@ def asked():
         time.sleep(0.5)
         host.x("type", "--window", wid, "--delay", "60", code)
         host.x("key", "--window", wid, "Return")
-        wait("it watches", lambda: json.loads(pathlib.Path("asking.json").read_text()).get("tutor", {}).get("heard") == 1)
+        wait(
+            "it watches", lambda: json.loads(pathlib.Path("asking.json").read_text()).get("tutor", {}).get("heard") == 1
+        )
         app.terminate()
         app.wait(PATIENCE_S)
         assert code not in pathlib.Path("typed.txt").read_text()

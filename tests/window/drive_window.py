@@ -1,14 +1,32 @@
 #!/usr/bin/env python3
 """Drives the window under Xvfb and checks each effect. Waits for what it wants to see, never for a time.
 usage: drive_window.py keys|room|hand|signals|failures BIN_DIR WORK_DIR SOURCE_DIR"""
+
 import array, csv, json, math, os, pathlib, re, resource, shutil, signal, subprocess, sys, time
 
 from driver import *
 
-part, bin_dir, work, source = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3]), pathlib.Path(sys.argv[4])
+part, bin_dir, work, source = (
+    sys.argv[1],
+    pathlib.Path(sys.argv[2]),
+    pathlib.Path(sys.argv[3]),
+    pathlib.Path(sys.argv[4]),
+)
 # Keys of these commands are pressed by drive_camera.py.
-CAMERA = {"magnify", "focus", "autofocus", "look_there", "look_at_drill", "guide_camera", "bookmark", "camera_back",
-          "orbit_left", "orbit_right", "orbit_up", "orbit_down"}
+CAMERA = {
+    "magnify",
+    "focus",
+    "autofocus",
+    "look_there",
+    "look_at_drill",
+    "guide_camera",
+    "bookmark",
+    "camera_back",
+    "orbit_left",
+    "orbit_right",
+    "orbit_up",
+    "orbit_down",
+}
 # And of these by drive_hand.py.
 HAND = {"tilt", "roll", "straight", "clutch", "wrist_rest", "second_mouse", "motion", "burr_speed", "hand_page"}
 
@@ -30,7 +48,11 @@ def apart(a, b):
 class Window(Program):
     def __init__(self, *args, case="case", before=None, end_page=False):
         # Straight to the window's program, so that signals go to it whoever starts it.
-        super().__init__([bin_dir / "osteo-rehearse", *([case] if case else []), *([] if end_page else ["--no-end-page"]), *args], "Osteotome", before)
+        super().__init__(
+            [bin_dir / "osteo-rehearse", *([case] if case else []), *([] if end_page else ["--no-end-page"]), *args],
+            "Osteotome",
+            before,
+        )
         if not case or "--review" in args:  # the start page, or one at the end: nothing ticks
             return
         wait("the first tick", lambda: self.state()["tick"] > 0)
@@ -57,7 +79,17 @@ class Window(Program):
 
 def make_case(region="temporal"):
     osteo("phantom", "ct.nrrd", "--region", region, "--spacing-mm", "1" if region == "temporal" else "2", "--quiet")
-    osteo("prepare", "ct.nrrd", "-o", "case", "--lower", "500", "--spacing-mm", "1" if region == "temporal" else "2", "--quiet")
+    osteo(
+        "prepare",
+        "ct.nrrd",
+        "-o",
+        "case",
+        "--lower",
+        "500",
+        "--spacing-mm",
+        "1" if region == "temporal" else "2",
+        "--quiet",
+    )
 
 
 def ticks(session):
@@ -90,7 +122,9 @@ def loudness(raw, seconds):
 def keys():
     make_case()
     pressed = set()
-    os.environ.update(SDL_AUDIODRIVER="disk", SDL_DISKAUDIOFILE="heard.raw")  # a sound card that writes what it would play
+    os.environ.update(
+        SDL_AUDIODRIVER="disk", SDL_DISKAUDIOFILE="heard.raw"
+    )  # a sound card that writes what it would play
     with Screen():
         w = Window("--dust", "--diameter-mm", 6, "-o", "first")
 
@@ -109,12 +143,19 @@ def keys():
         key("5", "diameter", lambda s: s["tool"] == "cutting 5 mm")
         key("ctrl+h", "hints", lambda s: s["hints"])
         key("ctrl+h", "no hints", lambda s: not s["hints"])
-        key("ctrl+t", "only after a session", lambda s: "when it is over" in s["message"] and s["tool"] == "cutting 5 mm")
+        key(
+            "ctrl+t",
+            "only after a session",
+            lambda s: "when it is over" in s["message"] and s["tool"] == "cutting 5 mm",
+        )
         key("space", "drill on", lambda s: s["drill_latched"] and s["drill_on"])
         key("space", "drill off", lambda s: not s["drill_latched"] and not s["drill_on"])
         before = w.next()
         deeper = key("Down", "deeper", lambda s: s["goal_mm"] != before["goal_mm"])
-        assert dot([a - b for a, b in zip(deeper["goal_mm"], before["goal_mm"])], before["eye"]) < -0.2, (before, deeper)
+        assert dot([a - b for a, b in zip(deeper["goal_mm"], before["goal_mm"])], before["eye"]) < -0.2, (
+            before,
+            deeper,
+        )
         key("Up", "back", lambda s: apart(s["goal_mm"], before["goal_mm"]) < 1e-6)
         # The cuts.
         key("F3", "a cut in the middle", lambda s: s["cut_in_middle"] == 0)
@@ -184,7 +225,11 @@ def keys():
         w.until("pinned", lambda s: s["notes"] == 1 and not s["writing"])
         w.x("mousemove", 480, 330)
         w.next()
-        key("s", "screenshot", lambda s: pathlib.Path("first/screenshot-1.png").exists() and s["message"].startswith("saved"))
+        key(
+            "s",
+            "screenshot",
+            lambda s: pathlib.Path("first/screenshot-1.png").exists() and s["message"].startswith("saved"),
+        )
         # What the second hand holds goes round.
         for _ in range(8):
             held = key("k", "another in the second hand", lambda s: s["message"].startswith("second hand: "))["message"]
@@ -255,7 +300,11 @@ def keys():
         key("r", "asks", lambda s: s["asking"])
         w.key("Escape", "no", lambda s: not s["asking"] and s["session"] == second)
         w.key("r", "asks", lambda s: s["asking"])
-        third = w.key("Return", "bone whole again", lambda s: s["session"] not in ("first", first, second) and s["bodies"] == 1 and s["tick"] > 0)["session"]
+        third = w.key(
+            "Return",
+            "bone whole again",
+            lambda s: s["session"] not in ("first", first, second) and s["bodies"] == 1 and s["tick"] > 0,
+        )["session"]
         pressed.update({"q", "Left", "Right"})  # of the page at the end: room()
         said = w.close()
     for s in ("first", first, second, third):
@@ -274,7 +323,9 @@ def keys():
     assert 'width: 1000' in osteo("info", "first/screenshot-1.png"), osteo("info", "first/screenshot-1.png")
     # Each key of the table was pressed above.
     named = {"kSpace": "space", "kKeyEscape": "Escape", "kEnter": "Return", "kKeypadEnter": "KP_Enter"}
-    table = re.findall(r"^    \{('.'|k\w+), Command::(\w+)(.*)\},$", (source / "libs/app/window/src/keys.cpp").read_text(), re.M)
+    table = re.findall(
+        r"^    \{('.'|k\w+), Command::(\w+)(.*)\},$", (source / "libs/app/window/src/keys.cpp").read_text(), re.M
+    )
     with_ctrl = {k[1].lower() for k, command, rest in table if "kWithCtrl" in rest}
     assert {f"ctrl+{k}" for k in with_ctrl} == {k for k in pressed if k.startswith("ctrl+")}, (with_ctrl, pressed)
     pressed = {k for k in pressed if not k.startswith("ctrl+")}
@@ -282,7 +333,11 @@ def keys():
     assert len(table) > 30, table
     wanted = {k[1].lower() if k[0] == "'" else named.get(k, k[1:]) for k in table}
     # And those of the burr kinds, each in its row of the table.
-    kinds = re.findall(r"^ +\.key = '(.)',$", (source / "libs/simulation/bone/include/osteo/simulation/bone/burr_kind.h").read_text(), re.M)
+    kinds = re.findall(
+        r"^ +\.key = '(.)',$",
+        (source / "libs/simulation/bone/include/osteo/simulation/bone/burr_kind.h").read_text(),
+        re.M,
+    )
     assert len(kinds) > 1, kinds
     wanted |= {k.lower() for k in kinds}
     assert wanted == pressed, (wanted - pressed, pressed - wanted)
@@ -402,13 +457,26 @@ def hand():
         way = rows[began + 100 : ended]
         assert max(map(force, way)) < 1, max(map(force, way))
         assert not any(int(float(r["pedal"])) for r in way)
-    print("most force on", len(seen), "ways:", max(max(map(force, rows[b + 100 : e])) for _, _, b, e in seen), "N; first tick", force(first), "N")
+    print(
+        "most force on",
+        len(seen),
+        "ways:",
+        max(max(map(force, rows[b + 100 : e])) for _, _, b, e in seen),
+        "N; first tick",
+        force(first),
+        "N",
+    )
 
 
 def signals():
     make_case()
     with Screen() as screen:
-        for name, sent in (("term", [signal.SIGTERM]), ("int", [signal.SIGINT]), ("hup", [signal.SIGHUP]), ("logout", [signal.SIGTERM, signal.SIGHUP, signal.SIGTERM])):
+        for name, sent in (
+            ("term", [signal.SIGTERM]),
+            ("int", [signal.SIGINT]),
+            ("hup", [signal.SIGHUP]),
+            ("logout", [signal.SIGTERM, signal.SIGHUP, signal.SIGTERM]),
+        ):
             w = Window("-o", name)
             for s in sent:
                 w.app.send_signal(s)
@@ -442,7 +510,11 @@ def failures():
         # A folder that is taken: said at once.
         pathlib.Path("taken").mkdir()
         pathlib.Path("taken/file").write_text("mine")
-        done = subprocess.run([bin_dir / "osteo", "rehearse", "case", "-o", "taken", "--width", "800", "--height", "600"], capture_output=True, text=True)
+        done = subprocess.run(
+            [bin_dir / "osteo", "rehearse", "case", "-o", "taken", "--width", "800", "--height", "600"],
+            capture_output=True,
+            text=True,
+        )
         assert done.returncode == 6 and "exists already" in done.stderr, done
         assert os.listdir("taken") == ["file"]
 
@@ -453,7 +525,9 @@ def failures():
 
         w = Window("-o", "spoilt")
         s = spoil(w, "spoilt")
-        assert s["session"] == "spoilt" and not pathlib.Path("case/sessions").exists(), s  # no empty folder of the one that was not begun
+        assert (
+            s["session"] == "spoilt" and not pathlib.Path("case/sessions").exists()
+        ), s  # no empty folder of the one that was not begun
         w.close(4)
         # From there the case itself is a way on, and then all is well but for what was lost.
         w = Window("-o", "spoilt-2")

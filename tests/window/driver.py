@@ -1,4 +1,5 @@
 """What the window drivers have in common: a screen of their own, a program that says what it shows, waiting for it, keys."""
+
 import json, os, pathlib, subprocess, time
 
 PATIENCE_S = 240  # of a wait; on a machine at rest most take a second
@@ -47,7 +48,9 @@ class Program:
     def __init__(self, command, title, before=None):
         self.file = pathlib.Path(f"state-{time.monotonic_ns()}.json")
         self.log = open(f"{self.file}.log", "w+")
-        self.app = subprocess.Popen([*map(str, command), "--state-file", str(self.file)], stderr=self.log, preexec_fn=before)
+        self.app = subprocess.Popen(
+            [*map(str, command), "--state-file", str(self.file)], stderr=self.log, preexec_fn=before
+        )
         wait("the window's first picture", lambda: self.file.exists() or self.app.poll() is not None)
         assert self.app.poll() is None, (self.app.returncode, self.said())
         self.id = wait("the window", lambda: x("search", "--name", f"^{title}").split())[-1]

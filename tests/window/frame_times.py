@@ -1,10 +1,16 @@
 #!/usr/bin/env python3
 """Pictures a second of the window under Xvfb while the camera is turned, by what is open, beside a plain VTK viewer
 of the same bone (picture_bench) in turns with it. Not a test: prints rows for docs/validation/accuracy.md.
-usage: frame_times.py BIN_DIR CASE [ROUNDS]      CASE: a prepared case with structures; BIN_DIR holds picture_bench (ninja picture_bench)"""
+usage: frame_times.py BIN_DIR CASE [ROUNDS]      CASE: a prepared case with structures; BIN_DIR holds picture_bench (ninja picture_bench)
+"""
+
 import os, pathlib, statistics, subprocess, sys, tempfile, time
 
-bin_dir, case, rounds = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve(), int((sys.argv[3:] or ["5"])[0])
+bin_dir, case, rounds = (
+    pathlib.Path(sys.argv[1]).resolve(),
+    pathlib.Path(sys.argv[2]).resolve(),
+    int((sys.argv[3:] or ["5"])[0]),
+)
 here = pathlib.Path(__file__).resolve()
 work = tempfile.mkdtemp()
 sys.argv = [sys.argv[0], "times", str(bin_dir), work, str(here.parents[2])]
@@ -46,7 +52,12 @@ def turned(flags, keys):
 
 
 def plain(wide, high):
-    said = subprocess.run([bin_dir / "picture_bench", case, "--size", f"{wide}x{high}", "--rounds", "5", "--plain"], capture_output=True, text=True, check=True).stdout
+    said = subprocess.run(
+        [bin_dir / "picture_bench", case, "--size", f"{wide}x{high}", "--rounds", "5", "--plain"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
     row = next(line for line in said.splitlines() if line.startswith("plain VTK viewer"))
     return float(row.split()[-2])  # the median in real time
 
@@ -59,11 +70,19 @@ with Screen("1360x860"):
             rows[name].append(got)
             viewer.setdefault(got[:2], []).append(plain(*got[:2]))
             loads.append(os.getloadavg()[0])
-            print(f"round {turn + 1}, {name}: {got}; plain viewer, as large: {viewer[got[:2]][-1]} ms", file=sys.stderr, flush=True)
+            print(
+                f"round {turn + 1}, {name}: {got}; plain viewer, as large: {viewer[got[:2]][-1]} ms",
+                file=sys.stderr,
+                flush=True,
+            )
 shutil.rmtree(work)
 
 print(f"load {min(loads):.0f} to {max(loads):.0f}, {os.cpu_count()} cores, {rounds} rounds, window 1360 x 860\n")
-print("| open | bone's part, pixels | bone turned: pictures a second | its scale | cuts, ms | plain VTK viewer, as large: pictures a second |\n|---|---|---|---|---|---|")
+print(
+    "| open | bone's part, pixels | bone turned: pictures a second | its scale | cuts, ms | plain VTK viewer, as large: pictures a second |\n|---|---|---|---|---|---|"
+)
 for name, got in rows.items():
     rate, scale, cuts = (statistics.median(g[k] for g in got) for k in (2, 3, 4))
-    print(f"| {name} | {got[0][0]} x {got[0][1]} | {rate:.1f} | {scale:.2f} | {cuts:.0f} | {1000 / statistics.median(viewer[got[0][:2]]):.1f} |")
+    print(
+        f"| {name} | {got[0][0]} x {got[0][1]} | {rate:.1f} | {scale:.2f} | {cuts:.0f} | {1000 / statistics.median(viewer[got[0][:2]]):.1f} |"
+    )

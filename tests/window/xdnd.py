@@ -1,5 +1,6 @@
 """Drops files onto a window as a desktop does: the source's half of XDND 5 (freedesktop.org), by Xlib alone.
 usage: drop(WINDOW_ID, [PATHS]) with DISPLAY set; returns whether the window took it."""
+
 import ctypes, time, urllib.parse
 
 X = ctypes.CDLL("libX11.so.6")
@@ -9,30 +10,69 @@ CLIENT_MESSAGE, SELECTION_REQUEST, SELECTION_NOTIFY = 33, 30, 31
 
 
 class ClientMessage(ctypes.Structure):
-    _fields_ = [("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("send_event", ctypes.c_int), ("display", DISPLAY),
-                ("window", WINDOW), ("message_type", ATOM), ("format", ctypes.c_int), ("data", ctypes.c_long * 5)]
+    _fields_ = [
+        ("type", ctypes.c_int),
+        ("serial", ctypes.c_ulong),
+        ("send_event", ctypes.c_int),
+        ("display", DISPLAY),
+        ("window", WINDOW),
+        ("message_type", ATOM),
+        ("format", ctypes.c_int),
+        ("data", ctypes.c_long * 5),
+    ]
 
 
 class SelectionRequest(ctypes.Structure):
-    _fields_ = [("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("send_event", ctypes.c_int), ("display", DISPLAY),
-                ("owner", WINDOW), ("requestor", WINDOW), ("selection", ATOM), ("target", ATOM), ("property", ATOM), ("time", ctypes.c_ulong)]
+    _fields_ = [
+        ("type", ctypes.c_int),
+        ("serial", ctypes.c_ulong),
+        ("send_event", ctypes.c_int),
+        ("display", DISPLAY),
+        ("owner", WINDOW),
+        ("requestor", WINDOW),
+        ("selection", ATOM),
+        ("target", ATOM),
+        ("property", ATOM),
+        ("time", ctypes.c_ulong),
+    ]
 
 
 class SelectionNotify(ctypes.Structure):
-    _fields_ = [("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("send_event", ctypes.c_int), ("display", DISPLAY),
-                ("requestor", WINDOW), ("selection", ATOM), ("target", ATOM), ("property", ATOM), ("time", ctypes.c_ulong)]
+    _fields_ = [
+        ("type", ctypes.c_int),
+        ("serial", ctypes.c_ulong),
+        ("send_event", ctypes.c_int),
+        ("display", DISPLAY),
+        ("requestor", WINDOW),
+        ("selection", ATOM),
+        ("target", ATOM),
+        ("property", ATOM),
+        ("time", ctypes.c_ulong),
+    ]
 
 
 class Event(ctypes.Union):
-    _fields_ = [("type", ctypes.c_int), ("client", ClientMessage), ("request", SelectionRequest), ("notify", SelectionNotify), ("pad", ctypes.c_long * 24)]
+    _fields_ = [
+        ("type", ctypes.c_int),
+        ("client", ClientMessage),
+        ("request", SelectionRequest),
+        ("notify", SelectionNotify),
+        ("pad", ctypes.c_long * 24),
+    ]
 
 
-for name, arguments in {"XInternAtom": [DISPLAY, ctypes.c_char_p, ctypes.c_int], "XDefaultRootWindow": [DISPLAY],
-                        "XCreateSimpleWindow": [DISPLAY, WINDOW] + [ctypes.c_int] * 2 + [ctypes.c_uint] * 3 + [ctypes.c_ulong] * 2,
-                        "XSendEvent": [DISPLAY, WINDOW, ctypes.c_int, ctypes.c_long, ctypes.POINTER(Event)],
-                        "XSetSelectionOwner": [DISPLAY, ATOM, WINDOW, ctypes.c_ulong], "XPending": [DISPLAY],
-                        "XNextEvent": [DISPLAY, ctypes.POINTER(Event)], "XFlush": [DISPLAY], "XCloseDisplay": [DISPLAY],
-                        "XChangeProperty": [DISPLAY, WINDOW, ATOM, ATOM, ctypes.c_int, ctypes.c_int, ctypes.c_char_p, ctypes.c_int]}.items():
+for name, arguments in {
+    "XInternAtom": [DISPLAY, ctypes.c_char_p, ctypes.c_int],
+    "XDefaultRootWindow": [DISPLAY],
+    "XCreateSimpleWindow": [DISPLAY, WINDOW] + [ctypes.c_int] * 2 + [ctypes.c_uint] * 3 + [ctypes.c_ulong] * 2,
+    "XSendEvent": [DISPLAY, WINDOW, ctypes.c_int, ctypes.c_long, ctypes.POINTER(Event)],
+    "XSetSelectionOwner": [DISPLAY, ATOM, WINDOW, ctypes.c_ulong],
+    "XPending": [DISPLAY],
+    "XNextEvent": [DISPLAY, ctypes.POINTER(Event)],
+    "XFlush": [DISPLAY],
+    "XCloseDisplay": [DISPLAY],
+    "XChangeProperty": [DISPLAY, WINDOW, ATOM, ATOM, ctypes.c_int, ctypes.c_int, ctypes.c_char_p, ctypes.c_int],
+}.items():
     getattr(X, name).argtypes = arguments
 X.XInternAtom.restype = X.XDefaultRootWindow.restype = X.XCreateSimpleWindow.restype = ctypes.c_ulong
 
@@ -46,7 +86,12 @@ def drop(window, paths, patience_s=60):
 
     def tell(message, *data):
         event = Event()
-        event.client.type, event.client.window, event.client.message_type, event.client.format = CLIENT_MESSAGE, window, atom(message), 32
+        event.client.type, event.client.window, event.client.message_type, event.client.format = (
+            CLIENT_MESSAGE,
+            window,
+            atom(message),
+            32,
+        )
         for n, d in enumerate(data):
             event.client.data[n] = d
         X.XSendEvent(display, window, 0, 0, ctypes.byref(event))
@@ -73,7 +118,11 @@ def drop(window, paths, patience_s=60):
             r = event.request
             X.XChangeProperty(display, r.requestor, r.property, r.target, 8, 0, uris, len(uris))
             answer = Event()
-            answer.notify.type, answer.notify.requestor, answer.notify.selection = SELECTION_NOTIFY, r.requestor, r.selection
+            answer.notify.type, answer.notify.requestor, answer.notify.selection = (
+                SELECTION_NOTIFY,
+                r.requestor,
+                r.selection,
+            )
             answer.notify.target, answer.notify.property, answer.notify.time = r.target, r.property, r.time
             X.XSendEvent(display, r.requestor, 0, 0, ctypes.byref(answer))
             X.XFlush(display)

@@ -1,5 +1,6 @@
 """What the examples draw with: numpy and the letters of VTK's own Python module (python3-vtk9), so that they run without a display and without
 matplotlib. Pictures are arrays (rows, columns, 3) of uint8, as osteo.snapshot gives them and osteo.save takes them."""
+
 import numpy as np
 import vtkmodules.vtkRenderingFreeType  # noqa: F401  (brings the letters)
 from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -14,7 +15,7 @@ def blend(picture, row, column, share, colour):
     r0, c0 = max(row, 0), max(column, 0)
     r1, c1 = min(row + share.shape[0], picture.shape[0]), min(column + share.shape[1], picture.shape[1])
     if r0 < r1 and c0 < c1:
-        share = share[r0 - row:r1 - row, c0 - column:c1 - column, None]
+        share = share[r0 - row : r1 - row, c0 - column : c1 - column, None]
         under = picture[r0:r1, c0:c1]
         under[...] = np.rint((1 - share) * under + share * np.array(colour))
 
@@ -25,7 +26,9 @@ def write(picture, row, column, words, size=14, colour=INK, at=0.0, turned=False
     letters.SetFontSize(size)
     vtkTextRenderer.GetInstance().RenderString(letters, words, shape, box, 72)
     wide, high, _ = shape.GetDimensions()
-    share = vtk_to_numpy(shape.GetPointData().GetScalars()).reshape(high, wide, -1)[box[1]::-1, :box[0] + 1, -1] / 255
+    share = (
+        vtk_to_numpy(shape.GetPointData().GetScalars()).reshape(high, wide, -1)[box[1] :: -1, : box[0] + 1, -1] / 255
+    )
     share = np.rot90(share) if turned else share
     over = (0.5, at) if not turned else (at, 0.5)
     blend(picture, round(row - over[0] * share.shape[0]), round(column - over[1] * share.shape[1]), share, colour)
@@ -37,7 +40,9 @@ def line(picture, rows, columns, colour=INK, width=1.8):
         low, high = int(min(r0, r1) - width - 1), int(max(r0, r1) + width + 2)
         left, right = int(min(c0, c1) - width - 1), int(max(c0, c1) + width + 2)
         r, c = np.mgrid[low:high, left:right].astype(float)
-        along = np.clip(((r - r0) * (r1 - r0) + (c - c0) * (c1 - c0)) / max((r1 - r0) ** 2 + (c1 - c0) ** 2, 1e-9), 0, 1)
+        along = np.clip(
+            ((r - r0) * (r1 - r0) + (c - c0) * (c1 - c0)) / max((r1 - r0) ** 2 + (c1 - c0) ** 2, 1e-9), 0, 1
+        )
         off = np.hypot(r - r0 - along * (r1 - r0), c - c0 - along * (c1 - c0))
         blend(picture, low, left, np.clip(width / 2 + 0.5 - off, 0, 1), colour)
 

@@ -1,4 +1,5 @@
 """A hole drilled into the mastoid, without a window: the force a hand would feel, as a structured array. Writes drilled-hole.png and drilled-hole.npy."""
+
 # %% The bone: a phantom of the left temporal bone, as density on a sparse grid
 import numpy as np
 import osteo
@@ -33,6 +34,11 @@ print(f"most force {force_n.max():.2f} N at {depth_mm[force_n.argmax()]:.2f} mm 
 print(f"removed {removed:.3f} mm3 by the servo, {gone * 0.5 ** 3:.3f} mm3 by the densities before and after")
 
 # %% The picture
-osteo.save(chart.beside(
-    osteo.snapshot(surface, view="left", width=440, height=360),
-    chart.plot([("force on the hand", t_s, force_n)], "time, s", "force, N", 460, 360)), "drilled-hole.png", force=True)
+osteo.save(
+    chart.beside(
+        osteo.snapshot(surface, view="left", width=440, height=360),
+        chart.plot([("force on the hand", t_s, force_n)], "time, s", "force, N", 460, 360),
+    ),
+    "drilled-hole.png",
+    force=True,
+)

@@ -1,9 +1,10 @@
 """Stages of Osteotome as functions on numpy arrays. Each function, its signature and its help are made from the stage's declaration.
 
-    import osteo
-    ct, labels = osteo.phantom(region="temporal", spacing_mm=1.0)
-    bone = osteo.threshold(ct, lower=500)
+import osteo
+ct, labels = osteo.phantom(region="temporal", spacing_mm=1.0)
+bone = osteo.threshold(ct, lower=500)
 """
+
 import inspect as _inspect
 import keyword as _keyword
 import os as _os
@@ -16,18 +17,36 @@ from .rehearsals import Rehearsal, Script, action_dtype, goal_dtype, goals, load
 from .sessions import Session
 from .vtk import from_vtk, to_vtk
 
-_types = {"source": "os.PathLike | str", "image": "Image", "labels": "Labels", "grid": "Grid", "surface": "Surface", "tets": "Tets",
-          "picture": "numpy.ndarray", "document": "dict"}
+_types = {
+    "source": "os.PathLike | str",
+    "image": "Image",
+    "labels": "Labels",
+    "grid": "Grid",
+    "surface": "Surface",
+    "tets": "Tets",
+    "picture": "numpy.ndarray",
+    "document": "dict",
+}
 # An .inp, .svg or .vtu that a stage makes is a text.
 _made = {**_types, "document": "dict | str"}
-_params = {"flag": "bool", "int": "int", "number": "float", "text": "str", "triple": "Sequence[float]", "list": "Sequence[int]", "choice": "str"}
+_params = {
+    "flag": "bool",
+    "int": "int",
+    "number": "float",
+    "text": "str",
+    "triple": "Sequence[float]",
+    "list": "Sequence[int]",
+    "choice": "str",
+}
 
 
 _old_stages, _old_fields = _osteo.old_names()
 
 
 def _renamed(old, current):
-    _warnings.warn(f"{old} is now called {current}; the old name is accepted until version 0.3", DeprecationWarning, stacklevel=3)
+    _warnings.warn(
+        f"{old} is now called {current}; the old name is accepted until version 0.3", DeprecationWarning, stacklevel=3
+    )
 
 
 def _identifier(name):
@@ -46,8 +65,15 @@ def _output_type(port):
 
 def _signature(stage):
     P = _inspect.Parameter
-    ports = [P(_identifier(p["name"]), P.POSITIONAL_OR_KEYWORD, default=None if p["optional"] else P.empty, annotation=_input_type(p))
-             for p in stage["inputs"]]
+    ports = [
+        P(
+            _identifier(p["name"]),
+            P.POSITIONAL_OR_KEYWORD,
+            default=None if p["optional"] else P.empty,
+            annotation=_input_type(p),
+        )
+        for p in stage["inputs"]
+    ]
     taken = {p.name for p in ports} | {"threads", "seed", "report"}
     # A port and a parameter of one name: the parameter gets an underscore.
     names = {}
@@ -58,11 +84,16 @@ def _signature(stage):
         taken.add(name)
         names[name] = f
     fields = [P(name, P.KEYWORD_ONLY, default=f["default"], annotation=_params[f["kind"]]) for name, f in names.items()]
-    common = [P("threads", P.KEYWORD_ONLY, default=0, annotation="int"), P("seed", P.KEYWORD_ONLY, default=1, annotation="int"),
-              P("report", P.KEYWORD_ONLY, default=None, annotation="dict | None")]
+    common = [
+        P("threads", P.KEYWORD_ONLY, default=0, annotation="int"),
+        P("seed", P.KEYWORD_ONLY, default=1, annotation="int"),
+        P("report", P.KEYWORD_ONLY, default=None, annotation="dict | None"),
+    ]
     outputs = [_output_type(p) for p in stage["outputs"]]
     returns = outputs[0] if len(outputs) == 1 else f"tuple[{', '.join(outputs)}]"
-    return _inspect.Signature(ports + fields + common, return_annotation=returns), {n: f["name"] for n, f in names.items()}
+    return _inspect.Signature(ports + fields + common, return_annotation=returns), {
+        n: f["name"] for n, f in names.items()
+    }
 
 
 def _help(stage, fields):
@@ -71,12 +102,18 @@ def _help(stage, fields):
     by_name = {f["name"]: f for f in stage["fields"]}
     for name, original in fields.items():
         f = by_name[original]
-        limits = f" ({f['lo']:g} to {f['hi']:g})" if abs(f["lo"]) != float("inf") and abs(f["hi"]) != float("inf") else ""
+        limits = (
+            f" ({f['lo']:g} to {f['hi']:g})" if abs(f["lo"]) != float("inf") and abs(f["hi"]) != float("inf") else ""
+        )
         unit = f" [{f['unit']}]" if f["unit"] else ""
         choices = f" (one of {', '.join(f['choices'])})" if f["choices"] else ""
         lines.append(f"{name}: {f['help']}{unit}{limits}{choices}")
-    lines += ["threads: 0 takes all cores; the result never depends on it", "seed: for every random choice",
-              "report: a dict that is filled with what the stage measured", ""]
+    lines += [
+        "threads: 0 takes all cores; the result never depends on it",
+        "seed: for every random choice",
+        "report: a dict that is filled with what the stage measured",
+        "",
+    ]
     lines += [f"Returns {_identifier(p['name'])}: {p['help']}" for p in stage["outputs"]]
     return _osteo.python_words("\n".join(lines))
 
@@ -86,7 +123,9 @@ def _function(stage):
     name = stage["name"]
     ports = [_identifier(p["name"]) for p in stage["inputs"]]
     outputs = [_identifier(p["name"]) for p in stage["outputs"]]
-    result = _namedtuple(f"_{_identifier(name)}_result", outputs, rename=True, module=__name__) if len(outputs) > 1 else None
+    result = (
+        _namedtuple(f"_{_identifier(name)}_result", outputs, rename=True, module=__name__) if len(outputs) > 1 else None
+    )
     if result is not None:
         globals()[result.__name__] = result  # where pickle looks for it
 
@@ -96,7 +135,9 @@ def _function(stage):
             kwargs[_old_fields[old]] = kwargs.pop(old)
         given = signature.bind(*args, **kwargs).arguments
         params = {fields[k]: v for k, v in given.items() if k in fields}
-        values, measured, warned = _osteo.run(name, [given.get(p) for p in ports], params, given.get("threads", 0), given.get("seed", 1))
+        values, measured, warned = _osteo.run(
+            name, [given.get(p) for p in ports], params, given.get("threads", 0), given.get("seed", 1)
+        )
         for text in warned:
             _warnings.warn(text, stacklevel=2)
         if given.get("report") is not None:
@@ -128,8 +169,32 @@ for _stage in _osteo.declarations():
         raise ImportError(f"stage {_stage['name']} has the name of another thing in this module")
     globals()[_f.__name__] = _f
     stages.append(_f.__name__)
-__all__ = ["Error", "Field", "Grid", "Image", "Labels", "Rehearsal", "Script", "Session", "Surface", "Tets", "WrongType", "WrongValue", "action_dtype",
-           "from_vtk", "goal_dtype", "goals", "load", "load_script", "save", "stages", "tick_dtype", "to_vtk", "tools", *stages]
+__all__ = [
+    "Error",
+    "Field",
+    "Grid",
+    "Image",
+    "Labels",
+    "Rehearsal",
+    "Script",
+    "Session",
+    "Surface",
+    "Tets",
+    "WrongType",
+    "WrongValue",
+    "action_dtype",
+    "from_vtk",
+    "goal_dtype",
+    "goals",
+    "load",
+    "load_script",
+    "save",
+    "stages",
+    "tick_dtype",
+    "to_vtk",
+    "tools",
+    *stages,
+]
 
 
 def __getattr__(name):

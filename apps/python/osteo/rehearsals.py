@@ -1,4 +1,5 @@
 """The servo of a rehearsal, stepped by a script."""
+
 from __future__ import annotations
 
 import json as _json
@@ -23,7 +24,9 @@ action_dtype: _np.dtype[_t.Any] = _osteo.action_dtype()
 tools: list[str] = _osteo.tools()
 
 
-def goals(position_mm: _npt.ArrayLike, *, axis: _npt.ArrayLike = (0, 0, 1), pedal: _npt.ArrayLike = 1.0, tool: str | int = 3) -> Records:
+def goals(
+    position_mm: _npt.ArrayLike, *, axis: _npt.ArrayLike = (0, 0, 1), pedal: _npt.ArrayLike = 1.0, tool: str | int = 3
+) -> Records:
     """Goals of one hand, one for each tick.
 
     position_mm: (ticks, 3), where the tip's centre is to be, LPS
@@ -89,15 +92,28 @@ class Rehearsal:
     surface: keep the surface up (its hash is in the summary); without it is quicker
     """
 
-    def __init__(self, bone: Grid | _Path, *, hand: _t.Literal["spring", "exact"] = "spring", hands: int = 1, contact: str = "overlap",
-                 settings: _Path | dict[str, _t.Any] | None = None, out: _Path | None = None, resume: _Path | None = None,
-                 rate_hz: float = 1000, surface: bool = True, threads: int = 0) -> None:
+    def __init__(
+        self,
+        bone: Grid | _Path,
+        *,
+        hand: _t.Literal["spring", "exact"] = "spring",
+        hands: int = 1,
+        contact: str = "overlap",
+        settings: _Path | dict[str, _t.Any] | None = None,
+        out: _Path | None = None,
+        resume: _Path | None = None,
+        rate_hz: float = 1000,
+        surface: bool = True,
+        threads: int = 0,
+    ) -> None:
         if hand not in ("spring", "exact"):
             raise ValueError(f"hand is 'spring' or 'exact', not {hand!r}")
         text = {name: "" if path is None else _os.fspath(path) for name, path in (("out", out), ("resume", resume))}
         if out is not None and not text["out"]:
             raise ValueError("out is empty")
-        self._servo = _osteo.Stepped(bone, hand == "spring", hands, contact, settings, text["out"], text["resume"], rate_hz, surface, threads)
+        self._servo = _osteo.Stepped(
+            bone, hand == "spring", hands, contact, settings, text["out"], text["resume"], rate_hz, surface, threads
+        )
         self._warn()
 
     def _warn(self) -> None:
@@ -108,7 +124,9 @@ class Rehearsal:
         """A tick for each goal. Returns their records, as Session.ticks has them: force_n, removed_mm3, flags, ... Of several hands goals and
         records are (ticks, hands). actions: of osteo.action_dtype, ticks counted from the beginning of the rehearsal; one that could not be
         done is a warning, and stands in the summary. Ctrl-C ends it between two ticks."""
-        records: Records = self._servo.run(_padded(goals, goal_dtype), None if actions is None else _padded(actions, action_dtype))
+        records: Records = self._servo.run(
+            _padded(goals, goal_dtype), None if actions is None else _padded(actions, action_dtype)
+        )
         self._warn()
         return records
 

@@ -1,4 +1,5 @@
 """Recorded sessions as numpy arrays."""
+
 import os as _os
 import pathlib as _pathlib
 import typing as _t

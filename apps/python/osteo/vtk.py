@@ -1,4 +1,5 @@
 """Values as data sets of VTK's own Python module and back. Needs it: python3-vtk9 of Debian, or vtk of PyPI."""
+
 from __future__ import annotations
 
 import typing as _t
@@ -13,6 +14,7 @@ if _t.TYPE_CHECKING:
 
 def _modules() -> tuple[_t.Any, _t.Any]:
     from vtkmodules import vtkCommonCore, vtkCommonDataModel  # type: ignore[import-untyped,import-not-found,unused-ignore]
+
     return vtkCommonCore, vtkCommonDataModel
 
 
@@ -21,7 +23,9 @@ def _array(core: _t.Any, kind: str, values: _t.Any, components: int, name: str) 
     array.SetName(name)
     array.SetNumberOfComponents(components)
     array.SetVoidArray(values, values.size, 1)  # 1: VTK does not free it
-    array._shared = values  # what it lies in lives as long as this object of Python, which VTK keeps as long as the array
+    array._shared = (
+        values  # what it lies in lives as long as this object of Python, which VTK keeps as long as the array
+    )
     return array
 
 
@@ -42,7 +46,10 @@ def to_vtk(value: Image | Labels | Field | Surface) -> _t.Any:
             begins = _np.arange(0, 3 * len(triangles) + 1, 3, dtype=_np.int32)
             cells = model.vtkCellArray()
             corners = triangles.view(_np.int32).reshape(-1)
-            cells.SetData(_array(core, "vtkTypeInt32Array", begins, 1, "begins"), _array(core, "vtkTypeInt32Array", corners, 1, "corners"))
+            cells.SetData(
+                _array(core, "vtkTypeInt32Array", begins, 1, "begins"),
+                _array(core, "vtkTypeInt32Array", corners, 1, "corners"),
+            )
             # Cells make arrays of their own around the same memory.
             cells.GetOffsetsArray()._shared = begins
             cells.GetConnectivityArray()._shared = corners
@@ -51,8 +58,10 @@ def to_vtk(value: Image | Labels | Field | Surface) -> _t.Any:
             poly.GetPointData().SetNormals(_array(core, "vtkFloatArray", normals, 3, "normals"))
         return poly
     if not isinstance(value, (_osteo.Image, _osteo.Labels, _osteo.Field)):
-        raise TypeError(f"to_vtk takes an Image, Labels, a Field or a Surface, not {type(value).__name__}" +
-                        ("; dense() makes a Field of it" if isinstance(value, _osteo.Grid) else ""))
+        raise TypeError(
+            f"to_vtk takes an Image, Labels, a Field or a Surface, not {type(value).__name__}"
+            + ("; dense() makes a Field of it" if isinstance(value, _osteo.Grid) else "")
+        )
     voxels = _osteo.shared_with_vtk(value)
     kind = {"int16": "vtkShortArray", "uint8": "vtkUnsignedCharArray", "float32": "vtkFloatArray"}[str(voxels.dtype)]
     image = model.vtkImageData()
@@ -66,9 +75,11 @@ def to_vtk(value: Image | Labels | Field | Surface) -> _t.Any:
 
 def from_vtk(data: _t.Any) -> Image | Labels | Field | Surface:
     """Of vtkImageData with scalars of short, unsigned char or float an Image, Labels or a Field, whose voxels are VTK's own; of vtkPolyData with
-    triangles a Surface, copied. Other scalars and cells are refused: vtkImageCast, vtkTriangleFilter and vtkCleanPolyData make these of them."""
+    triangles a Surface, copied. Other scalars and cells are refused: vtkImageCast, vtkTriangleFilter and vtkCleanPolyData make these of them.
+    """
     _, model = _modules()
     from vtkmodules.util import numpy_support  # type: ignore[import-untyped,import-not-found,unused-ignore]
+
     if isinstance(data, model.vtkImageData):
         scalars = data.GetPointData().GetScalars()
         if scalars is None or scalars.GetNumberOfComponents() != 1:
@@ -86,7 +97,9 @@ def from_vtk(data: _t.Any) -> Image | Labels | Field | Surface:
     if isinstance(data, model.vtkPolyData):
         polys = data.GetPolys()
         if data.GetNumberOfStrips() or data.GetNumberOfLines() or data.GetNumberOfVerts():
-            raise ValueError("the data set has strips, lines or points beside its polygons; vtkTriangleFilter leaves triangles alone")
+            raise ValueError(
+                "the data set has strips, lines or points beside its polygons; vtkTriangleFilter leaves triangles alone"
+            )
         corners = numpy_support.vtk_to_numpy(polys.GetConnectivityArray())
         begins = numpy_support.vtk_to_numpy(polys.GetOffsetsArray())
         if len(begins) > 1 and not (_np.diff(begins) == 3).all():
@@ -96,7 +109,12 @@ def from_vtk(data: _t.Any) -> Image | Labels | Field | Surface:
         points = numpy_support.vtk_to_numpy(data.GetPoints().GetData())
         normals = data.GetPointData().GetNormals()
         contiguous = _np.ascontiguousarray
-        return _t.cast("Surface", _osteo.Surface(
-            contiguous(points, dtype=_np.float32), contiguous(corners.reshape(-1, 3), dtype=_np.uint32),
-            None if normals is None else contiguous(numpy_support.vtk_to_numpy(normals), dtype=_np.float32)))
+        return _t.cast(
+            "Surface",
+            _osteo.Surface(
+                contiguous(points, dtype=_np.float32),
+                contiguous(corners.reshape(-1, 3), dtype=_np.uint32),
+                None if normals is None else contiguous(numpy_support.vtk_to_numpy(normals), dtype=_np.float32),
+            ),
+        )
     raise TypeError(f"from_vtk takes vtkImageData or vtkPolyData, not {type(data).__name__}")

@@ -6,8 +6,14 @@ from pydicom import dcmread
 from pydicom.dataset import Dataset
 from pydicom.encaps import encapsulate
 from pydicom.sequence import Sequence
-from pydicom.uid import (DeflatedExplicitVRLittleEndian, ExplicitVRBigEndian, JPEG2000Lossless, JPEGLSLossless, RLELossless,
-                         SecondaryCaptureImageStorage)
+from pydicom.uid import (
+    DeflatedExplicitVRLittleEndian,
+    ExplicitVRBigEndian,
+    JPEG2000Lossless,
+    JPEGLSLossless,
+    RLELossless,
+    SecondaryCaptureImageStorage,
+)
 from series import COUNT, ORIGIN, Slice, another, enhanced, move, of_folder, say_place, slices, store, twin, write
 
 VOLUME, REFUSE, EITHER = "volume", "refuse", "either"
@@ -18,18 +24,28 @@ class Case:
     leaves something out or fills something in. `want`: whether a volume, a refusal, or either is right."""
 
     def __init__(self, number, name, want, fill, volumes=(), word=False, nested=False):
-        self.number, self.name, self.want, self.fill, self.volumes, self.word = number, name, want, fill, list(volumes), word
+        self.number, self.name, self.want, self.fill, self.volumes, self.word = (
+            number,
+            name,
+            want,
+            fill,
+            list(volumes),
+            word,
+        )
         self.nested = nested  # the later volumes are parts of the first
 
 
 def plain(parts, syntax=None):
     def fill(folder):
-        for i, s in enumerate(parts): write(s.d, folder / f"{i:03}.dcm", *([syntax] if syntax else []))
+        for i, s in enumerate(parts):
+            write(s.d, folder / f"{i:03}.dcm", *([syntax] if syntax else []))
+
     return fill
 
 
 def encoded(parts, uid, encode):
     """Pixels by `encode`. pydicom does not write the name of each of these transfer syntaxes: RLE's stands in until the end."""
+
     def fill(folder):
         for i, s in enumerate(parts):
             write(s.d, folder / f"{i:03}.dcm")
@@ -39,10 +55,13 @@ def encoded(parts, uid, encode):
             d.file_meta.TransferSyntaxUID = RLELossless
             d.save_as(folder / f"{i:03}.dcm")
             b = (folder / f"{i:03}.dcm").read_bytes()
-            old, new = (bytes([2, 0, 16, 0]) + b"UI" + len(v).to_bytes(2, "little") + v
-                        for v in (RLELossless.encode() + b"\0", uid.encode() + b"\0" * (len(uid) % 2)))
+            old, new = (
+                bytes([2, 0, 16, 0]) + b"UI" + len(v).to_bytes(2, "little") + v
+                for v in (RLELossless.encode() + b"\0", uid.encode() + b"\0" * (len(uid) % 2))
+            )
             length = int.from_bytes(b[140:144], "little") + len(new) - len(old)
             (folder / f"{i:03}.dcm").write_bytes(b[:140] + length.to_bytes(4, "little") + b[144:].replace(old, new, 1))
+
     return fill
 
 
@@ -53,11 +72,15 @@ def deflate(pixels):
 
 def made(hu):
     """All cases that are made from one straight series."""
-    def base(count=COUNT): return slices(hu, count)
+
+    def base(count=COUNT):
+        return slices(hu, count)
+
     rng = np.random.default_rng(1)
 
     def lean(parts, gap, tangent):
-        for k, s in enumerate(parts): move(s, y=tangent * gap * k, z=ORIGIN[2] + gap * k)
+        for k, s in enumerate(parts):
+            move(s, y=tangent * gap * k, z=ORIGIN[2] + gap * k)
         return parts
 
     # 2 to 24, where they do not need the real files.
@@ -74,11 +97,16 @@ def made(hu):
     s = [p for k, p in enumerate(base()) if not 8 <= k < 13]
     yield Case(7, "five slices missing together", EITHER, plain(s), [s], word=True)
     s = base(4)
-    for p in s: move(p, z=ORIGIN[2])
+    for p in s:
+        move(p, z=ORIGIN[2])
     yield Case(8, "four slices at one place", REFUSE, plain(s))
     s = base()
     for p in s[16:]:
-        p.row, p.column, p.position = np.array([0, 1.0, 0]), np.array([0, 0, -1.0]), p.position * [0, 1, 0] + [float(p.position[2]), 0, 60]
+        p.row, p.column, p.position = (
+            np.array([0, 1.0, 0]),
+            np.array([0, 0, -1.0]),
+            p.position * [0, 1, 0] + [float(p.position[2]), 0, 60],
+        )
         say_place(p)
     yield Case(9, "two orientations in one series", EITHER, plain(s), [s[:16], s[16:]], word=True)
     s = base()
@@ -98,7 +126,8 @@ def made(hu):
     s = base()
     yield Case(12, "the same file twice", EITHER, plain(s + [copy.deepcopy(s[10])]), [s])
     s = base()
-    for p in s: p.d.InstanceNumber = 1
+    for p in s:
+        p.d.InstanceNumber = 1
     yield Case(13, "all slices of one number", VOLUME, plain(s), [s])
     s = base()
     del s[8].d.ImagePositionPatient
@@ -109,6 +138,7 @@ def made(hu):
         plain(s)(folder)
         f = folder / "008.dcm"
         f.write_bytes(f.read_bytes()[:-60000])
+
     yield Case(15, "one file cut short", EITHER, cut, [s[:8] + s[9:]], word=True)
     s = base()
     p = s[8]
@@ -127,21 +157,34 @@ def made(hu):
         write(p.d, folder / "scout.dcm")
         (folder / "readme.txt").write_text("notes")
         (folder / "DICOMDIR").write_bytes(b"\0" * 128 + b"DICM" + b"\2\0\0\0UL\4\0\0\0\0\0")
+
     yield Case(17, "localizer, DICOMDIR and text in the folder", VOLUME, litter, [s])
-    for n, name, syntax in ((18, "deflated", DeflatedExplicitVRLittleEndian), (20, "JPEG 2000", JPEG2000Lossless), (20, "RLE", RLELossless)):
+    for n, name, syntax in (
+        (18, "deflated", DeflatedExplicitVRLittleEndian),
+        (20, "JPEG 2000", JPEG2000Lossless),
+        (20, "RLE", RLELossless),
+    ):
         s = base(12)
         yield Case(n, name, VOLUME, plain(s, syntax), [s])
-    for name, uid, encode in (("HTJ2K", "4.201", imagecodecs.htj2k_encode), ("HTJ2K, by resolution", "4.202", imagecodecs.htj2k_encode),
-                              ("JPEG XL", "4.110", lambda a: imagecodecs.jpegxl_encode(a, lossless=True)),
-                              ("each picture deflated", "8.1", deflate), ("uncompressed, encapsulated", "1.98", lambda a: a.tobytes())):
+    for name, uid, encode in (
+        ("HTJ2K", "4.201", imagecodecs.htj2k_encode),
+        ("HTJ2K, by resolution", "4.202", imagecodecs.htj2k_encode),
+        ("JPEG XL", "4.110", lambda a: imagecodecs.jpegxl_encode(a, lossless=True)),
+        ("each picture deflated", "8.1", deflate),
+        ("uncompressed, encapsulated", "1.98", lambda a: a.tobytes()),
+    ):
         s = base(12)
-        for p in s: store(p, p.hu + 1024, 16, 16, 0, -1024)
+        for p in s:
+            store(p, p.hu + 1024, 16, 16, 0, -1024)
         yield Case(72, name, VOLUME, encoded(s, "1.2.840.10008.1.2." + uid, encode), [s])
     s = base(12)
-    for p in s: store(p, p.hu, 16, 15, 1, 0)
+    for p in s:
+        store(p, p.hu, 16, 15, 1, 0)
     yield Case(19, "JPEG-LS of signed pixels", VOLUME, plain(s, JPEGLSLossless), [s])
     s = base()
-    yield Case(21, "enhanced multi-frame CT", VOLUME, lambda f, s=s: write(enhanced(s, range(len(s))), f / "e.dcm"), [s])
+    yield Case(
+        21, "enhanced multi-frame CT", VOLUME, lambda f, s=s: write(enhanced(s, range(len(s))), f / "e.dcm"), [s]
+    )
     s = base()
     for p in s:
         p.measured[:4] = False
@@ -156,11 +199,13 @@ def made(hu):
         for i, p in enumerate(s):
             d = copy.deepcopy(p.d)
             d.save_as(folder / f"{i:03}.dcm", implicit_vr=True, little_endian=True)
+
     yield Case(24, "without preamble and meta header", VOLUME, bare, [s])
 
     # 25 to 41.
     s = base()
-    for p in s: store(p, p.hu & 0xFFF, 12, 11, 1, 0)
+    for p in s:
+        store(p, p.hu & 0xFFF, 12, 11, 1, 0)
     yield Case(25, "signed 12-bit pixels, sign not extended", VOLUME, plain(s), [s])
     s = base()
     for p in s:
@@ -169,24 +214,33 @@ def made(hu):
         p.air = ~p.measured
     yield Case(25, "padding that its 12 bits do not hold", VOLUME, plain(s), [s])
     s = base()
-    for p in s: store(p, (p.hu + 1024) | (rng.integers(0, 16, p.hu.shape) << 12), 12, 11)
+    for p in s:
+        store(p, (p.hu + 1024) | (rng.integers(0, 16, p.hu.shape) << 12), 12, 11)
     yield Case(26, "rubbish above HighBit", VOLUME, plain(s), [s])
     s = base()
-    for p in s: store(p, (p.hu + 1024) << 4, 12, 15)
+    for p in s:
+        store(p, (p.hu + 1024) << 4, 12, 15)
     yield Case(26, "pixels in the upper 12 bits of their words", VOLUME, plain(s), [s])
-    for name, tags in (("patients", {"PatientID": "OTHER", "PatientName": "Other^One"}), ("studies", {"StudyInstanceUID": "1.2.3.99"}),
-                       ("frames of reference", {"FrameOfReferenceUID": "1.2.3.98"})):
+    for name, tags in (
+        ("patients", {"PatientID": "OTHER", "PatientName": "Other^One"}),
+        ("studies", {"StudyInstanceUID": "1.2.3.99"}),
+        ("frames of reference", {"FrameOfReferenceUID": "1.2.3.98"}),
+    ):
         s = base()
-        for p in s[12:]: another(p, **tags)
+        for p in s[12:]:
+            another(p, **tags)
         yield Case(27, f"two {name} under one series UID", EITHER, plain(s), [s[:12], s[12:]], word=True)
     s = base()
-    for p in s: store(p, p.hu + 1024, intercept=0)
+    for p in s:
+        store(p, p.hu + 1024, intercept=0)
     yield Case(28, "no rescale intercept: 1024 HU too high", REFUSE, plain(s))
     s = base()
-    for p in s: p.d.ImageType, p.d.SliceThickness = ["DERIVED", "SECONDARY", "MIP"], 10
+    for p in s:
+        p.d.ImageType, p.d.SliceThickness = ["DERIVED", "SECONDARY", "MIP"], 10
     yield Case(29, "maximum-intensity slabs", REFUSE, plain(s))
     s = base()
-    for p in s: p.d.RescaleType = "Z_EFF"
+    for p in s:
+        p.d.RescaleType = "Z_EFF"
     yield Case(30, "effective atomic numbers", REFUSE, plain(s))
     s = base()
     for p in s:
@@ -220,14 +274,22 @@ def made(hu):
     yield Case(43, "two acquisitions that overlap in six slices", EITHER, plain(a + b), [a, b], word=True)
     s = base()
     order = rng.permutation(len(s)).tolist()
-    yield Case(44, "enhanced CT, frames shuffled", VOLUME, lambda f, s=s, o=order: write(enhanced(s, o), f / "e.dcm"), [s])
+    yield Case(
+        44, "enhanced CT, frames shuffled", VOLUME, lambda f, s=s, o=order: write(enhanced(s, o), f / "e.dcm"), [s]
+    )
     s = base()
     for k, p in enumerate(s):
         slope, intercept = 1 + 0.03125 * k, -1024 - k
         words = np.rint((p.hu - intercept) / slope).clip(0)
         p.hu = words * slope + intercept
         store(p, words, slope=slope, intercept=intercept)
-    yield Case(44, "enhanced CT, a HU scale for each frame", VOLUME, lambda f, s=s: write(enhanced(s, range(COUNT), True), f / "e.dcm"), [s])
+    yield Case(
+        44,
+        "enhanced CT, a HU scale for each frame",
+        VOLUME,
+        lambda f, s=s: write(enhanced(s, range(COUNT), True), f / "e.dcm"),
+        [s],
+    )
     s = base()
     p = s[8]
     p.pixel = p.pixel * 1.01
@@ -235,13 +297,16 @@ def made(hu):
     yield Case(45, "one slice with another pixel spacing", EITHER, plain(s), [s[:8] + s[9:]], word=True)
     for name, spacing in (("zero", [0, 0]), ("negative", [-0.9, 0.9])):
         s = base()
-        for p in s: p.d.PixelSpacing = spacing
+        for p in s:
+            p.d.PixelSpacing = spacing
         yield Case(46, f"pixel spacing {name}", REFUSE, plain(s))
     s = base()
-    for p in s: p.d.SpacingBetweenSlices, p.d.SliceThickness = -2.5, 5
+    for p in s:
+        p.d.SpacingBetweenSlices, p.d.SliceThickness = -2.5, 5
     yield Case(47, "SpacingBetweenSlices -2.5, thickness 5, positions 1 mm", VOLUME, plain(s), [s])
     s = base()
-    for p in s: p.d.ImagerPixelSpacing = [1.8, 1.8]
+    for p in s:
+        p.d.ImagerPixelSpacing = [1.8, 1.8]
     yield Case(48, "ImagerPixelSpacing twice the PixelSpacing", VOLUME, plain(s), [s])
     s = base()
     for p in s:
@@ -255,34 +320,48 @@ def made(hu):
         store(p, words, 10, slope=4)
     yield Case(49, "10 bits stored, slope 4", VOLUME, plain(s), [s])
     s = base()
-    for p in s: store(p, p.hu + 1024, 12)
+    for p in s:
+        store(p, p.hu + 1024, 12)
     yield Case(50, "big-endian, 12 bits", VOLUME, plain(s, ExplicitVRBigEndian), [s])
     s = base()
     for k, p in enumerate(s):
-        if k % 2: store(p, p.hu, 16, 15, 1, 0)
+        if k % 2:
+            store(p, p.hu, 16, 15, 1, 0)
     yield Case(51, "signed and unsigned slices in turn", VOLUME, plain(s), [s])
     s = base()
 
     def mixed(folder, s=s):
         for i, p in enumerate(s):
-            write(p.d, folder / f"{i:03}.dcm", *([JPEG2000Lossless] if i % 3 == 0 else [RLELossless] if i % 3 == 1 else []))
+            write(
+                p.d,
+                folder / f"{i:03}.dcm",
+                *([JPEG2000Lossless] if i % 3 == 0 else [RLELossless] if i % 3 == 1 else []),
+            )
+
     yield Case(52, "three encodings in one series", VOLUME, mixed, [s])
-    for n, name, tags in ((53, "two temporal positions (4D)", {"TemporalPositionIdentifier": 2}), (54, "dual energy, 80 and 140 kV", {"KVP": 140}),
-                          (55, "two phases of one series, no tag tells them apart", {})):
+    for n, name, tags in (
+        (53, "two temporal positions (4D)", {"TemporalPositionIdentifier": 2}),
+        (54, "dual energy, 80 and 140 kV", {"KVP": 140}),
+        (55, "two phases of one series, no tag tells them apart", {}),
+    ):
         a, b = base(), base()
         for k, p in enumerate(a):
-            if n == 53: p.d.TemporalPositionIdentifier = 1
-            if n == 54: p.d.KVP = 80
+            if n == 53:
+                p.d.TemporalPositionIdentifier = 1
+            if n == 54:
+                p.d.KVP = 80
         for k, p in enumerate(b):
             p.hu = np.where(p.hu > 200, p.hu - 150, p.hu)
             another(p, InstanceNumber=COUNT + k + 1, **tags)
             store(p)
         yield Case(n, name, EITHER if n != 55 else REFUSE, plain(a + b), [a, b], word=True)
     s = base()
-    for p in s: store(p, 1024 - p.hu, intercept=1024, slope=-1)
+    for p in s:
+        store(p, 1024 - p.hu, intercept=1024, slope=-1)
     yield Case(56, "negative slope that turns the values right", EITHER, plain(s), [s])
     s = base()
-    for p in s: p.d.RescaleSlope = -1
+    for p in s:
+        p.d.RescaleSlope = -1
     yield Case(56, "slope of the wrong sign", REFUSE, plain(s))
     s = base()
     scout = slices(hu, 1)[0]
@@ -297,14 +376,17 @@ def made(hu):
         p = slices(hu, 1)[0]
         d = p.d
         another(p, SOPClassUID=SecondaryCaptureImageStorage, InstanceNumber=99, ImageType=["DERIVED", "SECONDARY"])
-        for tag in ("ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing"): delattr(d, tag)
+        for tag in ("ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing"):
+            delattr(d, tag)
         d.SamplesPerPixel, d.PhotometricInterpretation, d.PlanarConfiguration = 3, "RGB", 0
         d.BitsAllocated, d.BitsStored, d.HighBit = 8, 8, 7
         d.PixelData = bytes(d.Rows * d.Columns * 3)
         write(d, folder / "shot.dcm")
+
     yield Case(58, "a screen shot in colour in the series", VOLUME, shot, [s])
     s = base()
-    for p in s: p.d.PhotometricInterpretation = "PALETTE COLOR"
+    for p in s:
+        p.d.PhotometricInterpretation = "PALETTE COLOR"
     for p in s:
         for part in ("Red", "Green", "Blue"):
             setattr(p.d, f"{part}PaletteColorLookupTableDescriptor", [256, 0, 8])
@@ -335,7 +417,8 @@ def made(hu):
         say_place(p)
     yield Case(62, "sagittal slices", VOLUME, plain(s), [s])
     s = base()
-    for k, p in enumerate(s): p.d.InstanceNumber = int(rng.integers(1, 1000))
+    for k, p in enumerate(s):
+        p.d.InstanceNumber = int(rng.integers(1, 1000))
     shuffled = [s[i] for i in rng.permutation(COUNT)]
     yield Case(63, "files and numbers in no order", VOLUME, plain(shuffled), [s])
     s = base()
@@ -346,21 +429,35 @@ def made(hu):
             del d.PixelData
             d.FloatPixelData = np.asarray(p.hu, np.float32).tobytes()
             d.BitsAllocated, d.RescaleIntercept = 32, 0
-            for tag in ("BitsStored", "HighBit", "PixelRepresentation"): delattr(d, tag)
+            for tag in ("BitsStored", "HighBit", "PixelRepresentation"):
+                delattr(d, tag)
             write(d, folder / f"{i:03}.dcm")
+
     yield Case(64, "pixels as floating-point numbers", EITHER, float_pixels, [s])
     s = base()
-    for p in s: store(p, p.hu, 32, 31, 1, 0, allocated=32)
+    for p in s:
+        store(p, p.hu, 32, 31, 1, 0, allocated=32)
     yield Case(65, "32 bits a pixel, signed", EITHER, plain(s), [s])
     s = base()
-    for k, p in enumerate(s): p.d.SeriesInstanceUID += f".{k % 2 + 1}"
-    yield Case(66, "one scan written as two series, slices in turn", EITHER, plain(s), [s, s[::2], s[1::2]], word=True, nested=True)
+    for k, p in enumerate(s):
+        p.d.SeriesInstanceUID += f".{k % 2 + 1}"
+    yield Case(
+        66,
+        "one scan written as two series, slices in turn",
+        EITHER,
+        plain(s),
+        [s, s[::2], s[1::2]],
+        word=True,
+        nested=True,
+    )
     s = base()
     a, b = s[:12], s[12:]
-    for k, p in enumerate(b): move(p, z=ORIGIN[2] + 12 + 0.5 * k)
+    for k, p in enumerate(b):
+        move(p, z=ORIGIN[2] + 12 + 0.5 * k)
     yield Case(67, "1 mm below, 0.5 mm above", VOLUME, plain(s), [s])
     s = base()
-    for p in s: p.d.ImageOrientationPatient = [1, 0, 0, 1, 0, 0]
+    for p in s:
+        p.d.ImageOrientationPatient = [1, 0, 0, 1, 0, 0]
     yield Case(68, "axes that are one line", REFUSE, plain(s))
     a, b = base(), base(6)
     for k, p in enumerate(b):
@@ -394,11 +491,21 @@ def made(hu):
 
 def real(data):
     """The cases that are real files."""
-    def whole(folder): return lambda to: shutil.copytree(folder, to, dirs_exist_ok=True)
-    head, phantom, odd = data / "dicom_ct_head_tilt_gaps", data / "dicom_ct_skull_phantom" / "S21610" / "S2010", data / "dicom_hard_geometry"
+
+    def whole(folder):
+        return lambda to: shutil.copytree(folder, to, dirs_exist_ok=True)
+
+    head, phantom, odd = (
+        data / "dicom_ct_head_tilt_gaps",
+        data / "dicom_ct_skull_phantom" / "S21610" / "S2010",
+        data / "dicom_hard_geometry",
+    )
     if head.exists():
-        yield Case(1, "real head: tilt 18.5 degrees, 4.0 / 1.08 / 7.0 mm", VOLUME, whole(head), [of_folder(head)], word=True)
-    if phantom.exists(): yield Case(3, "real tilt, index files in the folder", VOLUME, whole(phantom), [of_folder(phantom)])
+        yield Case(
+            1, "real head: tilt 18.5 degrees, 4.0 / 1.08 / 7.0 mm", VOLUME, whole(head), [of_folder(head)], word=True
+        )
+    if phantom.exists():
+        yield Case(3, "real tilt, index files in the folder", VOLUME, whole(phantom), [of_folder(phantom)])
 
 
 def all_cases(hu, data):

@@ -56,7 +56,7 @@ def slice_is_right(volume, s, gap):
     edge[~s.measured] = 0
     edge[[0, 1, -2, -1]] = edge[:, [0, 1, -2, -1]] = 0
     many = min(3000, edge.size // 8)
-    strong = np.argsort(edge.ravel())[-6 * many:]
+    strong = np.argsort(edge.ravel())[-6 * many :]
     inner = np.flatnonzero(s.measured.ravel())
     at = np.unique(np.concatenate([rng.choice(strong, many, False), rng.choice(inner, min(many, len(inner)), False)]))
     j, i = np.divmod(at, columns)
@@ -64,16 +64,22 @@ def slice_is_right(volume, s, gap):
     true = s.hu.ravel()[at].astype(float)
     if hasattr(s, "air"):
         b, a = np.divmod(rng.choice(np.flatnonzero(s.air.ravel()), 200), columns)
-        outside = volume.sample(volume.index_of(s.position + np.outer(a * s.pixel[0], s.row) + np.outer(b * s.pixel[1], s.column)))
+        outside = volume.sample(
+            volume.index_of(s.position + np.outer(a * s.pixel[0], s.row) + np.outer(b * s.pixel[1], s.column))
+        )
         # What a resampled volume does not cover is air to whoever looks at it.
-        if np.nanmin(outside, initial=-1024) < -1100 or np.nanmax(outside, initial=-1024) > -900: return False
+        if np.nanmin(outside, initial=-1024) < -1100 or np.nanmax(outside, initial=-1024) > -900:
+            return False
     index = volume.index_of(points)
-    if not np.all(np.isfinite(index)): return False
+    if not np.all(np.isfinite(index)):
+        return False
     if np.abs(index - np.rint(index)).max() < 0.02:
         k = np.rint(index).astype(int)
-        if np.any(k < 0) or np.any(k >= np.array(volume.values.shape[::-1])): return False
+        if np.any(k < 0) or np.any(k >= np.array(volume.values.shape[::-1])):
+            return False
         found = volume.values[k[:, 2], k[:, 1], k[:, 0]]
-        if np.abs(found - true)[s.measured.ravel()[at]].max() <= 0.51: return True
+        if np.abs(found - true)[s.measured.ravel()[at]].max() <= 0.51:
+            return True
 
     def off(shift):
         found = volume.sample(volume.index_of(points + shift))
@@ -82,16 +88,19 @@ def slice_is_right(volume, s, gap):
 
     normal = np.cross(s.row, s.column)
     here, found = off(0)
-    if not np.isfinite(here): return False
+    if not np.isfinite(here):
+        return False
     for axis, step in ((s.row, s.pixel[0]), (s.column, s.pixel[1]), (normal, min(gap, 1.0))):
-        if min(off(axis * step / 2)[0], off(axis * -step / 2)[0]) < here: return False
+        if min(off(axis * step / 2)[0], off(axis * -step / 2)[0]) < here:
+            return False
     keep = np.isfinite(found)
     slope, level = np.polyfit(found[keep], true[keep], 1) if np.ptp(found[keep]) > 0 else (0, 0)
     return bool(abs(slope - 1) < 0.1 and abs(np.mean(found[keep] - true[keep])) < 12)
 
 
 def is_right(volume, truth):
-    if not np.all(np.isfinite(volume.inverse)): return False
+    if not np.all(np.isfinite(volume.inverse)):
+        return False
     along = np.sort([s.position @ np.cross(s.row, s.column) for s in truth])
     gap = np.min(np.diff(along)) if len(along) > 1 else 1.0
     return all(slice_is_right(volume, s, gap) for s in truth)
@@ -99,12 +108,15 @@ def is_right(volume, truth):
 
 def judge(case, result):
     volumes, told = result
-    if not volumes: return "right" if case.want in (REFUSE, EITHER) and told else "refused"
-    if case.want == REFUSE: return "told" if told else "SILENT"
+    if not volumes:
+        return "right" if case.want in (REFUSE, EITHER) and told else "refused"
+    if case.want == REFUSE:
+        return "told" if told else "SILENT"
     matches = [{n for n, truth in enumerate(case.volumes) if is_right(v, truth)} for v in volumes]
     # Both of two scans in one volume are a mixture.
     found = set().union(*(m for m in matches if len(m) == 1 or 0 in m and case.nested))
-    if found and (told or not case.word or len(found) == len(case.volumes) > 1): return "right"
+    if found and (told or not case.word or len(found) == len(case.volumes) > 1):
+        return "right"
     return "told" if told else "SILENT"
 
 
@@ -121,13 +133,16 @@ def said(reader, text):
 
 def nifti(files):
     import nibabel
+
     volumes = []
     for f in files:
         image = nibabel.load(f)
-        if image.get_data_dtype().names or len(image.shape) < 3: continue  # colour, or one slice
+        if image.get_data_dtype().names or len(image.shape) < 3:
+            continue  # colour, or one slice
         values = np.asarray(image.dataobj)
         values = values.reshape(*values.shape[:3], -1)
-        for t in range(values.shape[3]): volumes.append(Volume(values[..., t].transpose(2, 1, 0), TO_LPS @ image.affine))
+        for t in range(values.shape[3]):
+            volumes.append(Volume(values[..., t].transpose(2, 1, 0), TO_LPS @ image.affine))
     return volumes
 
 
@@ -199,23 +214,40 @@ def run_script(name, script):
     def run(folder, out):
         code, text = command(sys.executable, "-c", script, folder, out)
         return arrays(out), said(name, text) or code != 0
+
     return run
 
 
 def versions():
     import gdcm, SimpleITK
-    niix = re.search(r"v1\.0\.\d+", command(shutil.which("dcm2niix", path=str(pathlib.Path(sys.executable).parent)) or "dcm2niix", "-v")[1])
+
+    niix = re.search(
+        r"v1\.0\.\d+",
+        command(shutil.which("dcm2niix", path=str(pathlib.Path(sys.executable).parent)) or "dcm2niix", "-v")[1],
+    )
     vtk = re.search(r"\d+\.\d+\.\d+", command("dicomtonifti", "--version")[1])
-    return [f"dcm2niix {niix[0] if niix else ''}", f"vtk-dicom {vtk[0] if vtk else ''}", f"SimpleITK {SimpleITK.Version.VersionString()}",
-            f"GDCM {gdcm.Version.GetVersion()}"]
+    return [
+        f"dcm2niix {niix[0] if niix else ''}",
+        f"vtk-dicom {vtk[0] if vtk else ''}",
+        f"SimpleITK {SimpleITK.Version.VersionString()}",
+        f"GDCM {gdcm.Version.GetVersion()}",
+    ]
 
 
 osteo, data = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
 only = {int(a) for a in sys.argv[3:]}
 phantom = data / "dicom_ct_skull_phantom" / "S21570" / "S2030"
 hu = of_phantom(phantom) if phantom.exists() else made_up()
-readers = {"osteo": run_osteo, "dcm2niix": run_dcm2niix, "vtk-dicom": run_vtk_dicom, "SimpleITK": run_script("SimpleITK", ITK), "GDCM": run_script("GDCM", GDCM)}
-print(f"Slices: {'a real skull phantom' if phantom.exists() else 'made up (no real data at hand)'}; {', '.join(versions())}.\n")
+readers = {
+    "osteo": run_osteo,
+    "dcm2niix": run_dcm2niix,
+    "vtk-dicom": run_vtk_dicom,
+    "SimpleITK": run_script("SimpleITK", ITK),
+    "GDCM": run_script("GDCM", GDCM),
+}
+print(
+    f"Slices: {'a real skull phantom' if phantom.exists() else 'made up (no real data at hand)'}; {', '.join(versions())}.\n"
+)
 print("| # | case | " + " | ".join(readers) + " |\n|---|---|" + "---|" * len(readers), flush=True)
 count = {r: collections.Counter() for r in readers}
 total = 0
@@ -235,12 +267,15 @@ with tempfile.TemporaryDirectory(prefix="osteo-scoreboard-") as work:
 
     straight = slices(hu)
     for reader, verdict in results(Case(0, "", VOLUME, plain(straight), [straight])):
-        if verdict != "right": sys.exit(f"{reader} does not read the series that nothing is wrong with: {verdict}")
+        if verdict != "right":
+            sys.exit(f"{reader} does not read the series that nothing is wrong with: {verdict}")
     for case in all_cases(hu, data):
-        if only and case.number not in only: continue
+        if only and case.number not in only:
+            continue
         total += 1
         row = [v for _, v in results(case)]
-        for reader, verdict in zip(readers, row): count[reader][verdict] += 1
+        for reader, verdict in zip(readers, row):
+            count[reader][verdict] += 1
         print(f"| {case.number} | {case.name} | " + " | ".join(row) + " |", flush=True)
 for verdict in ("right", "told", "SILENT", "refused"):
     print(f"| | **{verdict}**, of {total} | " + " | ".join(str(count[r][verdict]) for r in readers) + " |")

@@ -20,7 +20,7 @@ def of_phantom(folder):
         except Exception:  # an index file
             continue
     found.sort(key=lambda p: p[0])
-    return [np.clip(hu[::2, ::2], -1024, 2047) for _, hu in found[len(found) // 3:][:COUNT]]
+    return [np.clip(hu[::2, ::2], -1024, 2047) for _, hu in found[len(found) // 3 :][:COUNT]]
 
 
 def made_up():
@@ -55,7 +55,13 @@ class Slice:
         d.SOPClassUID, d.SOPInstanceUID = CTImageStorage, f"{uid}.1.{k + 1}"
         d.StudyInstanceUID, d.SeriesInstanceUID, d.FrameOfReferenceUID = f"{uid}.8", f"{uid}.1", f"{uid}.9"
         d.PatientName, d.PatientID, d.PatientBirthDate, d.PatientSex = "Test^Head", "T1", "", "O"
-        d.StudyDate, d.StudyTime, d.StudyID, d.AccessionNumber, d.ReferringPhysicianName = "20200101", "120000", "1", "", ""
+        d.StudyDate, d.StudyTime, d.StudyID, d.AccessionNumber, d.ReferringPhysicianName = (
+            "20200101",
+            "120000",
+            "1",
+            "",
+            "",
+        )
         d.Modality, d.Manufacturer, d.SeriesDescription = "CT", "TEST", "head"
         d.ImageType = ["ORIGINAL", "PRIMARY", "AXIAL"]
         d.SeriesNumber, d.AcquisitionNumber, d.InstanceNumber = 1, 1, k + 1
@@ -85,19 +91,26 @@ def store(s, words=None, stored=16, high=None, signed=0, intercept=-1024, slope=
     d.PixelData = np.asarray(words).astype(np.int64).astype(kind).tobytes()
     d["PixelData"].VR = "OB" if allocated == 8 else "OW"
     d.Rows, d.Columns = s.hu.shape
-    d.BitsAllocated, d.BitsStored, d.HighBit, d.PixelRepresentation = allocated, stored, stored - 1 if high is None else high, signed
+    d.BitsAllocated, d.BitsStored, d.HighBit, d.PixelRepresentation = (
+        allocated,
+        stored,
+        stored - 1 if high is None else high,
+        signed,
+    )
     d.RescaleIntercept, d.RescaleSlope = intercept, slope
 
 
 def move(s, x=0.0, y=0.0, z=None):
     s.position = s.position + [x, y, 0]
-    if z is not None: s.position[2] = z
+    if z is not None:
+        s.position[2] = z
     say_place(s)
 
 
 def another(s, **tags):
     """Another object with some tags changed."""
-    for k, v in tags.items(): setattr(s.d, k, v)
+    for k, v in tags.items():
+        setattr(s.d, k, v)
     s.d.SOPInstanceUID = s.d.SOPInstanceUID + ".7"
 
 
@@ -131,15 +144,24 @@ def enhanced(parts, order, per_frame_scale=False):
     first = parts[0].d
     d = copy.deepcopy(first)
     d.SOPClassUID = "1.2.840.10008.5.1.4.1.1.2.1"
-    for tag in ("ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "RescaleIntercept", "RescaleSlope", "RescaleType",
-                "SliceThickness"):
-        if tag in d: delattr(d, tag)
+    for tag in (
+        "ImagePositionPatient",
+        "ImageOrientationPatient",
+        "PixelSpacing",
+        "RescaleIntercept",
+        "RescaleSlope",
+        "RescaleType",
+        "SliceThickness",
+    ):
+        if tag in d:
+            delattr(d, tag)
     d.NumberOfFrames = len(parts)
     d.PixelData = b"".join(parts[k].d.PixelData for k in order)
 
     def one(**tags):
         item = Dataset()
-        for k, v in tags.items(): setattr(item, k, v)
+        for k, v in tags.items():
+            setattr(item, k, v)
         return [item]
 
     def scale(s):
@@ -148,14 +170,16 @@ def enhanced(parts, order, per_frame_scale=False):
     shared = Dataset()
     shared.PixelMeasuresSequence = one(PixelSpacing=first.PixelSpacing, SliceThickness=1)
     shared.PlaneOrientationSequence = one(ImageOrientationPatient=first.ImageOrientationPatient)
-    if not per_frame_scale: shared.PixelValueTransformationSequence = scale(parts[0])
+    if not per_frame_scale:
+        shared.PixelValueTransformationSequence = scale(parts[0])
     d.SharedFunctionalGroupsSequence = [shared]
     frames = []
     for n, k in enumerate(order):
         f = Dataset()
         f.FrameContentSequence = one(StackID="1", InStackPositionNumber=k + 1, DimensionIndexValues=[1, k + 1])
         f.PlanePositionSequence = one(ImagePositionPatient=parts[k].d.ImagePositionPatient)
-        if per_frame_scale: f.PixelValueTransformationSequence = scale(parts[k])
+        if per_frame_scale:
+            f.PixelValueTransformationSequence = scale(parts[k])
         frames.append(f)
     d.PerFrameFunctionalGroupsSequence = frames
     return d

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A renderer of its own for 'process:': the sphere that fits the corners of the mesh. What docs/validation/ground-truth.md shows as an example."""
+
 import math
 import sys
 import time
