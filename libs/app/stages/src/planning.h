@@ -11,12 +11,12 @@ struct PlanReconstructionStage {
     visit({"target", "mirrored: the healthy side; own: the mandible as it is, where its outline is not changed"},
           p.target);
     visit({"a_mm", "place in resection plane a, in the bone", "mm"}, p.a_mm);
-    visit({"a_normal", "its normal, towards what is removed"}, p.a_normal);
+    visit({"a_normal", "normal of the first plane, towards what is removed"}, p.a_normal);
     visit({"b_mm", "place in resection plane b, in the bone", "mm"}, p.b_mm);
-    visit({"b_normal", "its normal, towards what is removed"}, p.b_normal);
-    visit({"down", "from the teeth to the lower border, roughly"}, p.down);
+    visit({"b_normal", "normal of the second plane, towards what is removed"}, p.b_normal);
+    visit({"down", "direction from the teeth to the lower border, roughly"}, p.down);
     visit({"max_segments", "largest number of segments", "", 1, 6}, p.max_segments);
-    visit({"min_length_mm", "of the shortest line along a segment", "mm", 1, 100}, p.min_length_mm);
+    visit({"min_length_mm", "shortest length of a segment, along its shortest side", "mm", 1, 100}, p.min_length_mm);
     visit({"max_contour_mm", "fewer segments are taken while the mean error is not above this", "mm", 0.1, 10},
           p.max_contour_mm);
     visit({"kerf_mm", "width of each saw cut", "mm", 0, 5}, p.kerf_mm);
