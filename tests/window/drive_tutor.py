@@ -117,7 +117,7 @@ def follow():
     def front(w):
         w.x("windowraise", w.id)
         w.x("windowfocus", "--sync", w.id)
-        w.x("mousemove", 480, 330)
+        w.x("mousemove", 560, 350)
         w.next()
 
     with Screen():

@@ -56,7 +56,7 @@ class Window(Program):
         if not case or "--review" in args:  # the start page, or one at the end: nothing ticks
             return
         wait("the first tick", lambda: self.state()["tick"] > 0)
-        self.x("mousemove", 480, 330)
+        self.x("mousemove", 560, 350)
         self.next()
 
     def next(self, pictures=2):
@@ -223,7 +223,7 @@ def keys():
         w.next()
         w.x("key", "Return")
         w.until("pinned", lambda s: s["notes"] == 1 and not s["writing"])
-        w.x("mousemove", 480, 330)
+        w.x("mousemove", 560, 350)
         w.next()
         key(
             "s",
@@ -421,7 +421,7 @@ def hand():
         seen = []
         start = w.state()
         for turn in range(6):
-            w.x("mousemove", 470, 330)
+            w.x("mousemove", 550, 350)
             w.next()
             s = w.key("f", "on the way", lambda s: s["leading"])
             began = s["tick"]

@@ -16,7 +16,7 @@ struct ConsoleWindowCommand {
   using Params = ConsoleFlags;
   static void describe(Params& p, auto& visit) { ConsoleFlags::describe(p, visit); }
   static cli::CommandInfo info() {
-    return {"console",
+    return {"nerve-console",
             "the nerve monitor's console, over the network",
             "What 'osteo nerve-console SERVER' opens.",
             {{"server", "PORT or HOST:PORT of a rehearsal that streams"}},

@@ -84,7 +84,7 @@ TEST(CutPreview, TheEndPageTellsOfACut) {
     return EndLine{};
   };
   EXPECT_EQ(line("facial nerve").value, "INJURED: cut through by the saw, 0.5 mm³ of it");
-  EXPECT_EQ(line("dura").value, "INJURED: touched by the turning burr for 1.50 s, 3.1 mm³ of it");
+  EXPECT_EQ(line("dura").value, "INJURED: touched by the rotating burr for 1.50 s, 3.1 mm³ of it");
   EXPECT_EQ(line("chorda").value, "INJURED: the shaft went through it, 1 mm³ of it");
   EXPECT_EQ(line("malleus").value, "contact with the shaft");
   EXPECT_EQ(line("malleus").nearness, Nearness::close);

@@ -23,7 +23,7 @@ void set_ui_style(int em_pixels) {
   config.OversampleH = 2;
   // ImGui's size is from the highest ascender to the lowest descender, which Noto Sans has 1.36 em apart: letters would
   // be 12 pixels. Made larger, and lines stay as far apart as they are said to be.
-  constexpr float kLarger = 1.25F;
+  constexpr float kLarger = 1.05F;
   const auto add = [&](const unsigned char* font, std::size_t bytes, float high, const ImWchar* letters) {
     // ImGui asks for a pointer to what it may own; this it does not, and does not write to.
     config.GlyphOffset.y = -std::round((kLarger - 1) * high / 2);
