@@ -367,7 +367,7 @@ TEST(Versions, FramesThatDoNotHoldWhatTheySay) {
               const std::string text = "{\"tick\":-1}\n";
               w.part(kNotesPart, text.size(), std::as_bytes(std::span(text)));
               w.end_frame(2, 0, 0);
-            }).find("note that is none"),
+            }).find("note that is not valid"),
             std::string::npos);
   EXPECT_NE(with([](auto& w) {
               const std::byte two[2]{};

@@ -411,7 +411,7 @@ TEST_F(InAFolder, EveryFaultNamesFileAndLine) {
   has(fault("ratings/R.json",
             "{\"osteotome_ratings\": 1, \"rater\": \"R\", \"ratings\": [\n{\"session\": \"X\", \"item\": \"care\", "
             "\"value\": 3}]}"),
-      "'care' is none");
+      "'care' is not one of");
   has(fault("ratings/R.json", "{\"osteotome_ratings\": 1, \"study\": \"other\", \"rater\": \"R\", \"ratings\": []}"),
       "of another study");
   has(fault("study.json", "{\"osteotome_study\": 1,\n\"groups\": [\"a\"], \"cases\": [\"c\"], \"grops\": 1}"), "grops");
