@@ -150,42 +150,39 @@ std::size_t make_movies([[maybe_unused]] const fs::path& folder, [[maybe_unused]
 #endif
 }
 
-}  // namespace
-
-int run_study_demo(const std::string& name, int resamples, double level, bool movies, cli::Invocation& io) {
-  const auto begun = std::chrono::steady_clock::now();
-  const fs::path folder = name;
-  const auto seed = static_cast<std::uint64_t>(io.common.seed);
+/// A new study in a new folder; in one of a demo that was stopped, the same study goes on.
+void begin_study(const fs::path& folder, std::uint64_t seed) {
   if (output_exists(folder) && !fs::is_empty(folder)) {
     if (!fs::exists(folder / "study.json") || !study::read_study(folder).plan.simulated)
-      throw Error(ExitCode::cannot_write, "'" + name + "' holds something that is no simulated study",
+      throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds something that is no simulated study",
                   "give another folder");
     if (study::read_study(folder).plan.seed != seed)
-      throw Error(ExitCode::usage, "the study in '" + name + "' was begun with another --seed",
+      throw Error(ExitCode::usage, "the study in '" + folder.string() + "' was begun with another --seed",
                   "give that seed, or another folder");
-  } else {
-    make_output_folder(folder.parent_path().empty() ? fs::path(".") : folder.parent_path());
-    study::Plan plan;
-    plan.title = "window into the mastoid";
-    plan.procedure = "Window into the mastoid (pipelines/procedures/mastoid-window.json)";
-    plan.groups = {"novice", "expert"};
-    plan.competent = "expert";
-    plan.cases = {kCase};
-    plan.attempts = kAttempts;
-    plan.seed = seed;
-    plan.simulated = true;
-    study::new_study(folder, plan);
+    return;
   }
-  io.context.progress(0, "the case");
-  make_case(folder, io);
+  make_output_folder(folder.parent_path().empty() ? fs::path(".") : folder.parent_path());
+  study::Plan plan;
+  plan.title = "window into the mastoid";
+  plan.procedure = "Window into the mastoid (pipelines/procedures/mastoid-window.json)";
+  plan.groups = {"novice", "expert"};
+  plan.competent = "expert";
+  plan.cases = {kCase};
+  plan.attempts = kAttempts;
+  plan.seed = seed;
+  plan.simulated = true;
+  study::new_study(folder, plan);
+}
 
+/// Sessions of the reference and of the participants, who are in the study after it.
+std::vector<Job> jobs_of(const fs::path& folder, std::uint64_t seed) {
   std::vector<Job> jobs;
   // As many others are the reference: fewer say too little of where experts drill (docs/validation/trainee.md).
   for (int n = 0; n < kExperts + kNovices; ++n) {
     const TraineeGroup group = n < kExperts ? TraineeGroup::expert : TraineeGroup::novice;
     const std::string code = (n < kExperts ? "RE" : "RN") + std::to_string(n < kExperts ? n + 1 : n + 1 - kExperts);
-    jobs.push_back({code, "", 1, group, person_skill(group, seed * 1000 + 900 + static_cast<std::uint64_t>(n)),
-                    seed * 1000 + 900 + static_cast<std::uint64_t>(n)});
+    const std::uint64_t person = seed * 1000 + 900 + static_cast<std::uint64_t>(n);
+    jobs.push_back({code, "", 1, group, person_skill(group, person), person});
   }
   const study::Study before = study::read_study(folder);
   for (int n = 0; n < kExperts + kNovices; ++n) {
@@ -201,28 +198,31 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
                       seed * 1000 + 100 + static_cast<std::uint64_t>(2 * n + attempt)});
   }
   study::make_order(folder);
+  return jobs;
+}
 
-  const TraineeScene scene = trainee_scene(folder / "case", parse_procedure(kMastoidWindow, "mastoid-window.json"),
-                                           io.context.sub(0.04, 0.06));
-  make_output_folder(folder / "sessions");
-  const auto place = [&](const Job& j) { return folder / "sessions" / j.name; };
+/// Those that are not there yet. Returns how many were drilled now.
+std::size_t drill_sessions(const std::vector<Job>& jobs, const fs::path& sessions, const TraineeScene& scene,
+                           cli::Invocation& io) {
+  make_output_folder(sessions);
   std::mutex mutex;
   std::size_t done = 0, fresh = 0;
   const auto drilling = std::chrono::steady_clock::now();
   parallel_for(jobs.size(), 1, io.common.threads, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) {
       // trainee.json is written last: a session without it was stopped half-way, and is made again.
-      const bool there = fs::exists(place(jobs[i]) / "trainee.json");
+      const fs::path place = sessions / jobs[i].name;
+      const bool there = fs::exists(place / "trainee.json");
       if (!there) {
         io.context.check_cancelled();
-        fs::remove_all(place(jobs[i]));
+        fs::remove_all(place);
         TraineeOptions o;
         o.skill = jobs[i].skill;
         o.seed = jobs[i].seed;
         o.plan.radius_mm = kWindowMm;
         // Begun together with others, in threads of its own: told of being stopped, but silent.
         (void)simulate_trainee(scene, world_of(scene.the_case, scene.anatomy), o,
-                               create_session_folder(place(jobs[i]), scene.the_case.folder, {}));
+                               create_session_folder(place, scene.the_case.folder, {}));
       }
       const std::lock_guard lock(mutex);
       ++done;
@@ -236,15 +236,18 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
                               (fresh > 0 ? ", " + time_left(left) : ""));
     }
   });
+  return fresh;
+}
 
-  // Regions and forces are held against sessions of people who do not take part.
+/// Regions and forces are held against sessions of people who do not take part.
+Reference make_reference(const std::vector<Job>& jobs, const fs::path& folder, const TraineeScene& scene) {
   Reference reference;
   Json list = Json::list();
   for (const Job& j : jobs) {
     if (!j.participant.empty()) continue;
     const ReferenceSession which{"../sessions/" + j.name, j.name,
                                  j.group == TraineeGroup::expert ? ReferenceGroup::expert : ReferenceGroup::novice};
-    reference.sessions.push_back(read_reference(SessionReader(place(j) / "stream.oss"),
+    reference.sessions.push_back(read_reference(SessionReader(folder / "sessions" / j.name / "stream.oss"),
                                                 world_of(scene.the_case, scene.anatomy), scene.anatomy.structures.get(),
                                                 which));
     list.push_back({{"session", which.session},
@@ -254,7 +257,12 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
   make_output_folder(folder / "reference");
   write_file(folder / "reference" / "reference.json",
              Json{{"osteotome_reference", 1}, {"sessions", list}}.dump(2) + "\n");
+  return reference;
+}
 
+/// Those that the study does not hold yet.
+void score_sessions(const std::vector<Job>& jobs, const fs::path& folder, const TraineeScene& scene,
+                    const Reference& reference, cli::Invocation& io) {
   std::vector<std::string> notes;
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const Job& j = jobs[i];
@@ -264,11 +272,11 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
                     [&](const study::Session& s) { return s.participant == j.participant && s.attempt == j.attempt; }))
       continue;
     io.context.progress(0.7 + 0.15 * static_cast<double>(i) / static_cast<double>(jobs.size()), "scoring " + j.name);
-    const Score score = score_session(SessionReader(place(j) / "stream.oss"), world_of(scene.the_case, scene.anatomy),
+    const fs::path place = folder / "sessions" / j.name, file = place / "metrics.json";
+    const Score score = score_session(SessionReader(place / "stream.oss"), world_of(scene.the_case, scene.anatomy),
                                       scene.anatomy.structures.get(), &scene.procedure, &reference, j.participant);
-    const fs::path file = place(j) / "metrics.json";
     Json source = *score_json(score, false).find("source");
-    source["stream"] = hash_path(place(j) / "stream.oss").substr(0, 16);
+    source["stream"] = hash_path(place / "stream.oss").substr(0, 16);
     source["scored_by"] = program_version();
     const std::string text = Json{{"source", source}, {"metrics", metrics_of(score)}}.dump(2) + "\n";
     write_file(file, text);
@@ -276,9 +284,11 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
     study::add_session(folder, j.participant, kCase, j.attempt, study::read_measurements(text, file.string(), notes),
                        {"program"}, notes);
   }
+}
 
-  // Ratings by programs that know the skill: each has a severity of its own, and errs.
-  const study::Study rated = study::read_study(folder);
+/// Forms, and ratings by programs that know the skill: each has a severity of its own, and errs.
+void rate_sessions(const std::vector<Job>& jobs, const fs::path& folder, const study::Study& rated,
+                   std::uint64_t seed) {
   make_output_folder(folder / "forms");
   make_output_folder(folder / "ratings");
   for (int r = 1; r <= 2; ++r) {
@@ -302,8 +312,26 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
                 .dump(2) +
             "\n");
   }
-  std::vector<std::string> said;
-  const std::size_t shown = movies ? make_movies(folder, rated, "SIMULATED-1", scene, io, said) : 0;
+}
+
+}  // namespace
+
+int run_study_demo(const std::string& name, int resamples, double level, bool movies, cli::Invocation& io) {
+  const auto begun = std::chrono::steady_clock::now();
+  const fs::path folder = name;
+  const auto seed = static_cast<std::uint64_t>(io.common.seed);
+  begin_study(folder, seed);
+  io.context.progress(0, "the case");
+  make_case(folder, io);
+  const std::vector<Job> jobs = jobs_of(folder, seed);
+  const TraineeScene scene = trainee_scene(folder / "case", parse_procedure(kMastoidWindow, "mastoid-window.json"),
+                                           io.context.sub(0.04, 0.06));
+  const std::size_t fresh = drill_sessions(jobs, folder / "sessions", scene, io);
+  score_sessions(jobs, folder, scene, make_reference(jobs, folder, scene), io);
+  const study::Study rated = study::read_study(folder);
+  rate_sessions(jobs, folder, rated, seed);
+  std::vector<std::string> notes;
+  const std::size_t shown = movies ? make_movies(folder, rated, "SIMULATED-1", scene, io, notes) : 0;
   io.context.progress(0.96, "analysis");
   const study::Analysis analysis = study::analyse(study::read_study(folder), {level, resamples, {}});
   write_file(folder / "report.json", analysis.json.dump(2) + "\n");
@@ -315,7 +343,7 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     io.err << "simulated study of " << kExperts + kNovices << " trainees, " << fresh << " sessions drilled in "
            << format_number(std::round(took)) << " s: " << (folder / "report.html").string() << ", .pdf and .json\n";
-    for (const std::string& word : said) io.err << word << '\n';
+    for (const std::string& note : notes) io.err << note << '\n';
     if (shown > 0)
       io.err << "raters get the folders 'forms' and 'movies' (" << shown
              << " blinded movies, 15 times as fast; --no-movies leaves them out); everything else here is the key, and "
