@@ -319,22 +319,37 @@ TEST(FirstSteps, AreTickedOffByWhatCameOfThem) {
   now.undone = true;
   list.see(now);
   now.undone = false;
-  now.sucked_mm3 = 0.01;  // a sucker that was held in the air
+  now.tilted_rad = 0.05;
   list.see(now);
   EXPECT_EQ(list.next(), 2);
+  now.retracted = true;
+  list.see(now);
+  EXPECT_EQ(list.next(), 3) << "hardly tilted";
+  now.tilted_rad = 0.2;
+  now.sucked_mm3 = 0.01;  // a sucker that was held in the air
+  list.see(now);
+  EXPECT_EQ(list.next(), 4);
   now.sucked_mm3 = 0.3;
   now.magnification = 3;
   list.see(now);
-  EXPECT_EQ(list.next(), 4);
+  EXPECT_EQ(list.next(), 6);
   now.sawn_mm3 = 3;
   list.see(now);
   list.renew();  // another session: what was done stays done, what was there counts for nothing
   now.fixtures = 1;
   list.see(now);
-  EXPECT_EQ(list.next(), 5);
+  EXPECT_EQ(list.next(), 7);
   now.fixtures = 2;
   list.see(now);
+  EXPECT_EQ(list.next(), 8);
+  now.measured_mm = 4;
+  now.pictured = true;
+  list.see(now);
+  EXPECT_EQ(list.next(), 10);
+  now.ended = true;
+  list.see(now);
   EXPECT_EQ(list.next(), -1);
+  ASSERT_EQ(list.steps().size(), 11U);
 }
 
 TEST(FirstSteps, WithoutDustNothingIsAskedOfTheSucker) {
@@ -342,10 +357,11 @@ TEST(FirstSteps, WithoutDustNothingIsAskedOfTheSucker) {
   StepFacts now;
   now.magnification = 2;
   list.see(now);
-  EXPECT_EQ(list.steps()[2].name(), "Suction");
-  EXPECT_FALSE(list.steps()[2].possible);
+  EXPECT_EQ(list.steps()[4].name(), "Suction");
+  EXPECT_FALSE(list.steps()[4].possible);
   now.removed_mm3 = 1;
-  now.undone = true;
+  now.undone = now.retracted = true;
+  now.tilted_rad = 1;
   list.see(now);
   EXPECT_EQ(list.steps()[static_cast<std::size_t>(list.next())].name(), "Zoom") << "it is passed over";
 }

@@ -219,8 +219,7 @@ std::string HandTools::how() const {
     case Tool::piece:
       return "fragments: " + key_name(Command::perform) + " separates them, drag moves one";
     case Tool::plate:
-      return "plate: " + key_name(Command::bring) + " brings it, wheel presses it on, " + key_name(Command::perform) +
-             " fixes it";
+      return "plate: a click on bone brings it there, " + key_name(Command::perform) + " fixes it";
   }
   return {};
 }

@@ -237,6 +237,7 @@ void RehearsalWindow::save_screenshot() {
   try {
     save_picture(picture, path);
     control_.say("saved " + path.filename().string());
+    room_.picture_kept();
   } catch (const Error& e) {
     control_.say(e.what());
   }

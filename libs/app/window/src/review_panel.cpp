@@ -88,7 +88,7 @@ void draw_findings(ReviewControl& control) {
     }
     ImGui::PopID();
     draw_sign(ImGui::GetWindowDrawList(), {at.x + 0.5F * e, at.y + 0.6F * e}, 0.4F * e, look.corners, look.colour);
-    ImGui::GetWindowDrawList()->AddText(ImGui::GetFont(), e, {at.x + left, at.y}, im_colour32(theme().text),
+    ImGui::GetWindowDrawList()->AddText(ImGui::GetFont(), ImGui::GetFontSize(), {at.x + left, at.y}, im_colour32(theme().text),
                                         f.text.c_str(), nullptr, wide - left);
   }
   for (const std::string& w : r.words) {
@@ -126,7 +126,7 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
                         {"bone: seen, unseen", at.y + 2 * lane, lane, 0}};
   for (const Lane& l : lanes) {
     draw->AddRectFilled({left, l.top + 1}, {left + wide, l.top + l.height - 1}, im_colour32(theme().raised));
-    fitted_text(draw, {at.x, l.top, names - 0.5F * e, l.height}, 0.85F * e, theme().quiet, l.name);
+    fitted_text(draw, {at.x, l.top, names - 0.5F * e, l.height}, kLabelEm * e, theme().quiet, l.name);
   }
   float most_mm3 = 0;
   for (std::size_t n = 0; n < course.size(); ++n)

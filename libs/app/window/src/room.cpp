@@ -1,6 +1,7 @@
 #include "room.h"
 
 #include <imgui.h>
+#include <imgui_internal.h>
 #include <imgui_stdlib.h>
 
 #include <algorithm>
@@ -44,8 +45,9 @@ void MainView::renew() {
   latched_ = {};
 }
 
-void MainView::key(int code) {
-  if (!writing_) return;
+void MainView::key(int code, int modifiers, bool repeated) {
+  palette_.key(code, modifiers);
+  if (!writing_ || repeated) return;
   const Key* const known = find_key(code);
   if (known == nullptr) return;
   if (known->command == Command::perform) note_answer_ = 1;
@@ -68,46 +70,83 @@ void MainView::answer(int answer, RehearsalControl& control) {
   if (answer > 0) control.reset();
 }
 
-bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, const std::optional<Vec3>& bone) {
-  const Command c = press.command;
+// What lies in front of the bone has the key. True: it was for that.
+bool MainView::takes_in_front(Command c, RehearsalControl& control) {
   if (asking_) {
     answer(c == Command::perform ? 1 : c == Command::put_away ? -1 : 0, control);
     return true;
   }
-  if (keys_in_panel_) {
-    keys_in_panel_ = c != Command::put_away && c != Command::panel_keys;
-    // Arrows, Space and Enter are the panel's; other keys go on.
-    if (c == Command::put_away || c == Command::panel_keys || c == Command::deeper || c == Command::back ||
-        c == Command::drill || c == Command::perform)
+  if (palette_.typing()) return true;  // pressed in the picture in which it was opened
+  if (focus_ != Focus::bone) {
+    const bool leaves = c == Command::put_away || (c == Command::panel_keys && keys_in_panel());
+    if (leaves) focus_ = Focus::bone;
+    // Arrows, Space and Enter are the focus'; other keys go on.
+    if (leaves || c == Command::deeper || c == Command::back || c == Command::drill || c == Command::perform ||
+        c == Command::earlier || c == Command::later)
       return true;
   }
-  if (wheel_.open()) {
-    const bool takes_it = c == Command::wheel || c == Command::perform;
-    if (c == Command::deeper || c == Command::back) {
-      wheel_.turn(c == Command::deeper ? 1 : -1);
-      return true;
-    }
-    wheel_.close();
-    if (takes_it && wheel_.chosen() >= 0) {
-      const WheelItem& item = wheel_items()[static_cast<std::size_t>(wheel_.chosen())];
-      const Command chosen = item.command;
-      // A burr is for the drill.
-      const bool burr = chosen != Command::saw && chosen != Command::pieces && chosen != Command::plates &&
-                        chosen != Command::put_away;
-      if (burr && control.tools().tool() != HandTools::Tool::drill) pressed_.press(Command::put_away);
-      pressed_.press(chosen, item.value);
-    }
-    return takes_it || c == Command::put_away;
+  if (!wheel_.open()) return false;
+  const bool takes_it = c == Command::wheel || c == Command::perform;
+  if (c == Command::deeper || c == Command::back) {
+    wheel_.turn(c == Command::deeper ? 1 : -1);
+    return true;
   }
+  wheel_.close();
+  if (takes_it && wheel_.chosen() >= 0) {
+    const WheelItem& item = wheel_items()[static_cast<std::size_t>(wheel_.chosen())];
+    const Command chosen = item.command;
+    // A burr is for the drill.
+    const bool burr =
+        chosen != Command::saw && chosen != Command::pieces && chosen != Command::plates && chosen != Command::put_away;
+    if (burr && control.tools().tool() != HandTools::Tool::drill) pressed_.press(Command::put_away);
+    pressed_.press(chosen, item.value);
+  }
+  return takes_it || c == Command::put_away;
+}
+
+void MainView::show_wheel() {
+  const ImVec2 m = ImGui::GetIO().MousePos;
+  const float edge = ToolWheel::kOuterEm * em();
+  const ScreenBox& v = layout_.view;
+  const bool inside = v.holds(m.x, m.y);
+  const auto kept = [&](float at, float lo, float length) {
+    return length < 2 * edge ? lo + length / 2 : std::clamp(at, lo + edge, lo + length - edge);
+  };
+  wheel_.show(inside ? kept(m.x, v.x, v.width) : v.x + v.width / 2,
+              inside ? kept(m.y, v.y, v.height) : v.y + v.height / 2);
+}
+
+// The bone, and round the parts of the window again.
+void MainView::move_focus(int by) {
+  constexpr int kParts = 5;  // the panel is opened by its own key
+  const int now = keys_in_panel() ? 0 : static_cast<int>(focus_);
+  focus_ = static_cast<Focus>((now + by + kParts) % kParts);
+  focus_moved_ = true;
+}
+
+bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, const std::optional<Vec3>& bone) {
+  const Command c = press.command;
+  if (takes_in_front(c, control)) return true;
   switch (c) {
     case Command::help:
-      help_.show(!help_.open());
+      palette_.help();
       return true;
-    case Command::earlier:
-    case Command::later:
-      if (!help_.open()) return false;
-      help_.turn(c == Command::later ? 1 : -1);
+    case Command::palette:
+      palette_.show(CommandPalette::Shown::commands);
       return true;
+    case Command::focus_next:
+      move_focus(press.shift ? -1 : 1);
+      return true;
+    case Command::irrigation:
+      if (control.rehearsal().hands() < 2) {
+        control.say("no second hand: start with --dust");
+      } else {
+        latched_.irrigation = !latched_.irrigation;
+      }
+      return true;
+    case Command::lift:
+      lifting_ = true;
+      return false;
     case Command::layout:
       wanted_ = next_layout(wanted_);
       person_.values.layout = EnumNames<Layout>::values[static_cast<std::size_t>(wanted_)];
@@ -123,22 +162,13 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       return true;
     case Command::hand_page:
     case Command::panel_keys:
-      keys_in_panel_ = true;
+      focus_ = Focus::panel;
       hand_page_ = c == Command::hand_page;
       control.say("keys move in the panel: arrows, Space; Esc gives them back");
       return true;
-    case Command::wheel: {
-      const ImVec2 m = ImGui::GetIO().MousePos;
-      const float edge = ToolWheel::kOuterEm * em();
-      const ScreenBox& v = layout_.view;
-      const bool inside = v.holds(m.x, m.y);
-      const auto kept = [&](float at, float lo, float length) {
-        return length < 2 * edge ? lo + length / 2 : std::clamp(at, lo + edge, lo + length - edge);
-      };
-      wheel_.show(inside ? kept(m.x, v.x, v.width) : v.x + v.width / 2,
-                  inside ? kept(m.y, v.y, v.height) : v.y + v.height / 2);
+    case Command::wheel:
+      show_wheel();
       return true;
-    }
     case Command::ruler:
       ruler_.turn(!ruler_.on());
       control.say(ruler_.on() ? "ruler: click two points on the bone" : "ruler put away");
@@ -157,8 +187,8 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       undone_ = true;
       return false;
     case Command::put_away:
-      if (help_.open()) {
-        help_.show(false);
+      if (palette_.shown() != CommandPalette::Shown::nothing) {
+        palette_.show(CommandPalette::Shown::nothing);
         return true;
       }
       if (ruler_.on()) {
@@ -224,14 +254,21 @@ void MainView::see(const RoomScene& scene) {
     scene.control.say("taken back");
   }
   undo_steps_ = facts.undo_steps;
+  if (lifting_ && !scene.control.leading()) {
+    lifting_ = false;
+    facts.retracted = true;
+  }
+  facts.pictured = std::exchange(pictured_, false);
+  facts.tilted_rad = scene.control.handle().tilted_rad();
+  facts.measured_mm = ruler_.length_mm().value_or(0);
   facts.magnification = scene.magnification;
   steps_.see(facts);
 }
 
 void MainView::draw(const RoomScene& scene) {
   ImGuiIO& io = ImGui::GetIO();
-  // ImGui moves its own cursor only while the keys are the panel's.
-  if (keys_in_panel_) {
+  // ImGui moves its own cursor only while the keys are a part's of the window.
+  if (focus_ != Focus::bone) {
     io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
   } else {
     io.ConfigFlags &= ~ImGuiConfigFlags_NavEnableKeyboard;
@@ -240,11 +277,11 @@ void MainView::draw(const RoomScene& scene) {
   pressed_.held.clear();
   RehearsalControl& control = scene.control;
   const HandFacts hand = hand_facts(control, scene.sound, undo_steps_);
-  draw_tray(layout_.tray, hand, keys_in_panel_, latched_, pressed_);
+  draw_tray(layout_.tray, hand, keys_in_panel(), latched_, pressed_);
   draw_state(layout_.state, layout_.view,
              state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr), control.reported(),
              pressed_);
-  if (keys_in_panel_) {
+  if (keys_in_panel()) {
     if (!ImGui::IsAnyItemActive() && !io.NavVisible) ImGui::SetNextWindowFocus();
     draw_panel(scene);
   } else {
@@ -252,7 +289,7 @@ void MainView::draw(const RoomScene& scene) {
   }
   draw_marks(scene);
   if (writing_) draw_note_field(control);
-  help_.draw(shell_.width(), shell_.height(), [&] { draw_first_steps(steps_); });
+  draw_palette(control);
   if (wheel_.open()) {
     const float e = em();
     if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0)
@@ -260,6 +297,7 @@ void MainView::draw(const RoomScene& scene) {
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) pressed_.press(Command::wheel);
     draw_wheel(wheel_);
   }
+  give_focus();
   if (asking_) {
     // As if it were a key, at the next frame: what the answer begins shows pictures of its own.
     const int said =
@@ -267,6 +305,42 @@ void MainView::draw(const RoomScene& scene) {
                       "This session is saved and ends. A new one begins with the bone of the case.", "Reset bone");
     if (said != 0) pressed_.press(said > 0 ? Command::perform : Command::put_away);
   }
+}
+
+void MainView::draw_palette(RehearsalControl& control) {
+  const ScreenBox window{0, 0, static_cast<float>(shell_.width()), static_cast<float>(shell_.height())};
+  const CommandRow* const row = palette_.draw(window, layout_.view);
+  if (row == nullptr) return;
+  if (row->command == Command::suck) {
+    if (control.rehearsal().hands() > 1)
+      latched_.suction = !latched_.suction;
+    else
+      control.say("no second hand: start with --dust");
+  } else if (!row->command || row->held) {
+    control.say(row->keys.empty() ? row->name : row->name + ": " + row->keys + (row->held ? ", held" : ""));
+  } else {
+    pressed_.presses.push_back({*row->command, row->value, row->shift});
+  }
+}
+
+// After what is drawn, so that the part is there.
+void MainView::give_focus() {
+  if (!std::exchange(focus_moved_, false)) return;
+  if (focus_ == Focus::bone) return ImGui::SetWindowFocus(nullptr);
+  const bool drill = ImGui::FindWindowByName("burr") != nullptr && ImGui::FindWindowByName("burr")->WasActive;
+  const char* const names[] = {"", "tray", drill ? "burr" : "instrument", "cuts' foot", "state"};
+  ImGuiWindow* const part = ImGui::FindWindowByName(names[static_cast<std::size_t>(focus_)]);
+  if (part == nullptr || !part->Active) return;  // no room for it
+  ImGui::FocusWindow(part);
+  ImGui::NavInitWindow(part, true);
+  GImGui->NavDisableHighlight = false;
+  GImGui->NavDisableMouseHover = true;
+}
+
+void MainView::session_ended() {
+  StepFacts facts;
+  facts.ended = true;
+  steps_.see(facts);
 }
 
 // What belongs to the instrument in hand, and what comes next for a new user.
@@ -279,7 +353,10 @@ void MainView::draw_cards(const RoomScene& scene, const HandFacts& hand) {
   } else {
     draw_tool_card(view, kTitles[hand.tool], scene.draw_tools);
   }
-  if (person_.values.first_steps && !help_.open()) person_.values.first_steps = draw_next_step(view, steps_);
+  if (!person_.values.first_steps) return;
+  const bool card = palette_.shown() == CommandPalette::Shown::ten_keys;
+  const float beside = card ? CommandPalette::card_width() + 16 * unit() : 0;
+  person_.values.first_steps = draw_next_step({view.x + beside, view.y, view.width - beside, view.height}, steps_);
 }
 
 void MainView::draw_panel(const RoomScene& scene) {
@@ -372,7 +449,7 @@ void MainView::draw_marks(const RoomScene& scene) {
     draw->AddLine({x, y}, {x, y - 2 * e}, im_colour32(palette::kYellow), e / 8);
     draw->AddRectFilled({x, y - 2 * e}, {x + 1.4F * e, y - e}, im_colour32(palette::kYellow));
     const std::string number = std::to_string(note.number);
-    draw->AddText({x + 0.35F * e, y - 2 * e}, IM_COL32(0, 0, 0, 255), number.c_str());
+    draw->AddText({x + 0.35F * e, y - 2.1F * e}, IM_COL32(0, 0, 0, 255), number.c_str());
     words(x + 1.7F * e, y - 2 * e, note.text.size() > 40 ? note.text.substr(0, 40) + "..." : note.text, theme().text);
   }
   std::vector<std::array<float, 2>> ends;

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "help_page.h"
+#include "command_palette.h"
 #include "marks.h"
 #include "osteo/app/window/person_settings.h"
 #include "osteo/app/window/sound_out.h"
@@ -56,23 +56,32 @@ class MainView {
   [[nodiscard]] const RoomLayout& layout() const { return layout_; }
   [[nodiscard]] Layout wanted() const { return wanted_; }
   /// Mouse and keys are for something in front of the bone.
-  [[nodiscard]] bool in_front() const { return asking_ || wheel_.open() || writing_.has_value() || help_.open(); }
-  [[nodiscard]] const HelpPage& help() const { return help_; }
+  [[nodiscard]] bool in_front() const { return asking_ || wheel_.open() || writing_.has_value() || palette_.typing(); }
+  [[nodiscard]] const CommandPalette& palette() const { return palette_; }
   [[nodiscard]] bool asking() const { return asking_; }
   [[nodiscard]] bool wheel_open() const { return wheel_.open(); }
-  [[nodiscard]] bool keys_in_panel() const { return keys_in_panel_; }
+  /// The panel is open, and the keys are its.
+  [[nodiscard]] bool keys_in_panel() const { return focus_ == Focus::panel; }
+  /// Which part of the window has the arrows, Space and Enter; bone: none, they are the hand's.
+  enum class Focus { bone, strip, card, cuts, state, panel };
+  [[nodiscard]] Focus focus() const { return focus_; }
   [[nodiscard]] bool before() const { return before_; }
   void set_before(bool on) { before_ = on; }
   [[nodiscard]] const Ruler& ruler() const { return ruler_; }
   [[nodiscard]] const PinnedNotes& notes() const { return notes_; }
   [[nodiscard]] const FirstSteps& steps() const { return steps_; }
   [[nodiscard]] bool writing() const { return writing_.has_value(); }
+  /// Letters are for a text, and no command.
+  [[nodiscard]] bool typing() const { return writing() || palette_.typing(); }
 
   /// Another session has begun.
   void renew();
-  /// Each key as it is pressed, as GLFW numbers it: a note is finished by one that may be over before the next picture,
-  /// which ImGui misses.
-  void key(int code);
+  /// Each key as it is pressed or repeats, as GLFW numbers it: a note is finished by one that may be over before the
+  /// next picture, which ImGui misses.
+  void key(int code, int modifiers, bool repeated);
+  /// A picture was kept; the session has ended and is saved.
+  void picture_kept() { pictured_ = true; }
+  void session_ended();
   /// Presses of buttons since the last call, as if they were keys.
   [[nodiscard]] std::vector<Keyboard::Press> take_presses();
   /// A button that does it is held down.
@@ -94,6 +103,11 @@ class MainView {
  private:
   void draw_panel(const RoomScene& scene);
   void draw_cards(const RoomScene& scene, const HandFacts& hand);
+  void move_focus(int by);
+  void give_focus();
+  void draw_palette(RehearsalControl& control);
+  [[nodiscard]] bool takes_in_front(Command c, RehearsalControl& control);
+  void show_wheel();
   void draw_marks(const RoomScene& scene);
   void draw_note_field(RehearsalControl& control);
   void answer(int answer, RehearsalControl& control);
@@ -110,8 +124,11 @@ class MainView {
   FirstSteps steps_;
   Ruler ruler_;
   PinnedNotes notes_;
-  HelpPage help_;
-  bool asking_ = false, keys_in_panel_ = false, before_ = false, undone_ = false, write_focus_ = false;
+  CommandPalette palette_;
+  Focus focus_ = Focus::bone;
+  bool focus_moved_ = false;  // and ImGui is to be told
+  bool asking_ = false, before_ = false, undone_ = false, write_focus_ = false;
+  bool lifting_ = false, pictured_ = false;  // for the first steps
   std::size_t undo_steps_ = 0;
   std::uint64_t times_undone_ = 0;
   std::optional<Vec3> writing_;  // where a note is pinned

@@ -50,8 +50,6 @@ void draw_tool_card(const ScreenBox& view, const std::string& title, const std::
 void draw_apart(Pressed& pressed);
 /// One step at a time at the foot of the view. False: the person has closed it.
 [[nodiscard]] bool draw_next_step(const ScreenBox& view, const FirstSteps& steps);
-/// Into the current window: the list of the first minutes, in full. Two beside each other where there is room.
-void draw_first_steps(const FirstSteps& steps);
 void draw_wheel(const ToolWheel& wheel);
 /// A question in the middle of the window. 1: yes, -1: no, 0: not yet.
 [[nodiscard]] int draw_question(int width, int height, const std::string& title, const std::string& text,

@@ -10,12 +10,13 @@
 
 #include "palette.h"
 #include "room_layout.h"
+#include "ui_style.h"
 
 namespace osteo::inline app {
 
 /// Pixels of the screen for one of the design's.
 [[nodiscard]] inline float unit() {
-  return ImGui::GetFontSize() / static_cast<float>(kTextPixels);
+  return em() / static_cast<float>(kTextPixels);
 }
 inline constexpr float kTile = 40, kControl = 40, kSmallControl = 32, kRow = 36, kGap = 8, kRound = 8, kCardRound = 12;
 
