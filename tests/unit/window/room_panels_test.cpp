@@ -84,6 +84,7 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
       const Memory memory(s.width, s.height, em_pixels);
       for (const Layout wanted : {Layout::operate, Layout::plan}) {
         const RoomLayout l = lay_out(wanted, s.width, s.height, static_cast<float>(em_pixels));
+        const Message told{Message::Rank::harm, longest().warning};
         HandFacts hand;
         hand.second_hand = true;
         Pressed pressed;
@@ -91,7 +92,7 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
         bool unfolded = true;
         ScreenBox card;
         frames([&] {
-          draw_state(l.state, l.view, longest(), "a message", pressed);
+          draw_state(l.state, l.view, longest(), told, pressed);
           draw_tray(l.tray, hand, true, latched, pressed);
           card = draw_burr_card(l.view, l.view.width, hand, unfolded, pressed);
         });
@@ -187,7 +188,7 @@ TEST(Panels, NothingJumpsWhileDrilling) {
   const RoomLayout l = lay_out(Layout::operate, 1280, 800, 16);
   Pressed pressed;
   const auto grounds = [&](const StateFacts& f) {
-    frames([&] { draw_state(l.state, l.view, f, "", pressed); });
+    frames([&] { draw_state(l.state, l.view, f, {}, pressed); });
     const ImGuiWindow* const w = ImGui::FindWindowByName("state");
     std::vector<ImVec2> fixed;  // of the bars
     for (const ImDrawVert& v : w->DrawList->VtxBuffer) {
@@ -222,7 +223,7 @@ TEST(Panels, TheBarOfTheNearestStructureFills) {
     StateFacts f = longest();
     f.nearness = nearness;
     f.near_share = share;
-    frames([&] { draw_state(l.state, l.view, f, "", pressed); });
+    frames([&] { draw_state(l.state, l.view, f, {}, pressed); });
     float least = 1e9F, most = 0;
     for (const ImDrawVert& v : ImGui::FindWindowByName("state")->DrawList->VtxBuffer) {
       if (v.col != im_colour32(look_of(nearness).colour) || v.pos.y < l.state.y + 38) continue;
@@ -283,7 +284,7 @@ TEST(Panels, AButtonGivesTheCommandOfItsKey) {
   EXPECT_FALSE(has(seen, Command::suck));
   EXPECT_FALSE(has(seen, Command::undo)) << "nothing to take back";
   // What ends the session is in the state; sizes and kinds on the burr's card.
-  seen = clicked(l.state, l.state.right() - 40, [&](Pressed& p) { draw_state(l.state, l.view, longest(), "", p); });
+  seen = clicked(l.state, l.state.right() - 40, [&](Pressed& p) { draw_state(l.state, l.view, longest(), {}, p); });
   EXPECT_TRUE(has(seen, Command::quit));
   bool unfolded = false;
   ScreenBox card;
@@ -357,12 +358,46 @@ TEST(Kit, ComponentsHaveTheirSizes) {
     EXPECT_EQ(ImGui::GetItemRectSize().y, 36);
     static_cast<void>(kit_switch("Irrigation", on));
     EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
+    double mm = 3;
+    EXPECT_FALSE(kit_slider("Kerf", "3.0 mm", mm, 0, 10, 0.5));
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 48);
     static const std::string kTwo[] = {"One", "Two"};
     EXPECT_EQ(choice("c", kTwo, 0), -1);
     EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
     ImGui::End();
   });
   EXPECT_FALSE(on);
+}
+
+// A click on the track goes there by whole steps; name and value never lie on the track.
+TEST(Kit, ASliderGoesWhereItIsPressed) {
+  const Memory memory(800, 600, 16);
+  double mm = 0;
+  ImVec2 lo, hi;
+  const auto picture = [&] {
+    ImGui::NewFrame();
+    begin_fixed("kit", {0, 0, 400, 200});
+    const bool changed = kit_slider("Length", "75 mm", mm, 0, 150, 10);
+    lo = ImGui::GetItemRectMin();
+    hi = ImGui::GetItemRectMax();
+    ImGui::End();
+    ImGui::Render();
+    return changed;
+  };
+  EXPECT_FALSE(picture());
+  const float y = hi.y - 14, from = lo.x + 8, wide = hi.x - lo.x - 16;
+  ImGui::GetIO().MousePos = {from + 0.51F * wide, y};
+  EXPECT_FALSE(picture());
+  ImGui::GetIO().MouseDown[0] = true;
+  EXPECT_TRUE(picture());
+  EXPECT_EQ(mm, 80) << "0.51 of 150, by tens";
+  ImGui::GetIO().MousePos = {hi.x + 300, y};
+  EXPECT_TRUE(picture());
+  EXPECT_EQ(mm, 150);
+  ImGui::GetIO().MousePos = {0, y};
+  EXPECT_TRUE(picture());
+  EXPECT_EQ(mm, 0);
+  EXPECT_LT(lo.y + ImGui::GetFontSize(), y - 8) << "words above the knob";
 }
 
 }  // namespace

@@ -396,17 +396,6 @@ TEST(StateFacts, TellHowWarmItIs) {
   EXPECT_EQ(none.warmth, "bone up to 50 C");
 }
 
-TEST(StateFacts, AWarningThatLastsLetsPassWhatIsSaid) {
-  StateFacts f;
-  EXPECT_FALSE(warning_is_reported(f, ""));
-  f.warning = "the shaft touches bone";
-  EXPECT_TRUE(warning_is_reported(f, "saved"));
-  f.warning = "the bone is in 2 pieces";
-  f.lasts = true;
-  EXPECT_FALSE(warning_is_reported(f, "saved"));
-  EXPECT_TRUE(warning_is_reported(f, ""));
-}
-
 TEST(StateFacts, TellWhatTheTickTells) {
   TickRecord tick;
   tick.tick = 187000;

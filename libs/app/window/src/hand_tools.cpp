@@ -7,6 +7,7 @@
 #include "keys.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/geometry/grid/brick_places.h"
 #include "osteo/simulation/bone/plates.h"
 
 namespace osteo::inline app {
@@ -156,6 +157,20 @@ void HandTools::pick(Rehearsal& rehearsal, Vec3 from, Vec3 direction) {
     if (world.find(piece_)->of_region) piece_ = world.bodies().front().body->id;
     pose_ = world.find(piece_)->world_from_body;
     handle_mm_ = hit->at_mm;
+  });
+}
+
+void HandTools::take_piece(std::uint32_t body, Rehearsal& rehearsal) {
+  if (tool_ != Tool::piece) return;
+  rehearsal.look([&](const World& world, SceneReaders&) {
+    const PlacedBody* const placed = world.find(body);
+    if (placed == nullptr) return;
+    Vec3 sum{};
+    const BrickGrid& bone = placed->body->bone;
+    for (std::uint32_t b = 0; b < bone.brick_count(); ++b) sum += middle_of_brick_mm(bone, b);
+    piece_ = body;
+    pose_ = placed->world_from_body;
+    handle_mm_ = pose_(sum / std::max(1.0, static_cast<double>(bone.brick_count())));
   });
 }
 

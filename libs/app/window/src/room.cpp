@@ -139,7 +139,7 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       return true;
     case Command::irrigation:
       if (control.rehearsal().hands() < 2) {
-        control.say("no second hand: start with --dust");
+        control.say("no second hand: start with --dust", Message::Rank::hindrance);
       } else {
         latched_.irrigation = !latched_.irrigation;
       }
@@ -204,7 +204,7 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
 bool MainView::click(std::optional<Vec3> bone, RehearsalControl& control) {
   if (!ruler_.on()) return false;
   if (!bone) {
-    control.say("no bone under the mouse");
+    control.say("no bone under the mouse", Message::Rank::hindrance);
     return true;
   }
   if (const auto note = ruler_.click(*bone)) {
@@ -228,6 +228,7 @@ HandFacts MainView::hand_facts(const RehearsalControl& control, const SoundOut& 
   f.before = before_;
   f.ruler = ruler_.on();
   f.second_hand = control.rehearsal().hands() > 1;
+  f.burr_share = control.burr_share;
   f.undo_steps = undo_steps;
   return f;
 }
@@ -278,9 +279,8 @@ void MainView::draw(const RoomScene& scene) {
   RehearsalControl& control = scene.control;
   const HandFacts hand = hand_facts(control, scene.sound, undo_steps_);
   draw_tray(layout_.tray, hand, keys_in_panel(), latched_, pressed_);
-  draw_state(layout_.state, layout_.view,
-             state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr), control.reported(),
-             pressed_);
+  const StateFacts facts = state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr);
+  draw_state(layout_.state, layout_.view, facts, control.reported(causes_of(facts)), pressed_);
   if (keys_in_panel()) {
     if (!ImGui::IsAnyItemActive() && !io.NavVisible) ImGui::SetNextWindowFocus();
     draw_panel(scene);
@@ -315,7 +315,7 @@ void MainView::draw_palette(RehearsalControl& control) {
     if (control.rehearsal().hands() > 1)
       latched_.suction = !latched_.suction;
     else
-      control.say("no second hand: start with --dust");
+      control.say("no second hand: start with --dust", Message::Rank::hindrance);
   } else if (!row->command || row->held) {
     control.say(row->keys.empty() ? row->name : row->name + ": " + row->keys + (row->held ? ", held" : ""));
   } else {
@@ -348,10 +348,18 @@ void MainView::draw_cards(const RoomScene& scene, const HandFacts& hand) {
   const ScreenBox& view = layout_.view;
   const float taken = layout_.over[0].empty() ? 0 : view.right() - layout_.over[0].x;
   static constexpr const char* kTitles[] = {"Drill", "Saw", "Fragments", "Plate"};
-  if (hand.tool == 0) {
-    draw_burr_card(view, view.width - taken, hand, burr_unfolded_, pressed_);
+  float below = 0;
+  if (hand.tool == 0 && !hand.saw) {
+    below = draw_burr_card(view, view.width - taken, hand, burr_unfolded_, pressed_).bottom();
   } else {
-    draw_tool_card(view, kTitles[hand.tool], scene.draw_tools);
+    below = draw_tool_card(view, "instrument", hand.saw ? "Saw in the hand" : kTitles[hand.tool], scene.draw_tools);
+  }
+  RehearsalControl& control = scene.control;
+  const bool water = latched_.suction || latched_.irrigation || control.second().holds() > 0;
+  if (const float left = view.bottom() - below; hand.second_hand && water && left > 320 * unit()) {
+    draw_tool_card({view.x, below - 8 * unit(), view.width, left}, "second hand", "Second hand", [&] {
+      draw_second_hand(control.rehearsal(), control.second(), [&](const std::string& said) { control.say(said); });
+    });
   }
   if (!person_.values.first_steps) return;
   const bool card = palette_.shown() == CommandPalette::Shown::ten_keys;
@@ -373,7 +381,7 @@ void MainView::draw_panel(const RoomScene& scene) {
   ImGui::BeginChild("all", {0, std::max(4 * em(), ImGui::GetContentRegionAvail().y - apart)});
   scene.draw_camera();
   ImGui::Separator();
-  if (scene.control.tools().tool() == HandTools::Tool::drill) scene.draw_tools();  // plates that are fixed
+  scene.draw_plates();
   draw_sound(scene.sound);
   ImGui::TextDisabled("Colours");
   static const std::string kThemes[] = {"Dark", "Light", "High contrast"};
@@ -485,6 +493,32 @@ void MainView::draw_caption(const RoomScene& scene) {
   fitted_text(draw, {v.x + e / 2, y, v.width - bar - 2.5F * e, 2 * e}, e, theme().text, text);
 }
 
+namespace {
+
+void draw_figures(const std::vector<EndLine>& lines) {
+  if (!ImGui::BeginTable("done", 2)) return;
+  const float u = unit();
+  ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch, 0.45F);
+  ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch, 0.55F);
+  for (const EndLine& line : lines) {
+    ImGui::TableNextRow();
+    ImGui::TableSetColumnIndex(0);
+    ImGui::TextWrapped("%s", line.what.c_str());
+    ImGui::TableSetColumnIndex(1);
+    if (line.nearness != Nearness::unknown) {
+      const NearnessLook& look = look_of(line.nearness);
+      const ImVec2 at = ImGui::GetCursorScreenPos();
+      draw_sign(ImGui::GetWindowDrawList(), {at.x + 8 * u, at.y + ImGui::GetFontSize() / 2}, 7 * u, look.corners,
+                look.colour);
+      ImGui::SetCursorPosX(ImGui::GetCursorPosX() + 20 * u);
+    }
+    ImGui::TextWrapped("%s", line.value.c_str());
+  }
+  ImGui::EndTable();
+}
+
+}  // namespace
+
 EndChoice MainView::end_choice(Command command) {
   switch (command) {
     case Command::reset:
@@ -500,56 +534,52 @@ EndChoice MainView::end_choice(Command command) {
   }
 }
 
-EndChoice MainView::draw_end(const EndFacts& facts, const std::function<void()>& findings) {
+EndChoice MainView::draw_end(const EndFacts& facts, const EndParts& parts) {
   ImGuiIO& io = ImGui::GetIO();
   io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
   begin_fixed("end", layout_.page);
-  const float e = em();
-  fitted_text(ImGui::GetWindowDrawList(),
-              {ImGui::GetCursorScreenPos().x, ImGui::GetCursorScreenPos().y, layout_.page.width - 2 * e, 1.6F * e},
-              1.6F * e, theme().text, facts.past ? "A session, looked at again" : "The session is over, and saved");
-  ImGui::Dummy({0, 1.8F * e});
-  EndChoice choice = EndChoice::none;
-  const auto button = [&](const char* words, EndChoice of) {
-    if (ImGui::Button(words, {ImGui::GetContentRegionAvail().x, 0})) choice = of;
-  };
-  if (!facts.past) {
-    button("again, from the whole bone (R)", EndChoice::again);
-    button("go on from here (F5)", EndChoice::resume);
-  }
-  button("another case (Home)", EndChoice::another);
-  button("close (Q)", EndChoice::close);
-  findings();
-  ImGui::Separator();
-  if (ImGui::BeginTable("done", 2)) {
-    ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch, 0.45F);
-    ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch, 0.55F);
-    for (const EndLine& line : facts.lines) {
-      ImGui::TableNextRow();
-      ImGui::TableSetColumnIndex(0);
-      ImGui::TextWrapped("%s", line.what.c_str());
-      ImGui::TableSetColumnIndex(1);
-      const NearnessLook& look = look_of(line.nearness);
-      const bool plain = line.nearness == Nearness::unknown;
-      if (!plain) {
-        const ImVec2 at = ImGui::GetCursorScreenPos();
-        draw_sign(ImGui::GetWindowDrawList(), {at.x + e * 0.5F, at.y + e * 0.5F}, e * 0.4F, look.corners, look.colour);
-        ImGui::SetCursorPosX(ImGui::GetCursorPosX() + 1.2F * e);
-      }
-      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(plain ? theme().text : ink_of(look.colour)));
-      ImGui::TextWrapped("%s", line.value.c_str());
-      ImGui::PopStyleColor();
-    }
-    ImGui::EndTable();
-  }
-  ImGui::Separator();
-  ImGui::TextDisabled("files");
-  ImGui::TextWrapped("%s", facts.folder.string().c_str());
-  ImGui::TextWrapped("summary.json has the numbers, stream.oss every tick: osteo replay SESSION");
+  const float u = unit();
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const float wide = ImGui::GetContentRegionAvail().x;
+  fitted_text(ImGui::GetWindowDrawList(), {corner.x, corner.y, wide, 32 * u}, kBoldEm * em(), theme().text,
+              facts.past ? "A session, looked at again" : "Session saved", false, true);
+  ImGui::Dummy({0, 32 * u});
+  ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
+  ImGui::TextWrapped("%s", facts.summary.c_str());
+  ImGui::PopStyleColor();
   for (const std::string& w : facts.warnings) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
     ImGui::TextWrapped("! %s", w.c_str());
     ImGui::PopStyleColor();
+  }
+  parts.findings();
+  ImGui::Dummy({0, 4 * u});
+  ImGui::TextDisabled("Next");
+  EndChoice choice = EndChoice::none;
+  const float half = std::floor((wide - ImGui::GetStyle().ItemSpacing.x) / 2);
+  const auto button = [&](const char* words, EndChoice of, ButtonLook look, float width) {
+    if (kit_button(words, look, width)) choice = of;
+  };
+  // What was found serious is tried again on a whole bone; else one goes on.
+  if (facts.past) {
+    button("Another case (Home)", EndChoice::another, ButtonLook::main, wide);
+    button("Close (Q)", EndChoice::close, ButtonLook::usual, half);
+  } else {
+    const bool again = parts.try_again;
+    button(again ? "Try it again: bone reset (R)" : "Continue from here (F5)",
+           again ? EndChoice::again : EndChoice::resume, ButtonLook::main, wide);
+    button(again ? "Continue (F5)" : "Reset bone (R)", again ? EndChoice::resume : EndChoice::again, ButtonLook::usual,
+           half);
+    ImGui::SameLine();
+    button("Another case (Home)", EndChoice::another, ButtonLook::usual, half);
+    button("Close (Q)", EndChoice::close, ButtonLook::usual, half);
+  }
+  parts.course();
+  if (ImGui::CollapsingHeader("All figures")) draw_figures(facts.lines);
+  if (ImGui::CollapsingHeader("All findings")) parts.all_findings();
+  if (ImGui::CollapsingHeader("Files")) {
+    ImGui::TextWrapped("%s", facts.folder.string().c_str());
+    ImGui::TextWrapped("summary.json has the numbers, stream.oss every tick: osteo replay SESSION");
   }
   ImGui::End();
   return choice;

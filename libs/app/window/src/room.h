@@ -39,13 +39,19 @@ struct RoomScene {
   /// A point of the world in pixels of the window; nothing behind the eye.
   std::function<std::optional<std::array<float, 2>>(Vec3)> project;
   std::function<void()> draw_camera;  ///< the microscope: into the panel
-  std::function<void()> draw_tools;   ///< saw, fragments, plates: into their card, or the panel
+  std::function<void()> draw_tools;   ///< saw, fragments, plates: into their card
+  std::function<void()> draw_plates;  ///< those that are on the bone: into the panel
   /// What is chosen for the hand: into the panel. `show`: opened, and the keys' cursor on it.
   std::function<void(bool show)> draw_hand;
   std::optional<WarmthNow> warmth;  ///< where the scene has heat
 };
 
 enum class EndChoice { none, again, resume, another, close };
+/// What others draw into the page at the end, and whether its one next step is to try again.
+struct EndParts {
+  std::function<void()> findings, all_findings, course;
+  bool try_again = false;
+};
 
 class MainView {
  public:
@@ -95,8 +101,8 @@ class MainView {
   void draw(const RoomScene& scene);
   /// A caption over the picture, in the frame of a screenshot.
   void draw_caption(const RoomScene& scene);
-  /// In review. `findings`: drawn into the page.
-  [[nodiscard]] EndChoice draw_end(const EndFacts& facts, const std::function<void()>& findings);
+  /// In review.
+  [[nodiscard]] EndChoice draw_end(const EndFacts& facts, const EndParts& parts);
   /// What a key means on that page.
   [[nodiscard]] static EndChoice end_choice(Command command);
 

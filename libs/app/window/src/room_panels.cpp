@@ -35,7 +35,7 @@ float share_of_row(int buttons) {
 
 }  // namespace
 
-void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f, const std::string& message,
+void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f, const std::optional<Message>& message,
                 Pressed& pressed) {
   ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
   begin_fixed("state", box, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
@@ -108,11 +108,11 @@ void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f
   }
 
   // One place for words.
-  const bool warns = warning_is_reported(f, message);
-  const std::string& reported = warns ? f.warning : message;
-  if (!reported.empty()) {
-    const ChipLook chip{warns ? (f.alarm ? palette::kVermillion : palette::kYellow) : palette::kSkyBlue,
-                        warns ? (f.alarm ? 8 : 3) : 0, warns && f.alarm};
+  if (message) {
+    static constexpr ChipLook kLooks[] = {
+        {palette::kSkyBlue, 0, false}, {palette::kYellow, 3, false}, {palette::kVermillion, 8, true}};
+    const ChipLook chip = kLooks[static_cast<std::size_t>(message->rank)];
+    const std::string& reported = message->text;
     const float wide = chip_width(reported);
     const float room = time_x - 16 * u - near.right() - 24 * u;
     if (inside && wide <= room) {
@@ -280,24 +280,30 @@ ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFact
     if (const int shape = choice("shape", kShapes, static_cast<int>(burr.shape)); shape >= 0)
       pressed.press(kCommands[shape]);
     ImGui::SetCursorScreenPos({box.x + pad, y + 2 * line});
-    bool on = hand.latched;
-    ImGui::PushClipRect({box.x, box.y}, {box.right(), box.bottom()}, true);
-    if (kit_switch("Drill on", on, box.width - 2 * pad)) pressed.press(Command::drill);
-    ImGui::PopClipRect();
+    // A quarter a step, as its keys do.
+    ImGui::AlignTextToFramePadding();
+    ImGui::TextDisabled("Speed");
+    ImGui::SameLine();
+    static const std::string kSpeeds[] = {"25", "50", "75", "100 %"};
+    const int now = static_cast<int>(std::lround(4 * hand.burr_share)) - 1;
+    if (const int speed = choice("speed", kSpeeds, now); speed >= 0) {
+      for (int n = now; n != speed; n += speed > now ? 1 : -1) pressed.press(Command::burr_speed, speed > now ? 1 : -1);
+    }
   }
   ImGui::End();
   return box;
 }
 
-void draw_tool_card(const ScreenBox& view, const std::string& title, const std::function<void()>& content) {
+float draw_tool_card(const ScreenBox& view, const char* name, const std::string& title,
+                     const std::function<void()>& content) {
   const float u = unit(), wide = std::min(312 * u, view.width - 32 * u);
-  if (wide < 160 * u) return;
+  if (wide < 160 * u) return view.y;
   ImGui::SetNextWindowPos({view.x + 16 * u, view.y + 16 * u});
   ImGui::SetNextWindowSizeConstraints({wide, 0}, {wide, std::max(96 * u, view.height - 96 * u)});
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, kCardRound * u);
   ImVec4 ground = im_colour(theme().surface, 0.94F);
   ImGui::PushStyleColor(ImGuiCol_WindowBg, ground);
-  ImGui::Begin("instrument", nullptr,
+  ImGui::Begin(name, nullptr,
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
                    ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoBringToFrontOnFocus);
   ImGui::PopStyleColor();
@@ -307,10 +313,28 @@ void draw_tool_card(const ScreenBox& view, const std::string& title, const std::
   ImGui::TextUnformatted(title.c_str());
   ImGui::SetWindowFontScale(1);
   ImGui::PopFont();
-  ImGui::PushItemWidth(ImGui::GetContentRegionAvail().x * 0.6F);
   content();
-  ImGui::PopItemWidth();
+  const float bottom = ImGui::GetWindowPos().y + ImGui::GetWindowHeight();
   ImGui::End();
+  return bottom;
+}
+
+void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const std::string&)>& say) {
+  const std::pair<const char*, std::size_t> things[] = {{"Suction", SecondHand::kSucker},
+                                                        {"Irrigation", SecondHand::kIrrigator},
+                                                        {"Probe", SecondHand::kProbe},
+                                                        {"Nothing", 0}};
+  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
+  for (const auto& [name, what] : things) {
+    if (list_row(name, "", second.holds() == what)) say(second.take(rehearsal, what));
+  }
+  ImGui::PopStyleVar();
+  ImGui::TextDisabled("Suction tube, French");
+  static constexpr int kFrench[] = {5, 7, 8, 10, 12};
+  static const std::string kSizes[] = {"5", "7", "8", "10", "12"};
+  const auto at = std::find(std::begin(kFrench), std::end(kFrench), second.sucker_french()) - std::begin(kFrench);
+  if (const int size = choice("size", kSizes, static_cast<int>(at), kSmallControl); size >= 0)
+    second.take_sucker(kFrench[size]);
 }
 
 void draw_apart(Pressed& pressed) {
