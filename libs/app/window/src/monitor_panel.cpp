@@ -12,7 +12,7 @@ namespace osteo::inline app {
 namespace {
 
 // In heights of text.
-constexpr float kMinLaneEm = 1.7F, kMinEm = 13, kMaxEm = 18, kSwitchesEm = 24;
+constexpr float kMinLaneEm = 2.3F, kMinEm = 15, kMaxEm = 21, kSwitchesEm = 30;
 
 float button_wide(const char* words) {
   return ImGui::CalcTextSize(words).x + 2 * ImGui::GetStyle().FramePadding.x;
@@ -211,7 +211,7 @@ void MonitorPanel::draw_switches(MonitorController& controller) {
   ImGui::PushStyleColor(ImGuiCol_Text, im_colour(alarm ? ink_of(palette::kVermillion) : theme().quiet));
   ImGui::TextUnformatted(alarm ? "activity" : "quiet");
   ImGui::PopStyleColor();
-  ImGui::SameLine(7 * e);
+  ImGui::SameLine(8 * e);
   ImGui::TextDisabled("nerve monitor, for practice");
   if (ImGui::RadioButton("free run", !answers_)) answers_ = false;
   beside(box_wide("by stimulus"));
@@ -263,7 +263,7 @@ void MonitorPanel::draw(MonitorController& controller) {
     }
   };
   // Where it is wide enough the curves have all its height.
-  if (box_.width >= 48 * e) {
+  if (box_.width >= 54 * e) {
     ImGui::BeginChild("switches", {kSwitchesEm * e, 0}, false, ImGuiWindowFlags_NoScrollbar);
     draw_switches(controller);
     log(0);

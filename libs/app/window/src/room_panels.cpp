@@ -393,7 +393,7 @@ void draw_wheel(const ToolWheel& wheel) {
     draw->AddLine({middle.x + inner * std::cos(edge), middle.y + inner * std::sin(edge)},
                   {middle.x + outer * std::cos(edge), middle.y + outer * std::sin(edge)}, im_colour32(theme().quiet),
                   1);
-    const float r = outer * 0.68F, wide = 4.4F * e;
+    const float r = outer * 0.68F, wide = 5.6F * e;
     const ScreenBox box{middle.x + r * std::cos(angle) - wide / 2, middle.y + r * std::sin(angle) - e * 1.1F, wide,
                         e * 1.2F};
     fitted_text(draw, box, e * (chosen ? 1.15F : 1), theme().text, items[n].word, true);
