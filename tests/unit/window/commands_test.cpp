@@ -59,7 +59,8 @@ TEST(Commands, AreFoundByNameOldNameAndSynonym) {
   EXPECT_EQ(best("take back"), "Undo: last stroke, cut, move or plate");
   EXPECT_EQ(best("plat"), "Plate: take one");
   EXPECT_EQ(best("full"), "Full screen");
-  EXPECT_EQ(best("patient position"), "Menu and settings");
+  EXPECT_EQ(best("patient position"), "Patient position: supine");
+  EXPECT_EQ(best("light"), "Colours: light");
   EXPECT_EQ(best("burr 4"), "Burr of 4 mm");
   EXPECT_EQ(best("xyzzy"), "");
   EXPECT_EQ(best("saw xyzzy"), "") << "each word has to fit";

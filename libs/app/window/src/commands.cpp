@@ -4,6 +4,8 @@
 #include <cctype>
 
 #include "osteo/simulation/bone/burr_kind.h"
+#include "osteo/simulation/bone/posture.h"
+#include "palette.h"
 
 namespace osteo::inline app {
 namespace {
@@ -125,6 +127,14 @@ constexpr Named kSession[] = {
     {"Earlier in the course", "timeline back", earlier},
     {"Later in the course", "timeline on", later},
 };
+// Without keys: found by name alone.
+constexpr Named kPatient[] = {
+    {"Patient position: supine", "lies posture gravity back", posture, static_cast<int>(Posture::supine)},
+    {"Patient position: prone", "lies posture gravity belly", posture, static_cast<int>(Posture::prone)},
+    {"Patient position: sitting", "posture gravity", posture, static_cast<int>(Posture::session_runner)},
+    {"Patient position: on the left side", "lies posture gravity", posture, static_cast<int>(Posture::left_side)},
+    {"Patient position: on the right side", "lies posture gravity", posture, static_cast<int>(Posture::right_side)},
+};
 constexpr Named kWindow[] = {
     {"All commands", "search palette find", palette},
     {"Ten keys; again: all keys", "help mouse list", help},
@@ -133,6 +143,9 @@ constexpr Named kWindow[] = {
     {"Keys to the next part of the window", "focus tab strip card", focus_next},
     {"Full screen", "window maximise", full_screen},
     {"Sound on or off", "mute volume noise", sound},
+    {"Colours: dark", "theme night", colours, static_cast<int>(ThemeName::dark)},
+    {"Colours: light", "theme day bright", colours, static_cast<int>(ThemeName::light)},
+    {"Colours: high contrast", "theme black white", colours, static_cast<int>(ThemeName::high_contrast)},
     {"Text larger", "size scale letters", {}, 0, "Ctrl +"},
     {"Text smaller", "size scale letters", {}, 0, "Ctrl -"},
     {"Text as the monitor has it", "size scale letters", {}, 0, "Ctrl 0"},
@@ -232,6 +245,7 @@ const std::vector<CommandRow>& command_rows() {
     add(all, "Cuts", kCuts);
     add(all, "Hand", kHand);
     add(all, "Session", kSession);
+    add(all, "Patient position", kPatient);
     add(all, "Window", kWindow);
     return all;
   }();

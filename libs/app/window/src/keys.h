@@ -86,6 +86,8 @@ enum class Command {
   mute_monitor,  // and its sound
   regions,       // what the procedure wants removed or left
   lead,          // the own hand is led by another, or not
+  posture,       // value: Posture; how the patient lies
+  colours,       // value: ThemeName
 };
 
 /// Keys that are down with another, as GLFW numbers them.

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "osteo/simulation/bone/posture.h"
 #include "settings_panel.h"
 #include "sound_panel.h"
 #include "status_panel.h"
@@ -124,6 +125,22 @@ void MainView::move_focus(int by) {
   focus_moved_ = true;
 }
 
+// Where dust and water fall to: without them it changes nothing.
+void MainView::lay_patient(Posture posture, RehearsalControl& control) {
+  bool dust = false;
+  control.rehearsal().look([&](const World&, SceneReaders& readers) { dust = readers.dust != nullptr; });
+  if (!dust) return control.say("no dust and no water here: start with --dust", Message::Rank::hindrance);
+  control.rehearsal().act(SceneAction::posture(down_of(posture, 0)));
+  std::string name(EnumNames<Posture>::values[static_cast<std::size_t>(posture)]);
+  std::replace(name.begin(), name.end(), '_', ' ');
+  control.say("patient position: " + name);
+}
+
+void MainView::choose_theme(ThemeName name) {
+  person_.values.theme = EnumNames<ThemeName>::values[static_cast<std::size_t>(name)];
+  take_theme(person_.values.theme);
+}
+
 bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, const std::optional<Vec3>& bone) {
   const Command c = press.command;
   if (takes_in_front(c, control)) return true;
@@ -143,6 +160,12 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       } else {
         latched_.irrigation = !latched_.irrigation;
       }
+      return true;
+    case Command::posture:
+      lay_patient(static_cast<Posture>(press.value), control);
+      return true;
+    case Command::colours:
+      choose_theme(static_cast<ThemeName>(press.value));
       return true;
     case Command::lift:
       lifting_ = true;
@@ -385,10 +408,8 @@ void MainView::draw_panel(const RoomScene& scene) {
   draw_sound(scene.sound);
   ImGui::TextDisabled("Colours");
   static const std::string kThemes[] = {"Dark", "Light", "High contrast"};
-  if (const int chosen = choice("theme", kThemes, static_cast<int>(theme_name()), kSmallControl); chosen >= 0) {
-    person_.values.theme = EnumNames<ThemeName>::values[static_cast<std::size_t>(chosen)];
-    take_theme(person_.values.theme);
-  }
+  if (const int chosen = choice("theme", kThemes, static_cast<int>(theme_name()), kSmallControl); chosen >= 0)
+    choose_theme(static_cast<ThemeName>(chosen));
   if (scene.draw_hand) scene.draw_hand(std::exchange(hand_page_, false));
   draw_settings(rehearsal);
   draw_posture(rehearsal);

@@ -11,6 +11,7 @@
 #include "osteo/app/window/person_settings.h"
 #include "osteo/app/window/sound_out.h"
 #include "osteo/app/window/window_shell.h"
+#include "osteo/simulation/bone/posture.h"
 #include "rehearsal_control.h"
 #include "room_panels.h"
 #include "steps.h"
@@ -114,6 +115,8 @@ class MainView {
   void draw_palette(RehearsalControl& control);
   [[nodiscard]] bool takes_in_front(Command c, RehearsalControl& control);
   void show_wheel();
+  static void lay_patient(Posture posture, RehearsalControl& control);
+  void choose_theme(ThemeName name);
   void draw_marks(const RoomScene& scene);
   void draw_note_field(RehearsalControl& control);
   void answer(int answer, RehearsalControl& control);
