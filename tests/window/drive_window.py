@@ -72,6 +72,15 @@ class Window(Program):
         self.x("mouseup", button)
         return self.next()
 
+    def deeper(self):
+        """A step of the wheel with Shift, which is down for whole pictures: modifiers are looked at once in each."""
+        self.x("keydown", "shift")
+        self.next()
+        self.x("click", 4)
+        self.next()
+        self.x("keyup", "shift")
+        return self.next()
+
     def close(self, code=0):
         self.x("key", "q")
         return self.end(code)
@@ -447,7 +456,7 @@ def hand():
             seen.append((s["message"], s["eye"], began, s["tick"]))
             assert s["force_n"] < 1 and not s["drill_on"], s
             # Pressed and drilled a little; the next F starts from there.
-            w.x("keydown", "shift", "click", 4, "keyup", "shift")
+            w.deeper()
             w.x("mousedown", 1)
             w.until("drills", lambda s: s["drill_on"])
             w.x("mouseup", 1)

@@ -15,7 +15,7 @@ enum : int { kEscape = 256, kEnter = 257, kBackspace = 259, kDown = 264, kUp = 2
 enum : int { kF1 = 290, kKeypadEnter = 335 };
 constexpr int kPage = 8;
 constexpr float kListWide = 680, kField = 56, kFoot = 36, kHeading = 36, kLine = 40, kTwoLines = 60, kPad = 16;
-constexpr float kTenWide = 328, kTenRow = 28, kTenKeys = 112, kTenTitle = 44, kMouse = 92, kTenFoot = 32;
+constexpr float kTenWide = 352, kTenRow = 28, kTenKeys = 112, kTenTitle = 44, kMouse = 92, kTenFoot = 32;
 
 void text_at(ImDrawList* draw, ImVec2 at, Colour colour, const std::string& words, bool bold = false) {
   draw->AddText(bold ? bold_font() : ImGui::GetFont(), ImGui::GetFontSize(), {std::floor(at.x), std::floor(at.y)},
@@ -46,8 +46,8 @@ const std::vector<TenKeysRow>& ten_keys() {
   static const std::vector<TenKeysRow> rows = {
       {"left button", "drills while held"},
       {"Shift-wheel", "deeper, back"},
-      {key_name(Command::bring), "to the bone under the mouse"},
-      {key_name(Command::lift), "out of the bone"},
+      {key_name(Command::bring), "approach the bone"},
+      {key_name(Command::lift), "retract, out of the bone"},
       {key_name(Command::diameter, 1) + " to " + key_name(Command::diameter, 7), "burr size, mm"},
       {key_name(Command::suck), "suction, while held"},
       {key_name(Command::irrigation), "irrigation on, off"},

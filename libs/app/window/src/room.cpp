@@ -278,15 +278,17 @@ void MainView::see(const RoomScene& scene) {
     scene.control.say("taken back");
   }
   undo_steps_ = facts.undo_steps;
+  // Led away and there, not only asked for.
+  lifted_ = lifting_ && (lifted_ || scene.control.leading());
   if (lifting_ && !scene.control.leading()) {
+    facts.retracted = std::exchange(lifted_, false);
     lifting_ = false;
-    facts.retracted = true;
   }
   facts.pictured = std::exchange(pictured_, false);
   facts.tilted_rad = scene.control.handle().tilted_rad();
   facts.measured_mm = ruler_.length_mm().value_or(0);
   facts.magnification = scene.magnification;
-  steps_.see(facts);
+  steps_.see(seen_ = facts);
 }
 
 void MainView::draw(const RoomScene& scene) {
@@ -361,9 +363,9 @@ void MainView::give_focus() {
 }
 
 void MainView::session_ended() {
-  StepFacts facts;
-  facts.ended = true;
-  steps_.see(facts);
+  seen_.ended = true;
+  steps_.see(seen_);
+  seen_ = {};
 }
 
 // What belongs to the instrument in hand, and what comes next for a new user.

@@ -131,13 +131,14 @@ class MainView {
   Pressed pressed_;
   ToolWheel wheel_;
   FirstSteps steps_;
+  StepFacts seen_;  // by them, last
   Ruler ruler_;
   PinnedNotes notes_;
   CommandPalette palette_;
   Focus focus_ = Focus::bone;
   bool focus_moved_ = false;  // and ImGui is to be told
   bool asking_ = false, before_ = false, undone_ = false, write_focus_ = false;
-  bool lifting_ = false, pictured_ = false;  // for the first steps
+  bool lifting_ = false, lifted_ = false, pictured_ = false;  // for the first steps
   std::size_t undo_steps_ = 0;
   std::uint64_t times_undone_ = 0;
   std::optional<Vec3> writing_;  // where a note is pinned
