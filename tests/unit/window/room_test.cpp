@@ -113,7 +113,9 @@ TEST(RoomLayout, AllLayoutsFitTheSizesTheyAreFor) {
       EXPECT_EQ(l.over[c].width, l.over[c].height);
       EXPECT_LE(l.over[c].right(), l.view.right());
       EXPECT_LE(l.over[c].bottom(), l.view.bottom());
-      if (c > 0) EXPECT_GE(l.over[c].y, l.over[c - 1].bottom());
+      if (c > 0) {
+        EXPECT_GE(l.over[c].y, l.over[c - 1].bottom());
+      }
     }
     // As the person dragged them, within limits.
     EXPECT_GT(lay_out(Layout::operate, s.width, s.height, em, l.over[0].width + 16).over[0].width, l.over[0].width);
