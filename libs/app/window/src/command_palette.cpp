@@ -15,7 +15,7 @@ enum : int { kEscape = 256, kEnter = 257, kBackspace = 259, kDown = 264, kUp = 2
 enum : int { kF1 = 290, kKeypadEnter = 335 };
 constexpr int kPage = 8;
 constexpr float kListWide = 680, kField = 56, kFoot = 36, kHeading = 36, kLine = 40, kTwoLines = 60, kPad = 16;
-constexpr float kTenWide = 352, kTenRow = 28, kTenKeys = 112, kTenTitle = 44, kMouse = 92, kTenFoot = 32;
+constexpr float kTenWide = 352, kTenRow = 26, kTenKeys = 112, kTenTitle = 44, kMouse = 84, kTenFoot = 32;
 
 void text_at(ImDrawList* draw, ImVec2 at, Colour colour, const std::string& words, bool bold = false) {
   draw->AddText(bold ? bold_font() : ImGui::GetFont(), ImGui::GetFontSize(), {std::floor(at.x), std::floor(at.y)},
@@ -115,7 +115,8 @@ const CommandRow* CommandPalette::draw(const ScreenBox& window, const ScreenBox&
   // Letters before keys: who types and presses Enter between two pictures means what was typed.
   for (const ImWchar c : ImGui::GetIO().InputQueueCharacters) search_.type(c);
   const bool run = take_keys();
-  return typing() ? draw_list(window, run) : nullptr;
+  // Above the state: a contact stays visible.
+  return typing() ? draw_list({window.x, window.y, window.width, view.bottom() - window.y}, run) : nullptr;
 }
 
 std::vector<CommandPalette::Line> CommandPalette::lines(float wide) const {
@@ -144,8 +145,16 @@ const CommandRow* CommandPalette::draw_list(const ScreenBox& window, bool run) {
   const float list = std::clamp(tall, least, most);
   const ScreenBox box{std::floor(window.x + (window.width - wide) / 2),
                       std::floor(window.y + std::min(96 * u, (window.height - fixed - list) / 2)), wide, fixed + list};
+  // In front of all cards.
   ImGui::SetNextWindowFocus();
-  begin_card("commands", box, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
+  ImGui::SetNextWindowPos({box.x, box.y});
+  ImGui::SetNextWindowSize({box.width, box.height});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {0, 0});
+  ImGui::Begin("commands", nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoBackground |
+                   ImGuiWindowFlags_NoScrollWithMouse | ImGuiWindowFlags_NoNav);
+  ImGui::PopStyleVar(2);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
   draw->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32(t.surface), kCardRound * u);
@@ -226,12 +235,13 @@ float CommandPalette::card_width() {
 void CommandPalette::draw_ten_keys(const ScreenBox& view) {
   const float u = unit(), wide = std::min(kTenWide * u, view.width - 32 * u);
   const auto count = static_cast<float>(ten_keys().size());
-  const float most = view.height - 24 * u, without = (kTenTitle + kTenFoot) * u;
+  // Above the place of messages at the foot of a narrow window.
+  const float foot = 64 * u, most = view.height - foot - 8 * u, without = (kTenTitle + kTenFoot) * u;
   const bool mouse = most > without + (kMouse + count * kTenRow) * u;
   const float row = std::min(kTenRow * u, (most - without) / count);
   if (row < 18 * u || wide < 240 * u) return show(Shown::all);  // no room: the list can be scrolled
   const float high = without + count * row + (mouse ? kMouse * u : 0);
-  const ScreenBox box{view.x + 16 * u, view.bottom() - 16 * u - high, wide, high};
+  const ScreenBox box{view.x + 16 * u, view.bottom() - foot - high, wide, high};
   begin_card("ten keys", box, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoFocusOnAppearing);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();

@@ -281,9 +281,9 @@ ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFact
       pressed.press(kCommands[shape]);
     ImGui::SetCursorScreenPos({box.x + pad, y + 2 * line});
     // A quarter a step, as its keys do.
-    ImGui::AlignTextToFramePadding();
+    ImGui::SetCursorScreenPos({box.x + pad, y + 2 * line + 10 * u});
     ImGui::TextDisabled("Speed");
-    ImGui::SameLine();
+    ImGui::SetCursorScreenPos({box.x + pad + ImGui::GetItemRectSize().x + 12 * u, y + 2 * line});
     static const std::string kSpeeds[] = {"25", "50", "75", "100 %"};
     const int now = static_cast<int>(std::lround(4 * hand.burr_share)) - 1;
     if (const int speed = choice("speed", kSpeeds, now); speed >= 0) {

@@ -193,7 +193,7 @@ bool kit_slider(const std::string& name, const std::string& value, double& at, d
                 shortened(name, width - value_wide - kGap * u, ImGui::GetFontSize()).c_str());
   draw->AddText({i.hi.x - value_wide, i.lo.y}, im_colour32(t.text), value.c_str());
   const float x = from + (to - from) * static_cast<float>(most > least ? (at - least) / (most - least) : 0);
-  draw->AddRectFilled({i.lo.x, y - 2 * u}, {i.hi.x, y + 2 * u}, im_colour32(t.line), 2 * u);
+  draw->AddRectFilled({i.lo.x, y - u}, {i.hi.x, y + u}, im_colour32(t.line), u);
   draw->AddRectFilled({i.lo.x, y - 2 * u}, {x, y + 2 * u}, im_colour32(t.text), 2 * u);
   draw->AddCircleFilled({x, y}, knob, im_colour32(t.text), 20);
   if (i.hovered || i.active) draw->AddCircle({x, y}, knob + 2 * u, im_colour32(t.line), 20, 2 * u);
