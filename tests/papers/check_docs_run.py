@@ -81,6 +81,7 @@ NOT_RUN = [
     ),
     ("docs/guides/planning.md", r"mandible.stl", "bones of one's own: stages.works runs plan-reconstruction"),
     ("docs/validation/structures.md", r"SCAN", "a scan of one's own"),
+    ("docs/how-to/segment-network.md", r"neural/train/", "wants PyTorch, and most of an hour"),
     (
         "docs/validation/tissue.md",
         r"mesh.vtu|fem bone.inp|tissue.vtu",
@@ -89,6 +90,7 @@ NOT_RUN = [
     ("docs/validation/trainee.md", r"CASE|score", "a case with structures: stages.works runs simulate-trainee"),
 ]
 LONG = [
+    ("docs/how-to/segment-network.md", r"ear\.nrrd"),
     ("README.md", r"demo"),
     ("docs/guides/surgeon.md", r"jaw|session|phantom"),
     ("docs/guides/teacher.md", r""),

@@ -1,6 +1,7 @@
 """The card of a network: what it was made from, how well it does, and what may not be concluded."""
 
 import json
+import textwrap
 
 import numpy as np
 
@@ -26,7 +27,8 @@ def table_of(scores, cases, kept):
         worst = kept[int(values.argmin())]
         marks = [what for what in ("effusion", "metal_mm") if cases[worst][what]]
         told = f"{worst}{' (' + ', '.join(m.replace('_mm', '') for m in marks) + ')' if marks else ''}"
-        rows.append(f"| {name} | {np.median(values):.3f} | {np.percentile(values, 10):.3f} | {values.min():.3f} | {told} |")
+        figures = [np.median(values), np.percentile(values, 10), values.min()]
+        rows.append(f"| {name} | {' | '.join(f'{v:.3f}' for v in figures)} | {told} |")
     return "\n".join(rows)
 
 
@@ -34,9 +36,11 @@ def write_card(args, facts, dataset, scores):
     record = json.loads((args.raw / "cases.json").read_text())
     kept = sorted(next(iter(scores.values())))
     size = (args.out / "fold_0" / "checkpoint_final.pth").stat().st_size / 1e6
+    structures = ", ".join(name for name, value in dataset["labels"].items() if value)
+    what = textwrap.fill(f"A PlainConvUNet of nnU-Net v2 for the ear of the phantom: {structures}.", 120)
     text = f"""# Card of the network {args.out.name}
 
-A PlainConvUNet of nnU-Net v2 for the ear of the phantom: {", ".join(n for n, v in dataset["labels"].items() if v)}.
+{what}
 
 ## How it was made
 
