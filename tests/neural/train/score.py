@@ -36,7 +36,7 @@ def prepare(predictor, image, spacing):
 
 
 def labels_of(predictor, data, properties):
-    """Labels on the image's grid. Logits are interpolated by torch, which is nnU-Net's order 1 and takes seconds less."""
+    """Labels on the image's grid. torch interpolates the logits: nnU-Net's order 1, but for seconds less."""
     logits = predictor.predict_logits_from_preprocessed_data(data).float().to(predictor.device)
     size = [int(n) for n in properties["shape_after_cropping_and_before_resampling"]]
     cropped = F.interpolate(logits[None], size=size, mode="trilinear", align_corners=False)[0].argmax(0)
