@@ -187,7 +187,7 @@ def camera():
         assert sum(d > 2 for d in off) < 0.002 * len(off), (eye, max(off))
         off = [
             abs(above[eye * (HIGH // 2) + y][channel][x] - (eyes[2 * y][channel][x] + eyes[2 * y + 1][channel][x]) / 2)
-            for y in range(85, 155, 3)
+            for y in range(85, 140, 3)  # below lies the card of the first steps
             for x in columns
         ]
         assert sum(d > 2 for d in off) < 0.002 * len(off), (eye, max(off))

@@ -140,11 +140,11 @@ with Screen("1024x700") as screen:
     s = w.key("Return", "applied", lambda t: t["steps"] == 1 and not t["busy"])
     assert "removed" in s["message"] and s["unsaved"], s
 
-    # Two strokes in air beside the head; the second is taken back.
+    # Two strokes beside bone; the second is taken back.
     w.x("mousemove", *w.place(0, 0.5, 0.5))
     s = w.key("9", "brush", lambda t: t["tool"] == "Brush")
-    kept = [world(s, 0, *w.place(0, a, 0.5)) for a in (0.30, 0.36)]
-    w.drag(w.place(0, 0.30, 0.5), w.place(0, 0.36, 0.5))
+    kept = [world(s, 0, *w.place(0, a, 0.5)) for a in (0.34, 0.39)]
+    w.drag(w.place(0, 0.34, 0.5), w.place(0, 0.39, 0.5))
     w.until("a stroke", lambda t: t["steps"] == 2)
     undone = world(s, 0, *w.place(0, 0.5, 0.25))
     w.drag(w.place(0, 0.5, 0.25), w.place(0, 0.5, 0.27))

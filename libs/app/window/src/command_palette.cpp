@@ -11,8 +11,16 @@
 namespace osteo::inline app {
 namespace {
 
-enum : int { kEscape = 256, kEnter = 257, kBackspace = 259, kDown = 264, kUp = 265, kPageUp = 266, kPageDown = 267 };
-enum : int { kF1 = 290, kKeypadEnter = 335 };
+enum : int {
+  kEscape = 256,
+  kEnter = 257,
+  kBackspace = 259,
+  kArrowDown = 264,
+  kArrowUp = 265,
+  kPageUp = 266,
+  kPageDown = 267
+};
+enum : int { kFirstFunctionKey = 290, kKeypadEnter = 335 };
 constexpr int kPage = 8;
 constexpr float kListWide = 680, kField = 56, kFoot = 36, kHeading = 36, kLine = 40, kTwoLines = 60, kPad = 16;
 constexpr float kTenWide = 352, kTenRow = 26, kTenKeys = 112, kTenTitle = 44, kMouse = 84, kTenFoot = 32;
@@ -84,7 +92,7 @@ bool CommandPalette::take_keys() {
         run = true;
         break;
       case kEscape:
-      case kF1:
+      case kFirstFunctionKey:
         show(Shown::nothing);
         return false;
       case 'K':
@@ -94,9 +102,9 @@ bool CommandPalette::take_keys() {
       case kBackspace:
         search_.erase();
         break;
-      case kDown:
-      case kUp:
-        search_.move(p.code == kDown ? 1 : -1);
+      case kArrowDown:
+      case kArrowUp:
+        search_.move(p.code == kArrowDown ? 1 : -1);
         break;
       case kPageDown:
       case kPageUp:
