@@ -12,7 +12,7 @@ namespace osteo::inline app {
 namespace {
 
 enum : int {
-  kEscape = 256,
+  kEscapeKey = 256,
   kEnter = 257,
   kBackspace = 259,
   kArrowDown = 264,
@@ -91,7 +91,7 @@ bool CommandPalette::take_keys() {
       case kKeypadEnter:
         run = true;
         break;
-      case kEscape:
+      case kEscapeKey:
       case kFirstFunctionKey:
         show(Shown::nothing);
         return false;

@@ -50,7 +50,7 @@ constexpr Named kWater[] = {
 };
 constexpr Named kTools[] = {
     {"Saw, at the bone under the mouse", "osteotomy blade plane cut", saw},
-    {"Fragments: move pieces of bone", "pieces segments separate", pieces},
+    {"Fragments: separate and move bone", "pieces segments", pieces},
     {"Plate: take one", "plates screws fix osteosynthesis", plates},
     {"Turn saw, fragment or plate to the left", "rotate", turn_left},
     {"Turn saw, fragment or plate to the right", "rotate", turn_right},
@@ -131,7 +131,7 @@ constexpr Named kSession[] = {
 constexpr Named kPatient[] = {
     {"Patient position: supine", "lies posture gravity back", posture, static_cast<int>(Posture::supine)},
     {"Patient position: prone", "lies posture gravity belly", posture, static_cast<int>(Posture::prone)},
-    {"Patient position: sitting", "posture gravity", posture, static_cast<int>(Posture::session_runner)},
+    {"Patient position: sitting", "posture gravity", posture, static_cast<int>(Posture::sitting)},
     {"Patient position: on the left side", "lies posture gravity", posture, static_cast<int>(Posture::left_side)},
     {"Patient position: on the right side", "lies posture gravity", posture, static_cast<int>(Posture::right_side)},
 };

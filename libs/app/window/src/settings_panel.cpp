@@ -47,7 +47,7 @@ void draw_posture(Rehearsal& rehearsal) {
   }
   auto turned = static_cast<float>(now.head_turned_deg);
   ImGui::PushItemWidth(5 * ImGui::GetFontSize());
-  if (now.posture != Posture::session_runner && ImGui::SliderFloat("head turned", &turned, -90, 90, "%.0f deg"))
+  if (now.posture != Posture::sitting && ImGui::SliderFloat("head turned", &turned, -90, 90, "%.0f deg"))
     changed = true;
   ImGui::PopItemWidth();
   if (ImGui::IsItemHovered())

@@ -17,7 +17,7 @@ sheet::Drawing run_drawing(const Stimulus& s, const DisplayState& state, double 
   d.height = height;
   d.alt = std::string("path and position, ") + (state.kind == RunKind::test ? "test" : short_name(state.training));
   d.box(0, 0, width, height, kPaper);
-  // MainView for the bars above and below the path's own height.
+  // Room for the bars above and below the path's own height.
   const double scale = std::min(0.8 * width / s.params.length_mm, 0.55 * height / s.params.width_mm),
                bar = 0.32 * height;
   const auto at = [&](double x_mm, double z_mm) -> std::array<double, 2> {

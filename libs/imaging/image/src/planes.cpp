@@ -139,7 +139,7 @@ Labels morph_slices(const Labels& labels, std::uint8_t value, Morphology what, d
     }
   static constexpr std::array kOf{cv::MORPH_DILATE, cv::MORPH_ERODE, cv::MORPH_OPEN, cv::MORPH_CLOSE};
   return each_slice(labels, value, axis, context, [&](const cv::Mat& mask) {
-    // MainView around, so that closing may leave the slice and come back.
+    // Room around, so that closing may leave the slice and come back.
     cv::Mat wide, out;
     cv::copyMakeBorder(mask, wide, rv + 1, rv + 1, ru + 1, ru + 1, cv::BORDER_CONSTANT, 0);
     cv::morphologyEx(wide, out, kOf[static_cast<std::size_t>(what)], disc, {-1, -1}, 1, cv::BORDER_CONSTANT, 0);

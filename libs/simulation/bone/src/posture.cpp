@@ -9,7 +9,7 @@ namespace osteo::inline simulation {
 Vec3 down_of(Posture posture, double head_turned_deg) {
   Vec3 down{0, 1, 0};
   if (posture == Posture::prone) down = {0, -1, 0};
-  if (posture == Posture::session_runner) down = {0, 0, -1};
+  if (posture == Posture::sitting) down = {0, 0, -1};
   if (posture == Posture::left_side) down = {1, 0, 0};
   if (posture == Posture::right_side) down = {-1, 0, 0};
   // The face from -y towards +x: the head turns so, and what is down turns the other way in it.
@@ -18,7 +18,7 @@ Vec3 down_of(Posture posture, double head_turned_deg) {
 }
 
 PostureNow posture_of(Vec3 down) {
-  if (down.z * down.z > 0.5) return {Posture::session_runner, 0};
+  if (down.z * down.z > 0.5) return {Posture::sitting, 0};
   const double degrees = portable::atan2(down.x, down.y) * 180 / std::numbers::pi;
   if (degrees > 90.001) return {Posture::prone, degrees - 180};
   if (degrees < -90.001) return {Posture::prone, degrees + 180};

@@ -8,7 +8,7 @@
 
 namespace osteo::inline simulation {
 
-enum class Posture : int { supine, prone, session_runner, left_side, right_side };
+enum class Posture : int { supine, prone, sitting, left_side, right_side };
 [[nodiscard]] constexpr std::array<std::string_view, 5> enum_names(Posture) {
   return {"supine", "prone", "sitting", "left_side", "right_side"};
 }
@@ -22,7 +22,7 @@ struct PostureNow {
   Posture posture = Posture::supine;
   double head_turned_deg = 0;
 };
-/// One of those that give this direction (unit): supine, prone or sitting, turned by at most 90 degrees. SessionRunner
+/// One of those that give this direction (unit): supine, prone or sitting, turned by at most 90 degrees. Sitting
 /// where it lies along the body's axis more than across it.
 [[nodiscard]] PostureNow posture_of(Vec3 down);
 
