@@ -61,4 +61,53 @@ std::vector<Data> PlanReconstructionStage::run(const Params& params, std::span<c
   return {Document{plan_json(r.plan)}, Document{j.dump(1) + "\n"}};
 }
 
+StageInfo CuttingGuideStage::info() {
+  return {.name = "cutting-guide",
+          .version = 1,
+          .synopsis = "a cutting guide to print, from a plan and the bone",
+          .description =
+              "A block that fits the bone in one place, with a slot for each planned plane. Its underside is the "
+              "bone's offset surface as seen from where the guide comes from, so that nothing catches; its top is "
+              "flat, to be printed on. Slots that would run into each other share an opening whose two faces lead "
+              "the saw. Reports the gap by exact distances, an exact sweep of putting it on, and how far its play "
+              "lets each plane rock. For research and training; no medical device: a guide for a named patient is "
+              "a custom-made device under its own law.",
+          .inputs = {{"plan", {DataKind::document}, "plan file of 'plan-reconstruction', or written by hand"},
+                     {"bone", {DataKind::surface}, "closed surface of the bone that the plan cuts, in the plan's CT"}},
+          .outputs = {{"guide", {DataKind::surface}, "closed surface of the guide"},
+                      {"findings", {DataKind::document}, "measures of the guide in JSON", true}},
+          .references = {"G. Dantzig, Linear Programming and Extensions, Princeton 1963"},
+          .example = "osteo cutting-guide plan.json fibula.stl guide.stl --bone fibula --code CASE-7"};
+}
+
+std::vector<Data> CuttingGuideStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
+  const SurgicalPlan plan = plan_of(std::get<Document>(inputs[0]).json, "the plan");
+  const TriangleSoup bone = compacted(welded(soup_of(*std::get<Surface>(inputs[1]))));
+  const CuttingGuide g = make_cutting_guide(bone, plan, params, context);
+  context.report("cuts", static_cast<std::int64_t>(g.cuts.size()));
+  context.report("min_gap_mm", g.min_gap_mm);
+  context.report("seat_mm2", g.seat_mm2);
+  context.report("seat_off_mm", g.seat_off_mm);
+  context.report("insertion_clearance_mm", g.insertion_mm);
+  Json j{{"osteotome_cutting_guide", 1},
+         {"intended_use", "research, teaching and rehearsal; not a medical device"},
+         {"approach", json_of(g.approach)},
+         {"along", json_of(g.along)},
+         {"size_mm", Json{g.length_mm, g.width_mm, g.height_mm}},
+         {"gap_mm", params.gap_mm},
+         {"min_gap_mm", g.min_gap_mm},
+         {"seat_mm2", g.seat_mm2},
+         {"seat_off_mm", g.seat_off_mm},
+         {"insertion_clearance_mm", g.insertion_mm},
+         {"engraved", g.engraved}};
+  j["cuts"] = Json::list();
+  for (const GuideCut& c : g.cuts)
+    j["cuts"].push_back({{"plane", c.plane},
+                         {"two_sided", c.two_sided},
+                         {"width_mm", c.width_mm},
+                         {"rock_mm", c.rock_mm},
+                         {"rock_deg", c.rock_deg}});
+  return {std::make_shared<const TriMesh>(mesh_of(g.solid)), Document{j.dump(1) + "\n"}};
+}
+
 }  // namespace osteo::inline app
