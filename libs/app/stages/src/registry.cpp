@@ -54,6 +54,7 @@ Registry osteo_stages() {
   registry.add<RegisterStage>();
   registry.add<PlanReconstructionStage>();
   registry.add<CuttingGuideStage>();
+  registry.add<OutcomeStage>();
   registry.add<PhantomStage>();
   return registry;
 }
