@@ -209,6 +209,75 @@ TEST(CuttingGuide, ServesAReconstruction) {
   EXPECT_LT(jaw.seat_off_mm, 0.02);
 }
 
+void write_obj(const std::string& path, const TriangleSoup& s) {
+  const TriMesh m = mesh_of(s);  // single precision, as files of guides are
+  std::ofstream out(path);
+  out.precision(9);
+  for (const auto& p : m.points_mm) out << "v " << p[0] << ' ' << p[1] << ' ' << p[2] << '\n';
+  for (const auto& t : m.triangles) out << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
+}
+
+// OSTEO_GUIDES_SEEDS=30 [OSTEO_GUIDES_OUT=FOLDER] test_planning --gtest_filter=CuttingGuide.Benchmark: the table of
+// docs/validation/planning.md; tests/bench/guides_reference.py judges what is in FOLDER.
+TEST(CuttingGuide, Benchmark) {
+  const char* seeds = std::getenv("OSTEO_GUIDES_SEEDS");
+  const char* folder = std::getenv("OSTEO_GUIDES_OUT");
+  if (seeds == nullptr) GTEST_SKIP() << "OSTEO_GUIDES_SEEDS is not set";
+  for (int seed = 1; seed <= std::atoi(seeds); ++seed) {
+    const JawPhantom p = make_jaw_phantom(static_cast<std::uint64_t>(seed), 12);
+    ReconstructionParams r;
+    const auto set = [](std::array<double, 3>& to, Vec3 v) { to = {v.x, v.y, v.z}; };
+    set(r.a_mm, p.a_mm);
+    set(r.b_mm, p.b_mm);
+    set(r.a_normal, p.a_normal);
+    set(r.b_normal, p.b_normal);
+    SurgicalPlan plan;
+    try {
+      plan = reconstruct(p.jaw, p.donor, r).plan;
+    } catch (const Error& e) {
+      std::cout << "seed " << seed << " no plan: " << e.what() << std::endl;
+      continue;
+    }
+    for (const std::string which : {"fibula", "resection a", "resection b"}) {
+      CuttingGuideParams params;
+      const bool donor = which == "fibula";
+      params.bone = donor ? "fibula" : "mandible";
+      if (!donor) params.planes = which;
+      params.code = "S" + std::to_string(seed);
+      const TriangleSoup& bone = donor ? p.donor : p.jaw;
+      const auto start = std::clock();
+      std::cout << "seed " << seed << ' ' << which;
+      try {
+        const CuttingGuide g = make_cutting_guide(bone, plan, params);
+        const double s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+        const MeshSummary m = summarize(mesh_of(g.solid));
+        const SignedDistance solid(g.solid), distance(bone);
+        SlotFound worst;
+        double rock = 0;
+        for (const GuideCut& c : g.cuts) {
+          const SlotFound f =
+              measured_slot(g, solid, distance, plan.plane(c.plane), c.two_sided ? params.play_mm : 0);
+          if (f.places < 6) std::cout << " slot not measured: " << c.plane;
+          worst.off_mm = std::max(worst.off_mm, f.off_mm);
+          worst.off_deg = std::max(worst.off_deg, f.off_deg);
+          rock = std::max(rock, c.rock_deg);
+        }
+        std::cout << " manifold " << (m.watertight && m.manifold && m.bodies == 1) << " min_gap " << g.min_gap_mm
+                  << " seat_off " << g.seat_off_mm << " seat_mm2 " << g.seat_mm2 << " insertion " << g.insertion_mm
+                  << " slot_mm " << worst.off_mm << " slot_deg " << worst.off_deg << " rock_deg " << rock
+                  << " engraved " << g.engraved << " triangles " << m.triangles << " s " << s << std::endl;
+        if (folder == nullptr) continue;
+        const std::string name = std::string(folder) + "/" + std::to_string(seed) + " " + which;
+        write_obj(name + " guide.obj", g.solid);
+        write_obj(name + " bone.obj", bone);
+        std::ofstream(name + " approach.txt") << g.approach.x << ' ' << g.approach.y << ' ' << g.approach.z << '\n';
+      } catch (const Error& e) {
+        std::cout << " rejected: " << e.what() << std::endl;
+      }
+    }
+  }
+}
+
 TEST(CuttingGuide, WhatCannotBeMadeIsSaid) {
   const TriangleSoup bone = tube(6, 100);
   const auto complaint = [&](const SurgicalPlan& plan, auto&& change) {
