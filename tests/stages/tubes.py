@@ -33,11 +33,19 @@ tube(
 tube("fibula.obj", lambda t: ((0, 0, -300 * t), (1, 0, 0), (0, 1, 0)), 100)
 
 c, s = math.cos(math.radians(100)), math.sin(math.radians(100))
-plane = {"name": "a", "bone": "jaw", "at_mm": [45 * c, 45 * s, 0], "normal": [-s, c, 0], "kerf_mm": 1, "waste_ahead": True}
+plane = {
+    "name": "a",
+    "bone": "jaw",
+    "at_mm": [45 * c, 45 * s, 0],
+    "normal": [-s, c, 0],
+    "kerf_mm": 1,
+    "waste_ahead": True,
+}
 stays = {"name": "rest", "bone": "jaw", "planes": ["a"], "rotation_rows": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
 with open("cut.json", "w") as f:
     json.dump(
-        {"osteotome_surgical_plan": 1, "unit": "mm", "planes": [plane], "fragments": [stays | {"shift_mm": [0, 0, 0]}]}, f
+        {"osteotome_surgical_plan": 1, "unit": "mm", "planes": [plane], "fragments": [stays | {"shift_mm": [0, 0, 0]}]},
+        f,
     )
 
 voxels, step, dims, origin = array.array("h"), 0.8, (112, 90, 30), (-30, -14, -11.6)

@@ -49,8 +49,7 @@ SurgicalPlan one_plane(Vec3 at, Vec3 normal, double kerf = 1) {
 
 TriangleSoup box(Vec3 lo, Vec3 hi) {
   TriangleSoup s;
-  for (int n = 0; n < 8; ++n)
-    s.points_mm.push_back({n & 1 ? hi.x : lo.x, n & 2 ? hi.y : lo.y, n & 4 ? hi.z : lo.z});
+  for (int n = 0; n < 8; ++n) s.points_mm.push_back({n & 1 ? hi.x : lo.x, n & 2 ? hi.y : lo.y, n & 4 ? hi.z : lo.z});
   s.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                  {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   return s;
@@ -255,8 +254,7 @@ TEST(CuttingGuide, Benchmark) {
         SlotFound worst;
         double rock = 0;
         for (const GuideCut& c : g.cuts) {
-          const SlotFound f =
-              measured_slot(g, solid, distance, plan.plane(c.plane), c.two_sided ? params.play_mm : 0);
+          const SlotFound f = measured_slot(g, solid, distance, plan.plane(c.plane), c.two_sided ? params.play_mm : 0);
           if (f.places < 6) std::cout << " slot not measured: " << c.plane;
           worst.off_mm = std::max(worst.off_mm, f.off_mm);
           worst.off_deg = std::max(worst.off_deg, f.off_deg);

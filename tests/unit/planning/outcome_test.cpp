@@ -23,8 +23,7 @@ struct World {
   BoneField jaw, donor;
   SurgicalPlan rebuilt;   ///< from fibula segments, which lie upon each other
   SurgicalPlan advanced;  ///< one cut, the front moved away: faces that a CT shows
-  explicit World(std::uint64_t seed)
-      : phantom(make_jaw_phantom(seed, 12)), jaw(phantom.jaw), donor(phantom.donor) {
+  explicit World(std::uint64_t seed) : phantom(make_jaw_phantom(seed, 12)), jaw(phantom.jaw), donor(phantom.donor) {
     ReconstructionParams r;
     const auto set = [](std::array<double, 3>& to, Vec3 v) { to = {v.x, v.y, v.z}; };
     set(r.a_mm, phantom.a_mm);
@@ -276,7 +275,8 @@ TEST(LeastSquares, IntervalsHoldWithErrorsThatGoTogether) {
     for (int patch = 0; patch < 40; ++patch) {
       const double off = gaussian(random);
       for (int n = 0; n < 10; ++n)
-        all.push_back({{1, 0.1 * patch + 0.01 * n}, 2 + 0.5 * (0.1 * patch + 0.01 * n) + off + 0.1 * gaussian(random),
+        all.push_back({{1, 0.1 * patch + 0.01 * n},
+                       2 + 0.5 * (0.1 * patch + 0.01 * n) + off + 0.1 * gaussian(random),
                        {patch, 0, 0}});
     }
     const auto s = planning::least_squares<2>(all);

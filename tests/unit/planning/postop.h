@@ -93,14 +93,12 @@ inline std::vector<float> noise_of(const Frame& f, double sd, std::uint64_t seed
   return v;
 }
 
-inline Image postop_ct(const std::vector<TrueFragment>& fragments, BoxMm box, const PostopCt& how,
-                       std::uint64_t seed) {
+inline Image postop_ct(const std::vector<TrueFragment>& fragments, BoxMm box, const PostopCt& how, std::uint64_t seed) {
   Image ct;
   ct.frame.spacing_mm = how.spacing_mm;
   ct.frame.direction = rotation_about({}, normalized({1, 2, -1}), 0.07).rotation;
   const Vec3 middle = (box.lo + box.hi) / 2, half = (box.hi - box.lo) / 2 + Vec3{10, 10, 10};
-  for (std::size_t a = 0; a < 3; ++a)
-    ct.frame.dims[a] = static_cast<int>(2 * half[a] / how.spacing_mm[a]);
+  for (std::size_t a = 0; a < 3; ++a) ct.frame.dims[a] = static_cast<int>(2 * half[a] / how.spacing_mm[a]);
   ct.frame.origin_mm = middle - ct.frame.direction * half;
   const auto voxels = make_voxels<std::int16_t>(ct.frame.voxel_count());
   const std::vector<float> noise = noise_of(ct.frame, how.noise_hu, seed);
@@ -130,7 +128,8 @@ inline Image postop_ct(const std::vector<TrueFragment>& fragments, BoxMm box, co
           const double r = length(p);
           if (r > 3) hu += 250 * std::sin(9 * std::atan2(p.z, p.x)) * std::exp(-r / 15);
         }
-        voxels[n] = static_cast<std::int16_t>(std::lround(std::clamp(hu + static_cast<double>(noise[n]), -1000.0, 3071.0)));
+        voxels[n] =
+            static_cast<std::int16_t>(std::lround(std::clamp(hu + static_cast<double>(noise[n]), -1000.0, 3071.0)));
       }
     }
   }

@@ -126,12 +126,15 @@ StageInfo OutcomeStage::info() {
           "'register' brings it there. For research and training; no medical device.",
       .inputs = {{"plan", {DataKind::document}, "plan file"},
                  {"postop", {DataKind::image}, "CT after surgery"},
-                 {"bone", {DataKind::surface}, "closed surface of the bone that the plan names first, in the plan's CT"},
+                 {"bone",
+                  {DataKind::surface},
+                  "closed surface of the bone that the plan names first, in the plan's CT"},
                  {"donor", {DataKind::surface}, "closed surface of the plan's other bone", true}},
       .outputs = {{"outcome", {DataKind::document}, "deviations and intervals in JSON"},
                   {"page", {DataKind::document}, "one page to print, in HTML", true}},
-      .references = {"K.-Y. Liang, S. Zeger, Longitudinal data analysis using generalized linear models, Biometrika 1986",
-                     "D. Chetverikov et al., The trimmed iterative closest point algorithm, ICPR 2002"},
+      .references =
+          {"K.-Y. Liang, S. Zeger, Longitudinal data analysis using generalized linear models, Biometrika 1986",
+           "D. Chetverikov et al., The trimmed iterative closest point algorithm, ICPR 2002"},
       .example = "osteo outcome plan.json after.nrrd mandible.stl fibula.stl outcome.json --page-out outcome.html"};
 }
 
@@ -209,8 +212,8 @@ std::string outcome_page(const Outcome& o) {
   sheet::Table cuts{{"Cut", "off the plan (mm)", "tilt (degrees)"}, {}, {0.3, 0.35, 0.35}};
   for (const CutOutcome& c : o.cuts) {
     if (c.known)
-      cuts.rows.push_back({cell(c.plane), cell(text_of(c.off_mm)),
-                           cell(text_of(c.tilt_deg[0]) + "; " + text_of(c.tilt_deg[1]))});
+      cuts.rows.push_back(
+          {cell(c.plane), cell(text_of(c.off_mm)), cell(text_of(c.tilt_deg[0]) + "; " + text_of(c.tilt_deg[1]))});
     else
       cuts.rows.push_back({cell(c.plane), cell("not known: " + c.why, Tone::caution), cell("")});
   }

@@ -32,8 +32,9 @@ struct CuttingGuideStage {
     visit({"bone", "name of the bone in the plan; empty: the only one that it cuts"}, p.bone);
     visit({"planes", "names of the planes that the guide serves, separated by commas; empty: all of the bone"},
           p.planes);
-    visit({"approach", "direction from the bone to where the guide comes from; 0,0,0: where wedges open, else away "
-                       "from the bone's middle"},
+    visit({"approach",
+           "direction from the bone to where the guide comes from; 0,0,0: where wedges open, else away "
+           "from the bone's middle"},
           p.approach);
     visit({"slot", "closed: a bridge at both ends of each slot; open: at one end"}, p.slot);
     visit({"gap_mm", "distance of the guide's underside to the bone", "mm", 0.02, 2}, p.gap_mm);
@@ -52,8 +53,9 @@ struct OutcomeStage {
   static void describe(Params& p, auto& visit) {
     visit({"min_drop_hu", "an edge of bone drops by at least this much", "HU", 20, 3000}, p.min_drop_hu);
     visit({"metal_hu", "edges within 3 mm of voxels brighter than this are left out", "HU", 500, 32767}, p.metal_hu);
-    visit({"max_unsure_mm", "a result is not known where the half-width of its 95 % interval is larger", "mm", 0.01, 10},
-          p.max_unsure_mm);
+    visit(
+        {"max_unsure_mm", "a result is not known where the half-width of its 95 % interval is larger", "mm", 0.01, 10},
+        p.max_unsure_mm);
     visit({"max_unsure_deg", "a result is not known where the half-width of its 95 % interval is larger", "degrees",
            0.01, 30},
           p.max_unsure_deg);

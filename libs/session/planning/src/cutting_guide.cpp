@@ -203,8 +203,7 @@ GuideLayout layout_of(const TriangleSoup& local, const std::vector<CutPlane>& pl
   slot_ends(local, planes, axes, l);
   l.y0 = l.cut0 - params.wall_mm;
   l.y1 = l.cut1 + params.wall_mm;
-  for (std::size_t n = 0; n < planes.size(); ++n)
-    l.openings.push_back(slot_of(planes[n], n, axes, params.play_mm));
+  for (std::size_t n = 0; n < planes.size(); ++n) l.openings.push_back(slot_of(planes[n], n, axes, params.play_mm));
   const double first = axes.local(planes.front().at_mm).x, last = axes.local(planes.back().at_mm).x;
   const double reach = params.margin_mm + 20;
   under.measure_crest(first - reach, last + reach, l.y0, l.y1, params.depth_mm, context);
@@ -265,9 +264,9 @@ void rock(const GuideBlock& block, const std::vector<CutPlane>& planes, const Ax
   const auto most = [&](Vec3 shift, Vec3 turn) {
     double out = 0;
     for (const double sign : {1.0, -1.0})
-      out = std::max(out, largest({sign * shift.x, sign * shift.y, sign * shift.z, sign * turn.x, sign * turn.y,
-                                   sign * turn.z},
-                                  rows, room));
+      out = std::max(
+          out, largest({sign * shift.x, sign * shift.y, sign * shift.z, sign * turn.x, sign * turn.y, sign * turn.z},
+                       rows, room));
     return out;
   };
   for (std::size_t n = 0; n < planes.size(); ++n) {

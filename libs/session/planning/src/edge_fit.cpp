@@ -40,7 +40,8 @@ std::optional<double> EdgeReader::value(Vec3 point) const {
 }
 
 std::optional<EdgeReader::Edge> EdgeReader::along(Vec3 point, Vec3 direction, double reach_mm) const {
-  const int reach = static_cast<int>(std::ceil(reach_mm / kSampleMm)), metal = static_cast<int>(kMetalReachMm / kSampleMm);
+  const int reach = static_cast<int>(std::ceil(reach_mm / kSampleMm)),
+            metal = static_cast<int>(kMetalReachMm / kSampleMm);
   const int ends = std::max(reach + kHalf + 1, metal);
   std::vector<double> profile;
   profile.reserve(static_cast<std::size_t>(2 * ends + 1));

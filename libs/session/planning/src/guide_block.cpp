@@ -68,8 +68,8 @@ class Block {
         lo = std::max(lo, station(2 * k, y, l_.top));
         hi = std::min(hi, station(2 * k + 1, y, l_.top));
       }
-      const double fits = std::min({(hi - lo - 2) / (6.0 * static_cast<double>(text.size())), (l_.y1 - l_.y0 - 2) / 7,
-                                    kLargestPixelMm});
+      const double fits = std::min(
+          {(hi - lo - 2) / (6.0 * static_cast<double>(text.size())), (l_.y1 - l_.y0 - 2) / 7, kLargestPixelMm});
       if (fits <= pixel) continue;
       pixel = fits;
       x = (lo + hi - pixel * (6 * static_cast<double>(text.size()) - 1)) / 2;

@@ -58,9 +58,7 @@ double least_above(const Shadow& guide, const Shadow& bone) {
   std::copy(guide.at.begin(), guide.at.end(), now.begin());
   for (std::size_t e = 0; e < 3; ++e) {
     const Corner2 &a = bone.at[e], &b = bone.at[(e + 1) % 3];
-    const auto inside = [&](const Corner2& p) {
-      return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
-    };
+    const auto inside = [&](const Corner2& p) { return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]); };
     std::size_t m = 0;
     for (std::size_t k = 0; k < n; ++k) {
       const Corner2 &p = now[k], &q = now[(k + 1) % n];

@@ -45,10 +45,10 @@ class Underside {
 };
 
 struct GuideLayout {
-  double x0 = 0, x1 = 0;                  ///< ends of the block
+  double x0 = 0, x1 = 0;                      ///< ends of the block
   double y0 = 0, y1 = 0, cut0 = 0, cut1 = 0;  ///< sides of the block; ends of the slots
   double top = 0;
-  std::vector<GuideOpening> openings;     ///< by x
+  std::vector<GuideOpening> openings;  ///< by x
   bool open_end = false;
   double gap = 0.1;
   std::string text;

@@ -194,8 +194,7 @@ std::optional<Fit> located(const EdgeReader& ct, const std::vector<SurfacePlace>
   std::optional<Fit> best;
   for (std::size_t n = 0; n < std::min(search.keep, order.size()); ++n) {
     auto fit = refined(ct, places, starts[order[n]], 1.5 * search.step_mm + 2, context);
-    if (fit && (!best || fit->found > best->found + 0.02 ||
-                (fit->found > best->found - 0.02 && fit->rms < best->rms)))
+    if (fit && (!best || fit->found > best->found + 0.02 || (fit->found > best->found - 0.02 && fit->rms < best->rms)))
       best = std::move(fit);
   }
   return best;
@@ -307,7 +306,8 @@ CutOutcome cut_of(const CutPlane& plane, const std::string& fragment, const Tria
     std::vector<Equation<3>> all;
     for (const auto& s : seen) {
       if (std::abs(left(s)) > limit) continue;
-      all.push_back({{1, s.first[0] - middle[0], s.first[1] - middle[1]}, left(s),
+      all.push_back({{1, s.first[0] - middle[0], s.first[1] - middle[1]},
+                     left(s),
                      patch_of({s.first[0], s.first[1], 0}, kFacePatchMm)});
     }
     solved = planning::least_squares<3>(all);
@@ -327,7 +327,7 @@ CutOutcome cut_of(const CutPlane& plane, const std::string& fragment, const Tria
   std::array<Row<7>, 3> slope{};
   for (std::size_t k = 0; k < 7; ++k) slope[0][k] = -moves[2][k] - (k == 6 ? 1 : 0);
   for (std::size_t k = 0; k < 6; ++k) {
-    slope[1][k] = moves[4][k];   // h rises along x by minus the turn about y
+    slope[1][k] = moves[4][k];  // h rises along x by minus the turn about y
     slope[2][k] = -moves[3][k];
   }
   const auto pose = planning::carried<7, 3>(slope, fit.covariance);

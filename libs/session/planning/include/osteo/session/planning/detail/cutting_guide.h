@@ -18,16 +18,16 @@ enum class GuideSlot : int { closed, open };
 }
 
 struct CuttingGuideParams {
-  std::string bone;                   ///< as the plan names it; empty: the plan's only one
-  std::string planes;                 ///< names, separated by commas; empty: all of the bone
-  std::array<double, 3> approach{};   ///< from the bone to where the guide comes from; zero: chosen
+  std::string bone;                  ///< as the plan names it; empty: the plan's only one
+  std::string planes;                ///< names, separated by commas; empty: all of the bone
+  std::array<double, 3> approach{};  ///< from the bone to where the guide comes from; zero: chosen
   GuideSlot slot = GuideSlot::closed;
-  double gap_mm = 0.1;                ///< between guide and bone
-  double play_mm = 0.1;               ///< a slot is this much wider than the kerf
-  double wall_mm = 4;                 ///< over the highest place of the bone, and of the bridges
-  double margin_mm = 10;              ///< of the block beyond the outermost slots
-  double depth_mm = 4;                ///< how far the guide reaches down beside the highest place
-  std::string code;                   ///< engraved
+  double gap_mm = 0.1;    ///< between guide and bone
+  double play_mm = 0.1;   ///< a slot is this much wider than the kerf
+  double wall_mm = 4;     ///< over the highest place of the bone, and of the bridges
+  double margin_mm = 10;  ///< of the block beyond the outermost slots
+  double depth_mm = 4;    ///< how far the guide reaches down beside the highest place
+  std::string code;       ///< engraved
 };
 
 /// What one planned plane became.
@@ -41,9 +41,9 @@ struct GuideCut {
 };
 
 struct CuttingGuide {
-  TriangleSoup solid;  ///< closed, manifold, in the axes of the bone's CT
-  Vec3 approach;       ///< unit; the guide is put on against it
-  Vec3 along;          ///< unit, at right angles to it: from the first plane to the last
+  TriangleSoup solid;          ///< closed, manifold, in the axes of the bone's CT
+  Vec3 approach;               ///< unit; the guide is put on against it
+  Vec3 along;                  ///< unit, at right angles to it: from the first plane to the last
   std::vector<GuideCut> cuts;  ///< in this order
   double min_gap_mm = 0;       ///< least distance of the underside to the bone, exact at its nodes and between
   double seat_mm2 = 0;         ///< of the underside that follows the bone

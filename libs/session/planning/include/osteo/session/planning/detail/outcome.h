@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "osteo/core/base/context.h"
@@ -12,9 +13,9 @@
 namespace osteo::inline session {
 
 struct OutcomeParams {
-  double min_drop_hu = 200;    ///< an edge of bone drops by at least this much
-  double metal_hu = 2500;      ///< edges within 3 mm of what is brighter are left out
-  double max_unsure_mm = 1;    ///< half-width of an interval from which on it is not known
+  double min_drop_hu = 200;  ///< an edge of bone drops by at least this much
+  double metal_hu = 2500;    ///< edges within 3 mm of what is brighter are left out
+  double max_unsure_mm = 1;  ///< half-width of an interval from which on it is not known
   double max_unsure_deg = 2;
 };
 
@@ -28,11 +29,11 @@ struct Measured {
 struct FragmentOutcome {
   std::string name;
   bool known = false, reference = false;
-  std::string why;  ///< it is not known
+  std::string why;                             ///< it is not known
   std::array<Measured, 3> shift_mm, turn_deg;  ///< at `middle_mm`; rotation vector
   Vec3 middle_mm;                              ///< of the fragment as planned
-  double edge_mm = 0;   ///< root mean square of what edges are off along their normals
-  double found = 0;     ///< share of places at which the CT shows an edge that fits
+  double edge_mm = 0;                          ///< root mean square of what edges are off along their normals
+  double found = 0;                            ///< share of places at which the CT shows an edge that fits
   RigidTransform postop_from_ct;
 };
 
