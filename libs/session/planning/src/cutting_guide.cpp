@@ -199,10 +199,10 @@ GuideLayout layout_of(const TriangleSoup& local, const std::vector<CutPlane>& pl
                       const CuttingGuideParams& params, Underside& under, const Context& context) {
   GuideLayout l;
   l.gap = params.gap_mm;
-  l.open_end = params.slot == GuideSlot::open;
   slot_ends(local, planes, axes, l);
   l.y0 = l.cut0 - params.wall_mm;
   l.y1 = l.cut1 + params.wall_mm;
+  if (params.slot == GuideSlot::open) l.cut1 = l.y1;
   for (std::size_t n = 0; n < planes.size(); ++n) l.openings.push_back(slot_of(planes[n], n, axes, params.play_mm));
   const double first = axes.local(planes.front().at_mm).x, last = axes.local(planes.back().at_mm).x;
   const double reach = params.margin_mm + 20;

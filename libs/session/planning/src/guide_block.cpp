@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kNodesMm = 0.3, kEngravedMm = 0.5, kMayBeNearerMm = 0.01, kFloorMm = 0.02, kSteepest = 3;
 constexpr double kSmallestPixelMm = 0.6, kLargestPixelMm = 1.2;
-constexpr int kMaxRaises = 6, kMaxTraceSteps = 2000;
+constexpr int kMaxRaises = 12, kMaxTraceSteps = 2000;
 constexpr double kTracedMm = 1e-7;
 
 // Cells of a grid of rows (y) and columns (x), the holes left out; each cell has an underside and a top.
@@ -23,9 +23,8 @@ class Block {
     first_cut_ = rows_.size();
     add_rows(l_.cut0, l_.cut1);
     last_cut_ = rows_.size();
-    add_rows(l_.cut1, l_.y1);
+    if (l_.cut1 < l_.y1) add_rows(l_.cut1, l_.y1);
     rows_.push_back(l_.y1);
-    if (l_.open_end) last_cut_ = rows_.size() - 1;
     // Columns: between each two stations as many as keep to the wanted distance where they are widest apart.
     const std::size_t stations = 2 * l_.openings.size() + 2;
     first_column_.assign(1, 0);
@@ -178,9 +177,9 @@ class Block {
         for (std::size_t c = 0; c + 1 < columns_; ++c) {
           if (!there(j, c)) continue;
           for (const Vec3& p : places(j, c)) {
-            const ClosestPoint near = under_.tree().closest(p, hint);
-            hint = near.triangle;
-            out[at(j, c)] = std::min(out[at(j, c)], near.distance_mm);
+            const auto near = under_.bone().at(p, hint);
+            hint = near.closest.triangle;
+            out[at(j, c)] = std::min(out[at(j, c)], near.signed_mm);
           }
         }
       }
@@ -196,7 +195,7 @@ class Block {
         if (lacks <= 0) continue;
         any = true;
         for (const std::size_t n : {at(j, c), at(j, c + 1), at(j + 1, c), at(j + 1, c + 1)})
-          by[n] = std::max(by[n], lacks + 0.001);
+          by[n] = std::max(by[n], 1.5 * lacks + 0.001);
       }
     }
     for (std::size_t n = 0; n < by.size(); ++n) bottom_[n].z += by[n];
@@ -224,15 +223,17 @@ class Block {
           hi = std::max(hi, p.z);
           seated = seated && p.z > under_.crest(p.x) - under_.depth() + kFloorMm;
         }
-        if (!seated || hi - lo > kSteepest * kNodesMm) continue;
+        if (!seated) continue;
+        if (j % 4 == 0 && c % 4 == 0) {
+          const Vec3 p = places(j, c)[0];
+          const ClosestPoint near = under_.bone().closest(p);
+          out.contacts.push_back({p, normalized(p - near.point_mm), near.distance_mm});
+        }
+        if (hi - lo > kSteepest * kNodesMm) continue;
         const Vec3 &a = bottom_[n[0]], &b = bottom_[n[1]], &d = bottom_[n[2]], &e = bottom_[n[3]];
         out.seat_mm2 += length(cross(d - a, e - b)) / 2;
         for (const Vec3& p : places(j, c))
-          out.seat_off = std::max(out.seat_off, std::abs(under_.tree().closest(p).distance_mm - l_.gap));
-        if (j % 4 != 0 || c % 4 != 0) continue;
-        const Vec3 p = places(j, c)[0];
-        const ClosestPoint near = under_.tree().closest(p);
-        out.contacts.push_back({p, normalized(p - near.point_mm), near.distance_mm});
+          out.seat_off = std::max(out.seat_off, std::abs(under_.bone().closest(p).distance_mm - l_.gap));
       }
     }
   }
@@ -248,14 +249,14 @@ class Block {
 }  // namespace
 
 Underside::Underside(const TriangleSoup& local_bone, double gap, const Context& context)
-    : tree_(local_bone, context), box_(bounds_of(local_bone)), gap_(gap) {}
+    : bone_(local_bone, context), box_(bounds_of(local_bone)), gap_(gap) {}
 
 double Underside::traced(double x, double y, double floor) const {
   // Spheres without bone, one below the other.
   double z = box_.hi.z + gap_;
   std::uint32_t hint = ClosestPoint::kNone;
   for (int n = 0; n < kMaxTraceSteps && z > floor; ++n) {
-    const ClosestPoint near = tree_.closest({x, y, z}, hint);
+    const ClosestPoint near = bone_.closest({x, y, z}, hint);
     hint = near.triangle;
     const double free = near.distance_mm - gap_;
     if (free < kTracedMm) return z;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "osteo/core/base/context.h"
-#include "osteo/geometry/distance/triangle_tree.h"
+#include "osteo/geometry/distance/distance_map.h"
 #include "osteo/session/planning/detail/cutting_guide.h"
 
 namespace osteo::inline session::guide {
@@ -35,21 +35,21 @@ class Underside {
   [[nodiscard]] double crest(double x) const;
   [[nodiscard]] double depth() const { return depth_; }
   void measure_crest(double x0, double x1, double y0, double y1, double depth, const Context& context);
-  [[nodiscard]] const TriangleTree& tree() const { return tree_; }
+  [[nodiscard]] const SignedDistance& bone() const { return bone_; }
 
  private:
-  TriangleTree tree_;
+  SignedDistance bone_;
   BoxMm box_;
   double gap_, depth_ = 0, x0_ = 0;
   std::vector<double> crest_;  // 1 mm apart
 };
 
 struct GuideLayout {
-  double x0 = 0, x1 = 0;                      ///< ends of the block
-  double y0 = 0, y1 = 0, cut0 = 0, cut1 = 0;  ///< sides of the block; ends of the slots
+  double x0 = 0, x1 = 0;  ///< ends of the block
+  double y0 = 0, y1 = 0, cut0 = 0,
+         cut1 = 0;  ///< sides of the block; ends of the slots, also the side where they are open
   double top = 0;
   std::vector<GuideOpening> openings;  ///< by x
-  bool open_end = false;
   double gap = 0.1;
   std::string text;
 };
