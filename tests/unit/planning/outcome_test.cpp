@@ -224,7 +224,7 @@ TEST(Outcome, SaysWhatCannotBeKnown) {
   };
   const Image empty = postop_ct({}, box, {}, 4);
   EXPECT_NE(error_of(plan, world().bones(), empty).find("not found"), std::string::npos);
-  EXPECT_NE(error_of(plan, empty).find("mandible"), std::string::npos);
+  EXPECT_NE(error_of(plan, {}, empty).find("mandible"), std::string::npos);
   SurgicalPlan all = plan;
   all.fragments[0].planned_from_ct.shift_mm = {1, 0, 0};
   EXPECT_NE(error_of(all, world().bones(), empty).find("moves every fragment"), std::string::npos);
