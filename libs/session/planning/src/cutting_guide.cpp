@@ -178,7 +178,7 @@ void slot_ends(const TriangleSoup& local, const std::vector<CutPlane>& planes, c
   }
 }
 
-std::string text_of(const CuttingGuideParams& params, const Axes& axes, const Context& context) {
+std::string code_of(const CuttingGuideParams& params) {
   std::string text;
   for (const char c : params.code) {
     const char upper = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
@@ -187,11 +187,6 @@ std::string text_of(const CuttingGuideParams& params, const Axes& axes, const Co
                   "letters A to Z, digits and '-' can be engraved");
     text += upper;
   }
-  const Vec3 head = axes.turned({0, 0, 1});
-  if (std::max(std::abs(head.x), std::abs(head.y)) < 0.5)
-    context.warn("no arrow to the head is engraved: the head lies along the approach");
-  else
-    text += std::abs(head.x) > std::abs(head.y) ? (head.x > 0 ? '>' : '<') : (head.y > 0 ? '^' : 'v');
   return text;
 }
 
@@ -236,7 +231,8 @@ GuideLayout layout_of(const TriangleSoup& local, const std::vector<CutPlane>& pl
                 "the guide would be " + format_number(std::round(l.top - lo + params.depth_mm)) + " mm high",
                 "bone is in the way, or far from straight: another --approach, or a guide for each plane (--planes)");
   merge_openings(l, planes, axes, lo - params.depth_mm, context);
-  l.text = text_of(params, axes, context);
+  l.code = code_of(params);
+  l.head = axes.turned({0, 0, 1});
   return l;
 }
 

@@ -11,9 +11,25 @@ namespace osteo::inline session::guide {
 namespace {
 
 constexpr double kNodesMm = 0.3, kEngravedMm = 0.5, kMayBeNearerMm = 0.01, kFloorMm = 0.02, kSteepest = 3;
-constexpr double kSmallestPixelMm = 0.6, kLargestPixelMm = 1.2;
+constexpr double kSmallestPixelMm = 0.5, kLargestPixelMm = 1.2, kRimMm = 0.5, kSeenFromAbove = 0.5;
 constexpr int kMaxRaises = 12, kMaxTraceSteps = 2000;
 constexpr double kTracedMm = 1e-7;
+
+// Lines of characters about a middle; read along x, or along y with its top towards -x.
+struct Inscription {
+  std::vector<std::string> rows;
+  double x = 0, y = 0;
+  bool across = false;
+  [[nodiscard]] double wide() const { return 6 * static_cast<double>(rows[0].size()) - 1; }
+  [[nodiscard]] double high() const { return 9 * static_cast<double>(rows.size()) - 2; }
+  [[nodiscard]] bool covers(Vec3 p, double pixel) const {
+    const double u = (across ? p.y - y : p.x - x) / pixel + wide() / 2;
+    const double down = high() / 2 - (across ? x - p.x : p.y - y) / pixel;
+    if (down < 0 || down >= high()) return false;
+    const auto row = static_cast<std::size_t>(down / 9);
+    return glyph_at(rows[row], u, 7 - (down - 9 * static_cast<double>(row)));
+  }
+};
 
 // Cells of a grid of rows (y) and columns (x), the holes left out; each cell has an underside and a top.
 class Block {
@@ -58,25 +74,31 @@ class Block {
     }
   }
 
-  bool engrave(const std::string& text) {
-    double pixel = 0, x = 0;
-    if (text.empty()) return false;
+  // In the block and the layout (along or across, in one to three lines) that let it be largest.
+  bool engrave() {
+    double pixel = 0;
     for (std::size_t k = 0; k <= l_.openings.size(); ++k) {
       double lo = -1e9, hi = 1e9;
       for (const double y : {l_.cut0, l_.cut1}) {
         lo = std::max(lo, station(2 * k, y, l_.top));
         hi = std::min(hi, station(2 * k + 1, y, l_.top));
       }
-      const double fits = std::min(
-          {(hi - lo - 2) / (6.0 * static_cast<double>(text.size())), (l_.y1 - l_.y0 - 2) / 7, kLargestPixelMm});
-      if (fits <= pixel) continue;
-      pixel = fits;
-      x = (lo + hi - pixel * (6 * static_cast<double>(text.size()) - 1)) / 2;
+      for (const bool across : {false, true}) {
+        for (std::size_t lines = 1; lines <= 3; ++lines) {
+          const Inscription i = inscription((lo + hi) / 2, across, lines);
+          if (i.rows.empty()) continue;
+          const double along = across ? l_.y1 - l_.y0 : hi - lo, up = across ? hi - lo : l_.y1 - l_.y0;
+          const double fits =
+              std::min({(along - 2 * kRimMm) / i.wide(), (up - 2 * kRimMm) / i.high(), kLargestPixelMm});
+          if (fits <= pixel) continue;
+          pixel = fits;
+          text_ = i;
+        }
+      }
     }
     if (pixel < kSmallestPixelMm) return false;
-    const double y = (l_.y0 + l_.y1 - 7 * pixel) / 2;
     for (Vec3& p : top_)
-      if (glyph_at(text, (p.x - x) / pixel, (p.y - y) / pixel)) p.z = l_.top - kEngravedMm;
+      if (text_.covers(p, pixel)) p.z = l_.top - kEngravedMm;
     return true;
   }
 
@@ -106,6 +128,16 @@ class Block {
   }
 
  private:
+  [[nodiscard]] Inscription inscription(double x, bool across, std::size_t lines) const {
+    Inscription out{{}, x, (l_.y0 + l_.y1) / 2, across};
+    const double u = across ? l_.head.y : l_.head.x, w = across ? -l_.head.x : l_.head.y;
+    std::string text = l_.code;
+    if (std::max(std::abs(u), std::abs(w)) > kSeenFromAbove)
+      text += std::abs(u) > std::abs(w) ? (u > 0 ? '>' : '<') : (w > 0 ? '^' : 'v');
+    const std::size_t each = (text.size() + lines - 1) / lines;
+    for (std::size_t at = 0; at < text.size(); at += each) out.rows.push_back(text.substr(at, each));
+    return out;
+  }
   void add_rows(double from, double to) {
     const auto n = std::max<std::size_t>(1, static_cast<std::size_t>(std::ceil((to - from) / kNodesMm)));
     for (std::size_t k = 0; k < n; ++k)
@@ -244,6 +276,7 @@ class Block {
   std::size_t first_cut_ = 0, last_cut_ = 0, columns_ = 0;
   std::vector<std::size_t> first_column_;  // of each station
   std::vector<Vec3> bottom_, top_;
+  Inscription text_;
 };
 
 }  // namespace
@@ -296,7 +329,7 @@ GuideBlock build_block(const GuideLayout& layout, const Underside& under, const 
   block.lay(context);
   context.progress(0.7, "gap");
   block.keep_gap(out, context);
-  out.engraved = block.engrave(layout.text);
+  out.engraved = block.engrave();
   out.solid = block.solid();
   return out;
 }

@@ -51,7 +51,8 @@ struct GuideLayout {
   double top = 0;
   std::vector<GuideOpening> openings;  ///< by x
   double gap = 0.1;
-  std::string text;
+  std::string code;  ///< to engrave
+  Vec3 head;         ///< towards the patient's
 };
 
 struct GuideBlock {

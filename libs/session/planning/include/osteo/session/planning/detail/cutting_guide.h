@@ -25,7 +25,7 @@ struct CuttingGuideParams {
   double gap_mm = 0.1;    ///< between guide and bone
   double play_mm = 0.1;   ///< a slot is this much wider than the kerf
   double wall_mm = 4;     ///< over the highest place of the bone, and of the bridges
-  double margin_mm = 10;  ///< of the block beyond the outermost slots
+  double margin_mm = 12;  ///< of the block beyond the outermost slots
   double depth_mm = 4;    ///< how far the guide reaches down beside the highest place
   std::string code;       ///< engraved
 };
