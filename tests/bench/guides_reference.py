@@ -2,7 +2,7 @@
 """Cutting guides judged by manifold3d and trimesh: guides_reference.py FOLDER, as OSTEO_GUIDES_OUT=FOLDER has it.
 
 Manifold by both; least gap to the bone; and with the guide lifted along its approach step by step, what it has in
-common with the bone. pip install manifold3d trimesh numpy
+common with the bone. pip install manifold3d trimesh scipy
 """
 
 import pathlib

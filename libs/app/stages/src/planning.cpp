@@ -133,7 +133,8 @@ StageInfo OutcomeStage::info() {
       .outputs = {{"outcome", {DataKind::document}, "deviations and intervals in JSON"},
                   {"page", {DataKind::document}, "one page to print, in HTML", true}},
       .references =
-          {"K.-Y. Liang, S. Zeger, Longitudinal data analysis using generalized linear models, Biometrika 1986",
+          {"J. MacKinnon, H. White, Some heteroskedasticity-consistent covariance matrix estimators with improved "
+           "finite sample properties, Journal of Econometrics 1985",
            "D. Chetverikov et al., The trimmed iterative closest point algorithm, ICPR 2002"},
       .example = "osteo outcome plan.json after.nrrd mandible.stl fibula.stl outcome.json --page-out outcome.html"};
 }

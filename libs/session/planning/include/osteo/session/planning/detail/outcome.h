@@ -61,10 +61,10 @@ struct Outcome {
 /// At 2000 places on a fragment's outer surface, 2 mm and more from its cuts, the CT is read along the normal; an edge
 /// is where a smoothed profile drops most. Pose and a common offset (threshold, blur) by least squares, what does not
 /// fit left out. Cut faces the same way, along the plane's normal; a face that lies upon another fragment shows no
-/// edge, and then is not known. Intervals: errors of edges within 5 mm of each other are alike, so the covariance is
-/// that of sums over patches (K.-Y. Liang, S. Zeger, Biometrika 1986) with Student's quantile; the pose's part is in
-/// that of the cuts. Errors: usage: a bone that is missing, no fragment that stays; failed: the reference is not found.
-/// Same bytes for any number of threads.
+/// edge, and then is not known. Intervals: errors of edges within 5 mm of each other are alike, so each such patch is
+/// left out in turn (J. MacKinnon, H. White, Journal of Econometrics 1985), with Student's quantile; the pose's part is
+/// in that of the cuts. Errors: usage: a bone that is missing, no fragment that stays; failed: the reference is not
+/// found. Same bytes for any number of threads.
 [[nodiscard]] Outcome measure_outcome(const SurgicalPlan& plan,
                                       const std::vector<std::pair<std::string, TriangleSoup>>& bones,
                                       const Image& postop, const OutcomeParams& params, const Context& context = {});
