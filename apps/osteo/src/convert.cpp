@@ -76,7 +76,8 @@ int ConvertCommand::run(const Params& p, cli::Invocation& io) {
 cli::CommandInfo BenchCommand::info() {
   return {"bench",
           "speed against error, beside the peers, in one run",
-          "Prints the tables of docs/validation/accuracy.md. Runs osteo_bench, which is built by 'cmake --build build/release "
+          "Prints the tables of docs/validation/accuracy.md. Runs osteo_bench, which is built by 'cmake --build "
+          "build/release "
           "--target osteo_bench'.",
           {{"subject", bench_subject_names(), true}},
           "osteo bench import"};

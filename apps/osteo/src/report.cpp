@@ -111,8 +111,7 @@ namespace {
 void check_object(const std::string& object, const fs::path& example, const char* flag, const cli::Invocation& io) {
   if (object.empty()) return;
   if (fs::path(object).extension() != ".dcm")
-    throw Error(ExitCode::usage, "'" + object + "' does not end in .dcm",
-                std::string(flag) + " " + example.string());
+    throw Error(ExitCode::usage, "'" + object + "' does not end in .dcm", std::string(flag) + " " + example.string());
   if (output_exists(object) && !io.common.force)
     throw Error(ExitCode::cannot_write, "'" + object + "' exists already",
                 "give another name, or --force to replace it");

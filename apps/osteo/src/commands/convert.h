@@ -24,10 +24,11 @@ struct ConvertCommand {
     visit({"onto_source", "a label map as .dcm: on the source's own slices, tilted and uneven as they are"},
           p.onto_source);
     visit({"description", "series description of a .dcm output, as a PACS lists it"}, p.description);
-    visit({"segmentation",
-           "how a label map is stored as .dcm: binary has a frame for each structure, which every viewer reads; labelmap "
-           "has one frame a slice with the structures' numbers, which older viewers do not know"},
-          p.segmentation);
+    visit(
+        {"segmentation",
+         "how a label map is stored as .dcm: binary has a frame for each structure, which every viewer reads; labelmap "
+         "has one frame a slice with the structures' numbers, which older viewers do not know"},
+        p.segmentation);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

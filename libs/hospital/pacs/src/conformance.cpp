@@ -55,9 +55,9 @@ std::string deidentification() {
   std::map<DeidAction, std::size_t> count;
   for (const DeidRow& row : kDeidTable) ++count[row.action];
   constexpr std::pair<DeidAction, std::string_view> kNames[] = {
-      {DeidAction::D, "D"},   {DeidAction::Z, "Z"},   {DeidAction::X, "X"},     {DeidAction::U, "U"},
-      {DeidAction::ZD, "Z/D"}, {DeidAction::XZ, "X/Z"}, {DeidAction::XD, "X/D"}, {DeidAction::XZD, "X/Z/D"},
-      {DeidAction::XZU, "X/Z/U*"}};
+      {DeidAction::D, "D"},    {DeidAction::Z, "Z"},       {DeidAction::X, "X"},
+      {DeidAction::U, "U"},    {DeidAction::ZD, "Z/D"},    {DeidAction::XZ, "X/Z"},
+      {DeidAction::XD, "X/D"}, {DeidAction::XZD, "X/Z/D"}, {DeidAction::XZU, "X/Z/U*"}};
   std::string page =
       "## De-identification\n\n`osteo deidentify`: the Basic Application Level Confidentiality Profile (113100) of "
       "PS3.15 2026c, no option. Rows of table E.1-1 by their action, " +
@@ -74,8 +74,10 @@ std::string network_conformance() {
          table("class", kFetchedImages) + table("transfer syntax", kFetchedForms) +
          "Each of these objects in the first " + std::to_string(kPlainForms) + " of those forms:\n\n" +
          table("class", kFetchedObjects) +
-         "## Security\n\nTLS by the profile BCP 195, not downgrading (PS3.15 B.12): TLS 1.2 or later, both sides with a "
-         "certificate of an issuer that is named; none without `--tls-ca`. Audit messages by PS3.15 A.5 to a file or to "
+         "## Security\n\nTLS by the profile BCP 195, not downgrading (PS3.15 B.12): TLS 1.2 or later, both sides with "
+         "a "
+         "certificate of an issuer that is named; none without `--tls-ca`. Audit messages by PS3.15 A.5 to a file or "
+         "to "
          "syslog (TCP, TLS).\n\n" +
          deidentification();
 }

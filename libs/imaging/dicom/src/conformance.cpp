@@ -1,4 +1,5 @@
-// What is read and written, for the conformance statement: from the table of encodings, and from objects written for it.
+// What is read and written, for the conformance statement: from the table of encodings, and from objects written for
+// it.
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dctk.h>
 
@@ -24,8 +25,7 @@ constexpr std::array kWritten{
                   "`osteo convert --segmentation labelmap` or `labelmap16`"},
     WrittenObject{"STL", UID_EncapsulatedSTLStorage, "Encapsulated STL Storage", "`osteo convert`"},
     WrittenObject{"PDF", UID_EncapsulatedPDFStorage, "Encapsulated PDF Storage", "`osteo report --dicom`"},
-    WrittenObject{"SR", UID_ComprehensiveSRStorage, "Comprehensive SR Storage (TID 1500)",
-                  "`osteo report --measures`"},
+    WrittenObject{"SR", UID_ComprehensiveSRStorage, "Comprehensive SR Storage (TID 1500)", "`osteo report --measures`"},
 };
 
 // One object of each class, as small as it can be.
@@ -53,8 +53,12 @@ std::vector<fs::path> write_samples(const fs::path& folder) {
   save_encapsulated_pdf("%PDF-1.5", "Sample", folder / "pdf.dcm", of);
   save_measures_report({"0", "sample", 24, 300, {{"facial nerve", "tube, version 1", 24, 0}}, {}, folder / "seg.dcm"},
                        folder / "sr.dcm", of);
-  return {scan.series.at(0).headers.at(0).file, folder / "seg.dcm", folder / "map.dcm",
-          folder / "stl.dcm",                   folder / "pdf.dcm", folder / "sr.dcm"};
+  return {scan.series.at(0).headers.at(0).file,
+          folder / "seg.dcm",
+          folder / "map.dcm",
+          folder / "stl.dcm",
+          folder / "pdf.dcm",
+          folder / "sr.dcm"};
 }
 
 std::string tag_text(const DcmTagKey& tag) {
@@ -94,7 +98,8 @@ std::string objects_conformance() {
       "## Files that are read\n\n"
       "Slices are taken by what they hold and not by a list of classes: any image of one sample a pixel, 8, 16 or 32 "
       "bits, with position, orientation, spacing and a rescale slope, single frames or many. `import` wants CT, unless "
-      "it is told otherwise. Segmentations (SEG and LABELMAP) are read as structures. Values of an attribute that DICOM "
+      "it is told otherwise. Segmentations (SEG and LABELMAP) are read as structures. Values of an attribute that "
+      "DICOM "
       "does not allow are named, not guessed ([the verdict](../formats/verdict.md)).\n\n"
       "| transfer syntax | UID | pixels |\n|---|---|---|\n";
   for (const dicom::Encoding& e : dicom::encodings()) {
@@ -110,7 +115,8 @@ std::string objects_conformance() {
   for (const WrittenObject& w : kWritten)
     page += "| " + std::string(w.name) + " | " + std::string(w.uid) + " | " + std::string(w.made_by) + " |\n";
   page +=
-      "\nAll in Explicit VR Little Endian. UIDs are of the form 2.25 (a UUID), made from the content and the study: the "
+      "\nAll in Explicit VR Little Endian. UIDs are of the form 2.25 (a UUID), made from the content and the study: "
+      "the "
       "same content, the same UID. Attributes at the top of the data set, of objects written beside a series for this "
       "page:\n\n" +
       attribute_table();

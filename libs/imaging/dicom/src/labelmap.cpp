@@ -50,11 +50,12 @@ Head read_head(const fs::path& file, int background) {
     const int number = item.Get(kNumber).AsInt();
     const std::string name = text(item.Get(kLabel));
     const vtkDICOMSequence algorithm(item.Get(kAlgorithm));
-    const std::string version = algorithm.GetNumberOfItems() > 0
-                                    ? text(algorithm.GetItem(0).Get(kAlgorithmVersion))
-                                    : std::string();
+    const std::string version =
+        algorithm.GetNumberOfItems() > 0 ? text(algorithm.GetItem(0).Get(kAlgorithmVersion)) : std::string();
     if (number != background)
-      head.segments[number] = {1, name.empty() ? "Segment " + std::to_string(number) : name, {},
+      head.segments[number] = {1,
+                               name.empty() ? "Segment " + std::to_string(number) : name,
+                               {},
                                origin_from(text(item.Get(kAlgorithmType)), text(item.Get(kAlgorithmName)), version)};
   }
   const auto number_of = [&](vtkDICOMTag tag) {

@@ -97,8 +97,11 @@ ReferredSegmentation refer_to_segmentation(const MeasuresReport& report, const D
   DcmFileFormat file;
   dicom::require(file.loadFile(report.segmentation.c_str(), EXS_Unknown, EGL_noChange, 64), report.segmentation);
   DcmDataset& d = *file.getDataset();
-  ReferredSegmentation s{text_at(d, DCM_SOPClassUID), text_at(d, DCM_SOPInstanceUID),
-                         text_at(d, DCM_SeriesInstanceUID), text_at(d, DCM_StudyInstanceUID), {}};
+  ReferredSegmentation s{text_at(d, DCM_SOPClassUID),
+                         text_at(d, DCM_SOPInstanceUID),
+                         text_at(d, DCM_SeriesInstanceUID),
+                         text_at(d, DCM_StudyInstanceUID),
+                         {}};
   const auto refuse = [&](const std::string& why) {
     return Error(ExitCode::usage, "the segmentation '" + report.segmentation.string() + "' " + why,
                  "write it from the case: osteo convert CASE/structures.seg.nrrd SEG.dcm --source DICOM_FOLDER");
@@ -299,8 +302,7 @@ class MeasuresWriter {
       put(reference, DCM_ReferencedSOPInstanceUID, segmentation_.instance);
       dicom::require(reference.putAndInsertUint16(DCM_ReferencedSegmentNumber, number->second), path_);
       if (o_.source != nullptr)
-        tree_.uid(g, kContains, {"121232", "DCM", "Source series for segmentation"},
-                  dicom::valid_uid(o_.source->uid));
+        tree_.uid(g, kContains, {"121232", "DCM", "Source series for segmentation"}, dicom::valid_uid(o_.source->uid));
     }
     tree_.number(g, kVolume, s.volume_mm3, kCubicMm);
     if (s.length_mm > 0) tree_.number(g, kLength, s.length_mm, kMm);

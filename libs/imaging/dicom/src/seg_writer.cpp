@@ -134,7 +134,8 @@ void take_over_identity(DcmSegmentation& seg, const DicomObjectOptions& o, const
             path);
   }
   // The same voxels in another form are another object, in the same space.
-  const std::string form = o.form == SegmentationForm::binary ? "" : enum_names(o.form)[static_cast<std::size_t>(o.form)].data();
+  const std::string form =
+      o.form == SegmentationForm::binary ? "" : enum_names(o.form)[static_cast<std::size_t>(o.form)].data();
   require(seg.getSeries().setSeriesInstanceUID(dicom::uid_of(hash_text(content + form + "series")).c_str()), path);
   require(seg.getSOPCommon().setSOPInstanceUID(dicom::uid_of(hash_text(content + form + "instance")).c_str()), path);
   require(seg.getSeries().setSeriesDescription(o.description.substr(0, 64).c_str()), path);
@@ -221,9 +222,7 @@ class SegmentationWriter {
           code(std::string(type.code).c_str(), "SCT", std::string(type.meaning).c_str());
       DcmSegment* segment = nullptr;
       // Its name and what drew it are put in later.
-      require(DcmSegment::create(segment, "-", category, code,
-                                 DcmSegTypes::SAT_SEMIAUTOMATIC, "-"),
-              path_);
+      require(DcmSegment::create(segment, "-", category, code, DcmSegTypes::SAT_SEMIAUTOMATIC, "-"), path_);
       Uint16 number = 0;
       require(seg_->addSegment(segment, number), path_);
     }

@@ -1,5 +1,5 @@
-// What a structure is and what drew it, in the codes of DICOM. Private to libs/imaging/dicom; only for files that include
-// DCMTK first.
+// What a structure is and what drew it, in the codes of DICOM. Private to libs/imaging/dicom; only for files that
+// include DCMTK first.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -18,8 +18,8 @@ struct SegmentCode {
 void put_code(DcmItem& in, const DcmTagKey& sequence, SegmentCode code, const char* scheme,
               const std::filesystem::path& path);
 
-/// SegmentAlgorithmType, its name, and SegmentationAlgorithmIdentificationSequence where the origin tells what and which
-/// version (Structure::origin).
+/// SegmentAlgorithmType, its name, and SegmentationAlgorithmIdentificationSequence where the origin tells what and
+/// which version (Structure::origin).
 void put_algorithm(DcmItem& segment, const std::string& origin, const std::filesystem::path& path);
 
 /// What stands for the name of an algorithm that is not known.

@@ -31,11 +31,11 @@ struct DicomObjectOptions {
   SegmentationForm form = SegmentationForm::binary;  ///< of a label map
 };
 
-/// DICOM SEG (PS3.3 A.51), a segment a structure, a frame a slice that holds any of it (as LABELMAP: of any), with codes
-/// of SNOMED CT by its name and the algorithm by its origin. Frames lie on the slices
-/// of `labels`: after tilt repair an upright stack of its own, in the frame of reference of the source. A frame refers
-/// to the source slice it lies on, or to the two it lies between at its centre. Atomic. Errors: usage for a label map
-/// without a voxel, cannot_write.
+/// DICOM SEG (PS3.3 A.51), a segment a structure, a frame a slice that holds any of it (as LABELMAP: of any), with
+/// codes of SNOMED CT by its name and the algorithm by its origin. Frames lie on the slices of `labels`: after tilt
+/// repair an upright stack of its own, in the frame of reference of the source. A frame refers to the source slice it
+/// lies on, or to the two it lies between at its centre. Atomic. Errors: usage for a label map without a voxel,
+/// cannot_write.
 void save_segmentation(const Labels& labels, const std::filesystem::path& path, const DicomObjectOptions& options = {},
                        const Context& context = {});
 
