@@ -178,8 +178,10 @@ for name, seg_file in (("plain.dcm", None), ("with.dcm", "case.seg.dcm"), ("bin.
         segmentation = hd.seg.segread(str(work / seg_file))
         assert len(rois) == 3 and len(images) == 1 + 3 and segmentation.SOPInstanceUID in evidence
         for g in rois:
-            assert g.referenced_segment.referenced_sop_instance_uid == segmentation.SOPInstanceUID
-            s = segmentation.get_segment_description(int(g.referenced_segment.referenced_segment_number))
+            assert g.referenced_segment is not None and g.source_series_for_segmentation is not None
+            (item,) = (i for i in g[0].ContentSequence if i.ConceptNameCodeSequence[0].CodeValue == "121191")
+            assert item.ReferencedSOPSequence[0].ReferencedSOPInstanceUID == segmentation.SOPInstanceUID
+            s = segmentation.get_segment_description(int(item.ReferencedSOPSequence[0].ReferencedSegmentNumber))
             assert s.segment_label == g.tracking_identifier
     bone = next(g for n, g in by_name.items() if n.startswith("Bone of the case"))
     assert numbers_of(bone[0], "bone-threshold") == [steps["threshold"]["lower_hu"]]
