@@ -1,12 +1,12 @@
-"""The conformance statement against what is negotiated: pynetdicom proposes and answers, docs/reference/conformance.md says what must come.
+"""The conformance statement against what is negotiated: pynetdicom proposes and answers, the page says what must come.
 usage: check_conformance.py BIN WORK PAGE      exits 77 (skipped) when pynetdicom is missing"""
 
-import json, pathlib, re, shutil, subprocess, sys, time
+import json, pathlib, re, shutil, subprocess, sys
 
 try:
     import pydicom
     from pydicom.dataset import Dataset
-    from pynetdicom import AE, build_context, build_role, evt
+    from pynetdicom import AE, build_context, evt
     from pynetdicom.sop_class import StudyRootQueryRetrieveInformationModelFind as FIND
     from pynetdicom.sop_class import StudyRootQueryRetrieveInformationModelGet as GET
     from pynetdicom.sop_class import StudyRootQueryRetrieveInformationModelMove as MOVE
@@ -65,7 +65,7 @@ try:
     got = []
     for n in range(0, len(pairs), 128):
         got += negotiate([build_context(c, f) for c, f in pairs[n : n + 128]])
-    assert sorted(map(tuple, map(lambda p: (str(p[0]), str(p[1])), got))) == sorted(pairs), len(got)
+    assert sorted((str(c), str(f)) for c, f in got) == sorted(pairs), len(got)
     print(f"ok  the node accepts {len(got)} pairs of class and form: all of the page")
     # Of several forms the first of the page's order, whatever the sender's order.
     for several in (forms, forms[::-1], forms[4:][::-1], ["1.2.840.10008.1.2.4.201", "1.2.840.10008.1.2"]):
@@ -109,7 +109,8 @@ proposed = []
 def requested(event):
     primitive = event.assoc.requestor.primitive
     roles = {i.sop_class_uid: i for i in event.assoc.requestor.role_selection.values()}
-    proposed.append(([(str(c.abstract_syntax), [str(t) for t in c.transfer_syntax]) for c in primitive.presentation_context_definition_list], roles))
+    contexts = primitive.presentation_context_definition_list
+    proposed.append(([(str(c.abstract_syntax), [str(t) for t in c.transfer_syntax]) for c in contexts], roles))
 
 
 def find(event):

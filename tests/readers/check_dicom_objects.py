@@ -1,4 +1,4 @@
-"""What osteo writes for a PACS, read by pydicom, highdicom and dciodvfy: label maps as LABELMAP, algorithms, structured reports.
+"""What osteo writes for a PACS, read by pydicom, highdicom and dciodvfy: LABELMAP, algorithms, structured reports.
 usage: check_dicom_objects.py BIN_DIR FIXTURES WORK_DIR      exits 77 (skipped) when a reader is missing
 """
 
