@@ -115,10 +115,10 @@ std::string objects_conformance() {
   for (const WrittenObject& w : kWritten)
     page += "| " + std::string(w.name) + " | " + std::string(w.uid) + " | " + std::string(w.made_by) + " |\n";
   page +=
-      "\nAll in Explicit VR Little Endian. UIDs are of the form 2.25 (a UUID), made from the content and the study: "
-      "the "
-      "same content, the same UID. Attributes at the top of the data set, of objects written beside a series for this "
-      "page:\n\n" +
+      "\nAll in Explicit VR Little Endian. UIDs are of the form 2.25 (a UUID); those of all but CT slices are made "
+      "from "
+      "the content and the study: the same content, the same UID. Attributes at the top of the data set, of objects "
+      "written beside a series for this page:\n\n" +
       attribute_table();
   return page;
 }
