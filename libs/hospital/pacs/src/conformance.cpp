@@ -43,7 +43,7 @@ std::string node() {
   return "## The storage node\n\n"
          "Title " +
          by_default.ae + ", address " + by_default.address + ", port " + std::to_string(by_default.port) +
-         " unless told otherwise; at most " + std::to_string(by_default.most_associations) +
+         " by default; at most " + std::to_string(by_default.most_associations) +
          " associations at once. Who calls by a title that is not allowed is rejected. The asynchronous operations "
          "window, extended and user identity negotiation are not supported. Of the forms that a context offers, the "
          "first of this list is accepted:\n\n" +
