@@ -97,7 +97,8 @@ std::string objects_conformance() {
   std::string page =
       "## Files that are read\n\n"
       "Slices are taken by what they hold and not by a list of classes: any image of one sample a pixel, 8, 16 or 32 "
-      "bits, with position, orientation, spacing and a rescale slope, single frames or many. `import` wants CT (`--any-modality` "
+      "bits, with position, orientation, spacing and a rescale slope, single frames or many. `import` wants CT "
+      "(`--any-modality` "
       "takes others). Segmentations (SEG and LABELMAP) are read as structures. Values of an attribute that "
       "DICOM "
       "does not allow are named, not guessed ([the verdict](../formats/verdict.md)).\n\n"
