@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "osteo/core/base/translate.h"
 #include "keys.h"
 #include "ui_style.h"
 
@@ -65,7 +66,7 @@ void HelpPage::draw(int width, int height, const std::function<void()>& steps) {
   std::vector<HelpRow> rows;
   for (const HelpLine& l : lines) {
     const bool heading = l.keys[0] == '\0';
-    rows.push_back({heading ? 1.9F * e : std::max(high(l.keys, keys_wide), high(l.text, text_wide)) + line, heading});
+    rows.push_back({heading ? 1.9F * e : std::max(high(shown_keys(l).c_str(), keys_wide), high(shown_text(l).c_str(), text_wide)) + line, heading});
   }
   // Title, what turns the pages, and above the first page's keys what a new user does first.
   const float title = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemSpacing.y,
@@ -90,7 +91,7 @@ void HelpPage::draw(int width, int height, const std::function<void()>& steps) {
   ImGui::SetNextWindowPos({std::floor((w - wide) / 2), std::floor((h - tall) / 2)});
   ImGui::SetNextWindowSize({wide, tall});
   ImGui::Begin(
-      "Mouse and keys", &open_,
+      tr("Mouse and keys"), &open_,
       ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoScrollbar);
   const float began = ImGui::GetCursorPosY();
   if (steps && page_ == 0) {
@@ -105,24 +106,25 @@ void HelpPage::draw(int width, int height, const std::function<void()>& steps) {
     ImVec2 at{corner.x + static_cast<float>(c) * (column + kGapEm * e), corner.y};
     for (std::size_t n = packed[which].from; n < packed[which].to; ++n) {
       if (rows[n].heading) {
-        wrapped(lines[n].text, {at.x, at.y + 0.6F * e}, column, theme().quiet);
+        wrapped(shown_text(lines[n]).c_str(), {at.x, at.y + 0.6F * e}, column, theme().quiet);
       } else {
-        wrapped(lines[n].keys, at, keys_wide, palette::kSkyBlue);
-        wrapped(lines[n].text, {at.x + keys_wide + 0.5F * e, at.y}, text_wide, theme().text);
+        wrapped(shown_keys(lines[n]).c_str(), at, keys_wide, palette::kSkyBlue);
+        wrapped(shown_text(lines[n]).c_str(), {at.x + keys_wide + 0.5F * e, at.y}, text_wide, theme().text);
       }
       at.y += rows[n].height;
     }
   }
   ImGui::SetCursorPosY(tall - foot - pad.y);  // at the same place on each page
   if (pages_ > 1) {
-    if (ImGui::SmallButton("back (Left)")) turn(-1);
+    if (ImGui::SmallButton(tr("back (Left)"))) turn(-1);
     ImGui::SameLine();
-    ImGui::Text("page %d of %d", page_ + 1, pages_);
+    ImGui::TextUnformatted(
+        filled(tr("page {n} of {all}"), {{"n", std::to_string(page_ + 1)}, {"all", std::to_string(pages_)}}).c_str());
     ImGui::SameLine();
-    if (ImGui::SmallButton("on (Right)")) turn(1);
+    if (ImGui::SmallButton(tr("on (Right)"))) turn(1);
     ImGui::SameLine();
   }
-  ImGui::TextDisabled("F1 or Esc closes this");
+  ImGui::TextDisabled(tr("F1 or Esc closes this"));
   ImGui::End();
 }
 

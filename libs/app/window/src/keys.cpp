@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/burr_kind.h"
 
 namespace osteo::inline app {
@@ -152,6 +153,10 @@ bool has(const std::vector<Command>& list, Command c) {
   return std::find(list.begin(), list.end(), c) != list.end();
 }
 
+bool is_burrs(const HelpLine& line) {
+  return has(line.commands, Command::burr_kind);
+}
+
 }  // namespace
 
 std::span<const Key> key_table() {
@@ -265,88 +270,102 @@ const std::vector<HelpLine>& help_lines() {
   using enum Command;
   // "1 to 7, C, D", "burr: diameter, cutting, diamond".
   static const std::string burr_keys = [] {
-    std::string all = "1 to 7";
+    std::string all = tr_later("1 to 7");
     for (const BurrKindRow& kind : kBurrKinds) all += std::string(", ") + kind.key;
     return all;
   }();
   static const std::string burr_text = [] {
-    std::string all = "burr: diameter";
+    std::string all = tr_later("burr: diameter");
     for (const BurrKindRow& kind : kBurrKinds) all += ", " + std::string(kind.name);
     return all;
   }();
   static const std::vector<HelpLine> lines = {
-      {"", "the drill", {}},
-      {"move", "moves the drill across the view", {}},
-      {"F", "lifts the drill over to the bone under the mouse, drill off", {bring}},
-      {"U", "lifts the drill out of the bone, drill off", {lift}},
-      {"wheel, Up, Down, Shift-drag", "moves it deeper (away from you) or back", {deeper, back}},
-      {"left button, Space", "drills while held; Space: on and off", {drill}},
+      {"", tr_later("the drill"), {}},
+      {tr_later("move"), tr_later("moves the drill across the view"), {}},
+      {"F", tr_later("lifts the drill over to the bone under the mouse, drill off"), {bring}},
+      {"U", tr_later("lifts the drill out of the bone, drill off"), {lift}},
+      {tr_later("wheel, Up, Down, Shift-drag"), tr_later("moves it deeper (away from you) or back"), {deeper, back}},
+      {tr_later("left button, Space"), tr_later("drills while held; Space: on and off"), {drill}},
       {burr_keys.c_str(), burr_text.c_str(), {diameter, burr_kind}},
-      {"B, Y, T", "ball, cylinder, taper", {ball, cylinder, taper}},
-      {"9, 0", "burr slower, faster: 25 to 100 %", {burr_speed}},
-      {"Tab", "wheel of tools: point or Up, Down; Tab, Enter or a click takes", {wheel}},
-      {"V, I", "suction, or irrigation, beside the burr (with --dust)", {suck, wash}},
-      {"K", "second hand: suction, irrigation, probe, nothing", {second_hand}},
-      {"Z", "takes back the last stroke, cut, move, plate", {undo}},
-      {"W", "compare: the bone at the start, and now", {before}},
-      {"", "saw, fragments, plates", {}},
-      {"X", "saw, at the bone under the mouse: drag moves the plane, Shift-drag turns it, wheel: deeper", {saw}},
-      {"P", "fragments: drag moves one, Shift-drag turns it, wheel: deeper", {pieces}},
-      {"L", "plate in the hand, moved like the drill", {plates}},
-      {"A, E", "turn the saw, the piece or the plate", {turn_left, turn_right}},
-      {"Enter", "cut; separate fragments; fix the plate", {perform}},
-      {"Esc", "back to the drill", {put_away}},
-      {"", "the microscope", {}},
-      {"right drag", "turns the view about its focus; with Shift rolls it", {}},
-      {"middle drag", "shifts the view", {}},
-      {"Ctrl-wheel", "magnifies; with Shift focuses deeper and back", {}},
-      {"[, ]", "magnification, by its steps", {magnify}},
-      {"comma, full stop, /", "focus back, deeper; on the bone in the middle", {focus, autofocus}},
-      {"; (semicolon)", "looks at the bone under the mouse", {look_there}},
-      {"G", "looks at the drill; with Shift along it", {look_at_drill}},
-      {"O", "held, mouse or device move the camera; with Shift turn it", {guide_camera}},
-      {"F6, F7, F8", "go to a kept view; with Shift keep this one", {bookmark}},
-      {"keypad 4 6 8 2", "turn the view", {orbit_left, orbit_right, orbit_up, orbit_down}},
-      {"Backspace", "takes back the camera's last move", {camera_back}},
-      {"Home", "the whole bone, from the left", {home}},
-      {"J", "how the picture is drawn: auto, plain, calm, deep", {quality}},
-      {"", "the cuts", {}},
-      {"wheel, Ctrl-wheel", "scrolls; nearer and farther", {}},
-      {"click, Shift-move", "looks there in all three", {}},
-      {"left drag", "measures", {}},
-      {"right drag, click", "window and level; as they were", {}},
-      {"middle drag", "moves it", {}},
-      {"F3, double click", "it takes the middle, and back", {cut_in_middle}},
-      {"F4", "along the tool, or along the body", {cuts_along_tool}},
-      {"Ctrl-L", "what the procedure wants removed (green) or left (orange)", {regions}},
-      {"", "the hand", {}},
-      {"Alt-right drag, Alt-arrows", "tilts the handle; the burr stays where it is", {tilt}},
-      {"Alt-Shift-right drag, Page Up, Down, keypad 7 9", "rolls it about the line of sight", {roll}},
-      {"Insert, keypad 5", "the handle as the view holds it", {straight}},
-      {"' (apostrophe), keypad 0, mouse 4", "clutch: held, the mouse moves without the drill", {clutch}},
-      {"\\ (backslash), keypad ., mouse 5", "wrist rest: held, the hand moves finely", {wrist_rest}},
-      {"` (left of 1)", "held, the mouse moves the second hand, its left button works", {second_mouse}},
-      {"-, =", "motion of the hand finer or coarser, 1:1 to 1:8", {motion}},
-      {"Alt-H", "hand and pedals in the panel, by keys", {hand_page}},
-      {"", "the session", {}},
-      {"S", "screenshot with its caption into its folder", {screenshot}},
-      {"M", "note pinned to the bone under the mouse; without text: marks this moment", {mark}},
-      {"F9", "ruler: two points on the bone, by clicks", {ruler}},
-      {"F5", "saves it and goes on", {save}},
-      {"R", "asks; saves the session and resets the bone", {reset}},
-      {"Q", "saves and ends it, and shows what was done", {quit}},
-      {"Ctrl-T", "then: its course, and the bone as of any time", {timeline}},
-      {"Left, Right", "in it: a second back, on; with Shift ten; Space plays", {earlier, later}},
-      {"", "the window", {}},
-      {"F1, H", "shows this, and hides it", {help}},
-      {"F2", "layout: operate, or plan with four pictures", {layout}},
-      {"F10", "menu: all settings, by arrows and Space; Esc closes it", {panel_keys}},
-      {"F11", "full screen, and back", {full_screen}},
-      {"Ctrl +, Ctrl -, Ctrl 0", "size of text and panels; as the monitor has it", {}},
-      {"N", "sound on and off", {sound}},
-      {"Ctrl-H, Ctrl-G", "hints; in a lesson, your hand led or not", {hints, lead}},
-      {"Ctrl-N, Ctrl-M", "nerve monitor, with --monitor; its sound", {monitor, mute_monitor}}};
+      {"B, Y, T", tr_later("ball, cylinder, taper"), {ball, cylinder, taper}},
+      {"9, 0", tr_later("burr slower, faster: 25 to 100 %"), {burr_speed}},
+      {"Tab", tr_later("wheel of tools: point or Up, Down; Tab, Enter or a click takes"), {wheel}},
+      {"V, I", tr_later("suction, or irrigation, beside the burr (with --dust)"), {suck, wash}},
+      {"K", tr_later("second hand: suction, irrigation, probe, nothing"), {second_hand}},
+      {"Z", tr_later("takes back the last stroke, cut, move, plate"), {undo}},
+      {"W", tr_later("compare: the bone at the start, and now"), {before}},
+      {"", tr_later("saw, fragments, plates"), {}},
+      {"X", tr_later("saw, at the bone under the mouse: drag moves the plane, Shift-drag turns it, wheel: deeper"), {saw}},
+      {"P", tr_later("fragments: drag moves one, Shift-drag turns it, wheel: deeper"), {pieces}},
+      {"L", tr_later("plate in the hand, moved like the drill"), {plates}},
+      {"A, E", tr_later("turn the saw, the piece or the plate"), {turn_left, turn_right}},
+      {"Enter", tr_later("cut; separate fragments; fix the plate"), {perform}},
+      {"Esc", tr_later("back to the drill"), {put_away}},
+      {"", tr_later("the microscope"), {}},
+      {tr_later("right drag"), tr_later("turns the view about its focus; with Shift rolls it"), {}},
+      {tr_later("middle drag"), tr_later("shifts the view"), {}},
+      {tr_later("Ctrl-wheel"), tr_later("magnifies; with Shift focuses deeper and back"), {}},
+      {"[, ]", tr_later("magnification, by its steps"), {magnify}},
+      {tr_later("comma, full stop, /"), tr_later("focus back, deeper; on the bone in the middle"), {focus, autofocus}},
+      {tr_later("; (semicolon)"), tr_later("looks at the bone under the mouse"), {look_there}},
+      {"G", tr_later("looks at the drill; with Shift along it"), {look_at_drill}},
+      {"O", tr_later("held, mouse or device move the camera; with Shift turn it"), {guide_camera}},
+      {"F6, F7, F8", tr_later("go to a kept view; with Shift keep this one"), {bookmark}},
+      {tr_later("keypad 4 6 8 2"), tr_later("turn the view"), {orbit_left, orbit_right, orbit_up, orbit_down}},
+      {"Backspace", tr_later("takes back the camera's last move"), {camera_back}},
+      {"Home", tr_later("the whole bone, from the left"), {home}},
+      {"J", tr_later("how the picture is drawn: auto, plain, calm, deep"), {quality}},
+      {"", tr_later("the cuts"), {}},
+      {tr_later("wheel, Ctrl-wheel"), tr_later("scrolls; nearer and farther"), {}},
+      {tr_later("click, Shift-move"), tr_later("looks there in all three"), {}},
+      {tr_later("left drag"), tr_later("measures"), {}},
+      {tr_later("right drag, click"), tr_later("window and level; as they were"), {}},
+      {tr_later("middle drag"), tr_later("moves it"), {}},
+      {tr_later("F3, double click"), tr_later("it takes the middle, and back"), {cut_in_middle}},
+      {"F4", tr_later("along the tool, or along the body"), {cuts_along_tool}},
+      {"Ctrl-L", tr_later("what the procedure wants removed (green) or left (orange)"), {regions}},
+      {"", tr_later("the hand"), {}},
+      {tr_later("Alt-right drag, Alt-arrows"), tr_later("tilts the handle; the burr stays where it is"), {tilt}},
+      {tr_later("Alt-Shift-right drag, Page Up, Down, keypad 7 9"), tr_later("rolls it about the line of sight"), {roll}},
+      {tr_later("Insert, keypad 5"), tr_later("the handle as the view holds it"), {straight}},
+      {tr_later("' (apostrophe), keypad 0, mouse 4"), tr_later("clutch: held, the mouse moves without the drill"), {clutch}},
+      {tr_later("\\ (backslash), keypad ., mouse 5"), tr_later("wrist rest: held, the hand moves finely"), {wrist_rest}},
+      {tr_later("` (left of 1)"), tr_later("held, the mouse moves the second hand, its left button works"), {second_mouse}},
+      {"-, =", tr_later("motion of the hand finer or coarser, 1:1 to 1:8"), {motion}},
+      {"Alt-H", tr_later("hand and pedals in the panel, by keys"), {hand_page}},
+      {"", tr_later("the session"), {}},
+      {"S", tr_later("screenshot with its caption into its folder"), {screenshot}},
+      {"M", tr_later("note pinned to the bone under the mouse; without text: marks this moment"), {mark}},
+      {"F9", tr_later("ruler: two points on the bone, by clicks"), {ruler}},
+      {"F5", tr_later("saves it and goes on"), {save}},
+      {"R", tr_later("asks; saves the session and resets the bone"), {reset}},
+      {"Q", tr_later("saves and ends it, and shows what was done"), {quit}},
+      {"Ctrl-T", tr_later("then: its course, and the bone as of any time"), {timeline}},
+      {"Left, Right", tr_later("in it: a second back, on; with Shift ten; Space plays"), {earlier, later}},
+      {"", tr_later("the window"), {}},
+      {"F1, H", tr_later("shows this, and hides it"), {help}},
+      {"F2", tr_later("layout: operate, or plan with four pictures"), {layout}},
+      {"F10", tr_later("menu: all settings, by arrows and Space; Esc closes it"), {panel_keys}},
+      {"F11", tr_later("full screen, and back"), {full_screen}},
+      {"Ctrl +, Ctrl -, Ctrl 0", tr_later("size of text and panels; as the monitor has it"), {}},
+      {"N", tr_later("sound on and off"), {sound}},
+      {"Ctrl-H, Ctrl-G", tr_later("hints; in a lesson, your hand led or not"), {hints, lead}},
+      {"Ctrl-N, Ctrl-M", tr_later("nerve monitor, with --monitor; its sound"), {monitor, mute_monitor}}};
   return lines;
+}
+
+// The row of burrs lists what there is: its parts are in the catalogue, not the whole.
+std::string shown_keys(const HelpLine& line) {
+  const std::string text = line.keys;
+  const auto end = text.find(", ");
+  return is_burrs(line) ? tr(text.substr(0, end)) + text.substr(end) : tr(text);
+}
+
+std::string shown_text(const HelpLine& line) {
+  if (!is_burrs(line)) return tr(line.text);
+  std::string all = tr("burr: diameter");
+  for (const BurrKindRow& kind : kBurrKinds) all += ", " + tr(std::string(kind.name));
+  return all;
 }
 
 void Keyboard::on(int code, Event event, int modifiers) {

@@ -118,6 +118,9 @@ struct HelpLine {
   std::vector<Command> commands;
 };
 [[nodiscard]] const std::vector<HelpLine>& help_lines();
+/// Of a line, in the language.
+[[nodiscard]] std::string shown_keys(const HelpLine& line);
+[[nodiscard]] std::string shown_text(const HelpLine& line);
 
 /// Keys as the window's callback reports them. Events, not states: at few pictures a second a short press begins and
 /// ends between two frames. ImGui is not asked: until 1.87 it knew keys by the numbers of its backend, since then by

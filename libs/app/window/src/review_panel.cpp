@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/core/base/translate.h"
 #include "state_facts.h"
 #include "ui_style.h"
 
@@ -52,13 +53,13 @@ void draw_findings(ReviewControl& control) {
     case ReviewControl::State::none:
       return;
     case ReviewControl::State::making:
-      ImGui::TextDisabled("findings");
-      ImGui::ProgressBar(static_cast<float>(control.progress()), {-1, 0}, "the session is looked through");
+      ImGui::TextDisabled(tr("findings"));
+      ImGui::ProgressBar(static_cast<float>(control.progress()), {-1, 0}, tr("the session is looked through"));
       return;
     case ReviewControl::State::failed:
-      ImGui::TextDisabled("findings");
+      ImGui::TextDisabled(tr("findings"));
       ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
-      ImGui::TextWrapped("! there are none: %s", control.failure().c_str());
+      ImGui::TextWrapped("! %s", filled(tr("there are none: {why}"), {{"why", control.failure()}}).c_str());
       ImGui::PopStyleColor();
       return;
     case ReviewControl::State::ready:
@@ -67,9 +68,9 @@ void draw_findings(ReviewControl& control) {
   const SessionReview& r = control.review();
   const float e = em();
   bool shown = control.shown();
-  if (ImGui::Checkbox("course of the session (Ctrl-T)", &shown)) control.show(shown);
+  if (ImGui::Checkbox(tr("course of the session (Ctrl-T)"), &shown)) control.show(shown);
   for (const std::string& s : r.summary) ImGui::TextWrapped("%s", s.c_str());
-  ImGui::TextDisabled(r.findings.empty() ? "nothing was found" : "findings: a click looks there, another goes on");
+  ImGui::TextDisabled(r.findings.empty() ? tr("nothing was found") : tr("findings: a click looks there, another goes on"));
   for (std::size_t n = 0; n < r.findings.size(); ++n) {
     const ReviewFinding& f = r.findings[n];
     const WeightLook look = look_of(f.weight);
@@ -102,9 +103,12 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   begin_fixed("course", box, ImGuiWindowFlags_NoScrollbar);
   const ReviewCourse& course = control.review().course;
   const float e = em();
-  if (ImGui::Button(control.playing() ? "pause (Space)" : "play (Space)", {8 * e, 0})) control.play(!control.playing());
+  if (ImGui::Button(control.playing() ? tr("pause (Space)") : tr("play (Space)"), {8 * e, 0})) control.play(!control.playing());
   ImGui::SameLine();
-  ImGui::Text("%s of %s", clock_text(control.now_s()).c_str(), clock_text(control.review().player->end_s()).c_str());
+  ImGui::TextUnformatted(
+      filled(tr("{n} of {all}"),
+             {{"n", clock_text(control.now_s())}, {"all", clock_text(control.review().player->end_s())}})
+          .c_str());
   ImGui::SameLine();
   if (ImGui::SmallButton("-")) control.change_speed(-1);
   ImGui::SameLine();
@@ -112,7 +116,7 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   ImGui::SameLine();
   if (ImGui::SmallButton("+")) control.change_speed(1);
   ImGui::SameLine();
-  ImGui::Checkbox("surgeon's view", &control.surgeons_view);
+  ImGui::Checkbox(tr("surgeon's view"), &control.surgeons_view);
 
   const ImVec2 at = ImGui::GetCursorScreenPos(), room = ImGui::GetContentRegionAvail();
   const float names = 6 * e, left = at.x + names, wide = std::max(1.0F, room.x - names), high = std::max(1.0F, room.y);
@@ -121,9 +125,9 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   const auto x_of = [&](double t_s) { return left + wide * static_cast<float>(std::clamp(t_s / end_s, 0.0, 1.0)); };
   const float lane = high / 3;
   const float full_n = of_pixel(course.force_n, 0, course.size(), true) > 2 ? 8.0F : 2.0F;
-  const Lane lanes[] = {{full_n > 2 ? "force, to 8 N" : "force, to 2 N", at.y, lane, full_n},
-                        {"near, from 5 mm", at.y + lane, lane, 5},
-                        {"bone: seen, unseen", at.y + 2 * lane, lane, 0}};
+  const Lane lanes[] = {{full_n > 2 ? tr("force, to 8 N") : tr("force, to 2 N"), at.y, lane, full_n},
+                        {tr("near, from 5 mm"), at.y + lane, lane, 5},
+                        {tr("bone: seen, unseen"), at.y + 2 * lane, lane, 0}};
   for (const Lane& l : lanes) {
     draw->AddRectFilled({left, l.top + 1}, {left + wide, l.top + l.height - 1}, im_colour32(theme().raised));
     fitted_text(draw, {at.x, l.top, names - 0.5F * e, l.height}, 0.85F * e, theme().quiet, l.name);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "osteo/core/base/translate.h"
 #include "settings_panel.h"
 #include "sound_panel.h"
 #include "status_panel.h"
@@ -24,6 +25,7 @@ Layout layout_named(const std::string& name) {
 
 MainView::MainView(WindowShell& shell, PersonSettings& person)
     : shell_(shell), person_(person), wanted_(layout_named(person.values.layout)) {
+  use_language(language_named(person.values.language));
   take_theme(person.values.theme);
   lay_out(false, 0);
 }
@@ -112,7 +114,7 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       wanted_ = next_layout(wanted_);
       person_.values.layout = EnumNames<Layout>::values[static_cast<std::size_t>(wanted_)];
       if (lay_out(false, 0).why.empty()) {
-        control.say("layout: " + person_.values.layout);
+        control.say(filled(tr("layout: {name}"), {{"name", tr(person_.values.layout)}}));
       } else {
         control.say(layout_.why);
       }
@@ -125,7 +127,7 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
     case Command::panel_keys:
       keys_in_panel_ = true;
       hand_page_ = c == Command::hand_page;
-      control.say("keys move in the panel: arrows, Space; Esc gives them back");
+      control.say(tr("keys move in the panel: arrows, Space; Esc gives them back"));
       return true;
     case Command::wheel: {
       const ImVec2 m = ImGui::GetIO().MousePos;
@@ -141,7 +143,7 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
     }
     case Command::ruler:
       ruler_.turn(!ruler_.on());
-      control.say(ruler_.on() ? "ruler: click two points on the bone" : "ruler put away");
+      control.say(ruler_.on() ? tr("ruler: click two points on the bone") : tr("ruler put away"));
       return true;
     case Command::mark:
       // Where the mouse is; a button in the panel: where the burr is.
@@ -174,14 +176,12 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
 bool MainView::click(std::optional<Vec3> bone, RehearsalControl& control) {
   if (!ruler_.on()) return false;
   if (!bone) {
-    control.say("no bone under the mouse");
+    control.say(tr("no bone under the mouse"));
     return true;
   }
   if (const auto note = ruler_.click(*bone)) {
     control.rehearsal().note("ruler", *note);
-    char text[48];
-    std::snprintf(text, sizeof text, "%.1f mm", *ruler_.length_mm());
-    control.say(text);
+    control.say(shown_number(*ruler_.length_mm(), 1) + " mm");
   }
   return true;
 }
@@ -221,7 +221,7 @@ void MainView::see(const RoomScene& scene) {
   times_undone_ = undone;
   if (facts.undone) {
     undone_ = false;
-    scene.control.say("taken back");
+    scene.control.say(tr("taken back"));
   }
   undo_steps_ = facts.undo_steps;
   facts.magnification = scene.magnification;
@@ -263,8 +263,8 @@ void MainView::draw(const RoomScene& scene) {
   if (asking_) {
     // As if it were a key, at the next frame: what the answer begins shows pictures of its own.
     const int said =
-        draw_question(shell_.width(), shell_.height(), "Reset bone?",
-                      "This session is saved and ends. A new one begins with the bone of the case.", "Reset bone");
+        draw_question(shell_.width(), shell_.height(), tr("Reset bone?"),
+                      tr("This session is saved and ends. A new one begins with the bone of the case."), tr("Reset bone"));
     if (said != 0) pressed_.press(said > 0 ? Command::perform : Command::put_away);
   }
 }
@@ -273,11 +273,11 @@ void MainView::draw(const RoomScene& scene) {
 void MainView::draw_cards(const RoomScene& scene, const HandFacts& hand) {
   const ScreenBox& view = layout_.view;
   const float taken = layout_.over[0].empty() ? 0 : view.right() - layout_.over[0].x;
-  static constexpr const char* kTitles[] = {"Drill", "Saw", "Fragments", "Plate"};
+  const char* const titles[] = {tr("Drill"), tr("Saw"), tr("Fragments"), tr("Plate")};
   if (hand.tool == 0) {
     draw_burr_card(view, view.width - taken, hand, burr_unfolded_, pressed_);
   } else {
-    draw_tool_card(view, kTitles[hand.tool], scene.draw_tools);
+    draw_tool_card(view, titles[hand.tool], scene.draw_tools);
   }
   if (person_.values.first_steps && !help_.open()) person_.values.first_steps = draw_next_step(view, steps_);
 }
@@ -298,30 +298,36 @@ void MainView::draw_panel(const RoomScene& scene) {
   ImGui::Separator();
   if (scene.control.tools().tool() == HandTools::Tool::drill) scene.draw_tools();  // plates that are fixed
   draw_sound(scene.sound);
-  ImGui::TextDisabled("Colours");
-  static const std::string kThemes[] = {"Dark", "Light", "High contrast"};
-  if (const int chosen = choice("theme", kThemes, static_cast<int>(theme_name()), kSmallControl); chosen >= 0) {
+  ImGui::TextDisabled(tr("Colours"));
+  const std::string themes[] = {tr("Dark"), tr("Light"), tr("High contrast")};
+  if (const int chosen = choice("theme", themes, static_cast<int>(theme_name()), kSmallControl); chosen >= 0) {
     person_.values.theme = EnumNames<ThemeName>::values[static_cast<std::size_t>(chosen)];
     take_theme(person_.values.theme);
   }
+  draw_language(person_.values.language);
   if (scene.draw_hand) scene.draw_hand(std::exchange(hand_page_, false));
   draw_settings(rehearsal);
   draw_posture(rehearsal);
   draw_tissue(rehearsal);
-  if (ImGui::CollapsingHeader("Case and machine")) {
+  if (ImGui::CollapsingHeader(tr("Case and machine"))) {
     draw_approval(scene.machine.approval, scene.machine.approval_ended);
     if (scene.machine.scan != nullptr) draw_scan(*scene.machine.scan);
-    ImGui::TextWrapped("hand: %s", scene.machine.device.c_str());
+    ImGui::TextWrapped("%s", filled(tr("hand: {device}"), {{"device", scene.machine.device}}).c_str());
     ImGui::TextWrapped("%s",
                        rehearsal.realtime()
-                           ? "real-time priority: yes"
-                           : "real-time priority: NOT GRANTED. The force may stutter: allow rtprio in limits.conf.");
-    ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(scene.tick.work_us),
-                static_cast<double>(scene.tick.lateness_us));
-    ImGui::Text("%.2f of %.2f M triangles", scene.machine.drawn_millions, scene.machine.triangles_millions);
+                           ? tr("real-time priority: yes")
+                           : tr("real-time priority: NOT GRANTED. The force may stutter: allow rtprio in limits.conf."));
+    ImGui::TextUnformatted(filled(tr("servo {work} us a tick, late {late} us"),
+                                  {{"work", shown_number(static_cast<double>(scene.tick.work_us), 0)},
+                                   {"late", shown_number(static_cast<double>(scene.tick.lateness_us), 0)}})
+                               .c_str());
+    ImGui::TextUnformatted(filled(tr("{drawn} of {all} M triangles"),
+                                  {{"drawn", shown_number(scene.machine.drawn_millions, 2)},
+                                   {"all", shown_number(scene.machine.triangles_millions, 2)}})
+                               .c_str());
     ImGui::TextWrapped("%s", scene.machine.pictures.c_str());
-    ImGui::Checkbox("first steps", &person_.values.first_steps);
-    ImGui::Checkbox("remember cases", &person_.values.remember_cases);
+    ImGui::Checkbox(tr("first steps"), &person_.values.first_steps);
+    ImGui::Checkbox(tr("remember cases"), &person_.values.remember_cases);
   }
   ImGui::EndChild();
   draw_apart(pressed_);
@@ -332,22 +338,22 @@ void MainView::draw_note_field(RehearsalControl& control) {
   const float e = em(), wide = std::min(layout_.view.width - e, 26 * e);
   ImGui::SetNextWindowPos({layout_.view.x + (layout_.view.width - wide) / 2, layout_.view.y + e});
   ImGui::SetNextWindowSize({wide, 0});
-  ImGui::Begin("Note (without names)", nullptr,
+  ImGui::Begin(tr("Note (without names)"), nullptr,
                ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
   if (write_focus_) ImGui::SetKeyboardFocusHere();
   write_focus_ = false;
   ImGui::SetNextItemWidth(-1);
   ImGui::InputText("##note", &note_text_);
-  ImGui::TextDisabled("Enter keeps it; empty: marks this moment; Esc: nothing");
+  ImGui::TextDisabled(tr("Enter keeps it; empty: marks this moment; Esc: nothing"));
   ImGui::End();
   const int answer = std::exchange(note_answer_, 0);
   if (answer > 0) {
     if (const auto note = notes_.pin(*writing_, note_text_)) {
       control.rehearsal().note("note", *note);
-      control.say("note " + std::to_string(notes_.all().back().number) + " is pinned");
+      control.say(filled(tr("note {n} is pinned"), {{"n", std::to_string(notes_.all().back().number)}}));
     } else {
       control.rehearsal().note("mark", "{}");
-      control.say("marked");
+      control.say(tr("marked"));
     }
   }
   if (answer != 0) writing_.reset();
@@ -384,11 +390,10 @@ void MainView::draw_marks(const RoomScene& scene) {
   }
   if (ends.size() == 2 && ruler_.length_mm()) {
     draw->AddLine({ends[0][0], ends[0][1]}, {ends[1][0], ends[1][1]}, im_colour32(palette::kSkyBlue), e / 8);
-    char text[48];
-    std::snprintf(text, sizeof text, "%.1f mm", *ruler_.length_mm());
+    const std::string text = shown_number(*ruler_.length_mm(), 1) + " mm";
     words((ends[0][0] + ends[1][0]) / 2 + e / 2, (ends[0][1] + ends[1][1]) / 2, text, palette::kSkyBlue);
   }
-  if (before_) words(v.x + e, v.y + e / 2, "AS IT WAS AT THE BEGINNING (W goes back)", palette::kYellow);
+  if (before_) words(v.x + e, v.y + e / 2, tr("AS IT WAS AT THE BEGINNING (W goes back)"), palette::kYellow);
   draw->PopClipRect();
 }
 
@@ -430,18 +435,18 @@ EndChoice MainView::draw_end(const EndFacts& facts, const std::function<void()>&
   const float e = em();
   fitted_text(ImGui::GetWindowDrawList(),
               {ImGui::GetCursorScreenPos().x, ImGui::GetCursorScreenPos().y, layout_.page.width - 2 * e, 1.6F * e},
-              1.6F * e, theme().text, facts.past ? "A session, looked at again" : "The session is over, and saved");
+              1.6F * e, theme().text, facts.past ? tr("A session, looked at again") : tr("The session is over, and saved"));
   ImGui::Dummy({0, 1.8F * e});
   EndChoice choice = EndChoice::none;
   const auto button = [&](const char* words, EndChoice of) {
     if (ImGui::Button(words, {ImGui::GetContentRegionAvail().x, 0})) choice = of;
   };
   if (!facts.past) {
-    button("again, from the whole bone (R)", EndChoice::again);
-    button("go on from here (F5)", EndChoice::resume);
+    button(tr("again, from the whole bone (R)"), EndChoice::again);
+    button(tr("go on from here (F5)"), EndChoice::resume);
   }
-  button("another case (Home)", EndChoice::another);
-  button("close (Q)", EndChoice::close);
+  button(tr("another case (Home)"), EndChoice::another);
+  button(tr("close (Q)"), EndChoice::close);
   findings();
   ImGui::Separator();
   if (ImGui::BeginTable("done", 2)) {
@@ -466,9 +471,9 @@ EndChoice MainView::draw_end(const EndFacts& facts, const std::function<void()>&
     ImGui::EndTable();
   }
   ImGui::Separator();
-  ImGui::TextDisabled("files");
+  ImGui::TextDisabled(tr("files"));
   ImGui::TextWrapped("%s", facts.folder.string().c_str());
-  ImGui::TextWrapped("summary.json has the numbers, stream.oss every tick: osteo replay SESSION");
+  ImGui::TextWrapped(tr("summary.json has the numbers, stream.oss every tick: osteo replay SESSION"));
   for (const std::string& w : facts.warnings) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
     ImGui::TextWrapped("! %s", w.c_str());

@@ -3,6 +3,7 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <cstdio>
 
 #include <vtkActor.h>
 #include <vtkCellArray.h>
@@ -14,6 +15,7 @@
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/instrument_view.h"
 #include "osteo/simulation/bone/plates.h"
@@ -32,30 +34,30 @@ void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, con
     float value = static_cast<float>(mm);
     if (ImGui::SliderFloat(name, &value, least, most, format)) mm = static_cast<double>(value);
   };
-  slider("kerf", cut.kerf_mm, 0.2F, 5, "%.1f mm");
-  slider("long", cut.length_mm, 0, 150, cut.length_mm > 0 ? "%.0f mm" : "through");
-  slider("deep", cut.depth_mm, 0, 150, cut.depth_mm > 0 ? "%.0f mm" : "through");
+  slider(tr("kerf"), cut.kerf_mm, 0.2F, 5, "%.1f mm");
+  slider(tr("long"), cut.length_mm, 0, 150, cut.length_mm > 0 ? "%.0f mm" : tr("through"));
+  slider(tr("deep"), cut.depth_mm, 0, 150, cut.depth_mm > 0 ? "%.0f mm" : tr("through"));
   tools.set_cut(cut);
   if (!tools.planned().empty()) ImGui::SetNextItemWidth(-1);
-  if (!tools.planned().empty() && ImGui::BeginCombo("##planned", "planned cuts")) {
+  if (!tools.planned().empty() && ImGui::BeginCombo("##planned", tr("planned cuts"))) {
     for (std::size_t i = 0; i < tools.planned().size(); ++i) {
       if (ImGui::Selectable(tools.planned()[i].name.c_str())) tools.choose_planned(i);
     }
     ImGui::EndCombo();
   }
-  if (ImGui::Button("as I see it")) tools.aim_saw(view, false);
+  if (ImGui::Button(tr("as I see it"))) tools.aim_saw(view, false);
   ImGui::SameLine();
-  if (ImGui::Button("flat")) tools.aim_saw(view, true);
+  if (ImGui::Button(tr("flat"))) tools.aim_saw(view, true);
   if (!preview.text().empty()) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(preview.cuts() ? ink_of(palette::kVermillion) : theme().text));
     ImGui::TextWrapped("%s%s", preview.cuts() ? "! " : "", preview.text().c_str());
     ImGui::PopStyleColor();
   }
-  if (ImGui::Button("Cut (Enter)", {-1, 0})) tools.perform(rehearsal);
+  if (ImGui::Button(tr("Cut (Enter)"), {-1, 0})) tools.perform(rehearsal);
   // By force and time, with this plane as the cutting guide.
-  if (ImGui::Button("By hand, along this plane", {-1, 0})) tools.take_saw(rehearsal);
+  if (ImGui::Button(tr("By hand, along this plane"), {-1, 0})) tools.take_saw(rehearsal);
   ImGui::SetNextItemWidth(-1);
-  if (ImGui::InputTextWithHint("##plan", "keep as planned: name, Enter", plan_name.data(), plan_name.size(),
+  if (ImGui::InputTextWithHint("##plan", tr("keep as planned: name, Enter"), plan_name.data(), plan_name.size(),
                                ImGuiInputTextFlags_EnterReturnsTrue)) {
     tools.keep_planned(plan_name.data());
     plan_name.fill(0);
@@ -63,21 +65,25 @@ void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, con
 }
 
 void piece_panel(HandTools& tools, Rehearsal& rehearsal) {
-  if (ImGui::Button("Separate fragments (Enter)", {-1, 0})) tools.perform(rehearsal);
+  if (ImGui::Button(tr("Separate fragments (Enter)"), {-1, 0})) tools.perform(rehearsal);
   if (tools.piece() == SceneAction::kNobody) {
-    ImGui::TextWrapped("Press on a piece and drag it; with Shift it turns.");
+    ImGui::TextWrapped("%s", tr("Press on a piece and drag it; with Shift it turns."));
     return;
   }
   const Vec3 by = tools.piece_pose().shift_mm;
-  ImGui::Text("piece %u  %+.1f %+.1f %+.1f mm", tools.piece(), by.x, by.y, by.z);
-  if (ImGui::Button("Put back", {-1, 0})) tools.put_piece_back(rehearsal);
+  char moved[64];
+  std::snprintf(moved, sizeof moved, "%+.1f %+.1f %+.1f mm", by.x, by.y, by.z);
+  ImGui::TextUnformatted(
+      filled(tr("piece {n}  {moved}"), {{"n", std::to_string(tools.piece())}, {"moved", shown_figures(moved)}})
+          .c_str());
+  if (ImGui::Button(tr("Put back"), {-1, 0})) tools.put_piece_back(rehearsal);
 }
 
 void plate_panel(HandTools& tools, Rehearsal& rehearsal) {
   std::size_t plate = tools.plate();
   float turn = tools.plate_turn_deg(), tilt = tools.plate_tilt_deg();
   bool changed = false;
-  if (ImGui::BeginCombo("plate", plate_library()[plate].name.c_str())) {
+  if (ImGui::BeginCombo(tr("plate"), plate_library()[plate].name.c_str())) {
     for (std::size_t i = 0; i < plate_library().size(); ++i) {
       if (ImGui::Selectable(plate_library()[i].name.c_str(), i == plate)) {
         plate = i;
@@ -86,16 +92,18 @@ void plate_panel(HandTools& tools, Rehearsal& rehearsal) {
     }
     ImGui::EndCombo();
   }
-  ImGui::TextWrapped("%s", plate_library()[plate].about.c_str());
-  changed |= ImGui::SliderFloat("turn", &turn, -180, 180, "%.0f deg");
-  changed |= ImGui::SliderFloat("tilt", &tilt, -90, 90, "%.0f deg");
+  ImGui::TextWrapped("%s", tr(plate_library()[plate].about).c_str());
+  changed |= ImGui::SliderFloat(tr("turn"), &turn, -180, 180, "%.0f deg");
+  changed |= ImGui::SliderFloat(tr("tilt"), &tilt, -90, 90, "%.0f deg");
   if (changed) tools.set_plate(plate, turn, tilt, rehearsal);
-  if (ImGui::Button("Fix it here (Enter)", {-1, 0})) tools.perform(rehearsal);
+  if (ImGui::Button(tr("Fix it here (Enter)"), {-1, 0})) tools.perform(rehearsal);
 }
 
 // Where it should lie on bone.
 void report_collision(double mm) {
-  if (mm > kPlateCollisionMm) ImGui::TextColored({1.0F, 0.45F, 0.35F, 1}, "%.1f mm deep in bone", mm);
+  if (mm > kPlateCollisionMm)
+    ImGui::TextColored({1.0F, 0.45F, 0.35F, 1}, "%s",
+                       filled(tr("{mm} mm deep in bone"), {{"mm", shown_number(mm, 1)}}).c_str());
 }
 
 }  // namespace
@@ -170,11 +178,11 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
     ImGui::PushID(static_cast<int>(f.id));
     ImGui::Text("%u: %s", f.id, model.name.c_str());
     ImGui::SameLine();
-    if (ImGui::SmallButton("take off")) rehearsal.act(SceneAction::detach(f.id));
+    if (ImGui::SmallButton(tr("take off"))) rehearsal.act(SceneAction::detach(f.id));
     report_collision(in_bone_mm[static_cast<std::size_t>(&f - fixtures.data())]);
     if (model.most_opening_mm > 0 && f.other != SceneAction::kNobody) {
       float opening = static_cast<float>(f.opening_mm);
-      if (ImGui::SliderFloat("open", &opening, 0, static_cast<float>(model.most_opening_mm), "%.1f mm"))
+      if (ImGui::SliderFloat(tr("open"), &opening, 0, static_cast<float>(model.most_opening_mm), "%.1f mm"))
         rehearsal.act(SceneAction::open(f.id, static_cast<double>(opening)));
     }
     ImGui::PopID();

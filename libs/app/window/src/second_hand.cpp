@@ -2,12 +2,15 @@
 
 #include <algorithm>
 
+#include "osteo/core/base/translate.h"
+#include "state_facts.h"
+
 namespace osteo::inline app {
 namespace {
 
 // What it may hold, in turn; the first: nothing.
 constexpr const char* kSecond[] = {"", "sucker 10 Fr", "irrigator 2 mm", "probe 1 mm"};
-constexpr const char* kNone = "there is no second hand: --dust, or --second-device";
+constexpr const char* kNone = tr_later("there is no second hand: --dust, or --second-device");
 
 MouseDevice* moved_by_window(Rehearsal& rehearsal) {
   return rehearsal.hands() > 1 ? dynamic_cast<MouseDevice*>(&rehearsal.device(1)) : nullptr;
@@ -16,19 +19,20 @@ MouseDevice* moved_by_window(Rehearsal& rehearsal) {
 }  // namespace
 
 std::string SecondHand::take_next(Rehearsal& rehearsal) {
-  if (rehearsal.hands() < 2) return kNone;
+  if (rehearsal.hands() < 2) return tr(kNone);
   holds_ = (holds_ + 1) % std::size(kSecond);
   if (moved_by_window(rehearsal) == nullptr) {
     holds_ = std::max<std::size_t>(holds_, 1);
     rehearsal.device(1).set_tool(static_cast<std::uint8_t>(instrument_index(kSecond[holds_])));
   }
   if (holds_ == 0) follow();
-  return holds_ == 0 ? "second hand: nothing" : std::string("second hand: ") + kSecond[holds_];
+  return holds_ == 0 ? tr("second hand: nothing")
+                     : filled(tr("second hand: {tool}"), {{"tool", shown_tool(kSecond[holds_])}});
 }
 
 bool SecondHand::move(Rehearsal& rehearsal, Vec3 by_mm, std::string& said) {
   if (moved_by_window(rehearsal) == nullptr) {
-    said = rehearsal.hands() < 2 ? kNone : "the second hand has a device of its own";
+    said = rehearsal.hands() < 2 ? tr(kNone) : tr("the second hand has a device of its own");
     return false;
   }
   if (holds_ == 0) said = take_next(rehearsal);

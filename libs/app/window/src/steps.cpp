@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "osteo/core/base/translate.h"
 #include "keys.h"
 
 namespace osteo::inline app {
@@ -13,17 +14,35 @@ constexpr double kDrilledMm3 = 0.5, kSuckedMm3 = 0.05, kZoomed = 0.1;
 }  // namespace
 
 FirstSteps::FirstSteps() {
-  const auto key = [](Command c) { return key_name(c); };
-  steps_ = {{"Drill: point at the bone, " + key(Command::bring) +
-             " brings the drill; hold the left button, wheel away from you: deeper"},
-            {"Undo: " + key(Command::undo) + " takes the last stroke back"},
-            {"Suction: keep drilling, and hold " + key(Command::suck) +
-             ": the suction tube beside the burr removes the dust"},
-            {"Zoom: Ctrl-wheel; right drag turns the view"},
-            {"Cut: " + key(Command::saw) + " sets the saw where you point, drag moves it, " + key(Command::perform) +
-             " cuts"},
-            {"Plate: " + key(Command::plates) + " takes one, " + key(Command::bring) +
-             " brings it where you point, wheel presses it on, " + key(Command::perform) + " fixes it"}};
+  steps_ = {{tr_later("Drill: point at the bone, {bring} brings the drill; hold the left button, wheel away from you: "
+                      "deeper")},
+            {tr_later("Undo: {undo} takes the last stroke back")},
+            {tr_later("Suction: keep drilling, and hold {suction}: the suction tube beside the burr removes the dust")},
+            {tr_later("Zoom: Ctrl-wheel; right drag turns the view")},
+            {tr_later("Cut: {saw} sets the saw where you point, drag moves it, {perform} cuts")},
+            {tr_later("Plate: {plate} takes one, {bring} brings it where you point, wheel presses it on, {perform} "
+                      "fixes it")}};
+}
+
+std::string Step::words() const {
+  return filled(tr(text), {{"bring", key_name(Command::bring)},
+                           {"undo", key_name(Command::undo)},
+                           {"suction", key_name(Command::suck)},
+                           {"saw", key_name(Command::saw)},
+                           {"plate", key_name(Command::plates)},
+                           {"perform", key_name(Command::perform)}});
+}
+
+std::string Step::name() const {
+  const std::string all = words();
+  const auto end = all.find_last_not_of(' ', all.find(':') - 1);  // French has a blank before it
+  return all.substr(0, end + 1);
+}
+
+std::string Step::how() const {
+  const std::string all = words();
+  const auto from = all.find_first_not_of(": ", all.find(':'));
+  return from == std::string::npos ? std::string() : all.substr(from);
 }
 
 void FirstSteps::see(const StepFacts& now) {
