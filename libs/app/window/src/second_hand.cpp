@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "osteo/core/base/translate.h"
-#include "state_facts.h"
 
 namespace osteo::inline app {
 namespace {
@@ -27,7 +26,7 @@ std::string SecondHand::take_next(Rehearsal& rehearsal) {
   }
   if (holds_ == 0) follow();
   return holds_ == 0 ? tr("second hand: nothing")
-                     : filled(tr("second hand: {tool}"), {{"tool", shown_tool(kSecond[holds_])}});
+                     : filled(tr("second hand: {tool}"), {{"tool", tr_sized(kSecond[holds_])}});
 }
 
 bool SecondHand::move(Rehearsal& rehearsal, Vec3 by_mm, std::string& said) {

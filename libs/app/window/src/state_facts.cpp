@@ -25,12 +25,6 @@ std::string text_of(const char* format, A... a) {
 
 }  // namespace
 
-std::string shown_tool(const std::string& name) {
-  const auto digit = name.find_first_of("0123456789");
-  if (digit == std::string::npos || digit == 0) return tr(name);
-  return tr(name.substr(0, digit - 1)) + " " + shown_figures(name.substr(digit));
-}
-
 std::string clock_text(double seconds) {
   const auto whole = static_cast<long>(std::max(0.0, seconds));
   if (whole >= 3600) return text_of("%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60, whole % 60);
@@ -40,7 +34,7 @@ std::string clock_text(double seconds) {
 StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures, double rate_hz) {
   StateFacts f;
   const Instrument& held = instrument_of(tick.device.tool);
-  f.tool = (tick.flags & kPlateInHand) != 0 ? tr("plate in the hand") : shown_tool(held.name);
+  f.tool = (tick.flags & kPlateInHand) != 0 ? tr("plate in the hand") : tr_sized(held.name);
   f.turning = tick.speed_rpm > 0;
   // The last digits of a speed that follows a pedal would only flicker.
   f.speed = f.turning ? text_of("%.0f rpm", 500 * std::round(static_cast<double>(tick.speed_rpm) / 500)) : tr("still");

@@ -47,8 +47,6 @@ void report_warmth(StateFacts& facts, const WarmthNow& warmth, const TickRecord&
 /// Rather than the last thing said, which is empty after a while: a warning that lasts lets it pass.
 [[nodiscard]] bool warning_is_reported(const StateFacts& facts, const std::string& message);
 
-/// An instrument's name in the language, its size as it is: "cutting 4 mm".
-[[nodiscard]] std::string shown_tool(const std::string& name);
 /// "3:07"; from an hour "1:03:07".
 [[nodiscard]] std::string clock_text(double seconds);
 

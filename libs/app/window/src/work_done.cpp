@@ -74,7 +74,7 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
   if (session.score) add(tr("score"), *session.score);
   add(tr("bone drilled away"), text_of("%.1f mm³", session.removed_mm3));
   for (const auto& [tool, done] : work.by_tool()) {
-    add("    " + shown_tool(instrument_of(tool).name), filled(tr("{mm3} mm³ in {time}"),
+    add("    " + tr_sized(instrument_of(tool).name), filled(tr("{mm3} mm³ in {time}"),
                {{"mm3", shown_number(done.removed_mm3, 1)},
                 {"time", clock_text(static_cast<double>(done.ticks_turning) / session.rate_hz)}}));
   }

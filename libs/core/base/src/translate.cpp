@@ -190,6 +190,12 @@ std::string tr(const std::string& text) {
   return forms == nullptr ? text : forms->front();
 }
 
+std::string tr_sized(const std::string& name) {
+  const auto digit = name.find_first_of("0123456789");
+  if (digit == std::string::npos || digit < 2) return tr(name);
+  return tr(name.substr(0, digit - 1)) + " " + shown_figures(name.substr(digit));
+}
+
 const char* tr_of(const char* context, const char* text) {
   const auto* const forms = forms_of(std::string(context) + kOfContext + text);
   return forms == nullptr ? text : forms->front().c_str();

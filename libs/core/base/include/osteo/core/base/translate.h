@@ -36,6 +36,8 @@ class EnglishHere {
 /// tests/papers/catalogues.py --update. The result stays valid as long as `text` does.
 [[nodiscard]] const char* tr(const char* text);
 [[nodiscard]] std::string tr(const std::string& text);  ///< of a table's text, which tr_later() has marked
+/// Of a name that ends with a size, "cutting 4 mm": what stands before it is in the catalogue.
+[[nodiscard]] std::string tr_sized(const std::string& name);
 /// Of a word that says more than one thing: `context` tells which.
 [[nodiscard]] const char* tr_of(const char* context, const char* text);
 /// One form for one, others for many, by the language's rule.
