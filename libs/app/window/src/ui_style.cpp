@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "osteo/core/base/translate.h"
 #include "window_fonts.h"
 
 namespace osteo::inline app {
@@ -24,14 +25,29 @@ void set_ui_style(int em_pixels) {
   // ImGui's size is from the highest ascender to the lowest descender, which Noto Sans has 1.36 em apart: letters would
   // be 12 pixels. Made larger, and lines stay as far apart as they are said to be.
   constexpr float kLarger = 1.05F;
+  // From ascender to descender Noto Sans CJK is 1.448 em high: letters of one line are as large as each other.
+  constexpr float kChineseLarger = 1.448F / 1.362F;
   const auto add = [&](const unsigned char* font, std::size_t bytes, float high, const ImWchar* letters) {
     // ImGui asks for a pointer to what it may own; this it does not, and does not write to.
     config.GlyphOffset.y = -std::round((kLarger - 1) * high / 2);
     io.Fonts->AddFontFromMemoryTTF(const_cast<unsigned char*>(font), static_cast<int>(bytes),
                                    std::round(kLarger * high), &config, letters);
   };
+  // Of Chinese only what the catalogue has, in both.
+  ImVector<ImWchar> chinese;
+  ImFontGlyphRangesBuilder needed;
+  const std::string_view catalogue = catalogue_text(Language::chinese);
+  needed.AddText(catalogue.data(), catalogue.data() + catalogue.size());
+  needed.BuildRanges(&chinese);
+  const auto add_chinese = [&](float high) {
+    config.MergeMode = true;
+    add(kNotoSansSc, sizeof kNotoSansSc, high * kChineseLarger, chinese.Data);
+    config.MergeMode = false;
+  };
   add(kNotoSans, sizeof kNotoSans, size, kLetters);
+  add_chinese(size);
   add(kNotoSansBold, sizeof kNotoSansBold, std::round(kBoldEm * size), kLatin);
+  add_chinese(std::round(kBoldEm * size));
   io.Fonts->Build();
   io.Fonts->Fonts[0]->FontSize = size;
   io.Fonts->Fonts[1]->FontSize = std::round(kBoldEm * size);

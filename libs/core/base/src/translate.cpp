@@ -173,6 +173,13 @@ Language language_named(std::string_view name) {
   return at == kNames.end() ? language_of_environment() : at_name(&*at);
 }
 
+InLanguage::InLanguage(Language language) : before_(static_cast<Language>(chosen.load())) {
+  use_language(language);
+}
+InLanguage::~InLanguage() {
+  use_language(before_);
+}
+
 EnglishHere::EnglishHere() {
   ++english_here;
 }
@@ -242,6 +249,27 @@ std::string shown_number(double value, int decimals) {
   char out[64];
   std::snprintf(out, sizeof out, "%.*f", decimals, value);
   return shown_figures(out);
+}
+
+std::string shown_date(const std::string& iso) {
+  constexpr std::string_view kForm = "0000-00-00";
+  bool is = iso.size() == kForm.size();
+  for (std::size_t n = 0; is && n < iso.size(); ++n)
+    is = kForm[n] == '-' ? iso[n] == '-' : iso[n] >= '0' && iso[n] <= '9';
+  if (!is) return iso;
+  const std::string year = iso.substr(0, 4), month = iso.substr(5, 2), day = iso.substr(8);
+  switch (language()) {
+    case Language::english:
+      break;
+    case Language::german:
+      return day + "." + month + "." + year;
+    case Language::spanish:
+    case Language::french:
+      return day + "/" + month + "/" + year;
+    case Language::chinese:
+      return year + "年" + month + "月" + day + "日";
+  }
+  return iso;
 }
 
 std::string_view catalogue_text(Language language) {

@@ -23,6 +23,18 @@ void use_language(Language language);
 /// By its name in enum_names; any other, such as "auto": that of the environment.
 [[nodiscard]] Language language_named(std::string_view name);
 
+/// While it lives, all texts are in this language; then again as before. For a command that makes a page for people.
+class InLanguage {
+ public:
+  explicit InLanguage(Language language);
+  ~InLanguage();
+  InLanguage(const InLanguage&) = delete;
+  InLanguage& operator=(const InLanguage&) = delete;
+
+ private:
+  Language before_;
+};
+
 /// While it lives, this thread's texts and numbers are English: for what is written into files.
 class EnglishHere {
  public:
@@ -59,6 +71,9 @@ struct Place {
 [[nodiscard]] std::string shown_number(double value, int decimals);
 /// Of a text that is nothing but numbers and units, written as C does: with the language's decimal mark.
 [[nodiscard]] std::string shown_figures(std::string text);
+
+/// Of a date as files have it, 2026-11-27: as the language writes it on paper; any other text as it is.
+[[nodiscard]] std::string shown_date(const std::string& iso);
 
 /// All of a catalogue, as it was written: for fonts that have to hold its letters. Empty for English.
 [[nodiscard]] std::string_view catalogue_text(Language language);
