@@ -47,7 +47,7 @@ foreach(component ${deb_components})
   set(package ${deb_name_${component}})
   configure_file(apps/packaging/deb/changelog.in ${PROJECT_BINARY_DIR}/packaging/${package}/changelog @ONLY)
   execute_process(COMMAND gzip -9nfk ${PROJECT_BINARY_DIR}/packaging/${package}/changelog)
-  install(FILES apps/packaging/deb/copyright LICENSES/OFL-1.1.txt LICENSES/MIT-Tabler.txt ${PROJECT_BINARY_DIR}/packaging/${package}/changelog.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package}
+  install(FILES apps/packaging/deb/copyright LICENSES/OFL-1.1.txt LICENSES/MIT.txt ${PROJECT_BINARY_DIR}/packaging/${package}/changelog.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package}
     COMPONENT ${component} EXCLUDE_FROM_ALL)
   if(EXISTS ${PROJECT_SOURCE_DIR}/apps/packaging/deb/${package}.lintian-overrides)
     install(FILES apps/packaging/deb/${package}.lintian-overrides DESTINATION ${CMAKE_INSTALL_DATADIR}/lintian/overrides RENAME ${package}

@@ -6,7 +6,6 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/session/recording/session_reader.h"
-#include "osteo/session/recording/simulated.h"
 
 namespace osteo {
 

@@ -10,7 +10,6 @@
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/session/recording/session_reader.h"
-#include "osteo/session/recording/simulated.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"

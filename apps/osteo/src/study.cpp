@@ -84,6 +84,177 @@ void write_new(const fs::path& path, const std::string& content, bool force) {
   write_file(path, content);
 }
 
+/// What an action says: as JSON, in a line, and what is worth knowing besides.
+struct Result {
+  Json done;
+  std::string message;
+  std::vector<std::string> notes;
+};
+
+/// A new study, with the procedure's file where one was given.
+void make_new(const StudyCommand::Params& p, cli::Invocation& io, const fs::path& folder, Result& result) {
+  study::Plan plan;
+  plan.title = p.title;
+  plan.procedure = p.procedure;
+  plan.groups = names_in(p.groups);
+  plan.cases = names_in(p.cases);
+  plan.items = names_in(p.items);
+  plan.competent = !p.competent.empty() || plan.groups.empty() ? p.competent : plan.groups.back();
+  plan.attempts = p.attempts;
+  plan.lowest = p.lowest;
+  plan.highest = p.highest;
+  plan.seed = static_cast<std::uint64_t>(io.common.seed);
+  std::string file;
+  if (p.procedure.ends_with(".json")) {
+    plan.procedure = load_procedure(p.procedure).name;
+    file = read_text(p.procedure);
+  }
+  study::new_study(folder, plan);
+  if (!file.empty()) write_file(folder / kProcedure, file);
+  result.message = "made '" + folder.string() + "'; meant to pass: " + plan.competent + " (--competent says otherwise)";
+}
+
+/// A participant; their code is result.
+void add_person(const StudyCommand::Params& p, cli::Invocation& io, const fs::path& folder, Result& result) {
+  for (const char* const flag : {"case_name", "attempt", "mirror", "accept"}) {
+    if (io.given.contains(flag))
+      throw Error(ExitCode::usage, "which session, or file of its metrics?", "osteo study add STUDY SESSION ...");
+  }
+  const std::string code = study::add_participant(folder, p.participant, p.group);
+  result.done["participant"] = code;
+  result.message = code + " is in " + p.group;
+}
+
+/// A session, scored here, or a file of its metrics.
+void add_measured(const StudyCommand::Params& p, cli::Invocation& io, const fs::path& folder, Result& result) {
+  if (io.given.contains("group")) throw Error(ExitCode::usage, "--group is of a participant, not of a session");
+  const fs::path file = io.arguments[2];
+  const bool session = fs::is_directory(file);
+  if (p.mirror && !session)
+    throw Error(ExitCode::usage, "--mirror is of a session that is scored here, not of a file of metrics");
+  study::Measurements measured;
+  if (session) {
+    ScoreAsked asked;
+    if (fs::exists(folder / kProcedure)) asked.procedure = load_procedure(folder / kProcedure);
+    if (p.mirror) {
+      if (!asked.procedure)
+        throw Error(ExitCode::usage, "--mirror has no effect: the study has no procedure's file",
+                    "osteo study new ... --procedure FILE.json keeps one");
+      asked.procedure = mirrored(std::move(*asked.procedure));
+    }
+    const Scored scored = score_folder(file, asked, io.context);
+    io.end_progress();
+    // The same text as 'osteo score --json' writes: one way in.
+    measured = study::read_measurements(json_of(scored, false).dump(), file.string() + " (scored)", result.notes);
+    for (const std::string& word : scored.score.words) result.notes.push_back("note: " + word);
+  } else {
+    measured = study::read_measurements(read_text(file), file.string(), result.notes);
+  }
+  const std::string blind =
+      study::add_session(folder, p.participant, p.case_name, p.attempt, measured, names_in(p.accept), result.notes);
+  result.done["blind"] = blind;
+  result.message =
+      "raters know the session as " + blind + ": its movie goes to " + (folder / "movies" / (blind + ".mp4")).string();
+}
+
+/// A participant, or one of their sessions.
+void take_out(const StudyCommand::Params& p, cli::Invocation& io, const fs::path& folder, Result& result) {
+  if (p.participant.empty())
+    throw Error(ExitCode::usage, "nobody was named", "osteo study remove STUDY --participant CODE");
+  if (io.given.contains("attempt") && p.case_name.empty())
+    throw Error(ExitCode::usage, "--attempt is of a session: give its --case-name too");
+  const study::Removed r = study::remove(folder, p.participant, p.case_name, p.attempt);
+  result.done["sessions"] = r.sessions;
+  result.done["ratings"] = r.ratings;
+  result.done["movies"] = r.movies;
+  result.done["forms"] = Json(r.forms);
+  result.message = p.participant + (p.case_name.empty() ? " is out, with " : ": taken out ") +
+                   std::to_string(r.sessions) + (r.sessions == 1 ? " session, " : " sessions, ") +
+                   std::to_string(r.ratings) + " ratings and " + std::to_string(r.movies) + " movies";
+  if (!r.forms.empty())
+    result.notes.push_back(
+        "forms were written again: who has an old one opens the new one and loads what was saved; the "
+        "order is another");
+  result.notes.push_back("the report is of before until it is made again; sessions' own folders are not touched");
+}
+
+/// Primary outcomes, and what can be found with them.
+void plan_outcomes(const StudyCommand::Params& p, cli::Invocation& /*io*/, const fs::path& folder, Result& result) {
+  if (!p.primary.empty()) study::set_primary(folder, names_in(p.primary));
+  const study::Study study = study::read_study(folder);
+  result.done["primary"] = Json(study.plan.primary);
+  result.done["primary_after"] = study.plan.primary_after;
+  result.done["reach"] = Json::list();
+  if (study.plan.primary.empty())
+    result.notes.emplace_back("no primary outcome is named: all columns will be corrected together");
+  for (const study::Reach& r : study::reach_of(study)) {
+    result.done["reach"].push_back(study::json_of(r));
+    result.notes.push_back(study::reported(r));
+  }
+  result.message = "study.json: " + std::to_string(study.plan.primary.size()) + " primary outcomes";
+}
+
+/// The order of cases, for those who have none yet.
+void extend_order(const StudyCommand::Params& /*p*/, cli::Invocation& /*io*/, const fs::path& folder, Result& result) {
+  const std::size_t added = study::make_order(folder);
+  result.done["added"] = added;
+  result.message = "order.csv: " + std::to_string(added) + " people added";
+}
+
+/// A rater's form.
+void write_form(const StudyCommand::Params& p, cli::Invocation& io, const fs::path& folder, Result& result) {
+  const fs::path file = folder / "forms" / (p.rater + ".html");
+  const std::string page = study::form_html(study::read_study(folder), p.rater);
+  make_output_folder(folder / "forms");
+  write_new(file, page, io.common.force);
+  result.done["form"] = file.string();
+  result.message = "open " + file.string() + " in a browser";
+}
+
+/// What a rater saved.
+void take_ratings(const StudyCommand::Params& /*p*/, cli::Invocation& io, const fs::path& folder, Result& result) {
+  const study::RaterSheet sheet =
+      study::read_ratings(read_text(io.arguments[2]), io.arguments[2], study::read_study(folder), result.notes);
+  make_output_folder(folder / "ratings");
+  write_new(folder / "ratings" / (sheet.rater + ".json"), read_text(io.arguments[2]), io.common.force);
+  result.done["rater"] = sheet.rater;
+  result.message = sheet.rater + ": ratings of " + std::to_string(sheet.sessions.size()) + " sessions taken";
+}
+
+/// The analysis as page, PDF and JSON.
+void write_report(const StudyCommand::Params& p, cli::Invocation& io, const fs::path& folder, Result& result) {
+  const study::Study study = study::read_study(folder);
+  const study::Analysis analysis = study::analyse(study, {p.level, p.resamples, names_in(p.given)});
+  const std::string base = p.out.empty() ? (folder / "report").string() : p.out;
+  // The report follows from the folder; one that is there is replaced, as that of a case is, unless it was put
+  // elsewhere.
+  const bool replace = p.out.empty() || io.common.force;
+  for (const char* const suffix : {".json", ".html", ".pdf"}) {
+    if (!replace && output_exists(base + suffix))
+      throw Error(ExitCode::cannot_write, "'" + base + suffix + "' is there already", "--force replaces it");
+  }
+  write_file(base + ".json", analysis.json.dump(2) + "\n");
+  write_file(base + ".html", sheet_html(analysis.sheet));
+  write_file(base + ".pdf", sheet_pdf(analysis.sheet));
+  for (const Json& r : analysis.json.find("refused")->items())
+    result.notes.push_back("not computed: " + *r.find("what")->text() + ". " + *r.find("why")->text());
+  result.done = analysis.json;
+  result.message = base + ".html, .pdf and .json";
+}
+
+int run_demo(const StudyCommand::Params& p, cli::Invocation& io) {
+  if (io.arguments.size() > 1 && !p.out.empty())
+    throw Error(ExitCode::usage, "the demo's folder is given twice", "leave -o out");
+  if (io.arguments.size() < 2 && p.out.empty())
+    throw Error(ExitCode::usage, "the demo needs a folder", "osteo study demo -o FOLDER");
+#ifdef OSTEO_WITH_RESEARCH
+  return run_study_demo(io.arguments.size() > 1 ? io.arguments[1] : p.out, p.resamples, p.level, !p.no_movies, io);
+#else
+  throw Error(ExitCode::usage, "this build has no simulated trainees, by whom the demo's sessions are made",
+              "build with -DOSTEO_RESEARCH=ON");
+#endif
+}
+
 }  // namespace
 
 cli::CommandInfo StudyCommand::info() {
@@ -116,159 +287,30 @@ cli::CommandInfo StudyCommand::info() {
 int StudyCommand::run(const Params& p, cli::Invocation& io) {
   const std::string action = io.arguments[0];
   need_known(io, action);
-  if (action == "demo") {
-    if (io.arguments.size() > 1 && !p.out.empty())
-      throw Error(ExitCode::usage, "the demo's folder is given twice", "leave -o out");
-    if (io.arguments.size() < 2 && p.out.empty())
-      throw Error(ExitCode::usage, "the demo needs a folder", "osteo study demo -o FOLDER");
-#ifdef OSTEO_WITH_RESEARCH
-    return run_study_demo(io.arguments.size() > 1 ? io.arguments[1] : p.out, p.resamples, p.level, !p.no_movies, io);
-#else
-    throw Error(ExitCode::usage, "this build has no simulated trainees, by whom the demo's sessions are made",
-                "build with -DOSTEO_RESEARCH=ON");
-#endif
-  }
+  if (action == "demo") return run_demo(p, io);
   if (io.arguments.size() < 2)
     throw Error(ExitCode::usage, "'study " + action + "' needs the study's folder", "osteo study " + action + " STUDY");
   const fs::path folder = io.arguments[1];
   if (io.given.contains("seed") && action != "new")
     throw Error(ExitCode::usage, "--seed does nothing here: the study has its own",
                 "it is in " + (folder / "study.json").string());
-  std::vector<std::string> notes;
-  Json done{{"action", action}};
-  std::string said;
-  if (action == "new") {
-    study::Plan plan;
-    plan.title = p.title;
-    plan.procedure = p.procedure;
-    plan.groups = names_in(p.groups);
-    plan.cases = names_in(p.cases);
-    plan.items = names_in(p.items);
-    plan.competent = !p.competent.empty() || plan.groups.empty() ? p.competent : plan.groups.back();
-    plan.attempts = p.attempts;
-    plan.lowest = p.lowest;
-    plan.highest = p.highest;
-    plan.seed = static_cast<std::uint64_t>(io.common.seed);
-    std::string file;
-    if (p.procedure.ends_with(".json")) {
-      plan.procedure = load_procedure(p.procedure).name;
-      file = read_text(p.procedure);
-    }
-    study::new_study(folder, plan);
-    if (!file.empty()) write_file(folder / kProcedure, file);
-    said = "made '" + folder.string() + "'; meant to pass: " + plan.competent + " (--competent says otherwise)";
-  } else if (action == "add" && io.arguments.size() < 3) {
-    for (const char* const flag : {"case_name", "attempt", "mirror", "accept"}) {
-      if (io.given.contains(flag))
-        throw Error(ExitCode::usage, "which session, or file of its metrics?", "osteo study add STUDY SESSION ...");
-    }
-    const std::string code = study::add_participant(folder, p.participant, p.group);
-    done["participant"] = code;
-    said = code + " is in " + p.group;
-  } else if (action == "add") {
-    if (io.given.contains("group")) throw Error(ExitCode::usage, "--group is of a participant, not of a session");
-    const fs::path file = io.arguments[2];
-    const bool session = fs::is_directory(file);
-    if (p.mirror && !session)
-      throw Error(ExitCode::usage, "--mirror is of a session that is scored here, not of a file of metrics");
-    study::Measurements measured;
-    if (session) {
-      ScoreAsked asked;
-      if (fs::exists(folder / kProcedure)) asked.procedure = load_procedure(folder / kProcedure);
-      if (p.mirror) {
-        if (!asked.procedure)
-          throw Error(ExitCode::usage, "--mirror has no effect: the study has no procedure's file",
-                      "osteo study new ... --procedure FILE.json keeps one");
-        asked.procedure = mirrored(std::move(*asked.procedure));
-      }
-      const Scored scored = score_folder(file, asked, io.context);
-      io.end_progress();
-      // The same text as 'osteo score --json' writes: one way in.
-      measured = study::read_measurements(json_of(scored, false).dump(), file.string() + " (scored)", notes);
-      for (const std::string& word : scored.score.words) notes.push_back("note: " + word);
-    } else {
-      measured = study::read_measurements(read_text(file), file.string(), notes);
-    }
-    const std::string blind =
-        study::add_session(folder, p.participant, p.case_name, p.attempt, measured, names_in(p.accept), notes);
-    done["blind"] = blind;
-    said = "raters know the session as " + blind + ": its movie goes to " +
-           (folder / "movies" / (blind + ".mp4")).string();
-  } else if (action == "remove") {
-    if (p.participant.empty())
-      throw Error(ExitCode::usage, "nobody was named", "osteo study remove STUDY --participant CODE");
-    if (io.given.contains("attempt") && p.case_name.empty())
-      throw Error(ExitCode::usage, "--attempt is of a session: give its --case-name too");
-    const study::Removed r = study::remove(folder, p.participant, p.case_name, p.attempt);
-    done["sessions"] = r.sessions;
-    done["ratings"] = r.ratings;
-    done["movies"] = r.movies;
-    done["forms"] = Json(r.forms);
-    said = p.participant + (p.case_name.empty() ? " is out, with " : ": taken out ") + std::to_string(r.sessions) +
-           (r.sessions == 1 ? " session, " : " sessions, ") + std::to_string(r.ratings) + " ratings and " +
-           std::to_string(r.movies) + " movies";
-    if (!r.forms.empty())
-      notes.push_back(
-          "forms were written again: who has an old one opens the new one and loads what was saved; the "
-          "order is another");
-    notes.push_back("the report is of before until it is made again; sessions' own folders are not touched");
-  } else if (action == "plan") {
-    if (!p.primary.empty()) study::set_primary(folder, names_in(p.primary));
-    const study::Study study = study::read_study(folder);
-    done["primary"] = Json(study.plan.primary);
-    done["primary_after"] = study.plan.primary_after;
-    done["reach"] = Json::list();
-    if (study.plan.primary.empty())
-      notes.emplace_back("no primary outcome is named: all columns will be corrected together");
-    for (const study::Reach& r : study::reach_of(study)) {
-      done["reach"].push_back(study::json_of(r));
-      notes.push_back(study::reported(r));
-    }
-    said = "study.json: " + std::to_string(study.plan.primary.size()) + " primary outcomes";
-  } else if (action == "order") {
-    const std::size_t added = study::make_order(folder);
-    done["added"] = added;
-    said = "order.csv: " + std::to_string(added) + " people added";
-  } else if (action == "form") {
-    const fs::path file = folder / "forms" / (p.rater + ".html");
-    const std::string page = study::form_html(study::read_study(folder), p.rater);
-    make_output_folder(folder / "forms");
-    write_new(file, page, io.common.force);
-    done["form"] = file.string();
-    said = "open " + file.string() + " in a browser";
-  } else if (action == "rate") {
-    const study::RaterSheet sheet =
-        study::read_ratings(read_text(io.arguments[2]), io.arguments[2], study::read_study(folder), notes);
-    make_output_folder(folder / "ratings");
-    write_new(folder / "ratings" / (sheet.rater + ".json"), read_text(io.arguments[2]), io.common.force);
-    done["rater"] = sheet.rater;
-    said = sheet.rater + ": ratings of " + std::to_string(sheet.sessions.size()) + " sessions taken";
+  using Action = void (*)(const Params&, cli::Invocation&, const fs::path&, Result&);
+  static const std::map<std::string, Action> actions{
+      {"new", make_new},    {"remove", take_out},   {"plan", plan_outcomes},  {"order", extend_order},
+      {"form", write_form}, {"rate", take_ratings}, {"analyse", write_report}};
+  Result result{{{"action", action}}, {}, {}};
+  if (action == "add") {
+    (io.arguments.size() < 3 ? add_person : add_measured)(p, io, folder, result);
   } else {
-    const study::Study study = study::read_study(folder);
-    const study::Analysis analysis = study::analyse(study, {p.level, p.resamples, names_in(p.given)});
-    const std::string base = p.out.empty() ? (folder / "report").string() : p.out;
-    // The report follows from the folder; one that is there is replaced, as that of a case is, unless it was put
-    // elsewhere.
-    const bool replace = p.out.empty() || io.common.force;
-    for (const char* const suffix : {".json", ".html", ".pdf"}) {
-      if (!replace && output_exists(base + suffix))
-        throw Error(ExitCode::cannot_write, "'" + base + suffix + "' is there already", "--force replaces it");
-    }
-    write_file(base + ".json", analysis.json.dump(2) + "\n");
-    write_file(base + ".html", sheet_html(analysis.sheet));
-    write_file(base + ".pdf", sheet_pdf(analysis.sheet));
-    for (const Json& r : analysis.json.find("refused")->items())
-      notes.push_back("not computed: " + *r.find("what")->text() + ". " + *r.find("why")->text());
-    done = analysis.json;
-    said = base + ".html, .pdf and .json";
+    actions.at(action)(p, io, folder, result);
   }
   if (io.common.json) {
-    if (!notes.empty() && action != "analyse") done["notes"] = Json(notes);
-    io.out << done.dump(2) << '\n';
+    if (!result.notes.empty() && action != "analyse") result.done["notes"] = Json(result.notes);
+    io.out << result.done.dump(2) << '\n';
   }
   if (!io.common.quiet) {
-    for (const std::string& note : notes) io.err << note << '\n';
-    if (!io.common.json) io.err << said << '\n';
+    for (const std::string& note : result.notes) io.err << note << '\n';
+    if (!io.common.json) io.err << result.message << '\n';
   }
   return 0;
 }

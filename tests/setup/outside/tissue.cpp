@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "osteo/geometry/tets/lattice_tets.h"
-#include "osteo/simulation/tissue/statics.h"
+#include "osteo/simulation/tissue/fem.h"
 
 int main() {
   osteo::VoxelBits bar(osteo::Frame{.dims = {4, 4, 8}});  // cubes of 1 mm

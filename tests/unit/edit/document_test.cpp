@@ -142,7 +142,7 @@ TEST(EditDocument, IslandsByClickAndBySize) {
   EXPECT_NEAR(d.volume_mm3(0), 4.0 / 3 * M_PI * 8, 3);
   d.undo();
   done = d.apply(IslandSizeEdit{10, 0});
-  EXPECT_EQ(done.note, "1 piece removed, 2 left");
+  EXPECT_EQ(done.note, "1 component removed, 2 left");
   done = d.apply(IslandSizeEdit{0, 1});
   EXPECT_NEAR(d.volume_mm3(0), 4.0 / 3 * M_PI * 27, 6);
   // Where there is none, nothing is done, and it says why.

@@ -52,7 +52,8 @@ class MetricSession {
   static constexpr double kHz = 1000;
   static constexpr std::uint64_t kEnd = 20'000, kLostFrom = 18'500, kLostTo = 18'800;
 
-  static void write(const std::filesystem::path& file, Second second) {
+  static void write(const std::filesystem::path& file, Second second, std::uint64_t lost_from = kLostFrom,
+                    std::uint64_t lost_to = kLostTo) {
     const World bone = metric_bone();
     SessionHeader header;
     header.bone_hash = bone.hash();
@@ -61,9 +62,11 @@ class MetricSession {
     SessionWriter writer(file, header);
     SessionBatch batch;
     for (std::uint64_t n = 0; n < kEnd; ++n) {
-      if (n == kLostFrom) {
-        writer.append(RecordingGap{kLostFrom, kLostTo - kLostFrom, false});
-        n = kLostTo;
+      if (n == lost_from) {
+        if (!batch.ticks.empty()) writer.append(batch);
+        batch = {};
+        writer.append(RecordingGap{lost_from, lost_to - lost_from, false});
+        n = lost_to;
       }
       act(n, bone, batch);
       batch.ticks.push_back(first_hand(n));
@@ -74,7 +77,7 @@ class MetricSession {
     }
     SessionEnd end;
     end.ticks = kEnd;
-    end.ticks_lost = kLostTo - kLostFrom;
+    end.ticks_lost = lost_to - lost_from;
     writer.finish(end);
   }
 

@@ -2,6 +2,7 @@
 // without a row here fails.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -243,6 +244,41 @@ TEST(MetricTable, AnInjuryIsOneMomentAndContactsASecondApartAreEvents) {
     EXPECT_NEAR(touches_s[1], 15.66, 0.02);
     ASSERT_EQ(injuries_s.size(), 1U);
     EXPECT_NEAR(injuries_s[0], 16.66, 0.02);
+  }
+}
+
+const Measured* find(const Score& score, const std::string& name) {
+  const auto at =
+      std::find_if(score.values.begin(), score.values.end(), [&](const Measured& m) { return m.name() == name; });
+  return at == score.values.end() ? nullptr : &*at;
+}
+
+// The first of three contacts is recorded but for 20 ms of it: what the hand did there is not known, so what follows is
+// a contact of its own. The same 20 ms in the air change nothing.
+TEST(MetricTable, AContactDoesNotGoOnThroughWhatIsNotRecorded) {
+  for (const auto& [lost_from, touches] : {std::pair<std::uint64_t, double>{14'760, 4}, {15'250, 3}}) {
+    const test::ScratchFolder scratch;
+    MetricSession::write(scratch / "s.oss", Second::none, lost_from, lost_from + 20);
+    const Score score = score_session(SessionReader(scratch / "s.oss"), test::metric_bone(), test::metric_nerve().get(),
+                                      &procedure(), nullptr, {});
+    ASSERT_NE(find(score, "touches[nerve]"), nullptr);
+    EXPECT_EQ(find(score, "touches[nerve]")->value, touches) << lost_from;
+    EXPECT_NEAR(find(score, "lost_s")->value.value_or(0), 0.02, 1e-9);
+  }
+}
+
+// Bands of experts want a second of theirs: 100 samples, no fewer.
+TEST(MetricTable, BandsWantASecondOfTheExperts) {
+  const test::ScratchFolder scratch;
+  MetricSession::write(scratch / "s.oss", Second::none);
+  for (const std::size_t samples : {99U, 100U}) {
+    Reference experts = reference();
+    experts.sessions.front().near[1].resize(samples);
+    const Score score = score_session(SessionReader(scratch / "s.oss"), test::metric_bone(), test::metric_nerve().get(),
+                                      &procedure(), &experts, {});
+    const Measured* const share = find(score, "force_above_band_share[nerve]");
+    ASSERT_NE(share, nullptr);
+    EXPECT_EQ(share->value.has_value(), samples == 100) << samples;
   }
 }
 

@@ -96,7 +96,7 @@ TEST(Texture, TheFileIsCheckedWithItsLine) {
       "one for each");
   refused(
       R"({"osteotome_texture": 1, "rate_hz": 1000, "force_n": [1], "speed_mm_s": [20], "models": [{"force_n": 2, "speed_mm_s": 20, "ar": [0], "noise_n2": 1}]})",
-      "none of those");
+      "not one of those");
   refused("{}", "osteotome_texture");
   EXPECT_THROW(static_cast<void>(texture_node({1, 2, 3}, 2)), Error);
   EXPECT_THROW(Texture(TextureModel{}, 1), Error);

@@ -13,8 +13,8 @@
 #include "calculix.h"
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/io/inp_io.h"
+#include "osteo/simulation/tissue/fem.h"
 #include "osteo/simulation/tissue/problem.h"
-#include "osteo/simulation/tissue/statics.h"
 
 namespace osteo {
 namespace {

@@ -1,5 +1,5 @@
 // Movements, gravity and contact, against what is known in closed form and against CalculiX.
-#include "osteo/simulation/tissue/statics.h"
+#include "osteo/simulation/tissue/fem.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,6 @@
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/io/inp_io.h"
 #include "osteo/imaging/io/tet_io.h"
-#include "osteo/simulation/tissue/fem.h"
 #include "osteo/simulation/tissue/problem.h"
 #include "scratch.h"
 

@@ -10,7 +10,7 @@
 #include "osteo/assessment/trainee/simulate.h"
 #include "osteo/assessment/trainee/trainee_hand.h"
 #include "osteo/core/base/error.h"
-#include "osteo/session/recording/simulated.h"
+#include "osteo/session/recording/session_reader.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "scratch.h"
 

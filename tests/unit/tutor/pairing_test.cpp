@@ -20,7 +20,7 @@ constexpr const char* kCode = "K7MX2QPA";
 constexpr std::int64_t kStepUs = 5000;
 
 // One host and many guests, each by a network of its own, in steps of 5 ms.
-class MainView {
+class Lobby {
  public:
   struct Seat {
     Seat(std::string_view code, JoinRole role, const NetworkFaults& faults, std::uint16_t at_port, std::uint64_t seed)
@@ -94,7 +94,7 @@ TEST(PairingRoom, EverybodyWhoAsksAtOnceIsIn) {
     for (const double loss : {0.0, 0.3}) {
       for (const double jitter : {0.0, 1.0}) {  // of the way, so that what is sent 100 ms apart is overtaken at 200 ms
         for (int n = 1; n <= 9; ++n) {
-          MainView room;
+          Lobby room;
           room.seed = static_cast<std::uint64_t>(one_way * 1000 + loss * 100 + jitter * 10 + n);
           const NetworkFaults faults{one_way, jitter * one_way, loss, jitter * 0.1};
           for (int i = 0; i < n; ++i) room.enter(i == 4 ? JoinRole::trainee : JoinRole::watcher, faults);
@@ -120,7 +120,7 @@ TEST(PairingRoom, AfterAnOutageTheTraineeIsInFirstAndAllComeBack) {
   for (const double one_way : {1.0, 60.0, 200.0}) {
     for (const double loss : {0.0, 0.2}) {
       for (const int n : {2, 5, 9}) {
-        MainView room;
+        Lobby room;
         room.seed = static_cast<std::uint64_t>(one_way * 10 + n);
         for (int i = 0; i < n; ++i)
           room.enter(i == n - 1 ? JoinRole::trainee : JoinRole::watcher, {one_way, one_way / 5, loss, 0});
@@ -143,7 +143,7 @@ TEST(PairingRoom, AfterAnOutageTheTraineeIsInFirstAndAllComeBack) {
 
 // A trainee that does not come back keeps nobody out.
 TEST(PairingRoom, WatchersComeBackWithoutTheTrainee) {
-  MainView room;
+  Lobby room;
   for (int i = 0; i < 3; ++i) room.enter(i == 0 ? JoinRole::trainee : JoinRole::watcher, {10, 2, 0, 0});
   ASSERT_GE(room.settle(5), 0);
   room.cut(true);
@@ -159,7 +159,7 @@ TEST(PairingRoom, WatchersComeBackWithoutTheTrainee) {
 // The reason for which somebody is rejected is the case.
 TEST(PairingRoom, WhoIsRefusedIsToldATrueReason) {
   for (const double loss : {0.0, 0.4}) {
-    MainView room;
+    Lobby room;
     room.seed = 77;
     const NetworkFaults faults{20, 20, loss, 0.2};
     room.enter(JoinRole::trainee, faults);
@@ -189,7 +189,7 @@ TEST(PairingRoom, WhoIsRefusedIsToldATrueReason) {
 
 // A program that was ended and started again, at another port: it is no second trainee, and no tenth.
 TEST(PairingRoom, WhoStartsAgainElsewhereGetsTheSeat) {
-  MainView room;
+  Lobby room;
   const NetworkFaults faults{20, 5, 0, 0};
   for (int i = 0; i < 9; ++i) room.enter(i == 0 ? JoinRole::trainee : JoinRole::watcher, faults);
   ASSERT_GE(room.settle(5), 0);
@@ -206,7 +206,7 @@ TEST(PairingRoom, WhoStartsAgainElsewhereGetsTheSeat) {
 
 // Strangers who ask as fast as they like neither push out nor hold up who has been answered.
 TEST(PairingRoom, StrangersWhoAskKeepNobodyFromProving) {
-  MainView room;
+  Lobby room;
   for (int i = 0; i < 3; ++i) room.enter(JoinRole::watcher, {60, 0, 0, 0});
   room.run(0.07);
   for (int i = 0; i < 200 && room.joined() < 3; ++i) {

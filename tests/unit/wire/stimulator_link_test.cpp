@@ -36,7 +36,7 @@ int connected_to(int port) {
   return fd;
 }
 
-struct MainView {
+struct Theatre {
   std::vector<StimulatorSetting> set;
   StimulatorSetting now;
   StimulatorDoor door{kCode,
@@ -70,57 +70,57 @@ struct MainView {
 };
 
 TEST(StimulatorLink, WhoHasTheCodeSetsCurrentPulsesAndSearch) {
-  MainView room;
-  room.now.current_ma = 0.7;
+  Theatre theatre;
+  theatre.now.current_ma = 0.7;
   StimulatorLink link("K7MX2QPA");
   EXPECT_FALSE(link.set({}));
-  room.talk(link, 1, link.begin());
+  theatre.talk(link, 1, link.begin());
   ASSERT_TRUE(link.state().paired);
   EXPECT_EQ(link.state().now.current_ma, 0.7) << "as it is when one comes";
   EXPECT_EQ(link.state().hands, 2U);
   const StimulatorSetting wanted{1, 1.25, 10, 0.2, true};
-  room.talk(link, 1, *link.set(wanted));
-  ASSERT_EQ(room.set.size(), 1U);
-  EXPECT_EQ(room.set[0], wanted);
+  theatre.talk(link, 1, *link.set(wanted));
+  ASSERT_EQ(theatre.set.size(), 1U);
+  EXPECT_EQ(theatre.set[0], wanted);
   EXPECT_EQ(link.state().now, wanted);
   // Out of range is the nearest; a hand that is not there is nothing.
-  room.talk(link, 1, *link.set({0, 500, 1000, 9, false}));
-  ASSERT_EQ(room.set.size(), 2U);
-  EXPECT_EQ(room.set[1], (StimulatorSetting{0, StimulatorSetting::kMaxMa, 30, 1, false}));
-  room.talk(link, 1, *link.set({2, 1, 4, 0.1, false}));
-  EXPECT_EQ(room.set.size(), 2U);
-  EXPECT_EQ(room.door.counts().settings, 2U);
+  theatre.talk(link, 1, *link.set({0, 500, 1000, 9, false}));
+  ASSERT_EQ(theatre.set.size(), 2U);
+  EXPECT_EQ(theatre.set[1], (StimulatorSetting{0, StimulatorSetting::kMaxMa, 30, 1, false}));
+  theatre.talk(link, 1, *link.set({2, 1, 4, 0.1, false}));
+  EXPECT_EQ(theatre.set.size(), 2U);
+  EXPECT_EQ(theatre.door.counts().settings, 2U);
   link.reported(0, false);
   EXPECT_EQ(link.state().now.current_ma, 0);
 }
 
 TEST(StimulatorLink, AWrongCodeSetsNothingAndThreeCloseTheDoor) {
-  MainView room;
+  Theatre theatre;
   for (int i = 0; i < 3; ++i) {
     StimulatorLink wrong("AAAAAAAA");
-    room.talk(wrong, 10 + static_cast<std::uint64_t>(i), wrong.begin());
+    theatre.talk(wrong, 10 + static_cast<std::uint64_t>(i), wrong.begin());
     EXPECT_FALSE(wrong.state().paired);
     EXPECT_NE(wrong.state().refused.find("another"), std::string::npos);
     EXPECT_FALSE(wrong.set({0, 1, 4, 0.1, false}));
   }
-  EXPECT_EQ(room.door.counts().tries_left, 0);
+  EXPECT_EQ(theatre.door.counts().tries_left, 0);
   StimulatorLink right(kCode);
-  room.talk(right, 20, right.begin());
+  theatre.talk(right, 20, right.begin());
   EXPECT_FALSE(right.state().paired);
   EXPECT_NE(right.state().refused.find("three"), std::string::npos);
-  EXPECT_TRUE(room.set.empty());
+  EXPECT_TRUE(theatre.set.empty());
 }
 
 TEST(StimulatorLink, NothingIsTakenTwiceChangedOrFromSomebodyElse) {
-  MainView room;
+  Theatre theatre;
   StimulatorLink link(kCode);
-  room.talk(link, 1, link.begin());
+  theatre.talk(link, 1, link.begin());
   const WireBytes good = *link.set({0, 1, 4, 0.1, false});
-  room.talk(link, 1, good);
-  ASSERT_EQ(room.set.size(), 1U);
-  const std::vector<WireBytes> all = room.said_to_door;
+  theatre.talk(link, 1, good);
+  ASSERT_EQ(theatre.set.size(), 1U);
+  const std::vector<WireBytes> all = theatre.said_to_door;
   const auto hear = [&](std::uint64_t client, const WireBytes& b) {
-    with(b, [&](const IgtlMessage& m) { static_cast<void>(room.door.hear(client, m, room.at_s += 1)); });
+    with(b, [&](const IgtlMessage& m) { static_cast<void>(theatre.door.hear(client, m, theatre.at_s += 1)); });
   };
   hear(1, good);                              // once more
   for (const WireBytes& b : all) hear(2, b);  // all that was said, from another connection
@@ -130,20 +130,20 @@ TEST(StimulatorLink, NothingIsTakenTwiceChangedOrFromSomebodyElse) {
     body[at - IgtlParser::kHeader] ^= 1;
     hear(1, igtl_message(kStimulatorType, "Stimulator", 0, body));
   }
-  EXPECT_EQ(room.set.size(), 1U);
-  room.door.gone(1);
+  EXPECT_EQ(theatre.set.size(), 1U);
+  theatre.door.gone(1);
   hear(1, *link.set({0, 2, 4, 0.1, false}));
-  EXPECT_EQ(room.set.size(), 1U);
+  EXPECT_EQ(theatre.set.size(), 1U);
 }
 
 TEST(StimulatorLink, WhateverComesNothingBreaksAndNothingIsSet) {
-  MainView room;
+  Theatre theatre;
   StimulatorLink link(kCode);
-  room.talk(link, 1, link.begin());
-  room.talk(link, 1, *link.set({0, 1, 4, 0.1, false}));
+  theatre.talk(link, 1, link.begin());
+  theatre.talk(link, 1, *link.set({0, 1, 4, 0.1, false}));
   std::mt19937 dice(5);
   const auto below = [&](std::size_t n) { return static_cast<std::size_t>(dice()) % n; };
-  const std::vector<WireBytes> heard = room.said_to_door;
+  const std::vector<WireBytes> heard = theatre.said_to_door;
   for (int i = 0; i < 20000; ++i) {
     Bytes body;
     if (i % 2 == 0) {
@@ -157,16 +157,16 @@ TEST(StimulatorLink, WhateverComesNothingBreaksAndNothingIsSet) {
       if (below(3) == 0) body.resize(below(body.size() + 1));
     }
     with(igtl_message(kStimulatorType, "x", 0, body), [&](const IgtlMessage& m) {
-      static_cast<void>(room.door.hear(1 + below(8), m, room.at_s += 0.01));
+      static_cast<void>(theatre.door.hear(1 + below(8), m, theatre.at_s += 0.01));
       static_cast<void>(link.hear(m));
     });
   }
-  EXPECT_EQ(room.set.size(), 1U);
+  EXPECT_EQ(theatre.set.size(), 1U);
   // A flood in one moment: no more is looked at than in a second.
-  const auto before = room.door.counts().refused;
+  const auto before = theatre.door.counts().refused;
   for (int i = 0; i < 1000; ++i)
-    with(link.begin(), [&](const IgtlMessage& m) { static_cast<void>(room.door.hear(3, m, room.at_s)); });
-  EXPECT_GE(room.door.counts().refused - before, 1000U - 101U);
+    with(link.begin(), [&](const IgtlMessage& m) { static_cast<void>(theatre.door.hear(3, m, theatre.at_s)); });
+  EXPECT_GE(theatre.door.counts().refused - before, 1000U - 101U);
 }
 
 // Over the loopback, from a console to the door behind an OpenIGTLink server; and one who does not have the code hears

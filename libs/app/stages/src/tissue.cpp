@@ -9,7 +9,6 @@
 #include "osteo/simulation/tissue/dynamics.h"
 #include "osteo/simulation/tissue/fem.h"
 #include "osteo/simulation/tissue/implicit.h"
-#include "osteo/simulation/tissue/statics.h"
 #include "tissue_parts.h"
 
 namespace osteo::inline app {

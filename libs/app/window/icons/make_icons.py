@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Outlines of the window's icons as short lines, for a draw list at any size. usage: make_icons.py > ../src/icon_lines.h (needs fontTools)
 
-Sources: docs/design/tabler.json (Tabler Icons, MIT: LICENSES/MIT-Tabler.txt) and the instruments of docs/design/sketches.py.
+Sources: docs/design/tabler.json (Tabler Icons, MIT: LICENSES/MIT.txt) and the instruments of docs/design/sketches.py.
 """
 
 import ast, json, math, pathlib

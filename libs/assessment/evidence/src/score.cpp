@@ -7,7 +7,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/geometry/grid/brick_places.h"
-#include "osteo/session/recording/simulated.h"
+#include "osteo/session/recording/session_reader.h"
 #include "osteo/simulation/bone/instrument.h"
 
 namespace osteo::inline assessment {

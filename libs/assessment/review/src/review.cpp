@@ -7,7 +7,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/translate.h"
-#include "osteo/session/recording/simulated.h"
+#include "osteo/session/recording/session_reader.h"
 #include "pictures.h"
 
 namespace osteo::inline assessment {

@@ -9,7 +9,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
-#include "osteo/session/recording/simulated.h"
+#include "osteo/session/recording/session_reader.h"
 #include "osteo/session/scene/reader.h"
 #include "osteo/simulation/bone/instrument.h"
 

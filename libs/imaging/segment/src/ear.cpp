@@ -75,82 +75,26 @@ double fine_spacing(const Vec3& s) {
   return least / std::max(1.0, std::round(least / 0.5));
 }
 
-}  // namespace
-
-EarFindings find_ear_structures(const Image& given, const EarParams& params, const Context& context) {
-  const std::vector<EarStructure> asked = parse_what(params.what);
-  const auto wants = [&](EarStructure s) { return std::find(asked.begin(), asked.end(), s) != asked.end(); };
-  const Vec3 labyrinth_given{params.labyrinth_mm[0], params.labyrinth_mm[1], params.labyrinth_mm[2]};
-  const bool has_point = params.labyrinth_mm != std::array<double, 3>{};
-  if (wants(EarStructure::labyrinth)) {
-    if (!has_point && params.what.find("all") == std::string::npos)
-      throw Error(ExitCode::usage, "the labyrinth needs a point within it",
-                  "--labyrinth-mm X,Y,Z (LPS), in the vestibule");
-    const Vec3 x = given.frame.index_from_world(labyrinth_given);
-    for (std::size_t a = 0; has_point && a < 3; ++a) {
-      if (!(x[a] >= 0 && x[a] <= given.frame.dims[a] - 1))
-        throw Error(ExitCode::usage, "--labyrinth-mm lies outside the CT");
-    }
+/// A point within the labyrinth, where one was given; checked where it is wanted.
+std::optional<Vec3> labyrinth_point(const Image& ct, const EarParams& params, bool wanted) {
+  std::optional<Vec3> point;
+  if (params.labyrinth_mm != std::array<double, 3>{})
+    point = Vec3{params.labyrinth_mm[0], params.labyrinth_mm[1], params.labyrinth_mm[2]};
+  if (!wanted) return point;
+  if (!point && params.what.find("all") == std::string::npos)
+    throw Error(ExitCode::usage, "the labyrinth needs a point within it",
+                "--labyrinth-mm X,Y,Z (LPS), in the vestibule");
+  if (!point) return point;
+  const Vec3 x = ct.frame.index_from_world(*point);
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (!(x[a] >= 0 && x[a] <= ct.frame.dims[a] - 1))
+      throw Error(ExitCode::usage, "--labyrinth-mm lies outside the CT");
   }
-  const bool right = params.side == Side::right;
-  const Image ct = right ? mirrored(given) : given;
-  const auto flip = [&](Vec3 p) { return right ? Vec3{-p.x, p.y, p.z} : p; };
+  return point;
+}
 
-  EarFindings result;
-  result.labels.frame = given.frame;
-  std::array<Part, kEarStructures> parts;
-  const auto done = [&](const Field* f) {
-    const std::size_t n = given.frame.voxel_count();
-    const auto voxels = make_voxels<std::uint8_t>(n);
-    std::fill(voxels.get(), voxels.get() + n, std::uint8_t{0});
-    std::array<double, kEarStructures> volume{};
-    if (f != nullptr) {
-      // Of two that claim a voxel the last of this order has it.
-      constexpr std::array<EarStructure, kEarStructures> kOrder{EarStructure::dura,      EarStructure::tegmen,
-                                                                EarStructure::air_cells, EarStructure::ear_canal,
-                                                                EarStructure::labyrinth, EarStructure::sigmoid_sinus};
-      for (const EarStructure s : kOrder) {
-        const Part& part = parts[static_cast<std::size_t>(s)];
-        if (!wants(s) || !part.found || part.quality < params.min_quality) continue;
-        Field mask = *f;
-        for (std::size_t i = 0; i < mask.v.size(); ++i) mask.v[i] = part.mask[i] != 0 ? 1.0F : 0.0F;
-        Vec3 lo, hi;
-        bounds_of(f->frame(), lo, hi);
-        const auto nx = static_cast<std::size_t>(ct.frame.dims[0]), ny = static_cast<std::size_t>(ct.frame.dims[1]);
-        parallel_for(n / nx, 64, context.threads, [&](std::size_t begin, std::size_t end) {
-          for (std::size_t r = begin; r < end; ++r) {
-            for (std::size_t i = 0; i < nx; ++i) {
-              const Vec3 p = ct.frame.world_from_index(
-                  {static_cast<double>(i), static_cast<double>(r % ny), static_cast<double>(r / ny)});
-              if (p.x < lo.x || p.y < lo.y || p.z < lo.z || p.x > hi.x || p.y > hi.y || p.z > hi.z) continue;
-              if (mask.sample(p) >= 0.5) voxels[r * nx + i] = static_cast<std::uint8_t>(1 + static_cast<int>(s));
-            }
-          }
-        });
-      }
-      for (std::size_t i = 0; i < n; ++i)
-        if (voxels[i] != 0) volume[voxels[i] - 1U] += given.frame.voxel_volume_mm3();
-    }
-    for (const EarStructure s : asked) {
-      const auto at = static_cast<std::size_t>(s);
-      const Part& part = parts[at];
-      EarFinding finding{s, part.found && part.quality >= params.min_quality, part.quality, part.why, volume[at]};
-      if (part.found && !finding.found)
-        finding.why =
-            "quality " + format_number(std::round(part.quality * 100) / 100) + " is below --min-quality; " + part.why;
-      if (finding.found)
-        result.labels.structures.push_back({static_cast<std::uint8_t>(1 + at), std::string(kTitles[at]), kColours[at]});
-      result.findings.push_back(finding);
-    }
-    result.labels.voxels = voxels;
-    context.progress(1.0);
-  };
-  const auto give_up = [&](const std::string& why) {
-    for (Part& p : parts) p.why = why;
-    done(nullptr);
-    return result;
-  };
-
+/// Nothing: the scan has no soft tissue and bone to go by.
+std::optional<Levels> levels_of(const Image& ct, const Context& context) {
   Levels levels;
   try {
     const BoneGuide guide = guide_threshold(ct, context.threads);
@@ -158,7 +102,7 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
     levels.bone_hu = guide.dense_bone_hu;
   } catch (const Error& e) {
     if (e.code() != ExitCode::failed) throw;
-    return give_up("no soft tissue and bone to go by (a dry skull?)");
+    return std::nullopt;
   }
   levels.noise_hu = noise_of(ct);
   levels.bone_above = 0.5 * (levels.soft_hu + levels.bone_hu);
@@ -167,76 +111,166 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
   context.report("soft_tissue_hu", levels.soft_hu);
   context.report("bone_hu", levels.bone_hu);
   context.report("noise_hu", levels.noise_hu);
+  return levels;
+}
+
+/// The canal of a large image, looked for at 1 mm in its left half.
+Canal coarse_canal(const Image& ct, Vec3 lo, Vec3 hi, const Levels& levels, const Context& context) {
+  Vec3 half = lo;
+  if (hi.x - lo.x > 120) {
+    // The side of the middle of what is no air.
+    double sum = 0, count = 0;
+    const Field coarse = make_field(ct, lo, hi, 4, context.threads);
+    for (std::size_t i = 0; i < coarse.size(); ++i) {
+      if (static_cast<double>(coarse.v[i]) < levels.bone_above) continue;
+      const auto p = coarse.place(i);
+      sum += coarse.world(p[0], p[1], p[2]).x;
+      count += 1;
+    }
+    half.x = (count > 0 ? sum / count : 0.5 * (lo.x + hi.x)) + 18;
+  }
+  Field coarse = make_field(ct, half, hi, 1.0, context.threads);
+  quieten(coarse, levels.noise_hu, context.threads);
+  return find_canal(coarse, levels, context);
+}
+
+/// Structures of one ear, the left one as the finders see it.
+struct EarParts {
+  std::array<Part, kEarStructures> of;
+  std::vector<EarStructure> asked;
+
+  [[nodiscard]] bool wants(EarStructure s) const { return std::find(asked.begin(), asked.end(), s) != asked.end(); }
+  Part& operator[](EarStructure s) { return of[static_cast<std::size_t>(s)]; }
+  const Part& operator[](EarStructure s) const { return of[static_cast<std::size_t>(s)]; }
+};
+
+/// Finds what the canal is the landmark of.
+void find_by_canal(EarParts& parts, const Field& f, const Levels& levels, const Canal& canal, const Context& context) {
+  using enum EarStructure;
+  if (!canal.found) {
+    for (const EarStructure s : {air_cells, sigmoid_sinus, tegmen, dura})
+      parts[s].why = "no ear canal, by which it is placed: " + canal.why;
+    return;
+  }
+  if (parts.wants(air_cells) || parts.wants(tegmen))
+    parts[air_cells] = find_air_cells(f, levels, canal, context.sub(0.4, 0.5));
+  if (!parts.wants(sigmoid_sinus) && !parts.wants(tegmen) && !parts.wants(dura)) return;
+  const Brain brain = find_brain(f, levels, canal, context.sub(0.5, 0.6));
+  for (const EarStructure s : {sigmoid_sinus, tegmen, dura}) parts[s].why = brain.why;
+  if (!brain.found) return;
+  parts[sigmoid_sinus] = find_sinus(f, levels, canal, context.sub(0.6, 0.9));
+  const Part &air = parts[air_cells], &sinus = parts[sigmoid_sinus];
+  if (air.found) {
+    parts[tegmen] = find_tegmen(f, levels, canal, brain, air.mask, context);
+  } else {
+    parts[tegmen].why = air.why;
+  }
+  Mask none;
+  if (!sinus.found) none.assign(f.size(), 0);
+  parts[dura] = find_dura(f, levels, canal, brain, sinus.found ? sinus.mask : none, context.sub(0.9, 1));
+}
+
+/// Into the CT's voxels: those of which at least half lies in the part get `value`. `ct` as the finders saw it.
+void paint(std::uint8_t* voxels, std::uint8_t value, const Part& part, const Field& f, const Frame& ct,
+           const Context& context) {
+  Field mask = f;
+  for (std::size_t i = 0; i < mask.v.size(); ++i) mask.v[i] = part.mask[i] != 0 ? 1.0F : 0.0F;
+  Vec3 lo, hi;
+  bounds_of(f.frame(), lo, hi);
+  const auto nx = static_cast<std::size_t>(ct.dims[0]), ny = static_cast<std::size_t>(ct.dims[1]);
+  parallel_for(ct.voxel_count() / nx, 64, context.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t r = begin; r < end; ++r) {
+      for (std::size_t i = 0; i < nx; ++i) {
+        const Vec3 p =
+            ct.world_from_index({static_cast<double>(i), static_cast<double>(r % ny), static_cast<double>(r / ny)});
+        if (p.x < lo.x || p.y < lo.y || p.z < lo.z || p.x > hi.x || p.y > hi.y || p.z > hi.z) continue;
+        if (mask.sample(p) >= 0.5) voxels[r * nx + i] = value;
+      }
+    }
+  });
+}
+
+/// Labels and findings of what was asked for. `f`: null when nothing could be looked for.
+void write_findings(EarFindings& result, const EarParts& parts, const Field* f, const Frame& ct, double min_quality,
+                    const Context& context) {
+  const Frame& frame = result.labels.frame;
+  const std::size_t n = frame.voxel_count();
+  const auto voxels = make_voxels<std::uint8_t>(n);
+  std::fill(voxels.get(), voxels.get() + n, std::uint8_t{0});
+  std::array<double, kEarStructures> volume{};
+  if (f != nullptr) {
+    // Of two that claim a voxel the last of this order has it.
+    using enum EarStructure;
+    constexpr std::array<EarStructure, kEarStructures> kOrder{dura,      tegmen,    air_cells,
+                                                              ear_canal, labyrinth, sigmoid_sinus};
+    for (const EarStructure s : kOrder) {
+      const Part& part = parts[s];
+      if (!parts.wants(s) || !part.found || part.quality < min_quality) continue;
+      paint(voxels.get(), static_cast<std::uint8_t>(1 + static_cast<int>(s)), part, *f, ct, context);
+    }
+    for (std::size_t i = 0; i < n; ++i)
+      if (voxels[i] != 0) volume[voxels[i] - 1U] += frame.voxel_volume_mm3();
+  }
+  for (const EarStructure s : parts.asked) {
+    const auto at = static_cast<std::size_t>(s);
+    const Part& part = parts[s];
+    EarFinding finding{s, part.found && part.quality >= min_quality, part.quality, part.why, volume[at]};
+    if (part.found && !finding.found)
+      finding.why =
+          "quality " + format_number(std::round(part.quality * 100) / 100) + " is below --min-quality; " + part.why;
+    if (finding.found)
+      result.labels.structures.push_back({static_cast<std::uint8_t>(1 + at), std::string(kTitles[at]), kColours[at]});
+    result.findings.push_back(finding);
+  }
+  result.labels.voxels = voxels;
+  context.progress(1.0);
+}
+
+}  // namespace
+
+EarFindings find_ear_structures(const Image& given, const EarParams& params, const Context& context) {
+  EarParts parts{{}, parse_what(params.what)};
+  const std::optional<Vec3> labyrinth_at = labyrinth_point(given, params, parts.wants(EarStructure::labyrinth));
+  const bool right = params.side == Side::right;
+  const Image ct = right ? mirrored(given) : given;
+  const auto flip = [&](Vec3 p) { return right ? Vec3{-p.x, p.y, p.z} : p; };
+
+  EarFindings result;
+  result.labels.frame = given.frame;
+  const auto give_up = [&](const std::string& why) {
+    for (Part& p : parts.of) p.why = why;
+    write_findings(result, parts, nullptr, ct.frame, params.min_quality, context);
+    return result;
+  };
+  const std::optional<Levels> levels = levels_of(ct, context);
+  if (!levels) return give_up("no soft tissue and bone to go by (a dry skull?)");
 
   // Where the canal is: in a large image at 1 mm first.
   Vec3 lo, hi;
   bounds_of(ct.frame, lo, hi);
-  const double h = fine_spacing(ct.frame.spacing_mm);
   const Vec3 size = hi - lo;
   if (std::min({size.x, size.y, size.z}) < 10) return give_up("the image is smaller than an ear");
   if (size.x > 100 || size.y > 130 || size.z > 110) {
-    Vec3 half = lo;
-    if (size.x > 120) {
-      // The side of the middle of what is no air.
-      double sum = 0, count = 0;
-      const Field coarse = make_field(ct, lo, hi, 4, context.threads);
-      for (std::size_t i = 0; i < coarse.size(); ++i) {
-        if (static_cast<double>(coarse.v[i]) < levels.bone_above) continue;
-        const auto p = coarse.place(i);
-        sum += coarse.world(p[0], p[1], p[2]).x;
-        count += 1;
-      }
-      half.x = (count > 0 ? sum / count : 0.5 * (lo.x + hi.x)) + 18;
-    }
-    Field coarse = make_field(ct, half, hi, 1.0, context.threads);
-    quieten(coarse, levels.noise_hu, context.threads);
-    const Canal canal = find_canal(coarse, levels, context.sub(0, 0.2));
+    const Canal canal = coarse_canal(ct, lo, hi, *levels, context.sub(0, 0.2));
     if (!canal.found) return give_up("no ear canal, by which the others are placed: " + canal.why);
     lo = canal.drum_mm + Vec3{-38, -40, -45};
     hi = canal.drum_mm + Vec3{42, 65, 42};
   }
-  Field f = make_field(ct, lo, hi, h, context.threads);
-  quieten(f, levels.noise_hu, context.threads);
-  const Canal canal = find_canal(f, levels, context.sub(0.2, 0.4));
+  Field f = make_field(ct, lo, hi, fine_spacing(ct.frame.spacing_mm), context.threads);
+  quieten(f, levels->noise_hu, context.threads);
+  const Canal canal = find_canal(f, *levels, context.sub(0.2, 0.4));
   result.drum_mm = flip(canal.drum_mm);
-  if (wants(EarStructure::labyrinth)) {
-    Part& part = parts[static_cast<std::size_t>(EarStructure::labyrinth)];
-    if (has_point) {
-      part = find_labyrinth(f, levels, flip(labyrinth_given), context);
+  if (parts.wants(EarStructure::labyrinth)) {
+    Part& part = parts[EarStructure::labyrinth];
+    if (labyrinth_at) {
+      part = find_labyrinth(f, *levels, flip(*labyrinth_at), context);
     } else {
       part.why = "no point within it was given (--labyrinth-mm)";
     }
   }
-  parts[static_cast<std::size_t>(EarStructure::ear_canal)] = canal;
-  if (!canal.found) {
-    for (const EarStructure s :
-         {EarStructure::air_cells, EarStructure::sigmoid_sinus, EarStructure::tegmen, EarStructure::dura})
-      parts[static_cast<std::size_t>(s)].why = "no ear canal, by which it is placed: " + canal.why;
-    done(&f);
-    return result;
-  }
-  Part& air = parts[static_cast<std::size_t>(EarStructure::air_cells)];
-  if (wants(EarStructure::air_cells) || wants(EarStructure::tegmen))
-    air = find_air_cells(f, levels, canal, context.sub(0.4, 0.5));
-  if (wants(EarStructure::sigmoid_sinus) || wants(EarStructure::tegmen) || wants(EarStructure::dura)) {
-    const Brain brain = find_brain(f, levels, canal, context.sub(0.5, 0.6));
-    Part &sinus = parts[static_cast<std::size_t>(EarStructure::sigmoid_sinus)],
-         &tegmen = parts[static_cast<std::size_t>(EarStructure::tegmen)],
-         &dura = parts[static_cast<std::size_t>(EarStructure::dura)];
-    sinus.why = tegmen.why = dura.why = brain.why;
-    if (brain.found) {
-      sinus = find_sinus(f, levels, canal, context.sub(0.6, 0.9));
-      if (air.found) {
-        tegmen = find_tegmen(f, levels, canal, brain, air.mask, context);
-      } else {
-        tegmen.why = air.why;
-      }
-      Mask none;
-      if (!sinus.found) none.assign(f.size(), 0);
-      dura = find_dura(f, levels, canal, brain, sinus.found ? sinus.mask : none, context.sub(0.9, 1));
-    }
-  }
-  done(&f);
+  parts[EarStructure::ear_canal] = canal;
+  find_by_canal(parts, f, *levels, canal, context);
+  write_findings(result, parts, &f, ct.frame, params.min_quality, context);
   return result;
 }
 

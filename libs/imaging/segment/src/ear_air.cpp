@@ -95,89 +95,117 @@ void keep_tube(const Field& f, Mask& mask, const std::vector<float>& to_outside)
   }
 }
 
-}  // namespace
+/// Air, all else, and the air outside of the head on the side of +x.
+struct Airs {
+  Mask air, solid, exterior;
+  std::vector<float> to_solid;
+  bool outside = false;  ///< there is air outside
+};
 
-Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
-  Canal c;
+/// Outside: where a ball of air reaches that begins at the outer face of the image.
+Airs airs_of(const Field& f, const Levels& levels, const Context& context) {
   const std::size_t n = f.size();
-  Mask solid(n), air(n);
+  Airs a{Mask(n), Mask(n), Mask(n), {}, false};
   for (std::size_t i = 0; i < n; ++i) {
-    air[i] = static_cast<double>(f.v[i]) < levels.air_below ? 1 : 0;
-    solid[i] = 1 - air[i];
+    a.air[i] = static_cast<double>(f.v[i]) < levels.air_below ? 1 : 0;
+    a.solid[i] = 1 - a.air[i];
   }
-  // Outside: where a ball of air reaches that begins at the outer face of the image.
-  const std::vector<float> to_solid = distance_mm(f, solid, context);
+  a.to_solid = distance_mm(f, a.solid, context);
   Mask core(n);
   for (std::size_t i = 0; i < n; ++i)
-    core[i] = air[i] != 0 && static_cast<double>(to_solid[i]) > kOutsideBallMm ? 1 : 0;
+    core[i] = a.air[i] != 0 && static_cast<double>(a.to_solid[i]) > kOutsideBallMm ? 1 : 0;
   const Pieces cores = pieces_of(f, core, true);
   std::vector<std::uint8_t> outer(cores.size.size());
   for (int k = 0; k < f.n[2]; ++k)
     for (int j = 0; j < f.n[1]; ++j) outer[cores.of[f.at(f.n[0] - 1, j, k)]] = 1;
   outer[0] = 0;
   for (std::size_t i = 0; i < n; ++i) core[i] = outer[cores.of[i]];
-  c.exterior.assign(n, 0);
-  if (std::none_of(core.begin(), core.end(), [](std::uint8_t x) { return x != 0; })) {
-    c.why = "no air outside of the head on this side";
-    return c;
-  }
+  a.outside = std::any_of(core.begin(), core.end(), [](std::uint8_t x) { return x != 0; });
+  if (!a.outside) return a;
   const std::vector<float> to_core = distance_mm(f, core, context);
   for (std::size_t i = 0; i < n; ++i)
-    c.exterior[i] = air[i] != 0 && static_cast<double>(to_core[i]) <= kOutsideBallMm + f.h_mm ? 1 : 0;
-  // Narrow air that opens to the outside, and goes deep into bone.
+    a.exterior[i] = a.air[i] != 0 && static_cast<double>(to_core[i]) <= kOutsideBallMm + f.h_mm ? 1 : 0;
+  return a;
+}
+
+/// Narrow air that opens to the outside, and goes deep into bone.
+struct Inward {
+  Pieces pieces;
+  std::size_t best = 0;  ///< 0: none
+  std::vector<float> to_outside, to_bone;
+
+  [[nodiscard]] bool holds(std::size_t i) const { return pieces.of[i] == best; }
+  [[nodiscard]] double depth(std::size_t i) const { return static_cast<double>(to_outside[i]); }
+};
+
+Inward inward_air(const Field& f, const Levels& levels, const Airs& airs, const Context& context) {
+  const std::size_t n = f.size();
   Mask narrow(n), bone(n);
   for (std::size_t i = 0; i < n; ++i) {
-    narrow[i] = air[i] != 0 && c.exterior[i] == 0 ? 1 : 0;
+    narrow[i] = airs.air[i] != 0 && airs.exterior[i] == 0 ? 1 : 0;
     bone[i] = static_cast<double>(f.v[i]) > levels.bone_above ? 1 : 0;
   }
-  const std::vector<float> to_outside = distance_mm(f, c.exterior, context), to_bone = distance_mm(f, bone, context);
-  const Pieces pieces = pieces_of(f, narrow, false);
-  std::vector<double> deep(pieces.size.size());
-  std::vector<std::uint8_t> opens(pieces.size.size());
+  Inward in;
+  in.to_outside = distance_mm(f, airs.exterior, context);
+  in.to_bone = distance_mm(f, bone, context);
+  in.pieces = pieces_of(f, narrow, false);
+  std::vector<double> deep(in.pieces.size.size());
+  std::vector<std::uint8_t> opens(in.pieces.size.size());
   for (std::size_t i = 0; i < n; ++i) {
-    const std::uint32_t p = pieces.of[i];
+    const std::uint32_t p = in.pieces.of[i];
     if (p == 0) continue;
-    if (static_cast<double>(to_outside[i]) < 1.5 * f.h_mm) opens[p] = 1;
+    if (in.depth(i) < 1.5 * f.h_mm) opens[p] = 1;
     // Counts up to the length of a canal: cells behind a drum that is not seen must not decide.
-    const double away = static_cast<double>(to_outside[i]);
-    if (away > 6 && away < 30 && static_cast<double>(to_bone[i]) < 5.5) deep[p] += 1;
+    if (in.depth(i) > 6 && in.depth(i) < 30 && static_cast<double>(in.to_bone[i]) < 5.5) deep[p] += 1;
   }
-  std::size_t best = 0;
   for (std::size_t p = 1; p < deep.size(); ++p)
-    if (opens[p] != 0 && deep[p] > deep[best]) best = p;
-  const double voxel = f.h_mm * f.h_mm * f.h_mm;
-  if (best == 0 || deep[best] * voxel < 60) {
-    c.why = "no air goes from outside into bone on this side";
-    return c;
-  }
-  // Behind the drum: what can only be reached over a pass. The noise must not make one.
+    if (opens[p] != 0 && deep[p] > deep[in.best]) in.best = p;
+  if (deep[in.best] * f.h_mm * f.h_mm * f.h_mm < 60) in.best = 0;
+  return in;
+}
+
+/// Which of the inward air lies before the drum: what is nearer to air that no pass parts from outside.
+struct Drum {
+  bool seen = false;
+  std::vector<float> to_before, to_behind;
+};
+
+/// Behind the drum is what can only be reached over a pass. The noise must not make one.
+Drum drum_of(const Field& f, const Levels& levels, const Inward& in, const Context& context) {
+  const std::size_t n = f.size();
   std::vector<float> height = smoothed(f.v, f.n, std::max(0.5, 0.5 / f.h_mm), context.threads);
   std::vector<std::size_t> seeds;
   for (std::size_t i = 0; i < n; ++i) {
     height[i] = std::max(height[i], -1000.0F);
-    if (pieces.of[i] == best && static_cast<double>(to_outside[i]) < 1.5 * f.h_mm) seeds.push_back(i);
+    if (in.holds(i) && in.depth(i) < 1.5 * f.h_mm) seeds.push_back(i);
   }
-  const std::vector<float> up = climbed(f, height, seeds, [&](std::size_t i) { return pieces.of[i] == best; });
+  const std::vector<float> up = climbed(f, height, seeds, [&](std::size_t i) { return in.holds(i); });
   const Pass pass = lowest_pass(f, height, up, std::max(25.0, 1.0 * levels.noise_hu), kCavityMm3);
-  const bool drum = pass.volume_mm3 > 0;
+  Drum drum;
+  drum.seen = pass.volume_mm3 > 0;
   // Voxels at the walls are as high as a pass: they go with the nearest that are not.
   Mask before(n), behind(n);
   for (std::size_t i = 0; i < n; ++i) {
-    if (pieces.of[i] != best) continue;
-    before[i] = !drum || static_cast<double>(up[i]) < pass.height ? 1 : 0;
+    if (!in.holds(i)) continue;
+    before[i] = !drum.seen || static_cast<double>(up[i]) < pass.height ? 1 : 0;
     behind[i] =
-        drum && static_cast<double>(up[i]) >= pass.height && static_cast<double>(height[i]) < pass.height ? 1 : 0;
+        drum.seen && static_cast<double>(up[i]) >= pass.height && static_cast<double>(height[i]) < pass.height ? 1 : 0;
   }
-  const std::vector<float> to_before = distance_mm(f, before, context), to_behind = distance_mm(f, behind, context);
-  // The folds of the auricle are open to more sides than a canal is.
+  drum.to_before = distance_mm(f, before, context);
+  drum.to_behind = distance_mm(f, behind, context);
+  return drum;
+}
+
+/// The air before the drum that is enclosed as a canal is; the folds of the auricle are open to more sides.
+Mask enclosed_air(const Field& f, const Airs& airs, const Inward& in, const Drum& drum, const Context& context) {
+  const std::size_t n = f.size();
   Mask inner(n);
   parallel_for(n, 1 << 12, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      if (pieces.of[i] != best || static_cast<double>(to_before[i]) > static_cast<double>(to_behind[i])) continue;
+      if (!in.holds(i) || static_cast<double>(drum.to_before[i]) > static_cast<double>(drum.to_behind[i])) continue;
       const auto p = f.place(i);
-      inner[i] = static_cast<double>(to_outside[i]) > 25 ||
-                         enclosure(f, f.world(p[0], p[1], p[2]), 14,
-                                   [&](std::size_t q) { return air[q] != 0 ? 0 : 1; }) > kCanalEnclosed
+      inner[i] = in.depth(i) > 25 || enclosure(f, f.world(p[0], p[1], p[2]), 14,
+                                               [&](std::size_t q) { return airs.air[q] != 0 ? 0 : 1; }) > kCanalEnclosed
                      ? 1
                      : 0;
     }
@@ -185,66 +213,91 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
   const Pieces inners = pieces_of(f, inner, true);
   std::vector<double> depth(inners.size.size());
   for (std::size_t i = 0; i < n; ++i)
-    if (inners.of[i] != 0 && static_cast<double>(to_outside[i]) > 6) depth[inners.of[i]] += 1;
+    if (inners.of[i] != 0 && in.depth(i) > 6) depth[inners.of[i]] += 1;
   const std::size_t main = static_cast<std::size_t>(std::max_element(depth.begin(), depth.end()) - depth.begin());
   for (std::size_t i = 0; i < n; ++i) inner[i] = main > 0 && inners.of[i] == main ? 1 : 0;
   const std::vector<float> to_inner = distance_mm(f, inner, context);
-  c.mask.assign(n, 0);
+  Mask mask(n);
   for (std::size_t i = 0; i < n; ++i) {
-    c.mask[i] =
-        pieces.of[i] == best && to_before[i] <= to_behind[i] && static_cast<double>(to_inner[i]) < kMouthMm ? 1 : 0;
+    mask[i] =
+        in.holds(i) && drum.to_before[i] <= drum.to_behind[i] && static_cast<double>(to_inner[i]) < kMouthMm ? 1 : 0;
   }
-  // What no tube is, but reached without a pass: the middle ear and its cells, where no drum is seen.
-  double reached_mm3 = 0, tube_mm3 = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (pieces.of[i] == best && to_before[i] <= to_behind[i] && static_cast<double>(to_outside[i]) > 6)
-      reached_mm3 += voxel;
+  return mask;
+}
+
+/// Against bone the edge lies half way from air to bone, which is higher than half way to skin.
+void widen_at_bone(Canal& c, const Field& f, const Levels& levels, const Inward& in, const Drum& drum,
+                   const Context& context) {
+  const std::vector<float> to_mask = distance_mm(f, c.mask, context);
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    if (c.mask[i] != 0 || c.exterior[i] != 0 || drum.to_behind[i] < drum.to_before[i]) continue;
+    c.mask[i] = static_cast<double>(to_mask[i]) < 1.1 * f.h_mm && static_cast<double>(in.to_bone[i]) < 1.6 * f.h_mm &&
+                        static_cast<double>(f.v[i]) < levels.cell_below
+                    ? 1
+                    : 0;
   }
-  keep_tube(f, c.mask, to_outside);
+}
+
+/// Its inner end, the voxels deepest from the outside, and the share of the deeper half's wall that has bone behind it.
+/// Returns its volume in mm3.
+double measure_canal(Canal& c, const Field& f, const Airs& airs, const Inward& in) {
+  const std::size_t n = f.size();
   for (std::size_t i = 0; i < n; ++i)
-    if (c.mask[i] != 0 && static_cast<double>(to_outside[i]) > 6) tube_mm3 += voxel;
-  // Against bone the edge lies half way from air to bone, which is higher than half way to skin.
-  {
-    const std::vector<float> to_mask = distance_mm(f, c.mask, context);
-    for (std::size_t i = 0; i < n; ++i) {
-      if (c.mask[i] != 0 || c.exterior[i] != 0 || to_behind[i] < to_before[i]) continue;
-      c.mask[i] = static_cast<double>(to_mask[i]) < 1.1 * f.h_mm && static_cast<double>(to_bone[i]) < 1.6 * f.h_mm &&
-                          static_cast<double>(f.v[i]) < levels.cell_below
-                      ? 1
-                      : 0;
-    }
-  }
-  // Its inner end: the voxels deepest from the outside.
-  double deepest = 0;
-  for (std::size_t i = 0; i < n; ++i)
-    if (c.mask[i] != 0) deepest = std::max(deepest, static_cast<double>(to_outside[i]));
-  if (deepest <= 0) {
-    c.why = "no air goes from outside into bone on this side";
-    return c;
-  }
+    if (c.mask[i] != 0) c.length_mm = std::max(c.length_mm, in.depth(i));
+  if (c.length_mm <= 0) return 0;
   Vec3 sum;
   double count = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    if (c.mask[i] == 0 || static_cast<double>(to_outside[i]) < deepest - 1) continue;
+    if (c.mask[i] == 0 || in.depth(i) < c.length_mm - 1) continue;
     const auto p = f.place(i);
     sum += f.world(p[0], p[1], p[2]);
     count += 1;
   }
   c.drum_mm = sum / count;
-  c.length_mm = deepest;
-  // Quality: the share of the deeper half's wall that has bone behind it.
   double wall = 0, backed = 0, volume = 0;
   for (std::size_t i = 0; i < n; ++i) {
     if (c.mask[i] == 0) continue;
-    volume += voxel;
-    if (static_cast<double>(to_outside[i]) < 0.5 * deepest || static_cast<double>(to_outside[i]) > deepest - 2.5)
-      continue;
-    if (static_cast<double>(to_solid[i]) > 1.5 * f.h_mm) continue;
+    volume += f.h_mm * f.h_mm * f.h_mm;
+    if (in.depth(i) < 0.5 * c.length_mm || in.depth(i) > c.length_mm - 2.5) continue;
+    if (static_cast<double>(airs.to_solid[i]) > 1.5 * f.h_mm) continue;
     wall += 1;
-    backed += static_cast<double>(to_bone[i]) < 1.5 + f.h_mm ? 1 : 0;
+    backed += static_cast<double>(in.to_bone[i]) < 1.5 + f.h_mm ? 1 : 0;
   }
   c.quality = wall > 0 ? backed / wall : 0;
-  if (reached_mm3 - tube_mm3 > kMaxBesideMm3 && reached_mm3 > 1.3 * tube_mm3) {
+  return volume;
+}
+
+}  // namespace
+
+Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
+  Canal c;
+  const std::size_t n = f.size();
+  const Airs airs = airs_of(f, levels, context);
+  c.exterior = airs.exterior;
+  if (!airs.outside) {
+    c.why = "no air outside of the head on this side";
+    return c;
+  }
+  const Inward in = inward_air(f, levels, airs, context);
+  if (in.best == 0) {
+    c.why = "no air goes from outside into bone on this side";
+    return c;
+  }
+  const Drum drum = drum_of(f, levels, in, context);
+  c.mask = enclosed_air(f, airs, in, drum, context);
+  // What no tube is, but reached without a pass: the middle ear and its cells, where no drum is seen.
+  const double voxel = f.h_mm * f.h_mm * f.h_mm;
+  double reached_mm3 = 0, tube_mm3 = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    if (in.holds(i) && drum.to_before[i] <= drum.to_behind[i] && in.depth(i) > 6) reached_mm3 += voxel;
+  keep_tube(f, c.mask, in.to_outside);
+  for (std::size_t i = 0; i < n; ++i)
+    if (c.mask[i] != 0 && in.depth(i) > 6) tube_mm3 += voxel;
+  widen_at_bone(c, f, levels, in, drum, context);
+  const double volume = measure_canal(c, f, airs, in);
+  if (c.length_mm <= 0) {
+    c.why = "no air goes from outside into bone on this side";
+  } else if (reached_mm3 - tube_mm3 > kMaxBesideMm3 && reached_mm3 > 1.3 * tube_mm3) {
     c.why = "no drum is seen between the ear canal and the air behind it, so the two cannot be distinguished";
   } else if (c.length_mm < 8 || volume < 150) {
     c.why = "the air that goes inward is too short for a canal";
@@ -256,7 +309,7 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
             std::to_string(static_cast<int>(std::lround(100 * c.quality))) + " % of its wall";
   } else {
     c.found = true;
-    if (!drum) c.why = "no air behind its end: the middle ear is not seen apart from it";
+    if (!drum.seen) c.why = "no air behind its end: the middle ear is not seen apart from it";
   }
   return c;
 }

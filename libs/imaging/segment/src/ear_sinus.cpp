@@ -114,20 +114,27 @@ Round fit_round(const Field& f, const Levels& levels, Vec3 at, Vec3 along, doubl
   return out;
 }
 
-}  // namespace
+/// A coarser grid in which the groove is looked for, and how enclosed each of its places is.
+struct Groove {
+  Field g;                  ///< values: share of directions in space that meet a wall, where a sinus' middle can be
+  std::vector<float> wide;  ///< mm to the nearest wall
+  std::vector<std::uint32_t> piece;
+  std::size_t start = 0;  ///< its deepest place
+  double lowest_mm = 0;   ///< below, the vein leaves the skull, and muscles between bones look like grooves too
 
-Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const Context& context) {
-  Part part;
-  const std::size_t n = f.size();
-  Mask wall(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const auto v = static_cast<double>(f.v[i]);
-    wall[i] = v > levels.bone_above || v < levels.air_below ? 1 : 0;
+  [[nodiscard]] double worth(std::size_t i) const {
+    const auto w = static_cast<double>(wide[i]);
+    return std::clamp((static_cast<double>(g.v[i]) - 0.4) / 0.3, 0.0, 1.0) * std::clamp((w - 2.2) / 1.8, 0.0, 1.0) *
+           (w > 6.5 ? 0.3 : 1.0);
   }
-  // Skin over bone is no groove.
-  const auto holds = [&](std::size_t i) { return wall[i] == 0 ? 0 : canal.exterior[i] != 0 ? -1 : 1; };
-  const std::vector<float> to_wall = distance_mm(f, wall, context);
-  // How enclosed each place of a coarser grid is that is as far from walls as the middle of a sinus.
+  [[nodiscard]] Vec3 at(std::size_t i) const {
+    const auto p = g.place(i);
+    return g.world(p[0], p[1], p[2]);
+  }
+};
+
+/// The coarse grid behind the ear canal; without places where the image ends before the sinus.
+Field grid_behind(const Field& f, const Canal& canal) {
   Field g;
   const Vec3 lo = canal.drum_mm + Vec3{-30, -2, -26}, hi = canal.drum_mm + Vec3{26, 48, 24};
   g.h_mm = 1;
@@ -136,29 +143,39 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     g.origin_mm[a] = from;
     g.n[a] = std::max(0, static_cast<int>(to - from) + 1);
   }
-  if (std::min({g.n[0], g.n[1], g.n[2]}) < 12) {
-    part.why = "the image ends before the sinus";
-    return part;
-  }
+  if (std::min({g.n[0], g.n[1], g.n[2]}) < 12) g.n = {0, 0, 0};
+  return g;
+}
+
+/// How enclosed each place is that is as far from walls as the middle of a sinus.
+void enclose(Groove& groove, const Field& f, const Mask& wall, const Canal& canal, const Context& context) {
+  // Skin over bone is no groove.
+  const auto holds = [&](std::size_t i) { return wall[i] == 0 ? 0 : canal.exterior[i] != 0 ? -1 : 1; };
+  const std::vector<float> to_wall = distance_mm(f, wall, context);
+  Field& g = groove.g;
   g.v.assign(g.size(), 0.0F);
-  std::vector<float> wide(g.size());
+  groove.wide.resize(g.size());
   parallel_for(g.size(), 256, context.threads, [&](std::size_t begin, std::size_t end) {
     context.check_cancelled();
     for (std::size_t i = begin; i < end; ++i) {
-      const auto p = g.place(i);
-      const Vec3 x = g.world(p[0], p[1], p[2]);
+      const Vec3 x = groove.at(i);
       const auto q = f.nearest(x);
-      wide[i] = to_wall[f.at(q[0], q[1], q[2])];
-      const auto w = static_cast<double>(wide[i]);
+      groove.wide[i] = to_wall[f.at(q[0], q[1], q[2])];
+      const auto w = static_cast<double>(groove.wide[i]);
       if (w > 2.3 && w < 8) g.v[i] = static_cast<float>(enclosure(f, x, 12, holds));
     }
   });
-  // The groove: where walls are all around, behind the canal.
+}
+
+/// The largest piece behind the canal with walls all around it, and its deepest place. False: there is none.
+bool choose_groove(Groove& groove, const Canal& canal) {
+  const Field& g = groove.g;
   Mask deep(g.size());
   for (std::size_t i = 0; i < g.size(); ++i) {
-    const auto p = g.place(i);
-    const Vec3 x = g.world(p[0], p[1], p[2]) - canal.drum_mm;
-    deep[i] = g.v[i] > 0.62F && static_cast<double>(wide[i]) > kMinRadiusMm && x.y > 5 && x.z > -20 && x.z < 16 ? 1 : 0;
+    const Vec3 x = groove.at(i) - canal.drum_mm;
+    deep[i] = g.v[i] > 0.62F && static_cast<double>(groove.wide[i]) > kMinRadiusMm && x.y > 5 && x.z > -20 && x.z < 16
+                  ? 1
+                  : 0;
   }
   const Pieces pieces = pieces_of(g, deep, true);
   std::vector<double> most_z(pieces.size.size(), -1e9), least_z(pieces.size.size(), 1e9);
@@ -172,141 +189,165 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     if (most_z[p] - least_z[p] < 7) continue;
     if (best == 0 || pieces.size[p] > pieces.size[best]) best = p;
   }
-  if (best == 0) {
-    part.why = "no groove of a sinus' width behind the ear canal";
-    return part;
-  }
-  // From its deepest place both ways, as far as walls are on more than half of all sides.
-  std::size_t start = 0;
+  if (best == 0) return false;
   double start_value = -1;
   for (std::size_t i = 0; i < g.size(); ++i) {
     if (pieces.of[i] != best) continue;
-    const double value = static_cast<double>(g.v[i]) + 0.05 * static_cast<double>(wide[i]);
-    if (value > start_value) start_value = value, start = i;
+    const double value = static_cast<double>(g.v[i]) + 0.05 * static_cast<double>(groove.wide[i]);
+    if (value > start_value) start_value = value, groove.start = i;
   }
-  // Below the lowest place of the groove the vein leaves the skull, and muscles between bones look like grooves too.
-  const double lowest = g.origin_mm.z + least_z[best] * g.h_mm - 2;
-  constexpr float kFar = std::numeric_limits<float>::max();
-  std::vector<float> reached(g.size(), kFar);
-  std::vector<float> way_mm(g.size(), 0.0F);
-  std::vector<std::size_t> from(g.size(), start);
+  groove.lowest_mm = g.origin_mm.z + least_z[best] * g.h_mm - 2;
+  return true;
+}
+
+/// Cheapest ways from the deepest place, as far as walls are on more than half of all sides.
+struct Ways {
+  static constexpr float kFar = std::numeric_limits<float>::max();
+  std::vector<float> reached, mm;
+  std::vector<std::size_t> from;
+};
+
+Ways ways_along(const Groove& groove) {
+  const Field& g = groove.g;
+  Ways ways{std::vector<float>(g.size(), Ways::kFar), std::vector<float>(g.size(), 0.0F),
+            std::vector<std::size_t>(g.size(), groove.start)};
   using Entry = std::pair<float, std::size_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  const auto worth = [&](std::size_t i) {
-    const auto w = static_cast<double>(wide[i]);
-    return std::clamp((static_cast<double>(g.v[i]) - 0.4) / 0.3, 0.0, 1.0) * std::clamp((w - 2.2) / 1.8, 0.0, 1.0) *
-           (w > 6.5 ? 0.3 : 1.0);
-  };
-  reached[start] = 0;
-  queue.emplace(0.0F, start);
+  ways.reached[groove.start] = 0;
+  queue.emplace(0.0F, groove.start);
   while (!queue.empty()) {
     const auto [c, at] = queue.top();
     queue.pop();
-    if (c > reached[at]) continue;
+    if (c > ways.reached[at]) continue;
     const auto p = g.place(at);
     for (int k = -1; k <= 1; ++k)
       for (int j = -1; j <= 1; ++j)
         for (int i = -1; i <= 1; ++i) {
           if ((i == 0 && j == 0 && k == 0) || !g.inside(p[0] + i, p[1] + j, p[2] + k)) continue;
           const std::size_t to = g.at(p[0] + i, p[1] + j, p[2] + k);
-          if (g.v[to] < 0.52F || static_cast<double>(wide[to]) < kMinRadiusMm || g.world(0, 0, p[2] + k).z < lowest)
+          if (g.v[to] < 0.52F || static_cast<double>(groove.wide[to]) < kMinRadiusMm ||
+              g.world(0, 0, p[2] + k).z < groove.lowest_mm)
             continue;
           const double step = std::sqrt(static_cast<double>(i * i + j * j + k * k));
-          const auto cost = static_cast<float>(static_cast<double>(c) + step / (0.03 + worth(to) * worth(to)));
-          if (cost < reached[to]) {
-            reached[to] = cost;
-            way_mm[to] = way_mm[at] + static_cast<float>(step);
-            from[to] = at;
+          const auto cost =
+              static_cast<float>(static_cast<double>(c) + step / (0.03 + groove.worth(to) * groove.worth(to)));
+          if (cost < ways.reached[to]) {
+            ways.reached[to] = cost;
+            ways.mm[to] = ways.mm[at] + static_cast<float>(step);
+            ways.from[to] = at;
             queue.emplace(cost, to);
           }
         }
   }
+  return ways;
+}
+
+/// From the far end above to the far end below, evenly.
+std::vector<Vec3> line_of(const Groove& groove) {
+  const Ways ways = ways_along(groove);
   const auto line_to = [&](std::size_t end) {
     std::vector<Vec3> line;
-    for (std::size_t at = end;; at = from[at]) {
-      const auto p = g.place(at);
-      line.push_back(g.world(p[0], p[1], p[2]));
-      if (at == start) break;
+    for (std::size_t at = end;; at = ways.from[at]) {
+      line.push_back(groove.at(at));
+      if (at == groove.start) break;
     }
     std::reverse(line.begin(), line.end());
     return line;
   };
-  const auto s0 = g.place(start);
-  const Vec3 middle = g.world(s0[0], s0[1], s0[2]);
-  std::size_t up = start, down = start;
-  for (std::size_t i = 0; i < g.size(); ++i) {
-    if (reached[i] == kFar) continue;
-    const auto p = g.place(i);
-    const Vec3 x = g.world(p[0], p[1], p[2]);
-    if (x.z < lowest || worth(i) < 0.35 || g.v[i] < 0.58F) continue;
+  const Vec3 middle = groove.at(groove.start);
+  std::size_t up = groove.start, down = groove.start;
+  for (std::size_t i = 0; i < groove.g.size(); ++i) {
+    if (ways.reached[i] == Ways::kFar) continue;
+    const Vec3 x = groove.at(i);
+    if (x.z < groove.lowest_mm || groove.worth(i) < 0.35 || groove.g.v[i] < 0.58F) continue;
     // Upwards it goes backwards too; downwards inward and forward.
-    if (x.z > middle.z + 2 && x.y > middle.y - 3 && way_mm[i] > way_mm[up]) up = i;
-    if (x.z < middle.z + 4 && x.x < middle.x && x.y < middle.y + 4 && way_mm[i] > way_mm[down]) down = i;
+    if (x.z > middle.z + 2 && x.y > middle.y - 3 && ways.mm[i] > ways.mm[up]) up = i;
+    if (x.z < middle.z + 4 && x.x < middle.x && x.y < middle.y + 4 && ways.mm[i] > ways.mm[down]) down = i;
   }
   std::vector<Vec3> line = line_to(up), lower = line_to(down);
   std::reverse(line.begin(), line.end());
   line.insert(line.end(), lower.begin() + 1, lower.end());
-  line = evenly(line, kMarchStepMm);
-  if (line.size() < 16) {
-    part.why = "the groove behind the ear canal is too short for a sinus";
-    return part;
-  }
-  line = evenly(smoothed_line(line, std::vector<double>(line.size(), 1.0), kMarchStepMm, 1.5), kMarchStepMm);
+  return evenly(line, kMarchStepMm);
+}
+
+/// A round vessel fitted into the groove, station by station.
+struct Vessel {
+  std::vector<Vec3> line;
+  std::vector<double> radius;
   std::vector<Round> rounds;
-  std::vector<double> radius(line.size(), 0.0);
+};
+
+/// Sizes change slowly along a vessel: the median over 8 mm. Empty where no round is held.
+std::vector<double> slow_sizes(const std::vector<Round>& rounds) {
+  std::vector<double> sizes(rounds.size());
+  for (std::size_t i = 0; i < rounds.size(); ++i) {
+    std::vector<double> near;
+    for (std::size_t q = i > 8 ? i - 8 : 0; q <= std::min(i + 8, rounds.size() - 1); ++q)
+      if (rounds[q].held >= kHeld && rounds[q].radius > 0) near.push_back(rounds[q].radius);
+    if (near.empty()) continue;
+    std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2), near.end());
+    sizes[i] = near[near.size() / 2];
+  }
+  double last = 0;
+  for (double& s : sizes) last = s = s > 0 ? s : last;
+  for (std::size_t i = sizes.size(); i-- > 0;) last = sizes[i] = sizes[i] > 0 ? sizes[i] : last;
+  if (last <= 0) sizes.clear();
+  return sizes;
+}
+
+void fit_rounds(Vessel& vessel, const Field& f, const Levels& levels, const Context& context) {
+  const std::vector<Vec3>& line = vessel.line;
+  vessel.rounds.assign(line.size(), {});
+  const bool sized = vessel.radius.size() == line.size() && vessel.radius[0] > 0;
+  parallel_for(line.size(), 8, context.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::size_t a = i > 3 ? i - 3 : 0, b = std::min(i + 3, line.size() - 1);
+      vessel.rounds[i] = fit_round(f, levels, line[i], normalized(line[b] - line[a]), sized ? vessel.radius[i] : 0);
+    }
+  });
+}
+
+/// Rounds and line in turn, until both lie in the groove. Without rounds: no vessel fits.
+Vessel fit_vessel(std::vector<Vec3> line, const Field& f, const Levels& levels, const Context& context) {
+  Vessel v{std::move(line), {}, {}};
+  v.radius.assign(v.line.size(), 0.0);
   for (int round = 0; round <= 4; ++round) {
-    rounds.assign(line.size(), {});
-    const bool sized = radius.size() == line.size() && radius[0] > 0;
-    parallel_for(line.size(), 8, context.threads, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const std::size_t a = i > 3 ? i - 3 : 0, b = std::min(i + 3, line.size() - 1);
-        rounds[i] = fit_round(f, levels, line[i], normalized(line[b] - line[a]), sized ? radius[i] : 0);
-      }
-    });
+    fit_rounds(v, f, levels, context);
     if (round == 4) break;
-    // Sizes change slowly along a vessel: the median over 8 mm.
-    std::vector<double> sizes(line.size());
-    for (std::size_t i = 0; i < line.size(); ++i) {
-      std::vector<double> near;
-      for (std::size_t q = i > 8 ? i - 8 : 0; q <= std::min(i + 8, line.size() - 1); ++q)
-        if (rounds[q].held >= kHeld && rounds[q].radius > 0) near.push_back(rounds[q].radius);
-      if (near.empty()) continue;
-      std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2), near.end());
-      sizes[i] = near[near.size() / 2];
-    }
-    double last = 0;
-    for (double& s : sizes) last = s = s > 0 ? s : last;
-    for (std::size_t i = sizes.size(); i-- > 0;) last = sizes[i] = sizes[i] > 0 ? sizes[i] : last;
-    if (last <= 0) {
-      part.why = "no vessel fits into the groove behind the ear canal";
-      return part;
-    }
-    std::vector<Vec3> moved(line.size());
-    std::vector<double> weight(line.size());
-    for (std::size_t i = 0; i < line.size(); ++i) {
-      moved[i] = rounds[i].centre;
-      weight[i] = rounds[i].held >= 0.4 ? rounds[i].held : 0.02;
+    const std::vector<double> sizes = slow_sizes(v.rounds);
+    if (sizes.empty()) return {};
+    std::vector<Vec3> moved(v.line.size());
+    std::vector<double> weight(v.line.size());
+    for (std::size_t i = 0; i < v.line.size(); ++i) {
+      moved[i] = v.rounds[i].centre;
+      weight[i] = v.rounds[i].held >= 0.4 ? v.rounds[i].held : 0.02;
     }
     const std::vector<Vec3> smooth = smoothed_line(moved, weight, kMarchStepMm, 1.5);
     const std::vector<Vec3> next = evenly(smooth, kMarchStepMm);
     // Sizes go along to where the stations are now.
-    radius.assign(next.size(), 0.0);
+    v.radius.assign(next.size(), 0.0);
     for (std::size_t i = 0; i < next.size(); ++i) {
-      const double at = next.size() > 1 ? static_cast<double>(i) * static_cast<double>(line.size() - 1) /
+      const double at = next.size() > 1 ? static_cast<double>(i) * static_cast<double>(v.line.size() - 1) /
                                               static_cast<double>(next.size() - 1)
                                         : 0;
-      radius[i] = sizes[static_cast<std::size_t>(std::lround(at))];
+      v.radius[i] = sizes[static_cast<std::size_t>(std::lround(at))];
     }
-    line = next;
+    v.line = next;
   }
-  // The part that is held, around the deepest place.
+  return v;
+}
+
+/// The part that is held, around the place nearest to `middle`, each round where the line is and as wide as smoothed.
+std::vector<Round> held_part(const Vessel& v, Vec3 middle) {
+  const std::vector<Vec3>& line = v.line;
   std::size_t centre = 0;
   for (std::size_t i = 0; i < line.size(); ++i)
     if (length(line[i] - middle) < length(line[centre] - middle)) centre = i;
   const auto held = [&](std::size_t i) {
     double sum = 0;
     int count = 0;
-    for (std::size_t q = i > 2 ? i - 2 : 0; q <= std::min(i + 2, line.size() - 1); ++q) sum += rounds[q].held, ++count;
+    for (std::size_t q = i > 2 ? i - 2 : 0; q <= std::min(i + 2, line.size() - 1); ++q)
+      sum += v.rounds[q].held, ++count;
     return sum / count >= kHeld;
   };
   // Short stretches that less bone holds, as before the jugular bulb, do not end it.
@@ -315,28 +356,22 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     for (auto i = static_cast<std::ptrdiff_t>(centre); i >= 0 && i < static_cast<std::ptrdiff_t>(line.size());
          i += step) {
       const auto at = static_cast<std::size_t>(i);
-      if (rounds[at].held < kBridged && !held(at)) break;
+      if (v.rounds[at].held < kBridged && !held(at)) break;
       if (held(at)) end = at;
       if (std::abs(static_cast<double>(i) - static_cast<double>(end)) * kMarchStepMm > kBridgeMm) break;
     }
     return end;
   };
   const std::size_t first = end_of(-1), last = end_of(1);
-  std::vector<Round> tube(rounds.begin() + static_cast<std::ptrdiff_t>(first),
-                          rounds.begin() + static_cast<std::ptrdiff_t>(last) + 1);
-  for (std::size_t i = 0; i < tube.size(); ++i) tube[i].centre = line[first + i], tube[i].radius = radius[first + i];
-  double long_mm = 0, hold = 0, rough = 0;
-  for (std::size_t i = 0; i < tube.size(); ++i) {
-    if (i > 0) long_mm += length(tube[i].centre - tube[i - 1].centre);
-    hold += tube[i].held / static_cast<double>(tube.size());
-    rough += tube[i].rough / static_cast<double>(tube.size());
-  }
-  if (long_mm < 15) {
-    part.why =
-        "the groove behind the ear canal holds a vessel for only " + std::to_string(static_cast<int>(long_mm)) + " mm";
-    return part;
-  }
-  part.mask.assign(n, 0);
+  std::vector<Round> tube(v.rounds.begin() + static_cast<std::ptrdiff_t>(first),
+                          v.rounds.begin() + static_cast<std::ptrdiff_t>(last) + 1);
+  for (std::size_t i = 0; i < tube.size(); ++i) tube[i].centre = line[first + i], tube[i].radius = v.radius[first + i];
+  return tube;
+}
+
+/// What lies in the tube and is no wall.
+Mask fill_tube(const std::vector<Round>& tube, const Field& f, const Mask& wall) {
+  Mask mask(f.size(), 0);
   for (std::size_t i = 0; i + 1 < tube.size(); ++i) {
     const Vec3 a = tube[i].centre, ab = tube[i + 1].centre - a;
     const double l2 = std::max(dot(ab, ab), 1e-12), most = std::max(tube[i].radius, tube[i + 1].radius) + 0.6;
@@ -346,15 +381,54 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
       for (int j = std::min(p0[1], q0[1]); j <= std::max(p1[1], q1[1]); ++j)
         for (int x = std::min(p0[0], q0[0]); x <= std::max(p1[0], q1[0]); ++x) {
           const std::size_t at = f.at(x, j, k);
-          if (wall[at] != 0 || part.mask[at] != 0) continue;
+          if (wall[at] != 0 || mask[at] != 0) continue;
           const Vec3 d = f.world(x, j, k) - a;
           const double t = dot(d, ab) / l2;
           // Flat ends: nothing beyond where it is held.
           if ((i == 0 && t < 0) || (i + 2 == tube.size() && t > 1)) continue;
           const double s = std::clamp(t, 0.0, 1.0);
-          if (length(d - ab * s) <= tube[i].radius + (tube[i + 1].radius - tube[i].radius) * s + 0.1) part.mask[at] = 1;
+          if (length(d - ab * s) <= tube[i].radius + (tube[i + 1].radius - tube[i].radius) * s + 0.1) mask[at] = 1;
         }
   }
+  return mask;
+}
+
+Part not_found(std::string why) {
+  Part part;
+  part.why = std::move(why);
+  return part;
+}
+
+}  // namespace
+
+Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const Context& context) {
+  Mask wall(f.size());
+  for (std::size_t i = 0; i < wall.size(); ++i) {
+    const auto v = static_cast<double>(f.v[i]);
+    wall[i] = v > levels.bone_above || v < levels.air_below ? 1 : 0;
+  }
+  Groove groove;
+  groove.g = grid_behind(f, canal);
+  if (groove.g.size() == 0) return not_found("the image ends before the sinus");
+  enclose(groove, f, wall, canal, context);
+  if (!choose_groove(groove, canal)) return not_found("no groove of a sinus' width behind the ear canal");
+  std::vector<Vec3> line = line_of(groove);
+  if (line.size() < 16) return not_found("the groove behind the ear canal is too short for a sinus");
+  line = evenly(smoothed_line(line, std::vector<double>(line.size(), 1.0), kMarchStepMm, 1.5), kMarchStepMm);
+  const Vessel vessel = fit_vessel(std::move(line), f, levels, context);
+  if (vessel.rounds.empty()) return not_found("no vessel fits into the groove behind the ear canal");
+  const std::vector<Round> tube = held_part(vessel, groove.at(groove.start));
+  double long_mm = 0, hold = 0, rough = 0;
+  for (std::size_t i = 0; i < tube.size(); ++i) {
+    if (i > 0) long_mm += length(tube[i].centre - tube[i - 1].centre);
+    hold += tube[i].held / static_cast<double>(tube.size());
+    rough += tube[i].rough / static_cast<double>(tube.size());
+  }
+  if (long_mm < 15)
+    return not_found("the groove behind the ear canal holds a vessel for only " +
+                     std::to_string(static_cast<int>(long_mm)) + " mm");
+  Part part;
+  part.mask = fill_tube(tube, f, wall);
   part.quality = std::clamp(hold * (1 - rough / 3), 0.0, 1.0);
   part.found = true;
   return part;

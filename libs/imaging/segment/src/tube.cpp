@@ -53,10 +53,20 @@ struct Cross {
 };
 
 /// What the CT shows across the line at a point.
-Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const TubeParams& params) {
+/// What is met along each of the rays across a tube.
+struct Rays {
+  std::array<std::vector<double>, kRays> of;
+  int steps = 0;
+  double middle = 0;
+  double sign = 1;  ///< which way the wall differs from the content
+  bool air_cell = false;
+};
+
+Rays rays_across(const Sampler& hu, Vec3 at, Vec3 along, const TubeParams& params) {
+  Rays rays;
   const Vec3 u = any_perpendicular(along), v = cross(along, u);
   const double reach = 1.5 * params.max_radius_mm + 0.8;
-  const int n = static_cast<int>(reach / kRayStepMm) + 1;
+  const int n = rays.steps = static_cast<int>(reach / kRayStepMm) + 1;
   const auto value = [&](Vec3 p) { return (hu(p - along * 0.3) + 2 * hu(p) + hu(p + along * 0.3)) / 4; };
   double middle = value(at);
   for (int q = 0; q < 6; ++q) {
@@ -64,13 +74,13 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
     middle += value(at + (u * std::cos(a) + v * std::sin(a)) * 0.15);
   }
   middle /= 7;
+  rays.middle = middle;
   // Dark in bone or bright in air: what most of the surroundings are.
-  std::array<std::vector<double>, kRays> ray;
   std::vector<double> around;
   for (int q = 0; q < kRays; ++q) {
     const double a = 2 * std::numbers::pi * q / kRays;
     const Vec3 d = u * std::cos(a) + v * std::sin(a);
-    auto& r = ray[static_cast<std::size_t>(q)];
+    auto& r = rays.of[static_cast<std::size_t>(q)];
     r.resize(static_cast<std::size_t>(n));
     for (int i = 0; i < n; ++i) r[static_cast<std::size_t>(i)] = i == 0 ? middle : value(at + d * (i * kRayStepMm));
     around.push_back(r[static_cast<std::size_t>(std::min(n - 1, static_cast<int>(std::lround(1.0 / kRayStepMm))))]);
@@ -78,55 +88,50 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
   std::nth_element(around.begin(), around.begin() + kRays / 2, around.end());
   const bool nerve = params.kind == TubeKind::nerve;
   const bool in_air = nerve && around[kRays / 2] < -500 && middle < 0;
-  const double sign = nerve && !in_air ? 1 : -1;             // which way the wall differs from the content
-  if (nerve && !in_air && middle < -350) return {at, 0, 0};  // an air cell
-  // The wall of each ray: where the value is farthest from the middle's before it comes back by half.
+  rays.sign = nerve && !in_air ? 1 : -1;
+  rays.air_cell = nerve && !in_air && middle < -350;
+  return rays;
+}
+
+struct Edge {
+  double distance, wall, level;
+  bool met;
+};
+
+/// The wall of a ray: where the value is farthest from the middle's before it comes back by half.
+Edge wall_on(const std::vector<double>& r, double sign, double noise, const TubeParams& params) {
   const double least = std::max(kMinWallHu, 4 * noise);
-  struct Edge {
-    double distance, wall, level;
-    bool met;
-  };
-  std::array<Edge, kRays> edges{};
-  std::vector<double> walls;
-  int met = 0;
-  for (std::size_t q = 0; q < kRays; ++q) {
-    const auto& r = ray[q];
-    int top = 0, low = 0;  // the wall; where the content is purest before it
-    for (int i = 1; i < n; ++i) {
-      const double x = sign * r[static_cast<std::size_t>(i)];
-      const double peak = sign * r[static_cast<std::size_t>(top)], base = sign * r[static_cast<std::size_t>(low)];
-      if (x > peak) top = i;
-      if (peak - base < least) {
-        if (x < base) low = top = i;
-        if (low * kRayStepMm > 0.6 * params.max_radius_mm + 0.3) break;  // it only gets purer: not here
-      } else if (peak - x > std::max(2 * noise, 0.15 * (peak - base))) {
-        break;
-      }
+  const int n = static_cast<int>(r.size());
+  int top = 0, low = 0;  // the wall; where the content is purest before it
+  for (int i = 1; i < n; ++i) {
+    const double x = sign * r[static_cast<std::size_t>(i)];
+    const double peak = sign * r[static_cast<std::size_t>(top)], base = sign * r[static_cast<std::size_t>(low)];
+    if (x > peak) top = i;
+    if (peak - base < least) {
+      if (x < base) low = top = i;
+      if (low * kRayStepMm > 0.6 * params.max_radius_mm + 0.3) break;  // it only gets purer: not here
+    } else if (peak - x > std::max(2 * noise, 0.15 * (peak - base))) {
+      break;
     }
-    const double base = sign * r[static_cast<std::size_t>(low)], peak = sign * r[static_cast<std::size_t>(top)];
-    if (peak - base < least) continue;
-    const double half = 0.5 * (base + peak);
-    int i = low;
-    while (i < top && sign * r[static_cast<std::size_t>(i + 1)] < half) ++i;
-    const double a = sign * r[static_cast<std::size_t>(i)],
-                 b = sign * r[static_cast<std::size_t>(std::min(i + 1, n - 1))];
-    const double at_mm = (i + (b > a ? std::clamp((half - a) / (b - a), 0.0, 1.0) : 0.5)) * kRayStepMm;
-    if (at_mm > 1.2 * params.max_radius_mm) continue;
-    edges[q] = {at_mm, top * kRayStepMm, peak, true};
-    walls.push_back(peak);
-    ++met;
   }
-  if (met < kRays / 4) return {at, 0, static_cast<double>(met) / kRays};
-  // Circle through the edges by least squares, far ones left out. I. Kasa 1976.
-  std::vector<double> distances;
-  for (const Edge& e : edges)
-    if (e.met) distances.push_back(e.distance);
-  std::nth_element(distances.begin(), distances.begin() + met / 2, distances.end());
-  const double usual = distances[static_cast<std::size_t>(met / 2)];
+  const double base = sign * r[static_cast<std::size_t>(low)], peak = sign * r[static_cast<std::size_t>(top)];
+  if (peak - base < least) return {};
+  const double half = 0.5 * (base + peak);
+  int i = low;
+  while (i < top && sign * r[static_cast<std::size_t>(i + 1)] < half) ++i;
+  const double a = sign * r[static_cast<std::size_t>(i)],
+               b = sign * r[static_cast<std::size_t>(std::min(i + 1, n - 1))];
+  const double at_mm = (i + (b > a ? std::clamp((half - a) / (b - a), 0.0, 1.0) : 0.5)) * kRayStepMm;
+  if (at_mm > 1.2 * params.max_radius_mm) return {};
+  return {at_mm, top * kRayStepMm, peak, true};
+}
+
+/// The middle of the circle through the edges by least squares, at most 0.35 mm from where it was looked for. Edges
+/// that lie far out are taken out of `edges`. I. Kasa 1976.
+std::array<double, 2> circle_through(std::array<Edge, kRays>& edges, double usual) {
   double sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0, sz = 0, sxz = 0, syz = 0, count = 0;
   for (std::size_t q = 0; q < kRays; ++q) {
     if (!edges[q].met || edges[q].distance > 1.8 * usual + 0.1) {
-      if (edges[q].met) --met;
       edges[q].met = false;
       continue;
     }
@@ -134,7 +139,6 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
     const double x = edges[q].distance * std::cos(a), y = edges[q].distance * std::sin(a), z = x * x + y * y;
     sx += x, sy += y, sxx += x * x, sxy += x * y, syy += y * y, sz += z, sxz += x * z, syz += y * z, count += 1;
   }
-  Cross c{at, 0, static_cast<double>(met) / kRays};
   const double cxx = sxx - sx * sx / count, cyy = syy - sy * sy / count, cxy = sxy - sx * sy / count;
   const double bx = 0.5 * (sxz - sx * sz / count), by = 0.5 * (syz - sy * sz / count), det = cxx * cyy - cxy * cxy;
   double mx = 0, my = 0;
@@ -144,49 +148,51 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
   }
   const double off = std::sqrt(mx * mx + my * my), most = 0.35;
   if (off > most) mx *= most / off, my *= most / off;
-  c.centre = at + u * mx + v * my;
-  // Radius from what is missing: the blur moves it about but takes nothing away. Only where the wall is whole.
-  std::nth_element(walls.begin(), walls.begin() + static_cast<std::ptrdiff_t>(walls.size() / 2), walls.end());
-  const double wall = walls[walls.size() / 2];
-  // A vessel's content is what its middle shows, which is too little when it is thin.
-  const double content = nerve ? sign * params.lumen_hu : sign * middle;
-  {
-    double square = 0;
-    int low = 0, run = 0, widest = 0;
-    for (std::size_t q = 0; q < 2 * kRays; ++q) {
-      run = edges[q % kRays].met ? 0 : run + 1;
-      widest = std::max(widest, run);
-    }
-    for (std::size_t q = 0; q < kRays; ++q) {
-      if (!edges[q].met) continue;
-      const double a = 2 * std::numbers::pi * static_cast<double>(q) / kRays;
-      const double d = std::hypot(edges[q].distance * std::cos(a) - mx, edges[q].distance * std::sin(a) - my) - usual;
-      square += d * d;
-      low += edges[q].level - content < 0.6 * (wall - content) ? 1 : 0;
-    }
-    c.open = std::min(widest, kRays) / static_cast<double>(kRays);
-    c.rough = std::sqrt(square / std::max(1, met)) / std::max(0.2, usual);
-    c.thin = low / static_cast<double>(std::max(1, met));
-    c.level = wall - content;
-    c.filled = (sign * middle - content) / std::max(100.0, c.level);
+  return {mx, my};
+}
+
+/// How round, open and even the walls are. `usual`: their median distance; `wall`, `content`: median levels.
+void judge_walls(Cross& c, const std::array<Edge, kRays>& edges, std::array<double, 2> middle, double usual,
+                 double wall, double content) {
+  double square = 0;
+  int low = 0, run = 0, widest = 0, met = 0;
+  for (std::size_t q = 0; q < 2 * kRays; ++q) {
+    run = edges[q % kRays].met ? 0 : run + 1;
+    widest = std::max(widest, run);
   }
+  for (std::size_t q = 0; q < kRays; ++q) {
+    if (!edges[q].met) continue;
+    ++met;
+    const double a = 2 * std::numbers::pi * static_cast<double>(q) / kRays;
+    const double d =
+        std::hypot(edges[q].distance * std::cos(a) - middle[0], edges[q].distance * std::sin(a) - middle[1]) - usual;
+    square += d * d;
+    low += edges[q].level - content < 0.6 * (wall - content) ? 1 : 0;
+  }
+  c.walls = static_cast<double>(met) / kRays;
+  c.open = std::min(widest, kRays) / static_cast<double>(kRays);
+  c.rough = std::sqrt(square / std::max(1, met)) / std::max(0.2, usual);
+  c.thin = low / static_cast<double>(std::max(1, met));
+  c.level = wall - content;
+}
+
+/// The radius from what is missing: the blur moves it about but takes nothing away. Only where the wall is whole.
+double radius_by_area(const Rays& rays, const std::array<Edge, kRays>& edges, double usual, double wall,
+                      double content) {
   // From the mean of the rays, whose noise is less: the highest of a noisy ray is above its wall.
-  std::vector<double> mean(static_cast<std::size_t>(n));
+  std::vector<double> mean(static_cast<std::size_t>(rays.steps));
   double used = 0;
   int reached = 0;
   for (std::size_t q = 0; q < kRays; ++q) {
     if (!edges[q].met || edges[q].level < wall - 0.25 * std::abs(wall - content)) continue;
     used += 1;
     reached += static_cast<int>(std::lround(edges[q].wall / kRayStepMm));
-    for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += sign * ray[q][i];
+    for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += rays.sign * rays.of[q][i];
   }
-  if (used == 0) {
-    c.radius = usual;
-    return c;
-  }
+  if (used == 0) return usual;
   reached = static_cast<int>(reached / used) + 1;
   int top = 0;
-  for (int i = 1; i <= std::min(reached, n - 1); ++i)
+  for (int i = 1; i <= std::min(reached, rays.steps - 1); ++i)
     if (mean[static_cast<std::size_t>(i)] > mean[static_cast<std::size_t>(top)]) top = i;
   const double level = mean[static_cast<std::size_t>(top)] / used;
   double area = 0;
@@ -195,7 +201,34 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
     const double r0 = std::max(0.0, (i - 0.5) * kRayStepMm), r1 = (i + 0.5) * kRayStepMm;
     area += missing / std::max(1.0, level - content) * (r1 * r1 - r0 * r0);
   }
-  c.radius = std::sqrt(std::max(0.0, area));
+  return std::sqrt(std::max(0.0, area));
+}
+
+Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const TubeParams& params) {
+  const Rays rays = rays_across(hu, at, along, params);
+  if (rays.air_cell) return {at, 0, 0};
+  std::array<Edge, kRays> edges{};
+  std::vector<double> walls, distances;
+  for (std::size_t q = 0; q < kRays; ++q) {
+    edges[q] = wall_on(rays.of[q], rays.sign, noise, params);
+    if (!edges[q].met) continue;
+    walls.push_back(edges[q].level);
+    distances.push_back(edges[q].distance);
+  }
+  const std::size_t met = walls.size();
+  if (met < kRays / 4) return {at, 0, static_cast<double>(met) / kRays};
+  std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(met / 2), distances.end());
+  std::nth_element(walls.begin(), walls.begin() + static_cast<std::ptrdiff_t>(met / 2), walls.end());
+  const double usual = distances[met / 2], wall = walls[met / 2];
+  const std::array<double, 2> middle = circle_through(edges, usual);
+  const Vec3 u = any_perpendicular(along), v = cross(along, u);
+  Cross c{at};
+  c.centre = at + u * middle[0] + v * middle[1];
+  // A vessel's content is what its middle shows, which is too little when it is thin.
+  const double content = params.kind == TubeKind::nerve ? rays.sign * params.lumen_hu : rays.sign * rays.middle;
+  judge_walls(c, edges, middle, usual, wall, content);
+  c.filled = (rays.sign * rays.middle - content) / std::max(100.0, c.level);
+  c.radius = radius_by_area(rays, edges, usual, wall, content);
   return c;
 }
 
@@ -286,9 +319,8 @@ std::vector<double> trust_along(const std::vector<Cross>& crosses, const std::ve
   return trust;
 }
 
-}  // namespace
-
-Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubeParams& params, const Context& context) {
+/// The CT around the points. Errors: usage for fewer than two, for points outside or all the same.
+segment::Field field_around(const Image& ct, std::span<const Vec3> points_mm, const Context& context) {
   if (points_mm.size() < 2)
     throw Error(ExitCode::usage, "a tube needs two points or more", "where it begins and where it ends");
   const Vec3 last{ct.frame.dims[0] - 0.5, ct.frame.dims[1] - 0.5, ct.frame.dims[2] - 0.5};
@@ -310,15 +342,14 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
   const double margin = std::clamp(0.35 * longest, 5.0, 15.0);
   const Vec3 s = ct.frame.spacing_mm, rim{margin, margin, margin};
   const double h = std::clamp(0.8 * std::min({s.x, s.y, s.z}), 0.3, 0.6);
-  const segment::Field field = segment::make_field(ct, lo - rim, hi + rim, h, context.threads);
-  const std::vector<float> like = segment::tubeness(field, params, context.sub(0, 0.5));
-  const std::vector<Vec3> way = segment::cheapest_way(
-      field, like, points_mm, std::min(params.snap_mm, params.max_radius_mm), context.sub(0.5, 0.9));
+  return segment::make_field(ct, lo - rim, hi + rim, h, context.threads);
+}
 
-  const double noise = segment::noise_of(ct);
+/// The line moved between the walls in turns, and what lies across it at the last.
+std::vector<Cross> line_between_walls(std::vector<Vec3>& line, const Image& ct, double noise,
+                                      std::span<const Vec3> points_mm, const TubeParams& params,
+                                      const Context& context) {
   const Sampler hu(ct);
-  // Given points hold the line where the CT shows nothing; where it does, the CT is right.
-  std::vector<Vec3> line = evenly(way, kStepMm);
   std::vector<double> weight(line.size(), 1.0);
   line = evenly(smoothed_line(line, weight, kStepMm, kSmoothMm), kStepMm);
   std::vector<Cross> crosses;
@@ -339,6 +370,7 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
       moved[i] = crosses[i].centre;
       weight[i] = crosses[i].walls;
     }
+    // Given points hold the line where the CT shows nothing; where it does, the CT is right.
     const auto given = nearest_stations(line, points_mm);
     for (std::size_t q = 0; q < given.size(); ++q) {
       if (weight[given[q]] > 0) continue;
@@ -347,39 +379,51 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
     }
     line = evenly(smoothed_line(moved, weight, kStepMm, kSmoothMm), kStepMm);
   }
+  return crosses;
+}
 
-  Tube tube;
-  const std::size_t n = line.size();
-  for (std::size_t i = 0; i < n; ++i) {
-    // Of radius and confidence the median of five neighbours: single sections mislead.
+/// Of radius and walls the median of five neighbours: single sections mislead.
+std::vector<TubeStation> stations_of(const std::vector<Vec3>& line, const std::vector<Cross>& crosses,
+                                     double max_radius_mm) {
+  std::vector<TubeStation> stations;
+  for (std::size_t i = 0; i < line.size(); ++i) {
     std::vector<double> r, c;
-    for (std::size_t q = i > 2 ? i - 2 : 0; q <= std::min(i + 2, n - 1); ++q) {
-      if (crosses[q].radius > 0) r.push_back(std::min(crosses[q].radius, params.max_radius_mm));
+    for (std::size_t q = i > 2 ? i - 2 : 0; q <= std::min(i + 2, line.size() - 1); ++q) {
+      if (crosses[q].radius > 0) r.push_back(std::min(crosses[q].radius, max_radius_mm));
       c.push_back(crosses[q].walls);
     }
     std::sort(r.begin(), r.end());
     std::sort(c.begin(), c.end());
-    const double arc = i == 0 ? 0 : tube.stations.back().arc_mm + length(line[i] - line[i - 1]);
-    tube.stations.push_back({line[i], arc, r.empty() ? 0 : r[r.size() / 2], 0, c[c.size() / 2]});
+    const double arc = i == 0 ? 0 : stations.back().arc_mm + length(line[i] - line[i - 1]);
+    stations.push_back({line[i], arc, r.empty() ? 0 : r[r.size() / 2], 0, c[c.size() / 2]});
   }
-  const std::vector<double> trust =
-      trust_along(crosses, line, points_mm, nearest_stations(line, points_mm), noise, params);
-  for (std::size_t i = 0; i < n; ++i) tube.stations[i].confidence = trust[i];
-  // Where it is not sure the radius is that of the nearest place that is, or that has walls.
+  return stations;
+}
+
+/// Where it is not sure the radius is that of the nearest place that is, or that has walls.
+void borrow_radii(std::vector<TubeStation>& stations) {
+  const std::size_t n = stations.size();
   std::vector<std::size_t> good;
   for (std::size_t i = 0; i < n; ++i)
-    if (trust[i] >= 0.5 && tube.stations[i].radius_mm > 0) good.push_back(i);
+    if (stations[i].confidence >= 0.5 && stations[i].radius_mm > 0) good.push_back(i);
   for (std::size_t i = 0; i < n && good.empty(); ++i)
-    if (tube.stations[i].radius_mm > 0) good.push_back(i);
-  const std::vector<TubeStation> own = tube.stations;
+    if (stations[i].radius_mm > 0) good.push_back(i);
+  const std::vector<TubeStation> own = stations;
   for (std::size_t i = 0; i < n && !good.empty(); ++i) {
     const auto after = std::lower_bound(good.begin(), good.end(), i);
     std::size_t from = after != good.end() ? *after : good.back();
     if (after != good.begin() && i - *(after - 1) <= (from > i ? from - i : i - from)) from = *(after - 1);
     if (after != good.end() && *after == i) from = i;
-    tube.stations[i].radius_mm = own[from].radius_mm;
+    stations[i].radius_mm = own[from].radius_mm;
   }
+}
+
+/// Radii, confidence, unsure stretches of the whole. Errors: failed where too long a stretch has no walls.
+void summarise(Tube& tube, std::span<const Vec3> points_mm, const TubeParams& params) {
+  const std::size_t n = tube.stations.size();
   tube.length_mm = tube.stations.back().arc_mm;
+  std::vector<Vec3> line;
+  for (const TubeStation& t : tube.stations) line.push_back(t.at_mm);
   std::vector<bool> given(n);
   for (const std::size_t i : nearest_stations(line, points_mm)) given[i] = true;
   double sure = 0;
@@ -416,6 +460,25 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
                 "give a point on it there, check --kind, or allow it with --max-uncertain-mm");
   }
   tube.radius_mean_mm /= sure;
+}
+
+}  // namespace
+
+Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubeParams& params, const Context& context) {
+  const segment::Field field = field_around(ct, points_mm, context);
+  const std::vector<float> like = segment::tubeness(field, params, context.sub(0, 0.5));
+  const std::vector<Vec3> way = segment::cheapest_way(
+      field, like, points_mm, std::min(params.snap_mm, params.max_radius_mm), context.sub(0.5, 0.9));
+  const double noise = segment::noise_of(ct);
+  std::vector<Vec3> line = evenly(way, kStepMm);
+  const std::vector<Cross> crosses = line_between_walls(line, ct, noise, points_mm, params, context);
+  Tube tube;
+  tube.stations = stations_of(line, crosses, params.max_radius_mm);
+  const std::vector<double> trust =
+      trust_along(crosses, line, points_mm, nearest_stations(line, points_mm), noise, params);
+  for (std::size_t i = 0; i < line.size(); ++i) tube.stations[i].confidence = trust[i];
+  borrow_radii(tube.stations);
+  summarise(tube, points_mm, params);
   context.progress(1.0);
   return tube;
 }

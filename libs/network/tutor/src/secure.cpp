@@ -2,9 +2,11 @@
 
 #include <sodium.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "osteo/core/base/error.h"
+#include "osteo/network/tutor/detail/cpace.h"
 
 namespace osteo::inline network {
 namespace {
@@ -18,15 +20,8 @@ void need_sodium() {
     throw Error(ExitCode::failed, "there is no randomness for a key", "libsodium cannot be used on this machine");
 }
 
-template <std::size_t N>
-void add(crypto_generichash_state& state, const std::array<std::uint8_t, N>& bytes) {
-  ::crypto_generichash_update(&state, bytes.data(), bytes.size());
-}
-void add(crypto_generichash_state& state, std::string_view text) {
-  const auto n = static_cast<std::uint64_t>(text.size());  // so that no two lists of texts run together
-  ::crypto_generichash_update(&state, reinterpret_cast<const unsigned char*>(&n), sizeof n);
-  ::crypto_generichash_update(&state, reinterpret_cast<const unsigned char*>(text.data()), text.size());
-}
+constexpr std::string_view kChannel = "osteotome 5";  // both sides speak this, and nothing else of this kind
+constexpr std::string_view kHost = "host", kGuest = "guest";
 
 }  // namespace
 
@@ -78,48 +73,38 @@ Pairing::Nonce Pairing::make_nonce() {
   return nonce;
 }
 
-Pairing::Pairing(std::string_view tidy_code, const Nonce& guest, const Nonce& host) : guest_(guest), host_(host) {
+Pairing::Pairing(std::string_view tidy_code, const Nonce& guest, const Nonce& host) {
   need_sodium();
-  static_assert(crypto_core_ristretto255_HASHBYTES == 64 && crypto_core_ristretto255_BYTES == kShare);
-  crypto_generichash_state state;
-  ::crypto_generichash_init(&state, nullptr, 0, 64);
-  add(state, "osteotome tutor 1, generator");
-  add(state, tidy_code);
-  add(state, guest);
-  add(state, host);
-  std::array<std::uint8_t, 64> hash;
-  ::crypto_generichash_final(&state, hash.data(), hash.size());
-  std::array<std::uint8_t, kShare> generator;
-  ::crypto_core_ristretto255_from_hash(generator.data(), hash.data());
+  std::copy(guest.begin(), guest.end(), session_.begin());
+  std::copy(host.begin(), host.end(), session_.begin() + kNonce);
+  // From it the code could be tried out without talking to anybody.
+  CpacePoint generator = cpace_generator(tidy_code, kChannel, session_);
+  std::optional<CpacePoint> share;
   do {
     ::crypto_core_ristretto255_scalar_random(secret_.data());
-  } while (::crypto_scalarmult_ristretto255(mine_.data(), secret_.data(), generator.data()) != 0);
-  // From each of them the code could be tried out without talking to anybody.
-  ::sodium_memzero(&state, sizeof state);
-  ::sodium_memzero(hash.data(), hash.size());
+    share = cpace_multiply(secret_, generator);
+  } while (!share);
+  mine_ = *share;
   ::sodium_memzero(generator.data(), generator.size());
 }
 
 std::optional<PairKeys> Pairing::keys(const Share& theirs, bool i_am_host) const {
-  std::array<std::uint8_t, kShare> shared;
-  // Rejects what is no point, and gives the neutral one back as a failure.
-  if (::crypto_scalarmult_ristretto255(shared.data(), secret_.data(), theirs.data()) != 0) return std::nullopt;
+  std::optional<CpacePoint> shared = cpace_multiply(secret_, theirs);
+  if (!shared) return std::nullopt;
+  // The host's share is the first to be sent. What each is goes with its share, so that none can be sent back.
+  CpaceKey key =
+      cpace_key(session_, *shared, {i_am_host ? mine_ : theirs, kHost}, {i_am_host ? theirs : mine_, kGuest});
+  ::sodium_memzero(shared->data(), shared->size());
   PairKeys keys;
   const auto derive = [&](std::string_view label, std::array<std::uint8_t, 32>& out) {
-    crypto_generichash_state state;
-    ::crypto_generichash_init(&state, shared.data(), shared.size(), out.size());  // its first block holds the key
-    add(state, label);
-    add(state, guest_);
-    add(state, host_);
-    add(state, i_am_host ? theirs : mine_);
-    add(state, i_am_host ? mine_ : theirs);
-    ::crypto_generichash_final(&state, out.data(), out.size());
-    ::sodium_memzero(&state, sizeof state);
+    static_assert(std::tuple_size_v<CpaceKey> <= crypto_generichash_KEYBYTES_MAX);
+    ::crypto_generichash(out.data(), out.size(), reinterpret_cast<const unsigned char*>(label.data()), label.size(),
+                         key.data(), key.size());
   };
-  derive("osteotome tutor 1, to host", keys.to_host);
-  derive("osteotome tutor 1, to guest", keys.to_guest);
-  derive("osteotome tutor 1, confirm", keys.confirm);
-  ::sodium_memzero(shared.data(), shared.size());
+  derive("to host", keys.to_host);
+  derive("to guest", keys.to_guest);
+  derive("confirm", keys.confirm);
+  ::sodium_memzero(key.data(), key.size());
   return keys;
 }
 

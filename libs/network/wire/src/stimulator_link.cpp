@@ -9,7 +9,7 @@ namespace osteo::inline network {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "messages are little endian");
-constexpr std::uint8_t kVersion = 1;
+constexpr std::uint8_t kVersion = 2;
 constexpr std::uint32_t kConnection = 1;
 enum class Step : std::uint8_t { ask = 1, challenge, prove, welcome, refused, setting, state };
 enum class Refusal : std::uint8_t { wrong_code = 1, closed, version };

@@ -7,6 +7,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/geometry/distance/triangle_tree.h"
 #include "solve.h"
 

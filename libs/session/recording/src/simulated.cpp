@@ -1,4 +1,4 @@
-#include "osteo/session/recording/simulated.h"
+#include "osteo/session/recording/session_reader.h"
 
 namespace osteo::inline session {
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/portable_math.h"
 
 namespace osteo::inline simulation {
 namespace {
@@ -28,7 +29,7 @@ Motion motion(std::span<const double> y, double t0, double tau) {
   double n[3][3] = {}, r[3] = {}, yy = 0;
   for (std::size_t i = 0; i < y.size(); ++i) {
     const double t = static_cast<double>(i);
-    const double f[3] = {1, std::exp(-t / tau), t > t0 ? 1 - std::exp((t0 - t) / tau) : 0};
+    const double f[3] = {1, portable::exp(-t / tau), t > t0 ? 1 - portable::exp((t0 - t) / tau) : 0};
     for (std::size_t a = 0; a < 3; ++a) {
       for (std::size_t b = 0; b < 3; ++b) n[a][b] += f[a] * f[b];
       r[a] += f[a] * y[i];
@@ -116,7 +117,7 @@ class Measurement {
     const Motion m = best_motion(mm, sent - 0.5, sent + static_cast<double>(latest));
     const double quantum = std::max(device_.traits().encoder_mm, step_mm()),
                  beside = std::sqrt(m.off / static_cast<double>(mm.size())),
-                 moved = m.way * (1 - std::exp(-static_cast<double>(seen) / m.tau));
+                 moved = m.way * (1 - portable::exp(-static_cast<double>(seen) / m.tau));
     Pulse p;
     p.delay_s = (m.t0 - sent) * dt_s_;
     // mm for N s is m / (N s / m) * 1000.

@@ -1,4 +1,4 @@
-#include "osteo/simulation/tissue/statics.h"
+#include "osteo/simulation/tissue/fem.h"
 
 #include <algorithm>
 #include <cmath>

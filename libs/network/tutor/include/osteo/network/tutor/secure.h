@@ -26,16 +26,11 @@ struct PairKeys {
 /// Overwrites a secret text, and empties it.
 void wipe(std::string& secret) noexcept;
 
-/// One side of CPace on ristretto255 (a balanced PAKE: draft-irtf-cfrg-cpace): the code maps to a generator, each side
-/// sends a random multiple of it. Who listens learns nothing to try codes on; who takes part can try one code a run,
-/// and the host counts runs (three). Not withstood: someone who reads the code. The secret is wiped at the end.
-///
-/// Conformance: the protocol is CPace's (map, share, key, confirmation), its encoding is not the draft's
-/// CPACE-RISTR255-SHA512. Here the generator is the ristretto255 map of BLAKE2b-512 over "osteotome tutor 1,
-/// generator", code and both nonces, each text with its length; there it is that of SHA-512 over "CPaceRistretto255",
-/// padding, password, channel and session id. Keys are BLAKE2b over labels, nonces and shares, not the draft's ISK. So
-/// none of its published test vectors of generators or keys can be run against this; the group's operations behind them
-/// are libsodium's (RFC 9496), and a neutral or invalid share is rejected as the draft demands.
+/// One side of CPace (a balanced PAKE: draft-irtf-cfrg-cpace, suite CPACE-RISTR255-SHA512; the draft's published
+/// vectors are tested): the code maps to a generator, each side sends a random multiple of it. Who listens learns
+/// nothing to try codes on; who takes part can try one code a run, and the host counts runs (three). Not withstood:
+/// someone who reads the code. The session is both nonces, the host is the initiator, and each share goes with the role
+/// of who sent it. The three keys are BLAKE2b under the draft's ISK. The secret is wiped at the end.
 class Pairing {
  public:
   static constexpr std::size_t kNonce = 16, kShare = 32;
@@ -49,7 +44,7 @@ class Pairing {
   [[nodiscard]] std::optional<PairKeys> keys(const Share& theirs, bool i_am_host) const;
 
  private:
-  Nonce guest_, host_;
+  std::array<std::uint8_t, 2 * kNonce> session_{};  // the guest's nonce, then the host's
   std::array<std::uint8_t, 32> secret_{};
   Share mine_{};
 };

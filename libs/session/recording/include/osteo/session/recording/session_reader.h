@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <string_view>
 #include "osteo/session/recording/records.h"
 #include "osteo/session/recording/session_file.h"
 #include "osteo/simulation/bone/world.h"
@@ -142,5 +143,11 @@ std::optional<VoxelChange> apply_change(const VoxelChange& change, World& world)
 /// (parts_changes) is enough: strokes end there, and what was before is in the bone. Error(corrupt) where it changes a
 /// voxel that the bone does not have.
 void apply_part(const SessionPart& part, World& world);
+
+/// The kind of the note at the beginning of a session by a simulated trainee; its value names skill and seed.
+inline constexpr std::string_view kSimulatedNote = "simulated";
+
+/// For whoever shows a session, in a sentence; empty where a person drilled it. Reads until the first note at most.
+[[nodiscard]] std::string simulated_text(const SessionReader& session);
 
 }  // namespace osteo::inline session
