@@ -14,7 +14,7 @@
 namespace osteo {
 namespace {
 
-constexpr auto kNames = enum_names(Language{});
+constexpr auto kLanguageNames = enum_names(Language{});
 constexpr char kOfContext = '\4';  // as gettext parts context and text
 
 std::atomic<int> chosen{static_cast<int>(Language::english)};
@@ -93,8 +93,8 @@ Catalogue read_catalogue(std::string_view po) {
 }
 
 const Catalogue& catalogue(Language language) {
-  static std::array<Catalogue, kNames.size()> all;
-  static std::array<std::once_flag, kNames.size()> read;
+  static std::array<Catalogue, kLanguageNames.size()> all;
+  static std::array<std::once_flag, kLanguageNames.size()> read;
   const auto n = static_cast<std::size_t>(language);
   std::call_once(read[n], [&] { all[n] = read_catalogue(catalogue_text(language)); });
   return all[n];
@@ -125,16 +125,17 @@ const std::vector<std::string>* forms_of(const std::string& key) {
 
 // "de_AT.UTF-8@euro"; nothing where there is no catalogue. Traditional Chinese is not simplified Chinese.
 const std::string_view* name_for(std::string_view locale) {
-  const std::string_view place = locale.substr(0, locale.find_first_of(".@")), tongue = place.substr(0, place.find('_'));
+  const std::string_view place = locale.substr(0, locale.find_first_of(".@")),
+                         tongue = place.substr(0, place.find('_'));
   if (tongue == "zh" && (place == "zh_TW" || place == "zh_HK" || place == "zh_MO" || place.starts_with("zh_Hant")))
     return nullptr;
-  const auto at = std::find_if(kNames.begin(), kNames.end(),
+  const auto at = std::find_if(kLanguageNames.begin(), kLanguageNames.end(),
                                [&](std::string_view name) { return name.substr(0, name.find('_')) == tongue; });
-  return at == kNames.end() ? nullptr : &*at;
+  return at == kLanguageNames.end() ? nullptr : &*at;
 }
 
 Language at_name(const std::string_view* name) {
-  return name == nullptr ? Language::english : static_cast<Language>(name - kNames.data());
+  return name == nullptr ? Language::english : static_cast<Language>(name - kLanguageNames.data());
 }
 
 std::string_view variable(const char* name) {
@@ -169,8 +170,8 @@ Language language_of_environment() {
 }
 
 Language language_named(std::string_view name) {
-  const auto at = std::find(kNames.begin(), kNames.end(), name);
-  return at == kNames.end() ? language_of_environment() : at_name(&*at);
+  const auto at = std::find(kLanguageNames.begin(), kLanguageNames.end(), name);
+  return at == kLanguageNames.end() ? language_of_environment() : at_name(&*at);
 }
 
 InLanguage::InLanguage(Language language) : before_(static_cast<Language>(chosen.load())) {
@@ -273,7 +274,7 @@ std::string shown_date(const std::string& iso) {
 }
 
 std::string_view catalogue_text(Language language) {
-  const std::string name = std::string(kNames[static_cast<std::size_t>(language)]) + ".po";
+  const std::string name = std::string(kLanguageNames[static_cast<std::size_t>(language)]) + ".po";
   const auto* const at =
       std::find_if(std::begin(kCatalogues), std::end(kCatalogues), [&](const auto& c) { return c.first == name; });
   return at == std::end(kCatalogues) ? std::string_view() : at->second;
