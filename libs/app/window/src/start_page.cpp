@@ -36,7 +36,8 @@ void write_state(const StartList& list, std::uint64_t pictures, int em_pixels, c
   const Json j{{"page", "start"},           {"pictures", pictures},
                {"entries", entries},        {"selected", list.selected()},
                {"message", list.message()}, {"tick", 0},
-               {"em_pixels", em_pixels},    {"folder", list.folder().string()}};
+               {"em_pixels", em_pixels},    {"folder", list.folder().string()},
+               {"language", enum_names(Language{})[static_cast<std::size_t>(language())]}};
   const std::filesystem::path beside = file.string() + ".new";
   std::ofstream(beside) << j.dump() << '\n';
   std::error_code ignored;

@@ -114,10 +114,25 @@ void begin_fixed(const char* name, const ScreenBox& box, ImGuiWindowFlags more) 
                    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoBringToFrontOnFocus | more);
 }
 
+namespace {
+
+std::set<std::string>& cut() {
+  static std::set<std::string> all;
+  return all;
+}
+
+}  // namespace
+
+const std::set<std::string>& texts_cut() {
+  return cut();
+}
+
 std::string shortened(const std::string& text, float width, float size, ImFont* font) {
   if (font == nullptr) font = ImGui::GetFont();
   const auto wide = [&](const std::string& s) { return font->CalcTextSizeA(size, FLT_MAX, 0, s.c_str()).x; };
   if (wide(text) <= width) return text;
+  constexpr std::size_t kMost = 1000;  // a window that is open for days
+  if (cut().size() < kMost) cut().insert(text);
   // Whole characters: bytes that go on with one are not where it is parted.
   const auto whole = [&](std::size_t n) {
     while (n > 0 && n < text.size() && (static_cast<unsigned char>(text[n]) & 0xC0) == 0x80) --n;
