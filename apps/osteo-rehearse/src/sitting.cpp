@@ -394,8 +394,8 @@ SessionFacts SessionRunner::facts_of(const RehearsalSummary& s) const {
   }
   f.warnings = s.warnings;
   if (!s.gaps.empty())
-    f.warnings.push_back(filled(tr("NOT RECORDED: {n} ticks: the disk did not keep up"),
-                                {{"n", std::to_string(s.ticks_not_recorded)}}));
+    f.warnings.push_back(
+        filled(tr("NOT RECORDED: {n} ticks: the disk did not keep up"), {{"n", std::to_string(s.ticks_not_recorded)}}));
   return f;
 }
 

@@ -40,10 +40,8 @@ TEST_F(Translate, IsEnglishUntilSomeoneSaysOtherwise) {
 }
 
 TEST_F(Translate, SaysItInEachLanguage) {
-  const std::pair<Language, const char*> kEnds[] = {{Language::german, "Ende"},
-                                                    {Language::spanish, "Fin"},
-                                                    {Language::french, "Fin"},
-                                                    {Language::chinese, "结束"}};
+  const std::pair<Language, const char*> kEnds[] = {
+      {Language::german, "Ende"}, {Language::spanish, "Fin"}, {Language::french, "Fin"}, {Language::chinese, "结束"}};
   for (const auto& [language, word] : kEnds) {
     use_language(language);
     EXPECT_STREQ(tr("End"), word);

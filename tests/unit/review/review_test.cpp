@@ -72,10 +72,9 @@ Review example() {
 TEST(ReviewPage, IsInTheLanguageAndItsFilesAreNot) {
   const std::string english = review_html(example()), json = review_json(example()).dump();
   EXPECT_EQ(english.find("\"texts\""), std::string::npos) << "nothing to look up";
-  for (const auto& [language, heading, number] : {std::tuple{Language::german, "Befunde", "1,5 N"},
-                                                  std::tuple{Language::spanish, "Hallazgos", "1,5 N"},
-                                                  std::tuple{Language::french, "Constats", "1,5 N"},
-                                                  std::tuple{Language::chinese, "发现", "1.5 N"}}) {
+  for (const auto& [language, heading, number] :
+       {std::tuple{Language::german, "Befunde", "1,5 N"}, std::tuple{Language::spanish, "Hallazgos", "1,5 N"},
+        std::tuple{Language::french, "Constats", "1,5 N"}, std::tuple{Language::chinese, "发现", "1.5 N"}}) {
     const InLanguage theirs(language);
     Review r = example();
     {

@@ -164,9 +164,9 @@ TEST(Panels, FitInEveryLanguage) {
       card = draw_burr_card(l.view, l.view.width, {}, unfolded, pressed);
       static_cast<void>(draw_next_step(l.view, list));
       help.draw(kWidth, kHeight, [&] { draw_first_steps(list); });
-      static_cast<void>(draw_question(
-          kWidth, kHeight, tr("Reset bone?"),
-          tr("This session is saved and ends. A new one begins with the bone of the case."), tr("Reset bone")));
+      static_cast<void>(draw_question(kWidth, kHeight, tr("Reset bone?"),
+                                      tr("This session is saved and ends. A new one begins with the bone of the case."),
+                                      tr("Reset bone")));
     });
     for (const std::string& text : texts_cut()) EXPECT_TRUE(before.contains(text)) << text;
     ASSERT_FALSE(card.empty());
@@ -192,7 +192,8 @@ TEST(Panels, ButtonsAreAsWideAsTheirWords) {
     const auto expect_room = [&](const std::string& text, float room) {
       EXPECT_LE(ImGui::CalcTextSize(text.c_str(), nullptr, true).x + pad, room) << text;
     };
-    for (const char* const text : {"Save and continue", "Reset bone ..."}) expect_room(std::string(tr(text)) + " (F5)", whole);
+    for (const char* const text : {"Save and continue", "Reset bone ..."})
+      expect_room(std::string(tr(text)) + " (F5)", whole);
     for (const char* const text : {"as the view holds it (Insert)", "all as usual", "Camera back (Backspace)"})
       expect_room(tr(text), whole);
     // Of a question 28 em wide.

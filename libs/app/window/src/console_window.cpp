@@ -117,10 +117,11 @@ void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
     } else {
       begin_fixed("waiting", {0, 0, w, h - foot});
       ImGui::TextWrapped(
-          "%s", filled(tr("Waiting for a nerve monitor at {server}: 'osteo rehearse CASE --stream igtl:PORT', or 'osteo "
-                          "stream SESSION --to igtl:PORT'."),
-                       {{"server", options.server}})
-                    .c_str());
+          "%s",
+          filled(tr("Waiting for a nerve monitor at {server}: 'osteo rehearse CASE --stream igtl:PORT', or 'osteo "
+                    "stream SESSION --to igtl:PORT'."),
+                 {{"server", options.server}})
+              .c_str());
       ImGui::End();
     }
     begin_fixed("foot", {0, h - foot, w, foot}, ImGuiWindowFlags_NoScrollbar);

@@ -34,7 +34,8 @@ void CutsControl::set_bounds(Vec3 lo, Vec3 hi, double step_mm) {
 
 const char* CutsControl::name(int cut) const {
   static constexpr const char* kBody[] = {tr_later("Axial"), tr_later("Coronal"), tr_later("Sagittal")};
-  static constexpr const char* kTool[] = {tr_later("Across the tool"), tr_later("Along the tool"), tr_later("Along it, the other way")};
+  static constexpr const char* kTool[] = {tr_later("Across the tool"), tr_later("Along the tool"),
+                                          tr_later("Along it, the other way")};
   return tr((planes_ == Planes::body ? kBody : kTool)[cut]);
 }
 

@@ -273,9 +273,10 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
     if (small_button(tr(kShort[p]), control_.preset() == p)) control_.take_preset(p);
     if (ImGui::IsItemHovered()) {
       const HuWindow& hu = grey_presets()[static_cast<std::size_t>(p)].hu;
-      std::string help = filled(tr("window {window}, level {level} HU. Drag with the right button in a cut to change it; "
-                                   "right click: back to this."),
-                                {{"window", shown_number(hu.width, 0)}, {"level", shown_number(hu.level, 0)}});
+      std::string help =
+          filled(tr("window {window}, level {level} HU. Drag with the right button in a cut to change it; "
+                    "right click: back to this."),
+                 {{"window", shown_number(hu.width, 0)}, {"level", shown_number(hu.level, 0)}});
       if (ct_ && !ct_->soft_tissue()) {
         help += "\n";
         help += tr("The case keeps CT values of bone only: soft tissue stays black without --scan.");
@@ -300,7 +301,8 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
   if (regions_ != nullptr) {
     ImGui::SameLine();
     if (small_button(tr("plan"), regions_->shown())) regions_->show(!regions_->shown());
-    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", tr("what the procedure wants removed (green) or left (orange); Ctrl-L"));
+    if (ImGui::IsItemHovered())
+      ImGui::SetTooltip("%s", tr("what the procedure wants removed (green) or left (orange); Ctrl-L"));
   }
   ImGui::TextDisabled("%.0f / %.0f HU   %s", control_.hu.width, control_.hu.level,
                       control_.enlarged() >= 0 ? tr("F3: back") : tr("F3: in the middle"));
@@ -323,11 +325,11 @@ void CutsPanel::foot(const Rehearsal& rehearsal) {
   }
   const float side = foot_.height;
   ImGui::SetCursorScreenPos({foot_.right() - side, foot_.y});
-  if (tile("settings", "settings",
-           {false, settings_open_, true,
-            rehearsal.structures() != nullptr ? tr("Window, level, structures, plan")
-                                              : tr("Window, level, structures")},
-           side))
+  if (tile(
+          "settings", "settings",
+          {false, settings_open_, true,
+           rehearsal.structures() != nullptr ? tr("Window, level, structures, plan") : tr("Window, level, structures")},
+          side))
     settings_open_ = !settings_open_;
   ImGui::End();
 }

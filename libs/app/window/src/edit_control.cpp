@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/core/base/translate.h"
 #include "cut_picture.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 namespace {
@@ -461,10 +461,8 @@ std::string EditControl::hint() const {
 }
 
 void EditControl::reported(const EditOutcome& o) {
-  const std::initializer_list<Place> places{{"what", o.text},
-                                            {"added", volume_text(o.added_mm3)},
-                                            {"removed", volume_text(o.removed_mm3)},
-                                            {"note", o.note}};
+  const std::initializer_list<Place> places{
+      {"what", o.text}, {"added", volume_text(o.added_mm3)}, {"removed", volume_text(o.removed_mm3)}, {"note", o.note}};
   const char* text = tr("{what}: nothing changes");
   if (!o.changed) {
     if (!o.note.empty()) text = "{what}: {note}";

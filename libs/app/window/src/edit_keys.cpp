@@ -81,8 +81,9 @@ constexpr EditKeyRow kRows[] = {
 }  // namespace
 
 const char* edit_tool_name(EditTool tool) {
-  static constexpr const char* names[kEditTools] = {tr_later("Look"), tr_later("Ruler"), tr_later("Threshold"), tr_later("Piece"), tr_later("Small fragments"),
-                                                    tr_later("Box"),  tr_later("Fill"),  tr_later("Smooth"),    tr_later("Brush"), tr_later("Eraser")};
+  static constexpr const char* names[kEditTools] = {
+      tr_later("Look"), tr_later("Ruler"), tr_later("Threshold"), tr_later("Piece"), tr_later("Small fragments"),
+      tr_later("Box"),  tr_later("Fill"),  tr_later("Smooth"),    tr_later("Brush"), tr_later("Eraser")};
   return names[static_cast<int>(tool)];
 }
 
@@ -117,7 +118,9 @@ const std::vector<EditHelpLine>& edit_help_lines() {
        {from_front, from_left, from_above}},
       {"C", tr_later("crosshair on and off"), {cross}},
       {"O", tr_later("outlines on and off"), {outline}},
-      {tr_later("1 to 9, 0"), tr_later("tool: look, ruler, threshold, piece, small fragments, box, fill, smooth, brush, eraser"), {tool}},
+      {tr_later("1 to 9, 0"),
+       tr_later("tool: look, ruler, threshold, piece, small fragments, box, fill, smooth, brush, eraser"),
+       {tool}},
       {tr_later("left button"), tr_later("what the line at the bottom says"), {}},
       {tr_later("[ ], - =, Shift-wheel"), tr_later("brush smaller and larger"), {larger, smaller}},
       {"Enter", tr_later("applies the tool"), {apply}},

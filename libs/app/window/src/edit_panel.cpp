@@ -48,10 +48,9 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
   tools(control, scale);
   options(control);
   heading(tr("Grey values"));
-  ImGui::TextUnformatted(
-      filled(tr("window {window}, level {level} HU"),
-             {{"window", shown_number(control.hu.width, 0)}, {"level", shown_number(control.hu.level, 0)}})
-          .c_str());
+  ImGui::TextUnformatted(filled(tr("window {window}, level {level} HU"), {{"window", shown_number(control.hu.width, 0)},
+                                                                          {"level", shown_number(control.hu.level, 0)}})
+                             .c_str());
   for (std::size_t i = 0; i < grey_presets().size(); ++i) {
     const GreyPreset& p = grey_presets()[i];
     if (i > 0) ImGui::SameLine();
@@ -61,12 +60,12 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
       control.key(row);
     }
     if (ImGui::IsItemHovered())
-      ImGui::SetTooltip("%s", filled(tr("{name}: window {window}, level {level} (F{key})"),
-                                     {{"name", names[i]},
-                                      {"window", shown_number(p.hu.width, 0)},
-                                      {"level", shown_number(p.hu.level, 0)},
-                                      {"key", std::to_string(i + 2)}})
-                                  .c_str());
+      ImGui::SetTooltip(
+          "%s", filled(tr("{name}: window {window}, level {level} (F{key})"), {{"name", names[i]},
+                                                                               {"window", shown_number(p.hu.width, 0)},
+                                                                               {"level", shown_number(p.hu.level, 0)},
+                                                                               {"key", std::to_string(i + 2)}})
+                    .c_str());
   }
   structures(control, scale);
   ImGui::EndChild();
@@ -76,12 +75,14 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
   const EditDocument& d = control.document();
   ImGui::BeginDisabled(!d.can_undo() || control.busy());
   if (ImGui::Button(tr("Undo (Ctrl-Z)"), {half, tall})) control.undo();
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", filled(tr("takes back: {what}"), {{"what", d.undo_text()}}).c_str());
+  if (ImGui::IsItemHovered())
+    ImGui::SetTooltip("%s", filled(tr("takes back: {what}"), {{"what", d.undo_text()}}).c_str());
   ImGui::EndDisabled();
   ImGui::SameLine();
   ImGui::BeginDisabled(!d.can_redo() || control.busy());
   if (ImGui::Button(tr("Redo (Ctrl-Y)"), {half, tall})) control.redo();
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", filled(tr("does again: {what}"), {{"what", d.redo_text()}}).c_str());
+  if (ImGui::IsItemHovered())
+    ImGui::SetTooltip("%s", filled(tr("does again: {what}"), {{"what", d.redo_text()}}).c_str());
   ImGui::EndDisabled();
   const bool unsaved = control.unsaved();
   if (unsaved) ImGui::PushStyleColor(ImGuiCol_Button, {0.16F, 0.45F, 0.28F, 1});
@@ -136,7 +137,8 @@ void EditPanel::options(EditControl& control) {
       if (changed || top) control.set_threshold(lower, upper >= 4000 ? 32767 : upper);
       ImGui::Checkbox(tr("do later steps again"), &control.later_steps_again);
       if (ImGui::IsItemHovered())
-        ImGui::SetTooltip(tr("what was done since the last threshold is done again on the new one; else it is forgotten"));
+        ImGui::SetTooltip(
+            tr("what was done since the last threshold is done again on the new one; else it is forgotten"));
       if (wide_button(tr("Apply (Enter)"), free)) control.apply();
       return;
     }
@@ -168,7 +170,8 @@ void EditPanel::options(EditControl& control) {
       heading(title.c_str());
       slider("##smooth", control.smooth_mm, 0.1, 5, tr("within %.1f mm"));
       ImGui::TextWrapped(
-          "%s", tr("Nothing farther from the surface changes; walls thinner than this may go. The volume is reported."));
+          "%s",
+          tr("Nothing farther from the surface changes; walls thinner than this may go. The volume is reported."));
       if (wide_button(tr("Smooth (Enter)"), free)) control.apply();
       return;
     case EditTool::brush:
@@ -229,8 +232,7 @@ void EditPanel::structures(EditControl& control, float scale) {
     int role = static_cast<int>(s->role);
     ImGui::SetNextItemWidth(-1);
     const char* const roles[] = {tr("at risk: goes into the case"), tr("landmark: stays in the edits")};
-    const bool other_role =
-        ImGui::Combo("##role", &role, roles, IM_ARRAYSIZE(roles));
+    const bool other_role = ImGui::Combo("##role", &role, roles, IM_ARRAYSIZE(roles));
     const int value = s->is.value;
     if (renamed || other_role) {
       control.at_once(ChangeStructureEdit{value, renamed ? std::string(name_.data()) : s->is.name, rgb,

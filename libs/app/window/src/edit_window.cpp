@@ -434,8 +434,9 @@ class EditWindow {
     }
     ImGui::Separator();
     ImGui::TextWrapped(
-        "%s", tr("Everything can be undone. The scan is never changed; what is saved is what was done, and the bone that "
-                 "follows from it."));
+        "%s",
+        tr("Everything can be undone. The scan is never changed; what is saved is what was done, and the bone that "
+           "follows from it."));
     ImGui::End();
   }
 
@@ -451,7 +452,8 @@ class EditWindow {
     ImGui::SetNextWindowPos({(static_cast<float>(width_) - w) / 2, static_cast<float>(height_) / 3});
     ImGui::SetNextWindowSize({w, 0});
     ImGui::SetNextWindowFocus();
-    ImGui::Begin(tr("Close?"), nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove);
+    ImGui::Begin(tr("Close?"), nullptr,
+                 ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove);
     ImGui::TextWrapped("%s", saving_ ? tr("It is being saved.") : tr("There are corrections that are not saved."));
     const ImVec2 size{-1, ImGui::GetFontSize() * 1.9F};
     if (saving_) {

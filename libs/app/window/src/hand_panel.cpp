@@ -1,8 +1,8 @@
 // The page of the hand in the panel.
 #include <imgui.h>
 
-#include "osteo/core/base/translate.h"
 #include "hand_desk.h"
+#include "osteo/core/base/translate.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -50,7 +50,8 @@ void HandController::draw(RehearsalControl& control, bool show) {
   }
   ImGui::PushItemWidth(5 * em());
   share_slider(tr("at wrist rest"), v.wrist_rest, 0.05, tr("of that motion, while \\ or keypad . is held"));
-  share_slider(tr("burr at most"), v.burr_share, 0.25, tr("of its full speed, pedal or button all the way down; keys 9 and 0"));
+  share_slider(tr("burr at most"), v.burr_share, 0.25,
+               tr("of its full speed, pedal or button all the way down; keys 9 and 0"));
   ImGui::PopItemWidth();
   ImGui::Checkbox(tr("left-handed"), &v.left_handed);
   if (ImGui::IsItemHovered())

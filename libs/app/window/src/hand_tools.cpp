@@ -81,7 +81,8 @@ void HandTools::keep_planned(const std::string& name) {
     if (name.empty()) throw Error(ExitCode::usage, tr("a planned cut needs a name"));
     auto cuts = std::filesystem::exists(planned_file_) ? load_planned_cuts(planned_file_) : std::vector<PlannedCut>{};
     for (const PlannedCut& c : cuts) {
-      if (c.name == name) throw Error(ExitCode::usage, filled(tr("there is a planned cut '{name}' already"), {{"name", name}}));
+      if (c.name == name)
+        throw Error(ExitCode::usage, filled(tr("there is a planned cut '{name}' already"), {{"name", name}}));
     }
     cuts.push_back({name, cut_, within_mm_});
     write_file(planned_file_, planned_cuts_json(cuts));

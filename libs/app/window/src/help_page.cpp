@@ -6,8 +6,8 @@
 #include <cmath>
 #include <string>
 
-#include "osteo/core/base/translate.h"
 #include "keys.h"
+#include "osteo/core/base/translate.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -66,7 +66,10 @@ void HelpPage::draw(int width, int height, const std::function<void()>& steps) {
   std::vector<HelpRow> rows;
   for (const HelpLine& l : lines) {
     const bool heading = l.keys[0] == '\0';
-    rows.push_back({heading ? 1.9F * e : std::max(high(shown_keys(l).c_str(), keys_wide), high(shown_text(l).c_str(), text_wide)) + line, heading});
+    rows.push_back(
+        {heading ? 1.9F * e
+                 : std::max(high(shown_keys(l).c_str(), keys_wide), high(shown_text(l).c_str(), text_wide)) + line,
+         heading});
   }
   // Title, what turns the pages, and above the first page's keys what a new user does first.
   const float title = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemSpacing.y,

@@ -164,7 +164,8 @@ void MonitorPanel::draw_stimulator(MonitorController& controller) {
   const char* const look = now.search ? tr("looking ...") : tr("find threshold");
   beside(button_wide(look));
   const bool search = ImGui::Button(look);
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip(tr("twice, half and between, three pulses each, while the tip touches"));
+  if (ImGui::IsItemHovered())
+    ImGui::SetTooltip(tr("twice, half and between, three pulses each, while the tip touches"));
   if (controller.hands() > 1) {
     beside(box_wide(tr("second hand")));
     bool second = wanted_.hand == 1;
@@ -242,7 +243,8 @@ void MonitorPanel::draw(MonitorController& controller) {
   begin_fixed("monitor", box_, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
   if (controller.wiring().channels.empty()) {
     ImGui::TextWrapped(
-        "%s", tr("The case lists none of the nerves that the monitor knows: prepare it with --structures and --names."));
+        "%s",
+        tr("The case lists none of the nerves that the monitor knows: prepare it with --structures and --names."));
     ImGui::End();
     return;
   }

@@ -57,8 +57,8 @@ const NearnessLook& look_of(Nearness nearness) {
                                           {kThemes[2].quiet, tr_later("clear"), 0}},
                                 kUnknown[] = {
                                     {kThemes[0].quiet, "", 0}, {kThemes[1].quiet, "", 0}, {kThemes[2].quiet, "", 0}};
-  static constexpr NearnessLook kNear{palette::kYellow, tr_later("near"), 3}, kClose{palette::kOrange, tr_later("close"), 4},
-      kTouched{palette::kVermillion, tr_later("contact"), 8};
+  static constexpr NearnessLook kNear{palette::kYellow, tr_later("near"), 3},
+      kClose{palette::kOrange, tr_later("close"), 4}, kTouched{palette::kVermillion, tr_later("contact"), 8};
   switch (nearness) {
     case Nearness::near:
       return kNear;

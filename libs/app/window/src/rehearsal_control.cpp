@@ -241,10 +241,10 @@ static std::string brought_text(Brought what, bool put, double gap_mm) {
               tr("the saw was shut in; it was taken out and set down there"),
               tr("the plate was shut in; it was taken out and set down there"));
   if (gap_mm > 6)
-    return filled(of(tr("the drill gets no nearer than {mm} mm this way"),
-                     tr("the saw gets no nearer than {mm} mm this way"),
-                     tr("the plate gets no nearer than {mm} mm this way")),
-                  {{"mm", shown_number(gap_mm, 0)}});
+    return filled(
+        of(tr("the drill gets no nearer than {mm} mm this way"), tr("the saw gets no nearer than {mm} mm this way"),
+           tr("the plate gets no nearer than {mm} mm this way")),
+        {{"mm", shown_number(gap_mm, 0)}});
   return of(tr("drill brought to the bone"), tr("saw brought to the bone"), tr("plate brought to the bone"));
 }
 
@@ -285,7 +285,10 @@ void RehearsalControl::go_on_leading() {
     if (leading_->seen_mm) {
       const FreeWays::Found a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
       const double gap = length(a.end.at_mm - *leading_->seen_mm) - burr().diameter_mm / 2;
-      leading_->done = brought_text(plate_in_hand() ? Brought::plate : saw ? Brought::saw : Brought::drill, a.way.put, gap);
+      leading_->done = brought_text(plate_in_hand() ? Brought::plate
+                                    : saw           ? Brought::saw
+                                                    : Brought::drill,
+                                    a.way.put, gap);
       if (a.past_structures) leading_->done += tr(kPastStructures);
       go(Leading::Stage::on_the_way, a.way, a.end);
     } else {

@@ -144,8 +144,8 @@ void RehearsalWindow::plan_and_looks(const Rehearsal& rehearsal) {
   if (!actions_.notes_before) return;
   const Looks looks = looks_of(actions_.notes_before());
   if (looks.unreadable > 0)
-    control_.say(filled(tr("{n} notes of the session before could not be read"),
-                        {{"n", std::to_string(looks.unreadable)}}));
+    control_.say(
+        filled(tr("{n} notes of the session before could not be read"), {{"n", std::to_string(looks.unreadable)}}));
   if (structures_) {
     for (std::size_t s = 0; s < structures_->all().size(); ++s) {
       if (const auto look = looks.structures.find(structures_->all()[s].value); look != looks.structures.end())

@@ -70,7 +70,8 @@ void draw_findings(ReviewControl& control) {
   bool shown = control.shown();
   if (ImGui::Checkbox(tr("course of the session (Ctrl-T)"), &shown)) control.show(shown);
   for (const std::string& s : r.summary) ImGui::TextWrapped("%s", s.c_str());
-  ImGui::TextDisabled(r.findings.empty() ? tr("nothing was found") : tr("findings: a click looks there, another goes on"));
+  ImGui::TextDisabled(r.findings.empty() ? tr("nothing was found")
+                                         : tr("findings: a click looks there, another goes on"));
   for (std::size_t n = 0; n < r.findings.size(); ++n) {
     const ReviewFinding& f = r.findings[n];
     const WeightLook look = look_of(f.weight);
@@ -103,12 +104,12 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   begin_fixed("course", box, ImGuiWindowFlags_NoScrollbar);
   const ReviewCourse& course = control.review().course;
   const float e = em();
-  if (ImGui::Button(control.playing() ? tr("pause (Space)") : tr("play (Space)"), {8 * e, 0})) control.play(!control.playing());
+  if (ImGui::Button(control.playing() ? tr("pause (Space)") : tr("play (Space)"), {8 * e, 0}))
+    control.play(!control.playing());
   ImGui::SameLine();
-  ImGui::TextUnformatted(
-      filled(tr("{n} of {all}"),
-             {{"n", clock_text(control.now_s())}, {"all", clock_text(control.review().player->end_s())}})
-          .c_str());
+  ImGui::TextUnformatted(filled(tr("{n} of {all}"), {{"n", clock_text(control.now_s())},
+                                                     {"all", clock_text(control.review().player->end_s())}})
+                             .c_str());
   ImGui::SameLine();
   if (ImGui::SmallButton("-")) control.change_speed(-1);
   ImGui::SameLine();

@@ -262,9 +262,9 @@ void MainView::draw(const RoomScene& scene) {
   }
   if (asking_) {
     // As if it were a key, at the next frame: what the answer begins shows pictures of its own.
-    const int said =
-        draw_question(shell_.width(), shell_.height(), tr("Reset bone?"),
-                      tr("This session is saved and ends. A new one begins with the bone of the case."), tr("Reset bone"));
+    const int said = draw_question(shell_.width(), shell_.height(), tr("Reset bone?"),
+                                   tr("This session is saved and ends. A new one begins with the bone of the case."),
+                                   tr("Reset bone"));
     if (said != 0) pressed_.press(said > 0 ? Command::perform : Command::put_away);
   }
 }
@@ -313,18 +313,18 @@ void MainView::draw_panel(const RoomScene& scene) {
     draw_approval(scene.machine.approval, scene.machine.approval_ended);
     if (scene.machine.scan != nullptr) draw_scan(*scene.machine.scan);
     ImGui::TextWrapped("%s", filled(tr("hand: {device}"), {{"device", scene.machine.device}}).c_str());
-    ImGui::TextWrapped("%s",
-                       rehearsal.realtime()
-                           ? tr("real-time priority: yes")
-                           : tr("real-time priority: NOT GRANTED. The force may stutter: allow rtprio in limits.conf."));
+    ImGui::TextWrapped(
+        "%s", rehearsal.realtime()
+                  ? tr("real-time priority: yes")
+                  : tr("real-time priority: NOT GRANTED. The force may stutter: allow rtprio in limits.conf."));
     ImGui::TextUnformatted(filled(tr("servo {work} us a tick, late {late} us"),
                                   {{"work", shown_number(static_cast<double>(scene.tick.work_us), 0)},
                                    {"late", shown_number(static_cast<double>(scene.tick.lateness_us), 0)}})
                                .c_str());
-    ImGui::TextUnformatted(filled(tr("{drawn} of {all} M triangles"),
-                                  {{"drawn", shown_number(scene.machine.drawn_millions, 2)},
-                                   {"all", shown_number(scene.machine.triangles_millions, 2)}})
-                               .c_str());
+    ImGui::TextUnformatted(
+        filled(tr("{drawn} of {all} M triangles"), {{"drawn", shown_number(scene.machine.drawn_millions, 2)},
+                                                    {"all", shown_number(scene.machine.triangles_millions, 2)}})
+            .c_str());
     ImGui::TextWrapped("%s", scene.machine.pictures.c_str());
     ImGui::Checkbox(tr("first steps"), &person_.values.first_steps);
     ImGui::Checkbox(tr("remember cases"), &person_.values.remember_cases);
@@ -435,7 +435,8 @@ EndChoice MainView::draw_end(const EndFacts& facts, const std::function<void()>&
   const float e = em();
   fitted_text(ImGui::GetWindowDrawList(),
               {ImGui::GetCursorScreenPos().x, ImGui::GetCursorScreenPos().y, layout_.page.width - 2 * e, 1.6F * e},
-              1.6F * e, theme().text, facts.past ? tr("A session, looked at again") : tr("The session is over, and saved"));
+              1.6F * e, theme().text,
+              facts.past ? tr("A session, looked at again") : tr("The session is over, and saved"));
   ImGui::Dummy({0, 1.8F * e});
   EndChoice choice = EndChoice::none;
   const auto button = [&](const char* words, EndChoice of) {

@@ -147,25 +147,25 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& 
   };
   const bool drill = hand.tool == 0 && !hand.saw;
   const char* const no_second = tr("no second hand: start with --dust");
-  const Row rows[] = {
-      {"menu-2", tr("Menu and settings"), Command::panel_keys, false, menu},
-      {"drill", tr("Drill"), Command::put_away, drill, hand.latched, true, true},
-      {"saw", tr("Saw"), Command::saw, hand.tool == 1 || hand.saw},
-      {"plate", tr("Plate"), Command::plates, hand.tool == 3},
-      {"fragments", tr("Fragments"), Command::pieces, hand.tool == 2},
-      {"suction", tr("Suction"), Command::suck, false, hand.sucking, hand.second_hand, true, &latched.suction, no_second},
-      {"droplet", tr("Irrigation"), Command::wash, false, hand.washing, hand.second_hand, false, &latched.irrigation,
-       no_second},
-      {"arrow-bar-to-down", tr("Approach"), Command::bring, false, false, true, true},
-      {"arrow-bar-up", tr("Retract"), Command::lift},
-      {"arrow-back-up", tr("Undo"), Command::undo, false, false, hand.undo_steps > 0, false, nullptr,
-       tr("nothing to take back")},
-      {"versions", tr("Compare"), Command::before, false, hand.before, true, true},
-      {"ruler-measure", tr("Ruler"), Command::ruler, false, hand.ruler},
-      {"note", tr("Note"), Command::mark},
-      {"camera", tr("Picture"), Command::screenshot},
-      {"layout-grid", tr("Operate or plan"), Command::layout, false, false, true, true},
-      {"help", tr("Keys"), Command::help}};
+  const Row rows[] = {{"menu-2", tr("Menu and settings"), Command::panel_keys, false, menu},
+                      {"drill", tr("Drill"), Command::put_away, drill, hand.latched, true, true},
+                      {"saw", tr("Saw"), Command::saw, hand.tool == 1 || hand.saw},
+                      {"plate", tr("Plate"), Command::plates, hand.tool == 3},
+                      {"fragments", tr("Fragments"), Command::pieces, hand.tool == 2},
+                      {"suction", tr("Suction"), Command::suck, false, hand.sucking, hand.second_hand, true,
+                       &latched.suction, no_second},
+                      {"droplet", tr("Irrigation"), Command::wash, false, hand.washing, hand.second_hand, false,
+                       &latched.irrigation, no_second},
+                      {"arrow-bar-to-down", tr("Approach"), Command::bring, false, false, true, true},
+                      {"arrow-bar-up", tr("Retract"), Command::lift},
+                      {"arrow-back-up", tr("Undo"), Command::undo, false, false, hand.undo_steps > 0, false, nullptr,
+                       tr("nothing to take back")},
+                      {"versions", tr("Compare"), Command::before, false, hand.before, true, true},
+                      {"ruler-measure", tr("Ruler"), Command::ruler, false, hand.ruler},
+                      {"note", tr("Note"), Command::mark},
+                      {"camera", tr("Picture"), Command::screenshot},
+                      {"layout-grid", tr("Operate or plan"), Command::layout, false, false, true, true},
+                      {"help", tr("Keys"), Command::help}};
   // As far apart as there is room; smaller only where a screen is very low.
   const auto count = static_cast<float>(std::size(rows));
   const float inset = 8 * u, most = box.height - 2 * inset, line = 9 * u;

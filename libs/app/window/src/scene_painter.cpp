@@ -125,8 +125,9 @@ std::string ScenePainter::words() const {
   const auto name = [](Quality level) {
     return tr(std::string(EnumNames<Quality>::values[static_cast<std::size_t>(level)]));
   };
-  const std::string times = filled(tr("picture {moving} ms, at rest {resting} ms"),
-                                   {{"moving", shown_number(q.moving_ms(), 0)}, {"resting", shown_number(q.resting_ms(), 0)}});
+  const std::string times =
+      filled(tr("picture {moving} ms, at rest {resting} ms"),
+             {{"moving", shown_number(q.moving_ms(), 0)}, {"resting", shown_number(q.resting_ms(), 0)}});
   return times + "\n" +
          filled(q.wish() == Quality::automatic ? tr("quality (J): {wish}, now {level}") : tr("quality (J): {wish}"),
                 {{"wish", name(q.wish())}, {"level", name(q.level())}});

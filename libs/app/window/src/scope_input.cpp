@@ -176,11 +176,11 @@ void ScopeInput::advance(const Keyboard& keyboard, bool shift, const CameraDevic
 
 std::string scope_text(const ScopeView& view) {
   const bool eye = view.magnification < kNakedEye;
-  return filled(eye ? tr("eye {times}x  field {field} mm  at {distance} mm")
-                    : tr("{times}x  field {field} mm  WD {distance} mm"),
-                {{"times", shown_number(view.magnification, 1)},
-                 {"field", shown_number(view.field_mm(), eye ? 0 : 1)},
-                 {"distance", shown_number(view.working_distance_mm, 0)}});
+  return filled(
+      eye ? tr("eye {times}x  field {field} mm  at {distance} mm") : tr("{times}x  field {field} mm  WD {distance} mm"),
+      {{"times", shown_number(view.magnification, 1)},
+       {"field", shown_number(view.field_mm(), eye ? 0 : 1)},
+       {"distance", shown_number(view.working_distance_mm, 0)}});
 }
 
 }  // namespace osteo::inline app

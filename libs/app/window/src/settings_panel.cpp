@@ -84,10 +84,10 @@ void draw_tissue(const Rehearsal& rehearsal) {
       ImGui::TextUnformatted(
           filled(tr("{mm3} mm³ cut off, at rest"), {{"mm3", shown_number(body.cut_off_mm3, 1)}}).c_str());
     } else {
-      ImGui::TextUnformatted(filled(tr("{mm3} mm³ cut off, {share} % of real time"),
-                                    {{"mm3", shown_number(body.cut_off_mm3, 1)},
-                                     {"share", shown_number(100 * body.of_real_time, 0)}})
-                                 .c_str());
+      ImGui::TextUnformatted(
+          filled(tr("{mm3} mm³ cut off, {share} % of real time"),
+                 {{"mm3", shown_number(body.cut_off_mm3, 1)}, {"share", shown_number(100 * body.of_real_time, 0)}})
+              .c_str());
     }
   }
 }

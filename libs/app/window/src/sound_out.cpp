@@ -75,9 +75,9 @@ void SoundOut::set_alarms(bool alarms) {
 std::string SoundOut::status() const {
   if (!failure_.empty()) return failure_;
   if (!playing_) return on_ ? "" : tr("off");
-  return filled(on_ ? tr("through {driver}, {ms} ms at a time") : tr("off; {driver}, {ms} ms at a time"),
-                {{"driver", playing_->card.driver()},
-                 {"ms", std::to_string(std::lround(1000 * playing_->card.buffer_s()))}});
+  return filled(
+      on_ ? tr("through {driver}, {ms} ms at a time") : tr("off; {driver}, {ms} ms at a time"),
+      {{"driver", playing_->card.driver()}, {"ms", std::to_string(std::lround(1000 * playing_->card.buffer_s()))}});
 }
 
 }  // namespace osteo::inline app

@@ -34,7 +34,8 @@ FolderLook look_at_path(const fs::path& path) {
   std::error_code failed;
   const fs::file_status status = fs::status(path, failed);
   if (!fs::exists(status))
-    return {FolderKind::nothing, path, filled(tr("'{path}' is not there, or may not be read"), {{"path", path.string()}})};
+    return {FolderKind::nothing, path,
+            filled(tr("'{path}' is not there, or may not be read"), {{"path", path.string()}})};
   if (!fs::is_directory(status)) {
     const fs::path name = path.filename();
     if (name == "manifest.json" || name == "session.json" || name == "stream.oss")
@@ -109,8 +110,8 @@ void StartList::list() {
     below.resize(kMaxListed);
   }
   if (inside)
-    entries_.push_back({Group::browse, FolderKind::the_case, folder_,
-                        filled(tr("this case: {name}"), {{"name", name_of(folder_)}})});
+    entries_.push_back(
+        {Group::browse, FolderKind::the_case, folder_, filled(tr("this case: {name}"), {{"name", name_of(folder_)}})});
   for (const fs::path& b : below) {
     const FolderKind kind = look_at_path(b).kind;
     const char* const what = kind == FolderKind::the_case  ? tr("case: {name}")

@@ -33,10 +33,14 @@ void write_state(const StartList& list, std::uint64_t pictures, int em_pixels, c
   if (file.empty()) return;
   Json entries = Json::list();
   for (const StartEntry& e : list.entries()) entries.push_back(e.words);
-  const Json j{{"page", "start"},           {"pictures", pictures},
-               {"entries", entries},        {"selected", list.selected()},
-               {"message", list.message()}, {"tick", 0},
-               {"em_pixels", em_pixels},    {"folder", list.folder().string()},
+  const Json j{{"page", "start"},
+               {"pictures", pictures},
+               {"entries", entries},
+               {"selected", list.selected()},
+               {"message", list.message()},
+               {"tick", 0},
+               {"em_pixels", em_pixels},
+               {"folder", list.folder().string()},
                {"language", enum_names(Language{})[static_cast<std::size_t>(language())]}};
   const std::filesystem::path beside = file.string() + ".new";
   std::ofstream(beside) << j.dump() << '\n';
@@ -54,8 +58,8 @@ bool draw_entries(StartList& list, bool follow) {
     if (first || e.group != group) {
       if (!first) ImGui::Dummy({0, em() * 0.4F});
       const char* const groups[] = {tr("opened last"), tr("sessions"), tr("folders in {folder}")};
-      ImGui::TextDisabled(
-          "%s", filled(groups[static_cast<int>(e.group)], {{"folder", list.folder().string()}}).c_str());
+      ImGui::TextDisabled("%s",
+                          filled(groups[static_cast<int>(e.group)], {{"folder", list.folder().string()}}).c_str());
       group = e.group;
       first = false;
     }
@@ -121,8 +125,9 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
     fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, wide - 2 * e, 2.2F * e}, 2.2F * e, theme().text, "Osteotome");
     ImGui::Dummy({0, 2.4F * e});
     ImGui::TextWrapped(
-        "%s", tr("Choose a case: a folder made by 'osteo prepare', or drop one here. Up, Down and Enter; Backspace: the "
-                 "folder above; Q: close."));
+        "%s",
+        tr("Choose a case: a folder made by 'osteo prepare', or drop one here. Up, Down and Enter; Backspace: the "
+           "folder above; Q: close."));
     if (!list.message().empty()) {
       ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
       ImGui::TextWrapped("! %s", list.message().c_str());

@@ -11,10 +11,17 @@ namespace osteo::inline app {
 namespace {
 
 // What instrument_library() calls its instruments, without their sizes.
-[[maybe_unused]] constexpr const char* kKinds[] = {
-    tr_later("cutting"),  tr_later("cutting cylinder"), tr_later("cutting taper"), tr_later("diamond"),
-    tr_later("diamond cylinder"), tr_later("diamond taper"), tr_later("saw"), tr_later("sucker"),
-    tr_later("irrigator"), tr_later("probe"), tr_later("hook")};
+[[maybe_unused]] constexpr const char* kKinds[] = {tr_later("cutting"),
+                                                   tr_later("cutting cylinder"),
+                                                   tr_later("cutting taper"),
+                                                   tr_later("diamond"),
+                                                   tr_later("diamond cylinder"),
+                                                   tr_later("diamond taper"),
+                                                   tr_later("saw"),
+                                                   tr_later("sucker"),
+                                                   tr_later("irrigator"),
+                                                   tr_later("probe"),
+                                                   tr_later("hook")};
 
 template <class... A>
 std::string text_of(const char* format, A... a) {
@@ -99,7 +106,8 @@ StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const
   StateFacts f = state_of_tick(tick, rehearsal.structures(), rehearsal.rate_hz());
   if (warmth != nullptr) report_warmth(f, *warmth, tick, rehearsal.structures());
   f.removed = text_of("%.1f mm3", rehearsal.removed_mm3());
-  if (rehearsal.soft() != nullptr) f.removed = filled(tr("{bone}, tissue {tissue}"),
+  if (rehearsal.soft() != nullptr)
+    f.removed = filled(tr("{bone}, tissue {tissue}"),
                        {{"bone", f.removed}, {"tissue", shown_number(rehearsal.tissue_mm3(), 1)}});
   // A recording in trouble comes before everything: nothing of what follows would be kept.
   if (const std::string trouble = rehearsal.trouble(); !trouble.empty()) {

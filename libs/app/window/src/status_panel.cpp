@@ -9,12 +9,11 @@ namespace osteo::inline app {
 // The words of the import's verdict.
 void draw_scan(const VerdictSummary& scan) {
   if (scan.status.empty()) return;
-  const bool open =
-      ImGui::TreeNode("scan", "%s",
-                      filled(tr_n("Scan: {status} ({n} note)", "Scan: {status} ({n} notes)",
-                                  static_cast<double>(scan.findings.size())),
-                             {{"status", tr(scan.status)}, {"n", std::to_string(scan.findings.size())}})
-                          .c_str());
+  const bool open = ImGui::TreeNode(
+      "scan", "%s",
+      filled(tr_n("Scan: {status} ({n} note)", "Scan: {status} ({n} notes)", static_cast<double>(scan.findings.size())),
+             {{"status", tr(scan.status)}, {"n", std::to_string(scan.findings.size())}})
+          .c_str());
   if (!open) return;
   for (const Finding& f : scan.findings) {
     const ImVec4 colour = f.severity == Severity::info ? im_colour(theme().quiet) : im_colour(ink_of(palette::kYellow));

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "osteo/core/base/translate.h"
 #include "keys.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/core/base/translate.h"
 #include "keys.h"
+#include "osteo/core/base/translate.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -30,7 +30,7 @@ std::string who_cuts(const std::vector<std::string>& names, const std::vector<Ti
   std::string who;
   for (std::size_t h = 0; h < std::min(names.size(), hands.size()); ++h) {
     const TickRecord& t = hands[h];
-    if (t.speed_rpm > 0 && (t.immersed > 0 || t.voxels_changed > 0)) 
+    if (t.speed_rpm > 0 && (t.immersed > 0 || t.voxels_changed > 0))
       who = who.empty() ? names[h] : filled(tr("{one} and {other}"), {{"one", who}, {"other", names[h]}});
   }
   return who.empty() ? tr("nobody") : who;
@@ -45,9 +45,9 @@ std::optional<std::string> LinkWatch::look(const TutorNow& now) {
     if (before == heard_.end()) {
       if (l.heard) said = filled(tr("{who} has joined"), {{"who", l.who}});
     } else if (before->second != l.heard) {
-      said = filled(l.heard ? tr("the link to the {who} is back")
-                            : tr("the link to the {who} has dropped: your hand is let go"),
-                    {{"who", l.who}});
+      said = filled(
+          l.heard ? tr("the link to the {who} is back") : tr("the link to the {who} has dropped: your hand is let go"),
+          {{"who", l.who}});
     }
   }
   for (const auto& [who, was] : heard_) {
@@ -95,7 +95,7 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
   }
   if (hands.size() > 1) {
     ImGui::TextUnformatted(filled(tr("cuts: {who}"), {{"who", who_cuts(now.hands, hands)}}).c_str());
-    if (now.apart_mm >= 0) 
+    if (now.apart_mm >= 0)
       ImGui::TextUnformatted(filled(tr("apart {mm} mm"), {{"mm", shown_number(now.apart_mm, 1)}}).c_str());
   }
   if (now.leads) {

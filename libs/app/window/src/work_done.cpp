@@ -26,12 +26,11 @@ std::string cut_text(const std::string& by, double mm3) {
 }
 
 std::string injured_text(double seconds, double by_burr_mm3, double by_saw_mm3) {
-  const std::initializer_list<Place> places{{"time", shown_number(seconds, 2)},
-                                            {"mm3", text_of("%.2g", by_burr_mm3)},
-                                            {"sawn", text_of("%.2g", by_saw_mm3)}};
+  const std::initializer_list<Place> places{
+      {"time", shown_number(seconds, 2)}, {"mm3", text_of("%.2g", by_burr_mm3)}, {"sawn", text_of("%.2g", by_saw_mm3)}};
   if (by_burr_mm3 > 0 && by_saw_mm3 > 0)
-    return filled(tr("INJURED: touched by the rotating burr for {time} s, {mm3} mm³ of it, {sawn} mm³ of it by the saw"),
-                  places);
+    return filled(
+        tr("INJURED: touched by the rotating burr for {time} s, {mm3} mm³ of it, {sawn} mm³ of it by the saw"), places);
   if (by_burr_mm3 > 0) return filled(tr("INJURED: touched by the rotating burr for {time} s, {mm3} mm³ of it"), places);
   if (by_saw_mm3 > 0)
     return filled(tr("INJURED: touched by the rotating burr for {time} s, {sawn} mm³ of it by the saw"), places);
@@ -60,9 +59,9 @@ void SessionFacts::add_cut(const std::string& structure, const std::string& by, 
 
 std::string kept_text(const std::filesystem::path& folder) {
   std::error_code ec;
-  return std::filesystem::exists(folder, ec) ? filled(tr("What was recorded is kept: {folder}"), {{"folder", folder.string()}})
-                                             : filled(tr("Nothing of it is kept: {folder} was deleted or moved"),
-                                                      {{"folder", folder.string()}});
+  return std::filesystem::exists(folder, ec)
+             ? filled(tr("What was recorded is kept: {folder}"), {{"folder", folder.string()}})
+             : filled(tr("Nothing of it is kept: {folder} was deleted or moved"), {{"folder", folder.string()}});
 }
 
 EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
@@ -74,16 +73,19 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
   if (session.score) add(tr("score"), *session.score);
   add(tr("bone drilled away"), text_of("%.1f mm³", session.removed_mm3));
   for (const auto& [tool, done] : work.by_tool()) {
-    add("    " + tr_sized(instrument_of(tool).name), filled(tr("{mm3} mm³ in {time}"),
+    add("    " + tr_sized(instrument_of(tool).name),
+        filled(tr("{mm3} mm³ in {time}"),
                {{"mm3", shown_number(done.removed_mm3, 1)},
                 {"time", clock_text(static_cast<double>(done.ticks_turning) / session.rate_hz)}}));
   }
   if (work.undone() > 0) add(tr("taken back"), text_of("%zu", work.undone()));
-  if (work.cuts() > 0 || session.sawn_mm3 > 0) add(tr("saw cuts"), text_of("%zu, %.1f mm³", work.cuts(), session.sawn_mm3));
+  if (work.cuts() > 0 || session.sawn_mm3 > 0)
+    add(tr("saw cuts"), text_of("%zu, %.1f mm³", work.cuts(), session.sawn_mm3));
   if (session.tissue_mm3 > 0) add(tr("soft tissue cut off"), text_of("%.1f mm³", session.tissue_mm3));
   if (session.bodies > 1) add(tr("fragments of bone"), text_of("%zu", session.bodies));
   for (const std::string& p : session.plates) add(tr("plate"), p);
-  if (session.has_structures && session.structures.empty()) add(tr("critical structures"), tr("none came near"), Nearness::far);
+  if (session.has_structures && session.structures.empty())
+    add(tr("critical structures"), tr("none came near"), Nearness::far);
   for (const SessionFacts::Structure& s : session.structures) {
     double by_burr_mm3 = 0, by_hand_saw_mm3 = 0;  // by a tool that turns: said where its time is
     bool met = false;
@@ -98,7 +100,8 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
     if (s.injured_s > 0) {
       add(s.name, injured_text(s.injured_s, by_burr_mm3, by_hand_saw_mm3), Nearness::touched);
     } else if (s.touched_s > 0) {
-      add(s.name, filled(tr("touched for {time} s, drill off"), {{"time", shown_number(s.touched_s, 2)}}), Nearness::close);
+      add(s.name, filled(tr("touched for {time} s, drill off"), {{"time", shown_number(s.touched_s, 2)}}),
+          Nearness::close);
     } else if (!met) {
       add(s.name, filled(tr("never nearer than {mm} mm"), {{"mm", shown_number(s.least_clearance_mm, 1)}}),
           s.least_clearance_mm < StateFacts::kNearMm ? Nearness::near : Nearness::far);

@@ -180,17 +180,18 @@ std::string sources_of(const std::vector<StructureMeasure>& measures) {
   for (const StructureMeasure& m : measures) {
     const Plausibility p = plausibility_of(m);
     if (!p.known) continue;
-    const std::string text =
-        lower_case(m.structure.name).find("facial") != std::string::npos ? filled(tr("facial nerve: {source}"), {{"source", p.source}})
-                                                                              : p.source;
+    const std::string text = lower_case(m.structure.name).find("facial") != std::string::npos
+                                 ? filled(tr("facial nerve: {source}"), {{"source", p.source}})
+                                 : p.source;
     if (std::find(said.begin(), said.end(), text) == said.end()) said.push_back(text);
   }
   std::string all;
   for (const std::string& s : said) all += (all.empty() ? "" : "; ") + s;
-  return all.empty() ? all
-                     : filled(tr("Usual sizes: {sources}. Lengths are along the structure, up to 8 % long; distances to "
-                                 "half a voxel."),
-                              {{"sources", all}});
+  return all.empty()
+             ? all
+             : filled(tr("Usual sizes: {sources}. Lengths are along the structure, up to 8 % long; distances to "
+                         "half a voxel."),
+                      {{"sources", all}});
 }
 
 Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& asked_for,
@@ -199,9 +200,10 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
   Sheet s;
   s.title = tr("Case report");
   s.code = case_code(folder);
-  s.footer = filled(tr("Osteotome {version}. Not a medical device. The cuts are pictures of the patient: keep this page as "
-                       "you keep the scan."),
-                    {{"version", std::string(program_version())}});
+  s.footer =
+      filled(tr("Osteotome {version}. Not a medical device. The cuts are pictures of the patient: keep this page as "
+                "you keep the scan."),
+             {{"version", std::string(program_version())}});
   s.blocks.push_back({verdict_band(f)});
 
   Rows rows = scan_rows(f);
@@ -211,25 +213,27 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
 
   const bool scan = c.pictures.contains("soft-axial");
   const Vec3 p = cut_point(c.subject);
-  s.blocks.push_back(
-      {sheet::Heading{c.subject.measures.empty() ? std::string(tr("Cuts through the middle of the bone"))
-                                                 : filled(tr("Cuts through the {structure}"),
-                                                          {{"structure", c.subject.measures.front().structure.name}})}});
+  s.blocks.push_back({sheet::Heading{
+      c.subject.measures.empty()
+          ? std::string(tr("Cuts through the middle of the bone"))
+          : filled(tr("Cuts through the {structure}"), {{"structure", c.subject.measures.front().structure.name}})}});
   if (scan)
     add_row(s, c.pictures, 62,
             {{"soft-axial", tr("soft tissue (-160 to 240 HU); axial, seen from the feet")},
              {"soft-coronal", tr("coronal, seen from the front")},
              {"soft-sagittal", tr("sagittal, front to the left")}});
   add_row(s, c.pictures, 62,
-          {{"bone-axial", filled(scan ? tr("bone (-500 to 1500 HU); z {mm} mm") : tr("bone only: the scan was not at hand; z {mm} mm"),
+          {{"bone-axial", filled(scan ? tr("bone (-500 to 1500 HU); z {mm} mm")
+                                      : tr("bone only: the scan was not at hand; z {mm} mm"),
                                  {{"mm", number_text(p.z, 0)}})},
            {"bone-coronal", "y " + number_text(p.y, 0) + " mm"},
            {"bone-sagittal", "x " + number_text(p.x, 0) + " mm"}});
   s.blocks.push_back({sheet::Paragraph{
-      c.structures ? tr("Orange: where the bone of the case ends. Other colours: structures. L and R are the patient's. "
-                        "x, y, z grow to the patient's left, back and head.")
-                   : tr("Orange: where the bone of the case ends. L and R are the patient's. x, y, z grow to the "
-                        "patient's left, back and head."),
+      c.structures
+          ? tr("Orange: where the bone of the case ends. Other colours: structures. L and R are the patient's. "
+               "x, y, z grow to the patient's left, back and head.")
+          : tr("Orange: where the bone of the case ends. L and R are the patient's. x, y, z grow to the "
+               "patient's left, back and head."),
       Tone::quiet}});
   std::vector<std::pair<std::string, std::string>> slices;
   for (int n = 1; n <= 8; ++n)
@@ -294,9 +298,9 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
                   "Bone thinner than a voxel of the scan is too thin or missing here."),
                {{"share", number_text(c.thin_percent, c.thin_percent < 9.95 ? 1 : 0)}})}});
   small.push_back({resolution_table(f)});
-  small.push_back({sheet::Paragraph{
-      tr("Sizes are of adults, from textbooks. Two voxels across are the least by which a structure is seen everywhere."),
-      Tone::quiet}});
+  small.push_back({sheet::Paragraph{tr("Sizes are of adults, from textbooks. Two voxels across are the least by which "
+                                       "a structure is seen everywhere."),
+                                    Tone::quiet}});
   for (const auto& note : verdict_notes(f)) small.push_back({note});
   s.blocks.push_back({sheet::Columns{{thin, small}, {}}});
 
@@ -338,9 +342,10 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
     line.by = now.approval->by;
     line.date = shown_date(now.approval->date);
     line.note = now.approval->note;
-    line.state = now.state == ApprovalState::valid
-                     ? tr("Approved")
-                     : filled(tr("Approved before the last change ({changed}): no longer valid"), {{"changed", now.changed}});
+    line.state =
+        now.state == ApprovalState::valid
+            ? tr("Approved")
+            : filled(tr("Approved before the last change ({changed}): no longer valid"), {{"changed", now.changed}});
   } else {
     line.state = tr("Not approved: sign here, or osteo approve CASE --by NAME --note TEXT");
   }
@@ -444,7 +449,8 @@ CaseReport write_case_report(const fs::path& folder, const std::string& asked_fo
   if (!c.pictures.contains("soft-axial"))
     report.left_out.emplace_back(
         tr_later("soft tissue, histogram and what was taken off: these need the scan (osteo report CASE --scan SCAN)"));
-  if (!c.pictures.contains("side-front")) report.left_out.emplace_back(tr_later("the bone in 3D: the case holds no surface"));
+  if (!c.pictures.contains("side-front"))
+    report.left_out.emplace_back(tr_later("the bone in 3D: the case holds no surface"));
   Sheet s = sheet_of(folder, c, asked_for, report.left_out);
   s.marks["state"] = state;
   if (language() != Language::english)

@@ -270,7 +270,8 @@ Plausibility plausibility_of(const StructureMeasure& m) {
     if (u.to_mm3 > 0 && volume > u.to_mm3) add(p.doubt, tr_of("size of a structure", "large"));
     if (u.to_mm > 0 && m.length_mm > 0 && m.length_mm < u.from_mm) add(p.doubt, tr_of("size of a structure", "short"));
     if (u.to_mm > 0 && m.length_mm > u.to_mm) add(p.doubt, tr_of("size of a structure", "long"));
-    if (u.parts > 0 && m.parts > u.parts * sides) add(p.doubt, filled(tr("in {n} fragments"), {{"n", std::to_string(m.parts)}}));
+    if (u.parts > 0 && m.parts > u.parts * sides)
+      add(p.doubt, filled(tr("in {n} fragments"), {{"n", std::to_string(m.parts)}}));
     p.fits = p.doubt.empty();
     break;
   }

@@ -107,24 +107,26 @@ sheet::Band verdict_band(const CaseFacts& f) {
   constexpr double kMinHolderMm3 = 1000;
   if (const auto left = f.reported("threshold", "outside_body_left_mm3");
       status == "good" && left.value_or(0) >= kMinHolderMm3) {
-    return {tr("Look"),
-            filled(tr("{volume} outside the body are left in the bone, which may be table or head holder; 'osteo prepare "
-                      "--remove-table' takes them off."),
-                   {{"volume", volume_text(*left)}}),
-            Tone::caution};
+    return {
+        tr("Look"),
+        filled(tr("{volume} outside the body are left in the bone, which may be table or head holder; 'osteo prepare "
+                  "--remove-table' takes them off."),
+               {{"volume", volume_text(*left)}}),
+        Tone::caution};
   }
   if (status == "good" && text(f.verdict("source")) == "DICOM")
     return {tr("Good"), tr("Every slice was taken as the scanner stored it; nothing was guessed, moved or left out."),
             Tone::good};
   if (status == "good")
-    return {tr("Good"), tr("Values and places are as the file has them; what was done to the scan before is not known."),
+    return {tr("Good"),
+            tr("Values and places are as the file has them; what was done to the scan before is not known."),
             Tone::good};
   if (status == "repaired") {
     std::string said = first.empty() ? tr("Slices were resampled onto upright, even ones.") : first;
     if (warnings > 1)
-      said += " " + filled(tr_n("And {n} more note, below.", "And {n} more notes, below.",
-                                static_cast<double>(warnings - 1)),
-                           {{"n", std::to_string(warnings - 1)}});
+      said += " " +
+              filled(tr_n("And {n} more note, below.", "And {n} more notes, below.", static_cast<double>(warnings - 1)),
+                     {{"n", std::to_string(warnings - 1)}});
     // A warning alone mends nothing.
     const Json* const resampled = f.verdict("geometry", "resampled");
     const Json* const aside = f.verdict("set_aside");
@@ -178,34 +180,35 @@ Rows scan_rows(const CaseFacts& f) {
                  least = number(f.verdict("geometry", "gap_min_mm")),
                  most = number(f.verdict("geometry", "gap_max_mm"));
     const double thickness = number(f.verdict("series", "thickness_mm"));
-    add(tr("Slices"), filled(thickness > 0 ? tr("{n} of {columns} x {rows}, {mm} mm thick") : tr("{n} of {columns} x {rows}"),
-                             {{"n", number_text(number(f.verdict("geometry", "slices")), 0)},
-                              {"columns", number_text(number(f.verdict("geometry", "columns")), 0)},
-                              {"rows", number_text(number(f.verdict("geometry", "rows")), 0)},
-                              {"mm", number_text(thickness, 2)}}));
-    add(tr("Distance"), filled(most - least > 0.02 ? tr("{from} to {to} mm, mostly {usual}") : tr("{usual} mm, even"),
-                               {{"from", number_text(least, 2)},
-                                {"to", number_text(most, 2)},
-                                {"usual", number_text(usual, 2)}}));
+    add(tr("Slices"),
+        filled(thickness > 0 ? tr("{n} of {columns} x {rows}, {mm} mm thick") : tr("{n} of {columns} x {rows}"),
+               {{"n", number_text(number(f.verdict("geometry", "slices")), 0)},
+                {"columns", number_text(number(f.verdict("geometry", "columns")), 0)},
+                {"rows", number_text(number(f.verdict("geometry", "rows")), 0)},
+                {"mm", number_text(thickness, 2)}}));
+    add(tr("Distance"),
+        filled(most - least > 0.02 ? tr("{from} to {to} mm, mostly {usual}") : tr("{usual} mm, even"),
+               {{"from", number_text(least, 2)}, {"to", number_text(most, 2)}, {"usual", number_text(usual, 2)}}));
     const Json* const pixel = f.verdict("geometry", "pixel_mm");
     if (pixel != nullptr && pixel->items().size() == 2)
       add(tr("Pixel"), number_text(pixel->items()[0].number().value_or(0), 3) + " x " +
-                       number_text(pixel->items()[1].number().value_or(0), 3) + " mm");
+                           number_text(pixel->items()[1].number().value_or(0), 3) + " mm");
     const double tilt = number(f.verdict("geometry", "tilt_deg"));
-    if (std::abs(tilt) >= 0.05) add(tr("Gantry tilt"), filled(tr("{n} degrees"), {{"n", number_text(std::abs(tilt), 1)}}));
+    if (std::abs(tilt) >= 0.05)
+      add(tr("Gantry tilt"), filled(tr("{n} degrees"), {{"n", number_text(std::abs(tilt), 1)}}));
     const Json* const resampled = f.verdict("geometry", "resampled");
     const bool was = resampled != nullptr && resampled->flag() != nullptr && *resampled->flag();
     const double off = number(f.verdict("geometry", "position_error_mm"));
     add(tr("Resampling"), was ? tr("yes, onto upright even slices") : tr_of("resampling", "none"));
     add(tr("Placing"), off < 0.005 ? filled(tr("exact to {mm} mm"), {{"mm", number_text(0.01, 2)}})
-                                  : filled(tr("a pixel is at most {mm} mm off"), {{"mm", number_text(off, 2)}}));
+                                   : filled(tr("a pixel is at most {mm} mm off"), {{"mm", number_text(off, 2)}}));
   } else {
     add(tr("Scan"), tr("a volume file: of scanner, kernel and slices nothing is known"));
     const Json* const dims = f.verdict("output", "dims");
     if (dims != nullptr && dims->items().size() == 3)
       add(tr("Voxels"), number_text(dims->items()[0].number().value_or(0), 0) + " x " +
-                        number_text(dims->items()[1].number().value_or(0), 0) + " x " +
-                        number_text(dims->items()[2].number().value_or(0), 0));
+                            number_text(dims->items()[1].number().value_or(0), 0) + " x " +
+                            number_text(dims->items()[2].number().value_or(0), 0));
   }
   const Json* const made = f.verdict("geometry", "resampled");
   add(made != nullptr && made->flag() != nullptr && *made->flag() ? tr("Voxel, resampled") : tr("Voxel of the scan"),
@@ -213,8 +216,7 @@ Rows scan_rows(const CaseFacts& f) {
   if (const std::string axes = text(f.verdict("output", "axes")); !axes.empty()) add(tr("Axes"), axes_text(axes));
   if (const std::string given = f.param("import", "axes"); !given.empty())
     add(tr("Orientation"), filled(tr("given by hand as {axes}: the file does not know it"), {{"axes", given}}));
-  if (f.verdict("values") != nullptr)
-    add(tr("Values"), values_text(f));
+  if (f.verdict("values") != nullptr) add(tr("Values"), values_text(f));
   if (const std::string offset = f.param("import", "hu_offset"); !offset.empty() && offset != "0")
     add(tr("Offset"), filled(tr("{hu} HU were added by hand"), {{"hu", offset}}));
   return rows;
@@ -233,19 +235,20 @@ Rows bone_rows(const CaseFacts& f) {
     std::string name = region;
     std::replace(name.begin(), name.end(), '_', ' ');
     rows.emplace_back(tr("Region"), name == "whole" ? tr("the whole scan")
-                                  : name == "box" ? tr("a box, chosen by hand")
-                                                  : tr(name));
+                                    : name == "box" ? tr("a box, chosen by hand")
+                                                    : tr(name));
   }
   if (const auto lower = f.reported("threshold", "lower_hu")) {
-    rows.emplace_back(tr("Threshold"),
-                      filled(preset.empty() || preset == "fixed" ? tr("{hu} HU, given") : tr("{hu} HU, found for {preset} bone"),
-                             {{"hu", number_text(*lower, 0)}, {"preset", tr_preset(preset)}}));
+    rows.emplace_back(
+        tr("Threshold"),
+        filled(preset.empty() || preset == "fixed" ? tr("{hu} HU, given") : tr("{hu} HU, found for {preset} bone"),
+               {{"hu", number_text(*lower, 0)}, {"preset", tr_preset(preset)}}));
     if (const auto change = f.reported("threshold", "change_percent_per_50_hu"))
-      rows.emplace_back(
-          "", filled(tr("50 HU more or less change the volume by {share} %"),
-                     {{"share", number_text(*change, *change < 9.95 ? 1 : 0)}}));
+      rows.emplace_back("", filled(tr("50 HU more or less change the volume by {share} %"),
+                                   {{"share", number_text(*change, *change < 9.95 ? 1 : 0)}}));
     if (const auto sure = f.reported("threshold", "confidence"); sure && *sure < 0.7)
-      rows.emplace_back("", *sure < 0.4 ? tr("Poor: bone and tissue are hard to tell apart") : tr("Fair: look at the outline"));
+      rows.emplace_back(
+          "", *sure < 0.4 ? tr("Poor: bone and tissue are hard to tell apart") : tr("Fair: look at the outline"));
   }
   if (const auto volume = f.reported("resample", "volume_after_mm3")) {
     rows.emplace_back(tr("Bone"), volume_text(*volume));
@@ -257,16 +260,17 @@ Rows bone_rows(const CaseFacts& f) {
         spacing->items().size() == 3) {
       const double height = dims->items()[2].number().value_or(0) * spacing->items()[2].number().value_or(0);
       const double cm2 = height > 0 ? *volume / height / 100 : 0;
-      rows.emplace_back("", filled(cm2 > 45 ? tr("{cm2} cm2 in a slice on average; a head has up to 45: LOOK AT THE OUTLINE")
-                                       : tr("{cm2} cm2 in a slice on average; a head has up to 45"),
-                              {{"cm2", number_text(cm2, 1)}}));
+      rows.emplace_back(
+          "", filled(cm2 > 45 ? tr("{cm2} cm2 in a slice on average; a head has up to 45: LOOK AT THE OUTLINE")
+                              : tr("{cm2} cm2 in a slice on average; a head has up to 45"),
+                     {{"cm2", number_text(cm2, 1)}}));
     } else {
       rows.emplace_back("", tr("no usual range known for this region"));
     }
     if (const auto change = f.reported("resample", "volume_change_percent"))
-      rows.emplace_back(tr("Against the mask"),
-                        std::abs(*change) < 0.05 ? filled(tr("less than {share} % apart"), {{"share", number_text(0.1, 1)}})
-                                                 : number_text(*change, 1) + " %");
+      rows.emplace_back(tr("Against the mask"), std::abs(*change) < 0.05 ? filled(tr("less than {share} % apart"),
+                                                                                  {{"share", number_text(0.1, 1)}})
+                                                                         : number_text(*change, 1) + " %");
   }
   if (const Json* const spacing = at(f.manifest().find("frame"), "spacing_mm"))
     rows.emplace_back(tr("Voxel of the case"), edges_text(spacing));
@@ -279,8 +283,9 @@ Rows removed_rows(const CaseFacts& f) {
   if (!table.empty()) {
     rows.emplace_back(tr("Table, holder"), tr(table));
   } else if (const auto outside = f.reported("threshold", "outside_body_mm3")) {
-    rows.emplace_back(tr("Table, holder"), *outside > 0 ? filled(tr("{volume} taken off"), {{"volume", volume_text(*outside)}})
-                                                            : std::string(tr("none found")));
+    rows.emplace_back(tr("Table, holder"), *outside > 0
+                                               ? filled(tr("{volume} taken off"), {{"volume", volume_text(*outside)}})
+                                               : std::string(tr("none found")));
   } else {
     rows.emplace_back(tr("Table, holder"), tr("not looked for"));
   }
@@ -288,12 +293,11 @@ Rows removed_rows(const CaseFacts& f) {
   if (found && kept) {
     const double dropped = *found - *kept;
     const auto mm3 = f.reported("threshold", "small_pieces_mm3");
-    std::string said = filled(dropped <= 0 ? tr("none dropped")
-                              : mm3        ? tr("{n} of {all} dropped, {volume} together")
-                                           : tr("{n} of {all} dropped"),
-                              {{"n", number_text(dropped, 0)},
-                               {"all", number_text(*found, 0)},
-                               {"volume", volume_text(mm3.value_or(0))}});
+    std::string said = filled(
+        dropped <= 0 ? tr("none dropped")
+        : mm3        ? tr("{n} of {all} dropped, {volume} together")
+                     : tr("{n} of {all} dropped"),
+        {{"n", number_text(dropped, 0)}, {"all", number_text(*found, 0)}, {"volume", volume_text(mm3.value_or(0))}});
     const std::string least = f.param("threshold", "min_volume_mm3"), largest = f.param("threshold", "keep_largest");
     if (!least.empty()) said += "; " + filled(tr("each below {mm3} mm3"), {{"mm3", least}});
     if (!largest.empty() && largest != "0") said += ", " + filled(tr("or not among the {n} largest"), {{"n", largest}});
@@ -311,9 +315,8 @@ Rows removed_rows(const CaseFacts& f) {
     }
     rows.emplace_back(tr("Metal"), said);
     if (number(f.verdict("values", "saturated_mm3")) > 0)
-      rows.emplace_back(
-          "", filled(tr("{volume} lie at the scanner's highest value"),
-                     {{"volume", volume_text(number(f.verdict("values", "saturated_mm3")))}}));
+      rows.emplace_back("", filled(tr("{volume} lie at the scanner's highest value"),
+                                   {{"volume", volume_text(number(f.verdict("values", "saturated_mm3")))}}));
   }
   return rows;
 }
@@ -343,8 +346,9 @@ sheet::Table resolution_table(const CaseFacts& f) {
     const double least = mm / coarsest, most = mm / finest;
     const bool shown = least >= 2, partly = least >= 1;
     const std::string across =
-        most - least < 0.15 ? number_text(least, 1)
-                            : filled(tr("{from} to {to}"), {{"from", number_text(least, 1)}, {"to", number_text(most, 1)}});
+        most - least < 0.15
+            ? number_text(least, 1)
+            : filled(tr("{from} to {to}"), {{"from", number_text(least, 1)}, {"to", number_text(most, 1)}});
     t.rows.push_back({{tr(name), Tone::plain},
                       {number_text(mm, 1) + " mm", Tone::plain},
                       {across, Tone::plain},

@@ -140,13 +140,12 @@ class Finder {
                                   {{"bone", in(removed.value_or(0), "mm3")}, {"sawn", in(sawn.value_or(0), "mm3")}}));
     if (score_.procedure.empty() || score_.items.empty()) return;
     const std::size_t left = score_.items.size() - score_.judged();
-    out_.summary.push_back(
-        filled(score_.judged() == 0 ? tr("No item of the scale could be judged.")
-               : left > 0           ? tr("{n} of {all} items of the scale passed; {left} could not be judged.")
-                                    : tr("{n} of {all} items of the scale passed."),
-               {{"n", std::to_string(score_.passed())},
-                {"all", std::to_string(score_.judged())},
-                {"left", std::to_string(left)}}));
+    out_.summary.push_back(filled(score_.judged() == 0 ? tr("No item of the scale could be judged.")
+                                  : left > 0 ? tr("{n} of {all} items of the scale passed; {left} could not be judged.")
+                                             : tr("{n} of {all} items of the scale passed."),
+                                  {{"n", std::to_string(score_.passed())},
+                                   {"all", std::to_string(score_.judged())},
+                                   {"left", std::to_string(left)}}));
   }
 
   [[nodiscard]] double taken_by(CutBy by, const std::string& structure) const {
@@ -180,10 +179,9 @@ class Finder {
       return m.what == CutMetric::moment_of(by, true) && m.structure == name;
     });
     if (mm3 <= 0 && !contact) return false;
-    ScoreFinding& f = add(words.id, name, mm3 > 0 ? FindingSeverity::serious : FindingSeverity::caution,
-                          filled(mm3 > 0 ? words.through : words.touched,
-                                 {{"structure", name}, {"mm3", in(mm3, "mm3")}}),
-                          words.why);
+    ScoreFinding& f =
+        add(words.id, name, mm3 > 0 ? FindingSeverity::serious : FindingSeverity::caution,
+            filled(mm3 > 0 ? words.through : words.touched, {{"structure", name}, {"mm3", in(mm3, "mm3")}}), words.why);
     f.kind = mm3 > 0 ? "injury" : "touch";
     from(f, "cut_mm3", name, mm3, 0);
     moments(f, CutMetric::moment_of(by, mm3 <= 0), name);
@@ -193,9 +191,10 @@ class Finder {
   // What a burr and a saw reached so many times, and took of it or not.
   static const char* reached_text(double burr, double saw, bool took) {
     if (burr > 0 && saw > 0)
-      return took ? tr("A rotating burr reached the {structure} {times} and the running saw {sawn}, for {time} in all, "
-                       "and took {mm3} of it.")
-                  : tr("A rotating burr reached the {structure} {times} and the running saw {sawn}, for {time} in all.");
+      return took
+                 ? tr("A rotating burr reached the {structure} {times} and the running saw {sawn}, for {time} in all, "
+                      "and took {mm3} of it.")
+                 : tr("A rotating burr reached the {structure} {times} and the running saw {sawn}, for {time} in all.");
     if (saw > 0)
       return took ? tr("The running saw reached the {structure} {sawn}, for {time} in all, and took {mm3} of it.")
                   : tr("The running saw reached the {structure} {sawn}, for {time} in all.");
@@ -250,10 +249,10 @@ class Finder {
     for (const auto& [name, mm] : values("saw_clearance_mm")) {
       if (mm < by_saw.second) by_saw = {name, mm};
       if (mm >= limits_.near_miss_mm) continue;
-      ScoreFinding& f = add("saw-clearance", name, FindingSeverity::note,
-                            filled(tr("The saw's cut passed the {structure} at {mm}."),
-                                   {{"structure", name}, {"mm", in(mm, "mm")}}),
-                            below_text());
+      ScoreFinding& f =
+          add("saw-clearance", name, FindingSeverity::note,
+              filled(tr("The saw's cut passed the {structure} at {mm}."), {{"structure", name}, {"mm", in(mm, "mm")}}),
+              below_text());
       f.kind = "clearance";
       from(f, "saw_clearance_mm", name, mm, limits_.near_miss_mm);
     }
@@ -266,10 +265,10 @@ class Finder {
       from(f, "clearance_mm", name, c, limits_.near_miss_mm);
     }
     if (any && nearest.second > 0 && !cut) {
-      std::string text =
-          filled(nearest.second < 1e8 ? tr("No structure was touched; the burr came nearest to the {structure}, at {mm}.")
-                                      : tr("No structure was touched, and no burr came near one."),
-                 {{"structure", nearest.first}, {"mm", in(nearest.second, "mm")}});
+      std::string text = filled(nearest.second < 1e8
+                                    ? tr("No structure was touched; the burr came nearest to the {structure}, at {mm}.")
+                                    : tr("No structure was touched, and no burr came near one."),
+                                {{"structure", nearest.first}, {"mm", in(nearest.second, "mm")}});
       if (by_saw.second < 1e8)
         text += " " + filled(tr("The saw's cuts passed the {structure} at {mm}."),
                              {{"structure", by_saw.first}, {"mm", in(by_saw.second, "mm")}});
@@ -372,16 +371,17 @@ class Finder {
     const auto band = [&](MetricName metric, const char* kind, const char* text, const char* what) {
       for (const auto& [name, share] : values(metric)) {
         if (share <= limits_.above_band_share || to_be_opened(name)) continue;
-        ScoreFinding& f = add(kind, name, FindingSeverity::caution,
-                              filled(text, {{"share", percent(share)}, {"structure", name}}),
-                              tr("At the same distance; by chance it would be 10 %."));
+        ScoreFinding& f =
+            add(kind, name, FindingSeverity::caution, filled(text, {{"share", percent(share)}, {"structure", name}}),
+                tr("At the same distance; by chance it would be 10 %."));
         f.id = std::string(kind) + "-band-" + slug(name);
         from(f, metric, name, share, limits_.above_band_share);
         if (what[0] != 0) moments(f, what, name);
       }
     };
     band("force_above_band_share", "force",
-         tr("{share} of the drilling near the {structure} was pressed harder than nine in ten moments of the reference's "
+         tr("{share} of the drilling near the {structure} was pressed harder than nine in ten moments of the "
+            "reference's "
             "experts."),
          "pressed harder than experts do there");
     band("speed_above_band_share", "speed",
@@ -390,15 +390,15 @@ class Finder {
          "");
     if (const auto peak = value("force_peak_n")) {
       const auto p95 = value("force_p95_n"), middle = value("force_median_n");
-      ScoreFinding& f = add("force-peak", {}, FindingSeverity::note,
-                            filled(middle && p95 ? tr("The hardest press was {peak}; the middle of all was {middle}, and "
-                                                      "5 % were above {p95}.")
-                                   : middle      ? tr("The hardest press was {peak}; the middle of all was {middle}.")
-                                   : p95         ? tr("The hardest press was {peak}, and 5 % were above {p95}.")
-                                                 : tr("The hardest press was {peak}."),
-                                   {{"peak", in(*peak, "N")},
-                                    {"middle", in(middle.value_or(0), "N")},
-                                    {"p95", in(p95.value_or(0), "N")}}));
+      ScoreFinding& f = add(
+          "force-peak", {}, FindingSeverity::note,
+          filled(
+              middle && p95 ? tr("The hardest press was {peak}; the middle of all was {middle}, and "
+                                 "5 % were above {p95}.")
+              : middle      ? tr("The hardest press was {peak}; the middle of all was {middle}.")
+              : p95         ? tr("The hardest press was {peak}, and 5 % were above {p95}.")
+                            : tr("The hardest press was {peak}."),
+              {{"peak", in(*peak, "N")}, {"middle", in(middle.value_or(0), "N")}, {"p95", in(p95.value_or(0), "N")}}));
       f.kind = "force";
       from(f, "force_peak_n", {}, *peak, std::nullopt);
       moments(f, "hardest press", {});
@@ -445,8 +445,9 @@ class Finder {
     }
     if (const auto r = value("region_per_voxel")) {
       from(add("region-reference", {}, *r >= 0 ? FindingSeverity::good : FindingSeverity::note,
-               *r >= 0 ? tr("What was removed is more like what the reference's experts took than what its novices took.")
-                       : tr("What was removed is more like what the reference's novices took than what its experts took.")),
+               *r >= 0
+                   ? tr("What was removed is more like what the reference's experts took than what its novices took.")
+                   : tr("What was removed is more like what the reference's novices took than what its experts took.")),
            "region_per_voxel", {}, *r, 0);
       out_.list.back().kind = "region";
     }
@@ -501,21 +502,23 @@ class Finder {
       case ItemKind::fixed:
         break;
     }
-    return filled(tr_n("{value}, at least {threshold} is asked", "{value}, at least {threshold} are asked", r.threshold),
-                  {{"value", reported_number(r.value)}, {"threshold", reported_number(r.threshold)}});
+    return filled(
+        tr_n("{value}, at least {threshold} is asked", "{value}, at least {threshold} are asked", r.threshold),
+        {{"value", reported_number(r.value)}, {"threshold", reported_number(r.threshold)}});
   }
 
   void time() {
     const double duration = value("duration_s").value_or(0);
     if (const auto lost = value("lost_s"); lost && *lost > 0)
-      from(add("lost", {}, FindingSeverity::caution, filled(tr("{time} of the session were not recorded."), {{"time", reported_seconds(*lost)}}),
+      from(add("lost", {}, FindingSeverity::caution,
+               filled(tr("{time} of the session were not recorded."), {{"time", reported_seconds(*lost)}}),
                tr("What is said here is of the rest.")),
            "lost_s", {}, *lost, 0);
     if (procedure_ != nullptr && procedure_->usual_s > 0 && duration > procedure_->usual_s) {
-      ScoreFinding& f = add("time", {}, FindingSeverity::note,
-                            filled(tr("It took {time}; {usual} are usual for this procedure."),
-                                   {{"time", reported_seconds(duration)},
-                                    {"usual", reported_seconds(procedure_->usual_s)}}));
+      ScoreFinding& f =
+          add("time", {}, FindingSeverity::note,
+              filled(tr("It took {time}; {usual} are usual for this procedure."),
+                     {{"time", reported_seconds(duration)}, {"usual", reported_seconds(procedure_->usual_s)}}));
       from(f, "duration_s", {}, duration, procedure_->usual_s);
     }
     if (const auto idle = value("idle_s"); idle && duration > 0 && *idle > limits_.idle_share * duration)

@@ -119,8 +119,13 @@ void TimelineKeeper::near(const EvidenceFrame& f, const TickRecord& t, std::size
       if (now.event < line_.events.size()) line_.events[now.event].end_s = t_s;
     } else {
       const std::string name = scene_.structures->name_of(value);
-      now.event = add({turns ? EventKind::injury : EventKind::touch, t_s, t_s,
-                       {}, name, true, at,
+      now.event = add({turns ? EventKind::injury : EventKind::touch,
+                       t_s,
+                       t_s,
+                       {},
+                       name,
+                       true,
+                       at,
                        turns ? (saw ? tr_later("the running saw reached the {part}")
                                     : tr_later("a rotating burr reached the {part}"))
                              : (saw ? tr_later("the saw, at rest, touched the {part}")

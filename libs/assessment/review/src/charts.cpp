@@ -59,9 +59,8 @@ class TimelineChart {
  public:
   explicit TimelineChart(const Timeline& line) : line_(line) {
     d_.id = "timeline-still";
-    d_.alt =
-        filled(tr("Force, distance to the nearest structure, bone removed and speed over {time}"),
-               {{"time", reported_seconds(line.duration_s())}});
+    d_.alt = filled(tr("Force, distance to the nearest structure, bone removed and speed over {time}"),
+                    {{"time", reported_seconds(line.duration_s())}});
     d_.width = 720;
     w_ = d_.width - kLeft - kRight;
     duration_ = std::max(1.0, line.duration_s());
@@ -226,7 +225,8 @@ class TimelineChart {
       const double x = px(static_cast<double>(from) / Timeline::kRateHz),
                    x1 = px(static_cast<double>(n) / Timeline::kRateHz);
       d_.box(x, y_, std::max(0.5, x1 - x), 12, shade++ % 2 == 0 ? kBand : kRule);
-      const std::string name = line_.tool[from] == Timeline::kPlate ? tr("a plate") : tr_sized(instrument_of(line_.tool[from]).name);
+      const std::string name =
+          line_.tool[from] == Timeline::kPlate ? tr("a plate") : tr_sized(instrument_of(line_.tool[from]).name);
       if (x1 - x > 4.6 * static_cast<double>(name.size()) + 4) d_.text(x + 3, y_ + 9, name, 8.5, kInk);
       from = n;
     }
@@ -271,7 +271,8 @@ sheet::Drawing profile_chart(const ForceProfile& p, bool reference) {
                                  kTop + kH * (1 - std::clamp(n / most, 0.0, 1.0))};
   };
   d.text(0, 12, p.structure, 11, kInk, -1, true);
-  d.text(kLeft + kW, 12, filled(tr("{time} of drilling near it"), {{"time", reported_seconds(p.drilled_s)}}), 9, kQuiet, 1);
+  d.text(kLeft + kW, 12, filled(tr("{time} of drilling near it"), {{"time", reported_seconds(p.drilled_s)}}), 9, kQuiet,
+         1);
   for (double v = 0; v <= most * 1.0001; v += step) {
     d.line({at(0, v), at(kFar, v)}, kRule, 0.6);
     d.text(kLeft - 5, at(0, v)[1] + 3, shown_figures(format_number(std::round(v * 1000) / 1000)), 8.5, kQuiet, 1);
@@ -392,8 +393,8 @@ sheet::Drawing comparison_chart(const Comparison& c) {
   } else {
     alt += tr("not measured in this session");
   }
-  d.text(kTo + 18, kMid + 3.5, c.value ? reported_value(*c.row, *c.value) : tr("not measured"), 11, c.value ? kInk : kQuiet,
-         -1, c.value.has_value());
+  d.text(kTo + 18, kMid + 3.5, c.value ? reported_value(*c.row, *c.value) : tr("not measured"), 11,
+         c.value ? kInk : kQuiet, -1, c.value.has_value());
   d.text(720, kMid + 3, better, 8.5, kQuiet, 1);
   d.alt = alt;
   return d;

@@ -254,9 +254,10 @@ void findings(std::ostream& out, const Review& r) {
     for (std::size_t n = 0; n < std::min<std::size_t>(6, f.times_s.size()); ++n)
       out << "<button type=\"button\" data-t=\"" << format_number(f.times_s[n]) << "\">" << clock(f.times_s[n])
           << "</button>";
-    if (f.times_s.size() > 6) out << "<span class=\"small\">"
-          << filled(tr("and {n} more"), {{"n", std::to_string(f.times_s.size() - 6)}}) << "</span> ";
-    if (f.at_mm && !r.meshes.empty()) 
+    if (f.times_s.size() > 6)
+      out << "<span class=\"small\">" << filled(tr("and {n} more"), {{"n", std::to_string(f.times_s.size() - 6)}})
+          << "</span> ";
+    if (f.at_mm && !r.meshes.empty())
       out << "<button type=\"button\" data-f=\"" << e(f.id) << "\">" << tr("show in 3D") << "</button>";
     out << "</div></div>";
     if (p != nullptr) out << figure(*p, false);
@@ -286,8 +287,9 @@ void pictures(std::ostream& out, const Review& r) {
             " <span class=\"swatch\" style=\"background:var(--accent)\"></span>" +
             filled(tr("{mm3} mm³ unseen"), {{"mm3", reported_number(r.hidden_mm3)}});
   if (r.unknown_mm3 > 0)
-    text += " <span class=\"swatch\" style=\"background:#969696\"></span>" +
-            filled(tr("{mm3} mm³ before it was known from where one looked"), {{"mm3", reported_number(r.unknown_mm3)}});
+    text +=
+        " <span class=\"swatch\" style=\"background:#969696\"></span>" +
+        filled(tr("{mm3} mm³ before it was known from where one looked"), {{"mm3", reported_number(r.unknown_mm3)}});
   pair("seen-unseen", tr("What was removed, seen and unseen"), text + "</p>\n", "unseen", "unseen-side");
 }
 
@@ -315,15 +317,15 @@ void over_time(std::ostream& out, const Review& r) {
   }
   out << "<p class=\"small screen\">"
       << tr("Drag across it to look at a part of the session; arrow keys move, + and - zoom, Escape shows all again.")
-      << "</p>\n<p class=\"small\" id=\"readout\" aria-live=\"off\"></p>\n<div id=\"timeline\" tabindex=\"0\" data-alt=\""
+      << "</p>\n<p class=\"small\" id=\"readout\" aria-live=\"off\"></p>\n<div id=\"timeline\" tabindex=\"0\" "
+         "data-alt=\""
       << e(still.alt) << "\">" << svg_of(still)
       << "</div>\n<div class=\"bar\"><span class=\"small\" id=\"range\"></span><button type=\"button\" id=\"whole\" "
          "class=\"screen\">"
       << tr("whole session")
       << "</button></div>\n<p class=\"small\" id=\"event-count\"></p>\n<div class=\"scroll\"><table "
          "id=\"events\"><thead><tr><th>"
-      << tr("at") << "</th><th>" << tr("what happened") << "</th><th>" << tr("for")
-      << "</th></tr></thead><tbody>\n";
+      << tr("at") << "</th><th>" << tr("what happened") << "</th><th>" << tr("for") << "</th></tr></thead><tbody>\n";
   // Without a script the table is whole.
   for (const TimelineEvent& ev : r.timeline.events) {
     out << "<tr" << (ev.kind == EventKind::injury ? " class=\"bad\"" : "") << "><td class=\"n\">" << clock(ev.t_s)
@@ -345,7 +347,8 @@ void force(std::ostream& out, const Review& r) {
     return;
   }
   out << "<p class=\"small\">"
-      << tr("How hard the burr pressed on bone at each distance of its surface from a structure: orange, what nine in ten "
+      << tr("How hard the burr pressed on bone at each distance of its surface from a structure: orange, what nine in "
+            "ten "
             "moments stay below; dashed, half of them; dots, moments.")
       << " ";
   if (r.experts > 0) {
@@ -365,15 +368,13 @@ void force(std::ostream& out, const Review& r) {
 void comparison(std::ostream& out, const Review& r) {
   if (r.comparison.empty()) return;
   const auto swatch = [&](const char* style, const char* text, std::size_t n) {
-    out << "<span class=\"swatch\" style=\"" << style << "\"></span>"
-        << filled(text, {{"n", std::to_string(n)}});
+    out << "<span class=\"swatch\" style=\"" << style << "\"></span>" << filled(text, {{"n", std::to_string(n)}});
   };
   out << "<section id=\"comparison\"><h2>" << tr("Beside other sessions") << "</h2>\n<p class=\"legend\">";
   swatch("background:var(--accent);margin-left:0", tr("this session"), 1);
   if (r.earlier > 0) swatch("background:var(--ink)", tr("{n} earlier, the later the darker"), r.earlier);
   if (r.experts > 0) swatch("background:var(--band)", tr("band of {n} by experts"), r.experts);
-  if (r.novices > 0)
-    swatch("background:var(--quiet);width:.15rem;border-radius:0", tr("{n} by novices"), r.novices);
+  if (r.novices > 0) swatch("background:var(--quiet);width:.15rem;border-radius:0", tr("{n} by novices"), r.novices);
   out << "</p>\n<div class=\"chart\">\n";
   for (const Comparison& c : r.comparison) out << svg_of(review::comparison_chart(c));
   out << "</div></section>\n";
@@ -397,7 +398,8 @@ void tables(std::ostream& out, const Review& r) {
       out << "</td></tr>\n";
     }
     out << "</tbody></table>\n<p class=\"small\">"
-        << tr("Margin: distance from what is asked, in units of what good results differ by; negative where it does not "
+        << tr("Margin: distance from what is asked, in units of what good results differ by; negative where it does "
+              "not "
               "pass.")
         << "</p>\n";
     if (!r.score.steps.empty()) {
@@ -472,10 +474,10 @@ std::string review_html(const Review& r) {
   tables(out, r);
   out << "<footer class=\"small\">"
       << tr("Osteotome. Thresholds are starting values, fitted to no rated session; near means within 2 mm; what each "
-            "figure means and may not be used for: docs/how-to/review.md and docs/validation/evidence.md. A rehearsal is "
+            "figure means and may not be used for: docs/how-to/review.md and docs/validation/evidence.md. A rehearsal "
+            "is "
             "no proof of skill.")
-      << "</footer>\n<script type=\"application/json\" id=\"review-data\">"
-      << page_data(r) << "</script>\n<script>\n"
+      << "</footer>\n<script type=\"application/json\" id=\"review-data\">" << page_data(r) << "</script>\n<script>\n"
       << kReviewJs << "</script>\n</body></html>\n";
   return std::move(out).str();
 }

@@ -139,7 +139,8 @@ class Drawer {
           nothing ? tr_later("Before: nothing was drilled that would tell from where one worked")
                   : tr_later("Before: as one looked along the burr's mean shaft"),
           view(work_.centre_mm, radius, eye_, with_structures({before_})));
-    still("after", tr_later("After: from the same side"), view(work_.centre_mm, radius, eye_, with_structures({after_})));
+    still("after", tr_later("After: from the same side"),
+          view(work_.centre_mm, radius, eye_, with_structures({after_})));
     if (nothing) return;
     // Without the bone: from where one worked, and from the side, where undercutting shows.
     const Vec3 side = normalized(cross(std::abs(eye_.z) < 0.9 ? Vec3{0, 0, 1} : Vec3{0, -1, 0}, eye_));

@@ -134,7 +134,8 @@ std::vector<std::string> labels_of(const Opened& o, const HandWasLed& seen) {
     all.push_back(
         filled(tr("Guided: {how}. What was done then is not the hand's alone."),
                {{"how", o.folder.guided.empty() ? tr("forces that led the hand were on at times") : o.folder.guided}}));
-  if (!o.session.outline().end) all.emplace_back(tr("Cut short: the program was stopped before the session was closed."));
+  if (!o.session.outline().end)
+    all.emplace_back(tr("Cut short: the program was stopped before the session was closed."));
   return all;
 }
 

@@ -128,7 +128,8 @@ Sheet review_sheet(const Review& r) {
   const auto row = [&](const char* heading, std::initializer_list<const char*> ids, double height_mm) {
     sheet::Pictures pictures{{}, height_mm};
     for (const char* const id : ids) {
-      if (const ReviewPicture* const p = picture_with(r, id)) pictures.row.push_back({p->id, p->picture, review::shown_caption(*p)});
+      if (const ReviewPicture* const p = picture_with(r, id))
+        pictures.row.push_back({p->id, p->picture, review::shown_caption(*p)});
     }
     if (pictures.row.empty()) return;
     s.blocks.push_back({sheet::Heading{heading}});
@@ -170,12 +171,13 @@ Sheet review_sheet(const Review& r) {
   }
   if (!r.comparison.empty()) {
     s.blocks.push_back({sheet::Heading{tr("Beside other sessions")}});
-    s.blocks.push_back({sheet::Paragraph{filled(tr("Orange: this session. Diamonds: {earlier} earlier ones, the later the "
-                                                "darker. Band: {experts} of experts; ticks: {novices} of novices."),
-                                             {{"earlier", std::to_string(r.earlier)},
-                                              {"experts", std::to_string(r.experts)},
-                                              {"novices", std::to_string(r.novices)}}),
-                                         Tone::quiet}});
+    s.blocks.push_back(
+        {sheet::Paragraph{filled(tr("Orange: this session. Diamonds: {earlier} earlier ones, the later the "
+                                    "darker. Band: {experts} of experts; ticks: {novices} of novices."),
+                                 {{"earlier", std::to_string(r.earlier)},
+                                  {"experts", std::to_string(r.experts)},
+                                  {"novices", std::to_string(r.novices)}}),
+                          Tone::quiet}});
     for (const Comparison& c : r.comparison) s.blocks.push_back({review::comparison_chart(c)});
   }
   if (!shown.findings.not_measured.empty()) {
@@ -186,7 +188,8 @@ Sheet review_sheet(const Review& r) {
       s.blocks.push_back({sheet::Paragraph{why + ": " + names, Tone::quiet}});
     }
   }
-  for (const std::string& l : shown.left_out) s.blocks.push_back({sheet::Paragraph{filled(tr("Left out: {what}"), {{"what", l}}), Tone::quiet}});
+  for (const std::string& l : shown.left_out)
+    s.blocks.push_back({sheet::Paragraph{filled(tr("Left out: {what}"), {{"what", l}}), Tone::quiet}});
   return s;
 }
 

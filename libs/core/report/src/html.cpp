@@ -346,7 +346,8 @@ std::string svg_of(const sheet::Drawing& d) {
 std::string sheet_html(const Sheet& s) {
   const double scale = fitting_scale(s);
   std::ostringstream out;
-  out << "<!DOCTYPE html>\n<html lang=\"" << tr_of("the language of these texts, as HTML names it", "en") << "\"><head><meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+  out << "<!DOCTYPE html>\n<html lang=\"" << tr_of("the language of these texts, as HTML names it", "en")
+      << "\"><head><meta charset=\"utf-8\">\n<meta name=\"viewport\" "
          "content=\"width=device-width\">\n";
   for (const auto& [key, value] : s.marks)
     out << "<meta name=\"osteotome-" << escaped(key) << "\" content=\"" << escaped(value) << "\">\n";

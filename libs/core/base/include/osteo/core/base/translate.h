@@ -1,5 +1,6 @@
-// Texts of windows, reports and review pages in the language of who reads them, from gettext's catalogues. They are part
-// of the program, so that they are there wherever it runs; the process' locale stays C, so that files stay as they are.
+// Texts of windows, reports and review pages in the language of who reads them, from gettext's catalogues. They are
+// part of the program, so that they are there wherever it runs; the process' locale stays C, so that files stay as they
+// are.
 #pragma once
 #include <array>
 #include <initializer_list>
