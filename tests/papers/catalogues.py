@@ -33,6 +33,7 @@ tables = [
     ("libs/assessment/evidence/src/score.cpp", r'\? "(not judged)" : done \? "done" : "not done"', str),
     ("libs/assessment/evidence/src/score.cpp", r'\? "not judged" : done \? "(done)" : "not done"', str),
     ("libs/assessment/evidence/src/score.cpp", r'\? "not judged" : done \? "done" : "(not done)"', str),
+    ("libs/assessment/evidence/include/osteo/assessment/evidence/detail/metric_table.h", r'MetricWhen::\w+,\s*\w+,\s*((?:"[^"]*"\s*)+)\}', "joined"),
     ("libs/display/view/include/osteo/display/view/quality.h", r"names\(Quality\) \{\n  return \{(.*?)\}", "enum"),
 ]
 
@@ -52,6 +53,8 @@ def of_tables():
         if not found:
             yield file, None
         for text in found:
+            if kind == "joined":  # literals beside each other
+                text = "".join(re.findall(r'"([^"]+)"', text))
             for one in re.findall(r'"([^"]+)"', text) if kind == "enum" else [text]:
                 yield file, one.replace("_", " ") if kind == "enum" else one
 

@@ -422,7 +422,7 @@ void tables(std::ostream& out, const Review& r) {
       << "</th><th>" << tr("what it is") << "</th></tr></thead><tbody>\n";
   for (const Measured& m : r.score.values) {
     out << "<tr><td>" << m.row->name << "</td><td>" << e(m.of) << "</td><td class=\"n\">"
-        << (m.value ? e(reported_value(*m.row, *m.value)) : "&#8211;") << "</td><td>" << e(m.row->help)
+        << (m.value ? e(reported_value(*m.row, *m.value)) : "&#8211;") << "</td><td>" << e(tr(std::string(m.row->help)))
         << (m.value ? "" : e(filled(tr("; not measured: {why}"), {{"why", tr(m.word)}}))) << "</td></tr>\n";
   }
   out << "</tbody></table></details></section>\n";
