@@ -37,6 +37,13 @@ tables = [
     ("libs/display/view/include/osteo/display/view/quality.h", r"names\(Quality\) \{\n  return \{(.*?)\}", "enum"),
 ]
 
+# Names that structures have in our phantoms, procedures and finders; others are shown as the case has them.
+structures = (
+    "facial nerve,sigmoid sinus,external ear canal,air cells,dura,teeth,labyrinth,ossicles,chorda tympani,antrum,"
+    "alveolar nerve,mandibular nerve,mandibular canal,facial canal,transverse sinus,carotid artery,jugular bulb,"
+    "cochlea,malleus,incus,stapes,tegmen,inner ear,semicircular canals,tympanic cavity,bone,metal,soft tissue"
+).split(",")
+
 
 def run(*command):
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
@@ -47,6 +54,8 @@ def run(*command):
 
 def of_tables():
     """A source that marks the texts of the tables, by the file they are of."""
+    for name in structures:
+        yield __file__, name
     for file, pattern, kind in tables:
         path = root / file
         found = re.findall(pattern, path.read_text(), re.S) if path.exists() else []

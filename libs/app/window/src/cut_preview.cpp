@@ -38,7 +38,7 @@ void CutPreview::look(const World& world, const StructureMap* structures, const 
   text_ = nearest == near.end()
               ? tr("no structure within 5 mm")
               : filled(tr("nearest: the {structure}, {mm} mm"),
-                       {{"structure", structures->name_of(nearest->structure)},
+                       {{"structure", tr(structures->name_of(nearest->structure))},
                         {"mm", shown_figures(format_number(std::round(nearest->distance_mm * 10) / 10))}});
 }
 

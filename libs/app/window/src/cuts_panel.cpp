@@ -455,7 +455,7 @@ void CutsPanel::readout(const Rehearsal& rehearsal) {
       if (const auto near = map->at(*p); near.structure != 0) {
         below += (below.empty() ? "" : ";  ") +
                  filled(near.distance_mm < 0 ? tr("in {structure}") : tr("{structure}, {mm} mm away"),
-                        {{"structure", map->name_of(near.structure)}, {"mm", shown_number(near.distance_mm, 1)}});
+                        {{"structure", tr(map->name_of(near.structure))}, {"mm", shown_number(near.distance_mm, 1)}});
       }
     }
     ImGui::Text("%s", below.c_str());
@@ -495,7 +495,7 @@ void CutsPanel::list_structures(Rehearsal& rehearsal) {
   for (std::size_t s = 0; s < structures_->all().size(); ++s) {
     const std::uint8_t value = structures_->all()[s].value;
     const auto c = map.colour_of(value);
-    const std::string name = map.name_of(value), id = std::to_string(value);
+    const std::string name = tr(map.name_of(value)), id = std::to_string(value);
     ImGui::ColorButton(("##" + id).c_str(),
                        {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 1},
                        ImGuiColorEditFlags_NoTooltip, {ImGui::GetFontSize(), ImGui::GetFontSize()});

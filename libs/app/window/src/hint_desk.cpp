@@ -29,7 +29,7 @@ bool is_off(const std::string& off, const std::string& id) {
 // What is noted is the rule's own; what is shown is in the language.
 std::string shown_hint(const Hint& hint) {
   for (const HintRule& r : usual_hints()) {
-    if (r.id == hint.id) return filled(tr(r.words), {{"structure", hint.structure}});
+    if (r.id == hint.id) return filled(tr(r.words), {{"structure", tr(hint.structure)}});
   }
   return hint.words;
 }

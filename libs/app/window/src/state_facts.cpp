@@ -59,7 +59,7 @@ StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures,
     f.structure = filled(tr("none within {mm} mm"), {{"mm", shown_number(structures->reach_mm(), 0)}});
   } else {
     const auto mm = static_cast<double>(tick.clearance_mm);
-    f.structure = structures->name_of(static_cast<std::uint8_t>(tick.structure));
+    f.structure = tr(structures->name_of(static_cast<std::uint8_t>(tick.structure)));
     f.nearness = mm <= 0                     ? Nearness::touched
                  : mm < StateFacts::kCloseMm ? Nearness::close
                  : mm < StateFacts::kNearMm  ? Nearness::near
@@ -98,7 +98,7 @@ void report_warmth(StateFacts& f, const WarmthNow& warmth, const TickRecord& tic
                                       [](const auto& a, const auto& b) { return a.second < b.second; });
   if (worst == warmth.structures_c.end() || worst->second < 47) return;
   f.warning = filled(tr("{structure} is at {t} C: stop, and rinse"),
-                     {{"structure", structures->name_of(worst->first)}, {"t", shown_number(worst->second, 0)}});
+                     {{"structure", tr(structures->name_of(worst->first))}, {"t", shown_number(worst->second, 0)}});
   f.alarm = worst->second >= kCoagulatedC;
 }
 

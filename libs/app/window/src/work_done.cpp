@@ -95,15 +95,15 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
         continue;
       }
       met = true;
-      add(s.name, cut_text(by, mm3), mm3 <= 0 ? Nearness::close : Nearness::touched);
+      add(tr(s.name), cut_text(by, mm3), mm3 <= 0 ? Nearness::close : Nearness::touched);
     }
     if (s.injured_s > 0) {
-      add(s.name, injured_text(s.injured_s, by_burr_mm3, by_hand_saw_mm3), Nearness::touched);
+      add(tr(s.name), injured_text(s.injured_s, by_burr_mm3, by_hand_saw_mm3), Nearness::touched);
     } else if (s.touched_s > 0) {
-      add(s.name, filled(tr("touched for {time} s, drill off"), {{"time", shown_number(s.touched_s, 2)}}),
+      add(tr(s.name), filled(tr("touched for {time} s, drill off"), {{"time", shown_number(s.touched_s, 2)}}),
           Nearness::close);
     } else if (!met) {
-      add(s.name, filled(tr("never nearer than {mm} mm"), {{"mm", shown_number(s.least_clearance_mm, 1)}}),
+      add(tr(s.name), filled(tr("never nearer than {mm} mm"), {{"mm", shown_number(s.least_clearance_mm, 1)}}),
           s.least_clearance_mm < StateFacts::kNearMm ? Nearness::near : Nearness::far);
     }
   }

@@ -144,7 +144,7 @@ sheet::Table structure_table(const std::vector<StructureMeasure>& measures) {
   t.widths = {18, 12, 10, 11, 25, 30, 17};
   const auto name_of = [&](std::uint8_t value) {
     for (const auto& m : measures) {
-      if (m.structure.value == value) return m.structure.name;
+      if (m.structure.value == value) return tr(m.structure.name);
     }
     return std::string();
   };
@@ -159,7 +159,7 @@ sheet::Table structure_table(const std::vector<StructureMeasure>& measures) {
     if (m.specks > 0)
       pieces = filled(tr_n("{parts} and {n} speck", "{parts} and {n} specks", static_cast<double>(m.specks)),
                       {{"parts", pieces}, {"n", std::to_string(m.specks)}});
-    t.rows.push_back({{m.structure.name, Tone::plain},
+    t.rows.push_back({{tr(m.structure.name), Tone::plain},
                       {volume_text(m.volume_mm3), Tone::plain},
                       {pieces, Tone::plain},
                       {m.length_mm > 0 ? number_text(m.length_mm, 0) + " mm" : "", Tone::plain},
@@ -213,10 +213,10 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
 
   const bool scan = c.pictures.contains("soft-axial");
   const Vec3 p = cut_point(c.subject);
-  s.blocks.push_back({sheet::Heading{
-      c.subject.measures.empty()
-          ? std::string(tr("Cuts through the middle of the bone"))
-          : filled(tr("Cuts through the {structure}"), {{"structure", c.subject.measures.front().structure.name}})}});
+  s.blocks.push_back({sheet::Heading{c.subject.measures.empty()
+                                         ? std::string(tr("Cuts through the middle of the bone"))
+                                         : filled(tr("Cuts through the {structure}"),
+                                                  {{"structure", tr(c.subject.measures.front().structure.name)}})}});
   if (scan)
     add_row(s, c.pictures, 62,
             {{"soft-axial", tr("soft tissue (-160 to 240 HU); axial, seen from the feet")},

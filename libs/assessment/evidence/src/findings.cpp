@@ -179,9 +179,9 @@ class Finder {
       return m.what == CutMetric::moment_of(by, true) && m.structure == name;
     });
     if (mm3 <= 0 && !contact) return false;
-    ScoreFinding& f =
-        add(words.id, name, mm3 > 0 ? FindingSeverity::serious : FindingSeverity::caution,
-            filled(mm3 > 0 ? words.through : words.touched, {{"structure", name}, {"mm3", in(mm3, "mm3")}}), words.why);
+    ScoreFinding& f = add(
+        words.id, name, mm3 > 0 ? FindingSeverity::serious : FindingSeverity::caution,
+        filled(mm3 > 0 ? words.through : words.touched, {{"structure", tr(name)}, {"mm3", in(mm3, "mm3")}}), words.why);
     f.kind = mm3 > 0 ? "injury" : "touch";
     from(f, "cut_mm3", name, mm3, 0);
     moments(f, CutMetric::moment_of(by, mm3 <= 0), name);
@@ -221,7 +221,7 @@ class Finder {
         const double burr = count("reached by a rotating burr"), saw = count("reached by the running saw");
         const double taken = taken_by(CutBy::burr, name) + taken_by(CutBy::hand_saw, name);
         ScoreFinding& f = add("injury", name, FindingSeverity::serious,
-                              filled(reached_text(burr, saw, taken > 0), {{"structure", name},
+                              filled(reached_text(burr, saw, taken > 0), {{"structure", tr(name)},
                                                                           {"times", times(burr)},
                                                                           {"sawn", times(saw)},
                                                                           {"time", reported_seconds(injured)},
@@ -232,9 +232,10 @@ class Finder {
         moments(f, "reached by the running saw", name);
         std::sort(f.times_s.begin(), f.times_s.end());
       } else if (n > 0) {
-        ScoreFinding& f = add("touch", name, FindingSeverity::caution,
-                              filled(tr("The burr touched the {structure} {times}, for {time}, without turning."),
-                                     {{"structure", name}, {"times", times(n)}, {"time", reported_seconds(touched)}}));
+        ScoreFinding& f =
+            add("touch", name, FindingSeverity::caution,
+                filled(tr("The burr touched the {structure} {times}, for {time}, without turning."),
+                       {{"structure", tr(name)}, {"times", times(n)}, {"time", reported_seconds(touched)}}));
         from(f, "touches", name, n, 0);
         moments(f, "touched from the first tick on", name);
       }
@@ -249,29 +250,29 @@ class Finder {
     for (const auto& [name, mm] : values("saw_clearance_mm")) {
       if (mm < by_saw.second) by_saw = {name, mm};
       if (mm >= limits_.near_miss_mm) continue;
-      ScoreFinding& f =
-          add("saw-clearance", name, FindingSeverity::note,
-              filled(tr("The saw's cut passed the {structure} at {mm}."), {{"structure", name}, {"mm", in(mm, "mm")}}),
-              below_text());
+      ScoreFinding& f = add(
+          "saw-clearance", name, FindingSeverity::note,
+          filled(tr("The saw's cut passed the {structure} at {mm}."), {{"structure", tr(name)}, {"mm", in(mm, "mm")}}),
+          below_text());
       f.kind = "clearance";
       from(f, "saw_clearance_mm", name, mm, limits_.near_miss_mm);
     }
     for (const auto& [name, c] : values("clearance_mm")) {
       if (c <= 0 || c >= limits_.near_miss_mm || value("touches", name).value_or(0) > 0) continue;
-      ScoreFinding& f =
-          add("clearance", name, FindingSeverity::note,
-              filled(tr("The burr came within {mm} of the {structure}."), {{"structure", name}, {"mm", in(c, "mm")}}),
-              below_text());
+      ScoreFinding& f = add(
+          "clearance", name, FindingSeverity::note,
+          filled(tr("The burr came within {mm} of the {structure}."), {{"structure", tr(name)}, {"mm", in(c, "mm")}}),
+          below_text());
       from(f, "clearance_mm", name, c, limits_.near_miss_mm);
     }
     if (any && nearest.second > 0 && !cut) {
       std::string text = filled(nearest.second < 1e8
                                     ? tr("No structure was touched; the burr came nearest to the {structure}, at {mm}.")
                                     : tr("No structure was touched, and no burr came near one."),
-                                {{"structure", nearest.first}, {"mm", in(nearest.second, "mm")}});
+                                {{"structure", tr(nearest.first)}, {"mm", in(nearest.second, "mm")}});
       if (by_saw.second < 1e8)
         text += " " + filled(tr("The saw's cuts passed the {structure} at {mm}."),
-                             {{"structure", by_saw.first}, {"mm", in(by_saw.second, "mm")}});
+                             {{"structure", tr(by_saw.first)}, {"mm", in(by_saw.second, "mm")}});
       ScoreFinding& f = add("untouched", {}, FindingSeverity::good, text);
       f.kind = "touch";
       if (nearest.second < 1e8) from(f, "clearance_mm", nearest.first, nearest.second, std::nullopt);
@@ -286,7 +287,7 @@ class Finder {
   static std::string hidden_text(const std::string& mm3, const std::string& share,
                                  const std::vector<std::pair<std::string, double>>& near) {
     const auto part = [&](std::size_t n) { return n < near.size() ? in(near[n].second, "mm3") : std::string(); };
-    const auto name = [&](std::size_t n) { return n < near.size() ? near[n].first : std::string(); };
+    const auto name = [&](std::size_t n) { return n < near.size() ? tr(near[n].first) : std::string(); };
     const char* const text =
         near.empty()       ? tr("{mm3} of bone ({share}) was removed unseen.")
         : near.size() == 1 ? tr("{mm3} of bone ({share}) was removed unseen, {a} of it within {near} mm of the {one}.")
@@ -363,7 +364,7 @@ class Finder {
                                    "allows there: {most} was seen.")
                               : tr("Near the {structure} the burr pressed harder than the {limit} that the procedure "
                                    "allows there."),
-                     {{"structure", name}, {"limit", in(limit, "N")}, {"most", in(most, "N")}}),
+                     {{"structure", tr(name)}, {"limit", in(limit, "N")}, {"most", in(most, "N")}}),
               filled(tr("Impulse above the limit: {impulse}."), {{"impulse", in(ns, "N s")}}));
       from(f, "excess_force_ns", name, ns, 0);
       moments(f, "pressed too hard near it", name);
@@ -371,9 +372,9 @@ class Finder {
     const auto band = [&](MetricName metric, const char* kind, const char* text, const char* what) {
       for (const auto& [name, share] : values(metric)) {
         if (share <= limits_.above_band_share || to_be_opened(name)) continue;
-        ScoreFinding& f =
-            add(kind, name, FindingSeverity::caution, filled(text, {{"share", percent(share)}, {"structure", name}}),
-                tr("At the same distance; by chance it would be 10 %."));
+        ScoreFinding& f = add(kind, name, FindingSeverity::caution,
+                              filled(text, {{"share", percent(share)}, {"structure", tr(name)}}),
+                              tr("At the same distance; by chance it would be 10 %."));
         f.id = std::string(kind) + "-band-" + slug(name);
         from(f, metric, name, share, limits_.above_band_share);
         if (what[0] != 0) moments(f, what, name);
@@ -545,7 +546,7 @@ class Finder {
       if (m.value || (m.is("clearance_mm") && !m.of.empty())) continue;
       put(tr(m.word), m.of.empty() ? std::string(m.row->name)
                                    : filled(tr("{metric} of {structure}"),
-                                            {{"metric", std::string(m.row->name)}, {"structure", m.of}}));
+                                            {{"metric", std::string(m.row->name)}, {"structure", tr(m.of)}}));
     }
     for (const Product::Result& r : score_.items) {
       if (!r.measured) put(tr(r.word), filled(tr("item '{name}'"), {{"name", r.item->name}}));

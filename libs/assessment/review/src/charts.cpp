@@ -256,7 +256,7 @@ sheet::Drawing timeline_chart(const Review& r) {
 sheet::Drawing profile_chart(const ForceProfile& p, bool reference) {
   sheet::Drawing d;
   d.id = "profile";
-  d.alt = filled(tr("Force by distance to the {structure}"), {{"structure", p.structure}});
+  d.alt = filled(tr("Force by distance to the {structure}"), {{"structure", tr(p.structure)}});
   d.width = 340;
   d.height = 210;
   constexpr double kLeft = 34, kTop = 22, kW = 296, kH = 150, kFar = 8;
@@ -270,7 +270,7 @@ sheet::Drawing profile_chart(const ForceProfile& p, bool reference) {
     return std::array<double, 2>{kLeft + kW * std::clamp(mm, 0.0, kFar) / kFar,
                                  kTop + kH * (1 - std::clamp(n / most, 0.0, 1.0))};
   };
-  d.text(0, 12, p.structure, 11, kInk, -1, true);
+  d.text(0, 12, tr(p.structure), 11, kInk, -1, true);
   d.text(kLeft + kW, 12, filled(tr("{time} of drilling near it"), {{"time", reported_seconds(p.drilled_s)}}), 9, kQuiet,
          1);
   for (double v = 0; v <= most * 1.0001; v += step) {

@@ -135,8 +135,7 @@ Json mesh_json(const ReviewMesh& m, Vec3& lo_all, Vec3& hi_all) {
     lo_all[a] = std::min(lo_all[a], lo[a]);
     hi_all[a] = std::max(hi_all[a], hi[a]);
   }
-  const bool named = m.id.starts_with("structure-") || m.id.starts_with("opened-");
-  Json j{{"id", m.id}, {"name", named ? m.name : tr(m.name)}};
+  Json j{{"id", m.id}, {"name", tr(m.name)}};
   j["rgb"] = std::vector<int>{m.rgb[0], m.rgb[1], m.rgb[2]};
   j["lo"] = rounded(lo);
   j["size"] = Json::list();
@@ -184,6 +183,10 @@ Json shown_timeline(const Timeline& line) {
     events.push_back(std::move(shown));
   }
   j["events"] = std::move(events);
+  Json structures = Json::object();
+  for (const auto& [value, name] : j["structures"].members())
+    structures[value] = name.text() == nullptr ? std::string() : tr(*name.text());
+  j["structures"] = std::move(structures);
   Json instruments = Json::object();
   for (const auto& [value, name] : j["instruments"].members())
     instruments[value] = name.text() == nullptr ? std::string() : tr_sized(*name.text());
@@ -421,7 +424,7 @@ void tables(std::ostream& out, const Review& r) {
       << "</summary>\n<table><thead><tr><th>" << tr("figure") << "</th><th>" << tr("of") << "</th><th>" << tr("value")
       << "</th><th>" << tr("what it is") << "</th></tr></thead><tbody>\n";
   for (const Measured& m : r.score.values) {
-    out << "<tr><td>" << m.row->name << "</td><td>" << e(m.of) << "</td><td class=\"n\">"
+    out << "<tr><td>" << m.row->name << "</td><td>" << e(tr(m.of)) << "</td><td class=\"n\">"
         << (m.value ? e(reported_value(*m.row, *m.value)) : "&#8211;") << "</td><td>" << e(tr(std::string(m.row->help)))
         << (m.value ? "" : e(filled(tr("; not measured: {why}"), {{"why", tr(m.word)}}))) << "</td></tr>\n";
   }
