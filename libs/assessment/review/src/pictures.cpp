@@ -81,9 +81,14 @@ class Drawer {
     parts_.push_back({std::make_shared<const TriMesh>(std::move(mesh)), rgb, opacity, cut});
     return parts_.size() - 1;
   }
-  void still(std::string id, std::string caption, Still s) {
+  // With a caption of the catalogues.
+  void still(std::string id, const char* caption, Still s) {
+    still(std::move(id), caption, tr(caption), std::move(s));
+  }
+  void still(std::string id, std::string caption, std::string shown, Still s) {
     ids_.push_back(std::move(id));
     captions_.push_back(std::move(caption));
+    shown_.push_back(std::move(shown));
     stills_.push_back(std::move(s));
   }
 
