@@ -44,6 +44,12 @@ structures = (
     "cochlea,malleus,incus,stapes,tegmen,inner ear,semicircular canals,tympanic cavity,bone,metal,soft tissue"
 ).split(",")
 
+# What instrument_library() calls its instruments, without their sizes.
+instruments = (
+    "cutting,cutting cylinder,cutting taper,diamond,diamond cylinder,diamond taper,saw,hand saw,sucker,irrigator,probe,"
+    "hook,shaft,plate screws"
+).split(",")
+
 
 def run(*command):
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
@@ -54,7 +60,7 @@ def run(*command):
 
 def of_tables():
     """A source that marks the texts of the tables, by the file they are of."""
-    for name in structures:
+    for name in structures + instruments:
         yield __file__, name
     for file, pattern, kind in tables:
         path = root / file

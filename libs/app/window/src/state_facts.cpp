@@ -10,19 +10,6 @@
 namespace osteo::inline app {
 namespace {
 
-// What instrument_library() calls its instruments, without their sizes.
-[[maybe_unused]] constexpr const char* kKinds[] = {tr_later("cutting"),
-                                                   tr_later("cutting cylinder"),
-                                                   tr_later("cutting taper"),
-                                                   tr_later("diamond"),
-                                                   tr_later("diamond cylinder"),
-                                                   tr_later("diamond taper"),
-                                                   tr_later("saw"),
-                                                   tr_later("sucker"),
-                                                   tr_later("irrigator"),
-                                                   tr_later("probe"),
-                                                   tr_later("hook")};
-
 template <class... A>
 std::string text_of(const char* format, A... a) {
   char out[96];

@@ -13,7 +13,7 @@ std::string name_of(const Instrument& held, bool head) {
     case InstrumentKind::burr:
       return head ? tr("the drill") : tr("the drill's shaft");
     case InstrumentKind::sucker:
-      return tr("the sucker");
+      return tr("the suction tube");
     case InstrumentKind::irrigator:
       return tr("the irrigator");
     case InstrumentKind::probe:

@@ -167,7 +167,7 @@ sheet::Table structure_table(const std::vector<StructureMeasure>& measures) {
                       {p.known ? p.expected : tr("no usual size known"), p.known ? Tone::plain : Tone::quiet},
                       {!p.known ? ""
                        : p.fits ? tr("plausible")
-                                : filled(tr("look: {doubt}"), {{"doubt", p.doubt}}),
+                                : filled(tr("look: {why}"), {{"why", p.doubt}}),
                        !p.known ? Tone::plain
                        : p.fits ? Tone::good
                                 : Tone::caution}});
