@@ -128,7 +128,7 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   const float full_n = of_pixel(course.force_n, 0, course.size(), true) > 2 ? 8.0F : 2.0F;
   const Lane lanes[] = {{full_n > 2 ? tr("force, to 8 N") : tr("force, to 2 N"), at.y, lane, full_n},
                         {tr("near, from 5 mm"), at.y + lane, lane, 5},
-                        {tr("bone: seen, unseen"), at.y + 2 * lane, lane, 0}};
+                        {tr("seen, unseen"), at.y + 2 * lane, lane, 0}};
   for (const Lane& l : lanes) {
     draw->AddRectFilled({left, l.top + 1}, {left + wide, l.top + l.height - 1}, im_colour32(theme().raised));
     fitted_text(draw, {at.x, l.top, names - 0.5F * e, l.height}, 0.85F * e, theme().quiet, l.name);
