@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "osteo/core/base/json.h"
+#include "osteo/core/base/json_document.h"
 
 namespace osteo {
 namespace {
