@@ -19,10 +19,18 @@ languages = {
 tables = [
     ("pipelines/hints.json", r'"words": "([^"]*)"', str),
     ("pipelines/hints.json", r'"id": "([^"]*)"', str),
-    ("libs/simulation/bone/include/osteo/simulation/bone/posture.h", r"names\(Posture\) \{\n  return \{(.*?)\}", "enum"),
+    (
+        "libs/simulation/bone/include/osteo/simulation/bone/posture.h",
+        r"names\(Posture\) \{\n  return \{(.*?)\}",
+        "enum",
+    ),
     ("libs/simulation/bone/src/plates.cpp", r'StripPlan\{"[^"]*", "([^"]*)"', str),
     ("libs/simulation/bone/src/plates.cpp", r'\.about = "([^"]*)"', str),
-    ("libs/app/window/include/osteo/app/window/hand_buttons.h", r"names\(HandFunction\) \{\n  return \{(.*?)\}", "enum"),
+    (
+        "libs/app/window/include/osteo/app/window/hand_buttons.h",
+        r"names\(HandFunction\) \{\n  return \{(.*?)\}",
+        "enum",
+    ),
     ("libs/app/window/src/room_layout.h", r"names\(Layout\) \{\n  return \{(.*?)\}", "enum"),
     ("libs/assessment/evidence/src/score.cpp", r'words\.push_back\(\s*"([^"]*)"\)', str),
     ("libs/assessment/evidence/src/score.cpp", r'not_measured\(\s*"[^"]*", "([^"]*)"', str),
@@ -33,7 +41,11 @@ tables = [
     ("libs/assessment/evidence/src/score.cpp", r'\? "(not judged)" : done \? "done" : "not done"', str),
     ("libs/assessment/evidence/src/score.cpp", r'\? "not judged" : done \? "(done)" : "not done"', str),
     ("libs/assessment/evidence/src/score.cpp", r'\? "not judged" : done \? "done" : "(not done)"', str),
-    ("libs/assessment/evidence/include/osteo/assessment/evidence/detail/metric_table.h", r'MetricWhen::\w+,\s*\w+,\s*((?:"[^"]*"\s*)+)\}', "joined"),
+    (
+        "libs/assessment/evidence/include/osteo/assessment/evidence/detail/metric_table.h",
+        r'MetricWhen::\w+,\s*\w+,\s*((?:"[^"]*"\s*)+)\}',
+        "joined",
+    ),
     ("libs/display/view/include/osteo/display/view/quality.h", r"names\(Quality\) \{\n  return \{(.*?)\}", "enum"),
 ]
 
@@ -119,7 +131,9 @@ def make_pot(into):
     text = re.sub(r"^#, fuzzy\n", "", text, count=1, flags=re.M)
     text = text.replace("charset=CHARSET", "charset=UTF-8")
     text = re.sub(r"^# .*\n|^#\n", "", text, flags=re.M)
-    into.write_text("# Texts of Osteotome's windows, reports and review pages. Made by tests/papers/catalogues.py.\n" + text)
+    into.write_text(
+        "# Texts of Osteotome's windows, reports and review pages. Made by tests/papers/catalogues.py.\n" + text
+    )
 
 
 def unquoted(lines):
@@ -213,13 +227,27 @@ def check(language, plural, wanted):
 bad = []
 if "--missing" in sys.argv:
     have = entries(po / f"{sys.argv[-1]}.po") if (po / f"{sys.argv[-1]}.po").exists() else {}
-    lacks = [[c, i, p] for (c, i), (p, _, _) in entries(po / "osteotome.pot").items() if i and not all(have.get((c, i), (0, [""]))[1])]
+    lacks = [
+        [c, i, p]
+        for (c, i), (p, _, _) in entries(po / "osteotome.pot").items()
+        if i and not all(have.get((c, i), (0, [""]))[1])
+    ]
     print(json.dumps(lacks, ensure_ascii=False, indent=0))
     sys.exit(0)
 if "--update" in sys.argv:
     make_pot(po / "osteotome.pot")
     for language in languages:
-        run("msgmerge", "--no-fuzzy-matching", "--no-wrap", "--no-location", "-q", "-U", "--backup=off", po / f"{language}.po", po / "osteotome.pot")
+        run(
+            "msgmerge",
+            "--no-fuzzy-matching",
+            "--no-wrap",
+            "--no-location",
+            "-q",
+            "-U",
+            "--backup=off",
+            po / f"{language}.po",
+            po / "osteotome.pot",
+        )
         path = po / f"{language}.po"  # what is used nowhere any more goes
         path.write_text(re.sub(r"^#~.*\n", "", path.read_text(), flags=re.M).rstrip("\n") + "\n")
 else:
@@ -232,11 +260,15 @@ else:
     for language, plural in languages.items():
         check(language, plural, wanted)
     # What the review's script says is looked up by these.
-    for text in re.findall(r'\btx\((?:near < 0 \? )?"([^"]*)"', (root / "libs/assessment/review/page/review.js").read_text()):
+    for text in re.findall(
+        r'\btx\((?:near < 0 \? )?"([^"]*)"', (root / "libs/assessment/review/page/review.js").read_text()
+    ):
         if ("", text) not in wanted:
             bad.append(f"review.js says {text!r}, which kScriptTexts of libs/assessment/review/src/page.cpp lacks")
     font = root / "libs/app/window/fonts/NotoSansSC-Catalogue.otf"
-    lacking = {c for c in (po / "zh_CN.po").read_text() + "简体中文" if ord(c) > 0x2E80} - {chr(c) for c in letters_of(font)}
+    lacking = {c for c in (po / "zh_CN.po").read_text() + "简体中文" if ord(c) > 0x2E80} - {
+        chr(c) for c in letters_of(font)
+    }
     if lacking:
         bad.append(f"{font.name} lacks {''.join(sorted(lacking))}: libs/app/window/fonts/make_chinese.sh")
 for line in bad:

@@ -39,7 +39,14 @@ def languages():
             w.key("F1", "the help", lambda s: s["help"])
             picture(w, f"{language}-help")
             w.key("Escape", "away", lambda s: not s["help"])
-            for key, name in (("x", "saw"), ("Escape", None), ("p", "pieces"), ("Escape", None), ("l", "plate"), ("Escape", None)):
+            for key, name in (
+                ("x", "saw"),
+                ("Escape", None),
+                ("p", "pieces"),
+                ("Escape", None),
+                ("l", "plate"),
+                ("Escape", None),
+            ):
                 w.x("key", key)
                 if name:
                     picture(w, f"{language}-{name}")
