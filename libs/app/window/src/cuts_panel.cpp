@@ -446,7 +446,7 @@ void CutsPanel::readout(const Rehearsal& rehearsal) {
   ImGui::SetNextWindowSize({footer_.width, footer_.height});
   ImGui::Begin("Under the mouse", nullptr, kFixed);
   if (const auto p = control_.under_mouse()) {
-    std::string words = place_text(*p) + " mm";
+    std::string words = shown_figures(place_text(*p)) + " mm";
     if (const auto hu = ct_under_mouse_ ? ct_under_mouse_->at_world(*p) : std::nullopt)
       words += "   " + std::to_string(std::lround(*hu)) + " HU";
     ImGui::Text("%s", words.c_str());
@@ -460,7 +460,7 @@ void CutsPanel::readout(const Rehearsal& rehearsal) {
     }
     ImGui::Text("%s", below.c_str());
   } else {
-    ImGui::TextDisabled("%s mm", place_text(control_.cross_mm()).c_str());
+    ImGui::TextDisabled("%s mm", shown_figures(place_text(control_.cross_mm())).c_str());
   }
   ImGui::End();
 }

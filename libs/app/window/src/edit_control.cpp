@@ -259,7 +259,7 @@ void EditControl::double_click(SlicePointer at) {
 std::string EditControl::readout() const {
   if (!under_mouse_) return {};
   const Image& ct = document_.ct();
-  std::string text = place_text(*under_mouse_) + " mm";
+  std::string text = shown_figures(place_text(*under_mouse_)) + " mm";
   const auto here = hu_at(ct, *under_mouse_);
   if (!here) return text + "   " + tr("outside the scan");
   text += "   " + std::to_string(std::lround(*here)) + " HU";

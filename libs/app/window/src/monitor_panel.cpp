@@ -253,7 +253,7 @@ void MonitorPanel::draw(MonitorController& controller) {
     const std::vector<MonitorScreen::Line> lines = controller.screen().log();
     for (auto line = lines.rbegin(); line != lines.rend(); ++line) {
       if (line->alarm) ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kVermillion)));
-      ImGui::TextWrapped("%.2f s  %s", line->at_s, line->words.c_str());
+      ImGui::TextWrapped("%s s  %s", shown_number(line->at_s, 2).c_str(), line->words.c_str());
       if (line->alarm) ImGui::PopStyleColor();
     }
     ImGui::EndChild();
