@@ -55,6 +55,7 @@ def languages():
             w.key("Escape", "no", lambda s: not s["asking"])
             w.key("F2", "plan", lambda s: s["layout"] == "plan")
             picture(w, f"{language}-plan")
+            w.key("F2", "operate, which is kept", lambda s: s["layout"] == "operate")
             w.x("key", "q")
             s = w.until("the end", lambda s: s["ended"] and s["review_s"] > 0)
             picture(w, f"{language}-end")
