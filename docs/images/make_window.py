@@ -109,7 +109,7 @@ if "pieces" in wanted:
         for _ in range(60):
             if w.next()["force_n"] > 0.5:
                 break
-            w.x("click", 4)
+            w.deeper()
         w.key("Return", "fixed", lambda s: s["fixtures"] == 1)
         w.key("p", "pieces", lambda s: s["hand"] == "piece" and not s["leading"])
         shot(w, "plated", "window-pieces.png")

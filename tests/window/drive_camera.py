@@ -104,6 +104,10 @@ def camera():
         assert turned["focus_mm"] == before["focus_mm"] and dot(turned["view_back"], before["view_back"]) < 0.999
         shifted = w.drag(2, 30, 0)
         assert abs(apart(shifted["focus_mm"], turned["focus_mm"]) * turned["pixels_per_mm"] - 30) < 8, (turned, shifted)
+        w.x("click", 4)
+        w.until("the wheel", lambda s: s["magnification"] > 4.2)
+        w.x("click", 5)
+        w.until("and back", lambda s: s["magnification"] < 4.2)
         w.x("keydown", "ctrl")
         w.x("click", 4)
         w.until("Ctrl-wheel", lambda s: s["magnification"] > 4.2)

@@ -125,7 +125,7 @@ with Screen("1024x700") as screen:
     w.drag(w.place(0, 0.5, 0.5), w.place(0, 0.6, 0.5))
     s = w.until("window by drag", lambda t: t["window_hu"] > 4050)
     w.x("mousemove", *w.place(2, 0.5, 0.5))
-    w.double_click("enlarged", lambda t: t["enlarged"] == 2 and t["views"][2]["width"] > 700)
+    w.double_click("enlarged", lambda t: t["enlarged"] == 2 and t["views"][2]["width"] > 650)
     w.double_click("four again", lambda t: t["enlarged"] == -1)
     w.key("F1", "help", lambda t: t["help"])
     w.key("F1", "help away", lambda t: not t["help"])

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A new user's first five minutes in the window under Xvfb: what the list of first steps and F1 say is done, word for word, and each step
+"""A new user's first five minutes in the window under Xvfb: what the card of first steps says is done, word for word, and each step
 ticks itself off by what came of it, not by its key. Prints the table of docs/guides/surgeon.md.
 usage: drive_first_steps.py first_steps BIN_DIR WORK_DIR SOURCE_DIR"""
 
@@ -13,7 +13,7 @@ def first_steps():
     make_case()
     with Screen("1360x860"):
         table = []
-        w = Window(*SIZE, "--dust", "--no-sound", "-o", "first")
+        w = Window(*SIZE, "--dust", "--no-sound", "-o", "first", end_page=True)
 
         def step(name, actions):
             """Does what the list says of it, and waits until it is ticked off: none before."""
@@ -30,8 +30,7 @@ def first_steps():
         later = w.next(30)
         assert later["drawn"] == rested["drawn"] and later["tick"] > rested["tick"], (rested, later)
 
-        w.key("F1", "the help, at one look", lambda s: s["help"])
-        assert w.next()["help_pages"] == 1, w.state()
+        w.key("F1", "ten keys", lambda s: s["help"] and not s["typing"])
         w.key("Escape", "away", lambda s: not s["help"])
 
         def wheel(times, until):
@@ -48,7 +47,7 @@ def first_steps():
             wheel(60, lambda s: s["removed_mm3"] > 2)
             w.x("mouseup", 1)
             w.until("off", lambda s: not s["drill_on"])
-            return "point at the bone, F, hold the left button, wheel"
+            return "point at the bone, F, hold the left button, Shift-wheel"
 
         def undo():
             # A burr that still runs out in the bone that it is given back begins another stroke at once.
@@ -56,7 +55,20 @@ def first_steps():
             w.key("z", "taken back", lambda s: s["message"] == "taken back")
             return "Z"
 
+        def retract():
+            w.key("u", "out", lambda s: not s["leading"] and s["message"] == "drill lifted out")
+            return "U"
+
+        def tilt():
+            w.x("keydown", "alt")
+            w.drag(3, 60, 0)
+            w.x("keyup", "alt")
+            return "Alt-right drag"
+
         def suck():
+            w.x("mousemove", *BONE)
+            w.next()
+            w.key("f", "brings the drill", lambda s: not s["leading"] and s["message"] == "drill brought to the bone")
             # In the air it sucks nothing, and nothing is ticked off.
             w.x("keydown", "v")
             w.until("sucks", lambda s: s["sucking"])
@@ -68,12 +80,10 @@ def first_steps():
             return "V and the left button, wheel"
 
         def zoom():
-            w.x("keydown", "ctrl")
             for _ in range(4):
                 w.x("click", 4)
                 w.next()
-            w.x("keyup", "ctrl")
-            return "Ctrl-wheel"
+            return "wheel"
 
         def cut():
             s = w.key("x", "the saw, where one points", lambda s: s["hand"] == "saw" and "Enter cuts" in s["message"])
@@ -89,18 +99,42 @@ def first_steps():
             w.key("l", "a plate", lambda s: s["hand"] == "plate" and "Enter fixes it" in s["message"])
             w.x("mousemove", *BONE)
             w.next()
-            w.key("f", "brings it", lambda s: not s["leading"] and s["message"] == "plate brought to the bone")
-            wheel(20, lambda s: s["force_n"] > 0.5)
+            w.x("click", 1)
+            w.until("a click brings it", lambda s: s["message"] == "plate brought to the bone")
             w.x("key", "Return")
-            return "L, point, F, wheel, Enter"
+            return "L, click on bone, Enter"
+
+        def ruler():
+            w.key("F9", "ruler", lambda s: s["ruler"])
+            for x, y in ((700, 430), (760, 470)):
+                w.x("mousemove", x, y)
+                w.next()
+                w.x("click", 1)
+                w.next()
+            s = w.until("measured", lambda s: s["ruler_mm"] > 1)
+            return "F9, two clicks"
+
+        def picture():
+            w.x("key", "s")
+            return "S"
+
+        def end():
+            w.key("F9", "ruler away", lambda s: not s["ruler"])
+            w.x("key", "q")
+            return "Q"
 
         step("Drill", drill)
         step("Undo", undo)
+        step("Retract", retract)
+        step("Tilt", tilt)
         step("Suction", suck)
         step("Zoom", zoom)
         step("Cut", cut)
-        s = step("Plate", plate)
-        assert s["fixtures"] == 1 and s["next_step"] == "", s
+        assert step("Plate", plate)["fixtures"] == 1
+        step("Ruler", ruler)
+        step("Picture", picture)
+        s = step("End", end)
+        assert s["next_step"] == "" and s["ended"] and len(s["steps_done"]) == 11, s
         w.close()
         # In a scene without dust nobody is asked to suck; and what there is no thing for says so in words, in every layout.
         w = Window(*SIZE, "--no-sound", "-o", "second")
@@ -111,6 +145,8 @@ def first_steps():
         w.next()
         step("Drill", drill)
         step("Undo", undo)
+        step("Retract", retract)
+        step("Tilt", tilt)
         s = step("Zoom", zoom)
         assert s["next_step"] == "Cut" and "Suction" not in s["steps_done"], s
         w.close()

@@ -72,6 +72,15 @@ class Window(Program):
         self.x("mouseup", button)
         return self.next()
 
+    def deeper(self):
+        """A step of the wheel with Shift, which is down for whole pictures: modifiers are looked at once in each."""
+        self.x("keydown", "shift")
+        self.next()
+        self.x("click", 4)
+        self.next()
+        self.x("keyup", "shift")
+        return self.next()
+
     def close(self, code=0):
         self.x("key", "q")
         return self.end(code)
@@ -166,9 +175,27 @@ def keys():
         turned = w.drag(3, 60, 20)
         assert dot(turned["eye"], before["eye"]) < 0.99
         key("Home", "view from the left", lambda s: dot(s["eye"], before["eye"]) > 0.9999)
-        for name in ("F1", "h"):
-            key(name, "help", lambda s: s["help"])
-            key(name, "help away", lambda s: not s["help"])
+        key("F1", "the card of ten keys", lambda s: s["help"] and not s["typing"])
+        w.key("F1", "all commands", lambda s: s["typing"])
+        w.key("F1", "away", lambda s: not s["help"])
+        # A command by its old name; letters are the search's, whatever keys they are.
+        key("ctrl+k", "search", lambda s: s["typing"] and s["search"] == "")
+        w.x("type", "--delay", "100", "zap")
+        w.until("typed", lambda s: s["search"] == "zap" and s["found"] == "")
+        for _ in range(3):
+            w.x("key", "BackSpace")
+        w.x("type", "--delay", "100", "magnif")
+        w.until("found", lambda s: s["found"] == "Magnification: next step")
+        times = w.state()["magnification"]
+        w.key("Return", "done", lambda s: not s["typing"] and s["magnification"] > times)
+        key("Home", "view from the left", lambda s: dot(s["eye"], before["eye"]) > 0.9999)
+        key("ctrl+k", "search", lambda s: s["typing"])
+        w.key("Escape", "away", lambda s: not s["typing"])
+        # The focus goes round the window's parts, and Space presses what has it.
+        for part in ("strip", "card", "cuts", "state", "bone"):
+            key("Tab", f"focus: {part}", lambda s: s["focus"] == part)
+        w.key("shift+Tab", "the other way", lambda s: s["focus"] == "state")
+        w.key("Escape", "back to the bone", lambda s: s["focus"] == "bone")
         # The picture: as asked for; at rest in full size, and then not drawn again until something changes.
         for level in ("plain", "calm", "deep", "auto"):
             key("j", f"quality {level}", lambda s: s["quality"] == level and level in (s["level"], "auto"))
@@ -195,7 +222,7 @@ def keys():
         key("F11", "a window again", lambda s: not s["full_screen"])
         key("F10", "keys in the panel", lambda s: s["panel_keys"])
         w.key("Escape", "keys given back", lambda s: not s["panel_keys"])
-        key("Tab", "wheel", lambda s: s["wheel"])
+        key("ctrl+Tab", "wheel", lambda s: s["wheel"])
         w.key("Down", "still open", lambda s: s["wheel"])
         w.key("Down", "still open", lambda s: s["wheel"])
         w.key("Return", "the second of the wheel", lambda s: not s["wheel"] and s["tool"] == "diamond 5 mm")
@@ -254,14 +281,17 @@ def keys():
         wait("the drill is heard again", lambda: loudness("heard.raw", 0.05) > 0.003)
         w.x("mouseup", 1)
         assert w.until("drill off", lambda s: not s["drill_on"])["removed_mm3"] > 1
-        for name, state in (("v", "sucking"), ("i", "washing")):
-            w.x("keydown", name)
-            w.until(state, lambda s: s[state])
-            w.next(3)
-            assert w.state()[state]
-            w.x("keyup", name)
-            w.until(f"no longer {state}", lambda s: not s[state])
-            pressed.add(name)
+        w.x("keydown", "v")
+        w.until("sucks", lambda s: s["sucking"])
+        w.next(3)
+        assert w.state()["sucking"]
+        w.x("keyup", "v")
+        w.until("no longer", lambda s: not s["sucking"])
+        pressed.add("v")
+        key("i", "irrigation runs", lambda s: s["washing"])
+        w.next(3)
+        assert w.state()["washing"]
+        key("i", "and stops", lambda s: not s["washing"])
         key("u", "out", lambda s: not s["leading"] and s["message"] == "drill lifted out" and s["force_n"] == 0)
         out = w.state()
         assert dot([a - b for a, b in zip(out["at_mm"], out["centre_mm"])], out["eye"]) > 20, out
@@ -276,7 +306,7 @@ def keys():
         left = key("a", "saw turned", lambda s: apart(s["cut_along"], saw["cut_along"]) > 0.05)
         key("e", "saw turned back", lambda s: apart(s["cut_along"], saw["cut_along"]) < 1e-6 and s != left)
         key("Return", "cut", lambda s: s["undo_steps"] == before + 1)
-        key("z", "uncut", lambda s: s["undo_steps"] == before)
+        key("ctrl+z", "uncut", lambda s: s["undo_steps"] == before)
         key("KP_Enter", "cut again", lambda s: s["undo_steps"] == before + 1)
         key("Escape", "drill", lambda s: s["hand"] == "drill")
         key("p", "pieces", lambda s: s["hand"] == "piece")
@@ -290,11 +320,8 @@ def keys():
         key("e", "plate turned back", lambda s: apart(s["plate_x"], plate["plate_x"]) < 1e-6)
         w.x("mousemove", 440, 330)
         w.next()
-        key("f", "plate at the bone", lambda s: not s["leading"])
-        for _ in range(20):
-            w.x("click", 4)
-            if w.next()["force_n"] > 0.5:
-                break
+        w.x("click", 1)
+        w.until("a click brings it", lambda s: s["message"] == "plate brought to the bone")
         key("Return", "plate fixed", lambda s: s["fixtures"] == 1 and s["hand"] == "drill")
         key("z", "plate off", lambda s: s["fixtures"] == 0)
         key("r", "asks", lambda s: s["asking"])
@@ -326,7 +353,7 @@ def keys():
     table = re.findall(
         r"^    \{('.'|k\w+), Command::(\w+)(.*)\},$", (source / "libs/app/window/src/keys.cpp").read_text(), re.M
     )
-    with_ctrl = {k[1].lower() for k, command, rest in table if "kWithCtrl" in rest}
+    with_ctrl = {k[1].lower() if k[0] == "'" else k[1:] for k, command, rest in table if "kWithCtrl" in rest}
     assert {f"ctrl+{k}" for k in with_ctrl} == {k for k in pressed if k.startswith("ctrl+")}, (with_ctrl, pressed)
     pressed = {k for k in pressed if not k.startswith("ctrl+")}
     table = [k for k, command, rest in table if command not in CAMERA | HAND and "kWithCtrl" not in rest]
@@ -429,7 +456,7 @@ def hand():
             seen.append((s["message"], s["eye"], began, s["tick"]))
             assert s["force_n"] < 1 and not s["drill_on"], s
             # Pressed and drilled a little; the next F starts from there.
-            w.x("click", 4)
+            w.deeper()
             w.x("mousedown", 1)
             w.until("drills", lambda s: s["drill_on"])
             w.x("mouseup", 1)

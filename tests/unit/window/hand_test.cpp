@@ -359,7 +359,7 @@ TEST(ButtonAssign, SaysWhatAButtonNoLongerDoes) {
   // A key of the table.
   assign.listen(HandFunction::drill);
   const std::string said = assign.take('X', b);
-  EXPECT_EQ(said.find("key X: drill; no longer: saw"), 0U) << said;
+  EXPECT_EQ(said.find("key X: drill; no longer: Saw"), 0U) << said;
   // One that does the same by the table.
   assign.listen(HandFunction::clutch);
   EXPECT_EQ(assign.take('\'', b), "key apostrophe: clutch");

@@ -32,30 +32,17 @@ TEST(Keys, EachKeyHasOneMeaning) {
   EXPECT_EQ(find_key(263)->command, Command::earlier) << "Left, without Alt";
 }
 
-TEST(Keys, HelpTellsOfEachCommandOnceAndOfNoOther) {
-  std::multiset<Command> reported, bound;
-  for (const HelpLine& line : help_lines()) reported.insert(line.commands.begin(), line.commands.end());
-  for (const Key& k : key_table()) bound.insert(k.command);
-  for (const Command c : bound) EXPECT_EQ(reported.count(c), 1U) << static_cast<int>(c);
-  for (const Command c : reported) EXPECT_GE(bound.count(c), 1U) << static_cast<int>(c);
-}
-
-// Letters in a line of the help are the ones that do it.
-TEST(Keys, HelpNamesTheKeysThemselves) {
-  for (const HelpLine& line : help_lines()) {
-    const std::string keys = std::string(" ") + line.keys + ",";
-    for (const Key& k : key_table()) {
-      const bool letter = k.code >= 'A' && k.code <= 'Z';
-      const bool reported = std::find(line.commands.begin(), line.commands.end(), k.command) != line.commands.end();
-      const std::string name = std::string(k.with == kWithCtrl  ? "Ctrl-"
-                                           : k.with == kWithAlt ? "Alt-"
-                                                                : "") +
-                               static_cast<char>(k.code);
-      if (letter) {
-        EXPECT_EQ(keys.find(" " + name + ",") != std::string::npos, reported) << line.keys;
-      }
-    }
-  }
+// What other programs' users press.
+TEST(Keys, UndoSearchAndFocus) {
+  EXPECT_EQ(find_key('Z', kWithCtrl)->command, Command::undo);
+  EXPECT_EQ(find_key('Z')->command, Command::undo);
+  EXPECT_EQ(find_key('K', kWithCtrl)->command, Command::palette);
+  EXPECT_EQ(find_key('K')->command, Command::second_hand);
+  EXPECT_EQ(find_key(258)->command, Command::focus_next) << "Tab";
+  EXPECT_EQ(find_key(258, kWithShift)->command, Command::focus_next);
+  EXPECT_EQ(find_key(258, kWithCtrl)->command, Command::wheel);
+  EXPECT_EQ(find_key('I')->command, Command::irrigation);
+  EXPECT_EQ(find_key('H'), nullptr) << "no help by accident";
 }
 
 TEST(Keys, TheGuideTellsOfEachKey) {
@@ -77,11 +64,11 @@ TEST(Keys, TheGuideTellsOfEachKey) {
                              static_cast<char>(k.code);
     EXPECT_NE(keys.find(" " + name + ","), std::string::npos) << name;
   }
-  for (const char* name :
-       {" F5,",     " Enter,",      " Esc,",       " Home,",         " Space,", " Up,",  " Down,",       " F1,",
-        " 1 to 7,", " F2,",         " F9,",        " F10,",          " F11,",   " Tab,", " Alt-arrows,", " Page Up,",
-        " Insert,", " apostrophe,", " backslash,", " grave accent,", " -,",     " =,",   " 9,",          " 0,",
-        " Alt-H,",  " Ctrl-H,",     " Ctrl-T,",    " Left,",         " Right,"})
+  for (const char* name : {" F5,",         " Enter,",     " Esc,",          " Home,",       " Space,",   " Up,",
+                           " Down,",       " F1,",        " 1 to 7,",       " F2,",         " F9,",      " F10,",
+                           " F11,",        " Tab,",       " Ctrl-Tab,",     " Alt-arrows,", " Page Up,", " Insert,",
+                           " apostrophe,", " backslash,", " grave accent,", " -,",          " =,",       " 9,",
+                           " 0,",          " Alt-H,",     " Ctrl-H,",       " Ctrl-T,",     " Left,",    " Right,"})
     EXPECT_NE(keys.find(name), std::string::npos) << name << " in" << keys;
 }
 

@@ -109,6 +109,42 @@ TEST(ReviewControl, LooksAtAFindingsMomentsOneAfterAnother) {
   EXPECT_EQ(c.chosen(), -1);
 }
 
+// The page begins with at most three, and with none that is only to be known.
+TEST(ReviewControl, ThreeFindingsMatter) {
+  using Weight = ReviewFinding::Weight;
+  const auto of = [](std::initializer_list<Weight> weights) {
+    std::vector<ReviewFinding> all;
+    for (const Weight w : weights) all.emplace_back().weight = w;
+    return all;
+  };
+  EXPECT_EQ(shown_findings(of({Weight::serious, Weight::caution, Weight::note, Weight::good, Weight::good})),
+            (std::vector<std::size_t>{0, 1, 3}));
+  EXPECT_TRUE(serious(of({Weight::caution})));
+  EXPECT_TRUE(shown_findings(of({Weight::note})).empty());
+  EXPECT_FALSE(serious(of({Weight::note, Weight::good})));
+}
+
+TEST(ReviewControl, TheWorstIsLookedAtByItself) {
+  test::ScratchFolder scratch;
+  ReviewControl c;
+  c.begin([&](const Context&) {
+    SessionReview r = review_of_two_seconds(scratch / "s.oss");
+    r.findings[0].weight = ReviewFinding::Weight::serious;
+    return r;
+  });
+  wait_for(c);
+  const double end_s = c.now_s();
+  c.present();
+  EXPECT_EQ(c.chosen(), 0);
+  EXPECT_EQ(c.now_s(), end_s) << "the bone as it was left";
+  EXPECT_EQ(c.take_look(), (Vec3{1, 2, 3}));
+  EXPECT_EQ(c.take_places()->size(), 2U);
+  // Where nothing is serious, nothing is pointed at.
+  Ready r;
+  r.control.present();
+  EXPECT_EQ(r.control.chosen(), -1);
+}
+
 TEST(ReviewControl, WhatFailsIsSaidAndWhatIsNotWantedIsStopped) {
   ReviewControl c;
   EXPECT_EQ(c.poll(), ReviewControl::State::none);

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "help_page.h"
+#include "command_palette.h"
 #include "ui_kit.h"
 #include "ui_style.h"
 
@@ -84,6 +84,7 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
       const Memory memory(s.width, s.height, em_pixels);
       for (const Layout wanted : {Layout::operate, Layout::plan}) {
         const RoomLayout l = lay_out(wanted, s.width, s.height, static_cast<float>(em_pixels));
+        const Message told{Message::Rank::harm, longest().warning};
         HandFacts hand;
         hand.second_hand = true;
         Pressed pressed;
@@ -91,7 +92,7 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
         bool unfolded = true;
         ScreenBox card;
         frames([&] {
-          draw_state(l.state, l.view, longest(), "a message", pressed);
+          draw_state(l.state, l.view, longest(), told, pressed);
           draw_tray(l.tray, hand, true, latched, pressed);
           card = draw_burr_card(l.view, l.view.width, hand, unfolded, pressed);
         });
@@ -103,52 +104,82 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
         EXPECT_LE(card.right(), l.view.right());
         expect_nothing_outside("burr", card, false);
       }
-      // Pages over the picture: within the window.
-      HelpPage help;
-      help.show(true);
-      FirstSteps list;
-      StepFacts dusty;
-      dusty.dust = true;
-      list.see(dusty);
-      const auto six_steps = [&] { draw_first_steps(list); };
+      // What lies over the picture: within the window, and each command's name and keys whole.
+      const ScreenBox whole{0, 0, static_cast<float>(s.width), static_cast<float>(s.height)};
+      const RoomLayout l = lay_out(Layout::operate, s.width, s.height, static_cast<float>(em_pixels));
+      CommandPalette palette;
+      palette.help();
+      EXPECT_EQ(palette.shown(), CommandPalette::Shown::ten_keys);
       frames([&] {
-        help.draw(s.width, s.height, six_steps);
+        EXPECT_EQ(palette.draw(whole, l.view), nullptr);
         EXPECT_EQ(draw_question(s.width, s.height, "Reset bone?", "This session is saved and ends.", "Reset bone"), 0);
       });
-      const ScreenBox whole{0, 0, static_cast<float>(s.width), static_cast<float>(s.height)};
-      // The help is never scrolled: what one page cannot hold is on the next.
-      for (int page = 0; page < help.pages(); ++page) {
-        frames([&] { help.draw(s.width, s.height, six_steps); });
-        EXPECT_EQ(help.page(), page);
-        expect_nothing_outside("Mouse and keys", whole, false);
-        EXPECT_EQ(ImGui::FindWindowByName("Mouse and keys")->ScrollMax.y, 0);
-        help.turn(1);
-      }
       expect_nothing_outside("Reset bone?", whole, false);
-      if (s.width >= 1360 && by_hand <= 1) {
-        EXPECT_EQ(help.pages(), 1) << "all keys at one look";
-      } else if (by_hand <= 1) {
-        EXPECT_LE(help.pages(), 2);
+      EXPECT_EQ(palette.shown(), CommandPalette::Shown::ten_keys) << "there is room for it";
+      const ImGuiWindow* const ten = ImGui::FindWindowByName("ten keys");
+      ASSERT_NE(ten, nullptr);
+      const ScreenBox card{ten->Pos.x, ten->Pos.y, ten->Size.x, ten->Size.y};
+      EXPECT_TRUE(l.view.holds(card.x, card.y) && l.view.holds(card.right() - 1, card.bottom() - 1));
+      expect_nothing_outside("ten keys", card, false);
+      palette.help();
+      EXPECT_EQ(palette.shown(), CommandPalette::Shown::all);
+      frames([&] { EXPECT_EQ(palette.draw(whole, l.view), nullptr); });
+      const ImGuiWindow* const list = ImGui::FindWindowByName("commands");
+      ASSERT_NE(list, nullptr);
+      EXPECT_TRUE(whole.holds(list->Pos.x, list->Pos.y) &&
+                  whole.holds(list->Pos.x + list->Size.x - 1, list->Pos.y + list->Size.y - 1));
+      for (const CommandRow& row : command_rows()) {
+        const float room = list->Size.x - 56 * unit();
+        EXPECT_LE(ImGui::CalcTextSize(row.name.c_str()).x, room) << row.name;
+        EXPECT_LE(ImGui::CalcTextSize(row.keys.c_str()).x, room) << row.name;
       }
     }
   }
 }
 
-TEST(Help, RowsStayInTheirOrderAndHeadingsWithTheirs) {
-  const std::vector<HelpRow> rows = {{10, true}, {10}, {10}, {10, true}, {10}, {10, true}, {100}, {10}};
-  const auto columns = into_columns(rows, 0, 0, 40);
-  ASSERT_EQ(columns.size(), 4U);
-  EXPECT_EQ(columns[0].to, 3U) << "its fourth row would be a heading";
-  EXPECT_EQ(columns[1].from, 3U);
-  EXPECT_EQ(columns[1].to, 5U);
-  EXPECT_EQ(columns[2].to, 7U) << "a row that is too high still comes";
-  EXPECT_EQ(columns[3].to, 8U);
-  // The first page's columns may be lower than the others.
-  const auto lower = into_columns({{10}, {10}, {10}, {10}, {10}, {10}}, 2, 15, 40);
-  ASSERT_EQ(lower.size(), 3U);
-  EXPECT_EQ(lower[0].to, 1U);
-  EXPECT_EQ(lower[1].to, 2U);
-  EXPECT_TRUE(into_columns({}, 3, 10, 40).empty());
+// Typed, chosen and done by keys alone; each press counts, however few pictures there are.
+TEST(Palette, FindsByTypingAndDoesByEnter) {
+  const Memory memory(1280, 800, 16);
+  const ScreenBox whole{0, 0, 1280, 800}, view{56, 0, 1224, 736};
+  CommandPalette palette;
+  palette.show(CommandPalette::Shown::commands);
+  const auto picture = [&](const char* letters, const std::vector<int>& keys) {
+    for (const char* c = letters; *c != 0; ++c) ImGui::GetIO().AddInputCharacter(static_cast<unsigned>(*c));
+    for (const int k : keys) palette.key(k, 0);
+    ImGui::NewFrame();
+    const CommandRow* const done = palette.draw(whole, view);
+    ImGui::Render();
+    return done;
+  };
+  EXPECT_EQ(picture("wat", {}), nullptr);
+  EXPECT_EQ(palette.search().row()->command, Command::irrigation);
+  EXPECT_EQ(picture("", {259, 259, 259}), nullptr);  // Backspace
+  EXPECT_EQ(palette.search().text(), "");
+  const CommandRow* const done = picture("plate", {257});  // and Enter, in the same picture
+  ASSERT_NE(done, nullptr);
+  EXPECT_EQ(done->command, Command::plates);
+  EXPECT_FALSE(palette.typing());
+  palette.show(CommandPalette::Shown::all);
+  EXPECT_EQ(picture("", {264, 264, 265, 256}), nullptr);  // Down, Down, Up, Esc
+  EXPECT_FALSE(palette.typing());
+  // A click does it too.
+  palette.show(CommandPalette::Shown::commands);
+  picture("full screen", {});
+  const ImGuiWindow* const list = ImGui::FindWindowByName("commands");
+  ImGui::GetIO().MousePos = {list->Pos.x + 100, list->Pos.y + 56 + 20};
+  const CommandRow* clicked_row = nullptr;
+  for (const bool down : {false, true, false, false}) {
+    ImGui::GetIO().MouseDown[0] = down;
+    if (const CommandRow* const row = picture("", {})) clicked_row = row;
+  }
+  ASSERT_NE(clicked_row, nullptr);
+  EXPECT_EQ(clicked_row->command, Command::full_screen);
+}
+
+// The card is short because it can be read at a glance.
+TEST(Palette, TenKeys) {
+  EXPECT_EQ(ten_keys().size(), 10U);
+  for (const TenKeysRow& r : ten_keys()) EXPECT_FALSE(r.keys.empty()) << r.text;
 }
 
 // While drilling only letters and bars change: what is drawn where stays.
@@ -157,7 +188,7 @@ TEST(Panels, NothingJumpsWhileDrilling) {
   const RoomLayout l = lay_out(Layout::operate, 1280, 800, 16);
   Pressed pressed;
   const auto grounds = [&](const StateFacts& f) {
-    frames([&] { draw_state(l.state, l.view, f, "", pressed); });
+    frames([&] { draw_state(l.state, l.view, f, {}, pressed); });
     const ImGuiWindow* const w = ImGui::FindWindowByName("state");
     std::vector<ImVec2> fixed;  // of the bars
     for (const ImDrawVert& v : w->DrawList->VtxBuffer) {
@@ -192,7 +223,7 @@ TEST(Panels, TheBarOfTheNearestStructureFills) {
     StateFacts f = longest();
     f.nearness = nearness;
     f.near_share = share;
-    frames([&] { draw_state(l.state, l.view, f, "", pressed); });
+    frames([&] { draw_state(l.state, l.view, f, {}, pressed); });
     float least = 1e9F, most = 0;
     for (const ImDrawVert& v : ImGui::FindWindowByName("state")->DrawList->VtxBuffer) {
       if (v.col != im_colour32(look_of(nearness).colour) || v.pos.y < l.state.y + 38) continue;
@@ -236,9 +267,9 @@ TEST(Panels, AButtonGivesTheCommandOfItsKey) {
   Latched latched;
   const float middle = l.tray.x + l.tray.width / 2;
   auto seen = clicked(l.tray, middle, [&](Pressed& p) { draw_tray(l.tray, hand, false, latched, p); });
-  for (const Command c : {Command::help, Command::panel_keys, Command::bring, Command::lift, Command::saw,
-                          Command::plates, Command::pieces, Command::undo, Command::before, Command::ruler,
-                          Command::mark, Command::screenshot, Command::layout}) {
+  for (const Command c : {Command::help, Command::palette, Command::panel_keys, Command::bring, Command::lift,
+                          Command::saw, Command::plates, Command::pieces, Command::undo, Command::before,
+                          Command::ruler, Command::mark, Command::screenshot, Command::layout}) {
     EXPECT_TRUE(has(seen, c)) << key_name(c);
     EXPECT_FALSE(key_name(c).empty());
   }
@@ -253,7 +284,7 @@ TEST(Panels, AButtonGivesTheCommandOfItsKey) {
   EXPECT_FALSE(has(seen, Command::suck));
   EXPECT_FALSE(has(seen, Command::undo)) << "nothing to take back";
   // What ends the session is in the state; sizes and kinds on the burr's card.
-  seen = clicked(l.state, l.state.right() - 40, [&](Pressed& p) { draw_state(l.state, l.view, longest(), "", p); });
+  seen = clicked(l.state, l.state.right() - 40, [&](Pressed& p) { draw_state(l.state, l.view, longest(), {}, p); });
   EXPECT_TRUE(has(seen, Command::quit));
   bool unfolded = false;
   ScreenBox card;
@@ -285,7 +316,8 @@ TEST(Kit, WhatIsTooLongLosesItsMiddle) {
   frames([] {
     const std::string name = "superior semicircular canal of the labyrinth, left side";
     EXPECT_EQ(shortened(name, 1000, 16), name);
-    const std::string cut = shortened(name, 200, 16);
+    const float size = ImGui::GetFontSize();
+    const std::string cut = shortened(name, 200, size);
     EXPECT_TRUE(cut.starts_with("super") && cut.ends_with("side")) << cut;
     EXPECT_LE(ImGui::CalcTextSize(cut.c_str()).x, 200);
     const std::string greek = shortened("\u03b1\u03b2\u03b3\u03b4\u03b5\u03b6\u03b7\u03b8", 60, 16);  // whole letters
@@ -326,12 +358,46 @@ TEST(Kit, ComponentsHaveTheirSizes) {
     EXPECT_EQ(ImGui::GetItemRectSize().y, 36);
     static_cast<void>(kit_switch("Irrigation", on));
     EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
+    double mm = 3;
+    EXPECT_FALSE(kit_slider("Kerf", "3.0 mm", mm, 0, 10, 0.5));
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 48);
     static const std::string kTwo[] = {"One", "Two"};
     EXPECT_EQ(choice("c", kTwo, 0), -1);
     EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
     ImGui::End();
   });
   EXPECT_FALSE(on);
+}
+
+// A click on the track goes there by whole steps; name and value never lie on the track.
+TEST(Kit, ASliderGoesWhereItIsPressed) {
+  const Memory memory(800, 600, 16);
+  double mm = 0;
+  ImVec2 lo, hi;
+  const auto picture = [&] {
+    ImGui::NewFrame();
+    begin_fixed("kit", {0, 0, 400, 200});
+    const bool changed = kit_slider("Length", "75 mm", mm, 0, 150, 10);
+    lo = ImGui::GetItemRectMin();
+    hi = ImGui::GetItemRectMax();
+    ImGui::End();
+    ImGui::Render();
+    return changed;
+  };
+  EXPECT_FALSE(picture());
+  const float y = hi.y - 14, from = lo.x + 8, wide = hi.x - lo.x - 16;
+  ImGui::GetIO().MousePos = {from + 0.51F * wide, y};
+  EXPECT_FALSE(picture());
+  ImGui::GetIO().MouseDown[0] = true;
+  EXPECT_TRUE(picture());
+  EXPECT_EQ(mm, 80) << "0.51 of 150, by tens";
+  ImGui::GetIO().MousePos = {hi.x + 300, y};
+  EXPECT_TRUE(picture());
+  EXPECT_EQ(mm, 150);
+  ImGui::GetIO().MousePos = {0, y};
+  EXPECT_TRUE(picture());
+  EXPECT_EQ(mm, 0);
+  EXPECT_LT(lo.y + ImGui::GetFontSize(), y - 8) << "words above the knob";
 }
 
 }  // namespace

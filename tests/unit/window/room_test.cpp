@@ -113,7 +113,9 @@ TEST(RoomLayout, AllLayoutsFitTheSizesTheyAreFor) {
       EXPECT_EQ(l.over[c].width, l.over[c].height);
       EXPECT_LE(l.over[c].right(), l.view.right());
       EXPECT_LE(l.over[c].bottom(), l.view.bottom());
-      if (c > 0) EXPECT_GE(l.over[c].y, l.over[c - 1].bottom());
+      if (c > 0) {
+        EXPECT_GE(l.over[c].y, l.over[c - 1].bottom());
+      }
     }
     // As the person dragged them, within limits.
     EXPECT_GT(lay_out(Layout::operate, s.width, s.height, em, l.over[0].width + 16).over[0].width, l.over[0].width);
@@ -319,22 +321,37 @@ TEST(FirstSteps, AreTickedOffByWhatCameOfThem) {
   now.undone = true;
   list.see(now);
   now.undone = false;
-  now.sucked_mm3 = 0.01;  // a sucker that was held in the air
+  now.tilted_rad = 0.05;
   list.see(now);
   EXPECT_EQ(list.next(), 2);
+  now.retracted = true;
+  list.see(now);
+  EXPECT_EQ(list.next(), 3) << "hardly tilted";
+  now.tilted_rad = 0.2;
+  now.sucked_mm3 = 0.01;  // a sucker that was held in the air
+  list.see(now);
+  EXPECT_EQ(list.next(), 4);
   now.sucked_mm3 = 0.3;
   now.magnification = 3;
   list.see(now);
-  EXPECT_EQ(list.next(), 4);
+  EXPECT_EQ(list.next(), 6);
   now.sawn_mm3 = 3;
   list.see(now);
   list.renew();  // another session: what was done stays done, what was there counts for nothing
   now.fixtures = 1;
   list.see(now);
-  EXPECT_EQ(list.next(), 5);
+  EXPECT_EQ(list.next(), 7);
   now.fixtures = 2;
   list.see(now);
+  EXPECT_EQ(list.next(), 8);
+  now.measured_mm = 4;
+  now.pictured = true;
+  list.see(now);
+  EXPECT_EQ(list.next(), 10);
+  now.ended = true;
+  list.see(now);
   EXPECT_EQ(list.next(), -1);
+  ASSERT_EQ(list.steps().size(), 11U);
 }
 
 TEST(FirstSteps, WithoutDustNothingIsAskedOfTheSucker) {
@@ -342,10 +359,11 @@ TEST(FirstSteps, WithoutDustNothingIsAskedOfTheSucker) {
   StepFacts now;
   now.magnification = 2;
   list.see(now);
-  EXPECT_EQ(list.steps()[2].name(), "Suction");
-  EXPECT_FALSE(list.steps()[2].possible);
+  EXPECT_EQ(list.steps()[4].name(), "Suction");
+  EXPECT_FALSE(list.steps()[4].possible);
   now.removed_mm3 = 1;
-  now.undone = true;
+  now.undone = now.retracted = true;
+  now.tilted_rad = 1;
   list.see(now);
   EXPECT_EQ(list.steps()[static_cast<std::size_t>(list.next())].name(), "Zoom") << "it is passed over";
 }
@@ -378,17 +396,6 @@ TEST(StateFacts, TellHowWarmItIs) {
   EXPECT_EQ(none.warmth, "");
   report_warmth(none, {50, {}}, {}, nullptr);
   EXPECT_EQ(none.warmth, "bone up to 50 C");
-}
-
-TEST(StateFacts, AWarningThatLastsLetsPassWhatIsSaid) {
-  StateFacts f;
-  EXPECT_FALSE(warning_is_reported(f, ""));
-  f.warning = "the shaft touches bone";
-  EXPECT_TRUE(warning_is_reported(f, "saved"));
-  f.warning = "the bone is in 2 pieces";
-  f.lasts = true;
-  EXPECT_FALSE(warning_is_reported(f, "saved"));
-  EXPECT_TRUE(warning_is_reported(f, ""));
 }
 
 TEST(StateFacts, TellWhatTheTickTells) {

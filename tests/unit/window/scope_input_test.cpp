@@ -54,12 +54,26 @@ TEST(ScopeInput, ButtonsAndWheel) {
   EXPECT_FALSE(input.mouse({500, 300, 5, 5}, false, kFrame)) << "that is the hand's";
   ScopeMouse wheel{500, 300};
   wheel.wheel = 1;
-  EXPECT_FALSE(input.mouse(wheel, false, kFrame)) << "and so is that";
+  // Depth: with Shift, or while the button drills.
+  wheel.shift = true;
+  EXPECT_FALSE(input.mouse(wheel, false, kFrame));
+  wheel.shift = false;
+  wheel.works = true;
+  EXPECT_FALSE(input.mouse(wheel, false, kFrame));
   EXPECT_EQ(input.view(), before);
-  wheel.ctrl = true;
+  wheel.works = false;
   EXPECT_TRUE(input.mouse(wheel, false, kFrame));
   EXPECT_NEAR(input.view().magnification, 1.1 * before.magnification, 1e-12);
   EXPECT_EQ(input.view().eye_mm(), before.eye_mm());
+  // The hand keeps what the mouse went meanwhile; and the old way goes on, also while the button drills.
+  wheel.dx = 3;
+  EXPECT_FALSE(input.mouse(wheel, false, kFrame));
+  EXPECT_NEAR(input.view().magnification, 1.21 * before.magnification, 1e-12);
+  wheel.dx = 0;
+  wheel.ctrl = wheel.works = true;
+  EXPECT_TRUE(input.mouse(wheel, false, kFrame));
+  EXPECT_NEAR(input.view().magnification, 1.331 * before.magnification, 1e-12);
+  wheel.works = false;
   wheel.shift = true;
   EXPECT_TRUE(input.mouse(wheel, false, kFrame));
   EXPECT_LT(dot(input.view().focus_mm - before.focus_mm, before.back), 0) << "deeper";

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "commands.h"
+
 namespace osteo::inline app {
 namespace {
 
@@ -28,7 +30,7 @@ std::string ButtonAssign::take(int button, HandButtons& buttons) {
     return does + " has no button now; its keys of the table (F1) go on";
   }
   if (button == kF1 || button == kF10)
-    return name + " stays what it is: help and the panel are reached by it; press another, or Esc";
+    return name + " stays what it is: the keys and the menu are reached by it; press another, or Esc";
   if (button >= kFirstModifier && button <= kLastModifier)
     return "Shift, Ctrl and Alt go with other keys; press another, or Esc";
   const std::optional<HandFunction> before = buttons.assign(button, *for_);
@@ -38,10 +40,7 @@ std::string ButtonAssign::take(int button, HandButtons& buttons) {
   } else if (before) {
     said += "; no longer " + words_of(*before);
   } else if (const Key* const key = find_key(button); key != nullptr && key->command != command_of(*for_).command) {
-    for (const HelpLine& line : help_lines()) {
-      if (std::find(line.commands.begin(), line.commands.end(), key->command) == line.commands.end()) continue;
-      said += std::string("; no longer: ") + line.text;
-    }
+    if (const CommandRow* const row = row_of(key->command, key->value)) said += "; no longer: " + row->name;
   }
   cancel();
   return said;

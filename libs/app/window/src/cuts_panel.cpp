@@ -24,7 +24,7 @@ constexpr ImU32 kHead = IM_COL32(255, 170, 60, 240), kShaft = IM_COL32(190, 200,
                 kPlanned = IM_COL32(255, 90, 220, 230);
 
 float scale_now() {
-  return ImGui::GetFontSize() / 13;
+  return em() / 13;
 }
 
 // A blade as a closed body; endless sides are longer than any head.

@@ -215,9 +215,9 @@ class EditWindow {
   }
 
   [[nodiscard]] float panel_width() const {
-    return std::round(std::min(290 * scale_, static_cast<float>(width_) * 0.4F));
+    return std::round(std::min(340 * scale_, static_cast<float>(width_) * 0.4F));
   }
-  [[nodiscard]] int bar_height() const { return static_cast<int>(std::round(60 * scale_)); }
+  [[nodiscard]] int bar_height() const { return static_cast<int>(std::round(76 * scale_)); }
 
   void lay_out() {
     const int left = static_cast<int>(panel_width()) + 2, gap = 2;
@@ -420,7 +420,7 @@ class EditWindow {
   }
 
   void help() {
-    const float w = std::min(760 * scale_, static_cast<float>(width_) - 20),
+    const float w = std::min(960 * scale_, static_cast<float>(width_) - 20),
                 h = std::min(680 * scale_, static_cast<float>(height_) - 20);
     ImGui::SetNextWindowPos({(static_cast<float>(width_) - w) / 2, (static_cast<float>(height_) - h) / 2});
     ImGui::SetNextWindowSize({w, h});
@@ -428,7 +428,7 @@ class EditWindow {
                  ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove);
     for (const EditHelpLine& l : edit_help_lines()) {
       ImGui::TextColored({1, 0.88F, 0.55F, 1}, "%s", l.keys);
-      ImGui::SameLine(330 * scale_);
+      ImGui::SameLine(400 * scale_);
       ImGui::TextWrapped("%s", l.text);
     }
     ImGui::Separator();
@@ -446,7 +446,7 @@ class EditWindow {
       discard = discard || e.code == GLFW_KEY_D;
       go_on = go_on || e.code == GLFW_KEY_ESCAPE;
     }
-    const float w = 440 * scale_;
+    const float w = 500 * scale_;
     ImGui::SetNextWindowPos({(static_cast<float>(width_) - w) / 2, static_cast<float>(height_) / 3});
     ImGui::SetNextWindowSize({w, 0});
     ImGui::SetNextWindowFocus();

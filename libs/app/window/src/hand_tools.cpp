@@ -7,6 +7,7 @@
 #include "keys.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/geometry/grid/brick_places.h"
 #include "osteo/simulation/bone/plates.h"
 
 namespace osteo::inline app {
@@ -159,6 +160,20 @@ void HandTools::pick(Rehearsal& rehearsal, Vec3 from, Vec3 direction) {
   });
 }
 
+void HandTools::take_piece(std::uint32_t body, Rehearsal& rehearsal) {
+  if (tool_ != Tool::piece) return;
+  rehearsal.look([&](const World& world, SceneReaders&) {
+    const PlacedBody* const placed = world.find(body);
+    if (placed == nullptr) return;
+    Vec3 sum{};
+    const BrickGrid& bone = placed->body->bone;
+    for (std::uint32_t b = 0; b < bone.brick_count(); ++b) sum += middle_of_brick_mm(bone, b);
+    piece_ = body;
+    pose_ = placed->world_from_body;
+    handle_mm_ = pose_(sum / std::max(1.0, static_cast<double>(bone.brick_count())));
+  });
+}
+
 void HandTools::attach(Rehearsal& rehearsal) {
   const TickRecord tick = rehearsal.latest();
   const RigidTransform pose = plate_pose(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
@@ -219,8 +234,7 @@ std::string HandTools::how() const {
     case Tool::piece:
       return "fragments: " + key_name(Command::perform) + " separates them, drag moves one";
     case Tool::plate:
-      return "plate: " + key_name(Command::bring) + " brings it, wheel presses it on, " + key_name(Command::perform) +
-             " fixes it";
+      return "plate: a click on bone brings it there, " + key_name(Command::perform) + " fixes it";
   }
   return {};
 }

@@ -35,6 +35,8 @@ class HandTools {
   /// false.
   void drag(double right_mm, double up_mm, bool turn, Rehearsal& rehearsal, const ViewAxes& view);
   void push(double deeper_mm, Rehearsal& rehearsal, const ViewAxes& view);
+  /// Takes up that piece.
+  void take_piece(std::uint32_t body, Rehearsal& rehearsal);
   /// Takes up the piece that a ray hits.
   void pick(Rehearsal& rehearsal, Vec3 from_mm, Vec3 direction);
   /// Cuts, takes apart, fixes the plate: what the tool is for.

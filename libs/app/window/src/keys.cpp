@@ -63,7 +63,7 @@ constexpr Key kFixedKeys[] = {
     {'Y', Command::cylinder},
     {'T', Command::taper},
     {'V', Command::suck, Key::When::held},
-    {'I', Command::wash, Key::When::held},
+    {'I', Command::irrigation},
     {'X', Command::saw},
     {'P', Command::pieces},
     {'L', Command::plates},
@@ -72,6 +72,7 @@ constexpr Key kFixedKeys[] = {
     {kEnter, Command::perform},
     {kKeypadEnter, Command::perform},
     {'Z', Command::undo},
+    {'Z', Command::undo, Key::When::pressed, 0, kWithCtrl},
     {kKeyEscape, Command::put_away},
     {'M', Command::mark},
     {'S', Command::screenshot},
@@ -80,7 +81,6 @@ constexpr Key kFixedKeys[] = {
     {kHome, Command::home},
     {'N', Command::sound},
     {kF1, Command::help},
-    {'H', Command::help},
     {'Q', Command::quit},
     {'J', Command::quality},
     {kF3, Command::cut_in_middle},
@@ -105,7 +105,9 @@ constexpr Key kFixedKeys[] = {
     {kF2, Command::layout},
     {kF11, Command::full_screen},
     {kF10, Command::panel_keys},
-    {kTab, Command::wheel},
+    {kTab, Command::focus_next},
+    {kTab, Command::wheel, Key::When::pressed, 0, kWithCtrl},
+    {'K', Command::palette, Key::When::pressed, 0, kWithCtrl},
     {kF9, Command::ruler},
     {'W', Command::before},
     {kLeft, Command::tilt, Key::When::repeated, 0, kWithAlt},
@@ -259,94 +261,6 @@ ButtonCommand command_of(HandFunction function) {
       return {Command::straight, 0};
   }
   return {Command::pedal, 0};
-}
-
-const std::vector<HelpLine>& help_lines() {
-  using enum Command;
-  // "1 to 7, C, D", "burr: diameter, cutting, diamond".
-  static const std::string burr_keys = [] {
-    std::string all = "1 to 7";
-    for (const BurrKindRow& kind : kBurrKinds) all += std::string(", ") + kind.key;
-    return all;
-  }();
-  static const std::string burr_text = [] {
-    std::string all = "burr: diameter";
-    for (const BurrKindRow& kind : kBurrKinds) all += ", " + std::string(kind.name);
-    return all;
-  }();
-  static const std::vector<HelpLine> lines = {
-      {"", "the drill", {}},
-      {"move", "moves the drill across the view", {}},
-      {"F", "lifts the drill over to the bone under the mouse, drill off", {bring}},
-      {"U", "lifts the drill out of the bone, drill off", {lift}},
-      {"wheel, Up, Down, Shift-drag", "moves it deeper (away from you) or back", {deeper, back}},
-      {"left button, Space", "drills while held; Space: on and off", {drill}},
-      {burr_keys.c_str(), burr_text.c_str(), {diameter, burr_kind}},
-      {"B, Y, T", "ball, cylinder, taper", {ball, cylinder, taper}},
-      {"9, 0", "burr slower, faster: 25 to 100 %", {burr_speed}},
-      {"Tab", "wheel of tools: point or Up, Down; Tab, Enter or a click takes", {wheel}},
-      {"V, I", "suction, or irrigation, beside the burr (with --dust)", {suck, wash}},
-      {"K", "second hand: suction, irrigation, probe, nothing", {second_hand}},
-      {"Z", "takes back the last stroke, cut, move, plate", {undo}},
-      {"W", "compare: the bone at the start, and now", {before}},
-      {"", "saw, fragments, plates", {}},
-      {"X", "saw, at the bone under the mouse: drag moves the plane, Shift-drag turns it, wheel: deeper", {saw}},
-      {"P", "fragments: drag moves one, Shift-drag turns it, wheel: deeper", {pieces}},
-      {"L", "plate in the hand, moved like the drill", {plates}},
-      {"A, E", "turn the saw, the piece or the plate", {turn_left, turn_right}},
-      {"Enter", "cut; separate fragments; fix the plate", {perform}},
-      {"Esc", "back to the drill", {put_away}},
-      {"", "the microscope", {}},
-      {"right drag", "turns the view about its focus; with Shift rolls it", {}},
-      {"middle drag", "shifts the view", {}},
-      {"Ctrl-wheel", "magnifies; with Shift focuses deeper and back", {}},
-      {"[, ]", "magnification, by its steps", {magnify}},
-      {"comma, full stop, /", "focus back, deeper; on the bone in the middle", {focus, autofocus}},
-      {"; (semicolon)", "looks at the bone under the mouse", {look_there}},
-      {"G", "looks at the drill; with Shift along it", {look_at_drill}},
-      {"O", "held, mouse or device move the camera; with Shift turn it", {guide_camera}},
-      {"F6, F7, F8", "go to a kept view; with Shift keep this one", {bookmark}},
-      {"keypad 4 6 8 2", "turn the view", {orbit_left, orbit_right, orbit_up, orbit_down}},
-      {"Backspace", "takes back the camera's last move", {camera_back}},
-      {"Home", "the whole bone, from the left", {home}},
-      {"J", "how the picture is drawn: auto, plain, calm, deep", {quality}},
-      {"", "the cuts", {}},
-      {"wheel, Ctrl-wheel", "scrolls; nearer and farther", {}},
-      {"click, Shift-move", "looks there in all three", {}},
-      {"left drag", "measures", {}},
-      {"right drag, click", "window and level; as they were", {}},
-      {"middle drag", "moves it", {}},
-      {"F3, double click", "it takes the middle, and back", {cut_in_middle}},
-      {"F4", "along the tool, or along the body", {cuts_along_tool}},
-      {"Ctrl-L", "what the procedure wants removed (green) or left (orange)", {regions}},
-      {"", "the hand", {}},
-      {"Alt-right drag, Alt-arrows", "tilts the handle; the burr stays where it is", {tilt}},
-      {"Alt-Shift-right drag, Page Up, Down, keypad 7 9", "rolls it about the line of sight", {roll}},
-      {"Insert, keypad 5", "the handle as the view holds it", {straight}},
-      {"' (apostrophe), keypad 0, mouse 4", "clutch: held, the mouse moves without the drill", {clutch}},
-      {"\\ (backslash), keypad ., mouse 5", "wrist rest: held, the hand moves finely", {wrist_rest}},
-      {"` (left of 1)", "held, the mouse moves the second hand, its left button works", {second_mouse}},
-      {"-, =", "motion of the hand finer or coarser, 1:1 to 1:8", {motion}},
-      {"Alt-H", "hand and pedals in the panel, by keys", {hand_page}},
-      {"", "the session", {}},
-      {"S", "screenshot with its caption into its folder", {screenshot}},
-      {"M", "note pinned to the bone under the mouse; without text: marks this moment", {mark}},
-      {"F9", "ruler: two points on the bone, by clicks", {ruler}},
-      {"F5", "saves it and goes on", {save}},
-      {"R", "asks; saves the session and resets the bone", {reset}},
-      {"Q", "saves and ends it, and shows what was done", {quit}},
-      {"Ctrl-T", "then: its course, and the bone as of any time", {timeline}},
-      {"Left, Right", "in it: a second back, on; with Shift ten; Space plays", {earlier, later}},
-      {"", "the window", {}},
-      {"F1, H", "shows this, and hides it", {help}},
-      {"F2", "layout: operate, or plan with four pictures", {layout}},
-      {"F10", "menu: all settings, by arrows and Space; Esc closes it", {panel_keys}},
-      {"F11", "full screen, and back", {full_screen}},
-      {"Ctrl +, Ctrl -, Ctrl 0", "size of text and panels; as the monitor has it", {}},
-      {"N", "sound on and off", {sound}},
-      {"Ctrl-H, Ctrl-G", "hints; in a lesson, your hand led or not", {hints, lead}},
-      {"Ctrl-N, Ctrl-M", "nerve monitor, with --monitor; its sound", {monitor, mute_monitor}}};
-  return lines;
 }
 
 void Keyboard::on(int code, Event event, int modifiers) {

@@ -24,7 +24,8 @@ enum class Command {
   cylinder,
   taper,
   suck,
-  wash,
+  wash,        // while it is held, as by a pedal
+  irrigation,  // on and off
   saw,
   pieces,
   plates,
@@ -60,6 +61,8 @@ enum class Command {
   layout,
   full_screen,
   panel_keys,
+  focus_next,  // the keys go to the next part of the window; with Shift to the one before
+  palette,     // search among all commands
   wheel,
   ruler,
   before,
@@ -83,6 +86,8 @@ enum class Command {
   mute_monitor,  // and its sound
   regions,       // what the procedure wants removed or left
   lead,          // the own hand is led by another, or not
+  posture,       // value: Posture; how the patient lies
+  colours,       // value: ThemeName
 };
 
 /// Keys that are down with another, as GLFW numbers them.
@@ -110,14 +115,6 @@ struct ButtonCommand {
   int value;
 };
 [[nodiscard]] ButtonCommand command_of(HandFunction function);
-
-/// A line of the window's help, and the commands it tells of; none: of the mouse.
-struct HelpLine {
-  const char* keys;  ///< empty: the text is the heading of the lines that follow
-  const char* text;
-  std::vector<Command> commands;
-};
-[[nodiscard]] const std::vector<HelpLine>& help_lines();
 
 /// Keys as the window's callback reports them. Events, not states: at few pictures a second a short press begins and
 /// ends between two frames. ImGui is not asked: until 1.87 it knew keys by the numbers of its backend, since then by

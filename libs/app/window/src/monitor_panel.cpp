@@ -12,7 +12,7 @@ namespace osteo::inline app {
 namespace {
 
 // In heights of text.
-constexpr float kMinLaneEm = 1.7F, kMinEm = 13, kMaxEm = 18, kSwitchesEm = 24;
+constexpr float kMinLaneEm = 2.3F, kMinEm = 15, kMaxEm = 21, kSwitchesEm = 30;
 
 float button_wide(const char* words) {
   return ImGui::CalcTextSize(words).x + 2 * ImGui::GetStyle().FramePadding.x;
@@ -30,7 +30,7 @@ void beside(float wide) {
 ScreenBox lane_head(MonitorScreen& screen, std::size_t channel, const std::string& name, const ScreenBox& lane) {
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const float e = em(), wide = 8.2F * e;
-  fitted_text(draw, {lane.x, lane.y, wide - 0.4F * e, std::min(lane.height / 2, 1.1F * e)}, e * 0.85F, theme().text,
+  fitted_text(draw, {lane.x, lane.y, wide - 0.4F * e, std::min(lane.height / 2, 1.1F * e)}, e * kLabelEm, theme().text,
               name);
   ImGui::SetCursorScreenPos({lane.x, lane.y + lane.height / 2});
   ImGui::PushID(static_cast<int>(channel));
@@ -44,7 +44,7 @@ ScreenBox lane_head(MonitorScreen& screen, std::size_t channel, const std::strin
   ImGui::PopID();
   const ImVec2 at = ImGui::GetItemRectMax();
   fitted_text(draw, {at.x + e * 0.3F, lane.y + lane.height / 2, wide - 3 * e, std::min(lane.height / 2, 1.1F * e)},
-              e * 0.75F, theme().quiet, std::to_string(screen.gain_uv(channel)) + " uV");
+              e * kLabelEm, theme().quiet, std::to_string(screen.gain_uv(channel)) + " uV");
   return {lane.x + wide, lane.y, lane.width - wide, lane.height};
 }
 
@@ -128,7 +128,7 @@ void MonitorPanel::draw_answers(MonitorController& controller, float height) {
           const float x = box.x + box.width * static_cast<float>(ms) / 20;
           draw->AddLine({x, box.y}, {x, box.bottom()}, im_colour32(theme().raised));
           if (lane.last)
-            fitted_text(draw, {x + 2, box.bottom() - em(), 4 * em(), em()}, em() * 0.75F, theme().quiet,
+            fitted_text(draw, {x + 2, box.bottom() - em(), 4 * em(), em()}, em() * kLabelEm, theme().quiet,
                         std::to_string(ms) + " ms");
         }
         const auto& traces = view.traces[lane.channel];
@@ -211,7 +211,7 @@ void MonitorPanel::draw_switches(MonitorController& controller) {
   ImGui::PushStyleColor(ImGuiCol_Text, im_colour(alarm ? ink_of(palette::kVermillion) : theme().quiet));
   ImGui::TextUnformatted(alarm ? "activity" : "quiet");
   ImGui::PopStyleColor();
-  ImGui::SameLine(7 * e);
+  ImGui::SameLine(8 * e);
   ImGui::TextDisabled("nerve monitor, for practice");
   if (ImGui::RadioButton("free run", !answers_)) answers_ = false;
   beside(box_wide("by stimulus"));
@@ -263,7 +263,7 @@ void MonitorPanel::draw(MonitorController& controller) {
     }
   };
   // Where it is wide enough the curves have all its height.
-  if (box_.width >= 48 * e) {
+  if (box_.width >= 54 * e) {
     ImGui::BeginChild("switches", {kSwitchesEm * e, 0}, false, ImGuiWindowFlags_NoScrollbar);
     draw_switches(controller);
     log(0);

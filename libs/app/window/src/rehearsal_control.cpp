@@ -198,7 +198,7 @@ void RehearsalControl::send_goal(double seconds) {
 
 void RehearsalControl::lead(std::optional<Vec3> seen_mm, Vec3 forward) {
   if (!rehearsal().device().lead({})) {
-    say("the drill is in your own hand");
+    say("the drill is in your own hand", Message::Rank::hindrance);
     return;
   }
   leading_ = Leading{Leading::Stage::letting_go, 0, {}, seen_mm, forward, {}};
@@ -216,7 +216,7 @@ void RehearsalControl::lift() {
 void RehearsalControl::bring(Vec3 direction) {
   const std::optional<BoneHit> hit = bone_seen(direction);
   if (!hit) {
-    say("no bone under the mouse");
+    say("no bone under the mouse", Message::Rank::hindrance);
     return;
   }
   lead(hit->at_mm, direction);
@@ -302,7 +302,7 @@ void RehearsalControl::go_on_leading() {
 
 void RehearsalControl::take_burr(int tool) {
   if (leading_) {  // on a way that was found for the burr that it has
-    say("the drill is on its way: change the burr when it has arrived");
+    say("the drill is on its way: change the burr when it has arrived", Message::Rank::hindrance);
     return;
   }
   tool_ = tool;
@@ -457,7 +457,7 @@ void RehearsalControl::report_of_tools() {
 void RehearsalControl::drag_second(Vec3 by_mm) {
   std::string said;
   static_cast<void>(second_.move(rehearsal(), by_mm * motion_.factor(), said));
-  if (!said.empty() && said != message_) say(said);
+  if (!said.empty() && said != message()) say(said);
 }
 
 Vec3 RehearsalControl::second_mm() const {
@@ -471,19 +471,15 @@ void RehearsalControl::wash(bool suck, bool wash) {
 
 // --- what is told
 
-void RehearsalControl::notify(const std::string& text) {
-  message_ = text;
-  message_until_ = std::chrono::steady_clock::now() + std::chrono::seconds(4);
-}
-
-void RehearsalControl::say(const std::string& text) {
-  notify(text);
+void RehearsalControl::say(const std::string& text, Message::Rank rank) {
+  notify(text, rank);
   if (Rehearsal* const running = actions_.rehearsal()) running->note("message", text);
 }
 
-std::string RehearsalControl::reported() const {
-  if (leading_) return "the drill is on its way, off";
-  return std::chrono::steady_clock::now() < message_until_ ? message_ : std::string();
+std::optional<Message> RehearsalControl::reported(std::vector<Message> causes) {
+  if (leading_) causes.push_back({Message::Rank::hindrance, "the drill is on its way, off"});
+  messages_.causes(std::move(causes));
+  return messages_.shown();
 }
 
 }  // namespace osteo::inline app

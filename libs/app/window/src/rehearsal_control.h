@@ -1,7 +1,6 @@
 // What mouse, keys and buttons do to a rehearsal: all of the window but its pictures. Private to libs/app/window; no
 // GLFW, no ImGui, no VTK.
 #pragma once
-#include <chrono>
 #include <functional>
 #include <optional>
 #include <string>
@@ -10,6 +9,7 @@
 #include "hand_tools.h"
 #include "keys.h"
 #include "lead_pause.h"
+#include "messages.h"
 #include "mouse_hand.h"
 #include "osteo/app/window/rehearsal_window.h"
 #include "osteo/session/scene/free_ways.h"
@@ -102,6 +102,8 @@ class RehearsalControl {
   /// The second hand, where no device moves it: what it holds is beside the burr, a sucker or water while one of the
   /// two is asked for, else out of the way.
   void wash(bool suck, bool wash);
+  [[nodiscard]] SecondHand& second() { return second_; }
+  [[nodiscard]] const SecondHand& second() const { return second_; }
   [[nodiscard]] bool sucking() const { return second_.sucking(); }
   [[nodiscard]] bool washing() const { return second_.washing(); }
   /// So far as the mouse went at its depth.
@@ -111,12 +113,13 @@ class RehearsalControl {
   [[nodiscard]] bool second_hand_empty() const { return second_.empty(); }
 
   // --- what is told
-  void say(const std::string& text);     ///< also a note of the session
-  void notify(const std::string& text);  ///< no note: it may name a file, and so a patient
+  void say(const std::string& text, Message::Rank rank = Message::Rank::information);  ///< also a note of the session
+  /// No note: it may name a file, and so a patient.
+  void notify(const std::string& text, Message::Rank rank = Message::Rank::information) { messages_.say({rank, text}); }
   /// The last thing said.
-  [[nodiscard]] const std::string& message() const { return message_; }
-  /// What to show now; empty: nothing.
-  [[nodiscard]] std::string reported() const;
+  [[nodiscard]] const std::string& message() const { return messages_.last(); }
+  /// What to show now; `causes`: what is so, beside what was said.
+  [[nodiscard]] std::optional<Message> reported(std::vector<Message> causes);
 
  private:
   // First it lets go of the bone; then the way is found from where it is.
@@ -163,8 +166,8 @@ class RehearsalControl {
   bool ran_ = false, latched_ = false, second_works_ = false;
   double held_ = 0;  // how far down
   bool wait_for_release_ = false, in_hand_ = true;
-  std::string message_, reported_of_tools_;
-  std::chrono::steady_clock::time_point message_until_{};
+  std::string reported_of_tools_;
+  Messages messages_;
 };
 
 }  // namespace osteo::inline app

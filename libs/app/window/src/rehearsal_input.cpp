@@ -18,7 +18,8 @@ ScopeMouse RehearsalWindow::mouse() const {
           ImGui::IsMouseDown(ImGuiMouseButton_Right),  // its first pixels too: they are not the drill's
           ImGui::IsMouseDown(ImGuiMouseButton_Middle),
           io.KeyCtrl,
-          io.KeyShift};
+          io.KeyShift,
+          ImGui::IsMouseDown(ImGuiMouseButton_Left) || keyboard_.held(Command::second_mouse)};
 }
 
 // Where there is no hand to move.
@@ -45,7 +46,7 @@ void RehearsalWindow::mouse_and_keys() {
   }
   control_.look_from(view_axes());  // the mouse may have turned it
   const std::optional<Vec3> direction = in_view ? std::optional(ray(m.x, m.y)) : std::nullopt;
-  std::vector<Keyboard::Press> presses = keyboard_.frame(io.WantTextInput || room_.writing());
+  std::vector<Keyboard::Press> presses = keyboard_.frame(io.WantTextInput || room_.typing());
   for (const Keyboard::Press& button : room_.take_presses()) presses.push_back(button);
   for (const Keyboard::Press& press : presses) {
     do_press(press, direction);
@@ -120,9 +121,11 @@ void RehearsalWindow::use_mouse(const ScopeMouse& m) {
   HandTools& tools = control_.tools();
   if (!tools.in_hand()) {
     use_tool(tools, rehearsal, m);
-    if (m.wheel != 0) tools.push(1.0 * m.wheel, rehearsal, view_axes());
+    if (m.wheel != 0 && (m.shift || m.works)) tools.push(1.0 * m.wheel, rehearsal, view_axes());
     return;
   }
+  if (tools.tool() == HandTools::Tool::plate && !m.shift && ImGui::IsMouseClicked(ImGuiMouseButton_Left))
+    return control_.bring(ray(m.x, m.y));
   if (keyboard_.held(Command::second_mouse)) {
     const Vec3 by = step_of(m, control_.second_mm()).by_mm + view_axes().forward * (0.5 * m.wheel);
     if (m.dx != 0 || m.dy != 0 || m.wheel != 0) control_.drag_second(by);
@@ -133,7 +136,7 @@ void RehearsalWindow::use_mouse(const ScopeMouse& m) {
   } else if (m.dx != 0 || m.dy != 0) {
     control_.drag_hand(step_of(m, control_.goal_mm()));
   }
-  if (m.wheel != 0) control_.push_hand(0.5 * m.wheel);
+  if (m.wheel != 0 && (m.shift || m.works)) control_.push_hand(0.5 * m.wheel);
 }
 
 // Saw and pieces: what the mouse drags is not the hand.

@@ -160,6 +160,7 @@ RoomScene RehearsalWindow::room_scene(Rehearsal& now) {
           [this](Vec3 at) { return project(at); },
           [this] { draw_scope_panel(scope_, stereo_, scope_scene()); },
           [this, &now] { tools_->panel(control_.tools(), now, view_axes()); },
+          [&now] { SceneTools::fixed_plates(now); },
           [this](bool show) {
             controller_.draw(control_, show);
             hints_.panel();
@@ -202,7 +203,8 @@ void RehearsalWindow::end_picture() {
     const SceneBox box{whole(area.x), height_ - whole(area.y + area.height), std::max(1, whole(area.width)),
                        std::max(1, whole(area.height))};
     const bool settled = !scene || world_view_->rest(box.width, box.height, painter_->coarse());
-    if (!painter_->begin({box, width_, height_, settled, input(), screenshot_wanted_}, ImGui::GetDrawData()))
+    const bool still = screenshot_wanted_ || review_.wants_picture();
+    if (!painter_->begin({box, width_, height_, settled, input(), still}, ImGui::GetDrawData()))
       return painter_->wait();
   }
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
@@ -211,6 +213,10 @@ void RehearsalWindow::end_picture() {
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
     if (!two_eyes) painter_->show();
   });
+  if (!two_eyes && review_.wants_picture()) {  // of a finding: nobody sees this one
+    review_.take_picture(scope_.area, height_);
+    return painter_->done();
+  }
   if (screenshot_wanted_) save_screenshot();
   shell_.count_gl_errors();
   glfwSwapBuffers(window_);
@@ -237,6 +243,7 @@ void RehearsalWindow::save_screenshot() {
   try {
     save_picture(picture, path);
     control_.say("saved " + path.filename().string());
+    room_.picture_kept();
   } catch (const Error& e) {
     control_.say(e.what());
   }

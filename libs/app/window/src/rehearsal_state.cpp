@@ -19,7 +19,7 @@ void RehearsalWindow::write_state() {
   state.session = actions_.folder();
   state.tool = instrument_library()[static_cast<std::size_t>(control_.instrument())].name;
   state.drill_latched = control_.latched();
-  state.help = room_.help().open();
+  state.help = room_.palette().shown() != CommandPalette::Shown::nothing;
   state.room = room_state();
   const HandMotion& motion = control_.motion();
   state.motion = {motion.one_to,
@@ -104,8 +104,11 @@ RoomState RehearsalWindow::room_state() const {
   }
   if (const int next = room_.steps().next(); next >= 0)
     r.next_step = room_.steps().steps()[static_cast<std::size_t>(next)].name();
-  r.help_pages = room_.help().pages();
-  r.help_page = room_.help().page();
+  r.typing = room_.palette().typing();
+  r.search = room_.palette().search().text();
+  if (const CommandRow* const row = room_.palette().search().row(); r.typing && row != nullptr) r.found = row->name;
+  static constexpr const char* kParts[] = {"bone", "strip", "card", "cuts", "state", "panel"};
+  r.focus = kParts[static_cast<std::size_t>(room_.focus())];
   const ScreenBox& v = cuts_.scene();
   r.view = {v.x, v.y, v.width, v.height};
   return r;

@@ -99,7 +99,7 @@ void RehearsalWindow::open() {
   render_window_->AddRenderer(renderer_);
   shell_.on_key = [this](int key, int action, int modifiers) {
     if (controller_.key(key, action)) return;
-    if (action == 1) room_.key(key);
+    if (action != 0) room_.key(key, modifiers, action == 2);
     keyboard_.on(key, static_cast<Keyboard::Event>(action), modifiers);
   };
   cuts_.create();
@@ -237,12 +237,15 @@ void RehearsalWindow::end_session() {
   room_.set_before(false);
   if (!control_.end()) return;
   ended_ = end_facts(actions_.facts(), *work_);
+  room_.session_ended();
   if (actions_.review) review_.begin(actions_.review);
 }
 
 void RehearsalWindow::show_end() {
   camera_by_mouse();
-  EndChoice choice = room_.draw_end(*ended_, [this] { review_.draw_findings(); });
+  EndChoice choice =
+      room_.draw_end(*ended_, {[this] { review_.draw_findings(); }, [this] { review_.draw_all_findings(); },
+                               [this] { review_.draw_switch(); }, review_.found_serious()});
   for (const Keyboard::Press& press : keyboard_.frame(ImGui::GetIO().WantTextInput)) {
     if (review_.key(press)) continue;
     if (choice == EndChoice::none) choice = MainView::end_choice(press.command);

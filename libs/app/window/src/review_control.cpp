@@ -8,6 +8,27 @@
 
 namespace osteo::inline app {
 
+std::vector<std::size_t> shown_findings(const std::vector<ReviewFinding>& findings) {
+  std::vector<std::size_t> shown;
+  for (std::size_t n = 0; n < findings.size() && shown.size() < kShownFindings; ++n) {
+    if (findings[n].weight != ReviewFinding::Weight::note) shown.push_back(n);
+  }
+  return shown;
+}
+
+bool serious(const std::vector<ReviewFinding>& findings) {
+  return std::any_of(findings.begin(), findings.end(), [](const ReviewFinding& f) {
+    return f.weight == ReviewFinding::Weight::caution || f.weight == ReviewFinding::Weight::serious;
+  });
+}
+
+void ReviewControl::present() {
+  if (!review_ || chosen_ >= 0 || !serious(review_->findings)) return;
+  chosen_ = static_cast<int>(shown_findings(review_->findings)[0]);
+  places_new_ = true;
+  look_ = review_->findings[static_cast<std::size_t>(chosen_)].at_mm;
+}
+
 void ReviewControl::begin(const Make& make) {
   end();
   stop_ = false;

@@ -13,6 +13,13 @@
 
 namespace osteo::inline app {
 
+/// Places among the findings of those that the page begins with: at most three, the most serious first; what is only to
+/// be known is none of them.
+inline constexpr std::size_t kShownFindings = 3;
+[[nodiscard]] std::vector<std::size_t> shown_findings(const std::vector<ReviewFinding>& findings);
+/// Something was found that one would do otherwise.
+[[nodiscard]] bool serious(const std::vector<ReviewFinding>& findings);
+
 class ReviewControl {
  public:
   using Make = std::function<SessionReview(const Context&)>;
@@ -59,6 +66,8 @@ class ReviewControl {
   /// A finding is looked at, and its first moment gone to; chosen again, its next. No such finding: none is.
   void choose(int finding);
   [[nodiscard]] int chosen() const { return chosen_; }
+  /// The first of shown_findings() is looked at where it is serious, at the end of the session.
+  void present();
   /// Where the camera is to go, once.
   [[nodiscard]] std::optional<Vec3> take_look() { return std::exchange(look_, std::nullopt); }
   /// The places of the chosen finding, when they are others since they were last asked for.

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "state_facts.h"
+#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -46,51 +48,115 @@ struct Lane {
 
 }  // namespace
 
-void draw_findings(ReviewControl& control) {
-  ImGui::Separator();
+namespace {
+
+// A finding with its picture; true: pressed.
+bool finding_card(const ReviewFinding& f, const char* id, unsigned picture, bool chosen) {
+  const float u = unit(), wide = ImGui::GetContentRegionAvail().x, inset = 8 * u;
+  const float shot_wide = 112 * u, shot_high = 80 * u, left = shot_wide + 2 * inset;
+  const float text_wide = wide - left - 32 * u;
+  const float tall =
+      std::max(shot_high + 2 * inset, ImGui::CalcTextSize(f.text.c_str(), nullptr, false, text_wide).y + 2 * inset);
+  const ImVec2 lo = ImGui::GetCursorScreenPos(), hi{lo.x + wide, lo.y + tall};
+  const bool pressed = ImGui::InvisibleButton(id, {wide, tall});
+  const bool hovered = ImGui::IsItemHovered(), focused = ImGui::IsItemFocused() && ImGui::GetIO().NavVisible;
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  const Theme& t = theme();
+  draw->AddRectFilled(lo, hi, im_colour32(t.raised, chosen || hovered ? 1 : 0.5F), kCardRound * u);
+  if (chosen || focused) draw->AddRect(lo, hi, im_colour32(t.accent), kCardRound * u, 0, 2 * u);
+  if (chosen) draw->AddRectFilled({lo.x, lo.y + 12 * u}, {lo.x + 4 * u, hi.y - 12 * u}, im_colour32(t.accent), 2 * u);
+  const ImVec2 shot{lo.x + inset, lo.y + inset}, shot_end{shot.x + shot_wide, shot.y + shot_high};
+  if (picture != 0) {
+    draw->AddImageRounded(reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(picture)), shot, shot_end, {0, 1},
+                          {1, 0}, IM_COL32_WHITE, kRound * u);
+    const ImVec2 middle{(shot.x + shot_end.x) / 2, (shot.y + shot_end.y) / 2};
+    draw->AddCircle(middle, 16 * u, IM_COL32(0, 0, 0, 200), 32, 4 * u);
+    draw->AddCircle(middle, 16 * u, IM_COL32_WHITE, 32, 2 * u);
+  } else {
+    draw->AddRectFilled(shot, shot_end, im_colour32(t.ground), kRound * u);
+    const char* const none = f.at_mm ? "\u2026" : "no place";
+    const ImVec2 size = ImGui::CalcTextSize(none);
+    draw->AddText({(shot.x + shot_end.x - size.x) / 2, (shot.y + shot_end.y - size.y) / 2}, im_colour32(t.quiet), none);
+  }
+  const WeightLook look = look_of(f.weight);
+  draw_sign(draw, {lo.x + left + 10 * u, lo.y + inset + ImGui::GetFontSize() / 2}, 8 * u, look.corners, look.colour);
+  draw->AddText(ImGui::GetFont(), ImGui::GetFontSize(), {lo.x + left + 26 * u, lo.y + inset}, im_colour32(t.text),
+                f.text.c_str(), nullptr, text_wide);
+  return pressed;
+}
+
+void why(const ReviewFinding& f) {
+  if (!ImGui::IsItemHovered() || f.why.empty()) return;
+  ImGui::BeginTooltip();
+  ImGui::PushTextWrapPos(30 * em());
+  ImGui::TextUnformatted(f.why.c_str());
+  ImGui::PopTextWrapPos();
+  ImGui::EndTooltip();
+}
+
+}  // namespace
+
+void draw_findings(ReviewControl& control, std::span<const unsigned> pictures) {
   switch (control.poll()) {
     case ReviewControl::State::none:
       return;
     case ReviewControl::State::making:
-      ImGui::TextDisabled("findings");
-      ImGui::ProgressBar(static_cast<float>(control.progress()), {-1, 0}, "the session is looked through");
+      ImGui::TextDisabled("The session is looked through");
+      ImGui::ProgressBar(static_cast<float>(control.progress()), {-1, 0}, "");
       return;
     case ReviewControl::State::failed:
-      ImGui::TextDisabled("findings");
       ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
-      ImGui::TextWrapped("! there are none: %s", control.failure().c_str());
+      ImGui::TextWrapped("! There are no findings: %s", control.failure().c_str());
       ImGui::PopStyleColor();
       return;
     case ReviewControl::State::ready:
       break;
   }
   const SessionReview& r = control.review();
-  const float e = em();
-  bool shown = control.shown();
-  if (ImGui::Checkbox("course of the session (Ctrl-T)", &shown)) control.show(shown);
-  for (const std::string& s : r.summary) ImGui::TextWrapped("%s", s.c_str());
-  ImGui::TextDisabled(r.findings.empty() ? "nothing was found" : "findings: a click looks there, another goes on");
+  if (!serious(r.findings)) {
+    ImGui::TextWrapped("Nothing serious was found.");
+    for (const std::string& s : r.summary) ImGui::TextWrapped("%s", s.c_str());
+    for (const std::string& w : r.words) {
+      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
+      ImGui::TextWrapped("%s", w.c_str());
+      ImGui::PopStyleColor();
+    }
+  }
+  std::size_t place = 0;
+  for (const std::size_t n : shown_findings(r.findings)) {
+    const std::string id = "finding " + std::to_string(n);
+    if (finding_card(r.findings[n], id.c_str(), place < pictures.size() ? pictures[place] : 0,
+                     control.chosen() == static_cast<int>(n)))
+      control.choose(static_cast<int>(n));
+    why(r.findings[n]);
+    ++place;
+  }
+}
+
+void draw_all_findings(ReviewControl& control) {
+  if (control.state() != ReviewControl::State::ready) return;
+  const SessionReview& r = control.review();
+  const float e = em(), u = unit();
+  if (serious(r.findings)) {
+    for (const std::string& s : r.summary) ImGui::TextWrapped("%s", s.c_str());
+  }
   for (std::size_t n = 0; n < r.findings.size(); ++n) {
     const ReviewFinding& f = r.findings[n];
     const WeightLook look = look_of(f.weight);
     const ImVec2 at = ImGui::GetCursorScreenPos();
-    const float wide = ImGui::GetContentRegionAvail().x, left = 1.4F * e;
+    const float wide = ImGui::GetContentRegionAvail().x, left = 1.6F * e;
     const ImVec2 size = ImGui::CalcTextSize(f.text.c_str(), nullptr, false, wide - left);
     ImGui::PushID(static_cast<int>(n));
     if (ImGui::Selectable("##finding", control.chosen() == static_cast<int>(n), 0, {wide, size.y}))
       control.choose(static_cast<int>(n));
-    if (ImGui::IsItemHovered() && !f.why.empty()) {
-      ImGui::BeginTooltip();
-      ImGui::PushTextWrapPos(30 * e);
-      ImGui::TextUnformatted(f.why.c_str());
-      ImGui::PopTextWrapPos();
-      ImGui::EndTooltip();
-    }
+    why(f);
     ImGui::PopID();
-    draw_sign(ImGui::GetWindowDrawList(), {at.x + 0.5F * e, at.y + 0.6F * e}, 0.4F * e, look.corners, look.colour);
-    ImGui::GetWindowDrawList()->AddText(ImGui::GetFont(), e, {at.x + left, at.y}, im_colour32(theme().text),
-                                        f.text.c_str(), nullptr, wide - left);
+    draw_sign(ImGui::GetWindowDrawList(), {at.x + 10 * u, at.y + ImGui::GetFontSize() / 2}, 7 * u, look.corners,
+              look.colour);
+    ImGui::GetWindowDrawList()->AddText(ImGui::GetFont(), ImGui::GetFontSize(), {at.x + left, at.y},
+                                        im_colour32(theme().text), f.text.c_str(), nullptr, wide - left);
   }
+  if (!serious(r.findings)) return;
   for (const std::string& w : r.words) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
     ImGui::TextWrapped("%s", w.c_str());
@@ -126,7 +192,7 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
                         {"bone: seen, unseen", at.y + 2 * lane, lane, 0}};
   for (const Lane& l : lanes) {
     draw->AddRectFilled({left, l.top + 1}, {left + wide, l.top + l.height - 1}, im_colour32(theme().raised));
-    fitted_text(draw, {at.x, l.top, names - 0.5F * e, l.height}, 0.85F * e, theme().quiet, l.name);
+    fitted_text(draw, {at.x, l.top, names - 0.5F * e, l.height}, kLabelEm * e, theme().quiet, l.name);
   }
   float most_mm3 = 0;
   for (std::size_t n = 0; n < course.size(); ++n)

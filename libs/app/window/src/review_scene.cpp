@@ -1,5 +1,8 @@
 #include "review_scene.h"
 
+// GLEW, through VTK, must come before anything that includes GL.
+#include <vtk_glew.h>
+
 #include <vtkActor.h>
 #include <vtkCellArray.h>
 #include <vtkNew.h>
@@ -13,7 +16,7 @@
 
 #include "osteo/simulation/camera/microscope.h"
 #include "palette.h"
-#include "review_panel.h"
+#include "ui_kit.h"
 
 namespace osteo::inline app {
 
@@ -24,6 +27,13 @@ ReviewScene::~ReviewScene() {
 
 void ReviewScene::end() {
   control_.end();
+  for (unsigned& picture : pictures_) {
+    if (picture != 0) glDeleteTextures(1, &picture);
+    picture = 0;
+  }
+  due_.reset();
+  view_before_.reset();
+  taken_ = 0;
   drawn_ = false;
   course_ = {};
   if (places_ && renderer_ != nullptr) renderer_->RemoveActor(places_);
@@ -39,7 +49,66 @@ void ReviewScene::lay_out(RoomLayout& room, float em_pixels) {
 }
 
 void ReviewScene::draw_findings() {
-  osteo::draw_findings(control_);
+  osteo::draw_findings(control_, pictures_);
+}
+
+void ReviewScene::draw_switch() {
+  bool shown = control_.shown();
+  if (control_.state() == ReviewControl::State::ready && kit_switch("Course of the session (Ctrl-T)", shown))
+    control_.show(shown);
+}
+
+bool ReviewScene::found_serious() const {
+  return control_.state() == ReviewControl::State::ready && serious(control_.review().findings);
+}
+
+// Each finding once, from where the surgeon looked last; then the camera is where it was, and the worst is looked at.
+void ReviewScene::aim_at_next(ScopeInput& scope) {
+  constexpr double kFieldMm = 30;
+  if (due_) return;
+  const auto shown = shown_findings(control_.review().findings);
+  for (; taken_ < shown.size(); ++taken_) {
+    const std::optional<Vec3> at = control_.review().findings[shown[taken_]].at_mm;
+    if (!at) continue;
+    if (!view_before_) view_before_ = scope.control.target();
+    ScopeView view = *view_before_;
+    view.focus_mm = *at;
+    magnify(view, kFieldNumberMm / kFieldMm);
+    scope.control.jump(view);
+    due_ = taken_;
+    return;
+  }
+  if (view_before_) scope.control.jump(*view_before_);
+  view_before_.reset();
+  if (taken_ == shown.size()) control_.present();
+  ++taken_;  // once
+}
+
+void ReviewScene::take_picture(const PictureArea& area, int window_height) {
+  if (!due_) return;
+  // As wide as the card's: 7 to 5.
+  const double wide = std::min(area.width, 1.4 * area.height), high = wide / 1.4;
+  const int width = std::max(1, static_cast<int>(wide)), height = std::max(1, static_cast<int>(high));
+  std::vector<unsigned char> pixels(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glReadBuffer(GL_BACK);
+  glReadPixels(static_cast<int>(area.x + (area.width - wide) / 2),
+               window_height - static_cast<int>(area.y + (area.height + high) / 2), width, height, GL_RGB,
+               GL_UNSIGNED_BYTE, pixels.data());
+  unsigned& picture = pictures_[*due_];
+  if (picture == 0) glGenTextures(1, &picture);
+  glBindTexture(GL_TEXTURE_2D, picture);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE, pixels.data());
+  glGenerateMipmap(GL_TEXTURE_2D);  // it is shown far smaller
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  glBindTexture(GL_TEXTURE_2D, 0);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+  due_.reset();
+  ++taken_;
 }
 
 void ReviewScene::show(vtkRenderer* renderer, std::unique_ptr<WorldView>& world,
@@ -56,6 +125,7 @@ void ReviewScene::show(vtkRenderer* renderer, std::unique_ptr<WorldView>& world,
     show_hands(hands);
   }
   world->update(*scene.world(), scene.readers());  // colours may follow later
+  if (taken_ <= shown_findings(control_.review().findings).size()) aim_at_next(scope);
   if (const auto places = control_.take_places()) show_places(renderer, *places);
   if (const auto at = control_.take_look()) scope.control.look_at(*at);
   if (control_.playing() && control_.surgeons_view) {

@@ -1,12 +1,14 @@
 #include "room.h"
 
 #include <imgui.h>
+#include <imgui_internal.h>
 #include <imgui_stdlib.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
+#include "osteo/simulation/bone/posture.h"
 #include "settings_panel.h"
 #include "sound_panel.h"
 #include "status_panel.h"
@@ -44,8 +46,9 @@ void MainView::renew() {
   latched_ = {};
 }
 
-void MainView::key(int code) {
-  if (!writing_) return;
+void MainView::key(int code, int modifiers, bool repeated) {
+  palette_.key(code, modifiers);
+  if (!writing_ || repeated) return;
   const Key* const known = find_key(code);
   if (known == nullptr) return;
   if (known->command == Command::perform) note_answer_ = 1;
@@ -68,46 +71,105 @@ void MainView::answer(int answer, RehearsalControl& control) {
   if (answer > 0) control.reset();
 }
 
-bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, const std::optional<Vec3>& bone) {
-  const Command c = press.command;
+// What lies in front of the bone has the key. True: it was for that.
+bool MainView::takes_in_front(Command c, RehearsalControl& control) {
   if (asking_) {
     answer(c == Command::perform ? 1 : c == Command::put_away ? -1 : 0, control);
     return true;
   }
-  if (keys_in_panel_) {
-    keys_in_panel_ = c != Command::put_away && c != Command::panel_keys;
-    // Arrows, Space and Enter are the panel's; other keys go on.
-    if (c == Command::put_away || c == Command::panel_keys || c == Command::deeper || c == Command::back ||
-        c == Command::drill || c == Command::perform)
+  if (palette_.typing()) return true;  // pressed in the picture in which it was opened
+  if (focus_ != Focus::bone) {
+    const bool leaves = c == Command::put_away || (c == Command::panel_keys && keys_in_panel());
+    if (leaves) focus_ = Focus::bone;
+    // Arrows, Space and Enter are the focus'; other keys go on.
+    if (leaves || c == Command::deeper || c == Command::back || c == Command::drill || c == Command::perform ||
+        c == Command::earlier || c == Command::later)
       return true;
   }
-  if (wheel_.open()) {
-    const bool takes_it = c == Command::wheel || c == Command::perform;
-    if (c == Command::deeper || c == Command::back) {
-      wheel_.turn(c == Command::deeper ? 1 : -1);
-      return true;
-    }
-    wheel_.close();
-    if (takes_it && wheel_.chosen() >= 0) {
-      const WheelItem& item = wheel_items()[static_cast<std::size_t>(wheel_.chosen())];
-      const Command chosen = item.command;
-      // A burr is for the drill.
-      const bool burr = chosen != Command::saw && chosen != Command::pieces && chosen != Command::plates &&
-                        chosen != Command::put_away;
-      if (burr && control.tools().tool() != HandTools::Tool::drill) pressed_.press(Command::put_away);
-      pressed_.press(chosen, item.value);
-    }
-    return takes_it || c == Command::put_away;
+  if (!wheel_.open()) return false;
+  const bool takes_it = c == Command::wheel || c == Command::perform;
+  if (c == Command::deeper || c == Command::back) {
+    wheel_.turn(c == Command::deeper ? 1 : -1);
+    return true;
   }
+  wheel_.close();
+  if (takes_it && wheel_.chosen() >= 0) {
+    const WheelItem& item = wheel_items()[static_cast<std::size_t>(wheel_.chosen())];
+    const Command chosen = item.command;
+    // A burr is for the drill.
+    const bool burr =
+        chosen != Command::saw && chosen != Command::pieces && chosen != Command::plates && chosen != Command::put_away;
+    if (burr && control.tools().tool() != HandTools::Tool::drill) pressed_.press(Command::put_away);
+    pressed_.press(chosen, item.value);
+  }
+  return takes_it || c == Command::put_away;
+}
+
+void MainView::show_wheel() {
+  const ImVec2 m = ImGui::GetIO().MousePos;
+  const float edge = ToolWheel::kOuterEm * em();
+  const ScreenBox& v = layout_.view;
+  const bool inside = v.holds(m.x, m.y);
+  const auto kept = [&](float at, float lo, float length) {
+    return length < 2 * edge ? lo + length / 2 : std::clamp(at, lo + edge, lo + length - edge);
+  };
+  wheel_.show(inside ? kept(m.x, v.x, v.width) : v.x + v.width / 2,
+              inside ? kept(m.y, v.y, v.height) : v.y + v.height / 2);
+}
+
+// The bone, and round the parts of the window again.
+void MainView::move_focus(int by) {
+  constexpr int kParts = 5;  // the panel is opened by its own key
+  const int now = keys_in_panel() ? 0 : static_cast<int>(focus_);
+  focus_ = static_cast<Focus>((now + by + kParts) % kParts);
+  focus_moved_ = true;
+}
+
+// Where dust and water fall to: without them it changes nothing.
+void MainView::lay_patient(Posture posture, RehearsalControl& control) {
+  bool dust = false;
+  control.rehearsal().look([&](const World&, SceneReaders& readers) { dust = readers.dust != nullptr; });
+  if (!dust) return control.say("no dust and no water here: start with --dust", Message::Rank::hindrance);
+  control.rehearsal().act(SceneAction::posture(down_of(posture, 0)));
+  std::string name(EnumNames<Posture>::values[static_cast<std::size_t>(posture)]);
+  std::replace(name.begin(), name.end(), '_', ' ');
+  control.say("patient position: " + name);
+}
+
+void MainView::choose_theme(ThemeName name) {
+  person_.values.theme = EnumNames<ThemeName>::values[static_cast<std::size_t>(name)];
+  take_theme(person_.values.theme);
+}
+
+bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, const std::optional<Vec3>& bone) {
+  const Command c = press.command;
+  if (takes_in_front(c, control)) return true;
   switch (c) {
     case Command::help:
-      help_.show(!help_.open());
+      palette_.help();
       return true;
-    case Command::earlier:
-    case Command::later:
-      if (!help_.open()) return false;
-      help_.turn(c == Command::later ? 1 : -1);
+    case Command::palette:
+      palette_.show(CommandPalette::Shown::commands);
       return true;
+    case Command::focus_next:
+      move_focus(press.shift ? -1 : 1);
+      return true;
+    case Command::irrigation:
+      if (control.rehearsal().hands() < 2) {
+        control.say("no second hand: start with --dust", Message::Rank::hindrance);
+      } else {
+        latched_.irrigation = !latched_.irrigation;
+      }
+      return true;
+    case Command::posture:
+      lay_patient(static_cast<Posture>(press.value), control);
+      return true;
+    case Command::colours:
+      choose_theme(static_cast<ThemeName>(press.value));
+      return true;
+    case Command::lift:
+      lifting_ = true;
+      return false;
     case Command::layout:
       wanted_ = next_layout(wanted_);
       person_.values.layout = EnumNames<Layout>::values[static_cast<std::size_t>(wanted_)];
@@ -123,22 +185,13 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       return true;
     case Command::hand_page:
     case Command::panel_keys:
-      keys_in_panel_ = true;
+      focus_ = Focus::panel;
       hand_page_ = c == Command::hand_page;
       control.say("keys move in the panel: arrows, Space; Esc gives them back");
       return true;
-    case Command::wheel: {
-      const ImVec2 m = ImGui::GetIO().MousePos;
-      const float edge = ToolWheel::kOuterEm * em();
-      const ScreenBox& v = layout_.view;
-      const bool inside = v.holds(m.x, m.y);
-      const auto kept = [&](float at, float lo, float length) {
-        return length < 2 * edge ? lo + length / 2 : std::clamp(at, lo + edge, lo + length - edge);
-      };
-      wheel_.show(inside ? kept(m.x, v.x, v.width) : v.x + v.width / 2,
-                  inside ? kept(m.y, v.y, v.height) : v.y + v.height / 2);
+    case Command::wheel:
+      show_wheel();
       return true;
-    }
     case Command::ruler:
       ruler_.turn(!ruler_.on());
       control.say(ruler_.on() ? "ruler: click two points on the bone" : "ruler put away");
@@ -157,8 +210,8 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       undone_ = true;
       return false;
     case Command::put_away:
-      if (help_.open()) {
-        help_.show(false);
+      if (palette_.shown() != CommandPalette::Shown::nothing) {
+        palette_.show(CommandPalette::Shown::nothing);
         return true;
       }
       if (ruler_.on()) {
@@ -174,7 +227,7 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
 bool MainView::click(std::optional<Vec3> bone, RehearsalControl& control) {
   if (!ruler_.on()) return false;
   if (!bone) {
-    control.say("no bone under the mouse");
+    control.say("no bone under the mouse", Message::Rank::hindrance);
     return true;
   }
   if (const auto note = ruler_.click(*bone)) {
@@ -198,6 +251,7 @@ HandFacts MainView::hand_facts(const RehearsalControl& control, const SoundOut& 
   f.before = before_;
   f.ruler = ruler_.on();
   f.second_hand = control.rehearsal().hands() > 1;
+  f.burr_share = control.burr_share;
   f.undo_steps = undo_steps;
   return f;
 }
@@ -224,14 +278,23 @@ void MainView::see(const RoomScene& scene) {
     scene.control.say("taken back");
   }
   undo_steps_ = facts.undo_steps;
+  // Led away and there, not only asked for.
+  lifted_ = lifting_ && (lifted_ || scene.control.leading());
+  if (lifting_ && !scene.control.leading()) {
+    facts.retracted = std::exchange(lifted_, false);
+    lifting_ = false;
+  }
+  facts.pictured = std::exchange(pictured_, false);
+  facts.tilted_rad = scene.control.handle().tilted_rad();
+  facts.measured_mm = ruler_.length_mm().value_or(0);
   facts.magnification = scene.magnification;
-  steps_.see(facts);
+  steps_.see(seen_ = facts);
 }
 
 void MainView::draw(const RoomScene& scene) {
   ImGuiIO& io = ImGui::GetIO();
-  // ImGui moves its own cursor only while the keys are the panel's.
-  if (keys_in_panel_) {
+  // ImGui moves its own cursor only while the keys are a part's of the window.
+  if (focus_ != Focus::bone) {
     io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
   } else {
     io.ConfigFlags &= ~ImGuiConfigFlags_NavEnableKeyboard;
@@ -240,11 +303,10 @@ void MainView::draw(const RoomScene& scene) {
   pressed_.held.clear();
   RehearsalControl& control = scene.control;
   const HandFacts hand = hand_facts(control, scene.sound, undo_steps_);
-  draw_tray(layout_.tray, hand, keys_in_panel_, latched_, pressed_);
-  draw_state(layout_.state, layout_.view,
-             state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr), control.reported(),
-             pressed_);
-  if (keys_in_panel_) {
+  draw_tray(layout_.tray, hand, keys_in_panel(), latched_, pressed_);
+  const StateFacts facts = state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr);
+  draw_state(layout_.state, layout_.view, facts, control.reported(causes_of(facts)), pressed_);
+  if (keys_in_panel()) {
     if (!ImGui::IsAnyItemActive() && !io.NavVisible) ImGui::SetNextWindowFocus();
     draw_panel(scene);
   } else {
@@ -252,7 +314,7 @@ void MainView::draw(const RoomScene& scene) {
   }
   draw_marks(scene);
   if (writing_) draw_note_field(control);
-  help_.draw(shell_.width(), shell_.height(), [&] { draw_first_steps(steps_); });
+  draw_palette(control);
   if (wheel_.open()) {
     const float e = em();
     if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0)
@@ -260,6 +322,7 @@ void MainView::draw(const RoomScene& scene) {
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) pressed_.press(Command::wheel);
     draw_wheel(wheel_);
   }
+  give_focus();
   if (asking_) {
     // As if it were a key, at the next frame: what the answer begins shows pictures of its own.
     const int said =
@@ -269,17 +332,64 @@ void MainView::draw(const RoomScene& scene) {
   }
 }
 
+void MainView::draw_palette(RehearsalControl& control) {
+  const ScreenBox window{0, 0, static_cast<float>(shell_.width()), static_cast<float>(shell_.height())};
+  const CommandRow* const row = palette_.draw(window, layout_.view);
+  if (row == nullptr) return;
+  if (row->command == Command::suck) {
+    if (control.rehearsal().hands() > 1)
+      latched_.suction = !latched_.suction;
+    else
+      control.say("no second hand: start with --dust", Message::Rank::hindrance);
+  } else if (!row->command || row->held) {
+    control.say(row->keys.empty() ? row->name : row->name + ": " + row->keys + (row->held ? ", held" : ""));
+  } else {
+    pressed_.presses.push_back({*row->command, row->value, row->shift});
+  }
+}
+
+// After what is drawn, so that the part is there.
+void MainView::give_focus() {
+  if (!std::exchange(focus_moved_, false)) return;
+  if (focus_ == Focus::bone) return ImGui::SetWindowFocus(nullptr);
+  const bool drill = ImGui::FindWindowByName("burr") != nullptr && ImGui::FindWindowByName("burr")->WasActive;
+  const char* const names[] = {"", "tray", drill ? "burr" : "instrument", "cuts' foot", "state"};
+  ImGuiWindow* const part = ImGui::FindWindowByName(names[static_cast<std::size_t>(focus_)]);
+  if (part == nullptr || !part->Active) return;  // no room for it
+  ImGui::FocusWindow(part);
+  ImGui::NavInitWindow(part, true);
+  GImGui->NavDisableHighlight = false;
+  GImGui->NavDisableMouseHover = true;
+}
+
+void MainView::session_ended() {
+  seen_.ended = true;
+  steps_.see(seen_);
+  seen_ = {};
+}
+
 // What belongs to the instrument in hand, and what comes next for a new user.
 void MainView::draw_cards(const RoomScene& scene, const HandFacts& hand) {
   const ScreenBox& view = layout_.view;
   const float taken = layout_.over[0].empty() ? 0 : view.right() - layout_.over[0].x;
   static constexpr const char* kTitles[] = {"Drill", "Saw", "Fragments", "Plate"};
-  if (hand.tool == 0) {
-    draw_burr_card(view, view.width - taken, hand, burr_unfolded_, pressed_);
+  float below = 0;
+  if (hand.tool == 0 && !hand.saw) {
+    below = draw_burr_card(view, view.width - taken, hand, burr_unfolded_, pressed_).bottom();
   } else {
-    draw_tool_card(view, kTitles[hand.tool], scene.draw_tools);
+    below = draw_tool_card(view, "instrument", hand.saw ? "Saw in the hand" : kTitles[hand.tool], scene.draw_tools);
   }
-  if (person_.values.first_steps && !help_.open()) person_.values.first_steps = draw_next_step(view, steps_);
+  RehearsalControl& control = scene.control;
+  const bool water = latched_.suction || latched_.irrigation || control.second().holds() > 0;
+  if (const float left = view.bottom() - below; hand.second_hand && water && left > 320 * unit()) {
+    draw_tool_card({view.x, below - 8 * unit(), view.width, left}, "second hand", "Second hand", [&] {
+      draw_second_hand(control.rehearsal(), control.second(), [&](const std::string& said) { control.say(said); });
+    });
+  }
+  if (!person_.values.first_steps) return;
+  const bool card = palette_.shown() == CommandPalette::Shown::ten_keys;
+  const float beside = card ? CommandPalette::card_width() + 16 * unit() : 0;
+  person_.values.first_steps = draw_next_step({view.x + beside, view.y, view.width - beside, view.height}, steps_);
 }
 
 void MainView::draw_panel(const RoomScene& scene) {
@@ -296,14 +406,12 @@ void MainView::draw_panel(const RoomScene& scene) {
   ImGui::BeginChild("all", {0, std::max(4 * em(), ImGui::GetContentRegionAvail().y - apart)});
   scene.draw_camera();
   ImGui::Separator();
-  if (scene.control.tools().tool() == HandTools::Tool::drill) scene.draw_tools();  // plates that are fixed
+  scene.draw_plates();
   draw_sound(scene.sound);
   ImGui::TextDisabled("Colours");
   static const std::string kThemes[] = {"Dark", "Light", "High contrast"};
-  if (const int chosen = choice("theme", kThemes, static_cast<int>(theme_name()), kSmallControl); chosen >= 0) {
-    person_.values.theme = EnumNames<ThemeName>::values[static_cast<std::size_t>(chosen)];
-    take_theme(person_.values.theme);
-  }
+  if (const int chosen = choice("theme", kThemes, static_cast<int>(theme_name()), kSmallControl); chosen >= 0)
+    choose_theme(static_cast<ThemeName>(chosen));
   if (scene.draw_hand) scene.draw_hand(std::exchange(hand_page_, false));
   draw_settings(rehearsal);
   draw_posture(rehearsal);
@@ -372,7 +480,7 @@ void MainView::draw_marks(const RoomScene& scene) {
     draw->AddLine({x, y}, {x, y - 2 * e}, im_colour32(palette::kYellow), e / 8);
     draw->AddRectFilled({x, y - 2 * e}, {x + 1.4F * e, y - e}, im_colour32(palette::kYellow));
     const std::string number = std::to_string(note.number);
-    draw->AddText({x + 0.35F * e, y - 2 * e}, IM_COL32(0, 0, 0, 255), number.c_str());
+    draw->AddText({x + 0.35F * e, y - 2.1F * e}, IM_COL32(0, 0, 0, 255), number.c_str());
     words(x + 1.7F * e, y - 2 * e, note.text.size() > 40 ? note.text.substr(0, 40) + "..." : note.text, theme().text);
   }
   std::vector<std::array<float, 2>> ends;
@@ -408,6 +516,32 @@ void MainView::draw_caption(const RoomScene& scene) {
   fitted_text(draw, {v.x + e / 2, y, v.width - bar - 2.5F * e, 2 * e}, e, theme().text, text);
 }
 
+namespace {
+
+void draw_figures(const std::vector<EndLine>& lines) {
+  if (!ImGui::BeginTable("done", 2)) return;
+  const float u = unit();
+  ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch, 0.45F);
+  ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch, 0.55F);
+  for (const EndLine& line : lines) {
+    ImGui::TableNextRow();
+    ImGui::TableSetColumnIndex(0);
+    ImGui::TextWrapped("%s", line.what.c_str());
+    ImGui::TableSetColumnIndex(1);
+    if (line.nearness != Nearness::unknown) {
+      const NearnessLook& look = look_of(line.nearness);
+      const ImVec2 at = ImGui::GetCursorScreenPos();
+      draw_sign(ImGui::GetWindowDrawList(), {at.x + 8 * u, at.y + ImGui::GetFontSize() / 2}, 7 * u, look.corners,
+                look.colour);
+      ImGui::SetCursorPosX(ImGui::GetCursorPosX() + 20 * u);
+    }
+    ImGui::TextWrapped("%s", line.value.c_str());
+  }
+  ImGui::EndTable();
+}
+
+}  // namespace
+
 EndChoice MainView::end_choice(Command command) {
   switch (command) {
     case Command::reset:
@@ -423,56 +557,52 @@ EndChoice MainView::end_choice(Command command) {
   }
 }
 
-EndChoice MainView::draw_end(const EndFacts& facts, const std::function<void()>& findings) {
+EndChoice MainView::draw_end(const EndFacts& facts, const EndParts& parts) {
   ImGuiIO& io = ImGui::GetIO();
   io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
   begin_fixed("end", layout_.page);
-  const float e = em();
-  fitted_text(ImGui::GetWindowDrawList(),
-              {ImGui::GetCursorScreenPos().x, ImGui::GetCursorScreenPos().y, layout_.page.width - 2 * e, 1.6F * e},
-              1.6F * e, theme().text, facts.past ? "A session, looked at again" : "The session is over, and saved");
-  ImGui::Dummy({0, 1.8F * e});
-  EndChoice choice = EndChoice::none;
-  const auto button = [&](const char* words, EndChoice of) {
-    if (ImGui::Button(words, {ImGui::GetContentRegionAvail().x, 0})) choice = of;
-  };
-  if (!facts.past) {
-    button("again, from the whole bone (R)", EndChoice::again);
-    button("go on from here (F5)", EndChoice::resume);
-  }
-  button("another case (Home)", EndChoice::another);
-  button("close (Q)", EndChoice::close);
-  findings();
-  ImGui::Separator();
-  if (ImGui::BeginTable("done", 2)) {
-    ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch, 0.45F);
-    ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch, 0.55F);
-    for (const EndLine& line : facts.lines) {
-      ImGui::TableNextRow();
-      ImGui::TableSetColumnIndex(0);
-      ImGui::TextWrapped("%s", line.what.c_str());
-      ImGui::TableSetColumnIndex(1);
-      const NearnessLook& look = look_of(line.nearness);
-      const bool plain = line.nearness == Nearness::unknown;
-      if (!plain) {
-        const ImVec2 at = ImGui::GetCursorScreenPos();
-        draw_sign(ImGui::GetWindowDrawList(), {at.x + e * 0.5F, at.y + e * 0.5F}, e * 0.4F, look.corners, look.colour);
-        ImGui::SetCursorPosX(ImGui::GetCursorPosX() + 1.2F * e);
-      }
-      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(plain ? theme().text : ink_of(look.colour)));
-      ImGui::TextWrapped("%s", line.value.c_str());
-      ImGui::PopStyleColor();
-    }
-    ImGui::EndTable();
-  }
-  ImGui::Separator();
-  ImGui::TextDisabled("files");
-  ImGui::TextWrapped("%s", facts.folder.string().c_str());
-  ImGui::TextWrapped("summary.json has the numbers, stream.oss every tick: osteo replay SESSION");
+  const float u = unit();
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const float wide = ImGui::GetContentRegionAvail().x;
+  fitted_text(ImGui::GetWindowDrawList(), {corner.x, corner.y, wide, 32 * u}, kBoldEm * em(), theme().text,
+              facts.past ? "A session, looked at again" : "Session saved", false, true);
+  ImGui::Dummy({0, 32 * u});
+  ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
+  ImGui::TextWrapped("%s", facts.summary.c_str());
+  ImGui::PopStyleColor();
   for (const std::string& w : facts.warnings) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
     ImGui::TextWrapped("! %s", w.c_str());
     ImGui::PopStyleColor();
+  }
+  parts.findings();
+  ImGui::Dummy({0, 4 * u});
+  ImGui::TextDisabled("Next");
+  EndChoice choice = EndChoice::none;
+  const float half = std::floor((wide - ImGui::GetStyle().ItemSpacing.x) / 2);
+  const auto button = [&](const char* words, EndChoice of, ButtonLook look, float width) {
+    if (kit_button(words, look, width)) choice = of;
+  };
+  // What was found serious is tried again on a whole bone; else one goes on.
+  if (facts.past) {
+    button("Another case (Home)", EndChoice::another, ButtonLook::main, wide);
+    button("Close (Q)", EndChoice::close, ButtonLook::usual, half);
+  } else {
+    const bool again = parts.try_again;
+    button(again ? "Try it again: bone reset (R)" : "Continue from here (F5)",
+           again ? EndChoice::again : EndChoice::resume, ButtonLook::main, wide);
+    button(again ? "Continue (F5)" : "Reset bone (R)", again ? EndChoice::resume : EndChoice::again, ButtonLook::usual,
+           half);
+    ImGui::SameLine();
+    button("Another case (Home)", EndChoice::another, ButtonLook::usual, half);
+    button("Close (Q)", EndChoice::close, ButtonLook::usual, half);
+  }
+  parts.course();
+  if (ImGui::CollapsingHeader("All figures")) draw_figures(facts.lines);
+  if (ImGui::CollapsingHeader("All findings")) parts.all_findings();
+  if (ImGui::CollapsingHeader("Files")) {
+    ImGui::TextWrapped("%s", facts.folder.string().c_str());
+    ImGui::TextWrapped("summary.json has the numbers, stream.oss every tick: osteo replay SESSION");
   }
   ImGui::End();
   return choice;

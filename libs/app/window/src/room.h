@@ -6,11 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "help_page.h"
+#include "command_palette.h"
 #include "marks.h"
 #include "osteo/app/window/person_settings.h"
 #include "osteo/app/window/sound_out.h"
 #include "osteo/app/window/window_shell.h"
+#include "osteo/simulation/bone/posture.h"
 #include "rehearsal_control.h"
 #include "room_panels.h"
 #include "steps.h"
@@ -39,13 +40,19 @@ struct RoomScene {
   /// A point of the world in pixels of the window; nothing behind the eye.
   std::function<std::optional<std::array<float, 2>>(Vec3)> project;
   std::function<void()> draw_camera;  ///< the microscope: into the panel
-  std::function<void()> draw_tools;   ///< saw, fragments, plates: into their card, or the panel
+  std::function<void()> draw_tools;   ///< saw, fragments, plates: into their card
+  std::function<void()> draw_plates;  ///< those that are on the bone: into the panel
   /// What is chosen for the hand: into the panel. `show`: opened, and the keys' cursor on it.
   std::function<void(bool show)> draw_hand;
   std::optional<WarmthNow> warmth;  ///< where the scene has heat
 };
 
 enum class EndChoice { none, again, resume, another, close };
+/// What others draw into the page at the end, and whether its one next step is to try again.
+struct EndParts {
+  std::function<void()> findings, all_findings, course;
+  bool try_again = false;
+};
 
 class MainView {
  public:
@@ -56,23 +63,32 @@ class MainView {
   [[nodiscard]] const RoomLayout& layout() const { return layout_; }
   [[nodiscard]] Layout wanted() const { return wanted_; }
   /// Mouse and keys are for something in front of the bone.
-  [[nodiscard]] bool in_front() const { return asking_ || wheel_.open() || writing_.has_value() || help_.open(); }
-  [[nodiscard]] const HelpPage& help() const { return help_; }
+  [[nodiscard]] bool in_front() const { return asking_ || wheel_.open() || writing_.has_value() || palette_.typing(); }
+  [[nodiscard]] const CommandPalette& palette() const { return palette_; }
   [[nodiscard]] bool asking() const { return asking_; }
   [[nodiscard]] bool wheel_open() const { return wheel_.open(); }
-  [[nodiscard]] bool keys_in_panel() const { return keys_in_panel_; }
+  /// The panel is open, and the keys are its.
+  [[nodiscard]] bool keys_in_panel() const { return focus_ == Focus::panel; }
+  /// Which part of the window has the arrows, Space and Enter; bone: none, they are the hand's.
+  enum class Focus { bone, strip, card, cuts, state, panel };
+  [[nodiscard]] Focus focus() const { return focus_; }
   [[nodiscard]] bool before() const { return before_; }
   void set_before(bool on) { before_ = on; }
   [[nodiscard]] const Ruler& ruler() const { return ruler_; }
   [[nodiscard]] const PinnedNotes& notes() const { return notes_; }
   [[nodiscard]] const FirstSteps& steps() const { return steps_; }
   [[nodiscard]] bool writing() const { return writing_.has_value(); }
+  /// Letters are for a text, and no command.
+  [[nodiscard]] bool typing() const { return writing() || palette_.typing(); }
 
   /// Another session has begun.
   void renew();
-  /// Each key as it is pressed, as GLFW numbers it: a note is finished by one that may be over before the next picture,
-  /// which ImGui misses.
-  void key(int code);
+  /// Each key as it is pressed or repeats, as GLFW numbers it: a note is finished by one that may be over before the
+  /// next picture, which ImGui misses.
+  void key(int code, int modifiers, bool repeated);
+  /// A picture was kept; the session has ended and is saved.
+  void picture_kept() { pictured_ = true; }
+  void session_ended();
   /// Presses of buttons since the last call, as if they were keys.
   [[nodiscard]] std::vector<Keyboard::Press> take_presses();
   /// A button that does it is held down.
@@ -86,14 +102,21 @@ class MainView {
   void draw(const RoomScene& scene);
   /// A caption over the picture, in the frame of a screenshot.
   void draw_caption(const RoomScene& scene);
-  /// In review. `findings`: drawn into the page.
-  [[nodiscard]] EndChoice draw_end(const EndFacts& facts, const std::function<void()>& findings);
+  /// In review.
+  [[nodiscard]] EndChoice draw_end(const EndFacts& facts, const EndParts& parts);
   /// What a key means on that page.
   [[nodiscard]] static EndChoice end_choice(Command command);
 
  private:
   void draw_panel(const RoomScene& scene);
   void draw_cards(const RoomScene& scene, const HandFacts& hand);
+  void move_focus(int by);
+  void give_focus();
+  void draw_palette(RehearsalControl& control);
+  [[nodiscard]] bool takes_in_front(Command c, RehearsalControl& control);
+  void show_wheel();
+  static void lay_patient(Posture posture, RehearsalControl& control);
+  void choose_theme(ThemeName name);
   void draw_marks(const RoomScene& scene);
   void draw_note_field(RehearsalControl& control);
   void answer(int answer, RehearsalControl& control);
@@ -108,10 +131,14 @@ class MainView {
   Pressed pressed_;
   ToolWheel wheel_;
   FirstSteps steps_;
+  StepFacts seen_;  // by them, last
   Ruler ruler_;
   PinnedNotes notes_;
-  HelpPage help_;
-  bool asking_ = false, keys_in_panel_ = false, before_ = false, undone_ = false, write_focus_ = false;
+  CommandPalette palette_;
+  Focus focus_ = Focus::bone;
+  bool focus_moved_ = false;  // and ImGui is to be told
+  bool asking_ = false, before_ = false, undone_ = false, write_focus_ = false;
+  bool lifting_ = false, lifted_ = false, pictured_ = false;  // for the first steps
   std::size_t undo_steps_ = 0;
   std::uint64_t times_undone_ = 0;
   std::optional<Vec3> writing_;  // where a note is pinned

@@ -7,7 +7,7 @@ namespace osteo::inline app {
 namespace {
 
 // Of the design, docs/design/window.md, in pixels at scale 1.
-constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPanel = 320, kPage = 544;
+constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPanel = 400, kPage = 544;
 constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kMinCut = 96, kMaxCut = 272;
 // Of the smallest window that operate fits: its state needs the width, its strip the height.
 constexpr double kMinWideEm = 40, kMinHighEm = 26;

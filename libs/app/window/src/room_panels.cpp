@@ -35,14 +35,14 @@ float share_of_row(int buttons) {
 
 }  // namespace
 
-void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f, const std::string& message,
+void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f, const std::optional<Message>& message,
                 Pressed& pressed) {
   ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
   begin_fixed("state", box, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
   ImGui::PopStyleVar();
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
-  const float u = unit(), label = 0.875F * em();
+  const float u = unit(), label = kLabelEm * em();
   const float top = box.y + 8 * u, big = box.y + 26 * u, row = 32 * u;
   float x = box.x + 16 * u;
   const auto figure = [&](const std::string& name, const std::string& value, float wide) {
@@ -63,8 +63,8 @@ void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f
   const float end_wide = std::max(72 * u, button_width("End")), right = box.right() - 16 * u;
   const float time_wide = 96 * u, time_x = right - end_wide - 16 * u - time_wide;
   const auto flush_right = [&](float y, float high, const std::string& words, Colour colour) {
-    const std::string shown = shortened(words, time_wide, label);
-    const float wide = ImGui::GetFont()->CalcTextSizeA(label, FLT_MAX, 0, shown.c_str()).x;
+    const std::string shown = shortened(words, time_wide, kLineEm * label);
+    const float wide = ImGui::GetFont()->CalcTextSizeA(kLineEm * label, FLT_MAX, 0, shown.c_str()).x;
     fitted_text(draw, {time_x + time_wide - wide, y, wide + 1, high}, label, colour, shown);
   };
   flush_right(box.y + 12 * u, 18 * u, f.time, t.text);
@@ -86,7 +86,7 @@ void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f
   const bool is_near = !f.distance.empty() && f.nearness != Nearness::far;
   std::string words = is_near ? f.distance + " " + look.word : f.distance.empty() ? "" : f.distance;
   ImFont* const bold = bold_font();
-  const float said = words.empty() ? 0 : bold->CalcTextSizeA(em(), FLT_MAX, 0, words.c_str()).x;
+  const float said = words.empty() ? 0 : bold->CalcTextSizeA(ImGui::GetFontSize(), FLT_MAX, 0, words.c_str()).x;
   const float name_wide = near.width - said - (words.empty() ? 0 : 34 * u);
   const std::string name = f.structure + (f.warmth.empty() ? "" : ", " + f.warmth);
   if (name_wide > 24 * u)
@@ -95,7 +95,7 @@ void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f
     if (is_near)
       draw_sign(draw, {near.right() - said - 14 * u, near.y + 13 * u}, 8 * u, look.corners,
                 contact ? ink : look.colour);
-    draw->AddText(bold, em(), {near.right() - said, near.y + 2 * u}, im_colour32(ink), words.c_str());
+    draw->AddText(bold, ImGui::GetFontSize(), {near.right() - said, near.y + 2 * u}, im_colour32(ink), words.c_str());
   }
   const float bar_y = near.y + 34 * u;
   draw->AddRectFilled({near.x, bar_y}, {near.right(), bar_y + 8 * u}, im_colour32(contact ? Colour{0, 0, 0} : t.raised),
@@ -108,11 +108,11 @@ void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f
   }
 
   // One place for words.
-  const bool warns = warning_is_reported(f, message);
-  const std::string& reported = warns ? f.warning : message;
-  if (!reported.empty()) {
-    const ChipLook chip{warns ? (f.alarm ? palette::kVermillion : palette::kYellow) : palette::kSkyBlue,
-                        warns ? (f.alarm ? 8 : 3) : 0, warns && f.alarm};
+  if (message) {
+    static constexpr ChipLook kLooks[] = {
+        {palette::kSkyBlue, 0, false}, {palette::kYellow, 3, false}, {palette::kVermillion, 8, true}};
+    const ChipLook chip = kLooks[static_cast<std::size_t>(message->rank)];
+    const std::string& reported = message->text;
     const float wide = chip_width(reported);
     const float room = time_x - 16 * u - near.right() - 24 * u;
     if (inside && wide <= room) {
@@ -147,7 +147,7 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& 
       {"plate", "Plate", Command::plates, hand.tool == 3},
       {"fragments", "Fragments", Command::pieces, hand.tool == 2},
       {"suction", "Suction", Command::suck, false, hand.sucking, hand.second_hand, true, &latched.suction, no_second},
-      {"droplet", "Irrigation", Command::wash, false, hand.washing, hand.second_hand, false, &latched.irrigation,
+      {"droplet", "Irrigation", Command::irrigation, false, hand.washing, hand.second_hand, false, &latched.irrigation,
        no_second},
       {"arrow-bar-to-down", "Approach", Command::bring, false, false, true, true},
       {"arrow-bar-up", "Retract", Command::lift},
@@ -157,8 +157,9 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& 
       {"ruler-measure", "Ruler", Command::ruler, false, hand.ruler},
       {"note", "Note", Command::mark},
       {"camera", "Picture", Command::screenshot},
-      {"layout-grid", "Operate or plan", Command::layout, false, false, true, true},
-      {"help", "Keys", Command::help}};
+      {"layout-grid", "Operate or plan", Command::layout},
+      {"command", "All commands", Command::palette, false, false, true, true},
+      {"help", "Ten keys", Command::help}};
   // As far apart as there is room; smaller only where a screen is very low.
   const auto count = static_cast<float>(std::size(rows));
   const float inset = 8 * u, most = box.height - 2 * inset, line = 9 * u;
@@ -264,7 +265,7 @@ ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFact
     if (is) draw->AddRect(lo, hi, im_colour32(theme().accent), kRound * u, 0, 2 * u);
     const float radius = static_cast<float>(d) * kPixelsPerMm * u / 2;
     draw_burr(draw, {x + size / 2, y + 18 * u}, radius, kBurrKinds[static_cast<std::size_t>(burr.kind)], u);
-    fitted_text(draw, {lo.x, y + line - 17 * u, size, 16 * u}, 0.875F * em(), is ? theme().text : theme().quiet, name,
+    fitted_text(draw, {lo.x, y + line - 17 * u, size, 16 * u}, kLabelEm * em(), is ? theme().text : theme().quiet, name,
                 true);
     if (clicked) pressed.press(Command::diameter, d);
     if (hovered) ImGui::SetTooltip("%d mm   %d", d, d);
@@ -279,24 +280,30 @@ ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFact
     if (const int shape = choice("shape", kShapes, static_cast<int>(burr.shape)); shape >= 0)
       pressed.press(kCommands[shape]);
     ImGui::SetCursorScreenPos({box.x + pad, y + 2 * line});
-    bool on = hand.latched;
-    ImGui::PushClipRect({box.x, box.y}, {box.right(), box.bottom()}, true);
-    if (kit_switch("Drill on", on, box.width - 2 * pad)) pressed.press(Command::drill);
-    ImGui::PopClipRect();
+    // A quarter a step, as its keys do.
+    ImGui::AlignTextToFramePadding();
+    ImGui::TextDisabled("Speed");
+    ImGui::SameLine();
+    static const std::string kSpeeds[] = {"25", "50", "75", "100 %"};
+    const int now = static_cast<int>(std::lround(4 * hand.burr_share)) - 1;
+    if (const int speed = choice("speed", kSpeeds, now); speed >= 0) {
+      for (int n = now; n != speed; n += speed > now ? 1 : -1) pressed.press(Command::burr_speed, speed > now ? 1 : -1);
+    }
   }
   ImGui::End();
   return box;
 }
 
-void draw_tool_card(const ScreenBox& view, const std::string& title, const std::function<void()>& content) {
+float draw_tool_card(const ScreenBox& view, const char* name, const std::string& title,
+                     const std::function<void()>& content) {
   const float u = unit(), wide = std::min(312 * u, view.width - 32 * u);
-  if (wide < 160 * u) return;
+  if (wide < 160 * u) return view.y;
   ImGui::SetNextWindowPos({view.x + 16 * u, view.y + 16 * u});
   ImGui::SetNextWindowSizeConstraints({wide, 0}, {wide, std::max(96 * u, view.height - 96 * u)});
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, kCardRound * u);
   ImVec4 ground = im_colour(theme().surface, 0.94F);
   ImGui::PushStyleColor(ImGuiCol_WindowBg, ground);
-  ImGui::Begin("instrument", nullptr,
+  ImGui::Begin(name, nullptr,
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
                    ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoBringToFrontOnFocus);
   ImGui::PopStyleColor();
@@ -306,10 +313,28 @@ void draw_tool_card(const ScreenBox& view, const std::string& title, const std::
   ImGui::TextUnformatted(title.c_str());
   ImGui::SetWindowFontScale(1);
   ImGui::PopFont();
-  ImGui::PushItemWidth(ImGui::GetContentRegionAvail().x * 0.6F);
   content();
-  ImGui::PopItemWidth();
+  const float bottom = ImGui::GetWindowPos().y + ImGui::GetWindowHeight();
   ImGui::End();
+  return bottom;
+}
+
+void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const std::string&)>& say) {
+  const std::pair<const char*, std::size_t> things[] = {{"Suction", SecondHand::kSucker},
+                                                        {"Irrigation", SecondHand::kIrrigator},
+                                                        {"Probe", SecondHand::kProbe},
+                                                        {"Nothing", 0}};
+  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
+  for (const auto& [name, what] : things) {
+    if (list_row(name, "", second.holds() == what)) say(second.take(rehearsal, what));
+  }
+  ImGui::PopStyleVar();
+  ImGui::TextDisabled("Suction tube, French");
+  static constexpr int kFrench[] = {5, 7, 8, 10, 12};
+  static const std::string kSizes[] = {"5", "7", "8", "10", "12"};
+  const auto at = std::find(std::begin(kFrench), std::end(kFrench), second.sucker_french()) - std::begin(kFrench);
+  if (const int size = choice("size", kSizes, static_cast<int>(at), kSmallControl); size >= 0)
+    second.take_sucker(kFrench[size]);
 }
 
 void draw_apart(Pressed& pressed) {
@@ -335,42 +360,18 @@ bool draw_next_step(const ScreenBox& view, const FirstSteps& steps) {
   const ScreenBox box{view.x + 16 * u, view.bottom() - 64 * u - high, wide, high};
   begin_card("first steps", box, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoFocusOnAppearing);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
-  draw->AddText(bold_font(), em(), {box.x + 16 * u, box.y + 12 * u}, im_colour32(theme().text), name.c_str());
+  draw->AddText(bold_font(), ImGui::GetFontSize(), {box.x + 16 * u, box.y + 12 * u}, im_colour32(theme().text),
+                name.c_str());
   const std::string count = std::to_string(number) + " of " + std::to_string(possible);
   const float count_wide = ImGui::CalcTextSize(count.c_str()).x;
   draw->AddText({box.right() - 48 * u - count_wide, box.y + 12 * u}, im_colour32(theme().quiet), count.c_str());
   ImGui::SetCursorScreenPos({box.right() - 40 * u, box.y + 6 * u});
   const bool closed = ImGui::InvisibleButton("close", {32 * u, 32 * u});
   draw_icon(draw, {box.right() - 34 * u, box.y + 12 * u}, 20 * u, "x", im_colour32(theme().quiet));
-  draw->AddText(ImGui::GetFont(), em(), {box.x + 16 * u, box.y + 38 * u}, im_colour32(theme().text), how.c_str(),
-                nullptr, wide - 32 * u);
+  draw->AddText(ImGui::GetFont(), ImGui::GetFontSize(), {box.x + 16 * u, box.y + 38 * u}, im_colour32(theme().text),
+                how.c_str(), nullptr, wide - 32 * u);
   ImGui::End();
   return !closed;
-}
-
-void draw_first_steps(const FirstSteps& steps) {
-  ImGui::TextDisabled("the first minutes");
-  const int next = steps.next();
-  const bool beside = ImGui::GetContentRegionAvail().x > 70 * em();
-  if (beside && !ImGui::BeginTable("steps", 2)) return;
-  ImDrawList* const draw = ImGui::GetWindowDrawList();
-  const float e = em();
-  for (int n = 0; n < static_cast<int>(steps.steps().size()); ++n) {
-    const Step& step = steps.steps()[static_cast<std::size_t>(n)];
-    if (!step.possible) continue;  // is not asked for
-    if (beside) ImGui::TableNextColumn();
-    const ImVec2 at = ImGui::GetCursorScreenPos();
-    if (step.done)
-      draw_icon(draw, {at.x, at.y}, e, "check", im_colour32(theme().text));
-    else
-      draw->AddRect({at.x + e * 0.1F, at.y + e * 0.15F}, {at.x + e * 0.8F, at.y + e * 0.85F}, im_colour32(theme().line),
-                    0, 0, e / 12);
-    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + e * 1.2F);
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(n == next ? theme().text : theme().quiet));
-    ImGui::TextWrapped("%s", step.words.c_str());
-    ImGui::PopStyleColor();
-  }
-  if (beside) ImGui::EndTable();
 }
 
 void draw_wheel(const ToolWheel& wheel) {
@@ -392,11 +393,11 @@ void draw_wheel(const ToolWheel& wheel) {
     draw->AddLine({middle.x + inner * std::cos(edge), middle.y + inner * std::sin(edge)},
                   {middle.x + outer * std::cos(edge), middle.y + outer * std::sin(edge)}, im_colour32(theme().quiet),
                   1);
-    const float r = outer * 0.68F, wide = 4.4F * e;
+    const float r = outer * 0.68F, wide = 5.6F * e;
     const ScreenBox box{middle.x + r * std::cos(angle) - wide / 2, middle.y + r * std::sin(angle) - e * 1.1F, wide,
                         e * 1.2F};
     fitted_text(draw, box, e * (chosen ? 1.15F : 1), theme().text, items[n].word, true);
-    fitted_text(draw, {box.x, box.bottom(), wide, e * 0.9F}, e * 0.8F, theme().quiet,
+    fitted_text(draw, {box.x, box.bottom(), wide, e * 1.1F}, e * kLabelEm, theme().quiet,
                 key_name(items[n].command, items[n].value), true);
   }
   draw->AddCircle(middle, outer, im_colour32(theme().quiet), 64, 1.5F);

@@ -3,6 +3,8 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 
 #include <vtkActor.h>
 #include <vtkCellArray.h>
@@ -18,6 +20,7 @@
 #include "osteo/display/view/instrument_view.h"
 #include "osteo/simulation/bone/plates.h"
 #include "osteo/simulation/bone/world_mesh.h"
+#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -25,59 +28,91 @@ namespace {
 
 using Tool = HandTools::Tool;
 
+std::string mm_or_through(double mm) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.0f mm", mm);
+  return mm > 0 ? text : "through";
+}
+
 void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, const CutPreview& preview,
                std::array<char, 64>& plan_name) {
   SawCut cut = tools.cut();
-  const auto slider = [](const char* name, double& mm, float least, float most, const char* format) {
-    float value = static_cast<float>(mm);
-    if (ImGui::SliderFloat(name, &value, least, most, format)) mm = static_cast<double>(value);
-  };
-  slider("kerf", cut.kerf_mm, 0.2F, 5, "%.1f mm");
-  slider("long", cut.length_mm, 0, 150, cut.length_mm > 0 ? "%.0f mm" : "through");
-  slider("deep", cut.depth_mm, 0, 150, cut.depth_mm > 0 ? "%.0f mm" : "through");
-  tools.set_cut(cut);
-  if (!tools.planned().empty()) ImGui::SetNextItemWidth(-1);
-  if (!tools.planned().empty() && ImGui::BeginCombo("##planned", "planned cuts")) {
-    for (std::size_t i = 0; i < tools.planned().size(); ++i) {
-      if (ImGui::Selectable(tools.planned()[i].name.c_str())) tools.choose_planned(i);
+  char kerf[32];
+  std::snprintf(kerf, sizeof kerf, "%.1f mm", cut.kerf_mm);
+  bool changed = kit_slider("Kerf", kerf, cut.kerf_mm, 0.2, 5, 0.1);
+  changed |= kit_slider("Length", mm_or_through(cut.length_mm), cut.length_mm, 0, 150, 1);
+  changed |= kit_slider("Depth", mm_or_through(cut.depth_mm), cut.depth_mm, 0, 150, 1);
+  if (changed) tools.set_cut(cut);
+  if (!tools.planned().empty()) {
+    ImGui::SetNextItemWidth(-1);
+    if (ImGui::BeginCombo("##planned", "Planned cuts")) {
+      for (std::size_t i = 0; i < tools.planned().size(); ++i) {
+        if (ImGui::Selectable(tools.planned()[i].name.c_str())) tools.choose_planned(i);
+      }
+      ImGui::EndCombo();
     }
-    ImGui::EndCombo();
   }
-  if (ImGui::Button("as I see it")) tools.aim_saw(view, false);
+  if (kit_button("Upright", ButtonLook::usual, 0, kSmallControl)) tools.aim_saw(view, false);
   ImGui::SameLine();
-  if (ImGui::Button("flat")) tools.aim_saw(view, true);
+  if (kit_button("Flat", ButtonLook::usual, 0, kSmallControl)) tools.aim_saw(view, true);
   if (!preview.text().empty()) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(preview.cuts() ? ink_of(palette::kVermillion) : theme().text));
     ImGui::TextWrapped("%s%s", preview.cuts() ? "! " : "", preview.text().c_str());
     ImGui::PopStyleColor();
   }
-  if (ImGui::Button("Cut (Enter)", {-1, 0})) tools.perform(rehearsal);
+  const float wide = ImGui::GetContentRegionAvail().x;
+  if (kit_button("Cut (Enter)", ButtonLook::main, wide)) tools.perform(rehearsal);
   // By force and time, with this plane as the cutting guide.
-  if (ImGui::Button("By hand, along this plane", {-1, 0})) tools.take_saw(rehearsal);
+  if (kit_button("By hand, along this plane", ButtonLook::usual, wide)) tools.take_saw(rehearsal);
   ImGui::SetNextItemWidth(-1);
-  if (ImGui::InputTextWithHint("##plan", "keep as planned: name, Enter", plan_name.data(), plan_name.size(),
+  if (ImGui::InputTextWithHint("##plan", "Name: keeps it as planned", plan_name.data(), plan_name.size(),
                                ImGuiInputTextFlags_EnterReturnsTrue)) {
     tools.keep_planned(plan_name.data());
     plan_name.fill(0);
   }
 }
 
+void saw_in_hand_panel(HandTools& tools, Rehearsal& rehearsal) {
+  char kerf[64];
+  std::snprintf(kerf, sizeof kerf, "Held in its plane. Kerf %.1f mm.", tools.cut().kerf_mm);
+  ImGui::TextWrapped("%s", kerf);
+  if (kit_button("Put away (Esc)", ButtonLook::usual, ImGui::GetContentRegionAvail().x)) tools.put_saw_away(rehearsal);
+}
+
 void piece_panel(HandTools& tools, Rehearsal& rehearsal) {
-  if (ImGui::Button("Separate fragments (Enter)", {-1, 0})) tools.perform(rehearsal);
-  if (tools.piece() == SceneAction::kNobody) {
-    ImGui::TextWrapped("Press on a piece and drag it; with Shift it turns.");
+  std::vector<std::uint32_t> bodies;
+  rehearsal.look([&](const World& world, SceneReaders&) {
+    for (const PlacedBody& b : world.bodies()) {
+      if (!b.of_region) bodies.push_back(b.body->id);
+    }
+  });
+  const float wide = ImGui::GetContentRegionAvail().x;
+  if (kit_button("Separate fragments (Enter)", ButtonLook::main, wide)) tools.perform(rehearsal);
+  if (bodies.size() < 2) {
+    ImGui::TextWrapped("The bone is in one piece.");
     return;
   }
+  ImGui::TextWrapped("Drag one in the picture; with Shift it turns.");
+  constexpr std::size_t kShown = 5;
+  ImGui::BeginChild("fragments", {0, kRow * unit() * static_cast<float>(std::min(kShown, bodies.size()))});
+  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
+  for (const std::uint32_t body : bodies) {
+    if (list_row("Fragment " + std::to_string(body + 1), "", tools.piece() == body)) tools.take_piece(body, rehearsal);
+  }
+  ImGui::PopStyleVar();
+  ImGui::EndChild();
+  if (tools.piece() == SceneAction::kNobody) return;
   const Vec3 by = tools.piece_pose().shift_mm;
-  ImGui::Text("piece %u  %+.1f %+.1f %+.1f mm", tools.piece(), by.x, by.y, by.z);
-  if (ImGui::Button("Put back", {-1, 0})) tools.put_piece_back(rehearsal);
+  ImGui::Text("moved %+.1f %+.1f %+.1f mm", by.x, by.y, by.z);
+  if (kit_button("Put back", ButtonLook::usual, wide)) tools.put_piece_back(rehearsal);
 }
 
 void plate_panel(HandTools& tools, Rehearsal& rehearsal) {
   std::size_t plate = tools.plate();
-  float turn = tools.plate_turn_deg(), tilt = tools.plate_tilt_deg();
+  double turn = static_cast<double>(tools.plate_turn_deg()), tilt = static_cast<double>(tools.plate_tilt_deg());
   bool changed = false;
-  if (ImGui::BeginCombo("plate", plate_library()[plate].name.c_str())) {
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::BeginCombo("##plate", plate_library()[plate].name.c_str())) {
     for (std::size_t i = 0; i < plate_library().size(); ++i) {
       if (ImGui::Selectable(plate_library()[i].name.c_str(), i == plate)) {
         plate = i;
@@ -87,15 +122,16 @@ void plate_panel(HandTools& tools, Rehearsal& rehearsal) {
     ImGui::EndCombo();
   }
   ImGui::TextWrapped("%s", plate_library()[plate].about.c_str());
-  changed |= ImGui::SliderFloat("turn", &turn, -180, 180, "%.0f deg");
-  changed |= ImGui::SliderFloat("tilt", &tilt, -90, 90, "%.0f deg");
-  if (changed) tools.set_plate(plate, turn, tilt, rehearsal);
-  if (ImGui::Button("Fix it here (Enter)", {-1, 0})) tools.perform(rehearsal);
+  const auto degrees = [](double deg) { return std::to_string(std::lround(deg)) + "°"; };
+  changed |= kit_slider("Turn", degrees(turn), turn, -180, 180, 1);
+  changed |= kit_slider("Tilt", degrees(tilt), tilt, -90, 90, 1);
+  if (changed) tools.set_plate(plate, static_cast<float>(turn), static_cast<float>(tilt), rehearsal);
+  if (kit_button("Fix it here (Enter)", ButtonLook::main, ImGui::GetContentRegionAvail().x)) tools.perform(rehearsal);
 }
 
 // Where it should lie on bone.
 void report_collision(double mm) {
-  if (mm > kPlateCollisionMm) ImGui::TextColored({1.0F, 0.45F, 0.35F, 1}, "%.1f mm deep in bone", mm);
+  if (mm > kPlateCollisionMm) ImGui::TextColored(im_colour(ink_of(palette::kVermillion)), "! %.1f mm deep in bone", mm);
 }
 
 }  // namespace
@@ -152,12 +188,21 @@ SceneTools::~SceneTools() {
 }
 
 void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view) {
-  if (tools.tool() == Tool::saw) saw_panel(tools, rehearsal, view, preview_, plan_name_);
-  if (tools.tool() == Tool::piece) piece_panel(tools, rehearsal);
-  if (tools.tool() == Tool::plate) {
+  if (tools.saw_in_hand()) {
+    saw_in_hand_panel(tools, rehearsal);
+  } else if (tools.tool() == Tool::saw) {
+    saw_panel(tools, rehearsal, view, preview_, plan_name_);
+  } else if (tools.tool() == Tool::piece) {
+    piece_panel(tools, rehearsal);
+  } else if (tools.tool() == Tool::plate) {
     plate_panel(tools, rehearsal);
     report_collision(hand_in_bone_mm_);
+    fixed_plates(rehearsal);
   }
+  if (const std::string& note = tools.note(rehearsal); !note.empty()) ImGui::TextWrapped("%s", note.c_str());
+}
+
+void SceneTools::fixed_plates(Rehearsal& rehearsal) {
   std::vector<Fixture> fixtures;
   std::vector<double> in_bone_mm;
   rehearsal.look([&](const World& world, SceneReaders&) {
@@ -168,18 +213,18 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
   for (const Fixture& f : fixtures) {
     const PlateModel& model = plate_library()[f.plate];
     ImGui::PushID(static_cast<int>(f.id));
-    ImGui::Text("%u: %s", f.id, model.name.c_str());
-    ImGui::SameLine();
-    if (ImGui::SmallButton("take off")) rehearsal.act(SceneAction::detach(f.id));
+    ImGui::TextWrapped("%u: %s", f.id, model.name.c_str());
+    if (kit_button("Take off", ButtonLook::usual, 0, kSmallControl)) rehearsal.act(SceneAction::detach(f.id));
     report_collision(in_bone_mm[static_cast<std::size_t>(&f - fixtures.data())]);
     if (model.most_opening_mm > 0 && f.other != SceneAction::kNobody) {
-      float opening = static_cast<float>(f.opening_mm);
-      if (ImGui::SliderFloat("open", &opening, 0, static_cast<float>(model.most_opening_mm), "%.1f mm"))
-        rehearsal.act(SceneAction::open(f.id, static_cast<double>(opening)));
+      double opening = f.opening_mm;
+      char text[32];
+      std::snprintf(text, sizeof text, "%.1f mm", opening);
+      if (kit_slider("Opening", text, opening, 0, model.most_opening_mm, 0.1))
+        rehearsal.act(SceneAction::open(f.id, opening));
     }
     ImGui::PopID();
   }
-  if (const std::string& note = tools.note(rehearsal); !note.empty()) ImGui::TextWrapped("%s", note.c_str());
 }
 
 void SceneTools::show(const HandTools& tools, const TickRecord& tick, const World& world,

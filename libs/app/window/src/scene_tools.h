@@ -35,8 +35,10 @@ class SceneTools {
   SceneTools(const SceneTools&) = delete;
   SceneTools& operator=(const SceneTools&) = delete;
 
-  /// A section of the panel.
+  /// Into the current window: what belongs to the tool in hand, and nothing else.
   void panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view);
+  /// Plates that are on the bone, to be taken off or opened. No-op without any.
+  static void fixed_plates(Rehearsal& rehearsal);
   /// Cursors of the tools, before each frame.
   void show(const HandTools& tools, const TickRecord& tick, const World& world, const StructureMap* structures,
             double now_s);

@@ -61,15 +61,13 @@ bool ScopeInput::mouse(const ScopeMouse& m, bool as_device, double seconds) {
     if (moved) control.pan(-m.dx * mm, m.dy * mm);
     return true;
   }
-  if (m.ctrl && m.wheel != 0) {
-    if (m.shift) {
-      control.focus(m.wheel * kFocusPerKey * view().field_mm());
-    } else {
-      control.zoom(std::pow(kZoomPerStep, m.wheel));
-    }
+  if (m.wheel == 0 || (!m.ctrl && (m.shift || m.works))) return false;
+  if (m.ctrl && m.shift) {
+    control.focus(m.wheel * kFocusPerKey * view().field_mm());
     return true;
   }
-  return false;
+  control.zoom(std::pow(kZoomPerStep, m.wheel));
+  return m.ctrl || !moved;  // the hand does not lose what the mouse went meanwhile
 }
 
 bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, const std::optional<Vec3>& under_mouse,

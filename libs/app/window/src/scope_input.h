@@ -16,6 +16,7 @@ struct ScopeMouse {
   double x = 0, y = 0, dx = 0, dy = 0, wheel = 0;
   bool right = false, middle = false;  ///< down
   bool ctrl = false, shift = false;
+  bool works = false;  ///< the left button is down, or another hand has the mouse: the wheel is not the camera's
 };
 
 /// What of the scene a key may ask for.

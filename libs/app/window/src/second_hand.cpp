@@ -5,8 +5,7 @@
 namespace osteo::inline app {
 namespace {
 
-// What it may hold, in turn; the first: nothing.
-constexpr const char* kSecond[] = {"", "sucker 10 Fr", "irrigator 2 mm", "probe 1 mm"};
+constexpr std::size_t kThings = 4;  // nothing is the first
 constexpr const char* kNone = "there is no second hand: --dust, or --second-device";
 
 MouseDevice* moved_by_window(Rehearsal& rehearsal) {
@@ -15,15 +14,26 @@ MouseDevice* moved_by_window(Rehearsal& rehearsal) {
 
 }  // namespace
 
+std::string SecondHand::name_of(std::size_t what) const {
+  return what == kSucker      ? "sucker " + std::to_string(french_) + " Fr"
+         : what == kIrrigator ? "irrigator 2 mm"
+         : what == kProbe     ? "probe 1 mm"
+                              : "";
+}
+
 std::string SecondHand::take_next(Rehearsal& rehearsal) {
+  return take(rehearsal, (holds_ + 1) % kThings);
+}
+
+std::string SecondHand::take(Rehearsal& rehearsal, std::size_t what) {
   if (rehearsal.hands() < 2) return kNone;
-  holds_ = (holds_ + 1) % std::size(kSecond);
+  holds_ = what;
   if (moved_by_window(rehearsal) == nullptr) {
     holds_ = std::max<std::size_t>(holds_, 1);
-    rehearsal.device(1).set_tool(static_cast<std::uint8_t>(instrument_index(kSecond[holds_])));
+    rehearsal.device(1).set_tool(static_cast<std::uint8_t>(instrument_index(name_of(holds_))));
   }
   if (holds_ == 0) follow();
-  return holds_ == 0 ? "second hand: nothing" : std::string("second hand: ") + kSecond[holds_];
+  return holds_ == 0 ? "second hand: nothing" : "second hand: " + name_of(holds_);
 }
 
 bool SecondHand::move(Rehearsal& rehearsal, Vec3 by_mm, std::string& said) {
@@ -47,9 +57,9 @@ void SecondHand::hold(Rehearsal& rehearsal, const ViewAxes& view, bool suck, boo
   empty_ = !works && holds_ == 0;
   const TickRecord tick = rehearsal.latest();
   HandGoal goal;
-  goal.tool = static_cast<std::uint8_t>(instrument_index(suck   ? kSecond[1]
-                                                         : wash ? kSecond[2]
-                                                                : kSecond[std::max<std::size_t>(holds_, 1)]));
+  goal.tool = static_cast<std::uint8_t>(instrument_index(name_of(suck   ? kSucker
+                                                                 : wash ? kIrrigator
+                                                                        : std::max(holds_, kSucker))));
   goal.pedal = works ? 255 : 0;
   // From the side where the drill's handle is not.
   const Vec3 side = view.right * (left_handed ? 1.0 : -1.0);

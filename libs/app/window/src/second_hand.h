@@ -13,6 +13,13 @@ class SecondHand {
   /// The next of sucker, irrigator, probe and nothing; a device's hand always holds one of the three. What there is to
   /// say.
   std::string take_next(Rehearsal& rehearsal);
+  /// One of them; 0: nothing. What there is to say.
+  std::string take(Rehearsal& rehearsal, std::size_t what);
+  [[nodiscard]] std::size_t holds() const { return holds_; }
+  static constexpr std::size_t kSucker = 1, kIrrigator = 2, kProbe = 3;
+  /// Its sucker, in French: 5, 7, 8, 10 or 12.
+  void take_sucker(int french) { french_ = french; }
+  [[nodiscard]] int sucker_french() const { return french_; }
   /// The mouse moves it: from where it is, and it stays where it is put. With nothing in it, it takes a sucker. False:
   /// there is none that a mouse could move, and `said` is why.
   bool move(Rehearsal& rehearsal, Vec3 by_mm, std::string& said);
@@ -29,7 +36,9 @@ class SecondHand {
   [[nodiscard]] const std::optional<Vec3>& placed_mm() const { return placed_mm_; }
 
  private:
-  std::size_t holds_ = 0;  // place in kSecond
+  [[nodiscard]] std::string name_of(std::size_t what) const;
+  std::size_t holds_ = 0;
+  int french_ = 10;
   bool sucking_ = false, washing_ = false, empty_ = false;
   std::optional<Vec3> placed_mm_;
 };

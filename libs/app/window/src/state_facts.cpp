@@ -68,8 +68,12 @@ StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures,
   return f;
 }
 
-bool warning_is_reported(const StateFacts& facts, const std::string& message) {
-  return !facts.warning.empty() && !(facts.lasts && !message.empty());
+std::vector<Message> causes_of(const StateFacts& facts) {
+  if (facts.warning.empty()) return {};
+  return {{facts.alarm   ? Message::Rank::harm
+           : facts.lasts ? Message::Rank::information
+                         : Message::Rank::hindrance,
+           facts.warning}};
 }
 
 void report_warmth(StateFacts& f, const WarmthNow& warmth, const TickRecord& tick, const StructureMap* structures) {

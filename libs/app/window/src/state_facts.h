@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 
+#include "messages.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "palette.h"
 
@@ -44,8 +45,8 @@ void report_warmth(StateFacts& facts, const WarmthNow& warmth, const TickRecord&
 /// The part of it that follows from a tick alone. `structures` may be null.
 [[nodiscard]] StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures, double rate_hz);
 
-/// Rather than the last thing said, which is empty after a while: a warning that lasts lets it pass.
-[[nodiscard]] bool warning_is_reported(const StateFacts& facts, const std::string& message);
+/// Its warning by rank: harm, what stops the work, or, where it lasts, information.
+[[nodiscard]] std::vector<Message> causes_of(const StateFacts& facts);
 
 /// "3:07"; from an hour "1:03:07".
 [[nodiscard]] std::string clock_text(double seconds);

@@ -1,4 +1,4 @@
-// The first five minutes: what a new user does once, ticked off by what came of it. Private to libs/app/window; no
+// The first minutes: what a new user does once, ticked off by what came of it. Private to libs/app/window; no
 // ImGui.
 #pragma once
 #include <optional>
@@ -11,8 +11,13 @@ namespace osteo::inline app {
 struct StepFacts {
   double removed_mm3 = 0, sawn_mm3 = 0;
   std::size_t undo_steps = 0, fixtures = 0;
-  bool undone = false;  ///< something was taken back in this picture
-  bool dust = false;    ///< the scene has any: else nothing can be sucked off
+  bool undone = false;     ///< something was taken back in this picture
+  bool retracted = false;  ///< the drill has come out of the bone, asked for
+  bool pictured = false;   ///< a picture was kept
+  bool ended = false;      ///< the session is over, and saved
+  double tilted_rad = 0;   ///< the handle, from how the view holds it
+  double measured_mm = 0;  ///< by the ruler; 0: nothing
+  bool dust = false;       ///< the scene has any: else nothing can be sucked off
   double sucked_mm3 = 0;
   double magnification = 1;
 };

@@ -27,7 +27,7 @@ class ToolWheel {
   void turn(int items);  ///< by keys
   /// -1: none.
   [[nodiscard]] int chosen() const { return chosen_; }
-  static constexpr float kInnerEm = 2, kOuterEm = 8;
+  static constexpr float kInnerEm = 2, kOuterEm = 9.5F;
 
  private:
   bool open_ = false;

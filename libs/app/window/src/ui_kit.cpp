@@ -53,7 +53,7 @@ Item item(const char* id, ImVec2 size) {
 }
 
 void centred(ImDrawList* draw, ImVec2 lo, ImVec2 hi, const std::string& words, Colour colour) {
-  const std::string shown = shortened(words, hi.x - lo.x, em());
+  const std::string shown = shortened(words, hi.x - lo.x, ImGui::GetFontSize());
   const ImVec2 size = ImGui::CalcTextSize(shown.c_str());
   draw->AddText({std::floor((lo.x + hi.x - size.x) / 2), std::floor((lo.y + hi.y - size.y) / 2)},
                 im_colour32(colour, ImGui::GetStyle().Alpha), shown.c_str());
@@ -164,10 +164,41 @@ bool kit_switch(const std::string& words, bool& on, float width) {
   draw->AddRectFilled({x, y - 10 * u}, {x + 36 * u, y + 10 * u}, im_colour32(on ? t.text : t.raised), 10 * u);
   draw->AddRect({x, y - 10 * u}, {x + 36 * u, y + 10 * u}, im_colour32(t.line), 10 * u, 0, std::max(1.0F, u));
   draw->AddCircleFilled({x + (on ? 26 : 10) * u, y}, 7 * u, im_colour32(on ? t.ground : t.text), 20);
-  const std::string shown = shortened(words, x - i.lo.x - kGap * u, em());
-  draw->AddText({i.lo.x, std::floor(y - em() / 2)}, im_colour32(t.text), shown.c_str());
+  const std::string shown = shortened(words, x - i.lo.x - kGap * u, ImGui::GetFontSize());
+  draw->AddText({i.lo.x, std::floor(y - ImGui::GetFontSize() / 2)}, im_colour32(t.text), shown.c_str());
   focus_and_text({});
   return i.pressed;
+}
+
+bool kit_slider(const std::string& name, const std::string& value, double& at, double least, double most, double step,
+                float width) {
+  const float u = unit(), knob = 8 * u;
+  if (width <= 0) width = std::max(ImGui::GetContentRegionAvail().x, 96 * u);
+  const Item i = item(name.c_str(), {width, kSlider * u});
+  const float from = i.lo.x + knob, to = i.hi.x - knob, y = i.hi.y - 14 * u;
+  const double before = at;
+  if (i.active) {
+    const double share = static_cast<double>((ImGui::GetIO().MousePos.x - from) / std::max(1.0F, to - from));
+    at = least + step * std::round(std::clamp(share, 0.0, 1.0) * (most - least) / step);
+  } else if (ImGui::IsItemFocused() && ImGui::GetIO().NavVisible) {
+    const double by = step * (ImGui::GetIO().KeyShift ? 10 : 1);
+    if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_LeftArrow))) at -= by;
+    if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_RightArrow))) at += by;
+  }
+  at = std::clamp(at, least, most);
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  const Theme& t = theme();
+  const float value_wide = ImGui::CalcTextSize(value.c_str()).x;
+  draw->AddText({i.lo.x, i.lo.y}, im_colour32(t.quiet),
+                shortened(name, width - value_wide - kGap * u, ImGui::GetFontSize()).c_str());
+  draw->AddText({i.hi.x - value_wide, i.lo.y}, im_colour32(t.text), value.c_str());
+  const float x = from + (to - from) * static_cast<float>(most > least ? (at - least) / (most - least) : 0);
+  draw->AddRectFilled({i.lo.x, y - 2 * u}, {i.hi.x, y + 2 * u}, im_colour32(t.line), 2 * u);
+  draw->AddRectFilled({i.lo.x, y - 2 * u}, {x, y + 2 * u}, im_colour32(t.text), 2 * u);
+  draw->AddCircleFilled({x, y}, knob, im_colour32(t.text), 20);
+  if (i.hovered || i.active) draw->AddCircle({x, y}, knob + 2 * u, im_colour32(t.line), 20, 2 * u);
+  focus_and_text({});
+  return at != before;
 }
 
 bool list_row(const std::string& words, const std::string& right, bool selected, float high) {
@@ -178,10 +209,11 @@ bool list_row(const std::string& words, const std::string& right, bool selected,
   if (selected || i.hovered) draw->AddRectFilled(i.lo, i.hi, im_colour32(t.raised), kRound * u);
   if (selected)
     draw->AddRectFilled({i.lo.x, i.lo.y + 6 * u}, {i.lo.x + 4 * u, i.hi.y - 6 * u}, im_colour32(t.accent), 2 * u);
-  const float y = std::floor((i.lo.y + i.hi.y - em()) / 2), end = ImGui::CalcTextSize(right.c_str()).x;
+  const float y = std::floor((i.lo.y + i.hi.y - ImGui::GetFontSize()) / 2), end = ImGui::CalcTextSize(right.c_str()).x;
   draw->AddText({i.hi.x - end - 12 * u, y}, im_colour32(t.quiet), right.c_str());
-  draw->AddText({i.lo.x + 12 * u, y}, im_colour32(t.text),
-                shortened(words.substr(0, words.find("##")), i.hi.x - i.lo.x - end - 36 * u, em()).c_str());
+  draw->AddText(
+      {i.lo.x + 12 * u, y}, im_colour32(t.text),
+      shortened(words.substr(0, words.find("##")), i.hi.x - i.lo.x - end - 36 * u, ImGui::GetFontSize()).c_str());
   focus_and_text({});
   return i.pressed;
 }

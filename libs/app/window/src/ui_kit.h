@@ -10,14 +10,16 @@
 
 #include "palette.h"
 #include "room_layout.h"
+#include "ui_style.h"
 
 namespace osteo::inline app {
 
 /// Pixels of the screen for one of the design's.
 [[nodiscard]] inline float unit() {
-  return ImGui::GetFontSize() / static_cast<float>(kTextPixels);
+  return em() / static_cast<float>(kTextPixels);
 }
-inline constexpr float kTile = 40, kControl = 40, kSmallControl = 32, kRow = 36, kGap = 8, kRound = 8, kCardRound = 12;
+inline constexpr float kTile = 40, kControl = 40, kSlider = 48, kSmallControl = 32, kRow = 36, kGap = 8, kRound = 8,
+                       kCardRound = 12;
 
 /// Outline of 24 x 24 in a square of `side` pixels; a name of icon_lines.h. No-op for a name that it lacks.
 void draw_icon(ImDrawList* draw, ImVec2 corner, float side, std::string_view name, ImU32 colour);
@@ -42,6 +44,10 @@ enum class ButtonLook { usual, main, quiet };
 [[nodiscard]] int choice(const char* id, std::span<const std::string> words, int selected, float high = kControl);
 /// `width`: pixels; 0: as there is room.
 [[nodiscard]] bool kit_switch(const std::string& words, bool& on, float width = 0);
+/// 48 high: name above at the left, value at the right, neither on the track. A drag or a click moves the knob; with
+/// the focus Left and Right by `step`, with Shift by ten. `width`: pixels; 0: as there is room. True: `at` is another.
+[[nodiscard]] bool kit_slider(const std::string& name, const std::string& value, double& at, double least, double most,
+                              double step, float width = 0);
 /// A row of a list, as wide as there is room.
 [[nodiscard]] bool list_row(const std::string& words, const std::string& right, bool selected, float high = kRow);
 

@@ -21,20 +21,20 @@ void set_ui_style(int em_pixels) {
   ImFontConfig config;
   config.FontDataOwnedByAtlas = false;
   config.OversampleH = 2;
-  // ImGui's size is from the highest ascender to the lowest descender, which Noto Sans has 1.36 em apart: letters would
-  // be 12 pixels. Made larger, and lines stay as far apart as they are said to be.
-  constexpr float kLarger = 1.05F;
+  // ImGui's size is from the highest ascender to the lowest descender, which Noto Sans has 1.362 em apart; lines are
+  // nearer to each other than that.
+  constexpr float kTallEm = 1.362F;
   const auto add = [&](const unsigned char* font, std::size_t bytes, float high, const ImWchar* letters) {
     // ImGui asks for a pointer to what it may own; this it does not, and does not write to.
-    config.GlyphOffset.y = -std::round((kLarger - 1) * high / 2);
+    config.GlyphOffset.y = -std::round((kTallEm - kLineEm) * high / 2);
     io.Fonts->AddFontFromMemoryTTF(const_cast<unsigned char*>(font), static_cast<int>(bytes),
-                                   std::round(kLarger * high), &config, letters);
+                                   std::round(kTallEm * high), &config, letters);
   };
   add(kNotoSans, sizeof kNotoSans, size, kLetters);
   add(kNotoSansBold, sizeof kNotoSansBold, std::round(kBoldEm * size), kLatin);
   io.Fonts->Build();
-  io.Fonts->Fonts[0]->FontSize = size;
-  io.Fonts->Fonts[1]->FontSize = std::round(kBoldEm * size);
+  io.Fonts->Fonts[0]->FontSize = kLineEm * size;
+  io.Fonts->Fonts[1]->FontSize = kLineEm * kBoldEm * size;
   ImGuiStyle style;
   style.WindowRounding = 0;
   style.ChildRounding = 0;
@@ -119,9 +119,9 @@ void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour
                  bool middle, bool bold) {
   if (text.empty() || box.empty()) return;
   ImFont* const font = bold ? bold_font() : ImGui::GetFont();
-  float size = std::min(em_pixels, box.height);
+  float size = kLineEm * std::min(em_pixels, box.height);
   const float width = font->CalcTextSizeA(size, FLT_MAX, 0, text.c_str()).x;
-  const float least = std::min(size, 0.875F * em());  // 14 pixels of 16
+  const float least = std::min(size, kLineEm * kLabelEm * em());
   if (width > box.width) size = std::max(least, size * box.width / width);
   const std::string shown = shortened(text, box.width, size, font);
   if (shown != text && ImGui::IsMouseHoveringRect({box.x, box.y}, {box.right(), box.bottom()}, false))

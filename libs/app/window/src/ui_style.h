@@ -9,15 +9,19 @@
 
 namespace osteo::inline app {
 
-/// Puts Noto Sans at this height into the context's atlas, in place of what is there, and sets sizes and colours that
-/// go with it. It is part of the program: Latin, Greek and Cyrillic, no file is looked for. The atlas' texture has to
-/// be made again by whoever owns one.
+/// Puts Noto Sans into the context's atlas, an em of it so high, in place of what is there, and sets sizes and colours
+/// that go with it. It is part of the program: Latin, Greek and Cyrillic, no file is looked for. The atlas' texture has
+/// to be made again by whoever owns one.
 void set_ui_style(int em_pixels);
 /// Colours alone, as theme() has them now; and a person's theme by its name in the settings, into use.
 void set_ui_colours();
 void take_theme(const std::string& name);
 /// For figures and titles: digits of equal width, so that nothing moves while they change. Only Latin; kBoldEm em high.
 inline constexpr float kBoldEm = 1.5F;
+/// From line to line, in em. ImGui's size of a font is this: an em of letters is em() high.
+inline constexpr float kLineEm = 1.25F;
+/// Labels and keys, and nothing smaller: 14 pixels of 16.
+inline constexpr float kLabelEm = 0.875F;
 [[nodiscard]] ImFont* bold_font();
 
 [[nodiscard]] inline ImVec4 im_colour(Colour c, float alpha = 1) {
@@ -26,15 +30,15 @@ inline constexpr float kBoldEm = 1.5F;
 [[nodiscard]] inline ImU32 im_colour32(Colour c, float alpha = 1) {
   return ImGui::ColorConvertFloat4ToU32(im_colour(c, alpha));
 }
-/// Height of text now.
+/// An em of the letters now: 16 pixels at scale 1, of which a capital has 0.714.
 [[nodiscard]] inline float em() {
-  return ImGui::GetFontSize();
+  return ImGui::GetFontSize() / kLineEm;
 }
 
 /// A window at a fixed place that only scrolls. End() follows as after ImGui::Begin.
 void begin_fixed(const char* name, const ScreenBox& box, ImGuiWindowFlags more = 0);
-/// One line of text in a box, at most `em_pixels` high; centred in height, from the left or in the middle. Too long it
-/// is smaller, down to 14 pixels at scale 1; longer still it loses its middle, and is whole on hovering.
+/// One line of text in a box, its em at most `em_pixels` high; centred in height, from the left or in the middle. Too
+/// long it is smaller, down to 14 pixels at scale 1; longer still it loses its middle, and is whole on hovering.
 void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour colour, const std::string& text,
                  bool middle = false, bool bold = false);
 /// Of a text that is too long for its place: without its middle, "superior ... left side".

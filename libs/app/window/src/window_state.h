@@ -28,7 +28,9 @@ struct RoomState {
   double review_s = 0, review_mm3 = 0;  // the time that is shown, and the bone there is then
   std::vector<std::string> steps_done;  // of the first five minutes, by name
   std::string next_step;
-  int help_page = 0, help_pages = 1;  // as it was drawn last
+  bool typing = false;        // in the list of commands
+  std::string search, found;  // what, and the name of the row that is chosen
+  std::string focus;          // the part of the window that has the keys
   std::array<float, 4> view{};        // x, y, width, height
 };
 

@@ -88,6 +88,8 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
           s.least_clearance_mm < StateFacts::kNearMm ? Nearness::near : Nearness::far);
     }
   }
+  out.summary = clock_text(session.seconds) + text_of(" min, %.0f mm³ of bone", session.removed_mm3);
+  if (session.score) out.summary += ", " + *session.score;
   out.warnings = session.warnings;
   out.folder = session.folder;
   out.past = session.past;

@@ -35,6 +35,7 @@ struct EndLine {
 };
 struct EndFacts {
   std::vector<EndLine> lines;
+  std::string summary;  ///< in a line: how long, how much
   std::vector<std::string> warnings;
   std::filesystem::path folder;
   bool past = false;  ///< it was over before the window opened

@@ -190,15 +190,40 @@ class Converter {
     }
   }
 
+  /// The least and the greatest of a row, beside the ring. In T's own width, so that many are compared at once.
   template <class T>
-  void row(const T* in, std::int16_t* out, std::size_t n, bool sample) {
+  [[nodiscard]] std::pair<std::int64_t, std::int64_t> range(const T* in, std::size_t n) const {
+    if (ring_row_ == nullptr) {
+      T lo = in[0], hi = in[0];
+      for (std::size_t i = 0; i < n; ++i) {
+        lo = std::min(lo, in[i]);
+        hi = std::max(hi, in[i]);
+      }
+      return {lo, hi};
+    }
     std::int64_t lo = 1 << 30, hi = -(1 << 30);
     for (std::size_t i = 0; i < n; ++i) {
-      if (ring_row_ != nullptr && ring_row_[i] != 0) continue;
-      const std::int64_t v = in[i];
-      lo = std::min(lo, v);
-      hi = std::max(hi, v);
+      if (ring_row_[i] != 0) continue;
+      lo = std::min<std::int64_t>(lo, in[i]);
+      hi = std::max<std::int64_t>(hi, in[i]);
     }
+    return {lo, hi};
+  }
+
+  /// Stored values plus a whole number. The result fits, so that arithmetic modulo 65536 gives it.
+  template <class T>
+  static void shifted(const T* in, std::int16_t* out, std::size_t n, int shift) {
+    const auto by = static_cast<std::uint16_t>(shift);
+    // In place, a value is read before it is written, and no other one is looked at.
+#pragma GCC ivdep
+    for (std::size_t i = 0; i < n; ++i)
+      out[i] = static_cast<std::int16_t>(static_cast<std::uint16_t>(static_cast<std::uint16_t>(in[i]) + by));
+  }
+
+  template <class T>
+  void row(const T* in, std::int16_t* out, std::size_t n, bool sample) {
+    if (n == 0) return;
+    const auto [lo, hi] = range(in, n);
     const double low = hounsfield(static_cast<double>(lo), f_), high = hounsfield(static_cast<double>(hi), f_);
     const bool whole = f_.slope == 1 && f_.intercept == std::floor(f_.intercept);
     const bool padded = pad_lo_ <= pad_hi_ && lo <= pad_hi_ && hi >= pad_lo_;
@@ -206,8 +231,7 @@ class Converter {
     if (ring_row_ != nullptr) {
       careful_row(in, out, n);
     } else if (whole && !padded && !tissue && lo > found_ && low >= kPaddingBelowHu && high <= 32767) {
-      const auto shift = static_cast<int>(f_.intercept);
-      for (std::size_t i = 0; i < n; ++i) out[i] = static_cast<std::int16_t>(static_cast<int>(in[i]) + shift);
+      shifted(in, out, n, static_cast<int>(f_.intercept));
       count_.hu_min = std::min(count_.hu_min, static_cast<std::int64_t>(low));
     } else {
       careful_row(in, out, n);

@@ -347,6 +347,19 @@ class SliceJudge {
   std::vector<std::size_t> explained_;  // steps that are told already
 };
 
+/// A row of pixels to what is kept of each column. A band has at most some hundred rows: sums stay far below 2^31.
+void add_row(const std::int16_t* row, std::size_t n, std::int32_t* sum, std::int32_t* padding, std::int16_t* lowest,
+             std::int16_t* highest) {
+  for (std::size_t x = 0; x < n; ++x) {
+    sum[x] += row[x];
+    padding[x] += row[x] == kNoValue ? 1 : 0;
+  }
+  for (std::size_t x = 0; x < n; ++x) {
+    lowest[x] = std::min(lowest[x], row[x]);
+    highest[x] = std::max(highest[x], row[x]);
+  }
+}
+
 }  // namespace
 
 SliceFigure::SliceFigure(const std::int16_t* hu, int columns, int rows)
@@ -356,8 +369,10 @@ SliceFigure::SliceFigure(const std::int16_t* hu, int columns, int rows)
   std::vector<int> first(static_cast<std::size_t>(columns_) + 1);
   for (int i = 0; i <= columns_; ++i)
     first[static_cast<std::size_t>(i)] = static_cast<int>(static_cast<std::int64_t>(i) * columns / columns_);
-  std::vector<std::int64_t> sum(static_cast<std::size_t>(columns_)), padding(sum.size());
-  std::vector<std::int16_t> lowest(sum.size()), highest(sum.size());
+  // Columns of pixels first, many at once; then the blocks of a band out of its columns.
+  const auto width = static_cast<std::size_t>(columns);
+  std::vector<std::int32_t> sum(width), padding(width);
+  std::vector<std::int16_t> lowest(width), highest(width);
   const std::int16_t any = hu[0];
   for (int j = 0; j < rows_; ++j) {
     std::fill(sum.begin(), sum.end(), 0);
@@ -366,31 +381,25 @@ SliceFigure::SliceFigure(const std::int16_t* hu, int columns, int rows)
     std::fill(highest.begin(), highest.end(), std::int16_t{-32768});
     const int begin = static_cast<int>(static_cast<std::int64_t>(j) * rows / rows_),
               end = static_cast<int>(static_cast<std::int64_t>(j + 1) * rows / rows_);
-    for (int y = begin; y < end; ++y) {
-      const std::int16_t* const row = hu + static_cast<std::size_t>(y) * static_cast<std::size_t>(columns);
-      for (std::size_t i = 0; i < sum.size(); ++i) {
-        int s = 0, none = 0;
-        std::int16_t lo = lowest[i], hi = highest[i];
-        for (int x = first[i]; x < first[i + 1]; ++x) {
-          s += row[x];
-          none += row[x] == kNoValue ? 1 : 0;
-          lo = std::min(lo, row[x]);
-          hi = std::max(hi, row[x]);
-        }
-        sum[i] += s;
-        padding[i] += none;
-        lowest[i] = lo;
-        highest[i] = hi;
-      }
-    }
-    for (std::size_t i = 0; i < sum.size(); ++i) {
+    for (int y = begin; y < end; ++y)
+      add_row(hu + static_cast<std::size_t>(y) * width, width, sum.data(), padding.data(), lowest.data(),
+              highest.data());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(columns_); ++i) {
       Block& b = blocks_[static_cast<std::size_t>(j * columns_) + i];
+      std::int64_t total = 0, none = 0;
+      std::int16_t lo = 32767, hi = -32768;
+      for (auto x = static_cast<std::size_t>(first[i]); x < static_cast<std::size_t>(first[i + 1]); ++x) {
+        total += sum[x];
+        none += padding[x];
+        lo = std::min(lo, lowest[x]);
+        hi = std::max(hi, highest[x]);
+      }
       const std::int64_t count = static_cast<std::int64_t>(end - begin) * (first[i + 1] - first[i]),
-                         seen = count - padding[i];
-      b.one_value = lowest[i] == highest[i];
+                         seen = count - none;
+      b.one_value = lo == hi;
       b.measured = seen > 0;
-      if (seen > 0) b.hu = static_cast<float>(sum[i] - padding[i] * kNoValue) / static_cast<float>(seen);
-      blank_ = blank_ && b.one_value && lowest[i] == any;
+      if (seen > 0) b.hu = static_cast<float>(total - none * kNoValue) / static_cast<float>(seen);
+      blank_ = blank_ && b.one_value && lo == any;
     }
   }
 }
