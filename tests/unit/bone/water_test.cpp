@@ -154,7 +154,7 @@ TEST(Water, AFilmStaysDriesAndLeavesItsDust) {
 
 TEST(Water, FallsAndDustToWhereGravityPoints) {
   const auto bone = test::slab(0.5);
-  for (const Vec3 down : {down_of(Posture::supine, 25), down_of(Posture::session_runner, 0),
+  for (const Vec3 down : {down_of(Posture::supine, 25), down_of(Posture::sitting, 0),
                           down_of(Posture::right_side, -10), normalized({0.3, -0.5, 0.8})}) {
     // Away from the bone.
     const Vec3 far = bone.frame().world_from_index({40, 40, 60}) + Vec3{0, 0, 8};
@@ -189,11 +189,11 @@ TEST(Water, FallsAndDustToWhereGravityPoints) {
 TEST(Water, OfAPatientThatLiesSo) {
   EXPECT_EQ(down_of(Posture::supine, 0), (Vec3{0, 1, 0}));
   EXPECT_EQ(down_of(Posture::prone, 0), (Vec3{0, -1, 0}));
-  EXPECT_EQ(down_of(Posture::session_runner, 70), (Vec3{0, 0, -1}));
+  EXPECT_EQ(down_of(Posture::sitting, 70), (Vec3{0, 0, -1}));
   // The face to the left: the left ear (+x in LPS) is below.
   EXPECT_GT(down_of(Posture::supine, 60).x, 0.86);
   for (const Posture p :
-       {Posture::supine, Posture::prone, Posture::session_runner, Posture::left_side, Posture::right_side}) {
+       {Posture::supine, Posture::prone, Posture::sitting, Posture::left_side, Posture::right_side}) {
     for (const double turned : {-80.0, -20.0, 0.0, 35.0}) {
       const Vec3 down = down_of(p, turned);
       const PostureNow now = posture_of(down);
