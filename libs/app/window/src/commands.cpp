@@ -181,7 +181,7 @@ void add(std::vector<CommandRow>& rows, const char* group, const Named (&all)[N]
 
 void add_burrs(std::vector<CommandRow>& rows) {
   for (int d = 1; d <= 7; ++d) {
-    const Named size{"Burr of %d mm", "diameter size", Command::diameter, d};
+    const Named size{"", "diameter size", Command::diameter, d};
     rows.push_back({"Burr of " + std::to_string(d) + " mm", "Drill", size.synonyms, keys_of(size), size.command, d});
   }
   for (std::size_t n = 0; n < kBurrKinds.size(); ++n) {
