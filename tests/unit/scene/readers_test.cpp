@@ -182,8 +182,8 @@ TEST(Readers, APictureOfManySecondsTakesNoUndoAway) {
       Counter counter;
       r.add_counter(counter);
       if (slow) {
-        r.start();
         r.look([&](const World&, SceneReaders&) {
+          r.start();  // within, so that not one tick is followed before the end, however late a thread gets its turn
           while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
         });
       }
