@@ -1,5 +1,6 @@
-# A half ring and a rod, as a jaw and a fibula of which the plan is plain: jaw.obj, fibula.obj.
-import math
+# A half ring and a rod, as a jaw and a fibula of which the plan is plain: jaw.obj, fibula.obj. And a CT of the jaw
+# after a third of it was sawn off, half a millimetre beyond the plane of cut.json: after.nrrd.
+import array, json, math
 
 
 def tube(name, place, n):
@@ -30,3 +31,31 @@ tube(
     90,
 )
 tube("fibula.obj", lambda t: ((0, 0, -300 * t), (1, 0, 0), (0, 1, 0)), 100)
+
+c, s = math.cos(math.radians(100)), math.sin(math.radians(100))
+plane = {
+    "name": "a",
+    "bone": "jaw",
+    "at_mm": [45 * c, 45 * s, 0],
+    "normal": [-s, c, 0],
+    "kerf_mm": 1,
+    "waste_ahead": True,
+}
+stays = {"name": "rest", "bone": "jaw", "planes": ["a"], "rotation_rows": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
+with open("cut.json", "w") as f:
+    json.dump(
+        {"osteotome_surgical_plan": 1, "unit": "mm", "planes": [plane], "fragments": [stays | {"shift_mm": [0, 0, 0]}]},
+        f,
+    )
+
+voxels, step, dims, origin = array.array("h"), 0.8, (112, 90, 30), (-30, -14, -11.6)
+for k in range(dims[2]):
+    for j in range(dims[1]):
+        for i in range(dims[0]):
+            x, y, z = origin[0] + step * i, origin[1] + step * j, origin[2] + step * k
+            mm = max(math.hypot(math.hypot(x, y) - 45, z) - 5.97, -y, c * y - s * x - 0.5)
+            voxels.append(40 + round(1000 / (1 + math.exp(4 * max(min(mm, 5), -5)))))
+with open("after.nrrd", "wb") as f:
+    f.write(b"NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: %d %d %d\n" % dims)
+    f.write(b"space directions: (%g,0,0) (0,%g,0) (0,0,%g)\nspace origin: (%g,%g,%g)\n" % (step, step, step, *origin))
+    f.write(b"endian: little\nencoding: raw\n\n" + voxels.tobytes())

@@ -94,7 +94,8 @@ std::vector<cli::Group> command_groups() {
        {"mesh-info", "mesh-repair", "voxelize", "distance", "distance-at", "compare", "virtual-fixture", "saw",
         "separate-fragments", "tetrahedralize", "embed-surface"}},
       {"Tissue", {"simulate", "fem", "bone-stiffness", "calibrate", "fit-damping"}},
-      {"Research", {"experiment", "ground-truth", "simulate-trainee", "phantom", "plan-reconstruction", "bench"}},
+      {"Plan surgery", {"plan-reconstruction", "cutting-guide", "outcome"}},
+      {"Research", {"experiment", "ground-truth", "simulate-trainee", "phantom", "bench"}},
       {"Osteotome itself", {"demo", "list", "docs"}},
   };
 }

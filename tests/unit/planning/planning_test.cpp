@@ -8,7 +8,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/mesh/mesh_info.h"
 #include "osteo/session/planning/detail/jaw_phantom.h"
-#include "osteo/session/planning/reconstruct.h"
+#include "osteo/session/planning/detail/reconstruct.h"
 
 namespace osteo {
 namespace {

@@ -42,6 +42,12 @@ struct Recipe {
 constexpr const char* kProblem = R"({"osteotome_tissue": 1, "material": {"young_kpa": 10, "poisson": 0.4},
   "fixed": [{"box_mm": [[-20, -20, -20], [20, 20, -4]]}], "loads": [{"name": "pull", "forces": [{"at_mm": [0, 0, 8], "radius_mm": 8, "total_n": [0, 0, 0.1]}]}]})";
 
+// The ball, sawn beside its middle.
+constexpr const char* kPlan = R"({"osteotome_surgical_plan": 1, "unit": "mm",
+  "planes": [{"name": "a", "bone": "ball", "at_mm": [0, 0, 1], "normal": [0, 0, 1], "kerf_mm": 1, "waste_ahead": true}],
+  "fragments": [{"name": "rest", "bone": "ball", "planes": ["a"], "rotation_rows": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+                 "shift_mm": [0, 0, 0]}]})";
+
 // The ball of the table's problem, let go: about its own frequency.
 std::string plucked() {
   std::string csv = "time_s,u_mm\n";
@@ -85,6 +91,8 @@ const std::map<std::string, Recipe>& table() {
          {"reserve_mm", "5"}},
         {},
         {}}},
+      {"cutting-guide", {{{"approach", "1,0,0"}, {"margin_mm", "3"}}, {{"plan", kPlan}}, {}}},
+      {"outcome", {{}, {{"plan", kPlan}}, {}}},
       {"segment-network", {{{"folds", "0"}, {"mirror", "no"}, {"step", "1"}}, {}, {}}},
       {"phantom", {{{"region", "temporal"}, {"spacing_mm", "4"}}, {}, {}}},
   };
@@ -251,6 +259,22 @@ Image ct_around_the_ball() {
   return ct;
 }
 
+Image ct_of_the_ball() {
+  Image ct;
+  ct.frame.dims = {50, 50, 50};
+  ct.frame.spacing_mm = {0.8, 0.8, 0.8};
+  ct.frame.origin_mm = {-19.6, -19.6, -19.6};
+  const auto voxels = make_voxels<std::int16_t>(ct.frame.voxel_count());
+  std::size_t n = 0;
+  for (int k = 0; k < 50; ++k)
+    for (int j = 0; j < 50; ++j)
+      for (int i = 0; i < 50; ++i)
+        voxels[n++] = static_cast<std::int16_t>(
+            40 + 1000 / (1 + std::exp(3 * (length(ct.frame.world_from_index(Vec3(i, j, k))) - 9.9))));
+  ct.voxels = voxels;
+  return ct;
+}
+
 class EveryStage : public testing::TestWithParam<std::string> {};
 
 TEST_P(EveryStage, IsAVtkFilterThatGivesWhatTheStageGives) {
@@ -290,6 +314,7 @@ TEST_P(EveryStage, IsAVtkFilterThatGivesWhatTheStageGives) {
       inputs.back() = Document{edits_text(recipe_of(document))};
     }
     if (GetParam() == "find-structures") inputs.back() = finer_ct();  // an ear cannot be made out in 2 mm voxels
+    if (GetParam() == "outcome" && port.name == "postop") inputs.back() = ct_of_the_ball();
     if (GetParam() == "bone-stiffness" && port.name == "ct") inputs.back() = ct_around_the_ball();
     vtkNew<vtkTrivialProducer> producer;
     producer->SetOutput(as_vtk(inputs.back()));

@@ -1,9 +1,12 @@
 #include "planning.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/data/json_vec.h"
+#include "osteo/core/report/sheet.h"
 
 namespace osteo::inline app {
 
@@ -59,6 +62,194 @@ std::vector<Data> PlanReconstructionStage::run(const Params& params, std::span<c
   j["axis_points_mm"] = Json::list();
   for (const Vec3& p : r.axis_mm) j["axis_points_mm"].push_back(json_of(p));
   return {Document{plan_json(r.plan)}, Document{j.dump(1) + "\n"}};
+}
+
+StageInfo CuttingGuideStage::info() {
+  return {.name = "cutting-guide",
+          .version = 1,
+          .synopsis = "a cutting guide to print, from a plan and the bone",
+          .description =
+              "A block that fits the bone in one place, with a slot for each planned plane. Its underside is the "
+              "bone's offset surface as seen from where the guide comes from, so that nothing catches; its top is "
+              "flat, to be printed on. Slots that would run into each other share an opening whose two faces lead "
+              "the saw. Reports the gap by exact distances, an exact sweep of putting it on, and how far its play "
+              "lets each plane rock. For research and training; no medical device: a guide for a named patient is "
+              "a custom-made device under its own law.",
+          .inputs = {{"plan", {DataKind::document}, "plan file of 'plan-reconstruction', or written by hand"},
+                     {"bone", {DataKind::surface}, "closed surface of the bone that the plan cuts, in the plan's CT"}},
+          .outputs = {{"guide", {DataKind::surface}, "closed surface of the guide"},
+                      {"findings", {DataKind::document}, "measures of the guide in JSON", true}},
+          .references = {"G. Dantzig, Linear Programming and Extensions, Princeton 1963"},
+          .example = "osteo cutting-guide plan.json fibula.stl guide.stl --bone fibula --code CASE-7"};
+}
+
+std::vector<Data> CuttingGuideStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
+  const SurgicalPlan plan = plan_of(std::get<Document>(inputs[0]).json, "the plan");
+  const TriangleSoup bone = compacted(welded(soup_of(*std::get<Surface>(inputs[1]))));
+  const CuttingGuide g = make_cutting_guide(bone, plan, params, context);
+  context.report("cuts", static_cast<std::int64_t>(g.cuts.size()));
+  context.report("min_gap_mm", g.min_gap_mm);
+  context.report("seat_mm2", g.seat_mm2);
+  context.report("seat_off_mm", g.seat_off_mm);
+  context.report("insertion_clearance_mm", g.insertion_mm);
+  Json j{{"osteotome_cutting_guide", 1},
+         {"intended_use", "research, teaching and rehearsal; not a medical device"},
+         {"approach", json_of(g.approach)},
+         {"along", json_of(g.along)},
+         {"size_mm", Json{g.length_mm, g.width_mm, g.height_mm}},
+         {"gap_mm", params.gap_mm},
+         {"min_gap_mm", g.min_gap_mm},
+         {"seat_mm2", g.seat_mm2},
+         {"seat_off_mm", g.seat_off_mm},
+         {"insertion_clearance_mm", g.insertion_mm},
+         {"engraved", g.engraved}};
+  j["cuts"] = Json::list();
+  for (const GuideCut& c : g.cuts)
+    j["cuts"].push_back({{"plane", c.plane},
+                         {"two_sided", c.two_sided},
+                         {"width_mm", c.width_mm},
+                         {"rock_mm", c.rock_mm},
+                         {"rock_deg", c.rock_deg}});
+  return {std::make_shared<const TriMesh>(mesh_of(g.solid)), Document{j.dump(1) + "\n"}};
+}
+
+StageInfo OutcomeStage::info() {
+  return {
+      .name = "outcome",
+      .version = 1,
+      .synopsis = "what came of a plan: fragments and cuts in a CT after surgery, with intervals",
+      .description =
+          "Finds each fragment of a plan in a CT after surgery by the edges of its surface, and each cut face where "
+          "the CT shows it. Deviations are from the plan, with the largest fragment that stays as the reference, each "
+          "with a 95 % interval. What the CT does not show is not known, with the reason: a face that lies upon "
+          "other bone, a fragment under metal. The CT must lie within about 20 mm and 12 degrees of the plan's; "
+          "'register' brings it there. For research and training; no medical device.",
+      .inputs = {{"plan", {DataKind::document}, "plan file"},
+                 {"postop", {DataKind::image}, "CT after surgery"},
+                 {"bone",
+                  {DataKind::surface},
+                  "closed surface of the bone that the plan names first, in the plan's CT"},
+                 {"donor", {DataKind::surface}, "closed surface of the plan's other bone", true}},
+      .outputs = {{"outcome", {DataKind::document}, "deviations and intervals in JSON"},
+                  {"page", {DataKind::document}, "one page to print, in HTML", true}},
+      .references =
+          {"J. MacKinnon, H. White, Some heteroskedasticity-consistent covariance matrix estimators with improved "
+           "finite sample properties, Journal of Econometrics 1985",
+           "D. Chetverikov et al., The trimmed iterative closest point algorithm, ICPR 2002"},
+      .example = "osteo outcome plan.json after.nrrd mandible.stl fibula.stl outcome.json --page-out outcome.html"};
+}
+
+namespace {
+
+Json json_of(const Measured& m) {
+  return {{"value", m.value}, {"half_width_95", m.half}};
+}
+
+template <std::size_t N>
+Json json_of(const std::array<Measured, N>& all) {
+  Json j = Json::list();
+  for (const Measured& m : all) j.push_back(json_of(m));
+  return j;
+}
+
+Json outcome_json(const Outcome& o) {
+  Json j{{"osteotome_outcome", 1}, {"intended_use", "research, teaching and rehearsal; not a medical device"}};
+  j["fragments"] = Json::list();
+  for (const FragmentOutcome& f : o.fragments) {
+    Json one{{"name", f.name}, {"known", f.known}, {"reference", f.reference}, {"found", f.found}};
+    if (!f.known) one["why"] = f.why;
+    if (f.known) {
+      one["middle_mm"] = osteo::json_of(f.middle_mm);
+      one["edge_rms_mm"] = f.edge_mm;
+      if (!f.reference) {
+        one["shift_mm"] = json_of(f.shift_mm);
+        one["turn_deg"] = json_of(f.turn_deg);
+      }
+    }
+    j["fragments"].push_back(std::move(one));
+  }
+  j["cuts"] = Json::list();
+  for (const CutOutcome& c : o.cuts) {
+    Json one{{"plane", c.plane}, {"fragment", c.fragment}, {"known", c.known}, {"seen", c.seen}};
+    if (!c.known) one["why"] = c.why;
+    if (c.known) {
+      one["off_mm"] = json_of(c.off_mm);
+      one["tilt_deg"] = json_of(c.tilt_deg);
+      one["tilt_along"] = Json::list();
+      for (const Vec3& a : c.axes) one["tilt_along"].push_back(osteo::json_of(a));
+      one["angle_deg"] = c.angle_deg;
+    }
+    j["cuts"].push_back(std::move(one));
+  }
+  return j;
+}
+
+std::string text_of(const Measured& m) {
+  const auto hundredths = [](double v) { return format_number(std::round(100 * v) / 100); };
+  return hundredths(m.value) + " \u00b1 " + hundredths(m.half);
+}
+
+std::string outcome_page(const Outcome& o) {
+  Sheet s;
+  s.title = "Outcome against the plan";
+  s.footer = "Osteotome. Research, teaching and rehearsal; not a medical device.";
+  s.pages = 1;
+  const auto cell = [](std::string text, Tone tone = Tone::plain) { return sheet::Cell{std::move(text), tone}; };
+  sheet::Table fragments{{"Fragment", "shift x, y, z (mm)", "turn x, y, z (degrees)"}, {}, {0.3, 0.35, 0.35}};
+  for (const FragmentOutcome& f : o.fragments) {
+    std::vector<sheet::Cell> row{cell(f.name)};
+    if (!f.known) {
+      row.push_back(cell("not known: " + f.why, Tone::caution));
+      row.push_back(cell(""));
+    } else if (f.reference) {
+      row.push_back(cell("reference"));
+      row.push_back(cell("reference"));
+    } else {
+      for (const auto& all : {f.shift_mm, f.turn_deg})
+        row.push_back(cell(text_of(all[0]) + "; " + text_of(all[1]) + "; " + text_of(all[2])));
+    }
+    fragments.rows.push_back(std::move(row));
+  }
+  sheet::Table cuts{{"Cut", "off the plan (mm)", "tilt (degrees)"}, {}, {0.3, 0.35, 0.35}};
+  for (const CutOutcome& c : o.cuts) {
+    if (c.known)
+      cuts.rows.push_back(
+          {cell(c.plane), cell(text_of(c.off_mm)), cell(text_of(c.tilt_deg[0]) + "; " + text_of(c.tilt_deg[1]))});
+    else
+      cuts.rows.push_back({cell(c.plane), cell("not known: " + c.why, Tone::caution), cell("")});
+  }
+  s.blocks.push_back({sheet::Paragraph{
+      "Value and half-width of the 95 % interval. x: to the patient's left, y: to the back, z: to the head. A cut is "
+      "off by more than 0 where the face lies further towards what was removed."}});
+  s.blocks.push_back({sheet::Heading{"Fragments"}});
+  s.blocks.push_back({std::move(fragments)});
+  s.blocks.push_back({sheet::Heading{"Cuts"}});
+  s.blocks.push_back({std::move(cuts)});
+  return sheet_html(s);
+}
+
+}  // namespace
+
+std::vector<Data> OutcomeStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
+  const SurgicalPlan plan = plan_of(std::get<Document>(inputs[0]).json, "the plan");
+  if (plan.planes.empty()) throw Error(ExitCode::usage, "the plan has no plane", "give a plan with cuts");
+  std::vector<std::pair<std::string, TriangleSoup>> bones;
+  const auto add = [&](const std::string& name, const Data& data) {
+    if (const auto* s = std::get_if<Surface>(&data)) bones.emplace_back(name, compacted(welded(soup_of(**s))));
+  };
+  const std::string& first = plan.planes.front().bone;
+  add(first, inputs[2]);
+  for (const CutPlane& p : plan.planes)
+    if (p.bone != first && bones.size() == 1) add(p.bone, inputs[3]);
+  const Outcome o = measure_outcome(plan, bones, std::get<Image>(inputs[1]), params, context);
+  std::int64_t fragments = 0, cuts = 0;
+  for (const FragmentOutcome& f : o.fragments) fragments += f.known ? 1 : 0;
+  for (const CutOutcome& c : o.cuts) cuts += c.known ? 1 : 0;
+  context.report("fragments_known", fragments);
+  context.report("fragments", static_cast<std::int64_t>(o.fragments.size()));
+  context.report("cuts_known", cuts);
+  context.report("cuts", static_cast<std::int64_t>(o.cuts.size()));
+  return {Document{outcome_json(o).dump(1) + "\n"}, Document{outcome_page(o)}};
 }
 
 }  // namespace osteo::inline app

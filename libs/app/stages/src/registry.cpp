@@ -53,6 +53,8 @@ Registry osteo_stages() {
   registry.add<SegmentNetworkStage>();
   registry.add<RegisterStage>();
   registry.add<PlanReconstructionStage>();
+  registry.add<CuttingGuideStage>();
+  registry.add<OutcomeStage>();
   registry.add<PhantomStage>();
   return registry;
 }

@@ -1,4 +1,4 @@
-#include "osteo/session/planning/reconstruct.h"
+#include "osteo/session/planning/detail/reconstruct.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,72 @@
+// What came of a plan: where a CT after surgery shows each fragment and each cut, and how sure that is.
+#pragma once
+#include <array>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "osteo/core/base/context.h"
+#include "osteo/core/data/volume.h"
+#include "osteo/geometry/mesh/soup.h"
+#include "osteo/session/planning/detail/plan.h"
+
+namespace osteo::inline session {
+
+struct OutcomeParams {
+  double min_drop_hu = 200;  ///< an edge of bone drops by at least this much
+  double metal_hu = 2500;    ///< edges within 3 mm of what is brighter are left out
+  double max_unsure_mm = 1;  ///< half-width of an interval from which on it is not known
+  double max_unsure_deg = 2;
+};
+
+/// A number and the half-width of its 95 % interval.
+struct Measured {
+  double value = 0, half = 0;
+  [[nodiscard]] bool holds(double truth) const { return truth >= value - half && truth <= value + half; }
+};
+
+/// Deviations are from the plan, in the axes of the plan's CT, with the reference fragment where it was.
+struct FragmentOutcome {
+  std::string name;
+  bool known = false, reference = false;
+  std::string why;                             ///< it is not known
+  std::array<Measured, 3> shift_mm, turn_deg;  ///< at `middle_mm`; rotation vector
+  Vec3 middle_mm;                              ///< of the fragment as planned
+  double edge_mm = 0;                          ///< root mean square of what edges are off along their normals
+  double found = 0;                            ///< share of places at which the CT shows an edge that fits
+  RigidTransform postop_from_ct;
+};
+
+struct CutOutcome {
+  std::string plane, fragment;
+  bool known = false;
+  std::string why;
+  Measured off_mm;                   ///< of the face from the planned one, at its middle, towards the waste
+  std::array<Measured, 2> tilt_deg;  ///< by which it rises along two axes in the plane
+  std::array<Vec3, 2> axes;          ///< these, in the CT of the bone: the face rises along them by the tilts
+  std::array<double, 2> middle{};    ///< of the face, along the axes from the plane's place
+  double angle_deg = 0;              ///< between both planes
+  double seen = 0;                   ///< share of the face at which the CT shows it
+};
+
+struct Outcome {
+  std::vector<FragmentOutcome> fragments;  ///< as in the plan
+  std::vector<CutOutcome> cuts;            ///< of each fragment each plane
+};
+
+/// `bones`: names as in the plan, and surfaces in the CT of the plan. The reference is the largest fragment that the
+/// plan does not move; it is looked for within about 20 mm and 12 degrees of where the plan's CT has it, the others
+/// within 4 mm and 8 degrees of where they should be.
+///
+/// At 2000 places on a fragment's outer surface, 2 mm and more from its cuts, the CT is read along the normal; an edge
+/// is where a smoothed profile drops most. Pose and a common offset (threshold, blur) by least squares, what does not
+/// fit left out. Cut faces the same way, along the plane's normal; a face that lies upon another fragment shows no
+/// edge, and then is not known. Intervals: errors of edges within 5 mm of each other are alike, so each such patch is
+/// left out in turn (J. MacKinnon, H. White, Journal of Econometrics 1985), with Student's quantile; the pose's part is
+/// in that of the cuts. Errors: usage: a bone that is missing, no fragment that stays; failed: the reference is not
+/// found. Same bytes for any number of threads.
+[[nodiscard]] Outcome measure_outcome(const SurgicalPlan& plan,
+                                      const std::vector<std::pair<std::string, TriangleSoup>>& bones,
+                                      const Image& postop, const OutcomeParams& params, const Context& context = {});
+
+}  // namespace osteo::inline session

@@ -1,0 +1,343 @@
+// Cutting guides: manifold, as far from the bone as wanted, slots where the plan has them, and they can be put on.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <iostream>
+
+#include "guide_parts.h"
+#include "osteo/core/base/error.h"
+#include "osteo/geometry/distance/distance_map.h"
+#include "osteo/geometry/mesh/mesh_info.h"
+#include "osteo/session/planning/detail/jaw_phantom.h"
+#include "osteo/session/planning/planning.h"
+
+namespace osteo {
+namespace {
+
+constexpr double kDeg = 3.14159265358979 / 180;
+
+// Along z, about the axis.
+TriangleSoup tube(double radius, double length_mm, std::uint32_t around = 64) {
+  TriangleSoup s;
+  const std::uint32_t rings = 40;
+  for (std::uint32_t k = 0; k <= rings; ++k) {
+    for (std::uint32_t n = 0; n < around; ++n)
+      s.points_mm.push_back({radius * std::cos(360.0 * n / around * kDeg), radius * std::sin(360.0 * n / around * kDeg),
+                             length_mm * k / rings});
+  }
+  for (std::uint32_t k = 0; k < rings; ++k) {
+    for (std::uint32_t n = 0; n < around; ++n) {
+      const std::uint32_t a = around * k + n, b = around * k + (n + 1) % around;
+      s.triangles.push_back({a, b, b + around});
+      s.triangles.push_back({a, b + around, a + around});
+    }
+  }
+  for (std::uint32_t n = 1; n + 1 < around; ++n) {
+    s.triangles.push_back({0, n + 1, n});
+    s.triangles.push_back({around * rings, around * rings + n, around * rings + n + 1});
+  }
+  return s;
+}
+
+SurgicalPlan one_plane(Vec3 at, Vec3 normal, double kerf = 1) {
+  SurgicalPlan plan;
+  plan.planes = {{"cut", "fibula", at, normalized(normal), kerf, true}};
+  return plan;
+}
+
+TriangleSoup box(Vec3 lo, Vec3 hi) {
+  TriangleSoup s;
+  for (int n = 0; n < 8; ++n) s.points_mm.push_back({n & 1 ? hi.x : lo.x, n & 2 ? hi.y : lo.y, n & 4 ? hi.z : lo.z});
+  s.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                 {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return s;
+}
+
+template <class F>
+std::string error_of(F&& f) {
+  try {
+    f();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return {};
+}
+
+struct SlotFound {
+  double off_mm = 0, off_deg = 0, width_mm = 0;
+  int places = 0;
+};
+
+// Goes along the plane's normal from places in the kerf, above the bone and below the guide's top, to where the solid
+// begins: the face that stays, and the other. Independent of how the guide was made.
+SlotFound measured_slot(const CuttingGuide& g, const SignedDistance& solid, const SignedDistance& bone,
+                        const CutPlane& p, double play) {
+  const Vec3 e = p.waste_ahead ? p.normal : -p.normal;
+  const Vec3 across = normalized(cross(g.approach, e)), up = cross(e, across);
+  std::vector<Vec3> found;
+  SlotFound out;
+  for (double u = -4; u <= 4; u += 2) {
+    for (double h = 0; h < 20; h += 0.7) {
+      const Vec3 middle = p.at_mm + across * u + up * h + e * (p.kerf_mm / 2);
+      if (bone.at(middle).signed_mm < 0.3 || solid.inside(middle)) continue;
+      const auto wall = [&](double sign) {
+        double lo = 0, hi = 1.5;
+        if (!solid.inside(middle + e * (sign * hi))) return -1.0;
+        while (hi - lo > 1e-5) (solid.inside(middle + e * (sign * (lo + hi) / 2)) ? hi : lo) = (lo + hi) / 2;
+        return hi;
+      };
+      const double stays = wall(-1);
+      if (stays < 0) continue;
+      found.push_back(middle - e * stays);
+      if (const double other = wall(1); other > 0) out.width_mm = std::max(out.width_mm, stays + other);
+    }
+  }
+  out.places = static_cast<int>(found.size());
+  if (found.size() < 6) return out;
+  // Plane through the places by least squares over the two directions in the planned one.
+  double suu = 0, suv = 0, svv = 0, su = 0, sv = 0, sh = 0, suh = 0, svh = 0;
+  const double n = static_cast<double>(found.size());
+  for (const Vec3& q : found) {
+    const double u = dot(q - p.at_mm, across), v = dot(q - p.at_mm, up), h = dot(q - p.at_mm, e) + play / 2;
+    su += u, sv += v, sh += h, suu += u * u, suv += u * v, svv += v * v, suh += u * h, svh += v * h;
+    out.off_mm = std::max(out.off_mm, std::abs(h));
+  }
+  const double a = suu - su * su / n, b = suv - su * sv / n, d = svv - sv * sv / n;
+  const double r = suh - su * sh / n, s = svh - sv * sh / n, det = a * d - b * b;
+  out.off_deg = std::atan(std::hypot((r * d - s * b) / det, (a * s - b * r) / det)) / kDeg;
+  return out;
+}
+
+void expect_printable(const CuttingGuide& g) {
+  const MeshSummary m = summarize(mesh_of(g.solid));
+  EXPECT_TRUE(m.watertight && m.manifold) << m.open_edges << ' ' << m.nonmanifold_edges << ' ' << m.nonmanifold_points;
+  EXPECT_EQ(m.bodies, 1U);
+  EXPECT_EQ(m.degenerate + m.duplicates, 0U);
+  EXPECT_GT(m.volume_mm3, 0) << "faces outward";
+}
+
+TEST(CuttingGuide, FitsATube) {
+  const TriangleSoup bone = tube(6, 100);
+  const SurgicalPlan plan = one_plane({0, 0, 50}, {0.2, 0.3, 1}, 1.1);
+  CuttingGuideParams params;
+  params.code = "case-7";
+  params.approach = {1, 0, 0};
+  const CuttingGuide g = make_cutting_guide(bone, plan, params);
+  expect_printable(g);
+  EXPECT_TRUE(g.engraved);
+  EXPECT_NEAR(g.min_gap_mm, 0.1, 0.02);
+  EXPECT_LT(g.seat_off_mm, 0.02);
+  EXPECT_GT(g.seat_mm2, 100);
+  EXPECT_GE(g.insertion_mm, 0.08) << "above the bone, along the way, the gap is at least as high as it is wide";
+  EXPECT_LT(std::abs(dot(g.approach, normalized({1, 0, 0})) - 1), 0.1);
+  const SignedDistance solid(g.solid), tree(bone);
+  // Each corner of the guide by exact distance, each corner of the bone to the guide.
+  double least = 1e9;
+  for (const Vec3& p : g.solid.points_mm) least = std::min(least, tree.at(p).signed_mm);
+  for (const Vec3& p : bone.points_mm) least = std::min(least, solid.at(p).signed_mm);
+  EXPECT_GT(least, 0.08);
+  EXPECT_LT(least, 0.12);
+  const SlotFound slot = measured_slot(g, solid, tree, plan.planes[0], params.play_mm);
+  EXPECT_GT(slot.places, 20);
+  EXPECT_LT(slot.off_mm, 0.001);
+  EXPECT_LT(slot.off_deg, 0.01);
+  EXPECT_NEAR(slot.width_mm, 1.2, 0.001);
+  // A tube holds against turning across it, not along it.
+  ASSERT_EQ(g.cuts.size(), 1U);
+  EXPECT_GT(g.cuts[0].rock_mm, 4) << "it slides";
+}
+
+TEST(CuttingGuide, OpenSlotsReachTheSide) {
+  CuttingGuideParams params;
+  const CuttingGuide closed = make_cutting_guide(tube(6, 100), one_plane({0, 0, 50}, {0, 0, 1}), params);
+  params.slot = GuideSlot::open;
+  const CuttingGuide open = make_cutting_guide(tube(6, 100), one_plane({0, 0, 50}, {0, 0, 1}), params);
+  expect_printable(open);
+  EXPECT_EQ(summarize(mesh_of(closed.solid)).euler, 0) << "a body with one hole through it";
+  EXPECT_EQ(summarize(mesh_of(open.solid)).euler, 2);
+}
+
+TEST(CuttingGuide, RocksAsFarAsItsGapLets) {
+  // A bone of square section that is as long as the guide seats: the plane turns by what the gap gives at its ends.
+  const TriangleSoup bone = box({-5, -5, 0}, {5, 5, 100});
+  CuttingGuideParams params;
+  params.approach = {1, 0, 0};
+  params.margin_mm = 10;
+  const CuttingGuide g = make_cutting_guide(bone, one_plane({0, 0, 50}, {0, 0, 1}), params);
+  ASSERT_EQ(g.cuts.size(), 1U);
+  // Held down at its middle, it tilts until one end meets the bone, 10.55 mm away.
+  const double tilts = std::atan(0.1 / 10.55) / kDeg;
+  EXPECT_GT(g.cuts[0].rock_deg, 0.9 * tilts);
+  EXPECT_LT(g.cuts[0].rock_deg, 4 * tilts) << "with the turn that its sides let";
+  params.margin_mm = 40;
+  EXPECT_LT(make_cutting_guide(bone, one_plane({0, 0, 50}, {0, 0, 1}), params).cuts[0].rock_deg, g.cuts[0].rock_deg)
+      << "a longer guide sits better";
+}
+
+TEST(CuttingGuide, ServesAReconstruction) {
+  const JawPhantom p = make_jaw_phantom(1, 12);
+  ReconstructionParams r;
+  const auto set = [](std::array<double, 3>& to, Vec3 v) { to = {v.x, v.y, v.z}; };
+  set(r.a_mm, p.a_mm);
+  set(r.b_mm, p.b_mm);
+  set(r.a_normal, p.a_normal);
+  set(r.b_normal, p.b_normal);
+  r.max_contour_mm = 0.1;
+  r.min_length_mm = 12;
+  const SurgicalPlan plan = reconstruct(p.jaw, p.donor, r).plan;
+  CuttingGuideParams params;
+  params.bone = "fibula";
+  const CuttingGuide g = make_cutting_guide(p.donor, plan, params);
+  expect_printable(g);
+  EXPECT_NEAR(g.min_gap_mm, 0.1, 0.02);
+  EXPECT_LT(g.seat_off_mm, 0.02);
+  EXPECT_GE(g.insertion_mm, 0);
+  ASSERT_GE(g.cuts.size(), 4U);
+  const SignedDistance solid(g.solid), bone(p.donor);
+  for (const GuideCut& c : g.cuts) {
+    const SlotFound slot = measured_slot(g, solid, bone, plan.plane(c.plane), c.two_sided ? params.play_mm : 0);
+    EXPECT_GT(slot.places, 6) << c.plane;
+    EXPECT_LT(slot.off_mm, 0.05) << c.plane;
+    EXPECT_LT(slot.off_deg, 0.1) << c.plane;
+  }
+  params.bone = "mandible";
+  params.planes = "resection a";
+  const CuttingGuide jaw = make_cutting_guide(p.jaw, plan, params);
+  expect_printable(jaw);
+  EXPECT_LT(jaw.seat_off_mm, 0.02);
+}
+
+void write_obj(const std::string& path, const TriangleSoup& s) {
+  const TriMesh m = mesh_of(s);  // single precision, as files of guides are
+  std::ofstream out(path);
+  out.precision(9);
+  for (const auto& p : m.points_mm) out << "v " << p[0] << ' ' << p[1] << ' ' << p[2] << '\n';
+  for (const auto& t : m.triangles) out << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
+}
+
+// OSTEO_GUIDES_SEEDS=30 [OSTEO_GUIDES_OUT=FOLDER] test_planning --gtest_filter=CuttingGuide.Benchmark: the table of
+// docs/validation/planning.md; tests/bench/guides_reference.py judges what is in FOLDER.
+TEST(CuttingGuide, Benchmark) {
+  const char* seeds = std::getenv("OSTEO_GUIDES_SEEDS");
+  const char* folder = std::getenv("OSTEO_GUIDES_OUT");
+  if (seeds == nullptr) GTEST_SKIP() << "OSTEO_GUIDES_SEEDS is not set";
+  for (int seed = 1; seed <= std::atoi(seeds); ++seed) {
+    const JawPhantom p = make_jaw_phantom(static_cast<std::uint64_t>(seed), 12);
+    ReconstructionParams r;
+    const auto set = [](std::array<double, 3>& to, Vec3 v) { to = {v.x, v.y, v.z}; };
+    set(r.a_mm, p.a_mm);
+    set(r.b_mm, p.b_mm);
+    set(r.a_normal, p.a_normal);
+    set(r.b_normal, p.b_normal);
+    SurgicalPlan plan;
+    try {
+      plan = reconstruct(p.jaw, p.donor, r).plan;
+    } catch (const Error& e) {
+      std::cout << "seed " << seed << " no plan: " << e.what() << std::endl;
+      continue;
+    }
+    for (const std::string which : {"fibula", "resection a", "resection b"}) {
+      CuttingGuideParams params;
+      const bool donor = which == "fibula";
+      params.bone = donor ? "fibula" : "mandible";
+      if (!donor) params.planes = which;
+      params.code = "S" + std::to_string(seed);
+      const TriangleSoup& bone = donor ? p.donor : p.jaw;
+      const auto start = std::clock();
+      std::cout << "seed " << seed << ' ' << which;
+      try {
+        const CuttingGuide g = make_cutting_guide(bone, plan, params);
+        const double s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+        const MeshSummary m = summarize(mesh_of(g.solid));
+        const SignedDistance solid(g.solid), distance(bone);
+        SlotFound worst;
+        double rock = 0;
+        for (const GuideCut& c : g.cuts) {
+          const SlotFound f = measured_slot(g, solid, distance, plan.plane(c.plane), c.two_sided ? params.play_mm : 0);
+          if (f.places < 6) std::cout << " slot not measured: " << c.plane;
+          worst.off_mm = std::max(worst.off_mm, f.off_mm);
+          worst.off_deg = std::max(worst.off_deg, f.off_deg);
+          rock = std::max(rock, c.rock_deg);
+        }
+        std::cout << " manifold " << (m.watertight && m.manifold && m.bodies == 1) << " min_gap " << g.min_gap_mm
+                  << " seat_off " << g.seat_off_mm << " seat_mm2 " << g.seat_mm2 << " insertion " << g.insertion_mm
+                  << " slot_mm " << worst.off_mm << " slot_deg " << worst.off_deg << " rock_deg " << rock
+                  << " engraved " << g.engraved << " triangles " << m.triangles << " s " << s << std::endl;
+        if (folder == nullptr) continue;
+        const std::string name = std::string(folder) + "/" + std::to_string(seed) + " " + which;
+        write_obj(name + " guide.obj", g.solid);
+        write_obj(name + " bone.obj", bone);
+        std::ofstream(name + " approach.txt") << g.approach.x << ' ' << g.approach.y << ' ' << g.approach.z << '\n';
+      } catch (const Error& e) {
+        std::cout << " rejected: " << e.what() << std::endl;
+      }
+    }
+  }
+}
+
+TEST(CuttingGuide, WhatCannotBeMadeIsSaid) {
+  const TriangleSoup bone = tube(6, 100);
+  const auto complaint = [&](const SurgicalPlan& plan, auto&& change) {
+    CuttingGuideParams params;
+    params.approach = {1, 0, 0};
+    change(params);
+    return error_of([&] { static_cast<void>(make_cutting_guide(bone, plan, params)); });
+  };
+  const SurgicalPlan one = one_plane({0, 0, 50}, {0, 0, 1});
+  EXPECT_EQ(complaint(one, [](auto&) {}), "");
+  EXPECT_NE(complaint(one, [](auto& q) { q.approach = {0, 0, 1}; }).find("--approach"), std::string::npos);
+  EXPECT_NE(complaint(one, [](auto& q) { q.code = "a b"; }).find("--code"), std::string::npos);
+  EXPECT_NE(complaint(one, [](auto& q) { q.bone = "ulna"; }).find("ulna"), std::string::npos);
+  EXPECT_NE(complaint(one, [](auto& q) { q.planes = "cut, other"; }).find("other"), std::string::npos);
+  EXPECT_NE(complaint(one_plane({0, 0, 300}, {0, 0, 1}), [](auto&) {}).find("does not cut"), std::string::npos);
+  // A wedge that opens away from the guide.
+  SurgicalPlan wedge = one_plane({0, 0, 50}, {-0.3, 0, 1});
+  wedge.planes.push_back({"next", "fibula", {0, 0, 54}, normalized({-0.3, 0, -1}), 1, true});
+  EXPECT_NE(complaint(wedge, [](auto&) {}).find("closes towards the guide"), std::string::npos);
+  EXPECT_EQ(complaint(wedge, [](auto& q) { q.approach = {-1, 0, 0}; }), "") << "and from the other side it is open";
+  EXPECT_EQ(complaint(wedge, [](auto& q) { q.approach = {}; }), "") << "which is found";
+}
+
+TEST(InsertionClearance, IsTheLeastHeightAbove) {
+  EXPECT_NEAR(insertion_clearance_mm(box({0, 0, 5}, {4, 4, 9}), box({1, 1, 0}, {9, 9, 3}), {0, 0, 1}), 2, 1e-12);
+  EXPECT_NEAR(insertion_clearance_mm(box({0, 0, 5}, {4, 4, 9}), box({1, 1, 0}, {9, 9, 3}), {0, 0, -1}), -9, 1e-12);
+  EXPECT_TRUE(std::isinf(insertion_clearance_mm(box({0, 0, 5}, {1, 1, 9}), box({2, 2, 0}, {9, 9, 3}), {0, 0, 1})));
+  // Two edges that cross, high above each other's corners.
+  TriangleSoup a, b;
+  a.points_mm = {{-1, 0, 1}, {1, 0, 1}, {0, 1, 9}};
+  b.points_mm = {{0, -1, 0.75}, {0, 2, 0.75}, {2, 0, -9}};
+  a.triangles = b.triangles = {{0, 1, 2}};
+  EXPECT_NEAR(insertion_clearance_mm(a, b, {0, 0, 1}), 0.25, 1e-9);
+}
+
+TEST(GuideRock, LinearProgrammesAreSolved) {
+  using Row = std::array<double, 6>;
+  // max x + y, x + 2y <= 4, 3x + y <= 6, x >= -1: at (1.6, 1.2).
+  const std::vector<Row> a{{1, 2, 0, 0, 0, 0}, {3, 1, 0, 0, 0, 0}, {-1, 0, 0, 0, 0, 0}};
+  EXPECT_NEAR(guide::largest({1, 1, 0, 0, 0, 0}, a, {4, 6, 1}), 2.8, 1e-12);
+  EXPECT_NEAR(guide::largest({-1, 0, 0, 0, 0, 0}, a, {4, 6, 1}), 1, 1e-12);
+  EXPECT_TRUE(std::isinf(guide::largest({0, 0, 1, 0, 0, 0}, a, {4, 6, 1})));
+  // |R x| <= 1 in each place, R the reflection I - J / 3, which is its own inverse: c . x = (R c) . (R x).
+  const auto reflection = [](std::size_t row, std::size_t column) { return (row == column ? 1.0 : 0.0) - 1.0 / 3; };
+  const Row c{1, -2, 0.5, 3, 0, 1};
+  std::vector<Row> turned;
+  std::vector<double> b;
+  double expected = 0;
+  for (std::size_t k = 0; k < 6; ++k) {
+    double rc = 0;
+    for (std::size_t n = 0; n < 6; ++n) rc += reflection(k, n) * c[n];
+    expected += std::abs(rc);
+    for (const double sign : {1.0, -1.0}) {
+      Row r{};
+      for (std::size_t n = 0; n < 6; ++n) r[n] = sign * reflection(k, n);
+      turned.push_back(r);
+      b.push_back(1);
+    }
+  }
+  EXPECT_NEAR(guide::largest(c, turned, b), expected, 1e-9);
+}
+
+}  // namespace
+}  // namespace osteo

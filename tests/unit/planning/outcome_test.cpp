@@ -1,0 +1,334 @@
+// Outcomes against CTs after surgery of which the truth is known.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <ctime>
+#include <iostream>
+
+#include "edge_fit.h"
+#include "osteo/core/base/error.h"
+#include "osteo/session/planning/detail/jaw_phantom.h"
+#include "osteo/session/planning/planning.h"
+#include "postop.h"
+
+namespace osteo {
+namespace {
+
+using namespace testing_planning;
+
+constexpr double kDeg = 3.14159265358979323846 / 180;
+
+struct World {
+  JawPhantom phantom;
+  BoneField jaw, donor;
+  SurgicalPlan rebuilt;   ///< from fibula segments, which lie upon each other
+  SurgicalPlan advanced;  ///< one cut, the front moved away: faces that a CT shows
+  explicit World(std::uint64_t seed) : phantom(make_jaw_phantom(seed, 12)), jaw(phantom.jaw), donor(phantom.donor) {
+    ReconstructionParams r;
+    const auto set = [](std::array<double, 3>& to, Vec3 v) { to = {v.x, v.y, v.z}; };
+    set(r.a_mm, phantom.a_mm);
+    set(r.b_mm, phantom.b_mm);
+    set(r.a_normal, phantom.a_normal);
+    set(r.b_normal, phantom.b_normal);
+    rebuilt = reconstruct(phantom.jaw, phantom.donor, r).plan;
+    const Vec3 e = phantom.a_normal;
+    advanced.planes = {{"stays", "mandible", phantom.a_mm, e, 1, true},
+                       {"moves", "mandible", phantom.a_mm + e * 1.0, e, 1, false}};
+    RigidTransform away = motion(phantom.a_mm, e * 5, {2, -3, 1});
+    advanced.fragments = {{"back", "mandible", {"stays"}, {}}, {"front", "mandible", {"moves"}, away}};
+  }
+  [[nodiscard]] std::vector<std::pair<std::string, TriangleSoup>> bones() const {
+    return {{"mandible", phantom.jaw}, {"fibula", phantom.donor}};
+  }
+};
+
+const World& world() {
+  static const World w(1);
+  return w;
+}
+
+struct Truth {
+  std::vector<TrueFragment> fragments;
+  std::vector<RigidTransform> deviation;  ///< of each fragment, in the plan's axes
+  std::vector<Vec3> off_tilt;             ///< of each fragment's planes: mm, degrees about the sheet's axes
+};
+
+// Fragments off the plan by up to `most_mm` and `most_deg`, cuts too, the whole patient elsewhere.
+Truth surgery(const World& w, const SurgicalPlan& plan, double most_mm, double most_deg, std::uint64_t seed) {
+  statistics::Random random(seed);
+  Truth out;
+  const RigidTransform patient = motion({}, uniform_vector(random, 9), uniform_vector(random, 5));
+  for (std::size_t n = 0; n < plan.fragments.size(); ++n) {
+    const PlannedFragment& f = plan.fragments[n];
+    const RigidTransform d = n == 0 ? RigidTransform{}
+                                    : motion(f.planned_from_ct(plan.plane(f.planes[0]).at_mm),
+                                             uniform_vector(random, most_mm), uniform_vector(random, most_deg));
+    out.deviation.push_back(d);
+    TrueFragment t{f.bone == "mandible" ? &w.jaw : &w.donor, patient * d * f.planned_from_ct, {}};
+    for (const std::string& name : f.planes) {
+      const CutPlane& p = plan.plane(name);
+      const Vec3 e = p.waste_ahead ? p.normal : -p.normal;
+      const double off = uniform(random, -1, 1), a = uniform(random, -2, 2), b = uniform(random, -2, 2);
+      const Vec3 x = any_perpendicular(e), y = cross(e, x);
+      // h rises by tan a along x and by tan b along y.
+      t.faces.push_back({p.at_mm + e * off, normalized(e - x * std::tan(a * kDeg) - y * std::tan(b * kDeg))});
+      out.off_tilt.push_back({off, a, b});
+    }
+    out.fragments.push_back(std::move(t));
+  }
+  return out;
+}
+
+BoxMm box_of(const Truth& t, const SurgicalPlan& plan, const World& w) {
+  BoxMm box;
+  for (std::size_t n = 0; n < t.fragments.size(); ++n) {
+    const TriangleSoup& bone = plan.fragments[n].bone == "mandible" ? w.phantom.jaw : w.phantom.donor;
+    for (const Vec3& p : bone.points_mm) {
+      bool in = true;
+      for (const auto& [at, e] : t.fragments[n].faces) in = in && dot(p - at, e) < 0;
+      if (in) box.include(t.fragments[n].postop_from_ct(p));
+    }
+  }
+  return box;
+}
+
+Vec3 turn_of(const RigidTransform& d) {
+  const Mat3& m = d.rotation;
+  const Vec3 twice{m.column[1].z - m.column[2].y, m.column[2].x - m.column[0].z, m.column[0].y - m.column[1].x};
+  const double sin = length(twice) / 2;
+  return sin < 1e-15 ? Vec3{} : twice * (std::asin(std::min(1.0, sin)) / (2 * sin) / kDeg);
+}
+
+struct Errors {
+  std::vector<double> pose_mm, pose_deg, cut_mm, cut_deg;
+  int held[4] = {0, 0, 0, 0}, asked[4] = {0, 0, 0, 0};  ///< shift, turn, off, tilt
+  int unknown_fragments = 0, unknown_cuts = 0;
+  void ask(int which, const Measured& m, double truth) {
+    held[which] += m.holds(truth) ? 1 : 0;
+    ++asked[which];
+  }
+  void add(const Outcome& o, const Truth& t, const SurgicalPlan& plan) {
+    std::size_t cut = 0, reference = 0;
+    while (reference + 1 < o.fragments.size() && !o.fragments[reference].reference) ++reference;
+    for (std::size_t n = 0; n < o.fragments.size(); ++n) {
+      const FragmentOutcome& f = o.fragments[n];
+      unknown_fragments += f.known ? 0 : 1;
+      if (f.known && !f.reference) {
+        const RigidTransform d = t.deviation[reference].inverse() * t.deviation[n];
+        const Vec3 shift = d(f.middle_mm) - f.middle_mm, turn = turn_of(d);
+        Vec3 off, turned;
+        for (std::size_t a = 0; a < 3; ++a) {
+          off[a] = f.shift_mm[a].value - shift[a];
+          turned[a] = f.turn_deg[a].value - turn[a];
+          ask(0, f.shift_mm[a], shift[a]);
+          ask(1, f.turn_deg[a], turn[a]);
+        }
+        pose_mm.push_back(length(off));
+        pose_deg.push_back(length(turned));
+      }
+      for (std::size_t k = 0; k < plan.fragments[n].planes.size(); ++k, ++cut) {
+        const CutOutcome& c = o.cuts[cut];
+        unknown_cuts += c.known ? 0 : 1;
+        if (!c.known) continue;
+        const CutPlane& p = plan.plane(c.plane);
+        const auto& [at, e] = t.fragments[n].faces[k];
+        // The true face's height over the planned one, at the middle that was measured.
+        const Vec3 up = p.waste_ahead ? p.normal : -p.normal;
+        const Vec3 middle = p.at_mm + c.axes[0] * c.middle[0] + c.axes[1] * c.middle[1];
+        const double off = -dot(middle - at, e) / dot(up, e);
+        ask(2, c.off_mm, off);
+        ask(3, c.tilt_deg[0], t.off_tilt[cut].y);
+        ask(3, c.tilt_deg[1], t.off_tilt[cut].z);
+        cut_mm.push_back(std::abs(c.off_mm.value - off));
+        cut_deg.push_back(std::hypot(c.tilt_deg[0].value - t.off_tilt[cut].y, c.tilt_deg[1].value - t.off_tilt[cut].z));
+      }
+    }
+  }
+};
+
+Outcome measured(const World& w, const SurgicalPlan& plan, const Truth& t, const PostopCt& how, std::uint64_t seed) {
+  return measure_outcome(plan, w.bones(), postop_ct(t.fragments, box_of(t, plan, w), how, seed), {});
+}
+
+double most(const std::vector<double>& v) {
+  return v.empty() ? -1 : *std::max_element(v.begin(), v.end());
+}
+
+// A bar of metal on the outer side of the jaw, across a cut.
+RigidTransform plate_at(const World& w, const Truth& t, const SurgicalPlan& plan, std::size_t fragment) {
+  const CutPlane& p = plan.plane(plan.fragments[fragment].planes[0]);
+  Vec3 middle;
+  for (const Vec3& q : w.phantom.jaw.points_mm) middle += q / static_cast<double>(w.phantom.jaw.points_mm.size());
+  const Vec3 at = t.fragments[fragment].postop_from_ct(p.at_mm);
+  Vec3 out = t.fragments[0].postop_from_ct.rotation * (w.phantom.a_mm - middle);
+  const Vec3 x = t.fragments[fragment].postop_from_ct.rotation * p.normal;
+  out = normalized(out - x * dot(out, x));
+  RigidTransform r;
+  r.rotation = {{x, cross(out, x), out}};
+  r.shift_mm = at + out * 9.0;
+  return r;
+}
+
+TEST(Outcome, FindsFragmentsAndCuts) {
+  Errors errors;
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const Truth t = surgery(world(), world().advanced, 1.5, 3, seed);
+    const Outcome o = measured(world(), world().advanced, t, {}, seed);
+    EXPECT_TRUE(o.fragments[0].reference || o.fragments[1].reference);
+    errors.add(o, t, world().advanced);
+  }
+  EXPECT_EQ(errors.unknown_fragments, 0);
+  EXPECT_EQ(errors.unknown_cuts, 0);
+  EXPECT_LT(most(errors.pose_mm), 0.2);
+  EXPECT_LT(most(errors.pose_deg), 0.3);
+  EXPECT_LT(most(errors.cut_mm), 0.3);
+  EXPECT_LT(most(errors.cut_deg), 0.5);
+}
+
+TEST(Outcome, FindsSegmentsOfAnotherBoneBesideMetal) {
+  const SurgicalPlan& plan = world().rebuilt;
+  const Truth t = surgery(world(), plan, 0.7, 2, 7);
+  PostopCt how;
+  how.plates.push_back(plate_at(world(), t, plan, 0));
+  const Outcome o = measured(world(), plan, t, how, 7);
+  Errors errors;
+  errors.add(o, t, plan);
+  EXPECT_EQ(errors.unknown_fragments, 0);
+  EXPECT_LT(most(errors.pose_mm), 0.4);
+  EXPECT_LT(most(errors.pose_deg), 0.6);
+}
+
+TEST(Outcome, SaysWhatCannotBeKnown) {
+  const SurgicalPlan& plan = world().advanced;
+  Truth t = surgery(world(), plan, 0, 0, 3);
+  const BoxMm box = box_of(t, plan, world());
+  // Without the front: it is not there, and nothing is said of its cut.
+  t.fragments.pop_back();
+  const Outcome o = measure_outcome(plan, world().bones(), postop_ct(t.fragments, box, {}, 3), {});
+  ASSERT_EQ(o.fragments.size(), 2U);
+  EXPECT_NE(o.fragments[0].known, o.fragments[1].known);
+  for (std::size_t n = 0; n < 2; ++n) {
+    if (o.fragments[n].known) continue;
+    EXPECT_NE(o.fragments[n].why, "");
+    EXPECT_FALSE(o.cuts[n].known);
+    EXPECT_NE(o.cuts[n].why, "");
+  }
+  const auto error_of = [&](const SurgicalPlan& p, const std::vector<std::pair<std::string, TriangleSoup>>& bones,
+                            const Image& ct) -> std::string {
+    try {
+      static_cast<void>(measure_outcome(p, bones, ct, {}));
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return {};
+  };
+  const Image empty = postop_ct({}, box, {}, 4);
+  EXPECT_NE(error_of(plan, world().bones(), empty).find("not found"), std::string::npos);
+  EXPECT_NE(error_of(plan, {}, empty).find("mandible"), std::string::npos);
+  SurgicalPlan all = plan;
+  all.fragments[0].planned_from_ct.shift_mm = {1, 0, 0};
+  EXPECT_NE(error_of(all, world().bones(), empty).find("moves every fragment"), std::string::npos);
+}
+
+TEST(Outcome, TouchingFacesAreNotKnown) {
+  // Cut, and nothing moved or removed: face upon face.
+  SurgicalPlan plan = world().advanced;
+  plan.planes[1].at_mm = plan.planes[0].at_mm;
+  plan.fragments[1].planned_from_ct = {};
+  Truth t;
+  const Vec3 at = plan.planes[0].at_mm, e = plan.planes[0].normal;
+  t.fragments = {{&world().jaw, {}, {{at, e}}}, {&world().jaw, {}, {{at, -e}}}};
+  const Outcome o = measured(world(), plan, t, {}, 5);
+  for (const CutOutcome& c : o.cuts) EXPECT_FALSE(c.known) << c.plane;
+}
+
+TEST(EdgeReader, FindsABlurredStepAndKeepsAwayFromMetal) {
+  Image ct;
+  ct.frame.dims = {40, 40, 40};
+  ct.frame.spacing_mm = {0.5, 0.5, 0.5};
+  const auto voxels = make_voxels<std::int16_t>(ct.frame.voxel_count());
+  for (int k = 0, n = 0; k < 40; ++k)
+    for (int j = 0; j < 40; ++j)
+      for (int i = 0; i < 40; ++i, ++n)
+        voxels[static_cast<std::size_t>(n)] =
+            static_cast<std::int16_t>(k > 35 ? 3000 : 40 + 1000 * normal_share((9.87 - 0.5 * i) / 0.4));
+  ct.voxels = voxels;
+  const planning::EdgeReader reader(ct, 200, 2500);
+  for (double from = 9; from < 11; from += 0.37) {
+    const auto edge = reader.along({from, 10, 10}, {1, 0, 0}, 2);
+    ASSERT_TRUE(edge);
+    EXPECT_NEAR(from + edge->at_mm, 9.87, 0.02);
+  }
+  EXPECT_FALSE(reader.along({10, 10, 10}, {-1, 0, 0}, 2)) << "from soft tissue to bone is no edge of bone";
+  EXPECT_FALSE(reader.along({10, 10, 10}, {0, 1, 0}, 2));
+  EXPECT_FALSE(reader.along({19, 10, 10}, {1, 0, 0}, 2)) << "outside the CT";
+  EXPECT_FALSE(planning::EdgeReader(ct, 200, 900).along({10, 10, 10}, {1, 0, 0}, 2)) << "too bright";
+}
+
+TEST(LeastSquares, IntervalsHoldWithErrorsThatGoTogether) {
+  // A line through points in patches; all of a patch are off by the same, so 400 points know no more than 40.
+  statistics::Random random(3);
+  int held = 0;
+  const int runs = 2000;
+  for (int run = 0; run < runs; ++run) {
+    std::vector<planning::Equation<2>> all;
+    for (int patch = 0; patch < 40; ++patch) {
+      const double off = gaussian(random);
+      for (int n = 0; n < 10; ++n)
+        all.push_back({{1, 0.1 * patch + 0.01 * n},
+                       2 + 0.5 * (0.1 * patch + 0.01 * n) + off + 0.1 * gaussian(random),
+                       {patch, 0, 0}});
+    }
+    const auto s = planning::least_squares<2>(all);
+    ASSERT_TRUE(s);
+    held += std::abs(s->step[1] - 0.5) <= s->quantile * std::sqrt(s->covariance[1][1]) ? 1 : 0;
+  }
+  EXPECT_GT(held, 0.93 * runs);
+  EXPECT_LT(held, 0.97 * runs);
+}
+
+// OSTEO_OUTCOME_SEEDS=100 test_planning --gtest_filter=Outcome.Benchmark: the table of docs/validation/planning.md.
+TEST(Outcome, Benchmark) {
+  const char* seeds = std::getenv("OSTEO_OUTCOME_SEEDS");
+  if (seeds == nullptr) GTEST_SKIP() << "OSTEO_OUTCOME_SEEDS is not set";
+  for (const bool rebuilt : {false, true}) {
+    for (const bool metal : {false, true}) {
+      Errors errors;
+      const auto start = std::clock();
+      const SurgicalPlan& plan = rebuilt ? world().rebuilt : world().advanced;
+      for (int seed = 1; seed <= std::atoi(seeds); ++seed) {
+        const auto s = static_cast<std::uint64_t>(seed + (metal ? 5000 : 0));
+        const Truth t = surgery(world(), plan, rebuilt ? 0.7 : 1.5, 3, s);
+        PostopCt how;
+        how.noise_hu = 30 + 10 * (seed % 4);
+        how.spacing_mm = seed % 2 == 0 ? Vec3{0.6, 0.6, 0.75} : Vec3{0.45, 0.45, 1};
+        if (metal) how.plates.push_back(plate_at(world(), t, plan, 0));
+        try {
+          errors.add(measured(world(), plan, t, how, s), t, plan);
+        } catch (const Error& e) {
+          std::cout << "seed " << s << ' ' << e.what() << std::endl;
+        }
+      }
+      const auto line = [](const char* name, std::vector<double> v) {
+        std::sort(v.begin(), v.end());
+        if (v.empty()) return;
+        std::cout << "  " << name << " n " << v.size() << " median " << v[v.size() / 2] << " p95 "
+                  << v[v.size() * 95 / 100] << " worst " << v.back() << '\n';
+      };
+      std::cout << (rebuilt ? "rebuilt" : "advanced") << (metal ? " metal" : "") << " processor_s "
+                << static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC << " unknown fragments "
+                << errors.unknown_fragments << " cuts " << errors.unknown_cuts << '\n';
+      line("pose_mm", errors.pose_mm);
+      line("pose_deg", errors.pose_deg);
+      line("cut_mm", errors.cut_mm);
+      line("cut_deg", errors.cut_deg);
+      for (int k = 0; k < 4; ++k)
+        std::cout << "  held " << k << ": " << errors.held[k] << " of " << errors.asked[k] << " = "
+                  << 100.0 * errors.held[k] / std::max(1, errors.asked[k]) << " %\n";
+      std::cout << std::flush;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace osteo
