@@ -95,11 +95,11 @@ _osteo() {
     info) flags="$flags" ;;
     list-series) flags="$flags --studies --thumbnails" ;;
     suggest-threshold) flags="$flags --series --hu-offset --picture" ;;
-    convert) flags="$flags --source --series --onto-source --description" ;;
+    convert) flags="$flags --source --series --onto-source --description --segmentation" ;;
     run) flags="$flags --validate --dry-run --reuse --engine" ;;
     prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --keep-table --structures --names --series --axes --hu-offset --pipeline --edits --fresh --no-report" ;;
     batch) flags="$flags --out --pipeline --jobs --memory-mb --minutes --retries --retry-failed --keep-free-mb --only --report-only --no-report" ;;
-    report) flags="$flags --scan --dicom" ;;
+    report) flags="$flags --scan --dicom --measures --segmentation" ;;
     approve) flags="$flags --by --note --withdraw" ;;
     edit) flags="$flags --apply --scan --width --height --state-file" ;;
     export-slicer) flags="$flags --source" ;;

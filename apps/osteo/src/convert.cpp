@@ -43,14 +43,21 @@ int ConvertCommand::run(const Params& p, cli::Invocation& io) {
     data = load_data(from, std::array{DataKind::labels}, io.context);
   }
   require_savable(kind_of(data), to);
+  const auto* const labels = std::get_if<Labels>(&data);
+  if (io.given.contains("segmentation") && (labels == nullptr || to.extension() != ".dcm"))
+    throw Error(ExitCode::usage, "--segmentation is for a label map that becomes a .dcm");
+  DicomObjectOptions options{nullptr, p.description, p.segmentation};
   if (p.source.empty()) {
     if (p.onto_source) throw Error(ExitCode::usage, "--onto-source needs --source DICOM_FOLDER");
-    save_data(data, to, io.context, [&](const fs::path& old) { require_replaceable(old, to); });
+    if (labels != nullptr && to.extension() == ".dcm")
+      save_segmentation(*labels, to, options, io.context);
+    else
+      save_data(data, to, io.context, [&](const fs::path& old) { require_replaceable(old, to); });
   } else {
     if (to.extension() != ".dcm") throw Error(ExitCode::usage, "--source is for outputs that end in .dcm");
     const DicomScan scan = scan_dicom(p.source, {}, io.context);
-    const DicomObjectOptions options{&choose_series(scan, p.series, p.source), p.description};
-    if (const auto* labels = std::get_if<Labels>(&data)) {
+    options.source = &choose_series(scan, p.series, p.source);
+    if (labels != nullptr) {
       p.onto_source ? save_segmentation_on_source(*labels, to, options, io.context)
                     : save_segmentation(*labels, to, options, io.context);
     } else if (const auto* surface = std::get_if<Surface>(&data)) {
@@ -69,7 +76,8 @@ int ConvertCommand::run(const Params& p, cli::Invocation& io) {
 cli::CommandInfo BenchCommand::info() {
   return {"bench",
           "speed against error, beside the peers, in one run",
-          "Prints the tables of docs/validation/accuracy.md. Runs osteo_bench, which is built by 'cmake --build build/release "
+          "Prints the tables of docs/validation/accuracy.md. Runs osteo_bench, which is built by 'cmake --build "
+          "build/release "
           "--target osteo_bench'.",
           {{"subject", bench_subject_names(), true}},
           "osteo bench import"};

@@ -11,6 +11,7 @@
 #include "osteo/core/base/json_document.h"
 #include "osteo/hospital/pacs/roles.h"
 #include "osteo/imaging/dicom/objects.h"
+#include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/session/scene/approval.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/hand_over.h"
@@ -99,39 +100,70 @@ cli::CommandInfo ReportCommand::info() {
           "kept, or left out, and "
           "it says so. --dicom writes the PDF as a DICOM object too, of the patient and study of the scan, which is "
           "looked at for it: "
-          "'osteo send' brings it to a PACS.",
+          "'osteo send' brings it to a PACS. --measures writes what it says in numbers as a DICOM structured report.",
           {{"case", "a folder made by prepare"}},
           "osteo report CASE"};
 }
 
+namespace {
+
+// A DICOM object that is asked for, before anything is made.
+void check_object(const std::string& object, const fs::path& example, const char* flag, const cli::Invocation& io) {
+  if (object.empty()) return;
+  if (fs::path(object).extension() != ".dcm")
+    throw Error(ExitCode::usage, "'" + object + "' does not end in .dcm", std::string(flag) + " " + example.string());
+  if (output_exists(object) && !io.common.force)
+    throw Error(ExitCode::cannot_write, "'" + object + "' exists already",
+                "give another name, or --force to replace it");
+}
+
+void write_measures(const fs::path& folder, const ReportCommand::Params& p, const DicomSeries& series,
+                    const Context& context) {
+  const CaseMeasures measured = case_measures(folder, context);
+  MeasuresReport report;
+  report.program = program_version();
+  report.code = case_code(folder);
+  report.bone_mm3 = measured.bone_mm3.value_or(-1);
+  report.bone_lower_hu = measured.lower_hu;
+  for (const auto& s : measured.structures)
+    report.structures.push_back({s.is.name, s.is.origin, s.volume_mm3, s.length_mm});
+  for (const auto& g : measured.gaps) report.gaps.push_back({g.a, g.b, g.mm});
+  report.segmentation = p.segmentation;
+  save_measures_report(report, p.measures, {&series, "Measures of bone for rehearsal, not for diagnosis"}, context);
+}
+
+}  // namespace
+
 int ReportCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0], object = p.dicom;
   const AuditTrail trail;
-  if (!object.empty()) {
-    if (object.extension() != ".dcm")
-      throw Error(ExitCode::usage, "'" + p.dicom + "' does not end in .dcm",
-                  "--dicom " + report_file(folder, ".dcm").string());
-    if (output_exists(object) && !io.common.force)
-      throw Error(ExitCode::cannot_write, "'" + p.dicom + "' exists already",
-                  "give another name, or --force to replace it");
-  }
+  check_object(p.dicom, report_file(folder, ".dcm"), "--dicom", io);
+  check_object(p.measures, report_file(folder, ".measures.dcm"), "--measures", io);
+  if (!p.segmentation.empty() && p.measures.empty())
+    throw Error(ExitCode::usage, "--segmentation is what --measures refers to", "--measures FILE.dcm");
+  if (!p.measures.empty() && fs::path(p.measures).lexically_normal() == object.lexically_normal())
+    throw Error(ExitCode::usage, "--dicom and --measures are two objects", "give them two names");
   const auto recipe = read_recipe(folder);
   const auto pipeline = pipeline_at_hand(folder, recipe, p.scan);
   std::optional<CaseSeries> of;
-  if (!object.empty()) of = series_of(folder, pipeline, io);
+  if (!object.empty() || !p.measures.empty()) of = series_of(folder, pipeline, io);
   const CaseReport report = make_report(folder, recipe, pipeline, io);
-  if (of) {
+  if (!object.empty())
     save_encapsulated_pdf(read_text(report.pdf), "Bone for rehearsal: " + case_code(folder), object,
                           {of->series, "Bone for rehearsal, not for diagnosis"}, io.context);
+  if (!p.measures.empty()) write_measures(folder, p, *of->series, io.context);
+  if (of) {
     io.end_progress();
     audit_case(trail, AuditEvent::Kind::hand_over, folder, io.context);
-    if (!io.common.quiet) io.err << "  " << p.dicom << " (names the patient)\n";
+    for (const std::string& written : {p.dicom, p.measures})
+      if (!io.common.quiet && !written.empty()) io.err << "  " << written << " (names the patient)\n";
   }
   if (io.common.json) {
     Json said{{"html", report.html.string()},  {"pdf", report.pdf.string()},
               {"unchanged", report.unchanged}, {"left_out", report.left_out},
               {"code", case_code(folder)},     {"approval", approval_json(approval_of(folder))}};
-    if (of) said["dicom"] = p.dicom;
+    if (!object.empty()) said["dicom"] = p.dicom;
+    if (!p.measures.empty()) said["measures"] = p.measures;
     io.out << said.dump(2) << '\n';
   }
   return 0;

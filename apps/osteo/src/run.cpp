@@ -8,6 +8,8 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/hospital/pacs/peer.h"
+#include "osteo/imaging/dicom/objects.h"
 #include "osteo/imaging/pipeline/engine.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/session/recording/script.h"
@@ -114,6 +116,14 @@ std::string actions_page() {
   return page;
 }
 
+std::string conformance_page() {
+  return "<!-- Made by `osteo docs`; a test fails when it is stale. -->\n\n# DICOM conformance statement\n\n"
+         "What Osteotome takes, offers and writes, from the tables that the program itself goes by. The test "
+         "`pacs.conformance` holds it against what the storage node negotiates. Not a medical device: "
+         "[Intended use](../intended-use.md).\n\n" +
+         network_conformance() + objects_conformance();
+}
+
 }  // namespace
 
 int DocsCommand::run(const Params& p, cli::Invocation& io) {
@@ -135,6 +145,7 @@ int DocsCommand::run(const Params& p, cli::Invocation& io) {
   auto pages = cli::reference_pages(make_osteo_program());
   pages["script.schema.json"] = script_schema();
   pages["actions.md"] = actions_page();
+  pages["conformance.md"] = conformance_page();
   for (const auto& [name, content] : pages) {
     const fs::path path = folder / name;
     if (!p.check) {

@@ -78,6 +78,36 @@ TEST(Objects, StructuresHaveTheirCodes) {
   }
 }
 
+// A label map keeps its numbers; names, colours aside, and what drew each come back from every form. highdicom reads
+// the same files in readers.dicom_objects.
+TEST(Objects, SegmentationsKeepNamesNumbersAndOrigins) {
+  Frame f;
+  f.dims = {9, 7, 4};
+  const auto v = make_voxels<std::uint8_t>(f.voxel_count());
+  const std::array<std::uint8_t, 6> values{0, 3, 7, 90, 200, 255};
+  for (std::size_t i = 0; i < f.voxel_count(); ++i) v[i] = values[i % 6];
+  const std::vector<Structure> given{{3, "Nervus facialis, gr\u00f6\u00dfter Teil", {}, "tube, version 2"},
+                                     {7, "air cells", {}, "find-structures, version 2, corrected by hand"},
+                                     {90, "drawn", {}, "by hand"},
+                                     {200, "of somebody", {}, ""}};
+  for (const auto form : {SegmentationForm::binary, SegmentationForm::labelmap, SegmentationForm::labelmap16}) {
+    SCOPED_TRACE(static_cast<int>(form));
+    const fs::path file = scratch("origins") / "a.dcm";
+    save_segmentation({{f, v}, given}, file, {nullptr, "Bone", form});
+    const Labels back = load_segmentation(file);
+    ASSERT_EQ(back.structures.size(), 5u) << "a value without a name is a segment too";
+    for (std::size_t s = 0; s < back.structures.size(); ++s) {
+      EXPECT_EQ(back.structures[s].value, form == SegmentationForm::binary ? s + 1 : values[s + 1]);
+      EXPECT_EQ(back.structures[s].name, s < 4 ? given[s].name : "Structure 255");
+      EXPECT_EQ(back.structures[s].origin, s < 4 ? given[s].origin : "");
+    }
+    for (std::size_t i = 0; i < f.voxel_count(); ++i)
+      ASSERT_EQ(back.voxels[i], form == SegmentationForm::binary ? i % 6 : values[i % 6]) << i;
+    EXPECT_EQ(text_of(file, DCM_SegmentationType), form == SegmentationForm::binary ? "BINARY" : "LABELMAP");
+    EXPECT_EQ(text_of(file, DCM_SpecificCharacterSet), "ISO_IR 192");
+  }
+}
+
 // Careless anonymisation leaves hashes where dates and UIDs belong: what is not allowed is not taken over, by name.
 TEST(Objects, TagsOfTheSourceThatDicomDoesNotAllow) {
   Series s("bad-tags", slices(0, 12));

@@ -145,9 +145,12 @@ TEST(SparseSegmentation, AbsentFramesAreEmptyLayers) {
           const Labels truth = painted(stack(pitch, oblique), layers);
           save_segmentation(truth, out / "a.dcm");
           if (shuffled) shuffle_frames(out / "a.dcm");
-          const Loaded r = load(out / "a.dcm");
-          ASSERT_EQ(r.refused, "");
-          expect_same_structures(truth, r.labels);
+          for (const auto form : {SegmentationForm::binary, SegmentationForm::labelmap, SegmentationForm::labelmap16}) {
+            if (form != SegmentationForm::binary) save_segmentation(truth, out / "a.dcm", {nullptr, "Bone", form});
+            const Loaded r = load(out / "a.dcm");
+            ASSERT_EQ(r.refused, "");
+            expect_same_structures(truth, r.labels);
+          }
         }
       }
     }
@@ -161,13 +164,14 @@ TEST(SparseSegmentation, EverySubsetOfTwelveSlicesComesBack) {
   const int step = std::getenv("OSTEO_ALL_SUBSETS") != nullptr ? 1 : 97;
   for (const bool oblique : {false, true}) {
     for (int subset = 1 + (oblique ? step / 2 : 0); subset < 1 << 12; subset += step) {
-      SCOPED_TRACE(std::to_string(subset) + (oblique ? " oblique" : ""));
+      const auto form = static_cast<SegmentationForm>(subset % 3);
+      SCOPED_TRACE(std::to_string(subset) + (oblique ? " oblique" : "") + " form " + std::to_string(subset % 3));
       std::vector<std::pair<int, std::uint8_t>> layers;
       for (int k = 0; k < 12; ++k)
         if ((subset >> k & 1) != 0)
           layers.emplace_back(k, static_cast<std::uint8_t>(1 + layers.size() % 2));  // 1 is always there
       const Labels truth = painted(stack(1.0 / 3, oblique), layers);
-      save_segmentation(truth, file);
+      save_segmentation(truth, file, {nullptr, "Bone", form});
       const Loaded r = load(file);
       ASSERT_EQ(r.refused, "");
       expect_same_structures(truth, r.labels);

@@ -47,6 +47,17 @@ TEST(Segments, ComeBackInTheirBoxesWithTheirTags) {
   EXPECT_THROW(save_segments(labels, folder.path() / "s.nrrd", {}), Error);
 }
 
+TEST(Segments, OriginsComeBack) {
+  const TemporaryFolder folder;
+  Labels labels = two_boxes();
+  labels.structures[0].origin = "tube, version 2, corrected by hand";
+  save_labels(labels, folder.path() / "s.seg.nrrd");
+  const Labels back = load_labels(folder.path() / "s.seg.nrrd");
+  ASSERT_EQ(back.structures.size(), labels.structures.size());
+  for (const Structure& s : back.structures)
+    EXPECT_EQ(s.origin, s.value == 3 ? labels.structures[0].origin : "") << s.name;
+}
+
 // Slicer up to 4.11 at least never returns from a list of tags that holds one without a colon.
 TEST(Segments, EveryTagHasAColon) {
   const TemporaryFolder folder;

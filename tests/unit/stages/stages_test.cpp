@@ -7,9 +7,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include "edit.h"
 #include "meshes.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/data/tet_mesh.h"
+#include "osteo/imaging/edit/edit_file.h"
 #include "segment.h"
 
 namespace osteo {
@@ -33,6 +35,37 @@ T reported(const Report& report, const std::string& key) {
 
 nlohmann::json info_of(const Data& d, MeshInfoParams p = {}) {
   return nlohmann::json::parse(std::get<Document>(MeshInfoStage::run(p, std::span(&d, 1), {})[0]).json);
+}
+
+// What a person drew or changed says so; what was left as it was found does not.
+TEST(ApplyEdits, StructuresKnowTheHandsThatChangedThem) {
+  Image ct;
+  ct.frame.dims = {12, 12, 12};
+  const auto hu = make_voxels<std::int16_t>(ct.frame.voxel_count());
+  const auto mask = make_voxels<std::uint8_t>(ct.frame.voxel_count()),
+             map = make_voxels<std::uint8_t>(ct.frame.voxel_count());
+  for (std::size_t v = 0; v < ct.frame.voxel_count(); ++v) {
+    hu[v] = 500;
+    mask[v] = 1;
+    map[v] = static_cast<std::uint8_t>(v < 144 ? 1 : v < 288 ? 2 : 0);
+  }
+  ct.voxels = hu;
+  const Labels bone{{ct.frame, mask}, {}}, structures{{ct.frame, map},
+                                                      {{1, "left as found", {1, 1, 1}, "tube, version 2"},
+                                                       {2, "changed", {2, 2, 2}, "find-structures, version 2"}}};
+  EditDocument document(ct, bone, &structures);
+  document.apply(BrushEdit{2, false, 1.5, {{5, 5, 6}}});
+  document.apply(AddStructureEdit{3, "drawn", {250, 220, 40}, StructureRole::at_risk});
+  document.apply(BrushEdit{3, false, 1.5, {{5, 5, 9}}});
+  document.apply(AddStructureEdit{4, "by a tool", {250, 220, 40}, StructureRole::at_risk});
+  document.apply(VoxelsEdit{4, "1400 5"});
+  const std::vector<Data> inputs{ct, bone, Document{edits_text(recipe_of(document))}, structures};
+  const auto made = std::get<Labels>(ApplyEditsStage::run({}, inputs, {})[1]);
+  ASSERT_EQ(made.structures.size(), 4u);
+  EXPECT_EQ(made.structures[0].origin, "tube, version 2");
+  EXPECT_EQ(made.structures[1].origin, "find-structures, version 2, corrected by hand");
+  EXPECT_EQ(made.structures[2].origin, "by hand");
+  EXPECT_EQ(made.structures[3].origin, "");
 }
 
 TEST(MeshInfo, TellsWhatASurfaceIsLike) {

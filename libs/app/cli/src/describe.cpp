@@ -373,7 +373,8 @@ std::map<std::string, std::string> reference_pages(const Program& program) {
   index +=
       "\n[Exit codes](exit-codes.md), [schema of pipeline files](pipeline.schema.json), [of scripts of "
       "strokes](script.schema.json), "
-      "[actions of sessions](actions.md), [bash completion](osteo.bash).\n";
+      "[actions of sessions](actions.md), [DICOM conformance statement](conformance.md), [bash "
+      "completion](osteo.bash).\n";
   pages["README.md"] = index;
   std::string codes = note + "# Exit codes\n\n| code | name | meaning |\n|---|---|---|\n";
   for (const auto& d : exit_code_table)

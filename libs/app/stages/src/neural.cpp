@@ -1,12 +1,13 @@
 #include "neural.h"
 
 #include "osteo/imaging/image/structures.h"
+#include "segment.h"
 
 namespace osteo::inline app {
 
 StageInfo SegmentNetworkStage::info() {
   return {.name = "segment-network",
-          .version = 1,
+          .version = 2,
           .synopsis = "a label map by a trained network: an nnU-Net v2 folder, without Python",
           .description =
               "Reads the folder that nnU-Net v2 leaves of a training (plans.json, dataset.json, "
@@ -24,7 +25,8 @@ StageInfo SegmentNetworkStage::info() {
 
 std::vector<Data> SegmentNetworkStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
   const auto& ct = std::get<Image>(inputs[0]);
-  const Labels labels = segment_with_network(ct, std::get<Source>(inputs[1]).path, params, context);
+  Labels labels = segment_with_network(ct, std::get<Source>(inputs[1]).path, params, context);
+  for (Structure& s : labels.structures) s.origin = origin_of(info());
   return {name_structures(labels, {}, nullptr, context)};
 }
 

@@ -46,7 +46,7 @@ Labels with_colours(const Labels& labels) {
 StageInfo TubeStage::info() {
   return {
       .name = "tube",
-      .version = 1,
+      .version = 2,
       .synopsis = "a nerve or vessel from a few points on it: centre line, radius, mask",
       .description =
           "Finds the cheapest way between the points through what looks like a tube, moves it to the middle of the "
@@ -135,8 +135,9 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
   }
   Labels drawn = draw_tube(tube, ct.frame, p.name, onto);
   double volume = 0;
-  for (const Structure& s : drawn.structures) {
+  for (Structure& s : drawn.structures) {
     if (s.name != p.name) continue;
+    s.origin = origin_of(TubeStage::info());
     for (const std::uint8_t v : drawn.span()) volume += v == s.value ? ct.frame.voxel_volume_mm3() : 0;
   }
   if (const std::string why = implausible_volume(p.name, volume); !why.empty()) context.warn(why);
@@ -145,7 +146,7 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
 
 StageInfo FindStructuresStage::info() {
   return {.name = "find-structures",
-          .version = 1,
+          .version = 2,
           .synopsis = "ear canal, air cells, sigmoid sinus, tegmen, dura, labyrinth found in a CT",
           .description =
               "Looks for structures of one ear by what bone, air and soft tissue bound: the external canal from the "
@@ -199,7 +200,9 @@ std::vector<Data> FindStructuresStage::run(const Params& p, std::span<const Data
               "is it the right side, and is the ear within the image with air outside of it?"),
         "findings", document);
   }
-  return {found.labels, document};
+  Labels labels = found.labels;
+  for (Structure& s : labels.structures) s.origin = origin_of(FindStructuresStage::info());
+  return {std::move(labels), document};
 }
 
 }  // namespace osteo::inline app

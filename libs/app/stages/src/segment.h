@@ -8,6 +8,11 @@
 
 namespace osteo::inline app {
 
+/// Structure::origin of what a stage draws.
+[[nodiscard]] inline std::string origin_of(const StageInfo& stage) {
+  return stage.name + ", version " + std::to_string(stage.version);
+}
+
 struct TubeStageParams {
   TubeParams tube;
   std::string points_mm;

@@ -444,4 +444,24 @@ CaseReport write_case_report(const fs::path& folder, const std::string& asked_fo
   return report;
 }
 
+CaseMeasures case_measures(const fs::path& folder, const Context& context) {
+  const CaseFacts facts(folder);
+  const Case the_case = load_case(folder);
+  CaseMeasures out;
+  out.bone_mm3 = facts.reported("resample", "volume_after_mm3");
+  out.lower_hu = facts.reported("threshold", "lower_hu");
+  const auto file = the_case.files.find("structures");
+  if (file == the_case.files.end()) return out;
+  const std::vector<StructureMeasure> all = measure_structures(load_labels(file->second), context);
+  for (const StructureMeasure& m : all) {
+    out.structures.push_back({m.structure, m.volume_mm3, m.length_mm});
+    for (const StructureMeasure& other : all) {
+      if (other.structure.value <= m.structure.value) continue;
+      for (const StructureMeasure::Gap& g : m.gaps)
+        if (g.other == other.structure.value) out.gaps.push_back({m.structure.name, other.structure.name, g.mm});
+    }
+  }
+  return out;
+}
+
 }  // namespace osteo::inline assessment

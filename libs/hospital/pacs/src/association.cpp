@@ -15,6 +15,7 @@
 #include <new>
 
 #include "dcmtk/dcmdata/dcuid.h"
+#include "node_tables.h"
 
 namespace osteo::inline hospital::pacs {
 namespace {
@@ -209,27 +210,17 @@ bool let_in(T_ASC_Association* association, const ReceiveOptions& options, Share
            ASC_REASON_SU_APPCONTEXTNAMENOTSUPPORTED);
     return false;
   }
-  // What a sender has is taken as it is: compressed forms first, so that nobody decodes for us.
-  const char* forms[] = {UID_JPEGProcess14SV1TransferSyntax,
-                         UID_JPEGProcess14TransferSyntax,
-                         UID_JPEGLSLosslessTransferSyntax,
-                         UID_JPEG2000LosslessOnlyTransferSyntax,
-                         UID_RLELosslessTransferSyntax,
-                         UID_JPEGProcess2_4TransferSyntax,
-                         UID_JPEGProcess1TransferSyntax,
-                         UID_JPEGLSLossyTransferSyntax,
-                         UID_JPEG2000TransferSyntax,
-                         UID_DeflatedExplicitVRLittleEndianTransferSyntax,
-                         UID_LittleEndianExplicitTransferSyntax,
-                         UID_BigEndianExplicitTransferSyntax,
-                         UID_LittleEndianImplicitTransferSyntax};
-  const char* echo[] = {UID_VerificationSOPClass};
-  const char* plain[] = {UID_LittleEndianExplicitTransferSyntax, UID_LittleEndianImplicitTransferSyntax};
-  OFCondition done = ASC_acceptContextsWithPreferredTransferSyntaxes(association->params, echo, 1, plain, 2);
+  std::vector<const char*> forms, plain, classes;
+  for (const UidRow& row : kNodeSyntaxes) forms.push_back(row.uid.data());
+  for (const UidRow& row : kPlainSyntaxes) plain.push_back(row.uid.data());
+  for (const UidRow& row : kStorageClasses) classes.push_back(row.uid.data());
+  const char* echo[] = {kVerification.uid.data()};
+  OFCondition done = ASC_acceptContextsWithPreferredTransferSyntaxes(association->params, echo, 1, plain.data(),
+                                                                     static_cast<int>(plain.size()));
   if (done.good())
-    done = ASC_acceptContextsWithPreferredTransferSyntaxes(association->params, dcmAllStorageSOPClassUIDs,
-                                                           numberOfDcmAllStorageSOPClassUIDs, forms,
-                                                           static_cast<int>(std::size(forms)));
+    done = ASC_acceptContextsWithPreferredTransferSyntaxes(association->params, classes.data(),
+                                                           static_cast<int>(classes.size()), forms.data(),
+                                                           static_cast<int>(forms.size()));
   return done.good() && ASC_acknowledgeAssociation(association).good();
 }
 

@@ -13,6 +13,7 @@
 #include "association.h"
 #include "deidentify_table.h"
 #include "node.h"
+#include "node_tables.h"
 #include "osteo/core/base/json_document.h"
 #include "telling.h"
 
@@ -21,21 +22,6 @@ namespace {
 
 using pacs::DeidAction;
 using Key = std::array<unsigned char, crypto_generichash_KEYBYTES>;
-
-constexpr std::string_view kTakenClasses[] = {
-    UID_CTImageStorage,
-    UID_EnhancedCTImageStorage,
-    UID_LegacyConvertedEnhancedCTImageStorage,
-    UID_MRImageStorage,
-    UID_EnhancedMRImageStorage,
-    UID_LegacyConvertedEnhancedMRImageStorage,
-    UID_PositronEmissionTomographyImageStorage,
-    UID_EnhancedPETImageStorage,
-    UID_XRay3DAngiographicImageStorage,
-    UID_XRay3DCraniofacialImageStorage,
-    UID_SegmentationStorage,
-    UID_SurfaceSegmentationStorage,
-};
 
 const DcmTagKey kTelephones[] = {DCM_PatientTelephoneNumbers, DCM_ReferringPhysicianTelephoneNumbers,
                                  DCM_PersonTelephoneNumbers, DCM_OrderCallbackPhoneNumber};
@@ -270,7 +256,7 @@ bool is_text(DcmEVR kind) {
 }
 
 std::string why_not(DcmItem& data, const std::string& sop_class) {
-  if (std::ranges::find(kTakenClasses, sop_class) == std::end(kTakenClasses))
+  if (std::ranges::find(pacs::kDeidentified, sop_class, &pacs::UidRow::uid) == pacs::kDeidentified.end())
     return pacs::class_name(sop_class) + " may hold words that no table knows";
   if (pacs::text_of(data, DCM_BurnedInAnnotation) == "YES")
     return "words are burned into its pixels (BurnedInAnnotation is YES)";

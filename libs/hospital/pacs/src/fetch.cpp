@@ -6,7 +6,9 @@
 #include <charconv>
 #include <csignal>
 #include <set>
+#include <span>
 
+#include "node_tables.h"
 #include "query.h"
 
 namespace osteo::inline hospital {
@@ -15,13 +17,6 @@ namespace {
 using pacs::text_of;
 
 constexpr std::size_t kMaxFetchedSeries = 10'000;
-
-OFList<OFString> uncompressed() {
-  OFList<OFString> list;
-  list.push_back(UID_LittleEndianExplicitTransferSyntax);
-  list.push_back(UID_LittleEndianImplicitTransferSyntax);
-  return list;
-}
 
 int number_of(const std::string& text, int otherwise) {
   const std::size_t begin = std::min(text.find_first_not_of(' '), text.size());
@@ -180,39 +175,25 @@ FetchReport fetch_series(const DicomPeer& peer, const RemoteSeries& series, cons
   Getter scu(folder, limits, series.images, context);
   scu.prepare(peer);
   scu.setStorageMode(DCMSCU_STORAGE_BIT_PRESERVING);
-  scu.addPresentationContext(UID_GETStudyRootQueryRetrieveInformationModel, uncompressed());
-  // A context for each class and form: a node that chooses among several may choose one into which it has to convert.
-  const auto take = [&](const char* sop_class, std::initializer_list<const char*> syntaxes) {
-    for (const char* const s : syntaxes) {
+  OFList<OFString> plain;
+  for (const pacs::UidRow& row : pacs::kPlainSyntaxes) plain.push_back(row.uid.data());
+  scu.addPresentationContext(pacs::kGetStudyRoot.uid.data(), plain);
+  const auto take = [&](const pacs::UidRow& sop_class, std::span<const pacs::UidRow> forms) {
+    for (const pacs::UidRow& form : forms) {
       OFList<OFString> one;
-      one.push_back(s);
-      scu.addPresentationContext(sop_class, one, ASC_SC_ROLE_SCP);
+      one.push_back(form.uid.data());
+      scu.addPresentationContext(sop_class.uid.data(), one, ASC_SC_ROLE_SCP);
     }
   };
-  const auto slices = {UID_LittleEndianExplicitTransferSyntax,
-                       UID_LittleEndianImplicitTransferSyntax,
-                       UID_DeflatedExplicitVRLittleEndianTransferSyntax,
-                       UID_JPEGProcess14SV1TransferSyntax,
-                       UID_JPEGProcess14TransferSyntax,
-                       UID_JPEGLSLosslessTransferSyntax,
-                       UID_JPEG2000LosslessOnlyTransferSyntax,
-                       UID_RLELosslessTransferSyntax,
-                       UID_JPEGProcess2_4TransferSyntax,
-                       UID_JPEGProcess1TransferSyntax,
-                       UID_JPEGLSLossyTransferSyntax,
-                       UID_JPEG2000TransferSyntax};
-  for (const char* const c : {UID_CTImageStorage, UID_MRImageStorage, UID_EnhancedCTImageStorage}) take(c, slices);
-  for (const char* const c : {UID_SegmentationStorage, UID_EncapsulatedSTLStorage, UID_EncapsulatedPDFStorage,
-                              UID_SecondaryCaptureImageStorage, UID_ComprehensiveSRStorage, UID_EnhancedSRStorage,
-                              UID_BasicTextSRStorage, UID_RTStructureSetStorage})
-    take(c, {UID_LittleEndianExplicitTransferSyntax, UID_LittleEndianImplicitTransferSyntax,
-             UID_DeflatedExplicitVRLittleEndianTransferSyntax});
+  for (const pacs::UidRow& row : pacs::kFetchedImages) take(row, pacs::kFetchedForms);
+  for (const pacs::UidRow& row : pacs::kFetchedObjects)
+    take(row, std::span(pacs::kFetchedForms).first(pacs::kPlainForms));
   scu.connect(peer);
   DcmDataset keys;
   keys.putAndInsertString(DCM_QueryRetrieveLevel, "SERIES");
   keys.putAndInsertString(DCM_StudyInstanceUID, series.study.c_str());
   keys.putAndInsertString(DCM_SeriesInstanceUID, series.series.c_str());
-  const auto id = scu.findPresentationContextID(UID_GETStudyRootQueryRetrieveInformationModel, "");
+  const auto id = scu.findPresentationContextID(pacs::kGetStudyRoot.uid.data(), "");
   if (id == 0)
     throw Error(ExitCode::failed, peer_text(peer) + " does not give by C-GET",
                 "let it send to 'osteo receive' instead, or allow C-GET for " + peer.own_ae);

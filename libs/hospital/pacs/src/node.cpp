@@ -4,10 +4,13 @@
 #include <dcmtk/oflog/oflog.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+
+#include "node_tables.h"
 
 namespace osteo::inline hospital {
 
@@ -164,6 +167,8 @@ std::string text_of(DcmItem& item, const DcmTagKey& tag) {
 }
 
 std::string class_name(const std::string& uid) {
+  const auto* const row = std::ranges::find(kStorageClasses, uid, &UidRow::uid);
+  if (row != kStorageClasses.end()) return std::string(row->name);
   const char* const name = dcmFindNameOfUID(uid.c_str());
   if (name == nullptr) return uid;
   // DCMTK's names have no spaces: "CTImageStorage", "EncapsulatedSTLStorage".

@@ -1,13 +1,14 @@
 #include "query.h"
 
+#include "node_tables.h"
+
 namespace osteo::inline hospital::pacs {
 
 Query::Query(const DicomPeer& peer) : peer_(peer_text(peer)) {
   prepare(peer);
   OFList<OFString> syntaxes;
-  syntaxes.push_back(UID_LittleEndianExplicitTransferSyntax);
-  syntaxes.push_back(UID_LittleEndianImplicitTransferSyntax);
-  addPresentationContext(UID_FINDStudyRootQueryRetrieveInformationModel, syntaxes);
+  for (const UidRow& row : kPlainSyntaxes) syntaxes.push_back(row.uid.data());
+  addPresentationContext(kFindStudyRoot.uid.data(), syntaxes);
   connect(peer);
 }
 
@@ -16,7 +17,7 @@ Query::~Query() {
 }
 
 std::vector<std::unique_ptr<DcmDataset>> Query::ask(DcmDataset& keys, std::size_t most) {
-  const auto id = findPresentationContextID(UID_FINDStudyRootQueryRetrieveInformationModel, "");
+  const auto id = findPresentationContextID(kFindStudyRoot.uid.data(), "");
   found_.clear();
   most_ = most;
   more_ = false;

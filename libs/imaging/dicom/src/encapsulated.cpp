@@ -2,19 +2,18 @@
 #include <dcmtk/dcmdata/dctk.h>
 
 #include <algorithm>
-#include <cstring>
-#include <ctime>
 
 #include "dcmtk_tools.h"
+#include "object_identity.h"
 #include "osteo/imaging/dicom/objects.h"
 #include "osteo/imaging/io/surface_io.h"
 
 namespace osteo::inline imaging {
 namespace {
 
-void put(DcmItem& d, const DcmTagKey& tag, const std::string& value, const fs::path& path) {
-  dicom::require(d.putAndInsertString(DcmTag(tag), value.c_str()), path);
-}
+using dicom::now_text;
+using dicom::put;
+using dicom::put_identity;
 
 void put_code(DcmItem& d, const DcmTagKey& sequence, const char* value, const char* scheme, const char* meaning,
               const fs::path& path) {
@@ -25,51 +24,9 @@ void put_code(DcmItem& d, const DcmTagKey& sequence, const char* value, const ch
   put(*item, DCM_CodeMeaning, meaning, path);
 }
 
-bool of_space(const DcmTagKey& tag) {
-  return tag == DCM_FrameOfReferenceUID || tag == DCM_PositionReferenceIndicator;
-}
-
-// Patient and study are the source's, or nobody's. A document lies in no space: it has no frame of reference.
-void put_identity(DcmDataset& d, const DicomObjectOptions& o, const std::string& content, bool in_space,
-                  const fs::path& path, const Context& context) {
-  static const DcmTagKey kTaken[] = {DCM_SpecificCharacterSet,
-                                     DCM_PatientName,
-                                     DCM_PatientID,
-                                     DCM_PatientBirthDate,
-                                     DCM_PatientSex,
-                                     DCM_StudyInstanceUID,
-                                     DCM_StudyDate,
-                                     DCM_StudyTime,
-                                     DCM_ReferringPhysicianName,
-                                     DCM_StudyID,
-                                     DCM_AccessionNumber,
-                                     DCM_StudyDescription,
-                                     DCM_FrameOfReferenceUID,
-                                     DCM_PositionReferenceIndicator,
-                                     DCM_PatientIdentityRemoved,
-                                     DCM_DeidentificationMethod};
-  for (const auto& tag :
-       {DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyDate, DCM_StudyTime, DCM_ReferringPhysicianName, DCM_StudyID,
-        DCM_AccessionNumber, DCM_PositionReferenceIndicator}) {
-    if (in_space || !of_space(tag)) dicom::require(d.insertEmptyElement(DcmTag(tag)), path);
-  }
-  if (o.source == nullptr) {
-    put(d, DCM_PatientName, dicom::kAnonymousName, path);
-    put(d, DCM_PatientID, dicom::kAnonymousId, path);
-    put(d, DCM_StudyInstanceUID, dicom::uid_of(hash_text(content + "study")), path);
-    if (in_space) put(d, DCM_FrameOfReferenceUID, dicom::uid_of(hash_text(content + "frame")), path);
-    put(d, DCM_PatientIdentityRemoved, "YES", path);
-    put(d, DCM_DeidentificationMethod, "Made without the source's identity", path);
-    return;
-  }
-  DcmFileFormat source;
-  dicom::load_identity(*o.source, source, context);
-  for (const auto& tag : kTaken) {
-    OFString value;
-    if (!in_space && of_space(tag)) continue;
-    if (source.getDataset()->findAndGetOFStringArray(tag, value).good() && !value.empty())
-      put(d, tag, value.c_str(), path);
-  }
+// The slices that it was made from.
+void put_source(DcmDataset& d, const DicomObjectOptions& o, bool in_space, const fs::path& path) {
+  if (o.source == nullptr) return;
   DcmItem *item = nullptr, *series = nullptr;
   if (in_space) {  // Common Instance Reference, which the standard gives to models and not to documents
     dicom::require(d.findOrCreateSequenceItem(DCM_ReferencedSeriesSequence, series, 0), path);
@@ -95,12 +52,7 @@ struct Document {
 // What every encapsulated document says of itself (PS3.3 C.24.1, C.24.2).
 void put_document(DcmDataset& d, const Document& document, const DicomObjectOptions& options, const std::string& title,
                   const fs::path& path) {
-  char date[16], time[16];
-  const std::time_t now = std::time(nullptr);
-  std::tm local{};
-  localtime_r(&now, &local);
-  std::strftime(date, sizeof date, "%Y%m%d", &local);
-  std::strftime(time, sizeof time, "%H%M%S", &local);
+  const auto [date, time] = now_text();
   put(d, DCM_SOPClassUID, document.sop_class, path);
   put(d, DCM_SOPInstanceUID, dicom::uid_of(hash_text(document.content + "instance")), path);
   put(d, DCM_InstanceCreationDate, date, path);
@@ -116,7 +68,7 @@ void put_document(DcmDataset& d, const Document& document, const DicomObjectOpti
   put(d, DCM_InstanceNumber, "1", path);
   put(d, DCM_ContentDate, date, path);
   put(d, DCM_ContentTime, time, path);
-  put(d, DCM_AcquisitionDateTime, std::string(date) + time, path);
+  put(d, DCM_AcquisitionDateTime, date + time, path);
   put(d, DCM_BurnedInAnnotation, "NO", path);
   put(d, DCM_DocumentTitle, title, path);
   put(d, DCM_MIMETypeOfEncapsulatedDocument, document.mime_type, path);
@@ -146,6 +98,7 @@ void save_encapsulated_stl(const TriMesh& mesh, const fs::path& path, const Dico
   DcmFileFormat file;
   DcmDataset& d = *file.getDataset();
   put_identity(d, options, content, true, path, context);
+  put_source(d, options, true, path);
   put_document(d, {UID_EncapsulatedSTLStorage, "M3D", "9002", "model/stl", content}, options, options.description,
                path);
   put_code(d, DCM_ConceptNameCodeSequence, "85040-4", "LN", "3D Model", path);
@@ -168,6 +121,7 @@ void save_encapsulated_pdf(std::string_view pdf, const std::string& title, const
   DcmDataset& d = *file.getDataset();
   std::string content = hash_text(pdf);
   put_identity(d, options, content, false, path, context);
+  put_source(d, options, false, path);
   // The pages name nobody, so they can be the same in two studies, as after a scan was made anonymous: the objects are
   // not.
   OFString study;

@@ -23,10 +23,12 @@
 namespace osteo::inline imaging::dicom {
 namespace {
 
-const vtkDICOMTag kSegments(0x0062, 0x0002), kNumber(0x0062, 0x0004), kLabel(0x0062, 0x0005);
+const vtkDICOMTag kSegments(0x0062, 0x0002), kNumber(0x0062, 0x0004), kLabel(0x0062, 0x0005),
+    kAlgorithmType(0x0062, 0x0008), kAlgorithmName(0x0062, 0x0009), kAlgorithm(0x0062, 0x0007),
+    kAlgorithmVersion(0x0066, 0x0031);
 
 struct Head {
-  std::map<int, std::string> segments;  // label by number, background left out
+  std::map<int, Structure> segments;  // by number, background left out; values are given later
   double spacing_mm = 0, thickness_mm = 0;
 };
 
@@ -39,10 +41,22 @@ Head read_head(const fs::path& file, int background) {
   Head head;
   const vtkDICOMSequence list(meta->Get(kSegments));
   for (std::size_t i = 0; i < list.GetNumberOfItems(); ++i) {
-    const int number = list.GetItem(i).Get(kNumber).AsInt();
-    std::string name = list.GetItem(i).Get(kLabel).AsUTF8String();
-    while (!name.empty() && name.back() == ' ') name.pop_back();
-    if (number != background) head.segments[number] = name.empty() ? "Segment " + std::to_string(number) : name;
+    const vtkDICOMItem& item = list.GetItem(i);
+    const auto text = [](const vtkDICOMValue& value) {
+      std::string t = value.AsUTF8String();
+      while (!t.empty() && t.back() == ' ') t.pop_back();
+      return t;
+    };
+    const int number = item.Get(kNumber).AsInt();
+    const std::string name = text(item.Get(kLabel));
+    const vtkDICOMSequence algorithm(item.Get(kAlgorithm));
+    const std::string version =
+        algorithm.GetNumberOfItems() > 0 ? text(algorithm.GetItem(0).Get(kAlgorithmVersion)) : std::string();
+    if (number != background)
+      head.segments[number] = {1,
+                               name.empty() ? "Segment " + std::to_string(number) : name,
+                               {},
+                               origin_from(text(item.Get(kAlgorithmType)), text(item.Get(kAlgorithmName)), version)};
   }
   const auto number_of = [&](vtkDICOMTag tag) {
     const vtkDICOMValue& v = meta->Get(0, 0, tag);
@@ -114,11 +128,12 @@ Labels load_labelmap(const fs::path& path, const Context& context) {
   Labels labels{{frame, {}}, {}};
   const bool same_numbers = head.segments.begin()->first > 0 && head.segments.rbegin()->first <= 255;
   std::vector<int> value_of(65536, -1);
-  for (const auto& [number, name] : head.segments) {
+  for (const auto& [number, segment] : head.segments) {
     if (number < 0 || number > 65535) throw fail("segment " + std::to_string(number) + " has no number of 16 bits");
     const int value = same_numbers ? number : static_cast<int>(labels.structures.size()) + 1;
     value_of[static_cast<std::size_t>(number)] = value;
-    labels.structures.push_back({static_cast<std::uint8_t>(value), name, {}});
+    labels.structures.push_back(segment);
+    labels.structures.back().value = static_cast<std::uint8_t>(value);
   }
   if (background >= 0 && background < 65536) value_of[static_cast<std::size_t>(background)] = 0;
   if (value_of[0] < 0) value_of[0] = 0;

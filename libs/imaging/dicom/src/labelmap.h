@@ -16,4 +16,8 @@ inline constexpr std::string_view kLabelMapStorage = "1.2.840.10008.5.1.4.1.1.66
 /// that no segment has are rejected. Errors: corrupt.
 [[nodiscard]] Labels load_labelmap(const std::filesystem::path& path, const Context& context);
 
+/// Structure::origin of a segment that is read: its algorithm's name and version, or "by hand"; empty where it says
+/// none.
+[[nodiscard]] std::string origin_from(const std::string& type, const std::string& name, const std::string& version);
+
 }  // namespace osteo::inline imaging::dicom

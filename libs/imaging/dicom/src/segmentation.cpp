@@ -1,7 +1,5 @@
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dctk.h>
-#include <dcmtk/dcmfg/fgderimg.h>
-#include <dcmtk/dcmfg/fgfracon.h>
 #include <dcmtk/dcmfg/fgpixmsr.h>
 #include <dcmtk/dcmfg/fgplanor.h>
 #include <dcmtk/dcmfg/fgplanpo.h>
@@ -20,270 +18,12 @@
 #include "osteo/imaging/dicom/objects.h"
 #include "pixels.h"
 #include "seg_layers.h"
+#include "segment_codes.h"
 
 namespace osteo::inline imaging {
 namespace {
 
-using dicom::decimal;
 using dicom::require;
-
-// One slice of the segmentation to be: where it lies, and which labels its pixels have.
-struct Plane {
-  Vec3 position;
-  std::vector<std::uint8_t> labels;
-  std::vector<std::size_t> source_headers;  // the slices of the source it lies on, or between
-};
-
-struct Stack {
-  int columns = 0, rows = 0;
-  Vec3 along_row, along_column;
-  double column_mm = 1, row_mm = 1, thickness_mm = 1;
-  std::vector<Plane> planes;
-};
-
-std::vector<Structure> structures_of(const Labels& labels) {
-  if (!labels.structures.empty()) return labels.structures;
-  std::array<bool, 256> there{};
-  for (const auto v : labels.span()) there[v] = true;
-  std::vector<Structure> list;
-  for (std::size_t v = 1; v < 256; ++v) {
-    if (there[v])
-      list.push_back({static_cast<std::uint8_t>(v), v == 1 ? "Bone" : "Structure " + std::to_string(v), {}});
-  }
-  return list;
-}
-
-// The slice of the source that a point lies on, or the two that it lies between.
-std::vector<std::size_t> slices_around(const DicomSeries& source, Vec3 point) {
-  constexpr std::size_t kNone = static_cast<std::size_t>(-1);
-  std::size_t below = kNone, above = kNone;
-  double under = -1e30, over = 1e30;
-  for (std::size_t h = 0; h < source.headers.size(); ++h) {
-    const DicomHeader& header = source.headers[h];
-    if (!header.usable() || header.frames.size() != 1) continue;
-    const DicomFrame& f = header.frames.front();
-    const double d = dot(f.position_mm - point, cross(f.along_row, f.along_column));
-    if (d <= kSamePlaceMm && d > under) under = d, below = h;
-    if (d >= -kSamePlaceMm && d < over) over = d, above = h;
-  }
-  std::vector<std::size_t> found;
-  if (below != kNone) found.push_back(below);
-  if (above != kNone && above != below && (below == kNone || under < -kSamePlaceMm)) found.push_back(above);
-  return found;
-}
-
-Stack stack_of(const Labels& labels, const DicomSeries* source) {
-  const Frame& f = labels.frame;
-  Stack s{f.dims[0],      f.dims[1],      f.direction.column[0], f.direction.column[1],
-          f.spacing_mm.x, f.spacing_mm.y, f.spacing_mm.z,        {}};
-  const std::size_t area = static_cast<std::size_t>(s.columns) * static_cast<std::size_t>(s.rows);
-  for (int k = 0; k < f.dims[2]; ++k) {
-    const std::uint8_t* const p = labels.voxels.get() + static_cast<std::size_t>(k) * area;
-    if (std::all_of(p, p + area, [](std::uint8_t v) { return v == 0; })) continue;
-    Plane plane{f.world_from_index({0, 0, static_cast<double>(k)}), {p, p + area}, {}};
-    if (source != nullptr) {
-      plane.source_headers = slices_around(
-          *source, f.world_from_index({(s.columns - 1) / 2.0, (s.rows - 1) / 2.0, static_cast<double>(k)}));
-    }
-    s.planes.push_back(std::move(plane));
-  }
-  return s;
-}
-
-Stack stack_on_source(const Labels& labels, const DicomSeries& source) {
-  const Placement p = place_slices(source.headers, {.max_gap_mm = 1e9, .max_hole_mm = 1e9});
-  if (p.slices.size() < 2)
-    throw Error(ExitCode::corrupt, "the source series is no volume", "'osteo import --list' shows what it is");
-  Stack s{p.verdict.columns, p.verdict.rows,         p.along_row, p.along_column, p.column_spacing_mm,
-          p.row_spacing_mm,  p.verdict.gap_usual_mm, {}};
-  const Frame& f = labels.frame;
-  for (std::size_t k = 0; k < p.slices.size(); ++k) {
-    Plane plane{p.verdict.slices[k].position_mm, {}, {p.slices[k].header}};
-    plane.labels.resize(static_cast<std::size_t>(s.columns) * static_cast<std::size_t>(s.rows));
-    bool any = false;
-    for (int j = 0; j < s.rows; ++j) {
-      for (int i = 0; i < s.columns; ++i) {
-        const Vec3 at =
-            f.index_from_world(plane.position + s.along_row * (i * s.column_mm) + s.along_column * (j * s.row_mm));
-        const int x = static_cast<int>(std::lround(at.x)), y = static_cast<int>(std::lround(at.y)),
-                  z = static_cast<int>(std::lround(at.z));
-        if (x < 0 || y < 0 || z < 0 || x >= f.dims[0] || y >= f.dims[1] || z >= f.dims[2]) continue;
-        const std::uint8_t v = labels.at(x, y, z);
-        plane.labels[static_cast<std::size_t>(j) * static_cast<std::size_t>(s.columns) + static_cast<std::size_t>(i)] =
-            v;
-        any = any || v != 0;
-      }
-    }
-    if (any) s.planes.push_back(std::move(plane));
-  }
-  return s;
-}
-
-void take_over_identity(DcmSegmentation& seg, const DicomObjectOptions& o, const std::string& content,
-                        const fs::path& path, const Context& context) {
-  if (o.source != nullptr) {
-    DcmFileFormat source;
-    dicom::load_identity(*o.source, source, context);
-    require(seg.importFromSourceImage(*source.getDataset()), path);
-  } else {
-    require(seg.getPatient().setPatientName(dicom::kAnonymousName), path);
-    require(seg.getPatient().setPatientID(dicom::kAnonymousId), path);
-    require(seg.getStudy().setStudyInstanceUID(dicom::uid_of(hash_text(content + "study")).c_str()), path);
-    require(seg.getFrameOfReference().setFrameOfReferenceUID(dicom::uid_of(hash_text(content + "frame")).c_str()),
-            path);
-  }
-  require(seg.getSeries().setSeriesInstanceUID(dicom::uid_of(hash_text(content + "series")).c_str()), path);
-  require(seg.getSOPCommon().setSOPInstanceUID(dicom::uid_of(hash_text(content + "instance")).c_str()), path);
-  require(seg.getSeries().setSeriesDescription(o.description.substr(0, 64).c_str()), path);
-  require(seg.getSeries().setSeriesNumber("9001"), path);
-}
-
-void refer_to_series(DcmSegmentation& seg, const DicomSeries& source) {
-  auto* const item = new IODSeriesAndInstanceReferenceMacro::ReferencedSeriesItem();
-  item->setSeriesInstanceUID(dicom::valid_uid(source.uid).c_str());
-  for (const DicomHeader& h : source.headers) {
-    if (!h.usable()) continue;
-    auto* const instance = new SOPInstanceReferenceMacro();
-    instance->setReferencedSOPClassUID(h.sop_class.c_str());
-    instance->setReferencedSOPInstanceUID(dicom::valid_uid(h.sop_uid).c_str());
-    item->getReferencedInstanceItems().push_back(instance);
-  }
-  seg.getCommonInstanceReference().getReferencedSeriesItems().push_back(item);
-}
-
-// What a structure is, by the words of its name; the first row that fits counts. Bone where it is the only one.
-struct StructureCode {
-  std::string_view word, code, meaning;
-};
-constexpr std::array kStructureCodes{
-    StructureCode{"facial nerve", "56052001", "Facial nerve"},
-    StructureCode{"marrow", "14016003", "Bone marrow"},
-    StructureCode{"mandible", "91609006", "Mandible"},
-    StructureCode{"maxilla", "70925003", "Maxilla"},
-    StructureCode{"tooth", "38199008", "Tooth"},
-    StructureCode{"teeth", "38199008", "Tooth"},
-    StructureCode{"air cells", "91716001", "Mastoid cells and antra"},
-    StructureCode{"labyrinth", "22945000", "Inner ear"},
-    StructureCode{"ear canal", "84301002", "External auditory canal"},
-    StructureCode{"dura", "18545000", "Dura mater"},
-    StructureCode{"carotid", "69105007", "Carotid artery"},
-    StructureCode{"temporal bone", "60911003", "Temporal bone"},
-    StructureCode{"skull", "89546000", "Skull"},
-    StructureCode{"bone", "272673000", "Bone"},
-};
-CodeSequenceMacro type_of(const std::string& name, bool alone) {
-  const std::string lower = lower_case(name);
-  for (const StructureCode& c : kStructureCodes) {
-    if (lower.find(c.word) != std::string::npos)
-      return {std::string(c.code).c_str(), "SCT", std::string(c.meaning).c_str()};
-  }
-  if (alone) return {"272673000", "SCT", "Bone"};
-  return {"85756007", "SCT", "Tissue"};
-}
-
-void write(const Stack& stack, const std::vector<Structure>& structures, const fs::path& path,
-           const DicomObjectOptions& o, const Context& context) {
-  if (stack.planes.empty())
-    throw Error(ExitCode::usage, "the label map is empty: there is nothing to write to '" + path.string() + "'");
-  dicom::quiet_dcmtk();
-  Hasher hasher;
-  for (const Plane& p : stack.planes) {
-    hasher.add(&p.position, sizeof p.position);
-    hasher.add(p.labels.data(), p.labels.size());
-  }
-  const std::string content = hasher.hex();
-
-  DcmSegmentation* made = nullptr;
-  const IODGeneralEquipmentModule::EquipmentInfo equipment("Osteotome", "osteo", "0", "0.1");
-  const ContentIdentificationMacro identity("1", "BONE", o.description.substr(0, 64).c_str(), "OSTEOTOME^");
-  require(DcmSegmentation::createBinarySegmentation(made, static_cast<Uint16>(stack.rows),
-                                                    static_cast<Uint16>(stack.columns), equipment, identity),
-          path);
-  const std::unique_ptr<DcmSegmentation> seg(made);
-  take_over_identity(*seg, o, content, path, context);
-  if (o.source != nullptr) refer_to_series(*seg, *o.source);
-
-  for (const Structure& s : structures) {
-    const CodeSequenceMacro category("123037004", "SCT", "Anatomical Structure");
-    const CodeSequenceMacro type = type_of(s.name, structures.size() == 1);
-    DcmSegment* segment = nullptr;
-    require(DcmSegment::create(segment, s.name.substr(0, 64).c_str(), category, type, DcmSegTypes::SAT_SEMIAUTOMATIC,
-                               "Osteotome threshold"),
-            path);
-    Uint16 number = 0;
-    require(seg->addSegment(segment, number), path);
-  }
-
-  const auto text = [](double v) { return OFString(decimal(v).c_str()); };
-  FGPixelMeasures measures;
-  measures.setPixelSpacing((decimal(stack.row_mm) + "\\" + decimal(stack.column_mm)).c_str());
-  measures.setSliceThickness(text(stack.thickness_mm));
-  measures.setSpacingBetweenSlices(text(stack.thickness_mm));
-  require(seg->addForAllFrames(measures), path);
-  const Vec3 u = stack.along_row, v = stack.along_column;
-  const std::unique_ptr<FGPlaneOrientationPatient> orientation(
-      FGPlaneOrientationPatient::createMinimal(text(u.x), text(u.y), text(u.z), text(v.x), text(v.y), text(v.z)));
-  require(seg->addForAllFrames(*orientation), path);
-  const std::string organization = dicom::uid_of(hash_text(content + "dimensions"));
-  require(seg->getDimensions().addDimensionIndex(DCM_ReferencedSegmentNumber, organization.c_str(),
-                                                 DCM_SegmentIdentificationSequence, "Segment"),
-          path);
-  require(seg->getDimensions().addDimensionIndex(DCM_ImagePositionPatient, organization.c_str(),
-                                                 DCM_PlanePositionSequence, "Position"),
-          path);
-
-  std::vector<Uint8> bits;  // of all frames, a byte each
-  std::vector<Uint8> frame(static_cast<std::size_t>(stack.columns) * static_cast<std::size_t>(stack.rows));
-  for (std::size_t s = 0; s < structures.size(); ++s) {
-    for (std::size_t k = 0; k < stack.planes.size(); ++k) {
-      const Plane& plane = stack.planes[k];
-      bool any = false;
-      for (std::size_t i = 0; i < frame.size(); ++i) {
-        frame[i] = plane.labels[i] == structures[s].value ? 1 : 0;
-        any = any || frame[i] != 0;
-      }
-      if (!any) continue;
-      FGFrameContent where;
-      where.setDimensionIndexValues(static_cast<Uint32>(s + 1), 0);
-      where.setDimensionIndexValues(static_cast<Uint32>(k + 1), 1);
-      const std::unique_ptr<FGPlanePosPatient> position(
-          FGPlanePosPatient::createMinimal(text(plane.position.x), text(plane.position.y), text(plane.position.z)));
-      OFVector<FGBase*> groups;
-      groups.push_back(&where);
-      groups.push_back(position.get());
-      FGDerivationImage derivation;
-      if (!plane.source_headers.empty()) {
-        DerivationImageItem* derived = nullptr;
-        require(derivation.addDerivationImageItem(CodeSequenceMacro("113076", "DCM", "Segmentation"), "", derived),
-                path);
-        for (const std::size_t index : plane.source_headers) {
-          const DicomHeader& h = o.source->headers[index];
-          DcmDataset reference;
-          reference.putAndInsertString(DCM_SOPClassUID, h.sop_class.c_str());
-          reference.putAndInsertString(DCM_SOPInstanceUID, dicom::valid_uid(h.sop_uid).c_str());
-          SourceImageItem* image = nullptr;
-          const CodeSequenceMacro purpose("121322", "DCM", "Source image for image processing operation");
-          require(derived->addSourceImageItem(&reference, purpose, image), path);
-        }
-        groups.push_back(&derivation);
-      }
-      require(seg->addFrame(frame.data(), static_cast<Uint16>(s + 1), groups), path);
-      bits.insert(bits.end(), frame.begin(), frame.end());
-    }
-  }
-  // DCMTK 3.6.7 shifts frames whose size is no multiple of 8: the bits are packed here, one frame right after the other
-  // (PS3.5 8.1.1).
-  DcmFileFormat file;
-  require(seg->writeDataset(*file.getDataset()), path);
-  std::vector<Uint8> packed((bits.size() + 15) / 16 * 2);
-  for (std::size_t i = 0; i < bits.size(); ++i) packed[i / 8] = static_cast<Uint8>(packed[i / 8] | bits[i] << (i % 8));
-  require(file.getDataset()->putAndInsertUint8Array(DCM_PixelData, packed.data(),
-                                                    static_cast<unsigned long>(packed.size())),
-          path);
-  write_atomically(path, [&](const fs::path& temporary) {
-    require(file.saveFile(temporary.c_str(), EXS_LittleEndianExplicit), path);
-  });
-}
 
 bool read_position(DcmSegmentation& seg, Uint32 frame, Vec3& position) {
   auto* const fg =
@@ -347,18 +87,6 @@ std::string class_of(const fs::path& path) {
 }
 
 }  // namespace
-
-void save_segmentation(const Labels& labels, const fs::path& path, const DicomObjectOptions& options,
-                       const Context& context) {
-  write(stack_of(labels, options.source), structures_of(labels), path, options, context);
-}
-
-void save_segmentation_on_source(const Labels& labels, const fs::path& path, const DicomObjectOptions& options,
-                                 const Context& context) {
-  if (options.source == nullptr)
-    throw Error(ExitCode::usage, "a segmentation on the slices of its source needs the source series");
-  write(stack_on_source(labels, *options.source), structures_of(labels), path, options, context);
-}
 
 bool is_segmentation(const fs::path& path) {
   const std::string uid = class_of(path);
@@ -449,8 +177,21 @@ class SegmentationReader {
       if (segment != nullptr) const_cast<DcmSegment*>(segment)->getSegmentLabel(name);
       labels_.structures.push_back({static_cast<std::uint8_t>(s),
                                     name.empty() ? "Segment " + std::to_string(s) : std::string(name.c_str()),
-                                    {}});
+                                    {},
+                                    origin_of(s - 1)});
     }
+  }
+
+  [[nodiscard]] std::string origin_of(std::size_t segment) {
+    DcmItem *item = nullptr, *algorithm = nullptr;
+    if (file_.getDataset()->findAndGetSequenceItem(DCM_SegmentSequence, item, static_cast<long>(segment)).bad())
+      return {};
+    OFString type, name, version;
+    item->findAndGetOFString(DCM_SegmentAlgorithmType, type);
+    item->findAndGetOFString(DCM_SegmentAlgorithmName, name);
+    if (item->findAndGetSequenceItem(DCM_SegmentationAlgorithmIdentificationSequence, algorithm).good())
+      algorithm->findAndGetOFString(DCM_AlgorithmVersion, version);
+    return dicom::origin_from(type.c_str(), name.c_str(), version.c_str());
   }
 
   [[nodiscard]] Uint16 segment_of(Uint32 frame) const {

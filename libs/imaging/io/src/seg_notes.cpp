@@ -31,6 +31,8 @@ std::vector<SegmentNote> segments_from(const std::map<std::string, std::string>&
       const std::size_t colon = tag.find(':');
       if (colon != std::string::npos) s.tags[tag.substr(0, colon)] = tag.substr(colon + 1);
     }
+    if (const auto origin = s.tags.find(std::string(kOriginTag)); origin != s.tags.end())
+      s.structure.origin = origin->second;
     s.structure.name = !get("Name").empty() ? get("Name")
                        : !get("ID").empty() ? get("ID")
                                             : "Segment_" + std::to_string(n + 1);
@@ -100,6 +102,7 @@ std::map<std::string, std::string> notes_from(const Labels& labels, const std::m
     std::string all = "Segmentation.Status:inprogress|";
     for (const auto& [tag, value] : tags) all += tag + ':' + value + '|';
     if (!tags.empty()) all += std::string(kStructureTag) + ':' + tag_value(name) + '|';
+    if (!s.origin.empty()) all += std::string(kOriginTag) + ':' + tag_value(s.origin) + '|';
     notes[key + "Tags"] = all;
   }
   notes["Segmentation_MasterRepresentation"] = "Binary labelmap";

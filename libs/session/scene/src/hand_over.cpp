@@ -120,6 +120,14 @@ std::string percent(double share) {
   return format_number(std::round(share * 1000) / 10) + " %";
 }
 
+// What drew it, as its tag says; what was changed since says so.
+std::string origin_of(const Segment& s, const SegmentChange& c) {
+  const auto tag = s.tags.find(std::string(kOriginTag));
+  if (tag == s.tags.end() || tag->second.empty()) return {};
+  const bool same = c.added_mm3 == 0 && c.removed_mm3 == 0;
+  return tag->second + (same || tag->second.ends_with(kCorrectedByHand) ? "" : std::string(kCorrectedByHand));
+}
+
 std::string known_as(const Segment& s) {
   const auto tag = s.tags.find(std::string(kStructureTag));
   return tag == s.tags.end() ? tag_value(s.name) : tag->second;
@@ -321,7 +329,7 @@ class Taker {
       }
       if (c.after_mm3 > 0) {
         const auto value = static_cast<std::uint8_t>(labels.structures.size() + 1);
-        labels.structures.push_back({value, s->name, s->rgb});
+        labels.structures.push_back({value, s->name, s->rgb, origin_of(*s, c)});
         for (std::size_t v = 0; v < n; ++v) {
           if (after[v] == 0) continue;
           overlap += voxels[v] != 0 ? 1 : 0;

@@ -44,6 +44,24 @@ CaseReport write_case_report(const std::filesystem::path& case_folder, const std
 /// approval, report. A row without a name goes on with the one before.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> case_facts(const std::filesystem::path& case_folder);
 
+/// What the report says of a case in numbers.
+struct CaseMeasures {
+  std::optional<double> bone_mm3, lower_hu;  ///< volume of the bone and its threshold, where the case knows them
+  struct OfStructure {
+    Structure is;
+    double volume_mm3 = 0;
+    double length_mm = 0;  ///< of a tube, along itself, 0 to 8 % long; 0: not measured
+  };
+  struct Gap {
+    std::string a, b;  ///< names
+    double mm = 0;     ///< between the nearest faces of voxels, to half a voxel; 0: they touch
+  };
+  std::vector<OfStructure> structures;  ///< that hold a voxel
+  std::vector<Gap> gaps;                ///< of each two, once, in the order of the structures
+};
+/// About a second for the structures of an ear. Errors: as of load_case.
+[[nodiscard]] CaseMeasures case_measures(const std::filesystem::path& case_folder, const Context& context = {});
+
 /// A short name that can be said and says nothing: two words of five letters, for the first 32 bits of the hash of the
 /// scan (of the bone where the case knows no scan). D. Wilkerson, A proposal for proquints, arXiv:0901.4016.
 [[nodiscard]] std::string case_code(const std::filesystem::path& case_folder);

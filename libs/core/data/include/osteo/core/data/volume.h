@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "osteo/core/data/frame.h"
@@ -32,8 +33,11 @@ struct Structure {
   std::uint8_t value = 1;
   std::string name;                          ///< "facial nerve"; never empty
   std::array<std::uint8_t, 3> rgb{0, 0, 0};  ///< black: none was given
+  /// What drew it, like "tube, version 2" or "by hand", with ", corrected by hand" behind it; empty: not known.
+  std::string origin{};
   friend bool operator==(const Structure&, const Structure&) = default;
 };
+inline constexpr std::string_view kDrawnByHand = "by hand", kCorrectedByHand = ", corrected by hand";
 /// 0 is background; a mask has only 1 besides; a label map has one value a structure.
 struct Labels : Volume<std::uint8_t> {
   std::vector<Structure> structures{};  ///< in order of their values; empty when the file named none

@@ -14,7 +14,7 @@ class Ring {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
-  /// MainView for at least `capacity` items.
+  /// Room for at least `capacity` items.
   explicit Ring(std::size_t capacity) {
     std::size_t size = 2;
     while (size < capacity) size *= 2;

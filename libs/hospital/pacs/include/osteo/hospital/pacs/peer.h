@@ -30,4 +30,8 @@ struct DicomPeer {
 /// "ORTHANC@127.0.0.1:4242".
 [[nodiscard]] std::string peer_text(const DicomPeer& peer);
 
+/// Markdown for the conformance statement: services, roles, classes and transfer syntaxes as they are negotiated, TLS,
+/// de-identification.
+[[nodiscard]] std::string network_conformance();
+
 }  // namespace osteo::inline hospital

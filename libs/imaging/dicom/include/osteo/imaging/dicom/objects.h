@@ -1,8 +1,11 @@
 // What goes back into a PACS: label maps as DICOM SEG, surfaces as encapsulated STL, reports as encapsulated PDF.
 #pragma once
+#include <array>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "osteo/core/base/context.h"
 #include "osteo/core/data/tri_mesh.h"
@@ -11,6 +14,13 @@
 
 namespace osteo::inline imaging {
 
+/// How a label map is written: segments in bits, a frame each (what every viewer reads), or one frame a slice whose
+/// pixels are the numbers of segments, of 8 or of 16 bits (SOP class of 2024, smaller, and values stay).
+enum class SegmentationForm : int { binary, labelmap, labelmap16 };
+constexpr std::array<std::string_view, 3> enum_names(SegmentationForm) {
+  return {"binary", "labelmap", "labelmap16"};
+}
+
 struct DicomObjectOptions {
   /// The series it was made from. Patient, study and frame of reference are taken over from it, and its slices are
   /// referred to. Without one the object has a made-up identity ("OSTEOTOME^ANONYMOUS") and names nobody. Values that
@@ -18,12 +28,14 @@ struct DicomObjectOptions {
   /// one made from it (the same for all files), any other such value is left empty; a warning names them.
   const DicomSeries* source = nullptr;
   std::string description = "Bone";
+  SegmentationForm form = SegmentationForm::binary;  ///< of a label map
 };
 
-/// Binary DICOM SEG (PS3.3 A.51), a segment a structure, a frame a slice that holds any of it. Frames lie on the slices
-/// of `labels`: after tilt repair an upright stack of its own, in the frame of reference of the source. A frame refers
-/// to the source slice it lies on, or to the two it lies between at its centre. Atomic. Errors: usage for a label map
-/// without a voxel, cannot_write.
+/// DICOM SEG (PS3.3 A.51), a segment a structure, a frame a slice that holds any of it (as LABELMAP: of any), with
+/// codes of SNOMED CT by its name and the algorithm by its origin. Frames lie on the slices of `labels`: after tilt
+/// repair an upright stack of its own, in the frame of reference of the source. A frame refers to the source slice it
+/// lies on, or to the two it lies between at its centre. Atomic. Errors: usage for a label map without a voxel,
+/// cannot_write.
 void save_segmentation(const Labels& labels, const std::filesystem::path& path, const DicomObjectOptions& options = {},
                        const Context& context = {});
 
@@ -54,5 +66,38 @@ void save_encapsulated_stl(const TriMesh& mesh, const std::filesystem::path& pat
 /// Errors: usage for what does not begin as a PDF or is over 4 GB, cannot_write.
 void save_encapsulated_pdf(std::string_view pdf, const std::string& title, const std::filesystem::path& path,
                            const DicomObjectOptions& options = {}, const Context& context = {});
+
+/// What a report in DICOM says in numbers of one structure of a case.
+struct MeasuredStructure {
+  std::string name, origin;  ///< as in Structure
+  double volume_mm3 = 0;
+  double length_mm = 0;  ///< 0: not measured
+};
+struct MeasuredGap {
+  std::string a, b;  ///< names of structures
+  double mm = 0;
+};
+struct MeasuresReport {
+  std::string program;   ///< version of what measured
+  std::string code;      ///< that the case is called by
+  double bone_mm3 = -1;  ///< below 0: not known
+  std::optional<double> bone_lower_hu;
+  std::vector<MeasuredStructure> structures;
+  std::vector<MeasuredGap> gaps;
+  /// DICOM SEG of these structures that the report refers to; empty: to none.
+  std::filesystem::path segmentation;
+};
+
+/// Structured report (PS3.16 TID 1500 in a Comprehensive SR, PS3.3 A.35.3): a measurement group for each structure (TID
+/// 1411 where a segment is referred to, else 1501), for the distance between two, and for the bone, with the slices of
+/// the source and the segmentation as evidence. Modality SR, not verified, of the source's study. Atomic. Same
+/// numbers, same study: same UIDs. Errors: usage where the segmentation is of another study, has no segment of such a
+/// name, or one whose volume is another by more than half a percent; corrupt for what is no SEG; cannot_write.
+void save_measures_report(const MeasuresReport& report, const std::filesystem::path& path,
+                          const DicomObjectOptions& options = {}, const Context& context = {});
+
+/// Markdown for the conformance statement: encodings that are read, classes and attributes that are written. Writes
+/// small objects into a temporary folder, to list what they hold. Errors: cannot_write.
+[[nodiscard]] std::string objects_conformance();
 
 }  // namespace osteo::inline imaging

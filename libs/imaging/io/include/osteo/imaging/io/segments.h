@@ -16,6 +16,9 @@ namespace osteo::inline imaging {
 /// Tag of a segment that holds the name under which it was written, whatever it is called since.
 inline constexpr std::string_view kStructureTag = "Osteotome.Structure";
 
+/// Tag of a segment that tells what drew it (Structure::origin), where that is known.
+inline constexpr std::string_view kOriginTag = "Osteotome.Origin";
+
 /// A text as the value of a tag: the bar parts tags.
 [[nodiscard]] std::string tag_value(std::string text);
 

@@ -140,7 +140,7 @@ class Removal {
 
 /// At most about this many voxels change in a tick: with more under the burr, their rows take turns.
 inline constexpr std::size_t kMaxCutPerTick = 1024;
-/// MainView for the hits of any instrument of the library at this spacing.
+/// Room for the hits of any instrument of the library at this spacing.
 [[nodiscard]] std::size_t most_hits(double spacing_mm);
 
 }  // namespace osteo::inline simulation
