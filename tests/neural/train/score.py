@@ -36,13 +36,13 @@ def prepare(predictor, image, spacing):
 
 
 def labels_of(predictor, data, properties):
-    """Labels on the image's grid. torch interpolates the logits: nnU-Net's order 1, but for seconds less."""
+    """Logits on the network's grid, labels on the image's. torch interpolates the logits: nnU-Net's order 1, but for seconds less."""
     logits = predictor.predict_logits_from_preprocessed_data(data).float().to(predictor.device)
     size = [int(n) for n in properties["shape_after_cropping_and_before_resampling"]]
     cropped = F.interpolate(logits[None], size=size, mode="trilinear", align_corners=False)[0].argmax(0)
     labels = np.zeros(properties["shape_before_cropping"], np.uint8)
     labels[tuple(slice(*box) for box in properties["bbox_used_for_cropping"])] = cropped.cpu().numpy()
-    return labels
+    return logits, labels
 
 
 def dice(found, truth):
@@ -57,7 +57,7 @@ def score_cases(folder, cases, dataset, device, threads):
     with ThreadPoolExecutor(threads) as pool:
         prepared = pool.map(lambda case: prepare(predictor, case[1], case[3]), cases)
         for (case, _, truth, _), (data, properties) in zip(cases, prepared):
-            labels = labels_of(predictor, data, properties)
+            _, labels = labels_of(predictor, data, properties)
             for name, of in scores.items():
                 value = dataset["labels"][name]
                 of[case] = dice(labels == value, truth == value)

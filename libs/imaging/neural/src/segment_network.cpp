@@ -11,6 +11,7 @@
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/neural/detail/half.h"
 #include "osteo/imaging/neural/detail/predict.h"
+#include "osteo/imaging/neural/detail/trust.h"
 #include "osteo/imaging/neural/detail/windows.h"
 
 namespace osteo::inline imaging {
@@ -449,6 +450,24 @@ Labels labels_of_logits(const NetworkLogits& logits, const NetworkModel& model, 
   return labels;
 }
 
+namespace {
+
+// What a calibration says of this result. Without one nothing is known, and nothing is said.
+void report_trust(const NetworkLogits& logits, const NetworkModel& model, const NetworkCalibration& calibration,
+                  const Context& context) {
+  std::string expected, doubted;
+  for (const StructureTrust& t : trust_in(logits, model, calibration, context)) {
+    expected += (expected.empty() ? "" : ", ") + t.name + " " + format_number(std::round(100 * t.expected_dice) / 100);
+    if (!t.doubt.empty()) doubted += (doubted.empty() ? "" : ", ") + t.name + " (" + t.doubt + ")";
+  }
+  context.report("expected_dice", expected);
+  if (doubted.empty()) return;
+  context.report("not_to_be_trusted", doubted);
+  context.warn("not to be trusted here: " + doubted);
+}
+
+}  // namespace
+
 Labels segment_with_network(const Image& ct, const fs::path& model, const NetworkParams& params,
                             const Context& context) {
   require_valid(ct.frame);
@@ -458,6 +477,8 @@ Labels segment_with_network(const Image& ct, const fs::path& model, const Networ
   }
   NetworkModel of;
   const NetworkLogits logits = network_logits(ct, model, of, params, context);
+  if (const fs::path path = model / "calibration.json"; fs::exists(path))
+    report_trust(logits, of, read_network_calibration(read_text(path), of), context);
   context.progress(0.9, "labels");
   Labels labels = labels_of_logits(logits, of, ct.frame, context);
   std::array<bool, 256> met{};
