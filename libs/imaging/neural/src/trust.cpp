@@ -13,14 +13,14 @@
 namespace osteo::inline imaging {
 namespace {
 
-[[noreturn]] void refuse(const std::string& why) {
+[[noreturn]] void reject_calibration(const std::string& why) {
   throw Error(ExitCode::corrupt, "calibration.json: " + why, "make it again, or take it out of the folder");
 }
 
 double number_of(const Json* value, const std::string& what, double low, double high) {
   const auto n = value != nullptr ? value->number() : std::nullopt;
   if (!n || !(*n >= low && *n <= high))
-    refuse("'" + what + "' is not a number from " + format_number(low) + " to " + format_number(high));
+    reject_calibration("'" + what + "' is not a number from " + format_number(low) + " to " + format_number(high));
   return *n;
 }
 
@@ -46,18 +46,18 @@ std::string doubt_of(const StructureTrust& t, const StructureCalibration& c) {
 
 NetworkCalibration read_network_calibration(std::string_view text, const NetworkModel& model) {
   const auto json = Json::parse(text);
-  if (!json) refuse("it is not JSON");
+  if (!json) reject_calibration("it is not JSON");
   number_of(json->find("osteotome_calibration"), "osteotome_calibration", 1, 1);
   NetworkCalibration c;
   c.temperature = number_of(json->find("temperature"), "temperature", 0.05, 20);
   const Json* const rows = json->find("structures");
-  if (rows == nullptr || rows->items().empty()) refuse("'structures' is missing");
+  if (rows == nullptr || rows->items().empty()) reject_calibration("'structures' is missing");
   for (const Json& row : rows->items()) {
     StructureCalibration s;
     s.value = static_cast<int>(number_of(row.find("value"), "value", 1, 255));
     const auto named =
         std::find_if(model.names.begin(), model.names.end(), [&](const auto& n) { return n.first == s.value; });
-    if (named == model.names.end()) refuse("the network has no label " + std::to_string(s.value));
+    if (named == model.names.end()) reject_calibration("the network has no label " + std::to_string(s.value));
     s.name = named->second;
     s.least_mm3 = number_of(row.find("least_mm3"), "least_mm3", 0, 1e9);
     s.most_mm3 = number_of(row.find("most_mm3"), "most_mm3", s.least_mm3, 1e9);
@@ -97,7 +97,7 @@ std::vector<StructureTrust> trust_in(const NetworkLogits& logits, const NetworkM
   std::vector<StructureTrust> rows;
   for (const StructureCalibration& s : calibration.structures) {
     const auto at = std::find(model.values.begin(), model.values.end(), s.value);
-    if (at == model.values.end()) refuse("the network has no label " + std::to_string(s.value));
+    if (at == model.values.end()) reject_calibration("the network has no label " + std::to_string(s.value));
     const auto c = static_cast<std::size_t>(at - model.values.begin());
     Sums all;
     for (std::size_t z = 0; z < planes; ++z) {
