@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize embed-surface bone-stiffness fem calibrate simulate fit-damping saw separate-fragments virtual-fixture snapshot structures tube find-structures segment-network register plan-reconstruction phantom list info list-series suggest-threshold convert run prepare batch report approve edit export-slicer import-slicer estimate-cost export-result rehearse replay playback tutor join score movie goal-cavity review export sound heat nerve-monitor stream nerve-console experiment ground-truth study simulate-trainee devices markers calibrate-camera calibrate-pen track-pen deidentify send fetch receive watch-folder doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize embed-surface bone-stiffness fem calibrate simulate fit-damping saw separate-fragments virtual-fixture snapshot structures tube find-structures segment-network register plan-reconstruction cutting-guide outcome phantom list info list-series suggest-threshold convert run prepare batch report approve edit export-slicer import-slicer estimate-cost export-result rehearse replay playback tutor join score movie goal-cavity review export sound heat nerve-monitor stream nerve-console experiment ground-truth study simulate-trainee devices markers calibrate-camera calibrate-pen track-pen deidentify send fetch receive watch-folder doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -31,7 +31,9 @@ _osteo() {
     "find-structures --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
     "register --method") COMPREPLY=($(compgen -W "mutual surface " -- "$cur")); return ;;
     "plan-reconstruction --target") COMPREPLY=($(compgen -W "mirrored own " -- "$cur")); return ;;
+    "cutting-guide --slot") COMPREPLY=($(compgen -W "closed open " -- "$cur")); return ;;
     "phantom --region") COMPREPLY=($(compgen -W "head temporal mandible " -- "$cur")); return ;;
+    "convert --segmentation") COMPREPLY=($(compgen -W "binary labelmap labelmap16 " -- "$cur")); return ;;
     "run --engine") COMPREPLY=($(compgen -W "stages vtk " -- "$cur")); return ;;
     "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "prepare --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
@@ -90,6 +92,8 @@ _osteo() {
     segment-network) flags="$flags --xml --describe --folds --mirror --step --max-memory-gb" ;;
     register) flags="$flags --xml --describe --method --finest-mm --bone-hu --max-residual-mm --accept-poor --labels --findings-out --moved-out --labels-out --checkerboard-out" ;;
     plan-reconstruction) flags="$flags --xml --describe --target --a-mm --a-normal --b-mm --b-normal --down --max-segments --min-length-mm --max-contour-mm --kerf-mm --reserve-mm --findings-out" ;;
+    cutting-guide) flags="$flags --xml --describe --bone --planes --approach --slot --gap-mm --play-mm --wall-mm --margin-mm --depth-mm --code --findings-out" ;;
+    outcome) flags="$flags --xml --describe --min-drop-hu --metal-hu --max-unsure-mm --max-unsure-deg --donor --page-out" ;;
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --individual --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;

@@ -76,7 +76,7 @@ StageInfo CuttingGuideStage::info() {
               "lets each plane rock. For research and training; no medical device: a guide for a named patient is "
               "a custom-made device under its own law.",
           .inputs = {{"plan", {DataKind::document}, "plan file of 'plan-reconstruction', or written by hand"},
-                     {"bone", {DataKind::surface}, "closed surface of the bone that the plan cuts, in the plan's CT"}},
+                     {"surface", {DataKind::surface}, "closed surface of the bone that the plan cuts, in the plan's CT"}},
           .outputs = {{"guide", {DataKind::surface}, "closed surface of the guide"},
                       {"findings", {DataKind::document}, "measures of the guide in JSON", true}},
           .references = {"G. Dantzig, Linear Programming and Extensions, Princeton 1963"},

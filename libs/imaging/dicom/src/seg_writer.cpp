@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
 
 #include "dcmtk_tools.h"
 #include "labelmap.h"
@@ -181,6 +182,7 @@ class SegmentationWriter {
     DcmDataset& d = *file.getDataset();
     require(seg_->writeDataset(d), path_);
     require(d.putAndInsertString(DCM_SegmentsOverlap, "NO"), path_);
+    put_more_segments(d);
     std::string names;
     for (const Structure& s : structures_) names += s.name + s.origin;
     dicom::speak_utf8(d, names);
@@ -215,8 +217,10 @@ class SegmentationWriter {
     if (o_.source != nullptr) refer_to_series(*seg_, *o_.source);
   }
 
+  // DCMTK refuses more segments than frames, which a label map of few slices may have: those behind the first are put
+  // in by put_more_segments.
   void add_segments() {
-    for (const Structure& s : structures_) {
+    for (const Structure& s : std::span(structures_).first(map_ ? 1 : structures_.size())) {
       const dicom::SegmentCode type = dicom::code_of(s.name, structures_.size() == 1);
       const CodeSequenceMacro category("123037004", "SCT", "Anatomical Structure"),
           code(std::string(type.code).c_str(), "SCT", std::string(type.meaning).c_str());
@@ -225,6 +229,18 @@ class SegmentationWriter {
       require(DcmSegment::create(segment, "-", category, code, DcmSegTypes::SAT_SEMIAUTOMATIC, "-"), path_);
       Uint16 number = 0;
       require(seg_->addSegment(segment, number), path_);
+    }
+  }
+
+  void put_more_segments(DcmDataset& d) const {
+    DcmSequenceOfItems* segments = nullptr;
+    require(d.findAndGetSequence(DCM_SegmentSequence, segments), path_);
+    for (std::size_t s = segments->card(); s < structures_.size(); ++s) {
+      auto segment = std::make_unique<DcmItem>(*segments->getItem(0));
+      const dicom::SegmentCode type = dicom::code_of(structures_[s].name, false);
+      dicom::put_code(*segment, DCM_SegmentedPropertyTypeCodeSequence, type, "SCT", path_);
+      require(segments->append(segment.get()), path_);
+      static_cast<void>(segment.release());  // the sequence's
     }
   }
 
