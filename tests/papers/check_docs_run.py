@@ -71,6 +71,7 @@ NOT_RUN = [
         r"--peer|--dicomweb|--orthanc|osteo (receive|watch)",
         "needs a PACS, or waits for one: the tests pacs",
     ),
+    ("docs/how-to/pacs.md", r"osteo score", "a rehearsal of that very case: the test readers.dicom_objects"),
     ("docs/guides/tutoring.md", r"osteo (tutor|join)", "two machines: the tests of tutor"),
     ("", r"osteo stream .*igtl", "waits for who listens: the test readers.network"),
     ("docs/guides/edit.md", r"--apply", "corrections that somebody made in the window: the test window.edit"),
@@ -79,7 +80,7 @@ NOT_RUN = [
         r"metrics.json|study (form|rate|analyse)",
         "sessions and ratings of people; LONG's demo does all of it",
     ),
-    ("docs/guides/planning.md", r"mandible.stl", "bones of one's own: stages.works runs plan-reconstruction"),
+    ("docs/guides/planning.md", r"mandible.stl|fibula.stl|guide.stl", "bones of one's own: stages.works runs these stages"),
     ("docs/validation/structures.md", r"SCAN", "a scan of one's own"),
     ("docs/how-to/segment-network.md", r"neural/train/", "wants PyTorch, and most of an hour"),
     (

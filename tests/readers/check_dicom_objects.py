@@ -142,6 +142,11 @@ slices = [pydicom.dcmread(f) for f in sorted((work / "ct").iterdir())]
 VOLUME = pydicom.sr.coding.Code("118565006", "SCT", "Volume")
 
 
+def code_value(item):
+    concept = item.ConceptNameCodeSequence[0]
+    return concept.get("CodeValue") or concept.LongCodeValue
+
+
 def numbers_of(item, code):
     return [
         float(i.MeasuredValueSequence[0].NumericValue)
@@ -184,7 +189,7 @@ for name, seg_file in (("plain.dcm", None), ("with.dcm", "case.seg.dcm"), ("bin.
         segmentation = hd.seg.segread(str(work / seg_file))
         assert len(rois) == 3 and len(images) == 1 + 3 and segmentation.SOPInstanceUID in evidence
         for g in rois:
-            assert g.referenced_segment is not None and g.source_series_for_segmentation is not None
+            assert g.referenced_segment is not None and "121232" in [code_value(i) for i in g[0].ContentSequence]
             (item,) = (i for i in g[0].ContentSequence if i.ConceptNameCodeSequence[0].CodeValue == "121191")
             assert item.ReferencedSOPSequence[0].ReferencedSOPInstanceUID == segmentation.SOPInstanceUID
             s = segmentation.get_segment_description(int(item.ReferencedSOPSequence[0].ReferencedSegmentNumber))
@@ -204,6 +209,42 @@ for name, seg_file in (("plain.dcm", None), ("with.dcm", "case.seg.dcm"), ("bin.
         (mm,) = numbers_of(by_name[structure][0], "121206")
         assert abs(mm - max(0, near - voxel ** (1 / 3))) < 1e-3, (structure, mm, near)
     print(f"ok  {name}: {len(rois)} volumes of segments, {len(images)} other groups; dciodvfy finds no error")
+# The score of a rehearsal beside them: every number that the JSON has, of the structure that it is of.
+procedures = pathlib.Path(__file__).resolve().parents[2] / "pipelines"
+osteo("rehearse", "case", "--headless", "--fast", "--script", procedures / "sessions/mastoid.json", "-o", "session")
+procedure = ("--procedure", procedures / "procedures/mastoid-window.json")
+scored = json.loads(osteo("score", "session", *procedure, "--json", "--measures", "s.dcm").stdout)
+osteo("score", "session", *procedure, "--measures", "s-seg.dcm", "--segmentation", "case.bin.dcm")
+for name in ("s.dcm", "s-seg.dcm"):
+    assert not errors_of(work / name), errors_of(work / name)
+    sr = hd.sr.srread(str(work / name))
+    assert str(sr.PatientName) == "ROENTGEN^ANNA" and sr.StudyInstanceUID == slices[0].StudyInstanceUID
+    groups = {g.tracking_identifier: g for g in sr.content.get_volumetric_roi_measurement_groups()}
+    assert len(groups) == (0 if name == "s.dcm" else 3 + len({v["of"] for v in scored["metrics"]} & set(volumes)))
+    groups.update((g.tracking_identifier, g) for g in sr.content.get_image_measurement_groups())
+    said = {i.TextValue for c in sr.ContentSequence for i in c.get("ContentSequence", []) if code_value(i) == "121106"}
+    checked = absent = 0
+    for v in scored["metrics"]:
+        g = groups.get("Rehearsal session" + (f": {v['of']}" if v["of"] else ""))
+        items = [i for i in g[0].ContentSequence if code_value(i) == v["name"]] if g else []
+        if v["value"] is None:
+            assert not items and any(n.startswith("Not measured") and v["name"] in n for n in said), v
+            absent += 1
+        else:
+            given = float(items[0].MeasuredValueSequence[0].NumericValue)
+            assert len(items) == 1 and abs(given - v["value"]) <= 1e-9 * abs(v["value"]) + 1e-9, (v, given)
+            checked += 1
+    scale = groups["Scale " + scored["procedure"]]
+    verdicts = {
+        code_value(i): i.ConceptCodeSequence[0].CodeMeaning for i in scale[0].ContentSequence if i.ValueType == "CODE"
+    }
+    assert verdicts == {
+        f"{i['name']} passed": "Yes" if i["pass"] else "No" for i in scored["items"] if i["pass"] is not None
+    }
+    assert set(scored["words"]) <= said, said
+    print(f"ok  {name}: {checked} numbers of a score, {absent} without a value, {len(verdicts)} verdicts")
+r = osteo("score", "session", "--segmentation", "case.bin.dcm", code=2)
+assert "--measures" in r.stderr
 # The same case, the same object; a segmentation of other voxels is refused.
 osteo("report", "case", "--measures", "again.dcm")
 assert pydicom.dcmread(work / "again.dcm").SOPInstanceUID == pydicom.dcmread(work / "plain.dcm").SOPInstanceUID

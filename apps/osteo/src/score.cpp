@@ -1,9 +1,13 @@
 // score: a session as figures, each with what it comes from.
 #include "osteo/assessment/evidence/score.h"
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <ostream>
 
+#include "audit_case.h"
+#include "case_series.h"
 #include "commands/score.h"
 #include "osteo/assessment/scoring/hint_reader.h"
 #include "osteo/core/base/error.h"
@@ -118,6 +122,63 @@ Json json_of(const Scored& scored, bool evidence) {
   return j;
 }
 
+namespace {
+
+// Values by what they are of, then the items of the scale.
+std::vector<ScoredGroup> groups_of(const Scored& scored, const std::vector<MeasuredStructure>& structures) {
+  std::vector<ScoredGroup> groups{{"Rehearsal " + scored.name, {}, {}, {}}};
+  const auto group_of = [&](const std::string& of) -> ScoredGroup& {
+    const std::string name = of.empty() ? groups.front().name : groups.front().name + ": " + of;
+    const auto found = std::find_if(groups.begin(), groups.end(), [&](const ScoredGroup& g) { return g.name == name; });
+    if (found != groups.end()) return *found;
+    const bool structure = std::ranges::any_of(structures, [&](const auto& s) { return s.name == of; });
+    return groups.emplace_back(ScoredGroup{name, structure ? of : std::string(), {}, {}});
+  };
+  for (const Measured& m : scored.score.values)
+    if (m.value) group_of(m.of).numbers.push_back({std::string(m.row->name), *m.value, std::string(m.row->unit)});
+  if (scored.score.items.empty()) return groups;
+  ScoredGroup& scale = groups.emplace_back(ScoredGroup{"Scale " + scored.score.procedure, {}, {}, {}});
+  for (const Product::Result& r : scored.score.items) {
+    if (!r.measured) continue;
+    scale.numbers.push_back({r.item->name, r.value, r.unit});
+    scale.verdicts.push_back({r.item->name + " passed", r.pass});
+  }
+  return groups;
+}
+
+// What limits it, and what has no value, by the reason.
+std::vector<std::string> remarks_of(const Score& score) {
+  std::map<std::string, std::string> absent;
+  const auto add = [&](const std::string& name, const std::string& why) {
+    std::string& names = absent[why];
+    names += (names.empty() ? "" : ", ") + name;
+  };
+  for (const Measured& m : score.values)
+    if (!m.value) add(m.name(), m.word);
+  for (const Product::Result& r : score.items)
+    if (!r.measured) add(r.item->name, r.word);
+  std::vector<std::string> remarks = score.words;
+  for (const auto& [why, names] : absent) remarks.push_back("Not measured, " + why + ": " + names);
+  return remarks;
+}
+
+// The score goes where the case's scan is: of the patient, into the study.
+void write_measures(const fs::path& session, const ScoreCommand::Params& p, const Scored& scored, cli::Invocation& io) {
+  const AuditTrail trail;
+  const SessionFolder folder = open_session_folder(session, p.case_folder);
+  const CaseSeries of =
+      series_of(folder.case_folder, pipeline_at_hand(folder.case_folder, read_recipe(folder.case_folder), p.scan), io);
+  MeasuresReport report = measures_of_case(folder.case_folder, p.segmentation, io.context);
+  report.scores = groups_of(scored, report.structures);
+  report.remarks = remarks_of(scored.score);
+  save_measures_report(report, p.measures, {of.series, "Score of a rehearsal, not for diagnosis"}, io.context);
+  io.end_progress();
+  audit_case(trail, AuditEvent::Kind::hand_over, folder.case_folder, io.context);
+  if (!io.common.quiet) io.err << "  " << p.measures << " (names the patient)\n";
+}
+
+}  // namespace
+
 int ScoreCommand::run(const Params& p, cli::Invocation& io) {
   const auto refuse = [&](bool given, const char* flag, const char* without) {
     if (given) throw Error(ExitCode::usage, std::string(flag) + " has no effect without " + without, "leave it out");
@@ -125,6 +186,9 @@ int ScoreCommand::run(const Params& p, cli::Invocation& io) {
   refuse(p.mirror && p.procedure.empty(), "--mirror", "--procedure");
   refuse(!p.subject.empty() && p.reference.empty(), "--subject", "--reference");
   refuse(p.evidence && !io.common.json, "--evidence", "--json");
+  refuse(!p.segmentation.empty() && p.measures.empty(), "--segmentation", "--measures");
+  refuse(!p.scan.empty() && p.measures.empty(), "--scan", "--measures");
+  check_object(p.measures, io.arguments[0] + ".score.dcm", "--measures", io);
   ScoreAsked asked{{}, p.reference, p.subject, p.heat, p.case_folder, !p.csv.empty()};
   if (!p.procedure.empty()) {
     asked.procedure = load_procedure(p.procedure);
@@ -135,6 +199,7 @@ int ScoreCommand::run(const Params& p, cli::Invocation& io) {
   const Scored scored = score_folder(io.arguments[0], asked, io.context);
   io.end_progress();
   const Score& score = scored.score;
+  if (!p.measures.empty()) write_measures(io.arguments[0], p, scored, io);
   if (!p.csv.empty()) write_file(p.csv, score_csv(score, scored.name));
   if (io.common.json) {
     io.out << json_of(scored, p.evidence).dump(2) << '\n';

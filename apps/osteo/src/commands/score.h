@@ -13,6 +13,7 @@ struct ScoreCommand {
     std::string reference;
     std::string subject;
     std::string csv;
+    std::string measures, segmentation, scan;
     bool evidence = false;
     bool heat = false;
     std::string case_folder;
@@ -29,6 +30,17 @@ struct ScoreCommand {
         {"subject", "who this is, by the reference's code: sessions of the same person are left out of the comparison"},
         p.subject);
     visit({"csv", "also write a header and a row of all values (.csv)"}, p.csv);
+    visit({"measures",
+           "file for the score and the case's measures as a DICOM structured report (TID 1500), like "
+           "SESSION.score.dcm: it names the patient (empty: none)"},
+          p.measures);
+    visit({"segmentation",
+           "DICOM SEG of the case's structures, as convert writes it, that --measures refers to (empty: none)"},
+          p.segmentation);
+    visit({"scan",
+           "the scan that the case was made from, for --measures, when it is not where it was (empty: as this machine "
+           "remembers)"},
+          p.scan);
     visit({"evidence", "add to --json the places that prove each item, and all bone removed unseen"}, p.evidence);
     visit(
         {"heat", "also how warm bone and structures became: runs the session again, which takes several times as long"},

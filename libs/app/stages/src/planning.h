@@ -38,7 +38,7 @@ struct CuttingGuideStage {
           p.approach);
     visit({"slot", "closed: a bridge at both ends of each slot; open: at one end"}, p.slot);
     visit({"gap_mm", "distance of the guide's underside to the bone", "mm", 0.02, 2}, p.gap_mm);
-    visit({"play_mm", "by how much a slot is wider than the planned kerf", "mm", 0, 1}, p.play_mm);
+    visit({"play_mm", "width of a slot beyond the planned kerf", "mm", 0, 1}, p.play_mm);
     visit({"wall_mm", "thickness over the bone's highest place, and of the bridges", "mm", 1.5, 20}, p.wall_mm);
     visit({"margin_mm", "length of the block beyond the outermost slots", "mm", 3, 60}, p.margin_mm);
     visit({"depth_mm", "how far the guide reaches down beside the bone's highest place", "mm", 0.5, 20}, p.depth_mm);

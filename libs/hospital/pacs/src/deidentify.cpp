@@ -112,6 +112,11 @@ std::string replaced_uids(const Key& key, const std::string& values) {
   return all;
 }
 
+// Which class an object is of belongs to nobody, also where the standard named it after this DCMTK was made.
+bool names_class(const DcmTagKey& tag, const std::string& uid) {
+  return (tag == DCM_SOPClassUID || tag == DCM_ReferencedSOPClassUID) && uid.starts_with("1.2.840.10008.");
+}
+
 std::string value_of(DcmElement& e) {
   OFString text;
   if (e.getOFStringArray(text).bad()) return {};
@@ -201,7 +206,7 @@ class Cleaner {
       if (sequence) {
         each(e, dummies);
       } else if (e.ident() == EVR_UI) {
-        put(e, replaced_uids(key_, value_of(e)));
+        if (!names_class(tag, value_of(e))) put(e, replaced_uids(key_, value_of(e)));
       } else if (action != nullptr || dummies) {
         put_dummy(e);
       } else if (e.ident() == EVR_PN) {
@@ -240,6 +245,8 @@ pacs::Telling notifying_of(DcmItem& data) {
   pacs::Telling notifying;
   visit(data, [&](DcmElement& e) {
     const DcmTagKey tag = e.getTag().getXTag();
+    // What Osteotome 0.1 wrote for the creator of a segmentation is a program, and its manufacturer's name is kept.
+    if (tag == DCM_ContentCreatorName && value_of(e) == "OSTEOTOME^") return;
     if (e.ident() == EVR_PN || tag == DCM_PatientID || tag == DCM_AccessionNumber || tag == DCM_RETIRED_OtherPatientIDs)
       notifying.add_name(value_of(e));
     else if (tag == DCM_PatientBirthDate)

@@ -26,7 +26,7 @@ std::error_code each_entry(const fs::path& folder, const Use& use) {
 }
 
 ClosedSeries look(const fs::path& series) {
-  ClosedSeries c{series, 0, 0};
+  ClosedSeries c{series, 0, 0, {}};
   each_entry(series, [&](const fs::directory_entry& file) {
     std::error_code error;
     const auto size = file.file_size(error);

@@ -51,8 +51,17 @@ std::vector<fs::path> write_samples(const fs::path& folder) {
   mesh.triangles = {{0, 1, 2}};
   save_encapsulated_stl(mesh, folder / "stl.dcm", of);
   save_encapsulated_pdf("%PDF-1.5", "Sample", folder / "pdf.dcm", of);
-  save_measures_report({"0", "sample", 24, 300, {{"facial nerve", "tube, version 1", 24, 0}}, {}, folder / "seg.dcm"},
-                       folder / "sr.dcm", of);
+  MeasuresReport report;
+  report.program = "0";
+  report.code = "sample";
+  report.bone_mm3 = 24;
+  report.bone_lower_hu = 300;
+  report.structures = {{"facial nerve", "tube, version 1", 24, 0}};
+  report.scores = {
+      {"Rehearsal", "facial nerve", {{"near_contact_seconds", 1, "s"}, {"touches", 0, "1"}}, {{"a", true}}}};
+  report.remarks = {"sample"};
+  report.segmentation = folder / "seg.dcm";
+  save_measures_report(report, folder / "sr.dcm", of);
   return {scan.series.at(0).headers.at(0).file,
           folder / "seg.dcm",
           folder / "map.dcm",

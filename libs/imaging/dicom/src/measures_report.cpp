@@ -1,4 +1,4 @@
-// A case's measures as a structured report, TID 1500.
+// Measures of a case and of rehearsals on it as a structured report, TID 1500.
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dctk.h>
 
@@ -23,7 +23,8 @@ constexpr Code kVolume{"118565006", "SCT", "Volume"}, kLength{"410668003", "SCT"
     kDistance{"121206", "DCM", "Distance"}, kThreshold{"bone-threshold", "99OSTEOTOME", "Bone threshold"},
     kCubicMm{"mm3", "UCUM", "cubic millimeter"}, kMm{"mm", "UCUM", "millimeter"},
     kHounsfield{"[hnsf'U]", "UCUM", "Hounsfield unit"}, kFinding{"121071", "DCM", "Finding"},
-    kFindingSite{"363698007", "SCT", "Finding Site"}, kBone{"272673000", "SCT", "Bone"};
+    kFindingSite{"363698007", "SCT", "Finding Site"}, kBone{"272673000", "SCT", "Bone"},
+    kYes{"373066001", "SCT", "Yes"}, kNo{"373067005", "SCT", "No"};
 
 constexpr const char *kContains = "CONTAINS", *kObserved = "HAS OBS CONTEXT", *kModified = "HAS CONCEPT MOD";
 
@@ -77,6 +78,36 @@ class ContentTree {
 
  private:
   const fs::path& path_;
+};
+
+std::string spoken(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return dicom::lo_text(name);
+}
+
+// A unit as UCUM has it; a word, like "bodies", is a count with that word.
+struct Unit {
+  explicit Unit(const std::string& unit) {
+    static const std::map<std::string, std::pair<std::string, std::string>> kUnits{
+        {"mm", {"mm", "millimeter"}},
+        {"mm2", {"mm2", "square millimeter"}},
+        {"mm3", {"mm3", "cubic millimeter"}},
+        {"mm3/s", {"mm3/s", "cubic millimeter per second"}},
+        {"mm/s", {"mm/s", "millimeter per second"}},
+        {"s", {"s", "second"}},
+        {"1/s", {"/s", "per second"}},
+        {"min", {"min", "minute"}},
+        {"N", {"N", "newton"}},
+        {"N s", {"N.s", "newton second"}},
+        {"mJ", {"mJ", "millijoule"}},
+        {"C", {"Cel", "degree Celsius"}},
+        {"1", {"1", "no units"}},
+        {"", {"1", "no units"}}};
+    const auto found = kUnits.find(unit);
+    code = found != kUnits.end() ? found->second.first : "{" + unit + "}";
+    meaning = found != kUnits.end() ? found->second.second : unit;
+  }
+  std::string code, meaning;
 };
 
 // What the report needs to know of the segmentation that it refers to.
@@ -150,6 +181,8 @@ class MeasuresWriter {
     if (report_.bone_mm3 >= 0) put_bone(measurements);
     for (const MeasuredStructure& s : report_.structures) put_structure(measurements, s);
     for (const MeasuredGap& g : report_.gaps) put_gap(measurements, g);
+    for (const ScoredGroup& g : report_.scores) put_score(measurements, g);
+    put_remarks(d);
     write_atomically(path_, [&](const fs::path& temporary) {
       dicom::require(file.saveFile(temporary.c_str(), EXS_LittleEndianExplicit), path_);
     });
@@ -164,6 +197,12 @@ class MeasuresWriter {
     for (const MeasuredStructure& s : report_.structures)
       all += s.name + "\n" + s.origin + "\n" + dicom::decimal(s.volume_mm3) + " " + dicom::decimal(s.length_mm) + "\n";
     for (const MeasuredGap& g : report_.gaps) all += g.a + "\n" + g.b + "\n" + dicom::decimal(g.mm) + "\n";
+    for (const ScoredGroup& g : report_.scores) {
+      all += g.name + "\n" + g.structure + "\n";
+      for (const auto& n : g.numbers) all += n.name + " " + dicom::decimal(n.value) + n.unit + "\n";
+      for (const auto& v : g.verdicts) all += v.name + (v.passed ? " yes\n" : " no\n");
+    }
+    for (const std::string& r : report_.remarks) all += r + "\n";
     return all;
   }
 
@@ -173,6 +212,8 @@ class MeasuresWriter {
     dicom::put_identity(d, o_, content_, false, path_, context_);
     std::string texts;
     for (const MeasuredStructure& s : report_.structures) texts += s.name;
+    for (const ScoredGroup& g : report_.scores) texts += g.name;
+    for (const std::string& r : report_.remarks) texts += r;
     dicom::speak_utf8(d, texts);
     content_ += text_at(d, DCM_StudyInstanceUID);  // the same case can stand in two studies
     const auto [date, time] = dicom::now_text();
@@ -287,6 +328,16 @@ class MeasuresWriter {
     tree_.code(in, relation, concept_name, {value.c_str(), "SCT", meaning.c_str()});
   }
 
+  void refer_to_segment(DcmItem& g, Uint16 number) const {
+    DcmItem& image = tree_.item(g, kContains, "IMAGE", {"121191", "DCM", "Referenced Segment"});
+    DcmItem& reference = tree_.next(image, DCM_ReferencedSOPSequence);
+    put(reference, DCM_ReferencedSOPClassUID, segmentation_.sop_class);
+    put(reference, DCM_ReferencedSOPInstanceUID, segmentation_.instance);
+    dicom::require(reference.putAndInsertUint16(DCM_ReferencedSegmentNumber, number), path_);
+    if (o_.source != nullptr)
+      tree_.uid(g, kContains, {"121232", "DCM", "Source series for segmentation"}, dicom::valid_uid(o_.source->uid));
+  }
+
   void put_structure(DcmItem& measurements, const MeasuredStructure& s) const {
     const auto number = segmentation_.number.find(dicom::lo_text(s.name));
     const bool segment = number != segmentation_.number.end();
@@ -295,15 +346,7 @@ class MeasuresWriter {
     if (comma != std::string::npos)
       put_algorithm(g, "Osteotome " + s.origin.substr(0, comma), s.origin.substr(comma + 10));
     finding(g, kContains, kFinding, s.name);
-    if (segment) {
-      DcmItem& image = tree_.item(g, kContains, "IMAGE", {"121191", "DCM", "Referenced Segment"});
-      DcmItem& reference = tree_.next(image, DCM_ReferencedSOPSequence);
-      put(reference, DCM_ReferencedSOPClassUID, segmentation_.sop_class);
-      put(reference, DCM_ReferencedSOPInstanceUID, segmentation_.instance);
-      dicom::require(reference.putAndInsertUint16(DCM_ReferencedSegmentNumber, number->second), path_);
-      if (o_.source != nullptr)
-        tree_.uid(g, kContains, {"121232", "DCM", "Source series for segmentation"}, dicom::valid_uid(o_.source->uid));
-    }
+    if (segment) refer_to_segment(g, number->second);
     tree_.number(g, kVolume, s.volume_mm3, kCubicMm);
     if (s.length_mm > 0) tree_.number(g, kLength, s.length_mm, kMm);
   }
@@ -313,6 +356,30 @@ class MeasuresWriter {
     DcmItem& n = tree_.number(g, kDistance, gap.mm, kMm);
     finding(n, kModified, kFindingSite, gap.a);
     finding(n, kModified, kFindingSite, gap.b);
+  }
+
+  void put_score(DcmItem& measurements, const ScoredGroup& score) const {
+    const auto number = segmentation_.number.find(dicom::lo_text(score.structure));
+    const bool segment = !score.structure.empty() && number != segmentation_.number.end();
+    DcmItem& g = group(measurements, score.name, segment ? "1411" : "1501");
+    if (!score.structure.empty()) finding(g, kContains, kFinding, score.structure);
+    if (segment) refer_to_segment(g, number->second);
+    for (const auto& n : score.numbers) {
+      const std::string meaning = spoken(n.name);
+      const Code name{n.name.c_str(), "99OSTEOTOME", meaning.c_str()};
+      const Unit unit(n.unit);
+      tree_.number(g, name, n.value, {unit.code.c_str(), "UCUM", unit.meaning.c_str()});
+    }
+    for (const auto& v : score.verdicts) {
+      const std::string meaning = spoken(v.name);
+      tree_.code(g, kContains, {v.name.c_str(), "99OSTEOTOME", meaning.c_str()}, v.passed ? kYes : kNo);
+    }
+  }
+
+  void put_remarks(DcmItem& root) const {
+    if (report_.remarks.empty()) return;
+    DcmItem& said = tree_.container(root, {"C0034375", "UMLS", "Qualitative Evaluations"});
+    for (const std::string& r : report_.remarks) tree_.text(said, kContains, {"121106", "DCM", "Comment"}, r);
   }
 
   const MeasuresReport& report_;

@@ -207,7 +207,7 @@ class SegmentationWriter {
   void make(const Context& context) {
     DcmSegmentation* made = nullptr;
     const IODGeneralEquipmentModule::EquipmentInfo equipment("Osteotome", "osteo", "0", "0.1");
-    const ContentIdentificationMacro identity("1", "BONE", o_.description.substr(0, 64).c_str(), "OSTEOTOME^");
+    const ContentIdentificationMacro identity("1", "BONE", o_.description.substr(0, 64).c_str(), "");
     require(DcmSegmentation::createBinarySegmentation(made, static_cast<Uint16>(stack_.rows),
                                                       static_cast<Uint16>(stack_.columns), equipment, identity),
             path_);

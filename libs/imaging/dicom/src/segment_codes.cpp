@@ -61,7 +61,10 @@ void put_code(DcmItem& in, const DcmTagKey& sequence, SegmentCode code, const ch
               const std::filesystem::path& path) {
   DcmItem* item = nullptr;
   require(in.findOrCreateSequenceItem(sequence, item, 0), path);
-  require(item->putAndInsertString(DCM_CodeValue, std::string(code.code).c_str()), path);
+  // PS3.3 8.1: a code of more than 16 characters has another attribute.
+  const DcmTagKey value = code.code.size() > 16 ? DCM_LongCodeValue : DCM_CodeValue;
+  item->findAndDeleteElement(code.code.size() > 16 ? DCM_CodeValue : DCM_LongCodeValue);
+  require(item->putAndInsertString(value, std::string(code.code).c_str()), path);
   require(item->putAndInsertString(DCM_CodingSchemeDesignator, scheme), path);
   require(item->putAndInsertString(DCM_CodeMeaning, std::string(code.meaning).c_str()), path);
 }

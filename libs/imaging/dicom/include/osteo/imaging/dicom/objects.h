@@ -77,6 +77,22 @@ struct MeasuredGap {
   std::string a, b;  ///< names of structures
   double mm = 0;
 };
+/// What was measured of a rehearsal as a whole, near one structure, or by one instrument.
+struct ScoredGroup {
+  struct Number {
+    std::string name;  ///< its code in the scheme 99OSTEOTOME, and with spaces for "_" its meaning
+    double value = 0;
+    std::string unit;  ///< "mm", "mm2", "mm3", "mm3/s", "s", "1/s", "min", "N", "N s", "mJ", "C", "1", or a word
+  };
+  struct Verdict {
+    std::string name;
+    bool passed = false;
+  };
+  std::string name;       ///< what the report calls it
+  std::string structure;  ///< name of the structure that it is about; empty: none
+  std::vector<Number> numbers;
+  std::vector<Verdict> verdicts;
+};
 struct MeasuresReport {
   std::string program;   ///< version of what measured
   std::string code;      ///< that the case is called by
@@ -84,15 +100,19 @@ struct MeasuresReport {
   std::optional<double> bone_lower_hu;
   std::vector<MeasuredStructure> structures;
   std::vector<MeasuredGap> gaps;
+  std::vector<ScoredGroup> scores;
+  std::vector<std::string> remarks;  ///< what limits the numbers, a sentence each
   /// DICOM SEG of these structures that the report refers to; empty: to none.
   std::filesystem::path segmentation;
 };
 
 /// Structured report (PS3.16 TID 1500 in a Comprehensive SR, PS3.3 A.35.3): a measurement group for each structure (TID
-/// 1411 where a segment is referred to, else 1501), for the distance between two, and for the bone, with the slices of
-/// the source and the segmentation as evidence. Modality SR, not verified, of the source's study. Atomic. Same
-/// numbers, same study: same UIDs. Errors: usage where the segmentation is of another study, has no segment of such a
-/// name, or one whose volume is another by more than half a percent; corrupt for what is no SEG; cannot_write.
+/// 1411 where a segment is referred to, else 1501), for the distance between two, for the bone, and for each group of a
+/// score, with the slices of the source and the segmentation as evidence. Verdicts are "Yes" and
+/// "No", and remarks are comments in the qualitative evaluations. Modality SR,
+/// not verified, of the source's study. Atomic. Same numbers, same study: same UIDs. Errors: usage where the
+/// segmentation is of another study, has no segment of such a name, or one whose volume is another by more than half a
+/// percent; corrupt for what is no SEG; cannot_write.
 void save_measures_report(const MeasuresReport& report, const std::filesystem::path& path,
                           const DicomObjectOptions& options = {}, const Context& context = {});
 
