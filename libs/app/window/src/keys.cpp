@@ -150,6 +150,10 @@ const std::vector<Key>& all_keys() {
   return keys;
 }
 
+bool has(const std::vector<Command>& list, Command c) {
+  return std::find(list.begin(), list.end(), c) != list.end();
+}
+
 }  // namespace
 
 std::span<const Key> key_table() {

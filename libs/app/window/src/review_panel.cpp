@@ -169,7 +169,7 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   begin_fixed("course", box, ImGuiWindowFlags_NoScrollbar);
   const ReviewCourse& course = control.review().course;
   const float e = em();
-  if (ImGui::Button(control.playing() ? tr("pause (Space)") : tr("play (Space)"), {8 * e, 0}))
+  if (ImGui::Button(control.playing() ? tr("pause (Space)") : tr("play (Space)"), {10 * e, 0}))
     control.play(!control.playing());
   ImGui::SameLine();
   ImGui::TextUnformatted(filled(tr("{n} of {all}"), {{"n", clock_text(control.now_s())},
@@ -185,7 +185,7 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   ImGui::Checkbox(tr("surgeon's view"), &control.surgeons_view);
 
   const ImVec2 at = ImGui::GetCursorScreenPos(), room = ImGui::GetContentRegionAvail();
-  const float names = 6 * e, left = at.x + names, wide = std::max(1.0F, room.x - names), high = std::max(1.0F, room.y);
+  const float names = 9 * e, left = at.x + names, wide = std::max(1.0F, room.x - names), high = std::max(1.0F, room.y);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const double end_s = std::max(control.review().player->end_s(), 1e-3);
   const auto x_of = [&](double t_s) { return left + wide * static_cast<float>(std::clamp(t_s / end_s, 0.0, 1.0)); };
