@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The window in each language at 1024 x 700 under Xvfb: start page, operating, menu, keys, commands, end. No text loses a part for want of room, and the
+"""The window in each language at 1024 x 700 under Xvfb: start page, operating, menu, keys, commands, end, course. No text loses a part for want of room, and the
 pictures lie in WORK_DIR to be looked at (LANGUAGE-PAGE.png).
 usage: drive_languages.py languages BIN_DIR WORK_DIR SOURCE_DIR"""
 
@@ -59,9 +59,11 @@ def languages():
             picture(w, f"{language}-plan")
             w.key("F2", "operate, which is kept", lambda s: s["layout"] == "operate")
             w.x("key", "q")
-            s = w.until("the end", lambda s: s["ended"] and s["review_s"] > 0)
+            w.until("the end", lambda s: s["ended"] and s["review_s"] > 0)
             picture(w, f"{language}-end")
-            cut[language] = s["texts_cut"]
+            w.key("ctrl+t", "the course of the session", lambda s: s["timeline"])
+            picture(w, f"{language}-course")
+            cut[language] = w.state()["texts_cut"]
             w.x("key", "q")
             w.end()
     print(json.dumps(cut, ensure_ascii=False, indent=1))

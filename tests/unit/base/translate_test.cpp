@@ -52,8 +52,8 @@ TEST_F(Translate, SaysItInEachLanguage) {
   }
   use_language(Language::german);
   // One word that says two things, and a name with its size.
-  EXPECT_STREQ(tr_of("size of a structure", "long"), "lang");
-  EXPECT_STREQ(tr("long"), "Länge");
+  EXPECT_STREQ(tr_of("look", "clear"), "klar");
+  EXPECT_STREQ(tr("clear"), "frei");
   EXPECT_EQ(tr_sized("diamond 3 mm"), "Diamant 3 mm");
   EXPECT_EQ(tr_sized("diamond cylinder 2.5 mm"), "Diamant, Zylinder 2,5 mm");
 }
