@@ -239,6 +239,7 @@ TEST(Panels, FitInEveryLanguage) {
 // What stands on a button of half the panel's width, or of all of it.
 TEST(Panels, ButtonsAreAsWideAsTheirWords) {
   const Memory memory(1024, 700, kTextPixels);
+  frames([] {});  // ImGui has its font from the first on
   const float pad = 2 * ImGui::GetStyle().FramePadding.x, gap = ImGui::GetStyle().ItemSpacing.x;
   const ScreenBox panel = panel_of(lay_out(Layout::operate, 1024, 700, static_cast<float>(kTextPixels)));
   const float whole = panel.width - 2 * ImGui::GetStyle().WindowPadding.x;
@@ -260,6 +261,7 @@ TEST(Panels, ButtonsAreAsWideAsTheirWords) {
 
 TEST(Panels, EveryCharacterHasAGlyph) {
   const Memory memory(1024, 700, kTextPixels);
+  frames([] {});
   for (const Language language : kLanguages) {
     const std::string_view text = catalogue_text(language);
     for (const char* at = text.data(); at < text.data() + text.size();) {
