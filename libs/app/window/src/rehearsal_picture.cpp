@@ -243,8 +243,8 @@ void RehearsalWindow::save_screenshot() {
   } while (std::filesystem::exists(path));
   try {
     save_picture(picture, path);
-      control_.say(filled(tr("saved {file}"), {{"file", path.filename().string()}}));
-      room_.picture_kept();
+    control_.say(filled(tr("saved {file}"), {{"file", path.filename().string()}}));
+    room_.picture_kept();
   } catch (const Error& e) {
     control_.say(e.what());
   }

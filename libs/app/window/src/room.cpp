@@ -516,11 +516,11 @@ void MainView::draw_caption(const RoomScene& scene) {
   const StateFacts state = state_of_tick(scene.tick, nullptr, scene.control.rehearsal().rate_hz());
   char length[32];
   std::snprintf(length, sizeof length, "%.4g", bar_mm);
-  const std::string text = filled(tr("case {case}, {tool}, {time}, {mm} mm"),
-                                  {{"case", scene.machine.case_hash.substr(0, 8)},
-                                   {"tool", state.tool},
-                                   {"time", state.time},
-                                   {"mm", shown_figures(length)}});
+  const std::string text =
+      filled(tr("case {case}, {tool}, {time}, {mm} mm"), {{"case", scene.machine.case_hash.substr(0, 8)},
+                                                          {"tool", state.tool},
+                                                          {"time", state.time},
+                                                          {"mm", shown_figures(length)}});
   const float bar = static_cast<float>(bar_mm * scene.pixels_per_mm), y = v.bottom() - 2 * e;
   draw->AddRectFilled({v.x, y}, {v.right(), v.bottom()}, im_colour32(theme().ground, 0.85F));
   const float x = v.right() - bar - e;

@@ -82,9 +82,7 @@ class Drawer {
     return parts_.size() - 1;
   }
   // With a caption of the catalogues.
-  void still(std::string id, const char* caption, Still s) {
-    still(std::move(id), caption, tr(caption), std::move(s));
-  }
+  void still(std::string id, const char* caption, Still s) { still(std::move(id), caption, tr(caption), std::move(s)); }
   void still(std::string id, std::string caption, std::string shown, Still s) {
     ids_.push_back(std::move(id));
     captions_.push_back(std::move(caption));
