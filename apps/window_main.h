@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "osteo/app/cli/command.h"
+#include "osteo/app/window/person_settings.h"
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo {
 
@@ -16,6 +18,7 @@ inline constexpr std::string_view kOwnLicence = "Osteotome's own sources: Apache
 /// main() of a program of one command, whose name need not be given. Returns its exit code.
 template <class Command>
 int run_window_program(int argc, char** argv, std::string about, std::string licence) {
+  use_language(language_named(PersonSettings(PersonSettings::usual_file()).values.language));
   cli::Program program;
   program.about = std::move(about);
   program.licence = std::move(licence);

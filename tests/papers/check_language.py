@@ -29,7 +29,7 @@ def strings(folders):
             if path.suffix in (".h", ".cpp"):
                 text = re.sub(r"^\s*#include.*$|//.*$", "", path.read_text(), flags=re.M)
                 if path.name == "commands.cpp":  # the second of a row is what a command is found by: old names too
-                    text = re.sub(r'(\{"[^"]*", )"[^"]*"', r'\1""', text)
+                    text = re.sub(r'(\{(?:tr_later\()?"[^"]*"\)?,\s+(?:tr_later\()?)"[^"]*"', r'\1""', text)
                 yield " \n ".join((m[2] or m[3] or "") for m in literal.finditer(text))
 
 

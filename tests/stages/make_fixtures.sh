@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Small inputs that the cases share. usage: make_fixtures.sh BIN_DIR FIXTURES
 set -euo pipefail
+export LANGUAGE=en
 bin=$1 out=$2
 rm -rf "$out" && mkdir -p "$out" && cd "$out"
 export XDG_STATE_HOME=$out/state

@@ -2,6 +2,7 @@
 
 import json, os, pathlib, subprocess, time
 
+os.environ["LANGUAGE"] = "en"  # what is compared is English, wherever it runs
 PATIENCE_S = 240  # of a wait; on a machine at rest most take a second
 
 

@@ -108,6 +108,8 @@ struct WindowCommand {
     };
     take(&PersonValues::scale);
     take(&PersonValues::layout);
+    take(&PersonValues::theme);
+    take(&PersonValues::language);
     take(&PersonValues::full_screen);
     take(&PersonValues::sound);
     take(&PersonValues::volume);

@@ -45,7 +45,7 @@ SessionReview review_of(const SessionFolder& folder, const Case& the_case, const
   review.course.seen_mm3 = std::move(line.seen_mm3);
   review.course.hidden_mm3 = std::move(line.hidden_mm3);
   for (const TimelineEvent& e : line.events)
-    review.course.events.push_back({e.t_s, e.what, e.kind == EventKind::injury || e.kind == EventKind::touch});
+    review.course.events.push_back({e.t_s, e.shown(), e.kind == EventKind::injury || e.kind == EventKind::touch});
   review.player = std::make_unique<SessionPlayer>(session, std::move(begin), context.sub(0.6, 1));
   return review;
 }

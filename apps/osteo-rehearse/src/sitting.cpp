@@ -12,6 +12,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/session/recording/session_reader.h"
 #include "osteo/session/scene/free_ways.h"
@@ -393,7 +394,8 @@ SessionFacts SessionRunner::facts_of(const RehearsalSummary& s) const {
   }
   f.warnings = s.warnings;
   if (!s.gaps.empty())
-    f.warnings.push_back("NOT RECORDED: " + std::to_string(s.ticks_not_recorded) + " ticks: the disk did not keep up");
+    f.warnings.push_back(
+        filled(tr("NOT RECORDED: {n} ticks: the disk did not keep up"), {{"n", std::to_string(s.ticks_not_recorded)}}));
   return f;
 }
 

@@ -6,6 +6,7 @@
 #include "commands/prepare.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/imaging/io/volume_io.h"
 
 namespace osteo {
@@ -157,6 +158,7 @@ CaseReport report_on(const fs::path& folder, const std::string& asked_for, const
         scan = keeper.take();
       }
     }
+    const InLanguage theirs(language_of_environment());
     CaseReport report = write_case_report(folder, asked_for, scan, io.context);
     static_cast<void>(io.context.take_report());
     io.end_progress();

@@ -6,6 +6,7 @@
 #include "commands/review.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo {
 
@@ -54,8 +55,13 @@ int ReviewCommand::run(const Params& p, cli::Invocation& io) {
     name.clear();
   }
   q.pictures = !p.no_pictures;
-  const Review review = make_review(q, io.context);
-  write_review(review, p.out, io.common.force);
+  // The page is for people; what is printed here and the JSON are for programs too.
+  const Review review = [&] {
+    const InLanguage theirs(language_of_environment());
+    Review made = make_review(q, io.context);
+    write_review(made, p.out, io.common.force);
+    return made;
+  }();
   io.end_progress();
   if (io.common.json) {
     Json j{{"folder", p.out}, {"findings", review.findings.list.size()}, {"pictures", review.pictures.size()}};

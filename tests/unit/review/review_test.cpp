@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <tuple>
 
 #include "evidence/scene.h"
 #include "osteo/assessment/review/heat_sheet.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/display/view/pictures.h"
 #include "osteo/geometry/grid/brick_places.h"
 #include "osteo/simulation/bone/instrument.h"
@@ -64,6 +66,33 @@ Review example() {
   r.hidden_mm3 = 31;
   r.seen_mm3 = 72;
   return r;
+}
+
+// The page in a language, and the JSON as it always is.
+TEST(ReviewPage, IsInTheLanguageAndItsFilesAreNot) {
+  const std::string english = review_html(example()), json = review_json(example()).dump();
+  EXPECT_EQ(english.find("\"texts\""), std::string::npos) << "nothing to look up";
+  for (const auto& [language, heading, number] :
+       {std::tuple{Language::german, "Befunde", "1,5 N"}, std::tuple{Language::spanish, "Hallazgos", "1,5 N"},
+        std::tuple{Language::french, "Constats", "1,5 N"}, std::tuple{Language::chinese, "发现", "1.5 N"}}) {
+    const InLanguage theirs(language);
+    Review r = example();
+    {
+      const EnglishHere files;
+      r.findings = example().findings;
+    }
+    r.shown.findings = findings_of(r.score, nullptr, nullptr);
+    r.shown.labels = {tr("Scripted: a file of strokes moved the hand, no person did.")};
+    const std::string html = review_html(r);
+    EXPECT_NE(html.find(std::string("<h2>") + heading + "</h2>"), std::string::npos) << heading;
+    EXPECT_NE(html.find(number), std::string::npos) << heading;
+    EXPECT_NE(html.find(r.shown.findings.list[0].text), std::string::npos) << heading;
+    EXPECT_EQ(html.find(r.findings.list[0].text), std::string::npos) << heading;
+    EXPECT_NE(html.find("\"texts\""), std::string::npos) << "what the script says";
+    EXPECT_EQ(review_json(r).dump(), json) << heading;
+    EXPECT_EQ(review_sheet(r).title, tr("Review of a session"));
+  }
+  EXPECT_EQ(review_html(example()), english);
 }
 
 TEST(ReviewPage, SaysWhatWasFoundAndAsksForNothing) {

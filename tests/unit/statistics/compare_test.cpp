@@ -3,7 +3,6 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/statistics/curves.h"
-#include "osteo/core/statistics/decide.h"
 #include "reference.h"
 
 namespace osteo::statistics {

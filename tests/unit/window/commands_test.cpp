@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <set>
 
+#include "osteo/core/base/translate.h"
+
 namespace osteo {
 namespace {
 
@@ -64,6 +66,37 @@ TEST(Commands, AreFoundByNameOldNameAndSynonym) {
   EXPECT_EQ(best("burr 4"), "Burr of 4 mm");
   EXPECT_EQ(best("xyzzy"), "");
   EXPECT_EQ(best("saw xyzzy"), "") << "each word has to fit";
+}
+
+// What one types may be of the language or English, with or without accents; Chinese has no blanks between words.
+TEST(Commands, AreFoundInEnglishAndInTheLanguage) {
+  const std::string english = command_rows().front().name;
+  const auto command = [](const std::string& text) {
+    const auto found = find_commands(text);
+    return found.empty() ? std::nullopt : found[0]->command;
+  };
+  {
+    const InLanguage german(Language::german);
+    EXPECT_EQ(command_rows().front().name, english) << "rows are English, and shown in the language";
+    for (const char* const text : {"spülung ein", "SPÜLUNG EIN", "spulung ein", "wasser", "water"})
+      EXPECT_EQ(command(text), Command::irrigation) << text;
+    for (const CommandRow& row : command_rows()) {
+      const auto found = find_commands(shown_name(row));
+      EXPECT_NE(std::find(found.begin(), found.end(), &row), found.end()) << shown_name(row);
+      EXPECT_NE(shown_name(row), "");
+    }
+    EXPECT_EQ(shown_keys(*row_of(Command::deeper, 0)).find("Shift-wheel"), std::string::npos) << "gestures are";
+  }
+  {
+    const InLanguage french(Language::french);
+    EXPECT_EQ(command("plein ecran"), Command::full_screen);
+    EXPECT_EQ(command("full screen"), Command::full_screen);
+  }
+  const InLanguage chinese(Language::chinese);
+  EXPECT_EQ(command("\u5168\u5c4f"), Command::full_screen);
+  EXPECT_EQ(command("\u540a\u540a"), std::nullopt);
+  std::set<std::string> names;
+  for (const CommandRow& row : command_rows()) EXPECT_TRUE(names.insert(shown_name(row)).second) << shown_name(row);
 }
 
 TEST(Commands, AShiftedKeyIsARowOfItsOwn) {

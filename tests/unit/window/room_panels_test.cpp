@@ -7,8 +7,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
 
 #include "command_palette.h"
+#include "osteo/core/base/translate.h"
 #include "ui_kit.h"
 #include "ui_style.h"
 
@@ -180,6 +183,97 @@ TEST(Palette, FindsByTypingAndDoesByEnter) {
 TEST(Palette, TenKeys) {
   EXPECT_EQ(ten_keys().size(), 10U);
   for (const TenKeysRow& r : ten_keys()) EXPECT_FALSE(r.keys.empty()) << r.text;
+}
+
+constexpr Language kLanguages[] = {Language::english, Language::german, Language::spanish, Language::french,
+                                   Language::chinese};
+
+TEST(Panels, FitInEveryLanguage) {
+  for (const Language language : kLanguages) {
+    const InLanguage theirs(language);
+    SCOPED_TRACE(std::string(enum_names(language)[static_cast<std::size_t>(language)]));
+    constexpr int kWidth = 1024, kHeight = 700;
+    const Memory memory(kWidth, kHeight, kTextPixels);
+    const RoomLayout l = lay_out(Layout::operate, kWidth, kHeight, static_cast<float>(kTextPixels));
+    StateFacts f = longest();
+    f.structure = "facial nerve";  // a name of the case's may be cut
+    f.warning.clear();
+    const std::set<std::string> before = texts_cut();
+    Pressed pressed;
+    Latched latched;
+    bool unfolded = true;
+    ScreenBox card;
+    CommandPalette palette;
+    palette.help();
+    const ScreenBox whole{0, 0, kWidth, kHeight};
+    const FirstSteps list;
+    frames([&] {
+      draw_state(l.state, l.view, f, {}, pressed);
+      draw_tray(l.tray, {}, true, latched, pressed);
+      card = draw_burr_card(l.view, l.view.width, {}, unfolded, pressed);
+      static_cast<void>(draw_next_step(l.view, list));
+      EXPECT_EQ(palette.draw(whole, l.view), nullptr);
+      static_cast<void>(draw_question(kWidth, kHeight, tr("Reset bone?"),
+                                      tr("This session is saved and ends. A new one begins with the bone of the case."),
+                                      tr("Reset bone")));
+    });
+    for (const std::string& text : texts_cut()) EXPECT_TRUE(before.contains(text)) << text;
+    ASSERT_FALSE(card.empty());
+    expect_nothing_outside("burr", card, false);
+    expect_nothing_outside("state", l.state, false);
+    expect_nothing_outside(tr("Reset bone?"), whole, false);
+    EXPECT_EQ(palette.shown(), CommandPalette::Shown::ten_keys) << "there is room for it";
+    palette.help();
+    frames([&] { EXPECT_EQ(palette.draw(whole, l.view), nullptr); });
+    for (const std::string& text : texts_cut()) EXPECT_TRUE(before.contains(text)) << text;
+    const ImGuiWindow* const commands = ImGui::FindWindowByName("commands");
+    ASSERT_NE(commands, nullptr);
+    for (const CommandRow& row : command_rows()) {
+      const float room = commands->Size.x - 56 * unit();
+      EXPECT_LE(ImGui::CalcTextSize(shown_name(row).c_str()).x, room) << shown_name(row);
+      EXPECT_LE(ImGui::CalcTextSize(shown_keys(row).c_str()).x, room) << shown_keys(row);
+    }
+  }
+}
+
+// What stands on a button of half the panel's width, or of all of it.
+TEST(Panels, ButtonsAreAsWideAsTheirWords) {
+  const Memory memory(1024, 700, kTextPixels);
+  frames([] {});  // ImGui has its font from the first on
+  const float pad = 2 * ImGui::GetStyle().FramePadding.x, gap = ImGui::GetStyle().ItemSpacing.x;
+  const ScreenBox panel = panel_of(lay_out(Layout::operate, 1024, 700, static_cast<float>(kTextPixels)));
+  const float whole = panel.width - 2 * ImGui::GetStyle().WindowPadding.x;
+  for (const Language language : kLanguages) {
+    const InLanguage theirs(language);
+    const auto expect_room = [&](const std::string& text, float room) {
+      EXPECT_LE(ImGui::CalcTextSize(text.c_str(), nullptr, true).x + pad, room) << text;
+    };
+    for (const char* const text : {"Save and continue", "Reset bone ..."})
+      expect_room(std::string(tr(text)) + " (F5)", whole);
+    for (const char* const text : {"as the view holds it (Insert)", "all as usual", "Camera back (Backspace)"})
+      expect_room(tr(text), whole);
+    // Of a question 28 em wide.
+    const float half = (28 * em() - 2 * ImGui::GetStyle().WindowPadding.x - gap) / 2;
+    expect_room(tr("no (Esc)"), half);
+    expect_room(std::string(tr("Reset bone")) + " (Enter)", half);
+  }
+}
+
+TEST(Panels, EveryCharacterHasAGlyph) {
+  const Memory memory(1024, 700, kTextPixels);
+  frames([] {});
+  for (const Language language : kLanguages) {
+    const std::string_view text = catalogue_text(language);
+    for (const char* at = text.data(); at < text.data() + text.size();) {
+      unsigned int c = 0;
+      at += ImTextCharFromUtf8(&c, at, text.data() + text.size());
+      if (c <= ' ') continue;
+      EXPECT_NE(ImGui::GetFont()->FindGlyphNoFallback(static_cast<ImWchar>(c)), nullptr) << std::hex << c;
+      if (c >= 0x4E00) {
+        EXPECT_NE(bold_font()->FindGlyphNoFallback(static_cast<ImWchar>(c)), nullptr) << std::hex << c;
+      }
+    }
+  }
 }
 
 // While drilling only letters and bars change: what is drawn where stays.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/translate.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -22,17 +23,17 @@ std::optional<std::string> ask_for_code(WindowShell& shell, const std::string& h
     const float e = em(), wide = std::min(w, 30 * e), high = std::min(h, 14 * e);
     begin_fixed("code", {std::floor((w - wide) / 2), std::floor((h - high) / 2), wide, high},
                 ImGuiWindowFlags_NoScrollbar);
-    ImGui::TextWrapped("Join the session at %s", host.c_str());
-    ImGui::TextWrapped("Type the code that it shows there: eight characters.");
+    ImGui::TextWrapped("%s", filled(tr("Join the session at {host}"), {{"host", host}}).c_str());
+    ImGui::TextWrapped("%s", tr("Type the code that it shows there: eight characters."));
     ImGui::Dummy({0, 0.4F * e});
     if (!reported) ImGui::SetKeyboardFocusHere();
     ImGui::SetNextItemWidth(16 * e);
     done = ImGui::InputText("##code", typed.data(), typed.size(),
                             ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_CharsUppercase);
     ImGui::SameLine();
-    done = ImGui::Button("join (Enter)") || done;
+    done = ImGui::Button(tr("join (Enter)")) || done;
     ImGui::Dummy({0, 0.4F * e});
-    if (ImGui::Button("close (Esc)")) close = true;
+    if (ImGui::Button(tr("close (Esc)"))) close = true;
     ImGui::End();
     shell.show_page();
     if (!reported && !state_file.empty())

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "osteo/core/base/translate.h"
 #include "ui_kit.h"
 
 namespace osteo::inline app {
@@ -34,8 +35,8 @@ float wide_of(const std::string& words) {
   return ImGui::CalcTextSize(words.c_str()).x;
 }
 
-// The mouse, and what its parts do.
-void draw_mouse(ImDrawList* draw, float x, float y, float u) {
+// The mouse, and what its parts do, as far as `right`.
+void draw_mouse(ImDrawList* draw, float x, float y, float right, float u) {
   const ImU32 ink = im_colour32(theme().quiet), strong = im_colour32(theme().text);
   const float wide = 40 * u, high = 60 * u, thick = std::max(1.0F, 2 * u);
   draw->AddRect({x, y}, {x + wide, y + high}, ink, 20 * u, 0, thick);
@@ -43,26 +44,29 @@ void draw_mouse(ImDrawList* draw, float x, float y, float u) {
   draw->AddLine({x + wide / 2, y}, {x + wide / 2, y + 26 * u}, ink, thick);
   draw->AddRectFilled({x + wide / 2 - 4 * u, y + 6 * u}, {x + wide / 2 + 4 * u, y + 20 * u}, strong, 4 * u);
   const float words = x + wide + 16 * u;
-  text_at(draw, {words, y - 4 * u}, theme().text, "Wheel zooms");
-  text_at(draw, {words, y + 20 * u}, theme().text, "Right drag turns the view");
-  text_at(draw, {words, y + 44 * u}, theme().text, "Alt-right drag tilts the drill");
+  const auto line = [&](float top, const char* text) {
+    fitted_text(draw, {words, top, right - words, ImGui::GetFontSize()}, em(), theme().text, text);
+  };
+  line(y - 4 * u, tr("Wheel zooms"));
+  line(y + 20 * u, tr("Right drag turns the view"));
+  line(y + 44 * u, tr("Alt-right drag tilts the drill"));
 }
 
 }  // namespace
 
-const std::vector<TenKeysRow>& ten_keys() {
-  static const std::vector<TenKeysRow> rows = {
-      {"left button", "drills while held"},
-      {"Shift-wheel", "deeper, back"},
-      {key_name(Command::bring), "approach the bone"},
-      {key_name(Command::lift), "retract, out of the bone"},
-      {key_name(Command::diameter, 1) + " to " + key_name(Command::diameter, 7), "burr size, mm"},
-      {key_name(Command::suck), "suction, while held"},
-      {key_name(Command::irrigation), "irrigation on, off"},
-      {key_name(Command::undo), "undo"},
-      {key_name(Command::before), "compare with the start"},
-      {key_name(Command::palette), "all commands"}};
-  return rows;
+std::vector<TenKeysRow> ten_keys() {
+  const std::string sizes = filled(
+      tr("{first} to {last}"), {{"first", key_name(Command::diameter, 1)}, {"last", key_name(Command::diameter, 7)}});
+  return {{tr("left button"), tr("drills while held")},
+          {tr("Shift-wheel"), tr("deeper, back")},
+          {key_name(Command::bring), tr("approach the bone")},
+          {key_name(Command::lift), tr("retract, out of the bone")},
+          {sizes, tr("burr size, mm")},
+          {key_name(Command::suck), tr("suction, while held")},
+          {key_name(Command::irrigation), tr("irrigation on, off")},
+          {key_name(Command::undo), tr("undo")},
+          {key_name(Command::before), tr("compare with the start")},
+          {key_name(Command::palette), tr("all commands")}};
 }
 
 void CommandPalette::show(Shown what) {
@@ -134,8 +138,8 @@ std::vector<CommandPalette::Line> CommandPalette::lines(float wide) const {
   const bool grouped = shown_ == Shown::all && search_.text().empty();
   for (std::size_t n = 0; n < found.size(); ++n) {
     if (grouped && (n == 0 || found[n]->group != found[n - 1]->group))
-      all.push_back({nullptr, 0, found[n]->group, kHeading * u});
-    const bool two = wide_of(found[n]->name) + wide_of(found[n]->keys) + 24 * u > wide;
+      all.push_back({nullptr, 0, tr(found[n]->group), kHeading * u});
+    const bool two = wide_of(shown_name(*found[n])) + wide_of(shown_keys(*found[n])) + 24 * u > wide;
     all.push_back({found[n], n, {}, (two ? kTwoLines : kLine) * u});
   }
   return all;
@@ -174,7 +178,7 @@ const CommandRow* CommandPalette::draw_list(const ScreenBox& window, bool run) {
   const float text_x = box.x + pad + 36 * u;
   const std::string shown = shortened(text, box.right() - pad - text_x, line);
   text_at(draw, {text_x, text_y}, text.empty() ? t.quiet : t.text,
-          text.empty() ? "Name of a command, or what it does" : shown);
+          text.empty() ? tr("Name of a command, or what it does") : shown);
   if (std::fmod(ImGui::GetTime(), 1.0) < 0.6 || text.empty())
     draw->AddRectFilled({text_x + (text.empty() ? -3 * u : wide_of(shown) + u), text_y},
                         {text_x + (text.empty() ? -u : wide_of(shown) + 3 * u), text_y + line}, im_colour32(t.accent));
@@ -192,7 +196,7 @@ const CommandRow* CommandPalette::draw_list(const ScreenBox& window, bool run) {
   scroll_ = std::clamp(scroll_ - 2 * kLine * u * ImGui::GetIO().MouseWheel, 0.0F, std::max(0.0F, tall - list));
   const CommandRow* done = run ? search_.row() : nullptr;
   if (all.empty())
-    text_at(draw, {box.x + pad + 12 * u, top + (list - line) / 2}, t.quiet, "No command has such a name");
+    text_at(draw, {box.x + pad + 12 * u, top + (list - line) / 2}, t.quiet, tr("No command has such a name"));
   ImGui::PushClipRect({box.x, top}, {box.right(), bottom}, true);
   float y = top - scroll_;
   for (const Line& l : all) {
@@ -216,9 +220,9 @@ const CommandRow* CommandPalette::draw_list(const ScreenBox& window, bool run) {
       draw->AddRectFilled({lo.x, lo.y + 8 * u}, {lo.x + 4 * u, hi.y - 8 * u}, im_colour32(t.accent), 2 * u);
     }
     const bool two = l.high > kLine * u + 1;
-    text_at(draw, {lo.x + 12 * u, two ? from + 8 * u : from + (l.high - line) / 2}, t.text, l.row->name);
-    text_at(draw, {hi.x - 12 * u - wide_of(l.row->keys), two ? y - line - 8 * u : from + (l.high - line) / 2}, t.quiet,
-            l.row->keys);
+    text_at(draw, {lo.x + 12 * u, two ? from + 8 * u : from + (l.high - line) / 2}, t.text, shown_name(*l.row));
+    const std::string keys = shown_keys(*l.row);
+    text_at(draw, {hi.x - 12 * u - wide_of(keys), two ? y - line - 8 * u : from + (l.high - line) / 2}, t.quiet, keys);
   }
   ImGui::PopClipRect();
   if (tall > list) {  // how far down one is
@@ -228,8 +232,9 @@ const CommandRow* CommandPalette::draw_list(const ScreenBox& window, bool run) {
   }
   draw->AddLine({box.x, bottom}, {box.right(), bottom}, im_colour32(t.line, 0.6F), std::max(1.0F, u));
   fitted_text(draw, {box.x + pad + 12 * u, bottom, wide - 2 * pad - 120 * u, kFoot * u}, kLabelEm * em(), t.quiet,
-              "Up, Down choose    Enter does it    Esc closes");
-  const std::string count = std::to_string(search_.found().size()) + " of " + std::to_string(command_rows().size());
+              tr("Up, Down choose    Enter does it    Esc closes"));
+  const std::string count = filled(tr("{n} of {all}"), {{"n", std::to_string(search_.found().size())},
+                                                        {"all", std::to_string(command_rows().size())}});
   text_at(draw, {box.right() - pad - 12 * u - wide_of(count), bottom + (kFoot * u - line) / 2}, t.quiet, count);
   ImGui::End();
   if (done != nullptr) show(Shown::nothing);
@@ -253,13 +258,13 @@ void CommandPalette::draw_ten_keys(const ScreenBox& view) {
   begin_card("ten keys", box, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoFocusOnAppearing);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
-  text_at(draw, {box.x + 16 * u, box.y + 12 * u}, t.text, "Ten keys", true);
+  text_at(draw, {box.x + 16 * u, box.y + 12 * u}, t.text, tr("Ten keys"), true);
   ImGui::SetCursorScreenPos({box.right() - 40 * u, box.y + 6 * u});
   const bool closed = ImGui::InvisibleButton("close", {32 * u, 32 * u});
   draw_icon(draw, {box.right() - 34 * u, box.y + 12 * u}, 20 * u, "x", im_colour32(t.quiet));
   float y = box.y + kTenTitle * u;
   if (mouse) {
-    draw_mouse(draw, box.x + 24 * u, y + 8 * u, u);
+    draw_mouse(draw, box.x + 24 * u, y + 8 * u, box.right() - 12 * u, u);
     y += kMouse * u;
   }
   const float line = ImGui::GetFontSize();
@@ -269,11 +274,12 @@ void CommandPalette::draw_ten_keys(const ScreenBox& view) {
                         24 * u};
     draw->AddRectFilled({cap.x, cap.y}, {cap.right(), cap.bottom()}, im_colour32(t.raised), 6 * u);
     fitted_text(draw, cap, kLabelEm * em(), t.text, r.keys, true);
-    text_at(draw, {box.x + (16 + kTenKeys + 12) * u, y + (row - line) / 2}, t.text, r.text);
+    const float text_x = box.x + (16 + kTenKeys + 12) * u;
+    fitted_text(draw, {text_x, y + (row - line) / 2, box.right() - 12 * u - text_x, line}, em(), t.text, r.text);
     y += row;
   }
   text_at(draw, {box.x + 16 * u, box.bottom() - line - 8 * u}, t.quiet,
-          key_name(Command::help) + " again: keys of all commands");
+          filled(tr("{key} again: keys of all commands"), {{"key", key_name(Command::help)}}));
   ImGui::End();
   if (closed) show(Shown::nothing);
 }

@@ -9,11 +9,11 @@
 
 namespace osteo::inline app {
 
-/// A row of the card: keys, and what they do.
+/// A row of the card: keys, and what they do, in the language.
 struct TenKeysRow {
   std::string keys, text;
 };
-[[nodiscard]] const std::vector<TenKeysRow>& ten_keys();
+[[nodiscard]] std::vector<TenKeysRow> ten_keys();
 
 class CommandPalette {
  public:

@@ -10,19 +10,24 @@
 namespace osteo::inline app {
 
 struct CommandRow {
-  std::string name, group, synonyms;
-  std::string keys;                ///< those that do it, with commas between them; empty: none
-  std::optional<Command> command;  ///< none: a gesture of the mouse, which can only be told
+  std::string name, group, synonyms;  ///< in English; tr() has group and synonyms in the language
+  std::string gesture;                ///< of the mouse; what `keys` begin with
+  std::string keys;                   ///< those that do it, with commas between them; empty: none
+  std::optional<Command> command;     ///< none: a gesture of the mouse, which can only be told
   int value = 0;
   bool shift = false;
   bool held = false;  ///< works while its key is down: a click on its row cannot do it
 };
 /// Groups one after another, in the order of the work.
 [[nodiscard]] const std::vector<CommandRow>& command_rows();
+/// A row's name and keys in the language. Names of keys stay English, as they are on most keyboards.
+[[nodiscard]] std::string shown_name(const CommandRow& row);
+[[nodiscard]] std::string shown_keys(const CommandRow& row);
 /// What a key or a button does in words: the row of its command and value; null: it has none.
 [[nodiscard]] const CommandRow* row_of(Command command, int value);
 /// Rows by how well they fit, best first; all of them for a text without letters. Each word of the text has to begin a
-/// word of the row's name, synonyms or group.
+/// word of the row's name, synonyms or group, all of them in English or all of them in the language; accents and
+/// capitals make no difference.
 [[nodiscard]] std::vector<const CommandRow*> find_commands(const std::string& text);
 
 /// A text that is being typed, what is found for it, and which of that is chosen.

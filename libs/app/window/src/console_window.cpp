@@ -11,6 +11,7 @@
 #include "monitor_screen.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/translate.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -38,7 +39,9 @@ class ConsoleSound {
     sound_ = sound;
   }
   [[nodiscard]] std::string words() const {
-    return card_ ? "sound through " + card_->driver() : failure_.empty() ? "no sound" : "no sound: " + failure_;
+    return card_              ? filled(tr("sound through {driver}"), {{"driver", card_->driver()}})
+           : failure_.empty() ? tr("no sound")
+                              : filled(tr("no sound: {why}"), {{"why", failure_}});
   }
 
  private:
@@ -114,9 +117,11 @@ void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
     } else {
       begin_fixed("waiting", {0, 0, w, h - foot});
       ImGui::TextWrapped(
-          "Waiting for a nerve monitor at %s: 'osteo rehearse CASE --stream igtl:PORT', or 'osteo stream SESSION --to "
-          "igtl:PORT'.",
-          options.server.c_str());
+          "%s",
+          filled(tr("Waiting for a nerve monitor at {server}: 'osteo rehearse CASE --stream igtl:PORT', or 'osteo "
+                    "stream SESSION --to igtl:PORT'."),
+                 {{"server", options.server}})
+              .c_str());
       ImGui::End();
     }
     begin_fixed("foot", {0, h - foot, w, foot}, ImGuiWindowFlags_NoScrollbar);
@@ -125,11 +130,13 @@ void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
       ImGui::TextUnformatted(("! " + facts.trouble).c_str());
       ImGui::PopStyleColor();
     } else {
-      ImGui::TextDisabled(
-          "%s  %s%s  %s  F freeze  M mute  G view%s  Q close", options.server.c_str(),
-          facts.ended ? "the session has ended" : "connected",
-          facts.lost > 0 ? (", " + std::to_string(facts.lost) + " samples lost on the way").c_str() : "",
-          sound.words().c_str(), controller && controller->stimulates() ? "  S stimulator  T threshold" : "");
+      std::string link = facts.ended ? tr("the session has ended") : tr("connected");
+      if (facts.lost > 0)
+        link = filled(tr("{link}, {n} samples lost on the way"), {{"link", link}, {"n", std::to_string(facts.lost)}});
+      ImGui::TextDisabled("%s  %s  %s  %s", options.server.c_str(), link.c_str(), sound.words().c_str(),
+                          controller && controller->stimulates()
+                              ? tr("F freeze  M mute  G view  S stimulator  T threshold  Q close")
+                              : tr("F freeze  M mute  G view  Q close"));
     }
     ImGui::End();
     shell.show_page();

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 namespace {
@@ -28,15 +29,17 @@ void CutPreview::look(const World& world, const StructureMap* structures, const 
   const std::vector<StructureCut> near = structures_cut(*structures, *blade);
   if (const std::string reported = reported_structures_cut(*structures, near); !reported.empty()) {
     cuts_ = true;
-    text_ = "would cut " + reported;
+    text_ = filled(tr("would cut {what}"), {{"what", reported}});
     return;
   }
   const auto nearest = std::min_element(near.begin(), near.end(), [](const StructureCut& a, const StructureCut& b) {
     return a.distance_mm < b.distance_mm;
   });
-  text_ = nearest == near.end() ? "no structure within 5 mm"
-                                : "nearest: the " + structures->name_of(nearest->structure) + ", " +
-                                      format_number(std::round(nearest->distance_mm * 10) / 10) + " mm";
+  text_ = nearest == near.end()
+              ? tr("no structure within 5 mm")
+              : filled(tr("nearest: the {structure}, {mm} mm"),
+                       {{"structure", tr(structures->name_of(nearest->structure))},
+                        {"mm", shown_figures(format_number(std::round(nearest->distance_mm * 10) / 10))}});
 }
 
 void CutPreview::clear() {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/core/base/translate.h"
+
 namespace osteo::inline app {
 namespace {
 
@@ -31,9 +33,10 @@ void CutsControl::set_bounds(Vec3 lo, Vec3 hi, double step_mm) {
 }
 
 const char* CutsControl::name(int cut) const {
-  static constexpr const char* kBody[] = {"Axial", "Coronal", "Sagittal"};
-  static constexpr const char* kTool[] = {"Across the tool", "Along the tool", "Along it, the other way"};
-  return (planes_ == Planes::body ? kBody : kTool)[cut];
+  static constexpr const char* kBody[] = {tr_later("Axial"), tr_later("Coronal"), tr_later("Sagittal")};
+  static constexpr const char* kTool[] = {tr_later("Across the tool"), tr_later("Along the tool"),
+                                          tr_later("Along it, the other way")};
+  return tr((planes_ == Planes::body ? kBody : kTool)[cut]);
 }
 
 void CutsControl::set_cross(Vec3 world_mm) {

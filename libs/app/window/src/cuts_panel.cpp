@@ -9,6 +9,7 @@
 #include <cmath>
 #include <utility>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/display/view/instrument_view.h"
 #include "slice_overlay.h"
 #include "ui_kit.h"
@@ -266,40 +267,45 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
   ImGui::SetNextWindowPos({header_.x, header_.y});
   ImGui::SetNextWindowSize({header_.width, header_.height});
   ImGui::Begin("Cuts", nullptr, kFixed);
-  static constexpr const char* kShort[] = {"Bone", "Soft", "Temporal"};
+  static constexpr const char* kShort[] = {tr_later("Bone"), tr_later("Soft"), tr_later("Temporal")};
   for (int p = 0; p < static_cast<int>(grey_presets().size()); ++p) {
     if (p > 0) ImGui::SameLine();
-    if (small_button(kShort[p], control_.preset() == p)) control_.take_preset(p);
+    if (small_button(tr(kShort[p]), control_.preset() == p)) control_.take_preset(p);
     if (ImGui::IsItemHovered()) {
       const HuWindow& hu = grey_presets()[static_cast<std::size_t>(p)].hu;
-      ImGui::SetTooltip(
-          "window %.0f, level %.0f HU. Drag with the right button in a cut to change it; right click: back to this.%s",
-          hu.width, hu.level,
-          ct_ && !ct_->soft_tissue()
-              ? "\nThe case keeps CT values of bone only: soft tissue stays black without --scan."
-              : "");
+      std::string help =
+          filled(tr("window {window}, level {level} HU. Drag with the right button in a cut to change it; "
+                    "right click: back to this."),
+                 {{"window", shown_number(hu.width, 0)}, {"level", shown_number(hu.level, 0)}});
+      if (ct_ && !ct_->soft_tissue()) {
+        help += "\n";
+        help += tr("The case keeps CT values of bone only: soft tissue stays black without --scan.");
+      }
+      ImGui::SetTooltip("%s", help.c_str());
     }
   }
   bool follows = control_.follows();
-  if (ImGui::Checkbox("follow", &follows)) control_.follow(follows);
+  if (ImGui::Checkbox(tr("follow"), &follows)) control_.follow(follows);
   ImGui::SameLine();
   const bool along = control_.planes() == CutsControl::Planes::tool;
-  if (small_button("along the drill (F4)", along))
+  if (small_button(tr("along the drill (F4)"), along))
     control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
-  ImGui::Checkbox("removed", &shown_.tint_removed);
+  ImGui::Checkbox(tr("removed"), &shown_.tint_removed);
   if (before_.empty()) shown_.tint_removed = false;
   if (rehearsal.structures() != nullptr) {
     ImGui::SameLine();
-    const std::string words = "structures (" + std::to_string(rehearsal.structures()->values().size()) + ")";
+    const std::string words =
+        filled(tr("structures ({n})"), {{"n", std::to_string(rehearsal.structures()->values().size())}});
     if (small_button(words.c_str(), list_open_)) list_open_ = !list_open_;
   }
   if (regions_ != nullptr) {
     ImGui::SameLine();
-    if (small_button("plan", regions_->shown())) regions_->show(!regions_->shown());
-    if (ImGui::IsItemHovered()) ImGui::SetTooltip("what the procedure wants removed (green) or left (orange); Ctrl-L");
+    if (small_button(tr("plan"), regions_->shown())) regions_->show(!regions_->shown());
+    if (ImGui::IsItemHovered())
+      ImGui::SetTooltip("%s", tr("what the procedure wants removed (green) or left (orange); Ctrl-L"));
   }
-  ImGui::TextDisabled("%.0f / %.0f HU   F3: %s", control_.hu.width, control_.hu.level,
-                      control_.enlarged() >= 0 ? "back" : "in the middle");
+  ImGui::TextDisabled("%.0f / %.0f HU   %s", control_.hu.width, control_.hu.level,
+                      control_.enlarged() >= 0 ? tr("F3: back") : tr("F3: in the middle"));
   ImGui::End();
 }
 
@@ -313,16 +319,17 @@ void CutsPanel::foot(const Rehearsal& rehearsal) {
     if (const int cut = choice("which", kBody, chosen_, kSmallControl); cut >= 0) chosen_ = cut;
     ImGui::SameLine(0, 0);
   } else {
-    static const std::string kPlanes[] = {"Body", "Drill"};
-    if (const int planes = choice("planes", kPlanes, along ? 1 : 0, kSmallControl); planes >= 0)
+    const std::string all_planes[] = {tr_of("planes of the cuts", "Body"), tr_of("planes of the cuts", "Drill")};
+    if (const int planes = choice("planes", all_planes, along ? 1 : 0, kSmallControl); planes >= 0)
       control_.take_planes(planes == 1 ? CutsControl::Planes::tool : CutsControl::Planes::body);
   }
   const float side = foot_.height;
   ImGui::SetCursorScreenPos({foot_.right() - side, foot_.y});
-  if (tile("settings", "settings",
-           {false, settings_open_, true,
-            "Window, level, structures" + std::string(rehearsal.structures() != nullptr ? ", plan" : "")},
-           side))
+  if (tile(
+          "settings", "settings",
+          {false, settings_open_, true,
+           rehearsal.structures() != nullptr ? tr("Window, level, structures, plan") : tr("Window, level, structures")},
+          side))
     settings_open_ = !settings_open_;
   ImGui::End();
 }
@@ -439,22 +446,21 @@ void CutsPanel::readout(const Rehearsal& rehearsal) {
   ImGui::SetNextWindowSize({footer_.width, footer_.height});
   ImGui::Begin("Under the mouse", nullptr, kFixed);
   if (const auto p = control_.under_mouse()) {
-    std::string words = place_text(*p) + " mm";
+    std::string words = shown_figures(place_text(*p)) + " mm";
     if (const auto hu = ct_under_mouse_ ? ct_under_mouse_->at_world(*p) : std::nullopt)
       words += "   " + std::to_string(std::lround(*hu)) + " HU";
     ImGui::Text("%s", words.c_str());
-    std::string below = ct_under_mouse_ && !ct_under_mouse_->at_world(*p) ? "no CT value is kept here" : "";
+    std::string below = ct_under_mouse_ && !ct_under_mouse_->at_world(*p) ? tr("no CT value is kept here") : "";
     if (const StructureMap* const map = rehearsal.structures()) {
       if (const auto near = map->at(*p); near.structure != 0) {
-        char text[160];
-        std::snprintf(text, sizeof text, near.distance_mm < 0 ? "in %s" : "%s, %.1f mm away",
-                      map->name_of(near.structure).c_str(), near.distance_mm);
-        below += (below.empty() ? "" : ";  ") + std::string(text);
+        below += (below.empty() ? "" : ";  ") +
+                 filled(near.distance_mm < 0 ? tr("in {structure}") : tr("{structure}, {mm} mm away"),
+                        {{"structure", tr(map->name_of(near.structure))}, {"mm", shown_number(near.distance_mm, 1)}});
       }
     }
     ImGui::Text("%s", below.c_str());
   } else {
-    ImGui::TextDisabled("%s mm", place_text(control_.cross_mm()).c_str());
+    ImGui::TextDisabled("%s mm", shown_figures(place_text(control_.cross_mm())).c_str());
   }
   ImGui::End();
 }
@@ -464,10 +470,10 @@ void CutsPanel::list_structures(Rehearsal& rehearsal) {
   const float scale = scale_now(), width = std::min(300 * scale, middle_.width);
   ImGui::SetNextWindowPos({header_.x - width, header_.y});
   ImGui::SetNextWindowSizeConstraints({width, 0}, {width, 0.8F * middle_.height});
-  ImGui::Begin("Structures", &list_open_,
+  ImGui::Begin(tr("Structures"), &list_open_,
                ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
                    ImGuiWindowFlags_AlwaysAutoResize);
-  static constexpr const char* kWords[] = {"solid", "clear", "hidden"};
+  const char* const looks[] = {tr_of("look", "solid"), tr_of("look", "clear"), tr_of("look", "hidden")};
   const auto take = [&](std::size_t number, StructureLook look) {
     const StructuresView::One& s = structures_->all()[number];
     if (s.look == look) return;
@@ -478,18 +484,18 @@ void CutsPanel::list_structures(Rehearsal& rehearsal) {
     ImGui::PushID(id);
     for (int l = 0; l < 3; ++l) {
       ImGui::SameLine(width - (3 - static_cast<float>(l)) * 54 * scale);
-      if (small_button(kWords[l], now == static_cast<StructureLook>(l))) chosen(static_cast<StructureLook>(l));
+      if (small_button(looks[l], now == static_cast<StructureLook>(l))) chosen(static_cast<StructureLook>(l));
     }
     ImGui::PopID();
   };
-  ImGui::TextUnformatted("all");
+  ImGui::TextUnformatted(tr("all"));
   choice("all", std::nullopt, [&](StructureLook look) {
     for (std::size_t s = 0; s < structures_->all().size(); ++s) take(s, look);
   });
   for (std::size_t s = 0; s < structures_->all().size(); ++s) {
     const std::uint8_t value = structures_->all()[s].value;
     const auto c = map.colour_of(value);
-    const std::string name = map.name_of(value), id = std::to_string(value);
+    const std::string name = tr(map.name_of(value)), id = std::to_string(value);
     ImGui::ColorButton(("##" + id).c_str(),
                        {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 1},
                        ImGuiColorEditFlags_NoTooltip, {ImGui::GetFontSize(), ImGui::GetFontSize()});

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "cut_picture.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 namespace {
@@ -27,7 +28,7 @@ std::size_t axis_of(const Frame& frame, Plane plane) {
 std::string rounded(double v) {
   char text[32];
   std::snprintf(text, sizeof text, std::abs(v) < 10 ? "%.1f" : "%.0f", v);
-  return text;
+  return shown_figures(text);
 }
 
 constexpr std::array<std::array<int, 3>, 8> kColours{{{255, 220, 60},
@@ -142,7 +143,7 @@ std::pair<int, int> EditControl::slice(int view) const {
 // ----------------------------------------------------------------------------------------------------------------------------
 
 bool EditControl::refuse_when_busy() {
-  if (busy()) message_ = "wait until it is worked out (Esc stops it)";
+  if (busy()) message_ = tr("wait until it is worked out (Esc stops it)");
   return busy();
 }
 
@@ -258,15 +259,15 @@ void EditControl::double_click(SlicePointer at) {
 std::string EditControl::readout() const {
   if (!under_mouse_) return {};
   const Image& ct = document_.ct();
-  std::string text = place_text(*under_mouse_) + " mm";
+  std::string text = shown_figures(place_text(*under_mouse_)) + " mm";
   const auto here = hu_at(ct, *under_mouse_);
-  if (!here) return text + "   outside the scan";
+  if (!here) return text + "   " + tr("outside the scan");
   text += "   " + std::to_string(std::lround(*here)) + " HU";
   const Vec3 x = ct.frame.index_from_world(*under_mouse_);
   std::array<int, 3> at{};
   for (std::size_t a = 0; a < 3; ++a)
     at[a] = std::clamp(static_cast<int>(std::floor(x[a] + 0.5)), 0, ct.frame.dims[a] - 1);
-  if (document_.bone().at(at[0], at[1], at[2])) text += "   bone";
+  if (document_.bone().at(at[0], at[1], at[2])) text += std::string("   ") + tr("bone");
   if (const EditStructure* const s = document_.structure(document_.labels()[ct.offset(at[0], at[1], at[2])]))
     text += "   " + s->is.name;
   return text;
@@ -339,7 +340,7 @@ bool EditControl::at_once(const EditOperation& operation) {
 bool EditControl::add_structure(const std::string& name) {
   const int value = document_.free_value();
   if (value == 0) {
-    message_ = "255 structures are all there can be";
+    message_ = tr("255 structures are all there can be");
     return false;
   }
   const auto& c = kColours[static_cast<std::size_t>(value - 1) % kColours.size()];
@@ -357,14 +358,14 @@ void EditControl::show_structure(int value, bool shown) {
 void EditControl::undo() {
   if (refuse_when_busy()) return;
   const std::string what = document_.undo_text();
-  message_ = document_.undo() ? "taken back: " + what : "nothing to undo";
+  message_ = document_.undo() ? filled(tr("taken back: {what}"), {{"what", what}}) : tr("nothing to undo");
   redraw_ = true;
 }
 
 void EditControl::redo() {
   if (refuse_when_busy()) return;
   const std::string what = document_.redo_text();
-  message_ = document_.redo() ? "done again: " + what : "nothing to do again";
+  message_ = document_.redo() ? filled(tr("done again: {what}"), {{"what", what}}) : tr("nothing to do again");
   redraw_ = true;
 }
 
@@ -430,52 +431,54 @@ bool EditControl::key(const EditKeyRow& k) {
 }
 
 std::string EditControl::hint() const {
-  if (busy()) return "Being worked out; look around meanwhile. Esc stops it.";
+  if (busy()) return tr("Being worked out; look around meanwhile. Esc stops it.");
   const EditStructure* const s = document_.structure(structure);
-  const std::string what = s != nullptr ? "'" + s->is.name + "'" : std::string("bone");
-  char size[32];
-  std::snprintf(size, sizeof size, "%.1f", 2 * brush_radius_mm);
+  const std::string what = s != nullptr ? "'" + s->is.name + "'" : std::string(tr("bone"));
+  const std::string size = shown_number(2 * brush_radius_mm, 1);
   switch (tool_) {
     case EditTool::look:
-      return "Drag: window and level. Wheel: slices. Shift-move: crosshair.";
+      return tr("Drag: window and level. Wheel: slices. Shift-move: crosshair.");
     case EditTool::ruler:
-      return "Drag: measures a length.";
+      return tr("Drag: measures a length.");
     case EditTool::threshold:
-      return "Blue is what would be bone. Enter applies it.";
+      return tr("Blue is what would be bone. Enter applies it.");
     case EditTool::piece:
-      return "Click: that piece of bone goes. Shift-click: it alone stays.";
+      return tr("Click: that piece of bone goes. Shift-click: it alone stays.");
     case EditTool::pieces:
-      return "Enter: removes small fragments.";
+      return tr("Enter: removes small fragments.");
     case EditTool::box:
-      return "Drag: sets the box in this view. Enter clears the bone inside.";
+      return tr("Drag: sets the box in this view. Enter clears the bone inside.");
     case EditTool::fill:
-      return "Enter: enclosed cavities become bone.";
+      return tr("Enter: enclosed cavities become bone.");
     case EditTool::smooth:
-      return "Enter: smooths the whole surface.";
+      return tr("Enter: smooths the whole surface.");
     case EditTool::brush:
-      return "Drag: adds to " + what + ", ball of " + size + " mm.";
+      return filled(tr("Drag: adds to {structure}, ball of {mm} mm."), {{"structure", what}, {"mm", size}});
     case EditTool::eraser:
-      return "Drag: takes from " + what + ", ball of " + size + " mm.";
+      return filled(tr("Drag: takes from {structure}, ball of {mm} mm."), {{"structure", what}, {"mm", size}});
   }
   return {};
 }
 
 void EditControl::reported(const EditOutcome& o) {
-  message_ = o.text;
+  const std::initializer_list<Place> places{
+      {"what", o.text}, {"added", volume_text(o.added_mm3)}, {"removed", volume_text(o.removed_mm3)}, {"note", o.note}};
+  const char* text = tr("{what}: nothing changes");
   if (!o.changed) {
-    message_ += ": " + (o.note.empty() ? "nothing changes" : o.note);
-    return;
+    if (!o.note.empty()) text = "{what}: {note}";
+  } else if (o.added_mm3 > 0) {
+    text = o.removed_mm3 > 0 ? tr("{what}: {added} added, {removed} removed") : tr("{what}: {added} added");
+  } else {
+    text = o.removed_mm3 > 0 ? tr("{what}: {removed} removed") : "{what}";
   }
-  if (o.added_mm3 > 0) message_ += ": " + volume_text(o.added_mm3) + " added";
-  if (o.removed_mm3 > 0)
-    message_ += std::string(o.added_mm3 > 0 ? ", " : ": ") + volume_text(o.removed_mm3) + " removed";
-  if (!o.note.empty()) message_ += " (" + o.note + ")";
+  message_ = filled(text, places);
+  if (o.changed && !o.note.empty()) message_ += " (" + o.note + ")";
 }
 
 void EditControl::tick() {
   if (auto done = worker_.take_plan()) {
     if (done->error) {
-      message_ = done->error->code() == ExitCode::cancelled ? "stopped; nothing was changed"
+      message_ = done->error->code() == ExitCode::cancelled ? tr("stopped; nothing was changed")
                                                             : std::string(done->error->what());
     } else {
       reported(document_.commit(std::move(*done->plan)));

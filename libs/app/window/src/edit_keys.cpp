@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <iterator>
 
+#include "osteo/core/base/translate.h"
+
 namespace osteo::inline app {
 namespace {
 
@@ -79,8 +81,9 @@ constexpr EditKeyRow kRows[] = {
 }  // namespace
 
 const char* edit_tool_name(EditTool tool) {
-  static constexpr const char* names[kEditTools] = {"Look", "Ruler", "Threshold", "Piece", "Small fragments",
-                                                    "Box",  "Fill",  "Smooth",    "Brush", "Eraser"};
+  static constexpr const char* names[kEditTools] = {
+      tr_later("Look"), tr_later("Ruler"), tr_later("Threshold"), tr_later("Piece"), tr_later("Small fragments"),
+      tr_later("Box"),  tr_later("Fill"),  tr_later("Smooth"),    tr_later("Brush"), tr_later("Eraser")};
   return names[static_cast<int>(tool)];
 }
 
@@ -98,33 +101,35 @@ const EditKeyRow* find_edit_key(int code, bool control, bool shift) {
 const std::vector<EditHelpLine>& edit_help_lines() {
   using enum EditKey;
   static const std::vector<EditHelpLine> lines = {
-      {"wheel, Up, Down, Right, Left, F, B",
-       "next and previous slice of the view under the mouse",
+      {tr_later("wheel, Up, Down, Right, Left, F, B"),
+       tr_later("next and previous slice of the view under the mouse"),
        {next_slice, previous_slice}},
-      {"Shift-move", "the crosshair goes to the mouse, and all views to it", {}},
-      {"left drag (Look)", "window across, level up and down", {}},
-      {"Ctrl-double-click", "window and level as at the beginning", {}},
-      {"F2, F3, F4", "grey values for bone, soft tissue, temporal bone", {preset}},
-      {"Ctrl-wheel, right drag", "zoom", {}},
-      {"middle drag", "moves the picture", {}},
-      {"R", "all views show the whole scan", {fit}},
-      {"double click", "the view alone, and back to four", {}},
-      {"3D: left, right, middle drag, wheel", "turns, zooms, moves, zooms", {}},
-      {"keypad 1, 3, 7",
-       "3D from the front, left, above; with Shift from the other side",
+      {tr_later("Shift-move"), tr_later("the crosshair goes to the mouse, and all views to it"), {}},
+      {tr_later("left drag (Look)"), tr_later("window across, level up and down"), {}},
+      {tr_later("Ctrl-double-click"), tr_later("window and level as at the beginning"), {}},
+      {"F2, F3, F4", tr_later("grey values for bone, soft tissue, temporal bone"), {preset}},
+      {tr_later("Ctrl-wheel, right drag"), tr_later("zoom"), {}},
+      {tr_later("middle drag"), tr_later("moves the picture"), {}},
+      {"R", tr_later("all views show the whole scan"), {fit}},
+      {tr_later("double click"), tr_later("the view alone, and back to four"), {}},
+      {tr_later("3D: left, right, middle drag, wheel"), tr_later("turns, zooms, moves, zooms"), {}},
+      {tr_later("keypad 1, 3, 7"),
+       tr_later("3D from the front, left, above; with Shift from the other side"),
        {from_front, from_left, from_above}},
-      {"C", "crosshair on and off", {cross}},
-      {"O", "outlines on and off", {outline}},
-      {"1 to 9, 0", "tool: look, ruler, threshold, piece, small fragments, box, fill, smooth, brush, eraser", {tool}},
-      {"left button", "what the line at the bottom says", {}},
-      {"[ ], - =, Shift-wheel", "brush smaller and larger", {larger, smaller}},
-      {"Enter", "applies the tool", {apply}},
-      {"Esc", "stops what is worked out; back to Look", {cancel}},
-      {"Ctrl-Z, Z", "undo", {undo}},
-      {"Ctrl-Y, Y, Ctrl-Shift-Z", "redo", {redo}},
-      {"Ctrl-S", "save into the case", {save}},
-      {"F1", "shows this, and hides it", {help}},
-      {"Q, Ctrl-Q", "close; asks when something is not saved", {close}},
+      {"C", tr_later("crosshair on and off"), {cross}},
+      {"O", tr_later("outlines on and off"), {outline}},
+      {tr_later("1 to 9, 0"),
+       tr_later("tool: look, ruler, threshold, piece, small fragments, box, fill, smooth, brush, eraser"),
+       {tool}},
+      {tr_later("left button"), tr_later("what the line at the bottom says"), {}},
+      {tr_later("[ ], - =, Shift-wheel"), tr_later("brush smaller and larger"), {larger, smaller}},
+      {"Enter", tr_later("applies the tool"), {apply}},
+      {"Esc", tr_later("stops what is worked out; back to Look"), {cancel}},
+      {"Ctrl-Z, Z", tr_later("undo"), {undo}},
+      {"Ctrl-Y, Y, Ctrl-Shift-Z", tr_later("redo"), {redo}},
+      {"Ctrl-S", tr_later("save into the case"), {save}},
+      {"F1", tr_later("shows this, and hides it"), {help}},
+      {"Q, Ctrl-Q", tr_later("close; asks when something is not saved"), {close}},
   };
   return lines;
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/core/base/translate.h"
+
 namespace osteo::inline app {
 
 void annotate_slice(ImDrawList* draw, const EditControl& control, int v, ImVec2 lo, float scale) {
@@ -10,9 +12,9 @@ void annotate_slice(ImDrawList* draw, const EditControl& control, int v, ImVec2 
   const SliceOnScreen on{draw, view, lo, scale};
   const auto place = [&](Vec3 mm) { return on.place(mm); };
   if (control.show_cross) on.cross(control.cross_mm());
-  static constexpr const char* names[] = {"Axial", "Coronal", "Sagittal"};
+  static constexpr const char* names[] = {tr_later("Axial"), tr_later("Coronal"), tr_later("Sagittal")};
   const auto [slice, slices] = control.slice(v);
-  on.title(std::string(names[v]) + "  " + std::to_string(slice) + " / " + std::to_string(slices));
+  on.title(std::string(tr(names[v])) + "  " + std::to_string(slice) + " / " + std::to_string(slices));
   on.letters();
   on.scale_bar();
   if (control.ruler_mm) on.ruler(*control.ruler_mm);

@@ -21,6 +21,7 @@
 #include "edit_state.h"
 #include "open_window.h"
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/imaging/edit/edit_file.h"
 #include "ui_style.h"
 
@@ -46,7 +47,7 @@ class EditWindow {
     const std::string name = renderer != nullptr ? renderer : "";
     if (name.find("llvmpipe") != std::string::npos || name.find("softpipe") != std::string::npos)
       control_.preview_voxels = 500'000;
-    control_.say("F1 shows what mouse and keys do");
+    control_.say(tr("F1 shows what mouse and keys do"));
   }
 
   ~EditWindow() {
@@ -333,7 +334,7 @@ class EditWindow {
     if (control_.document().in_stroke()) return;
     saving_ = true;
     saving_version_ = control_.document().version();
-    control_.say("saving: rebuilding the bone of the case ...");
+    control_.say(tr("saving: rebuilding the bone of the case ..."));
     actions_.save(edits_text(recipe_of(control_.document())));
   }
 
@@ -385,9 +386,9 @@ class EditWindow {
         draw->AddCircle(c, 7 * scale_, kCrossColour, 0, 2 * scale_);
       }
       shadowed_text(draw, {lo.x + 8 * scale_, lo.y + 6 * scale_},
-                    control_.previewing() ? "3D preview, being made ..."
-                    : control_.live()     ? "3D preview of the threshold"
-                                          : "3D preview, coarse");
+                    control_.previewing() ? tr("3D preview, being made ...")
+                    : control_.live()     ? tr("3D preview of the threshold")
+                                          : tr("3D preview, coarse"));
       draw->PopClipRect();
     }
   }
@@ -424,17 +425,18 @@ class EditWindow {
                 h = std::min(680 * scale_, static_cast<float>(height_) - 20);
     ImGui::SetNextWindowPos({(static_cast<float>(width_) - w) / 2, (static_cast<float>(height_) - h) / 2});
     ImGui::SetNextWindowSize({w, h});
-    ImGui::Begin("Mouse and keys", &control_.show_help,
+    ImGui::Begin(tr("Mouse and keys"), &control_.show_help,
                  ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove);
     for (const EditHelpLine& l : edit_help_lines()) {
-      ImGui::TextColored({1, 0.88F, 0.55F, 1}, "%s", l.keys);
+      ImGui::TextColored({1, 0.88F, 0.55F, 1}, "%s", tr(l.keys));
       ImGui::SameLine(400 * scale_);
-      ImGui::TextWrapped("%s", l.text);
+      ImGui::TextWrapped("%s", tr(l.text));
     }
     ImGui::Separator();
     ImGui::TextWrapped(
-        "Everything can be undone. The scan is never changed; what is saved is what was done, and the bone that "
-        "follows from it.");
+        "%s",
+        tr("Everything can be undone. The scan is never changed; what is saved is what was done, and the bone that "
+           "follows from it."));
     ImGui::End();
   }
 
@@ -450,23 +452,24 @@ class EditWindow {
     ImGui::SetNextWindowPos({(static_cast<float>(width_) - w) / 2, static_cast<float>(height_) / 3});
     ImGui::SetNextWindowSize({w, 0});
     ImGui::SetNextWindowFocus();
-    ImGui::Begin("Close?", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove);
-    ImGui::TextWrapped("%s", saving_ ? "It is being saved." : "There are corrections that are not saved.");
+    ImGui::Begin(tr("Close?"), nullptr,
+                 ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove);
+    ImGui::TextWrapped("%s", saving_ ? tr("It is being saved.") : tr("There are corrections that are not saved."));
     const ImVec2 size{-1, ImGui::GetFontSize() * 1.9F};
     if (saving_) {
-      if (ImGui::Button("Close when it is saved (Enter)", size) || save_now) {
+      if (ImGui::Button(tr("Close when it is saved (Enter)"), size) || save_now) {
         close_after_save_ = true;
         asking_ = false;
       }
     } else {
-      if (ImGui::Button("Save and close (Enter)", size) || save_now) {
+      if (ImGui::Button(tr("Save and close (Enter)"), size) || save_now) {
         save();
         close_after_save_ = saving_;
         asking_ = false;
       }
-      if (ImGui::Button("Close without saving (D)", size) || discard) quit_ = true;
+      if (ImGui::Button(tr("Close without saving (D)"), size) || discard) quit_ = true;
     }
-    if (ImGui::Button("Go on editing (Esc)", size) || go_on) {
+    if (ImGui::Button(tr("Go on editing (Esc)"), size) || go_on) {
       asking_ = false;
       close_after_save_ = false;
     }

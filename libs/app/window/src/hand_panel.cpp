@@ -1,9 +1,8 @@
 // The page of the hand in the panel.
 #include <imgui.h>
 
-#include <cstdio>
-
 #include "hand_desk.h"
+#include "osteo/core/base/translate.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -36,45 +35,48 @@ void HandController::draw(RehearsalControl& control, bool show) {
     ImGui::SetKeyboardFocusHere();
   }
   row_.clear();
-  const bool open = ImGui::CollapsingHeader("Hand and pedals");
+  const bool open = ImGui::CollapsingHeader(tr("Hand and pedals"));
   if (show) ImGui::SetScrollHereY(0);
   if (!open) {
     assign_.cancel();
     return;
   }
   PersonValues& v = person_.values;
-  ImGui::TextDisabled("motion of the hand (- =)");
+  ImGui::TextDisabled(tr("motion of the hand (- =)"));
   for (int n = 1; n <= HandMotion::kFinest; n *= 2) {
     if (n > 1) ImGui::SameLine();
     const std::string name = "1:" + std::to_string(n);
     if (ImGui::RadioButton(name.c_str(), static_cast<int>(v.motion_one_to) == n)) v.motion_one_to = n;
   }
   ImGui::PushItemWidth(5 * em());
-  share_slider("at wrist rest", v.wrist_rest, 0.05, "of that motion, while \\ or keypad . is held");
-  share_slider("burr at most", v.burr_share, 0.25, "of its full speed, pedal or button all the way down; keys 9 and 0");
+  share_slider(tr("at wrist rest"), v.wrist_rest, 0.05, tr("of that motion, while \\ or keypad . is held"));
+  share_slider(tr("burr at most"), v.burr_share, 0.25,
+               tr("of its full speed, pedal or button all the way down; keys 9 and 0"));
   ImGui::PopItemWidth();
-  ImGui::Checkbox("left-handed", &v.left_handed);
+  ImGui::Checkbox(tr("left-handed"), &v.left_handed);
   if (ImGui::IsItemHovered())
-    ImGui::SetTooltip("the drill is held from the left, the second hand comes from the right");
-  ImGui::Checkbox("mouse buttons change places", &v.mirror_mouse);
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("where the system has not done so already");
-  char words[64];
-  std::snprintf(words, sizeof words, "handle tilted %.0f deg", control.handle().tilted_rad() * 57.29577951308232);
-  ImGui::TextUnformatted(words);
-  if (ImGui::Button("as the view holds it (Insert)", {-1, 0})) control.handle().straight();
+    ImGui::SetTooltip(tr("the drill is held from the left, the second hand comes from the right"));
+  ImGui::Checkbox(tr("mouse buttons change places"), &v.mirror_mouse);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip(tr("where the system has not done so already"));
+  ImGui::TextUnformatted(filled(tr("handle tilted {angle} deg"),
+                                {{"angle", shown_number(control.handle().tilted_rad() * 57.29577951308232, 0)}})
+                             .c_str());
+  if (ImGui::Button(tr("as the view holds it (Insert)"), {-1, 0})) control.handle().straight();
   draw_buttons();
   give(control);
 }
 
 // What each thing is done by. One row for each; a press on it, then the button.
 void HandController::draw_buttons() {
-  ImGui::TextDisabled("pedals, buttons, keys");
+  ImGui::TextDisabled(tr("pedals, buttons, keys"));
   if (assign_.listens()) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
-    ImGui::TextWrapped("Press what is to do it: %s. Esc: nothing; Delete: none.", words_of(*assign_.listens()).c_str());
+    ImGui::TextWrapped("%s", filled(tr("Press what is to do it: {function}. Esc: nothing; Delete: none."),
+                                    {{"function", words_of(*assign_.listens())}})
+                                 .c_str());
     ImGui::PopStyleColor();
   } else {
-    ImGui::TextWrapped("%s", said_.empty() ? "Choose a row, then press pedal, button or key." : said_.c_str());
+    ImGui::TextWrapped("%s", said_.empty() ? tr("Choose a row, then press pedal, button or key.") : said_.c_str());
   }
   for (std::size_t n = 0; n < EnumNames<HandFunction>::values.size(); ++n) {
     const auto function = static_cast<HandFunction>(n);
@@ -87,18 +89,18 @@ void HandController::draw_buttons() {
     for (const int b : person_.buttons.buttons_of(function)) {
       absent += there(b) ? 0 : 1;
       if (there(b)) add(by, button_name(b));
-      add(all, button_name(b) + (there(b) ? "" : " (not plugged in)"));
+      add(all, there(b) ? button_name(b) : filled(tr("{button} (not plugged in)"), {{"button", button_name(b)}}));
     }
-    if (by.empty()) by = absent > 0 ? std::to_string(absent) + " not plugged in" : "-";
+    if (by.empty()) by = absent > 0 ? filled(tr("{n} not plugged in"), {{"n", std::to_string(absent)}}) : "-";
     const std::string row = words_of(function) + ": " + by + "##" + std::to_string(n);
     if (ImGui::Selectable(row.c_str(), assign_.listens() == function)) assign_.listen(function);
     if (ImGui::IsItemFocused()) row_ = words_of(function);
     if (ImGui::IsItemHovered())
-      ImGui::SetTooltip("%s: %s", words_of(function).c_str(), all.empty() ? "no button" : all.c_str());
+      ImGui::SetTooltip("%s: %s", words_of(function).c_str(), all.empty() ? tr("no button") : all.c_str());
   }
-  if (ImGui::Button("all as usual", {-1, 0})) {
+  if (ImGui::Button(tr("all as usual"), {-1, 0})) {
     person_.buttons = HandButtons::usual();
-    said_ = "pedals, buttons and keys are as usual";
+    said_ = tr("pedals, buttons and keys are as usual");
     assign_.cancel();
   }
 }

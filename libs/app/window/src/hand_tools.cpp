@@ -7,6 +7,7 @@
 #include "keys.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/geometry/grid/brick_places.h"
 #include "osteo/simulation/bone/plates.h"
 
@@ -73,20 +74,21 @@ void HandTools::plan(std::vector<PlannedCut> cuts, std::filesystem::path file) {
 void HandTools::choose_planned(std::size_t cut) {
   cut_ = planned_[cut].cut;
   within_mm_ = planned_[cut].within_mm;
-  note_ = "saw at the planned cut '" + planned_[cut].name + "'";
+  note_ = filled(tr("saw at the planned cut '{name}'"), {{"name", planned_[cut].name}});
 }
 
 void HandTools::keep_planned(const std::string& name) {
   try {
-    if (name.empty()) throw Error(ExitCode::usage, "a planned cut needs a name");
+    if (name.empty()) throw Error(ExitCode::usage, tr("a planned cut needs a name"));
     auto cuts = std::filesystem::exists(planned_file_) ? load_planned_cuts(planned_file_) : std::vector<PlannedCut>{};
     for (const PlannedCut& c : cuts) {
-      if (c.name == name) throw Error(ExitCode::usage, "there is a planned cut '" + name + "' already");
+      if (c.name == name)
+        throw Error(ExitCode::usage, filled(tr("there is a planned cut '{name}' already"), {{"name", name}}));
     }
     cuts.push_back({name, cut_, within_mm_});
     write_file(planned_file_, planned_cuts_json(cuts));
     planned_ = std::move(cuts);
-    note_ = "kept as '" + name + "' in " + planned_file_.string();
+    note_ = filled(tr("kept as '{name}' in {file}"), {{"name", name}, {"file", planned_file_.string()}});
   } catch (const Error& e) {
     note_ = e.what();
   }
@@ -96,8 +98,8 @@ void HandTools::take_saw(Rehearsal& rehearsal) {
   tool_ = Tool::drill;
   saw_in_hand_ = true;
   rehearsal.act(SceneAction::cutting_guide(guide()));
-  note_ = "saw in the hand, held in its plane: " + key_name(Command::bring) + " brings it, " + key_name(Command::saw) +
-          " puts it away";
+  note_ = filled(tr("saw in the hand, held in its plane: {bring} brings it, {saw} puts it away"),
+                 {{"bring", key_name(Command::bring)}, {"saw", key_name(Command::saw)}});
 }
 
 void HandTools::loosen_saw(bool loose, Rehearsal& rehearsal) {
@@ -182,12 +184,12 @@ void HandTools::attach(Rehearsal& rehearsal) {
   rehearsal.look(
       [&](const World& world, SceneReaders&) { under = bodies_under(world, plate_library()[plate_], pose); });
   if (under.empty()) {
-    note_ = "no bone within 2 mm below the plate";
+    note_ = tr("no bone within 2 mm below the plate");
     return;
   }
   rehearsal.act(SceneAction::attach(static_cast<std::uint32_t>(plate_), pose, under[0],
                                     under.size() > 1 ? under[1] : SceneAction::kNobody));
-  note_ = under.size() > 1 ? "fixed to two fragments" : "fixed to one fragment";
+  note_ = under.size() > 1 ? tr("fixed to two fragments") : tr("fixed to one fragment");
   tool_ = Tool::drill;
 }
 
@@ -229,12 +231,14 @@ std::string HandTools::how() const {
     case Tool::drill:
       break;
     case Tool::saw:
-      return "saw: drag moves it, " + key_name(Command::perform) + " cuts, " + key_name(Command::put_away) +
-             " puts it away";
+      return filled(tr("saw: drag moves it, {perform} cuts, {away} puts it away"),
+                    {{"perform", key_name(Command::perform)}, {"away", key_name(Command::put_away)}});
     case Tool::piece:
-      return "fragments: " + key_name(Command::perform) + " separates them, drag moves one";
+      return filled(tr("fragments: {perform} separates them, drag moves one"),
+                    {{"perform", key_name(Command::perform)}});
     case Tool::plate:
-      return "plate: a click on bone brings it there, " + key_name(Command::perform) + " fixes it";
+      return filled(tr("plate: a click on bone brings it there, {perform} fixes it"),
+                    {{"perform", key_name(Command::perform)}});
   }
   return {};
 }

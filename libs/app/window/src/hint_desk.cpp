@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/translate.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -23,6 +24,14 @@ std::vector<std::string> names_in(const std::string& off) {
 bool is_off(const std::string& off, const std::string& id) {
   const auto names = names_in(off);
   return std::find(names.begin(), names.end(), id) != names.end();
+}
+
+// What is noted is the rule's own; what is shown is in the language.
+std::string shown_hint(const Hint& hint) {
+  for (const HintRule& r : usual_hints()) {
+    if (r.id == hint.id) return filled(tr(r.words), {{"structure", tr(hint.structure)}});
+  }
+  return hint.words;
 }
 
 }  // namespace
@@ -84,7 +93,7 @@ void HintController::frame(Vec3 eye_mm, double now_s) {
   if (!reader_ || rehearsal_ == nullptr) return;
   reader_->look_from(eye_mm);
   if (const auto hint = reader_->take()) {
-    words_ = hint->words;
+    words_ = shown_hint(*hint);
     until_s_ = now_s + kShownS;
     rehearsal_->note("hint", hint_note(*hint));
   }
@@ -104,13 +113,13 @@ void HintController::draw(const ScreenBox& view) const {
 }
 
 void HintController::panel() {
-  if (!ImGui::CollapsingHeader("Hints while one drills")) return;
+  if (!ImGui::CollapsingHeader(tr("Hints while one drills"))) return;
   bool all = on();
-  if (ImGui::Checkbox("hints (Ctrl-H)", &all)) turn(all);
+  if (ImGui::Checkbox(tr("hints (Ctrl-H)"), &all)) turn(all);
   for (const HintRule& r : usual_hints()) {
     bool one = !is_off(person_.values.hints_off, r.id);
-    if (!ImGui::Checkbox(r.id.c_str(), &one)) {
-      if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", r.words.c_str());
+    if (!ImGui::Checkbox((tr(r.id) + "##" + r.id).c_str(), &one)) {
+      if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", tr(r.words).c_str());
       continue;
     }
     person_.values.hints_off = with_hint(person_.values.hints_off, r.id, one);

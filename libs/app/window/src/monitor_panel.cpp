@@ -6,6 +6,7 @@
 
 #include "monitor_screen.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/translate.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -36,10 +37,10 @@ ScreenBox lane_head(MonitorScreen& screen, std::size_t channel, const std::strin
   ImGui::PushID(static_cast<int>(channel));
   ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, ImVec2(e * 0.25F, 0));
   if (ImGui::SmallButton("-")) screen.change_gain(channel, 1);
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("smaller in the picture");
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip(tr("smaller in the picture"));
   ImGui::SameLine(0, e * 0.2F);
   if (ImGui::SmallButton("+")) screen.change_gain(channel, -1);
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("larger in the picture");
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip(tr("larger in the picture"));
   ImGui::PopStyleVar();
   ImGui::PopID();
   const ImVec2 at = ImGui::GetItemRectMax();
@@ -154,24 +155,25 @@ void MonitorPanel::draw_stimulator(MonitorController& controller) {
       ImGui::SliderFloat("##ma", &ma, static_cast<float>(StimulatorSetting::kMinMa),
                          static_cast<float>(StimulatorSetting::kMaxMa), "%.2f mA", ImGuiSliderFlags_Logarithmic);
   wanted_.current_ma = static_cast<double>(ma);
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("current of the stimulator: the tip of the tool is its electrode");
-  const char* const turn = on ? "stimulator on" : "stimulator off";
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip(tr("current of the stimulator: the tip of the tool is its electrode"));
+  const char* const turn = on ? tr("stimulator on") : tr("stimulator off");
   beside(button_wide(turn));
   if (on) ImGui::PushStyleColor(ImGuiCol_Button, im_colour(palette::kBlue));
   const bool turned = ImGui::Button(turn);
   if (on) ImGui::PopStyleColor();
-  const char* const look = now.search ? "looking ..." : "find threshold";
+  const char* const look = now.search ? tr("looking ...") : tr("find threshold");
   beside(button_wide(look));
   const bool search = ImGui::Button(look);
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("twice, half and between, three pulses each, while the tip touches");
+  if (ImGui::IsItemHovered())
+    ImGui::SetTooltip(tr("twice, half and between, three pulses each, while the tip touches"));
   if (controller.hands() > 1) {
-    beside(box_wide("second hand"));
+    beside(box_wide(tr("second hand")));
     bool second = wanted_.hand == 1;
-    if (ImGui::Checkbox("second hand", &second)) wanted_.hand = second ? 1 : 0;
+    if (ImGui::Checkbox(tr("second hand"), &second)) wanted_.hand = second ? 1 : 0;
   }
   if (const auto found = controller.screen().threshold_ma()) {
     beside(10 * em());
-    ImGui::Text("threshold %.2f mA", *found);
+    ImGui::TextUnformatted(filled(tr("threshold {ma} mA"), {{"ma", shown_number(*found, 2)}}).c_str());
   }
   if (search) {
     find_threshold(controller);
@@ -209,21 +211,21 @@ void MonitorPanel::draw_switches(MonitorController& controller) {
   ImGui::Dummy({e * 1.2F, 1});
   ImGui::SameLine();
   ImGui::PushStyleColor(ImGuiCol_Text, im_colour(alarm ? ink_of(palette::kVermillion) : theme().quiet));
-  ImGui::TextUnformatted(alarm ? "activity" : "quiet");
+  ImGui::TextUnformatted(alarm ? tr("activity") : tr("quiet"));
   ImGui::PopStyleColor();
   ImGui::SameLine(8 * e);
-  ImGui::TextDisabled("nerve monitor, for practice");
-  if (ImGui::RadioButton("free run", !answers_)) answers_ = false;
-  beside(box_wide("by stimulus"));
-  if (ImGui::RadioButton("by stimulus", answers_)) answers_ = true;
-  beside(box_wide("freeze"));
-  if (ImGui::Checkbox("freeze", &frozen)) screen.freeze(frozen);
-  const char* const mute = own_window_ ? "mute (M)" : "mute (Ctrl-M)";
+  ImGui::TextDisabled(tr("nerve monitor, for practice"));
+  if (ImGui::RadioButton(tr("free run"), !answers_)) answers_ = false;
+  beside(box_wide(tr("by stimulus")));
+  if (ImGui::RadioButton(tr("by stimulus"), answers_)) answers_ = true;
+  beside(box_wide(tr("freeze")));
+  if (ImGui::Checkbox(tr("freeze"), &frozen)) screen.freeze(frozen);
+  const char* const mute = own_window_ ? tr("mute (M)") : tr("mute (Ctrl-M)");
   beside(box_wide(mute));
   if (ImGui::Checkbox(mute, &muted)) controller.sound().mute(muted);
   if (!own_window_) {
-    beside(button_wide("hide (Ctrl-N)"));
-    if (ImGui::SmallButton("hide (Ctrl-N)")) shown_ = false;
+    beside(button_wide(tr("hide (Ctrl-N)")));
+    if (ImGui::SmallButton(tr("hide (Ctrl-N)"))) shown_ = false;
   }
   if (controller.stimulates()) draw_stimulator(controller);
   if (!controller.invitation().empty()) ImGui::TextWrapped("%s", controller.invitation().c_str());
@@ -241,7 +243,8 @@ void MonitorPanel::draw(MonitorController& controller) {
   begin_fixed("monitor", box_, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
   if (controller.wiring().channels.empty()) {
     ImGui::TextWrapped(
-        "The case lists none of the nerves that the monitor knows: prepare it with --structures and --names.");
+        "%s",
+        tr("The case lists none of the nerves that the monitor knows: prepare it with --structures and --names."));
     ImGui::End();
     return;
   }
@@ -250,7 +253,7 @@ void MonitorPanel::draw(MonitorController& controller) {
     const std::vector<MonitorScreen::Line> lines = controller.screen().log();
     for (auto line = lines.rbegin(); line != lines.rend(); ++line) {
       if (line->alarm) ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kVermillion)));
-      ImGui::TextWrapped("%.2f s  %s", line->at_s, line->words.c_str());
+      ImGui::TextWrapped("%s s  %s", shown_number(line->at_s, 2).c_str(), line->words.c_str());
       if (line->alarm) ImGui::PopStyleColor();
     }
     ImGui::EndChild();

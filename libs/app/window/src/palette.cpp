@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/core/base/translate.h"
+
 namespace osteo::inline app {
 namespace {
 
@@ -50,13 +52,13 @@ Colour ink_of(Colour status) {
 }
 
 const NearnessLook& look_of(Nearness nearness) {
-  static constexpr NearnessLook kFar[] = {{kThemes[0].quiet, "clear", 0},
-                                          {kThemes[1].quiet, "clear", 0},
-                                          {kThemes[2].quiet, "clear", 0}},
+  static constexpr NearnessLook kFar[] = {{kThemes[0].quiet, tr_later("clear"), 0},
+                                          {kThemes[1].quiet, tr_later("clear"), 0},
+                                          {kThemes[2].quiet, tr_later("clear"), 0}},
                                 kUnknown[] = {
                                     {kThemes[0].quiet, "", 0}, {kThemes[1].quiet, "", 0}, {kThemes[2].quiet, "", 0}};
-  static constexpr NearnessLook kNear{palette::kYellow, "near", 3}, kClose{palette::kOrange, "close", 4},
-      kTouched{palette::kVermillion, "contact", 8};
+  static constexpr NearnessLook kNear{palette::kYellow, tr_later("near"), 3},
+      kClose{palette::kOrange, tr_later("close"), 4}, kTouched{palette::kVermillion, tr_later("contact"), 8};
   switch (nearness) {
     case Nearness::near:
       return kNear;

@@ -6,6 +6,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 namespace {
@@ -63,6 +64,12 @@ PersonSettings::PersonSettings(std::filesystem::path file) : file_(std::move(fil
         if (m.key == "theme" && values.theme != "dark" && values.theme != "light" && values.theme != "high_contrast") {
           values.theme = PersonValues{}.theme;
           throw json.wrong(m.value, "'theme' is dark, light or high_contrast");
+        }
+        constexpr auto kLanguages = enum_names(Language{});
+        if (m.key == "language" && values.language != "auto" &&
+            std::find(kLanguages.begin(), kLanguages.end(), values.language) == kLanguages.end()) {
+          values.language = PersonValues{}.language;
+          throw json.wrong(m.value, "'language' is auto, en, de, es, fr or zh_CN");
         }
         if (const double n = values.motion_one_to; n != 1 && n != 2 && n != 4 && n != 8) {
           values.motion_one_to = PersonValues{}.motion_one_to;

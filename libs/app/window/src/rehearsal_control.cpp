@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <new>
 #include <numbers>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/geometry/grid/brick_places.h"
 #include "osteo/simulation/haptics/device.h"
 
@@ -70,11 +70,11 @@ bool RehearsalControl::begin(bool from_case, bool save_first) {
 }
 
 void RehearsalControl::save() {
-  if (begin(false, true)) say("saved; a new session goes on from here");
+  if (begin(false, true)) say(tr("saved; a new session goes on from here"));
 }
 
 void RehearsalControl::reset() {
-  if (begin(true, true)) say("bone reset; the session before was saved");
+  if (begin(true, true)) say(tr("bone reset; the session before was saved"));
 }
 
 bool RehearsalControl::end() {
@@ -198,13 +198,13 @@ void RehearsalControl::send_goal(double seconds) {
 
 void RehearsalControl::lead(std::optional<Vec3> seen_mm, Vec3 forward) {
   if (!rehearsal().device().lead({})) {
-    say("the drill is in your own hand", Message::Rank::hindrance);
+    say(tr("the drill is in your own hand"), Message::Rank::hindrance);
     return;
   }
   leading_ = Leading{Leading::Stage::letting_go, 0, {}, seen_mm, forward, {}};
   tools_.loosen_saw(true, rehearsal());
   // Pulled aside it would not get there.
-  if (lead_pause_.begin()) say("the drill finds its way: your hand is let go until it is there");
+  if (lead_pause_.begin()) say(tr("the drill finds its way: your hand is let go until it is there"));
   latched_ = false;
   wait_for_release_ = true;
 }
@@ -216,7 +216,7 @@ void RehearsalControl::lift() {
 void RehearsalControl::bring(Vec3 direction) {
   const std::optional<BoneHit> hit = bone_seen(direction);
   if (!hit) {
-    say("no bone under the mouse", Message::Rank::hindrance);
+    say(tr("no bone under the mouse"), Message::Rank::hindrance);
     return;
   }
   lead(hit->at_mm, direction);
@@ -230,8 +230,26 @@ std::optional<BoneHit> RehearsalControl::bone_seen(Vec3 direction) const {
   return hit;
 }
 
+enum class Brought { drill, saw, plate };
+// How what is in the hand has come to the bone: through free space or `put` there, so far off it.
+static std::string brought_text(Brought what, bool put, double gap_mm) {
+  const auto of = [&](const char* drill, const char* saw, const char* plate) {
+    return what == Brought::drill ? drill : what == Brought::saw ? saw : plate;
+  };
+  if (put)
+    return of(tr("the drill was shut in; it was taken out and set down there"),
+              tr("the saw was shut in; it was taken out and set down there"),
+              tr("the plate was shut in; it was taken out and set down there"));
+  if (gap_mm > 6)
+    return filled(
+        of(tr("the drill gets no nearer than {mm} mm this way"), tr("the saw gets no nearer than {mm} mm this way"),
+           tr("the plate gets no nearer than {mm} mm this way")),
+        {{"mm", shown_number(gap_mm, 0)}});
+  return of(tr("drill brought to the bone"), tr("saw brought to the bone"), tr("plate brought to the bone"));
+}
+
 // No way was free of critical structures.
-static constexpr const char* kPastStructures = "; past a critical structure, since no other path was free";
+static constexpr const char* kPastStructures = tr_later("; past a critical structure, since no other path was free");
 
 void RehearsalControl::go_on_leading() {
   constexpr double kBackMm = 0.3;
@@ -240,7 +258,7 @@ void RehearsalControl::go_on_leading() {
   Device& device = rehearsal().device();
   const Led led = device.led();
   if (led == Led::on_the_way) return;
-  const std::string drill = tools_.saw_in_hand() ? "saw" : "drill";
+  const bool saw = tools_.saw_in_hand();
   const auto go = [&](Leading::Stage stage, const HandWay& way, const HandPose& end) {
     leading_->stage = stage;
     goal_.position_mm = end.at_mm;
@@ -267,23 +285,23 @@ void RehearsalControl::go_on_leading() {
     if (leading_->seen_mm) {
       const FreeWays::Found a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
       const double gap = length(a.end.at_mm - *leading_->seen_mm) - burr().diameter_mm / 2;
-      const std::string what = plate_in_hand() ? "plate" : drill;
-      char far[80];
-      std::snprintf(far, sizeof far, "the %s gets no nearer than %.0f mm this way", what.c_str(), gap);
-      leading_->done = a.way.put ? "the " + what + " was shut in; it was taken out and set down there"
-                       : gap > 6 ? far
-                                 : what + " brought to the bone";
-      if (a.past_structures) leading_->done += kPastStructures;
+      leading_->done = brought_text(plate_in_hand() ? Brought::plate
+                                    : saw           ? Brought::saw
+                                                    : Brought::drill,
+                                    a.way.put, gap);
+      if (a.past_structures) leading_->done += tr(kPastStructures);
       go(Leading::Stage::on_the_way, a.way, a.end);
     } else {
       const HandPose to = waiting(ways);
       const FreeWays::Found out = ways.way(from, to);
-      leading_->done = out.way.put ? "the " + drill + " was shut in; it was taken out" : drill + " lifted out";
-      if (out.past_structures) leading_->done += kPastStructures;
+      leading_->done = out.way.put ? (saw ? tr("the saw was shut in; it was taken out")
+                                          : tr("the drill was shut in; it was taken out"))
+                                   : (saw ? tr("saw lifted out") : tr("drill lifted out"));
+      if (out.past_structures) leading_->done += tr(kPastStructures);
       go(Leading::Stage::on_the_way, out.way, to);
     }
   } else if (led == Led::blocked && leading_->stage == Leading::Stage::on_the_way) {
-    leading_->done = "the " + drill + " was stuck; it was taken out";
+    leading_->done = saw ? tr("the saw was stuck; it was taken out") : tr("the drill was stuck; it was taken out");
     const HandPose to = waiting(free_ways(true));
     HandWay way;
     way.put = true;
@@ -294,7 +312,7 @@ void RehearsalControl::go_on_leading() {
     if (leading_->seen_mm) motion_.meet();
     // Who took up the saw meanwhile has to know how it is used.
     const std::string how = leading_->seen_mm ? std::string() : tools_.how();
-    say((how.empty() ? leading_->done : how) + (lead_pause_.end() ? "; your hand is led again" : ""));
+    say((how.empty() ? leading_->done : how) + (lead_pause_.end() ? tr("; your hand is led again") : ""));
     leading_.reset();
     tools_.loosen_saw(false, rehearsal());
   }
@@ -302,7 +320,7 @@ void RehearsalControl::go_on_leading() {
 
 void RehearsalControl::take_burr(int tool) {
   if (leading_) {  // on a way that was found for the burr that it has
-    say("the drill is on its way: change the burr when it has arrived", Message::Rank::hindrance);
+    say(tr("the drill is on its way: change the burr when it has arrived"), Message::Rank::hindrance);
     return;
   }
   tool_ = tool;
@@ -327,9 +345,7 @@ void RehearsalControl::next_burr(int by) {
 
 void RehearsalControl::set_burr_share(int by) {
   burr_share = std::clamp(burr_share + 0.25 * by, 0.25, 1.0);
-  char text[64];
-  std::snprintf(text, sizeof text, "burr at most at %.0f %% of its speed", 100 * burr_share);
-  say(text);
+  say(filled(tr("burr at most at {share} % of its speed"), {{"share", shown_number(100 * burr_share, 0)}}));
 }
 
 // --- a frame
@@ -402,10 +418,10 @@ bool RehearsalControl::command(const Keyboard::Press& press, const std::optional
       return true;
     case Command::motion: {
       motion_.step(press.value);
-      say("motion of the hand 1:" + std::to_string(motion_.one_to) +
-          (motion_.one_to == 1 && motion_.parted()
-               ? "; " + key_name(Command::bring) + " brings the drill under the mouse again"
-               : ""));
+      say(filled(motion_.one_to == 1 && motion_.parted()
+                     ? tr("motion of the hand 1:{n}; {bring} brings the drill under the mouse again")
+                     : tr("motion of the hand 1:{n}"),
+                 {{"n", std::to_string(motion_.one_to)}, {"bring", key_name(Command::bring)}}));
       return true;
     }
     case Command::burr_speed:
@@ -477,7 +493,7 @@ void RehearsalControl::say(const std::string& text, Message::Rank rank) {
 }
 
 std::optional<Message> RehearsalControl::reported(std::vector<Message> causes) {
-  if (leading_) causes.push_back({Message::Rank::hindrance, "the drill is on its way, off"});
+  if (leading_) causes.push_back({Message::Rank::hindrance, tr("the drill is on its way, off")});
   messages_.causes(std::move(causes));
   return messages_.shown();
 }

@@ -1,6 +1,7 @@
 #include <vector>
 
 #include "gamepad.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/world_mesh.h"
 #include "rehearsal_parts.h"
 
@@ -154,9 +155,9 @@ void RehearsalWindow::command(Command command) {
   if (command == Command::screenshot) screenshot_wanted_ = true;
   if (command == Command::hints) {
     hints_.turn(!hints_.on());
-    control_.say(hints_.on() ? "hints are given" : "no hints");
+    control_.say(hints_.on() ? tr("hints are given") : tr("no hints"));
   }
-  if (command == Command::timeline) control_.say("the course of the session is shown when it is over (Q)");
+  if (command == Command::timeline) control_.say(tr("the course of the session is shown when it is over (Q)"));
   if (command == Command::sound) sound_.turn(!sound_.on());
   if (command == Command::lead) switch_lead();
   if (command == Command::monitor || command == Command::mute_monitor) monitor_command(command);
@@ -173,7 +174,7 @@ void RehearsalWindow::command(Command command) {
     if (regions_) {
       regions_->show(!regions_->shown());
     } else {
-      control_.say("no regions are planned: --procedure FILE names them");
+      control_.say(tr("no regions are planned: --procedure FILE names them"));
     }
   }
   if (command == Command::quit) end_session();
@@ -181,21 +182,21 @@ void RehearsalWindow::command(Command command) {
 
 // What the pull does is in the samples of who leads, and so recorded; that it was the person's wish is a note.
 void RehearsalWindow::switch_lead() {
-  if (!tutor_.leads || !actions_.lead) return control_.say("nobody leads your hand in this session");
-  if (control_.leading()) return control_.say("the drill is on its way: your hand is let go until it is there");
+  if (!tutor_.leads || !actions_.lead) return control_.say(tr("nobody leads your hand in this session"));
+  if (control_.leading()) return control_.say(tr("the drill is on its way: your hand is let go until it is there"));
   const bool on = !tutor_.guiding;
   actions_.lead(on);
   control_.rehearsal().note("lead", on ? R"({"on":true})" : R"({"on":false})");
-  control_.say(on ? "your hand is led" : "your hand is let go");
+  control_.say(on ? tr("your hand is led") : tr("your hand is let go"));
 }
 
 void RehearsalWindow::monitor_command(Command command) {
   MonitorController* const controller = monitor_controller();
-  if (controller == nullptr) return control_.say("there is no nerve monitor: begin with --monitor");
+  if (controller == nullptr) return control_.say(tr("there is no nerve monitor: begin with --monitor"));
   if (command == Command::monitor) monitor_.show(!monitor_.shown());
   if (command == Command::mute_monitor) {
     controller->sound().mute(!controller->sound().muted());
-    control_.say(controller->sound().muted() ? "the nerve monitor is muted" : "the nerve monitor is heard");
+    control_.say(controller->sound().muted() ? tr("the nerve monitor is muted") : tr("the nerve monitor is heard"));
   }
 }
 

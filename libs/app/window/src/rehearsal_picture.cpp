@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/offscreen.h"
 #include "osteo/imaging/io/surface_io.h"
@@ -242,7 +243,7 @@ void RehearsalWindow::save_screenshot() {
   } while (std::filesystem::exists(path));
   try {
     save_picture(picture, path);
-    control_.say("saved " + path.filename().string());
+    control_.say(filled(tr("saved {file}"), {{"file", path.filename().string()}}));
     room_.picture_kept();
   } catch (const Error& e) {
     control_.say(e.what());

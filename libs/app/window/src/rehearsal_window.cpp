@@ -5,6 +5,7 @@
 
 #include "osteo/app/window/start_page.h"
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/simulation/bone/world_mesh.h"
 #include "rehearsal_parts.h"
@@ -78,12 +79,12 @@ WindowEnd RehearsalWindow::run() {
 WindowActions RehearsalWindow::working(WindowActions actions) {
   actions.begin = [this, begin = actions.begin](bool from_case, const HandView& view) {
     HandGoal goal;
-    shell_.while_working(from_case ? "the bone is made ready" : "the session is made ready", {},
+    shell_.while_working(from_case ? tr("the bone is made ready") : tr("the session is made ready"), {},
                          [&](const Context&) { goal = begin(from_case, view); });
     return goal;
   };
   actions.save = [this, save = actions.save, rehearsal = actions.rehearsal] {
-    if (rehearsal() != nullptr) shell_.while_working("the session is saved", {}, [&](const Context&) { save(); });
+    if (rehearsal() != nullptr) shell_.while_working(tr("the session is saved"), {}, [&](const Context&) { save(); });
   };
   if (actions.tune) actions.tune = [this, tune = actions.tune](const HandTuning& t) { tune(controller_.tuned(t)); };
   return actions;
@@ -133,17 +134,18 @@ void RehearsalWindow::plan_and_looks(const Rehearsal& rehearsal) {
   if (std::exchange(has_plan_, true)) return;
   if (!planned_.empty()) {
     if (rehearsal.structures() == nullptr) {
-      control_.say("the case knows no structures: the procedure's regions are not shown");
+      control_.say(tr("the case knows no structures: the procedure's regions are not shown"));
     } else {
       regions_ = std::make_unique<RegionsView>(renderer_, *rehearsal.structures(), planned_);
       for (const std::string& name : regions_->missing())
-        control_.say("the case lacks the structure of region '" + name + "'");
+        control_.say(filled(tr("the case lacks the structure of region '{name}'"), {{"name", name}}));
     }
   }
   if (!actions_.notes_before) return;
   const Looks looks = looks_of(actions_.notes_before());
   if (looks.unreadable > 0)
-    control_.say(std::to_string(looks.unreadable) + " notes of the session before could not be read");
+    control_.say(
+        filled(tr("{n} notes of the session before could not be read"), {{"n", std::to_string(looks.unreadable)}}));
   if (structures_) {
     for (std::size_t s = 0; s < structures_->all().size(); ++s) {
       if (const auto look = looks.structures.find(structures_->all()[s].value); look != looks.structures.end())
@@ -214,12 +216,12 @@ void RehearsalWindow::show_before(bool on) {
   if (!on || before_view_) return;
   if (!actions_.world_at_begin) {
     room_.set_before(false);
-    control_.say("how the bone was is not known");
+    control_.say(tr("how the bone was is not known"));
     return;
   }
   try {
     TriMesh mesh;
-    shell_.while_working("rebuilding the bone at the start", {},
+    shell_.while_working(tr("rebuilding the bone at the start"), {},
                          [&](const Context& context) { mesh = surface_of(actions_.world_at_begin(context), context); });
     before_view_ = std::make_unique<BeforeView>(render_window_, mesh);
   } catch (const Error& e) {
@@ -265,7 +267,7 @@ void RehearsalWindow::begin_again(bool from_case) {
   ImGui::EndFrame();
   const bool begun = control_.begin(from_case, false);
   ended_.reset();  // failure() speaks for itself
-  if (begun) control_.say(from_case ? "bone reset" : "a new session continues from what was recorded");
+  if (begun) control_.say(from_case ? tr("bone reset") : tr("a new session continues from what was recorded"));
   shell_.new_frame();
 }
 
@@ -274,15 +276,15 @@ void RehearsalWindow::report_failure() {
   const float wide = std::min(static_cast<float>(width_), 30 * ImGui::GetFontSize());
   ImGui::SetNextWindowPos({(static_cast<float>(width_) - wide) / 2, static_cast<float>(height_) / 3});
   ImGui::SetNextWindowSize({wide, 0});
-  ImGui::Begin("No session runs", nullptr,
+  ImGui::Begin(tr("No session runs"), nullptr,
                ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
   ImGui::TextWrapped("%s", control_.failure()->what());
   if (!control_.failure()->advice().empty()) ImGui::TextWrapped("%s", control_.failure()->advice().c_str());
   ImGui::Separator();
   if (const auto folder = actions_.folder(); !folder.empty()) ImGui::TextWrapped("%s", kept_text(folder).c_str());
-  bool go_on = ImGui::Button("Go on from there (F5)", {-1, 0});
-  bool anew = ImGui::Button("Begin again from the case (R)", {-1, 0});
-  if (ImGui::Button("Close (Q)", {-1, 0})) quit_ = true;
+  bool go_on = ImGui::Button(tr("Go on from there (F5)"), {-1, 0});
+  bool anew = ImGui::Button(tr("Begin again from the case (R)"), {-1, 0});
+  if (ImGui::Button(tr("Close (Q)"), {-1, 0})) quit_ = true;
   ImGui::End();
   for (const Keyboard::Press& press : keyboard_.frame(ImGui::GetIO().WantTextInput)) {
     go_on = go_on || press.command == Command::save;

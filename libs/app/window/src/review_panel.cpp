@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "osteo/core/base/translate.h"
 #include "state_facts.h"
 #include "ui_kit.h"
 #include "ui_style.h"
@@ -74,7 +75,7 @@ bool finding_card(const ReviewFinding& f, const char* id, unsigned picture, bool
     draw->AddCircle(middle, 16 * u, IM_COL32_WHITE, 32, 2 * u);
   } else {
     draw->AddRectFilled(shot, shot_end, im_colour32(t.ground), kRound * u);
-    const char* const none = f.at_mm ? "\u2026" : "no place";
+    const char* const none = f.at_mm ? "\u2026" : tr("no place");
     const ImVec2 size = ImGui::CalcTextSize(none);
     draw->AddText({(shot.x + shot_end.x - size.x) / 2, (shot.y + shot_end.y - size.y) / 2}, im_colour32(t.quiet), none);
   }
@@ -101,12 +102,12 @@ void draw_findings(ReviewControl& control, std::span<const unsigned> pictures) {
     case ReviewControl::State::none:
       return;
     case ReviewControl::State::making:
-      ImGui::TextDisabled("The session is looked through");
+      ImGui::TextDisabled(tr("The session is looked through"));
       ImGui::ProgressBar(static_cast<float>(control.progress()), {-1, 0}, "");
       return;
     case ReviewControl::State::failed:
       ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
-      ImGui::TextWrapped("! There are no findings: %s", control.failure().c_str());
+      ImGui::TextWrapped("! %s", filled(tr("There are no findings: {why}"), {{"why", control.failure()}}).c_str());
       ImGui::PopStyleColor();
       return;
     case ReviewControl::State::ready:
@@ -114,7 +115,7 @@ void draw_findings(ReviewControl& control, std::span<const unsigned> pictures) {
   }
   const SessionReview& r = control.review();
   if (!serious(r.findings)) {
-    ImGui::TextWrapped("Nothing serious was found.");
+    ImGui::TextWrapped("%s", tr("Nothing serious was found."));
     for (const std::string& s : r.summary) ImGui::TextWrapped("%s", s.c_str());
     for (const std::string& w : r.words) {
       ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
@@ -168,9 +169,12 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   begin_fixed("course", box, ImGuiWindowFlags_NoScrollbar);
   const ReviewCourse& course = control.review().course;
   const float e = em();
-  if (ImGui::Button(control.playing() ? "pause (Space)" : "play (Space)", {8 * e, 0})) control.play(!control.playing());
+  if (ImGui::Button(control.playing() ? tr("pause (Space)") : tr("play (Space)"), {10 * e, 0}))
+    control.play(!control.playing());
   ImGui::SameLine();
-  ImGui::Text("%s of %s", clock_text(control.now_s()).c_str(), clock_text(control.review().player->end_s()).c_str());
+  ImGui::TextUnformatted(filled(tr("{n} of {all}"), {{"n", clock_text(control.now_s())},
+                                                     {"all", clock_text(control.review().player->end_s())}})
+                             .c_str());
   ImGui::SameLine();
   if (ImGui::SmallButton("-")) control.change_speed(-1);
   ImGui::SameLine();
@@ -178,18 +182,18 @@ void draw_course(const ScreenBox& box, ReviewControl& control) {
   ImGui::SameLine();
   if (ImGui::SmallButton("+")) control.change_speed(1);
   ImGui::SameLine();
-  ImGui::Checkbox("surgeon's view", &control.surgeons_view);
+  ImGui::Checkbox(tr("surgeon's view"), &control.surgeons_view);
 
   const ImVec2 at = ImGui::GetCursorScreenPos(), room = ImGui::GetContentRegionAvail();
-  const float names = 6 * e, left = at.x + names, wide = std::max(1.0F, room.x - names), high = std::max(1.0F, room.y);
+  const float names = 9 * e, left = at.x + names, wide = std::max(1.0F, room.x - names), high = std::max(1.0F, room.y);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const double end_s = std::max(control.review().player->end_s(), 1e-3);
   const auto x_of = [&](double t_s) { return left + wide * static_cast<float>(std::clamp(t_s / end_s, 0.0, 1.0)); };
   const float lane = high / 3;
   const float full_n = of_pixel(course.force_n, 0, course.size(), true) > 2 ? 8.0F : 2.0F;
-  const Lane lanes[] = {{full_n > 2 ? "force, to 8 N" : "force, to 2 N", at.y, lane, full_n},
-                        {"near, from 5 mm", at.y + lane, lane, 5},
-                        {"bone: seen, unseen", at.y + 2 * lane, lane, 0}};
+  const Lane lanes[] = {{full_n > 2 ? tr("force, to 8 N") : tr("force, to 2 N"), at.y, lane, full_n},
+                        {tr("near, from 5 mm"), at.y + lane, lane, 5},
+                        {tr("bone: seen, unseen"), at.y + 2 * lane, lane, 0}};
   for (const Lane& l : lanes) {
     draw->AddRectFilled({left, l.top + 1}, {left + wide, l.top + l.height - 1}, im_colour32(theme().raised));
     fitted_text(draw, {at.x, l.top, names - 0.5F * e, l.height}, kLabelEm * e, theme().quiet, l.name);

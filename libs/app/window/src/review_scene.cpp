@@ -14,6 +14,7 @@
 
 #include <algorithm>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/simulation/camera/microscope.h"
 #include "palette.h"
 #include "ui_kit.h"
@@ -54,7 +55,7 @@ void ReviewScene::draw_findings() {
 
 void ReviewScene::draw_switch() {
   bool shown = control_.shown();
-  if (control_.state() == ReviewControl::State::ready && kit_switch("Course of the session (Ctrl-T)", shown))
+  if (control_.state() == ReviewControl::State::ready && kit_switch(tr("Course of the session (Ctrl-T)"), shown))
     control_.show(shown);
 }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/posture.h"
 #include "settings_panel.h"
 #include "sound_panel.h"
@@ -26,6 +27,7 @@ Layout layout_named(const std::string& name) {
 
 MainView::MainView(WindowShell& shell, PersonSettings& person)
     : shell_(shell), person_(person), wanted_(layout_named(person.values.layout)) {
+  use_language(language_named(person.values.language));
   take_theme(person.values.theme);
   lay_out(false, 0);
 }
@@ -129,11 +131,11 @@ void MainView::move_focus(int by) {
 void MainView::lay_patient(Posture posture, RehearsalControl& control) {
   bool dust = false;
   control.rehearsal().look([&](const World&, SceneReaders& readers) { dust = readers.dust != nullptr; });
-  if (!dust) return control.say("no dust and no water here: start with --dust", Message::Rank::hindrance);
+  if (!dust) return control.say(tr("no dust and no water here: start with --dust"), Message::Rank::hindrance);
   control.rehearsal().act(SceneAction::posture(down_of(posture, 0)));
   std::string name(EnumNames<Posture>::values[static_cast<std::size_t>(posture)]);
   std::replace(name.begin(), name.end(), '_', ' ');
-  control.say("patient position: " + name);
+  control.say(filled(tr("patient position: {position}"), {{"position", tr(name)}}));
 }
 
 void MainView::choose_theme(ThemeName name) {
@@ -156,7 +158,7 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       return true;
     case Command::irrigation:
       if (control.rehearsal().hands() < 2) {
-        control.say("no second hand: start with --dust", Message::Rank::hindrance);
+        control.say(tr("no second hand: start with --dust"), Message::Rank::hindrance);
       } else {
         latched_.irrigation = !latched_.irrigation;
       }
@@ -174,7 +176,7 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       wanted_ = next_layout(wanted_);
       person_.values.layout = EnumNames<Layout>::values[static_cast<std::size_t>(wanted_)];
       if (lay_out(false, 0).why.empty()) {
-        control.say("layout: " + person_.values.layout);
+        control.say(filled(tr("layout: {name}"), {{"name", tr(person_.values.layout)}}));
       } else {
         control.say(layout_.why);
       }
@@ -187,14 +189,14 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
     case Command::panel_keys:
       focus_ = Focus::panel;
       hand_page_ = c == Command::hand_page;
-      control.say("keys move in the panel: arrows, Space; Esc gives them back");
+      control.say(tr("keys move in the panel: arrows, Space; Esc gives them back"));
       return true;
     case Command::wheel:
       show_wheel();
       return true;
     case Command::ruler:
       ruler_.turn(!ruler_.on());
-      control.say(ruler_.on() ? "ruler: click two points on the bone" : "ruler put away");
+      control.say(ruler_.on() ? tr("ruler: click two points on the bone") : tr("ruler put away"));
       return true;
     case Command::mark:
       // Where the mouse is; a button in the panel: where the burr is.
@@ -227,14 +229,12 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
 bool MainView::click(std::optional<Vec3> bone, RehearsalControl& control) {
   if (!ruler_.on()) return false;
   if (!bone) {
-    control.say("no bone under the mouse", Message::Rank::hindrance);
+    control.say(tr("no bone under the mouse"), Message::Rank::hindrance);
     return true;
   }
   if (const auto note = ruler_.click(*bone)) {
     control.rehearsal().note("ruler", *note);
-    char text[48];
-    std::snprintf(text, sizeof text, "%.1f mm", *ruler_.length_mm());
-    control.say(text);
+    control.say(shown_number(*ruler_.length_mm(), 1) + " mm");
   }
   return true;
 }
@@ -275,7 +275,7 @@ void MainView::see(const RoomScene& scene) {
   times_undone_ = undone;
   if (facts.undone) {
     undone_ = false;
-    scene.control.say("taken back");
+    scene.control.say(tr("taken back"));
   }
   undo_steps_ = facts.undo_steps;
   // Led away and there, not only asked for.
@@ -325,9 +325,9 @@ void MainView::draw(const RoomScene& scene) {
   give_focus();
   if (asking_) {
     // As if it were a key, at the next frame: what the answer begins shows pictures of its own.
-    const int said =
-        draw_question(shell_.width(), shell_.height(), "Reset bone?",
-                      "This session is saved and ends. A new one begins with the bone of the case.", "Reset bone");
+    const int said = draw_question(shell_.width(), shell_.height(), tr("Reset bone?"),
+                                   tr("This session is saved and ends. A new one begins with the bone of the case."),
+                                   tr("Reset bone"));
     if (said != 0) pressed_.press(said > 0 ? Command::perform : Command::put_away);
   }
 }
@@ -340,9 +340,12 @@ void MainView::draw_palette(RehearsalControl& control) {
     if (control.rehearsal().hands() > 1)
       latched_.suction = !latched_.suction;
     else
-      control.say("no second hand: start with --dust", Message::Rank::hindrance);
+      control.say(tr("no second hand: start with --dust"), Message::Rank::hindrance);
   } else if (!row->command || row->held) {
-    control.say(row->keys.empty() ? row->name : row->name + ": " + row->keys + (row->held ? ", held" : ""));
+    const std::string name = shown_name(*row), keys = shown_keys(*row);
+    control.say(keys.empty() ? name
+                             : filled(row->held ? tr("{command}: {keys}, held") : tr("{command}: {keys}"),
+                                      {{"command", name}, {"keys", keys}}));
   } else {
     pressed_.presses.push_back({*row->command, row->value, row->shift});
   }
@@ -372,17 +375,17 @@ void MainView::session_ended() {
 void MainView::draw_cards(const RoomScene& scene, const HandFacts& hand) {
   const ScreenBox& view = layout_.view;
   const float taken = layout_.over[0].empty() ? 0 : view.right() - layout_.over[0].x;
-  static constexpr const char* kTitles[] = {"Drill", "Saw", "Fragments", "Plate"};
+  const char* const titles[] = {tr("Drill"), tr("Saw"), tr("Fragments"), tr("Plate")};
   float below = 0;
   if (hand.tool == 0 && !hand.saw) {
     below = draw_burr_card(view, view.width - taken, hand, burr_unfolded_, pressed_).bottom();
   } else {
-    below = draw_tool_card(view, "instrument", hand.saw ? "Saw in the hand" : kTitles[hand.tool], scene.draw_tools);
+    below = draw_tool_card(view, "instrument", hand.saw ? tr("Saw in the hand") : titles[hand.tool], scene.draw_tools);
   }
   RehearsalControl& control = scene.control;
   const bool water = latched_.suction || latched_.irrigation || control.second().holds() > 0;
   if (const float left = view.bottom() - below; hand.second_hand && water && left > 320 * unit()) {
-    draw_tool_card({view.x, below - 8 * unit(), view.width, left}, "second hand", "Second hand", [&] {
+    draw_tool_card({view.x, below - 8 * unit(), view.width, left}, "second hand", tr("Second hand"), [&] {
       draw_second_hand(control.rehearsal(), control.second(), [&](const std::string& said) { control.say(said); });
     });
   }
@@ -408,28 +411,34 @@ void MainView::draw_panel(const RoomScene& scene) {
   ImGui::Separator();
   scene.draw_plates();
   draw_sound(scene.sound);
-  ImGui::TextDisabled("Colours");
-  static const std::string kThemes[] = {"Dark", "Light", "High contrast"};
-  if (const int chosen = choice("theme", kThemes, static_cast<int>(theme_name()), kSmallControl); chosen >= 0)
+  ImGui::TextDisabled("%s", tr("Colours"));
+  const std::string themes[] = {tr("Dark"), tr("Light"), tr("High contrast")};
+  if (const int chosen = choice("theme", themes, static_cast<int>(theme_name()), kSmallControl); chosen >= 0)
     choose_theme(static_cast<ThemeName>(chosen));
+  draw_language(person_.values.language);
   if (scene.draw_hand) scene.draw_hand(std::exchange(hand_page_, false));
   draw_settings(rehearsal);
   draw_posture(rehearsal);
   draw_tissue(rehearsal);
-  if (ImGui::CollapsingHeader("Case and machine")) {
+  if (ImGui::CollapsingHeader(tr("Case and machine"))) {
     draw_approval(scene.machine.approval, scene.machine.approval_ended);
     if (scene.machine.scan != nullptr) draw_scan(*scene.machine.scan);
-    ImGui::TextWrapped("hand: %s", scene.machine.device.c_str());
-    ImGui::TextWrapped("%s",
-                       rehearsal.realtime()
-                           ? "real-time priority: yes"
-                           : "real-time priority: NOT GRANTED. The force may stutter: allow rtprio in limits.conf.");
-    ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(scene.tick.work_us),
-                static_cast<double>(scene.tick.lateness_us));
-    ImGui::Text("%.2f of %.2f M triangles", scene.machine.drawn_millions, scene.machine.triangles_millions);
+    ImGui::TextWrapped("%s", filled(tr("hand: {device}"), {{"device", scene.machine.device}}).c_str());
+    ImGui::TextWrapped(
+        "%s", rehearsal.realtime()
+                  ? tr("real-time priority: yes")
+                  : tr("real-time priority: NOT GRANTED. The force may stutter: allow rtprio in limits.conf."));
+    ImGui::TextUnformatted(filled(tr("servo {work} us a tick, late {late} us"),
+                                  {{"work", shown_number(static_cast<double>(scene.tick.work_us), 0)},
+                                   {"late", shown_number(static_cast<double>(scene.tick.lateness_us), 0)}})
+                               .c_str());
+    ImGui::TextUnformatted(
+        filled(tr("{drawn} of {all} M triangles"), {{"drawn", shown_number(scene.machine.drawn_millions, 2)},
+                                                    {"all", shown_number(scene.machine.triangles_millions, 2)}})
+            .c_str());
     ImGui::TextWrapped("%s", scene.machine.pictures.c_str());
-    ImGui::Checkbox("first steps", &person_.values.first_steps);
-    ImGui::Checkbox("remember cases", &person_.values.remember_cases);
+    ImGui::Checkbox(tr("first steps"), &person_.values.first_steps);
+    ImGui::Checkbox(tr("remember cases"), &person_.values.remember_cases);
   }
   ImGui::EndChild();
   draw_apart(pressed_);
@@ -440,22 +449,22 @@ void MainView::draw_note_field(RehearsalControl& control) {
   const float e = em(), wide = std::min(layout_.view.width - e, 26 * e);
   ImGui::SetNextWindowPos({layout_.view.x + (layout_.view.width - wide) / 2, layout_.view.y + e});
   ImGui::SetNextWindowSize({wide, 0});
-  ImGui::Begin("Note (without names)", nullptr,
+  ImGui::Begin(tr("Note (without names)"), nullptr,
                ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
   if (write_focus_) ImGui::SetKeyboardFocusHere();
   write_focus_ = false;
   ImGui::SetNextItemWidth(-1);
   ImGui::InputText("##note", &note_text_);
-  ImGui::TextDisabled("Enter keeps it; empty: marks this moment; Esc: nothing");
+  ImGui::TextDisabled(tr("Enter keeps it; empty: marks this moment; Esc: nothing"));
   ImGui::End();
   const int answer = std::exchange(note_answer_, 0);
   if (answer > 0) {
     if (const auto note = notes_.pin(*writing_, note_text_)) {
       control.rehearsal().note("note", *note);
-      control.say("note " + std::to_string(notes_.all().back().number) + " is pinned");
+      control.say(filled(tr("note {n} is pinned"), {{"n", std::to_string(notes_.all().back().number)}}));
     } else {
       control.rehearsal().note("mark", "{}");
-      control.say("marked");
+      control.say(tr("marked"));
     }
   }
   if (answer != 0) writing_.reset();
@@ -492,11 +501,10 @@ void MainView::draw_marks(const RoomScene& scene) {
   }
   if (ends.size() == 2 && ruler_.length_mm()) {
     draw->AddLine({ends[0][0], ends[0][1]}, {ends[1][0], ends[1][1]}, im_colour32(palette::kSkyBlue), e / 8);
-    char text[48];
-    std::snprintf(text, sizeof text, "%.1f mm", *ruler_.length_mm());
+    const std::string text = shown_number(*ruler_.length_mm(), 1) + " mm";
     words((ends[0][0] + ends[1][0]) / 2 + e / 2, (ends[0][1] + ends[1][1]) / 2, text, palette::kSkyBlue);
   }
-  if (before_) words(v.x + e, v.y + e / 2, "AS IT WAS AT THE BEGINNING (W goes back)", palette::kYellow);
+  if (before_) words(v.x + e, v.y + e / 2, tr("AS IT WAS AT THE BEGINNING (W goes back)"), palette::kYellow);
   draw->PopClipRect();
 }
 
@@ -506,9 +514,13 @@ void MainView::draw_caption(const RoomScene& scene) {
   const ScreenBox& v = layout_.view;
   const double bar_mm = scale_bar_mm(scene.pixels_per_mm, static_cast<double>(v.width) / 4);
   const StateFacts state = state_of_tick(scene.tick, nullptr, scene.control.rehearsal().rate_hz());
-  char text[200];
-  std::snprintf(text, sizeof text, "case %s, %s, %s, %.4g mm", scene.machine.case_hash.substr(0, 8).c_str(),
-                state.tool.c_str(), state.time.c_str(), bar_mm);
+  char length[32];
+  std::snprintf(length, sizeof length, "%.4g", bar_mm);
+  const std::string text =
+      filled(tr("case {case}, {tool}, {time}, {mm} mm"), {{"case", scene.machine.case_hash.substr(0, 8)},
+                                                          {"tool", state.tool},
+                                                          {"time", state.time},
+                                                          {"mm", shown_figures(length)}});
   const float bar = static_cast<float>(bar_mm * scene.pixels_per_mm), y = v.bottom() - 2 * e;
   draw->AddRectFilled({v.x, y}, {v.right(), v.bottom()}, im_colour32(theme().ground, 0.85F));
   const float x = v.right() - bar - e;
@@ -565,7 +577,7 @@ EndChoice MainView::draw_end(const EndFacts& facts, const EndParts& parts) {
   const ImVec2 corner = ImGui::GetCursorScreenPos();
   const float wide = ImGui::GetContentRegionAvail().x;
   fitted_text(ImGui::GetWindowDrawList(), {corner.x, corner.y, wide, 32 * u}, kBoldEm * em(), theme().text,
-              facts.past ? "A session, looked at again" : "Session saved", false, true);
+              facts.past ? tr("A session, looked at again") : tr("Session saved"), false, true);
   ImGui::Dummy({0, 32 * u});
   ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
   ImGui::TextWrapped("%s", facts.summary.c_str());
@@ -577,7 +589,7 @@ EndChoice MainView::draw_end(const EndFacts& facts, const EndParts& parts) {
   }
   parts.findings();
   ImGui::Dummy({0, 4 * u});
-  ImGui::TextDisabled("Next");
+  ImGui::TextDisabled("%s", tr("Next"));
   EndChoice choice = EndChoice::none;
   const float half = std::floor((wide - ImGui::GetStyle().ItemSpacing.x) / 2);
   const auto button = [&](const char* words, EndChoice of, ButtonLook look, float width) {
@@ -585,24 +597,24 @@ EndChoice MainView::draw_end(const EndFacts& facts, const EndParts& parts) {
   };
   // What was found serious is tried again on a whole bone; else one goes on.
   if (facts.past) {
-    button("Another case (Home)", EndChoice::another, ButtonLook::main, wide);
-    button("Close (Q)", EndChoice::close, ButtonLook::usual, half);
+    button(tr("Another case (Home)"), EndChoice::another, ButtonLook::main, wide);
+    button(tr("Close (Q)"), EndChoice::close, ButtonLook::usual, half);
   } else {
     const bool again = parts.try_again;
-    button(again ? "Try it again: bone reset (R)" : "Continue from here (F5)",
+    button(again ? tr("Try it again: bone reset (R)") : tr("Continue from here (F5)"),
            again ? EndChoice::again : EndChoice::resume, ButtonLook::main, wide);
-    button(again ? "Continue (F5)" : "Reset bone (R)", again ? EndChoice::resume : EndChoice::again, ButtonLook::usual,
-           half);
+    button(again ? tr("Continue (F5)") : tr("Reset bone (R)"), again ? EndChoice::resume : EndChoice::again,
+           ButtonLook::usual, half);
     ImGui::SameLine();
-    button("Another case (Home)", EndChoice::another, ButtonLook::usual, half);
-    button("Close (Q)", EndChoice::close, ButtonLook::usual, half);
+    button(tr("Another case (Home)"), EndChoice::another, ButtonLook::usual, half);
+    button(tr("Close (Q)"), EndChoice::close, ButtonLook::usual, half);
   }
   parts.course();
-  if (ImGui::CollapsingHeader("All figures")) draw_figures(facts.lines);
-  if (ImGui::CollapsingHeader("All findings")) parts.all_findings();
-  if (ImGui::CollapsingHeader("Files")) {
+  if (ImGui::CollapsingHeader(tr("All figures"))) draw_figures(facts.lines);
+  if (ImGui::CollapsingHeader(tr("All findings"))) parts.all_findings();
+  if (ImGui::CollapsingHeader(tr("Files"))) {
     ImGui::TextWrapped("%s", facts.folder.string().c_str());
-    ImGui::TextWrapped("summary.json has the numbers, stream.oss every tick: osteo replay SESSION");
+    ImGui::TextWrapped("%s", tr("summary.json has the numbers, stream.oss every tick: osteo replay SESSION"));
   }
   ImGui::End();
   return choice;

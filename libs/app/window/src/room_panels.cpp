@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/burr_kind.h"
 #include "ui_kit.h"
 #include "ui_style.h"
@@ -16,8 +17,14 @@
 namespace osteo::inline app {
 namespace {
 
-std::string with_key(const char* word, Command command, std::optional<int> value = {}) {
-  return std::string(word) + " (" + key_name(command, value) + ")";
+// As a sentence begins; letters beyond ASCII stay as they are.
+std::string capital(std::string text) {
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  return text;
+}
+
+std::string with_key(const char* word, Command command) {
+  return std::string(word) + " (" + key_name(command) + ")";
 }
 
 // Name and key of a command.
@@ -50,17 +57,17 @@ void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f
     fitted_text(draw, {x, big, wide - 8 * u, row}, kBoldEm * em(), t.text, value, false, true);
     x += wide;
   };
-  figure("Force", f.force, 96 * u);
+  figure(tr("Force"), f.force, 96 * u);
   const float bar = 3 * u, force_x = box.x + 16 * u;
   draw->AddRectFilled({force_x, box.bottom() - 2 * bar}, {force_x + 80 * u, box.bottom() - bar}, im_colour32(t.raised));
   draw->AddRectFilled({force_x, box.bottom() - 2 * bar},
                       {force_x + 80 * u * static_cast<float>(f.force_share), box.bottom() - bar},
                       im_colour32(f.force_share < 1 ? t.text : palette::kVermillion));
-  figure("Burr, rpm", f.turning ? f.speed.substr(0, f.speed.find(' ')) : "0", 104 * u);
-  figure("Bone below", f.under, 112 * u);
+  figure(tr("Burr, rpm"), f.turning ? f.speed.substr(0, f.speed.find(' ')) : "0", 104 * u);
+  figure(tr("Bone below"), f.under, 112 * u);
 
   // From the right: the button, time and volume. What is left is the structure's and the message's.
-  const float end_wide = std::max(72 * u, button_width("End")), right = box.right() - 16 * u;
+  const float end_wide = std::max(72 * u, button_width(tr("End"))), right = box.right() - 16 * u;
   const float time_wide = 96 * u, time_x = right - end_wide - 16 * u - time_wide;
   const auto flush_right = [&](float y, float high, const std::string& words, Colour colour) {
     const std::string shown = shortened(words, time_wide, kLineEm * label);
@@ -70,7 +77,7 @@ void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f
   flush_right(box.y + 12 * u, 18 * u, f.time, t.text);
   flush_right(box.y + 34 * u, 18 * u, f.removed, t.quiet);
   ImGui::SetCursorScreenPos({right - end_wide, box.y + 12 * u});
-  if (kit_button("End", ButtonLook::usual, end_wide)) pressed.press(Command::quit);
+  if (kit_button(tr("End"), ButtonLook::usual, end_wide)) pressed.press(Command::quit);
 
   const float rest = time_x - 16 * u - x, chip_least = 176 * u;
   const bool inside = rest >= 264 * u + 24 * u + chip_least;
@@ -84,7 +91,7 @@ void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f
                         im_colour32(look.colour), kRound * u);
   const Colour ink = contact ? Colour{0, 0, 0} : t.text;
   const bool is_near = !f.distance.empty() && f.nearness != Nearness::far;
-  std::string words = is_near ? f.distance + " " + look.word : f.distance.empty() ? "" : f.distance;
+  std::string words = is_near ? f.distance + " " + tr(look.word) : f.distance;
   ImFont* const bold = bold_font();
   const float said = words.empty() ? 0 : bold->CalcTextSizeA(ImGui::GetFontSize(), FLT_MAX, 0, words.c_str()).x;
   const float name_wide = near.width - said - (words.empty() ? 0 : 34 * u);
@@ -139,27 +146,27 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& 
     const char* why = "";
   };
   const bool drill = hand.tool == 0 && !hand.saw;
-  const char* const no_second = "no second hand: start with --dust";
-  const Row rows[] = {
-      {"menu-2", "Menu and settings", Command::panel_keys, false, menu},
-      {"drill", "Drill", Command::put_away, drill, hand.latched, true, true},
-      {"saw", "Saw", Command::saw, hand.tool == 1 || hand.saw},
-      {"plate", "Plate", Command::plates, hand.tool == 3},
-      {"fragments", "Fragments", Command::pieces, hand.tool == 2},
-      {"suction", "Suction", Command::suck, false, hand.sucking, hand.second_hand, true, &latched.suction, no_second},
-      {"droplet", "Irrigation", Command::irrigation, false, hand.washing, hand.second_hand, false, &latched.irrigation,
-       no_second},
-      {"arrow-bar-to-down", "Approach", Command::bring, false, false, true, true},
-      {"arrow-bar-up", "Retract", Command::lift},
-      {"arrow-back-up", "Undo", Command::undo, false, false, hand.undo_steps > 0, false, nullptr,
-       "nothing to take back"},
-      {"versions", "Compare", Command::before, false, hand.before, true, true},
-      {"ruler-measure", "Ruler", Command::ruler, false, hand.ruler},
-      {"note", "Note", Command::mark},
-      {"camera", "Picture", Command::screenshot},
-      {"layout-grid", "Operate or plan", Command::layout},
-      {"command", "All commands", Command::palette, false, false, true, true},
-      {"help", "Ten keys", Command::help}};
+  const char* const no_second = tr("no second hand: start with --dust");
+  const Row rows[] = {{"menu-2", tr("Menu and settings"), Command::panel_keys, false, menu},
+                      {"drill", tr("Drill"), Command::put_away, drill, hand.latched, true, true},
+                      {"saw", tr("Saw"), Command::saw, hand.tool == 1 || hand.saw},
+                      {"plate", tr("Plate"), Command::plates, hand.tool == 3},
+                      {"fragments", tr("Fragments"), Command::pieces, hand.tool == 2},
+                      {"suction", tr("Suction"), Command::suck, false, hand.sucking, hand.second_hand, true,
+                       &latched.suction, no_second},
+                      {"droplet", tr("Irrigation"), Command::irrigation, false, hand.washing, hand.second_hand, false,
+                       &latched.irrigation, no_second},
+                      {"arrow-bar-to-down", tr("Approach"), Command::bring, false, false, true, true},
+                      {"arrow-bar-up", tr("Retract"), Command::lift},
+                      {"arrow-back-up", tr("Undo"), Command::undo, false, false, hand.undo_steps > 0, false, nullptr,
+                       tr("nothing to take back")},
+                      {"versions", tr("Compare"), Command::before, false, hand.before, true, true},
+                      {"ruler-measure", tr("Ruler"), Command::ruler, false, hand.ruler},
+                      {"note", tr("Note"), Command::mark},
+                      {"camera", tr("Picture"), Command::screenshot},
+                      {"layout-grid", tr("Operate or plan"), Command::layout},
+                      {"command", tr("All commands"), Command::palette, false, false, true, true},
+                      {"help", tr("Ten keys"), Command::help}};
   // As far apart as there is room; smaller only where a screen is very low.
   const auto count = static_cast<float>(std::size(rows));
   const float inset = 8 * u, most = box.height - 2 * inset, line = 9 * u;
@@ -182,7 +189,7 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& 
     const float side = two ? std::min(28 * u, box.width / 2) : std::min(40 * u, pitch);
     const float x = two ? box.x + (number % 2 == 0 ? 0 : box.width / 2) : box.x + (box.width - side) / 2;
     ImGui::SetCursorScreenPos({x, y});
-    if (tile(r.name, r.icon, look, side)) {
+    if (tile(r.icon, r.icon, look, side)) {
       if (r.latch != nullptr) {
         *r.latch = !*r.latch;
       } else if (r.command != Command::put_away || !drill) {
@@ -234,8 +241,7 @@ ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFact
   const bool held = hand.tool == 0 && !hand.saw;
   std::vector<std::string> kinds;
   for (const BurrKindRow& k : kBurrKinds) {
-    kinds.emplace_back(k.name.data());
-    kinds.back()[0] = static_cast<char>(std::toupper(kinds.back()[0]));
+    kinds.push_back(capital(tr(std::string(k.name))));
   }
   float kinds_wide = 0;
   for (const std::string& k : kinds) kinds_wide += ImGui::CalcTextSize(k.c_str()).x + 24 * u;
@@ -275,14 +281,14 @@ ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFact
   draw_icon(draw, {box.right() - pad - 24 * u, box.y + 20 * u}, 24 * u, "chevron-down", im_colour32(theme().quiet));
   if (unfolded) {
     ImGui::SetCursorScreenPos({box.x + pad, y + line + 4 * u});
-    static const std::string kShapes[] = {"Ball", "Cylinder", "Taper"};
+    const std::string shapes[] = {tr("Ball"), tr("Cylinder"), tr("Taper")};
     static constexpr Command kCommands[] = {Command::ball, Command::cylinder, Command::taper};
-    if (const int shape = choice("shape", kShapes, static_cast<int>(burr.shape)); shape >= 0)
+    if (const int shape = choice("shape", shapes, static_cast<int>(burr.shape)); shape >= 0)
       pressed.press(kCommands[shape]);
     ImGui::SetCursorScreenPos({box.x + pad, y + 2 * line});
     // A quarter a step, as its keys do.
     ImGui::SetCursorScreenPos({box.x + pad, y + 2 * line + 10 * u});
-    ImGui::TextDisabled("Speed");
+    ImGui::TextDisabled("%s", tr("Speed"));
     ImGui::SetCursorScreenPos({box.x + pad + ImGui::GetItemRectSize().x + 12 * u, y + 2 * line});
     static const std::string kSpeeds[] = {"25", "50", "75", "100 %"};
     const int now = static_cast<int>(std::lround(4 * hand.burr_share)) - 1;
@@ -320,16 +326,16 @@ float draw_tool_card(const ScreenBox& view, const char* name, const std::string&
 }
 
 void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const std::string&)>& say) {
-  const std::pair<const char*, std::size_t> things[] = {{"Suction", SecondHand::kSucker},
-                                                        {"Irrigation", SecondHand::kIrrigator},
-                                                        {"Probe", SecondHand::kProbe},
-                                                        {"Nothing", 0}};
+  const std::pair<const char*, std::size_t> things[] = {{tr("Suction"), SecondHand::kSucker},
+                                                        {tr("Irrigation"), SecondHand::kIrrigator},
+                                                        {tr("Probe"), SecondHand::kProbe},
+                                                        {tr("Nothing"), 0}};
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
   for (const auto& [name, what] : things) {
     if (list_row(name, "", second.holds() == what)) say(second.take(rehearsal, what));
   }
   ImGui::PopStyleVar();
-  ImGui::TextDisabled("Suction tube, French");
+  ImGui::TextDisabled("%s", tr("Suction tube, French"));
   static constexpr int kFrench[] = {5, 7, 8, 10, 12};
   static const std::string kSizes[] = {"5", "7", "8", "10", "12"};
   const auto at = std::find(std::begin(kFrench), std::end(kFrench), second.sucker_french()) - std::begin(kFrench);
@@ -339,8 +345,8 @@ void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::funct
 
 void draw_apart(Pressed& pressed) {
   ImGui::Separator();
-  if (ImGui::Button(with_key("Save and continue", Command::save).c_str(), {-1, 0})) pressed.press(Command::save);
-  if (ImGui::Button(with_key("Reset bone ...", Command::reset).c_str(), {-1, 0})) pressed.press(Command::reset);
+  if (ImGui::Button(with_key(tr("Save and continue"), Command::save).c_str(), {-1, 0})) pressed.press(Command::save);
+  if (ImGui::Button(with_key(tr("Reset bone ..."), Command::reset).c_str(), {-1, 0})) pressed.press(Command::reset);
 }
 
 bool draw_next_step(const ScreenBox& view, const FirstSteps& steps) {
@@ -353,16 +359,15 @@ bool draw_next_step(const ScreenBox& view, const FirstSteps& steps) {
     possible += steps.steps()[static_cast<std::size_t>(n)].possible ? 1 : 0;
     if (n == next) number = possible;
   }
-  const std::string name = step.name();
-  std::string how = step.words.substr(std::min(step.words.size(), name.size() + 2));
-  if (!how.empty()) how[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(how[0])));
+  const std::string name = step.name(), how = capital(step.how());
   const float high = 52 * u + ImGui::CalcTextSize(how.c_str(), nullptr, false, wide - 32 * u).y;
   const ScreenBox box{view.x + 16 * u, view.bottom() - 64 * u - high, wide, high};
   begin_card("first steps", box, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoFocusOnAppearing);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   draw->AddText(bold_font(), ImGui::GetFontSize(), {box.x + 16 * u, box.y + 12 * u}, im_colour32(theme().text),
                 name.c_str());
-  const std::string count = std::to_string(number) + " of " + std::to_string(possible);
+  const std::string count =
+      filled(tr("{n} of {all}"), {{"n", std::to_string(number)}, {"all", std::to_string(possible)}});
   const float count_wide = ImGui::CalcTextSize(count.c_str()).x;
   draw->AddText({box.right() - 48 * u - count_wide, box.y + 12 * u}, im_colour32(theme().quiet), count.c_str());
   ImGui::SetCursorScreenPos({box.right() - 40 * u, box.y + 6 * u});
@@ -396,7 +401,7 @@ void draw_wheel(const ToolWheel& wheel) {
     const float r = outer * 0.68F, wide = 5.6F * e;
     const ScreenBox box{middle.x + r * std::cos(angle) - wide / 2, middle.y + r * std::sin(angle) - e * 1.1F, wide,
                         e * 1.2F};
-    fitted_text(draw, box, e * (chosen ? 1.15F : 1), theme().text, items[n].word, true);
+    fitted_text(draw, box, e * (chosen ? 1.15F : 1), theme().text, tr(items[n].word), true);
     fitted_text(draw, {box.x, box.bottom(), wide, e * 1.1F}, e * kLabelEm, theme().quiet,
                 key_name(items[n].command, items[n].value), true);
   }
@@ -415,7 +420,7 @@ int draw_question(int width, int height, const std::string& title, const std::st
   ImGui::Dummy({0, em() * 0.4F});
   int answer = 0;
   const float half = share_of_row(2);
-  if (ImGui::Button("no (Esc)", {half, 0})) answer = -1;
+  if (ImGui::Button(tr("no (Esc)"), {half, 0})) answer = -1;
   ImGui::SameLine();
   ImGui::PushStyleColor(ImGuiCol_Border, im_colour(palette::kVermillion));
   if (ImGui::Button((yes + " (Enter)").c_str(), {half, 0})) answer = 1;

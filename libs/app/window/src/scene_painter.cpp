@@ -12,8 +12,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/world_view.h"
 
@@ -121,14 +121,16 @@ void ScenePainter::wait() const {
 }
 
 std::string ScenePainter::words() const {
-  char text[96];
   const QualityChoice& q = quality_;
   const auto name = [](Quality level) {
-    return std::string(EnumNames<Quality>::values[static_cast<std::size_t>(level)]);
+    return tr(std::string(EnumNames<Quality>::values[static_cast<std::size_t>(level)]));
   };
-  std::snprintf(text, sizeof text, "picture %.0f ms, at rest %.0f ms", q.moving_ms(), q.resting_ms());
-  return std::string(text) + "\nquality (J): " + name(q.wish()) +
-         (q.wish() == Quality::automatic ? ", now " + name(q.level()) : "");
+  const std::string times =
+      filled(tr("picture {moving} ms, at rest {resting} ms"),
+             {{"moving", shown_number(q.moving_ms(), 0)}, {"resting", shown_number(q.resting_ms(), 0)}});
+  return times + "\n" +
+         filled(q.wish() == Quality::automatic ? tr("quality (J): {wish}, now {level}") : tr("quality (J): {wish}"),
+                {{"wish", name(q.wish())}, {"level", name(q.level())}});
 }
 
 }  // namespace osteo::inline app

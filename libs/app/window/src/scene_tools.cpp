@@ -16,6 +16,7 @@
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/display/view/actors.h"
 #include "osteo/display/view/instrument_view.h"
 #include "osteo/simulation/bone/plates.h"
@@ -29,43 +30,39 @@ namespace {
 using Tool = HandTools::Tool;
 
 std::string mm_or_through(double mm) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.0f mm", mm);
-  return mm > 0 ? text : "through";
+  return mm > 0 ? shown_number(mm, 0) + " mm" : tr("through");
 }
 
 void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, const CutPreview& preview,
                std::array<char, 64>& plan_name) {
   SawCut cut = tools.cut();
-  char kerf[32];
-  std::snprintf(kerf, sizeof kerf, "%.1f mm", cut.kerf_mm);
-  bool changed = kit_slider("Kerf", kerf, cut.kerf_mm, 0.2, 5, 0.1);
-  changed |= kit_slider("Length", mm_or_through(cut.length_mm), cut.length_mm, 0, 150, 1);
-  changed |= kit_slider("Depth", mm_or_through(cut.depth_mm), cut.depth_mm, 0, 150, 1);
+  bool changed = kit_slider(tr("Kerf"), shown_number(cut.kerf_mm, 1) + " mm", cut.kerf_mm, 0.2, 5, 0.1);
+  changed |= kit_slider(tr("Length"), mm_or_through(cut.length_mm), cut.length_mm, 0, 150, 1);
+  changed |= kit_slider(tr("Depth"), mm_or_through(cut.depth_mm), cut.depth_mm, 0, 150, 1);
   if (changed) tools.set_cut(cut);
   if (!tools.planned().empty()) {
     ImGui::SetNextItemWidth(-1);
-    if (ImGui::BeginCombo("##planned", "Planned cuts")) {
+    if (ImGui::BeginCombo("##planned", tr("Planned cuts"))) {
       for (std::size_t i = 0; i < tools.planned().size(); ++i) {
         if (ImGui::Selectable(tools.planned()[i].name.c_str())) tools.choose_planned(i);
       }
       ImGui::EndCombo();
     }
   }
-  if (kit_button("Upright", ButtonLook::usual, 0, kSmallControl)) tools.aim_saw(view, false);
+  if (kit_button(tr_of("saw", "Upright"), ButtonLook::usual, 0, kSmallControl)) tools.aim_saw(view, false);
   ImGui::SameLine();
-  if (kit_button("Flat", ButtonLook::usual, 0, kSmallControl)) tools.aim_saw(view, true);
+  if (kit_button(tr_of("saw", "Flat"), ButtonLook::usual, 0, kSmallControl)) tools.aim_saw(view, true);
   if (!preview.text().empty()) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(preview.cuts() ? ink_of(palette::kVermillion) : theme().text));
     ImGui::TextWrapped("%s%s", preview.cuts() ? "! " : "", preview.text().c_str());
     ImGui::PopStyleColor();
   }
   const float wide = ImGui::GetContentRegionAvail().x;
-  if (kit_button("Cut (Enter)", ButtonLook::main, wide)) tools.perform(rehearsal);
+  if (kit_button(tr("Cut (Enter)"), ButtonLook::main, wide)) tools.perform(rehearsal);
   // By force and time, with this plane as the cutting guide.
-  if (kit_button("By hand, along this plane", ButtonLook::usual, wide)) tools.take_saw(rehearsal);
+  if (kit_button(tr("By hand, along this plane"), ButtonLook::usual, wide)) tools.take_saw(rehearsal);
   ImGui::SetNextItemWidth(-1);
-  if (ImGui::InputTextWithHint("##plan", "Name: keeps it as planned", plan_name.data(), plan_name.size(),
+  if (ImGui::InputTextWithHint("##plan", tr("Name: keeps it as planned"), plan_name.data(), plan_name.size(),
                                ImGuiInputTextFlags_EnterReturnsTrue)) {
     tools.keep_planned(plan_name.data());
     plan_name.fill(0);
@@ -73,10 +70,10 @@ void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, con
 }
 
 void saw_in_hand_panel(HandTools& tools, Rehearsal& rehearsal) {
-  char kerf[64];
-  std::snprintf(kerf, sizeof kerf, "Held in its plane. Kerf %.1f mm.", tools.cut().kerf_mm);
-  ImGui::TextWrapped("%s", kerf);
-  if (kit_button("Put away (Esc)", ButtonLook::usual, ImGui::GetContentRegionAvail().x)) tools.put_saw_away(rehearsal);
+  ImGui::TextWrapped(
+      "%s", filled(tr("Held in its plane. Kerf {mm} mm."), {{"mm", shown_number(tools.cut().kerf_mm, 1)}}).c_str());
+  if (kit_button(tr("Put away (Esc)"), ButtonLook::usual, ImGui::GetContentRegionAvail().x))
+    tools.put_saw_away(rehearsal);
 }
 
 void piece_panel(HandTools& tools, Rehearsal& rehearsal) {
@@ -87,24 +84,27 @@ void piece_panel(HandTools& tools, Rehearsal& rehearsal) {
     }
   });
   const float wide = ImGui::GetContentRegionAvail().x;
-  if (kit_button("Separate fragments (Enter)", ButtonLook::main, wide)) tools.perform(rehearsal);
+  if (kit_button(tr("Separate fragments (Enter)"), ButtonLook::main, wide)) tools.perform(rehearsal);
   if (bodies.size() < 2) {
-    ImGui::TextWrapped("The bone is in one piece.");
+    ImGui::TextWrapped("%s", tr("The bone is in one piece."));
     return;
   }
-  ImGui::TextWrapped("Drag one in the picture; with Shift it turns.");
+  ImGui::TextWrapped("%s", tr("Drag one in the picture; with Shift it turns."));
   constexpr std::size_t kShown = 5;
   ImGui::BeginChild("fragments", {0, kRow * unit() * static_cast<float>(std::min(kShown, bodies.size()))});
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
   for (const std::uint32_t body : bodies) {
-    if (list_row("Fragment " + std::to_string(body + 1), "", tools.piece() == body)) tools.take_piece(body, rehearsal);
+    const std::string name = filled(tr("Fragment {n}"), {{"n", std::to_string(body + 1)}});
+    if (list_row(name, "", tools.piece() == body)) tools.take_piece(body, rehearsal);
   }
   ImGui::PopStyleVar();
   ImGui::EndChild();
   if (tools.piece() == SceneAction::kNobody) return;
   const Vec3 by = tools.piece_pose().shift_mm;
-  ImGui::Text("moved %+.1f %+.1f %+.1f mm", by.x, by.y, by.z);
-  if (kit_button("Put back", ButtonLook::usual, wide)) tools.put_piece_back(rehearsal);
+  char moved[64];
+  std::snprintf(moved, sizeof moved, "%+.1f %+.1f %+.1f", by.x, by.y, by.z);
+  ImGui::TextUnformatted(filled(tr("moved {mm} mm"), {{"mm", shown_figures(moved)}}).c_str());
+  if (kit_button(tr("Put back"), ButtonLook::usual, wide)) tools.put_piece_back(rehearsal);
 }
 
 void plate_panel(HandTools& tools, Rehearsal& rehearsal) {
@@ -121,17 +121,20 @@ void plate_panel(HandTools& tools, Rehearsal& rehearsal) {
     }
     ImGui::EndCombo();
   }
-  ImGui::TextWrapped("%s", plate_library()[plate].about.c_str());
+  ImGui::TextWrapped("%s", tr(plate_library()[plate].about).c_str());
   const auto degrees = [](double deg) { return std::to_string(std::lround(deg)) + "°"; };
-  changed |= kit_slider("Turn", degrees(turn), turn, -180, 180, 1);
-  changed |= kit_slider("Tilt", degrees(tilt), tilt, -90, 90, 1);
+  changed |= kit_slider(tr("Turn"), degrees(turn), turn, -180, 180, 1);
+  changed |= kit_slider(tr("Tilt"), degrees(tilt), tilt, -90, 90, 1);
   if (changed) tools.set_plate(plate, static_cast<float>(turn), static_cast<float>(tilt), rehearsal);
-  if (kit_button("Fix it here (Enter)", ButtonLook::main, ImGui::GetContentRegionAvail().x)) tools.perform(rehearsal);
+  if (kit_button(tr("Fix it here (Enter)"), ButtonLook::main, ImGui::GetContentRegionAvail().x))
+    tools.perform(rehearsal);
 }
 
 // Where it should lie on bone.
 void report_collision(double mm) {
-  if (mm > kPlateCollisionMm) ImGui::TextColored(im_colour(ink_of(palette::kVermillion)), "! %.1f mm deep in bone", mm);
+  if (mm > kPlateCollisionMm)
+    ImGui::TextColored(im_colour(ink_of(palette::kVermillion)), "! %s",
+                       filled(tr("{mm} mm deep in bone"), {{"mm", shown_number(mm, 1)}}).c_str());
 }
 
 }  // namespace
@@ -214,13 +217,11 @@ void SceneTools::fixed_plates(Rehearsal& rehearsal) {
     const PlateModel& model = plate_library()[f.plate];
     ImGui::PushID(static_cast<int>(f.id));
     ImGui::TextWrapped("%u: %s", f.id, model.name.c_str());
-    if (kit_button("Take off", ButtonLook::usual, 0, kSmallControl)) rehearsal.act(SceneAction::detach(f.id));
+    if (kit_button(tr("Take off"), ButtonLook::usual, 0, kSmallControl)) rehearsal.act(SceneAction::detach(f.id));
     report_collision(in_bone_mm[static_cast<std::size_t>(&f - fixtures.data())]);
     if (model.most_opening_mm > 0 && f.other != SceneAction::kNobody) {
       double opening = f.opening_mm;
-      char text[32];
-      std::snprintf(text, sizeof text, "%.1f mm", opening);
-      if (kit_slider("Opening", text, opening, 0, model.most_opening_mm, 0.1))
+      if (kit_slider(tr("Opening"), shown_number(opening, 1) + " mm", opening, 0, model.most_opening_mm, 0.1))
         rehearsal.act(SceneAction::open(f.id, opening));
     }
     ImGui::PopID();

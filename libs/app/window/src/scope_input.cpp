@@ -1,8 +1,9 @@
 #include "scope_input.h"
 
 #include <cmath>
-#include <cstdio>
 #include <numbers>
+
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 namespace {
@@ -73,11 +74,6 @@ bool ScopeInput::mouse(const ScopeMouse& m, bool as_device, double seconds) {
 bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, const std::optional<Vec3>& under_mouse,
                      std::string& said) {
   const auto bone = [&](Vec3 direction) { return scene.bone ? scene.bone(view().eye_mm(), direction) : std::nullopt; };
-  const auto notify = [&](const char* format, auto... values) {
-    char text[96];
-    std::snprintf(text, sizeof text, format, values...);
-    said = text;
-  };
   switch (press.command) {
     case Command::magnify:
       // From the naked eye to the microscope: it comes down on the bone in the middle.
@@ -99,14 +95,14 @@ bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, cons
         focus_on_depth_of(to, *at);
         control.go(to);
       } else {
-        said = "no bone in the middle of the picture: nothing to focus on";
+        said = tr("no bone in the middle of the picture: nothing to focus on");
       }
       return true;
     case Command::look_there:
       if (const auto at = under_mouse ? bone(*under_mouse) : std::nullopt) {
         control.look_at(*at);
       } else {
-        said = "no bone under the mouse: nothing to look at";
+        said = tr("no bone under the mouse: nothing to look at");
       }
       return true;
     case Command::look_at_drill:
@@ -119,13 +115,14 @@ bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, cons
     case Command::bookmark:
       if (press.shift) {
         control.set_bookmark(static_cast<std::size_t>(press.value));
-        notify("view %d kept", press.value + 1);
+        said = filled(tr("view {n} kept"), {{"n", std::to_string(press.value + 1)}});
       } else if (!control.go_to_bookmark(static_cast<std::size_t>(press.value))) {
-        notify("no view %d is kept yet: Shift-F%d keeps this one", press.value + 1, press.value + 6);
+        said = filled(tr("no view {n} is kept yet: Shift-F{key} keeps this one"),
+                      {{"n", std::to_string(press.value + 1)}, {"key", std::to_string(press.value + 6)}});
       }
       return true;
     case Command::camera_back:
-      if (!control.undo()) said = "no move of the camera to take back";
+      if (!control.undo()) said = tr("no move of the camera to take back");
       return true;
     case Command::home:
       overview(StandardView::left, scene, true);
@@ -176,12 +173,12 @@ void ScopeInput::advance(const Keyboard& keyboard, bool shift, const CameraDevic
 }
 
 std::string scope_text(const ScopeView& view) {
-  char text[96];
-  std::snprintf(
-      text, sizeof text,
-      view.magnification < kNakedEye ? "eye %.1fx  field %.0f mm  at %.0f mm" : "%.1fx  field %.1f mm  WD %.0f mm",
-      view.magnification, view.field_mm(), view.working_distance_mm);
-  return text;
+  const bool eye = view.magnification < kNakedEye;
+  return filled(
+      eye ? tr("eye {times}x  field {field} mm  at {distance} mm") : tr("{times}x  field {field} mm  WD {distance} mm"),
+      {{"times", shown_number(view.magnification, 1)},
+       {"field", shown_number(view.field_mm(), eye ? 0 : 1)},
+       {"distance", shown_number(view.working_distance_mm, 0)}});
 }
 
 }  // namespace osteo::inline app

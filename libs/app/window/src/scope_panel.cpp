@@ -6,6 +6,7 @@
 #include <string>
 
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 
@@ -13,7 +14,7 @@ void draw_scope(const ScopeView& view, const PictureArea& area, StereoMode stere
   const auto line = static_cast<double>(ImGui::GetTextLineHeight());
   const ScaleBar bar = scale_bar(view.pixels_per_mm(area), std::min(0.12 * area.width, 12.0 * line));
   constexpr double kMicroscope = 2;  // below, the bar says enough
-  const std::string length = format_number(bar.length_mm) + " mm",
+  const std::string length = shown_figures(format_number(bar.length_mm)) + " mm",
                     words = view.magnification < kMicroscope ? std::string() : scope_text(view);
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
   // At the lower right, of each eye's picture.
@@ -40,66 +41,66 @@ void draw_scope(const ScopeView& view, const PictureArea& area, StereoMode stere
 namespace {
 
 void draw_stereo(StereoScreen& screen) {
-  static constexpr const char* kModes[] = {"one picture",          "side by side",    "top and bottom",
-                                           "anaglyph (red, cyan)", "interlaced rows", "quad buffer"};
+  const char* const modes[] = {tr("one picture"),          tr("side by side"),    tr("top and bottom"),
+                               tr("anaglyph (red, cyan)"), tr("interlaced rows"), tr("quad buffer")};
   StereoParams& s = screen.params;
   int mode = static_cast<int>(s.mode);
   ImGui::SetNextItemWidth(-1);
-  if (ImGui::Combo("##stereo", &mode, kModes, IM_ARRAYSIZE(kModes))) s.mode = static_cast<StereoMode>(mode);
+  if (ImGui::Combo("##stereo", &mode, modes, IM_ARRAYSIZE(modes))) s.mode = static_cast<StereoMode>(mode);
   if (s.mode == StereoMode::quad_buffer && !screen.has_quad_buffer())
     ImGui::TextWrapped(
-        "This display has no buffer for each eye, or the window was not opened with --stereo quad_buffer: the left eye "
-        "is shown.");
+        "%s", tr("This display has no buffer for each eye, or the window was not opened with --stereo quad_buffer: the "
+                 "left eye is shown."));
   if (s.mode == StereoMode::off) return;
   auto base = static_cast<float>(s.base_mm), convergence = static_cast<float>(s.convergence_mm);
-  if (ImGui::SliderFloat("base, mm", &base, 0, 65, "%.0f")) s.base_mm = static_cast<double>(base);
-  if (ImGui::SliderFloat("in front, mm", &convergence, -50, 50, "%.0f"))
+  if (ImGui::SliderFloat(tr("base, mm"), &base, 0, 65, "%.0f")) s.base_mm = static_cast<double>(base);
+  if (ImGui::SliderFloat(tr("in front, mm"), &convergence, -50, 50, "%.0f"))
     s.convergence_mm = static_cast<double>(convergence);
-  ImGui::Checkbox("eyes swapped", &s.swap);
+  ImGui::Checkbox(tr("eyes swapped"), &s.swap);
 }
 
 }  // namespace
 
 void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene& scene) {
-  ImGui::Text("Look from");
+  ImGui::TextUnformatted(tr("Look from"));
   const auto button = [&](const char* name, StandardView from, bool last = false) {
     if (ImGui::Button(name)) scope.overview(from, scene, true);
     if (!last) ImGui::SameLine();
   };
-  button("left", StandardView::left);
-  button("right", StandardView::right);
-  button("front", StandardView::front);
-  button("above", StandardView::above, true);
-  button("surgeon", StandardView::surgeon);
-  if (ImGui::Button("drill (G)")) scope.control.look_at(scene.drill_mm);
+  button(tr_of("seen from", "left"), StandardView::left);
+  button(tr_of("seen from", "right"), StandardView::right);
+  button(tr_of("seen from", "front"), StandardView::front);
+  button(tr_of("seen from", "above"), StandardView::above, true);
+  button(tr_of("seen from", "surgeon"), StandardView::surgeon);
+  if (ImGui::Button(tr("drill (G)"))) scope.control.look_at(scene.drill_mm);
   ImGui::SameLine();
-  if (ImGui::Button("along it")) scope.control.look_along(scene.drill_mm, scene.handle);
+  if (ImGui::Button(tr("along it"))) scope.control.look_along(scene.drill_mm, scene.handle);
   ImGui::Text("%s", scope_text(scope.view()).c_str());
-  if (!ImGui::TreeNode("microscope", "Microscope")) return;
+  if (!ImGui::TreeNode("microscope", "%s", tr("Microscope"))) return;
   ScopeControl& control = scope.control;
   ImGui::PushItemWidth(-5.5F * ImGui::GetFontSize());  // room for their names
-  if (ImGui::Button("Camera back (Backspace)", {-1, 0})) static_cast<void>(control.undo());
+  if (ImGui::Button(tr("Camera back (Backspace)"), {-1, 0})) static_cast<void>(control.undo());
   auto m = static_cast<float>(scope.view().magnification);
   if (ImGui::SliderFloat("x", &m, 0.5F, 40, "%.1f", ImGuiSliderFlags_Logarithmic))
     control.zoom(static_cast<double>(m) / scope.view().magnification);
   auto wd = static_cast<float>(scope.view().working_distance_mm);
-  if (ImGui::SliderFloat("WD, mm", &wd, 150, 600, "%.0f")) control.set_working_distance(static_cast<double>(wd));
+  if (ImGui::SliderFloat(tr("WD, mm"), &wd, 150, 600, "%.0f")) control.set_working_distance(static_cast<double>(wd));
   bool upright = control.target().upright;
-  if (ImGui::Checkbox("head stays up", &upright)) control.set_upright(upright);
-  ImGui::Checkbox("fly to views (0.4 s)", &control.flights);
+  if (ImGui::Checkbox(tr("head stays up"), &upright)) control.set_upright(upright);
+  ImGui::Checkbox(tr("fly to views (0.4 s)"), &control.flights);
   auto inertia = static_cast<float>(control.arm.params.inertia_s);
-  if (ImGui::SliderFloat("inertia, s", &inertia, 0, 0.5F, "%.2f"))
+  if (ImGui::SliderFloat(tr("inertia, s"), &inertia, 0, 0.5F, "%.2f"))
     control.arm.params.inertia_s = static_cast<double>(inertia);
-  ImGui::Text("O, pedal: the device");
+  ImGui::TextUnformatted(tr("O, pedal: the device"));
   int mode = static_cast<int>(scope.mode);
-  bool changed = ImGui::RadioButton("moves", &mode, 0);
+  bool changed = ImGui::RadioButton(tr("moves"), &mode, 0);
   ImGui::SameLine();
-  changed = ImGui::RadioButton("turns", &mode, 1) || changed;
+  changed = ImGui::RadioButton(tr("turns"), &mode, 1) || changed;
   ImGui::SameLine();
-  changed = ImGui::RadioButton("both", &mode, 2) || changed;
+  changed = ImGui::RadioButton(tr("both"), &mode, 2) || changed;
   if (changed) scope.mode = static_cast<CameraGuide>(mode);
   for (int n = 0; n < static_cast<int>(ScopeControl::kBookmarks); ++n) {
-    const std::string name = "F" + std::to_string(6 + n), keep = "keep##" + name;
+    const std::string name = "F" + std::to_string(6 + n), keep = std::string(tr("keep")) + "##" + name;
     const bool kept = control.bookmark(static_cast<std::size_t>(n)).has_value();
     if (!kept) ImGui::PushStyleVar(ImGuiStyleVar_Alpha, 0.5F);
     if (ImGui::Button(name.c_str()) && kept) static_cast<void>(control.go_to_bookmark(static_cast<std::size_t>(n)));
@@ -108,7 +109,7 @@ void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene&
     if (ImGui::Button(keep.c_str())) control.set_bookmark(static_cast<std::size_t>(n));
     if (n + 1 < static_cast<int>(ScopeControl::kBookmarks)) ImGui::SameLine();
   }
-  ImGui::Text("Stereo");
+  ImGui::TextUnformatted(tr("Stereo"));
   draw_stereo(stereo);
   ImGui::PopItemWidth();
   ImGui::TreePop();

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 
+#include "osteo/core/base/translate.h"
+
 namespace osteo::inline app {
 namespace {
 
 constexpr std::size_t kThings = 4;  // nothing is the first
-constexpr const char* kNone = "there is no second hand: --dust, or --second-device";
+constexpr const char* kNone = tr_later("there is no second hand: --dust, or --second-device");
 
 MouseDevice* moved_by_window(Rehearsal& rehearsal) {
   return rehearsal.hands() > 1 ? dynamic_cast<MouseDevice*>(&rehearsal.device(1)) : nullptr;
@@ -26,19 +28,20 @@ std::string SecondHand::take_next(Rehearsal& rehearsal) {
 }
 
 std::string SecondHand::take(Rehearsal& rehearsal, std::size_t what) {
-  if (rehearsal.hands() < 2) return kNone;
+  if (rehearsal.hands() < 2) return tr(kNone);
   holds_ = what;
   if (moved_by_window(rehearsal) == nullptr) {
     holds_ = std::max<std::size_t>(holds_, 1);
     rehearsal.device(1).set_tool(static_cast<std::uint8_t>(instrument_index(name_of(holds_))));
   }
   if (holds_ == 0) follow();
-  return holds_ == 0 ? "second hand: nothing" : "second hand: " + name_of(holds_);
+  return holds_ == 0 ? tr("second hand: nothing")
+                     : filled(tr("second hand: {tool}"), {{"tool", tr_sized(name_of(holds_))}});
 }
 
 bool SecondHand::move(Rehearsal& rehearsal, Vec3 by_mm, std::string& said) {
   if (moved_by_window(rehearsal) == nullptr) {
-    said = rehearsal.hands() < 2 ? kNone : "the second hand has a device of its own";
+    said = rehearsal.hands() < 2 ? tr(kNone) : tr("the second hand has a device of its own");
     return false;
   }
   if (holds_ == 0) said = take_next(rehearsal);

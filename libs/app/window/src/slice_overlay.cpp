@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <string>
 #include <vector>
+
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 namespace {
@@ -83,8 +86,7 @@ void SliceOnScreen::ruler(const std::array<Vec3, 2>& r) const {
   draw->AddLine(a, b, colour, 2 * scale);
   draw->AddCircleFilled(a, 3 * scale, colour);
   draw->AddCircleFilled(b, 3 * scale, colour);
-  char words[48];
-  std::snprintf(words, sizeof words, "%.1f mm", length(r[1] - r[0]));
+  const std::string words = shown_number(length(r[1] - r[0]), 1) + " mm";
   shadowed_text(draw, {b.x + 8 * scale, b.y - text_size()}, words, IM_COL32(255, 150, 150, 255), text_size());
 }
 

@@ -5,6 +5,7 @@
 
 #include "audio_out.h"
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/session/scene/sound.h"
 
 namespace osteo::inline app {
@@ -73,9 +74,10 @@ void SoundOut::set_alarms(bool alarms) {
 
 std::string SoundOut::status() const {
   if (!failure_.empty()) return failure_;
-  if (!playing_) return on_ ? "" : "off";
-  return (on_ ? "through " : "off; ") + playing_->card.driver() + ", " +
-         std::to_string(std::lround(1000 * playing_->card.buffer_s())) + " ms at a time";
+  if (!playing_) return on_ ? "" : tr("off");
+  return filled(
+      on_ ? tr("through {driver}, {ms} ms at a time") : tr("off; {driver}, {ms} ms at a time"),
+      {{"driver", playing_->card.driver()}, {"ms", std::to_string(std::lround(1000 * playing_->card.buffer_s()))}});
 }
 
 }  // namespace osteo::inline app

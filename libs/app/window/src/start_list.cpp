@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/session/scene/session_folder.h"
 
 namespace osteo::inline app {
@@ -33,13 +34,15 @@ FolderLook look_at_path(const fs::path& path) {
   std::error_code failed;
   const fs::file_status status = fs::status(path, failed);
   if (!fs::exists(status))
-    return {FolderKind::nothing, path, "'" + path.string() + "' is not there, or may not be read"};
+    return {FolderKind::nothing, path,
+            filled(tr("'{path}' is not there, or may not be read"), {{"path", path.string()}})};
   if (!fs::is_directory(status)) {
     const fs::path name = path.filename();
     if (name == "manifest.json" || name == "session.json" || name == "stream.oss")
       return look_at_path(fs::absolute(path).parent_path());
     return {FolderKind::nothing, path,
-            "'" + name.string() + "' is a file: a case is a folder, made from a scan by 'osteo prepare'"};
+            filled(tr("'{name}' is a file: a case is a folder, made from a scan by 'osteo prepare'"),
+                   {{"name", name.string()}})};
   }
   const auto has = [&](const char* name) { return fs::is_regular_file(path / name, failed); };
   if (has("manifest.json")) return {FolderKind::the_case, path, {}};
@@ -71,7 +74,8 @@ void StartList::list() {
     const FolderLook look = look_at_path(r);
     const bool there = look.kind == FolderKind::the_case;
     entries_.push_back({Group::recent, there ? FolderKind::the_case : FolderKind::nothing, r,
-                        name_of(r) + (there ? "" : "  (no longer there)") + "   " + r.parent_path().string()});
+                        (there ? name_of(r) : filled(tr("{name}  (no longer there)"), {{"name", name_of(r)}})) + "   " +
+                            r.parent_path().string()});
   }
   // Of the case opened last, or of the one that is looked into.
   const bool inside = look_at_path(folder_).kind == FolderKind::the_case;
@@ -82,7 +86,8 @@ void StartList::list() {
                         [](const StartEntry& e) { return e.group == Group::session; }) == 5)
         break;
       entries_.push_back(
-          {Group::session, FolderKind::session, s, "go on from session " + name_of(s) + " of " + name_of(of)});
+          {Group::session, FolderKind::session, s,
+           filled(tr("go on from session {session} of {case}"), {{"session", name_of(s)}, {"case", name_of(of)}})});
     }
   }
   if (folder_.has_parent_path() && folder_ != folder_.root_path())
@@ -91,7 +96,7 @@ void StartList::list() {
   std::error_code failed;
   fs::directory_iterator at(folder_, fs::directory_options::skip_permission_denied, failed);
   if (failed) {
-    message_ = "'" + folder_.string() + "' cannot be read: " + failed.message();
+    message_ = filled(tr("'{path}' cannot be read: {why}"), {{"path", folder_.string()}, {"why", failed.message()}});
   } else {
     for (const fs::directory_iterator end; !failed && at != end; at.increment(failed)) {
       std::error_code unknown;
@@ -100,15 +105,19 @@ void StartList::list() {
   }
   std::sort(below.begin(), below.end(), before_in_order);
   if (below.size() > kMaxListed) {
-    message_ =
-        "of " + std::to_string(below.size()) + " folders the first " + std::to_string(kMaxListed) + " are listed";
+    message_ = filled(tr("of {all} folders the first {n} are listed"),
+                      {{"all", std::to_string(below.size())}, {"n", std::to_string(kMaxListed)}});
     below.resize(kMaxListed);
   }
-  if (inside) entries_.push_back({Group::browse, FolderKind::the_case, folder_, "this case: " + name_of(folder_)});
+  if (inside)
+    entries_.push_back(
+        {Group::browse, FolderKind::the_case, folder_, filled(tr("this case: {name}"), {{"name", name_of(folder_)}})});
   for (const fs::path& b : below) {
     const FolderKind kind = look_at_path(b).kind;
-    const char* const what = kind == FolderKind::the_case ? "case: " : kind == FolderKind::session ? "session: " : "";
-    entries_.push_back({Group::browse, kind, b, what + name_of(b)});
+    const char* const what = kind == FolderKind::the_case  ? tr("case: {name}")
+                             : kind == FolderKind::session ? tr("session: {name}")
+                                                           : "{name}";
+    entries_.push_back({Group::browse, kind, b, filled(what, {{"name", name_of(b)}})});
   }
   selected_ = 0;
 }
@@ -156,8 +165,9 @@ std::optional<StartChoice> choice_of(const fs::path& path, std::string& why) {
       return std::nullopt;
     }
   }
-  why =
-      look.kind == FolderKind::nothing ? look.why : "'" + name_of(look.folder) + "' is no case: its folders are listed";
+  why = look.kind == FolderKind::nothing
+            ? look.why
+            : filled(tr("'{name}' is no case: its folders are listed"), {{"name", name_of(look.folder)}});
   return std::nullopt;
 }
 

@@ -9,6 +9,7 @@
 
 #include "file_dialog.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/translate.h"
 #include "start_list.h"
 #include "ui_style.h"
 
@@ -32,10 +33,15 @@ void write_state(const StartList& list, std::uint64_t pictures, int em_pixels, c
   if (file.empty()) return;
   Json entries = Json::list();
   for (const StartEntry& e : list.entries()) entries.push_back(e.words);
-  const Json j{{"page", "start"},           {"pictures", pictures},
-               {"entries", entries},        {"selected", list.selected()},
-               {"message", list.message()}, {"tick", 0},
-               {"em_pixels", em_pixels},    {"folder", list.folder().string()}};
+  const Json j{{"page", "start"},
+               {"pictures", pictures},
+               {"entries", entries},
+               {"selected", list.selected()},
+               {"message", list.message()},
+               {"tick", 0},
+               {"em_pixels", em_pixels},
+               {"folder", list.folder().string()},
+               {"language", enum_names(Language{})[static_cast<std::size_t>(language())]}};
   const std::filesystem::path beside = file.string() + ".new";
   std::ofstream(beside) << j.dump() << '\n';
   std::error_code ignored;
@@ -51,9 +57,9 @@ bool draw_entries(StartList& list, bool follow) {
   for (const StartEntry& e : list.entries()) {
     if (first || e.group != group) {
       if (!first) ImGui::Dummy({0, em() * 0.4F});
-      static constexpr const char* kGroups[] = {"opened last", "sessions", "folders in "};
-      ImGui::TextDisabled("%s%s", kGroups[static_cast<int>(e.group)],
-                          e.group == StartEntry::Group::browse ? list.folder().string().c_str() : "");
+      const char* const groups[] = {tr("opened last"), tr("sessions"), tr("folders in {folder}")};
+      ImGui::TextDisabled("%s",
+                          filled(groups[static_cast<int>(e.group)], {{"folder", list.folder().string()}}).c_str());
       group = e.group;
       first = false;
     }
@@ -78,6 +84,7 @@ bool draw_entries(StartList& list, bool follow) {
 
 std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& person, const StartOptions& options) {
   take_theme(person.values.theme);
+  use_language(language_named(person.values.language));
   shell.set_title("Osteotome");
   StartList list(person.cases(), options.folder.empty() ? std::filesystem::current_path() : options.folder);
   list.say(options.message);
@@ -118,8 +125,9 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
     fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, wide - 2 * e, 2.2F * e}, 2.2F * e, theme().text, "Osteotome");
     ImGui::Dummy({0, 2.4F * e});
     ImGui::TextWrapped(
-        "Choose a case: a folder made by 'osteo prepare', or drop one here. Up, Down and Enter; Backspace: the folder "
-        "above; Q: close.");
+        "%s",
+        tr("Choose a case: a folder made by 'osteo prepare', or drop one here. Up, Down and Enter; Backspace: the "
+           "folder above; Q: close."));
     if (!list.message().empty()) {
       ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
       ImGui::TextWrapped("! %s", list.message().c_str());
@@ -129,23 +137,23 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
     ImGui::BeginChild("list", {0, std::max(4 * e, ImGui::GetContentRegionAvail().y - below)}, true);
     open = draw_entries(list, std::exchange(follow, false)) || open;
     ImGui::EndChild();
-    if (ImGui::Button("open (Enter)")) open = true;
+    if (ImGui::Button(tr("open (Enter)"))) open = true;
     ImGui::SameLine();
-    if (ImGui::Button("the folder above (Backspace)")) list.up();
+    if (ImGui::Button(tr("the folder above (Backspace)"))) list.up();
     if (dialogs) {
       ImGui::SameLine();
-      if (ImGui::Button("dialog (O)")) ask = true;
+      if (ImGui::Button(tr("dialog (O)"))) ask = true;
     }
     ImGui::SameLine();
-    if (ImGui::Button("close (Q)")) close = true;
-    ImGui::Checkbox("remember cases", &person.values.remember_cases);
+    if (ImGui::Button(tr("close (Q)"))) close = true;
+    ImGui::Checkbox(tr("remember cases"), &person.values.remember_cases);
     ImGui::SameLine();
-    if (ImGui::Button("forget them")) {
+    if (ImGui::Button(tr("forget them"))) {
       person.forget_cases();
       list.forget_recent();
     }
     ImGui::SameLine();
-    ImGui::TextDisabled("text: Ctrl +, Ctrl -");
+    ImGui::TextDisabled("%s", tr("text: Ctrl +, Ctrl -"));
     ImGui::End();
     if (std::exchange(open, false)) choice = list.open();
     shell.show_page();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/session/scene/heat_reader.h"
 
 namespace osteo::inline app {
@@ -13,7 +14,7 @@ template <class... A>
 std::string text_of(const char* format, A... a) {
   char out[96];
   std::snprintf(out, sizeof out, format, a...);
-  return out;
+  return shown_figures(out);
 }
 
 }  // namespace
@@ -27,25 +28,25 @@ std::string clock_text(double seconds) {
 StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures, double rate_hz) {
   StateFacts f;
   const Instrument& held = instrument_of(tick.device.tool);
-  f.tool = (tick.flags & kPlateInHand) != 0 ? "plate in the hand" : held.name;
+  f.tool = (tick.flags & kPlateInHand) != 0 ? tr("plate in the hand") : tr_sized(held.name);
   f.turning = tick.speed_rpm > 0;
   // The last digits of a speed that follows a pedal would only flicker.
-  f.speed = f.turning ? text_of("%.0f rpm", 500 * std::round(static_cast<double>(tick.speed_rpm) / 500)) : "still";
+  f.speed = f.turning ? text_of("%.0f rpm", 500 * std::round(static_cast<double>(tick.speed_rpm) / 500)) : tr("still");
   f.force_n = length(from_floats(tick.force_n));
   f.force = text_of("%.2f N", f.force_n);
   f.force_share = std::min(1.0, f.force_n / StateFacts::kFullForceN);
   f.depth = text_of("%.2f mm", static_cast<double>(tick.depth_mm));
   f.under = tick.thickness_mm <= 0    ? std::string("-")
-            : tick.thickness_mm >= 10 ? std::string("over 10 mm")
+            : tick.thickness_mm >= 10 ? std::string(tr("over 10 mm"))
                                       : text_of("%.1f mm", static_cast<double>(tick.thickness_mm));
   if (structures == nullptr) {
-    f.structure = "none in this case";
+    f.structure = tr("none in this case");
   } else if (tick.structure == 0) {
     f.nearness = Nearness::far;
-    f.structure = text_of("none within %.0f mm", structures->reach_mm());
+    f.structure = filled(tr("none within {mm} mm"), {{"mm", shown_number(structures->reach_mm(), 0)}});
   } else {
     const auto mm = static_cast<double>(tick.clearance_mm);
-    f.structure = structures->name_of(static_cast<std::uint8_t>(tick.structure));
+    f.structure = tr(structures->name_of(static_cast<std::uint8_t>(tick.structure)));
     f.nearness = mm <= 0                     ? Nearness::touched
                  : mm < StateFacts::kCloseMm ? Nearness::close
                  : mm < StateFacts::kNearMm  ? Nearness::near
@@ -55,15 +56,15 @@ StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures,
   }
   f.time = clock_text(static_cast<double>(tick.tick) / rate_hz);
   if ((tick.flags & kStructureInjured) != 0) {
-    f.warning = "the rotating burr touches " + f.structure;
+    f.warning = filled(tr("the rotating burr touches {structure}"), {{"structure", f.structure}});
     f.alarm = true;
   } else if ((tick.flags & kEscape) != 0) {
-    f.warning = "the burr is buried in bone";
+    f.warning = tr("the burr is buried in bone");
     f.alarm = true;
   } else if ((tick.flags & kShaftContact) != 0) {
-    f.warning = "the shaft touches bone";
+    f.warning = tr("the shaft touches bone");
   } else if ((tick.flags & kNoRoom) != 0) {
-    f.warning = "no room: bone is left at the burr's rim";
+    f.warning = tr("no room: bone is left at the burr's rim");
   }
   return f;
 }
@@ -79,7 +80,7 @@ std::vector<Message> causes_of(const StateFacts& facts) {
 void report_warmth(StateFacts& f, const WarmthNow& warmth, const TickRecord& tick, const StructureMap* structures) {
   const auto of = warmth.structures_c.find(static_cast<std::uint8_t>(tick.structure));
   if (tick.structure == 0 || structures == nullptr) {
-    f.warmth = text_of("bone up to %.0f C", warmth.bone_c);
+    f.warmth = filled(tr("bone up to {t} C"), {{"t", shown_number(warmth.bone_c, 0)}});
   } else {
     f.warmth = text_of("%.1f C", of == warmth.structures_c.end() ? 37.0 : of->second);
   }
@@ -87,7 +88,8 @@ void report_warmth(StateFacts& f, const WarmthNow& warmth, const TickRecord& tic
   const auto worst = std::max_element(warmth.structures_c.begin(), warmth.structures_c.end(),
                                       [](const auto& a, const auto& b) { return a.second < b.second; });
   if (worst == warmth.structures_c.end() || worst->second < 47) return;
-  f.warning = structures->name_of(worst->first) + text_of(" is at %.0f C: stop, and rinse", worst->second);
+  f.warning = filled(tr("{structure} is at {t} C: stop, and rinse"),
+                     {{"structure", tr(structures->name_of(worst->first))}, {"t", shown_number(worst->second, 0)}});
   f.alarm = worst->second >= kCoagulatedC;
 }
 
@@ -95,7 +97,9 @@ StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const
   StateFacts f = state_of_tick(tick, rehearsal.structures(), rehearsal.rate_hz());
   if (warmth != nullptr) report_warmth(f, *warmth, tick, rehearsal.structures());
   f.removed = text_of("%.1f mm3", rehearsal.removed_mm3());
-  if (rehearsal.soft() != nullptr) f.removed += text_of(", tissue %.1f", rehearsal.tissue_mm3());
+  if (rehearsal.soft() != nullptr)
+    f.removed = filled(tr("{bone}, tissue {tissue}"),
+                       {{"bone", f.removed}, {"tissue", shown_number(rehearsal.tissue_mm3(), 1)}});
   // A recording in trouble comes before everything: nothing of what follows would be kept.
   if (const std::string trouble = rehearsal.trouble(); !trouble.empty()) {
     f.warning = trouble;

@@ -2,14 +2,18 @@
 
 #include <imgui.h>
 
+#include "osteo/core/base/translate.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
 // The words of the import's verdict.
 void draw_scan(const VerdictSummary& scan) {
   if (scan.status.empty()) return;
-  const bool open =
-      ImGui::TreeNode("scan", "Scan: %s (%d notes)", scan.status.c_str(), static_cast<int>(scan.findings.size()));
+  const bool open = ImGui::TreeNode(
+      "scan", "%s",
+      filled(tr_n("Scan: {status} ({n} note)", "Scan: {status} ({n} notes)", static_cast<double>(scan.findings.size())),
+             {{"status", tr(scan.status)}, {"n", std::to_string(scan.findings.size())}})
+          .c_str());
   if (!open) return;
   for (const Finding& f : scan.findings) {
     const ImVec4 colour = f.severity == Severity::info ? im_colour(theme().quiet) : im_colour(ink_of(palette::kYellow));
@@ -25,7 +29,7 @@ void draw_scan(const VerdictSummary& scan) {
 void draw_approval(const std::string& words, bool ended) {
   if (words.empty()) return;
   ImGui::PushStyleColor(ImGuiCol_Text, ended ? im_colour(ink_of(palette::kYellow)) : im_colour(theme().quiet));
-  ImGui::TextWrapped("Case: %s", words.c_str());
+  ImGui::TextWrapped("%s", filled(tr("Case: {approval}"), {{"approval", words}}).c_str());
   ImGui::PopStyleColor();
 }
 

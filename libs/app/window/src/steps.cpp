@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "keys.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 namespace {
@@ -13,22 +14,43 @@ constexpr double kDrilledMm3 = 0.5, kSuckedMm3 = 0.05, kZoomed = 0.1, kTiltedRad
 }  // namespace
 
 FirstSteps::FirstSteps() {
-  const auto key = [](Command c) { return key_name(c); };
-  steps_ = {{"Drill: point at the bone, " + key(Command::bring) +
-             " brings the drill; hold the left button; Shift-wheel away from you: deeper"},
-            {"Undo: " + key(Command::undo) + " takes the last stroke back"},
-            {"Retract: " + key(Command::lift) + " lifts the drill out of the bone"},
-            {"Tilt: drag with Alt and the right button"},
-            {"Suction: keep drilling, and hold " + key(Command::suck) +
-             ": the suction tube beside the burr removes the dust"},
-            {"Zoom: wheel; right drag turns the view"},
-            {"Cut: " + key(Command::saw) + " sets the saw where you point, drag moves it, " + key(Command::perform) +
-             " cuts"},
-            {"Plate: " + key(Command::plates) + " takes one, a click on bone brings it there, " +
-             key(Command::perform) + " fixes it"},
-            {"Ruler: " + key(Command::ruler) + ", then click two points on the bone"},
-            {"Picture: " + key(Command::screenshot) + " keeps one in the session's folder"},
-            {"End: " + key(Command::quit) + " saves the session and shows what was done"}};
+  steps_ = {{tr_later("Drill: point at the bone, {bring} brings the drill; hold the left button; Shift-wheel away from "
+                      "you: deeper")},
+            {tr_later("Undo: {undo} takes the last stroke back")},
+            {tr_later("Retract: {lift} lifts the drill out of the bone")},
+            {tr_later("Tilt: drag with Alt and the right button")},
+            {tr_later("Suction: keep drilling, and hold {suction}: the suction tube beside the burr removes the dust")},
+            {tr_later("Zoom: wheel; right drag turns the view")},
+            {tr_later("Cut: {saw} sets the saw where you point, drag moves it, {perform} cuts")},
+            {tr_later("Plate: {plate} takes one, a click on bone brings it there, {perform} fixes it")},
+            {tr_later("Ruler: {ruler}, then click two points on the bone")},
+            {tr_later("Picture: {picture} keeps one in the session's folder")},
+            {tr_later("End: {end} saves the session and shows what was done")}};
+}
+
+std::string Step::words() const {
+  return filled(tr(text), {{"bring", key_name(Command::bring)},
+                           {"undo", key_name(Command::undo)},
+                           {"lift", key_name(Command::lift)},
+                           {"suction", key_name(Command::suck)},
+                           {"saw", key_name(Command::saw)},
+                           {"plate", key_name(Command::plates)},
+                           {"perform", key_name(Command::perform)},
+                           {"ruler", key_name(Command::ruler)},
+                           {"picture", key_name(Command::screenshot)},
+                           {"end", key_name(Command::quit)}});
+}
+
+std::string Step::name() const {
+  const std::string all = words();
+  const auto end = all.find_last_not_of(' ', all.find(':') - 1);  // French has a blank before it
+  return all.substr(0, end + 1);
+}
+
+std::string Step::how() const {
+  const std::string all = words();
+  const auto from = all.find_first_not_of(": ", all.find(':'));
+  return from == std::string::npos ? std::string() : all.substr(from);
 }
 
 void FirstSteps::see(const StepFacts& now) {

@@ -23,9 +23,11 @@ struct StepFacts {
 };
 
 struct Step {
-  std::string words;  ///< what to do, with its keys; its name up to the colon
+  const char* text;  ///< of the catalogue: its name, a colon, what to do
   bool possible = true, done = false;
-  [[nodiscard]] std::string name() const { return words.substr(0, words.find(':')); }
+  [[nodiscard]] std::string words() const;  ///< in the language, with its keys
+  [[nodiscard]] std::string name() const;   ///< what stands before the colon
+  [[nodiscard]] std::string how() const;    ///< what follows it
 };
 
 class FirstSteps {

@@ -3,15 +3,25 @@
 #include <cmath>
 
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 namespace {
 
 std::string name_of(const Instrument& held, bool head) {
-  const std::string kind = held.kind == InstrumentKind::burr
-                               ? "drill"
-                               : std::string(EnumNames<InstrumentKind>::values[static_cast<std::size_t>(held.kind)]);
-  return "the " + kind + (head || held.kind != InstrumentKind::burr ? "" : "'s shaft");
+  switch (held.kind) {
+    case InstrumentKind::burr:
+      return head ? tr("the drill") : tr("the drill's shaft");
+    case InstrumentKind::sucker:
+      return tr("the suction tube");
+    case InstrumentKind::irrigator:
+      return tr("the irrigator");
+    case InstrumentKind::probe:
+      return tr("the probe");
+    case InstrumentKind::saw:
+      return tr("the saw");
+  }
+  return {};
 }
 
 InstrumentPlace place_of(const TickRecord& t) {
@@ -35,7 +45,8 @@ std::optional<ToolTouch::Reported> ToolTouch::look(std::span<const TickRecord> h
       if (gap.gap_mm >= 0) continue;
       at_mm_ = gap.at_mm;
       const auto rounded = [](double x) { return std::round(x * 100) / 100; };
-      reported = Reported{name_of(*other.held, gap.other_head) + " touches " + name_of(*first.held, gap.first_head),
+      reported = Reported{filled(tr("{one} touches {other}"), {{"one", name_of(*other.held, gap.other_head)},
+                                                               {"other", name_of(*first.held, gap.first_head)}}),
                           Json{{"hands", Json{static_cast<int>(hands[a].hand), static_cast<int>(hands[b].hand)}},
                                {"tools", Json{first.held->name, other.held->name}},
                                {"at_mm", Json{rounded(gap.at_mm.x), rounded(gap.at_mm.y), rounded(gap.at_mm.z)}}}

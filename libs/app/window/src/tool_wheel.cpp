@@ -4,6 +4,7 @@
 #include <numbers>
 #include <vector>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/burr_kind.h"
 
 namespace osteo::inline app {
@@ -13,13 +14,13 @@ std::span<const WheelItem> wheel_items() {
     std::vector<WheelItem> all;
     for (std::size_t n = 0; n < kBurrKinds.size(); ++n)
       all.push_back({kBurrKinds[n].name.data(), Command::burr_kind, static_cast<int>(n)});
-    all.insert(all.end(), {{"ball", Command::ball},
-                           {"taper", Command::taper},
-                           {"cylinder", Command::cylinder},
-                           {"plate", Command::plates},
-                           {"Fragments", Command::pieces},
-                           {"saw", Command::saw},
-                           {"drill", Command::put_away}});
+    all.insert(all.end(), {{tr_later("ball"), Command::ball},
+                           {tr_later("taper"), Command::taper},
+                           {tr_later("cylinder"), Command::cylinder},
+                           {tr_later("plate"), Command::plates},
+                           {tr_later("Fragments"), Command::pieces},
+                           {tr_later("saw"), Command::saw},
+                           {tr_later("drill"), Command::put_away}});
     return all;
   }();
   return items;

@@ -4,11 +4,12 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
+#include <string>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 
@@ -47,12 +48,16 @@ void TrialOverlay::draw(const ScopeView& view, const PictureArea& area) const {
     list->AddLine(m, {static_cast<float>((*top)[0]), static_cast<float>((*top)[1])}, ink, 2);  // up
     list->AddCircleFilled(m, 4, ink);
   }
-  char words[96];
-  std::snprintf(words, sizeof words, "view %zu of %zu, %.1fx: %.1f s%s", trial_->results().size() + 1, trial_->count(),
-                t.magnification, trial_->seconds(), close ? ", hold" : "");
-  const ImVec2 at{static_cast<float>(area.x) + 16, static_cast<float>(area.y) + 16}, size = ImGui::CalcTextSize(words);
+  const std::string words = filled(
+      close ? tr("view {n} of {all}, {times}x: {seconds} s, hold") : tr("view {n} of {all}, {times}x: {seconds} s"),
+      {{"n", std::to_string(trial_->results().size() + 1)},
+       {"all", std::to_string(trial_->count())},
+       {"times", shown_number(t.magnification, 1)},
+       {"seconds", shown_number(trial_->seconds(), 1)}});
+  const ImVec2 at{static_cast<float>(area.x) + 16, static_cast<float>(area.y) + 16},
+      size = ImGui::CalcTextSize(words.c_str());
   list->AddRectFilled({at.x - 8, at.y - 6}, {at.x + size.x + 8, at.y + size.y + 6}, IM_COL32(10, 14, 20, 170), 4);
-  list->AddText(at, ink, words);
+  list->AddText(at, ink, words.c_str());
   list->PopClipRect();
 }
 
@@ -67,10 +72,11 @@ std::optional<std::string> TrialOverlay::advance(const ScopeControl& control, do
     return std::string(e.what());
   }
   const TrialSummary s = summary_of(trial_->results());
-  char words[120];
-  std::snprintf(words, sizeof words, "view %zu of %zu reached in %.1f s%s", s.targets, trial_->count(),
-                trial_->results().back().seconds, running() ? "" : "; times are in camera-trial.csv");
-  return std::string(words);
+  return filled(running() ? tr("view {n} of {all} reached in {seconds} s")
+                          : tr("view {n} of {all} reached in {seconds} s; times are in camera-trial.csv"),
+                {{"n", std::to_string(s.targets)},
+                 {"all", std::to_string(trial_->count())},
+                 {"seconds", shown_number(trial_->results().back().seconds, 1)}});
 }
 
 }  // namespace osteo::inline app

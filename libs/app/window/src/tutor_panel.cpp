@@ -2,33 +2,38 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "keys.h"
+#include "osteo/core/base/translate.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
 
 std::string link_text(const TutorNow::Link& link) {
-  if (!link.heard) return link.who + ": not heard";
-  char text[160];
-  std::snprintf(text, sizeof text, "there and back %.1f ms, %.0f %% lost, clock %+.1f ms, %+.0f ppm", link.rtt_ms,
-                100 * link.lost, link.offset_ms, link.drift_ppm);
-  std::string words = link.who + ": " + text;
-  if (link.behind_s > 0.5) {
-    std::snprintf(text, sizeof text, ", %.1f s behind", link.behind_s);
-    words += text;
-  }
-  return words + (link.differs ? ", its bone differs and is made again" : "");
+  if (!link.heard) return filled(tr("{who}: not heard"), {{"who", link.who}});
+  const auto signed_number = [](double value, int decimals) {
+    return (value < 0 ? "" : "+") + shown_number(value, decimals);
+  };
+  const std::initializer_list<Place> places{{"who", link.who},
+                                            {"rtt", shown_number(link.rtt_ms, 1)},
+                                            {"lost", shown_number(100 * link.lost, 0)},
+                                            {"offset", signed_number(link.offset_ms, 1)},
+                                            {"drift", signed_number(link.drift_ppm, 0)}};
+  std::string words =
+      filled(tr("{who}: there and back {rtt} ms, {lost} % lost, clock {offset} ms, {drift} ppm"), places);
+  if (link.behind_s > 0.5)
+    words = filled(tr("{link}, {seconds} s behind"), {{"link", words}, {"seconds", shown_number(link.behind_s, 1)}});
+  return link.differs ? filled(tr("{link}, its bone differs and is made again"), {{"link", words}}) : words;
 }
 
 std::string who_cuts(const std::vector<std::string>& names, const std::vector<TickRecord>& hands) {
   std::string who;
   for (std::size_t h = 0; h < std::min(names.size(), hands.size()); ++h) {
     const TickRecord& t = hands[h];
-    if (t.speed_rpm > 0 && (t.immersed > 0 || t.voxels_changed > 0)) who += (who.empty() ? "" : " and ") + names[h];
+    if (t.speed_rpm > 0 && (t.immersed > 0 || t.voxels_changed > 0))
+      who = who.empty() ? names[h] : filled(tr("{one} and {other}"), {{"one", who}, {"other", names[h]}});
   }
-  return who.empty() ? "nobody" : who;
+  return who.empty() ? tr("nobody") : who;
 }
 
 std::optional<std::string> LinkWatch::look(const TutorNow& now) {
@@ -38,15 +43,16 @@ std::optional<std::string> LinkWatch::look(const TutorNow& now) {
     heard.emplace_back(l.who, l.heard);
     const auto before = std::find_if(heard_.begin(), heard_.end(), [&](const auto& h) { return h.first == l.who; });
     if (before == heard_.end()) {
-      if (l.heard) said = l.who + " has joined";
+      if (l.heard) said = filled(tr("{who} has joined"), {{"who", l.who}});
     } else if (before->second != l.heard) {
-      said = l.heard ? "the link to the " + l.who + " is back"
-                     : "the link to the " + l.who + " has dropped: your hand is let go";
+      said = filled(
+          l.heard ? tr("the link to the {who} is back") : tr("the link to the {who} has dropped: your hand is let go"),
+          {{"who", l.who}});
     }
   }
   for (const auto& [who, was] : heard_) {
     if (std::none_of(heard.begin(), heard.end(), [&, name = who](const auto& h) { return h.first == name; }))
-      said = who + " has left";
+      said = filled(tr("{who} has left"), {{"who", who}});
   }
   heard_ = std::move(heard);
   return said;
@@ -88,12 +94,13 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
     ImGui::PopStyleColor();
   }
   if (hands.size() > 1) {
-    ImGui::TextUnformatted(("cuts: " + who_cuts(now.hands, hands)).c_str());
-    if (now.apart_mm >= 0) ImGui::Text("apart %.1f mm", now.apart_mm);
+    ImGui::TextUnformatted(filled(tr("cuts: {who}"), {{"who", who_cuts(now.hands, hands)}}).c_str());
+    if (now.apart_mm >= 0)
+      ImGui::TextUnformatted(filled(tr("apart {mm} mm"), {{"mm", shown_number(now.apart_mm, 1)}}).c_str());
   }
   if (now.leads) {
     const std::string key = key_name(Command::lead);
-    ImGui::Text("%s (%s)", now.guiding ? "your hand is led" : "your hand is free", key.c_str());
+    ImGui::Text("%s (%s)", now.guiding ? tr("your hand is led") : tr("your hand is free"), key.c_str());
     ImGui::ProgressBar(static_cast<float>(now.pull), {-1, 0.5F * e}, "");
   }
   ImGui::End();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "osteo/core/base/translate.h"
 #include "window_fonts.h"
 
 namespace osteo::inline app {
@@ -24,14 +25,29 @@ void set_ui_style(int em_pixels) {
   // ImGui's size is from the highest ascender to the lowest descender, which Noto Sans has 1.362 em apart; lines are
   // nearer to each other than that.
   constexpr float kTallEm = 1.362F;
+  // From ascender to descender Noto Sans CJK is 1.448 em high: letters of one line are as large as each other.
+  constexpr float kChineseLarger = 1.448F / 1.362F;
   const auto add = [&](const unsigned char* font, std::size_t bytes, float high, const ImWchar* letters) {
     // ImGui asks for a pointer to what it may own; this it does not, and does not write to.
     config.GlyphOffset.y = -std::round((kTallEm - kLineEm) * high / 2);
     io.Fonts->AddFontFromMemoryTTF(const_cast<unsigned char*>(font), static_cast<int>(bytes),
                                    std::round(kTallEm * high), &config, letters);
   };
+  // Of Chinese only what the catalogue has, in both.
+  ImVector<ImWchar> chinese;
+  ImFontGlyphRangesBuilder needed;
+  const std::string_view catalogue = catalogue_text(Language::chinese);
+  needed.AddText(catalogue.data(), catalogue.data() + catalogue.size());
+  needed.BuildRanges(&chinese);
+  const auto add_chinese = [&](float high) {
+    config.MergeMode = true;
+    add(kNotoSansSc, sizeof kNotoSansSc, high * kChineseLarger, chinese.Data);
+    config.MergeMode = false;
+  };
   add(kNotoSans, sizeof kNotoSans, size, kLetters);
+  add_chinese(size);
   add(kNotoSansBold, sizeof kNotoSansBold, std::round(kBoldEm * size), kLatin);
+  add_chinese(std::round(kBoldEm * size));
   io.Fonts->Build();
   io.Fonts->Fonts[0]->FontSize = kLineEm * size;
   io.Fonts->Fonts[1]->FontSize = kLineEm * kBoldEm * size;
@@ -98,10 +114,25 @@ void begin_fixed(const char* name, const ScreenBox& box, ImGuiWindowFlags more) 
                    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoBringToFrontOnFocus | more);
 }
 
+namespace {
+
+std::set<std::string>& cut() {
+  static std::set<std::string> all;
+  return all;
+}
+
+}  // namespace
+
+const std::set<std::string>& texts_cut() {
+  return cut();
+}
+
 std::string shortened(const std::string& text, float width, float size, ImFont* font) {
   if (font == nullptr) font = ImGui::GetFont();
   const auto wide = [&](const std::string& s) { return font->CalcTextSizeA(size, FLT_MAX, 0, s.c_str()).x; };
   if (wide(text) <= width) return text;
+  constexpr std::size_t kMost = 1000;  // a window that is open for days
+  if (cut().size() < kMost) cut().insert(text);
   // Whole characters: bytes that go on with one are not where it is parted.
   const auto whole = [&](std::size_t n) {
     while (n > 0 && n < text.size() && (static_cast<unsigned char>(text[n]) & 0xC0) == 0x80) --n;

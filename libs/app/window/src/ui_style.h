@@ -2,6 +2,7 @@
 #pragma once
 #include <imgui.h>
 
+#include <set>
 #include <string>
 
 #include "palette.h"
@@ -43,6 +44,8 @@ void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour
                  bool middle = false, bool bold = false);
 /// Of a text that is too long for its place: without its middle, "superior ... left side".
 [[nodiscard]] std::string shortened(const std::string& text, float width, float size, ImFont* font = nullptr);
+/// Texts that had no room and lost their middle since the program began, each once: what a test of the window asks for.
+[[nodiscard]] const std::set<std::string>& texts_cut();
 /// The sign of a state: a disc for 0 corners.
 void draw_sign(ImDrawList* draw, ImVec2 centre, float radius, int corners, Colour colour);
 

@@ -4,6 +4,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "osteo/core/base/translate.h"
+#include "ui_style.h"
+
 namespace osteo::inline app {
 namespace {
 
@@ -108,6 +111,8 @@ void write_window_state(const WindowState& s, const std::filesystem::path& file)
                                  {"found", s.room.found},
                                  {"focus", s.room.focus},
                                  {"view", s.room.view},
+                                 {"texts_cut", texts_cut()},
+                                 {"language", enum_names(Language{})[static_cast<std::size_t>(language())]},
                                  {"one_to", s.motion.one_to},
                                  {"clutch", s.motion.clutch},
                                  {"wrist_rest", s.motion.wrist_rest},

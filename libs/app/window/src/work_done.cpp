@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "state_facts.h"
 
@@ -13,7 +14,27 @@ template <class... A>
 std::string text_of(const char* format, A... a) {
   char out[160];
   std::snprintf(out, sizeof out, format, a...);
-  return out;
+  return shown_figures(out);
+}
+
+// Of what does not turn: "saw", "shaft", "plate screws".
+std::string cut_text(const std::string& by, double mm3) {
+  const std::initializer_list<Place> places{{"tool", tr(by)}, {"mm3", text_of("%.2g", mm3)}};
+  if (mm3 <= 0) return filled(tr("contact with the {tool}"), places);
+  if (by == "saw") return filled(tr("INJURED: cut through by the saw, {mm3} mm³ of it"), places);
+  return filled(tr("INJURED: the {tool} went through it, {mm3} mm³ of it"), places);
+}
+
+std::string injured_text(double seconds, double by_burr_mm3, double by_saw_mm3) {
+  const std::initializer_list<Place> places{
+      {"time", shown_number(seconds, 2)}, {"mm3", text_of("%.2g", by_burr_mm3)}, {"sawn", text_of("%.2g", by_saw_mm3)}};
+  if (by_burr_mm3 > 0 && by_saw_mm3 > 0)
+    return filled(
+        tr("INJURED: touched by the rotating burr for {time} s, {mm3} mm³ of it, {sawn} mm³ of it by the saw"), places);
+  if (by_burr_mm3 > 0) return filled(tr("INJURED: touched by the rotating burr for {time} s, {mm3} mm³ of it"), places);
+  if (by_saw_mm3 > 0)
+    return filled(tr("INJURED: touched by the rotating burr for {time} s, {sawn} mm³ of it by the saw"), places);
+  return filled(tr("INJURED: touched by the rotating burr for {time} s"), places);
 }
 
 }  // namespace
@@ -38,8 +59,9 @@ void SessionFacts::add_cut(const std::string& structure, const std::string& by, 
 
 std::string kept_text(const std::filesystem::path& folder) {
   std::error_code ec;
-  return std::filesystem::exists(folder, ec) ? "What was recorded is kept: " + folder.string()
-                                             : "Nothing of it is kept: " + folder.string() + " was deleted or moved";
+  return std::filesystem::exists(folder, ec)
+             ? filled(tr("What was recorded is kept: {folder}"), {{"folder", folder.string()}})
+             : filled(tr("Nothing of it is kept: {folder} was deleted or moved"), {{"folder", folder.string()}});
 }
 
 EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
@@ -47,48 +69,46 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
   const auto add = [&](std::string what, std::string value, Nearness nearness = Nearness::unknown) {
     out.lines.push_back({std::move(what), std::move(value), nearness});
   };
-  add("time", clock_text(session.seconds));
-  if (session.score) add("score", *session.score);
-  add("bone drilled away", text_of("%.1f mm³", session.removed_mm3));
+  add(tr("time"), clock_text(session.seconds));
+  if (session.score) add(tr("score"), *session.score);
+  add(tr("bone drilled away"), text_of("%.1f mm³", session.removed_mm3));
   for (const auto& [tool, done] : work.by_tool()) {
-    add("    " + instrument_of(tool).name, text_of("%.1f mm³ in ", done.removed_mm3) +
-                                               clock_text(static_cast<double>(done.ticks_turning) / session.rate_hz));
+    add("    " + tr_sized(instrument_of(tool).name),
+        filled(tr("{mm3} mm³ in {time}"),
+               {{"mm3", shown_number(done.removed_mm3, 1)},
+                {"time", clock_text(static_cast<double>(done.ticks_turning) / session.rate_hz)}}));
   }
-  if (work.undone() > 0) add("taken back", text_of("%zu", work.undone()));
-  if (work.cuts() > 0 || session.sawn_mm3 > 0) add("saw cuts", text_of("%zu, %.1f mm³", work.cuts(), session.sawn_mm3));
-  if (session.tissue_mm3 > 0) add("soft tissue cut off", text_of("%.1f mm³", session.tissue_mm3));
-  if (session.bodies > 1) add("fragments of bone", text_of("%zu", session.bodies));
-  for (const std::string& p : session.plates) add("plate", p);
-  if (session.has_structures && session.structures.empty()) add("critical structures", "none came near", Nearness::far);
+  if (work.undone() > 0) add(tr("taken back"), text_of("%zu", work.undone()));
+  if (work.cuts() > 0 || session.sawn_mm3 > 0)
+    add(tr("saw cuts"), text_of("%zu, %.1f mm³", work.cuts(), session.sawn_mm3));
+  if (session.tissue_mm3 > 0) add(tr("soft tissue cut off"), text_of("%.1f mm³", session.tissue_mm3));
+  if (session.bodies > 1) add(tr("fragments of bone"), text_of("%zu", session.bodies));
+  for (const std::string& p : session.plates) add(tr("plate"), p);
+  if (session.has_structures && session.structures.empty())
+    add(tr("critical structures"), tr("none came near"), Nearness::far);
   for (const SessionFacts::Structure& s : session.structures) {
-    std::string drilled;  // by a tool that turns: said where its time is
+    double by_burr_mm3 = 0, by_hand_saw_mm3 = 0;  // by a tool that turns: said where its time is
     bool met = false;
     for (const auto& [by, mm3] : s.cut_mm3) {
-      const std::string volume = text_of("%.2g mm³ of it", mm3);
       if (by == "burr" || by == "hand saw") {
-        if (mm3 > 0) drilled += ", " + volume + (by == "burr" ? "" : " by the saw");
+        (by == "burr" ? by_burr_mm3 : by_hand_saw_mm3) += std::max(0.0, mm3);
         continue;
       }
       met = true;
-      if (mm3 <= 0) {
-        add(s.name, "contact with the " + by, Nearness::close);
-      } else {
-        add(s.name,
-            "INJURED: " + (by == "saw" ? "cut through by the saw, " : "the " + by + " went through it, ") + volume,
-            Nearness::touched);
-      }
+      add(tr(s.name), cut_text(by, mm3), mm3 <= 0 ? Nearness::close : Nearness::touched);
     }
     if (s.injured_s > 0) {
-      add(s.name, text_of("INJURED: touched by the rotating burr for %.2f s", s.injured_s) + drilled,
-          Nearness::touched);
+      add(tr(s.name), injured_text(s.injured_s, by_burr_mm3, by_hand_saw_mm3), Nearness::touched);
     } else if (s.touched_s > 0) {
-      add(s.name, text_of("touched for %.2f s, drill off", s.touched_s), Nearness::close);
+      add(tr(s.name), filled(tr("touched for {time} s, drill off"), {{"time", shown_number(s.touched_s, 2)}}),
+          Nearness::close);
     } else if (!met) {
-      add(s.name, text_of("never nearer than %.1f mm", s.least_clearance_mm),
+      add(tr(s.name), filled(tr("never nearer than {mm} mm"), {{"mm", shown_number(s.least_clearance_mm, 1)}}),
           s.least_clearance_mm < StateFacts::kNearMm ? Nearness::near : Nearness::far);
     }
   }
-  out.summary = clock_text(session.seconds) + text_of(" min, %.0f mm³ of bone", session.removed_mm3);
+  out.summary = filled(tr("{time} min, {mm3} mm³ of bone"),
+                       {{"time", clock_text(session.seconds)}, {"mm3", shown_number(session.removed_mm3, 0)}});
   if (session.score) out.summary += ", " + *session.score;
   out.warnings = session.warnings;
   out.folder = session.folder;

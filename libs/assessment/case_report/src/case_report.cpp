@@ -8,6 +8,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/core/report/sheet.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/imaging/io/surface_io.h"
@@ -139,11 +140,11 @@ void add_row(Sheet& s, const Pictures& pictures, double height_mm,
 
 sheet::Table structure_table(const std::vector<StructureMeasure>& measures) {
   sheet::Table t;
-  t.head = {"structure", "volume", "parts", "length", "nearest to it", "usual", ""};
+  t.head = {tr("structure"), tr("volume"), tr("parts"), tr("length"), tr("nearest to it"), tr("usual"), ""};
   t.widths = {18, 12, 10, 11, 25, 30, 17};
   const auto name_of = [&](std::uint8_t value) {
     for (const auto& m : measures) {
-      if (m.structure.value == value) return m.structure.name;
+      if (m.structure.value == value) return tr(m.structure.name);
     }
     return std::string();
   };
@@ -151,19 +152,22 @@ sheet::Table structure_table(const std::vector<StructureMeasure>& measures) {
     const Plausibility p = plausibility_of(m);
     std::string near;
     for (std::size_t g = 0; g < std::min<std::size_t>(2, m.gaps.size()); ++g)
-      near += (near.empty() ? "" : "; ") + name_of(m.gaps[g].other) +
-              (m.gaps[g].mm < 0.05 ? " touches" : " " + number_text(m.gaps[g].mm, 1) + " mm");
+      near += (near.empty() ? "" : "; ") +
+              filled(m.gaps[g].mm < 0.05 ? tr("{structure} touches") : "{structure} {mm} mm",
+                     {{"structure", name_of(m.gaps[g].other)}, {"mm", number_text(m.gaps[g].mm, 1)}});
     std::string pieces = std::to_string(m.parts);
-    if (m.specks > 0) pieces += " and " + std::to_string(m.specks) + (m.specks == 1 ? " speck" : " specks");
-    t.rows.push_back({{m.structure.name, Tone::plain},
+    if (m.specks > 0)
+      pieces = filled(tr_n("{parts} and {n} speck", "{parts} and {n} specks", static_cast<double>(m.specks)),
+                      {{"parts", pieces}, {"n", std::to_string(m.specks)}});
+    t.rows.push_back({{tr(m.structure.name), Tone::plain},
                       {volume_text(m.volume_mm3), Tone::plain},
                       {pieces, Tone::plain},
                       {m.length_mm > 0 ? number_text(m.length_mm, 0) + " mm" : "", Tone::plain},
                       {near, Tone::plain},
-                      {p.known ? p.expected : "no usual size known", p.known ? Tone::plain : Tone::quiet},
+                      {p.known ? p.expected : tr("no usual size known"), p.known ? Tone::plain : Tone::quiet},
                       {!p.known ? ""
-                       : p.fits ? "plausible"
-                                : "look: " + p.doubt,
+                       : p.fits ? tr("plausible")
+                                : filled(tr("look: {why}"), {{"why", p.doubt}}),
                        !p.known ? Tone::plain
                        : p.fits ? Tone::good
                                 : Tone::caution}});
@@ -176,23 +180,30 @@ std::string sources_of(const std::vector<StructureMeasure>& measures) {
   for (const StructureMeasure& m : measures) {
     const Plausibility p = plausibility_of(m);
     if (!p.known) continue;
-    const std::string text =
-        lower_case(m.structure.name).find("facial") != std::string::npos ? "facial nerve: " + p.source : p.source;
+    const std::string text = lower_case(m.structure.name).find("facial") != std::string::npos
+                                 ? filled(tr("facial nerve: {source}"), {{"source", p.source}})
+                                 : p.source;
     if (std::find(said.begin(), said.end(), text) == said.end()) said.push_back(text);
   }
   std::string all;
-  for (const std::string& s : said) all += (all.empty() ? "Usual sizes: " : "; ") + s;
-  return all.empty() ? all : all + ". Lengths are along the structure, up to 8 % long; distances to half a voxel.";
+  for (const std::string& s : said) all += (all.empty() ? "" : "; ") + s;
+  return all.empty()
+             ? all
+             : filled(tr("Usual sizes: {sources}. Lengths are along the structure, up to 8 % long; distances to "
+                         "half a voxel."),
+                      {{"sources", all}});
 }
 
 Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& asked_for,
                const std::vector<std::string>& left_out) {
   const CaseFacts& f = c.facts;
   Sheet s;
-  s.title = "Case report";
+  s.title = tr("Case report");
   s.code = case_code(folder);
-  s.footer = "Osteotome " + std::string(program_version()) +
-             ". Not a medical device. The cuts are pictures of the patient: keep this page as you keep the scan.";
+  s.footer =
+      filled(tr("Osteotome {version}. Not a medical device. The cuts are pictures of the patient: keep this page as "
+                "you keep the scan."),
+             {{"version", std::string(program_version())}});
   s.blocks.push_back({verdict_band(f)});
 
   Rows rows = scan_rows(f);
@@ -202,118 +213,123 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
 
   const bool scan = c.pictures.contains("soft-axial");
   const Vec3 p = cut_point(c.subject);
-  s.blocks.push_back(
-      {sheet::Heading{c.subject.measures.empty() ? "Cuts through the middle of the bone"
-                                                 : "Cuts through the " + c.subject.measures.front().structure.name}});
+  s.blocks.push_back({sheet::Heading{c.subject.measures.empty()
+                                         ? std::string(tr("Cuts through the middle of the bone"))
+                                         : filled(tr("Cuts through the {structure}"),
+                                                  {{"structure", tr(c.subject.measures.front().structure.name)}})}});
   if (scan)
     add_row(s, c.pictures, 62,
-            {{"soft-axial", "soft tissue (-160 to 240 HU); axial, seen from the feet"},
-             {"soft-coronal", "coronal, seen from the front"},
-             {"soft-sagittal", "sagittal, front to the left"}});
+            {{"soft-axial", tr("soft tissue (-160 to 240 HU); axial, seen from the feet")},
+             {"soft-coronal", tr("coronal, seen from the front")},
+             {"soft-sagittal", tr("sagittal, front to the left")}});
   add_row(s, c.pictures, 62,
-          {{"bone-axial", (scan ? "bone (-500 to 1500 HU); z " : "bone only: the scan was not at hand; z ") +
-                              number_text(p.z, 0) + " mm"},
+          {{"bone-axial", filled(scan ? tr("bone (-500 to 1500 HU); z {mm} mm")
+                                      : tr("bone only: the scan was not at hand; z {mm} mm"),
+                                 {{"mm", number_text(p.z, 0)}})},
            {"bone-coronal", "y " + number_text(p.y, 0) + " mm"},
            {"bone-sagittal", "x " + number_text(p.x, 0) + " mm"}});
   s.blocks.push_back({sheet::Paragraph{
-      "Orange: where the bone of the case ends. " + std::string(c.structures ? "Other colours: structures. " : "") +
-          "L and R are the patient's. x, y, z grow to the patient's left, back and head.",
+      c.structures
+          ? tr("Orange: where the bone of the case ends. Other colours: structures. L and R are the patient's. "
+               "x, y, z grow to the patient's left, back and head.")
+          : tr("Orange: where the bone of the case ends. L and R are the patient's. x, y, z grow to the "
+               "patient's left, back and head."),
       Tone::quiet}});
   std::vector<std::pair<std::string, std::string>> slices;
   for (int n = 1; n <= 8; ++n)
-    slices.emplace_back("slice-" + std::to_string(n), n == 1 ? "lowest" : n == 8 ? "highest" : "");
-  s.blocks.push_back({sheet::Heading{"Eight slices, from the feet up"}});
+    slices.emplace_back("slice-" + std::to_string(n), n == 1 ? tr("lowest") : n == 8 ? tr("highest") : "");
+  s.blocks.push_back({sheet::Heading{tr("Eight slices, from the feet up")}});
   add_row(s, c.pictures, 27, slices);
-  s.blocks.push_back({sheet::Heading{"The bone from six sides"}});
+  s.blocks.push_back({sheet::Heading{tr("The bone from six sides")}});
   add_row(s, c.pictures, 32,
-          {{"side-front", "front"},
-           {"side-back", "back"},
-           {"side-left", "patient's left"},
-           {"side-right", "patient's right"},
-           {"side-above", "above"},
-           {"side-below", "below"}});
+          {{"side-front", tr_of("seen from", "front")},
+           {"side-back", tr_of("seen from", "back")},
+           {"side-left", tr("patient's left")},
+           {"side-right", tr("patient's right")},
+           {"side-above", tr_of("seen from", "above")},
+           {"side-below", tr_of("seen from", "below")}});
 
   s.blocks.push_back({sheet::PageBreak{}});
   // Where the threshold lies, beside what was taken off.
-  SheetBlocks left{{sheet::Heading{"Values of the scan, and the threshold"}}},
-      right{{sheet::Heading{"Taken off, and left on"}}};
+  SheetBlocks left{{sheet::Heading{tr("Values of the scan, and the threshold")}}},
+      right{{sheet::Heading{tr("Taken off, and left on")}}};
   if (!c.histogram.empty()) {
     sheet::Bars bars{
-        "histogram", kHistogramFrom, kHistogramTo, 500, c.histogram, {}, "HU; voxels on a logarithmic scale", 30};
+        "histogram", kHistogramFrom, kHistogramTo, 500, c.histogram, {}, tr("HU; voxels on a logarithmic scale"), 30};
     if (const auto v = f.reported("threshold", "soft_tissue_hu"))
-      bars.marks.push_back({*v, "soft tissue " + number_text(*v, 0), Tone::quiet});
+      bars.marks.push_back({*v, filled(tr("soft tissue {hu}"), {{"hu", number_text(*v, 0)}}), Tone::quiet});
     if (const auto v = f.reported("threshold", "lower_hu"))
-      bars.marks.push_back({*v, "threshold " + number_text(*v, 0) + " HU", Tone::bad});
+      bars.marks.push_back({*v, filled(tr("threshold {hu} HU"), {{"hu", number_text(*v, 0)}}), Tone::bad});
     if (const auto v = f.reported("threshold", "dense_bone_hu"))
-      bars.marks.push_back({*v, "dense bone " + number_text(*v, 0), Tone::quiet});
+      bars.marks.push_back({*v, filled(tr("dense bone {hu}"), {{"hu", number_text(*v, 0)}}), Tone::quiet});
     left.push_back({bars});
   } else {
-    left.push_back({sheet::Paragraph{"The histogram needs the scan, which was not at hand.", Tone::quiet}});
+    left.push_back({sheet::Paragraph{tr("The histogram needs the scan, which was not at hand."), Tone::quiet}});
   }
   right.push_back({sheet::Facts{removed_rows(f), 1}});
   sheet::Pictures removed{{}, 36};
   for (const char* const id : {"removed-axial", "removed-front", "removed-side"}) {
     if (const auto it = c.pictures.find(id); it != c.pictures.end())
       removed.row.push_back({id, it->second,
-                             std::string(id) == "removed-axial"   ? "from the feet"
-                             : std::string(id) == "removed-front" ? "from the front"
-                                                                  : "from the left"});
+                             std::string(id) == "removed-axial"   ? tr("from the feet")
+                             : std::string(id) == "removed-front" ? tr("from the front")
+                                                                  : tr("from the left")});
   }
   if (!removed.row.empty()) {
     right.push_back({removed});
     right.push_back({sheet::Paragraph{
-        "Red: above the threshold, but not in the case. Grey: the bone of the case, seen through.", Tone::quiet}});
+        tr("Red: above the threshold, but not in the case. Grey: the bone of the case, seen through."), Tone::quiet}});
   } else {
     right.push_back({sheet::Paragraph{
-        scan ? "Nothing above the threshold was taken off." : "Pictures of it need the scan.", Tone::quiet}});
+        scan ? tr("Nothing above the threshold was taken off.") : tr("Pictures of it need the scan."), Tone::quiet}});
   }
   s.blocks.push_back({sheet::Columns{{left, right}, {}}});
 
-  SheetBlocks thin{{sheet::Heading{"Thin bone"}}}, small{{sheet::Heading{"What the scan can resolve"}}};
+  SheetBlocks thin{{sheet::Heading{tr("Thin bone")}}}, small{{sheet::Heading{tr("What the scan can resolve")}}};
   sheet::Pictures thin_row{{}, 46};
   for (const auto& [id, caption] :
-       {std::pair{"thin-left-front", "from the left front"}, std::pair{"thin-below", "from below"}}) {
+       {std::pair{"thin-left-front", tr("from the left front")}, std::pair{"thin-below", tr("from below")}}) {
     if (const auto it = c.pictures.find(id); it != c.pictures.end()) thin_row.row.push_back({id, it->second, caption});
   }
   if (!thin_row.row.empty()) thin.push_back({thin_row});
   if (c.thin_percent >= 0)
-    thin.push_back({sheet::Paragraph{"Red: less than 1 mm of bone beneath the surface (" +
-                                     number_text(c.thin_percent, c.thin_percent < 9.95 ? 1 : 0) +
-                                     " % of it); yellow 1 mm; pale 2 mm and more. Bone thinner than a voxel of the "
-                                     "scan is too thin or missing here."}});
+    thin.push_back({sheet::Paragraph{
+        filled(tr("Red: less than 1 mm of bone beneath the surface ({share} % of it); yellow 1 mm; pale 2 mm and more. "
+                  "Bone thinner than a voxel of the scan is too thin or missing here."),
+               {{"share", number_text(c.thin_percent, c.thin_percent < 9.95 ? 1 : 0)}})}});
   small.push_back({resolution_table(f)});
-  small.push_back({sheet::Paragraph{
-      "Sizes are of adults, from textbooks. Two voxels across are the least by which a structure is seen everywhere.",
-      Tone::quiet}});
+  small.push_back({sheet::Paragraph{tr("Sizes are of adults, from textbooks. Two voxels across are the least by which "
+                                       "a structure is seen everywhere."),
+                                    Tone::quiet}});
   for (const auto& note : verdict_notes(f)) small.push_back({note});
   s.blocks.push_back({sheet::Columns{{thin, small}, {}}});
 
-  s.blocks.push_back({sheet::Heading{"Structures"}});
+  s.blocks.push_back({sheet::Heading{tr("Structures")}});
   if (c.subject.measures.empty()) {
     s.blocks.push_back(
-        {sheet::Paragraph{"None were given: nerves and vessels are not marked in this case.", Tone::caution}});
+        {sheet::Paragraph{tr("None were given: nerves and vessels are not marked in this case."), Tone::caution}});
   } else if (const auto it = c.pictures.find("structures"); it != c.pictures.end()) {
     s.blocks.push_back({sheet::Columns{
         {{{structure_table(c.subject.measures)}, {sheet::Paragraph{sources_of(c.subject.measures), Tone::quiet}}},
-         {{sheet::Pictures{{{"structures", it->second, "structures in clear bone"}}, 48}}}},
+         {{sheet::Pictures{{{"structures", it->second, tr("structures in clear bone")}}, 48}}}},
         {76, 24}}});
   } else {
     s.blocks.push_back({structure_table(c.subject.measures)});
     s.blocks.push_back({sheet::Paragraph{sources_of(c.subject.measures), Tone::quiet}});
   }
 
-  s.blocks.push_back({sheet::Heading{"How it was made"}});
+  s.blocks.push_back({sheet::Heading{tr("How it was made")}});
   const auto manifest_text = [&](const char* key) {
     const Json* const v = f.manifest().find(key);
-    return v == nullptr || v->text() == nullptr ? std::string("not known") : *v->text();
+    return v == nullptr || v->text() == nullptr ? std::string(tr("not known")) : *v->text();
   };
   s.blocks.push_back(
-      {sheet::Facts{{{"Asked for", asked_for.substr(std::min(asked_for.size(), asked_for.find_first_not_of(' ')))},
-                     {"Pipeline", manifest_text("pipeline")},
-                     {"Made by", "Osteotome " + manifest_text("program")},
-                     {"Bone", c.bone->hash().substr(0, 16)},
-                     {"Content of the case", case_hash(folder).substr(0, 16)},
-                     {"Left out", left_out.empty() ? "nothing" : left_out.front()}},
+      {sheet::Facts{{{tr("Asked for"), asked_for.substr(std::min(asked_for.size(), asked_for.find_first_not_of(' ')))},
+                     {tr("Pipeline"), manifest_text("pipeline")},
+                     {tr("Made by"), "Osteotome " + manifest_text("program")},
+                     {tr("Bone"), c.bone->hash().substr(0, 16)},
+                     {tr("Content of the case"), case_hash(folder).substr(0, 16)},
+                     {tr("Left out"), left_out.empty() ? std::string(tr("nothing")) : tr(left_out.front())}},
                     2}});
 
   const ApprovalNow now = approval_of(folder);
@@ -324,13 +340,14 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
                                                      : Tone::plain;
   if (now.approval) {
     line.by = now.approval->by;
-    line.date = now.approval->date;
+    line.date = shown_date(now.approval->date);
     line.note = now.approval->note;
-    line.state = now.state == ApprovalState::valid
-                     ? "Approved"
-                     : "Approved before the last change (" + now.changed + "): no longer valid";
+    line.state =
+        now.state == ApprovalState::valid
+            ? tr("Approved")
+            : filled(tr("Approved before the last change ({changed}): no longer valid"), {{"changed", now.changed}});
   } else {
-    line.state = "Not approved: sign here, or osteo approve CASE --by NAME --note TEXT";
+    line.state = tr("Not approved: sign here, or osteo approve CASE --by NAME --note TEXT");
   }
   s.blocks.push_back({line});
   return s;
@@ -409,7 +426,9 @@ CaseReport write_case_report(const fs::path& folder, const std::string& asked_fo
                              const Context& context) {
   CaseReport report{report_file(folder, ".html"), report_file(folder, ".pdf"), false, {}, {}};
   context.progress(0, "report");
-  if (approval_of(folder).state == ApprovalState::valid && has_full_report(folder) &&
+  const std::string earlier_language = mark_of_html(earlier_html(folder), "language");
+  const bool same_language = language_named(earlier_language.empty() ? "en" : earlier_language) == language();
+  if (approval_of(folder).state == ApprovalState::valid && has_full_report(folder) && same_language &&
       earlier_html(folder).find("class=\"signature good\"") != std::string::npos) {
     report.unchanged = true;
     return report;
@@ -429,12 +448,15 @@ CaseReport write_case_report(const fs::path& folder, const std::string& asked_fo
   }
   if (!c.pictures.contains("soft-axial"))
     report.left_out.emplace_back(
-        "soft tissue, histogram and what was taken off: these need the scan (osteo report CASE --scan SCAN)");
-  if (!c.pictures.contains("side-front")) report.left_out.emplace_back("the bone in 3D: the case holds no surface");
+        tr_later("soft tissue, histogram and what was taken off: these need the scan (osteo report CASE --scan SCAN)"));
+  if (!c.pictures.contains("side-front"))
+    report.left_out.emplace_back(tr_later("the bone in 3D: the case holds no surface"));
   Sheet s = sheet_of(folder, c, asked_for, report.left_out);
   s.marks["state"] = state;
+  if (language() != Language::english)
+    s.marks["language"] = enum_names(Language{})[static_cast<std::size_t>(language())];
   s.marks["left-out"] = report.left_out.empty() ? "" : "scan";
-  if (c.thin_percent >= 0) s.marks["thin-percent"] = number_text(c.thin_percent, 2);
+  if (c.thin_percent >= 0) s.marks["thin-percent"] = format_number(std::round(100 * c.thin_percent) / 100);
   context.progress(0.9, "report: pages");
   const std::string html = sheet_html(s);
   report.says_other = !earlier.empty() && html_without_signature(earlier) != html_without_signature(html);

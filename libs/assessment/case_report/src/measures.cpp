@@ -8,6 +8,7 @@
 
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/imaging/image/components.h"
 #include "osteo/simulation/bone/depth_map.h"
 
@@ -167,7 +168,7 @@ std::vector<StructureMeasure> measure_structures(const Labels& labels, const Con
     });
     m.middle_mm = f.world_from_index(
         {double(box.lo[0] + middle[0]), double(box.lo[1] + middle[1]), double(box.lo[2] + middle[2])});
-    if (part.voxels.size() <= kLongestPath && plausibility_of(m).expected.find(" long") != std::string::npos) {
+    if (part.voxels.size() <= kLongestPath && plausibility_of(m).has_length) {
       for (std::uint32_t v = 0; v < part.voxels.size(); ++v)
         part.number[Part::name(part.voxels[v][0], part.voxels[v][1], part.voxels[v][2])] = v;
       const auto end = farthest(part, f.spacing_mm, 0).first;
@@ -202,7 +203,7 @@ struct Usual {
   const char* source;
 };
 
-constexpr const char* kTextbook = "textbook anatomy";
+constexpr const char* kTextbook = tr_later("textbook anatomy");
 
 const std::vector<Usual>& usual() {
   // In this order: "facial nerve" before "nerve". Ranges are wide: what lies outside is worth a look, not wrong.
@@ -213,7 +214,7 @@ const std::vector<Usual>& usual() {
        25,
        55,
        1,
-       "canal 33.3 +- 2.0 mm, 47 ears (doi 10.15953/j.ctta.2026.163); with the meatal part up to 50"},
+       tr_later("canal 33.3 +- 2.0 mm, 47 ears (doi 10.15953/j.ctta.2026.163); with the meatal part up to 50")},
       {{"chorda"}, 0.5, 30, 8, 45, 1, kTextbook},
       {{"alveolar", "mandibular nerve", "mandibular canal"}, 100, 900, 40, 100, 1, kTextbook},
       {{"sigmoid", "transverse sinus"}, 1000, 20000, 25, 200, 1, kTextbook},
@@ -229,7 +230,7 @@ const std::vector<Usual>& usual() {
        0,
        0,
        0,
-       "classes below 5, 5 to 8, above 8 mL (CT series); mean 9 mL of 8 bones (micro-CT)"},
+       tr_later("classes below 5, 5 to 8, above 8 mL (CT series); mean 9 mL of 8 bones (micro-CT)")},
       {{"ear canal", "external canal", "auditory canal"}, 400, 2500, 0, 0, 1, kTextbook},
       {{"tympanic", "middle ear"}, 300, 4000, 0, 0, 1, kTextbook},
   };
@@ -237,7 +238,7 @@ const std::vector<Usual>& usual() {
 }
 
 std::string whole(double v) {
-  return v >= 10 ? std::to_string(std::lround(v)) : format_number(std::round(v * 10) / 10);
+  return v >= 10 ? std::to_string(std::lround(v)) : shown_figures(format_number(std::round(v * 10) / 10));
 }
 
 }  // namespace
@@ -250,20 +251,27 @@ Plausibility plausibility_of(const StructureMeasure& m) {
       continue;
     const int sides = m.on_both_sides() ? 2 : 1;
     p.known = true;
-    p.source = u.source;
+    p.source = tr(u.source);
+    p.has_length = u.to_mm > 0;
     const auto add = [](std::string& text, const std::string& more) { text += (text.empty() ? "" : ", ") + more; };
-    if (u.to_mm > 0) add(p.expected, whole(u.from_mm) + " to " + whole(u.to_mm) + " mm long");
+    const auto range = [](const char* text, double from, double to) {
+      return filled(text, {{"from", whole(from)}, {"to", whole(to)}});
+    };
+    if (u.to_mm > 0) add(p.expected, range(tr("{from} to {to} mm long"), u.from_mm, u.to_mm));
     if (u.to_mm3 > 0)
-      add(p.expected, u.to_mm3 >= 1000 ? whole(u.from_mm3 / 1000) + " to " + whole(u.to_mm3 / 1000) + " mL"
-                                       : whole(u.from_mm3) + " to " + whole(u.to_mm3) + " mm3");
-    if (u.parts > 0) add(p.expected, u.parts == 1 ? "one piece" : "up to " + std::to_string(u.parts) + " fragments");
-    if (sides == 2) p.expected += ", each side";
+      add(p.expected, u.to_mm3 >= 1000 ? range(tr("{from} to {to} mL"), u.from_mm3 / 1000, u.to_mm3 / 1000)
+                                       : range(tr("{from} to {to} mm3"), u.from_mm3, u.to_mm3));
+    if (u.parts > 0)
+      add(p.expected, u.parts == 1 ? std::string(tr("one piece"))
+                                   : filled(tr("up to {n} fragments"), {{"n", std::to_string(u.parts)}}));
+    if (sides == 2) add(p.expected, tr("each side"));
     const double volume = m.volume_mm3 / sides;
-    if (volume < u.from_mm3) add(p.doubt, "small");
-    if (u.to_mm3 > 0 && volume > u.to_mm3) add(p.doubt, "large");
-    if (u.to_mm > 0 && m.length_mm > 0 && m.length_mm < u.from_mm) add(p.doubt, "short");
-    if (u.to_mm > 0 && m.length_mm > u.to_mm) add(p.doubt, "long");
-    if (u.parts > 0 && m.parts > u.parts * sides) add(p.doubt, "in " + std::to_string(m.parts) + " fragments");
+    if (volume < u.from_mm3) add(p.doubt, tr_of("size of a structure", "small"));
+    if (u.to_mm3 > 0 && volume > u.to_mm3) add(p.doubt, tr_of("size of a structure", "large"));
+    if (u.to_mm > 0 && m.length_mm > 0 && m.length_mm < u.from_mm) add(p.doubt, tr_of("size of a structure", "short"));
+    if (u.to_mm > 0 && m.length_mm > u.to_mm) add(p.doubt, tr_of("size of a structure", "long"));
+    if (u.parts > 0 && m.parts > u.parts * sides)
+      add(p.doubt, filled(tr("in {n} fragments"), {{"n", std::to_string(m.parts)}}));
     p.fits = p.doubt.empty();
     break;
   }

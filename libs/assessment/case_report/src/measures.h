@@ -32,7 +32,7 @@ struct StructureMeasure {
 [[nodiscard]] std::vector<StructureMeasure> measure_structures(const Labels& labels, const Context& context);
 
 struct Plausibility {
-  bool known = false, fits = true;
+  bool known = false, fits = true, has_length = false;
   std::string expected;  ///< "33 mm (29 to 50), one piece"
   std::string doubt;     ///< why it does not fit
   std::string source;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/core/base/translate.h"
+
 namespace osteo::inline assessment {
 namespace {
 
@@ -13,12 +15,12 @@ std::string in(double v, const std::string& unit) {
 std::string percent(double share) {
   const double p = 100 * share;
   // What is not all is not told as all, and what is not nothing not as nothing.
-  if (p > 0 && p < 1) return "less than 1 %";
-  if (p < 100 && p > 99) return "over 99 %";
+  if (p > 0 && p < 1) return tr("less than 1 %");
+  if (p < 100 && p > 99) return tr("over 99 %");
   return format_number(std::round(p)) + " %";
 }
 std::string times(double n) {
-  return n == 1 ? "once" : n == 2 ? "twice" : reported_number(n) + " times";
+  return n == 1 ? tr("once") : n == 2 ? tr("twice") : filled(tr("{n} times"), {{"n", reported_number(n)}});
 }
 std::string slug(const std::string& text) {
   std::string out;
@@ -47,7 +49,7 @@ class Finder {
       : score_(score), structures_(structures), procedure_(procedure), limits_(limits), out_(out) {}
 
   void all() {
-    out_.words = score_.words;
+    for (const std::string& w : score_.words) out_.words.push_back(tr(w));
     summary();
     structures();
     hidden();
@@ -125,31 +127,25 @@ class Finder {
     const auto duration = value("duration_s"), drilling = value("drilling_s"), removed = value("removed_mm3"),
                sawn = value("sawn_mm3");
     if (duration) {
-      std::string s = "The session lasted " + reported_seconds(*duration);
-      s += drilling && *drilling > 0 ? "; for " + reported_seconds(*drilling) + " of it a burr was drilling."
-                                     : "; no burr drilled.";
-      out_.summary.push_back(s);
+      out_.summary.push_back(
+          filled(drilling && *drilling > 0 ? tr("The session lasted {time}; for {drilling} of it a burr was drilling.")
+                                           : tr("The session lasted {time}; no burr drilled."),
+                 {{"time", reported_seconds(*duration)}, {"drilling", reported_seconds(drilling.value_or(0))}}));
     }
-    if (removed && *removed > 0) {
-      std::string s = "Burrs took " + in(*removed, "mm3") + " of bone";
-      if (sawn && *sawn > 0) s += " and saws " + in(*sawn, "mm3");
-      out_.summary.push_back(s + ".");
-    } else if (sawn && *sawn > 0) {
-      out_.summary.push_back("Saws took " + in(*sawn, "mm3") + " of bone, burrs none.");
-    } else {
-      out_.summary.push_back("No bone was removed.");
-    }
-    if (!score_.procedure.empty() && !score_.items.empty()) {
-      std::string s = score_.judged() == 0 ? "No item of the scale could be judged."
-                                           : std::to_string(score_.passed()) + " of " +
-                                                 std::to_string(score_.judged()) + " items of the scale passed";
-      if (score_.judged() > 0) {
-        if (score_.judged() < score_.items.size())
-          s += "; " + std::to_string(score_.items.size() - score_.judged()) + " could not be judged";
-        s += ".";
-      }
-      out_.summary.push_back(s);
-    }
+    const bool drilled = removed && *removed > 0, cut = sawn && *sawn > 0;
+    out_.summary.push_back(filled(drilled && cut ? tr("Burrs took {bone} of bone and saws {sawn}.")
+                                  : drilled      ? tr("Burrs took {bone} of bone.")
+                                  : cut          ? tr("Saws took {sawn} of bone, burrs none.")
+                                                 : tr("No bone was removed."),
+                                  {{"bone", in(removed.value_or(0), "mm3")}, {"sawn", in(sawn.value_or(0), "mm3")}}));
+    if (score_.procedure.empty() || score_.items.empty()) return;
+    const std::size_t left = score_.items.size() - score_.judged();
+    out_.summary.push_back(filled(score_.judged() == 0 ? tr("No item of the scale could be judged.")
+                                  : left > 0 ? tr("{n} of {all} items of the scale passed; {left} could not be judged.")
+                                             : tr("{n} of {all} items of the scale passed."),
+                                  {{"n", std::to_string(score_.passed())},
+                                   {"all", std::to_string(score_.judged())},
+                                   {"left", std::to_string(left)}}));
   }
 
   [[nodiscard]] double taken_by(CutBy by, const std::string& structure) const {
@@ -165,26 +161,48 @@ class Finder {
       const char *id, *through, *touched, *why;
     };
     const Words words =
-        by == CutBy::saw ? Words{"cut", "The saw cut through the ", "The saw's cut was in contact with the ",
-                                 "Cut through: it lay in the path of the blade, as far as that was in bone."}
+        by == CutBy::saw
+            ? Words{"cut", tr("The saw cut through the {structure}: {mm3} of it."),
+                    tr("The saw's cut was in contact with the {structure} and removed nothing of it that can be "
+                       "measured."),
+                    tr("Cut through: it lay in the path of the blade, as far as that was in bone.")}
         : by == CutBy::shaft
-            ? Words{"shaft", "A shaft went through the ", "A shaft was in contact with the ",
-                    "The part of it that lay inside the shaft, on its way."}
-            : Words{"screws", "Screws of a plate went through the ", "Screws of a plate were in contact with the ",
-                    "The part of it that lay inside the screws, as long as they are drawn."};
+            ? Words{"shaft", tr("A shaft went through the {structure}: {mm3} of it."),
+                    tr("A shaft was in contact with the {structure} and removed nothing of it that can be measured."),
+                    tr("The part of it that lay inside the shaft, on its way.")}
+            : Words{"screws", tr("Screws of a plate went through the {structure}: {mm3} of it."),
+                    tr("Screws of a plate were in contact with the {structure} and removed nothing of it that can be "
+                       "measured."),
+                    tr("The part of it that lay inside the screws, as long as they are drawn.")};
     const double mm3 = taken_by(by, name);
     const bool contact = std::any_of(score_.moments.begin(), score_.moments.end(), [&](const Moment& m) {
       return m.what == CutMetric::moment_of(by, true) && m.structure == name;
     });
     if (mm3 <= 0 && !contact) return false;
-    ScoreFinding& f = add(words.id, name, mm3 > 0 ? FindingSeverity::serious : FindingSeverity::caution,
-                          mm3 > 0 ? words.through + name + ": " + in(mm3, "mm3") + " of it."
-                                  : words.touched + name + " and removed nothing of it that can be measured.",
-                          words.why);
+    ScoreFinding& f = add(
+        words.id, name, mm3 > 0 ? FindingSeverity::serious : FindingSeverity::caution,
+        filled(mm3 > 0 ? words.through : words.touched, {{"structure", tr(name)}, {"mm3", in(mm3, "mm3")}}), words.why);
     f.kind = mm3 > 0 ? "injury" : "touch";
     from(f, "cut_mm3", name, mm3, 0);
     moments(f, CutMetric::moment_of(by, mm3 <= 0), name);
     return true;
+  }
+
+  // What a burr and a saw reached so many times, and took of it or not.
+  static const char* reached_text(double burr, double saw, bool took) {
+    if (burr > 0 && saw > 0)
+      return took
+                 ? tr("A rotating burr reached the {structure} {times} and the running saw {sawn}, for {time} in all, "
+                      "and took {mm3} of it.")
+                 : tr("A rotating burr reached the {structure} {times} and the running saw {sawn}, for {time} in all.");
+    if (saw > 0)
+      return took ? tr("The running saw reached the {structure} {sawn}, for {time} in all, and took {mm3} of it.")
+                  : tr("The running saw reached the {structure} {sawn}, for {time} in all.");
+    if (burr > 0)
+      return took ? tr("A rotating burr reached the {structure} {times}, for {time} in all, and took {mm3} of it.")
+                  : tr("A rotating burr reached the {structure} {times}, for {time} in all.");
+    return took ? tr("A rotating burr reached the {structure}, for {time} in all, and took {mm3} of it.")
+                : tr("A rotating burr reached the {structure}, for {time} in all.");
   }
 
   void structures() {
@@ -201,23 +219,23 @@ class Finder {
           }));
         };
         const double burr = count("reached by a rotating burr"), saw = count("reached by the running saw");
-        std::string text = burr == 0 && saw > 0 ? "The running saw reached the " : "A rotating burr reached the ";
-        text += name;
-        if (burr > 0 || saw > 0) text += " " + times(burr > 0 ? burr : saw);
-        if (burr > 0 && saw > 0) text += " and the running saw " + times(saw);
         const double taken = taken_by(CutBy::burr, name) + taken_by(CutBy::hand_saw, name);
         ScoreFinding& f = add("injury", name, FindingSeverity::serious,
-                              text + ", for " + reported_seconds(injured) + " in all" +
-                                  (taken > 0 ? ", and took " + in(taken, "mm3") + " of it." : "."),
-                              "Reached: the tool's surface lay inside the structure's face.");
+                              filled(reached_text(burr, saw, taken > 0), {{"structure", tr(name)},
+                                                                          {"times", times(burr)},
+                                                                          {"sawn", times(saw)},
+                                                                          {"time", reported_seconds(injured)},
+                                                                          {"mm3", in(taken, "mm3")}}),
+                              tr("Reached: the tool's surface lay inside the structure's face."));
         from(f, "injured_s", name, injured, 0);
         moments(f, "reached by a rotating burr", name);
         moments(f, "reached by the running saw", name);
         std::sort(f.times_s.begin(), f.times_s.end());
       } else if (n > 0) {
-        ScoreFinding& f = add("touch", name, FindingSeverity::caution,
-                              "The burr touched the " + name + " " + times(n) + ", for " + reported_seconds(touched) +
-                                  ", without turning.");
+        ScoreFinding& f =
+            add("touch", name, FindingSeverity::caution,
+                filled(tr("The burr touched the {structure} {times}, for {time}, without turning."),
+                       {{"structure", tr(name)}, {"times", times(n)}, {"time", reported_seconds(touched)}}));
         from(f, "touches", name, n, 0);
         moments(f, "touched from the first tick on", name);
       }
@@ -232,39 +250,69 @@ class Finder {
     for (const auto& [name, mm] : values("saw_clearance_mm")) {
       if (mm < by_saw.second) by_saw = {name, mm};
       if (mm >= limits_.near_miss_mm) continue;
-      ScoreFinding& f = add("saw-clearance", name, FindingSeverity::note,
-                            "The saw's cut passed the " + name + " at " + in(mm, "mm") + ".",
-                            "Told below " + reported_number(limits_.near_miss_mm) + " mm.");
+      ScoreFinding& f = add(
+          "saw-clearance", name, FindingSeverity::note,
+          filled(tr("The saw's cut passed the {structure} at {mm}."), {{"structure", tr(name)}, {"mm", in(mm, "mm")}}),
+          below_text());
       f.kind = "clearance";
       from(f, "saw_clearance_mm", name, mm, limits_.near_miss_mm);
     }
     for (const auto& [name, c] : values("clearance_mm")) {
       if (c <= 0 || c >= limits_.near_miss_mm || value("touches", name).value_or(0) > 0) continue;
-      ScoreFinding& f =
-          add("clearance", name, FindingSeverity::note, "The burr came within " + in(c, "mm") + " of the " + name + ".",
-              "Told below " + reported_number(limits_.near_miss_mm) + " mm.");
+      ScoreFinding& f = add(
+          "clearance", name, FindingSeverity::note,
+          filled(tr("The burr came within {mm} of the {structure}."), {{"structure", tr(name)}, {"mm", in(c, "mm")}}),
+          below_text());
       from(f, "clearance_mm", name, c, limits_.near_miss_mm);
     }
     if (any && nearest.second > 0 && !cut) {
-      const std::string saw =
-          by_saw.second < 1e8 ? " The saw's cuts passed the " + by_saw.first + " at " + in(by_saw.second, "mm") + "."
-                              : "";
-      ScoreFinding& f = add("untouched", {}, FindingSeverity::good,
-                            (nearest.second < 1e8 ? "No structure was touched; the burr came nearest to the " +
-                                                        nearest.first + ", at " + in(nearest.second, "mm") + "."
-                                                  : "No structure was touched, and no burr came near one.") +
-                                saw);
+      std::string text = filled(nearest.second < 1e8
+                                    ? tr("No structure was touched; the burr came nearest to the {structure}, at {mm}.")
+                                    : tr("No structure was touched, and no burr came near one."),
+                                {{"structure", tr(nearest.first)}, {"mm", in(nearest.second, "mm")}});
+      if (by_saw.second < 1e8)
+        text += " " + filled(tr("The saw's cuts passed the {structure} at {mm}."),
+                             {{"structure", tr(by_saw.first)}, {"mm", in(by_saw.second, "mm")}});
+      ScoreFinding& f = add("untouched", {}, FindingSeverity::good, text);
       f.kind = "touch";
       if (nearest.second < 1e8) from(f, "clearance_mm", nearest.first, nearest.second, std::nullopt);
     }
+  }
+
+  [[nodiscard]] std::string below_text() const {
+    return filled(tr("Told below {mm} mm."), {{"mm", reported_number(limits_.near_miss_mm)}});
+  }
+
+  // Of `near` the first three, the most first.
+  static std::string hidden_text(const std::string& mm3, const std::string& share,
+                                 const std::vector<std::pair<std::string, double>>& near) {
+    const auto part = [&](std::size_t n) { return n < near.size() ? in(near[n].second, "mm3") : std::string(); };
+    const auto name = [&](std::size_t n) { return n < near.size() ? tr(near[n].first) : std::string(); };
+    const char* const text =
+        near.empty()       ? tr("{mm3} of bone ({share}) was removed unseen.")
+        : near.size() == 1 ? tr("{mm3} of bone ({share}) was removed unseen, {a} of it within {near} mm of the {one}.")
+        : near.size() == 2
+            ? tr("{mm3} of bone ({share}) was removed unseen, {a} of it within {near} mm of the {one} and {b} of the "
+                 "{two}.")
+            : tr("{mm3} of bone ({share}) was removed unseen, {a} of it within {near} mm of the {one}, {b} of the "
+                 "{two} and {c} of the {three}.");
+    return filled(text, {{"mm3", mm3},
+                         {"share", share},
+                         {"near", reported_number(kNearMm)},
+                         {"a", part(0)},
+                         {"one", name(0)},
+                         {"b", part(1)},
+                         {"two", name(1)},
+                         {"c", part(2)},
+                         {"three", name(2)}});
   }
 
   void hidden() {
     const auto mm3 = value("hidden_mm3"), share = value("seen_share");
     if (!mm3 || !share) return;
     if (*mm3 <= 0) {
-      from(add("hidden", {}, FindingSeverity::good, "All bone that was removed was seen as it went.",
-               "Seen: a straight line from it to the eye met no bone."),
+      from(add("hidden", {}, FindingSeverity::good, tr("All bone that was removed was seen as it went."),
+               tr("Seen: a straight line from it to the eye met no bone.")),
            "hidden_mm3", {}, 0, std::nullopt);
       return;
     }
@@ -273,15 +321,10 @@ class Finder {
       if (v.second > 0 && !to_be_opened(v.first)) near.push_back(v);
     }
     const bool danger = !near.empty() && near.front().second >= limits_.hidden_near_mm3;
-    std::string text = in(*mm3, "mm3") + " of bone (" + percent(1 - *share) + ") was removed unseen";
-    for (std::size_t n = 0; n < std::min<std::size_t>(near.size(), 3); ++n) {
-      text += n == 0 ? ", " : n + 1 == std::min<std::size_t>(near.size(), 3) ? " and " : ", ";
-      text += in(near[n].second, "mm3") +
-              (n == 0 ? " of it within " + reported_number(kNearMm) + " mm of the " : " of the ") + near[n].first;
-    }
-    ScoreFinding& f = add(
-        "hidden", {}, danger || *share < limits_.seen_well ? FindingSeverity::caution : FindingSeverity::good,
-        text + ".", "Unseen: bone lay between it and the eye as it went; voxels in touch with the burr are left out.");
+    ScoreFinding& f =
+        add("hidden", {}, danger || *share < limits_.seen_well ? FindingSeverity::caution : FindingSeverity::good,
+            hidden_text(in(*mm3, "mm3"), percent(1 - *share), near),
+            tr("Unseen: bone lay between it and the eye as it went; voxels in touch with the burr are left out."));
     from(f, "hidden_mm3", {}, *mm3, std::nullopt);
     std::vector<Vec3> all, close;
     for (const auto& [name, v] : score_.hidden) {
@@ -317,32 +360,46 @@ class Finder {
       }
       ScoreFinding& f =
           add("force", name, FindingSeverity::caution,
-              "Near the " + name + " the burr pressed harder than the " + in(limit, "N") +
-                  " that the procedure allows there" + (most > 0 ? ": " + in(most, "N") + " was seen." : "."),
-              "Impulse above the limit: " + in(ns, "N s") + ".");
+              filled(most > 0 ? tr("Near the {structure} the burr pressed harder than the {limit} that the procedure "
+                                   "allows there: {most} was seen.")
+                              : tr("Near the {structure} the burr pressed harder than the {limit} that the procedure "
+                                   "allows there."),
+                     {{"structure", tr(name)}, {"limit", in(limit, "N")}, {"most", in(most, "N")}}),
+              filled(tr("Impulse above the limit: {impulse}."), {{"impulse", in(ns, "N s")}}));
       from(f, "excess_force_ns", name, ns, 0);
       moments(f, "pressed too hard near it", name);
     }
-    const auto band = [&](MetricName metric, const char* kind, const char* how, const char* what) {
+    const auto band = [&](MetricName metric, const char* kind, const char* text, const char* what) {
       for (const auto& [name, share] : values(metric)) {
         if (share <= limits_.above_band_share || to_be_opened(name)) continue;
         ScoreFinding& f = add(kind, name, FindingSeverity::caution,
-                              percent(share) + " of the drilling near the " + name + " was " + how +
-                                  " than nine in ten moments of the reference's experts.",
-                              "At the same distance; by chance it would be 10 %.");
+                              filled(text, {{"share", percent(share)}, {"structure", tr(name)}}),
+                              tr("At the same distance; by chance it would be 10 %."));
         f.id = std::string(kind) + "-band-" + slug(name);
         from(f, metric, name, share, limits_.above_band_share);
         if (what[0] != 0) moments(f, what, name);
       }
     };
-    band("force_above_band_share", "force", "pressed harder", "pressed harder than experts do there");
-    band("speed_above_band_share", "speed", "faster", "");
+    band("force_above_band_share", "force",
+         tr("{share} of the drilling near the {structure} was pressed harder than nine in ten moments of the "
+            "reference's "
+            "experts."),
+         "pressed harder than experts do there");
+    band("speed_above_band_share", "speed",
+         tr("{share} of the drilling near the {structure} was faster than nine in ten moments of the reference's "
+            "experts."),
+         "");
     if (const auto peak = value("force_peak_n")) {
       const auto p95 = value("force_p95_n"), middle = value("force_median_n");
-      ScoreFinding& f = add("force-peak", {}, FindingSeverity::note,
-                            "The hardest press was " + in(*peak, "N") +
-                                (middle ? "; the middle of all was " + in(*middle, "N") : "") +
-                                (p95 ? ", and 5 % were above " + in(*p95, "N") : "") + ".");
+      ScoreFinding& f = add(
+          "force-peak", {}, FindingSeverity::note,
+          filled(
+              middle && p95 ? tr("The hardest press was {peak}; the middle of all was {middle}, and "
+                                 "5 % were above {p95}.")
+              : middle      ? tr("The hardest press was {peak}; the middle of all was {middle}.")
+              : p95         ? tr("The hardest press was {peak}, and 5 % were above {p95}.")
+                            : tr("The hardest press was {peak}."),
+              {{"peak", in(*peak, "N")}, {"middle", in(middle.value_or(0), "N")}, {"p95", in(p95.value_or(0), "N")}}));
       f.kind = "force";
       from(f, "force_peak_n", {}, *peak, std::nullopt);
       moments(f, "hardest press", {});
@@ -353,20 +410,20 @@ class Finder {
     if (const auto share = value("burr_choice_share")) {
       if (*share < 1) {
         from(add("instrument", {}, FindingSeverity::caution,
-                 "For " + percent(1 - *share) +
-                     " of the drilling where the procedure restricts burrs, another was in the hand."),
+                 filled(tr("For {share} of the drilling where the procedure restricts burrs, another was in the hand."),
+                        {{"share", percent(1 - *share)}})),
              "burr_choice_share", {}, *share, 1);
       } else {
         from(add("instrument", {}, FindingSeverity::good,
-                 "Where the procedure restricts burrs, only allowed ones were used."),
+                 tr("Where the procedure restricts burrs, only allowed ones were used.")),
              "burr_choice_share", {}, *share, 1);
       }
     }
     if (const auto wet = value("irrigation_share"); wet && *wet < 1 - limits_.dry_share) {
       from(add("water", {}, FindingSeverity::note,
-               *wet > 0 ? percent(1 - *wet) + " of the drilling was without water."
-                        : "No water was used while drilling.",
-               "Water cools bone; burrs heat it."),
+               *wet > 0 ? filled(tr("{share} of the drilling was without water."), {{"share", percent(1 - *wet)}})
+                        : tr("No water was used while drilling."),
+               tr("Water cools bone; burrs heat it.")),
            "irrigation_share", {}, *wet, 1 - limits_.dry_share);
     }
   }
@@ -375,20 +432,23 @@ class Finder {
     for (const auto& [name, mm3] : values("forbidden_mm3")) {
       if (mm3 <= 0) continue;
       from(add("region", name, FindingSeverity::caution,
-               in(mm3, "mm3") + " of bone is gone that should have stayed: " + name + "."),
+               filled(tr("{mm3} of bone is gone that should have stayed: {region}."),
+                      {{"mm3", in(mm3, "mm3")}, {"region", name}})),
            "forbidden_mm3", name, mm3, 0);
       out_.list.back().structure.clear();
     }
     for (const auto& [name, share] : values("target_share")) {
       from(add("region", name, FindingSeverity::note,
-               percent(share) + " of the bone that was to be removed is gone: " + name + "."),
+               filled(tr("{share} of the bone that was to be removed is gone: {region}."),
+                      {{"share", percent(share)}, {"region", name}})),
            "target_share", name, share, std::nullopt);
       out_.list.back().structure.clear();
     }
     if (const auto r = value("region_per_voxel")) {
       from(add("region-reference", {}, *r >= 0 ? FindingSeverity::good : FindingSeverity::note,
-               *r >= 0 ? "What was removed is more like what the reference's experts took than what its novices took."
-                       : "What was removed is more like what the reference's novices took than what its experts took."),
+               *r >= 0
+                   ? tr("What was removed is more like what the reference's experts took than what its novices took.")
+                   : tr("What was removed is more like what the reference's novices took than what its experts took.")),
            "region_per_voxel", {}, *r, 0);
       out_.list.back().kind = "region";
     }
@@ -404,7 +464,8 @@ class Finder {
                             r.pass     ? FindingSeverity::good
                             : violated ? FindingSeverity::serious
                                        : FindingSeverity::caution,
-                            capital(r.item->name) + (r.pass ? ": passed, " : ": not passed, ") + reported_item(r) + ".",
+                            filled(r.pass ? tr("{item}: passed, {how}.") : tr("{item}: not passed, {how}."),
+                                   {{"item", capital(r.item->name)}, {"how", reported_item(r)}}),
                             reported_item(r).ends_with(r.word) ? std::string() : r.word);
       f.metric = r.item->name;
       f.structure = r.item->structure;
@@ -417,49 +478,54 @@ class Finder {
   static std::string reported_item(const Product::Result& r) {
     const bool share = r.unit == "1" && r.item->kind != ItemKind::pieces && r.item->kind != ItemKind::fixed;
     const auto notify = [&](double v) { return share ? percent(v) : in(v, r.unit); };
+    const std::initializer_list<Place> places{{"value", notify(r.value)}, {"threshold", notify(r.threshold)}};
     switch (r.item->kind) {
       case ItemKind::exposed:
-        return notify(r.value) + " of it is laid open, at least " + notify(r.threshold) + " is asked";
+        return filled(tr("{value} of it is laid open, at least {threshold} is asked"), places);
       case ItemKind::not_violated:
-        if (r.value > 0) return notify(r.value) + " of it is gone";
-        return r.pass ? "none of it is gone" : "none of it is gone, but a running burr or saw reached into it";
+        if (r.value > 0) return filled(tr("{value} of it is gone"), places);
+        return r.pass ? tr("none of it is gone") : tr("none of it is gone, but a running burr or saw reached into it");
       case ItemKind::no_hole:
-        return "the largest bare part has " + notify(r.value) + ", below " + notify(r.threshold) + " is asked";
+        return filled(tr("the largest bare part has {value}, below {threshold} is asked"), places);
       case ItemKind::no_cells_left:
-        return notify(r.value) + " of the cells near it are left, at most " + notify(r.threshold) + " is asked";
+        return filled(tr("{value} of the cells near it are left, at most {threshold} is asked"), places);
       case ItemKind::no_overhang:
-        return notify(r.value) + " of the wall can be seen, at least " + notify(r.threshold) + " is asked";
+        return filled(tr("{value} of the wall can be seen, at least {threshold} is asked"), places);
       case ItemKind::thinned:
-        return notify(r.value) + " of bone is left over it, at most " + notify(r.threshold) + " is asked";
+        return filled(tr("{value} of bone is left over it, at most {threshold} is asked"), places);
       case ItemKind::sharp_angle:
-        return "a ball of " + notify(r.value) + " fits into what is left, at most " + notify(r.threshold) + " is asked";
+        return filled(tr("a ball of {value} fits into what is left, at most {threshold} is asked"), places);
       case ItemKind::followed:
-        return notify(r.value) + " of its length is shown, at least " + notify(r.threshold) + " is asked";
+        return filled(tr("{value} of its length is shown, at least {threshold} is asked"), places);
       case ItemKind::margin:
-        return "it ends " + notify(r.value) + " off, at most " + notify(r.threshold) + " is asked";
+        return filled(tr("it ends {value} off, at most {threshold} is asked"), places);
       case ItemKind::pieces:
       case ItemKind::fixed:
         break;
     }
-    return reported_number(r.value) + ", at least " + reported_number(r.threshold) +
-           (r.threshold == 1 ? " is asked" : " are asked");
+    return filled(
+        tr_n("{value}, at least {threshold} is asked", "{value}, at least {threshold} are asked", r.threshold),
+        {{"value", reported_number(r.value)}, {"threshold", reported_number(r.threshold)}});
   }
 
   void time() {
     const double duration = value("duration_s").value_or(0);
     if (const auto lost = value("lost_s"); lost && *lost > 0)
-      from(add("lost", {}, FindingSeverity::caution, reported_seconds(*lost) + " of the session were not recorded.",
-               "What is said here is of the rest."),
+      from(add("lost", {}, FindingSeverity::caution,
+               filled(tr("{time} of the session were not recorded."), {{"time", reported_seconds(*lost)}}),
+               tr("What is said here is of the rest.")),
            "lost_s", {}, *lost, 0);
     if (procedure_ != nullptr && procedure_->usual_s > 0 && duration > procedure_->usual_s) {
-      ScoreFinding& f = add("time", {}, FindingSeverity::note,
-                            "It took " + reported_seconds(duration) + "; " + reported_seconds(procedure_->usual_s) +
-                                " are usual for this procedure.");
+      ScoreFinding& f =
+          add("time", {}, FindingSeverity::note,
+              filled(tr("It took {time}; {usual} are usual for this procedure."),
+                     {{"time", reported_seconds(duration)}, {"usual", reported_seconds(procedure_->usual_s)}}));
       from(f, "duration_s", {}, duration, procedure_->usual_s);
     }
     if (const auto idle = value("idle_s"); idle && duration > 0 && *idle > limits_.idle_share * duration)
       from(add("idle", {}, FindingSeverity::note,
-               "For " + reported_seconds(*idle) + " (" + percent(*idle / duration) + ") neither hand moved."),
+               filled(tr("For {time} ({share}) neither hand moved."),
+                      {{"time", reported_seconds(*idle)}, {"share", percent(*idle / duration)}})),
            "idle_s", {}, *idle, limits_.idle_share * duration);
     for (ScoreFinding& f : out_.list) {
       if (f.id == "idle") f.kind = "time";
@@ -478,10 +544,12 @@ class Finder {
     for (const Measured& m : score_.values) {
       // A structure that no burr came near has no clearance to tell: that is as it should be.
       if (m.value || (m.is("clearance_mm") && !m.of.empty())) continue;
-      put(m.word, std::string(m.row->name) + (m.of.empty() ? "" : " of " + m.of));
+      put(tr(m.word), m.of.empty() ? std::string(m.row->name)
+                                   : filled(tr("{metric} of {structure}"),
+                                            {{"metric", std::string(m.row->name)}, {"structure", tr(m.of)}}));
     }
     for (const Product::Result& r : score_.items) {
-      if (!r.measured) put(r.word, "item '" + r.item->name + "'");
+      if (!r.measured) put(tr(r.word), filled(tr("item '{name}'"), {{"name", r.item->name}}));
     }
   }
 
@@ -513,7 +581,7 @@ std::string reported_number(double v) {
   const double size = std::abs(v);
   const double step = size >= 10 ? 1 : size >= 1 ? 0.1 : std::pow(10, std::floor(std::log10(size)) - 1);
   const double rounded = std::round(v / step) * step;
-  return format_number(std::round(rounded * 1e6) / 1e6);
+  return shown_figures(format_number(std::round(rounded * 1e6) / 1e6));
 }
 
 std::string reported_seconds(double s) {

@@ -6,6 +6,7 @@
 
 #include "osteo/assessment/evidence/detail/process.h"
 #include "osteo/assessment/evidence/frames.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/haptics/saw_slot.h"
 
@@ -33,6 +34,10 @@ Json numbers(const std::vector<float>& values) {
   Json list = Json::list();
   for (const float v : values) list.push_back(short_number(v));
   return list;
+}
+
+std::string in_english(const TimelineEvent& e) {
+  return filled(e.text, {{"part", e.part}});
 }
 
 }  // namespace
@@ -74,11 +79,20 @@ std::size_t TimelineKeeper::sample_at(std::uint64_t tick) {
   return n;
 }
 
+std::string TimelineEvent::shown() const {
+  if (text == nullptr) return what;
+  if (kind == EventKind::instrument) return filled(tr(text), {{"part", tr_sized(part)}});
+  if (kind == EventKind::injury || kind == EventKind::touch) return filled(tr(text), {{"part", tr(part)}});
+  const bool figure = part.find_first_not_of("0123456789.") == std::string::npos;
+  return filled(tr(text), {{"part", figure ? shown_figures(part) : part}});
+}
+
 std::size_t TimelineKeeper::add(TimelineEvent event) {
   if (line_.events.size() >= Timeline::kMaxEvents) {
     ++line_.events_left_out;
     return Timeline::kMaxEvents;
   }
+  if (event.text != nullptr) event.what = in_english(event);
   line_.events.push_back(std::move(event));
   return line_.events.size() - 1;
 }
@@ -106,42 +120,50 @@ void TimelineKeeper::near(const EvidenceFrame& f, const TickRecord& t, std::size
       if (now.event < line_.events.size()) line_.events[now.event].end_s = t_s;
     } else {
       const std::string name = scene_.structures->name_of(value);
-      now.event = add({turns ? EventKind::injury : EventKind::touch, t_s, t_s,
-                       turns ? (saw ? "the running saw reached the " : "a rotating burr reached the ") + name
-                             : (saw ? "the saw, at rest, touched the " : "the burr, at rest, touched the ") + name,
-                       name, true, at});
+      now.event = add({turns ? EventKind::injury : EventKind::touch,
+                       t_s,
+                       t_s,
+                       {},
+                       name,
+                       true,
+                       at,
+                       turns ? (saw ? tr_later("the running saw reached the {part}")
+                                    : tr_later("a rotating burr reached the {part}"))
+                             : (saw ? tr_later("the saw, at rest, touched the {part}")
+                                    : tr_later("the burr, at rest, touched the {part}")),
+                       name});
     }
   }
 }
 
 void TimelineKeeper::act(const SceneAction& a, double rate_hz) {
   const double t_s = second_of(a.tick, rate_hz);
-  const auto placed = [&](EventKind kind, std::string what, Vec3 at) {
-    add({kind, t_s, t_s, std::move(what), {}, true, at});
+  const auto placed = [&](EventKind kind, const char* text, Vec3 at) {
+    add({kind, t_s, t_s, {}, {}, true, at, text, {}});
   };
   if (a.is(ActionKind::undo)) {
-    add({EventKind::undo, t_s, t_s, "a step was taken back", {}, false, {}});
+    add({EventKind::undo, t_s, t_s, {}, {}, false, {}, tr_later("a step was taken back"), {}});
   } else if (a.is(ActionKind::saw)) {
-    placed(EventKind::saw, "saw cut", a.saw_cut().at_mm);
+    placed(EventKind::saw, tr_later("saw cut"), a.saw_cut().at_mm);
   } else if (a.is(ActionKind::split)) {
-    add({EventKind::split, t_s, t_s, "what is not connected was separated", {}, false, {}});
+    add({EventKind::split, t_s, t_s, {}, {}, false, {}, tr_later("what is not connected was separated"), {}});
   } else if (a.is(ActionKind::attach)) {
-    placed(EventKind::plate, "a plate was fixed", a.transform().shift_mm);
+    placed(EventKind::plate, tr_later("a plate was fixed"), a.transform().shift_mm);
   } else if (a.is(ActionKind::detach)) {
-    add({EventKind::plate, t_s, t_s, "a plate was taken off", {}, false, {}});
+    add({EventKind::plate, t_s, t_s, {}, {}, false, {}, tr_later("a plate was taken off"), {}});
   } else if (a.is(ActionKind::open) || a.is(ActionKind::move)) {
     // They come many times a second while something is wound or pulled: one event for as long as that goes on.
     const bool move = a.is(ActionKind::move);
-    const std::string what =
-        move ? "piece " + std::to_string(a.body) + " was moved"
-             : "a distractor was opened to " + format_number(std::round(a.values[0] * 100) / 100) + " mm";
+    TimelineEvent e{move ? EventKind::move : EventKind::plate, t_s, t_s, {}, {}, false, {}};
+    e.text = move ? tr_later("piece {part} was moved") : tr_later("a distractor was opened to {part} mm");
+    e.part = move ? std::to_string(a.body) : format_number(std::round(a.values[0] * 100) / 100);
     const auto last = last_slow_.find({a.kind, move ? a.body : a.item});
     if (last != last_slow_.end() && last->second < line_.events.size() && t_s - line_.events[last->second].end_s < 1) {
       line_.events[last->second].end_s = t_s;
-      line_.events[last->second].what = what;
+      line_.events[last->second].part = e.part;
+      line_.events[last->second].what = in_english(e);
     } else {
-      last_slow_[{a.kind, move ? a.body : a.item}] =
-          add({move ? EventKind::move : EventKind::plate, t_s, t_s, what, {}, false, {}});
+      last_slow_[{a.kind, move ? a.body : a.item}] = add(std::move(e));
     }
   }
 }
@@ -172,7 +194,7 @@ void TimelineKeeper::frame(const EvidenceFrame& f) {
     line_.tool[n] = static_cast<std::uint8_t>(now);
     if (now != last_tool_) {
       const double t_s = second_of(t.tick, f.rate_hz);
-      add({EventKind::instrument, t_s, t_s, plate ? "a plate" : tool.name, {}, false, {}});
+      add({EventKind::instrument, t_s, t_s, {}, {}, false, {}, plate ? tr_later("a plate") : "{part}", tool.name});
       last_tool_ = now;
     }
     if ((t.flags & (kPoseInvalid | kPoseJumped)) != 0) {
@@ -207,19 +229,23 @@ void TimelineKeeper::note(const Note& n) {
     e.placed = true;
   };
   if (n.kind == "mark") {
-    e.what = "a mark";
+    e.text = tr_later("a mark");
   } else if (n.kind == "note") {
-    e.what = text != nullptr && text->text() != nullptr ? "note: " + *text->text() : "a note";
+    const bool has = text != nullptr && text->text() != nullptr;
+    e.text = has ? tr_later("note: {part}") : tr_later("a note");
+    if (has) e.part = *text->text();
     place("at_mm");
   } else if (n.kind == "ruler") {
     const Json* const mm = j ? j->find("length_mm") : nullptr;
     const auto v = mm != nullptr ? mm->number() : std::nullopt;
-    e.what = v ? "measured " + format_number(std::round(*v * 10) / 10) + " mm" : "a measurement";
+    e.text = v ? tr_later("measured {part} mm") : tr_later("a measurement");
+    if (v) e.part = format_number(std::round(*v * 10) / 10);
     place("from_mm");
   } else if (n.kind == "message") {
     e.what = text != nullptr && text->text() != nullptr ? *text->text()
              : j && j->text() != nullptr                ? *j->text()
-                                                        : "a message";
+                                                        : std::string();
+    if (e.what.empty()) e.text = tr_later("a message");
   } else {
     return;
   }
@@ -231,9 +257,11 @@ void TimelineKeeper::gap(const Gap& g) {
   add({EventKind::gap,
        from,
        from + second_of(g.ticks, scene_.rate_hz),
-       g.bone_lost ? "not recorded, bone too" : "not recorded",
+       {},
        {},
        false,
+       {},
+       g.bone_lost ? tr_later("not recorded, bone too") : tr_later("not recorded"),
        {}});
 }
 

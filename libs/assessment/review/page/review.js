@@ -3,10 +3,11 @@
 const R = JSON.parse(document.getElementById("review-data").textContent), T = R.timeline, N = T.samples, HZ = T.rate_hz;
 const $ = id => document.getElementById(id), css = n => getComputedStyle(document.documentElement).getPropertyValue(n).trim();
 const C = {ink: css("--ink"), quiet: css("--quiet"), rule: css("--rule"), accent: css("--accent"), seen: css("--seen"), band: css("--band"), force: "#5c6c80"};
+const W = R.texts || {}, tx = (s, p = {}) => (W[s] || s).replace(/\{(\w+)\}/g, (all, k) => k in p ? p[k] : all), dec = s => R.decimal ? s.replace(".", R.decimal) : s;
 const esc = s => String(s).replace(/[&<>"]/g, c => ({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}[c]));
-const num = v => v === null || v === undefined || !isFinite(v) ? "–" : Math.abs(v) >= 10 ? v.toFixed(0) : Math.abs(v) >= 1 ? v.toFixed(1) : v.toFixed(2);
+const num = v => v === null || v === undefined || !isFinite(v) ? "–" : dec(Math.abs(v) >= 10 ? v.toFixed(0) : Math.abs(v) >= 1 ? v.toFixed(1) : v.toFixed(2));
 const clock = (s, fine) => { const h = Math.floor(s / 3600), m = Math.floor(s / 60) % 60, r = s % 60;
-  const t = fine ? r.toFixed(1).padStart(4, "0") : String(Math.floor(r)).padStart(2, "0"); return h ? h + ":" + String(m).padStart(2, "0") + ":" + t : m + ":" + t; };
+  const t = fine ? dec(r.toFixed(1).padStart(4, "0")) : String(Math.floor(r)).padStart(2, "0"); return h ? h + ":" + String(m).padStart(2, "0") + ":" + t : m + ":" + t; };
 const END = Math.max(0.1, N / HZ);
 let from = 0, to = END, hover = null, drag = null;
 
@@ -31,15 +32,15 @@ function draw() {
   const grid = (name, unit, max, step) => {
     s += `<text x="0" y="${y + 11}" font-size="12" font-weight="600" fill="${C.ink}">${name}</text>` + (W < 560 ? "" : `<text x="0" y="${y + 25}" font-size="10" fill="${C.quiet}">${unit}</text>`);
     for (let v = 0; v <= max * 1.0001; v += step) { const at = y + lane * (1 - v / max);
-      s += `<line x1="${L}" x2="${L + w}" y1="${f(at)}" y2="${f(at)}" stroke="${C.rule}"/><text x="${L - 4}" y="${f(at + 3.5)}" font-size="10" text-anchor="end" fill="${C.quiet}">${+v.toFixed(3)}</text>`; } };
+      s += `<line x1="${L}" x2="${L + w}" y1="${f(at)}" y2="${f(at)}" stroke="${C.rule}"/><text x="${L - 4}" y="${f(at + 3.5)}" font-size="10" text-anchor="end" fill="${C.quiet}">${dec(String(+v.toFixed(3)))}</text>`; } };
   const area = (get, max, fill, opacity) => { let d = `M${f(cx(0))} ${y + lane}`;
     for (let c = 0; c < cols; ++c) { const at = y + lane * (1 - Math.min(1, get(c) / max)); d += `L${f(cx(c))} ${f(at)}L${f(cx(c) + cw)} ${f(at)}`; }
     s += `<path d="${d}L${f(cx(cols - 1) + cw)} ${y + lane}Z" fill="${fill}" opacity="${opacity}"/>`; };
   const height = top + 4 * (lane + gap) + 62;
   for (const e of T.events) if (e.kind === "gap" && e.end_s >= from && e.t_s <= to) s += `<rect x="${f(x(Math.max(from, e.t_s)))}" y="${top}" width="${f(Math.max(1, x(Math.min(to, e.end_s)) - x(Math.max(from, e.t_s))))}" height="${4 * (lane + gap)}" fill="${C.rule}"/>`;
   let step = niceStep(FORCE, 2), max = Math.ceil(FORCE / step) * step;
-  grid("Force", "N, of the burr", max, step); area(c => peak(T.force_n, lo(c), hi(c)), max, C.force, 0.75);
-  y += lane + gap; grid("Distance", "mm, nearest", 8, 4);
+  grid(tx("Force"), tx("N, of the burr"), max, step); area(c => peak(T.force_n, lo(c), hi(c)), max, C.force, 0.75);
+  y += lane + gap; grid(tx("Distance"), tx("mm, nearest"), 8, 4);
   s += `<rect x="${L}" y="${f(y + lane * 0.75)}" width="${w}" height="${f(lane * 0.25)}" fill="${C.accent}" opacity="0.1"/>`;
   let d = "", on = false;
   for (let c = 0; c < cols; ++c) { const v = least(T.distance_mm, lo(c), hi(c)); if (v === null) { on = false; continue; }
@@ -48,12 +49,12 @@ function draw() {
   y += lane + gap;
   let most = 0.1; const rate = c => HZ / (hi(c) - lo(c)), seen = c => (total(T.seen_mm3, lo(c), hi(c)) + total(T.unknown_mm3, lo(c), hi(c))) * rate(c), hid = c => total(T.hidden_mm3, lo(c), hi(c)) * rate(c);
   for (let c = 0; c < cols; ++c) most = Math.max(most, seen(c) + hid(c));
-  step = niceStep(most, 2); most = Math.ceil(most / step) * step; grid("Bone", "mm³/s; orange unseen", most, step);
+  step = niceStep(most, 2); most = Math.ceil(most / step) * step; grid(tx("Bone"), tx("mm³/s; orange unseen"), most, step);
   area(c => seen(c) + hid(c), most, C.seen, 1); area(hid, most, C.accent, 1);
   y += lane + gap; step = niceStep(FAST, 2); max = Math.ceil(FAST / step) * step;
-  grid("Speed", "mm/s, of the tip", max, step); area(c => total(T.speed_mm_s, lo(c), hi(c)) / (hi(c) - lo(c)), max, C.force, 0.4);
+  grid(tx("Speed"), tx("mm/s, of the tip"), max, step); area(c => total(T.speed_mm_s, lo(c), hi(c)) / (hi(c) - lo(c)), max, C.force, 0.4);
   y += lane + 8;
-  s += `<text x="0" y="${y + 12}" font-size="12" font-weight="600" fill="${C.ink}">In hand</text>`;
+  s += `<text x="0" y="${y + 12}" font-size="12" font-weight="600" fill="${C.ink}">${tx("In hand")}</text>`;
   for (let k = i0, b = i0, shade = 0; k <= i1; ++k) if (k === i1 || T.tool[k] !== T.tool[b]) { const a = x(b / HZ), e = x(k / HZ), name = T.instruments[T.tool[b]];
     s += `<rect x="${f(a)}" y="${y}" width="${f(Math.max(0.5, e - a))}" height="16" fill="${shade++ % 2 ? C.rule : C.band}"/>`;
     if (e - a > 6 * name.length + 6) s += `<text x="${f(a + 4)}" y="${y + 12}" font-size="10.5" fill="${C.ink}">${esc(name)}</text>`; b = k; }
@@ -72,13 +73,14 @@ function draw() {
 function range() {
   const i = Math.max(0, Math.floor(from * HZ)), j = Math.min(N, Math.ceil(to * HZ)), near = least(T.distance_mm, i, j);
   let who = ""; if (near !== null) for (let k = i; k < j; ++k) if (T.distance_mm[k] === near) { who = " (" + (T.structures[T.structure[k]] || "") + ")"; break; }
-  $("range").textContent = `${clock(from)} to ${clock(to)}: ${num(total(T.removed_mm3, i, j))} mm³ taken, ${num(total(T.hidden_mm3, i, j))} mm³ of what is gone unseen; hardest press ${num(peak(T.force_n, i, j))} N; nearest ${near === null ? "nothing" : (near < 0 ? num(-near) + " mm inside" : num(near) + " mm") + who}`;
+  const nearest = near === null ? tx("nothing") : tx(near < 0 ? "{mm} mm inside" : "{mm} mm", {mm: num(Math.abs(near))}) + who;
+  $("range").textContent = tx("{from} to {to}: {taken} mm³ taken, {unseen} mm³ of what is gone unseen; hardest press {force} N; nearest {nearest}", {from: clock(from), to: clock(to), taken: num(total(T.removed_mm3, i, j)), unseen: num(total(T.hidden_mm3, i, j)), force: num(peak(T.force_n, i, j)), nearest});
   let shown = 0, all = 0, rows = "";
   for (let k = 0; k < T.events.length; ++k) { const e = T.events[k]; if (e.end_s < from || e.t_s > to) continue; ++all; if (shown >= 500) continue; ++shown;
     const long = e.end_s - e.t_s;
     rows += `<tr class="go${e.kind === "injury" ? " bad" : ""}" data-n="${k}" tabindex="0"><td class="n">${clock(e.t_s, true)}</td><td>${esc(e.what)}</td><td class="n">${long > 0.05 ? num(long) + " s" : ""}</td></tr>`; }
-  $("events").tBodies[0].innerHTML = rows || '<tr><td colspan="3">nothing in this time</td></tr>';
-  $("event-count").textContent = all > shown ? `the first ${shown} of ${all}` : all === 1 ? "1 event" : all + " events";
+  $("events").tBodies[0].innerHTML = rows || `<tr><td colspan="3">${tx("nothing in this time")}</td></tr>`;
+  $("event-count").textContent = all > shown ? tx("the first {n} of {all}", {n: shown, all}) : all === 1 ? tx("1 event") : tx("{n} events", {n: all});
 }
 function show(a, b) { const least = Math.min(1, END); if (b - a < least) { const m = (a + b) / 2; a = m - least / 2; b = m + least / 2; }
   if (a < 0) { b -= a; a = 0; } if (b > END) { a -= b - END; b = END; } from = Math.max(0, a); to = Math.min(END, b); draw(); }
@@ -86,7 +88,7 @@ function readout(t) {
   const k = Math.min(N - 1, Math.max(0, Math.floor(t * HZ))), cross = $("cross");
   if (cross && G) { const px = G.L + G.w * (t - from) / (to - from); cross.setAttribute("x1", px); cross.setAttribute("x2", px); }
   const dist = T.distance_mm[k];
-  $("readout").innerHTML = T.known[k] ? `<b>${clock(t, true)}</b> &ensp; ${num(T.force_n[k])} N &ensp; ${dist === null ? "no structure near" : num(dist) + " mm to the " + esc(T.structures[T.structure[k]] || "")} &ensp; ${num(T.speed_mm_s[k])} mm/s &ensp; ${esc(T.instruments[T.tool[k]])}${T.drilling[k] ? ", drilling" : ""}` : `<b>${clock(t, true)}</b> &ensp; not recorded`;
+  $("readout").innerHTML = T.known[k] ? `<b>${clock(t, true)}</b> &ensp; ${num(T.force_n[k])} N &ensp; ${dist === null ? tx("no structure near") : tx("{mm} mm to the {structure}", {mm: num(dist), structure: esc(T.structures[T.structure[k]] || "")})} &ensp; ${num(T.speed_mm_s[k])} mm/s &ensp; ${esc(T.instruments[T.tool[k]])}${T.drilling[k] ? tx(", drilling") : ""}` : `<b>${clock(t, true)}</b> &ensp; ${tx("not recorded")}`;
   scene && scene.tip(T.known[k] ? T.at_mm[k] : null);
 }
 let scene = null;

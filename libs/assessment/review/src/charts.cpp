@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "pictures.h"
 
@@ -33,6 +34,16 @@ double clock_step(double duration_s, int wanted) {
 
 }  // namespace
 
+ReviewTexts texts_of(const Review& r) {
+  const ReviewTexts& t = r.shown;
+  const bool none = t.labels.empty() && t.left_out.empty() && t.findings.list.empty() && t.findings.summary.empty();
+  return none ? ReviewTexts{r.labels, r.left_out, r.findings} : t;
+}
+
+const std::string& shown_caption(const ReviewPicture& p) {
+  return p.shown.empty() ? p.caption : p.shown;
+}
+
 std::string clock(double s) {
   const auto whole = static_cast<long>(s + 1e-6);
   const long h = whole / 3600, min = whole / 60 % 60, sec = whole % 60;
@@ -48,8 +59,8 @@ class TimelineChart {
  public:
   explicit TimelineChart(const Timeline& line) : line_(line) {
     d_.id = "timeline-still";
-    d_.alt =
-        "Force, distance to the nearest structure, bone removed and speed over " + reported_seconds(line.duration_s());
+    d_.alt = filled(tr("Force, distance to the nearest structure, bone removed and speed over {time}"),
+                    {{"time", reported_seconds(line.duration_s())}});
     d_.width = 720;
     w_ = d_.width - kLeft - kRight;
     duration_ = std::max(1.0, line.duration_s());
@@ -100,7 +111,7 @@ class TimelineChart {
     for (double v = 0; v <= scale.most * 1.0001; v += scale.step) {
       const double at = height_of(v / scale.most);
       d_.line({{kLeft, at}, {kLeft + w_, at}}, kRule, 0.6);
-      d_.text(kLeft - 4, at + 3, format_number(std::round(v * 100) / 100), 8, kQuiet, 1);
+      d_.text(kLeft - 4, at + 3, shown_figures(format_number(std::round(v * 100) / 100)), 8, kQuiet, 1);
     }
   }
   // Of a share of the lane's most.
@@ -135,7 +146,7 @@ class TimelineChart {
     const auto& force = line_.force_n;
     const double peak = force.empty() ? 0.0 : static_cast<double>(*std::max_element(force.begin(), force.end()));
     const Scale scale = scale_of(std::max(0.5, peak));
-    lane("Force", "N, of the burr", scale);
+    lane(tr("Force"), tr("N, of the burr"), scale);
     Steps shape = begin_area();
     each([&](double x, std::size_t from, std::size_t to) {
       const double v = static_cast<double>(*std::max_element(force.begin() + static_cast<std::ptrdiff_t>(from),
@@ -147,7 +158,7 @@ class TimelineChart {
 
   // The least of each column; where none is known the line ends.
   void draw_distance() {
-    lane("Distance", "mm, nearest structure", {8, 4});
+    lane(tr("Distance"), tr("mm, nearest structure"), {8, 4});
     d_.box(kLeft, y_ + kLane * 0.75, w_, kLane * 0.25, kAccent, 0.10);
     Steps run;
     const auto end_run = [&] {
@@ -179,7 +190,7 @@ class TimelineChart {
       most_mm3 = std::max(most_mm3, (seen + hidden) * per_s);
     });
     const Scale scale = scale_of(most_mm3);
-    lane("Bone", "mm³/s; orange unseen", scale);
+    lane(tr("Bone"), tr("mm³/s; orange unseen"), scale);
     for (const bool all : {true, false}) {
       Steps shape = begin_area();
       for (const auto& [x, seen, hidden] : bars)
@@ -194,7 +205,7 @@ class TimelineChart {
     std::sort(sorted.begin(), sorted.end());
     const Scale scale =
         scale_of(sorted.empty() ? 1 : std::max(1.0, 1.2 * static_cast<double>(sorted[(sorted.size() - 1) * 98 / 100])));
-    lane("Speed", "mm/s, of the tip", scale);
+    lane(tr("Speed"), tr("mm/s, of the tip"), scale);
     Steps shape = begin_area();
     each([&](double x, std::size_t from, std::size_t to) {
       double v = 0;
@@ -206,7 +217,7 @@ class TimelineChart {
   }
 
   void draw_instruments() {
-    d_.text(0, y_ + 9, "In hand", 9.5, kInk, -1, true);
+    d_.text(0, y_ + 9, tr("In hand"), 9.5, kInk, -1, true);
     std::size_t from = 0;
     int shade = 0;
     for (std::size_t n = 1; n <= line_.size(); ++n) {
@@ -214,7 +225,8 @@ class TimelineChart {
       const double x = px(static_cast<double>(from) / Timeline::kRateHz),
                    x1 = px(static_cast<double>(n) / Timeline::kRateHz);
       d_.box(x, y_, std::max(0.5, x1 - x), 12, shade++ % 2 == 0 ? kBand : kRule);
-      const std::string name = line_.tool[from] == Timeline::kPlate ? "a plate" : instrument_of(line_.tool[from]).name;
+      const std::string name =
+          line_.tool[from] == Timeline::kPlate ? tr("a plate") : tr_sized(instrument_of(line_.tool[from]).name);
       if (x1 - x > 4.6 * static_cast<double>(name.size()) + 4) d_.text(x + 3, y_ + 9, name, 8.5, kInk);
       from = n;
     }
@@ -244,7 +256,7 @@ sheet::Drawing timeline_chart(const Review& r) {
 sheet::Drawing profile_chart(const ForceProfile& p, bool reference) {
   sheet::Drawing d;
   d.id = "profile";
-  d.alt = "Force by distance to the " + p.structure;
+  d.alt = filled(tr("Force by distance to the {structure}"), {{"structure", tr(p.structure)}});
   d.width = 340;
   d.height = 210;
   constexpr double kLeft = 34, kTop = 22, kW = 296, kH = 150, kFar = 8;
@@ -258,14 +270,15 @@ sheet::Drawing profile_chart(const ForceProfile& p, bool reference) {
     return std::array<double, 2>{kLeft + kW * std::clamp(mm, 0.0, kFar) / kFar,
                                  kTop + kH * (1 - std::clamp(n / most, 0.0, 1.0))};
   };
-  d.text(0, 12, p.structure, 11, kInk, -1, true);
-  d.text(kLeft + kW, 12, reported_seconds(p.drilled_s) + " of drilling near it", 9, kQuiet, 1);
+  d.text(0, 12, tr(p.structure), 11, kInk, -1, true);
+  d.text(kLeft + kW, 12, filled(tr("{time} of drilling near it"), {{"time", reported_seconds(p.drilled_s)}}), 9, kQuiet,
+         1);
   for (double v = 0; v <= most * 1.0001; v += step) {
     d.line({at(0, v), at(kFar, v)}, kRule, 0.6);
-    d.text(kLeft - 5, at(0, v)[1] + 3, format_number(std::round(v * 1000) / 1000), 8.5, kQuiet, 1);
+    d.text(kLeft - 5, at(0, v)[1] + 3, shown_figures(format_number(std::round(v * 1000) / 1000)), 8.5, kQuiet, 1);
   }
   for (int mm = 0; mm <= 8; mm += 2) d.text(at(mm, 0)[0], kTop + kH + 13, std::to_string(mm), 8.5, kQuiet, 0);
-  d.text(kLeft + kW / 2, kTop + kH + 26, "mm from its surface", 8.5, kQuiet, 0);
+  d.text(kLeft + kW / 2, kTop + kH + 26, tr("mm from its surface"), 8.5, kQuiet, 0);
   d.text(0, kTop + 4, "N", 8.5, kQuiet);
   // Steps as they are; a curve holds to the end.
   const auto steps = [&](const std::vector<IsotonicQuantile::Point>& curve) {
@@ -292,11 +305,11 @@ sheet::Drawing profile_chart(const ForceProfile& p, bool reference) {
   d.line(steps(p.middle), kInk, 1.2, true);
   d.line(steps(p.most), kAccent, 1.8);
   d.text(kLeft + kW, d.height - 2,
-         reference ? (p.experts_most.empty() ? "experts drilled less than a second here"
-                                             : "grey: nine in ten of the experts' moments")
-                   : "no reference: no band of experts",
+         reference ? (p.experts_most.empty() ? tr("experts drilled less than a second here")
+                                             : tr("grey: nine in ten of the experts' moments"))
+                   : tr("no reference: no band of experts"),
          8, kQuiet, 1);
-  d.text(0, d.height - 2, "orange: nine in ten of yours; dashed: half", 8, kQuiet);
+  d.text(0, d.height - 2, tr("orange: nine in ten of yours; dashed: half"), 8, kQuiet);
   return d;
 }
 
@@ -305,20 +318,20 @@ std::string_view plain_name(std::string_view metric) {
     MetricName metric;
     std::string_view plain;
   };
-  static constexpr Row kRows[] = {{"items_passed", "items passed"},
-                                  {"seen_share", "bone seen as it went"},
-                                  {"hidden_mm3", "removed unseen"},
-                                  {"hidden_near_mm3", "unseen, near structures"},
-                                  {"touches", "touches of structures"},
-                                  {"injured_s", "rotating burr in structures"},
-                                  {"clearance_mm", "nearest to any structure"},
-                                  {"force_p95_n", "force, 95 % are below"},
-                                  {"force_peak_n", "hardest press"},
-                                  {"duration_s", "time"},
-                                  {"drilling_s", "time drilling"},
-                                  {"removed_mm3", "bone removed"},
-                                  {"rate_mm3_per_s", "bone for each second"},
-                                  {"path_mm", "way of the tip"}};
+  static constexpr Row kRows[] = {{"items_passed", tr_later("items passed")},
+                                  {"seen_share", tr_later("bone seen as it went")},
+                                  {"hidden_mm3", tr_later("removed unseen")},
+                                  {"hidden_near_mm3", tr_later("unseen, near structures")},
+                                  {"touches", tr_later("touches of structures")},
+                                  {"injured_s", tr_later("rotating burr in structures")},
+                                  {"clearance_mm", tr_later("nearest to any structure")},
+                                  {"force_p95_n", tr_later("force, 95 % are below")},
+                                  {"force_peak_n", tr_later("hardest press")},
+                                  {"duration_s", tr_later("time")},
+                                  {"drilling_s", tr_later("time drilling")},
+                                  {"removed_mm3", tr_later("bone removed")},
+                                  {"rate_mm3_per_s", tr_later("bone for each second")},
+                                  {"path_mm", tr_later("way of the tip")}};
   for (const Row& r : kRows) {
     if (r.metric.row().name == metric) return r.plain;
   }
@@ -327,7 +340,7 @@ std::string_view plain_name(std::string_view metric) {
 
 std::string reported_value(const MetricRow& row, double v) {
   if (row.unit == "s") return reported_seconds(v);
-  if (row.name.ends_with("_share")) return format_number(std::round(1000 * v) / 10) + " %";
+  if (row.name.ends_with("_share")) return shown_figures(format_number(std::round(1000 * v) / 10)) + " %";
   const std::string unit = unit_text(row.unit);
   return reported_number(v) + (unit.empty() ? "" : " " + unit);
 }
@@ -351,16 +364,18 @@ sheet::Drawing comparison_chart(const Comparison& c) {
   }
   constexpr double kFrom = 190, kTo = 560, kMid = 13;
   const auto px = [&](double v) { return kFrom + (kTo - kFrom) * (v - lo) / (hi - lo); };
-  d.text(0, kMid + 3.5, std::string(plain_name(c.row->name)), 11, kInk);
+  d.text(0, kMid + 3.5, tr(std::string(plain_name(c.row->name))), 11, kInk);
   d.line({{kFrom - 6, kMid}, {kTo + 6, kMid}}, kRule, 1);
-  const std::string better = c.row->better == Better::higher  ? "more is better"
-                             : c.row->better == Better::lower ? "less is better"
+  const std::string better = c.row->better == Better::higher  ? tr("more is better")
+                             : c.row->better == Better::lower ? tr("less is better")
                                                               : "";
-  std::string alt = std::string(plain_name(c.row->name)) + ": ";
+  std::string alt = tr(std::string(plain_name(c.row->name))) + ": ";
   if (!c.experts.empty()) {
     const auto [a, b] = std::minmax_element(c.experts.begin(), c.experts.end());
     d.box(std::min(px(*a), px(*b)) - 4, kMid - 7, std::abs(px(*b) - px(*a)) + 8, 14, kBand);
-    alt += "experts " + reported_value(*c.row, *a) + " to " + reported_value(*c.row, *b) + "; ";
+    alt += filled(tr("experts {from} to {to}"),
+                  {{"from", reported_value(*c.row, *a)}, {"to", reported_value(*c.row, *b)}}) +
+           "; ";
   }
   for (const double v : c.novices) d.line({{px(v), kMid - 4}, {px(v), kMid + 4}}, kQuiet, 1);
   for (const double v : c.experts) d.line({{px(v), kMid - 6}, {px(v), kMid + 6}}, kSeen, 1.4);
@@ -374,12 +389,12 @@ sheet::Drawing comparison_chart(const Comparison& c) {
   if (c.value) {
     const double x = px(*c.value);
     d.area({{x, kMid - 7}, {x + 7, kMid}, {x, kMid + 7}, {x - 7, kMid}}, kAccent);
-    alt += "this session " + reported_value(*c.row, *c.value);
+    alt += filled(tr("this session {value}"), {{"value", reported_value(*c.row, *c.value)}});
   } else {
-    alt += "not measured in this session";
+    alt += tr("not measured in this session");
   }
-  d.text(kTo + 18, kMid + 3.5, c.value ? reported_value(*c.row, *c.value) : "not measured", 11, c.value ? kInk : kQuiet,
-         -1, c.value.has_value());
+  d.text(kTo + 18, kMid + 3.5, c.value ? reported_value(*c.row, *c.value) : tr("not measured"), 11,
+         c.value ? kInk : kQuiet, -1, c.value.has_value());
   d.text(720, kMid + 3, better, 8.5, kQuiet, 1);
   d.alt = alt;
   return d;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/display/view/pictures.h"
 #include "osteo/display/view/structures_view.h"
 #include "osteo/simulation/bone/instrument.h"
@@ -51,7 +52,7 @@ class Drawer {
     context_.progress(0.5, "drawing");
     std::vector<Picture> pictures = draw_stills(parts_, stills_);
     for (std::size_t n = 0; n < pictures.size(); ++n)
-      r_.pictures.push_back({ids_[n], captions_[n], std::move(pictures[n])});
+      r_.pictures.push_back({ids_[n], captions_[n], std::move(pictures[n]), shown_[n]});
     for_page();
   }
 
@@ -80,9 +81,12 @@ class Drawer {
     parts_.push_back({std::make_shared<const TriMesh>(std::move(mesh)), rgb, opacity, cut});
     return parts_.size() - 1;
   }
-  void still(std::string id, std::string caption, Still s) {
+  // With a caption of the catalogues.
+  void still(std::string id, const char* caption, Still s) { still(std::move(id), caption, tr(caption), std::move(s)); }
+  void still(std::string id, std::string caption, std::string shown, Still s) {
     ids_.push_back(std::move(id));
     captions_.push_back(std::move(caption));
+    shown_.push_back(std::move(shown));
     stills_.push_back(std::move(s));
   }
 
@@ -135,20 +139,24 @@ class Drawer {
     // Who took nothing held no shaft that would tell the side.
     const bool nothing = by_[0].empty() && by_[1].empty() && by_[2].empty();
     still("before",
-          nothing ? "Before: nothing was drilled that would tell from where one worked"
-                  : "Before: as one looked along the burr's mean shaft",
+          nothing ? tr_later("Before: nothing was drilled that would tell from where one worked")
+                  : tr_later("Before: as one looked along the burr's mean shaft"),
           view(work_.centre_mm, radius, eye_, with_structures({before_})));
-    still("after", "After: from the same side", view(work_.centre_mm, radius, eye_, with_structures({after_})));
+    still("after", tr_later("After: from the same side"),
+          view(work_.centre_mm, radius, eye_, with_structures({after_})));
     if (nothing) return;
     // Without the bone: from where one worked, and from the side, where undercutting shows.
     const Vec3 side = normalized(cross(std::abs(eye_.z) < 0.9 ? Vec3{0, 0, 1} : Vec3{0, -1, 0}, eye_));
     const double close = work_.radius_mm * 1.12 + 2;
-    const std::string what = by_[0].empty() && by_[1].empty()
-                                 ? "What was removed, without the bone; nobody knows from where one looked"
-                                 : "What was removed, without the bone: blue-grey seen, orange unseen";
-    still("unseen", what + "; from where one worked",
+    const bool known = !by_[0].empty() || !by_[1].empty();
+    still("unseen",
+          known ? tr_later("What was removed, without the bone: blue-grey seen, orange unseen; from where one worked")
+                : tr_later("What was removed, without the bone; nobody knows from where one looked; from where one "
+                           "worked"),
           view(work_.centre_mm, close, eye_, with_structures({seen_, hidden_, unknown_})));
-    still("unseen-side", what + "; from the side",
+    still("unseen-side",
+          known ? tr_later("What was removed, without the bone: blue-grey seen, orange unseen; from the side")
+                : tr_later("What was removed, without the bone; nobody knows from where one looked; from the side"),
           view(work_.centre_mm, close, side, with_structures({seen_, hidden_, unknown_})));
   }
 
@@ -177,8 +185,14 @@ class Drawer {
               : part(dots_at(near, std::clamp((near.size() < 20 ? 0.03 : 0.012) * ball.radius_mm, 0.12, 0.7), 2500),
                      shares(kHiddenRgb));
       Still s = view(ball.centre_mm, ball.radius_mm, from.eye, with_structures({after_, marks}));
-      std::string caption = f.text;
-      if (ball_mm > 0) caption += f.kind == "item" ? " (Orange: that ball.)" : " (Orange: the burr at these moments.)";
+      const ScoreFinding* const other = r_.shown.findings.find(f.id);
+      std::string caption = f.text, shown = other == nullptr ? f.text : other->text;
+      const auto add = [&](const char* more) {
+        caption += std::string(" ") + more;
+        shown += std::string(" ") + tr(more);
+      };
+      if (ball_mm > 0)
+        add(f.kind == "item" ? tr_later("(Orange: that ball.)") : tr_later("(Orange: the burr at these moments.)"));
       if (from.seen_share < 0.5) {
         // It lies behind bone: what is in front of it is taken off, and other structures are left out.
         s.eye = eye_;
@@ -190,13 +204,15 @@ class Drawer {
         for (const Vec3 p : near) nearer.push_back(dot(p - ball.centre_mm, eye_));
         std::sort(nearer.begin(), nearer.end());
         s.cut_mm = nearer[(nearer.size() - 1) * 3 / 4] + 0.6;
-        caption += " (Bone in front of it is cut away.)";
+        add(tr_later("(Bone in front of it is cut away.)"));
       }
-      still(f.id, caption, s);
+      still(f.id, caption, shown, s);
     }
-    if (wanted > drawn)
-      r_.left_out.push_back("pictures of " + std::to_string(wanted - drawn) + " more findings: the first " +
-                            std::to_string(drawn) + " have one");
+    if (wanted <= drawn) return;
+    constexpr const char* kMore = tr_later("pictures of {more} more findings: the first {n} have one");
+    const std::initializer_list<Place> places{{"more", std::to_string(wanted - drawn)}, {"n", std::to_string(drawn)}};
+    r_.left_out.push_back(filled(kMore, places));
+    r_.shown.left_out.push_back(filled(tr(kMore), places));
   }
 
   // What a place stands for, where that is a ball: the burr in hand at the first of a finding's moments, or the ball
@@ -226,8 +242,8 @@ class Drawer {
       if (cropped.triangles.empty()) return;
       r_.meshes.push_back({std::move(id), std::move(name), rgb, simplified(cropped, most, error)});
     };
-    add("after", "bone, after", kBoneRgb, after_, 130'000, 0.12 * voxel);
-    add("before", "bone, before", kBoneRgb, before_, 60'000, 0.25 * voxel);
+    add("after", tr_later("bone, after"), kBoneRgb, after_, 130'000, 0.12 * voxel);
+    add("before", tr_later("bone, before"), kBoneRgb, before_, 60'000, 0.25 * voxel);
     for (std::size_t s = 0; s < structure_parts_.size(); ++s) {
       const std::uint8_t value = structures_->values()[s];
       const auto c = structures_->colour_of(value);
@@ -236,9 +252,9 @@ class Drawer {
       add((opened_[s] ? "opened-" : "structure-") + std::to_string(value), structures_->name_of(value), rgb,
           structure_parts_[s], 12'000, 0.1);
     }
-    add("seen", "removed, seen", kSeenRgb, seen_solid_, 40'000, 0.2 * voxel);
-    add("hidden", "removed, unseen", kHiddenRgb, hidden_, 40'000, 0.1 * voxel);
-    add("unknown", "removed before the first look", kUnknownRgb, unknown_, 40'000, 0.2 * voxel);
+    add("seen", tr_later("removed, seen"), kSeenRgb, seen_solid_, 40'000, 0.2 * voxel);
+    add("hidden", tr_later("removed, unseen"), kHiddenRgb, hidden_, 40'000, 0.1 * voxel);
+    add("unknown", tr_later("removed before the first look"), kUnknownRgb, unknown_, 40'000, 0.2 * voxel);
   }
 
   Review& r_;
@@ -251,7 +267,7 @@ class Drawer {
   Vec3 eye_;
   std::vector<StillPart> parts_;
   std::vector<Still> stills_;
-  std::vector<std::string> ids_, captions_;
+  std::vector<std::string> ids_, captions_, shown_;
   std::vector<std::size_t> structure_parts_;
   std::vector<bool> opened_;
   std::size_t before_ = 0, after_ = 0, seen_ = 0, seen_solid_ = 0, hidden_ = 0, unknown_ = 0;

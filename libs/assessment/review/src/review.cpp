@@ -6,6 +6,7 @@
 #include "osteo/assessment/evidence/frames.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/session/recording/session_reader.h"
 #include "pictures.h"
 
@@ -127,14 +128,14 @@ std::vector<std::string> labels_of(const Opened& o, const HandWasLed& seen) {
   if (std::string words = simulated_text(o.session); !words.empty()) {
     all.push_back(std::move(words));
   } else if (output_exists(o.folder.folder / "strokes.json")) {
-    all.emplace_back("Scripted: a file of strokes moved the hand, no person did.");
+    all.emplace_back(tr("Scripted: a file of strokes moved the hand, no person did."));
   }
   if (!o.folder.guided.empty() || seen.curve || seen.guide)
     all.push_back(
-        "Guided: " +
-        (o.folder.guided.empty() ? std::string("forces that led the hand were on at times") : o.folder.guided) +
-        ". What was done then is not the hand's alone.");
-  if (!o.session.outline().end) all.emplace_back("Cut short: the program was stopped before the session was closed.");
+        filled(tr("Guided: {how}. What was done then is not the hand's alone."),
+               {{"how", o.folder.guided.empty() ? tr("forces that led the hand were on at times") : o.folder.guided}}));
+  if (!o.session.outline().end)
+    all.emplace_back(tr("Cut short: the program was stopped before the session was closed."));
   return all;
 }
 
@@ -197,9 +198,14 @@ Review make_review(const ReviewRequest& q, const Context& context) {
       o.session.header().haptics.structures != structures->hash())
     r.score.words.emplace_back(
         "the case's structures are not those that the session watched: they are measured as the case has them now");
-  r.labels = labels_of(o, led);
   r.procedure = r.score.procedure;
-  r.findings = findings_of(r.score, structures, procedure);
+  r.shown.labels = labels_of(o, led);
+  r.shown.findings = findings_of(r.score, structures, procedure);
+  {
+    const EnglishHere files;
+    r.labels = labels_of(o, led);
+    r.findings = findings_of(r.score, structures, procedure);
+  }
   r.timeline = keeper.timeline(detail.voxels);
   for (const auto& [name, v] : detail.voxels) {
     (v.seen == VisibilityMetric::Seen::seen     ? r.seen_mm3
@@ -227,7 +233,9 @@ Review make_review(const ReviewRequest& q, const Context& context) {
     }
   }
   if (!q.pictures) {
-    r.left_out.emplace_back("pictures and the view in 3D were not asked for");
+    constexpr const char* kNone = tr_later("pictures and the view in 3D were not asked for");
+    r.left_out.emplace_back(kNone);
+    r.shown.left_out.emplace_back(tr(kNone));
   } else {
     context.progress(0.72, "drawing");
     std::size_t unreadable = 0;

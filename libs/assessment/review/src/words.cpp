@@ -6,6 +6,7 @@
 #include "osteo/assessment/review/review.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline assessment {
 namespace {
@@ -39,6 +40,7 @@ Json points(const std::vector<IsotonicQuantile::Point>& curve) {
 }  // namespace
 
 Json review_json(const Review& r) {
+  const EnglishHere files;
   Json j{{"osteotome_review", 1}};
   j["labels"] = r.labels;
   j["procedure"] = r.procedure.empty() ? Json() : Json(r.procedure);
@@ -93,65 +95,68 @@ Json review_json(const Review& r) {
 }
 
 Sheet review_sheet(const Review& r) {
+  const ReviewTexts shown = review::texts_of(r);
   Sheet s;
-  s.title = r.procedure.empty() ? "Review of a session" : r.procedure;
-  s.code = "review";
-  s.footer = "Osteotome. Thresholds are starting values, fitted to no rated session; a rehearsal is no proof of skill.";
+  s.title = r.procedure.empty() ? tr("Review of a session") : r.procedure;
+  s.code = tr("review");
+  s.footer =
+      tr("Osteotome. Thresholds are starting values, fitted to no rated session; a rehearsal is no proof of skill.");
   s.pages = 4;
-  for (const std::string& label : r.labels) {
+  for (const std::string& label : shown.labels) {
     const auto colon = label.find(": ");
     s.blocks.push_back({sheet::Band{label.substr(0, colon), colon == std::string::npos ? "" : label.substr(colon + 2),
                                     Tone::caution}});
   }
   std::string summary;
-  for (const std::string& line : r.findings.summary) summary += (summary.empty() ? "" : " ") + line;
+  for (const std::string& line : shown.findings.summary) summary += (summary.empty() ? "" : " ") + line;
   s.blocks.push_back({sheet::Paragraph{summary}});
-  for (const std::string& w : r.findings.words) s.blocks.push_back({sheet::Paragraph{w, Tone::caution}});
-  sheet::Table list{{"what was found", "look at"}, {}, {84, 16}};
-  for (const ScoreFinding& f : r.findings.list) {
+  for (const std::string& w : shown.findings.words) s.blocks.push_back({sheet::Paragraph{w, Tone::caution}});
+  sheet::Table list{{tr("what was found"), tr("look at")}, {}, {84, 16}};
+  for (const ScoreFinding& f : shown.findings.list) {
     std::string when;
     for (std::size_t n = 0; n < std::min<std::size_t>(3, f.times_s.size()); ++n)
       when += (n > 0 ? ", " : "") + review::clock(f.times_s[n]);
     if (f.times_s.size() > 3) when += ", ...";
     list.rows.push_back({{f.text, tone_of(f.severity)}, {when, Tone::quiet}});
   }
-  s.blocks.push_back({sheet::Heading{"What was found"}});
+  s.blocks.push_back({sheet::Heading{tr("What was found")}});
   if (list.rows.empty()) {
-    s.blocks.push_back({sheet::Paragraph{"There is nothing to tell.", Tone::quiet}});
+    s.blocks.push_back({sheet::Paragraph{tr("There is nothing to tell."), Tone::quiet}});
   } else {
     s.blocks.push_back({list});
   }
   const auto row = [&](const char* heading, std::initializer_list<const char*> ids, double height_mm) {
     sheet::Pictures pictures{{}, height_mm};
     for (const char* const id : ids) {
-      if (const ReviewPicture* const p = picture_with(r, id)) pictures.row.push_back({p->id, p->picture, p->caption});
+      if (const ReviewPicture* const p = picture_with(r, id))
+        pictures.row.push_back({p->id, p->picture, review::shown_caption(*p)});
     }
     if (pictures.row.empty()) return;
     s.blocks.push_back({sheet::Heading{heading}});
     s.blocks.push_back({pictures});
   };
-  row("Before and after", {"before", "after"}, 66);
-  row("What was removed, seen and unseen", {"unseen", "unseen-side"}, 66);
-  s.blocks.push_back({sheet::Heading{"Over time"}});
+  row(tr("Before and after"), {"before", "after"}, 66);
+  row(tr("What was removed, seen and unseen"), {"unseen", "unseen-side"}, 66);
+  s.blocks.push_back({sheet::Heading{tr("Over time")}});
   s.blocks.push_back({review::timeline_chart(r)});
   sheet::Pictures evidence{{}, 40};
   bool first = true;
   const auto flush = [&] {
     if (evidence.row.empty()) return;
-    if (first) s.blocks.push_back({sheet::Heading{"Where to look"}});
+    if (first) s.blocks.push_back({sheet::Heading{tr("Where to look")}});
     first = false;
     s.blocks.push_back({evidence});
     evidence.row.clear();
   };
-  for (const ScoreFinding& f : r.findings.list) {
+  for (const ScoreFinding& f : shown.findings.list) {
     const ReviewPicture* const p = picture_with(r, f.id);
     if (p == nullptr) continue;
-    evidence.row.push_back({p->id, p->picture, p->caption});
+    evidence.row.push_back({p->id, p->picture, review::shown_caption(*p)});
     if (evidence.row.size() == 3) flush();
   }
   flush();
   if (!r.profiles.empty()) {
-    s.blocks.push_back({sheet::Heading{"Force by distance"}});
+    s.blocks.push_back({sheet::Heading{tr("Force by distance")}});
     for (std::size_t n = 0; n < std::min<std::size_t>(4, r.profiles.size()); n += 2) {
       sheet::Columns two;
       for (std::size_t k = n; k < n + 2; ++k) {
@@ -165,22 +170,26 @@ Sheet review_sheet(const Review& r) {
     }
   }
   if (!r.comparison.empty()) {
-    s.blocks.push_back({sheet::Heading{"Beside other sessions"}});
-    s.blocks.push_back({sheet::Paragraph{"Orange: this session. Diamonds: " + std::to_string(r.earlier) +
-                                             " earlier ones, the later the darker. Band: " + std::to_string(r.experts) +
-                                             " of experts; ticks: " + std::to_string(r.novices) + " of novices.",
-                                         Tone::quiet}});
+    s.blocks.push_back({sheet::Heading{tr("Beside other sessions")}});
+    s.blocks.push_back(
+        {sheet::Paragraph{filled(tr("Orange: this session. Diamonds: {earlier} earlier ones, the later the "
+                                    "darker. Band: {experts} of experts; ticks: {novices} of novices."),
+                                 {{"earlier", std::to_string(r.earlier)},
+                                  {"experts", std::to_string(r.experts)},
+                                  {"novices", std::to_string(r.novices)}}),
+                          Tone::quiet}});
     for (const Comparison& c : r.comparison) s.blocks.push_back({review::comparison_chart(c)});
   }
-  if (!r.findings.not_measured.empty()) {
-    s.blocks.push_back({sheet::Heading{"What could not be measured"}});
-    for (const auto& [why, what] : r.findings.not_measured) {
+  if (!shown.findings.not_measured.empty()) {
+    s.blocks.push_back({sheet::Heading{tr("What could not be measured")}});
+    for (const auto& [why, what] : shown.findings.not_measured) {
       std::string names;
       for (const std::string& w : what) names += (names.empty() ? "" : ", ") + w;
       s.blocks.push_back({sheet::Paragraph{why + ": " + names, Tone::quiet}});
     }
   }
-  for (const std::string& l : r.left_out) s.blocks.push_back({sheet::Paragraph{"Left out: " + l, Tone::quiet}});
+  for (const std::string& l : shown.left_out)
+    s.blocks.push_back({sheet::Paragraph{filled(tr("Left out: {what}"), {{"what", l}}), Tone::quiet}});
   return s;
 }
 

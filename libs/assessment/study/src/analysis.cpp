@@ -1,7 +1,7 @@
 #include "analyst.h"
 #include "charts.h"
 #include "osteo/core/base/param.h"
-#include "osteo/core/statistics/decide.h"
+#include "osteo/core/statistics/compare.h"
 
 namespace osteo::inline assessment::study {
 

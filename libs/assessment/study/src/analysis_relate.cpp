@@ -1,8 +1,8 @@
 // Do raters agree, do metrics follow them, and can a value tell who is who?
 #include "analyst.h"
 #include "charts.h"
+#include "osteo/core/statistics/compare.h"
 #include "osteo/core/statistics/curves.h"
-#include "osteo/core/statistics/decide.h"
 
 namespace osteo::inline assessment::study {
 

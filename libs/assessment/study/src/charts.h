@@ -6,7 +6,6 @@
 
 #include "osteo/core/report/sheet.h"
 #include "osteo/core/statistics/compare.h"
-#include "osteo/core/statistics/decide.h"
 
 namespace osteo::inline assessment::study {
 

@@ -6,6 +6,7 @@
 
 #include "layout.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/translate.h"
 #include "plot.h"
 
 namespace osteo {
@@ -120,9 +121,9 @@ void write_signature(std::ostream& out, const sheet::Signature& s) {
   };
   out << kSignatureBegin << "<section class=\"signature " << tone_class(s.tone) << "\"><b class=\""
       << tone_class(s.tone) << "\">" << sign(s.tone) << escaped(s.state) << "</b><div class=\"fields\">";
-  field("by", "approved by", s.by);
-  field("date", "date", s.date);
-  field("note", "note", s.note);
+  field("by", tr("approved by"), s.by);
+  field("date", tr("date"), s.date);
+  field("note", tr("note"), s.note);
   out << "</div></section>" << kSignatureEnd << '\n';
 }
 
@@ -345,7 +346,8 @@ std::string svg_of(const sheet::Drawing& d) {
 std::string sheet_html(const Sheet& s) {
   const double scale = fitting_scale(s);
   std::ostringstream out;
-  out << "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+  out << "<!DOCTYPE html>\n<html lang=\"" << tr_of("the language of these texts, as HTML names it", "en")
+      << "\"><head><meta charset=\"utf-8\">\n<meta name=\"viewport\" "
          "content=\"width=device-width\">\n";
   for (const auto& [key, value] : s.marks)
     out << "<meta name=\"osteotome-" << escaped(key) << "\" content=\"" << escaped(value) << "\">\n";

@@ -7,6 +7,7 @@
 
 #include "layout.h"
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/core/report/cairo_owned.h"
 #include "plot.h"
 
@@ -235,9 +236,9 @@ double draw_signature(const Pen& pen, const sheet::Signature& s, double x, doubl
     measure.on = false;
     pen.text(text, from, base - measure.text(text, from, base, width, style) - 1, width, style);
   };
-  field("approved by", s.by, x + 2 * kPad, third - 4 * kPad, 2);
-  field("date", s.date, x + third, third * 0.5 - 2 * kPad, 1);
-  field("note", s.note, x + 1.5 * third, 1.5 * third - 2 * kPad, 2);
+  field(tr("approved by"), s.by, x + 2 * kPad, third - 4 * kPad, 2);
+  field(tr("date"), s.date, x + third, third * 0.5 - 2 * kPad, 1);
+  field(tr("note"), s.note, x + 1.5 * third, 1.5 * third - 2 * kPad, 2);
   return h;
 }
 
@@ -437,6 +438,14 @@ void require_a_font() {
   if (n == 0)
     throw Error(ExitCode::failed, "there is no font on this machine to write a report with",
                 "install fonts-liberation");
+  // Boxes in place of characters would be no report.
+  if (language() != Language::chinese) return;
+  Paper paper;
+  const CairoOwned<PangoLayout> layout(pango_cairo_create_layout(paper.cairo.get()));
+  pango_layout_set_text(layout.get(), tr("Bone"), -1);
+  if (pango_layout_get_unknown_glyphs_count(layout.get()) > 0)
+    throw Error(ExitCode::failed, "there is no font on this machine that has Chinese characters, for the PDF",
+                "install fonts-noto-cjk, or set LANGUAGE=en");
 }
 
 }  // namespace

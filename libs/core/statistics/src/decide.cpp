@@ -1,4 +1,4 @@
-#include "osteo/core/statistics/decide.h"
+#include "osteo/core/statistics/compare.h"
 
 #include <algorithm>
 #include <cmath>

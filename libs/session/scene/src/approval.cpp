@@ -6,6 +6,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
+#include "osteo/core/base/translate.h"
 #include "osteo/core/report/sheet.h"
 #include "osteo/session/scene/case.h"
 
@@ -63,9 +64,13 @@ void require_text(const std::string& what, const std::string& text, std::size_t 
 }  // namespace
 
 std::string ApprovalNow::words() const {
-  if (state == ApprovalState::none) return "not approved";
-  const std::string who = approval ? "approved by " + approval->by + " on " + approval->date : "approved";
-  return state == ApprovalState::valid ? who : who + ", before the last change (" + changed + "): no longer valid";
+  if (state == ApprovalState::none) return tr("not approved");
+  const std::string who = approval ? filled(tr("approved by {who} on {date}"),
+                                            {{"who", approval->by}, {"date", shown_date(approval->date)}})
+                                   : std::string(tr("approved"));
+  return state == ApprovalState::valid ? who
+                                       : filled(tr("{approval}, before the last change ({changed}): no longer valid"),
+                                                {{"approval", who}, {"changed", changed}});
 }
 
 fs::path report_file(const fs::path& case_folder, const std::string& suffix) {

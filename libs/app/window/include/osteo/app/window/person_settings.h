@@ -18,7 +18,7 @@ namespace osteo::inline app {
 struct PersonValues {
   using Params = PersonValues;
   double scale = 1;  ///< of text and panels, times the monitor's
-  std::string layout = "operate", theme = "dark";
+  std::string layout = "operate", theme = "dark", language = "auto";
   bool full_screen = false, sound = true, alarms = false, remember_cases = true, first_steps = true;
   bool hints = false;
   std::string hints_off;
@@ -29,6 +29,7 @@ struct PersonValues {
     visit({"scale", "size of text and panels, times the monitor's", "", 0.6, 2.5}, p.scale);
     visit({"layout", "layout of the window: operate or plan"}, p.layout);
     visit({"theme", "colours of the window: dark, light or high_contrast"}, p.theme);
+    visit({"language", "language of the window: auto (that of the system), en, de, es, fr or zh_CN"}, p.language);
     visit({"full_screen", "the window fills the screen"}, p.full_screen);
     visit({"sound", "what drilling sounds like"}, p.sound);
     visit({"volume", "volume of the sound", "", 0, 1}, p.volume);

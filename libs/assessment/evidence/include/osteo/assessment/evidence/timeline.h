@@ -37,6 +37,11 @@ struct TimelineEvent {
   std::string structure;      ///< of injury and touch
   bool placed = false;
   Vec3 at_mm;  ///< where placed: in the world; of injury and touch where the bone lay at the beginning
+  /// What `what` was made of: a text of the catalogues and what fills its {part}; null: `what` is a person's own.
+  const char* text = nullptr;
+  std::string part = {};
+  /// `what` in the language.
+  [[nodiscard]] std::string shown() const;
 };
 
 /// Arrays of one length; sample n stands for [n, n + 1) tenths of a second. What is not known is not a number.

@@ -54,6 +54,13 @@ struct ReviewPicture {
   std::string id;       ///< "before", "after", "unseen", "unseen-side", or that of a finding
   std::string caption;  ///< also what is read aloud
   Picture picture;
+  std::string shown = {};  ///< the caption in the language of the page
+};
+
+/// The texts of a review in the language of its page and paper; its own are English, as its JSON has them.
+struct ReviewTexts {
+  std::vector<std::string> labels, left_out;
+  Findings findings;
 };
 
 /// All that the page, the PDF and the JSON say.
@@ -72,6 +79,7 @@ struct Review {
   double view_radius_mm = 30;
   std::vector<ReviewPicture> pictures;
   std::vector<std::string> left_out;  ///< what the page lacks, and why
+  ReviewTexts shown;
   double hidden_mm3 = 0, seen_mm3 = 0, unknown_mm3 = 0;
   bool damaged = false;  ///< the session's file is
 
@@ -84,7 +92,8 @@ struct Review {
 
 /// "osteotome_review": 1. All that the page says, and the voxels and places that prove it.
 [[nodiscard]] Json review_json(const Review& review);
-/// Self-contained: pictures, meshes, script and style inside; asks for nothing from anywhere. Same review, same bytes.
+/// In the language that is used, which is the one that the review was made in. Self-contained: pictures, meshes, script
+/// and style inside; asks for nothing from anywhere. Same review, same language, same bytes.
 [[nodiscard]] std::string review_html(const Review& review);
 [[nodiscard]] Sheet review_sheet(const Review& review);
 

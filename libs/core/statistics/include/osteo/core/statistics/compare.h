@@ -1,7 +1,9 @@
-// Two groups of people: whether and by how much they differ, one value for each person.
+// Two groups of people: whether and by how much they differ, one value for each person; and from a value to a decision:
+// ROC, pass marks, and how many people a study needs.
 #pragma once
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "osteo/core/statistics/basics.h"
 
@@ -49,5 +51,50 @@ struct Permutation {
 /// (2004), from the unbiased variance; where the groups do not overlap at all, Wilson's bound with the smaller group's
 /// size.
 [[nodiscard]] Estimate cliffs_delta(std::span<const double> a, std::span<const double> b, double level = 0.95);
+
+/// How well a value tells two groups apart, larger meaning `positive`. Area by Mann and Whitney's count, its variance
+/// by DeLong, DeLong and Clarke-Pearson (1988), interval cut at 0 and 1; where the groups do not overlap at all that
+/// variance is 0 and Wilson's bound with the smaller group's size is taken.
+struct Roc {
+  struct Point {
+    double threshold = 0, true_positive = 0, false_positive = 0;  ///< shares, of values >= threshold
+  };
+  Estimate area;
+  double standard_error = kUndefined;
+  std::vector<Point> curve;  ///< by falling threshold, from (0, 0) at +infinity to (1, 1)
+  Point best;                ///< the largest true - false (Youden 1950); the highest threshold of equal ones
+};
+/// Both groups need one value at least; the standard error two.
+[[nodiscard]] Roc roc(std::span<const double> positive, std::span<const double> negative, double level = 0.95);
+
+/// Contrasting groups (Livingston and Zieky 1982): the pass mark lies where the normal curves of those who can and
+/// those who cannot cross, between their means. NaN where they do not, or a group has fewer than two or no spread.
+struct PassMark {
+  Estimate mark;                                                                ///< interval by bootstrap in each group
+  double competent_fail_fitted = kUndefined, other_pass_fitted = kUndefined;    ///< shares, by the curves
+  double competent_fail_counted = kUndefined, other_pass_counted = kUndefined;  ///< shares, of those who were there
+  bool higher_is_better = true;
+};
+[[nodiscard]] PassMark contrasting_groups(std::span<const double> competent, std::span<const double> others,
+                                          const Resampling& resampling = {});
+
+/// Chance that a comparison of two groups finds a difference, by simulating it: normal people, equal spread, `effect`
+/// between the groups in standard deviations of a single session, each person's mean of `sessions` sessions of which
+/// `icc` is the person's own share; Welch's t.
+struct PowerSettings {
+  double effect = 0.8;
+  int sessions = 1;  ///< of each person, at least 1
+  double icc = 0;    ///< 0 to 1; means nothing for one session
+  double alpha = 0.05;
+  int draws = 4000;  ///< at least 100
+  std::uint64_t seed = 1;
+};
+/// Groups of at least two. The interval (Wilson) is that of the simulation.
+[[nodiscard]] Estimate power_two_groups(std::size_t n_a, std::size_t n_b, const PowerSettings& settings = {});
+/// The smallest effect that is found in `power` of such studies, to 0.01. NaN where even 10 is not.
+[[nodiscard]] double detectable_effect(std::size_t n_a, std::size_t n_b, double power = 0.8,
+                                       const PowerSettings& settings = {});
+/// The fewest people in each of two equal groups for `power`, at most 100000. NaN for no effect.
+[[nodiscard]] double people_needed(double power = 0.8, const PowerSettings& settings = {});
 
 }  // namespace osteo::statistics
