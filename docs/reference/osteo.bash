@@ -115,7 +115,7 @@ _osteo() {
     playback) flags="$flags --out --mode --drills --pace --stiffness-n-per-mm --damping-n-s-per-m --forward --max-force-n --dead-zone-mm --tolerance-radius-mm --ramp-s --forget --trial-s --from-s --to-s --experts --headless --hand --device --case-folder --state-file" ;;
     tutor) flags="$flags --out --script --settings --resume --listen --port --two-way --stiffness-n-per-mm --max-force-n --min-trainees --wait-s" ;;
     join) flags="$flags --out --case-folder --code --role --hand --stiffness-n-per-mm --max-force-n --wait-s --silence-s" ;;
-    score) flags="$flags --procedure --mirror --reference --subject --csv --evidence --heat --case-folder" ;;
+    score) flags="$flags --procedure --mirror --reference --subject --csv --measures --segmentation --scan --evidence --heat --case-folder" ;;
     movie) flags="$flags --camera --speed --from-s --to-s --skip-idle --no-overlay --blind --size --fps --deep --case-folder" ;;
     goal-cavity) flags="$flags --out --procedure --mirror --session --burr-mm --approach" ;;
     review) flags="$flags --out --procedure --mirror --reference --subject --earlier --no-pictures --case-folder" ;;
