@@ -11,7 +11,7 @@ namespace osteo::inline session::guide {
 namespace {
 
 constexpr double kNodesMm = 0.3, kEngravedMm = 0.5, kMayBeNearerMm = 0.01, kFloorMm = 0.02, kSteepest = 3;
-constexpr double kAlongSlopeMm = 0.45, kSlopeEveryMm = 2, kContactMm = 2;
+constexpr double kAlongSlopeMm = 0.34, kSlopeEveryMm = 2, kContactMm = 2;
 constexpr std::size_t kMostRows = 4, kContactEvery = 4;  // rows for one where it is steep; cells to a contact
 constexpr double kSmallestPixelMm = 0.5, kLargestPixelMm = 1.2, kRimMm = 0.5, kSeenFromAbove = 0.5;
 constexpr int kMaxRaises = 12, kMaxTraceSteps = 2000;
