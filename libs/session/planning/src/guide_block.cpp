@@ -11,7 +11,7 @@ namespace osteo::inline session::guide {
 namespace {
 
 constexpr double kNodesMm = 0.3, kEngravedMm = 0.5, kMayBeNearerMm = 0.01, kFloorMm = 0.02, kSteepest = 3;
-constexpr double kAlongSlopeMm = 0.34, kSlopeEveryMm = 2, kContactMm = 2;
+constexpr double kAlongSlopeMm = 0.34, kSlopeEveryMm = 2, kContactMm = 2, kLeastCosine = 0.1;
 constexpr std::size_t kMostRows = 4, kContactEvery = 4;  // rows for one where it is steep; cells to a contact
 constexpr double kSmallestPixelMm = 0.5, kLargestPixelMm = 1.2, kRimMm = 0.5, kSeenFromAbove = 0.5;
 constexpr int kMaxRaises = 12, kMaxTraceSteps = 2000;
@@ -246,8 +246,12 @@ class Block {
         const double lacks = there(j, c) ? l_.gap - kMayBeNearerMm - found[at(j, c)] : 0;
         if (lacks <= 0) continue;
         any = true;
+        // On a slope a raise widens the gap by its cosine only.
+        const Vec3 across =
+            cross(bottom_[at(j + 1, c + 1)] - bottom_[at(j, c)], bottom_[at(j + 1, c)] - bottom_[at(j, c + 1)]);
+        const double cosine = std::max(kLeastCosine, std::abs(across.z) / std::max(length(across), 1e-12));
         for (const std::size_t n : {at(j, c), at(j, c + 1), at(j + 1, c), at(j + 1, c + 1)})
-          by[n] = std::max(by[n], 1.5 * lacks + 0.001);
+          by[n] = std::max(by[n], 1.1 * lacks / cosine + 0.001);
       }
     }
     for (std::size_t n = 0; n < by.size(); ++n) bottom_[n].z += by[n];
