@@ -71,7 +71,8 @@ struct SlotFound {
 };
 
 // Goes along the plane's normal from places in the kerf, above the bone and below the guide's top, to where the solid
-// begins: the face that stays, and the other. Independent of how the guide was made.
+// begins: the face that stays, and the other. Independent of how the guide was made. Beside the slot's edges the solid
+// may begin at its top or underside: what is met there lies more than 30 degrees from the plane.
 SlotFound measured_slot(const CuttingGuide& g, const SignedDistance& solid, const SignedDistance& bone,
                         const CutPlane& p, double play) {
   const Vec3 e = p.waste_ahead ? p.normal : -p.normal;
@@ -86,7 +87,9 @@ SlotFound measured_slot(const CuttingGuide& g, const SignedDistance& solid, cons
         double lo = 0, hi = 1.5;
         if (!solid.inside(middle + e * (sign * hi))) return -1.0;
         while (hi - lo > 1e-5) (solid.inside(middle + e * (sign * (lo + hi) / 2)) ? hi : lo) = (lo + hi) / 2;
-        return hi;
+        const auto& t = g.solid.triangles[solid.closest(middle + e * (sign * hi)).triangle];
+        const Vec3 &a = g.solid.points_mm[t[0]], &b = g.solid.points_mm[t[1]], &c = g.solid.points_mm[t[2]];
+        return std::abs(dot(normalized(cross(b - a, c - a)), e)) < std::cos(30 * kDeg) ? -1.0 : hi;
       };
       const double stays = wall(-1);
       if (stays < 0) continue;

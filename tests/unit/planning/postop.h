@@ -61,6 +61,8 @@ struct TrueFragment {
   const BoneField* bone = nullptr;
   RigidTransform postop_from_ct;
   std::vector<std::pair<Vec3, Vec3>> faces;  ///< where it really was sawn: a place, and the direction to the waste
+  /// The planes go on to where the bone comes back: there is no bone of this fragment on that side.
+  Vec3 guard_at, guard_normal;
 };
 
 struct PostopCt {
@@ -72,6 +74,14 @@ struct PostopCt {
 
 inline double normal_share(double x) {
   return 0.5 * std::erfc(-x / std::sqrt(2.0));
+}
+
+/// That two normal variables of this correlation are below x and y; the tetrachoric series, for what is below 0.6 in
+/// it.
+inline double both_below(double x, double y, double correlation) {
+  const double p = normal_share(x), q = normal_share(y), r = correlation;
+  const double at = std::exp(-(x * x + y * y) / 2) / (2 * 3.14159265358979323846);
+  return p * q + at * (r + r * r / 2 * x * y + r * r * r / 6 * (x * x - 1) * (y * y - 1));
 }
 
 inline double gaussian(statistics::Random& random) {
@@ -110,17 +120,30 @@ inline Image postop_ct(const std::vector<TrueFragment>& fragments, BoxMm box, co
     for (int j = 0; j < ct.frame.dims[1]; ++j) {
       for (int i = 0; i < ct.frame.dims[0]; ++i, ++n) {
         const Vec3 x = ct.frame.world_from_index(Vec3(i, j, k));
-        double hu = 40;
+        double hu = 40, solid = 0;
         for (std::size_t f = 0; f < fragments.size(); ++f) {
           const Vec3 p = back[f](x);
+          if (dot(p - fragments[f].guard_at, fragments[f].guard_normal) < 0) continue;
           const double skin = fragments[f].bone->at(p);
           if (skin >= 3) continue;
-          double sd = skin;
-          for (const auto& [at, e] : fragments[f].faces) sd = std::max(sd, dot(p - at, e));
-          if (sd >= 3) continue;
-          const double core = how.marrow ? 900 * normal_share((-skin - 2.5) / how.blur_mm) : 0;
-          hu = std::max(hu, 40 + (1160 - core) * normal_share(-sd / how.blur_mm));
+          double cut = -100;
+          Vec3 across;
+          for (const auto& [at, e] : fragments[f].faces) {
+            if (dot(p - at, e) <= cut) continue;
+            cut = dot(p - at, e);
+            across = e;
+          }
+          if (cut >= 3) continue;
+          // Blur goes over cortex, marrow and face together: for planes exactly this, by the angle between them.
+          double r = 0;
+          if (cut > -3 && std::abs(skin + 1.25) < 3.25)
+            r = std::clamp(fragments[f].bone->at(p + across * 0.5) - fragments[f].bone->at(p - across * 0.5), -0.6,
+                           0.6);
+          const double b = how.blur_mm, bone = both_below(-skin / b, -cut / b, r);
+          const double core = how.marrow ? 900 * both_below((-skin - 2.5) / b, -cut / b, r) : 0;
+          solid += 1160 * bone - core;
         }
+        hu += std::min(solid, 1160.0);  // bones that touch add up; where they would be in one another, they are bone
         for (const RigidTransform& to_plate : plate_back) {
           const Vec3 p = to_plate(x);
           const double sd = std::max({std::abs(p.x) - 12, std::abs(p.y) - 2.5, std::abs(p.z) - 0.8});

@@ -162,6 +162,7 @@ Json outcome_json(const Outcome& o) {
       one["middle_mm"] = osteo::json_of(f.middle_mm);
       one["edge_rms_mm"] = f.edge_mm;
       if (!f.reference) {
+        if (!(f.slides_along == Vec3{})) one["slides_along"] = osteo::json_of(f.slides_along);
         one["shift_mm"] = json_of(f.shift_mm);
         one["turn_deg"] = json_of(f.turn_deg);
       }
@@ -207,6 +208,7 @@ std::string outcome_page(const Outcome& o) {
     } else {
       for (const auto& all : {f.shift_mm, f.turn_deg})
         row.push_back(cell(text_of(all[0]) + "; " + text_of(all[1]) + "; " + text_of(all[2])));
+      if (!(f.slides_along == Vec3{})) row[0].text += " (not known along itself)";
     }
     fragments.rows.push_back(std::move(row));
   }
@@ -220,7 +222,9 @@ std::string outcome_page(const Outcome& o) {
   }
   s.blocks.push_back({sheet::Paragraph{
       "Value and half-width of the 95 % interval. x: to the patient's left, y: to the back, z: to the head. A cut is "
-      "off by more than 0 where the face lies further towards what was removed."}});
+      "off by more than 0 where the face lies further towards what was removed. Not known along itself: the surface of "
+      "a "
+      "shaft does not show how far it is shifted along its axis; the shift is what lies across."}});
   s.blocks.push_back({sheet::Heading{"Fragments"}});
   s.blocks.push_back({std::move(fragments)});
   s.blocks.push_back({sheet::Heading{"Cuts"}});

@@ -26,7 +26,7 @@ constexpr std::array<Suffixes, 7> kSuffixes{{{DataKind::image, ".nrrd .nii .nii.
                                              {DataKind::grid, ".vdb .nrrd .vti"},
                                              {DataKind::surface, ".ply .stl .obj .glb .3mf .vtp .dcm"},
                                              {DataKind::picture, ".png"},
-                                             {DataKind::document, ".json .inp .svg .csv .tfm .vtu"},
+                                             {DataKind::document, ".json .inp .svg .csv .tfm .vtu .html"},
                                              {DataKind::tets, ".vtu .node .ele"}}};
 
 bool accepts(std::span<const DataKind> kinds, DataKind kind) {

@@ -16,7 +16,7 @@ namespace guide {
 namespace {
 
 constexpr double kBetweenSlotsMm = 2.5, kBesideSectionMm = 1, kSectionNearMm = 40, kTiltLimit = 0.35;
-constexpr double kMaxHeightMm = 40, kWedgeMm = 0.02;
+constexpr double kMaxHeightMm = 40, kWedgeMm = 0.02, kLeastSeatMm2 = 20;
 constexpr double kNotHeldMm = 5, kNotHeldDeg = 5;
 
 struct Axes {
@@ -308,7 +308,7 @@ CuttingGuide make_cutting_guide(const TriangleSoup& bone, const SurgicalPlan& pl
       out.cuts[n].width_mm = guide::least_between(o.lower, o.upper, layout, box.lo.z);
     }
   }
-  if (block.contacts.size() < 12)
+  if (block.seat_mm2 < guide::kLeastSeatMm2 || block.contacts.empty())
     throw Error(ExitCode::failed, "the guide would not seat: almost nothing of it follows the bone",
                 "another --approach, a larger --depth-mm or --margin-mm");
   context.progress(0.8, "seat");

@@ -11,6 +11,8 @@ namespace osteo::inline session::guide {
 namespace {
 
 constexpr double kNodesMm = 0.3, kEngravedMm = 0.5, kMayBeNearerMm = 0.01, kFloorMm = 0.02, kSteepest = 3;
+constexpr double kAlongSlopeMm = 0.34, kSlopeEveryMm = 2, kContactMm = 2, kLeastCosine = 0.1;
+constexpr std::size_t kMostRows = 4, kContactEvery = 4;  // rows for one where it is steep; cells to a contact
 constexpr double kSmallestPixelMm = 0.5, kLargestPixelMm = 1.2, kRimMm = 0.5, kSeenFromAbove = 0.5;
 constexpr int kMaxRaises = 12, kMaxTraceSteps = 2000;
 constexpr double kTracedMm = 1e-7;
@@ -34,12 +36,12 @@ struct Inscription {
 // Cells of a grid of rows (y) and columns (x), the holes left out; each cell has an underside and a top.
 class Block {
  public:
-  Block(const GuideLayout& layout, const Underside& under) : l_(layout), under_(under) {
-    add_rows(l_.y0, l_.cut0);
+  Block(const GuideLayout& layout, const Underside& under, const Context& context) : l_(layout), under_(under) {
+    add_rows(l_.y0, l_.cut0, context);
     first_cut_ = rows_.size();
-    add_rows(l_.cut0, l_.cut1);
+    add_rows(l_.cut0, l_.cut1, context);
     last_cut_ = rows_.size();
-    if (l_.cut1 < l_.y1) add_rows(l_.cut1, l_.y1);
+    if (l_.cut1 < l_.y1) add_rows(l_.cut1, l_.y1, context);
     rows_.push_back(l_.y1);
     // Columns: between each two stations as many as keep to the wanted distance where they are widest apart.
     const std::size_t stations = 2 * l_.openings.size() + 2;
@@ -138,10 +140,28 @@ class Block {
     for (std::size_t at = 0; at < text.size(); at += each) out.rows.push_back(text.substr(at, each));
     return out;
   }
-  void add_rows(double from, double to) {
+  // Between two rows where the underside is steep anywhere, more rows: nodes as far apart along the slope lie further
+  // from what is between them the more the bone is bent, and a wall of the bone is met as near as rows are apart.
+  void add_rows(double from, double to, const Context& context) {
     const auto n = std::max<std::size_t>(1, static_cast<std::size_t>(std::ceil((to - from) / kNodesMm)));
-    for (std::size_t k = 0; k < n; ++k)
-      rows_.push_back(from + (to - from) * static_cast<double>(k) / static_cast<double>(n));
+    const auto y = [&](std::size_t k) { return from + (to - from) * static_cast<double>(k) / static_cast<double>(n); };
+    const auto places = static_cast<std::size_t>((l_.x1 - l_.x0) / kSlopeEveryMm) + 1;
+    std::vector<double> height((n + 1) * places);
+    parallel_for(n + 1, 1, context.threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k)
+        for (std::size_t p = 0; p < places; ++p)
+          height[k * places + p] = under_.height(l_.x0 + (static_cast<double>(p) + 0.5) * kSlopeEveryMm, y(k));
+    });
+    for (std::size_t k = 0; k < n; ++k) {
+      double rise = 0;
+      for (std::size_t p = 0; p < places; ++p)
+        rise = std::max(rise, std::abs(height[(k + 1) * places + p] - height[k * places + p]));
+      const double along = std::sqrt(rise * rise + (y(k + 1) - y(k)) * (y(k + 1) - y(k)));
+      const auto parts =
+          std::clamp<std::size_t>(static_cast<std::size_t>(std::ceil(along / kAlongSlopeMm)), 1, kMostRows);
+      for (std::size_t part = 0; part < parts; ++part)
+        rows_.push_back(y(k) + (y(k + 1) - y(k)) * static_cast<double>(part) / static_cast<double>(parts));
+    }
   }
   [[nodiscard]] std::size_t at(std::size_t row, std::size_t column) const { return row * columns_ + column; }
   [[nodiscard]] const GuideFace& face(std::size_t station) const {
@@ -226,8 +246,12 @@ class Block {
         const double lacks = there(j, c) ? l_.gap - kMayBeNearerMm - found[at(j, c)] : 0;
         if (lacks <= 0) continue;
         any = true;
+        // On a slope a raise widens the gap by its cosine only.
+        const Vec3 across =
+            cross(bottom_[at(j + 1, c + 1)] - bottom_[at(j, c)], bottom_[at(j + 1, c)] - bottom_[at(j, c + 1)]);
+        const double cosine = std::max(kLeastCosine, std::abs(across.z) / std::max(length(across), 1e-12));
         for (const std::size_t n : {at(j, c), at(j, c + 1), at(j + 1, c), at(j + 1, c + 1)})
-          by[n] = std::max(by[n], 1.5 * lacks + 0.001);
+          by[n] = std::max(by[n], 1.1 * lacks / cosine + 0.001);
       }
     }
     for (std::size_t n = 0; n < by.size(); ++n) bottom_[n].z += by[n];
@@ -247,23 +271,21 @@ class Block {
         if (!there(j, c)) continue;
         out.min_gap = std::min(out.min_gap, found[at(j, c)]);
         const std::array<std::size_t, 4> n{at(j, c), at(j, c + 1), at(j + 1, c + 1), at(j + 1, c)};
-        double lo = 1e9, hi = -1e9;
-        bool seated = true;
-        for (const std::size_t m : n) {
-          const Vec3& p = bottom_[m];
-          lo = std::min(lo, p.z);
-          hi = std::max(hi, p.z);
-          seated = seated && p.z > under_.crest(p.x) - under_.depth() + kFloorMm;
-        }
-        if (!seated) continue;
-        if (j % 4 == 0 && c % 4 == 0) {
+        const Vec3 &a = bottom_[n[0]], &b = bottom_[n[1]], &d = bottom_[n[2]], &e = bottom_[n[3]];
+        const bool seated = std::all_of(n.begin(), n.end(), [&](std::size_t m) {
+          return bottom_[m].z > under_.crest(bottom_[m].x) - under_.depth() + kFloorMm;
+        });
+        const Vec3 across = cross(d - a, e - b);
+        const bool steep = across.z * across.z * (1 + kSteepest * kSteepest) < dot(across, across);
+        // Walls hold the guide too, though they are but one cell wide and end at the floor.
+        if (c % kContactEvery == 0 && (steep || j % kContactEvery == 0)) {
           const Vec3 p = places(j, c)[0];
           const ClosestPoint near = under_.bone().closest(p);
-          out.contacts.push_back({p, normalized(p - near.point_mm), near.distance_mm});
+          if (near.distance_mm < kContactMm)
+            out.contacts.push_back({p, normalized(p - near.point_mm), near.distance_mm});
         }
-        if (hi - lo > kSteepest * kNodesMm) continue;
-        const Vec3 &a = bottom_[n[0]], &b = bottom_[n[1]], &d = bottom_[n[2]], &e = bottom_[n[3]];
-        out.seat_mm2 += length(cross(d - a, e - b)) / 2;
+        if (!seated || steep) continue;
+        out.seat_mm2 += length(across) / 2;
         for (const Vec3& p : places(j, c))
           out.seat_off = std::max(out.seat_off, std::abs(under_.bone().closest(p).distance_mm - l_.gap));
       }
@@ -325,7 +347,7 @@ void Underside::measure_crest(double x0, double x1, double y0, double y1, double
 
 GuideBlock build_block(const GuideLayout& layout, const Underside& under, const Context& context) {
   GuideBlock out;
-  Block block(layout, under);
+  Block block(layout, under, context);
   block.lay(context);
   context.progress(0.7, "gap");
   block.keep_gap(out, context);

@@ -11,6 +11,7 @@
 #include "osteo/core/base/param.h"
 #include "osteo/core/base/portable_math.h"
 #include "section.h"
+#include "solve.h"
 
 namespace osteo::inline session {
 namespace outcome {
@@ -23,10 +24,15 @@ using planning::Solved;
 using planning::Square;
 
 constexpr std::size_t kPlaces = 2000, kCoarsePlaces = 250;
-constexpr double kFromCutsMm = 2, kPatchMm = 5, kFacePatchMm = 3, kFaceStepMm = 0.6, kFaceRimMm = 0.8;
-constexpr double kFaceReachMm = 2.5, kFaceDropShare = 0.6, kMinFaceSeen = 0.12, kMinFound = 0.35;
+constexpr double kFromCutsMm = 2, kPatchMm = 5, kFacePatchMm = 4, kStreakPatchMm = 8, kFaceStepMm = 0.6,
+                 kFaceRimMm = 0.8;
+constexpr double kFaceReachMm = 2.5, kFaceDropShare = 0.6, kRiseShare = 0.15, kMinFaceSeen = 0.12;
+constexpr double kMinFound = 0.35, kBrighterHu = 150, kMetalMm = 8;
+// Where edges say nothing, a pose stays where it is wanted: a shaft slides in its own surface. Weights against those of
+// 2000 edges: what these do say is moved by less than a thousandth.
+constexpr Row<7> kHold{0.01, 0.01, 0.01, 0.5, 0.5, 0.5, 0};
 constexpr double kDeg = std::numbers::pi / 180;
-constexpr int kRounds = 14, kSettleRounds = 4;
+constexpr int kRounds = 40, kSettleRounds = 4;
 
 struct SurfacePlace {
   Vec3 at, normal;
@@ -38,15 +44,44 @@ bool behind(const std::vector<const CutPlane*>& planes, Vec3 p, double by) {
   });
 }
 
+// Triangles of what stays: behind the planes, and in one piece with what is nearest to the first one's place. Planes go
+// on beyond the bone's section: behind one across the left of a jaw also lies the right ramus, which is another's.
+std::vector<bool> part(const TriangleSoup& bone, const std::vector<const CutPlane*>& planes) {
+  std::vector<std::uint32_t> piece(bone.points_mm.size());
+  for (std::size_t n = 0; n < piece.size(); ++n) piece[n] = static_cast<std::uint32_t>(n);
+  const auto root = [&](std::uint32_t n) {
+    while (piece[n] != n) n = piece[n] = piece[piece[n]];
+    return n;
+  };
+  std::vector<bool> in(bone.triangles.size());
+  double nearest = std::numeric_limits<double>::infinity();
+  std::uint32_t wanted = 0;
+  for (std::size_t n = 0; n < in.size(); ++n) {
+    const auto& t = bone.triangles[n];
+    const Vec3 middle = (bone.points_mm[t[0]] + bone.points_mm[t[1]] + bone.points_mm[t[2]]) / 3;
+    in[n] = behind(planes, middle, kFromCutsMm);
+    if (!in[n]) continue;
+    piece[root(t[1])] = root(t[0]);
+    piece[root(t[2])] = root(t[0]);
+    const double mm = planes.empty() ? 0 : length(middle - planes[0]->at_mm);
+    if (mm >= nearest) continue;
+    nearest = mm;
+    wanted = t[0];
+  }
+  for (std::size_t n = 0; n < in.size(); ++n) in[n] = in[n] && root(bone.triangles[n][0]) == root(wanted);
+  return in;
+}
+
 // Spread over the area of what stays, by the golden ratio; the same every time.
 std::vector<SurfacePlace> spread(const TriangleSoup& bone, const std::vector<const CutPlane*>& planes) {
   std::vector<double> until;
   std::vector<std::size_t> of;
   double sum = 0;
+  const std::vector<bool> in = part(bone, planes);
   for (std::size_t n = 0; n < bone.triangles.size(); ++n) {
+    if (!in[n]) continue;
     const auto& t = bone.triangles[n];
     const Vec3 a = bone.points_mm[t[0]], b = bone.points_mm[t[1]], c = bone.points_mm[t[2]];
-    if (!behind(planes, (a + b + c) / 3, kFromCutsMm)) continue;
     until.push_back(sum += length(cross(b - a, c - a)) / 2);
     of.push_back(n);
   }
@@ -73,13 +108,19 @@ struct Fit {
   double offset = 0;    ///< what all edges lie further out
   Vec3 middle;          ///< about which the pose's error turns, in the CT after surgery
   Square<7> covariance{};
-  double quantile = 0, rms = 0, found = 0, drop = 0;
+  double quantile = 0, rms = 0, found = 0, drop = 0, blur = 0, beyond = 0;
 };
 
 RigidTransform small_motion(Vec3 about, Vec3 shift, Vec3 turn) {
   RigidTransform r = length(turn) > 0 ? rotation_about(about, normalized(turn), length(turn)) : RigidTransform{};
   r.shift_mm += shift;
   return r;
+}
+
+Vec3 rotation_vector(const Mat3& m) {
+  const Vec3 twice{m.column[1].z - m.column[2].y, m.column[2].x - m.column[0].z, m.column[0].y - m.column[1].x};
+  const double sin = length(twice) / 2, cos = (m.column[0].x + m.column[1].y + m.column[2].z - 1) / 2;
+  return sin < 1e-15 ? Vec3{} : twice * (portable::atan2(sin, cos) / (2 * sin));
 }
 
 // How well edges are met: the mean drop across the surface.
@@ -108,27 +149,37 @@ std::array<int, 3> patch_of(Vec3 p, double size) {
 // Edges upon the surface by least squares over turn, shift and offset; the reach shrinks, and what is off by more than
 // three times the usual is left out.
 std::optional<Fit> refined(const EdgeReader& ct, const std::vector<SurfacePlace>& places, const RigidTransform& start,
-                           double reach, const Context& context) {
+                           const RigidTransform& wanted, double reach, const Context& context) {
   Fit fit;
   fit.pose = start;
+  const double patch = ct.has_metal() ? kStreakPatchMm : kPatchMm;  // streaks are wider than noise
   std::vector<std::optional<EdgeReader::Edge>> edges(places.size());
   for (int round = 0; round < kRounds; ++round) {
     context.check_cancelled();
     const double here = std::max(1.8, reach * std::pow(0.75, round));
     parallel_for(places.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n)
-        edges[n] = ct.along(fit.pose(places[n].at), fit.pose.rotation * places[n].normal, here);
+      for (std::size_t n = begin; n < end; ++n) {
+        const Vec3 at = fit.pose(places[n].at);
+        edges[n].reset();
+        if (ct.metal_mm(at) < kMetalMm) continue;
+        edges[n] = ct.along(at, fit.pose.rotation * places[n].normal, here);
+        if (edges[n] && edges[n]->rise_hu > kRiseShare * edges[n]->drop_hu) edges[n].reset();
+      }
     });
-    std::vector<double> at, drops, off;
+    std::vector<double> at, drops, steps, beyond, off;
     for (const auto& e : edges) {
       if (!e) continue;
       at.push_back(e->at_mm);
       drops.push_back(e->drop_hu);
+      steps.push_back(e->step_hu);
+      beyond.push_back(e->beyond_hu);
     }
     const double common = median_of(at);
     for (const double v : at) off.push_back(std::abs(v - common));
     const double limit = std::max(0.25, 3 * 1.4826 * median_of(off));
     fit.drop = median_of(drops);
+    fit.beyond = median_of(beyond);
+    fit.blur = EdgeReader::blur_mm(median_of(steps), fit.drop);
     fit.middle = {};
     std::vector<std::size_t> kept;
     for (std::size_t n = 0; n < edges.size(); ++n) {
@@ -142,9 +193,11 @@ std::optional<Fit> refined(const EdgeReader& ct, const std::vector<SurfacePlace>
     std::vector<Equation<7>> all;
     for (const std::size_t n : kept) {
       const Vec3 d = fit.pose.rotation * places[n].normal, m = cross(fit.pose(places[n].at) - fit.middle, d);
-      all.push_back({{d.x, d.y, d.z, m.x, m.y, m.z, 1}, edges[n]->at_mm, patch_of(places[n].at, kPatchMm)});
+      all.push_back({{d.x, d.y, d.z, m.x, m.y, m.z, 1}, edges[n]->at_mm, patch_of(places[n].at, patch)});
     }
-    const auto solved = planning::least_squares<7>(all);
+    const RigidTransform back = wanted * fit.pose.inverse();
+    const Vec3 b = back(fit.middle) - fit.middle, w = rotation_vector(back.rotation);
+    const auto solved = planning::least_squares<7>(all, kHold, {b.x, b.y, b.z, w.x, w.y, w.z, 0});
     if (!solved) return std::nullopt;
     const auto& s = solved->step;
     double squares = 0;
@@ -193,17 +246,11 @@ std::optional<Fit> located(const EdgeReader& ct, const std::vector<SurfacePlace>
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return score[a] > score[b]; });
   std::optional<Fit> best;
   for (std::size_t n = 0; n < std::min(search.keep, order.size()); ++n) {
-    auto fit = refined(ct, places, starts[order[n]], 1.5 * search.step_mm + 2, context);
+    auto fit = refined(ct, places, starts[order[n]], guess, 1.5 * search.step_mm + 2, context);
     if (fit && (!best || fit->found > best->found + 0.02 || (fit->found > best->found - 0.02 && fit->rms < best->rms)))
       best = std::move(fit);
   }
   return best;
-}
-
-Vec3 rotation_vector(const Mat3& m) {
-  const Vec3 twice{m.column[1].z - m.column[2].y, m.column[2].x - m.column[0].z, m.column[0].y - m.column[1].x};
-  const double sin = length(twice) / 2, cos = (m.column[0].x + m.column[1].y + m.column[2].z - 1) / 2;
-  return sin < 1e-15 ? Vec3{} : twice * (portable::atan2(sin, cos) / (2 * sin));
 }
 
 // The shift and turn of a place under a pose's error, from its unknowns, in other axes.
@@ -221,16 +268,34 @@ std::array<Row<7>, 6> at_place(const Fit& fit, Vec3 place, const Mat3& axes) {
   return out;
 }
 
-void deviation(FragmentOutcome& out, const PlannedFragment& planned, const Fit& fit, const Fit& reference) {
+void deviation(FragmentOutcome& out, const PlannedFragment& planned, const Fit& fit, const Fit& reference,
+               const OutcomeParams& params) {
   const RigidTransform back = reference.pose.inverse();
   const RigidTransform d = back * fit.pose * planned.planned_from_ct.inverse();
   const Vec3 place = fit.pose(planned.planned_from_ct.inverse()(out.middle_mm));
-  const Vec3 shift = d(out.middle_mm) - out.middle_mm, turn = rotation_vector(d.rotation);
+  Vec3 shift = d(out.middle_mm) - out.middle_mm;
+  const Vec3 turn = rotation_vector(d.rotation);
   const auto own = planning::carried<7, 6>(at_place(fit, place, back.rotation), fit.covariance);
   const auto other = planning::carried<7, 6>(at_place(reference, place, back.rotation), reference.covariance);
   const double quantile = std::max(fit.quantile, reference.quantile);
+  std::array<std::array<double, 3>, 3> shifts{};
+  for (std::size_t r = 0; r < 3; ++r)
+    for (std::size_t c = 0; c < 3; ++c) shifts[r][c] = own[r][c] + other[r][c];
+  const auto half_along = [&](Vec3 a) {
+    double sum = 0;
+    for (std::size_t r = 0; r < 3; ++r)
+      for (std::size_t c = 0; c < 3; ++c) sum += a[r] * shifts[r][c] * a[c];
+    return quantile * std::sqrt(std::max(0.0, sum));
+  };
+  const Mat3 axes = planning::principal_axes(shifts);
+  if (half_along(axes.column[0]) > params.max_unsure_mm && half_along(axes.column[1]) <= params.max_unsure_mm) {
+    out.slides_along = axes.column[0];
+    shift = shift - out.slides_along * dot(shift, out.slides_along);
+  }
   for (std::size_t k = 0; k < 3; ++k) {
-    out.shift_mm[k] = {shift[k], quantile * std::sqrt(own[k][k] + other[k][k])};
+    Vec3 axis;
+    axis[k] = 1;
+    out.shift_mm[k] = {shift[k], half_along(axis - out.slides_along * out.slides_along[k])};
     out.turn_deg[k] = {turn[k] / kDeg, quantile * std::sqrt(own[k + 3][k + 3] + other[k + 3][k + 3]) / kDeg};
   }
 }
@@ -281,8 +346,12 @@ CutOutcome cut_of(const CutPlane& plane, const std::string& fragment, const Tria
   const auto places = face_places(bone, sheet);
   std::vector<std::pair<planning::Point2, double>> seen;
   for (const auto& p : places) {
-    const auto edge = ct.along(fit.pose(sheet.world(p)), fit.pose.rotation * e, kFaceReachMm);
-    if (edge && edge->drop_hu > kFaceDropShare * fit.drop) seen.push_back({p, edge->at_mm - fit.offset});
+    const Vec3 place = fit.pose(sheet.world(p));
+    if (ct.metal_mm(place) < kMetalMm) continue;
+    const auto edge = ct.along(place, fit.pose.rotation * e, kFaceReachMm);
+    if (edge && edge->drop_hu > kFaceDropShare * fit.drop && edge->rise_hu < kRiseShare * edge->drop_hu &&
+        edge->beyond_hu < fit.beyond + kBrighterHu)
+      seen.push_back({p, edge->at_mm - edge->pulled * fit.blur - fit.offset});
   }
   out.seen = places.empty() ? 0 : static_cast<double>(seen.size()) / static_cast<double>(places.size());
   if (places.size() < 30 || out.seen < kMinFaceSeen) {
@@ -414,12 +483,16 @@ Outcome measure_outcome(const SurgicalPlan& plan, const std::vector<std::pair<st
     o.found = fits[n]->found;
     o.postop_from_ct = fits[n]->pose;
     o.known = true;
-    if (!o.reference) outcome::deviation(o, f, *fits[n], *fits[reference]);
+    if (!o.reference) outcome::deviation(o, f, *fits[n], *fits[reference], params);
     for (std::size_t k = 0; k < 3; ++k)
       o.known = o.known && o.shift_mm[k].half <= params.max_unsure_mm && o.turn_deg[k].half <= params.max_unsure_deg;
     if (!o.known) o.why = "the interval is wider than what is accepted";
-    for (const CutPlane* p : planes[n])
+    for (const CutPlane* p : planes[n]) {
       out.cuts.push_back(outcome::cut_of(*p, f.name, outcome::bone_called(bones, f.bone), *fits[n], ct, params));
+      CutOutcome& c = out.cuts.back();
+      if (!c.known && c.off_mm.half > params.max_unsure_mm && !(o.slides_along == Vec3{}))
+        c.why = "the fragment's surface does not show where along itself it lies, so not where it was cut";
+    }
   }
   return out;
 }

@@ -14,7 +14,7 @@ namespace osteo::inline session {
 
 struct OutcomeParams {
   double min_drop_hu = 200;  ///< an edge of bone drops by at least this much
-  double metal_hu = 2500;    ///< edges within 3 mm of what is brighter are left out
+  double metal_hu = 2500;    ///< edges within 8 mm of what is brighter are left out
   double max_unsure_mm = 1;  ///< half-width of an interval from which on it is not known
   double max_unsure_deg = 2;
 };
@@ -31,9 +31,12 @@ struct FragmentOutcome {
   bool known = false, reference = false;
   std::string why;                             ///< it is not known
   std::array<Measured, 3> shift_mm, turn_deg;  ///< at `middle_mm`; rotation vector
-  Vec3 middle_mm;                              ///< of the fragment as planned
-  double edge_mm = 0;                          ///< root mean square of what edges are off along their normals
-  double found = 0;                            ///< share of places at which the CT shows an edge that fits
+  /// Unit: the surface slides in itself along it, as a shaft does, so the CT does not show the shift along it;
+  /// `shift_mm` is then what lies across. Zero: there is no such direction.
+  Vec3 slides_along;
+  Vec3 middle_mm;      ///< of the fragment as planned
+  double edge_mm = 0;  ///< root mean square of what edges are off along their normals
+  double found = 0;    ///< share of places at which the CT shows an edge that fits
   RigidTransform postop_from_ct;
 };
 
@@ -58,13 +61,16 @@ struct Outcome {
 /// plan does not move; it is looked for within about 20 mm and 12 degrees of where the plan's CT has it, the others
 /// within 4 mm and 8 degrees of where they should be.
 ///
-/// At 2000 places on a fragment's outer surface, 2 mm and more from its cuts, the CT is read along the normal; an edge
+/// A fragment is what lies behind its planes, in one piece with what is nearest to the first one. At 2000 places on its
+/// outer surface, 2 mm and more from its cuts and 8 mm from metal, the CT is read along the normal; an edge
 /// is where a smoothed profile drops most. Pose and a common offset (threshold, blur) by least squares, what does not
-/// fit left out. Cut faces the same way, along the plane's normal; a face that lies upon another fragment shows no
-/// edge, and then is not known. Intervals: errors of edges within 5 mm of each other are alike, so each such patch is
-/// left out in turn (J. MacKinnon, H. White, Journal of Econometrics 1985), with Student's quantile; the pose's part is
-/// in that of the cuts. Errors: usage: a bone that is missing, no fragment that stays; failed: the reference is not
-/// found. Same bytes for any number of threads.
+/// fit left out; where edges do not hold a fragment, it stays as planned. Cut faces the same way, along the plane's
+/// normal: where the bone changes along it, the edge is corrected for the slope; where other bone begins within 2.4 mm
+/// or it is brighter there than beside the bone's surface, it is left out. A face that lies upon another fragment shows
+/// no edge, and then is not known. Intervals: errors of edges within 5 mm (8 where the CT has metal) are alike, so each
+/// such patch is left out in turn (J. MacKinnon, H. White, Journal of Econometrics 1985), with Student's quantile; the
+/// pose's part is in that of the cuts. Errors: usage: a bone that is missing, no fragment that stays; failed: the
+/// reference is not found. Same bytes for any number of threads.
 [[nodiscard]] Outcome measure_outcome(const SurgicalPlan& plan,
                                       const std::vector<std::pair<std::string, TriangleSoup>>& bones,
                                       const Image& postop, const OutcomeParams& params, const Context& context = {});
