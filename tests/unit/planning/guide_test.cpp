@@ -73,7 +73,7 @@ struct SlotFound {
 // Goes along the plane's normal from places in the kerf, above the bone and below the guide's top, to where the solid
 // begins: the face that stays, and the other. Independent of how the guide was made. Beside the slot's edges the solid
 // may begin at its top or underside: what is met there lies more than 30 degrees from the plane.
-SlotFound measured_slot(const CuttingGuide& g, const SignedDistance& solid, const SignedDistance& bone,
+SlotFound measured_slot(const PrintedGuide& g, const SignedDistance& solid, const SignedDistance& bone,
                         const CutPlane& p, double play) {
   const Vec3 e = p.waste_ahead ? p.normal : -p.normal;
   const Vec3 across = normalized(cross(g.approach, e)), up = cross(e, across);
@@ -113,7 +113,7 @@ SlotFound measured_slot(const CuttingGuide& g, const SignedDistance& solid, cons
   return out;
 }
 
-void expect_printable(const CuttingGuide& g) {
+void expect_printable(const PrintedGuide& g) {
   const MeshSummary m = summarize(mesh_of(g.solid));
   EXPECT_TRUE(m.watertight && m.manifold) << m.open_edges << ' ' << m.nonmanifold_edges << ' ' << m.nonmanifold_points;
   EXPECT_EQ(m.bodies, 1U);
@@ -127,7 +127,7 @@ TEST(CuttingGuide, FitsATube) {
   CuttingGuideParams params;
   params.code = "case-7";
   params.approach = {1, 0, 0};
-  const CuttingGuide g = make_cutting_guide(bone, plan, params);
+  const PrintedGuide g = make_cutting_guide(bone, plan, params);
   expect_printable(g);
   EXPECT_TRUE(g.engraved);
   EXPECT_NEAR(g.min_gap_mm, 0.1, 0.02);
@@ -154,9 +154,9 @@ TEST(CuttingGuide, FitsATube) {
 
 TEST(CuttingGuide, OpenSlotsReachTheSide) {
   CuttingGuideParams params;
-  const CuttingGuide closed = make_cutting_guide(tube(6, 100), one_plane({0, 0, 50}, {0, 0, 1}), params);
+  const PrintedGuide closed = make_cutting_guide(tube(6, 100), one_plane({0, 0, 50}, {0, 0, 1}), params);
   params.slot = GuideSlot::open;
-  const CuttingGuide open = make_cutting_guide(tube(6, 100), one_plane({0, 0, 50}, {0, 0, 1}), params);
+  const PrintedGuide open = make_cutting_guide(tube(6, 100), one_plane({0, 0, 50}, {0, 0, 1}), params);
   expect_printable(open);
   EXPECT_EQ(summarize(mesh_of(closed.solid)).euler, 0) << "a body with one hole through it";
   EXPECT_EQ(summarize(mesh_of(open.solid)).euler, 2);
@@ -168,7 +168,7 @@ TEST(CuttingGuide, RocksAsFarAsItsGapLets) {
   CuttingGuideParams params;
   params.approach = {1, 0, 0};
   params.margin_mm = 10;
-  const CuttingGuide g = make_cutting_guide(bone, one_plane({0, 0, 50}, {0, 0, 1}), params);
+  const PrintedGuide g = make_cutting_guide(bone, one_plane({0, 0, 50}, {0, 0, 1}), params);
   ASSERT_EQ(g.cuts.size(), 1U);
   // Held down at its middle, it tilts until one end meets the bone, 10.55 mm away.
   const double tilts = std::atan(0.1 / 10.55) / kDeg;
@@ -192,7 +192,7 @@ TEST(CuttingGuide, ServesAReconstruction) {
   const SurgicalPlan plan = reconstruct(p.jaw, p.donor, r).plan;
   CuttingGuideParams params;
   params.bone = "fibula";
-  const CuttingGuide g = make_cutting_guide(p.donor, plan, params);
+  const PrintedGuide g = make_cutting_guide(p.donor, plan, params);
   expect_printable(g);
   EXPECT_NEAR(g.min_gap_mm, 0.1, 0.02);
   EXPECT_LT(g.seat_off_mm, 0.02);
@@ -207,7 +207,7 @@ TEST(CuttingGuide, ServesAReconstruction) {
   }
   params.bone = "mandible";
   params.planes = "resection a";
-  const CuttingGuide jaw = make_cutting_guide(p.jaw, plan, params);
+  const PrintedGuide jaw = make_cutting_guide(p.jaw, plan, params);
   expect_printable(jaw);
   EXPECT_LT(jaw.seat_off_mm, 0.02);
 }
@@ -251,7 +251,7 @@ TEST(CuttingGuide, Benchmark) {
       const auto start = std::clock();
       std::cout << "seed " << seed << ' ' << which;
       try {
-        const CuttingGuide g = make_cutting_guide(bone, plan, params);
+        const PrintedGuide g = make_cutting_guide(bone, plan, params);
         const double s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
         const MeshSummary m = summarize(mesh_of(g.solid));
         const SignedDistance solid(g.solid), distance(bone);

@@ -108,7 +108,7 @@ struct Errors {
   std::vector<double> pose_mm, pose_deg, sliding_deg, cut_mm, cut_deg;
   int held[4] = {0, 0, 0, 0}, asked[4] = {0, 0, 0, 0};  ///< shift, turn, off, tilt
   int unknown_fragments = 0, unknown_cuts = 0, sliding = 0;
-  void ask(int which, const Measured& m, double truth) {
+  void ask(int which, const Interval95& m, double truth) {
     held[which] += m.holds(truth) ? 1 : 0;
     ++asked[which];
   }
@@ -215,7 +215,9 @@ TEST(Outcome, FindsSegmentsOfAnotherBoneBesideMetal) {
     EXPECT_NEAR(dot(along, f.slides_along), 0, 1e-9);
   }
   for (const CutOutcome& c : o.cuts) {
-    if (c.fragment.find("segment") != std::string::npos) EXPECT_FALSE(c.known) << c.plane;
+    if (c.fragment.find("segment") != std::string::npos) {
+      EXPECT_FALSE(c.known) << c.plane;
+    }
   }
 }
 

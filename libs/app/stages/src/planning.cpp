@@ -65,28 +65,29 @@ std::vector<Data> PlanReconstructionStage::run(const Params& params, std::span<c
 }
 
 StageInfo CuttingGuideStage::info() {
-  return {.name = "cutting-guide",
-          .version = 1,
-          .synopsis = "a cutting guide to print, from a plan and the bone",
-          .description =
-              "A block that fits the bone in one place, with a slot for each planned plane. Its underside is the "
-              "bone's offset surface as seen from where the guide comes from, so that nothing catches; its top is "
-              "flat, to be printed on. Slots that would run into each other share an opening whose two faces lead "
-              "the saw. Reports the gap by exact distances, an exact sweep of putting it on, and how far its play "
-              "lets each plane rock. For research and training; no medical device: a guide for a named patient is "
-              "a custom-made device under its own law.",
-          .inputs = {{"plan", {DataKind::document}, "plan file of 'plan-reconstruction', or written by hand"},
-                     {"surface", {DataKind::surface}, "closed surface of the bone that the plan cuts, in the plan's CT"}},
-          .outputs = {{"guide", {DataKind::surface}, "closed surface of the guide"},
-                      {"findings", {DataKind::document}, "measures of the guide in JSON", true}},
-          .references = {"G. Dantzig, Linear Programming and Extensions, Princeton 1963"},
-          .example = "osteo cutting-guide plan.json fibula.stl guide.stl --bone fibula --code CASE-7"};
+  return {
+      .name = "cutting-guide",
+      .version = 1,
+      .synopsis = "a cutting guide to print, from a plan and the bone",
+      .description =
+          "A block that fits the bone in one place, with a slot for each planned plane. Its underside is the "
+          "bone's offset surface as seen from where the guide comes from, so that nothing catches; its top is "
+          "flat, to be printed on. Slots that would run into each other share an opening whose two faces lead "
+          "the saw. Reports the gap by exact distances, an exact sweep of putting it on, and how far its play "
+          "lets each plane rock. For research and training; no medical device: a guide for a named patient is "
+          "a custom-made device under its own law.",
+      .inputs = {{"plan", {DataKind::document}, "plan file of 'plan-reconstruction', or written by hand"},
+                 {"surface", {DataKind::surface}, "closed surface of the bone that the plan cuts, in the plan's CT"}},
+      .outputs = {{"guide", {DataKind::surface}, "closed surface of the guide"},
+                  {"findings", {DataKind::document}, "measures of the guide in JSON", true}},
+      .references = {"G. Dantzig, Linear Programming and Extensions, Princeton 1963"},
+      .example = "osteo cutting-guide plan.json fibula.stl guide.stl --bone fibula --code CASE-7"};
 }
 
 std::vector<Data> CuttingGuideStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
   const SurgicalPlan plan = plan_of(std::get<Document>(inputs[0]).json, "the plan");
   const TriangleSoup bone = compacted(welded(soup_of(*std::get<Surface>(inputs[1]))));
-  const CuttingGuide g = make_cutting_guide(bone, plan, params, context);
+  const PrintedGuide g = make_cutting_guide(bone, plan, params, context);
   context.report("cuts", static_cast<std::int64_t>(g.cuts.size()));
   context.report("min_gap_mm", g.min_gap_mm);
   context.report("seat_mm2", g.seat_mm2);
@@ -141,14 +142,14 @@ StageInfo OutcomeStage::info() {
 
 namespace {
 
-Json json_of(const Measured& m) {
+Json json_of(const Interval95& m) {
   return {{"value", m.value}, {"half_width_95", m.half}};
 }
 
 template <std::size_t N>
-Json json_of(const std::array<Measured, N>& all) {
+Json json_of(const std::array<Interval95, N>& all) {
   Json j = Json::list();
-  for (const Measured& m : all) j.push_back(json_of(m));
+  for (const Interval95& m : all) j.push_back(json_of(m));
   return j;
 }
 
@@ -185,7 +186,7 @@ Json outcome_json(const Outcome& o) {
   return j;
 }
 
-std::string text_of(const Measured& m) {
+std::string text_of(const Interval95& m) {
   const auto hundredths = [](double v) { return format_number(std::round(100 * v) / 100); };
   return hundredths(m.value) + " \u00b1 " + hundredths(m.half);
 }

@@ -277,7 +277,7 @@ void rock(const GuideBlock& block, const std::vector<CutPlane>& planes, const Ax
 }  // namespace
 }  // namespace guide
 
-CuttingGuide make_cutting_guide(const TriangleSoup& bone, const SurgicalPlan& plan, const CuttingGuideParams& params,
+PrintedGuide make_cutting_guide(const TriangleSoup& bone, const SurgicalPlan& plan, const CuttingGuideParams& params,
                                 const Context& context) {
   require_sound(bone);
   std::vector<CutPlane> planes = guide::wanted_planes(plan, params);
@@ -288,7 +288,7 @@ CuttingGuide make_cutting_guide(const TriangleSoup& bone, const SurgicalPlan& pl
   const guide::GuideLayout layout = guide::layout_of(local, planes, axes, params, under, context);
   context.progress(0.2, "underside");
   guide::GuideBlock block = guide::build_block(layout, under, context);
-  CuttingGuide out;
+  PrintedGuide out;
   out.approach = axes.to.column[2];
   out.along = axes.to.column[0];
   out.min_gap_mm = block.min_gap;

@@ -40,7 +40,7 @@ struct GuideCut {
   double rock_deg = 0;    ///< most that it turns it; the same from 5 on
 };
 
-struct CuttingGuide {
+struct PrintedGuide {
   TriangleSoup solid;          ///< closed, manifold, in the axes of the bone's CT
   Vec3 approach;               ///< unit; the guide is put on against it
   Vec3 along;                  ///< unit, at right angles to it: from the first plane to the last
@@ -58,12 +58,12 @@ struct CuttingGuide {
 /// distances to the triangles. So nothing catches on the way. Faces of slots lie in the planned planes: one half of
 /// `play_mm` from the face that stays, or in it where two neighbours' slots would run into each other and share an
 /// opening. Nodes are 0.3 mm apart, across the bone down to 0.075 mm where it is steep; where the surface between them
-/// comes nearer to the bone than the gap less 0.01 mm, they are raised. Rocking: linear programmes over small motions of
-/// the seated guide, which the exact gaps limit, those of its walls too; its middle is held down. Errors: usage: no
+/// comes nearer to the bone than the gap less 0.01 mm, they are raised. Rocking: linear programmes over small motions
+/// of the seated guide, which the exact gaps limit, those of its walls too; its middle is held down. Errors: usage: no
 /// such bone or plane, an approach along the bone, a code of other characters than A to Z, 0 to 9 and '-'; failed: a
 /// plane that misses the bone, planes too close, a wedge that closes towards the guide, bone in the way. Same bytes for
 /// any number of threads.
-[[nodiscard]] CuttingGuide make_cutting_guide(const TriangleSoup& bone, const SurgicalPlan& plan,
+[[nodiscard]] PrintedGuide make_cutting_guide(const TriangleSoup& bone, const SurgicalPlan& plan,
                                               const CuttingGuideParams& params, const Context& context = {});
 
 /// The exact sweep: over all lines along `approach`, the least height of a place of the guide above one of the bone.

@@ -20,7 +20,7 @@ struct OutcomeParams {
 };
 
 /// A number and the half-width of its 95 % interval.
-struct Measured {
+struct Interval95 {
   double value = 0, half = 0;
   [[nodiscard]] bool holds(double truth) const { return truth >= value - half && truth <= value + half; }
 };
@@ -29,8 +29,8 @@ struct Measured {
 struct FragmentOutcome {
   std::string name;
   bool known = false, reference = false;
-  std::string why;                             ///< it is not known
-  std::array<Measured, 3> shift_mm, turn_deg;  ///< at `middle_mm`; rotation vector
+  std::string why;                               ///< it is not known
+  std::array<Interval95, 3> shift_mm, turn_deg;  ///< at `middle_mm`; rotation vector
   /// Unit: the surface slides in itself along it, as a shaft does, so the CT does not show the shift along it;
   /// `shift_mm` is then what lies across. Zero: there is no such direction.
   Vec3 slides_along;
@@ -44,12 +44,12 @@ struct CutOutcome {
   std::string plane, fragment;
   bool known = false;
   std::string why;
-  Measured off_mm;                   ///< of the face from the planned one, at its middle, towards the waste
-  std::array<Measured, 2> tilt_deg;  ///< by which it rises along two axes in the plane
-  std::array<Vec3, 2> axes;          ///< these, in the CT of the bone: the face rises along them by the tilts
-  std::array<double, 2> middle{};    ///< of the face, along the axes from the plane's place
-  double angle_deg = 0;              ///< between both planes
-  double seen = 0;                   ///< share of the face at which the CT shows it
+  Interval95 off_mm;                   ///< of the face from the planned one, at its middle, towards the waste
+  std::array<Interval95, 2> tilt_deg;  ///< by which it rises along two axes in the plane
+  std::array<Vec3, 2> axes;            ///< these, in the CT of the bone: the face rises along them by the tilts
+  std::array<double, 2> middle{};      ///< of the face, along the axes from the plane's place
+  double angle_deg = 0;                ///< between both planes
+  double seen = 0;                     ///< share of the face at which the CT shows it
 };
 
 struct Outcome {
