@@ -1,5 +1,5 @@
-# A half ring and a rod, as a jaw and a fibula of which the plan is plain: jaw.obj, fibula.obj. And a CT of the jaw
-# after a third of it was sawn off, half a millimetre beyond the plane of cut.json: after.nrrd.
+# A half ring and a rod, as a jaw and a fibula of which the plan is plain: jaw.obj, fibula.obj. And two CTs of the jaw:
+# before.nrrd, and after.nrrd, when a third of it was sawn off, half a millimetre beyond the plane of cut.json.
 import array, json, math
 
 
@@ -48,14 +48,26 @@ with open("cut.json", "w") as f:
         f,
     )
 
-voxels, step, dims, origin = array.array("h"), 0.8, (112, 90, 30), (-30, -14, -11.6)
+step, dims, origin = 0.8, (112, 90, 30), (-30, -14, -11.6)
+before, after = array.array("h"), array.array("h")
 for k in range(dims[2]):
     for j in range(dims[1]):
         for i in range(dims[0]):
             x, y, z = origin[0] + step * i, origin[1] + step * j, origin[2] + step * k
-            mm = max(math.hypot(math.hypot(x, y) - 45, z) - 5.97, -y, c * y - s * x - 0.5)
-            voxels.append(40 + round(1000 / (1 + math.exp(4 * max(min(mm, 5), -5)))))
-with open("after.nrrd", "wb") as f:
-    f.write(b"NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: %d %d %d\n" % dims)
-    f.write(b"space directions: (%g,0,0) (0,%g,0) (0,0,%g)\nspace origin: (%g,%g,%g)\n" % (step, step, step, *origin))
-    f.write(b"endian: little\nencoding: raw\n\n" + voxels.tobytes())
+            bone = max(math.hypot(math.hypot(x, y) - 45, z) - 5.97, -y)
+            for voxels, mm in ((before, bone), (after, max(bone, c * y - s * x - 0.5))):
+                voxels.append(40 + round(1000 / (1 + math.exp(4 * max(min(mm, 5), -5)))))
+            if bone > 8:
+                before[-1] = -1000  # air about the skin
+head = "NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: %d %d %d\n" % dims
+head += "space directions: (%g,0,0) (0,%g,0) (0,0,%g)\nspace origin: (%g,%g,%g)\n" % (step, step, step, *origin)
+head += "endian: little\nencoding: raw\n\n"
+for name, voxels in (("before", before), ("after", after)):
+    with open(f"{name}.nrrd", "wb") as f:
+        f.write(head.encode() + voxels.tobytes())
+# Its plane sawn in a rehearsal, as it is planned in the case.
+strokes = {"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 4}, "axis": [0, 0, 1]}
+strokes["waypoints"] = [{"t_s": t, "at_mm": [0, 0, 60], "drill": False} for t in (0, 0.6)]
+strokes["actions"] = [{"t_s": 0.1, "saw": {"planned": "a"}}, {"t_s": 0.3, "split": {"least_mm3": 50}}]
+with open("strokes.json", "w") as f:
+    json.dump(strokes, f)

@@ -7,6 +7,7 @@
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/data/json_vec.h"
 #include "osteo/core/report/sheet.h"
+#include "osteo/session/recording/planned_cuts.h"
 
 namespace osteo::inline app {
 
@@ -79,10 +80,30 @@ StageInfo CuttingGuideStage::info() {
       .inputs = {{"plan", {DataKind::document}, "plan file of 'plan-reconstruction', or written by hand"},
                  {"surface", {DataKind::surface}, "closed surface of the bone that the plan cuts, in the plan's CT"}},
       .outputs = {{"guide", {DataKind::surface}, "closed surface of the guide"},
-                  {"findings", {DataKind::document}, "measures of the guide in JSON", true}},
+                  {"findings", {DataKind::document}, "measures of the guide in JSON", true},
+                  {"cuts",
+                   {DataKind::document},
+                   "the same planes for a rehearsal: CASE/planned-cuts.json of a case of this CT, whose saw slips into "
+                   "them",
+                   true}},
       .references = {"G. Dantzig, Linear Programming and Extensions, Princeton 1963"},
       .example = "osteo cutting-guide plan.json fibula.stl guide.stl --bone fibula --code CASE-7"};
 }
+
+namespace {
+
+// The blade's middle is half a kerf from the face that stays; its length lies across the guide's approach.
+PlannedCut planned_cut_of(const CutPlane& plane, Vec3 approach) {
+  PlannedCut c;
+  c.name = plane.name;
+  c.cut.at_mm = plane.at_mm + plane.normal * ((plane.waste_ahead ? 0.5 : -0.5) * plane.kerf_mm);
+  c.cut.normal = plane.normal;
+  c.cut.along = cross(plane.normal, approach);
+  c.cut.kerf_mm = plane.kerf_mm;
+  return c;
+}
+
+}  // namespace
 
 std::vector<Data> CuttingGuideStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
   const SurgicalPlan plan = plan_of(std::get<Document>(inputs[0]).json, "the plan");
@@ -111,7 +132,10 @@ std::vector<Data> CuttingGuideStage::run(const Params& params, std::span<const D
                          {"width_mm", c.width_mm},
                          {"rock_mm", c.rock_mm},
                          {"rock_deg", c.rock_deg}});
-  return {std::make_shared<const TriMesh>(mesh_of(g.solid)), Document{j.dump(1) + "\n"}};
+  std::vector<PlannedCut> cuts;
+  for (const GuideCut& c : g.cuts) cuts.push_back(planned_cut_of(plan.plane(c.plane), g.approach));
+  return {std::make_shared<const TriMesh>(mesh_of(g.solid)), Document{j.dump(1) + "\n"},
+          Document{planned_cuts_json(cuts)}};
 }
 
 StageInfo OutcomeStage::info() {
