@@ -34,6 +34,7 @@ GIVEN = {
         "JAW": "folder",
     },
     "docs/guides/server.md": {"CT": SCAN, "INBOX": "folder", "CASES": "folder"},
+    "docs/guides/planning.md": {"CASE": CASE},
     "docs/guides/surgeon.md": {"CASE": CASE},
     "docs/validation/monitor.md": {"ct.nrrd": "ct", "labels.nrrd": LABELS},
     "docs/how-to/movie.md": {"SESSION": SESSION},
