@@ -64,6 +64,7 @@ NOT_RUN = [
     ("docs/how-to/packages.md", r"", "builds packages: the test setup.debs"),
     ("docs/platforms.md", r"", "builds all in a root of another distribution: by hand"),
     ("docs/validation/hard-cases.md", r"scoreboard", "gets other readers from PyPI"),
+    ("docs/validation/planning.md", r"peers", "gets other programs from PyPI, for tables that take an hour"),
     ("docs/validation/robustness.md", r"", "hours, by hand"),
     ("docs/guides/surgeon.md", r"/etc/udev", "is root's"),
     ("docs/validation/ground-truth.md", r"mine.py|probe.traj", "another's program, another's recording"),
