@@ -38,9 +38,10 @@ void put_identity(DcmDataset& d, const DicomObjectOptions& o, const std::string&
                                      DCM_PositionReferenceIndicator,
                                      DCM_PatientIdentityRemoved,
                                      DCM_DeidentificationMethod};
+  // Of type 2: without a value they are there all the same.
   for (const auto& tag :
-       {DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyDate, DCM_StudyTime, DCM_ReferringPhysicianName, DCM_StudyID,
-        DCM_AccessionNumber, DCM_PositionReferenceIndicator}) {
+       {DCM_PatientName, DCM_PatientID, DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyDate, DCM_StudyTime,
+        DCM_ReferringPhysicianName, DCM_StudyID, DCM_AccessionNumber, DCM_PositionReferenceIndicator}) {
     if (in_space || !of_space(tag)) require(d.insertEmptyElement(DcmTag(tag)), path);
   }
   if (o.source == nullptr) {
