@@ -74,6 +74,12 @@ void put_document(DcmDataset& d, const Document& document, const DicomObjectOpti
   put(d, DCM_MIMETypeOfEncapsulatedDocument, document.mime_type, path);
 }
 
+std::string study_of(DcmDataset& d, const fs::path& path) {
+  OFString study;
+  dicom::require(d.findAndGetOFString(DCM_StudyInstanceUID, study), path);
+  return study.c_str();
+}
+
 void save_document(DcmFileFormat& file, std::string bytes, const fs::path& path) {
   DcmDataset& d = *file.getDataset();
   dicom::require(d.putAndInsertUint32(DCM_EncapsulatedDocumentLength, static_cast<Uint32>(bytes.size())), path);
@@ -94,11 +100,12 @@ void save_encapsulated_stl(const TriMesh& mesh, const fs::path& path, const Dico
     throw Error(ExitCode::usage, "the surface is empty: there is nothing to write to '" + path.string() + "'");
   dicom::quiet_dcmtk();
   std::string stl = stl_text(mesh);
-  const std::string content = hash_text(stl);
+  std::string content = hash_text(stl);
   DcmFileFormat file;
   DcmDataset& d = *file.getDataset();
   put_identity(d, options, content, true, path, context);
   put_source(d, options, true, path);
+  content += study_of(d, path);  // the same surface can stand in two studies
   put_document(d, {UID_EncapsulatedSTLStorage, "M3D", "9002", "model/stl", content}, options, options.description,
                path);
   put_code(d, DCM_ConceptNameCodeSequence, "85040-4", "LN", "3D Model", path);
@@ -124,9 +131,7 @@ void save_encapsulated_pdf(std::string_view pdf, const std::string& title, const
   put_source(d, options, false, path);
   // The pages name nobody, so they can be the same in two studies, as after a scan was made anonymous: the objects are
   // not.
-  OFString study;
-  dicom::require(d.findAndGetOFString(DCM_StudyInstanceUID, study), path);
-  content += study.c_str();
+  content += study_of(d, path);
   put_document(d, {UID_EncapsulatedPDFStorage, "DOC", "9003", "application/pdf", content}, options, title, path);
   put(d, DCM_ConversionType, "WSD", path);
   // None of the codes for titles says what it is: no diagnosis, no radiologist's report. It may be empty.
