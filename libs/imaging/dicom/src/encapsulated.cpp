@@ -53,6 +53,7 @@ struct Document {
 void put_document(DcmDataset& d, const Document& document, const DicomObjectOptions& options, const std::string& title,
                   const fs::path& path) {
   const auto [date, time] = now_text();
+  dicom::speak_utf8(d, options.description + title);
   put(d, DCM_SOPClassUID, document.sop_class, path);
   put(d, DCM_SOPInstanceUID, dicom::uid_of(hash_text(document.content + "instance")), path);
   put(d, DCM_InstanceCreationDate, date, path);
@@ -60,7 +61,7 @@ void put_document(DcmDataset& d, const Document& document, const DicomObjectOpti
   put(d, DCM_Modality, document.modality, path);
   put(d, DCM_SeriesInstanceUID, dicom::uid_of(hash_text(document.content + "series")), path);
   put(d, DCM_SeriesNumber, document.series_number, path);
-  put(d, DCM_SeriesDescription, options.description.substr(0, 64), path);
+  put(d, DCM_SeriesDescription, dicom::lo_text(options.description), path);
   put(d, DCM_Manufacturer, "Osteotome", path);
   put(d, DCM_ManufacturerModelName, "osteo", path);
   put(d, DCM_DeviceSerialNumber, "0", path);

@@ -210,12 +210,8 @@ class MeasuresWriter {
   void put_document(DcmDataset& d) {
     content_ = content();
     dicom::put_identity(d, o_, content_, false, path_, context_);
-    std::string texts;
-    for (const MeasuredStructure& s : report_.structures) texts += s.name;
-    for (const ScoredGroup& g : report_.scores) texts += g.name;
-    for (const std::string& r : report_.remarks) texts += r;
-    dicom::speak_utf8(d, texts);
-    content_ += text_at(d, DCM_StudyInstanceUID);  // the same case can stand in two studies
+    dicom::speak_utf8(d, content_ + o_.description);  // every text that follows
+    content_ += text_at(d, DCM_StudyInstanceUID);     // the same case can stand in two studies
     const auto [date, time] = dicom::now_text();
     put(d, DCM_SOPClassUID, UID_ComprehensiveSRStorage);
     put(d, DCM_SOPInstanceUID, uid("instance"));

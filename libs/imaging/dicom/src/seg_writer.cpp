@@ -142,7 +142,6 @@ void take_over_identity(DcmSegmentation& seg, const DicomObjectOptions& o, const
   const std::string own = content + named + study.c_str() + enum_names(o.form)[static_cast<std::size_t>(o.form)].data();
   require(seg.getSeries().setSeriesInstanceUID(dicom::uid_of(hash_text(own + "series")).c_str()), path);
   require(seg.getSOPCommon().setSOPInstanceUID(dicom::uid_of(hash_text(own + "instance")).c_str()), path);
-  require(seg.getSeries().setSeriesDescription(o.description.substr(0, 64).c_str()), path);
   require(seg.getSeries().setSeriesNumber("9001"), path);
 }
 
@@ -192,9 +191,11 @@ class SegmentationWriter {
     require(seg_->writeDataset(d), path_);
     require(d.putAndInsertString(DCM_SegmentsOverlap, "NO"), path_);
     put_more_segments(d);
-    std::string names;
+    std::string names = o_.description;
     for (const Structure& s : structures_) names += s.name + s.origin;
     dicom::speak_utf8(d, names);
+    for (const DcmTagKey& tag : {DCM_SeriesDescription, DCM_ContentDescription})
+      dicom::put(d, tag, dicom::lo_text(o_.description), path_);
     for (std::size_t s = 0; s < structures_.size(); ++s) {
       DcmItem& segment = *item(d, DCM_SegmentSequence, s);
       dicom::put(segment, DCM_SegmentLabel, dicom::lo_text(structures_[s].name), path_);
@@ -216,7 +217,7 @@ class SegmentationWriter {
   void make(const Context& context) {
     DcmSegmentation* made = nullptr;
     const IODGeneralEquipmentModule::EquipmentInfo equipment("Osteotome", "osteo", "0", "0.1");
-    const ContentIdentificationMacro identity("1", "BONE", o_.description.substr(0, 64).c_str(), "");
+    const ContentIdentificationMacro identity("1", "BONE", "", "");  // described in write()
     require(DcmSegmentation::createBinarySegmentation(made, static_cast<Uint16>(stack_.rows),
                                                       static_cast<Uint16>(stack_.columns), equipment, identity),
             path_);
