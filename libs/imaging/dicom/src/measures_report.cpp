@@ -339,8 +339,10 @@ class MeasuresWriter {
     const bool segment = number != segmentation_.number.end();
     DcmItem& g = group(measurements, s.name, segment ? "1411" : "1501");
     const std::size_t comma = s.origin.find(", version ");
-    if (comma != std::string::npos)
-      put_algorithm(g, "Osteotome " + s.origin.substr(0, comma), s.origin.substr(comma + 10));
+    if (comma != std::string::npos) {
+      const std::string name = s.origin.substr(0, comma);
+      put_algorithm(g, (dicom::is_own_drawer(name) ? "Osteotome " : "") + name, s.origin.substr(comma + 10));
+    }
     finding(g, kContains, kFinding, s.name);
     if (segment) refer_to_segment(g, number->second);
     tree_.number(g, kVolume, s.volume_mm3, kCubicMm);
