@@ -81,6 +81,7 @@ std::string lo_text(const std::string& text) {
     if ((byte & 0xC0U) != 0x80U && ++characters > 64) break;
     out += byte < 32 || c == '\\' ? ' ' : c;
   }
+  while (!out.empty() && out.back() == ' ') out.pop_back();  // as it is read back
   return out;
 }
 
