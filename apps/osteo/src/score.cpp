@@ -74,6 +74,11 @@ void add_heat(const SessionReader& session, World begin, const Anatomy& anatomy,
     score.words.push_back("heat is known only up to where the first ticks are missing");
 }
 
+// Also of "SESSION/", as a shell completes it.
+std::string name_of(const fs::path& folder) {
+  return (folder.has_filename() ? folder : folder.parent_path()).filename().string();
+}
+
 }  // namespace
 
 Scored score_folder(const fs::path& session_folder, const ScoreAsked& asked, const Context& context) {
@@ -100,7 +105,7 @@ Scored score_folder(const fs::path& session_folder, const ScoreAsked& asked, con
   Scored scored{score_session(session, std::move(begin), anatomy.structures.get(),
                               asked.procedure ? &*asked.procedure : nullptr, reference ? &*reference : nullptr,
                               asked.subject, context.sub(compares ? 0.5 : 0, asked.heat ? 0.6 : 1)),
-                folder.folder.filename().string(), folder.guided, session.outline().damaged()};
+                name_of(folder.folder), folder.guided, session.outline().damaged()};
   Score& score = scored.score;
   score.source.stream = hash_path(folder.stream()).substr(0, 16);
   score.source.scored_by = program_version();

@@ -92,14 +92,17 @@ StageInfo CuttingGuideStage::info() {
 
 namespace {
 
-// The blade's middle is half a kerf from the face that stays; its length lies across the guide's approach.
+// The blade's middle is half a kerf from the face that stays; its length lies across the guide's approach. A plan may
+// have a kerf of 0, a saw of a rehearsal not: the file would not be read.
 PlannedCut planned_cut_of(const CutPlane& plane, Vec3 approach) {
+  constexpr double kThinnestMm = 0.05;
+  const double kerf = std::max(plane.kerf_mm, kThinnestMm);
   PlannedCut c;
   c.name = plane.name;
-  c.cut.at_mm = plane.at_mm + plane.normal * ((plane.waste_ahead ? 0.5 : -0.5) * plane.kerf_mm);
+  c.cut.at_mm = plane.at_mm + plane.normal * ((plane.waste_ahead ? 0.5 : -0.5) * kerf);
   c.cut.normal = plane.normal;
   c.cut.along = cross(plane.normal, approach);
-  c.cut.kerf_mm = plane.kerf_mm;
+  c.cut.kerf_mm = kerf;
   return c;
 }
 

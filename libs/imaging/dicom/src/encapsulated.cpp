@@ -53,6 +53,7 @@ struct Document {
 void put_document(DcmDataset& d, const Document& document, const DicomObjectOptions& options, const std::string& title,
                   const fs::path& path) {
   const auto [date, time] = now_text();
+  dicom::speak_utf8(d, options.description + title);
   put(d, DCM_SOPClassUID, document.sop_class, path);
   put(d, DCM_SOPInstanceUID, dicom::uid_of(hash_text(document.content + "instance")), path);
   put(d, DCM_InstanceCreationDate, date, path);
@@ -60,7 +61,7 @@ void put_document(DcmDataset& d, const Document& document, const DicomObjectOpti
   put(d, DCM_Modality, document.modality, path);
   put(d, DCM_SeriesInstanceUID, dicom::uid_of(hash_text(document.content + "series")), path);
   put(d, DCM_SeriesNumber, document.series_number, path);
-  put(d, DCM_SeriesDescription, options.description.substr(0, 64), path);
+  put(d, DCM_SeriesDescription, dicom::lo_text(options.description), path);
   put(d, DCM_Manufacturer, "Osteotome", path);
   put(d, DCM_ManufacturerModelName, "osteo", path);
   put(d, DCM_DeviceSerialNumber, "0", path);
@@ -72,6 +73,12 @@ void put_document(DcmDataset& d, const Document& document, const DicomObjectOpti
   put(d, DCM_BurnedInAnnotation, "NO", path);
   put(d, DCM_DocumentTitle, title, path);
   put(d, DCM_MIMETypeOfEncapsulatedDocument, document.mime_type, path);
+}
+
+std::string study_of(DcmDataset& d, const fs::path& path) {
+  OFString study;
+  dicom::require(d.findAndGetOFString(DCM_StudyInstanceUID, study), path);
+  return study.c_str();
 }
 
 void save_document(DcmFileFormat& file, std::string bytes, const fs::path& path) {
@@ -94,11 +101,12 @@ void save_encapsulated_stl(const TriMesh& mesh, const fs::path& path, const Dico
     throw Error(ExitCode::usage, "the surface is empty: there is nothing to write to '" + path.string() + "'");
   dicom::quiet_dcmtk();
   std::string stl = stl_text(mesh);
-  const std::string content = hash_text(stl);
+  std::string content = hash_text(stl);
   DcmFileFormat file;
   DcmDataset& d = *file.getDataset();
   put_identity(d, options, content, true, path, context);
   put_source(d, options, true, path);
+  content += study_of(d, path);  // the same surface can stand in two studies
   put_document(d, {UID_EncapsulatedSTLStorage, "M3D", "9002", "model/stl", content}, options, options.description,
                path);
   put_code(d, DCM_ConceptNameCodeSequence, "85040-4", "LN", "3D Model", path);
@@ -124,9 +132,7 @@ void save_encapsulated_pdf(std::string_view pdf, const std::string& title, const
   put_source(d, options, false, path);
   // The pages name nobody, so they can be the same in two studies, as after a scan was made anonymous: the objects are
   // not.
-  OFString study;
-  dicom::require(d.findAndGetOFString(DCM_StudyInstanceUID, study), path);
-  content += study.c_str();
+  content += study_of(d, path);
   put_document(d, {UID_EncapsulatedPDFStorage, "DOC", "9003", "application/pdf", content}, options, title, path);
   put(d, DCM_ConversionType, "WSD", path);
   // None of the codes for titles says what it is: no diagnosis, no radiologist's report. It may be empty.

@@ -210,12 +210,8 @@ class MeasuresWriter {
   void put_document(DcmDataset& d) {
     content_ = content();
     dicom::put_identity(d, o_, content_, false, path_, context_);
-    std::string texts;
-    for (const MeasuredStructure& s : report_.structures) texts += s.name;
-    for (const ScoredGroup& g : report_.scores) texts += g.name;
-    for (const std::string& r : report_.remarks) texts += r;
-    dicom::speak_utf8(d, texts);
-    content_ += text_at(d, DCM_StudyInstanceUID);  // the same case can stand in two studies
+    dicom::speak_utf8(d, content_ + o_.description);  // every text that follows
+    content_ += text_at(d, DCM_StudyInstanceUID);     // the same case can stand in two studies
     const auto [date, time] = dicom::now_text();
     put(d, DCM_SOPClassUID, UID_ComprehensiveSRStorage);
     put(d, DCM_SOPInstanceUID, uid("instance"));
@@ -343,8 +339,10 @@ class MeasuresWriter {
     const bool segment = number != segmentation_.number.end();
     DcmItem& g = group(measurements, s.name, segment ? "1411" : "1501");
     const std::size_t comma = s.origin.find(", version ");
-    if (comma != std::string::npos)
-      put_algorithm(g, "Osteotome " + s.origin.substr(0, comma), s.origin.substr(comma + 10));
+    if (comma != std::string::npos) {
+      const std::string name = s.origin.substr(0, comma);
+      put_algorithm(g, (dicom::is_own_drawer(name) ? "Osteotome " : "") + name, s.origin.substr(comma + 10));
+    }
     finding(g, kContains, kFinding, s.name);
     if (segment) refer_to_segment(g, number->second);
     tree_.number(g, kVolume, s.volume_mm3, kCubicMm);

@@ -38,9 +38,10 @@ void put_identity(DcmDataset& d, const DicomObjectOptions& o, const std::string&
                                      DCM_PositionReferenceIndicator,
                                      DCM_PatientIdentityRemoved,
                                      DCM_DeidentificationMethod};
+  // Of type 2: without a value they are there all the same.
   for (const auto& tag :
-       {DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyDate, DCM_StudyTime, DCM_ReferringPhysicianName, DCM_StudyID,
-        DCM_AccessionNumber, DCM_PositionReferenceIndicator}) {
+       {DCM_PatientName, DCM_PatientID, DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyDate, DCM_StudyTime,
+        DCM_ReferringPhysicianName, DCM_StudyID, DCM_AccessionNumber, DCM_PositionReferenceIndicator}) {
     if (in_space || !of_space(tag)) require(d.insertEmptyElement(DcmTag(tag)), path);
   }
   if (o.source == nullptr) {
@@ -80,6 +81,7 @@ std::string lo_text(const std::string& text) {
     if ((byte & 0xC0U) != 0x80U && ++characters > 64) break;
     out += byte < 32 || c == '\\' ? ' ' : c;
   }
+  while (!out.empty() && out.back() == ' ') out.pop_back();  // as it is read back
   return out;
 }
 

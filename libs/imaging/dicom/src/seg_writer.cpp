@@ -121,8 +121,9 @@ Stack stack_on_source(const Labels& labels, const DicomSeries& source) {
   return s;
 }
 
+// `named`: what the segments are called and what drew them.
 void take_over_identity(DcmSegmentation& seg, const DicomObjectOptions& o, const std::string& content,
-                        const fs::path& path, const Context& context) {
+                        const std::string& named, const fs::path& path, const Context& context) {
   if (o.source != nullptr) {
     DcmFileFormat source;
     dicom::load_identity(*o.source, source, context);
@@ -134,12 +135,13 @@ void take_over_identity(DcmSegmentation& seg, const DicomObjectOptions& o, const
     require(seg.getFrameOfReference().setFrameOfReferenceUID(dicom::uid_of(hash_text(content + "frame")).c_str()),
             path);
   }
-  // The same voxels in another form are another object, in the same space.
-  const std::string form =
-      o.form == SegmentationForm::binary ? "" : enum_names(o.form)[static_cast<std::size_t>(o.form)].data();
-  require(seg.getSeries().setSeriesInstanceUID(dicom::uid_of(hash_text(content + form + "series")).c_str()), path);
-  require(seg.getSOPCommon().setSOPInstanceUID(dicom::uid_of(hash_text(content + form + "instance")).c_str()), path);
-  require(seg.getSeries().setSeriesDescription(o.description.substr(0, 64).c_str()), path);
+  // The same voxels in another form, under other names or in another study are another object, in the same space: a
+  // PACS keeps the first of two that have one UID.
+  OFString study;
+  static_cast<void>(seg.getStudy().getStudyInstanceUID(study));
+  const std::string own = content + named + study.c_str() + enum_names(o.form)[static_cast<std::size_t>(o.form)].data();
+  require(seg.getSeries().setSeriesInstanceUID(dicom::uid_of(hash_text(own + "series")).c_str()), path);
+  require(seg.getSOPCommon().setSOPInstanceUID(dicom::uid_of(hash_text(own + "instance")).c_str()), path);
   require(seg.getSeries().setSeriesNumber("9001"), path);
 }
 
@@ -158,6 +160,12 @@ void refer_to_series(DcmSegmentation& seg, const DicomSeries& source) {
 
 std::string content_of(const Stack& stack) {
   Hasher hasher;
+  const std::array<int, 2> size{stack.columns, stack.rows};
+  hasher.add(size.data(), sizeof size);
+  const std::array<double, 3> mm{stack.column_mm, stack.row_mm, stack.thickness_mm};
+  hasher.add(mm.data(), sizeof mm);
+  hasher.add(&stack.along_row, sizeof stack.along_row);
+  hasher.add(&stack.along_column, sizeof stack.along_column);
   for (const Plane& p : stack.planes) {
     hasher.add(&p.position, sizeof p.position);
     hasher.add(p.labels.data(), p.labels.size());
@@ -183,9 +191,11 @@ class SegmentationWriter {
     require(seg_->writeDataset(d), path_);
     require(d.putAndInsertString(DCM_SegmentsOverlap, "NO"), path_);
     put_more_segments(d);
-    std::string names;
+    std::string names = o_.description;
     for (const Structure& s : structures_) names += s.name + s.origin;
     dicom::speak_utf8(d, names);
+    for (const DcmTagKey& tag : {DCM_SeriesDescription, DCM_ContentDescription})
+      dicom::put(d, tag, dicom::lo_text(o_.description), path_);
     for (std::size_t s = 0; s < structures_.size(); ++s) {
       DcmItem& segment = *item(d, DCM_SegmentSequence, s);
       dicom::put(segment, DCM_SegmentLabel, dicom::lo_text(structures_[s].name), path_);
@@ -207,13 +217,15 @@ class SegmentationWriter {
   void make(const Context& context) {
     DcmSegmentation* made = nullptr;
     const IODGeneralEquipmentModule::EquipmentInfo equipment("Osteotome", "osteo", "0", "0.1");
-    const ContentIdentificationMacro identity("1", "BONE", o_.description.substr(0, 64).c_str(), "");
+    const ContentIdentificationMacro identity("1", "BONE", "", "");  // described in write()
     require(DcmSegmentation::createBinarySegmentation(made, static_cast<Uint16>(stack_.rows),
                                                       static_cast<Uint16>(stack_.columns), equipment, identity),
             path_);
     seg_.reset(made);
     content_ = content_of(stack_);
-    take_over_identity(*seg_, o_, content_, path_, context);
+    std::string named;
+    for (const Structure& s : structures_) named += std::to_string(s.value) + " " + s.name + "\n" + s.origin + "\n";
+    take_over_identity(*seg_, o_, content_, named, path_, context);
     if (o_.source != nullptr) refer_to_series(*seg_, *o_.source);
   }
 

@@ -98,6 +98,10 @@ void put_algorithm(DcmItem& segment, const std::string& origin, const std::files
   put(*item, DCM_AlgorithmSource, "Osteotome");
 }
 
+bool is_own_drawer(std::string_view algorithm) {
+  return std::any_of(kDrawers.begin(), kDrawers.end(), [&](const Drawer& d) { return d.stage == algorithm; });
+}
+
 std::string origin_from(const std::string& type, const std::string& name, const std::string& version) {
   if (type == "MANUAL") return std::string(kDrawnByHand);
   if (name.empty() || name.starts_with(kNotRecorded)) return {};

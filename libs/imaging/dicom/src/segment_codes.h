@@ -22,6 +22,9 @@ void put_code(DcmItem& in, const DcmTagKey& sequence, SegmentCode code, const ch
 /// which version (Structure::origin).
 void put_algorithm(DcmItem& segment, const std::string& origin, const std::filesystem::path& path);
 
+/// One of our stages; any other algorithm is of a segmentation that somebody else's program wrote.
+[[nodiscard]] bool is_own_drawer(std::string_view algorithm);
+
 /// What stands for the name of an algorithm that is not known.
 inline constexpr std::string_view kNotRecorded = "not recorded";
 

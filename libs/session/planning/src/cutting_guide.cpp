@@ -230,6 +230,13 @@ GuideLayout layout_of(const TriangleSoup& local, const std::vector<CutPlane>& pl
     throw Error(ExitCode::failed,
                 "the guide would be " + format_number(std::round(l.top - lo + params.depth_mm)) + " mm high",
                 "bone is in the way, or far from straight: another --approach, or a guide for each plane (--planes)");
+  // How far the block may reach has an end: a slanted face that leaves it there would fold it.
+  const double rest = std::min(kBetweenSlotsMm, params.margin_mm / 2);
+  for (const double y : {l.cut0, l.cut1})
+    for (const double z : {lo - params.depth_mm, l.top})
+      if (l.openings.front().lower.x(y, z) - l.x0 < rest || l.x1 - l.openings.back().upper.x(y, z) < rest)
+        throw Error(ExitCode::failed, "the outermost cut is so slanted that it leaves the guide at its end",
+                    "another --approach, a larger --margin-mm, or a guide for each plane (--planes)");
   merge_openings(l, planes, axes, lo - params.depth_mm, context);
   l.code = code_of(params);
   l.head = axes.turned({0, 0, 1});
