@@ -222,10 +222,12 @@ for name in ("s.dcm", "s-seg.dcm"):
     groups = {g.tracking_identifier: g for g in sr.content.get_volumetric_roi_measurement_groups()}
     assert len(groups) == (0 if name == "s.dcm" else 3 + len({v["of"] for v in scored["metrics"]} & set(volumes)))
     groups.update((g.tracking_identifier, g) for g in sr.content.get_image_measurement_groups())
+    (rehearsal,) = (n for n in groups if n.startswith("Rehearsal ") and ":" not in n)
+    assert "session" not in rehearsal, "nobody's name"
     said = {i.TextValue for c in sr.ContentSequence for i in c.get("ContentSequence", []) if code_value(i) == "121106"}
     checked = absent = 0
     for v in scored["metrics"]:
-        g = groups.get("Rehearsal session" + (f": {v['of']}" if v["of"] else ""))
+        g = groups.get(rehearsal + (f": {v['of']}" if v["of"] else ""))
         items = [i for i in g[0].ContentSequence if code_value(i) == v["name"]] if g else []
         if v["value"] is None:
             assert not items and any(n.startswith("Not measured") and v["name"] in n for n in said), v

@@ -129,9 +129,10 @@ Json json_of(const Scored& scored, bool evidence) {
 
 namespace {
 
-// Values by what they are of, then the items of the scale.
+// Values by what they are of, then the items of the scale. The session's folder may be named after who rehearsed, so it
+// is called by the hash of its file.
 std::vector<ScoredGroup> groups_of(const Scored& scored, const std::vector<MeasuredStructure>& structures) {
-  std::vector<ScoredGroup> groups{{"Rehearsal " + scored.name, {}, {}, {}}};
+  std::vector<ScoredGroup> groups{{"Rehearsal " + scored.score.source.stream.substr(0, 8), {}, {}, {}}};
   const auto group_of = [&](const std::string& of) -> ScoredGroup& {
     const std::string name = of.empty() ? groups.front().name : groups.front().name + ": " + of;
     const auto found = std::find_if(groups.begin(), groups.end(), [&](const ScoredGroup& g) { return g.name == name; });

@@ -277,8 +277,10 @@ class MeasuresWriter {
     tree_.text(root, kObserved, {"121013", "DCM", "Device Observer Name"}, "Osteotome " + report_.program);
     tree_.text(root, kObserved, {"121014", "DCM", "Device Observer Manufacturer"}, "Osteotome");
     tree_.text(root, kObserved, {"121015", "DCM", "Device Observer Model Name"}, "osteo");
-    tree_.code(root, kModified, {"121058", "DCM", "Procedure reported"},
-               {"25045-6", "LN", "CT unspecified body region"});
+    const bool ct = o_.source == nullptr || o_.source->modality == "CT";
+    tree_.code(
+        root, kModified, {"121058", "DCM", "Procedure reported"},
+        ct ? Code{"25045-6", "LN", "CT unspecified body region"} : Code{"363679005", "SCT", "Imaging procedure"});
   }
 
   // TID 1600: the slices.
@@ -286,7 +288,9 @@ class MeasuresWriter {
     if (o_.source == nullptr) return;
     DcmItem& library = tree_.container(root, {"111028", "DCM", "Image Library"}, "1600");
     DcmItem& group = tree_.container(library, {"126200", "DCM", "Image Library Group"});
-    tree_.code(group, "HAS ACQ CONTEXT", {"121139", "DCM", "Modality"}, {"CT", "DCM", "Computed Tomography"});
+    constexpr Code kModalities[] = {{"CT", "DCM", "Computed Tomography"}, {"MR", "DCM", "Magnetic Resonance"}};
+    for (const Code& m : kModalities)
+      if (o_.source->modality == m.value) tree_.code(group, "HAS ACQ CONTEXT", {"121139", "DCM", "Modality"}, m);
     for (const DicomHeader& h : o_.source->headers) {
       if (!h.usable()) continue;
       DcmItem& image = tree_.next(group, DCM_ContentSequence);
@@ -363,14 +367,14 @@ class MeasuresWriter {
     if (!score.structure.empty()) finding(g, kContains, kFinding, score.structure);
     if (segment) refer_to_segment(g, number->second);
     for (const auto& n : score.numbers) {
-      const std::string meaning = spoken(n.name);
-      const Code name{n.name.c_str(), "99OSTEOTOME", meaning.c_str()};
+      const std::string code = dicom::lo_text(n.name), meaning = spoken(n.name);
+      const Code name{code.c_str(), "99OSTEOTOME", meaning.c_str()};
       const Unit unit(n.unit);
       tree_.number(g, name, n.value, {unit.code.c_str(), "UCUM", unit.meaning.c_str()});
     }
     for (const auto& v : score.verdicts) {
-      const std::string meaning = spoken(v.name);
-      tree_.code(g, kContains, {v.name.c_str(), "99OSTEOTOME", meaning.c_str()}, v.passed ? kYes : kNo);
+      const std::string code = dicom::lo_text(v.name), meaning = spoken(v.name);
+      tree_.code(g, kContains, {code.c_str(), "99OSTEOTOME", meaning.c_str()}, v.passed ? kYes : kNo);
     }
   }
 

@@ -257,26 +257,27 @@ void rock(const GuideBlock& block, const std::vector<CutPlane>& planes, const Ax
   rows.push_back({0, 0, 1, 0, 0, 0});
   room.push_back(0);
   // What nothing limits (along a smooth shaft) ends here.
+  constexpr double kNotHeldRad = kNotHeldDeg * std::numbers::pi / 180;
   for (std::size_t k = 0; k < 6; ++k) {
     for (const double sign : {1.0, -1.0}) {
       rows.emplace_back();
       rows.back()[k] = sign;
-      room.push_back(k < 3 ? kNotHeldMm : kNotHeldDeg * std::numbers::pi / 180);
+      room.push_back(k < 3 ? kNotHeldMm : kNotHeldRad);
     }
   }
-  const auto most = [&](Vec3 shift, Vec3 turn) {
+  const auto most = [&](Vec3 shift, Vec3 turn, double not_held) {
     double out = 0;
     for (const double sign : {1.0, -1.0})
       out = std::max(
           out, largest({sign * shift.x, sign * shift.y, sign * shift.z, sign * turn.x, sign * turn.y, sign * turn.z},
                        rows, room));
-    return out;
+    return std::isfinite(out) ? out : not_held;
   };
   for (std::size_t n = 0; n < planes.size(); ++n) {
     const Vec3 normal = axes.turned(planes[n].normal), at = axes.local(planes[n].at_mm);
-    cuts[n].rock_mm = most(normal, cross(at - middle, normal));
+    cuts[n].rock_mm = most(normal, cross(at - middle, normal), kNotHeldMm);
     const Vec3 u = any_perpendicular(normal), v = cross(normal, u);
-    const double a = most({}, u), b = most({}, v);
+    const double a = most({}, u, kNotHeldRad), b = most({}, v, kNotHeldRad);
     cuts[n].rock_deg = portable::hypot(a, b) * 180 / std::numbers::pi;  // no turn of the plane is more
   }
 }

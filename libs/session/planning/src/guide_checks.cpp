@@ -102,7 +102,7 @@ double largest(const std::array<double, 6>& c, const std::vector<std::array<doub
     std::size_t in = kColumns;
     for (std::size_t k = 0; k < kColumns; ++k)
       if (t[rows][k] < -1e-10 && (in == kColumns || outside[k] < outside[in])) in = k;
-    if (in == kColumns) break;
+    if (in == kColumns) return t[rows][kColumns];
     std::size_t out = rows;
     double step = std::numeric_limits<double>::infinity();
     for (std::size_t r = 0; r < rows; ++r) {
@@ -126,7 +126,7 @@ double largest(const std::array<double, 6>& c, const std::vector<std::array<doub
     }
     std::swap(outside[in], basis[out]);
   }
-  return t[rows][kColumns];
+  return std::numeric_limits<double>::infinity();  // what was reached so far would claim too little
 }
 
 }  // namespace guide
