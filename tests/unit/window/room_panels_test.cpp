@@ -75,6 +75,39 @@ StateFacts longest() {
   return f;
 }
 
+// At few pictures a second letters and keys come many at a time.
+TEST(Palette, LettersAndKeysStayInTheirOrder) {
+  constexpr int kBackspace = 259;
+  const Memory memory(1280, 800, 16);
+  const RoomLayout l = lay_out(Layout::operate, 1280, 800, 16);
+  CommandPalette palette;
+  const auto draw = [&] { frames([&] { EXPECT_EQ(palette.draw({0, 0, 1280, 800}, l.view), nullptr); }); };
+  palette.letter('q');
+  draw();
+  EXPECT_EQ(palette.shown(), CommandPalette::Shown::nothing) << "a letter alone opens nothing";
+  palette.key('K', kWithCtrl);
+  for (const char c : {'z', 'a'}) {
+    palette.key(c - 'a' + 'A', 0);
+    palette.letter(static_cast<char32_t>(c));
+  }
+  palette.show(CommandPalette::Shown::commands);  // what the key does, in the picture after
+  draw();
+  EXPECT_EQ(palette.search().text(), "za");
+  palette.key(kBackspace, 0);
+  palette.key(kBackspace, 0);
+  palette.letter('m');
+  palette.letter('x');
+  palette.key(kBackspace, 0);
+  palette.letter('a');
+  draw();
+  EXPECT_EQ(palette.search().text(), "ma");
+  palette.show(CommandPalette::Shown::nothing);
+  palette.letter('q');
+  palette.show(CommandPalette::Shown::commands);
+  draw();
+  EXPECT_EQ(palette.search().text(), "");
+}
+
 TEST(Panels, NothingIsCutOffAtAnySize) {
   struct Size {
     int width, height;
@@ -147,7 +180,7 @@ TEST(Palette, FindsByTypingAndDoesByEnter) {
   CommandPalette palette;
   palette.show(CommandPalette::Shown::commands);
   const auto picture = [&](const char* letters, const std::vector<int>& keys) {
-    for (const char* c = letters; *c != 0; ++c) ImGui::GetIO().AddInputCharacter(static_cast<unsigned>(*c));
+    for (const char* c = letters; *c != 0; ++c) palette.letter(static_cast<char32_t>(*c));
     for (const int k : keys) palette.key(k, 0);
     ImGui::NewFrame();
     const CommandRow* const done = palette.draw(whole, view);

@@ -72,7 +72,8 @@ std::vector<TenKeysRow> ten_keys() {
 void CommandPalette::show(Shown what) {
   shown_ = what;
   search_.clear();
-  pressed_.clear();
+  if (!opens_) pressed_.clear();
+  opens_ = false;
   scroll_ = 0;
   shown_chosen_ = 0;
 }
@@ -82,7 +83,16 @@ void CommandPalette::help() {
 }
 
 void CommandPalette::key(int code, int modifiers) {
-  if (typing()) pressed_.push_back({code, modifiers});
+  if (!typing() && !opens_ && code == 'K' && (modifiers & kWithCtrl) != 0) {
+    opens_ = true;
+    pressed_.clear();
+  } else if (typing() || opens_) {
+    pressed_.push_back({code, modifiers, 0});
+  }
+}
+
+void CommandPalette::letter(char32_t letter) {
+  if (typing() || opens_) pressed_.push_back({0, 0, letter});
 }
 
 // True: Enter was among them.
@@ -90,6 +100,10 @@ bool CommandPalette::take_keys() {
   bool run = false;
   for (const Pressed& p : std::exchange(pressed_, {})) {
     if (run) break;
+    if (p.letter != 0) {
+      search_.type(p.letter);
+      continue;
+    }
     switch (p.code) {
       case kEnter:
       case kKeypadEnter:
@@ -123,9 +137,8 @@ bool CommandPalette::take_keys() {
 
 const CommandRow* CommandPalette::draw(const ScreenBox& window, const ScreenBox& view) {
   if (shown_ == Shown::ten_keys) draw_ten_keys(view);
+  opens_ = false;  // what was to open it has been looked at
   if (!typing()) return nullptr;
-  // Letters before keys: who types and presses Enter between two pictures means what was typed.
-  for (const ImWchar c : ImGui::GetIO().InputQueueCharacters) search_.type(c);
   const bool run = take_keys();
   // Above the state: a contact stays visible.
   return typing() ? draw_list({window.x, window.y, window.width, view.bottom() - window.y}, run) : nullptr;

@@ -26,8 +26,10 @@ class CommandPalette {
   [[nodiscard]] bool typing() const { return shown_ == Shown::commands || shown_ == Shown::all; }
   [[nodiscard]] const CommandSearch& search() const { return search_; }
 
-  /// Each key as it is pressed or repeats, as GLFW numbers it; looked at when it is drawn next.
+  /// Each key as it is pressed or repeats, as GLFW numbers it, and each letter that is typed: looked at in their order
+  /// when it is drawn next, also those that come before the picture in which Ctrl-K opens it.
   void key(int code, int modifiers);
+  void letter(char32_t letter);
   /// Of the card of ten keys, in pixels now.
   [[nodiscard]] static float card_width();
   /// Between ImGui::NewFrame and Render. The card lies on `view`, the list in the middle of `window`. The row that is
@@ -50,8 +52,10 @@ class CommandPalette {
   CommandSearch search_;
   struct Pressed {
     int code, modifiers;
+    char32_t letter;  // 0: a key
   };
   std::vector<Pressed> pressed_;
+  bool opens_ = false;  // Ctrl-K was pressed since the last picture
   float scroll_ = 0;
   std::size_t shown_chosen_ = 0;  // the chosen row is in sight
 };

@@ -49,6 +49,7 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
 
 RehearsalWindow::~RehearsalWindow() {
   shell_.on_key = nullptr;
+  shell_.on_letter = nullptr;
   review_.end();
   if (actions_.rehearsal() != nullptr) hints_.leave();
   // The session is the caller's to save, and goes on until then.
@@ -103,6 +104,7 @@ void RehearsalWindow::open() {
     if (action != 0) room_.key(key, modifiers, action == 2);
     keyboard_.on(key, static_cast<Keyboard::Event>(action), modifiers);
   };
+  shell_.on_letter = [this](char32_t letter) { room_.letter(letter); };
   cuts_.create();
 }
 

@@ -86,6 +86,8 @@ class MainView {
   /// Each key as it is pressed or repeats, as GLFW numbers it: a note is finished by one that may be over before the
   /// next picture, which ImGui misses.
   void key(int code, int modifiers, bool repeated);
+  /// Each letter as it is typed, for the search of commands.
+  void letter(char32_t letter) { palette_.letter(letter); }
   /// A picture was kept; the session has ended and is saved.
   void picture_kept() { pictured_ = true; }
   void session_ended();

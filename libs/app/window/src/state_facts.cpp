@@ -109,7 +109,10 @@ StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const
   if (!f.warning.empty()) return f;
   const Burr* const edge = instrument_of(tick.device.tool).cutter();
   f.lasts = true;
-  if (edge != nullptr) f.warning = too_small_for_voxels(*edge, rehearsal.finest_voxel_mm());
+  // Before the first tick nobody holds the burr that a record begins with.
+  if (edge != nullptr && tick.tick > 0 && !too_small_for_voxels(*edge, rehearsal.finest_voxel_mm()).empty())
+    f.warning = filled(tr("the instrument is small for voxels of {mm} mm: its force is coarse"),
+                       {{"mm", shown_number(rehearsal.finest_voxel_mm(), 2)}});
   return f;
 }
 

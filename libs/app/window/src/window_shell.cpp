@@ -40,6 +40,10 @@ WindowShell::WindowShell(const ShellOptions& options) : fixed_scale_(options.sca
     }
     if (shell->on_key) shell->on_key(key, action, modifiers & (GLFW_MOD_SHIFT | GLFW_MOD_CONTROL | GLFW_MOD_ALT));
   });
+  glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned letter) {
+    auto* const shell = static_cast<WindowShell*>(glfwGetWindowUserPointer(w));
+    if (shell->on_letter) shell->on_letter(letter);
+  });
   glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int has) {
     static_cast<WindowShell*>(glfwGetWindowUserPointer(w))->attended_ = has != GLFW_FALSE;
   });

@@ -35,6 +35,8 @@ class WindowShell {
   /// Keys as GLFW numbers them; released 0, pressed 1, repeated 2; shift 1, Ctrl 2, Alt 4 were down with it. Ctrl with
   /// + and - is the shell's.
   std::function<void(int key, int action, int modifiers)> on_key;
+  /// A letter that was typed (Unicode), in its order among the keys.
+  std::function<void(char32_t letter)> on_letter;
   /// The window has the keys; before it has ever had them, too.
   [[nodiscard]] bool attended() const { return attended_; }
   /// The mouse's right and left button change places, for all of the window.
