@@ -1,5 +1,8 @@
 #include "case_series.h"
 
+#include <ostream>
+
+#include "audit_case.h"
 #include "built_in_pipelines.h"
 #include "case_edits.h"
 #include "case_pipeline.h"
@@ -67,6 +70,13 @@ void check_object(const std::string& object, const fs::path& example, const char
   if (output_exists(object) && !io.common.force)
     throw Error(ExitCode::cannot_write, "'" + object + "' exists already",
                 "give another name, or --force to replace it");
+}
+
+void handed_over(const AuditTrail& trail, const fs::path& case_folder, const std::string& written,
+                 cli::Invocation& io) {
+  io.end_progress();
+  audit_case(trail, AuditEvent::Kind::hand_over, case_folder, io.context);
+  if (!io.common.quiet) io.err << "  " << written << " (names the patient)\n";
 }
 
 MeasuresReport measures_of_case(const fs::path& folder, const fs::path& segmentation, const Context& context) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "osteo/app/cli/command.h"
+#include "osteo/hospital/pacs/audit.h"
 #include "osteo/imaging/dicom/objects.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/session/scene/recipe.h"
@@ -29,6 +30,10 @@ struct CaseSeries {
 /// --force. `example`: a name that would do.
 void check_object(const std::string& object, const std::filesystem::path& example, const char* flag,
                   const cli::Invocation& io);
+
+/// Tells the audit trail and the person that `written`, which names the patient, is there.
+void handed_over(const AuditTrail& trail, const std::filesystem::path& case_folder, const std::string& written,
+                 cli::Invocation& io);
 
 /// Measures of the case, for a structured report. `segmentation`: DICOM SEG of its structures; empty: none.
 [[nodiscard]] MeasuresReport measures_of_case(const std::filesystem::path& folder,

@@ -64,20 +64,15 @@ int ReportCommand::run(const Params& p, cli::Invocation& io) {
   if (!object.empty() || !p.measures.empty()) of = series_of(folder, pipeline, io);
   const CaseReport report = make_report(folder, recipe, pipeline, io);
   // Of each at once: where the second fails, the first is there, and names the patient.
-  const auto handed_over = [&](const std::string& written) {
-    io.end_progress();
-    audit_case(trail, AuditEvent::Kind::hand_over, folder, io.context);
-    if (!io.common.quiet) io.err << "  " << written << " (names the patient)\n";
-  };
   if (!object.empty()) {
     save_encapsulated_pdf(read_text(report.pdf), "Bone for rehearsal: " + case_code(folder), object,
                           {of->series, "Bone for rehearsal, not for diagnosis"}, io.context);
-    handed_over(p.dicom);
+    handed_over(trail, folder, p.dicom, io);
   }
   if (!p.measures.empty()) {
     save_measures_report(measures_of_case(folder, p.segmentation, io.context), p.measures,
                          {of->series, "Measures of bone for rehearsal, not for diagnosis"}, io.context);
-    handed_over(p.measures);
+    handed_over(trail, folder, p.measures, io);
   }
   if (io.common.json) {
     Json said{{"html", report.html.string()},  {"pdf", report.pdf.string()},

@@ -6,7 +6,6 @@
 #include <map>
 #include <ostream>
 
-#include "audit_case.h"
 #include "case_series.h"
 #include "commands/score.h"
 #include "osteo/assessment/scoring/hint_reader.h"
@@ -74,11 +73,6 @@ void add_heat(const SessionReader& session, World begin, const Anatomy& anatomy,
     score.words.push_back("heat is known only up to where the first ticks are missing");
 }
 
-// Also of "SESSION/", as a shell completes it.
-std::string name_of(const fs::path& folder) {
-  return (folder.has_filename() ? folder : folder.parent_path()).filename().string();
-}
-
 }  // namespace
 
 Scored score_folder(const fs::path& session_folder, const ScoreAsked& asked, const Context& context) {
@@ -105,7 +99,7 @@ Scored score_folder(const fs::path& session_folder, const ScoreAsked& asked, con
   Scored scored{score_session(session, std::move(begin), anatomy.structures.get(),
                               asked.procedure ? &*asked.procedure : nullptr, reference ? &*reference : nullptr,
                               asked.subject, context.sub(compares ? 0.5 : 0, asked.heat ? 0.6 : 1)),
-                name_of(folder.folder), folder.guided, session.outline().damaged()};
+                folder.folder.filename().string(), folder.guided, session.outline().damaged()};
   Score& score = scored.score;
   score.source.stream = hash_path(folder.stream()).substr(0, 16);
   score.source.scored_by = program_version();
@@ -178,9 +172,7 @@ void write_measures(const fs::path& session, const ScoreCommand::Params& p, cons
   report.scores = groups_of(scored, report.structures);
   report.remarks = remarks_of(scored.score);
   save_measures_report(report, p.measures, {of.series, "Score of a rehearsal, not for diagnosis"}, io.context);
-  io.end_progress();
-  audit_case(trail, AuditEvent::Kind::hand_over, folder.case_folder, io.context);
-  if (!io.common.quiet) io.err << "  " << p.measures << " (names the patient)\n";
+  handed_over(trail, folder.case_folder, p.measures, io);
 }
 
 }  // namespace

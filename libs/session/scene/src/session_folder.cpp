@@ -70,7 +70,8 @@ SessionFolder open_session_folder(const fs::path& folder, const fs::path& case_f
   const fs::path file = folder / "session.json";
   if (!fs::exists(file))
     throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a session: it has no session.json");
-  SessionFolder s{folder, case_folder, {}, {}, 0, {}};
+  // Also of "SESSION/", as a shell completes it: the folder has its name.
+  SessionFolder s{folder.has_filename() ? folder : folder.parent_path(), case_folder, {}, {}, 0, {}};
   try {
     const auto j = ordered_json::parse(read_text(file));
     if (s.case_folder.empty()) s.case_folder = folder / j.at("case").get<std::string>();
