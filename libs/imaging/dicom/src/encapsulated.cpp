@@ -7,6 +7,7 @@
 #include "object_identity.h"
 #include "osteo/imaging/dicom/objects.h"
 #include "osteo/imaging/io/surface_io.h"
+#include "segment_codes.h"
 
 namespace osteo::inline imaging {
 namespace {
@@ -14,15 +15,6 @@ namespace {
 using dicom::now_text;
 using dicom::put;
 using dicom::put_identity;
-
-void put_code(DcmItem& d, const DcmTagKey& sequence, const char* value, const char* scheme, const char* meaning,
-              const fs::path& path) {
-  DcmItem* item = nullptr;
-  dicom::require(d.findOrCreateSequenceItem(sequence, item, 0), path);
-  put(*item, DCM_CodeValue, value, path);
-  put(*item, DCM_CodingSchemeDesignator, scheme, path);
-  put(*item, DCM_CodeMeaning, meaning, path);
-}
 
 // The slices that it was made from.
 void put_source(DcmDataset& d, const DicomObjectOptions& o, bool in_space, const fs::path& path) {
@@ -109,11 +101,11 @@ void save_encapsulated_stl(const TriMesh& mesh, const fs::path& path, const Dico
   content += study_of(d, path);  // the same surface can stand in two studies
   put_document(d, {UID_EncapsulatedSTLStorage, "M3D", "9002", "model/stl", content}, options, options.description,
                path);
-  put_code(d, DCM_ConceptNameCodeSequence, "85040-4", "LN", "3D Model", path);
-  put_code(d, DCM_MeasurementUnitsCodeSequence, "mm", "UCUM", "mm", path);
+  dicom::put_code(d, DCM_ConceptNameCodeSequence, {"85040-4", "3D Model"}, "LN", path);
+  dicom::put_code(d, DCM_MeasurementUnitsCodeSequence, {"mm", "mm"}, "UCUM", path);
   put(d, DCM_ModelModification, "NO", path);
   put(d, DCM_ModelMirroring, "NO", path);
-  put_code(d, DCM_ModelUsageCodeSequence, "129013", "DCM", "Planning Intent", path);
+  dicom::put_code(d, DCM_ModelUsageCodeSequence, {"129013", "Planning Intent"}, "DCM", path);
   save_document(file, std::move(stl), path);
 }
 

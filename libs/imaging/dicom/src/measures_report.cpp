@@ -307,11 +307,9 @@ class MeasuresWriter {
     return g;
   }
 
-  void put_algorithm(DcmItem& in, const std::string& name, const std::string& version,
-                     const std::string& parameters = {}) const {
+  void put_algorithm(DcmItem& in, const std::string& name, const std::string& version) const {
     tree_.text(in, kModified, {"111001", "DCM", "Algorithm Name"}, name);
     tree_.text(in, kModified, {"111003", "DCM", "Algorithm Version"}, version);
-    if (!parameters.empty()) tree_.text(in, kModified, {"111002", "DCM", "Algorithm Parameters"}, parameters);
   }
 
   void put_bone(DcmItem& measurements) const {
@@ -342,11 +340,9 @@ class MeasuresWriter {
     const auto number = segmentation_.number.find(dicom::lo_text(s.name));
     const bool segment = number != segmentation_.number.end();
     DcmItem& g = group(measurements, s.name, segment ? "1411" : "1501");
-    const std::size_t comma = s.origin.find(", version ");
-    if (comma != std::string::npos) {
-      const std::string name = s.origin.substr(0, comma);
-      put_algorithm(g, (dicom::is_own_drawer(name) ? "Osteotome " : "") + name, s.origin.substr(comma + 10));
-    }
+    if (const dicom::DrawnBy drawn = dicom::drawn_by(s.origin); !drawn.version.empty())
+      put_algorithm(g, (drawn.own ? "Osteotome " : "") + drawn.name,
+                    drawn.version + (drawn.corrected ? std::string(kCorrectedByHand) : ""));
     finding(g, kContains, kFinding, s.name);
     if (segment) refer_to_segment(g, number->second);
     tree_.number(g, kVolume, s.volume_mm3, kCubicMm);

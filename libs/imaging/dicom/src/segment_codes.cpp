@@ -69,37 +69,51 @@ void put_code(DcmItem& in, const DcmTagKey& sequence, SegmentCode code, const ch
   require(item->putAndInsertString(DCM_CodeMeaning, std::string(code.meaning).c_str()), path);
 }
 
+namespace {
+
+const Drawer* drawer_called(std::string_view stage) {
+  const auto* const d =
+      std::find_if(kDrawers.begin(), kDrawers.end(), [&](const Drawer& x) { return x.stage == stage; });
+  return d == kDrawers.end() ? nullptr : d;
+}
+
+}  // namespace
+
+DrawnBy drawn_by(const std::string& origin) {
+  DrawnBy d;
+  d.corrected = origin.ends_with(kCorrectedByHand);
+  const std::string made = d.corrected ? origin.substr(0, origin.size() - kCorrectedByHand.size()) : origin;
+  const std::size_t comma = made.rfind(kVersion);
+  d.name = made.substr(0, comma);
+  if (comma != std::string::npos) d.version = made.substr(comma + kVersion.size());
+  d.own = drawer_called(d.name) != nullptr;
+  return d;
+}
+
 void put_algorithm(DcmItem& segment, const std::string& origin, const std::filesystem::path& path) {
-  const bool corrected = origin.ends_with(kCorrectedByHand);
-  const std::string made = corrected ? origin.substr(0, origin.size() - kCorrectedByHand.size()) : origin;
+  const DrawnBy drawn = drawn_by(origin);
   const auto put = [&](DcmItem& in, const DcmTagKey& tag, const std::string& value) {
     dicom::put(in, tag, lo_text(value), path);
   };
-  if (made == kDrawnByHand) {
+  if (drawn.name == kDrawnByHand) {
     put(segment, DCM_SegmentAlgorithmType, "MANUAL");
     segment.findAndDeleteElement(DCM_SegmentAlgorithmName);
     return;
   }
-  const std::size_t comma = made.rfind(kVersion);
-  const std::string name = made.substr(0, comma);
-  const auto* const drawer =
-      std::find_if(kDrawers.begin(), kDrawers.end(), [&](const Drawer& d) { return d.stage == name; });
-  const bool known = drawer != kDrawers.end();
+  const Drawer* const drawer = drawer_called(drawn.name);
   // Without knowledge the type that claims least: a person may have had a part in it.
-  put(segment, DCM_SegmentAlgorithmType, known && !corrected ? std::string(drawer->type) : "SEMIAUTOMATIC");
+  put(segment, DCM_SegmentAlgorithmType,
+      drawer != nullptr && !drawn.corrected ? std::string(drawer->type) : "SEMIAUTOMATIC");
   put(segment, DCM_SegmentAlgorithmName,
-      (name.empty() ? std::string(kNotRecorded) : name) + (corrected ? std::string(kCorrectedByHand) : ""));
-  if (!known || comma == std::string::npos) return;
+      (drawn.name.empty() ? std::string(kNotRecorded) : drawn.name) +
+          (drawn.corrected ? std::string(kCorrectedByHand) : ""));
+  if (drawer == nullptr || drawn.version.empty()) return;
   DcmItem* item = nullptr;
   require(segment.findOrCreateSequenceItem(DCM_SegmentationAlgorithmIdentificationSequence, item, 0), path);
   put_code(*item, DCM_AlgorithmFamilyCodeSequence, drawer->family, "DCM", path);
-  put(*item, DCM_AlgorithmName, name);
-  put(*item, DCM_AlgorithmVersion, made.substr(comma + kVersion.size()));
+  put(*item, DCM_AlgorithmName, drawn.name);
+  put(*item, DCM_AlgorithmVersion, drawn.version);
   put(*item, DCM_AlgorithmSource, "Osteotome");
-}
-
-bool is_own_drawer(std::string_view algorithm) {
-  return std::any_of(kDrawers.begin(), kDrawers.end(), [&](const Drawer& d) { return d.stage == algorithm; });
 }
 
 std::string origin_from(const std::string& type, const std::string& name, const std::string& version) {

@@ -22,8 +22,13 @@ void put_code(DcmItem& in, const DcmTagKey& sequence, SegmentCode code, const ch
 /// which version (Structure::origin).
 void put_algorithm(DcmItem& segment, const std::string& origin, const std::filesystem::path& path);
 
-/// One of our stages; any other algorithm is of a segmentation that somebody else's program wrote.
-[[nodiscard]] bool is_own_drawer(std::string_view algorithm);
+/// Structure::origin read.
+struct DrawnBy {
+  std::string name, version;  ///< of what drew it; empty: not known
+  bool corrected = false;     ///< by hand, afterwards
+  bool own = false;           ///< one of our stages; else somebody else's program, or a hand
+};
+[[nodiscard]] DrawnBy drawn_by(const std::string& origin);
 
 /// What stands for the name of an algorithm that is not known.
 inline constexpr std::string_view kNotRecorded = "not recorded";
