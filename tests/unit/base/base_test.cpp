@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "error_of.h"
 #include "osteo/core/base/context.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -38,14 +39,7 @@ struct Sample {
   }
 };
 
-std::string error_of(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return {};
-}
+using test::error_of;
 
 std::filesystem::path fresh_folder() {
   const auto p = std::filesystem::temp_directory_path() / ("osteo-base-" + std::to_string(::getpid()));

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iostream>
 
+#include "error_of.h"
 #include "guide_parts.h"
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/distance/distance_map.h"
@@ -55,15 +56,7 @@ TriangleSoup box(Vec3 lo, Vec3 hi) {
   return s;
 }
 
-template <class F>
-std::string error_of(F&& f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return {};
-}
+using test::error_of;
 
 struct SlotFound {
   double off_mm = 0, off_deg = 0, width_mm = 0;

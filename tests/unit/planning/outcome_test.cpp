@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "edge_fit.h"
+#include "error_of.h"
 #include "osteo/core/base/error.h"
 #include "osteo/session/planning/detail/jaw_phantom.h"
 #include "osteo/session/planning/planning.h"
@@ -251,12 +252,7 @@ TEST(Outcome, SaysWhatCannotBeKnown) {
   }
   const auto error_of = [&](const SurgicalPlan& p, const std::vector<std::pair<std::string, TriangleSoup>>& bones,
                             const Image& ct) -> std::string {
-    try {
-      static_cast<void>(measure_outcome(p, bones, ct, {}));
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return {};
+    return test::error_of([&] { static_cast<void>(measure_outcome(p, bones, ct, {})); });
   };
   const Image empty = postop_ct({}, box, {}, 4);
   EXPECT_NE(error_of(plan, world().bones(), empty).find("not found"), std::string::npos);

@@ -5,6 +5,7 @@
 #include <ctime>
 #include <iostream>
 
+#include "error_of.h"
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/mesh/mesh_info.h"
 #include "osteo/session/planning/detail/jaw_phantom.h"
@@ -46,15 +47,7 @@ double angle_deg(const SymmetryPlane& s, const JawPhantom& p) {
   return std::acos(std::min(1.0, std::abs(dot(s.normal, p.symmetry_normal)))) / kDeg;
 }
 
-template <class F>
-std::string error_of(F&& f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return {};
-}
+using test::error_of;
 
 TEST(JawPhantom, IsClosedManifoldAndItsOwn) {
   const JawPhantom p = make_jaw_phantom(3, 12);
