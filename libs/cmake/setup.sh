@@ -118,7 +118,7 @@ ensure_packages() {
     # What only tests need may be missing in one of the distributions: those tests are skipped.
     local wanted=()
     for package in "${missing[@]}"; do
-      if sed '1,/^# tests/d' "$list" | grep -qx "$package" && ! LC_ALL=C apt-cache policy "$package" 2>/dev/null | grep -q 'Candidate: [^(]'; then
+      if sed '1,/^# tests/d' "$list" | grep -qx "$package" && [ -z "$(LC_ALL=C apt-cache policy "$package" 2>/dev/null | sed -n '/Candidate: [^(]/p')" ]; then
         say "There is no package $package in $here: what is tested with it is skipped"
       else
         wanted+=("$package")

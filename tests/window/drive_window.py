@@ -482,7 +482,8 @@ def hand():
     # What it was pressed with before takes a moment to go; then it is lifted, carried and set down without touching hard, drill off.
     for _, _, began, ended in seen:
         way = rows[began + 100 : ended]
-        assert max(map(force, way)) < 1.5, max(map(force, way))
+        hard = [(r["tick"], round(force(r), 2)) for r in way if force(r) > 1.5]
+        assert not hard, f"of the way from tick {began} to {ended}: {hard[:1]} to {hard[-1:]}, {len(hard)} ticks"
         assert not any(int(float(r["pedal"])) for r in way)
     print(
         "most force on",

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <numbers>
 #include <set>
 
 #include "osteo/core/base/error.h"
@@ -138,6 +139,32 @@ TEST(Hands, AsManyAsThereAreDevices) {
   MouseDevice mouse{HandGoal{}};
   Stream stream;
   EXPECT_THROW(Servo(r, mouse, stream, 1000), Error);
+}
+
+// Goals come with the pictures: however far apart these are, the handle turns evenly, and slowly while bone pushes it.
+TEST(MouseDevice, TurnsItsAxisEvenlyHoweverSeldomItIsTold) {
+  const auto degrees = [](const DeviceSample& s, Vec3 from) {
+    return std::acos(std::clamp(dot(from_floats(s.axis), from), -1.0, 1.0)) * 180 / std::numbers::pi;
+  };
+  for (const Vec3 to : {Vec3{1, 0, 0}, Vec3{0, 0, -1}}) {
+    for (const double push_n : {0.0, 2.0}) {
+      MouseDevice mouse{HandGoal{}};
+      Vec3 before = from_floats(mouse.read(0, 1e-3, {}).axis);
+      mouse.set_goal({.position_mm = {}, .axis = to_floats(to)});
+      const double degrees_per_s = (push_n > 0 ? 1 : 4) * 180 / std::numbers::pi;
+      for (std::uint64_t t = 1; t <= 300; ++t) {
+        const DeviceSample s = mouse.read(t, 1e-3, {push_n, 0, 0});
+        ASSERT_LT(degrees(s, before), degrees_per_s * 1e-3 + 0.03) << t;
+        before = from_floats(s.axis);
+        ASSERT_NEAR(length(before), 1, 1e-6);
+      }
+      EXPECT_NEAR(std::acos(before.z) * 180 / std::numbers::pi, degrees_per_s * 0.3, 0.1);
+      for (std::uint64_t t = 301; t <= 2500 && push_n == 0; ++t) before = from_floats(mouse.read(t, 1e-3, {}).axis);
+      if (push_n == 0) {
+        EXPECT_LT(length(before - to), 1e-6);
+      }
+    }
+  }
 }
 
 // The speed against the closed form of a first-order lag, up, half up and down.

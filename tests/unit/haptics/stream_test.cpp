@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <thread>
 
 #include "osteo/core/base/error.h"
@@ -64,7 +65,12 @@ TEST(Stream, ReadersJoinAndLeaveAThousandTimesAndNobodyElseLosesAnything) {
       for (int n = 0; n < 1000; ++n) {
         StreamReader& r = stream.add_reader(1 << 10, 1 << 12);
         Followed mine;
-        for (int looks = 0; looks < 50 && mine.ticks == 0; ++looks) {
+        // Most leave after a moment, whatever they got. Every eighth stays until it got something, so that some have on
+        // a busy machine too.
+        const bool patient = n % 8 == 0;
+        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+        for (int looks = 0; (looks < 50 || patient) && mine.ticks == 0; ++looks) {
+          if (looks > 50 && std::chrono::steady_clock::now() > end) break;
           std::this_thread::yield();
           mine.drain(r);
         }
@@ -89,7 +95,7 @@ TEST(Stream, ReadersJoinAndLeaveAThousandTimesAndNobodyElseLosesAnything) {
   EXPECT_EQ(stays.dropped, 0u);
   EXPECT_EQ(stays.actions_dropped, 0u);
   EXPECT_EQ(wrong, 0u);
-  EXPECT_GT(reported, 200u);
+  EXPECT_GE(reported, 250u);
 }
 
 TEST(Stream, HasRoomForSoManyReadersAndForOthersWhenTheyLeave) {

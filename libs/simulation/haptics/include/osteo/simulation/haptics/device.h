@@ -119,7 +119,8 @@ class GuidedHand {
   SpringHand hand_;
 };
 
-/// The goal is set by another thread (the window).
+/// The goal is set by another thread (the window), as seldom as it likes: the hand follows on its spring and turns the
+/// axis to the goal's at 4 rad/s, at 1 rad/s while bone pushes it with more than 0.1 N.
 class MouseDevice final : public Device {
  public:
   /// The first tick is there.
