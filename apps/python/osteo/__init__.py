@@ -11,6 +11,11 @@ import os as _os
 import warnings as _warnings
 from collections import namedtuple as _namedtuple
 
+# A wheel brings along the names of DICOM's attributes, which the library looks for in the environment.
+_dictionary = _os.path.join(_os.path.dirname(__file__), "data", "dicom.dic")
+if _os.path.exists(_dictionary):
+    _os.environ.setdefault("DCMDICTPATH", _dictionary)
+
 from . import _osteo
 from ._osteo import Error, Field, Grid, Image, Labels, Surface, Tets, WrongType, WrongValue, __version__
 from .rehearsals import Rehearsal, Script, action_dtype, goal_dtype, goals, load_script, tick_dtype, tools
