@@ -65,20 +65,13 @@ class Window(Program):
         return wait("the next picture", lambda: (s := self.state())["pictures"] >= after and s)
 
     def drag(self, button, dx, dy):
-        self.x("mousedown", button)
-        self.next()
-        self.x("mousemove_relative", "--", dx, dy)
-        self.next()
-        self.x("mouseup", button)
+        """Within one picture, if that is slow: what the mouse does is done in its order."""
+        self.x("mousedown", button, "mousemove_relative", "--", dx, dy, "mouseup", button)
         return self.next()
 
     def deeper(self):
-        """A step of the wheel with Shift, which is down for whole pictures: modifiers are looked at once in each."""
-        self.x("keydown", "shift")
-        self.next()
-        self.x("click", 4)
-        self.next()
-        self.x("keyup", "shift")
+        """A step of the wheel with Shift."""
+        self.x("keydown", "shift", "click", 4, "keyup", "shift")
         return self.next()
 
     def close(self, code=0):
@@ -174,6 +167,15 @@ def keys():
         # The view, the help, a picture.
         turned = w.drag(3, 60, 20)
         assert dot(turned["eye"], before["eye"]) < 0.99
+        key("Home", "view from the left", lambda s: dot(s["eye"], before["eye"]) > 0.9999)
+        # A picture that is long in coming: a drag, a step of the wheel and a way on are one after the other all the same.
+        w.app.send_signal(signal.SIGSTOP)
+        w.x("mousedown", 3, "mousemove_relative", "--", 60, 20, "mouseup", 3)
+        w.x("keydown", "shift", "click", 4, "click", 4, "keyup", "shift", "mousemove", 560, 350)
+        w.app.send_signal(signal.SIGCONT)
+        late = w.next()
+        assert dot(late["eye"], turned["eye"]) > 0.999, (turned["eye"], late["eye"])
+        assert dot([a - b for a, b in zip(late["goal_mm"], turned["goal_mm"])], late["eye"]) < -0.8, (turned, late)
         key("Home", "view from the left", lambda s: dot(s["eye"], before["eye"]) > 0.9999)
         key("F1", "the card of ten keys", lambda s: s["help"] and not s["typing"])
         w.key("F1", "all commands", lambda s: s["typing"])

@@ -7,27 +7,38 @@
 
 namespace osteo::inline app {
 
-ScopeMouse RehearsalWindow::mouse() const {
-  const ImGuiIO& io = ImGui::GetIO();
-  const auto [x, y] = unsqueezed(stereo_.params.mode, scope_.area, static_cast<double>(io.MousePos.x),
-                                 static_cast<double>(io.MousePos.y));
-  return {x,
-          y,
-          static_cast<double>(io.MouseDelta.x),
-          static_cast<double>(io.MouseDelta.y),
-          static_cast<double>(io.MouseWheel),
-          ImGui::IsMouseDown(ImGuiMouseButton_Right),  // its first pixels too: they are not the drill's
-          ImGui::IsMouseDown(ImGuiMouseButton_Middle),
-          io.KeyCtrl,
-          io.KeyShift,
-          ImGui::IsMouseDown(ImGuiMouseButton_Left) || keyboard_.held(Command::second_mouse)};
+std::vector<ScopeMouse> RehearsalWindow::mouse() {
+  const auto on_picture = [&](double x, double y) { return unsqueezed(stereo_.params.mode, scope_.area, x, y); };
+  std::vector<ScopeMouse> all;
+  for (const MouseSpell& s : trail_.take()) {
+    const auto [x, y] = on_picture(s.x, s.y);
+    ScopeMouse m;
+    m.x = x;
+    m.y = y;
+    m.dx = s.dx;
+    m.dy = s.dy;
+    m.wheel = s.wheel;
+    m.right = s.right;  // its first pixels too: they are not the drill's
+    m.middle = s.middle;
+    m.ctrl = s.ctrl;
+    m.shift = s.shift;
+    m.alt = s.alt;
+    m.left = s.left;
+    m.clicked = s.clicked;
+    m.works = s.left || keyboard_.held(Command::second_mouse);
+    all.push_back(m);
+  }
+  return all;
 }
 
 // Where there is no hand to move.
 void RehearsalWindow::camera_by_mouse() {
   const ImGuiIO& io = ImGui::GetIO();
   const auto seconds = static_cast<double>(io.DeltaTime);
-  if (cuts_.scene().holds(io.MousePos.x, io.MousePos.y) && !io.WantCaptureMouse) scope_.mouse(mouse(), false, seconds);
+  const std::vector<ScopeMouse> did = mouse();
+  if (cuts_.scene().holds(io.MousePos.x, io.MousePos.y) && !io.WantCaptureMouse) {
+    for (const ScopeMouse& m : did) scope_.mouse(m, false, seconds / static_cast<double>(did.size()));
+  }
   scope_.advance(keyboard_, io.KeyShift, {}, seconds);
 }
 
@@ -38,15 +49,20 @@ void RehearsalWindow::mouse_and_keys() {
   const CameraDevices devices = actions_.camera ? actions_.camera(scope_.lent()) : CameraDevices{};
   read_hand();
   scope_.lend(keyboard_.held(Command::guide_camera));
-  const ScopeMouse m = mouse();
+  const std::vector<ScopeMouse> did = mouse();
   bool measured = false;
   if (in_view && !io.WantCaptureMouse) {
-    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) measured = room_.click(bone_seen(ray(m.x, m.y)), control_);
-    const bool tilted = !measured && tilt_by_mouse(m);
-    if (!measured && !tilted && !scope_.mouse(m, scope_.lent() && !devices.hand_mm, seconds)) use_mouse(m);
+    const bool lent = scope_.lent() && !devices.hand_mm;
+    for (const ScopeMouse& m : did) {
+      const bool measures = m.clicked && room_.click(bone_seen(ray(m.x - m.dx, m.y - m.dy)), control_);
+      measured = measured || measures;
+      if (measures || tilt_by_mouse(m)) continue;
+      if (!scope_.mouse(m, lent, seconds / static_cast<double>(did.size()))) use_mouse(m);
+      control_.look_from(view_axes());  // the mouse may have turned it
+    }
   }
-  control_.look_from(view_axes());  // the mouse may have turned it
-  const std::optional<Vec3> direction = in_view ? std::optional(ray(m.x, m.y)) : std::nullopt;
+  control_.look_from(view_axes());
+  const std::optional<Vec3> direction = in_view ? std::optional(ray(did.back().x, did.back().y)) : std::nullopt;
   std::vector<Keyboard::Press> presses = keyboard_.frame(io.WantTextInput || room_.typing());
   for (const Keyboard::Press& button : room_.take_presses()) presses.push_back(button);
   for (const Keyboard::Press& press : presses) {
@@ -79,7 +95,7 @@ void RehearsalWindow::read_hand() {
 
 bool RehearsalWindow::tilt_by_mouse(const ScopeMouse& m) {
   constexpr double kRadPerPx = 0.0061;
-  if (!ImGui::GetIO().KeyAlt || !m.right || !control_.tools().in_hand()) return false;
+  if (!m.alt || !m.right || !control_.tools().in_hand()) return false;
   if (m.shift) {
     control_.roll_hand(kRadPerPx * m.dx);
   } else {
@@ -125,14 +141,14 @@ void RehearsalWindow::use_mouse(const ScopeMouse& m) {
     if (m.wheel != 0 && (m.shift || m.works)) tools.push(1.0 * m.wheel, rehearsal, view_axes());
     return;
   }
-  if (tools.tool() == HandTools::Tool::plate && !m.shift && ImGui::IsMouseClicked(ImGuiMouseButton_Left))
-    return control_.bring(ray(m.x, m.y));
+  if (tools.tool() == HandTools::Tool::plate && !m.shift && m.clicked)
+    return control_.bring(ray(m.x - m.dx, m.y - m.dy));
   if (keyboard_.held(Command::second_mouse)) {
     const Vec3 by = step_of(m, control_.second_mm()).by_mm + view_axes().forward * (0.5 * m.wheel);
     if (m.dx != 0 || m.dy != 0 || m.wheel != 0) control_.drag_second(by);
     return;
   }
-  if (m.shift && ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
+  if (m.shift && m.left) {
     control_.push_hand(0.05 * -m.dy);
   } else if (m.dx != 0 || m.dy != 0) {
     control_.drag_hand(step_of(m, control_.goal_mm()));
@@ -142,8 +158,8 @@ void RehearsalWindow::use_mouse(const ScopeMouse& m) {
 
 // Saw and pieces: what the mouse drags is not the hand.
 void RehearsalWindow::use_tool(HandTools& tools, Rehearsal& rehearsal, const ScopeMouse& m) {
-  if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) tools.pick(rehearsal, view_axes().eye_mm, ray(m.x, m.y));
-  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || (m.dx == 0 && m.dy == 0)) return;
+  if (m.clicked) tools.pick(rehearsal, view_axes().eye_mm, ray(m.x - m.dx, m.y - m.dy));
+  if (!m.left || (m.dx == 0 && m.dy == 0)) return;
   const Vec3 at = tools.position_mm();
   const Vec3 by = step_of(m, at).by_mm;
   const ViewAxes view = view_axes();

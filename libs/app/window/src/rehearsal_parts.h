@@ -17,6 +17,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "before_view.h"
 #include "camera_notes.h"
@@ -26,6 +27,7 @@
 #include "looks.h"
 #include "monitor_panel.h"
 #include "monitor_screen.h"
+#include "mouse_trail.h"
 #include "osteo/app/window/rehearsal_window.h"
 #include "osteo/display/view/instrument_view.h"
 #include "osteo/display/view/planned_regions.h"
@@ -81,7 +83,10 @@ class RehearsalWindow {
 
   // --- the hand (rehearsal_input.cpp)
 
-  [[nodiscard]] ScopeMouse mouse() const;
+  // What the mouse did since the last picture, in order; at least what it is now.
+  [[nodiscard]] std::vector<ScopeMouse> mouse();
+  // What it did while the window said that it works was meant for nothing here.
+  void forget_mouse() { static_cast<void>(trail_.take()); }
   // Where there is no hand to move.
   void camera_by_mouse();
   void mouse_and_keys();
@@ -153,6 +158,7 @@ class RehearsalWindow {
   const std::vector<PlannedRegion> planned_;
   std::filesystem::path state_file_;
   Keyboard keyboard_;
+  MouseTrail trail_;
   HandController controller_;
   std::unique_ptr<BeforeView> before_view_;
   std::unique_ptr<WorkDone> work_;

@@ -50,6 +50,9 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
 RehearsalWindow::~RehearsalWindow() {
   shell_.on_key = nullptr;
   shell_.on_letter = nullptr;
+  shell_.on_pointer = nullptr;
+  shell_.on_button = nullptr;
+  shell_.on_wheel = nullptr;
   review_.end();
   if (actions_.rehearsal() != nullptr) hints_.leave();
   // The session is the caller's to save, and goes on until then.
@@ -82,10 +85,12 @@ WindowActions RehearsalWindow::working(WindowActions actions) {
     HandGoal goal;
     shell_.while_working(from_case ? tr("the bone is made ready") : tr("the session is made ready"), {},
                          [&](const Context&) { goal = begin(from_case, view); });
+    forget_mouse();
     return goal;
   };
   actions.save = [this, save = actions.save, rehearsal = actions.rehearsal] {
     if (rehearsal() != nullptr) shell_.while_working(tr("the session is saved"), {}, [&](const Context&) { save(); });
+    forget_mouse();
   };
   if (actions.tune) actions.tune = [this, tune = actions.tune](const HandTuning& t) { tune(controller_.tuned(t)); };
   return actions;
@@ -105,6 +110,9 @@ void RehearsalWindow::open() {
     keyboard_.on(key, static_cast<Keyboard::Event>(action), modifiers);
   };
   shell_.on_letter = [this](char32_t letter) { room_.letter(letter); };
+  shell_.on_pointer = [this](double x, double y, int modifiers) { trail_.move(x, y, modifiers); };
+  shell_.on_button = [this](int which, bool down, int modifiers) { trail_.button(which, down, modifiers); };
+  shell_.on_wheel = [this](double steps, int modifiers) { trail_.wheel(steps, modifiers); };
   cuts_.create();
 }
 
@@ -178,6 +186,7 @@ void RehearsalWindow::frame() {
   shell_.new_frame();
   if (control_.failure()) {
     report_failure();
+    forget_mouse();
   } else if (ended_) {
     show_end();
   } else {
@@ -225,6 +234,7 @@ void RehearsalWindow::show_before(bool on) {
     TriMesh mesh;
     shell_.while_working(tr("rebuilding the bone at the start"), {},
                          [&](const Context& context) { mesh = surface_of(actions_.world_at_begin(context), context); });
+    forget_mouse();
     before_view_ = std::make_unique<BeforeView>(render_window_, mesh);
   } catch (const Error& e) {
     room_.set_before(false);

@@ -15,7 +15,8 @@ namespace osteo::inline app {
 struct ScopeMouse {
   double x = 0, y = 0, dx = 0, dy = 0, wheel = 0;
   bool right = false, middle = false;  ///< down
-  bool ctrl = false, shift = false;
+  bool ctrl = false, shift = false, alt = false;
+  bool left = false, clicked = false;  ///< the left button is down; it went down at the beginning, at (x - dx, y - dy)
   bool works = false;  ///< the left button is down, or another hand has the mouse: the wheel is not the camera's
 };
 

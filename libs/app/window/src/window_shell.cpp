@@ -20,6 +20,21 @@
 #include "ui_style.h"
 
 namespace osteo::inline app {
+namespace {
+
+constexpr int kModifiers = GLFW_MOD_SHIFT | GLFW_MOD_CONTROL | GLFW_MOD_ALT;
+
+// Moves and wheels come without them.
+int modifiers_now(GLFWwindow* window) {
+  const auto down = [&](int left, int right) {
+    return glfwGetKey(window, left) == GLFW_PRESS || glfwGetKey(window, right) == GLFW_PRESS;
+  };
+  return (down(GLFW_KEY_LEFT_SHIFT, GLFW_KEY_RIGHT_SHIFT) ? GLFW_MOD_SHIFT : 0) |
+         (down(GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL) ? GLFW_MOD_CONTROL : 0) |
+         (down(GLFW_KEY_LEFT_ALT, GLFW_KEY_RIGHT_ALT) ? GLFW_MOD_ALT : 0);
+}
+
+}  // namespace
 
 WindowShell::WindowShell(const ShellOptions& options) : fixed_scale_(options.scale), by_hand_(options.by_hand) {
   window_ = open_window(options.title, options.width, options.height,
@@ -38,11 +53,26 @@ WindowShell::WindowShell(const ShellOptions& options) : fixed_scale_(options.sca
       if (larger || smaller) return shell->change_scale(larger ? 1 : -1);
       if (key == GLFW_KEY_0 || key == GLFW_KEY_KP_0) return shell->change_scale(0);
     }
-    if (shell->on_key) shell->on_key(key, action, modifiers & (GLFW_MOD_SHIFT | GLFW_MOD_CONTROL | GLFW_MOD_ALT));
+    if (shell->on_key) shell->on_key(key, action, modifiers & kModifiers);
   });
   glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned letter) {
     auto* const shell = static_cast<WindowShell*>(glfwGetWindowUserPointer(w));
     if (shell->on_letter) shell->on_letter(letter);
+  });
+  glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double x, double y) {
+    auto* const shell = static_cast<WindowShell*>(glfwGetWindowUserPointer(w));
+    if (shell->on_pointer) shell->on_pointer(x, y, modifiers_now(w));
+  });
+  glfwSetMouseButtonCallback(window_, [](GLFWwindow* w, int which, int action, int modifiers) {
+    auto* const shell = static_cast<WindowShell*>(glfwGetWindowUserPointer(w));
+#if IMGUI_VERSION_NUM < 18700  // later ones hand on what is mirrored already, below
+    if (shell->mirror_mouse && which <= GLFW_MOUSE_BUTTON_RIGHT) which = GLFW_MOUSE_BUTTON_RIGHT - which;
+#endif
+    if (shell->on_button) shell->on_button(which, action == GLFW_PRESS, modifiers & kModifiers);
+  });
+  glfwSetScrollCallback(window_, [](GLFWwindow* w, double, double steps) {
+    auto* const shell = static_cast<WindowShell*>(glfwGetWindowUserPointer(w));
+    if (shell->on_wheel) shell->on_wheel(steps, modifiers_now(w));
   });
   glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int has) {
     static_cast<WindowShell*>(glfwGetWindowUserPointer(w))->attended_ = has != GLFW_FALSE;

@@ -15,7 +15,6 @@ constexpr double kMassKg = 0.15, kSpringNPerMm = 0.8, kMaxHandN = 6;
 constexpr double kNearMmPerS = 30, kFreeMmPerS = 200, kRadPerS = 4;
 constexpr double kNearAheadMm = 0.8, kFreeAheadMm = 8, kTouchN = 0.1, kTouchAheadMm = 0.6;
 constexpr double kThereMm = 0.3, kPatienceS = 1, kQuietS = 0.03;
-constexpr double kTouchRadPerS = 1;
 
 // From one direction (a unit) towards another, by so many radians at most.
 Vec3 turned_towards(Vec3 from, Vec3 to, double most_rad) {
@@ -147,8 +146,7 @@ DeviceSample MouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) noexcep
   static_cast<void>(goal_.try_load(last_));  // while it is being written, the last one will do
   if (!hand_.leading() && last_.ways == hand_.ended()) {
     // Pictures may be slow, and a step of the handle would throw its shaft into bone.
-    const double rad_per_s = length(force_n) > kTouchN ? kTouchRadPerS : kRadPerS;
-    const Vec3 axis = turned_towards(from_floats(held_.axis), from_floats(last_.goal.axis), rad_per_s * dt_s);
+    const Vec3 axis = turned_towards(from_floats(held_.axis), from_floats(last_.goal.axis), kRadPerS * dt_s);
     held_ = last_.goal;
     held_.axis = to_floats(axis);
   }

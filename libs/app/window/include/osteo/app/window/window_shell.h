@@ -37,6 +37,11 @@ class WindowShell {
   std::function<void(int key, int action, int modifiers)> on_key;
   /// A letter that was typed (Unicode), in its order among the keys.
   std::function<void(char32_t letter)> on_letter;
+  /// The mouse as it went, in pixels of the window; buttons 0 left, 1 right, 2 middle, after mirror_mouse; steps of the
+  /// wheel, positive away from the person. Modifiers as of on_key.
+  std::function<void(double x, double y, int modifiers)> on_pointer;
+  std::function<void(int button, bool down, int modifiers)> on_button;
+  std::function<void(double steps, int modifiers)> on_wheel;
   /// The window has the keys; before it has ever had them, too.
   [[nodiscard]] bool attended() const { return attended_; }
   /// The mouse's right and left button change places, for all of the window.

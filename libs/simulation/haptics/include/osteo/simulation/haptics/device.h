@@ -120,7 +120,7 @@ class GuidedHand {
 };
 
 /// The goal is set by another thread (the window), as seldom as it likes: the hand follows on its spring and turns the
-/// axis to the goal's at 4 rad/s, at 1 rad/s while bone pushes it with more than 0.1 N.
+/// axis to the goal's at 4 rad/s.
 class MouseDevice final : public Device {
  public:
   /// The first tick is there.
