@@ -32,7 +32,7 @@ int EditCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0];
   if (!output_exists(folder / "manifest.json")) {
     throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a prepared case: it has no manifest.json",
-                "make one with: osteo prepare CT -o " + folder.string());
+                "make one with: osteo prepare CT -o " + shell_path(folder));
   }
   if (!p.apply.empty()) {
     for (const char* const name : {"width", "height", "state_file"}) {

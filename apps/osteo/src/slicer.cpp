@@ -28,7 +28,7 @@ CasePipeline pipeline_of(const fs::path& folder, const std::string& named_source
   const auto recipe = read_recipe(folder);
   if (!recipe) {
     throw Error(ExitCode::no_input, "'" + folder.string() + "' is no case that remembers how it was made",
-                "make one with: osteo prepare CT -o " + folder.string());
+                "make one with: osteo prepare CT -o " + shell_path(folder));
   }
   if (!recipe->lost.empty())
     throw Error(ExitCode::no_input,
@@ -39,7 +39,7 @@ CasePipeline pipeline_of(const fs::path& folder, const std::string& named_source
     const auto path = pipeline_file(folder, recipe->pipeline_hash);
     if (!path)
       throw Error(ExitCode::no_input, "the pipeline file of the case is not known here, or was moved or changed",
-                  "run 'osteo prepare -o " + folder.string() + " --pipeline FILE' first");
+                  "run 'osteo prepare -o " + shell_path(folder) + " --pipeline FILE' first");
     made.text = read_text(*path);
   }
   fs::path source = named_source;

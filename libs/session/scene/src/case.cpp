@@ -298,7 +298,7 @@ Case load_case(const fs::path& folder) {
   }
   if (!fs::is_directory(folder) || !fs::exists(manifest)) {
     throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a prepared case: it has no manifest.json",
-                "make one with: osteo prepare CT -o " + folder.string());
+                "make one with: osteo prepare CT -o " + shell_path(folder));
   }
   Case result;
   result.folder = folder;
