@@ -6,6 +6,7 @@
 #include "commands/prepare.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/imaging/io/volume_io.h"
 

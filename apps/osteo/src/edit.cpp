@@ -9,6 +9,7 @@
 #include "commands/prepare.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/session/scene/case.h"
 #include "window_program.h"
 

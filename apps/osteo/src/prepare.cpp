@@ -11,6 +11,7 @@
 #include "osteo/app/cli/report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/imaging/dicom/verdict.h"
 #include "osteo/session/scene/approval.h"
 #include "osteo/session/scene/case.h"

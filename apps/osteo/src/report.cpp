@@ -9,6 +9,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/hospital/pacs/roles.h"
 #include "osteo/imaging/dicom/objects.h"
 #include "osteo/imaging/pipeline/pipeline.h"

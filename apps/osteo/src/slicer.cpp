@@ -13,6 +13,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/imaging/edit/document.h"
 #include "osteo/imaging/io/segments.h"
 #include "osteo/imaging/io/volume_io.h"

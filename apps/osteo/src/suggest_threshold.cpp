@@ -10,6 +10,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/imaging/dicom/import.h"
 #include "osteo/imaging/image/threshold.h"
 

@@ -13,6 +13,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/shell.h"
 
 namespace osteo {
 namespace {

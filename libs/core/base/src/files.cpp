@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cctype>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -361,19 +360,6 @@ std::map<std::string, std::string> hash_files(const fs::path& folder) {
     throw error_of(e);
   }
   return files;
-}
-
-std::string shell_path(const fs::path& path) {
-  const std::string text = path.string();
-  // Letters beyond ASCII are a shell's plain ones.
-  const bool plain = !text.empty() && text.front() != '~' && std::all_of(text.begin(), text.end(), [](unsigned char c) {
-    return c >= 0x80 || std::isalnum(c) != 0 ||
-           std::string_view("_-./+,:@%=~").find(static_cast<char>(c)) != std::string_view::npos;
-  });
-  if (plain) return text;
-  std::string quoted = "'";
-  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
 }
 
 double peak_memory_mb() {

@@ -15,6 +15,7 @@
 #include "node.h"
 #include "node_tables.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/shell.h"
 #include "telling.h"
 
 namespace osteo::inline hospital {

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <memory>
 
+#include "osteo/core/base/shell.h"
+
 namespace osteo::inline hospital {
 namespace {
 

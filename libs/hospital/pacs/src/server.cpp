@@ -27,6 +27,7 @@
 
 #include "node.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/hospital/pacs/watch.h"
 #include "osteo/hospital/pacs/web.h"
 

@@ -160,7 +160,7 @@ std::vector<Vec3> contour_of(const TriangleSoup& target, const Plane& a, const P
     if (!loop)
       throw Error(ExitCode::failed,
                   "the target has no closed section " + std::to_string(out.size() * 2) + " mm from resection plane a",
-                  "the surface must be closed, and the target there: 'osteo mesh-repair' closes holes");
+                  "the place of the plane must lie in the bone, in LPS mm, and the surface be closed ('osteo mesh-repair')");
     return *loop;
   };
   Sheet sheet(a.at, a.normal);

@@ -6,6 +6,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/core/report/sheet.h"
 #include "osteo/session/scene/case.h"

@@ -13,6 +13,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/imaging/pipeline/report_json.h"
 

@@ -35,10 +35,6 @@ void write_file(const fs::path& path, std::string_view content);
 void write_folder_atomically(const fs::path& path, const std::function<void(const fs::path& old)>& may_replace,
                              const std::function<void(const fs::path& temporary)>& fill);
 
-/// A path as a person copies it into a shell's line: in single quotes where it holds a blank or another character that
-/// a shell takes for its own.
-[[nodiscard]] std::string shell_path(const fs::path& path);
-
 /// The folder that an output of this name stands for: links followed, without "." and trailing slashes.
 /// Error(cannot_write) where there is a file or a link that leads nowhere, and for the folder one is in or one above
 /// it. It need not exist.
