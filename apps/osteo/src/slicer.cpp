@@ -146,7 +146,7 @@ int ExportSlicerCommand::run(const Params& p, cli::Invocation& io) {
            << " structures)\n";
   io.err << "  in 3D Slicer: drag the folder onto the window, edit in Segment Editor, save all into the same folder\n  "
             "then: osteo import-slicer "
-         << io.arguments[0] << ' ' << folder.string() << '\n';
+         << shell_path(io.arguments[0]) << ' ' << shell_path(folder) << '\n';
   return 0;
 }
 
