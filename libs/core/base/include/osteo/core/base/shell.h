@@ -5,8 +5,8 @@
 
 namespace osteo {
 
-/// A path as one word of a shell's line: in single quotes where it holds a blank or another character that a shell takes
-/// for its own.
+/// A path as one word of a shell's line: in single quotes where it holds a blank or another character that a shell
+/// takes for its own.
 [[nodiscard]] std::string shell_path(const std::filesystem::path& path);
 
 }  // namespace osteo
