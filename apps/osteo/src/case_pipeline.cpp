@@ -6,6 +6,7 @@
 #include "commands/prepare.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/imaging/io/volume_io.h"
 
@@ -170,10 +171,10 @@ CaseReport report_on(const fs::path& folder, const std::string& asked_for, const
     return report;
   } catch (const Error& e) {
     io.end_progress();
-    if (e.code() == ExitCode::cancelled) throw;
-    throw Error(
-        e.code(), std::string("the case is whole, but its report is not written: ") + e.what(),
-        e.advice().empty() ? "'osteo report " + folder.string() + "' writes it; --no-report does without" : e.advice());
+    if (e.code() == ExitCode::cancelled || !output_exists(folder / "manifest.json")) throw;
+    throw Error(e.code(), std::string("the case is whole, but its report is not written: ") + e.what(),
+                e.advice().empty() ? "'osteo report " + shell_path(folder) + "' writes it; --no-report does without"
+                                   : e.advice());
   }
 }
 

@@ -9,6 +9,7 @@
 #include "commands/prepare.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/session/scene/case.h"
 #include "window_program.h"
 
@@ -32,7 +33,7 @@ int EditCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0];
   if (!output_exists(folder / "manifest.json")) {
     throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a prepared case: it has no manifest.json",
-                "make one with: osteo prepare CT -o " + folder.string());
+                "make one with: osteo prepare CT -o " + shell_path(folder));
   }
   if (!p.apply.empty()) {
     for (const char* const name : {"width", "height", "state_file"}) {

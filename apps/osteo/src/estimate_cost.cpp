@@ -222,7 +222,7 @@ class SceneCosts {
         "balls and cylinders of less than " + format_number(std::ceil(least_mm * 10 - 1e-6) / 10) +
         " mm, tapers of less than " + format_number(std::ceil(2 * least_mm * 10 - 1e-6) / 10) +
         " mm, are small for voxels of " + format_number(rounded(voxel_mm, 1000)) +
-        " mm: force and its direction are coarse; prepare with a smaller --spacing, or a finer region of interest");
+        " mm: force and its direction are coarse; prepare with a smaller --spacing-mm, or a finer region of interest");
   }
 
   // A few seconds of drilling, without a clock.

@@ -11,7 +11,9 @@
 #include "osteo/app/cli/report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/imaging/dicom/verdict.h"
+#include "osteo/session/scene/approval.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/hand_over.h"
 
@@ -419,12 +421,15 @@ class Preparation {
     if (io_.common.quiet) return;
     io_.err << "case: " << folder_.string() << "  " << case_code(folder_) << "  (peak memory "
             << std::lround(peak_memory_mb()) << " MB)\n";
+    // Who signed it before would else not hear that the signature is gone.
+    if (const ApprovalNow now = approval_of(folder_); now.state == ApprovalState::outdated)
+      io_.err << "  " << now.words() << '\n';
     if (report_) {
-      io_.err << "  look at " << report_->html.string() << "\n  then: osteo approve " << folder_.string()
+      io_.err << "  look at " << report_->html.string() << "\n  then: osteo approve " << shell_path(folder_)
               << " --by NAME\n";
     } else {
-      io_.err << "  look at " << (folder_ / "preview.png").string() << "\n  then: osteo rehearse " << folder_.string()
-              << '\n';
+      io_.err << "  look at " << (folder_ / "preview.png").string() << "\n  then: osteo rehearse "
+              << shell_path(folder_) << '\n';
     }
   }
 
@@ -453,8 +458,8 @@ class Preparation {
 
 int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   if (p.out.empty())
-    throw Error(ExitCode::usage,
-                "where to? osteo prepare " + (io.arguments.empty() ? "SCAN" : io.arguments[0]) + " -o CASE");
+    throw Error(ExitCode::usage, "where to? osteo prepare " +
+                                     (io.arguments.empty() ? "SCAN" : shell_path(io.arguments[0])) + " -o CASE");
   const AuditTrail trail;
   const int done = Preparation(p, io).run();
   // What changes a case by hand ends here: 'edit' and its window, 'take-back', and who gives corrections.

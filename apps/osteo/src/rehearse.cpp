@@ -12,6 +12,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/core/data/json_vec.h"
 #include "osteo/display/view/world_view.h"
 #include "osteo/imaging/io/surface_io.h"
@@ -317,7 +318,7 @@ class HeadlessSession {
     if (s_.loop) report_loop(*s_.loop);
     io_.err << "session: " << session_.folder.string()
             << "  (before.png, after.png, surface.ply, summary.json)\n  again: osteo replay "
-            << session_.folder.string() << '\n';
+            << shell_path(session_.folder) << '\n';
   }
 
   void report_loop(const LoopStats& l) const {

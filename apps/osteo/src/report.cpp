@@ -9,6 +9,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/hospital/pacs/roles.h"
 #include "osteo/imaging/dicom/objects.h"
 #include "osteo/imaging/pipeline/pipeline.h"
@@ -104,6 +105,7 @@ int ApproveCommand::run(const Params& p, cli::Invocation& io) {
   if (p.withdraw && (!p.by.empty() || !p.note.empty()))
     throw Error(ExitCode::usage, "--withdraw takes the approval back: --by and --note do nothing beside it",
                 "leave them out");
+  if (!p.withdraw && p.by.empty()) throw Error(ExitCode::usage, "who approves it? --by NAME");
   const AuditTrail trail;
   require_role("approve", trail, io.context);
   // A case whose files are not what its manifest says is not to be approved.
@@ -115,7 +117,7 @@ int ApproveCommand::run(const Params& p, cli::Invocation& io) {
     // Looked at must have been the case as it is.
     if (output_exists(report_file(folder, ".html")) && !report_shows(folder)) {
       throw Error(ExitCode::failed, "the report of '" + folder.string() + "' shows the case before its last change",
-                  "make it again with 'osteo report " + folder.string() + "', look at it, then approve");
+                  "make it again with 'osteo report " + shell_path(folder) + "', look at it, then approve");
     }
     if (output_exists(report_file(folder, ".html")) && make_report(folder, io).says_other) {
       throw Error(ExitCode::failed,

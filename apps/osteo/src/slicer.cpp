@@ -13,6 +13,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/imaging/edit/document.h"
 #include "osteo/imaging/io/segments.h"
 #include "osteo/imaging/io/volume_io.h"
@@ -28,7 +29,7 @@ CasePipeline pipeline_of(const fs::path& folder, const std::string& named_source
   const auto recipe = read_recipe(folder);
   if (!recipe) {
     throw Error(ExitCode::no_input, "'" + folder.string() + "' is no case that remembers how it was made",
-                "make one with: osteo prepare CT -o " + folder.string());
+                "make one with: osteo prepare CT -o " + shell_path(folder));
   }
   if (!recipe->lost.empty())
     throw Error(ExitCode::no_input,
@@ -39,7 +40,7 @@ CasePipeline pipeline_of(const fs::path& folder, const std::string& named_source
     const auto path = pipeline_file(folder, recipe->pipeline_hash);
     if (!path)
       throw Error(ExitCode::no_input, "the pipeline file of the case is not known here, or was moved or changed",
-                  "run 'osteo prepare -o " + folder.string() + " --pipeline FILE' first");
+                  "run 'osteo prepare -o " + shell_path(folder) + " --pipeline FILE' first");
     made.text = read_text(*path);
   }
   fs::path source = named_source;
@@ -145,7 +146,7 @@ int ExportSlicerCommand::run(const Params& p, cli::Invocation& io) {
            << " structures)\n";
   io.err << "  in 3D Slicer: drag the folder onto the window, edit in Segment Editor, save all into the same folder\n  "
             "then: osteo import-slicer "
-         << io.arguments[0] << ' ' << folder.string() << '\n';
+         << shell_path(io.arguments[0]) << ' ' << shell_path(folder) << '\n';
   return 0;
 }
 

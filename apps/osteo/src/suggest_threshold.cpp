@@ -10,6 +10,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/imaging/dicom/import.h"
 #include "osteo/imaging/image/threshold.h"
 
@@ -114,7 +115,7 @@ int SuggestThresholdCommand::run(const Params& p, cli::Invocation& io) {
     io.out << line;
   }
   if (!g.doubt.empty()) return 0;
-  io.out << "\nosteo prepare " << io.arguments[0] << " -o CASE --preset cellular"
+  io.out << "\nosteo prepare " << shell_path(io.arguments[0]) << " -o CASE --preset cellular"
          << (p.series.empty() ? "" : " --series " + p.series)
          << (p.hu_offset == 0 ? "" : " --hu-offset " + format_number(p.hu_offset)) << '\n';
   return 0;

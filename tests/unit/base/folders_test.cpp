@@ -13,6 +13,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/shell.h"
 
 namespace osteo {
 namespace {
@@ -36,6 +37,19 @@ std::string message_of(const std::function<void()>& f, ExitCode code) {
 
 std::size_t entries(const fs::path& folder) {
   return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), {}));
+}
+
+// What a program proposes to type is one word for the shell, whatever the folder is called.
+TEST(ShellPath, IsOneWordForAShell) {
+  EXPECT_EQ(shell_path("out/case-1.b"), "out/case-1.b");
+  EXPECT_EQ(shell_path("Fälle/Größe"), "Fälle/Größe");
+  for (const std::string name : {"Fall 1", "Kopf (2)", "it's", "a;b", "$HOME", "~", "a*", "#1", "-x y", "a\nb"}) {
+    const fs::path heard = fs::temp_directory_path() / ("shell-" + std::to_string(getpid()));
+    const std::string line = "printf %s " + shell_path(name) + " > " + shell_path(heard);
+    ASSERT_EQ(std::system(line.c_str()), 0) << line;
+    EXPECT_EQ(read_text(heard), name) << line;
+    fs::remove(heard);
+  }
 }
 
 TEST(Folders, ReplacedWholeOrNotAtAll) {

@@ -1,5 +1,6 @@
 // What hands, shafts, screws and planes take of critical structures, against volumes in closed form.
 #include "osteo/simulation/haptics/structure_judge.h"
+#include "osteo/core/base/translate.h"
 
 #include <gtest/gtest.h>
 
@@ -175,6 +176,10 @@ TEST(StructureJudge, AGrazeIsContactAndBesideIsNothing) {
   EXPECT_EQ(reported_cut(nerve_and_dura(), CutBy::saw, both),
             "the saw cut through the dura (31 mm³); contact of the saw with the facial nerve");
   EXPECT_EQ(reported_cut(nerve_and_dura(), CutBy::saw, {}), "");
+  // The window's message of a harm, in the language of who reads it.
+  const InLanguage theirs(Language::german);
+  EXPECT_EQ(reported_cut(nerve_and_dura(), CutBy::saw, both),
+            "die Säge hat durchtrennt: „Dura“ (31 mm³); Kontakt (Säge): „N. facialis“");
 }
 
 TEST(StructureJudge, EventsAreOfOneTimeAndPlace) {

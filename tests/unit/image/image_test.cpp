@@ -7,6 +7,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/distance/binary_distance.h"
 #include "osteo/imaging/image/components.h"
+#include "osteo/imaging/image/crop.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/structures.h"
 #include "osteo/imaging/image/threshold.h"
@@ -302,6 +303,32 @@ TEST(Structures, AVolumeThatItsNameCannotHaveIsTold) {
   context.on_log([&](LogLevel, std::string_view text) { warned += text; });
   (void)name_structures(l, {.names = "1=facial nerve"}, nullptr, context);
   EXPECT_NE(warned.find("8000 mm3"), std::string::npos) << warned;
+}
+
+// A temporal bone of a scan that begins in the mastoid is told, and on which side; air at the scan's end is not.
+TEST(Crop, BoneBeyondTheScanIsTold) {
+  Image ct;
+  ct.frame.dims = {40, 40, 30};
+  ct.frame.origin_mm = {-20, -20, 100};
+  auto voxels = make_voxels<std::int16_t>(ct.frame.voxel_count());
+  for (int k = 0; k < 30; ++k) {
+    for (int j = 0; j < 40; ++j) {
+      for (int i = 0; i < 40; ++i)
+        voxels[ct.offset(i, j, k)] = k < 20 && std::abs(i - 20) < 5 && std::abs(j - 20) < 5 ? 900 : -1000;
+    }
+  }
+  ct.voxels = voxels;
+  EXPECT_EQ(bone_beyond_scan(ct, {{-10, -10, 78}, {10, 10, 150}}), "below by 22 mm") << "above lies air";
+  EXPECT_EQ(bone_beyond_scan(ct, {{-10, -10, 97}, {10, 10, 150}}), "") << "3 mm are no loss to speak of";
+  EXPECT_EQ(bone_beyond_scan(ct, {{-40, -40, 101}, {10, 10, 110}}), "") << "beside it is air";
+  // Upside down in the file, it is below all the same.
+  ct.frame.direction.column[2] = {0, 0, -1};
+  ct.frame.origin_mm.z = 129;
+  auto turned = make_voxels<std::int16_t>(ct.frame.voxel_count());
+  for (int k = 0; k < 30; ++k)
+    std::copy_n(ct.voxels.get() + ct.offset(0, 0, k), 1600, turned.get() + ct.offset(0, 0, 29 - k));
+  ct.voxels = turned;
+  EXPECT_EQ(bone_beyond_scan(ct, {{-10, -10, 78}, {10, 10, 150}}), "below by 22 mm");
 }
 
 }  // namespace

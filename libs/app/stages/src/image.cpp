@@ -38,6 +38,8 @@ std::vector<Data> CropStage::run(const Params& params, std::span<const Data> inp
   };
   context.report("centre_mm", text(centre));
   context.report("size_mm", text(size));
+  if (const std::string beyond = bone_beyond_scan(ct, box); params.region != Region::box && !beyond.empty())
+    context.warn("the scan ends within the region, where there is bone: " + beyond);
   Data cut_labels;
   if (labels != nullptr) cut_labels = crop(*labels, box);
   return {crop(ct, box), cut_labels};

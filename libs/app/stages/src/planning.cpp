@@ -164,7 +164,8 @@ StageInfo OutcomeStage::info() {
           {"J. MacKinnon, H. White, Some heteroskedasticity-consistent covariance matrix estimators with improved "
            "finite sample properties, Journal of Econometrics 1985",
            "D. Chetverikov et al., The trimmed iterative closest point algorithm, ICPR 2002"},
-      .example = "osteo outcome plan.json after.nrrd mandible.stl fibula.stl outcome.json --page-out outcome.html"};
+      .example =
+          "osteo outcome plan.json after.nrrd mandible.stl outcome.json --donor fibula.stl --page-out outcome.html"};
 }
 
 namespace {

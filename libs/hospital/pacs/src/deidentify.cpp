@@ -15,6 +15,7 @@
 #include "node.h"
 #include "node_tables.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/shell.h"
 #include "telling.h"
 
 namespace osteo::inline hospital {
@@ -40,7 +41,7 @@ Key key_of(const fs::path& file) {
   if (::stat(file.c_str(), &facts) != 0 || !S_ISREG(facts.st_mode))
     throw Error(ExitCode::usage, "the key '" + file.string() + "' is no file", kHow);
   if ((facts.st_mode & 077) != 0)
-    throw Error(ExitCode::usage, "others may read the key '" + file.string() + "'", "chmod 600 " + file.string());
+    throw Error(ExitCode::usage, "others may read the key '" + file.string() + "'", "chmod 600 " + shell_path(file));
   if (facts.st_size < 32 || facts.st_size > 4096)
     throw Error(ExitCode::usage,
                 "the key '" + file.string() + "' has " + std::to_string(facts.st_size) + " bytes, not 32 to 4096",

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <memory>
 
+#include "osteo/core/base/shell.h"
+
 namespace osteo::inline hospital {
 namespace {
 
@@ -23,7 +25,7 @@ std::string read_login(const fs::path& file) {
   require_readable(file);
   struct stat s {};
   if (::stat(file.c_str(), &s) != 0 || (s.st_mode & 077) != 0)
-    throw Error(ExitCode::usage, "others can read '" + file.string() + "'", "chmod 600 " + file.string());
+    throw Error(ExitCode::usage, "others can read '" + file.string() + "'", "chmod 600 " + shell_path(file));
   std::string text = read_text(file);
   while (text.ends_with('\n') || text.ends_with('\r')) text.pop_back();
   if (text.find(':') == std::string::npos || text.starts_with(':') || text.find('\n') != std::string::npos)

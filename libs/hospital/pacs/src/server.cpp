@@ -27,6 +27,7 @@
 
 #include "node.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/hospital/pacs/watch.h"
 #include "osteo/hospital/pacs/web.h"
 
@@ -128,7 +129,7 @@ void check_folder(Findings& all, const std::string& what, const fs::path& folder
   if (of_patients && there && (s.st_mode & 07) != 0)
     return say(FindingState::care,
                name + ": " + room + "; everybody on this machine may look into it, and it names patients",
-               "chmod o= " + folder.string());
+               "chmod o= " + shell_path(folder));
   if (std::abs(apart_s) > kClocksApart)
     return say(FindingState::care,
                name + ": its clock is " + format_number(std::abs(apart_s)) + " s " +
@@ -236,7 +237,7 @@ void check_tls(Findings& all, const ServerSetup& s) {
     static_cast<void>(pacs::tls_layer(s.tls, NET_ACCEPTOR));
     struct stat of {};
     if (::stat(s.tls.key.c_str(), &of) != 0 || (of.st_mode & 077) != 0)
-      throw Error(ExitCode::usage, "others can read " + in_quotes(s.tls.key), "chmod 600 " + s.tls.key);
+      throw Error(ExitCode::usage, "others can read " + in_quotes(s.tls.key), "chmod 600 " + shell_path(s.tls.key));
   });
 }
 

@@ -152,6 +152,43 @@ Box find_region(const Image& ct, const CropParams& p) {
   return {centre - size * 0.5, centre + size * 0.5};
 }
 
+std::string bone_beyond_scan(const Image& ct, const Box& box) {
+  constexpr double kMissingMm = 5, kBoneMm2 = 20;
+  constexpr int kBoneHu = 250;
+  // In the order of LPS, towards smaller values and towards larger ones.
+  constexpr std::array<std::array<const char*, 2>, 3> kSides{
+      {{"on the right", "on the left"}, {"in front", "behind"}, {"below", "above"}}};
+  const Image inside = crop(ct, box);
+  const Frame& f = inside.frame;
+  std::string said;
+  for (std::size_t a = 0; a < 3; ++a) {  // an index axis, and the one of the body that it follows
+    const Vec3 direction = f.direction.column[a];
+    std::size_t body = 0;
+    for (std::size_t b = 1; b < 3; ++b) {
+      if (std::abs(direction[b]) > std::abs(direction[body])) body = b;
+    }
+    for (const bool end : {false, true}) {
+      std::array<int, 3> at{};
+      at[a] = end ? f.dims[a] - 1 : 0;
+      const std::size_t high = end == (direction[body] > 0) ? 1 : 0;
+      const Vec3 face =
+          f.world_from_index({static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])});
+      const double missing = high == 1 ? box.hi_mm[body] - face[body] : face[body] - box.lo_mm[body];
+      if (missing <= kMissingMm) continue;
+      const std::size_t u = (a + 1) % 3, v = (a + 2) % 3;
+      std::size_t bone = 0;
+      for (at[u] = 0; at[u] < f.dims[u]; ++at[u]) {
+        for (at[v] = 0; at[v] < f.dims[v]; ++at[v])
+          bone += inside.voxels[inside.offset(at[0], at[1], at[2])] >= kBoneHu ? 1 : 0;
+      }
+      if (static_cast<double>(bone) * f.spacing_mm[u] * f.spacing_mm[v] < kBoneMm2) continue;
+      said += (said.empty() ? "" : ", ") + std::string(kSides[body][high]) + " by " +
+              format_number(std::round(missing)) + " mm";
+    }
+  }
+  return said;
+}
+
 Image crop(const Image& ct, const Box& box) {
   return cut(ct, box);
 }

@@ -158,9 +158,10 @@ std::vector<Vec3> contour_of(const TriangleSoup& target, const Plane& a, const P
   const auto outline = [&](const Sheet& sheet, Vec3 near) {
     auto loop = planning::outline_near(target, sheet, near, kNearMm);
     if (!loop)
-      throw Error(ExitCode::failed,
-                  "the target has no closed section " + std::to_string(out.size() * 2) + " mm from resection plane a",
-                  "the surface must be closed, and the target there: 'osteo mesh-repair' closes holes");
+      throw Error(
+          ExitCode::failed,
+          "the target has no closed section " + std::to_string(out.size() * 2) + " mm from resection plane a",
+          "the place of the plane must lie in the bone, in LPS mm, and the surface be closed ('osteo mesh-repair')");
     return *loop;
   };
   Sheet sheet(a.at, a.normal);

@@ -6,6 +6,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/core/report/sheet.h"
 #include "osteo/session/scene/case.h"
@@ -23,7 +24,8 @@ fs::path record_of(const fs::path& folder) {
 std::map<std::string, std::string> contents(const fs::path& folder) {
   const fs::path manifest = folder / "manifest.json";
   if (!fs::exists(manifest))
-    throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a prepared case: it has no manifest.json");
+    throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a prepared case: it has no manifest.json",
+                "make one with: osteo prepare CT -o " + shell_path(folder));
   std::map<std::string, std::string> hashes;
   for (const auto& [role, file] : parse_manifest(read_text(manifest), manifest.string())) {
     const fs::path path = folder / file.name;
@@ -142,7 +144,7 @@ bool withdraw_approval(const fs::path& folder) {
 void require_approval(const ApprovalNow& now, const fs::path& folder) {
   if (now.state == ApprovalState::valid) return;
   throw Error(ExitCode::failed, "'" + folder.string() + "': " + now.words() + ", and --require-approved was given",
-              "look at its report, then: osteo approve " + folder.string() + " --by NAME");
+              "look at its report, then: osteo approve " + shell_path(folder) + " --by NAME");
 }
 
 Json approval_json(const ApprovalNow& now) {

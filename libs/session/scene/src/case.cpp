@@ -13,6 +13,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/shell.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/imaging/pipeline/report_json.h"
 
@@ -298,7 +299,7 @@ Case load_case(const fs::path& folder) {
   }
   if (!fs::is_directory(folder) || !fs::exists(manifest)) {
     throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a prepared case: it has no manifest.json",
-                "make one with: osteo prepare CT -o " + folder.string());
+                "make one with: osteo prepare CT -o " + shell_path(folder));
   }
   Case result;
   result.folder = folder;

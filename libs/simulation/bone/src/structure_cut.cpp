@@ -7,6 +7,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/base/portable_math.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo::inline simulation {
 namespace {
@@ -191,12 +192,17 @@ std::string reported_structures_cut(const StructureMap& map, std::span<const Str
     if (c.mm3 <= 0) continue;
     // To two places below 10 mm3, else to whole ones.
     const double step = c.mm3 < 10 ? 0.01 : 1;
-    parts.push_back("the " + map.name_of(c.structure) + " (" +
-                    format_number(std::max(step, std::round(c.mm3 / step) * step)) + " mm³)");
+    parts.push_back(filled(tr("the {structure} ({mm3} mm³)"),
+                           {{"structure", tr(map.name_of(c.structure))},
+                            {"mm3", shown_figures(format_number(std::max(step, std::round(c.mm3 / step) * step)))}}));
   }
   std::string all;
-  for (std::size_t n = 0; n < parts.size(); ++n)
-    all += (n == 0 ? "" : n + 1 == parts.size() ? " and " : ", ") + parts[n];
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    const bool last = n > 0 && n + 1 == parts.size();
+    all = n == 0 ? parts[n]
+          : last ? filled(tr("{one} and {other}"), {{"one", all}, {"other", parts[n]}})
+                 : all + ", " + parts[n];
+  }
   return all;
 }
 

@@ -40,7 +40,7 @@ std::string too_small_for_voxels(const Burr& burr, double spacing_mm) {
          format_number(std::round(spacing_mm * 1000) / 1000) + " mm (radius " +
          format_number(std::round(voxels * 10) / 10) + " voxels): force and its direction are coarse; from " +
          format_number(std::floor(spacing_mm * voxels / kMinRadiusVoxels * 100 + 1e-6) / 100) +
-         " mm they are true: prepare with a smaller --spacing, or a finer region of interest where it drills";
+         " mm they are true: prepare with a smaller --spacing-mm, or a finer region of interest where it drills";
 }
 
 Removal::Removal(const BrickGrid& bone)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/bone/plates.h"
 #include "osteo/simulation/haptics/saw_slot.h"
@@ -48,16 +49,19 @@ std::string_view name_of(CutBy by) {
 }
 
 std::string reported_cut(const StructureMap& map, CutBy by, std::span<const StructureCut> cuts) {
-  const std::string what = "the " + std::string(name_of(by));
+  const std::string tool = tr(std::string(name_of(by)));
   std::string reported;
   if (const std::string through = reported_structures_cut(map, cuts); !through.empty())
-    reported = what + (by == CutBy::saw ? " cut through " : " went through ") + through;
+    reported = by == CutBy::saw ? filled(tr("the saw cut through {what}"), {{"what", through}})
+                                : filled(tr("the {tool} went through {what}"), {{"tool", tool}, {"what", through}});
   std::string met;
   for (const StructureCut& c : cuts) {
-    if (c.mm3 <= 0 && c.distance_mm <= 0) met += (met.empty() ? "the " : ", the ") + map.name_of(c.structure);
+    if (c.mm3 > 0 || c.distance_mm > 0) continue;
+    met += (met.empty() ? "" : ", ") + filled(tr("the {structure}"), {{"structure", tr(map.name_of(c.structure))}});
   }
   if (met.empty()) return reported;
-  return reported + (reported.empty() ? "" : "; ") + "contact of " + what + " with " + met;
+  return reported + (reported.empty() ? "" : "; ") +
+         filled(tr("contact of the {tool} with {what}"), {{"tool", tool}, {"what", met}});
 }
 
 double StructureJudge::Shape::distance_mm(Vec3 p) const {

@@ -28,6 +28,10 @@ struct Box {
 /// the scan does not reach the top of the head.
 [[nodiscard]] Box find_region(const Image& ct, const CropParams& params);
 
+/// Where bone goes on beyond the scan that the box reaches past by more than 5 mm: "below by 28 mm", the sides with
+/// commas between them. Empty: all bone of the box is in the scan.
+[[nodiscard]] std::string bone_beyond_scan(const Image& ct, const Box& box);
+
 /// The smallest block of whole voxels that covers the box. Error(usage) when the box lies outside.
 [[nodiscard]] Image crop(const Image& ct, const Box& box);
 [[nodiscard]] Labels crop(const Labels& labels, const Box& box);
