@@ -31,7 +31,7 @@ tables = [
         r"names\(HandFunction\) \{\n  return \{(.*?)\}",
         "enum",
     ),
-    ("libs/app/window/src/room_layout.h", r"names\(Layout\) \{\n  return \{(.*?)\}", "enum"),
+    ("libs/app/window/src/view_layout.h", r"names\(Layout\) \{\n  return \{(.*?)\}", "enum"),
     ("libs/assessment/evidence/src/score.cpp", r'words\.push_back\(\s*"([^"]*)"\)', str),
     ("libs/assessment/evidence/src/score.cpp", r'not_measured\(\s*"[^"]*", "([^"]*)"', str),
     ("libs/assessment/evidence/src/process.cpp", r'not_measured\(\s*\w+, "([^"]*)"', str),

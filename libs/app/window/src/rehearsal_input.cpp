@@ -33,7 +33,7 @@ void RehearsalWindow::camera_by_mouse() {
 
 void RehearsalWindow::mouse_and_keys() {
   const ImGuiIO& io = ImGui::GetIO();
-  const bool in_view = cuts_.scene().holds(io.MousePos.x, io.MousePos.y) && !room_.in_front();
+  const bool in_view = cuts_.scene().holds(io.MousePos.x, io.MousePos.y) && !main_view_.in_front();
   const auto seconds = static_cast<double>(io.DeltaTime);
   const CameraDevices devices = actions_.camera ? actions_.camera(scope_.lent()) : CameraDevices{};
   read_hand();
@@ -41,14 +41,14 @@ void RehearsalWindow::mouse_and_keys() {
   const ScopeMouse m = mouse();
   bool measured = false;
   if (in_view && !io.WantCaptureMouse) {
-    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) measured = room_.click(bone_seen(ray(m.x, m.y)), control_);
+    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) measured = main_view_.click(bone_seen(ray(m.x, m.y)), control_);
     const bool tilted = !measured && tilt_by_mouse(m);
     if (!measured && !tilted && !scope_.mouse(m, scope_.lent() && !devices.hand_mm, seconds)) use_mouse(m);
   }
   control_.look_from(view_axes());  // the mouse may have turned it
   const std::optional<Vec3> direction = in_view ? std::optional(ray(m.x, m.y)) : std::nullopt;
-  std::vector<Keyboard::Press> presses = keyboard_.frame(io.WantTextInput || room_.typing());
-  for (const Keyboard::Press& button : room_.take_presses()) presses.push_back(button);
+  std::vector<Keyboard::Press> presses = keyboard_.frame(io.WantTextInput || main_view_.typing());
+  for (const Keyboard::Press& button : main_view_.take_presses()) presses.push_back(button);
   for (const Keyboard::Press& press : presses) {
     do_press(press, direction);
     if (control_.failure() || ended_ || quit_) return;
@@ -57,14 +57,14 @@ void RehearsalWindow::mouse_and_keys() {
   control_.look_from(view_axes());
   if (const auto said = trial_.advance(scope_.control, seconds, actions_.folder() / "camera-trial.csv"))
     control_.say(*said);
-  const bool may_drill = in_view && !io.WantCaptureMouse && !measured && !room_.ruler().on() && !room_.before();
+  const bool may_drill = in_view && !io.WantCaptureMouse && !measured && !main_view_.ruler().on() && !main_view_.before();
   controller_.take(control_);
   HandInput hand = controller_.input(control_);
   hand.seconds = seconds;
   hand.pressed = ImGui::IsMouseDown(ImGuiMouseButton_Left) && !scope_.lent();
   hand.on_bone = may_drill;
   hand.pad = read_gamepad();
-  if (scope_.lent() || room_.before()) hand.drill = 0;
+  if (scope_.lent() || main_view_.before()) hand.drill = 0;
   control_.hold(hand);
 }
 
@@ -95,8 +95,8 @@ void RehearsalWindow::do_press(const Keyboard::Press& press, const std::optional
   if (long_work) ImGui::EndFrame();
   const std::optional<Vec3> bone = press.command == Command::mark ? bone_seen(direction) : std::nullopt;
   if (press.command == Command::before) {
-    show_before(!room_.before());
-  } else if (!room_.takes(press, control_, bone) && !camera_takes(press, direction) &&
+    show_before(!main_view_.before());
+  } else if (!main_view_.takes(press, control_, bone) && !camera_takes(press, direction) &&
              !control_.command(press, direction)) {
     command(press.command);
   }

@@ -16,7 +16,7 @@ namespace osteo::inline app {
 RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, const WindowOptions& options,
                                  const SparseGrid* hu, const WindowActions& actions, SoundOut& sound)
     : shell_(shell),
-      room_(shell, person),
+      main_view_(shell, person),
       control_(working(actions), options.tool, [this](Rehearsal& rehearsal) { show_bone(rehearsal); }),
       actions_(actions),
       sound_(sound),
@@ -38,7 +38,7 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
   painter_ = std::make_unique<ScenePainter>(render_window_, renderer_);
   painter_->quality().want(options.quality);
   make_scene();
-  way_view_ = std::make_unique<WayView>(renderer_, options.way);
+  way_view_ = std::make_unique<PathView>(renderer_, options.way);
   scope_.overview(StandardView::left, scope_scene(), false);
   control_.look_from(view_axes());
   control_.begin(options.from_case, false);
@@ -101,10 +101,10 @@ void RehearsalWindow::open() {
   render_window_->AddRenderer(renderer_);
   shell_.on_key = [this](int key, int action, int modifiers) {
     if (controller_.key(key, action)) return;
-    if (action != 0) room_.key(key, modifiers, action == 2);
+    if (action != 0) main_view_.key(key, modifiers, action == 2);
     keyboard_.on(key, static_cast<Keyboard::Event>(action), modifiers);
   };
-  shell_.on_letter = [this](char32_t letter) { room_.letter(letter); };
+  shell_.on_letter = [this](char32_t letter) { main_view_.letter(letter); };
   cuts_.create();
 }
 
@@ -123,7 +123,7 @@ void RehearsalWindow::show_bone(Rehearsal& rehearsal) {
   plan_and_looks(rehearsal);
   cuts_.begin(rehearsal, structures_.get(), regions_.get());
   before_view_.reset();
-  room_.renew();
+  main_view_.renew();
   work_ = std::make_unique<WorkDone>();  // the session that the last one followed is over
   rehearsal.add_counter(*work_);
   hints_.follow(rehearsal);
@@ -203,10 +203,10 @@ void RehearsalWindow::take_dropped() {
 }
 
 void RehearsalWindow::lay_out() {
-  RoomLayout room = room_.lay_out(ended_.has_value(), cuts_.wished_width());
-  review_.lay_out(room, static_cast<float>(shell_.em_pixels()));
-  monitor_.lay_out(room, static_cast<float>(shell_.em_pixels()), !ended_ && monitor_controller() != nullptr);
-  cuts_.lay_out(room);
+  ViewLayout layout = main_view_.lay_out(ended_.has_value(), cuts_.wished_width());
+  review_.lay_out(layout, static_cast<float>(shell_.em_pixels()));
+  monitor_.lay_out(layout, static_cast<float>(shell_.em_pixels()), !ended_ && monitor_controller() != nullptr);
+  cuts_.lay_out(layout);
   const ScreenBox& scene = cuts_.scene();
   scope_.area = {static_cast<double>(scene.x), static_cast<double>(scene.y),
                  std::max(1.0, static_cast<double>(scene.width)), std::max(1.0, static_cast<double>(scene.height))};
@@ -214,10 +214,10 @@ void RehearsalWindow::lay_out() {
 
 // The bone as it was: made when it is first asked for, kept while the session runs. Between two frames.
 void RehearsalWindow::show_before(bool on) {
-  room_.set_before(on);
+  main_view_.set_before(on);
   if (!on || before_view_) return;
   if (!actions_.world_at_begin) {
-    room_.set_before(false);
+    main_view_.set_before(false);
     control_.say(tr("how the bone was is not known"));
     return;
   }
@@ -227,7 +227,7 @@ void RehearsalWindow::show_before(bool on) {
                          [&](const Context& context) { mesh = surface_of(actions_.world_at_begin(context), context); });
     before_view_ = std::make_unique<BeforeView>(render_window_, mesh);
   } catch (const Error& e) {
-    room_.set_before(false);
+    main_view_.set_before(false);
     control_.say(e.what());
   }
 }
@@ -238,17 +238,17 @@ void RehearsalWindow::end_session() {
     quit_ = true;
     return;
   }
-  room_.set_before(false);
+  main_view_.set_before(false);
   if (!control_.end()) return;
   ended_ = end_facts(actions_.facts(), *work_);
-  room_.session_ended();
+  main_view_.session_ended();
   if (actions_.review) review_.begin(actions_.review);
 }
 
 void RehearsalWindow::show_end() {
   camera_by_mouse();
   EndChoice choice =
-      room_.draw_end(*ended_, {[this] { review_.draw_findings(); }, [this] { review_.draw_all_findings(); },
+      main_view_.draw_end(*ended_, {[this] { review_.draw_findings(); }, [this] { review_.draw_all_findings(); },
                                [this] { review_.draw_switch(); }, review_.found_serious()});
   for (const Keyboard::Press& press : keyboard_.frame(ImGui::GetIO().WantTextInput)) {
     if (review_.key(press)) continue;

@@ -10,7 +10,7 @@
 #include "osteo/app/window/tutor_now.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "palette.h"
-#include "room_layout.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 

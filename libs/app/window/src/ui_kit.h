@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "palette.h"
-#include "room_layout.h"
+#include "view_layout.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {

@@ -16,7 +16,7 @@
 #include <utility>
 
 #include "open_window.h"
-#include "room_layout.h"
+#include "view_layout.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {

@@ -14,7 +14,7 @@
 namespace osteo::inline app {
 
 /// Of what is around the bone.
-struct RoomState {
+struct ViewState {
   std::string layout;
   int em_pixels = 0;
   bool full_screen = false, asking = false, wheel = false, panel_keys = false, before = false, writing = false,
@@ -60,7 +60,7 @@ struct TutorState {
 
 struct WindowState {
   TutorState tutor;
-  RoomState room;
+  ViewState main_view;
   HandState motion;
   MonitorState monitor;
   std::uint64_t pictures = 0;  // turns of the loop

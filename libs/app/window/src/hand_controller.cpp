@@ -1,4 +1,4 @@
-#include "hand_desk.h"
+#include "hand_controller.h"
 
 #include <algorithm>
 

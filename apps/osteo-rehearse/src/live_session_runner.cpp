@@ -1,4 +1,4 @@
-#include "live_sitting.h"
+#include "live_session_runner.h"
 
 #include <utility>
 

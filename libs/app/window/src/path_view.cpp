@@ -1,4 +1,4 @@
-#include "way_view.h"
+#include "path_view.h"
 
 #include <vtkCellArray.h>
 #include <vtkPoints.h>
@@ -9,7 +9,7 @@
 
 namespace osteo::inline app {
 
-WayView::WayView(vtkRenderer* renderer, std::span<const Vec3> way_mm) : renderer_(renderer) {
+PathView::PathView(vtkRenderer* renderer, std::span<const Vec3> way_mm) : renderer_(renderer) {
   if (way_mm.size() < 2) return;
   auto points = vtkSmartPointer<vtkPoints>::New();
   auto lines = vtkSmartPointer<vtkCellArray>::New();
@@ -31,7 +31,7 @@ WayView::WayView(vtkRenderer* renderer, std::span<const Vec3> way_mm) : renderer
   renderer_->AddActor(actor_);
 }
 
-WayView::~WayView() {
+PathView::~PathView() {
   if (actor_) renderer_->RemoveActor(actor_);
 }
 

@@ -26,7 +26,7 @@ enum class Layout : int { operate, plan, review };
 /// The two that one works in, in turns.
 [[nodiscard]] Layout next_layout(Layout layout);
 
-struct RoomLayout {
+struct ViewLayout {
   Layout shown = Layout::operate;  ///< what there was room for
   std::string why;                 ///< when that is not what was asked for; else empty
   ScreenBox tray;                  ///< the strip of tools
@@ -45,13 +45,13 @@ inline constexpr double kPictureShare = 0.8;
 /// 34 em) it is operate that is shown, and says why. `cut_side`: of the cuts on the picture as the person dragged it,
 /// within limits; 0: the largest that leaves the picture its share, three where the window is 1200 of the design's
 /// pixels wide, else one.
-[[nodiscard]] RoomLayout lay_out(Layout wanted, int width, int height, float em_pixels, float cut_side = 0);
+[[nodiscard]] ViewLayout lay_out(Layout wanted, int width, int height, float em_pixels, float cut_side = 0);
 /// The panel of all that can be set, over the picture.
-[[nodiscard]] ScreenBox panel_of(const RoomLayout& room);
+[[nodiscard]] ScreenBox panel_of(const ViewLayout& layout);
 
 /// A strip above the state, as high as asked for but never more than half the pictures' height, for something that is
 /// shown for a while: the pictures make room, all else stays. Empty in review.
-[[nodiscard]] ScreenBox take_strip(RoomLayout& room, float high);
+[[nodiscard]] ScreenBox take_strip(ViewLayout& layout, float high);
 
 /// Height of text at scale 1.
 inline constexpr double kTextPixels = 16;

@@ -1,4 +1,4 @@
-#include "osteo/assessment/experiment/desk.h"
+#include "osteo/assessment/experiment/force_skill_controller.h"
 
 #include <utility>
 
@@ -23,14 +23,14 @@ ForceSkillController::ForceSkillController(std::filesystem::path experiment, Pro
 // The page before the next trial.
 void ForceSkillController::load() {
   if (next_ >= trials_.size()) {
-    page_ = DeskPage::done;
+    page_ = RunPage::done;
     return;
   }
   stimulus_ = std::make_unique<Stimulus>(stimulus_of(protocol_, trials_[next_]));
   record_.trial = trials_[next_];
   record_.training.clear();
   record_.test.clear();
-  page_ = trials_[next_].pause ? DeskPage::pause : retention_ ? DeskPage::before_test : DeskPage::before_training;
+  page_ = trials_[next_].pause ? RunPage::pause : retention_ ? RunPage::before_test : RunPage::before_training;
 }
 
 void ForceSkillController::begin(RunKind kind) {
@@ -41,7 +41,7 @@ void ForceSkillController::begin(RunKind kind) {
   ticks_->clear();
   ticks_->reserve(task_->ticks());
   tick_ = 0;
-  page_ = kind == RunKind::training ? DeskPage::training : DeskPage::test;
+  page_ = kind == RunKind::training ? RunPage::training : RunPage::test;
   running_.store(true, std::memory_order_release);
 }
 
@@ -56,33 +56,33 @@ Vec3 ForceSkillController::step(const DeviceSample& sample) noexcept {
 
 void ForceSkillController::go_on() {
   switch (page_) {
-    case DeskPage::pause:
-      page_ = retention_ ? DeskPage::before_test : DeskPage::before_training;
+    case RunPage::pause:
+      page_ = retention_ ? RunPage::before_test : RunPage::before_training;
       break;
-    case DeskPage::before_training:
+    case RunPage::before_training:
       begin(RunKind::training);
       break;
-    case DeskPage::feedback:
-      page_ = DeskPage::before_test;
+    case RunPage::feedback:
+      page_ = RunPage::before_test;
       break;
-    case DeskPage::before_test:
+    case RunPage::before_test:
       begin(RunKind::test);
       break;
-    case DeskPage::training:
-    case DeskPage::test:
-    case DeskPage::done:
+    case RunPage::training:
+    case RunPage::test:
+    case RunPage::done:
       break;
   }
 }
 
 void ForceSkillController::update() {
   if (running()) return;
-  if (page_ == DeskPage::training) {
+  if (page_ == RunPage::training) {
     // Sight of the own force behind the run, where it was not there in it.
     page_ = protocol_.feedback == Feedback::delayed && trials_[next_].training != Training::haptic
-                ? DeskPage::feedback
-                : DeskPage::before_test;
-  } else if (page_ == DeskPage::test) {
+                ? RunPage::feedback
+                : RunPage::before_test;
+  } else if (page_ == RunPage::test) {
     (void)save_trial(folder_, participant_, *stimulus_, record_);
     ++next_;
     load();
@@ -94,7 +94,7 @@ TaskView ForceSkillController::view() const {
 }
 
 sheet::Drawing ForceSkillController::drawing(double width, double height) const {
-  if (page_ != DeskPage::training && page_ != DeskPage::test) {
+  if (page_ != RunPage::training && page_ != RunPage::test) {
     sheet::Drawing nothing;
     nothing.width = width;
     nothing.height = height;
@@ -102,7 +102,7 @@ sheet::Drawing ForceSkillController::drawing(double width, double height) const 
   }
   DisplayState s;
   s.training = trial().training;
-  s.kind = page_ == DeskPage::training ? RunKind::training : RunKind::test;
+  s.kind = page_ == RunPage::training ? RunKind::training : RunKind::test;
   s.view = view();
   s.view.done = false;
   s.most_n = protocol_.scale ? protocol_.device_n : protocol_.peak_n;
@@ -113,7 +113,7 @@ sheet::Drawing ForceSkillController::drawing(double width, double height) const 
 }
 
 std::pair<std::string, std::string> ForceSkillController::words() const {
-  if (page_ == DeskPage::done) return {"All trials are done.", "Thank you. Escape closes the window."};
+  if (page_ == RunPage::done) return {"All trials are done.", "Thank you. Escape closes the window."};
   const Trial& t = trial();
   const std::string number = "Trial " + std::to_string(next_ + 1) + " of " + std::to_string(trials_.size());
   static constexpr std::array<const char*, kTrainings> kToDo{
@@ -121,15 +121,15 @@ std::pair<std::string, std::string> ForceSkillController::words() const {
       "The blue bar will show a force. Learn it, and press down as it says.",
       "The blue bar will show a force, the green one what you press. Keep both equally high, and learn the force."};
   switch (page_) {
-    case DeskPage::pause:
+    case RunPage::pause:
       return {"A break of " + std::to_string(static_cast<int>(protocol_.break_min)) + " minutes",
               "The space bar goes on."};
-    case DeskPage::before_training:
+    case RunPage::before_training:
       return {number + ": training " + short_name(t.training),
               std::string(kToDo[static_cast<std::size_t>(t.training)]) + " The space bar begins."};
-    case DeskPage::feedback:
+    case RunPage::feedback:
       return {number + ": what you pressed", "Blue: the force to learn. Green: yours. The space bar goes on."};
-    case DeskPage::before_test:
+    case RunPage::before_test:
       return {number + ": test",
               "Press the force that you have learned, while you are led along the path. The space bar begins."};
     default:

@@ -8,7 +8,7 @@
 #include "osteo/app/window/person_settings.h"
 #include "osteo/assessment/scoring/hint_reader.h"
 #include "osteo/session/scene/rehearsal.h"
-#include "room_layout.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 

@@ -13,7 +13,7 @@
 #include "osteo/app/window/window_shell.h"
 #include "osteo/simulation/bone/posture.h"
 #include "rehearsal_control.h"
-#include "room_panels.h"
+#include "view_panels.h"
 #include "steps.h"
 #include "work_done.h"
 
@@ -30,7 +30,7 @@ struct MachineFacts {
 };
 
 /// A rehearsal that runs, and how it is seen now.
-struct RoomScene {
+struct ViewScene {
   RehearsalControl& control;
   SoundOut& sound;
   TickRecord tick;
@@ -59,8 +59,8 @@ class MainView {
   MainView(WindowShell& shell, PersonSettings& person);
 
   /// For the window as it is now; `over`: the session has ended; `cut_side`: see lay_out().
-  const RoomLayout& lay_out(bool over, float cut_side);
-  [[nodiscard]] const RoomLayout& layout() const { return layout_; }
+  const ViewLayout& lay_out(bool over, float cut_side);
+  [[nodiscard]] const ViewLayout& layout() const { return layout_; }
   [[nodiscard]] Layout wanted() const { return wanted_; }
   /// Mouse and keys are for something in front of the bone.
   [[nodiscard]] bool in_front() const { return asking_ || wheel_.open() || writing_.has_value() || palette_.typing(); }
@@ -101,17 +101,17 @@ class MainView {
   bool click(std::optional<Vec3> bone, RehearsalControl& control);
 
   /// Between ImGui::NewFrame and Render.
-  void draw(const RoomScene& scene);
+  void draw(const ViewScene& scene);
   /// A caption over the picture, in the frame of a screenshot.
-  void draw_caption(const RoomScene& scene);
+  void draw_caption(const ViewScene& scene);
   /// In review.
   [[nodiscard]] EndChoice draw_end(const EndFacts& facts, const EndParts& parts);
   /// What a key means on that page.
   [[nodiscard]] static EndChoice end_choice(Command command);
 
  private:
-  void draw_panel(const RoomScene& scene);
-  void draw_cards(const RoomScene& scene, const HandFacts& hand);
+  void draw_panel(const ViewScene& scene);
+  void draw_cards(const ViewScene& scene, const HandFacts& hand);
   void move_focus(int by);
   void give_focus();
   void draw_palette(RehearsalControl& control);
@@ -119,17 +119,17 @@ class MainView {
   void show_wheel();
   static void lay_patient(Posture posture, RehearsalControl& control);
   void choose_theme(ThemeName name);
-  void draw_marks(const RoomScene& scene);
+  void draw_marks(const ViewScene& scene);
   void draw_note_field(RehearsalControl& control);
   void answer(int answer, RehearsalControl& control);
-  void see(const RoomScene& scene);
+  void see(const ViewScene& scene);
   [[nodiscard]] HandFacts hand_facts(const RehearsalControl& control, const SoundOut& sound,
                                      std::size_t undo_steps) const;
 
   WindowShell& shell_;
   PersonSettings& person_;
   Layout wanted_ = Layout::operate;
-  RoomLayout layout_;
+  ViewLayout layout_;
   Pressed pressed_;
   ToolWheel wheel_;
   FirstSteps steps_;

@@ -1,4 +1,4 @@
-#include "room.h"
+#include "main_view.h"
 
 #include <imgui.h>
 #include <imgui_internal.h>
@@ -32,7 +32,7 @@ MainView::MainView(WindowShell& shell, PersonSettings& person)
   lay_out(false, 0);
 }
 
-const RoomLayout& MainView::lay_out(bool over, float cut_side) {
+const ViewLayout& MainView::lay_out(bool over, float cut_side) {
   layout_ = osteo::lay_out(over ? Layout::review : wanted_, shell_.width(), shell_.height(),
                            static_cast<float>(shell_.em_pixels()), cut_side);
   return layout_;
@@ -256,7 +256,7 @@ HandFacts MainView::hand_facts(const RehearsalControl& control, const SoundOut& 
   return f;
 }
 
-void MainView::see(const RoomScene& scene) {
+void MainView::see(const ViewScene& scene) {
   StepFacts facts;
   std::uint64_t undone = 0;
   Rehearsal& rehearsal = scene.control.rehearsal();
@@ -291,7 +291,7 @@ void MainView::see(const RoomScene& scene) {
   steps_.see(seen_ = facts);
 }
 
-void MainView::draw(const RoomScene& scene) {
+void MainView::draw(const ViewScene& scene) {
   ImGuiIO& io = ImGui::GetIO();
   // ImGui moves its own cursor only while the keys are a part's of the window.
   if (focus_ != Focus::bone) {
@@ -372,7 +372,7 @@ void MainView::session_ended() {
 }
 
 // What belongs to the instrument in hand, and what comes next for a new user.
-void MainView::draw_cards(const RoomScene& scene, const HandFacts& hand) {
+void MainView::draw_cards(const ViewScene& scene, const HandFacts& hand) {
   const ScreenBox& view = layout_.view;
   const float taken = layout_.over[0].empty() ? 0 : view.right() - layout_.over[0].x;
   const char* const titles[] = {tr("Drill"), tr("Saw"), tr("Fragments"), tr("Plate")};
@@ -395,7 +395,7 @@ void MainView::draw_cards(const RoomScene& scene, const HandFacts& hand) {
   person_.values.first_steps = draw_next_step({view.x + beside, view.y, view.width - beside, view.height}, steps_);
 }
 
-void MainView::draw_panel(const RoomScene& scene) {
+void MainView::draw_panel(const ViewScene& scene) {
   RehearsalControl& control = scene.control;
   Rehearsal& rehearsal = control.rehearsal();
   const ScreenBox box = panel_of(layout_);
@@ -470,7 +470,7 @@ void MainView::draw_note_field(RehearsalControl& control) {
   if (answer != 0) writing_.reset();
 }
 
-void MainView::draw_marks(const RoomScene& scene) {
+void MainView::draw_marks(const ViewScene& scene) {
   ImDrawList* const draw = ImGui::GetBackgroundDrawList();
   const float e = em();
   const ScreenBox& v = layout_.view;
@@ -508,7 +508,7 @@ void MainView::draw_marks(const RoomScene& scene) {
   draw->PopClipRect();
 }
 
-void MainView::draw_caption(const RoomScene& scene) {
+void MainView::draw_caption(const ViewScene& scene) {
   ImDrawList* const draw = ImGui::GetForegroundDrawList();
   const float e = em();
   const ScreenBox& v = layout_.view;

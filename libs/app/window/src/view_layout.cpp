@@ -1,4 +1,4 @@
-#include "room_layout.h"
+#include "view_layout.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,15 +15,15 @@ constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kMinCut
 constexpr double kMinWideEm = 40, kMinHighEm = 26;
 
 // In the view's upper right corner, no larger than it has room for.
-void stack_over(RoomLayout& room, float side, std::size_t count) {
-  const float u = room.unit, gap = std::round(kCutGap * u), inset = std::round(kInset * u);
+void stack_over(ViewLayout& layout, float side, std::size_t count) {
+  const float u = layout.unit, gap = std::round(kCutGap * u), inset = std::round(kInset * u);
   const auto n = static_cast<float>(count);
-  side = std::min(side, (room.view.height - 2 * inset - gap * (n - 1) - kChoice * u) / n);
-  side = std::floor(std::min(side, 0.4F * room.view.width));
-  room.over = {};
+  side = std::min(side, (layout.view.height - 2 * inset - gap * (n - 1) - kChoice * u) / n);
+  side = std::floor(std::min(side, 0.4F * layout.view.width));
+  layout.over = {};
   if (side < 0.6F * kMinCut * u) return;
   for (std::size_t c = 0; c < count; ++c)
-    room.over[c] = {room.view.right() - inset - side, room.view.y + inset + static_cast<float>(c) * (side + gap), side,
+    layout.over[c] = {layout.view.right() - inset - side, layout.view.y + inset + static_cast<float>(c) * (side + gap), side,
                     side};
 }
 
@@ -33,15 +33,15 @@ Layout next_layout(Layout layout) {
   return layout == Layout::operate ? Layout::plan : Layout::operate;
 }
 
-double RoomLayout::picture_share(int width, int height) const {
+double ViewLayout::picture_share(int width, int height) const {
   float left = view.width * view.height;
   for (const ScreenBox& b : over) left -= b.width * b.height;
   return static_cast<double>(left) / (static_cast<double>(width) * height);
 }
 
-RoomLayout lay_out(Layout wanted, int width, int height, float em, float cut_side) {
+ViewLayout lay_out(Layout wanted, int width, int height, float em, float cut_side) {
   const auto w = static_cast<float>(width), h = static_cast<float>(height);
-  RoomLayout out;
+  ViewLayout out;
   const float u = out.unit = em / static_cast<float>(kTextPixels);
   // Whole pixels: textures and viewports have no others.
   const auto whole = [&](float n) { return std::round(n * u); };
@@ -75,29 +75,29 @@ RoomLayout lay_out(Layout wanted, int width, int height, float em, float cut_sid
   return out;
 }
 
-ScreenBox panel_of(const RoomLayout& room) {
-  const float top = room.view.y, bottom = room.state.empty() ? room.view.bottom() : room.state.y;
-  return {room.tray.right(), top, std::min(std::round(kPanel * room.unit), room.state.width), bottom - top};
+ScreenBox panel_of(const ViewLayout& layout) {
+  const float top = layout.view.y, bottom = layout.state.empty() ? layout.view.bottom() : layout.state.y;
+  return {layout.tray.right(), top, std::min(std::round(kPanel * layout.unit), layout.state.width), bottom - top};
 }
 
-ScreenBox take_strip(RoomLayout& room, float high) {
-  if (room.shown == Layout::review) return {};
-  const bool four = room.shown == Layout::plan;
-  const float top = room.view.y, bottom = four ? room.cuts[1].bottom() : room.view.bottom();
-  const float left = room.view.x, right = four ? room.cuts[0].right() : room.view.right();
+ScreenBox take_strip(ViewLayout& layout, float high) {
+  if (layout.shown == Layout::review) return {};
+  const bool four = layout.shown == Layout::plan;
+  const float top = layout.view.y, bottom = four ? layout.cuts[1].bottom() : layout.view.bottom();
+  const float left = layout.view.x, right = four ? layout.cuts[0].right() : layout.view.right();
   high = std::floor(std::min(high, (bottom - top) / 2));
   if (!(high > 0)) return {};
   if (four) {
     const float upper = std::floor((bottom - top - high) / 2), lower = bottom - top - high - upper;
-    room.view.height = room.cuts[0].height = upper;
-    for (ScreenBox* const cut : {&room.cuts[1], &room.cuts[2]}) {
+    layout.view.height = layout.cuts[0].height = upper;
+    for (ScreenBox* const cut : {&layout.cuts[1], &layout.cuts[2]}) {
       cut->y = top + upper;
       cut->height = lower;
     }
   } else {
-    room.view.height -= high;
-    const auto shown = std::count_if(room.over.begin(), room.over.end(), [](const ScreenBox& b) { return !b.empty(); });
-    if (shown > 0) stack_over(room, room.over[0].width, static_cast<std::size_t>(shown));
+    layout.view.height -= high;
+    const auto shown = std::count_if(layout.over.begin(), layout.over.end(), [](const ScreenBox& b) { return !b.empty(); });
+    if (shown > 0) stack_over(layout, layout.over[0].width, static_cast<std::size_t>(shown));
   }
   return {left, bottom - high, right - left, high};
 }

@@ -12,7 +12,7 @@
 
 namespace osteo::inline assessment::experiment {
 
-enum class DeskPage : int { before_training, training, feedback, before_test, test, pause, done };
+enum class RunPage : int { before_training, training, feedback, before_test, test, pause, done };
 
 /// Two threads: step() is the servo's, all else the window's.
 class ForceSkillController {
@@ -30,7 +30,7 @@ class ForceSkillController {
   /// Notices runs that have ended; saves the trial behind its test. Error(cannot_write). Call it once a picture.
   void update();
 
-  [[nodiscard]] DeskPage page() const { return page_; }
+  [[nodiscard]] RunPage page() const { return page_; }
   /// Trials done, and of how many.
   [[nodiscard]] std::size_t done() const { return next_; }
   [[nodiscard]] std::size_t trials() const { return trials_.size(); }
@@ -55,7 +55,7 @@ class ForceSkillController {
   bool retention_;
   std::vector<Trial> trials_;
   std::size_t next_ = 0;
-  DeskPage page_ = DeskPage::done;
+  RunPage page_ = RunPage::done;
   std::unique_ptr<Stimulus> stimulus_;
   TrialRecord record_;
   // The servo's while running_.

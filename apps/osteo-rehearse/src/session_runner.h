@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "hands.h"
-#include "live_sitting.h"
+#include "live_session_runner.h"
 #include "osteo/app/cli/command.h"
-#include "osteo/app/window/monitor_desk.h"
+#include "osteo/app/window/monitor_controller.h"
 #include "osteo/assessment/evidence/procedure.h"
 #include "osteo/network/tutor/playback.h"
 #include "osteo/network/wire/rehearsal_stream.h"

@@ -1,4 +1,4 @@
-#include "room_panels.h"
+#include "view_panels.h"
 
 #include <imgui.h>
 

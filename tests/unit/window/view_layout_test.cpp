@@ -7,7 +7,7 @@
 
 #include "marks.h"
 #include "palette.h"
-#include "room_layout.h"
+#include "view_layout.h"
 #include "state_facts.h"
 #include "steps.h"
 #include "tool_wheel.h"
@@ -21,7 +21,7 @@ struct Size {
 };
 constexpr Size kSizes[] = {{1024, 700}, {1280, 800}, {1920, 1080}, {2560, 1440}, {3840, 2160}};
 
-std::vector<ScreenBox> boxes_of(const RoomLayout& l) {
+std::vector<ScreenBox> boxes_of(const ViewLayout& l) {
   std::vector<ScreenBox> all;
   for (const ScreenBox& b : {l.tray, l.view, l.state, l.cuts[0], l.cuts[1], l.cuts[2], l.page}) {
     if (!b.empty()) all.push_back(b);
@@ -30,7 +30,7 @@ std::vector<ScreenBox> boxes_of(const RoomLayout& l) {
 }
 
 // Nothing outside, nothing twice, nothing left: whatever the size, the layout and the size of text.
-TEST(RoomLayout, BoxesTileTheWindow) {
+TEST(ViewLayout, BoxesTileTheWindow) {
   for (const Size s : kSizes) {
     for (const double by_hand : {0.6, 1.0, 1.7, 2.5}) {
       const auto em = static_cast<float>(
@@ -57,14 +57,14 @@ TEST(RoomLayout, BoxesTileTheWindow) {
 }
 
 // What is shown for a while takes its strip from the pictures alone, and together they still tile the window.
-TEST(RoomLayout, AStripTakesFromThePicturesAlone) {
+TEST(ViewLayout, AStripTakesFromThePicturesAlone) {
   for (const Size s : kSizes) {
     const auto em =
         static_cast<float>(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), 1, s.width, s.height));
     for (const Layout wanted : {Layout::operate, Layout::plan}) {
       for (const float high : {13.5F * em, 1e5F}) {
-        const RoomLayout before = lay_out(wanted, s.width, s.height, em);
-        RoomLayout l = before;
+        const ViewLayout before = lay_out(wanted, s.width, s.height, em);
+        ViewLayout l = before;
         const ScreenBox strip = take_strip(l, high);
         ASSERT_FALSE(strip.empty());
         EXPECT_EQ(l.tray, before.tray);
@@ -87,24 +87,24 @@ TEST(RoomLayout, AStripTakesFromThePicturesAlone) {
         EXPECT_GE(l.view.height * 2 + 2, before.view.height);
       }
     }
-    RoomLayout review = lay_out(Layout::review, s.width, s.height, em);
+    ViewLayout review = lay_out(Layout::review, s.width, s.height, em);
     EXPECT_TRUE(take_strip(review, 13 * em).empty());
   }
 }
 
 // The least size of all shows every layout at its usual text.
-TEST(RoomLayout, AllLayoutsFitTheSizesTheyAreFor) {
+TEST(ViewLayout, AllLayoutsFitTheSizesTheyAreFor) {
   for (const Size s : kSizes) {
     const auto em = static_cast<float>(
         std::lround(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), 1, s.width, s.height)));
     EXPECT_GE(em, 16);
     for (const Layout wanted : {Layout::operate, Layout::plan}) {
-      const RoomLayout l = lay_out(wanted, s.width, s.height, em);
+      const ViewLayout l = lay_out(wanted, s.width, s.height, em);
       EXPECT_EQ(l.shown, wanted) << s.width << ": " << l.why;
       EXPECT_TRUE(l.why.empty());
     }
     // Operate is for the picture, also with its cuts on it; and they are squares within it, apart from each other.
-    const RoomLayout l = lay_out(Layout::operate, s.width, s.height, em);
+    const ViewLayout l = lay_out(Layout::operate, s.width, s.height, em);
     EXPECT_GE(l.picture_share(s.width, s.height), kPictureShare) << s.width;
     EXPECT_LT(l.picture_share(s.width, s.height), 0.88) << s.width << ": cuts no smaller than they must be";
     EXPECT_EQ(l.over[1].empty(), s.width < 1200);
@@ -126,8 +126,8 @@ TEST(RoomLayout, AllLayoutsFitTheSizesTheyAreFor) {
   }
 }
 
-TEST(RoomLayout, WithoutRoomItSaysWhy) {
-  const RoomLayout l = lay_out(Layout::plan, 1024, 500, 16);
+TEST(ViewLayout, WithoutRoomItSaysWhy) {
+  const ViewLayout l = lay_out(Layout::plan, 1024, 500, 16);
   EXPECT_EQ(l.shown, Layout::operate);
   EXPECT_NE(l.why.find("no room"), std::string::npos);
   // However small: a window is dragged through all sizes.
@@ -138,7 +138,7 @@ TEST(RoomLayout, WithoutRoomItSaysWhy) {
   }
 }
 
-TEST(RoomLayout, TwoLayoutsInTurns) {
+TEST(ViewLayout, TwoLayoutsInTurns) {
   EXPECT_EQ(next_layout(Layout::operate), Layout::plan);
   EXPECT_EQ(next_layout(Layout::plan), Layout::operate);
   EXPECT_EQ(next_layout(Layout::review), Layout::operate);

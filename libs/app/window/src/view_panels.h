@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "keys.h"
-#include "room_layout.h"
+#include "view_layout.h"
 #include "second_hand.h"
 #include "state_facts.h"
 #include "steps.h"

@@ -12,12 +12,12 @@ class vtkRenderer;
 namespace osteo::inline app {
 
 /// Seen through bone too, faintly. Fewer than two points: nothing.
-class WayView {
+class PathView {
  public:
-  WayView(vtkRenderer* renderer, std::span<const Vec3> way_mm);
-  ~WayView();
-  WayView(const WayView&) = delete;
-  WayView& operator=(const WayView&) = delete;
+  PathView(vtkRenderer* renderer, std::span<const Vec3> way_mm);
+  ~PathView();
+  PathView(const PathView&) = delete;
+  PathView& operator=(const PathView&) = delete;
 
  private:
   vtkRenderer* renderer_;

@@ -1,4 +1,4 @@
-#include "hint_desk.h"
+#include "hint_controller.h"
 
 #include <imgui.h>
 

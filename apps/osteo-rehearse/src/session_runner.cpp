@@ -1,4 +1,4 @@
-#include "sitting.h"
+#include "session_runner.h"
 
 #include <unistd.h>
 

@@ -1,6 +1,6 @@
 // Panels drawn into memory: nothing is cut off, nothing lies outside, at any size of window and text. ImGui without a
 // screen.
-#include "room_panels.h"
+#include "view_panels.h"
 
 #include <gtest/gtest.h>
 #include <imgui_internal.h>
@@ -79,7 +79,7 @@ StateFacts longest() {
 TEST(Palette, LettersAndKeysStayInTheirOrder) {
   constexpr int kBackspace = 259;
   const Memory memory(1280, 800, 16);
-  const RoomLayout l = lay_out(Layout::operate, 1280, 800, 16);
+  const ViewLayout l = lay_out(Layout::operate, 1280, 800, 16);
   CommandPalette palette;
   const auto draw = [&] { frames([&] { EXPECT_EQ(palette.draw({0, 0, 1280, 800}, l.view), nullptr); }); };
   palette.letter('q');
@@ -119,7 +119,7 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
       SCOPED_TRACE(std::to_string(s.width) + " text " + std::to_string(em_pixels));
       const Memory memory(s.width, s.height, em_pixels);
       for (const Layout wanted : {Layout::operate, Layout::plan}) {
-        const RoomLayout l = lay_out(wanted, s.width, s.height, static_cast<float>(em_pixels));
+        const ViewLayout l = lay_out(wanted, s.width, s.height, static_cast<float>(em_pixels));
         const Message told{Message::Rank::harm, longest().warning};
         HandFacts hand;
         hand.second_hand = true;
@@ -142,7 +142,7 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
       }
       // What lies over the picture: within the window, and each command's name and keys whole.
       const ScreenBox whole{0, 0, static_cast<float>(s.width), static_cast<float>(s.height)};
-      const RoomLayout l = lay_out(Layout::operate, s.width, s.height, static_cast<float>(em_pixels));
+      const ViewLayout l = lay_out(Layout::operate, s.width, s.height, static_cast<float>(em_pixels));
       CommandPalette palette;
       palette.help();
       EXPECT_EQ(palette.shown(), CommandPalette::Shown::ten_keys);
@@ -227,7 +227,7 @@ TEST(Panels, FitInEveryLanguage) {
     SCOPED_TRACE(std::string(enum_names(language)[static_cast<std::size_t>(language)]));
     constexpr int kWidth = 1024, kHeight = 700;
     const Memory memory(kWidth, kHeight, kTextPixels);
-    const RoomLayout l = lay_out(Layout::operate, kWidth, kHeight, static_cast<float>(kTextPixels));
+    const ViewLayout l = lay_out(Layout::operate, kWidth, kHeight, static_cast<float>(kTextPixels));
     StateFacts f = longest();
     f.structure = "facial nerve";  // a name of the case's may be cut
     f.warning.clear();
@@ -312,7 +312,7 @@ TEST(Panels, EveryCharacterHasAGlyph) {
 // While drilling only letters and bars change: what is drawn where stays.
 TEST(Panels, NothingJumpsWhileDrilling) {
   const Memory memory(1280, 800, 16);
-  const RoomLayout l = lay_out(Layout::operate, 1280, 800, 16);
+  const ViewLayout l = lay_out(Layout::operate, 1280, 800, 16);
   Pressed pressed;
   const auto grounds = [&](const StateFacts& f) {
     frames([&] { draw_state(l.state, l.view, f, {}, pressed); });
@@ -344,7 +344,7 @@ TEST(Panels, NothingJumpsWhileDrilling) {
 // The bar fills as the structure comes nearer, in its colour; a contact fills the field.
 TEST(Panels, TheBarOfTheNearestStructureFills) {
   const Memory memory(1280, 800, 16);
-  const RoomLayout l = lay_out(Layout::operate, 1280, 800, 16);
+  const ViewLayout l = lay_out(Layout::operate, 1280, 800, 16);
   Pressed pressed;
   const auto painted = [&](Nearness nearness, double share) {
     StateFacts f = longest();
@@ -385,7 +385,7 @@ std::vector<Keyboard::Press> clicked(const ScreenBox& box, float x, const std::f
 
 TEST(Panels, AButtonGivesTheCommandOfItsKey) {
   const Memory memory(1024, 700, 16);
-  const RoomLayout l = lay_out(Layout::operate, 1024, 700, 16);
+  const ViewLayout l = lay_out(Layout::operate, 1024, 700, 16);
   const auto has = [](const std::vector<Keyboard::Press>& all, Command c) {
     return std::any_of(all.begin(), all.end(), [&](const Keyboard::Press& p) { return p.command == c; });
   };

@@ -1,4 +1,4 @@
-#include "osteo/app/window/monitor_desk.h"
+#include "osteo/app/window/monitor_controller.h"
 
 #include "monitor_screen.h"
 #include "osteo/session/scene/monitor_sound.h"
