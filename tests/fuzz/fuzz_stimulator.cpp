@@ -9,7 +9,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace osteo;
-  StimulatorDoor door(
+  StimulatorEndpoint door(
       "K7MX2QPA", [](const StimulatorSetting&) { __builtin_trap(); },  // nobody here has paired
       [] { return std::pair(StimulatorSetting{}, std::uint32_t{1}); });
   StimulatorLink link("AAAAAAAA");

@@ -15,10 +15,10 @@
 #include "osteo/core/base/translate.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/session/recording/session_reader.h"
-#include "osteo/session/scene/free_ways.h"
+#include "osteo/session/scene/path_planner.h"
 #include "osteo/simulation/bone/plates.h"
 #include "osteo/simulation/haptics/device_measure.h"
-#include "playback_words.h"
+#include "playback_text.h"
 
 namespace osteo {
 namespace {
@@ -130,7 +130,7 @@ HandGoal SessionRunner::begin(bool from_case, const HandView& view) {
   if (live_.joins()) return begin_joined(view);
   World world = world_at_begin(session, case_, options_.anatomy, io_.context);
   const HandPose pose =
-      FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
+      PathPlanner(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
   const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
   auto devices = hands_.make(start, near_the_bone(world, start));
   if (live_.hosts()) live_.add_hand(devices, options_);
@@ -234,7 +234,7 @@ HandGoal SessionRunner::begin_joined(const HandView& view) {
     throw Error(ExitCode::usage, "the host's case has other critical structures", "both need the same case, unchanged");
   World world = world_of_past(past, case_, options_.anatomy);
   const HandPose pose =
-      FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
+      PathPlanner(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
   const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
   std::unique_ptr<Device> own;
   if (live_.has_hand()) own = std::move(hands_.make(start, near_the_bone(world, start)).front());

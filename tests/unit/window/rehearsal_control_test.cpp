@@ -34,7 +34,7 @@ struct SessionRunner {
       if (fails_to_begin) throw Error(*std::exchange(fails_to_begin, {}));
       World world = (from_case ? first : last).copy();
       const HandPose pose =
-          FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
+          PathPlanner(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
       const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
       RehearsalOptions options;
       options.follow = {true, true, true};

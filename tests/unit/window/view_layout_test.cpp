@@ -7,10 +7,10 @@
 
 #include "marks.h"
 #include "palette.h"
-#include "view_layout.h"
 #include "state_facts.h"
 #include "steps.h"
 #include "tool_wheel.h"
+#include "view_layout.h"
 #include "work_done.h"
 
 namespace osteo {

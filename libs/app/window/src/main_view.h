@@ -13,8 +13,8 @@
 #include "osteo/app/window/window_shell.h"
 #include "osteo/simulation/bone/posture.h"
 #include "rehearsal_control.h"
-#include "view_panels.h"
 #include "steps.h"
+#include "view_panels.h"
 #include "work_done.h"
 
 namespace osteo::inline app {

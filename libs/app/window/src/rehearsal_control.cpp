@@ -128,17 +128,17 @@ HandPose RehearsalControl::hand_pose() const {
   return {from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm), from_floats(tick.device.axis)};
 }
 
-FreeWays RehearsalControl::free_ways(bool whole_tool) const {
+PathPlanner RehearsalControl::path_planner(bool whole_tool) const {
   ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_.plate(), tools_.plate_grip())
                                   : skin_of_instrument(static_cast<std::size_t>(instrument()), whole_tool);
-  std::optional<FreeWays> ways;
+  std::optional<PathPlanner> ways;
   rehearsal().look(
       [&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin), rehearsal().structures()); });
   return *std::move(ways);
 }
 
 bool RehearsalControl::outside() const {
-  const FreeWays ways = free_ways(true);
+  const PathPlanner ways = path_planner(true);
   return length(hand_pose().at_mm - ways.centre_mm()) > ways.radius_mm();
 }
 
@@ -171,7 +171,7 @@ void RehearsalControl::turn_handle(double seconds) {
   constexpr double kRadPerS = 4;
   const Vec3 wanted = wanted_axis();
   if (length(wanted - axis_) < 1e-3) return;
-  axis_ = free_ways(false).turned({hand_pose().at_mm, axis_}, wanted, kRadPerS * std::min(seconds, 0.2));
+  axis_ = path_planner(false).turned({hand_pose().at_mm, axis_}, wanted, kRadPerS * std::min(seconds, 0.2));
 }
 
 void RehearsalControl::send_goal(double seconds) {
@@ -267,7 +267,7 @@ void RehearsalControl::go_on_leading() {
     goal_.pedal = 0;
     device.lead(way);
   };
-  const auto waiting = [&](const FreeWays& ways) { return ways.waiting(towards_eye(), wanted_axis()); };
+  const auto waiting = [&](const PathPlanner& ways) { return ways.waiting(towards_eye(), wanted_axis()); };
   if (leading_->stage == Leading::Stage::letting_go) {
     if (lead_pause_.pulled()) return;
     const TickRecord now = rehearsal().latest();
@@ -280,10 +280,10 @@ void RehearsalControl::go_on_leading() {
       device.lead({});
       return;
     }
-    const FreeWays ways = free_ways(true);
+    const PathPlanner ways = path_planner(true);
     const HandPose from = hand_pose();
     if (leading_->seen_mm) {
-      const FreeWays::Found a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
+      const PathPlanner::Found a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
       const double gap = length(a.end.at_mm - *leading_->seen_mm) - burr().diameter_mm / 2;
       leading_->done = brought_text(plate_in_hand() ? Brought::plate
                                     : saw           ? Brought::saw
@@ -293,7 +293,7 @@ void RehearsalControl::go_on_leading() {
       go(Leading::Stage::on_the_way, a.way, a.end);
     } else {
       const HandPose to = waiting(ways);
-      const FreeWays::Found out = ways.way(from, to);
+      const PathPlanner::Found out = ways.way(from, to);
       leading_->done = out.way.put ? (saw ? tr("the saw was shut in; it was taken out")
                                           : tr("the drill was shut in; it was taken out"))
                                    : (saw ? tr("saw lifted out") : tr("drill lifted out"));
@@ -302,7 +302,7 @@ void RehearsalControl::go_on_leading() {
     }
   } else if (led == Led::blocked && leading_->stage == Leading::Stage::on_the_way) {
     leading_->done = saw ? tr("the saw was stuck; it was taken out") : tr("the drill was stuck; it was taken out");
-    const HandPose to = waiting(free_ways(true));
+    const HandPose to = waiting(path_planner(true));
     HandWay way;
     way.put = true;
     way.points[0] = {to.at_mm, to_floats(to.axis), false};

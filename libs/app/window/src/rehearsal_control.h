@@ -12,7 +12,7 @@
 #include "messages.h"
 #include "mouse_hand.h"
 #include "osteo/app/window/rehearsal_window.h"
-#include "osteo/session/scene/free_ways.h"
+#include "osteo/session/scene/path_planner.h"
 #include "second_hand.h"
 
 namespace osteo::inline app {
@@ -138,7 +138,7 @@ class RehearsalControl {
   [[nodiscard]] Vec3 wanted_axis() const;
   [[nodiscard]] HandPose hand_pose() const;
   [[nodiscard]] bool outside() const;
-  [[nodiscard]] FreeWays free_ways(bool whole_tool) const;
+  [[nodiscard]] PathPlanner path_planner(bool whole_tool) const;
   void turn_handle(double seconds);
   void next_burr(int by);
   void set_burr_share(int by);

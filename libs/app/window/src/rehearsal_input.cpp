@@ -57,7 +57,8 @@ void RehearsalWindow::mouse_and_keys() {
   control_.look_from(view_axes());
   if (const auto said = trial_.advance(scope_.control, seconds, actions_.folder() / "camera-trial.csv"))
     control_.say(*said);
-  const bool may_drill = in_view && !io.WantCaptureMouse && !measured && !main_view_.ruler().on() && !main_view_.before();
+  const bool may_drill =
+      in_view && !io.WantCaptureMouse && !measured && !main_view_.ruler().on() && !main_view_.before();
   controller_.take(control_);
   HandInput hand = controller_.input(control_);
   hand.seconds = seconds;

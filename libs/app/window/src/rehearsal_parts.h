@@ -24,6 +24,7 @@
 #include "hand_controller.h"
 #include "hint_controller.h"
 #include "looks.h"
+#include "main_view.h"
 #include "monitor_panel.h"
 #include "monitor_screen.h"
 #include "osteo/app/window/rehearsal_window.h"
@@ -31,9 +32,9 @@
 #include "osteo/display/view/planned_regions.h"
 #include "osteo/display/view/structures_view.h"
 #include "osteo/display/view/world_view.h"
+#include "path_view.h"
 #include "rehearsal_control.h"
 #include "review_scene.h"
-#include "main_view.h"
 #include "scene_painter.h"
 #include "scene_tools.h"
 #include "scope_input.h"
@@ -41,7 +42,6 @@
 #include "tool_touch.h"
 #include "trial_overlay.h"
 #include "tutor_panel.h"
-#include "path_view.h"
 #include "window_state.h"
 
 namespace osteo::inline app {

@@ -106,7 +106,8 @@ ViewState RehearsalWindow::view_state() const {
     r.next_step = main_view_.steps().steps()[static_cast<std::size_t>(next)].name();
   r.typing = main_view_.palette().typing();
   r.search = main_view_.palette().search().text();
-  if (const CommandRow* const row = main_view_.palette().search().row(); r.typing && row != nullptr) r.found = row->name;
+  if (const CommandRow* const row = main_view_.palette().search().row(); r.typing && row != nullptr)
+    r.found = row->name;
   static constexpr const char* kParts[] = {"bone", "strip", "card", "cuts", "state", "panel"};
   r.focus = kParts[static_cast<std::size_t>(main_view_.focus())];
   const ScreenBox& v = cuts_.scene();

@@ -249,7 +249,7 @@ void RehearsalWindow::show_end() {
   camera_by_mouse();
   EndChoice choice =
       main_view_.draw_end(*ended_, {[this] { review_.draw_findings(); }, [this] { review_.draw_all_findings(); },
-                               [this] { review_.draw_switch(); }, review_.found_serious()});
+                                    [this] { review_.draw_switch(); }, review_.found_serious()});
   for (const Keyboard::Press& press : keyboard_.frame(ImGui::GetIO().WantTextInput)) {
     if (review_.key(press)) continue;
     if (choice == EndChoice::none) choice = MainView::end_choice(press.command);

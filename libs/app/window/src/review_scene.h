@@ -10,8 +10,8 @@
 #include "osteo/display/view/world_view.h"
 #include "review_control.h"
 #include "review_panel.h"
-#include "view_layout.h"
 #include "scope_input.h"
+#include "view_layout.h"
 #include "window_state.h"
 
 class vtkActor;

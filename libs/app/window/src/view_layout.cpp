@@ -23,8 +23,8 @@ void stack_over(ViewLayout& layout, float side, std::size_t count) {
   layout.over = {};
   if (side < 0.6F * kMinCut * u) return;
   for (std::size_t c = 0; c < count; ++c)
-    layout.over[c] = {layout.view.right() - inset - side, layout.view.y + inset + static_cast<float>(c) * (side + gap), side,
-                    side};
+    layout.over[c] = {layout.view.right() - inset - side, layout.view.y + inset + static_cast<float>(c) * (side + gap),
+                      side, side};
 }
 
 }  // namespace
@@ -96,7 +96,8 @@ ScreenBox take_strip(ViewLayout& layout, float high) {
     }
   } else {
     layout.view.height -= high;
-    const auto shown = std::count_if(layout.over.begin(), layout.over.end(), [](const ScreenBox& b) { return !b.empty(); });
+    const auto shown =
+        std::count_if(layout.over.begin(), layout.over.end(), [](const ScreenBox& b) { return !b.empty(); });
     if (shown > 0) stack_over(layout, layout.over[0].width, static_cast<std::size_t>(shown));
   }
   return {left, bottom - high, right - left, high};

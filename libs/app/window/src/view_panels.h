@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "keys.h"
-#include "view_layout.h"
 #include "second_hand.h"
 #include "state_facts.h"
 #include "steps.h"
 #include "tool_wheel.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 

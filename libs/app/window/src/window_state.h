@@ -28,10 +28,10 @@ struct ViewState {
   double review_s = 0, review_mm3 = 0;  // the time that is shown, and the bone there is then
   std::vector<std::string> steps_done;  // of the first five minutes, by name
   std::string next_step;
-  bool typing = false;        // in the list of commands
-  std::string search, found;  // what, and the name of the row that is chosen
-  std::string focus;          // the part of the window that has the keys
-  std::array<float, 4> view{};        // x, y, width, height
+  bool typing = false;          // in the list of commands
+  std::string search, found;    // what, and the name of the row that is chosen
+  std::string focus;            // the part of the window that has the keys
+  std::array<float, 4> view{};  // x, y, width, height
 };
 
 /// Of the hand.

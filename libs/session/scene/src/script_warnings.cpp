@@ -52,28 +52,28 @@ double nearest_mm(const Script& script, const Box& box, double times) {
 
 }  // namespace
 
-std::vector<std::string> doubts_about(const Script& script, const World& world, bool dust) {
-  std::vector<std::string> doubts;
+std::vector<std::string> warnings_about(const Script& script, const World& world, bool dust) {
+  std::vector<std::string> warnings;
   const Box box = box_of(world);
   const double near = nearest_mm(script, box, 1), size = length(box.hi - box.lo);
   double extent = 0;
   for (const auto& w : script.waypoints)
     extent = std::max({extent, std::abs(w.at_mm.x), std::abs(w.at_mm.y), std::abs(w.at_mm.z)});
   if (extent < 0.01 * size && extent > 0 && nearest_mm(script, box, 1000) < kFarMm) {
-    doubts.push_back("all strokes lie within " + format_number(std::round(extent * 1000) / 1000) +
-                     " mm of the origin: are the script's points in metres? They are taken as millimetres");
+    warnings.push_back("all strokes lie within " + format_number(std::round(extent * 1000) / 1000) +
+                       " mm of the origin: are the script's points in metres? They are taken as millimetres");
   } else if (near > kFarMm) {
-    doubts.push_back("the burr never comes nearer than " + format_number(std::round(near)) +
-                     " mm to the bone: points are LPS mm of the case, whose bone lies between " +
-                     format_number(std::round(box.lo.x)) + ", " + format_number(std::round(box.lo.y)) + ", " +
-                     format_number(std::round(box.lo.z)) + " and " + format_number(std::round(box.hi.x)) + ", " +
-                     format_number(std::round(box.hi.y)) + ", " + format_number(std::round(box.hi.z)));
+    warnings.push_back("the burr never comes nearer than " + format_number(std::round(near)) +
+                       " mm to the bone: points are LPS mm of the case, whose bone lies between " +
+                       format_number(std::round(box.lo.x)) + ", " + format_number(std::round(box.lo.y)) + ", " +
+                       format_number(std::round(box.lo.z)) + " and " + format_number(std::round(box.hi.x)) + ", " +
+                       format_number(std::round(box.hi.y)) + ", " + format_number(std::round(box.hi.z)));
   }
   const auto cleans = [](const Script::TimedAction& d) { return row_of(d.action).moves_dust; };
   if (!dust && std::any_of(script.actions.begin(), script.actions.end(), cleans))
-    doubts.emplace_back(
+    warnings.emplace_back(
         "the script sucks off dust, pours water or turns the patient, but there is no dust: add --dust");
-  return doubts;
+  return warnings;
 }
 
 }  // namespace osteo::inline session

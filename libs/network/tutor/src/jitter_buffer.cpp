@@ -33,7 +33,7 @@ WireTimes ClockSync::stamp(std::int64_t now_us) const {
   return {now_us, last_sent_us_, last_sent_us_ == 0 ? 0 : now_us - last_heard_us_};
 }
 
-void Playout::put(const FarSample& s, std::uint64_t now, bool newest) noexcept {
+void JitterBuffer::put(const FarSample& s, std::uint64_t now, bool newest) noexcept {
   const std::uint64_t back = any_ && s.tick < newest_ ? newest_ - s.tick : 0;
   // What is far ahead of all before it begins again; what is older than the buffer is of no use.
   if (back >= kSlots / 2) return;
@@ -65,7 +65,7 @@ void Playout::put(const FarSample& s, std::uint64_t now, bool newest) noexcept {
   any_ = true;
 }
 
-DeviceSample Playout::read(std::uint64_t now, bool pulls) noexcept {
+DeviceSample JitterBuffer::read(std::uint64_t now, bool pulls) noexcept {
   if (!any_) {
     DeviceSample nobody;
     nobody.position_mm = {0, 0, 5000};
@@ -102,11 +102,11 @@ DeviceSample Playout::read(std::uint64_t now, bool pulls) noexcept {
 DeviceSample FarDevice::read(std::uint64_t tick, double, Vec3) noexcept {
   std::array<Item, 64> items;
   const std::size_t n = inbox_.pop(items);
-  for (std::size_t i = 0; i < n; ++i) playout_.put(items[i].sample, tick, items[i].newest);
-  const DeviceSample s = playout_.read(tick, pulls());
+  for (std::size_t i = 0; i < n; ++i) jitter_buffer_.put(items[i].sample, tick, items[i].newest);
+  const DeviceSample s = jitter_buffer_.read(tick, pulls());
   shown_.store(s);
   strength_.store(static_cast<double>(s.buttons & kLeadStrength) / double{kLeadStrength}, std::memory_order_relaxed);
-  buffer_.store(playout_.buffer_ticks(), std::memory_order_relaxed);
+  buffer_.store(jitter_buffer_.buffer_ticks(), std::memory_order_relaxed);
   return s;
 }
 

@@ -62,7 +62,7 @@ Json gaps_of(const World& world, const Fixture& f, const fs::path& csv) {
 
 }  // namespace
 
-std::string write_plan(const World& world, const fs::path& folder, const Context& context) {
+std::string write_result(const World& world, const fs::path& folder, const Context& context) {
   if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
     throw Error(ExitCode::cannot_write, "'" + folder.string() + "' exists already", "give the name of a new folder");
   std::error_code ec;

@@ -1,4 +1,4 @@
-#include "osteo/session/scene/hand_over.h"
+#include "osteo/session/scene/slicer_exchange.h"
 
 #include <algorithm>
 #include <array>
@@ -136,13 +136,13 @@ std::string known_as(const Segment& s) {
 // What comes back, each file by itself: segments in place, and which were there before.
 class Taker {
  public:
-  Taker(const CaseImages& images, const TakeBackOptions& options, const Context& context)
+  Taker(const CaseImages& images, const SlicerImportOptions& options, const Context& context)
       : images_(images), options_(options), context_(context) {}
 
-  TakenBack run(const fs::path& folder) {
+  SlicerImport run(const fs::path& folder) {
     read(folder);
     require_same_scan(folder);
-    TakenBack back;
+    SlicerImport back;
     if (bone_ != nullptr) take_bone(back);
     if (!structures_.empty() || structures_came_) take_structures(back);
     return back;
@@ -258,7 +258,7 @@ class Taker {
     return c;
   }
 
-  void take_bone(TakenBack& back) {
+  void take_bone(SlicerImport& back) {
     const Frame& frame = images_.ct.frame;
     const auto after = placed(*bone_, frame);
     std::vector<std::uint8_t> before(frame.voxel_count());
@@ -292,7 +292,7 @@ class Taker {
     return fit ? own : images_.ct.frame;
   }
 
-  void take_structures(TakenBack& back) {
+  void take_structures(SlicerImport& back) {
     const Frame& frame = frame_of_structures();
     const std::size_t n = frame.voxel_count();
     struct Old {
@@ -356,7 +356,7 @@ class Taker {
   }
 
   const CaseImages& images_;
-  const TakeBackOptions& options_;
+  const SlicerImportOptions& options_;
   const Context& context_;
   std::vector<Segment> all_;
   const Segment* bone_ = nullptr;
@@ -410,7 +410,7 @@ CaseImages images_of_case(const CasePipeline& from, const fs::path& case_folder,
   return images;
 }
 
-void hand_over(const CaseImages& images, const fs::path& folder) {
+void export_slicer(const CaseImages& images, const fs::path& folder) {
   const auto must_be_empty = [&](const fs::path& old) {
     throw Error(ExitCode::cannot_write, "'" + old.string() + "' is not empty",
                 "give a new folder: what was edited there is not written over");
@@ -423,8 +423,8 @@ void hand_over(const CaseImages& images, const fs::path& folder) {
   });
 }
 
-TakenBack take_back(const CaseImages& images, const fs::path& folder, const TakeBackOptions& options,
-                    const Context& context) {
+SlicerImport import_slicer(const CaseImages& images, const fs::path& folder, const SlicerImportOptions& options,
+                           const Context& context) {
   return Taker(images, options, context).run(folder);
 }
 

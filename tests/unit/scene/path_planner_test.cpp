@@ -11,7 +11,7 @@
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/structures.h"
 #include "osteo/imaging/image/threshold.h"
-#include "osteo/session/scene/free_ways.h"
+#include "osteo/session/scene/path_planner.h"
 #include "osteo/simulation/bone/burr.h"
 #include "osteo/simulation/bone/structure_map.h"
 #include "osteo/simulation/haptics/renderer.h"
@@ -135,7 +135,7 @@ class Hand {
 
 // From each view to what one sees there, beginning where the view before ended.
 void from_six_views(const char* name, const World& world, const StructureMap* structures = nullptr) {
-  const FreeWays ways(world, skin_of_instrument(kTool), structures);
+  const PathPlanner ways(world, skin_of_instrument(kTool), structures);
   const HandPose start = ways.waiting(normalized(kViews[0].eye), kViews[0].axis());
   Hand hand(world, start);
   hand.tick();
@@ -152,7 +152,7 @@ void from_six_views(const char* name, const World& world, const StructureMap* st
       if (!at) continue;
       EXPECT_EQ(hand.walk({}), Led::arrived);
       const auto began = std::chrono::steady_clock::now();
-      const FreeWays::Found a = ways.approach(hand.shown(), *at, normalized(aim - eye), view.axis());
+      const PathPlanner::Found a = ways.approach(hand.shown(), *at, normalized(aim - eye), view.axis());
       plan_s = std::max(plan_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
       const double from_s = hand.seconds();
       EXPECT_EQ(hand.walk(a.way), Led::arrived) << name << ", " << view.name << " " << across;
@@ -183,13 +183,13 @@ void from_six_views(const char* name, const World& world, const StructureMap* st
       name, walked, put, most_n, farthest, longest_s, plan_s);
 }
 
-TEST(FreeWays, FromSixViewsOnThePhantomsHead) {
+TEST(PathPlanner, FromSixViewsOnThePhantomsHead) {
   PhantomParams p;
   p.spacing_mm = 1.5;
   from_six_views("phantom head", world_of(make_phantom(p).ct, 500, 1));
 }
 
-TEST(FreeWays, FromSixViewsOnThePhantomsTemporalBone) {
+TEST(PathPlanner, FromSixViewsOnThePhantomsTemporalBone) {
   PhantomParams p;
   p.region = PhantomRegion::temporal;
   p.spacing_mm = 0.8;
@@ -197,7 +197,7 @@ TEST(FreeWays, FromSixViewsOnThePhantomsTemporalBone) {
 }
 
 // Structures cost little where they are, and change nothing where they are covered by bone.
-TEST(FreeWays, FromSixViewsWithStructuresAtRisk) {
+TEST(PathPlanner, FromSixViewsWithStructuresAtRisk) {
   PhantomParams p;
   p.region = PhantomRegion::temporal;
   p.spacing_mm = 0.8;
@@ -209,7 +209,7 @@ TEST(FreeWays, FromSixViewsWithStructuresAtRisk) {
   from_six_views("phantom temporal bone with structures", world_of(phantom.ct, 500, 0.8), &structures);
 }
 
-TEST(FreeWays, FromSixViewsOnAHead) {
+TEST(PathPlanner, FromSixViewsOnAHead) {
   const std::filesystem::path file =
       std::filesystem::path(OSTEO_SHARED_DATA) / "ct_head_unc/CThead_HU_256x256x113_derived.nrrd";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << "no " << file;
@@ -218,7 +218,7 @@ TEST(FreeWays, FromSixViewsOnAHead) {
   from_six_views("CT of a head", world_of(import_ct(file, p).image, 300, 1));
 }
 
-TEST(FreeWays, FromSixViewsOnASkull) {
+TEST(PathPlanner, FromSixViewsOnASkull) {
   const std::filesystem::path folder = std::filesystem::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom/S21570/S2030";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no " << folder;
   from_six_views("CT of a skull", world_of(import_ct(folder, {}).image, 300, 1));
@@ -226,7 +226,7 @@ TEST(FreeWays, FromSixViewsOnASkull) {
 
 // A slot too narrow for the head, a tunnel below it, and at one end a hole that lets it out: back along the tunnel,
 // then up.
-TEST(FreeWays, BackThroughATunnel) {
+TEST(PathPlanner, BackThroughATunnel) {
   const auto bone = [](Vec3 p) {
     const bool slot = std::abs(p.y) < 1.8 && p.x > -20 && p.x < 12 && p.z > -4;
     const bool tunnel = std::hypot(p.y, p.z + 4) < 3.2 && p.x > -20 && p.x < 12;
@@ -234,7 +234,7 @@ TEST(FreeWays, BackThroughATunnel) {
     return !(slot || tunnel || hole);
   };
   const World world = carved({24, 12, 12}, bone);
-  const FreeWays ways(world, skin_of_instrument(kTool));
+  const PathPlanner ways(world, skin_of_instrument(kTool));
   const HandPose inside{{8, 0, -4}, {0, 0, 1}};
   ASSERT_TRUE(ways.free(inside, 0.4));
   Hand hand(world, inside);
@@ -246,19 +246,19 @@ TEST(FreeWays, BackThroughATunnel) {
   EXPECT_LT(hand.most_n(), 1.0);
   // And in again, to the floor of the tunnel's far end, which only a slanting look can see: as near as it gets, never
   // harder.
-  const FreeWays::Found a = ways.approach(hand.pose(), {8, 0, -7}, {0, 0, -1}, {0, 0, 1});
+  const PathPlanner::Found a = ways.approach(hand.pose(), {8, 0, -7}, {0, 0, -1}, {0, 0, 1});
   EXPECT_EQ(hand.walk(a.way), Led::arrived);
   EXPECT_LT(hand.most_n(), 1.0);
 }
 
 // No way leads out of a closed shell: the tool is taken away and put where it was wanted.
-TEST(FreeWays, OutOfAClosedShellItIsPut) {
+TEST(PathPlanner, OutOfAClosedShellItIsPut) {
   const World world = carved({24, 24, 24}, [](Vec3 p) { return length(p) > 12 && length(p) < 20; });
-  const FreeWays ways(world, skin_of_instrument(kTool));
+  const PathPlanner ways(world, skin_of_instrument(kTool));
   // The shaft sticks in the shell: jammed, as the drill was that began at the origin.
   Hand hand(world, {{0, 0, 0}, normalized({0.6, 0.4, 0.6})});
   for (int t = 0; t < 1000; ++t) hand.tick();
-  const FreeWays::Found a = ways.approach(hand.pose(), {20, 0, 0}, {-1, 0, 0}, normalized({0.64, 0.62, 0.45}));
+  const PathPlanner::Found a = ways.approach(hand.pose(), {20, 0, 0}, {-1, 0, 0}, normalized({0.64, 0.62, 0.45}));
   EXPECT_TRUE(a.way.put);
   const double jammed_n = hand.force_n();
   EXPECT_EQ(hand.walk(a.way), Led::arrived);
@@ -267,9 +267,9 @@ TEST(FreeWays, OutOfAClosedShellItIsPut) {
 }
 
 // Pressed hard, drill on: the way begins by letting go.
-TEST(FreeWays, LiftsOutOfACavityWhileItDrills) {
+TEST(PathPlanner, LiftsOutOfACavityWhileItDrills) {
   const World world = carved({20, 20, 12}, [](Vec3 p) { return p.z < 4; });
-  const FreeWays ways(world, skin_of_instrument(kTool));
+  const PathPlanner ways(world, skin_of_instrument(kTool));
   const Vec3 axis = normalized({0.3, 0.2, 0.9});
   Hand hand(world, {{0, 0, 8}, axis});
   hand.push({0, 0, -1}, true, 6000);
@@ -277,7 +277,7 @@ TEST(FreeWays, LiftsOutOfACavityWhileItDrills) {
   EXPECT_GT(hand.removed_mm3(), 5);
   const double before = hand.force_n();
   hand.walk({});
-  const FreeWays::Found out = ways.way(hand.shown(), ways.waiting({0, 0, 1}, axis));
+  const PathPlanner::Found out = ways.way(hand.shown(), ways.waiting({0, 0, 1}, axis));
   EXPECT_FALSE(out.way.put) << "nothing is put aside";
   hand.device().lead(out.way);
   double last = before, removed = hand.removed_mm3();
@@ -295,9 +295,9 @@ TEST(FreeWays, LiftsOutOfACavityWhileItDrills) {
 }
 
 // What came into the way after it was found: the hand gives up where it is, and does not press.
-TEST(FreeWays, GivesUpWhereSomethingIsInTheWay) {
+TEST(PathPlanner, GivesUpWhereSomethingIsInTheWay) {
   const World empty = carved({20, 20, 20}, [](Vec3 p) { return length(p - Vec3{-15, 0, 0}) < 3; });
-  const FreeWays ways(empty, skin_of_instrument(kTool));
+  const PathPlanner ways(empty, skin_of_instrument(kTool));
   const HandPose a = ways.waiting({1, 0, 0}, {1, 0, 0});
   const World wall = carved({20, 20, 20}, [](Vec3 p) { return std::abs(p.x) < 4; });
   Hand hand(wall, a);
@@ -315,7 +315,7 @@ TEST(FreeWays, GivesUpWhereSomethingIsInTheWay) {
 }
 
 // The goal that was sent before a way, or while it went on, does not count after it.
-TEST(FreeWays, AfterAWayOnlyANewGoalCounts) {
+TEST(PathPlanner, AfterAWayOnlyANewGoalCounts) {
   const World world = carved({8, 8, 8}, [](Vec3 p) { return length(p) < 3; });
   Hand hand(world, {{30, 0, 0}, {1, 0, 0}});
   hand.tick();
@@ -333,9 +333,9 @@ TEST(FreeWays, AfterAWayOnlyANewGoalCounts) {
 }
 
 // The handle follows the view as far as bone lets its shaft.
-TEST(FreeWays, TurnsOnlyAsFarAsTheShaftIsFree) {
+TEST(PathPlanner, TurnsOnlyAsFarAsTheShaftIsFree) {
   const World world = carved({20, 20, 20}, [](Vec3 p) { return p.z < 0 && std::hypot(p.x, p.y) > 4; });
-  const FreeWays shaft(world, skin_of_instrument(kTool, false));
+  const PathPlanner shaft(world, skin_of_instrument(kTool, false));
   HandPose pose{{0, 0, -10}, {0, 0, 1}};
   for (int frame = 0; frame < 200; ++frame) pose.axis = shaft.turned(pose, {1, 0, 0}, 0.1);
   const double tilt = std::atan2(pose.axis.x, pose.axis.z);
@@ -348,18 +348,18 @@ TEST(FreeWays, TurnsOnlyAsFarAsTheShaftIsFree) {
 }
 
 // A burr that rests on the floor of a hole touches bone already: the shaft may not touch more.
-TEST(FreeWays, ATouchingToolTurnsOnlyAsFarAsItTouchesNoMore) {
+TEST(PathPlanner, ATouchingToolTurnsOnlyAsFarAsItTouchesNoMore) {
   const World world = carved({20, 20, 20}, [](Vec3 p) { return p.z < 0 && (std::hypot(p.x, p.y) > 4 || p.z < -12); });
-  const FreeWays whole(world, skin_of_instrument(kTool));
+  const PathPlanner whole(world, skin_of_instrument(kTool));
   const HandPose pose{{0, 0, -10.6}, {0, 0, 1}};
   ASSERT_FALSE(whole.free(pose, 0));
   const Vec3 axis = whole.turned(pose, {1, 0, 0}, 1);
   EXPECT_LT(std::acos(axis.z), 0.5);
 }
 
-TEST(FreeWays, WaitsInFreeAirWhereverOneLooksFrom) {
+TEST(PathPlanner, WaitsInFreeAirWhereverOneLooksFrom) {
   const World world = carved({30, 10, 20}, [](Vec3) { return true; });
-  const FreeWays ways(world, skin_of_instrument(kTool));
+  const PathPlanner ways(world, skin_of_instrument(kTool));
   for (const View& view : kViews) {
     const HandPose pose = ways.waiting(normalized(view.eye), view.axis());
     EXPECT_TRUE(ways.free(pose, 2));
@@ -405,48 +405,48 @@ double least_clearance(const StructureMap& structures, Hand& hand, const HandWay
 }
 
 // A pit with a nerve laid bare across it, above the burr: past the nerve, not through it.
-TEST(FreeWays, KeepClearOfANerveThatHasBeenLaidBare) {
+TEST(PathPlanner, KeepClearOfANerveThatHasBeenLaidBare) {
   const World world =
       carved({24, 24, 12}, [](Vec3 p) { return p.z < 4 && (std::abs(p.x) > 14 || std::abs(p.y) > 9 || p.z < -8); });
   const StructureMap nerve = structures_of({24, 24, 14}, [](Vec3 p) { return std::hypot(p.x, p.z) < 1.2; });
   const HandPose inside{{0, 0, -5}, normalized({0.7, 0, 0.7})};
   const ToolSkin skin = skin_of_instrument(kTool);
-  const FreeWays of_bone(world, skin), ways(world, skin, &nerve);
+  const PathPlanner of_bone(world, skin), ways(world, skin, &nerve);
   ASSERT_TRUE(of_bone.free(inside, 0.4));
   ASSERT_TRUE(ways.free(inside, 0.4));
   EXPECT_FALSE(ways.free({{0, 0, 0}, {0, 1, 0}}, -0.3));  // on the nerve, in free air
   const HandPose outside = of_bone.waiting({0, 0, 1}, normalized({0.7, 0, 0.7}));
-  const auto clearance = [&](const FreeWays& w) {
+  const auto clearance = [&](const PathPlanner& w) {
     Hand hand(world, inside);
     hand.tick();
-    const FreeWays::Found out = w.way(inside, outside);
+    const PathPlanner::Found out = w.way(inside, outside);
     EXPECT_FALSE(out.way.put);
     EXPECT_FALSE(out.past_structures);
     return least_clearance(nerve, hand, out.way);
   };
   EXPECT_LT(clearance(of_bone), 0.2);  // as it was: the nerve is brushed
-  EXPECT_GT(clearance(ways), FreeWays::kClearOfStructuresMm - 0.2);
+  EXPECT_GT(clearance(ways), PathPlanner::kClearOfStructuresMm - 0.2);
 
   // And down to bone behind the nerve: to a place beside the line of sight's end that is clear of it.
   Hand hand(world, outside);
   hand.tick();
-  const FreeWays::Found down = ways.approach(hand.pose(), {5, 0, -8}, {0, 0, -1}, {0, 0, 1});
+  const PathPlanner::Found down = ways.approach(hand.pose(), {5, 0, -8}, {0, 0, -1}, {0, 0, 1});
   EXPECT_FALSE(down.way.put);
   EXPECT_FALSE(down.past_structures);
   EXPECT_LT(length(down.end.at_mm - Vec3{5, 0, -8}), 3.5);
-  EXPECT_GT(least_clearance(nerve, hand, down.way), FreeWays::kClearOfStructuresMm - 0.2);
+  EXPECT_GT(least_clearance(nerve, hand, down.way), PathPlanner::kClearOfStructuresMm - 0.2);
 }
 
 // A membrane over the whole mouth of a pit: the way leads through it, and that is told.
-TEST(FreeWays, PastAStructureOnlyWhereNothingElseIsFree) {
+TEST(PathPlanner, PastAStructureOnlyWhereNothingElseIsFree) {
   const World world = carved({16, 16, 12}, [](Vec3 p) { return std::abs(p.x) > 7 || std::abs(p.y) > 7 || p.z < -8; });
   const StructureMap membrane = structures_of({20, 20, 14}, [](Vec3 p) { return std::abs(p.z - 4) < 0.6; });
   // Held upright, so that the shaft alone goes through.
   const HandPose inside{{0, 0, -4}, {0, 0, 1}};
-  const FreeWays ways(world, skin_of_instrument(kTool), &membrane);
+  const PathPlanner ways(world, skin_of_instrument(kTool), &membrane);
   const HandPose outside = ways.waiting({0, 0, 1}, {0, 0, 1});
   EXPECT_TRUE(ways.free(outside, 2));
-  const FreeWays::Found out = ways.way(inside, outside);
+  const PathPlanner::Found out = ways.way(inside, outside);
   EXPECT_TRUE(out.past_structures);
   EXPECT_FALSE(out.way.put);
   Hand hand(world, inside);

@@ -2,7 +2,7 @@
 
 #include "osteo/core/rt/loop.h"
 #include "osteo/network/wire/stimulator_link.h"
-#include "outlets.h"
+#include "wire_sinks.h"
 
 namespace osteo::inline network {
 namespace {
@@ -11,9 +11,9 @@ std::string numbered(const char* name, std::size_t hand) {
   return hand == 0 ? name : name + std::to_string(hand + 1);
 }
 
-class IgtlOutlet final : public WireOutlet {
+class IgtlSink final : public WireSink {
  public:
-  explicit IgtlOutlet(const StreamTarget& target)
+  explicit IgtlSink(const StreamTarget& target)
       : stimulator_(target.stimulator), server_(wire_address(target.address), [](std::uint64_t dropped) {
           return igtl_status("Osteotome", 0, IgtlStatus::overflow, static_cast<std::int64_t>(dropped), "dropped",
                              std::to_string(dropped) + " messages were dropped: this listener did not keep up");
@@ -52,12 +52,12 @@ class IgtlOutlet final : public WireOutlet {
     server_.send(
         igtl_string("NerveEvent", static_cast<double>(e.sample) / MonitorSetup::kRateHz, event_json(e, words)));
   }
-  void let_stimulate(const std::shared_ptr<StimulatorDoor>& door) override {
+  void let_stimulate(const std::shared_ptr<StimulatorEndpoint>& endpoint) override {
     if (!stimulator_) return;
-    server_.answer({[door](std::uint64_t client, const IgtlMessage& m) {
-                      return door->hear(client, m, static_cast<double>(monotonic_ns()) / 1e9);
+    server_.answer({[endpoint](std::uint64_t client, const IgtlMessage& m) {
+                      return endpoint->hear(client, m, static_cast<double>(monotonic_ns()) / 1e9);
                     },
-                    [door](std::uint64_t client) { door->gone(client); }});
+                    [endpoint](std::uint64_t client) { endpoint->gone(client); }});
   }
   void end(double at_s, const std::string& json) override {
     server_.send(igtl_string("SessionEnd", at_s, json));
@@ -82,8 +82,8 @@ class IgtlOutlet final : public WireOutlet {
 
 }  // namespace
 
-std::unique_ptr<WireOutlet> make_igtl_outlet(const StreamTarget& target) {
-  return std::make_unique<IgtlOutlet>(target);
+std::unique_ptr<WireSink> make_igtl_sink(const StreamTarget& target) {
+  return std::make_unique<IgtlSink>(target);
 }
 
 }  // namespace osteo::inline network

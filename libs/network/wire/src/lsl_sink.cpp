@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "osteo/core/base/error.h"
-#include "outlets.h"
+#include "wire_sinks.h"
 
 namespace osteo::inline network {
 namespace {
@@ -68,7 +68,7 @@ class Library {
 
 // Samples are stamped by LSL's clock as of the session's beginning, so that its time and that of others agree. The
 // library's own threads send; what nobody takes within kBufferedS it drops.
-class LslOutlet final : public WireOutlet {
+class LslSink final : public WireSink {
  public:
   void begin(const WireMonitor& monitor) override {
     channels_ = monitor.labels.size();
@@ -88,7 +88,7 @@ class LslOutlet final : public WireOutlet {
     signal_ = lsl_.create_outlet(info, 0, kBufferedS);
     lsl_.destroy_info(info);
   }
-  ~LslOutlet() override {
+  ~LslSink() override {
     // What the library has not sent yet is lost with the outlet, and it does not tell when it has: time for the last
     // blocks.
     bool heard = false;
@@ -138,8 +138,8 @@ class LslOutlet final : public WireOutlet {
 
 }  // namespace
 
-std::unique_ptr<WireOutlet> make_lsl_outlet() {
-  return std::make_unique<LslOutlet>();
+std::unique_ptr<WireSink> make_lsl_sink() {
+  return std::make_unique<LslSink>();
 }
 
 }  // namespace osteo::inline network

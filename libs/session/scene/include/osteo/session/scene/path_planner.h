@@ -31,13 +31,13 @@ struct ToolSkin {
 /// Looks at bone as it is now; bodies that change meanwhile are seen in part as they were. Critical structures are in
 /// the way like bone, with kClearOfStructuresMm between them and the tool; where a tool is nearer at the beginning it
 /// may not come nearer. Soft tissue is not looked at. One thread.
-class FreeWays {
+class PathPlanner {
  public:
   /// More than the error of the structures' faces (StructureMap) with voxels of a millimetre.
   static constexpr double kClearOfStructuresMm = 0.5;
 
   /// Keeps the bodies of the world, not the world; `structures`, where there are some, must outlive it. O(bricks).
-  FreeWays(const World& world, ToolSkin tool, const StructureMap* structures = nullptr);
+  PathPlanner(const World& world, ToolSkin tool, const StructureMap* structures = nullptr);
 
   /// The ball that all bone lies in.
   [[nodiscard]] Vec3 centre_mm() const { return centre_mm_; }

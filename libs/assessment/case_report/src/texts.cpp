@@ -1,4 +1,4 @@
-#include "words.h"
+#include "texts.h"
 
 #include <algorithm>
 #include <cmath>

@@ -40,7 +40,7 @@ struct CasePipeline {
 
 /// ct.nrrd, bone.seg.nrrd and, where there are any, structures.seg.nrrd. Atomic as a folder, which must be new or
 /// empty. Each segment carries kScanTag. Nothing in them names the patient, but a CT of a head shows a face.
-void hand_over(const CaseImages& images, const std::filesystem::path& folder);
+void export_slicer(const CaseImages& images, const std::filesystem::path& folder);
 
 /// What became of one structure.
 struct SegmentChange {
@@ -50,14 +50,14 @@ struct SegmentChange {
   [[nodiscard]] bool changed() const { return added_mm3 > 0 || removed_mm3 > 0 || name != was; }
 };
 
-struct TakenBack {
+struct SlicerImport {
   std::optional<Labels> bone;        ///< on the lattice of the CT; none when it did not come back
   std::optional<Labels> structures;  ///< none when no file of structures came back
   std::vector<SegmentChange> changes;
   bool bone_changed = false, structures_changed = false;
 };
 
-struct TakeBackOptions {
+struct SlicerImportOptions {
   bool match_by_position = false;  ///< also what bears no mark, if it lies where the case's bone lies
 };
 
@@ -66,8 +66,8 @@ struct TakeBackOptions {
 /// of the case. A colour that was changed counts as no change. Errors, each with its reason: corrupt for segments of
 /// another scan, without any proof, or that lie elsewhere (less than half of the bone where it was, or a structure
 /// outside the CT); no_input without a file. Warns of what was resampled, overlaps or sticks out.
-[[nodiscard]] TakenBack take_back(const CaseImages& images, const std::filesystem::path& folder,
-                                  const TakeBackOptions& options = {}, const Context& context = {});
+[[nodiscard]] SlicerImport import_slicer(const CaseImages& images, const std::filesystem::path& folder,
+                                         const SlicerImportOptions& options = {}, const Context& context = {});
 
 /// The pipeline with kCorrectedBone in place of the stage that made the mask; its fixed threshold stays that of the
 /// boundary. It names the file by the variable "case" alone, so that no folder's name gets into the case, and the case

@@ -4,7 +4,7 @@
 #include <bit>
 
 #include "osteo/network/tutor/udp.h"
-#include "outlets.h"
+#include "wire_sinks.h"
 
 namespace osteo::inline network {
 namespace {
@@ -38,9 +38,9 @@ bool is_loopback(const UdpPeer& p) {
 
 // Times are samples of 30 kHz from the session's beginning (the system says so: its clock is 30,000 Hz). What the
 // system cannot send at once is lost, and counted; a stream of packets has no listeners to know of.
-class CerebusOutlet final : public WireOutlet {
+class CerebusSink final : public WireSink {
  public:
-  explicit CerebusOutlet(const StreamTarget& target)
+  explicit CerebusSink(const StreamTarget& target)
       : peer_(udp_peer(target.address)), socket_(is_loopback(peer_) ? "127.0.0.1" : "", 0), version_(target.version) {
     datagram_.reserve(kDatagram);
   }
@@ -143,8 +143,8 @@ class CerebusOutlet final : public WireOutlet {
 
 }  // namespace
 
-std::unique_ptr<WireOutlet> make_cerebus_outlet(const StreamTarget& target) {
-  return std::make_unique<CerebusOutlet>(target);
+std::unique_ptr<WireSink> make_cerebus_sink(const StreamTarget& target) {
+  return std::make_unique<CerebusSink>(target);
 }
 
 }  // namespace osteo::inline network

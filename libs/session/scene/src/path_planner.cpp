@@ -1,4 +1,4 @@
-#include "osteo/session/scene/free_ways.h"
+#include "osteo/session/scene/path_planner.h"
 
 #include <algorithm>
 #include <cmath>
@@ -115,7 +115,7 @@ ToolSkin skin_of_plate(std::size_t plate, const RigidTransform& grip) {
   return skin;
 }
 
-FreeWays::FreeWays(const World& world, ToolSkin tool, const StructureMap* structures)
+PathPlanner::PathPlanner(const World& world, ToolSkin tool, const StructureMap* structures)
     : tool_(std::move(tool)), structures_(structures) {
   Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
   for (const PlacedBody& placed : world.bodies()) {
@@ -148,14 +148,14 @@ FreeWays::FreeWays(const World& world, ToolSkin tool, const StructureMap* struct
 }
 
 // Points of the skin that are in bone or too near to a structure, counted to one more than `most`.
-std::size_t FreeWays::touching(const HandPose& pose, double margin_mm, std::size_t most) const {
+std::size_t PathPlanner::touching(const HandPose& pose, double margin_mm, std::size_t most) const {
   const std::size_t bone = touching_bone(pose, margin_mm, most);
   if (bone > most || structures_ == nullptr) return bone;
   return bone + touching_structures(pose, std::max(kClearOfStructuresMm, margin_mm), most - bone);
 }
 
 // A point that is far from all structures speaks for those beside it: distance grows no faster than one goes.
-std::size_t FreeWays::touching_structures(const HandPose& pose, double clear_mm, std::size_t most) const {
+std::size_t PathPlanner::touching_structures(const HandPose& pose, double clear_mm, std::size_t most) const {
   constexpr double kErrorMm = 0.2;  // of the map's distances
   const RigidTransform hand{frame_of_axis(pose.axis), pose.at_mm};
   std::size_t count = 0;
@@ -171,7 +171,7 @@ std::size_t FreeWays::touching_structures(const HandPose& pose, double clear_mm,
   return count;
 }
 
-std::size_t FreeWays::touching_bone(const HandPose& pose, double margin_mm, std::size_t most) const {
+std::size_t PathPlanner::touching_bone(const HandPose& pose, double margin_mm, std::size_t most) const {
   // With room to keep any bone counts; without it, what is more bone than not.
   const float least = margin_mm > 0 ? 0.05F : 0.5F;
   const RigidTransform hand{frame_of_axis(pose.axis), pose.at_mm};
@@ -200,20 +200,20 @@ std::size_t FreeWays::touching_bone(const HandPose& pose, double margin_mm, std:
   return count;
 }
 
-bool FreeWays::in_bone(Vec3 at_mm) const {
+bool PathPlanner::in_bone(Vec3 at_mm) const {
   return std::any_of(bones_.begin(), bones_.end(),
                      [&](const Bone& b) { return b.body->bone.nearest(b.body_from_world(at_mm)) >= 0.5F; });
 }
 
-bool FreeWays::free(const HandPose& pose, double margin_mm) const {
+bool PathPlanner::free(const HandPose& pose, double margin_mm) const {
   return touching(pose, margin_mm, 0) == 0;
 }
 
-bool FreeWays::outside(Vec3 at_mm) const {
+bool PathPlanner::outside(Vec3 at_mm) const {
   return length(at_mm - centre_mm_) >= radius_mm_ + kOutsideMm;
 }
 
-bool FreeWays::free_leg(const HandPose& a, const HandPose& b, double margin_mm) const {
+bool PathPlanner::free_leg(const HandPose& a, const HandPose& b, double margin_mm) const {
   const double mm = std::max(length(b.at_mm - a.at_mm), tool_.reach_mm * angle_between(a.axis, b.axis));
   const int n = std::max(1, static_cast<int>(std::ceil(mm / (margin_mm > 1 ? 2 * kLookMm : kLookMm))));
   for (int i = 0; i <= n; ++i) {
@@ -223,21 +223,21 @@ bool FreeWays::free_leg(const HandPose& a, const HandPose& b, double margin_mm) 
 }
 
 // The most room in bone, of those that ways are looked for with.
-double FreeWays::margin_at(const HandPose& pose) const {
+double PathPlanner::margin_at(const HandPose& pose) const {
   for (const double m : {kClearMm, 0.0}) {
     if (touching_bone(pose, m, 0) == 0) return m;
   }
   return kPressedMm;
 }
 
-HandPose FreeWays::waiting(Vec3 eye, Vec3 axis) const {
+HandPose PathPlanner::waiting(Vec3 eye, Vec3 axis) const {
   HandPose pose{centre_mm_ + eye * (radius_mm_ + kOutsideMm), axis};
   while (!free(pose, kFarMm)) pose.at_mm += eye * kFarMm;
   return pose;
 }
 
 // Straight from a pose to the outside. At the beginning the tool may touch, but never more than it did.
-bool FreeWays::leaves(const HandPose& from, Vec3 direction, double near_margin, double margin, HandPose& end) const {
+bool PathPlanner::leaves(const HandPose& from, Vec3 direction, double near_margin, double margin, HandPose& end) const {
   constexpr double kBeginningMm = 4;
   // The middle of the tip alone tells most that do not.
   for (double s = kBeginningMm; !outside(from.at_mm + direction * s); s += kLookMm) {
@@ -258,8 +258,8 @@ bool FreeWays::leaves(const HandPose& from, Vec3 direction, double near_margin, 
 }
 
 // Where no straight way leads out: on a lattice, places farther out first.
-std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double near_margin, double far_margin,
-                                                    double step_mm) const {
+std::optional<PathPlanner::Poses> PathPlanner::search_out(const HandPose& from, double near_margin, double far_margin,
+                                                          double step_mm) const {
   constexpr int kMaxLooks = 40000;
   constexpr double kBeginningMm = 3;
   // At the beginning the tool may touch, but never more than it does.
@@ -315,7 +315,8 @@ std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double
   return std::nullopt;
 }
 
-std::optional<FreeWays::Poses> FreeWays::straight_out(const HandPose& from, Vec3 rather, double least_margin) const {
+std::optional<PathPlanner::Poses> PathPlanner::straight_out(const HandPose& from, Vec3 rather,
+                                                            double least_margin) const {
   if (outside(from.at_mm)) return Poses{};
   const double here = margin_at(from);
   const std::vector<Vec3> all = directions(from.axis, rather);
@@ -329,7 +330,7 @@ std::optional<FreeWays::Poses> FreeWays::straight_out(const HandPose& from, Vec3
   return std::nullopt;
 }
 
-std::optional<FreeWays::Poses> FreeWays::way_out(const HandPose& from, Vec3 rather) const {
+std::optional<PathPlanner::Poses> PathPlanner::way_out(const HandPose& from, Vec3 rather) const {
   if (auto straight = straight_out(from, rather, kPressedMm)) return straight;
   const double here = std::min(0.0, margin_at(from));
   auto roomy = search_out(from, here, kClearMm, 1);
@@ -339,7 +340,7 @@ std::optional<FreeWays::Poses> FreeWays::way_out(const HandPose& from, Vec3 rath
 }
 
 // Round the ball, from outside it to outside it, no farther off than needed.
-std::optional<FreeWays::Poses> FreeWays::across(const HandPose& from, const HandPose& to) const {
+std::optional<PathPlanner::Poses> PathPlanner::across(const HandPose& from, const HandPose& to) const {
   const Vec3 a = from.at_mm - centre_mm_, b = to.at_mm - centre_mm_, ua = normalized(a), ub = normalized(b);
   const double lowest = std::max({length(a), length(b), radius_mm_ + kOutsideMm});
   const double turn = angle_between(from.axis, to.axis), arc = angle_between(ua, ub);
@@ -362,7 +363,7 @@ std::optional<FreeWays::Poses> FreeWays::across(const HandPose& from, const Hand
 }
 
 // To a place near by: lifted a little, over, and down.
-std::optional<FreeWays::Poses> FreeWays::over(const HandPose& from, const HandPose& to, Vec3 lift) const {
+std::optional<PathPlanner::Poses> PathPlanner::over(const HandPose& from, const HandPose& to, Vec3 lift) const {
   constexpr double kNearByMm = 40;
   if (length(to.at_mm - from.at_mm) > kNearByMm || dot(from.axis, to.axis) < 0.5) return std::nullopt;
   const double here = margin_at(from);
@@ -376,7 +377,7 @@ std::optional<FreeWays::Poses> FreeWays::over(const HandPose& from, const HandPo
 }
 
 // Slowly where bone is near, quickly elsewhere. Nothing where there are too many corners.
-std::optional<HandWay> FreeWays::finished(const HandPose& from, const Poses& poses) const {
+std::optional<HandWay> PathPlanner::finished(const HandPose& from, const Poses& poses) const {
   constexpr int kWorthMm = 6;  // a shorter stretch is not worth going quickly
   HandWay way;
   HandPose a = from;
@@ -407,10 +408,10 @@ std::optional<HandWay> FreeWays::finished(const HandPose& from, const Poses& pos
 }
 
 // Clear of the structures, or where only they are in the way, past them.
-FreeWays::Found FreeWays::clear_or_past_structures(const auto& find) const {
+PathPlanner::Found PathPlanner::clear_or_past_structures(const auto& find) const {
   const Found clear = find(*this);
   if (!clear.way.put || structures_ == nullptr) return clear;
-  FreeWays of_bone(*this);
+  PathPlanner of_bone(*this);
   of_bone.structures_ = nullptr;
   Found past = find(of_bone);
   if (past.way.put) return clear;
@@ -418,16 +419,16 @@ FreeWays::Found FreeWays::clear_or_past_structures(const auto& find) const {
   return past;
 }
 
-FreeWays::Found FreeWays::way(const HandPose& from, const HandPose& to) const {
-  return clear_or_past_structures([&](const FreeWays& ways) { return ways.found_way(from, to); });
+PathPlanner::Found PathPlanner::way(const HandPose& from, const HandPose& to) const {
+  return clear_or_past_structures([&](const PathPlanner& ways) { return ways.found_way(from, to); });
 }
 
-FreeWays::Found FreeWays::approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const {
+PathPlanner::Found PathPlanner::approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const {
   return clear_or_past_structures(
-      [&](const FreeWays& ways) { return ways.found_approach(from, seen_mm, forward, axis); });
+      [&](const PathPlanner& ways) { return ways.found_approach(from, seen_mm, forward, axis); });
 }
 
-FreeWays::Found FreeWays::found_way(const HandPose& from, const HandPose& to) const {
+PathPlanner::Found PathPlanner::found_way(const HandPose& from, const HandPose& to) const {
   if (auto poses = way_out(from, normalized(to.at_mm - centre_mm_))) {
     if (const auto rest = across(poses->empty() ? from : poses->back(), to)) {
       poses->insert(poses->end(), rest->begin(), rest->end());
@@ -437,7 +438,7 @@ FreeWays::Found FreeWays::found_way(const HandPose& from, const HandPose& to) co
   return {put_at(to), to};
 }
 
-FreeWays::Found FreeWays::found_approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const {
+PathPlanner::Found PathPlanner::found_approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const {
   constexpr double kGapMm = 0.5;
   const Vec3 back = forward * -1;
   // As asked; leaning as much to the other sides; towards who looks.
@@ -481,7 +482,7 @@ FreeWays::Found FreeWays::found_approach(const HandPose& from, Vec3 seen_mm, Vec
   }
 }
 
-Vec3 FreeWays::turned(const HandPose& pose, Vec3 wanted, double most_rad) const {
+Vec3 PathPlanner::turned(const HandPose& pose, Vec3 wanted, double most_rad) const {
   const double angle = angle_between(pose.axis, wanted);
   if (angle < 1e-6) return wanted;
   const std::size_t now = touching(pose, 0, tool_.points.size());
