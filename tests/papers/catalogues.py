@@ -221,6 +221,9 @@ def check(language, plural, wanted):
                 bad.append(f"{name}: its places are not those of {s!r}")
             if s.count("\n") != key[1].count("\n"):
                 bad.append(f"{name}: its lines are not those of {s!r}")
+            # With a plain space a colon could come to stand alone on a line.
+            if language == "fr" and re.search(r"\S [:;?!»]|« ", s):
+                bad.append(f"{name}: a no-break space (U+00A0) belongs before : ; ? ! » and after «, not a plain one")
     bad.extend(f"{language}.po: {k[1]!r} is used nowhere" for k in have if k not in wanted)
 
 

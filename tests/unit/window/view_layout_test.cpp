@@ -100,7 +100,7 @@ TEST(ViewLayout, AllLayoutsFitTheSizesTheyAreFor) {
     EXPECT_GE(em, 16);
     for (const Layout wanted : {Layout::operate, Layout::plan}) {
       const ViewLayout l = lay_out(wanted, s.width, s.height, em);
-      EXPECT_EQ(l.shown, wanted) << s.width << ": " << l.why;
+      EXPECT_EQ(l.shown, wanted) << s.width << ": " << l.why.shown;
       EXPECT_TRUE(l.why.empty());
     }
     // Operate is for the picture, also with its cuts on it; and they are squares within it, apart from each other.
@@ -129,7 +129,7 @@ TEST(ViewLayout, AllLayoutsFitTheSizesTheyAreFor) {
 TEST(ViewLayout, WithoutRoomItSaysWhy) {
   const ViewLayout l = lay_out(Layout::plan, 1024, 500, 16);
   EXPECT_EQ(l.shown, Layout::operate);
-  EXPECT_NE(l.why.find("no room"), std::string::npos);
+  EXPECT_NE(l.why.english.find("no room"), std::string::npos);
   // However small: a window is dragged through all sizes.
   for (int w = 200; w < 700; w += 90) {
     for (const Layout wanted : {Layout::operate, Layout::plan, Layout::review}) {

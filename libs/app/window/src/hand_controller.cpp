@@ -17,7 +17,7 @@ void HandController::read(std::vector<ButtonLevel> levels, bool attended, const 
                           RehearsalControl& control) {
   if (attended_ && !attended) {
     keyboard_.let_go();
-    if (control.latched()) control.say(tr("another window has the keys: the drill is off"));
+    if (control.latched()) control.say([&] { return tr("another window has the keys: the drill is off"); });
     control.latch(false);
   }
   attended_ = attended;

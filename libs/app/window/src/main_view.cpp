@@ -131,11 +131,12 @@ void MainView::move_focus(int by) {
 void MainView::lay_patient(Posture posture, RehearsalControl& control) {
   bool dust = false;
   control.rehearsal().look([&](const World&, SceneReaders& readers) { dust = readers.dust != nullptr; });
-  if (!dust) return control.say(tr("no dust and no water here: start with --dust"), Message::Rank::hindrance);
+  if (!dust)
+    return control.say([&] { return tr("no dust and no water here: start with --dust"); }, Message::Rank::hindrance);
   control.rehearsal().act(SceneAction::posture(down_of(posture, 0)));
   std::string name(EnumNames<Posture>::values[static_cast<std::size_t>(posture)]);
   std::replace(name.begin(), name.end(), '_', ' ');
-  control.say(filled(tr("patient position: {position}"), {{"position", tr(name)}}));
+  control.say([&] { return filled(tr("patient position: {position}"), {{"position", tr(name)}}); });
 }
 
 void MainView::choose_theme(ThemeName name) {
@@ -158,7 +159,7 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       return true;
     case Command::irrigation:
       if (control.rehearsal().hands() < 2) {
-        control.say(tr("no second hand: start with --dust"), Message::Rank::hindrance);
+        control.say([&] { return tr("no second hand: start with --dust"); }, Message::Rank::hindrance);
       } else {
         latched_.irrigation = !latched_.irrigation;
       }
@@ -176,7 +177,7 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       wanted_ = next_layout(wanted_);
       person_.values.layout = EnumNames<Layout>::values[static_cast<std::size_t>(wanted_)];
       if (lay_out(false, 0).why.empty()) {
-        control.say(filled(tr("layout: {name}"), {{"name", tr(person_.values.layout)}}));
+        control.say([&] { return filled(tr("layout: {name}"), {{"name", tr(person_.values.layout)}}); });
       } else {
         control.say(layout_.why);
       }
@@ -189,14 +190,14 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
     case Command::panel_keys:
       focus_ = Focus::panel;
       hand_page_ = c == Command::hand_page;
-      control.say(tr("keys move in the panel: arrows, Space; Esc gives them back"));
+      control.say([&] { return tr("keys move in the panel: arrows, Space; Esc gives them back"); });
       return true;
     case Command::wheel:
       show_wheel();
       return true;
     case Command::ruler:
       ruler_.turn(!ruler_.on());
-      control.say(ruler_.on() ? tr("ruler: click two points on the bone") : tr("ruler put away"));
+      control.say([&] { return ruler_.on() ? tr("ruler: click two points on the bone") : tr("ruler put away"); });
       return true;
     case Command::mark:
       // Where the mouse is; a button in the panel: where the burr is.
@@ -229,12 +230,12 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
 bool MainView::click(std::optional<Vec3> bone, RehearsalControl& control) {
   if (!ruler_.on()) return false;
   if (!bone) {
-    control.say(tr("no bone under the mouse"), Message::Rank::hindrance);
+    control.say([&] { return tr("no bone under the mouse"); }, Message::Rank::hindrance);
     return true;
   }
   if (const auto note = ruler_.click(*bone)) {
     control.rehearsal().note("ruler", *note);
-    control.say(shown_number(*ruler_.length_mm(), 1) + " mm");
+    control.say([&] { return shown_number(*ruler_.length_mm(), 1) + " mm"; });
   }
   return true;
 }
@@ -275,7 +276,7 @@ void MainView::see(const ViewScene& scene) {
   times_undone_ = undone;
   if (facts.undone) {
     undone_ = false;
-    scene.control.say(tr("taken back"));
+    scene.control.say([&] { return tr("taken back"); });
   }
   undo_steps_ = facts.undo_steps;
   // Led away and there, not only asked for.
@@ -340,12 +341,14 @@ void MainView::draw_palette(RehearsalControl& control) {
     if (control.rehearsal().hands() > 1)
       latched_.suction = !latched_.suction;
     else
-      control.say(tr("no second hand: start with --dust"), Message::Rank::hindrance);
+      control.say([&] { return tr("no second hand: start with --dust"); }, Message::Rank::hindrance);
   } else if (!row->command || row->held) {
-    const std::string name = shown_name(*row), keys = shown_keys(*row);
-    control.say(keys.empty() ? name
-                             : filled(row->held ? tr("{command}: {keys}, held") : tr("{command}: {keys}"),
-                                      {{"command", name}, {"keys", keys}}));
+    control.say([&] {
+      const std::string name = shown_name(*row), keys = shown_keys(*row);
+      if (keys.empty()) return name;
+      return filled(row->held ? tr("{command}: {keys}, held") : tr("{command}: {keys}"),
+                    {{"command", name}, {"keys", keys}});
+    });
   } else {
     pressed_.presses.push_back({*row->command, row->value, row->shift});
   }
@@ -386,7 +389,7 @@ void MainView::draw_cards(const ViewScene& scene, const HandFacts& hand) {
   const bool water = latched_.suction || latched_.irrigation || control.second().holds() > 0;
   if (const float left = view.bottom() - below; hand.second_hand && water && left > 320 * unit()) {
     draw_tool_card({view.x, below - 8 * unit(), view.width, left}, "second hand", tr("Second hand"), [&] {
-      draw_second_hand(control.rehearsal(), control.second(), [&](const std::string& said) { control.say(said); });
+      draw_second_hand(control.rehearsal(), control.second(), [&](const LocalText& said) { control.say(said); });
     });
   }
   if (!person_.values.first_steps) return;
@@ -461,10 +464,12 @@ void MainView::draw_note_field(RehearsalControl& control) {
   if (answer > 0) {
     if (const auto note = notes_.pin(*writing_, note_text_)) {
       control.rehearsal().note("note", *note);
-      control.say(filled(tr("note {n} is pinned"), {{"n", std::to_string(notes_.all().back().number)}}));
+      control.say([&] {
+        return filled(tr("note {n} is pinned"), {{"n", std::to_string(notes_.all().back().number)}});
+      });
     } else {
       control.rehearsal().note("mark", "{}");
-      control.say(tr("marked"));
+      control.say([&] { return tr("marked"); });
     }
   }
   if (answer != 0) writing_.reset();

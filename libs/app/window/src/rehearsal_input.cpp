@@ -105,7 +105,7 @@ void RehearsalWindow::do_press(const Keyboard::Press& press, const std::optional
 }
 
 bool RehearsalWindow::camera_takes(const Keyboard::Press& press, const std::optional<Vec3>& direction) {
-  std::string said;
+  LocalText said;
   if (!scope_.key(press, scope_scene(), direction, said)) return false;
   if (!said.empty()) control_.say(said);
   return true;
@@ -156,9 +156,10 @@ void RehearsalWindow::command(Command command) {
   if (command == Command::screenshot) screenshot_wanted_ = true;
   if (command == Command::hints) {
     hints_.turn(!hints_.on());
-    control_.say(hints_.on() ? tr("hints are given") : tr("no hints"));
+    control_.say([&] { return hints_.on() ? tr("hints are given") : tr("no hints"); });
   }
-  if (command == Command::timeline) control_.say(tr("the course of the session is shown when it is over (Q)"));
+  if (command == Command::timeline)
+    control_.say([&] { return tr("the course of the session is shown when it is over (Q)"); });
   if (command == Command::sound) sound_.turn(!sound_.on());
   if (command == Command::lead) switch_lead();
   if (command == Command::monitor || command == Command::mute_monitor) monitor_command(command);
@@ -175,7 +176,7 @@ void RehearsalWindow::command(Command command) {
     if (regions_) {
       regions_->show(!regions_->shown());
     } else {
-      control_.say(tr("no regions are planned: --procedure FILE names them"));
+      control_.say([&] { return tr("no regions are planned: --procedure FILE names them"); });
     }
   }
   if (command == Command::quit) end_session();
@@ -183,21 +184,25 @@ void RehearsalWindow::command(Command command) {
 
 // What the pull does is in the samples of who leads, and so recorded; that it was the person's wish is a note.
 void RehearsalWindow::switch_lead() {
-  if (!tutor_.leads || !actions_.lead) return control_.say(tr("nobody leads your hand in this session"));
-  if (control_.leading()) return control_.say(tr("the drill is on its way: your hand is let go until it is there"));
+  if (!tutor_.leads || !actions_.lead)
+    return control_.say([&] { return tr("nobody leads your hand in this session"); });
+  if (control_.leading())
+    return control_.say([&] { return tr("the drill is on its way: your hand is let go until it is there"); });
   const bool on = !tutor_.guiding;
   actions_.lead(on);
   control_.rehearsal().note("lead", on ? R"({"on":true})" : R"({"on":false})");
-  control_.say(on ? tr("your hand is led") : tr("your hand is let go"));
+  control_.say([&] { return on ? tr("your hand is led") : tr("your hand is let go"); });
 }
 
 void RehearsalWindow::monitor_command(Command command) {
   MonitorController* const controller = monitor_controller();
-  if (controller == nullptr) return control_.say(tr("there is no nerve monitor: begin with --monitor"));
+  if (controller == nullptr) return control_.say([&] { return tr("there is no nerve monitor: begin with --monitor"); });
   if (command == Command::monitor) monitor_.show(!monitor_.shown());
   if (command == Command::mute_monitor) {
     controller->sound().mute(!controller->sound().muted());
-    control_.say(controller->sound().muted() ? tr("the nerve monitor is muted") : tr("the nerve monitor is heard"));
+    control_.say([&] {
+      return controller->sound().muted() ? tr("the nerve monitor is muted") : tr("the nerve monitor is heard");
+    });
   }
 }
 

@@ -122,7 +122,7 @@ void RehearsalWindow::report_touch(Rehearsal& now) {
     if (tick.tick != 0 && (hand == 0 || !control_.second_hand_empty())) hands.push_back(tick);
   }
   if (const auto reported = touch_.look(hands)) {
-    control_.say(reported->words);
+    control_.say(reported->text);
     now.note("touch", reported->note);
   }
   const auto at = touch_.at_mm() ? project(*touch_.at_mm()) : std::nullopt;
@@ -243,10 +243,10 @@ void RehearsalWindow::save_screenshot() {
   } while (std::filesystem::exists(path));
   try {
     save_picture(picture, path);
-    control_.say(filled(tr("saved {file}"), {{"file", path.filename().string()}}));
+    control_.say([&] { return filled(tr("saved {file}"), {{"file", path.filename().string()}}); });
     main_view_.picture_kept();
   } catch (const Error& e) {
-    control_.say(e.what());
+    control_.say(LocalText::untranslated(e.what()));
   }
 }
 

@@ -136,18 +136,19 @@ void RehearsalWindow::plan_and_looks(const Rehearsal& rehearsal) {
   if (std::exchange(has_plan_, true)) return;
   if (!planned_.empty()) {
     if (rehearsal.structures() == nullptr) {
-      control_.say(tr("the case knows no structures: the procedure's regions are not shown"));
+      control_.say([&] { return tr("the case knows no structures: the procedure's regions are not shown"); });
     } else {
       regions_ = std::make_unique<RegionsView>(renderer_, *rehearsal.structures(), planned_);
       for (const std::string& name : regions_->missing())
-        control_.say(filled(tr("the case lacks the structure of region '{name}'"), {{"name", name}}));
+        control_.say([&] { return filled(tr("the case lacks the structure of region '{name}'"), {{"name", name}}); });
     }
   }
   if (!actions_.notes_before) return;
   const Looks looks = looks_of(actions_.notes_before());
   if (looks.unreadable > 0)
-    control_.say(
-        filled(tr("{n} notes of the session before could not be read"), {{"n", std::to_string(looks.unreadable)}}));
+    control_.say([&] {
+      return filled(tr("{n} notes of the session before could not be read"), {{"n", std::to_string(looks.unreadable)}});
+    });
   if (structures_) {
     for (std::size_t s = 0; s < structures_->all().size(); ++s) {
       if (const auto look = looks.structures.find(structures_->all()[s].value); look != looks.structures.end())
@@ -218,7 +219,7 @@ void RehearsalWindow::show_before(bool on) {
   if (!on || before_view_) return;
   if (!actions_.world_at_begin) {
     main_view_.set_before(false);
-    control_.say(tr("how the bone was is not known"));
+    control_.say([&] { return tr("how the bone was is not known"); });
     return;
   }
   try {
@@ -228,7 +229,7 @@ void RehearsalWindow::show_before(bool on) {
     before_view_ = std::make_unique<BeforeView>(render_window_, mesh);
   } catch (const Error& e) {
     main_view_.set_before(false);
-    control_.say(e.what());
+    control_.say(LocalText::untranslated(e.what()));
   }
 }
 
@@ -269,7 +270,8 @@ void RehearsalWindow::begin_again(bool from_case) {
   ImGui::EndFrame();
   const bool begun = control_.begin(from_case, false);
   ended_.reset();  // failure() speaks for itself
-  if (begun) control_.say(from_case ? tr("bone reset") : tr("a new session continues from what was recorded"));
+  if (begun)
+    control_.say([&] { return from_case ? tr("bone reset") : tr("a new session continues from what was recorded"); });
   shell_.new_frame();
 }
 

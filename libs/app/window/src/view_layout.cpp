@@ -48,7 +48,7 @@ ViewLayout lay_out(Layout wanted, int width, int height, float em, float cut_sid
   out.shown = wanted;
   if (wanted == Layout::plan && (w < whole(kPlanWide) || h < whole(kPlanHigh))) {
     out.shown = Layout::operate;
-    out.why = tr("no room for four pictures: a larger window or smaller text (Ctrl -) shows them");
+    out.why = [] { return tr("no room for four pictures: a larger window or smaller text (Ctrl -) shows them"); };
   }
   if (out.shown == Layout::review) {
     const float page = std::min(whole(kPage), w);

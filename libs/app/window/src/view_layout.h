@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 
+#include "local_text.h"
 #include "osteo/core/base/param.h"
 
 namespace osteo::inline app {
@@ -28,7 +29,7 @@ enum class Layout : int { operate, plan, review };
 
 struct ViewLayout {
   Layout shown = Layout::operate;  ///< what there was room for
-  std::string why;                 ///< when that is not what was asked for; else empty
+  LocalText why;                   ///< when that is not what was asked for; else empty
   ScreenBox tray;                  ///< the strip of tools
   ScreenBox view;                  ///< the bone
   ScreenBox state;                 ///< the strip of what the burr does now, at the bottom

@@ -288,7 +288,7 @@ ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFact
     ImGui::SetCursorScreenPos({box.x + pad, y + 2 * line});
     // A quarter a step, as its keys do.
     ImGui::SetCursorScreenPos({box.x + pad, y + 2 * line + 10 * u});
-    ImGui::TextDisabled("%s", tr("Speed"));
+    ImGui::TextDisabled("%s", tr_of("of the burr", "Speed"));
     ImGui::SetCursorScreenPos({box.x + pad + ImGui::GetItemRectSize().x + 12 * u, y + 2 * line});
     static const std::string kSpeeds[] = {"25", "50", "75", "100 %"};
     const int now = static_cast<int>(std::lround(4 * hand.burr_share)) - 1;
@@ -325,7 +325,7 @@ float draw_tool_card(const ScreenBox& view, const char* name, const std::string&
   return bottom;
 }
 
-void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const std::string&)>& say) {
+void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const LocalText&)>& say) {
   const std::pair<const char*, std::size_t> things[] = {{tr("Suction"), SecondHand::kSucker},
                                                         {tr("Irrigation"), SecondHand::kIrrigator},
                                                         {tr("Probe"), SecondHand::kProbe},

@@ -52,7 +52,7 @@ ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFact
 float draw_tool_card(const ScreenBox& view, const char* name, const std::string& title,
                      const std::function<void()>& content);
 /// Into a card: what the second hand holds, and the size of its suction tube.
-void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const std::string&)>& say);
+void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const LocalText&)>& say);
 /// Into the current window: what ends or begins a session.
 void draw_apart(Pressed& pressed);
 /// One step at a time at the foot of the view. False: the person has closed it.

@@ -186,7 +186,7 @@ Rows scan_rows(const CaseFacts& f) {
                 {"columns", number_text(number(f.verdict("geometry", "columns")), 0)},
                 {"rows", number_text(number(f.verdict("geometry", "rows")), 0)},
                 {"mm", number_text(thickness, 2)}}));
-    add(tr("Distance"),
+    add(tr("Slice spacing"),
         filled(most - least > 0.02 ? tr("{from} to {to} mm, mostly {usual}") : tr("{usual} mm, even"),
                {{"from", number_text(least, 2)}, {"to", number_text(most, 2)}, {"usual", number_text(usual, 2)}}));
     const Json* const pixel = f.verdict("geometry", "pixel_mm");
