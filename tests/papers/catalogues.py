@@ -58,7 +58,7 @@ structures = (
 
 # What instrument_library() calls its instruments, without their sizes.
 instruments = (
-    "cutting,cutting cylinder,cutting taper,diamond,diamond cylinder,diamond taper,saw,hand saw,sucker,irrigator,probe,"
+    "cutting,cutting cylinder,cutting taper,diamond,diamond cylinder,diamond taper,saw,hand saw,suction tube,irrigator,probe,"
     "hook,shaft,plate screws"
 ).split(",")
 

@@ -263,7 +263,7 @@ def keys():
             w.next()
             if held == "second hand: nothing":
                 break
-        key("k", "a sucker again", lambda s: "sucker" in s["message"])
+        key("k", "a sucker again", lambda s: "suction tube" in s["message"])
         # To the bone, drilled, sucked and washed, out again. A short V and a long one.
         key("f", "at the bone", lambda s: not s["leading"] and s["message"] == "drill brought to the bone")
         down = w.state()

@@ -43,7 +43,7 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
 
 cli::CommandInfo RehearseCommand::info() {
   std::vector<cli::FlagGroup> groups = window_flag_groups({"headless", "script"});
-  groups.push_back({"Without a window", {"seconds", "side", "fast", "pieces"}});
+  groups.push_back({"Without a window", {"seconds", "side", "fast", "fragments"}});
   groups.push_back({"Settings", {"show_settings"}});
   return {"rehearse",
           "drill the bone of a case, in a window or by script",

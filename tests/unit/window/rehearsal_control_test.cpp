@@ -549,7 +549,7 @@ TEST(RehearsalControl, TheMouseMovesTheSecondHand) {
   ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().tick > 50; }));
   const Vec3 drill = control.goal_mm();
   control.drag_second({0, 3, 0});
-  EXPECT_NE(control.message().find("sucker"), std::string::npos) << control.message();
+  EXPECT_NE(control.message().find("suction tube"), std::string::npos) << control.message();
   const Vec3 there = control.second_mm() + Vec3{2, 0, 1};
   control.drag_second({2, 0, 1});
   EXPECT_EQ(control.second_mm(), there);

@@ -22,7 +22,7 @@ TEST(ToolTouch, IsToldOnceAndShownWhileItLasts) {
   const auto reported = look(3);
   ASSERT_TRUE(reported);
   EXPECT_EQ(reported->text.shown, "the suction tube touches the drill");
-  EXPECT_EQ(reported->note.find("{\"hands\":[0,1],\"tools\":[\"cutting 4 mm\",\"sucker 8 Fr\"],\"at_mm\":["), 0U)
+  EXPECT_EQ(reported->note.find("{\"hands\":[0,1],\"tools\":[\"cutting 4 mm\",\"suction tube 8 Fr\"],\"at_mm\":["), 0U)
       << reported->note;
   ASSERT_TRUE(touch.at_mm());
   EXPECT_NEAR(touch.at_mm()->x, 1.83, 0.05);

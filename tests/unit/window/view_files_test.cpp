@@ -117,13 +117,19 @@ TEST(PersonSettings, ButtonsAreKeptWhereTheyAreNotAsUsual) {
     EXPECT_EQ(p.save(), "");
   }
   const auto j = nlohmann::json::parse(read_text(file));
-  EXPECT_EQ(j["buttons"], (nlohmann::json{{"key F13", "undo"}, {"pedal 2", "suck"}, {"pedal 3", "nothing"}}));
+  EXPECT_EQ(j["buttons"], (nlohmann::json{{"key F13", "undo"}, {"pedal 2", "suction"}, {"pedal 3", "nothing"}}));
   PersonSettings again(file);
   EXPECT_TRUE(again.complaints().empty());
   EXPECT_EQ(again.buttons.function(302), HandFunction::undo);
   EXPECT_EQ(again.buttons.function(button::kPedal), HandFunction::drill);
   EXPECT_EQ(again.buttons.function(button::kPedal + 1), HandFunction::suck);
   EXPECT_FALSE(again.buttons.function(button::kPedal + 2));
+  // Names of before are read, and written as they are now.
+  write_file(file, R"({"osteotome_settings": 1, "buttons": {"pedal 1": "water", "pedal 2": "bring"}})");
+  PersonSettings older(file);
+  EXPECT_TRUE(older.complaints().empty());
+  EXPECT_EQ(older.buttons.function(button::kPedal), HandFunction::water);
+  EXPECT_EQ(older.buttons.function(button::kPedal + 1), HandFunction::bring);
   EXPECT_TRUE(again.values.left_handed);
   EXPECT_EQ(again.values.motion_one_to, 4);
   again.buttons = HandButtons::usual();

@@ -509,7 +509,7 @@ void MainView::draw_marks(const ViewScene& scene) {
     const std::string text = shown_number(*ruler_.length_mm(), 1) + " mm";
     words((ends[0][0] + ends[1][0]) / 2 + e / 2, (ends[0][1] + ends[1][1]) / 2, text, palette::kSkyBlue);
   }
-  if (before_) words(v.x + e, v.y + e / 2, tr("AS IT WAS AT THE BEGINNING (W goes back)"), palette::kYellow);
+  if (before_) words(v.x + e, v.y + e / 2, tr("BONE AT THE START (W goes back)"), palette::kYellow);
   draw->PopClipRect();
 }
 

@@ -17,7 +17,7 @@ MouseDevice* moved_by_window(Rehearsal& rehearsal) {
 }  // namespace
 
 std::string SecondHand::name_of(std::size_t what) const {
-  return what == kSucker      ? "sucker " + std::to_string(french_) + " Fr"
+  return what == kSucker      ? "suction tube " + std::to_string(french_) + " Fr"
          : what == kIrrigator ? "irrigator 2 mm"
          : what == kProbe     ? "probe 1 mm"
                               : "";

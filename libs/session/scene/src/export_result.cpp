@@ -22,7 +22,7 @@ Json matrix(const RigidTransform& t) {
   rows.push_back({0, 0, 0, 1});
   return rows;
 }
-Json triple(Vec3 v) {
+Json point_json(Vec3 v) {
   return {v.x, v.y, v.z};
 }
 
@@ -71,7 +71,7 @@ std::string write_result(const World& world, const fs::path& folder, const Conte
   Json j;
   j["osteotome_plan"] = 1;
   j["units"] = "mm, LPS; transforms take points of the case to where they are now";
-  j["pieces"] = Json::list();
+  j["fragments"] = Json::list();
   j["pieces_without_bone"] = Json::list();  // by their numbers: sawn or drilled away
   constexpr double kWarnPercent = 0.1;
   const double steps = static_cast<double>(world.bodies().size() + world.fixtures().size());
@@ -106,14 +106,14 @@ std::string write_result(const World& world, const fs::path& folder, const Conte
                {"surface_moved_mm", surface.moved_mm},
                {"region_of_interest", b.of_region},
                {"transform", matrix(b.world_from_body)},
-               {"shift_mm", triple(b.world_from_body.shift_mm)}};
+               {"shift_mm", point_json(b.world_from_body.shift_mm)}};
     if (largest != parts.end()) {
-      piece["centre_mm"] = triple(b.world_from_body(largest->centre_mm));
+      piece["centre_mm"] = point_json(b.world_from_body(largest->centre_mm));
       piece["inertia_g_mm2_at_1_g_per_cm3_in_the_case"] = Json::list();
       for (const double i : largest->inertia_mm2)
         piece["inertia_g_mm2_at_1_g_per_cm3_in_the_case"].push_back(i * voxel / 1000);
     }
-    j["pieces"].push_back(piece);
+    j["fragments"].push_back(piece);
   }
   j["plates"] = Json::list();
   for (const Fixture& f : world.fixtures()) {
@@ -125,7 +125,7 @@ std::string write_result(const World& world, const fs::path& folder, const Conte
     Json screws = Json::list();
     for (const Vec3 h : plate.holes_mm) {
       const bool moves = plate.most_opening_mm > 0 && h.x > 0;
-      screws.push_back(triple(pose(h + Vec3{moves ? f.opening_mm : 0, 0, 0})));
+      screws.push_back(point_json(pose(h + Vec3{moves ? f.opening_mm : 0, 0, 0})));
     }
     Json on = Json::list();
     on.push_back(f.body);
@@ -134,12 +134,12 @@ std::string write_result(const World& world, const fs::path& folder, const Conte
                            {"plate", plate.name},
                            {"about", plate.about},
                            {"file", name + ".stl"},
-                           {"pieces", on},
+                           {"fragments", on},
                            {"transform", matrix(pose)},
                            {"opening_mm", f.opening_mm},
                            {"screw_diameter_mm", plate.screw_mm},
                            {"screws_at_mm", screws},
-                           {"screws_towards", triple(pose.rotation.column[2] * -1)},
+                           {"screws_towards", point_json(pose.rotation.column[2] * -1)},
                            {"gap", gaps_of(world, f, folder / (name + "-gap.csv"))}});
   }
   context.progress(1);

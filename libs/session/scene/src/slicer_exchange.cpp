@@ -195,8 +195,8 @@ class Taker {
         throw Error(
             ExitCode::corrupt,
             "the segment '" + s.name + "' was drawn on another scan than that of the case, or on another part of it",
-            "take it back into the case that was handed over; where the case's region was changed since, hand it over "
-            "anew");
+            "import it into the case that was exported; where the case's region was changed since, export it "
+            "again");
       }
       marked = true;
     }
