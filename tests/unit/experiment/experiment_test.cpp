@@ -1,4 +1,4 @@
-// Protocol, runs, trials on disk, the desk and the analysis: by what they do.
+// Protocol, runs, trials on disk, the controller and the analysis: by what they do.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -295,7 +295,7 @@ TEST(Controller, GoesThroughATrialAndSavesIt) {
   const auto scores = read_trials(folder.path() / "S1");
   ASSERT_EQ(scores.size(), 1U);
   EXPECT_EQ(scores[0].mover, Mover::keys);
-  // Another desk goes on there.
+  // Another controller goes on there.
   const ForceSkillController again(folder.path(), p, 0, false, Mover::keys, "keys", {});
   EXPECT_EQ(again.done(), 1U);
 }

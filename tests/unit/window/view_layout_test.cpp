@@ -1,4 +1,4 @@
-// The room around the bone: rectangles, sizes, colours, wheel, marks, first steps, the page at the end. No screen.
+// The main view around the bone: rectangles, sizes, colours, wheel, marks, first steps, the page at the end. No screen.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// The person's hand at this desk: what was chosen for it, and what pedals, buttons and keys do to it. Private to
+// The person's hand: what was chosen for it, and what pedals, buttons and keys do to it. Private to
 // libs/app/window.
 #pragma once
 #include <string>

@@ -1,4 +1,4 @@
-// The room around the bone: layouts, panels, tray, wheel, help, questions, ruler, notes, first steps, the page at the
+// The main view around the bone: layouts, panels, tray, wheel, help, questions, ruler, notes, first steps, the page at the
 // end. Private to libs/app/window; ImGui, no VTK and no GL: what it draws on the bone it projects itself.
 #pragma once
 #include <functional>
@@ -95,7 +95,7 @@ class MainView {
   [[nodiscard]] std::vector<Keyboard::Press> take_presses();
   /// A button that does it is held down.
   [[nodiscard]] bool holds(Command command) const;
-  /// True when it was for the room. `bone`: under the mouse, in the view.
+  /// True when it was for the main view. `bone`: under the mouse, in the view.
   bool takes(const Keyboard::Press& press, RehearsalControl& control, const std::optional<Vec3>& bone);
   /// A click on the bone; true when it was a point of the ruler.
   bool click(std::optional<Vec3> bone, RehearsalControl& control);
