@@ -8,6 +8,7 @@
 
 #include "bar.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/session/recording/session_file.h"
 #include "scratch.h"
