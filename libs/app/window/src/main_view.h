@@ -1,5 +1,5 @@
-// The main view around the bone: layouts, panels, tray, wheel, help, questions, ruler, notes, first steps, the page at the
-// end. Private to libs/app/window; ImGui, no VTK and no GL: what it draws on the bone it projects itself.
+// The main view around the bone: layouts, panels, tray, wheel, help, questions, ruler, notes, first steps, the page at
+// the end. Private to libs/app/window; ImGui, no VTK and no GL: what it draws on the bone it projects itself.
 #pragma once
 #include <functional>
 #include <optional>
