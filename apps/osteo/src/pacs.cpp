@@ -47,9 +47,9 @@ Endpoint endpoint_of(const PeerOrWebFlags& p, const cli::Invocation& io) {
   endpoint.web->url = p.dicomweb;
   endpoint.web->ca = p.dicomweb_ca;
   endpoint.web->timeout_s = p.timeout_s;
-  door.web->flag = "--dicomweb";
+  endpoint.web->flag = "--dicomweb";
   const char* const given = std::getenv("OSTEO_DICOMWEB_LOGIN");
-  door.web->login = !p.dicomweb_login.empty() ? read_login(p.dicomweb_login) : given != nullptr ? given : "";
+  endpoint.web->login = !p.dicomweb_login.empty() ? read_login(p.dicomweb_login) : given != nullptr ? given : "";
   check_dicomweb(*endpoint.web);
   endpoint.name = web_text(*endpoint.web);
   return endpoint;

@@ -169,8 +169,8 @@ TEST(StimulatorLink, WhateverComesNothingBreaksAndNothingIsSet) {
   EXPECT_GE(theatre.endpoint.counts().refused - before, 1000U - 101U);
 }
 
-// Over the loopback, from a console to the door behind an OpenIGTLink server; and one who does not have the code hears
-// as before.
+// Over the loopback, from a console to the endpoint behind an OpenIGTLink server; and one who does not have the code
+// hears as before.
 TEST(StimulatorLink, OverTheNetwork) {
   auto sink = make_sink({StreamTarget::Kind::igtl, "127.0.0.1:0", "", true});
   std::mutex mutex;

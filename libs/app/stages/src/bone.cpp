@@ -109,12 +109,13 @@ std::vector<Data> SeparateFragmentsStage::run(const Params& p, std::span<const D
     // About the centre, for a density of 1 g/cm3 where bone is whole: g mm2.
     for (const double i : piece.solid.inertia_mm2) inertia.push_back(i * voxel / 1000);
     const VolumeSurface surface = surface_of_volume(piece.bone, context);
-    j["fragments"].push_back({{"volume_mm3", piece.volume_mm3()},
-                           {"surface_volume_mm3", surface.surface_mm3},
-                           {"surface_moved_mm", surface.moved_mm},
-                           {"centre_mm", {piece.solid.centre_mm.x, piece.solid.centre_mm.y, piece.solid.centre_mm.z}},
-                           {"inertia_g_mm2_at_1_g_per_cm3", inertia},
-                           {"moved_mm", {away.x, away.y, away.z}}});
+    j["fragments"].push_back(
+        {{"volume_mm3", piece.volume_mm3()},
+         {"surface_volume_mm3", surface.surface_mm3},
+         {"surface_moved_mm", surface.moved_mm},
+         {"centre_mm", {piece.solid.centre_mm.x, piece.solid.centre_mm.y, piece.solid.centre_mm.z}},
+         {"inertia_g_mm2_at_1_g_per_cm3", inertia},
+         {"moved_mm", {away.x, away.y, away.z}}});
     const TriMesh& mesh = surface.mesh;
     const auto first = static_cast<std::uint32_t>(all.points_mm.size());
     for (const auto& q : mesh.points_mm)

@@ -135,10 +135,8 @@ struct Move {
   double turn_deg = 0, over_s = 0;
   static void describe(Move& p, auto& visit) {
     visit({"piece", "which", "", 0, kMaxPieces, true}, p.piece);
-    visit({"shift_mm", "where to, after the turn; left out: as far as before", "mm", -kFarMm, kFarMm},
-          p.shift_mm);
-    visit({"turn_deg", "about axis through about_mm; left out: as far as before", "deg", -360, 360},
-          p.turn_deg);
+    visit({"shift_mm", "where to, after the turn; left out: as far as before", "mm", -kFarMm, kFarMm}, p.shift_mm);
+    visit({"turn_deg", "about axis through about_mm; left out: as far as before", "deg", -360, 360}, p.turn_deg);
     visit({"axis", "axis of the rotation", "", -kFarMm, kFarMm}, p.axis);
     visit({"about_mm", "a point of that axis, LPS", "mm", -kFarMm, kFarMm}, p.about_mm);
     visit({"over_s", "how long it takes", "s", 0, 3600}, p.over_s);

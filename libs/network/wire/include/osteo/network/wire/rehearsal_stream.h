@@ -23,7 +23,7 @@ class RehearsalStream {
   [[nodiscard]] const MonitorReader& monitor() const { return *monitor_; }
   /// What a console needs to set the stimulator, in a line; empty: nobody may. To be shown, and written nowhere.
   [[nodiscard]] const std::string& invitation() const { return invitation_; }
-  /// Of the door; null: none.
+  /// Of the endpoint; null: none.
   [[nodiscard]] const StimulatorEndpoint* endpoint() const { return endpoint_.get(); }
 
  private:
