@@ -54,7 +54,7 @@ struct WindowFlags {
   CameraPlace camera_place = CameraPlace::facing;
   double hand_scale = 1;
   SecondDevice second_device = SecondDevice::keys;
-  std::string second_instrument = "sucker 10 Fr";
+  std::string second_instrument = "suction tube 10 Fr";
   bool dust = false;
   bool heat = false;
   Posture position = Posture::supine;
@@ -121,7 +121,8 @@ struct WindowFlags {
            "with --dust"},
           p.second_device);
     visit({"second_instrument",
-           "instrument of the second hand where it has a device of its own: sucker 10 Fr, irrigator 2 mm, probe 1 mm, "
+           "instrument of the second hand where it has a device of its own: suction tube 10 Fr, irrigator 2 mm, probe "
+           "1 mm, "
            "a burr"},
           p.second_instrument);
     visit(

@@ -148,7 +148,7 @@ for body, surface, young_kpa, fixed in (
     )
 osteo("convert", "muscle.stl", work / "two/tissue/muscle/tissue.ply")
 sucker = {
-    "instrument": "sucker 12 Fr",
+    "instrument": "suction tube 12 Fr",
     "axis": [0.1, 0.1, -0.98],
     "waypoints": [
         {"t_s": t, "at_mm": at}

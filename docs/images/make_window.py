@@ -71,7 +71,7 @@ def head():
         return
     osteo("phantom", "head.nrrd", "--spacing-mm", 1, "--quiet")
     osteo("prepare", "head.nrrd", "-o", "head", "--lower", 500, "--spacing-mm", 1, "--quiet")
-    session("head", "split-head.json", "apart", "--pieces")
+    session("head", "split-head.json", "apart", "--fragments")
 
 
 if "mastoid" in wanted:

@@ -31,7 +31,7 @@ tables = [
         r"names\(HandFunction\) \{\n  return \{(.*?)\}",
         "enum",
     ),
-    ("libs/app/window/src/room_layout.h", r"names\(Layout\) \{\n  return \{(.*?)\}", "enum"),
+    ("libs/app/window/src/view_layout.h", r"names\(Layout\) \{\n  return \{(.*?)\}", "enum"),
     ("libs/assessment/evidence/src/score.cpp", r'words\.push_back\(\s*"([^"]*)"\)', str),
     ("libs/assessment/evidence/src/score.cpp", r'not_measured\(\s*"[^"]*", "([^"]*)"', str),
     ("libs/assessment/evidence/src/process.cpp", r'not_measured\(\s*\w+, "([^"]*)"', str),
@@ -58,7 +58,7 @@ structures = (
 
 # What instrument_library() calls its instruments, without their sizes.
 instruments = (
-    "cutting,cutting cylinder,cutting taper,diamond,diamond cylinder,diamond taper,saw,hand saw,sucker,irrigator,probe,"
+    "cutting,cutting cylinder,cutting taper,diamond,diamond cylinder,diamond taper,saw,hand saw,suction tube,irrigator,probe,"
     "hook,shaft,plate screws"
 ).split(",")
 
@@ -221,6 +221,9 @@ def check(language, plural, wanted):
                 bad.append(f"{name}: its places are not those of {s!r}")
             if s.count("\n") != key[1].count("\n"):
                 bad.append(f"{name}: its lines are not those of {s!r}")
+            # With a plain space a colon could come to stand alone on a line.
+            if language == "fr" and re.search(r"\S [:;?!»]|« ", s):
+                bad.append(f"{name}: a no-break space (U+00A0) belongs before : ; ? ! » and after «, not a plain one")
     bad.extend(f"{language}.po: {k[1]!r} is used nowhere" for k in have if k not in wanted)
 
 

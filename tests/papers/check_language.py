@@ -2,7 +2,8 @@
 """Words that docs/glossary.md no longer uses, counted in what users read. usage: check_language.py SOURCE_DIR [--write]
 
 Words in `code marks` in the glossary's last column are looked for in the help texts (docs/reference), in string literals of the window, of other
-libraries and programs, and in the pages of docs; a flag's help may not begin with a word that leans on another flag. The counts may only fall: tests/papers/language.txt holds what is left, --write writes it.
+libraries and programs, and in the pages of docs: none may be left there. Keys and names in files, which programs of others read, are counted by themselves;
+there the count may only fall: tests/papers/language.txt holds what is left, --write writes it. A flag's help may not begin with a word that leans on another flag.
 """
 
 import pathlib, re, sys
@@ -23,14 +24,26 @@ finder = re.compile(
 literal = re.compile(r'R"(\w*)\((.*?)\)\1"|"((?:\\.|[^"\\\n])*)"', re.S)
 
 
-def strings(folders):
+# A literal that is one lower-case word is a key or a name in files; so is one within a text of JSON or HTML.
+name_in_file = re.compile(r"[a-z][a-z0-9_]*")
+inner_key = re.compile(r'\\"([a-z][a-z0-9_]*)\\":|data-\w+=\\"([a-z ]*)\\"')
+
+
+def strings(folders, keys=False):
     for folder in folders:
         for path in sorted((root / folder).rglob("*")):
             if path.suffix in (".h", ".cpp"):
                 text = re.sub(r"^\s*#include.*$|//.*$", "", path.read_text(), flags=re.M)
                 if path.name == "commands.cpp":  # the second of a row is what a command is found by: old names too
                     text = re.sub(r'(\{(?:tr_later\()?"[^"]*"\)?,\s+(?:tr_later\()?)"[^"]*"', r'\1""', text)
-                yield " \n ".join((m[2] or m[3] or "") for m in literal.finditer(text))
+                # Names of before are accepted, and stand in tables called so.
+                text = re.sub(r"\bkOld\w*[^;]*;", "", text)
+                found = [m[2] or m[3] or "" for m in literal.finditer(text)]
+                if keys:
+                    inner = [m[1] or m[2] or "" for s in found for m in inner_key.finditer(s)]
+                    yield " \n ".join([s for s in found if name_in_file.fullmatch(s)] + inner)
+                else:
+                    yield " \n ".join(inner_key.sub("", s) for s in found if not name_in_file.fullmatch(s))
 
 
 def pages(folder):
@@ -60,6 +73,7 @@ places = {
         ]
     ),
     "docs": pages("docs"),
+    "keys": strings(["libs", "apps"], keys=True),
 }
 counts = {}
 for place, texts in places.items():
@@ -70,13 +84,15 @@ for place, texts in places.items():
 if "--write" in sys.argv:
     kept.write_text(
         "# place word count: what is left of the words that docs/glossary.md no longer uses; check_language.py --write\n"
-        + "".join(f"{p}\t{w}\t{n}\n" for (p, w), n in sorted(counts.items()))
+        + "".join(f"{p}\t{w}\t{n}\n" for (p, w), n in sorted(counts.items()) if p == "keys")
     )
 allowed = {}
 for line in kept.read_text().splitlines():
     if line and line[0] != "#":
         place, word, n = line.split("\t")
         allowed[place, word] = int(n)
+if strict := [k for k in allowed if k[0] != "keys"]:
+    sys.exit(f"tests/papers/language.txt may hold keys only, not {strict}")
 bad = [
     f"{p}: '{w}' {n} times, {allowed.get((p, w), 0)} were left; docs/glossary.md has the term that is used for it"
     for (p, w), n in sorted(counts.items())

@@ -205,7 +205,7 @@ script = {
 (work / "parts.json").write_text(json.dumps(script))
 osteo("rehearse", fixtures / "case", "--headless", "--fast", "--script", "parts.json", "-o", "parts")
 osteo("export-result", "parts", "-o", "parts-plan")
-pieces = json.loads((work / "parts-plan/plan.json").read_text())["pieces"]
+pieces = json.loads((work / "parts-plan/plan.json").read_text())["fragments"]
 assert len(pieces) >= 8, len(pieces)
 worst = 0
 for piece in pieces:

@@ -90,7 +90,7 @@ def hand():
         held("grave", "nothing yet", lambda s: not s["sucking"])
         w.next()
         w.x("mousemove_relative", "--", 30, 0)
-        w.until("a sucker", lambda s: "sucker" in s["message"])
+        w.until("a sucker", lambda s: "suction tube" in s["message"])
         there = w.next()["second_mm"]
         w.x("mousemove_relative", "--", 0, 20)
         w.until("it moves", lambda s: apart(s["second_mm"], there) > 1)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Drives the window under Xvfb and checks each effect. Waits for what it wants to see, never for a time.
-usage: drive_window.py keys|room|hand|signals|failures BIN_DIR WORK_DIR SOURCE_DIR"""
+usage: drive_window.py keys|main_view|hand|signals|failures BIN_DIR WORK_DIR SOURCE_DIR"""
 
 import array, csv, json, math, os, pathlib, re, resource, shutil, signal, subprocess, sys, time
 
@@ -212,7 +212,7 @@ def keys():
         key("m", "a note is written", lambda s: s["writing"])
         w.x("key", "Return")
         w.until("without text it marks", lambda s: s["message"] == "marked" and not s["writing"])
-        # The room: none of it changes what is felt.
+        # The main view: none of it changes what is felt.
         em = w.state()["em_pixels"]
         w.key("ctrl+minus", "smaller text", lambda s: s["em_pixels"] < em)
         w.key("ctrl+0", "text as the monitor has it", lambda s: s["em_pixels"] == em)
@@ -265,7 +265,7 @@ def keys():
             w.next()
             if held == "second hand: nothing":
                 break
-        key("k", "a sucker again", lambda s: "sucker" in s["message"])
+        key("k", "a sucker again", lambda s: "suction tube" in s["message"])
         # To the bone, drilled, sucked and washed, out again. A short V and a long one.
         key("f", "at the bone", lambda s: not s["leading"] and s["message"] == "drill brought to the bone")
         down = w.state()
@@ -314,7 +314,7 @@ def keys():
         key("p", "pieces", lambda s: s["hand"] == "piece")
         apart_now = key("Return", "taken apart", lambda s: s["bodies"] > 1)
         w.x("mousemove", 440, 330)
-        w.drag(1, 40, -20)
+        w.drag(1, -80, -40)
         moved = w.until("piece moved", lambda s: s["places_mm"] != apart_now["places_mm"])
         key("a", "piece turned", lambda s: s["places_mm"] != moved["places_mm"])
         plate = key("l", "plate", lambda s: s["hand"] == "plate")
@@ -334,7 +334,7 @@ def keys():
             "bone whole again",
             lambda s: s["session"] not in ("first", first, second) and s["bodies"] == 1 and s["tick"] > 0,
         )["session"]
-        pressed.update({"q", "Left", "Right"})  # of the page at the end: room()
+        pressed.update({"q", "Left", "Right"})  # of the page at the end: main_view()
         said = w.close()
     for s in ("first", first, second, third):
         assert s in said
@@ -372,7 +372,7 @@ def keys():
     assert wanted == pressed, (wanted - pressed, pressed - wanted)
 
 
-def room():
+def main_view():
     """From the start page to the end page, by keys alone."""
     make_case()
     pathlib.Path("broken").mkdir()
@@ -600,5 +600,5 @@ os.chdir(work)
 os.environ["LIBGL_ALWAYS_SOFTWARE"] = "1"
 os.environ["XDG_CONFIG_HOME"] = str(work / "config")  # nobody's own settings, and none are left behind
 if __name__ == "__main__":
-    {"keys": keys, "room": room, "hand": hand, "signals": signals, "failures": failures}[part]()
+    {"keys": keys, "main_view": main_view, "hand": hand, "signals": signals, "failures": failures}[part]()
     print(f"window {part}: all as it should be")

@@ -9,8 +9,8 @@
 #include "osteo/imaging/image/structures.h"
 #include "osteo/imaging/pipeline/formats.h"
 #include "osteo/session/scene/case.h"
-#include "osteo/session/scene/hand_over.h"
 #include "osteo/session/scene/recipe.h"
+#include "osteo/session/scene/slicer_exchange.h"
 
 namespace osteo {
 namespace {

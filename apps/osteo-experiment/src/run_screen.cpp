@@ -14,7 +14,7 @@
 namespace osteo {
 namespace {
 
-using experiment::DeskPage;
+using experiment::RunPage;
 
 // GLFW's numbers.
 enum : int { kSpaceKey = 32, kEscapeKey = 256, kDownKey = 264, kUpKey = 265 };
@@ -129,7 +129,7 @@ int run_experiment_window(experiment::ForceSkillController& controller, PressedF
   };
   std::uint64_t pictures = 0;
   std::chrono::steady_clock::time_point paused = std::chrono::steady_clock::now();
-  DeskPage last = controller.page();
+  RunPage last = controller.page();
   while (!leave && !shell.closing() && !context.cancelled()) {
     if (!shell.poll()) continue;
     if (std::exchange(go_on, false)) controller.go_on();
@@ -142,7 +142,7 @@ int run_experiment_window(experiment::ForceSkillController& controller, PressedF
     shell.new_frame();
     const auto width = static_cast<float>(shell.width()), height = static_cast<float>(shell.height()),
                em = static_cast<float>(shell.em_pixels());
-    const bool running = controller.page() == DeskPage::training || controller.page() == DeskPage::test;
+    const bool running = controller.page() == RunPage::training || controller.page() == RunPage::test;
     if (options.by_hand) {
       const float top = 0.2F * height, bottom = 0.85F * height, y = ImGui::GetIO().MousePos.y;
       const float mouse =
@@ -154,7 +154,7 @@ int run_experiment_window(experiment::ForceSkillController& controller, PressedF
       if (options.by_hand) draw_force_axis(pressed.n.load(), most_n, options.keys, width, height, em);
     } else {
       auto [title, words] = controller.words();
-      if (controller.page() == DeskPage::pause) {
+      if (controller.page() == RunPage::pause) {
         const double left = 60 * controller.protocol().break_min -
                             std::chrono::duration<double>(std::chrono::steady_clock::now() - paused).count();
         char line[64];
@@ -163,7 +163,7 @@ int run_experiment_window(experiment::ForceSkillController& controller, PressedF
         words += line;
       }
       draw_page(title, words, width, height, em);
-      if (controller.page() == DeskPage::feedback) draw_feedback(controller, width, height);
+      if (controller.page() == RunPage::feedback) draw_feedback(controller, width, height);
     }
     shell.show_page();
     ++pictures;
@@ -182,7 +182,7 @@ int run_experiment_window(experiment::ForceSkillController& controller, PressedF
              {"pressed_n", static_cast<double>(pressed.n.load())},
              {"hand_mm", Json{v.hand_mm.x, v.hand_mm.y, v.hand_mm.z}},
              {"path_mm", Json{v.path_x_mm, v.path_z_mm}}};
-      if (controller.page() != DeskPage::done) j["training"] = experiment::short_name(controller.trial().training);
+      if (controller.page() != RunPage::done) j["training"] = experiment::short_name(controller.trial().training);
       const std::filesystem::path beside = options.state_file.string() + ".new";
       std::ofstream(beside) << j.dump() << '\n';
       std::error_code ignored;

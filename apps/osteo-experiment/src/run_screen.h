@@ -2,7 +2,7 @@
 #pragma once
 #include <filesystem>
 
-#include "osteo/assessment/experiment/desk.h"
+#include "osteo/assessment/experiment/force_skill_controller.h"
 #include "osteo/core/base/context.h"
 
 namespace osteo {

@@ -14,7 +14,7 @@
 #include "osteo/session/recording/session_reader.h"
 #include "osteo/session/scene/approval.h"
 #include "osteo/simulation/bone/burr.h"
-#include "sitting.h"
+#include "session_runner.h"
 #include "window_flags.h"
 #include "window_main.h"
 

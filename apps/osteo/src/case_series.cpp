@@ -9,7 +9,7 @@
 #include "osteo/assessment/case_report/case_report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/session/scene/hand_over.h"
+#include "osteo/session/scene/slicer_exchange.h"
 
 namespace osteo {
 

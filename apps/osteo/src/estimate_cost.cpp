@@ -134,7 +134,7 @@ class SceneCosts {
         return bytes;
       });
     });
-    timed("fragments (window, or --pieces)", "follower",
+    timed("fragments (window, or --fragments)", "follower",
           [&] { return over_bodies([](const BrickGrid& b) { return LiveComponents(b).memory_bytes(); }); });
     if (params_.dust) {
       timed("bone dust (a copy of the bone; more where it lies)", "follower",

@@ -44,7 +44,7 @@ int ExportResultCommand::run(const Params& p, cli::Invocation& io) {
   const auto picture = draw_world(world, readers, nullptr, view);
   std::string text;
   write_folder_atomically(folder, {}, [&](const fs::path& whole) {
-    text = write_plan(world, whole, io.context);
+    text = write_result(world, whole, io.context);
     save_picture(picture, whole / "plan.png");
   });
   io.end_progress();

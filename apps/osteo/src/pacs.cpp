@@ -18,41 +18,41 @@ namespace osteo {
 namespace {
 
 // Where to, or from where: one of both.
-struct Door {
+struct Endpoint {
   std::optional<DicomPeer> node;
   std::optional<WebServer> web;
   std::string name;
 };
 
-Door door_of(const PeerOrWebFlags& p, const cli::Invocation& io) {
-  Door door;
+Endpoint endpoint_of(const PeerOrWebFlags& p, const cli::Invocation& io) {
+  Endpoint endpoint;
   if (p.dicomweb.empty()) {
     if (!p.dicomweb_login.empty() || !p.dicomweb_ca.empty())
       throw Error(ExitCode::usage, "a login or certificates for which server?", "--dicomweb URL");
     if (p.peer.empty())
       throw Error(ExitCode::usage, "no node is named",
                   "--peer TITLE@HOST:PORT, like ORTHANC@127.0.0.1:4242, or --dicomweb URL");
-    door.node = parse_peer(p.peer);
-    door.node->own_ae = checked_ae(p.ae);
-    door.node->timeout_s = p.timeout_s;
-    door.node->tls = p.tls();
-    door.name = peer_text(*door.node);
-    return door;
+    endpoint.node = parse_peer(p.peer);
+    endpoint.node->own_ae = checked_ae(p.ae);
+    endpoint.node->timeout_s = p.timeout_s;
+    endpoint.node->tls = p.tls();
+    endpoint.name = peer_text(*endpoint.node);
+    return endpoint;
   }
   for (const char* const flag : {"peer", "ae", "tls_ca", "tls_certificate", "tls_key"})
     if (io.given.contains(flag))
       throw Error(ExitCode::usage, "a DICOM node and a DICOMweb server at once",
                   "--dicomweb has a login and certificates of its own");
-  door.web.emplace();
-  door.web->url = p.dicomweb;
-  door.web->ca = p.dicomweb_ca;
-  door.web->timeout_s = p.timeout_s;
-  door.web->flag = "--dicomweb";
+  endpoint.web.emplace();
+  endpoint.web->url = p.dicomweb;
+  endpoint.web->ca = p.dicomweb_ca;
+  endpoint.web->timeout_s = p.timeout_s;
+  endpoint.web->flag = "--dicomweb";
   const char* const given = std::getenv("OSTEO_DICOMWEB_LOGIN");
-  door.web->login = !p.dicomweb_login.empty() ? read_login(p.dicomweb_login) : given != nullptr ? given : "";
-  check_dicomweb(*door.web);
-  door.name = web_text(*door.web);
-  return door;
+  endpoint.web->login = !p.dicomweb_login.empty() ? read_login(p.dicomweb_login) : given != nullptr ? given : "";
+  check_dicomweb(*endpoint.web);
+  endpoint.name = web_text(*endpoint.web);
+  return endpoint;
 }
 
 // Of a server: a terminal would take control characters for orders.
@@ -94,7 +94,7 @@ cli::CommandInfo SendCommand::info() {
 }
 
 int SendCommand::run(const Params& p, cli::Invocation& io) {
-  const Door to = door_of(p, io);
+  const Endpoint to = endpoint_of(p, io);
   const AuditTrail trail;
   if (!p.dry_run) require_role("send", trail, io.context);
   if (!p.key.empty() && !p.deidentify)
@@ -211,7 +211,7 @@ cli::CommandInfo FetchCommand::info() {
 }
 
 int FetchCommand::run(const Params& p, cli::Invocation& io) {
-  const Door from = door_of(p, io);
+  const Endpoint from = endpoint_of(p, io);
   if (!p.out.empty() && output_exists(p.out) && !(fs::is_directory(p.out) && fs::is_empty(p.out)))
     throw Error(ExitCode::cannot_write, "'" + p.out + "' exists already",
                 "another folder: what was fetched is never replaced");

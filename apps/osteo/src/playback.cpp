@@ -16,7 +16,7 @@
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"
 #include "osteo/simulation/bone/instrument.h"
-#include "playback_words.h"
+#include "playback_text.h"
 #include "window_program.h"
 
 namespace osteo {

@@ -44,7 +44,7 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
 
 cli::CommandInfo RehearseCommand::info() {
   std::vector<cli::FlagGroup> groups = window_flag_groups({"headless", "script"});
-  groups.push_back({"Without a window", {"seconds", "side", "fast", "pieces"}});
+  groups.push_back({"Without a window", {"seconds", "side", "fast", "fragments"}});
   groups.push_back({"Settings", {"show_settings"}});
   return {"rehearse",
           "drill the bone of a case, in a window or by script",
@@ -162,7 +162,7 @@ class HeadlessSession {
   void read_script(const World& world, int tool) {
     script_ = p_.script.empty() ? make_default_script(world, p_.side == Side::left, tool, p_.seconds)
                                 : load_script(p_.script, planned_cuts_of(case_.folder));
-    doubts_ = doubts_about(script_, world, p_.dust);
+    doubts_ = warnings_about(script_, world, p_.dust);
     for (const std::string& d : doubts_) io_.context.warn(d);
     if (!p_.dust && (p_.position != Posture::supine || p_.head_turned_deg != 0))
       io_.context.warn("how the patient lies moves dust and water alone, and there are none: add --dust");

@@ -15,7 +15,7 @@
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/session/scene/approval.h"
 #include "osteo/session/scene/case.h"
-#include "osteo/session/scene/hand_over.h"
+#include "osteo/session/scene/slicer_exchange.h"
 
 namespace osteo {
 namespace {

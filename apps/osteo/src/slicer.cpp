@@ -18,7 +18,7 @@
 #include "osteo/imaging/io/segments.h"
 #include "osteo/imaging/io/volume_io.h"
 #include "osteo/session/scene/case.h"
-#include "osteo/session/scene/hand_over.h"
+#include "osteo/session/scene/slicer_exchange.h"
 
 namespace osteo {
 namespace {
@@ -86,7 +86,7 @@ std::string mm3(double v) {
   return format_number(v >= 100 ? std::round(v) : std::round(v * 10) / 10) + " mm3";
 }
 
-void print_changes(const TakenBack& back, std::ostream& out) {
+void print_changes(const SlicerImport& back, std::ostream& out) {
   char line[200];
   std::snprintf(line, sizeof line, "%-28s %12s %12s %12s %12s\n", "structure", "before", "after", "added", "removed");
   out << line;
@@ -101,7 +101,7 @@ void print_changes(const TakenBack& back, std::ostream& out) {
   }
 }
 
-Json changes_json(const TakenBack& back) {
+Json changes_json(const SlicerImport& back) {
   Json list = Json::list();
   for (const SegmentChange& c : back.changes)
     list.push_back({{"name", c.name},
@@ -135,7 +135,7 @@ int ExportSlicerCommand::run(const Params& p, cli::Invocation& io) {
   std::optional<CaseEdits> edits;
   const CaseImages images = images_now(pipeline_of(io.arguments[0], p.source), io.arguments[0], edits, io);
   const AuditTrail trail;
-  hand_over(images, folder);
+  export_slicer(images, folder);
   io.end_progress();
   audit_case(trail, AuditEvent::Kind::hand_over, io.arguments[0], io.context);
   if (io.common.quiet) return 0;
@@ -168,7 +168,7 @@ int ImportSlicerCommand::run(const Params& p, cli::Invocation& io) {
   const CasePipeline pipeline = pipeline_of(folder, p.source);
   std::optional<CaseEdits> edits;
   const CaseImages images = images_now(pipeline, folder, edits, io);
-  TakenBack back = take_back(images, from, {p.match_by_position}, io.context);
+  SlicerImport back = import_slicer(images, from, {p.match_by_position}, io.context);
   io.end_progress();
   if (io.common.json) {
     io.out << changes_json(back).dump(2) << '\n';

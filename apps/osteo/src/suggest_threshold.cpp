@@ -85,7 +85,7 @@ int SuggestThresholdCommand::run(const Params& p, cli::Invocation& io) {
   if (!p.picture.empty()) write_file(p.picture, histogram_svg(ct, g));
   if (io.common.json) {
     Json j{{"soft_tissue_hu", g.soft_tissue_hu}, {"noise_hu", g.noise_hu}, {"dense_bone_hu", g.dense_bone_hu},
-           {"confidence", g.confidence},         {"doubt", g.doubt},       {"presets", Json::object()}};
+           {"confidence", g.confidence},         {"warning", g.doubt},     {"presets", Json::object()}};
     for (const PresetGuide& each : g.presets) {
       j["presets"][std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(each.preset)])] = {
           {"lower_hu", each.lower_hu},

@@ -20,7 +20,7 @@
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"
 #include "osteo/simulation/bone/instrument.h"
-#include "playback_words.h"
+#include "playback_text.h"
 
 namespace osteo {
 namespace {

@@ -13,7 +13,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 #include "pictures.h"
-#include "words.h"
+#include "texts.h"
 
 namespace osteo::case_report {
 namespace {

@@ -1,4 +1,4 @@
-// Protocol, runs, trials on disk, the desk and the analysis: by what they do.
+// Protocol, runs, trials on disk, the controller and the analysis: by what they do.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <set>
 
 #include "osteo/assessment/experiment/analysis.h"
-#include "osteo/assessment/experiment/desk.h"
+#include "osteo/assessment/experiment/force_skill_controller.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/statistics/basics.h"
@@ -260,10 +260,10 @@ TEST(Controller, GoesThroughATrialAndSavesIt) {
   // The first block that is not by hand alone has feedback behind its training.
   ForceSkillController controller(folder.path(), p, 0, false, Mover::keys, "keys", {.damping_n_s_per_m = 12});
   const bool sees = controller.trial().training != Training::haptic;
-  EXPECT_EQ(controller.page(), DeskPage::before_training);
+  EXPECT_EQ(controller.page(), RunPage::before_training);
   EXPECT_EQ(length(controller.step({})), 0);
   controller.update();
-  EXPECT_EQ(controller.page(), DeskPage::before_training);
+  EXPECT_EQ(controller.page(), RunPage::before_training);
   const auto run = [&] {
     SimulatedDeviceParams arm;
     arm.mass_kg = 0.25;
@@ -281,21 +281,21 @@ TEST(Controller, GoesThroughATrialAndSavesIt) {
     controller.update();
   };
   controller.go_on();
-  EXPECT_EQ(controller.page(), DeskPage::training);
+  EXPECT_EQ(controller.page(), RunPage::training);
   run();
   if (sees) {
-    EXPECT_EQ(controller.page(), DeskPage::feedback);
+    EXPECT_EQ(controller.page(), RunPage::feedback);
     EXPECT_EQ(controller.last_training().first.size(), controller.last_training().second.size());
     controller.go_on();
   }
-  EXPECT_EQ(controller.page(), DeskPage::before_test);
+  EXPECT_EQ(controller.page(), RunPage::before_test);
   controller.go_on();
   run();
   EXPECT_EQ(controller.done(), 1U);
   const auto scores = read_trials(folder.path() / "S1");
   ASSERT_EQ(scores.size(), 1U);
   EXPECT_EQ(scores[0].mover, Mover::keys);
-  // Another desk goes on there.
+  // Another controller goes on there.
   const ForceSkillController again(folder.path(), p, 0, false, Mover::keys, "keys", {});
   EXPECT_EQ(again.done(), 1U);
 }

@@ -397,7 +397,7 @@ TEST(Script, IsReadStrictlyAndErrorsSayFileAndLine) {
   for (const std::string pieces : {"[]", "[0, 1, 2]", "[1, 1]"})
     expect(with_action("{ \"t_s\": 0.2, \"attach\": { \"plate\": \"miniplate-4\", \"at_mm\": [0, 0, 0], \"pieces\": " +
                        pieces + " } }"),
-           "7", "\"pieces\" are one, or two");
+           "7", "\"fragments\" are one, or two");
   expect(with_action("{ \"t_s\": 0.2, \"suction\": { \"at_mm\": [0, 0, 0], \"radius_mm\": 150 } }"), "7",
          "\"radius_mm\" is 150 but must be");
   expect(with_action("{ \"t_s\": 0.2, \"suction\": { \"radius_mm\": 5 } }"), "7", "\"at_mm\" is missing");
@@ -458,7 +458,7 @@ TEST(Script, SchemaAndReaderAgree) {
     for (const auto& [key, k] : keys.items()) {
       if (key == "plate")
         right[key] = "miniplate-4";
-      else if (key == "pieces")
+      else if (key == "fragments")
         right[key] = {0, 1};
       else if (k.value("type", "") == "array")
         right[key] = key == "along" ? nlohmann::json{0, 1, 0} : nlohmann::json{1, 0, 0};

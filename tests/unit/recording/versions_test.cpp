@@ -115,7 +115,7 @@ TEST(Versions, ALaterSessionIsReadByThisVersion) {
 // A burr that came later, and stands where it belongs, gives all behind it other numbers: names count.
 TEST(Versions, InstrumentsAndPlatesGoByTheirNames) {
   const auto path = fresh("renumbered.oss");
-  const std::vector<std::string> used{"cutting 1 mm", "diamond 7 mm", "sucker 8 Fr", "hook 2 mm", "saw 25 mm"};
+  const std::vector<std::string> used{"cutting 1 mm", "diamond 7 mm", "suction tube 8 Fr", "hook 2 mm", "saw 25 mm"};
   const std::uint32_t plate = static_cast<std::uint32_t>(plate_library().size()) - 1;
   const std::string plate_name = plate_library()[plate].name;
   for (const bool shorter : {false, true}) {
@@ -131,13 +131,17 @@ TEST(Versions, InstrumentsAndPlatesGoByTheirNames) {
             !shorter);
         test::renumber(
             j["plates"], [](const std::string&) { return true; }, true);
+        // Sessions of 0.1 call suction tubes so.
+        for (auto& i : j["instruments"])
+          if (shorter && i["name"] == "suction tube 8 Fr") i["name"] = "sucker 8 Fr";
         instruments = j["instruments"];
         plates = j["plates"];
         for (auto& t : j["haptics"]["tool_methods"]) t[0] = test::number_in(instruments, "saw 25 mm");
       });
       auto ticks = some_ticks(0, used.size());
       for (std::size_t n = 0; n < used.size(); ++n)
-        ticks[n].device.tool = static_cast<std::uint8_t>(test::number_in(instruments, used[n]));
+        ticks[n].device.tool =
+            static_cast<std::uint8_t>(test::number_in(instruments, shorter && n == 2 ? "sucker 8 Fr" : used[n]));
       SceneAction grip = SceneAction::grip(test::number_in(plates, plate_name)),
                   away = SceneAction::grip(SceneAction::kNobody);
       SceneAction off = SceneAction::detach(1);

@@ -145,27 +145,27 @@ TEST(ScriptedScene, PosesThatAreNoneAreCounted) {
   }
 }
 
-TEST(ScriptedScene, DoubtsAboutAScript) {
+TEST(ScriptedScene, WarningsAboutAScript) {
   const World world(test::bar(0.5, 0));
-  const auto doubts = [&](Script s, bool dust = false) {
+  const auto warnings = [&](Script s, bool dust = false) {
     std::string all;
-    for (const std::string& d : doubts_about(s, world, dust)) all += d + "\n";
+    for (const std::string& d : warnings_about(s, world, dust)) all += d + "\n";
     return all;
   };
   Script s = press();
-  EXPECT_EQ(doubts(s), "");
+  EXPECT_EQ(warnings(s), "");
   for (auto& w : s.waypoints) w.at_mm = w.at_mm * 0.001;
-  EXPECT_NE(doubts(s).find("metres"), std::string::npos);
+  EXPECT_NE(warnings(s).find("metres"), std::string::npos);
   s = press();
   for (auto& w : s.waypoints) w.at_mm.x += 5000;
-  EXPECT_NE(doubts(s).find("never comes nearer than"), std::string::npos);
+  EXPECT_NE(warnings(s).find("never comes nearer than"), std::string::npos);
   // On its way from far to far it passes the bone.
   s.waypoints = {{0, {-5000, 0, 0}, true}, {1, {5000, 0, 0}, true}};
-  EXPECT_EQ(doubts(s), "");
+  EXPECT_EQ(warnings(s), "");
   s = press();
   s.actions = {{0.1, SceneAction::irrigate({0, 0, 5}, 5, 1)}};
-  EXPECT_NE(doubts(s).find("--dust"), std::string::npos);
-  EXPECT_EQ(doubts(s, true), "");
+  EXPECT_NE(warnings(s).find("--dust"), std::string::npos);
+  EXPECT_EQ(warnings(s, true), "");
 }
 
 }  // namespace

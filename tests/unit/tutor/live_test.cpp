@@ -192,8 +192,8 @@ TEST(Live, TheSpringThatIsStableForEveryDelay) {
   EXPECT_LE(far_guide(0, 1, {.damping_n_s_per_m = 21}, 10, 6).stiffness_n_per_mm, 23.0 * 23 / 0.5 / 1000);
 }
 
-TEST(Playout, PlaysEvenlyWhatComesUnevenly) {
-  Playout playout;
+TEST(JitterBuffer, PlaysEvenlyWhatComesUnevenly) {
+  JitterBuffer jitter_buffer;
   test::SimNetwork net({20, 30, 0.1, 0.1}, 3);
   std::map<std::uint64_t, int> plays;
   std::uint64_t before = 0, backwards = 0, jumps = 0;
@@ -208,28 +208,28 @@ TEST(Playout, PlaysEvenlyWhatComesUnevenly) {
       std::memcpy(&tick, a.data(), 8);
       DeviceSample x;
       x.position_mm[0] = static_cast<float>(tick);
-      playout.put({tick, x}, t, true);
+      jitter_buffer.put({tick, x}, t, true);
     }
-    static_cast<void>(playout.read(t));
+    static_cast<void>(jitter_buffer.read(t));
     if (t > 1000) {
-      backwards += playout.played_tick() < before ? 1 : 0;
-      jumps += playout.played_tick() > before + 4 ? 1 : 0;
+      backwards += jitter_buffer.played_tick() < before ? 1 : 0;
+      jumps += jitter_buffer.played_tick() > before + 4 ? 1 : 0;
     }
-    before = playout.played_tick();
+    before = jitter_buffer.played_tick();
   }
   EXPECT_EQ(backwards, 0U);
   EXPECT_LT(jumps, 20U);
-  EXPECT_NEAR(playout.buffer_ticks(), 29, 3);
+  EXPECT_NEAR(jitter_buffer.buffer_ticks(), 29, 3);
 }
 
 // A machine that is busy for a moment: the pull comes back as it went, not within half a second.
-TEST(Playout, AMomentOfSilenceTakesThePullForAMomentOnly) {
+TEST(JitterBuffer, AMomentOfSilenceTakesThePullForAMomentOnly) {
   const auto ticks_below = [](std::uint64_t silent) {
-    Playout playout;
+    JitterBuffer jitter_buffer;
     int below = 0;
     for (std::uint64_t t = 0; t < 3000; ++t) {
-      if (t % 4 == 0 && (t < 1000 || t >= 1000 + silent)) playout.put({t, {}}, t, true);
-      const DeviceSample s = playout.read(t);
+      if (t % 4 == 0 && (t < 1000 || t >= 1000 + silent)) jitter_buffer.put({t, {}}, t, true);
+      const DeviceSample s = jitter_buffer.read(t);
       if (t >= 1000) below += (s.buttons & kLeadStrength) < kLeadStrength ? 1 : 0;
     }
     return below;

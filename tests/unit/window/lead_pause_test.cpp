@@ -44,7 +44,7 @@ struct LedSessionRunner {
     a.begin = [this](bool, const HandView& view) {
       World world(test::bar(0.5, 0.2));
       const HandPose pose =
-          FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
+          PathPlanner(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
       const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
       RehearsalOptions o;
       o.follow.surface = false;

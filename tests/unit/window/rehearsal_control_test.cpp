@@ -8,6 +8,9 @@
 
 #include "bar.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/core/base/translate.h"
+#include "osteo/session/recording/session_file.h"
 #include "scratch.h"
 
 namespace osteo {
@@ -34,7 +37,7 @@ struct SessionRunner {
       if (fails_to_begin) throw Error(*std::exchange(fails_to_begin, {}));
       World world = (from_case ? first : last).copy();
       const HandPose pose =
-          FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
+          PathPlanner(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
       const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
       RehearsalOptions options;
       options.follow = {true, true, true};
@@ -133,7 +136,7 @@ TEST(RehearsalControl, ZTakesBackTheLastStrokeAndThenTheCut) {
   EXPECT_EQ(hash(), whole);
   press(control, Command::undo);
   std::string note;
-  ASSERT_TRUE(frames_until(control, [&] { return !(note = control.tools().note(control.rehearsal())).empty(); }));
+  ASSERT_TRUE(frames_until(control, [&] { return !(note = control.tools().note(control.rehearsal()).shown).empty(); }));
   EXPECT_EQ(note, "undo: there is nothing to take back");
   session_runner.running->stop();
 }
@@ -151,7 +154,7 @@ TEST(RehearsalControl, APlannedCutIsChosenAndOneIsKept) {
   ASSERT_EQ(tools.planned().size(), 1u);
   press(control, Command::saw);
   tools.choose_planned(0);
-  EXPECT_EQ(tools.note(control.rehearsal()), "saw at the planned cut 'body'");
+  EXPECT_EQ(tools.note(control.rehearsal()).shown, "saw at the planned cut 'body'");
   tools.take_saw(control.rehearsal());
   ASSERT_TRUE(
       frames_until(control, [&] { return of_world(control, [](const World& w) { return w.cutting_guide().on(); }); }));
@@ -174,13 +177,14 @@ TEST(RehearsalControl, APlannedCutIsChosenAndOneIsKept) {
   // A name twice, none, a folder that is not there: said, and the file stays as it is.
   const std::string before = read_text(file);
   tools.keep_planned("ramus");
-  EXPECT_EQ(tools.note(control.rehearsal()), "there is a planned cut 'ramus' already");
+  EXPECT_EQ(tools.note(control.rehearsal()).shown, "there is a planned cut 'ramus' already");
   tools.keep_planned("");
-  EXPECT_EQ(tools.note(control.rehearsal()), "a planned cut needs a name");
+  EXPECT_EQ(tools.note(control.rehearsal()).shown, "a planned cut needs a name");
   EXPECT_EQ(read_text(file), before);
   tools.plan({}, scratch.path() / "gone" / "x.json");
   tools.keep_planned("lost");
-  EXPECT_NE(tools.note(control.rehearsal()).find("gone"), std::string::npos) << tools.note(control.rehearsal());
+  EXPECT_NE(tools.note(control.rehearsal()).shown.find("gone"), std::string::npos)
+      << tools.note(control.rehearsal()).shown;
   EXPECT_TRUE(tools.planned().empty());
   session_runner.running->stop();
 }
@@ -546,7 +550,7 @@ TEST(RehearsalControl, TheMouseMovesTheSecondHand) {
   ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().tick > 50; }));
   const Vec3 drill = control.goal_mm();
   control.drag_second({0, 3, 0});
-  EXPECT_NE(control.message().find("sucker"), std::string::npos) << control.message();
+  EXPECT_NE(control.message().find("suction tube"), std::string::npos) << control.message();
   const Vec3 there = control.second_mm() + Vec3{2, 0, 1};
   control.drag_second({2, 0, 1});
   EXPECT_EQ(control.second_mm(), there);
@@ -594,6 +598,46 @@ TEST(RehearsalControl, ALeftHandHasTheSecondOneAtItsRight) {
     EXPECT_TRUE(frames_until(control, so)) << left;
   }
   session_runner.running->stop();
+}
+
+TEST(RehearsalControl, ASessionKeepsItsMessagesInEnglishInAnyLanguage) {
+  SessionRunner session_runner;
+  RehearsalControl control = session_runner.control();
+  std::vector<std::string> shown;
+  {
+    const InLanguage german(Language::german);
+    ASSERT_TRUE(control.begin(true, false));
+    const auto said = [&] { shown.push_back(control.message()); };
+    press(control, Command::burr_speed, -1);
+    said();
+    press(control, Command::second_hand);
+    said();
+    press(control, Command::saw);
+    said();
+    control.tools().keep_planned("");
+    ASSERT_TRUE(frames_until(control, [&] { return control.message() != shown.back(); }));
+    said();
+    control.say([] { return shown_number(2.5, 1) + " mm"; });
+    said();
+  }
+  session_runner.running.reset();
+  const SessionReader file(session_runner.scratch / "1.oss");
+  std::vector<std::string> kept;
+  auto parts = file.parts();
+  while (const SessionPart* const part = parts.next()) {
+    for (const Note& note : part->notes) {
+      const auto text = note.kind == "message" ? Json::parse(note.json) : std::nullopt;
+      if (text && text->text() != nullptr) kept.push_back(*text->text());
+    }
+  }
+  ASSERT_EQ(kept.size(), shown.size());
+  EXPECT_EQ(kept[0], "burr at most at 75 % of its speed");
+  EXPECT_EQ(kept[1].find("second hand: "), 0U) << kept[1];
+  EXPECT_EQ(kept[2].find("saw: "), 0U) << kept[2];
+  EXPECT_EQ(kept[3], "a planned cut needs a name");
+  EXPECT_EQ(kept[4], "2.5 mm");
+  for (std::size_t n = 0; n < kept.size(); ++n) EXPECT_NE(kept[n], shown[n]) << "on screen it is German";
+  EXPECT_EQ(shown[4], "2,5 mm");
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "evidence/scene.h"
-#include "hint_desk.h"
+#include "hint_controller.h"
 #include "osteo/core/base/error.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "review_panel.h"
@@ -166,10 +166,10 @@ TEST(ReviewControl, WhatFailsIsSaidAndWhatIsNotWantedIsStopped) {
 
 TEST(ReviewScene, CourseTakesTheLowerEdgeOfThePictureOnlyWhereItIsShown) {
   ReviewScene scene;
-  RoomLayout room = lay_out(Layout::review, 1024, 700, 16);
-  const ScreenBox view = room.view;
-  scene.lay_out(room, 16);
-  EXPECT_EQ(room.view, view);
+  ViewLayout layout = lay_out(Layout::review, 1024, 700, 16);
+  const ScreenBox view = layout.view;
+  scene.lay_out(layout, 16);
+  EXPECT_EQ(layout.view, view);
 }
 
 TEST(Hints, AreTurnedOffOneByOne) {

@@ -30,10 +30,10 @@ ScopeInput some_input() {
 
 std::string press(ScopeInput& input, Command command, int value = 0, bool shift = false,
                   std::optional<Vec3> under = {}) {
-  std::string said;
+  LocalText said;
   EXPECT_TRUE(input.key({command, value, shift}, some_scene(), under, said));
   input.advance(Keyboard(), false, {}, 1);
-  return said;
+  return said.shown;
 }
 
 TEST(ScopeInput, TheMiddleButtonKeepsTheFocusPlaneUnderTheMouse) {
@@ -124,7 +124,7 @@ TEST(ScopeInput, KeysForViews) {
   EXPECT_EQ(input.view().focus_mm, some_scene().centre_mm);
   for (int n = 0; n < 10; ++n) press(input, Command::camera_back);
   EXPECT_NE(press(input, Command::camera_back), "");
-  std::string said;
+  LocalText said;
   EXPECT_FALSE(input.key({Command::bring, 0}, some_scene(), {}, said)) << "not the camera's";
 }
 

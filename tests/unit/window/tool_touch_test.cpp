@@ -21,8 +21,8 @@ TEST(ToolTouch, IsToldOnceAndShownWhileItLasts) {
   EXPECT_FALSE(touch.at_mm());
   const auto reported = look(3);
   ASSERT_TRUE(reported);
-  EXPECT_EQ(reported->words, "the suction tube touches the drill");
-  EXPECT_EQ(reported->note.find("{\"hands\":[0,1],\"tools\":[\"cutting 4 mm\",\"sucker 8 Fr\"],\"at_mm\":["), 0U)
+  EXPECT_EQ(reported->text.shown, "the suction tube touches the drill");
+  EXPECT_EQ(reported->note.find("{\"hands\":[0,1],\"tools\":[\"cutting 4 mm\",\"suction tube 8 Fr\"],\"at_mm\":["), 0U)
       << reported->note;
   ASSERT_TRUE(touch.at_mm());
   EXPECT_NEAR(touch.at_mm()->x, 1.83, 0.05);
@@ -34,7 +34,7 @@ TEST(ToolTouch, IsToldOnceAndShownWhileItLasts) {
   EXPECT_FALSE(look(8));  // away and back
   const auto shaft = look(2, 8);
   ASSERT_TRUE(shaft);
-  EXPECT_EQ(shaft->words, "the suction tube touches the drill's shaft");
+  EXPECT_EQ(shaft->text.shown, "the suction tube touches the drill's shaft");
   drill.flags = kPlateInHand;
   EXPECT_FALSE(look(8));
   EXPECT_FALSE(look(3));

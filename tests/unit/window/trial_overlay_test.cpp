@@ -28,10 +28,10 @@ TEST(TrialOverlay, SaysAndWritesEachViewThatIsReached) {
   for (std::size_t n = 0; n < targets.size(); ++n) {
     ASSERT_TRUE(trial.running());
     control.go(targets[n]);
-    std::optional<std::string> said;
+    std::optional<LocalText> said;
     for (int frame = 0; frame < 60 && !said; ++frame) said = trial.advance(control, 1.0 / 60, csv);
     ASSERT_TRUE(said) << n;
-    last = *said;
+    last = said->shown;
   }
   EXPECT_FALSE(trial.running());
   EXPECT_NE(last.find("view 12 of 12"), std::string::npos) << last;
@@ -50,10 +50,10 @@ TEST(TrialOverlay, AFolderThatIsGoneIsSaid) {
   const ScopeView start = overview({}, 60, {1, 0, 0});
   trial.begin(start, {});
   control.go(camera_targets(start, TrialOverlay::kTargets, 1)[0]);
-  std::optional<std::string> said;
+  std::optional<LocalText> said;
   for (int frame = 0; frame < 60 && !said; ++frame) said = trial.advance(control, 1.0 / 60, "/nowhere/at/all.csv");
   ASSERT_TRUE(said);
-  EXPECT_NE(said->find("/nowhere"), std::string::npos) << *said;
+  EXPECT_NE(said->shown.find("/nowhere"), std::string::npos) << said->shown;
 }
 
 }  // namespace

@@ -33,15 +33,15 @@ TEST(TutorPanel, ALinkThatDropsIsToldOnce) {
   TutorNow now;
   EXPECT_FALSE(watch.look(now));
   now.links.push_back({"trainee", true});
-  EXPECT_EQ(watch.look(now), "trainee has joined");
+  EXPECT_EQ(watch.look(now)->shown, "trainee has joined");
   EXPECT_FALSE(watch.look(now));
   now.links[0].heard = false;
-  EXPECT_NE(watch.look(now)->find("has dropped"), std::string::npos);
+  EXPECT_NE(watch.look(now)->shown.find("has dropped"), std::string::npos);
   EXPECT_FALSE(watch.look(now));
   now.links[0].heard = true;
-  EXPECT_NE(watch.look(now)->find("is back"), std::string::npos);
+  EXPECT_NE(watch.look(now)->shown.find("is back"), std::string::npos);
   now.links.clear();
-  EXPECT_EQ(watch.look(now), "trainee has left");
+  EXPECT_EQ(watch.look(now)->shown, "trainee has left");
 }
 
 }  // namespace

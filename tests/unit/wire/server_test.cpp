@@ -264,9 +264,9 @@ class Kept final : public MonitorSink {
 
 // What a feed tells is what a console far away shows: every sample, every event but those that nobody can know.
 TEST(RemoteMonitor, HasEverySampleAndEvent) {
-  auto outlet = make_outlet({StreamTarget::Kind::igtl, "127.0.0.1:0", ""});
-  outlet->begin({{"oculi", "oris"}, 100});
-  const std::string reported = outlet->reported();
+  auto sink = make_sink({StreamTarget::Kind::igtl, "127.0.0.1:0", ""});
+  sink->begin({{"oculi", "oris"}, 100});
+  const std::string reported = sink->reported();
   const int port = std::stoi(reported.substr(reported.find("port ") + 5));
   Kept kept;
   std::atomic<int> begun{0};
@@ -275,7 +275,7 @@ TEST(RemoteMonitor, HasEverySampleAndEvent) {
     ++begun;
     return std::vector<MonitorSink*>{&kept};
   });
-  ASSERT_TRUE(outlet->wait(1, 30, {}));
+  ASSERT_TRUE(sink->wait(1, 30, {}));
   std::vector<std::int16_t> sent;
   for (int block = 0; block < 200; ++block) {
     std::vector<std::int16_t> values(300);
@@ -283,7 +283,7 @@ TEST(RemoteMonitor, HasEverySampleAndEvent) {
       values[i] = static_cast<std::int16_t>(block * 300 + static_cast<int>(i));
     const std::uint64_t first =
         static_cast<std::uint64_t>(block) * 150 + (block >= 100 ? 600 : 0);  // 20 ms are missing
-    outlet->block({first, 2, values});
+    sink->block({first, 2, values});
     sent.insert(sent.end(), values.begin(), values.end());
   }
   MonitorEvent e;
@@ -293,10 +293,10 @@ TEST(RemoteMonitor, HasEverySampleAndEvent) {
   e.uv = 250.5;
   e.ms = 5.25;
   e.ma = 0.5;
-  outlet->event(e, "response, oris");
+  sink->event(e, "response, oris");
   e.kind = MonitorEventKind::cause;
   EXPECT_EQ(event_json(e, ""), "");
-  outlet->end(1, "{}");
+  sink->end(1, "{}");
   ASSERT_TRUE(soon([&] { return remote.ended(); }));
   EXPECT_EQ(kept.values, sent);
   EXPECT_EQ(remote.samples(), 30000u);
@@ -311,7 +311,7 @@ TEST(RemoteMonitor, HasEverySampleAndEvent) {
   EXPECT_EQ(begun, 1);
   // Another session of the same server begins before what was heard: nothing is lost, and it is shown again.
   const std::vector<std::int16_t> two{1, 2};
-  outlet->block({0, 2, two});
+  sink->block({0, 2, two});
   ASSERT_TRUE(soon([&] { return begun == 2; }));
   ASSERT_TRUE(soon([&] { return remote.samples() == 30001; }));
   EXPECT_EQ(remote.lost(), 600u);

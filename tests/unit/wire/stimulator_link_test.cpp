@@ -39,12 +39,12 @@ int connected_to(int port) {
 struct Theatre {
   std::vector<StimulatorSetting> set;
   StimulatorSetting now;
-  StimulatorDoor door{kCode,
-                      [this](const StimulatorSetting& s) {
-                        set.push_back(s);
-                        now = s;
-                      },
-                      [this] { return std::pair(now, std::uint32_t{2}); }};
+  StimulatorEndpoint endpoint{kCode,
+                              [this](const StimulatorSetting& s) {
+                                set.push_back(s);
+                                now = s;
+                              },
+                              [this] { return std::pair(now, std::uint32_t{2}); }};
   double at_s = 0;
   std::vector<WireBytes> said_to_door;
 
@@ -56,7 +56,7 @@ struct Theatre {
       for (const WireBytes& b : to_door) {
         said_to_door.push_back(b);
         with(b, [&](const IgtlMessage& m) {
-          for (WireBytes& a : door.hear(client, m, at_s)) to_link.push_back(std::move(a));
+          for (WireBytes& a : endpoint.hear(client, m, at_s)) to_link.push_back(std::move(a));
         });
       }
       to_door.clear();
@@ -89,7 +89,7 @@ TEST(StimulatorLink, WhoHasTheCodeSetsCurrentPulsesAndSearch) {
   EXPECT_EQ(theatre.set[1], (StimulatorSetting{0, StimulatorSetting::kMaxMa, 30, 1, false}));
   theatre.talk(link, 1, *link.set({2, 1, 4, 0.1, false}));
   EXPECT_EQ(theatre.set.size(), 2U);
-  EXPECT_EQ(theatre.door.counts().settings, 2U);
+  EXPECT_EQ(theatre.endpoint.counts().settings, 2U);
   link.reported(0, false);
   EXPECT_EQ(link.state().now.current_ma, 0);
 }
@@ -103,7 +103,7 @@ TEST(StimulatorLink, AWrongCodeSetsNothingAndThreeCloseTheDoor) {
     EXPECT_NE(wrong.state().refused.find("another"), std::string::npos);
     EXPECT_FALSE(wrong.set({0, 1, 4, 0.1, false}));
   }
-  EXPECT_EQ(theatre.door.counts().tries_left, 0);
+  EXPECT_EQ(theatre.endpoint.counts().tries_left, 0);
   StimulatorLink right(kCode);
   theatre.talk(right, 20, right.begin());
   EXPECT_FALSE(right.state().paired);
@@ -120,7 +120,7 @@ TEST(StimulatorLink, NothingIsTakenTwiceChangedOrFromSomebodyElse) {
   ASSERT_EQ(theatre.set.size(), 1U);
   const std::vector<WireBytes> all = theatre.said_to_door;
   const auto hear = [&](std::uint64_t client, const WireBytes& b) {
-    with(b, [&](const IgtlMessage& m) { static_cast<void>(theatre.door.hear(client, m, theatre.at_s += 1)); });
+    with(b, [&](const IgtlMessage& m) { static_cast<void>(theatre.endpoint.hear(client, m, theatre.at_s += 1)); });
   };
   hear(1, good);                              // once more
   for (const WireBytes& b : all) hear(2, b);  // all that was said, from another connection
@@ -131,7 +131,7 @@ TEST(StimulatorLink, NothingIsTakenTwiceChangedOrFromSomebodyElse) {
     hear(1, igtl_message(kStimulatorType, "Stimulator", 0, body));
   }
   EXPECT_EQ(theatre.set.size(), 1U);
-  theatre.door.gone(1);
+  theatre.endpoint.gone(1);
   hear(1, *link.set({0, 2, 4, 0.1, false}));
   EXPECT_EQ(theatre.set.size(), 1U);
 }
@@ -157,34 +157,34 @@ TEST(StimulatorLink, WhateverComesNothingBreaksAndNothingIsSet) {
       if (below(3) == 0) body.resize(below(body.size() + 1));
     }
     with(igtl_message(kStimulatorType, "x", 0, body), [&](const IgtlMessage& m) {
-      static_cast<void>(theatre.door.hear(1 + below(8), m, theatre.at_s += 0.01));
+      static_cast<void>(theatre.endpoint.hear(1 + below(8), m, theatre.at_s += 0.01));
       static_cast<void>(link.hear(m));
     });
   }
   EXPECT_EQ(theatre.set.size(), 1U);
   // A flood in one moment: no more is looked at than in a second.
-  const auto before = theatre.door.counts().refused;
+  const auto before = theatre.endpoint.counts().refused;
   for (int i = 0; i < 1000; ++i)
-    with(link.begin(), [&](const IgtlMessage& m) { static_cast<void>(theatre.door.hear(3, m, theatre.at_s)); });
-  EXPECT_GE(theatre.door.counts().refused - before, 1000U - 101U);
+    with(link.begin(), [&](const IgtlMessage& m) { static_cast<void>(theatre.endpoint.hear(3, m, theatre.at_s)); });
+  EXPECT_GE(theatre.endpoint.counts().refused - before, 1000U - 101U);
 }
 
-// Over the loopback, from a console to the door behind an OpenIGTLink server; and one who does not have the code hears
-// as before.
+// Over the loopback, from a console to the endpoint behind an OpenIGTLink server; and one who does not have the code
+// hears as before.
 TEST(StimulatorLink, OverTheNetwork) {
-  auto outlet = make_outlet({StreamTarget::Kind::igtl, "127.0.0.1:0", "", true});
+  auto sink = make_sink({StreamTarget::Kind::igtl, "127.0.0.1:0", "", true});
   std::mutex mutex;
   std::vector<StimulatorSetting> set;
-  const auto door = std::make_shared<StimulatorDoor>(
+  const auto endpoint = std::make_shared<StimulatorEndpoint>(
       kCode,
       [&](const StimulatorSetting& s) {
         const std::lock_guard lock(mutex);
         set.push_back(s);
       },
       [] { return std::pair(StimulatorSetting{}, std::uint32_t{1}); });
-  outlet->let_stimulate(door);
-  outlet->begin({{"oculi"}, 100});
-  const std::string reported = outlet->reported();
+  sink->let_stimulate(endpoint);
+  sink->begin({{"oculi"}, 100});
+  const std::string reported = sink->reported();
   const int port = std::stoi(reported.substr(reported.find("port ") + 5));
   const auto none = [](const WireMonitor&) { return std::vector<MonitorSink*>{}; };
   RemoteMonitor with_code({"127.0.0.1", port}, none, kCode), without({"127.0.0.1", port}, none),
@@ -205,7 +205,7 @@ TEST(StimulatorLink, OverTheNetwork) {
   MonitorEvent e;
   e.kind = MonitorEventKind::threshold;
   e.ma = 0.4;
-  outlet->event(e, "threshold");
+  sink->event(e, "threshold");
   ASSERT_TRUE(soon([&] { return with_code.stimulator().now.current_ma == 0; }));
   // One who floods its connection with what looks right, and one with what is no message at all: neither is in
   // anybody's way.
@@ -218,7 +218,7 @@ TEST(StimulatorLink, OverTheNetwork) {
   EXPECT_EQ(::send(flooder, much.data(), much.size(), MSG_NOSIGNAL), static_cast<ssize_t>(much.size()));
   const WireBytes noise(100000, 0xa5);
   EXPECT_EQ(::send(babbler, noise.data(), noise.size(), MSG_NOSIGNAL), static_cast<ssize_t>(noise.size()));
-  ASSERT_TRUE(soon([&] { return door->counts().refused > 1000; }));
+  ASSERT_TRUE(soon([&] { return endpoint->counts().refused > 1000; }));
   with_code.stimulate({0, 2.5, 4, 0.1, false});
   ASSERT_TRUE(soon([&] { return with_code.stimulator().now.current_ma == 2.5; }));
   ::close(flooder);

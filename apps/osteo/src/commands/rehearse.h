@@ -27,7 +27,7 @@ struct RehearseCommand {
     visit({"side", "side of the patient for the built-in strokes"}, p.side);
     visit({"seconds", "length of the built-in strokes", "s", 1, 3600}, p.seconds);
     visit({"fast", "run as fast as possible instead of in real time; the result is the same"}, p.fast);
-    visit({"pieces", "watch for separate fragments; the summary lists them (the window always does)"}, p.pieces);
+    visit({"fragments", "watch for separate fragments; the summary lists them (the window always does)"}, p.pieces);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

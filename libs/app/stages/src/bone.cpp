@@ -77,7 +77,7 @@ StageInfo SeparateFragmentsStage::info() {
                   {"surface", {DataKind::surface}, "closed, one body or more a piece", true},
                   {"kept", {DataKind::grid}, "density of the piece that --keep names, or of all but the crumbs", true}},
       .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.6"},
-      .example = "osteo separate-fragments cut.vdb pieces.json --surface-out pieces.ply --apart-mm 15"};
+      .example = "osteo separate-fragments cut.vdb fragments.json --surface-out fragments.ply --apart-mm 15"};
 }
 
 std::vector<Data> SeparateFragmentsStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
@@ -98,7 +98,7 @@ std::vector<Data> SeparateFragmentsStage::run(const Params& p, std::span<const D
   }
   middle = middle / mass;
   Json j;
-  j["pieces"] = Json::list();
+  j["fragments"] = Json::list();
   j["crumbs"] = {{"count", split.crumbs}, {"volume_mm3", split.crumbs_mm3}};
   TriMesh all;
   for (std::size_t n = 0; n < split.pieces.size(); ++n) {
@@ -109,12 +109,13 @@ std::vector<Data> SeparateFragmentsStage::run(const Params& p, std::span<const D
     // About the centre, for a density of 1 g/cm3 where bone is whole: g mm2.
     for (const double i : piece.solid.inertia_mm2) inertia.push_back(i * voxel / 1000);
     const VolumeSurface surface = surface_of_volume(piece.bone, context);
-    j["pieces"].push_back({{"volume_mm3", piece.volume_mm3()},
-                           {"surface_volume_mm3", surface.surface_mm3},
-                           {"surface_moved_mm", surface.moved_mm},
-                           {"centre_mm", {piece.solid.centre_mm.x, piece.solid.centre_mm.y, piece.solid.centre_mm.z}},
-                           {"inertia_g_mm2_at_1_g_per_cm3", inertia},
-                           {"moved_mm", {away.x, away.y, away.z}}});
+    j["fragments"].push_back(
+        {{"volume_mm3", piece.volume_mm3()},
+         {"surface_volume_mm3", surface.surface_mm3},
+         {"surface_moved_mm", surface.moved_mm},
+         {"centre_mm", {piece.solid.centre_mm.x, piece.solid.centre_mm.y, piece.solid.centre_mm.z}},
+         {"inertia_g_mm2_at_1_g_per_cm3", inertia},
+         {"moved_mm", {away.x, away.y, away.z}}});
     const TriMesh& mesh = surface.mesh;
     const auto first = static_cast<std::uint32_t>(all.points_mm.size());
     for (const auto& q : mesh.points_mm)
@@ -122,7 +123,7 @@ std::vector<Data> SeparateFragmentsStage::run(const Params& p, std::span<const D
           {q[0] + static_cast<float>(away.x), q[1] + static_cast<float>(away.y), q[2] + static_cast<float>(away.z)});
     for (const auto& t : mesh.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
   }
-  context.report("pieces", static_cast<std::int64_t>(split.pieces.size()));
+  context.report("fragments", static_cast<std::int64_t>(split.pieces.size()));
   context.report("largest_mm3", split.pieces.front().volume_mm3());
   context.report("crumbs", static_cast<std::int64_t>(split.crumbs));
   context.report("crumbs_mm3", split.crumbs_mm3);

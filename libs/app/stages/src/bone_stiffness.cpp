@@ -159,7 +159,7 @@ TetMesh map_of(const TetMesh& mesh, const std::vector<double>& volume, const std
   return map;
 }
 
-void warn_of_doubts(const BoneDensity& density, const BoneStiffness& bone, const Context& context) {
+void warn_of_extrapolation(const BoneDensity& density, const BoneStiffness& bone, const Context& context) {
   const BoneDensity guess;
   if (density.per_1000_hu == guess.per_1000_hu && density.at_0_hu == guess.at_0_hu)
     context.warn("density by a guess of " + format_number(guess.per_1000_hu) +
@@ -277,7 +277,7 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
   context.report("mean_young_mpa", sums.young / bone.volume_mm3);
   context.report("materials", static_cast<std::int64_t>(bone.materials));
   context.report("mass_g", 1000 * sums.kg);
-  warn_of_doubts(p.density, bone, context);
+  warn_of_extrapolation(p.density, bone, context);
   Document inp{inp_text(body, body.on_all_points(problem.loads[n]))};
   context.progress(1);
   return {std::move(inp), std::make_shared<const TetMesh>(map_of(mesh, volume, graded.materials)),

@@ -49,7 +49,7 @@ struct BoneStiffnessStage {
         p.step_percent);
     visit({"keep_floating",
            "parts of the mesh that nothing holds are written too; without, small ones are left out and large ones "
-           "refused"},
+           "rejected"},
           p.keep_floating);
     visit({"load", "name of the load (empty: the first)"}, p.load);
     visit({"order",

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "commands.h"
-#include "room_layout.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kEscapeKey = 256, kF11Key = 300;  // GLFW's numbers
 
-// The card plays what the desk sounds like; the desk is exchanged while it is kept out.
+// The card plays what the controller sounds like; the controller is exchanged while it is kept out.
 class ConsoleSound {
  public:
   explicit ConsoleSound(bool on) {

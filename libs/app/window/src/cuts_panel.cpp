@@ -173,8 +173,8 @@ void CutsPanel::begin(Rehearsal& rehearsal, StructuresView* structures, RegionsV
   drawn_ = {};
 }
 
-void CutsPanel::lay_out(const RoomLayout& room) {
-  middle_ = scene_ = room.view;
+void CutsPanel::lay_out(const ViewLayout& layout) {
+  middle_ = scene_ = layout.view;
   header_ = footer_ = {};
   boxes_ = {};
   // Header above, reading below: at fixed places, whatever they say.
@@ -184,26 +184,26 @@ void CutsPanel::lay_out(const RoomLayout& room) {
   foot_ = {};
   any_ = true;
   one_alone_ = false;
-  if (room.shown == Layout::plan) {
-    boxes_ = room.cuts;
+  if (layout.shown == Layout::plan) {
+    boxes_ = layout.cuts;
     ScreenBox& first = boxes_.front();
     header_ = {first.x, first.y, first.width, std::min(top, first.height)};
     first = {first.x, first.y + header_.height, first.width, first.height - header_.height};
     ScreenBox& last = boxes_.back();
     footer_ = {last.x, std::max(last.y, last.bottom() - bottom), last.width, std::min(bottom, last.height)};
     last.height -= footer_.height;
-  } else if (!room.over[0].empty()) {
-    const float u = room.unit, wide = std::min(344 * u, room.view.width);
-    one_alone_ = room.over[1].empty();
+  } else if (!layout.over[0].empty()) {
+    const float u = layout.unit, wide = std::min(344 * u, layout.view.width);
+    one_alone_ = layout.over[1].empty();
     if (one_alone_) {
-      boxes_[static_cast<std::size_t>(chosen_)] = room.over[0];
+      boxes_[static_cast<std::size_t>(chosen_)] = layout.over[0];
     } else {
-      boxes_ = room.over;
+      boxes_ = layout.over;
     }
-    const ScreenBox& lowest = one_alone_ ? room.over[0] : room.over[2];
+    const ScreenBox& lowest = one_alone_ ? layout.over[0] : layout.over[2];
     foot_ = {lowest.x, lowest.bottom() + kGap * u, lowest.width, kSmallControl * u};
-    if (settings_open_) header_ = {std::max(room.view.x, lowest.x - kGap * u - wide), room.over[0].y, wide, top};
-    footer_ = {std::max(room.view.x, lowest.right() - wide), foot_.bottom() + kGap * u, wide, bottom};
+    if (settings_open_) header_ = {std::max(layout.view.x, lowest.x - kGap * u - wide), layout.over[0].y, wide, top};
+    footer_ = {std::max(layout.view.x, lowest.right() - wide), foot_.bottom() + kGap * u, wide, bottom};
   } else {
     any_ = false;
   }

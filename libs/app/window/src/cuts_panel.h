@@ -11,7 +11,7 @@
 #include "osteo/display/view/structures_view.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/simulation/bone/saw.h"
-#include "room_layout.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 
@@ -29,7 +29,7 @@ class CutsPanel {
   void take(const CutsLook& look);
 
   /// Before the rest of a frame: where things lie. On the picture, three or the one that is chosen, or four up.
-  void lay_out(const RoomLayout& room);
+  void lay_out(const ViewLayout& layout);
   /// Side of the cuts on the picture as the person dragged it; 0: as the layout has it.
   [[nodiscard]] float wished_width() const { return wished_width_; }
   /// Where the bone is drawn: the middle, or the place of the cut that has taken it.

@@ -1,7 +1,7 @@
 // The page of the hand in the panel.
 #include <imgui.h>
 
-#include "hand_desk.h"
+#include "hand_controller.h"
 #include "osteo/core/base/translate.h"
 #include "ui_style.h"
 

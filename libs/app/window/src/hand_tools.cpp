@@ -53,7 +53,7 @@ void HandTools::renew(Vec3 centre_mm, double size_mm) {
   cut_.at_mm = centre_mm;
   within_mm_ = kGuideMm;
   saw_in_hand_ = false;
-  note_.clear();
+  note_ = {};
 }
 
 void HandTools::choose(Tool tool, Rehearsal& rehearsal, const ViewAxes& view) {
@@ -61,7 +61,7 @@ void HandTools::choose(Tool tool, Rehearsal& rehearsal, const ViewAxes& view) {
   if (tool_ == Tool::plate && tool != Tool::plate) rehearsal.act(SceneAction::grip(SceneAction::kNobody));
   put_saw_away(rehearsal);
   tool_ = tool;
-  note_.clear();
+  note_ = {};
   if (tool == Tool::saw) aim_saw(view, false);
   if (tool == Tool::plate) grip(rehearsal);
 }
@@ -74,23 +74,29 @@ void HandTools::plan(std::vector<PlannedCut> cuts, std::filesystem::path file) {
 void HandTools::choose_planned(std::size_t cut) {
   cut_ = planned_[cut].cut;
   within_mm_ = planned_[cut].within_mm;
-  note_ = filled(tr("saw at the planned cut '{name}'"), {{"name", planned_[cut].name}});
+  note_ = [&] { return filled(tr("saw at the planned cut '{name}'"), {{"name", planned_[cut].name}}); };
 }
 
 void HandTools::keep_planned(const std::string& name) {
   try {
-    if (name.empty()) throw Error(ExitCode::usage, tr("a planned cut needs a name"));
+    if (name.empty()) {
+      note_ = [] { return tr("a planned cut needs a name"); };
+      return;
+    }
     auto cuts = std::filesystem::exists(planned_file_) ? load_planned_cuts(planned_file_) : std::vector<PlannedCut>{};
     for (const PlannedCut& c : cuts) {
-      if (c.name == name)
-        throw Error(ExitCode::usage, filled(tr("there is a planned cut '{name}' already"), {{"name", name}}));
+      if (c.name != name) continue;
+      note_ = [&] { return filled(tr("there is a planned cut '{name}' already"), {{"name", name}}); };
+      return;
     }
     cuts.push_back({name, cut_, within_mm_});
     write_file(planned_file_, planned_cuts_json(cuts));
     planned_ = std::move(cuts);
-    note_ = filled(tr("kept as '{name}' in {file}"), {{"name", name}, {"file", planned_file_.string()}});
+    note_ = [&] {
+      return filled(tr("kept as '{name}' in {file}"), {{"name", name}, {"file", planned_file_.string()}});
+    };
   } catch (const Error& e) {
-    note_ = e.what();
+    note_ = LocalText::untranslated(e.what());
   }
 }
 
@@ -98,8 +104,10 @@ void HandTools::take_saw(Rehearsal& rehearsal) {
   tool_ = Tool::drill;
   saw_in_hand_ = true;
   rehearsal.act(SceneAction::cutting_guide(guide()));
-  note_ = filled(tr("saw in the hand, held in its plane: {bring} brings it, {saw} puts it away"),
-                 {{"bring", key_name(Command::bring)}, {"saw", key_name(Command::saw)}});
+  note_ = [] {
+    return filled(tr("saw in the hand, held in its plane: {bring} brings it, {saw} puts it away"),
+                  {{"bring", key_name(Command::bring)}, {"saw", key_name(Command::saw)}});
+  };
 }
 
 void HandTools::loosen_saw(bool loose, Rehearsal& rehearsal) {
@@ -184,12 +192,12 @@ void HandTools::attach(Rehearsal& rehearsal) {
   rehearsal.look(
       [&](const World& world, SceneReaders&) { under = bodies_under(world, plate_library()[plate_], pose); });
   if (under.empty()) {
-    note_ = tr("no bone within 2 mm below the plate");
+    note_ = [] { return tr("no bone within 2 mm below the plate"); };
     return;
   }
   rehearsal.act(SceneAction::attach(static_cast<std::uint32_t>(plate_), pose, under[0],
                                     under.size() > 1 ? under[1] : SceneAction::kNobody));
-  note_ = under.size() > 1 ? tr("fixed to two fragments") : tr("fixed to one fragment");
+  note_ = [&] { return under.size() > 1 ? tr("fixed to two fragments") : tr("fixed to one fragment"); };
   tool_ = Tool::drill;
 }
 
@@ -223,7 +231,7 @@ void HandTools::perform(Rehearsal& rehearsal) {
 void HandTools::undo(Rehearsal& rehearsal) {
   rehearsal.act(SceneAction::plain(ActionKind::undo));
   piece_ = SceneAction::kNobody;
-  note_.clear();
+  note_ = {};
 }
 
 std::string HandTools::how() const {
@@ -243,8 +251,9 @@ std::string HandTools::how() const {
   return {};
 }
 
-const std::string& HandTools::note(Rehearsal& rehearsal) {
-  if (std::string refused = rehearsal.take_refusal(); !refused.empty()) note_ = std::move(refused);
+const LocalText& HandTools::note(Rehearsal& rehearsal) {
+  if (std::string refused = rehearsal.take_refusal(); !refused.empty())
+    note_ = LocalText::untranslated(std::move(refused));
   return note_;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "keys.h"
+#include "local_text.h"
 #include "osteo/session/recording/planned_cuts.h"
 #include "osteo/session/scene/rehearsal.h"
 
@@ -83,7 +84,7 @@ class HandTools {
   /// Where the tool is: mouse motions are measured at this depth.
   [[nodiscard]] Vec3 position_mm() const { return tool_ == Tool::saw ? cut_.at_mm : handle_mm_; }
   /// What there is to say about the last thing done; also why it was rejected, which is asked for here.
-  const std::string& note(Rehearsal& rehearsal);
+  const LocalText& note(Rehearsal& rehearsal);
   /// How the tool in the hand is used, in a few words; empty for the drill.
   [[nodiscard]] std::string how() const;
 
@@ -106,7 +107,7 @@ class HandTools {
   std::vector<PlannedCut> planned_;
   std::filesystem::path planned_file_;
   double within_mm_ = kGuideMm;
-  std::string note_;
+  LocalText note_;
 };
 
 /// The first bone on a ray, and the body it belongs to.

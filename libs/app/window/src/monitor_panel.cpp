@@ -231,10 +231,10 @@ void MonitorPanel::draw_switches(MonitorController& controller) {
   if (!controller.invitation().empty()) ImGui::TextWrapped("%s", controller.invitation().c_str());
 }
 
-void MonitorPanel::lay_out(RoomLayout& room, float em_pixels, bool there) {
+void MonitorPanel::lay_out(ViewLayout& layout, float em_pixels, bool there) {
   box_ = {};
   if (there && shown_)
-    box_ = take_strip(room, std::clamp(room.view.height * 0.28F, kMinEm * em_pixels, kMaxEm * em_pixels));
+    box_ = take_strip(layout, std::clamp(layout.view.height * 0.28F, kMinEm * em_pixels, kMaxEm * em_pixels));
 }
 
 void MonitorPanel::draw(MonitorController& controller) {

@@ -1,7 +1,7 @@
 // The nerve monitor's window in the window. Private to libs/app/window; ImGui.
 #pragma once
-#include "osteo/app/window/monitor_desk.h"
-#include "room_layout.h"
+#include "osteo/app/window/monitor_controller.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 
@@ -10,7 +10,7 @@ class MonitorPanel {
   [[nodiscard]] bool shown() const { return shown_; }
   void show(bool on) { shown_ = on; }
   /// Its strip, taken from the pictures; none where there is no monitor, or while it is not shown.
-  void lay_out(RoomLayout& room, float em_pixels, bool there);
+  void lay_out(ViewLayout& layout, float em_pixels, bool there);
   /// In place of a strip: all of a window of its own.
   void fill(const ScreenBox& area) {
     box_ = area;

@@ -6,11 +6,15 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/param.h"
 #include "osteo/core/base/translate.h"
 
 namespace osteo::inline app {
 namespace {
 
+// What settings of 0.1 call things that a button does.
+constexpr std::array<OldName, 4> kOldFunctions{
+    {{"bring", "approach"}, {"lift", "retract"}, {"suck", "suction"}, {"water", "irrigation"}}};
 constexpr std::string_view kFormat = "osteotome_settings", kCases = "recent_cases", kButtons = "buttons",
                            kNothing = "nothing";
 
@@ -109,7 +113,10 @@ void PersonSettings::read_buttons(const JsonFile& json, const JsonValue& value) 
       if (!which)
         throw json.wrong(m.value, "there is no button '" + m.key + "'",
                          "such as 'pedal 1', 'device 2', 'mouse 4', 'key F13'");
-      const std::string& does = json.text(m.value, "what '" + m.key + "' does");
+      std::string does = json.text(m.value, "what '" + m.key + "' does");
+      const auto* const old = std::find_if(kOldFunctions.begin(), kOldFunctions.end(),
+                                           [&](const OldName& name) { return name.old == does; });
+      if (old != kOldFunctions.end()) does = old->current;
       const auto& all = EnumNames<HandFunction>::values;
       const auto* const at = std::find(all.begin(), all.end(), does);
       if (does == kNothing) {

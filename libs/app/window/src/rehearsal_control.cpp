@@ -70,11 +70,11 @@ bool RehearsalControl::begin(bool from_case, bool save_first) {
 }
 
 void RehearsalControl::save() {
-  if (begin(false, true)) say(tr("saved; a new session goes on from here"));
+  if (begin(false, true)) say([&] { return tr("saved; a new session goes on from here"); });
 }
 
 void RehearsalControl::reset() {
-  if (begin(true, true)) say(tr("bone reset; the session before was saved"));
+  if (begin(true, true)) say([&] { return tr("bone reset; the session before was saved"); });
 }
 
 bool RehearsalControl::end() {
@@ -128,17 +128,17 @@ HandPose RehearsalControl::hand_pose() const {
   return {from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm), from_floats(tick.device.axis)};
 }
 
-FreeWays RehearsalControl::free_ways(bool whole_tool) const {
+PathPlanner RehearsalControl::path_planner(bool whole_tool) const {
   ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_.plate(), tools_.plate_grip())
                                   : skin_of_instrument(static_cast<std::size_t>(instrument()), whole_tool);
-  std::optional<FreeWays> ways;
+  std::optional<PathPlanner> ways;
   rehearsal().look(
       [&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin), rehearsal().structures()); });
   return *std::move(ways);
 }
 
 bool RehearsalControl::outside() const {
-  const FreeWays ways = free_ways(true);
+  const PathPlanner ways = path_planner(true);
   return length(hand_pose().at_mm - ways.centre_mm()) > ways.radius_mm();
 }
 
@@ -171,7 +171,7 @@ void RehearsalControl::turn_handle(double seconds) {
   constexpr double kRadPerS = 4;
   const Vec3 wanted = wanted_axis();
   if (length(wanted - axis_) < 1e-3) return;
-  axis_ = free_ways(false).turned({hand_pose().at_mm, axis_}, wanted, kRadPerS * std::min(seconds, 0.2));
+  axis_ = path_planner(false).turned({hand_pose().at_mm, axis_}, wanted, kRadPerS * std::min(seconds, 0.2));
 }
 
 void RehearsalControl::send_goal(double seconds) {
@@ -198,13 +198,13 @@ void RehearsalControl::send_goal(double seconds) {
 
 void RehearsalControl::lead(std::optional<Vec3> seen_mm, Vec3 forward) {
   if (!rehearsal().device().lead({})) {
-    say(tr("the drill is in your own hand"), Message::Rank::hindrance);
+    say([&] { return tr("the drill is in your own hand"); }, Message::Rank::hindrance);
     return;
   }
   leading_ = Leading{Leading::Stage::letting_go, 0, {}, seen_mm, forward, {}};
   tools_.loosen_saw(true, rehearsal());
   // Pulled aside it would not get there.
-  if (lead_pause_.begin()) say(tr("the drill finds its way: your hand is let go until it is there"));
+  if (lead_pause_.begin()) say([&] { return tr("the drill finds its way: your hand is let go until it is there"); });
   latched_ = false;
   wait_for_release_ = true;
 }
@@ -216,7 +216,7 @@ void RehearsalControl::lift() {
 void RehearsalControl::bring(Vec3 direction) {
   const std::optional<BoneHit> hit = bone_seen(direction);
   if (!hit) {
-    say(tr("no bone under the mouse"), Message::Rank::hindrance);
+    say([&] { return tr("no bone under the mouse"); }, Message::Rank::hindrance);
     return;
   }
   lead(hit->at_mm, direction);
@@ -267,7 +267,7 @@ void RehearsalControl::go_on_leading() {
     goal_.pedal = 0;
     device.lead(way);
   };
-  const auto waiting = [&](const FreeWays& ways) { return ways.waiting(towards_eye(), wanted_axis()); };
+  const auto waiting = [&](const PathPlanner& ways) { return ways.waiting(towards_eye(), wanted_axis()); };
   if (leading_->stage == Leading::Stage::letting_go) {
     if (lead_pause_.pulled()) return;
     const TickRecord now = rehearsal().latest();
@@ -280,29 +280,31 @@ void RehearsalControl::go_on_leading() {
       device.lead({});
       return;
     }
-    const FreeWays ways = free_ways(true);
+    const PathPlanner ways = path_planner(true);
     const HandPose from = hand_pose();
     if (leading_->seen_mm) {
-      const FreeWays::Found a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
+      const PathPlanner::Found a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
       const double gap = length(a.end.at_mm - *leading_->seen_mm) - burr().diameter_mm / 2;
-      leading_->done = brought_text(plate_in_hand() ? Brought::plate
-                                    : saw           ? Brought::saw
-                                                    : Brought::drill,
-                                    a.way.put, gap);
-      if (a.past_structures) leading_->done += tr(kPastStructures);
+      const Brought what = plate_in_hand() ? Brought::plate : saw ? Brought::saw : Brought::drill;
+      leading_->done = [&] { return brought_text(what, a.way.put, gap); };
+      if (a.past_structures) leading_->done += [] { return tr(kPastStructures); };
       go(Leading::Stage::on_the_way, a.way, a.end);
     } else {
       const HandPose to = waiting(ways);
-      const FreeWays::Found out = ways.way(from, to);
-      leading_->done = out.way.put ? (saw ? tr("the saw was shut in; it was taken out")
-                                          : tr("the drill was shut in; it was taken out"))
-                                   : (saw ? tr("saw lifted out") : tr("drill lifted out"));
-      if (out.past_structures) leading_->done += tr(kPastStructures);
+      const PathPlanner::Found out = ways.way(from, to);
+      leading_->done = [&] {
+        return out.way.put
+                   ? (saw ? tr("the saw was shut in; it was taken out") : tr("the drill was shut in; it was taken out"))
+                   : (saw ? tr("saw lifted out") : tr("drill lifted out"));
+      };
+      if (out.past_structures) leading_->done += [] { return tr(kPastStructures); };
       go(Leading::Stage::on_the_way, out.way, to);
     }
   } else if (led == Led::blocked && leading_->stage == Leading::Stage::on_the_way) {
-    leading_->done = saw ? tr("the saw was stuck; it was taken out") : tr("the drill was stuck; it was taken out");
-    const HandPose to = waiting(free_ways(true));
+    leading_->done = [&] {
+      return saw ? tr("the saw was stuck; it was taken out") : tr("the drill was stuck; it was taken out");
+    };
+    const HandPose to = waiting(path_planner(true));
     HandWay way;
     way.put = true;
     way.points[0] = {to.at_mm, to_floats(to.axis), false};
@@ -311,8 +313,10 @@ void RehearsalControl::go_on_leading() {
   } else {
     if (leading_->seen_mm) motion_.meet();
     // Who took up the saw meanwhile has to know how it is used.
-    const std::string how = leading_->seen_mm ? std::string() : tools_.how();
-    say((how.empty() ? leading_->done : how) + (lead_pause_.end() ? tr("; your hand is led again") : ""));
+    const LocalText how = leading_->seen_mm ? LocalText() : LocalText([&] { return tools_.how(); });
+    LocalText done = how.empty() ? leading_->done : how;
+    if (lead_pause_.end()) done += [] { return tr("; your hand is led again"); };
+    say(done);
     leading_.reset();
     tools_.loosen_saw(false, rehearsal());
   }
@@ -320,7 +324,7 @@ void RehearsalControl::go_on_leading() {
 
 void RehearsalControl::take_burr(int tool) {
   if (leading_) {  // on a way that was found for the burr that it has
-    say(tr("the drill is on its way: change the burr when it has arrived"), Message::Rank::hindrance);
+    say([&] { return tr("the drill is on its way: change the burr when it has arrived"); }, Message::Rank::hindrance);
     return;
   }
   tool_ = tool;
@@ -345,7 +349,9 @@ void RehearsalControl::next_burr(int by) {
 
 void RehearsalControl::set_burr_share(int by) {
   burr_share = std::clamp(burr_share + 0.25 * by, 0.25, 1.0);
-  say(filled(tr("burr at most at {share} % of its speed"), {{"share", shown_number(100 * burr_share, 0)}}));
+  say([&] {
+    return filled(tr("burr at most at {share} % of its speed"), {{"share", shown_number(100 * burr_share, 0)}});
+  });
 }
 
 // --- a frame
@@ -361,7 +367,7 @@ bool RehearsalControl::command(const Keyboard::Press& press, const std::optional
     }
   }
   if (tools_.key(press.command, rehearsal(), view_)) {
-    if (tools_.tool() != before && !tools_.how().empty()) say(tools_.how());
+    if (tools_.tool() != before && !tools_.how().empty()) say([&] { return tools_.how(); });
     return true;
   }
   switch (press.command) {
@@ -418,10 +424,12 @@ bool RehearsalControl::command(const Keyboard::Press& press, const std::optional
       return true;
     case Command::motion: {
       motion_.step(press.value);
-      say(filled(motion_.one_to == 1 && motion_.parted()
-                     ? tr("motion of the hand 1:{n}; {bring} brings the drill under the mouse again")
-                     : tr("motion of the hand 1:{n}"),
-                 {{"n", std::to_string(motion_.one_to)}, {"bring", key_name(Command::bring)}}));
+      say([&] {
+        return filled(motion_.one_to == 1 && motion_.parted()
+                          ? tr("motion of the hand 1:{n}; {bring} brings the drill under the mouse again")
+                          : tr("motion of the hand 1:{n}"),
+                      {{"n", std::to_string(motion_.one_to)}, {"bring", key_name(Command::bring)}});
+      });
       return true;
     }
     case Command::burr_speed:
@@ -464,16 +472,16 @@ void RehearsalControl::hold(const HandInput& input) {
 
 // What came of saw, pieces and plates, or why nothing did: once, wherever the panel is.
 void RehearsalControl::report_of_tools() {
-  const std::string& note = tools_.note(rehearsal());
+  const LocalText& note = tools_.note(rehearsal());
   if (note == reported_of_tools_) return;
   reported_of_tools_ = note;
   if (!note.empty()) say(note);
 }
 
 void RehearsalControl::drag_second(Vec3 by_mm) {
-  std::string said;
+  LocalText said;
   static_cast<void>(second_.move(rehearsal(), by_mm * motion_.factor(), said));
-  if (!said.empty() && said != message()) say(said);
+  if (!said.empty() && said.shown != message()) say(said);
 }
 
 Vec3 RehearsalControl::second_mm() const {
@@ -487,9 +495,9 @@ void RehearsalControl::wash(bool suck, bool wash) {
 
 // --- what is told
 
-void RehearsalControl::say(const std::string& text, Message::Rank rank) {
-  notify(text, rank);
-  if (Rehearsal* const running = actions_.rehearsal()) running->note("message", text);
+void RehearsalControl::say(const LocalText& text, Message::Rank rank) {
+  notify(text.shown, rank);
+  if (Rehearsal* const running = actions_.rehearsal()) running->note("message", text.english);
 }
 
 std::optional<Message> RehearsalControl::reported(std::vector<Message> causes) {

@@ -9,10 +9,11 @@
 #include "hand_tools.h"
 #include "keys.h"
 #include "lead_pause.h"
+#include "local_text.h"
 #include "messages.h"
 #include "mouse_hand.h"
 #include "osteo/app/window/rehearsal_window.h"
-#include "osteo/session/scene/free_ways.h"
+#include "osteo/session/scene/path_planner.h"
 #include "second_hand.h"
 
 namespace osteo::inline app {
@@ -113,7 +114,8 @@ class RehearsalControl {
   [[nodiscard]] bool second_hand_empty() const { return second_.empty(); }
 
   // --- what is told
-  void say(const std::string& text, Message::Rank rank = Message::Rank::information);  ///< also a note of the session
+  /// Also a note of the session, in English whatever the language.
+  void say(const LocalText& text, Message::Rank rank = Message::Rank::information);
   /// No note: it may name a file, and so a patient.
   void notify(const std::string& text, Message::Rank rank = Message::Rank::information) { messages_.say({rank, text}); }
   /// The last thing said.
@@ -129,7 +131,7 @@ class RehearsalControl {
     std::optional<std::uint64_t> quiet_tick;  // when it had let go: what is known of the hand may be older
     std::optional<Vec3> seen_mm;              // bone to come down at; none: out
     Vec3 forward;
-    std::string done;
+    LocalText done;
   };
   template <class F>
   bool guarded(F&& f);
@@ -138,7 +140,7 @@ class RehearsalControl {
   [[nodiscard]] Vec3 wanted_axis() const;
   [[nodiscard]] HandPose hand_pose() const;
   [[nodiscard]] bool outside() const;
-  [[nodiscard]] FreeWays free_ways(bool whole_tool) const;
+  [[nodiscard]] PathPlanner path_planner(bool whole_tool) const;
   void turn_handle(double seconds);
   void next_burr(int by);
   void set_burr_share(int by);
@@ -166,7 +168,7 @@ class RehearsalControl {
   bool ran_ = false, latched_ = false, second_works_ = false;
   double held_ = 0;  // how far down
   bool wait_for_release_ = false, in_hand_ = true;
-  std::string reported_of_tools_;
+  LocalText reported_of_tools_;
   Messages messages_;
 };
 

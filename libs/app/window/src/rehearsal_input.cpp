@@ -44,7 +44,7 @@ void RehearsalWindow::camera_by_mouse() {
 
 void RehearsalWindow::mouse_and_keys() {
   const ImGuiIO& io = ImGui::GetIO();
-  const bool in_view = cuts_.scene().holds(io.MousePos.x, io.MousePos.y) && !room_.in_front();
+  const bool in_view = cuts_.scene().holds(io.MousePos.x, io.MousePos.y) && !main_view_.in_front();
   const auto seconds = static_cast<double>(io.DeltaTime);
   const CameraDevices devices = actions_.camera ? actions_.camera(scope_.lent()) : CameraDevices{};
   read_hand();
@@ -54,7 +54,7 @@ void RehearsalWindow::mouse_and_keys() {
   if (in_view && !io.WantCaptureMouse) {
     const bool lent = scope_.lent() && !devices.hand_mm;
     for (const ScopeMouse& m : did) {
-      const bool measures = m.clicked && room_.click(bone_seen(ray(m.x - m.dx, m.y - m.dy)), control_);
+      const bool measures = m.clicked && main_view_.click(bone_seen(ray(m.x - m.dx, m.y - m.dy)), control_);
       measured = measured || measures;
       if (measures || tilt_by_mouse(m)) continue;
       if (!scope_.mouse(m, lent, seconds / static_cast<double>(did.size()))) use_mouse(m);
@@ -63,8 +63,8 @@ void RehearsalWindow::mouse_and_keys() {
   }
   control_.look_from(view_axes());
   const std::optional<Vec3> direction = in_view ? std::optional(ray(did.back().x, did.back().y)) : std::nullopt;
-  std::vector<Keyboard::Press> presses = keyboard_.frame(io.WantTextInput || room_.typing());
-  for (const Keyboard::Press& button : room_.take_presses()) presses.push_back(button);
+  std::vector<Keyboard::Press> presses = keyboard_.frame(io.WantTextInput || main_view_.typing());
+  for (const Keyboard::Press& button : main_view_.take_presses()) presses.push_back(button);
   for (const Keyboard::Press& press : presses) {
     do_press(press, direction);
     if (control_.failure() || ended_ || quit_) return;
@@ -73,14 +73,15 @@ void RehearsalWindow::mouse_and_keys() {
   control_.look_from(view_axes());
   if (const auto said = trial_.advance(scope_.control, seconds, actions_.folder() / "camera-trial.csv"))
     control_.say(*said);
-  const bool may_drill = in_view && !io.WantCaptureMouse && !measured && !room_.ruler().on() && !room_.before();
+  const bool may_drill =
+      in_view && !io.WantCaptureMouse && !measured && !main_view_.ruler().on() && !main_view_.before();
   controller_.take(control_);
   HandInput hand = controller_.input(control_);
   hand.seconds = seconds;
   hand.pressed = ImGui::IsMouseDown(ImGuiMouseButton_Left) && !scope_.lent();
   hand.on_bone = may_drill;
   hand.pad = read_gamepad();
-  if (scope_.lent() || room_.before()) hand.drill = 0;
+  if (scope_.lent() || main_view_.before()) hand.drill = 0;
   control_.hold(hand);
 }
 
@@ -111,8 +112,8 @@ void RehearsalWindow::do_press(const Keyboard::Press& press, const std::optional
   if (long_work) ImGui::EndFrame();
   const std::optional<Vec3> bone = press.command == Command::mark ? bone_seen(direction) : std::nullopt;
   if (press.command == Command::before) {
-    show_before(!room_.before());
-  } else if (!room_.takes(press, control_, bone) && !camera_takes(press, direction) &&
+    show_before(!main_view_.before());
+  } else if (!main_view_.takes(press, control_, bone) && !camera_takes(press, direction) &&
              !control_.command(press, direction)) {
     command(press.command);
   }
@@ -120,7 +121,7 @@ void RehearsalWindow::do_press(const Keyboard::Press& press, const std::optional
 }
 
 bool RehearsalWindow::camera_takes(const Keyboard::Press& press, const std::optional<Vec3>& direction) {
-  std::string said;
+  LocalText said;
   if (!scope_.key(press, scope_scene(), direction, said)) return false;
   if (!said.empty()) control_.say(said);
   return true;
@@ -171,9 +172,10 @@ void RehearsalWindow::command(Command command) {
   if (command == Command::screenshot) screenshot_wanted_ = true;
   if (command == Command::hints) {
     hints_.turn(!hints_.on());
-    control_.say(hints_.on() ? tr("hints are given") : tr("no hints"));
+    control_.say([&] { return hints_.on() ? tr("hints are given") : tr("no hints"); });
   }
-  if (command == Command::timeline) control_.say(tr("the course of the session is shown when it is over (Q)"));
+  if (command == Command::timeline)
+    control_.say([&] { return tr("the course of the session is shown when it is over (Q)"); });
   if (command == Command::sound) sound_.turn(!sound_.on());
   if (command == Command::lead) switch_lead();
   if (command == Command::monitor || command == Command::mute_monitor) monitor_command(command);
@@ -190,7 +192,7 @@ void RehearsalWindow::command(Command command) {
     if (regions_) {
       regions_->show(!regions_->shown());
     } else {
-      control_.say(tr("no regions are planned: --procedure FILE names them"));
+      control_.say([&] { return tr("no regions are planned: --procedure FILE names them"); });
     }
   }
   if (command == Command::quit) end_session();
@@ -198,21 +200,25 @@ void RehearsalWindow::command(Command command) {
 
 // What the pull does is in the samples of who leads, and so recorded; that it was the person's wish is a note.
 void RehearsalWindow::switch_lead() {
-  if (!tutor_.leads || !actions_.lead) return control_.say(tr("nobody leads your hand in this session"));
-  if (control_.leading()) return control_.say(tr("the drill is on its way: your hand is let go until it is there"));
+  if (!tutor_.leads || !actions_.lead)
+    return control_.say([&] { return tr("nobody leads your hand in this session"); });
+  if (control_.leading())
+    return control_.say([&] { return tr("the drill is on its way: your hand is let go until it is there"); });
   const bool on = !tutor_.guiding;
   actions_.lead(on);
   control_.rehearsal().note("lead", on ? R"({"on":true})" : R"({"on":false})");
-  control_.say(on ? tr("your hand is led") : tr("your hand is let go"));
+  control_.say([&] { return on ? tr("your hand is led") : tr("your hand is let go"); });
 }
 
 void RehearsalWindow::monitor_command(Command command) {
   MonitorController* const controller = monitor_controller();
-  if (controller == nullptr) return control_.say(tr("there is no nerve monitor: begin with --monitor"));
+  if (controller == nullptr) return control_.say([&] { return tr("there is no nerve monitor: begin with --monitor"); });
   if (command == Command::monitor) monitor_.show(!monitor_.shown());
   if (command == Command::mute_monitor) {
     controller->sound().mute(!controller->sound().muted());
-    control_.say(controller->sound().muted() ? tr("the nerve monitor is muted") : tr("the nerve monitor is heard"));
+    control_.say([&] {
+      return controller->sound().muted() ? tr("the nerve monitor is muted") : tr("the nerve monitor is heard");
+    });
   }
 }
 

@@ -22,9 +22,10 @@
 #include "before_view.h"
 #include "camera_notes.h"
 #include "cuts_panel.h"
-#include "hand_desk.h"
-#include "hint_desk.h"
+#include "hand_controller.h"
+#include "hint_controller.h"
 #include "looks.h"
+#include "main_view.h"
 #include "monitor_panel.h"
 #include "monitor_screen.h"
 #include "mouse_trail.h"
@@ -33,9 +34,9 @@
 #include "osteo/display/view/planned_regions.h"
 #include "osteo/display/view/structures_view.h"
 #include "osteo/display/view/world_view.h"
+#include "path_view.h"
 #include "rehearsal_control.h"
 #include "review_scene.h"
-#include "room.h"
 #include "scene_painter.h"
 #include "scene_tools.h"
 #include "scope_input.h"
@@ -43,7 +44,6 @@
 #include "tool_touch.h"
 #include "trial_overlay.h"
 #include "tutor_panel.h"
-#include "way_view.h"
 #include "window_state.h"
 
 namespace osteo::inline app {
@@ -134,7 +134,7 @@ class RehearsalWindow {
   void switch_lead();
   void look_at_warmth(const SceneReaders& readers);
   void note_camera(Rehearsal& rehearsal);
-  [[nodiscard]] RoomScene room_scene(Rehearsal& now);
+  [[nodiscard]] ViewScene view_scene(Rehearsal& now);
   // A point of the world in pixels of the window, from its upper left corner.
   [[nodiscard]] std::optional<std::array<float, 2>> project(Vec3 at) const;
   [[nodiscard]] static bool input();
@@ -145,10 +145,10 @@ class RehearsalWindow {
 
   // For tests: what can be seen, as numbers. Whole at any moment.
   void write_state();
-  [[nodiscard]] RoomState room_state() const;
+  [[nodiscard]] ViewState view_state() const;
 
   WindowShell& shell_;
-  MainView room_;
+  MainView main_view_;
   RehearsalControl control_;
   WindowActions actions_;
   SoundOut& sound_;
@@ -168,7 +168,7 @@ class RehearsalWindow {
   WindowEnd end_;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkNew<vtkRenderer> renderer_;
-  std::unique_ptr<WayView> way_view_;
+  std::unique_ptr<PathView> way_view_;
   std::array<std::unique_ptr<InstrumentView>, kMaxHands> hands_;
   std::unique_ptr<ScenePainter> painter_;
   std::unique_ptr<WorldView> world_view_;

@@ -42,9 +42,9 @@ Vec3 RehearsalWindow::middle_of_bone() {
 
 void RehearsalWindow::show() {
   Rehearsal& now = control_.rehearsal();
-  const RoomScene scene = room_scene(now);
-  room_.draw(scene);
-  if (screenshot_wanted_) room_.draw_caption(scene);
+  const ViewScene scene = view_scene(now);
+  main_view_.draw(scene);
+  if (screenshot_wanted_) main_view_.draw_caption(scene);
   if (MonitorController* const controller = monitor_controller()) monitor_.draw(*controller);
   cuts_.draw(now, control_.tools().tool() == HandTools::Tool::saw ? &control_.tools().cut() : nullptr);
   now.look([&](const World& world, SceneReaders& readers) {
@@ -61,8 +61,8 @@ void RehearsalWindow::show() {
     tools_->show(control_.tools(), tick, world, now.structures(), ImGui::GetTime());
   });
   draw_saw_line(control_.tools(), tools_->preview(), scene.project, cuts_.scene(), ImGui::GetBackgroundDrawList());
-  control_.wash(keyboard_.held(Command::suck) || room_.holds(Command::suck),
-                keyboard_.held(Command::wash) || room_.holds(Command::wash));
+  control_.wash(keyboard_.held(Command::suck) || main_view_.holds(Command::suck),
+                keyboard_.held(Command::wash) || main_view_.holds(Command::wash));
   note_camera(now);
   hints_.frame(scope_.view().eye_mm(), ImGui::GetTime());
   hints_.draw(cuts_.scene());
@@ -122,7 +122,7 @@ void RehearsalWindow::report_touch(Rehearsal& now) {
     if (tick.tick != 0 && (hand == 0 || !control_.second_hand_empty())) hands.push_back(tick);
   }
   if (const auto reported = touch_.look(hands)) {
-    control_.say(reported->words);
+    control_.say(reported->text);
     now.note("touch", reported->note);
   }
   const auto at = touch_.at_mm() ? project(*touch_.at_mm()) : std::nullopt;
@@ -142,7 +142,7 @@ void RehearsalWindow::note_camera(Rehearsal& rehearsal) {
   if (const auto note = camera_notes_.next(noted, now_s, &rehearsal)) rehearsal.note("camera", *note);
 }
 
-RoomScene RehearsalWindow::room_scene(Rehearsal& now) {
+ViewScene RehearsalWindow::view_scene(Rehearsal& now) {
   MachineFacts machine;
   machine.device = device_name_;
   machine.drawn_millions = static_cast<double>(world_view_->drawn_triangles()) / 1e6;
@@ -188,7 +188,7 @@ void RehearsalWindow::end_picture() {
   renderer_->SetViewport(area.x / width_, 1 - (area.y + area.height) / height_, (area.x + area.width) / width_,
                          1 - area.y / height_);
   aim(renderer_, scope_.view(), area);
-  if (before_view_) before_view_->place(renderer_, room_.before());
+  if (before_view_) before_view_->place(renderer_, main_view_.before());
   renderer_->ResetCameraClippingRange();
   const bool scene = world_view_ && !control_.failure(), two_eyes = scene && stereo_.on();
   if (scene && !screenshot_wanted_)
@@ -243,10 +243,10 @@ void RehearsalWindow::save_screenshot() {
   } while (std::filesystem::exists(path));
   try {
     save_picture(picture, path);
-    control_.say(filled(tr("saved {file}"), {{"file", path.filename().string()}}));
-    room_.picture_kept();
+    control_.say([&] { return filled(tr("saved {file}"), {{"file", path.filename().string()}}); });
+    main_view_.picture_kept();
   } catch (const Error& e) {
-    control_.say(e.what());
+    control_.say(LocalText::untranslated(e.what()));
   }
 }
 

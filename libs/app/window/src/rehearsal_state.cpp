@@ -19,8 +19,8 @@ void RehearsalWindow::write_state() {
   state.session = actions_.folder();
   state.tool = instrument_library()[static_cast<std::size_t>(control_.instrument())].name;
   state.drill_latched = control_.latched();
-  state.help = room_.palette().shown() != CommandPalette::Shown::nothing;
-  state.room = room_state();
+  state.help = main_view_.palette().shown() != CommandPalette::Shown::nothing;
+  state.main_view = view_state();
   const HandMotion& motion = control_.motion();
   state.motion = {motion.one_to,
                   motion.clutch,
@@ -82,33 +82,34 @@ void RehearsalWindow::write_state() {
   write_window_state(state, state_file_);
 }
 
-RoomState RehearsalWindow::room_state() const {
-  RoomState r;
-  r.layout = EnumNames<Layout>::values[static_cast<std::size_t>(room_.layout().shown)];
+ViewState RehearsalWindow::view_state() const {
+  ViewState r;
+  r.layout = EnumNames<Layout>::values[static_cast<std::size_t>(main_view_.layout().shown)];
   r.em_pixels = shell_.em_pixels();
   r.full_screen = shell_.full_screen();
-  r.asking = room_.asking();
-  r.wheel = room_.wheel_open();
-  r.panel_keys = room_.keys_in_panel();
-  r.before = room_.before() && before_view_;
-  r.writing = room_.writing();
+  r.asking = main_view_.asking();
+  r.wheel = main_view_.wheel_open();
+  r.panel_keys = main_view_.keys_in_panel();
+  r.before = main_view_.before() && before_view_;
+  r.writing = main_view_.writing();
   r.ended = ended_.has_value();
-  r.ruler = room_.ruler().on();
+  r.ruler = main_view_.ruler().on();
   review_.state(r);
   r.hints = hints_.on();
   r.hint = hints_.words();
-  r.ruler_mm = room_.ruler().length_mm().value_or(0);
-  r.notes = room_.notes().all().size();
-  for (const Step& s : room_.steps().steps()) {
+  r.ruler_mm = main_view_.ruler().length_mm().value_or(0);
+  r.notes = main_view_.notes().all().size();
+  for (const Step& s : main_view_.steps().steps()) {
     if (s.done) r.steps_done.push_back(s.name());
   }
-  if (const int next = room_.steps().next(); next >= 0)
-    r.next_step = room_.steps().steps()[static_cast<std::size_t>(next)].name();
-  r.typing = room_.palette().typing();
-  r.search = room_.palette().search().text();
-  if (const CommandRow* const row = room_.palette().search().row(); r.typing && row != nullptr) r.found = row->name;
+  if (const int next = main_view_.steps().next(); next >= 0)
+    r.next_step = main_view_.steps().steps()[static_cast<std::size_t>(next)].name();
+  r.typing = main_view_.palette().typing();
+  r.search = main_view_.palette().search().text();
+  if (const CommandRow* const row = main_view_.palette().search().row(); r.typing && row != nullptr)
+    r.found = row->name;
   static constexpr const char* kParts[] = {"bone", "strip", "card", "cuts", "state", "panel"};
-  r.focus = kParts[static_cast<std::size_t>(room_.focus())];
+  r.focus = kParts[static_cast<std::size_t>(main_view_.focus())];
   const ScreenBox& v = cuts_.scene();
   r.view = {v.x, v.y, v.width, v.height};
   return r;

@@ -16,7 +16,7 @@ namespace osteo::inline app {
 RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, const WindowOptions& options,
                                  const SparseGrid* hu, const WindowActions& actions, SoundOut& sound)
     : shell_(shell),
-      room_(shell, person),
+      main_view_(shell, person),
       control_(working(actions), options.tool, [this](Rehearsal& rehearsal) { show_bone(rehearsal); }),
       actions_(actions),
       sound_(sound),
@@ -38,7 +38,7 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
   painter_ = std::make_unique<ScenePainter>(render_window_, renderer_);
   painter_->quality().want(options.quality);
   make_scene();
-  way_view_ = std::make_unique<WayView>(renderer_, options.way);
+  way_view_ = std::make_unique<PathView>(renderer_, options.way);
   scope_.overview(StandardView::left, scope_scene(), false);
   control_.look_from(view_axes());
   control_.begin(options.from_case, false);
@@ -106,10 +106,10 @@ void RehearsalWindow::open() {
   render_window_->AddRenderer(renderer_);
   shell_.on_key = [this](int key, int action, int modifiers) {
     if (controller_.key(key, action)) return;
-    if (action != 0) room_.key(key, modifiers, action == 2);
+    if (action != 0) main_view_.key(key, modifiers, action == 2);
     keyboard_.on(key, static_cast<Keyboard::Event>(action), modifiers);
   };
-  shell_.on_letter = [this](char32_t letter) { room_.letter(letter); };
+  shell_.on_letter = [this](char32_t letter) { main_view_.letter(letter); };
   shell_.on_pointer = [this](double x, double y, int modifiers) { trail_.move(x, y, modifiers); };
   shell_.on_button = [this](int which, bool down, int modifiers) { trail_.button(which, down, modifiers); };
   shell_.on_wheel = [this](double steps, int modifiers) { trail_.wheel(steps, modifiers); };
@@ -131,7 +131,7 @@ void RehearsalWindow::show_bone(Rehearsal& rehearsal) {
   plan_and_looks(rehearsal);
   cuts_.begin(rehearsal, structures_.get(), regions_.get());
   before_view_.reset();
-  room_.renew();
+  main_view_.renew();
   work_ = std::make_unique<WorkDone>();  // the session that the last one followed is over
   rehearsal.add_counter(*work_);
   hints_.follow(rehearsal);
@@ -144,18 +144,19 @@ void RehearsalWindow::plan_and_looks(const Rehearsal& rehearsal) {
   if (std::exchange(has_plan_, true)) return;
   if (!planned_.empty()) {
     if (rehearsal.structures() == nullptr) {
-      control_.say(tr("the case knows no structures: the procedure's regions are not shown"));
+      control_.say([&] { return tr("the case knows no structures: the procedure's regions are not shown"); });
     } else {
       regions_ = std::make_unique<RegionsView>(renderer_, *rehearsal.structures(), planned_);
       for (const std::string& name : regions_->missing())
-        control_.say(filled(tr("the case lacks the structure of region '{name}'"), {{"name", name}}));
+        control_.say([&] { return filled(tr("the case lacks the structure of region '{name}'"), {{"name", name}}); });
     }
   }
   if (!actions_.notes_before) return;
   const Looks looks = looks_of(actions_.notes_before());
   if (looks.unreadable > 0)
-    control_.say(
-        filled(tr("{n} notes of the session before could not be read"), {{"n", std::to_string(looks.unreadable)}}));
+    control_.say([&] {
+      return filled(tr("{n} notes of the session before could not be read"), {{"n", std::to_string(looks.unreadable)}});
+    });
   if (structures_) {
     for (std::size_t s = 0; s < structures_->all().size(); ++s) {
       if (const auto look = looks.structures.find(structures_->all()[s].value); look != looks.structures.end())
@@ -212,10 +213,10 @@ void RehearsalWindow::take_dropped() {
 }
 
 void RehearsalWindow::lay_out() {
-  RoomLayout room = room_.lay_out(ended_.has_value(), cuts_.wished_width());
-  review_.lay_out(room, static_cast<float>(shell_.em_pixels()));
-  monitor_.lay_out(room, static_cast<float>(shell_.em_pixels()), !ended_ && monitor_controller() != nullptr);
-  cuts_.lay_out(room);
+  ViewLayout layout = main_view_.lay_out(ended_.has_value(), cuts_.wished_width());
+  review_.lay_out(layout, static_cast<float>(shell_.em_pixels()));
+  monitor_.lay_out(layout, static_cast<float>(shell_.em_pixels()), !ended_ && monitor_controller() != nullptr);
+  cuts_.lay_out(layout);
   const ScreenBox& scene = cuts_.scene();
   scope_.area = {static_cast<double>(scene.x), static_cast<double>(scene.y),
                  std::max(1.0, static_cast<double>(scene.width)), std::max(1.0, static_cast<double>(scene.height))};
@@ -223,11 +224,11 @@ void RehearsalWindow::lay_out() {
 
 // The bone as it was: made when it is first asked for, kept while the session runs. Between two frames.
 void RehearsalWindow::show_before(bool on) {
-  room_.set_before(on);
+  main_view_.set_before(on);
   if (!on || before_view_) return;
   if (!actions_.world_at_begin) {
-    room_.set_before(false);
-    control_.say(tr("how the bone was is not known"));
+    main_view_.set_before(false);
+    control_.say([&] { return tr("how the bone was is not known"); });
     return;
   }
   try {
@@ -237,8 +238,8 @@ void RehearsalWindow::show_before(bool on) {
     forget_mouse();
     before_view_ = std::make_unique<BeforeView>(render_window_, mesh);
   } catch (const Error& e) {
-    room_.set_before(false);
-    control_.say(e.what());
+    main_view_.set_before(false);
+    control_.say(LocalText::untranslated(e.what()));
   }
 }
 
@@ -248,18 +249,18 @@ void RehearsalWindow::end_session() {
     quit_ = true;
     return;
   }
-  room_.set_before(false);
+  main_view_.set_before(false);
   if (!control_.end()) return;
   ended_ = end_facts(actions_.facts(), *work_);
-  room_.session_ended();
+  main_view_.session_ended();
   if (actions_.review) review_.begin(actions_.review);
 }
 
 void RehearsalWindow::show_end() {
   camera_by_mouse();
   EndChoice choice =
-      room_.draw_end(*ended_, {[this] { review_.draw_findings(); }, [this] { review_.draw_all_findings(); },
-                               [this] { review_.draw_switch(); }, review_.found_serious()});
+      main_view_.draw_end(*ended_, {[this] { review_.draw_findings(); }, [this] { review_.draw_all_findings(); },
+                                    [this] { review_.draw_switch(); }, review_.found_serious()});
   for (const Keyboard::Press& press : keyboard_.frame(ImGui::GetIO().WantTextInput)) {
     if (review_.key(press)) continue;
     if (choice == EndChoice::none) choice = MainView::end_choice(press.command);
@@ -279,7 +280,8 @@ void RehearsalWindow::begin_again(bool from_case) {
   ImGui::EndFrame();
   const bool begun = control_.begin(from_case, false);
   ended_.reset();  // failure() speaks for itself
-  if (begun) control_.say(from_case ? tr("bone reset") : tr("a new session continues from what was recorded"));
+  if (begun)
+    control_.say([&] { return from_case ? tr("bone reset") : tr("a new session continues from what was recorded"); });
   shell_.new_frame();
 }
 

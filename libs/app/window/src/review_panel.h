@@ -3,7 +3,7 @@
 #include <span>
 
 #include "review_control.h"
-#include "room_layout.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 

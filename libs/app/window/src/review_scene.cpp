@@ -41,12 +41,12 @@ void ReviewScene::end() {
   places_ = nullptr;
 }
 
-void ReviewScene::lay_out(RoomLayout& room, float em_pixels) {
+void ReviewScene::lay_out(ViewLayout& layout, float em_pixels) {
   course_ = {};
-  if (room.shown != Layout::review || !control_.shown()) return;
-  const float high = std::min(kCourseEm * em_pixels, 0.4F * room.view.height);
-  course_ = {room.view.x, room.view.bottom() - high, room.view.width, high};
-  room.view.height -= high;
+  if (layout.shown != Layout::review || !control_.shown()) return;
+  const float high = std::min(kCourseEm * em_pixels, 0.4F * layout.view.height);
+  course_ = {layout.view.x, layout.view.bottom() - high, layout.view.width, high};
+  layout.view.height -= high;
 }
 
 void ReviewScene::draw_findings() {
@@ -176,7 +176,7 @@ void ReviewScene::show_places(vtkRenderer* renderer, const std::vector<Vec3>& pl
   renderer->AddActor(places_);
 }
 
-void ReviewScene::state(RoomState& state) const {
+void ReviewScene::state(ViewState& state) const {
   if (control_.state() != ReviewControl::State::ready) return;
   state.findings = static_cast<int>(control_.review().findings.size());
   state.timeline = control_.shown();

@@ -10,8 +10,8 @@
 #include "osteo/display/view/world_view.h"
 #include "review_control.h"
 #include "review_panel.h"
-#include "room_layout.h"
 #include "scope_input.h"
+#include "view_layout.h"
 #include "window_state.h"
 
 class vtkActor;
@@ -29,7 +29,7 @@ class ReviewScene {
   void end();
 
   /// Takes the course's place from the lower edge of the picture, where it is shown.
-  void lay_out(RoomLayout& room, float em_pixels);
+  void lay_out(ViewLayout& layout, float em_pixels);
   /// Into the current window: the three that matter; all of them.
   void draw_findings();
   void draw_all_findings() { osteo::draw_all_findings(control_); }
@@ -45,7 +45,7 @@ class ReviewScene {
   /// `world` is replaced by a view of the session's own scene as soon as that is there.
   void show(vtkRenderer* renderer, std::unique_ptr<WorldView>& world,
             std::array<std::unique_ptr<InstrumentView>, kMaxHands>& hands, ScopeInput& scope, double seconds);
-  void state(RoomState& state) const;
+  void state(ViewState& state) const;
 
  private:
   void show_places(vtkRenderer* renderer, const std::vector<Vec3>& places_mm);

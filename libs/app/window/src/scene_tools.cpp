@@ -202,7 +202,7 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
     report_collision(hand_in_bone_mm_);
     fixed_plates(rehearsal);
   }
-  if (const std::string& note = tools.note(rehearsal); !note.empty()) ImGui::TextWrapped("%s", note.c_str());
+  if (const LocalText& note = tools.note(rehearsal); !note.empty()) ImGui::TextWrapped("%s", note.shown.c_str());
 }
 
 void SceneTools::fixed_plates(Rehearsal& rehearsal) {

@@ -11,7 +11,7 @@
 #include "cut_preview.h"
 #include "hand_tools.h"
 #include "osteo/display/view/instrument_view.h"
-#include "room_layout.h"
+#include "view_layout.h"
 
 struct ImDrawList;
 class vtkActor;

@@ -72,7 +72,7 @@ bool ScopeInput::mouse(const ScopeMouse& m, bool as_device, double seconds) {
 }
 
 bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, const std::optional<Vec3>& under_mouse,
-                     std::string& said) {
+                     LocalText& said) {
   const auto bone = [&](Vec3 direction) { return scene.bone ? scene.bone(view().eye_mm(), direction) : std::nullopt; };
   switch (press.command) {
     case Command::magnify:
@@ -95,14 +95,14 @@ bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, cons
         focus_on_depth_of(to, *at);
         control.go(to);
       } else {
-        said = tr("no bone in the middle of the picture: nothing to focus on");
+        said = [&] { return tr("no bone in the middle of the picture: nothing to focus on"); };
       }
       return true;
     case Command::look_there:
       if (const auto at = under_mouse ? bone(*under_mouse) : std::nullopt) {
         control.look_at(*at);
       } else {
-        said = tr("no bone under the mouse: nothing to look at");
+        said = [&] { return tr("no bone under the mouse: nothing to look at"); };
       }
       return true;
     case Command::look_at_drill:
@@ -115,14 +115,16 @@ bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, cons
     case Command::bookmark:
       if (press.shift) {
         control.set_bookmark(static_cast<std::size_t>(press.value));
-        said = filled(tr("view {n} kept"), {{"n", std::to_string(press.value + 1)}});
+        said = [&] { return filled(tr("view {n} kept"), {{"n", std::to_string(press.value + 1)}}); };
       } else if (!control.go_to_bookmark(static_cast<std::size_t>(press.value))) {
-        said = filled(tr("no view {n} is kept yet: Shift-F{key} keeps this one"),
-                      {{"n", std::to_string(press.value + 1)}, {"key", std::to_string(press.value + 6)}});
+        said = [&] {
+          return filled(tr("no view {n} is kept yet: Shift-F{key} keeps this one"),
+                        {{"n", std::to_string(press.value + 1)}, {"key", std::to_string(press.value + 6)}});
+        };
       }
       return true;
     case Command::camera_back:
-      if (!control.undo()) said = tr("no move of the camera to take back");
+      if (!control.undo()) said = [&] { return tr("no move of the camera to take back"); };
       return true;
     case Command::home:
       overview(StandardView::left, scene, true);

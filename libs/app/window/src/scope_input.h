@@ -6,6 +6,7 @@
 #include <string>
 
 #include "keys.h"
+#include "local_text.h"
 #include "osteo/app/window/rehearsal_window.h"
 #include "osteo/simulation/camera/scope_control.h"
 
@@ -47,7 +48,7 @@ class ScopeInput {
   bool mouse(const ScopeMouse& mouse, bool as_device, double seconds);
   /// True when the key was the camera's; `said` is what there is to say of it. `under_mouse`: ray through the mouse.
   bool key(const Keyboard::Press& press, const ScopeScene& scene, const std::optional<Vec3>& under_mouse,
-           std::string& said);
+           LocalText& said);
   /// Keys that are held, devices, flights: once a frame, after the mouse.
   void advance(const Keyboard& keyboard, bool shift, const CameraDevices& devices, double seconds);
   /// The whole bone, as when a session begins; `fly`: or at once.

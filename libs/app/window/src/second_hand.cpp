@@ -17,31 +17,31 @@ MouseDevice* moved_by_window(Rehearsal& rehearsal) {
 }  // namespace
 
 std::string SecondHand::name_of(std::size_t what) const {
-  return what == kSucker      ? "sucker " + std::to_string(french_) + " Fr"
+  return what == kSucker      ? "suction tube " + std::to_string(french_) + " Fr"
          : what == kIrrigator ? "irrigator 2 mm"
          : what == kProbe     ? "probe 1 mm"
                               : "";
 }
 
-std::string SecondHand::take_next(Rehearsal& rehearsal) {
+LocalText SecondHand::take_next(Rehearsal& rehearsal) {
   return take(rehearsal, (holds_ + 1) % kThings);
 }
 
-std::string SecondHand::take(Rehearsal& rehearsal, std::size_t what) {
-  if (rehearsal.hands() < 2) return tr(kNone);
+LocalText SecondHand::take(Rehearsal& rehearsal, std::size_t what) {
+  if (rehearsal.hands() < 2) return [] { return tr(kNone); };
   holds_ = what;
   if (moved_by_window(rehearsal) == nullptr) {
     holds_ = std::max<std::size_t>(holds_, 1);
     rehearsal.device(1).set_tool(static_cast<std::uint8_t>(instrument_index(name_of(holds_))));
   }
   if (holds_ == 0) follow();
-  return holds_ == 0 ? tr("second hand: nothing")
-                     : filled(tr("second hand: {tool}"), {{"tool", tr_sized(name_of(holds_))}});
+  if (holds_ == 0) return [] { return tr("second hand: nothing"); };
+  return [&] { return filled(tr("second hand: {tool}"), {{"tool", tr_sized(name_of(holds_))}}); };
 }
 
-bool SecondHand::move(Rehearsal& rehearsal, Vec3 by_mm, std::string& said) {
+bool SecondHand::move(Rehearsal& rehearsal, Vec3 by_mm, LocalText& said) {
   if (moved_by_window(rehearsal) == nullptr) {
-    said = rehearsal.hands() < 2 ? tr(kNone) : tr("the second hand has a device of its own");
+    said = [&] { return rehearsal.hands() < 2 ? tr(kNone) : tr("the second hand has a device of its own"); };
     return false;
   }
   if (holds_ == 0) said = take_next(rehearsal);

@@ -12,9 +12,9 @@ class SecondHand {
  public:
   /// The next of sucker, irrigator, probe and nothing; a device's hand always holds one of the three. What there is to
   /// say.
-  std::string take_next(Rehearsal& rehearsal);
+  LocalText take_next(Rehearsal& rehearsal);
   /// One of them; 0: nothing. What there is to say.
-  std::string take(Rehearsal& rehearsal, std::size_t what);
+  LocalText take(Rehearsal& rehearsal, std::size_t what);
   [[nodiscard]] std::size_t holds() const { return holds_; }
   static constexpr std::size_t kSucker = 1, kIrrigator = 2, kProbe = 3;
   /// Its sucker, in French: 5, 7, 8, 10 or 12.
@@ -22,7 +22,7 @@ class SecondHand {
   [[nodiscard]] int sucker_french() const { return french_; }
   /// The mouse moves it: from where it is, and it stays where it is put. With nothing in it, it takes a sucker. False:
   /// there is none that a mouse could move, and `said` is why.
-  bool move(Rehearsal& rehearsal, Vec3 by_mm, std::string& said);
+  bool move(Rehearsal& rehearsal, Vec3 by_mm, LocalText& said);
   /// Beside the burr again.
   void follow() { placed_mm_.reset(); }
   /// Each frame: `suck`, `wash`: what is asked for by key; `works`: what it holds is to work.

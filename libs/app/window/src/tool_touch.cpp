@@ -45,12 +45,15 @@ std::optional<ToolTouch::Reported> ToolTouch::look(std::span<const TickRecord> h
       if (gap.gap_mm >= 0) continue;
       at_mm_ = gap.at_mm;
       const auto rounded = [](double x) { return std::round(x * 100) / 100; };
-      reported = Reported{filled(tr("{one} touches {other}"), {{"one", name_of(*other.held, gap.other_head)},
-                                                               {"other", name_of(*first.held, gap.first_head)}}),
-                          Json{{"hands", Json{static_cast<int>(hands[a].hand), static_cast<int>(hands[b].hand)}},
-                               {"tools", Json{first.held->name, other.held->name}},
-                               {"at_mm", Json{rounded(gap.at_mm.x), rounded(gap.at_mm.y), rounded(gap.at_mm.z)}}}
-                              .dump()};
+      reported =
+          Reported{[&] {
+                     return filled(tr("{one} touches {other}"), {{"one", name_of(*other.held, gap.other_head)},
+                                                                 {"other", name_of(*first.held, gap.first_head)}});
+                   },
+                   Json{{"hands", Json{static_cast<int>(hands[a].hand), static_cast<int>(hands[b].hand)}},
+                        {"tools", Json{first.held->name, other.held->name}},
+                        {"at_mm", Json{rounded(gap.at_mm.x), rounded(gap.at_mm.y), rounded(gap.at_mm.z)}}}
+                       .dump()};
     }
   }
   if (least > kApartMm) reported_ = false;

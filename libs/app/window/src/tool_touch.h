@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "local_text.h"
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/simulation/haptics/stream.h"
 
@@ -15,8 +16,8 @@ class ToolTouch {
   /// Their gap must have been so wide since the last touch before another is told: a hand trembles.
   static constexpr double kApartMm = 0.5;
   struct Reported {
-    std::string words;  ///< "the sucker touches the drill's shaft"
-    std::string note;   ///< the value of a "touch" note
+    LocalText text;    ///< "the sucker touches the drill's shaft"
+    std::string note;  ///< the value of a "touch" note
   };
   /// The hands as they are, empty ones left out. Something when a touch begins.
   std::optional<Reported> look(std::span<const TickRecord> hands);

@@ -61,22 +61,24 @@ void TrialOverlay::draw(const ScopeView& view, const PictureArea& area) const {
   list->PopClipRect();
 }
 
-std::optional<std::string> TrialOverlay::advance(const ScopeControl& control, double seconds,
-                                                 const std::filesystem::path& csv) {
+std::optional<LocalText> TrialOverlay::advance(const ScopeControl& control, double seconds,
+                                               const std::filesystem::path& csv) {
   if (!running()) return std::nullopt;
   const bool reached = trial_->advance(control, seconds);
   if (!reached) return std::nullopt;
   try {
     write_file(csv, trial_csv(trial_->results()));
   } catch (const Error& e) {
-    return std::string(e.what());
+    return LocalText::untranslated(e.what());
   }
   const TrialSummary s = summary_of(trial_->results());
-  return filled(running() ? tr("view {n} of {all} reached in {seconds} s")
-                          : tr("view {n} of {all} reached in {seconds} s; times are in camera-trial.csv"),
-                {{"n", std::to_string(s.targets)},
-                 {"all", std::to_string(trial_->count())},
-                 {"seconds", shown_number(trial_->results().back().seconds, 1)}});
+  return LocalText([&] {
+    return filled(running() ? tr("view {n} of {all} reached in {seconds} s")
+                            : tr("view {n} of {all} reached in {seconds} s; times are in camera-trial.csv"),
+                  {{"n", std::to_string(s.targets)},
+                   {"all", std::to_string(trial_->count())},
+                   {"seconds", shown_number(trial_->results().back().seconds, 1)}});
+  });
 }
 
 }  // namespace osteo::inline app

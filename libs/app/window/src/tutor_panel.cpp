@@ -36,23 +36,25 @@ std::string who_cuts(const std::vector<std::string>& names, const std::vector<Ti
   return who.empty() ? tr("nobody") : who;
 }
 
-std::optional<std::string> LinkWatch::look(const TutorNow& now) {
-  std::optional<std::string> said;
+std::optional<LocalText> LinkWatch::look(const TutorNow& now) {
+  std::optional<LocalText> said;
   std::vector<std::pair<std::string, bool>> heard;
   for (const TutorNow::Link& l : now.links) {
     heard.emplace_back(l.who, l.heard);
     const auto before = std::find_if(heard_.begin(), heard_.end(), [&](const auto& h) { return h.first == l.who; });
     if (before == heard_.end()) {
-      if (l.heard) said = filled(tr("{who} has joined"), {{"who", l.who}});
+      if (l.heard) said = LocalText([&] { return filled(tr("{who} has joined"), {{"who", l.who}}); });
     } else if (before->second != l.heard) {
-      said = filled(
-          l.heard ? tr("the link to the {who} is back") : tr("the link to the {who} has dropped: your hand is let go"),
-          {{"who", l.who}});
+      said = LocalText([&] {
+        return filled(l.heard ? tr("the link to the {who} is back")
+                              : tr("the link to the {who} has dropped: your hand is let go"),
+                      {{"who", l.who}});
+      });
     }
   }
   for (const auto& [who, was] : heard_) {
     if (std::none_of(heard.begin(), heard.end(), [&, name = who](const auto& h) { return h.first == name; }))
-      said = filled(tr("{who} has left"), {{"who", who}});
+      said = LocalText([&] { return filled(tr("{who} has left"), {{"who", who}}); });
   }
   heard_ = std::move(heard);
   return said;

@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "local_text.h"
 #include "osteo/app/window/tutor_now.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "palette.h"
-#include "room_layout.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 
@@ -26,7 +27,7 @@ inline constexpr Colour kPartnerColour = palette::kPurple;
 class LinkWatch {
  public:
   /// What is to be said now.
-  std::optional<std::string> look(const TutorNow& now);
+  std::optional<LocalText> look(const TutorNow& now);
 
  private:
   std::vector<std::pair<std::string, bool>> heard_;

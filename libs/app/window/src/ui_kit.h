@@ -9,8 +9,8 @@
 #include <string_view>
 
 #include "palette.h"
-#include "room_layout.h"
 #include "ui_style.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "palette.h"
-#include "room_layout.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 

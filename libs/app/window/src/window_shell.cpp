@@ -16,8 +16,8 @@
 #include <utility>
 
 #include "open_window.h"
-#include "room_layout.h"
 #include "ui_style.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 namespace {

@@ -14,7 +14,7 @@
 namespace osteo::inline app {
 
 /// Of what is around the bone.
-struct RoomState {
+struct ViewState {
   std::string layout;
   int em_pixels = 0;
   bool full_screen = false, asking = false, wheel = false, panel_keys = false, before = false, writing = false,
@@ -28,10 +28,10 @@ struct RoomState {
   double review_s = 0, review_mm3 = 0;  // the time that is shown, and the bone there is then
   std::vector<std::string> steps_done;  // of the first five minutes, by name
   std::string next_step;
-  bool typing = false;        // in the list of commands
-  std::string search, found;  // what, and the name of the row that is chosen
-  std::string focus;          // the part of the window that has the keys
-  std::array<float, 4> view{};        // x, y, width, height
+  bool typing = false;          // in the list of commands
+  std::string search, found;    // what, and the name of the row that is chosen
+  std::string focus;            // the part of the window that has the keys
+  std::array<float, 4> view{};  // x, y, width, height
 };
 
 /// Of the hand.
@@ -60,7 +60,7 @@ struct TutorState {
 
 struct WindowState {
   TutorState tutor;
-  RoomState room;
+  ViewState main_view;
   HandState motion;
   MonitorState monitor;
   std::uint64_t pictures = 0;  // turns of the loop

@@ -18,7 +18,7 @@
 #include "osteo/session/scene/case.h"
 #include "osteo/simulation/bone/live_surface.h"
 #include "pictures.h"
-#include "words.h"
+#include "texts.h"
 
 namespace osteo::inline assessment {
 namespace {

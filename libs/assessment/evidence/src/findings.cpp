@@ -280,7 +280,7 @@ class Finder {
   }
 
   [[nodiscard]] std::string below_text() const {
-    return filled(tr("Told below {mm} mm."), {{"mm", reported_number(limits_.near_miss_mm)}});
+    return filled(tr("Reported below {mm} mm."), {{"mm", reported_number(limits_.near_miss_mm)}});
   }
 
   // Of `near` the first three, the most first.

@@ -80,7 +80,8 @@ std::size_t TimelineKeeper::sample_at(std::uint64_t tick) {
 }
 
 std::string TimelineEvent::shown() const {
-  if (text == nullptr) return what;
+  // Messages of the window are kept in English. Those that hold no value are found in the catalogue again.
+  if (text == nullptr) return kind == EventKind::note ? tr(what) : what;
   if (kind == EventKind::instrument) return filled(tr(text), {{"part", tr_sized(part)}});
   if (kind == EventKind::injury || kind == EventKind::touch) return filled(tr(text), {{"part", tr(part)}});
   const bool figure = part.find_first_not_of("0123456789.") == std::string::npos;

@@ -40,7 +40,7 @@ function draw() {
   for (const e of T.events) if (e.kind === "gap" && e.end_s >= from && e.t_s <= to) s += `<rect x="${f(x(Math.max(from, e.t_s)))}" y="${top}" width="${f(Math.max(1, x(Math.min(to, e.end_s)) - x(Math.max(from, e.t_s))))}" height="${4 * (lane + gap)}" fill="${C.rule}"/>`;
   let step = niceStep(FORCE, 2), max = Math.ceil(FORCE / step) * step;
   grid(tx("Force"), tx("N, of the burr"), max, step); area(c => peak(T.force_n, lo(c), hi(c)), max, C.force, 0.75);
-  y += lane + gap; grid(tx("Distance"), tx("mm, nearest"), 8, 4);
+  y += lane + gap; grid(tx("Clearance"), tx("mm, nearest"), 8, 4);
   s += `<rect x="${L}" y="${f(y + lane * 0.75)}" width="${w}" height="${f(lane * 0.25)}" fill="${C.accent}" opacity="0.1"/>`;
   let d = "", on = false;
   for (let c = 0; c < cols; ++c) { const v = least(T.distance_mm, lo(c), hi(c)); if (v === null) { on = false; continue; }
@@ -52,7 +52,7 @@ function draw() {
   step = niceStep(most, 2); most = Math.ceil(most / step) * step; grid(tx("Bone"), tx("mm³/s; orange unseen"), most, step);
   area(c => seen(c) + hid(c), most, C.seen, 1); area(hid, most, C.accent, 1);
   y += lane + gap; step = niceStep(FAST, 2); max = Math.ceil(FAST / step) * step;
-  grid(tx("Speed"), tx("mm/s, of the tip"), max, step); area(c => total(T.speed_mm_s, lo(c), hi(c)) / (hi(c) - lo(c)), max, C.force, 0.4);
+  grid(tx("Tip speed"), tx("mm/s"), max, step); area(c => total(T.speed_mm_s, lo(c), hi(c)) / (hi(c) - lo(c)), max, C.force, 0.4);
   y += lane + 8;
   s += `<text x="0" y="${y + 12}" font-size="12" font-weight="600" fill="${C.ink}">${tx("In hand")}</text>`;
   for (let k = i0, b = i0, shade = 0; k <= i1; ++k) if (k === i1 || T.tool[k] !== T.tool[b]) { const a = x(b / HZ), e = x(k / HZ), name = T.instruments[T.tool[b]];

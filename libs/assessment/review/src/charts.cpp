@@ -158,7 +158,7 @@ class TimelineChart {
 
   // The least of each column; where none is known the line ends.
   void draw_distance() {
-    lane(tr("Distance"), tr("mm, nearest structure"), {8, 4});
+    lane(tr("Clearance"), tr("mm, nearest structure"), {8, 4});
     d_.box(kLeft, y_ + kLane * 0.75, w_, kLane * 0.25, kAccent, 0.10);
     Steps run;
     const auto end_run = [&] {
@@ -205,7 +205,7 @@ class TimelineChart {
     std::sort(sorted.begin(), sorted.end());
     const Scale scale =
         scale_of(sorted.empty() ? 1 : std::max(1.0, 1.2 * static_cast<double>(sorted[(sorted.size() - 1) * 98 / 100])));
-    lane(tr("Speed"), tr("mm/s, of the tip"), scale);
+    lane(tr("Tip speed"), tr("mm/s"), scale);
     Steps shape = begin_area();
     each([&](double x, std::size_t from, std::size_t to) {
       double v = 0;

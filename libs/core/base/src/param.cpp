@@ -50,7 +50,7 @@ constexpr std::array<OldName, 12> kOldCommands = {{{"console", "nerve-console"},
                                                    {"take-back", "import-slicer"},
                                                    {"watch", "watch-folder"}}};
 
-constexpr std::array<OldName, 16> kOldFields = {{{"anybody", "allow_all"},
+constexpr std::array<OldName, 17> kOldFields = {{{"anybody", "allow_all"},
                                                  {"attend", "min_trainees"},
                                                  {"by_place", "match_by_position"},
                                                  {"content_hu", "lumen_hu"},
@@ -65,7 +65,8 @@ constexpr std::array<OldName, 16> kOldFields = {{{"anybody", "allow_all"},
                                                  {"most_mpa", "max_mpa"},
                                                  {"most_n", "max_force_n"},
                                                  {"most_points", "max_points"},
-                                                 {"patience_s", "silence_s"}}};
+                                                 {"patience_s", "silence_s"},
+                                                 {"pieces", "fragments"}}};
 
 }  // namespace
 

@@ -22,14 +22,14 @@ RehearsalStream::RehearsalStream(Rehearsal& rehearsal, std::span<const StreamTar
       monitor_->add_sink(*notes_);
     }
     const std::string code = make_pairing_code();
-    door_ = std::make_shared<StimulatorDoor>(
+    endpoint_ = std::make_shared<StimulatorEndpoint>(
         tidy_code(code), [this](const StimulatorSetting& s) { monitor_->stimulate(s); },
         [this] {
           StimulatorSetting now;
           rehearsal_.look([&](const World&, SceneReaders&) { now = monitor_->stimulator(); });
           return std::pair(now, static_cast<std::uint32_t>(rehearsal_.hands()));
         });
-    feed_->let_stimulate(door_);
+    feed_->let_stimulate(endpoint_);
     invitation_ = "to set the stimulator: osteo nerve-console " + place->address + " --code " + code;
   }
   if (own_) rehearsal.add_reader(*own_);

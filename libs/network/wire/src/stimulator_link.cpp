@@ -63,19 +63,19 @@ std::optional<std::pair<StimulatorSetting, std::uint32_t>> setting_in(std::span<
 
 }  // namespace
 
-StimulatorDoor::StimulatorDoor(std::string_view tidy_code, Set set, Now now)
+StimulatorEndpoint::StimulatorEndpoint(std::string_view tidy_code, Set set, Now now)
     : code_(tidy_code), set_(std::move(set)), now_(std::move(now)) {}
 
-StimulatorDoor::Counts StimulatorDoor::counts() const {
+StimulatorEndpoint::Counts StimulatorEndpoint::counts() const {
   const std::lock_guard lock(mutex_);
   return counts_;
 }
 
-void StimulatorDoor::gone(std::uint64_t client) {
+void StimulatorEndpoint::gone(std::uint64_t client) {
   clients_.erase(client);
 }
 
-std::vector<WireBytes> StimulatorDoor::hear(std::uint64_t client, const IgtlMessage& m, double now_s) {
+std::vector<WireBytes> StimulatorEndpoint::hear(std::uint64_t client, const IgtlMessage& m, double now_s) {
   if (m.type != kStimulatorType) return {};
   Client& c = clients_[client];
   c.messages = std::min(kMaxMessagesS, c.messages + std::max(0.0, now_s - c.last_s) * kMaxMessagesS);
@@ -93,7 +93,7 @@ std::vector<WireBytes> StimulatorDoor::hear(std::uint64_t client, const IgtlMess
   return answers;
 }
 
-std::vector<WireBytes> StimulatorDoor::take(Client& c, std::span<const std::uint8_t> body) {
+std::vector<WireBytes> StimulatorEndpoint::take(Client& c, std::span<const std::uint8_t> body) {
   std::uint8_t version = 0, step = 0;
   if (!osteo::take(body, version) || !osteo::take(body, step)) return {};
   if (version != kVersion) return {message_of(Step::refused, Refusal::version)};

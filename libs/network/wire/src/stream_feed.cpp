@@ -5,7 +5,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
-#include "outlets.h"
+#include "wire_sinks.h"
 
 namespace osteo::inline network {
 namespace {
@@ -154,16 +154,16 @@ std::optional<MonitorEvent> event_in(const std::string& json) {
   return e;
 }
 
-std::unique_ptr<WireOutlet> make_outlet(const StreamTarget& target) {
+std::unique_ptr<WireSink> make_sink(const StreamTarget& target) {
   switch (target.kind) {
     case StreamTarget::Kind::cerebus:
-      return make_cerebus_outlet(target);
+      return make_cerebus_sink(target);
     case StreamTarget::Kind::lsl:
-      return make_lsl_outlet();
+      return make_lsl_sink();
     case StreamTarget::Kind::igtl:
       break;
   }
-  return make_igtl_outlet(target);
+  return make_igtl_sink(target);
 }
 
 StreamFeed::StreamFeed(std::span<const StreamTarget> targets, double rate_hz, std::size_t hands,
@@ -172,10 +172,10 @@ StreamFeed::StreamFeed(std::span<const StreamTarget> targets, double rate_hz, st
       every_(static_cast<std::uint64_t>(std::max(1.0, std::round(rate_hz / kPoseHz)))),
       now_(hands),
       monitor_(monitor) {
-  for (const StreamTarget& t : targets) outlets_.push_back(make_outlet(t));
+  for (const StreamTarget& t : targets) sinks_.push_back(make_sink(t));
   WireMonitor m;
   if (monitor != nullptr) m = {monitor->wiring().labels(), monitor->setup().constants.event_uv};
-  for (const auto& o : outlets_) o->begin(m);
+  for (const auto& o : sinks_) o->begin(m);
 }
 
 StreamFeed::~StreamFeed() {
@@ -199,7 +199,7 @@ void StreamFeed::tick(const TickRecord& record, std::span<const VoxelChange>) {
     const std::lock_guard lock(mutex_);
     camera.swap(camera_);
   }
-  for (const auto& o : outlets_) {
+  for (const auto& o : sinks_) {
     o->tools(at_s, now_);
     if (camera) o->camera(at_s, *camera);
   }
@@ -208,19 +208,19 @@ void StreamFeed::tick(const TickRecord& record, std::span<const VoxelChange>) {
 }
 
 void StreamFeed::block(const MonitorBlock& block) {
-  for (const auto& o : outlets_) o->block(block);
+  for (const auto& o : sinks_) o->block(block);
   counts_.samples += block.samples();
 }
 
 void StreamFeed::event(const MonitorEvent& event) {
   if (event.kind == MonitorEventKind::cause || monitor_ == nullptr) return;
   const std::string words = words_of(event, monitor_->wiring());
-  for (const auto& o : outlets_) o->event(event, words);
+  for (const auto& o : sinks_) o->event(event, words);
   ++counts_.events;
 }
 
 void StreamFeed::spike(const MonitorSpike& spike) {
-  for (const auto& o : outlets_) o->spike(spike);
+  for (const auto& o : sinks_) o->spike(spike);
   ++counts_.spikes;
 }
 
@@ -241,26 +241,26 @@ void StreamFeed::end() {
       {"cameras", counts_.cameras},
       {"spikes",
        counts_.spikes}}.dump();
-  for (const auto& o : outlets_) o->end(static_cast<double>(tick_) / rate_hz_, json);
+  for (const auto& o : sinks_) o->end(static_cast<double>(tick_) / rate_hz_, json);
 }
 
-void StreamFeed::let_stimulate(const std::shared_ptr<StimulatorDoor>& door) {
-  for (const auto& o : outlets_) o->let_stimulate(door);
+void StreamFeed::let_stimulate(const std::shared_ptr<StimulatorEndpoint>& endpoint) {
+  for (const auto& o : sinks_) o->let_stimulate(endpoint);
 }
 
 bool StreamFeed::wait_for(std::size_t listeners, double most_s, const std::function<bool()>& stop) {
-  return std::all_of(outlets_.begin(), outlets_.end(), [&](const auto& o) { return o->wait(listeners, most_s, stop); });
+  return std::all_of(sinks_.begin(), sinks_.end(), [&](const auto& o) { return o->wait(listeners, most_s, stop); });
 }
 
 std::vector<std::string> StreamFeed::reported() const {
   std::vector<std::string> all;
-  for (const auto& o : outlets_) all.push_back(o->reported());
+  for (const auto& o : sinks_) all.push_back(o->reported());
   return all;
 }
 
 std::uint64_t StreamFeed::dropped() const {
   std::uint64_t sum = 0;
-  for (const auto& o : outlets_) sum += o->dropped();
+  for (const auto& o : sinks_) sum += o->dropped();
   return sum;
 }
 

@@ -48,7 +48,7 @@ std::string words_of_instruments() {
   return text;
 }
 
-// { "diamond": "proxy", "cutting taper": "volume", "sucker": "overlap" }: an instrument is meant when its name holds
+// { "diamond": "proxy", "cutting taper": "volume", "suction": "overlap" }: an instrument is meant when its name holds
 // all of the words.
 void set_tool_methods(const JsonValue& tools, const JsonFile& file, HapticSetup& setup) {
   if (tools.kind != JsonValue::Kind::object) throw file.wrong(tools, "\"tools\" must be an object in braces");
@@ -65,7 +65,10 @@ void set_tool_methods(const JsonValue& tools, const JsonFile& file, HapticSetup&
       const std::string name = " " + i.name + (ball ? " ball " : " ");
       std::istringstream in(words);
       bool all = true;
-      for (std::string word; in >> word;) all = all && name.find(" " + word + " ") != std::string::npos;
+      for (std::string word; in >> word;) {
+        if (word == "sucker") word = "suction";  // as files of 0.1 have it
+        all = all && name.find(" " + word + " ") != std::string::npos;
+      }
       if (!all) continue;
       setup.tool_methods[static_cast<int>(t)] = method;
       any = true;

@@ -270,7 +270,8 @@ class ScriptReader {
   }
   void act(double t, const Attach& a, const JsonValue& j, const std::string& where) {
     if (a.pieces.empty() || a.pieces.size() > 2 || (a.pieces.size() == 2 && a.pieces[0] == a.pieces[1]))
-      throw file_.wrong(*j.find("pieces"), where + ": \"pieces\" are one, or two that are not the same");
+      throw file_.wrong(*(j.find("fragments") != nullptr ? j.find("fragments") : j.find("pieces")),
+                        where + ": \"fragments\" are one, or two that are not the same");
     add(t, SceneAction::attach(plate(j, where, a.plate), {axes_of(j, where, a.x, a.z), vec(a.at_mm)},
                                static_cast<std::uint32_t>(a.pieces[0]),
                                a.pieces.size() > 1 ? static_cast<std::uint32_t>(a.pieces[1]) : SceneAction::kNobody));
@@ -391,9 +392,9 @@ std::string script_schema() {
     ordered_json entry = object_schema<When>();
     ordered_json what = object_schema<F>();
     what["description"] = F::kHelp;
-    if (what["properties"].contains("pieces")) {
-      what["properties"]["pieces"]["minItems"] = 1;
-      what["properties"]["pieces"]["maxItems"] = 2;
+    if (what["properties"].contains("fragments")) {
+      what["properties"]["fragments"]["minItems"] = 1;
+      what["properties"]["fragments"]["maxItems"] = 2;
     }
     if (what["properties"].contains("planned"))
       what["anyOf"] = {{{"required", {"planned"}}}, {{"required", {"at_mm", "normal"}}}};

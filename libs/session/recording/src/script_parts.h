@@ -71,7 +71,8 @@ struct HandPart {
   std::string instrument;
   Triple axis{0, 0, 1};
   static void describe(HandPart& p, auto& visit) {
-    visit({"instrument", "name of the instrument, like sucker 8 Fr or cutting 4 mm", "", 0, 0, true}, p.instrument);
+    visit({"instrument", "name of the instrument, like suction tube 8 Fr or cutting 4 mm", "", 0, 0, true},
+          p.instrument);
     visit({"axis", "direction from the tip to the handle, LPS", "", -kFarMm, kFarMm, true}, p.axis);
   }
 };
@@ -134,10 +135,8 @@ struct Move {
   double turn_deg = 0, over_s = 0;
   static void describe(Move& p, auto& visit) {
     visit({"piece", "which", "", 0, kMaxPieces, true}, p.piece);
-    visit({"shift_mm", "where to, after the turn; left out: as far as it was shifted before", "mm", -kFarMm, kFarMm},
-          p.shift_mm);
-    visit({"turn_deg", "about axis through about_mm; left out: as far as it was turned before", "deg", -360, 360},
-          p.turn_deg);
+    visit({"shift_mm", "where to, after the turn; left out: as far as before", "mm", -kFarMm, kFarMm}, p.shift_mm);
+    visit({"turn_deg", "about axis through about_mm; left out: as far as before", "deg", -360, 360}, p.turn_deg);
     visit({"axis", "axis of the rotation", "", -kFarMm, kFarMm}, p.axis);
     visit({"about_mm", "a point of that axis, LPS", "mm", -kFarMm, kFarMm}, p.about_mm);
     visit({"over_s", "how long it takes", "s", 0, 3600}, p.over_s);
@@ -166,7 +165,7 @@ struct Attach {
     visit({"at_mm", "middle of its underside, LPS", "mm", -kFarMm, kFarMm, true}, p.at_mm);
     visit({"x", "along the plate", "", -kFarMm, kFarMm}, p.x);
     visit({"z", "away from the bone", "", -kFarMm, kFarMm}, p.z);
-    visit({"pieces", "one or two; the plate stays with the first", "", 0, kMaxPieces, true}, p.pieces);
+    visit({"fragments", "one or two; the plate stays with the first", "", 0, kMaxPieces, true}, p.pieces);
   }
 };
 

@@ -160,6 +160,16 @@ std::vector<std::string> names_in(const ordered_json& list) {
   return names;
 }
 
+// Suction tubes have another name in sessions of 0.1.
+std::vector<std::string> instruments_in(const ordered_json& list) {
+  std::vector<std::string> names = names_in(list);
+  constexpr std::string_view kOld = "sucker ", kNow = "suction tube ";
+  for (std::string& n : names) {
+    if (n.starts_with(kOld)) n.replace(0, kOld.size(), kNow);
+  }
+  return names;
+}
+
 FieldType type_of(const std::string& text, const std::string& name) {
   for (const FieldType t : {FieldType::u8, FieldType::u32, FieldType::u64, FieldType::f32, FieldType::f64}) {
     if (name_of(t) == text) return t;
@@ -313,7 +323,7 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
     o.action_names[static_cast<std::uint32_t>(std::stoul(kind))] = action;
   o.tools = names_of(instrument_library());
   o.plates = names_of(plate_library());
-  numbers.tools = NamedNumbers("instrument", names_in(j.at("instruments")), o.tools);
+  numbers.tools = NamedNumbers("instrument", instruments_in(j.at("instruments")), o.tools);
   numbers.plates = NamedNumbers("plate", names_in(j.value("plates", ordered_json::array())), o.plates);
   o.numbered_alike = numbers.tools.same() && numbers.plates.same();
   std::vector<std::string> unknown;

@@ -317,9 +317,9 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   }
   if (!s.warnings.empty()) j["warnings"] = s.warnings;
   if (!s.pieces.empty()) {
-    j["pieces"] = ordered_json::array();
+    j["fragments"] = ordered_json::array();
     for (const auto& p : s.pieces) {
-      j["pieces"].push_back(
+      j["fragments"].push_back(
           {{"volume_mm3", p.mass * s.voxel_mm3}, {"centre_mm", {p.centre_mm.x, p.centre_mm.y, p.centre_mm.z}}});
     }
   }

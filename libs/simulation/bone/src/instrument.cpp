@@ -47,7 +47,7 @@ const std::vector<Instrument>& instrument_library() {
     for (const Burr& b : burr_library()) all.push_back(cutting(InstrumentKind::burr, b));
     for (const int french : {5, 7, 8, 10, 12}) {
       const double outer_mm = french * kMmPerFrench, size = french / 10.0;
-      Instrument i = rod(InstrumentKind::sucker, "sucker " + std::to_string(french) + " Fr", outer_mm, outer_mm);
+      Instrument i = rod(InstrumentKind::sucker, "suction tube " + std::to_string(french) + " Fr", outer_mm, outer_mm);
       i.rate = 60 * size * size;
       i.reach_mm = 4 * size;
       all.push_back(std::move(i));
@@ -72,8 +72,11 @@ const std::vector<Instrument>& instrument_library() {
 }
 
 int instrument_index(std::string_view name) {
+  constexpr std::string_view kOld = "sucker ";  // of 0.1, in scripts and calls
+  const std::string wanted =
+      name.starts_with(kOld) ? "suction tube " + std::string(name.substr(kOld.size())) : std::string(name);
   const auto& all = instrument_library();
-  const auto it = std::find_if(all.begin(), all.end(), [&](const Instrument& i) { return i.name == name; });
+  const auto it = std::find_if(all.begin(), all.end(), [&](const Instrument& i) { return i.name == wanted; });
   if (it != all.end()) return static_cast<int>(it - all.begin());
   std::string names;
   for (const Instrument& i : all) {

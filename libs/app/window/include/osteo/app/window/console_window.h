@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "osteo/app/window/monitor_desk.h"
+#include "osteo/app/window/monitor_controller.h"
 #include "osteo/app/window/window_shell.h"
 
 namespace osteo::inline app {

@@ -35,9 +35,9 @@ enum class HandFunction : int {
   straight
 };
 [[nodiscard]] constexpr std::array<std::string_view, 19> enum_names(HandFunction) {
-  return {"drill",  "clutch", "wrist_rest", "second_hand", "camera",      "suck",         "water",
-          "undo",   "bring",  "lift",       "other_burr",  "larger_burr", "smaller_burr", "tool_wheel",
-          "faster", "slower", "finer",      "coarser",     "straight"};
+  return {"drill",  "clutch",   "wrist_rest", "second_hand", "camera",      "suction",      "irrigation",
+          "undo",   "approach", "retract",    "other_burr",  "larger_burr", "smaller_burr", "tool_wheel",
+          "faster", "slower",   "finer",      "coarser",     "straight"};
 }
 
 /// A button is a number: a key as GLFW numbers keys (32 to 348), or one of these and its own number from 0.

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "osteo/app/window/monitor_desk.h"
+#include "osteo/app/window/monitor_controller.h"
 #include "osteo/app/window/person_settings.h"
 #include "osteo/app/window/session_review.h"
 #include "osteo/app/window/sound_out.h"

@@ -61,7 +61,7 @@ struct FarSample {
 /// after it was made, which is what all but a hundredth of them need, and changes by a tick in twenty. When nothing was
 /// heard for kSilenceTicks the strength of the pull goes to 0 within another 30, and the pose is told as old as it is.
 /// It comes back as soon when it was but a moment (kMomentTicks), else within kRampTicks. No allocation.
-class Playout {
+class JitterBuffer {
  public:
   static constexpr std::uint64_t kSilenceTicks = 20, kFadeTicks = 30, kMomentTicks = 250, kRampTicks = 500;
   /// `newest`: the last of its packet, by which delay is measured.
@@ -109,7 +109,7 @@ class FarDevice final : public Device {
     bool newest = false;
   };
   Ring<Item> inbox_{1024};
-  Playout playout_;
+  JitterBuffer jitter_buffer_;
   std::atomic<double> strength_{0};
   std::atomic<int> buffer_{0};
   std::atomic<bool> pulls_{true};

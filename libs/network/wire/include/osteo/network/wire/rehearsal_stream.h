@@ -23,8 +23,8 @@ class RehearsalStream {
   [[nodiscard]] const MonitorReader& monitor() const { return *monitor_; }
   /// What a console needs to set the stimulator, in a line; empty: nobody may. To be shown, and written nowhere.
   [[nodiscard]] const std::string& invitation() const { return invitation_; }
-  /// Of the door; null: none.
-  [[nodiscard]] const StimulatorDoor* door() const { return door_.get(); }
+  /// Of the endpoint; null: none.
+  [[nodiscard]] const StimulatorEndpoint* endpoint() const { return endpoint_.get(); }
 
  private:
   Rehearsal& rehearsal_;
@@ -32,7 +32,7 @@ class RehearsalStream {
   std::unique_ptr<MonitorNotes> notes_;
   MonitorReader* monitor_;
   std::string invitation_;
-  std::shared_ptr<StimulatorDoor> door_;
+  std::shared_ptr<StimulatorEndpoint> endpoint_;
   std::unique_ptr<StreamFeed> feed_;
 };
 

@@ -23,14 +23,14 @@ inline constexpr std::string_view kStimulatorType = "OSTEO_STIM";
 /// The rehearsal's side, for all who are connected. Three wrong codes close it. At most kMaxMessagesS messages of each
 /// client a second are looked at, and kMaxPairingsS pairings of all. Memory: about 300 bytes a client. hear() and
 /// gone() from one thread, the rest from any.
-class StimulatorDoor {
+class StimulatorEndpoint {
  public:
   static constexpr int kTries = 3;
   static constexpr double kMaxMessagesS = 100, kMaxPairingsS = 20;
   using Set = std::function<void(const StimulatorSetting&)>;
   /// As it is set now, and how many hands there are.
   using Now = std::function<std::pair<StimulatorSetting, std::uint32_t>()>;
-  StimulatorDoor(std::string_view tidy_code, Set set, Now now);
+  StimulatorEndpoint(std::string_view tidy_code, Set set, Now now);
 
   /// What a client says, and the answers for it alone: messages of kStimulatorType; others are nothing.
   [[nodiscard]] std::vector<WireBytes> hear(std::uint64_t client, const IgtlMessage& message, double now_s);

@@ -12,7 +12,7 @@
 
 namespace osteo::inline network {
 
-class StimulatorDoor;
+class StimulatorEndpoint;
 
 /// One place that a stream goes to.
 struct StreamTarget {
@@ -53,9 +53,9 @@ struct WireMonitor {
 [[nodiscard]] std::optional<MonitorEvent> event_in(const std::string& json);
 
 /// One kind of network. Calls come one at a time; none may wait for the network.
-class WireOutlet {
+class WireSink {
  public:
-  virtual ~WireOutlet() = default;
+  virtual ~WireSink() = default;
   /// Once, before anything else.
   virtual void begin(const WireMonitor& monitor) { static_cast<void>(monitor); }
   virtual void tools(double at_s, std::span<const WireTool> tools) {
@@ -73,7 +73,7 @@ class WireOutlet {
   }
   virtual void spike(const MonitorSpike& spike) { static_cast<void>(spike); }
   /// From now on who has its code may set the stimulator. Nothing, where this network cannot.
-  virtual void let_stimulate(const std::shared_ptr<StimulatorDoor>& door) { static_cast<void>(door); }
+  virtual void let_stimulate(const std::shared_ptr<StimulatorEndpoint>& endpoint) { static_cast<void>(endpoint); }
   /// Nothing more comes; waits until what was told is on its way, a second at most.
   virtual void end(double at_s, const std::string& json) {
     static_cast<void>(at_s);
@@ -91,10 +91,10 @@ class WireOutlet {
   [[nodiscard]] virtual std::uint64_t dropped() const { return 0; }
 };
 /// Error(usage, failed) where it cannot be.
-[[nodiscard]] std::unique_ptr<WireOutlet> make_outlet(const StreamTarget& target);
+[[nodiscard]] std::unique_ptr<WireSink> make_sink(const StreamTarget& target);
 
-/// Follows a rehearsal or a replay and tells all outlets. Tools at kPoseHz of the session's time, the monitor's blocks
-/// as they come. Times are the session's own, from its beginning: no date leaves. Memory: what the outlets hold.
+/// Follows a rehearsal or a replay and tells all sinks. Tools at kPoseHz of the session's time, the monitor's blocks
+/// as they come. Times are the session's own, from its beginning: no date leaves. Memory: what the sinks hold.
 class StreamFeed final : public Reader, public MonitorSink {
  public:
   static constexpr double kPoseHz = 60;
@@ -110,7 +110,7 @@ class StreamFeed final : public Reader, public MonitorSink {
   void note(const std::string& kind, const std::string& json);
   void end();
 
-  void let_stimulate(const std::shared_ptr<StimulatorDoor>& door);
+  void let_stimulate(const std::shared_ptr<StimulatorEndpoint>& endpoint);
   bool wait_for(std::size_t listeners, double most_s, const std::function<bool()>& stop);
   [[nodiscard]] std::vector<std::string> reported() const;
 
@@ -118,11 +118,11 @@ class StreamFeed final : public Reader, public MonitorSink {
     std::uint64_t samples = 0, tools = 0, events = 0, cameras = 0, spikes = 0;
   };
   [[nodiscard]] const Counts& counts() const { return counts_; }
-  /// By outlets, for listeners that did not keep up.
+  /// By sinks, for listeners that did not keep up.
   [[nodiscard]] std::uint64_t dropped() const;
 
  private:
-  std::vector<std::unique_ptr<WireOutlet>> outlets_;
+  std::vector<std::unique_ptr<WireSink>> sinks_;
   double rate_hz_;
   std::uint64_t every_;
   std::vector<WireTool> now_;

@@ -46,7 +46,7 @@ struct Script : Strokes {
 
 /// { "osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 4}, "axis": [1, 0, 0],
 ///   "waypoints": [ {"t_s": 0, "at_mm": [80, 24, -26], "drill": true, "pedal": 0.5}, ... ],
-///   "hands": [ {"instrument": "sucker 8 Fr", "axis": [0, 1, 0], "waypoints": [...]}, ... ],
+///   "hands": [ {"instrument": "suction tube 8 Fr", "axis": [0, 1, 0], "waypoints": [...]}, ... ],
 ///   "actions": [ {"t_s": 3, "saw": {"at_mm": [0, 0, 0], "normal": [1, 0, 0]}}, {"t_s": 4, "split": {}}, ... ] }
 /// Points are LPS mm, the axis points from the tip to the handle. "hands" are those besides the one with the burr. Read
 /// strictly: keys, kinds, ranges and what belongs together. "saw" and "cutting_guide" may name one of `planned` (those

@@ -84,6 +84,6 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
 /// in rows; each plate's pieces, transform, opening, screw places and gaps to bone), piece-N.stl and plate-N.stl where
 /// they are now, plate-N-gap.csv (points of the underside and how far below them bone begins). LPS mm. Returns the text
 /// of plan.json. Error(cannot_write).
-std::string write_plan(const World& world, const std::filesystem::path& folder, const Context& context);
+std::string write_result(const World& world, const std::filesystem::path& folder, const Context& context);
 
 }  // namespace osteo::inline session

@@ -20,7 +20,7 @@ enum class InstrumentKind : int { burr, sucker, irrigator, probe, saw };
 /// All of them are felt when they touch bone; what they do besides needs the pedal.
 struct Instrument {
   InstrumentKind kind = InstrumentKind::burr;
-  std::string name;  ///< "cutting 4 mm", "sucker 8 Fr", "irrigator 2 mm", "probe 1 mm", "hook 2 mm", "saw 25 mm"
+  std::string name;  ///< "cutting 4 mm", "suction tube 8 Fr", "irrigator 2 mm", "probe 1 mm", "hook 2 mm", "saw 25 mm"
   RoundCone head;    ///< its tip's centre at the origin, handle along +z
   RoundCone shaft;   ///< behind it, in the same frame
   std::optional<Burr> edge;    ///< what removes bone with it: a burr, or the teeth of a saw; none: it removes nothing

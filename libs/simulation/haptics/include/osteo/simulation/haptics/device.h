@@ -14,8 +14,8 @@
 
 namespace osteo::inline simulation {
 
-/// A way that a hand takes by itself, the pedal up: straight from point to point, from wherever it is. FreeWays finds
-/// them.
+/// A way that a hand takes by itself, the pedal up: straight from point to point, from wherever it is. PathPlanner
+/// finds them.
 struct HandWay {
   static constexpr std::size_t kMax = 96;
   struct Point {

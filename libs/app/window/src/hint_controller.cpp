@@ -1,0 +1,130 @@
+#include "hint_controller.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "osteo/core/base/json_document.h"
+#include "osteo/core/base/translate.h"
+#include "ui_style.h"
+
+namespace osteo::inline app {
+namespace {
+
+std::vector<std::string> names_in(const std::string& off) {
+  std::vector<std::string> names;
+  std::istringstream in(off);
+  for (std::string name; std::getline(in, name, ',');) {
+    if (!name.empty()) names.push_back(name);
+  }
+  return names;
+}
+
+bool is_off(const std::string& off, const std::string& id) {
+  const auto names = names_in(off);
+  return std::find(names.begin(), names.end(), id) != names.end();
+}
+
+// What is noted is the rule's own; what is shown is in the language.
+std::string shown_hint(const Hint& hint) {
+  for (const HintRule& r : usual_hints()) {
+    if (r.id == hint.id) return filled(tr(r.words), {{"structure", tr(hint.structure)}});
+  }
+  return hint.words;
+}
+
+}  // namespace
+
+std::vector<HintRule> hints_left(const std::vector<HintRule>& rules, const std::string& off) {
+  std::vector<HintRule> left;
+  for (const HintRule& r : rules) {
+    if (!is_off(off, r.id)) left.push_back(r);
+  }
+  return left;
+}
+
+std::string with_hint(const std::string& off, const std::string& id, bool on) {
+  std::vector<std::string> names = names_in(off);
+  std::erase(names, id);
+  if (!on) names.push_back(id);
+  std::string text;
+  for (const std::string& n : names) text += (text.empty() ? "" : ",") + n;
+  return text;
+}
+
+std::string hint_note(const Hint& hint) {
+  Json j{{"id", hint.id}, {"words", hint.words}};
+  if (!hint.structure.empty()) j["structure"] = hint.structure;
+  return j.dump();
+}
+
+void HintController::follow(Rehearsal& rehearsal) {
+  reader_.reset();  // of the one that is over
+  rehearsal_ = &rehearsal;
+  words_.clear();
+  if (on()) join();
+}
+
+void HintController::join() {
+  bool water = false;
+  rehearsal_->look([&](const World&, SceneReaders& readers) { water = readers.dust != nullptr; });
+  reader_ = std::make_unique<HintReader>(hints_left(usual_hints(), person_.values.hints_off), rehearsal_->rate_hz(),
+                                         rehearsal_->structures(), water);
+  rehearsal_->add_reader(*reader_);
+}
+
+void HintController::leave() {
+  if (reader_ && rehearsal_ != nullptr) rehearsal_->remove_reader(*reader_);
+  reader_.reset();
+  rehearsal_ = nullptr;
+}
+
+void HintController::turn(bool on) {
+  person_.values.hints = on;
+  words_.clear();
+  if (rehearsal_ == nullptr) return;
+  if (reader_) rehearsal_->remove_reader(*reader_);
+  reader_.reset();
+  if (on) join();
+}
+
+void HintController::frame(Vec3 eye_mm, double now_s) {
+  if (!reader_ || rehearsal_ == nullptr) return;
+  reader_->look_from(eye_mm);
+  if (const auto hint = reader_->take()) {
+    words_ = shown_hint(*hint);
+    until_s_ = now_s + kShownS;
+    rehearsal_->note("hint", hint_note(*hint));
+  }
+  if (now_s > until_s_) words_.clear();
+}
+
+void HintController::draw(const ScreenBox& view) const {
+  if (words_.empty()) return;
+  const float e = em(), high = 2.2F * e;
+  const float wide = std::min(view.width - 2 * e, ImGui::CalcTextSize(words_.c_str()).x * 1.3F + 3 * e);
+  if (wide < 4 * e) return;
+  const ScreenBox box{view.x + (view.width - wide) / 2, view.y + 0.7F * e, wide, high};
+  ImDrawList* const draw = ImGui::GetBackgroundDrawList();
+  draw->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32(theme().ground, 0.8F), 0.4F * e);
+  draw_sign(draw, {box.x + 1.1F * e, box.y + high / 2}, 0.45F * e, 4, palette::kYellow);
+  fitted_text(draw, {box.x + 2.0F * e, box.y, box.width - 2.5F * e, box.height}, 1.3F * e, theme().text, words_);
+}
+
+void HintController::panel() {
+  if (!ImGui::CollapsingHeader(tr("Hints while one drills"))) return;
+  bool all = on();
+  if (ImGui::Checkbox(tr("hints (Ctrl-H)"), &all)) turn(all);
+  for (const HintRule& r : usual_hints()) {
+    bool one = !is_off(person_.values.hints_off, r.id);
+    if (!ImGui::Checkbox((tr(r.id) + "##" + r.id).c_str(), &one)) {
+      if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", tr(r.words).c_str());
+      continue;
+    }
+    person_.values.hints_off = with_hint(person_.values.hints_off, r.id, one);
+    if (on()) turn(true);
+  }
+}
+
+}  // namespace osteo::inline app

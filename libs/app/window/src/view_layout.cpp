@@ -1,0 +1,119 @@
+#include "view_layout.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "osteo/core/base/translate.h"
+
+namespace osteo::inline app {
+namespace {
+
+// Of the design, docs/design/window.md, in pixels at scale 1.
+constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPanel = 400, kPage = 544;
+constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kMinCut = 96, kMaxCut = 272;
+// Of the smallest window that operate fits: its state needs the width, its strip the height.
+constexpr double kMinWideEm = 40, kMinHighEm = 26;
+
+// In the view's upper right corner, no larger than it has room for.
+void stack_over(ViewLayout& layout, float side, std::size_t count) {
+  const float u = layout.unit, gap = std::round(kCutGap * u), inset = std::round(kInset * u);
+  const auto n = static_cast<float>(count);
+  side = std::min(side, (layout.view.height - 2 * inset - gap * (n - 1) - kChoice * u) / n);
+  side = std::floor(std::min(side, 0.4F * layout.view.width));
+  layout.over = {};
+  if (side < 0.6F * kMinCut * u) return;
+  for (std::size_t c = 0; c < count; ++c)
+    layout.over[c] = {layout.view.right() - inset - side, layout.view.y + inset + static_cast<float>(c) * (side + gap),
+                      side, side};
+}
+
+}  // namespace
+
+Layout next_layout(Layout layout) {
+  return layout == Layout::operate ? Layout::plan : Layout::operate;
+}
+
+double ViewLayout::picture_share(int width, int height) const {
+  float left = view.width * view.height;
+  for (const ScreenBox& b : over) left -= b.width * b.height;
+  return static_cast<double>(left) / (static_cast<double>(width) * height);
+}
+
+ViewLayout lay_out(Layout wanted, int width, int height, float em, float cut_side) {
+  const auto w = static_cast<float>(width), h = static_cast<float>(height);
+  ViewLayout out;
+  const float u = out.unit = em / static_cast<float>(kTextPixels);
+  // Whole pixels: textures and viewports have no others.
+  const auto whole = [&](float n) { return std::round(n * u); };
+  out.shown = wanted;
+  if (wanted == Layout::plan && (w < whole(kPlanWide) || h < whole(kPlanHigh))) {
+    out.shown = Layout::operate;
+    out.why = [] { return tr("no room for four pictures: a larger window or smaller text (Ctrl -) shows them"); };
+  }
+  if (out.shown == Layout::review) {
+    const float page = std::min(whole(kPage), w);
+    out.page = {0, 0, page, h};
+    out.view = {page, 0, w - page, h};
+    return out;
+  }
+  const float tray = std::min(whole(kStrip), w), state = std::min(whole(kState), h), above = h - state;
+  out.tray = {0, 0, tray, h};
+  out.state = {tray, above, w - tray, state};
+  out.view = {tray, 0, w - tray, above};
+  if (out.shown == Layout::plan) {
+    const float left = std::floor((w - tray) / 2), top = std::floor(above / 2);
+    out.view = {tray, 0, left, top};
+    out.cuts = {ScreenBox{tray + left, 0, w - tray - left, top}, ScreenBox{tray, top, left, above - top},
+                ScreenBox{tray + left, top, w - tray - left, above - top}};
+    return out;
+  }
+  const std::size_t count = w >= kThreeCutsWide * u ? 3 : 1;
+  const float spare = out.view.width * out.view.height - static_cast<float>(kPictureShare) * w * h;
+  const float most = std::sqrt(std::max(0.0F, spare) / static_cast<float>(count)), grid = kGrid * u;
+  const float usual = std::clamp(std::floor(most / grid) * grid, kMinCut * u, kMaxCut * u);
+  stack_over(out, cut_side > 0 ? std::max(cut_side, kMinCut * u) : usual, count);
+  return out;
+}
+
+ScreenBox panel_of(const ViewLayout& layout) {
+  const float top = layout.view.y, bottom = layout.state.empty() ? layout.view.bottom() : layout.state.y;
+  return {layout.tray.right(), top, std::min(std::round(kPanel * layout.unit), layout.state.width), bottom - top};
+}
+
+ScreenBox take_strip(ViewLayout& layout, float high) {
+  if (layout.shown == Layout::review) return {};
+  const bool four = layout.shown == Layout::plan;
+  const float top = layout.view.y, bottom = four ? layout.cuts[1].bottom() : layout.view.bottom();
+  const float left = layout.view.x, right = four ? layout.cuts[0].right() : layout.view.right();
+  high = std::floor(std::min(high, (bottom - top) / 2));
+  if (!(high > 0)) return {};
+  if (four) {
+    const float upper = std::floor((bottom - top - high) / 2), lower = bottom - top - high - upper;
+    layout.view.height = layout.cuts[0].height = upper;
+    for (ScreenBox* const cut : {&layout.cuts[1], &layout.cuts[2]}) {
+      cut->y = top + upper;
+      cut->height = lower;
+    }
+  } else {
+    layout.view.height -= high;
+    const auto shown =
+        std::count_if(layout.over.begin(), layout.over.end(), [](const ScreenBox& b) { return !b.empty(); });
+    if (shown > 0) stack_over(layout, layout.over[0].width, static_cast<std::size_t>(shown));
+  }
+  return {left, bottom - high, right - left, high};
+}
+
+double automatic_scale(double reported_by_monitor, int width, int height) {
+  return std::clamp(std::max(reported_by_monitor, std::min(width / 1920.0, height / 1080.0)), 1.0, 4.0);
+}
+
+double scale_that_fits(double automatic, double by_hand, int width, int height) {
+  const double most = std::min(width / (kMinWideEm * kTextPixels), height / (kMinHighEm * kTextPixels));
+  return std::max(0.7, std::min(automatic * by_hand, most));
+}
+
+double next_scale(double by_hand, int steps) {
+  return std::clamp(by_hand * std::pow(1.1, steps), 0.6, 2.5);
+}
+
+}  // namespace osteo::inline app

@@ -1,0 +1,65 @@
+// What the window shows beside its pictures, drawn from plain values. Private to libs/app/window; ImGui, no GL. What a
+// button does is what its key does: it gives the same command.
+#pragma once
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "keys.h"
+#include "second_hand.h"
+#include "state_facts.h"
+#include "steps.h"
+#include "tool_wheel.h"
+#include "view_layout.h"
+
+namespace osteo::inline app {
+
+/// What the hand has, for buttons that show it.
+struct HandFacts {
+  int burr = 0;      ///< index in burr_library()
+  int tool = 0;      ///< HandTools::Tool
+  bool saw = false;  ///< in the hand, in place of the burr
+  bool latched = false, sucking = false, washing = false, sound = true, before = false, ruler = false;
+  bool second_hand = false;  ///< moved by keys
+  double burr_share = 1;     ///< of the burr's full speed
+  std::size_t undo_steps = 0;
+};
+
+/// Presses of buttons, in order; and those held down.
+struct Pressed {
+  std::vector<Keyboard::Press> presses;
+  std::vector<Command> held;
+  void press(Command command, int value = 0) { presses.push_back({command, value}); }
+};
+
+/// Fields that never change places: force, burr speed, bone below, the nearest structure with a bar that fills as it
+/// comes nearer; time, volume and the button that ends. `message`: what there is to tell now, in the strip where that
+/// is wide enough, else at the foot of `view`.
+void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& facts,
+                const std::optional<Message>& message, Pressed& pressed);
+/// The strip of tools: icons, each with its name and key on hovering. `menu`: the panel is open. `latched`: suction and
+/// irrigation, which a click leaves on.
+struct Latched {
+  bool suction = false, irrigation = false;
+};
+void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& latched, Pressed& pressed);
+/// What belongs to the burr, at the upper left of the view: kind, diameter; unfolded its shape and speed. Its box.
+ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFacts& hand, bool& unfolded,
+                         Pressed& pressed);
+/// The same place for what belongs to another instrument, as high as it needs. `name`: of ImGui's window. Its lower
+/// edge.
+float draw_tool_card(const ScreenBox& view, const char* name, const std::string& title,
+                     const std::function<void()>& content);
+/// Into a card: what the second hand holds, and the size of its suction tube.
+void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const LocalText&)>& say);
+/// Into the current window: what ends or begins a session.
+void draw_apart(Pressed& pressed);
+/// One step at a time at the foot of the view. False: the person has closed it.
+[[nodiscard]] bool draw_next_step(const ScreenBox& view, const FirstSteps& steps);
+void draw_wheel(const ToolWheel& wheel);
+/// A question in the middle of the window. 1: yes, -1: no, 0: not yet.
+[[nodiscard]] int draw_question(int width, int height, const std::string& title, const std::string& text,
+                                const std::string& yes);
+
+}  // namespace osteo::inline app

@@ -1,0 +1,531 @@
+// Panels drawn into memory: nothing is cut off, nothing lies outside, at any size of window and text. ImGui without a
+// screen.
+#include "view_panels.h"
+
+#include <gtest/gtest.h>
+#include <imgui_internal.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "command_palette.h"
+#include "osteo/core/base/translate.h"
+#include "ui_kit.h"
+#include "ui_style.h"
+
+namespace osteo {
+namespace {
+
+struct Memory {
+  Memory(int width, int height, int em_pixels) {
+    ImGui::CreateContext();
+    ImGuiIO& io = ImGui::GetIO();
+    io.IniFilename = nullptr;
+    io.DisplaySize = {static_cast<float>(width), static_cast<float>(height)};
+    io.DeltaTime = 1 / 60.0F;
+    set_ui_style(em_pixels);
+  }
+  ~Memory() { ImGui::DestroyContext(); }
+};
+
+// Of two frames: ImGui knows what a window holds from the one before.
+void frames(const std::function<void()>& draw) {
+  for (int n = 0; n < 2; ++n) {
+    ImGui::NewFrame();
+    draw();
+    ImGui::Render();
+  }
+}
+
+void expect_nothing_outside(const char* window, const ScreenBox& box, bool may_scroll) {
+  const ImGuiWindow* const w = ImGui::FindWindowByName(window);
+  ASSERT_NE(w, nullptr) << window;
+  const ImVec2 pad = w->WindowPadding;
+  const float slack = 1.5F + ImGui::GetStyle().WindowBorderSize;  // its own frame, drawn smooth
+  EXPECT_LE(w->ContentSize.x + 2 * pad.x, box.width + slack) << window;
+  if (!may_scroll) {
+    EXPECT_LE(w->ContentSize.y + 2 * pad.y, box.height + slack) << window;
+  }
+  for (const ImDrawVert& v : w->DrawList->VtxBuffer) {
+    EXPECT_GE(v.pos.x, box.x - slack) << window;
+    EXPECT_LE(v.pos.x, box.right() + slack) << window;
+    if (may_scroll) continue;
+    EXPECT_GE(v.pos.y, box.y - slack) << window;
+    EXPECT_LE(v.pos.y, box.bottom() + slack) << window;
+  }
+}
+
+StateFacts longest() {
+  StateFacts f;
+  f.tool = "diamond cylinder 7 mm";
+  f.turning = true;
+  f.speed = "120000 rpm";
+  f.force = "12.34 N";
+  f.force_share = 1;
+  f.under = "over 10 mm";
+  f.nearness = Nearness::touched;
+  f.structure = "superior semicircular canal of the labyrinth, left side";
+  f.distance = "10.0 mm";
+  f.removed = "12345.6 mm3, tissue 1234.5";
+  f.time = "11:03:07";
+  f.warning = "recording has ended: no space is left on the device, and what is drilled from now on is not kept";
+  f.alarm = true;
+  return f;
+}
+
+// At few pictures a second letters and keys come many at a time.
+TEST(Palette, LettersAndKeysStayInTheirOrder) {
+  constexpr int kBackspace = 259;
+  const Memory memory(1280, 800, 16);
+  const ViewLayout l = lay_out(Layout::operate, 1280, 800, 16);
+  CommandPalette palette;
+  const auto draw = [&] { frames([&] { EXPECT_EQ(palette.draw({0, 0, 1280, 800}, l.view), nullptr); }); };
+  palette.letter('q');
+  draw();
+  EXPECT_EQ(palette.shown(), CommandPalette::Shown::nothing) << "a letter alone opens nothing";
+  palette.key('K', kWithCtrl);
+  for (const char c : {'z', 'a'}) {
+    palette.key(c - 'a' + 'A', 0);
+    palette.letter(static_cast<char32_t>(c));
+  }
+  palette.show(CommandPalette::Shown::commands);  // what the key does, in the picture after
+  draw();
+  EXPECT_EQ(palette.search().text(), "za");
+  palette.key(kBackspace, 0);
+  palette.key(kBackspace, 0);
+  palette.letter('m');
+  palette.letter('x');
+  palette.key(kBackspace, 0);
+  palette.letter('a');
+  draw();
+  EXPECT_EQ(palette.search().text(), "ma");
+  palette.show(CommandPalette::Shown::nothing);
+  palette.letter('q');
+  palette.show(CommandPalette::Shown::commands);
+  draw();
+  EXPECT_EQ(palette.search().text(), "");
+}
+
+TEST(Panels, NothingIsCutOffAtAnySize) {
+  struct Size {
+    int width, height;
+  };
+  for (const Size s : {Size{1024, 700}, {1280, 800}, {1360, 860}, {1920, 1080}, {2560, 1440}, {3840, 2160}}) {
+    for (const double by_hand : {0.8, 1.0, 1.5}) {
+      const double scale = scale_that_fits(automatic_scale(1, s.width, s.height), by_hand, s.width, s.height);
+      const auto em_pixels = static_cast<int>(std::lround(kTextPixels * scale));
+      SCOPED_TRACE(std::to_string(s.width) + " text " + std::to_string(em_pixels));
+      const Memory memory(s.width, s.height, em_pixels);
+      for (const Layout wanted : {Layout::operate, Layout::plan}) {
+        const ViewLayout l = lay_out(wanted, s.width, s.height, static_cast<float>(em_pixels));
+        const Message told{Message::Rank::harm, longest().warning};
+        HandFacts hand;
+        hand.second_hand = true;
+        Pressed pressed;
+        Latched latched;
+        bool unfolded = true;
+        ScreenBox card;
+        frames([&] {
+          draw_state(l.state, l.view, longest(), told, pressed);
+          draw_tray(l.tray, hand, true, latched, pressed);
+          card = draw_burr_card(l.view, l.view.width, hand, unfolded, pressed);
+        });
+        EXPECT_TRUE(pressed.presses.empty());
+        EXPECT_FALSE(latched.suction || latched.irrigation);
+        expect_nothing_outside("state", l.state, false);
+        expect_nothing_outside("tray", l.tray, false);
+        if (card.empty()) continue;  // no room: the keys and the panel have it
+        EXPECT_LE(card.right(), l.view.right());
+        expect_nothing_outside("burr", card, false);
+      }
+      // What lies over the picture: within the window, and each command's name and keys whole.
+      const ScreenBox whole{0, 0, static_cast<float>(s.width), static_cast<float>(s.height)};
+      const ViewLayout l = lay_out(Layout::operate, s.width, s.height, static_cast<float>(em_pixels));
+      CommandPalette palette;
+      palette.help();
+      EXPECT_EQ(palette.shown(), CommandPalette::Shown::ten_keys);
+      frames([&] {
+        EXPECT_EQ(palette.draw(whole, l.view), nullptr);
+        EXPECT_EQ(draw_question(s.width, s.height, "Reset bone?", "This session is saved and ends.", "Reset bone"), 0);
+      });
+      expect_nothing_outside("Reset bone?", whole, false);
+      EXPECT_EQ(palette.shown(), CommandPalette::Shown::ten_keys) << "there is room for it";
+      const ImGuiWindow* const ten = ImGui::FindWindowByName("ten keys");
+      ASSERT_NE(ten, nullptr);
+      const ScreenBox card{ten->Pos.x, ten->Pos.y, ten->Size.x, ten->Size.y};
+      EXPECT_TRUE(l.view.holds(card.x, card.y) && l.view.holds(card.right() - 1, card.bottom() - 1));
+      expect_nothing_outside("ten keys", card, false);
+      palette.help();
+      EXPECT_EQ(palette.shown(), CommandPalette::Shown::all);
+      frames([&] { EXPECT_EQ(palette.draw(whole, l.view), nullptr); });
+      const ImGuiWindow* const list = ImGui::FindWindowByName("commands");
+      ASSERT_NE(list, nullptr);
+      EXPECT_TRUE(whole.holds(list->Pos.x, list->Pos.y) &&
+                  whole.holds(list->Pos.x + list->Size.x - 1, list->Pos.y + list->Size.y - 1));
+      for (const CommandRow& row : command_rows()) {
+        const float room = list->Size.x - 56 * unit();
+        EXPECT_LE(ImGui::CalcTextSize(row.name.c_str()).x, room) << row.name;
+        EXPECT_LE(ImGui::CalcTextSize(row.keys.c_str()).x, room) << row.name;
+      }
+    }
+  }
+}
+
+// Typed, chosen and done by keys alone; each press counts, however few pictures there are.
+TEST(Palette, FindsByTypingAndDoesByEnter) {
+  const Memory memory(1280, 800, 16);
+  const ScreenBox whole{0, 0, 1280, 800}, view{56, 0, 1224, 736};
+  CommandPalette palette;
+  palette.show(CommandPalette::Shown::commands);
+  const auto picture = [&](const char* letters, const std::vector<int>& keys) {
+    for (const char* c = letters; *c != 0; ++c) palette.letter(static_cast<char32_t>(*c));
+    for (const int k : keys) palette.key(k, 0);
+    ImGui::NewFrame();
+    const CommandRow* const done = palette.draw(whole, view);
+    ImGui::Render();
+    return done;
+  };
+  EXPECT_EQ(picture("wat", {}), nullptr);
+  EXPECT_EQ(palette.search().row()->command, Command::irrigation);
+  EXPECT_EQ(picture("", {259, 259, 259}), nullptr);  // Backspace
+  EXPECT_EQ(palette.search().text(), "");
+  const CommandRow* const done = picture("plate", {257});  // and Enter, in the same picture
+  ASSERT_NE(done, nullptr);
+  EXPECT_EQ(done->command, Command::plates);
+  EXPECT_FALSE(palette.typing());
+  palette.show(CommandPalette::Shown::all);
+  EXPECT_EQ(picture("", {264, 264, 265, 256}), nullptr);  // Down, Down, Up, Esc
+  EXPECT_FALSE(palette.typing());
+  // A click does it too.
+  palette.show(CommandPalette::Shown::commands);
+  picture("full screen", {});
+  const ImGuiWindow* const list = ImGui::FindWindowByName("commands");
+  ImGui::GetIO().MousePos = {list->Pos.x + 100, list->Pos.y + 56 + 20};
+  const CommandRow* clicked_row = nullptr;
+  for (const bool down : {false, true, false, false}) {
+    ImGui::GetIO().MouseDown[0] = down;
+    if (const CommandRow* const row = picture("", {})) clicked_row = row;
+  }
+  ASSERT_NE(clicked_row, nullptr);
+  EXPECT_EQ(clicked_row->command, Command::full_screen);
+}
+
+// The card is short because it can be read at a glance.
+TEST(Palette, TenKeys) {
+  EXPECT_EQ(ten_keys().size(), 10U);
+  for (const TenKeysRow& r : ten_keys()) EXPECT_FALSE(r.keys.empty()) << r.text;
+}
+
+constexpr Language kLanguages[] = {Language::english, Language::german, Language::spanish, Language::french,
+                                   Language::chinese};
+
+TEST(Panels, FitInEveryLanguage) {
+  for (const Language language : kLanguages) {
+    const InLanguage theirs(language);
+    SCOPED_TRACE(std::string(enum_names(language)[static_cast<std::size_t>(language)]));
+    constexpr int kWidth = 1024, kHeight = 700;
+    const Memory memory(kWidth, kHeight, kTextPixels);
+    const ViewLayout l = lay_out(Layout::operate, kWidth, kHeight, static_cast<float>(kTextPixels));
+    StateFacts f = longest();
+    f.structure = "facial nerve";  // a name of the case's may be cut
+    f.warning.clear();
+    const std::set<std::string> before = texts_cut();
+    Pressed pressed;
+    Latched latched;
+    bool unfolded = true;
+    ScreenBox card;
+    CommandPalette palette;
+    palette.help();
+    const ScreenBox whole{0, 0, kWidth, kHeight};
+    const FirstSteps list;
+    frames([&] {
+      draw_state(l.state, l.view, f, {}, pressed);
+      draw_tray(l.tray, {}, true, latched, pressed);
+      card = draw_burr_card(l.view, l.view.width, {}, unfolded, pressed);
+      static_cast<void>(draw_next_step(l.view, list));
+      EXPECT_EQ(palette.draw(whole, l.view), nullptr);
+      static_cast<void>(draw_question(kWidth, kHeight, tr("Reset bone?"),
+                                      tr("This session is saved and ends. A new one begins with the bone of the case."),
+                                      tr("Reset bone")));
+    });
+    for (const std::string& text : texts_cut()) EXPECT_TRUE(before.contains(text)) << text;
+    ASSERT_FALSE(card.empty());
+    expect_nothing_outside("burr", card, false);
+    expect_nothing_outside("state", l.state, false);
+    expect_nothing_outside(tr("Reset bone?"), whole, false);
+    EXPECT_EQ(palette.shown(), CommandPalette::Shown::ten_keys) << "there is room for it";
+    palette.help();
+    frames([&] { EXPECT_EQ(palette.draw(whole, l.view), nullptr); });
+    for (const std::string& text : texts_cut()) EXPECT_TRUE(before.contains(text)) << text;
+    const ImGuiWindow* const commands = ImGui::FindWindowByName("commands");
+    ASSERT_NE(commands, nullptr);
+    for (const CommandRow& row : command_rows()) {
+      const float room = commands->Size.x - 56 * unit();
+      EXPECT_LE(ImGui::CalcTextSize(shown_name(row).c_str()).x, room) << shown_name(row);
+      EXPECT_LE(ImGui::CalcTextSize(shown_keys(row).c_str()).x, room) << shown_keys(row);
+    }
+  }
+}
+
+// What stands on a button of half the panel's width, or of all of it.
+TEST(Panels, ButtonsAreAsWideAsTheirWords) {
+  const Memory memory(1024, 700, kTextPixels);
+  frames([] {});  // ImGui has its font from the first on
+  const float pad = 2 * ImGui::GetStyle().FramePadding.x, gap = ImGui::GetStyle().ItemSpacing.x;
+  const ScreenBox panel = panel_of(lay_out(Layout::operate, 1024, 700, static_cast<float>(kTextPixels)));
+  const float whole = panel.width - 2 * ImGui::GetStyle().WindowPadding.x;
+  for (const Language language : kLanguages) {
+    const InLanguage theirs(language);
+    const auto expect_room = [&](const std::string& text, float room) {
+      EXPECT_LE(ImGui::CalcTextSize(text.c_str(), nullptr, true).x + pad, room) << text;
+    };
+    for (const char* const text : {"Save and continue", "Reset bone ..."})
+      expect_room(std::string(tr(text)) + " (F5)", whole);
+    for (const char* const text : {"as the view holds it (Insert)", "all as usual", "Camera back (Backspace)"})
+      expect_room(tr(text), whole);
+    // Of a question 28 em wide.
+    const float half = (28 * em() - 2 * ImGui::GetStyle().WindowPadding.x - gap) / 2;
+    expect_room(tr("no (Esc)"), half);
+    expect_room(std::string(tr("Reset bone")) + " (Enter)", half);
+  }
+}
+
+TEST(Panels, EveryCharacterHasAGlyph) {
+  const Memory memory(1024, 700, kTextPixels);
+  frames([] {});
+  for (const Language language : kLanguages) {
+    const std::string_view text = catalogue_text(language);
+    for (const char* at = text.data(); at < text.data() + text.size();) {
+      unsigned int c = 0;
+      at += ImTextCharFromUtf8(&c, at, text.data() + text.size());
+      if (c <= ' ') continue;
+      EXPECT_NE(ImGui::GetFont()->FindGlyphNoFallback(static_cast<ImWchar>(c)), nullptr) << std::hex << c;
+      if (c >= 0x4E00) {
+        EXPECT_NE(bold_font()->FindGlyphNoFallback(static_cast<ImWchar>(c)), nullptr) << std::hex << c;
+      }
+    }
+  }
+}
+
+// While drilling only letters and bars change: what is drawn where stays.
+TEST(Panels, NothingJumpsWhileDrilling) {
+  const Memory memory(1280, 800, 16);
+  const ViewLayout l = lay_out(Layout::operate, 1280, 800, 16);
+  Pressed pressed;
+  const auto grounds = [&](const StateFacts& f) {
+    frames([&] { draw_state(l.state, l.view, f, {}, pressed); });
+    const ImGuiWindow* const w = ImGui::FindWindowByName("state");
+    std::vector<ImVec2> fixed;  // of the bars
+    for (const ImDrawVert& v : w->DrawList->VtxBuffer) {
+      if (v.col == im_colour32(theme().raised)) fixed.push_back(v.pos);
+    }
+    return fixed;
+  };
+  StateFacts quiet;
+  quiet.tool = "cutting 1 mm";
+  quiet.speed = "still";
+  quiet.force = "0.00 N";
+  quiet.under = "-";
+  quiet.structure = "none within 10 mm";
+  quiet.nearness = Nearness::far;
+  StateFacts near = longest();
+  near.nearness = Nearness::near;
+  const auto before = grounds(quiet), after = grounds(near);
+  ASSERT_GE(before.size(), 8U);
+  ASSERT_EQ(before.size(), after.size());
+  for (std::size_t n = 0; n < before.size(); ++n) {
+    EXPECT_EQ(before[n].x, after[n].x);
+    EXPECT_EQ(before[n].y, after[n].y);
+  }
+}
+
+// The bar fills as the structure comes nearer, in its colour; a contact fills the field.
+TEST(Panels, TheBarOfTheNearestStructureFills) {
+  const Memory memory(1280, 800, 16);
+  const ViewLayout l = lay_out(Layout::operate, 1280, 800, 16);
+  Pressed pressed;
+  const auto painted = [&](Nearness nearness, double share) {
+    StateFacts f = longest();
+    f.nearness = nearness;
+    f.near_share = share;
+    frames([&] { draw_state(l.state, l.view, f, {}, pressed); });
+    float least = 1e9F, most = 0;
+    for (const ImDrawVert& v : ImGui::FindWindowByName("state")->DrawList->VtxBuffer) {
+      if (v.col != im_colour32(look_of(nearness).colour) || v.pos.y < l.state.y + 38) continue;
+      least = std::min(least, v.pos.x);
+      most = std::max(most, v.pos.x);
+    }
+    return std::max(0.0F, most - least);
+  };
+  const float half = painted(Nearness::near, 0.5), more = painted(Nearness::close, 0.9);
+  EXPECT_GT(half, 50);
+  EXPECT_NEAR(more / half, 0.9 / 0.5, 0.1);
+  EXPECT_GE(painted(Nearness::touched, 1), more);
+}
+
+// A click on every place of a strip.
+std::vector<Keyboard::Press> clicked(const ScreenBox& box, float x, const std::function<void(Pressed&)>& draw) {
+  std::vector<Keyboard::Press> seen;
+  for (float y = box.y + 4; y < box.bottom(); y += 10) {
+    for (const bool down : {false, true, false}) {
+      ImGuiIO& io = ImGui::GetIO();
+      io.MousePos = {x, y};
+      io.MouseDown[0] = down;
+      Pressed pressed;
+      ImGui::NewFrame();
+      draw(pressed);
+      ImGui::Render();
+      seen.insert(seen.end(), pressed.presses.begin(), pressed.presses.end());
+    }
+  }
+  return seen;
+}
+
+TEST(Panels, AButtonGivesTheCommandOfItsKey) {
+  const Memory memory(1024, 700, 16);
+  const ViewLayout l = lay_out(Layout::operate, 1024, 700, 16);
+  const auto has = [](const std::vector<Keyboard::Press>& all, Command c) {
+    return std::any_of(all.begin(), all.end(), [&](const Keyboard::Press& p) { return p.command == c; });
+  };
+  HandFacts hand;
+  hand.undo_steps = 1;
+  Latched latched;
+  const float middle = l.tray.x + l.tray.width / 2;
+  auto seen = clicked(l.tray, middle, [&](Pressed& p) { draw_tray(l.tray, hand, false, latched, p); });
+  for (const Command c : {Command::help, Command::palette, Command::panel_keys, Command::bring, Command::lift,
+                          Command::saw, Command::plates, Command::pieces, Command::undo, Command::before,
+                          Command::ruler, Command::mark, Command::screenshot, Command::layout}) {
+    EXPECT_TRUE(has(seen, c)) << key_name(c);
+    EXPECT_FALSE(key_name(c).empty());
+  }
+  // There is no second hand: its tiles do nothing. With one a click leaves them on, and the next off.
+  EXPECT_FALSE(latched.suction || latched.irrigation);
+  hand.second_hand = true;
+  hand.undo_steps = 0;
+  seen = clicked(l.tray, middle, [&](Pressed& p) {
+    draw_tray(l.tray, hand, false, latched, p);
+    latched.suction = false;  // each place is clicked several times: each turns it on
+  });
+  EXPECT_FALSE(has(seen, Command::suck));
+  EXPECT_FALSE(has(seen, Command::undo)) << "nothing to take back";
+  // What ends the session is in the state; sizes and kinds on the burr's card.
+  seen = clicked(l.state, l.state.right() - 40, [&](Pressed& p) { draw_state(l.state, l.view, longest(), {}, p); });
+  EXPECT_TRUE(has(seen, Command::quit));
+  bool unfolded = false;
+  ScreenBox card;
+  std::vector<int> sizes;
+  for (float x = l.view.x; x < l.view.x + 560; x += 20) {
+    for (const Keyboard::Press& p :
+         clicked({x, 40, 1, 8}, x, [&](Pressed& q) { card = draw_burr_card(l.view, l.view.width, hand, unfolded, q); }))
+      if (p.command == Command::diameter) sizes.push_back(p.value);
+  }
+  for (int d = 1; d <= 7; ++d) EXPECT_NE(std::find(sizes.begin(), sizes.end(), d), sizes.end()) << d;
+}
+
+// --- components
+
+TEST(Kit, FiguresHaveOneWidthAndScriptsAreThere) {
+  const Memory memory(800, 600, 16);
+  for (ImFont* const font : {ImGui::GetIO().Fonts->Fonts[0], bold_font()}) {
+    const float zero = font->GetCharAdvance('0');
+    for (char c = '1'; c <= '9'; ++c) EXPECT_EQ(font->GetCharAdvance(static_cast<ImWchar>(c)), zero) << c;
+  }
+  // Latin, accents, Greek, Cyrillic, signs.
+  const ImFont* const font = ImGui::GetIO().Fonts->Fonts[0];
+  for (const ImWchar c : {0x41, 0xE9, 0x16F, 0x3B1, 0x416, 0xB3, 0xB0, 0x2026})
+    EXPECT_NE(font->FindGlyphNoFallback(c), nullptr) << static_cast<int>(c);
+}
+
+TEST(Kit, WhatIsTooLongLosesItsMiddle) {
+  const Memory memory(800, 600, 16);
+  frames([] {
+    const std::string name = "superior semicircular canal of the labyrinth, left side";
+    EXPECT_EQ(shortened(name, 1000, 16), name);
+    const float size = ImGui::GetFontSize();
+    const std::string cut = shortened(name, 200, size);
+    EXPECT_TRUE(cut.starts_with("super") && cut.ends_with("side")) << cut;
+    EXPECT_LE(ImGui::CalcTextSize(cut.c_str()).x, 200);
+    const std::string greek = shortened("\u03b1\u03b2\u03b3\u03b4\u03b5\u03b6\u03b7\u03b8", 60, 16);  // whole letters
+    for (std::size_t n = 0; n < greek.size(); ++n)
+      EXPECT_TRUE((static_cast<unsigned char>(greek[n]) & 0x80) == 0 || n + 1 < greek.size() ||
+                  (static_cast<unsigned char>(greek[n]) & 0xC0) == 0x80);
+    EXPECT_EQ(shortened("abc", 1, 16), "");
+  });
+}
+
+TEST(Kit, EveryIconThatIsUsedIsThere) {
+  for (const char* const name : {"menu-2",       "drill",
+                                 "saw",          "plate",
+                                 "fragments",    "suction",
+                                 "droplet",      "arrow-bar-to-down",
+                                 "arrow-bar-up", "arrow-back-up",
+                                 "versions",     "ruler-measure",
+                                 "note",         "camera",
+                                 "layout-grid",  "help",
+                                 "chevron-down", "x",
+                                 "check",        "settings"})
+    EXPECT_TRUE(has_icon(name)) << name;
+  EXPECT_FALSE(has_icon("nothing"));
+}
+
+TEST(Kit, ComponentsHaveTheirSizes) {
+  const Memory memory(800, 600, 16);
+  bool on = false;
+  frames([&] {
+    begin_fixed("kit", {0, 0, 800, 600});
+    static_cast<void>(tile("t", "drill", {}));
+    EXPECT_EQ(ImGui::GetItemRectSize().x, 40);
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
+    static_cast<void>(kit_button("Beenden und zur \u00dcbersicht"));
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
+    EXPECT_GE(ImGui::GetItemRectSize().x, ImGui::CalcTextSize("Beenden und zur \u00dcbersicht").x + 32);
+    static_cast<void>(list_row("a row", "3", true));
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 36);
+    static_cast<void>(kit_switch("Irrigation", on));
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
+    double mm = 3;
+    EXPECT_FALSE(kit_slider("Kerf", "3.0 mm", mm, 0, 10, 0.5));
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 48);
+    static const std::string kTwo[] = {"One", "Two"};
+    EXPECT_EQ(choice("c", kTwo, 0), -1);
+    EXPECT_EQ(ImGui::GetItemRectSize().y, 40);
+    ImGui::End();
+  });
+  EXPECT_FALSE(on);
+}
+
+// A click on the track goes there by whole steps; name and value never lie on the track.
+TEST(Kit, ASliderGoesWhereItIsPressed) {
+  const Memory memory(800, 600, 16);
+  double mm = 0;
+  ImVec2 lo, hi;
+  const auto picture = [&] {
+    ImGui::NewFrame();
+    begin_fixed("kit", {0, 0, 400, 200});
+    const bool changed = kit_slider("Length", "75 mm", mm, 0, 150, 10);
+    lo = ImGui::GetItemRectMin();
+    hi = ImGui::GetItemRectMax();
+    ImGui::End();
+    ImGui::Render();
+    return changed;
+  };
+  EXPECT_FALSE(picture());
+  const float y = hi.y - 14, from = lo.x + 8, wide = hi.x - lo.x - 16;
+  ImGui::GetIO().MousePos = {from + 0.51F * wide, y};
+  EXPECT_FALSE(picture());
+  ImGui::GetIO().MouseDown[0] = true;
+  EXPECT_TRUE(picture());
+  EXPECT_EQ(mm, 80) << "0.51 of 150, by tens";
+  ImGui::GetIO().MousePos = {hi.x + 300, y};
+  EXPECT_TRUE(picture());
+  EXPECT_EQ(mm, 150);
+  ImGui::GetIO().MousePos = {0, y};
+  EXPECT_TRUE(picture());
+  EXPECT_EQ(mm, 0);
+  EXPECT_LT(lo.y + ImGui::GetFontSize(), y - 8) << "words above the knob";
+}
+
+}  // namespace
+}  // namespace osteo
