@@ -126,6 +126,7 @@ void expect_whole(const std::string& pdf) {
 TEST(Sheet, APdfSaysWhatItsPartsAre) {
   Sheet s = example();
   s.blocks.push_back({sheet::Drawing{"d", "Łuk (a) \xff", 100, 50, {}, "below"}});
+  s.blocks.push_back({sheet::Pictures{{{"mute", gradient(8, 9), ""}}, 9}});  // decoration
   const std::string pdf = sheet_pdf(s);
   expect_whole(pdf);
   const auto parts = [&pdf](const std::string& name) { return count(pdf, "/StructElem\n   /S /" + name + "\n"); };

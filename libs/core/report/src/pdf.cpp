@@ -53,8 +53,10 @@ class Pen {
   double text_as(const char* tag, const std::string& what, double x, double y, double width, const Style& style) const {
     return as(tag, [&] { return text(what, x, y, width, style); });
   }
+  // Without words it is decoration, as on a page with an empty alt.
   template <class Draw>
   void figure(const std::string& shows, const Draw& draw) const {
+    if (shows.empty()) return static_cast<void>(draw());
     if (on) shown_->push_back(shows);
     begin("Figure");
     draw();
@@ -528,8 +530,7 @@ void describe(std::string& pdf, const std::vector<std::string>& shown) {
       added[to] = std::string("   /Lang (") + tr_of("the language of these texts, as HTML names it", "en") +
                   ")\n   /ViewerPreferences << /DisplayDocTitle true >>\n";
     } else if (const auto in = opens("StructElem\n   /S /Figure"); in > 0 && figure < shown.size()) {
-      if (!shown[figure].empty()) added[in] = "   /Alt " + pdf_text(shown[figure]) + "\n";
-      ++figure;
+      added[in] = "   /Alt " + pdf_text(shown[figure++]) + "\n";
     } else if (const auto th = opens("StructElem\n   /S /TH"); th > 0) {
       added[th] = "   /A << /O /Table /Scope /Column >>\n";
     }
