@@ -112,7 +112,7 @@ if poppler:
     # It can be read aloud: in this order, with a table that is one and pictures that say what they show.
     assert re.search(r"^Tagged: +yes$", info, re.M) and "Title:           Case report" in info, info
     tree = subprocess.run(["pdfinfo", "-struct-text", pdf_file], capture_output=True, check=True).stdout.decode()
-    parts = re.findall(r"^ *(\w+)(?: \(|$)", tree, re.M)
+    parts = re.findall(r"^ *(\w+)(?: \(|:?$)", tree, re.M)
     assert parts[:3] == ["Document", "H1", "P"] and parts.count("H1") == parts.count("Document") == 1, parts
     words = [w for w in re.findall(r'^ *"(.*)"$', tree, re.M) if w]
     heads = re.findall(r'^ *H2 \(block\)\n *"(.*)"$', tree, re.M)

@@ -70,6 +70,25 @@ struct EchoCommand {
   }
 };
 
+struct PairCommand {
+  struct Params {
+    std::string one, two, from;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"one", "a file"}, p.one);
+    visit({"two", "another file"}, p.two);
+    visit({"from", "what is read"}, p.from);
+  }
+  static cli::CommandInfo info() {
+    return {"pair", "writes two",   "Writes two.",   {{"what", "to read", true}}, "osteo pair", false,
+            {},     {"one", "two"}, {"from", "what"}};
+  }
+  static int run(const Params& p, cli::Invocation& io) {
+    io.out << p.one + "|" + p.two;
+    return 0;
+  }
+};
+
 // Not a TemporaryFolder: a program that fails removes those of its process.
 class Folder {
  public:
@@ -103,25 +122,6 @@ Said run(std::vector<std::string> args) {
   said.err = err.str();
   return said;
 }
-
-struct PairCommand {
-  struct Params {
-    std::string one, two, from;
-  };
-  static void describe(Params& p, auto& visit) {
-    visit({"one", "a file"}, p.one);
-    visit({"two", "another file"}, p.two);
-    visit({"from", "what is read"}, p.from);
-  }
-  static cli::CommandInfo info() {
-    return {"pair", "writes two",   "Writes two.",   {{"what", "to read", true}}, "osteo pair", false,
-            {},     {"one", "two"}, {"from", "what"}};
-  }
-  static int run(const Params& p, cli::Invocation& io) {
-    io.out << p.one + "|" + p.two;
-    return 0;
-  }
-};
 
 TEST(Cli, NoFileIsWrittenTwiceOrReadAndWritten) {
   const Folder folder;
