@@ -59,7 +59,7 @@ install(CODE "file(GLOB pages \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_I
     execute_process(COMMAND gzip -9nf \${pages} COMMAND_ERROR_IS_FATAL ANY)
   endif()" COMPONENT server EXCLUDE_FROM_ALL)
 
-# What each package is made of, as SPDX, of the program that is packed.
+# What each package is made of, as SPDX, of the program that is packed, and what is known of vulnerabilities of the parts, as VEX.
 set(deb_options "")
 foreach(option OSTEO_CGAL OSTEO_TETGEN OSTEO_CERES OSTEO_MOVIE)
   if(${option})
@@ -78,7 +78,9 @@ function(osteo_sbom component package programs options)
   set(folder "\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATADIR}/doc/${package}")
   install(CODE "file(MAKE_DIRECTORY \"${folder}\")
   execute_process(COMMAND python3 \"${PROJECT_SOURCE_DIR}/apps/packaging/sbom.py\" \"${folder}/${package}.spdx.json\" --version ${OSTEO_DEB_VERSION}
-    --package ${package} ${options} --program ${files} COMMAND_ERROR_IS_FATAL ANY)" COMPONENT ${component} EXCLUDE_FROM_ALL)
+    --package ${package} ${options} --program ${files} COMMAND_ERROR_IS_FATAL ANY)
+  execute_process(COMMAND python3 \"${PROJECT_SOURCE_DIR}/apps/packaging/vex.py\" \"${folder}/${package}.vex.json\" --sbom \"${folder}/${package}.spdx.json\"
+    --program ${files} COMMAND_ERROR_IS_FATAL ANY)" COMPONENT ${component} EXCLUDE_FROM_ALL)
 endfunction()
 osteo_sbom(server ${OSTEO_DEB_SERVER} osteo "${deb_options}")
 if(window IN_LIST deb_components)

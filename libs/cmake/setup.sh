@@ -140,8 +140,8 @@ ensure_packages() {
 ensure_readers() {
   local dir=$root/build/readers
   [ "$dir/.complete" -nt "$root/libs/cmake/setup.sh" ] && return
-  say "Installing readers for the tests from PyPI (pydicom, highdicom, SimpleITK, nibabel, trimesh, h5py, mcap, zstandard, slicerio, neo, pyigtl, pycbsdk, pylsl, pynetdicom) ..."
-  if python3 -m venv "$dir" >/dev/null 2>&1 && "$dir/bin/pip" install -q --disable-pip-version-check --retries 1 --timeout 20 pydicom==3.0.1 highdicom==0.26.0 SimpleITK==2.5.0 nibabel==5.3.2 trimesh==4.6.8 networkx==3.4.2 lxml==5.4.0 jsonschema==4.24.0 h5py==3.16.0 mcap==1.6.0 zstandard==0.25.0 slicerio==1.4.0 pynrrd==1.1.3 neo==0.14.6 pyigtl==0.3.4 pycbsdk==0.4.1 pylsl==1.18.6 pynetdicom==3.0.4 numpy >/dev/null 2>&1; then
+  say "Installing readers for the tests from PyPI (pydicom, highdicom, SimpleITK, nibabel, trimesh, h5py, mcap, zstandard, slicerio, neo, pyigtl, pycbsdk, pylsl, pynetdicom, cyclonedx) ..."
+  if python3 -m venv "$dir" >/dev/null 2>&1 && "$dir/bin/pip" install -q --disable-pip-version-check --retries 1 --timeout 20 pydicom==3.0.1 highdicom==0.26.0 SimpleITK==2.5.0 nibabel==5.3.2 trimesh==4.6.8 networkx==3.4.2 lxml==5.4.0 jsonschema==4.26.0 "cyclonedx-python-lib[json-validation]==11.12.0" h5py==3.16.0 mcap==1.6.0 zstandard==0.25.0 slicerio==1.4.0 pynrrd==1.1.3 neo==0.14.6 pyigtl==0.3.4 pycbsdk==0.4.1 pylsl==1.18.6 pynetdicom==3.0.4 numpy >/dev/null 2>&1; then
     touch "$dir/.complete"
   else
     say "They cannot be had: tests that read outputs back are skipped."

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """The list of what Osteotome is made of: a row for each package that is installed to build, no other; an SPDX document that hangs together; copyleft
-only by its option; the same bytes twice. usage: check_sbom.py SOURCE_DIR [PROGRAM]"""
+only by its option; the same bytes twice. And the VEX file of the parts of a program: by CycloneDX's schema, with no
+row that does not hold. usage: check_sbom.py SOURCE_DIR [PROGRAM]
+"""
 
-import json, os, pathlib, re, subprocess, sys, tempfile
+import gzip, json, os, pathlib, re, subprocess, sys, tempfile
 
 root = pathlib.Path(sys.argv[1]).resolve()
 os.environ["SOURCE_DATE_EPOCH"] = "1767225600"
@@ -83,8 +85,78 @@ if len(sys.argv) > 2:
         vtk = [p for n, p in seen.items() if n.startswith("libvtk9")]
         if vtk and (vtk[0]["licenseConcluded"] != "BSD-3-Clause" or vtk[0]["versionInfo"] == "NOASSERTION"):
             bad.append("VTK's library has no licence or version")
+
+
+def vex(sbom, rows=None):
+    """The VEX file of the program, or why there is none; `rows` in place of the checked-in assessments."""
+    with tempfile.TemporaryDirectory() as work:
+        work = pathlib.Path(work)
+        (work / "s.json").write_bytes(sbom)
+        flags = []
+        if rows is not None:
+            (work / "rows.txt").write_text(rows)
+            flags = ["--assessments", work / "rows.txt"]
+        tool = [sys.executable, root / "apps/packaging/vex.py", work / "v.json", "--sbom", work / "s.json"]
+        said = subprocess.run([*tool, "--program", sys.argv[2], *flags], capture_output=True, text=True)
+        return (work / "v.json").read_text() if said.returncode == 0 else None, said.stderr
+
+
+schema = "no program"
+if len(sys.argv) > 2 and out is not None:
+    text, why = vex(out)
+    if text is None:
+        sys.exit(why)
+    if vex(out)[0] != text:
+        bad.append("the same VEX inputs give other bytes")
+    found = json.loads(text)
+    known = {c["bom-ref"]: c["name"] for c in found["components"]}
+    if set(known.values()) != {p["name"] for p in json.loads(out)["packages"][1:] if p["versionInfo"] != "NOASSERTION"}:
+        bad.append("the VEX file has other parts than the SBOM")
+    state = {}
+    for v in found["vulnerabilities"]:
+        for a in v["affects"]:
+            if a["ref"] not in known:
+                bad.append(f"{v['id']} is of {a['ref']}, which is no part")
+            state[v["id"], known.get(a["ref"])] = v["analysis"]["state"]
+    # What Debian's changelog of an installed part says is there, and each row of ours whose part is.
+    for part in (n for n in known.values() if n.startswith("libdcmtk")):
+        changelog = pathlib.Path(f"/usr/share/doc/{part}/changelog.Debian.gz")
+        named = (
+            re.findall(r"CVE-\d+-\d+", gzip.decompress(changelog.read_bytes()).decode()) if changelog.exists() else []
+        )
+        if named and not any(state.get((c, part)) == "resolved" for c in named):
+            bad.append(f"what the changelog of {part} names as mended is not in the VEX file")
+    mine = [l.split("|") for l in (root / "apps/packaging/assessments.txt").read_text().splitlines() if l[:3] == "CVE"]
+    for cve, part, said, *_ in ([f.strip() for f in r] for r in mine):
+        if part in known.values() and state.get((cve, part)) != said.partition(":")[0]:
+            bad.append(f"{cve} of {part} is {state.get((cve, part))} in the VEX file, {said} in assessments.txt")
+    if not any(p in known.values() for _, p, *_ in ([f.strip() for f in r] for r in mine)):
+        bad.append("no row of assessments.txt is of a part of the program")
+    # A row that no longer holds is refused, and one that says nothing of what shows it.
+    for evidence, wanted in (
+        ("no library libvtkCommonCore", "does not hold"),
+        ("no symbol gdcm::JPEG2000Codec", "does not hold"),
+        ("no package libdcmtk", "does not hold"),
+        ("test Objects.ThereIsNone", "does not hold"),
+        ("-", "rows.txt:1"),
+    ):
+        row = f"CVE-2099-0001 | {next(n for n in known.values() if n.startswith('libdcmtk'))} | not_affected:code_not_reachable | {evidence} | invented"
+        text_of_row, why = vex(out, row + "\n")
+        if text_of_row is not None or wanted not in why:
+            bad.append(f"a row with '{evidence}' is taken: {why}")
+    try:
+        from cyclonedx.schema import SchemaVersion
+        from cyclonedx.validation.json import JsonStrictValidator
+
+        schema = JsonStrictValidator(SchemaVersion.V1_5).validate_str(text)
+        if schema is not None:
+            bad.append(f"CycloneDX's schema: {schema}")
+        schema = "by CycloneDX's schema"
+    except ImportError:
+        schema = "not held to CycloneDX's schema: there is no cyclonedx"
+    schema = f"{len(found['vulnerabilities'])} vulnerabilities known of {len(known)} parts, {schema}"
 print(
     "\n".join(bad)
-    or f"{len(rows)} rows, {len(free['packages'])} components without options, {len(full['packages'])} with all"
+    or f"{len(rows)} rows, {len(free['packages'])} components without options, {len(full['packages'])} with all; {schema}"
 )
 sys.exit(bool(bad))

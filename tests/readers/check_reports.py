@@ -109,6 +109,24 @@ if poppler:
     assert re.search(r"^Pages: +2$", info, re.M) and "A4" in info, info
     assert "CreationDate" not in info
     fonts = subprocess.run(["pdffonts", pdf_file], capture_output=True, check=True, text=True).stdout.splitlines()[2:]
+    # It can be read aloud: in this order, with a table that is one and pictures that say what they show.
+    assert re.search(r"^Tagged: +yes$", info, re.M) and "Title:           Case report" in info, info
+    tree = subprocess.run(["pdfinfo", "-struct-text", pdf_file], capture_output=True, check=True).stdout.decode()
+    parts = re.findall(r"^ *(\w+)(?: \(|:?$)", tree, re.M)
+    assert parts[:3] == ["Document", "H1", "P"] and parts.count("H1") == parts.count("Document") == 1, parts
+    words = [w for w in re.findall(r'^ *"(.*)"$', tree, re.M) if w]
+    heads = re.findall(r'^ *H2 \(block\)\n *"(.*)"$', tree, re.M)
+    assert words[0] == "Case report" and "Not a medical device." in words[-1], (words[0], words[-1])
+    markup = html_file.read_text()
+    assert heads == re.findall("<h2>(.*?)</h2>", markup), heads
+    assert parts.count("TH") > 3 and parts.count("TD") > 9 and parts.count("Table") == markup.count("<table"), parts
+    raw = pdf_file.read_bytes()
+    spoken = [
+        bytes.fromhex(h.decode()).decode("utf-16") for h in re.findall(rb"/S /Figure\n   /Alt <([0-9A-F]+)>", raw)
+    ]
+    assert "patient's left" in spoken and len(spoken) == parts.count("Figure") and b"/Lang (en)" in raw, spoken
+    if shutil.which("qpdf"):
+        subprocess.run(["qpdf", "--check", pdf_file], check=True, capture_output=True)
     assert fonts and all(re.search(r"(Type|CID).* yes +(yes|no) +(yes|no) ", f) for f in fonts), fonts  # embedded
     said = pdf_text()
     for word in ("facial nerve", "sigmoid sinus", "Not approved", "500 HU", "1/2", "2/2"):

@@ -41,7 +41,7 @@ as_user "osteo phantom ct.nrrd --region temporal --spacing-mm 1 --quiet"
 as_user "osteo prepare ct.nrrd -o case --lower 500 --spacing-mm 1 --quiet"
 as_user "osteo rehearse case --headless --fast --script /usr/share/osteo/pipelines/sessions/mastoid.json -o session --quiet"
 as_user "osteo replay session"
-for f in /usr/share/man/man1/osteo-prepare.1.gz /usr/share/bash-completion/completions/osteo /usr/lib/udev/rules.d/70-osteotome.rules /usr/share/doc/osteo/osteo.spdx.json /usr/share/doc/osteo/copyright \
+for f in /usr/share/man/man1/osteo-prepare.1.gz /usr/share/bash-completion/completions/osteo /usr/lib/udev/rules.d/70-osteotome.rules /usr/share/doc/osteo/osteo.spdx.json /usr/share/doc/osteo/osteo.vex.json /usr/share/doc/osteo/copyright \
   /usr/lib/systemd/system/osteo-receive.service /usr/lib/systemd/system/osteo-watch.service /usr/lib/systemd/system/osteo-watch-orthanc@.service; do
   [ -s "$work/root$f" ] || [ -s "$work/root${f#/usr}" ] || { echo "$f is not there"; exit 1; }
 done

@@ -32,7 +32,10 @@ cli::CommandInfo ExperimentCommand::info() {
           "show: 'osteo rehearse CASE --experiment camera' times yours on the same kind of views.",
           {{"which", "force-skill, analyse, stimuli, demo, null or camera"},
            {"folder", "of force-skill training (force-skill: 'force-skill')", true}},
-          "osteo experiment demo -o FOLDER"};
+          "osteo experiment demo -o FOLDER",
+          false,
+          {},
+          {"out", "state_file"}};
 }
 
 int ExperimentCommand::run(const Params& p, cli::Invocation& io) {

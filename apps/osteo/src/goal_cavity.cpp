@@ -19,7 +19,11 @@ cli::CommandInfo GoalCavityCommand::info() {
           "left, and removed beyond it. A goal by rules is a proposal to look at, not a plan for a patient "
           "(docs/validation/goal.md).",
           {{"case", "a folder made by prepare, with structures"}},
-          "osteo goal-cavity CASE --procedure pipelines/procedures/mastoidectomy.json -o goal.seg.nrrd"};
+          "osteo goal-cavity CASE --procedure pipelines/procedures/mastoidectomy.json -o goal.seg.nrrd",
+          false,
+          {},
+          {"out"},
+          {"procedure"}};
 }
 
 int GoalCavityCommand::run(const Params& p, cli::Invocation& io) {

@@ -151,7 +151,11 @@ cli::CommandInfo CalibratePenCommand::info() {
           "it was seen in fewer than 20 pictures, leant by less than 20 degrees, or when the tip wandered by more than "
           "2 mm (RMS).",
           {{"source", "/dev/video0, a video, or a folder of pictures"}},
-          "osteo calibrate-pen /dev/video0 --camera camera.json -o pen.json"};
+          "osteo calibrate-pen /dev/video0 --camera camera.json -o pen.json",
+          false,
+          {},
+          {"out"},
+          {"camera", "source"}};
 }
 
 int CalibratePenCommand::run(const Params& p, cli::Invocation& io) {

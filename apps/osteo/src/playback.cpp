@@ -79,7 +79,10 @@ cli::CommandInfo PlaybackCommand::info() {
       "by yours (--drills). "
       "What is recorded says that it was guided; scores never mix it with unaided sessions. docs/guides/tutoring.md.",
       {{"session", "the expert's, a session folder"}},
-      "osteo playback SESSION --mode guide --pace way"};
+      "osteo playback SESSION --mode guide --pace way",
+      false,
+      {},
+      {"out", "state_file"}};
 }
 
 int PlaybackCommand::run(const Params& p, cli::Invocation& io) {

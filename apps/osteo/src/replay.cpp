@@ -27,7 +27,10 @@ cli::CommandInfo ReplayCommand::info() {
           "comes before is repeated, "
           "the rest taken from the recorded changes), 4 when the file is damaged.",
           {{"session", "a session folder"}},
-          "osteo replay SESSION"};
+          "osteo replay SESSION",
+          false,
+          {},
+          {"surface_out", "bone_out"}};
 }
 
 int ReplayCommand::run(const Params& p, cli::Invocation& io) {

@@ -47,7 +47,11 @@ cli::CommandInfo ReportCommand::info() {
           "looked at for it: "
           "'osteo send' brings it to a PACS. --measures writes what it says in numbers as a DICOM structured report.",
           {{"case", "a folder made by prepare"}},
-          "osteo report CASE"};
+          "osteo report CASE",
+          false,
+          {},
+          {"dicom", "measures"},
+          {"segmentation", "scan"}};
 }
 
 int ReportCommand::run(const Params& p, cli::Invocation& io) {
@@ -57,8 +61,6 @@ int ReportCommand::run(const Params& p, cli::Invocation& io) {
   check_object(p.measures, report_file(folder, ".measures.dcm"), "--measures", io);
   if (!p.segmentation.empty() && p.measures.empty())
     throw Error(ExitCode::usage, "--segmentation is what --measures refers to", "--measures FILE.dcm");
-  if (!p.measures.empty() && fs::path(p.measures).lexically_normal() == object.lexically_normal())
-    throw Error(ExitCode::usage, "--dicom and --measures are two objects", "give them two names");
   const auto recipe = read_recipe(folder);
   const auto pipeline = pipeline_at_hand(folder, recipe, p.scan);
   std::optional<CaseSeries> of;

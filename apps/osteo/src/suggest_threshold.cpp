@@ -67,7 +67,11 @@ cli::CommandInfo SuggestThresholdCommand::info() {
           "(cellular) and for thin plates (thin), with the volume of bone each gives and how much that depends on the "
           "exact number.",
           {{"source", "DICOM folder or zip, or a volume file"}},
-          "osteo suggest-threshold DICOM_FOLDER"};
+          "osteo suggest-threshold DICOM_FOLDER",
+          false,
+          {},
+          {"picture"},
+          {"source"}};
 }
 
 int SuggestThresholdCommand::run(const Params& p, cli::Invocation& io) {

@@ -70,6 +70,25 @@ struct EchoCommand {
   }
 };
 
+struct PairCommand {
+  struct Params {
+    std::string one, two, from;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"one", "a file"}, p.one);
+    visit({"two", "another file"}, p.two);
+    visit({"from", "what is read"}, p.from);
+  }
+  static cli::CommandInfo info() {
+    return {"pair", "writes two",   "Writes two.",   {{"what", "to read", true}}, "osteo pair", false,
+            {},     {"one", "two"}, {"from", "what"}};
+  }
+  static int run(const Params& p, cli::Invocation& io) {
+    io.out << p.one + "|" + p.two;
+    return 0;
+  }
+};
+
 // Not a TemporaryFolder: a program that fails removes those of its process.
 class Folder {
  public:
@@ -92,6 +111,7 @@ Said run(std::vector<std::string> args) {
   cli::Program program;
   program.registry.add<FailStage>();
   program.add<EchoCommand>();
+  program.add<PairCommand>();
   args.insert(args.begin(), "osteo");
   std::vector<char*> argv;
   for (auto& a : args) argv.push_back(a.data());
@@ -101,6 +121,32 @@ Said run(std::vector<std::string> args) {
   said.out = out.str();
   said.err = err.str();
   return said;
+}
+
+TEST(Cli, NoFileIsWrittenTwiceOrReadAndWritten) {
+  const Folder folder;
+  const auto pair = [&](std::vector<std::string> args) {
+    args.insert(args.begin(), "pair");
+    return run(args);
+  };
+  const std::string a = (folder.path() / "a").string(), b = (folder.path() / "b").string();
+  EXPECT_EQ(pair({"--one", a, "--two", b, "--from", "c", "d"}).out, a + "|" + b);
+  EXPECT_EQ(pair({}).out, "|") << "two that are not given are not one file";
+  EXPECT_EQ(pair({"--from", a, a}).code, 0) << "what is only read may be read twice";
+  fs::create_symlink(a, folder.path() / "link");
+  fs::create_directory(folder.path() / "sub");
+  std::ofstream(a) << "there";
+  for (const std::string& again : {a, (folder.path() / "sub/../a").string(), (folder.path() / "link").string()}) {
+    for (const std::vector<std::string>& args :
+         {std::vector<std::string>{"--two", again}, {"--from", again}, {again}}) {
+      std::vector<std::string> all{"--one", a, "--force"};
+      all.insert(all.end(), args.begin(), args.end());
+      const Said said = pair(all);
+      EXPECT_EQ(said.code, static_cast<int>(ExitCode::usage)) << again << ' ' << args.front();
+      EXPECT_EQ(said.out, "");
+      EXPECT_NE(said.err.find("are one file"), std::string::npos) << said.err;
+    }
+  }
 }
 
 TEST(Cli, FlagsReachTheCommandAndItKnowsWhichWereGiven) {

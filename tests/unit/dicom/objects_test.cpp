@@ -9,6 +9,9 @@
 #include <gdcmImageReader.h>
 #include <gdcmImageWriter.h>
 
+#include <functional>
+#include <set>
+
 #include "edit.h"
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/dicom/objects.h"
@@ -55,6 +58,36 @@ std::string text_of(const fs::path& file, const DcmTagKey& tag) {
   OFString value;
   f.getDataset()->findAndGetOFString(tag, value);
   return value.c_str();
+}
+
+// The segments that the groups of a report refer to, each under a tracking UID of its own.
+std::vector<int> tracked(const fs::path& report) {
+  DcmFileFormat f;
+  EXPECT_TRUE(f.loadFile(report.c_str()).good());
+  std::vector<int> segments;
+  std::set<std::string> uids;
+  DcmStack stack;
+  while (f.getDataset()->search(DCM_ReferencedSegmentNumber, stack, ESM_afterStackTop, true).good()) {
+    Uint16 number = 0;
+    static_cast<DcmElement*>(stack.top())->getUint16(number);
+    segments.push_back(number);
+  }
+  std::size_t groups = 0;
+  stack.clear();
+  while (f.getDataset()->search(DCM_ContentSequence, stack, ESM_afterStackTop, true).good()) {
+    auto* const items = static_cast<DcmSequenceOfItems*>(stack.top());
+    for (unsigned long i = 0; i < items->card(); ++i) {
+      OFString meaning, uid;
+      items->getItem(i)->findAndGetOFString(DCM_CodeMeaning, meaning, 0, true);
+      if (meaning != "Tracking Unique Identifier") continue;
+      items->getItem(i)->findAndGetOFString(DCM_UID, uid);
+      uids.insert(uid.c_str());
+      ++groups;
+    }
+  }
+  EXPECT_EQ(uids.size(), groups);
+  EXPECT_EQ(groups, segments.size());
+  return segments;
 }
 
 // Each structure says in SNOMED what it is, where its name tells.
@@ -106,6 +139,62 @@ TEST(Objects, SegmentationsKeepNamesNumbersAndOrigins) {
     EXPECT_EQ(text_of(file, DCM_SegmentationType), form == SegmentationForm::binary ? "BINARY" : "LABELMAP");
     EXPECT_EQ(text_of(file, DCM_SpecificCharacterSet), "ISO_IR 192");
   }
+}
+
+// A segment for each structure, whether it has voxels or not, and however few frames there are.
+TEST(Objects, SegmentsMayBeEmptyOrMoreThanFrames) {
+  Frame f;
+  f.dims = {9, 7, 1};
+  const auto v = make_voxels<std::uint8_t>(f.voxel_count());
+  for (std::size_t i = 0; i < f.voxel_count(); ++i) v[i] = static_cast<std::uint8_t>(i % 3 == 0 ? 40 : 0);
+  std::vector<Structure> given;
+  for (int n = 1; n <= 12; ++n) given.push_back({static_cast<std::uint8_t>(10 * n), "part " + std::to_string(n), {}});
+  for (const auto form : {SegmentationForm::binary, SegmentationForm::labelmap}) {
+    SCOPED_TRACE(static_cast<int>(form));
+    const bool bits = form == SegmentationForm::binary;
+    const fs::path file = scratch("empty-segments") / "a.dcm";
+    save_segmentation({{f, v}, given}, file, {nullptr, "Bone", form});
+    const Labels back = load_segmentation(file);
+    ASSERT_EQ(back.structures.size(), given.size());
+    for (std::size_t s = 0; s < given.size(); ++s) {
+      EXPECT_EQ(back.structures[s].name, given[s].name);
+      EXPECT_EQ(back.structures[s].value, bits ? s + 1 : given[s].value);
+    }
+    for (std::size_t i = 0; i < f.voxel_count(); ++i) ASSERT_EQ(back.voxels[i], i % 3 == 0 ? (bits ? 4 : 40) : 0) << i;
+  }
+}
+
+// Labels hold 64 characters: of longer names the label is their begin, their end and what tells them apart.
+TEST(Objects, LongNamesStayApart) {
+  Frame f;
+  f.dims = {9, 7, 4};
+  const auto v = make_voxels<std::uint8_t>(f.voxel_count());
+  for (std::size_t i = 0; i < f.voxel_count(); ++i) v[i] = static_cast<std::uint8_t>(i % 4);
+  const std::string long_name = "vessel of the skull base that a person drew on the scan \u00e4 in steps, ";
+  const std::vector<Structure> given{{1, long_name + "left", {}}, {2, long_name + "right", {}}, {3, "nerve", {}}};
+  const fs::path folder = scratch("long-names"), file = folder / "seg.dcm", measures = folder / "measures.dcm";
+  save_segmentation({{f, v}, given}, file);
+  const Labels back = load_segmentation(file);
+  ASSERT_EQ(back.structures.size(), 3u);
+  EXPECT_NE(back.structures[0].name, back.structures[1].name);
+  EXPECT_TRUE(back.structures[0].name.starts_with("vessel of the skull base")) << back.structures[0].name;
+  EXPECT_NE(back.structures[0].name.find(", left "), std::string::npos) << back.structures[0].name;
+  EXPECT_EQ(back.structures[2].name, "nerve");
+
+  // The report's groups refer to their own segments; two of one name are two things that are tracked.
+  MeasuresReport report;
+  report.segmentation = file;
+  const auto volume = [&](std::uint8_t value) {
+    return static_cast<double>(std::count(v.get(), v.get() + f.voxel_count(), value)) * f.voxel_volume_mm3();
+  };
+  for (const Structure& s : given) report.structures.push_back({s.name, "", volume(s.value), 0});
+  save_measures_report(report, measures);
+  EXPECT_EQ(tracked(measures), (std::vector<int>{1, 2, 3}));
+
+  save_segmentation({{f, v}, {{1, "same", {}}, {2, "same", {}}, {3, "nerve", {}}}}, file);
+  for (std::size_t s : {0U, 1U}) report.structures[s].name = "same";
+  save_measures_report(report, measures);
+  EXPECT_EQ(tracked(measures), (std::vector<int>{1, 2, 3}));
 }
 
 // Careless anonymisation leaves hashes where dates and UIDs belong: what is not allowed is not taken over, by name.
@@ -229,6 +318,41 @@ std::vector<Uint8> run_length(const std::vector<Uint8>& bytes) {
   return out;
 }
 
+std::string box(const std::string& type, const std::string& holds) {
+  const std::size_t n = holds.size() + 8;
+  std::string b;
+  for (const int shift : {24, 16, 8, 0}) b += static_cast<char>(n >> shift & 255U);
+  return b + type + holds;
+}
+
+// Each frame in a fragment of its own, as `change` makes it.
+void rewrite_frames(const fs::path& from, const fs::path& to,
+                    const std::function<std::string(const std::string&)>& change) {
+  DcmFileFormat file;
+  ASSERT_TRUE(file.loadFile(from.c_str()).good());
+  DcmElement* pixels = nullptr;
+  ASSERT_TRUE(file.getDataset()->findAndGetElement(DCM_PixelData, pixels).good());
+  DcmPixelSequence* frames = nullptr;
+  const DcmRepresentationParameter* parameter = nullptr;
+  ASSERT_TRUE(static_cast<DcmPixelData*>(pixels)
+                  ->getEncapsulatedRepresentation(EXS_JPEG2000LosslessOnly, parameter, frames)
+                  .good());
+  DcmPixelItem* item = nullptr;
+  ASSERT_TRUE(frames->getItem(item, 0).good());
+  ASSERT_TRUE(item->putUint8Array(nullptr, 0).good());  // no table of offsets, which would be wrong
+  for (unsigned long f = 1; f < frames->card(); ++f) {
+    ASSERT_TRUE(frames->getItem(item, f).good());
+    Uint8* bytes = nullptr;
+    ASSERT_TRUE(item->getUint8Array(bytes).good());
+    std::string made = change({reinterpret_cast<const char*>(bytes), item->getLength()});
+    if (made.size() % 2 != 0) made += '\0';
+    ASSERT_TRUE(
+        item->putUint8Array(reinterpret_cast<const Uint8*>(made.data()), static_cast<unsigned long>(made.size()))
+            .good());
+  }
+  ASSERT_TRUE(file.saveFile(to.c_str(), EXS_JPEG2000LosslessOnly).good());
+}
+
 TEST(Objects, SegmentationsAreReadHoweverTheyArePacked) {
   const Series s("packed", slices(0, 8));
   const Labels bone = bone_of(load_dicom_series(scan_dicom(s.folder).series.at(0)).image);
@@ -273,6 +397,33 @@ TEST(Objects, SegmentationsAreReadHoweverTheyArePacked) {
   writer.SetImage(change.GetOutput());
   ASSERT_TRUE(writer.Write());
   expect_read(out / "j2k.dcm");
+
+  // A codestream in a JP2 file, behind a box that holds the head of another; and one of more bits than there is room
+  // for, which GDCM 3.0.21 would write beyond it.
+  rewrite_frames(out / "j2k.dcm", out / "jp2.dcm", [](const std::string& codestream) {
+    std::string other = codestream.substr(0, 64);
+    other[11] = static_cast<char>(other[11] ^ 1);  // columns
+    return box("jP  ", "\r\n\x87\n") + box("ftyp", "jp2 " + std::string(4, '\0') + "jp2 ") +
+           box("uuid", std::string(16, 'u') + other) +
+           box("jp2h",
+               box("ihdr", codestream.substr(12, 4) + codestream.substr(8, 4) + std::string("\0\1\7\7\1\0", 6)) +
+                   box("colr", std::string("\1\0\0\0\0\0\x11", 7))) +
+           box("jp2c", codestream);
+  });
+  expect_read(out / "jp2.dcm");
+  rewrite_frames(out / "j2k.dcm", out / "wide.dcm", [](std::string codestream) {
+    codestream[42] = 15;
+    return codestream;
+  });
+  const auto said = [&] {
+    try {
+      static_cast<void>(load_segmentation(out / "wide.dcm"));
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  }();
+  EXPECT_NE(said.find("they have 16 bits, the header says 8"), std::string::npos) << said;
 
   // Bits in run lengths: the packed bytes of each frame are what is encoded.
   ASSERT_TRUE(file.loadFile(plain.c_str()).good());

@@ -111,6 +111,56 @@ TEST(Sheet, SameSheetSameBytes) {
   EXPECT_NE(pdf.find("/FontFile"), std::string::npos);  // embedded
 }
 
+// Each object's place in the table at the end is where that object begins.
+void expect_whole(const std::string& pdf) {
+  const std::size_t table = std::stoul(pdf.substr(pdf.rfind("startxref\n") + 10));
+  ASSERT_EQ(pdf.compare(table, 7, "xref\n0 "), 0);
+  const std::size_t n = std::stoul(pdf.substr(table + 7)), entries = pdf.find('\n', table + 7) + 1;
+  EXPECT_EQ(n - 1, count(pdf, " 0 obj\n"));
+  for (std::size_t object = 1; object < n; ++object) {
+    const std::string begin = std::to_string(object) + " 0 obj\n";
+    EXPECT_EQ(pdf.compare(std::stoul(pdf.substr(entries + 20 * object, 10)), begin.size(), begin), 0) << begin;
+  }
+}
+
+TEST(Sheet, APdfSaysWhatItsPartsAre) {
+  Sheet s = example();
+  s.blocks.push_back({sheet::Drawing{"d", "Łuk (a) \xff", 100, 50, {}, "below"}});
+  s.blocks.push_back({sheet::Pictures{{{"mute", gradient(8, 9), ""}}, 9}});  // decoration
+  const std::string pdf = sheet_pdf(s);
+  expect_whole(pdf);
+  const auto parts = [&pdf](const std::string& name) { return count(pdf, "/StructElem\n   /S /" + name + "\n"); };
+  EXPECT_EQ(count(pdf, "/MarkInfo << /Marked true >>"), 1U);
+  EXPECT_EQ(count(pdf, "/Lang (en)"), 1U);
+  EXPECT_EQ(parts("Document"), 1U);
+  EXPECT_EQ(parts("H1"), 1U);
+  EXPECT_EQ(parts("H2"), 1U);
+  EXPECT_EQ(parts("Table"), 1U);
+  EXPECT_EQ(parts("TR"), 4U);
+  EXPECT_EQ(parts("TH"), 2U);
+  EXPECT_EQ(count(pdf, "/Scope /Column"), 2U);
+  EXPECT_EQ(parts("TD"), 6U);
+  EXPECT_EQ(parts("LI"), 6U);      // three facts, three fields of the signature
+  EXPECT_EQ(parts("LBody"), 3U);   // which are empty
+  EXPECT_EQ(parts("Figure"), 4U);  // two pictures, bars, drawing
+  EXPECT_EQ(parts("Caption"), 3U);
+  // What figures show, in their order, in UTF-16.
+  std::size_t at = 0;
+  for (const char* const alt :
+       {"<FEFF00660069007200730074>", "<FEFF007300650063006F006E0064>",
+        "<FEFF00480055003B0020007400680072006500730068006F006C0064>", "<FEFF01410075006B00200028006100290020FFFD>"}) {
+    at = pdf.find("/S /Figure\n   /Alt " + std::string(alt), at);
+    ASSERT_NE(at, std::string::npos) << alt;
+  }
+  // One that goes over pages is one table still, and the title is there once.
+  const std::string many = sheet_pdf(example(400));
+  expect_whole(many);
+  EXPECT_GT(pages(many), 2U);
+  EXPECT_EQ(count(many, "/StructElem\n   /S /Table\n"), 1U);
+  EXPECT_EQ(count(many, "/StructElem\n   /S /TR\n"), 401U);
+  EXPECT_EQ(count(many, "/StructElem\n   /S /H1\n"), 1U);
+}
+
 TEST(Sheet, IsMadeSmallerBeforeItIsLonger) {
   EXPECT_EQ(pages(sheet_pdf(example(3))), 1U);
   EXPECT_EQ(report::fitting_scale(example(3)), 1);

@@ -4,6 +4,7 @@
 #include <csignal>
 #include <cstring>
 #include <iostream>
+#include <map>
 #include <new>
 #include <set>
 
@@ -111,6 +112,36 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
                 near.empty() ? "--help shows the flags" : "did you mean " + near + "?");
   }
   return parsed;
+}
+
+// Before anything is done: a file that is written twice, or read and written, would be only the last of them.
+void refuse_one_file_for_two(const CommandInfo& info, const std::vector<FieldRef>& fields,
+                             const std::vector<std::string>& arguments) {
+  struct Named {
+    std::string flag, file;
+  };
+  const auto named = [&](const std::string& name) -> Named {
+    for (std::size_t i = 0; i < info.positionals.size(); ++i) {
+      if (info.positionals[i].name == name)
+        return {"<" + name + ">", i < arguments.size() ? arguments[i] : std::string()};
+    }
+    const FieldRef* const field = find_field(fields, name);
+    if (field == nullptr) throw Error(ExitCode::failed, "'" + info.name + "' has no flag '" + name + "'");
+    return {field->flag(), field->to_text()};
+  };
+  std::map<std::string, std::string> taken;  // by place, what is written there
+  for (const bool written : {true, false}) {
+    for (const std::string& name : written ? info.writes : info.reads) {
+      const Named one = named(name);
+      if (one.file.empty()) continue;
+      const std::string place = true_place(one.file);
+      const auto other = taken.find(place);
+      if (other != taken.end())
+        throw Error(ExitCode::usage, other->second + " and " + one.flag + " are one file, '" + one.file + "'",
+                    "give them two names");
+      if (written) taken[place] = one.flag;
+    }
+  }
 }
 
 // " (2 names), but 3 were given"
@@ -335,6 +366,7 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
                   "'osteo help " + subject + "' says more");
     }
     invocation.arguments = std::move(parsed.positionals);
+    refuse_one_file_for_two(command->info(), fields, invocation.arguments);
     invocation.settings = std::move(parsed.settings);
     renamed.insert(renamed.end(), parsed.renamed.begin(), parsed.renamed.end());
     invocation.given = std::move(parsed.given);

@@ -1,9 +1,11 @@
-// The sheet on paper: Pango lays out the text, cairo draws it.
+// The sheet on paper: Pango lays out the text, cairo draws it and tags what it is, for those who have it read aloud.
 #include <cairo-pdf.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <functional>
+#include <map>
 
 #include "layout.h"
 #include "osteo/core/base/error.h"
@@ -30,8 +32,36 @@ struct Style {
 // Draws, or only measures: both go the same way, so both agree.
 class Pen {
  public:
-  explicit Pen(cairo_t* cairo) : cairo_(cairo) {}
+  // Takes down what each figure shows, in the order in which they are drawn.
+  Pen(cairo_t* cairo, std::vector<std::string>* shown) : cairo_(cairo), shown_(shown) {}
   bool on = false;
+
+  // PDF's name for what is drawn next, until end of the same name. What is drawn outside of all is decoration.
+  void begin(const char* tag) const {
+    if (on) cairo_tag_begin(cairo_, tag, nullptr);
+  }
+  void end(const char* tag) const {
+    if (on) cairo_tag_end(cairo_, tag);
+  }
+  template <class Draw>
+  auto as(const char* tag, const Draw& draw) const {
+    begin(tag);
+    const auto result = draw();
+    end(tag);
+    return result;
+  }
+  double text_as(const char* tag, const std::string& what, double x, double y, double width, const Style& style) const {
+    return as(tag, [&] { return text(what, x, y, width, style); });
+  }
+  // Without words it is decoration, as on a page with an empty alt.
+  template <class Draw>
+  void figure(const std::string& shows, const Draw& draw) const {
+    if (shows.empty()) return static_cast<void>(draw());
+    if (on) shown_->push_back(shows);
+    begin("Figure");
+    draw();
+    end("Figure");
+  }
 
   double text(const std::string& what, double x, double y, double width, const Style& style) const {
     const CairoOwned<PangoLayout> layout(pango_cairo_create_layout(cairo_));
@@ -164,6 +194,7 @@ class Pen {
 
  private:
   cairo_t* cairo_;
+  std::vector<std::string>* shown_;
 };
 
 double draw(const Pen& pen, const SheetBlocks& blocks, double x, double y, double w);
@@ -175,15 +206,17 @@ double draw_row(const Pen& pen, const sheet::Table& t, const std::vector<sheet::
   const std::size_t n = std::max(t.head.size(), cells.size());
   for (std::size_t c = 0; c < n; ++c) all += share(c);
   double at = x;
+  pen.begin("TR");
   for (std::size_t c = 0; c < n; ++c) {
     const double width = w * share(c) / all;
     if (c < cells.size()) {
       const Style style{kTextPt - 0.6, head, head ? ink(Tone::quiet) : ink(cells[c].tone)};
-      height = std::max(
-          height, pen.text(std::string(sign(cells[c].tone)) + cells[c].text, at, y + 0.35 * kPad, width - kPad, style));
+      height = std::max(height, pen.text_as(head ? "TH" : "TD", std::string(sign(cells[c].tone)) + cells[c].text, at,
+                                            y + 0.35 * kPad, width - kPad, style));
     }
     at += width;
   }
+  pen.end("TR");
   height += 0.7 * kPad;
   pen.line(x, y + height, x + w, y + height, {0.82, 0.84, 0.87}, head ? 0.9 : 0.4);
   return height;
@@ -224,21 +257,26 @@ double draw_bars(const Pen& pen, const sheet::Bars& b, double x, double y, doubl
 double draw_signature(const Pen& pen, const sheet::Signature& s, double x, double y, double w) {
   const double h = 19.5 * kMm, third = w / 3;
   pen.box(x, y, w, h, wash(s.tone));
-  pen.text(std::string(sign(s.tone)) + s.state, x + 2 * kPad, y + kPad, w - 4 * kPad,
-           {kTextPt + 1, true, ink(s.tone), PANGO_ALIGN_LEFT, 1});
+  pen.text_as("P", std::string(sign(s.tone)) + s.state, x + 2 * kPad, y + kPad, w - 4 * kPad,
+              {kTextPt + 1, true, ink(s.tone), PANGO_ALIGN_LEFT, 1});
   const double base = y + h - 4.2 * kMm;
   const auto field = [&](const char* name, const std::string& text, double from, double width, int lines) {
     pen.line(from, base, from + width, base, ink(Tone::quiet));
-    pen.text(name, from, base + 1.5, width, {kTextPt - 1.6, false, ink(Tone::quiet), PANGO_ALIGN_LEFT, 1});
-    if (text.empty()) return;
-    const Style style{kTextPt, false, ink(Tone::plain), PANGO_ALIGN_LEFT, lines};
-    Pen measure = pen;
-    measure.on = false;
-    pen.text(text, from, base - measure.text(text, from, base, width, style) - 1, width, style);
+    pen.begin("LI");
+    pen.text_as("Lbl", name, from, base + 1.5, width, {kTextPt - 1.6, false, ink(Tone::quiet), PANGO_ALIGN_LEFT, 1});
+    if (!text.empty()) {
+      const Style style{kTextPt, false, ink(Tone::plain), PANGO_ALIGN_LEFT, lines};
+      Pen measure = pen;
+      measure.on = false;
+      pen.text_as("LBody", text, from, base - measure.text(text, from, base, width, style) - 1, width, style);
+    }
+    pen.end("LI");
   };
+  pen.begin("L");
   field(tr("approved by"), s.by, x + 2 * kPad, third - 4 * kPad, 2);
   field(tr("date"), s.date, x + third, third * 0.5 - 2 * kPad, 1);
   field(tr("note"), s.note, x + 1.5 * third, 1.5 * third - 2 * kPad, 2);
+  pen.end("L");
   return h;
 }
 
@@ -247,12 +285,12 @@ double draw(const Pen& pen, const SheetBlock& block, double x, double y, double 
     const Pen& pen;
     double x, y, w;
     double operator()(const sheet::Heading& h) const {
-      const double height = pen.text(h.text, x, y + 0.8 * kMm, w, {kTextPt + 1.5, true, {0.10, 0.25, 0.42}});
+      const double height = pen.text_as("H2", h.text, x, y + 0.8 * kMm, w, {kTextPt + 1.5, true, {0.10, 0.25, 0.42}});
       return height + 0.8 * kMm;
     }
     double operator()(const sheet::Paragraph& p) const {
-      return pen.text(std::string(sign(p.tone)) + p.text, x, y, w,
-                      {p.tone == Tone::quiet ? kTextPt - 1 : kTextPt, false, ink(p.tone)});
+      return pen.text_as("P", std::string(sign(p.tone)) + p.text, x, y, w,
+                         {p.tone == Tone::quiet ? kTextPt - 1 : kTextPt, false, ink(p.tone)});
     }
     double operator()(const sheet::Band& b) const {
       const Style word{kTextPt + 2.5, true, ink(b.tone)}, text{kTextPt + 0.5, false, ink(Tone::plain)};
@@ -263,8 +301,8 @@ double draw(const Pen& pen, const SheetBlock& block, double x, double y, double 
                                      measure.text(b.text, x, y, w - left - 2 * kPad, text));
       pen.box(x, y, w, height + 3 * kPad, wash(b.tone));
       pen.box(x, y, 0.8 * kMm, height + 3 * kPad, ink(b.tone));
-      pen.text(std::string(sign(b.tone)) + b.word, x + 2.2 * kPad, y + 1.2 * kPad, left - 3 * kPad, word);
-      pen.text(b.text, x + left, y + 1.5 * kPad, w - left - 2 * kPad, text);
+      pen.text_as("P", std::string(sign(b.tone)) + b.word, x + 2.2 * kPad, y + 1.2 * kPad, left - 3 * kPad, word);
+      pen.text_as("P", b.text, x + left, y + 1.5 * kPad, w - left - 2 * kPad, text);
       return height + 3 * kPad;
     }
     double operator()(const sheet::Facts& f) const {
@@ -273,22 +311,28 @@ double draw(const Pen& pen, const SheetBlock& block, double x, double y, double 
       const double width = (w - kGap * 2 * static_cast<double>(n - 1)) / static_cast<double>(n),
                    name = (n > 1 ? 0.30 : 0.34) * width;
       double height = 0;
+      pen.begin("L");
       for (std::size_t c = 0; c < n; ++c) {
         double at = y;
         const double left = x + static_cast<double>(c) * (width + 2 * kGap);
         for (std::size_t r = c * each; r < std::min(f.rows.size(), (c + 1) * each); ++r) {
-          const double a = pen.text(f.rows[r].first, left, at, name - kPad, {kTextPt - 0.3, false, ink(Tone::quiet)});
-          const double b =
-              pen.text(f.rows[r].second, left + name, at, width - name, {kTextPt - 0.3, false, ink(Tone::plain)});
+          const Style quiet{kTextPt - 0.3, false, ink(Tone::quiet)}, plain{kTextPt - 0.3, false, ink(Tone::plain)};
+          pen.begin("LI");
+          const double a = pen.text_as("Lbl", f.rows[r].first, left, at, name - kPad, quiet);
+          const double b = pen.text_as("LBody", f.rows[r].second, left + name, at, width - name, plain);
+          pen.end("LI");
           at += std::max(a, b) + 0.5 * kPad;
         }
         height = std::max(height, at - y);
       }
+      pen.end("L");
       return height;
     }
     double operator()(const sheet::Table& t) const {
+      pen.begin("Table");
       double height = t.head.empty() ? 0 : draw_row(pen, t, head_of(t), true, x, y, w);
       for (const auto& row : t.rows) height += draw_row(pen, t, row, false, x, y + height, w);
+      pen.end("Table");
       return height;
     }
     double operator()(const sheet::Pictures& p) const {
@@ -300,24 +344,31 @@ double draw(const Pen& pen, const SheetBlock& block, double x, double y, double 
       double at = x, caption = 0;
       for (const sheet::Image& i : p.row) {
         const double width = i.picture.height > 0 ? real * i.picture.width / i.picture.height : real;
-        pen.picture(i.picture, at, y, width, real);
+        pen.figure(i.caption, [&] { pen.picture(i.picture, at, y, width, real); });
         if (!i.caption.empty())
-          caption = std::max(
-              caption, pen.text(i.caption, at, y + real + 0.8, width - gap, {kTextPt - 1.4, false, ink(Tone::quiet)}));
+          caption = std::max(caption, pen.text_as("Caption", i.caption, at, y + real + 0.8, width - gap,
+                                                  {kTextPt - 1.4, false, ink(Tone::quiet)}));
         at += width + gap;
       }
       return real + (caption > 0 ? caption + 1.2 : 0);
     }
-    double operator()(const sheet::Bars& b) const { return draw_bars(pen, b, x, y, w); }
+    double operator()(const sheet::Bars& b) const {
+      std::string shows = b.axis;
+      for (const sheet::Bars::Mark& mark : b.marks) shows += "; " + mark.text;
+      double height = 0;
+      pen.figure(shows, [&] { height = draw_bars(pen, b, x, y, w); });
+      return height;
+    }
     double operator()(const sheet::Drawing& d) const {
       const double height = w * d.height / d.width;
-      pen.drawing(d, x, y, w / d.width);
+      pen.figure(d.alt, [&] { pen.drawing(d, x, y, w / d.width); });
       if (d.caption.empty()) return height;
-      return height + 1 + pen.text(d.caption, x, y + height + 1, w, {kTextPt - 1.4, false, ink(Tone::quiet)});
+      return height + 1 +
+             pen.text_as("Caption", d.caption, x, y + height + 1, w, {kTextPt - 1.4, false, ink(Tone::quiet)});
     }
     double operator()(const sheet::Plot& p) const {
       const sheet::Drawing d = drawing_of(p, w);
-      pen.drawing(d, x, y, 1);
+      pen.figure(p.title, [&] { pen.drawing(d, x, y, 1); });
       return d.height;
     }
     double operator()(const sheet::Signature& s) const { return draw_signature(pen, s, x, y, w); }
@@ -349,6 +400,7 @@ struct Unit {
   std::function<double(const Pen&, double x, double y, double w)> draw;
   bool keep_with_next = false, new_page = false;
   double after = kGap;
+  bool begins_table = false, ends_table = false;  // a table's rows are units of their own, but one table
 };
 
 std::vector<Unit> units_of(const Sheet& s) {
@@ -361,11 +413,13 @@ std::vector<Unit> units_of(const Sheet& s) {
         units.push_back(
             {[t](const Pen& p, double x, double y, double w) { return draw_row(p, *t, head_of(*t), true, x, y, w); },
              true, false, 0});
+      const std::size_t first = units.size() - (t->head.empty() ? 0 : 1);
       for (const auto& row : t->rows)
         units.push_back(
             {[t, &row](const Pen& p, double x, double y, double w) { return draw_row(p, *t, row, false, x, y, w); },
              false, false, 0});
       units.back().after = kGap;
+      units[first].begins_table = units.back().ends_table = true;
     } else {
       units.push_back({[&block](const Pen& p, double x, double y, double w) { return draw(p, block, x, y, w); },
                        std::holds_alternative<sheet::Heading>(block.is)});
@@ -374,31 +428,41 @@ std::vector<Unit> units_of(const Sheet& s) {
   return units;
 }
 
-// Goes over all pages; returns how many. `total`: to show, 0 while they are counted.
-int go(cairo_t* cairo, const Sheet& s, double scale, int total) {
+// Goes over all pages; returns how many. `total`: to show, 0 while they are counted. `shown`: by each figure.
+int go(cairo_t* cairo, const Sheet& s, double scale, int total, std::vector<std::string>& shown) {
   const double width = (kPageWidth - 2 * kMargin) * kMm / scale, left = kMargin * kMm / scale,
                top = kMargin * kMm / scale;
   const double bottom = (kPageHeight - kMargin - kFoot) * kMm / scale;
-  Pen pen(cairo);
-  Pen measure(cairo);
+  Pen pen(cairo, &shown);
+  Pen measure(cairo, &shown);
+  pen.on = total > 0;
   int page = 0;
   double y = 0;
   const auto begin_page = [&] {
     ++page;
-    pen.on = total > 0;
-    const double a = pen.text(s.title, left, top, 0.72 * width,
-                              {kTextPt + (page == 1 ? 7 : 3), true, {0.10, 0.25, 0.42}, PANGO_ALIGN_LEFT, 1});
-    const double b = pen.text(s.code, left + 0.6 * width, top, 0.4 * width,
-                              {kTextPt + (page == 1 ? 7 : 3), true, ink(Tone::plain), PANGO_ALIGN_RIGHT, 1});
+    const Style title{kTextPt + (page == 1 ? 7 : 3), true, {0.10, 0.25, 0.42}, PANGO_ALIGN_LEFT, 1},
+        code{title.pt, true, ink(Tone::plain), PANGO_ALIGN_RIGHT, 1};
+    const auto head = [&](const char* tag, const std::string& what, double x, double w, const Style& style) {
+      // Read once, not on every page.
+      return page == 1 ? pen.text_as(tag, what, x, top, w, style) : pen.text(what, x, top, w, style);
+    };
+    const double a = head("H1", s.title, left, 0.72 * width, title);
+    const double b = head("P", s.code, left + 0.6 * width, 0.4 * width, code);
     y = top + std::max(a, b) + 1;
     pen.line(left, y, left + width, y, {0.10, 0.25, 0.42}, 1);
     y += 1.2 * kGap;
+  };
+  const auto end_page = [&] {
     const double foot = (kPageHeight - kMargin) * kMm / scale - kTextPt;
-    pen.text(s.footer, left, foot, 0.85 * width, {kTextPt - 1.6, false, ink(Tone::quiet), PANGO_ALIGN_LEFT, 1});
+    const Style quiet{kTextPt - 1.6, false, ink(Tone::quiet), PANGO_ALIGN_LEFT, 1};
+    page == total ? pen.text_as("P", s.footer, left, foot, 0.85 * width, quiet)
+                  : pen.text(s.footer, left, foot, 0.85 * width, quiet);
     pen.text(std::to_string(page) + " / " + std::to_string(total), left + 0.85 * width, foot, 0.15 * width,
              {kTextPt - 1.2, false, ink(Tone::quiet), PANGO_ALIGN_RIGHT, 1});
+    if (total > 0) cairo_show_page(cairo);
   };
   if (scale != 1) cairo_scale(cairo, scale, scale);
+  pen.begin("Document");
   begin_page();
   const auto units = units_of(s);
   double first = y;
@@ -407,20 +471,82 @@ int go(cairo_t* cairo, const Sheet& s, double scale, int total) {
     if (units[u].keep_with_next && u + 1 < units.size())
       need += units[u].after + units[u + 1].draw(measure, left, y, width);
     if ((units[u].new_page || y + need > bottom) && y > first) {
-      if (total > 0) cairo_show_page(cairo);
+      end_page();
       begin_page();
       first = y;
     }
     if (units[u].new_page) continue;
+    if (units[u].begins_table) pen.begin("Table");
     y += units[u].draw(pen, left, y, width) + units[u].after;
+    if (units[u].ends_table) pen.end("Table");
   }
-  if (total > 0) cairo_show_page(cairo);
+  end_page();
+  pen.end("Document");
   return page;
 }
 
 cairo_status_t append(void* sink, const unsigned char* bytes, unsigned n) {
   static_cast<std::string*>(sink)->append(reinterpret_cast<const char*>(bytes), n);
   return CAIRO_STATUS_SUCCESS;
+}
+
+// A text as PDF writes it: UTF-16 in hexadecimal.
+std::string pdf_text(const std::string& text) {
+  static constexpr char kHex[] = "0123456789ABCDEF";
+  const std::string valid = valid_utf8(text);
+  glong n = 0;
+  gunichar2* const units = g_utf8_to_utf16(valid.data(), static_cast<glong>(valid.size()), nullptr, &n, nullptr);
+  std::string hex = "<FEFF";
+  for (glong i = 0; i < n; ++i) {
+    for (const int shift : {12, 8, 4, 0}) hex += kHex[units[i] >> shift & 15];
+  }
+  g_free(units);
+  return hex + ">";
+}
+
+// Adds what cairo cannot be told: the language, what figures show, that a column's head is one. cairo writes the
+// dictionaries that want it as text, and where they begin into a table at the end, which moves along. What is not laid
+// out so stays as it is.
+void describe(std::string& pdf, const std::vector<std::string>& shown) {
+  constexpr std::string_view kStart = "startxref\n", kTable = "xref\n0 ";
+  constexpr std::size_t kEntry = 20, kDigits = 10;  // of the table, and of the place in an entry
+  const auto number_at = [&](std::size_t at) -> std::size_t { return std::strtoull(pdf.c_str() + at, nullptr, 10); };
+  const auto start = pdf.rfind(kStart);
+  if (start == std::string::npos) return;
+  const std::size_t table = number_at(start + kStart.size());
+  if (table >= start || pdf.compare(table, kTable.size(), kTable) != 0) return;
+  const std::size_t objects = number_at(table + kTable.size()), entries = pdf.find('\n', table + kTable.size()) + 1;
+  if (objects > (start - entries) / kEntry) return;
+  std::map<std::size_t, std::string> added;  // where
+  std::size_t figure = 0;
+  for (std::size_t object = 1; object < objects; ++object) {
+    const std::size_t at = number_at(entries + object * kEntry);
+    const auto opens = [&](std::string_view words) {
+      const std::string begin = std::to_string(object) + " 0 obj\n<< /Type /" + std::string(words) + "\n";
+      return pdf.compare(at, begin.size(), begin) == 0 ? at + begin.size() : 0;
+    };
+    if (at >= table) continue;
+    if (const auto to = opens("Catalog"); to > 0) {
+      added[to] = std::string("   /Lang (") + tr_of("the language of these texts, as HTML names it", "en") +
+                  ")\n   /ViewerPreferences << /DisplayDocTitle true >>\n";
+    } else if (const auto in = opens("StructElem\n   /S /Figure"); in > 0 && figure < shown.size()) {
+      added[in] = "   /Alt " + pdf_text(shown[figure++]) + "\n";
+    } else if (const auto th = opens("StructElem\n   /S /TH"); th > 0) {
+      added[th] = "   /A << /O /Table /Scope /Column >>\n";
+    }
+  }
+  const auto moved = [&](std::size_t at) {
+    std::size_t by = 0;
+    for (const auto& [to, text] : added) by += to <= at ? text.size() : 0;
+    return std::to_string(at + by);
+  };
+  pdf.replace(start + kStart.size(), std::to_string(table).size(), moved(table));
+  for (std::size_t object = 1; object < objects; ++object) {
+    const std::size_t entry = entries + object * kEntry;
+    const std::string place = moved(number_at(entry));
+    pdf.replace(entry, kDigits, std::string(kDigits - place.size(), '0') + place);
+  }
+  for (auto it = added.rbegin(); it != added.rend(); ++it) pdf.insert(it->first, it->second);
 }
 
 struct Paper {
@@ -453,7 +579,8 @@ void require_a_font() {
 double fitting_scale(const Sheet& s) {
   for (double scale = 1; scale > kSmallest + 0.01; scale -= 0.03) {
     Paper paper;
-    if (go(paper.cairo.get(), s, scale, 0) <= s.pages) return scale;
+    std::vector<std::string> none;
+    if (go(paper.cairo.get(), s, scale, 0, none) <= s.pages) return scale;
   }
   return 0.85;  // longer then, but readable
 }
@@ -464,17 +591,20 @@ std::string sheet_pdf(const Sheet& s) {
   using namespace report;
   require_a_font();
   const double scale = fitting_scale(s);
+  std::vector<std::string> shown;
   int pages = 0;
   {
     Paper counted;
-    pages = go(counted.cairo.get(), s, scale, 0);
+    pages = go(counted.cairo.get(), s, scale, 0, shown);
   }
   Paper paper;
+  // Later versions may pack the dictionaries that `describe` adds to.
+  cairo_pdf_surface_restrict_to_version(paper.surface.get(), CAIRO_PDF_VERSION_1_4);
   cairo_pdf_surface_set_metadata(paper.surface.get(), CAIRO_PDF_METADATA_TITLE,
                                  valid_utf8(s.title + " " + s.code).c_str());
   cairo_pdf_surface_set_metadata(paper.surface.get(), CAIRO_PDF_METADATA_CREATOR, "Osteotome");
   cairo_pdf_surface_set_metadata(paper.surface.get(), CAIRO_PDF_METADATA_CREATE_DATE, "2000-01-01T00:00:00Z");
-  go(paper.cairo.get(), s, scale, pages);
+  go(paper.cairo.get(), s, scale, pages, shown);
   cairo_surface_finish(paper.surface.get());
   const cairo_status_t status = cairo_surface_status(paper.surface.get());
   if (status != CAIRO_STATUS_SUCCESS)
@@ -484,6 +614,7 @@ std::string sheet_pdf(const Sheet& s) {
     const auto end = paper.bytes.find(')', at);
     if (end != std::string::npos) paper.bytes.replace(at, end - at + 1, end - at + 1, ' ');
   }
+  describe(paper.bytes, shown);
   return std::move(paper.bytes);
 }
 

@@ -35,14 +35,23 @@ Shape shape_of(std::span<const char> bytes, bool jpeg2000) {
   const std::size_t n = bytes.size();
   const char* const p = bytes.data();
   if (jpeg2000) {
-    // The codestream may lie in a JP2 file.
-    for (std::size_t at = 0; at + 42 < n && at < 4096; ++at) {
-      if (u32(p + at) != 0xFF4FFF51U) continue;
-      const char* const siz = p + at + 8;  // after SOC, SIZ, length
-      return {u32(siz) - u32(siz + 8), u32(siz + 4) - u32(siz + 12), u16(siz + 32),
-              (static_cast<unsigned char>(siz[34]) & 127U) + 1};
+    // The codestream may lie in a JP2 file, in its box jp2c (I.4): what looks like one elsewhere is not what is
+    // decoded.
+    std::size_t at = 0;
+    if (n >= 12 && std::memcmp(p, "\0\0\0\x0CjP  \r\n\x87\n", 12) == 0) {
+      for (bool found = false; !found;) {
+        if (at + 16 > n) return {};
+        const bool wide = u32(p + at) == 1;  // a length of 64 bits follows
+        const std::size_t head = wide ? 16 : 8, length = wide ? u32(p + at + 12) : u32(p + at);
+        found = std::memcmp(p + at + 4, "jp2c", 4) == 0;
+        if (!found && (length < head || (wide && u32(p + at + 8) != 0))) return {};
+        at += found ? head : length;
+      }
     }
-    return {};
+    if (at + 43 > n || u32(p + at) != 0xFF4FFF51U) return {};
+    const char* const siz = p + at + 8;  // after SOC, SIZ, length
+    return {u32(siz) - u32(siz + 8), u32(siz + 4) - u32(siz + 12), u16(siz + 32),
+            (static_cast<unsigned char>(siz[34]) & 127U) + 1};
   }
   // Markers up to the scan must follow each other without a gap: GDCM's decoders abort on some pictures that libjpeg
   // patches up.
@@ -105,6 +114,10 @@ bool decode_with_gdcm(const DicomHeader& h, Codec codec_of, std::span<const char
                                                                : stored <= 8       ? 8
                                                                : stored <= 12      ? 12
                                                                                    : 16);
+  // It would write two bytes a pixel where there is room for one.
+  if (stored > allocated)
+    throw PixelError("its compressed pixels are damaged: they have " + std::to_string(stored) +
+                     " bits, the header says " + std::to_string(h.bits_allocated));
   const gdcm::PixelFormat format(1, allocated, std::min(stored, allocated),
                                  static_cast<unsigned short>(std::min(stored, allocated) - 1), h.is_signed ? 1 : 0);
   const auto run = [&](auto& codec) {

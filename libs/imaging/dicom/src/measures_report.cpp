@@ -113,8 +113,22 @@ struct Unit {
 // What the report needs to know of the segmentation that it refers to.
 struct ReferredSegmentation {
   std::string sop_class, instance, series, study;
-  std::map<std::string, Uint16> number;  // of a segment, by its label
+  std::vector<std::pair<std::string, Uint16>> segments;  // labels and numbers
+
+  // Of the segment of a structure; of the n-th where several have one name, which is foreign. 0 where there is none.
+  [[nodiscard]] Uint16 number(const std::string& name, std::size_t nth = 0) const {
+    const std::string label = dicom::segment_label(name);
+    for (const auto& [called, number] : segments) {
+      if (called == label && nth-- == 0) return number;
+    }
+    return 0;
+  }
 };
+
+// How many before this one have its name.
+std::size_t namesakes_before(const std::vector<MeasuredStructure>& all, const MeasuredStructure& one) {
+  return static_cast<std::size_t>(std::count_if(all.data(), &one, [&](const auto& s) { return s.name == one.name; }));
+}
 
 std::string text_at(DcmItem& d, const DcmTagKey& tag) {
   OFString value;
@@ -146,8 +160,10 @@ ReferredSegmentation refer_to_segmentation(const MeasuresReport& report, const D
   std::array<std::size_t, 256> count{};
   for (const std::uint8_t v : labels.span()) ++count[v];
   for (const MeasuredStructure& m : report.structures) {
-    const auto found = std::find_if(labels.structures.begin(), labels.structures.end(),
-                                    [&](const Structure& x) { return x.name == dicom::lo_text(m.name); });
+    std::size_t nth = namesakes_before(report.structures, m);
+    const auto found = std::find_if(labels.structures.begin(), labels.structures.end(), [&](const Structure& x) {
+      return x.name == dicom::segment_label(m.name) && nth-- == 0;
+    });
     if (found == labels.structures.end()) throw refuse("has no segment '" + m.name + "'");
     const double volume = static_cast<double>(count[found->value]) * labels.frame.voxel_volume_mm3();
     if (std::abs(volume - m.volume_mm3) > 0.005 * m.volume_mm3)
@@ -158,7 +174,7 @@ ReferredSegmentation refer_to_segmentation(const MeasuresReport& report, const D
   for (long n = 0; d.findAndGetSequenceItem(DCM_SegmentSequence, segment, n).good(); ++n) {
     Uint16 number = 0;
     if (segment->findAndGetUint16(DCM_SegmentNumber, number).good())
-      s.number[text_at(*segment, DCM_SegmentLabel)] = number;
+      s.segments.emplace_back(text_at(*segment, DCM_SegmentLabel), number);
   }
   return s;
 }
@@ -300,10 +316,13 @@ class MeasuresWriter {
     }
   }
 
-  DcmItem& group(DcmItem& measurements, const std::string& name, const char* tid) const {
+  DcmItem& group(DcmItem& measurements, const std::string& name, const char* tid) {
     DcmItem& g = tree_.container(measurements, {"125007", "DCM", "Measurement Group"}, tid);
     tree_.text(g, kObserved, {"112039", "DCM", "Tracking Identifier"}, name);
-    tree_.uid(g, kObserved, {"112040", "DCM", "Tracking Unique Identifier"}, uid(name));
+    // Two of one name are two things.
+    const std::size_t nth = groups_[name]++;
+    tree_.uid(g, kObserved, {"112040", "DCM", "Tracking Unique Identifier"},
+              uid(nth == 0 ? name : name + "\n" + std::to_string(nth)));
     return g;
   }
 
@@ -312,7 +331,7 @@ class MeasuresWriter {
     tree_.text(in, kModified, {"111003", "DCM", "Algorithm Version"}, version);
   }
 
-  void put_bone(DcmItem& measurements) const {
+  void put_bone(DcmItem& measurements) {
     DcmItem& g = group(measurements, "Bone of the case " + report_.code, "1501");
     tree_.code(g, kContains, kFinding, kBone);
     tree_.number(g, kVolume, report_.bone_mm3, kCubicMm);
@@ -336,32 +355,30 @@ class MeasuresWriter {
       tree_.uid(g, kContains, {"121232", "DCM", "Source series for segmentation"}, dicom::valid_uid(o_.source->uid));
   }
 
-  void put_structure(DcmItem& measurements, const MeasuredStructure& s) const {
-    const auto number = segmentation_.number.find(dicom::lo_text(s.name));
-    const bool segment = number != segmentation_.number.end();
-    DcmItem& g = group(measurements, s.name, segment ? "1411" : "1501");
+  void put_structure(DcmItem& measurements, const MeasuredStructure& s) {
+    const Uint16 segment = segmentation_.number(s.name, namesakes_before(report_.structures, s));
+    DcmItem& g = group(measurements, s.name, segment > 0 ? "1411" : "1501");
     if (const dicom::DrawnBy drawn = dicom::drawn_by(s.origin); !drawn.version.empty())
       put_algorithm(g, (drawn.own ? "Osteotome " : "") + drawn.name,
                     drawn.version + (drawn.corrected ? std::string(kCorrectedByHand) : ""));
     finding(g, kContains, kFinding, s.name);
-    if (segment) refer_to_segment(g, number->second);
+    if (segment > 0) refer_to_segment(g, segment);
     tree_.number(g, kVolume, s.volume_mm3, kCubicMm);
     if (s.length_mm > 0) tree_.number(g, kLength, s.length_mm, kMm);
   }
 
-  void put_gap(DcmItem& measurements, const MeasuredGap& gap) const {
+  void put_gap(DcmItem& measurements, const MeasuredGap& gap) {
     DcmItem& g = group(measurements, "Distance from " + gap.a + " to " + gap.b, "1501");
     DcmItem& n = tree_.number(g, kDistance, gap.mm, kMm);
     finding(n, kModified, kFindingSite, gap.a);
     finding(n, kModified, kFindingSite, gap.b);
   }
 
-  void put_score(DcmItem& measurements, const ScoredGroup& score) const {
-    const auto number = segmentation_.number.find(dicom::lo_text(score.structure));
-    const bool segment = !score.structure.empty() && number != segmentation_.number.end();
-    DcmItem& g = group(measurements, score.name, segment ? "1411" : "1501");
+  void put_score(DcmItem& measurements, const ScoredGroup& score) {
+    const Uint16 segment = score.structure.empty() ? Uint16{0} : segmentation_.number(score.structure);
+    DcmItem& g = group(measurements, score.name, segment > 0 ? "1411" : "1501");
     if (!score.structure.empty()) finding(g, kContains, kFinding, score.structure);
-    if (segment) refer_to_segment(g, number->second);
+    if (segment > 0) refer_to_segment(g, segment);
     for (const auto& n : score.numbers) {
       const std::string code = dicom::lo_text(n.name), meaning = spoken(n.name);
       const Code name{code.c_str(), "99OSTEOTOME", meaning.c_str()};
@@ -387,6 +404,7 @@ class MeasuresWriter {
   const ContentTree tree_;
   ReferredSegmentation segmentation_;
   std::string content_;
+  std::map<std::string, std::size_t> groups_;  // how many have each name
 };
 
 }  // namespace

@@ -85,6 +85,16 @@ std::string lo_text(const std::string& text) {
   return out;
 }
 
+std::string segment_label(const std::string& name) {
+  constexpr int kHead = 30, kTail = 22, kHash = 8, kMost = 64;  // head, "...", tail, a blank, hash
+  const auto begins = [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; };
+  if (std::count_if(name.begin(), name.end(), begins) <= kMost) return lo_text(name);
+  std::size_t head = 0, tail = name.size();
+  for (int n = 0; head < name.size() && (n += begins(name[head]) ? 1 : 0) <= kHead;) ++head;
+  for (int n = 0; tail > 0 && n < kTail;) n += begins(name[--tail]) ? 1 : 0;
+  return lo_text(name.substr(0, head) + "..." + name.substr(tail) + " " + hash_text(name).substr(0, kHash));
+}
+
 void speak_utf8(DcmDataset& d, const std::string& texts) {
   if (std::all_of(texts.begin(), texts.end(), [](char c) { return static_cast<unsigned char>(c) < 128; })) return;
   // Where this DCMTK cannot, the patient's name stays right, and the other texts are not.

@@ -21,6 +21,9 @@ void put_identity(DcmDataset& d, const DicomObjectOptions& o, const std::string&
 /// At most 64 characters, as LO asks, of UTF-8; no backslash and no control characters.
 [[nodiscard]] std::string lo_text(const std::string& text);
 
+/// As lo_text; of a name that is longer its begin, its end and a hash, so that two names have two labels.
+[[nodiscard]] std::string segment_label(const std::string& name);
+
 /// Makes the texts that are there UTF-8, where one that is to be put in is not ASCII.
 void speak_utf8(DcmDataset& d, const std::string& texts);
 

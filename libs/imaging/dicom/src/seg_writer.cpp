@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <span>
 
 #include "dcmtk_tools.h"
 #include "labelmap.h"
@@ -173,8 +172,9 @@ std::string content_of(const Stack& stack) {
   return hasher.hex();
 }
 
-// One object, step by step. Its frames are made by DCMTK as those of a binary segmentation; what a label map has
-// otherwise is put in its place afterwards, since DCMTK before 3.7 knows none.
+// One object, step by step. Its frames are made by DCMTK as those of a binary segmentation of one segment: it refuses
+// more segments than frames, which a stack of few slices may have. What is otherwise is put in its place afterwards,
+// a label map too, which DCMTK before 3.7 does not know.
 class SegmentationWriter {
  public:
   SegmentationWriter(const Stack& stack, const std::vector<Structure>& structures, const fs::path& path,
@@ -183,7 +183,7 @@ class SegmentationWriter {
 
   void write(const Context& context) {
     make(context);
-    add_segments();
+    add_segment();
     add_shared();
     map_ ? add_planes() : add_planes_of_segments();
     DcmFileFormat file;
@@ -198,7 +198,7 @@ class SegmentationWriter {
       dicom::put(d, tag, dicom::lo_text(o_.description), path_);
     for (std::size_t s = 0; s < structures_.size(); ++s) {
       DcmItem& segment = *item(d, DCM_SegmentSequence, s);
-      dicom::put(segment, DCM_SegmentLabel, dicom::lo_text(structures_[s].name), path_);
+      dicom::put(segment, DCM_SegmentLabel, dicom::segment_label(structures_[s].name), path_);
       dicom::put_algorithm(segment, structures_[s].origin, path_);
     }
     map_ ? put_map(d) : put_bits(d);
@@ -229,19 +229,16 @@ class SegmentationWriter {
     if (o_.source != nullptr) refer_to_series(*seg_, *o_.source);
   }
 
-  // DCMTK refuses more segments than frames, which a label map of few slices may have: those behind the first are put
-  // in by put_more_segments.
-  void add_segments() {
-    for (const Structure& s : std::span(structures_).first(map_ ? 1 : structures_.size())) {
-      const dicom::SegmentCode type = dicom::code_of(s.name, structures_.size() == 1);
-      const CodeSequenceMacro category("123037004", "SCT", "Anatomical Structure"),
-          code(std::string(type.code).c_str(), "SCT", std::string(type.meaning).c_str());
-      DcmSegment* segment = nullptr;
-      // Its name and what drew it are put in later.
-      require(DcmSegment::create(segment, "-", category, code, DcmSegTypes::SAT_SEMIAUTOMATIC, "-"), path_);
-      Uint16 number = 0;
-      require(seg_->addSegment(segment, number), path_);
-    }
+  // The first; those behind it are put in by put_more_segments.
+  void add_segment() {
+    const dicom::SegmentCode type = dicom::code_of(structures_.front().name, structures_.size() == 1);
+    const CodeSequenceMacro category("123037004", "SCT", "Anatomical Structure"),
+        code(std::string(type.code).c_str(), "SCT", std::string(type.meaning).c_str());
+    DcmSegment* segment = nullptr;
+    // Its name and what drew it are put in later.
+    require(DcmSegment::create(segment, "-", category, code, DcmSegTypes::SAT_SEMIAUTOMATIC, "-"), path_);
+    Uint16 number = 0;
+    require(seg_->addSegment(segment, number), path_);
   }
 
   void put_more_segments(DcmDataset& d) const {
@@ -251,6 +248,7 @@ class SegmentationWriter {
       auto segment = std::make_unique<DcmItem>(*segments->getItem(0));
       const dicom::SegmentCode type = dicom::code_of(structures_[s].name, false);
       dicom::put_code(*segment, DCM_SegmentedPropertyTypeCodeSequence, type, "SCT", path_);
+      require(segment->putAndInsertUint16(DCM_SegmentNumber, static_cast<Uint16>(s + 1)), path_);
       require(segments->append(segment.get()), path_);
       static_cast<void>(segment.release());  // the sequence's
     }
@@ -307,7 +305,8 @@ class SegmentationWriter {
       refer_to_source(plane, derivation);
       groups.push_back(&derivation);
     }
-    require(seg_->addFrame(pixels.data(), static_cast<Uint16>(segment + 1), groups), path_);
+    require(seg_->addFrame(pixels.data(), 1, groups), path_);
+    segments_.push_back(static_cast<Uint16>(segment + 1));
   }
 
   void add_planes_of_segments() {
@@ -343,6 +342,10 @@ class SegmentationWriter {
   // DCMTK 3.6.7 shifts frames whose size is no multiple of 8: the bits are packed here, one frame right after the other
   // (PS3.5 8.1.1).
   void put_bits(DcmDataset& d) const {
+    for (std::size_t i = 0; i < segments_.size(); ++i) {
+      DcmItem& shown = *item(*item(d, DCM_PerFrameFunctionalGroupsSequence, i), DCM_SegmentIdentificationSequence, 0);
+      require(shown.putAndInsertUint16(DCM_ReferencedSegmentNumber, segments_[i]), path_);
+    }
     std::vector<Uint8> packed((bits_.size() + 15) / 16 * 2);
     for (std::size_t i = 0; i < bits_.size(); ++i)
       packed[i / 8] = static_cast<Uint8>(packed[i / 8] | bits_[i] << (i % 8));
@@ -404,7 +407,8 @@ class SegmentationWriter {
   const bool map_;
   std::unique_ptr<DcmSegmentation> seg_;
   std::string content_;
-  std::vector<Uint8> bits_;  // of all frames, a byte each
+  std::vector<Uint8> bits_;       // of all frames, a byte each
+  std::vector<Uint16> segments_;  // which each frame shows
 };
 
 void write_segmentation(const Stack& stack, const std::vector<Structure>& structures, const fs::path& path,

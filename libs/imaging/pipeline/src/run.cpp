@@ -377,7 +377,7 @@ void validate(Pipeline& pipeline, const Registry& registry) {
       const Port* const port = find_port(info.outputs, name);
       if (port == nullptr) unknown(where, "output", name, names_of(info.outputs));
       require_savable(port->kinds.front(), path);
-      const auto [it, inserted] = written_by.try_emplace(path.lexically_normal().string(), node.id);
+      const auto [it, inserted] = written_by.try_emplace(true_place(path), node.id);
       if (!inserted)
         throw Error(ExitCode::usage, where + " and stage '" + it->second + "' both write '" + path.string() + "'");
     }
@@ -452,6 +452,13 @@ std::string list_names(const std::vector<std::string>& names) {
   for (std::size_t i = 0; i < std::min(kShown, names.size()); ++i) text += (i > 0 ? ", " : "") + names[i];
   if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
   return text;
+}
+
+std::string true_place(const fs::path& path) {
+  std::error_code ec;
+  fs::path place = fs::weakly_canonical(fs::absolute(path, ec), ec);
+  if (ec) place = path.lexically_normal();
+  return (place.has_filename() ? place : place.parent_path()).string();
 }
 
 fs::path provenance_path(const fs::path& output) {

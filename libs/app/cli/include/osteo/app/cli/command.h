@@ -59,6 +59,9 @@ struct CommandInfo {
   std::string example;
   bool takes_settings = false;              ///< --set NAME=VALUE
   std::vector<FlagGroup> flag_groups = {};  ///< none: one list. Fields of no group come last
+  /// Fields and positionals that name what is written, and what is read beside it: no two that are written, and none
+  /// that is read, may be one file.
+  std::vector<std::string> writes = {}, reads = {};
 };
 
 /// What a verb gets to work with.

@@ -176,8 +176,8 @@ struct Sheet {
 
 /// Self-contained: pictures inside, no scripts, nothing from elsewhere. Same sheet, same bytes.
 [[nodiscard]] std::string sheet_html(const Sheet& sheet);
-/// PDF 1.5 with the fonts it uses and text that can be selected. Same sheet and same fonts on the machine, same bytes:
-/// it holds no date. Error(failed) where the machine has no font at all.
+/// PDF 1.4 with the fonts it uses and text that can be selected; tagged, so that it can be read aloud. Same sheet and
+/// same fonts on the machine, same bytes: it holds no date. Error(failed) where the machine has no font at all.
 [[nodiscard]] std::string sheet_pdf(const Sheet& sheet);
 
 /// Parts of pages that are not sheets. A drawing as SVG, as wide as what it stands in; with its caption below it.

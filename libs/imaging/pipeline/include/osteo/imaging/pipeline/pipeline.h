@@ -89,6 +89,8 @@ void require_replaceable(const std::filesystem::path& folder, const std::filesys
 /// "a, b, c, d, e and 12 more"
 [[nodiscard]] std::string list_names(const std::vector<std::string>& names);
 
+/// One text for all names of one file or folder: absolute, links followed. It need not exist.
+[[nodiscard]] std::string true_place(const std::filesystem::path& path);
 [[nodiscard]] std::filesystem::path provenance_path(const std::filesystem::path& output);
 /// "0.1.0 (commit c8d6ef5d1b2a)", with ", changed" where the sources differed from it, or "(unknown commit)" without
 /// git.
