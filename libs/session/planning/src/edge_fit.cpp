@@ -137,7 +137,7 @@ std::optional<EdgeReader::Edge> EdgeReader::along(Vec3 point, Vec3 direction, do
   double slope = 0, squares = 0;
   for (int k = kInsideFrom; k <= kInsideTo; ++k) {
     const double x = (k - 0.5 * (kInsideFrom + kInsideTo)) * kSampleMm;
-    slope += x * at(k);
+    slope += x * (at(k) - at(k - kInsideFrom + kStepFrom));
     squares += x * x;
   }
   out.pulled = slope / squares * kSmoothMm / most;  // A is the drop times the blur over the filter's part of it

@@ -23,7 +23,8 @@ class EdgeReader {
     double rise_hu = 0;    ///< most that it rises again within 2.4 mm beyond: other bone across a narrow gap
     double beyond_hu = 0;  ///< mean from 1 to 2.4 mm beyond
     /// What a change of the bone along the line moves the edge by, over the blur (one sigma, with the filter's): to be
-    /// taken off at_mm. A + B x inside, blurred by s, drops most at B s^2 / A.
+    /// taken off at_mm. A + B x inside, blurred by s, drops most at B s^2 / A. B is by how much more it rises inside
+    /// than outside: the slope of a streak of metal is on both sides and moves nothing.
     double pulled = 0;
   };
   /// The blur of CT and filter together, from how much lower than its step an edge drops.
@@ -34,7 +35,6 @@ class EdgeReader {
   [[nodiscard]] std::optional<double> value(Vec3 point) const;
   /// How far metal is, in whole mm, up to 8; further than that or none at all: infinity.
   [[nodiscard]] double metal_mm(Vec3 point) const;
-  [[nodiscard]] bool has_metal() const { return !to_metal_.empty(); }
 
  private:
   void find_metal();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 
 #include "edge_fit.h"
 #include "osteo/core/base/error.h"
@@ -24,8 +25,11 @@ using planning::Solved;
 using planning::Square;
 
 constexpr std::size_t kPlaces = 2000, kCoarsePlaces = 250;
-constexpr double kFromCutsMm = 2, kPatchMm = 5, kFacePatchMm = 4, kStreakPatchMm = 8, kFaceStepMm = 0.6,
-                 kFaceRimMm = 0.8;
+constexpr double kFromCutsMm = 2, kPatchMm = 8, kFaceStepMm = 0.6, kFaceRimMm = 0.8;
+// How far errors go together is not known: noise over 1 to 2 mm, the phase of the grid and streaks over several. Of a
+// face, patches are as large as leaves this many; Student's quantile pays for there being few.
+constexpr std::size_t kFacePatches = 8;
+constexpr double kSmallestFacePatchMm = 4;
 constexpr double kFaceReachMm = 2.5, kFaceDropShare = 0.6, kRiseShare = 0.15, kMinFaceSeen = 0.12;
 constexpr double kMinFound = 0.35, kBrighterHu = 150, kMetalMm = 8;
 // Where edges say nothing, a pose stays where it is wanted: a shaft slides in its own surface. Weights against those of
@@ -152,7 +156,6 @@ std::optional<Fit> refined(const EdgeReader& ct, const std::vector<SurfacePlace>
                            const RigidTransform& wanted, double reach, const Context& context) {
   Fit fit;
   fit.pose = start;
-  const double patch = ct.has_metal() ? kStreakPatchMm : kPatchMm;  // streaks are wider than noise
   std::vector<std::optional<EdgeReader::Edge>> edges(places.size());
   for (int round = 0; round < kRounds; ++round) {
     context.check_cancelled();
@@ -193,7 +196,7 @@ std::optional<Fit> refined(const EdgeReader& ct, const std::vector<SurfacePlace>
     std::vector<Equation<7>> all;
     for (const std::size_t n : kept) {
       const Vec3 d = fit.pose.rotation * places[n].normal, m = cross(fit.pose(places[n].at) - fit.middle, d);
-      all.push_back({{d.x, d.y, d.z, m.x, m.y, m.z, 1}, edges[n]->at_mm, patch_of(places[n].at, patch)});
+      all.push_back({{d.x, d.y, d.z, m.x, m.y, m.z, 1}, edges[n]->at_mm, patch_of(places[n].at, kPatchMm)});
     }
     const RigidTransform back = wanted * fit.pose.inverse();
     const Vec3 b = back(fit.middle) - fit.middle, w = rotation_vector(back.rotation);
@@ -373,11 +376,16 @@ CutOutcome cut_of(const CutPlane& plane, const std::string& fragment, const Tria
     for (const auto& s : seen) off.push_back(std::abs(left(s)));
     const double limit = round == 0 ? 1e9 : std::max(0.25, 3 * 1.4826 * median_of(off));
     std::vector<Equation<3>> all;
-    for (const auto& s : seen) {
-      if (std::abs(left(s)) > limit) continue;
-      all.push_back({{1, s.first[0] - middle[0], s.first[1] - middle[1]},
-                     left(s),
-                     patch_of({s.first[0], s.first[1], 0}, kFacePatchMm)});
+    for (double patch = kPatchMm; patch >= kSmallestFacePatchMm; --patch) {
+      all.clear();
+      std::set<std::array<int, 3>> patches;
+      for (const auto& s : seen) {
+        if (std::abs(left(s)) > limit) continue;
+        const double x = s.first[0] - middle[0], y = s.first[1] - middle[1];
+        all.push_back({{1, x, y}, left(s), patch_of({x, y, 0}, patch)});
+        patches.insert(all.back().patch);
+      }
+      if (patches.size() >= kFacePatches) break;
     }
     solved = planning::least_squares<3>(all);
     if (!solved) break;

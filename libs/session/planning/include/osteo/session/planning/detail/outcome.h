@@ -67,10 +67,10 @@ struct Outcome {
 /// fit left out; where edges do not hold a fragment, it stays as planned. Cut faces the same way, along the plane's
 /// normal: where the bone changes along it, the edge is corrected for the slope; where other bone begins within 2.4 mm
 /// or it is brighter there than beside the bone's surface, it is left out. A face that lies upon another fragment shows
-/// no edge, and then is not known. Intervals: errors of edges within 5 mm (8 where the CT has metal) are alike, so each
-/// such patch is left out in turn (J. MacKinnon, H. White, Journal of Econometrics 1985), with Student's quantile; the
-/// pose's part is in that of the cuts. Errors: usage: a bone that is missing, no fragment that stays; failed: the
-/// reference is not found. Same bytes for any number of threads.
+/// no edge, and then is not known. Intervals: errors of edges within 8 mm are alike, so each such patch is left out in
+/// turn (J. MacKinnon, H. White, Journal of Econometrics 1985), with Student's quantile; of a cut face, patches of at
+/// most 8 mm, as large as leaves eight of them. The pose's part is in that of the cuts. Errors: usage: a bone that is
+/// missing, no fragment that stays; failed: the reference is not found. Same bytes for any number of threads.
 [[nodiscard]] Outcome measure_outcome(const SurgicalPlan& plan,
                                       const std::vector<std::pair<std::string, TriangleSoup>>& bones,
                                       const Image& postop, const OutcomeParams& params, const Context& context = {});
