@@ -184,7 +184,7 @@ TEST(Script, ActionsAreReadAndErrorsSayWhich) {
   };
   const Script s = with(R"({"t_s": 1, "saw": {"at_mm": [1, 2, 3], "normal": [0, 0, 2], "kerf_mm": 0.9}},
     {"t_s": 2, "split": {}}, {"t_s": 3, "move": {"piece": 1, "shift_mm": [0, 0, 10], "turn_deg": 90, "over_s": 1}},
-    {"t_s": 5, "attach": {"plate": "miniplate-4", "at_mm": [0, 0, 1], "x": [0, 1, 0], "pieces": [0, 1]}})");
+    {"t_s": 5, "attach": {"plate": "miniplate-4", "at_mm": [0, 0, 1], "x": [0, 1, 0], "fragments": [0, 1]}})");
   const auto actions = actions_of(s, 1000);
   ASSERT_EQ(actions.size(), 2u + 50u + 1u);
   EXPECT_EQ(actions[0].tick, 1000u);
@@ -194,10 +194,19 @@ TEST(Script, ActionsAreReadAndErrorsSayWhich) {
   EXPECT_NEAR(actions[51].transform().rotation.column[0].y, 1, 1e-12);
   EXPECT_NEAR(actions[26].transform().shift_mm.z, 5, 1e-12);
   EXPECT_EQ(actions.back().transform().rotation.column[0], (Vec3{0, 1, 0}));
-  for (const auto& [bad, word] : {std::pair{R"({"t_s": 1, "dance": {}})", "action 1"},
-                                  {R"({"t_s": 1, "split": {}}, {"t_s": 0, "undo": {}})", "action 2"},
-                                  {R"({"t_s": 1, "attach": {"plate": "tin", "at_mm": [0,0,0], "pieces": [0]}})", "tin"},
-                                  {R"({"t_s": 1, "saw": {}})", "at_mm"}}) {
+  // As version 0.1 called them; not both.
+  const Script old =
+      with(R"({"t_s": 5, "attach": {"plate": "miniplate-4", "at_mm": [0, 0, 1], "x": [0, 1, 0], "pieces": [0, 1]}})");
+  const auto attached = actions_of(old, 1000);
+  ASSERT_EQ(attached.size(), 1u);
+  EXPECT_EQ(attached[0].other, 1u);
+  for (const auto& [bad, word] :
+       {std::pair{R"({"t_s": 1, "dance": {}})", "action 1"},
+        {R"({"t_s": 1, "attach": {"plate": "miniplate-4", "at_mm": [0,0,0], "pieces": [0], "fragments": [0]}})",
+         "pieces"},
+        {R"({"t_s": 1, "split": {}}, {"t_s": 0, "undo": {}})", "action 2"},
+        {R"({"t_s": 1, "attach": {"plate": "tin", "at_mm": [0,0,0], "pieces": [0]}})", "tin"},
+        {R"({"t_s": 1, "saw": {}})", "at_mm"}}) {
     try {
       with(bad);
       FAIL() << bad;

@@ -194,9 +194,25 @@ void JsonFile::read(const JsonValue& object, const std::string& where, std::span
   std::vector<std::string> known;
   for (const FieldRef& f : fields) known.emplace_back(f.doc.name);
   known.insert(known.end(), besides.begin(), besides.end());
-  allow(object, where, known);
+  // A field's name of before stands for it, unless both are there.
+  const auto value_of = [&](std::string_view name) -> const JsonValue* {
+    if (const JsonValue* const value = object.find(name); value != nullptr) return value;
+    for (const OldName& n : old_field_names()) {
+      if (n.current != name || std::find(known.begin(), known.end(), n.old) != known.end()) continue;
+      if (const JsonValue* const value = object.find(n.old); value != nullptr) return value;
+    }
+    return nullptr;
+  };
+  std::vector<std::string> allowed = known;
+  for (const OldName& n : old_field_names()) {
+    const JsonValue* const value = object.find(n.old);
+    if (value != nullptr && value_of(n.current) == value &&
+        std::find(known.begin(), known.end(), n.current) != known.end())
+      allowed.emplace_back(n.old);
+  }
+  allow(object, where, allowed);
   for (const FieldRef& f : fields) {
-    if (const JsonValue* const value = object.find(f.doc.name); value != nullptr) {
+    if (const JsonValue* const value = value_of(f.doc.name); value != nullptr) {
       read(*value, where, f);
     } else if (f.doc.needed) {
       throw wrong(object, (where.empty() ? "" : where + ": ") + "\"" + std::string(f.doc.name) + "\" is missing: " +
