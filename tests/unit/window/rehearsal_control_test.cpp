@@ -603,6 +603,7 @@ TEST(RehearsalControl, ALeftHandHasTheSecondOneAtItsRight) {
 TEST(RehearsalControl, ASessionKeepsItsMessagesInEnglishInAnyLanguage) {
   SessionRunner session_runner;
   RehearsalControl control = session_runner.control();
+  control.look_from(kFromAbove);
   std::vector<std::string> shown;
   {
     const InLanguage german(Language::german);

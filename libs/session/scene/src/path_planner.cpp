@@ -231,6 +231,8 @@ double PathPlanner::margin_at(const HandPose& pose) const {
 }
 
 HandPose PathPlanner::waiting(Vec3 eye, Vec3 axis) const {
+  // Nobody has looked yet: there is no way that leads out of bone along no direction.
+  if (!(length(eye) > 0.5)) eye = {0, 0, 1};
   HandPose pose{centre_mm_ + eye * (radius_mm_ + kOutsideMm), axis};
   while (!free(pose, kFarMm)) pose.at_mm += eye * kFarMm;
   return pose;
