@@ -110,6 +110,9 @@ void RehearsalWindow::open() {
     keyboard_.on(key, static_cast<Keyboard::Event>(action), modifiers);
   };
   shell_.on_letter = [this](char32_t letter) { main_view_.letter(letter); };
+  double x = 0, y = 0;  // where it is before it moves
+  glfwGetCursorPos(shell_.window(), &x, &y);
+  trail_.move(x, y, 0);
   shell_.on_pointer = [this](double x, double y, int modifiers) { trail_.move(x, y, modifiers); };
   shell_.on_button = [this](int which, bool down, int modifiers) { trail_.button(which, down, modifiers); };
   shell_.on_wheel = [this](double steps, int modifiers) { trail_.wheel(steps, modifiers); };
