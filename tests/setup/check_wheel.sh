@@ -17,7 +17,7 @@ chmod 755 "$work"
 for wheel in "$wheels"/*.whl; do
   mb=$(($(stat -c %s "$wheel") / 1000000))
   echo "$(basename "$wheel"): $mb MB"
-  [ "$mb" -le 80 ] || { echo "more than 80 MB"; exit 1; }
+  [ "$mb" -le 100 ] || { echo "more than PyPI takes"; exit 1; }
 done
 cat >"$work/try.sh" <<'TRY'
 set -eu
