@@ -14,7 +14,7 @@ import argparse, base64, hashlib, os, pathlib, re, shutil, subprocess, sys, temp
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # The machine's own: they belong to its loader and its drivers, which a second copy would get in the way of.
 MACHINES_OWN = re.compile(
-    r"^(ld-linux.*|lib(c|m|dl|pthread|rt|util|resolv|nsl|anl|mvec|BrokenLocale)\.so\.\d+"
+    r"^(ld-linux.*|lib(c|m|dl|pthread|rt|util|resolv|anl|mvec|BrokenLocale)\.so\.\d+"
     r"|libstdc\+\+\.so\.6|libgcc_s\.so\.1|linux-vdso.*)$"
 )
 # What the licence of the whole does not allow to come along (docs/how-to/packages.md): Debian builds these under the GPL.

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Wheels of apps/packaging/wheel.sh in fresh roots of distributions that hold Python and no library of ours, as an ordinary user: the program and the
+# Wheels of apps/packaging/wheel.sh in fresh roots of distributions that hold Python, Mesa and no library of ours, as an ordinary user: the program and the
 # module do there what they do here, to the byte. Wants root, mirrors of Debian and PyPI, and mmdebstrap.
 # usage: check_wheel.sh WHEELS [SUITE...]      SUITE as Debian names it; bookworm (Python 3.11) and trixie (3.13) where none is given
 set -euo pipefail
@@ -29,7 +29,7 @@ TRY
 (mkdir "$work/here" && cd "$work/here" && PATH=$(dirname "$osteo"):$PATH sh "$work/try.sh" "$root/pipelines" >/dev/null)
 for suite; do
   fresh=$work/$suite
-  mmdebstrap --quiet --variant=apt --aptopt='APT::Install-Recommends "false"' --include=python3-venv "$suite" "$fresh"
+  mmdebstrap --quiet --variant=apt --aptopt='APT::Install-Recommends "false"' --include=passwd,python3-venv,libegl1,libgl1-mesa-dri "$suite" "$fresh"
   mount -t proc proc "$fresh/proc"
   inside() { chroot "$fresh" env -i PATH=/home/someone/env/bin:/usr/sbin:/usr/bin:/sbin:/bin HOME=/tmp LC_ALL=C.UTF-8 "$@"; }
   as_user() { inside su -s /bin/sh someone -c "export PATH=/home/someone/env/bin:\$PATH; cd ~ && $*"; }
@@ -61,9 +61,9 @@ assert osteo.Session(sys.argv[2]).ticks["force_n"].any()
 with osteo.Rehearsal(sys.argv[1]) as r:
     assert len(r.run(osteo.goals(np.zeros((10, 3)), tool="cutting 4 mm"))) == 10
 PYTHON
-  # Uninstalled, nothing stays.
+  # Uninstalled, no file stays (pip leaves empty folders of share).
   as_user env/bin/pip uninstall -q -y osteotome
-  left=$(cd "$fresh/home/someone/env" && find . -ipath '*osteo*' | head)
+  left=$(cd "$fresh/home/someone/env" && find . -ipath '*osteo*' -type f | head)
   [ -z "$left" ] || { echo "left behind: $left"; exit 1; }
   umount "$fresh/proc"
   echo "$suite, Python $version: installed, run as a user, the same bytes, removed"
