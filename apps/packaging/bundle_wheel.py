@@ -11,6 +11,9 @@ symbols. Letters for reports, DICOM's dictionary, licences and an SPDX list of t
 
 import argparse, base64, hashlib, os, pathlib, re, shutil, subprocess, sys, tempfile, zipfile
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+from sbom import owners
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # The machine's own: they belong to its loader and its drivers, which a second copy would get in the way of.
 MACHINES_OWN = re.compile(
@@ -83,19 +86,6 @@ def bundle(tree, elves):
     return sorted(libs.iterdir()), sorted(set(paths.values()))
 
 
-def packages_of(paths):
-    """Debian packages that the files belong to."""
-    names = set()
-    for path in paths:
-        real = os.path.realpath(path)
-        for known in (real, re.sub(r"^/usr", "", real)):
-            said = subprocess.run(["dpkg", "-S", known], capture_output=True, text=True).stdout
-            if said:
-                names.add(said.split(":")[0])
-                break
-    return sorted(names)
-
-
 def write_record(tree, info):
     rows = []
     for path in sorted(p for p in tree.rglob("*") if p.is_file()):
@@ -146,7 +136,7 @@ def main():
         licences = tree / info / "licenses"
         licences.mkdir(exist_ok=True)
         shutil.copy(ROOT / "LICENSE", licences)
-        for package in packages_of([*sources, *fonts, dictionary[-1]]):
+        for package in sorted(owners(map(str, [*sources, *fonts, dictionary[-1]]))[0]):
             shutil.copy(f"/usr/share/doc/{package}/copyright", licences / f"{package}.copyright")
         (tree / info / "sboms").mkdir()
         bill = [sys.executable, ROOT / "apps/packaging/sbom.py", tree / info / "sboms/osteotome.spdx.json"]

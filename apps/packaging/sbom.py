@@ -13,12 +13,16 @@ OPTIONS = ("OSTEO_CGAL", "OSTEO_TETGEN", "OSTEO_CERES", "OSTEO_MOVIE", "OSTEO_WI
 SAME_SOURCE = {"suitesparse": "libceres-dev"}
 
 
+def table(path):
+    """(number of the line, its fields) of each row that is no comment."""
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        if line and not line.startswith("#"):
+            yield number, [f.strip() for f in line.split("|")]
+
+
 def rows(path=root / "apps/packaging/licences.txt"):
     out = []
-    for number, line in enumerate(path.read_text().splitlines(), 1):
-        if not line or line.startswith("#"):
-            continue
-        fields = [f.strip() for f in line.split("|")]
+    for number, fields in table(path):
         if len(fields) != 4 or not all(fields):
             sys.exit(f"{path.name}:{number}: a row is: package | licence | when | what for")
         if fields[2] not in OPTIONS + ("always", "runtime", "build", "test"):
@@ -56,6 +60,24 @@ def dpkg(*names):
     return out
 
 
+def owners(paths):
+    """Debian packages that files belong to, and the files that belong to none."""
+    # Debian 12 knows a library below /lib or below /usr/lib. All are asked for at once: dpkg reads its lists each time.
+    names = {
+        path: {path, os.path.realpath(path), re.sub(r"^/usr", "", os.path.realpath(path)), "/usr" + path}
+        for path in paths
+    }
+    owner = {}
+    for line in run("dpkg", "-S", *sorted(set().union(*names.values()))).stdout.splitlines():
+        package, _, path = line.rpartition(": ")
+        owner[path] = package.split(":")[0]
+    packages, unowned = set(), set()
+    for path, known in names.items():
+        found = sorted(owner[n] for n in known if n in owner)
+        packages.add(found[0]) if found else unowned.add(path)
+    return packages, unowned
+
+
 def loaded_packages(program):
     """Debian packages of the shared libraries that the loader gives a program, and the names of those that belong to none."""
     said = run("ldd", str(program))
@@ -67,20 +89,8 @@ def loaded_packages(program):
             strange.add(line.split()[0])
         elif m := re.search(r"=> (/\S+)", line):
             paths.add(m[1])
-    # Debian 12 knows a library below /lib or below /usr/lib. All are asked for at once: dpkg reads its lists each time.
-    names = {
-        path: {path, os.path.realpath(path), re.sub(r"^/usr", "", os.path.realpath(path)), "/usr" + path}
-        for path in paths
-    }
-    owner = {}
-    for line in run("dpkg", "-S", *sorted(set().union(*names.values()))).stdout.splitlines():
-        package, _, path = line.rpartition(": ")
-        owner[path] = package.split(":")[0]
-    packages = set()
-    for path, known in names.items():
-        owners = sorted(owner[n] for n in known if n in owner)
-        packages.add(owners[0]) if owners else strange.add(os.path.basename(path))
-    return packages, strange
+    packages, unowned = owners(paths)
+    return packages, strange | {os.path.basename(p) for p in unowned}
 
 
 def component(name, version, licence, comment, supplier="Organization: Debian"):

@@ -9,7 +9,7 @@ A vulnerability that neither names is not in the file, and a part of which neith
 import argparse, gzip, json, pathlib, re, sys, urllib.parse, uuid
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-from sbom import created, root, run
+from sbom import created, root, run, table
 
 STATES = ("in_triage", "exploitable")
 JUSTIFICATIONS = ("code_not_present", "code_not_reachable", "protected_by_mitigating_control")
@@ -18,10 +18,7 @@ CVE = r"CVE-\d{4}-\d{4,}"
 
 def assessments(path=root / "apps/packaging/assessments.txt"):
     out = []
-    for number, line in enumerate(path.read_text().splitlines(), 1):
-        if not line or line.startswith("#"):
-            continue
-        fields = [f.strip() for f in line.split("|")]
+    for number, fields in table(path):
         state, _, justification = fields[2].partition(":") if len(fields) == 5 else ("", "", "")
         evidence = (
             re.fullmatch(r"(no library|no symbol|no package|test) (.+)|-", fields[3]) if len(fields) == 5 else None

@@ -60,21 +60,7 @@ as_user "osteo calibrate-camera pages" >"$work/said" 2>&1 && { echo "a camera ca
 grep -q '10 are needed' "$work/said" || { cat "$work/said"; exit 1; }
 if [ -n "$(deb python3-osteo)" ]; then
   install $(deb python3-osteo)
-  # Computes by itself, opens what the program made, and draws without a display.
-  as_user "python3 - case session" <<'PYTHON'
-import sys
-import numpy as np
-import osteo
-
-ct, labels = osteo.phantom(region="temporal", spacing_mm=2.0)
-surface = osteo.surface(osteo.resample(ct, osteo.threshold(ct, lower=500), spacing_mm=2.0, lower=500)[0])
-assert len(surface.triangles) > 1000, len(surface.triangles)
-assert osteo.Session(sys.argv[2]).ticks["force_n"].any()
-with osteo.Rehearsal(sys.argv[1]) as r:
-    assert len(r.run(osteo.goals(np.zeros((10, 3)), tool="cutting 4 mm"))) == 10
-assert osteo.snapshot(surface).max() > 0
-print("python3-osteo:", len(surface.triangles), "triangles")
-PYTHON
+  as_user "python3 - case session" <"$root/tests/setup/try_module.py"
   [ -s "$work/root/usr/share/doc/python3-osteo/examples/drilled_hole.py" ] || { echo "no examples for Python"; exit 1; }
 fi
 if [ -n "$(deb osteo-full)" ]; then

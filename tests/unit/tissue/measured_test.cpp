@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "error_of.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "scanned.h"
@@ -14,19 +15,9 @@ namespace osteo {
 namespace {
 
 using test::block;
+using test::error_of;
 using test::Scan;
 using test::scanned;
-
-// What an error says, or nothing.
-template <class F>
-std::string said(F&& f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return {};
-}
 
 // A post, 8 x 8 x 16 mm, 1000 kPa below and 50 kPa above or all alike, pulled and bent; finite elements on a mesh half
 // again as fine.
@@ -290,7 +281,7 @@ TEST(Measured, ErrorsSayWhat) {
   const auto says = [&](const auto& change) {
     MeasuredCase c = good;
     change(c);
-    return said([&] { static_cast<void>(calibrate_measured(model, surface, std::span(&c, 1))); });
+    return error_of([&] { static_cast<void>(calibrate_measured(model, surface, std::span(&c, 1))); });
   };
   const auto scaled = [](double by, Vec3 shift) {
     return [=](MeasuredCase& c) {
@@ -324,7 +315,7 @@ TEST(Measured, Files) {
   EXPECT_EQ(cloud.noise_mm[0], 0.5);
   const MeasuredPoints markers = read_measured_csv("x_mm,y_mm,z_mm,x0_mm,y0_mm,z0_mm\n1,2,3,4,5,6\n", "m.csv");
   EXPECT_EQ(markers.rest_mm.at(0).y, 5);
-  const auto wrong = [](const char* csv) { return said([&] { static_cast<void>(read_measured_csv(csv, "w.csv")); }); };
+  const auto wrong = [](const char* csv) { return error_of([&] { static_cast<void>(read_measured_csv(csv, "w.csv")); }); };
   EXPECT_NE(wrong("x_mm,y_mm,z_mm\n1,2,3\n1,nan,3\n").find("line 3: y_mm is 'nan'"), std::string::npos);
   EXPECT_NE(wrong("x_mm,y_mm\n1,2\n").find("no column z_mm"), std::string::npos);
   EXPECT_NE(wrong("x_mm,y_mm,z_mm,x0_mm\n1,2,3,4\n").find("no column y0_mm"), std::string::npos);
@@ -356,7 +347,7 @@ TEST(Measured, Files) {
   EXPECT_EQ(read_measured(folder.path() / "pull.csv", loads).size(), 1U);
   write("push.csv", "x_mm,y_mm,z_mm\n1,2,3\n");
   EXPECT_NE(
-      said([&] { static_cast<void>(read_measured(folder.path(), loads)); }).find("'push.csv' is called like no load"),
+      error_of([&] { static_cast<void>(read_measured(folder.path(), loads)); }).find("'push.csv' is called like no load"),
       std::string::npos);
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "osteo/core/base/json_document.h"
@@ -195,24 +196,20 @@ void JsonFile::read(const JsonValue& object, const std::string& where, std::span
   for (const FieldRef& f : fields) known.emplace_back(f.doc.name);
   known.insert(known.end(), besides.begin(), besides.end());
   // A field's name of before stands for it, unless both are there.
-  const auto value_of = [&](std::string_view name) -> const JsonValue* {
-    if (const JsonValue* const value = object.find(name); value != nullptr) return value;
-    for (const OldName& n : old_field_names()) {
-      if (n.current != name || std::find(known.begin(), known.end(), n.old) != known.end()) continue;
-      if (const JsonValue* const value = object.find(n.old); value != nullptr) return value;
-    }
-    return nullptr;
-  };
+  std::map<const FieldRef*, const JsonValue*> by_old_name;
   std::vector<std::string> allowed = known;
-  for (const OldName& n : old_field_names()) {
-    const JsonValue* const value = object.find(n.old);
-    if (value != nullptr && value_of(n.current) == value &&
-        std::find(known.begin(), known.end(), n.current) != known.end())
-      allowed.emplace_back(n.old);
+  for (const JsonMember& m : object.members) {
+    if (std::find(known.begin(), known.end(), m.key) != known.end()) continue;
+    const FieldRef* const field = find_field(fields, m.key);
+    if (field == nullptr || object.find(field->doc.name) != nullptr) continue;
+    by_old_name.emplace(field, &m.value);
+    allowed.push_back(m.key);
   }
   allow(object, where, allowed);
   for (const FieldRef& f : fields) {
-    if (const JsonValue* const value = value_of(f.doc.name); value != nullptr) {
+    const auto old = by_old_name.find(&f);
+    const JsonValue* const value = old != by_old_name.end() ? old->second : object.find(f.doc.name);
+    if (value != nullptr) {
       read(*value, where, f);
     } else if (f.doc.needed) {
       throw wrong(object, (where.empty() ? "" : where + ": ") + "\"" + std::string(f.doc.name) + "\" is missing: " +
