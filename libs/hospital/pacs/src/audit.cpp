@@ -2,9 +2,11 @@
 
 #include <curl/curl.h>
 #include <fcntl.h>
+#include <linux/sockios.h>
 #include <poll.h>
 #include <pwd.h>
 #include <sys/file.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -22,6 +24,7 @@
 #include <ctime>
 #include <memory>
 #include <set>
+#include <thread>
 
 #include "node.h"
 #include "osteo/core/base/json.h"
@@ -289,24 +292,39 @@ class Wire {
     for (std::array<char, 512> some{};;) {
       const auto left =
           std::chrono::duration_cast<std::chrono::milliseconds>(until - std::chrono::steady_clock::now()).count();
-      if (left <= 0 || !ready(POLLIN, static_cast<int>(left))) return;
-      int error = 0;
-      socklen_t size = sizeof error;
-      if (::getsockopt(socket_, SOL_SOCKET, SO_ERROR, &error, &size) == 0 && error != 0)
-        throw failed(s_.to + " has hung up: " + std::strerror(error));
+      if (left <= 0 || !ready(POLLIN, static_cast<int>(left))) return acknowledged();
+      throw_reset();
       std::size_t n = 0;
       const CURLcode done = ::curl_easy_recv(curl_.get(), some.data(), some.size(), &n);
       if (done == CURLE_AGAIN) continue;
       check(done);
       if (n > 0) continue;
       if (tls) throw failed(s_.to + " has hung up");
-      return;  // it has read all of it, and closes as we did
+      return acknowledged();  // it closes as we did; whether it has read all of it, its machine says
     }
   }
 
  private:
   void check(CURLcode done) const {
     if (done != CURLE_OK) throw failed(s_.to + ": " + ::curl_easy_strerror(done));
+  }
+  void throw_reset() const {
+    int error = 0;
+    socklen_t size = sizeof error;
+    if (::getsockopt(socket_, SOL_SOCKET, SO_ERROR, &error, &size) == 0 && error != 0)
+      throw failed(s_.to + " has hung up: " + std::strerror(error));
+  }
+  // Who closes before our message is there sends its end first and the reset after it, on a busy machine much later.
+  // Until then our message is not acknowledged; who has read it all has acknowledged it before or with its end.
+  void acknowledged() const {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(s_.timeout_s);
+    for (int unread = 0;; std::this_thread::sleep_for(std::chrono::milliseconds(1))) {
+      const bool asked = ::ioctl(socket_, SIOCOUTQ, &unread) == 0;
+      throw_reset();
+      if (!asked || unread == 0) return;
+      if (std::chrono::steady_clock::now() >= until)
+        throw failed(s_.to + " has not taken " + std::to_string(unread) + " bytes of it");
+    }
   }
   [[nodiscard]] bool ready(short what, int ms) const {
     pollfd p{static_cast<int>(socket_), what, 0};
