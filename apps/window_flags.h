@@ -167,7 +167,7 @@ struct WindowFlags {
           p.scan);
     visit({"procedure",
            "procedure to follow, as JSON (pipelines/procedures): its regions are outlined in bone and cuts, the page "
-           "at the end has its findings (empty: none)"},
+           "at the end has its findings, and no alarm is raised for what it opens (empty: none)"},
           p.procedure);
     visit({"sound", "play the sound of drilling (a model, docs/validation/sound.md)"}, p.sound);
     visit({"volume", "volume of the sound; long loud parts are held below the level that is safe with headphones", "",

@@ -91,6 +91,7 @@ SessionRunner::SessionRunner(const WindowFlags& flags, const Case& the_case, con
   options_.haptics.params.effects.held_shaft = true;  // a hand meets it; settings may say otherwise
   apply_haptic_settings(case_.folder, flags.settings, options_.haptics);
   if (!flags.playback.empty()) learn(flags);
+  if (procedure_ != nullptr) options_.haptics.opened = procedure_->opened();
   if (!flags.review.empty()) past_.emplace(flags.review, case_.folder);
   if (flags.playback.empty() && !flags.playback_as.empty())
     throw Error(ExitCode::usage, "--playback-as has no effect without --playback", "leave it out");
@@ -232,6 +233,10 @@ HandGoal SessionRunner::begin_joined(const HandView& view) {
   const auto [header, past] = live_.wait(io_.context);
   if (options_.haptics.structures != header.haptics.structures)
     throw Error(ExitCode::usage, "the host's case has other critical structures", "both need the same case, unchanged");
+  if (options_.haptics.opened != header.haptics.opened) {  // whom nobody warns of is the host's to say
+    options_.haptics.opened = header.haptics.opened;
+    options_.anatomy = anatomy_of(case_, options_.haptics, io_.context);
+  }
   World world = world_of_past(past, case_, options_.anatomy);
   const HandPose pose =
       PathPlanner(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);

@@ -9,6 +9,7 @@
 #include "audit_case.h"
 #include "commands/rehearse.h"
 #include "osteo/app/cli/report.h"
+#include "osteo/assessment/evidence/procedure.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
@@ -150,6 +151,7 @@ class HeadlessSession {
     options_.haptics.params.contact.method = p_.contact;
     options_.haptics.device = SpringHand::traits();
     apply_haptic_settings(case_.folder, p_.settings, options_.haptics);
+    if (!p_.procedure.empty()) options_.haptics.opened = load_procedure(p_.procedure).opened();
     options_.anatomy = anatomy_of(case_, options_.haptics, io_.context);
   }
 

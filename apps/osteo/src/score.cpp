@@ -65,11 +65,13 @@ Reference load_sessions(const fs::path& folder, const SessionFolder& mine, const
 
 namespace {
 
-void add_heat(const SessionReader& session, World begin, const Anatomy& anatomy, Score& score, const Context& context) {
-  HeatReader heat(begin, anatomy.structures.get(), session.header().rate_hz);
+// `anatomy`: as it was recorded with; `structures`: as they are scored.
+void add_heat(const SessionReader& session, World begin, const Anatomy& anatomy, const StructureMap* structures,
+              Score& score, const Context& context) {
+  HeatReader heat(begin, structures, session.header().rate_hz);
   Reader* const readers[] = {&heat};
   const ReplayResult again = replay(session, std::move(begin), anatomy, context, readers);
-  for (Measured& m : heat_values(heat, anatomy.structures.get())) score.values.push_back(std::move(m));
+  for (Measured& m : heat_values(heat, structures)) score.values.push_back(std::move(m));
   if (!again.identical)
     score.words.push_back("run again the replay differs from what was recorded (" + again.difference +
                           "): neither may its heat");
@@ -91,6 +93,7 @@ Scored score_folder(const fs::path& session_folder, const ScoreAsked& asked, con
   HapticSetup setup;
   setup.hardness = false;
   if (asked.heat) setup = session.header().haptics;
+  setup.opened = asked.procedure ? asked.procedure->opened() : session.header().haptics.opened;
   const Anatomy anatomy = anatomy_of(the_case, setup, context);
   World begin = world_at_begin(folder, the_case, anatomy, context);
   std::optional<World> again;
@@ -108,7 +111,14 @@ Scored score_folder(const fs::path& session_folder, const ScoreAsked& asked, con
   score.source.stream = hash_path(folder.stream()).substr(0, 16);
   score.source.scored_by = program_version();
   score.source.guided = !folder.guided.empty();
-  if (again) add_heat(session, std::move(*again), anatomy, score, context.sub(0.6, 1));
+  if (again) {
+    Anatomy recorded = anatomy;
+    if (setup.opened != session.header().haptics.opened) {
+      HapticSetup as_recorded = session.header().haptics;
+      recorded = anatomy_of(the_case, as_recorded, context);
+    }
+    add_heat(session, std::move(*again), recorded, anatomy.structures.get(), score, context.sub(0.6, 1));
+  }
   if (session.header().haptics.structures != setup.structures)
     score.words.push_back(
         "the case's structures are not those that the session watched: they are measured as the case has them now");

@@ -240,6 +240,25 @@ TEST(StructureMap, EachStructureHasADistanceOfItsOwn) {
   }
 }
 
+// Of one that is opened distances are known as before; the nearest at risk is the other, also from within the opened.
+TEST(StructureMap, WhatIsOpenedIsNotAtRisk) {
+  const std::vector<std::string> names{"nerve", "not there"};
+  const StructureMap usual(two_balls(0.25)), map(two_balls(0.25), 8, {}, names);
+  EXPECT_FALSE(map.opened(0));
+  EXPECT_TRUE(map.opened(1));
+  EXPECT_EQ(map.hash(), usual.hash());
+  for (const Vec3 x : {Vec3{6, 0, 0}, Vec3{1, 0, 0}, Vec3{-1, 2, 0}, Vec3{20, 0, 0}}) {
+    std::array<double, 2> each{}, as_usual{};
+    const auto nearest = map.clearance({0, 0, 1, 1}, x, {0, 0, 1}, each);
+    static_cast<void>(usual.clearance({0, 0, 1, 1}, x, {0, 0, 1}, as_usual));
+    EXPECT_EQ(each, as_usual);
+    EXPECT_EQ(nearest.distance_mm, each[0]);
+    EXPECT_EQ(nearest.structure, each[0] < 8 ? 1 : 0);
+    EXPECT_EQ(map.at(x).structure, usual.at(x).structure);
+    EXPECT_EQ(map.at_risk(x).distance_mm, map.distance_mm(0, x));
+  }
+}
+
 TEST(StructureMap, SameForAnyNumberOfThreads) {
   Context one, three;
   one.threads = 1;

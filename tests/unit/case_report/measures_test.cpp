@@ -128,10 +128,10 @@ TEST(ThinBone, OfAShell) {
 }
 
 TEST(Words, DigitsThatMeanSomething) {
-  EXPECT_EQ(volume_text(573217.8), "573 cm3");
-  EXPECT_EQ(volume_text(12345), "12.3 cm3");
-  EXPECT_EQ(volume_text(1234), "1.23 cm3");
-  EXPECT_EQ(volume_text(412.7), "413 mm3");
+  EXPECT_EQ(volume_text(573217.8), "573 cm³");
+  EXPECT_EQ(volume_text(12345), "12.3 cm³");
+  EXPECT_EQ(volume_text(1234), "1.23 cm³");
+  EXPECT_EQ(volume_text(412.7), "413 mm³");
   EXPECT_EQ(number_text(0.48828119999999997, 2), "0.49");
 }
 

@@ -196,6 +196,23 @@ TEST(VolumeFileVerdict, SaysWhatTheFileLeavesOpen) {
   EXPECT_FALSE(import_ct(file, given).verdict.has(code::axes_not_stated));
 }
 
+// Of a head in centimetres, or in metres, that says millimetres; the other way round; and what only looks so.
+TEST(VolumeFileVerdict, LengthsOfNoPatientAreTold) {
+  const fs::path file = scratch("size") / "ct.nrrd";
+  const Image ct = phantom(PhantomRegion::temporal, 4);
+  for (const auto& [scale, told] :
+       std::vector<std::pair<double, bool>>{{0.1, true}, {0.001, true}, {1, false}, {0.3, false}, {100, true}}) {
+    Image other = ct;
+    other.frame.spacing_mm = ct.frame.spacing_mm * scale * (scale == 0.1 ? 0.15 : 1);
+    save_image(other, file);
+    const Verdict v = import_ct(file, {}).verdict;
+    EXPECT_EQ(v.has(code::size_implausible), told) << scale;
+    if (!told) continue;
+    EXPECT_EQ(v.status(), "repaired");
+    EXPECT_EQ(finding(v, code::size_implausible).text.find("micro-CT") != std::string::npos, scale < 1) << scale;
+  }
+}
+
 TEST(VolumeFileVerdict, APairOfHeaderAndVoxelsIsRefusedForWhatItIs) {
   const fs::path folder = scratch("pair");
   write_file(folder / "a.hdr", std::string("\x5c\x01\0\0", 4) + std::string(344, '\0'));

@@ -131,7 +131,7 @@ TEST(Findings, ItemsSayWhatWasAsked) {
   pieces.word = "the bone is gone";
   s.items = {violated, shown, pieces};
   const Findings f = findings_of(s, nullptr, &p);
-  EXPECT_EQ(f.find("item-sinus-intact")->text, "Sinus intact: not passed, 0.5 mm³ of it is gone.");
+  EXPECT_EQ(f.find("item-sinus-intact")->text, "Sinus intact: not passed, 0.5 mm³ of bone within it is gone.");
   EXPECT_EQ(f.find("item-sinus-intact")->severity, FindingSeverity::serious);  // it was never to be touched
   EXPECT_EQ(*f.find("item-sinus-intact")->at_mm, (Vec3{0, 0, 1}));
   EXPECT_EQ(f.find("item-sinus-shown")->text, "Sinus shown: passed, 62 % of it is laid open, at least 40 % is asked.");
@@ -143,9 +143,10 @@ TEST(Findings, ItemsSayWhatWasAsked) {
   // Not passed though nothing of it is gone: the burr was in it.
   s.items[0].value = 0;
   EXPECT_EQ(findings_of(s, nullptr, &p).find("item-sinus-intact")->text,
-            "Sinus intact: not passed, none of it is gone, but a running burr or saw reached into it.");
+            "Sinus intact: not passed, no bone within it is gone, but a running burr or saw reached into it.");
   s.items[0].pass = true;
-  EXPECT_EQ(findings_of(s, nullptr, &p).find("item-sinus-intact")->text, "Sinus intact: passed, none of it is gone.");
+  EXPECT_EQ(findings_of(s, nullptr, &p).find("item-sinus-intact")->text,
+            "Sinus intact: passed, no bone within it is gone.");
 }
 
 TEST(Findings, ForceWaterAndTime) {

@@ -282,9 +282,8 @@ TEST(Operation, TheBorderOfARegionIsNotFelt) {
   EXPECT_LT(sideways, 0.03 * most);
 }
 
-// Two structures in the bar: the strokes go through one and near the other. What the summary tells follows from the
-// stream alone.
-TEST(Rehearsal, TellsOfEveryStructureAndAReplayAgrees) {
+// Two structures in the bar: the strokes go through one, called nerve, and near the other.
+Labels two_in_the_bar() {
   Labels labels;
   labels.frame.dims = {48, 40, 48};
   labels.frame.spacing_mm = {0.25, 0.25, 0.25};
@@ -299,8 +298,13 @@ TEST(Rehearsal, TellsOfEveryStructureAndAReplayAgrees) {
       }
   labels.voxels = v;
   labels.structures = {{2, "nerve", {}}};
+  return labels;
+}
+
+// What the summary tells follows from the stream alone.
+TEST(Rehearsal, TellsOfEveryStructureAndAReplayAgrees) {
   Anatomy anatomy;
-  anatomy.structures = std::make_shared<const StructureMap>(labels);
+  anatomy.structures = std::make_shared<const StructureMap>(two_in_the_bar());
   const test::ScratchFolder scratch;
   RehearsalOptions options;
   options.haptics.device = SpringHand::traits();
@@ -335,6 +339,40 @@ TEST(Rehearsal, TellsOfEveryStructureAndAReplayAgrees) {
     EXPECT_EQ(again.structures.at(value).ticks_touched, e.ticks_touched);
     EXPECT_EQ(again.structures.at(value).ticks_injured, e.ticks_injured);
   }
+}
+
+// The same strokes in an operation that opens what they go through: nobody is warned of it, of the other as before.
+TEST(Rehearsal, WhatTheOperationOpensIsNotAtRisk) {
+  const test::ScratchFolder scratch;
+  const World world(test::bar(0.5, 0.2));
+  const auto rehearsed = [&](const std::vector<std::string>& opened, const std::string& file) {
+    RehearsalOptions options;
+    options.haptics.device = SpringHand::traits();
+    options.anatomy.structures = std::make_shared<const StructureMap>(two_in_the_bar(), 8, Context(), opened);
+    options.haptics.structures = options.anatomy.structures->hash();
+    options.haptics.opened = opened;
+    options.session_file = scratch / file;
+    Rehearsal rehearsal(world.copy(), std::make_unique<ScriptedDevice>(strokes(0, 2), 1000), options, {});
+    RehearsalSummary s = rehearsal.run_to_end({});
+    const ReplayResult again = replay(SessionReader(options.session_file), world.copy(), options.anatomy, {});
+    EXPECT_TRUE(again.identical) << again.difference;
+    EXPECT_EQ(read_session(options.session_file).header.haptics.opened, opened);
+    return s;
+  };
+  const RehearsalSummary usual = rehearsed({}, "usual.oss"), s = rehearsed({"nerve", "no such cells"}, "opened.oss");
+  EXPECT_EQ(s.bone_hash, usual.bone_hash) << "only who is warned differs";
+  EXPECT_FALSE(usual.structure_cuts.empty());
+  EXPECT_TRUE(s.structure_cuts.empty());
+  ASSERT_EQ(s.structures.size(), 1u);
+  EXPECT_EQ(s.structures.at(9).least_clearance_mm, usual.structures.at(9).least_clearance_mm);
+  for (const TickRecord& t : read_session(scratch / "opened.oss").ticks) {
+    ASSERT_EQ(t.flags & (kStructureTouched | kStructureInjured), 0u);
+    ASSERT_NE(t.structure, 2u);
+  }
+  // As another operation would see it a session cannot be run again.
+  Anatomy other;
+  other.structures = std::make_shared<const StructureMap>(two_in_the_bar());
+  EXPECT_THROW(static_cast<void>(replay(SessionReader(scratch / "opened.oss"), world.copy(), other, {})), Error);
 }
 
 TEST(Operation, APlateRestsOnBone) {

@@ -96,7 +96,7 @@ void report_warmth(StateFacts& f, const WarmthNow& warmth, const TickRecord& tic
 StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const WarmthNow* warmth) {
   StateFacts f = state_of_tick(tick, rehearsal.structures(), rehearsal.rate_hz());
   if (warmth != nullptr) report_warmth(f, *warmth, tick, rehearsal.structures());
-  f.removed = text_of("%.1f mm3", rehearsal.removed_mm3());
+  f.removed = text_of("%.1f mm³", rehearsal.removed_mm3() + rehearsal.sawn_mm3());
   if (rehearsal.soft() != nullptr)
     f.removed = filled(tr("{bone}, tissue {tissue}"),
                        {{"bone", f.removed}, {"tissue", shown_number(rehearsal.tissue_mm3(), 1)}});

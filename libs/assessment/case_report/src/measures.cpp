@@ -260,7 +260,7 @@ Plausibility plausibility_of(const StructureMeasure& m) {
     if (u.to_mm > 0) add(p.expected, range(tr("{from} to {to} mm long"), u.from_mm, u.to_mm));
     if (u.to_mm3 > 0)
       add(p.expected, u.to_mm3 >= 1000 ? range(tr("{from} to {to} mL"), u.from_mm3 / 1000, u.to_mm3 / 1000)
-                                       : range(tr("{from} to {to} mm3"), u.from_mm3, u.to_mm3));
+                                       : range(tr("{from} to {to} mm³"), u.from_mm3, u.to_mm3));
     if (u.parts > 0)
       add(p.expected, u.parts == 1 ? std::string(tr("one piece"))
                                    : filled(tr("up to {n} fragments"), {{"n", std::to_string(u.parts)}}));

@@ -85,10 +85,10 @@ std::string number_text(double value, int decimals) {
 }
 
 std::string volume_text(double mm3) {
-  if (std::abs(mm3) < 10) return number_text(mm3, 1) + " mm3";
-  if (std::abs(mm3) < 1000) return number_text(mm3, 0) + " mm3";
+  if (std::abs(mm3) < 10) return number_text(mm3, 1) + " mm³";
+  if (std::abs(mm3) < 1000) return number_text(mm3, 0) + " mm³";
   const double cm3 = mm3 / 1000;
-  return number_text(cm3, cm3 < 10 ? 2 : cm3 < 100 ? 1 : 0) + " cm3";
+  return number_text(cm3, cm3 < 10 ? 2 : cm3 < 100 ? 1 : 0) + " cm³";
 }
 
 sheet::Band verdict_band(const CaseFacts& f) {
@@ -299,7 +299,7 @@ Rows removed_rows(const CaseFacts& f) {
                      : tr("{n} of {all} dropped"),
         {{"n", number_text(dropped, 0)}, {"all", number_text(*found, 0)}, {"volume", volume_text(mm3.value_or(0))}});
     const std::string least = f.param("threshold", "min_volume_mm3"), largest = f.param("threshold", "keep_largest");
-    if (!least.empty()) said += "; " + filled(tr("each below {mm3} mm3"), {{"mm3", least}});
+    if (!least.empty()) said += "; " + filled(tr("each below {mm3} mm³"), {{"mm3", least}});
     if (!largest.empty() && largest != "0") said += ", " + filled(tr("or not among the {n} largest"), {{"n", largest}});
     rows.emplace_back(tr("Small components"), said);
   }

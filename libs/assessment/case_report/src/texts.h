@@ -28,7 +28,7 @@ class CaseFacts {
   Json manifest_, verdict_;
 };
 
-/// "574 cm3", "12.3 cm3", "0.41 cm3"; below 0.1 cm3 "83 mm3".
+/// "574 cm³", "12.3 cm³", "1.41 cm³"; below 1 cm³ "83 mm³".
 [[nodiscard]] std::string volume_text(double mm3);
 /// With so many digits that mean something: "0.45", "1", "12.5".
 [[nodiscard]] std::string number_text(double value, int decimals);

@@ -79,8 +79,7 @@ class Finder {
     return all;
   }
   [[nodiscard]] bool to_be_opened(const std::string& structure) const {
-    const ProcedureStructure* const p = procedure_ == nullptr ? nullptr : procedure_->find(structure);
-    return p != nullptr && p->role == ProcedureRole::enter;
+    return procedure_ != nullptr && procedure_->enters(structure);
   }
   ScoreFinding& add(std::string kind, const std::string& of, FindingSeverity severity, std::string text,
                     std::string why = {}) {
@@ -330,7 +329,7 @@ class Finder {
     for (const auto& [name, v] : score_.hidden) {
       all.push_back(v.own_mm);
       if (structures_ == nullptr) continue;
-      const StructureMap::Answer a = structures_->at(v.own_mm);
+      const StructureMap::Answer a = structures_->at_risk(v.own_mm);
       if (a.structure != 0 && a.distance_mm <= kNearMm && !to_be_opened(structures_->name_of(a.structure)))
         close.push_back(v.own_mm);
     }
@@ -483,8 +482,9 @@ class Finder {
       case ItemKind::exposed:
         return filled(tr("{value} of it is laid open, at least {threshold} is asked"), places);
       case ItemKind::not_violated:
-        if (r.value > 0) return filled(tr("{value} of it is gone"), places);
-        return r.pass ? tr("none of it is gone") : tr("none of it is gone, but a running burr or saw reached into it");
+        if (r.value > 0) return filled(tr("{value} of bone within it is gone"), places);
+        return r.pass ? tr("no bone within it is gone")
+                      : tr("no bone within it is gone, but a running burr or saw reached into it");
       case ItemKind::no_hole:
         return filled(tr("the largest bare part has {value}, below {threshold} is asked"), places);
       case ItemKind::no_cells_left:

@@ -218,6 +218,18 @@ const ProcedureStructure* Procedure::find(std::string_view structure) const {
   return s == structures.end() ? nullptr : &*s;
 }
 
+bool Procedure::enters(std::string_view structure) const {
+  const ProcedureStructure* const s = find(structure);
+  return s != nullptr && s->role == ProcedureRole::enter;
+}
+
+std::vector<std::string> Procedure::opened() const {
+  std::vector<std::string> names;
+  for (const ProcedureStructure& s : structures)
+    if (s.role == ProcedureRole::enter) names.push_back(s.name);
+  return names;
+}
+
 FacePart::FacePart(const Procedure& procedure, const ScaleItem& item)
     : towards_(normalized({item.towards[0], item.towards[1], item.towards[2]})),
       all_sides_(length(towards_) == 0),

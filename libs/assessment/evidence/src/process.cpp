@@ -320,11 +320,9 @@ void NearMetric::finish(const World& /*world*/, std::vector<Measured>& values, s
     return;
   }
   for (std::size_t s = 0; s < of_.size(); ++s) {
+    if (scene_.opens(s)) continue;
     const Of& o = of_[s];
     const std::string name = scene_.structures->name_of(scene_.structures->values()[s]);
-    const ProcedureStructure* const p = scene_.procedure == nullptr ? nullptr : scene_.procedure->find(name);
-    // What is to be opened is not injured by that.
-    if (p != nullptr && p->role == ProcedureRole::enter) continue;
     if (o.least_mm < scene_.structures->reach_mm()) {
       values.push_back(measured("clearance_mm", o.least_mm, name));
     } else {

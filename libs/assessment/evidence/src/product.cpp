@@ -51,9 +51,8 @@ Product::Product(const World& before, const World& after, const StructureMap& st
   std::array<bool, 256> blocks{};
   std::vector<CellBlock> boxes;
   for (const std::uint8_t v : structures_.values()) {
-    const ProcedureStructure* const s = procedure.find(structures_.name_of(v));
     // What the procedure does not name, and is a space, is not known to be one: it ends a cavity.
-    blocks[v] = s == nullptr || s->role != ProcedureRole::enter;
+    blocks[v] = !procedure.enters(structures_.name_of(v));
     boxes.push_back(cells_->near(v, 0));
   }
   cells_->label = label_cells(frame_, structures_, boxes, context);

@@ -51,11 +51,10 @@ void CutMetric::finish(const World& /*world*/, std::vector<Measured>& values, st
     return;
   }
   const std::vector<StructureCutEvent> events = judge_->events();
-  for (const std::uint8_t s : scene_.structures->values()) {
+  for (std::size_t n = 0; n < scene_.structures->values().size(); ++n) {
+    if (scene_.opens(n)) continue;
+    const std::uint8_t s = scene_.structures->values()[n];
     const std::string name = scene_.structures->name_of(s);
-    const ProcedureStructure* const p = scene_.procedure == nullptr ? nullptr : scene_.procedure->find(name);
-    // What is to be opened is not injured by that.
-    if (p != nullptr && p->role == ProcedureRole::enter) continue;
     double mm3 = 0;
     bool sawn = false;
     for (const StructureCutEvent& e : events) {

@@ -191,6 +191,23 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
   }
 }
 
+// Directions of a procedure are one side's. Where they look to the one and the hand came from the other, its items are
+// of faces that nobody worked on.
+std::string side_doubt(const Procedure& procedure, Vec3 approach) {
+  constexpr double kSideways = 0.5;
+  Vec3 sum;
+  for (const ScaleItem& item : procedure.items) {
+    const Vec3 towards{item.towards[0], item.towards[1], item.towards[2]};
+    if (length(towards) > 0) sum += normalized(towards);
+  }
+  if (!(length(sum) > 0)) return {};
+  const double looks = normalized(sum).x, came = approach.x;
+  if (std::abs(looks) < kSideways || std::abs(came) < kSideways || looks * came > 0) return {};
+  return std::string("the procedure is for the patient's ") + (looks > 0 ? "left" : "right") +
+         " side, and the hand came from the other: score it " +
+         (procedure.hash.ends_with("mirrored") ? "without" : "with") + " --mirror";
+}
+
 void judge(const World& begin, const World& end, const ScoreKeeper& keeper, const StructureMap* structures,
            const Procedure& procedure, Score& score, const Context& context) {
   if (structures == nullptr) {
@@ -217,6 +234,7 @@ void judge(const World& begin, const World& end, const ScoreKeeper& keeper, cons
   if (!product.word().empty()) score.words.push_back(product.word());
   score.items.resize(procedure.items.size());
   const Vec3 approach = keeper.approach();
+  if (std::string doubt = side_doubt(procedure, approach); !doubt.empty()) score.words.push_back(std::move(doubt));
   parallel_for(procedure.items.size(), 1, context.threads, [&](std::size_t from, std::size_t to) {
     for (std::size_t n = from; n < to; ++n) score.items[n] = product.evaluate(procedure.items[n], approach, injured);
   });

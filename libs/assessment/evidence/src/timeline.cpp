@@ -56,11 +56,9 @@ TimelineKeeper::TimelineKeeper(const EvidenceScene& scene) : scene_(scene), moti
     hand.touch.resize(n);
     hand.injury.resize(n);
   }
-  for (const std::uint8_t v : scene_.structures->values()) {
-    const std::string name = scene_.structures->name_of(v);
-    const ProcedureStructure* const p = scene_.procedure == nullptr ? nullptr : scene_.procedure->find(name);
-    watched_.push_back(p == nullptr || p->role != ProcedureRole::enter ? 1 : 0);
-    line_.structure_names[v] = name;
+  for (std::size_t s = 0; s < n; ++s) {
+    watched_.push_back(scene_.opens(s) ? 0 : 1);
+    line_.structure_names[scene_.structures->values()[s]] = scene_.structures->name_of(scene_.structures->values()[s]);
   }
 }
 

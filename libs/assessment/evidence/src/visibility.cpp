@@ -185,7 +185,7 @@ void VisibilityMetric::finish(const World& world, std::vector<Measured>& values,
   for (const auto& [name, v] : voxels_) {
     (v.seen == Seen::seen ? seen : v.seen == Seen::hidden ? hidden : unknown) += static_cast<double>(v.mm3);
     if (v.seen != Seen::hidden || scene_.structures == nullptr) continue;
-    const StructureMap::Answer a = scene_.structures->at(v.own_mm);
+    const StructureMap::Answer a = scene_.structures->at_risk(v.own_mm);
     if (a.structure != 0 && a.distance_mm <= kNearMm) near[a.structure] += static_cast<double>(v.mm3);
   }
   const std::string why = voxels_.empty() ? "nothing was removed" : "the session has no camera notes";
@@ -210,7 +210,7 @@ void VisibilityMetric::finish(const World& world, std::vector<Measured>& values,
   std::stable_sort(in_time.begin(), in_time.end(),
                    [](const auto* a, const auto* b) { return a->second.tick < b->second.tick; });
   for (const auto* const v : in_time) {
-    const StructureMap::Answer a = scene_.structures->at(v->second.own_mm);
+    const StructureMap::Answer a = scene_.structures->at_risk(v->second.own_mm);
     if (a.structure == 0 || a.distance_mm > kNearMm) continue;
     const auto reported = last_reported.find(a.structure);
     if (reported != last_reported.end() && static_cast<double>(v->second.tick - reported->second) < scene_.rate_hz)

@@ -108,10 +108,8 @@ class Drawer {
         const std::uint8_t value = structures_->values()[s];
         const TriMesh smooth = smooth_surface(structures_->face(s), structures_->label_spacing_mm()[1] / 2);
         structure_parts_.push_back(part(smooth, structures_->colour_of(value)));
-        const ProcedureStructure* const p =
-            r_.of_procedure == nullptr ? nullptr : r_.of_procedure->find(structures_->name_of(value));
         // Air cells fill the picture with what is not in danger.
-        opened_.push_back(p != nullptr && p->role == ProcedureRole::enter);
+        opened_.push_back(structures_->opened(s));
       }
     }
     seen_ = part(blob_of(by_[0], begin_, context_), shares(kSeenRgb), 0.30);

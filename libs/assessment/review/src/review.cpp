@@ -22,20 +22,21 @@ struct Reported {
 struct Opened {
   SessionFolder folder;
   Case the_case;
-  Anatomy anatomy;
   SessionReader session;
+  Anatomy anatomy;
 
-  Opened(const fs::path& path, const fs::path& case_folder, const Context& context)
+  Opened(const fs::path& path, const fs::path& case_folder, const Procedure* procedure, const Context& context)
       : folder(open_session_folder(path, case_folder)),
         the_case(load_case(folder.case_folder)),
-        anatomy(anatomy_without_hu(context)),
-        session(folder.stream(), Damage::keep) {}
+        session(folder.stream(), Damage::keep),
+        anatomy(anatomy_without_hu(procedure, context)) {}
   [[nodiscard]] World begin(const Context& context) const { return world_at_begin(folder, the_case, anatomy, context); }
 
  private:
-  [[nodiscard]] Anatomy anatomy_without_hu(const Context& context) const {
+  [[nodiscard]] Anatomy anatomy_without_hu(const Procedure* procedure, const Context& context) const {
     HapticSetup setup;
     setup.hardness = false;
+    setup.opened = procedure != nullptr ? procedure->opened() : session.header().haptics.opened;
     return anatomy_of(the_case, setup, context);
   }
 };
@@ -84,8 +85,7 @@ std::vector<ForceProfile> profiles_of(const ScoreDetail& detail, const Reference
   for (const auto& [value, samples] : detail.near) {
     ForceProfile p;
     p.structure = structures->name_of(value);
-    const ProcedureStructure* const s = procedure == nullptr ? nullptr : procedure->find(p.structure);
-    if (s != nullptr && s->role == ProcedureRole::enter) continue;
+    if (procedure != nullptr && procedure->enters(p.structure)) continue;
     p.drilled_s = static_cast<double>(samples.size()) / 100;
     std::vector<IsotonicQuantile::Point> mine, theirs;
     for (const NearMetric::Sample& v : samples)
@@ -143,10 +143,10 @@ std::vector<std::string> labels_of(const Opened& o, const HandWasLed& seen) {
 
 Review make_review(const ReviewRequest& q, const Context& context) {
   Review r;
-  const Opened o(q.session, q.case_folder, context);
-  const StructureMap* const structures = o.anatomy.structures.get();
   if (q.procedure) r.of_procedure = std::make_shared<const Procedure>(*q.procedure);
   const Procedure* const procedure = r.of_procedure.get();
+  const Opened o(q.session, q.case_folder, procedure, context);
+  const StructureMap* const structures = o.anatomy.structures.get();
   World begin = o.begin(context);
   r.damaged = o.session.outline().damaged();
 
@@ -162,7 +162,7 @@ Review make_review(const ReviewRequest& q, const Context& context) {
     const std::vector<ReferenceSession> list = load_reference(q.reference);
     for (std::size_t n = 0; n < list.size(); ++n) {
       context.progress(0.3 * static_cast<double>(n) / static_cast<double>(list.size()), "reading the reference");
-      const Opened one(q.reference / list[n].session, o.folder.case_folder, context);
+      const Opened one(q.reference / list[n].session, o.folder.case_folder, procedure, context);
       World its = one.begin(context);
       if (its.hash() != o.session.header().bone_hash || one.session.header().bone_hash != o.session.header().bone_hash)
         throw Error(ExitCode::usage,
@@ -178,7 +178,7 @@ Review make_review(const ReviewRequest& q, const Context& context) {
   }
   for (const fs::path& path : q.earlier) {
     context.progress(0.3, "reading earlier sessions");
-    const Opened one(path, {}, context);
+    const Opened one(path, {}, procedure, context);
     others.push_back(
         {reported_of(one, one.begin(context), procedure, nullptr, {}, Context()).score, Other::Of::earlier});
   }

@@ -261,6 +261,7 @@ TraineeScene trainee_scene(const std::filesystem::path& case_folder, Procedure p
   TraineeScene scene{load_case(case_folder), {}, {}, std::move(procedure)};
   scene.haptics.device = SpringHand::traits();
   apply_haptic_settings(scene.the_case.folder, {}, scene.haptics);
+  scene.haptics.opened = scene.procedure.opened();
   scene.anatomy = anatomy_of(scene.the_case, scene.haptics, context);
   if (!scene.anatomy.structures)
     throw Error(ExitCode::usage, "the case has no structures, and a trainee's plan begins with them",
@@ -280,10 +281,8 @@ SimulatedSession simulate_trainee(const TraineeScene& scene, World begin, const 
   const WorkPlan& plan = result.plan;
   const Vec3 start = plan.centre_mm + plan.toward * (kClearMm + 6);
   std::vector<bool> guarded;
-  for (const std::uint8_t value : o.anatomy.structures->values()) {
-    const ProcedureStructure* const named = procedure.find(o.anatomy.structures->name_of(value));
-    guarded.push_back(named == nullptr || named->role != ProcedureRole::enter);
-  }
+  for (const std::uint8_t value : o.anatomy.structures->values())
+    guarded.push_back(!procedure.enters(o.anatomy.structures->name_of(value)));
   auto device = std::make_unique<TraineeHand>(options.skill, options.seed, o.anatomy.structures.get(), guarded, start,
                                               plan.toward, plan.toward);
   TraineeHand& hand = *device;

@@ -63,8 +63,7 @@ std::vector<OwnTruth> own_truth(const Procedure& procedure, const StructureMap& 
     while (number < structures.values().size() && structures.name_of(structures.values()[number]) != item.structure)
       ++number;
     // What opens into a space that was there before is more than where the burr has been.
-    const ProcedureStructure* const named = procedure.find(item.structure);
-    if (named != nullptr && named->role == ProcedureRole::enter) continue;
+    if (procedure.enters(item.structure)) continue;
     if (!known || number == structures.values().size()) continue;
     const TriMesh& face = structures.face(number);
     std::vector<Place> places = places_of(face, procedure, item, item.kind == ItemKind::not_violated);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
 
 #include "osteo/core/base/error.h"
@@ -56,6 +57,25 @@ void report_findings(Verdict& v, const std::vector<VolumeFinding>& findings, boo
   }
 }
 
+// A file that is in centimetres and says millimetres: its head is as long as a thumb, in voxels that no scanner of
+// patients makes.
+void check_size(Verdict& v, const Frame& frame) {
+  const Vec3 h = frame.spacing_mm;
+  const double finest = std::min({h.x, h.y, h.z});
+  const Vec3 size{h.x * frame.dims[0], h.y * frame.dims[1], h.z * frame.dims[2]};
+  const double longest = std::max({size.x, size.y, size.z});
+  if ((longest >= kSpecimenMm || finest >= kSpecimenVoxelMm) && longest <= kLongestMm) return;
+  const auto mm = [](double x) {
+    const double step = x < 1 ? 1e-4 : 0.1;
+    return format_number(std::round(x / step) * step);
+  };
+  v.add(code::size_implausible, Severity::warning,
+        "it is " + mm(size.x) + " x " + mm(size.y) + " x " + mm(size.z) + " mm large, in voxels of " + mm(finest) +
+            " mm: " + (longest < kSpecimenMm ? "a specimen in micro-CT, or " : "") +
+            "a scan whose lengths are not in the unit that the file states",
+        "if it is a patient's, save it with its lengths in millimetres");
+}
+
 // A header beside its voxels, as of SPM and Analyze: true to the letter it is no DICOM, but nobody is helped by hearing
 // so.
 void refuse_pair(const fs::path& source) {
@@ -108,6 +128,7 @@ Verdict judge_file(Image& image, const ImportParams& params, const std::vector<V
           "look at the mask before you rely on a threshold");
   }
   report_findings(v, findings, !params.axes.empty());
+  check_size(v, image.frame);
   dicom::check_values(v, count, image.frame.voxel_volume_mm3(), params.any_modality);
   std::vector<dicom::JudgedSlice> layers;
   for (int k = 0; k < image.frame.dims[2]; ++k)

@@ -137,6 +137,10 @@ constexpr auto kTable = std::to_array<VerdictCode>({
     {code::lengths_converted, "warning", Refuses::no, 0, "", "a volume file's lengths are not in mm", "converted"},
     {code::places_disagree, "warning", Refuses::no, 1, "voxel",
      "the two forms of a NIfTI file put its voxels at different places", "the sform is taken"},
+    {code::size_implausible, "warning", Refuses::no, kSpecimenMm, "mm",
+     "a volume file is smaller than a scan of a patient in voxels below 0.075 mm, or longer than 2.5 m: micro-CT, or "
+     "lengths that are not in the unit that it states",
+     "taken as stated"},
     {code::hu_offset, "warning", Refuses::no, 0, "", "an offset that was asked for", "added to all values"},
     {code::hu_scaled, "warning", Refuses::no, 0, "", "air and soft tissue are not where HU puts them (cone-beam greys)",
      "check the threshold by eye"},

@@ -53,6 +53,7 @@ ordered_json haptics_json(const HapticSetup& h) {
   j["hardness"] = h.hardness.value_or(false);
   j["hardness_law"] = h.hardness_json;
   j["structures"] = h.structures;
+  if (!h.opened.empty()) j["opened"] = h.opened;
   j["vibration"] = h.vibration_json;
   if (!h.texture_json.empty()) j["texture"] = h.texture_json;
   j["curve"] = ordered_json::array();
@@ -96,6 +97,7 @@ HapticSetup setup_of(const ordered_json& j, const NamedNumbers& tools, std::vect
   h.hardness = j.at("hardness").get<bool>();
   h.hardness_json = j.at("hardness_law");
   h.structures = j.at("structures");
+  h.opened = j.value("opened", std::vector<std::string>{});
   h.vibration_json = j.at("vibration");
   h.texture_json = j.value("texture", "");
   for (const auto& p : j.at("curve")) h.curve.push_back({p.at(0), p.at(1), p.at(2)});

@@ -56,7 +56,7 @@ struct HeatReader::Body {
     }
     HeatMatter m{sum / static_cast<float>(edge * edge * edge), 0};
     // Soft tissue is where the structures of the patient are: known before anything is moved.
-    if (structures != nullptr && structures->at(body_from_cells(vec(cell))).distance_mm < 0) m.tissue = 1 - m.bone;
+    if (structures != nullptr && structures->at_risk(body_from_cells(vec(cell))).distance_mm < 0) m.tissue = 1 - m.bone;
     return m;
   }
 };
@@ -102,6 +102,7 @@ void HeatReader::place_structures() {
   std::size_t next = 0;
   std::set<std::array<int, 5>> known;
   for (std::size_t n = 0; n < structures_->values().size(); ++n) {
+    if (structures_->opened(n)) continue;
     const std::uint8_t structure = structures_->values()[n];
     for (const auto& q : structures_->face(n).points_mm) {
       const Vec3 at{static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])};

@@ -161,7 +161,7 @@ std::size_t PathPlanner::touching_structures(const HandPose& pose, double clear_
   std::size_t count = 0;
   for (std::size_t i = 0; i < tool_.points.size();) {
     const Vec3 here = tool_.points[i].at_mm;
-    const double distance = structures_->at(hand(here)).distance_mm;
+    const double distance = structures_->at_risk(hand(here)).distance_mm;
     if (distance < clear_mm && ++count > most) return count;
     const double room = distance - clear_mm - kErrorMm;
     do {

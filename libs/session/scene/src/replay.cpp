@@ -36,6 +36,13 @@ void check_same_case(const SessionReader& session, const World& start, const Ana
     throw Error(ExitCode::corrupt, "the session watched other critical structures than this case has",
                 "give the case it was recorded on, unchanged");
   }
+  const std::vector<std::string>& opened = header.haptics.opened;
+  for (std::size_t n = 0; anatomy.structures && n < anatomy.structures->values().size(); ++n) {
+    const std::string name = anatomy.structures->name_of(anatomy.structures->values()[n]);
+    if (anatomy.structures->opened(n) != (std::find(opened.begin(), opened.end(), name) != opened.end()))
+      throw Error(ExitCode::usage, "'" + name + "' is opened by the operation that was recorded, or by this one alone",
+                  "an anatomy is made from the session's own setup (anatomy_of)");
+  }
 }
 
 // The servo once more, and the recorded changes beside it.

@@ -224,7 +224,7 @@ Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& cont
     // Of structures that were all deleted by hand an empty map is left.
     const auto any = [](std::uint8_t v) { return v != 0; };
     if (labels != nullptr && std::any_of(labels->span().begin(), labels->span().end(), any)) {
-      anatomy.structures = std::make_shared<const StructureMap>(*labels, 8, context);
+      anatomy.structures = std::make_shared<const StructureMap>(*labels, 8, context, setup.opened);
       setup.structures = anatomy.structures->hash();
     }
   }
@@ -336,7 +336,12 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
                         {"dried", s.dust->dried_mm3},
                         {"run_off", s.dust->run_off_mm3}};
   }
-  if (anatomy.structures) j["structures"] = structures_of(s.structures, *anatomy.structures, rate_hz);
+  if (anatomy.structures) {
+    j["structures"] = structures_of(s.structures, *anatomy.structures, rate_hz);
+    for (std::size_t n = 0; n < anatomy.structures->values().size(); ++n)
+      if (anatomy.structures->opened(n))
+        j["structures_opened"].push_back(anatomy.structures->name_of(anatomy.structures->values()[n]));
+  }
   for (const StructureCutEvent& e : s.structure_cuts) {
     if (!anatomy.structures) break;
     j["structures_cut"].push_back({{"name", anatomy.structures->name_of(e.cut.structure)},

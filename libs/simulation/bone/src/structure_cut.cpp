@@ -180,6 +180,7 @@ std::vector<StructureCut> structures_cut(const StructureMap& map, const SawCut& 
   const double within = std::min(within_mm, map.reach_mm() - StructureCut::kReachLessMm);
   std::vector<StructureCut> cuts;
   for (std::size_t n = 0; n < map.values().size(); ++n) {
+    if (map.opened(n)) continue;
     const StructureCut c = Search(map, n, blade, within).result();
     if (c.mm3 > 0 || c.distance_mm < within) cuts.push_back(c);
   }

@@ -194,7 +194,8 @@ StructureMap::Part StructureMap::part_of(const Labels& labels, std::uint8_t valu
   return part;
 }
 
-StructureMap::StructureMap(const Labels& labels, double reach_mm, const Context& context)
+StructureMap::StructureMap(const Labels& labels, double reach_mm, const Context& context,
+                           std::span<const std::string> opened)
     : reach_mm_(reach_mm), structures_(labels.structures) {
   const Vec3 h = labels.frame.spacing_mm;
   spacing_mm_ = {std::min({h.x, h.y, h.z}), std::max({h.x, h.y, h.z})};
@@ -223,6 +224,7 @@ StructureMap::StructureMap(const Labels& labels, double reach_mm, const Context&
     const double done = static_cast<double>(parts_.size()), all = static_cast<double>(values_.size());
     parts_.push_back(
         part_of(labels, value, boxes[value], reach_mm + thickest, context.sub(done / all, (done + 1) / all)));
+    parts_.back().opened = std::find(opened.begin(), opened.end(), name_of(value)) != opened.end();
   }
 }
 
@@ -280,7 +282,11 @@ double StructureMap::Part::clearance(const RoundCone& tool, Vec3 start_mm, Vec3 
 }
 
 StructureMap::Answer StructureMap::at(Vec3 world_mm) const noexcept {
-  return clearance({0, 0, 0, 0}, world_mm, {0, 0, 1});
+  return nearest({0, 0, 0, 0}, world_mm, {0, 0, 1}, {}, true);
+}
+
+StructureMap::Answer StructureMap::at_risk(Vec3 world_mm) const noexcept {
+  return nearest({0, 0, 0, 0}, world_mm, {0, 0, 1}, {}, false);
 }
 
 double StructureMap::distance_mm(std::size_t number, Vec3 world_mm) const noexcept {
@@ -290,6 +296,11 @@ double StructureMap::distance_mm(std::size_t number, Vec3 world_mm) const noexce
 
 StructureMap::Answer StructureMap::clearance(const RoundCone& tool, Vec3 start_mm, Vec3 axis,
                                              std::span<double> each) const noexcept {
+  return nearest(tool, start_mm, axis, each, false);
+}
+
+StructureMap::Answer StructureMap::nearest(const RoundCone& tool, Vec3 start_mm, Vec3 axis, std::span<double> each,
+                                           bool with_opened) const noexcept {
   const Vec3 middle = start_mm + axis * (tool.start_mm + tool.length_mm / 2);
   const double reach = reach_mm_ + tool.length_mm / 2 + tool.largest_radius_mm();
   Answer nearest{reach_mm_, 0};
@@ -300,7 +311,7 @@ StructureMap::Answer StructureMap::clearance(const RoundCone& tool, Vec3 start_m
       beyond = beyond || box.lo[a] - middle[a] > reach || middle[a] - box.hi[a] > reach;
     const double gap = beyond ? reach_mm_ : parts_[s].clearance(tool, start_mm, axis);
     if (s < each.size()) each[s] = gap < reach_mm_ ? gap : reach_mm_;
-    if (gap < nearest.distance_mm) nearest = {gap, values_[s]};
+    if (gap < nearest.distance_mm && (with_opened || !parts_[s].opened)) nearest = {gap, values_[s]};
   }
   return nearest;
 }

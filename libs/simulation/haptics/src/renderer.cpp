@@ -104,6 +104,7 @@ void HapticRenderer::watch(HandRenderer& hand) noexcept {
   hand.record().clearance_mm = static_cast<float>(nearest.distance_mm);
   hand.record().structure = nearest.structure;
   for (std::size_t s = 0; s < events_.size(); ++s) {
+    if (anatomy_.structures->opened(s)) continue;
     events_[s].least_clearance_mm = std::min(events_[s].least_clearance_mm, clearances_[s]);
     if (clearances_[s] > 0) continue;
     hand.flag(kStructureTouched | (hand.cuts() ? kStructureInjured : 0U));

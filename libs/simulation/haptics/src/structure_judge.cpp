@@ -113,7 +113,7 @@ void StructureJudge::meet(CutBy by, std::uint32_t hand, std::uint64_t tick, cons
   if (std::none_of(parts_.begin(), parts_.end(), [&](const Part& p) { return may_meet(p, shape); })) return;
   map_.clearance(*shape.cone, shape.at_mm, shape.axis, each_);
   for (std::size_t s = 0; s < parts_.size(); ++s) {
-    if (each_[s] > 0 || !may_meet(parts_[s], shape)) continue;
+    if (each_[s] > 0 || map_.opened(s) || !may_meet(parts_[s], shape)) continue;
     const Vec3 a = shape.at_mm + shape.axis * shape.cone->start_mm, b = a + shape.axis * shape.cone->length_mm;
     const double r = shape.cone->largest_radius_mm() + kCell;
     std::array<int, 3> from{};

@@ -74,6 +74,12 @@ struct EvidenceScene {
   double rate_hz = 1000;
   const StructureMap* structures = nullptr;
   const Procedure* procedure = nullptr;
+
+  /// Whether the operation enters a structure, by its number in values(): what is to be opened is not injured by that.
+  [[nodiscard]] bool opens(std::size_t number) const {
+    return structures->opened(number) ||
+           (procedure != nullptr && procedure->enters(structures->name_of(structures->values()[number])));
+  }
 };
 
 /// One of the readers that together make a score. Frames in order; then finish(), once.

@@ -169,6 +169,9 @@ struct Procedure {
 
   /// Null when the procedure does not name it.
   [[nodiscard]] const ProcedureStructure* find(std::string_view structure) const;
+  [[nodiscard]] bool enters(std::string_view structure) const;
+  /// Names of those that it enters (ProcedureRole::enter).
+  [[nodiscard]] std::vector<std::string> opened() const;
 };
 
 /// The part of a structure's face that an item is about: by place (its patch), and by where it looks. Both must outlive

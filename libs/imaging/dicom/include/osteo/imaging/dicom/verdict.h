@@ -43,7 +43,7 @@ inline constexpr std::string_view slice_blank = "SLICE_BLANK", slice_part_missin
                                   slice_order = "SLICE_ORDER";
 // What a volume file leaves open.
 inline constexpr std::string_view axes_not_stated = "AXES_NOT_STATED", lengths_converted = "LENGTHS_CONVERTED",
-                                  places_disagree = "PLACES_DISAGREE";
+                                  places_disagree = "PLACES_DISAGREE", size_implausible = "SIZE_IMPLAUSIBLE";
 // The values.
 inline constexpr std::string_view padding_tag = "PADDING_TAG", padding_found = "PADDING_FOUND",
                                   padding_tag_wrong = "PADDING_TAG_WRONG", monochrome1 = "MONOCHROME1",

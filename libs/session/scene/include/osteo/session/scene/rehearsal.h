@@ -136,7 +136,9 @@ class Rehearsal {
 
   /// Latest tick of a hand, for display.
   [[nodiscard]] TickRecord latest(std::size_t hand = 0) const;
+  /// By burrs, and by saws whose plane was placed; what was taken back counts too.
   [[nodiscard]] double removed_mm3() const { return operation_.removed_mm3(); }
+  [[nodiscard]] double sawn_mm3() const { return readers_->tools.sawn_mm3(); }
   /// Soft tissue cut off; 0 where the scene has none.
   [[nodiscard]] double tissue_mm3() const { return tissue_mm3_; }
   [[nodiscard]] bool realtime() const { return loop_ && loop_->realtime(); }

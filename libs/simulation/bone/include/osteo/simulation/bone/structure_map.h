@@ -33,23 +33,29 @@ namespace osteo::inline simulation {
 /// so about 4 a label voxel near the face and 4 / 8 elsewhere; made in O(voxels of the map). Immutable.
 class StructureMap {
  public:
-  /// Error(failed) when the map holds no structure.
-  explicit StructureMap(const Labels& labels, double reach_mm = 8, const Context& context = {});
+  /// `opened`: names of those that the operation enters, a canal or cells, which therefore are not at risk; names that
+  /// the map has not are left out. Error(failed) when the map holds no structure.
+  explicit StructureMap(const Labels& labels, double reach_mm = 8, const Context& context = {},
+                        std::span<const std::string> opened = {});
 
   struct Answer {
     double distance_mm = 0;      ///< negative inside; reach_mm() where nothing is near
     std::uint8_t structure = 0;  ///< value in the label map; 0: none within reach
   };
-  /// The nearest structure. 0.05 us for each that is near.
+  /// The nearest structure, also of those that are opened. 0.05 us for each that is near.
   [[nodiscard]] Answer at(Vec3 world_mm) const noexcept;
+  /// The nearest of those at risk.
+  [[nodiscard]] Answer at_risk(Vec3 world_mm) const noexcept;
   /// To one structure, by its number in values(): as at(), whatever else is near; reach_mm() where it is farther.
   [[nodiscard]] double distance_mm(std::size_t number, Vec3 world_mm) const noexcept;
-  /// Between a tool's surface and the nearest structure; negative when it reaches into one. `each`, where not empty,
-  /// gets the same for every structure in the order of values(), reach_mm() where it is farther. Cost: an at() for each
-  /// half radius along the tool's axis and eight more; one for a ball.
+  /// Between a tool's surface and the nearest structure at risk; negative when it reaches into one. `each`, where not
+  /// empty, gets the same for every structure in the order of values(), reach_mm() where it is farther. Cost: an at()
+  /// for each half radius along the tool's axis and eight more; one for a ball.
   Answer clearance(const RoundCone& tool, Vec3 start_mm, Vec3 axis, std::span<double> each = {}) const noexcept;
 
   [[nodiscard]] double reach_mm() const { return reach_mm_; }
+  /// Whether the operation enters it, by its number in values().
+  [[nodiscard]] bool opened(std::size_t number) const { return parts_[number].opened; }
   /// Of the structures that have voxels, ascending.
   [[nodiscard]] const std::vector<std::uint8_t>& values() const { return values_; }
   [[nodiscard]] const std::vector<Structure>& structures() const { return structures_; }
@@ -74,10 +80,13 @@ class StructureMap {
   struct Part {
     TriMesh face;
     BoxMm box;  // of the face
+    bool opened = false;
     Field near, whole;
     [[nodiscard]] double at(Vec3 world_mm) const noexcept;
     [[nodiscard]] double clearance(const RoundCone& tool, Vec3 start_mm, Vec3 axis) const noexcept;
   };
+  Answer nearest(const RoundCone& tool, Vec3 start_mm, Vec3 axis, std::span<double> each,
+                 bool with_opened) const noexcept;
   [[nodiscard]] static Part part_of(const Labels& labels, std::uint8_t value, std::array<std::array<int, 2>, 3> box,
                                     double far_mm, const Context& context);
   static Field field_of(const TriangleSoup& face, const TriangleTree& tree, const Frame& frame, double inside_mm,
@@ -116,10 +125,11 @@ struct StructureCut {
                                                 std::uint32_t body = SceneAction::kNobody);
 
 /// What a blade with a length and a depth does to the structures that it cuts or comes within `within_mm` of, in the
-/// order of map.values(). `blade`: in the frame of the map. Volumes by cells of 0.15 mm: those of the map's face within
-/// 5 % where a nerve of 1 mm is cut across, within 10 % where it is grazed along 18 mm; distances within 0.1 mm. The
-/// face is the labels' own, which of a rod of 1 mm radius in labels of 0.4 mm is 0.2 mm within the rod's. Error(usage)
-/// where the blade is endless. Cost: milliseconds; 20 ms where the blade lies along a structure of 50 mm.
+/// order of map.values(); those that the operation opens are left out. `blade`: in the frame of the map. Volumes by
+/// cells of 0.15 mm: those of the map's face within 5 % where a nerve of 1 mm is cut across, within 10 % where it is
+/// grazed along 18 mm; distances within 0.1 mm. The face is the labels' own, which of a rod of 1 mm radius in labels of
+/// 0.4 mm is 0.2 mm within the rod's. Error(usage) where the blade is endless. Cost: milliseconds; 20 ms where the
+/// blade lies along a structure of 50 mm.
 [[nodiscard]] std::vector<StructureCut> structures_cut(const StructureMap& map, const SawCut& blade,
                                                        double within_mm = 5);
 

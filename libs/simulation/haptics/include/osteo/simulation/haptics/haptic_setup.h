@@ -68,9 +68,10 @@ struct HapticSetup {
       tool_methods;  ///< index in instrument_library() -> another method than params.contact.method for that tool
   std::optional<bool>
       hardness;  ///< removal goes by the HU of the case; empty: where it keeps them, which anatomy_of() settles
-  std::string hardness_json;  ///< the law, as parse_hardness reads it; empty: the built-in one
-  std::string structures;     ///< hash of the critical structures that are watched; empty: none
-  std::vector<Vec3> curve;    ///< points of a virtual fixture for hand 0, in mm; fewer than 2: none
+  std::string hardness_json;        ///< the law, as parse_hardness reads it; empty: the built-in one
+  std::string structures;           ///< hash of the critical structures that are watched; empty: none
+  std::vector<std::string> opened;  ///< names of structures that the operation enters: nobody is warned of them
+  std::vector<Vec3> curve;          ///< points of a virtual fixture for hand 0, in mm; fewer than 2: none
   CurveConstraintParams curve_params;
   std::string
       texture_json;  ///< of what tools slide over, as parse_texture reads it; empty: none, and nothing is spent on it

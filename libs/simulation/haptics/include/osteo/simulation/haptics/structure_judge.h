@@ -39,13 +39,14 @@ struct StructureCutEvent {
 /// comes behind it: "contact of the shaft with the chorda tympani". Empty: none was met.
 [[nodiscard]] std::string reported_cut(const StructureMap& map, CutBy by, std::span<const StructureCut> cuts);
 
-/// Follows all hands. What of a structure lay in a running burr or saw, or in a shaft, counts cell by cell (kCellMm) by
-/// the share of the cell that was inside both; each share once, for whoever took it first, so that a shaft in the bore
-/// of its own burr takes nothing. Volumes within 5 % where a structure of 1 mm is cut across or a burr is half a
-/// millimetre deep in one; a touch that comes to less than StructureCut::kMinMm3 is a contact. What a hand does
-/// within kSameS and kSameMm of what it did before is the same event. Saws by their plane are counted by themselves
-/// (structures_cut()). Cost: of a tick in which nothing is near 0.1 us for each structure; 0.1 ms where a burr of
-/// 4 mm moves in one. Memory: 1 KB for each 4 mm3 that tools came to. The same ticks give the same events.
+/// Follows all hands; structures that the operation opens (StructureMap::opened) are left out. What of a structure lay
+/// in a running burr or saw, or in a shaft, counts cell by cell (kCellMm) by the share of the cell that was inside
+/// both; each share once, for whoever took it first, so that a shaft in the bore of its own burr takes nothing. Volumes
+/// within 5 % where a structure of 1 mm is cut across or a burr is half a millimetre deep in one; a touch that comes to
+/// less than StructureCut::kMinMm3 is a contact. What a hand does within kSameS and kSameMm of what it did before is
+/// the same event. Saws by their plane are counted by themselves (structures_cut()). Cost: of a tick in which nothing
+/// is near 0.1 us for each structure; 0.1 ms where a burr of 4 mm moves in one. Memory: 1 KB for each 4 mm3 that tools
+/// came to. The same ticks give the same events.
 class StructureJudge {
  public:
   static constexpr double kCellMm = 0.2;
