@@ -209,7 +209,7 @@ TEST(VolumeFileVerdict, LengthsOfNoPatientAreTold) {
     EXPECT_EQ(v.has(code::size_implausible), told) << scale;
     if (!told) continue;
     EXPECT_EQ(v.status(), "repaired");
-    EXPECT_EQ(finding(v, code::size_implausible).text.find("micro-CT") != std::string::npos, scale < 1) << scale;
+    EXPECT_EQ(finding(v, code::size_implausible).message.find("micro-CT") != std::string::npos, scale < 1) << scale;
   }
 }
 

@@ -8,6 +8,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/param.h"
+#include "osteo/imaging/dicom/detail/verdict_codes.h"
 #include "osteo/imaging/dicom/volume.h"
 #include "osteo/imaging/io/volume_io.h"
 #include "pixels.h"

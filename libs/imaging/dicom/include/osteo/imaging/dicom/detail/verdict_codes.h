@@ -8,11 +8,8 @@
 namespace osteo::inline imaging {
 
 /// Sizes from which on something is told; each stands here only.
-inline constexpr double kTiltDeg = 0.05;  ///< slices that lean by less are straight: 0.2 mm over a head
-inline constexpr double kShiftMm = 0.05;  ///< of a slice, sideways against the others
-/// Smaller in voxels below the second, or longer than the third, no scan of a patient is: fields of cone-beam scanners
-/// begin at 40 mm, their voxels at 0.075 mm, and tables of CT scanners end at 2 m.
-inline constexpr double kSpecimenMm = 40, kSpecimenVoxelMm = 0.074, kLongestMm = 2500;
+inline constexpr double kTiltDeg = 0.05;   ///< slices that lean by less are straight: 0.2 mm over a head
+inline constexpr double kShiftMm = 0.05;   ///< of a slice, sideways against the others
 inline constexpr double kMaxBoneCm2 = 80;  ///< of bone in each slice on average: a skull has up to 45, a pelvis 60
 inline constexpr double kShiftedHu = 200;  ///< values shifted by as much are rejected
 inline constexpr double kSliceBlankEndMm2PerMm =
@@ -21,6 +18,9 @@ inline constexpr double kSlicePartShare = 0.15;    ///< of the body in a slice t
 inline constexpr double kSliceStepHu = 30;         ///< of air or soft tissue from a slice to the next
 inline constexpr double kSliceMirrorRatio = 1.25;  ///< how much better a slice fits the next when turned over
 inline constexpr double kSliceOrderRatio = 1.2;    ///< how much better two slices fit in each other's place
+/// Smaller in voxels below the second, or longer than the third, no scan of a patient is: fields of cone-beam scanners
+/// begin at 40 mm, their voxels at 0.075 mm, and tables of CT scanners end at 2 m.
+inline constexpr double kSpecimenMm = 40, kSpecimenVoxelMm = 0.074, kLongestMm = 2500;
 
 enum class Refuses {
   no,
