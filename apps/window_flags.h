@@ -68,6 +68,7 @@ struct WindowFlags {
   Attend role = Attend::trainee;
   std::string scan;
   std::string procedure;
+  bool mirror = false;
   bool sound = true;
   double volume = 0.7;
   bool alarms = false;
@@ -166,9 +167,12 @@ struct WindowFlags {
            "case keeps)"},
           p.scan);
     visit({"procedure",
-           "procedure to follow, as JSON (pipelines/procedures): its regions are outlined in bone and cuts, the page "
+           "procedure to follow, by name (mastoidectomy, mastoid-window, mandible-split) or as JSON: its regions are "
+           "outlined in bone and cuts, the page "
            "at the end has its findings, and no alarm is raised for what it opens (empty: none)"},
           p.procedure);
+    visit({"mirror", "the procedure is for the other side of the body: left and right of its directions are exchanged"},
+          p.mirror);
     visit({"sound", "play the sound of drilling (a model, docs/validation/sound.md)"}, p.sound);
     visit({"volume", "volume of the sound; long loud parts are held below the level that is safe with headphones", "",
            0, 1},

@@ -420,10 +420,33 @@ def main_view():
         w.key("q", "the page at the end", lambda s: s["ended"])
         w.key("Home", "another case", lambda s: s.get("page") == "start")
         assert any("case" in e for e in w.state()["entries"][:1]), w.state()
+        # The demo ear by the mouse alone: made, and opened with a procedure and with dust.
+
+        def click(name, what, condition):
+            at = w.until(name, lambda s: name in s["at"])["at"][name]
+            w.x("mousemove", *map(round, at), "click", 1)
+            return w.until(f"{name}: {what}", condition)
+
+        demo = w.state()["entries"].index("demo ear")
+        click(f"card {demo}", "chosen", lambda s: s["selected"] == demo)
+        click("make demo", "is being made", lambda s: s["making_demo"])
+        w.until("the demo can be opened", lambda s: not s["making_demo"] and "operate" in s["at"])
+        assert not w.state()["message"] and w.state()["selected"] == demo, w.state()
+        click("procedure", "its list", lambda s: "mastoidectomy" in s["at"])
+        click("mastoidectomy", "chosen", lambda s: s["procedure"] == "mastoidectomy")
+        click("dust", "on", lambda s: s["dust"])
+        shot = click("operate", "opened", lambda s: s.get("page") != "start" and s["tick"] > 0)
+        assert shot["layout"] == "operate", shot
+        on_demo = pathlib.Path(w.key("q", "the page at the end", lambda s: s["ended"])["session"])
+        w.key("Home", "another case", lambda s: s.get("page") == "start")
         w.x("key", "q")
         w.end(0)
+    summary = json.loads((on_demo / "summary.json").read_text())
+    assert summary["structures_opened"] == ["air cells", "antrum"] and "dust_mm3" in summary, summary
+    osteo("replay", on_demo, "--quiet")
     kept = json.loads(settings.read_text())
-    assert kept["layout"] == "plan" and kept["colour"] == "red" and len(kept["recent_cases"]) == 1, kept
+    assert kept["layout"] == "operate" and kept["colour"] == "red" and len(kept["recent_cases"]) == 2, kept
+    assert kept["procedure"] == "mastoidectomy" and kept["dust"], kept
     sessions = sorted(p for p in pathlib.Path("case/sessions").iterdir())
     assert len(sessions) == 3, sessions
     assert json.loads((sessions[1] / "session.json").read_text()).get("resumed_from"), sessions
@@ -605,6 +628,7 @@ work.mkdir(parents=True)
 os.chdir(work)
 os.environ["LIBGL_ALWAYS_SOFTWARE"] = "1"
 os.environ["XDG_CONFIG_HOME"] = str(work / "config")  # nobody's own settings, and none are left behind
+os.environ["XDG_DATA_HOME"] = str(work / "data")
 if __name__ == "__main__":
     {"keys": keys, "main_view": main_view, "hand": hand, "signals": signals, "failures": failures}[part]()
     print(f"window {part}: all as it should be")

@@ -97,6 +97,12 @@ struct WindowCommand {
     if (given("volume")) values.volume = p.volume;
     if (given("alarms")) values.alarms = p.alarms;
     if (given("full_screen")) values.full_screen = p.full_screen;
+    if (given("procedure")) values.procedure = p.procedure;
+    if (given("mirror")) values.mirror_procedure = p.mirror;
+    if (given("dust")) values.dust = p.dust;
+    if (given("heat")) values.heat = p.heat;
+    if (given("monitor")) values.monitor = p.monitor;
+    if (given("position")) values.position = EnumNames<Posture>::values[static_cast<std::size_t>(p.position)];
     if (p.layout != StartLayout::last)
       values.layout = EnumNames<StartLayout>::values[static_cast<std::size_t>(p.layout)];
     return values;
@@ -123,6 +129,28 @@ struct WindowCommand {
     take(&PersonValues::mirror_mouse);
     take(&PersonValues::hints);
     take(&PersonValues::hints_off);
+    take(&PersonValues::procedure);
+    take(&PersonValues::mirror_procedure);
+    take(&PersonValues::dust);
+    take(&PersonValues::heat);
+    take(&PersonValues::monitor);
+    take(&PersonValues::position);
+  }
+  // As the start page has them.
+  static void take_switches(const PersonValues& values, Params& flags) {
+    flags.procedure = values.procedure;
+    flags.mirror = values.mirror_procedure;
+    flags.dust = values.dust;
+    flags.heat = values.heat;
+    flags.monitor = values.monitor;
+    constexpr auto kPositions = enum_names(Posture{});
+    const auto* const at = std::find(kPositions.begin(), kPositions.end(), values.position);
+    if (at != kPositions.end()) flags.position = static_cast<Posture>(at - kPositions.begin());
+  }
+  static std::optional<Procedure> procedure_of(const Params& p) {
+    if (p.procedure.empty()) return std::nullopt;
+    Procedure procedure = load_procedure(p.procedure);
+    return p.mirror ? mirrored(std::move(procedure)) : std::move(procedure);
   }
 
   // One case, from its first session to the last. `left`: how the person left it.
@@ -209,8 +237,9 @@ struct WindowCommand {
       throw Error(ExitCode::usage, "--experiment: there is no '" + p.experiment + "'", "'camera' is the only one");
     if (!p.dust && (p.position != Posture::supine || p.head_turned_deg != 0))
       io.context.warn("how the patient lies moves dust and water alone, and there are none: add --dust");
-    std::optional<Procedure> procedure;  // of all cases that are opened
-    if (!p.procedure.empty()) procedure = load_procedure(p.procedure);
+    if (p.mirror && p.procedure.empty())
+      throw Error(ExitCode::usage, "--mirror has no effect without --procedure", "add it, or leave it out");
+    std::optional<Procedure> procedure = procedure_of(p);  // what is wrong with it is said without a window
     PersonSettings person(PersonSettings::usual_file());
     for (const std::string& c : person.complaints()) io.context.warn(c);
     PersonValues kept = person.values;
@@ -234,6 +263,8 @@ struct WindowCommand {
     StartOptions start;
     start.state_file = p.state_file;
     start.stop = [&] { return io.context.cancelled(); };
+    for (const std::string& name : built_in_procedures()) start.procedures.push_back({name, load_procedure(name).name});
+    start.osteo = fs::read_symlink("/proc/self/exe").parent_path() / "osteo";
     std::optional<StartChoice> choice;
     if (!flags.join.empty() && flags.code.empty()) {
       const auto typed = ask_for_code(shell, flags.join, start.stop, p.state_file);
@@ -246,13 +277,15 @@ struct WindowCommand {
       if (!choice) {
         choice = run_start_page(shell, person, start);
         if (!choice) break;
+        take_switches(person.values, flags);
       }
       flags.resume = choice->resume;
       WindowEnd left;
       try {
         std::unique_ptr<OpenCase> open;
         shell.while_working("the case is opened", io.context, [&](const Context& context) {
-          open = open_case(choice->case_folder, p, procedure, context);
+          procedure = procedure_of(flags);
+          open = open_case(choice->case_folder, flags, procedure, context);
         });
         person.opened(open->files.folder);
         sat = true;

@@ -19,7 +19,7 @@ cli::CommandInfo GoalCavityCommand::info() {
           "left, and removed beyond it. A goal by rules is a proposal to look at, not a plan for a patient "
           "(docs/validation/goal.md).",
           {{"case", "a folder made by prepare, with structures"}},
-          "osteo goal-cavity CASE --procedure pipelines/procedures/mastoidectomy.json -o goal.seg.nrrd",
+          "osteo goal-cavity CASE --procedure mastoidectomy -o goal.seg.nrrd",
           false,
           {},
           {"out"},
@@ -28,8 +28,7 @@ cli::CommandInfo GoalCavityCommand::info() {
 
 int GoalCavityCommand::run(const Params& p, cli::Invocation& io) {
   if (p.procedure.empty())
-    throw Error(ExitCode::usage, "a goal goes by a procedure's rules",
-                "--procedure pipelines/procedures/mastoidectomy.json");
+    throw Error(ExitCode::usage, "a goal goes by a procedure's rules", "--procedure mastoidectomy");
   if (!p.out.empty()) {
     require_savable(DataKind::labels, p.out);
     if (!io.common.force && output_exists(p.out))

@@ -101,6 +101,7 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
       refuse(name, "with --headless", "there is no window; leave it out");
     if (p.stream.empty()) refuse("monitor_setup", "with --headless and without --stream", "leave it out");
   }
+  if (p.procedure.empty()) refuse("mirror", "without --procedure", "add it, or leave it out");
   if (p.device == Hand::igtl && p.tracker.empty())
     throw Error(ExitCode::usage, "--device igtl needs --tracker", "HOST:PORT or HOST:PORT/NAME");
   if (p.device != Hand::igtl) refuse("tracker", "without --device igtl", "add it, or leave it out");

@@ -23,7 +23,7 @@ cli::CommandInfo ReviewCommand::info() {
           "there "
           "is shown, and the exit code is 4.",
           {{"session", "a session folder"}},
-          "osteo review SESSION -o review --procedure pipelines/procedures/mastoidectomy.json"};
+          "osteo review SESSION -o review --procedure mastoidectomy"};
 }
 
 int ReviewCommand::run(const Params& p, cli::Invocation& io) {

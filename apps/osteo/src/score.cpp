@@ -30,7 +30,7 @@ cli::CommandInfo ScoreCommand::info() {
           "says what may not be "
           "concluded). Of a damaged session what is there is scored, and the exit code is 4.",
           {{"session", "a session folder"}},
-          "osteo score SESSION --procedure pipelines/procedures/mastoidectomy.json",
+          "osteo score SESSION --procedure mastoidectomy",
           false,
           {},
           {"csv", "measures"},

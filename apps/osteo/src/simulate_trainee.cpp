@@ -27,13 +27,12 @@ cli::CommandInfo SimulateTraineeCommand::info() {
               skills + ".",
           {{"case", "a folder made by prepare, with structures"}},
           "osteo simulate-trainee CASE --skill 'novice, undercut=0.8' --procedure "
-          "pipelines/procedures/mastoid-window.json -o SESSION"};
+          "mastoid-window -o SESSION"};
 }
 
 int SimulateTraineeCommand::run(const Params& p, cli::Invocation& io) {
   if (p.procedure.empty())
-    throw Error(ExitCode::usage, "a trainee needs to know what is to be done",
-                "--procedure pipelines/procedures/mastoid-window.json");
+    throw Error(ExitCode::usage, "a trainee needs to know what is to be done", "--procedure mastoid-window");
   TraineeOptions options;
   options.skill = parse_skill(p.skill);
   options.seed = static_cast<std::uint64_t>(io.common.seed);

@@ -105,9 +105,10 @@ void make_new(const StudyCommand::Params& p, cli::Invocation& io, const fs::path
   plan.highest = p.highest;
   plan.seed = static_cast<std::uint64_t>(io.common.seed);
   std::string file;
-  if (p.procedure.ends_with(".json")) {
-    plan.procedure = load_procedure(p.procedure).name;
-    file = read_text(p.procedure);
+  const auto known = built_in_procedures();
+  if (p.procedure.ends_with(".json") || std::find(known.begin(), known.end(), p.procedure) != known.end()) {
+    file = procedure_text(p.procedure);
+    plan.procedure = parse_procedure(file, p.procedure).name;
   }
   study::new_study(folder, plan);
   if (!file.empty()) write_file(folder / kProcedure, file);

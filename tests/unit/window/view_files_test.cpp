@@ -4,6 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "case_card.h"
 #include "osteo/app/window/person_settings.h"
 #include "osteo/core/base/files.h"
 #include "scratch.h"
@@ -51,9 +52,10 @@ TEST(PersonSettings, WhatIsWrongIsToldWithItsLineAndTheRestIsTaken) {
   const fs::path file = scratch / "settings.json";
   write(file,
         "{\"osteotome_settings\": 1,\n\"volume\": 0.25,\n\"colour\": \"red\",\n\"scale\": 99,\n\"layout\": "
-        "\"sideways\"}");
+        "\"sideways\",\n\"position\": \"upside down\"}");
   PersonSettings p(file);
-  ASSERT_EQ(p.complaints().size(), 3U);
+  ASSERT_EQ(p.complaints().size(), 4U);
+  EXPECT_EQ(p.values.position, "supine");
   EXPECT_NE(p.complaints()[0].find("line 3"), std::string::npos) << p.complaints()[0];
   EXPECT_NE(p.complaints()[1].find("line 4"), std::string::npos) << p.complaints()[1];
   EXPECT_NE(p.complaints()[2].find("line 5"), std::string::npos) << p.complaints()[2];
@@ -265,6 +267,73 @@ TEST(StartList, OfSeveralThingsDroppedTheFirstThatCanBeOpenedCounts) {
   EXPECT_TRUE(list.take({f.cases() / "scan.nrrd", f.cases() / "ear"}));
   EXPECT_FALSE(list.take({f.cases() / "scan.nrrd", f.cases() / "empty"}));
   EXPECT_NE(list.message().find("scan.nrrd"), std::string::npos);
+}
+
+// What a card says of a case, of a broken one, and of one that is gone; and of a session.
+TEST(CaseCard, SaysWhatMattersOfACase) {
+  const test::ScratchFolder scratch;
+  const fs::path folder = scratch / "ear";
+  const std::string manifest =
+      R"({"osteotome_case": 1, "recipe": {"settings": {"names": "5=ossicles, 6=facial nerve, 7=sigmoid sinus, 12=labyrinth"}},
+      "files": {"bone": {"file": "bone.vdb", "hash": "a"}, "picture": {"file": "preview.png", "hash": "b"}},
+      "frame": {"spacing_mm": [0.3, 0.3, 0.6]}})";
+  write(folder / "manifest.json", manifest);
+  write(folder / "preview.png", "x");
+  const CaseCard lacks = card_of(folder);
+  EXPECT_EQ(lacks.state, CaseCard::State::broken);
+  EXPECT_EQ(lacks.why, "bone.vdb is missing: prepare it again");
+  write(folder / "bone.vdb", "x");
+  for (const char* n : {"1", "2"})
+    write(folder / "sessions" / n / "session.json", R"({"osteotome_session": 1, "case": "../.."})");
+  const CaseCard good = card_of(folder);
+  EXPECT_EQ(good.state, CaseCard::State::plain) << good.why;
+  EXPECT_EQ(good.name, "ear");
+  EXPECT_EQ(good.facts.find("0.3 mm · 2 sessions · today "), 0U) << good.facts;
+  EXPECT_EQ(good.structures, "ossicles, facial nerve, sigmoid sinus, 1 more");
+  EXPECT_EQ(good.words, "not approved");
+  EXPECT_EQ(good.preview, folder / "preview.png");
+  write(folder / "manifest.json", manifest.substr(0, 40));
+  const CaseCard torn = card_of(folder);
+  EXPECT_EQ(torn.state, CaseCard::State::broken);
+  EXPECT_NE(torn.why.find("JSON"), std::string::npos) << torn.why;
+  EXPECT_EQ(card_of(scratch / "gone").why, "it is no longer there");
+
+  const fs::path session = folder / "sessions/1";
+  EXPECT_EQ(session_figures(session), "");
+  write(session / "summary.json",
+        R"({"ticks": 90000, "rate_hz": 1000, "removed_mm3": 600.4, "sawn_mm3": 26, "structures": [
+          {"name": "dura", "least_clearance_mm": 2}, {"name": "sigmoid sinus", "least_clearance_mm": 0.44}]})");
+  EXPECT_EQ(session_figures(session), "1.5 min, 626 mm³; nearest: the sigmoid sinus, 0.4 mm");
+  write(session / "summary.json",
+        R"({"ticks": 900000, "rate_hz": 1000, "removed_mm3": 1.25, "structures": [
+          {"name": "dura", "least_clearance_mm": -0.2}]})");
+  EXPECT_EQ(session_figures(session), "15 min, 1.2 mm³; touched: dura");
+  write(session / "summary.json", "{");
+  EXPECT_EQ(session_figures(session), "");
+}
+
+TEST(StartList, TheDemoIsOfferedBehindTheCasesAndMadeWhenItIsWanted) {
+  const Folders f;
+  const fs::path demo = f.scratch / "data/demo/case";
+  StartList list({f.cases() / "ear"}, f.scratch.path(), demo);
+  const int at = index_of(list, "demo ear");
+  EXPECT_EQ(at, 1);
+  list.select(at);
+  EXPECT_FALSE(list.open());
+  EXPECT_TRUE(list.wants_demo());
+  EXPECT_FALSE(list.wants_demo()) << "once";
+  write(demo / "manifest.json", "{}");
+  list.select(0);
+  list.refresh(demo);
+  EXPECT_EQ(list.selected(), at);
+  const auto choice = list.open();
+  ASSERT_TRUE(choice);
+  EXPECT_EQ(choice->case_folder, demo);
+  EXPECT_FALSE(list.wants_demo());
+  // Among the cases opened last it stands once.
+  const StartList again({demo}, f.scratch.path(), demo);
+  EXPECT_EQ(index_of(again, "demo ear"), -1);
+  EXPECT_EQ(again.entries()[0].folder, demo);
 }
 
 }  // namespace

@@ -18,7 +18,8 @@ struct GoalCavityCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "label map of the cavity, .nrrd or .seg.nrrd (empty: none is written; also -o)"}, p.out);
-    visit({"procedure", "what is to be done, as JSON (pipelines/procedures)"}, p.procedure);
+    visit({"procedure", "what is to be done, by name (mastoidectomy, mastoid-window, mandible-split) or as JSON"},
+          p.procedure);
     visit({"mirror",
            "the procedure is written for the other side of the body: its directions and curves turn about x = 0"},
           p.mirror);

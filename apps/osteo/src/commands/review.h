@@ -19,7 +19,9 @@ struct ReviewCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder for review.html, review.pdf and review.json, made when it is not there (also -o)"}, p.out);
-    visit({"procedure", "what was to be done, as JSON (pipelines/procedures); empty: no items, regions or rules"},
+    visit({"procedure",
+           "what was to be done, by name (mastoidectomy, mastoid-window, mandible-split) or as JSON; empty: no items, "
+           "regions or rules"},
           p.procedure);
     visit({"mirror",
            "the procedure is written for the other side of the body: its directions and curves turn about x = 0"},

@@ -19,7 +19,9 @@ struct ScoreCommand {
     std::string case_folder;
   };
   static void describe(Params& p, auto& visit) {
-    visit({"procedure", "what was to be done, as JSON (pipelines/procedures); empty: no items, regions or rules"},
+    visit({"procedure",
+           "what was to be done, by name (mastoidectomy, mastoid-window, mandible-split) or as JSON; empty: no items, "
+           "regions or rules"},
           p.procedure);
     visit({"mirror",
            "the procedure is written for the other side of the body: its directions and curves turn about x = 0"},

@@ -23,7 +23,8 @@ struct SimulateTraineeCommand {
     visit({"skill",
            "expert or novice, then KEY=VALUE by commas, like 'novice, undercut=0.8'; what is not named is an expert's"},
           p.skill);
-    visit({"procedure", "what is to be done, as JSON (pipelines/procedures)"}, p.procedure);
+    visit({"procedure", "what is to be done, by name (mastoidectomy, mastoid-window, mandible-split) or as JSON"},
+          p.procedure);
     visit({"mirror",
            "the procedure is written for the other side of the body: its directions and curves turn about x = 0"},
           p.mirror);

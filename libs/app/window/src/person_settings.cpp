@@ -8,6 +8,7 @@
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/base/translate.h"
+#include "osteo/simulation/bone/posture.h"
 
 namespace osteo::inline app {
 namespace {
@@ -74,6 +75,11 @@ PersonSettings::PersonSettings(std::filesystem::path file) : file_(std::move(fil
             std::find(kLanguages.begin(), kLanguages.end(), values.language) == kLanguages.end()) {
           values.language = PersonValues{}.language;
           throw json.wrong(m.value, "'language' is auto, en, de, es, fr or zh_CN");
+        }
+        constexpr auto kPositions = enum_names(Posture{});
+        if (std::find(kPositions.begin(), kPositions.end(), values.position) == kPositions.end()) {
+          values.position = PersonValues{}.position;
+          throw json.wrong(m.value, "'position' is supine, prone, sitting, left_side or right_side");
         }
         if (const double n = values.motion_one_to; n != 1 && n != 2 && n != 4 && n != 8) {
           values.motion_one_to = PersonValues{}.motion_one_to;

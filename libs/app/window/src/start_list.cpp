@@ -62,8 +62,8 @@ std::vector<fs::path> sessions_of(const fs::path& the_case) {
   return found;
 }
 
-StartList::StartList(std::vector<fs::path> recent, fs::path from)
-    : recent_(std::move(recent)), folder_(fs::absolute(from)) {
+StartList::StartList(std::vector<fs::path> recent, fs::path from, fs::path demo)
+    : recent_(std::move(recent)), folder_(fs::absolute(from)), demo_(std::move(demo)) {
   list();
 }
 
@@ -76,6 +76,10 @@ void StartList::list() {
     entries_.push_back({Group::recent, there ? FolderKind::the_case : FolderKind::nothing, r,
                         (there ? name_of(r) : filled(tr("{name}  (no longer there)"), {{"name", name_of(r)}})) + "   " +
                             r.parent_path().string()});
+  }
+  if (!demo_.empty() && std::find(recent_.begin(), recent_.end(), demo_) == recent_.end()) {
+    const bool there = look_at_path(demo_).kind == FolderKind::the_case;
+    entries_.push_back({Group::recent, there ? FolderKind::the_case : FolderKind::demo, demo_, tr("demo ear")});
   }
   // Of the case opened last, or of the one that is looked into.
   const bool inside = look_at_path(folder_).kind == FolderKind::the_case;
@@ -151,7 +155,18 @@ std::optional<StartChoice> StartList::open() {
     look_into(entry.folder);
     return std::nullopt;
   }
+  if (entry.kind == FolderKind::demo) {
+    wants_demo_ = true;
+    return std::nullopt;
+  }
   return take_one(entry.folder);
+}
+
+void StartList::refresh(const fs::path& chosen) {
+  list();
+  for (std::size_t n = 0; n < entries_.size(); ++n) {
+    if (entries_[n].folder == chosen) return select(static_cast<int>(n));
+  }
 }
 
 std::optional<StartChoice> choice_of(const fs::path& path, std::string& why) {

@@ -4,13 +4,14 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "osteo/app/window/start_page.h"
 
 namespace osteo::inline app {
 
-enum class FolderKind { nothing, folder, the_case, session };
+enum class FolderKind { nothing, folder, the_case, session, demo };
 struct FolderLook {
   FolderKind kind = FolderKind::nothing;
   std::filesystem::path folder;
@@ -31,14 +32,16 @@ class StartList {
  public:
   static constexpr std::size_t kMaxListed = 500;
   /// `from`: the folder that the browser begins in; one that cannot be read is told in message().
-  StartList(std::vector<std::filesystem::path> recent, std::filesystem::path from);
+  /// `demo`: the case of the demo ear, offered behind those opened last, whether it is there yet or not; empty: none.
+  StartList(std::vector<std::filesystem::path> recent, std::filesystem::path from, std::filesystem::path demo = {});
 
   [[nodiscard]] const std::vector<StartEntry>& entries() const { return entries_; }
   [[nodiscard]] int selected() const { return selected_; }
   void select(int entry);
   void move(int by);  ///< stops at the ends
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
-  /// Opens the entry: a folder is looked into; a case or a session is a choice.
+  /// Opens the entry: a folder is looked into; a case or a session is a choice; of a demo that is not there yet
+  /// wants_demo() is set.
   std::optional<StartChoice> open();
   void up();  ///< to the folder above
   /// What was dropped onto the window, or chosen in a dialog: of several things the first that is a case or a session.
@@ -47,13 +50,18 @@ class StartList {
   [[nodiscard]] const std::string& message() const { return message_; }
   void say(std::string text) { message_ = std::move(text); }
   void forget_recent();
+  /// Once: the demo is to be made.
+  [[nodiscard]] bool wants_demo() { return std::exchange(wants_demo_, false); }
+  /// Looks again, and stays with the entry of that folder.
+  void refresh(const std::filesystem::path& chosen);
 
  private:
   std::optional<StartChoice> take_one(const std::filesystem::path& path);
   void list();
   void look_into(const std::filesystem::path& folder);
   std::vector<std::filesystem::path> recent_;
-  std::filesystem::path folder_;
+  std::filesystem::path folder_, demo_;
+  bool wants_demo_ = false;
   std::vector<StartEntry> entries_;
   int selected_ = 0;
   std::string message_;

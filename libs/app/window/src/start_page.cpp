@@ -1,16 +1,28 @@
 #include "osteo/app/window/start_page.h"
 
+// GLEW, through VTK, must come before anything that includes GL.
+#include <vtk_glew.h>
+
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
+#include <map>
+#include <string>
 #include <utility>
 
+#include "case_card.h"
+#include "demo_ear.h"
 #include "file_dialog.h"
+#include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/translate.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/simulation/bone/posture.h"
 #include "start_list.h"
+#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -21,6 +33,8 @@ enum : int {
   kKeyEscape = 256,
   kEnter = 257,
   kBackspace = 259,
+  kRight = 262,
+  kLeft = 263,
   kDown = 264,
   kUp = 265,
   kPageUp = 266,
@@ -29,56 +43,371 @@ enum : int {
   kKeypadEnter = 335
 };
 
-void write_state(const StartList& list, std::uint64_t pictures, int em_pixels, const std::filesystem::path& file) {
-  if (file.empty()) return;
-  Json entries = Json::list();
-  for (const StartEntry& e : list.entries()) entries.push_back(e.words);
-  const Json j{{"page", "start"},
-               {"pictures", pictures},
-               {"entries", entries},
-               {"selected", list.selected()},
-               {"message", list.message()},
-               {"tick", 0},
-               {"em_pixels", em_pixels},
-               {"folder", list.folder().string()},
-               {"language", enum_names(Language{})[static_cast<std::size_t>(language())]}};
-  const std::filesystem::path beside = file.string() + ".new";
-  std::ofstream(beside) << j.dump() << '\n';
-  std::error_code ignored;
-  std::filesystem::rename(beside, file, ignored);
-}
+// Names of the built-in procedures, for the catalogues: what their files say is looked up here.
+[[maybe_unused]] constexpr const char* kProcedureNames[] = {tr_later("Cortical mastoidectomy with facial recess"),
+                                                            tr_later("Window into the mastoid"),
+                                                            tr_later("Mandible sawn on both sides and drawn forward")};
 
-// True when an entry was double-clicked.
-bool draw_entries(StartList& list, bool follow) {
-  bool opened = false;
-  StartEntry::Group group{};
-  bool first = true;
-  int n = 0;
-  for (const StartEntry& e : list.entries()) {
-    if (first || e.group != group) {
-      if (!first) ImGui::Dummy({0, em() * 0.4F});
-      const char* const groups[] = {tr("opened last"), tr("sessions"), tr("folders in {folder}")};
-      ImGui::TextDisabled("%s",
-                          filled(groups[static_cast<int>(e.group)], {{"folder", list.folder().string()}}).c_str());
-      group = e.group;
-      first = false;
-    }
-    ImGui::PushID(n);
-    const bool dull = e.kind == FolderKind::nothing || e.kind == FolderKind::folder;
-    const bool selected = n == list.selected();
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(dull ? theme().quiet : theme().text));
-    if (ImGui::Selectable(((selected ? "> " : "   ") + e.words).c_str(), selected,
-                          ImGuiSelectableFlags_AllowDoubleClick)) {
-      list.select(n);
-      opened = opened || ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left);
-    }
-    ImGui::PopStyleColor();
-    if (selected && follow) ImGui::SetScrollHereY();
-    ImGui::PopID();
-    ++n;
+// Previews of cases as textures; one is read a picture.
+class Previews {
+ public:
+  Previews() = default;
+  ~Previews() {
+    for (const auto& [file, texture] : made_) glDeleteTextures(1, &texture);
   }
-  return opened;
-}
+  Previews(const Previews&) = delete;
+  Previews& operator=(const Previews&) = delete;
+  void begin() { read_ = false; }
+  // 0: there is none, or not yet.
+  GLuint of(const std::filesystem::path& file) {
+    if (file.empty()) return 0;
+    if (const auto known = made_.find(file); known != made_.end()) return known->second;
+    if (std::exchange(read_, true)) return 0;
+    GLuint& texture = made_[file];
+    try {
+      const Picture picture = load_picture(file);
+      glGenTextures(1, &texture);
+      glBindTexture(GL_TEXTURE_2D, texture);
+      glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+      glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+      glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+      glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, picture.width, picture.height, 0, GL_RGB, GL_UNSIGNED_BYTE,
+                   picture.rgb.data());
+      glBindTexture(GL_TEXTURE_2D, 0);
+    } catch (const Error&) {
+      texture = 0;  // a card without a picture
+    }
+    return texture;
+  }
+
+ private:
+  std::map<std::filesystem::path, GLuint> made_;
+  bool read_ = false;
+};
+
+class StartPage {
+ public:
+  StartPage(PersonSettings& person, const StartOptions& options)
+      : person_(person),
+        options_(options),
+        demo_(options.osteo, DemoEar::usual_folder()),
+        list_(person.cases(), options.folder.empty() ? std::filesystem::current_path() : options.folder,
+              demo_.offered() ? demo_.the_case() : std::filesystem::path()) {
+    list_.say(options.message);
+  }
+
+  StartList& list() { return list_; }
+  bool follow = true, open = false, close = false, ask = false;
+
+  void poll() {
+    if (list_.wants_demo()) {
+      if (const std::string why = demo_.make(); !why.empty()) list_.say(why);
+    }
+    if (const auto ended = demo_.poll()) {
+      if (!ended->empty()) list_.say(filled(tr("the demo ear could not be made: {why}"), {{"why", *ended}}));
+      cards_.erase(demo_.the_case());
+      list_.refresh(demo_.the_case());
+      follow = true;
+    }
+  }
+
+  void draw(float wide, float high) {
+    previews_.begin();
+    at_.clear();
+    const float u = unit();
+    // Beside each other where both have room, else one below the other.
+    const bool beside = wide >= 860 * u;
+    const float panel = beside ? std::min(368 * u, 0.3F * wide) : wide;
+    begin_fixed("start", {0, 0, beside ? wide - panel : wide, high});
+    ImDrawList* const draw = ImGui::GetWindowDrawList();
+    const ImVec2 at = ImGui::GetCursorScreenPos();
+    const float room = ImGui::GetContentRegionAvail().x;
+    draw_icon(draw, {at.x, at.y + 2 * u}, 28 * u, "bone", im_colour32(theme().text));
+    fitted_text(draw, {at.x + 40 * u, at.y, room - 40 * u, 32 * u}, 1.5F * em(), theme().text, "Osteotome", false,
+                true);
+    ImGui::Dummy({0, 40 * u});
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
+    ImGui::TextWrapped(
+        "%s", tr("Choose a case with Up, Down and Enter, or drop one here: a folder made by 'osteo prepare'."));
+    ImGui::PopStyleColor();
+    if (!list_.message().empty()) {
+      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
+      ImGui::TextWrapped("! %s", list_.message().c_str());
+      ImGui::PopStyleColor();
+    }
+    draw_entries();
+    if (beside) {
+      ImGui::End();
+      begin_fixed("start panel", {wide - panel, 0, panel, high});
+    } else {
+      ImGui::Separator();
+    }
+    draw_panel();
+    ImGui::End();
+  }
+
+  void write_state(std::uint64_t pictures, int em_pixels) const {
+    const std::filesystem::path& file = options_.state_file;
+    if (file.empty()) return;
+    Json entries = Json::list(), at = Json::object();
+    for (const StartEntry& e : list_.entries()) entries.push_back(e.words);
+    for (const auto& [name, place] : at_) at[name] = Json{static_cast<double>(place.x), static_cast<double>(place.y)};
+    const PersonValues& v = person_.values;
+    const Json j{{"page", "start"},
+                 {"pictures", pictures},
+                 {"entries", entries},
+                 {"selected", list_.selected()},
+                 {"message", list_.message()},
+                 {"tick", 0},
+                 {"em_pixels", em_pixels},
+                 {"folder", list_.folder().string()},
+                 {"procedure", v.procedure},
+                 {"dust", v.dust},
+                 {"making_demo", demo_.making()},
+                 {"at", at},
+                 {"cut_texts", Json(texts_cut())},
+                 {"language", enum_names(Language{})[static_cast<std::size_t>(language())]}};
+    const std::filesystem::path beside = file.string() + ".new";
+    std::ofstream(beside) << j.dump() << '\n';
+    std::error_code ignored;
+    std::filesystem::rename(beside, file, ignored);
+  }
+
+ private:
+  void heading(const std::string& words) {
+    ImGui::Dummy({0, 4 * unit()});
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
+    ImGui::TextWrapped("%s", words.c_str());
+    ImGui::PopStyleColor();
+  }
+
+  // Where the middle of the last item is, for who drives the page.
+  void note(const std::string& name) {
+    const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
+    at_[name] = {(lo.x + hi.x) / 2, (lo.y + hi.y) / 2};
+  }
+
+  const CaseCard& card(const std::filesystem::path& folder) {
+    const auto known = cards_.find(folder);
+    return known != cards_.end() ? known->second : cards_.emplace(folder, card_of(folder)).first->second;
+  }
+
+  void select(int n) {
+    list_.select(n);
+    open = open || ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left);
+  }
+
+  void draw_entries() {
+    const float u = unit();
+    const auto& entries = list_.entries();
+    const float room = ImGui::GetContentRegionAvail().x, gap = 2 * kGap * u;
+    const int columns = std::max(1, static_cast<int>((room + gap) / (260 * u + gap)));
+    const float wide =
+        std::floor(std::min(360 * u, (room - gap * static_cast<float>(columns - 1)) / static_cast<float>(columns)));
+    int column = 0;
+    bool first = true;
+    StartEntry::Group group{};
+    for (int n = 0; n < static_cast<int>(entries.size()); ++n) {
+      const StartEntry& e = entries[static_cast<std::size_t>(n)];
+      if (first || e.group != group) {
+        const char* const groups[] = {tr("Cases"), tr("Sessions"), tr("Folders in {folder}")};
+        heading(filled(groups[static_cast<int>(e.group)], {{"folder", list_.folder().string()}}));
+        group = e.group;
+        first = false;
+      }
+      ImGui::PushID(n);
+      if (e.group == StartEntry::Group::recent) {
+        if (column > 0) ImGui::SameLine(0, gap);
+        column = (column + 1) % columns;
+        draw_card_of(e, n, wide);
+      } else {
+        const std::string figures = e.kind == FolderKind::session ? figures_of(e.folder) : std::string();
+        if (list_row(e.words == ".." ? tr("the folder above (Backspace)") : e.words, figures, n == list_.selected()))
+          select(n);
+      }
+      if (n == list_.selected() && follow) ImGui::SetScrollHereY();
+      ImGui::PopID();
+    }
+    follow = false;
+  }
+
+  const std::string& figures_of(const std::filesystem::path& session) {
+    const auto known = figures_.find(session);
+    return known != figures_.end() ? known->second : figures_.emplace(session, session_figures(session)).first->second;
+  }
+
+  void draw_card_of(const StartEntry& e, int n, float wide) {
+    const float u = unit(), picture = std::floor(0.553F * wide), high = picture + 92 * u, inset = 12 * u;
+    if (ImGui::InvisibleButton("card", {wide, high})) select(n);
+    note("card " + std::to_string(n));
+    const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
+    const bool hovered = ImGui::IsItemHovered(), selected = n == list_.selected();
+    ImDrawList* const draw = ImGui::GetWindowDrawList();
+    const Theme& t = theme();
+    draw->AddRectFilled(lo, hi, im_colour32(hovered ? t.raised : t.surface), kCardRound * u);
+    const bool is_demo = e.folder == demo_.the_case(), to_make = e.kind == FolderKind::demo;
+    CaseCard shown;
+    if (to_make) {
+      shown.facts = tr("a phantom, of no patient");
+      shown.words = demo_.making()
+                        ? filled(tr("being made: {share} %"), {{"share", shown_number(100 * demo_.share(), 0)}})
+                        : std::string(tr("make it, in half a minute"));
+    } else {
+      shown = card(e.folder);
+    }
+    if (is_demo) shown.name = tr("Demo ear");
+    const ImVec2 from{lo.x + u, lo.y + u}, to{hi.x - u, lo.y + picture};
+    // The view in 3D is the last of four; its upper edge holds words.
+    if (const GLuint texture = previews_.of(shown.preview); texture != 0) {
+      draw->AddImageRounded(reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(texture)), from, to,
+                            {0.503F, 0.58F}, {1, 0.965F}, IM_COL32_WHITE, kCardRound * u, ImDrawFlags_RoundCornersTop);
+    } else {
+      draw->AddRectFilled(from, to, im_colour32(t.ground), kCardRound * u, ImDrawFlags_RoundCornersTop);
+      draw_icon(draw, {(lo.x + hi.x) / 2 - 20 * u, lo.y + picture / 2 - 20 * u}, 40 * u,
+                shown.state == CaseCard::State::broken ? "alert-triangle" : "bone", im_colour32(t.quiet));
+      if (to_make && demo_.making())
+        draw->AddRectFilled({from.x, to.y - 4 * u},
+                            {from.x + (to.x - from.x) * static_cast<float>(demo_.share()), to.y}, im_colour32(t.text));
+    }
+    const float text = wide - 2 * inset;
+    float y = lo.y + picture + 6 * u;
+    fitted_text(draw, {lo.x + inset, y, text, 26 * u}, em(), t.text, shown.name);
+    fitted_text(draw, {lo.x + inset, y + 26 * u, text, 24 * u}, kLabelEm * em(), t.quiet, shown.facts);
+    y += 52 * u;
+    const bool approved = shown.state == CaseCard::State::approved;
+    const Colour colour = approved ? palette::kGreen : palette::kOrange;
+    const bool sign = shown.state != CaseCard::State::plain;
+    if (sign) draw_sign(draw, {lo.x + inset + 8 * u, y + 13 * u}, 8 * u, approved ? 0 : 4, colour);
+    fitted_text(draw, {lo.x + inset + (sign ? 24 * u : 0), y, text - (sign ? 24 * u : 0), 26 * u}, kLabelEm * em(),
+                t.text, shown.words);
+    draw->AddRect(lo, hi, im_colour32(selected ? t.accent : t.line, selected ? 1 : 0.6F), kCardRound * u, 0,
+                  selected ? 3 * u : std::max(1.0F, u));
+  }
+
+  void label(const char* words) { ImGui::TextDisabled("%s", words); }
+
+  void draw_procedure() {
+    PersonValues& v = person_.values;
+    label(tr("Procedure"));
+    std::string name =
+        v.procedure.empty() ? std::string(tr("none")) : std::filesystem::path(v.procedure).filename().string();
+    for (const StartProcedure& p : options_.procedures)
+      if (p.id == v.procedure) name = tr(p.name);
+    ImGui::SetNextItemWidth(-1);
+    if (ImGui::BeginCombo("##procedure", name.c_str())) {
+      if (ImGui::Selectable(tr("none"), v.procedure.empty())) v.procedure.clear();
+      for (const StartProcedure& p : options_.procedures) {
+        if (ImGui::Selectable(tr(p.name).c_str(), p.id == v.procedure)) v.procedure = p.id;
+        note(p.id);
+      }
+      ImGui::EndCombo();
+    }
+    note("procedure");
+    if (!v.procedure.empty() && kit_switch(tr("For the other side, mirrored"), v.mirror_procedure)) {
+    }
+  }
+
+  void draw_position() {
+    PersonValues& v = person_.values;
+    static constexpr const char* kNames[] = {tr_later("Supine"), tr_later("Prone"), tr_later("Sitting"),
+                                             tr_later("On the left side"), tr_later("On the right side")};
+    constexpr auto kIds = enum_names(Posture{});
+    const auto* const at = std::find(kIds.begin(), kIds.end(), v.position);
+    label(tr("Patient position"));
+    ImGui::SetNextItemWidth(-1);
+    if (!ImGui::BeginCombo("##position", tr(kNames[at == kIds.end() ? 0 : at - kIds.begin()]))) return;
+    for (std::size_t n = 0; n < kIds.size(); ++n)
+      if (ImGui::Selectable(tr(kNames[n]), v.position == kIds[n])) v.position = kIds[n];
+    ImGui::EndCombo();
+  }
+
+  void toggle(const char* name, const char* words, bool& on) {
+    static_cast<void>(kit_switch(words, on));
+    note(name);
+  }
+
+  // The second of two buttons, where both have room.
+  static void next_beside(const std::string& first, const std::string& second, float room) {
+    const float half = (room - kGap * unit()) / 2;
+    if (std::max(button_width(first), button_width(second)) <= half) ImGui::SameLine(0, kGap * unit());
+  }
+
+  void draw_panel() {
+    const float u = unit();
+    PersonValues& v = person_.values;
+    const auto& entries = list_.entries();
+    const StartEntry* const e = list_.selected() < static_cast<int>(entries.size())
+                                    ? &entries[static_cast<std::size_t>(list_.selected())]
+                                    : nullptr;
+    const bool can_open = e != nullptr && (e->kind == FolderKind::the_case || e->kind == FolderKind::session);
+    ImGui::Dummy({0, 4 * u});
+    const ImVec2 at = ImGui::GetCursorScreenPos();
+    const float room = ImGui::GetContentRegionAvail().x, half = std::floor((room - kGap * u) / 2);
+    if (e != nullptr && e->kind == FolderKind::the_case) {
+      const CaseCard& shown = card(e->folder);
+      const bool is_demo = e->folder == demo_.the_case();
+      fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, room, 30 * u}, 1.25F * em(), theme().text,
+                  is_demo ? std::string(tr("Demo ear")) : shown.name, false, true);
+      ImGui::Dummy({0, 30 * u});
+      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
+      if (!shown.structures.empty()) ImGui::TextWrapped("%s", shown.structures.c_str());
+      ImGui::TextWrapped("%s", (shown.why.empty() ? shown.words : shown.why).c_str());
+      ImGui::PopStyleColor();
+    } else {
+      fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, room, 30 * u}, 1.25F * em(), theme().text,
+                  e == nullptr ? std::string() : e->words, false, true);
+      ImGui::Dummy({0, 30 * u});
+    }
+    ImGui::Dummy({0, kGap * u});
+    draw_procedure();
+    toggle("dust", tr("Bone dust and irrigation"), v.dust);
+    toggle("sound", tr("Sound"), v.sound);
+    toggle("heat", tr("Heat"), v.heat);
+    toggle("monitor", tr("Nerve monitor"), v.monitor);
+    toggle("hints", tr("Hints"), v.hints);
+    draw_position();
+    ImGui::Dummy({0, 2 * kGap * u});
+    if (can_open) {
+      // The layout of the last time is what Enter opens.
+      const bool plan = v.layout == "plan";
+      if (kit_button(tr("Operate"), plan ? ButtonLook::usual : ButtonLook::main, half)) open_in("operate");
+      note("operate");
+      next_beside(tr("Operate"), tr("Plan"), room);
+      if (kit_button(tr("Plan"), plan ? ButtonLook::main : ButtonLook::usual, half)) open_in("plan");
+      note("plan");
+    } else if (e != nullptr && e->kind == FolderKind::demo) {
+      if (!demo_.making() && kit_button(tr("Make the demo ear"), ButtonLook::main, room)) open = true;
+      note("make demo");
+    } else if (e != nullptr && e->kind == FolderKind::folder) {
+      if (kit_button(tr("Look into it"), ButtonLook::main, room)) open = true;
+    }
+    ImGui::Dummy({0, kGap * u});
+    if (FileDialog::there() && kit_button(tr("Choose a folder (O)"), ButtonLook::usual, room)) ask = true;
+    toggle("remember", tr("Remember cases"), v.remember_cases);
+    if (!person_.cases().empty()) {
+      if (kit_button(tr("Forget them"), ButtonLook::usual, half)) {
+        person_.forget_cases();
+        list_.forget_recent();
+      }
+      next_beside(tr("Forget them"), tr("Close (Q)"), room);
+    }
+    if (kit_button(tr("Close (Q)"), ButtonLook::usual, half)) close = true;
+  }
+
+  void open_in(const char* layout) {
+    person_.values.layout = layout;
+    open = true;
+  }
+
+  PersonSettings& person_;
+  const StartOptions& options_;
+  DemoEar demo_;
+  StartList list_;
+  Previews previews_;
+  std::map<std::filesystem::path, CaseCard> cards_;
+  std::map<std::filesystem::path, std::string> figures_;
+  std::map<std::string, ImVec2> at_;
+};
 
 }  // namespace
 
@@ -86,78 +415,43 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
   take_theme(person.values.theme);
   use_language(language_named(person.values.language));
   shell.set_title("Osteotome");
-  StartList list(person.cases(), options.folder.empty() ? std::filesystem::current_path() : options.folder);
-  list.say(options.message);
+  StartPage page(person, options);
+  StartList& list = page.list();
   std::optional<StartChoice> choice;
   shell.mirror_mouse = person.values.mirror_mouse;
-  bool open = false, close = false, follow = true, ask = false;
   FileDialog dialog;
   const bool dialogs = FileDialog::there();
   shell.on_key = [&](int key, int action, int) {
     if (action == 0) return;
-    if (key == kDown || key == kUp) list.move(key == kDown ? 1 : -1);
+    if (key == kDown || key == kRight) list.move(1);
+    if (key == kUp || key == kLeft) list.move(-1);
     if (key == kPageDown || key == kPageUp) list.move(key == kPageDown ? 10 : -10);
     if (key == kBackspace) list.up();
-    if (key == kEnter || key == kKeypadEnter) open = true;
+    if (key == kEnter || key == kKeypadEnter) page.open = true;
     if (key == kF11) {
       shell.toggle_full_screen();
       person.values.full_screen = shell.full_screen();
     }
-    if (key == 'O' && dialogs) ask = true;
-    if (key == 'Q' || key == kKeyEscape) close = true;
-    follow = true;
+    if (key == 'O' && dialogs) page.ask = true;
+    if (key == 'Q' || key == kKeyEscape) page.close = true;
+    page.follow = true;
   };
   ImGui::GetIO().ConfigFlags &= ~ImGuiConfigFlags_NavEnableKeyboard;
   std::uint64_t pictures = 0;
-  while (!choice && !close && !shell.closing() && !(options.stop && options.stop())) {
+  while (!choice && !page.close && !shell.closing() && !(options.stop && options.stop())) {
     if (!shell.poll()) continue;
+    page.poll();
     if (const auto dropped = shell.take_dropped(); !dropped.empty()) choice = list.take(dropped);
-    if (std::exchange(ask, false)) list.say(dialog.is_open() ? list.message() : dialog.open(list.folder()));
+    if (std::exchange(page.ask, false)) list.say(dialog.is_open() ? list.message() : dialog.open(list.folder()));
     if (const auto answer = dialog.poll()) {
       list.say(answer->why);
       if (answer->chosen) choice = list.take({*answer->chosen});
     }
     shell.new_frame();
-    const auto w = static_cast<float>(shell.width()), h = static_cast<float>(shell.height());
-    const float e = em(), wide = std::min(w, 60 * e);
-    begin_fixed("start", {std::floor((w - wide) / 2), 0, wide, h}, ImGuiWindowFlags_NoScrollbar);
-    const ImVec2 at = ImGui::GetCursorScreenPos();
-    fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, wide - 2 * e, 2.2F * e}, 2.2F * e, theme().text, "Osteotome");
-    ImGui::Dummy({0, 2.4F * e});
-    ImGui::TextWrapped(
-        "%s",
-        tr("Choose a case: a folder made by 'osteo prepare', or drop one here. Up, Down and Enter; Backspace: the "
-           "folder above; Q: close."));
-    if (!list.message().empty()) {
-      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
-      ImGui::TextWrapped("! %s", list.message().c_str());
-      ImGui::PopStyleColor();
-    }
-    const float below = ImGui::GetFrameHeightWithSpacing() * 2 + e * 1.2F;
-    ImGui::BeginChild("list", {0, std::max(4 * e, ImGui::GetContentRegionAvail().y - below)}, true);
-    open = draw_entries(list, std::exchange(follow, false)) || open;
-    ImGui::EndChild();
-    if (ImGui::Button(tr("open (Enter)"))) open = true;
-    ImGui::SameLine();
-    if (ImGui::Button(tr("the folder above (Backspace)"))) list.up();
-    if (dialogs) {
-      ImGui::SameLine();
-      if (ImGui::Button(tr("dialog (O)"))) ask = true;
-    }
-    ImGui::SameLine();
-    if (ImGui::Button(tr("close (Q)"))) close = true;
-    ImGui::Checkbox(tr("remember cases"), &person.values.remember_cases);
-    ImGui::SameLine();
-    if (ImGui::Button(tr("forget them"))) {
-      person.forget_cases();
-      list.forget_recent();
-    }
-    ImGui::SameLine();
-    ImGui::TextDisabled("%s", tr("text: Ctrl +, Ctrl -"));
-    ImGui::End();
-    if (std::exchange(open, false)) choice = list.open();
+    page.draw(static_cast<float>(shell.width()), static_cast<float>(shell.height()));
+    if (std::exchange(page.open, false)) choice = list.open();
     shell.show_page();
-    write_state(list, ++pictures, shell.em_pixels(), options.state_file);
+    page.write_state(++pictures, shell.em_pixels());
   }
   shell.on_key = nullptr;
   return choice;

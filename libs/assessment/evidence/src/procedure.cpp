@@ -8,6 +8,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
+#include "procedures_json.h"
 
 namespace osteo::inline assessment {
 namespace {
@@ -263,8 +264,26 @@ Procedure parse_procedure(std::string_view json, const std::string& name) {
   return p;
 }
 
+std::vector<std::string> built_in_procedures() {
+  std::vector<std::string> names;
+  for (const auto& [file, text] : kProceduresJson) names.emplace_back(file.substr(0, file.rfind('.')));
+  return names;
+}
+
+std::string procedure_text(const std::filesystem::path& file) {
+  std::error_code unknown;
+  if (std::filesystem::exists(file, unknown)) return read_text(file);
+  std::string names;
+  for (const auto& [name, text] : kProceduresJson) {
+    const std::string known(name.substr(0, name.rfind('.')));
+    if (file == known) return std::string(text);
+    names += (names.empty() ? "" : ", ") + known;
+  }
+  throw Error(ExitCode::no_input, "there is no procedure '" + file.string() + "'", "a JSON file, or one of " + names);
+}
+
 Procedure load_procedure(const std::filesystem::path& file) {
-  return parse_procedure(read_text(file), file.filename().string());
+  return parse_procedure(procedure_text(file), file.filename().string());
 }
 
 Procedure mirrored(Procedure p) {

@@ -22,6 +22,8 @@ struct PersonValues {
   bool full_screen = false, sound = true, alarms = false, remember_cases = true, first_steps = true;
   bool hints = false;
   std::string hints_off;
+  bool dust = false, heat = false, monitor = false, mirror_procedure = false;
+  std::string procedure, position = "supine";
   double volume = 0.7;
   double motion_one_to = 1, wrist_rest = 0.2, burr_share = 1;
   bool left_handed = false, mirror_mouse = false;
@@ -43,6 +45,13 @@ struct PersonValues {
     visit({"left_handed", "the drill is held from the left, the second hand comes from the right"}, p.left_handed);
     visit({"mirror_mouse", "the mouse's right and left button change places"}, p.mirror_mouse);
     visit({"hints", "words while one drills: not seen, press less, ..."}, p.hints);
+    visit({"procedure", "procedure of the cases that the start page opens: a name or a file; empty: none"},
+          p.procedure);
+    visit({"mirror_procedure", "it is for the other side of the body"}, p.mirror_procedure);
+    visit({"dust", "bone dust and irrigation, from the start page"}, p.dust);
+    visit({"heat", "how warm drilling makes bone, from the start page"}, p.heat);
+    visit({"monitor", "the nerve monitor, from the start page"}, p.monitor);
+    visit({"position", "how the patient lies: supine, prone, sitting, left_side or right_side"}, p.position);
     visit({"hints_off", "those that are never said, by name, with commas between them"}, p.hints_off);
   }
   friend bool operator==(const PersonValues&, const PersonValues&) = default;

@@ -16,11 +16,18 @@ struct StartChoice {
   std::filesystem::path resume;  ///< a session to go on from; empty: from the whole bone
 };
 
+/// A procedure to choose: by its name for load_procedure(), and as people call it.
+struct StartProcedure {
+  std::string id, name;
+};
+
 struct StartOptions {
   std::string message;               ///< why one is here again, such as what is wrong with a case
   std::filesystem::path folder;      ///< that the browser begins in; empty: the current one
   std::filesystem::path state_file;  ///< as of the rehearsal's window
   std::function<bool()> stop;        ///< asked before each picture
+  std::vector<StartProcedure> procedures;
+  std::filesystem::path osteo;  ///< the program that makes the demo ear; empty: it is offered only where it is there
 };
 
 /// What a path that was dropped stands for: a case, a session or a file that one is known by; else nothing, and `why`

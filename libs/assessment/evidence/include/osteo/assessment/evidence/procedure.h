@@ -195,8 +195,12 @@ class FacePart {
 /// `name` as errors call it. Strict: Error(usage) with file, item and line for a key that is not known or says nothing
 /// for its kind, a structure or an item that is not declared, two of one name, what is out of range.
 [[nodiscard]] Procedure parse_procedure(std::string_view json, const std::string& name);
-/// Errors as above; no_input.
+/// A file, or a name of built_in_procedures() where no file of that name is there. Errors as above; no_input.
 [[nodiscard]] Procedure load_procedure(const std::filesystem::path& file);
+/// Those that are part of the program, "mastoidectomy" first: the files in pipelines/procedures, without ".json".
+[[nodiscard]] std::vector<std::string> built_in_procedures();
+/// The text that load_procedure() reads.
+[[nodiscard]] std::string procedure_text(const std::filesystem::path& file);
 /// The same for the other side of the body: x of all directions, curves and patches turns its sign (about the plane x =
 /// 0).
 [[nodiscard]] Procedure mirrored(Procedure procedure);
