@@ -117,7 +117,7 @@ class StartPage {
     const float u = unit();
     // Beside each other where both have room, else one below the other.
     const bool beside = wide >= 860 * u;
-    const float panel = beside ? std::min(368 * u, 0.3F * wide) : wide;
+    const float panel = beside ? std::min(400 * u, 0.32F * wide) : wide;
     begin_fixed("start", {0, 0, beside ? wide - panel : wide, high});
     ImDrawList* const draw = ImGui::GetWindowDrawList();
     const ImVec2 at = ImGui::GetCursorScreenPos();
@@ -294,6 +294,7 @@ class StartPage {
     for (const StartProcedure& p : options_.procedures)
       if (p.id == v.procedure) name = tr(p.name);
     ImGui::SetNextItemWidth(-1);
+    name = shortened(name, ImGui::GetContentRegionAvail().x - 3 * em(), ImGui::GetFontSize());
     if (ImGui::BeginCombo("##procedure", name.c_str())) {
       if (ImGui::Selectable(tr("none"), v.procedure.empty())) v.procedure.clear();
       for (const StartProcedure& p : options_.procedures) {
@@ -303,8 +304,7 @@ class StartPage {
       ImGui::EndCombo();
     }
     note("procedure");
-    if (!v.procedure.empty() && kit_switch(tr("For the other side, mirrored"), v.mirror_procedure)) {
-    }
+    if (!v.procedure.empty()) toggle("mirror", tr("For the other side, mirrored"), v.mirror_procedure);
   }
 
   void draw_position() {
