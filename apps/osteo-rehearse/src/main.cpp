@@ -170,6 +170,10 @@ struct WindowCommand {
     window.ct = open.ct;
     window.bone = open.bone;
     window.regions = open.regions;
+    if (procedure != nullptr) {
+      for (const ProcedureStructure& s : procedure->structures)
+        if (s.role == ProcedureRole::thin) window.thinned.push_back(s.name);
+    }
     window.planned_cuts = planned_cuts_of(open.files.folder);
     window.planned_cuts_file = open.files.folder / kPlannedCutsFile;
     window.stereo.mode = p.stereo;

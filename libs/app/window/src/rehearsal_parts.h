@@ -68,6 +68,7 @@ class RehearsalWindow {
   // A rehearsal has begun, perhaps with another bone.
   void show_bone(Rehearsal& rehearsal);
   void plan_and_looks(const Rehearsal& rehearsal);
+  void show_spaces(const Rehearsal& rehearsal);
   void frame();
   void take_dropped();
   void lay_out();
@@ -156,6 +157,7 @@ class RehearsalWindow {
   const std::string approval_;
   const bool approval_ended_;
   const std::vector<PlannedRegion> planned_;
+  const std::vector<std::string> thinned_;
   std::filesystem::path state_file_;
   Keyboard keyboard_;
   MouseTrail trail_;

@@ -24,6 +24,7 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
       approval_(options.approval),
       approval_ended_(options.approval_ended),
       planned_(options.regions),
+      thinned_(options.thinned),
       state_file_(options.state_file),
       controller_(person, keyboard_),
       hints_(person),
@@ -154,6 +155,7 @@ void RehearsalWindow::plan_and_looks(const Rehearsal& rehearsal) {
         control_.say([&] { return filled(tr("the case lacks the structure of region '{name}'"), {{"name", name}}); });
     }
   }
+  show_spaces(rehearsal);
   if (!actions_.notes_before) return;
   const Looks looks = looks_of(actions_.notes_before());
   if (looks.unreadable > 0)
@@ -170,6 +172,24 @@ void RehearsalWindow::plan_and_looks(const Rehearsal& rehearsal) {
     cuts_.take(*looks.cuts);
     if (regions_) regions_->show(looks.cuts->regions);
   }
+}
+
+// What the operation opens would fill the cavity, drawn as a solid body; what it thins hides what lies behind.
+void RehearsalWindow::show_spaces(const Rehearsal& rehearsal) {
+  if (!structures_) return;
+  const StructureMap& map = *rehearsal.structures();
+  std::string hidden;
+  for (std::size_t s = 0; s < structures_->all().size(); ++s) {
+    const std::string name = map.name_of(structures_->all()[s].value);
+    if (map.opened(s)) {
+      structures_->show(s, StructureLook::hidden);
+      hidden += (hidden.empty() ? "" : ", ") + tr(name);
+    } else if (std::find(thinned_.begin(), thinned_.end(), name) != thinned_.end()) {
+      structures_->show(s, StructureLook::clear);
+    }
+  }
+  if (!hidden.empty())
+    control_.say([hidden] { return filled(tr("not drawn, since it is to be opened: {names}"), {{"names", hidden}}); });
 }
 
 void RehearsalWindow::frame() {

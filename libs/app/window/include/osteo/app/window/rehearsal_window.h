@@ -42,6 +42,7 @@ struct WindowOptions {
   std::optional<Image> ct;  ///< the scan of the case, for its cuts; none: they show what the case keeps of it
   std::vector<PlannedRegion>
       regions;  ///< of a procedure, to be outlined; those of structures that the case lacks are told
+  std::vector<std::string> thinned;  ///< structures whose wall a procedure thins: clear at first, for they are spaces
   std::vector<PlannedCut> planned_cuts;     ///< to choose from
   std::filesystem::path planned_cuts_file;  ///< that a cut kept as planned is added to
   std::vector<Vec3> way;                    ///< of a recorded hand that leads; drawn; empty: none does
