@@ -23,7 +23,7 @@ constexpr Size kSizes[] = {{1024, 700}, {1280, 800}, {1920, 1080}, {2560, 1440},
 
 std::vector<ScreenBox> boxes_of(const ViewLayout& l) {
   std::vector<ScreenBox> all;
-  for (const ScreenBox& b : {l.tray, l.view, l.state, l.cuts[0], l.cuts[1], l.cuts[2], l.page}) {
+  for (const ScreenBox& b : {l.tray, l.side, l.view, l.state, l.cuts[0], l.cuts[1], l.cuts[2], l.page}) {
     if (!b.empty()) all.push_back(b);
   }
   return all;
@@ -124,6 +124,23 @@ TEST(ViewLayout, AllLayoutsFitTheSizesTheyAreFor) {
     EXPECT_EQ(panel.x, l.tray.right());
     EXPECT_EQ(panel.bottom(), l.state.y);
   }
+}
+
+// Beside four pictures of one size, where the text leaves room for it.
+TEST(ViewLayout, PlanHasASideAndFourPicturesOfOneSize) {
+  for (const Size s : kSizes) {
+    const auto em = static_cast<float>(
+        std::lround(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), 1, s.width, s.height)));
+    const ViewLayout l = lay_out(Layout::plan, s.width, s.height, em);
+    EXPECT_NEAR(l.side.width, 18 * em, 1) << s.width;
+    EXPECT_EQ(l.side.height, l.state.y);
+    for (const ScreenBox& c : l.cuts) {
+      EXPECT_NEAR(c.width, l.view.width, 1);
+      EXPECT_NEAR(c.height, l.view.height, 1);
+    }
+  }
+  EXPECT_TRUE(lay_out(Layout::plan, 1024, 900, 20).side.empty());
+  EXPECT_TRUE(lay_out(Layout::operate, 1920, 1080, 16).side.empty());
 }
 
 TEST(ViewLayout, WithoutRoomItSaysWhy) {

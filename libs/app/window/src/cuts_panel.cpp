@@ -24,6 +24,8 @@ constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoResize | ImGuiWindowFlags
 constexpr ImU32 kHead = IM_COL32(255, 170, 60, 240), kShaft = IM_COL32(190, 200, 215, 220),
                 kPlanned = IM_COL32(255, 90, 220, 230);
 
+constexpr float kListRow = 30;  // of the design's pixels
+
 float scale_now() {
   return em() / 13;
 }
@@ -175,7 +177,7 @@ void CutsPanel::begin(Rehearsal& rehearsal, StructuresView* structures, RegionsV
 
 void CutsPanel::lay_out(const ViewLayout& layout) {
   middle_ = scene_ = layout.view;
-  header_ = footer_ = {};
+  header_ = footer_ = list_ = room_ = {};
   boxes_ = {};
   // Header above, reading below: at fixed places, whatever they say.
   const ImGuiStyle& style = ImGui::GetStyle();
@@ -184,7 +186,18 @@ void CutsPanel::lay_out(const ViewLayout& layout) {
   foot_ = {};
   any_ = true;
   one_alone_ = false;
-  if (layout.shown == Layout::plan) {
+  if (!layout.side.empty()) {
+    boxes_ = layout.cuts;
+    const ScreenBox& side = layout.side;
+    header_ = {side.x, side.y, side.width, std::min(top, side.height)};
+    footer_ = {side.x, std::max(header_.bottom(), side.bottom() - bottom), side.width, std::min(bottom, side.height)};
+    // The structures have half of what is left, or less where that is enough.
+    const float left = footer_.y - header_.bottom();
+    const auto rows = static_cast<float>(structures_ == nullptr ? 0 : structures_->all().size());
+    list_ = {side.x, header_.bottom(), side.width,
+             rows > 0 ? std::min(std::floor(left / 2), line + pad + rows * kListRow * layout.unit) : 0};
+    room_ = {side.x, list_.bottom(), side.width, footer_.y - list_.bottom()};
+  } else if (layout.shown == Layout::plan) {
     boxes_ = layout.cuts;
     ScreenBox& first = boxes_.front();
     header_ = {first.x, first.y, first.width, std::min(top, first.height)};
@@ -254,12 +267,13 @@ void CutsPanel::draw(Rehearsal& rehearsal, const SawCut* planned) {
   ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
   if (!header_.empty()) header(rehearsal);
   if (!foot_.empty()) foot(rehearsal);
+  if (!list_.empty() && structures_ != nullptr) list_in_side(rehearsal);
   mouse_in_ = false;
   for (int c = 0; c < CutsControl::kCuts; ++c) one_cut(c, rehearsal, planned);
   if (!mouse_in_) control_.move({});
   if (foot_.empty() || mouse_in_) readout(rehearsal);
   ImGui::PopStyleVar();
-  if (list_open_ && structures_ != nullptr) list_structures(rehearsal);
+  if (list_open_ && list_.empty() && structures_ != nullptr) list_structures(rehearsal);
   take(rehearsal);
 }
 
@@ -292,7 +306,7 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
     control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
   ImGui::Checkbox(tr("removed"), &shown_.tint_removed);
   if (before_.empty()) shown_.tint_removed = false;
-  if (rehearsal.structures() != nullptr) {
+  if (rehearsal.structures() != nullptr && list_.empty()) {
     ImGui::SameLine();
     const std::string words =
         filled(tr("structures ({n})"), {{"n", std::to_string(rehearsal.structures()->values().size())}});
@@ -465,6 +479,41 @@ void CutsPanel::readout(const Rehearsal& rehearsal) {
   ImGui::End();
 }
 
+void CutsPanel::look_as(std::size_t number, StructureLook look, Rehearsal& rehearsal) {
+  const StructuresView::One& s = structures_->all()[number];
+  if (s.look == look) return;
+  structures_->show(number, look);
+  note_look(rehearsal, s);
+}
+
+// A row for each: a click shows it solid, clear, hidden in turns.
+void CutsPanel::list_in_side(Rehearsal& rehearsal) {
+  const StructureMap& map = *rehearsal.structures();
+  const float u = unit();
+  begin_fixed("Structures in the side", list_);
+  ImGui::TextDisabled("%s", tr("Structures"));
+  const char* const looks[] = {tr_of("look", "solid"), tr_of("look", "clear"), tr_of("look", "hidden")};
+  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
+  for (std::size_t s = 0; s < structures_->all().size(); ++s) {
+    const StructuresView::One& one = structures_->all()[s];
+    const auto look = static_cast<int>(one.look);
+    ImGui::Dummy({24 * u, kListRow * u});
+    ImGui::SameLine();
+    if (list_row(tr(map.name_of(one.value)) + "##" + std::to_string(one.value), looks[look], false, kListRow))
+      look_as(s, static_cast<StructureLook>((look + 1) % 3), rehearsal);
+    const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
+    const auto c = map.colour_of(one.value);
+    const float y = (lo.y + hi.y) / 2;
+    ImGui::GetWindowDrawList()->AddRectFilled(
+        {lo.x - 20 * u, y - 8 * u}, {lo.x - 4 * u, y + 8 * u},
+        ImGui::ColorConvertFloat4ToU32({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]),
+                                        one.look == StructureLook::hidden ? 0.35F : 1}),
+        3 * u);
+  }
+  ImGui::PopStyleVar();
+  ImGui::End();
+}
+
 void CutsPanel::list_structures(Rehearsal& rehearsal) {
   const StructureMap& map = *rehearsal.structures();
   const float scale = scale_now(), width = std::min(300 * scale, middle_.width);
@@ -474,12 +523,7 @@ void CutsPanel::list_structures(Rehearsal& rehearsal) {
                ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
                    ImGuiWindowFlags_AlwaysAutoResize);
   const char* const looks[] = {tr_of("look", "solid"), tr_of("look", "clear"), tr_of("look", "hidden")};
-  const auto take = [&](std::size_t number, StructureLook look) {
-    const StructuresView::One& s = structures_->all()[number];
-    if (s.look == look) return;
-    structures_->show(number, look);
-    note_look(rehearsal, s);
-  };
+  const auto take = [&](std::size_t number, StructureLook look) { look_as(number, look, rehearsal); };
   const auto choice = [&](const char* id, std::optional<StructureLook> now, auto&& chosen) {
     ImGui::PushID(id);
     for (int l = 0; l < 3; ++l) {

@@ -32,6 +32,8 @@ class CutsPanel {
   void lay_out(const ViewLayout& layout);
   /// Side of the cuts on the picture as the person dragged it; 0: as the layout has it.
   [[nodiscard]] float wished_width() const { return wished_width_; }
+  /// What is left of the layout's side for the instrument in hand; empty where there is no side.
+  [[nodiscard]] const ScreenBox& room() const { return room_; }
   /// Where the bone is drawn: the middle, or the place of the cut that has taken it.
   [[nodiscard]] const ScreenBox& scene() const { return scene_; }
   /// Between ImGui::NewFrame and Render. `planned`: a saw cut that is being placed; null: none.
@@ -46,6 +48,8 @@ class CutsPanel {
   void mouse_over(int cut, float corner_x, float corner_y);
   void readout(const Rehearsal& rehearsal);
   void list_structures(Rehearsal& rehearsal);
+  void list_in_side(Rehearsal& rehearsal);
+  void look_as(std::size_t number, StructureLook look, Rehearsal& rehearsal);
   void take(Rehearsal& rehearsal);
   void upload(DrawnCut cut);
   [[nodiscard]] CutsLook look() const;
@@ -62,6 +66,7 @@ class CutsPanel {
   CutsScene shown_;
   std::array<ScreenBox, CutsControl::kCuts> boxes_;
   ScreenBox header_, footer_, middle_, scene_, foot_;  // foot_: below cuts that lie on the picture
+  ScreenBox list_, room_;                              // in the layout's side
   float wished_width_ = 0;
   int chosen_ = 0;  // where one alone has room
   bool list_open_ = false, mouse_in_ = false, any_ = false, settings_open_ = false, one_alone_ = false;

@@ -376,6 +376,7 @@ void MainView::session_ended() {
 
 // What belongs to the instrument in hand, and what comes next for a new user.
 void MainView::draw_cards(const ViewScene& scene, const HandFacts& hand) {
+  if (!scene.side.empty()) return draw_side(scene, hand);
   const ScreenBox& view = layout_.view;
   const float taken = layout_.over[0].empty() ? 0 : view.right() - layout_.over[0].x;
   const char* const titles[] = {tr("Drill"), tr("Saw"), tr("Fragments"), tr("Plate")};
@@ -396,6 +397,40 @@ void MainView::draw_cards(const ViewScene& scene, const HandFacts& hand) {
   const bool card = palette_.shown() == CommandPalette::Shown::ten_keys;
   const float beside = card ? CommandPalette::card_width() + 16 * unit() : 0;
   person_.values.first_steps = draw_next_step({view.x + beside, view.y, view.width - beside, view.height}, steps_);
+}
+
+// In plan the card is beside the pictures, and with the drill the planned cuts are there.
+void MainView::draw_side(const ViewScene& scene, const HandFacts& hand) {
+  HandTools& tools = scene.control.tools();
+  const float u = unit();
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
+  begin_fixed(hand.tool != 0 || hand.saw ? "instrument" : "planned cuts", scene.side);
+  ImGui::PopStyleVar();
+  if (hand.tool != 0 || hand.saw) {
+    if (wanted_cut_ && tools.tool() == HandTools::Tool::saw) tools.choose_planned(*wanted_cut_);
+    wanted_cut_.reset();
+    const char* const titles[] = {tr("Drill"), tr("Saw"), tr("Fragments"), tr("Plate")};
+    ImGui::TextDisabled("%s", hand.saw ? tr("Saw in the hand") : titles[hand.tool]);
+    scene.draw_tools();
+    ImGui::End();
+    return;
+  }
+  ImGui::TextDisabled("%s", tr("Planned cuts"));
+  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 4 * u});
+  for (std::size_t n = 0; n < tools.planned().size(); ++n) {
+    const PlannedCut& cut = tools.planned()[n];
+    if (!list_row(cut.name + "##" + std::to_string(n), shown_number(cut.cut.kerf_mm, 1) + " mm", false)) continue;
+    wanted_cut_ = n;  // once the saw is there, which is put before the bone first
+    pressed_.press(Command::saw);
+  }
+  ImGui::PopStyleVar();
+  if (tools.planned().empty()) {
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
+    ImGui::TextWrapped("%s", tr("A cut that is placed with the saw and named is kept here."));
+    ImGui::PopStyleColor();
+  }
+  if (kit_button(tr("Place a cut"), ButtonLook::usual, ImGui::GetContentRegionAvail().x)) pressed_.press(Command::saw);
+  ImGui::End();
 }
 
 void MainView::draw_panel(const ViewScene& scene) {

@@ -41,6 +41,7 @@ struct ViewScene {
   std::function<std::optional<std::array<float, 2>>(Vec3)> project;
   std::function<void()> draw_camera;  ///< the microscope: into the panel
   std::function<void()> draw_tools;   ///< saw, fragments, plates: into their card
+  ScreenBox side;                     ///< CutsPanel::room(): where the card is then
   std::function<void()> draw_plates;  ///< those that are on the bone: into the panel
   /// What is chosen for the hand: into the panel. `show`: opened, and the keys' cursor on it.
   std::function<void(bool show)> draw_hand;
@@ -112,6 +113,7 @@ class MainView {
  private:
   void draw_panel(const ViewScene& scene);
   void draw_cards(const ViewScene& scene, const HandFacts& hand);
+  void draw_side(const ViewScene& scene, const HandFacts& hand);
   void move_focus(int by);
   void give_focus();
   void draw_palette(RehearsalControl& control);
@@ -138,7 +140,8 @@ class MainView {
   PinnedNotes notes_;
   CommandPalette palette_;
   Focus focus_ = Focus::bone;
-  bool focus_moved_ = false;  // and ImGui is to be told
+  bool focus_moved_ = false;               // and ImGui is to be told
+  std::optional<std::size_t> wanted_cut_;  // a planned one, until the saw is there
   bool asking_ = false, before_ = false, undone_ = false, write_focus_ = false;
   bool lifting_ = false, lifted_ = false, pictured_ = false;  // for the first steps
   std::size_t undo_steps_ = 0;

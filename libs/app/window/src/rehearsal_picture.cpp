@@ -161,6 +161,7 @@ ViewScene RehearsalWindow::view_scene(Rehearsal& now) {
           [this](Vec3 at) { return project(at); },
           [this] { draw_scope_panel(scope_, stereo_, scope_scene()); },
           [this, &now] { tools_->panel(control_.tools(), now, view_axes()); },
+          cuts_.room(),
           [&now] { SceneTools::fixed_plates(now); },
           [this](bool show) {
             controller_.draw(control_, show);

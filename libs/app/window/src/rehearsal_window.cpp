@@ -189,7 +189,7 @@ void RehearsalWindow::show_spaces(const Rehearsal& rehearsal) {
     }
   }
   if (!hidden.empty())
-    control_.say([hidden] { return filled(tr("not drawn, since it is to be opened: {names}"), {{"names", hidden}}); });
+    control_.say([hidden] { return filled(tr("hidden, to be opened: {names}"), {{"names", hidden}}); });
 }
 
 void RehearsalWindow::frame() {

@@ -9,8 +9,9 @@ namespace osteo::inline app {
 namespace {
 
 // Of the design, docs/design/window.md, in pixels at scale 1.
-constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPanel = 400, kPage = 544;
-constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kMinCut = 96, kMaxCut = 272;
+constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPanel = 400, kPage = 544,
+                kSide = 288;
+constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kSideWide = 960, kMinCut = 96, kMaxCut = 272;
 // Of the smallest window that operate fits: its state needs the width, its strip the height.
 constexpr double kMinWideEm = 40, kMinHighEm = 26;
 
@@ -61,10 +62,12 @@ ViewLayout lay_out(Layout wanted, int width, int height, float em, float cut_sid
   out.state = {tray, above, w - tray, state};
   out.view = {tray, 0, w - tray, above};
   if (out.shown == Layout::plan) {
-    const float left = std::floor((w - tray) / 2), top = std::floor(above / 2);
-    out.view = {tray, 0, left, top};
-    out.cuts = {ScreenBox{tray + left, 0, w - tray - left, top}, ScreenBox{tray, top, left, above - top},
-                ScreenBox{tray + left, top, w - tray - left, above - top}};
+    const float side = w >= whole(kSideWide) ? whole(kSide) : 0, from = tray + side;
+    const float left = std::floor((w - from) / 2), top = std::floor(above / 2);
+    out.side = {tray, 0, side, side > 0 ? above : 0};
+    out.view = {from, 0, left, top};
+    out.cuts = {ScreenBox{from + left, 0, w - from - left, top}, ScreenBox{from, top, left, above - top},
+                ScreenBox{from + left, top, w - from - left, above - top}};
     return out;
   }
   const std::size_t count = w >= kThreeCutsWide * u ? 3 : 1;

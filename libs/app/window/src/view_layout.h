@@ -31,6 +31,7 @@ struct ViewLayout {
   Layout shown = Layout::operate;  ///< what there was room for
   LocalText why;                   ///< when that is not what was asked for; else empty
   ScreenBox tray;                  ///< the strip of tools
+  ScreenBox side;                  ///< in plan, where there is room: grey values, structures, planned cuts; else empty
   ScreenBox view;                  ///< the bone
   ScreenBox state;                 ///< the strip of what the burr does now, at the bottom
   std::array<ScreenBox, 3> cuts;   ///< four up; empty in other layouts
