@@ -381,6 +381,7 @@ def keys():
 def main_view():
     """From the start page to the end page, by keys alone."""
     make_case()
+    osteo("import", "ct.nrrd", "series", "--quiet")
     pathlib.Path("broken").mkdir()
     pathlib.Path("broken/manifest.json").write_text('{"osteotome_case": 1')
     settings = work / "config/osteotome/settings.json"
@@ -400,6 +401,17 @@ def main_view():
         choose("broken")
         w.x("key", "Return")
         s = w.until("says why", lambda s: s.get("page") == "start" and "JSON" in s["message"])
+
+        def click(name, what, condition):
+            at = w.until(name, lambda s: name in s["at"])["at"][name]
+            w.x("mousemove", *map(round, at), "click", 1)
+            return w.until(f"{name}: {what}", condition)
+
+        # A scan becomes a case beside it.
+        choose("series")
+        click("prepare", "a case is being made", lambda s: s["making"].endswith("series-case"))
+        made = w.until("it is there", lambda s: not s["making"] and "operate" in s["at"])
+        assert made["entries"][made["selected"]] == "case: series-case" and not made["message"], made
         choose("case")
         w.x("key", "Return")
         first = w.until("the first tick", lambda s: s.get("page") != "start" and s["tick"] > 0)
@@ -421,16 +433,10 @@ def main_view():
         w.key("Home", "another case", lambda s: s.get("page") == "start")
         assert any("case" in e for e in w.state()["entries"][:1]), w.state()
         # The demo ear by the mouse alone: made, and opened with a procedure and with dust.
-
-        def click(name, what, condition):
-            at = w.until(name, lambda s: name in s["at"])["at"][name]
-            w.x("mousemove", *map(round, at), "click", 1)
-            return w.until(f"{name}: {what}", condition)
-
         demo = w.state()["entries"].index("demo ear")
         click(f"card {demo}", "chosen", lambda s: s["selected"] == demo)
-        click("make demo", "is being made", lambda s: s["making_demo"])
-        w.until("the demo can be opened", lambda s: not s["making_demo"] and "operate" in s["at"])
+        click("make demo", "is being made", lambda s: s["making"])
+        w.until("the demo can be opened", lambda s: not s["making"] and "operate" in s["at"])
         assert not w.state()["message"] and w.state()["selected"] == demo, w.state()
         click("procedure", "its list", lambda s: "mastoidectomy" in s["at"])
         click("mastoidectomy", "chosen", lambda s: s["procedure"] == "mastoidectomy")

@@ -1,10 +1,13 @@
 // What a person chose, and what the start page offers.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "case_card.h"
+#include "case_maker.h"
 #include "osteo/app/window/person_settings.h"
 #include "osteo/core/base/files.h"
 #include "scratch.h"
@@ -310,6 +313,68 @@ TEST(CaseCard, SaysWhatMattersOfACase) {
   EXPECT_EQ(session_figures(session), "15 min, 1.2 mm³; touched: dura");
   write(session / "summary.json", "{");
   EXPECT_EQ(session_figures(session), "");
+}
+
+TEST(StartList, AFolderOfDicomIsAScan) {
+  const Folders f;
+  const fs::path series = f.scratch / "cases/series";
+  write(series / "a.dcm", std::string(128, '\0') + "DICM and more");
+  write(f.scratch / "cases/short/a.dcm", "DICM");
+  EXPECT_EQ(look_at_path(series).kind, FolderKind::scan);
+  EXPECT_EQ(look_at_path(f.scratch / "cases/short").kind, FolderKind::folder);
+  StartList list({}, f.cases());
+  EXPECT_GE(index_of(list, "CT: series"), 0);
+  // As any folder it can be looked into.
+  list.select(index_of(list, "CT: series"));
+  EXPECT_FALSE(list.open());
+  EXPECT_EQ(list.folder(), series);
+  // A case of it would be beside it, and never in the place of another.
+  EXPECT_EQ(CaseMaker::case_beside(series), f.cases() / "series-case");
+  fs::create_directories(f.cases() / "series-case");
+  EXPECT_EQ(CaseMaker::case_beside(series), f.cases() / "series-case-2");
+}
+
+// A stand-in for 'osteo' that says what it would: how far it is, and what is wrong.
+TEST(CaseMaker, FollowsWhatItStartsAndSaysWhyThereIsNoCase) {
+  const test::ScratchFolder scratch;
+  const fs::path program = scratch / "osteo", scan = scratch / "a scan's", the_case = scratch / "it's here";
+  const auto does = [&](const std::string& script) {
+    write(program, "#!/bin/sh\n" + script);
+    fs::permissions(program, fs::perms::owner_all);
+  };
+  CaseMaker maker(program);
+  EXPECT_FALSE(maker.can_make());
+  const auto ended = [&] {
+    std::optional<CaseMaker::Made> made;
+    while (!(made = maker.poll())) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    return *made;
+  };
+  does(
+      "[ \"$1\" = prepare ] && [ \"$3\" = -o ] && mkdir \"$4\" && echo '{\"progress\":0.5,\"activity\":\"body\"}' "
+      ">&2\n");
+  EXPECT_TRUE(maker.can_make());
+  EXPECT_FALSE(maker.poll());
+  ASSERT_EQ(maker.make(scan, the_case), "");
+  EXPECT_EQ(maker.making(), the_case);
+  EXPECT_EQ(maker.make(scan, scratch / "another"), "") << "one at a time";
+  EXPECT_EQ(ended().why, "");
+  EXPECT_TRUE(fs::exists(the_case)) << "names with blanks and quotes";
+  EXPECT_TRUE(maker.making().empty());
+  does(
+      "echo 'scan: 0.07 s' >&2; echo \"osteo: '$2' holds no DICOM image\" >&2; echo '  give the folder' >&2; exit 4\n");
+  ASSERT_EQ(maker.make(scan, the_case), "");
+  EXPECT_EQ(ended().why, "'" + scan.string() + "' holds no DICOM image; give the folder");
+  does("exit 3\n");
+  ASSERT_EQ(maker.make(scan, the_case), "");
+  EXPECT_NE(ended().why.find("without a word"), std::string::npos);
+  // Left in the middle it is ended with all that it started.
+  does("sleep 60 & wait\n");
+  const auto begun = std::chrono::steady_clock::now();
+  {
+    CaseMaker left(program);
+    ASSERT_EQ(left.make(scan, the_case), "");
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(30));
 }
 
 TEST(StartList, TheDemoIsOfferedBehindTheCasesAndMadeWhenItIsWanted) {

@@ -107,6 +107,7 @@ CaseCard card_of(const fs::path& folder) {
       if (!fs::exists(folder / kept.name))
         return broken(filled(tr("{file} is missing: prepare it again"), {{"file", kept.name}}));
       if (role == "picture") card.preview = folder / kept.name;
+      if (role == "verdict") card.scan = read_verdict(read_text(folder / kept.name));
     }
     const Json manifest = Json::parse(text).value_or(Json());
     card.structures = names_of(manifest);

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <string>
 
+#include "osteo/imaging/dicom/verdict.h"
+
 namespace osteo::inline app {
 
 struct CaseCard {
@@ -13,6 +15,7 @@ struct CaseCard {
   std::string words;              ///< of its approval; of a broken case that it cannot be opened
   std::string why;                ///< of a broken case: what is wrong, and what to do
   std::string structures;         ///< names, the first few; empty: none
+  VerdictSummary scan;            ///< what its import found; status empty: unknown
   std::filesystem::path preview;  ///< a picture of four views (snapshot); empty: there is none
 };
 /// Never throws.

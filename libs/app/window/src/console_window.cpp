@@ -17,7 +17,7 @@
 namespace osteo::inline app {
 namespace {
 
-constexpr int kEscapeKey = 256, kF11Key = 300;  // GLFW's numbers
+constexpr int kConsoleEscape = 256, kF11Key = 300;  // GLFW's numbers
 
 // The card plays what the controller sounds like; the controller is exchanged while it is kept out.
 class ConsoleSound {
@@ -91,7 +91,7 @@ void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
   bool close = false;
   shell.on_key = [&](int key, int action, int) {
     if (action != 1) return;
-    if (key == 'Q' || key == kEscapeKey) close = true;
+    if (key == 'Q' || key == kConsoleEscape) close = true;
     if (key == kF11Key) shell.toggle_full_screen();
     if (key == 'G') panel.show_answers(!panel.answers());
     if (!controller) return;

@@ -1,6 +1,9 @@
 #include "start_list.h"
 
 #include <algorithm>
+#include <array>
+#include <fstream>
+#include <string_view>
 #include <system_error>
 
 #include "osteo/core/base/error.h"
@@ -28,6 +31,23 @@ std::string name_of(const fs::path& folder) {
   return name.empty() ? folder.string() : name.string();
 }
 
+// By the first files in it: slices lie in one folder, and what else is there is not many.
+bool holds_dicom(const fs::path& folder) {
+  constexpr int kLookedAt = 4;
+  std::error_code failed;
+  int seen = 0;
+  for (fs::directory_iterator at(folder, fs::directory_options::skip_permission_denied, failed), end;
+       !failed && at != end && seen < kLookedAt; at.increment(failed)) {
+    std::error_code unknown;
+    if (!at->is_regular_file(unknown)) continue;
+    ++seen;
+    std::array<char, 132> first{};
+    std::ifstream(at->path(), std::ios::binary).read(first.data(), first.size());
+    if (std::string_view(first.data() + 128, 4) == "DICM") return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 FolderLook look_at_path(const fs::path& path) {
@@ -47,6 +67,7 @@ FolderLook look_at_path(const fs::path& path) {
   const auto has = [&](const char* name) { return fs::is_regular_file(path / name, failed); };
   if (has("manifest.json")) return {FolderKind::the_case, path, {}};
   if (has("session.json")) return {FolderKind::session, path, {}};
+  if (holds_dicom(path)) return {FolderKind::scan, path, {}};
   return {FolderKind::folder, path, {}};
 }
 
@@ -120,6 +141,7 @@ void StartList::list() {
     const FolderKind kind = look_at_path(b).kind;
     const char* const what = kind == FolderKind::the_case  ? tr("case: {name}")
                              : kind == FolderKind::session ? tr("session: {name}")
+                             : kind == FolderKind::scan    ? tr("CT: {name}")
                                                            : "{name}";
     entries_.push_back({Group::browse, kind, b, filled(what, {{"name", name_of(b)}})});
   }
@@ -151,7 +173,7 @@ void StartList::up() {
 std::optional<StartChoice> StartList::open() {
   if (selected_ >= static_cast<int>(entries_.size())) return std::nullopt;
   const StartEntry entry = entries_[static_cast<std::size_t>(selected_)];
-  if (entry.kind == FolderKind::folder) {
+  if (entry.kind == FolderKind::folder || entry.kind == FolderKind::scan) {
     look_into(entry.folder);
     return std::nullopt;
   }
@@ -211,7 +233,7 @@ std::optional<StartChoice> StartList::take_one(const fs::path& path) {
   const std::optional<StartChoice> choice = choice_of(path, why);
   if (choice) return choice;
   const FolderLook look = look_at_path(path);
-  if (look.kind == FolderKind::folder) look_into(fs::absolute(look.folder));
+  if (look.kind == FolderKind::folder || look.kind == FolderKind::scan) look_into(fs::absolute(look.folder));
   message_ = why;
   return std::nullopt;
 }

@@ -11,14 +11,15 @@
 
 namespace osteo::inline app {
 
-enum class FolderKind { nothing, folder, the_case, session, demo };
+enum class FolderKind { nothing, folder, the_case, session, demo, scan };
 struct FolderLook {
   FolderKind kind = FolderKind::nothing;
   std::filesystem::path folder;
   std::string why;  ///< of nothing: what it is instead, and what to do
 };
 /// What a path stands for. A file that a case or a session is known by (manifest.json, session.json, stream.oss) stands
-/// for its folder. Reads names only. Never throws.
+/// for its folder; a folder with DICOM files in it for a scan. Reads names, and of a few files whether they are DICOM.
+/// Never throws.
 [[nodiscard]] FolderLook look_at_path(const std::filesystem::path& path);
 
 struct StartEntry {

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "case_card.h"
-#include "demo_ear.h"
+#include "case_maker.h"
 #include "file_dialog.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
@@ -22,6 +22,7 @@
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/simulation/bone/posture.h"
 #include "start_list.h"
+#include "status_panel.h"
 #include "ui_kit.h"
 #include "ui_style.h"
 
@@ -90,9 +91,9 @@ class StartPage {
   StartPage(PersonSettings& person, const StartOptions& options)
       : person_(person),
         options_(options),
-        demo_(options.osteo, DemoEar::usual_folder()),
+        maker_(options.osteo),
         list_(person.cases(), options.folder.empty() ? std::filesystem::current_path() : options.folder,
-              demo_.offered() ? demo_.the_case() : std::filesystem::path()) {
+              offered_demo(maker_)) {
     list_.say(options.message);
   }
 
@@ -101,12 +102,12 @@ class StartPage {
 
   void poll() {
     if (list_.wants_demo()) {
-      if (const std::string why = demo_.make(); !why.empty()) list_.say(why);
+      list_.say(maker_.make_demo());
     }
-    if (const auto ended = demo_.poll()) {
-      if (!ended->empty()) list_.say(filled(tr("the demo ear could not be made: {why}"), {{"why", *ended}}));
-      cards_.erase(demo_.the_case());
-      list_.refresh(demo_.the_case());
+    if (const auto made = maker_.poll()) {
+      if (!made->why.empty()) list_.say(filled(tr("no case could be made: {why}"), {{"why", made->why}}));
+      cards_.erase(made->the_case);
+      list_.refresh(made->the_case);
       follow = true;
     }
   }
@@ -128,7 +129,7 @@ class StartPage {
     ImGui::Dummy({0, 40 * u});
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
     ImGui::TextWrapped(
-        "%s", tr("Choose a case with Up, Down and Enter, or drop one here: a folder made by 'osteo prepare'."));
+        "%s", tr("Choose a case with Up, Down and Enter, or drop one here. A folder with a CT is prepared here."));
     ImGui::PopStyleColor();
     if (!list_.message().empty()) {
       ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
@@ -163,7 +164,7 @@ class StartPage {
                  {"folder", list_.folder().string()},
                  {"procedure", v.procedure},
                  {"dust", v.dust},
-                 {"making_demo", demo_.making()},
+                 {"making", maker_.making().string()},
                  {"at", at},
                  {"cut_texts", Json(texts_cut())},
                  {"language", enum_names(Language{})[static_cast<std::size_t>(language())]}};
@@ -185,6 +186,16 @@ class StartPage {
   void note(const std::string& name) {
     const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
     at_[name] = {(lo.x + hi.x) / 2, (lo.y + hi.y) / 2};
+  }
+
+  [[nodiscard]] bool is_made(const std::filesystem::path& the_case) const { return maker_.making() == the_case; }
+
+  // Where it is there, or can be made.
+  static std::filesystem::path offered_demo(const CaseMaker& maker) {
+    const std::filesystem::path demo = CaseMaker::demo_case();
+    std::error_code unknown;
+    const bool there = !demo.empty() && std::filesystem::exists(demo / "manifest.json", unknown);
+    return there || maker.can_make() ? demo : std::filesystem::path();
   }
 
   const CaseCard& card(const std::filesystem::path& folder) {
@@ -245,12 +256,12 @@ class StartPage {
     ImDrawList* const draw = ImGui::GetWindowDrawList();
     const Theme& t = theme();
     draw->AddRectFilled(lo, hi, im_colour32(hovered ? t.raised : t.surface), kCardRound * u);
-    const bool is_demo = e.folder == demo_.the_case(), to_make = e.kind == FolderKind::demo;
+    const bool is_demo = e.folder == demo_, to_make = e.kind == FolderKind::demo;
     CaseCard shown;
     if (to_make) {
       shown.facts = tr("a phantom, of no patient");
-      shown.words = demo_.making()
-                        ? filled(tr("being made: {share} %"), {{"share", shown_number(100 * demo_.share(), 0)}})
+      shown.words = is_made(e.folder)
+                        ? filled(tr("being made: {share} %"), {{"share", shown_number(100 * maker_.share(), 0)}})
                         : std::string(tr("make it, in half a minute"));
     } else {
       shown = card(e.folder);
@@ -265,9 +276,9 @@ class StartPage {
       draw->AddRectFilled(from, to, im_colour32(t.ground), kCardRound * u, ImDrawFlags_RoundCornersTop);
       draw_icon(draw, {(lo.x + hi.x) / 2 - 20 * u, lo.y + picture / 2 - 20 * u}, 40 * u,
                 shown.state == CaseCard::State::broken ? "alert-triangle" : "bone", im_colour32(t.quiet));
-      if (to_make && demo_.making())
+      if (is_made(e.folder))
         draw->AddRectFilled({from.x, to.y - 4 * u},
-                            {from.x + (to.x - from.x) * static_cast<float>(demo_.share()), to.y}, im_colour32(t.text));
+                            {from.x + (to.x - from.x) * static_cast<float>(maker_.share()), to.y}, im_colour32(t.text));
     }
     const float text = wide - 2 * inset;
     float y = lo.y + picture + 6 * u;
@@ -332,6 +343,20 @@ class StartPage {
     if (std::max(button_width(first), button_width(second)) <= half) ImGui::SameLine(0, kGap * unit());
   }
 
+  // Of a scan: a case of it, beside it, as 'osteo prepare' makes them by itself.
+  void draw_prepare(const std::filesystem::path& scan, float room) {
+    if (!maker_.making().empty()) {
+      ImGui::TextWrapped(
+          "%s", filled(tr("{case} is being made: {share} %"), {{"case", maker_.making().filename().string()},
+                                                               {"share", shown_number(100 * maker_.share(), 0)}})
+                    .c_str());
+    } else if (maker_.can_make() && kit_button(tr("Prepare a case"), ButtonLook::main, room)) {
+      list_.say(maker_.make(scan, CaseMaker::case_beside(scan)));
+    }
+    note("prepare");
+    if (kit_button(tr("Look into it"), ButtonLook::usual, room)) open = true;
+  }
+
   void draw_panel() {
     const float u = unit();
     PersonValues& v = person_.values;
@@ -345,7 +370,7 @@ class StartPage {
     const float room = ImGui::GetContentRegionAvail().x, half = std::floor((room - kGap * u) / 2);
     if (e != nullptr && e->kind == FolderKind::the_case) {
       const CaseCard& shown = card(e->folder);
-      const bool is_demo = e->folder == demo_.the_case();
+      const bool is_demo = e->folder == demo_;
       fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, room, 30 * u}, 1.25F * em(), theme().text,
                   is_demo ? std::string(tr("Demo ear")) : shown.name, false, true);
       ImGui::Dummy({0, 30 * u});
@@ -353,6 +378,7 @@ class StartPage {
       if (!shown.structures.empty()) ImGui::TextWrapped("%s", shown.structures.c_str());
       ImGui::TextWrapped("%s", (shown.why.empty() ? shown.words : shown.why).c_str());
       ImGui::PopStyleColor();
+      draw_scan(shown.scan);
     } else {
       fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, room, 30 * u}, 1.25F * em(), theme().text,
                   e == nullptr ? std::string() : e->words, false, true);
@@ -376,8 +402,10 @@ class StartPage {
       if (kit_button(tr("Plan"), plan ? ButtonLook::main : ButtonLook::usual, half)) open_in("plan");
       note("plan");
     } else if (e != nullptr && e->kind == FolderKind::demo) {
-      if (!demo_.making() && kit_button(tr("Make the demo ear"), ButtonLook::main, room)) open = true;
+      if (maker_.making().empty() && kit_button(tr("Make the demo ear"), ButtonLook::main, room)) open = true;
       note("make demo");
+    } else if (e != nullptr && e->kind == FolderKind::scan) {
+      draw_prepare(e->folder, room);
     } else if (e != nullptr && e->kind == FolderKind::folder) {
       if (kit_button(tr("Look into it"), ButtonLook::main, room)) open = true;
     }
@@ -401,7 +429,8 @@ class StartPage {
 
   PersonSettings& person_;
   const StartOptions& options_;
-  DemoEar demo_;
+  CaseMaker maker_;
+  std::filesystem::path demo_ = CaseMaker::demo_case();
   StartList list_;
   Previews previews_;
   std::map<std::filesystem::path, CaseCard> cards_;

@@ -27,7 +27,7 @@ struct StartOptions {
   std::filesystem::path state_file;  ///< as of the rehearsal's window
   std::function<bool()> stop;        ///< asked before each picture
   std::vector<StartProcedure> procedures;
-  std::filesystem::path osteo;  ///< the program that makes the demo ear; empty: it is offered only where it is there
+  std::filesystem::path osteo;  ///< the program that makes cases; empty: none are made here
 };
 
 /// What a path that was dropped stands for: a case, a session or a file that one is known by; else nothing, and `why`
