@@ -12,7 +12,9 @@
 #include "osteo/core/base/param.h"
 #include "osteo/core/report/sheet.h"
 #include "scoring.h"
+#ifdef OSTEO_WITH_RESEARCH
 #include "study_demo.h"
+#endif
 
 namespace osteo {
 namespace {
