@@ -345,6 +345,17 @@ Plucked plucked_by(const TissueModel& model, const TissueLoad& pluck, std::span<
   return to;
 }
 
+double hz_of_four_swings(const Release& release, const MeasuredMotion& used, double guess_hz) {
+  const Trace t = release.run(Stepping::explicit_steps, 0, 1, 4 / guess_hz);
+  MeasuredMotion even = used;
+  for (auto& c : even.channels) {
+    c.time_s.clear();
+    for (int i = 0; i < 160; ++i) c.time_s.push_back(i / (40 * guess_hz));
+    c.mm.assign(c.time_s.size(), 0);
+  }
+  return swing_of(as_measured(t, even), guess_hz / 3, 2 * guess_hz).hz;
+}
+
 void need_values_close_enough(const DampingFit& fit, const DampingOptions& options) {
   if (fit.interval_s > 0.5 / fit.model_hz)
     throw Error(ExitCode::usage,
@@ -528,17 +539,8 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
   const double gently =
       std::min(1.0, 1e-2 * fit.largest_mm.front() / plucked.seen_mm);  // small, so that it is that of small motion
   release.start = pluck_by(gently);
-  {
-    const Trace t = release.run(Stepping::explicit_steps, 0, 1, 4 / guess_hz);
-    MeasuredMotion even = used;
-    for (auto& c : even.channels) {
-      c.time_s.clear();
-      for (int i = 0; i < 160; ++i) c.time_s.push_back(i / (40 * guess_hz));
-      c.mm.assign(c.time_s.size(), 0);
-    }
-    fit.model_hz = swing_of(as_measured(t, even), guess_hz / 3, 2 * guess_hz).hz;
-    ++fit.simulations;
-  }
+  fit.model_hz = hz_of_four_swings(release, used, guess_hz);
+  ++fit.simulations;
   context.progress(0.1, "fitting");
   need_values_close_enough(fit, options);
   // Not slower than half a swing in the table, where a drift would be taken for one.
