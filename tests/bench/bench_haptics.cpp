@@ -23,6 +23,7 @@
 #include "osteo/session/recording/recorder.h"
 #include "osteo/simulation/haptics/servo.h"
 #include "slab.h"
+#include "solid.h"
 #include "stability.h"
 
 namespace osteo {
@@ -341,12 +342,9 @@ void bench_haptics_fuzz(const Context&) {
     for (std::uint64_t t = 0; t < n; ++t) {
       if (t % 2'000'000 == 0) {
         const double a = 0.7 + 0.1 * static_cast<double>(t / 2'000'000 % 5);
-        bone = voxels_of(
-            {"fuzz",
-             [a](Vec3 p) { return (std::sin(a * p.x) + std::sin(1.3 * a * p.y) + std::sin(0.9 * p.z) - 0.2) * 0.6; },
-             {},
-             {}},
-            0.5);
+        bone = test::solid(
+            0.5, 9, [a](Vec3 p) { return std::sin(a * p.x) + std::sin(1.3 * a * p.y) + std::sin(0.9 * p.z) - 0.2 < 0; },
+            {}, 8);
         renderer = std::make_unique<HapticRenderer>(setup, bone, Anatomy{}, 1e-3);
         last = {};
       }

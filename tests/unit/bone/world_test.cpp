@@ -503,7 +503,7 @@ TEST(World, ARegionOfInterestTakesThePlaceOfTheCoarseBone) {
   const auto refused = [&](World& bad, const Frame& frame) -> std::string {
     const std::string before = bad.hash();
     try {
-      bad.add_region(BrickGrid(frame, bricks));
+      bad.add_region(BrickGrid::dense(frame));
     } catch (const Error& e) {
       EXPECT_EQ(bad.hash(), before);
       EXPECT_EQ(e.code(), ExitCode::usage);
@@ -539,7 +539,7 @@ TEST(World, ARegionOfInterestTakesThePlaceOfTheCoarseBone) {
   EXPECT_NE(refused(w, f).find("there is one already"), std::string::npos);
   WorldProbe::next_brick(bad) = BrickGrid::kMaxBricks - 124;
   try {
-    bad.add_region(BrickGrid(f, bricks));
+    bad.add_region(BrickGrid::dense(f));
     FAIL() << "names given twice";
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::resources);
