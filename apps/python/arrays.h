@@ -98,6 +98,8 @@ inline py::object from_json(const std::string& text) {
 /// SceneAction.
 [[nodiscard]] py::dtype action_dtype();
 
+void add_values(py::module_& m);
+void add_stages(py::module_& m);
 void add_sessions(py::module_& m);
 void add_rehearsal(py::module_& m);
 

@@ -16,7 +16,10 @@ if(OSTEO_PROGRAMS)
   endif()
   install(FILES apps/share/70-osteotome.rules DESTINATION lib/udev/rules.d COMPONENT server)
   install(FILES apps/share/osteo-receive.service apps/share/osteo-watch.service apps/share/osteo-watch-orthanc@.service DESTINATION lib/systemd/system COMPONENT server)
-  install(DIRECTORY pipelines/ DESTINATION ${CMAKE_INSTALL_DATADIR}/osteo/pipelines COMPONENT server)
+  if(NOT OSTEO_RESEARCH)
+    set(of_research PATTERN ground-truth EXCLUDE)  # what only a command that is left out reads
+  endif()
+  install(DIRECTORY pipelines/ DESTINATION ${CMAKE_INSTALL_DATADIR}/osteo/pipelines COMPONENT server ${of_research})
   install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT server)
   install(FILES README.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT server)
   # Man pages, completion and modules of 3D Slicer are made from the declarations, by the program that is installed.

@@ -319,9 +319,7 @@ void bench_pieces(const Context& context) {
     f.dims = {72, 72, 72};
     f.spacing_mm = {0.4, 0.4, 0.4};
     f.origin_mm = {-14.2, -14.2, -14.2};
-    std::vector<Ijk> bricks;
-    for (int b = 0; b < 729; ++b) bricks.push_back({b % 9, b / 9 % 9, b / 81});
-    BrickGrid g(f, bricks);
+    BrickGrid g = BrickGrid::dense(f);
     for (VoxelKey v = 0; v < g.brick_count() * BrickGrid::kVoxels; ++v) {
       const Ijk c = g.coordinate(v);
       int in = 0;
@@ -351,9 +349,7 @@ void bench_dust() {
   Frame f;
   f.dims = {192, 192, 192};
   f.spacing_mm = {0.5, 0.5, 0.5};
-  std::vector<Ijk> bricks;
-  for (int b = 0; b < 24 * 24 * 24; ++b) bricks.push_back({b % 24, b / 24 % 24, b / 576});
-  BrickGrid bone(f, bricks);
+  BrickGrid bone = BrickGrid::dense(f);
   for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) {
     const Ijk c = bone.coordinate(v);
     bone.set(v, length(Vec3{c.i - 96.0, c.j - 80.0, c.k - 96.0}) > 84 ? 1.0F : 0.0F);

@@ -367,11 +367,7 @@ void live_table() {
   Frame f;
   f.dims = {160, 160, 160};
   f.spacing_mm = {0.5, 0.5, 0.5};
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < 20; ++k)
-    for (int j = 0; j < 20; ++j)
-      for (int i = 0; i < 20; ++i) bricks.push_back({i, j, k});
-  BrickGrid bone(f, bricks);
+  BrickGrid bone = BrickGrid::dense(f);
   const auto at = [&](int i, int j, int k) { return f.world_from_index({double(i), double(j), double(k)}); };
   const Vec3 centre{40, 40, 40};
   for (int k = 0; k < 160; ++k)

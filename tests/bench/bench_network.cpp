@@ -94,8 +94,8 @@ bool row(Listed listed, double seconds) {
   crowd.reset();
   flood.reset();
   const RehearsalSummary sum = r.stop();
-  const std::uint64_t refused = stream ? stream->door()->counts().refused : 0,
-                      set = stream ? stream->door()->counts().settings : 0;
+  const std::uint64_t refused = stream ? stream->endpoint()->counts().refused : 0,
+                      set = stream ? stream->endpoint()->counts().settings : 0;
   const char* const names[] = {"nothing listed", "heat, monitor, network", "OpenIGTLink flooded",
                                "Cerebus' sender flooded", "LSL flooded"};
   std::printf("| %s | %.0f | %.0f, %.0f, %.0f | %.2f, %.1f | %.1f MB | %.1f MB | %llu | %llu |\n",

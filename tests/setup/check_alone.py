@@ -3,7 +3,8 @@
 
 The build compiles several sources of a library as one, which hides an include that one of them lacks. Here each is compiled alone, syntax only,
 with the options of its library. A header that a source includes before anything else is proved by that source; the others are compiled here too.
-Libraries that the build leaves out (copyleft, window) are named and not judged. 0 if all compile, 1 if not."""
+Libraries that the build leaves out (copyleft, window) are named and not judged. Then a build without research (OSTEO_RESEARCH=OFF) is configured, and
+those sources of its programs that could want research are compiled as there. 0 if all compile, 1 if not."""
 
 import concurrent.futures, json, os, pathlib, re, shutil, subprocess, sys, tempfile, time
 
@@ -82,8 +83,50 @@ with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
             print(
                 f"{file.relative_to(source)} does not compile by itself: let it include what it names", file=sys.stderr
             )
+
+# Without research: it can be configured, makes nothing of research, no source of a program includes what only the whole build has, and those that tell
+# the two apart compile. That no library lists one of research is held by layering.py.
+without = build / "tests/without-research"
+configured = subprocess.run(
+    ["cmake", "-S", source, "-B", without, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release"]
+    + ["-DOSTEO_RESEARCH=OFF", "-DOSTEO_TESTS=OFF", "-DOSTEO_PYTHON=OFF"],
+    capture_output=True,
+    text=True,
+)
+if configured.returncode:
+    sys.exit(f"OSTEO_RESEARCH=OFF cannot be configured:\n{configured.stderr[-2000:]}")
+research = re.search(r"^research: (.+)$", (source / "libs/layers.txt").read_text(), re.M)[1].split()
+left_in = {}  # sources of that build
+for entry in json.loads((without / "compile_commands.json").read_text()):
+    left_in[pathlib.Path(entry["directory"], entry["file"]).resolve()] = entry
+    for own in re.findall(r"osteo_(\w+)\.dir", entry["command"]):
+        if own in research:
+            failed += 1
+            print(f"OSTEO_RESEARCH=OFF builds {own} all the same", file=sys.stderr)
+absent = "|".join(sorted(p.stem for p in source.glob("apps/osteo/src/*.cpp") if p not in left_in))
+wants = re.compile(rf'^#include "(?:osteo/\w+/(?:{"|".join(research)})/.*|(?:commands/)?(?:{absent})\.h)"', re.M)
+guarded = re.compile(r"^#ifdef OSTEO_WITH_RESEARCH\n.*?^#(?:else|endif)", re.M | re.S)
+judged = []
+for path, entry in left_in.items():
+    if not path.is_relative_to(source / "apps"):
+        continue
+    text = path.read_text()
+    if found := wants.search(guarded.sub("", text)):
+        failed += 1
+        print(f"{path.relative_to(source)}: {found[0]}: OSTEO_RESEARCH=OFF leaves that out", file=sys.stderr)
+    if "OSTEO_WITH_RESEARCH" in text:
+        judged.append((path, [*options(entry["command"]), "-w"], entry["directory"]))
+if not judged:
+    sys.exit("no source of a program tells builds with research from those without: this check sees nothing")
+with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+    for (path, _, _), said in zip(judged, pool.map(lambda j: compiles(j[1], j[2], j[0]), judged)):
+        if said:
+            failed += 1
+            print("\n".join([line for line in said.splitlines() if "error" in line][:3] or [said]), file=sys.stderr)
+            print(f"{path.relative_to(source)} does not compile with OSTEO_RESEARCH=OFF", file=sys.stderr)
 print(
     f"{len(together)} sources and {len(work) - len(together)} headers compiled alone, {proved} headers are the first that such a source includes"
     + (f"; not built: {' '.join(sorted(left_out))}" if left_out else "")
+    + f"; without research: {' '.join(sorted(p.name for p, _, _ in judged))}"
 )
 sys.exit(1 if failed else 0)

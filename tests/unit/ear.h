@@ -21,11 +21,7 @@ inline Ear ear(const HeadAnatomy& head, double h) {
   f.dims = {n(20), n(16), n(16)};
   f.spacing_mm = {h, h, h};
   f.origin_mm = {40, 2, -41};
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < f.dims[2] / 8; ++k)
-    for (int j = 0; j < f.dims[1] / 8; ++j)
-      for (int i = 0; i < f.dims[0] / 8; ++i) bricks.push_back({i, j, k});
-  Ear e{BrickGrid(f, bricks), {}};
+  Ear e{BrickGrid::dense(f), {}};
   auto values = make_voxels<std::uint8_t>(f.voxel_count());
   std::size_t at = 0;
   for (int k = 0; k < f.dims[2]; ++k)

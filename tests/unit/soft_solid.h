@@ -6,15 +6,11 @@
 
 namespace osteo::test {
 
-/// All voxels of a frame (cubes; dimensions in whole bricks): bone where `depth_mm` of their centre is positive, a half
+/// All voxels of a frame (cubes): bone where `depth_mm` of their centre is positive, a half
 /// at 0, in between by the share of a voxel.
 template <class Depth>
 BrickGrid soft_solid(const Frame& f, Depth&& depth_mm) {
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < f.dims[2] / 8; ++k)
-    for (int j = 0; j < f.dims[1] / 8; ++j)
-      for (int i = 0; i < f.dims[0] / 8; ++i) bricks.push_back({i, j, k});
-  BrickGrid g(f, bricks);
+  BrickGrid g = BrickGrid::dense(f);
   for (int k = 0; k < f.dims[2]; ++k)
     for (int j = 0; j < f.dims[1]; ++j)
       for (int i = 0; i < f.dims[0]; ++i) {

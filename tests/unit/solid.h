@@ -20,11 +20,7 @@ BrickGrid solid(double h, double half_mm, Inside inside, Vec3 centre = {}, int p
   f.spacing_mm = {h, h, h};
   const double lo = -n * h / 2 + h / 2;
   f.origin_mm = centre + Vec3{lo, lo, lo};
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < n / 8; ++k)
-    for (int j = 0; j < n / 8; ++j)
-      for (int i = 0; i < n / 8; ++i) bricks.push_back({i, j, k});
-  BrickGrid g(f, bricks);
+  BrickGrid g = BrickGrid::dense(f);
   const int points = per_edge * per_edge * per_edge;
   for (int k = 0; k < n; ++k)
     for (int j = 0; j < n; ++j)

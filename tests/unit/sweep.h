@@ -23,11 +23,7 @@ inline BrickGrid block(double h, const Face& face) {
   f.dims = {static_cast<int>(16 / h), static_cast<int>(18 / h), static_cast<int>(8 / h)};
   f.spacing_mm = {h, h, h};
   f.origin_mm = {-8, -6, -5};
-  std::vector<Ijk> bricks;
-  for (int k = 0; k <= f.dims[2] / 8; ++k)
-    for (int j = 0; j <= f.dims[1] / 8; ++j)
-      for (int i = 0; i <= f.dims[0] / 8; ++i) bricks.push_back({i, j, k});
-  BrickGrid g(f, bricks);
+  BrickGrid g = BrickGrid::dense(f);
   constexpr int n = 32;
   for (int k = 0; k < f.dims[2]; ++k)
     for (int j = 0; j < f.dims[1]; ++j)

@@ -6,6 +6,7 @@
 #include "commands/review.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/param.h"
 #include "osteo/core/base/translate.h"
 
 namespace osteo {
@@ -50,8 +51,7 @@ int ReviewCommand::run(const Params& p, cli::Invocation& io) {
       name += c;
       continue;
     }
-    const auto from = name.find_first_not_of(' ');
-    if (from != std::string::npos) q.earlier.emplace_back(name.substr(from, name.find_last_not_of(' ') - from + 1));
+    if (const std::string_view own = trimmed(name); !own.empty()) q.earlier.emplace_back(own);
     name.clear();
   }
   q.pictures = !p.no_pictures;

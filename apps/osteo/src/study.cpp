@@ -12,7 +12,9 @@
 #include "osteo/core/base/param.h"
 #include "osteo/core/report/sheet.h"
 #include "scoring.h"
+#ifdef OSTEO_WITH_RESEARCH
 #include "study_demo.h"
+#endif
 
 namespace osteo {
 namespace {
@@ -25,8 +27,7 @@ std::vector<std::string> names_in(const std::string& text) {
       name += c;
       continue;
     }
-    const auto from = name.find_first_not_of(' '), to = name.find_last_not_of(' ');
-    if (from != std::string::npos) names.push_back(name.substr(from, to - from + 1));
+    if (const std::string_view own = trimmed(name); !own.empty()) names.emplace_back(own);
     name.clear();
   }
   return names;

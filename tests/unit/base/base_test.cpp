@@ -9,6 +9,7 @@
 #include "osteo/core/base/context.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
 
@@ -79,6 +80,29 @@ TEST(Param, NearestName) {
   EXPECT_EQ(nearest_name("treshold", known), "threshold");
   EXPECT_EQ(nearest_name("surfaces", known), "surface");
   EXPECT_EQ(nearest_name("banana", known), "");
+}
+
+TEST(Param, TrimmedIsAPartOfTheSameText) {
+  const std::string_view text = " \t a b\t ";
+  EXPECT_EQ(trimmed(text), "a b");
+  EXPECT_EQ(trimmed(text).data(), text.data() + 3);
+  EXPECT_EQ(trimmed("\ta ", " "), "\ta");
+  EXPECT_EQ(trimmed(" \t "), "");
+  EXPECT_EQ(trimmed(""), "");
+}
+
+TEST(Order, PlacesAreThoseOfTheSortedList) {
+  EXPECT_EQ(upper_median(std::vector<double>{}), 0);
+  EXPECT_EQ(value_at_share(std::vector<float>{}, 0.5), 0);
+  for (int n = 1; n < 12; ++n) {
+    std::vector<int> values, sorted;
+    for (int i = 0; i < n; ++i) values.push_back(i * 7 % 12);
+    sorted = values;
+    std::sort(sorted.begin(), sorted.end());
+    EXPECT_EQ(upper_median(values), sorted[static_cast<std::size_t>(n) / 2]);
+    for (const double share : {0.0, 0.25, 0.5, 0.95, 1.0})
+      EXPECT_EQ(value_at_share(values, share), sorted[static_cast<std::size_t>(share * (n - 1))]) << share;
+  }
 }
 
 TEST(Files, AtomicWriteLeavesOldFileOnFailure) {

@@ -13,11 +13,7 @@ BrickGrid empty(int bricks, double h = 0.5) {
   f.dims = {bricks * 8, bricks * 8, bricks * 8};
   f.spacing_mm = {h, h, h};
   f.origin_mm = {-3, 4, 5};
-  std::vector<Ijk> all;
-  for (int k = 0; k < bricks; ++k)
-    for (int j = 0; j < bricks; ++j)
-      for (int i = 0; i < bricks; ++i) all.push_back({i, j, k});
-  return {f, all};
+  return BrickGrid::dense(f);
 }
 
 // The flood fill of a dense mask: what labels must equal.

@@ -60,9 +60,7 @@ TEST(LiveSurface, ClosedManifoldAndEqualToARebuildAfterEveryEdit) {
   Frame f;
   f.dims = {16, 16, 16};
   f.spacing_mm = {0.5, 0.5, 0.5};
-  std::vector<Ijk> bricks;
-  for (int b = 0; b < 8; ++b) bricks.push_back({b & 1, b >> 1 & 1, b >> 2});
-  BrickGrid bone(f, bricks);
+  BrickGrid bone = BrickGrid::dense(f);
   std::mt19937 random(1);
   constexpr float kValues[] = {0, 0, 0.2F, 0.499F, 0.5F, 0.8F, 1, 1};
   LiveSurface live(bone, {});

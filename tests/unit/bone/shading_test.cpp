@@ -34,11 +34,7 @@ BrickGrid grid_of(double h, double half_mm) {
   f.dims = {n, n, n};
   f.spacing_mm = {h, h, h};
   f.origin_mm = Vec3{1, 1, 1} * (-0.5 * (n - 1) * h);
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < n / 8; ++k)
-    for (int j = 0; j < n / 8; ++j)
-      for (int i = 0; i < n / 8; ++i) bricks.push_back({i, j, k});
-  return {f, bricks};
+  return BrickGrid::dense(f);
 }
 
 template <class F>

@@ -487,9 +487,7 @@ TEST(World, ARegionOfInterestTakesThePlaceOfTheCoarseBone) {
   f.spacing_mm = {0.2, 0.2, 0.2};
   f.dims = {40, 40, 40};
   f.origin_mm = corner + Vec3{0.1, 0.1, 0.1};
-  std::vector<Ijk> bricks;
-  for (int b = 0; b < 125; ++b) bricks.push_back({b % 5, b / 5 % 5, b / 25});
-  BrickGrid fine(f, bricks);
+  BrickGrid fine = BrickGrid::dense(f);
   for (VoxelKey v = 0; v < 125 * 512; ++v) {
     const Ijk c = fine.coordinate(v);
     const Vec3 p = f.world_from_index({double(c.i), double(c.j), double(c.k)});
@@ -505,7 +503,7 @@ TEST(World, ARegionOfInterestTakesThePlaceOfTheCoarseBone) {
   const auto refused = [&](World& bad, const Frame& frame) -> std::string {
     const std::string before = bad.hash();
     try {
-      bad.add_region(BrickGrid(frame, bricks));
+      bad.add_region(BrickGrid::dense(frame));
     } catch (const Error& e) {
       EXPECT_EQ(bad.hash(), before);
       EXPECT_EQ(e.code(), ExitCode::usage);
@@ -541,7 +539,7 @@ TEST(World, ARegionOfInterestTakesThePlaceOfTheCoarseBone) {
   EXPECT_NE(refused(w, f).find("there is one already"), std::string::npos);
   WorldProbe::next_brick(bad) = BrickGrid::kMaxBricks - 124;
   try {
-    bad.add_region(BrickGrid(f, bricks));
+    bad.add_region(BrickGrid::dense(f));
     FAIL() << "names given twice";
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::resources);

@@ -103,9 +103,7 @@ TEST(ThinBone, OfAShell) {
   Frame f;
   f.dims = {80, 80, 80};
   f.spacing_mm = {0.5, 0.5, 0.5};
-  std::vector<Ijk> bricks;
-  for (int n = 0; n < 1000; ++n) bricks.push_back({n % 10, n / 10 % 10, n / 100});
-  BrickGrid bone(f, bricks);
+  BrickGrid bone = BrickGrid::dense(f);
   for (VoxelKey key = 0; key < bone.brick_count() * BrickGrid::kVoxels; ++key) {
     const Ijk c = bone.coordinate(key);
     const double r = length(Vec3{c.i * 0.5, c.j * 0.5, c.k * 0.5} - Vec3{20, 20, 20});

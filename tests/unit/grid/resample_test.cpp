@@ -159,6 +159,16 @@ TEST(BrickGrid, FindCoordinateAndBlocksAgree) {
 }
 
 // What a case keeps of a patient is bone: no voxel is stored that does not touch bone, so no skin, and no face.
+TEST(BrickGrid, DenseHoldsEachVoxelOfItsFrameAndNoBrickBeyond) {
+  Frame f;
+  f.dims = {16, 9, 1};
+  const BrickGrid g = BrickGrid::dense(f);
+  EXPECT_EQ(g.brick_count(), 4u);
+  EXPECT_NE(g.find(15, 8, 0), BrickGrid::kNone);
+  EXPECT_EQ(g.find_brick(2, 0, 0), BrickGrid::kNone);
+  EXPECT_EQ(g.sum(), 0);
+}
+
 TEST(Resample, NothingButBoneIsKept) {
   PhantomParams p;
   p.spacing_mm = 2;

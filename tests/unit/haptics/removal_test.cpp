@@ -168,9 +168,7 @@ TEST(Grains, WithoutRoomBoneStays) {
   Frame f;
   f.dims = {16, 16, 16};
   f.spacing_mm = {1, 1, 1};
-  std::vector<Ijk> bricks;
-  for (int b = 0; b < 8; ++b) bricks.push_back({b & 1, b >> 1 & 1, b >> 2});
-  BrickGrid bone(f, bricks);
+  BrickGrid bone = BrickGrid::dense(f);
   const auto voxels = static_cast<VoxelKey>(bone.brick_count() * BrickGrid::kVoxels);
   for (VoxelKey v = 0; v < voxels; ++v) bone.set(v, 1);
   Grains grains(bone);

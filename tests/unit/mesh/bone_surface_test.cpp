@@ -13,15 +13,9 @@ namespace {
 // A grid of n^3 bricks from f(i, j, k), stored at brick (1,1,1) on so that the surface never leaves positive indices.
 template <class F>
 BrickGrid make_grid(int n, F&& f) {
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < n; ++k) {
-    for (int j = 0; j < n; ++j) {
-      for (int i = 0; i < n; ++i) bricks.push_back({i, j, k});
-    }
-  }
   Frame frame;
   frame.dims = {8 * n, 8 * n, 8 * n};
-  BrickGrid grid(frame, bricks);
+  BrickGrid grid = BrickGrid::dense(frame);
   for (int k = 0; k < 8 * n; ++k) {
     for (int j = 0; j < 8 * n; ++j) {
       for (int i = 0; i < 8 * n; ++i) grid.set(grid.find(i, j, k), static_cast<float>(f(i, j, k)));

@@ -240,17 +240,13 @@ TEST(Operation, TheBorderOfARegionIsNotFelt) {
   f.dims = {96, 48, 32};
   f.spacing_mm = {0.5, 0.5, 0.5};
   f.origin_mm = {-23.75, -11.75, -9.6};  // the face cuts voxels
-  std::vector<Ijk> bricks;
-  for (int b = 0; b < 12 * 6 * 4; ++b) bricks.push_back({b % 12, b / 12 % 6, b / 72});
-  BrickGrid coarse(f, bricks);
+  BrickGrid coarse = BrickGrid::dense(f);
   fill(coarse);
   Frame g = f;
   g.spacing_mm = {0.2, 0.2, 0.2};
   g.dims = {80, 80, 60};  // 16 x 16 x 12 mm
   g.origin_mm = f.world_from_index({15.5, 7.5, 7.5}) + Vec3{0.1, 0.1, 0.1};
-  bricks.clear();
-  for (int b = 0; b < 10 * 10 * 8; ++b) bricks.push_back({b % 10, b / 10 % 10, b / 100});
-  BrickGrid fine(g, bricks);
+  BrickGrid fine = BrickGrid::dense(g);
   fill(fine);
   for (VoxelKey v = 0; v < fine.brick_count() * BrickGrid::kVoxels; ++v) {
     if (fine.coordinate(v).k >= 60) fine.set(v, 0);

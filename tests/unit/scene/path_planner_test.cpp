@@ -37,11 +37,7 @@ World carved(Vec3 half_mm, const std::function<bool(Vec3)>& bone) {
   f.spacing_mm = {h, h, h};
   for (std::size_t a = 0; a < 3; ++a) f.dims[a] = 2 * static_cast<int>(half_mm[a] / h);
   f.origin_mm = half_mm * -1 + Vec3{h / 2, h / 2, h / 2};
-  std::vector<Ijk> bricks;
-  for (int k = 0; k <= f.dims[2] / 8; ++k)
-    for (int j = 0; j <= f.dims[1] / 8; ++j)
-      for (int i = 0; i <= f.dims[0] / 8; ++i) bricks.push_back({i, j, k});
-  BrickGrid g(f, bricks);
+  BrickGrid g = BrickGrid::dense(f);
   for (int k = 0; k < f.dims[2]; ++k)
     for (int j = 0; j < f.dims[1]; ++j)
       for (int i = 0; i < f.dims[0]; ++i)

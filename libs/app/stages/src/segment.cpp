@@ -6,6 +6,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/param.h"
 #include "osteo/core/data/points_io.h"
 #include "osteo/imaging/image/structures.h"
 
@@ -22,14 +23,11 @@ std::vector<Vec3> parse_points(const std::string& text) {
   std::stringstream all(text);
   std::string item;
   while (std::getline(all, item, ';')) {
-    if (item.find_first_not_of(" \t") == std::string::npos) continue;
+    if (trimmed(item).empty()) continue;
     std::stringstream words(item);
     std::string word;
     std::vector<double> v;
-    while (std::getline(words, word, ',')) {
-      const std::size_t a = word.find_first_not_of(" \t"), b = word.find_last_not_of(" \t");
-      v.push_back(parse_number(a == std::string::npos ? "" : word.substr(a, b - a + 1), "--points-mm"));
-    }
+    while (std::getline(words, word, ',')) v.push_back(parse_number(trimmed(word), "--points-mm"));
     if (v.size() != 3)
       throw Error(ExitCode::usage, "--points-mm: '" + item + "' is not x,y,z", "like --points-mm '41,7,-16; 43,8,-22'");
     points.push_back({v[0], v[1], v[2]});

@@ -194,23 +194,7 @@ std::string sources_of(const std::vector<StructureMeasure>& measures) {
                       {{"sources", all}});
 }
 
-Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& asked_for,
-               const std::vector<std::string>& left_out) {
-  const CaseFacts& f = c.facts;
-  Sheet s;
-  s.title = tr("Case report");
-  s.code = case_code(folder);
-  s.footer =
-      filled(tr("Osteotome {version}. Not a medical device. The cuts are pictures of the patient: keep this page as "
-                "you keep the scan."),
-             {{"version", std::string(program_version())}});
-  s.blocks.push_back({verdict_band(f)});
-
-  Rows rows = scan_rows(f);
-  const Rows bone = bone_rows(f);
-  rows.insert(rows.end(), bone.begin(), bone.end());
-  s.blocks.push_back({sheet::Facts{rows, 2}});
-
+void add_cuts(Sheet& s, const Content& c) {
   const bool scan = c.pictures.contains("soft-axial");
   const Vec3 p = cut_point(c.subject);
   s.blocks.push_back({sheet::Heading{c.subject.measures.empty()
@@ -235,6 +219,9 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
           : tr("Orange: where the bone of the case ends. L and R are the patient's. x, y, z grow to the "
                "patient's left, back and head."),
       Tone::quiet}});
+}
+
+void add_slices_and_sides(Sheet& s, const Content& c) {
   std::vector<std::pair<std::string, std::string>> slices;
   for (int n = 1; n <= 8; ++n)
     slices.emplace_back("slice-" + std::to_string(n), n == 1 ? tr("lowest") : n == 8 ? tr("highest") : "");
@@ -248,9 +235,12 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
            {"side-right", tr("patient's right")},
            {"side-above", tr_of("seen from", "above")},
            {"side-below", tr_of("seen from", "below")}});
+}
 
-  s.blocks.push_back({sheet::PageBreak{}});
-  // Where the threshold lies, beside what was taken off.
+// Where the threshold lies, beside what was taken off.
+void add_threshold_and_removed(Sheet& s, const Content& c) {
+  const CaseFacts& f = c.facts;
+  const bool scan = c.pictures.contains("soft-axial");
   SheetBlocks left{{sheet::Heading{tr("Values of the scan, and the threshold")}}},
       right{{sheet::Heading{tr("Taken off, and left on")}}};
   if (!c.histogram.empty()) {
@@ -284,7 +274,9 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
         scan ? tr("Nothing above the threshold was taken off.") : tr("Pictures of it need the scan."), Tone::quiet}});
   }
   s.blocks.push_back({sheet::Columns{{left, right}, {}}});
+}
 
+void add_thin_bone_and_resolution(Sheet& s, const Content& c) {
   SheetBlocks thin{{sheet::Heading{tr("Thin bone")}}}, small{{sheet::Heading{tr("What the scan can resolve")}}};
   sheet::Pictures thin_row{{}, 46};
   for (const auto& [id, caption] :
@@ -297,13 +289,15 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
         filled(tr("Red: less than 1 mm of bone beneath the surface ({share} % of it); yellow 1 mm; pale 2 mm and more. "
                   "Bone thinner than a voxel of the scan is too thin or missing here."),
                {{"share", number_text(c.thin_percent, c.thin_percent < 9.95 ? 1 : 0)}})}});
-  small.push_back({resolution_table(f)});
+  small.push_back({resolution_table(c.facts)});
   small.push_back({sheet::Paragraph{tr("Sizes are of adults, from textbooks. Two voxels across are the least by which "
                                        "a structure is seen everywhere."),
                                     Tone::quiet}});
-  for (const auto& note : verdict_notes(f)) small.push_back({note});
+  for (const auto& note : verdict_notes(c.facts)) small.push_back({note});
   s.blocks.push_back({sheet::Columns{{thin, small}, {}}});
+}
 
+void add_structures(Sheet& s, const Content& c) {
   s.blocks.push_back({sheet::Heading{tr("Structures")}});
   if (c.subject.measures.empty()) {
     s.blocks.push_back(
@@ -317,10 +311,13 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
     s.blocks.push_back({structure_table(c.subject.measures)});
     s.blocks.push_back({sheet::Paragraph{sources_of(c.subject.measures), Tone::quiet}});
   }
+}
 
+void add_how_made(Sheet& s, const fs::path& folder, const Content& c, const std::string& asked_for,
+                  const std::vector<std::string>& left_out) {
   s.blocks.push_back({sheet::Heading{tr("How it was made")}});
   const auto manifest_text = [&](const char* key) {
-    const Json* const v = f.manifest().find(key);
+    const Json* const v = c.facts.manifest().find(key);
     return v == nullptr || v->text() == nullptr ? std::string(tr("not known")) : *v->text();
   };
   s.blocks.push_back(
@@ -331,7 +328,9 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
                      {tr("Content of the case"), case_hash(folder).substr(0, 16)},
                      {tr("Left out"), left_out.empty() ? std::string(tr("nothing")) : tr(left_out.front())}},
                     2}});
+}
 
+sheet::Signature signature_of(const fs::path& folder) {
   const ApprovalNow now = approval_of(folder);
   sheet::Signature line;
   line.state = now.words();
@@ -349,7 +348,35 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
   } else {
     line.state = tr("Not approved: sign here, or osteo approve CASE --by NAME --note TEXT");
   }
-  s.blocks.push_back({line});
+  return line;
+}
+
+Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& asked_for,
+               const std::vector<std::string>& left_out) {
+  const CaseFacts& f = c.facts;
+  Sheet s;
+  s.title = tr("Case report");
+  s.code = case_code(folder);
+  s.footer =
+      filled(tr("Osteotome {version}. Not a medical device. The cuts are pictures of the patient: keep this page as "
+                "you keep the scan."),
+             {{"version", std::string(program_version())}});
+  s.blocks.push_back({verdict_band(f)});
+
+  Rows rows = scan_rows(f);
+  const Rows bone = bone_rows(f);
+  rows.insert(rows.end(), bone.begin(), bone.end());
+  s.blocks.push_back({sheet::Facts{rows, 2}});
+
+  add_cuts(s, c);
+  add_slices_and_sides(s, c);
+
+  s.blocks.push_back({sheet::PageBreak{}});
+  add_threshold_and_removed(s, c);
+  add_thin_bone_and_resolution(s, c);
+  add_structures(s, c);
+  add_how_made(s, folder, c, asked_for, left_out);
+  s.blocks.push_back({signature_of(folder)});
   return s;
 }
 

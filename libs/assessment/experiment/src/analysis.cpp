@@ -147,8 +147,12 @@ class Analyst {
 
   void compare() {
     add(sheet::Heading{"Trainings compared (figure 28)"});
-    const RepeatedAnova a = repeated_anova(people_.table(), kTrainings);
-    const OneWayAnova pooled = one_way_anova(people_.pooled);
+    compare_means();
+    compare_all(repeated_anova(people_.table(), kTrainings), one_way_anova(people_.pooled));
+    compare_pairs();
+  }
+
+  void compare_means() {
     sheet::Columns row;
     row.columns.push_back({{means_plot(people_.means, level_)}});
     sheet::Table means{{"training", "mean score", "interval over people"}, {}, {}};
@@ -168,7 +172,9 @@ class Analyst {
                            Tone::quiet}}});
     add(std::move(row));
     json_["means"] = levels;
+  }
 
+  void compare_all(const RepeatedAnova& a, const OneWayAnova& pooled) {
     sheet::Table tests{{"test", "statistic", "df", "p", "effect"}, {}, {3, 1.4, 1.4, 1.2, 2}};
     const auto df = [](double x, double y) { return text(x) + ", " + text(y, 4); };
     tests.rows.push_back({{"repeated measures, no correction"},
@@ -207,7 +213,9 @@ class Analyst {
                                             {"df", Json{pooled.df_groups, pooled.df_error}},
                                             {"p", pooled.p},
                                             {"printed_p_below", 0.001}};
+  }
 
+  void compare_pairs() {
     std::vector<double> p;
     std::vector<Paired> pairs;
     std::vector<Permutation> exact;

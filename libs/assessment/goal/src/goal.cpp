@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/base/portable_math.h"
 
@@ -266,11 +267,7 @@ GoalScore score_against(const GoalCavity& goal, const BrickGrid& before, const B
     }
   }
   if (in_goal + removed > 0) s.dice = 2 * s.done_mm3 / (in_goal + removed);
-  if (!beyond.empty()) {
-    const auto at = beyond.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(beyond.size() - 1));
-    std::nth_element(beyond.begin(), at, beyond.end());
-    s.beyond_mm = *at;
-  }
+  s.beyond_mm = value_at_share(std::move(beyond), 0.95);
   return s;
 }
 

@@ -24,11 +24,7 @@ BrickGrid block(double h) {
   f.dims = {static_cast<int>(24 / h), static_cast<int>(24 / h), static_cast<int>(20 / h)};
   f.spacing_mm = {h, h, h};
   f.origin_mm = {-12 + h / 2, -12 + h / 2, -16 + h / 2};
-  std::vector<Ijk> bricks;
-  for (int k = 0; k <= (f.dims[2] - 1) / 8; ++k)
-    for (int j = 0; j <= (f.dims[1] - 1) / 8; ++j)
-      for (int i = 0; i <= (f.dims[0] - 1) / 8; ++i) bricks.push_back({i, j, k});
-  return BrickGrid(f, bricks);
+  return BrickGrid::dense(f);
 }
 // The share of each voxel below `top`, in the layers between.
 void fill_to(BrickGrid& g, double top, double from, double to) {

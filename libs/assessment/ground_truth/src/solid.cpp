@@ -412,18 +412,14 @@ CubicField sampled_field(const Solid& solid, int n, double scale, FieldCurve cur
 }
 
 BrickGrid sampled_bone(const Solid& solid, double h, const Context& context) {
-  const int bricks_along = static_cast<int>(std::ceil(2 * solid.half_mm() / h / 8)), n = bricks_along * 8;
+  const int n = static_cast<int>(std::ceil(2 * solid.half_mm() / h / 8)) * 8;
   Frame f;
   f.dims = {n, n, n};
   f.spacing_mm = {h, h, h};
   const double lo = -n * h / 2 + h / 2;
   f.origin_mm = {lo, lo, lo};
   const auto at = [&](int i) { return lo + i * h; };
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < bricks_along; ++k)
-    for (int j = 0; j < bricks_along; ++j)
-      for (int i = 0; i < bricks_along; ++i) bricks.push_back({i, j, k});
-  BrickGrid g(f, bricks);
+  BrickGrid g = BrickGrid::dense(f);
   parallel_for(static_cast<std::size_t>(n), 8, context.threads, [&](std::size_t begin, std::size_t end) {
     for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k)
       for (int j = 0; j < n; ++j)

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/param.h"
 
 namespace osteo::inline assessment {
 
@@ -15,11 +16,6 @@ TraineeSkill parse_skill(std::string_view text) {
     const std::size_t comma = std::min(text.find(','), text.size());
     std::string_view part = text.substr(0, comma);
     text.remove_prefix(std::min(comma + 1, text.size()));
-    const auto trimmed = [](std::string_view t) {
-      while (!t.empty() && t.front() == ' ') t.remove_prefix(1);
-      while (!t.empty() && t.back() == ' ') t.remove_suffix(1);
-      return t;
-    };
     part = trimmed(part);
     if (part.empty()) continue;
     const bool begins = std::exchange(first, false);

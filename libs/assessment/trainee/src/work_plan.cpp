@@ -162,20 +162,17 @@ WorkPlan plan_goal(const World& world, const StructureMap& structures, const Pro
   return plan;
 }
 
-}  // namespace
+/// A place across the direction of approach.
+struct Flat {
+  double u = 0, v = 0;
+};
 
-WorkPlan plan_work(const World& world, const StructureMap& structures, const Procedure& procedure,
-                   const TraineeSkill& skill, std::uint64_t seed, const WorkPlanOptions& o) {
-  if (o.goal) return plan_goal(world, structures, procedure, o);
-  WorkPlan plan;
-  plan.toward = o.toward ? normalized(*o.toward) : toward_of(procedure);
-  plan.radius_mm = o.radius_mm;
-  plan.coarse_tool = static_cast<std::uint8_t>(burr_index(BurrKind::cutting, o.coarse_diameter_mm));
-  plan.fine_tool = static_cast<std::uint8_t>(burr_index(BurrKind::diamond, o.fine_diameter_mm));
-  const double coarse = o.coarse_diameter_mm / 2, fine = o.fine_diameter_mm / 2;
-  const Columns columns(world, structures, procedure, plan.toward, o.most_depth_mm);
+int reach_of(const WorkPlanOptions& o) {
+  return static_cast<int>(o.radius_mm / kPitch);
+}
 
-  // The best place, as one sees it who knows.
+/// Where the window lies best, as one sees it who knows: the most of the targets below it. `fine`: the burr's radius.
+Flat best_place(const Columns& columns, double fine, const WorkPlanOptions& o) {
   const int w = static_cast<int>((columns.flat().hi.x - columns.flat().lo.x) / kPitch) + 1;
   const int h = static_cast<int>((columns.flat().hi.y - columns.flat().lo.y) / kPitch) + 1;
   const auto u_of = [&](int i) { return columns.flat().lo.x + i * kPitch; };
@@ -197,8 +194,9 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
                 "from this side nothing of the target regions is within " + format_number(o.most_depth_mm) +
                     " mm of the bone's surface",
                 "give another --approach");
-  const int reach = static_cast<int>(o.radius_mm / kPitch);
-  double best = -1e300, u0 = 0, v0 = 0;
+  const int reach = reach_of(o);
+  double best = -1e300;
+  Flat place;
   for (int j = 0; j < h; ++j)
     for (int i = 0; i < w; ++i) {
       double sum = 0;
@@ -209,10 +207,84 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
         }
       if (sum > best) {
         best = sum;
-        u0 = u_of(i);
-        v0 = v_of(j);
+        place.u = u_of(i);
+        place.v = v_of(j);
       }
     }
+  return place;
+}
+
+struct Cell {
+  double u, v;                               // from the window's middle
+  double top, coarse, fine, fine_by_coarse;  // how deep the lowest point goes with which burr
+};
+using Cells = std::map<std::pair<int, int>, Cell>;
+
+/// What is drilled, by its place in steps from the window's middle.
+struct Work {
+  Cells cells, opening;
+};
+
+/// `known`: the best place; `real`: where this one drills instead. `belief`: how much too deep it thinks it may.
+/// `coarse`, `fine`: radii; `open`: of the opening; `roof`: how deep that goes.
+Work work_of(const Columns& columns, Flat known, Flat real, double coarse, double fine, double belief, double open,
+             double roof, const WorkPlanOptions& o) {
+  Work work;
+  const auto depth_of = [](const Column& c) { return c.target ? c.top - *c.target : 0.0; };
+  const int reach = reach_of(o);
+  for (int b = -reach; b <= reach; ++b)
+    for (int a = -reach; a <= reach; ++a) {
+      if ((a * a + b * b) * kPitch * kPitch > o.radius_mm * o.radius_mm) continue;
+      const double u = a * kPitch, v = b * kPitch;
+      const double depth_coarse = depth_of(columns.column(known.u + u, known.v + v, coarse, 0, true)),
+                   depth_fine = depth_of(columns.column(known.u + u, known.v + v, fine, 0, false)),
+                   depth_swap = depth_of(columns.column(known.u + u, known.v + v, coarse, 0, false));
+      const Column real_coarse = columns.column(real.u + u, real.v + v, coarse, belief, true),
+                   real_fine = columns.column(real.u + u, real.v + v, fine, belief, false),
+                   real_swap = columns.column(real.u + u, real.v + v, coarse, belief, false);
+      if (!real_fine.bone || depth_fine <= 0) continue;
+      Cell c{u, v, real_fine.top, 0, 0, 0};
+      c.fine = std::max(c.top - depth_fine - belief, real_fine.safe);
+      c.fine_by_coarse = std::max(c.top - std::max(depth_swap, depth_coarse) - belief, real_swap.safe);
+      // Where the coarse burr reaches no target region above what is ruled out, it goes as deep as it may on the way
+      // there.
+      const double wanted = depth_coarse > 0 ? depth_coarse : depth_fine;
+      c.coarse = std::max({c.top - wanted - belief, real_coarse.safe, c.fine});
+      work.cells[{a, b}] = c;
+      // The opening is the window, drawn together towards its middle: a continuous matter, whatever the columns' pitch.
+      const double narrow = open / o.radius_mm;
+      const Column above =
+          narrow < 1 ? columns.column(real.u + u * narrow, real.v + v * narrow, coarse, belief, true) : real_coarse;
+      if (!above.bone) continue;
+      Cell narrowed = c;
+      narrowed.u *= narrow;
+      narrowed.v *= narrow;
+      narrowed.top = above.top;
+      narrowed.coarse = narrow < 1 ? std::max({above.top - wanted - belief, above.safe, above.top - roof}) : c.coarse;
+      work.opening[{a, b}] = narrowed;
+    }
+  if (work.cells.empty())
+    throw Error(ExitCode::usage, "there is no bone where this trainee means to drill",
+                "another --seed, or more of skill 'region'");
+  return work;
+}
+
+}  // namespace
+
+WorkPlan plan_work(const World& world, const StructureMap& structures, const Procedure& procedure,
+                   const TraineeSkill& skill, std::uint64_t seed, const WorkPlanOptions& o) {
+  if (o.goal) return plan_goal(world, structures, procedure, o);
+  WorkPlan plan;
+  plan.toward = o.toward ? normalized(*o.toward) : toward_of(procedure);
+  plan.radius_mm = o.radius_mm;
+  plan.coarse_tool = static_cast<std::uint8_t>(burr_index(BurrKind::cutting, o.coarse_diameter_mm));
+  plan.fine_tool = static_cast<std::uint8_t>(burr_index(BurrKind::diamond, o.fine_diameter_mm));
+  const double coarse = o.coarse_diameter_mm / 2, fine = o.fine_diameter_mm / 2;
+  const Columns columns(world, structures, procedure, plan.toward, o.most_depth_mm);
+
+  const Flat best = best_place(columns, fine, o);
+  const double u0 = best.u, v0 = best.v;
+  const int reach = reach_of(o);
 
   // Where this one drills instead, and how deep it thinks it may.
   statistics::Random random(seed ^ 0x706c616eULL);
@@ -223,46 +295,7 @@ WorkPlan plan_work(const World& world, const StructureMap& structures, const Pro
   plan.open_mm = open;
   plan.shifted_mm = columns.across() * du + columns.along() * dv;
 
-  struct Cell {
-    double u, v;                               // from the window's middle
-    double top, coarse, fine, fine_by_coarse;  // how deep the lowest point goes with which burr
-  };
-  std::map<std::pair<int, int>, Cell> cells, opening;
-  const auto depth_of = [](const Column& c) { return c.target ? c.top - *c.target : 0.0; };
-  for (int b = -reach; b <= reach; ++b)
-    for (int a = -reach; a <= reach; ++a) {
-      if ((a * a + b * b) * kPitch * kPitch > o.radius_mm * o.radius_mm) continue;
-      const double u = a * kPitch, v = b * kPitch;
-      const double depth_coarse = depth_of(columns.column(u0 + u, v0 + v, coarse, 0, true)),
-                   depth_fine = depth_of(columns.column(u0 + u, v0 + v, fine, 0, false)),
-                   depth_swap = depth_of(columns.column(u0 + u, v0 + v, coarse, 0, false));
-      const Column real_coarse = columns.column(u0 + du + u, v0 + dv + v, coarse, belief, true),
-                   real_fine = columns.column(u0 + du + u, v0 + dv + v, fine, belief, false),
-                   real_swap = columns.column(u0 + du + u, v0 + dv + v, coarse, belief, false);
-      if (!real_fine.bone || depth_fine <= 0) continue;
-      Cell c{u, v, real_fine.top, 0, 0, 0};
-      c.fine = std::max(c.top - depth_fine - belief, real_fine.safe);
-      c.fine_by_coarse = std::max(c.top - std::max(depth_swap, depth_coarse) - belief, real_swap.safe);
-      // Where the coarse burr reaches no target region above what is ruled out, it goes as deep as it may on the way
-      // there.
-      const double wanted = depth_coarse > 0 ? depth_coarse : depth_fine;
-      c.coarse = std::max({c.top - wanted - belief, real_coarse.safe, c.fine});
-      cells[{a, b}] = c;
-      // The opening is the window, drawn together towards its middle: a continuous matter, whatever the columns' pitch.
-      const double narrow = open / o.radius_mm;
-      const Column above =
-          narrow < 1 ? columns.column(u0 + du + u * narrow, v0 + dv + v * narrow, coarse, belief, true) : real_coarse;
-      if (!above.bone) continue;
-      Cell narrowed = c;
-      narrowed.u *= narrow;
-      narrowed.v *= narrow;
-      narrowed.top = above.top;
-      narrowed.coarse = narrow < 1 ? std::max({above.top - wanted - belief, above.safe, above.top - roof}) : c.coarse;
-      opening[{a, b}] = narrowed;
-    }
-  if (cells.empty())
-    throw Error(ExitCode::usage, "there is no bone where this trainee means to drill",
-                "another --seed, or more of skill 'region'");
+  const auto [cells, opening] = work_of(columns, best, {best.u + du, best.v + dv}, coarse, fine, belief, open, roof, o);
   double middle = 0, deepest = 0;
   for (const auto& [key, c] : cells) {
     middle += c.top / static_cast<double>(cells.size());

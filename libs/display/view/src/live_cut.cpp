@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "osteo/core/base/order.h"
 #include "osteo/geometry/grid/sampler.h"
 
 namespace osteo::inline display {
@@ -55,8 +56,7 @@ double difference_hu(const SparseGrid& kept, const Image& scan) {
     }
   }
   if (off.empty() || 20 * outside > off.size()) return std::numeric_limits<double>::infinity();
-  std::nth_element(off.begin(), off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2), off.end());
-  return static_cast<double>(off[off.size() / 2]);
+  return static_cast<double>(upper_median(std::move(off)));
 }
 
 void draw_live_cut(const SliceView& view, const LiveCut& cut, std::vector<std::uint32_t>& rgba) {

@@ -37,16 +37,9 @@ TriMesh offset_surface(const StructureMap& map, std::size_t number, double withi
   Frame frame;
   frame.spacing_mm = {h, h, h};
   frame.origin_mm = lo - Vec3{margin, margin, margin};
-  std::array<int, 3> bricks{};
-  for (std::size_t a = 0; a < 3; ++a) {
-    bricks[a] = static_cast<int>(std::ceil((hi[a] - lo[a] + 2 * margin) / (8 * h)));
-    frame.dims[a] = 8 * bricks[a];
-  }
-  std::vector<Ijk> all;
-  for (int k = 0; k < bricks[2]; ++k)
-    for (int j = 0; j < bricks[1]; ++j)
-      for (int i = 0; i < bricks[0]; ++i) all.push_back({i, j, k});
-  BrickGrid field(frame, std::move(all));
+  for (std::size_t a = 0; a < 3; ++a)
+    frame.dims[a] = 8 * static_cast<int>(std::ceil((hi[a] - lo[a] + 2 * margin) / (8 * h)));
+  BrickGrid field = BrickGrid::dense(frame);
   parallel_for(field.brick_count(), 16, 0, [&](std::size_t begin, std::size_t end) {
     std::vector<double> each(map.values().size());
     for (std::size_t b = begin; b < end; ++b) {

@@ -66,6 +66,14 @@ BrickGrid::BrickGrid(Frame frame, std::vector<Ijk> bricks) : frame_(frame), orig
   bricks_ = in_a_block(zeros(origins_.size()), origins_.size());
 }
 
+BrickGrid BrickGrid::dense(const Frame& frame) {
+  std::vector<Ijk> bricks;
+  for (int k = 0; k < frame.dims[2]; k += kEdge)
+    for (int j = 0; j < frame.dims[1]; j += kEdge)
+      for (int i = 0; i < frame.dims[0]; i += kEdge) bricks.push_back({i / kEdge, j / kEdge, k / kEdge});
+  return {frame, std::move(bricks)};
+}
+
 BrickGrid::BrickGrid(const BrickGrid& other)
     : frame_(other.frame_),
       extent_(other.extent_),

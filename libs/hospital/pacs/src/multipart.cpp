@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/param.h"
 
 namespace osteo::inline hospital::pacs {
 namespace {
@@ -18,12 +19,6 @@ std::string small(std::string_view text) {
   for (char& c : s)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   return s;
-}
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t begin = text.find_first_not_of(" \t");
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(" \t") - begin + 1);
 }
 
 }  // namespace

@@ -28,14 +28,13 @@ namespace fs = std::filesystem;
 constexpr std::string_view kDeflated = "1.2.840.10008.1.2.1.99", kBigEndian = "1.2.840.10008.1.2.2";
 constexpr std::string_view kImplicit = "1.2.840.10008.1.2", kExplicit = "1.2.840.10008.1.2.1";
 
-std::string trimmed(std::string text) {
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\0')) text.pop_back();
-  const std::size_t first = text.find_first_not_of(' ');
-  return first == std::string::npos ? std::string() : text.substr(first);
+/// Without what values are padded with to an even length.
+std::string unpadded(std::string_view text) {
+  return std::string(trimmed(text, std::string_view(" \0", 2)));
 }
 
 std::string text_of(vtkDICOMMetaData* meta, vtkDICOMTag tag) {
-  return trimmed(meta->Get(tag).AsString());
+  return unpadded(meta->Get(tag).AsString());
 }
 
 // Values of these name a person, a visit or a place. They are looked for in whatever could leave the program, and
@@ -151,7 +150,7 @@ DicomFrame read_frame(vtkDICOMMetaData* meta, int frame) {
   if (const vtkDICOMValue& s = get(DC::RescaleSlope); s.IsValid() && s.GetNumberOfValues() > 0) f.slope = s.AsDouble();
   if (const vtkDICOMValue& s = get(DC::RescaleIntercept); s.IsValid() && s.GetNumberOfValues() > 0)
     f.intercept = s.AsDouble();
-  f.rescale_type = trimmed(get(DC::RescaleType).AsString());
+  f.rescale_type = unpadded(get(DC::RescaleType).AsString());
   return f;
 }
 
@@ -174,7 +173,7 @@ void set_problem(DicomHeader& h, std::string_view code, std::string why) {
 
 /// A number of the tag as it stands in the file when it has a decimal comma, which DICOM has not.
 std::string with_comma(vtkDICOMMetaData* meta, vtkDICOMTag tag) {
-  const std::string text = trimmed(meta->Get(tag).AsString());
+  const std::string text = unpadded(meta->Get(tag).AsString());
   return text.find(',') != std::string::npos ? text : std::string();
 }
 
@@ -265,7 +264,7 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.study_description = text_of(meta, DC::StudyDescription);
   h.identifying = identifying_values(meta);
   h.modality = text_of(meta, DC::Modality);
-  h.image_type = trimmed(meta->Get(DC::ImageType).AsString());
+  h.image_type = unpadded(meta->Get(DC::ImageType).AsString());
   h.description = text_of(meta, DC::SeriesDescription);
   const std::string technique = text_of(meta, DC::VolumeBasedCalculationTechnique);
   h.projection = is_projection(h.image_type) || is_projection(h.description) || technique == "MAX_IP" ||

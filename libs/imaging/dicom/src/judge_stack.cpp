@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/dicom/detail/verdict_codes.h"
 #include "place_parts.h"
@@ -149,10 +150,7 @@ class StackJudge {
 
   static double median(std::vector<double> values) {
     std::erase_if(values, [](double v) { return !std::isfinite(v); });
-    if (values.empty()) return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
+    return upper_median(std::move(values));
   }
 
   // Drift in mm per mm along the normal, and where it is at the first slice: a line through most slices, which single

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/dicom/detail/verdict_codes.h"
 #include "pixels.h"
@@ -19,13 +20,6 @@ constexpr float kObjectHu = -500, kAirBelowHu = -800;
 constexpr int kMinBlocks = 16;
 // Of a line of blocks from edge to edge that is of one value.
 constexpr int kLostInLine = 8;
-
-double median(std::vector<double> v) {
-  if (v.empty()) return 0;
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return *middle;
-}
 
 // How a picture may be turned over: 1 left and right, 2 up and down, 3 both.
 double difference(const SliceFigure& a, const SliceFigure& b, int turned_over = 0) {
@@ -233,8 +227,8 @@ class SliceJudge {
       if (air.back().known) sizes_air.push_back(std::abs(air.back().hu));
       if (soft.back().known) sizes_soft.push_back(std::abs(soft.back().hu));
     }
-    const double limit_air = std::max(kSliceStepHu, 6 * median(sizes_air)),
-                 limit_soft = std::max(kSliceStepHu, 6 * median(sizes_soft));
+    const double limit_air = std::max(kSliceStepHu, 6 * upper_median(sizes_air)),
+                 limit_soft = std::max(kSliceStepHu, 6 * upper_median(sizes_soft));
     std::vector<std::string> names;
     std::string said;
     double most = 0;
@@ -284,7 +278,7 @@ class SliceJudge {
   // Two slices that fit better in each other's place.
   void judge_order() {
     const std::size_t n = sound_.size();
-    const double usual = median(steps_);
+    const double usual = upper_median(steps_);
     // Slices that fit their neighbours badly, the worst first.
     std::vector<std::pair<double, std::size_t>> odd;
     for (std::size_t s = 0; s < n; ++s) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cv_slices.h"
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/parallel.h"
 #include "projections.h"
 
@@ -36,13 +37,6 @@ Image each_slice(const Image& image, const Context& context, F&& change) {
 
 std::int16_t rounded(float v) {
   return static_cast<std::int16_t>(std::clamp(std::floor(v + 0.5F), -32768.0F, 32767.0F));
-}
-
-double median(std::vector<float>& v) {
-  if (v.empty()) return 0;
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return static_cast<double>(*middle);
 }
 
 // From 10 to 90 % along the gradient of `where`, of the edge in `values`; 0 where there is no clean one.
@@ -154,7 +148,8 @@ Sharpness sharpness_of(const Image& image, const Image& edges_of) {
       }
   }
   // The median of a normal distribution's size is 0.6745 of its deviation.
-  return {median(noise) / 0.6745 / 6, median(widths)};
+  return {static_cast<double>(upper_median(std::move(noise))) / 0.6745 / 6,
+          static_cast<double>(upper_median(std::move(widths)))};
 }
 
 Image denoise(const Image& image, const DenoiseParams& params, const Context& context) {

@@ -5,30 +5,25 @@
 #include <map>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/param.h"
 
 namespace osteo::inline imaging {
 namespace {
 
-std::string trimmed(const std::string& text) {
-  const std::size_t a = text.find_first_not_of(" \t"), b = text.find_last_not_of(" \t");
-  return a == std::string::npos ? std::string() : text.substr(a, b - a + 1);
-}
-
-std::map<int, std::string> parse_names(const std::string& text) {
+std::map<int, std::string> parse_names(std::string_view rest) {
   std::map<int, std::string> names;
-  std::string rest = text;
   while (!trimmed(rest).empty()) {
     const std::size_t comma = std::min(rest.find(','), rest.size());
-    const std::string item = trimmed(rest.substr(0, comma));
-    rest = comma < rest.size() ? rest.substr(comma + 1) : std::string();
+    const std::string_view item = trimmed(rest.substr(0, comma));
+    rest.remove_prefix(std::min(comma + 1, rest.size()));
     const std::size_t equals = item.find('=');
-    const std::string value = trimmed(item.substr(0, equals));
+    const std::string value(trimmed(item.substr(0, equals)));
     const bool number =
         !value.empty() && value.find_first_not_of("0123456789") == std::string::npos && value.size() < 4;
     const int v = number ? std::atoi(value.c_str()) : 0;
-    const std::string name = equals == std::string::npos ? std::string() : trimmed(item.substr(equals + 1));
+    const std::string name(equals == std::string_view::npos ? "" : trimmed(item.substr(equals + 1)));
     if (v < 1 || v > 255 || name.empty()) {
-      throw Error(ExitCode::usage, "--names: '" + item + "' is not VALUE=NAME with a value from 1 to 255",
+      throw Error(ExitCode::usage, "--names: '" + std::string(item) + "' is not VALUE=NAME with a value from 1 to 255",
                   "like --names '1=facial nerve, 2=sigmoid sinus'");
     }
     names[v] = name;

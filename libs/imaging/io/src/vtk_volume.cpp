@@ -361,14 +361,9 @@ std::string meta_value(std::string_view all, std::string_view key) {
   for (std::size_t at = 0; at < limit;) {
     const std::size_t end = std::min(all.find('\n', at), limit);
     const std::string_view line = all.substr(at, end - at);
-    const auto trimmed = [](std::string_view text) {
-      while (text.starts_with(' ')) text.remove_prefix(1);
-      while (text.ends_with(' ') || text.ends_with('\r')) text.remove_suffix(1);
-      return text;
-    };
     const std::size_t equals = line.find('=');
-    if (equals != std::string_view::npos && trimmed(line.substr(0, equals)) == key)
-      return std::string(trimmed(line.substr(equals + 1)));
+    if (equals != std::string_view::npos && trimmed(line.substr(0, equals), " \r") == key)
+      return std::string(trimmed(line.substr(equals + 1), " \r"));
     at = end + 1;
   }
   return {};

@@ -7,6 +7,7 @@
 
 #include "gaps.h"
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/geometry/distance/triangle_tree.h"
 #include "osteo/geometry/grid/brick_grid.h"
@@ -94,11 +95,10 @@ SurfaceFit fit_surfaces(const BoneOf& first, const BoneOf& second, const RigidTr
     }
     return pairs;
   };
-  const auto median = [](const std::vector<Pair>& pairs, double share) {
+  const auto apart_at = [](const std::vector<Pair>& pairs, double share) {
     std::vector<double> d;
     for (const Pair& p : pairs) d.push_back(p.apart);
-    std::sort(d.begin(), d.end());
-    return d[static_cast<std::size_t>(share * static_cast<double>(d.size() - 1))];
+    return value_at_share(std::move(d), share);
   };
   SurfaceFit fit;
   const std::size_t step = std::max<std::size_t>(1, b.points_mm.size() / kMaxPoints);
@@ -110,7 +110,7 @@ SurfaceFit fit_surfaces(const BoneOf& first, const BoneOf& second, const RigidTr
                   "too little bone is seen by both scans: " + std::to_string(pairs.size()) + " points of the surface",
                   "--method mutual goes by all tissue");
     // Of what is left after a drilled cavity and what only one shows, thrice the median is generous.
-    const double limit = std::max(3 * median(pairs, 0.5), 0.3);
+    const double limit = std::max(3 * apart_at(pairs, 0.5), 0.3);
     std::vector<Gap> gaps;
     for (const Pair& p : pairs) {
       if (p.apart <= limit) gaps.push_back({p.from, p.normal, p.gap});
@@ -126,7 +126,7 @@ SurfaceFit fit_surfaces(const BoneOf& first, const BoneOf& second, const RigidTr
     fit.mean_mm += p.apart / static_cast<double>(pairs.size());
     fit.shape_mean_mm += std::abs(p.gap - fit.boundary_shift_mm) / static_cast<double>(pairs.size());
   }
-  fit.p95_mm = median(pairs, 0.95);
+  fit.p95_mm = apart_at(pairs, 0.95);
   fit.second_from_first = first_from_second.inverse();
   return fit;
 }

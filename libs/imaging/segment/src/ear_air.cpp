@@ -5,6 +5,7 @@
 #include <queue>
 
 #include "ear_parts.h"
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/parallel.h"
 
 namespace osteo::inline imaging::segment {
@@ -69,8 +70,8 @@ void keep_tube(const Field& f, Mask& mask, const std::vector<float>& to_outside)
   if (shells.size() < 10) return;
   std::vector<double> areas;
   for (std::size_t s = 3; s < std::min<std::size_t>(13, shells.size()); ++s) areas.push_back(shells[s].count);
-  std::nth_element(areas.begin(), areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2), areas.end());
-  const double usual = areas[areas.size() / 2], radius = std::sqrt(usual * f.h_mm * f.h_mm * f.h_mm / 3.14159265358979);
+  const double usual = upper_median(std::move(areas)),
+               radius = std::sqrt(usual * f.h_mm * f.h_mm * f.h_mm / 3.14159265358979);
   std::size_t mouth = shells.size();
   for (std::size_t s = 8; s + 1 < shells.size() && mouth == shells.size(); ++s)
     if (shells[s].count > 1.5 * usual && shells[s + 1].count > 1.5 * usual) mouth = s;

@@ -12,6 +12,7 @@
 
 #include "ear_parts.h"
 #include "line.h"
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/parallel.h"
 
 namespace osteo::inline imaging::segment {
@@ -58,8 +59,7 @@ Round fit_round(const Field& f, const Levels& levels, Vec3 at, Vec3 along, doubl
   if (r <= 0) {
     std::vector<double> away;
     for (const Edge& e : edges) away.push_back(std::hypot(e.x, e.y));
-    std::nth_element(away.begin(), away.begin() + static_cast<std::ptrdiff_t>(away.size() / 2), away.end());
-    r = away[away.size() / 2];
+    r = upper_median(std::move(away));
   }
   double reach = 2.5;
   for (int round = 0; round < 8; ++round) {
@@ -285,8 +285,7 @@ std::vector<double> slow_sizes(const std::vector<Round>& rounds) {
     for (std::size_t q = i > 8 ? i - 8 : 0; q <= std::min(i + 8, rounds.size() - 1); ++q)
       if (rounds[q].held >= kHeld && rounds[q].radius > 0) near.push_back(rounds[q].radius);
     if (near.empty()) continue;
-    std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2), near.end());
-    sizes[i] = near[near.size() / 2];
+    sizes[i] = upper_median(std::move(near));
   }
   double last = 0;
   for (double& s : sizes) last = s = s > 0 ? s : last;

@@ -7,6 +7,7 @@
 #include "field.h"
 #include "line.h"
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/parallel.h"
 #include "tube_path.h"
 
@@ -217,9 +218,7 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
   }
   const std::size_t met = walls.size();
   if (met < kRays / 4) return {at, 0, static_cast<double>(met) / kRays};
-  std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(met / 2), distances.end());
-  std::nth_element(walls.begin(), walls.begin() + static_cast<std::ptrdiff_t>(met / 2), walls.end());
-  const double usual = distances[met / 2], wall = walls[met / 2];
+  const double usual = upper_median(std::move(distances)), wall = upper_median(std::move(walls));
   const std::array<double, 2> middle = circle_through(edges, usual);
   const Vec3 u = any_perpendicular(along), v = cross(along, u);
   Cross c{at};

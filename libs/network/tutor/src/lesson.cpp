@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/param.h"
 
 namespace osteo::inline network {
@@ -102,10 +103,7 @@ double spread_mm(const Lesson& lesson, std::span<const Lesson> others, double sh
       apart.push_back(std::sqrt(least));
     }
   }
-  if (apart.empty()) return 0;
-  const auto at = static_cast<std::ptrdiff_t>(std::clamp(share, 0.0, 1.0) * static_cast<double>(apart.size() - 1));
-  std::nth_element(apart.begin(), apart.begin() + at, apart.end());
-  return apart[static_cast<std::size_t>(at)];
+  return value_at_share(std::move(apart), std::clamp(share, 0.0, 1.0));
 }
 
 }  // namespace osteo::inline network

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/order.h"
 
 namespace osteo::inline network {
 
@@ -258,9 +259,7 @@ GuidedFacts measure_guided(const SessionReader& session, std::uint64_t begin_tic
   if (errors.empty()) return f;
   f.rms_mm = std::sqrt(squares / static_cast<double>(errors.size()));
   f.most_mm = static_cast<double>(*std::max_element(errors.begin(), errors.end()));
-  const auto at = errors.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(errors.size() - 1));
-  std::nth_element(errors.begin(), at, errors.end());
-  f.p95_mm = static_cast<double>(*at);
+  f.p95_mm = static_cast<double>(value_at_share(std::move(errors), 0.95));
   return f;
 }
 

@@ -5,6 +5,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/param.h"
 #include "wire_sinks.h"
 
 namespace osteo::inline network {
@@ -35,10 +36,8 @@ std::vector<StreamTarget> stream_targets(const std::string& text) {
   std::vector<StreamTarget> all;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t comma = std::min(text.find(',', at), text.size());
-    std::string one = text.substr(at, comma - at);
+    const std::string one(trimmed(std::string_view(text).substr(at, comma - at)));
     at = comma + 1;
-    one.erase(0, one.find_first_not_of(' '));
-    one.erase(one.find_last_not_of(' ') + 1);
     const std::size_t colon = one.find(':');
     const std::string kind = one.substr(0, colon), rest = colon == std::string::npos ? "" : one.substr(colon + 1);
     StreamTarget t;

@@ -16,18 +16,12 @@ namespace {
 TriMesh surface_of(const std::function<double(Vec3)>& distance, Vec3 lo, Vec3 hi, double h) {
   Frame f;
   f.spacing_mm = {h, h, h};
-  std::vector<Ijk> bricks;
-  int n[3];
   for (std::size_t a = 0; a < 3; ++a) {
-    n[a] = static_cast<int>(std::ceil((hi[a] - lo[a]) / h / 8 + 0.5)) + 1;
-    f.dims[a] = 8 * n[a];
+    f.dims[a] = 8 * (static_cast<int>(std::ceil((hi[a] - lo[a]) / h / 8 + 0.5)) + 1);
     // Symmetric about the box's middle, so that the mesh is.
     f.origin_mm[a] = 0.5 * (lo[a] + hi[a]) - 0.5 * (f.dims[a] - 1) * h;
   }
-  for (int k = 0; k < n[2]; ++k)
-    for (int j = 0; j < n[1]; ++j)
-      for (int i = 0; i < n[0]; ++i) bricks.push_back({i, j, k});
-  BrickGrid g(f, std::move(bricks));
+  BrickGrid g = BrickGrid::dense(f);
   for (VoxelKey v = 0; v < g.brick_count() * BrickGrid::kVoxels; ++v) {
     g.set(v, static_cast<float>(std::clamp(0.5 - distance(place_of_voxel_mm(g, v)) / h, 0.0, 1.0)));
   }

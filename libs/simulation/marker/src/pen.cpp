@@ -10,6 +10,7 @@
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/core/base/order.h"
 
 namespace osteo::inline simulation {
 namespace {
@@ -107,9 +108,7 @@ PivotFit fit_pivot(std::span<const RigidTransform> all, double most_rms_mm) {
   PivotFit fit = solve(poses);
   std::vector<double> off;
   for (const RigidTransform* p : poses) off.push_back(length((*p)(fit.tip_mm) - fit.pivot_mm));
-  std::vector<double> sorted = off;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  const double most = std::max(1e-9, 3 * sorted[sorted.size() / 2]);
+  const double most = std::max(1e-9, 3 * upper_median(off));
   std::vector<const RigidTransform*> kept;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (off[i] <= most) kept.push_back(poses[i]);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 
+#include "osteo/core/base/order.h"
 #include "osteo/simulation/marker/detail/tracker.h"
 
 namespace osteo::inline simulation {
@@ -223,9 +224,7 @@ PenSight pose_of(const CameraModel& camera, const std::vector<MarkerCorners>& al
     // The marker that fits worst goes, when it is worse than the corners of the others allow.
     std::vector<double> rms;
     for (std::size_t m = 0; m < seen.size(); ++m) rms.push_back(problem.rms_of_marker(best->pose, m));
-    std::vector<double> sorted = rms;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-    const double median = sorted[sorted.size() / 2];
+    const double median = upper_median(rms);
     const auto worst = std::max_element(rms.begin(), rms.end());
     if (seen.size() >= 3 && *worst > std::max(0.8, 4 * median)) {
       seen.erase(seen.begin() + (worst - rms.begin()));

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/data/tet_mesh.h"
 #include "surface_goal.h"
@@ -160,13 +162,6 @@ class Level {
   EquilibriumSolver solver_;
 };
 
-double median(std::vector<double> v) {
-  if (v.empty()) return 0;
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return *middle;
-}
-
 // Of a view, at the fitted shape.
 void describe(const SurfaceGoal& goal, std::size_t k, std::span<const Vec3> rest, std::span<const Vec3> shape,
               MeasuredView& view) {
@@ -198,7 +193,7 @@ void describe(const SurfaceGoal& goal, std::size_t k, std::span<const Vec3> rest
   }
   view.correlation = alone > 0 ? std::clamp(with / alone, -0.9, 0.9) : 0;
   if (v.markers()) return;
-  const double spacing = std::sqrt(median(apart));
+  const double spacing = std::sqrt(upper_median(std::move(apart)));
   const std::vector<Vec3> x = goal.moved(shape), x0 = goal.moved(rest);
   std::vector<double> by, area, reach;
   std::vector<Vec3> middle, facing;
@@ -228,6 +223,233 @@ void describe(const SurfaceGoal& goal, std::size_t k, std::span<const Vec3> rest
   view.seen_share = whole > 0 ? seen / whole : 0;
 }
 
+// One row each, in the order of loads; `plain`: shapes with the closed form as the problem has it, where there are any.
+std::vector<MeasuredView> views_of(std::span<const MeasuredCase> cases, std::span<SurfaceGoal* const> goals,
+                                   const std::vector<std::vector<Vec3> >* plain) {
+  std::vector<MeasuredView> views;
+  for (std::size_t n = 0; n < cases.size(); ++n) {
+    for (std::size_t k = 0; k < cases[n].views.size(); ++k) {
+      MeasuredView view;
+      view.name = cases[n].views[k].name;
+      view.load = n;
+      view.markers = goals[n]->views()[k].markers();
+      view.points = cases[n].views[k].points_mm.size();
+      view.drawn = goals[n]->views()[k].drawn.size();
+      if (plain != nullptr) view.before = goals[n]->error(k, (*plain)[n]);
+      views.push_back(view);
+    }
+  }
+  return views;
+}
+
+void tell_estimate(std::size_t rows, std::size_t width, double seconds, const Context& context) {
+  const std::string reported = std::to_string(rows) + " distances and " + std::to_string(width) +
+                               " parameters: the fit takes about " + format_number(std::max(1.0, std::round(seconds))) +
+                               " s";
+  if (seconds > 30) {
+    context.warn(reported);
+  } else {
+    context.info(reported);
+  }
+}
+
+/// Fits until the noise stays. `at`: parameters, those that it begins with and ends at. Returns how often it was
+/// fitted.
+int fit_until_the_noise_stays(Fit& fit, std::span<SurfaceGoal* const> goals, std::vector<double>& at,
+                              const std::function<void()>& evaluate, const CalibrateOptions& options,
+                              const Context& context) {
+  for (int round = 1;; ++round) {
+    Descent d = descend(fit, at, options, context);
+    if (!d.usable)
+      throw Error(ExitCode::failed,
+                  "no factors were found with which the model comes to rest under these loads: " + d.why,
+                  "make the loads smaller");
+    at = d.parameters;
+    fit.result.converged = d.converged;
+    fit.result.why = d.why;
+    fit.result.cost.insert(fit.result.cost.end(), d.costs.begin(), d.costs.end());
+    for (auto& step : d.course) {
+      step.resize(static_cast<std::size_t>(fit.parameters()));
+      fit.result.course.push_back(std::move(step));
+    }
+    // The last evaluation of a descent need not be where it ended.
+    evaluate();
+    bool stays = true;
+    for (std::size_t n = 0; n < goals.size(); ++n) {
+      SurfaceGoal* const goal = goals[n];
+      std::vector<double> before;
+      for (const auto& v : goal->views()) before.push_back(v.sigma_mm);
+      goal->widen_by_noise(fit.shapes()[n]);
+      for (std::size_t k = 0; k < before.size(); ++k)
+        stays = stays && std::abs(goal->views()[k].sigma_mm - before[k]) < 0.1 * before[k];
+    }
+    if (stays || round == kMaxRounds) return round;
+  }
+}
+
+/// What is left at each view, and how its pose was found.
+void describe_views(const Fit& fit, std::span<SurfaceGoal* const> goals, const TissueModel& model,
+                    const std::vector<double>& at, bool find_pose, std::vector<MeasuredView>& views) {
+  for (MeasuredView& view : views) {
+    const std::size_t k =
+        static_cast<std::size_t>(&view - views.data()) -
+        static_cast<std::size_t>(
+            std::find_if(views.begin(), views.end(), [&](const MeasuredView& o) { return o.load == view.load; }) -
+            views.begin());
+    describe(*goals[view.load], k, model.rest(), fit.shapes()[view.load], view);
+    if (!find_pose) continue;
+    const auto& v = goals[view.load]->views()[k];
+    std::size_t own = static_cast<std::size_t>(fit.parameters()) + 6 * k;
+    for (std::size_t n = 0; n < view.load; ++n) own += goals[n]->own();
+    for (std::size_t a = 0; a < 3; ++a) {
+      view.turned_deg[a] = at[own + a] * v.turn * 57.29577951308232;
+      view.shifted_mm[a] = at[own + 3 + a] * v.shift;
+    }
+  }
+}
+
+/// Which point of a map, and which kind of constraint, each factor is of.
+class FactorPlaces {
+ public:
+  FactorPlaces(const TissueModel& model, const Fit& fit, const CalibrateOptions& options)
+      : fit_(fit), grid_(options.grid), shared_(options.shared_grid) {
+    for (const Vec3& p : model.rest())
+      for (std::size_t a = 0; a < 3; ++a) {
+        lo_[a] = std::min(lo_[a], p[a]);
+        hi_[a] = std::max(hi_[a], p[a]);
+      }
+  }
+  [[nodiscard]] bool map() const { return fit_.nodes() > 1; }
+  [[nodiscard]] bool shared() const { return shared_; }
+  [[nodiscard]] std::size_t node_of(int i) const {
+    return fit_.of_map(i) ? fit_.number_of(i) : shared_ ? fit_.nodes() : fit_.number_of(i) / kTissueClasses;
+  }
+  [[nodiscard]] std::size_t class_of(int i) const {
+    return fit_.of_map(i) ? kTissueClasses
+           : shared_      ? fit_.number_of(i) - fit_.nodes()
+                          : fit_.number_of(i) % kTissueClasses;
+  }
+
+  /// Covariance of what nobody knew of the factors (and poses) before.
+  [[nodiscard]] DenseMatrix before() const {
+    DenseMatrix before = DenseMatrix::Zero(fit_.width(), fit_.width());
+    const double far = 0.5 * std::max({hi_.x - lo_.x, hi_.y - lo_.y, hi_.z - lo_.z});
+    for (int a = 0; a < fit_.width(); ++a) {
+      if (a >= fit_.parameters()) {
+        before(a, a) = 1;
+        continue;
+      }
+      for (int b = 0; b < fit_.parameters(); ++b) {
+        const double own = class_of(a) == static_cast<std::size_t>(TissueClass::face) ? kFacesBefore : kClassBefore;
+        const bool everywhere = shared_ && (!fit_.of_map(a) || !fit_.of_map(b));  // one of them is a class's factor
+        if (!everywhere || !map()) {
+          const double apart = map() ? length(place(node_of(a)) - place(node_of(b))) / far : 0;
+          before(a, b) += kFactorBefore * kFactorBefore * std::exp(-apart);
+          if (!fit_.of_map(a) && class_of(a) == class_of(b)) before(a, b) += own * own * std::exp(-apart);
+        } else if (a == b) {
+          before(a, b) += own * own;
+        }
+      }
+    }
+    return before;
+  }
+
+ private:
+  [[nodiscard]] Vec3 place(std::size_t node) const {
+    Vec3 x;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto many = static_cast<std::size_t>(grid_[a]);
+      x[a] = many > 1 ? static_cast<double>(node % many) / static_cast<double>(many - 1) * (hi_[a] - lo_[a]) : 0;
+      node /= many;
+    }
+    return x;
+  }
+
+  const Fit& fit_;
+  std::array<int, 3> grid_;
+  bool shared_;
+  Vec3 lo_{1e300, 1e300, 1e300}, hi_ = lo_ * -1;
+};
+
+/// Of all parameters: noise, widened where neighbours go together, and what pulling put in place of `before`.
+DenseMatrix covariance_of(const Fit& fit, std::span<const MeasuredView> views, const std::vector<double>& residuals,
+                          const std::vector<double>& jacobian, const DenseMatrix& before) {
+  const auto w = static_cast<Eigen::Index>(fit.width());
+  const Eigen::Map<const RowMajor> j(jacobian.data(), static_cast<Eigen::Index>(residuals.size()), w);
+  const Eigen::Index data_rows = fit.goal_rows();
+  DenseMatrix data = DenseMatrix::Zero(w, w), spread = data;
+  Eigen::Index row = 0;
+  for (const MeasuredView& view : views) {
+    const Eigen::Index n = static_cast<Eigen::Index>(view.drawn) * (view.markers ? 3 : 1);
+    const DenseMatrix own = j.middleRows(row, n).transpose() * j.middleRows(row, n);
+    const double left =
+        Eigen::Map<const Eigen::VectorXd>(residuals.data() + row, n).squaredNorm() / static_cast<double>(n);
+    // Values on a plane that go with their neighbours count as fewer, by the sum of what each goes with.
+    const double wide = view.correlation > 0 ? (1 + view.correlation) / (1 - view.correlation) : 1;
+    data += own;
+    spread += own * (left * wide * wide);
+    row += n;
+  }
+  const DenseMatrix prior = j.bottomRows(j.rows() - data_rows).transpose() * j.bottomRows(j.rows() - data_rows);
+  // A class without a constraint (or faces that carry nothing) must not make it singular.
+  DenseMatrix all = data + prior;
+  all.diagonal().array() += 1e-14 * all.trace();
+  const Eigen::LDLT<DenseMatrix> solved(all);
+  const DenseMatrix inner = spread + prior * before * prior;
+  return solved.solve(solved.solve(inner).transpose());
+}
+
+/// Logarithms of stiffness with their deviations: of all, of groups, of each point of the map.
+void tell_stiffness(const TissueModel& model, const Fit& fit, const FactorPlaces& places, const std::vector<double>& at,
+                    const DenseMatrix& covariance, const DenseMatrix& before, const MeasuredOptions& options,
+                    MeasuredCalibration& result) {
+  const auto w = static_cast<Eigen::Index>(fit.width());
+  const std::size_t nodes = fit.nodes();
+  const Eigen::VectorXd logs = Eigen::Map<const Eigen::VectorXd>(at.data(), w);
+  const auto mean_of = [&](const auto& wanted) {
+    Eigen::VectorXd share = Eigen::VectorXd::Zero(w);
+    double count = 0;
+    for (std::size_t c = 0; c < model.constraints().size(); ++c) {
+      if (model.constraints()[c].nodes != 2 || !wanted(c)) continue;
+      fit.for_parameters(c, [&](std::uint32_t i, double weight) { share[static_cast<Eigen::Index>(i)] += weight; });
+      count += 1;
+    }
+    return Eigen::VectorXd(share / std::max(1.0, count));
+  };
+  const auto stiffness = [&](const Eigen::VectorXd& share) {
+    return LogStiffness{share.dot(logs), std::sqrt(std::max(0.0, share.dot(covariance * share)))};
+  };
+  const Eigen::VectorXd whole = mean_of([](std::size_t) { return true; });
+  result.all = stiffness(whole);
+  int groups = 0;
+  for (const int g : options.group_of) groups = std::max(groups, g + 1);
+  for (int g = 0; g < groups; ++g)
+    result.groups.push_back(stiffness(mean_of([&](std::size_t c) { return options.group_of[c] == g; })));
+  // A point of the map: its own logarithm, with the classes' as edges have them on the whole.
+  result.deviation.assign(nodes, 0);
+  result.settled.assign(nodes, 0);
+  for (std::size_t node = 0; node < nodes; ++node) {
+    Eigen::VectorXd share = Eigen::VectorXd::Zero(w);
+    bool there = !places.map();
+    for (int i = 0; i < fit.parameters(); ++i) {
+      if (fit.of_map(i)) {
+        if (fit.number_of(i) != node) continue;
+        share[i] = 1;
+        there = true;
+      } else if (places.shared()) {
+        share[i] = whole[i];
+      } else if (places.node_of(i) == node && places.class_of(i) < static_cast<std::size_t>(TissueClass::face)) {
+        share[i] = 0.5;
+        there = true;
+      }
+    }
+    if (!there) continue;
+    const double after = share.dot(covariance * share), unknown = share.dot(before * share);
+    result.deviation[node] = std::sqrt(std::max(0.0, after));
+    result.settled[node] = std::clamp(1 - after / unknown, 0.0, 1.0);
+  }
+}
+
 }  // namespace
 
 MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& surface,
@@ -255,18 +477,7 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   Level level(model, cases, goals, options.calibrate, context);
   Level::At plain{0, 1e300, {cases.size(), model.rest()}, level.own};
   const bool rests = level.solve(plain);
-  for (std::size_t n = 0; n < cases.size(); ++n) {
-    for (std::size_t k = 0; k < cases[n].views.size(); ++k) {
-      MeasuredView view;
-      view.name = cases[n].views[k].name;
-      view.load = n;
-      view.markers = goals[n]->views()[k].markers();
-      view.points = cases[n].views[k].points_mm.size();
-      view.drawn = goals[n]->views()[k].drawn.size();
-      if (rests) view.before = goals[n]->error(k, plain.shapes[n]);
-      result.views.push_back(view);
-    }
-  }
+  result.views = views_of(cases, goals, rests ? &plain.shapes : nullptr);
   const Level::At start = level.find();
   result.level_log = start.log;
   if (!(start.off < 0.98 * level.rest))
@@ -305,170 +516,16 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
     const double steps = fit.parameters() > 8 ? 25 : 12;
     result.estimate_s =
         steps * (seconds_since(one) + level.solve_s + 2e-9 * static_cast<double>(residuals.size() * width * width));
-    const std::string reported = std::to_string(rows) + " distances and " + std::to_string(width) +
-                                 " parameters: the fit takes about " +
-                                 format_number(std::max(1.0, std::round(result.estimate_s))) + " s";
-    if (result.estimate_s > 30) {
-      context.warn(reported);
-    } else {
-      context.info(reported);
-    }
+    tell_estimate(rows, width, result.estimate_s, context);
   }
-  for (result.rounds = 1;; ++result.rounds) {
-    Descent d = descend(fit, at, options.calibrate, context);
-    if (!d.usable)
-      throw Error(ExitCode::failed,
-                  "no factors were found with which the model comes to rest under these loads: " + d.why,
-                  "make the loads smaller");
-    at = d.parameters;
-    fit.result.converged = d.converged;
-    fit.result.why = d.why;
-    fit.result.cost.insert(fit.result.cost.end(), d.costs.begin(), d.costs.end());
-    for (auto& step : d.course) {
-      step.resize(static_cast<std::size_t>(fit.parameters()));
-      fit.result.course.push_back(std::move(step));
-    }
-    // The last evaluation of a descent need not be where it ended.
-    evaluate();
-    bool stays = true;
-    for (std::size_t n = 0; n < goals.size(); ++n) {
-      SurfaceGoal* const goal = goals[n];
-      std::vector<double> before;
-      for (const auto& v : goal->views()) before.push_back(v.sigma_mm);
-      goal->widen_by_noise(fit.shapes()[n]);
-      for (std::size_t k = 0; k < before.size(); ++k)
-        stays = stays && std::abs(goal->views()[k].sigma_mm - before[k]) < 0.1 * before[k];
-    }
-    if (stays || result.rounds == kMaxRounds) break;
-  }
+  result.rounds = fit_until_the_noise_stays(fit, goals, at, evaluate, options.calibrate, context);
   evaluate();
 
-  // What is left, and how sure the factors are.
-  for (MeasuredView& view : result.views) {
-    const std::size_t k =
-        static_cast<std::size_t>(&view - result.views.data()) -
-        static_cast<std::size_t>(std::find_if(result.views.begin(), result.views.end(),
-                                              [&](const MeasuredView& o) { return o.load == view.load; }) -
-                                 result.views.begin());
-    describe(*goals[view.load], k, model.rest(), fit.shapes()[view.load], view);
-    if (!options.find_pose) continue;
-    const auto& v = goals[view.load]->views()[k];
-    std::size_t own = static_cast<std::size_t>(fit.parameters()) + 6 * k;
-    for (std::size_t n = 0; n < view.load; ++n) own += goals[n]->own();
-    for (std::size_t a = 0; a < 3; ++a) {
-      view.turned_deg[a] = at[own + a] * v.turn * 57.29577951308232;
-      view.shifted_mm[a] = at[own + 3 + a] * v.shift;
-    }
-  }
-  const auto w = static_cast<Eigen::Index>(width);
-  const Eigen::Map<const RowMajor> j(jacobian.data(), static_cast<Eigen::Index>(residuals.size()), w);
-  const Eigen::Index data_rows = fit.goal_rows();
-  DenseMatrix data = DenseMatrix::Zero(w, w), spread = data;
-  Eigen::Index row = 0;
-  for (const MeasuredView& view : result.views) {
-    const Eigen::Index n = static_cast<Eigen::Index>(view.drawn) * (view.markers ? 3 : 1);
-    const DenseMatrix own = j.middleRows(row, n).transpose() * j.middleRows(row, n);
-    const double left =
-        Eigen::Map<const Eigen::VectorXd>(residuals.data() + row, n).squaredNorm() / static_cast<double>(n);
-    // Values on a plane that go with their neighbours count as fewer, by the sum of what each goes with.
-    const double wide = view.correlation > 0 ? (1 + view.correlation) / (1 - view.correlation) : 1;
-    data += own;
-    spread += own * (left * wide * wide);
-    row += n;
-  }
-  const DenseMatrix prior = j.bottomRows(j.rows() - data_rows).transpose() * j.bottomRows(j.rows() - data_rows);
-  const auto& grid = options.calibrate.grid;
-  const std::size_t nodes = fit.nodes();
-  const bool map = nodes > 1, shared = options.calibrate.shared_grid;
-  Vec3 lo{1e300, 1e300, 1e300}, hi = lo * -1;
-  for (const Vec3& p : model.rest())
-    for (std::size_t a = 0; a < 3; ++a) {
-      lo[a] = std::min(lo[a], p[a]);
-      hi[a] = std::max(hi[a], p[a]);
-    }
-  const auto place = [&](std::size_t node) {
-    Vec3 x;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const auto many = static_cast<std::size_t>(grid[a]);
-      x[a] = many > 1 ? static_cast<double>(node % many) / static_cast<double>(many - 1) * (hi[a] - lo[a]) : 0;
-      node /= many;
-    }
-    return x;
-  };
-  const double far = 0.5 * std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
-  const auto node_of = [&](int i) {
-    return fit.of_map(i) ? fit.number_of(i) : shared ? nodes : fit.number_of(i) / kTissueClasses;
-  };
-  const auto class_of = [&](int i) {
-    return fit.of_map(i) ? kTissueClasses : shared ? fit.number_of(i) - nodes : fit.number_of(i) % kTissueClasses;
-  };
-  DenseMatrix before = DenseMatrix::Zero(w, w);
-  for (int a = 0; a < fit.width(); ++a) {
-    if (a >= fit.parameters()) {
-      before(a, a) = 1;
-      continue;
-    }
-    for (int b = 0; b < fit.parameters(); ++b) {
-      const double own = class_of(a) == static_cast<std::size_t>(TissueClass::face) ? kFacesBefore : kClassBefore;
-      const bool everywhere = shared && (!fit.of_map(a) || !fit.of_map(b));  // one of them is a class's factor
-      if (!everywhere || !map) {
-        const double apart = map ? length(place(node_of(a)) - place(node_of(b))) / far : 0;
-        before(a, b) += kFactorBefore * kFactorBefore * std::exp(-apart);
-        if (!fit.of_map(a) && class_of(a) == class_of(b)) before(a, b) += own * own * std::exp(-apart);
-      } else if (a == b) {
-        before(a, b) += own * own;
-      }
-    }
-  }
-  // A class without a constraint (or faces that carry nothing) must not make it singular.
-  DenseMatrix all = data + prior;
-  all.diagonal().array() += 1e-14 * all.trace();
-  const Eigen::LDLT<DenseMatrix> solved(all);
-  const DenseMatrix inner = spread + prior * before * prior;
-  const DenseMatrix covariance = solved.solve(solved.solve(inner).transpose());
-  const Eigen::VectorXd logs = Eigen::Map<const Eigen::VectorXd>(at.data(), w);
-  const auto mean_of = [&](const auto& wanted) {
-    Eigen::VectorXd share = Eigen::VectorXd::Zero(w);
-    double count = 0;
-    for (std::size_t c = 0; c < model.constraints().size(); ++c) {
-      if (model.constraints()[c].nodes != 2 || !wanted(c)) continue;
-      fit.for_parameters(c, [&](std::uint32_t i, double weight) { share[static_cast<Eigen::Index>(i)] += weight; });
-      count += 1;
-    }
-    return Eigen::VectorXd(share / std::max(1.0, count));
-  };
-  const auto stiffness = [&](const Eigen::VectorXd& share) {
-    return LogStiffness{share.dot(logs), std::sqrt(std::max(0.0, share.dot(covariance * share)))};
-  };
-  const Eigen::VectorXd whole = mean_of([](std::size_t) { return true; });
-  result.all = stiffness(whole);
-  int groups = 0;
-  for (const int g : options.group_of) groups = std::max(groups, g + 1);
-  for (int g = 0; g < groups; ++g)
-    result.groups.push_back(stiffness(mean_of([&](std::size_t c) { return options.group_of[c] == g; })));
-  // A point of the map: its own logarithm, with the classes' as edges have them on the whole.
-  result.deviation.assign(nodes, 0);
-  result.settled.assign(nodes, 0);
-  for (std::size_t node = 0; node < nodes; ++node) {
-    Eigen::VectorXd share = Eigen::VectorXd::Zero(w);
-    bool there = !map;
-    for (int i = 0; i < fit.parameters(); ++i) {
-      if (fit.of_map(i)) {
-        if (fit.number_of(i) != node) continue;
-        share[i] = 1;
-        there = true;
-      } else if (shared) {
-        share[i] = whole[i];
-      } else if (node_of(i) == node && class_of(i) < static_cast<std::size_t>(TissueClass::face)) {
-        share[i] = 0.5;
-        there = true;
-      }
-    }
-    if (!there) continue;
-    const double after = share.dot(covariance * share), unknown = share.dot(before * share);
-    result.deviation[node] = std::sqrt(std::max(0.0, after));
-    result.settled[node] = std::clamp(1 - after / unknown, 0.0, 1.0);
-  }
+  describe_views(fit, goals, model, at, options.find_pose, result.views);
+  const FactorPlaces places(model, fit, options.calibrate);
+  const DenseMatrix before = places.before(),
+                    covariance = covariance_of(fit, result.views, residuals, jacobian, before);
+  tell_stiffness(model, fit, places, at, covariance, before, options, result);
 
   Calibration& c = fit.result;
   c.parameters = fit.parameters();
@@ -481,7 +538,8 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
     unsure[i] = std::sqrt(std::max(0.0, covariance(at_i, at_i)));
   }
   c.uncertainty = fit.all_of(unsure);
-  if (shared) {
+  if (places.shared()) {
+    const std::size_t nodes = fit.nodes();
     c.log_stiffness.assign(full.begin(), full.begin() + static_cast<std::ptrdiff_t>(nodes));
     c.log_factors.clear();
     for (std::size_t p = 0; p < nodes; ++p)

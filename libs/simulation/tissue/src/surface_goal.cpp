@@ -8,6 +8,7 @@
 #include <random>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/order.h"
 #include "osteo/core/base/param.h"
 #include "osteo/geometry/mesh/soup.h"
 
@@ -31,13 +32,6 @@ Eigen::Vector3d eigen(Vec3 v) {
 }
 Vec3 vec(const Eigen::Vector3d& v) {
   return {v.x(), v.y(), v.z()};
-}
-
-double quantile(std::vector<double> v, double share) {
-  if (v.empty()) return 0;
-  const auto at = v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
-  std::nth_element(v.begin(), at, v.end());
-  return *at;
 }
 
 // A residual whose square is A. Cauchy's loss, and its slope.
@@ -79,7 +73,7 @@ SurfaceGoal::SurfaceGoal(const TissueModel& model, const BodySurface& surface, s
       v.drawn.resize(most);
       std::sort(v.drawn.begin(), v.drawn.end());
     }
-    const double usual = quantile(source.noise_mm, 0.5);
+    const double usual = value_at_share(source.noise_mm, 0.5);
     for (const std::size_t p : v.drawn) {
       v.weight.push_back(source.noise_mm.empty() ? 1 : source.noise_mm[p] / usual);
       v.centre += source.points_mm[p] / static_cast<double>(v.drawn.size());
@@ -329,7 +323,7 @@ void SurfaceGoal::widen_by_noise(std::span<const Vec3> shape) {
       if (here >= 0.1 * most) off.push_back(anywhere.back());
     }
     if (off.size() < 10) off = std::move(anywhere);
-    v.sigma_mm = std::max(quantile(std::move(off), kTwoThirds) / (v.markers() ? kOfThree : 1), least);
+    v.sigma_mm = std::max(value_at_share(std::move(off), kTwoThirds) / (v.markers() ? kOfThree : 1), least);
     v.width_mm = kCauchy * v.sigma_mm * (v.markers() ? std::sqrt(3.0) : 1);
   }
 }
@@ -361,8 +355,8 @@ MeasuredError SurfaceGoal::error(std::size_t view, std::span<const Vec3> shape) 
   const View& v = views_[view];
   std::vector<double> off;
   for (std::size_t p = 0; p < v.drawn.size(); ++p) off.push_back(length(left(view, p)));
-  e.median_mm = quantile(off, 0.5);
-  const double limit = kStray * quantile(off, kTwoThirds);
+  e.median_mm = value_at_share(off, 0.5);
+  const double limit = kStray * value_at_share(off, kTwoThirds);
   double sum = 0, used = 0;
   for (const double d : off) {
     if (d > limit) continue;

@@ -92,6 +92,8 @@ struct OldName {
 
 /// ASCII letters in lower case.
 [[nodiscard]] std::string lower_case(std::string text);
+/// Without the blanks (those characters) at both ends: a part of the same text, which must outlive it.
+[[nodiscard]] std::string_view trimmed(std::string_view text, std::string_view blanks = " \t");
 /// Shortest text that reads back to the same double; no locale.
 [[nodiscard]] std::string format_number(double value);
 /// Strict: the whole text must be a finite number. Throws Error(usage) naming `what`.

@@ -44,6 +44,8 @@ class BrickGrid {
   /// All-zero bricks at the given brick coordinates (>= 0, each at most once, any order; they are sorted z, y, x).
   /// Error(corrupt) where they are beyond the limits.
   BrickGrid(Frame frame, std::vector<Ijk> bricks);
+  /// All-zero, with every brick that holds a voxel of the frame.
+  [[nodiscard]] static BrickGrid dense(const Frame& frame);
   BrickGrid(const BrickGrid& other);
   BrickGrid(BrickGrid&&) noexcept = default;
   BrickGrid& operator=(BrickGrid&&) noexcept = default;
