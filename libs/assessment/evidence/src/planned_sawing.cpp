@@ -159,7 +159,7 @@ Found found(const std::vector<Lost>& lost, const std::vector<bool>& taken, const
   }
   middle = middle / mm3;
   if (beside > kMostBeside * mm3) {
-    out.plane.why = "more is gone there than a saw takes: no plane can be told";
+    out.plane.why = "more is gone there than a saw takes: no plane can be measured";
     return out;
   }
   double xx = 0, xy = 0, yy = 0;
@@ -172,7 +172,7 @@ Found found(const std::vector<Lost>& lost, const std::vector<bool>& taken, const
   }
   const double shorter = (xx + yy) / 2 - std::sqrt((xx - yy) * (xx - yy) / 4 + xy * xy);
   if (shorter < kLeastAcrossMm * kLeastAcrossMm) {
-    out.plane.why = "too little is sawn: no plane can be told";
+    out.plane.why = "too little is sawn: no plane can be measured";
     return out;
   }
   const double slope = portable::hypot(slot.rise[1], slot.rise[2]);
