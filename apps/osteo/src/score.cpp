@@ -98,19 +98,27 @@ Scored score_folder(const fs::path& session_folder, const ScoreAsked& asked, con
   World begin = world_at_begin(folder, the_case, anatomy, context);
   std::optional<World> again;
   if (asked.heat) again = begin.copy();
+  const std::vector<PlannedCut> planned = planned_cuts_of(folder.case_folder);
+  ScoreDetail detail;
   std::optional<Reference> reference;
   const bool compares = !asked.reference.empty();
   if (compares)
     reference =
         load_sessions(asked.reference, folder, the_case, anatomy, session.header().bone_hash, context.sub(0, 0.5));
-  Scored scored{score_session(session, std::move(begin), anatomy.structures.get(),
-                              asked.procedure ? &*asked.procedure : nullptr, reference ? &*reference : nullptr,
-                              asked.subject, context.sub(compares ? 0.5 : 0, asked.heat ? 0.6 : 1)),
-                folder.folder.filename().string(), folder.guided, session.outline().damaged()};
+  Scored scored{
+      score_session(session, std::move(begin), anatomy.structures.get(), asked.procedure ? &*asked.procedure : nullptr,
+                    reference ? &*reference : nullptr, asked.subject,
+                    context.sub(compares ? 0.5 : 0, asked.heat ? 0.6 : 1), planned.empty() ? nullptr : &detail),
+      folder.folder.filename().string(), folder.guided, session.outline().damaged()};
   Score& score = scored.score;
   score.source.stream = hash_path(folder.stream()).substr(0, 16);
   score.source.scored_by = program_version();
   score.source.guided = !folder.guided.empty();
+  // Sessions before this one may have sawn too: held against the case's own bone.
+  if (detail.end) {
+    for (Measured& m : planned_cut_values(world_of(the_case, anatomy), *detail.end, planned))
+      score.values.push_back(std::move(m));
+  }
   if (again) {
     Anatomy recorded = anatomy;
     if (setup.opened != session.header().haptics.opened) {

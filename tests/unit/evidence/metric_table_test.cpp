@@ -128,6 +128,10 @@ const Row kRows[] = {
     {"heat_bone_c", 37, 37},
     {"heat_peak_c[nerve]", 37, 37},
     {"heat_cem43_min[nerve]", 0, 0},
+    // Of cases with planned cuts: PlannedSawing.* have their values by hand.
+    {"plan_off_mm[cut]", NAN, NAN},
+    {"plan_angle_deg[cut]", NAN, NAN},
+    {"plan_voxels[cut]", NAN, NAN},
     {"force_above_band_share[nerve]", (200.0 + 8) / 800, (200.0 + 8) / 800},
     {"speed_above_band_share[nerve]", kMoreThan5MmS, kMoreThan5MmS, 0.02},
     {"region_log_ratio", std::log(2), std::log(2)},

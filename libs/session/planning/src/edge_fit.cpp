@@ -32,6 +32,7 @@ EdgeReader::EdgeReader(const Image& ct, double min_drop_hu, double metal_hu)
     c = {c.x / ct.frame.spacing_mm.x, c.y / ct.frame.spacing_mm.y, c.z / ct.frame.spacing_mm.z};
   shift_ = index_ * ct.frame.origin_mm * -1;
   find_metal();
+  find_spline();
 }
 
 void EdgeReader::find_metal() {
@@ -90,11 +91,71 @@ double EdgeReader::metal_mm(Vec3 point) const {
   return mm > kFarFromMetalMm ? std::numeric_limits<double>::infinity() : mm;
 }
 
-std::optional<double> EdgeReader::value(Vec3 point) const {
+std::optional<Vec3> EdgeReader::index_of(Vec3 point) const {
   const Vec3 i = index_ * point + shift_;
   for (std::size_t a = 0; a < 3; ++a)
     if (!(i[a] >= 0 && i[a] <= ct_.frame.dims[a] - 1)) return std::nullopt;
-  return sample_linear(ct_, i);
+  return i;
+}
+
+std::optional<double> EdgeReader::value(Vec3 point) const {
+  const auto i = index_of(point);
+  return i ? std::optional(sample_linear(ct_, *i)) : std::nullopt;
+}
+
+// A cubic B-spline through the voxels. Along straight lines between them, an edge lies where its phase in the grid has
+// it: on slices of 1 mm a shaft was turned about itself by 0.4 degrees without any noise. Cubic convolution needs no
+// coefficients, but leaves 1.3 to 3 times as much of that error.
+void EdgeReader::find_spline() {
+  constexpr double kPole = -0.26794919243112270647;  // root of 3, less 2
+  constexpr std::size_t kFades = 16;                 // its power is below a millionth of a millionth of 10^4 HU
+  const auto voxels = ct_.span();
+  spline_.assign(voxels.begin(), voxels.end());
+  std::size_t stride = 1;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto count = static_cast<std::size_t>(ct_.frame.dims[a]), block = stride * count;
+    for (std::size_t from = 0; count > 1 && from < spline_.size(); from += block) {
+      float* const v = spline_.data() + from;
+      const auto add = [&](std::size_t to, std::size_t of, double share, double all) {
+        for (std::size_t n = 0; n < stride; ++n)
+          v[to * stride + n] = static_cast<float>(
+              all * (static_cast<double>(v[to * stride + n]) + share * static_cast<double>(v[of * stride + n])));
+      };
+      double power = kPole;
+      for (std::size_t k = 1; k < std::min(count, kFades); ++k, power *= kPole) add(0, k, power, 1);
+      for (std::size_t k = 1; k < count; ++k) add(k, k - 1, kPole, 1);
+      add(count - 1, count - 2, kPole, 6 * kPole / (kPole * kPole - 1));
+      // -6 z (c - d / 6) is what it is with coefficients that are scaled already.
+      for (std::size_t k = count - 1; k-- > 0;) add(k, k + 1, -1.0 / 6, -6 * kPole);
+    }
+    stride = block;
+  }
+}
+
+double EdgeReader::spline(Vec3 index) const {
+  std::array<std::array<std::size_t, 4>, 3> at{};
+  std::array<std::array<double, 4>, 3> weight{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const int last = ct_.frame.dims[a] - 1, below = static_cast<int>(index[a]);
+    const double t = index[a] - below, u = 1 - t;
+    weight[a] = {u * u * u / 6, (4 - 6 * t * t + 3 * t * t * t) / 6, (4 - 6 * u * u + 3 * u * u * u) / 6,
+                 t * t * t / 6};
+    for (int n = 0; n < 4; ++n) {  // mirrored at the ends
+      const int k = std::abs(below + n - 1);
+      at[a][static_cast<std::size_t>(n)] = static_cast<std::size_t>(std::max(0, k > last ? 2 * last - k : k));
+    }
+  }
+  const auto columns = static_cast<std::size_t>(ct_.frame.dims[0]), rows = static_cast<std::size_t>(ct_.frame.dims[1]);
+  double sum = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    for (std::size_t j = 0; j < 4; ++j) {
+      const float* const row = spline_.data() + (at[2][k] * rows + at[1][j]) * columns;
+      double along = 0;
+      for (std::size_t i = 0; i < 4; ++i) along += weight[0][i] * static_cast<double>(row[at[0][i]]);
+      sum += weight[2][k] * weight[1][j] * along;
+    }
+  }
+  return sum;
 }
 
 double EdgeReader::blur_mm(double step_hu, double drop_hu) {
@@ -108,9 +169,10 @@ std::optional<EdgeReader::Edge> EdgeReader::along(Vec3 point, Vec3 direction, do
   std::vector<double> profile;
   profile.reserve(static_cast<std::size_t>(2 * ends + 1));
   for (int k = -ends; k <= ends; ++k) {
-    const auto v = value(point + direction * (k * kSampleMm));
-    if (!v || (std::abs(k) <= metal && *v > metal_)) return std::nullopt;
-    profile.push_back(*v);
+    const auto i = index_of(point + direction * (k * kSampleMm));
+    if (!i) return std::nullopt;
+    profile.push_back(spline(*i));
+    if (std::abs(k) <= metal && profile.back() > metal_) return std::nullopt;
   }
   const auto drop = [&](int at) {
     double sum = 0;

@@ -31,19 +31,23 @@ class EdgeReader {
   [[nodiscard]] static double blur_mm(double step_hu, double drop_hu);
   /// Along a unit direction from bone to what is not bone: where it drops most within `reach_mm` of the point.
   [[nodiscard]] std::optional<Edge> along(Vec3 point, Vec3 direction, double reach_mm) const;
-  /// Nothing outside the CT.
+  /// Between voxels along straight lines; nothing outside the CT. For a first look.
   [[nodiscard]] std::optional<double> value(Vec3 point) const;
   /// How far metal is, in whole mm, up to 8; further than that or none at all: infinity.
   [[nodiscard]] double metal_mm(Vec3 point) const;
 
  private:
   void find_metal();
+  [[nodiscard]] std::optional<Vec3> index_of(Vec3 point) const;
+  void find_spline();
+  [[nodiscard]] double spline(Vec3 index) const;
 
   const Image& ct_;
   Mat3 index_;
   Vec3 shift_;
   double min_drop_, metal_;
   std::array<int, 3> cell_{1, 1, 1}, cells_{};  // voxels along a cell's edges of about 1 mm; cells
+  std::vector<float> spline_;                   // coefficients: twice the CT's memory
   std::vector<std::uint8_t> to_metal_;
 };
 

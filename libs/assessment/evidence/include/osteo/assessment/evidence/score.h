@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "osteo/assessment/evidence/detail/planned_sawing.h"
 #include "osteo/assessment/evidence/detail/process.h"
 #include "osteo/assessment/evidence/detail/product.h"
 #include "osteo/assessment/evidence/detail/reference.h"

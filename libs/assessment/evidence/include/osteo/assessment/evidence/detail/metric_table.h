@@ -17,6 +17,7 @@ enum class MetricPlace {
   product,    ///< score_session, from Product
   reference,  ///< score_session, from Reference
   heat,       ///< heat_values (library scene)
+  plan,       ///< planned_cut_values
 };
 /// What has to be there for a value. What is missing is missing for all metrics of a place that need it:
 /// not_measured_all().
@@ -32,6 +33,7 @@ enum class MetricWhen {
   removal,        ///< bone that was removed
   bands,          ///< a reference with samples near structures
   regions,        ///< a reference with experts and novices
+  planned,        ///< a planned cut that was made
 };
 
 /// The declaration of a metric: all that lines, columns, JSON and the table in docs/validation/evidence.md need to know
@@ -40,7 +42,8 @@ struct MetricRow {
   std::string_view name;  ///< lower case; unit at its end where it has one
   std::string_view unit;  ///< "1": a share or a count
   Better better;
-  std::string_view needs;  ///< "": nothing but the ticks; else "camera", "structures", "procedure", "reference"
+  std::string_view needs;  ///< "": nothing but the ticks; else "camera", "structures", "procedure",
+                           ///< "planned cuts", "reference"
   MetricPlace place;
   MetricWhen when;
   std::string_view source;  ///< where it is from
@@ -164,6 +167,12 @@ inline constexpr MetricRow kRows[] = {
      "the warmest that the structure's face became"},
     {"heat_cem43_min", "min", kDown, "heat, structures", MetricPlace::heat, MetricWhen::structures, kHeat,
      "dose at its face, in minutes at 43 C; 16 harm bone"},
+    {"plan_off_mm", "mm", kDown, "planned cuts", MetricPlace::plan, MetricWhen::planned, kOurs,
+     "from the planned plane to the sawn one, in the middle of what was sawn"},
+    {"plan_angle_deg", "deg", kDown, "planned cuts", MetricPlace::plan, MetricWhen::planned, kOurs,
+     "between the planned plane and the sawn one"},
+    {"plan_voxels", "1", kNone, "planned cuts", MetricPlace::plan, MetricWhen::planned, kOurs,
+     "voxels of the sawn slot that the two are from"},
     {"force_above_band_share", "1", kDown, "structures, reference", MetricPlace::reference, MetricWhen::bands,
      kThesis352, "of drilling near it, pressing harder than 90 % of experts do at that distance"},
     {"speed_above_band_share", "1", kDown, "structures, reference", MetricPlace::reference, MetricWhen::bands,
