@@ -111,6 +111,7 @@ struct Errors {
   int held[4] = {0, 0, 0, 0}, asked[4] = {0, 0, 0, 0};  ///< shift, turn, off, tilt
   double squares[4] = {0, 0, 0, 0};                     ///< of errors over half-widths
   int unknown_fragments = 0, unknown_cuts = 0, sliding = 0;
+  int far[2] = {0, 0}, far_held[2] = {0, 0};  ///< turns of shafts off by over 0.3 degrees, tilts by over 0.5; held
   void ask(int which, const Interval95& m, double truth) {
     held[which] += m.holds(truth) ? 1 : 0;
     squares[which] += (m.value - truth) * (m.value - truth) / (m.half * m.half);
@@ -139,11 +140,17 @@ struct Errors {
         shift = shift - f.slides_along * dot(shift, f.slides_along);
         sliding += f.slides_along == Vec3{} ? 0 : 1;
         Vec3 off, turned;
+        bool turn_held = true;
         for (std::size_t a = 0; a < 3; ++a) {
           off[a] = f.shift_mm[a].value - shift[a];
           turned[a] = f.turn_deg[a].value - turn[a];
           ask(0, f.shift_mm[a], shift[a]);
           ask(1, f.turn_deg[a], turn[a]);
+          turn_held = turn_held && f.turn_deg[a].holds(turn[a]);
+        }
+        if (length(turned) > 0.3) {
+          ++far[0];
+          far_held[0] += turn_held ? 1 : 0;
         }
         pose_mm.push_back(length(off));
         (f.slides_along == Vec3{} ? pose_deg : sliding_deg).push_back(length(turned));
@@ -163,6 +170,10 @@ struct Errors {
         ask(3, c.tilt_deg[1], t.off_tilt[cut].z);
         cut_mm.push_back(std::abs(c.off_mm.value - off));
         cut_deg.push_back(std::hypot(c.tilt_deg[0].value - t.off_tilt[cut].y, c.tilt_deg[1].value - t.off_tilt[cut].z));
+        if (cut_deg.back() > 0.5) {
+          ++far[1];
+          far_held[1] += c.tilt_deg[0].holds(t.off_tilt[cut].y) && c.tilt_deg[1].holds(t.off_tilt[cut].z) ? 1 : 0;
+        }
       }
     }
   }
@@ -489,6 +500,8 @@ TEST(Outcome, Benchmark) {
       line("sliding_deg", errors.sliding_deg);
       line("cut_mm", errors.cut_mm);
       line("cut_deg", errors.cut_deg);
+      std::cout << "  turns off by over 0.3 degrees " << errors.far[0] << ", held " << errors.far_held[0]
+                << "; tilts by over 0.5 " << errors.far[1] << ", held " << errors.far_held[1] << '\n';
       for (int n = 0; n < 4; ++n)
         std::cout << "  held " << n << ": " << errors.held[n] << " of " << errors.asked[n] << " = "
                   << 100.0 * errors.held[n] / std::max(1, errors.asked[n]) << " %, errors over half-widths "
