@@ -395,6 +395,9 @@ TEST(StartList, TheDemoIsOfferedBehindTheCasesAndMadeWhenItIsWanted) {
   ASSERT_TRUE(choice);
   EXPECT_EQ(choice->case_folder, demo);
   EXPECT_FALSE(list.wants_demo());
+  list.select(0);
+  list.refresh(f.scratch / "never made");
+  EXPECT_EQ(list.selected(), 0);
   // Among the cases opened last it stands once.
   const StartList again({demo}, f.scratch.path(), demo);
   EXPECT_EQ(index_of(again, "demo ear"), -1);

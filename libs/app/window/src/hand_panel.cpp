@@ -3,6 +3,7 @@
 
 #include "hand_controller.h"
 #include "osteo/core/base/translate.h"
+#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -35,7 +36,7 @@ void HandController::draw(RehearsalControl& control, bool show) {
     ImGui::SetKeyboardFocusHere();
   }
   row_.clear();
-  const bool open = ImGui::CollapsingHeader(tr("Hand and pedals"));
+  const bool open = fold(tr("Hand and pedals"));
   if (show) ImGui::SetScrollHereY(0);
   if (!open) {
     assign_.cancel();

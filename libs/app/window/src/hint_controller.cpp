@@ -7,6 +7,7 @@
 
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/translate.h"
+#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -113,7 +114,7 @@ void HintController::draw(const ScreenBox& view) const {
 }
 
 void HintController::panel() {
-  if (!ImGui::CollapsingHeader(tr("Hints while one drills"))) return;
+  if (!fold(tr("Hints while one drills"))) return;
   bool all = on();
   if (ImGui::Checkbox(tr("hints (Ctrl-H)"), &all)) turn(all);
   for (const HintRule& r : usual_hints()) {

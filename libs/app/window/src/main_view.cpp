@@ -458,7 +458,7 @@ void MainView::draw_panel(const ViewScene& scene) {
   draw_settings(rehearsal);
   draw_posture(rehearsal);
   draw_tissue(rehearsal);
-  if (ImGui::CollapsingHeader(tr("Case and machine"))) {
+  if (fold(tr("Case and machine"))) {
     draw_approval(scene.machine.approval, scene.machine.approval_ended);
     if (scene.machine.scan != nullptr) draw_scan(*scene.machine.scan);
     ImGui::TextWrapped("%s", filled(tr("hand: {device}"), {{"device", scene.machine.device}}).c_str());
@@ -650,9 +650,9 @@ EndChoice MainView::draw_end(const EndFacts& facts, const EndParts& parts) {
     button(tr("Close (Q)"), EndChoice::close, ButtonLook::usual, half);
   }
   parts.course();
-  if (ImGui::CollapsingHeader(tr("All figures"))) draw_figures(facts.lines);
-  if (ImGui::CollapsingHeader(tr("All findings"))) parts.all_findings();
-  if (ImGui::CollapsingHeader(tr("Files"))) {
+  if (fold(tr("All figures"))) draw_figures(facts.lines);
+  if (fold(tr("All findings"))) parts.all_findings();
+  if (fold(tr("Files"))) {
     ImGui::TextWrapped("%s", facts.folder.string().c_str());
     ImGui::TextWrapped("%s", tr("summary.json has the numbers, stream.oss every tick: osteo replay SESSION"));
   }

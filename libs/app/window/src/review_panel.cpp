@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include "osteo/core/base/translate.h"
 #include "state_facts.h"
@@ -165,25 +167,70 @@ void draw_all_findings(ReviewControl& control) {
   }
 }
 
+namespace {
+
+// The next moment that something happened, or the one before; the ends, where there is none.
+double event_beside(const ReviewControl& control, bool later) {
+  constexpr double kHereS = 0.2;  // while it plays the one before is the one before this
+  double best = later ? control.review().player->end_s() : 0;
+  for (const ReviewCourse::Event& event : control.review().course.events) {
+    if (later ? event.t_s > control.now_s() + kHereS : event.t_s < control.now_s() - kHereS)
+      best = later ? std::min(best, event.t_s) : std::max(best, event.t_s);
+  }
+  return best;
+}
+
+void draw_player(ReviewControl& control) {
+  const float u = unit();
+  if (tile("before", "player-track-prev", {false, false, true, tr("event before")}))
+    control.go_to(event_beside(control, false));
+  ImGui::SameLine(0, 0);
+  const bool playing = control.playing();
+  if (tile("play", playing ? "player-pause" : "player-play",
+           {false, playing, true, playing ? tr("pause (Space)") : tr("play (Space)")}))
+    control.play(!playing);
+  ImGui::SameLine(0, 0);
+  if (tile("after", "player-track-next", {false, false, true, tr("next event")}))
+    control.go_to(event_beside(control, true));
+  ImGui::SameLine(0, kGap * u);
+  const std::string time = clock_text(control.now_s()) + " / " + clock_text(control.review().player->end_s());
+  const ImVec2 at = ImGui::GetCursorScreenPos();
+  const float time_wide = 7 * em();
+  fitted_text(ImGui::GetWindowDrawList(), {at.x, at.y, time_wide, kTile * u}, em(), theme().text, time);
+  ImGui::Dummy({time_wide, kTile * u});
+  ImGui::SameLine(0, kGap * u);
+  // All speeds where they have room, else the one that is on: a click takes the next.
+  std::vector<std::string> speeds;
+  float wide = 0;
+  for (const double s : ReviewControl::kSpeeds) {
+    speeds.push_back(shown_number(s, s < 1 ? 1 : 0) + "x");
+    wide += ImGui::CalcTextSize(speeds.back().c_str()).x + 24 * u;
+  }
+  const int count = static_cast<int>(speeds.size());
+  const int now =
+      static_cast<int>(std::find(ReviewControl::kSpeeds.begin(), ReviewControl::kSpeeds.end(), control.speed()) -
+                       ReviewControl::kSpeeds.begin());
+  const float view_wide = ImGui::CalcTextSize(tr("surgeon's view")).x + 64 * u;
+  if (wide + view_wide + 2 * kGap * u <= ImGui::GetContentRegionAvail().x) {
+    if (const int chosen = choice("speed", speeds, now); chosen >= 0) control.change_speed(chosen - now);
+  } else if (kit_button(speeds[static_cast<std::size_t>(now)] + "##speed")) {
+    control.change_speed(now + 1 < count ? 1 : -now);
+  }
+  ImGui::SameLine(0, kGap * u);
+  if (view_wide <= ImGui::GetContentRegionAvail().x) {
+    static_cast<void>(kit_switch(tr("surgeon's view"), control.surgeons_view, view_wide));
+  } else if (tile("surgeon's view", "eye", {false, control.surgeons_view, true, tr("surgeon's view")})) {
+    control.surgeons_view = !control.surgeons_view;
+  }
+}
+
+}  // namespace
+
 void draw_course(const ScreenBox& box, ReviewControl& control) {
   begin_fixed("course", box, ImGuiWindowFlags_NoScrollbar);
   const ReviewCourse& course = control.review().course;
   const float e = em();
-  if (ImGui::Button(control.playing() ? tr("pause (Space)") : tr("play (Space)"), {10 * e, 0}))
-    control.play(!control.playing());
-  ImGui::SameLine();
-  ImGui::TextUnformatted(filled(tr("{n} of {all}"), {{"n", clock_text(control.now_s())},
-                                                     {"all", clock_text(control.review().player->end_s())}})
-                             .c_str());
-  ImGui::SameLine();
-  if (ImGui::SmallButton("-")) control.change_speed(-1);
-  ImGui::SameLine();
-  ImGui::Text("x%g", control.speed());
-  ImGui::SameLine();
-  if (ImGui::SmallButton("+")) control.change_speed(1);
-  ImGui::SameLine();
-  ImGui::Checkbox(tr("surgeon's view"), &control.surgeons_view);
-
+  draw_player(control);
   const ImVec2 at = ImGui::GetCursorScreenPos(), room = ImGui::GetContentRegionAvail();
   const float names = 9 * e, left = at.x + names, wide = std::max(1.0F, room.x - names), high = std::max(1.0F, room.y);
   ImDrawList* const draw = ImGui::GetWindowDrawList();

@@ -9,6 +9,7 @@
 
 #include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/posture.h"
+#include "ui_kit.h"
 
 namespace osteo::inline app {
 namespace {
@@ -52,7 +53,7 @@ void draw_posture(Rehearsal& rehearsal) {
   rehearsal.look([&](const World&, SceneReaders& readers) {
     if (readers.dust) down = readers.dust->dust().gravity();
   });
-  if (!down || !ImGui::CollapsingHeader(tr("How the patient lies"))) return;
+  if (!down || !fold(tr("How the patient lies"))) return;
   PostureNow now = posture_of(*down);
   bool changed = false;
   for (std::size_t n = 0; n < EnumNames<Posture>::values.size(); ++n) {
@@ -75,7 +76,7 @@ void draw_posture(Rehearsal& rehearsal) {
 
 void draw_tissue(const Rehearsal& rehearsal) {
   const std::vector<SoftTissue::Facts> bodies = rehearsal.tissue();
-  if (bodies.empty() || !ImGui::CollapsingHeader(tr("Soft tissue"))) return;
+  if (bodies.empty() || !fold(tr("Soft tissue"))) return;
   for (const SoftTissue::Facts& body : bodies) {
     // A name is a folder's: nothing in it is a format.
     ImGui::TextUnformatted(body.name.c_str());
@@ -93,7 +94,7 @@ void draw_tissue(const Rehearsal& rehearsal) {
 }
 
 void draw_settings(Rehearsal& rehearsal) {
-  if (!ImGui::CollapsingHeader(tr("How it feels"))) return;
+  if (!fold(tr("How it feels"))) return;
   HapticsParams params = rehearsal.settings();
   const auto fields = fields_of<HapticsParams>(params);
   ImGui::PushItemWidth(4.5F * ImGui::GetFontSize());

@@ -33,11 +33,11 @@ std::string name_of(const fs::path& folder) {
 
 // By the first files in it: slices lie in one folder, and what else is there is not many.
 bool holds_dicom(const fs::path& folder) {
-  constexpr int kLookedAt = 4;
+  constexpr int kLookedAt = 4, kPassed = 40;
   std::error_code failed;
-  int seen = 0;
+  int seen = 0, passed = 0;
   for (fs::directory_iterator at(folder, fs::directory_options::skip_permission_denied, failed), end;
-       !failed && at != end && seen < kLookedAt; at.increment(failed)) {
+       !failed && at != end && seen < kLookedAt && passed < kPassed; at.increment(failed), ++passed) {
     std::error_code unknown;
     if (!at->is_regular_file(unknown)) continue;
     ++seen;
@@ -185,9 +185,13 @@ std::optional<StartChoice> StartList::open() {
 }
 
 void StartList::refresh(const fs::path& chosen) {
+  const std::size_t at = static_cast<std::size_t>(selected_);
+  const fs::path before = at < entries_.size() ? entries_[at].folder : fs::path();
   list();
-  for (std::size_t n = 0; n < entries_.size(); ++n) {
-    if (entries_[n].folder == chosen) return select(static_cast<int>(n));
+  for (const fs::path& wanted : {chosen, before}) {
+    const auto found =
+        std::find_if(entries_.begin(), entries_.end(), [&](const auto& e) { return e.folder == wanted; });
+    if (found != entries_.end()) return select(static_cast<int>(found - entries_.begin()));
   }
 }
 

@@ -53,7 +53,7 @@ class StartList {
   void forget_recent();
   /// Once: the demo is to be made.
   [[nodiscard]] bool wants_demo() { return std::exchange(wants_demo_, false); }
-  /// Looks again, and stays with the entry of that folder.
+  /// Looks again, and goes to the entry of that folder; where there is none it stays where it was.
   void refresh(const std::filesystem::path& chosen);
 
  private:

@@ -218,6 +218,14 @@ bool list_row(const std::string& words, const std::string& right, bool selected,
   return i.pressed;
 }
 
+bool fold(const char* words) {
+  ImGui::PushStyleColor(ImGuiCol_Header, im_colour(theme().raised));
+  ImGui::PushStyleColor(ImGuiCol_HeaderActive, im_colour(theme().line, 0.6F));
+  const bool open = ImGui::CollapsingHeader(words);
+  ImGui::PopStyleColor(2);
+  return open;
+}
+
 float chip_width(const std::string& words) {
   return ImGui::CalcTextSize(words.c_str()).x + 48 * unit();
 }

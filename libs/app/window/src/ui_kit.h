@@ -51,6 +51,9 @@ enum class ButtonLook { usual, main, quiet };
 /// A row of a list, as wide as there is room.
 [[nodiscard]] bool list_row(const std::string& words, const std::string& right, bool selected, float high = kRow);
 
+/// A heading that folds out what is below it: true where it is open. It is no selection, so not in the accent.
+[[nodiscard]] bool fold(const char* words);
+
 /// A chip as wide as its words, at most `width`; its sign says how serious, its words are never in that colour.
 struct ChipLook {
   Colour colour;
