@@ -1,5 +1,5 @@
 // Smoothness against values that others computed from the same definitions, and what filtering does to it.
-#include "osteo/core/statistics/movement.h"
+#include "osteo/core/statistics/curves.h"
 
 #include "osteo/core/base/error.h"
 #include "reference.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "osteo/core/statistics/movement.h"
+#include "osteo/core/statistics/curves.h"
 
 namespace osteo::inline assessment {
 

@@ -1,4 +1,4 @@
-#include "osteo/core/statistics/movement.h"
+#include "osteo/core/statistics/curves.h"
 
 #include <algorithm>
 #include <bit>

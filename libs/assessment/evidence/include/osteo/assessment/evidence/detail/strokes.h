@@ -10,7 +10,7 @@ namespace osteo::inline assessment {
 struct Stroke {
   double begin_s = 0, end_s = 0, length_mm = 0;
   Vec3 direction;  ///< unit, from its beginning to its end
-  /// How smooth its speed is, nearer to 0 is smoother (statistics/movement.h); not a number below 100 ms.
+  /// How smooth its speed is, nearer to 0 is smoother (statistics/curves.h); not a number below 100 ms.
   double sparc = std::numeric_limits<double>::quiet_NaN(), log_dimensionless_jerk = sparc;
 };
 
