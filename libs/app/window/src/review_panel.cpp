@@ -227,7 +227,8 @@ void draw_player(ReviewControl& control) {
 }  // namespace
 
 void draw_course(const ScreenBox& box, ReviewControl& control) {
-  begin_fixed("course", box, ImGuiWindowFlags_NoScrollbar);
+  // Arrows and Space are the course's own keys: as steps from button to button they would press one as well.
+  begin_fixed("course", box, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoNav);
   const ReviewCourse& course = control.review().course;
   const float e = em();
   draw_player(control);
