@@ -4,6 +4,7 @@
 #include <vtk_glew.h>
 
 #include <imgui.h>
+#include <imgui_internal.h>
 
 #include <algorithm>
 #include <array>
@@ -310,7 +311,8 @@ class StartPage {
       if (ImGui::Selectable(tr("none"), v.procedure.empty())) v.procedure.clear();
       for (const StartProcedure& p : options_.procedures) {
         if (ImGui::Selectable(tr(p.name).c_str(), p.id == v.procedure)) v.procedure = p.id;
-        note(p.id);
+        // In its first picture a list is not seen, and not where it will be.
+        if (!ImGui::IsWindowAppearing() && !ImGui::GetCurrentWindow()->Hidden) note(p.id);
       }
       ImGui::EndCombo();
     }
