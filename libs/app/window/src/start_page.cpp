@@ -99,12 +99,11 @@ class StartPage {
   }
 
   StartList& list() { return list_; }
+  const bool dialogs = FileDialog::there();  // asked once: it looks through PATH
   bool follow = true, open = false, close = false, ask = false;
 
   void poll() {
-    if (list_.wants_demo()) {
-      list_.say(maker_.make_demo());
-    }
+    if (list_.wants_demo()) list_.say(maker_.make_demo());
     if (const auto made = maker_.poll()) {
       if (!made->why.empty()) list_.say(filled(tr("no case could be made: {why}"), {{"why", made->why}}));
       cards_.erase(made->the_case);
@@ -258,16 +257,14 @@ class StartPage {
     const Theme& t = theme();
     draw->AddRectFilled(lo, hi, im_colour32(hovered ? t.raised : t.surface), kCardRound * u);
     const bool is_demo = e.folder == demo_, to_make = e.kind == FolderKind::demo;
-    CaseCard shown;
+    CaseCard to_come;
     if (to_make) {
-      shown.facts = tr("a phantom, of no patient");
-      shown.words = is_made(e.folder)
-                        ? filled(tr("being made: {share} %"), {{"share", shown_number(100 * maker_.share(), 0)}})
-                        : std::string(tr("make it, in half a minute"));
-    } else {
-      shown = card(e.folder);
+      to_come.facts = tr("a phantom, of no patient");
+      to_come.words = is_made(e.folder)
+                          ? filled(tr("being made: {share} %"), {{"share", shown_number(100 * maker_.share(), 0)}})
+                          : std::string(tr("make it, in half a minute"));
     }
-    if (is_demo) shown.name = tr("Demo ear");
+    const CaseCard& shown = to_make ? to_come : card(e.folder);
     const ImVec2 from{lo.x + u, lo.y + u}, to{hi.x - u, lo.y + picture};
     // The view in 3D is the last of four; its upper edge holds words.
     if (const GLuint texture = previews_.of(shown.preview); texture != 0) {
@@ -283,7 +280,8 @@ class StartPage {
     }
     const float text = wide - 2 * inset;
     float y = lo.y + picture + 6 * u;
-    fitted_text(draw, {lo.x + inset, y, text, 26 * u}, em(), t.text, shown.name);
+    fitted_text(draw, {lo.x + inset, y, text, 26 * u}, em(), t.text,
+                is_demo ? std::string(tr("Demo ear")) : shown.name);
     fitted_text(draw, {lo.x + inset, y + 26 * u, text, 24 * u}, kLabelEm * em(), t.quiet, shown.facts);
     y += 52 * u;
     const bool approved = shown.state == CaseCard::State::approved;
@@ -412,7 +410,7 @@ class StartPage {
       if (kit_button(tr("Look into it"), ButtonLook::main, room)) open = true;
     }
     ImGui::Dummy({0, kGap * u});
-    if (FileDialog::there() && kit_button(tr("Choose a folder (O)"), ButtonLook::usual, room)) ask = true;
+    if (dialogs && kit_button(tr("Choose a folder (O)"), ButtonLook::usual, room)) ask = true;
     toggle("remember", tr("Remember cases"), v.remember_cases);
     if (!person_.cases().empty()) {
       if (kit_button(tr("Forget them"), ButtonLook::usual, half)) {
@@ -451,7 +449,6 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
   std::optional<StartChoice> choice;
   shell.mirror_mouse = person.values.mirror_mouse;
   FileDialog dialog;
-  const bool dialogs = FileDialog::there();
   shell.on_key = [&](int key, int action, int) {
     if (action == 0) return;
     if (key == kDown || key == kRight) list.move(1);
@@ -463,7 +460,7 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
       shell.toggle_full_screen();
       person.values.full_screen = shell.full_screen();
     }
-    if (key == 'O' && dialogs) page.ask = true;
+    if (key == 'O' && page.dialogs) page.ask = true;
     if (key == 'Q' || key == kKeyEscape) page.close = true;
     page.follow = true;
   };
