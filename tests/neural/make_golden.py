@@ -20,6 +20,7 @@ import numpy as np
 import torch
 from nnunetv2.inference.predict_from_raw_data import nnUNetPredictor
 from nnunetv2.utilities.get_network_from_plans import get_network_from_plans
+from nnunetv2.utilities.label_handling.label_handling import determine_num_input_channels
 from nnunetv2.utilities.plans_handling.plans_handler import PlansManager
 
 CT = {
@@ -58,7 +59,7 @@ def architecture(kind, dim, features, kernels, strides, blocks, decoder, norm="I
     }
 
 
-def plans_of(name, configuration, transpose=(0, 1, 2)):
+def plans_of(name, configuration, transpose=(0, 1, 2), others=None):
     configuration = dict(
         {
             "data_identifier": "nnUNetPlans_" + name,
@@ -83,7 +84,7 @@ def plans_of(name, configuration, transpose=(0, 1, 2)):
         "image_reader_writer": "SimpleITKIO",
         "transpose_forward": list(transpose),
         "transpose_backward": back,
-        "configurations": {name: configuration},
+        "configurations": dict({name: configuration}, **(others or {})),
         "foreground_intensity_properties_per_channel": CT,
         "experiment_planner_used": "ExperimentPlanner",
         "label_manager": "LabelManager",
@@ -168,6 +169,31 @@ CASES = {
     ),
 }
 
+# Two stages: labels of a coarse network come into a fine one. Between slices the grid is exactly twice as fine, where
+# the labels' weights tie; zeros around the image are no label at all.
+_UNET = ("PlainConvUNet", 3, [6, 12], [[3, 3, 3], [3, 3, 3]], [[1, 1, 1], [2, 2, 2]], [1, 2], [1])
+_COARSE = plans_of(
+    "3d_lowres", {"patch_size": [8, 16, 16], "spacing": [1.6, 1.3, 1.3], "architecture": architecture(*_UNET)}
+)["configurations"]["3d_lowres"]
+CASCADE = dict(
+    shape=(9, 22, 25),
+    zeros=2,
+    spacing=(1.6, 0.9, 0.9),
+    mirror=(0, 1, 2),
+    folds=1,
+    dataset={"labels": {"background": 0, "nerve": 1, "sinus": 2, "canal": 3}},
+    plans=plans_of(
+        "3d_cascade_fullres",
+        {
+            "patch_size": [8, 16, 16],
+            "spacing": [0.8, 0.75, 0.75],
+            "previous_stage": "3d_lowres",
+            "architecture": architecture(*_UNET),
+        },
+        others={"3d_lowres": dict(_COARSE, next_stage="3d_cascade_fullres")},
+    ),
+)
+
 
 def image_of(shape, zeros, seed):
     rng = np.random.default_rng(seed)
@@ -227,7 +253,7 @@ def make_model(folder, case, seed, bias=None):
         configuration.network_arch_class_name,
         configuration.network_arch_init_kwargs,
         configuration.network_arch_init_kwargs_req_import,
-        1,
+        determine_num_input_channels(manager, configuration, dataset),
         heads,
         deep_supervision=False,
     )
@@ -256,7 +282,7 @@ def make_model(folder, case, seed, bias=None):
         )
 
 
-def predict(folder, image, spacing):
+def predict(folder, image, spacing, before=None):
     predictor = nnUNetPredictor(
         tile_step_size=0.5,
         use_gaussian=True,
@@ -269,24 +295,43 @@ def predict(folder, image, spacing):
     kept = []
     plain = predictor.predict_logits_from_preprocessed_data
     predictor.predict_logits_from_preprocessed_data = lambda data: kept.append(plain(data)) or kept[-1].clone()
-    labels = predictor.predict_single_npy_array(image[None].astype(np.float32), {"spacing": list(spacing)})
+    labels = predictor.predict_single_npy_array(
+        image[None].astype(np.float32),
+        {"spacing": list(spacing)},
+        None if before is None else before[None].astype(np.int8),
+    )
     return labels.astype(np.uint8), kept[0].numpy()
+
+
+def make(folder, case, seed, image, before=None):
+    make_model(folder, case, seed)
+    _, logits = predict(folder, image, case["spacing"], before)
+    # So that each class is somewhere.
+    bias = -np.median(logits.astype(np.float32), axis=(1, 2, 3))
+    make_model(folder, case, seed, bias)
+    labels, logits = predict(folder, image, case["spacing"], before)
+    print(folder.name, logits.shape, np.bincount(labels.ravel()).tolist(), float(np.abs(logits).max()))
+    return labels, logits
+
+
+def write_golden(folder, case, image, labels, logits):
+    write_nrrd(folder / "image.nrrd", image, case["spacing"])
+    write_nrrd(folder / "labels.nrrd", labels, case["spacing"])
+    (folder / "logits.f16").write_bytes(np.ascontiguousarray(logits).astype("<f2").tobytes())
 
 
 def main():
     out = pathlib.Path(sys.argv[1])
     for number, (name, case) in enumerate(CASES.items()):
         image = image_of(case["shape"], case["zeros"], 7 + number)
-        make_model(out / name, case, 100 * number + 1)
-        _, logits = predict(out / name, image, case["spacing"])
-        # So that each class is somewhere.
-        bias = -np.median(logits.astype(np.float32), axis=(1, 2, 3))
-        make_model(out / name, case, 100 * number + 1, bias)
-        labels, logits = predict(out / name, image, case["spacing"])
-        write_nrrd(out / name / "image.nrrd", image, case["spacing"])
-        write_nrrd(out / name / "labels.nrrd", labels, case["spacing"])
-        (out / name / "logits.f16").write_bytes(np.ascontiguousarray(logits).astype("<f2").tobytes())
-        print(name, logits.shape, np.bincount(labels.ravel()).tolist(), float(np.abs(logits).max()))
+        labels, logits = make(out / name, case, 100 * number + 1, image)
+        write_golden(out / name, case, image, labels, logits)
+    stage = "nnUNetTrainer__nnUNetPlans__"
+    image = image_of(CASCADE["shape"], CASCADE["zeros"], 31)
+    first, _ = make(out / "cascade" / (stage + "3d_lowres"), dict(CASCADE, name="3d_lowres"), 901, image)
+    second = out / "cascade" / (stage + "3d_cascade_fullres")
+    labels, logits = make(second, dict(CASCADE, name="3d_cascade_fullres"), 951, image, first)
+    write_golden(second, CASCADE, image, labels, logits)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,9 @@
 #include "osteo/imaging/neural/detail/conv_kernel.h"
 #include "osteo/imaging/neural/detail/half.h"
 #include "osteo/imaging/neural/detail/predict.h"
+#include "osteo/imaging/neural/detail/windows.h"
 #include "osteo/imaging/neural/segment_network.h"
+#include "scratch.h"
 
 namespace osteo {
 namespace {
@@ -81,6 +83,60 @@ TEST(NetworkGolden, Flat) {
   EXPECT_LE(a.worst, 1e-3);
   EXPECT_LE(a.mean, 2e-6);
   EXPECT_GE(a.labels, 0.9999);
+}
+
+const std::string kSecondStage = "cascade/nnUNetTrainer__nnUNetPlans__3d_cascade_fullres";
+
+TEST(NetworkGolden, Cascade) {
+  const Agreement a = agreement(kSecondStage);
+  EXPECT_EQ(a.found, 4);
+  EXPECT_LE(a.worst, 1e-3);
+  EXPECT_LE(a.mean, 2e-6);
+  EXPECT_GE(a.labels, 0.9999);
+}
+
+// The stage before is found beside it by its name, with a slash at the end and without, and is asked for where it
+// lacks.
+TEST(NetworkGolden, ACascadeNeedsItsFirstStage) {
+  const test::ScratchFolder dir;
+  const fs::path from = golden(kSecondStage), to = dir.path() / "T__P__3d_cascade_fullres";
+  fs::copy(from, to, fs::copy_options::recursive);
+  const Image ct = load_image(from / "image.nrrd");
+  NetworkParams quick;
+  quick.mirror = false;
+  try {
+    static_cast<void>(segment_with_network(ct, to, quick));
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::no_input);
+    EXPECT_NE(std::string(error.what()).find("T__P__3d_lowres"), std::string::npos) << error.what();
+  }
+  fs::copy(golden("cascade/nnUNetTrainer__nnUNetPlans__3d_lowres"), dir.path() / "T__P__3d_lowres",
+           fs::copy_options::recursive);
+  const Context context;
+  const Labels got = segment_with_network(ct, to.string() + "/", quick, context);
+  EXPECT_TRUE(std::ranges::equal(got.span(), segment_with_network(ct, from, quick).span()));
+  int first = 0;
+  for (const auto& [key, value] : context.take_report()) first += key.starts_with("first_stage_") ? 1 : 0;
+  EXPECT_EQ(first, 3);
+  // A first stage of other labels gives another result: it is used.
+  fs::remove_all(dir.path() / "T__P__3d_lowres/fold_0");
+  fs::copy(from / "fold_0", dir.path() / "T__P__3d_lowres/fold_0", fs::copy_options::recursive);
+  EXPECT_THROW(static_cast<void>(segment_with_network(ct, to, quick)), Error);
+}
+
+TEST(NetworkGrid, LabelsTakeTheLargestShareAndTheNearestOfEqualOnes) {
+  const std::vector<std::int16_t> labels{0, 3, 1, 1};
+  const Axes size{1, 1, 4};
+  EXPECT_EQ(resample_labels(labels, size, size, -1, {}), labels);
+  EXPECT_EQ(resample_labels(labels, size, {1, 1, 8}, -1, {}), (std::vector<std::int16_t>{0, 0, 3, 3, 1, 1, 1, 1}));
+  // The middle of a pair lies between both: the nearest voxel of scipy is the upper one.
+  EXPECT_EQ(resample_labels(labels, size, {1, 1, 2}, -1, {}), (std::vector<std::int16_t>{3, 1}));
+  EXPECT_EQ(resample_labels({3, 0}, {1, 1, 2}, {1, 1, 1}, -1, {}), (std::vector<std::int16_t>{0}));
+  // Three around a corner: 1 and 2 have half each less what 3 has; the nearest is neither, so the smaller is taken.
+  EXPECT_EQ(resample_labels({3, 1, 1, 1, 2, 2, 2, 3}, {2, 2, 2}, {1, 1, 1}, -1, {}), (std::vector<std::int16_t>{1}));
+  // Along the separate axis nothing is mixed.
+  EXPECT_EQ(resample_labels({5, 2, 2}, {3, 1, 1}, {2, 1, 1}, 0, {}), (std::vector<std::int16_t>{5, 2}));
 }
 
 TEST(NetworkBits, AreTheSameForAnyNumberOfThreads) {
@@ -213,7 +269,9 @@ TEST(NetworkPlans, WhatIsNotSupportedIsNamed) {
   EXPECT_EQ(refusal("\"batch_size\": 2", "\"batch_size\": 3"), "");
   EXPECT_NE(refusal("unet.ResidualEncoderUNet", "primus.Primus").find("Primus"), std::string::npos);
   EXPECT_NE(refusal("torch.nn.LeakyReLU", "torch.nn.GELU").find("nonlin"), std::string::npos);
-  EXPECT_NE(refusal("\"batch_size\"", "\"previous_stage\": \"3d_fullres\", \"x\"").find("cascade"), std::string::npos);
+  EXPECT_EQ(refusal("\"batch_size\"", "\"previous_stage\": \"3d_fullres\", \"x\""), "");
+  EXPECT_NE(refusal("\"batch_size\"", "\"previous_stage\": \"../secret\", \"x\"").find("previous_stage"),
+            std::string::npos);
   EXPECT_NE(refusal("CTNormalization", "RGBTo01Normalization").find("RGB"), std::string::npos);
   EXPECT_NE(refusal("SimpleITKIO", "NibabelIOWithReorient").find("Reorient"), std::string::npos);
   EXPECT_NE(refusal("resample_data_or_seg_to_shape", "resample_torch_fornnunet").find("resampling of data"),

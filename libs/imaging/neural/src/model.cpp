@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
@@ -178,6 +179,7 @@ void require_resampling(const Json& configuration, const std::string& what, int 
 void read_labels(const Json& dataset, NetworkModel& model) {
   const auto& labels = member(dataset, "labels").members();
   std::vector<std::pair<std::string, std::vector<int>>> all;
+  std::set<int> foreground;
   for (const auto& m : labels) {
     if (m.key == "ignore") continue;
     std::vector<int> values;
@@ -188,6 +190,7 @@ void read_labels(const Json& dataset, NetworkModel& model) {
       if (values.empty()) refuse("the label '" + m.key + "' has no value");
     }
     model.regions |= values.size() > 1;
+    foreground.insert(values.begin(), values.end());
     all.emplace_back(m.key, std::move(values));
   }
   if (model.regions) {
@@ -211,6 +214,10 @@ void read_labels(const Json& dataset, NetworkModel& model) {
   std::sort(model.names.begin(), model.names.end());
   if (model.values.empty()) refuse("it has no labels");
   model.unet.classes = static_cast<int>(model.values.size());
+  if (model.previous_stage.empty()) return;
+  foreground.erase(0);
+  model.previous_labels.assign(foreground.begin(), foreground.end());
+  model.unet.channels += static_cast<int>(foreground.size());
 }
 
 Json parsed(std::string_view text) {
@@ -227,8 +234,11 @@ NetworkModel read_network_model(std::string_view plans_text, std::string_view da
   try {
     const Json plans = parsed(plans_text);
     const Json c = configuration_of(plans, configuration_name);
-    if (const Json* const before = c.find("previous_stage"); before != nullptr && !before->is_null())
-      refuse("a network of a cascade's second stage is not supported");
+    if (const Json* const before = c.find("previous_stage"); before != nullptr && !before->is_null()) {
+      model.previous_stage = word(*before, "previous_stage");
+      if (model.previous_stage.empty() || model.previous_stage.find('/') != std::string::npos)
+        refuse("'previous_stage' is no configuration's name");
+    }
     if (const Json* const reader = plans.find("image_reader_writer"); ends_with(reader, "WithReorient"))
       refuse("images that the reader '" + *reader->text() + "' turns are not supported");
     const auto& patch = member(c, "patch_size");

@@ -134,11 +134,17 @@ struct Window {
   Axes first{};
 };
 
-// Sums of one fold over all windows; `data` is padded to at least a window.
+// Sums of one fold over all windows; `data` is padded to at least a window, and so are `labels`, what the stage before
+// has found (of a cascade; else empty).
 class Sliding {
  public:
-  Sliding(const NetworkModel& model, const std::vector<float>& data, const Axes& size, const NetworkParams& params)
-      : model_(model), data_(data), size_(size), weights_(window_weights(model.patch, model.unet.flat)) {
+  Sliding(const NetworkModel& model, const std::vector<float>& data, const std::vector<std::int16_t>& labels,
+          const Axes& size, const NetworkParams& params)
+      : model_(model),
+        data_(data),
+        labels_(labels),
+        size_(size),
+        weights_(window_weights(model.patch, model.unet.flat)) {
     std::array<std::vector<int>, 3> starts;
     for (std::size_t a = 0; a < 3; ++a) {
       if (a == 0 && model.unet.flat) {
@@ -158,7 +164,8 @@ class Sliding {
     const std::size_t voxels = voxels_of(size_), patch = voxels_of(model_.patch);
     const auto classes = static_cast<std::size_t>(model_.unet.classes);
     std::vector<std::uint16_t> sums(classes * voxels, 0), weight(voxels, 0);
-    std::vector<float> input(patch), logits(classes * patch), sum(passes.size() > 1 ? classes * patch : 0);
+    std::vector<float> input(static_cast<std::size_t>(model_.unet.channels) * patch), logits(classes * patch),
+        sum(passes.size() > 1 ? classes * patch : 0);
     for (std::size_t w = 0; w < windows_.size(); ++w) {
       context.progress(static_cast<double>(w) / static_cast<double>(windows_.size()),
                        "window " + std::to_string(w + 1) + " of " + std::to_string(windows_.size()));
@@ -191,11 +198,18 @@ class Sliding {
 
  private:
   void cut(const Axes& first, unsigned turned, std::vector<float>& input) const {
+    const std::size_t patch = voxels_of(model_.patch);
     for (int z = 0; z < model_.patch[0]; ++z) {
       for (int y = 0; y < model_.patch[1]; ++y) {
-        const float* const from = data_.data() + offset(size_, first[0] + z, first[1] + y, first[2]);
+        const std::size_t from = offset(size_, first[0] + z, first[1] + y, first[2]);
         const Row row = turned_row(model_.patch, z, y, turned);
-        for (int x = 0; x < model_.patch[2]; ++x) input[row.first + static_cast<std::size_t>(x * row.step)] = from[x];
+        for (int x = 0; x < model_.patch[2]; ++x) {
+          const std::size_t to = row.first + static_cast<std::size_t>(x * row.step);
+          input[to] = data_[from + static_cast<std::size_t>(x)];
+          for (std::size_t c = 0; c < model_.previous_labels.size(); ++c)
+            input[(c + 1) * patch + to] =
+                labels_[from + static_cast<std::size_t>(x)] == model_.previous_labels[c] ? 1.0F : 0.0F;
+        }
       }
     }
   }
@@ -244,19 +258,85 @@ class Sliding {
 
   const NetworkModel& model_;
   const std::vector<float>& data_;
+  const std::vector<std::int16_t>& labels_;
   Axes size_;
   std::vector<std::uint16_t> weights_;
   std::vector<Window> windows_;
 };
 
-std::vector<float> padded(const std::vector<float>& data, const Axes& size, const Axes& to, const Axes& before) {
-  std::vector<float> out(voxels_of(to), 0.0F);
+template <class T>
+std::vector<T> padded(const std::vector<T>& data, const Axes& size, const Axes& to, const Axes& before) {
+  std::vector<T> out(voxels_of(to), T{0});
   for (int z = 0; z < size[0]; ++z) {
     for (int y = 0; y < size[1]; ++y)
       std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(offset(size, z, y, 0)), size[2],
                   out.begin() + static_cast<std::ptrdiff_t>(offset(to, z + before[0], y + before[1], before[2])));
   }
   return out;
+}
+
+// Zeros from which a way of zeros leads out of the image: not image, but what was written around it.
+std::vector<bool> outside_of(const Image& ct, const Turned& turned) {
+  std::vector<bool> outside(voxels_of(turned.size), false);
+  std::vector<Axes> open;
+  const auto visit = [&](const Axes& n) {
+    const std::size_t at = offset(turned.size, n[0], n[1], n[2]);
+    if (outside[at] || ct.voxels[turned.at(n[0], n[1], n[2])] != 0) return;
+    outside[at] = true;
+    open.push_back(n);
+  };
+  for (int z = 0; z < turned.size[0]; ++z) {
+    for (int y = 0; y < turned.size[1]; ++y) {
+      const bool face = z == 0 || y == 0 || z == turned.size[0] - 1 || y == turned.size[1] - 1;
+      const int step = face ? 1 : std::max(turned.size[2] - 1, 1);
+      for (int x = 0; x < turned.size[2]; x += step) visit({z, y, x});
+    }
+  }
+  while (!open.empty()) {
+    const Axes n = open.back();
+    open.pop_back();
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (const int way : {-1, 1}) {
+        Axes next = n;
+        next[a] += way;
+        if (next[a] >= 0 && next[a] < turned.size[a]) visit(next);
+      }
+    }
+  }
+  return outside;
+}
+
+// What the stage before has found, on this network's grid. -1 is what lies outside of the image.
+std::vector<std::int16_t> previous_on_grid(const Image& ct, const Labels& found, const Turned& turned,
+                                           const NetworkLogits& out, const Context& context) {
+  const std::vector<bool> outside = outside_of(ct, turned);
+  std::vector<std::int16_t> labels(voxels_of(out.cropped));
+  for (int z = 0; z < out.cropped[0]; ++z) {
+    for (int y = 0; y < out.cropped[1]; ++y) {
+      for (int x = 0; x < out.cropped[2]; ++x) {
+        const Axes n{z + out.first[0], y + out.first[1], x + out.first[2]};
+        const int label = found.voxels[turned.at(n[0], n[1], n[2])];
+        labels[offset(out.cropped, z, y, x)] =
+            static_cast<std::int16_t>(label == 0 && outside[offset(turned.size, n[0], n[1], n[2])] ? -1 : label);
+      }
+    }
+  }
+  return resample_labels(labels, out.cropped, out.size, separate_axis(out.image_mm, out.grid_mm), context);
+}
+
+// nnU-Net keeps TRAINER__PLANS__CONFIGURATION folders beside each other.
+fs::path folder_of_stage(const fs::path& folder, const std::string& configuration, const std::string& previous) {
+  std::error_code ignored;
+  fs::path whole = fs::weakly_canonical(folder, ignored);
+  if (whole.filename().empty()) whole = whole.parent_path();
+  const std::string name = whole.filename().string(), end = "__" + configuration;
+  const fs::path wanted =
+      whole.parent_path() / ((name.ends_with(end) ? name.substr(0, name.size() - end.size()) : name) + "__" + previous);
+  if (!fs::is_directory(wanted))
+    throw Error(ExitCode::no_input,
+                "the network is the second stage of a cascade, and its first stage is missing: " + wanted.string(),
+                "put the folder of '" + previous + "' beside it, under the name that nnU-Net gave it");
+  return wanted;
 }
 
 std::string gb_text(double bytes) {
@@ -283,8 +363,10 @@ std::vector<int> network_folds(const fs::path& model) {
   return folds;
 }
 
-NetworkLogits network_logits(const Image& ct, const fs::path& folder, NetworkModel& model, const NetworkParams& params,
-                             const Context& context) {
+namespace {
+
+NetworkLogits logits_of_stage(const Image& ct, const fs::path& folder, NetworkModel& model, const NetworkParams& params,
+                              bool first_stage, const Context& around) {
   if (!(params.step > 0 && params.step <= 1)) throw Error(ExitCode::usage, "--step is not above 0 and at most 1");
   std::vector<int> folds = network_folds(folder);
   if (!params.folds.empty()) {
@@ -297,6 +379,20 @@ NetworkLogits network_logits(const Image& ct, const fs::path& folder, NetworkMod
   Checkpoint checkpoint = read_checkpoint(fold_folder(folder, folds[0]) / "checkpoint_final.pth");
   model = read_network_model(read_text(folder / "plans.json"), read_text(folder / "dataset.json"),
                              checkpoint.configuration);
+
+  std::optional<Labels> previous;
+  Context context = around;
+  if (!model.previous_stage.empty()) {
+    if (first_stage) throw Error(ExitCode::corrupt, "the first stage of a cascade has a stage before it itself");
+    NetworkModel before;
+    const fs::path at = folder_of_stage(folder, checkpoint.configuration, model.previous_stage);
+    const NetworkLogits found = logits_of_stage(ct, at, before, params, true, around.sub(0, 0.4));
+    previous = labels_of_logits(found, before, ct.frame, around);
+    context = around.sub(0.4, 1);
+  }
+  const auto report = [&](std::string_view key, ReportValue value) {
+    context.report(first_stage ? "first_stage_" + std::string(key) : std::string(key), std::move(value));
+  };
 
   const Turned turned(ct.frame, model.transpose);
   NetworkLogits out;
@@ -319,9 +415,13 @@ NetworkLogits network_logits(const Image& ct, const fs::path& folder, NetworkMod
   const double resampling = 4 * (image_voxels + 2 * between),
                windows = 4 * grid_voxels + 6 * padded_voxels +
                          (folds.size() > 1 || padded_voxels > grid_voxels ? 4 : 2) * classes * padded_voxels +
-                         (4 + 8 * classes) * patch + static_cast<double>(network->bytes(model.patch));
-  const double bytes = std::max(resampling, windows) + 3 * static_cast<double>(ct.frame.voxel_count());
-  context.report("memory_mb", std::ceil(bytes / 1e6));
+                         (4 * model.unet.channels + 8 * classes) * patch +
+                         static_cast<double>(network->bytes(model.patch));
+  // Of a cascade: labels found, the image's outside, and labels on both grids.
+  const double cascade =
+      previous ? 2 * static_cast<double>(ct.frame.voxel_count()) + 2 * (image_voxels + grid_voxels + padded_voxels) : 0;
+  const double bytes = std::max(resampling, windows) + cascade + 3 * static_cast<double>(ct.frame.voxel_count());
+  report("memory_mb", std::ceil(bytes / 1e6));
   if (bytes > params.max_memory_gb * 1e9)
     throw Error(ExitCode::resources, "the network needs " + gb_text(bytes) + " of memory for this image",
                 "crop the image to what is looked for, or raise --max-memory-gb");
@@ -342,6 +442,12 @@ NetworkLogits network_logits(const Image& ct, const fs::path& folder, NetworkMod
     before[a] = (size[a] - out.size[a]) / 2;
   }
   if (size != out.size) data = padded(data, out.size, size, before);
+  std::vector<std::int16_t> labels;
+  if (previous) {
+    labels = previous_on_grid(ct, *previous, turned, out, context);
+    previous.reset();
+    if (size != out.size) labels = padded(labels, out.size, size, before);
+  }
 
   std::vector<int> axes = params.mirror ? checkpoint.mirror_axes : std::vector<int>{};
   if (std::any_of(axes.begin(), axes.end(), [&](int a) { return a > (model.unet.flat ? 1 : 2); }))
@@ -350,9 +456,9 @@ NetworkLogits network_logits(const Image& ct, const fs::path& folder, NetworkMod
   if (std::adjacent_find(axes.begin(), axes.end()) != axes.end())
     throw Error(ExitCode::corrupt, "the checkpoint mirrors an axis twice");
   const auto passes = mirrored_passes(axes, model.unet.flat);
-  const Sliding sliding(model, data, size, params);
-  context.report("windows", static_cast<std::int64_t>(sliding.windows()));
-  context.report("passes", static_cast<std::int64_t>(passes.size() * folds.size()));
+  const Sliding sliding(model, data, labels, size, params);
+  report("windows", static_cast<std::int64_t>(sliding.windows()));
+  report("passes", static_cast<std::int64_t>(passes.size() * folds.size()));
 
   std::vector<std::uint16_t> total;
   for (std::size_t f = 0; f < folds.size(); ++f) {
@@ -390,6 +496,13 @@ NetworkLogits network_logits(const Image& ct, const fs::path& folder, NetworkMod
     }
   }
   return out;
+}
+
+}  // namespace
+
+NetworkLogits network_logits(const Image& ct, const fs::path& folder, NetworkModel& model, const NetworkParams& params,
+                             const Context& context) {
+  return logits_of_stage(ct, folder, model, params, false, context);
 }
 
 Labels labels_of_logits(const NetworkLogits& logits, const NetworkModel& model, const Frame& frame,

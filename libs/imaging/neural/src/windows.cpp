@@ -143,6 +143,61 @@ std::vector<LinearTap> linear_taps(int size, int to, bool nearest) {
   return taps;
 }
 
+std::vector<std::int16_t> resample_labels(const std::vector<std::int16_t>& labels, const Axes& size, const Axes& to,
+                                          int separate, const Context& context) {
+  if (size == to) return labels;
+  std::array<std::vector<LinearTap>, 3> taps, nearest;
+  for (std::size_t a = 0; a < 3; ++a) {
+    nearest[a] = linear_taps(size[a], to[a], true);
+    taps[a] = static_cast<int>(a) == separate ? nearest[a] : linear_taps(size[a], to[a], false);
+  }
+  const auto at = [&](int z, int y, int x) {
+    return labels[(static_cast<std::size_t>(z) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(y)) *
+                      static_cast<std::size_t>(size[2]) +
+                  static_cast<std::size_t>(x)];
+  };
+  std::vector<std::int16_t> out(voxels_of(to));
+  const auto plane = static_cast<std::size_t>(to[1]) * static_cast<std::size_t>(to[2]);
+  parallel_for(static_cast<std::size_t>(to[0]), 1, context.threads, [&](std::size_t begin, std::size_t end) {
+    context.check_cancelled();
+    for (std::size_t n = begin * plane; n < end * plane; ++n) {
+      const std::array<std::size_t, 3> v{n / plane,
+                                         n / static_cast<std::size_t>(to[2]) % static_cast<std::size_t>(to[1]),
+                                         n % static_cast<std::size_t>(to[2])};
+      // Sums in the order in which scipy.ndimage takes them: ties are exact, and frequent.
+      std::array<std::pair<std::int16_t, double>, 8> met;
+      std::size_t count = 0;
+      for (int corner = 0; corner < 8; ++corner) {
+        std::array<int, 3> from{};
+        double weight = 1;
+        for (std::size_t a = 0; a < 3; ++a) {
+          const LinearTap& t = taps[a][v[a]];
+          const bool high = (corner >> (2 - a) & 1) != 0;
+          from[a] = high ? t.high : t.low;
+          weight *= high ? t.share : 1 - t.share;
+        }
+        const std::int16_t label = at(from[0], from[1], from[2]);
+        std::size_t k = 0;
+        while (k < count && met[k].first != label) ++k;
+        if (k == count) met[count++] = {label, 0.0};
+        met[k].second += weight;
+      }
+      double most = 0;
+      for (std::size_t k = 0; k < count; ++k) most = std::max(most, met[k].second);
+      const std::int16_t here = at(nearest[0][v[0]].low, nearest[1][v[1]].low, nearest[2][v[2]].low);
+      std::int16_t lowest = std::numeric_limits<std::int16_t>::max();
+      bool level = false;
+      for (std::size_t k = 0; k < count; ++k) {
+        if (met[k].second < most) continue;
+        lowest = std::min(lowest, met[k].first);
+        level = level || met[k].first == here;
+      }
+      out[n] = level ? here : lowest;
+    }
+  });
+  return out;
+}
+
 std::vector<int> window_starts(int size, int window, double step) {
   const int count = static_cast<int>(std::ceil((size - window) / (window * step))) + 1;
   std::vector<int> starts;

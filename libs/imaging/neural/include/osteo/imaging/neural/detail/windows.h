@@ -20,6 +20,10 @@ struct LinearTap {
 /// Cubic B-splines, edges repeated, held to the range of what came in; nearest along `separate`.
 [[nodiscard]] std::vector<float> resample_cubic(std::vector<float> values, const Axes& size, const Axes& to,
                                                 int separate, const Context& context);
+/// Labels: of the labels around a voxel the one with the largest linear weight; of equal ones the nearest voxel's, else
+/// the smallest. Slice by slice, and then nearest, along `separate`. As batchgenerators does from 0.25.4 on.
+[[nodiscard]] std::vector<std::int16_t> resample_labels(const std::vector<std::int16_t>& labels, const Axes& size,
+                                                        const Axes& to, int separate, const Context& context);
 [[nodiscard]] std::vector<LinearTap> linear_taps(int size, int to, bool nearest);
 /// First voxels of the windows along one axis.
 [[nodiscard]] std::vector<int> window_starts(int size, int window, double step);
