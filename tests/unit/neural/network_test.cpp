@@ -46,7 +46,7 @@ Agreement agreement(const std::string& name, const NetworkParams& params = {}) {
     a.mean += std::abs(want - got) / static_cast<double>(logits.values.size());
     a.largest = std::max(a.largest, std::abs(want));
   }
-  const Labels got = segment_with_network(ct, folder, params);
+  const Labels got = segment_with_network(ct, folder, params).structures;
   EXPECT_EQ(got.frame, ct.frame);
   std::size_t same = 0;
   std::set<int> found;
@@ -114,8 +114,8 @@ TEST(NetworkGolden, ACascadeNeedsItsFirstStage) {
   fs::copy(golden("cascade/nnUNetTrainer__nnUNetPlans__3d_lowres"), dir.path() / "T__P__3d_lowres",
            fs::copy_options::recursive);
   const Context context;
-  const Labels got = segment_with_network(ct, to.string() + "/", quick, context);
-  EXPECT_TRUE(std::ranges::equal(got.span(), segment_with_network(ct, from, quick).span()));
+  const Labels got = segment_with_network(ct, to.string() + "/", quick, context).structures;
+  EXPECT_TRUE(std::ranges::equal(got.span(), segment_with_network(ct, from, quick).structures.span()));
   int first = 0;
   for (const auto& [key, value] : context.take_report()) first += key.starts_with("first_stage_") ? 1 : 0;
   EXPECT_EQ(first, 3);

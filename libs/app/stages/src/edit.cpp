@@ -20,6 +20,10 @@ void note_hands(Labels& structures, const std::vector<std::uint8_t>& before, con
       s.origin = found[s.value] ? "" : kDrawnByHand;
     else if (changed[s.value] && !s.origin.empty() && s.origin != kDrawnByHand && !s.origin.ends_with(kCorrectedByHand))
       s.origin += kCorrectedByHand;
+    if (!was[s.value] || changed[s.value]) {  // what was said of its boundary was said of another
+      s.within_mm = 0;
+      s.doubt.clear();
+    }
   }
 }
 

@@ -25,6 +25,19 @@ std::string clock_text(double seconds) {
   return text_of("%ld:%02ld", whole / 60, whole % 60);
 }
 
+namespace {
+
+// " ± 0.6" where the one who drew the structure says so.
+std::string uncertainty_of(const StructureMap& structures, std::uint32_t value) {
+  for (const Structure& s : structures.structures()) {
+    if (s.value != value || s.within_mm <= 0) continue;
+    return std::isfinite(s.within_mm) ? " ± " + shown_number(s.within_mm, 1) : " ± ?";
+  }
+  return {};
+}
+
+}  // namespace
+
 StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures, double rate_hz) {
   StateFacts f;
   const Instrument& held = instrument_of(tick.device.tool);
@@ -51,7 +64,7 @@ StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures,
                  : mm < StateFacts::kCloseMm ? Nearness::close
                  : mm < StateFacts::kNearMm  ? Nearness::near
                                              : Nearness::far;
-    f.distance = text_of("%.1f mm", std::max(0.0, mm));
+    f.distance = text_of("%.1f", std::max(0.0, mm)) + uncertainty_of(*structures, tick.structure) + " mm";
     f.near_share = std::clamp(1 - mm / StateFacts::kClearMm, 0.0, 1.0);
   }
   f.time = clock_text(static_cast<double>(tick.tick) / rate_hz);

@@ -21,7 +21,7 @@ struct StateFacts {
   std::string under;       ///< bone under the burr: "2.3 mm", "over 10 mm", "-" where it touches none
   Nearness nearness = Nearness::unknown;
   std::string structure;  ///< the nearest; "none within 10 mm"; "none in this case"
-  std::string distance;   ///< "1.2 mm"; empty where none is near
+  std::string distance;   ///< "1.2 mm", "1.2 ± 0.6 mm" where its boundary is uncertain; empty where none is near
   double near_share = 0;  ///< how far the bar of nearness is full: 0 from kClearMm on, 1 on contact
   std::string warmth;     ///< of that structure, or of the warmest bone: "38.2 C"; empty where the scene has no heat
   std::string removed;    ///< by burrs and saws: "12.3 mm³"

@@ -138,15 +138,37 @@ void add_row(Sheet& s, const Pictures& pictures, double height_mm,
   if (!row.row.empty()) s.blocks.push_back({row});
 }
 
+// Of a distance between two boundaries, each within so many mm in 95 % of places; empty where that is not known of
+// both.
+std::string uncertainty_text(const Structure& a, const Structure& b) {
+  if (a.within_mm <= 0 || b.within_mm <= 0) return {};
+  const double mm = std::hypot(a.within_mm, b.within_mm);
+  return std::isfinite(mm) ? " ± " + number_text(mm, 1) : " ± ?";
+}
+
+// What the one who drew it says of it, and whether it looks like what it is called.
+sheet::Cell judged(const StructureMeasure& m, const Plausibility& p) {
+  std::string why = m.structure.doubt;
+  if (!p.fits && p.known) why += (why.empty() ? "" : "; ") + p.doubt;
+  if (!m.structure.doubt.empty()) return {filled(tr("not to be trusted: {why}"), {{"why", why}}), Tone::caution};
+  std::string text = !p.known ? "" : p.fits ? tr("plausible") : filled(tr("look: {why}"), {{"why", p.doubt}});
+  if (m.structure.within_mm > 0)
+    text += (text.empty() ? "" : "; ") +
+            (std::isfinite(m.structure.within_mm)
+                 ? filled(tr("boundary within {mm} mm"), {{"mm", number_text(m.structure.within_mm, 1)}})
+                 : std::string(tr("boundary uncertain")));
+  const bool doubtful = !p.fits || !std::isfinite(m.structure.within_mm);
+  return {text, doubtful && !text.empty() ? Tone::caution : p.known ? Tone::good : Tone::plain};
+}
+
 sheet::Table structure_table(const std::vector<StructureMeasure>& measures) {
   sheet::Table t;
   t.head = {tr("structure"), tr("volume"), tr("parts"), tr("length"), tr("nearest to it"), tr("usual"), ""};
   t.widths = {18, 12, 10, 11, 25, 30, 17};
-  const auto name_of = [&](std::uint8_t value) {
-    for (const auto& m : measures) {
-      if (m.structure.value == value) return tr(m.structure.name);
-    }
-    return std::string();
+  const auto of = [&](std::uint8_t value) {
+    const auto m = std::find_if(measures.begin(), measures.end(),
+                                [&](const auto& other) { return other.structure.value == value; });
+    return m == measures.end() ? Structure{} : m->structure;
   };
   for (const StructureMeasure& m : measures) {
     const Plausibility p = plausibility_of(m);
@@ -154,7 +176,8 @@ sheet::Table structure_table(const std::vector<StructureMeasure>& measures) {
     for (std::size_t g = 0; g < std::min<std::size_t>(2, m.gaps.size()); ++g)
       near += (near.empty() ? "" : "; ") +
               filled(m.gaps[g].mm < 0.05 ? tr("{structure} touches") : "{structure} {mm} mm",
-                     {{"structure", name_of(m.gaps[g].other)}, {"mm", number_text(m.gaps[g].mm, 1)}});
+                     {{"structure", tr(of(m.gaps[g].other).name)},
+                      {"mm", number_text(m.gaps[g].mm, 1) + uncertainty_text(m.structure, of(m.gaps[g].other))}});
     std::string pieces = std::to_string(m.parts);
     if (m.specks > 0)
       pieces = filled(tr_n("{parts} and {n} speck", "{parts} and {n} specks", static_cast<double>(m.specks)),
@@ -165,12 +188,7 @@ sheet::Table structure_table(const std::vector<StructureMeasure>& measures) {
                       {m.length_mm > 0 ? number_text(m.length_mm, 0) + " mm" : "", Tone::plain},
                       {near, Tone::plain},
                       {p.known ? p.expected : tr("no usual size known"), p.known ? Tone::plain : Tone::quiet},
-                      {!p.known ? ""
-                       : p.fits ? tr("plausible")
-                                : filled(tr("look: {why}"), {{"why", p.doubt}}),
-                       !p.known ? Tone::plain
-                       : p.fits ? Tone::good
-                                : Tone::caution}});
+                      judged(m, p)});
   }
   return t;
 }

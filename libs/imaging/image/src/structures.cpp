@@ -135,6 +135,8 @@ Labels name_structures(const Labels& labels, const StructuresParams& params, con
     if (s.rgb == std::array<std::uint8_t, 3>{}) s.rgb = colour_for(s.name, result.structures.size());
     const double volume = static_cast<double>(count[v]) * f.voxel_volume_mm3();
     context.report(s.name + " mm3", volume);
+    if (ct != nullptr && !s.doubt.empty())
+      context.warn(s.name + " is not to be trusted here, as what drew it says: " + s.doubt);
     if (const std::string why = implausible_volume(s.name, volume); !why.empty()) context.warn(why);
     result.structures.push_back(std::move(s));
   }

@@ -33,6 +33,7 @@ std::vector<SegmentNote> segments_from(const std::map<std::string, std::string>&
     }
     if (const auto origin = s.tags.find(std::string(kOriginTag)); origin != s.tags.end())
       s.structure.origin = origin->second;
+    read_certainty(s.tags, s.structure);
     s.structure.name = !get("Name").empty() ? get("Name")
                        : !get("ID").empty() ? get("ID")
                                             : "Segment_" + std::to_string(n + 1);
@@ -103,6 +104,9 @@ std::map<std::string, std::string> notes_from(const Labels& labels, const std::m
     for (const auto& [tag, value] : tags) all += tag + ':' + value + '|';
     if (!tags.empty()) all += std::string(kStructureTag) + ':' + tag_value(name) + '|';
     if (!s.origin.empty()) all += std::string(kOriginTag) + ':' + tag_value(s.origin) + '|';
+    if (s.within_mm > 0)
+      all += std::string(kWithinTag) + ':' + (std::isfinite(s.within_mm) ? format_number(s.within_mm) : "inf") + '|';
+    if (!s.doubt.empty()) all += std::string(kDoubtTag) + ':' + tag_value(s.doubt) + '|';
     notes[key + "Tags"] = all;
   }
   notes["Segmentation_MasterRepresentation"] = "Binary labelmap";

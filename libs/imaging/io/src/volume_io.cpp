@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <limits>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -99,6 +101,16 @@ std::variant<Image, Labels> load_volume(const fs::path& path, const Context& con
 void save_image(const Image& image, const fs::path& path) {
   save_volume(image, io::Scalar::i16, path);
 }
+void read_certainty(const std::map<std::string, std::string>& tags, Structure& structure) {
+  if (const auto within = tags.find(std::string(kWithinTag)); within != tags.end()) {
+    const std::string& text = within->second;
+    double mm = text == "inf" ? std::numeric_limits<double>::infinity() : 0;
+    if (text != "inf") std::from_chars(text.data(), text.data() + text.size(), mm);
+    structure.within_mm = mm > 0 ? mm : 0;
+  }
+  if (const auto doubt = tags.find(std::string(kDoubtTag)); doubt != tags.end()) structure.doubt = doubt->second;
+}
+
 std::string tag_value(std::string text) {
   std::replace(text.begin(), text.end(), '|', '/');
   return text;

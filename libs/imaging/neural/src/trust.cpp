@@ -62,6 +62,17 @@ NetworkCalibration read_network_calibration(std::string_view text, const Network
     s.least_mm3 = number_of(row.find("least_mm3"), "least_mm3", 0, 1e9);
     s.most_mm3 = number_of(row.find("most_mm3"), "most_mm3", s.least_mm3, 1e9);
     s.least_dice = number_of(row.find("least_dice"), "least_dice", 0, 1);
+    if (const Json* const table = row.find("boundary_mm")) {
+      for (const Json& pair : table->items()) {
+        if (pair.items().size() != 2) reject_calibration("'boundary_mm' is not a list of pairs");
+        const auto low = s.boundary_mm.empty() ? std::array{0.0, 0.0} : s.boundary_mm.back();
+        s.boundary_mm.push_back({number_of(&pair.items()[0], "boundary_mm", low[0], 100),
+                                 number_of(&pair.items()[1], "boundary_mm", low[1], 100)});
+        if (s.boundary_mm.size() > 1 && s.boundary_mm.back()[0] == low[0])
+          reject_calibration("'boundary_mm' has a width twice");
+      }
+      if (s.boundary_mm.empty()) reject_calibration("'boundary_mm' is empty");
+    }
     c.structures.push_back(s);
   }
   return c;

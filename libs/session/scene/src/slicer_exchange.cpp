@@ -330,6 +330,7 @@ class Taker {
       if (c.after_mm3 > 0) {
         const auto value = static_cast<std::uint8_t>(labels.structures.size() + 1);
         labels.structures.push_back({value, s->name, s->rgb, origin_of(*s, c)});
+        if (c.added_mm3 == 0 && c.removed_mm3 == 0) read_certainty(s->tags, labels.structures.back());
         for (std::size_t v = 0; v < n; ++v) {
           if (after[v] == 0) continue;
           overlap += voxels[v] != 0 ? 1 : 0;

@@ -35,6 +35,11 @@ struct Structure {
   std::array<std::uint8_t, 3> rgb{0, 0, 0};  ///< black: none was given
   /// What drew it, like "tube, version 2" or "by hand", with ", corrected by hand" behind it; empty: not known.
   std::string origin{};
+  /// Its boundary lies within so many mm of where it was drawn, in 95 % of places, as what drew it says; infinity: it
+  /// cannot say that of any distance. 0: nothing is known.
+  double within_mm = 0;
+  /// Why what drew it says that it is not to be trusted here; empty: it does not say so.
+  std::string doubt{};
   friend bool operator==(const Structure&, const Structure&) = default;
 };
 inline constexpr std::string_view kDrawnByHand = "by hand", kCorrectedByHand = ", corrected by hand";

@@ -31,7 +31,8 @@ struct StructureLimits {
 /// Every value gets a name and a colour. `params.names`: "1=facial nerve, 2=sigmoid sinus" goes before what the file
 /// says; what neither names is "structure 3", or with `only_named` background. Values that no voxel has are left out.
 /// Reports the volume of each, and warns of one too large for its name. With a CT: Error(failed) when no labelled voxel
-/// lies inside it, a warning when less than half do. Error(usage) for names that cannot be read.
+/// lies inside it, a warning when less than half do, and one of each structure that is not to be trusted (Structure::
+/// doubt). Error(usage) for names that cannot be read.
 [[nodiscard]] Labels name_structures(const Labels& labels, const StructuresParams& params, const Image* ct = nullptr,
                                      const Context& context = {});
 

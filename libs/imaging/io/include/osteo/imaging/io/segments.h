@@ -18,6 +18,11 @@ inline constexpr std::string_view kStructureTag = "Osteotome.Structure";
 
 /// Tag of a segment that tells what drew it (Structure::origin), where that is known.
 inline constexpr std::string_view kOriginTag = "Osteotome.Origin";
+/// Tags of Structure::within_mm ("0.6", "inf") and Structure::doubt, where they are known.
+inline constexpr std::string_view kWithinTag = "Osteotome.BoundaryWithinMm", kDoubtTag = "Osteotome.Doubt";
+
+/// What the tags say of a segment's certainty; what is no distance there counts as not known.
+void read_certainty(const std::map<std::string, std::string>& tags, Structure& structure);
 
 /// A text as the value of a tag: the bar parts tags.
 [[nodiscard]] std::string tag_value(std::string text);

@@ -21,7 +21,7 @@ struct NetworkModel {
   bool regions = false;                                  ///< each class by itself, drawn in this order
   std::vector<int> values;                               ///< label of each class; of labels 0, 1, 2, ...
   std::vector<std::pair<int, std::string>>
-      names;  ///< label and what it is called; of a region of several the drawn one's
+      names;                         ///< label and what it is called; of a region of several the drawn one's
   std::string previous_stage;        ///< of a cascade: the configuration whose labels come in as well; else empty
   std::vector<int> previous_labels;  ///< of a cascade: which labels of it, one channel each
 };
