@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <regex>
 
@@ -32,6 +33,31 @@ Labels draw(std::array<int, 3> dims, double spacing, const std::function<int(Vec
   }
   l.voxels = voxels;
   return l;
+}
+
+// What drew them says how far their boundaries may be off: distances carry it, and what is not to be trusted stands
+// out.
+TEST(Structures, CarryWhatIsKnownOfTheirBoundaries) {
+  StructureMeasure nerve, canal, hand;
+  nerve.structure = {1, "nervus", {}, "segment-network, version 3", 0.6};
+  canal.structure = {2, "meatus", {}, "segment-network, version 3", 0.3};
+  hand.structure = {3, "antrum", {}, "by hand"};
+  nerve.gaps = {{2, 1.25}, {3, 2}};
+  canal.gaps = {{1, 1.25}};
+  const auto near = [](const StructureMeasure& a, const StructureMeasure& b, const StructureMeasure& c) {
+    return structure_table({a, b, c}).rows[0][4].text;
+  };
+  const auto last = [](const StructureMeasure& m) { return structure_table({m}).rows[0].back(); };
+  EXPECT_EQ(near(nerve, canal, hand), "meatus 1.3 ± 0.7 mm; antrum 2 mm");
+  EXPECT_EQ(last(nerve).text, "boundary within 0.6 mm");
+  EXPECT_EQ(last(hand).text, "");
+  canal.structure.within_mm = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(near(nerve, canal, hand), "meatus 1.3 ± ? mm; antrum 2 mm");
+  EXPECT_EQ(last(canal).text, "boundary uncertain");
+  EXPECT_EQ(last(canal).tone, sheet::Tone::caution);
+  canal.structure.doubt = "60 mm3, less than 83";
+  EXPECT_EQ(last(canal).text, "not to be trusted: 60 mm3, less than 83");
+  EXPECT_EQ(last(canal).tone, sheet::Tone::caution);
 }
 
 TEST(Structures, VolumePiecesAndGapsOfBalls) {

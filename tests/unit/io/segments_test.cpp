@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -45,6 +46,27 @@ TEST(Segments, ComeBackInTheirBoxesWithTheirTags) {
   EXPECT_EQ(s[1].mask->frame.voxel_count(), 1u);
   EXPECT_FALSE(s[2].mask);
   EXPECT_THROW(save_segments(labels, folder.path() / "s.nrrd", {}), Error);
+}
+
+TEST(Segments, WhatIsKnownOfTheirBoundariesComesBack) {
+  const TemporaryFolder folder;
+  Labels labels = two_boxes();
+  labels.structures[0].within_mm = 0.6;
+  labels.structures[0].doubt = "60 mm3, less than 83";
+  labels.structures[1].within_mm = std::numeric_limits<double>::infinity();
+  save_labels(labels, folder.path() / "s.seg.nrrd");
+  const Labels back = load_labels(folder.path() / "s.seg.nrrd");
+  ASSERT_EQ(back.structures.size(), 3U);
+  for (const Structure& s : back.structures) {
+    EXPECT_EQ(s.within_mm, s.value == 3 ? 0.6 : s.value == 200 ? std::numeric_limits<double>::infinity() : 0) << s.name;
+    EXPECT_EQ(s.doubt, s.value == 3 ? "60 mm3, less than 83" : "") << s.name;
+  }
+  // What is no distance is nothing known.
+  for (const char* const text : {"", "-1", "nan", "x", "0"}) {
+    Structure s;
+    read_certainty({{std::string(kWithinTag), text}}, s);
+    EXPECT_EQ(s.within_mm, 0) << text;
+  }
 }
 
 TEST(Segments, OriginsComeBack) {

@@ -50,9 +50,10 @@ TEST(ApplyEdits, StructuresKnowTheHandsThatChangedThem) {
     map[v] = static_cast<std::uint8_t>(v < 144 ? 1 : v < 288 ? 2 : 0);
   }
   ct.voxels = hu;
-  const Labels bone{{ct.frame, mask}, {}}, structures{{ct.frame, map},
-                                                      {{1, "left as found", {1, 1, 1}, "tube, version 2"},
-                                                       {2, "changed", {2, 2, 2}, "find-structures, version 2"}}};
+  const Labels bone{{ct.frame, mask}, {}},
+      structures{{ct.frame, map},
+                 {{1, "left as found", {1, 1, 1}, "tube, version 2", 0.6, "short"},
+                  {2, "changed", {2, 2, 2}, "find-structures, version 2", 0.6, "short"}}};
   EditDocument document(ct, bone, &structures);
   document.apply(BrushEdit{2, false, 1.5, {{5, 5, 6}}});
   document.apply(AddStructureEdit{3, "drawn", {250, 220, 40}, StructureRole::at_risk});
@@ -66,6 +67,13 @@ TEST(ApplyEdits, StructuresKnowTheHandsThatChangedThem) {
   EXPECT_EQ(made.structures[1].origin, "find-structures, version 2, corrected by hand");
   EXPECT_EQ(made.structures[2].origin, "by hand");
   EXPECT_EQ(made.structures[3].origin, "");
+  // What was said of a boundary was said of that boundary.
+  EXPECT_EQ(made.structures[0].within_mm, 0.6);
+  EXPECT_EQ(made.structures[0].doubt, "short");
+  for (std::size_t n = 1; n < 4; ++n) {
+    EXPECT_EQ(made.structures[n].within_mm, 0) << n;
+    EXPECT_EQ(made.structures[n].doubt, "") << n;
+  }
 }
 
 TEST(MeshInfo, TellsWhatASurfaceIsLike) {

@@ -387,6 +387,23 @@ TEST(FirstSteps, WithoutDustNothingIsAskedOfTheSucker) {
 
 // --- what the burr does now
 
+TEST(StateFacts, ADistanceSaysHowUncertainTheBoundaryIs) {
+  Labels labels;
+  labels.frame.dims = {8, 8, 8};
+  const auto voxels = make_voxels<std::uint8_t>(512);
+  voxels[292] = 6;
+  labels.voxels = voxels;
+  labels.structures = {{6, "facial nerve", {1, 1, 0}}};
+  TickRecord tick;
+  tick.structure = 6;
+  tick.clearance_mm = 1.24F;
+  for (const auto& [within, text] : {std::pair{0.0, "1.2 mm"}, {0.6, "1.2 ± 0.6 mm"}, {INFINITY, "1.2 ± ? mm"}}) {
+    labels.structures[0].within_mm = within;
+    const StructureMap map(labels);
+    EXPECT_EQ(state_of_tick(tick, &map, 1000).distance, text);
+  }
+}
+
 TEST(StateFacts, TellHowWarmItIs) {
   Labels labels;
   labels.frame.dims = {8, 8, 8};

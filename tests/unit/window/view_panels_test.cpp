@@ -67,7 +67,7 @@ StateFacts longest() {
   f.under = "over 10 mm";
   f.nearness = Nearness::touched;
   f.structure = "superior semicircular canal of the labyrinth, left side";
-  f.distance = "10.0 mm";
+  f.distance = "10.0 ± 1.2 mm";
   f.removed = "12345.6 mm3, tissue 1234.5";
   f.time = "11:03:07";
   f.warning = "recording has ended: no space is left on the device, and what is drilled from now on is not kept";

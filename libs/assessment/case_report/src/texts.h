@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "measures.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/report/sheet.h"
 
@@ -41,6 +42,11 @@ using Rows = std::vector<std::pair<std::string, std::string>>;
 [[nodiscard]] Rows bone_rows(const CaseFacts& facts);
 /// What was taken off the bone and what was left that might not belong to it.
 [[nodiscard]] Rows removed_rows(const CaseFacts& facts);
+/// One row a structure. Distances carry the uncertainty of both boundaries (root of the sum of squares) where it is
+/// known of both; what its maker says is not to be trusted stands out.
+[[nodiscard]] sheet::Table structure_table(const std::vector<StructureMeasure>& measures);
+/// Of the sizes that the table calls usual.
+[[nodiscard]] std::string sources_of(const std::vector<StructureMeasure>& measures);
 /// How many voxels small structures have, and what that means.
 [[nodiscard]] sheet::Table resolution_table(const CaseFacts& facts);
 
