@@ -48,7 +48,7 @@ GIVEN = {
         "mr-labels.seg.nrrd": "structures",
     },
     "docs/how-to/review.md": {"SESSION": SESSION, "EXPERTS": "sessions", "MONDAY": SESSION, "TUESDAY": SESSION},
-    "docs/how-to/segment-network.md": {"ct.nrrd": "network image", "MODEL_FOLDER": "network"},
+    "docs/how-to/segment-network.md": {"ct.nrrd": "network image", "MODEL_FOLDER": "network", "CASE": "folder"},
     "docs/guides/study.md": {"SESSION": SESSION},
     "docs/validation/tissue.md": {"FOLDER": "folder"},
     "docs/guides/tutoring.md": {"SESSION": SESSION, "CASE": CASE, "lesson.json": "script"},

@@ -13,6 +13,11 @@
 namespace osteo {
 namespace {
 
+// nnU-Net's folder of a training.
+bool is_network(const fs::path& folder) {
+  return fs::is_directory(folder) && output_exists(folder / "plans.json") && output_exists(folder / "dataset.json");
+}
+
 std::string quoted(const std::string& text) {
   return text.empty() || text.find_first_of(" '\"$;()") != std::string::npos ? "'" + text + "'" : text;
 }
@@ -79,6 +84,46 @@ std::string flags_of(const Recipe& recipe) {
   return all.empty() ? " nothing" : all;
 }
 
+namespace {
+
+// `structures`: a label map, or the folder of a trained network that finds them in the CT of the case.
+void add_structures(Pipeline& pipeline, const fs::path& structures, const Recipe& recipe, bool as_held,
+                    const fs::path& folder) {
+  const bool has_ct =
+      std::any_of(pipeline.nodes.begin(), pipeline.nodes.end(), [](const PipelineNode& n) { return n.id == "ct"; });
+  PipelineNode node;
+  node.id = node.stage = "structures";
+  if (is_network(structures)) {
+    if (!has_ct)
+      throw Error(ExitCode::usage, "the pipeline has no step 'ct', in which a network could look for structures",
+                  "run 'osteo segment-network', and give its label map as --structures");
+    PipelineNode network;
+    network.id = "network";
+    network.stage = "segment-network";
+    network.inputs["image"].node = "ct";
+    network.inputs["model"].file = structures;
+    if (output_exists(structures / "calibration.json"))
+      network.outputs["uncertainty"] = folder / "uncertainty.seg.nrrd";
+    pipeline.nodes.push_back(std::move(network));
+    node.inputs["labels"].node = "network";
+  } else {
+    node.inputs["labels"].file = structures;
+  }
+  if (has_ct) node.inputs["image"].node = "ct";
+  const auto names = recipe.settings.find("names");
+  if (names != recipe.settings.end() && !as_held) {
+    node.params["names"] = names->second;
+    node.params["only_named"] = "true";
+  }
+  node.outputs["structures"] = folder / "structures.seg.nrrd";
+  pipeline.nodes.push_back(std::move(node));
+  for (PipelineNode& n : pipeline.nodes) {
+    if (n.id == "preview") n.inputs["mask"].node = "structures";
+  }
+}
+
+}  // namespace
+
 Pipeline case_pipeline(const std::string& text, const Recipe& recipe, const fs::path& source,
                        const fs::path& structures, bool as_held, const fs::path& folder,
                        const std::optional<CaseEdits>& edits, bool threshold_asked) {
@@ -87,24 +132,7 @@ Pipeline case_pipeline(const std::string& text, const Recipe& recipe, const fs::
   settings["source"] = source.string();
   settings["case"] = folder.string();
   Pipeline pipeline = parse_pipeline(text, settings);
-  if (!structures.empty()) {
-    PipelineNode node;
-    node.id = node.stage = "structures";
-    node.inputs["labels"].file = structures;
-    const bool has_ct =
-        std::any_of(pipeline.nodes.begin(), pipeline.nodes.end(), [](const PipelineNode& n) { return n.id == "ct"; });
-    if (has_ct) node.inputs["image"].node = "ct";
-    const auto names = recipe.settings.find("names");
-    if (names != recipe.settings.end() && !as_held) {
-      node.params["names"] = names->second;
-      node.params["only_named"] = "true";
-    }
-    node.outputs["structures"] = folder / "structures.seg.nrrd";
-    pipeline.nodes.push_back(std::move(node));
-    for (PipelineNode& n : pipeline.nodes) {
-      if (n.id == "preview") n.inputs["mask"].node = "structures";
-    }
-  }
+  if (!structures.empty()) add_structures(pipeline, structures, recipe, as_held, folder);
   if (edits) add_edits(pipeline, *edits, folder, threshold_asked);
   pass_threshold_on(pipeline);
   return pipeline;

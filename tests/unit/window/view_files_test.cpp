@@ -334,6 +334,19 @@ TEST(StartList, AFolderOfDicomIsAScan) {
   EXPECT_EQ(CaseMaker::case_beside(series), f.cases() / "series-case-2");
 }
 
+TEST(StartList, AFolderOfNnUNetIsATrainedNetwork) {
+  const Folders f;
+  const fs::path model = f.scratch / "cases/T__P__3d_fullres";
+  write(model / "plans.json", "{}");
+  EXPECT_EQ(look_at_path(model).kind, FolderKind::folder);
+  write(model / "dataset.json", "{}");
+  EXPECT_EQ(look_at_path(model).kind, FolderKind::network);
+  StartList list({}, f.cases());
+  list.select(index_of(list, "trained network: T__P__3d_fullres"));
+  EXPECT_FALSE(list.open());
+  EXPECT_EQ(list.folder(), model);
+}
+
 // A stand-in for 'osteo' that says what it would: how far it is, and what is wrong.
 TEST(CaseMaker, FollowsWhatItStartsAndSaysWhyThereIsNoCase) {
   const test::ScratchFolder scratch;
@@ -360,6 +373,13 @@ TEST(CaseMaker, FollowsWhatItStartsAndSaysWhyThereIsNoCase) {
   EXPECT_EQ(ended().why, "");
   EXPECT_TRUE(fs::exists(the_case)) << "names with blanks and quotes";
   EXPECT_TRUE(maker.making().empty());
+  // With a network, and without one no empty word.
+  does("[ $# = 8 ] && [ \"$5\" = --structures ] && [ \"$6\" = \"/a net's\" ]\n");
+  ASSERT_EQ(maker.make(scan, scratch / "by a network", "/a net's"), "");
+  EXPECT_EQ(ended().why, "");
+  does("[ $# = 6 ] && [ \"$5\" = --progress ]\n");
+  ASSERT_EQ(maker.make(scan, scratch / "by no network"), "");
+  EXPECT_EQ(ended().why, "");
   does(
       "echo 'scan: 0.07 s' >&2; echo \"osteo: '$2' holds no DICOM image\" >&2; echo '  give the folder' >&2; exit 4\n");
   ASSERT_EQ(maker.make(scan, the_case), "");

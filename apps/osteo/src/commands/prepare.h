@@ -40,7 +40,9 @@ struct PrepareCommand {
            "clear table and head holder also where it is not certain that they are; what is certain goes without it"},
           p.remove_table);
     visit({"keep_table", "leave table and head holder on, however certain"}, p.keep_table);
-    visit({"structures", "label map of nerves, vessels, ... (.seg.nrrd, .nii.gz, .dcm) that belongs to the CT"},
+    visit({"structures",
+           "label map of nerves, vessels, ... (.seg.nrrd, .nii.gz, .dcm) that belongs to the CT, or the folder of a "
+           "trained network that finds them in it ('osteo help segment-network')"},
           p.structures);
     visit({"names",
            "what its values stand for, like '1=facial nerve, 2=sigmoid sinus'; values without a name are left out"},

@@ -34,7 +34,7 @@ std::vector<Data> SegmentNetworkStage::run(const Params& params, std::span<const
   NetworkLabels found = segment_with_network(ct, std::get<Source>(inputs[1]).path, params, context);
   for (Structure& s : found.structures.structures) s.origin = origin_of(info());
   std::vector<Data> out{name_structures(found.structures, {}, nullptr, context), {}};
-  if (found.uncertainty.voxels != nullptr) out[1] = std::move(found.uncertainty);
+  out[1] = std::move(found.uncertainty);
   return out;
 }
 

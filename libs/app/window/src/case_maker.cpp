@@ -29,7 +29,7 @@ constexpr const char* kDemo =
     "--progress json --names '5=ossicles, 6=facial nerve, 7=sigmoid sinus, 12=labyrinth, 13=chorda tympani, 16=dura, "
     "17=air cells, 18=external ear canal, 19=antrum'";
 constexpr double kPhantomShare = 0.35;  // of the time
-constexpr const char* kPrepare = "exec \"$1\" prepare \"$2\" -o \"$3\" --progress json";
+constexpr const char* kPrepare = "exec \"$1\" prepare \"$2\" -o \"$3\" ${4:+--structures \"$4\"} --progress json";
 
 }  // namespace
 
@@ -60,9 +60,9 @@ std::string CaseMaker::make_demo() {
   return why;
 }
 
-std::string CaseMaker::make(const fs::path& scan, const fs::path& the_case) {
+std::string CaseMaker::make(const fs::path& scan, const fs::path& the_case, const fs::path& network) {
   if (!making_.empty()) return {};
-  const std::string why = start(kPrepare, {program_.string(), scan.string(), the_case.string()}, 0);
+  const std::string why = start(kPrepare, {program_.string(), scan.string(), the_case.string(), network.string()}, 0);
   if (why.empty()) making_ = the_case;
   return why;
 }

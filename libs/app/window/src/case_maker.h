@@ -26,7 +26,9 @@ class CaseMaker {
   [[nodiscard]] bool can_make() const;
   /// Empty, or why it cannot be made. One at a time: no-op while another is being made.
   std::string make_demo();
-  std::string make(const std::filesystem::path& scan, const std::filesystem::path& the_case);
+  /// `network`: of a trained network that finds its structures; empty: none.
+  std::string make(const std::filesystem::path& scan, const std::filesystem::path& the_case,
+                   const std::filesystem::path& network = {});
   /// That is being made; empty: none.
   [[nodiscard]] const std::filesystem::path& making() const { return making_; }
   /// 0 to 1, of all of it.

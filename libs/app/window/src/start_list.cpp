@@ -67,6 +67,7 @@ FolderLook look_at_path(const fs::path& path) {
   const auto has = [&](const char* name) { return fs::is_regular_file(path / name, failed); };
   if (has("manifest.json")) return {FolderKind::the_case, path, {}};
   if (has("session.json")) return {FolderKind::session, path, {}};
+  if (has("plans.json") && has("dataset.json")) return {FolderKind::network, path, {}};
   if (holds_dicom(path)) return {FolderKind::scan, path, {}};
   return {FolderKind::folder, path, {}};
 }
@@ -142,6 +143,7 @@ void StartList::list() {
     const char* const what = kind == FolderKind::the_case  ? tr("case: {name}")
                              : kind == FolderKind::session ? tr("session: {name}")
                              : kind == FolderKind::scan    ? tr("CT: {name}")
+                             : kind == FolderKind::network ? tr("trained network: {name}")
                                                            : "{name}";
     entries_.push_back({Group::browse, kind, b, filled(what, {{"name", name_of(b)}})});
   }
@@ -173,7 +175,7 @@ void StartList::up() {
 std::optional<StartChoice> StartList::open() {
   if (selected_ >= static_cast<int>(entries_.size())) return std::nullopt;
   const StartEntry entry = entries_[static_cast<std::size_t>(selected_)];
-  if (entry.kind == FolderKind::folder || entry.kind == FolderKind::scan) {
+  if (entry.kind == FolderKind::folder || entry.kind == FolderKind::scan || entry.kind == FolderKind::network) {
     look_into(entry.folder);
     return std::nullopt;
   }
@@ -237,7 +239,8 @@ std::optional<StartChoice> StartList::take_one(const fs::path& path) {
   const std::optional<StartChoice> choice = choice_of(path, why);
   if (choice) return choice;
   const FolderLook look = look_at_path(path);
-  if (look.kind == FolderKind::folder || look.kind == FolderKind::scan) look_into(fs::absolute(look.folder));
+  if (look.kind == FolderKind::folder || look.kind == FolderKind::scan || look.kind == FolderKind::network)
+    look_into(fs::absolute(look.folder));
   message_ = why;
   return std::nullopt;
 }

@@ -11,7 +11,7 @@
 
 namespace osteo::inline app {
 
-enum class FolderKind { nothing, folder, the_case, session, demo, scan };
+enum class FolderKind { nothing, folder, the_case, session, demo, scan, network };
 struct FolderLook {
   FolderKind kind = FolderKind::nothing;
   std::filesystem::path folder;

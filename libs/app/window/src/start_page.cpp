@@ -350,10 +350,31 @@ class StartPage {
           "%s", filled(tr("{case} is being made: {share} %"), {{"case", maker_.making().filename().string()},
                                                                {"share", shown_number(100 * maker_.share(), 0)}})
                     .c_str());
-    } else if (maker_.can_make() && kit_button(tr("Prepare a case"), ButtonLook::main, room)) {
-      list_.say(maker_.make(scan, CaseMaker::case_beside(scan)));
+    } else if (maker_.can_make()) {
+      std::string& network = person_.values.network;
+      if (!network.empty()) {
+        bool use = true;
+        const std::string name = std::filesystem::path(network).filename().string();
+        toggle("use network", filled(tr("Find structures by {network}"), {{"network", name}}).c_str(), use);
+        if (!use) network.clear();
+      }
+      if (kit_button(tr("Prepare a case"), ButtonLook::main, room))
+        list_.say(maker_.make(scan, CaseMaker::case_beside(scan), network));
     }
     note("prepare");
+    if (kit_button(tr("Look into it"), ButtonLook::usual, room)) open = true;
+  }
+
+  // Of a trained network: whether it finds the structures of the cases that are prepared here.
+  void draw_network(const std::filesystem::path& folder, float room) {
+    std::string& chosen = person_.values.network;
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
+    ImGui::TextWrapped("%s", tr("It proposes structures in a CT of which a case is prepared. Look at them before use."));
+    ImGui::PopStyleColor();
+    const bool is = chosen == folder.string();
+    if (kit_button(is ? tr("Not for new cases") : tr("Use for new cases"), ButtonLook::main, room))
+      chosen = is ? std::string() : folder.string();
+    note("network");
     if (kit_button(tr("Look into it"), ButtonLook::usual, room)) open = true;
   }
 
@@ -406,6 +427,8 @@ class StartPage {
       note("make demo");
     } else if (e != nullptr && e->kind == FolderKind::scan) {
       draw_prepare(e->folder, room);
+    } else if (e != nullptr && e->kind == FolderKind::network) {
+      draw_network(e->folder, room);
     } else if (e != nullptr && e->kind == FolderKind::folder) {
       if (kit_button(tr("Look into it"), ButtonLook::main, room)) open = true;
     }

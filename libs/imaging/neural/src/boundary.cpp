@@ -130,6 +130,26 @@ struct Under {
 
 }  // namespace
 
+Labels no_uncertainty(const Frame& frame) {
+  Labels none;
+  none.frame = frame;
+  const auto voxels = make_voxels<std::uint8_t>(frame.voxel_count());
+  std::fill_n(voxels.get(), frame.voxel_count(), std::uint8_t{0});
+  none.voxels = voxels;
+  // From green to red by way of lightness, for eyes of every kind (Okabe and Ito).
+  constexpr std::array<std::array<std::uint8_t, 3>, kUncertaintyMm.size() + 1> kColours{
+      {{0, 158, 115}, {86, 180, 233}, {240, 228, 66}, {213, 94, 0}}};
+  for (std::size_t c = 0; c < kColours.size(); ++c) {
+    const bool last = c == kUncertaintyMm.size();
+    none.structures.push_back(
+        {.value = static_cast<std::uint8_t>(c + 1),
+         .name = last ? "boundary uncertain by more than " + format_number(kUncertaintyMm.back()) + " mm"
+                      : "boundary within " + format_number(kUncertaintyMm[c]) + " mm",
+         .rgb = kColours[c]});
+  }
+  return none;
+}
+
 std::optional<BoundaryUncertainty> boundary_uncertainty(const Labels& labels, const NetworkLogits& logits,
                                                         const NetworkModel& model,
                                                         const NetworkCalibration& calibration, const Context& context) {
@@ -151,7 +171,7 @@ std::optional<BoundaryUncertainty> boundary_uncertainty(const Labels& labels, co
   };
   const auto classes = make_voxels<std::uint8_t>(labels.frame.voxel_count());
   std::fill_n(classes.get(), labels.frame.voxel_count(), std::uint8_t{0});
-  BoundaryUncertainty result;
+  BoundaryUncertainty result{no_uncertainty(labels.frame), {}};
   Probability probability(logits, calibration.temperature, context);
   for (const StructureCalibration& s : calibration.structures) {
     if (s.boundary_mm.empty()) continue;
@@ -186,19 +206,7 @@ std::optional<BoundaryUncertainty> boundary_uncertainty(const Labels& labels, co
     row.within_mm = c < kUncertaintyMm.size() ? kUncertaintyMm[c] : std::numeric_limits<double>::infinity();
     if (all > 0) result.structures.push_back(row);
   }
-  result.classes.frame = labels.frame;
   result.classes.voxels = classes;
-  // Green to red, for eyes of every kind told apart by their lightness as well (Okabe and Ito).
-  constexpr std::array<std::array<std::uint8_t, 3>, 4> kColours{
-      {{0, 158, 115}, {86, 180, 233}, {240, 228, 66}, {213, 94, 0}}};
-  for (std::size_t c = 0; c < kColours.size(); ++c) {
-    const bool last = c == kUncertaintyMm.size();
-    result.classes.structures.push_back(
-        {.value = static_cast<std::uint8_t>(c + 1),
-         .name = last ? "boundary uncertain by more than " + format_number(kUncertaintyMm.back()) + " mm"
-                      : "boundary within " + format_number(kUncertaintyMm[c]) + " mm",
-         .rgb = kColours[c]});
-  }
   return result;
 }
 

@@ -387,7 +387,7 @@ void judge(NetworkLabels& found, const NetworkLogits& logits, const NetworkModel
     found.uncertainty = std::move(boundary->classes);
   }
   context.report("expected_dice", expected);
-  if (!within.empty()) context.report("boundary_within_mm", within);
+  context.report("boundary_within_mm", within.empty() ? "not calibrated" : within);
   if (doubted.empty()) return;
   context.report("not_to_be_trusted", doubted);
   context.warn("not to be trusted here: " + doubted);
@@ -407,6 +407,7 @@ NetworkLabels segment_with_network(const Image& ct, const fs::path& model, const
   context.progress(0.9, "labels");
   NetworkLabels found;
   found.structures = labels_of_logits(logits, of, ct.frame, context);
+  found.uncertainty = no_uncertainty(ct.frame);
   std::array<bool, 256> met{};
   for (const std::uint8_t v : found.structures.span()) met[v] = true;
   std::string missing;

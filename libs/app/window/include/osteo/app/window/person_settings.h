@@ -23,7 +23,7 @@ struct PersonValues {
   bool hints = false;
   std::string hints_off;
   bool dust = false, heat = false, monitor = false, mirror_procedure = false;
-  std::string procedure, position = "supine";
+  std::string procedure, position = "supine", network;
   double volume = 0.7;
   double motion_one_to = 1, wrist_rest = 0.2, burr_share = 1;
   bool left_handed = false, mirror_mouse = false;
@@ -47,6 +47,7 @@ struct PersonValues {
     visit({"hints", "words while one drills: not seen, press less, ..."}, p.hints);
     visit({"procedure", "procedure of the cases that the start page opens: a name or a file; empty: none"},
           p.procedure);
+    visit({"network", "folder of the trained network that finds structures in new cases; empty: none"}, p.network);
     visit({"mirror_procedure", "it is for the other side of the body"}, p.mirror_procedure);
     visit({"dust", "bone dust and irrigation, from the start page"}, p.dust);
     visit({"heat", "how warm drilling makes bone, from the start page"}, p.heat);

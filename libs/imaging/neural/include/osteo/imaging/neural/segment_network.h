@@ -18,8 +18,8 @@ struct NetworkParams {
 
 struct NetworkLabels {
   Labels structures;   ///< in the CT's frame, with the names of dataset.json, and what is known of their certainty
-  Labels uncertainty;  ///< at their boundaries: within how many mm they lie, in classes that are named; no voxels where
-                       ///< the model's folder has no calibration of boundaries
+  Labels uncertainty;  ///< at their boundaries: within how many mm they lie, in classes that are named; empty where
+                       ///< the model's folder has no calibration of boundaries, or the network has regions
 };
 
 /// Runs the network of `model` (plans.json, dataset.json, fold_*/checkpoint_final.pth) over `ct`, which must be in HU

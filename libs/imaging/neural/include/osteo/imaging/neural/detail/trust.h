@@ -59,6 +59,9 @@ struct BoundaryUncertainty {
   std::vector<StructureBoundary> structures;
 };
 
+/// The classes with their names and colours, in no voxel.
+[[nodiscard]] Labels no_uncertainty(const Frame& frame);
+
 /// At each voxel of a calibrated structure that touches another label: the way outwards, against the gradient of the
 /// structure's probability, to where it is at most 0.1, and inwards to where it is at least 0.9; together the
 /// boundary's width, at most kWidestMm. The calibration turns it into mm of error. Nothing where the model has regions,
