@@ -194,6 +194,33 @@ CASCADE = dict(
     ),
 )
 
+# Residual blocks, thick slices; kept as an ONNX file of each of torch's two exporters as well.
+ONNX = dict(
+    name="3d_fullres",
+    shape=(10, 24, 21),
+    zeros=0,
+    spacing=(1.1, 0.7, 0.7),
+    mirror=(0, 2),
+    folds=1,
+    dataset={"labels": {"background": 0, "nerve": 1, "sinus": 2}},
+    plans=plans_of(
+        "3d_fullres",
+        {
+            "patch_size": [8, 16, 16],
+            "spacing": [1.0, 0.8, 0.8],
+            "architecture": architecture(
+                "ResidualEncoderUNet",
+                3,
+                [6, 10],
+                [[1, 3, 3], [3, 3, 3]],
+                [[1, 1, 1], [1, 2, 2]],
+                [1, 2],
+                [1],
+            ),
+        },
+    ),
+)
+
 
 def image_of(shape, zeros, seed):
     rng = np.random.default_rng(seed)
@@ -320,6 +347,34 @@ def write_golden(folder, case, image, labels, logits):
     (folder / "logits.f16").write_bytes(np.ascontiguousarray(logits).astype("<f2").tobytes())
 
 
+def write_onnx(model, folder, newer):
+    """The model's network as an ONNX file, and network.json beside it. The newer exporter keeps weights in a file beside."""
+    predictor = nnUNetPredictor(device=torch.device("cpu"), perform_everything_on_device=False, allow_tqdm=False)
+    predictor.initialize_from_trained_model_folder(str(model), None)
+    predictor.network.load_state_dict(predictor.list_of_parameters[0])
+    network = predictor.network.eval()
+    configuration = predictor.configuration_manager
+    folder.mkdir(parents=True, exist_ok=True)
+    patch = [int(n) for n in configuration.patch_size]
+    torch.onnx.export(network, (torch.zeros(1, 1, *patch),), str(folder / "network.onnx"), dynamo=newer)
+    of = CT["0"]
+    description = {
+        "osteotome_network": 1,
+        "onnx": "network.onnx",
+        "patch_size": patch,
+        "spacing_mm": [float(mm) for mm in configuration.spacing],
+        "normalisation": {
+            "lower": of["percentile_00_5"],
+            "upper": of["percentile_99_5"],
+            "mean": of["mean"],
+            "std": of["std"],
+        },
+        "labels": predictor.dataset_json["labels"],
+        "mirror_axes": list(predictor.allowed_mirroring_axes),
+    }
+    (folder / "network.json").write_text(json.dumps(description, indent=1) + "\n")
+
+
 def main():
     out = pathlib.Path(sys.argv[1])
     for number, (name, case) in enumerate(CASES.items()):
@@ -332,6 +387,12 @@ def main():
     second = out / "cascade" / (stage + "3d_cascade_fullres")
     labels, logits = make(second, dict(CASCADE, name="3d_cascade_fullres"), 951, image, first)
     write_golden(second, CASCADE, image, labels, logits)
+    image = image_of(ONNX["shape"], 0, 41)
+    labels, logits = make(out / "onnx" / "nnunet", ONNX, 971, image)
+    for name, newer in (("older", False), ("newer", True)):
+        write_onnx(out / "onnx" / "nnunet", out / "onnx" / name, newer)
+        write_golden(out / "onnx" / name, ONNX, image, labels, logits)
+    write_onnx(out / "flat", out / "onnx" / "flat", True)
 
 
 if __name__ == "__main__":

@@ -13,9 +13,10 @@
 namespace osteo {
 namespace {
 
-// nnU-Net's folder of a training.
+// nnU-Net's folder of a training, or one with an ONNX file.
 bool is_network(const fs::path& folder) {
-  return fs::is_directory(folder) && output_exists(folder / "plans.json") && output_exists(folder / "dataset.json");
+  const auto has = [&](const char* name) { return output_exists(folder / name); };
+  return fs::is_directory(folder) && ((has("plans.json") && has("dataset.json")) || has("network.json"));
 }
 
 std::string quoted(const std::string& text) {

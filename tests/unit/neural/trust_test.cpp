@@ -82,9 +82,14 @@ TEST(NetworkTrust, DamagedCalibrationsAreRefused) {
   ASSERT_EQ(c.structures.size(), 1U);
   EXPECT_EQ(c.structures[0].name, "ossicles");
   EXPECT_EQ(c.structures[0].most_mm3, 9);
-  for (const auto& [from, to] : {std::pair{"1.5", "0"}, {"1.5", "\"1\""}, {"\"value\": 2", "\"value\": 7"},
-                                 {"\"most_mm3\": 9", "\"most_mm3\": 2"}, {"0.4", "1.4"}, {"structures", "others"},
-                                 {"_calibration\": 1", "_calibration\": 2"}, {"}]}", "}]"}}) {
+  for (const auto& [from, to] : {std::pair{"1.5", "0"},
+                                 {"1.5", "\"1\""},
+                                 {"\"value\": 2", "\"value\": 7"},
+                                 {"\"most_mm3\": 9", "\"most_mm3\": 2"},
+                                 {"0.4", "1.4"},
+                                 {"structures", "others"},
+                                 {"_calibration\": 1", "_calibration\": 2"},
+                                 {"}]}", "}]"}}) {
     std::string text = good;
     text.replace(text.find(from), std::string(from).size(), to);
     EXPECT_THROW(static_cast<void>(read_network_calibration(text, two_structures())), Error) << text;

@@ -11,13 +11,16 @@ StageInfo SegmentNetworkStage::info() {
           .synopsis = "a label map by a trained network: an nnU-Net v2 folder, without Python",
           .description =
               "Reads the folder that nnU-Net v2 leaves of a training (plans.json, dataset.json, "
-              "fold_*/checkpoint_final.pth) and runs it over the CT on this machine's processor: PlainConvUNet and "
+              "fold_*/checkpoint_final.pth), or one with an ONNX file and network.json, and runs it over the CT on "
+              "this machine's processor: PlainConvUNet and "
               "ResidualEncoderUNet, 2d, 3d and cascades, labels or regions, folds and mirrored passes averaged. No "
               "code runs from a checkpoint. Memory is known before the first window. The result is a proposal to be "
               "looked at: "
               "docs/how-to/segment-network.md says what may not be concluded from it.",
           .inputs = {{"image", {DataKind::image}, "CT in HU, lying in memory as the training's images did"},
-                     {"model", {DataKind::source}, "nnU-Net's folder of one trained configuration"}},
+                     {"model",
+                      {DataKind::source},
+                      "nnU-Net's folder of one trained configuration, or one with network.json and an ONNX file"}},
           .outputs = {{"structures", {DataKind::labels}, "label map with the names of dataset.json"},
                       {"uncertainty",
                        {DataKind::labels},

@@ -67,7 +67,7 @@ FolderLook look_at_path(const fs::path& path) {
   const auto has = [&](const char* name) { return fs::is_regular_file(path / name, failed); };
   if (has("manifest.json")) return {FolderKind::the_case, path, {}};
   if (has("session.json")) return {FolderKind::session, path, {}};
-  if (has("plans.json") && has("dataset.json")) return {FolderKind::network, path, {}};
+  if ((has("plans.json") && has("dataset.json")) || has("network.json")) return {FolderKind::network, path, {}};
   if (holds_dicom(path)) return {FolderKind::scan, path, {}};
   return {FolderKind::folder, path, {}};
 }

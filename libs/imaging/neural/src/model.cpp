@@ -6,6 +6,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
+#include "osteo/imaging/neural/detail/onnx.h"
 
 namespace osteo::inline imaging {
 namespace {
@@ -227,6 +228,55 @@ Json parsed(std::string_view text) {
 }
 
 }  // namespace
+
+OnnxModel read_onnx_model(std::string_view network_json) {
+  OnnxModel model;
+  NetworkModel& n = model.network;
+  try {
+    const Json json = parsed(network_json);
+    number(member(json, "osteotome_network"), "osteotome_network", 1, 1);
+    constexpr std::array<std::string_view, 8> kKnown{
+        "osteotome_network", "onnx",   "patch_size",  "spacing_mm",
+        "normalisation",     "labels", "mirror_axes", "regions_class_order"};
+    for (const auto& m : json.members())
+      if (std::find(kKnown.begin(), kKnown.end(), m.key) == kKnown.end())
+        refuse("the key '" + m.key + "' is not known");
+    model.file = word(member(json, "onnx"), "onnx");
+    if (model.file.empty() || model.file == "." || model.file == ".." ||
+        model.file.find_first_of("/\\") != std::string::npos)
+      refuse("'onnx' is no name of a file beside it");
+    const Json& patch = member(json, "patch_size");
+    n.unet.flat = patch.items().size() == 2;
+    n.patch = axes(patch, "patch_size", n.unet.flat, 1, 1024);
+    for (const Json& v : member(json, "spacing_mm").items()) n.spacing_mm.push_back(number(v, "spacing_mm", 1e-3, 100));
+    if (n.spacing_mm.size() != (n.unet.flat ? 2U : 3U))
+      refuse("'spacing_mm' has not a number for each axis of a window");
+    const Json& how = member(json, "normalisation");
+    if (const std::string* const name = how.text()) {
+      if (*name == "z_score")
+        n.normalisation = Normalisation::z_score;
+      else if (*name == "0_to_1")
+        n.normalisation = Normalisation::rescale_to_01;
+      else if (*name == "none")
+        n.normalisation = Normalisation::none;
+      else
+        refuse("'normalisation' is none of z_score, 0_to_1, none and an object with lower, upper, mean and std");
+    } else {
+      n.lower = number(member(how, "lower"), "lower", -1e6, 1e6);
+      n.upper = number(member(how, "upper"), "upper", n.lower, 1e6);
+      n.mean = number(member(how, "mean"), "mean", -1e6, 1e6);
+      n.deviation = number(member(how, "std"), "std", 1e-8, 1e6);
+    }
+    read_labels(json, n);
+    if (const Json* const mirrored = json.find("mirror_axes")) {
+      for (const Json& v : mirrored->items())
+        model.mirror_axes.push_back(whole(v, "mirror_axes", 0, n.unet.flat ? 1 : 2));
+    }
+  } catch (const Error& error) {
+    throw error.in("network.json");
+  }
+  return model;
+}
 
 NetworkModel read_network_model(std::string_view plans_text, std::string_view dataset_text,
                                 const std::string& configuration_name) {

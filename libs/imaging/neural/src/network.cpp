@@ -6,18 +6,14 @@
 #include <new>
 #include <string>
 
+#include "network_steps.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
-#include "osteo/imaging/neural/detail/conv_kernel.h"
 
 namespace osteo::inline imaging {
 namespace {
 
 constexpr int kRowsOfTask = 16;
-
-int blocks_of(int channels) {
-  return (channels + kChannels - 1) / kChannels;
-}
 
 struct Freed {
   void operator()(float* p) const { ::operator delete[](p, std::align_val_t{64}); }
@@ -45,117 +41,44 @@ struct Features {
 
 using Held = std::shared_ptr<Features>;
 
-struct Convolution {
-  int in = 0, out = 0;
-  Axes kernel{}, stride{};
-  std::vector<int> blocks;     // channels of each block of inputs, in order
-  std::vector<float> weights;  // output block, input block, z, y, x, channel, 16 outputs
-  std::vector<float> bias;     // of whole blocks
-
-  [[nodiscard]] std::ptrdiff_t taps() const { return std::ptrdiff_t{1} * kernel[0] * kernel[1] * kernel[2]; }
-};
-
-struct Norm {
-  std::vector<float> weight, bias, mean, variance;  // of whole blocks; the last two of batches
-};
-
-struct Layer {
-  Convolution convolution;
-  Norm norm;
-};
-
-struct Block {  // of the residual encoder
-  Layer first, second;
-  bool pools = false, projects = false;
-  Layer projection;
-};
-
-class Weights {
- public:
-  Weights(const UnetPlan& plan, const Checkpoint& checkpoint) : plan_(plan), checkpoint_(checkpoint) {}
-
-  // `lanes`: channels of a block of what comes in.
-  Convolution convolution(const std::string& name, const std::vector<int>& in, int out, Axes kernel, Axes stride,
-                          bool biased, bool transposed = false, int lanes = kChannels) const {
-    Convolution c;
-    for (const int n : in) {
-      c.in += n;
-      for (int at = 0; at < n; at += lanes) c.blocks.push_back(std::min(lanes, n - at));
-    }
-    c.out = out;
-    c.kernel = kernel;
-    c.stride = stride;
-    std::vector<std::int64_t> shape{transposed ? c.in : out, transposed ? out : c.in};
-    for (int a = plan_.flat ? 1 : 0; a < 3; ++a) shape.push_back(kernel[static_cast<std::size_t>(a)]);
-    const std::vector<float>& w = values(name + ".weight", shape);
-    const auto taps = static_cast<std::size_t>(c.taps());
-    const auto size_in = static_cast<std::size_t>(c.in), size_out = static_cast<std::size_t>(out);
-    const std::size_t per_output = size_in * taps * kChannels;
-    c.weights.assign(per_output * static_cast<std::size_t>(blocks_of(out)), 0.0F);
-    for (std::size_t o = 0; o < size_out; ++o) {
-      std::size_t channel = 0;
-      for (const int n : c.blocks) {
-        const auto size = static_cast<std::size_t>(n);
-        float* const to = c.weights.data() + o / kChannels * per_output + channel * taps * kChannels;
-        for (std::size_t i = 0; i < size; ++i) {
-          const std::size_t from = transposed ? (channel + i) * size_out + o : o * size_in + channel + i;
-          for (std::size_t t = 0; t < taps; ++t) to[(t * size + i) * kChannels + o % kChannels] = w[from * taps + t];
-        }
-        channel += size;
-      }
-    }
-    c.bias = biased ? vector(name + ".bias", out) : std::vector<float>(whole(out), 0.0F);
-    return c;
-  }
-
-  Layer layer(const std::string& name, const std::vector<int>& in, int out, Axes kernel, Axes stride, bool biased,
-              int lanes = kChannels) const {
-    Layer l;
-    l.convolution = convolution(name + ".conv", in, out, kernel, stride, biased, false, lanes);
-    l.norm.weight = vector(name + ".norm.weight", out);
-    l.norm.bias = vector(name + ".norm.bias", out);
-    if (plan_.batch_norm) {
-      l.norm.mean = vector(name + ".norm.running_mean", out);
-      l.norm.variance = vector(name + ".norm.running_var", out);
-    }
-    return l;
-  }
-
- private:
-  static std::size_t whole(int channels) { return static_cast<std::size_t>(blocks_of(channels) * kChannels); }
-
-  const std::vector<float>& values(const std::string& name, const std::vector<std::int64_t>& shape) const {
-    const auto it = checkpoint_.weights.find(name);
-    if (it == checkpoint_.weights.end())
-      throw Error(ExitCode::corrupt, "the checkpoint has no '" + name + "', which plans.json asks for",
-                  "the checkpoint and plans.json must be of one training");
-    if (it->second.shape != shape)
-      throw Error(ExitCode::corrupt, "'" + name + "' of the checkpoint is not of the shape that plans.json asks for",
-                  "the checkpoint and plans.json must be of one training");
-    return it->second.values;
-  }
-  std::vector<float> vector(const std::string& name, int channels) const {
-    std::vector<float> v = values(name, {channels});
-    v.resize(whole(channels), 0.0F);
-    return v;
-  }
-
-  const UnetPlan& plan_;
-  const Checkpoint& checkpoint_;
-};
-
 }  // namespace
 
+Convolution packed_convolution(std::span<const float> weights, std::span<const float> bias, const std::vector<int>& in,
+                               int out, Axes kernel, Axes stride, bool transposed, int lanes) {
+  Convolution c;
+  for (const int n : in) {
+    c.in += n;
+    for (int at = 0; at < n; at += lanes) c.blocks.push_back(std::min(lanes, n - at));
+  }
+  c.out = out;
+  c.kernel = kernel;
+  c.stride = stride;
+  const auto taps = static_cast<std::size_t>(c.taps());
+  const auto size_in = static_cast<std::size_t>(c.in), size_out = static_cast<std::size_t>(out);
+  const std::size_t per_output = size_in * taps * kChannels;
+  c.weights.assign(per_output * static_cast<std::size_t>(blocks_of(out)), 0.0F);
+  for (std::size_t o = 0; o < size_out; ++o) {
+    std::size_t channel = 0;
+    for (const int n : c.blocks) {
+      const auto size = static_cast<std::size_t>(n);
+      float* const to = c.weights.data() + o / kChannels * per_output + channel * taps * kChannels;
+      for (std::size_t i = 0; i < size; ++i) {
+        const std::size_t from = transposed ? (channel + i) * size_out + o : o * size_in + channel + i;
+        for (std::size_t t = 0; t < taps; ++t)
+          to[(t * size + i) * kChannels + o % kChannels] = weights[from * taps + t];
+      }
+      channel += size;
+    }
+  }
+  c.bias.assign(static_cast<std::size_t>(blocks_of(out) * kChannels), 0.0F);
+  std::copy(bias.begin(), bias.end(), c.bias.begin());
+  return c;
+}
+
 struct Network::Impl {
-  UnetPlan plan;
+  NetworkSteps made;
+  std::vector<std::size_t> last_use;  // of each value: the step after which it is free
   Axes border{};
-  std::vector<std::vector<Layer>> encoder;  // plain
-  Layer stem;                               // residual
-  std::vector<std::vector<Block>> residual;
-  std::vector<Convolution> up;  // from stage s + 1 to s
-  std::vector<std::vector<Layer>> decoder;
-  Convolution last;
-  std::size_t weight_bytes = 0;
 
   // Features that are free, by their number of channels and size: their borders are zero still.
   struct Key {
@@ -205,8 +128,8 @@ struct Network::Impl {
     });
   }
 
-  Held convolve(const Convolution& c, std::initializer_list<const Features*> inputs) {
-    const Features& first = **inputs.begin();
+  Held convolve(const Convolution& c, const std::vector<const Features*>& inputs) {
+    const Features& first = *inputs.front();
     Axes size{};
     for (std::size_t a = 0; a < 3; ++a) size[a] = (first.size[a] - 1) / c.stride[a] + 1;
     Held held_out = take(c.out, size);
@@ -285,16 +208,19 @@ struct Network::Impl {
 
   // In place. Sums of a channel: rows in float, planes and the whole in double, in order.
   void normalise(Features& f, const Norm& n, const Features* add, float slope) const {
-    if (counting) return;
+    if (counting || (n.kind == Norm::Kind::none && add == nullptr && slope == 1)) return;
     const auto planes = static_cast<std::size_t>(f.size[0]);
     parallel_for(static_cast<std::size_t>(f.blocks()), 1, context->threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t at = begin; at < end; ++at) {
         const int b = static_cast<int>(at);
         const std::size_t first = at * kChannels;
         float scale[kChannels], shift[kChannels];
-        if (plan.batch_norm) {
+        if (n.kind == Norm::Kind::none) {
+          std::fill_n(scale, kChannels, 1.0F);
+          std::fill_n(shift, kChannels, 0.0F);
+        } else if (n.kind == Norm::Kind::batch) {
           for (std::size_t c = 0; c < kChannels; ++c) {
-            const double by = n.weight[first + c] / std::sqrt(static_cast<double>(n.variance[first + c]) + plan.eps);
+            const double by = n.weight[first + c] / std::sqrt(static_cast<double>(n.variance[first + c]) + n.eps);
             scale[c] = static_cast<float>(by);
             shift[c] = static_cast<float>(n.bias[first + c] - n.mean[first + c] * by);
           }
@@ -312,7 +238,7 @@ struct Network::Impl {
             }
           }
           for (std::size_t c = 0; c < kChannels; ++c) {
-            const double by = n.weight[first + c] / std::sqrt(sums[1][c] / count + plan.eps);
+            const double by = n.weight[first + c] / std::sqrt(sums[1][c] / count + n.eps);
             scale[c] = static_cast<float>(by);
             shift[c] = static_cast<float>(n.bias[first + c] - mean[c] * by);
           }
@@ -325,12 +251,6 @@ struct Network::Impl {
         }
       }
     });
-  }
-
-  Held apply(const Layer& l, std::initializer_list<const Features*> inputs, const Features* add, bool bends) {
-    Held f = convolve(l.convolution, inputs);
-    normalise(*f, l.norm, add, bends ? static_cast<float>(plan.slope) : 1.0F);
-    return f;
   }
 
   // Means over what a stride covers.
@@ -360,97 +280,40 @@ struct Network::Impl {
     return held_out;
   }
 
-  Held apply(const Block& block, const Held& in, const Axes& stride) {
-    Held middle = apply(block.first, {in.get()}, nullptr, true);
-    Held skip = block.pools ? pool(*in, stride) : in;
-    if (block.projects) skip = apply(block.projection, {skip.get()}, nullptr, false);
-    return apply(block.second, {middle.get()}, skip.get(), true);
-  }
-
-  Held pass(Held x) {
-    std::vector<Held> skips;
-    const std::size_t count = plan.stages.size();
-    if (plan.residual) x = apply(stem, {x.get()}, nullptr, true);
-    for (std::size_t s = 0; s < count; ++s) {
-      if (plan.residual) {
-        for (std::size_t n = 0; n < residual[s].size(); ++n)
-          x = apply(residual[s][n], x, n == 0 ? plan.stages[s].stride : Axes{1, 1, 1});
-      } else {
-        for (const Layer& l : encoder[s]) x = apply(l, {x.get()}, nullptr, true);
-      }
-      if (s + 1 < count) skips.push_back(x);
+  Held pass(Held input) {
+    std::vector<Held> values(made.steps.size() + 1);
+    values[0] = std::move(input);
+    for (std::size_t n = 0; n < made.steps.size(); ++n) {
+      const Step& s = made.steps[n];
+      const auto value = [&](int v) { return values[static_cast<std::size_t>(v)].get(); };
+      std::vector<const Features*> in;
+      for (const int v : s.in) in.push_back(value(v));
+      Held& out = values[n + 1];
+      out = s.kind == Step::Kind::convolution  ? convolve(s.convolution, in)
+            : s.kind == Step::Kind::transposed ? convolve_up(s.convolution, *in[0])
+                                               : pool(*in[0], s.stride);
+      normalise(*out, s.norm, s.add < 0 ? nullptr : value(s.add), s.slope);
+      for (std::size_t v = 0; v <= n; ++v)
+        if (last_use[v] == n) values[v].reset();
     }
-    for (std::size_t s = count - 1; s-- > 0;) {
-      x = convolve_up(up[s], *x);
-      for (std::size_t n = 0; n < decoder[s].size(); ++n) {
-        x = n == 0 ? apply(decoder[s][n], {x.get(), skips[s].get()}, nullptr, true)
-                   : apply(decoder[s][n], {x.get()}, nullptr, true);
-        if (n == 0) skips[s].reset();
-      }
-    }
-    return convolve(last, {x.get()});
+    return values[static_cast<std::size_t>(made.result)];
   }
 };
 
-Network::Network(const UnetPlan& plan, const Checkpoint& checkpoint) : impl_(std::make_unique<Impl>()) {
+Network::Network(const UnetPlan& plan, const Checkpoint& checkpoint) : Network(unet_steps(plan, checkpoint)) {}
+
+Network::Network(NetworkSteps steps) : impl_(std::make_unique<Impl>()) {
   Impl& m = *impl_;
-  m.plan = plan;
-  const Weights weights(m.plan, checkpoint);
-  const std::size_t count = plan.stages.size();
-  const auto number = [](std::size_t n) { return std::to_string(n); };
-  for (const UnetStage& s : plan.stages) {
-    for (std::size_t a = 0; a < 3; ++a) m.border[a] = std::max(m.border[a], s.kernel[a] / 2);
+  m.made = std::move(steps);
+  m.last_use.assign(m.made.steps.size() + 1, m.made.steps.size());
+  for (std::size_t n = 0; n < m.made.steps.size(); ++n) {
+    const Step& s = m.made.steps[n];
+    for (const int v : s.in) m.last_use[static_cast<std::size_t>(v)] = n;
+    if (s.add >= 0) m.last_use[static_cast<std::size_t>(s.add)] = n;
+    if (s.kind != Step::Kind::convolution) continue;
+    for (std::size_t a = 0; a < 3; ++a) m.border[a] = std::max(m.border[a], s.convolution.kernel[a] / 2);
   }
-  const Axes one{1, 1, 1};
-  int channels = plan.channels;
-  if (plan.residual) {
-    const UnetStage& s = plan.stages[0];
-    m.stem = weights.layer("encoder.stem.convs.0", {channels}, s.features, s.kernel, one, plan.conv_bias, 1);
-    channels = s.features;
-  }
-  for (std::size_t n = 0; n < count; ++n) {
-    const UnetStage& s = plan.stages[n];
-    if (plan.residual) m.residual.emplace_back();
-    if (!plan.residual) m.encoder.emplace_back();
-    for (int b = 0; b < s.encoder_blocks; ++b) {
-      const Axes stride = b == 0 ? s.stride : one;
-      if (!plan.residual) {
-        m.encoder[n].push_back(weights.layer("encoder.stages." + number(n) + ".0.convs." + std::to_string(b),
-                                             {channels}, s.features, s.kernel, stride, plan.conv_bias,
-                                             n + static_cast<std::size_t>(b) == 0 ? 1 : kChannels));
-      } else {
-        const std::string name = "encoder.stages." + number(n) + ".blocks." + std::to_string(b);
-        Block block;
-        block.first = weights.layer(name + ".conv1", {channels}, s.features, s.kernel, stride, plan.conv_bias);
-        block.second = weights.layer(name + ".conv2", {s.features}, s.features, s.kernel, one, plan.conv_bias);
-        block.pools = stride != one;
-        block.projects = channels != s.features;
-        if (block.projects)
-          block.projection =
-              weights.layer(name + (block.pools ? ".skip.1" : ".skip.0"), {channels}, s.features, one, one, false);
-        m.residual[n].push_back(std::move(block));
-      }
-      channels = s.features;
-    }
-  }
-  m.up.resize(count - 1);
-  m.decoder.resize(count - 1);
-  for (std::size_t n = count - 1; n-- > 0;) {
-    const UnetStage& s = plan.stages[n];
-    const std::string at = number(count - 2 - n);  // decoders are counted from the coarsest
-    const Axes stride = plan.stages[n + 1].stride;
-    m.up[n] =
-        weights.convolution("decoder.transpconvs." + at, {channels}, s.features, stride, stride, plan.conv_bias, true);
-    for (int c = 0; c < s.decoder_convolutions; ++c) {
-      m.decoder[n].push_back(
-          weights.layer("decoder.stages." + at + ".convs." + std::to_string(c),
-                        c == 0 ? std::vector<int>{s.features, s.features} : std::vector<int>{s.features}, s.features,
-                        s.kernel, one, plan.conv_bias));
-    }
-    channels = s.features;
-  }
-  m.last = weights.convolution("decoder.seg_layers." + number(count - 2), {channels}, plan.classes, one, one, true);
-  for (const auto& [name, tensor] : checkpoint.weights) m.weight_bytes += tensor.values.size() * sizeof(float);
+  m.last_use[static_cast<std::size_t>(m.made.result)] = m.made.steps.size();
 }
 
 Network::~Network() = default;
@@ -460,9 +323,9 @@ Network& Network::operator=(Network&&) noexcept = default;
 void Network::run(std::span<const float> input, const Axes& size, std::span<float> logits, const Context& context) {
   Impl& m = *impl_;
   m.context = &context;
-  Held in = m.take(m.plan.channels, size, 1);
+  Held in = m.take(m.made.channels, size, 1);
   std::size_t from = 0;
-  for (int c = 0; c < m.plan.channels; ++c) {
+  for (int c = 0; c < m.made.channels; ++c) {
     for (int z = 0; z < size[0]; ++z) {
       for (int y = 0; y < size[1]; ++y, from += static_cast<std::size_t>(size[2]))
         std::copy_n(input.begin() + static_cast<std::ptrdiff_t>(from), size[2], in->at(c, z, y, 0));
@@ -470,7 +333,7 @@ void Network::run(std::span<const float> input, const Axes& size, std::span<floa
   }
   const Held out = m.pass(std::move(in));
   std::size_t to = 0;
-  for (int c = 0; c < m.plan.classes; ++c) {
+  for (int c = 0; c < out->channels; ++c) {
     for (int z = 0; z < size[0]; ++z) {
       for (int y = 0; y < size[1]; ++y) {
         const float* const row = out->at(c / kChannels, z, y, 0) + c % kChannels;
@@ -485,12 +348,12 @@ std::size_t Network::bytes(const Axes& size) {
   m.free.clear();
   m.held = 0;
   m.counting = true;
-  m.pass(m.take(m.plan.channels, size, 1)).reset();
+  m.pass(m.take(m.made.channels, size, 1)).reset();
   m.counting = false;
   m.free.clear();
   const std::size_t run = m.held;
   m.held = 0;
-  return run + 2 * m.weight_bytes;
+  return run + 2 * m.made.weight_bytes;
 }
 
 }  // namespace osteo::inline imaging

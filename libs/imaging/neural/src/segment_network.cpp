@@ -4,11 +4,13 @@
 #include <cmath>
 #include <optional>
 
+#include "network_steps.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/neural/detail/half.h"
+#include "osteo/imaging/neural/detail/onnx.h"
 #include "osteo/imaging/neural/detail/predict.h"
 #include "osteo/imaging/neural/detail/trust.h"
 #include "osteo/imaging/neural/detail/windows.h"
@@ -17,6 +19,8 @@
 
 namespace osteo::inline imaging {
 namespace {
+
+constexpr const char* kOnnxModel = "network.json";
 
 fs::path fold_folder(const fs::path& model, int fold) {
   return model / (fold < 0 ? "fold_all" : "fold_" + std::to_string(fold));
@@ -144,6 +148,7 @@ std::string gb_text(double bytes) {
 }  // namespace
 
 std::vector<int> network_folds(const fs::path& model) {
+  if (fs::exists(model / kOnnxModel)) return {0};
   std::vector<int> folds;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(model, error)) {
@@ -163,6 +168,24 @@ std::vector<int> network_folds(const fs::path& model) {
 
 namespace {
 
+// The first of a folder's networks, and what is said of all of them.
+void open_network(const fs::path& folder, int fold, NetworkModel& model, std::string& configuration,
+                  std::vector<int>& mirror_axes, std::optional<Network>& network) {
+  if (fs::exists(folder / kOnnxModel)) {
+    const OnnxModel onnx = read_onnx_model(read_text(folder / kOnnxModel));
+    model = onnx.network;
+    mirror_axes = onnx.mirror_axes;
+    network.emplace(read_onnx(read_file(folder / onnx.file), folder, model.unet.classes, model.patch));
+    return;
+  }
+  const Checkpoint checkpoint = read_checkpoint(fold_folder(folder, fold) / "checkpoint_final.pth");
+  model = read_network_model(read_text(folder / "plans.json"), read_text(folder / "dataset.json"),
+                             checkpoint.configuration);
+  configuration = checkpoint.configuration;
+  mirror_axes = checkpoint.mirror_axes;
+  network.emplace(model.unet, checkpoint);
+}
+
 NetworkLogits logits_of_stage(const Image& ct, const fs::path& folder, NetworkModel& model, const NetworkParams& params,
                               bool first_stage, const Context& around) {
   if (!(params.step > 0 && params.step <= 1)) throw Error(ExitCode::usage, "--step is not above 0 and at most 1");
@@ -174,16 +197,17 @@ NetworkLogits logits_of_stage(const Image& ct, const fs::path& folder, NetworkMo
     }
     folds = params.folds;
   }
-  Checkpoint checkpoint = read_checkpoint(fold_folder(folder, folds[0]) / "checkpoint_final.pth");
-  model = read_network_model(read_text(folder / "plans.json"), read_text(folder / "dataset.json"),
-                             checkpoint.configuration);
+  std::string configuration;
+  std::vector<int> mirror_axes;
+  std::optional<Network> network;
+  open_network(folder, folds[0], model, configuration, mirror_axes, network);
 
   std::optional<Labels> previous;
   Context context = around;
   if (!model.previous_stage.empty()) {
     if (first_stage) throw Error(ExitCode::corrupt, "the first stage of a cascade has a stage before it itself");
     NetworkModel before;
-    const fs::path at = folder_of_stage(folder, checkpoint.configuration, model.previous_stage);
+    const fs::path at = folder_of_stage(folder, configuration, model.previous_stage);
     const NetworkLogits found = logits_of_stage(ct, at, before, params, true, around.sub(0, 0.4));
     previous = labels_of_logits(found, before, ct.frame, around);
     context = around.sub(0.4, 1);
@@ -207,7 +231,6 @@ NetworkLogits logits_of_stage(const Image& ct, const fs::path& folder, NetworkMo
     padded_voxels *= std::max<double>(n, model.patch[a]);
     between *= std::max<double>(n, out.cropped[a]);
   }
-  std::optional<Network> network(std::in_place, model.unet, checkpoint);
   const auto image_voxels = static_cast<double>(voxels_of(out.cropped));
   const double classes = model.unet.classes, patch = static_cast<double>(voxels_of(model.patch));
   const double resampling = 4 * (image_voxels + 2 * between),
@@ -247,12 +270,12 @@ NetworkLogits logits_of_stage(const Image& ct, const fs::path& folder, NetworkMo
     if (size != out.size) labels = padded(labels, out.size, size, before);
   }
 
-  std::vector<int> axes = params.mirror ? checkpoint.mirror_axes : std::vector<int>{};
+  std::vector<int> axes = params.mirror ? mirror_axes : std::vector<int>{};
   if (std::any_of(axes.begin(), axes.end(), [&](int a) { return a > (model.unet.flat ? 1 : 2); }))
-    throw Error(ExitCode::corrupt, "the checkpoint mirrors an axis that its network has not");
+    throw Error(ExitCode::corrupt, "the model mirrors an axis that its network has not");
   std::sort(axes.begin(), axes.end());
   if (std::adjacent_find(axes.begin(), axes.end()) != axes.end())
-    throw Error(ExitCode::corrupt, "the checkpoint mirrors an axis twice");
+    throw Error(ExitCode::corrupt, "the model mirrors an axis twice");
   const auto passes = mirrored_passes(axes, model.unet.flat);
   const Sliding sliding(model, data, labels, size, params);
   report("windows", static_cast<std::int64_t>(sliding.windows()));
@@ -262,10 +285,8 @@ NetworkLogits logits_of_stage(const Image& ct, const fs::path& folder, NetworkMo
   for (std::size_t f = 0; f < folds.size(); ++f) {
     if (f > 0) {
       network.reset();
-      checkpoint = read_checkpoint(fold_folder(folder, folds[f]) / "checkpoint_final.pth");
-      network.emplace(model.unet, checkpoint);
+      network.emplace(model.unet, read_checkpoint(fold_folder(folder, folds[f]) / "checkpoint_final.pth"));
     }
-    checkpoint.weights.clear();  // the network has its own by now
     const auto share = [&](std::size_t n) { return 0.9 * static_cast<double>(n) / static_cast<double>(folds.size()); };
     auto sums = sliding.run(*network, passes, context.sub(share(f), share(f + 1)));
     if (f == 0) {
@@ -399,8 +420,10 @@ NetworkLabels segment_with_network(const Image& ct, const fs::path& model, const
                                    const Context& context) {
   require_valid(ct.frame);
   if (!fs::is_directory(model)) {
-    throw Error(ExitCode::no_input, model.string() + " is not a folder",
-                "give nnU-Net's folder of a trained configuration, with plans.json, dataset.json and fold_0");
+    throw Error(
+        ExitCode::no_input, model.string() + " is not a folder",
+        "give nnU-Net's folder of a trained configuration, with plans.json, dataset.json and fold_0, or one with "
+        "network.json and an ONNX file");
   }
   NetworkModel of;
   const NetworkLogits logits = network_logits(ct, model, of, params, context);

@@ -1,4 +1,4 @@
-// A label map from a CT by a trained network: an nnU-Net v2 result folder as it is, without Python.
+// A label map from a CT by a trained network: an nnU-Net v2 result folder as it is, or an ONNX file; without Python.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -22,17 +22,17 @@ struct NetworkLabels {
                        ///< the model's folder has no calibration of boundaries, or the network has regions
 };
 
-/// Runs the network of `model` (plans.json, dataset.json, fold_*/checkpoint_final.pth) over `ct`, which must be in HU
-/// and lie in memory as the training's images did: nothing is turned, except where the plans say so.
-/// Follows nnU-Net 2.x step by step, its 16-bit sums included: crop to what is not zero, normalise, resample, windows
-/// weighted by a Gaussian, mirrored passes, folds averaged, logits resampled, labels or regions. The second stage of a
-/// cascade runs its first stage before, whose folder lies beside it under nnU-Net's name for it.
-/// With a calibration.json in the folder, structures say how far they may be trusted. Reports windows, memory, voxels.
-/// Same bits for any number of threads and any width of vectors. Cost: one pass of the network a window, mirrored pass
-/// and fold; memory: weights, one window's features, 2 bytes a voxel and class of the resampled grid.
-/// Errors: no_input (no such folder or file), corrupt (damaged, or of a kind that is not supported, named), usage,
-/// resources (needs more than max_memory_gb), cancelled.
-/// F. Isensee et al., nnU-Net: a self-configuring method ..., Nat. Methods 18, 2021.
+/// Runs the network of `model` (plans.json, dataset.json, fold_*/checkpoint_final.pth; or network.json and an ONNX
+/// file, docs/how-to/segment-network.md) over `ct`, which must be in HU and lie in memory as the training's images did:
+/// nothing is turned, except where the plans say so. Follows nnU-Net 2.x step by step, its 16-bit sums included: crop
+/// to what is not zero, normalise, resample, windows weighted by a Gaussian, mirrored passes, folds averaged, logits
+/// resampled, labels or regions. The second stage of a cascade runs its first stage before, whose folder lies beside it
+/// under nnU-Net's name for it. With a calibration.json in the folder, structures say how far they may be trusted.
+/// Reports windows, memory, voxels. Same bits for any number of threads and any width of vectors. Cost: one pass of the
+/// network a window, mirrored pass and fold; memory: weights, one window's features, 2 bytes a voxel and class of the
+/// resampled grid. Errors: no_input (no such folder or file), corrupt (damaged, or of a kind that is not supported,
+/// named), usage, resources (needs more than max_memory_gb), cancelled. F. Isensee et al., nnU-Net: a self-configuring
+/// method ..., Nat. Methods 18, 2021.
 [[nodiscard]] NetworkLabels segment_with_network(const Image& ct, const std::filesystem::path& model,
                                                  const NetworkParams& params = {}, const Context& context = {});
 

@@ -34,10 +34,13 @@ struct UnetPlan {
   std::vector<UnetStage> stages;  ///< the finest first
 };
 
+struct NetworkSteps;
+
 class Network {
  public:
   /// Weights by their names in the checkpoint. Error(corrupt) for one that is missing or of another shape.
   Network(const UnetPlan& plan, const Checkpoint& checkpoint);
+  explicit Network(NetworkSteps steps);
   ~Network();
   Network(Network&&) noexcept;
   Network& operator=(Network&&) noexcept;
