@@ -247,11 +247,33 @@ with Screen("1024x700") as screen:
     w.x("key", "q")
     w.end()
 
+    # Of a network that does not know where its boundaries lie: the editor lists where to look, and goes there.
+    network = pathlib.Path(__file__).resolve().parents[2] / "testdata/neural/plain"
+    shutil.copytree(network, "network")
+    rows = [{"value": v, "least_mm3": 0, "most_mm3": 1e9, "least_dice": 0, "boundary_mm": [[0.1, 20]]} for v in (1, 2)]
+    pathlib.Path("network/calibration.json").write_text(
+        json.dumps({"osteotome_calibration": 1, "temperature": 1, "structures": rows})
+    )
+    osteo(
+        *("prepare", network / "image.nrrd", "-o", "netcase", "--structures", "network", "--lower", 500),
+        *("--spacing-mm", 0.9, "--quiet"),
+    )
+    w = Window(case="netcase")
+    x, y, width, height = w.state()["first_place"]
+    assert width > 20, w.state()
+    before = w.state()["cross_mm"]
+    w.x("mousemove", round(x + width / 2), round(y + height / 2), "click", 1)
+    s = w.until("at the place", lambda t: t["cross_mm"] != before)
+    classes, at = nrrd("netcase/uncertainty.seg.nrrd")
+    assert at(s["cross_mm"]) == 4 and set(classes) == {0, 4}, (s["cross_mm"], set(classes))
+    w.x("key", "q")
+    w.end()
+
 # Nothing of the scan lies about but in the reports, which say that they hold pictures of it.
 made = (
     {p.name for p in work.iterdir()}
     - files_before
-    - {"mask.nrrd", "corrected.nrrd", "copy", "other", "other.nrrd", "none.json", "handed", "returned", "again"}
+    - {"mask.nrrd", "corrected.nrrd", "copy", "other", "other.nrrd", "none.json", "handed", "returned", "again", "network", "netcase"}
 )
 assert all(n.startswith("state") or n.endswith(".prov.json") or ".report." in n for n in made), made
 print("window edit: all as it should be")

@@ -7,6 +7,8 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/image/structures.h"
+#include "osteo/imaging/io/volume_io.h"
+#include "osteo/imaging/neural/segment_network.h"
 #include "osteo/imaging/pipeline/formats.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/recipe.h"
@@ -118,7 +120,7 @@ EditedScan open_edited_scan(const fs::path& folder, const std::string& scan, con
   if (!recipe->structures_hash.empty()) {
     StructuresParams names;
     fs::path file;
-    if (const auto path = recall_file(recipe->structures_hash)) {
+    if (const auto path = recall_file(recipe->structures_hash); path && !is_network_folder(*path)) {
       file = *path;
       if (const auto it = recipe->settings.find("names"); it != recipe->settings.end()) names = {it->second, true};
     } else {
@@ -130,6 +132,10 @@ EditedScan open_edited_scan(const fs::path& folder, const std::string& scan, con
     }
     const DataKind wanted[] = {DataKind::labels};
     result.structures = name_structures(std::get<Labels>(load_data(file, wanted, context)), names, &result.ct, context);
+  }
+  if (const fs::path file = folder / "uncertainty.seg.nrrd"; result.structures && output_exists(file)) {
+    Labels uncertainty = load_labels(file);
+    if (uncertainty.frame == result.structures->frame) result.uncertainty = std::move(uncertainty);
   }
   if (!recipe->edits_hash.empty()) {
     const fs::path file = folder / "edits.json";

@@ -15,6 +15,7 @@ struct EditedScan {
   Image ct;
   Labels mask;
   std::optional<Labels> structures;
+  std::optional<Labels> uncertainty;  ///< of their boundaries, where a network found them that knows it
   std::optional<EditRecipe> edits;
   std::filesystem::path scan;  ///< where it was found
 };

@@ -16,6 +16,7 @@
 #include "osteo/app/window/edit_window.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/imaging/neural/segment_network.h"
 #include "window_main.h"
 
 extern char** environ;
@@ -91,6 +92,17 @@ class Saver {
   std::future<EditSaved> running_;
 };
 
+// Where a network could not say where a boundary lies, the largest first.
+std::vector<EditPlace> uncertain_in(const EditedScan& scan) {
+  std::vector<EditPlace> places;
+  if (!scan.uncertainty) return places;
+  for (const UncertainPlace& p : uncertain_places(*scan.structures, *scan.uncertainty, 12)) {
+    for (const Structure& s : scan.structures->structures)
+      if (s.value == p.structure) places.push_back({p.at_mm, p.structure, s.name, p.voxels});
+  }
+  return places;
+}
+
 struct EditWindowCommand {
   using Params = EditFlags;
   static void describe(Params& p, auto& visit) { EditFlags::describe(p, visit); }
@@ -108,6 +120,7 @@ struct EditWindowCommand {
     EditDocument document(scan->ct, scan->mask, scan->structures ? &*scan->structures : nullptr);
     const fs::path source = scan->scan;
     const std::optional<EditRecipe> edits = scan->edits;
+    const std::vector<EditPlace> places = uncertain_in(*scan);
     scan.reset();
     if (edits) apply_edits(document, *edits, io.context);
     io.end_progress();
@@ -122,6 +135,7 @@ struct EditWindowCommand {
     options.height = p.height;
     options.title = "Osteotome edit - " + folder.filename().string();
     options.state_file = p.state_file;
+    options.places = places;
     Saver saver(folder, source, io.common.threads);
     EditWindowActions actions;
     actions.save = [&](const std::string& text) { saver.begin(text); };

@@ -9,15 +9,10 @@
 #include "osteo/core/base/shell.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/imaging/io/volume_io.h"
+#include "osteo/imaging/neural/segment_network.h"
 
 namespace osteo {
 namespace {
-
-// nnU-Net's folder of a training, or one with an ONNX file.
-bool is_network(const fs::path& folder) {
-  const auto has = [&](const char* name) { return output_exists(folder / name); };
-  return fs::is_directory(folder) && ((has("plans.json") && has("dataset.json")) || has("network.json"));
-}
 
 std::string quoted(const std::string& text) {
   return text.empty() || text.find_first_of(" '\"$;()") != std::string::npos ? "'" + text + "'" : text;
@@ -94,7 +89,7 @@ void add_structures(Pipeline& pipeline, const fs::path& structures, const Recipe
       std::any_of(pipeline.nodes.begin(), pipeline.nodes.end(), [](const PipelineNode& n) { return n.id == "ct"; });
   PipelineNode node;
   node.id = node.stage = "structures";
-  if (is_network(structures)) {
+  if (is_network_folder(structures)) {
     if (!has_ct)
       throw Error(ExitCode::usage, "the pipeline has no step 'ct', in which a network could look for structures",
                   "run 'osteo segment-network', and give its label map as --structures");

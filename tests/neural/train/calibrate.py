@@ -2,7 +2,7 @@
 """Fits how far a network's probabilities may be believed, on phantoms that neither training nor scores have seen.
 
     phantoms.py CALIBRATION --seed 2 --train 0 --unseen 32 --osteo build/release/bin/osteo
-    calibrate.py MODEL_FOLDER CALIBRATION
+    calibrate.py MODEL_FOLDER CALIBRATION --logits build/release/bin/network_logits
 
 Half of the cases fit temperature, bars and how far boundaries are off, the other half checks them, as it is and ruined
 by blur and noise. Writes MODEL_FOLDER/calibration.json, which `osteo segment-network` reads, and what was measured into
@@ -13,14 +13,17 @@ import argparse
 import json
 import multiprocessing
 import pathlib
+import subprocess
+import tempfile
 
+import nrrd
 import numpy as np
 import torch
 from nnunetv2.preprocessing.preprocessors.default_preprocessor import DefaultPreprocessor
 from nnunetv2.utilities.plans_handling.plans_handler import PlansManager
 from scipy import ndimage
 
-from score import dice, labels_of, predictor_of
+from score import dice, labels_on_image, predictor_of
 from train import CONFIGURATION, case_names, read_case
 
 # As libs/imaging/neural/src/boundary.cpp has them.
@@ -52,18 +55,18 @@ def prepare(job):
         dataset,
     )
     properties.pop("class_locations", None)
-    return data, np.maximum(seg[0], 0).astype(np.int16), properties, labels, spacing
+    return data, np.maximum(seg[0], 0).astype(np.int16), properties, labels, spacing, image
 
 
 class Case:
     """Logits on the network's grid with the truth there, and Dice by structure on the image's."""
 
-    def __init__(self, predictor, prepared, classes):
-        data, seg, properties, truth, spacing = prepared
-        self.logits, labels = labels_of(predictor, torch.from_numpy(data), properties)
+    def __init__(self, logits, grid_spacing, prepared, classes):
+        _, seg, properties, truth, spacing, _ = prepared
+        self.logits, labels = logits, labels_on_image(logits, properties)
         self.truth = torch.from_numpy(seg.astype(np.int64)).to(self.logits.device)
         self.dice = [dice(labels == value, truth == value) for value in range(1, classes)]
-        grid = np.prod(predictor.configuration_manager.spacing)
+        grid = np.prod(grid_spacing)
         found = self.logits.argmax(0)
         self.found_mm3 = [float((found == value).sum()) * grid for value in range(1, classes)]
         self.true_mm3 = [float((truth == value).sum()) * np.prod(spacing) for value in range(1, classes)]
@@ -177,6 +180,21 @@ def boundary_report(rows, measured):
     return lines, held
 
 
+def logits_by(program, folder, prepared, scratch):
+    """Of Osteotome itself, which are nnunetv2's to a thousandth, in a third of the time."""
+    image, spacing = prepared[5], prepared[4]
+    name = scratch / f"{multiprocessing.current_process().pid}.nrrd"
+    z, y, x = (float(mm) for mm in spacing)
+    nrrd.write(str(name), np.ascontiguousarray(np.rint(image).astype(np.int16).T), {
+        "space": "left-posterior-superior", "space directions": [[x, 0, 0], [0, y, 0], [0, 0, z]],
+        "space origin": [0, 0, 0], "encoding": "raw",
+    })  # fmt: skip
+    out = name.with_suffix(".f16")
+    done = subprocess.run([program, name, folder, out], check=True, capture_output=True, text=True)
+    size = [int(n) for n in done.stdout.split()]
+    return torch.from_numpy(np.fromfile(out, np.float16).reshape(size).astype(np.float32))
+
+
 def fit_temperature(cases):
     """The temperature under which the truth is likeliest: the least cross entropy over sampled voxels."""
     generator = torch.Generator().manual_seed(1)
@@ -271,6 +289,7 @@ def main():
     parser.add_argument("model", type=pathlib.Path, help="folder of train.py")
     parser.add_argument("raw", type=pathlib.Path, help="folder of phantoms.py with another seed, --train 0")
     parser.add_argument("--threads", type=int, default=2, help="of the processor (default 2)")
+    parser.add_argument("--logits", type=pathlib.Path, help="program network_logits, in place of nnunetv2")
     parser.add_argument("--device", help="cpu or cuda (default cuda where there is one)")
     args = parser.parse_args()
     device = torch.device(args.device or ("cuda" if torch.cuda.is_available() else "cpu"))
@@ -279,13 +298,20 @@ def main():
     half = len(found) // 2
     jobs = [(args.raw, args.model, name, n, False) for n, name in enumerate(found)]
     jobs += [(args.raw, args.model, name, n, True) for n, name in enumerate(found) if n >= half]
-    with multiprocessing.get_context("fork").Pool(args.threads) as pool:
+    plans = PlansManager(json.loads((args.model / "plans.json").read_text()))
+    spacing = plans.get_configuration(CONFIGURATION).spacing
+    with multiprocessing.get_context("fork").Pool(args.threads) as pool, tempfile.TemporaryDirectory() as scratch:
         prepared = pool.imap(prepare, jobs, chunksize=1)
         predictor = None
         cases = []
         for one in prepared:
-            predictor = predictor or predictor_of(args.model, device)
-            cases.append(Case(predictor, one, len(dataset["labels"])))
+            if args.logits:
+                logits = logits_by(args.logits.resolve(), args.model, one, pathlib.Path(scratch))
+            else:
+                predictor = predictor or predictor_of(args.model, device)
+                data = torch.from_numpy(one[0])
+                logits = predictor.predict_logits_from_preprocessed_data(data).float().to(predictor.device)
+            cases.append(Case(logits, spacing, one, len(dataset["labels"])))
             print(len(cases), " ".join(f"{d:.2f}" for d in cases[-1].dice), flush=True)
     fitted, whole, ruined = cases[:half], cases[half : len(found)], cases[len(found) :]
     temperature = fit_temperature(fitted)

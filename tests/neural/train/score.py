@@ -38,11 +38,15 @@ def prepare(predictor, image, spacing):
 def labels_of(predictor, data, properties):
     """Logits on the network's grid, labels on the image's. torch interpolates the logits: nnU-Net's order 1, but for seconds less."""
     logits = predictor.predict_logits_from_preprocessed_data(data).float().to(predictor.device)
+    return logits, labels_on_image(logits, properties)
+
+
+def labels_on_image(logits, properties):
     size = [int(n) for n in properties["shape_after_cropping_and_before_resampling"]]
     cropped = F.interpolate(logits[None], size=size, mode="trilinear", align_corners=False)[0].argmax(0)
     labels = np.zeros(properties["shape_before_cropping"], np.uint8)
     labels[tuple(slice(*box) for box in properties["bbox_used_for_cropping"])] = cropped.cpu().numpy()
-    return logits, labels
+    return labels
 
 
 def dice(found, truth):

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <limits>
 
+#include "osteo/core/base/error.h"
 #include "osteo/imaging/neural/detail/half.h"
 #include "osteo/imaging/neural/detail/trust.h"
+#include "osteo/imaging/neural/segment_network.h"
 
 namespace osteo {
 namespace {
@@ -118,6 +120,41 @@ TEST(NetworkBoundary, NothingIsSaidWhereNothingIsKnown) {
   std::fill(p.logits.values.begin(), p.logits.values.end(), half_from_double(0));
   EXPECT_EQ(boundary_uncertainty(p.labels, p.logits, p.model, step_at(kWidestMm - 0.01), {})->structures[0].within_mm,
             1.2);
+}
+
+// Two stretches of one structure, of which one touches another structure's, a single voxel, and one of another class.
+TEST(NetworkBoundary, UncertainPlacesAreListedByTheirSize) {
+  Labels structures;
+  structures.frame.dims = {12, 6, 5};
+  structures.frame.spacing_mm = {0.5, 1, 2};
+  structures.frame.origin_mm = {10, 20, 30};
+  const std::size_t n = structures.frame.voxel_count();
+  const auto labels = make_voxels<std::uint8_t>(n), classes = make_voxels<std::uint8_t>(n);
+  std::fill_n(labels.get(), n, std::uint8_t{0});
+  std::fill_n(classes.get(), n, std::uint8_t{0});
+  const auto put = [&](int i, int j, int k, int structure, int of) {
+    labels[structures.offset(i, j, k)] = static_cast<std::uint8_t>(structure);
+    classes[structures.offset(i, j, k)] = static_cast<std::uint8_t>(of);
+  };
+  for (int i = 0; i < 5; ++i) put(i, i % 2, 1, 3, 4);  // by corners: one place
+  for (int i = 0; i < 7; ++i) put(i, 2, 1, 7, 4);      // beside it, another structure's
+  for (int i = 0; i < 4; ++i) put(11, i, 4, 3, 4);     // of the first again, far away
+  for (int i = 0; i < 6; ++i) put(11, i, 0, 3, 3);     // less uncertain
+  put(6, 5, 4, 3, 4);                                  // too small
+  structures.voxels = labels;
+  Labels uncertainty = no_uncertainty(structures.frame);
+  uncertainty.voxels = classes;
+  const auto places = uncertain_places(structures, uncertainty, 9);
+  ASSERT_EQ(places.size(), 3U);
+  EXPECT_EQ(places[0].structure, 7);
+  EXPECT_EQ(places[0].voxels, 7U);
+  EXPECT_LT(length(places[0].at_mm - Vec3{11.5, 22, 32}), 1e-9);
+  EXPECT_EQ(places[1].structure, 3);
+  EXPECT_EQ(places[1].voxels, 5U);
+  EXPECT_EQ(places[2].voxels, 4U);
+  EXPECT_EQ(uncertain_places(structures, uncertainty, 1).size(), 1U);
+  uncertainty.frame.spacing_mm.x = 0.6;
+  EXPECT_THROW(static_cast<void>(uncertain_places(structures, uncertainty, 9)), Error);
 }
 
 TEST(NetworkBoundary, SameForAnyNumberOfThreads) {

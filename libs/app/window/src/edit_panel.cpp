@@ -67,6 +67,7 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
                                                                                {"key", std::to_string(i + 2)}})
                     .c_str());
   }
+  places(control);
   structures(control, scale);
   ImGui::EndChild();
   ImGui::Separator();
@@ -186,6 +187,28 @@ void EditPanel::options(EditControl& control) {
                                    .c_str());
       return;
     }
+  }
+}
+
+// The network's own word on where it may be wrong; what was corrected since is still listed, to be looked at again.
+void EditPanel::places(EditControl& control) {
+  first_place_ = {};
+  if (places_.empty()) return;
+  heading(tr("Uncertain boundaries: look here first"));
+  for (std::size_t n = 0; n < places_.size(); ++n) {
+    const EditPlace& p = places_[n];
+    ImGui::PushID(static_cast<int>(n));
+    const std::string words =
+        filled(tr("{structure}, {n} voxels"), {{"structure", tr(p.name)}, {"n", std::to_string(p.voxels)}});
+    if (ImGui::Selectable(words.c_str(), length(control.cross_mm() - p.at_mm) < 1e-6)) {
+      control.go_to(p.at_mm);
+      if (control.document().structure(p.structure) != nullptr) control.structure = p.structure;
+    }
+    if (n == 0) {
+      const ImVec2 lo = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();
+      first_place_ = {lo.x, lo.y, size.x, size.y};
+    }
+    ImGui::PopID();
   }
 }
 

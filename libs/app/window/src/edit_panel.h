@@ -2,8 +2,11 @@
 #pragma once
 #include <array>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "edit_control.h"
+#include "osteo/app/window/edit_window.h"
 
 namespace osteo::inline app {
 
@@ -15,6 +18,10 @@ class EditPanel {
   };
   /// Between ImGui::NewFrame and Render. `scale`: of the text, against 96 dots an inch.
   Wishes draw(EditControl& control, float width, float height, float scale, bool saving);
+  /// Listed above the structures; a click goes there.
+  void set_places(std::vector<EditPlace> places) { places_ = std::move(places); }
+  /// Where the first of them was drawn, as threshold_slider().
+  [[nodiscard]] const std::array<float, 4>& first_place() const { return first_place_; }
   /// Where the slider of the lower threshold was drawn last, for tests: x, y, width, height; no width: it was not.
   [[nodiscard]] const std::array<float, 4>& threshold_slider() const { return slider_; }
 
@@ -22,11 +29,13 @@ class EditPanel {
   void tools(EditControl& control, float scale);
   void options(EditControl& control);
   void structures(EditControl& control, float scale);
+  void places(EditControl& control);
   std::array<char, 65> new_name_{}, name_{};
   int named_ = -1;  // whose name stands in name_
   std::array<float, 3> colour_{};
   int coloured_ = -1;
-  std::array<float, 4> slider_{};
+  std::array<float, 4> slider_{}, first_place_{};
+  std::vector<EditPlace> places_;
 };
 
 }  // namespace osteo::inline app

@@ -48,6 +48,7 @@ void write_edit_state(const EditWindowState& s, const EditControl& control, cons
                {"structures", std::move(structures)},
                {"triangles", s.triangles},
                {"threshold_slider", s.threshold_slider},
+               {"first_place", s.first_place},
                {"worst_ms", s.worst_ms}};
   const std::filesystem::path beside = file.string() + ".new";
   std::ofstream(beside) << j.dump() << '\n';

@@ -35,6 +35,7 @@ class EditWindow {
   EditWindow(EditDocument& document, const EditWindowOptions& options, const EditWindowActions& actions)
       : control_(document), actions_(actions), state_file_(options.state_file) {
     open(options);
+    panel_.set_places(options.places);
     scene_ = std::make_unique<EditScene>();
     glGenTextures(3, textures_.data());
     for (const unsigned t : textures_) {
@@ -210,7 +211,8 @@ class EditWindow {
                             asking_,
                             worst_ms_,
                             scene_->triangles(),
-                            panel_.threshold_slider()};
+                            panel_.threshold_slider(),
+                            panel_.first_place()};
       write_edit_state(state, control_, state_file_);
     }
   }

@@ -3,10 +3,12 @@
 #include <cmath>
 #include <limits>
 
+#include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/neural/detail/half.h"
 #include "osteo/imaging/neural/detail/trust.h"
+#include "osteo/imaging/neural/segment_network.h"
 #include "turned.h"
 
 namespace osteo::inline imaging {
@@ -208,6 +210,61 @@ std::optional<BoundaryUncertainty> boundary_uncertainty(const Labels& labels, co
   }
   result.classes.voxels = classes;
   return result;
+}
+
+std::vector<UncertainPlace> uncertain_places(const Labels& structures, const Labels& uncertainty, std::size_t most) {
+  if (structures.frame != uncertainty.frame)
+    throw Error(ExitCode::usage, "structures and their uncertainty are not of one grid");
+  constexpr auto kLast = static_cast<std::uint8_t>(kUncertaintyMm.size() + 1);
+  constexpr std::size_t kFewest = 4;
+  const Frame& f = structures.frame;
+  std::vector<bool> met(f.voxel_count(), false);
+  std::vector<std::array<int, 3>> open;
+  std::vector<UncertainPlace> places;
+  const auto visit = [&](int i, int j, int k, std::uint8_t structure) {
+    const std::size_t v = structures.offset(i, j, k);
+    if (met[v] || uncertainty.voxels[v] != kLast || structures.voxels[v] != structure) return;
+    met[v] = true;
+    open.push_back({i, j, k});
+  };
+  for (int k = 0; k < f.dims[2]; ++k) {
+    for (int j = 0; j < f.dims[1]; ++j) {
+      for (int i = 0; i < f.dims[0]; ++i) {
+        const std::uint8_t structure = structures.voxels[structures.offset(i, j, k)];
+        if (structure == 0) continue;
+        open.clear();
+        visit(i, j, k, structure);
+        std::array<double, 3> middle{};
+        for (std::size_t n = 0; n < open.size(); ++n) {
+          const std::array<int, 3> at = open[n];
+          for (std::size_t a = 0; a < 3; ++a) middle[a] += at[a];
+          for (int way = 0; way < 27; ++way) {
+            const std::array<int, 3> x{at[0] + way % 3 - 1, at[1] + way / 3 % 3 - 1, at[2] + way / 9 - 1};
+            if (x[0] >= 0 && x[1] >= 0 && x[2] >= 0 && x[0] < f.dims[0] && x[1] < f.dims[1] && x[2] < f.dims[2])
+              visit(x[0], x[1], x[2], structure);
+          }
+        }
+        if (open.size() < kFewest) continue;
+        UncertainPlace place{{}, structure, open.size()};
+        double least = std::numeric_limits<double>::infinity();
+        for (const std::array<int, 3>& at : open) {
+          double away = 0;
+          for (std::size_t a = 0; a < 3; ++a) {
+            const double d = at[a] - middle[a] / static_cast<double>(open.size());
+            away += d * d;
+          }
+          if (away >= least) continue;
+          least = away;
+          place.at_mm =
+              f.world_from_index({static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])});
+        }
+        places.push_back(place);
+      }
+    }
+  }
+  std::stable_sort(places.begin(), places.end(), [](const auto& a, const auto& b) { return a.voxels > b.voxels; });
+  places.resize(std::min(places.size(), most));
+  return places;
 }
 
 }  // namespace osteo::inline imaging

@@ -147,6 +147,12 @@ std::string gb_text(double bytes) {
 
 }  // namespace
 
+bool is_network_folder(const fs::path& folder) {
+  std::error_code ignored;
+  const auto has = [&](const char* name) { return fs::is_regular_file(folder / name, ignored); };
+  return (has("plans.json") && has("dataset.json")) || has(kOnnxModel);
+}
+
 std::vector<int> network_folds(const fs::path& model) {
   if (fs::exists(model / kOnnxModel)) return {0};
   std::vector<int> folds;

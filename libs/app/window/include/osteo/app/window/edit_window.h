@@ -5,14 +5,24 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "osteo/imaging/edit/document.h"
 
 namespace osteo::inline app {
 
+/// A place that should be looked at first: where the boundary of a structure is uncertain.
+struct EditPlace {
+  Vec3 at_mm;
+  int structure = 0;  ///< its value
+  std::string name;
+  std::size_t voxels = 0;  ///< of the boundary that are uncertain there
+};
+
 struct EditWindowOptions {
   int width = 1360, height = 860;  ///< made smaller where the screen is
   std::string title;
+  std::vector<EditPlace> places;  ///< listed in this order
   std::filesystem::path
       state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };

@@ -1,10 +1,13 @@
 // A label map from a CT by a trained network: an nnU-Net v2 result folder as it is, or an ONNX file; without Python.
 #pragma once
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "osteo/core/base/context.h"
+#include "osteo/core/data/vec.h"
 #include "osteo/core/data/volume.h"
 
 namespace osteo::inline imaging {
@@ -21,6 +24,19 @@ struct NetworkLabels {
   Labels uncertainty;  ///< at their boundaries: within how many mm they lie, in classes that are named; empty where
                        ///< the model's folder has no calibration of boundaries, or the network has regions
 };
+
+/// Whether the folder holds a model that segment_with_network() takes, by the names of its files.
+[[nodiscard]] bool is_network_folder(const std::filesystem::path& folder);
+
+/// A stretch of a structure's boundary that is in the last class of uncertainty.
+struct UncertainPlace {
+  Vec3 at_mm;  ///< a voxel of it, the nearest to its middle
+  std::uint8_t structure = 0;
+  std::size_t voxels = 0;  ///< that touch each other, also by a corner
+};
+/// The largest first, at most `most`, each of at least 4 voxels. Both maps in one frame: Error(usage) otherwise.
+[[nodiscard]] std::vector<UncertainPlace> uncertain_places(const Labels& structures, const Labels& uncertainty,
+                                                           std::size_t most);
 
 /// Runs the network of `model` (plans.json, dataset.json, fold_*/checkpoint_final.pth; or network.json and an ONNX
 /// file, docs/how-to/segment-network.md) over `ct`, which must be in HU and lie in memory as the training's images did:
