@@ -49,6 +49,32 @@ def resolved(elf):
     return found
 
 
+# A table of contents without entries, as ICU reads it (udata.h of ICU: a header of 32 bytes, then how many there are).
+NO_ICU_DATA = """
+#include <stdint.h>
+const struct {
+  uint16_t header; uint8_t magic[2]; uint16_t size, reserved; uint8_t big, charset, wide, reserved_byte;
+  uint8_t format[4], format_version[4], data_version[4]; char text[8]; uint32_t entries, end;
+} icudt%s_dat = {32, {0xda, 0x27}, 20, 0, 0, 0, 2, 0, {'T', 'o', 'C', 'P'}, {1, 0, 0, 0}, {0, 0, 0, 0}, "", 0, 0};
+"""
+
+
+def icu_without_data(name, paths, copy):
+    """ICU's names and rules of all languages are a seventh of the wheel. libxml2 alone loads ICU, and asks it for encodings
+    of XML files that iconv has not: nothing here reads such. Where something else loads it too, they come along."""
+    takers = {taker for taker, path in paths.items() for n in needed(path) if re.match(r"libicu(uc|data|i18n)\b", n)}
+    if not (m := re.match(r"libicudata\.so\.(\d+)", name)) or {t.split(".")[0] for t in takers} - {
+        "libicuuc",
+        "libxml2",
+    }:
+        return False
+    source = copy.with_suffix(".c")
+    source.write_text(NO_ICU_DATA % m[1])
+    run("cc", "-shared", "-fPIC", "-nostdlib", f"-Wl,-soname,{name}", "-o", copy, source)
+    source.unlink()
+    return True
+
+
 def lowest_glibc(elves):
     highest = (0, 0)
     for elf in elves:
@@ -71,7 +97,8 @@ def bundle(tree, elves):
         digest = hashlib.sha256(path.read_bytes()).hexdigest()[:8]
         stem, _, rest = name.partition(".so")
         names[name] = f"{stem}-{digest}.so{rest}"
-        shutil.copy(path.resolve(), libs / names[name])
+        if not icu_without_data(name, paths, libs / names[name]):
+            shutil.copy(path.resolve(), libs / names[name])
         (libs / names[name]).chmod(0o755)
     for elf in [*elves, *sorted(libs.iterdir())]:
         changes = []

@@ -54,10 +54,10 @@ TEST(Structures, CarryWhatIsKnownOfTheirBoundaries) {
   canal.structure.within_mm = std::numeric_limits<double>::infinity();
   EXPECT_EQ(near(nerve, canal, hand), "meatus 1.3 ± ? mm; antrum 2 mm");
   EXPECT_EQ(last(canal).text, "boundary uncertain");
-  EXPECT_EQ(last(canal).tone, sheet::Tone::caution);
+  EXPECT_EQ(last(canal).tone, Tone::caution);
   canal.structure.doubt = "60 mm3, less than 83";
   EXPECT_EQ(last(canal).text, "not to be trusted: 60 mm3, less than 83");
-  EXPECT_EQ(last(canal).tone, sheet::Tone::caution);
+  EXPECT_EQ(last(canal).tone, Tone::caution);
 }
 
 TEST(Structures, VolumePiecesAndGapsOfBalls) {
