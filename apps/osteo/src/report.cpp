@@ -12,6 +12,7 @@
 #include "osteo/core/base/shell.h"
 #include "osteo/hospital/pacs/roles.h"
 #include "osteo/imaging/dicom/objects.h"
+#include "osteo/imaging/io/volume_io.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/session/scene/approval.h"
 #include "osteo/session/scene/case.h"
@@ -102,6 +103,19 @@ cli::CommandInfo ApproveCommand::info() {
           "osteo approve CASE --by 'A. Miller' --note 'mastoid only'"};
 }
 
+namespace {
+
+// Who approves a case takes the word of what drew its structures, unless a hand has changed them since.
+void warn_of_doubts(const fs::path& folder, const Context& context) {
+  const fs::path file = folder / "structures.seg.nrrd";
+  if (!output_exists(file)) return;
+  for (const Structure& s : load_labels(file).structures)
+    if (!s.doubt.empty())
+      context.warn(s.name + " is approved as it was found, though it is not to be trusted here: " + s.doubt);
+}
+
+}  // namespace
+
 int ApproveCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0];
   if (p.withdraw && (!p.by.empty() || !p.note.empty()))
@@ -126,6 +140,7 @@ int ApproveCommand::run(const Params& p, cli::Invocation& io) {
                   "the report of '" + folder.string() + "' was of another version of the program, and is made again",
                   "look at it, then approve");
     }
+    warn_of_doubts(folder, io.context);
     approve(folder, p.by, p.note);
   }
   audit_case(trail, p.withdraw ? AuditEvent::Kind::withdraw : AuditEvent::Kind::approve, folder, io.context);
