@@ -10,6 +10,7 @@
 #include <gdcmImageWriter.h>
 
 #include <functional>
+#include <limits>
 #include <set>
 
 #include "edit.h"
@@ -119,8 +120,13 @@ TEST(Objects, SegmentationsKeepNamesNumbersAndOrigins) {
   const auto v = make_voxels<std::uint8_t>(f.voxel_count());
   const std::array<std::uint8_t, 6> values{0, 3, 7, 90, 200, 255};
   for (std::size_t i = 0; i < f.voxel_count(); ++i) v[i] = values[i % 6];
-  const std::vector<Structure> given{{3, "Nervus facialis, gr\u00f6\u00dfter Teil", {}, "tube, version 2"},
-                                     {7, "air cells", {}, "find-structures, version 2, corrected by hand"},
+  const std::vector<Structure> given{{3, "Nervus facialis, gr\u00f6\u00dfter Teil", {}, "tube, version 2", 0.6},
+                                     {7,
+                                      "air cells",
+                                      {},
+                                      "find-structures, version 2, corrected by hand",
+                                      std::numeric_limits<double>::infinity(),
+                                      "60 mm3, less than 83"},
                                      {90, "drawn", {}, "by hand"},
                                      {200, "of somebody", {}, ""}};
   for (const auto form : {SegmentationForm::binary, SegmentationForm::labelmap, SegmentationForm::labelmap16}) {
@@ -133,6 +139,8 @@ TEST(Objects, SegmentationsKeepNamesNumbersAndOrigins) {
       EXPECT_EQ(back.structures[s].value, form == SegmentationForm::binary ? s + 1 : values[s + 1]);
       EXPECT_EQ(back.structures[s].name, s < 4 ? given[s].name : "Structure 255");
       EXPECT_EQ(back.structures[s].origin, s < 4 ? given[s].origin : "");
+      EXPECT_EQ(back.structures[s].within_mm, s < 4 ? given[s].within_mm : 0);
+      EXPECT_EQ(back.structures[s].doubt, s < 4 ? given[s].doubt : "");
     }
     for (std::size_t i = 0; i < f.voxel_count(); ++i)
       ASSERT_EQ(back.voxels[i], form == SegmentationForm::binary ? i % 6 : values[i % 6]) << i;

@@ -24,8 +24,8 @@ namespace osteo::inline imaging::dicom {
 namespace {
 
 const vtkDICOMTag kSegments(0x0062, 0x0002), kNumber(0x0062, 0x0004), kLabel(0x0062, 0x0005),
-    kAlgorithmType(0x0062, 0x0008), kAlgorithmName(0x0062, 0x0009), kAlgorithm(0x0062, 0x0007),
-    kAlgorithmVersion(0x0066, 0x0031);
+    kDescription(0x0062, 0x0006), kAlgorithmType(0x0062, 0x0008), kAlgorithmName(0x0062, 0x0009),
+    kAlgorithm(0x0062, 0x0007), kAlgorithmVersion(0x0066, 0x0031);
 
 struct Head {
   std::map<int, Structure> segments;  // by number, background left out; values are given later
@@ -57,6 +57,7 @@ Head read_head(const fs::path& file, int background) {
                                name.empty() ? "Segment " + std::to_string(number) : name,
                                {},
                                origin_from(text(item.Get(kAlgorithmType)), text(item.Get(kAlgorithmName)), version)};
+    if (number != background) read_certainty(text(item.Get(kDescription)), head.segments[number]);
   }
   const auto number_of = [&](vtkDICOMTag tag) {
     const vtkDICOMValue& v = meta->Get(0, 0, tag);

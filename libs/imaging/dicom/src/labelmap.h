@@ -20,4 +20,7 @@ inline constexpr std::string_view kLabelMapStorage = "1.2.840.10008.5.1.4.1.1.66
 /// none.
 [[nodiscard]] std::string origin_from(const std::string& type, const std::string& name, const std::string& version);
 
+/// Structure::within_mm and doubt from its SegmentDescription; as they are where it says nothing of them.
+void read_certainty(const std::string& description, Structure& structure);
+
 }  // namespace osteo::inline imaging::dicom

@@ -192,7 +192,7 @@ class SegmentationWriter {
     require(d.putAndInsertString(DCM_SegmentsOverlap, "NO"), path_);
     put_more_segments(d);
     std::string names = o_.description;
-    for (const Structure& s : structures_) names += s.name + s.origin;
+    for (const Structure& s : structures_) names += s.name + s.origin + s.doubt;
     dicom::speak_utf8(d, names);
     for (const DcmTagKey& tag : {DCM_SeriesDescription, DCM_ContentDescription})
       dicom::put(d, tag, dicom::lo_text(o_.description), path_);
@@ -200,6 +200,7 @@ class SegmentationWriter {
       DcmItem& segment = *item(d, DCM_SegmentSequence, s);
       dicom::put(segment, DCM_SegmentLabel, dicom::segment_label(structures_[s].name), path_);
       dicom::put_algorithm(segment, structures_[s].origin, path_);
+      dicom::put_certainty(segment, structures_[s], path_);
     }
     map_ ? put_map(d) : put_bits(d);
     write_atomically(path_, [&](const fs::path& temporary) {

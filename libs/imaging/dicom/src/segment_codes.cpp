@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
 
 #include "dcmtk_tools.h"
 #include "labelmap.h"
@@ -78,6 +81,33 @@ const Drawer* drawer_called(std::string_view stage) {
 }
 
 }  // namespace
+
+namespace {
+constexpr std::string_view kWithin = "Boundary within ", kOfPlaces = " mm in 95 % of places.",
+                           kUnknown = "Boundary uncertain by more than can be said.",
+                           kNotTrusted = "Not to be trusted: ";
+}  // namespace
+
+void put_certainty(DcmItem& segment, const Structure& structure, const std::filesystem::path& path) {
+  std::string text;
+  if (structure.within_mm > 0)
+    text = std::isfinite(structure.within_mm)
+               ? std::string(kWithin) + format_number(structure.within_mm) + std::string(kOfPlaces)
+               : std::string(kUnknown);
+  if (!structure.doubt.empty()) text += (text.empty() ? "" : " ") + std::string(kNotTrusted) + structure.doubt;
+  if (!text.empty()) dicom::put(segment, DCM_SegmentDescription, text.substr(0, 1024), path);
+}
+
+void read_certainty(const std::string& text, Structure& structure) {
+  if (text.starts_with(kUnknown)) structure.within_mm = std::numeric_limits<double>::infinity();
+  if (text.starts_with(kWithin) && text.find(kOfPlaces) != std::string::npos) {
+    double mm = 0;
+    std::from_chars(text.data() + kWithin.size(), text.data() + text.size(), mm);
+    structure.within_mm = mm > 0 && std::isfinite(mm) ? mm : 0;
+  }
+  if (const std::size_t at = text.find(kNotTrusted); at != std::string::npos && (at == 0 || structure.within_mm > 0))
+    structure.doubt = text.substr(at + kNotTrusted.size());
+}
 
 DrawnBy drawn_by(const std::string& origin) {
   DrawnBy d;

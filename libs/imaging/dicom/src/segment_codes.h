@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "osteo/core/data/volume.h"
+
 namespace osteo::inline imaging::dicom {
 
 struct SegmentCode {
@@ -21,6 +23,10 @@ void put_code(DcmItem& in, const DcmTagKey& sequence, SegmentCode code, const ch
 /// SegmentAlgorithmType, its name, and SegmentationAlgorithmIdentificationSequence where the origin tells what and
 /// which version (Structure::origin).
 void put_algorithm(DcmItem& segment, const std::string& origin, const std::filesystem::path& path);
+
+/// What is known of its boundary (Structure::within_mm, doubt) as SegmentDescription, in English; nothing where nothing
+/// is known. labelmap.h reads it back.
+void put_certainty(DcmItem& segment, const Structure& structure, const std::filesystem::path& path);
 
 /// Structure::origin read.
 struct DrawnBy {

@@ -179,6 +179,11 @@ class SegmentationReader {
                                     name.empty() ? "Segment " + std::to_string(s) : std::string(name.c_str()),
                                     {},
                                     origin_of(s - 1)});
+      DcmItem* item = nullptr;
+      OFString description;
+      if (file_.getDataset()->findAndGetSequenceItem(DCM_SegmentSequence, item, static_cast<long>(s - 1)).good() &&
+          item->findAndGetOFStringArray(DCM_SegmentDescription, description).good())
+        dicom::read_certainty(description.c_str(), labels_.structures.back());
     }
   }
 
