@@ -111,7 +111,7 @@ void warn_of_doubts(const fs::path& folder, const Context& context) {
   if (!output_exists(file)) return;
   for (const Structure& s : load_labels(file).structures)
     if (!s.doubt.empty())
-      context.warn(s.name + " is approved as it was found, though it is not to be trusted here: " + s.doubt);
+      context.warn(s.name + " is approved as found, though it is not to be trusted here: " + s.doubt);
 }
 
 }  // namespace

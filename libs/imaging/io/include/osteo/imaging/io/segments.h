@@ -19,7 +19,7 @@ inline constexpr std::string_view kStructureTag = "Osteotome.Structure";
 /// Tag of a segment that tells what drew it (Structure::origin), where that is known.
 inline constexpr std::string_view kOriginTag = "Osteotome.Origin";
 /// Tags of Structure::within_mm ("0.6", "inf") and Structure::doubt, where they are known.
-inline constexpr std::string_view kWithinTag = "Osteotome.BoundaryWithinMm", kDoubtTag = "Osteotome.Doubt";
+inline constexpr std::string_view kWithinTag = "Osteotome.BoundaryWithinMm", kDoubtTag = "Osteotome.NotTrusted";
 
 /// What the tags say of a segment's certainty; what is no distance there counts as not known.
 void read_certainty(const std::map<std::string, std::string>& tags, Structure& structure);
