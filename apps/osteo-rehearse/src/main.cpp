@@ -26,6 +26,7 @@ struct OpenCase {
   Case files;
   std::optional<SparseGrid> hu;
   std::optional<Image> ct;       // the whole scan, where it was given
+  std::optional<Labels> uncertainty;
   std::vector<SparseGrid> bone;  // density, the finest first
   ApprovalNow approval;
   VerdictSummary scan;
@@ -41,6 +42,8 @@ std::unique_ptr<OpenCase> open_case(const fs::path& folder, const WindowFlags& f
   if (const auto it = open->files.files.find("hu"); it != open->files.files.end()) open->hu = load_grid(it->second);
   if (const auto it = open->files.files.find("verdict"); it != open->files.files.end())
     open->scan = read_verdict(read_text(it->second));
+  if (const auto it = open->files.files.find("uncertainty"); it != open->files.files.end())
+    open->uncertainty = load_labels(it->second);
   open->hash = hash_path(open->files.folder / "manifest.json");
   if (const auto it = open->files.files.find("region"); it != open->files.files.end())
     open->bone.push_back(load_grid(it->second));
@@ -174,6 +177,7 @@ struct WindowCommand {
       for (const ProcedureStructure& s : procedure->structures)
         if (s.role == ProcedureRole::thin) window.thinned.push_back(s.name);
     }
+    window.uncertainty = open.uncertainty;
     window.planned_cuts = planned_cuts_of(open.files.folder);
     window.planned_cuts_file = open.files.folder / kPlannedCutsFile;
     window.stereo.mode = p.stereo;

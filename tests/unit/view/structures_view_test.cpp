@@ -186,5 +186,55 @@ TEST(StructuresView, ClearLetsEveryOtherPixelThroughAndHiddenAll) {
   EXPECT_EQ(view.all()[0].value, 1);
 }
 
+// The left half of a ball is uncertain: it has bars of a paler colour, the right half has none.
+TEST(StructuresView, WhatIsUncertainIsHatched) {
+  Labels labels = labelled(8, {0.4, 0.4, 0.4}, [](Vec3 p) { return length(p) - 6; });
+  labels.structures = {{1, "ball", {200, 0, 0}, "segment-network, version 3", 0.6}};
+  const StructureMap map(labels, 2);
+  labels.structures[0].within_mm = 0;  // as after a correction
+  const StructureMap corrected(labels, 2);
+  Labels values = labels;
+  const auto v = make_voxels<std::uint8_t>(labels.frame.voxel_count());
+  for (int k = 0; k < labels.frame.dims[2]; ++k)
+    for (int j = 0; j < labels.frame.dims[1]; ++j)
+      for (int i = 0; i < labels.frame.dims[0]; ++i) {
+        const bool left = labels.frame.world_from_index({double(i), double(j), double(k)}).x < -1;
+        v[labels.offset(i, j, k)] = static_cast<std::uint8_t>(labels.at(i, j, k) == 0 ? 0 : left ? 4 : 3);
+      }
+  values.voxels = v;
+  OffscreenWindow window(200, 200);
+  vtkNew<vtkRenderer> renderer;
+  window.window()->AddRenderer(renderer);
+  set_up_scene(renderer);
+  StructuresView view(renderer, map);
+  look_at(renderer, {0, 0, 0}, 8, {0, -1, 0});
+  const auto pale = [&](int x0, int x1) {
+    const Picture p = window.render();
+    int counted = 0;
+    for (int y = 90; y < 110; ++y)
+      for (int x = x0; x < x1; ++x) counted += p.rgb[3 * static_cast<std::size_t>(y * p.width + x) + 1] > 60 ? 1 : 0;
+    return counted / (20.0 * (x1 - x0));
+  };
+  EXPECT_EQ(pale(60, 90), 0);
+  view.hatch(values, 5);
+  EXPECT_EQ(pale(60, 90) + pale(110, 140), 0) << "nothing is in that class";
+  view.hatch(values, 4);
+  const double left = pale(60, 90), right = pale(110, 140);
+  EXPECT_NEAR(std::max(left, right), 0.5, 0.2);
+  EXPECT_EQ(std::min(left, right), 0);
+  // What a hand has corrected is not.
+  view.show(0, StructureLook::hidden);
+  {
+    StructuresView other(renderer, corrected);
+    other.hatch(values, 4);
+    EXPECT_EQ(pale(60, 90) + pale(110, 140), 0);
+  }
+  view.show(0, StructureLook::solid);
+  view.show(0, StructureLook::hidden);
+  EXPECT_EQ(pale(60, 140), 0);
+  view.show(0, StructureLook::solid);
+  EXPECT_NEAR(std::max(pale(60, 90), pale(110, 140)), 0.5, 0.2);
+}
+
 }  // namespace
 }  // namespace osteo

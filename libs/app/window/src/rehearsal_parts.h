@@ -158,6 +158,7 @@ class RehearsalWindow {
   const bool approval_ended_;
   const std::vector<PlannedRegion> planned_;
   const std::vector<std::string> thinned_;
+  const std::optional<Labels> uncertainty_;
   std::filesystem::path state_file_;
   Keyboard keyboard_;
   MouseTrail trail_;

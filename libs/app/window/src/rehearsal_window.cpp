@@ -25,6 +25,7 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
       approval_ended_(options.approval_ended),
       planned_(options.regions),
       thinned_(options.thinned),
+      uncertainty_(options.uncertainty),
       state_file_(options.state_file),
       controller_(person, keyboard_),
       hints_(person),
@@ -130,8 +131,11 @@ void RehearsalWindow::show_bone(Rehearsal& rehearsal) {
   world_view_ = std::make_unique<WorldView>(renderer_, rehearsal.structures());
   rehearsal.look([&](const World& world, SceneReaders& readers) { world_view_->update(world, readers); });
   tools_ = std::make_unique<SceneTools>(renderer_);
-  if (!structures_ && rehearsal.structures() != nullptr)  // the same in all sessions
+  if (!structures_ && rehearsal.structures() != nullptr) {  // the same in all sessions
     structures_ = std::make_unique<StructuresView>(renderer_, *rehearsal.structures());
+    if (uncertainty_ && !uncertainty_->structures.empty())
+      structures_->hatch(*uncertainty_, uncertainty_->structures.back().value);
+  }
   plan_and_looks(rehearsal);
   cuts_.begin(rehearsal, structures_.get(), regions_.get());
   before_view_.reset();

@@ -2,11 +2,14 @@
 
 #include <vtkActor.h>
 #include <vtkNew.h>
+#include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
+#include <vtkPolyDataMapper.h>
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
 #include <vtkShaderProperty.h>
+#include <vtkUnsignedCharArray.h>
 #include <vtkWindowedSincPolyDataFilter.h>
 
 #include <algorithm>
@@ -136,6 +139,8 @@ StructuresView::StructuresView(vtkRenderer* renderer, const StructureMap& map)
     const auto c = map.colour_of(one.value);
     one.actor->GetProperty()->SetColor(c[0], c[1], c[2]);
     renderer_->AddActor(one.actor);
+    for (const Structure& structure : map.structures())
+      if (structure.value == one.value) one.proposed = structure.within_mm > 0;
   }
 }
 
@@ -155,6 +160,52 @@ void StructuresView::show(std::size_t number, StructureLook look) {
   const std::string discard = "//VTK::Light::Impl\n  { int x = int(gl_FragCoord.x), y = int(gl_FragCoord.y); if (((" +
                               std::string(kPatterns[number % 4]) + ") & 1) != 0) discard; }\n";
   one.actor->GetShaderProperty()->AddFragmentShaderReplacement("//VTK::Light::Impl", true, discard, false);
+}
+
+void StructuresView::hatch(const Labels& values, std::uint8_t from) {
+  constexpr double kPeriodMm = 1.6, kPale = 0.65;
+  const Frame& f = values.frame;
+  // A face lies between voxels, and the drawn one a little beside it: any of those around counts.
+  const auto marked = [&](Vec3 world_mm) {
+    const Vec3 x = f.index_from_world(world_mm);
+    for (int way = 0; way < 27; ++way) {
+      std::array<int, 3> at{};
+      bool inside = true;
+      for (std::size_t a = 0; a < 3; ++a) {
+        at[a] = static_cast<int>(std::lround(x[a])) + (a == 0 ? way % 3 : a == 1 ? way / 3 % 3 : way / 9) - 1;
+        inside = inside && at[a] >= 0 && at[a] < f.dims[a];
+      }
+      if (inside && values.at(at[0], at[1], at[2]) >= from) return true;
+    }
+    return false;
+  };
+  parallel_for(all_.size(), 1, 0, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      const One& one = all_[s];
+      if (!one.proposed) continue;
+      double rgb[3];
+      one.actor->GetProperty()->GetColor(rgb);
+      vtkNew<vtkUnsignedCharArray> colours;
+      colours->SetNumberOfComponents(3);
+      colours->SetName("hatched");
+      bool any = false;
+      for (const auto& p : one.surface->points_mm) {
+        const Vec3 at = from_floats(p);
+        const double bars =
+            std::fmod(std::fmod((at.x + at.y + at.z) / std::sqrt(3.0), kPeriodMm) + kPeriodMm, kPeriodMm);
+        const bool pale = bars < kPeriodMm / 2 && marked(at);
+        any = any || pale;
+        for (const double c : rgb)
+          colours->InsertNextValue(static_cast<unsigned char>(std::lround(255 * (pale ? c + (1 - c) * kPale : c))));
+      }
+      if (!any) continue;
+      auto* const mapper = vtkPolyDataMapper::SafeDownCast(one.actor->GetMapper());
+      mapper->GetInput()->GetPointData()->SetScalars(colours);
+      mapper->SetScalarModeToUsePointData();
+      mapper->SetColorModeToDirectScalars();
+      mapper->ScalarVisibilityOn();
+    }
+  });
 }
 
 }  // namespace osteo::inline display

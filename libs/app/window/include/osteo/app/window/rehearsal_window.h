@@ -43,6 +43,8 @@ struct WindowOptions {
   std::vector<PlannedRegion>
       regions;  ///< of a procedure, to be outlined; those of structures that the case lacks are told
   std::vector<std::string> thinned;  ///< structures whose wall a procedure thins: clear at first, for they are spaces
+  std::optional<Labels>
+      uncertainty;  ///< of boundaries, as segment-network gives it; what is in its last class is hatched
   std::vector<PlannedCut> planned_cuts;     ///< to choose from
   std::filesystem::path planned_cuts_file;  ///< that a cut kept as planned is added to
   std::vector<Vec3> way;                    ///< of a recorded hand that leads; drawn; empty: none does

@@ -43,12 +43,17 @@ class StructuresView {
     std::shared_ptr<const TriMesh> surface;
     StructureLook look = StructureLook::solid;
     vtkSmartPointer<vtkActor> actor;
+    bool proposed = false;  ///< a network drew it that knows how far off it may be, and no hand has changed it
   };
   /// In the order of the map's values().
   [[nodiscard]] const std::vector<One>& all() const { return all_; }
   /// A clear one is screen-door: every other pixel of it is left out, in one of four patterns by its number, so nothing
   /// has to be sorted, peeled or drawn twice. `number` in all().
   void show(std::size_t number, StructureLook look);
+  /// Of structures that are still as proposed, hatches what lies at voxels of that value or a larger one, as where a
+  /// network is not sure of a boundary: bars of 0.8 mm in a paler colour, which are of the surface and turn with it.
+  /// Values may lie in another grid than the map's.
+  void hatch(const Labels& values, std::uint8_t from);
 
  private:
   vtkRenderer* renderer_;
