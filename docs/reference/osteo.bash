@@ -89,7 +89,7 @@ _osteo() {
     structures) flags="$flags --xml --describe --names --only-named --image" ;;
     tube) flags="$flags --xml --describe --points-mm --name --kind --max-radius-mm --lumen-hu --snap-mm --max-uncertain-mm --points --labels --line-out" ;;
     find-structures) flags="$flags --xml --describe --side --what --labyrinth-mm --min-quality --findings-out" ;;
-    segment-network) flags="$flags --xml --describe --folds --mirror --step --max-memory-gb" ;;
+    segment-network) flags="$flags --xml --describe --folds --mirror --step --max-memory-gb --uncertainty-out" ;;
     register) flags="$flags --xml --describe --method --finest-mm --bone-hu --max-residual-mm --accept-poor --labels --findings-out --moved-out --labels-out --checkerboard-out" ;;
     plan-reconstruction) flags="$flags --xml --describe --target --a-mm --a-normal --b-mm --b-normal --down --max-segments --min-length-mm --max-contour-mm --kerf-mm --reserve-mm --findings-out" ;;
     cutting-guide) flags="$flags --xml --describe --bone --planes --approach --slot --gap-mm --play-mm --wall-mm --margin-mm --depth-mm --code --findings-out --cuts-out" ;;
