@@ -446,6 +446,8 @@ NetworkLabels segment_with_network(const Image& ct, const fs::path& model, const
   if (!missing.empty()) context.report("not_found", missing);
   if (const fs::path path = model / "calibration.json"; fs::exists(path))
     judge(found, logits, of, read_network_calibration(read_text(path), of), context);
+  else
+    context.report("boundary_within_mm", "not calibrated");
   context.progress(1);
   return found;
 }
