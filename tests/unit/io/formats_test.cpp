@@ -204,19 +204,6 @@ TEST(Labels, CtIsNotTakenForLabels) {
   EXPECT_THROW(static_cast<void>(load_labels(path)), Error);
 }
 
-TEST(Surface, FormatsKeepPointsAndTriangles) {
-  TriMesh mesh;
-  mesh.points_mm = {{-1.5F, 2, 3}, {4, 5.25F, 6}, {7, 8, 9.125F}, {0, 0, 1}};
-  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
-  for (const char* suffix : {".ply", ".stl", ".obj", ".vtp"}) {
-    const auto path = folder() / (std::string("mesh") + suffix);
-    save_surface(mesh, path);
-    const auto back = load_surface(path);
-    EXPECT_EQ(back->triangles.size(), 2u) << suffix;
-    EXPECT_NEAR(area_mm2(*back), area_mm2(mesh), 1e-4) << suffix;
-  }
-}
-
 // A .ply of our own is read without VTK: as VTK reads it, which a second comment makes it do.
 TEST(Surface, OwnPlyIsReadAsByVtk) {
   TriMesh mesh;
@@ -265,6 +252,19 @@ TEST(Nifti, IsHeaderAndVoxels) {
   EXPECT_EQ(std::memcmp(back.voxels.get(), image.voxels.get(), bytes), 0);
   EXPECT_EQ(std::memcmp(again.voxels.get(), image.voxels.get(), bytes), 0);
   EXPECT_LT(packed.size(), plain.size());
+}
+
+TEST(Surface, FormatsKeepPointsAndTriangles) {
+  TriMesh mesh;
+  mesh.points_mm = {{-1.5F, 2, 3}, {4, 5.25F, 6}, {7, 8, 9.125F}, {0, 0, 1}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  for (const char* suffix : {".ply", ".stl", ".obj", ".vtp"}) {
+    const auto path = folder() / (std::string("mesh") + suffix);
+    save_surface(mesh, path);
+    const auto back = load_surface(path);
+    EXPECT_EQ(back->triangles.size(), 2u) << suffix;
+    EXPECT_NEAR(area_mm2(*back), area_mm2(mesh), 1e-4) << suffix;
+  }
 }
 
 TEST(Tets, ValuesAtPointsSurviveInVtu) {

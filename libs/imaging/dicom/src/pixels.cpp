@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 #include "decode.h"
 #include "osteo/core/base/parallel.h"
@@ -147,6 +148,12 @@ class Converter {
   }
 
  private:
+  /// All bits or none: compilers compare many at once so, where a choice between values keeps them from it.
+  template <class Int>
+  [[nodiscard]] static Int mask(bool yes) {
+    return static_cast<Int>(-static_cast<Int>(yes));
+  }
+
   // Up to two values (the corners of a picture, and what lies outside the table) that many pixels share, below all
   // others.
   template <class T>
@@ -158,16 +165,28 @@ class Converter {
       found_ = whole(std::ceil((kPaddingBelowHu - f_.intercept) / f_.slope)) - 1;
       return;
     }
+    // No wider than the values need, and without branches, so that many are compared at once.
+    using Wide = std::conditional_t<(sizeof(T) > 2), std::int64_t, std::int32_t>;
+    using Limits = std::numeric_limits<Wide>;
+    const auto wide = [](std::int64_t v) {
+      return static_cast<Wide>(std::clamp<std::int64_t>(v, Limits::min(), Limits::max()));
+    };
     for (int found = 0; found < 2; ++found) {
-      std::int64_t lowest = std::numeric_limits<std::int64_t>::max();
+      const Wide above = wide(found_), pad_lo = wide(pad_lo_), pad_hi = wide(pad_hi_);
+      Wide lowest = Limits::max();
       for (std::size_t i = 0; i < n; ++i) {
-        const std::int64_t v = in[i];
-        if (v > found_ && v < lowest && !(v >= pad_lo_ && v <= pad_hi_)) lowest = v;
+        const Wide v = in[i];
+        const Wide counts = mask<Wide>(v > above) & (mask<Wide>(v < pad_lo) | mask<Wide>(v > pad_hi));
+        lowest = std::min<Wide>(lowest, (v & counts) | (Limits::max() & ~counts));
       }
-      if (hounsfield(static_cast<double>(lowest), f_) >= kPaddingBelowHu) return;
-      const auto top = lowest + whole(kSamePaddingHu / f_.slope);
-      std::size_t same = 0;
-      for (std::size_t i = 0; i < n; ++i) same += in[i] >= lowest && in[i] <= top ? 1 : 0;
+      if (lowest == Limits::max() || hounsfield(static_cast<double>(lowest), f_) >= kPaddingBelowHu) return;
+      const auto top = static_cast<std::int64_t>(lowest) + whole(kSamePaddingHu / f_.slope);
+      const Wide same_to = wide(top);
+      std::uint32_t same = 0;  // a picture has fewer pixels
+      for (std::size_t i = 0; i < n; ++i) {
+        const Wide v = in[i];
+        same -= static_cast<std::uint32_t>(mask<Wide>(v >= lowest) & mask<Wide>(v <= same_to));
+      }
       if (same < 16 || static_cast<double>(same) < 2e-4 * static_cast<double>(n)) return;
       found_ = top;
     }
@@ -261,6 +280,8 @@ class Converter {
     } else if (whole && !padded && !tissue && lo > found_ && low >= kPaddingBelowHu && high <= 32767) {
       shifted(in, out, n, static_cast<int>(f_.intercept));
       count_.hu_min = std::min(count_.hu_min, static_cast<std::int64_t>(low));
+    } else if (whole && !tissue && low > kNoValue && high <= 32767) {
+      padded_row(in, out, n);
     } else {
       careful_row(in, out, n);
     }
@@ -279,6 +300,40 @@ class Converter {
       const bool counts = bin < static_cast<unsigned>(ValueCount::kBins) && out[i] != kAirHu;
       ++sampled_[i % sampled_.size()][counts ? bin : static_cast<unsigned>(ValueCount::kBins)];
     }
+  }
+
+  // careful_row() for whole numbers that fit, without a branch: rows of round pictures are half padding.
+  template <class T>
+  void padded_row(const T* in, std::int16_t* out, std::size_t n) {
+    using Limits = std::numeric_limits<std::int32_t>;
+    const auto word = [](std::int64_t v) {
+      return static_cast<std::int32_t>(std::clamp<std::int64_t>(v, Limits::min(), Limits::max()));
+    };
+    const std::int32_t pad_lo = word(pad_lo_), pad_hi = word(pad_hi_), found = word(found_),
+                       shift = word(static_cast<std::int64_t>(f_.intercept));
+    const std::int32_t any_found = mask<std::int32_t>(found_ >= Limits::min());
+    constexpr auto kAirLimit = static_cast<std::int32_t>(kPaddingBelowHu);
+    std::int32_t by_tag = 0, by_value = 0, below = 0;  // a row is short
+    std::int32_t lowest_pad = Limits::max(), lowest = Limits::max();
+    // In place, as in shifted().
+#pragma GCC ivdep
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto v = static_cast<std::int32_t>(in[i]);
+      const std::int32_t hu = v + shift;
+      const std::int32_t tagged = mask<std::int32_t>(v >= pad_lo) & mask<std::int32_t>(v <= pad_hi),
+                         low = any_found & mask<std::int32_t>(v <= found) & ~tagged, none = tagged | low;
+      by_tag -= tagged;
+      by_value -= low;
+      below -= mask<std::int32_t>(hu < kAirLimit) & ~none;
+      lowest_pad = std::min(lowest_pad, (hu & none) | (Limits::max() & ~none));
+      lowest = std::min(lowest, (hu & ~none) | (Limits::max() & none));
+      out[i] = static_cast<std::int16_t>((hu & ~none) | (kNoValue & none));
+    }
+    count_.by_tag += static_cast<std::uint64_t>(by_tag);
+    count_.found += static_cast<std::uint64_t>(by_value);
+    count_.below_air += static_cast<std::uint64_t>(below);
+    if (by_tag + by_value > 0) count_.padding_hu = std::min(count_.padding_hu, static_cast<double>(lowest_pad));
+    if (lowest != Limits::max()) count_.hu_min = std::min<std::int64_t>(count_.hu_min, lowest);
   }
 
   template <class T>

@@ -173,7 +173,9 @@ DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& opt
       finish(p, frame, reader, options);
       if (p.verdict.values.padding_source != "none") {
         parallel_for(area * count, 1 << 18, context.threads, [&](std::size_t begin, std::size_t end) {
-          std::replace(pixels.get() + begin, pixels.get() + end, dicom::kNoValue, dicom::kAirHu);
+          // Written either way, so that many are replaced at once.
+          for (std::size_t i = begin; i < end; ++i)
+            pixels[i] = pixels[i] == dicom::kNoValue ? dicom::kAirHu : pixels[i];
         });
       }
       result.image = {frame, pixels};
