@@ -57,6 +57,78 @@ Error error_of(const std::vector<double>& d, const std::vector<double>& truth, d
   return e;
 }
 
+void write_for_peers(const fs::path& folder, const TriangleSoup& soup, const std::vector<Vec3>& points) {
+  std::vector<double> xyz;
+  for (const Vec3 p : soup.points_mm) xyz.insert(xyz.end(), {p.x, p.y, p.z});
+  write_raw(folder / "v.f64", xyz);
+  std::vector<std::uint32_t> ids;
+  for (const auto& t : soup.triangles) ids.insert(ids.end(), t.begin(), t.end());
+  write_raw(folder / "f.u32", ids);
+  xyz.clear();
+  for (const Vec3 p : points) xyz.insert(xyz.end(), {p.x, p.y, p.z});
+  write_raw(folder / "p.f64", xyz);
+}
+
+std::vector<double> read_values(const fs::path& file) {
+  std::vector<double> v(fs::file_size(file) / 8);
+  std::ifstream(file, std::ios::binary)
+      .read(reinterpret_cast<char*>(v.data()), static_cast<std::streamsize>(v.size() * 8));
+  return v;
+}
+
+// 200,000 points in the box around each surface and 5 % more, signed, in the order of their making: nobody sorted them.
+void scattered_table(const std::vector<Subject>& all, const fs::path& folder, const Context& one) {
+  std::printf(
+      "\n### Scattered points, signed\n\n200,000 random points in the box of each surface and 5 %% more; CPU seconds "
+      "on "
+      "one thread with tree and all. Errors against the same question asked alone, in extents; wrong signs.\n\n| "
+      "surface "
+      "| method | CPU s | of ours | error max | wrong signs |\n|---|---|---|---|---|---|\n");
+  for (const Subject& s : all) {
+    Vec3 lo = s.soup.points_mm.front(), hi = lo;
+    for (const auto& t : s.soup.triangles) {
+      for (const auto c : t) {
+        for (std::size_t a = 0; a < 3; ++a) {
+          lo[a] = std::min(lo[a], s.soup.points_mm[c][a]);
+          hi[a] = std::max(hi[a], s.soup.points_mm[c][a]);
+        }
+      }
+    }
+    const Vec3 size = hi - lo;
+    const double extent = std::max({size.x, size.y, size.z});
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> u(-0.05, 1.05);
+    std::vector<Vec3> points(200000);
+    for (Vec3& p : points) p = lo + Vec3{u(random) * size.x, u(random) * size.y, u(random) * size.z};
+    std::vector<SignedDistance::Answer> alone(points.size()), together;
+    const double alone_s = cpu([&] {
+      const SignedDistance d(s.soup, one);
+      for (std::size_t i = 0; i < points.size(); ++i) alone[i] = d.at(points[i]);
+    });
+    const double together_s = cpu([&] { together = SignedDistance(s.soup, one).at(points, one); });
+    const auto row = [&](const std::string& name, double seconds, const std::vector<double>& d) {
+      double worst = 0;
+      std::uint64_t wrong = 0;
+      for (std::size_t i = 0; i < d.size(); ++i) {
+        worst = std::max(worst, std::abs(std::abs(d[i]) - alone[i].closest.distance_mm));
+        wrong += (d[i] < 0) != (alone[i].signed_mm < 0) ? 1 : 0;
+      }
+      std::printf("| %s | %s | %.3f | %.2f | %.1e | %llu |\n", s.name.c_str(), name.c_str(), seconds,
+                  seconds / together_s, worst / extent, static_cast<unsigned long long>(wrong));
+      std::fflush(stdout);
+    };
+    const auto values = [](const std::vector<SignedDistance::Answer>& answers) {
+      std::vector<double> v;
+      for (const auto& a : answers) v.push_back(a.signed_mm);
+      return v;
+    };
+    row("ours, together", together_s, values(together));
+    row("ours, one by one", alone_s, values(alone));
+    write_for_peers(folder, s.soup, points);
+    for (const Line& l : python_peers(folder, "scattered")) row(l.name, l.seconds, read_values(l.file));
+  }
+}
+
 }  // namespace
 
 void distance_tables(const Context& context, const fs::path& folder) {
@@ -217,19 +289,9 @@ void distance_tables(const Context& context, const fs::path& folder) {
   dense.resize(d2.size());
   for (std::size_t i = 0; i < d2.size(); ++i) dense[i] = static_cast<float>(std::max(0.0, std::sqrt(d2[i]) / h - 0.5));
   row("Euclidean transform of the mask, less half a voxel", t, from_dense(), "mask");
-  std::vector<double> xyz;
-  for (const Vec3 p : s.soup.points_mm) xyz.insert(xyz.end(), {p.x, p.y, p.z});
-  write_raw(folder / "v.f64", xyz);
-  std::vector<std::uint32_t> ids;
-  for (const auto& tr : s.soup.triangles) ids.insert(ids.end(), tr.begin(), tr.end());
-  write_raw(folder / "f.u32", ids);
-  xyz.clear();
-  for (const Vec3 p : points) xyz.insert(xyz.end(), {p.x, p.y, p.z});
-  write_raw(folder / "p.f64", xyz);
+  write_for_peers(folder, s.soup, points);
   for (const Line& l : python_peers(folder, "points")) {
-    std::vector<double> v(fs::file_size(l.file) / 8);
-    std::ifstream(l.file, std::ios::binary)
-        .read(reinterpret_cast<char*>(v.data()), static_cast<std::streamsize>(v.size() * 8));
+    const std::vector<double> v = read_values(l.file);
     const std::size_t every = (points.size() + v.size() - 1) / v.size();
     std::vector<double> all_values(points.size(), std::numeric_limits<double>::quiet_NaN());
     for (std::size_t i = 0; i < v.size() && i * every < all_values.size(); ++i) all_values[i * every] = v[i];
@@ -238,6 +300,8 @@ void distance_tables(const Context& context, const fs::path& folder) {
         : l.name.find("Open3D") == 0 ? "parity"
                                      : "none");
   }
+
+  scattered_table(all, folder, one);
 
   std::printf(
       "\n### Whole box and narrow band (3 voxels inside, 2 outside) at 195\n\nCPU seconds, one thread. Wrong signs: "

@@ -23,6 +23,8 @@
 #include <chrono>
 #include <cstdio>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "bench.h"
 #include "osteo/core/base/files.h"
@@ -192,6 +194,54 @@ bool python_has(const char* module) {
   return std::system(("python3 -c 'import " + std::string(module) + "' 2>/dev/null").c_str()) == 0;
 }
 
+// In a process of measure(), which it becomes.
+bool become(std::vector<std::string> words) {
+  std::vector<char*> argv;
+  for (std::string& w : words) argv.push_back(w.data());
+  argv.push_back(nullptr);
+  static_cast<void>(std::freopen("/dev/null", "w", stdout));
+  static_cast<void>(std::freopen("/dev/null", "w", stderr));
+  ::execvp(argv.front(), argv.data());
+  return false;
+}
+
+bool is_program(const std::string& name) {
+  return std::system(("command -v " + name + " >/dev/null 2>&1").c_str()) == 0;
+}
+
+// Whole programs, from files to files. What a program takes to start is a row of its own: it grows with the libraries
+// that it is linked with, not with the series.
+void programs(const fs::path& series, const fs::path& out) {
+  std::error_code ec;
+  const fs::path osteo = fs::read_symlink("/proc/self/exe", ec).parent_path() / "osteo";
+  fs::create_directories(out);
+  constexpr int kRuns = 5;
+  std::printf(
+      "\n300 uncompressed slices of 512x512 from files to a file, by whole programs, all cores.\n\n| to | program | "
+      "wall s "
+      "| CPU s | peak MB |\n|---|---|---|---|---|\n");
+  if (fs::exists(osteo)) {
+    row("nothing", "osteo --version", measure(kRuns, [&] { return become({osteo, "--version"}); }));
+    for (const char* const name : {"ct.nii", "ct.nii.gz", "ct.nrrd"})
+      row(fs::path(name).extension(), "osteo import", measure(kRuns, [&] {
+            return become({osteo, "import", series, out / name, "--force"});
+          }));
+  }
+  if (is_program("dcm2niix")) {
+    row(".nii", "dcm2niix", measure(kRuns, [&] {
+          return become({"dcm2niix", "-b", "n", "-z", "n", "-w", "1", "-o", out, series});
+        }));
+    row(".gz", "dcm2niix", measure(kRuns, [&] {
+          return become({"dcm2niix", "-b", "n", "-z", "y", "-w", "1", "-o", out, series});
+        }));
+  }
+  if (is_program("dicomtonifti"))
+    row(".nii", "vtk-dicom (dicomtonifti)", measure(kRuns, [&] {
+          return become({"dicomtonifti", "--no-qform", "--batch", "-r", "-o", out, series});
+        }));
+  fs::remove_all(out, ec);
+}
+
 bool read_with_osteo(const fs::path& folder) {
   const DicomScan scan = scan_dicom(folder);
   return load_dicom_series(choose_series(scan, "", "")).image.frame.voxel_count() > 0;
@@ -264,6 +314,8 @@ void bench_import(const Context& context) {
     if (itk) row(e.name, "SimpleITK", measure(runs, [&] { return read_with_python(at); }));
     if (!raw) fs::remove_all(at);
   }
+
+  programs(plain, folder.path() / "files");
 
   const fs::path lean = folder.path() / "lean";
   make_series(lean, 300, [](DcmDataset& d, int i) {

@@ -19,7 +19,8 @@ def show(name, seconds, values):
     print(f"{name}|{seconds:.6f}|{file}", flush=True)
 
 
-if what == "points":
+if what in ("points", "scattered"):
+    all_of_them = what == "scattered"
     V = np.fromfile(folder / "v.f64").reshape(-1, 3)
     F = np.fromfile(folder / "f.u32", np.uint32).reshape(-1, 3)
     P = np.fromfile(folder / "p.f64").reshape(-1, 3)
@@ -35,19 +36,23 @@ if what == "points":
         seconds = time.process_time() - t
         show("FCPW (wheel), CPU s of all threads", seconds, [i.d for i in near])
     if igl := have("igl"):
-        n = P[:: max(1, len(P) // 50000)]
+        n = P if all_of_them else P[:: max(1, len(P) // 50000)]
         t = time.process_time()
         r = igl.signed_distance(n, V, F.astype(np.int64), sign_type=igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL)
         seconds = (time.process_time() - t) * len(P) / len(n)
-        show("libigl pseudonormal, from a sample", seconds, np.abs(r[0]))
+        show(
+            "libigl pseudonormal" + ("" if all_of_them else ", from a sample"),
+            seconds,
+            r[0] if all_of_them else np.abs(r[0]),
+        )
     if o3 := have("open3d"):
-        n = P[:: max(1, len(P) // 200000)]
+        n = P if all_of_them else P[:: max(1, len(P) // 200000)]
         t = time.process_time()
         scene = o3.t.geometry.RaycastingScene(nthreads=1)
         scene.add_triangles(o3.core.Tensor(V.astype(np.float32)), o3.core.Tensor(F))
         d = scene.compute_signed_distance(o3.core.Tensor(n.astype(np.float32)), nthreads=1).numpy()
         seconds = (time.process_time() - t) * len(P) / len(n)
-        show("Open3D signed, from a sample", seconds, np.abs(d))
+        show("Open3D signed" + ("" if all_of_them else ", from a sample"), seconds, d if all_of_them else np.abs(d))
 else:  # masks: z, y, x order
     nx, ny, nz, sx, sy, sz = np.fromfile(folder / "shape.f64")
     M = np.fromfile(folder / "mask.u8", np.uint8).reshape(int(nz), int(ny), int(nx))

@@ -442,6 +442,57 @@ TEST(SignedDistance, AgreesWithTheWindingNumber) {
   EXPECT_FALSE(SignedDistance(open).closed());
 }
 
+// To the bit, whatever neighbour told a point where to look and on which side it is.
+TEST(SignedDistance, ManyTogetherAreAsEachAlone) {
+  TriangleSoup open = sphere(10, 3), far = moved(sphere(10, 3), 1, {1e6, -2e6, 3e6}), small = sphere(10, 3);
+  open.triangles.resize(open.triangles.size() * 4 / 5);
+  for (Vec3& p : small.points_mm) p = p * 1e-6;
+  const TriangleSoup cases[] = {sphere(10, 3),
+                                open,
+                                far,
+                                small,
+                                joined(sphere(10, 3), turned(sphere(5, 2))),
+                                joined(sphere(10, 2), moved(sphere(10, 2), 1, {20, 0, 0})),
+                                joined(box({-6, -6, -6}, {7, 8, 9}), box({-1e-7, -20, -20}, {1e-7, 20, 20})),
+                                test::unwelded(box({-6, -6, -6}, {7, 8, 9}))};
+  std::mt19937 random(23);
+  for (const TriangleSoup& s : cases) {
+    Vec3 lo = s.points_mm.front(), hi = lo;
+    for (const Vec3 p : s.points_mm) {
+      for (std::size_t a = 0; a < 3; ++a) lo[a] = std::min(lo[a], p[a]), hi[a] = std::max(hi[a], p[a]);
+    }
+    const Vec3 size = hi - lo;
+    std::uniform_real_distribution<double> u(-0.3, 1.3), tiny(-1e-9, 1e-9);
+    std::vector<Vec3> points;
+    for (int i = 0; i < 3000; ++i)
+      points.push_back(lo + Vec3{u(random) * size.x, u(random) * size.y, u(random) * size.z});
+    // On corners and edges, a hair beside the surface, twice at one place, far away.
+    for (const auto& t : s.triangles) {
+      const Vec3 a = s.points_mm[t[0]], b = s.points_mm[t[1]], c = s.points_mm[t[2]];
+      const Vec3 middle = (a + b + c) / 3;
+      points.insert(points.end(), {a, (a + b) / 2, middle, middle + size * tiny(random), middle + size * tiny(random)});
+    }
+    points.push_back(points.front());
+    points.push_back(hi + size * 1e6);
+    const SignedDistance d(s);
+    Context two;
+    two.threads = 2;
+    const auto together = d.at(points), shared = d.at(points, two);
+    ASSERT_EQ(together.size(), points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto alone = d.at(points[i]);
+      for (const auto* const answer : {&together[i], &shared[i]}) {
+        ASSERT_EQ(answer->closest.distance_mm, alone.closest.distance_mm) << i;
+        ASSERT_EQ(answer->closest.triangle, alone.closest.triangle) << i;
+        ASSERT_EQ(answer->closest.feature, alone.closest.feature) << i;
+        ASSERT_EQ(answer->closest.point_mm, alone.closest.point_mm) << i;
+        ASSERT_EQ(std::signbit(answer->signed_mm), std::signbit(alone.signed_mm)) << i;
+      }
+    }
+  }
+  EXPECT_TRUE(SignedDistance(cases[0]).at(std::span<const Vec3>()).empty());
+}
+
 TEST(ThesisDistance, CorrectedIsExactAndAsPrintedIsNot) {
   const TriangleSoup s = joined(sphere(10, 3), box({14, -4, -4}, {20, 4, 4}));
   const Frame f = frame_around(s, 24, 2);

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -201,6 +202,56 @@ TEST(Labels, CtIsNotTakenForLabels) {
   const auto path = folder() / "ct.nrrd";
   save_image(oblique(false), path);
   EXPECT_THROW(static_cast<void>(load_labels(path)), Error);
+}
+
+// A .ply of our own is read without VTK: as VTK reads it, which a second comment makes it do.
+TEST(Surface, OwnPlyIsReadAsByVtk) {
+  TriMesh mesh;
+  mesh.points_mm = {{-1.5F, 2, 3}, {4, 5.25F, 6}, {7, 8, 9.125F}, {0, 0, 1}};
+  mesh.triangles = {{0, 1, 2}, {3, 2, 0}};
+  for (const bool normals : {false, true}) {
+    if (normals) mesh.normals.assign(4, {0, 0, 1});
+    const auto own = folder() / "own.ply", other = folder() / "other.ply";
+    save_surface(mesh, own);
+    const std::string text = read_text(own);
+    std::string changed = text;
+    changed.insert(changed.find("comment"), "comment another line\n");
+    write_file(other, changed);
+    for (const auto& path : {own, other}) {
+      const auto back = load_surface(path);
+      EXPECT_EQ(back->points_mm, mesh.points_mm) << path;
+      EXPECT_EQ(back->triangles, mesh.triangles) << path;
+      EXPECT_TRUE(back->normals.empty()) << path;
+    }
+    write_file(own, text.substr(0, text.size() - 5));
+    EXPECT_THROW(static_cast<void>(load_surface(own)), Error);
+    std::string beyond = text;
+    beyond[text.size() - 2] = 1;  // the last triangle names a point that is not there
+    write_file(own, beyond);
+    EXPECT_THROW(static_cast<void>(load_surface(own)), Error);
+  }
+}
+
+// The header is VTK's, what follows ours; packed, the same bytes.
+TEST(Nifti, IsHeaderAndVoxels) {
+  const Image image = oblique(false);
+  save_image(image, folder() / "plain.nii");
+  save_image(image, folder() / "packed.nii.gz");
+  const std::string plain = read_text(folder() / "plain.nii"), packed = read_text(folder() / "packed.nii.gz");
+  const std::size_t bytes = image.frame.voxel_count() * sizeof(std::int16_t);
+  ASSERT_EQ(plain.size(), 352 + bytes);
+  std::int32_t header_bytes = 0;
+  float voxels_at = 0;
+  std::memcpy(&header_bytes, plain.data(), 4);
+  std::memcpy(&voxels_at, plain.data() + 108, 4);
+  EXPECT_EQ(header_bytes, 348);
+  EXPECT_EQ(voxels_at, 352);
+  EXPECT_EQ(plain.substr(344, 8), std::string("n+1\0\0\0\0\0", 8));
+  EXPECT_EQ(std::memcmp(plain.data() + 352, image.voxels.get(), bytes), 0);
+  const Image back = load_image(folder() / "packed.nii.gz"), again = load_image(folder() / "plain.nii");
+  EXPECT_EQ(std::memcmp(back.voxels.get(), image.voxels.get(), bytes), 0);
+  EXPECT_EQ(std::memcmp(again.voxels.get(), image.voxels.get(), bytes), 0);
+  EXPECT_LT(packed.size(), plain.size());
 }
 
 TEST(Surface, FormatsKeepPointsAndTriangles) {

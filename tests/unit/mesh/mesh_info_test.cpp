@@ -1,6 +1,13 @@
 // Summary and repair of surfaces.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <map>
+#include <random>
+#include <utility>
+#include <vector>
+
 #include "meshes.h"
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/mesh/mesh_info.h"
@@ -90,6 +97,74 @@ TEST(Repair, WeldsDropsAndKeeps) {
   EXPECT_THROW((void)repaired(bad, {.drop_unsound = false}, r), Error);
   EXPECT_GT(mesh_of(repaired(bad, {}, r)).triangles.size(), 300U);
   EXPECT_GT(r.unsound, 0U);
+}
+
+// Edges counted in a map, fans by walking from triangle to triangle.
+MeshCheck counted_plainly(const TriMesh& m) {
+  MeshCheck c;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::pair<int, int>> edges;  // uses, forward ones
+  for (const auto& t : m.triangles) {
+    if (t[0] == t[1] || t[1] == t[2] || t[0] == t[2]) {
+      ++c.degenerate;
+      continue;
+    }
+    for (std::size_t e = 0; e < 3; ++e) {
+      const auto a = t[e], b = t[(e + 1) % 3];
+      auto& [uses, forward] = edges[{std::min(a, b), std::max(a, b)}];
+      ++uses;
+      forward += a < b ? 1 : 0;
+    }
+  }
+  for (const auto& [edge, count] : edges) {
+    c.open_edges += count.first == 1 ? 1 : 0;
+    c.nonmanifold_edges += count.first > 2 ? 1 : 0;
+    c.misoriented_edges += count.first >= 2 && 2 * count.second != count.first ? 1 : 0;
+  }
+  for (std::uint32_t v = 0; v < m.points_mm.size(); ++v) {
+    std::vector<std::array<std::uint32_t, 3>> around;
+    for (const auto& t : m.triangles) {
+      for (const auto corner : t) {
+        if (corner == v) around.push_back(t);
+      }
+    }
+    std::vector<bool> met(around.size());
+    std::vector<std::size_t> open;
+    if (!around.empty()) met[0] = true, open.push_back(0);
+    while (!open.empty()) {
+      const auto t = around[open.back()];
+      open.pop_back();
+      for (std::size_t n = 0; n < around.size(); ++n) {
+        int shared = 0;
+        for (const auto a : t) shared += static_cast<int>(std::count(around[n].begin(), around[n].end(), a));
+        if (met[n] || shared < 2) continue;
+        met[n] = true;
+        open.push_back(n);
+      }
+    }
+    c.nonmanifold_points += std::count(met.begin(), met.end(), false) > 0 ? 1 : 0;
+  }
+  return c;
+}
+
+TEST(MeshCheck, CountsAsPlainly) {
+  std::mt19937 random(3);
+  for (int round = 0; round < 300; ++round) {
+    TriMesh m;
+    const std::uint32_t points = 4 + random() % 8;
+    m.points_mm.resize(points);
+    if (round % 3 == 0) m.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};  // a closed one to begin with
+    const std::uint32_t more = random() % 14;
+    for (std::uint32_t t = 0; t < more; ++t)
+      m.triangles.push_back({static_cast<std::uint32_t>(random() % points),
+                             static_cast<std::uint32_t>(random() % points),
+                             static_cast<std::uint32_t>(random() % points)});
+    const MeshCheck is = check(m), wanted = counted_plainly(m);
+    ASSERT_EQ(is.open_edges, wanted.open_edges) << round;
+    ASSERT_EQ(is.nonmanifold_edges, wanted.nonmanifold_edges) << round;
+    ASSERT_EQ(is.misoriented_edges, wanted.misoriented_edges) << round;
+    ASSERT_EQ(is.nonmanifold_points, wanted.nonmanifold_points) << round;
+    ASSERT_EQ(is.degenerate, wanted.degenerate) << round;
+  }
 }
 
 }  // namespace

@@ -254,15 +254,7 @@ std::vector<Data> DistanceAtStage::run(const Params&, std::span<const Data> inpu
   const TriangleSoup surface = soup_of(*std::get<Surface>(inputs[0]));
   const std::vector<Vec3> points = load_points(std::get<Source>(inputs[1]).path);
   const SignedDistance distance(surface, context);
-  std::vector<SignedDistance::Answer> answers(points.size());
-  parallel_for(points.size(), 256, context.threads, [&](std::size_t begin, std::size_t end) {
-    context.check_cancelled();
-    std::uint32_t hint = ClosestPoint::kNone;
-    for (std::size_t i = begin; i < end; ++i) {
-      answers[i] = distance.at(points[i], hint);
-      hint = answers[i].closest.triangle;
-    }
-  });
+  const std::vector<SignedDistance::Answer> answers = distance.at(points, context);
   Json j;
   const std::string sign_by = distance.closed() ? "whole winding number" : "generalized winding number";
   j["sign_by"] = sign_by;

@@ -1,6 +1,8 @@
 #include "osteo/core/data/tri_mesh.h"
 
 #include <algorithm>
+#include <array>
+#include <span>
 
 #include "osteo/core/base/union_find.h"
 
@@ -10,6 +12,30 @@ namespace {
 Vec3 point(const TriMesh& mesh, std::uint32_t i) {
   const auto& p = mesh.points_mm[i];
   return {p[0], p[1], p[2]};
+}
+
+// True when one walk around the point, from a triangle to the one that goes on where it ends, meets all of its
+// triangles: so it is nearly everywhere. False says nothing.
+bool is_one_fan(const TriMesh& mesh, std::uint32_t v, std::span<const std::uint32_t> triangles) {
+  constexpr std::size_t kMost = 32;
+  if (triangles.size() > kMost) return false;
+  std::array<std::uint32_t, kMost> from{}, to{};
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const auto& t = mesh.triangles[triangles[i]];
+    const std::size_t at = t[0] == v ? 0 : t[1] == v ? 1 : 2;
+    from[i] = t[(at + 1) % 3];
+    to[i] = t[(at + 2) % 3];
+    if (from[i] == v || to[i] == v || from[i] == to[i]) return false;
+  }
+  std::uint32_t met = 1;  // a bit for each
+  for (std::size_t n = 1, at = 0; n < triangles.size(); ++n) {
+    std::size_t next = 0;
+    while (next < triangles.size() && ((met >> next & 1) != 0 || from[next] != to[at])) ++next;
+    if (next == triangles.size()) return false;
+    met |= std::uint32_t{1} << next;
+    at = next;
+  }
+  return true;
 }
 
 // Counts the fans of triangles around each point: walks from triangle to triangle across shared edges by union-find.
@@ -29,7 +55,7 @@ std::uint64_t count_nonmanifold_points(const TriMesh& mesh) {
   std::vector<std::uint32_t> parent;
   for (std::uint32_t v = 0; v < n; ++v) {
     const std::uint32_t begin = first[v], count = first[v + 1] - begin;
-    if (count < 2) continue;
+    if (count < 2 || is_one_fan(mesh, v, {incident.data() + begin, count})) continue;
     parent.resize(count);
     for (std::uint32_t i = 0; i < count; ++i) parent[i] = i;
     std::uint32_t fans = count;
@@ -51,34 +77,42 @@ std::uint64_t count_nonmanifold_points(const TriMesh& mesh) {
 
 MeshCheck check(const TriMesh& mesh) {
   MeshCheck result;
-  struct Edge {
-    std::uint32_t lo, hi;
-    bool forward;
-    bool operator<(const Edge& o) const { return lo != o.lo ? lo < o.lo : hi < o.hi; }
-  };
-  std::vector<Edge> edges;
-  edges.reserve(mesh.triangles.size() * 3);
+  // Edges by their lower point, counted out; then the few of each point by their other one.
+  const auto is_degenerate = [](const auto& t) { return t[0] == t[1] || t[1] == t[2] || t[0] == t[2]; };
+  std::uint32_t top = 0;
+  for (const auto& t : mesh.triangles) top = std::max({top, t[0], t[1], t[2]});
+  std::vector<std::uint64_t> first(mesh.triangles.empty() ? 1 : std::size_t{top} + 2, 0);
   for (const auto& t : mesh.triangles) {
-    if (t[0] == t[1] || t[1] == t[2] || t[0] == t[2]) {
+    if (is_degenerate(t)) {
       ++result.degenerate;
       continue;
     }
-    for (std::size_t e = 0; e < 3; ++e) {
-      const auto a = t[e], b = t[(e + 1) % 3];
-      edges.push_back({std::min(a, b), std::max(a, b), a < b});
+    for (std::size_t e = 0; e < 3; ++e) ++first[std::size_t{std::min(t[e], t[(e + 1) % 3])} + 1];
+  }
+  for (std::size_t p = 1; p < first.size(); ++p) first[p] += first[p - 1];
+  std::vector<std::uint64_t> other(first.back());  // the higher point, doubled, and 1 where the edge runs towards it
+  {
+    std::vector<std::uint64_t> fill(first.begin(), first.end() - 1);
+    for (const auto& t : mesh.triangles) {
+      if (is_degenerate(t)) continue;
+      for (std::size_t e = 0; e < 3; ++e) {
+        const std::uint32_t a = t[e], b = t[(e + 1) % 3];
+        other[fill[std::min(a, b)]++] = std::uint64_t{std::max(a, b)} << 1 | (a < b ? 1 : 0);
+      }
     }
   }
-  std::sort(edges.begin(), edges.end());
-  for (std::size_t i = 0; i < edges.size();) {
-    std::size_t j = i;
-    int forward = 0;
-    while (j < edges.size() && edges[j].lo == edges[i].lo && edges[j].hi == edges[i].hi)
-      forward += edges[j++].forward ? 1 : 0;
-    const std::size_t uses = j - i;
-    if (uses == 1) ++result.open_edges;
-    if (uses > 2) ++result.nonmanifold_edges;
-    if (uses >= 2 && static_cast<std::size_t>(forward) * 2 != uses) ++result.misoriented_edges;
-    i = j;
+  for (std::size_t p = 0; p + 1 < first.size(); ++p) {
+    const std::span<std::uint64_t> edges(other.data() + first[p], first[p + 1] - first[p]);
+    std::sort(edges.begin(), edges.end());
+    for (std::size_t i = 0; i < edges.size();) {
+      std::size_t j = i, forward = 0;
+      while (j < edges.size() && edges[j] >> 1 == edges[i] >> 1) forward += edges[j++] & 1;
+      const std::size_t uses = j - i;
+      if (uses == 1) ++result.open_edges;
+      if (uses > 2) ++result.nonmanifold_edges;
+      if (uses >= 2 && forward * 2 != uses) ++result.misoriented_edges;
+      i = j;
+    }
   }
   result.nonmanifold_points = count_nonmanifold_points(mesh);
   return result;

@@ -1,6 +1,10 @@
 // Where things lie on a page. Private to libs/core/report; millimetres from the upper left corner unless it says
 // otherwise.
 #pragma once
+#include <cairo.h>
+
+#include <vector>
+
 #include "osteo/core/report/sheet.h"
 
 namespace osteo::report {
@@ -23,6 +27,8 @@ struct Rgb {
 /// "✓ " and the like before the text of a tone, so that it can be told in black and white; empty for plain.
 [[nodiscard]] std::string_view sign(Tone tone);
 
+/// For cairo, in `pixels`, which must outlive it.
+[[nodiscard]] cairo_surface_t* surface_of(const Picture& picture, std::vector<unsigned char>& pixels);
 [[nodiscard]] std::string png_of(const Picture& picture);
 [[nodiscard]] Picture picture_of_png(std::string_view png);  ///< empty when it is none
 [[nodiscard]] std::string valid_utf8(std::string_view text);

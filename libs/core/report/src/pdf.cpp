@@ -123,17 +123,8 @@ class Pen {
   }
   void picture(const Picture& p, double x, double y, double w, double h) const {
     if (!on || p.width == 0) return;
-    const std::string png = png_of(p);
-    std::string_view rest = png;
-    const CairoOwned<cairo_surface_t> image(cairo_image_surface_create_from_png_stream(
-        [](void* source, unsigned char* to, unsigned n) {
-          auto& r = *static_cast<std::string_view*>(source);
-          if (r.size() < n) return CAIRO_STATUS_READ_ERROR;
-          std::copy_n(r.data(), n, reinterpret_cast<char*>(to));
-          r.remove_prefix(n);
-          return CAIRO_STATUS_SUCCESS;
-        },
-        &rest));
+    std::vector<unsigned char> pixels;
+    const CairoOwned<cairo_surface_t> image(surface_of(p, pixels));
     cairo_save(cairo_);
     cairo_translate(cairo_, x, y);
     cairo_scale(cairo_, w / p.width, h / p.height);

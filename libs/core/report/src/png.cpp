@@ -10,9 +10,9 @@
 
 namespace osteo::report {
 
-std::string png_of(const Picture& picture) {
+cairo_surface_t* surface_of(const Picture& picture, std::vector<unsigned char>& pixels) {
   const int stride = cairo_format_stride_for_width(CAIRO_FORMAT_RGB24, picture.width);
-  std::vector<unsigned char> pixels(static_cast<std::size_t>(stride) * static_cast<std::size_t>(picture.height));
+  pixels.resize(static_cast<std::size_t>(stride) * static_cast<std::size_t>(picture.height));
   const std::uint8_t* from = picture.rgb.data();
   for (int y = 0; y < picture.height; ++y) {
     auto* to = reinterpret_cast<std::uint32_t*>(pixels.data() +
@@ -20,8 +20,12 @@ std::string png_of(const Picture& picture) {
     for (int x = 0; x < picture.width; ++x, from += 3, ++to)
       *to = static_cast<std::uint32_t>(from[0]) << 16 | static_cast<std::uint32_t>(from[1]) << 8 | from[2];
   }
-  cairo_surface_t* const surface =
-      cairo_image_surface_create_for_data(pixels.data(), CAIRO_FORMAT_RGB24, picture.width, picture.height, stride);
+  return cairo_image_surface_create_for_data(pixels.data(), CAIRO_FORMAT_RGB24, picture.width, picture.height, stride);
+}
+
+std::string png_of(const Picture& picture) {
+  std::vector<unsigned char> pixels;
+  cairo_surface_t* const surface = surface_of(picture, pixels);
   std::string png;
   const cairo_status_t status = cairo_surface_write_to_png_stream(
       surface,

@@ -28,6 +28,15 @@ struct TriangleTree::Data {
 };
 
 namespace distance {
+/// Points within +-384 of the tree's centre along a Morton curve, in its order; equal keys by index.
+struct Keyed {
+  std::uint64_t key;
+  std::uint32_t index;
+};
+[[nodiscard]] std::uint64_t curve_key(Vec3 at);
+/// By key, stable.
+void radix_sort(std::vector<Keyed>& items);
+
 /// The closest point on a triangle of the tree, in its units: d2 as `measure` gives it is not used here, only the
 /// place.
 struct Place {

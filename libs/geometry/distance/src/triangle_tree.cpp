@@ -88,12 +88,18 @@ std::uint64_t spread(std::uint64_t x) {
   return (x | x << 2) & 0x1249249249249249ULL;
 }
 
-struct Keyed {
-  std::uint64_t key;
-  std::uint32_t index;
-};
+}  // namespace
 
-// Stable, 11 bits a pass; passes over digits that are all equal are skipped.
+std::uint64_t curve_key(Vec3 at) {
+  std::uint64_t key = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double q = std::clamp((at[a] + 384) * (2097151.0 / 768), 0.0, 2097151.0);
+    key |= spread(static_cast<std::uint64_t>(q)) << a;
+  }
+  return key;
+}
+
+// 11 bits a pass; passes over digits that are all equal are skipped.
 void radix_sort(std::vector<Keyed>& items) {
   std::vector<Keyed> other(items.size());
   for (int shift = 0; shift < 63; shift += 11) {
@@ -105,6 +111,8 @@ void radix_sort(std::vector<Keyed>& items) {
     items.swap(other);
   }
 }
+
+namespace {
 
 TriangleRecord make_record(const ExactTriangle& t, float margin) {
   const Vec3 a{t.a[0], t.a[1], t.a[2]}, b{t.b[0], t.b[1], t.b[2]}, c{t.c[0], t.c[1], t.c[2]};
@@ -227,14 +235,8 @@ TriangleTree::TriangleTree(const TriangleSoup& soup, const Mat3& axes, const Con
   parallel_for(n, 8192, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const auto& v = soup.triangles[t];
-      const Vec3 c = points[v[0]] + points[v[1]] + points[v[2]];
-      std::uint64_t key = 0;
-      for (std::size_t a = 0; a < 3; ++a) {
-        // Coordinates lie within +-128 (a rotated box), their sums within 3 times that.
-        const double q = std::clamp((c[a] + 384) * (2097151.0 / 768), 0.0, 2097151.0);
-        key |= distance::spread(static_cast<std::uint64_t>(q)) << a;
-      }
-      keys[t] = {key, static_cast<std::uint32_t>(t)};
+      // Coordinates lie within +-128 (a rotated box), their sums within 3 times that.
+      keys[t] = {distance::curve_key(points[v[0]] + points[v[1]] + points[v[2]]), static_cast<std::uint32_t>(t)};
     }
   });
   distance::radix_sort(keys);

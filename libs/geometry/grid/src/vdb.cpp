@@ -186,7 +186,11 @@ void save_grid(const SparseGrid& sparse, const fs::path& path) {
   write_atomically(path, [&](const fs::path& temporary) {
     try {
       openvdb::io::File file(temporary.string());
-      file.setCompression(openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK);
+      // OpenVDB packs each block twice, once to know how long it gets. Blosc takes an eighth of zip's time for a fifth
+      // more bytes of bone.
+      const bool blosc = openvdb::io::Archive::hasBloscCompression();
+      file.setCompression((blosc ? openvdb::io::COMPRESS_BLOSC : openvdb::io::COMPRESS_ZIP) |
+                          openvdb::io::COMPRESS_ACTIVE_MASK);
       file.write({copy}, openvdb::MetaMap());
       file.close();
     } catch (const openvdb::Exception& e) {

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 #include "decode.h"
 #include "osteo/core/base/parallel.h"
@@ -123,23 +124,40 @@ class Converter {
   // `in` and `out` may be the same memory when T has two bytes.
   template <class T>
   void run(const T* in, std::int16_t* out, std::size_t columns, std::size_t rows) {
-    find_padding(in, columns * rows);
+    std::vector<std::pair<T, T>> ranges(columns > 0 ? rows : 0);
+    T least{};
+    for (std::size_t y = 0; y < ranges.size(); ++y) {
+      ranges[y] = least_and_greatest(in + y * columns, columns);
+      least = y == 0 ? ranges[y].first : std::min(least, ranges[y].first);
+    }
+    find_padding(in, columns * rows, least);
     find_ring(in, columns, rows);
     if (count_.histogram.empty()) count_.histogram.assign(ValueCount::kBins, 0);
-    for (std::size_t y = 0; y < rows; ++y) {
+    sampled_.fill({});
+    for (std::size_t y = 0; y < ranges.size(); ++y) {
       ring_row_ = ring_.empty() ? nullptr : ring_.data() + y * columns;
-      row(in + y * columns, out + y * columns, columns, y % 4 == 0);
+      const auto [lo, hi] = ring_row_ != nullptr
+                                ? range_beside_ring(in + y * columns, columns)
+                                : std::pair<std::int64_t, std::int64_t>(ranges[y].first, ranges[y].second);
+      row(in + y * columns, out + y * columns, columns, lo, hi, y % 4 == 0);
+    }
+    for (const auto& part : sampled_) {
+      for (std::size_t bin = 0; bin < count_.histogram.size(); ++bin) count_.histogram[bin] += part[bin];
     }
     count_.pixels += columns * rows;
   }
 
  private:
+  /// All bits or none: compilers compare many at once so, where a choice between values keeps them from it.
+  template <class Int>
+  [[nodiscard]] static Int mask(bool yes) {
+    return static_cast<Int>(-static_cast<Int>(yes));
+  }
+
   // Up to two values (the corners of a picture, and what lies outside the table) that many pixels share, below all
   // others.
   template <class T>
-  void find_padding(const T* in, std::size_t n) {
-    T least = n > 0 ? in[0] : T{};
-    for (std::size_t i = 0; i < n; ++i) least = std::min(least, in[i]);
+  void find_padding(const T* in, std::size_t n, T least) {
     if (hounsfield(static_cast<double>(least), f_) >= kPaddingBelowHu) return;
     const auto whole = [](double stored) { return static_cast<std::int64_t>(std::clamp(stored, -1e12, 1e12)); };
     if (h_.lossy) {
@@ -147,16 +165,28 @@ class Converter {
       found_ = whole(std::ceil((kPaddingBelowHu - f_.intercept) / f_.slope)) - 1;
       return;
     }
+    // No wider than the values need, and without branches, so that many are compared at once.
+    using Wide = std::conditional_t<(sizeof(T) > 2), std::int64_t, std::int32_t>;
+    using Limits = std::numeric_limits<Wide>;
+    const auto wide = [](std::int64_t v) {
+      return static_cast<Wide>(std::clamp<std::int64_t>(v, Limits::min(), Limits::max()));
+    };
     for (int found = 0; found < 2; ++found) {
-      std::int64_t lowest = std::numeric_limits<std::int64_t>::max();
+      const Wide above = wide(found_), pad_lo = wide(pad_lo_), pad_hi = wide(pad_hi_);
+      Wide lowest = Limits::max();
       for (std::size_t i = 0; i < n; ++i) {
-        const std::int64_t v = in[i];
-        if (v > found_ && v < lowest && !(v >= pad_lo_ && v <= pad_hi_)) lowest = v;
+        const Wide v = in[i];
+        const Wide counts = mask<Wide>(v > above) & (mask<Wide>(v < pad_lo) | mask<Wide>(v > pad_hi));
+        lowest = std::min<Wide>(lowest, (v & counts) | (Limits::max() & ~counts));
       }
-      if (hounsfield(static_cast<double>(lowest), f_) >= kPaddingBelowHu) return;
-      const auto top = lowest + whole(kSamePaddingHu / f_.slope);
-      std::size_t same = 0;
-      for (std::size_t i = 0; i < n; ++i) same += in[i] >= lowest && in[i] <= top ? 1 : 0;
+      if (lowest == Limits::max() || hounsfield(static_cast<double>(lowest), f_) >= kPaddingBelowHu) return;
+      const auto top = static_cast<std::int64_t>(lowest) + whole(kSamePaddingHu / f_.slope);
+      const Wide same_to = wide(top);
+      std::uint32_t same = 0;  // a picture has fewer pixels
+      for (std::size_t i = 0; i < n; ++i) {
+        const Wide v = in[i];
+        same -= static_cast<std::uint32_t>(mask<Wide>(v >= lowest) & mask<Wide>(v <= same_to));
+      }
       if (same < 16 || static_cast<double>(same) < 2e-4 * static_cast<double>(n)) return;
       found_ = top;
     }
@@ -190,17 +220,23 @@ class Converter {
     }
   }
 
-  /// The least and the greatest of a row, beside the ring. In T's own width, so that many are compared at once.
+  /// Of a row of at least one. Compared as signed numbers, many at once: the least that all processors have compares
+  /// words only so.
   template <class T>
-  [[nodiscard]] std::pair<std::int64_t, std::int64_t> range(const T* in, std::size_t n) const {
-    if (ring_row_ == nullptr) {
-      T lo = in[0], hi = in[0];
-      for (std::size_t i = 0; i < n; ++i) {
-        lo = std::min(lo, in[i]);
-        hi = std::max(hi, in[i]);
-      }
-      return {lo, hi};
+  [[nodiscard]] static std::pair<T, T> least_and_greatest(const T* in, std::size_t n) {
+    using Signed = std::make_signed_t<T>;
+    constexpr T kTurn = std::is_unsigned_v<T> ? static_cast<T>(T{1} << (8 * sizeof(T) - 1)) : T{0};
+    Signed lo = std::numeric_limits<Signed>::max(), hi = std::numeric_limits<Signed>::min();
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto v = static_cast<Signed>(static_cast<T>(in[i] ^ kTurn));
+      lo = std::min(lo, v);
+      hi = std::max(hi, v);
     }
+    return {static_cast<T>(static_cast<T>(lo) ^ kTurn), static_cast<T>(static_cast<T>(hi) ^ kTurn)};
+  }
+
+  template <class T>
+  [[nodiscard]] std::pair<std::int64_t, std::int64_t> range_beside_ring(const T* in, std::size_t n) const {
     std::int64_t lo = 1 << 30, hi = -(1 << 30);
     for (std::size_t i = 0; i < n; ++i) {
       if (ring_row_[i] != 0) continue;
@@ -208,6 +244,19 @@ class Converter {
       hi = std::max<std::int64_t>(hi, in[i]);
     }
     return {lo, hi};
+  }
+
+  /// How many are at least this much. In words as wide as the values, so that many are compared at once.
+  [[nodiscard]] static std::uint64_t at_least(const std::int16_t* hu, std::size_t n, std::int16_t limit) {
+    constexpr std::size_t kBlock = 1 << 15;
+    std::uint64_t all = 0;
+    for (std::size_t begin = 0; begin < n; begin += kBlock) {
+      std::uint16_t count = 0;
+      for (std::size_t i = begin; i < std::min(n, begin + kBlock); ++i)
+        count = static_cast<std::uint16_t>(count + (hu[i] >= limit ? 1 : 0));
+      all += count;
+    }
+    return all;
   }
 
   /// Stored values plus a whole number. The result fits, so that arithmetic modulo 65536 gives it.
@@ -221,9 +270,7 @@ class Converter {
   }
 
   template <class T>
-  void row(const T* in, std::int16_t* out, std::size_t n, bool sample) {
-    if (n == 0) return;
-    const auto [lo, hi] = range(in, n);
+  void row(const T* in, std::int16_t* out, std::size_t n, std::int64_t lo, std::int64_t hi, bool sample) {
     const double low = hounsfield(static_cast<double>(lo), f_), high = hounsfield(static_cast<double>(hi), f_);
     const bool whole = f_.slope == 1 && f_.intercept == std::floor(f_.intercept);
     const bool padded = pad_lo_ <= pad_hi_ && lo <= pad_hi_ && hi >= pad_lo_;
@@ -233,24 +280,60 @@ class Converter {
     } else if (whole && !padded && !tissue && lo > found_ && low >= kPaddingBelowHu && high <= 32767) {
       shifted(in, out, n, static_cast<int>(f_.intercept));
       count_.hu_min = std::min(count_.hu_min, static_cast<std::int64_t>(low));
+    } else if (whole && !tissue && low > kNoValue && high <= 32767) {
+      padded_row(in, out, n);
     } else {
       careful_row(in, out, n);
     }
     count_.hu_max = std::max(count_.hu_max, static_cast<std::int64_t>(std::floor(high + 0.5)));
     if (hi >= top_) {
-      for (std::size_t i = 0; i < n; ++i)
-        count_.saturated +=
-            out[i] >= static_cast<std::int64_t>(std::floor(hounsfield(static_cast<double>(top_), f_))) ? 1 : 0;
+      const auto top = static_cast<std::int64_t>(std::floor(hounsfield(static_cast<double>(top_), f_)));
+      if (top <= 32767)
+        count_.saturated += at_least(out, n, static_cast<std::int16_t>(std::max<std::int64_t>(top, -32768)));
     }
-    if (high >= kMetalHu) {
-      for (std::size_t i = 0; i < n; ++i) count_.metal += out[i] >= kMetalHu ? 1 : 0;
-    }
+    if (high >= kMetalHu) count_.metal += at_least(out, n, kMetalHu);
     if (!sample) return;
+    // Without a branch, which noise would mislead, and in turn to several counts, as neighbours are often alike. Air
+    // that the scanner cut off at -1024 is no peak of its own: it goes where what lies outside goes.
     for (std::size_t i = 0; i < n; ++i) {
-      const int bin = (out[i] + 1200) >> 2;
-      // Air that the scanner cut off at -1024 is no peak of its own.
-      if (bin >= 0 && bin < ValueCount::kBins && out[i] != kAirHu) ++count_.histogram[static_cast<std::size_t>(bin)];
+      const auto bin = static_cast<unsigned>((out[i] + 1200) >> 2);
+      const bool counts = bin < static_cast<unsigned>(ValueCount::kBins) && out[i] != kAirHu;
+      ++sampled_[i % sampled_.size()][counts ? bin : static_cast<unsigned>(ValueCount::kBins)];
     }
+  }
+
+  // careful_row() for whole numbers that fit, without a branch: rows of round pictures are half padding.
+  template <class T>
+  void padded_row(const T* in, std::int16_t* out, std::size_t n) {
+    using Limits = std::numeric_limits<std::int32_t>;
+    const auto word = [](std::int64_t v) {
+      return static_cast<std::int32_t>(std::clamp<std::int64_t>(v, Limits::min(), Limits::max()));
+    };
+    const std::int32_t pad_lo = word(pad_lo_), pad_hi = word(pad_hi_), found = word(found_),
+                       shift = word(static_cast<std::int64_t>(f_.intercept));
+    const std::int32_t any_found = mask<std::int32_t>(found_ >= Limits::min());
+    constexpr auto kAirLimit = static_cast<std::int32_t>(kPaddingBelowHu);
+    std::int32_t by_tag = 0, by_value = 0, below = 0;  // a row is short
+    std::int32_t lowest_pad = Limits::max(), lowest = Limits::max();
+    // In place, as in shifted().
+#pragma GCC ivdep
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto v = static_cast<std::int32_t>(in[i]);
+      const std::int32_t hu = v + shift;
+      const std::int32_t tagged = mask<std::int32_t>(v >= pad_lo) & mask<std::int32_t>(v <= pad_hi),
+                         low = any_found & mask<std::int32_t>(v <= found) & ~tagged, none = tagged | low;
+      by_tag -= tagged;
+      by_value -= low;
+      below -= mask<std::int32_t>(hu < kAirLimit) & ~none;
+      lowest_pad = std::min(lowest_pad, (hu & none) | (Limits::max() & ~none));
+      lowest = std::min(lowest, (hu & ~none) | (Limits::max() & none));
+      out[i] = static_cast<std::int16_t>((hu & ~none) | (kNoValue & none));
+    }
+    count_.by_tag += static_cast<std::uint64_t>(by_tag);
+    count_.found += static_cast<std::uint64_t>(by_value);
+    count_.below_air += static_cast<std::uint64_t>(below);
+    if (by_tag + by_value > 0) count_.padding_hu = std::min(count_.padding_hu, static_cast<double>(lowest_pad));
+    if (lowest != Limits::max()) count_.hu_min = std::min<std::int64_t>(count_.hu_min, lowest);
   }
 
   template <class T>
@@ -289,6 +372,8 @@ class Converter {
   ValueCount& count_;
   std::vector<std::uint8_t> ring_;          // of the picture: 1 where find_ring() found padding; empty without
   const std::uint8_t* ring_row_ = nullptr;  // of the row that is converted
+  // What is sampled of the picture; the last bin is of what lies outside the others.
+  std::array<std::array<std::uint32_t, ValueCount::kBins + 1>, 4> sampled_;
   std::int64_t pad_lo_ = 1, pad_hi_ = 0, tissue_lo_ = 1, tissue_hi_ = 0, top_ = 0;
   std::int64_t found_ =
       std::numeric_limits<std::int64_t>::min();  // stored values up to this are padding that no tag names

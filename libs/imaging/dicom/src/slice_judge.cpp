@@ -18,6 +18,8 @@ constexpr int kMinSide = 12;
 constexpr float kObjectHu = -500, kAirBelowHu = -800;
 // Fewer blocks than this show too little of a body to compare.
 constexpr int kMinBlocks = 16;
+// How much better, in HU of a block, slices must fit in another order or turned over.
+constexpr double kLeastGainHu = 10;
 // Of a line of blocks from edge to edge that is of one value.
 constexpr int kLostInLine = 8;
 
@@ -180,9 +182,12 @@ class SliceJudge {
   };
   static Step step_of(std::vector<double> steps) {
     if (steps.size() < 2 * kMinBlocks) return {};
-    std::sort(steps.begin(), steps.end());
-    const double middle = steps[steps.size() / 2];
-    return {true, middle, middle > 0 ? steps[steps.size() / 4] : steps[steps.size() * 3 / 4]};
+    const auto at = [&](std::size_t n) {
+      std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(n), steps.end());
+      return steps[n];
+    };
+    const double middle = at(steps.size() / 2);
+    return {true, middle, at(middle > 0 ? steps.size() / 4 : steps.size() * 3 / 4)};
   }
   // Of blocks that are air in both slices, or would be without a step, and of blocks well within soft tissue in both:
   // what is tissue in one and air in the other is another place of the body.
@@ -256,10 +261,10 @@ class SliceJudge {
     std::vector<std::string> names;
     int how = 0;
     for (std::size_t s = 0; s + 1 < sound_.size(); ++s) {
-      if (explained(s)) continue;
+      if (explained(s) || steps_[s] <= kLeastGainHu) continue;
       for (int turned_over = 1; turned_over <= 3; ++turned_over) {
         const double d = difference(figure(s), figure(s + 1), turned_over);
-        if (!(d > 0) || steps_[s] < kSliceMirrorRatio * d || steps_[s] - d < 10) continue;
+        if (!(d > 0) || steps_[s] < kSliceMirrorRatio * d || steps_[s] - d < kLeastGainHu) continue;
         names.push_back(name(s + 1));
         explained_.push_back(s);
         how = turned_over;
@@ -299,18 +304,20 @@ class SliceJudge {
     for (const auto& [i, j] : pairs) {
       const auto taken = [&](std::size_t s) { return s == i ? j : s == j ? i : s; };
       double as_stored = 0, exchanged = 0;
+      // Sums only grow: most pairs are out after one difference, or none.
+      const auto out = [&] {
+        return as_stored - exchanged < kLeastGainHu || (exchanged > 0 && as_stored / exchanged <= best);
+      };
       std::vector<std::size_t> places{i, j};
       if (i > 0) places.push_back(i - 1);
       if (j > 0) places.push_back(j - 1);
       std::sort(places.begin(), places.end());
       places.erase(std::unique(places.begin(), places.end()), places.end());
-      for (const std::size_t s : places) {
-        if (s + 1 >= n) continue;
-        as_stored += steps_[s];
-        exchanged += difference(figure(taken(s)), figure(taken(s + 1)));
+      for (const std::size_t s : places) as_stored += s + 1 < n ? steps_[s] : 0;
+      for (auto s = places.begin(); s != places.end() && !out(); ++s) {
+        if (*s + 1 < n) exchanged += difference(figure(taken(*s)), figure(taken(*s + 1)));
       }
-      if (exchanged <= 0 || as_stored - exchanged < 10) continue;
-      if (as_stored / exchanged <= best) continue;
+      if (exchanged <= 0 || out()) continue;
       best = as_stored / exchanged;
       at = {i, j};
     }

@@ -13,18 +13,20 @@ namespace osteo::inline imaging::dicom {
 void SliceReader::read(std::size_t begin, std::size_t end, const std::vector<std::int16_t*>& out,
                        const Context& context) {
   // Frames of one file are one job.
-  std::map<std::size_t, std::vector<FrameTarget>> jobs;
+  std::map<std::size_t, Job> jobs;
   for (std::size_t k = begin; k < end; ++k) {
-    jobs[placement_.slices[k].header].push_back({placement_.slices[k].frame, out[k]});
+    Job& job = jobs[placement_.slices[k].header];
+    job.targets.push_back({placement_.slices[k].frame, out[k]});
+    job.slices.push_back(k);
   }
-  std::vector<std::pair<std::size_t, std::vector<FrameTarget>>> list(jobs.begin(), jobs.end());
+  std::vector<std::pair<std::size_t, Job>> list(jobs.begin(), jobs.end());
   std::vector<ValueCount> counts(list.size());
   std::optional<DamagedFile> damaged;
   std::mutex mutex;
   // A compressed file of many frames is decoded once, a frame a thread, before the files of single frames are shared
   // out.
   for (std::size_t f = 0; f < list.size() && !damaged; ++f) {
-    const auto& [index, targets] = list[f];
+    const std::size_t index = list[f].first;
     const DicomHeader& h = headers_[index];
     if (!h.compressed || h.frames.size() < 2) continue;
     std::vector<std::int16_t>& all = decoded_[index];
@@ -43,15 +45,25 @@ void SliceReader::read(std::size_t begin, std::size_t end, const std::vector<std
   if (damaged) throw DamagedFile(*damaged);
   std::atomic<std::size_t> done{0};
   parallel_for(list.size(), 1, context.threads, [&](std::size_t first, std::size_t) {
-    const auto& [index, targets] = list[first];
+    const auto& [index, job] = list[first];
     const DicomHeader& h = headers_[index];
+    // The pixels are looked at as soon as they are there, while they are in the cache.
+    const auto look = [&](std::size_t t) {
+      figures_[job.slices[t]] = SliceFigure(job.targets[t].out, placement_.verdict.columns, placement_.verdict.rows);
+    };
     try {
       if (h.compressed && h.frames.size() > 1) {
         const std::size_t n = h.pixels_per_frame();
         const std::vector<std::int16_t>& all = decoded_.at(index);
-        for (const FrameTarget& t : targets) std::copy_n(all.data() + static_cast<std::size_t>(t.frame) * n, n, t.out);
+        for (std::size_t t = 0; t < job.targets.size(); ++t) {
+          std::copy_n(all.data() + static_cast<std::size_t>(job.targets[t].frame) * n, n, job.targets[t].out);
+          look(t);
+        }
       } else {
-        read_frames_hu(h, targets, counts[first]);
+        for (std::size_t t = 0; t < job.targets.size(); ++t) {
+          read_frames_hu(h, {&job.targets[t], 1}, counts[first]);
+          look(t);
+        }
       }
     } catch (const PixelError& e) {
       const std::lock_guard lock(mutex);
@@ -60,10 +72,6 @@ void SliceReader::read(std::size_t begin, std::size_t end, const std::vector<std
     context.progress(static_cast<double>(++done) / static_cast<double>(list.size()), "reading slices");
   });
   if (damaged) throw DamagedFile(*damaged);
-  parallel_for(end - begin, 1, context.threads, [&](std::size_t first, std::size_t) {
-    const std::size_t k = begin + first;
-    figures_[k] = SliceFigure(out[k], placement_.verdict.columns, placement_.verdict.rows);
-  });
   for (const ValueCount& c : counts) count_.add(c);
 }
 

@@ -29,6 +29,11 @@ class SliceReader {
   [[nodiscard]] const std::vector<SliceFigure>& figures() const { return figures_; }
 
  private:
+  /// What one file is read for.
+  struct Job {
+    std::vector<FrameTarget> targets;
+    std::vector<std::size_t> slices;  ///< of each target
+  };
   const std::vector<DicomHeader>& headers_;
   const Placement& placement_;
   ValueCount count_;

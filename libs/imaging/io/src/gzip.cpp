@@ -56,19 +56,25 @@ Bytes without_end(Bytes stream, std::span<const std::byte> content) {
 
 }  // namespace
 
-std::string gzip(std::span<const std::byte> bytes) {
-  const std::size_t pieces = std::max<std::size_t>(1, (bytes.size() + kPiece - 1) / kPiece);
+std::string gzip(std::string_view head, std::string_view body) {
+  std::vector<std::span<const std::byte>> content;
+  for (const std::string_view part : {head, body}) {
+    for (std::size_t at = 0; at < part.size(); at += kPiece)
+      content.push_back(std::as_bytes(std::span(part.substr(at, kPiece))));
+  }
+  if (content.empty()) content.emplace_back();
+  const std::size_t pieces = content.size();
   std::vector<Bytes> packed(pieces);
   parallel_for(pieces, 16, 0, [&](std::size_t begin, std::size_t end) {
     const Compressor compressor(libdeflate_alloc_compressor(kLevel), &libdeflate_free_compressor);
     if (!compressor) throw std::bad_alloc();
     for (std::size_t i = begin; i < end; ++i) {
-      const auto content = bytes.subspan(i * kPiece, std::min(kPiece, bytes.size() - i * kPiece));
-      Bytes stream(libdeflate_deflate_compress_bound(compressor.get(), content.size()));
+      const auto piece = content[i];
+      Bytes stream(libdeflate_deflate_compress_bound(compressor.get(), piece.size()));
       stream.resize(
-          libdeflate_deflate_compress(compressor.get(), content.data(), content.size(), stream.data(), stream.size()));
+          libdeflate_deflate_compress(compressor.get(), piece.data(), piece.size(), stream.data(), stream.size()));
       // The last one as well is read again, for the comparison alone.
-      Bytes joined = without_end(stream, content);
+      Bytes joined = without_end(stream, piece);
       packed[i] = i + 1 < pieces ? std::move(joined) : std::move(stream);
     }
   });
@@ -77,8 +83,8 @@ std::string gzip(std::span<const std::byte> bytes) {
   for (const Bytes& p : packed) size += p.size();
   out.reserve(size);
   for (const Bytes& p : packed) out.append(reinterpret_cast<const char*>(p.data()), p.size());
-  for (const std::uint32_t word :
-       {libdeflate_crc32(0, bytes.data(), bytes.size()), static_cast<std::uint32_t>(bytes.size())}) {
+  const std::uint32_t crc = libdeflate_crc32(libdeflate_crc32(0, head.data(), head.size()), body.data(), body.size());
+  for (const std::uint32_t word : {crc, static_cast<std::uint32_t>(head.size() + body.size())}) {
     for (unsigned shift = 0; shift < 32; shift += 8) out.push_back(static_cast<char>(word >> shift & 0xffU));
   }
   return out;

@@ -392,9 +392,7 @@ void write_nrrd(const RawVolume& raw, const fs::path& path) {
   header << '\n';
   static_assert(std::endian::native == std::endian::little);
   const std::size_t size = f.voxel_count() * size_of(raw.type);
-  std::string packed = header.str();
-  packed += gzip({static_cast<const std::byte*>(raw.data.get()), size});
-  write_file(path, packed);
+  write_parts(path, header.view(), gzip({}, {static_cast<const char*>(raw.data.get()), size}));
 }
 
 }  // namespace osteo::inline imaging::io

@@ -2,10 +2,16 @@
 
 #include "seg_notes.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
 
@@ -47,6 +53,30 @@ void require_room(const std::filesystem::path& path, double voxels, double bytes
               "'" + path.string() + "': its header states " + format_number(voxels) + " voxels, which " +
                   format_number(there) + " bytes cannot hold",
               "the header is wrong or the file was cut short; copy it again from its source");
+}
+
+void write_parts(const std::filesystem::path& path, std::string_view header, std::string_view voxels) {
+  write_atomically(path, [&](const fs::path& temporary) {
+    const auto failed = [&](int error) {
+      return Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + std::strerror(error),
+                   error == ENOSPC || error == EDQUOT ? "free some space, or write to another disk" : "");
+    };
+    const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (fd < 0) throw failed(errno);
+    for (std::string_view rest : {header, voxels}) {
+      while (!rest.empty()) {
+        const ssize_t n = ::write(fd, rest.data(), rest.size());
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) {
+          const int error = errno;
+          ::close(fd);
+          throw failed(error);
+        }
+        rest.remove_prefix(static_cast<std::size_t>(n));
+      }
+    }
+    if (::close(fd) != 0) throw failed(errno);
+  });
 }
 
 Image image_from(const RawVolume& raw, const Context& context) {

@@ -76,6 +76,9 @@ void visit_scalars(const RawVolume& raw, F&& f) {
 /// (xyzt_units)".
 void convert_lengths(RawVolume& raw, double mm, const std::string& unit);
 
+/// Writes a header and its voxels as one file, atomically and without a copy of both together.
+void write_parts(const std::filesystem::path& path, std::string_view header, std::string_view voxels);
+
 /// Error(corrupt) when `there` bytes of a file cannot hold the `voxels` its header states: checked before memory is
 /// asked for. Packed bytes (deflate) grow at most 1032 times.
 void require_room(const std::filesystem::path& path, double voxels, double bytes_each, double there, bool packed);

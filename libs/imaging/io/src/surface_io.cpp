@@ -11,9 +11,14 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkXMLPolyDataReader.h>
 #include <vtkXMLPolyDataWriter.h>
+
 #include <algorithm>
+#include <bit>
+#include <charconv>
 #include <cmath>
+#include <cstring>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <tuple>
 
@@ -77,6 +82,78 @@ vtkSmartPointer<vtkPolyData> read_poly(const fs::path& path) {
   return poly;
 }
 
+// A .ply as io::ply_text() writes it, whose bytes are ours; anything else is nothing, and VTK's to judge.
+std::shared_ptr<TriMesh> read_own_ply(const fs::path& path) {
+  require_readable(path);
+  std::ifstream file(path, std::ios::binary);
+  std::string head(512, '\0');
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  std::string_view rest = head;
+  const auto take = [&](std::string_view text) {
+    const bool there = rest.starts_with(text);
+    if (there) rest.remove_prefix(text.size());
+    return there;
+  };
+  const auto take_number = [&](std::size_t& n) {
+    const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), n);
+    rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
+    return error == std::errc() && n < (std::size_t{1} << 32) && take("\n");
+  };
+  std::size_t points = 0, triangles = 0;
+  if (!take("ply\nformat binary_little_endian 1.0\ncomment ") || rest.find('\n') == rest.npos) return nullptr;
+  rest.remove_prefix(rest.find('\n'));
+  if (!take("\nelement vertex ") || !take_number(points) ||
+      !take("property float x\nproperty float y\nproperty float z\n"))
+    return nullptr;
+  const bool normals = take("property float nx\nproperty float ny\nproperty float nz\n");
+  if (!take("element face ") || !take_number(triangles) ||
+      !take("property list uchar uint vertex_indices\nend_header\n"))
+    return nullptr;
+  const std::size_t begin = head.size() - rest.size(), point_bytes = normals ? 24 : 12;
+  constexpr std::size_t kTriangleBytes = 13;
+  // VTK reads on where a file ends.
+  const std::uintmax_t needed = begin + points * point_bytes + triangles * kTriangleBytes, there = fs::file_size(path);
+  if (there < needed) {
+    throw Error(ExitCode::corrupt,
+                "'" + path.string() + "': " + std::to_string(points) + " points and " + std::to_string(triangles) +
+                    " triangles take " + std::to_string(needed) + " bytes, but there are only " + std::to_string(there),
+                "the file was cut short; copy it again from its source");
+  }
+  if (there > needed) return nullptr;
+  auto mesh = std::make_shared<TriMesh>();
+  mesh->points_mm.resize(points);
+  mesh->triangles.resize(triangles);
+  file.clear();
+  file.seekg(static_cast<std::streamoff>(begin));
+  constexpr std::size_t kAtOnce = 8192;
+  std::vector<char> part(kAtOnce * point_bytes);
+  const auto read = [&](std::size_t n, std::size_t each) {
+    return static_cast<bool>(file.read(part.data(), static_cast<std::streamsize>(n * each)));
+  };
+  for (std::size_t p = 0; p < points; p += kAtOnce) {
+    const std::size_t n = std::min(kAtOnce, points - p);
+    if (!read(n, point_bytes)) return nullptr;
+    for (std::size_t i = 0; i < n; ++i) std::memcpy(&mesh->points_mm[p + i], part.data() + i * point_bytes, 12);
+  }
+  part.resize(kAtOnce * kTriangleBytes);
+  for (std::size_t t = 0; t < triangles; t += kAtOnce) {
+    const std::size_t n = std::min(kAtOnce, triangles - t);
+    if (!read(n, kTriangleBytes)) return nullptr;
+    for (std::size_t i = 0; i < n; ++i) {
+      auto& corners = mesh->triangles[t + i];
+      std::memcpy(&corners, part.data() + i * kTriangleBytes + 1, 12);
+      if (part[i * kTriangleBytes] != 3) return nullptr;
+      if (const std::uint32_t most = std::max({corners[0], corners[1], corners[2]}); most >= points) {
+        throw Error(ExitCode::corrupt, "'" + path.string() + "': polygon " + std::to_string(t + i) + " names point " +
+                                           std::to_string(most) + ", but there are only " + std::to_string(points) +
+                                           " points");
+      }
+    }
+  }
+  return mesh;
+}
+
 }  // namespace
 
 bool is_surface_file(const fs::path& path) {
@@ -85,6 +162,10 @@ bool is_surface_file(const fs::path& path) {
 }
 
 Surface load_surface(const fs::path& path) {
+  static_assert(std::endian::native == std::endian::little);
+  if (path.extension() == ".ply") {
+    if (auto mesh = read_own_ply(path); mesh && !mesh->triangles.empty()) return mesh;
+  }
   const vtkSmartPointer<vtkPolyData> poly = read_poly(path);
   try {
     auto mesh = std::make_shared<TriMesh>(mesh_from_vtk(poly));

@@ -5,6 +5,7 @@
 #include <vtkDataArray.h>
 #include <vtkErrorCode.h>
 #include <vtkImageData.h>
+#include <vtkInformationVector.h>
 #include <vtkMatrix3x3.h>
 #include <vtkMatrix4x4.h>
 #include <vtkNIFTIImageHeader.h>
@@ -19,6 +20,7 @@
 #include <vtkmetaio/metaImage.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <iostream>
@@ -309,50 +311,69 @@ RawVolume with_slices_reversed(const RawVolume& raw) {
 
 namespace {
 
-// A file that goes when this does.
-struct Removed {
-  fs::path path;
-  ~Removed() {
-    std::error_code ignored;
-    if (!path.empty()) fs::remove(path, ignored);
+// VTK's header without its voxels, which it writes row by row.
+class NiftiHeaderWriter : public vtkNIFTIImageWriter {
+ public:
+  static NiftiHeaderWriter* New();
+  vtkTypeMacro(NiftiHeaderWriter, vtkNIFTIImageWriter);
+  NiftiHeaderWriter(const NiftiHeaderWriter&) = delete;
+  void operator=(const NiftiHeaderWriter&) = delete;
+  std::string header;
+
+ protected:
+  NiftiHeaderWriter() = default;
+  int RequestData(vtkInformation*, vtkInformationVector** input, vtkInformationVector*) override {
+    const int ok = GenerateHeader(input[0]->GetInformationObject(0), true);
+    // Sizes of nifti1.h and nifti2.h; four more bytes say that nothing comes in between. More than 32767 voxels a side
+    // make VTK take the second.
+    alignas(8) std::array<char, 540 + 4> bytes{};
+    const bool second = std::string_view(OwnHeader->GetMagic()).starts_with("n+2");
+    if (second) {
+      OwnHeader->GetHeader(reinterpret_cast<nifti_2_header*>(bytes.data()));
+    } else {
+      OwnHeader->GetHeader(reinterpret_cast<nifti_1_header*>(bytes.data()));
+    }
+    header.assign(bytes.data(), second ? 540 + 4 : 348 + 4);
+    return ok;
   }
 };
+vtkStandardNewMacro(NiftiHeaderWriter);
 
 }  // namespace
 
 void write_nifti(const RawVolume& given, const fs::path& path) {
   // A qform holds only rotations: a left-handed volume is written with its slices in reverse order.
   const RawVolume raw = determinant(given.frame.direction) < 0 ? with_slices_reversed(given) : given;
-  write_atomically(path, [&](const fs::path& temporary) {
-    const QuietVtk quiet;
-    // The matrix carries the place; the VTK image itself stays at the origin with unit axes.
-    const auto image = vtk_view(raw);
-    image->SetOrigin(0, 0, 0);
-    image->SetDirectionMatrix(1, 0, 0, 0, 1, 0, 0, 0, 1);
-    vtkNew<vtkMatrix4x4> ras;
-    const Frame& f = raw.frame;
-    for (int a = 0; a < 3; ++a) {
-      const Vec3 c = f.direction.column[static_cast<std::size_t>(a)];
-      ras->SetElement(0, a, -c.x);
-      ras->SetElement(1, a, -c.y);
-      ras->SetElement(2, a, c.z);
-    }
-    ras->SetElement(0, 3, -f.origin_mm.x);
-    ras->SetElement(1, 3, -f.origin_mm.y);
-    ras->SetElement(2, 3, f.origin_mm.z);
-    // VTK packs in one thread: it writes the plain file, which is packed here.
-    const bool packed = temporary.extension() == ".gz";
-    const Removed plain{packed ? fs::path(temporary).replace_extension() : fs::path()};
-    vtkNew<vtkNIFTIImageWriter> writer;
-    writer->SetFileName(packed ? plain.path.c_str() : temporary.c_str());
-    writer->SetInputData(image);
-    writer->SetQFormMatrix(ras);
-    writer->SetSFormMatrix(ras);
-    writer->SetDescription("Osteotome");
-    writer->Write();
-    if (writer->GetErrorCode() != 0) throw vtk_write_error(path, writer->GetErrorCode());
-    if (packed) write_file(temporary, gzip(read_file(plain.path)));
-  });
+  const QuietVtk quiet;
+  // The matrix carries the place; the VTK image itself stays at the origin with unit axes.
+  const auto image = vtk_view(raw);
+  image->SetOrigin(0, 0, 0);
+  image->SetDirectionMatrix(1, 0, 0, 0, 1, 0, 0, 0, 1);
+  vtkNew<vtkMatrix4x4> ras;
+  const Frame& f = raw.frame;
+  for (int a = 0; a < 3; ++a) {
+    const Vec3 c = f.direction.column[static_cast<std::size_t>(a)];
+    ras->SetElement(0, a, -c.x);
+    ras->SetElement(1, a, -c.y);
+    ras->SetElement(2, a, c.z);
+  }
+  ras->SetElement(0, 3, -f.origin_mm.x);
+  ras->SetElement(1, 3, -f.origin_mm.y);
+  ras->SetElement(2, 3, f.origin_mm.z);
+  vtkNew<NiftiHeaderWriter> writer;
+  writer->SetFileName(path.c_str());
+  writer->SetInputData(image);
+  writer->SetQFormMatrix(ras);
+  writer->SetSFormMatrix(ras);
+  writer->SetDescription("Osteotome");
+  writer->Write();
+  if (writer->GetErrorCode() != 0) throw vtk_write_error(path, writer->GetErrorCode());
+  const std::string_view voxels(static_cast<const char*>(raw.data.get()), f.voxel_count() * size_of(raw.type));
+  if (path.extension() == ".gz") {
+    write_file(path, gzip(writer->header, voxels));
+  } else {
+    write_parts(path, writer->header, voxels);
+  }
 }
 
 // The value of a line "KEY = value" of a MetaImage header; empty where there is none.

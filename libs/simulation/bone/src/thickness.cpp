@@ -9,6 +9,13 @@ float linear(const BrickGrid& g, Vec3 x) noexcept {
   const int i = static_cast<int>(std::floor(x.x)), j = static_cast<int>(std::floor(x.y)),
             k = static_cast<int>(std::floor(x.z));
   const auto u = static_cast<float>(x.x - i), v = static_cast<float>(x.y - j), w = static_cast<float>(x.z - k);
+  // Two of three times all eight lie in one brick, which is then looked for once.
+  if ((i & 7) != 7 && (j & 7) != 7 && (k & 7) != 7) {
+    const VoxelKey first = g.find(i, j, k);
+    if (first == BrickGrid::kNone) return 0;
+    const auto row = [&](VoxelKey at) { return (1 - u) * g.value(first + at) + u * g.value(first + at + 1); };
+    return (1 - w) * ((1 - v) * row(0) + v * row(8)) + w * ((1 - v) * row(64) + v * row(72));
+  }
   const auto row = [&](int b, int c) { return (1 - u) * g.at(i, b, c) + u * g.at(i + 1, b, c); };
   return (1 - w) * ((1 - v) * row(j, k) + v * row(j + 1, k)) + w * ((1 - v) * row(j, k + 1) + v * row(j + 1, k + 1));
 }

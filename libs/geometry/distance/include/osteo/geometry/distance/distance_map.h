@@ -88,6 +88,10 @@ class SignedDistance {
   /// O(log n); where a point's winding number is within rounding of one half, also O(openings). Any number of threads
   /// may ask at once.
   [[nodiscard]] Answer at(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone) const;
+  /// Of many points, the same to the bit and several times faster: sorted along a curve through space, each has a
+  /// neighbour that tells it where to look and, where that neighbour is farther from the surface than from it, on which
+  /// side it is.
+  [[nodiscard]] std::vector<Answer> at(std::span<const Vec3> points_mm, const Context& context = {}) const;
   /// As of TriangleTree.
   [[nodiscard]] ClosestPoint closest(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone,
                                      double limit_mm = std::numeric_limits<double>::infinity()) const {
