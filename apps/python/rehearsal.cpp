@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "arrays.h"
+#include "osteo/assessment/evidence/procedure.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "osteo/session/recording/haptic_settings.h"
 #include "osteo/session/recording/script.h"
@@ -84,8 +85,8 @@ void require_goals(const HandGoal* goals, std::size_t n, std::size_t hands) {
 class Stepped {
  public:
   Stepped(const py::object& from, bool spring, std::size_t hands, const std::string& contact,
-          const py::object& settings, const std::string& out, const std::string& resume, double rate_hz, bool surface,
-          int threads)
+          const py::object& settings, const py::object& procedure, const std::string& out, const std::string& resume,
+          double rate_hz, bool surface, int threads)
       : hands_(hands), rate_hz_(rate_hz) {
     if (hands < 1 || hands > kMaxHands)
       refuse("hands must be 1 to " + std::to_string(kMaxHands) + ", not " + std::to_string(hands));
@@ -113,6 +114,10 @@ class Stepped {
     if (of_grid && (!out.empty() || !resume.empty()))
       refuse("a grid by itself is no case: its session could not be replayed",
              "make a case with 'osteo prepare', or leave out= and resume= out");
+    const std::string operation =
+        procedure.is_none() ? "" : std::string(py::str(py::module_::import("os").attr("fspath")(procedure)));
+    if (of_grid && !operation.empty())
+      refuse("a grid by itself has no structures that a procedure could open", "give a case, or leave procedure= out");
     const auto change = [&] {
       if (!by_name) return;
       auto fields = fields_of<HapticsParams>(haptics.params);
@@ -142,6 +147,7 @@ class Stepped {
     }
     change();
     const py::gil_scoped_release free;
+    if (!operation.empty()) haptics.opened = load_procedure(operation).opened();
     options.anatomy = anatomy_of(*the_case, haptics, context_);
     anatomy_ = options.anatomy;
     World world = resume.empty() ? world_of(*the_case, options.anatomy)
@@ -362,8 +368,8 @@ py::tuple script(const std::string& path, double rate_hz) {
 
 void add_rehearsal(py::module_& m) {
   py::class_<Stepped>(m, "Stepped")
-      .def(py::init<const py::object&, bool, std::size_t, const std::string&, const py::object&, const std::string&,
-                    const std::string&, double, bool, int>())
+      .def(py::init<const py::object&, bool, std::size_t, const std::string&, const py::object&, const py::object&,
+                    const std::string&, const std::string&, double, bool, int>())
       .def("run", &Stepped::run)
       .def("bone", &Stepped::bone)
       .def("surface", &Stepped::surface)

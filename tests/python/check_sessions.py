@@ -148,6 +148,48 @@ with osteo.Rehearsal(case, hands=2, resume=out / "two", out=out / "on") as r:
 assert osteo.Session(out / "on").header["bone_hash"] == b.end["bone_hash"]
 assert {"tick": 0, "kind": "mark", "value": {"name": "here"}} in osteo.Session(out / "on").notes
 
+# What the operation opens is not at risk: the flags, the header and the end are those of the command with --procedure.
+ear = out / "ear"
+run(
+    "phantom", out / "ct.nrrd", "--labels-out", out / "l.nrrd", "--region", "temporal", "--spacing-mm", "1.5", "--quiet"
+)
+run(
+    *("prepare", out / "ct.nrrd", "-o", ear, "--lower", "500", "--spacing-mm", "1", "--structures", out / "l.nrrd"),
+    *("--names", "17=air cells, 6=facial nerve", "--quiet"),
+)
+cells = osteo.load(out / "l.nrrd", kind="labels")
+place = np.argwhere(cells.voxels == 17)
+place = place[np.argsort(place[:, 2])[-len(place) // 4]][::-1]  # of those, one not far from the left side
+target = np.array(cells.origin_mm) + cells.spacing_mm * place
+side = np.linspace(25, -1, 1500)[:, None] * (1, 0, 0)
+through = osteo.goals(target + side, axis=(1, 0, 0), tool="cutting 4 mm")
+waypoints = [{"t_s": i / 1000, "at_mm": p.tolist()} for i, p in enumerate(through["position_mm"])]
+script = {"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 4}, "axis": [1, 0, 0]}
+(out / "cells.json").write_text(json.dumps(script | {"waypoints": waypoints}))
+(out / "opens.json").write_text(
+    json.dumps({"osteotome_procedure": 1, "name": "cells", "structures": [{"name": "air cells", "role": "enter"}]})
+)
+run(
+    *("rehearse", ear, "--headless", "--fast", "--script", out / "cells.json", "--procedure", out / "opens.json"),
+    *("-o", out / "opened", "--quiet"),
+)
+strokes, _ = osteo.load_script(out / "cells.json")
+ends = {}
+for name, procedure in ("usual", None), ("opened too", out / "opens.json"):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with osteo.Rehearsal(ear, procedure=procedure, out=out / name) as r:
+            ends[name] = r.run(strokes), r.close(), json.loads((out / name / "summary.json").read_text())
+command = osteo.Session(out / "opened")
+same(ends["opened too"][0], command.ticks)
+assert ends["usual"][1]["bone_hash"] == ends["opened too"][1]["bone_hash"] == command.end["bone_hash"]
+assert ends["usual"][1]["removed_mm3"] > 1 and "structures_opened" not in ends["usual"][2]
+assert ends["opened too"][2]["structures_opened"] == ["air cells"]
+cut = [{c["name"] for c in e[2].get("structures_cut", [])} for e in ends.values()]
+assert "air cells" in cut[0] and "air cells" not in cut[1], cut
+run("replay", out / "opened too", "--quiet")
+fails(lambda: osteo.Rehearsal(ear, procedure="no such operation"), 3, "no procedure")
+
 # Bone by itself: a block of known volume, drilled by a hand that is exactly where it is told to be.
 voxels = np.zeros((40, 40, 40), np.float32)
 voxels[5:35, 5:35, 5:35] = 1
@@ -197,6 +239,7 @@ assert exact.ticks == 800
 fails(lambda: osteo.Rehearsal(block, contact="touch"), 2, "contact")
 fails(lambda: osteo.Rehearsal(block, settings={"no_such": 1}), 2, "no_such")
 fails(lambda: osteo.Rehearsal(block, out=out / "none"), 2, "no case")
+fails(lambda: osteo.Rehearsal(block, procedure="mastoidectomy"), 2, "no structures")
 fails(lambda: osteo.Rehearsal(block, hands=9), 2, "hands")
 fails(lambda: osteo.Rehearsal(out / "no-case"), 3, "no-case")
 fails(lambda: osteo.Rehearsal(case, out=out / "two"), 6, "two")

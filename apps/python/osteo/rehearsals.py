@@ -88,6 +88,7 @@ class Rehearsal:
     hand: "spring" holds the tool on a damped spring to its goals, as scripts and mice do; "exact" puts it there, whatever it meets
     contact: how the burr feels bone: rays, volume, overlap or proxy
     settings: a file of settings, or a dict of them by name; without, haptics.json of the case where there is one
+    procedure: of the operation, a file or a built-in name such as "mastoidectomy": what it opens is not at risk
     out: folder for the session, which is recorded then; `resume`: a session at whose end this begins
     surface: keep the surface up (its hash is in the summary); without it is quicker
     """
@@ -100,6 +101,7 @@ class Rehearsal:
         hands: int = 1,
         contact: str = "overlap",
         settings: _Path | dict[str, _t.Any] | None = None,
+        procedure: _Path | None = None,
         out: _Path | None = None,
         resume: _Path | None = None,
         rate_hz: float = 1000,
@@ -112,7 +114,17 @@ class Rehearsal:
         if out is not None and not text["out"]:
             raise ValueError("out is empty")
         self._servo = _osteo.Stepped(
-            bone, hand == "spring", hands, contact, settings, text["out"], text["resume"], rate_hz, surface, threads
+            bone,
+            hand == "spring",
+            hands,
+            contact,
+            settings,
+            procedure,
+            text["out"],
+            text["resume"],
+            rate_hz,
+            surface,
+            threads,
         )
         self._warn()
 

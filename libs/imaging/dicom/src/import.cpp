@@ -67,8 +67,8 @@ void check_size(Verdict& v, const Frame& frame) {
   const double longest = std::max({size.x, size.y, size.z});
   if ((longest >= kSpecimenMm || finest >= kSpecimenVoxelMm) && longest <= kLongestMm) return;
   const auto mm = [](double x) {
-    const double step = x < 1 ? 1e-4 : 0.1;
-    return format_number(std::round(x / step) * step);
+    const double parts = x < 1 ? 1e4 : 10;
+    return format_number(std::round(x * parts) / parts);
   };
   v.add(code::size_implausible, Severity::warning,
         "it is " + mm(size.x) + " x " + mm(size.y) + " x " + mm(size.z) + " mm large, in voxels of " + mm(finest) +

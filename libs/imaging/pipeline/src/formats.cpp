@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/core/base/param.h"
 #include "osteo/core/stage/stage.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/geometry/grid/sampler.h"
@@ -55,6 +57,25 @@ Volume<float> dense(const SparseGrid& grid, const Context& context) {
   return all;
 }
 
+// STL and its like have no unit. A stage cannot refuse a tooth or a whole body, but these are neither.
+void warn_of_size(const TriMesh& surface, const fs::path& path, const Context& context) {
+  constexpr float kShortestMm = 2, kLongestMm = 5000;
+  if (surface.points_mm.empty()) return;
+  auto lo = surface.points_mm.front(), hi = lo;
+  for (const auto& p : surface.points_mm) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      lo[a] = std::min(lo[a], p[a]);
+      hi[a] = std::max(hi[a], p[a]);
+    }
+  }
+  const float longest = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
+  if (longest > 0 && (longest < kShortestMm || longest > kLongestMm))
+    context.warn(
+        "'" + path.string() + "' is " + format_number(std::round(1e4 * static_cast<double>(longest)) / 1e4) +
+        " mm large: " + (longest < kShortestMm ? "are its lengths in metres?" : "are its lengths in micrometres?") +
+        " They are taken as millimetres");
+}
+
 }  // namespace
 
 std::string suffixes_of(DataKind kind) {
@@ -81,7 +102,9 @@ Data load_data(const fs::path& path, std::span<const DataKind> accepted, const C
   }
   if (is_surface_file(path)) {
     if (!accepts(accepted, DataKind::surface)) throw wrong(DataKind::surface);
-    return load_surface(path);
+    Surface surface = load_surface(path);
+    warn_of_size(*surface, path, context);
+    return surface;
   }
   if (path.extension() == ".inp" && accepts(accepted, DataKind::document)) return Document{read_text(path)};
   if (is_tet_file(path)) {

@@ -17,9 +17,10 @@ namespace reg = registration;
 
 constexpr double kMinOverlap = 0.25, kMaxInverseMm = 1, kManyOff = 1.3, kLike = 0.8;
 constexpr int kMinEdges = 300;
-// Thin slices of one head meet to 0.03 to 0.05 mm at half of all edges; from here on a mirror is tried, and believed
-// when it halves that. Trying it costs time and rejects no pair of one head: in a mirror that never fits better.
-constexpr double kDoubtMm = 0.06, kMirrorBetter = 0.5;
+// Thin slices of one head meet to 0.03 to 0.05 mm at half of all edges; from here on a mirror is tried. What is better
+// goes by the pair's own residual: thick slices leave 0.2 mm to a right pair and 0.25 to its mirror image. Of right
+// pairs none fitted better in a mirror by both (docs/validation/registration.md); between, nobody can tell.
+constexpr double kDoubtMm = 0.06, kMirrorBetter = 0.87, kMirrorBetterP90 = 0.96, kMirrorAlike = 1.15;
 // Of one head a tenth of all edges lies more than 0.07 (1 mm voxels) to 0.34 (5 mm slices) of the coarser scan's
 // spacing off; another head's do from here on.
 constexpr double kManyOffOfSpacing = 0.45, kManyOffLeastMm = 0.4;
@@ -87,7 +88,8 @@ std::string doubt(const Registration& r, const RegisterParams& p) {
   if (r.residual.points < kMinEdges)
     return "both scans show only " + std::to_string(r.residual.points) +
            " points of an edge in the same place: too little to go by";
-  if (r.mirror_tried && r.mirror.points >= kMinEdges && r.mirror.median_mm < kMirrorBetter * r.residual.median_mm)
+  if (r.mirror_tried && r.mirror.points >= kMinEdges && r.mirror.median_mm < kMirrorBetter * r.residual.median_mm &&
+      r.mirror.p90_mm < kMirrorBetterP90 * r.residual.p90_mm)
     return "the second scan fits better in a mirror, with left and right exchanged: half of all edges then meet to " +
            mm(r.mirror.median_mm) + " instead of " + mm(r.residual.median_mm) +
            "; one of the two files is mirrored, or shows the other side";
@@ -185,7 +187,12 @@ Registration register_scans(const Image& first, const Image& second, const Regis
                  " off or missing: drilled, swollen, a jaw or neck that moved, thick slices, or another patient; look "
                  "at --checkerboard-out");
   }
-  if (const std::string why = doubt(r, p); !why.empty()) {
+  const std::string why = doubt(r, p);
+  if (why.empty() && r.mirror_tried && r.mirror.points >= kMinEdges &&
+      r.mirror.median_mm < kMirrorAlike * r.residual.median_mm)
+    context.warn("in a mirror, with left and right exchanged, the second scan fits as well (" + mm(r.mirror.median_mm) +
+                 "): these scans do not show whether one of the files is mirrored");
+  if (!why.empty()) {
     if (!p.accept_poor)
       throw Error(
           ExitCode::failed, "the scans cannot be registered: " + why,

@@ -289,6 +289,7 @@ PrintedGuide make_cutting_guide(const TriangleSoup& bone, const SurgicalPlan& pl
                                 const Context& context) {
   require_sound(bone);
   std::vector<CutPlane> planes = guide::wanted_planes(plan, params);
+  planning::require_size_mm(bounds_of(bone), planes.front().bone, planning::kShortestBoneMm);
   const guide::Axes axes = guide::axes_of(bone, planes, params);
   TriangleSoup local = bone;
   for (Vec3& p : local.points_mm) p = axes.local(p);

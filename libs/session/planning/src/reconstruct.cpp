@@ -471,6 +471,8 @@ Reconstruction reconstruct(const TriangleSoup& jaw, const TriangleSoup& donor_bo
                            const Context& context) {
   require_sound(jaw);
   require_sound(donor_bone);
+  planning::require_size_mm(bounds_of(jaw), "mandible", planning::kShortestBoneMm);
+  planning::require_size_mm(bounds_of(donor_bone), "donor bone", planning::kShortestDonorMm);
   const Plane a{vec(params.a_mm), direction(params.a_normal, "--a-normal")};
   const Plane b{vec(params.b_mm), direction(params.b_normal, "--b-normal")};
   const Vec3 down = direction(params.down, "--down");

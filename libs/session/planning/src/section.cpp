@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <unordered_map>
+
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/param.h"
 
 namespace osteo::inline session::planning {
 namespace {
@@ -21,6 +25,27 @@ void crossings(const Loop& loop, double y, std::vector<double>& out) {
 }
 
 }  // namespace
+
+void require_size_mm(const BoxMm& box, const std::string& name, double shortest_mm) {
+  constexpr double kLongestMm = 2500, kLongestInMetresMm = 2;
+  const Vec3 size = box.hi - box.lo;
+  const double longest = std::max({size.x, size.y, size.z});
+  if (!(longest >= 0) || (longest >= shortest_mm && longest <= kLongestMm)) return;  // of nothing others say it
+  struct Unit {
+    std::string_view name, times;
+  };
+  const Unit unit = longest > kLongestMm           ? Unit{"micrometres", "0.001"}
+                    : longest < kLongestInMetresMm ? Unit{"metres", "1000"}
+                                                   : Unit{"centimetres or inches", "10 or 25.4"};
+  const auto mm = [](double x) {
+    const double parts = x < 1 ? 1e4 : 10;
+    return format_number(std::round(x * parts) / parts);
+  };
+  throw Error(ExitCode::usage,
+              "the " + name + " is " + mm(size.x) + " x " + mm(size.y) + " x " + mm(size.z) +
+                  " mm large: its lengths look like " + std::string(unit.name),
+              "lengths are taken as millimetres; save it with lengths times " + std::string(unit.times));
+}
 
 Sheet::Sheet(Vec3 at, Vec3 normal) : at_mm(at) {
   const Vec3 x = any_perpendicular(normal);

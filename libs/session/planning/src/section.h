@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "osteo/geometry/mesh/soup.h"
@@ -25,6 +26,13 @@ struct Sheet {
 /// The outline nearest to a place by its centroid, of those of at least 4 mm2; holes within it are not looked at.
 [[nodiscard]] std::optional<Loop> outline_near(const TriangleSoup& bone, const Sheet& sheet, Vec3 place,
                                                double within_mm);
+
+/// Refuses what is no bone of a patient in millimetres: a box whose longest side is shorter than `shortest_mm`, or
+/// longer than 2.5 m. Says the unit that its lengths look like. Without that, each step after it blames planes and
+/// sections.
+void require_size_mm(const BoxMm& box, const std::string& name, double shortest_mm);
+constexpr double kShortestBoneMm = 20;   // a jaw in centimetres is shorter
+constexpr double kShortestDonorMm = 60;  // and so is a fibula
 
 struct Moments {
   double area = 0;  ///< mm2, positive

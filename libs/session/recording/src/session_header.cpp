@@ -12,8 +12,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Kernel of contact whose guard forgot at the end of each contact; only in that does it differ from today's.
-constexpr int kForgetfulGuard = 2;
+// Kernels of contact from here on differ in the guard alone: GuardParams::law is less by one.
+constexpr int kFirstRepeatedContact = 2;
 
 const char* const kRoles[] = {"input", "result", "machine"};
 
@@ -269,7 +269,7 @@ std::string header_json(const SessionHeader& h) {
   j["dust"] = h.dust;
   if (h.dust) j["dust_model"] = h.dust_model;
   // Where an older session goes on under its own settings, it is reported by them.
-  const int contact = h.haptics.params.guard.law == 1 ? kForgetfulGuard : h.kernels.contact;
+  const int law = h.haptics.params.guard.law, contact = law == GuardParams{}.law ? h.kernels.contact : law + 1;
   j["kernels"] = {{"burrs", h.kernels.burrs}, {"contact", contact}, {"scene", h.kernels.scene}};
   for (const RecordTable* const t : {&tick_table(), &change_table(), &action_record_table()})
     j["records"][std::string(t->name)] = record_json(*t);
@@ -302,7 +302,8 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   const auto& k = j.at("kernels");
   h.kernels = {k.at("burrs"), k.at("contact"), k.at("scene")};
   Kernels repeated = h.kernels;
-  if (repeated.contact == kForgetfulGuard) repeated.contact = Kernels{}.contact;
+  const bool older_guard = h.kernels.contact >= kFirstRepeatedContact && h.kernels.contact < Kernels{}.contact;
+  if (older_guard) repeated.contact = Kernels{}.contact;
   if (repeated != Kernels{})
     say_not_replayable(o, "burrs, contact or scene of " + h.program_version + " give other bits than this version's");
   for (const auto& [kind, record] : j.at("records").items()) tables.push_back(table_of(kind, record, name, o));
@@ -333,7 +334,7 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   if (j.at("hands") != h.haptics.hands())
     throw Error(ExitCode::corrupt, name + " does not tell of a device for each hand");
   if (h.haptics.hands() > kMaxHands) say_not_replayable(o, "it has " + std::to_string(h.haptics.hands()) + " hands");
-  if (h.kernels.contact == kForgetfulGuard) h.haptics.params.guard.law = 1;
+  if (older_guard) h.haptics.params.guard.law = h.kernels.contact - 1;
   for (const auto& [setting, value] : j.at("haptics").at("params").items()) o.setting_names.push_back(setting);
   for (const std::string& u : unknown) {
     o.newer.push_back("the setting '" + u + "'");

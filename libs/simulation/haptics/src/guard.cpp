@@ -23,6 +23,11 @@ constexpr double kCreditShare = 0.5, kCreditMj = 0.1;
 // The way over which the share of the force follows.
 constexpr double kShareMm = 0.02;
 
+// Of a force of damping, for one step of the encoder.
+constexpr double kFeltStepN = 0.05;
+// Below, the force changes by the noise of numbers.
+constexpr double kLeastWayMm = 1e-3;
+
 // A limit that is not a number is the strictest.
 double limit_of(double value) {
   return value > 0 ? value : 0;
@@ -87,6 +92,31 @@ double EnergyDebt::update(Vec3 x_mm, Vec3 elastic_n, double stored_mj, Vec3 velo
   return share_;
 }
 
+void LocalStiffness::update(Vec3 x_mm, Vec3 elastic_n, Vec3 normal, double dt_s, double encoder_mm) noexcept {
+  const Vec3 moved = x_mm - last_x_mm_, more = elastic_n - last_force_n_;
+  const double step_mm = limit_of(encoder_mm);
+  if (!started_ || elastic_n == Vec3{}) {
+    const double left = std::max(0.0, 1 - dt_s / kForgetS);
+    along_ *= left;
+    across_ *= left;
+  } else if (length(moved) < std::max(kLeastWayMm, 0.5 * step_mm)) {
+    return;  // the force has hardly changed either; the way adds up
+  } else {
+    const auto follow = [&](double& value, double way_mm, double rise_n) {
+      const double slope = std::clamp(rise_n / std::max(way_mm, kLeastWayMm), 0.0, kMostNPerMm);
+      value += (slope - value) * std::min(1.0, way_mm / ((slope > value ? kWayMm : 8 * kWayMm) + step_mm));
+    };
+    const double out = dot(moved, normal);
+    const Vec3 aside = moved - normal * out, more_aside = more - normal * dot(more, normal);
+    follow(along_, std::abs(out), out > 0 ? -dot(more, normal) : dot(more, normal));
+    const double aside_mm = length(aside);
+    follow(across_, aside_mm, aside_mm > 0 ? -dot(more_aside, aside) / aside_mm : 0);
+  }
+  started_ = true;
+  last_x_mm_ = x_mm;
+  last_force_n_ = elastic_n;
+}
+
 Guard::Guard(const GuardParams& params, const DeviceTraits& device) : device_(device) {
   set(params);
 }
@@ -105,6 +135,7 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
     passivity_.reset();
     drag_.reset();
     debt_.jumped();
+    stiffness_.jumped();
     resume_ = 0;
     out.flags |= kPoseJumped;
   }
@@ -131,7 +162,22 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
   if (!(elastic == Vec3{})) {
     // Damping may slow the hand's way out, but never hold it.
     const Vec3 normal = direction(in.normal);
-    const double damping = params_.contact_damping_n_s_per_m / 1000 * dot(velocity_, normal) * share;
+    double along = params_.contact_damping_n_s_per_m, across = 0;
+    if (params_.law > 2) {
+      // What safe_stiffness_n_per_mm() would ask of damping where the force is as stiff as it really is.
+      stiffness_.update(at, elastic, normal, dt, device_.encoder_mm);
+      const double s = (dt / 2 + limit_of(device_.delay_s)) / (device_.encoder_mm > 0 ? 0.25 : 0.5);
+      // Velocities of an encoder come in steps, each of which would be felt.
+      const double most =
+          std::min(limit_of(params_.max_damping_n_s_per_m), kFeltStepN * 1000 * dt / limit_of(device_.encoder_mm));
+      const auto asked = [&](double n_per_mm) {
+        return std::clamp(1000 * n_per_mm * s - limit_of(device_.damping_n_s_per_m), 0.0, most);
+      };
+      along = std::max(along, asked(stiffness_.along_n_per_mm()));
+      across = asked(stiffness_.across_n_per_mm());
+    }
+    const double out = dot(velocity_, normal), damping = along / 1000 * out * share;
+    force -= (velocity_ - normal * out) * (across / 1000 * share);
     force -= normal * std::min(damping, std::max(0.0, dot(elastic, normal)));
   }
   if (params_.passivity) {

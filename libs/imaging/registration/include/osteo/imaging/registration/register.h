@@ -69,8 +69,8 @@ struct Registration {
 ///
 /// Where half of all edges are more than 0.06 mm off, or a tenth more than 0.45 of the coarser scan's spacing (at least
 /// 0.4 mm, at most 1.3 times `max_residual_mm`; that is a warning as well), the second scan is registered in a mirror
-/// too, by `mutual`: that halves the residual of a file with left and right exchanged, and of nothing else. It takes as
-/// long again.
+/// too, by `mutual`: that lowers the residual of a file with left and right exchanged, and of nothing else. Where it is
+/// as low as without, a warning says that the two do not show it. It takes as long again.
 ///
 /// Error(failed) that says why, unless `accept_poor`: a mirror that fits better, edges that do not meet to
 /// `max_residual_mm` (another patient, the other side, not rigid), less than a quarter of the smaller scan inside the

@@ -26,9 +26,10 @@ struct GuardParams {
   double resume_s = 0.1;
   double stale_ms = 10;
   double fade_ms = 40;
-  /// Which arithmetic; no setting. 2, or 1 for the replay of sessions whose kernel of contact is 2: nothing is owed
-  /// from one contact to the next, and drag may give energy.
-  int law = 2;
+  /// Which arithmetic; no setting. 3, or for the replay of sessions whose kernel of contact is less than 4: 2, which
+  /// damps by the stiffness asked for and not by the real one; 1, where besides nothing is owed from one contact to the
+  /// next, and drag may give energy.
+  int law = 3;
 
   static void describe(GuardParams& p, auto& visit) {
     visit({"limit_force_n", "the hand never feels more", "N", 0, 100}, p.max_force_n);
@@ -104,6 +105,24 @@ class EnergyDebt {
   bool started_ = false;
 };
 
+/// How stiff a force is where the hand is: along the contact's normal and across it, of what it changed by over the last
+/// kWayMm. In a hollow of the burr's own shape a law of force is several times as stiff as on flat bone, and stiff to
+/// the sides too, where flat bone is not.
+class LocalStiffness {
+ public:
+  static constexpr double kWayMm = 0.005, kForgetS = 0.1, kMostNPerMm = 20;
+  /// `elastic_n` by its law, before anything is taken from it.
+  void update(Vec3 x_mm, Vec3 elastic_n, Vec3 normal, double dt_s, double encoder_mm) noexcept;
+  [[nodiscard]] double along_n_per_mm() const { return along_; }
+  [[nodiscard]] double across_n_per_mm() const { return across_; }
+  void jumped() noexcept { started_ = false; }
+
+ private:
+  Vec3 last_x_mm_, last_force_n_;
+  double along_ = 0, across_ = 0;
+  bool started_ = false;
+};
+
 /// All limits in one place, in this order: fading and resuming, debt, damping and passivity, force
 /// cap, rate cap. The last thing between whatever went wrong before and a hand. No allocation. The same input gives the
 /// same bits.
@@ -141,6 +160,7 @@ class Guard {
   double most_n_ = 0;
   PassivityControl passivity_, drag_;
   EnergyDebt debt_;
+  LocalStiffness stiffness_;
   Vec3 velocity_, last_x_mm_, last_force_n_;
   bool moving_ = false;  // last_x_mm_ is of the tick before
   double resume_ = 1;    // 0 right after a jump, 1 when the force is back
