@@ -1,6 +1,6 @@
 // Tubes and structures of the ear against their truth: the tables of docs/validation/structures.md. Not a test.
 //   osteo_bench_segment tubes
-//   osteo_bench_segment shapes [FIRST LAST MAX_RADIUS MAX_UNSURE]
+//   osteo_bench_segment shapes [FIRST LAST MAX_RADIUS MAX_UNSURE] | fields [FIRST LAST SPACING NOISE]
 //   osteo_bench_segment nerves|ears [FIRST LAST SPACING SLICE NOISE SCALE]
 #include <sys/resource.h>
 
@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <map>
+#include <random>
 #include <string>
 
 #include "osteo/core/base/error.h"
@@ -264,6 +266,100 @@ void ears(int first, int last, double spacing, double slice, double noise, doubl
   std::printf("CPU %.1f s an ear\n", seconds / (last - first + 1));
 }
 
+// Fields of 40 to 60 mm, as temporal bones are scanned: cubes about the drum, the middle moved by up to 4 mm each way.
+// `inward`: the middle lies over the petrous bone, so that the canal's mouth is cut off; else the mouth is in the
+// field. With and without the drum.
+void fields(int first, int last, double spacing, double noise) {
+  constexpr double kRight = 0.7;  // by Dice
+  struct Sum {
+    int right = 0, wrong = 0;
+    double wrong_quality = 0, least_right = 1;
+    std::map<std::string, int> reasons;
+  };
+  std::map<std::string, Sum> sums;
+  for (int who = first; who <= last; ++who) {
+    PhantomParams p;
+    p.region = PhantomRegion::temporal;
+    p.spacing_mm = spacing;
+    p.noise_hu = noise;
+    p.individual = who;
+    const Phantom phantom = make_phantom(p);
+    const HeadAnatomy head(static_cast<std::uint64_t>(who));
+    std::array<std::vector<std::uint8_t>, kEarStructures> truth;
+    for (int s = 0; s < 5; ++s)
+      truth[static_cast<std::size_t>(s)] = ear_truth(phantom.labels, head, static_cast<EarStructure>(s));
+    for (const double size : {40.0, 49.0, 60.0}) {
+      for (const bool inward : {false, true}) {
+        for (const bool drum : {true, false}) {
+          std::mt19937 random(static_cast<unsigned>(who));
+          const auto moved = [&] { return static_cast<double>(random()) / 4294967296.0 * 8 - 4; };
+          const double dx = moved(), dy = moved(), dz = moved();
+          const Vec3 middle = kTrueDrum + Vec3{(inward ? -4 : 10) + dx, 6 + dy, 2 + dz};
+          const Frame& whole = phantom.ct.frame;
+          std::array<int, 3> from{}, n{};
+          for (std::size_t a = 0; a < 3; ++a) {
+            from[a] = std::max(0, static_cast<int>((middle[a] - size / 2 - whole.origin_mm[a]) / spacing));
+            n[a] = std::min(whole.dims[a], from[a] + static_cast<int>(size / spacing)) - from[a];
+          }
+          Frame f = whole;
+          f.dims = n;
+          f.origin_mm = whole.world_from_index({double(from[0]), double(from[1]), double(from[2])});
+          const auto v = make_voxels<std::int16_t>(f.voxel_count());
+          std::array<std::vector<std::uint8_t>, kEarStructures> here;
+          for (auto& h : here) h.resize(f.voxel_count());
+          std::size_t at = 0;
+          for (int k = 0; k < n[2]; ++k)
+            for (int j = 0; j < n[1]; ++j)
+              for (int i = 0; i < n[0]; ++i, ++at) {
+                const std::size_t q = phantom.ct.offset(from[0] + i, from[1] + j, from[2] + k);
+                v[at] = phantom.ct.voxels[q];
+                for (std::size_t s = 0; s < 5; ++s) here[s][at] = truth[s][q];
+                const auto t = static_cast<Tissue>(phantom.labels.voxels[q]);
+                const Vec3 x = f.world_from_index({double(i), double(j), double(k)});
+                if (!drum && length(x - kTrueDrum) < 5.5 && !is_bone(t) && v[at] < 300) v[at] = -1000;
+              }
+          EarParams e;
+          const EarFindings found = find_ear_structures({f, v}, e);
+          for (const EarFinding& x : found.findings) {
+            const auto s = static_cast<std::size_t>(x.what);
+            Sum& sum = sums[std::to_string(static_cast<int>(size)) + (inward ? " inward" : " mouth") +
+                            (drum ? " | " : " no drum | ") + std::string(EnumNames<EarStructure>::values[s])];
+            if (!x.found) {
+              std::string why;
+              for (const char c : x.why)
+                why += c >= '0' && c <= '9' ? (why.ends_with('#') ? "" : "#") : std::string(1, c);
+              ++sum.reasons[why];
+              continue;
+            }
+            const Overlap o = overlap(found.labels, static_cast<std::uint8_t>(1 + s), here[s]);
+            if (o.dice >= kRight) {
+              ++sum.right;
+              sum.least_right = std::min(sum.least_right, x.quality);
+            } else {
+              ++sum.wrong;
+              sum.wrong_quality = std::max(sum.wrong_quality, x.quality);
+              std::printf("wrong: %d %.0f %s %s %s Dice %.2f quality %.2f %.0f of %.0f mm3 %s\n", who, size,
+                          inward ? "inward" : "mouth", drum ? "drum" : "no drum",
+                          EnumNames<EarStructure>::values[s].data(), o.dice, x.quality, x.volume_mm3, o.true_mm3,
+                          x.why.c_str());
+              std::fflush(stdout);
+            }
+          }
+        }
+      }
+    }
+  }
+  std::printf(
+      "\n| field | structure | right | least quality | wrong | most quality | not found, why "
+      "|\n|---|---|---|---|---|---|---|\n");
+  for (const auto& [name, sum] : sums) {
+    std::printf("| %s | %d | %.2f | %d | %.2f |", name.c_str(), sum.right, sum.least_right, sum.wrong,
+                sum.wrong_quality);
+    for (const auto& [why, n] : sum.reasons) std::printf(" %d: %s;", n, why.c_str());
+    std::printf(" |\n");
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -278,10 +374,12 @@ int main(int argc, char** argv) {
     nerves(static_cast<int>(arg(2, 6)), static_cast<int>(arg(3, 15)), arg(4, 0.5), arg(5, 0), arg(6, 30));
   } else if (what == "ears") {
     ears(static_cast<int>(arg(2, 6)), static_cast<int>(arg(3, 15)), arg(4, 0.5), arg(5, 0), arg(6, 30), arg(7, 1));
+  } else if (what == "fields") {
+    fields(static_cast<int>(arg(2, 16)), static_cast<int>(arg(3, 35)), arg(4, 0.5), arg(5, 30));
   } else {
     std::fprintf(stderr,
                  "osteo_bench_segment ears [FIRST LAST SPACING SLICE NOISE SCALE] | tubes | nerves [FIRST LAST SPACING "
-                 "SLICE NOISE] | shapes [FIRST LAST MAX_RADIUS MAX_UNSURE]\n");
+                 "SLICE NOISE] | shapes [FIRST LAST MAX_RADIUS MAX_UNSURE] | fields [FIRST LAST SPACING NOISE]\n");
     return 2;
   }
   rusage u{};

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "error_of.h"
 #include "osteo/core/base/context.h"
@@ -103,6 +104,18 @@ TEST(Order, PlacesAreThoseOfTheSortedList) {
     for (const double share : {0.0, 0.25, 0.5, 0.95, 1.0})
       EXPECT_EQ(value_at_share(values, share), sorted[static_cast<std::size_t>(share * (n - 1))]) << share;
   }
+}
+
+// As of `osteo run <(...)`: no size, and longer than what a pipe holds at once.
+TEST(Files, APipeIsReadUntilItEnds) {
+  const TemporaryFolder folder;
+  const auto pipe = folder.path() / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const std::string text(300000, 'x');
+  std::thread writer([&] { std::ofstream(pipe, std::ios::binary) << text; });
+  const std::string read = read_text(pipe);
+  writer.join();
+  EXPECT_EQ(read, text);
 }
 
 TEST(Files, AtomicWriteLeavesOldFileOnFailure) {

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "ear_truth.h"
 #include "osteo/core/base/error.h"
+#include "osteo/imaging/image/crop.h"
 
 namespace osteo::test {
 namespace {
@@ -167,6 +169,47 @@ TEST(Ear, AFieldThatEndsAboveTheEarIsTheReasonForNoBrain) {
   Image low = ear().ct;
   low.frame.dims[2] = static_cast<int>((-12 - f.origin_mm.z) / f.spacing_mm.z);
   EXPECT_NE(why(low).find("the image ends"), std::string::npos) << why(low);
+}
+
+// Fields of 40 to 50 mm, as temporal bones are scanned. Beyond the skin they hold less air than a ball of 8 mm has room
+// in, which was taken for the middle ear without a drum.
+TEST(Ear, SmallFieldsHaveTheirStructuresOrATrueReason) {
+  const auto field = [](const Image& ct, Vec3 middle, double size) {
+    const Vec3 half{size / 2, size / 2, size / 2};
+    return crop(ct, {middle - half, middle + half});
+  };
+  const Image mouth = field(ear().ct, {55, 6, -18}, 49);
+  const EarFindings found = find(mouth, "ear_canal,air_cells,sigmoid_sinus,tegmen,dura");
+  for (const EarFinding& f : found.findings)
+    EXPECT_TRUE(f.found) << EnumNames<EarStructure>::values[static_cast<std::size_t>(f.what)] << ": " << f.why;
+  // Over the petrous bone the mouth of the canal is not in the field: that is the reason, and no drum that is not seen.
+  for (const double size : {40.0, 49.0, 60.0}) {
+    for (const EarFinding& f : find(field(ear().ct, {40, 6, -18}, size), "ear_canal,dura").findings) {
+      EXPECT_FALSE(f.found);
+      EXPECT_NE(f.why.find("the image ends inside the head on"), std::string::npos) << f.why;
+    }
+  }
+}
+
+// Without a visible drum, in a field that cuts off most of the cells: a pass between what is left of them is no drum.
+TEST(Ear, CellsThatTheFieldCutsOffAreNoDrum) {
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 0.5;
+  p.individual = 19;
+  p.noise_hu = 30;
+  const Phantom phantom = make_phantom(p);
+  std::mt19937 random(19);  // the field of bench_segment.cpp
+  const auto moved = [&] { return static_cast<double>(random()) / 4294967296.0 * 8 - 4; };
+  const double x = moved(), y = moved(), z = moved();
+  const Vec3 middle = kTrueDrum + Vec3{10 + x, 6 + y, 2 + z}, half{20, 20, 20};
+  const Box box{middle - half, middle + half};
+  const Labels labels = crop(phantom.labels, box);
+  const Image ct = changed(crop(phantom.ct, box), [&](std::size_t at, Vec3 place, int hu) {
+    return length(place - kTrueDrum) < 5.5 && !is_bone(static_cast<Tissue>(labels.voxels[at])) && hu < 300 ? -1000 : hu;
+  });
+  const EarFindings found = find(ct, "ear_canal");
+  EXPECT_FALSE(of(found, EarStructure::ear_canal).found) << of(found, EarStructure::ear_canal).volume_mm3;
 }
 
 TEST(Ear, NoiseMakesItUnsureRatherThanWrong) {

@@ -6,6 +6,7 @@
 #include <xxhash.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
@@ -132,8 +133,20 @@ void require_readable(const fs::path& path) {
 std::vector<std::byte> read_file(const fs::path& path) {
   require_readable(path);
   if (fs::is_directory(path)) throw Error(ExitCode::cannot_read, "'" + path.string() + "' is a folder, not a file");
-  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  std::ifstream in(path, std::ios::binary);
   if (!in) throw Error(ExitCode::cannot_read, "cannot read '" + path.string() + "': " + std::strerror(errno));
+  if (!in.seekg(0, std::ios::end)) {
+    // A pipe has no size: it is read until it ends.
+    in.clear();
+    std::vector<std::byte> bytes;
+    std::array<char, 1 << 16> part{};
+    while (in.read(part.data(), part.size()), in.gcount() > 0) {
+      const auto* const first = reinterpret_cast<const std::byte*>(part.data());
+      bytes.insert(bytes.end(), first, first + in.gcount());
+    }
+    if (in.bad()) throw Error(ExitCode::cannot_read, "cannot read '" + path.string() + "': " + std::strerror(errno));
+    return bytes;
+  }
   std::vector<std::byte> bytes(static_cast<std::size_t>(in.tellg()));
   in.seekg(0);
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));

@@ -17,6 +17,9 @@ constexpr double kCanalEnclosed = 0.75, kMouthMm = 2.5;  // where less of the ro
 constexpr double kCavityMm3 =
     60;  // the tympanic cavity below its ossicles has more; behind wax or a bend there is less
 
+constexpr double kMaxToBehindMm = 4;  // from the canal's end to air behind the drum; through a drum it is half a mm
+constexpr double kCutOff = 0.3;       // of the outer face; skin at the rim of a field that holds the mouth is less
+
 constexpr double kMaxBesideMm3 = 250;  // of air beside the tube that no pass parts from it: folds of a canal have less
 // Twice the most that nine in ten adults have in front of the drum (0.63 to 1.46 mL: R. Margolis, J. Heller, Screening
 // tympanometry, Audiology 1987).
@@ -268,15 +271,44 @@ double measure_canal(Canal& c, const Field& f, const Airs& airs, const Inward& i
   return volume;
 }
 
-}  // namespace
+/// From the inner end of the canal to the nearest air behind the drum.
+double behind_mm(const Canal& c, const Field& f, const Inward& in, const Drum& drum) {
+  double nearest = 1e9;
+  for (std::size_t i = 0; i < f.size(); ++i)
+    if (c.mask[i] != 0 && in.depth(i) > c.length_mm - 1)
+      nearest = std::min(nearest, static_cast<double>(drum.to_behind[i]));
+  return nearest;
+}
 
-Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
+/// Wider outward by what lies at the outer face. A field that ends just beyond the skin has air in which no ball fits,
+/// which would be taken for more of the canal.
+Field widened(const Field& f, double by_mm) {
+  Field wide = f;
+  const int more = static_cast<int>(std::ceil(by_mm / f.h_mm));
+  wide.n[0] += more;
+  wide.v.resize(wide.size());
+  for (int k = 0; k < f.n[2]; ++k)
+    for (int j = 0; j < f.n[1]; ++j)
+      for (int i = 0; i < wide.n[0]; ++i) wide.v[wide.at(i, j, k)] = f.v[f.at(std::min(i, f.n[0] - 1), j, k)];
+  return wide;
+}
+
+void narrow_again(Mask& mask, const Field& wide, const Field& f) {
+  if (mask.empty()) return;
+  Mask kept(f.size());
+  for (int k = 0; k < f.n[2]; ++k)
+    for (int j = 0; j < f.n[1]; ++j)
+      for (int i = 0; i < f.n[0]; ++i) kept[f.at(i, j, k)] = mask[wide.at(i, j, k)];
+  mask = std::move(kept);
+}
+
+Canal canal_in(const Field& f, const Levels& levels, const Context& context) {
   Canal c;
   const std::size_t n = f.size();
   const Airs airs = airs_of(f, levels, context);
   c.exterior = airs.exterior;
   if (!airs.outside) {
-    c.why = "no air outside of the head on this side";
+    c.why = "no air outside of the head within the image on this side";
     return c;
   }
   const Inward in = inward_air(f, levels, airs, context);
@@ -300,6 +332,9 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
     c.why = "no air goes from outside into bone on this side";
   } else if (reached_mm3 - tube_mm3 > kMaxBesideMm3 && reached_mm3 > 1.3 * tube_mm3) {
     c.why = "no drum is seen between the ear canal and the air behind it, so the two cannot be distinguished";
+  } else if (drum.seen && behind_mm(c, f, in, drum) > kMaxToBehindMm) {
+    // The pass lies elsewhere, between cells that the image cuts off: what was taken for the canal goes on behind it.
+    c.why = "no drum is seen at the inner end of the air that goes inward";
   } else if (c.length_mm < 8 || volume < 150) {
     c.why = "the air that goes inward is too short for a canal";
   } else if (c.length_mm > 50 || volume > kMaxCanalMm3) {
@@ -312,6 +347,26 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
     c.found = true;
     if (!drum.seen) c.why = "no air behind its end: the middle ear is not seen apart from it";
   }
+  return c;
+}
+
+}  // namespace
+
+Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
+  const Field wide = widened(f, kOutsideBallMm + 2);
+  Canal c = canal_in(wide, levels, context);
+  narrow_again(c.mask, wide, f);
+  narrow_again(c.exterior, wide, f);
+  if (c.found) return c;
+  // Whatever was seen instead: from the canal's mouth on it cannot be followed where that is not in the image.
+  double solid = 0;
+  for (int k = 0; k < f.n[2]; ++k)
+    for (int j = 0; j < f.n[1]; ++j)
+      solid += static_cast<double>(f.v[f.at(f.n[0] - 1, j, k)]) < levels.air_below ? 0 : 1;
+  const double share = solid / (static_cast<double>(f.n[1]) * f.n[2]);
+  if (share > kCutOff)
+    c.why = "the image ends inside the head on " + std::to_string(static_cast<int>(std::lround(100 * share))) +
+            " % of its outer side, so that the canal's mouth may be cut off (" + c.why + ")";
   return c;
 }
 

@@ -19,6 +19,7 @@ namespace osteo::inline imaging::segment {
 namespace {
 
 constexpr double kMinRadiusMm = 2.5, kMaxRadiusMm = 7.5;
+constexpr double kRimMm = 2;
 constexpr double kMarchStepMm = 0.5;
 constexpr int kRays = 48;
 constexpr double kHeld = 0.5;  // share of the round
@@ -430,6 +431,14 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
   part.mask = fill_tube(tube, f, wall);
   part.quality = std::clamp(hold * (1 - rough / 3), 0.0, 1.0);
   part.found = true;
+  Vec3 lo, hi;
+  bounds_of(f.frame(), lo, hi);
+  for (const Round* end : {&tube.front(), &tube.back()}) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double rim = std::min(end->centre[a] - lo[a], hi[a] - end->centre[a]);
+      if (rim < end->radius + kRimMm) part.why = "only a part of it: the image ends where it goes on";
+    }
+  }
   return part;
 }
 
