@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/core/base/big_array.h"
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/io/vtk_data.h"
@@ -157,7 +156,7 @@ DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& opt
     const int columns = p.verdict.columns, rows = p.verdict.rows;
     const std::size_t area = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows),
                       count = p.slices.size();
-    const auto pixels = std::allocate_shared_for_overwrite<std::int16_t[]>(BigAllocator<std::int16_t>(), area * count);
+    const auto pixels = make_voxels<std::int16_t>(area * count);
     std::vector<std::int16_t*> slice(count);
     for (std::size_t k = 0; k < count; ++k) slice[k] = pixels.get() + k * area;
     SliceReader reader(series.headers, p);
