@@ -15,7 +15,7 @@ struct StructureCalibration {
   int value = 0;
   std::string name;
   double least_mm3 = 0, most_mm3 = 0;  ///< volumes that are plausible
-  double least_dice = 0;               ///< an expected Dice below it is rarer than one in fifty where all is well
+  double least_dice = 0;               ///< an expected Dice below it was never met where all was well
   /// Width of a boundary in its probabilities, and the error that 95 % of such boundaries do not exceed; both in mm,
   /// both ascending, linear between. Empty: nothing is known of its boundary.
   std::vector<std::array<double, 2>> boundary_mm;
