@@ -149,7 +149,8 @@ def widths(p, at, mm):
 def fit_boundary(pairs, bins=16):
     """Rows of (width, the error that 95 % of such boundaries do not exceed), both ascending."""
     width, off = np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs])
-    edges = np.unique(np.quantile(width, np.linspace(0, 1, bins + 1)))
+    width = np.round(width, 3)  # sums of steps, which differ by the noise of numbers
+    edges = np.unique(np.quantile(width, np.linspace(0, 1, bins + 1), method="nearest"))
     rows, most = [], 0.0
     for low, high in zip(edges[:-1], edges[1:]):
         here = (width >= low) & ((width < high) | (high == edges[-1]))

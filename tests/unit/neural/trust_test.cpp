@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
 #include "osteo/imaging/neural/detail/half.h"
 #include "osteo/imaging/neural/detail/trust.h"
 
@@ -74,6 +75,15 @@ TEST(NetworkTrust, SameBitsForAnyNumberOfThreads) {
   }
 }
 
+TEST(NetworkTrust, TheShippedCalibrationIsOfTheShippedNetwork) {
+  const fs::path folder = fs::path(OSTEO_SOURCE) / "testdata/neural/ear";
+  const NetworkModel model =
+      read_network_model(read_text(folder / "plans.json"), read_text(folder / "dataset.json"), "3d_fullres");
+  const NetworkCalibration c = read_network_calibration(read_text(folder / "calibration.json"), model);
+  ASSERT_EQ(c.structures.size(), 9U);
+  for (const StructureCalibration& s : c.structures) EXPECT_GE(s.boundary_mm.size(), 2U) << s.name;
+}
+
 TEST(NetworkTrust, DamagedCalibrationsAreRefused) {
   const std::string good =
       R"({"osteotome_calibration": 1, "temperature": 1.5, "structures": [{"value": 2, "least_mm3": 3, "most_mm3": 9, "least_dice": 0.4}]})";
@@ -94,6 +104,15 @@ TEST(NetworkTrust, DamagedCalibrationsAreRefused) {
     text.replace(text.find(from), std::string(from).size(), to);
     EXPECT_THROW(static_cast<void>(read_network_calibration(text, two_structures())), Error) << text;
   }
+  const auto with_table = [&](const std::string& table) {
+    std::string text = good;
+    return text.replace(text.find("}]}"), 1, ", \"boundary_mm\": " + table + "}");
+  };
+  const auto rows = read_network_calibration(with_table("[[0.6, 0.3], [2, 0.3], [6, 9]]"), two_structures());
+  EXPECT_EQ(rows.structures[0].boundary_mm.size(), 3U);
+  for (const char* const table : {"[]", "[[1]]", "[[1, 2], [1, 3]]", "[[2, 1], [1, 3]]", "[[1, 3], [2, 1]]",
+                                  "[[-1, 3]]", "[[1, \"3\"]]", "[1, 3]"})
+    EXPECT_THROW(static_cast<void>(read_network_calibration(with_table(table), two_structures())), Error) << table;
 }
 
 }  // namespace

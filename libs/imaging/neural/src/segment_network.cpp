@@ -193,7 +193,7 @@ void open_network(const fs::path& folder, int fold, NetworkModel& model, std::st
 }
 
 NetworkLogits logits_of_stage(const Image& ct, const fs::path& folder, NetworkModel& model, const NetworkParams& params,
-                              bool first_stage, const Context& around) {
+                              bool first_stage, const Context& around, const NetworkKnown& known = {}) {
   if (!(params.step > 0 && params.step <= 1)) throw Error(ExitCode::usage, "--step is not above 0 and at most 1");
   std::vector<int> folds = network_folds(folder);
   if (!params.folds.empty()) {
@@ -207,6 +207,7 @@ NetworkLogits logits_of_stage(const Image& ct, const fs::path& folder, NetworkMo
   std::vector<int> mirror_axes;
   std::optional<Network> network;
   open_network(folder, folds[0], model, configuration, mirror_axes, network);
+  if (known) known(model);
 
   std::optional<Labels> previous;
   Context context = around;
@@ -326,8 +327,8 @@ NetworkLogits logits_of_stage(const Image& ct, const fs::path& folder, NetworkMo
 }  // namespace
 
 NetworkLogits network_logits(const Image& ct, const fs::path& folder, NetworkModel& model, const NetworkParams& params,
-                             const Context& context) {
-  return logits_of_stage(ct, folder, model, params, false, context);
+                             const Context& context, const NetworkKnown& known) {
+  return logits_of_stage(ct, folder, model, params, false, context, known);
 }
 
 Labels labels_of_logits(const NetworkLogits& logits, const NetworkModel& model, const Frame& frame,
@@ -432,7 +433,12 @@ NetworkLabels segment_with_network(const Image& ct, const fs::path& model, const
         "network.json and an ONNX file");
   }
   NetworkModel of;
-  const NetworkLogits logits = network_logits(ct, model, of, params, context);
+  std::optional<NetworkCalibration> calibration;
+  // A damaged one is rejected before the first window.
+  const NetworkLogits logits = network_logits(ct, model, of, params, context, [&](const NetworkModel& known) {
+    if (const fs::path path = model / "calibration.json"; fs::exists(path))
+      calibration = read_network_calibration(read_text(path), known);
+  });
   context.progress(0.9, "labels");
   NetworkLabels found;
   found.structures = labels_of_logits(logits, of, ct.frame, context);
@@ -444,8 +450,8 @@ NetworkLabels segment_with_network(const Image& ct, const fs::path& model, const
     if (!met[s.value]) missing += (missing.empty() ? "" : ", ") + s.name;
   }
   if (!missing.empty()) context.report("not_found", missing);
-  if (const fs::path path = model / "calibration.json"; fs::exists(path))
-    judge(found, logits, of, read_network_calibration(read_text(path), of), context);
+  if (calibration)
+    judge(found, logits, of, *calibration, context);
   else
     context.report("boundary_within_mm", "not calibrated");
   context.progress(1);

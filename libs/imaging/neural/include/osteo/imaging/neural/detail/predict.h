@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "osteo/core/data/volume.h"
@@ -19,8 +20,11 @@ struct NetworkLogits {
 
 /// The folder's folds, in order: numbers, or -1 for fold_all where there is no other.
 [[nodiscard]] std::vector<int> network_folds(const std::filesystem::path& model);
+/// Called with the model once it is known, before the first window.
+using NetworkKnown = std::function<void(const NetworkModel& model)>;
 [[nodiscard]] NetworkLogits network_logits(const Image& ct, const std::filesystem::path& folder, NetworkModel& model,
-                                           const NetworkParams& params, const Context& context);
+                                           const NetworkParams& params, const Context& context,
+                                           const NetworkKnown& known = {});
 [[nodiscard]] Labels labels_of_logits(const NetworkLogits& logits, const NetworkModel& model, const Frame& frame,
                                       const Context& context);
 
