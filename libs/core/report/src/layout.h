@@ -1,11 +1,11 @@
 // Where things lie on a page. Private to libs/core/report; millimetres from the upper left corner unless it says
 // otherwise.
 #pragma once
-#include <cairo.h>
-
 #include <vector>
 
 #include "osteo/core/report/sheet.h"
+
+using cairo_surface_t = struct _cairo_surface;  // as cairo.h has it, which not all who include this need
 
 namespace osteo::report {
 
