@@ -153,7 +153,7 @@ def fit_boundary(pairs, bins=16):
     edges = np.unique(np.quantile(width, np.linspace(0, 1, bins + 1), method="nearest"))
     rows, most = [], 0.0
     for low, high in zip(edges[:-1], edges[1:]):
-        here = (width >= low) & ((width < high) | (high == edges[-1]))
+        here = (width <= high) & ((width > low) | (low == edges[0]))
         if here.sum() < 50:
             continue
         most = max(most, min(float(np.quantile(off[here], 0.95)), 20.0))
