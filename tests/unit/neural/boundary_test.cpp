@@ -98,6 +98,16 @@ TEST(NetworkBoundary, IsToldByPlace) {
   EXPECT_EQ(got->classes.structures[3].name, "boundary uncertain by more than 1.2 mm");
 }
 
+// To a tenth of a millimetre, rounded up; never 0, which says that nothing is known.
+TEST(NetworkBoundary, OfAStructureItIsToldInTenths) {
+  const Plane p = plane(7.1, [](double y) { return y < 0.5 ? 2.0 : 0.3; });
+  NetworkCalibration c = step_at(2.5);
+  for (const auto& [mm, want] : {std::pair{0.0, 0.1}, {0.31, 0.4}, {0.9, 0.9}, {5.95, INFINITY}, {80.0, INFINITY}}) {
+    c.structures[0].boundary_mm = {{2.5, mm}, {4, mm}};
+    EXPECT_EQ(boundary_uncertainty(p.labels, p.logits, p.model, c, {})->structures[0].within_mm, want) << mm;
+  }
+}
+
 TEST(NetworkBoundary, TemperatureWidensIt) {
   const Plane p = plane(7.1, [](double) { return 0.3; });
   NetworkCalibration c = step_at(2);  // 1.3 wide as it is, 2.6 with a temperature of 2

@@ -15,7 +15,8 @@ namespace osteo::inline imaging {
 namespace {
 
 constexpr double kStepMm = 0.1, kOutside = 0.1, kInside = 0.9;
-using Point = std::array<double, 3>;  // on the network's grid, in voxels
+constexpr std::size_t kMostTenths = 60;  // of a millimetre: from there on nothing can be said
+using Point = std::array<double, 3>;     // on the network's grid, in voxels
 
 // Probability of one class on the network's grid.
 class Probability {
@@ -187,25 +188,30 @@ std::optional<BoundaryUncertainty> boundary_uncertainty(const Labels& labels, co
           for (n[2] = 0; n[2] < size[2]; ++n[2]) {
             if (label(n) != s.value || !at_boundary(n)) continue;
             const double mm = calibrated(s.boundary_mm, width_mm(probability, under.of(n), under.mm));
-            const auto found =
-                std::find_if(kUncertaintyMm.begin(), kUncertaintyMm.end(), [&](double most) { return mm <= most; });
+            // Tenths for now, rounded up, and 1 more, since 0 is no boundary.
             classes[under.turned.at(n[0], n[1], n[2])] =
-                static_cast<std::uint8_t>(1 + (found - kUncertaintyMm.begin()));
+                static_cast<std::uint8_t>(1 + std::min<double>(kMostTenths, std::ceil(10 * mm - 1e-6)));
           }
         }
       }
     });
     StructureBoundary row;
     row.name = s.name;
+    std::array<std::size_t, kMostTenths + 1> met{};
     std::size_t all = 0;
     for (std::size_t v = 0; v < labels.frame.voxel_count(); ++v) {
       if (labels.voxels[v] != s.value || classes[v] == 0) continue;
-      ++row.voxels[classes[v] - 1U];
+      const auto tenths = static_cast<std::size_t>(classes[v] - 1);
+      ++met[tenths];
       ++all;
+      std::size_t c = 0;
+      while (c < kUncertaintyMm.size() && static_cast<double>(tenths) > 10 * kUncertaintyMm[c] + 1e-6) ++c;
+      classes[v] = static_cast<std::uint8_t>(c + 1);
+      ++row.voxels[c];
     }
-    std::size_t met = 0, c = 0;
-    while (c < kUncertaintyMm.size() && (met += row.voxels[c]) * 20 < all * 19) ++c;
-    row.within_mm = c < kUncertaintyMm.size() ? kUncertaintyMm[c] : std::numeric_limits<double>::infinity();
+    std::size_t below = met[0], tenths = 1;  // 0 would say that nothing is known
+    while (tenths < kMostTenths && (below += met[tenths]) * 20 < all * 19) ++tenths;
+    row.within_mm = tenths < kMostTenths ? static_cast<double>(tenths) / 10 : std::numeric_limits<double>::infinity();
     if (all > 0) result.structures.push_back(row);
   }
   result.classes.voxels = classes;

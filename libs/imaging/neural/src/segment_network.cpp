@@ -408,8 +408,7 @@ void judge(NetworkLabels& found, const NetworkLogits& logits, const NetworkModel
   }
   if (auto boundary = boundary_uncertainty(found.structures, logits, model, calibration, context)) {
     for (const StructureBoundary& s : boundary->structures) {
-      add(within, s.name + (std::isfinite(s.within_mm) ? " " + format_number(s.within_mm)
-                                                       : " more than " + format_number(kUncertaintyMm.back())));
+      add(within, s.name + " " + (std::isfinite(s.within_mm) ? format_number(s.within_mm) : "not known"));
       structure(s.name)->within_mm = s.within_mm;
     }
     found.uncertainty = std::move(boundary->classes);

@@ -52,7 +52,7 @@ inline constexpr double kWidestMm = 6;  ///< of a boundary in its probabilities;
 struct StructureBoundary {
   std::string name;
   std::array<std::size_t, kUncertaintyMm.size() + 1> voxels{};  ///< at its boundary, by class
-  double within_mm = 0;  ///< the uncertainty that 95 % of them do not exceed; infinite in the last class
+  double within_mm = 0;  ///< the uncertainty that 95 % of them do not exceed, in tenths; infinite from 6 mm on
 };
 struct BoundaryUncertainty {
   Labels classes;  ///< in the frame of the labels: 1 to 4 in voxels of calibrated structures that touch another label
