@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "measures.h"
+#include "osteo/core/base/param.h"
 #include "osteo/core/base/translate.h"
 #include "texts.h"
 
