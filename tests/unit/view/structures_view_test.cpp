@@ -212,7 +212,7 @@ TEST(StructuresView, WhatIsUncertainIsHatched) {
     const Picture p = window.render();
     int counted = 0;
     for (int y = 90; y < 110; ++y)
-      for (int x = x0; x < x1; ++x) counted += p.rgb[3 * static_cast<std::size_t>(y * p.width + x) + 1] > 60 ? 1 : 0;
+      for (int x = x0; x < x1; ++x) counted += p.rgb[3 * static_cast<std::size_t>(y * p.width + x) + 1] > 85 ? 1 : 0;
     return counted / (20.0 * (x1 - x0));
   };
   EXPECT_EQ(pale(60, 90), 0);
