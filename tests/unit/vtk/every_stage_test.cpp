@@ -277,6 +277,14 @@ Image ct_of_the_ball() {
 
 class EveryStage : public testing::TestWithParam<std::string> {};
 
+// The ball drawn out: a donor bone of 20 mm would be taken for one in centimetres.
+Surface long_donor() {
+  auto mesh = std::make_shared<TriMesh>(*values().surface);
+  for (auto& p : mesh->points_mm) p = to_floats(Vec3{from_floats(p).x, from_floats(p).y, 5 * from_floats(p).z});
+  mesh->normals.clear();
+  return mesh;
+}
+
 TEST_P(EveryStage, IsAVtkFilterThatGivesWhatTheStageGives) {
   if ((GetParam() == "calibrate" || GetParam() == "fit-damping") && !has_ceres()) GTEST_SKIP() << "built without Ceres";
   const Registry registry = osteo_stages();
@@ -315,6 +323,7 @@ TEST_P(EveryStage, IsAVtkFilterThatGivesWhatTheStageGives) {
     }
     if (GetParam() == "find-structures") inputs.back() = finer_ct();  // an ear cannot be made out in 2 mm voxels
     if (GetParam() == "outcome" && port.name == "postop") inputs.back() = ct_of_the_ball();
+    if (GetParam() == "plan-reconstruction" && port.name == "fibula") inputs.back() = long_donor();
     if (GetParam() == "bone-stiffness" && port.name == "ct") inputs.back() = ct_around_the_ball();
     vtkNew<vtkTrivialProducer> producer;
     producer->SetOutput(as_vtk(inputs.back()));
