@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Small networks with seeded weights in nnU-Net's folder format, and what nnunetv2 makes of a seeded image with them.
 
-    python3 -m venv build/nnunet && build/nnunet/bin/pip install nnunetv2 pynrrd
+    python3 -m venv build/nnunet && build/nnunet/bin/pip install nnunetv2 pynrrd onnx onnxscript
     build/nnunet/bin/python tests/neural/make_golden.py testdata/neural
 
 Writes per case: the model's folder, image.nrrd, labels.nrrd and logits.f16 (class by class, on the network's grid).
@@ -17,6 +17,7 @@ os.environ.setdefault("nnUNet_raw", "/tmp")
 os.environ.setdefault("nnUNet_preprocessed", "/tmp")
 os.environ.setdefault("nnUNet_results", "/tmp")
 import numpy as np
+import onnx
 import torch
 from nnunetv2.inference.predict_from_raw_data import nnUNetPredictor
 from nnunetv2.utilities.get_network_from_plans import get_network_from_plans
@@ -347,6 +348,16 @@ def write_golden(folder, case, image, labels, logits):
     (folder / "logits.f16").write_bytes(np.ascontiguousarray(logits).astype("<f2").tobytes())
 
 
+def without_traces(file):
+    """The exporters write where in their own sources each node came from."""
+    model = onnx.load(file, load_external_data=False)
+    graph = model.graph
+    for part in [model, graph, *graph.node, *graph.initializer, *graph.input, *graph.output, *graph.value_info]:
+        del part.metadata_props[:]
+        part.doc_string = ""
+    file.write_bytes(model.SerializeToString())
+
+
 def write_onnx(model, folder, newer):
     """The model's network as an ONNX file, and network.json beside it. The newer exporter keeps weights in a file beside."""
     predictor = nnUNetPredictor(device=torch.device("cpu"), perform_everything_on_device=False, allow_tqdm=False)
@@ -357,6 +368,7 @@ def write_onnx(model, folder, newer):
     folder.mkdir(parents=True, exist_ok=True)
     patch = [int(n) for n in configuration.patch_size]
     torch.onnx.export(network, (torch.zeros(1, 1, *patch),), str(folder / "network.onnx"), dynamo=newer)
+    without_traces(folder / "network.onnx")
     of = CT["0"]
     description = {
         "osteotome_network": 1,
