@@ -141,6 +141,21 @@ TEST(StructureSurfaces, ACrumbStaysWhatItIs) {
   EXPECT_GT(moved, 100);
 }
 
+// A map's structures from the front, from 8 mm to each side.
+struct Seen {
+  explicit Seen(const StructureMap& map) : view(made(), map) { look_at(renderer, {0, 0, 0}, 8, {0, -1, 0}); }
+  OffscreenWindow window{200, 200};
+  vtkNew<vtkRenderer> renderer;
+  StructuresView view;
+
+ private:
+  vtkRenderer* made() {
+    window.window()->AddRenderer(renderer);
+    set_up_scene(renderer);
+    return renderer;
+  }
+};
+
 TEST(StructuresView, ClearLetsEveryOtherPixelThroughAndHiddenAll) {
   // A small ball behind a large one.
   Labels labels = labelled(8, {0.5, 0.5, 0.5}, [](Vec3 p) { return length(p - Vec3{0, -3, 0}) - 4; });
@@ -156,14 +171,10 @@ TEST(StructuresView, ClearLetsEveryOtherPixelThroughAndHiddenAll) {
   labels.voxels = v;
   labels.structures = {{1, "in front", {255, 0, 0}}, {2, "behind", {0, 255, 0}}};
   const StructureMap map(labels, 2);
-  OffscreenWindow window(200, 200);
-  vtkNew<vtkRenderer> renderer;
-  window.window()->AddRenderer(renderer);
-  set_up_scene(renderer);
-  StructuresView view(renderer, map);
-  look_at(renderer, {0, 0, 0}, 8, {0, -1, 0});
+  Seen seen(map);
+  StructuresView& view = seen.view;
   const auto share_in_middle = [&](std::size_t channel) {
-    const Picture p = window.render();
+    const Picture p = seen.window.render();
     int counted = 0;
     for (int y = 94; y < 106; ++y) {
       for (int x = 94; x < 106; ++x) {
@@ -202,14 +213,10 @@ TEST(StructuresView, WhatIsUncertainIsHatched) {
         v[labels.offset(i, j, k)] = static_cast<std::uint8_t>(labels.at(i, j, k) == 0 ? 0 : left ? 4 : 3);
       }
   values.voxels = v;
-  OffscreenWindow window(200, 200);
-  vtkNew<vtkRenderer> renderer;
-  window.window()->AddRenderer(renderer);
-  set_up_scene(renderer);
-  StructuresView view(renderer, map);
-  look_at(renderer, {0, 0, 0}, 8, {0, -1, 0});
+  Seen seen(map);
+  StructuresView& view = seen.view;
   const auto pale = [&](int x0, int x1) {
-    const Picture p = window.render();
+    const Picture p = seen.window.render();
     int counted = 0;
     for (int y = 90; y < 110; ++y)
       for (int x = x0; x < x1; ++x) counted += p.rgb[3 * static_cast<std::size_t>(y * p.width + x) + 1] > 85 ? 1 : 0;
@@ -225,7 +232,7 @@ TEST(StructuresView, WhatIsUncertainIsHatched) {
   // What a hand has corrected is not.
   view.show(0, StructureLook::hidden);
   {
-    StructuresView other(renderer, corrected);
+    StructuresView other(seen.renderer, corrected);
     other.hatch(values, 4);
     EXPECT_EQ(pale(60, 90) + pale(110, 140), 0);
   }

@@ -387,13 +387,18 @@ TEST(FirstSteps, WithoutDustNothingIsAskedOfTheSucker) {
 
 // --- what the burr does now
 
-TEST(StateFacts, ADistanceSaysHowUncertainTheBoundaryIs) {
+Labels one_voxel_nerve() {
   Labels labels;
   labels.frame.dims = {8, 8, 8};
   const auto voxels = make_voxels<std::uint8_t>(512);
   voxels[292] = 6;
   labels.voxels = voxels;
   labels.structures = {{6, "facial nerve", {1, 1, 0}}};
+  return labels;
+}
+
+TEST(StateFacts, ADistanceSaysHowUncertainTheBoundaryIs) {
+  Labels labels = one_voxel_nerve();
   TickRecord tick;
   tick.structure = 6;
   tick.clearance_mm = 1.24F;
@@ -405,13 +410,7 @@ TEST(StateFacts, ADistanceSaysHowUncertainTheBoundaryIs) {
 }
 
 TEST(StateFacts, TellHowWarmItIs) {
-  Labels labels;
-  labels.frame.dims = {8, 8, 8};
-  const auto voxels = make_voxels<std::uint8_t>(512);
-  voxels[292] = 6;
-  labels.voxels = voxels;
-  labels.structures = {{6, "facial nerve", {1, 1, 0}}};
-  const StructureMap map(labels);
+  const StructureMap map(one_voxel_nerve());
   TickRecord tick;
   StateFacts far = state_of_tick(tick, &map, 1000), near = far, hot = far, worst = far;
   report_warmth(far, {41.7, {{6, 40.25}}}, tick, &map);

@@ -48,6 +48,10 @@ bool holds_dicom(const fs::path& folder) {
   return false;
 }
 
+bool can_be_looked_into(FolderKind kind) {
+  return kind == FolderKind::folder || kind == FolderKind::scan || kind == FolderKind::network;
+}
+
 }  // namespace
 
 FolderLook look_at_path(const fs::path& path) {
@@ -175,7 +179,7 @@ void StartList::up() {
 std::optional<StartChoice> StartList::open() {
   if (selected_ >= static_cast<int>(entries_.size())) return std::nullopt;
   const StartEntry entry = entries_[static_cast<std::size_t>(selected_)];
-  if (entry.kind == FolderKind::folder || entry.kind == FolderKind::scan || entry.kind == FolderKind::network) {
+  if (can_be_looked_into(entry.kind)) {
     look_into(entry.folder);
     return std::nullopt;
   }
@@ -239,8 +243,7 @@ std::optional<StartChoice> StartList::take_one(const fs::path& path) {
   const std::optional<StartChoice> choice = choice_of(path, why);
   if (choice) return choice;
   const FolderLook look = look_at_path(path);
-  if (look.kind == FolderKind::folder || look.kind == FolderKind::scan || look.kind == FolderKind::network)
-    look_into(fs::absolute(look.folder));
+  if (can_be_looked_into(look.kind)) look_into(fs::absolute(look.folder));
   message_ = why;
   return std::nullopt;
 }

@@ -28,6 +28,7 @@ class OnnxSteps {
     values_[graph.inputs[0]] = {{0}};
     channels_ = {1};
     scale_ = {{1, 1, 1}};
+    open_ = {false};
     for (const auto& [name, tensor] : graph.tensors) made_.weight_bytes += tensor.values.size() * sizeof(float);
   }
 
@@ -145,13 +146,11 @@ class OnnxSteps {
     made_.steps.push_back(std::move(s));
     channels_.push_back(channels);
     scale_.push_back(scale);
-    open_.resize(channels_.size(), false);
-    open_.back() = open;
+    open_.push_back(open);
     return static_cast<int>(made_.steps.size());
   }
   void give(int v) { values_[node_->outputs[0]] = {v}; }
   void seal(const std::vector<int>& values) {
-    open_.resize(channels_.size(), false);
     for (const int v : values) open_[static_cast<std::size_t>(v)] = false;
   }
   Step& step(int v) { return made_.steps[static_cast<std::size_t>(v) - 1]; }
@@ -160,7 +159,6 @@ class OnnxSteps {
   template <class Fits>
   int own(std::size_t n, const Fits& fits) {
     const int v = one(n);
-    open_.resize(channels_.size(), false);
     if (open_[static_cast<std::size_t>(v)] && uses_.at(input(n)) == 1 && fits(step(v))) return v;
     Step copy;
     copy.kind = Step::Kind::pool;
