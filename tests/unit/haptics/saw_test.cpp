@@ -41,6 +41,7 @@ struct Cut {
   World world{test::bar(0.25, 0.4)};
   double removed_mm3 = 0, middle_mm = 0, spread_mm = 0, farthest_mm = 0, most_n = 0, shown_off_mm = 0, seconds = 0;
   std::vector<TickRecord> records;
+  std::map<VoxelKey, double> lost;  // share of each voxel
 
   explicit Cut(const CuttingGuide& guide, const std::function<DeviceSample(double t_s, double z_mm)>& hand,
                double mm_per_s = 1, double most_s = 1e9) {
@@ -52,7 +53,6 @@ struct Cut {
     const BrickGrid& bone = world.bodies().front().body->bone;
     const double voxel = bone.frame().voxel_volume_mm3();
     double sum = 0, squares = 0;
-    std::map<VoxelKey, double> gone_of;
     seconds = std::min(most_s, 10.4 / mm_per_s);
     for (int t = 0; t < seconds * 1000; ++t) {
       const double t_s = t / 1000.0, z = 5.2 - mm_per_s * t_s;
@@ -63,14 +63,14 @@ struct Cut {
         removed_mm3 += gone;
         sum += gone * x;
         squares += gone * x * x;
-        gone_of[c.voxel] += gone / voxel;
+        lost[c.voxel] += gone / voxel;
       }
       const Vec3 tip = from_floats(step.record.device.position_mm) + from_floats(step.record.shown_offset_mm);
       if (t > 300) shown_off_mm = std::max(shown_off_mm, std::abs(tip.x - kGuide.at_mm.x));
       most_n = std::max(most_n, static_cast<double>(step.record.normal_force_n));
       records.push_back(step.record);
     }
-    for (const auto& [name, gone] : gone_of) {
+    for (const auto& [name, gone] : lost) {
       if (gone > 0.1) farthest_mm = std::max(farthest_mm, std::abs(place_of_voxel_mm(bone, name).x - kGuide.at_mm.x));
     }
     middle_mm = sum / removed_mm3;
@@ -198,16 +198,135 @@ TEST(HandSaw, SlipsInAndOutWithoutAJump) {
   EXPECT_EQ(last, 0);
 }
 
+// A slot with play, by its closed form: as the hand has it where the faces let it; else as far over as they let it.
+TEST(HandSaw, ASlotWithPlayLetsTheBladeLieBetweenItsFaces) {
+  // 8 mm high, 20 mm long, 0.2 mm of play; its middle is 6 mm above the plane's place in bone.
+  const CuttingGuide printed{{2, 0, 6}, {1, 0, 0}, 3, 0.2, {0, 0, 8}, 20};
+  struct Case {
+    Vec3 at, axis;
+    double off, slope;  // of the tip; in mm a mm along the plane
+    const char* what;
+  };
+  const auto leaning = [](double slope, Vec3 along) { return normalized(along + Vec3{slope, 0, 0}); };
+  const Vec3 down{0, 0, -1}, across{0, 1, 0};
+  const std::vector<Case> cases{
+      {{2.05, 0, 0}, down, 0.05, 0, "straight down, within the play"},
+      {{2.7, 0, 0}, down, 0.1, 0, "straight down, at a face"},
+      {{1.2, 0, -5}, down, -0.1, 0, "at the other face, deeper"},
+      // Over at both ends of the faces: 0.2 mm over 8 mm, and on in that line below them.
+      {{2.9, 0, 0}, leaning(0.2, down), 0.1 + 2 * 0.025, 0.025, "leaning, above its tip between the faces"},
+      // Far below them the hand is so far over that both ends are at the other face.
+      {{3.5, 0, -10}, leaning(0.2, down), -0.1, 0, "leaning, both ends at one face"},
+      {{4.4, 0, -10}, leaning(0.2, down), 12 * 0.0125, 0.0125, "leaning, one end in the middle"},
+      {{-0.4, 0, -10}, leaning(-0.2, down), -12 * 0.0125, -0.0125, "the other way"},
+      {{2.03, 0, 2}, leaning(0.01, down), 0.03, 0.01, "a little, within the play"},
+      // Along the slot it is 20 mm long.
+      {{4, 10, 0}, leaning(0.2, across), 0.1, 0.01, "along the slot, at its end"},
+      {{2.0, 0, 0}, leaning(0.2, across), 0, 0.01, "along the slot, in its middle"},
+      {{2.0, 0, 0}, leaning(-0.2, across), 0, -0.01, "along the slot, the other way"},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.what);
+    SawSlot slot;
+    Vec3 at, axis;
+    for (int t = 0; t < 200; ++t) EXPECT_TRUE(slot.step(printed, true, at = c.at, axis = c.axis, 1e-3));
+    EXPECT_NEAR(at.x - 2, c.off, 1e-12);
+    EXPECT_NEAR(axis.x / std::sqrt(1 - axis.x * axis.x), c.slope, 1e-12);
+    EXPECT_EQ(at.y, c.at.y);
+    EXPECT_EQ(at.z, c.at.z);
+    EXPECT_NEAR(slot.force_n(4, 100).x, 4 * (c.off - (c.at.x - 2)), 1e-9);
+  }
+  // Turned anywhere, with the same play in each direction of the plane.
+  const CuttingGuide square{{2, 0, 6}, {1, 0, 0}, 3, 0.2, {0, 0, 8}, 8};
+  EXPECT_NEAR(square.reach_mm(normalized({0, 1, 1})), 4 * std::numbers::sqrt2, 1e-12);
+  EXPECT_NEAR(square.reach_mm({0, -1, 0}), 4, 1e-12);
+}
+
+// How far the plane through the removed bone is off in the bar's middle, and tilted.
+struct Plane {
+  double off_mm = 0, tilt_deg = 0;
+};
+// Regression of x over y and z.
+Plane plane_of(const Cut& c) {
+  const BrickGrid& bone = c.world.bodies().front().body->bone;
+  double all = 0, yy = 0, zz = 0, yz = 0, xy = 0, xz = 0;
+  Vec3 mean;
+  for (const auto& [name, share] : c.lost) {
+    all += share;
+    mean += place_of_voxel_mm(bone, name) * share;
+  }
+  mean = mean * (1 / all);
+  for (const auto& [name, share] : c.lost) {
+    const Vec3 d = place_of_voxel_mm(bone, name) - mean;
+    yy += share * d.y * d.y;
+    zz += share * d.z * d.z;
+    yz += share * d.y * d.z;
+    xy += share * d.x * d.y;
+    xz += share * d.x * d.z;
+  }
+  const double det = yy * zz - yz * yz, sy = (xy * zz - xz * yz) / det, sz = (xz * yy - xy * yz) / det;
+  return {mean.x - sy * mean.y - sz * mean.z - kGuide.at_mm.x, std::atan(std::hypot(sy, sz)) * 360 / kTurn};
+}
+
+// The unsteady hand with the blade upright, to and fro along the slot while it goes down; and one that always leans to
+// one side, which play cannot average out.
+DeviceSample upright(double t, double z) {
+  return held({2.4 + 1.5 * std::sin(kTurn * 0.9 * t), 7 * std::sin(kTurn * 0.5 * t), z},
+              {0.21 * std::sin(kTurn * 0.6 * t + 1), 0.05, -1});
+}
+DeviceSample leaning(double t, double z) {
+  return held({2.4 + 0.3 * std::sin(kTurn * 0.9 * t), 7 * std::sin(kTurn * 0.5 * t), z}, {0.21, 0, -1});
+}
+
+// What play costs. Its bound: half of it, and what it leaves of a slope from the slot's middle to the bone's.
+TEST(HandSaw, PlayCostsWhatItsClosedFormSays) {
+  const auto slot = [](double play) { return CuttingGuide{{2, 0, 9}, {1, 0, 0}, 3, play, {0, 0, 8}, 16}; };
+  std::printf("hand      guide        removed/section  off mm  tilt deg\n");
+  const auto row = [](const char* hand, const char* guide, const Cut& c) {
+    const Plane p = plane_of(c);
+    std::printf("%-9s %-12s %14.3f %8.3f %8.2f\n", hand, guide, c.removed_mm3 / 80, p.off_mm, p.tilt_deg);
+    return p;
+  };
+  const Cut free({}, upright, 1);
+  row("upright", "none", free);
+  EXPECT_GT(free.removed_mm3 / 80, 1.4);
+  for (const double play : {0.0, 0.1, 0.3}) {
+    const double most_mm = play / 2 + play / 8 * 9, most_deg = std::atan(play / 8) * 360 / kTurn;
+    for (const auto& [name, hand] : {std::pair{"upright", &upright}, std::pair{"leaning", &leaning}}) {
+      if (play != 0.1 && (hand == &upright) != (play == 0)) continue;  // these say all
+      const Cut c(slot(play), hand, 0.5);
+      const Plane p = row(name, ("play " + std::to_string(play)).substr(0, 8).c_str(), c);
+      EXPECT_LT(std::abs(p.off_mm), most_mm + 0.03) << name << play;
+      EXPECT_LT(p.tilt_deg, most_deg + 0.4) << name << play;
+      EXPECT_LT(c.removed_mm3 / 80, 1.1 + 2 * most_mm) << name << play;
+      // A hand that leans to one side gets all of it.
+      if (play > 0.2 && name == std::string("leaning")) {
+        EXPECT_GT(p.off_mm, 0.2 * most_mm);
+        EXPECT_GT(p.tilt_deg, 0.5 * most_deg);
+      }
+    }
+  }
+}
+
 TEST(HandSaw, AGuideIsCheckedBeforeItIsThere) {
   World w(test::bar(0.5, 0.4));
   EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, -1})).done);
   EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 11})).done);
   EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {0, 0, 0}, 2})).done);
+  // A slot with play has faces, in its plane.
+  EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 2, 0.1})).done);
+  EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 2, 0.1, {8, 0, 0}, 20})).done);
+  EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 2, 0.1, {0, 0, 8}, 0})).done);
+  EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 2, 9, {0, 0, 8}, 20})).done);
+  EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 2, -0.1, {0, 0, 8}, 20})).done);
   EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 2}, kMaxHands)).done);
   EXPECT_FALSE(w.cutting_guide().on());
   ASSERT_TRUE(w.act(SceneAction::cutting_guide({{1, 2, 3}, {0, 0, 5}, 2}, 1)).done);
   EXPECT_FALSE(w.cutting_guide(0).on());
   EXPECT_EQ(w.cutting_guide(1), (CuttingGuide{{1, 2, 3}, {0, 0, 1}, 2}));
+  const CuttingGuide printed{{1, 2, 3}, {0, 0, 1}, 2, 0.1, {8, 0, 0}, 20};
+  ASSERT_TRUE(w.act(SceneAction::cutting_guide(printed, 1)).done);
+  EXPECT_EQ(w.cutting_guide(1), printed);
   ASSERT_TRUE(w.act(SceneAction::cutting_guide({}, 1)).done);
   EXPECT_FALSE(w.cutting_guide(1).on());
 }

@@ -170,6 +170,61 @@ TEST(CuttingGuide, RocksAsFarAsItsGapLets) {
   params.margin_mm = 40;
   EXPECT_LT(make_cutting_guide(bone, one_plane({0, 0, 50}, {0, 0, 1}), params).cuts[0].rock_deg, g.cuts[0].rock_deg)
       << "a longer guide sits better";
+  // The motion that says so: it turns the plane that far, and the guide then meets the bone and does not enter it.
+  const GuideCut& c = g.cuts[0];
+  const Vec3 turned = c.rocked.rotation * Vec3{0, 0, 1};
+  const double deg = std::acos(std::min(1.0, turned.z)) / kDeg;
+  EXPECT_LE(deg, c.rock_deg + 1e-9);
+  EXPECT_GT(deg, 0.7 * c.rock_deg);
+  TriangleSoup moved = g.solid;
+  for (Vec3& p : moved.points_mm) p = c.rocked(p);
+  const SignedDistance tree(bone), solid(moved);
+  double least = 1e9;
+  for (const Vec3& p : moved.points_mm) least = std::min(least, tree.at(p).signed_mm);
+  for (const Vec3& p : bone.points_mm) least = std::min(least, solid.at(p).signed_mm);
+  EXPECT_GT(least, -0.005);
+  EXPECT_LT(least, 0.02);
+}
+
+// What a rehearsal's saw feels of the slot: its faces as the solid has them.
+TEST(CuttingGuide, ItsSlotIsToldAsItIs) {
+  const TriangleSoup bone = tube(6, 100);
+  const SurgicalPlan plan = one_plane({0, 0, 50}, {0.2, 0.3, 1}, 1.1);
+  CuttingGuideParams params;
+  params.approach = {1, 0, 0};
+  std::vector<std::string> said;
+  Context context;
+  context.on_log([&](LogLevel level, std::string_view text) {
+    if (level == LogLevel::warning) said.emplace_back(text);
+  });
+  const PrintedGuide g = make_cutting_guide(bone, plan, params, context);
+  EXPECT_TRUE(said.empty());
+  const GuideCut& c = g.cuts[0];
+  const CutPlane& p = plan.planes[0];
+  const Vec3 e = p.waste_ahead ? p.normal : -p.normal, up = normalized(c.slot_up_mm), across = cross(e, up);
+  EXPECT_NEAR(dot(c.slot_at_mm - p.at_mm, e), p.kerf_mm / 2, 1e-9);
+  EXPECT_NEAR(dot(c.slot_up_mm, e), 0, 1e-9);
+  EXPECT_GT(dot(up, g.approach), 0.9);
+  EXPECT_GE(length(c.slot_up_mm), params.wall_mm) << "over the highest place of the bone";
+  EXPECT_NEAR(std::tan(c.play_deg * kDeg), params.play_mm / length(c.slot_up_mm), 1e-9);
+  EXPECT_LT(c.play_deg, 1);
+  // Free in the middle, and solid just behind each face wherever it is said to be one.
+  const SignedDistance solid(g.solid);
+  for (const double v : {-0.45, 0.0, 0.45}) {
+    for (const double u : {-0.45, 0.0, 0.45}) {
+      const Vec3 at = c.slot_at_mm + c.slot_up_mm * v + across * (c.slot_length_mm * u);
+      EXPECT_FALSE(solid.inside(at)) << u << ' ' << v;
+      for (const double side : {-1.0, 1.0}) {
+        EXPECT_FALSE(solid.inside(at + e * (side * (c.width_mm / 2 - 0.01)))) << u << ' ' << v << ' ' << side;
+        EXPECT_TRUE(solid.inside(at + e * (side * (c.width_mm / 2 + 0.01)))) << u << ' ' << v << ' ' << side;
+      }
+    }
+  }
+  // A thin one is told of.
+  params.wall_mm = 1.5;
+  make_cutting_guide(bone, plan, params, context);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_NE(said[0].find("the blade can tilt by 1."), std::string::npos) << said[0];
 }
 
 TEST(CuttingGuide, ServesAReconstruction) {

@@ -162,8 +162,9 @@ TEST(RehearsalControl, APlannedCutIsChosenAndOneIsKept) {
             (CuttingGuide{{8, 0, 0}, {1, 0, 0}, 1.5}));
   tools.put_saw_away(control.rehearsal());
   // Another beside it, where meanwhile somebody added a third.
-  write_file(file,
-             planned_cuts_json(std::vector<PlannedCut>{tools.planned()[0], {"theirs", {{1, 2, 3}, {0, 1, 0}}, 2}}));
+  write_file(file, planned_cuts_json(std::vector<PlannedCut>{
+                       tools.planned()[0],
+                       {"theirs", {{1, 2, 3}, {0, 1, 0}}, 2, {{1, 2.5, 9}, {0, 3, 0.2}, 2, 0.1, {0.5, 1, 7}, 18}}}));
   SawCut cut = tools.cut();
   cut.at_mm = {-4, 0.1, 1.0 / 3};
   tools.set_cut(cut);
@@ -174,6 +175,19 @@ TEST(RehearsalControl, APlannedCutIsChosenAndOneIsKept) {
   EXPECT_EQ(kept[2].name, "ramus");
   EXPECT_EQ(kept[2].cut.at_mm, cut.at_mm) << "to the last bit";
   EXPECT_EQ(tools.planned().size(), 3u);
+  // Of a printed guide: its slot to the last bit; the saw is in it until the plane is moved.
+  EXPECT_EQ(kept[1].slot, (CuttingGuide{{1, 2.5, 9}, {0, 3, 0.2}, 2, 0.1, {0.5, 1, 7}, 18}));
+  tools.choose_planned(1);
+  const CuttingGuide printed = tools.guide();
+  EXPECT_EQ(printed.at_mm, (Vec3{1, 2.5, 9}));
+  EXPECT_NEAR(length(printed.normal), 1, 1e-12);
+  EXPECT_NEAR(dot(printed.up_mm, printed.normal), 0, 1e-12);
+  EXPECT_EQ(printed.play_mm, 0.1);
+  SawCut moved = tools.cut();
+  moved.at_mm.x += 0.5;
+  tools.set_cut(moved);
+  EXPECT_EQ(tools.guide().play_mm, 0);
+  EXPECT_EQ(tools.guide().at_mm, moved.at_mm);
   // A name twice, none, a folder that is not there: said, and the file stays as it is.
   const std::string before = read_text(file);
   tools.keep_planned("ramus");

@@ -93,8 +93,10 @@ StageInfo CuttingGuideStage::info() {
 namespace {
 
 // The blade's middle is half a kerf from the face that stays; its length lies across the guide's approach. A plan may
-// have a kerf of 0, a saw of a rehearsal not: the file would not be read.
-PlannedCut planned_cut_of(const CutPlane& plane, Vec3 approach) {
+// have a kerf of 0, a saw of a rehearsal not: the file would not be read. In an opening that two planes share the blade
+// is held against its face, so it has no play.
+PlannedCut planned_cut_of(const CutPlane& plane, Vec3 approach, const GuideCut& guide,
+                          const CuttingGuideParams& params) {
   constexpr double kThinnestMm = 0.05;
   const double kerf = std::max(plane.kerf_mm, kThinnestMm);
   PlannedCut c;
@@ -103,6 +105,13 @@ PlannedCut planned_cut_of(const CutPlane& plane, Vec3 approach) {
   c.cut.normal = plane.normal;
   c.cut.along = cross(plane.normal, approach);
   c.cut.kerf_mm = kerf;
+  const RigidTransform moved = params.seat == GuideSeat::rocked ? guide.rocked : RigidTransform{};
+  c.slot = {moved(guide.slot_at_mm),
+            moved.rotation * plane.normal,
+            c.within_mm,
+            guide.two_sided ? params.play_mm : 0,
+            moved.rotation * guide.slot_up_mm,
+            guide.slot_length_mm};
   return c;
 }
 
@@ -133,10 +142,13 @@ std::vector<Data> CuttingGuideStage::run(const Params& params, std::span<const D
     j["cuts"].push_back({{"plane", c.plane},
                          {"two_sided", c.two_sided},
                          {"width_mm", c.width_mm},
+                         {"slot_high_mm", length(c.slot_up_mm)},
+                         {"slot_long_mm", c.slot_length_mm},
+                         {"play_deg", c.play_deg},
                          {"rock_mm", c.rock_mm},
                          {"rock_deg", c.rock_deg}});
   std::vector<PlannedCut> cuts;
-  for (const GuideCut& c : g.cuts) cuts.push_back(planned_cut_of(plan.plane(c.plane), g.approach));
+  for (const GuideCut& c : g.cuts) cuts.push_back(planned_cut_of(plan.plane(c.plane), g.approach, c, params));
   return {std::make_shared<const TriMesh>(mesh_of(g.solid)), Document{j.dump(1) + "\n"},
           Document{planned_cuts_json(cuts)}};
 }

@@ -42,6 +42,10 @@ struct CuttingGuideStage {
     visit({"wall_mm", "thickness over the bone's highest place, and of the bridges", "mm", 1.5, 20}, p.wall_mm);
     visit({"margin_mm", "length of the block beyond the outermost slots", "mm", 3, 60}, p.margin_mm);
     visit({"depth_mm", "how far the guide reaches down beside the bone's highest place", "mm", 0.5, 20}, p.depth_mm);
+    visit({"seat",
+           "in --cuts-out the guide lies as planned, or as far off as its play lets it turn each plane: what the cuts "
+           "are held against stays the plan"},
+          p.seat);
     visit({"code", "engraved in the top: letters, digits and '-'"}, p.code);
   }
   static StageInfo info();

@@ -77,6 +77,12 @@ void HandTools::choose_planned(std::size_t cut) {
   note_ = [&] { return filled(tr("saw at the planned cut '{name}'"), {{"name", planned_[cut].name}}); };
 }
 
+CuttingGuide HandTools::guide() const {
+  for (const PlannedCut& c : planned_)
+    if (c.cut.at_mm == cut_.at_mm && c.cut.normal == cut_.normal && c.within_mm == within_mm_) return c.guide();
+  return {cut_.at_mm, normalized(cut_.normal), within_mm_};
+}
+
 void HandTools::keep_planned(const std::string& name) {
   try {
     if (name.empty()) {

@@ -50,7 +50,8 @@ class HandTools {
   /// While the hand is led somewhere the guide does not hold its saw.
   void loosen_saw(bool loose, Rehearsal& rehearsal);
   [[nodiscard]] bool saw_in_hand() const { return saw_in_hand_; }
-  [[nodiscard]] CuttingGuide guide() const { return {cut_.at_mm, normalized(cut_.normal), within_mm_}; }
+  /// Of a planned cut that was not moved its own, with the slot's play.
+  [[nodiscard]] CuttingGuide guide() const;
 
   /// Cuts that were planned before, to choose from, and the file that one kept here is added to.
   void plan(std::vector<PlannedCut> cuts, std::filesystem::path file);

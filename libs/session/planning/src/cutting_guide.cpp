@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kBetweenSlotsMm = 2.5, kBesideSectionMm = 1, kSectionNearMm = 40, kTiltLimit = 0.35;
 constexpr double kMaxHeightMm = 40, kWedgeMm = 0.02, kLeastSeatMm2 = 20;
-constexpr double kNotHeldMm = 5, kNotHeldDeg = 5;
+constexpr double kNotHeldMm = 5, kNotHeldDeg = 5, kMostPlayDeg = 1, kPressedMm = 1e-4;
 
 struct Axes {
   Vec3 origin;
@@ -243,17 +243,34 @@ GuideLayout layout_of(const TriangleSoup& local, const std::vector<CutPlane>& pl
   return l;
 }
 
+// What a plane's slot is without a neighbour, before the guide is seated.
+GuideCut cut_of(const CutPlane& p, const GuideLayout& l, const Underside& under, const Axes& axes,
+                const CuttingGuideParams& params) {
+  GuideCut c;
+  c.plane = p.name;
+  c.width_mm = p.kerf_mm + params.play_mm;
+  const GuideFace middle = face_of(p, axes, p.kerf_mm / 2);
+  const double y = (l.cut0 + l.cut1) / 2;
+  const double floor = under.crest(middle.x(y, l.top - params.wall_mm)) + l.gap, z = (floor + l.top) / 2;
+  c.slot_at_mm = axes.world({middle.x(y, z), y, z});
+  c.slot_up_mm = axes.to * Vec3{middle.x(y, l.top) - middle.x(y, floor), 0, l.top - floor};
+  c.slot_length_mm = l.cut1 - l.cut0;
+  c.play_deg = portable::atan2(params.play_mm, length(c.slot_up_mm)) * 180 / std::numbers::pi;
+  return c;
+}
+
 // How far the play lets the guide move each plane while its middle is held down.
 void rock(const GuideBlock& block, const std::vector<CutPlane>& planes, const Axes& axes, std::vector<GuideCut>& cuts) {
   Vec3 middle;
   for (const auto& c : block.contacts) middle += c.at / static_cast<double>(block.contacts.size());
   std::vector<std::array<double, 6>> rows;
   std::vector<double> room;
-  for (const auto& c : block.contacts) {
+  const auto add = [&](const GuideBlock::Contact& c) {
     const Vec3 m = cross(c.at - middle, c.normal);
     rows.push_back({-c.normal.x, -c.normal.y, -c.normal.z, -m.x, -m.y, -m.z});
     room.push_back(c.gap);
-  }
+  };
+  for (const auto& c : block.contacts) add(c);
   rows.push_back({0, 0, 1, 0, 0, 0});
   room.push_back(0);
   // What nothing limits (along a smooth shaft) ends here.
@@ -265,20 +282,55 @@ void rock(const GuideBlock& block, const std::vector<CutPlane>& planes, const Ax
       room.push_back(k < 3 ? kNotHeldMm : kNotHeldRad);
     }
   }
+  using Motion = std::array<double, 6>;  // shift, turn about the middle
+  Motion farthest;
+  // With the contacts that hold it so far; where that motion would press another one into bone, with that one too. The
+  // worst of them first, so that a few dozen of several thousand are enough.
+  const auto hold = [&](const Motion& c, Motion& x) {
+    for (;;) {
+      const double reached = largest(c, rows, room, &x);
+      const GuideBlock::Contact* worst = nullptr;
+      double deepest = kPressedMm;
+      for (const auto& o : block.others) {
+        const Vec3 moved = Vec3{x[0], x[1], x[2]} + cross(Vec3{x[3], x[4], x[5]}, o.at - middle);
+        const double pressed = -o.gap - dot(o.normal, moved);
+        if (pressed <= deepest) continue;
+        deepest = pressed;
+        worst = &o;
+      }
+      if (worst == nullptr) return reached;
+      add(*worst);
+    }
+  };
   const auto most = [&](Vec3 shift, Vec3 turn, double not_held) {
     double out = 0;
-    for (const double sign : {1.0, -1.0})
-      out = std::max(
-          out, largest({sign * shift.x, sign * shift.y, sign * shift.z, sign * turn.x, sign * turn.y, sign * turn.z},
-                       rows, room));
+    for (const double sign : {1.0, -1.0}) {
+      Motion x{};
+      const double reached =
+          hold({sign * shift.x, sign * shift.y, sign * shift.z, sign * turn.x, sign * turn.y, sign * turn.z}, x);
+      if (reached > out) farthest = x;
+      out = std::max(out, reached);
+    }
     return std::isfinite(out) ? out : not_held;
   };
   for (std::size_t n = 0; n < planes.size(); ++n) {
     const Vec3 normal = axes.turned(planes[n].normal), at = axes.local(planes[n].at_mm);
     cuts[n].rock_mm = most(normal, cross(at - middle, normal), kNotHeldMm);
     const Vec3 u = any_perpendicular(normal), v = cross(normal, u);
-    const double a = most({}, u, kNotHeldRad), b = most({}, v, kNotHeldRad);
-    cuts[n].rock_deg = portable::hypot(a, b) * 180 / std::numbers::pi;  // no turn of the plane is more
+    std::array<double, 4> turned{};
+    double largest_turn = 0;
+    for (std::size_t k = 0; k < turned.size(); ++k) {
+      farthest = {};
+      turned[k] = most({}, k < 2 ? (k == 0 ? u : v) : normalized(k == 2 ? u + v : u - v), kNotHeldRad);
+      const Vec3 turn{farthest[3], farthest[4], farthest[5]}, tilt = turn - normal * dot(turn, normal);
+      if (length(tilt) <= largest_turn) continue;
+      largest_turn = length(tilt);
+      // In the CT's axes, about the guide's middle.
+      RigidTransform shift;
+      shift.shift_mm = axes.to * Vec3{farthest[0], farthest[1], farthest[2]};
+      cuts[n].rocked = shift * rotation_about(axes.world(middle), normalized(axes.to * turn), length(turn));
+    }
+    cuts[n].rock_deg = portable::hypot(turned[0], turned[1]) * 180 / std::numbers::pi;  // no turn of the plane is more
   }
 }
 
@@ -309,17 +361,24 @@ PrintedGuide make_cutting_guide(const TriangleSoup& bone, const SurgicalPlan& pl
   out.length_mm = box.hi.x - box.lo.x;
   out.width_mm = box.hi.y - box.lo.y;
   out.height_mm = box.hi.z - box.lo.z;
-  for (const CutPlane& p : planes) out.cuts.push_back({p.name, true, p.kerf_mm + params.play_mm, 0, 0});
+  for (const CutPlane& p : planes) out.cuts.push_back(guide::cut_of(p, layout, under, axes, params));
   for (const guide::GuideOpening& o : layout.openings) {
     for (const std::size_t n : o.cuts) {
       if (o.cuts.size() < 2) continue;
       out.cuts[n].two_sided = false;
+      out.cuts[n].play_deg = 0;
       out.cuts[n].width_mm = guide::least_between(o.lower, o.upper, layout, box.lo.z);
     }
   }
   if (block.seat_mm2 < guide::kLeastSeatMm2 || block.contacts.empty())
     throw Error(ExitCode::failed, "the guide would not seat: almost nothing of it follows the bone",
                 "another --approach, a larger --depth-mm or --margin-mm");
+  for (const GuideCut& c : out.cuts)
+    if (c.play_deg > guide::kMostPlayDeg)
+      context.warn("in the slot of '" + c.plane + "' the blade can tilt by " +
+                   format_number(std::round(10 * c.play_deg) / 10) + " degrees: its faces are " +
+                   format_number(std::round(10 * length(c.slot_up_mm)) / 10) +
+                   " mm high; a larger --wall-mm or a smaller --play-mm keeps it straighter");
   context.progress(0.8, "seat");
   guide::rock(block, planes, axes, out.cuts);
   out.solid = std::move(block.solid);

@@ -278,12 +278,13 @@ class Block {
         const Vec3 across = cross(d - a, e - b);
         const bool steep = across.z * across.z * (1 + kSteepest * kSteepest) < dot(across, across);
         // Walls hold the guide too, though they are but one cell wide and end at the floor.
-        if (c % kContactEvery == 0 && (steep || j % kContactEvery == 0)) {
-          const Vec3 p = places(j, c)[0];
+        const bool some = c % kContactEvery == 0 && (steep || j % kContactEvery == 0);
+        const auto touch = [&](const Vec3& p, std::vector<GuideBlock::Contact>& list) {
           const ClosestPoint near = under_.bone().closest(p);
-          if (near.distance_mm < kContactMm)
-            out.contacts.push_back({p, normalized(p - near.point_mm), near.distance_mm});
-        }
+          if (near.distance_mm < kContactMm) list.push_back({p, normalized(p - near.point_mm), near.distance_mm});
+        };
+        touch(places(j, c)[0], some ? out.contacts : out.others);
+        for (const std::size_t m : n) touch(bottom_[m], out.others);
         if (!seated || steep) continue;
         out.seat_mm2 += length(across) / 2;
         for (const Vec3& p : places(j, c))

@@ -81,7 +81,7 @@ double least_above(const Shadow& guide, const Shadow& bone) {
 }  // namespace
 
 double largest(const std::array<double, 6>& c, const std::vector<std::array<double, 6>>& a,
-               const std::vector<double>& b) {
+               const std::vector<double>& b, std::array<double, 6>* x) {
   // Each unknown is the difference of two that are not negative; slacks are the first basis.
   constexpr std::size_t kColumns = 12;
   const std::size_t rows = a.size();
@@ -102,7 +102,14 @@ double largest(const std::array<double, 6>& c, const std::vector<std::array<doub
     std::size_t in = kColumns;
     for (std::size_t k = 0; k < kColumns; ++k)
       if (t[rows][k] < -1e-10 && (in == kColumns || outside[k] < outside[in])) in = k;
-    if (in == kColumns) return t[rows][kColumns];
+    if (in == kColumns) {
+      if (x != nullptr) {
+        x->fill(0);
+        for (std::size_t r = 0; r < rows; ++r)
+          if (basis[r] < kColumns) (*x)[basis[r] % 6] += (basis[r] < 6 ? 1 : -1) * t[r][kColumns];
+      }
+      return t[rows][kColumns];
+    }
     std::size_t out = rows;
     double step = std::numeric_limits<double>::infinity();
     for (std::size_t r = 0; r < rows; ++r) {

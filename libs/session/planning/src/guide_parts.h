@@ -63,13 +63,14 @@ struct GuideBlock {
     Vec3 at, normal;  ///< towards the guide, at the underside
     double gap = 0;
   };
-  std::vector<Contact> contacts;
+  std::vector<Contact> contacts;  ///< a few all over it
+  std::vector<Contact> others;    ///< its nodes, and the middles of the other cells
 };
 [[nodiscard]] GuideBlock build_block(const GuideLayout& layout, const Underside& under, const Context& context);
 
 /// The most that c . x reaches where a x <= b for all rows; b >= 0, so that 0 is allowed. Simplex method with Bland's
-/// rule. Infinity where nothing limits it, and where it is not found in 2000 steps.
+/// rule. Infinity where nothing limits it, and where it is not found in 2000 steps. `x`: where it is reached, if it is.
 [[nodiscard]] double largest(const std::array<double, 6>& c, const std::vector<std::array<double, 6>>& a,
-                             const std::vector<double>& b);
+                             const std::vector<double>& b, std::array<double, 6>* x = nullptr);
 
 }  // namespace osteo::inline session::guide

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Kernels of contact from here on differ in the guard alone: GuardParams::law is less by one.
+// Kernels of contact from here on differ in the guard, and in how a slot holds a saw: GuardParams::law is less by one.
 constexpr int kFirstRepeatedContact = 2;
 
 const char* const kRoles[] = {"input", "result", "machine"};

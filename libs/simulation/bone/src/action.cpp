@@ -39,8 +39,9 @@ constexpr ActionValue kSetting[] = {{"value", "as the setting's"}};
 constexpr ActionValue kGuide[] = {{"hand", "1"}, {"stiffness", "N/mm"}, {"damping", "N s/m"}, {"forward", "1"},
                                   {"most", "N"}, {"dead_zone", "mm"},   {"own_contact", "1"}, {"brake", "N s/m"}};
 
-constexpr ActionValue kCuttingGuide[] = {{"at_x", "mm"},    {"at_y", "mm"},    {"at_z", "mm"},  {"normal_x", "1"},
-                                         {"normal_y", "1"}, {"normal_z", "1"}, {"within", "mm"}};
+constexpr ActionValue kCuttingGuide[] = {{"at_x", "mm"},    {"at_y", "mm"},    {"at_z", "mm"},   {"normal_x", "1"},
+                                         {"normal_y", "1"}, {"normal_z", "1"}, {"within", "mm"}, {"play", "mm"},
+                                         {"up_x", "mm"},    {"up_y", "mm"},    {"up_z", "mm"},   {"length", "mm"}};
 
 constexpr auto kLast = static_cast<std::size_t>(ActionKind::behind_last) - 1;
 constexpr std::array<ActionRow, kLast> kTable{{
@@ -159,7 +160,9 @@ constexpr std::array<ActionRow, kLast> kTable{{
      .values = kGuide},
     {.kind = ActionKind::cutting_guide,
      .name = "cutting_guide",
-     .help = "a slot that holds the hand's saw in a plane, until the next of these; within 0: none",
+     .help = "a slot that holds the hand's saw in a plane, until the next of these; within 0: none; with play the "
+             "blade moves "
+             "in it between faces that are as high as `up` and as long as `length`",
      .changes_touch = true,
      .last_counts = true,
      .hand = "whose saw",
@@ -285,6 +288,9 @@ SceneAction SceneAction::cutting_guide(const CuttingGuide& guide, std::uint32_t 
   put(a.values, 0, guide.at_mm);
   put(a.values, 3, guide.normal);
   a.values[6] = guide.within_mm;
+  a.values[7] = guide.play_mm;
+  put(a.values, 8, guide.up_mm);
+  a.values[11] = guide.length_mm;
   a.hand = hand;
   return a;
 }
@@ -292,7 +298,14 @@ SceneAction SceneAction::cutting_guide(const CuttingGuide& guide, std::uint32_t 
 CuttingGuide SceneAction::guide() const {
   const Vec3 normal = vector_at(values, 3);
   if (!(length(normal) > 1e-9)) return {};
-  return {vector_at(values, 0), normalized(normal), values[6]};
+  CuttingGuide guide{vector_at(values, 0), normalized(normal), values[6]};
+  if (values[7] > 0) {
+    guide.play_mm = values[7];
+    guide.up_mm = vector_at(values, 8);
+    guide.up_mm -= guide.normal * dot(guide.up_mm, guide.normal);
+    guide.length_mm = values[11];
+  }
+  return guide;
 }
 
 RigidTransform SceneAction::transform() const {

@@ -51,6 +51,15 @@ std::string senseless(const SceneAction& a) {
         return "a saw slips into a cutting guide from 0 to " + format_number(SceneAction::kMaxSlotMm) + " mm away";
       if (v[6] > 0 && !(length(Vec3{v[3], v[4], v[5]}) > 1e-9))
         return "the plane of a cutting guide has no direction across it";
+      if (v[6] > 0 && v[7] != 0) {
+        const CuttingGuide g = a.guide();
+        const auto fits = [](double mm) { return mm >= SceneAction::kLeastFaceMm && mm <= SceneAction::kMaxFaceMm; };
+        if (!(v[7] > 0 && v[7] <= SceneAction::kMaxPlayMm))
+          return "a blade has 0 to " + format_number(SceneAction::kMaxPlayMm) + " mm of play in its slot";
+        if (!fits(length(g.up_mm)) || !fits(g.length_mm))
+          return "the faces of a slot with play are " + format_number(SceneAction::kLeastFaceMm) + " to " +
+                 format_number(SceneAction::kMaxFaceMm) + " mm high, in its plane, and long";
+      }
       break;
     case ActionKind::suction:
     case ActionKind::irrigate:

@@ -34,6 +34,8 @@ const CutDepth& shell_depth(double spacing_mm, std::size_t tool) {
 constexpr double kTeeth = 0.75, kTeethTell = 1.25;
 // A proxy that is no farther off the surface than this share of its shell rests on it.
 constexpr double kOnIt = 0.5;
+// Of a saw in a slot: with less of a push than this in the slot's plane there is no direction in it.
+constexpr double kFlatShare = 0.02;
 
 // With more voxels under the burr than may change in a tick, their rows take turns.
 std::vector<std::uint32_t> strides_for(double spacing_mm) {
@@ -157,8 +159,17 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
     // is twice the mean thickness of what lies in the shell: there it goes by that thickness.
     const double hollow = 3 / std::max(there.surface_mm2, 1e-9), depth = std::min(flat_depth, hollow * there.sharp_mm3);
     c.value_mm = shell - depth;
+    double share = 1;
+    if (!(held_ == Vec3{})) {
+      // The slot takes what presses across it. What is left presses in its plane, by its share of the bone.
+      const Vec3 flat = c.normal - held_ * dot(c.normal, held_);
+      share = length(flat);
+      c.value_mm = shell - depth * share;
+      c.normal = share > kFlatShare ? flat / share : axis_;
+    }
     // And it grows faster: the step out is then the shorter.
-    const double slope = depth < flat_depth ? hollow * pressed : pressed / depths.area_mm2(there.sharp_mm3, cosine);
+    const double full = depth < flat_depth ? hollow * pressed : pressed / depths.area_mm2(there.sharp_mm3, cosine),
+                 slope = full * share * share;
     c.gradient = c.normal * (depth > 0.2 * shell ? std::clamp(slope, 0.5, 50.0) : 1.0);
     return c;
   };
@@ -170,6 +181,7 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   g.evaluations = spacing_mm_ < 0.3 ? 8 : 16;  // 100 to 200 us at most
   // A blade's shell meets ten times a burr's voxels; what is left over is done in the next tick.
   if (instrument_library()[tool_].kind == InstrumentKind::saw) g.evaluations = 4;
+  if (!(held_ == Vec3{}) && proxy_.placed()) proxy_.carry(held_ * dot(at - proxy_.position_mm(), held_));
   const GodObject::Answer answer = proxy_.update(field, at, g);
   const Vec3 offset = answer.proxy_mm - at;
   r.shown_offset_mm = offset;

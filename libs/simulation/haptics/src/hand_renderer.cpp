@@ -227,6 +227,8 @@ void HandRenderer::touch() noexcept {
     own.axis = to_floats(item.body_from_world.rotation * axis_);
     model->set(law_);
     model->know(&item.bone->grains());
+    const bool held = (flags_ & kInSlot) != 0 && common_.params.guard.law > 3;
+    model->hold(held ? item.body_from_world.rotation * slot_.across() : Vec3{});
     Touch& t = touched_[touched_count_++];
     t = {&item, model, model->contact(item.bone->bone(), own)};
     const Mat3& turn = item.world_from_body.rotation;

@@ -14,8 +14,11 @@ struct PlannedCut {
   std::string name;
   SawCut cut;            ///< normal and along as the file has them
   double within_mm = 2;  ///< as a cutting guide: a saw this near slips in
+  /// Of a printed guide, where it lies: it may be off the plan. As the file has it; not on(): the guide is the plane.
+  CuttingGuide slot{};
 
-  [[nodiscard]] CuttingGuide guide() const { return {cut.at_mm, normalized(cut.normal), within_mm}; }
+  /// Normal unit, the slot's height in its plane.
+  [[nodiscard]] CuttingGuide guide() const;
 };
 
 /// The file in a case's folder.
@@ -24,8 +27,11 @@ inline constexpr std::string_view kPlannedCutsFile = "planned-cuts.json";
 /// { "osteotome_planned_cuts": 1, "about": "...",
 ///   "cuts": [ {"name": "left body", "at_mm": [x, y, z], "normal": [1, 0, 0], "along": [0, 0, 1], "kerf_mm": 1,
 ///   "length_mm": 0,
-///              "depth_mm": 0, "within_mm": 2} ] }
-/// LPS mm of the case at rest; a name, a place and a normal are needed, 0 of length and depth: through. Errors: usage,
+///              "depth_mm": 0, "within_mm": 2,
+///              "slot": {"play_mm": 0.1, "at_mm": [x, y, z], "normal": [1, 0, 0], "up_mm": [0, 0, 8],
+///              "length_mm": 20}} ] }
+/// LPS mm of the case at rest; a name, a place and a normal are needed, 0 of length and depth: through; a slot that is
+/// left out is the plane without play. Errors: usage,
 /// with file and line: unknown keys, ranges, directions without length, two of one name, none; no_input.
 [[nodiscard]] std::vector<PlannedCut> load_planned_cuts(const std::filesystem::path& file);
 /// Of a case; none where it has no such file.

@@ -40,8 +40,10 @@ enum class ActionKind : std::uint32_t {
 /// the scene alone.
 struct SceneAction {
   static constexpr std::uint32_t kNobody = 0xffffffffU;
-  static constexpr double kMaxReachMm = 50;  ///< of a sucker and of water
-  static constexpr double kMaxSlotMm = 10;   ///< that a saw slips into a cutting guide from
+  static constexpr double kMaxReachMm = 50;                    ///< of a sucker and of water
+  static constexpr double kMaxSlotMm = 10;                     ///< that a saw slips into a cutting guide from
+  static constexpr double kMaxPlayMm = 3;                      ///< of a blade in a slot
+  static constexpr double kLeastFaceMm = 1, kMaxFaceMm = 200;  ///< height and length of a slot's faces
   static constexpr double kPlateReachMm =
       5;  ///< attach: bone of each piece begins within this below the plate's underside
 
@@ -71,7 +73,8 @@ struct SceneAction {
   /// deeper.
   static SceneAction soft_push(Vec3 at_mm, Vec3 normal, double force_n, double stiffness_n_per_mm);
   static SceneAction setting(std::uint32_t number, double value);
-  static SceneAction cutting_guide(const CuttingGuide& guide, std::uint32_t hand = 0);  ///< its normal need not be unit
+  /// Its normal need not be unit; of the slot's height only what lies in the plane counts.
+  static SceneAction cutting_guide(const CuttingGuide& guide, std::uint32_t hand = 0);
   [[nodiscard]] SawCut saw_cut() const;
   [[nodiscard]] RigidTransform transform() const;
   [[nodiscard]] CuttingGuide guide() const;  ///< of a cutting_guide

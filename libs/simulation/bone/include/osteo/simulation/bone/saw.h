@@ -1,5 +1,6 @@
 // A cut by a thin blade, and the guide that holds the blade in a plane.
 #pragma once
+#include <cmath>
 #include <vector>
 
 #include "osteo/core/data/vec.h"
@@ -29,10 +30,19 @@ double apply_saw(BrickGrid& bone, const SawCut& cut, std::vector<VoxelKey>& chan
 
 // -- A cutting guide: a slot that holds a saw in a plane which was planned before.
 
-/// A plane of the world, without extent. Not fixed to a piece: it stays where it is when bone is moved.
+/// A plane of the world, and the slot of a printed guide in it where that has play. Not fixed to a piece: it stays
+/// where it is when bone is moved.
 struct CuttingGuide {
-  Vec3 at_mm, normal{0, 0, 1};  ///< normal: unit
+  Vec3 at_mm, normal{0, 0, 1};  ///< normal: unit. With play: `at_mm` is the middle of the slot's faces
   double within_mm = 0;         ///< a saw this near slips in; 0: there is no guide
+  double play_mm = 0;           ///< width of the slot beyond the blade's; 0: the plane holds the blade without play
+  Vec3 up_mm{};                 ///< in the plane, as long as the slot is high: from the bone out; with play alone
+  double length_mm = 0;         ///< of the slot, across `up_mm`; with play alone
+
+  /// Half of how far the slot's faces reach along a direction (unit) of the plane.
+  [[nodiscard]] double reach_mm(Vec3 along) const {
+    return (std::abs(dot(along, up_mm)) + std::abs(dot(along, normalized(cross(normal, up_mm)))) * length_mm) / 2;
+  }
 
   [[nodiscard]] bool on() const { return within_mm > 0; }
   /// Of what lies in the plane 0; signed.

@@ -89,6 +89,9 @@ class ContactModel {
   /// Where burrs have been in the bone of the contact()s to come; null: nowhere. Must outlive them. With it a burr is
   /// pressed by what it may still take, and by no bone that it can never reach.
   void know(const Grains* known) noexcept { known_ = known; }
+  /// A slot holds the tool across this direction (unit, in the bone's frame) from the next contact() on; zero: nothing
+  /// does. Of the proxy alone, the method of saws: it does not slide there, and bone beside it does not stop it.
+  void hold(Vec3 across) noexcept { held_ = across; }
   /// Force for this pose. A pose that is not finite gives none. No allocation, no exception.
   virtual ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept = 0;
   /// What the last contact() would cut; empty when the pedal was up. Valid until the next contact().
@@ -102,6 +105,7 @@ class ContactModel {
  protected:
   ContactParams params_;
   const Grains* known_ = nullptr;
+  Vec3 held_;
 };
 
 /// `spacing_mm` of the bone it will meet: sizes its buffers. `tools`: of instrument_library(), that it is for; none:

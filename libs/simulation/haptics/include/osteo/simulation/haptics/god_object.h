@@ -51,6 +51,11 @@ class GodObject {
     placed_ = true;
     slipping_ = false;
   }
+  /// Along with what it stands on: neither a step nor a slip.
+  void carry(Vec3 by_mm) {
+    x_ += by_mm;
+    last_ += by_mm;
+  }
   void forget() { placed_ = false; }
 
   template <class Field>

@@ -26,10 +26,10 @@ struct GuardParams {
   double resume_s = 0.1;
   double stale_ms = 10;
   double fade_ms = 40;
-  /// Which arithmetic; no setting. 3, or for the replay of sessions whose kernel of contact is less than 4: 2, which
-  /// damps by the stiffness asked for and not by the real one; 1, where besides nothing is owed from one contact to the
-  /// next, and drag may give energy.
-  int law = 3;
+  /// Which arithmetic; no setting. 4, or for the replay of sessions whose kernel of contact is less than 5: 3, where a
+  /// saw slides across its slot (ContactModel::hold); 2, which besides damps by the stiffness asked for and not by the
+  /// real one; 1, where besides nothing is owed from one contact to the next, and drag may give energy.
+  int law = 4;
 
   static void describe(GuardParams& p, auto& visit) {
     visit({"limit_force_n", "the hand never feels more", "N", 0, 100}, p.max_force_n);
@@ -105,9 +105,9 @@ class EnergyDebt {
   bool started_ = false;
 };
 
-/// How stiff a force is where the hand is: along the contact's normal and across it, of what it changed by over the last
-/// kWayMm. In a hollow of the burr's own shape a law of force is several times as stiff as on flat bone, and stiff to
-/// the sides too, where flat bone is not.
+/// How stiff a force is where the hand is: along the contact's normal and across it, of what it changed by over the
+/// last kWayMm. In a hollow of the burr's own shape a law of force is several times as stiff as on flat bone, and stiff
+/// to the sides too, where flat bone is not.
 class LocalStiffness {
  public:
   static constexpr double kWayMm = 0.005, kForgetS = 0.1, kMostNPerMm = 20;

@@ -9,7 +9,10 @@ namespace osteo::inline simulation {
 /// out beyond four times that or 45 degrees; either takes kEaseS, so that nothing jumps. In the slot the blade is where
 /// the hand and the plane agree: at the hand's place and in its direction, without what of them goes across the plane.
 /// A spring pulls the hand after it, no harder than contact may push. The depth is the hand's own: nothing stops the
-/// blade along the plane but bone. No allocation; the same input gives the same bits.
+/// blade along the plane but bone. In a slot with play the blade lies as the hand has it as far as the faces let it:
+/// within their reach along the blade it is off the plane by half of the play at most, and beyond them by what that
+/// leaves of its slope. Turning about its own length is not limited: the blade is a rod. No allocation; the same input
+/// gives the same bits.
 class SawSlot {
  public:
   static constexpr double kEnterSine = 0.5, kLeaveSine = 0.70710678118654757;
@@ -18,13 +21,15 @@ class SawSlot {
   /// Moves a saw's tip and its direction (unit) into the slot; false: they stay what they are. `saw`: one is in the
   /// hand.
   bool step(const CuttingGuide& guide, bool saw, Vec3& at_mm, Vec3& axis, double dt_s) noexcept;
+  /// The normal of the plane that the saw is in, unit; after step() that said so.
+  [[nodiscard]] Vec3 across() const noexcept { return held_.normal; }
   /// What the hand feels of it, after step(), by a spring and its limit.
   [[nodiscard]] Vec3 force_n(double stiffness_n_per_mm, double most_n) const noexcept;
 
  private:
   CuttingGuide held_;  // that the saw is in, or on its way out of
   bool in_ = false;
-  double share_ = 0, offset_mm_ = 0;
+  double share_ = 0, offset_mm_ = 0;  // of the tip, to where the slot has it
 };
 
 /// Where an instrument points, unit: as the hand holds it, or as the guide does (kInSlot). Exact but for the kEaseS

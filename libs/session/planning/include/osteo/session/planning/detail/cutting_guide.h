@@ -6,6 +6,7 @@
 
 #include "osteo/core/base/context.h"
 #include "osteo/core/base/param.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/geometry/mesh/soup.h"
 #include "osteo/session/planning/detail/plan.h"
 
@@ -17,17 +18,25 @@ enum class GuideSlot : int { closed, open };
   return {"closed", "open"};
 }
 
+/// Where the guide lies when it is rehearsed with. rocked: as far as its play lets it turn each plane, held at its
+/// middle.
+enum class GuideSeat : int { planned, rocked };
+[[nodiscard]] constexpr std::array<std::string_view, 2> enum_names(GuideSeat) {
+  return {"planned", "rocked"};
+}
+
 struct CuttingGuideParams {
   std::string bone;                  ///< as the plan names it; empty: the plan's only one
   std::string planes;                ///< names, separated by commas; empty: all of the bone
   std::array<double, 3> approach{};  ///< from the bone to where the guide comes from; zero: chosen
   GuideSlot slot = GuideSlot::closed;
-  double gap_mm = 0.1;    ///< between guide and bone
-  double play_mm = 0.1;   ///< a slot is this much wider than the kerf
-  double wall_mm = 4;     ///< over the highest place of the bone, and of the bridges
-  double margin_mm = 12;  ///< of the block beyond the outermost slots
-  double depth_mm = 4;    ///< how far the guide reaches down beside the highest place
-  std::string code;       ///< engraved
+  double gap_mm = 0.1;                  ///< between guide and bone
+  double play_mm = 0.1;                 ///< a slot is this much wider than the kerf
+  double wall_mm = 6;                   ///< over the highest place of the bone, and of the bridges
+  double margin_mm = 12;                ///< of the block beyond the outermost slots
+  double depth_mm = 4;                  ///< how far the guide reaches down beside the highest place
+  GuideSeat seat = GuideSeat::planned;  ///< of a rehearsal's; the solid is the same
+  std::string code;                     ///< engraved
 };
 
 /// What one planned plane became.
@@ -38,6 +47,13 @@ struct GuideCut {
   double rock_mm = 0;     ///< most that the seated guide's play moves the plane at its place in the bone; 5 and more:
                           ///< the bone does not hold it
   double rock_deg = 0;    ///< most that it turns it; the same from 5 on
+  /// Middle of the slot's faces in the plan's plane (half a kerf off the face that stays); from the bone out, as long
+  /// as they are high at least; how long they are across. Of a shared opening: of the face that leads.
+  Vec3 slot_at_mm, slot_up_mm;
+  double slot_length_mm = 0;
+  double play_deg = 0;  ///< that the slot's play lets the blade tilt in it; of a shared opening 0: the face leads
+  /// Of the motions that the play allows, the one that turns the plane most of 16 directions.
+  RigidTransform rocked;
 };
 
 struct PrintedGuide {
