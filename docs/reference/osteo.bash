@@ -32,7 +32,8 @@ _osteo() {
     "register --method") COMPREPLY=($(compgen -W "mutual surface " -- "$cur")); return ;;
     "plan-reconstruction --target") COMPREPLY=($(compgen -W "mirrored own " -- "$cur")); return ;;
     "cutting-guide --slot") COMPREPLY=($(compgen -W "closed open " -- "$cur")); return ;;
-    "phantom --region") COMPREPLY=($(compgen -W "head temporal mandible " -- "$cur")); return ;;
+    "cutting-guide --seat") COMPREPLY=($(compgen -W "planned rocked " -- "$cur")); return ;;
+    "phantom --region") COMPREPLY=($(compgen -W "head temporal mandible fibula " -- "$cur")); return ;;
     "convert --segmentation") COMPREPLY=($(compgen -W "binary labelmap labelmap16 " -- "$cur")); return ;;
     "run --engine") COMPREPLY=($(compgen -W "stages vtk " -- "$cur")); return ;;
     "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
@@ -91,8 +92,8 @@ _osteo() {
     find-structures) flags="$flags --xml --describe --side --what --labyrinth-mm --min-quality --findings-out" ;;
     segment-network) flags="$flags --xml --describe --folds --mirror --step --max-memory-gb --uncertainty-out" ;;
     register) flags="$flags --xml --describe --method --finest-mm --bone-hu --max-residual-mm --accept-poor --labels --findings-out --moved-out --labels-out --checkerboard-out" ;;
-    plan-reconstruction) flags="$flags --xml --describe --target --a-mm --a-normal --b-mm --b-normal --down --max-segments --min-length-mm --max-contour-mm --kerf-mm --reserve-mm --findings-out" ;;
-    cutting-guide) flags="$flags --xml --describe --bone --planes --approach --slot --gap-mm --play-mm --wall-mm --margin-mm --depth-mm --code --findings-out --cuts-out" ;;
+    plan-reconstruction) flags="$flags --xml --describe --target --a-mm --a-normal --b-mm --b-normal --down --max-segments --min-length-mm --max-contour-mm --kerf-mm --reserve-mm --structures --findings-out" ;;
+    cutting-guide) flags="$flags --xml --describe --bone --planes --approach --slot --gap-mm --play-mm --wall-mm --margin-mm --depth-mm --seat --code --findings-out --cuts-out" ;;
     outcome) flags="$flags --xml --describe --min-drop-hu --metal-hu --max-unsure-mm --max-unsure-deg --donor --page-out" ;;
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --individual --labels-out" ;;
     list) flags="$flags" ;;

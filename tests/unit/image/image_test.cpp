@@ -227,6 +227,59 @@ TEST(Phantom, HoldsEveryTissueAndTheMarkerOnlyAtTheLeft) {
   for (int t = 0; t < kTissueCount; ++t) EXPECT_GT(seen[t], 0) << tissue_name(static_cast<Tissue>(t));
 }
 
+// The donor bone: a shaft with cortex about a canal, as long as it says, and its margins are safe.
+TEST(Phantom, AFibulaIsAShaftWithACanal) {
+  PhantomParams p;
+  p.region = PhantomRegion::fibula;
+  p.spacing_mm = 1.25;
+  p.noise_hu = 0;
+  double before = 0;
+  for (const int individual : {0, 7}) {
+    p.individual = individual;
+    const Phantom phantom = make_phantom(p);
+    const Frame& f = phantom.labels.frame;
+    // By slice: area of cortex, of what it encloses, and of spongy bone.
+    int slices = 0, with_canal = 0, spongy_slices = 0;
+    for (int k = 0; k < f.dims[2]; ++k) {
+      int cortex = 0, spongy = 0, canal = 0;
+      for (int j = 0; j < f.dims[1]; ++j) {
+        int first = -1, last = -1;
+        for (int i = 0; i < f.dims[0]; ++i) {
+          const auto t = static_cast<Tissue>(phantom.labels.at(i, j, k));
+          cortex += t == Tissue::cortical;
+          spongy += t == Tissue::diploe;
+          if (is_bone(t)) (first < 0 ? first : last) = i;
+        }
+        for (int i = first; first >= 0 && i <= last; ++i)
+          canal += !is_bone(static_cast<Tissue>(phantom.labels.at(i, j, k)));
+      }
+      slices += cortex > 0;
+      with_canal += canal > 4;
+      spongy_slices += spongy > 4;
+      if (cortex > 0 && canal > 4) {
+        EXPECT_GT(cortex, 25) << k;
+        EXPECT_LT(canal, 40) << k;
+      }
+    }
+    EXPECT_GT(slices * p.spacing_mm, 315);
+    EXPECT_LT(slices * p.spacing_mm, 385);
+    EXPECT_GT(with_canal, 0.7 * slices);
+    EXPECT_GT(spongy_slices, 0.1 * slices);
+    EXPECT_NE(phantom.bone_mm3, before) << "another individual";
+    before = phantom.bone_mm3;
+    // Voxels that a margin calls uniform are: the finer one says the same where it has a voxel there.
+    PhantomParams fine = p;
+    fine.spacing_mm = 0.625;
+    if (individual != 7) continue;
+    const Phantom twice = make_phantom(fine);
+    EXPECT_NEAR(twice.bone_mm3 / phantom.bone_mm3, 1, 0.005);
+    for (int k = 0; k < f.dims[2]; k += 3)
+      for (int j = 0; j < f.dims[1]; ++j)
+        for (int i = 0; i < f.dims[0]; ++i)
+          ASSERT_EQ(phantom.labels.at(i, j, k), twice.labels.at(2 * i, 2 * j, 2 * k)) << i << ' ' << j << ' ' << k;
+  }
+}
+
 TEST(Phantom, LabelsAreTheExactTissue) {
   PhantomParams p;
   p.region = PhantomRegion::temporal;

@@ -351,6 +351,52 @@ TEST(CuttingGuide, WhatCannotBeMadeIsSaid) {
   EXPECT_EQ(complaint(wedge, [](auto& q) { q.approach = {}; }), "") << "which is found";
 }
 
+// A bar along z, sawn at z = 30 and 60 with what lies between removed; voxels of 1 mm whose places are plain.
+TEST(PlannedHarm, WhatTheSawMeetsAndWhatIsRemoved) {
+  const TriangleSoup bar = box({-5, -5, 0}, {5, 5, 100});
+  SurgicalPlan plan;
+  plan.planes.push_back({"lower", "bar", {0, 0, 30}, {0, 0, 1}, 1, true});
+  plan.planes.push_back({"upper", "bar", {0, 0, 60}, {0, 0, 1}, 1, false});  // its kerf lies below it
+  const Frame frame{{41, 41, 101}, {1, 1, 1}, {-20, -20, 0}};
+  const auto voxels = make_voxels<std::uint8_t>(frame.voxel_count());
+  std::fill_n(voxels.get(), frame.voxel_count(), std::uint8_t{0});
+  Labels labels{{frame, voxels}, {{1, "nerve"}, {2, "tooth"}, {3, "far"}, {4, "beside"}, {5, "nowhere"}}};
+  const auto put = [&](int x, int y, int z, std::uint8_t value) { voxels[labels.offset(x + 20, y + 20, z)] = value; };
+  for (int z = 10; z <= 80; ++z) put(0, 0, z, 1);   // 71 mm3, right through
+  for (int z = 34; z <= 40; ++z) put(2, 1, z, 2);   // 7 mm3, from 33.5 on: 2.5 above the lower kerf
+  for (int z = 80; z <= 85; ++z) put(1, 1, z, 3);   // 19.5 above the upper plane
+  for (int z = 28; z <= 32; ++z) put(15, 0, z, 4);  // at the lower plane, but beyond the section's circle
+  const PlannedHarm harm = harm_of(plan, "bar", bar, labels);
+  ASSERT_EQ(harm.at_cuts.size(), 3U);
+  const auto at = [&](std::size_t n, const char* plane, const char* structure, double mm, double mm3) {
+    SCOPED_TRACE(n);
+    EXPECT_EQ(harm.at_cuts[n].plane, plane);
+    EXPECT_EQ(harm.at_cuts[n].structure, structure);
+    EXPECT_NEAR(harm.at_cuts[n].nearest_mm, mm, 1e-9);
+    EXPECT_NEAR(harm.at_cuts[n].cut_mm3, mm3, 1e-9);
+  };
+  at(0, "lower", "nerve", 0, 1);  // halves of the voxels at 30 and 31
+  at(1, "lower", "tooth", 2.5, 0);
+  at(2, "upper", "nerve", 0, 1);
+  // Ahead of both planes: the nerve from 31 to 59, all of the tooth; what is far from the bar is not removed with it.
+  ASSERT_EQ(harm.removed.size(), 2U);
+  EXPECT_EQ(harm.removed[0].structure, "tooth");
+  EXPECT_EQ(harm.removed[0].share, 1);
+  EXPECT_EQ(harm.removed[1].structure, "nerve");
+  EXPECT_EQ(harm.removed[1].mm3, 29);
+  EXPECT_NEAR(harm.removed[1].share, 29.0 / 71, 1e-12);
+  // Nearer is asked for; one plane alone removes nothing that is known; nothing without names, or of another bone.
+  EXPECT_EQ(harm_of(plan, "bar", bar, labels, 2).at_cuts.size(), 2U);
+  plan.planes.pop_back();
+  EXPECT_TRUE(harm_of(plan, "bar", bar, labels).removed.empty());
+  const auto complaint = [&](const char* bone) {
+    return error_of([&] { static_cast<void>(harm_of(plan, bone, bar, labels)); });
+  };
+  EXPECT_NE(complaint("rod").find("'rod'"), std::string::npos);
+  labels.structures.clear();
+  EXPECT_NE(complaint("bar").find("no names"), std::string::npos);
+}
+
 TEST(InsertionClearance, IsTheLeastHeightAbove) {
   EXPECT_NEAR(insertion_clearance_mm(box({0, 0, 5}, {4, 4, 9}), box({1, 1, 0}, {9, 9, 3}), {0, 0, 1}), 2, 1e-12);
   EXPECT_NEAR(insertion_clearance_mm(box({0, 0, 5}, {4, 4, 9}), box({1, 1, 0}, {9, 9, 3}), {0, 0, -1}), -9, 1e-12);

@@ -99,11 +99,12 @@ StageInfo PhantomStage::info() {
   return {
       .name = "phantom",
       .version = 2,
-      .synopsis = "a synthetic CT of a head whose every boundary is known",
+      .synopsis = "a synthetic CT of a head, or of a fibula, whose every boundary is known",
       .description =
           "Skull, jaw with teeth, and temporal bones with air cells, ear canal, ossicles, labyrinth, facial nerve, "
           "sigmoid sinus and "
-          "tegmen in sizes of published anatomy, and a bead on the left side only. Voxels hold the mean over their "
+          "tegmen in sizes of published anatomy, and a bead on the left side only. A fibula is a "
+          "shaft with a canal of marrow. Voxels hold the mean over their "
           "volume, spread as by "
           "a scanner, plus noise (--seed). Give a folder as output for a DICOM series.",
       .inputs = {},

@@ -68,8 +68,9 @@ struct StructuresStage {
 struct PhantomStage {
   using Params = PhantomParams;
   static void describe(Params& p, auto& visit) {
-    visit({"region", "the whole head, a block around the left temporal bone, or the lower jaw with its joints"},
-          p.region);
+    visit(
+        {"region", "the whole head, a block around the left temporal bone, the lower jaw with its joints, or a fibula"},
+        p.region);
     visit({"spacing_mm", "voxel size in the slice", "mm", 0.2, 4}, p.spacing_mm);
     visit({"slice_mm", "distance of slices (0: same as spacing_mm)", "mm", 0, 10}, p.slice_mm);
     visit({"noise_hu", "standard deviation of the noise", "HU", 0, 200}, p.noise_hu);

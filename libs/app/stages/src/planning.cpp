@@ -22,7 +22,11 @@ StageInfo PlanReconstructionStage::info() {
           "landmarks. Reports contour error and contact of each joint. For research and training; no medical "
           "device: vessels, skin, teeth and occlusion are not considered.",
       .inputs = {{"mandible", {DataKind::surface}, "closed surface, before resection"},
-                 {"fibula", {DataKind::surface}, "closed surface of the donor bone"}},
+                 {"fibula", {DataKind::surface}, "closed surface of the donor bone"},
+                 {"structures",
+                  {DataKind::labels},
+                  "named structures of the mandible's CT (nerve, teeth): which of them the resection meets",
+                  true}},
       .outputs = {{"plan", {DataKind::document}, "cut planes, fragments and their movements in JSON"},
                   {"findings", {DataKind::document}, "figures of the plan, contour and axes in JSON", true}},
       .references = {"Y. Chen, G. Medioni, Object modelling by registration of multiple range images, Image and "
@@ -33,16 +37,40 @@ StageInfo PlanReconstructionStage::info() {
           "--b-mm 40,-20,8 --b-normal -0.4,-0.9,0"};
 }
 
+namespace {
+
+// Before it is done, where the planner looks: what is cut through, and what is nearer to a saw than a hand is steady.
+void tell(const PlannedHarm& harm, const Context& context) {
+  constexpr double kNearMm = 2;
+  const auto tenths = [](double v) { return format_number(std::round(10 * v) / 10); };
+  for (const StructureAtCut& s : harm.at_cuts) {
+    if (s.cut_mm3 > 0)
+      context.warn(s.plane + " cuts " + s.structure + " (" + tenths(s.cut_mm3) + " mm\u00b3 in the kerf)");
+    else if (s.nearest_mm < kNearMm)
+      context.warn(s.plane + " passes " + s.structure + " at " + tenths(s.nearest_mm) + " mm");
+  }
+  for (const StructureRemoved& s : harm.removed)
+    context.info(tenths(100 * s.share) + " % of " + s.structure + " is in what is removed");
+}
+
+}  // namespace
+
 std::vector<Data> PlanReconstructionStage::run(const Params& params, std::span<const Data> inputs,
                                                const Context& context) {
   const auto bone = [&](std::size_t n) { return compacted(welded(soup_of(*std::get<Surface>(inputs[n])))); };
-  const Reconstruction r = reconstruct(bone(0), bone(1), params, context);
+  const TriangleSoup jaw = bone(0);
+  const Reconstruction r = reconstruct(jaw, bone(1), params, context);
   const double contact = *std::min_element(r.contact.begin(), r.contact.end());
   context.report("segments", static_cast<std::int64_t>(r.segments.size()));
   context.report("contour_mean_mm", r.contour_mean_mm);
   context.report("contour_max_mm", r.contour_max_mm);
   context.report("least_contact", contact);
   context.report("donor_used_mm", r.donor_used_mm);
+  PlannedHarm harm;
+  if (const auto* const structures = std::get_if<Labels>(&inputs[2])) {
+    harm = harm_of(r.plan, "mandible", jaw, *structures);
+    tell(harm, context);
+  }
   Json j{{"osteotome_reconstruction", 1},
          {"contour_mean_mm", r.contour_mean_mm},
          {"contour_max_mm", r.contour_max_mm},
@@ -58,6 +86,13 @@ std::vector<Data> PlanReconstructionStage::run(const Params& params, std::span<c
   j["segments"] = Json::list();
   for (const DonorSegment& s : r.segments)
     j["segments"].push_back({{"length_mm", s.length_mm}, {"shortest_mm", s.shortest_mm}, {"from_mm", s.from_mm}});
+  j["structures_at_cuts"] = Json::list();
+  for (const StructureAtCut& s : harm.at_cuts)
+    j["structures_at_cuts"].push_back(
+        {{"plane", s.plane}, {"structure", s.structure}, {"nearest_mm", s.nearest_mm}, {"cut_mm3", s.cut_mm3}});
+  j["structures_removed"] = Json::list();
+  for (const StructureRemoved& s : harm.removed)
+    j["structures_removed"].push_back({{"structure", s.structure}, {"mm3", s.mm3}, {"share", s.share}});
   j["contour_points_mm"] = Json::list();
   for (const Vec3& p : r.contour_mm) j["contour_points_mm"].push_back(json_of(p));
   j["axis_points_mm"] = Json::list();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "fibula_anatomy.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
 
@@ -42,11 +43,19 @@ void spread(std::vector<float>& v, const Frame& frame, std::size_t axis, int thr
   });
 }
 
-Frame phantom_frame(const PhantomParams& p) {
+constexpr double kBeyondFibulaMm = 10;
+
+Frame phantom_frame(const PhantomParams& p, const FibulaAnatomy& fibula) {
   const double slice = p.slice_mm > 0 ? p.slice_mm : p.spacing_mm;
   Vec3 lo{-92, -124, -122}, hi{92, 106, 108};
   if (p.region == PhantomRegion::temporal) lo = {14, -30, -62}, hi = {86, 58, 12};
   if (p.region == PhantomRegion::mandible) lo = {-68, -108, -118}, hi = {68, 4, -6};
+  if (p.region == PhantomRegion::fibula) {
+    const double top = FibulaAnatomy::kTopMm + kBeyondFibulaMm,
+                 bottom = FibulaAnatomy::kTopMm - fibula.length_mm() - kBeyondFibulaMm, x = FibulaAnatomy::kMiddleX,
+                 around = FibulaAnatomy::kAroundMm;
+    lo = {x - around, -around, bottom}, hi = {x + around, around, top};
+  }
   Frame f;
   f.spacing_mm = {p.spacing_mm, p.spacing_mm, slice};
   f.origin_mm = lo;
@@ -61,7 +70,8 @@ struct VoxelMean {
   Tissue tissue;
   double hu = 0, bone = 0;
 };
-VoxelMean voxel_mean(const HeadAnatomy& head, Vec3 centre, Vec3 spacing) {
+template <class Anatomy>
+VoxelMean voxel_mean(const Anatomy& head, Vec3 centre, Vec3 spacing) {
   const HeadAnatomy::Sample s = head.sample(centre);
   VoxelMean v{s.tissue, tissue_hu(s.tissue), is_bone(s.tissue) ? 1.0 : 0.0};
   if (s.margin_mm >= 0.5 * length(spacing)) return v;
@@ -78,15 +88,12 @@ VoxelMean voxel_mean(const HeadAnatomy& head, Vec3 centre, Vec3 spacing) {
   return v;
 }
 
-}  // namespace
-
-Phantom make_phantom(const PhantomParams& p, const Context& context) {
-  const Frame frame = phantom_frame(p);
+template <class Anatomy>
+Phantom phantom_of(const Anatomy& head, const Frame& frame, const PhantomParams& p, const Context& context) {
   if (static_cast<double>(frame.voxel_count()) > 1e9) {
     throw Error(ExitCode::resources, "a phantom of this size has more than 10^9 voxels",
                 "use --region temporal or a larger --spacing-mm");
   }
-  const HeadAnatomy head(static_cast<std::uint64_t>(p.individual));
   const auto hu = make_voxels<std::int16_t>(frame.voxel_count());
   const auto labels = make_voxels<std::uint8_t>(frame.voxel_count());
   std::vector<float> means(frame.voxel_count());
@@ -144,6 +151,16 @@ Phantom make_phantom(const PhantomParams& p, const Context& context) {
   for (const double b : bone) result.bone_mm3 += b * frame.voxel_volume_mm3();
   context.report("bone_volume_mm3", result.bone_mm3);
   return result;
+}
+
+}  // namespace
+
+Phantom make_phantom(const PhantomParams& p, const Context& context) {
+  const auto individual = static_cast<std::uint64_t>(p.individual);
+  const FibulaAnatomy fibula(individual);
+  const Frame frame = phantom_frame(p, fibula);
+  return p.region == PhantomRegion::fibula ? phantom_of(fibula, frame, p, context)
+                                           : phantom_of(HeadAnatomy(individual), frame, p, context);
 }
 
 }  // namespace osteo::inline imaging

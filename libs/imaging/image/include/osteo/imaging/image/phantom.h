@@ -11,9 +11,9 @@
 
 namespace osteo::inline imaging {
 
-enum class PhantomRegion : int { head, temporal, mandible };
-[[nodiscard]] constexpr std::array<std::string_view, 3> enum_names(PhantomRegion) {
-  return {"head", "temporal", "mandible"};
+enum class PhantomRegion : int { head, temporal, mandible, fibula };
+[[nodiscard]] constexpr std::array<std::string_view, 4> enum_names(PhantomRegion) {
+  return {"head", "temporal", "mandible", "fibula"};
 }
 
 struct PhantomParams {
@@ -29,8 +29,10 @@ struct Phantom {
   Labels labels;  ///< exact tissue at the voxel centre
   double bone_mm3 = 0;  ///< by the same 27 samples a voxel
 };
-/// A CT of `HeadAnatomy(params.individual)`. Same parameters and context.seed (of the noise), same bytes, for any
-/// number of threads. Voxels that one tissue fills, which its margin tells, cost one sample for all of a block.
+/// A CT of `HeadAnatomy(params.individual)`, or of a fibula (superelliptic shaft, bowed, twisted and thicker at its
+/// ends; a canal of marrow within the cortex, of HU like soft tissue). Same parameters and context.seed (of the noise),
+/// same bytes, for any number of threads. Voxels that one tissue fills, which its margin tells, cost one sample for all
+/// of a block.
 [[nodiscard]] Phantom make_phantom(const PhantomParams& params, const Context& context = {});
 
 }  // namespace osteo::inline imaging

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "osteo/core/data/rigid_transform.h"
+#include "osteo/core/data/volume.h"
+#include "osteo/geometry/mesh/soup.h"
 
 namespace osteo::inline session {
 
@@ -44,5 +46,28 @@ struct SurgicalPlan {
 /// What plan_of reads as the same, to the last bit. Errors as of plan_of, so that no plan is written that cannot be
 /// read.
 [[nodiscard]] std::string plan_json(const SurgicalPlan& plan);
+
+/// A structure beside a planned cut, or in it.
+struct StructureAtCut {
+  std::string plane, structure;
+  double nearest_mm = 0;  ///< from the kerf to the nearest voxel's face; 0: the saw meets it
+  double cut_mm3 = 0;     ///< of it within the kerf
+};
+/// A structure in what is removed, and how much of it.
+struct StructureRemoved {
+  std::string structure;
+  double mm3 = 0, share = 0;
+};
+struct PlannedHarm {
+  std::vector<StructureAtCut> at_cuts;    ///< of each plane those within `within_mm`, the nearest first
+  std::vector<StructureRemoved> removed;  ///< between the planes of the bone; the largest share first
+};
+
+/// What a plan does to the structures of the CT of one of its bones: nerves, teeth. A cut reaches as far as the circle
+/// about the bone's section there. What is removed lies ahead of all planes of the bone, in it or within 3 mm of it,
+/// and no farther from their middle than 1.5 times the farthest plane. By voxels: places are known to half of one.
+/// Error(usage): no structure has a name; the bone is not in the plan. O(voxels).
+[[nodiscard]] PlannedHarm harm_of(const SurgicalPlan& plan, std::string_view bone, const TriangleSoup& surface,
+                                  const Labels& structures, double within_mm = 10);
 
 }  // namespace osteo::inline session
