@@ -287,8 +287,9 @@ void rock(const GuideBlock& block, const std::vector<CutPlane>& planes, const Ax
   // With the contacts that hold it so far; where that motion would press another one into bone, with that one too. The
   // worst of them first, so that a few dozen of several thousand are enough.
   const auto hold = [&](const Motion& c, Motion& x) {
-    for (;;) {
+    for (const GuideBlock::Contact* added = nullptr;;) {
       const double reached = largest(c, rows, room, &x);
+      if (!std::isfinite(reached)) return reached;
       const GuideBlock::Contact* worst = nullptr;
       double deepest = kPressedMm;
       for (const auto& o : block.others) {
@@ -299,7 +300,9 @@ void rock(const GuideBlock& block, const std::vector<CutPlane>& planes, const Ax
         worst = &o;
       }
       if (worst == nullptr) return reached;
+      if (worst == added) return std::numeric_limits<double>::infinity();  // not solved well enough to hold by it
       add(*worst);
+      added = worst;
     }
   };
   const auto most = [&](Vec3 shift, Vec3 turn, double not_held) {

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kFinestCellMm = 0.5;
 constexpr int kMaxPivots = 2000;
+constexpr double kBelieved = 1e-6;  // mm; the gaps are known to less
 
 using Corner2 = std::array<double, 2>;
 
@@ -84,11 +85,18 @@ double largest(const std::array<double, 6>& c, const std::vector<std::array<doub
                const std::vector<double>& b, std::array<double, 6>* x) {
   // Each unknown is the difference of two that are not negative; slacks are the first basis.
   constexpr std::size_t kColumns = 12;
+  constexpr double kLeastPivot = 1e-8;  // of rows that are of order 1: below it there is nothing but rounding
   const std::size_t rows = a.size();
   std::vector<std::array<double, kColumns + 1>> t(rows + 1);
+  // Columns of one size: turns act by arms of centimetres.
+  std::array<double, 6> size{};
+  for (std::size_t k = 0; k < 6; ++k) {
+    for (std::size_t r = 0; r < rows; ++r) size[k] = std::max(size[k], std::abs(a[r][k]));
+    if (!(size[k] > 0)) size[k] = 1;
+  }
   for (std::size_t r = 0; r <= rows; ++r) {
     for (std::size_t k = 0; k < 6; ++k) {
-      t[r][k] = r < rows ? a[r][k] : -c[k];
+      t[r][k] = (r < rows ? a[r][k] : -c[k]) / size[k];
       t[r][k + 6] = -t[r][k];
     }
     t[r][kColumns] = r < rows ? b[r] : 0;
@@ -103,17 +111,21 @@ double largest(const std::array<double, 6>& c, const std::vector<std::array<doub
     for (std::size_t k = 0; k < kColumns; ++k)
       if (t[rows][k] < -1e-10 && (in == kColumns || outside[k] < outside[in])) in = k;
     if (in == kColumns) {
-      if (x != nullptr) {
-        x->fill(0);
-        for (std::size_t r = 0; r < rows; ++r)
-          if (basis[r] < kColumns) (*x)[basis[r] % 6] += (basis[r] < 6 ? 1 : -1) * t[r][kColumns];
+      std::array<double, 6> at{};
+      for (std::size_t r = 0; r < rows; ++r)
+        if (basis[r] < kColumns) at[basis[r] % 6] += (basis[r] < 6 ? 1 : -1) * t[r][kColumns] / size[basis[r] % 6];
+      for (std::size_t r = 0; r < rows; ++r) {
+        double over = -b[r];
+        for (std::size_t k = 0; k < 6; ++k) over += a[r][k] * at[k];
+        if (over > kBelieved) return std::numeric_limits<double>::infinity();  // lost in rounding
       }
+      if (x != nullptr) *x = at;
       return t[rows][kColumns];
     }
     std::size_t out = rows;
     double step = std::numeric_limits<double>::infinity();
     for (std::size_t r = 0; r < rows; ++r) {
-      if (t[r][in] <= 1e-10) continue;
+      if (t[r][in] <= kLeastPivot) continue;
       const double s = t[r][kColumns] / t[r][in];
       if (s < step - 1e-13 || (s < step + 1e-13 && out < rows && basis[r] < basis[out])) {
         step = s;

@@ -69,7 +69,8 @@ struct GuideBlock {
 [[nodiscard]] GuideBlock build_block(const GuideLayout& layout, const Underside& under, const Context& context);
 
 /// The most that c . x reaches where a x <= b for all rows; b >= 0, so that 0 is allowed. Simplex method with Bland's
-/// rule. Infinity where nothing limits it, and where it is not found in 2000 steps. `x`: where it is reached, if it is.
+/// rule. Infinity where nothing limits it, where it is not found in 2000 steps, and where
+/// what is found does not keep to the rows within 1e-6. `x`: where it is reached, if it is.
 [[nodiscard]] double largest(const std::array<double, 6>& c, const std::vector<std::array<double, 6>>& a,
                              const std::vector<double>& b, std::array<double, 6>* x = nullptr);
 
