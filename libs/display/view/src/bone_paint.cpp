@@ -57,7 +57,11 @@ Shine shine_through(const StructureMap& structures, Vec3 p, Vec3 inwards) {
   auto last = structures.at(p);
   if (last.structure == 0 || last.distance_mm >= kMax) return {};
   if (last.distance_mm <= 0) return {1, last.structure};
-  for (double t = kStep; t < kMax + kStep; t += kStep) {
+  // How far there is none for certain; distances are read between the places of a grid.
+  const auto free_mm = [](double distance_mm) { return 0.9 * distance_mm - 0.05; };
+  for (double t = 0; t < kMax;) {
+    if (t + free_mm(last.distance_mm) > kMax) return {};
+    t += kStep * std::max(1.0, std::floor(free_mm(last.distance_mm) / kStep));
     const auto there = structures.at(p + inwards * t);
     if (there.structure != 0 && there.distance_mm <= 0) {
       // Where between the two the face lies.

@@ -22,11 +22,15 @@ struct PictureStyle {
   friend bool operator==(const PictureStyle&, const PictureStyle&) = default;
 };
 
+/// What moves in a picture: nothing; what is before a camera that rests; or the camera, so that all is drawn again.
+enum class Motion : int { none, scene, camera };
+
 /// Chooses style by times of pictures. A moving picture is to take at most kMovingMs: where three in a row take more,
-/// the next has fewer pixels (of kScales), until eight in a row would take less than 0.8 of that with more. Effects: a
-/// resting picture's time tells what they cost. At or below kDeepMs automatic goes from calm to deep, and back where
-/// eight moving pictures in a row take more than kTooDeepMs; where a resting picture takes more than kTooCalmMs,
-/// automatic goes on as plain, until the picture has half as many pixels. Deterministic.
+/// the next has fewer pixels (of kScales), until eight in a row would take less than 0.8 of that with more; apart for
+/// each kind of motion, since with the camera at rest a picture costs much less. Effects: a resting picture's time
+/// tells what they cost. At or below kDeepMs automatic goes from calm to deep, and back where eight moving pictures in
+/// a row take more than kTooDeepMs; where a resting picture takes more than kTooCalmMs, automatic goes on as plain,
+/// until the picture has half as many pixels. Deterministic.
 class QualityChoice {
  public:
   static constexpr double kMovingMs = 50, kDeepMs = 20, kTooDeepMs = 40, kTooCalmMs = 2500;
@@ -38,17 +42,21 @@ class QualityChoice {
   [[nodiscard]] Quality wish() const { return wish_; }
   /// plain, calm or deep.
   [[nodiscard]] Quality level() const { return level_; }
-  [[nodiscard]] PictureStyle style(bool moving) const;
+  [[nodiscard]] PictureStyle style(Motion motion) const;
   /// A picture of that style took so long, its own work and handing it to the screen; `pixels` shown.
-  void took(const PictureStyle& style, bool moving, double ms, double pixels);
+  void took(const PictureStyle& style, Motion motion, double ms, double pixels);
   /// Of the last ones; 0: none yet.
   [[nodiscard]] double moving_ms() const { return moving_ms_; }
   [[nodiscard]] double resting_ms() const { return resting_ms_; }
 
  private:
   Quality wish_ = Quality::automatic, level_ = Quality::calm, found_ = Quality::calm;
-  std::size_t scale_ = 0;  // of kScales
-  int slow_ = 0, quick_ = 0, too_deep_ = 0;
+  struct Size {
+    std::size_t scale = 0;  // of kScales
+    int slow = 0, quick = 0;
+  };
+  std::array<Size, 2> sizes_;  // while the scene moves, while the camera does
+  int too_deep_ = 0;
   double moving_ms_ = 0, resting_ms_ = 0, plain_from_pixels_ = 0;
 };
 
