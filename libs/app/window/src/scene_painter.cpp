@@ -24,6 +24,7 @@ namespace {
 // shown again; how long nobody did anything when the window sleeps, and how long it does at most: a clock's seconds,
 // and messages that go.
 constexpr std::chrono::milliseconds kRest{300}, kTurned{100}, kPanels{100}, kAwake{1500}, kSleep{250};
+constexpr double kMuch = 0.3;  // of the scene's parts: where more changes, all is as good as drawn again
 constexpr double kLookAgainS = 0.008, kIdleS = 0.05, kStirS = 0.02;
 
 void add(std::uint64_t& h, const void* data, std::size_t bytes) {
@@ -76,11 +77,13 @@ bool ScenePainter::begin(const Turn& turn, const ImDrawData* panels) {
     turned_at_ = began_;
   }
   const bool moves = !turn.still && (began_ - changed_at_ < kRest || !turn.settled);
-  motion_ = !moves ? Motion::none : began_ - turned_at_ < kTurned ? Motion::camera : Motion::scene;
+  motion_ = !moves                                                         ? Motion::none
+            : began_ - turned_at_ < kTurned || layer_.live_share() > kMuch ? Motion::all
+                                                                           : Motion::little;
   const PictureStyle style = quality_.style(motion_);
   // A picture that was drawn at rest stays until something changes; one of a moving camera until that rests.
   draws_ = scene != stamp_ || resized || drawn_ == 0 || (motion_ == Motion::none && style != style_) ||
-           (motion_ == Motion::scene && style.scale > style_.scale);
+           (motion_ == Motion::little && style.scale > style_.scale);
   if (draws_) {
     stamp_ = scene;
     style_ = style;

@@ -70,7 +70,7 @@ class ScenePainter {
   Turn turn_;
   PictureStyle style_;
   StillLayer layer_;
-  Motion motion_ = Motion::camera;
+  Motion motion_ = Motion::all;
   bool draws_ = false;
   std::uint64_t seen_ = 0, view_ = 0, stamp_ = 0, panels_ = 0, drawn_ = 0;
   double slept_s_ = 0;

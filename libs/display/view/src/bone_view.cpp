@@ -357,7 +357,13 @@ void BoneView::draw(Chunk& chunk, vtkTypeInt32Array* triangles, Drawn drawn) {
 
 void BoneView::draw_only(std::size_t n, std::uint64_t version, std::span<const std::uint32_t> triangles) {
   Chunk& chunk = chunks_[n];
-  if (chunk.complete.version == version) draw(chunk, array_of(triangles), Drawn::visible);
+  if (chunk.complete.version != version) return;
+  // What is drawn so already stays untouched: nobody draws it again for that.
+  if (chunk.drawn == Drawn::visible &&
+      std::equal(triangles.begin(), triangles.end(), chunk.visible.begin(), chunk.visible.end()))
+    return;
+  chunk.visible.assign(triangles.begin(), triangles.end());
+  draw(chunk, array_of(triangles), Drawn::visible);
 }
 
 void BoneView::keep_coarse(std::size_t n, std::uint64_t version, std::vector<std::uint32_t> triangles) {

@@ -9,7 +9,7 @@ void QualityChoice::want(Quality wish) {
 
 PictureStyle QualityChoice::style(Motion motion) const {
   if (motion == Motion::none) return {level_ != Quality::plain, 1};
-  return {level_ == Quality::deep, kScales[sizes_[motion == Motion::camera ? 1 : 0].scale]};
+  return {level_ == Quality::deep, motion == Motion::all ? kScales[scale_] : 1};
 }
 
 void QualityChoice::took(const PictureStyle& style, Motion motion, double ms, double pixels) {
@@ -17,19 +17,18 @@ void QualityChoice::took(const PictureStyle& style, Motion motion, double ms, do
   (moving ? moving_ms_ : resting_ms_) = ms;
   constexpr int kSlow = 3, kQuick = 8;
   if (moving) {
-    auto& [scale, slow, quick] = sizes_[motion == Motion::camera ? 1 : 0];
     // Times of another scale are late news. What a picture costs apart from its pixels is not known: none of it is
     // counted on to shrink.
-    if (style.scale == kScales[scale]) {
-      const double more = scale > 0 ? kScales[scale - 1] / kScales[scale] : 1;
-      slow = ms > kMovingMs ? slow + 1 : 0;
-      quick = scale > 0 && ms * more * more < 0.8 * kMovingMs ? quick + 1 : 0;
-      if (slow >= kSlow && scale + 1 < kScales.size()) {
-        ++scale;
-        slow = quick = 0;
-      } else if (quick >= kQuick) {
-        --scale;
-        slow = quick = 0;
+    if (motion == Motion::all && style.scale == kScales[scale_]) {
+      const double more = scale_ > 0 ? kScales[scale_ - 1] / kScales[scale_] : 1;
+      slow_ = ms > kMovingMs ? slow_ + 1 : 0;
+      quick_ = scale_ > 0 && ms * more * more < 0.8 * kMovingMs ? quick_ + 1 : 0;
+      if (slow_ >= kSlow && scale_ + 1 < kScales.size()) {
+        ++scale_;
+        slow_ = quick_ = 0;
+      } else if (quick_ >= kQuick) {
+        --scale_;
+        slow_ = quick_ = 0;
       }
     }
     too_deep_ = style.effects && ms > kTooDeepMs ? too_deep_ + 1 : 0;

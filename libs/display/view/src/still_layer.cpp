@@ -81,6 +81,7 @@ std::vector<vtkProp*> StillLayer::visible() const {
 // What has changed since the last picture. True: what is kept is still as it was.
 bool StillLayer::look(const std::vector<vtkProp*>& props) {
   bool as_kept = true, waiting = false;
+  std::size_t lively = 0;
   for (vtkProp* const prop : props) {
     Known& k = known_[prop];
     k.seen = picture_;
@@ -91,8 +92,10 @@ bool StillLayer::look(const std::vector<vtkProp*>& props) {
       k.may_be_kept = !is_late(prop) && prop->HasTranslucentPolygonalGeometry() == 0;
       as_kept &= !k.kept;
     }
+    lively += live(k) ? 1 : 0;
     waiting |= k.may_be_kept && !k.kept && !live(k);
   }
+  live_share_ = props.empty() ? 0 : static_cast<double>(lively) / static_cast<double>(props.size());
   // What is no longer there, or not to be seen.
   std::erase_if(known_, [&](const auto& k) {
     if (k.second.seen == picture_) return false;
@@ -111,6 +114,10 @@ void StillLayer::render() {
       view_stamp(renderer_) * 31 + static_cast<std::uint64_t>(size[0]) * 65536 + static_cast<std::uint64_t>(size[1]);
   const std::vector<vtkProp*> props = visible();
   const bool as_kept = look(props), same_view = view == view_;
+  // What camera and size bring with them tells nothing about what lies still.
+  if (!same_view) {
+    for (auto& [prop, k] : known_) k.last = k.before = 0;
+  }
   view_ = view;
   valid_ = valid_ && as_kept && same_view;
   bool alone = true;

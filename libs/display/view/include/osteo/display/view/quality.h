@@ -22,15 +22,16 @@ struct PictureStyle {
   friend bool operator==(const PictureStyle&, const PictureStyle&) = default;
 };
 
-/// What moves in a picture: nothing; what is before a camera that rests; or the camera, so that all is drawn again.
-enum class Motion : int { none, scene, camera };
+/// What moves in a picture: nothing; a little before a camera that rests, so that only that is drawn again; or the
+/// camera, or so much that all is.
+enum class Motion : int { none, little, all };
 
-/// Chooses style by times of pictures. A moving picture is to take at most kMovingMs: where three in a row take more,
-/// the next has fewer pixels (of kScales), until eight in a row would take less than 0.8 of that with more; apart for
-/// each kind of motion, since with the camera at rest a picture costs much less. Effects: a resting picture's time
-/// tells what they cost. At or below kDeepMs automatic goes from calm to deep, and back where eight moving pictures in
-/// a row take more than kTooDeepMs; where a resting picture takes more than kTooCalmMs, automatic goes on as plain,
-/// until the picture has half as many pixels. Deterministic.
+/// Chooses style by times of pictures. A picture in which all moves is to take at most kMovingMs: where three in a row
+/// take more, the next has fewer pixels (of kScales), until eight in a row would take less than 0.8 of that with more.
+/// Where little moves, fewer pixels would save next to nothing. Effects: a resting picture's time tells what they cost.
+/// At or below kDeepMs automatic goes from calm to deep, and back where eight moving pictures in a row take more than
+/// kTooDeepMs; where a resting picture takes more than kTooCalmMs, automatic goes on as plain, until the picture has
+/// half as many pixels. Deterministic.
 class QualityChoice {
  public:
   static constexpr double kMovingMs = 50, kDeepMs = 20, kTooDeepMs = 40, kTooCalmMs = 2500;
@@ -51,12 +52,8 @@ class QualityChoice {
 
  private:
   Quality wish_ = Quality::automatic, level_ = Quality::calm, found_ = Quality::calm;
-  struct Size {
-    std::size_t scale = 0;  // of kScales
-    int slow = 0, quick = 0;
-  };
-  std::array<Size, 2> sizes_;  // while the scene moves, while the camera does
-  int too_deep_ = 0;
+  std::size_t scale_ = 0;  // of kScales
+  int slow_ = 0, quick_ = 0, too_deep_ = 0;
   double moving_ms_ = 0, resting_ms_ = 0, plain_from_pixels_ = 0;
 };
 

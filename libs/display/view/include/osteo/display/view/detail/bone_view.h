@@ -93,7 +93,7 @@ class BoneView {
     vtkSmartPointer<vtkPolyData> data;
     vtkSmartPointer<vtkActor> actor;
     Arrays complete;
-    std::vector<std::uint32_t> coarse;
+    std::vector<std::uint32_t> coarse, visible;  // visible: as last drawn
     std::uint64_t coarse_version = 0;
     Drawn drawn = Drawn::complete;
     std::size_t drawn_triangles = 0;

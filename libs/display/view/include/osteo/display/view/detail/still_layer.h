@@ -28,6 +28,8 @@ class StillLayer {
   /// In place of the window's Render(). The camera's clipping range may be widened. With ambient occlusion or smooth
   /// edges, or where another renderer draws too, all is drawn; what is kept stays.
   void render();
+  /// Of the props of the last picture the share that was live.
+  [[nodiscard]] double live_share() const { return live_share_; }
   /// Props that the last picture took from what is kept, and those that it drew. For tests.
   [[nodiscard]] std::size_t kept() const { return kept_now_; }
   [[nodiscard]] std::size_t drawn() const { return drawn_now_; }
@@ -55,6 +57,7 @@ class StillLayer {
   std::array<int, 2> size_{};
   std::array<unsigned, 3> gl_{};  // frame buffer, colours, depths
   std::size_t kept_now_ = 0, drawn_now_ = 0;
+  double live_share_ = 0;
 };
 
 /// As vtkRenderer::New(), for a StillLayer.
