@@ -108,6 +108,7 @@ TEST(StillLayer, WhatChangesIsSeenAndLeftOutWhileItDoes) {
   }
   EXPECT_EQ(scene.layer.kept(), 4U);
   EXPECT_EQ(scene.layer.drawn(), 3U);
+  EXPECT_NEAR(scene.layer.live_share(), 3.0 / 7, 0.01);  // of balls of as many triangles each
   scene.balls[1]->VisibilityOff();
   pictures(1, "one is hidden");
   scene.renderer->RemoveActor(scene.balls[0]);

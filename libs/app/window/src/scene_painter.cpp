@@ -24,7 +24,7 @@ namespace {
 // shown again; how long nobody did anything when the window sleeps, and how long it does at most: a clock's seconds,
 // and messages that go.
 constexpr std::chrono::milliseconds kRest{300}, kTurned{100}, kPanels{100}, kAwake{1500}, kSleep{250};
-constexpr double kMuch = 0.3;  // of the scene's parts: where more changes, all is as good as drawn again
+constexpr double kMuch = 0.5;  // of the triangles: where more changes, all is as good as drawn again
 constexpr double kLookAgainS = 0.008, kIdleS = 0.05, kStirS = 0.02;
 
 void add(std::uint64_t& h, const void* data, std::size_t bytes) {

@@ -3,7 +3,10 @@
 // GLEW, through VTK, must come before anything that includes GL.
 #include <vtk_glew.h>
 
+#include <vtkActor.h>
 #include <vtkCamera.h>
+#include <vtkDataSet.h>
+#include <vtkMapper.h>
 #include <vtkObjectFactory.h>
 #include <vtkOpenGLFramebufferObject.h>
 #include <vtkOpenGLRenderWindow.h>
@@ -48,6 +51,13 @@ int of_attachment(GLenum place, GLenum what) {
   return value;
 }
 
+// Triangles, or what else it consists of.
+double cells_of(vtkProp* prop) {
+  auto* const actor = vtkActor::SafeDownCast(prop);
+  vtkDataSet* const data = actor != nullptr && actor->GetMapper() != nullptr ? actor->GetMapper()->GetInput() : nullptr;
+  return data != nullptr ? static_cast<double>(data->GetNumberOfCells()) : 0;
+}
+
 }  // namespace
 
 vtkSmartPointer<vtkRenderer> make_layered_renderer() {
@@ -81,7 +91,7 @@ std::vector<vtkProp*> StillLayer::visible() const {
 // What has changed since the last picture. True: what is kept is still as it was.
 bool StillLayer::look(const std::vector<vtkProp*>& props) {
   bool as_kept = true, waiting = false;
-  std::size_t lively = 0;
+  double cells = 0, lively = 0;
   for (vtkProp* const prop : props) {
     Known& k = known_[prop];
     k.seen = picture_;
@@ -91,11 +101,13 @@ bool StillLayer::look(const std::vector<vtkProp*>& props) {
       k.last = picture_;
       k.may_be_kept = !is_late(prop) && prop->HasTranslucentPolygonalGeometry() == 0;
       as_kept &= !k.kept;
+      k.cells = cells_of(prop);
     }
-    lively += live(k) ? 1 : 0;
+    cells += k.cells;
+    if (!k.may_be_kept || live(k)) lively += k.cells;
     waiting |= k.may_be_kept && !k.kept && !live(k);
   }
-  live_share_ = props.empty() ? 0 : static_cast<double>(lively) / static_cast<double>(props.size());
+  live_share_ = cells > 0 ? lively / cells : 0;
   // What is no longer there, or not to be seen.
   std::erase_if(known_, [&](const auto& k) {
     if (k.second.seen == picture_) return false;

@@ -28,7 +28,7 @@ class StillLayer {
   /// In place of the window's Render(). The camera's clipping range may be widened. With ambient occlusion or smooth
   /// edges, or where another renderer draws too, all is drawn; what is kept stays.
   void render();
-  /// Of the props of the last picture the share that was live.
+  /// Of the triangles of the last picture the share that cannot be kept.
   [[nodiscard]] double live_share() const { return live_share_; }
   /// Props that the last picture took from what is kept, and those that it drew. For tests.
   [[nodiscard]] std::size_t kept() const { return kept_now_; }
@@ -39,6 +39,7 @@ class StillLayer {
     std::uint64_t stamp = 0;
     std::uint64_t last = 0, before = 0;  // pictures before which it changed; 0: never
     std::uint64_t seen = 0;
+    double cells = 0;
     bool kept = false, may_be_kept = false;
   };
   [[nodiscard]] std::vector<vtkProp*> visible() const;
