@@ -58,6 +58,8 @@ class ScenePainter {
 
   [[nodiscard]] std::uint64_t drawn() const { return drawn_; }  ///< pictures of the scene
   [[nodiscard]] double scale() const { return style_.scale; }   ///< of the last one
+  /// Of the last one: parts that were not drawn again, as they lay still.
+  [[nodiscard]] std::size_t kept() const { return layer_.kept(); }
   [[nodiscard]] bool at_rest() const { return drawn_ > 0 && motion_ == Motion::none; }
   /// For the panel: "picture 21 ms, at rest 180 ms: calm".
   [[nodiscard]] std::string words() const;
