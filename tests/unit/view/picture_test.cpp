@@ -326,6 +326,53 @@ TEST(Colours, ShineThroughThinBoneWithoutSteps) {
   EXPECT_LT(widest, 0.06);
 }
 
+// By what is remembered of each vertex colours are the same, and the remembered is not used where a vertex has moved.
+TEST(Colours, RememberedShineIsTheSame) {
+  auto bone = block();
+  Labels labels;
+  labels.frame.dims = {60, 60, 60};
+  labels.frame.spacing_mm = {0.5, 0.5, 0.5};
+  labels.frame.origin_mm = {-15, -15, -15};
+  const auto voxels = make_voxels<std::uint8_t>(labels.frame.voxel_count());
+  for (int k = 0; k < 60; ++k)
+    for (int j = 0; j < 60; ++j)
+      for (int i = 0; i < 60; ++i)
+        voxels[static_cast<std::size_t>((k * 60 + j) * 60 + i)] = j > 38 && j < 48 && std::abs(k - 30) < 8 ? 6 : 0;
+  labels.voxels = voxels;
+  labels.structures = {{6, "sigmoid sinus", {0, 0, 255}}};
+  const StructureMap map(labels);
+  LiveSurface surface(bone, {});
+  surface.shade({});
+  BonePaint paint(bone, &map, nullptr);
+  std::vector<ShineMemo> memos(bone.brick_count());
+  std::vector<Rgb> whole, remembered;
+  std::size_t blue = 0, held = 0;
+  for (int stroke = 0; stroke < 4; ++stroke) {
+    for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
+      paint.paint(bone, surface.patch(b), whole);
+      paint.paint(bone, surface.patch(b), remembered, &memos[b]);
+      ASSERT_EQ(whole.size(), remembered.size());
+      for (std::size_t n = 0; n < whole.size(); ++n) {
+        for (std::size_t c = 0; c < 3; ++c) ASSERT_NEAR(whole[n][c], remembered[n][c], 4) << stroke;
+        blue += whole[n][2] > whole[n][0] ? 1 : 0;
+      }
+      held += memos[b].of_key.size();
+    }
+    for (VoxelKey key = 0; key < bone.brick_count() * BrickGrid::kVoxels; ++key) {
+      const Ijk c = bone.coordinate(key);
+      if (length(bone.frame().world_from_index({1.0 * c.i, 1.0 * c.j, 1.0 * c.k}) - Vec3{0, 2.0 + stroke, 0}) > 3)
+        continue;
+      bone.set(key, 0);
+      surface.mark(key);
+    }
+    const auto changed = surface.update();
+    paint.renew(bone, changed);
+    surface.settle();
+  }
+  EXPECT_GT(blue, 50U);
+  EXPECT_GT(held, 0U);
+}
+
 // As by small steps all the way, from everywhere near two structures and in any direction.
 TEST(Colours, ShineThroughAsByStepsAllTheWay) {
   Labels labels;
