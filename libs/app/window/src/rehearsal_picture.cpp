@@ -208,9 +208,11 @@ void RehearsalWindow::end_picture() {
                        std::max(1, whole(area.height))};
     const bool settled = !scene || world_view_->rest(box.width, box.height, painter_->coarse());
     const bool still = screenshot_wanted_ || review_.wants_picture();
-    // Curves that run, partners, what is played or flies, and a cursor in a text move without an event.
+    // Curves that run, partners, what is played or flies, a cursor in a text, and a key that is held in the panel move
+    // without an event.
     const bool calm = !ended_ && !control_.leading() && !scope_.control.flies() && tutor_.title.empty() &&
-                      monitor_controller() == nullptr && !main_view_.in_front() && !controller_.assign().listens();
+                      monitor_controller() == nullptr && !main_view_.in_front() &&
+                      main_view_.focus() == MainView::Focus::bone && !controller_.assign().listens();
     const ScenePainter::Turn turn{box,  width_,         height_, settled, input(), still, shell_.take_uncovered(),
                                   calm, cuts_.uploads()};
     if (!painter_->begin(turn, ImGui::GetDrawData())) return painter_->wait([this] { return stirs(); });

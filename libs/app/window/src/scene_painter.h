@@ -8,8 +8,8 @@
 
 #include <vtkSmartPointer.h>
 
-#include "osteo/display/view/detail/still_layer.h"
 #include "osteo/display/view/quality.h"
+#include "osteo/display/view/still_layer.h"
 
 class vtkGenericOpenGLRenderWindow;
 class vtkRenderer;
