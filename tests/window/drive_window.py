@@ -506,7 +506,32 @@ def hand():
                 if dot(s["eye"], eye) < 0.4:
                     break
             assert dot(s["eye"], eye) < 0.4, (turn, s)
+        # While it drills, the picture is drawn in every pixel, and what lies still is not drawn again.
+        w.x("mousemove", 550, 350)
+        w.key("f", "on the way", lambda s: s["leading"])
+        w.until("arrived", lambda s: not s["leading"])
+        w.deeper()
+        w.x("mousedown", 1)
+        first = w.until("drills", lambda s: s["drill_on"])
+        n, sharp = 0, []
+        while len(sharp) < 10 and n < 400:
+            n += 1
+            w.x("mousemove", 550 + n % 5, 350 + n % 7)
+            s = w.next(1)
+            if s["drawn"] >= first["drawn"] + 5 and s["kept"] > 0:
+                sharp.append(s)
+        w.x("mouseup", 1)
+        assert len(sharp) == 10 and all(s["scale"] == 1 for s in sharp), [(s["scale"], s["kept"]) for s in sharp]
         w.key("u", "out", lambda s: not s["leading"] and s["message"].startswith("drill lifted"))
+        # With saw, plate or fragments in the hand it rests, in full, and the window sleeps: a few turns a second.
+        for tool, name in (("x", "saw"), ("l", "plate"), ("p", "piece")):
+            w.key(tool, name, lambda s: s["hand"] == name)
+            rested = w.until("the picture rests", lambda s: s["at_rest"] and s["scale"] == 1)
+            still = w.until("nobody did anything", lambda s: s["tick"] >= rested["tick"] + 3000)
+            slept = w.until("nothing is drawn", lambda s: s["tick"] >= still["tick"] + 5000)
+            assert slept["drawn"] <= rested["drawn"] + 2, (name, rested, slept)
+            assert slept["pictures"] <= still["pictures"] + 60, (name, still, slept)  # 100 where it never sleeps
+            w.key("Escape", "away", lambda s: s["hand"] == "drill")
         w.close()
     assert sum(s[0] == "drill brought to the bone" for s in seen) >= 4, seen
     summary, _ = closed("session")

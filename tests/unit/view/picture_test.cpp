@@ -326,6 +326,95 @@ TEST(Colours, ShineThroughThinBoneWithoutSteps) {
   EXPECT_LT(widest, 0.06);
 }
 
+// By what is remembered of each vertex colours are the same, and the remembered is not used where a vertex has moved.
+TEST(Colours, RememberedShineIsTheSame) {
+  auto bone = block();
+  Labels labels;
+  labels.frame.dims = {60, 60, 60};
+  labels.frame.spacing_mm = {0.5, 0.5, 0.5};
+  labels.frame.origin_mm = {-15, -15, -15};
+  const auto voxels = make_voxels<std::uint8_t>(labels.frame.voxel_count());
+  for (int k = 0; k < 60; ++k)
+    for (int j = 0; j < 60; ++j)
+      for (int i = 0; i < 60; ++i)
+        voxels[static_cast<std::size_t>((k * 60 + j) * 60 + i)] = j > 38 && j < 48 && std::abs(k - 30) < 8 ? 6 : 0;
+  labels.voxels = voxels;
+  labels.structures = {{6, "sigmoid sinus", {0, 0, 255}}};
+  const StructureMap map(labels);
+  LiveSurface surface(bone, {});
+  surface.shade({});
+  BonePaint paint(bone, &map, nullptr);
+  std::vector<ShineMemo> memos(bone.brick_count());
+  std::vector<Rgb> whole, remembered;
+  std::size_t blue = 0, held = 0;
+  for (int stroke = 0; stroke < 4; ++stroke) {
+    for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
+      paint.paint(bone, surface.patch(b), whole);
+      paint.paint(bone, surface.patch(b), remembered, &memos[b]);
+      ASSERT_EQ(whole.size(), remembered.size());
+      for (std::size_t n = 0; n < whole.size(); ++n) {
+        for (std::size_t c = 0; c < 3; ++c) ASSERT_NEAR(whole[n][c], remembered[n][c], 4) << stroke;
+        blue += whole[n][2] > whole[n][0] ? 1 : 0;
+      }
+      held += memos[b].of_key.size();
+    }
+    for (VoxelKey key = 0; key < bone.brick_count() * BrickGrid::kVoxels; ++key) {
+      const Ijk c = bone.coordinate(key);
+      if (length(bone.frame().world_from_index({1.0 * c.i, 1.0 * c.j, 1.0 * c.k}) - Vec3{0, 2.0 + stroke, 0}) > 3)
+        continue;
+      bone.set(key, 0);
+      surface.mark(key);
+    }
+    const auto changed = surface.update();
+    paint.renew(bone, changed);
+    surface.settle();
+  }
+  EXPECT_GT(blue, 50U);
+  EXPECT_GT(held, 0U);
+}
+
+// As by small steps all the way, from everywhere near two structures and in any direction.
+TEST(Colours, ShineThroughAsByStepsAllTheWay) {
+  Labels labels;
+  labels.frame.dims = {40, 40, 40};
+  labels.frame.spacing_mm = {0.4, 0.4, 0.4};
+  labels.frame.origin_mm = {-8, -8, -8};
+  const auto voxels = make_voxels<std::uint8_t>(labels.frame.voxel_count());
+  for (int k = 0; k < 40; ++k)
+    for (int j = 0; j < 40; ++j)
+      for (int i = 0; i < 40; ++i)
+        voxels[static_cast<std::size_t>((k * 40 + j) * 40 + i)] = std::hypot(j - 20, k - 20) < 4         ? 6
+                                                                  : std::hypot(i - 8, j - 9, k - 31) < 5 ? 7
+                                                                                                         : 0;
+  labels.voxels = voxels;
+  labels.structures = {{6, "facial nerve", {255, 255, 0}}, {7, "sigmoid sinus", {0, 0, 255}}};
+  const StructureMap map(labels);
+  int shines = 0, other = 0;
+  for (int n = 0; n < 20000; ++n) {
+    // Evenly over the box and over directions, by irrational steps.
+    const auto part = [&](double by) { return std::fmod(by * (n + 1), 1.0); };
+    const Vec3 at{16 * part(0.7548776662) - 8, 16 * part(0.5698402909) - 8, 16 * part(0.4301597090) - 8};
+    const double turn = 2 * std::numbers::pi * part(0.6180339887), up = 2 * part(0.4142135623) - 1;
+    const Vec3 along{std::sqrt(1 - up * up) * std::cos(turn), std::sqrt(1 - up * up) * std::sin(turn), up};
+    const Shine found = shine_through(map, at, along);
+    // The depth at which the way first meets one, to a hundredth.
+    double deep = 99;
+    const auto first = map.at(at);
+    if (first.structure != 0 && first.distance_mm < BonePaint::kShownThroughMm) {
+      for (double t = 0; t <= BonePaint::kShownThroughMm && deep > 90; t += 0.01) {
+        if (const auto there = map.at(at + along * t); there.structure != 0 && there.distance_mm <= 0) deep = t;
+      }
+    }
+    const double none = std::exp(-BonePaint::kShownThroughMm / 0.8);
+    const double expected = deep > 90 ? 0 : std::clamp((std::exp(-deep / 0.8) - none) / (1 - none), 0.0, 1.0);
+    shines += expected > 0 ? 1 : 0;
+    // A way that only grazes one may miss it between two steps.
+    other += std::abs(found.share - expected) > 0.03 ? 1 : 0;
+  }
+  EXPECT_GT(shines, 1000);
+  EXPECT_LT(other, shines / 50) << shines;
+}
+
 // The speckle of cut cancellous bone belongs to the place.
 TEST(Colours, SpeckleStaysWhereItIs) {
   const auto bone = test::solid(

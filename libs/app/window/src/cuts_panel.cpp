@@ -231,6 +231,7 @@ void CutsPanel::lay_out(const ViewLayout& layout) {
 
 void CutsPanel::upload(DrawnCut cut) {
   const auto n = static_cast<std::size_t>(cut.cut);
+  ++uploads_;
   glBindTexture(GL_TEXTURE_2D, textures_[n]);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
   glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, cut.view.width, cut.view.height, 0, GL_RGBA, GL_UNSIGNED_BYTE,

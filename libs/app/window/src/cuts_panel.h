@@ -40,6 +40,8 @@ class CutsPanel {
   void draw(Rehearsal& rehearsal, const SawCut* planned);
   [[nodiscard]] CutsControl& control() { return control_; }
   [[nodiscard]] double last_ms() const { return drawer_.last_ms(); }
+  /// Images of cuts that were put in so far.
+  [[nodiscard]] std::uint64_t uploads() const { return uploads_; }
 
  private:
   void header(const Rehearsal& rehearsal);
@@ -68,6 +70,7 @@ class CutsPanel {
   ScreenBox header_, footer_, middle_, scene_, foot_;  // foot_: below cuts that lie on the picture
   ScreenBox list_, room_;                              // in the layout's side
   float wished_width_ = 0;
+  std::uint64_t uploads_ = 0;
   int chosen_ = 0;  // where one alone has room
   bool list_open_ = false, mouse_in_ = false, any_ = false, settings_open_ = false, one_alone_ = false;
 };

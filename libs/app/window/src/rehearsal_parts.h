@@ -140,6 +140,8 @@ class RehearsalWindow {
   [[nodiscard]] std::optional<std::array<float, 2>> project(Vec3 at) const;
   [[nodiscard]] static bool input();
   void end_picture();
+  // While the window sleeps: whether hands, pedals or buttons do anything.
+  [[nodiscard]] bool stirs();
   void save_screenshot();
 
   // --- the state (rehearsal_state.cpp)
@@ -170,7 +172,7 @@ class RehearsalWindow {
   HintController hints_;
   WindowEnd end_;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
-  vtkNew<vtkRenderer> renderer_;
+  vtkSmartPointer<vtkRenderer> renderer_ = make_layered_renderer();
   std::unique_ptr<PathView> way_view_;
   std::array<std::unique_ptr<InstrumentView>, kMaxHands> hands_;
   std::unique_ptr<ScenePainter> painter_;
@@ -185,6 +187,7 @@ class RehearsalWindow {
   int width_ = 0, height_ = 0;
   std::uint64_t pictures_ = 0;
   bool screenshot_wanted_ = false, quit_ = false, has_plan_ = false;
+  std::array<TickRecord, kMaxHands> last_seen_{};  // of each hand, when the window was drawn last
   ScopeInput scope_;
   StereoScreen stereo_;
   TrialOverlay trial_;

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "gamepad.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/display/view/actors.h"
@@ -87,6 +88,7 @@ void RehearsalWindow::show_instruments(Rehearsal& now) {
     const auto solid = [&](Vec3 p) { return is_bone(world, p); };
     for (std::size_t hand = 0; hand < now.hands(); ++hand) {
       TickRecord tick = now.latest(hand);
+      last_seen_[hand] = tick;
       if (tick.tick == 0 && hand == 0) tick.device.tool = static_cast<std::uint8_t>(control_.instrument());
       if (hand > 0 && (tick.tick == 0 || control_.second_hand_empty())) {
         hands_[hand]->hide();
@@ -206,8 +208,14 @@ void RehearsalWindow::end_picture() {
                        std::max(1, whole(area.height))};
     const bool settled = !scene || world_view_->rest(box.width, box.height, painter_->coarse());
     const bool still = screenshot_wanted_ || review_.wants_picture();
-    if (!painter_->begin({box, width_, height_, settled, input(), still}, ImGui::GetDrawData()))
-      return painter_->wait();
+    // Curves that run, partners, what is played or flies, a cursor in a text, and a key that is held in the panel move
+    // without an event.
+    const bool calm = !ended_ && !control_.leading() && !scope_.control.flies() && tutor_.title.empty() &&
+                      monitor_controller() == nullptr && !main_view_.in_front() &&
+                      main_view_.focus() == MainView::Focus::bone && !controller_.assign().listens();
+    const ScenePainter::Turn turn{box,  width_,         height_, settled, input(), still, shell_.take_uncovered(),
+                                  calm, cuts_.uploads()};
+    if (!painter_->begin(turn, ImGui::GetDrawData())) return painter_->wait([this] { return stirs(); });
   }
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   stereo_.show([&] {
@@ -223,6 +231,24 @@ void RehearsalWindow::end_picture() {
   shell_.count_gl_errors();
   glfwSwapBuffers(window_);
   if (!two_eyes) painter_->done();
+}
+
+bool RehearsalWindow::stirs() {
+  Rehearsal* const rehearsal = actions_.rehearsal();
+  if (rehearsal == nullptr || control_.failure() || ended_) return actions_.stop();
+  constexpr double kUnseenMm = 0.005;
+  for (std::size_t hand = 0; hand < std::min(rehearsal->hands(), last_seen_.size()); ++hand) {
+    const DeviceSample now = rehearsal->latest(hand).device, &was = last_seen_[hand].device;
+    if (length(from_floats(now.position_mm) - from_floats(was.position_mm)) > kUnseenMm ||
+        length(from_floats(now.axis) - from_floats(was.axis)) > kUnseenMm || now.pedal != was.pedal ||
+        now.tool != was.tool || now.buttons != was.buttons)
+      return true;
+  }
+  std::vector<ButtonLevel> levels;
+  read_stick_buttons(levels);
+  return actions_.stop() ||
+         std::any_of(levels.begin(), levels.end(), [](const ButtonLevel& l) { return l.level > 0.5; }) ||
+         (actions_.switches && actions_.switches(shell_.attended()).value_or(0) != 0);
 }
 
 void RehearsalWindow::save_screenshot() {

@@ -11,6 +11,7 @@ void RehearsalWindow::write_state() {
   state.pictures = pictures_;
   state.drawn = painter_->drawn();
   state.at_rest = painter_->at_rest();
+  state.kept = painter_->kept();
   state.scale = painter_->scale();
   state.quality = painter_->quality();
   state.failure = control_.failure() ? control_.failure()->what() : "";

@@ -212,6 +212,8 @@ void RehearsalWindow::frame() {
   }
   lay_out();
   shell_.new_frame();
+  ImGuiIO& io = ImGui::GetIO();  // what a key is held for begins with its press
+  io.DeltaTime = std::max(0.001F, io.DeltaTime - static_cast<float>(painter_->take_slept_s()));
   if (control_.failure()) {
     report_failure();
     forget_mouse();

@@ -20,10 +20,12 @@
 namespace osteo::inline app {
 namespace {
 
-// How long nothing has changed when the picture rests; how often panels alone are shown again, with and without a
-// change that is known of.
-constexpr std::chrono::milliseconds kRest{300}, kPanels{100}, kPictures{250};
-constexpr double kLookAgainS = 0.008, kIdleS = 0.05;
+// How long nothing has changed when the picture rests, and the camera not when it does; how often panels alone are
+// shown again; how long nobody did anything when the window sleeps, and how long it does at most: a clock's seconds,
+// and messages that go.
+constexpr std::chrono::milliseconds kRest{300}, kTurned{100}, kPanels{100}, kAwake{1500}, kSleep{250};
+constexpr double kMuch = 0.5;  // of the triangles: where more changes, all is as good as drawn again
+constexpr double kLookAgainS = 0.008, kIdleS = 0.05, kStirS = 0.02;
 
 void add(std::uint64_t& h, const void* data, std::size_t bytes) {
   const auto* const p = static_cast<const unsigned char*>(data);
@@ -54,7 +56,7 @@ std::uint64_t panels_stamp(const ImDrawData* panels) {
 }
 
 ScenePainter::ScenePainter(vtkGenericOpenGLRenderWindow* window, vtkRenderer* renderer)
-    : window_(window), renderer_(renderer) {
+    : window_(window), renderer_(renderer), layer_(window, renderer) {
   window->SetFrameBlitModeToNoBlit();
 }
 
@@ -64,21 +66,31 @@ bool ScenePainter::begin(const Turn& turn, const ImDrawData* panels) {
                        turn.box.bottom != turn_.box.bottom || turn.box.width != turn_.box.width ||
                        turn.box.height != turn_.box.height;
   turn_ = turn;
-  const std::uint64_t scene = scene_stamp(renderer_), flat = panels_stamp(panels);
+  const std::uint64_t scene = scene_stamp(renderer_), view = view_stamp(renderer_),
+                      flat = panels_stamp(panels) + turn.images * 0x9e3779b97f4a7c15ULL;
   if (scene != seen_ || resized) {
     seen_ = scene;
     changed_at_ = began_;
   }
-  moving_ = !turn.still && (began_ - changed_at_ < kRest || !turn.settled);
-  const PictureStyle style = quality_.style(moving_);
-  // A picture that was drawn at rest stays until something changes.
-  draws_ = scene != stamp_ || resized || drawn_ == 0 || (!moving_ && style != style_);
+  if (view != view_ || resized) {
+    view_ = view;
+    turned_at_ = began_;
+  }
+  const bool moves = !turn.still && (began_ - changed_at_ < kRest || !turn.settled);
+  motion_ = !moves                                                         ? Motion::none
+            : began_ - turned_at_ < kTurned || layer_.live_share() > kMuch ? Motion::all
+                                                                           : Motion::little;
+  const PictureStyle style = quality_.style(motion_);
+  // A picture that was drawn at rest stays until something changes; one of a moving camera until that rests.
+  draws_ = scene != stamp_ || resized || drawn_ == 0 || (motion_ == Motion::none && style != style_) ||
+           (motion_ == Motion::little && style.scale > style_.scale);
   if (draws_) {
     stamp_ = scene;
     style_ = style;
   }
+  if (turn.input || changed_at_ == began_) stirred_at_ = began_;
   const auto since = began_ - shown_at_;
-  const bool shows = draws_ || turn.still || (flat != panels_ && (turn.input || since > kPanels)) || since > kPictures;
+  const bool shows = draws_ || turn.still || turn.uncovered || (flat != panels_ && (turn.input || since > kPanels));
   if (shows) panels_ = flat;
   return shows;
 }
@@ -94,7 +106,7 @@ void ScenePainter::show() {
     renderer_->SetViewport(0, 0, 1, 1);
     set_depth(renderer_, style_);
     window_->GetState()->Reset();
-    window_->Render();
+    layer_.render();
     renderer_->SetViewport(before);
     window_->SetSize(turn_.width, turn_.height);
     stamp_ = seen_ = scene_stamp(renderer_);  // occlusion touches what it draws for the first time
@@ -112,12 +124,23 @@ void ScenePainter::show() {
 void ScenePainter::done() {
   shown_at_ = Clock::now();
   if (draws_)
-    quality_.took(style_, moving_, std::chrono::duration<double, std::milli>(shown_at_ - began_).count(),
+    quality_.took(style_, motion_, std::chrono::duration<double, std::milli>(shown_at_ - began_).count(),
                   static_cast<double>(turn_.box.width) * turn_.box.height);
 }
 
-void ScenePainter::wait() const {
-  glfwWaitEventsTimeout(Clock::now() - changed_at_ < std::chrono::seconds(1) ? kLookAgainS : kIdleS);
+void ScenePainter::wait(const std::function<bool()>& stirs) {
+  const auto begin = Clock::now();
+  if (begin - changed_at_ < std::chrono::seconds(1)) return glfwWaitEventsTimeout(kLookAgainS);
+  if (!turn_.calm || begin - stirred_at_ < kAwake) return glfwWaitEventsTimeout(kIdleS);
+  for (auto now = begin; now - begin < kSleep && !stirs();) {
+    glfwWaitEventsTimeout(kStirS);
+    const auto then = std::exchange(now, Clock::now());
+    if (std::chrono::duration<double>(now - then).count() < 0.9 * kStirS) {  // an event
+      stirred_at_ = now;
+      break;
+    }
+  }
+  slept_s_ += std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 std::string ScenePainter::words() const {

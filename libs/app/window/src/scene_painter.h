@@ -2,11 +2,14 @@
 #pragma once
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <utility>
 
 #include <vtkSmartPointer.h>
 
 #include "osteo/display/view/quality.h"
+#include "osteo/display/view/still_layer.h"
 
 class vtkGenericOpenGLRenderWindow;
 class vtkRenderer;
@@ -23,7 +26,8 @@ struct SceneBox {
 /// wait(). What is drawn of the scene stays with VTK's window and is shown again while only panels change.
 class ScenePainter {
  public:
-  /// Both must outlive this. VTK's window draws into its own frame and shows nothing by itself.
+  /// Both must outlive this. VTK's window draws into its own frame and shows nothing by itself. With a renderer of
+  /// make_layered_renderer() what lies still is not drawn again while the camera rests.
   ScenePainter(vtkGenericOpenGLRenderWindow* window, vtkRenderer* renderer);
 
   [[nodiscard]] QualityChoice& quality() { return quality_; }
@@ -37,6 +41,9 @@ class ScenePainter {
     bool settled = true;        ///< the scene is as it will be until something changes
     bool input = false;         ///< mouse or keys did something
     bool still = false;         ///< for a still picture: as at rest, at any price
+    bool uncovered = false;     ///< the system has lost what was shown
+    bool calm = false;          ///< nothing but events and what wait() asks can change what is shown
+    std::uint64_t images = 0;   ///< another number when an image in the panels has changed
   };
   /// True: this turn has a picture to show. `panels` as ImGui is about to draw them.
   [[nodiscard]] bool begin(const Turn& turn, const ImDrawData* panels);
@@ -44,12 +51,16 @@ class ScenePainter {
   void show();
   /// After the swap.
   void done();
-  /// Until an event comes or it is time to look again.
-  void wait() const;
+  /// Until an event comes, `stirs` says that something moves, or it is time to look again.
+  void wait(const std::function<bool()>& stirs);
+  /// Of the time since the last turn, what went by while nothing happened at all: no key was held then.
+  [[nodiscard]] double take_slept_s() { return std::exchange(slept_s_, 0.0); }
 
   [[nodiscard]] std::uint64_t drawn() const { return drawn_; }  ///< pictures of the scene
   [[nodiscard]] double scale() const { return style_.scale; }   ///< of the last one
-  [[nodiscard]] bool at_rest() const { return drawn_ > 0 && !moving_; }
+  /// Of the last one: parts that were not drawn again, as they lay still.
+  [[nodiscard]] std::size_t kept() const { return layer_.kept(); }
+  [[nodiscard]] bool at_rest() const { return drawn_ > 0 && motion_ == Motion::none; }
   /// For the panel: "picture 21 ms, at rest 180 ms: calm".
   [[nodiscard]] std::string words() const;
 
@@ -60,9 +71,13 @@ class ScenePainter {
   QualityChoice quality_;
   Turn turn_;
   PictureStyle style_;
-  bool moving_ = true, draws_ = false;
-  std::uint64_t seen_ = 0, stamp_ = 0, panels_ = 0, drawn_ = 0;
-  Clock::time_point changed_at_{}, shown_at_{}, began_{};
+  StillLayer layer_;
+  Motion motion_ = Motion::all;
+  bool draws_ = false;
+  std::uint64_t seen_ = 0, view_ = 0, stamp_ = 0, panels_ = 0, drawn_ = 0;
+  double slept_s_ = 0;
+  // When the scene changed last, when the camera did, when anybody did anything, when anything was shown anew.
+  Clock::time_point changed_at_{}, turned_at_{}, stirred_at_{}, shown_at_{}, began_{};
 };
 
 /// Another number when panels would look different. Pictures in them do not count.

@@ -162,11 +162,14 @@ void draw_saw_line(const HandTools& tools, const CutPreview& preview, const Proj
   draw->AddCircleFilled({(*middle)[0], (*middle)[1]}, e * 0.35F, IM_COL32(0, 0, 0, 160));
   draw->AddCircle({(*middle)[0], (*middle)[1]}, e * 0.35F, im_colour32(colour), 16, e / 8);
   if (preview.cuts()) {
+    // In lines, so that the cuts on the picture do not hide the end.
+    const float most = 16 * e;
     const ImVec2 at{(*middle)[0] + e * 0.8F, (*middle)[1] - e * 0.5F},
-        wide = ImGui::CalcTextSize(preview.text().c_str());
+        wide = ImGui::CalcTextSize(preview.text().c_str(), nullptr, false, most);
     draw->AddRectFilled({at.x - e * 0.25F, at.y}, {at.x + wide.x + e * 0.25F, at.y + wide.y}, IM_COL32(0, 0, 0, 190),
                         e / 4);
-    draw->AddText(at, im_colour32(palette::kVermillion), preview.text().c_str());
+    draw->AddText(ImGui::GetFont(), ImGui::GetFontSize(), at, im_colour32(palette::kVermillion), preview.text().c_str(),
+                  nullptr, most);
   }
   draw->PopClipRect();
 }

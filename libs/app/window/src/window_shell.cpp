@@ -77,6 +77,13 @@ WindowShell::WindowShell(const ShellOptions& options) : fixed_scale_(options.sca
   glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int has) {
     static_cast<WindowShell*>(glfwGetWindowUserPointer(w))->attended_ = has != GLFW_FALSE;
   });
+  glfwSetWindowRefreshCallback(
+      window_, [](GLFWwindow* w) { static_cast<WindowShell*>(glfwGetWindowUserPointer(w))->uncovered_ = true; });
+  glfwSetWindowIconifyCallback(window_, [](GLFWwindow* w, int away) {
+    auto* const shell = static_cast<WindowShell*>(glfwGetWindowUserPointer(w));
+    shell->put_away_ = away != GLFW_FALSE;
+    shell->uncovered_ = true;
+  });
   glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** paths) {
     auto* const shell = static_cast<WindowShell*>(glfwGetWindowUserPointer(w));
     shell->dropped_.insert(shell->dropped_.end(), paths, paths + count);
@@ -134,7 +141,7 @@ void WindowShell::apply_scale() {
 bool WindowShell::poll() {
   glfwPollEvents();
   glfwGetFramebufferSize(window_, &width_, &height_);
-  if (width_ < 200 || height_ < 150) return false;
+  if (put_away_ || width_ < 200 || height_ < 150) return false;
   apply_scale();
   return true;
 }

@@ -24,6 +24,7 @@ void write_window_state(const WindowState& s, const std::filesystem::path& file)
   const nlohmann::ordered_json j{{"pictures", s.pictures},
                                  {"drawn", s.drawn},
                                  {"at_rest", s.at_rest},
+                                 {"kept", s.kept},
                                  {"scale", s.scale},
                                  {"quality", EnumNames<Quality>::values[static_cast<std::size_t>(s.quality.wish())]},
                                  {"level", EnumNames<Quality>::values[static_cast<std::size_t>(s.quality.level())]},

@@ -66,6 +66,7 @@ struct WindowState {
   std::uint64_t pictures = 0;  // turns of the loop
   std::uint64_t drawn = 0;     // pictures of the scene
   bool at_rest = false;
+  std::size_t kept = 0;  // parts of the last one that were not drawn again
   double scale = 1;
   QualityChoice quality;
   std::string failure, message, tool;

@@ -68,6 +68,10 @@ vtkSmartPointer<vtkActor> make_late_actor(Late how) {
   return actor;
 }
 
+bool is_late(vtkProp* prop) {
+  return LateActor::SafeDownCast(prop) != nullptr;
+}
+
 vtkSmartPointer<vtkActor> make_bone_actor(vtkPolyData* data) {
   auto actor = vtkSmartPointer<vtkActor>::New();
   vtkNew<vtkPolyDataMapper> mapper;

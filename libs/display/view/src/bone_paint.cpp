@@ -57,7 +57,11 @@ Shine shine_through(const StructureMap& structures, Vec3 p, Vec3 inwards) {
   auto last = structures.at(p);
   if (last.structure == 0 || last.distance_mm >= kMax) return {};
   if (last.distance_mm <= 0) return {1, last.structure};
-  for (double t = kStep; t < kMax + kStep; t += kStep) {
+  // How far there is none for certain; distances are read between the places of a grid.
+  const auto free_mm = [](double distance_mm) { return 0.9 * distance_mm - 0.05; };
+  for (double t = 0; t < kMax;) {
+    if (t + free_mm(last.distance_mm) > kMax) return {};
+    t += kStep * std::max(1.0, std::floor(free_mm(last.distance_mm) / kStep));
     const auto there = structures.at(p + inwards * t);
     if (there.structure != 0 && there.distance_mm <= 0) {
       // Where between the two the face lies.
@@ -89,7 +93,9 @@ double BonePaint::density_below(const BrickGrid& bone, Vec3 index, Vec3 outwards
   return densest;
 }
 
-void BonePaint::paint(const BrickGrid& bone, const SurfacePatch& patch, std::vector<Rgb>& colours) const {
+void BonePaint::paint(const BrickGrid& bone, const SurfacePatch& patch, std::vector<Rgb>& colours,
+                      ShineMemo* memo) const {
+  if (memo != nullptr && memo->of_key.size() > 2 * patch.vertices.size()) memo->of_key.clear();
   const Frame& frame = bone.frame();
   colours.resize(patch.vertices.size());
   for (std::size_t n = 0; n < patch.vertices.size(); ++n) {
@@ -104,7 +110,19 @@ void BonePaint::paint(const BrickGrid& bone, const SurfacePatch& patch, std::vec
       if (dense < 1) colour = colour * (1 + kSpeckle * (1 - dense) * speckle(at));
     }
     if (structures_ != nullptr) {
-      if (const Shine shine = shine_through(*structures_, at, -(frame.direction * outwards)); shine.share > 0) {
+      const auto look = [&] { return shine_through(*structures_, at, -(frame.direction * outwards)); };
+      Shine shine;
+      if (memo == nullptr) {
+        shine = look();
+      } else {
+        constexpr double kSame = 0.9998;  // cosine of a degree
+        const auto [known, fresh] = memo->of_key.try_emplace(v.key);
+        ShineMemo::Found& found = known->second;
+        if (fresh || found.index != v.index || dot(from_floats(found.normal), outwards) < kSame)
+          found = {v.index, v.normal, look()};
+        shine = found.shine;
+      }
+      if (shine.share > 0) {
         const auto below = structures_->colour_of(shine.structure);
         for (std::size_t c = 0; c < 3; ++c) colour[c] += shine.share * (below[c] - colour[c]);
       }

@@ -80,11 +80,12 @@ void BoneView::show(const LiveSurface& surface) {
   colours_.assign(surface.bone().brick_count(), {});
   wet_.assign(surface.bone().brick_count(), {});
   warm_.assign(surface.bone().brick_count(), {});
+  shines_.assign(surface.bone().brick_count(), {});
   is_updated_.assign(surface.bone().brick_count(), false);
   updated_.clear();
   std::vector<std::uint32_t> all(surface.bone().brick_count());
   std::iota(all.begin(), all.end(), 0U);
-  paint(surface, all);
+  paint(surface, all, false);
   for (Chunk& c : chunks_) {
     c.data = vtkSmartPointer<vtkPolyData>::New();
     c.actor = make_bone_actor(c.data);
@@ -99,7 +100,7 @@ void BoneView::show(const LiveSurface& surface) {
 void BoneView::update(const LiveSurface& surface, std::span<const std::uint32_t> bricks) {
   if (bricks.empty()) return;
   paint_->renew(surface.bone(), bricks);
-  paint(surface, bricks);
+  paint(surface, bricks, true);
   std::set<std::uint32_t> touched;
   for (const std::uint32_t b : bricks) {
     touched.insert(chunk_of_brick_[b]);
@@ -111,11 +112,12 @@ void BoneView::update(const LiveSurface& surface, std::span<const std::uint32_t>
   for (const std::uint32_t c : touched) rebuild(chunks_[c], surface);
 }
 
-void BoneView::paint(const LiveSurface& surface, std::span<const std::uint32_t> bricks) {
+void BoneView::paint(const LiveSurface& surface, std::span<const std::uint32_t> bricks, bool by_memo) {
   // By threads only where it is worth waking them.
   parallel_for(bricks.size(), bricks.size() > 200 ? 32 : bricks.size() + 1, 0, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      paint_->paint(surface.bone(), surface.patch(bricks[n]), colours_[bricks[n]]);
+      paint_->paint(surface.bone(), surface.patch(bricks[n]), colours_[bricks[n]],
+                    by_memo ? &shines_[bricks[n]] : nullptr);
       wet_brick(surface, bricks[n]);
     }
   });
@@ -165,7 +167,7 @@ void BoneView::refresh(const LiveSurface& surface) {
   updated_.clear();
   updated_beside_mm_.clear();
   all_updated_ = false;
-  paint(surface, std::vector<std::uint32_t>(near.begin(), near.end()));
+  paint(surface, std::vector<std::uint32_t>(near.begin(), near.end()), false);
   for (const std::uint32_t b : near) touched.insert(chunk_of_brick_[b]);
   for (const std::uint32_t c : touched) recolour(chunks_[c]);
 }
@@ -357,7 +359,13 @@ void BoneView::draw(Chunk& chunk, vtkTypeInt32Array* triangles, Drawn drawn) {
 
 void BoneView::draw_only(std::size_t n, std::uint64_t version, std::span<const std::uint32_t> triangles) {
   Chunk& chunk = chunks_[n];
-  if (chunk.complete.version == version) draw(chunk, array_of(triangles), Drawn::visible);
+  if (chunk.complete.version != version) return;
+  // What is drawn so already stays untouched: nobody draws it again for that.
+  if (chunk.drawn == Drawn::visible &&
+      std::equal(triangles.begin(), triangles.end(), chunk.visible.begin(), chunk.visible.end()))
+    return;
+  chunk.visible.assign(triangles.begin(), triangles.end());
+  draw(chunk, array_of(triangles), Drawn::visible);
 }
 
 void BoneView::keep_coarse(std::size_t n, std::uint64_t version, std::vector<std::uint32_t> triangles) {

@@ -10,6 +10,8 @@
 
 #include <cstring>
 
+#include "stamp.h"
+
 namespace osteo::inline display {
 namespace {
 
@@ -35,7 +37,7 @@ class Stamp {
 
 }  // namespace
 
-std::uint64_t scene_stamp(vtkRenderer* renderer) {
+std::uint64_t view_stamp(vtkRenderer* renderer) {
   Stamp stamp;
   // By values: drawing itself touches the times of camera and lights.
   vtkCamera* const camera = renderer->GetActiveCamera();
@@ -54,13 +56,26 @@ std::uint64_t scene_stamp(vtkRenderer* renderer) {
     stamp.add(light->GetFocalPoint(), 3);
     stamp.add(light->GetDiffuseColor(), 3);
   }
+  return stamp.value();
+}
+
+std::uint64_t prop_stamp(vtkProp* prop) {
+  Stamp stamp;
+  stamp.add(static_cast<std::uint64_t>(prop->GetRedrawMTime()));
+  if (auto* const placed = vtkProp3D::SafeDownCast(prop); placed != nullptr && placed->GetUserMatrix() != nullptr)
+    stamp.add(static_cast<std::uint64_t>(placed->GetUserMatrix()->GetMTime()));
+  return stamp.value();
+}
+
+std::uint64_t scene_stamp(vtkRenderer* renderer) {
+  Stamp stamp;
+  stamp.add(view_stamp(renderer));
+  vtkCollectionSimpleIterator at{};
   vtkPropCollection* const props = renderer->GetViewProps();
   for (props->InitTraversal(at); vtkProp* const prop = props->GetNextProp(at);) {
     if (prop->GetVisibility() == 0) continue;
     stamp.add(reinterpret_cast<std::uintptr_t>(prop));
-    stamp.add(static_cast<std::uint64_t>(prop->GetRedrawMTime()));
-    if (auto* const placed = vtkProp3D::SafeDownCast(prop); placed != nullptr && placed->GetUserMatrix() != nullptr)
-      stamp.add(static_cast<std::uint64_t>(placed->GetUserMatrix()->GetMTime()));
+    stamp.add(prop_stamp(prop));
   }
   return stamp.value();
 }

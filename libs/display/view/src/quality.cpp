@@ -7,18 +7,19 @@ void QualityChoice::want(Quality wish) {
   level_ = wish == Quality::automatic ? found_ : wish;
 }
 
-PictureStyle QualityChoice::style(bool moving) const {
-  if (!moving) return {level_ != Quality::plain, 1};
-  return {level_ == Quality::deep, kScales[scale_]};
+PictureStyle QualityChoice::style(Motion motion) const {
+  if (motion == Motion::none) return {level_ != Quality::plain, 1};
+  return {level_ == Quality::deep, motion == Motion::all ? kScales[scale_] : 1};
 }
 
-void QualityChoice::took(const PictureStyle& style, bool moving, double ms, double pixels) {
+void QualityChoice::took(const PictureStyle& style, Motion motion, double ms, double pixels) {
+  const bool moving = motion != Motion::none;
   (moving ? moving_ms_ : resting_ms_) = ms;
+  constexpr int kSlow = 3, kQuick = 8;
   if (moving) {
-    constexpr int kSlow = 3, kQuick = 8;
     // Times of another scale are late news. What a picture costs apart from its pixels is not known: none of it is
     // counted on to shrink.
-    if (style.scale == kScales[scale_]) {
+    if (motion == Motion::all && style.scale == kScales[scale_]) {
       const double more = scale_ > 0 ? kScales[scale_ - 1] / kScales[scale_] : 1;
       slow_ = ms > kMovingMs ? slow_ + 1 : 0;
       quick_ = scale_ > 0 && ms * more * more < 0.8 * kMovingMs ? quick_ + 1 : 0;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "osteo/core/base/context.h"
@@ -51,6 +52,8 @@ class WindowShell {
 
   /// Events, size and, where the scale has changed, text. False: the window is put away, and there is nothing to draw.
   bool poll();
+  /// Since the last call the system has asked for the picture again: something had covered it.
+  [[nodiscard]] bool take_uncovered() { return std::exchange(uncovered_, false); }
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   /// Height of text in pixels.
@@ -78,7 +81,7 @@ class WindowShell {
   GLFWwindow* window_ = nullptr;
   int width_ = 0, height_ = 0, em_ = 0;
   double reported_scale_ = 1, fixed_scale_, by_hand_;
-  bool full_screen_ = false, attended_ = true;
+  bool full_screen_ = false, attended_ = true, uncovered_ = false, put_away_ = false;
   int windowed_[4] = {0, 0, 0, 0};
   int gl_errors_ = 0;
   std::vector<std::filesystem::path> dropped_;

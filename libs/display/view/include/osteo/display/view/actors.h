@@ -12,6 +12,7 @@
 class vtkActor;
 class vtkMatrix4x4;
 class vtkPolyData;
+class vtkProp;
 class vtkRenderer;
 
 namespace osteo::inline display {
@@ -31,6 +32,7 @@ enum class Late {
   through_all  ///< whatever is in front
 };
 [[nodiscard]] vtkSmartPointer<vtkActor> make_late_actor(Late how);
+[[nodiscard]] bool is_late(vtkProp* prop);
 /// The surface of a round cone, its axis along +z; with normals.
 [[nodiscard]] vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape);
 void set_matrix(vtkMatrix4x4* matrix, const RigidTransform& transform);

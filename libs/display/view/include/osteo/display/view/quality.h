@@ -22,11 +22,16 @@ struct PictureStyle {
   friend bool operator==(const PictureStyle&, const PictureStyle&) = default;
 };
 
-/// Chooses style by times of pictures. A moving picture is to take at most kMovingMs: where three in a row take more,
-/// the next has fewer pixels (of kScales), until eight in a row would take less than 0.8 of that with more. Effects: a
-/// resting picture's time tells what they cost. At or below kDeepMs automatic goes from calm to deep, and back where
-/// eight moving pictures in a row take more than kTooDeepMs; where a resting picture takes more than kTooCalmMs,
-/// automatic goes on as plain, until the picture has half as many pixels. Deterministic.
+/// What moves in a picture: nothing; a little before a camera that rests, so that only that is drawn again; or the
+/// camera, or so much that all is.
+enum class Motion : int { none, little, all };
+
+/// Chooses style by times of pictures. A picture in which all moves is to take at most kMovingMs: where three in a row
+/// take more, the next has fewer pixels (of kScales), until eight in a row would take less than 0.8 of that with more.
+/// Where little moves, fewer pixels would save next to nothing. Effects: a resting picture's time tells what they cost.
+/// At or below kDeepMs automatic goes from calm to deep, and back where eight moving pictures in a row take more than
+/// kTooDeepMs; where a resting picture takes more than kTooCalmMs, automatic goes on as plain, until the picture has
+/// half as many pixels. Deterministic.
 class QualityChoice {
  public:
   static constexpr double kMovingMs = 50, kDeepMs = 20, kTooDeepMs = 40, kTooCalmMs = 2500;
@@ -38,9 +43,9 @@ class QualityChoice {
   [[nodiscard]] Quality wish() const { return wish_; }
   /// plain, calm or deep.
   [[nodiscard]] Quality level() const { return level_; }
-  [[nodiscard]] PictureStyle style(bool moving) const;
+  [[nodiscard]] PictureStyle style(Motion motion) const;
   /// A picture of that style took so long, its own work and handing it to the screen; `pixels` shown.
-  void took(const PictureStyle& style, bool moving, double ms, double pixels);
+  void took(const PictureStyle& style, Motion motion, double ms, double pixels);
   /// Of the last ones; 0: none yet.
   [[nodiscard]] double moving_ms() const { return moving_ms_; }
   [[nodiscard]] double resting_ms() const { return resting_ms_; }

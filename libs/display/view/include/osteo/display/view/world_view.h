@@ -105,5 +105,7 @@ struct WorldPicture {
 /// while nothing was, however often it is drawn in the same way; the first drawing with other effects changes it once.
 /// Clipping planes do not count: they follow the scene. About 0.2 us a prop.
 [[nodiscard]] std::uint64_t scene_stamp(vtkRenderer* renderer);
+/// The same of camera, lights and background alone.
+[[nodiscard]] std::uint64_t view_stamp(vtkRenderer* renderer);
 
 }  // namespace osteo::inline display

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "osteo/display/view/detail/openness.h"
@@ -14,6 +15,8 @@
 namespace osteo::inline display {
 
 using Rgb = std::array<std::uint8_t, 3>;
+
+struct ShineMemo;
 
 /// Dense bone is ivory. Where the millimetre below the surface is hardly denser than marrow, as on a cut through the
 /// diploe, it is redder and speckled; the speckle belongs to the place, not to the triangles. What is less than
@@ -34,8 +37,10 @@ class BonePaint {
   [[nodiscard]] std::shared_ptr<const Openness> openness() const { return openness_; }
   /// Bone of the same world that shades this too: a finer region and what is around it.
   void shade_with(std::vector<std::shared_ptr<const Openness>> others) { others_ = std::move(others); }
-  /// One for each vertex of a patch. About 0.5 us each, near structures 1.
-  void paint(const BrickGrid& bone, const SurfacePatch& patch, std::vector<Rgb>& colours) const;
+  /// One for each vertex of a patch. About 0.5 us each, near structures 1. `memo` of the patch, if any: what shines
+  /// through a vertex that is where it was, its normal turned by less than a degree, is not looked for again.
+  void paint(const BrickGrid& bone, const SurfacePatch& patch, std::vector<Rgb>& colours,
+             ShineMemo* memo = nullptr) const;
 
  private:
   [[nodiscard]] double density_below(const BrickGrid& bone, Vec3 index, Vec3 outwards_index) const;
@@ -52,5 +57,14 @@ struct Shine {
   std::uint8_t structure = 0;
 };
 [[nodiscard]] Shine shine_through(const StructureMap& structures, Vec3 at_mm, Vec3 inwards);
+
+/// What was found for the vertices of a patch: drilling changes some of them, and the normals around many times more.
+struct ShineMemo {
+  struct Found {
+    std::array<float, 3> index, normal;
+    Shine shine;
+  };
+  std::unordered_map<std::uint64_t, Found> of_key;
+};
 
 }  // namespace osteo::inline display

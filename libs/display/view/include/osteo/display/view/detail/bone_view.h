@@ -93,7 +93,7 @@ class BoneView {
     vtkSmartPointer<vtkPolyData> data;
     vtkSmartPointer<vtkActor> actor;
     Arrays complete;
-    std::vector<std::uint32_t> coarse;
+    std::vector<std::uint32_t> coarse, visible;  // visible: as last drawn
     std::uint64_t coarse_version = 0;
     Drawn drawn = Drawn::complete;
     std::size_t drawn_triangles = 0;
@@ -104,7 +104,7 @@ class BoneView {
   void set_colours(Chunk& chunk);
   bool wet_brick(const LiveSurface& surface, std::uint32_t brick);
   bool warm_brick(const LiveSurface& surface, std::uint32_t brick, const std::function<double(Vec3)>& celsius_at);
-  void paint(const LiveSurface& surface, std::span<const std::uint32_t> bricks);
+  void paint(const LiveSurface& surface, std::span<const std::uint32_t> bricks, bool by_memo);
   static void draw(Chunk& chunk, vtkTypeInt32Array* triangles, Drawn drawn);
 
   vtkRenderer* renderer_;
@@ -113,6 +113,7 @@ class BoneView {
   std::unique_ptr<BonePaint> paint_;
   std::vector<std::vector<Rgb>> colours_;        // of each brick's vertices
   std::vector<std::vector<std::uint8_t>> wet_;   // 255: all wet; empty: dry
+  std::vector<ShineMemo> shines_;                // of bricks that were drilled, or near
   std::vector<std::vector<std::uint8_t>> warm_;  // kelvin above where it is seen; empty: nowhere
   const WetFilm* film_ = nullptr;
   RigidTransform placed_, wetted_at_;
