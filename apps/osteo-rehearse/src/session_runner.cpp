@@ -71,18 +71,14 @@ SessionRunner::SessionRunner(const WindowFlags& flags, const Case& the_case, con
       hands_(flags),
       next_folder_(flags.out),
       last_(flags.resume),
+      monitor_setup_(flags.monitor_setup),
       live_(flags),
       sound_(person.sound, person.volume, person.alarms) {
   options_.rate_hz = flags.rate_hz;
   options_.follow = {true, true, flags.dust, flags.heat};
   options_.actions = first_actions(flags);
   options_.haptics.params.contact.method = flags.contact;
-  if (flags.monitor) {
-    monitor_json_ = flags.monitor_setup.empty() ? std::string() : read_text(flags.monitor_setup);
-    monitor_options_.emplace();
-    monitor_options_->setup = parse_monitor(monitor_json_.empty() ? default_monitor_json() : monitor_json_,
-                                            flags.monitor_setup.empty() ? "the built-in monitor" : flags.monitor_setup);
-  }
+  if (flags.monitor) want_monitor();
   targets_ = stream_targets(flags.stream);
   options_.heard = [this](const std::string& kind, const std::string& json) {
     const std::lock_guard lock(stream_mutex_);
@@ -364,6 +360,26 @@ void SessionRunner::begin_stream() {
   }
   if (monitor_) monitor_->invite(stream_->invitation());
   if (!stream_->invitation().empty()) io_.err << stream_->invitation() << std::endl;
+}
+
+void SessionRunner::want_monitor() {
+  monitor_json_ = monitor_setup_.empty() ? std::string() : read_text(monitor_setup_);
+  monitor_options_.emplace();
+  monitor_options_->setup = parse_monitor(monitor_json_.empty() ? default_monitor_json() : monitor_json_,
+                                          monitor_setup_.empty() ? "the built-in monitor" : monitor_setup_.string());
+}
+
+bool SessionRunner::turn_monitor(bool on) {
+  if (past_ || live_.joins() || (stream_ && monitor_)) return false;
+  if (on) {
+    want_monitor();
+    if (rehearsal_) begin_monitor();
+  } else {
+    monitor_options_.reset();
+    sound_.mix_in(nullptr);
+    monitor_.reset();
+  }
+  return true;
 }
 
 void SessionRunner::begin_monitor() {

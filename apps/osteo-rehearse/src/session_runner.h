@@ -65,6 +65,8 @@ class SessionRunner {
   }
   [[nodiscard]] SoundOut& sound() { return sound_; }
   [[nodiscard]] MonitorController* monitor() const { return monitor_.get(); }
+  /// While a rehearsal runs, or for the next. False: a stream has the one there is, or the host's is the only one.
+  bool turn_monitor(bool on);
   [[nodiscard]] std::string device() const { return hands_.name(); }
   [[nodiscard]] CameraDevices camera(bool lend) const {
     return hands_.camera(rehearsal_ ? &rehearsal_->device() : nullptr, lend);
@@ -90,6 +92,7 @@ class SessionRunner {
 
   void save_now();
   void leave_sound();
+  void want_monitor();
   void begin_monitor();
   void begin_stream();
   // Taken from under those who leave notes; what it waits for when it goes may be theirs.
@@ -112,6 +115,7 @@ class SessionRunner {
   std::mutex mutex_;
   std::optional<MonitorOptions> monitor_options_;  // where one is listed
   std::string monitor_json_;                       // of the person's own file
+  const std::filesystem::path monitor_setup_;
   std::vector<StreamTarget> targets_;
   std::mutex stream_mutex_;
   LiveSessionRunner live_;

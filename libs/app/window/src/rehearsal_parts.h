@@ -110,6 +110,11 @@ class RehearsalWindow {
     return actions_.monitor ? actions_.monitor() : nullptr;
   }
   void monitor_command(Command command);
+  // What the person has chosen meanwhile, by keys or in the settings: hardware, monitor and session follow.
+  void look_at_settings();
+  [[nodiscard]] std::array<bool, 3> switches_now() const {
+    return {sound_.on(), hints_.on(), monitor_controller() != nullptr};
+  }
   // What is the window's own.
   void command(Command command);
 
@@ -159,6 +164,7 @@ class RehearsalWindow {
   const std::vector<PlannedRegion> planned_;
   const std::vector<std::string> thinned_;
   const std::optional<Labels> uncertainty_;
+  const std::vector<StartProcedure> procedures_;
   std::filesystem::path state_file_;
   Keyboard keyboard_;
   MouseTrail trail_;
@@ -168,6 +174,8 @@ class RehearsalWindow {
   std::optional<EndFacts> ended_;
   ReviewScene review_;
   HintController hints_;
+  PersonSettings& person_;
+  std::array<bool, 3> switches_{};  // sound, hints, monitor: as the session has them noted
   WindowEnd end_;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkNew<vtkRenderer> renderer_;

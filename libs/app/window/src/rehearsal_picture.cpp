@@ -44,6 +44,7 @@ void RehearsalWindow::show() {
   Rehearsal& now = control_.rehearsal();
   const ViewScene scene = view_scene(now);
   main_view_.draw(scene);
+  look_at_settings();
   if (screenshot_wanted_) main_view_.draw_caption(scene);
   if (MonitorController* const controller = monitor_controller()) monitor_.draw(*controller);
   cuts_.draw(now, control_.tools().tool() == HandTools::Tool::saw ? &control_.tools().cut() : nullptr);
@@ -159,14 +160,15 @@ ViewScene RehearsalWindow::view_scene(Rehearsal& now) {
           scope_.view().pixels_per_mm(scope_.area),
           scope_.view().magnification,
           [this](Vec3 at) { return project(at); },
-          [this] { draw_scope_panel(scope_, stereo_, scope_scene()); },
+          [this] {
+            draw_scope_panel(scope_, stereo_, scope_scene());
+            draw_quality(painter_->quality());
+          },
           [this, &now] { tools_->panel(control_.tools(), now, view_axes()); },
           cuts_.room(),
-          [&now] { SceneTools::fixed_plates(now); },
-          [this](bool show) {
-            controller_.draw(control_, show);
-            hints_.panel();
-          },
+          [this] { controller_.draw(control_); },
+          procedures_,
+          tutor_.title.empty(),
           warmth_};
 }
 

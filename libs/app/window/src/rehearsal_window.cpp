@@ -26,9 +26,11 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
       planned_(options.regions),
       thinned_(options.thinned),
       uncertainty_(options.uncertainty),
+      procedures_(options.procedures),
       state_file_(options.state_file),
       controller_(person, keyboard_),
       hints_(person),
+      person_(person),
       device_name_(options.device),
       case_hash_(options.case_hash),
       end_page_(options.end_page),
@@ -45,6 +47,7 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
   control_.look_from(view_axes());
   control_.begin(options.from_case, false);
   scope_.overview(StandardView::left, scope_scene(), false);
+  if (options.view) scope_.control.jump(*options.view);
   if (options.review_only) end_session();
   if (options.camera_trial) trial_.begin(scope_.view(), middle_of_bone());
 }
@@ -143,6 +146,7 @@ void RehearsalWindow::show_bone(Rehearsal& rehearsal) {
   work_ = std::make_unique<WorkDone>();  // the session that the last one followed is over
   rehearsal.add_counter(*work_);
   hints_.follow(rehearsal);
+  switches_ = switches_now();
   ended_.reset();
 }
 

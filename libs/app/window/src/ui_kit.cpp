@@ -1,5 +1,7 @@
 #include "ui_kit.h"
 
+#include <imgui_internal.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -164,7 +166,7 @@ bool kit_switch(const std::string& words, bool& on, float width) {
   draw->AddRectFilled({x, y - 10 * u}, {x + 36 * u, y + 10 * u}, im_colour32(on ? t.text : t.raised), 10 * u);
   draw->AddRect({x, y - 10 * u}, {x + 36 * u, y + 10 * u}, im_colour32(t.line), 10 * u, 0, std::max(1.0F, u));
   draw->AddCircleFilled({x + (on ? 26 : 10) * u, y}, 7 * u, im_colour32(on ? t.ground : t.text), 20);
-  const std::string shown = shortened(words, x - i.lo.x - kGap * u, ImGui::GetFontSize());
+  const std::string shown = shortened(words.substr(0, words.find("##")), x - i.lo.x - kGap * u, ImGui::GetFontSize());
   draw->AddText({i.lo.x, std::floor(y - ImGui::GetFontSize() / 2)}, im_colour32(t.text), shown.c_str());
   focus_and_text({});
   return i.pressed;
@@ -184,6 +186,7 @@ bool kit_slider(const std::string& name, const std::string& value, double& at, d
     const double by = step * (ImGui::GetIO().KeyShift ? 10 : 1);
     if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_LeftArrow))) at -= by;
     if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_RightArrow))) at += by;
+    if (at != before) ImGui::NavMoveRequestCancel();  // they are the knob's here
   }
   at = std::clamp(at, least, most);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
@@ -199,6 +202,29 @@ bool kit_slider(const std::string& name, const std::string& value, double& at, d
   if (i.hovered || i.active) draw->AddCircle({x, y}, knob + 2 * u, im_colour32(t.line), 20, 2 * u);
   focus_and_text({});
   return at != before;
+}
+
+int kit_list(const std::string& name, std::span<const std::string> words, int selected, const std::string& shown) {
+  const float u = unit();
+  ImGui::PushID(name.c_str());
+  ImGui::TextDisabled("%s", name.c_str());
+  const float wide = ImGui::GetContentRegionAvail().x;
+  ImGui::SetNextItemWidth(wide);
+  ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {12 * u, (kControl * u - ImGui::GetFontSize()) / 2});
+  const std::string field = shortened(selected < 0 ? shown : words[static_cast<std::size_t>(selected)],
+                                      wide - kControl * u - 16 * u, ImGui::GetFontSize());
+  int chosen = -1;
+  const bool open = ImGui::BeginCombo("##list", field.c_str());
+  ImGui::PopStyleVar();
+  if (open) {
+    for (int n = 0; n < static_cast<int>(words.size()); ++n) {
+      if (ImGui::Selectable(words[static_cast<std::size_t>(n)].c_str(), n == selected)) chosen = n;
+      if (n == selected) ImGui::SetItemDefaultFocus();
+    }
+    ImGui::EndCombo();
+  }
+  ImGui::PopID();
+  return chosen;
 }
 
 bool list_row(const std::string& words, const std::string& right, bool selected, float high) {

@@ -48,6 +48,10 @@ enum class ButtonLook { usual, main, quiet };
 /// the focus Left and Right by `step`, with Shift by ten. `width`: pixels; 0: as there is room. True: `at` is another.
 [[nodiscard]] bool kit_slider(const std::string& name, const std::string& value, double& at, double least, double most,
                               double step, float width = 0);
+/// Its name, and below it a field that opens a list. The one that was chosen now, else -1. `shown`: in the field where
+/// none of `words` is selected.
+[[nodiscard]] int kit_list(const std::string& name, std::span<const std::string> words, int selected,
+                           const std::string& shown = {});
 /// A row of a list, as wide as there is room.
 [[nodiscard]] bool list_row(const std::string& words, const std::string& right, bool selected, float high = kRow);
 

@@ -9,8 +9,7 @@ namespace osteo::inline app {
 namespace {
 
 // Of the design, docs/design/window.md, in pixels at scale 1.
-constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPanel = 400, kPage = 544,
-                kSide = 288;
+constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPage = 544, kSide = 288;
 constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kSideWide = 960, kMinCut = 96, kMaxCut = 272;
 // Of the smallest window that operate fits: its state needs the width, its strip the height.
 constexpr double kMinWideEm = 40, kMinHighEm = 26;
@@ -76,11 +75,6 @@ ViewLayout lay_out(Layout wanted, int width, int height, float em, float cut_sid
   const float usual = std::clamp(std::floor(most / grid) * grid, kMinCut * u, kMaxCut * u);
   stack_over(out, cut_side > 0 ? std::max(cut_side, kMinCut * u) : usual, count);
   return out;
-}
-
-ScreenBox panel_of(const ViewLayout& layout) {
-  const float top = layout.view.y, bottom = layout.state.empty() ? layout.view.bottom() : layout.state.y;
-  return {layout.tray.right(), top, std::min(std::round(kPanel * layout.unit), layout.state.width), bottom - top};
 }
 
 ScreenBox take_strip(ViewLayout& layout, float high) {

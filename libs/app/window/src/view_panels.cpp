@@ -23,10 +23,6 @@ std::string capital(std::string text) {
   return text;
 }
 
-std::string with_key(const char* word, Command command) {
-  return std::string(word) + " (" + key_name(command) + ")";
-}
-
 // Name and key of a command.
 std::string words_of(const char* name, Command command) {
   const std::string key = key_name(command);
@@ -147,7 +143,7 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& 
   };
   const bool drill = hand.tool == 0 && !hand.saw;
   const char* const no_second = tr("no second hand: start with --dust");
-  const Row rows[] = {{"menu-2", tr("Menu and settings"), Command::panel_keys, false, menu},
+  const Row rows[] = {{"menu-2", tr("Menu and settings"), Command::settings, false, menu},
                       {"drill", tr("Drill"), Command::put_away, drill, hand.latched, true, true},
                       {"saw", tr("Saw"), Command::saw, hand.tool == 1 || hand.saw},
                       {"plate", tr("Plate"), Command::plates, hand.tool == 3},
@@ -344,9 +340,13 @@ void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::funct
 }
 
 void draw_apart(Pressed& pressed) {
-  ImGui::Separator();
-  if (ImGui::Button(with_key(tr("Save and continue"), Command::save).c_str(), {-1, 0})) pressed.press(Command::save);
-  if (ImGui::Button(with_key(tr("Reset bone ..."), Command::reset).c_str(), {-1, 0})) pressed.press(Command::reset);
+  const float wide = ImGui::GetContentRegionAvail().x;
+  if (kit_button(tr("Save and continue"), ButtonLook::usual, wide)) pressed.press(Command::save);
+  if (kit_button(tr("Reset bone ..."), ButtonLook::usual, wide)) pressed.press(Command::reset);
+}
+
+float apart_width() {
+  return std::max(button_width(tr("Save and continue")), button_width(tr("Reset bone ...")));
 }
 
 bool draw_next_step(const ScreenBox& view, const FirstSteps& steps) {
