@@ -139,6 +139,8 @@ struct WindowCommand {
     take(&PersonValues::heat);
     take(&PersonValues::monitor);
     take(&PersonValues::position);
+    take(&PersonValues::network);
+    take(&PersonValues::lessons_at);
   }
   // As the start page has them.
   static void take_switches(const PersonValues& values, Params& flags) {
@@ -207,6 +209,7 @@ struct WindowCommand {
     actions.turn_monitor = [&](bool on) { return session_runner.turn_monitor(on); };
     if (p.tutor || !p.join.empty() || !p.playback.empty()) {
       actions.tutor = [&] { return session_runner.tutor(); };
+      actions.steps = [&](const std::vector<std::string>& injured) { return session_runner.steps(injured); };
       actions.lead = [&](bool on) { session_runner.lead(on); };
     }
     actions.facts = [&] { return session_runner.facts(); };
@@ -291,6 +294,11 @@ struct WindowCommand {
         choice = run_start_page(shell, person, start);
         if (!choice) break;
         take_switches(person.values, flags);
+        flags.tutor = choice->teach;
+        if (flags.tutor) {
+          flags.listen = person.values.lessons_at;
+          flags.dust = person.values.dust = false;  // its second hand would be a third
+        }
       }
       flags.resume = choice->resume;
       left = {false, {}, false, left.changed ? left.view : std::nullopt};

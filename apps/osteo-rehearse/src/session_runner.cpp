@@ -146,9 +146,17 @@ void SessionRunner::save() {
   save_now();
 }
 
+std::vector<TutorNow::Step> SessionRunner::steps(const std::vector<std::string>& injured) {
+  return progress_ && rehearsal_ ? progress_->look(*rehearsal_, injured) : std::vector<TutorNow::Step>{};
+}
+
 TutorNow SessionRunner::tutor() const {
-  if (!playback_) return live_.now(rehearsal_.get());
   TutorNow n;
+  if (!playback_) {
+    n = live_.now(rehearsal_.get());
+    if (procedure_ != nullptr) n.procedure = procedure_->name;
+    return n;
+  }
   n.title = "Lesson: " + std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(playback_params_.mode)]) +
             ", " + format_number(std::round(10 * playback_->seconds.load()) / 10) + " of " +
             format_number(std::round(10 * lesson_->seconds()) / 10) + " s";
@@ -274,6 +282,8 @@ void SessionRunner::run(World world, std::vector<std::unique_ptr<Device>> device
       header.rate_hz = options_.rate_hz;
       header.haptics = options_.haptics;
     }
+    if (live_.hosts() && procedure_ != nullptr && options_.anatomy.structures)
+      progress_ = std::make_unique<ProcedureProgress>(*procedure_, *options_.anatomy.structures, world.copy());
     rehearsal_ = std::make_shared<Rehearsal>(std::move(world), std::move(devices), options_, io_.context);
     if (live_.hosts()) live_.open(*rehearsal_, header, session_);
     if (monitor_options_) begin_monitor();
@@ -302,6 +312,7 @@ void SessionRunner::save_now() {
   if (!rehearsal_) return;
   sound_.follow(nullptr);
   sound_.mix_in(nullptr);
+  progress_.reset();
   // Whatever comes of it, it is over; and what was recorded can be gone on from.
   const std::shared_ptr<Rehearsal> over = std::move(rehearsal_);
   const std::unique_ptr<MonitorController> monitor = std::move(monitor_);  // hears it to its end, and goes before it

@@ -17,6 +17,7 @@
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"
 #include "past_session.h"
+#include "procedure_progress.h"
 #include "session_review.h"
 
 namespace osteo {
@@ -43,6 +44,8 @@ class SessionRunner {
 
   /// Who leads, and who takes part.
   [[nodiscard]] TutorNow tutor() const;
+  /// How far a teacher's procedure is, as ProcedureProgress::look().
+  [[nodiscard]] std::vector<TutorNow::Step> steps(const std::vector<std::string>& injured);
   void lead(bool on);
 
   /// Of the recorded hand that leads; empty where none does.
@@ -121,6 +124,7 @@ class SessionRunner {
   LiveSessionRunner live_;
   std::shared_ptr<Playback> playback_;  // of a lesson that is shown
   std::shared_ptr<Rehearsal> rehearsal_;
+  std::unique_ptr<ProcedureProgress> progress_;  // of a teacher's session
   std::unique_ptr<MonitorController> monitor_;
   std::unique_ptr<RehearsalStream> stream_;  // of the monitor: before it, it goes
   SoundOut sound_;                           // before the rehearsal it follows, it goes

@@ -359,6 +359,27 @@ TEST(Panels, TheBarOfTheNearestStructureFills) {
   EXPECT_GE(painted(Nearness::touched, 1), more);
 }
 
+// A long message at the foot of a small picture is whole, and leaves the scale bar's box free.
+TEST(Panels, ALongMessageLeavesTheScaleFree) {
+  const Memory memory(1024, 700, 16);
+  const ViewLayout l = lay_out(Layout::operate, 1024, 700, 16);
+  Pressed pressed;
+  const std::string message = "of this picture alone: " + longest().warning;
+  float right = 0, top = 1e9F;
+  frames([&] {
+    draw_state(l.state, l.view, longest(), Message{Message::Rank::harm, message}, pressed);
+    right = 0;
+    for (const ImDrawVert& v : ImGui::GetBackgroundDrawList()->VtxBuffer) {
+      right = std::max(right, v.pos.x);
+      top = std::min(top, v.pos.y);
+    }
+  });
+  EXPECT_GT(right, l.view.x + 300);
+  EXPECT_LT(right, l.view.right() - 320);
+  EXPECT_GE(top, l.view.bottom() - 64) << "below the card of the next step";
+  EXPECT_EQ(texts_cut().count(message), 0U);
+}
+
 // A click on every place of a strip.
 std::vector<Keyboard::Press> clicked(const ScreenBox& box, float x, const std::function<void(Pressed&)>& draw) {
   std::vector<Keyboard::Press> seen;
@@ -450,16 +471,29 @@ TEST(Kit, WhatIsTooLongLosesItsMiddle) {
 }
 
 TEST(Kit, EveryIconThatIsUsedIsThere) {
-  for (const char* const name : {"menu-2",       "drill",
-                                 "saw",          "plate",
-                                 "fragments",    "suction",
-                                 "droplet",      "arrow-bar-to-down",
-                                 "arrow-bar-up", "arrow-back-up",
-                                 "versions",     "ruler-measure",
-                                 "note",         "camera",
-                                 "layout-grid",  "help",
-                                 "chevron-down", "x",
-                                 "check",        "settings"})
+  for (const char* const name : {"menu-2",
+                                 "drill",
+                                 "saw",
+                                 "plate",
+                                 "fragments",
+                                 "suction",
+                                 "droplet",
+                                 "arrow-bar-to-down",
+                                 "arrow-bar-up",
+                                 "arrow-back-up",
+                                 "versions",
+                                 "ruler-measure",
+                                 "note",
+                                 "camera",
+                                 "layout-grid",
+                                 "help",
+                                 "chevron-down",
+                                 "x",
+                                 "check",
+                                 "settings",
+                                 "eye",
+                                 "eye-off",
+                                 "adjustments-horizontal"})
     EXPECT_TRUE(has_icon(name)) << name;
   EXPECT_FALSE(has_icon("nothing"));
 }

@@ -64,6 +64,8 @@ class MainView {
 
   /// For the window as it is now; `over`: the session has ended; `cut_side`: see lay_out().
   const ViewLayout& lay_out(bool over, float cut_side);
+  /// What strips and columns of others have left of it.
+  void take_layout(const ViewLayout& layout) { layout_ = layout; }
   [[nodiscard]] const ViewLayout& layout() const { return layout_; }
   [[nodiscard]] Layout wanted() const { return wanted_; }
   /// Mouse and keys are for something in front of the bone.
@@ -98,6 +100,8 @@ class MainView {
   /// A picture was kept; the session has ended and is saved.
   void picture_kept() { pictured_ = true; }
   void session_ended();
+  /// For buttons of others.
+  [[nodiscard]] Pressed& pressed() { return pressed_; }
   /// Presses of buttons since the last call, as if they were keys.
   [[nodiscard]] std::vector<Keyboard::Press> take_presses();
   /// A button that does it is held down.

@@ -200,6 +200,8 @@ class RehearsalWindow {
   MonitorPanel monitor_;
   ToolTouch touch_;
   TutorNow tutor_;
+  TutorPanel tutor_panel_;
+  std::vector<HarmLine> harm_;
   LinkWatch links_;
   std::optional<WarmthNow> warmth_;
   std::chrono::steady_clock::time_point warmth_at_{};  // when it is looked at again

@@ -99,7 +99,19 @@ void RehearsalWindow::show_instruments(Rehearsal& now) {
 }
 
 void RehearsalWindow::look_at_tutor() {
-  if (actions_.tutor) tutor_ = actions_.tutor();
+  if (!actions_.tutor) return;
+  Rehearsal* const rehearsal = actions_.rehearsal();
+  std::vector<std::string> injured;
+  harm_.clear();
+  if (rehearsal != nullptr && work_ && rehearsal->structures() != nullptr) {
+    const auto harm = work_->harm();
+    harm_ = harm_lines(harm, rehearsal->structures());
+    for (const auto& [value, h] : harm) {
+      if (h.violations > 0) injured.push_back(rehearsal->structures()->name_of(value));
+    }
+  }
+  tutor_ = actions_.tutor();
+  if (actions_.steps) tutor_.steps = actions_.steps(injured);
 }
 
 void RehearsalWindow::show_tutor(Rehearsal& now) {
@@ -112,7 +124,8 @@ void RehearsalWindow::show_tutor(Rehearsal& now) {
       hands_[hand]->report_apart({kPartnerColour.red, kPartnerColour.green, kPartnerColour.blue},
                                  tutor_.ghosts ? 0.5 : 1);
   }
-  TutorPanel::draw(tutor_, hands, cuts_.scene(), [this](Vec3 at) { return project(at); });
+  tutor_panel_.draw(
+      tutor_, hands, harm_, cuts_.scene(), [this](Vec3 at) { return project(at); }, main_view_.pressed());
 }
 
 void RehearsalWindow::report_touch(Rehearsal& now) {

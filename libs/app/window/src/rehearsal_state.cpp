@@ -44,8 +44,15 @@ void RehearsalWindow::write_state() {
   }
   const auto heard =
       std::count_if(tutor_.links.begin(), tutor_.links.end(), [](const TutorNow::Link& l) { return l.heard; });
+  std::vector<std::string> done, harm;
+  for (const TutorNow::Step& s : tutor_.steps) {
+    if (s.items > 0 && s.passed == s.items) done.push_back(s.name);
+  }
+  for (const HarmLine& l : harm_) harm.push_back(l.text);
   state.tutor = {tutor_.title,
                  tutor_.invitation,
+                 done,
+                 harm,
                  tutor_.links.size(),
                  static_cast<std::size_t>(heard),
                  tutor_.leads && tutor_.guiding,

@@ -247,7 +247,9 @@ void RehearsalWindow::lay_out() {
   ViewLayout layout = main_view_.lay_out(ended_.has_value(), cuts_.wished_width());
   review_.lay_out(layout, static_cast<float>(shell_.em_pixels()));
   monitor_.lay_out(layout, static_cast<float>(shell_.em_pixels()), !ended_ && monitor_controller() != nullptr);
+  tutor_panel_.lay_out(layout, tutor_);
   cuts_.lay_out(layout);
+  main_view_.take_layout(layout);
   const ScreenBox& scene = cuts_.scene();
   scope_.area = {static_cast<double>(scene.x), static_cast<double>(scene.y),
                  std::max(1.0, static_cast<double>(scene.width)), std::max(1.0, static_cast<double>(scene.height))};

@@ -37,6 +37,7 @@ constexpr SettingRow kRows[] = {
     {"heat", operation, tr_later("Heat")},
     {"monitor", operation, tr_later("Nerve monitor")},
     {"position", operation, tr_later("Patient position")},
+    {"lessons_at", operation, tr_later("Lessons can be joined from")},
     {"motion_one_to", controls, tr_later("Motion of the hand")},
     {"wrist_rest", controls, tr_later("At wrist rest"), tr_later("of that motion, while \\ or keypad . is held")},
     {"burr_share", controls, tr_later("Burr at most"),
@@ -120,6 +121,9 @@ void choose_text(const SettingRow& row, std::string& value, const SettingsParts&
   } else if (row.member == "layout") {
     static constexpr std::string_view kIds[] = {"operate", "plan"};
     static_cast<void>(choose("layout", name, {tr("Operate"), tr("Plan")}, kIds, value, true));
+  } else if (row.member == "lessons_at") {
+    static constexpr std::string_view kIds[] = {"127.0.0.1", "0.0.0.0"};
+    static_cast<void>(choose("lessons", name, {tr("This machine"), tr("The network")}, kIds, value, true));
   } else if (row.member == "position") {
     static_cast<void>(choose(
         "position", name, {tr("Supine"), tr("Prone"), tr("Sitting"), tr("On the left side"), tr("On the right side")},

@@ -52,13 +52,15 @@ enum class ButtonLook { usual, main, quiet };
 /// none of `words` is selected.
 [[nodiscard]] int kit_list(const std::string& name, std::span<const std::string> words, int selected,
                            const std::string& shown = {});
-/// A row of a list, as wide as there is room.
-[[nodiscard]] bool list_row(const std::string& words, const std::string& right, bool selected, float high = kRow);
+/// A row of a list, as wide as there is room; `icon`: of icon_lines.h, behind all words.
+[[nodiscard]] bool list_row(const std::string& words, const std::string& right, bool selected, float high = kRow,
+                            std::string_view icon = {});
 
 /// A heading that folds out what is below it: true where it is open. It is no selection, so not in the accent.
 [[nodiscard]] bool fold(const char* words);
 
-/// A chip as wide as its words, at most `width`; its sign says how serious, its words are never in that colour.
+/// A chip as wide as its words, or narrower: in a box 48 high it then has two lines. Its sign says how serious, its
+/// words are never in that colour.
 struct ChipLook {
   Colour colour;
   int corners = 0;      ///< draw_sign()

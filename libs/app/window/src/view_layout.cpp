@@ -100,6 +100,28 @@ ScreenBox take_strip(ViewLayout& layout, float high) {
   return {left, bottom - high, right - left, high};
 }
 
+ScreenBox take_column(ViewLayout& layout, float wide) {
+  if (layout.shown == Layout::review) return {};
+  const bool four = layout.shown == Layout::plan;
+  const float left = layout.view.x, right = four ? layout.cuts[0].right() : layout.view.right();
+  const float bottom = four ? layout.cuts[1].bottom() : layout.view.bottom();
+  wide = std::floor(std::min(wide, (right - left) / 2));
+  if (!(wide > 0)) return {};
+  if (four) {
+    const float first = std::floor((right - left - wide) / 2), second = right - left - wide - first;
+    layout.view.width = layout.cuts[1].width = first;
+    for (ScreenBox* const cut : {&layout.cuts[0], &layout.cuts[2]}) {
+      cut->x = left + first;
+      cut->width = second;
+    }
+  } else {
+    layout.view.width -= wide;
+    // One cut beside a column: the bone has the picture.
+    if (!layout.over[0].empty()) stack_over(layout, layout.over[0].width, 1);
+  }
+  return {right - wide, layout.view.y, wide, bottom - layout.view.y};
+}
+
 double automatic_scale(double reported_by_monitor, int width, int height) {
   return std::clamp(std::max(reported_by_monitor, std::min(width / 1920.0, height / 1080.0)), 1.0, 4.0);
 }

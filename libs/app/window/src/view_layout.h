@@ -52,6 +52,10 @@ inline constexpr double kPictureShare = 0.8;
 /// shown for a while: the pictures make room, all else stays. Empty in review.
 [[nodiscard]] ScreenBox take_strip(ViewLayout& layout, float high);
 
+/// A column at the right, so wide but at most half of the pictures' width: the pictures make room, state and strip
+/// stay. Empty in review.
+[[nodiscard]] ScreenBox take_column(ViewLayout& layout, float wide);
+
 /// Height of text at scale 1.
 inline constexpr double kTextPixels = 16;
 /// A monitor's scale as the system tells it; where that is 1 on a large framebuffer, which many systems leave so, by

@@ -121,7 +121,11 @@ void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f
     if (inside && wide <= room) {
       draw_chip(draw, {near.right() + 24 * u, box.y + 16 * u, wide, 32 * u}, reported, chip);
     } else {
-      const ScreenBox at{view.x + 16 * u, view.bottom() - 48 * u, std::min(wide, view.width - 32 * u), 32 * u};
+      // Beside the scale bar's box, or in a small picture above it; in two lines where one is too short.
+      const bool beside = view.width > 720 * u;
+      const float most = view.width - (beside ? 352 : 32) * u, high = (wide > most ? 48 : 32) * u;
+      const float foot = view.bottom() - (beside ? 8 : 88) * u;
+      const ScreenBox at{view.x + 16 * u, foot - high, std::min(wide, most), high};
       if (at.width > 64 * u) draw_chip(ImGui::GetBackgroundDrawList(), at, reported, chip);
     }
   }

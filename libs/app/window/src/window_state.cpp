@@ -50,6 +50,8 @@ void write_window_state(const WindowState& s, const std::filesystem::path& file)
                                  {"tutor",
                                   {{"title", s.tutor.title},
                                    {"invitation", s.tutor.invitation},
+                                   {"steps", s.tutor.steps},
+                                   {"harm", s.tutor.harm},
                                    {"links", s.tutor.links},
                                    {"heard", s.tutor.heard},
                                    {"guiding", s.tutor.guiding},

@@ -59,6 +59,7 @@ struct MonitorState {
 /// Of who leads and who takes part; title empty: nobody.
 struct TutorState {
   std::string title, invitation;
+  std::vector<std::string> steps, harm;  // of steps those that are done
   std::size_t links = 0, heard = 0;
   bool guiding = false;
   double pull = 0, apart_mm = -1;

@@ -140,6 +140,9 @@ struct WindowActions {
   std::function<MonitorController*()> monitor = {};
   /// Who leads the hand, and who takes part from elsewhere. Empty: nobody ever does.
   std::function<TutorNow()> tutor = {};
+  /// Each frame of a session with a tutor: how far the procedure is. `injured`: structures that a rotating burr or a saw
+  /// has reached. Empty: it is not judged here.
+  std::function<std::vector<TutorNow::Step>(const std::vector<std::string>& injured)> steps = {};
   /// The hand is to be led, or let go; softly. Empty: nobody leads it.
   std::function<void(bool)> lead = {};
 };
