@@ -4,32 +4,12 @@
 #include <memory>
 #include <utility>
 
-#include "osteo/assessment/evidence/detail/product.h"
-#include "osteo/geometry/grid/brick_places.h"
+#include "osteo/assessment/evidence/progress.h"
 
 namespace osteo {
 namespace {
 
 constexpr auto kLeastRest = std::chrono::seconds(2);
-constexpr float kSolid = 0.5F;
-
-// What is gone, where it lay.
-std::vector<RemovedVoxel> removed_between(const World& begin, const World& now) {
-  std::vector<RemovedVoxel> removed;
-  for (const PlacedBody& b : begin.bodies()) {
-    const BrickGrid& was = b.body->bone;
-    const auto mm3 = static_cast<float>(was.frame().voxel_volume_mm3());
-    const auto voxels = static_cast<VoxelKey>(was.brick_count() * BrickGrid::kVoxels);
-    for (VoxelKey v = 0; v < voxels; ++v) {
-      if (was.value(v) < kSolid) continue;
-      const PlacedBody* const owner = now.owner(b.body->name_of(v));
-      if (owner != nullptr && owner->body->bone.value(b.body->name_of(v) - owner->body->name_of(0)) >= kSolid) continue;
-      removed.push_back({place_of_voxel_mm(was, v), mm3});
-    }
-  }
-  return removed;
-}
-
 }  // namespace
 
 ProcedureProgress::ProcedureProgress(const Procedure& procedure, const StructureMap& structures, World begin)
@@ -41,17 +21,9 @@ std::vector<TutorNow::Step> ProcedureProgress::judge(const World& now, Vec3 appr
                                                      const std::vector<std::string>& injured) const {
   Context alone;
   alone.threads = 1;
-  const Product product(begin_, now, structures_, procedure_, removed_between(begin_, now), alone);
   std::vector<TutorNow::Step> steps;
-  for (const ProcedureStep& s : procedure_.steps) {
-    steps.push_back({s.name, s.items.size(), 0});
-    for (const ScaleItem& item : procedure_.items) {
-      if (std::find(s.items.begin(), s.items.end(), item.name) == s.items.end()) continue;
-      const bool counted = item.kind == ItemKind::pieces || item.kind == ItemKind::fixed;
-      const Product::Result r = counted ? Product::count(item, now) : product.evaluate(item, approach, injured);
-      steps.back().passed += r.measured && r.pass ? 1 : 0;
-    }
-  }
+  for (const StepProgress& s : step_progress(begin_, now, structures_, procedure_, approach, injured, alone))
+    steps.push_back({s.name, s.items, s.passed});
   return steps;
 }
 
