@@ -247,7 +247,8 @@ void RehearsalWindow::lay_out() {
   ViewLayout layout = main_view_.lay_out(ended_.has_value(), cuts_.wished_width());
   review_.lay_out(layout, static_cast<float>(shell_.em_pixels()));
   monitor_.lay_out(layout, static_cast<float>(shell_.em_pixels()), !ended_ && monitor_controller() != nullptr);
-  tutor_panel_.lay_out(layout, tutor_);
+  // Settings are in front where both have no room.
+  tutor_panel_.lay_out(layout, tutor_, main_view_.in_settings() ? SettingsDialog::box_in(layout).right() : 0);
   cuts_.lay_out(layout);
   main_view_.take_layout(layout);
   const ScreenBox& scene = cuts_.scene();

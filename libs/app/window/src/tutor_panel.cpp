@@ -225,8 +225,14 @@ void draw_names(const TutorNow& now, const std::vector<TickRecord>& hands, const
 
 }  // namespace
 
-void TutorPanel::lay_out(ViewLayout& layout, const TutorNow& now) {
-  box_ = now.teaches ? take_column(layout, std::round(kColumn * layout.unit)) : ScreenBox{};
+void TutorPanel::lay_out(ViewLayout& layout, const TutorNow& now, float from) {
+  box_ = {};
+  if (!now.teaches) return;
+  ViewLayout left = layout;
+  const ScreenBox column = take_column(left, std::round(kColumn * layout.unit));
+  if (column.empty() || column.x < from) return;
+  box_ = column;
+  layout = left;
 }
 
 void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands, const std::vector<HarmLine>& harm,
@@ -251,6 +257,7 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
     ImGui::End();
     return;
   }
+  if (now.teaches) return;  // no room now
   // Who is taught sees who leads, and lets go.
   const float wide = std::min(kColumn * u, area.width - 32 * u);
   if (wide < 120 * u) return;

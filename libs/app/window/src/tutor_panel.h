@@ -52,8 +52,8 @@ struct Invitation {
 class TutorPanel {
  public:
   using Project = std::function<std::optional<std::array<float, 2>>(Vec3)>;
-  /// Who teaches or watches has a column at the right.
-  void lay_out(ViewLayout& layout, const TutorNow& now);
+  /// Who teaches or watches has a column at the right, unless it would begin left of `from`.
+  void lay_out(ViewLayout& layout, const TutorNow& now, float from);
   /// Between ImGui::NewFrame and Render; `area`: of the bone, on which names of other hands are, and for who is taught
   /// a card.
   void draw(const TutorNow& now, const std::vector<TickRecord>& hands, const std::vector<HarmLine>& harm,
