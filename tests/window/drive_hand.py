@@ -110,7 +110,7 @@ def hand():
         w.x("keyup", "apostrophe")
         back(int(w.id))
         # A page of the panel, by keys alone: a row is chosen, a key given to it, and that does it.
-        key("alt+h", "the page", lambda s: s["panel_keys"])
+        key("alt+h", "the page", lambda s: s["settings"])
         w.next(3)
         rows = []
         while w.state()["page_row"] != "undo":
@@ -125,7 +125,7 @@ def hand():
         w.x("keyup", "space")
         w.next(2)
         w.key("F12", "given", lambda s: s["listening"] == "")
-        w.key("Escape", "keys given back", lambda s: not s["panel_keys"])
+        w.key("Escape", "keys given back", lambda s: not s["settings"])
         w.key("F12", "nothing to take back", lambda s: True)
         w.close()
     closed("first")

@@ -222,15 +222,32 @@ def keys():
         key("F2", "operate", lambda s: s["layout"] == "operate" and s["view"] == view)
         key("F11", "full screen", lambda s: s["full_screen"])
         key("F11", "a window again", lambda s: not s["full_screen"])
-        key("F10", "keys in the panel", lambda s: s["panel_keys"])
-        w.key("Escape", "keys given back", lambda s: not s["panel_keys"])
+        # Settings: what is switched takes effect at once, and the session has it noted.
+        key("F10", "the settings", lambda s: s["settings"] == "view")
+
+        def setting(row, what, condition):
+            s = w.until(f"{row} is there", lambda s: row in s["rows"])
+            w.x("mousemove", *map(round, s["rows"][row]))
+            w.next()
+            w.x("click", 1)
+            return w.until(f"{row}: {what}", condition)
+
+        setting("page sound", "its page", lambda s: s["settings"] == "sound")
+        setting("sound", "off", lambda s: not s["sound"])
+        setting("hints", "on", lambda s: s["hints"])
+        setting("sound", "on again", lambda s: s["sound"])
+        setting("page operation", "its page", lambda s: s["settings"] == "operation")
+        setting("monitor", "shown, whatever it hears", lambda s: s["monitor"]["shown"])
+        w.key("Escape", "keys given back", lambda s: not s["settings"])
+        w.x("mousemove", 560, 350)
+        w.key("ctrl+h", "no hints", lambda s: not s["hints"])
         key("ctrl+Tab", "wheel", lambda s: s["wheel"])
         w.key("Down", "still open", lambda s: s["wheel"])
         w.key("Down", "still open", lambda s: s["wheel"])
         w.key("Return", "the second of the wheel", lambda s: not s["wheel"] and s["tool"] == "diamond 5 mm")
         key("c", "cutting", lambda s: s["tool"] == "cutting 5 mm")
-        key("ctrl+n", "no nerve monitor here", lambda s: s["message"].startswith("there is no nerve monitor"))
-        key("ctrl+m", "nor its sound", lambda s: s["message"].startswith("there is no nerve monitor"))
+        key("ctrl+n", "the nerve monitor is hidden", lambda s: not s["monitor"]["shown"])
+        key("ctrl+m", "and muted", lambda s: s["monitor"]["muted"])
         key("ctrl+g", "nobody leads here", lambda s: s["message"].startswith("nobody leads your hand"))
         key("w", "as it was", lambda s: s["before"])
         key("w", "as it is", lambda s: not s["before"])
@@ -340,9 +357,16 @@ def keys():
             "bone whole again",
             lambda s: s["session"] not in ("first", first, second) and s["bodies"] == 1 and s["tick"] > 0,
         )["session"]
+        # What a session keeps from its beginning: another continues from here, seen from the same side.
+        eye = w.drag(3, 40, 10)["eye"]
+        w.key("F10", "the settings, where they were left", lambda s: s["settings"] == "operation")
+        setting("heat", "needs another session", lambda s: "another" in s["rows"] and not s["hottest_c"])
+        warm = setting("another", "has heat", lambda s: s["hottest_c"] > 30 and s["session"] != third)
+        assert apart(warm["eye"], eye) < 1e-6 and not warm["settings"], (warm, eye)
+        fourth = warm["session"]
         pressed.update({"q", "Left", "Right"})  # of the page at the end: main_view()
         said = w.close()
-    for s in ("first", first, second, third):
+    for s in ("first", first, second, third, fourth):
         assert s in said
     summary, _ = closed("first")
     assert summary["removed_mm3"] > 1 and summary["dust_mm3"]["sucked_off"] >= 0, summary
@@ -350,11 +374,21 @@ def keys():
     assert any(r["hand"] == "1" and r["pedal"] == "255" for r in ticks(first))
     assert closed(second)[0]["sawn_mm3"] > 10
     assert closed(third)[1]["actions"] == 0
+    closed(fourth)
     assert (pathlib.Path(second) / "session.json").read_text().count("resumed_from") == 1
     osteo("export", "first", "first.csv")
     notes = pathlib.Path("first-notes.csv").read_text()
     assert '"mark"' in notes and "eye_mm" in notes, notes
     assert "length_mm" in notes and "spine" in notes, notes
+    switched = re.findall(r'"name"":""(\w+)"",""on"":(\w+)', notes)
+    assert switched[:5] == [
+        ("hints", "true"),
+        ("hints", "false"),
+        ("sound", "false"),
+        ("hints", "true"),
+        ("sound", "true"),
+    ], switched
+    assert ("monitor", "true") in switched, switched
     assert 'width: 1000' in osteo("info", "first/screenshot-1.png"), osteo("info", "first/screenshot-1.png")
     # Each key of the table was pressed above.
     named = {"kSpace": "space", "kKeyEscape": "Escape", "kEnter": "Return", "kKeypadEnter": "KP_Enter"}

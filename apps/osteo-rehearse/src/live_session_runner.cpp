@@ -109,6 +109,7 @@ void LiveSessionRunner::guide(bool on) {
 TutorNow LiveSessionRunner::now(const Rehearsal* rehearsal) const {
   TutorNow n;
   if (hosts_ && host_ && net_) {
+    n.teaches = true;
     n.title = two_way_ ? "You teach; hands pull each other" : "You teach; the trainee's hand is led by yours";
     const bool bracket = listen_.find(':') != std::string::npos;
     n.invitation = "osteo rehearse CASE --join " + (bracket ? "[" + listen_ + "]" : listen_) + ":" +
@@ -131,12 +132,14 @@ TutorNow LiveSessionRunner::now(const Rehearsal* rehearsal) const {
       n.apart_mm = length(from_floats(far.device.position_mm) - from_floats(rehearsal->latest(0).device.position_mm));
   } else if (hosts_ && !closed_.empty()) {
     n.title = "You teach";
+    n.teaches = true;
     n.hands = {"you", "trainee"};
     n.trouble = "nobody can join this session: " + closed_;
   } else if (seat_) {
     const SeatStatus s = seat_->status();
     const bool trainee = role_ == JoinRole::trainee;
     n.title = trainee ? "You learn; the instructor's hand leads yours" : "You watch";
+    n.teaches = !trainee;
     n.hands =
         trainee ? std::vector<std::string>{"you", "instructor"} : std::vector<std::string>{"instructor", "trainee"};
     n.links.push_back({"instructor", s.state == JoinState::joined && seat_->silent_s() < 0.5, s.rtt_ms, s.offset_ms,

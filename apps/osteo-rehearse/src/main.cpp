@@ -25,7 +25,7 @@ namespace {
 struct OpenCase {
   Case files;
   std::optional<SparseGrid> hu;
-  std::optional<Image> ct;       // the whole scan, where it was given
+  std::optional<Image> ct;  // the whole scan, where it was given
   std::optional<Labels> uncertainty;
   std::vector<SparseGrid> bone;  // density, the finest first
   ApprovalNow approval;
@@ -93,19 +93,20 @@ struct WindowCommand {
             window_flag_groups()};
   }
 
-  // What was given beats what the person chose last.
+  // What was given beats what the person chose last; of a case that was given the flags alone say what it has.
   static PersonValues chosen(const Params& p, const cli::Invocation& io, PersonValues values) {
     const auto given = [&](const char* name) { return io.given.contains(name); };
     if (given("sound")) values.sound = p.sound;
     if (given("volume")) values.volume = p.volume;
     if (given("alarms")) values.alarms = p.alarms;
     if (given("full_screen")) values.full_screen = p.full_screen;
-    if (given("procedure")) values.procedure = p.procedure;
-    if (given("mirror")) values.mirror_procedure = p.mirror;
-    if (given("dust")) values.dust = p.dust;
-    if (given("heat")) values.heat = p.heat;
-    if (given("monitor")) values.monitor = p.monitor;
-    if (given("position")) values.position = EnumNames<Posture>::values[static_cast<std::size_t>(p.position)];
+    const bool alone = !io.arguments.empty();
+    if (alone || given("procedure")) values.procedure = p.procedure;
+    if (alone || given("mirror")) values.mirror_procedure = p.mirror;
+    if (alone || given("dust")) values.dust = p.dust;
+    if (alone || given("heat")) values.heat = p.heat;
+    if (alone || given("monitor")) values.monitor = p.monitor;
+    if (alone || given("position")) values.position = EnumNames<Posture>::values[static_cast<std::size_t>(p.position)];
     if (p.layout != StartLayout::last)
       values.layout = EnumNames<StartLayout>::values[static_cast<std::size_t>(p.layout)];
     return values;
@@ -138,6 +139,8 @@ struct WindowCommand {
     take(&PersonValues::heat);
     take(&PersonValues::monitor);
     take(&PersonValues::position);
+    take(&PersonValues::network);
+    take(&PersonValues::lessons_at);
   }
   // As the start page has them.
   static void take_switches(const PersonValues& values, Params& flags) {
@@ -157,8 +160,8 @@ struct WindowCommand {
   }
 
   // One case, from its first session to the last. `left`: how the person left it.
-  static bool sit(const Params& p, const OpenCase& open, const Procedure* procedure, WindowShell& shell,
-                  PersonSettings& person, cli::Invocation& io, WindowEnd& left) {
+  static bool sit(const Params& p, const OpenCase& open, const Procedure* procedure, const StartOptions& start,
+                  WindowShell& shell, PersonSettings& person, cli::Invocation& io, WindowEnd& left) {
     WindowOptions window;
     window.tool = burr_index(p.burr, p.diameter_mm, p.shape);
     window.from_case = p.resume.empty();
@@ -182,6 +185,8 @@ struct WindowCommand {
     window.planned_cuts_file = open.files.folder / kPlannedCutsFile;
     window.stereo.mode = p.stereo;
     window.stereo.base_mm = p.stereo_base;
+    window.procedures = start.procedures;
+    window.view = left.view;
     window.camera_trial = p.experiment == "camera";
     shell.set_title("Osteotome - " + open.files.folder.filename().string());
     SessionRunner session_runner(p, open.files, procedure, person.values, io);
@@ -201,8 +206,10 @@ struct WindowCommand {
     actions.switches = [&](bool attended) { return session_runner.switches(attended); };
     actions.stop = [&] { return io.context.cancelled(); };
     actions.monitor = [&] { return session_runner.monitor(); };
+    actions.turn_monitor = [&](bool on) { return session_runner.turn_monitor(on); };
     if (p.tutor || !p.join.empty() || !p.playback.empty()) {
       actions.tutor = [&] { return session_runner.tutor(); };
+      actions.steps = [&](const std::vector<std::string>& injured) { return session_runner.steps(injured); };
       actions.lead = [&](bool on) { session_runner.lead(on); };
     }
     actions.facts = [&] { return session_runner.facts(); };
@@ -281,14 +288,20 @@ struct WindowCommand {
     }
     if (from_command_line) choice = StartChoice{io.arguments[0], p.resume};
     bool chosen_in_window = !from_command_line;
+    WindowEnd left;
     while (!closed && !io.context.cancelled()) {
       if (!choice) {
         choice = run_start_page(shell, person, start);
         if (!choice) break;
         take_switches(person.values, flags);
+        flags.tutor = choice->teach;
+        if (flags.tutor) {
+          flags.listen = person.values.lessons_at;
+          flags.dust = person.values.dust = false;  // its second hand would be a third
+        }
       }
       flags.resume = choice->resume;
-      WindowEnd left;
+      left = {false, {}, false, left.changed ? left.view : std::nullopt};
       try {
         std::unique_ptr<OpenCase> open;
         shell.while_working("the case is opened", io.context, [&](const Context& context) {
@@ -297,7 +310,7 @@ struct WindowCommand {
         });
         person.opened(open->files.folder);
         sat = true;
-        lost_ticks = sit(flags, *open, procedure ? &*procedure : nullptr, shell, person, io, left) || lost_ticks;
+        lost_ticks = sit(flags, *open, procedure ? &*procedure : nullptr, start, shell, person, io, left) || lost_ticks;
         closed = !left.another;
         start.message.clear();
       } catch (const Error& e) {
@@ -309,6 +322,7 @@ struct WindowCommand {
       start.folder = fs::absolute(choice->case_folder).parent_path();
       choice.reset();
       if (left.dropped) choice = choice_of(*left.dropped, start.message);
+      if (left.changed) take_switches(person.values, flags);
       chosen_in_window = true;
       flags.out.clear();
       flags.review.clear();

@@ -71,18 +71,14 @@ SessionRunner::SessionRunner(const WindowFlags& flags, const Case& the_case, con
       hands_(flags),
       next_folder_(flags.out),
       last_(flags.resume),
+      monitor_setup_(flags.monitor_setup),
       live_(flags),
       sound_(person.sound, person.volume, person.alarms) {
   options_.rate_hz = flags.rate_hz;
   options_.follow = {true, true, flags.dust, flags.heat};
   options_.actions = first_actions(flags);
   options_.haptics.params.contact.method = flags.contact;
-  if (flags.monitor) {
-    monitor_json_ = flags.monitor_setup.empty() ? std::string() : read_text(flags.monitor_setup);
-    monitor_options_.emplace();
-    monitor_options_->setup = parse_monitor(monitor_json_.empty() ? default_monitor_json() : monitor_json_,
-                                            flags.monitor_setup.empty() ? "the built-in monitor" : flags.monitor_setup);
-  }
+  if (flags.monitor) want_monitor();
   targets_ = stream_targets(flags.stream);
   options_.heard = [this](const std::string& kind, const std::string& json) {
     const std::lock_guard lock(stream_mutex_);
@@ -150,9 +146,17 @@ void SessionRunner::save() {
   save_now();
 }
 
+std::vector<TutorNow::Step> SessionRunner::steps(const std::vector<std::string>& injured) {
+  return progress_ && rehearsal_ ? progress_->look(*rehearsal_, injured) : std::vector<TutorNow::Step>{};
+}
+
 TutorNow SessionRunner::tutor() const {
-  if (!playback_) return live_.now(rehearsal_.get());
   TutorNow n;
+  if (!playback_) {
+    n = live_.now(rehearsal_.get());
+    if (procedure_ != nullptr) n.procedure = procedure_->name;
+    return n;
+  }
   n.title = "Lesson: " + std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(playback_params_.mode)]) +
             ", " + format_number(std::round(10 * playback_->seconds.load()) / 10) + " of " +
             format_number(std::round(10 * lesson_->seconds()) / 10) + " s";
@@ -278,6 +282,8 @@ void SessionRunner::run(World world, std::vector<std::unique_ptr<Device>> device
       header.rate_hz = options_.rate_hz;
       header.haptics = options_.haptics;
     }
+    if (live_.hosts() && procedure_ != nullptr && options_.anatomy.structures)
+      progress_ = std::make_unique<ProcedureProgress>(*procedure_, *options_.anatomy.structures, world.copy());
     rehearsal_ = std::make_shared<Rehearsal>(std::move(world), std::move(devices), options_, io_.context);
     if (live_.hosts()) live_.open(*rehearsal_, header, session_);
     if (monitor_options_) begin_monitor();
@@ -306,6 +312,7 @@ void SessionRunner::save_now() {
   if (!rehearsal_) return;
   sound_.follow(nullptr);
   sound_.mix_in(nullptr);
+  progress_.reset();
   // Whatever comes of it, it is over; and what was recorded can be gone on from.
   const std::shared_ptr<Rehearsal> over = std::move(rehearsal_);
   const std::unique_ptr<MonitorController> monitor = std::move(monitor_);  // hears it to its end, and goes before it
@@ -364,6 +371,26 @@ void SessionRunner::begin_stream() {
   }
   if (monitor_) monitor_->invite(stream_->invitation());
   if (!stream_->invitation().empty()) io_.err << stream_->invitation() << std::endl;
+}
+
+void SessionRunner::want_monitor() {
+  monitor_json_ = monitor_setup_.empty() ? std::string() : read_text(monitor_setup_);
+  monitor_options_.emplace();
+  monitor_options_->setup = parse_monitor(monitor_json_.empty() ? default_monitor_json() : monitor_json_,
+                                          monitor_setup_.empty() ? "the built-in monitor" : monitor_setup_.string());
+}
+
+bool SessionRunner::turn_monitor(bool on) {
+  if (past_ || live_.joins() || (stream_ && monitor_)) return false;
+  if (on) {
+    want_monitor();
+    if (rehearsal_) begin_monitor();
+  } else {
+    monitor_options_.reset();
+    sound_.mix_in(nullptr);
+    monitor_.reset();
+  }
+  return true;
 }
 
 void SessionRunner::begin_monitor() {

@@ -17,6 +17,7 @@
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/session/scene/session_folder.h"
 #include "past_session.h"
+#include "procedure_progress.h"
 #include "session_review.h"
 
 namespace osteo {
@@ -43,6 +44,8 @@ class SessionRunner {
 
   /// Who leads, and who takes part.
   [[nodiscard]] TutorNow tutor() const;
+  /// How far a teacher's procedure is, as ProcedureProgress::look().
+  [[nodiscard]] std::vector<TutorNow::Step> steps(const std::vector<std::string>& injured);
   void lead(bool on);
 
   /// Of the recorded hand that leads; empty where none does.
@@ -65,6 +68,8 @@ class SessionRunner {
   }
   [[nodiscard]] SoundOut& sound() { return sound_; }
   [[nodiscard]] MonitorController* monitor() const { return monitor_.get(); }
+  /// While a rehearsal runs, or for the next. False: a stream has the one there is, or the host's is the only one.
+  bool turn_monitor(bool on);
   [[nodiscard]] std::string device() const { return hands_.name(); }
   [[nodiscard]] CameraDevices camera(bool lend) const {
     return hands_.camera(rehearsal_ ? &rehearsal_->device() : nullptr, lend);
@@ -90,6 +95,7 @@ class SessionRunner {
 
   void save_now();
   void leave_sound();
+  void want_monitor();
   void begin_monitor();
   void begin_stream();
   // Taken from under those who leave notes; what it waits for when it goes may be theirs.
@@ -112,11 +118,13 @@ class SessionRunner {
   std::mutex mutex_;
   std::optional<MonitorOptions> monitor_options_;  // where one is listed
   std::string monitor_json_;                       // of the person's own file
+  const std::filesystem::path monitor_setup_;
   std::vector<StreamTarget> targets_;
   std::mutex stream_mutex_;
   LiveSessionRunner live_;
   std::shared_ptr<Playback> playback_;  // of a lesson that is shown
   std::shared_ptr<Rehearsal> rehearsal_;
+  std::unique_ptr<ProcedureProgress> progress_;  // of a teacher's session
   std::unique_ptr<MonitorController> monitor_;
   std::unique_ptr<RehearsalStream> stream_;  // of the monitor: before it, it goes
   SoundOut sound_;                           // before the rehearsal it follows, it goes

@@ -44,5 +44,39 @@ TEST(TutorPanel, ALinkThatDropsIsToldOnce) {
   EXPECT_EQ(watch.look(now)->shown, "trainee has left");
 }
 
+TEST(TutorPanel, TheCodeIsApartFromWhatIsStarted) {
+  const Invitation i = invitation_of("osteo rehearse CASE --join 127.0.0.1:41234\ncode K7MX-2QPA");
+  EXPECT_EQ(i.command, "osteo rehearse CASE --join 127.0.0.1:41234");
+  EXPECT_EQ(i.code, "K7MX-2QPA");
+  EXPECT_TRUE(invitation_of("").code.empty());
+}
+
+// Each time that something comes nearer than before counts once, however long it stays.
+TEST(TutorPanel, HarmCountsTimes) {
+  WorkDone work;
+  const auto tick = [&](std::uint32_t structure, float clearance, std::uint32_t flags, std::uint32_t hand = 0) {
+    TickRecord t;
+    t.structure = structure;
+    t.clearance_mm = clearance;
+    t.flags = flags;
+    t.hand = hand;
+    for (int n = 0; n < 3; ++n) work.tick(t, {});
+  };
+  EXPECT_TRUE(work.harm().empty());
+  tick(6, 3, 0);
+  EXPECT_TRUE(work.harm().empty()) << "not near";
+  tick(6, 1.5F, 0);
+  tick(6, 0, kStructureTouched);
+  tick(6, -0.1F, kStructureTouched | kStructureInjured);
+  tick(6, 1, 0);
+  tick(6, 5, 0);
+  tick(6, 1, 0);
+  tick(7, 0, kStructureTouched, 1);
+  const auto harm = work.harm();
+  EXPECT_EQ(harm.at(6), (WorkDone::Harm{2, 1, 1}));
+  EXPECT_EQ(harm.at(7), (WorkDone::Harm{1, 1, 0})) << "of the other hand";
+  EXPECT_TRUE(harm_lines(harm, nullptr).empty()) << "a case without structures has no names for them";
+}
+
 }  // namespace
 }  // namespace osteo

@@ -269,23 +269,17 @@ TEST(Panels, FitInEveryLanguage) {
   }
 }
 
-// What stands on a button of half the panel's width, or of all of it.
+// What stands on a button of a question.
 TEST(Panels, ButtonsAreAsWideAsTheirWords) {
   const Memory memory(1024, 700, kTextPixels);
   frames([] {});  // ImGui has its font from the first on
   const float pad = 2 * ImGui::GetStyle().FramePadding.x, gap = ImGui::GetStyle().ItemSpacing.x;
-  const ScreenBox panel = panel_of(lay_out(Layout::operate, 1024, 700, static_cast<float>(kTextPixels)));
-  const float whole = panel.width - 2 * ImGui::GetStyle().WindowPadding.x;
   for (const Language language : kLanguages) {
     const InLanguage theirs(language);
     const auto expect_room = [&](const std::string& text, float room) {
       EXPECT_LE(ImGui::CalcTextSize(text.c_str(), nullptr, true).x + pad, room) << text;
     };
-    for (const char* const text : {"Save and continue", "Reset bone ..."})
-      expect_room(std::string(tr(text)) + " (F5)", whole);
-    for (const char* const text : {"as the view holds it (Insert)", "all as usual", "Camera back (Backspace)"})
-      expect_room(tr(text), whole);
-    // Of a question 28 em wide.
+    // 28 em wide.
     const float half = (28 * em() - 2 * ImGui::GetStyle().WindowPadding.x - gap) / 2;
     expect_room(tr("no (Esc)"), half);
     expect_room(std::string(tr("Reset bone")) + " (Enter)", half);
@@ -365,6 +359,27 @@ TEST(Panels, TheBarOfTheNearestStructureFills) {
   EXPECT_GE(painted(Nearness::touched, 1), more);
 }
 
+// A long message at the foot of a small picture is whole, and leaves the scale bar's box free.
+TEST(Panels, ALongMessageLeavesTheScaleFree) {
+  const Memory memory(1024, 700, 16);
+  const ViewLayout l = lay_out(Layout::operate, 1024, 700, 16);
+  Pressed pressed;
+  const std::string message = "of this picture alone: " + longest().warning;
+  float right = 0, top = 1e9F;
+  frames([&] {
+    draw_state(l.state, l.view, longest(), Message{Message::Rank::harm, message}, pressed);
+    right = 0;
+    for (const ImDrawVert& v : ImGui::GetBackgroundDrawList()->VtxBuffer) {
+      right = std::max(right, v.pos.x);
+      top = std::min(top, v.pos.y);
+    }
+  });
+  EXPECT_GT(right, l.view.x + 300);
+  EXPECT_LT(right, l.view.right() - 320);
+  EXPECT_GE(top, l.view.bottom() - 64) << "below the card of the next step";
+  EXPECT_EQ(texts_cut().count(message), 0U);
+}
+
 // A click on every place of a strip.
 std::vector<Keyboard::Press> clicked(const ScreenBox& box, float x, const std::function<void(Pressed&)>& draw) {
   std::vector<Keyboard::Press> seen;
@@ -394,7 +409,7 @@ TEST(Panels, AButtonGivesTheCommandOfItsKey) {
   Latched latched;
   const float middle = l.tray.x + l.tray.width / 2;
   auto seen = clicked(l.tray, middle, [&](Pressed& p) { draw_tray(l.tray, hand, false, latched, p); });
-  for (const Command c : {Command::help, Command::palette, Command::panel_keys, Command::bring, Command::lift,
+  for (const Command c : {Command::help, Command::palette, Command::settings, Command::bring, Command::lift,
                           Command::saw, Command::plates, Command::pieces, Command::undo, Command::before,
                           Command::ruler, Command::mark, Command::screenshot, Command::layout}) {
     EXPECT_TRUE(has(seen, c)) << key_name(c);
@@ -456,16 +471,29 @@ TEST(Kit, WhatIsTooLongLosesItsMiddle) {
 }
 
 TEST(Kit, EveryIconThatIsUsedIsThere) {
-  for (const char* const name : {"menu-2",       "drill",
-                                 "saw",          "plate",
-                                 "fragments",    "suction",
-                                 "droplet",      "arrow-bar-to-down",
-                                 "arrow-bar-up", "arrow-back-up",
-                                 "versions",     "ruler-measure",
-                                 "note",         "camera",
-                                 "layout-grid",  "help",
-                                 "chevron-down", "x",
-                                 "check",        "settings"})
+  for (const char* const name : {"menu-2",
+                                 "drill",
+                                 "saw",
+                                 "plate",
+                                 "fragments",
+                                 "suction",
+                                 "droplet",
+                                 "arrow-bar-to-down",
+                                 "arrow-bar-up",
+                                 "arrow-back-up",
+                                 "versions",
+                                 "ruler-measure",
+                                 "note",
+                                 "camera",
+                                 "layout-grid",
+                                 "help",
+                                 "chevron-down",
+                                 "x",
+                                 "check",
+                                 "settings",
+                                 "eye",
+                                 "eye-off",
+                                 "adjustments-horizontal"})
     EXPECT_TRUE(has_icon(name)) << name;
   EXPECT_FALSE(has_icon("nothing"));
 }

@@ -15,7 +15,8 @@ own = source[source.index("ICONS |= {") + 9 :]
 ICONS |= ast.literal_eval(own[: own.index("\n}") + 2])
 USED = """drill saw plate fragments suction droplet arrow-bar-to-down arrow-bar-up arrow-back-up versions ruler-measure note camera command
 menu-2 search x chevron-down chevron-right plus minus check alert-triangle info-circle bone folder-open history power settings
-maximize layout-grid target help player-play player-pause player-track-prev player-track-next eye""".split()
+maximize layout-grid target help player-play player-pause player-track-prev player-track-next eye eye-off
+adjustments-horizontal""".split()
 
 
 class Lines(BasePen):

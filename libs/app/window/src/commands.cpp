@@ -149,7 +149,7 @@ constexpr Named kWindow[] = {
     {tr_later("Ten keys; again: all keys"), tr_later("help mouse list"), help},
     {tr_later("Operate or plan"), tr_later("layout four pictures cuts screens"), layout},
     {tr_later("Menu and settings"), tr_later("panel options theme colours light dark patient position haptics"),
-     panel_keys},
+     settings},
     {tr_later("Keys to the next part of the window"), tr_later("focus tab strip card"), focus_next},
     {tr_later("Full screen"), tr_later("window maximise"), full_screen},
     {tr_later("Sound on or off"), tr_later("mute volume noise"), sound},

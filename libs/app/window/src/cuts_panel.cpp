@@ -487,21 +487,32 @@ void CutsPanel::look_as(std::size_t number, StructureLook look, Rehearsal& rehea
   note_look(rehearsal, s);
 }
 
+// From where all cuts meet; empty where it is out of the map's reach.
+std::string CutsPanel::far_text(const StructureMap& map, std::uint8_t value) const {
+  const auto& values = map.values();
+  const auto number = static_cast<std::size_t>(std::find(values.begin(), values.end(), value) - values.begin());
+  const double mm = number < values.size() ? map.distance_mm(number, control_.cross_mm()) : map.reach_mm();
+  return mm >= map.reach_mm() ? std::string() : shown_number(mm, 1);
+}
+
 // A row for each: a click shows it solid, clear, hidden in turns.
 void CutsPanel::list_in_side(Rehearsal& rehearsal) {
   const StructureMap& map = *rehearsal.structures();
   const float u = unit();
   begin_fixed("Structures in the side", list_);
-  ImGui::TextDisabled("%s", tr("Structures"));
+  ImGui::TextDisabled("%s", tr("Structures, mm from the cross"));
   const char* const looks[] = {tr_of("look", "solid"), tr_of("look", "clear"), tr_of("look", "hidden")};
+  static constexpr std::string_view kEyes[] = {"eye", "adjustments-horizontal", "eye-off"};
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
   for (std::size_t s = 0; s < structures_->all().size(); ++s) {
     const StructuresView::One& one = structures_->all()[s];
     const auto look = static_cast<int>(one.look);
     ImGui::Dummy({24 * u, kListRow * u});
     ImGui::SameLine();
-    if (list_row(tr(map.name_of(one.value)) + "##" + std::to_string(one.value), looks[look], false, kListRow))
+    if (list_row(tr(map.name_of(one.value)) + "##" + std::to_string(one.value), far_text(map, one.value), false,
+                 kListRow, kEyes[look]))
       look_as(s, static_cast<StructureLook>((look + 1) % 3), rehearsal);
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", looks[look]);
     const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
     const auto c = map.colour_of(one.value);
     const float y = (lo.y + hi.y) / 2;

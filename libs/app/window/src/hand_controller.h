@@ -34,9 +34,13 @@ class HandController {
   /// The row of the page that the keys' cursor is on; empty: on none.
   [[nodiscard]] const std::string& row() const { return row_; }
   [[nodiscard]] bool mirror_mouse() const { return person_.values.mirror_mouse; }
-  /// Into the current ImGui window: a header that opens, and under it all that can be chosen for the hand. `show`: it
-  /// is opened now, and the keys' cursor put on it.
-  void draw(RehearsalControl& control, bool show);
+  /// Into the current ImGui window: the handle, and what pedals, buttons and keys do. Not drawn any more, it listens to
+  /// none.
+  void draw(RehearsalControl& control);
+  void leave() {
+    assign_.cancel();
+    row_.clear();
+  }
 
  private:
   void draw_buttons();

@@ -1,4 +1,4 @@
-// The page of the hand in the panel.
+// The hand's part of the settings.
 #include <imgui.h>
 
 #include "hand_controller.h"
@@ -8,15 +8,6 @@
 
 namespace osteo::inline app {
 namespace {
-
-bool share_slider(const char* name, double& share, double least, const char* help) {
-  auto percent = static_cast<float>(100 * share);
-  const bool changed =
-      ImGui::SliderFloat(name, &percent, static_cast<float>(100 * least), 100, "%.0f %%", ImGuiSliderFlags_AlwaysClamp);
-  if (changed) share = static_cast<double>(percent) / 100;
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", help);
-  return changed;
-}
 
 // By the table, unless that key was given something else.
 std::string key_of(HandFunction function, const HandButtons& buttons) {
@@ -30,39 +21,13 @@ std::string key_of(HandFunction function, const HandButtons& buttons) {
 
 }  // namespace
 
-void HandController::draw(RehearsalControl& control, bool show) {
-  if (show) {
-    ImGui::SetNextItemOpen(true);
-    ImGui::SetKeyboardFocusHere();
-  }
+void HandController::draw(RehearsalControl& control) {
   row_.clear();
-  const bool open = fold(tr("Hand and pedals"));
-  if (show) ImGui::SetScrollHereY(0);
-  if (!open) {
-    assign_.cancel();
-    return;
-  }
-  PersonValues& v = person_.values;
-  ImGui::TextDisabled(tr("motion of the hand (- =)"));
-  for (int n = 1; n <= HandMotion::kFinest; n *= 2) {
-    if (n > 1) ImGui::SameLine();
-    const std::string name = "1:" + std::to_string(n);
-    if (ImGui::RadioButton(name.c_str(), static_cast<int>(v.motion_one_to) == n)) v.motion_one_to = n;
-  }
-  ImGui::PushItemWidth(5 * em());
-  share_slider(tr("at wrist rest"), v.wrist_rest, 0.05, tr("of that motion, while \\ or keypad . is held"));
-  share_slider(tr("burr at most"), v.burr_share, 0.25,
-               tr("of its full speed, pedal or button all the way down; keys 9 and 0"));
-  ImGui::PopItemWidth();
-  ImGui::Checkbox(tr("left-handed"), &v.left_handed);
-  if (ImGui::IsItemHovered())
-    ImGui::SetTooltip(tr("the drill is held from the left, the second hand comes from the right"));
-  ImGui::Checkbox(tr("mouse buttons change places"), &v.mirror_mouse);
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip(tr("where the system has not done so already"));
-  ImGui::TextUnformatted(filled(tr("handle tilted {angle} deg"),
-                                {{"angle", shown_number(control.handle().tilted_rad() * 57.29577951308232, 0)}})
-                             .c_str());
-  if (ImGui::Button(tr("as the view holds it (Insert)"), {-1, 0})) control.handle().straight();
+  ImGui::TextWrapped("%s", filled(tr("handle tilted {angle} deg"),
+                                  {{"angle", shown_number(control.handle().tilted_rad() * 57.29577951308232, 0)}})
+                               .c_str());
+  if (kit_button(tr("as the view holds it (Insert)"), ButtonLook::usual, ImGui::GetContentRegionAvail().x))
+    control.handle().straight();
   draw_buttons();
   give(control);
 }
@@ -93,13 +58,13 @@ void HandController::draw_buttons() {
       add(all, there(b) ? button_name(b) : filled(tr("{button} (not plugged in)"), {{"button", button_name(b)}}));
     }
     if (by.empty()) by = absent > 0 ? filled(tr("{n} not plugged in"), {{"n", std::to_string(absent)}}) : "-";
-    const std::string row = words_of(function) + ": " + by + "##" + std::to_string(n);
-    if (ImGui::Selectable(row.c_str(), assign_.listens() == function)) assign_.listen(function);
+    if (list_row(words_of(function) + "##" + std::to_string(n), by, assign_.listens() == function))
+      assign_.listen(function);
     if (ImGui::IsItemFocused()) row_ = words_of(function);
     if (ImGui::IsItemHovered())
       ImGui::SetTooltip("%s: %s", words_of(function).c_str(), all.empty() ? tr("no button") : all.c_str());
   }
-  if (ImGui::Button(tr("all as usual"), {-1, 0})) {
+  if (kit_button(tr("all as usual"), ButtonLook::usual, ImGui::GetContentRegionAvail().x)) {
     person_.buttons = HandButtons::usual();
     said_ = tr("pedals, buttons and keys are as usual");
     assign_.cancel();

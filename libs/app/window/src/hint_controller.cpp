@@ -7,7 +7,6 @@
 
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/translate.h"
-#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -70,6 +69,7 @@ void HintController::follow(Rehearsal& rehearsal) {
 void HintController::join() {
   bool water = false;
   rehearsal_->look([&](const World&, SceneReaders& readers) { water = readers.dust != nullptr; });
+  joined_off_ = person_.values.hints_off;
   reader_ = std::make_unique<HintReader>(hints_left(usual_hints(), person_.values.hints_off), rehearsal_->rate_hz(),
                                          rehearsal_->structures(), water);
   rehearsal_->add_reader(*reader_);
@@ -91,7 +91,9 @@ void HintController::turn(bool on) {
 }
 
 void HintController::frame(Vec3 eye_mm, double now_s) {
-  if (!reader_ || rehearsal_ == nullptr) return;
+  if (rehearsal_ == nullptr) return;
+  if (on() != (reader_ != nullptr) || (reader_ && joined_off_ != person_.values.hints_off)) turn(on());
+  if (!reader_) return;
   reader_->look_from(eye_mm);
   if (const auto hint = reader_->take()) {
     words_ = shown_hint(*hint);
@@ -111,21 +113,6 @@ void HintController::draw(const ScreenBox& view) const {
   draw->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32(theme().ground, 0.8F), 0.4F * e);
   draw_sign(draw, {box.x + 1.1F * e, box.y + high / 2}, 0.45F * e, 4, palette::kYellow);
   fitted_text(draw, {box.x + 2.0F * e, box.y, box.width - 2.5F * e, box.height}, 1.3F * e, theme().text, words_);
-}
-
-void HintController::panel() {
-  if (!fold(tr("Hints while one drills"))) return;
-  bool all = on();
-  if (ImGui::Checkbox(tr("hints (Ctrl-H)"), &all)) turn(all);
-  for (const HintRule& r : usual_hints()) {
-    bool one = !is_off(person_.values.hints_off, r.id);
-    if (!ImGui::Checkbox((tr(r.id) + "##" + r.id).c_str(), &one)) {
-      if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", tr(r.words).c_str());
-      continue;
-    }
-    person_.values.hints_off = with_hint(person_.values.hints_off, r.id, one);
-    if (on()) turn(true);
-  }
 }
 
 }  // namespace osteo::inline app

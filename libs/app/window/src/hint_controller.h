@@ -32,20 +32,20 @@ class HintController {
   void leave();
   void turn(bool on);
   [[nodiscard]] bool on() const { return person_.values.hints; }
-  /// A picture: takes up what was said, which the session is told; `now_s` by any clock.
+  /// A picture: follows what the person has chosen, takes up what was said, which the session is told; `now_s` by any
+  /// clock.
   void frame(Vec3 eye_mm, double now_s);
   /// What is shown now; empty: nothing.
   [[nodiscard]] const std::string& words() const { return words_; }
   /// At the upper edge of the picture.
   void draw(const ScreenBox& view) const;
-  /// Into the panel: all on or off, and each.
-  void panel();
 
  private:
   void join();
   PersonSettings& person_;
   Rehearsal* rehearsal_ = nullptr;
   std::unique_ptr<HintReader> reader_;
+  std::string joined_off_;  // what the reader leaves out
   std::string words_;
   double until_s_ = 0;
 };

@@ -1,5 +1,5 @@
-// Made by libs/app/window/icons/make_icons.py: not edited by hand. Tabler Icons, https://tabler.io/icons, MIT,
-// Copyright (c) 2020-2026 Pawel Kuna; drill, saw, plate, fragments and suction are our own.
+// Made by libs/app/window/icons/make_icons.py: not edited by hand. Tabler Icons, https://tabler.io/icons, MIT, Copyright (c)
+// 2020-2026 Pawel Kuna; drill, saw, plate, fragments and suction are our own.
 #pragma once
 #include <cstdint>
 #include <string_view>
@@ -51,6 +51,8 @@ inline constexpr std::uint8_t kIcon_player_pause[] = {17,60,60,61,55,65,51,70,50
 inline constexpr std::uint8_t kIcon_player_track_prev[] = {4,210,50,210,190,130,120,210,50,4,100,50,100,190,20,120,100,50,0};
 inline constexpr std::uint8_t kIcon_player_track_next[] = {4,30,50,30,190,110,120,30,50,4,140,50,140,190,220,120,140,50,0};
 inline constexpr std::uint8_t kIcon_eye[] = {21,100,120,101,126,104,132,108,136,114,139,120,140,126,139,132,136,136,132,139,126,140,120,139,114,136,108,132,104,126,101,120,100,114,101,108,104,104,108,101,114,100,120,33,210,120,201,134,191,146,180,157,170,165,158,172,146,176,133,179,120,180,107,179,94,176,82,172,70,165,60,157,49,146,39,134,30,120,39,106,49,94,60,83,70,75,82,68,94,64,107,61,120,60,133,61,146,64,158,68,170,75,180,83,191,94,201,106,210,120,0};
+inline constexpr std::uint8_t kIcon_eye_off[] = {11,106,106,102,111,100,117,100,123,102,129,106,134,111,138,117,140,123,140,129,138,134,134,20,167,167,158,171,149,175,140,178,130,180,120,180,107,179,94,176,82,172,70,165,60,157,49,146,39,134,30,120,36,110,43,101,50,92,58,85,65,79,73,73,17,102,62,108,61,114,60,120,60,133,61,146,64,158,68,170,75,180,83,191,94,201,106,210,120,206,126,202,133,198,138,193,144,189,149,2,30,30,210,210,0};
+inline constexpr std::uint8_t kIcon_adjustments_horizontal[] = {21,120,60,121,66,124,72,128,76,134,79,140,80,146,79,152,76,156,72,159,66,160,60,159,54,156,48,152,44,146,41,140,40,134,41,128,44,124,48,121,54,120,60,2,40,60,120,60,2,160,60,200,60,21,60,120,61,126,64,132,68,136,74,139,80,140,86,139,92,136,96,132,99,126,100,120,99,114,96,108,92,104,86,101,80,100,74,101,68,104,64,108,61,114,60,120,2,40,120,60,120,2,100,120,200,120,21,150,180,151,186,154,192,158,196,164,199,170,200,176,199,182,196,186,192,189,186,190,180,189,174,186,168,182,164,176,161,170,160,164,161,158,164,154,168,151,174,150,180,2,40,180,150,180,2,190,180,200,180,0};
 inline constexpr IconLines kIcons[] = {
     {"drill", kIcon_drill},
     {"saw", kIcon_saw},
@@ -90,6 +92,8 @@ inline constexpr IconLines kIcons[] = {
     {"player-track-prev", kIcon_player_track_prev},
     {"player-track-next", kIcon_player_track_next},
     {"eye", kIcon_eye},
+    {"eye-off", kIcon_eye_off},
+    {"adjustments-horizontal", kIcon_adjustments_horizontal},
 };
 // clang-format on
 

@@ -104,7 +104,7 @@ constexpr Key kFixedKeys[] = {
     {'K', Command::second_hand},
     {kF2, Command::layout},
     {kF11, Command::full_screen},
-    {kF10, Command::panel_keys},
+    {kF10, Command::settings},
     {kTab, Command::focus_next},
     {kTab, Command::wheel, Key::When::pressed, 0, kWithCtrl},
     {'K', Command::palette, Key::When::pressed, 0, kWithCtrl},

@@ -60,7 +60,7 @@ enum class Command {
   second_hand,
   layout,
   full_screen,
-  panel_keys,
+  settings,    // all that can be chosen, in a dialog
   focus_next,  // the keys go to the next part of the window; with Shift to the one before
   palette,     // search among all commands
   wheel,
@@ -77,7 +77,7 @@ enum class Command {
   burr_speed,    // value: 1 faster, -1 slower
   other_burr,    // of the next kind
   next_burr,     // value: 1 larger, -1 smaller
-  hand_page,     // of the panel
+  hand_page,     // of the settings
   timeline,
   earlier,
   later,

@@ -10,8 +10,6 @@
 
 #include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/posture.h"
-#include "settings_panel.h"
-#include "sound_panel.h"
 #include "status_panel.h"
 #include "ui_kit.h"
 #include "ui_style.h"
@@ -23,10 +21,37 @@ Layout layout_named(const std::string& name) {
   return name == "plan" ? Layout::plan : Layout::operate;
 }
 
+// What belongs to saw, fragments or plate; of fragments soft tissue, too.
+void draw_tools(const ViewScene& scene, const HandFacts& hand) {
+  scene.draw_tools();
+  if (hand.tool == 2) draw_tissue(scene.control.rehearsal());
+}
+
+// Of the case, the device and the machine.
+void draw_information(const ViewScene& scene) {
+  const Rehearsal& rehearsal = scene.control.rehearsal();
+  draw_approval(scene.machine.approval, scene.machine.approval_ended);
+  if (scene.machine.scan != nullptr) draw_scan(*scene.machine.scan);
+  ImGui::TextWrapped("%s", filled(tr("hand: {device}"), {{"device", scene.machine.device}}).c_str());
+  ImGui::TextWrapped("%s",
+                     rehearsal.realtime()
+                         ? tr("real-time priority: yes")
+                         : tr("real-time priority: NOT GRANTED. The force may stutter: allow rtprio in limits.conf."));
+  ImGui::TextWrapped("%s", filled(tr("servo {work} us a tick, late {late} us"),
+                                  {{"work", shown_number(static_cast<double>(scene.tick.work_us), 0)},
+                                   {"late", shown_number(static_cast<double>(scene.tick.lateness_us), 0)}})
+                               .c_str());
+  ImGui::TextWrapped(
+      "%s", filled(tr("{drawn} of {all} M triangles"), {{"drawn", shown_number(scene.machine.drawn_millions, 2)},
+                                                        {"all", shown_number(scene.machine.triangles_millions, 2)}})
+                .c_str());
+  ImGui::TextWrapped("%s", scene.machine.pictures.c_str());
+}
+
 }  // namespace
 
 MainView::MainView(WindowShell& shell, PersonSettings& person)
-    : shell_(shell), person_(person), wanted_(layout_named(person.values.layout)) {
+    : shell_(shell), person_(person), wanted_(layout_named(person.values.layout)), begun_(person.values) {
   use_language(language_named(person.values.language));
   take_theme(person.values.theme);
   lay_out(false, 0);
@@ -35,6 +60,8 @@ MainView::MainView(WindowShell& shell, PersonSettings& person)
 const ViewLayout& MainView::lay_out(bool over, float cut_side) {
   layout_ = osteo::lay_out(over ? Layout::review : wanted_, shell_.width(), shell_.height(),
                            static_cast<float>(shell_.em_pixels()), cut_side);
+  // Where both have no room the settings are in front.
+  if (in_settings() && SettingsDialog::box_in(layout_).right() > layout_.over[0].x) layout_.over = {};
   return layout_;
 }
 
@@ -46,6 +73,7 @@ void MainView::renew() {
   writing_.reset();
   wheel_.close();
   latched_ = {};
+  felt_then_.reset();
 }
 
 void MainView::key(int code, int modifiers, bool repeated) {
@@ -81,8 +109,11 @@ bool MainView::takes_in_front(Command c, RehearsalControl& control) {
   }
   if (palette_.typing()) return true;  // pressed in the picture in which it was opened
   if (focus_ != Focus::bone) {
-    const bool leaves = c == Command::put_away || (c == Command::panel_keys && keys_in_panel());
-    if (leaves) focus_ = Focus::bone;
+    const bool leaves = c == Command::put_away || (c == Command::settings && in_settings());
+    if (leaves) {
+      focus_ = Focus::bone;
+      settings_.close();
+    }
     // Arrows, Space and Enter are the focus'; other keys go on.
     if (leaves || c == Command::deeper || c == Command::back || c == Command::drill || c == Command::perform ||
         c == Command::earlier || c == Command::later)
@@ -122,13 +153,15 @@ void MainView::show_wheel() {
 // The bone, and round the parts of the window again.
 void MainView::move_focus(int by) {
   constexpr int kParts = 5;  // the panel is opened by its own key
-  const int now = keys_in_panel() ? 0 : static_cast<int>(focus_);
+  const int now = in_settings() ? 0 : static_cast<int>(focus_);
   focus_ = static_cast<Focus>((now + by + kParts) % kParts);
+  settings_.close();
   focus_moved_ = true;
 }
 
-// Where dust and water fall to: without them it changes nothing.
+// Where dust and water fall to: without them it is for a session that has them.
 void MainView::lay_patient(Posture posture, RehearsalControl& control) {
+  person_.values.position = EnumNames<Posture>::values[static_cast<std::size_t>(posture)];
   bool dust = false;
   control.rehearsal().look([&](const World&, SceneReaders& readers) { dust = readers.dust != nullptr; });
   if (!dust)
@@ -137,11 +170,6 @@ void MainView::lay_patient(Posture posture, RehearsalControl& control) {
   std::string name(EnumNames<Posture>::values[static_cast<std::size_t>(posture)]);
   std::replace(name.begin(), name.end(), '_', ' ');
   control.say([&] { return filled(tr("patient position: {position}"), {{"position", tr(name)}}); });
-}
-
-void MainView::choose_theme(ThemeName name) {
-  person_.values.theme = EnumNames<ThemeName>::values[static_cast<std::size_t>(name)];
-  take_theme(person_.values.theme);
 }
 
 bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, const std::optional<Vec3>& bone) {
@@ -168,7 +196,8 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       lay_patient(static_cast<Posture>(press.value), control);
       return true;
     case Command::colours:
-      choose_theme(static_cast<ThemeName>(press.value));
+      person_.values.theme = EnumNames<ThemeName>::values[static_cast<std::size_t>(press.value)];
+      take_theme(person_.values.theme);
       return true;
     case Command::lift:
       lifting_ = true;
@@ -187,11 +216,11 @@ bool MainView::takes(const Keyboard::Press& press, RehearsalControl& control, co
       person_.values.full_screen = shell_.full_screen();
       return true;
     case Command::hand_page:
-    case Command::panel_keys:
-      focus_ = Focus::panel;
-      hand_page_ = c == Command::hand_page;
-      control.say([&] { return tr("keys move in the panel: arrows, Space; Esc gives them back"); });
+    case Command::settings:
+      focus_ = Focus::settings;
+      settings_.show(c == Command::hand_page ? SettingsPage::controls : settings_.page(), c == Command::hand_page);
       return true;
+
     case Command::wheel:
       show_wheel();
       return true;
@@ -304,12 +333,11 @@ void MainView::draw(const ViewScene& scene) {
   pressed_.held.clear();
   RehearsalControl& control = scene.control;
   const HandFacts hand = hand_facts(control, scene.sound, undo_steps_);
-  draw_tray(layout_.tray, hand, keys_in_panel(), latched_, pressed_);
+  draw_tray(layout_.tray, hand, in_settings(), latched_, pressed_);
   const StateFacts facts = state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr);
   draw_state(layout_.state, layout_.view, facts, control.reported(causes_of(facts)), pressed_);
-  if (keys_in_panel()) {
-    if (!ImGui::IsAnyItemActive() && !io.NavVisible) ImGui::SetNextWindowFocus();
-    draw_panel(scene);
+  if (in_settings()) {
+    draw_settings(scene);
   } else {
     draw_cards(scene, hand);
   }
@@ -384,7 +412,8 @@ void MainView::draw_cards(const ViewScene& scene, const HandFacts& hand) {
   if (hand.tool == 0 && !hand.saw) {
     below = draw_burr_card(view, view.width - taken, hand, burr_unfolded_, pressed_).bottom();
   } else {
-    below = draw_tool_card(view, "instrument", hand.saw ? tr("Saw in the hand") : titles[hand.tool], scene.draw_tools);
+    below = draw_tool_card(view, "instrument", hand.saw ? tr("Saw in the hand") : titles[hand.tool],
+                           [&] { draw_tools(scene, hand); });
   }
   RehearsalControl& control = scene.control;
   const bool water = latched_.suction || latched_.irrigation || control.second().holds() > 0;
@@ -411,7 +440,7 @@ void MainView::draw_side(const ViewScene& scene, const HandFacts& hand) {
     wanted_cut_.reset();
     const char* const titles[] = {tr("Drill"), tr("Saw"), tr("Fragments"), tr("Plate")};
     ImGui::TextDisabled("%s", hand.saw ? tr("Saw in the hand") : titles[hand.tool]);
-    scene.draw_tools();
+    draw_tools(scene, hand);
     ImGui::End();
     return;
   }
@@ -433,54 +462,52 @@ void MainView::draw_side(const ViewScene& scene, const HandFacts& hand) {
   ImGui::End();
 }
 
-void MainView::draw_panel(const ViewScene& scene) {
-  RehearsalControl& control = scene.control;
-  Rehearsal& rehearsal = control.rehearsal();
-  const ScreenBox box = panel_of(layout_);
-  ImGui::SetNextWindowPos({box.x, box.y});
-  ImGui::SetNextWindowSize({box.width, box.height});
-  ImGui::Begin("panel", nullptr,
-               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
-                   ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoScrollbar);
-  // What ends a session stays in its place at the bottom, apart from all else.
-  const float apart = 2 * ImGui::GetFrameHeightWithSpacing() + ImGui::GetStyle().ItemSpacing.y + 2;
-  ImGui::BeginChild("all", {0, std::max(4 * em(), ImGui::GetContentRegionAvail().y - apart)});
-  scene.draw_camera();
-  ImGui::Separator();
-  scene.draw_plates();
-  draw_sound(scene.sound);
-  ImGui::TextDisabled("%s", tr("Colours"));
-  const std::string themes[] = {tr("Dark"), tr("Light"), tr("High contrast")};
-  if (const int chosen = choice("theme", themes, static_cast<int>(theme_name()), kSmallControl); chosen >= 0)
-    choose_theme(static_cast<ThemeName>(chosen));
-  draw_language(person_.values.language);
-  if (scene.draw_hand) scene.draw_hand(std::exchange(hand_page_, false));
-  draw_settings(rehearsal);
-  draw_posture(rehearsal);
-  draw_tissue(rehearsal);
-  if (fold(tr("Case and machine"))) {
-    draw_approval(scene.machine.approval, scene.machine.approval_ended);
-    if (scene.machine.scan != nullptr) draw_scan(*scene.machine.scan);
-    ImGui::TextWrapped("%s", filled(tr("hand: {device}"), {{"device", scene.machine.device}}).c_str());
-    ImGui::TextWrapped(
-        "%s", rehearsal.realtime()
-                  ? tr("real-time priority: yes")
-                  : tr("real-time priority: NOT GRANTED. The force may stutter: allow rtprio in limits.conf."));
-    ImGui::TextUnformatted(filled(tr("servo {work} us a tick, late {late} us"),
-                                  {{"work", shown_number(static_cast<double>(scene.tick.work_us), 0)},
-                                   {"late", shown_number(static_cast<double>(scene.tick.lateness_us), 0)}})
-                               .c_str());
-    ImGui::TextUnformatted(
-        filled(tr("{drawn} of {all} M triangles"), {{"drawn", shown_number(scene.machine.drawn_millions, 2)},
-                                                    {"all", shown_number(scene.machine.triangles_millions, 2)}})
-            .c_str());
-    ImGui::TextWrapped("%s", scene.machine.pictures.c_str());
-    ImGui::Checkbox(tr("first steps"), &person_.values.first_steps);
-    ImGui::Checkbox(tr("remember cases"), &person_.values.remember_cases);
-  }
-  ImGui::EndChild();
-  draw_apart(pressed_);
-  ImGui::End();
+void MainView::draw_settings(const ViewScene& scene) {
+  Rehearsal& rehearsal = scene.control.rehearsal();
+  PersonValues& values = person_.values;
+  // What keys have changed meanwhile.
+  values.sound = scene.sound.on();
+  values.volume = scene.sound.volume();
+  values.alarms = scene.sound.alarms();
+  values.scale = shell_.by_hand();
+  values.full_screen = shell_.full_screen();
+  const PersonValues before = values;
+  if (!felt_then_) felt_then_ = rehearsal.settings();
+  SettingsParts parts;
+  const auto more = [&](SettingsPage page) -> std::function<void()>& {
+    return parts.more[static_cast<std::size_t>(page)];
+  };
+  more(SettingsPage::view) = scene.draw_camera;
+  if (scene.sound.on()) more(SettingsPage::sound) = [&] { ImGui::TextWrapped("%s", scene.sound.status().c_str()); };
+  more(SettingsPage::operation) = [&] { draw_head_turned(rehearsal); };
+  more(SettingsPage::controls) = scene.draw_hand;
+  more(SettingsPage::haptics) = [&] { draw_haptics(rehearsal, *felt_then_); };
+  more(SettingsPage::information) = [&] { draw_information(scene); };
+  parts.foot = [&] { draw_apart(pressed_); };
+  parts.foot_wide = apart_width();
+  parts.procedures = scene.procedures;
+  parts.another = scene.alone && needs_another_session(begun_, values);
+  another_session_ = settings_.draw(SettingsDialog::box_in(layout_), values, parts);
+  if (!settings_.open()) focus_ = Focus::bone;
+  take_settings(before, scene);
+}
+
+// What was changed, where it has its effect. Hints and the monitor look for themselves.
+void MainView::take_settings(const PersonValues& before, const ViewScene& scene) {
+  const PersonValues& now = person_.values;
+  if (now.theme != before.theme) take_theme(now.theme);
+  if (now.language != before.language) use_language(language_named(now.language));
+  if (now.scale != before.scale) shell_.set_scale(now.scale);
+  if (now.full_screen != before.full_screen) shell_.toggle_full_screen();
+  if (now.layout != before.layout) wanted_ = layout_named(now.layout);
+  if (now.sound != before.sound) scene.sound.turn(now.sound);
+  if (now.volume != before.volume) scene.sound.set_volume(now.volume);
+  if (now.alarms != before.alarms) scene.sound.set_alarms(now.alarms);
+  constexpr auto kPositions = enum_names(Posture{});
+  if (now.position != before.position)
+    lay_patient(
+        static_cast<Posture>(std::find(kPositions.begin(), kPositions.end(), now.position) - kPositions.begin()),
+        scene.control);
 }
 
 void MainView::draw_note_field(RehearsalControl& control) {

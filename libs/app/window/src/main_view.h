@@ -3,7 +3,9 @@
 #pragma once
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "command_palette.h"
@@ -13,6 +15,7 @@
 #include "osteo/app/window/window_shell.h"
 #include "osteo/simulation/bone/posture.h"
 #include "rehearsal_control.h"
+#include "settings_dialog.h"
 #include "steps.h"
 #include "view_panels.h"
 #include "work_done.h"
@@ -39,12 +42,12 @@ struct ViewScene {
   double magnification = 1;
   /// A point of the world in pixels of the window; nothing behind the eye.
   std::function<std::optional<std::array<float, 2>>(Vec3)> project;
-  std::function<void()> draw_camera;  ///< the microscope: into the panel
+  std::function<void()> draw_camera;  ///< views, the microscope, the picture: into the settings
   std::function<void()> draw_tools;   ///< saw, fragments, plates: into their card
   ScreenBox side;                     ///< CutsPanel::room(): where the card is then
-  std::function<void()> draw_plates;  ///< those that are on the bone: into the panel
-  /// What is chosen for the hand: into the panel. `show`: opened, and the keys' cursor on it.
-  std::function<void(bool show)> draw_hand;
+  std::function<void()> draw_hand;    ///< its handle, pedals and buttons: into the settings
+  std::span<const StartProcedure> procedures;
+  bool alone = true;  ///< nobody takes part from elsewhere: another session can be begun with other settings
   std::optional<WarmthNow> warmth;  ///< where the scene has heat
 };
 
@@ -61,6 +64,8 @@ class MainView {
 
   /// For the window as it is now; `over`: the session has ended; `cut_side`: see lay_out().
   const ViewLayout& lay_out(bool over, float cut_side);
+  /// What strips and columns of others have left of it.
+  void take_layout(const ViewLayout& layout) { layout_ = layout; }
   [[nodiscard]] const ViewLayout& layout() const { return layout_; }
   [[nodiscard]] Layout wanted() const { return wanted_; }
   /// Mouse and keys are for something in front of the bone.
@@ -68,10 +73,13 @@ class MainView {
   [[nodiscard]] const CommandPalette& palette() const { return palette_; }
   [[nodiscard]] bool asking() const { return asking_; }
   [[nodiscard]] bool wheel_open() const { return wheel_.open(); }
-  /// The panel is open, and the keys are its.
-  [[nodiscard]] bool keys_in_panel() const { return focus_ == Focus::panel; }
+  /// The settings are open, and the keys are theirs.
+  [[nodiscard]] bool in_settings() const { return focus_ == Focus::settings; }
+  [[nodiscard]] const SettingsDialog& settings() const { return settings_; }
+  /// The person wants another session that continues from here with what was chosen; asked once.
+  [[nodiscard]] bool take_another_session() { return std::exchange(another_session_, false); }
   /// Which part of the window has the arrows, Space and Enter; bone: none, they are the hand's.
-  enum class Focus { bone, strip, card, cuts, state, panel };
+  enum class Focus { bone, strip, card, cuts, state, settings };
   [[nodiscard]] Focus focus() const { return focus_; }
   [[nodiscard]] bool before() const { return before_; }
   void set_before(bool on) { before_ = on; }
@@ -92,6 +100,8 @@ class MainView {
   /// A picture was kept; the session has ended and is saved.
   void picture_kept() { pictured_ = true; }
   void session_ended();
+  /// For buttons of others.
+  [[nodiscard]] Pressed& pressed() { return pressed_; }
   /// Presses of buttons since the last call, as if they were keys.
   [[nodiscard]] std::vector<Keyboard::Press> take_presses();
   /// A button that does it is held down.
@@ -111,7 +121,8 @@ class MainView {
   [[nodiscard]] static EndChoice end_choice(Command command);
 
  private:
-  void draw_panel(const ViewScene& scene);
+  void draw_settings(const ViewScene& scene);
+  void take_settings(const PersonValues& before, const ViewScene& scene);
   void draw_cards(const ViewScene& scene, const HandFacts& hand);
   void draw_side(const ViewScene& scene, const HandFacts& hand);
   void move_focus(int by);
@@ -119,8 +130,7 @@ class MainView {
   void draw_palette(RehearsalControl& control);
   [[nodiscard]] bool takes_in_front(Command c, RehearsalControl& control);
   void show_wheel();
-  static void lay_patient(Posture posture, RehearsalControl& control);
-  void choose_theme(ThemeName name);
+  void lay_patient(Posture posture, RehearsalControl& control);
   void draw_marks(const ViewScene& scene);
   void draw_note_field(RehearsalControl& control);
   void answer(int answer, RehearsalControl& control);
@@ -149,7 +159,10 @@ class MainView {
   std::optional<Vec3> writing_;  // where a note is pinned
   std::string note_text_;
   int note_answer_ = 0;  // 1: kept, -1: not
-  bool hand_page_ = false, burr_unfolded_ = false;
+  bool burr_unfolded_ = false, another_session_ = false;
+  SettingsDialog settings_;
+  const PersonValues begun_;                // what the sessions of this sitting began with
+  std::optional<HapticsParams> felt_then_;  // when the session began
   Latched latched_;
 };
 

@@ -1,6 +1,7 @@
 #include <vector>
 
 #include "gamepad.h"
+#include "osteo/core/base/json_document.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/simulation/bone/world_mesh.h"
 #include "rehearsal_parts.h"
@@ -210,9 +211,38 @@ void RehearsalWindow::switch_lead() {
   control_.say([&] { return on ? tr("your hand is led") : tr("your hand is let go"); });
 }
 
+// What the person has chosen meanwhile, by keys or in the settings; what a session had when is a note of it.
+void RehearsalWindow::look_at_settings() {
+  const SettingsDialog& settings = main_view_.settings();
+  if (!main_view_.in_settings() || settings.page() != SettingsPage::controls) controller_.leave();
+  PersonValues& values = person_.values;
+  if (values.monitor != (monitor_controller() != nullptr) && actions_.turn_monitor) {
+    if (!actions_.turn_monitor(values.monitor))
+      control_.say([&] { return tr("the nerve monitor stays as it is in this session"); }, Message::Rank::hindrance);
+    values.monitor = monitor_controller() != nullptr;
+    monitor_.show(true);
+  }
+  static constexpr const char* kNames[] = {"sound", "hints", "monitor"};
+  const std::array<bool, 3> now = switches_now();
+  for (std::size_t n = 0; n < now.size(); ++n) {
+    if (now[n] == switches_[n]) continue;
+    control_.rehearsal().note("switch", Json{{"name", kNames[n]}, {"on", now[n]}}.dump());
+  }
+  switches_ = now;
+  if (!main_view_.take_another_session()) return;
+  end_ = {true, actions_.folder(), true, scope_.view()};
+  quit_ = true;
+}
+
 void RehearsalWindow::monitor_command(Command command) {
   MonitorController* const controller = monitor_controller();
-  if (controller == nullptr) return control_.say([&] { return tr("there is no nerve monitor: begin with --monitor"); });
+  if (controller == nullptr) {
+    if (command == Command::monitor && actions_.turn_monitor)
+      person_.values.monitor = true;  // it begins with this picture
+    else
+      control_.say([&] { return tr("there is no nerve monitor here"); });
+    return;
+  }
   if (command == Command::monitor) monitor_.show(!monitor_.shown());
   if (command == Command::mute_monitor) {
     controller->sound().mute(!controller->sound().muted());

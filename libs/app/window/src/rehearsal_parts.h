@@ -110,6 +110,11 @@ class RehearsalWindow {
     return actions_.monitor ? actions_.monitor() : nullptr;
   }
   void monitor_command(Command command);
+  // What the person has chosen meanwhile, by keys or in the settings: hardware, monitor and session follow.
+  void look_at_settings();
+  [[nodiscard]] std::array<bool, 3> switches_now() const {
+    return {sound_.on(), hints_.on(), monitor_controller() != nullptr};
+  }
   // What is the window's own.
   void command(Command command);
 
@@ -161,6 +166,7 @@ class RehearsalWindow {
   const std::vector<PlannedRegion> planned_;
   const std::vector<std::string> thinned_;
   const std::optional<Labels> uncertainty_;
+  const std::vector<StartProcedure> procedures_;
   std::filesystem::path state_file_;
   Keyboard keyboard_;
   MouseTrail trail_;
@@ -170,6 +176,8 @@ class RehearsalWindow {
   std::optional<EndFacts> ended_;
   ReviewScene review_;
   HintController hints_;
+  PersonSettings& person_;
+  std::array<bool, 3> switches_{};  // sound, hints, monitor: as the session has them noted
   WindowEnd end_;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkSmartPointer<vtkRenderer> renderer_ = make_layered_renderer();
@@ -195,6 +203,8 @@ class RehearsalWindow {
   MonitorPanel monitor_;
   ToolTouch touch_;
   TutorNow tutor_;
+  TutorPanel tutor_panel_;
+  std::vector<HarmLine> harm_;
   LinkWatch links_;
   std::optional<WarmthNow> warmth_;
   std::chrono::steady_clock::time_point warmth_at_{};  // when it is looked at again

@@ -45,6 +45,7 @@ void RehearsalWindow::show() {
   Rehearsal& now = control_.rehearsal();
   const ViewScene scene = view_scene(now);
   main_view_.draw(scene);
+  look_at_settings();
   if (screenshot_wanted_) main_view_.draw_caption(scene);
   if (MonitorController* const controller = monitor_controller()) monitor_.draw(*controller);
   cuts_.draw(now, control_.tools().tool() == HandTools::Tool::saw ? &control_.tools().cut() : nullptr);
@@ -100,7 +101,19 @@ void RehearsalWindow::show_instruments(Rehearsal& now) {
 }
 
 void RehearsalWindow::look_at_tutor() {
-  if (actions_.tutor) tutor_ = actions_.tutor();
+  if (!actions_.tutor) return;
+  Rehearsal* const rehearsal = actions_.rehearsal();
+  std::vector<std::string> injured;
+  harm_.clear();
+  if (rehearsal != nullptr && work_ && rehearsal->structures() != nullptr) {
+    const auto harm = work_->harm();
+    harm_ = harm_lines(harm, rehearsal->structures());
+    for (const auto& [value, h] : harm) {
+      if (h.violations > 0) injured.push_back(rehearsal->structures()->name_of(value));
+    }
+  }
+  tutor_ = actions_.tutor();
+  if (actions_.steps) tutor_.steps = actions_.steps(injured);
 }
 
 void RehearsalWindow::show_tutor(Rehearsal& now) {
@@ -113,7 +126,8 @@ void RehearsalWindow::show_tutor(Rehearsal& now) {
       hands_[hand]->report_apart({kPartnerColour.red, kPartnerColour.green, kPartnerColour.blue},
                                  tutor_.ghosts ? 0.5 : 1);
   }
-  TutorPanel::draw(tutor_, hands, cuts_.scene(), [this](Vec3 at) { return project(at); });
+  tutor_panel_.draw(
+      tutor_, hands, harm_, cuts_.scene(), [this](Vec3 at) { return project(at); }, main_view_.pressed());
 }
 
 void RehearsalWindow::report_touch(Rehearsal& now) {
@@ -161,14 +175,15 @@ ViewScene RehearsalWindow::view_scene(Rehearsal& now) {
           scope_.view().pixels_per_mm(scope_.area),
           scope_.view().magnification,
           [this](Vec3 at) { return project(at); },
-          [this] { draw_scope_panel(scope_, stereo_, scope_scene()); },
+          [this] {
+            draw_scope_panel(scope_, stereo_, scope_scene());
+            draw_quality(painter_->quality());
+          },
           [this, &now] { tools_->panel(control_.tools(), now, view_axes()); },
           cuts_.room(),
-          [&now] { SceneTools::fixed_plates(now); },
-          [this](bool show) {
-            controller_.draw(control_, show);
-            hints_.panel();
-          },
+          [this] { controller_.draw(control_); },
+          procedures_,
+          tutor_.title.empty(),
           warmth_};
 }
 

@@ -45,8 +45,15 @@ void RehearsalWindow::write_state() {
   }
   const auto heard =
       std::count_if(tutor_.links.begin(), tutor_.links.end(), [](const TutorNow::Link& l) { return l.heard; });
+  std::vector<std::string> done, harm;
+  for (const TutorNow::Step& s : tutor_.steps) {
+    if (s.items > 0 && s.passed == s.items) done.push_back(s.name);
+  }
+  for (const HarmLine& l : harm_) harm.push_back(l.text);
   state.tutor = {tutor_.title,
                  tutor_.invitation,
+                 done,
+                 harm,
                  tutor_.links.size(),
                  static_cast<std::size_t>(heard),
                  tutor_.leads && tutor_.guiding,
@@ -90,7 +97,10 @@ ViewState RehearsalWindow::view_state() const {
   r.full_screen = shell_.full_screen();
   r.asking = main_view_.asking();
   r.wheel = main_view_.wheel_open();
-  r.panel_keys = main_view_.keys_in_panel();
+  if (main_view_.in_settings()) {
+    r.settings = enum_names(SettingsPage{})[static_cast<std::size_t>(main_view_.settings().page())];
+    for (const SettingsDialog::Place& p : main_view_.settings().places()) r.rows.push_back({p.name, p.x, p.y});
+  }
   r.before = main_view_.before() && before_view_;
   r.writing = main_view_.writing();
   r.ended = ended_.has_value();
@@ -109,7 +119,7 @@ ViewState RehearsalWindow::view_state() const {
   r.search = main_view_.palette().search().text();
   if (const CommandRow* const row = main_view_.palette().search().row(); r.typing && row != nullptr)
     r.found = row->name;
-  static constexpr const char* kParts[] = {"bone", "strip", "card", "cuts", "state", "panel"};
+  static constexpr const char* kParts[] = {"bone", "strip", "card", "cuts", "state", "settings"};
   r.focus = kParts[static_cast<std::size_t>(main_view_.focus())];
   const ScreenBox& v = cuts_.scene();
   r.view = {v.x, v.y, v.width, v.height};

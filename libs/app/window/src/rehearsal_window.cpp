@@ -26,9 +26,11 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
       planned_(options.regions),
       thinned_(options.thinned),
       uncertainty_(options.uncertainty),
+      procedures_(options.procedures),
       state_file_(options.state_file),
       controller_(person, keyboard_),
       hints_(person),
+      person_(person),
       device_name_(options.device),
       case_hash_(options.case_hash),
       end_page_(options.end_page),
@@ -45,6 +47,7 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
   control_.look_from(view_axes());
   control_.begin(options.from_case, false);
   scope_.overview(StandardView::left, scope_scene(), false);
+  if (options.view) scope_.control.jump(*options.view);
   if (options.review_only) end_session();
   if (options.camera_trial) trial_.begin(scope_.view(), middle_of_bone());
 }
@@ -143,6 +146,7 @@ void RehearsalWindow::show_bone(Rehearsal& rehearsal) {
   work_ = std::make_unique<WorkDone>();  // the session that the last one followed is over
   rehearsal.add_counter(*work_);
   hints_.follow(rehearsal);
+  switches_ = switches_now();
   ended_.reset();
 }
 
@@ -245,7 +249,10 @@ void RehearsalWindow::lay_out() {
   ViewLayout layout = main_view_.lay_out(ended_.has_value(), cuts_.wished_width());
   review_.lay_out(layout, static_cast<float>(shell_.em_pixels()));
   monitor_.lay_out(layout, static_cast<float>(shell_.em_pixels()), !ended_ && monitor_controller() != nullptr);
+  // Settings are in front where both have no room.
+  tutor_panel_.lay_out(layout, tutor_, main_view_.in_settings() ? SettingsDialog::box_in(layout).right() : 0);
   cuts_.lay_out(layout);
+  main_view_.take_layout(layout);
   const ScreenBox& scene = cuts_.scene();
   scope_.area = {static_cast<double>(scene.x), static_cast<double>(scene.y),
                  std::max(1.0, static_cast<double>(scene.width)), std::max(1.0, static_cast<double>(scene.height))};

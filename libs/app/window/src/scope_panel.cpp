@@ -3,10 +3,12 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "osteo/core/base/param.h"
 #include "osteo/core/base/translate.h"
+#include "ui_kit.h"
 
 namespace osteo::inline app {
 
@@ -41,78 +43,82 @@ void draw_scope(const ScopeView& view, const PictureArea& area, StereoMode stere
 namespace {
 
 void draw_stereo(StereoScreen& screen) {
-  const char* const modes[] = {tr("one picture"),          tr("side by side"),    tr("top and bottom"),
+  const std::string modes[] = {tr("one picture"),          tr("side by side"),    tr("top and bottom"),
                                tr("anaglyph (red, cyan)"), tr("interlaced rows"), tr("quad buffer")};
   StereoParams& s = screen.params;
-  int mode = static_cast<int>(s.mode);
-  ImGui::SetNextItemWidth(-1);
-  if (ImGui::Combo("##stereo", &mode, modes, IM_ARRAYSIZE(modes))) s.mode = static_cast<StereoMode>(mode);
+  if (const int mode = kit_list(tr("Stereo"), modes, static_cast<int>(s.mode)); mode >= 0)
+    s.mode = static_cast<StereoMode>(mode);
   if (s.mode == StereoMode::quad_buffer && !screen.has_quad_buffer())
     ImGui::TextWrapped(
         "%s", tr("This display has no buffer for each eye, or the window was not opened with --stereo quad_buffer: the "
                  "left eye is shown."));
   if (s.mode == StereoMode::off) return;
-  auto base = static_cast<float>(s.base_mm), convergence = static_cast<float>(s.convergence_mm);
-  if (ImGui::SliderFloat(tr("base, mm"), &base, 0, 65, "%.0f")) s.base_mm = static_cast<double>(base);
-  if (ImGui::SliderFloat(tr("in front, mm"), &convergence, -50, 50, "%.0f"))
-    s.convergence_mm = static_cast<double>(convergence);
-  ImGui::Checkbox(tr("eyes swapped"), &s.swap);
+  static_cast<void>(kit_slider(tr("Between the eyes"), shown_number(s.base_mm, 0) + " mm", s.base_mm, 0, 65, 1));
+  static_cast<void>(kit_slider(tr("In front of the screen"), shown_number(s.convergence_mm, 0) + " mm",
+                               s.convergence_mm, -50, 50, 1));
+  static_cast<void>(kit_switch(tr("Eyes swapped"), s.swap));
 }
+
+// Buttons side by side, in the next row where one has no room.
+class Row {
+ public:
+  bool button(const std::string& words) {
+    const float gap = kGap * unit();
+    if (!first_ && ImGui::GetItemRectMax().x + gap + button_width(words) <= right_) ImGui::SameLine(0, gap);
+    first_ = false;
+    return kit_button(words);
+  }
+
+ private:
+  bool first_ = true;
+  float right_ = ImGui::GetCursorScreenPos().x + ImGui::GetContentRegionAvail().x;
+};
 
 }  // namespace
 
+void draw_quality(QualityChoice& quality) {
+  const std::string words[] = {tr("Automatic"), tr("Plain"), tr("Calm"), tr("Deep")};
+  if (const int n = kit_list(tr("Picture quality"), words, static_cast<int>(quality.wish())); n >= 0)
+    quality.want(static_cast<Quality>(n));
+}
+
 void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene& scene) {
-  ImGui::TextUnformatted(tr("Look from"));
-  const auto button = [&](const char* name, StandardView from, bool last = false) {
-    if (ImGui::Button(name)) scope.overview(from, scene, true);
-    if (!last) ImGui::SameLine();
-  };
-  button(tr_of("seen from", "left"), StandardView::left);
-  button(tr_of("seen from", "right"), StandardView::right);
-  button(tr_of("seen from", "front"), StandardView::front);
-  button(tr_of("seen from", "above"), StandardView::above, true);
-  button(tr_of("seen from", "surgeon"), StandardView::surgeon);
-  if (ImGui::Button(tr("drill (G)"))) scope.control.look_at(scene.drill_mm);
-  ImGui::SameLine();
-  if (ImGui::Button(tr("along it"))) scope.control.look_along(scene.drill_mm, scene.handle);
-  ImGui::Text("%s", scope_text(scope.view()).c_str());
-  if (!ImGui::TreeNode("microscope", "%s", tr("Microscope"))) return;
   ScopeControl& control = scope.control;
-  ImGui::PushItemWidth(-5.5F * ImGui::GetFontSize());  // room for their names
-  if (ImGui::Button(tr("Camera back (Backspace)"), {-1, 0})) static_cast<void>(control.undo());
-  auto m = static_cast<float>(scope.view().magnification);
-  if (ImGui::SliderFloat("x", &m, 0.5F, 40, "%.1f", ImGuiSliderFlags_Logarithmic))
-    control.zoom(static_cast<double>(m) / scope.view().magnification);
-  auto wd = static_cast<float>(scope.view().working_distance_mm);
-  if (ImGui::SliderFloat(tr("WD, mm"), &wd, 150, 600, "%.0f")) control.set_working_distance(static_cast<double>(wd));
-  bool upright = control.target().upright;
-  if (ImGui::Checkbox(tr("head stays up"), &upright)) control.set_upright(upright);
-  ImGui::Checkbox(tr("fly to views (0.4 s)"), &control.flights);
-  auto inertia = static_cast<float>(control.arm.params.inertia_s);
-  if (ImGui::SliderFloat(tr("inertia, s"), &inertia, 0, 0.5F, "%.2f"))
-    control.arm.params.inertia_s = static_cast<double>(inertia);
-  ImGui::TextUnformatted(tr("O, pedal: the device"));
-  int mode = static_cast<int>(scope.mode);
-  bool changed = ImGui::RadioButton(tr("moves"), &mode, 0);
-  ImGui::SameLine();
-  changed = ImGui::RadioButton(tr("turns"), &mode, 1) || changed;
-  ImGui::SameLine();
-  changed = ImGui::RadioButton(tr("both"), &mode, 2) || changed;
-  if (changed) scope.mode = static_cast<CameraGuide>(mode);
-  for (int n = 0; n < static_cast<int>(ScopeControl::kBookmarks); ++n) {
-    const std::string name = "F" + std::to_string(6 + n), keep = std::string(tr("keep")) + "##" + name;
-    const bool kept = control.bookmark(static_cast<std::size_t>(n)).has_value();
-    if (!kept) ImGui::PushStyleVar(ImGuiStyleVar_Alpha, 0.5F);
-    if (ImGui::Button(name.c_str()) && kept) static_cast<void>(control.go_to_bookmark(static_cast<std::size_t>(n)));
-    if (!kept) ImGui::PopStyleVar();
-    ImGui::SameLine();
-    if (ImGui::Button(keep.c_str())) control.set_bookmark(static_cast<std::size_t>(n));
-    if (n + 1 < static_cast<int>(ScopeControl::kBookmarks)) ImGui::SameLine();
+  ImGui::TextDisabled("%s", tr("Look from"));
+  Row from;
+  if (from.button(tr_of("seen from", "left"))) scope.overview(StandardView::left, scene, true);
+  if (from.button(tr_of("seen from", "right"))) scope.overview(StandardView::right, scene, true);
+  if (from.button(tr_of("seen from", "front"))) scope.overview(StandardView::front, scene, true);
+  if (from.button(tr_of("seen from", "above"))) scope.overview(StandardView::above, scene, true);
+  if (from.button(tr_of("seen from", "surgeon"))) scope.overview(StandardView::surgeon, scene, true);
+  if (from.button(tr("drill (G)"))) control.look_at(scene.drill_mm);
+  if (from.button(tr("along it"))) control.look_along(scene.drill_mm, scene.handle);
+  if (from.button(tr("Camera back (Backspace)"))) static_cast<void>(control.undo());
+  ImGui::TextDisabled("%s", tr("Kept views"));
+  Row kept;
+  for (std::size_t n = 0; n < ScopeControl::kBookmarks; ++n) {
+    const std::string key = "F" + std::to_string(6 + n);
+    if (control.bookmark(n) && kept.button(key)) static_cast<void>(control.go_to_bookmark(n));
+    if (kept.button(filled(tr("keep as {key}"), {{"key", key}}))) control.set_bookmark(n);
   }
-  ImGui::TextUnformatted(tr("Stereo"));
+  ImGui::TextDisabled("%s", tr("Microscope"));
+  const double times = scope.view().magnification;
+  double steps = std::log2(times);
+  if (kit_slider(tr("Magnification"), shown_number(times, 1) + "x", steps, -1, std::log2(40.0), 0.1))
+    control.zoom(std::exp2(steps) / times);
+  double distance = scope.view().working_distance_mm;
+  if (kit_slider(tr("Working distance"), shown_number(distance, 0) + " mm", distance, 150, 600, 10))
+    control.set_working_distance(distance);
+  bool upright = control.target().upright;
+  if (kit_switch(tr("Head stays up"), upright)) control.set_upright(upright);
+  static_cast<void>(kit_switch(tr("Fly to views (0.4 s)"), control.flights));
+  static_cast<void>(kit_slider(tr("Inertia"), shown_number(control.arm.params.inertia_s, 2) + " s",
+                               control.arm.params.inertia_s, 0, 0.5, 0.02));
+  ImGui::TextDisabled("%s", tr("O, pedal: the device"));
+  const std::string modes[] = {tr("moves"), tr("turns"), tr("both")};
+  if (const int mode = choice("guide", modes, static_cast<int>(scope.mode)); mode >= 0)
+    scope.mode = static_cast<CameraGuide>(mode);
   draw_stereo(stereo);
-  ImGui::PopItemWidth();
-  ImGui::TreePop();
 }
 
 }  // namespace osteo::inline app

@@ -100,7 +100,7 @@ class StartPage {
 
   StartList& list() { return list_; }
   const bool dialogs = FileDialog::there();  // asked once: it looks through PATH
-  bool follow = true, open = false, close = false, ask = false;
+  bool follow = true, open = false, close = false, ask = false, teach = false;
 
   void poll() {
     if (list_.wants_demo()) list_.say(maker_.make_demo());
@@ -422,6 +422,8 @@ class StartPage {
       next_beside(tr("Operate"), tr("Plan"), room);
       if (kit_button(tr("Plan"), plan ? ButtonLook::main : ButtonLook::usual, half)) open_in("plan");
       note("plan");
+      if (kit_button(tr("Teach"), ButtonLook::usual, room)) open_in("operate", true);
+      note("teach");
     } else if (e != nullptr && e->kind == FolderKind::demo) {
       if (maker_.making().empty() && kit_button(tr("Make the demo ear"), ButtonLook::main, room)) open = true;
       note("make demo");
@@ -445,9 +447,10 @@ class StartPage {
     if (kit_button(tr("Close (Q)"), ButtonLook::usual, half)) close = true;
   }
 
-  void open_in(const char* layout) {
+  void open_in(const char* layout, bool teaches = false) {
     person_.values.layout = layout;
     open = true;
+    teach = teaches;
   }
 
   PersonSettings& person_;
@@ -501,6 +504,7 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
     shell.new_frame();
     page.draw(static_cast<float>(shell.width()), static_cast<float>(shell.height()));
     if (std::exchange(page.open, false)) choice = list.open();
+    if (const bool teach = std::exchange(page.teach, false); choice) choice->teach = teach;
     shell.show_page();
     page.write_state(++pictures, shell.em_pixels());
   }

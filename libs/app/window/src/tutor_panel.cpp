@@ -5,6 +5,8 @@
 
 #include "keys.h"
 #include "osteo/core/base/translate.h"
+#include "state_facts.h"
+#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -60,13 +62,156 @@ std::optional<LocalText> LinkWatch::look(const TutorNow& now) {
   return said;
 }
 
-void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands, const ScreenBox& area,
-                      const Project& project) {
-  if (now.title.empty()) return;
+std::vector<HarmLine> harm_lines(const std::map<std::uint8_t, WorkDone::Harm>& harm, const StructureMap* structures) {
+  std::vector<HarmLine> lines;
+  if (structures == nullptr) return lines;
+  for (const auto& [value, h] : harm) {
+    const Nearness nearness = h.violations > 0 ? Nearness::touched : h.contacts > 0 ? Nearness::close : Nearness::near;
+    const std::size_t times = h.violations > 0 ? h.violations : h.contacts > 0 ? h.contacts : h.near;
+    const char* const text = h.violations > 0 ? tr("{structure}: violation ({n})")
+                             : h.contacts > 0 ? tr("{structure}: contact ({n})")
+                                              : tr("{structure}: near ({n})");
+    const std::string name = structures->name_of(value);
+    lines.push_back({nearness, filled(text, {{"structure", tr(name)}, {"n", std::to_string(times)}})});
+  }
+  std::stable_sort(lines.begin(), lines.end(),
+                   [](const HarmLine& a, const HarmLine& b) { return a.nearness > b.nearness; });
+  return lines;
+}
+
+Invitation invitation_of(const std::string& text) {
+  static constexpr std::string_view kCode = "\ncode ";
+  const std::size_t at = text.find(kCode);
+  if (at == std::string::npos) return {text, {}};
+  return {text.substr(0, at), text.substr(at + kCode.size())};
+}
+
+namespace {
+
+constexpr float kColumn = 304;
+
+// Steps of the built-in procedures, for the catalogues: what their files say is looked up here.
+[[maybe_unused]] constexpr const char* kStepNames[] = {tr_later("take the cortex off and find the sinus and the dura"),
+                                                       tr_later("open the antrum"),
+                                                       tr_later("clear the cells and the angle"),
+                                                       tr_later("thin the wall of the canal"),
+                                                       tr_later("find the nerve and open the recess"),
+                                                       tr_later("open the cortex and the cells"),
+                                                       tr_later("leave the sinus whole"),
+                                                       tr_later("stay clear of the rest"),
+                                                       tr_later("saw and split"),
+                                                       tr_later("draw forward and fix")};
+
+void wrapped(const std::string& words, Colour colour) {
+  ImGui::PushStyleColor(ImGuiCol_Text, im_colour(colour));
+  ImGui::TextWrapped("%s", words.c_str());
+  ImGui::PopStyleColor();
+}
+
+void heading(const std::string& words) {
+  ImGui::Dummy({0, 4 * unit()});
+  wrapped(words, theme().quiet);
+}
+
+// A line behind a sign.
+void signed_line(const std::string& words, int corners, Colour colour, bool filled_sign = true) {
+  const float u = unit();
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  const ImVec2 at = ImGui::GetCursorScreenPos();
+  const ImVec2 centre{at.x + 10 * u, at.y + ImGui::GetFontSize() / 2};
+  if (filled_sign) {
+    draw_sign(draw, centre, 8 * u, corners, colour);
+  } else {
+    draw->AddCircle(centre, 7 * u, im_colour32(colour), 20, 2 * u);
+  }
+  ImGui::SetCursorPosX(ImGui::GetCursorPosX() + 28 * u);
+  ImGui::TextWrapped("%s", words.c_str());
+}
+
+void draw_invitation(const std::string& text) {
+  if (text.empty()) return;
+  const Invitation invitation = invitation_of(text);
+  heading(tr("Invitation code"));
+  ImGui::PushFont(bold_font());
+  ImGui::SetWindowFontScale(kBoldEm / 1.25F);
+  ImGui::TextUnformatted(invitation.code.c_str());
+  ImGui::SetWindowFontScale(1);
+  ImGui::PopFont();
+  // An address in one piece.
+  std::string command = invitation.command;
+  if (const std::size_t at = command.find(" --join"); at != std::string::npos) command[at] = '\n';
+  wrapped(command, theme().quiet);
+}
+
+void draw_people(const TutorNow& now, const std::vector<TickRecord>& hands) {
+  heading(tr("People"));
+  if (hands.size() > 1) {
+    for (std::size_t h = 0; h < std::min(now.hands.size(), hands.size()); ++h) {
+      std::vector<TickRecord> one(hands.size());
+      one[h] = hands[h];
+      const bool cuts = who_cuts(now.hands, one) == now.hands[h];
+      const bool there = h == 0 || (hands[h].tick != 0 && hands[h].device.age_ms != 255);
+      static_cast<void>(list_row(now.hands[h] + "##hand" + std::to_string(h),
+                                 cuts    ? tr("cuts")
+                                 : there ? ""
+                                         : tr("not there"),
+                                 false, 30));
+    }
+  }
+  for (const TutorNow::Link& l : now.links) {
+    const bool well = l.heard && !l.differs;
+    wrapped((well ? "" : "! ") + link_text(l), well ? theme().quiet : ink_of(palette::kYellow));
+  }
+  if (!now.trouble.empty()) wrapped("! " + now.trouble, ink_of(palette::kYellow));
+  if (hands.size() > 1 && now.apart_mm >= 0)
+    wrapped(filled(tr("apart {mm} mm"), {{"mm", shown_number(now.apart_mm, 1)}}), theme().text);
+}
+
+// A person who is led may let go, and be led again.
+void draw_guidance(const TutorNow& now, Pressed& pressed) {
+  if (!now.leads) return;
+  bool on = now.guiding;
+  if (kit_switch(std::string(tr("Haptic guidance")) + "##guidance", on)) pressed.press(Command::lead);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", key_name(Command::lead).c_str());
+  ImGui::ProgressBar(static_cast<float>(now.pull), {-1, 8 * unit()}, "");
+}
+
+void draw_steps(const TutorNow& now) {
+  if (now.procedure.empty()) return;
+  heading(tr(now.procedure));
+  for (const TutorNow::Step& s : now.steps) {
+    const bool done = s.items > 0 && s.passed == s.items;
+    const std::string share =
+        done || s.items == 0
+            ? std::string()
+            : " (" + filled(tr("{n} of {all}"), {{"n", std::to_string(s.passed)}, {"all", std::to_string(s.items)}}) +
+                  ")";
+    signed_line(tr(s.name) + share, 0, done ? palette::kGreen : theme().line, done);
+  }
+  if (now.steps.empty()) wrapped(tr("The steps are judged where the session runs."), theme().quiet);
+}
+
+void draw_harm(const std::vector<HarmLine>& harm) {
+  heading(tr("Harm so far"));
+  if (std::none_of(harm.begin(), harm.end(), [](const HarmLine& l) { return l.nearness != Nearness::near; }))
+    signed_line(tr("no contact, no violation"), 0, palette::kGreen);
+  for (const HarmLine& l : harm) signed_line(l.text, look_of(l.nearness).corners, look_of(l.nearness).colour);
+}
+
+void draw_moments(Pressed& pressed) {
+  const float gap = kGap * unit(), half = std::floor((ImGui::GetContentRegionAvail().x - gap) / 2);
+  const bool beside = std::max(button_width(tr("Note")), button_width(tr("Picture"))) <= half;
+  if (kit_button(tr("Note"), ButtonLook::usual, half)) pressed.press(Command::mark);
+  if (beside) ImGui::SameLine(0, gap);
+  if (kit_button(tr("Picture"), ButtonLook::usual, half)) pressed.press(Command::screenshot);
+}
+
+// Beside each handle, so that the name is not on what is worked at.
+void draw_names(const TutorNow& now, const std::vector<TickRecord>& hands, const ScreenBox& area,
+                const TutorPanel::Project& project) {
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
   for (std::size_t h = 1; h < std::min(now.hands.size(), hands.size()); ++h) {
     if (hands[h].tick == 0 || hands[h].device.age_ms == 255) continue;  // not there
-    // Beside the handle, so that the name is not on what is worked at.
     const Vec3 at = from_floats(hands[h].device.position_mm) + normalized(from_floats(hands[h].device.axis)) * 14;
     const auto p = project(at);
     if (!p || !area.holds((*p)[0], (*p)[1])) continue;
@@ -76,35 +221,55 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
                         im_colour32(theme().ground, 0.75F), 0.2F * em());
     list->AddText(from, im_colour32(kPartnerColour), now.hands[h].c_str());
   }
-  const float e = em(), wide = std::min(24 * e, area.width - e);
-  ImGui::SetNextWindowPos({area.right() - wide - e / 2, area.y + e / 2}, ImGuiCond_Always);
+}
+
+}  // namespace
+
+void TutorPanel::lay_out(ViewLayout& layout, const TutorNow& now, float from) {
+  box_ = {};
+  if (!now.teaches) return;
+  ViewLayout left = layout;
+  const ScreenBox column = take_column(left, std::round(kColumn * layout.unit));
+  if (column.empty() || column.x < from) return;
+  box_ = column;
+  layout = left;
+}
+
+void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands, const std::vector<HarmLine>& harm,
+                      const ScreenBox& area, const Project& project, Pressed& pressed) const {
+  if (now.title.empty()) return;
+  draw_names(now, hands, area, project);
+  const float u = unit();
+  if (!box_.empty()) {
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
+    begin_fixed("tutoring", box_);
+    ImGui::PopStyleVar();
+    ImGui::PushFont(bold_font());
+    ImGui::TextWrapped("%s", now.title.c_str());
+    ImGui::PopFont();
+    draw_invitation(now.invitation);
+    draw_people(now, hands);
+    draw_guidance(now, pressed);
+    draw_steps(now);
+    draw_harm(harm);
+    ImGui::Dummy({0, 4 * u});
+    draw_moments(pressed);
+    ImGui::End();
+    return;
+  }
+  if (now.teaches) return;  // no room now
+  // Who is taught sees who leads, and lets go.
+  const float wide = std::min(kColumn * u, area.width - 32 * u);
+  if (wide < 120 * u) return;
+  ImGui::SetNextWindowPos({area.x + (area.width - wide) / 2, area.y + 16 * u}, ImGuiCond_Always);
   ImGui::SetNextWindowSize({wide, 0}, ImGuiCond_Always);
-  ImGui::SetNextWindowBgAlpha(0.82F);
+  ImGui::SetNextWindowBgAlpha(0.94F);
   ImGui::Begin("tutoring", nullptr,
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
   ImGui::TextWrapped("%s", now.title.c_str());
-  if (!now.invitation.empty()) ImGui::TextWrapped("%s", now.invitation.c_str());
-  if (!now.trouble.empty()) {
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
-    ImGui::TextWrapped("! %s", now.trouble.c_str());
-    ImGui::PopStyleColor();
-  }
-  for (const TutorNow::Link& l : now.links) {
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(l.heard && !l.differs ? theme().text : ink_of(palette::kYellow)));
-    ImGui::TextWrapped("%s%s", l.heard ? "" : "! ", link_text(l).c_str());
-    ImGui::PopStyleColor();
-  }
-  if (hands.size() > 1) {
-    ImGui::TextUnformatted(filled(tr("cuts: {who}"), {{"who", who_cuts(now.hands, hands)}}).c_str());
-    if (now.apart_mm >= 0)
-      ImGui::TextUnformatted(filled(tr("apart {mm} mm"), {{"mm", shown_number(now.apart_mm, 1)}}).c_str());
-  }
-  if (now.leads) {
-    const std::string key = key_name(Command::lead);
-    ImGui::Text("%s (%s)", now.guiding ? tr("your hand is led") : tr("your hand is free"), key.c_str());
-    ImGui::ProgressBar(static_cast<float>(now.pull), {-1, 0.5F * e}, "");
-  }
+  draw_people(now, hands);
+  draw_guidance(now, pressed);
   ImGui::End();
 }
 

@@ -1,8 +1,9 @@
-// Who teaches and who learns, in the window: a small panel, names beside the hands of others, who cuts. Private to
-// libs/app/window; ImGui.
+// Who teaches and who learns, in the window: people, invitation, guidance, steps and harm in a column for who teaches,
+// a card for who is taught, names beside the hands of others. Private to libs/app/window; ImGui.
 #pragma once
 #include <array>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,8 @@
 #include "osteo/session/scene/rehearsal.h"
 #include "palette.h"
 #include "view_layout.h"
+#include "view_panels.h"
+#include "work_done.h"
 
 namespace osteo::inline app {
 
@@ -33,12 +36,31 @@ class LinkWatch {
   std::vector<std::pair<std::string, bool>> heard_;
 };
 
+/// What came near a structure so far, the worst first. No ImGui.
+struct HarmLine {
+  Nearness nearness = Nearness::near;
+  std::string text;
+};
+[[nodiscard]] std::vector<HarmLine> harm_lines(const std::map<std::uint8_t, WorkDone::Harm>& harm,
+                                               const StructureMap* structures);
+/// Of TutorNow::invitation: what to start elsewhere, and the code to type there. No ImGui.
+struct Invitation {
+  std::string command, code;
+};
+[[nodiscard]] Invitation invitation_of(const std::string& text);
+
 class TutorPanel {
  public:
   using Project = std::function<std::optional<std::array<float, 2>>(Vec3)>;
-  /// Between ImGui::NewFrame and Render; `area`: of the bone, at whose upper right corner it is.
-  static void draw(const TutorNow& now, const std::vector<TickRecord>& hands, const ScreenBox& area,
-                   const Project& project);
+  /// Who teaches or watches has a column at the right, unless it would begin left of `from`.
+  void lay_out(ViewLayout& layout, const TutorNow& now, float from);
+  /// Between ImGui::NewFrame and Render; `area`: of the bone, on which names of other hands are, and for who is taught
+  /// a card.
+  void draw(const TutorNow& now, const std::vector<TickRecord>& hands, const std::vector<HarmLine>& harm,
+            const ScreenBox& area, const Project& project, Pressed& pressed) const;
+
+ private:
+  ScreenBox box_;
 };
 
 }  // namespace osteo::inline app

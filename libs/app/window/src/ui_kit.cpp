@@ -1,5 +1,7 @@
 #include "ui_kit.h"
 
+#include <imgui_internal.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -164,7 +166,7 @@ bool kit_switch(const std::string& words, bool& on, float width) {
   draw->AddRectFilled({x, y - 10 * u}, {x + 36 * u, y + 10 * u}, im_colour32(on ? t.text : t.raised), 10 * u);
   draw->AddRect({x, y - 10 * u}, {x + 36 * u, y + 10 * u}, im_colour32(t.line), 10 * u, 0, std::max(1.0F, u));
   draw->AddCircleFilled({x + (on ? 26 : 10) * u, y}, 7 * u, im_colour32(on ? t.ground : t.text), 20);
-  const std::string shown = shortened(words, x - i.lo.x - kGap * u, ImGui::GetFontSize());
+  const std::string shown = shortened(words.substr(0, words.find("##")), x - i.lo.x - kGap * u, ImGui::GetFontSize());
   draw->AddText({i.lo.x, std::floor(y - ImGui::GetFontSize() / 2)}, im_colour32(t.text), shown.c_str());
   focus_and_text({});
   return i.pressed;
@@ -184,6 +186,7 @@ bool kit_slider(const std::string& name, const std::string& value, double& at, d
     const double by = step * (ImGui::GetIO().KeyShift ? 10 : 1);
     if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_LeftArrow))) at -= by;
     if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_RightArrow))) at += by;
+    if (at != before) ImGui::NavMoveRequestCancel();  // they are the knob's here
   }
   at = std::clamp(at, least, most);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
@@ -201,7 +204,30 @@ bool kit_slider(const std::string& name, const std::string& value, double& at, d
   return at != before;
 }
 
-bool list_row(const std::string& words, const std::string& right, bool selected, float high) {
+int kit_list(const std::string& name, std::span<const std::string> words, int selected, const std::string& shown) {
+  const float u = unit();
+  ImGui::PushID(name.c_str());
+  ImGui::TextDisabled("%s", name.c_str());
+  const float wide = ImGui::GetContentRegionAvail().x;
+  ImGui::SetNextItemWidth(wide);
+  ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {12 * u, (kControl * u - ImGui::GetFontSize()) / 2});
+  const std::string field = shortened(selected < 0 ? shown : words[static_cast<std::size_t>(selected)],
+                                      wide - kControl * u - 16 * u, ImGui::GetFontSize());
+  int chosen = -1;
+  const bool open = ImGui::BeginCombo("##list", field.c_str());
+  ImGui::PopStyleVar();
+  if (open) {
+    for (int n = 0; n < static_cast<int>(words.size()); ++n) {
+      if (ImGui::Selectable(words[static_cast<std::size_t>(n)].c_str(), n == selected)) chosen = n;
+      if (n == selected) ImGui::SetItemDefaultFocus();
+    }
+    ImGui::EndCombo();
+  }
+  ImGui::PopID();
+  return chosen;
+}
+
+bool list_row(const std::string& words, const std::string& right, bool selected, float high, std::string_view icon) {
   const float u = unit();
   const Item i = item(words.c_str(), {std::max(ImGui::GetContentRegionAvail().x, 48 * u), high * u});
   ImDrawList* const draw = ImGui::GetWindowDrawList();
@@ -209,7 +235,10 @@ bool list_row(const std::string& words, const std::string& right, bool selected,
   if (selected || i.hovered) draw->AddRectFilled(i.lo, i.hi, im_colour32(t.raised), kRound * u);
   if (selected)
     draw->AddRectFilled({i.lo.x, i.lo.y + 6 * u}, {i.lo.x + 4 * u, i.hi.y - 6 * u}, im_colour32(t.accent), 2 * u);
-  const float y = std::floor((i.lo.y + i.hi.y - ImGui::GetFontSize()) / 2), end = ImGui::CalcTextSize(right.c_str()).x;
+  const float y = std::floor((i.lo.y + i.hi.y - ImGui::GetFontSize()) / 2);
+  const float behind = icon.empty() ? 0 : 28 * u, end = ImGui::CalcTextSize(right.c_str()).x + behind;
+  if (!icon.empty())
+    draw_icon(draw, {i.hi.x - 32 * u, std::floor((i.lo.y + i.hi.y) / 2 - 10 * u)}, 20 * u, icon, im_colour32(t.quiet));
   draw->AddText({i.hi.x - end - 12 * u, y}, im_colour32(t.quiet), right.c_str());
   draw->AddText(
       {i.lo.x + 12 * u, y}, im_colour32(t.text),
@@ -233,13 +262,20 @@ float chip_width(const std::string& words) {
 void draw_chip(ImDrawList* draw, const ScreenBox& box, const std::string& words, const ChipLook& look) {
   const float u = unit();
   const ImVec2 lo{box.x, box.y}, hi{box.right(), box.bottom()};
-  draw->AddRectFilled(lo, hi, im_colour32(look.filled ? look.colour : theme().surface, look.filled ? 1 : 0.94F),
-                      box.height / 2);
-  draw->AddRect(lo, hi, im_colour32(look.colour), box.height / 2, 0, 2 * u);
+  const bool wraps = chip_width(words) > box.width + 1 && box.height > 40 * u;
+  const float round = std::min(box.height / 2, 16 * u);
+  draw->AddRectFilled(lo, hi, im_colour32(look.filled ? look.colour : theme().surface, look.filled ? 1 : 0.94F), round);
+  draw->AddRect(lo, hi, im_colour32(look.colour), round, 0, 2 * u);
   const Colour ink = look.filled ? Colour{0, 0, 0} : theme().text;
   draw_sign(draw, {box.x + 20 * u, box.y + box.height / 2}, 9 * u, look.corners,
             look.filled ? Colour{0, 0, 0} : look.colour);
-  fitted_text(draw, {box.x + 36 * u, box.y, box.width - 48 * u, box.height}, em(), ink, words);
+  const ScreenBox inside{box.x + 36 * u, box.y, box.width - 48 * u, box.height};
+  if (!wraps) return fitted_text(draw, inside, em(), ink, words);
+  const float size = kLineEm * kLabelEm * em();
+  const std::string shown = shortened(words, 1.8F * inside.width, size);
+  const float tall = ImGui::GetFont()->CalcTextSizeA(size, FLT_MAX, inside.width, shown.c_str()).y;
+  draw->AddText(ImGui::GetFont(), size, {inside.x, std::floor(box.y + (box.height - tall) / 2)}, im_colour32(ink),
+                shown.c_str(), nullptr, inside.width);
 }
 
 void draw_card(ImDrawList* draw, const ScreenBox& box) {

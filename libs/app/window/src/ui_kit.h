@@ -48,13 +48,19 @@ enum class ButtonLook { usual, main, quiet };
 /// the focus Left and Right by `step`, with Shift by ten. `width`: pixels; 0: as there is room. True: `at` is another.
 [[nodiscard]] bool kit_slider(const std::string& name, const std::string& value, double& at, double least, double most,
                               double step, float width = 0);
-/// A row of a list, as wide as there is room.
-[[nodiscard]] bool list_row(const std::string& words, const std::string& right, bool selected, float high = kRow);
+/// Its name, and below it a field that opens a list. The one that was chosen now, else -1. `shown`: in the field where
+/// none of `words` is selected.
+[[nodiscard]] int kit_list(const std::string& name, std::span<const std::string> words, int selected,
+                           const std::string& shown = {});
+/// A row of a list, as wide as there is room; `icon`: of icon_lines.h, behind all words.
+[[nodiscard]] bool list_row(const std::string& words, const std::string& right, bool selected, float high = kRow,
+                            std::string_view icon = {});
 
 /// A heading that folds out what is below it: true where it is open. It is no selection, so not in the accent.
 [[nodiscard]] bool fold(const char* words);
 
-/// A chip as wide as its words, at most `width`; its sign says how serious, its words are never in that colour.
+/// A chip as wide as its words, or narrower: in a box 48 high it then has two lines. Its sign says how serious, its
+/// words are never in that colour.
 struct ChipLook {
   Colour colour;
   int corners = 0;      ///< draw_sign()

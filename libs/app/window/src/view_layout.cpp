@@ -9,8 +9,7 @@ namespace osteo::inline app {
 namespace {
 
 // Of the design, docs/design/window.md, in pixels at scale 1.
-constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPanel = 400, kPage = 544,
-                kSide = 288;
+constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPage = 544, kSide = 288;
 constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kSideWide = 960, kMinCut = 96, kMaxCut = 272;
 // Of the smallest window that operate fits: its state needs the width, its strip the height.
 constexpr double kMinWideEm = 40, kMinHighEm = 26;
@@ -78,11 +77,6 @@ ViewLayout lay_out(Layout wanted, int width, int height, float em, float cut_sid
   return out;
 }
 
-ScreenBox panel_of(const ViewLayout& layout) {
-  const float top = layout.view.y, bottom = layout.state.empty() ? layout.view.bottom() : layout.state.y;
-  return {layout.tray.right(), top, std::min(std::round(kPanel * layout.unit), layout.state.width), bottom - top};
-}
-
 ScreenBox take_strip(ViewLayout& layout, float high) {
   if (layout.shown == Layout::review) return {};
   const bool four = layout.shown == Layout::plan;
@@ -104,6 +98,28 @@ ScreenBox take_strip(ViewLayout& layout, float high) {
     if (shown > 0) stack_over(layout, layout.over[0].width, static_cast<std::size_t>(shown));
   }
   return {left, bottom - high, right - left, high};
+}
+
+ScreenBox take_column(ViewLayout& layout, float wide) {
+  if (layout.shown == Layout::review) return {};
+  const bool four = layout.shown == Layout::plan;
+  const float left = layout.view.x, right = four ? layout.cuts[0].right() : layout.view.right();
+  const float bottom = four ? layout.cuts[1].bottom() : layout.view.bottom();
+  wide = std::floor(std::min(wide, (right - left) / 2));
+  if (!(wide > 0)) return {};
+  if (four) {
+    const float first = std::floor((right - left - wide) / 2), second = right - left - wide - first;
+    layout.view.width = layout.cuts[1].width = first;
+    for (ScreenBox* const cut : {&layout.cuts[0], &layout.cuts[2]}) {
+      cut->x = left + first;
+      cut->width = second;
+    }
+  } else {
+    layout.view.width -= wide;
+    // One cut beside a column: the bone has the picture.
+    if (!layout.over[0].empty()) stack_over(layout, layout.over[0].width, 1);
+  }
+  return {right - wide, layout.view.y, wide, bottom - layout.view.y};
 }
 
 double automatic_scale(double reported_by_monitor, int width, int height) {

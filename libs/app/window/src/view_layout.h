@@ -48,12 +48,13 @@ inline constexpr double kPictureShare = 0.8;
 /// within limits; 0: the largest that leaves the picture its share, three where the window is 1200 of the design's
 /// pixels wide, else one.
 [[nodiscard]] ViewLayout lay_out(Layout wanted, int width, int height, float em_pixels, float cut_side = 0);
-/// The panel of all that can be set, over the picture.
-[[nodiscard]] ScreenBox panel_of(const ViewLayout& layout);
-
 /// A strip above the state, as high as asked for but never more than half the pictures' height, for something that is
 /// shown for a while: the pictures make room, all else stays. Empty in review.
 [[nodiscard]] ScreenBox take_strip(ViewLayout& layout, float high);
+
+/// A column at the right, so wide but at most half of the pictures' width: the pictures make room, state and strip
+/// stay. Empty in review.
+[[nodiscard]] ScreenBox take_column(ViewLayout& layout, float wide);
 
 /// Height of text at scale 1.
 inline constexpr double kTextPixels = 16;

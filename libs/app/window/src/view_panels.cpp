@@ -23,10 +23,6 @@ std::string capital(std::string text) {
   return text;
 }
 
-std::string with_key(const char* word, Command command) {
-  return std::string(word) + " (" + key_name(command) + ")";
-}
-
 // Name and key of a command.
 std::string words_of(const char* name, Command command) {
   const std::string key = key_name(command);
@@ -125,7 +121,11 @@ void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& f
     if (inside && wide <= room) {
       draw_chip(draw, {near.right() + 24 * u, box.y + 16 * u, wide, 32 * u}, reported, chip);
     } else {
-      const ScreenBox at{view.x + 16 * u, view.bottom() - 48 * u, std::min(wide, view.width - 32 * u), 32 * u};
+      // Beside the scale bar's box, or in a small picture above it; in two lines where one is too short.
+      const bool beside = view.width > 720 * u;
+      const float most = view.width - (beside ? 352 : 32) * u, high = (wide > most ? 48 : 32) * u;
+      const float foot = view.bottom() - (beside ? 8 : 88) * u;
+      const ScreenBox at{view.x + 16 * u, foot - high, std::min(wide, most), high};
       if (at.width > 64 * u) draw_chip(ImGui::GetBackgroundDrawList(), at, reported, chip);
     }
   }
@@ -147,7 +147,7 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& 
   };
   const bool drill = hand.tool == 0 && !hand.saw;
   const char* const no_second = tr("no second hand: start with --dust");
-  const Row rows[] = {{"menu-2", tr("Menu and settings"), Command::panel_keys, false, menu},
+  const Row rows[] = {{"menu-2", tr("Menu and settings"), Command::settings, false, menu},
                       {"drill", tr("Drill"), Command::put_away, drill, hand.latched, true, true},
                       {"saw", tr("Saw"), Command::saw, hand.tool == 1 || hand.saw},
                       {"plate", tr("Plate"), Command::plates, hand.tool == 3},
@@ -344,9 +344,13 @@ void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::funct
 }
 
 void draw_apart(Pressed& pressed) {
-  ImGui::Separator();
-  if (ImGui::Button(with_key(tr("Save and continue"), Command::save).c_str(), {-1, 0})) pressed.press(Command::save);
-  if (ImGui::Button(with_key(tr("Reset bone ..."), Command::reset).c_str(), {-1, 0})) pressed.press(Command::reset);
+  const float wide = ImGui::GetContentRegionAvail().x;
+  if (kit_button(tr("Save and continue"), ButtonLook::usual, wide)) pressed.press(Command::save);
+  if (kit_button(tr("Reset bone ..."), ButtonLook::usual, wide)) pressed.press(Command::reset);
+}
+
+float apart_width() {
+  return std::max(button_width(tr("Save and continue")), button_width(tr("Reset bone ...")));
 }
 
 bool draw_next_step(const ScreenBox& view, const FirstSteps& steps) {

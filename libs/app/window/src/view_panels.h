@@ -55,6 +55,7 @@ float draw_tool_card(const ScreenBox& view, const char* name, const std::string&
 void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const LocalText&)>& say);
 /// Into the current window: what ends or begins a session.
 void draw_apart(Pressed& pressed);
+[[nodiscard]] float apart_width();
 /// One step at a time at the foot of the view. False: the person has closed it.
 [[nodiscard]] bool draw_next_step(const ScreenBox& view, const FirstSteps& steps);
 void draw_wheel(const ToolWheel& wheel);

@@ -20,6 +20,8 @@ void write_window_state(const WindowState& s, const std::filesystem::path& file)
   static constexpr const char* kHands[] = {"drill", "saw", "piece", "plate"};
   nlohmann::ordered_json places = nlohmann::ordered_json::array();
   for (const Vec3 p : s.places_mm) places.push_back(list(p));
+  nlohmann::ordered_json rows = nlohmann::ordered_json::object();
+  for (const auto& row : s.main_view.rows) rows[row.name] = {row.x, row.y};
   const Vec3 force = from_floats(s.tick.force_n);
   const nlohmann::ordered_json j{{"pictures", s.pictures},
                                  {"drawn", s.drawn},
@@ -49,6 +51,8 @@ void write_window_state(const WindowState& s, const std::filesystem::path& file)
                                  {"tutor",
                                   {{"title", s.tutor.title},
                                    {"invitation", s.tutor.invitation},
+                                   {"steps", s.tutor.steps},
+                                   {"harm", s.tutor.harm},
                                    {"links", s.tutor.links},
                                    {"heard", s.tutor.heard},
                                    {"guiding", s.tutor.guiding},
@@ -91,7 +95,8 @@ void write_window_state(const WindowState& s, const std::filesystem::path& file)
                                  {"full_screen", s.main_view.full_screen},
                                  {"asking", s.main_view.asking},
                                  {"wheel", s.main_view.wheel},
-                                 {"panel_keys", s.main_view.panel_keys},
+                                 {"settings", s.main_view.settings},
+                                 {"rows", rows},
                                  {"before", s.main_view.before},
                                  {"writing", s.main_view.writing},
                                  {"ended", s.main_view.ended},

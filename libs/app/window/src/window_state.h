@@ -17,8 +17,8 @@ namespace osteo::inline app {
 struct ViewState {
   std::string layout;
   int em_pixels = 0;
-  bool full_screen = false, asking = false, wheel = false, panel_keys = false, before = false, writing = false,
-       ended = false, ruler = false;
+  bool full_screen = false, asking = false, wheel = false, before = false, writing = false, ended = false,
+       ruler = false;
   double ruler_mm = 0;
   std::size_t notes = 0;
   std::string hint;  // that is shown
@@ -28,8 +28,14 @@ struct ViewState {
   double review_s = 0, review_mm3 = 0;  // the time that is shown, and the bone there is then
   std::vector<std::string> steps_done;  // of the first five minutes, by name
   std::string next_step;
-  bool typing = false;          // in the list of commands
-  std::string search, found;    // what, and the name of the row that is chosen
+  bool typing = false;        // in the list of commands
+  std::string search, found;  // what, and the name of the row that is chosen
+  std::string settings;       // the page that is open
+  struct Place {
+    std::string name;
+    float x = 0, y = 0;
+  };
+  std::vector<Place> rows;      // of that page: where they are
   std::string focus;            // the part of the window that has the keys
   std::array<float, 4> view{};  // x, y, width, height
 };
@@ -53,6 +59,7 @@ struct MonitorState {
 /// Of who leads and who takes part; title empty: nobody.
 struct TutorState {
   std::string title, invitation;
+  std::vector<std::string> steps, harm;  // of steps those that are done
   std::size_t links = 0, heard = 0;
   bool guiding = false;
   double pull = 0, apart_mm = -1;

@@ -45,10 +45,33 @@ void WorkDone::action(const SceneAction& action) {
 }
 
 void WorkDone::tick(const TickRecord& record, std::span<const VoxelChange>) {
+  int nearness = 0;
+  if ((record.flags & kStructureInjured) != 0) {
+    nearness = 3;
+  } else if ((record.flags & kStructureTouched) != 0) {
+    nearness = 2;
+  } else if (record.structure != 0 && static_cast<double>(record.clearance_mm) < StateFacts::kNearMm) {
+    nearness = 1;
+  }
+  Was& was = was_[std::min<std::size_t>(record.hand, was_.size() - 1)];
+  const int before = was.structure == record.structure ? was.nearness : 0;
+  if (nearness > before) {  // what it was already is one time with it
+    const std::lock_guard lock(mutex_);
+    Harm& harm = harm_[static_cast<std::uint8_t>(record.structure)];
+    if (before < 1) ++harm.near;
+    if (before < 2 && nearness >= 2) ++harm.contacts;
+    if (nearness == 3) ++harm.violations;
+  }
+  was = {record.structure, nearness};
   if (record.speed_rpm <= 0 && record.removed_mm3 <= 0) return;
   ByTool& tool = by_tool_[record.device.tool];
   if (record.speed_rpm > 0) ++tool.ticks_turning;
   tool.removed_mm3 += static_cast<double>(record.removed_mm3);
+}
+
+std::map<std::uint8_t, WorkDone::Harm> WorkDone::harm() const {
+  const std::lock_guard lock(mutex_);
+  return harm_;
 }
 
 void SessionFacts::add_cut(const std::string& structure, const std::string& by, double mm3) {

@@ -23,7 +23,7 @@ struct PersonValues {
   bool hints = false;
   std::string hints_off;
   bool dust = false, heat = false, monitor = false, mirror_procedure = false;
-  std::string procedure, position = "supine", network;
+  std::string procedure, position = "supine", network, lessons_at = "127.0.0.1";
   double volume = 0.7;
   double motion_one_to = 1, wrist_rest = 0.2, burr_share = 1;
   bool left_handed = false, mirror_mouse = false;
@@ -53,6 +53,10 @@ struct PersonValues {
     visit({"heat", "how warm drilling makes bone, from the start page"}, p.heat);
     visit({"monitor", "the nerve monitor, from the start page"}, p.monitor);
     visit({"position", "how the patient lies: supine, prone, sitting, left_side or right_side"}, p.position);
+    visit({"lessons_at",
+           "address where lessons begun on the start page can be joined: 127.0.0.1 (from this machine "
+           "alone), 0.0.0.0 (from all that reach it) or one of its own"},
+          p.lessons_at);
     visit({"hints_off", "those that are never said, by name, with commas between them"}, p.hints_off);
   }
   friend bool operator==(const PersonValues&, const PersonValues&) = default;

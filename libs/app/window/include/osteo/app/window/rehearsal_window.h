@@ -11,6 +11,7 @@
 #include "osteo/app/window/person_settings.h"
 #include "osteo/app/window/session_review.h"
 #include "osteo/app/window/sound_out.h"
+#include "osteo/app/window/start_page.h"
 #include "osteo/app/window/tutor_now.h"
 #include "osteo/app/window/window_shell.h"
 #include "osteo/core/base/error.h"
@@ -21,6 +22,7 @@
 #include "osteo/imaging/dicom/verdict.h"
 #include "osteo/session/recording/planned_cuts.h"
 #include "osteo/session/scene/rehearsal.h"
+#include "osteo/simulation/camera/microscope.h"
 #include "osteo/simulation/camera/stereo.h"
 
 namespace osteo::inline simulation {
@@ -52,8 +54,10 @@ struct WindowOptions {
   bool review_only = false;  ///< a session that is over is shown: the page at the end, and nothing that begins another
   bool camera_trial =
       false;  ///< views to bring the camera to are shown and timed; camera-trial.csv in the session's folder
-  std::string case_hash;  ///< of the manifest: names the case in captions, without its folder
-  bool end_page = true;   ///< what was done is shown when the person ends the session; false: the window closes
+  std::string case_hash;                   ///< of the manifest: names the case in captions, without its folder
+  std::vector<StartProcedure> procedures;  ///< to choose from in the settings
+  std::optional<ScopeView> view;           ///< where one looks from at first; none: from the left
+  bool end_page = true;  ///< what was done is shown when the person ends the session; false: the window closes
   std::filesystem::path
       state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };
@@ -130,10 +134,15 @@ struct WindowActions {
   /// Of the session that was saved last: what there is to say of it. May take seconds, and is called in another thread,
   /// in which no session is begun meanwhile. Empty: nothing is shown.
   std::function<SessionReview(const Context&)> review = {};
+  /// From now on the rehearsal has a nerve monitor, or none. False: it has to stay as it is. Empty: it always has.
+  std::function<bool(bool)> turn_monitor = {};
   /// The nerve monitor of the rehearsal that runs; null: it has none. Empty: there never is one.
   std::function<MonitorController*()> monitor = {};
   /// Who leads the hand, and who takes part from elsewhere. Empty: nobody ever does.
   std::function<TutorNow()> tutor = {};
+  /// Each frame of a session with a tutor: how far the procedure is. `injured`: structures that a rotating burr or a saw
+  /// has reached. Empty: it is not judged here.
+  std::function<std::vector<TutorNow::Step>(const std::vector<std::string>& injured)> steps = {};
   /// The hand is to be led, or let go; softly. Empty: nobody leads it.
   std::function<void(bool)> lead = {};
 };
@@ -142,6 +151,8 @@ struct WindowActions {
 struct WindowEnd {
   bool another = false;                               ///< the person wants another case
   std::optional<std::filesystem::path> dropped = {};  ///< which, when it was dropped onto the window
+  bool changed = false;  ///< that is the session itself, to continue with what was chosen in the settings meanwhile
+  std::optional<ScopeView> view = {};  ///< and from where one looked then
 };
 
 /// Begins a session in the window and runs until the person leaves it; the session that runs then is the caller's to

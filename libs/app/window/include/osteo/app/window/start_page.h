@@ -14,6 +14,7 @@ namespace osteo::inline app {
 struct StartChoice {
   std::filesystem::path case_folder;
   std::filesystem::path resume;  ///< a session to go on from; empty: from the whole bone
+  bool teach = false;            ///< others may join it
 };
 
 /// A procedure to choose: by its name for load_procedure(), and as people call it.

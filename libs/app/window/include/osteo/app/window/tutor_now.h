@@ -1,6 +1,7 @@
 // What the window shows of who leads the hand, and of who takes part from elsewhere: plain values, asked for with each
 // picture.
 #pragma once
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,15 @@ struct TutorNow {
     double behind_s = 0;   ///< of the session's ticks
     bool differs = false;  ///< its bone is another
   };
-  std::string title;  ///< empty: nobody teaches, and nothing is shown
+  /// Of the procedure, with its items that pass now; all of them: it is done. None of its own: it cannot be judged.
+  struct Step {
+    std::string name;
+    std::size_t items = 0, passed = 0;
+  };
+  std::string title;        ///< empty: nobody teaches, and nothing is shown
+  bool teaches = false;     ///< who sits here teaches or watches: people, steps and harm have a column of their own
+  std::string procedure;    ///< its name; empty: none
+  std::vector<Step> steps;  ///< of it
   std::string
       invitation;       ///< what others need to join: address and code; shown, and written nowhere. Empty: nobody can
   std::string trouble;  ///< for people; empty: all well

@@ -60,6 +60,7 @@ class WindowShell {
   [[nodiscard]] int em_pixels() const { return em_; }
   [[nodiscard]] double by_hand() const { return by_hand_; }
   void change_scale(int steps);  ///< of 10 %; 0: as the monitor has it
+  void set_scale(double by_hand) { by_hand_ = by_hand; }
   [[nodiscard]] bool full_screen() const { return full_screen_; }
   void toggle_full_screen();
   /// The close button was pressed, or the system asks for it.
