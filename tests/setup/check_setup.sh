@@ -120,10 +120,21 @@ builds() { # PROGRAM COMMAND...
   ./osteo "$@" 2>"$work/said" || { echo "./osteo $* fails:"; cat "$work/said"; exit 1; }
   [ "$(cat "$OSTEO_ASKED")" = "osteo${program:+ $program}" ] || { echo "./osteo $* builds '$(cat "$OSTEO_ASKED")', not '$program'"; exit 1; }
 }
+# Which command starts which program, by the commands' own sources, which are called as they are.
+declare -A starts=()
+for source in $(grep -lE 'window_program\("osteo-' "$1"/apps/osteo/src/*.cpp); do
+  command=$(basename "$source" .cpp)
+  command=${command%_force} command=${command//_/-}
+  [ -e "$1/docs/reference/command-$command.md" ] || { echo "$source is of no command"; exit 1; }
+  starts[$command]=$(grep -oE 'window_program\("osteo-[a-z]+' "$source" | sed 's/.*"//')
+done
+[ "${#starts[@]}" -ge 5 ] || { echo "programs are known of ${!starts[*]} only"; exit 1; }
+for command in "${!starts[@]}"; do builds "${starts[$command]}" "$command" SUBJECT; done
 builds osteo-edit edit CASE
 builds osteo-rehearse rehearse CASE
 builds osteo-rehearse playback SESSION --mode guide
-builds osteo-console console 18944
+builds osteo-console nerve-console 18944
+builds osteo-console console 18944 # its name in version 0.1
 builds osteo-experiment experiment force-skill study
 builds "" edit CASE --apply edits.json
 builds "" rehearse CASE --headless -o SESSION
@@ -134,7 +145,7 @@ while read -r command rest; do
   program=
   case " $rest " in
     *" --headless "* | *" --apply "* | *" --simulated "*) ;;
-    *) case $command in edit | console) program=osteo-$command ;; rehearse | playback) program=osteo-rehearse ;; esac ;;
+    *) program=${starts[$command]:-} ;;
   esac
   [ "$command" != experiment ] || case $rest in force-skill*) program=osteo-experiment ;; *) continue ;; esac
   [ -z "$program" ] || builds "$program" $command $rest

@@ -21,8 +21,9 @@ using test::Series;
 
 using Slices = std::vector<std::vector<std::int16_t>>;
 
-constexpr std::array kJudged{code::slice_blank,    code::slice_part_missing, code::slice_values_step,
-                             code::slice_mirrored, code::slice_order,        code::concatenation_incomplete};
+constexpr std::array kJudged{
+    code::slice_blank, code::slice_part_missing, code::slice_values_step, code::slice_mirrored,
+    code::slice_order, code::slice_foreign,      code::slice_repeated,    code::concatenation_incomplete};
 
 std::vector<std::string> judged(const Verdict& v) {
   std::vector<std::string> found;
@@ -128,6 +129,7 @@ std::vector<Fault> faults() {
     for (std::size_t i = 0; i < s.size(); ++i)
       if (static_cast<int>(i) % nx < nx / 2) s[i] = -1024;
   };
+  const auto sideways = [](auto& s) { std::rotate(s.begin(), s.begin() + 6, s.end()); };
   const auto swap = [](std::size_t a, std::size_t b) { return [=](Slices& s) { std::swap(s[a], s[b]); }; };
   return {{"one blank", code::slice_blank, each(kAt, kAt + 1, blank)},
           {"three blank", code::slice_blank, each(kAt, kAt + 3, blank)},
@@ -144,6 +146,16 @@ std::vector<Fault> faults() {
           {"neighbours exchanged", code::slice_order, swap(kAt, kAt + 1)},
           {"others exchanged", code::slice_order, swap(kAt, kAt + 8)},
           {"ends exchanged", code::slice_order, swap(0, last)},
+          {"ten in reverse order", code::slice_order,
+           [](Slices& s) { std::reverse(s.begin() + kAt - 8, s.begin() + kAt + 2); }},
+          {"of another place", code::slice_foreign, [](Slices& s) { s[kAt] = s[kAt - 15]; }},
+          {"two of another place", code::slice_foreign,
+           [](Slices& s) {
+             s[kAt] = s[kAt - 15];
+             s[kAt + 1] = s[kAt - 14];
+           }},
+          {"moved sideways", code::slice_foreign, each(kAt, kAt + 1, sideways)},
+          {"the same twice", code::slice_repeated, [](Slices& s) { s[kAt] = s[kAt - 1]; }},
           {"one mirrored", code::slice_mirrored, each(kAt, kAt + 1, [](auto& s) { turn_over(s, false); })},
           {"ten mirrored", code::slice_mirrored, each(kAt, kAt + 10, [](auto& s) { turn_over(s, false); })},
           {"the rest mirrored", code::slice_mirrored, each(kAt, last + 1, [](auto& s) { turn_over(s, false); })},

@@ -90,6 +90,27 @@ Measurements scored(const std::string& stream) {
   return m;
 }
 
+// The first row has no other to be compared with.
+TEST_F(InAFolder, TheStudysOwnProcedureBindsTheFirstRowToo) {
+  new_study(folder_, plan_of());
+  add_participant(folder_, "", "novice");
+  write_file(folder_ / "procedure.json", "{}");
+  std::vector<std::string> notes;
+  const auto add = [&](const std::string& procedure, const std::vector<std::string>& accepted) {
+    Measurements m = scored("one");
+    m.source.procedure = procedure;
+    return message_of([&] { add_session(folder_, "P01", "left", 1, m, accepted, notes); });
+  };
+  EXPECT_NE(add("none", {}).find("another procedure than the study's own"), std::string::npos);
+  EXPECT_NE(add("steps", {"program"}).find("another procedure than the study's own"), std::string::npos);
+  EXPECT_EQ(add("none", {"procedure"}), "no error");
+  remove(folder_, "P01", "left", 1);
+  const std::string own = hash_text("{}").substr(0, 16);
+  EXPECT_EQ(add(own + " mirrored", {}), "no error");
+  remove(folder_, "P01", "left", 1);
+  EXPECT_EQ(add(own, {}), "no error");
+}
+
 TEST_F(InAFolder, ARowKnowsItsSessionAndWhatDoesNotBelongIsRefusedOrAsked) {
   new_study(folder_, plan_of());
   for (int i = 0; i < 3; ++i) add_participant(folder_, "", "novice");

@@ -31,7 +31,8 @@ std::string blind_code(std::uint64_t seed) {
 }
 
 // Where a row differs from the others: what it may be called to be accepted, and in words.
-std::vector<std::pair<std::string, std::string>> differences(const Study& s, const Session& added) {
+std::vector<std::pair<std::string, std::string>> differences(const Study& s, const fs::path& folder,
+                                                             const Session& added) {
   std::vector<std::pair<std::string, std::string>> found;
   const auto differs = [&](const char* as, const std::string& words) {
     if (std::none_of(found.begin(), found.end(), [&](const auto& f) { return f.first == as; }))
@@ -40,6 +41,11 @@ std::vector<std::pair<std::string, std::string>> differences(const Study& s, con
   const auto base = [](const std::string& procedure) { return procedure.substr(0, procedure.find(' ')); };
   const Source& mine = added.source;
   if (mine.cut_short) differs("cut-short", "it was cut short, or a part of it is lost");
+  // The study's own procedure binds the first row too, which has no other to be compared with.
+  if (const fs::path own = folder / "procedure.json"; mine.known() && fs::exists(own)) {
+    if (base(mine.procedure) != hash_text(read_text(own)).substr(0, 16))
+      differs("procedure", "it was scored by another procedure than the study's own, '" + own.string() + "'");
+  }
   for (const Session& other : s.sessions) {
     const Source& o = other.source;
     if (!o.known() || !mine.known()) continue;
@@ -142,7 +148,7 @@ std::string add_session(const fs::path& folder, const std::string& participant, 
   Session added{"", participant, case_name, attempt, {}, measured.source};
   need_own_work(s, added);
   std::string asks, names;
-  for (const auto& [as, words] : differences(s, added)) {
+  for (const auto& [as, words] : differences(s, folder, added)) {
     if (as == "other-bone") added.source.other_bone = true;
     if (among(accepted, as)) continue;
     asks += (asks.empty() ? "" : "; ") + words;

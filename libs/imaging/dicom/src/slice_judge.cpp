@@ -56,9 +56,11 @@ class SliceJudge {
     if (sound_.size() < kMinSlices) return;
     steps_.resize(sound_.size() - 1);
     for (std::size_t s = 0; s + 1 < sound_.size(); ++s) steps_[s] = difference(figure(s), figure(s + 1));
-    judge_order();
+    judge_repeated();
+    if (!judge_exchanged()) judge_reversed();
     judge_sides();
     judge_values();
+    judge_foreign();
   }
 
  private:
@@ -241,6 +243,7 @@ class SliceJudge {
       if (explained(s)) continue;
       const bool by_air = exceeds(air[s], limit_air, 0.9), by_soft = exceeds(soft[s], limit_soft, 0.75);
       if (!by_air && !by_soft) continue;
+      explained_.push_back(s);
       const double hu = by_air && (!by_soft || std::abs(air[s].hu) > std::abs(soft[s].hu)) ? air[s].hu : soft[s].hu;
       names.push_back(name(s + 1));
       if (std::abs(hu) <= most) continue;
@@ -280,11 +283,58 @@ class SliceJudge {
                  "compare with the scanner's own pictures, or export the series again", names);
   }
 
-  // Two slices that fit better in each other's place.
-  void judge_order() {
+  // The same picture at two places beside each other: noise alone makes two of them differ. Where most are alike, as
+  // made ones may be, it says nothing.
+  void judge_repeated() {
+    if (upper_median(steps_) <= 0) return;
+    std::vector<std::string> names;
+    for (std::size_t s = 0; s + 1 < sound_.size(); ++s) {
+      const auto &a = figure(s).blocks(), &b = figure(s + 1).blocks();
+      const bool same = std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& p, const auto& q) {
+        return p.hu == q.hu && p.one_value == q.one_value;
+      });
+      if (!same || object_blocks(figure(s)) < kMinBlocks) continue;
+      names.push_back(name(s + 1));
+      explained_.push_back(s);
+    }
+    if (names.empty()) return;
+    verdict_.add(code::slice_repeated, Severity::warning,
+                 listed(names) + (names.size() == 1 ? " shows" : " show") +
+                     " the same picture as the slice before, to the last value: what lies there is not in the scan",
+                 "copy the files again from their source, or export the series again", names);
+  }
+
+  // Up to eight slices that fit neither the slice before nor the one after, which fit each other: of another place or
+  // another scan, turned by a quarter, moved sideways. Where a body changes fast, slices farther apart fit worse still.
+  void judge_foreign() {
+    constexpr std::size_t kMost = 8;
+    std::vector<std::string> names;
+    const std::size_t n = sound_.size();
+    for (std::size_t s = 1; s + 1 < n; ++s) {
+      if (explained(s - 1) || steps_[s - 1] <= kLeastGainHu) continue;
+      for (std::size_t end = s + 1; end < n && end - s <= kMost; ++end) {
+        const double before = steps_[s - 1], after = steps_[end - 1], worse = std::min(before, after);
+        if (explained(end - 1)) break;
+        if (worse <= kLeastGainHu) continue;
+        const double across = difference(figure(s - 1), figure(end));
+        if (!(across > 0) || worse < kSliceForeignRatio * across || worse - across < kLeastGainHu) continue;
+        for (std::size_t i = s; i < end; ++i) names.push_back(name(i));
+        s = end;
+        break;
+      }
+    }
+    if (names.empty()) return;
+    verdict_.add(code::slice_foreign, Severity::warning,
+                 listed(names) + (names.size() == 1 ? " fits" : " fit") +
+                     " neither the slice before nor the one after, which fit each other: another place of the body, "
+                     "or moved or turned in the picture",
+                 "compare with the scanner's own pictures, or export the series again", names);
+  }
+
+  // Slices that fit a neighbour badly, the worst first.
+  [[nodiscard]] std::vector<std::size_t> ill_fitting() const {
     const std::size_t n = sound_.size();
     const double usual = upper_median(steps_);
-    // Slices that fit their neighbours badly, the worst first.
     std::vector<std::pair<double, std::size_t>> odd;
     for (std::size_t s = 0; s < n; ++s) {
       double step = 0;
@@ -294,10 +344,50 @@ class SliceJudge {
     }
     std::sort(odd.rbegin(), odd.rend());
     if (odd.size() > 24) odd.resize(24);
+    std::vector<std::size_t> slices;
+    for (const auto& o : odd) slices.push_back(o.second);
+    return slices;
+  }
+
+  // Slices between two others that fit better in reverse order.
+  void judge_reversed() {
+    const std::size_t n = sound_.size();
+    const std::vector<std::size_t> odd = ill_fitting();
+    double best = kSliceOrderRatio;
+    std::size_t from = n, to = n;
+    for (const std::size_t i : odd) {
+      for (const std::size_t j : odd) {
+        if (i < 1 || j + 1 >= n || j < i + 2) continue;
+        const double as_stored = steps_[i - 1] + steps_[j];
+        const double first = difference(figure(i - 1), figure(j));
+        if (!(first > 0) || as_stored - first < kLeastGainHu || as_stored <= best * first) continue;
+        const double second = difference(figure(i), figure(j + 1));
+        const double reversed = first + second;
+        if (!(second > 0) || as_stored - reversed < kLeastGainHu || as_stored <= best * reversed) continue;
+        best = as_stored / reversed;
+        from = i;
+        to = j;
+      }
+    }
+    if (from == n) return;
+    std::vector<std::string> names;
+    for (std::size_t s = from; s <= to; ++s) names.push_back(name(s));
+    explained_.push_back(from - 1);
+    explained_.push_back(to);
+    verdict_.add(
+        code::slice_order, Severity::warning,
+        listed(names) + " fit the slices beside them better in reverse order: their positions seem to be reversed",
+        "compare with the scanner's own pictures, or export the series again", names);
+  }
+
+  // Two slices that fit better in each other's place.
+  bool judge_exchanged() {
+    const std::size_t n = sound_.size();
+    const std::vector<std::size_t> odd = ill_fitting();
     std::vector<std::pair<std::size_t, std::size_t>> pairs;
-    for (std::size_t a = 0; a < odd.size(); ++a)
-      for (std::size_t b = 0; b < odd.size(); ++b)
-        if (odd[a].second < odd[b].second) pairs.emplace_back(odd[a].second, odd[b].second);
+    for (const std::size_t a : odd)
+      for (const std::size_t b : odd)
+        if (a < b) pairs.emplace_back(a, b);
     for (std::size_t s = 0; s + 1 < n; ++s) pairs.emplace_back(s, s + 1);
     double best = kSliceOrderRatio;
     std::pair<std::size_t, std::size_t> at{n, n};
@@ -321,7 +411,7 @@ class SliceJudge {
       best = as_stored / exchanged;
       at = {i, j};
     }
-    if (at.first == n) return;
+    if (at.first == n) return false;
     for (const std::size_t s : {at.first, at.second}) {
       explained_.push_back(s);
       if (s > 0) explained_.push_back(s - 1);
@@ -331,6 +421,7 @@ class SliceJudge {
                      "' fit the slices beside them better in each other's place: their positions seem to be exchanged",
                  "compare with the scanner's own pictures, or export the series again",
                  {name(at.first), name(at.second)});
+    return true;
   }
 
   [[nodiscard]] bool explained(std::size_t s) const {

@@ -43,7 +43,7 @@ struct JudgedSlice {
 
 /// Compares each slice with its neighbours and adds what does not fit to the verdict, by name: slices without a
 /// picture, pictures of which a part is missing, steps in the values, slices in another order than their positions say,
-/// slices that are mirrored. Nothing for fewer than four slices or fewer than 48 pixels a side. Slices are in order
+/// slices that are mirrored, of another place, or there twice. Nothing for fewer than four slices or fewer than 48 pixels a side. Slices are in order
 /// along the normal, all figures of one size; `picture_mm2` is the area of one. O(slices * blocks).
 void judge_slices(Verdict& verdict, const std::vector<JudgedSlice>& slices, const std::vector<SliceFigure>& figures,
                   double picture_mm2);

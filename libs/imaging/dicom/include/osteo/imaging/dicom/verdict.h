@@ -40,6 +40,7 @@ inline constexpr std::string_view not_ct = "NOT_CT", not_a_volume = "NOT_A_VOLUM
 // Pixels of slices that do not fit those beside them.
 inline constexpr std::string_view slice_blank = "SLICE_BLANK", slice_part_missing = "SLICE_PART_MISSING",
                                   slice_values_step = "SLICE_VALUES_STEP", slice_mirrored = "SLICE_MIRRORED",
+                                  slice_foreign = "SLICE_FOREIGN", slice_repeated = "SLICE_REPEATED",
                                   slice_order = "SLICE_ORDER";
 // What a volume file leaves open.
 inline constexpr std::string_view axes_not_stated = "AXES_NOT_STATED", lengths_converted = "LENGTHS_CONVERTED",

@@ -14,10 +14,11 @@ inline constexpr double kMaxBoneCm2 = 80;  ///< of bone in each slice on average
 inline constexpr double kShiftedHu = 200;  ///< values shifted by as much are rejected
 inline constexpr double kSliceBlankEndMm2PerMm =
     1700;  ///< a body that ends between two slices: three times what a head's vault does
-inline constexpr double kSlicePartShare = 0.15;    ///< of the body in a slice that is of one value
-inline constexpr double kSliceStepHu = 30;         ///< of air or soft tissue from a slice to the next
-inline constexpr double kSliceMirrorRatio = 1.25;  ///< how much better a slice fits the next when turned over
-inline constexpr double kSliceOrderRatio = 1.2;    ///< how much better two slices fit in each other's place
+inline constexpr double kSlicePartShare = 0.15;     ///< of the body in a slice that is of one value
+inline constexpr double kSliceStepHu = 30;          ///< of air or soft tissue from a slice to the next
+inline constexpr double kSliceMirrorRatio = 1.25;   ///< how much better a slice fits the next when turned over
+inline constexpr double kSliceForeignRatio = 1.25;  ///< how much better the slices beside a foreign one fit each other
+inline constexpr double kSliceOrderRatio = 1.2;     ///< how much better two slices fit in each other's place
 /// Smaller in voxels below the second, or longer than the third, no scan of a patient is: fields of cone-beam scanners
 /// begin at 40 mm, their voxels at 0.075 mm, and tables of CT scanners end at 2 m.
 inline constexpr double kSpecimenMm = 40, kSpecimenVoxelMm = 0.074, kLongestMm = 2500;
