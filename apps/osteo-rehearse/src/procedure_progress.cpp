@@ -4,7 +4,7 @@
 #include <memory>
 #include <utility>
 
-#include "osteo/assessment/evidence/progress.h"
+#include "osteo/assessment/evidence/score.h"
 
 namespace osteo {
 namespace {

@@ -1,5 +1,6 @@
 // The primitives of the final product against bodies whose answer is known.
 #include "osteo/assessment/evidence/detail/product.h"
+#include "osteo/assessment/evidence/detail/progress.h"
 
 #include <gtest/gtest.h>
 
@@ -217,6 +218,28 @@ TEST(Product, ABubbleThatNobodyReachedIsNoCavity) {
   const Procedure p = procedure("");
   const test::Drilled c = drilled([](Vec3 q) { return length(q - Vec3{6, 6, 0}) - 2; });
   EXPECT_EQ(Product(c.before, c.after, structures(), p, c.removed).cavity_mm3(), 0);
+}
+
+// While it is drilled: each step's items as the score judges them at the end; before anything is gone, and after harm.
+TEST(Product, StepsAreAsFarAsTheirItems) {
+  const Procedure p =
+      procedure(R"({"name": "shown", "kind": "exposed", "structure": "ball", "towards": [0, 0, 1], "within_deg": 90,)"
+                R"( "cover_mm": 1.5}, {"name": "whole", "kind": "not_violated", "structure": "ball"},)"
+                R"( {"name": "spared", "kind": "not_violated", "structure": "tube"} ], "steps": [)"
+                R"( {"name": "find it", "items": ["shown"]}, {"name": "harm nothing", "items": ["whole", "spared"]})");
+  const auto steps = [&](const test::Drilled& c, const std::vector<std::string>& injured = {}) {
+    const auto all = step_progress(c.before, c.after, structures(), p, {0, 0, 1}, injured);
+    EXPECT_EQ(all.size(), 2U);
+    EXPECT_EQ(all[0].name, "find it");
+    EXPECT_EQ(all[0].items, 1U);
+    EXPECT_EQ(all[1].items, 2U);
+    return std::pair{all[0].passed, all[1].passed};
+  };
+  using Passed = std::pair<std::size_t, std::size_t>;
+  EXPECT_EQ(steps(drilled([](Vec3) { return 1e3; })), (Passed{0, 2})) << "nothing is gone yet";
+  EXPECT_EQ(steps(drilled(shaft(3.2, 6))), (Passed{1, 2}));
+  EXPECT_EQ(steps(drilled(shaft(2, 6))), (Passed{1, 1})) << "through the ball's cap";
+  EXPECT_EQ(steps(drilled(shaft(3.2, 6)), {"tube"}), (Passed{1, 1})) << "a burr has reached the tube";
 }
 
 TEST(Product, WhatTheCaseLacksIsNotJudged) {

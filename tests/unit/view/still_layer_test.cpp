@@ -1,5 +1,5 @@
 // What lies still is drawn once, and the picture is as if all had been drawn.
-#include "osteo/display/view/still_layer.h"
+#include "osteo/display/view/detail/still_layer.h"
 
 #include <gtest/gtest.h>
 #include <vtkActor.h>

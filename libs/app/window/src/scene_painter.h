@@ -9,7 +9,6 @@
 #include <vtkSmartPointer.h>
 
 #include "osteo/display/view/quality.h"
-#include "osteo/display/view/still_layer.h"
 
 class vtkGenericOpenGLRenderWindow;
 class vtkRenderer;

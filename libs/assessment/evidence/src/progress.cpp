@@ -1,4 +1,4 @@
-#include "osteo/assessment/evidence/progress.h"
+#include "osteo/assessment/evidence/detail/progress.h"
 
 #include <algorithm>
 

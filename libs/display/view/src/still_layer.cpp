@@ -1,4 +1,4 @@
-#include "osteo/display/view/still_layer.h"
+#include "osteo/display/view/detail/still_layer.h"
 
 // GLEW, through VTK, must come before anything that includes GL.
 #include <vtk_glew.h>

@@ -9,6 +9,7 @@
 #include "osteo/assessment/evidence/detail/planned_sawing.h"
 #include "osteo/assessment/evidence/detail/process.h"
 #include "osteo/assessment/evidence/detail/product.h"
+#include "osteo/assessment/evidence/detail/progress.h"
 #include "osteo/assessment/evidence/detail/reference.h"
 #include "osteo/assessment/evidence/detail/saw_cuts.h"
 #include "osteo/assessment/evidence/frames.h"
@@ -74,7 +75,7 @@ struct ScoreSource {
 };
 
 struct Score {
-  std::string procedure;           ///< its name; empty: none
+  std::string procedure;  ///< its name; empty: none
   ScoreSource source;
   std::vector<std::string> words;  ///< what limits it, each a sentence
   std::vector<Measured> values;

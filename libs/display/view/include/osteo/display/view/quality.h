@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "osteo/core/base/param.h"
+#include "osteo/display/view/detail/still_layer.h"
 
 namespace osteo::inline display {
 
