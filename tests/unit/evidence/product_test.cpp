@@ -224,7 +224,7 @@ TEST(Product, ABubbleThatNobodyReachedIsNoCavity) {
 TEST(Product, StepsAreAsFarAsTheirItems) {
   const Procedure p =
       procedure(R"({"name": "shown", "kind": "exposed", "structure": "ball", "towards": [0, 0, 1], "within_deg": 90,)"
-                R"( "cover_mm": 1.5}, {"name": "whole", "kind": "not_violated", "structure": "ball"},)"
+                R"( "cover_mm": 2.5}, {"name": "whole", "kind": "not_violated", "structure": "ball"},)"
                 R"( {"name": "spared", "kind": "not_violated", "structure": "tube"} ], "steps": [)"
                 R"( {"name": "find it", "items": ["shown"]}, {"name": "harm nothing", "items": ["whole", "spared"]})");
   const auto steps = [&](const test::Drilled& c, const std::vector<std::string>& injured = {}) {
