@@ -286,5 +286,37 @@ TEST(MetricTable, BandsWantASecondOfTheExperts) {
   }
 }
 
+// Experts press with 0.75 N. Harder next to the nerve, for 80 ms, is one moment; harder 3 mm from it is none.
+TEST(MetricTable, HarderThanExpertsNextToAStructureIsAMoment) {
+  const test::ScratchFolder scratch;
+  MetricSession::write(scratch / "s.oss", Second::none);
+  const Reference experts = reference();
+  const Score score = score_session(SessionReader(scratch / "s.oss"), test::metric_bone(), test::metric_nerve().get(),
+                                    &procedure(), &experts, {});
+  std::vector<Moment> harder;
+  for (const Moment& m : score.moments)
+    if (m.what == "pressed harder than experts do there") harder.push_back(m);
+  ASSERT_EQ(harder.size(), 1U);
+  EXPECT_NEAR(harder[0].t_s, 10, 0.02);
+  EXPECT_EQ(harder[0].structure, "nerve");
+  EXPECT_NEAR(harder[0].value, 3, 1e-6);
+  EXPECT_NEAR(harder[0].limit, 0.75, 1e-6);
+}
+
+// Where nothing is known of how fast experts went, nobody was faster; how hard they pressed is known all the same.
+TEST(MetricTable, ABandOfSpeedsWantsSpeeds) {
+  const test::ScratchFolder scratch;
+  MetricSession::write(scratch / "s.oss", Second::none);
+  Reference experts = reference();
+  for (NearMetric::Sample& s : experts.sessions.front().near[1]) s.speed_mm_s = NAN;
+  const Score score = score_session(SessionReader(scratch / "s.oss"), test::metric_bone(), test::metric_nerve().get(),
+                                    &procedure(), &experts, {});
+  ASSERT_NE(find(score, "force_above_band_share[nerve]"), nullptr);
+  EXPECT_TRUE(find(score, "force_above_band_share[nerve]")->value);
+  ASSERT_NE(find(score, "speed_above_band_share[nerve]"), nullptr);
+  EXPECT_FALSE(find(score, "speed_above_band_share[nerve]")->value);
+  EXPECT_EQ(find(score, "speed_above_band_share[nerve]")->word, "no drilling near it is long enough for a speed");
+}
+
 }  // namespace
 }  // namespace osteo

@@ -115,6 +115,55 @@ TEST(PlannedSawing, WhatWasNotSawnIsNotMade) {
   EXPECT_NE(sawn_planes(bar(), left, beside)[1].why, "");
 }
 
+// Within 5 mm and 20 degrees it is the planned cut, told however far off; beyond it is another.
+TEST(PlannedSawing, FiveMillimetresAndTwentyDegreesAreTheEnd) {
+  for (const auto& [mm, deg, made] :
+       {std::tuple(4.7, 0.0, true), {-4.7, 0.0, true}, {5.4, 0.0, false}, {0.0, 19.0, true}, {0.0, 21.5, false}}) {
+    const std::vector<PlannedCut> plan{planned("cut", {0, 0, 0}, {0, 0, 1})};
+    World left = bar(0.8);
+    left.act(SceneAction::saw(sawn_off(plan[0], mm, deg)));
+    const auto planes = sawn_planes(bar(0.8), left, plan);
+    EXPECT_EQ(planes[0].why.empty(), made) << mm << ' ' << deg << ' ' << planes[0].why;
+    if (!made) {
+      EXPECT_EQ(planes[0].why, "not made: nothing is sawn within 5 mm and 20 degrees of it");
+      continue;
+    }
+    EXPECT_NEAR(planes[0].off_mm, mm, 0.15) << deg;
+    EXPECT_NEAR(planes[0].angle_deg, deg, 0.5) << mm;
+    EXPECT_NEAR(length(planes[0].at_mm - Vec3{0, 0, mm}), 0, 0.3);
+    EXPECT_NEAR(length(planes[0].normal), 1, 1e-9);
+    EXPECT_NEAR(planes[0].normal.z, std::cos(deg * kDeg), 0.01);
+  }
+}
+
+// So deep from one side: less than 5 mm2 is a scratch and no cut; a shallow groove has no plane; a deep one has.
+TEST(PlannedSawing, ASlotHasToBeDeepEnoughForAPlane) {
+  const std::string shallow = "too little is sawn: no plane can be measured";
+  for (const auto& [kerf, deep, why] : {std::tuple<double, double, std::string>{1, 0.25, "not made"},
+                                        {2, 0.25, "not made"},
+                                        {1, 2, shallow},
+                                        {2, 1, shallow},
+                                        {1, 4.5, ""}}) {
+    const std::vector<PlannedCut> plan{planned("cut", {0, 0, 0}, {0, 0, 1}, kerf)};
+    const World left = test::solid_world(
+        [kerf = kerf, deep = deep](Vec3 p) {
+          return std::min(std::min({7 - std::abs(p.x), 5 - std::abs(p.y), 26 - std::abs(p.z)}),
+                          std::max({std::abs(p.z - 0.4) - kerf / 2, 5 - deep - p.y, p.x - 5}));
+        },
+        0.5, 64, {}, 0.2);
+    const auto planes = sawn_planes(bar(), left, plan);
+    if (why.empty()) {
+      ASSERT_EQ(planes[0].why, "");
+      EXPECT_NEAR(planes[0].off_mm, 0.4, 0.1);
+      EXPECT_LT(planes[0].angle_deg, 1.5);
+      EXPECT_NEAR(planes[0].at_mm.x, -1, 0.4);  // of -7 to 5 mm
+      EXPECT_NEAR(planes[0].at_mm.y, 5 - deep / 2, 0.4);
+    } else {
+      EXPECT_EQ(planes[0].why.find(why), 0U) << kerf << ' ' << deep << ": " << planes[0].why;
+    }
+  }
+}
+
 TEST(PlannedSawing, AHoleIsNoPlane) {
   World left = test::solid_world(
       [](Vec3 p) {

@@ -56,6 +56,40 @@ TEST(ProductLattice, LabelsAreThoseOfEachCellAskedByItself) {
   }
 }
 
+TEST(ProductLattice, BlocksHoldWhatTheyAreMadeOf) {
+  const CellBlock a{{1, 2, 3}, {5, 6, 7}}, b{{4, 0, 5}, {9, 4, 6}}, none, far{{7, 7, 7}, {8, 8, 8}};
+  const CellBlock around = block_around(a, b), common = common_block(a, b);
+  EXPECT_EQ(around.lo, (std::array<int, 3>{1, 0, 3}));
+  EXPECT_EQ(around.hi, (std::array<int, 3>{9, 6, 7}));
+  EXPECT_EQ(common.lo, (std::array<int, 3>{4, 2, 5}));
+  EXPECT_EQ(common.hi, (std::array<int, 3>{5, 4, 6}));
+  EXPECT_FALSE(common.empty());
+  EXPECT_TRUE(none.empty());
+  EXPECT_TRUE(common_block(a, far).empty());
+  for (const CellBlock& c : {block_around(a, none), block_around(none, a)}) {
+    EXPECT_EQ(c.lo, a.lo);
+    EXPECT_EQ(c.hi, a.hi);
+  }
+  int cells = 0;
+  each_cell(common, [&](int i, int j, int k) {
+    EXPECT_EQ(i, 4);
+    EXPECT_EQ(j, 2 + cells);
+    EXPECT_EQ(k, 5);
+    ++cells;
+  });
+  EXPECT_EQ(cells, 2);
+  // Of a mask, in whichever words of a row its first and last cells lie.
+  EXPECT_TRUE(block_of(BitMask({200, 5, 4})).empty());
+  for (const auto& [first, last] : {std::pair(0, 0), {63, 63}, {64, 64}, {3, 130}, {70, 199}}) {
+    BitMask mask({200, 5, 4});
+    mask.set(2 * 5 + 1, first, first + 1, true);
+    mask.set(3 * 5 + 4, last, last + 1, true);
+    const CellBlock of = block_of(mask);
+    EXPECT_EQ(of.lo, (std::array<int, 3>{first, 1, 2}));
+    EXPECT_EQ(of.hi, (std::array<int, 3>{last + 1, 5, 4}));
+  }
+}
+
 TEST(ProductLattice, DistancesInAPartAreThoseOfAll) {
   std::mt19937 random(4);
   for (const double h : {0.5, 0.4, 0.31}) {

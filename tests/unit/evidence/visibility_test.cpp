@@ -132,6 +132,70 @@ TEST_F(Drilled, WhatLiesUnderARoofIsHidden) {
   EXPECT_DOUBLE_EQ(value(values, "hidden_mm3"), 0.125 * static_cast<double>(all - open));
 }
 
+// Unseen and next to a structure at risk is a moment, one a second of each; what is 2 mm off and more is none.
+TEST_F(Drilled, UnseenNextToAStructureIsAMomentASecond) {
+  const StructureMap map = test::structure_map(
+      [](Vec3 p) -> std::uint8_t {
+        if (p.x > -8 && p.x < -4 && p.z > -4 && p.z < -2 && std::abs(p.y) < 9) return p.y < 3 ? 1 : 2;
+        return 0;
+      },
+      {{1, "nerve", {}}, {2, "vein", {}}, {3, "nowhere", {}}}, 0.5, 24);
+  const CameraPose above{0, {0.3, 0.2, 200}, {}};
+  VisibilityMetric metric({1000, &map, nullptr});
+  const std::size_t last = 8;
+  const std::pair<Vec3, std::uint64_t> taken[last + 1] = {{{6, 0, -0.2}, 50},      // seen
+                                                          {{-10.5, 0, -0.2}, 60},  // unseen, but far from both
+                                                          {{-6, -8, -1.2}, 100},  {{-6, -6, -1.2}, 1099},
+                                                          {{-6, -4, -1.2}, 1100}, {{-6, -2, -1.2}, 1600},
+                                                          {{-6, 7, -1.2}, 1700},  // of the other
+                                                          {{-6, 0, -1.2}, 2101},  {{-6, 5, -1.2}, 2699}};
+  for (const auto& [at, tick] : taken) take(metric, at, tick, &above);
+  double seen = 0, hidden = 0, near[3] = {};
+  for (const auto& [name, v] : metric.voxels()) {
+    (v.seen == VisibilityMetric::Seen::seen ? seen : hidden) += 0.125;
+    if (v.seen == VisibilityMetric::Seen::seen) continue;
+    // Faces are planes but for the ends.
+    const StructureMap::Answer a = map.at_risk(v.own_mm);
+    if (a.distance_mm <= 2 && a.structure > 0) near[a.structure - 1] += 0.125;
+  }
+  EXPECT_GT(near[0], 1);
+  EXPECT_GT(near[1], 1);
+  EXPECT_LT(near[0] + near[1], hidden);
+  std::vector<Measured> values;
+  std::vector<Moment> moments;
+  metric.finish(world_, values, moments);
+  EXPECT_DOUBLE_EQ(value(values, "seen_share"), seen / (seen + hidden));
+  EXPECT_DOUBLE_EQ(value(values, "hidden_mm3"), hidden);
+  EXPECT_EQ(value(values, "sight_unknown_mm3"), -2) << "all of it is known";
+  EXPECT_DOUBLE_EQ(value(values, "hidden_near_mm3[nerve]"), near[0]);
+  EXPECT_DOUBLE_EQ(value(values, "hidden_near_mm3[vein]"), near[1]);
+  std::vector<std::pair<std::string, double>> told,
+      wanted{{"nerve", 0.1}, {"nerve", 1.1}, {"vein", 1.7}, {"nerve", 2.101}};
+  for (const Moment& m : moments) {
+    EXPECT_EQ(m.what, "removed unseen");
+    EXPECT_LE(m.value, 2);
+    EXPECT_EQ(m.limit, 2);
+    told.emplace_back(m.structure, m.t_s);
+  }
+  EXPECT_EQ(told, wanted);
+}
+
+// Before the first note of a camera it is not known what was seen; the shares are of what is.
+TEST_F(Drilled, WhatNoCameraWasThereForIsUnknown) {
+  const CameraPose above{0, {0.3, 0.2, 200}, {}};
+  VisibilityMetric metric({1000, nullptr, nullptr});
+  take(metric, {6, 0, -0.2}, 10, nullptr);
+  const std::size_t unknown = metric.voxels().size();
+  take(metric, {6, 5, -0.2}, 20, &above);
+  std::vector<Measured> values;
+  std::vector<Moment> moments;
+  metric.finish(world_, values, moments);
+  EXPECT_EQ(value(values, "seen_share"), 1);
+  EXPECT_EQ(value(values, "hidden_mm3"), 0);
+  EXPECT_DOUBLE_EQ(value(values, "sight_unknown_mm3"), 0.125 * static_cast<double>(unknown));
+  EXPECT_TRUE(moments.empty());
+}
+
 // What the burr touches does not hide what it takes; what lies a voxel farther does.
 TEST_F(Drilled, BoneInTouchWithTheBurrDoesNotHide) {
   const CameraPose aside{0, {200, 0.2, -2.9}, {}};

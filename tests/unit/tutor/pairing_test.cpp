@@ -7,6 +7,7 @@
 #include <cstring>
 #include <new>
 
+#include "handshake.h"
 #include "osteo/network/tutor/live.h"
 #include "sim_network.h"
 
@@ -327,10 +328,227 @@ TEST(Pairing, AnotherProtocolIsRefused) {
     const std::int64_t now = i * 100'000;
     Bytes ask = *guest.poll(now);
     ask[5] ^= 1;
+    EXPECT_EQ(guest.answered(), i > 0);
     guest.receive(*host.receive({}, ask, now, seats), now);
+    EXPECT_TRUE(guest.answered());
   }
   EXPECT_EQ(guest.state(), PairingGuest::State::refused);
   EXPECT_NE(guest.why().find("another version"), std::string::npos);
+  // A host of another version says so in its own, whose checksum is not known.
+  PairingGuest older(kCode, JoinRole::watcher);
+  Bytes ask = *older.poll(0);
+  ask[5] ^= 1;
+  Bytes refused = *host.receive({}, ask, 0, seats);
+  refused[5] = kTutorProtocol + 1;
+  refused.back() ^= 1;
+  EXPECT_FALSE(older.answered());
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(older.state(), PairingGuest::State::asking) << i;
+    older.receive(refused, i);
+    EXPECT_TRUE(older.answered());
+  }
+  EXPECT_EQ(older.state(), PairingGuest::State::refused);
+  EXPECT_NE(older.why().find("another version"), std::string::npos);
+}
+
+// A host and guests that know each other's times to the microsecond.
+struct Room {
+  struct Seats final : PairingSeats {
+    Answer seat(const UdpPeer&, JoinRole role, std::int64_t, std::int64_t) override {
+      ++asked;
+      last = role;
+      return answer;
+    }
+    std::uint32_t take(const UdpPeer&, JoinRole, const PairKeys&, std::int64_t) override { return 31; }
+    Answer answer = Answer::free;
+    JoinRole last{};
+    int asked = 0;
+  } seats;
+  PairingHost host{kCode};
+  std::optional<Bytes> ask(const Bytes& said, std::int64_t now, std::uint16_t port = 5) {
+    return host.receive({{}, 0, port}, said, now, seats);
+  }
+};
+
+// Each packet is repeated every 100 ms until it is answered; a proof that is not answered for 2 s is given up.
+TEST(Pairing, AGuestRepeatsAndGivesUpWhenItShould) {
+  Room room;
+  PairingGuest guest(kCode, JoinRole::trainee);
+  EXPECT_FALSE(guest.answered());
+  std::int64_t now = 5'000'000;
+  const auto asked = guest.poll(now);
+  ASSERT_TRUE(asked);
+  EXPECT_FALSE(guest.poll(now + 99'999));
+  EXPECT_EQ(guest.poll(now + 100'000), asked) << "the same again, with the same nonce";
+  now += 110'000;
+  guest.receive(*room.ask(*asked, now), now);
+  EXPECT_TRUE(guest.answered());
+  ASSERT_EQ(guest.state(), PairingGuest::State::proving);
+  const auto proof = guest.poll(now);
+  ASSERT_TRUE(proof);
+  EXPECT_FALSE(guest.poll(now + 99'999));
+  // Told to wait, it does: from then on two seconds.
+  room.seats.answer = PairingSeats::Answer::wait;
+  now += 1'500'000;
+  const auto wait = room.ask(*proof, now);
+  ASSERT_TRUE(wait);
+  EXPECT_LE(wait->size(), proof->size());
+  guest.receive(*wait, now);
+  EXPECT_EQ(guest.poll(now + 2'000'000), proof);
+  EXPECT_EQ(guest.state(), PairingGuest::State::proving);
+  ASSERT_TRUE(guest.poll(now + 2'000'001));
+  EXPECT_EQ(guest.state(), PairingGuest::State::asking);
+  EXPECT_EQ(guest.take_keys().to_host, PairKeys{}.to_host) << "those of the attempt are gone with it";
+  EXPECT_EQ(room.seats.last, JoinRole::trainee);
+  EXPECT_EQ(room.seats.asked, 1);
+  EXPECT_EQ(room.host.tries_left(), PairingHost::kTries);
+}
+
+TEST(Pairing, KeysAreGivenOnce) {
+  Room room;
+  PairingGuest guest(kCode, JoinRole::watcher);
+  const Bytes asked = *guest.poll(0);
+  guest.receive(*room.ask(asked, 0), 0);
+  guest.receive(*room.ask(*guest.poll(0), 0), 0);
+  ASSERT_EQ(guest.state(), PairingGuest::State::joined);
+  EXPECT_FALSE(room.ask(asked, 0)) << "a question that its own proof has overtaken";
+  EXPECT_EQ(guest.connection(), 31U);
+  EXPECT_EQ(room.seats.last, JoinRole::watcher);
+  EXPECT_FALSE(guest.poll(10'000'000)) << "who has joined asks no more";
+  const PairKeys none, keys = guest.take_keys(), again = guest.take_keys();
+  EXPECT_NE(keys.to_host, none.to_host);
+  EXPECT_NE(keys.to_host, keys.to_guest);
+  EXPECT_EQ(again.to_host, none.to_host);
+  EXPECT_EQ(again.to_guest, none.to_guest);
+  EXPECT_EQ(again.confirm, none.confirm);
+}
+
+// An outcome is kept for ten seconds after the attempt's last packet; then the proof belongs to nothing.
+TEST(Pairing, AnOutcomeIsKeptForTenSeconds) {
+  for (const std::int64_t silent : {10'000'000, 10'000'001}) {
+    Room room;
+    room.seats.answer = PairingSeats::Answer::taken;
+    PairingGuest guest(kCode, JoinRole::watcher);
+    guest.receive(*room.ask(*guest.poll(0), 0), 0);
+    const Bytes proof = *guest.poll(0);
+    const auto first = room.ask(proof, 0);
+    ASSERT_TRUE(first);
+    EXPECT_EQ(room.ask(proof, 1000), first);
+    const auto later = room.ask(proof, 1000 + silent);
+    ASSERT_TRUE(later);
+    EXPECT_EQ(later == first, silent == 10'000'000);
+    EXPECT_EQ(room.seats.asked, 1);
+    guest.receive(*later, silent);
+    EXPECT_EQ(guest.state(), silent == 10'000'000 ? PairingGuest::State::refused : PairingGuest::State::asking);
+    if (silent != 10'000'000) continue;
+    EXPECT_EQ(guest.why(), "someone else is the trainee, or nobody else can join");
+    EXPECT_FALSE(guest.poll(20'000'000));
+    EXPECT_EQ(guest.take_keys().to_host, PairKeys{}.to_host);
+  }
+}
+
+// Three wrong codes close the door, also for who has asked before and proves behind them, and for who asks once more.
+TEST(Pairing, ThreeWrongCodesCloseTheDoorForWhoIsOnTheWay) {
+  Room room;
+  PairingGuest right(kCode, JoinRole::watcher);
+  const Bytes asked = *right.poll(0);
+  right.receive(*room.ask(asked, 0), 0);
+  const Bytes proof = *right.poll(0);
+  for (int i = 0; i < PairingHost::kTries; ++i) {
+    EXPECT_EQ(room.host.tries_left(), PairingHost::kTries - i);
+    PairingGuest wrong("AAAAAAAA", JoinRole::watcher);
+    wrong.receive(*room.ask(*wrong.poll(0), 0, 6), 0);
+    const Bytes guess = *wrong.poll(0);
+    wrong.receive(*room.ask(guess, 0, 6), 0);
+    EXPECT_EQ(wrong.why(), "the code is another");
+    EXPECT_TRUE(room.ask(guess, 0, 6)) << "said again, it is judged once";
+  }
+  EXPECT_EQ(room.host.tries_left(), 0);
+  const auto refused = room.ask(proof, 0);
+  ASSERT_TRUE(refused);
+  EXPECT_FALSE(room.ask(asked, 0));
+  EXPECT_EQ(room.ask(proof, 0), refused);
+  right.receive(*refused, 0);
+  EXPECT_EQ(right.state(), PairingGuest::State::refused);
+  EXPECT_EQ(right.why().find("there were too many wrong codes"), 0U);
+  PairingGuest late(kCode, JoinRole::watcher);
+  late.receive(*room.ask(*late.poll(0), 0, 7), 0);
+  EXPECT_EQ(late.why(), right.why());
+  EXPECT_EQ(room.seats.asked, 0);
+}
+
+// Twenty who ask are answered at once, and one more for each twentieth of a second; those who ask again are no new
+// ones.
+TEST(Pairing, TwentyASecondAreAnswered) {
+  Room room;
+  std::vector<Bytes> asks;
+  for (int i = 0; i < 30; ++i) asks.push_back(*PairingGuest(kCode, JoinRole::watcher).poll(0));
+  const auto answered = [&](std::size_t i, std::int64_t now) {
+    return room.ask(asks[i], now, static_cast<std::uint16_t>(i)).has_value();
+  };
+  for (std::size_t i = 0; i < 30; ++i) EXPECT_EQ(answered(i, 1'000'000), i < 20) << i;
+  EXPECT_EQ(room.host.refused(), 10U);
+  EXPECT_TRUE(answered(3, 1'000'000));
+  EXPECT_FALSE(answered(20, 1'049'000));
+  EXPECT_TRUE(answered(20, 1'051'000));
+  EXPECT_FALSE(answered(21, 1'060'000));
+  // A second later there is room for twenty again, and not for more.
+  for (std::size_t i = 21; i < 30; ++i) EXPECT_TRUE(answered(i, 9'000'000)) << i;
+  for (int i = 0; i < 20; ++i)
+    EXPECT_EQ(room.ask(*PairingGuest(kCode, JoinRole::watcher).poll(0), 9'000'000).has_value(), i < 11) << i;
+}
+
+// One too short to be answered in full, one of no known role and one that is no question are of no use.
+TEST(Pairing, WhatIsNoQuestionIsNotAnswered) {
+  Room room;
+  PairingGuest guest(kCode, static_cast<JoinRole>(3));
+  EXPECT_FALSE(room.ask(*guest.poll(0), 0));
+  EXPECT_EQ(room.host.refused(), 1U);
+  PairingGuest watcher(kCode, JoinRole::watcher);
+  const auto challenge = room.ask(*watcher.poll(0), 0);
+  ASSERT_TRUE(challenge);
+  EXPECT_FALSE(room.ask(*challenge, 0)) << "thrown back";
+  EXPECT_FALSE(room.ask({}, 0));
+  EXPECT_EQ(room.host.refused(), 3U);
+  // A packet that says less, or something else, than its kind has to.
+  const auto nonce_of = [](const Bytes& b) {
+    Pairing::Nonce nonce;
+    std::copy_n(b.begin() + 6, nonce.size(), nonce.begin());
+    return nonce;
+  };
+  const Bytes asked = *PairingGuest(kCode, JoinRole::watcher).poll(0);
+  const Pairing::Nonce other_nonce = nonce_of(asked), mine = nonce_of(*challenge);
+  for (const std::size_t size : {kAskBytes - 1, kAskBytes})
+    EXPECT_EQ(
+        room.ask(PairingPacket(PairingStep::ask).add(other_nonce).add(JoinRole::watcher).sealed(size), 0).has_value(),
+        size == kAskBytes)
+        << size;
+  EXPECT_EQ(room.host.refused(), 4U);
+  EXPECT_FALSE(room.ask(PairingPacket(PairingStep::prove).add(mine).sealed(), 0));
+  EXPECT_EQ(room.host.refused(), 5U);
+  EXPECT_EQ(room.host.tries_left(), PairingHost::kTries);
+  for (const PairingStep step : {PairingStep::refused, PairingStep::challenge, PairingStep::welcome, PairingStep::wait,
+                                 PairingStep::again, PairingStep::ask, PairingStep::prove}) {
+    watcher.receive(PairingPacket(step).add(mine).sealed(), 0);
+    EXPECT_EQ(watcher.state(), PairingGuest::State::asking) << static_cast<int>(step);
+  }
+  // A second host's welcome is not the first one's: it has another key.
+  Room other;
+  watcher.receive(*challenge, 0);
+  const Bytes proof = *watcher.poll(0);
+  const auto again = other.ask(proof, 0);
+  ASSERT_TRUE(again);
+  watcher.receive(*again, 0);
+  EXPECT_EQ(watcher.state(), PairingGuest::State::asking) << "it knows nothing of it";
+  // Each reason has its words.
+  for (const auto& [why, words] : {std::pair(PairingRefusal::wrong_code, "the code is another"),
+                                   {PairingRefusal::locked, "there were too many wrong codes"},
+                                   {PairingRefusal::full, "someone else is the trainee"}}) {
+    PairingGuest one(kCode, JoinRole::watcher);
+    one.receive(PairingPacket(PairingStep::refused).add(nonce_of(*one.poll(0))).add(why).sealed(), 0);
+    EXPECT_EQ(one.state(), PairingGuest::State::refused);
+    EXPECT_EQ(one.why().find(words), 0U) << one.why();
+  }
 }
 
 // What is left in memory of an object that has gone.

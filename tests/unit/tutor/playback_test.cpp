@@ -369,6 +369,118 @@ TEST(LessonClock, GoesWithTheHandWaitsAndGoesBack) {
   EXPECT_GT(again, 300);
 }
 
+// There and back on the same places: a hand that lags at one of them is still on its way there, and time goes back to
+// it; not on to where it comes by the second time.
+TEST(LessonClock, OfAPlaceThatIsPassedTwiceTheFirstTimeCounts) {
+  Lesson lesson;
+  lesson.hands.resize(1);
+  for (int t = 0; t <= 600; ++t) {
+    DeviceSample s;
+    s.position_mm = to_floats({(t <= 300 ? t : 600 - t) / 100.0, 0, 0});  // 3 mm and back
+    lesson.hands[0].push_back(s);
+  }
+  for (std::uint32_t n = 0; n <= 30; ++n) {
+    const double fifths = n <= 15 ? n : 30 - n;  // both passes at the very same places
+    lesson.way.push_back({to_floats({fifths / 5, 0, 0}), static_cast<float>(n) / 5, 20 * n});
+  }
+  PlaybackParams params;
+  params.mode = PlaybackMode::guide;
+  params.pace = Pace::way;
+  params.tolerance_radius_mm = 1;
+  LessonClock clock(lesson, params);
+  while (!clock.started()) clock.step({}, 1e-3);
+  // With the hand along until the way is 0.6 mm on its way back, at 2.4 mm.
+  while (clock.sample() < 360) clock.step(clock.target_mm(), 1e-3);
+  ASSERT_NEAR(clock.target_mm().x, 2.4, 1e-6);
+  // A hand at 1 mm was there 2.6 mm of way ago, and will be 1.4 mm further on.
+  for (int t = 0; t < 20; ++t) clock.step({1, 0, 0}, 1e-3);
+  EXPECT_EQ(clock.sample(), 340U) << "time goes back by a tick each";
+}
+
+TEST(LessonClock, ItBeginsAMillimetreFromTheBeginning) {
+  Lesson lesson = straight(10, 1);
+  for (DeviceSample& at : lesson.hands[0]) at.position_mm[0] += 5;
+  for (Lesson::Point& at : lesson.way) at.at_mm[0] += 5;
+  // Where nothing leads time waits for who comes by himself; by the clock it does not.
+  for (const auto& [mode, pace, hand, starts] : {std::tuple(PlaybackMode::graphics, Pace::way, 1.0, true),
+                                                 std::tuple(PlaybackMode::graphics, Pace::way, 1.001, false),
+                                                 std::tuple(PlaybackMode::feel, Pace::clock, 50.0, true),
+                                                 std::tuple(PlaybackMode::guide, Pace::way, 1.001, false)}) {
+    PlaybackParams params;
+    params.mode = mode;
+    params.pace = pace;
+    LessonClock clock(lesson, params);
+    EXPECT_FALSE(clock.started());
+    for (int t = 0; t < 200; ++t) {
+      clock.step({5, hand, 0}, 1e-3);
+      if (clock.started()) break;
+    }
+    EXPECT_EQ(clock.started(), starts) << hand;
+    EXPECT_EQ(clock.goes_on(), starts);
+    EXPECT_EQ(clock.sample(), 0U);
+    EXPECT_EQ(clock.target_mm().y, 0) << "the target is where the lesson begins";
+  }
+  // What leads comes at 30 mm/s, and not on where the hand does not come along.
+  PlaybackParams led;
+  led.mode = PlaybackMode::guide;
+  led.tolerance_radius_mm = 2;
+  LessonClock clock(lesson, led);
+  const Vec3 hand{5, 9, 0};
+  clock.step(hand, 1e-3);
+  EXPECT_NEAR(clock.target_mm().y, 9 - 0.03, 1e-9);
+  for (int t = 0; t < 500; ++t) clock.step(hand, 1e-3);
+  EXPECT_NEAR(clock.target_mm().y, 7, 0.031);
+  EXPECT_LT(clock.target_mm().y, 7);
+  EXPECT_FALSE(clock.started());
+}
+
+// What leads, who drills and what time goes by, of each mode; each may be asked for otherwise.
+TEST(Modes, SayWhatLeadsWhoDrillsAndWhatTimeGoesBy) {
+  struct Row {
+    PlaybackMode mode;
+    bool leads, expert, clock;
+  };
+  for (const Row& row :
+       {Row{PlaybackMode::show, true, true, true}, Row{PlaybackMode::feel, false, true, true},
+        Row{PlaybackMode::guide, true, true, false}, Row{PlaybackMode::fading, true, false, false},
+        Row{PlaybackMode::amplify, true, false, false}, Row{PlaybackMode::graphics, false, false, false}}) {
+    PlaybackParams p;
+    p.mode = row.mode;
+    p.stiffness_n_per_mm = 0.7;
+    p.damping_n_s_per_m = 3;
+    p.most_n = 4;
+    p.dead_zone_mm = 1.5;
+    p.forward = 0.6;
+    const int mode = static_cast<int>(row.mode);
+    EXPECT_EQ(leads(p), row.leads) << mode;
+    EXPECT_EQ(expert_drills(p), row.expert) << mode;
+    EXPECT_EQ(by_clock(p), row.clock) << mode;
+    const HandGuide g = guide_of(p);
+    EXPECT_EQ(g.most_n, 4) << mode;
+    const bool away = row.mode == PlaybackMode::amplify;
+    EXPECT_DOUBLE_EQ(g.stiffness_n_per_mm, !row.leads ? HandGuide{}.stiffness_n_per_mm
+                                           : away     ? -std::min(0.7, GuideLaw::kAwayStiffness)
+                                                      : 0.7)
+        << mode;
+    EXPECT_DOUBLE_EQ(g.damping_n_s_per_m, !row.leads ? HandGuide{}.damping_n_s_per_m : away ? 10 : 3) << mode;
+    EXPECT_EQ(g.dead_zone_mm, row.mode == PlaybackMode::fading || away ? 1.5 : HandGuide{}.dead_zone_mm) << mode;
+    EXPECT_EQ(g.own_contact, row.leads ? row.mode != PlaybackMode::show : HandGuide{}.own_contact) << mode;
+    EXPECT_EQ(g.forward, row.mode == PlaybackMode::show ? 0.6 : HandGuide{}.forward) << mode;
+    for (const bool other : {false, true}) {
+      p.drills = other ? WhoDrills::expert : WhoDrills::learner;
+      p.pace = other ? Pace::clock : Pace::way;
+      EXPECT_EQ(expert_drills(p), other) << mode;
+      EXPECT_EQ(by_clock(p), other) << mode;
+    }
+    p.most_n = 0;
+    EXPECT_EQ(guide_of(p).most_n, 1e-3) << "a leader there is";
+    p.damping_n_s_per_m = 12;
+    if (away) {
+      EXPECT_EQ(guide_of(p).damping_n_s_per_m, 12);
+    }
+  }
+}
+
 TEST(LessonClock, ByTheClockItWaitsForNobody) {
   const Lesson lesson = straight(10, 1);
   PlaybackParams feel;
@@ -406,6 +518,33 @@ TEST(FadingGuide, ForgetsWithoutErrorsAndComesBackWithThem) {
   g.add(NAN);
   g.end_trial();
   EXPECT_LE(g.strength(), 1);
+}
+
+// The 90th percentile of a trial: an error that one tick in ten has counts, one that fewer have does not.
+TEST(FadingGuide, AnErrorIsTheNinetiethPercentileOfATrial) {
+  for (const auto& [large, mm] : {std::pair<int, double>{100, 1}, {101, 4}, {0, 1}, {1000, 4}}) {
+    FadingGuide g(0.5, 2);
+    for (int i = 0; i < 1000; ++i) g.add(i < large ? 4.01 : 1.01);
+    g.end_trial();
+    EXPECT_NEAR(g.last_error_mm(), mm, 0.03) << large;
+    // Half is forgotten; an error of 4 mm, of 2 to 5, asks for two thirds of the other half.
+    EXPECT_NEAR(g.strength(), mm < 2 ? 0.5 : 0.5 + 0.5 * 2 / 3, 0.01) << large;
+    EXPECT_EQ(g.trials(), 1);
+    g.end_trial();  // nothing added
+    EXPECT_EQ(g.trials(), 1);
+    EXPECT_NEAR(g.last_error_mm(), mm, 0.03);
+  }
+  // A dead zone as wide as the worst error leaves a tenth of a millimetre.
+  FadingGuide narrow(0, FadingGuide::kWorstMm);
+  narrow.add(5.03);
+  narrow.end_trial();
+  EXPECT_NEAR(narrow.strength(), 0.25, 1e-9);
+  FadingGuide far(0.5, 2);
+  for (const double error : {1e9, static_cast<double>(NAN), -1.0}) {
+    far.add(error);
+    far.end_trial();
+    EXPECT_NEAR(far.last_error_mm(), error < 0 ? 0 : 25.6, 0.03) << error;
+  }
 }
 
 TEST(Spread, IsTheDistanceOfWays) {

@@ -83,9 +83,7 @@ class Labeller {
         for (int j = at[1]; j < block.hi[1]; j += step)
           for (int i = at[0]; i < block.hi[0]; i += step) visit({i, j, k}, level + 1);
     } else {
-      for (int k = block.lo[2]; k < block.hi[2]; ++k)
-        for (int j = block.lo[1]; j < block.hi[1]; ++j)
-          for (int i = block.lo[0]; i < block.hi[0]; ++i) one(i, j, k);
+      each_cell(block, [&](int i, int j, int k) { one(i, j, k); });
     }
   }
 
@@ -103,19 +101,9 @@ class Labeller {
     std::uint8_t& l = label(i, j, k);
     if (l == 0 || d < structures_.distance_mm(number_[l], at)) l = structures_.values()[s_];
   }
+  // So deep inside that no other structure is near: each voxel of labels is of one alone.
   void inside(const CellBlock& block) const {
-    for (int k = block.lo[2]; k < block.hi[2]; ++k) {
-      for (int j = block.lo[1]; j < block.hi[1]; ++j) {
-        for (int i = block.lo[0]; i < block.hi[0]; ++i) {
-          std::uint8_t& l = label(i, j, k);
-          if (l == 0) {
-            l = structures_.values()[s_];
-          } else {
-            one(i, j, k);
-          }
-        }
-      }
-    }
+    each_cell(block, [&](int i, int j, int k) { label(i, j, k) = structures_.values()[s_]; });
   }
   const Frame& lattice_;
   const StructureMap& structures_;

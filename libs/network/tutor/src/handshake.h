@@ -62,9 +62,10 @@ class PairingFields {
     left_ = left_.subspan(sizeof value);
     return value;
   }
-  /// As it was sent.
-  [[nodiscard]] bool whole() const {
-    if (packet_.size() < 6 + kChecksumBytes) return false;
+  /// As it was sent. The checksum is no field: once.
+  [[nodiscard]] bool whole() {
+    if (left_.size() < kChecksumBytes) return false;
+    left_ = left_.first(left_.size() - kChecksumBytes);
     const auto sum = packet_checksum(packet_.first(packet_.size() - kChecksumBytes));
     return std::equal(sum.begin(), sum.end(), packet_.end() - kChecksumBytes);
   }

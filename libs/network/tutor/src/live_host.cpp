@@ -41,12 +41,8 @@ void LiveHost::action(const SceneAction& action) {
 void LiveHost::tick(const TickRecord& record, std::span<const VoxelChange> changes) {
   const std::lock_guard lock(mutex_);
   if (state_ == LogState::lost) return;
-  if (record.tick * hands_ + record.hand != log_.size()) {
+  if (record.tick * hands_ + record.hand != log_.size() || record.tick >= kMaxTicks) {
     // Ticks were dropped before they came here; or there is no more room for a lesson of half an hour.
-    state_ = LogState::lost;
-    return;
-  }
-  if (log_.size() >= kMaxTicks * hands_) {
     state_ = LogState::lost;
     return;
   }
@@ -185,10 +181,8 @@ void LiveHost::hear(Peer& peer, const HandPacket& p, std::int64_t now_us) {
   if (peer.role != JoinRole::trainee || p.samples.empty()) return;
   const std::uint64_t first = p.newest + 1 - p.samples.size();
   const bool newest = p.newest > peer.newest_hand;
-  for (std::size_t i = 0; i < p.samples.size(); ++i) {
-    if (first + i <= peer.newest_hand && !(i + 1 == p.samples.size()) && peer.newest_hand - (first + i) > 256) continue;
+  for (std::size_t i = 0; i < p.samples.size(); ++i)
     far_->put({first + i, p.samples[i]}, newest && i + 1 == p.samples.size());
-  }
   peer.newest_hand = std::max(peer.newest_hand, p.newest);
 }
 
@@ -271,10 +265,14 @@ std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
       ++sent;
     }
     if (p.sent_to + LogPacket::kMaxTicks >= ticks) {
-      // The newest, with those before them once more.
-      const LogPacket log = log_from(std::min(p.sent_to, ticks > kOverlap ? ticks - kOverlap : 0));
-      p.sent_to = std::max(p.sent_to, log.first_tick + log.samples.size() / hands_);
-      send(log);
+      // The newest, with those before them once more: in one packet, but of many hands or actions.
+      std::uint64_t from = std::min(p.sent_to, ticks > kOverlap ? ticks - kOverlap : 0);
+      do {
+        const LogPacket log = log_from(from);
+        from += log.samples.size() / hands_;
+        send(log);
+      } while (from < ticks);
+      p.sent_to = from;
     }
   }
   return std::exchange(out_, {});
