@@ -19,7 +19,7 @@ class FibulaAnatomy {
   explicit FibulaAnatomy(std::uint64_t individual) {
     if (individual == 0) return;
     // Numbers that follow from the individual's alone.
-    Random random(individual);
+    statistics::Random random(individual);
     const auto between = [&](double lo, double hi) { return lo + (hi - lo) * random.uniform(); };
     length_mm_ = between(320, 380);
     bow_mm_ = between(1, 4);
