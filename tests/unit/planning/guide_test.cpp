@@ -10,6 +10,7 @@
 
 #include "error_of.h"
 #include "guide_parts.h"
+#include "jaw_params.h"
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/distance/distance_map.h"
 #include "osteo/geometry/mesh/mesh_info.h"
@@ -231,12 +232,7 @@ TEST(CuttingGuide, ItsSlotIsToldAsItIs) {
 
 TEST(CuttingGuide, ServesAReconstruction) {
   const JawPhantom p = make_jaw_phantom(1, 12);
-  ReconstructionParams r;
-  const auto set = [](std::array<double, 3>& to, Vec3 v) { to = {v.x, v.y, v.z}; };
-  set(r.a_mm, p.a_mm);
-  set(r.b_mm, p.b_mm);
-  set(r.a_normal, p.a_normal);
-  set(r.b_normal, p.b_normal);
+  ReconstructionParams r = test::params_for(p);
   r.max_contour_mm = 0.1;
   r.min_length_mm = 12;
   const SurgicalPlan plan = reconstruct(p.jaw, p.donor, r).plan;
@@ -265,12 +261,7 @@ TEST(CuttingGuide, ServesAReconstruction) {
 // Rows of turns are sixty times those of shifts; unscaled, this one's shift was lost in rounding and called not held.
 TEST(CuttingGuide, RocksAsFarAsItsGapLetsOnALongShaft) {
   const JawPhantom p = make_jaw_phantom(60, 12);
-  ReconstructionParams r;
-  const auto set = [](std::array<double, 3>& to, Vec3 v) { to = {v.x, v.y, v.z}; };
-  set(r.a_mm, p.a_mm);
-  set(r.b_mm, p.b_mm);
-  set(r.a_normal, p.a_normal);
-  set(r.b_normal, p.b_normal);
+  ReconstructionParams r = test::params_for(p);
   CuttingGuideParams params;
   params.bone = "fibula";
   for (const GuideCut& c : make_cutting_guide(p.donor, reconstruct(p.jaw, p.donor, r).plan, params).cuts)
@@ -295,12 +286,7 @@ TEST(CuttingGuide, Benchmark) {
   for (int seed = dash != nullptr ? std::atoi(seeds) : 1; seed <= std::atoi(dash != nullptr ? dash + 1 : seeds);
        ++seed) {
     const JawPhantom p = make_jaw_phantom(static_cast<std::uint64_t>(seed), 12);
-    ReconstructionParams r;
-    const auto set = [](std::array<double, 3>& to, Vec3 v) { to = {v.x, v.y, v.z}; };
-    set(r.a_mm, p.a_mm);
-    set(r.b_mm, p.b_mm);
-    set(r.a_normal, p.a_normal);
-    set(r.b_normal, p.b_normal);
+    ReconstructionParams r = test::params_for(p);
     SurgicalPlan plan;
     try {
       plan = reconstruct(p.jaw, p.donor, r).plan;

@@ -8,6 +8,7 @@
 
 #include "edge_fit.h"
 #include "error_of.h"
+#include "jaw_params.h"
 #include "osteo/core/base/error.h"
 #include "osteo/session/planning/detail/jaw_phantom.h"
 #include "osteo/session/planning/planning.h"
@@ -26,12 +27,7 @@ struct World {
   SurgicalPlan rebuilt;   ///< from fibula segments, which lie upon each other
   SurgicalPlan advanced;  ///< one cut, the front moved away: faces that a CT shows
   explicit World(std::uint64_t seed) : phantom(make_jaw_phantom(seed, 12)), jaw(phantom.jaw), donor(phantom.donor) {
-    ReconstructionParams r;
-    const auto set = [](std::array<double, 3>& to, Vec3 v) { to = {v.x, v.y, v.z}; };
-    set(r.a_mm, phantom.a_mm);
-    set(r.b_mm, phantom.b_mm);
-    set(r.a_normal, phantom.a_normal);
-    set(r.b_normal, phantom.b_normal);
+    ReconstructionParams r = test::params_for(phantom);
     rebuilt = reconstruct(phantom.jaw, phantom.donor, r).plan;
     const Vec3 e = phantom.a_normal;
     advanced.planes = {{"stays", "mandible", phantom.a_mm, e, 1, true},

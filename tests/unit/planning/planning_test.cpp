@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "error_of.h"
+#include "jaw_params.h"
 #include "osteo/core/base/error.h"
 #include "osteo/geometry/mesh/mesh_info.h"
 #include "osteo/session/planning/detail/jaw_phantom.h"
@@ -16,15 +17,7 @@ namespace {
 
 constexpr double kDeg = 3.14159265358979 / 180;
 
-ReconstructionParams params_for(const JawPhantom& p) {
-  ReconstructionParams params;
-  const auto set = [](std::array<double, 3>& to, Vec3 v) { to = {v.x, v.y, v.z}; };
-  set(params.a_mm, p.a_mm);
-  set(params.b_mm, p.b_mm);
-  set(params.a_normal, p.a_normal);
-  set(params.b_normal, p.b_normal);
-  return params;
-}
+using test::params_for;
 
 double to_axes(Vec3 c, const std::vector<Vec3>& axes) {
   double best = 1e9;

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <numbers>
 #include <thread>
 
@@ -300,20 +301,28 @@ TEST(Picture, IsDrawnAgainOnlyWhenSomethingHasChanged) {
   changed("something gone");
 }
 
+// A cube of so many voxels about the origin; `value` of each by its index.
+Labels cube_labels(int size, double spacing_mm, std::vector<Structure> structures,
+                   const std::function<int(int i, int j, int k)>& value) {
+  Labels labels;
+  const double corner_mm = -0.5 * size * spacing_mm;
+  labels.frame.dims = {size, size, size};
+  labels.frame.spacing_mm = {spacing_mm, spacing_mm, spacing_mm};
+  labels.frame.origin_mm = {corner_mm, corner_mm, corner_mm};
+  const auto voxels = make_voxels<std::uint8_t>(labels.frame.voxel_count());
+  for (int k = 0; k < size; ++k)
+    for (int j = 0; j < size; ++j)
+      for (int i = 0; i < size; ++i)
+        voxels[static_cast<std::size_t>((k * size + j) * size + i)] = static_cast<std::uint8_t>(value(i, j, k));
+  labels.voxels = voxels;
+  labels.structures = std::move(structures);
+  return labels;
+}
+
 // Bone that gets thinner over a nerve takes on its colour without steps.
 TEST(Colours, ShineThroughThinBoneWithoutSteps) {
-  Labels labels;
-  labels.frame.dims = {40, 40, 40};
-  labels.frame.spacing_mm = {0.4, 0.4, 0.4};
-  labels.frame.origin_mm = {-8, -8, -8};
-  const auto voxels = make_voxels<std::uint8_t>(labels.frame.voxel_count());
-  for (int k = 0; k < 40; ++k)
-    for (int j = 0; j < 40; ++j)
-      for (int i = 0; i < 40; ++i)
-        voxels[static_cast<std::size_t>((k * 40 + j) * 40 + i)] = std::hypot(j - 20, k - 20) < 4 ? 6 : 0;
-  labels.voxels = voxels;
-  labels.structures = {{6, "facial nerve", {255, 255, 0}}};
-  const StructureMap map(labels);
+  const StructureMap map(cube_labels(40, 0.4, {{6, "facial nerve", {255, 255, 0}}},
+                                     [](int, int j, int k) { return std::hypot(j - 20, k - 20) < 4 ? 6 : 0; }));
   double last = 2, widest = 0;
   for (double depth = 0.02; depth < 3; depth += 0.02) {
     const double share = shine_through(map, {0, 0, 1.6 + depth}, {0, 0, -1}).share;
@@ -329,18 +338,9 @@ TEST(Colours, ShineThroughThinBoneWithoutSteps) {
 // By what is remembered of each vertex colours are the same, and the remembered is not used where a vertex has moved.
 TEST(Colours, RememberedShineIsTheSame) {
   auto bone = block();
-  Labels labels;
-  labels.frame.dims = {60, 60, 60};
-  labels.frame.spacing_mm = {0.5, 0.5, 0.5};
-  labels.frame.origin_mm = {-15, -15, -15};
-  const auto voxels = make_voxels<std::uint8_t>(labels.frame.voxel_count());
-  for (int k = 0; k < 60; ++k)
-    for (int j = 0; j < 60; ++j)
-      for (int i = 0; i < 60; ++i)
-        voxels[static_cast<std::size_t>((k * 60 + j) * 60 + i)] = j > 38 && j < 48 && std::abs(k - 30) < 8 ? 6 : 0;
-  labels.voxels = voxels;
-  labels.structures = {{6, "sigmoid sinus", {0, 0, 255}}};
-  const StructureMap map(labels);
+  const StructureMap map(cube_labels(60, 0.5, {{6, "sigmoid sinus", {0, 0, 255}}}, [](int, int j, int k) {
+    return j > 38 && j < 48 && std::abs(k - 30) < 8 ? 6 : 0;
+  }));
   LiveSurface surface(bone, {});
   surface.shade({});
   BonePaint paint(bone, &map, nullptr);
@@ -375,20 +375,10 @@ TEST(Colours, RememberedShineIsTheSame) {
 
 // As by small steps all the way, from everywhere near two structures and in any direction.
 TEST(Colours, ShineThroughAsByStepsAllTheWay) {
-  Labels labels;
-  labels.frame.dims = {40, 40, 40};
-  labels.frame.spacing_mm = {0.4, 0.4, 0.4};
-  labels.frame.origin_mm = {-8, -8, -8};
-  const auto voxels = make_voxels<std::uint8_t>(labels.frame.voxel_count());
-  for (int k = 0; k < 40; ++k)
-    for (int j = 0; j < 40; ++j)
-      for (int i = 0; i < 40; ++i)
-        voxels[static_cast<std::size_t>((k * 40 + j) * 40 + i)] = std::hypot(j - 20, k - 20) < 4         ? 6
-                                                                  : std::hypot(i - 8, j - 9, k - 31) < 5 ? 7
-                                                                                                         : 0;
-  labels.voxels = voxels;
-  labels.structures = {{6, "facial nerve", {255, 255, 0}}, {7, "sigmoid sinus", {0, 0, 255}}};
-  const StructureMap map(labels);
+  const StructureMap map(cube_labels(
+      40, 0.4, {{6, "facial nerve", {255, 255, 0}}, {7, "sigmoid sinus", {0, 0, 255}}}, [](int i, int j, int k) {
+        return std::hypot(j - 20, k - 20) < 4 ? 6 : std::hypot(i - 8, j - 9, k - 31) < 5 ? 7 : 0;
+      }));
   int shines = 0, other = 0;
   for (int n = 0; n < 20000; ++n) {
     // Evenly over the box and over directions, by irrational steps.

@@ -67,6 +67,14 @@ struct Scene {
     water_pose->SetElement(1, 3, -1);
     renderer->ResetCameraClippingRange();
   }
+  // So many, each with what moves a little on, and the same either way.
+  void pictures(int count, const char* what) {
+    for (int k = 0; k < count; ++k) {
+      next();
+      expect_same(what);
+    }
+  }
+  void next() { move(moved_++); }
   // By the layer, and all at once.
   void expect_same(const std::string& what) {
     layer.render();
@@ -77,6 +85,9 @@ struct Scene {
     for (std::size_t n = 0; n < whole.rgb.size(); ++n) off += std::abs(int(whole.rgb[n]) - int(parts.rgb[n])) > 2;
     EXPECT_LE(off, 12U) << what;  // of 144,000: depths fall otherwise where surfaces cut each other
   }
+
+ private:
+  int moved_ = 0;
 };
 
 TEST(StillLayer, DrawsOnlyWhatChanges) {
@@ -93,70 +104,56 @@ TEST(StillLayer, DrawsOnlyWhatChanges) {
 
 TEST(StillLayer, WhatChangesIsSeenAndLeftOutWhileItDoes) {
   Scene scene;
-  int n = 0;
-  const auto pictures = [&](int count, const char* what) {
-    for (int k = 0; k < count; ++k) {
-      scene.move(n++);
-      scene.expect_same(what);
-    }
-  };
-  pictures(5, "at first");
+  scene.pictures(5, "at first");
   // A chunk of bone that is drilled.
   for (int k = 0; k < 4; ++k) {
     scene.balls[2]->GetProperty()->SetColor(0.2, 0.2 + 0.1 * k, 0.9);
-    pictures(1, "one changes");
+    scene.pictures(1, "one changes");
   }
   EXPECT_EQ(scene.layer.kept(), 4U);
   EXPECT_EQ(scene.layer.drawn(), 3U);
   EXPECT_NEAR(scene.layer.live_share(), 3.0 / 7, 0.01);  // of balls of as many triangles each
   scene.balls[1]->VisibilityOff();
-  pictures(1, "one is hidden");
+  scene.pictures(1, "one is hidden");
   scene.renderer->RemoveActor(scene.balls[0]);
-  pictures(2, "one is gone");
+  scene.pictures(2, "one is gone");
   EXPECT_EQ(scene.layer.kept(), 2U);
   scene.balls[1]->VisibilityOn();
-  pictures(1, "one is back");
-  pictures(static_cast<int>(2 * StillLayer::kLive), "later");
+  scene.pictures(1, "one is back");
+  scene.pictures(static_cast<int>(2 * StillLayer::kLive), "later");
   EXPECT_EQ(scene.layer.kept(), 4U) << "what has come to rest is kept again";
 }
 
 TEST(StillLayer, FollowsCameraSizeAndEffects) {
   Scene scene;
-  int n = 0;
-  const auto pictures = [&](int count, const char* what) {
-    for (int k = 0; k < count; ++k) {
-      scene.move(n++);
-      scene.expect_same(what);
-    }
-  };
-  pictures(4, "at first");
+  scene.pictures(4, "at first");
   for (int k = 0; k < 3; ++k) {
     scene.renderer->GetActiveCamera()->Azimuth(3);
-    pictures(1, "turned");
+    scene.pictures(1, "turned");
     EXPECT_EQ(scene.layer.kept(), 0U) << "nothing is kept of a camera that moves";
   }
-  pictures(2, "at rest again");
+  scene.pictures(2, "at rest again");
   EXPECT_EQ(scene.layer.kept(), 5U);
   scene.renderer->GetActiveCamera()->Dolly(1.4);
-  pictures(3, "nearer");
+  scene.pictures(3, "nearer");
   scene.window.window()->SetSize(180, 150);
-  pictures(3, "smaller");
+  scene.pictures(3, "smaller");
   EXPECT_EQ(scene.layer.kept(), 5U);
   // A picture at rest between two that move: what was kept is good for the next.
   set_depth(scene.renderer, {true, 1});
   scene.layer.render();
   EXPECT_EQ(scene.layer.kept(), 0U);
   set_depth(scene.renderer, {false, 1});
-  scene.move(n++);
+  scene.next();
   scene.layer.render();
   EXPECT_EQ(scene.layer.kept(), 5U);
   EXPECT_EQ(scene.layer.drawn(), 2U);
-  pictures(2, "after effects");
+  scene.pictures(2, "after effects");
   // Another drew into the window meanwhile, in another size.
   scene.window.window()->SetSize(60, 50);
   scene.window.window()->Render();
   scene.window.window()->SetSize(180, 150);
-  pictures(2, "after another size");
+  scene.pictures(2, "after another size");
 }
 
 TEST(StillLayer, AnyOtherRendererIsDrawnWhole) {

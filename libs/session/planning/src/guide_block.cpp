@@ -266,6 +266,7 @@ class Block {
   }
   void measure(const std::vector<double>& found, GuideBlock& out) const {
     out.min_gap = std::numeric_limits<double>::infinity();
+    std::vector<bool> touched(bottom_.size());  // a node is of up to four cells
     for (std::size_t j = 0; j + 1 < rows_.size(); ++j) {
       for (std::size_t c = 0; c + 1 < columns_; ++c) {
         if (!there(j, c)) continue;
@@ -284,7 +285,10 @@ class Block {
           if (near.distance_mm < kContactMm) list.push_back({p, normalized(p - near.point_mm), near.distance_mm});
         };
         touch(places(j, c)[0], some ? out.contacts : out.others);
-        for (const std::size_t m : n) touch(bottom_[m], out.others);
+        for (const std::size_t m : n) {
+          if (!touched[m]) touch(bottom_[m], out.others);
+          touched[m] = true;
+        }
         if (!seated || steep) continue;
         out.seat_mm2 += length(across) / 2;
         for (const Vec3& p : places(j, c))
