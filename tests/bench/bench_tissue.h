@@ -56,8 +56,8 @@ inline double nrms_of(TissueModel& model, const Body& body, const TissueLoad& lo
 }
 
 /// bench_tissue_fem.cpp: finite elements against analytic answers. bench_tissue_time.cpp: steps in time, resolution,
-/// skins. bench_tissue_pressed.cpp: long steps under a tool. bench_tissue_measured.cpp: calibration from measured
-/// surfaces.
+/// skins. bench_tissue_pressed.cpp: fewer steps than real time under a tool. bench_tissue_measured.cpp: calibration from
+/// measured surfaces.
 void tissue_elements();
 void tissue_time();
 void tissue_pressed();

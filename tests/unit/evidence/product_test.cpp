@@ -103,7 +103,7 @@ TEST(Product, AWallIsAsThickAsItIs) {
   ASSERT_TRUE(r.measured);
   EXPECT_NEAR(r.value, 1.85, 0.3);
   EXPECT_TRUE(r.pass);
-  EXPECT_EQ(judge(drilled([](Vec3) { return 1e3; }), p).word, "nothing was removed: the bone is unchanged");
+  EXPECT_EQ(judge(drilled([](Vec3) { return 1e3; }), p).word, "no voxel lost half of its bone: there is no cavity");
   // A groove that no ball of 0.5 mm enters opens nothing either, and that is another reason.
   const auto groove = judge(drilled([](Vec3 q) { return std::max(std::abs(q.x) - 0.3, 6 - q.z); }), p);
   EXPECT_FALSE(groove.measured);

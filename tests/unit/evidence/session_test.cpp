@@ -213,7 +213,7 @@ TEST(Sessions, UndoTakesBackWhatWasRemoved) {
   EXPECT_TRUE(says(back, "nothing was removed"));
   EXPECT_TRUE(says(back, "a step was taken back"));
   EXPECT_FALSE(says(all, "taken back"));
-  EXPECT_EQ(find(back.values, "seen_share")->word, "nothing was removed");
+  EXPECT_EQ(find(back.values, "seen_share")->word, "no voxel lost half of its bone");
 }
 
 TEST(Sessions, ItemsRulesAndSteps) {
@@ -309,6 +309,17 @@ TEST(Sessions, HardCasesHaveAWordEach) {
   EXPECT_TRUE(says(idle, "nothing was removed"));
   EXPECT_EQ(find(idle.values, "strokes")->word, "no burr drilled");
   EXPECT_NEAR(value(idle.values, "idle_s"), 2, 0.11);
+  // A burr that only grazes it: some bone is gone, but nowhere half a voxel.
+  Script graze;
+  graze.waypoints = {
+      {0, {0, 0, 9}, true}, {0.3, {0, 0, 5.75}, true}, {0.32, {0, 0, 5.75}, true}, {0.4, {0, 0, 9}, false}};
+  RehearsalOptions grazed = options(scratch / "graze.oss");
+  Rehearsal(block(), std::make_unique<ScriptedDevice>(graze, 1000), grazed, {}).run_to_end({});
+  const Score little = score(scratch / "graze.oss", &p);
+  EXPECT_GT(value(little.values, "removed_mm3"), 0);
+  EXPECT_EQ(value(little.values, "cavity_mm3"), 0);
+  EXPECT_FALSE(says(little, "nothing was removed"));
+  EXPECT_TRUE(says(little, "less was removed than half of any voxel"));
   // Inside a structure from the beginning.
   NearMetric near({1000, rod().get(), nullptr});
   TickRecord inside;

@@ -227,7 +227,7 @@ TEST_F(Drilled, WithoutACameraNothingIsSaidAndUndoTakesBack) {
   VisibilityMetric none({1000, nullptr, nullptr});
   values.clear();
   none.finish(world_, values, moments);
-  EXPECT_EQ(values.front().word, "nothing was removed");
+  EXPECT_EQ(values.front().word, "no voxel lost half of its bone");
 }
 
 }  // namespace

@@ -159,10 +159,10 @@ TEST(SoftTissue, ForcesOfAllBodiesOnAToolAreOnePlane) {
   SoftPush push[2];
   for (int n = 0; n < 60; ++n) {
     felt = update(both, tool);
-    push[0] = update(*below, tool);
+    push[0] = below->update({&tool, 1}, SoftBody::kMaxWork - beside->work()).front();
     push[1] = update(*beside, tool);
   }
-  ASSERT_EQ(both.facts()[0].of_real_time, below->slow_motion()) << "there is room for both";
+  ASSERT_EQ(both.facts()[0].of_real_time, below->slow_motion()) << "it has what the softer one leaves";
   ASSERT_EQ(both.facts()[1].of_real_time, beside->slow_motion());
   ASSERT_GT(length(push[0].force_n), 0.003);
   ASSERT_GT(length(push[1].force_n), 0.003);
@@ -297,7 +297,9 @@ TEST(SoftTissue, BodiesShareWhatAnUpdateMayTake) {
   EXPECT_NEAR(facts[0].of_real_time, alone * rest / 2, 0.05 * alone);
   // The others asleep, the first has all of it.
   const SoftTool tool{{12, 12, 72.2}, {0, 0, 1}, diamond(6), false};
-  for (int n = 0; n < 2000 && !(tissue.body(1).asleep() && tissue.body(2).asleep()); ++n) update(tissue, tool);
+  // What lies still goes to sleep within a second, however short its steps: rounding does not keep it awake.
+  for (int n = 0; n < 100 && !(tissue.body(1).asleep() && tissue.body(2).asleep()); ++n) update(tissue, tool);
+  ASSERT_TRUE(tissue.body(1).asleep());
   update(tissue, tool);
   EXPECT_FALSE(tissue.facts()[0].asleep);
   EXPECT_EQ(tissue.facts()[0].of_real_time, alone);

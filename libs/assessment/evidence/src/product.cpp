@@ -228,7 +228,7 @@ void Product::settle(Result& r, bool passes_at_worst, bool passes_at_best) const
 }
 
 std::string Product::no_cavity() const {
-  return removed_.empty() ? "nothing was removed: the bone is unchanged"
+  return removed_.empty() ? "no voxel lost half of its bone: there is no cavity"
                           : "nothing was opened: no ball of " + format_number(kBallMm) +
                                 " mm comes in where bone was removed, so there is no cavity to measure from";
 }

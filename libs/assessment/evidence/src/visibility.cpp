@@ -188,7 +188,7 @@ void VisibilityMetric::finish(const World& world, std::vector<Measured>& values,
     const StructureMap::Answer a = scene_.structures->at_risk(v.own_mm);
     if (a.structure != 0 && a.distance_mm <= kNearMm) near[a.structure] += static_cast<double>(v.mm3);
   }
-  const std::string why = voxels_.empty() ? "nothing was removed" : "the session has no camera notes";
+  const std::string why = voxels_.empty() ? "no voxel lost half of its bone" : "the session has no camera notes";
   if (seen + hidden == 0) {
     not_measured_all(values, MetricPlace::sight, {MetricWhen::camera, MetricWhen::structures}, why);
     return;

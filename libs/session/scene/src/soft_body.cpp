@@ -14,14 +14,14 @@
 namespace osteo::inline session {
 namespace {
 
-constexpr int kMaxSteps = 200;          // of an update: beside SoftBody::kMaxWork
+constexpr int kMaxSteps = 400;          // of an update: beside SoftBody::kMaxWork
 constexpr double kToolStiffness = 0.1;  // N/mm of each place that the tool meets
 constexpr double kBoneStiffness = 0.3;  // and of each point that meets bone
 constexpr double kMinPushN = 1e-4;
 constexpr double kFeltStiffness =
     0.05;  // N/mm for each place that the tool meets: in series with what gives way behind it
 constexpr double kDampingPerS = 150;  // tissue does not ring
-constexpr double kStepShare = 0.75;   // of the certified step, so that there is room for stiff contact
+constexpr double kStepShare = 0.6;    // of the certified step, so that contact need not be softened
 constexpr double kGrip = 1;           // of what does not turn: a surface does not slip round what has dug in
 // Still: no point further than this from where it was so many updates ago. Then the bone is looked at once more, and it
 // takes so many more.

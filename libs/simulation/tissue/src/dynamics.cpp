@@ -114,7 +114,6 @@ void TissueDynamics<Real>::Impl::rows(bool edges, const At& place, std::vector<d
 // Limit of the step: 2 / omega, omega^2 <= max over points of row / m (Gershgorin).
 template <class Real>
 double TissueDynamics<Real>::Impl::certify() {
-  if (is_factorised()) return options.factorised_step_s;
   edge_row.assign(x.size(), 0);
   const auto at_rest = [&](std::uint32_t p) { return model.rest()[p]; };
   rows(true, at_rest, edge_row);
@@ -153,9 +152,9 @@ void TissueDynamics<Real>::Impl::certify_again() {
     // Heavier it keeps its momentum, lighter its velocity: neither adds energy.
     const Real keep = std::min(Real(1), inverse_mass[p] / before);
     if (keep == 1) continue;
-    px[p] = x[p] - (x[p] - px[p]) * keep;
-    py[p] = y[p] - (y[p] - py[p]) * keep;
-    pz[p] = z[p] - (z[p] - pz[p]) * keep;
+    dx[p] *= keep;
+    dy[p] *= keep;
+    dz[p] *= keep;
   }
 }
 
@@ -165,8 +164,6 @@ TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const s
     : impl_(std::make_unique<Impl>(model, options)) {
   Impl& m = *impl_;
   if (!(options.density_kg_m3 > 0)) throw Error(ExitCode::usage, "tissue needs a density above 0");
-  if (!(options.factorised_step_s >= 0) || options.iterations < 1)
-    throw Error(ExitCode::usage, "factorised steps need a length above 0 and at least one iteration");
   const std::size_t n = model.point_count();
   m.fixed.assign(n, false);
   for (const std::uint32_t p : fixed) {
@@ -182,7 +179,7 @@ TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const s
   }
   m.sliders.assign(sliders.begin(), sliders.end());
   m.mass = masses(model, options.density_kg_m3);
-  for (auto* const v : {&m.x, &m.y, &m.z, &m.px, &m.py, &m.pz, &m.fx, &m.fy, &m.fz, &m.lx, &m.ly, &m.lz})
+  for (auto* const v : {&m.x, &m.y, &m.z, &m.dx, &m.dy, &m.dz, &m.fx, &m.fy, &m.fz, &m.lx, &m.ly, &m.lz})
     v->assign(n, 0);
   for (std::uint32_t p = 0; p < n; ++p) set_position(p, model.rest()[p]);
   m.lay_out();
@@ -218,9 +215,10 @@ void TissueDynamics<Real>::set_load(std::span<const std::pair<std::uint32_t, Vec
 template <class Real>
 void TissueDynamics<Real>::set_position(std::uint32_t p, Vec3 at) {
   Impl& m = *impl_;
-  m.x[p] = m.px[p] = static_cast<Real>(at.x);
-  m.y[p] = m.py[p] = static_cast<Real>(at.y);
-  m.z[p] = m.pz[p] = static_cast<Real>(at.z);
+  m.x[p] = static_cast<Real>(at.x);
+  m.y[p] = static_cast<Real>(at.y);
+  m.z[p] = static_cast<Real>(at.z);
+  m.dx[p] = m.dy[p] = m.dz[p] = 0;
 }
 
 template <class Real>
@@ -278,8 +276,7 @@ void TissueDynamics<Real>::Impl::forces() {
 template <class Real>
 Vec3 TissueDynamics<Real>::step(int steps) {
   Impl& m = *impl_;
-  for (int s = 0; s < steps && m.is_factorised(); ++s) m.step_factorised();
-  for (int s = 0; s < steps && !m.is_factorised(); ++s) {
+  for (int s = 0; s < steps; ++s) {
     if (++m.since_certified >= kCertifySteps) {
       m.since_certified = 0;
       m.certify_again();
@@ -295,18 +292,20 @@ Vec3 TissueDynamics<Real>::step(int steps) {
     const Real dt2 = static_cast<Real>(m.dt * m.dt);
     for (std::size_t p = 0; p < m.x.size(); ++p) {
       const Real w = dt2 * m.inverse_mass[p];
-      const Real nx = (2 * m.x[p] - keep * m.px[p] + w * m.fx[p]) * whole,
-                 ny = (2 * m.y[p] - keep * m.py[p] + w * m.fy[p]) * whole,
-                 nz = (2 * m.z[p] - keep * m.pz[p] + w * m.fz[p]) * whole;
-      m.px[p] = m.x[p];
-      m.py[p] = m.y[p];
-      m.pz[p] = m.z[p];
-      if (m.inverse_mass[p] == 0) continue;
+      if (m.inverse_mass[p] == 0) {
+        m.dx[p] = m.dy[p] = m.dz[p] = 0;
+        continue;
+      }
+      m.dx[p] = (keep * m.dx[p] + w * m.fx[p]) * whole;
+      m.dy[p] = (keep * m.dy[p] + w * m.fy[p]) * whole;
+      m.dz[p] = (keep * m.dz[p] + w * m.fz[p]) * whole;
+      const Real nx = m.x[p] + m.dx[p], ny = m.y[p] + m.dy[p], nz = m.z[p] + m.dz[p];
       if (std::isfinite(nx + ny + nz)) {
         m.x[p] = nx;
         m.y[p] = ny;
         m.z[p] = nz;
       } else {
+        m.dx[p] = m.dy[p] = m.dz[p] = 0;
         ++m.counts.not_finite;
       }
     }
@@ -370,10 +369,9 @@ double TissueDynamics<Real>::kinetic_mj() const {
   for (std::size_t p = 0; p < m.x.size(); ++p) {
     // The velocity now, half a step after that between the last two places.
     const Vec3 f{static_cast<double>(m.fx[p]), static_cast<double>(m.fy[p]), static_cast<double>(m.fz[p])};
-    const Vec3 v = Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]),
-                        static_cast<double>(m.z[p] - m.pz[p])} /
-                       m.dt +
-                   f * (0.5 * m.dt * static_cast<double>(m.inverse_mass[p]));
+    const Vec3 v =
+        Vec3{static_cast<double>(m.dx[p]), static_cast<double>(m.dy[p]), static_cast<double>(m.dz[p])} / m.dt +
+        f * (0.5 * m.dt * static_cast<double>(m.inverse_mass[p]));
     sum += m.fixed[p] ? 0 : 0.5 * m.mass[p] * dot(v, v);
   }
   return sum;
@@ -389,8 +387,7 @@ Vec3 TissueDynamics<Real>::momentum_n_s() const {
   const Impl& m = *impl_;
   Vec3 sum{};
   for (std::size_t p = 0; p < m.x.size(); ++p) {
-    sum += Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]),
-                static_cast<double>(m.z[p] - m.pz[p])} *
+    sum += Vec3{static_cast<double>(m.dx[p]), static_cast<double>(m.dy[p]), static_cast<double>(m.dz[p])} *
            (m.mass[p] / m.dt);
   }
   return sum;

@@ -31,7 +31,6 @@ void TissueDynamics<Real>::set_obstacle(RigidContact obstacle) {
   m.ties.clear();
   m.tied.assign(m.x.size(), false);
   m.steps = 0;
-  m.factorised.reset();
   if (!m.obstacle.shape) return;
   m.ties = points_inside(*m.obstacle.shape, m.model.rest(), m.surface);
   for (const std::uint32_t p : m.ties) m.tied[p] = true;
@@ -216,7 +215,5 @@ template void TissueDynamics<float>::set_obstacle(RigidContact);
 template void TissueDynamics<double>::set_obstacle(RigidContact);
 template void TissueDynamics<float>::look_at_obstacle();
 template void TissueDynamics<double>::look_at_obstacle();
-template struct TissueDynamics<float>::Impl;
-template struct TissueDynamics<double>::Impl;
 
 }  // namespace osteo::inline simulation

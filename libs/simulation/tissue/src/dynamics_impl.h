@@ -15,9 +15,11 @@ struct TissueDynamics<Real>::Impl {
   TissueModel model;
   DynamicsOptions options;
   double dt = 0;
-  std::vector<Real> x, y, z, px, py, pz, fx, fy, fz;  // now, before, force
-  std::vector<Real> inverse_mass;                     // 1 / (N s2 / mm); 0: fixed
-  std::vector<Real> lx, ly, lz;                       // load
+  // Now, by how much that is further than before, force. Not the place before: its difference would be rounded to the
+  // place's last digit, which a float's short steps do not outweigh.
+  std::vector<Real> x, y, z, dx, dy, dz, fx, fy, fz;
+  std::vector<Real> inverse_mass;  // 1 / (N s2 / mm); 0: fixed
+  std::vector<Real> lx, ly, lz;    // load
   std::vector<double> mass, edge_row;
   std::vector<bool> fixed;
   std::vector<Slider> sliders;
@@ -62,16 +64,7 @@ struct TissueDynamics<Real>::Impl {
   double load_size = 0;
   Counts counts;
 
-  // Of factorised steps (dynamics_factorised.cpp), once there was one.
-  struct Factorised;
-  std::shared_ptr<Factorised> factorised;
-
   Impl(const TissueModel& m, const DynamicsOptions& o) : model(m), options(o) {}
-  [[nodiscard]] bool is_factorised() const { return options.factorised_step_s > 0; }
-  [[nodiscard]] double inertia(std::uint32_t p) const;
-  void factorise();
-  void gradient_of_step(const std::vector<Vec3>& target, std::vector<float>& gradient);
-  void step_factorised();
   void lay_out();
   double certify();
   void certify_again();
@@ -80,7 +73,6 @@ struct TissueDynamics<Real>::Impl {
   void forces();
   // What the certified step leaves room for, of tool and obstacle each: with both omega dt stays below 2.
   [[nodiscard]] double room(std::uint32_t p) const {
-    if (is_factorised()) return INFINITY;
     return 0.45 * (4 - 4 * options.step_share * options.step_share) * mass[p] / (dt * dt);
   }
   double stiffness(const RigidContact& by, double most);
@@ -94,8 +86,8 @@ struct TissueDynamics<Real>::Impl {
   }
   // Half of critical damping, as a depth less: velocity along `out` times the root of m / k.
   [[nodiscard]] double slowed(std::uint32_t p, double k, Vec3 out) const {
-    const Vec3 before{static_cast<double>(px[p]), static_cast<double>(py[p]), static_cast<double>(pz[p])};
-    return dot(out, at(p) - before) / dt * std::sqrt(mass[p] / k);
+    const Vec3 further{static_cast<double>(dx[p]), static_cast<double>(dy[p]), static_cast<double>(dz[p])};
+    return dot(out, further) / dt * std::sqrt(mass[p] / k);
   }
   void find_planes();
   void lay_surface();

@@ -1,5 +1,4 @@
-// The fast model in time: explicit steps, vectorised, with a time step that is known to be stable; or long ones with a
-// factor made once.
+// The fast model in time: explicit steps, vectorised, with a time step that is known to be stable.
 #pragma once
 #include <array>
 #include <memory>
@@ -18,21 +17,12 @@ struct DynamicsOptions {
   double step_share = 0.9;   ///< of the certified limit
   double least_step_s =
       0;  ///< a step may be this long at least: points are then made heavier until it is stable, which is counted
-  /// Above 0: factorised steps of this length, whatever the certified limit; step_share and least_step_s say nothing
-  /// then.
-  double factorised_step_s = 0;
-  int iterations = 3;  ///< of each factorised step
 };
 
 /// Verlet's method with implicit viscous damping (D. Morris 2006, section 5.4.1). The step is certified by Gershgorin's
 /// bound on the highest frequency at rest, with a quarter more for stretch; what is stretched further is looked for
-/// every hundred steps. Lumped masses. Factorised steps are backward Euler's, taken so far as a fixed number of
-/// conjugate gradients gets, preconditioned by the Cholesky factor of the model's stiffness at rest: the law stays the
-/// model's own, at large strains too, and what is not converged is seen as slower motion. They take more motion away
-/// than `damping` asks for, the longer the more. The factor is made at the first step, and again when what the obstacle
-/// holds is another; cutting leaves it as it is. Memory: 40 bytes a block of it (10,000 tetrahedra: 13 MB). A place
-/// that is no number is not taken, and counted. `Real` float: the quick one; double: the exact one, momentum kept to
-/// rounding. The same bits for any instruction set.
+/// every hundred steps. Lumped masses. A place that is no number is not taken, and counted. `Real` float: the quick one;
+/// double: the exact one, momentum kept to rounding. The same bits for any instruction set.
 template <class Real>
 class TissueDynamics {
  public:
@@ -58,9 +48,6 @@ class TissueDynamics {
   /// Tetrahedra of parts that nothing holds: no fixed or sliding point, nothing tied to the obstacle. O(tets).
   [[nodiscard]] std::vector<std::uint32_t> loose() const;
 
-  /// Makes the factor of factorised steps now, which the first step does otherwise.
-  void prepare();
-  [[nodiscard]] std::size_t factor_bytes() const;  ///< 0 before it is made
   /// Returns the force on tool 0 in the last step, N.
   Vec3 step(int steps = 1);
 
