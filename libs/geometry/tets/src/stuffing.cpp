@@ -387,7 +387,7 @@ std::uint64_t open_hinges(TetMesh& mesh) {
       if (sides[i].a == sides[i + 1].a && sides[i].b == sides[i + 1].b)
         join_sets(parent, sides[i].local, sides[i + 1].local);
     }
-    const std::uint32_t stays = n > 0 ? root_of(parent, 0) : 0;
+    const std::uint32_t stays = n > 0 ? root_of(parent, 0U) : 0;
     std::unordered_map<std::uint32_t, std::uint32_t> own;
     for (std::uint32_t k = 0; k < n; ++k) {
       const std::uint32_t r = root_of(parent, k);

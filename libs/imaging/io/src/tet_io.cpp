@@ -167,13 +167,6 @@ void drop_middles(TetMesh& mesh, std::vector<bool> middle) {
   }
 }
 
-void append_number(std::string& text, double v) {
-  char buffer[32];
-  const auto [end, problem] = std::to_chars(buffer, buffer + sizeof buffer, static_cast<float>(v));
-  (void)problem;
-  text.append(buffer, end);
-}
-
 }  // namespace
 
 bool is_tet_file(const fs::path& path) {

@@ -215,5 +215,18 @@ template void TissueDynamics<float>::set_obstacle(RigidContact);
 template void TissueDynamics<double>::set_obstacle(RigidContact);
 template void TissueDynamics<float>::look_at_obstacle();
 template void TissueDynamics<double>::look_at_obstacle();
+// What dynamics.cpp calls; not all of Impl, which one source alone may ask for.
+template void TissueDynamics<float>::Impl::lay_surface();
+template void TissueDynamics<float>::Impl::find_near();
+template void TissueDynamics<float>::Impl::push_by(Tool&);
+template void TissueDynamics<float>::Impl::find_planes();
+template void TissueDynamics<float>::Impl::untie();
+template void TissueDynamics<float>::Impl::push_by_obstacle();
+template void TissueDynamics<double>::Impl::lay_surface();
+template void TissueDynamics<double>::Impl::find_near();
+template void TissueDynamics<double>::Impl::push_by(Tool&);
+template void TissueDynamics<double>::Impl::find_planes();
+template void TissueDynamics<double>::Impl::untie();
+template void TissueDynamics<double>::Impl::push_by_obstacle();
 
 }  // namespace osteo::inline simulation
