@@ -182,6 +182,7 @@ void ReviewScene::state(ViewState& state) const {
   state.timeline = control_.shown();
   state.playing = control_.playing();
   state.review_s = control_.now_s();
+  state.speed = control_.speed();
   state.review_mm3 = volume_mm3_;
 }
 
