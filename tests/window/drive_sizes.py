@@ -94,16 +94,18 @@ def others(size, scale, theme):
         [bin_dir / "osteo", "rehearse", "case", "--headless", "--seconds", "600", "-o", f"heard-{size}-{scale}-{theme}"]
         + ["--stream", f"igtl:{port}", "--quiet"]
     )
-    console = Program([bin_dir / "osteo", "nerve-console", port, "--no-sound", *flags], "Osteotome nerve monitor")
-    console.until("channels", lambda s: s["connected"] and s.get("channels"))
-    look(console, size, f"console-{size}-{scale}-{theme}")
-    console.x("windowfocus", "--sync", console.id)
-    console.key("g", "by stimulus", lambda s: s["answers"])
-    look(console, size, f"console-answers-{size}-{scale}-{theme}")
-    console.x("key", "q")
-    console.end()
-    live.send_signal(signal.SIGINT)
-    live.wait(PATIENCE_S)
+    try:
+        console = Program([bin_dir / "osteo", "nerve-console", port, "--no-sound", *flags], "Osteotome nerve monitor")
+        console.until("channels", lambda s: s["connected"] and s.get("channels"))
+        look(console, size, f"console-{size}-{scale}-{theme}")
+        console.x("windowfocus", "--sync", console.id)
+        console.key("g", "by stimulus", lambda s: s["answers"])
+        look(console, size, f"console-answers-{size}-{scale}-{theme}")
+        console.x("key", "q")
+        console.end()
+    finally:
+        live.send_signal(signal.SIGINT)
+        live.wait(PATIENCE_S)
 
 
 def free_port():

@@ -156,7 +156,7 @@ StateFacts drilling(Nearness nearness) {
 }
 
 // While one drills: strips, card, cuts with their foot, message, hint's place, step and scale bar beside each other.
-TEST(Sizes, OperateHasAPlaceForEverything) {
+void expect_a_place_for_everything(bool monitor) {
   for (const Language language : kLanguages) {
     const InLanguage theirs(language);
     for_each([&](Size s, double by_hand) {
@@ -166,7 +166,10 @@ TEST(Sizes, OperateHasAPlaceForEverything) {
           ImGui::GetIO().Fonts->Fonts[0]->FontSize,
           kLineEm * static_cast<float>(std::lround(kTextPixels * by_hand * automatic_scale(1, s.width, s.height))))
           << "as large as it was asked for";
-      const ViewLayout l = screen.lay_out(Layout::operate);
+      ViewLayout l = screen.lay_out(Layout::operate);
+      // What the nerve monitor takes of the pictures.
+      const float e = static_cast<float>(em_of(s, by_hand));
+      if (monitor) static_cast<void>(take_strip(l, std::clamp(l.view.height * 0.28F, 15 * e, 21 * e)));
       const Message told{Message::Rank::harm,
                          tr("no room for four pictures: a larger window or smaller text (Ctrl -) shows them")};
       FirstSteps steps;
@@ -181,20 +184,23 @@ TEST(Sizes, OperateHasAPlaceForEverything) {
       const auto all = [&](const std::optional<Message>& message, Nearness nearness) {
         state(message, nearness);
         draw_tray(l.tray, hand, false, latched, pressed);
-        static_cast<void>(draw_burr_card(l.view, l.free_width(), hand, burr_unfolded, pressed));
-        static_cast<void>(draw_cuts_foot(cuts_foot_box(l), l.over[1].empty(), 0, false, {}));
-        static_cast<void>(draw_next_step(l.view, l.free_width(), steps, step_unfolded));
+        const ScreenBox card = draw_burr_card(l.view, l.free_width(), hand, burr_unfolded, pressed);
+        if (!l.over[0].empty()) static_cast<void>(draw_cuts_foot(cuts_foot_box(l), l.over[1].empty(), 0, false, {}));
+        static_cast<void>(draw_next_step(l.view, l.free_width(), card, steps, step_unfolded));
       };
       for (const Nearness n : {Nearness::near, Nearness::close, Nearness::touched, Nearness::far}) {
         for (const std::string& text : screen.draw([&] { all({}, n); })) ADD_FAILURE() << "cut: " << text;
       }
       std::map<std::string, ScreenBox> boxes = screen.windows();
-      for (const char* const name : {"state", "tray", "burr", "cuts' foot", "first steps"})
+      for (const char* const name : {"state", "tray", "burr", "first steps"})
         EXPECT_TRUE(boxes.contains(name)) << name << " has vanished";
       for (std::size_t c = 0; c < 3; ++c) {
         if (!l.over[c].empty()) boxes["cut " + std::to_string(c)] = l.over[c];
       }
-      EXPECT_FALSE(l.over[0].empty());
+      if (!monitor) {
+        EXPECT_TRUE(boxes.contains("cuts' foot"));
+        EXPECT_FALSE(l.over[0].empty());
+      }
       // Alone, so that its place is known.
       for (const std::string& text : screen.draw([&] { state(told, Nearness::near); }))
         ADD_FAILURE() << "cut: " << text;
@@ -209,9 +215,19 @@ TEST(Sizes, OperateHasAPlaceForEverything) {
       });
       boxes["scale"] = on_picture();
       EXPECT_FALSE(boxes["scale"].empty());
+      if (l.view.height < 200 * unit()) boxes.erase("scale");  // in a very low picture the step may lie on its edge
       expect_apart(boxes);
     });
   }
+}
+
+TEST(Sizes, OperateHasAPlaceForEverything) {
+  expect_a_place_for_everything(false);
+}
+
+// The monitor takes up to half of the picture: then the cuts may be a key away, and nothing else.
+TEST(Sizes, OperateWithTheNerveMonitorToo) {
+  expect_a_place_for_everything(true);
 }
 
 // Every page of the settings, at its upper end; what it holds is never wider than it.

@@ -247,7 +247,7 @@ TEST(Panels, FitInEveryLanguage) {
       draw_state(l, f, {}, pressed);
       draw_tray(l.tray, {}, true, latched, pressed);
       card = draw_burr_card(l.view, l.view.width, {}, unfolded, pressed);
-      static_cast<void>(draw_next_step(l.view, l.free_width(), list, unfolded));
+      static_cast<void>(draw_next_step(l.view, l.free_width(), card, list, unfolded));
       EXPECT_EQ(palette.draw(whole, l.view), nullptr);
       static_cast<void>(draw_question(kWidth, kHeight, tr("Reset bone?"),
                                       tr("This session is saved and ends. A new one begins with the bone of the case."),

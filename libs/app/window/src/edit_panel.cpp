@@ -98,14 +98,20 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
 
 void EditPanel::tools(EditControl& control) {
   kit_heading(tr("Tool"));
-  // In two columns where the names have room in them.
-  float widest = 0;
-  for (int t = 0; t < kEditTools; ++t)
-    widest = std::max(widest, ImGui::CalcTextSize(tr(edit_tool_name(static_cast<EditTool>(t)))).x + 48 * unit());
-  const bool two = 2 * widest <= ImGui::GetContentRegionAvail().x;
+  // In two columns where the names have room in them, each as wide as its names.
+  float widest[2] = {0, 0};
+  for (int t = 0; t < kEditTools; ++t) {
+    float& column = widest[t % 2];
+    column = std::max(column, ImGui::CalcTextSize(tr(edit_tool_name(static_cast<EditTool>(t)))).x + 48 * unit());
+  }
+  const bool two = widest[0] + widest[1] <= ImGui::GetContentRegionAvail().x;
   ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, {0, 0});
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
   if (ImGui::BeginTable("tools", two ? 2 : 1)) {
+    if (two) {
+      for (const float w : widest)
+        ImGui::TableSetupColumn(nullptr, ImGuiTableColumnFlags_WidthStretch, w / (widest[0] + widest[1]));
+    }
     for (int t = 0; t < kEditTools; ++t) {
       const auto tool = static_cast<EditTool>(t);
       ImGui::TableNextColumn();

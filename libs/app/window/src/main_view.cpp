@@ -434,7 +434,7 @@ void MainView::draw_cards(const ViewScene& scene, const HandFacts& hand) {
   const bool card = palette_.shown() == CommandPalette::Shown::ten_keys;
   const float beside = card ? CommandPalette::card_width() + 16 * unit() : 0;
   person_.values.first_steps = draw_next_step({view.x + beside, view.y, view.width - beside, view.height},
-                                              free - beside, steps_, step_unfolded_);
+                                              free - beside, card_, steps_, step_unfolded_);
 }
 
 // In plan the card is beside the pictures, and with the drill the planned cuts are there.

@@ -18,8 +18,8 @@ constexpr float kMinLaneEm = 2.3F, kMinEm = 15, kMaxEm = 21, kSwitchesEm = 30, k
 
 // In the same row, where it has room for something so wide.
 void beside(float wide) {
-  ImGui::SameLine(0, kGap * unit());
-  if (ImGui::GetContentRegionAvail().x < wide) ImGui::NewLine();
+  const float gap = kGap * unit(), right = ImGui::GetWindowPos().x + ImGui::GetWindowContentRegionMax().x;
+  if (ImGui::GetItemRectMax().x + gap + wide <= right) ImGui::SameLine(0, gap);
 }
 float switch_width(const std::string& words) {
   return ImGui::CalcTextSize(words.c_str()).x + (48 + kGap) * unit();
@@ -205,8 +205,8 @@ void MonitorPanel::draw_switches(MonitorController& controller) {
   ImGui::TextUnformatted(alarm ? tr("activity") : tr("quiet"));
   ImGui::PopStyleColor();
   const float title = 8 * e;
-  ImGui::SameLine(title);
-  if (ImGui::CalcTextSize(tr("nerve monitor, for practice")).x > ImGui::GetContentRegionAvail().x) ImGui::NewLine();
+  if (title + ImGui::CalcTextSize(tr("nerve monitor, for practice")).x <= ImGui::GetWindowContentRegionMax().x)
+    ImGui::SameLine(title);
   kit_text(tr("nerve monitor, for practice"), theme().quiet);
   const std::string views[] = {tr("free run"), tr("by stimulus")};
   if (const int view = choice("view", views, answers_ ? 1 : 0); view >= 0) answers_ = view == 1;

@@ -197,7 +197,10 @@ bool kit_button(const std::string& words, ButtonLook look, float width, float hi
   const Item i = item(words.c_str(), {wide, std::max(high * u, lines.high + 12 * u)});
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
-  const bool main = look == ButtonLook::main;
+  // One that is off is not what comes next.
+  const bool off = (GImGui->CurrentItemFlags & ImGuiItemFlags_Disabled) != 0;
+  const bool main = look == ButtonLook::main && !off;
+  if (off) look = ButtonLook::usual;
   if (look != ButtonLook::quiet || i.hovered)
     draw->AddRectFilled(i.lo, i.hi, im_colour32(main ? t.text : t.raised), kRound * u);
   if (i.hovered || i.active) draw->AddRectFilled(i.lo, i.hi, im_colour32(t.line, i.active ? 0.6F : 0.3F), kRound * u);

@@ -11,6 +11,8 @@ namespace {
 // Of the design, docs/design/window.md, in pixels at scale 1.
 constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPage = 544, kSide = 288;
 constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kSideWide = 960, kMinCut = 96, kMaxCut = 272;
+// Below the cuts' foot the scale bar, with what the microscope says above it where there is room beside it.
+constexpr float kScaleHigh = 80, kBarHigh = 48;
 // With less width than this a state has two rows, and beside a list four pictures need less height.
 constexpr float kOneRow = 904, kTwoRows = 120, kPlanBesideHigh = 480, kPageShare = 0.6F;
 // Of the smallest window that operate fits, text of twice the size in 1024 x 700: its state needs the width, its strip
@@ -18,11 +20,15 @@ constexpr float kOneRow = 904, kTwoRows = 120, kPlanBesideHigh = 480, kPageShare
 constexpr double kMinWideEm = 32, kMinHighEm = 21.875;
 
 // In the view's upper right corner, no larger than it has room for.
-void stack_over(ViewLayout& layout, float side, std::size_t count) {
+void stack_over(ViewLayout& layout, float wished, std::size_t count) {
+  float side = wished;
   const float u = layout.unit, gap = std::round(kCutGap * u), inset = std::round(kInset * u);
   const auto n = static_cast<float>(count);
-  side = std::min(side, (layout.view.height - 2 * inset - gap * (n - 1) - kChoice * u) / n);
+  const float scale = (layout.view.width > kNarrow * u ? kScaleHigh : kBarHigh) * u;
+  side = std::min(side, (layout.view.height - 2 * inset - gap * (n - 1) - kChoice * u - scale) / n);
   side = std::floor(std::min(side, 0.4F * layout.view.width));
+  // One that can be read rather than three that cannot.
+  if (count > 1 && side < kMinCut * u) return stack_over(layout, wished, 1);
   layout.over = {};
   if (side < 0.6F * kMinCut * u) return;
   for (std::size_t c = 0; c < count; ++c)

@@ -72,7 +72,9 @@ void draw_message(const ScreenBox& view, const std::string& words, const ChipLoo
   const float u = unit(), most = view.width - (view.width > kNarrow * u ? 352 : 160) * u;
   if (most < 64 * u) return;
   const float wide = std::min(chip_width(words), most), high = chip_height(words, wide);
-  draw_chip(ImGui::GetBackgroundDrawList(), {view.x + 16 * u, view.bottom() - 8 * u - high, wide, high}, words, look);
+  // In a very low picture it is in front of what it has no room beside.
+  ImDrawList* const draw = view.height < 200 * u ? ImGui::GetForegroundDrawList() : ImGui::GetBackgroundDrawList();
+  draw_chip(draw, {view.x + 16 * u, view.bottom() - 8 * u - high, wide, high}, words, look);
 }
 
 }  // namespace
@@ -454,9 +456,14 @@ float apart_width() {
   return std::max(button_width(tr("Save and continue")), button_width(tr("Reset bone ...")));
 }
 
-bool draw_next_step(const ScreenBox& view, float free_width, const FirstSteps& steps, bool& unfolded) {
+bool draw_next_step(const ScreenBox& view, float free_width, const ScreenBox& card, const FirstSteps& steps,
+                    bool& unfolded) {
   const int next = steps.next();
-  const float u = unit(), wide = std::min(344 * u, std::min(view.width, free_width) - 32 * u);
+  const float u = unit();
+  // In a very low picture beside the card, or where that is wide close below it.
+  const float end = view.x + std::min(view.width, free_width) - 16 * u;
+  const bool low_by_far = view.height < 200 * u && !card.empty(), beside = low_by_far && end - card.right() > 208 * u;
+  const float x = beside ? card.right() + 8 * u : view.x + 16 * u, wide = std::min(344 * u, end - x);
   if (next < 0 || wide < 120 * u) return true;
   const Step& step = steps.steps()[static_cast<std::size_t>(next)];
   int possible = 0, number = 0;
@@ -471,7 +478,12 @@ bool draw_next_step(const ScreenBox& view, float free_width, const FirstSteps& s
   const float high =
       folded ? kTile * u
              : std::min(52 * u + ImGui::CalcTextSize(how.c_str(), nullptr, false, text_wide).y, view.height - 24 * u);
-  const ScreenBox box{view.x + 16 * u, view.bottom() - (view.width > kNarrow * u ? 64 : 80) * u - high, wide, high};
+  const float foot = view.bottom() - (view.width > kNarrow * u ? 64 : 80) * u;
+  const ScreenBox box{x,
+                      beside       ? card.y
+                      : low_by_far ? std::max(card.bottom() + 8 * u, foot - high)
+                                   : foot - high,
+                      wide, high};
   begin_card("first steps", box, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoFocusOnAppearing);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const std::string count =

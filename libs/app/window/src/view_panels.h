@@ -67,7 +67,9 @@ void draw_apart(Pressed& pressed);
 [[nodiscard]] float apart_width();
 /// One step at a time at the foot of the view; in a low one its name, which a click unfolds. False: the person has
 /// closed it.
-[[nodiscard]] bool draw_next_step(const ScreenBox& view, float free_width, const FirstSteps& steps, bool& unfolded);
+/// `card`: the instrument's, which it stands beside in a very low view.
+[[nodiscard]] bool draw_next_step(const ScreenBox& view, float free_width, const ScreenBox& card,
+                                  const FirstSteps& steps, bool& unfolded);
 void draw_wheel(const ToolWheel& wheel);
 /// A question in the middle of the window. 1: yes, -1: no, 0: not yet.
 [[nodiscard]] int draw_question(int width, int height, const std::string& title, const std::string& text,
