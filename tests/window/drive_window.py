@@ -465,10 +465,20 @@ def main_view():
         back = w.key("shift+Left", "ten seconds back", lambda s: s["review_s"] <= max(0, last["review_s"] - 9.9))
         w.key("Right", "a second on", lambda s: s["review_s"] > back["review_s"])
         w.key("space", "plays", lambda s: s["playing"] or s["review_s"] == last["review_s"])
-        # The player by the mouse: to the ends, where nothing happened in between; it plays, faster, and rests.
-        w.item("before", "the beginning", lambda s: s["review_s"] == 0)
-        w.item("after", "the end", lambda s: s["review_s"] == last["review_s"])
-        w.item("before", "the beginning", lambda s: s["review_s"] == 0)
+        # The player by the mouse: from event to event as far as the ends; it plays, faster, and rests.
+        w.until("at rest", lambda s: not s["playing"])
+
+        def jump(button, way, end):
+            for _ in range(20):
+                here = w.state()["review_s"]
+                if here == end:
+                    return
+                w.item(button, "another event", lambda s: (s["review_s"] - here) * way > 0)
+            raise AssertionError((button, w.state()["review_s"], end))
+
+        jump("before", -1, 0)
+        jump("after", 1, last["review_s"])
+        jump("before", -1, 0)
         speed = w.state()["speed"]
         shown = next(n for n in w.state()["items"] if re.fullmatch(r"[0-9.]+x", n) and float(n[:-1]) == speed)
         fast = w.item(shown, "another speed", lambda s: s["speed"] != speed)["speed"]

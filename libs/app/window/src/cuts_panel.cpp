@@ -433,8 +433,11 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
   }
   on.cross(control_.cross_mm());
   on.letters();
-  on.scale_bar();
-  on.title(control_.name(cut));
+  // In a very small one they would lie on the letters; its foot says which it is.
+  if (foot_.empty() || box.width >= 128 * unit()) {
+    on.scale_bar();
+    on.title(control_.name(cut));
+  }
   if (!foot_.empty())
     draw->AddRect(lo, {lo.x + box.width, lo.y + box.height}, im_colour32(theme().line), kRound * unit(), 0,
                   std::max(1.0F, unit()));

@@ -104,23 +104,19 @@ void EditPanel::tools(EditControl& control) {
     float& column = widest[t % 2];
     column = std::max(column, ImGui::CalcTextSize(tr(edit_tool_name(static_cast<EditTool>(t)))).x + 48 * unit());
   }
-  const bool two = widest[0] + widest[1] <= ImGui::GetContentRegionAvail().x;
-  ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, {0, 0});
+  const float room = ImGui::GetContentRegionAvail().x, left = std::floor(room * widest[0] / (widest[0] + widest[1]));
+  const bool two = widest[0] + widest[1] <= room;
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
-  if (ImGui::BeginTable("tools", two ? 2 : 1)) {
-    if (two) {
-      for (const float w : widest)
-        ImGui::TableSetupColumn(nullptr, ImGuiTableColumnFlags_WidthStretch, w / (widest[0] + widest[1]));
-    }
-    for (int t = 0; t < kEditTools; ++t) {
-      const auto tool = static_cast<EditTool>(t);
-      ImGui::TableNextColumn();
-      if (list_row(tr(edit_tool_name(tool)), std::to_string((t + 1) % 10), control.tool() == tool, kSmallControl))
-        control.take(tool);
-    }
-    ImGui::EndTable();
+  for (int t = 0; t < kEditTools; ++t) {
+    const auto tool = static_cast<EditTool>(t);
+    if (two && t % 2 == 1) ImGui::SameLine();
+    if (list_row(tr(edit_tool_name(tool)), std::to_string((t + 1) % 10), control.tool() == tool, kSmallControl, {},
+                 !two         ? 0
+                 : t % 2 == 0 ? left
+                              : room - left))
+      control.take(tool);
   }
-  ImGui::PopStyleVar(2);
+  ImGui::PopStyleVar();
 }
 
 void EditPanel::greys(EditControl& control) {

@@ -55,7 +55,7 @@ constexpr const char* kPageNames[] = {tr_later("View"),       tr_later("Display"
 // Of the design, docs/design/window.md.
 constexpr float kWide = 720, kPages = 184, kPad = 16, kHead = 56, kRing = 4;  // kRing: round what has the keys
 // In less the pages have a field above them in place of a list beside them.
-constexpr float kListed = 560, kField = 64;
+constexpr float kListed = 560, kField = 48;
 
 std::string percent(double share) {
   return filled(tr("{share} %"), {{"share", shown_number(100 * share, 0)}});

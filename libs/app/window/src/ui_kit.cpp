@@ -350,8 +350,9 @@ int kit_list(const std::string& name, std::span<const std::string> words, int se
   return chosen;
 }
 
-bool list_row(const std::string& words, const std::string& right, bool selected, float high, std::string_view icon) {
-  const float u = unit(), wide = std::max(ImGui::GetContentRegionAvail().x, 48 * u);
+bool list_row(const std::string& words, const std::string& right, bool selected, float high, std::string_view icon,
+              float width) {
+  const float u = unit(), wide = std::max(width > 0 ? width : ImGui::GetContentRegionAvail().x, 48 * u);
   const std::string shown = shown_part(words);
   const float behind = icon.empty() ? 0 : 28 * u, end = ImGui::CalcTextSize(right.c_str()).x + behind;
   const float words_wide = ImGui::CalcTextSize(shown.c_str()).x;

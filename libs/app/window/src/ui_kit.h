@@ -72,9 +72,9 @@ enum class ButtonLook { usual, main, quiet };
 [[nodiscard]] int kit_list(const std::string& name, std::span<const std::string> words, int selected,
                            const std::string& shown = {});
 /// A row of a list, as wide as there is room, with a second line where one is too short for both; `icon`: of
-/// icon_lines.h, behind all words.
+/// icon_lines.h, behind all words. `width`: pixels, in place of all the room.
 [[nodiscard]] bool list_row(const std::string& words, const std::string& right, bool selected, float high = kRow,
-                            std::string_view icon = {});
+                            std::string_view icon = {}, float width = 0);
 
 /// Above what belongs together, in the labels' colour; and words in lines as there is room.
 void kit_heading(const std::string& words);
