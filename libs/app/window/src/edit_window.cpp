@@ -36,6 +36,24 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+// Parted at spaces where a line would be wider.
+std::string in_lines(const std::string& words, float width) {
+  std::string lines;
+  for (std::size_t at = 0, line = 0; at < words.size();) {
+    const std::size_t end = std::min(words.find(' ', at), words.size());
+    const std::string word = words.substr(at, end - at);
+    if (!lines.empty()) {
+      const std::string longer = lines.substr(line) + " " + word;
+      const bool fits = ImGui::CalcTextSize(longer.c_str()).x <= width;
+      lines += fits ? ' ' : '\n';
+      if (!fits) line = lines.size();
+    }
+    lines += word;
+    at = end + 1;
+  }
+  return lines;
+}
+
 class EditWindow {
  public:
   EditWindow(EditDocument& document, const EditWindowOptions& options, const EditWindowActions& actions)
@@ -239,7 +257,11 @@ class EditWindow {
   [[nodiscard]] float panel_width() const {
     return std::round(std::min(340 * scale_, static_cast<float>(width_) * 0.4F));
   }
-  [[nodiscard]] int bar_height() const { return static_cast<int>(std::round(84 * scale_)); }
+  // Of the words at the foot, which need more lines where it is narrow.
+  [[nodiscard]] int bar_height() const {
+    const bool narrow = static_cast<float>(width_) - panel_width() < 560 * scale_;
+    return static_cast<int>(std::round((narrow ? 124 : 84) * scale_));
+  }
 
   void lay_out() {
     const int left = static_cast<int>(panel_width()) + 2, gap = 2;
@@ -406,10 +428,11 @@ class EditWindow {
         const ImVec2 c{lo.x + static_cast<float>(p[0]), lo.y + static_cast<float>(p[1])};
         draw->AddCircle(c, 7 * scale_, kCrossColour, 0, 2 * scale_);
       }
+      const std::string caption = control_.previewing() ? tr("3D preview, being made ...")
+                                  : control_.live()     ? tr("3D preview of the threshold")
+                                                        : tr("3D preview, coarse");
       shadowed_text(draw, {lo.x + 8 * scale_, lo.y + 6 * scale_},
-                    control_.previewing() ? tr("3D preview, being made ...")
-                    : control_.live()     ? tr("3D preview of the threshold")
-                                          : tr("3D preview, coarse"));
+                    in_lines(caption, static_cast<float>(b.width) - 16 * scale_));
       draw->PopClipRect();
     }
   }
@@ -421,30 +444,25 @@ class EditWindow {
   }
 
   void status_bar() {
-    const float left = panel_width(), u = unit();
-    begin_fixed("Status",
-                {left, static_cast<float>(height_ - bar_height()), static_cast<float>(width_) - left,
-                 static_cast<float>(bar_height())},
-                ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
-    // Above what can be done and where the mouse is, below what was said last: both whole, or whole on hovering.
-    const std::string place = control_.readout();
-    const ImVec2 at = ImGui::GetCursorScreenPos();
-    const float room = ImGui::GetContentRegionAvail().x, place_wide = ImGui::CalcTextSize(place.c_str()).x,
-                line = ImGui::GetFontSize() + 4 * u, hint_wide = room - (place.empty() ? 0 : place_wide + 16 * u);
-    ImDrawList* const draw = ImGui::GetWindowDrawList();
-    const bool beside = ImGui::CalcTextSize(control_.hint().c_str()).x <= hint_wide;
-    fitted_text(draw, {at.x, at.y, beside ? hint_wide : room, line}, em(), theme().quiet, control_.hint());
-    if (!place.empty())
-      fitted_text(draw,
-                  {at.x + room - std::min(room, place_wide + 1), at.y + (beside ? 0 : line),
-                   std::min(room, place_wide + 1), line},
-                  em(), theme().text, place);
-    ImGui::SetCursorScreenPos({at.x, at.y + (beside ? 1 : 2) * line});
+    const float left = panel_width(), u = unit(), wide = static_cast<float>(width_) - left,
+                high = static_cast<float>(bar_height());
+    // What is longer than it has room for can be scrolled to.
+    begin_fixed("Status", {left, static_cast<float>(height_) - high, wide, high});
+    // Above what can be done and where the mouse is, below what was said last.
+    const std::string hint = control_.hint(), place = control_.readout();
+    const float room = ImGui::GetContentRegionAvail().x, place_wide = ImGui::CalcTextSize(place.c_str()).x;
+    ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {8 * u, 2 * u});
+    kit_text(hint, theme().quiet);
+    if (!place.empty()) {
+      if (ImGui::CalcTextSize(hint.c_str()).x + place_wide + 16 * u <= room) ImGui::SameLine(room - place_wide);
+      kit_text(place, theme().text);
+    }
     if (control_.busy()) {
       ImGui::ProgressBar(static_cast<float>(control_.progress()), {std::min(160 * u, room), ImGui::GetFontSize()});
       ImGui::SameLine();
     }
     kit_text(control_.message(), theme().text);
+    ImGui::PopStyleVar();
     ImGui::End();
   }
 

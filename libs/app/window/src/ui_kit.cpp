@@ -96,6 +96,7 @@ struct Lines {
   float wide, high;
 };
 Lines lines_of(const std::string& words, float width, float size) {
+  need_letters(words);
   ImFont* const font = ImGui::GetFont();
   float longest = 0;
   for (std::size_t at = 0; at < words.size();) {
@@ -191,7 +192,7 @@ float button_width(const std::string& words) {
 bool kit_button(const std::string& words, ButtonLook look, float width, float high) {
   const float u = unit(), room = std::max(ImGui::GetContentRegionAvail().x, 64 * u), wanted = button_width(words);
   const std::string shown = shown_part(words);
-  const float wide = wanted > room + 1 ? room : std::max(width, wanted);
+  const float wide = wanted > room + 1 ? room : std::max(std::min(width, room), wanted);
   const Lines lines = wanted > room + 1 ? lines_of(shown, room - 16 * u, ImGui::GetFontSize())
                                         : Lines{shown, wanted - 32 * u, ImGui::GetFontSize()};
   const Item i = item(words.c_str(), {wide, std::max(high * u, lines.high + 12 * u)});
@@ -357,7 +358,11 @@ bool list_row(const std::string& words, const std::string& right, bool selected,
   const float behind = icon.empty() ? 0 : 28 * u, end = ImGui::CalcTextSize(right.c_str()).x + behind;
   const float words_wide = ImGui::CalcTextSize(shown.c_str()).x;
   const bool two = !right.empty() && words_wide + end + 36 * u > wide;
-  const Item i = item(words.c_str(), {wide, (two ? std::max(high, 60.0F) : high) * u});
+  // Words alone have as many lines as they need.
+  const bool alone = right.empty() && words_wide + behind + 24 * u > wide;
+  const Lines lines = alone ? lines_of(shown, wide - behind - 24 * u, ImGui::GetFontSize()) : Lines{};
+  const float tall = alone ? std::max(high * u, lines.high + 12 * u) : (two ? std::max(high, 60.0F) : high) * u;
+  const Item i = item(words.c_str(), {wide, tall});
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
   if (selected || i.hovered) draw->AddRectFilled(i.lo, i.hi, im_colour32(t.raised), kRound * u);
@@ -369,6 +374,12 @@ bool list_row(const std::string& words, const std::string& right, bool selected,
   const std::string told = two ? shortened(right, wide - behind - 24 * u, ImGui::GetFontSize()) : right;
   draw->AddText({i.hi.x - ImGui::CalcTextSize(told.c_str()).x - behind - 12 * u, middle + by}, im_colour32(t.quiet),
                 told.c_str());
+  if (alone) {
+    draw_lines(draw, {i.lo.x + 12 * u, (i.lo.y + i.hi.y - lines.high) / 2}, wide - behind - 24 * u, lines.words,
+               t.text);
+    focus_and_text(lines.words == shown ? std::string() : shown);
+    return i.pressed;
+  }
   const std::string name =
       shortened(shown, wide - (two ? behind + 24 * u : end + (right.empty() ? 24 : 36) * u), ImGui::GetFontSize());
   draw->AddText({i.lo.x + 12 * u, middle - by}, im_colour32(t.text), name.c_str());
