@@ -28,7 +28,7 @@ float switch_width(const std::string& words) {
 // A lane of a channel: its name and gain at the left, where clicks change the gain.
 ScreenBox lane_head(MonitorScreen& screen, std::size_t channel, const std::string& name, const ScreenBox& lane) {
   ImDrawList* const draw = ImGui::GetWindowDrawList();
-  const float e = em(), wide = std::min(8.2F * e, 0.45F * lane.width), side = std::min(lane.height / 2, 1.5F * e);
+  const float e = em(), wide = std::min(8.2F * e, 0.6F * lane.width), side = std::min(lane.height / 2, 1.5F * e);
   fitted_text(draw, {lane.x, lane.y, wide - 0.4F * e, std::min(lane.height / 2, 1.1F * e)}, e * kLabelEm, theme().text,
               name);
   const float y = lane.y + lane.height / 2;
