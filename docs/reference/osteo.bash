@@ -106,7 +106,7 @@ _osteo() {
     batch) flags="$flags --out --pipeline --jobs --memory-mb --minutes --retries --retry-failed --keep-free-mb --only --report-only --no-report" ;;
     report) flags="$flags --scan --dicom --measures --segmentation" ;;
     approve) flags="$flags --by --note --withdraw" ;;
-    edit) flags="$flags --apply --scan --width --height --state-file" ;;
+    edit) flags="$flags --apply --scan --width --height --scale --state-file" ;;
     export-slicer) flags="$flags --source" ;;
     import-slicer) flags="$flags --source --match-by-position --check" ;;
     estimate-cost) flags="$flags --settings --contact --dust --heat" ;;

@@ -18,7 +18,7 @@ languages = {
 # Texts that stand in tables of libraries below, which know nothing of languages: file, pattern, how it is shown.
 tables = [
     ("pipelines/hints.json", r'"words": "([^"]*)"', str),
-    ("pipelines/hints.json", r'"id": "([^"]*)"', str),
+    ("pipelines/hints.json", r'"name": "([^"]*)"', str),
     (
         "libs/simulation/bone/include/osteo/simulation/bone/posture.h",
         r"names\(Posture\) \{\n  return \{(.*?)\}",
@@ -29,6 +29,11 @@ tables = [
     (
         "libs/app/window/include/osteo/app/window/hand_buttons.h",
         r"names\(HandFunction\) \{\n  return \{(.*?)\}",
+        "enum",
+    ),
+    (
+        "libs/network/tutor/include/osteo/network/tutor/playback_params.h",
+        r"names\(PlaybackMode\) \{\n  return \{(.*?)\}",
         "enum",
     ),
     ("libs/app/window/src/view_layout.h", r"names\(Layout\) \{\n  return \{(.*?)\}", "enum"),
@@ -268,7 +273,7 @@ else:
     ):
         if ("", text) not in wanted:
             bad.append(f"review.js says {text!r}, which kScriptTexts of libs/assessment/review/src/page.cpp lacks")
-    font = root / "libs/app/window/fonts/NotoSansSC-Catalogue.otf"
+    font = root / "libs/app/window/fonts/NotoSansSC.otf"
     lacking = {c for c in (po / "zh_CN.po").read_text() + "简体中文" if ord(c) > 0x2E80} - {
         chr(c) for c in letters_of(font)
     }

@@ -182,6 +182,18 @@ def lesson():
         w.key("s", "screenshot", lambda s: pathlib.Path("led/screenshot-1.png").exists())
         w.key("ctrl+g", "led", lambda s: s["tutor"]["guiding"] and s["tutor"]["pull"] == 1)
         w.close()
+        # Who teaches, and how, is said in the language of the window.
+        english, everywhere = os.environ["LANGUAGE"], os.environ.get("LC_ALL")
+        os.environ.update(LANGUAGE="", LC_ALL="de_DE.UTF-8")
+        for flags, title in (
+            (("--playback", "expert", "--playback-as", "mode=show"), "Lektion: vorführen, "),
+            (("--tutor", "--two-way"), "Sie unterrichten; "),
+        ):
+            w = Window(*flags, "--no-sound", "-o", f"german-{flags[0][2:]}")
+            w.until("in German", lambda s: s["tutor"]["title"].startswith(title))
+            w.close()
+        os.environ["LANGUAGE"] = english
+        os.environ.pop("LC_ALL") if everywhere is None else os.environ.update(LC_ALL=everywhere)
     closed("led")
     assert fades("led", 1) <= 0.06, fades("led", 1)
 

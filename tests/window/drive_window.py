@@ -238,6 +238,12 @@ def keys():
         setting("sound", "on again", lambda s: s["sound"])
         setting("page operation", "its page", lambda s: s["settings"] == "operation")
         setting("monitor", "shown, whatever it hears", lambda s: s["monitor"]["shown"])
+        # The patient is turned over by the mouse: dust falls to the other side of the head, and back.
+        lies = w.state()["down"]
+        w.item("Patient position", "its list", lambda s: "Prone" in s["items"])
+        w.item("Prone", "turned over", lambda s: dot(s["down"], lies) < -0.99 and "prone" in s["message"])
+        w.item("Patient position", "its list", lambda s: "Supine" in s["items"])
+        w.item("Supine", "as before", lambda s: dot(s["down"], lies) > 0.99)
         w.key("Escape", "keys given back", lambda s: not s["settings"])
         w.x("mousemove", 560, 350)
         w.key("ctrl+h", "no hints", lambda s: not s["hints"])
@@ -389,7 +395,7 @@ def keys():
         ("sound", "true"),
     ], switched
     assert ("monitor", "true") in switched, switched
-    assert 'width: 1000' in osteo("info", "first/screenshot-1.png"), osteo("info", "first/screenshot-1.png")
+    assert "width: 1000" in osteo("info", "first/screenshot-1.png"), osteo("info", "first/screenshot-1.png")
     # Each key of the table was pressed above.
     named = {"kSpace": "space", "kKeyEscape": "Escape", "kEnter": "Return", "kKeypadEnter": "KP_Enter"}
     table = re.findall(
@@ -459,6 +465,26 @@ def main_view():
         back = w.key("shift+Left", "ten seconds back", lambda s: s["review_s"] <= max(0, last["review_s"] - 9.9))
         w.key("Right", "a second on", lambda s: s["review_s"] > back["review_s"])
         w.key("space", "plays", lambda s: s["playing"] or s["review_s"] == last["review_s"])
+        # The player by the mouse: from event to event as far as the ends; it plays, faster, and rests.
+        w.until("at rest", lambda s: not s["playing"])
+
+        def jump(button, way, end):
+            for _ in range(20):
+                here = w.state()["review_s"]
+                if here == end:
+                    return
+                w.item(button, "another event", lambda s: (s["review_s"] - here) * way > 0)
+            raise AssertionError((button, w.state()["review_s"], end))
+
+        jump("before", -1, 0)
+        jump("after", 1, last["review_s"])
+        jump("before", -1, 0)
+        speed = w.state()["speed"]
+        shown = next(n for n in w.state()["items"] if re.fullmatch(r"[0-9.]+x", n) and float(n[:-1]) == speed)
+        fast = w.item(shown, "another speed", lambda s: s["speed"] != speed)["speed"]
+        w.item(f"{fast:g}x", "and another", lambda s: s["speed"] not in (speed, fast))
+        w.item("play", "plays", lambda s: s["playing"] and s["review_s"] > 0 or s["review_s"] == last["review_s"])
+        w.until("to the end, and rests there", lambda s: not s["playing"] and s["review_s"] == last["review_s"])
         w.key("ctrl+t", "away again", lambda s: not s["timeline"] and not s["playing"])
         again = w.key("F5", "goes on", lambda s: not s["ended"] and s["tick"] > 0 and s["session"] != ended["session"])
         w.key("q", "the page at the end", lambda s: s["ended"])
@@ -477,6 +503,15 @@ def main_view():
         click("dust", "on", lambda s: s["dust"])
         shot = click("operate", "opened", lambda s: s.get("page") != "start" and s["tick"] > 0)
         assert shot["layout"] == "operate", shot
+        # In plan a click on a structure's eye shows it solid, clear, hidden in turns.
+        w.key("F2", "plan", lambda s: s["layout"] == "plan")
+        plan = w.until("its list of structures", lambda s: set(s["items"]) & set(s["structures"]))
+        eye = sorted(set(plan["items"]) & set(plan["structures"]))[0]
+        looks = [plan["structures"][eye]]
+        for _ in range(3):
+            looks.append(w.item(eye, "another look", lambda s: s["structures"][eye] != looks[-1])["structures"][eye])
+        assert set(looks[:3]) == {"solid", "clear", "hidden"} and looks[3] == looks[0], looks
+        w.key("F2", "operate", lambda s: s["layout"] == "operate")
         on_demo = pathlib.Path(w.key("q", "the page at the end", lambda s: s["ended"])["session"])
         w.key("Home", "another case", lambda s: s.get("page") == "start")
         w.x("key", "q")

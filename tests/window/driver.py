@@ -82,6 +82,23 @@ class Program:
         x("key", key)
         return self.until(f"{key}: {what}", condition)
 
+    def item(self, words, what, condition):
+        """Clicks what has these words, once it stays where it is."""
+        last = None
+
+        def still(state):
+            nonlocal last
+            at = state["items"].get(words)
+            before, last = last, at
+            return at is not None and at == before
+
+        at = self.until(f"'{words}' is there", still)["items"][words]
+        x("mousemove", *map(round, at))
+        n = self.state()["pictures"]
+        self.until("the mouse is seen there", lambda s: s["pictures"] > n + 1)
+        x("click", 1)
+        return self.until(f"'{words}': {what}", condition)
+
     def end(self, code=0):
         self.app.wait(PATIENCE_S)
         assert self.app.returncode == code, (self.app.returncode, self.said())

@@ -133,6 +133,7 @@ struct EditWindowCommand {
     EditWindowOptions options;
     options.width = p.width;
     options.height = p.height;
+    options.scale = p.scale;
     options.title = "Osteotome edit - " + folder.filename().string();
     options.state_file = p.state_file;
     options.places = places;

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "osteo/core/base/error.h"
+#include "osteo/core/base/translate.h"
 
 namespace osteo {
 namespace {
@@ -110,7 +111,7 @@ TutorNow LiveSessionRunner::now(const Rehearsal* rehearsal) const {
   TutorNow n;
   if (hosts_ && host_ && net_) {
     n.teaches = true;
-    n.title = two_way_ ? "You teach; hands pull each other" : "You teach; the trainee's hand is led by yours";
+    n.title = two_way_ ? tr("You teach; hands pull each other") : tr("You teach; the trainee's hand is led by yours");
     const bool bracket = listen_.find(':') != std::string::npos;
     n.invitation = "osteo rehearse CASE --join " + (bracket ? "[" + listen_ + "]" : listen_) + ":" +
                    std::to_string(net_->port()) + "\ncode " + code_;
@@ -124,21 +125,22 @@ TutorNow LiveSessionRunner::now(const Rehearsal* rehearsal) const {
       n.links.push_back({who, s.heard, s.rtt_ms, s.offset_ms, s.drift_ppm, s.lost,
                          static_cast<double>(s.behind_ticks) / 1000, s.bone_differs_since > 0});
     }
-    if (host_->tries_left() == 0) n.trouble = "three wrong codes: nobody else can join this session";
+    if (host_->tries_left() == 0) n.trouble = tr("three wrong codes: nobody else can join this session");
     if (host_->lost())
-      n.trouble = "this machine does not keep up, or half an hour has passed: the others get no more of this session";
+      n.trouble =
+          tr("this machine does not keep up, or half an hour has passed: the others get no more of this session");
     const TickRecord far = rehearsal != nullptr ? rehearsal->latest(1) : TickRecord{};
     if (far.tick != 0 && far.device.age_ms < 255)
       n.apart_mm = length(from_floats(far.device.position_mm) - from_floats(rehearsal->latest(0).device.position_mm));
   } else if (hosts_ && !closed_.empty()) {
-    n.title = "You teach";
+    n.title = tr("You teach");
     n.teaches = true;
     n.hands = {"you", "trainee"};
-    n.trouble = "nobody can join this session: " + closed_;
+    n.trouble = filled(tr("nobody can join this session: {why}"), {{"why", closed_}});
   } else if (seat_) {
     const SeatStatus s = seat_->status();
     const bool trainee = role_ == JoinRole::trainee;
-    n.title = trainee ? "You learn; the instructor's hand leads yours" : "You watch";
+    n.title = trainee ? tr("You learn; the instructor's hand leads yours") : tr("You watch");
     n.teaches = !trainee;
     n.hands =
         trainee ? std::vector<std::string>{"you", "instructor"} : std::vector<std::string>{"instructor", "trainee"};
@@ -148,11 +150,11 @@ TutorNow LiveSessionRunner::now(const Rehearsal* rehearsal) const {
     n.guiding = pulls_;
     n.pull = trainee ? s.strength : 0;
     if (trainee && s.strength > 0) n.apart_mm = s.apart_mm;
-    if (s.over) n.trouble = "the instructor's session is over";
-    if (s.host_lost) n.trouble = "the instructor's machine gives no more of this session";
-    if (s.state == JoinState::refused) n.trouble = "the host rejects: " + s.why;
+    if (s.over) n.trouble = tr("the instructor's session is over");
+    if (s.host_lost) n.trouble = tr("the instructor's machine gives no more of this session");
+    if (s.state == JoinState::refused) n.trouble = filled(tr("the host rejects: {why}"), {{"why", s.why}});
     n.begin_again = s.another || (s.bone_differs_since > 0 && again_ < kMaxAgain);
-    if (s.bone_differs_since > 0 && !n.begin_again) n.trouble = "this copy's bone is another than the instructor's";
+    if (s.bone_differs_since > 0 && !n.begin_again) n.trouble = tr("this copy's bone is another than the instructor's");
   }
   return n;
 }

@@ -157,9 +157,10 @@ TutorNow SessionRunner::tutor() const {
     if (procedure_ != nullptr) n.procedure = procedure_->name;
     return n;
   }
-  n.title = "Lesson: " + std::string(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(playback_params_.mode)]) +
-            ", " + format_number(std::round(10 * playback_->seconds.load()) / 10) + " of " +
-            format_number(std::round(10 * lesson_->seconds()) / 10) + " s";
+  const std::string mode(EnumNames<PlaybackMode>::values[static_cast<std::size_t>(playback_params_.mode)]);
+  n.title = filled(tr("Lesson: {mode}, {now} of {all} s"), {{"mode", tr(mode)},
+                                                            {"now", shown_number(playback_->seconds.load(), 1)},
+                                                            {"all", shown_number(lesson_->seconds(), 1)}});
   n.hands = {"you"};
   for (std::size_t h = 0; h < lesson_->hands.size(); ++h)
     n.hands.push_back(h == 0 ? "recorded" : "recorded " + std::to_string(h + 1));

@@ -36,7 +36,7 @@ int EditCommand::run(const Params& p, cli::Invocation& io) {
                 "make one with: osteo prepare CT -o " + shell_path(folder));
   }
   if (!p.apply.empty()) {
-    for (const char* const name : {"width", "height", "state_file"}) {
+    for (const char* const name : {"width", "height", "scale", "state_file"}) {
       if (io.given.contains(name))
         throw Error(ExitCode::usage, "--apply opens no window, so --" + std::string(name) + " does nothing");
     }

@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "osteo/assessment/evidence/hints.h"
 #include "osteo/core/base/translate.h"
 #include "ui_kit.h"
 #include "ui_style.h"
@@ -55,6 +56,18 @@ TEST(Settings, EachMemberHasOneRow) {
   for (const SettingRow& r : setting_rows()) members.insert(r.member);
   for (const FieldRef& f : fields_of<PersonValues>(values)) EXPECT_EQ(members.count(f.doc.name), 1U) << f.doc.name;
   EXPECT_EQ(members.size(), fields_of<PersonValues>(values).size());
+}
+
+// People choose hints by names in their language, not by what files call them.
+TEST(Settings, HintsHaveNames) {
+  for (const HintRule& r : usual_hints()) {
+    EXPECT_FALSE(r.name.empty()) << r.id;
+    EXPECT_NE(r.name, r.id);
+    for (const Language language : {Language::german, Language::spanish, Language::french, Language::chinese}) {
+      const InLanguage theirs(language);
+      EXPECT_NE(tr(r.name), r.name) << r.id;
+    }
+  }
 }
 
 // A click somewhere in a row changes what it is for and nothing else.

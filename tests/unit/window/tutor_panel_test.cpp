@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "osteo/core/base/translate.h"
+
 namespace osteo {
 namespace {
 
@@ -76,6 +78,24 @@ TEST(TutorPanel, HarmCountsTimes) {
   EXPECT_EQ(harm.at(6), (WorkDone::Harm{2, 1, 1}));
   EXPECT_EQ(harm.at(7), (WorkDone::Harm{1, 1, 0})) << "of the other hand";
   EXPECT_TRUE(harm_lines(harm, nullptr).empty()) << "a case without structures has no names for them";
+}
+
+// The runner of sessions names who takes part in English, which notes and messages compare; people read their language.
+TEST(TutorPanel, WhoTakesPartIsNamedInTheLanguage) {
+  const InLanguage german(Language::german);
+  TutorNow::Link link;
+  for (const std::string who : {"trainee", "watcher", "instructor", "recorded", "you"}) {
+    EXPECT_NE(shown_who(who), who);
+    EXPECT_EQ(shown_who(who), tr(who));
+    link.who = who + " 2";
+    EXPECT_EQ(shown_who(link.who), tr(who) + " 2");
+    for (const bool heard : {false, true}) {
+      link.heard = heard;
+      EXPECT_NE(link_text(link).find(tr(who) + " 2"), std::string::npos) << link_text(link);
+    }
+  }
+  EXPECT_EQ(shown_who("2"), "2");
+  EXPECT_EQ(shown_who(""), "");
 }
 
 }  // namespace

@@ -167,18 +167,41 @@ TEST(ViewLayout, PlanHasASideAndFourPicturesOfOneSize) {
       EXPECT_NEAR(c.height, l.view.height, 1);
     }
   }
-  EXPECT_TRUE(lay_out(Layout::plan, 1024, 900, 20).side.empty());
+  EXPECT_TRUE(lay_out(Layout::plan, 1100, 900, 20).side.empty());
+  // On 1920 x 1080 with text of twice the size four pictures have room beside their list.
+  EXPECT_EQ(lay_out(Layout::plan, 1920, 1080, 32).shown, Layout::plan);
+  EXPECT_FALSE(lay_out(Layout::plan, 1920, 1080, 32).side.empty());
   EXPECT_TRUE(lay_out(Layout::operate, 1920, 1080, 16).side.empty());
 }
 
 TEST(ViewLayout, WithoutRoomItSaysWhy) {
-  const ViewLayout l = lay_out(Layout::plan, 1024, 500, 16);
+  const ViewLayout l = lay_out(Layout::plan, 1024, 470, 16);
   EXPECT_EQ(l.shown, Layout::operate);
   EXPECT_NE(l.why.english.find("no room"), std::string::npos);
   // However small: a window is dragged through all sizes.
   for (int w = 200; w < 700; w += 90) {
     for (const Layout wanted : {Layout::operate, Layout::plan, Layout::review}) {
       for (const ScreenBox& b : boxes_of(lay_out(wanted, w, 150, 16))) EXPECT_GE(b.width, 0);
+    }
+  }
+}
+
+// Where the state's parts have no room beside each other they have two rows; the bone is never squeezed out.
+TEST(ViewLayout, TextOfTwiceTheSizeLeavesRoomForTheBone) {
+  for (const Size s : kSizes) {
+    for (const double by_hand : {1.0, 1.25, 1.5, 1.75, 2.0}) {
+      const auto em = static_cast<float>(std::lround(
+          kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), by_hand, s.width, s.height)));
+      const ViewLayout l = lay_out(Layout::operate, s.width, s.height, em);
+      EXPECT_EQ(l.two_rows, l.state.width < 904 * l.unit) << s.width << " at " << by_hand;
+      EXPECT_GE(l.view.width, 400 * l.unit);
+      EXPECT_GE(l.view.height, 220 * l.unit);
+      EXPECT_FALSE(l.over[0].empty()) << "a cut lies on it";
+      EXPECT_LE(l.over[0].bottom() + 40 * l.unit, l.view.bottom()) << "and its foot below it";
+      EXPECT_GE(l.free_width(), 328 * l.unit) << "beside it a card";
+      const ViewLayout review = lay_out(Layout::review, s.width, s.height, em);
+      EXPECT_GE(review.view.width, 200 * l.unit) << "beside the page";
+      EXPECT_EQ(review.page.width + review.view.width, static_cast<float>(s.width));
     }
   }
 }
@@ -197,7 +220,12 @@ TEST(Scale, TextKeepsItsShareOfALargeScreen) {
   // By hand from there; never so large that nothing else has room.
   EXPECT_NEAR(next_scale(next_scale(1, 1), -1), 1, 1e-12);
   EXPECT_EQ(next_scale(2.5, 1), 2.5);
-  EXPECT_LT(scale_that_fits(1, 2.5, 1024, 700) * kTextPixels * 40, 1025);
+  EXPECT_LE(scale_that_fits(1, 2.5, 1024, 700), 2);
+  // Text of twice the size is that large in each of the sizes (WCAG 2.2, 1.4.4).
+  for (const Size s : kSizes) {
+    const double automatic = automatic_scale(1, s.width, s.height);
+    EXPECT_EQ(scale_that_fits(automatic, 2, s.width, s.height), 2 * automatic) << s.width;
+  }
 }
 
 // --- colours: IEC 61966-2-1 to linear light; contrast as WCAG 2.1 defines it; dichromats after Vienot, Brettel and

@@ -16,7 +16,7 @@ ICONS |= ast.literal_eval(own[: own.index("\n}") + 2])
 USED = """drill saw plate fragments suction droplet arrow-bar-to-down arrow-bar-up arrow-back-up versions ruler-measure note camera command
 menu-2 search x chevron-down chevron-right plus minus check alert-triangle info-circle bone folder-open history power settings
 maximize layout-grid target help player-play player-pause player-track-prev player-track-next eye eye-off
-adjustments-horizontal""".split()
+adjustments-horizontal crosshair scissors list-check""".split()
 
 
 class Lines(BasePen):

@@ -152,8 +152,12 @@ std::vector<CommandPalette::Line> CommandPalette::lines(float wide) const {
   for (std::size_t n = 0; n < found.size(); ++n) {
     if (grouped && (n == 0 || found[n]->group != found[n - 1]->group))
       all.push_back({nullptr, 0, tr(found[n]->group), kHeading * u});
-    const bool two = wide_of(shown_name(*found[n])) + wide_of(shown_keys(*found[n])) + 24 * u > wide;
-    all.push_back({found[n], n, {}, (two ? kTwoLines : kLine) * u});
+    // A name that is longer than a line has two, and the keys one below.
+    const std::string name = shown_name(*found[n]), keys = shown_keys(*found[n]);
+    const bool two = wide_of(name) + wide_of(keys) + 24 * u > wide;
+    const float tall = ImGui::CalcTextSize(name.c_str(), nullptr, false, wide - 24 * u).y;
+    const float more = tall - ImGui::GetFontSize() - (keys.empty() ? 20 * u : 0);
+    all.push_back({found[n], n, {}, (two ? kTwoLines * u + more : kLine * u)});
   }
   return all;
 }
@@ -220,9 +224,11 @@ const CommandRow* CommandPalette::draw_list(const ScreenBox& window, bool run) {
       text_at(draw, {box.x + pad + 12 * u, y - line - 4 * u}, t.quiet, l.heading);
       continue;
     }
-    ImGui::SetCursorScreenPos({box.x + pad, from});
+    // As far as it is in sight.
+    const float seen = std::max(from, top);
+    ImGui::SetCursorScreenPos({box.x + pad, seen});
     ImGui::PushID(static_cast<int>(l.found));
-    if (ImGui::InvisibleButton("row", {wide - 2 * pad, l.high})) done = l.row;
+    if (ImGui::InvisibleButton("row", {wide - 2 * pad, std::max(1.0F, std::min(y, bottom) - seen)})) done = l.row;
     const bool hovered = ImGui::IsItemHovered(), chosen = l.found == search_.chosen();
     ImGui::PopID();
     if (hovered && (ImGui::GetIO().MouseDelta.x != 0 || ImGui::GetIO().MouseDelta.y != 0))
@@ -233,7 +239,9 @@ const CommandRow* CommandPalette::draw_list(const ScreenBox& window, bool run) {
       draw->AddRectFilled({lo.x, lo.y + 8 * u}, {lo.x + 4 * u, hi.y - 8 * u}, im_colour32(t.accent), 2 * u);
     }
     const bool two = l.high > kLine * u + 1;
-    text_at(draw, {lo.x + 12 * u, two ? from + 8 * u : from + (l.high - line) / 2}, t.text, shown_name(*l.row));
+    draw->AddText(ImGui::GetFont(), line,
+                  {std::floor(lo.x + 12 * u), std::floor(two ? from + 8 * u : from + (l.high - line) / 2)},
+                  im_colour32(t.text), shown_name(*l.row).c_str(), nullptr, inner - 24 * u);
     const std::string keys = shown_keys(*l.row);
     text_at(draw, {hi.x - 12 * u - wide_of(keys), two ? y - line - 8 * u : from + (l.high - line) / 2}, t.quiet, keys);
   }

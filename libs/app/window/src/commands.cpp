@@ -331,7 +331,11 @@ std::vector<const CommandRow*> find_commands(const std::string& text) {
   const std::vector<std::string> asked = words_of_text(text);
   std::vector<std::pair<int, const CommandRow*>> fitting;
   for (const CommandRow& row : command_rows()) {
-    if (const auto far = distance(row, asked)) fitting.emplace_back(*far, &row);
+    const auto far = distance(row, asked);
+    if (!far) continue;
+    // One that is called so, and no more, comes before those whose names go on.
+    const bool called = words_of_text(row.name) == asked || words_of_text(shown_name(row)) == asked;
+    fitting.emplace_back(called ? -1 : *far, &row);
   }
   std::stable_sort(fitting.begin(), fitting.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<const CommandRow*> out;

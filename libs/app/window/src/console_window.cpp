@@ -5,13 +5,17 @@
 #include <algorithm>
 #include <fstream>
 #include <optional>
+#include <string>
 
 #include "audio_out.h"
+#include "drawn_state.h"
 #include "monitor_panel.h"
 #include "monitor_screen.h"
+#include "osteo/app/window/person_settings.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/translate.h"
+#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
@@ -75,6 +79,7 @@ void write_state(const std::filesystem::path& file, const ConsoleFacts& facts, M
     for (std::size_t ch = 0; ch < controller->wiring().channels.size(); ++ch)
       j["gains_uv"].push_back(controller->screen().gain_uv(ch));
   }
+  add_drawn(j);
   const std::filesystem::path beside = file.string() + ".new";
   std::ofstream(beside) << j.dump() << '\n';
   std::error_code ignored;
@@ -84,7 +89,11 @@ void write_state(const std::filesystem::path& file, const ConsoleFacts& facts, M
 }  // namespace
 
 void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
+  const PersonSettings person(PersonSettings::usual_file());
+  take_theme(person.values.theme);
+  shell.set_scale(person.values.scale);
   shell.set_title("Osteotome nerve monitor - " + options.server);
+  if (!options.state_file.empty()) keep_places();
   std::shared_ptr<MonitorController> controller;
   ConsoleSound sound(options.sound);
   MonitorPanel panel;
@@ -110,34 +119,31 @@ void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
     const ConsoleFacts facts = options.facts();
     shell.new_frame();
     const auto w = static_cast<float>(shell.width()), h = static_cast<float>(shell.height());
-    const float e = em(), foot = ImGui::GetFrameHeight() + e * 0.9F;
+    // As high as its words need.
+    std::string link = facts.ended ? tr("the session has ended") : tr("connected");
+    if (facts.lost > 0)
+      link = filled(tr("{link}, {n} samples lost on the way"), {{"link", link}, {"n", std::to_string(facts.lost)}});
+    const std::string told = !facts.trouble.empty()
+                                 ? "! " + facts.trouble
+                                 : options.server + "  " + link + "  " + sound.words() + "  " +
+                                       (controller && controller->stimulates()
+                                            ? tr("F freeze  M mute  G view  S stimulator  T threshold  Q close")
+                                            : tr("F freeze  M mute  G view  Q close"));
+    const float pad = ImGui::GetStyle().WindowPadding.x;
+    const float foot = ImGui::CalcTextSize(told.c_str(), nullptr, false, w - 2 * pad).y + 2 * pad;
     if (controller) {
       panel.fill({0, 0, w, h - foot});
       panel.draw(*controller);
     } else {
       begin_fixed("waiting", {0, 0, w, h - foot});
-      ImGui::TextWrapped(
-          "%s",
-          filled(tr("Waiting for a nerve monitor at {server}: 'osteo rehearse CASE --stream igtl:PORT', or 'osteo "
-                    "stream SESSION --to igtl:PORT'."),
-                 {{"server", options.server}})
-              .c_str());
+      kit_text(filled(tr("Waiting for a nerve monitor at {server}: 'osteo rehearse CASE --stream igtl:PORT', or 'osteo "
+                         "stream SESSION --to igtl:PORT'."),
+                      {{"server", options.server}}),
+               theme().text);
       ImGui::End();
     }
-    begin_fixed("foot", {0, h - foot, w, foot}, ImGuiWindowFlags_NoScrollbar);
-    if (!facts.trouble.empty()) {
-      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kYellow)));
-      ImGui::TextUnformatted(("! " + facts.trouble).c_str());
-      ImGui::PopStyleColor();
-    } else {
-      std::string link = facts.ended ? tr("the session has ended") : tr("connected");
-      if (facts.lost > 0)
-        link = filled(tr("{link}, {n} samples lost on the way"), {{"link", link}, {"n", std::to_string(facts.lost)}});
-      ImGui::TextDisabled("%s  %s  %s  %s", options.server.c_str(), link.c_str(), sound.words().c_str(),
-                          controller && controller->stimulates()
-                              ? tr("F freeze  M mute  G view  S stimulator  T threshold  Q close")
-                              : tr("F freeze  M mute  G view  Q close"));
-    }
+    begin_fixed("foot", {0, h - foot, w, foot}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
+    kit_text(told, facts.trouble.empty() ? theme().quiet : ink_of(palette::kYellow));
     ImGui::End();
     shell.show_page();
     write_state(options.state_file, facts, controller.get(), panel.answers(), ++pictures);

@@ -14,6 +14,7 @@
 #include "slice_overlay.h"
 #include "ui_kit.h"
 #include "ui_style.h"
+#include "view_panels.h"
 
 namespace osteo::inline app {
 namespace {
@@ -79,13 +80,6 @@ std::optional<Vec3> bone_nearest(const World& world, Vec3 to) {
 // Kept in the session: what could be seen is part of what was done.
 void note_look(Rehearsal& rehearsal, const StructuresView::One& s) {
   rehearsal.note("structure", note_of(s.value, rehearsal.structures()->name_of(s.value), s.look));
-}
-
-bool small_button(const char* words, bool chosen) {
-  if (chosen) ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
-  const bool clicked = ImGui::SmallButton(words);
-  if (chosen) ImGui::PopStyleColor();
-  return clicked;
 }
 
 }  // namespace
@@ -182,7 +176,8 @@ void CutsPanel::lay_out(const ViewLayout& layout) {
   // Header above, reading below: at fixed places, whatever they say.
   const ImGuiStyle& style = ImGui::GetStyle();
   const float line = ImGui::GetFontSize() + style.ItemSpacing.y, pad = 2 * style.WindowPadding.y;
-  const float top = 4 * (line + 2) + pad - style.ItemSpacing.y, bottom = 2 * line + pad - style.ItemSpacing.y;
+  const float top = 2 * (kSmallControl * layout.unit + style.ItemSpacing.y) + line + pad,
+              bottom = 2 * line + pad - style.ItemSpacing.y;
   foot_ = {};
   any_ = true;
   one_alone_ = false;
@@ -214,11 +209,12 @@ void CutsPanel::lay_out(const ViewLayout& layout) {
       boxes_ = layout.over;
     }
     const ScreenBox& lowest = one_alone_ ? layout.over[0] : layout.over[2];
-    foot_ = {lowest.x, lowest.bottom() + kGap * u, lowest.width, kSmallControl * u};
+    foot_ = cuts_foot_box(layout);
     if (settings_open_) header_ = {std::max(layout.view.x, lowest.x - kGap * u - wide), layout.over[0].y, wide, top};
-    footer_ = {std::max(layout.view.x, lowest.right() - wide), foot_.bottom() + kGap * u, wide, bottom};
+    footer_ = {std::max(layout.view.x, lowest.right() - wide),
+               std::min(foot_.bottom() + kGap * u, layout.view.bottom() - bottom), wide, bottom};
   } else {
-    any_ = false;
+    any_ = control_.enlarged() >= 0;  // over the whole picture there is room for one in any case
   }
   if (const int big = control_.enlarged(); big >= 0 && any_) {
     ScreenBox& box = boxes_[static_cast<std::size_t>(big)];
@@ -279,74 +275,67 @@ void CutsPanel::draw(Rehearsal& rehearsal, const SawCut* planned) {
 }
 
 void CutsPanel::header(const Rehearsal& rehearsal) {
-  ImGui::SetNextWindowPos({header_.x, header_.y});
-  ImGui::SetNextWindowSize({header_.width, header_.height});
-  ImGui::Begin("Cuts", nullptr, kFixed);
-  static constexpr const char* kShort[] = {tr_later("Bone"), tr_later("Soft"), tr_later("Temporal")};
-  for (int p = 0; p < static_cast<int>(grey_presets().size()); ++p) {
-    if (p > 0) ImGui::SameLine();
-    if (small_button(tr(kShort[p]), control_.preset() == p)) control_.take_preset(p);
-    if (ImGui::IsItemHovered()) {
-      const HuWindow& hu = grey_presets()[static_cast<std::size_t>(p)].hu;
-      std::string help =
-          filled(tr("window {window}, level {level} HU. Drag with the right button in a cut to change it; "
-                    "right click: back to this."),
-                 {{"window", shown_number(hu.width, 0)}, {"level", shown_number(hu.level, 0)}});
-      if (ct_ && !ct_->soft_tissue()) {
-        help += "\n";
-        help += tr("The case keeps CT values of bone only: soft tissue stays black without --scan.");
-      }
-      ImGui::SetTooltip("%s", help.c_str());
+  begin_fixed("Cuts", header_, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
+  const std::string presets[] = {tr("Bone"), tr("Soft"), tr("Temporal")};
+  ImGui::BeginGroup();
+  if (const int p = choice("preset", presets, control_.preset(), kSmallControl); p >= 0) control_.take_preset(p);
+  ImGui::EndGroup();
+  if (ImGui::IsItemHovered()) {
+    std::string help;
+    for (std::size_t p = 0; p < grey_presets().size(); ++p) {
+      const HuWindow& hu = grey_presets()[p].hu;
+      help +=
+          filled(tr("{name}: window {window}, level {level}"),
+                 {{"name", presets[p]}, {"window", shown_number(hu.width, 0)}, {"level", shown_number(hu.level, 0)}});
+      help += "\n";
     }
+    help += tr("Drag with the right button in a cut to change it; right click: back to this.");
+    if (ct_ && !ct_->soft_tissue()) {
+      help += "\n";
+      help += tr("The case keeps CT values of bone only: soft tissue stays black without --scan.");
+    }
+    ImGui::SetTooltip("%s", help.c_str());
   }
-  bool follows = control_.follows();
-  if (ImGui::Checkbox(tr("follow"), &follows)) control_.follow(follows);
-  ImGui::SameLine();
+  const float side = kSmallControl * unit(), gap = 4 * unit();
+  bool first = true;
+  const auto is_pressed = [&](const char* icon, bool on, const std::string& words) {
+    if (!std::exchange(first, false)) ImGui::SameLine(0, gap);
+    return tile(icon, icon, {false, on, true, words}, side);
+  };
+  if (is_pressed("crosshair", control_.follows(), tr("the cuts follow the tool"))) control_.follow(!control_.follows());
   const bool along = control_.planes() == CutsControl::Planes::tool;
-  if (small_button(tr("along the drill (F4)"), along))
+  if (is_pressed("drill", along, tr("along the drill (F4)")))
     control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
-  ImGui::Checkbox(tr("removed"), &shown_.tint_removed);
   if (before_.empty()) shown_.tint_removed = false;
-  if (rehearsal.structures() != nullptr && list_.empty()) {
-    ImGui::SameLine();
-    const std::string words =
-        filled(tr("structures ({n})"), {{"n", std::to_string(rehearsal.structures()->values().size())}});
-    if (small_button(words.c_str(), list_open_)) list_open_ = !list_open_;
-  }
-  if (regions_ != nullptr) {
-    ImGui::SameLine();
-    if (small_button(tr("plan"), regions_->shown())) regions_->show(!regions_->shown());
-    if (ImGui::IsItemHovered())
-      ImGui::SetTooltip("%s", tr("what the procedure wants removed (green) or left (orange); Ctrl-L"));
-  }
-  ImGui::TextDisabled("%.0f / %.0f HU   %s", control_.hu.width, control_.hu.level,
-                      control_.enlarged() >= 0 ? tr("F3: back") : tr("F3: in the middle"));
+  if (!before_.empty() && is_pressed("scissors", shown_.tint_removed, tr("what was removed is tinted")))
+    shown_.tint_removed = !shown_.tint_removed;
+  if (regions_ != nullptr &&
+      is_pressed("target", regions_->shown(), tr("what the procedure wants removed (green) or left (orange); Ctrl-L")))
+    regions_->show(!regions_->shown());
+  if (rehearsal.structures() != nullptr && list_.empty() &&
+      is_pressed("list-check", list_open_,
+                 filled(tr("structures ({n})"), {{"n", std::to_string(rehearsal.structures()->values().size())}})))
+    list_open_ = !list_open_;
+  kit_text(filled("{window} / {level} HU   ",
+                  {{"window", shown_number(control_.hu.width, 0)}, {"level", shown_number(control_.hu.level, 0)}}) +
+               (control_.enlarged() >= 0 ? tr("F3: back") : tr("F3: in the middle")),
+           theme().quiet);
   ImGui::End();
 }
 
-// Below cuts that lie on the picture: which, where there is room for one, and what else there is to set.
 void CutsPanel::foot(const Rehearsal& rehearsal) {
-  begin_card("cuts' foot", foot_, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
-  ImGui::SetCursorScreenPos({foot_.x, foot_.y});
   const bool along = control_.planes() == CutsControl::Planes::tool;
-  if (one_alone_) {
-    static const std::string kBody[] = {"A", "C", "S"};
-    if (const int cut = choice("which", kBody, chosen_, kSmallControl); cut >= 0) chosen_ = cut;
-    ImGui::SameLine(0, 0);
-  } else {
-    const std::string all_planes[] = {tr_of("planes of the cuts", "Body"), tr_of("planes of the cuts", "Drill")};
-    if (const int planes = choice("planes", all_planes, along ? 1 : 0, kSmallControl); planes >= 0)
-      control_.take_planes(planes == 1 ? CutsControl::Planes::tool : CutsControl::Planes::body);
-  }
-  const float side = foot_.height;
-  ImGui::SetCursorScreenPos({foot_.right() - side, foot_.y});
-  if (tile(
-          "settings", "settings",
-          {false, settings_open_, true,
-           rehearsal.structures() != nullptr ? tr("Window, level, structures, plan") : tr("Window, level, structures")},
-          side))
-    settings_open_ = !settings_open_;
-  ImGui::End();
+  const CutsFoot pressed = draw_cuts_foot(
+      foot_, one_alone_,
+      one_alone_ ? chosen_
+      : along    ? 1
+                 : 0,
+      settings_open_,
+      rehearsal.structures() != nullptr ? tr("Window, level, structures, plan") : tr("Window, level, structures"));
+  if (pressed.chosen >= 0 && one_alone_) chosen_ = pressed.chosen;
+  if (pressed.chosen >= 0 && !one_alone_)
+    control_.take_planes(pressed.chosen == 1 ? CutsControl::Planes::tool : CutsControl::Planes::body);
+  if (pressed.settings) settings_open_ = !settings_open_;
 }
 
 void CutsPanel::mouse_over(int cut, float corner_x, float corner_y) {
@@ -444,8 +433,11 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
   }
   on.cross(control_.cross_mm());
   on.letters();
-  on.scale_bar();
-  on.title(control_.name(cut));
+  // In a very small one they would lie on the letters; its foot says which it is.
+  if (foot_.empty() || box.width >= 128 * unit()) {
+    on.scale_bar();
+    on.title(control_.name(cut));
+  }
   if (!foot_.empty())
     draw->AddRect(lo, {lo.x + box.width, lo.y + box.height}, im_colour32(theme().line), kRound * unit(), 0,
                   std::max(1.0F, unit()));
@@ -495,12 +487,17 @@ std::string CutsPanel::far_text(const StructureMap& map, std::uint8_t value) con
   return mm >= map.reach_mm() ? std::string() : shown_number(mm, 1);
 }
 
-// A row for each: a click shows it solid, clear, hidden in turns.
 void CutsPanel::list_in_side(Rehearsal& rehearsal) {
-  const StructureMap& map = *rehearsal.structures();
-  const float u = unit();
   begin_fixed("Structures in the side", list_);
   ImGui::TextDisabled("%s", tr("Structures, mm from the cross"));
+  list_rows(rehearsal);
+  ImGui::End();
+}
+
+// A row for each: a click shows it solid, clear, hidden in turns.
+void CutsPanel::list_rows(Rehearsal& rehearsal) {
+  const StructureMap& map = *rehearsal.structures();
+  const float u = unit();
   const char* const looks[] = {tr_of("look", "solid"), tr_of("look", "clear"), tr_of("look", "hidden")};
   static constexpr std::string_view kEyes[] = {"eye", "adjustments-horizontal", "eye-off"};
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
@@ -523,43 +520,23 @@ void CutsPanel::list_in_side(Rehearsal& rehearsal) {
         3 * u);
   }
   ImGui::PopStyleVar();
-  ImGui::End();
 }
 
+// The same rows over the picture, with all of them at once above.
 void CutsPanel::list_structures(Rehearsal& rehearsal) {
-  const StructureMap& map = *rehearsal.structures();
-  const float scale = scale_now(), width = std::min(300 * scale, middle_.width);
-  ImGui::SetNextWindowPos({header_.x - width, header_.y});
-  ImGui::SetNextWindowSizeConstraints({width, 0}, {width, 0.8F * middle_.height});
-  ImGui::Begin(tr("Structures"), &list_open_,
-               ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
-                   ImGuiWindowFlags_AlwaysAutoResize);
-  const char* const looks[] = {tr_of("look", "solid"), tr_of("look", "clear"), tr_of("look", "hidden")};
-  const auto take = [&](std::size_t number, StructureLook look) { look_as(number, look, rehearsal); };
-  const auto choice = [&](const char* id, std::optional<StructureLook> now, auto&& chosen) {
-    ImGui::PushID(id);
-    for (int l = 0; l < 3; ++l) {
-      ImGui::SameLine(width - (3 - static_cast<float>(l)) * 54 * scale);
-      if (small_button(looks[l], now == static_cast<StructureLook>(l))) chosen(static_cast<StructureLook>(l));
-    }
-    ImGui::PopID();
-  };
-  ImGui::TextUnformatted(tr("all"));
-  choice("all", std::nullopt, [&](StructureLook look) {
-    for (std::size_t s = 0; s < structures_->all().size(); ++s) take(s, look);
-  });
-  for (std::size_t s = 0; s < structures_->all().size(); ++s) {
-    const std::uint8_t value = structures_->all()[s].value;
-    const auto c = map.colour_of(value);
-    const std::string name = tr(map.name_of(value)), id = std::to_string(value);
-    ImGui::ColorButton(("##" + id).c_str(),
-                       {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 1},
-                       ImGuiColorEditFlags_NoTooltip, {ImGui::GetFontSize(), ImGui::GetFontSize()});
-    ImGui::SameLine();
-    ImGui::TextUnformatted(name.c_str());
-    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", name.c_str());
-    choice(id.c_str(), structures_->all()[s].look, [&](StructureLook look) { take(s, look); });
+  const float u = unit(), width = std::min(344 * u, middle_.width - 16 * u);
+  const ScreenBox box{
+      std::max(middle_.x + 8 * u, header_.x - width), middle_.y + 8 * u, width,
+      std::min(middle_.height - 16 * u, 112 * u + kListRow * u * static_cast<float>(structures_->all().size()))};
+  begin_card("Structures", box, {12 * u, 12 * u});
+  kit_text(tr("Structures, mm from the cross"), theme().quiet);
+  ImGui::SameLine(box.width - 48 * u);
+  if (tile("close", "x", {false, false, true, tr("Close")}, 36 * u)) list_open_ = false;
+  const std::string looks[] = {tr_of("look", "solid"), tr_of("look", "clear"), tr_of("look", "hidden")};
+  if (const int look = choice("all", looks, -1, kSmallControl); look >= 0) {
+    for (std::size_t s = 0; s < structures_->all().size(); ++s) look_as(s, static_cast<StructureLook>(look), rehearsal);
   }
+  list_rows(rehearsal);
   ImGui::End();
 }
 

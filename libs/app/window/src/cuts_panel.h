@@ -52,6 +52,7 @@ class CutsPanel {
   void readout(const Rehearsal& rehearsal);
   void list_structures(Rehearsal& rehearsal);
   void list_in_side(Rehearsal& rehearsal);
+  void list_rows(Rehearsal& rehearsal);
   [[nodiscard]] std::string far_text(const StructureMap& map, std::uint8_t value) const;
   void look_as(std::size_t number, StructureLook look, Rehearsal& rehearsal);
   void take(Rehearsal& rehearsal);

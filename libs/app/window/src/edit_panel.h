@@ -16,8 +16,8 @@ class EditPanel {
   struct Wishes {
     bool save = false, close = false;
   };
-  /// Between ImGui::NewFrame and Render. `scale`: of the text, against 96 dots an inch.
-  Wishes draw(EditControl& control, float width, float height, float scale, bool saving);
+  /// Between ImGui::NewFrame and Render.
+  Wishes draw(EditControl& control, float width, float height, bool saving);
   /// Listed above the structures; a click goes there.
   void set_places(std::vector<EditPlace> places) { places_ = std::move(places); }
   /// Where the first of them was drawn, as threshold_slider().
@@ -26,11 +26,13 @@ class EditPanel {
   [[nodiscard]] const std::array<float, 4>& threshold_slider() const { return slider_; }
 
  private:
-  void tools(EditControl& control, float scale);
+  void tools(EditControl& control);
   void options(EditControl& control);
-  void structures(EditControl& control, float scale);
+  void greys(EditControl& control);
+  void structures(EditControl& control);
+  bool draw_colour(const EditStructure& s, std::array<float, 3>& rgb);
   void places(EditControl& control);
-  std::array<char, 65> new_name_{}, name_{};
+  std::string new_name_, name_;
   int named_ = -1;  // whose name stands in name_
   std::array<float, 3> colour_{};
   int coloured_ = -1;

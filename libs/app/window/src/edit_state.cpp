@@ -2,6 +2,7 @@
 
 #include <fstream>
 
+#include "drawn_state.h"
 #include "osteo/core/base/json_document.h"
 
 namespace osteo::inline app {
@@ -23,33 +24,34 @@ void write_edit_state(const EditWindowState& s, const EditControl& control, cons
   for (const EditStructure& e : control.document().structures())
     structures.push_back({{"value", e.is.value}, {"name", e.is.name}, {"shown", e.shown}});
   const EditDocument& d = control.document();
-  const Json j{{"pictures", s.pictures},
-               {"size", {s.width, s.height}},
-               {"views", std::move(views)},
-               {"enlarged", control.enlarged()},
-               {"tool", edit_tool_name(control.tool())},
-               {"hint", control.hint()},
-               {"message", control.message()},
-               {"readout", control.readout()},
-               {"cross_mm", list(control.cross_mm())},
-               {"window_hu", control.hu.width},
-               {"level_hu", control.hu.level},
-               {"lower_hu", control.lower_hu},
-               {"brush_mm", 2 * control.brush_radius_mm},
-               {"steps", d.steps()},
-               {"can_redo", d.can_redo()},
-               {"version", d.version()},
-               {"busy", control.busy()},
-               {"previewing", control.previewing()},
-               {"unsaved", control.unsaved()},
-               {"saving", s.saving},
-               {"asking", s.asking},
-               {"help", control.show_help},
-               {"structures", std::move(structures)},
-               {"triangles", s.triangles},
-               {"threshold_slider", s.threshold_slider},
-               {"first_place", s.first_place},
-               {"worst_ms", s.worst_ms}};
+  Json j{{"pictures", s.pictures},
+         {"size", {s.width, s.height}},
+         {"views", std::move(views)},
+         {"enlarged", control.enlarged()},
+         {"tool", edit_tool_name(control.tool())},
+         {"hint", control.hint()},
+         {"message", control.message()},
+         {"readout", control.readout()},
+         {"cross_mm", list(control.cross_mm())},
+         {"window_hu", control.hu.width},
+         {"level_hu", control.hu.level},
+         {"lower_hu", control.lower_hu},
+         {"brush_mm", 2 * control.brush_radius_mm},
+         {"steps", d.steps()},
+         {"can_redo", d.can_redo()},
+         {"version", d.version()},
+         {"busy", control.busy()},
+         {"previewing", control.previewing()},
+         {"unsaved", control.unsaved()},
+         {"saving", s.saving},
+         {"asking", s.asking},
+         {"help", control.show_help},
+         {"structures", std::move(structures)},
+         {"triangles", s.triangles},
+         {"threshold_slider", s.threshold_slider},
+         {"first_place", s.first_place},
+         {"worst_ms", s.worst_ms}};
+  add_drawn(j);
   const std::filesystem::path beside = file.string() + ".new";
   std::ofstream(beside) << j.dump() << '\n';
   std::error_code ignored;

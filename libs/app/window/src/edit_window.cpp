@@ -12,6 +12,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "cut_picture.h"
 #include "edit_control.h"
@@ -20,21 +23,43 @@
 #include "edit_scene.h"
 #include "edit_state.h"
 #include "open_window.h"
+#include "osteo/app/window/person_settings.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/imaging/edit/edit_file.h"
+#include "ui_kit.h"
 #include "ui_style.h"
+#include "view_layout.h"
 
 namespace osteo::inline app {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
+// Parted at spaces where a line would be wider.
+std::string in_lines(const std::string& words, float width) {
+  std::string lines;
+  for (std::size_t at = 0, line = 0; at < words.size();) {
+    const std::size_t end = std::min(words.find(' ', at), words.size());
+    const std::string word = words.substr(at, end - at);
+    if (!lines.empty()) {
+      const std::string longer = lines.substr(line) + " " + word;
+      const bool fits = ImGui::CalcTextSize(longer.c_str()).x <= width;
+      lines += fits ? ' ' : '\n';
+      if (!fits) line = lines.size();
+    }
+    lines += word;
+    at = end + 1;
+  }
+  return lines;
+}
+
 class EditWindow {
  public:
   EditWindow(EditDocument& document, const EditWindowOptions& options, const EditWindowActions& actions)
       : control_(document), actions_(actions), state_file_(options.state_file) {
     open(options);
+    if (!state_file_.empty()) keep_places();
     panel_.set_places(options.places);
     scene_ = std::make_unique<EditScene>();
     glGenTextures(3, textures_.data());
@@ -129,7 +154,8 @@ class EditWindow {
     });
     glfwSetWindowRefreshCallback(window_, [](GLFWwindow* w) { self(w).awake_ = 3; });
     glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int) { self(w).shift_ = self(w).control_key_ = false; });
-    glfwSetWindowContentScaleCallback(window_, [](GLFWwindow* w, float sx, float) { self(w).new_scale_ = sx; });
+    glfwSetWindowContentScaleCallback(
+        window_, [](GLFWwindow* w, float sx, float) { self(w).reported_scale_ = static_cast<double>(sx); });
 
     ImGui::CreateContext();
     ImGui::GetIO().IniFilename = nullptr;
@@ -137,13 +163,23 @@ class EditWindow {
     ImGui_ImplOpenGL3_Init("#version 150");
     float sx = 1, sy = 1;
     glfwGetWindowContentScale(window_, &sx, &sy);
-    new_scale_ = sx;
+    reported_scale_ = static_cast<double>(sx);
+    fixed_scale_ = options.scale;
+    const PersonSettings person(PersonSettings::usual_file());
+    by_hand_ = person.values.scale;
+    take_theme(person.values.theme);
   }
 
-  // Text of 16 pixels at 96 dots an inch, of any at the same size on the desk.
+  // Text of 16 pixels at 96 dots an inch, of any at the same size on the desk, times what the person chose.
   void set_scale() {
-    scale_ = std::clamp(std::exchange(new_scale_, 0.0F), 1.0F, 4.0F);
-    set_ui_style(static_cast<int>(std::lround(kTextPixels * scale_)));
+    const double automatic = fixed_scale_ > 0 ? fixed_scale_ : automatic_scale(reported_scale_, width_, height_);
+    const int wanted =
+        static_cast<int>(std::lround(kTextPixels * scale_that_fits(automatic, by_hand_, width_, height_)));
+    if (wanted == em_ && !letters_missing()) return;
+    em_ = wanted;
+    scale_ = static_cast<float>(em_) / static_cast<float>(kTextPixels);
+    set_ui_style(em_);
+    awake_ = 3;
     ImGui_ImplOpenGL3_DestroyFontsTexture();
     ImGui_ImplOpenGL3_CreateFontsTexture();
     ImGui::GetStyle().WindowBorderSize = 0;
@@ -153,12 +189,13 @@ class EditWindow {
 
   void frame() {
     const Clock::time_point begin = Clock::now();
-    if (new_scale_ > 0) set_scale();
     glfwGetFramebufferSize(window_, &width_, &height_);
-    if (width_ < 200 || height_ < 150) {  // put away
+    if (width_ < 200 || height_ < 150 || glfwGetWindowAttrib(window_, GLFW_ICONIFIED) != 0) {  // put away
       events_.clear();
+      awake_ = 0;
       return;
     }
+    set_scale();
     lay_out();
     if (!asking_) handle_events();
     control_.tick();
@@ -177,7 +214,7 @@ class EditWindow {
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
     ImGui::NewFrame();
-    const EditPanel::Wishes wishes = panel_.draw(control_, panel_width(), static_cast<float>(height_), scale_, saving_);
+    const EditPanel::Wishes wishes = panel_.draw(control_, panel_width(), static_cast<float>(height_), saving_);
     if (wishes.save) save();
     wants_close_ = wants_close_ || wishes.close;
     status_bar();
@@ -220,7 +257,11 @@ class EditWindow {
   [[nodiscard]] float panel_width() const {
     return std::round(std::min(340 * scale_, static_cast<float>(width_) * 0.4F));
   }
-  [[nodiscard]] int bar_height() const { return static_cast<int>(std::round(76 * scale_)); }
+  // Of the words at the foot, which need more lines where it is narrow.
+  [[nodiscard]] int bar_height() const {
+    const bool narrow = static_cast<float>(width_) - panel_width() < 560 * scale_;
+    return static_cast<int>(std::round((narrow ? 124 : 84) * scale_));
+  }
 
   void lay_out() {
     const int left = static_cast<int>(panel_width()) + 2, gap = 2;
@@ -387,10 +428,11 @@ class EditWindow {
         const ImVec2 c{lo.x + static_cast<float>(p[0]), lo.y + static_cast<float>(p[1])};
         draw->AddCircle(c, 7 * scale_, kCrossColour, 0, 2 * scale_);
       }
+      const std::string caption = control_.previewing() ? tr("3D preview, being made ...")
+                                  : control_.live()     ? tr("3D preview of the threshold")
+                                                        : tr("3D preview, coarse");
       shadowed_text(draw, {lo.x + 8 * scale_, lo.y + 6 * scale_},
-                    control_.previewing() ? tr("3D preview, being made ...")
-                    : control_.live()     ? tr("3D preview of the threshold")
-                                          : tr("3D preview, coarse"));
+                    in_lines(caption, static_cast<float>(b.width) - 16 * scale_));
       draw->PopClipRect();
     }
   }
@@ -402,43 +444,58 @@ class EditWindow {
   }
 
   void status_bar() {
-    const float left = panel_width();
-    ImGui::SetNextWindowPos({left, static_cast<float>(height_ - bar_height())});
-    ImGui::SetNextWindowSize({static_cast<float>(width_) - left, static_cast<float>(bar_height())});
-    ImGui::Begin("Status", nullptr,
-                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoBringToFrontOnFocus);
-    const std::string place = control_.readout();
-    ImGui::TextColored({0.75F, 0.85F, 1, 1}, "%s", control_.hint().c_str());
+    const float left = panel_width(), u = unit(), wide = static_cast<float>(width_) - left,
+                high = static_cast<float>(bar_height());
+    // What is longer than it has room for can be scrolled to.
+    begin_fixed("Status", {left, static_cast<float>(height_) - high, wide, high});
+    // Above what can be done and where the mouse is, below what was said last.
+    const std::string hint = control_.hint(), place = control_.readout();
+    const float room = ImGui::GetContentRegionAvail().x, place_wide = ImGui::CalcTextSize(place.c_str()).x;
+    ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {8 * u, 2 * u});
+    kit_text(hint, theme().quiet);
     if (!place.empty()) {
-      ImGui::SameLine(std::max(0.0F, ImGui::GetWindowWidth() - ImGui::CalcTextSize(place.c_str()).x - 12 * scale_));
-      ImGui::Text("%s", place.c_str());
+      if (ImGui::CalcTextSize(hint.c_str()).x + place_wide + 16 * u <= room) ImGui::SameLine(room - place_wide);
+      kit_text(place, theme().text);
     }
     if (control_.busy()) {
-      ImGui::ProgressBar(static_cast<float>(control_.progress()), {160 * scale_, ImGui::GetFontSize()});
+      ImGui::ProgressBar(static_cast<float>(control_.progress()), {std::min(160 * u, room), ImGui::GetFontSize()});
       ImGui::SameLine();
     }
-    ImGui::Text("%s", control_.message().c_str());
-    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", control_.message().c_str());
+    kit_text(control_.message(), theme().text);
+    ImGui::PopStyleVar();
     ImGui::End();
   }
 
   void help() {
-    const float w = std::min(960 * scale_, static_cast<float>(width_) - 20),
-                h = std::min(680 * scale_, static_cast<float>(height_) - 20);
-    ImGui::SetNextWindowPos({(static_cast<float>(width_) - w) / 2, (static_cast<float>(height_) - h) / 2});
-    ImGui::SetNextWindowSize({w, h});
-    ImGui::Begin(tr("Mouse and keys"), &control_.show_help,
-                 ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove);
-    for (const EditHelpLine& l : edit_help_lines()) {
-      ImGui::TextColored({1, 0.88F, 0.55F, 1}, "%s", tr(l.keys));
-      ImGui::SameLine(400 * scale_);
-      ImGui::TextWrapped("%s", tr(l.text));
+    const float u = unit(), w = std::min(960 * u, static_cast<float>(width_) - 16 * u),
+                h = std::min(680 * u, static_cast<float>(height_) - 16 * u);
+    begin_card("Mouse and keys", {(static_cast<float>(width_) - w) / 2, (static_cast<float>(height_) - h) / 2, w, h},
+               {16 * u, 16 * u});
+    ImGui::PushFont(bold_font());
+    ImGui::SetWindowFontScale(1.25F / kBoldEm);
+    ImGui::TextUnformatted(tr("Mouse and keys"));
+    ImGui::SetWindowFontScale(1);
+    ImGui::PopFont();
+    ImGui::SameLine(w - 72 * u);
+    if (tile("close", "x", {false, false, true, tr("Close (F1)")}, 40 * u)) control_.show_help = false;
+    const float keys = std::min(400 * u, 0.4F * w);
+    if (ImGui::BeginTable("keys", 2)) {
+      ImGui::TableSetupColumn("keys", ImGuiTableColumnFlags_WidthFixed, keys);
+      ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch);
+      for (const EditHelpLine& l : edit_help_lines()) {
+        ImGui::TableNextRow();
+        ImGui::TableSetColumnIndex(0);
+        kit_text(tr(l.keys), theme().quiet);
+        ImGui::TableSetColumnIndex(1);
+        kit_text(tr(l.text), theme().text);
+      }
+      ImGui::EndTable();
     }
     ImGui::Separator();
-    ImGui::TextWrapped(
-        "%s",
+    kit_text(
         tr("Everything can be undone. The scan is never changed; what is saved is what was done, and the bone that "
-           "follows from it."));
+           "follows from it."),
+        theme().text);
     ImGui::End();
   }
 
@@ -450,32 +507,27 @@ class EditWindow {
       discard = discard || e.code == GLFW_KEY_D;
       go_on = go_on || e.code == GLFW_KEY_ESCAPE;
     }
-    const float w = 500 * scale_;
-    ImGui::SetNextWindowPos({(static_cast<float>(width_) - w) / 2, static_cast<float>(height_) / 3});
-    ImGui::SetNextWindowSize({w, 0});
-    ImGui::SetNextWindowFocus();
-    ImGui::Begin(tr("Close?"), nullptr,
-                 ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove);
-    ImGui::TextWrapped("%s", saving_ ? tr("It is being saved.") : tr("There are corrections that are not saved."));
-    const ImVec2 size{-1, ImGui::GetFontSize() * 1.9F};
+    const std::string texts[] = {saving_ ? tr("It is being saved.") : tr("There are corrections that are not saved.")};
+    std::vector<std::string> answers{tr("Go on editing (Esc)")};
     if (saving_) {
-      if (ImGui::Button(tr("Close when it is saved (Enter)"), size) || save_now) {
-        close_after_save_ = true;
-        asking_ = false;
-      }
+      answers.emplace_back(tr("Close when it is saved (Enter)"));
     } else {
-      if (ImGui::Button(tr("Save and close (Enter)"), size) || save_now) {
-        save();
-        close_after_save_ = saving_;
-        asking_ = false;
-      }
-      if (ImGui::Button(tr("Close without saving (D)"), size) || discard) quit_ = true;
+      answers.emplace_back(tr("Save and close (Enter)"));
+      answers.emplace_back(tr("Close without saving (D)"));
     }
-    if (ImGui::Button(tr("Go on editing (Esc)"), size) || go_on) {
+    ImGui::SetNextWindowFocus();
+    const int pressed =
+        kit_dialog({0, 0, static_cast<float>(width_), static_cast<float>(height_)}, tr("Close?"), texts, answers);
+    if (go_on || pressed == 0) {
       asking_ = false;
       close_after_save_ = false;
+    } else if (save_now || pressed == 1) {
+      if (!saving_) save();
+      close_after_save_ = saving_;
+      asking_ = false;
+    } else if (!saving_ && (discard || pressed == 2)) {
+      quit_ = true;
     }
-    ImGui::End();
     awake_ = std::max(awake_, 1);
   }
 
@@ -484,7 +536,9 @@ class EditWindow {
   std::filesystem::path state_file_;
   GLFWwindow* window_ = nullptr;
   int width_ = 0, height_ = 0;
-  float scale_ = 1, new_scale_ = 0;
+  int em_ = 0;
+  float scale_ = 1;
+  double reported_scale_ = 1, fixed_scale_ = 0, by_hand_ = 1;
   std::unique_ptr<EditScene> scene_;
   EditPanel panel_;
   std::array<unsigned, 3> textures_{};

@@ -3,11 +3,12 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "osteo/core/base/json_document.h"
 #include "osteo/core/base/translate.h"
-#include "ui_style.h"
+#include "ui_kit.h"
 
 namespace osteo::inline app {
 namespace {
@@ -103,16 +104,14 @@ void HintController::frame(Vec3 eye_mm, double now_s) {
   if (now_s > until_s_) words_.clear();
 }
 
-void HintController::draw(const ScreenBox& view) const {
+void HintController::draw(const ScreenBox& room) const {
   if (words_.empty()) return;
-  const float e = em(), high = 2.2F * e;
-  const float wide = std::min(view.width - 2 * e, ImGui::CalcTextSize(words_.c_str()).x * 1.3F + 3 * e);
-  if (wide < 4 * e) return;
-  const ScreenBox box{view.x + (view.width - wide) / 2, view.y + 0.7F * e, wide, high};
-  ImDrawList* const draw = ImGui::GetBackgroundDrawList();
-  draw->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32(theme().ground, 0.8F), 0.4F * e);
-  draw_sign(draw, {box.x + 1.1F * e, box.y + high / 2}, 0.45F * e, 4, palette::kYellow);
-  fitted_text(draw, {box.x + 2.0F * e, box.y, box.width - 2.5F * e, box.height}, 1.3F * e, theme().text, words_);
+  const float u = unit(), most = room.width - 32 * u;
+  if (most < 64 * u) return;
+  const float wide = std::min(chip_width(words_), most);
+  draw_chip(ImGui::GetBackgroundDrawList(),
+            {room.x + std::floor((room.width - wide) / 2), room.y + 8 * u, wide, chip_height(words_, wide)}, words_,
+            {palette::kYellow, 4, false});
 }
 
 }  // namespace osteo::inline app

@@ -37,8 +37,8 @@ class HintController {
   void frame(Vec3 eye_mm, double now_s);
   /// What is shown now; empty: nothing.
   [[nodiscard]] const std::string& words() const { return words_; }
-  /// At the upper edge of the picture.
-  void draw(const ScreenBox& view) const;
+  /// At the upper edge of what is free of the picture.
+  void draw(const ScreenBox& room) const;
 
  private:
   void join();

@@ -2,7 +2,6 @@
 
 #include <imgui.h>
 #include <imgui_internal.h>
-#include <imgui_stdlib.h>
 
 #include <algorithm>
 #include <cmath>
@@ -335,7 +334,8 @@ void MainView::draw(const ViewScene& scene) {
   const HandFacts hand = hand_facts(control, scene.sound, undo_steps_);
   draw_tray(layout_.tray, hand, in_settings(), latched_, pressed_);
   const StateFacts facts = state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr);
-  draw_state(layout_.state, layout_.view, facts, control.reported(causes_of(facts)), pressed_);
+  draw_state(layout_, facts, control.reported(causes_of(facts)), pressed_);
+  card_ = {};
   if (in_settings()) {
     draw_settings(scene);
   } else {
@@ -402,30 +402,39 @@ void MainView::session_ended() {
   seen_ = {};
 }
 
+ScreenBox MainView::free_room() const {
+  const ScreenBox& v = layout_.view;
+  const ScreenBox all{v.x, v.y, layout_.free_width(), v.height};
+  if (card_.empty()) return all;
+  if (card_.bottom() < v.y + v.height / 2) return {all.x, card_.bottom(), all.width, v.bottom() - card_.bottom()};
+  return {card_.right(), all.y, std::max(0.0F, all.right() - card_.right()), all.height};
+}
+
 // What belongs to the instrument in hand, and what comes next for a new user.
 void MainView::draw_cards(const ViewScene& scene, const HandFacts& hand) {
   if (!scene.side.empty()) return draw_side(scene, hand);
   const ScreenBox& view = layout_.view;
-  const float taken = layout_.over[0].empty() ? 0 : view.right() - layout_.over[0].x;
+  const float free = layout_.free_width();
   const char* const titles[] = {tr("Drill"), tr("Saw"), tr("Fragments"), tr("Plate")};
-  float below = 0;
   if (hand.tool == 0 && !hand.saw) {
-    below = draw_burr_card(view, view.width - taken, hand, burr_unfolded_, pressed_).bottom();
+    card_ = draw_burr_card(view, free, hand, burr_unfolded_, pressed_);
   } else {
-    below = draw_tool_card(view, "instrument", hand.saw ? tr("Saw in the hand") : titles[hand.tool],
+    card_ = draw_tool_card(view, free, "instrument", hand.saw ? tr("Saw in the hand") : titles[hand.tool],
                            [&] { draw_tools(scene, hand); });
   }
   RehearsalControl& control = scene.control;
   const bool water = latched_.suction || latched_.irrigation || control.second().holds() > 0;
+  const float below = card_.bottom();
   if (const float left = view.bottom() - below; hand.second_hand && water && left > 320 * unit()) {
-    draw_tool_card({view.x, below - 8 * unit(), view.width, left}, "second hand", tr("Second hand"), [&] {
+    draw_tool_card({view.x, below - 8 * unit(), view.width, left}, free, "second hand", tr("Second hand"), [&] {
       draw_second_hand(control.rehearsal(), control.second(), [&](const LocalText& said) { control.say(said); });
     });
   }
   if (!person_.values.first_steps) return;
   const bool card = palette_.shown() == CommandPalette::Shown::ten_keys;
   const float beside = card ? CommandPalette::card_width() + 16 * unit() : 0;
-  person_.values.first_steps = draw_next_step({view.x + beside, view.y, view.width - beside, view.height}, steps_);
+  person_.values.first_steps = draw_next_step({view.x + beside, view.y, view.width - beside, view.height},
+                                              free - beside, card_, steps_, step_unfolded_);
 }
 
 // In plan the card is beside the pictures, and with the drill the planned cuts are there.
@@ -479,7 +488,13 @@ void MainView::draw_settings(const ViewScene& scene) {
   };
   more(SettingsPage::view) = scene.draw_camera;
   if (scene.sound.on()) more(SettingsPage::sound) = [&] { ImGui::TextWrapped("%s", scene.sound.status().c_str()); };
-  more(SettingsPage::operation) = [&] { draw_head_turned(rehearsal); };
+  // In a low window the second hand's card has no room.
+  more(SettingsPage::operation) = [&] {
+    draw_head_turned(rehearsal);
+    if (rehearsal.hands() < 2 || !scene.alone) return;
+    ImGui::TextDisabled("%s", tr("Second hand"));
+    draw_second_hand(rehearsal, scene.control.second(), [&](const LocalText& said) { scene.control.say(said); });
+  };
   more(SettingsPage::controls) = scene.draw_hand;
   more(SettingsPage::haptics) = [&] { draw_haptics(rehearsal, *felt_then_); };
   more(SettingsPage::information) = [&] { draw_information(scene); };
@@ -518,9 +533,8 @@ void MainView::draw_note_field(RehearsalControl& control) {
                ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
   if (write_focus_) ImGui::SetKeyboardFocusHere();
   write_focus_ = false;
-  ImGui::SetNextItemWidth(-1);
-  ImGui::InputText("##note", &note_text_);
-  ImGui::TextDisabled(tr("Enter keeps it; empty: marks this moment; Esc: nothing"));
+  static_cast<void>(kit_field("##note", {}, note_text_));
+  kit_text(tr("Enter keeps it; empty: marks this moment; Esc: nothing"), theme().quiet);
   ImGui::End();
   const int answer = std::exchange(note_answer_, 0);
   if (answer > 0) {

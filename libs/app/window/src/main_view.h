@@ -90,6 +90,9 @@ class MainView {
   /// Letters are for a text, and no command.
   [[nodiscard]] bool typing() const { return writing() || palette_.typing(); }
 
+  /// Of the view, what cards and cuts leave at its upper edge: below a low card, beside a high one.
+  [[nodiscard]] ScreenBox free_room() const;
+
   /// Another session has begun.
   void renew();
   /// Each key as it is pressed or repeats, as GLFW numbers it: a note is finished by one that may be over before the
@@ -159,7 +162,8 @@ class MainView {
   std::optional<Vec3> writing_;  // where a note is pinned
   std::string note_text_;
   int note_answer_ = 0;  // 1: kept, -1: not
-  bool burr_unfolded_ = false, another_session_ = false;
+  ScreenBox card_;       // of the instrument, as it was drawn last; empty: none
+  bool burr_unfolded_ = false, step_unfolded_ = false, another_session_ = false;
   SettingsDialog settings_;
   const PersonValues begun_;                // what the sessions of this sitting began with
   std::optional<HapticsParams> felt_then_;  // when the session began

@@ -2,50 +2,45 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <string>
 
 #include "monitor_screen.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/base/translate.h"
+#include "ui_kit.h"
 #include "ui_style.h"
 
 namespace osteo::inline app {
 namespace {
 
 // In heights of text.
-constexpr float kMinLaneEm = 2.3F, kMinEm = 15, kMaxEm = 21, kSwitchesEm = 30;
+constexpr float kMinLaneEm = 2.3F, kMinEm = 15, kMaxEm = 21, kSwitchesEm = 30, kWideEm = 54;
 
-float button_wide(const char* words) {
-  return ImGui::CalcTextSize(words).x + 2 * ImGui::GetStyle().FramePadding.x;
-}
-float box_wide(const char* words) {
-  return ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x + ImGui::CalcTextSize(words).x;
-}
 // In the same row, where it has room for something so wide.
 void beside(float wide) {
-  ImGui::SameLine();
-  if (ImGui::GetContentRegionAvail().x < wide) ImGui::NewLine();
+  const float gap = kGap * unit(), right = ImGui::GetWindowPos().x + ImGui::GetWindowContentRegionMax().x;
+  if (ImGui::GetItemRectMax().x + gap + wide <= right) ImGui::SameLine(0, gap);
+}
+float switch_width(const std::string& words) {
+  return ImGui::CalcTextSize(words.c_str()).x + (48 + kGap) * unit();
 }
 
 // A lane of a channel: its name and gain at the left, where clicks change the gain.
 ScreenBox lane_head(MonitorScreen& screen, std::size_t channel, const std::string& name, const ScreenBox& lane) {
   ImDrawList* const draw = ImGui::GetWindowDrawList();
-  const float e = em(), wide = 8.2F * e;
+  const float e = em(), wide = std::min(8.2F * e, 0.6F * lane.width), side = std::min(lane.height / 2, 1.5F * e);
   fitted_text(draw, {lane.x, lane.y, wide - 0.4F * e, std::min(lane.height / 2, 1.1F * e)}, e * kLabelEm, theme().text,
               name);
-  ImGui::SetCursorScreenPos({lane.x, lane.y + lane.height / 2});
+  const float y = lane.y + lane.height / 2;
   ImGui::PushID(static_cast<int>(channel));
-  ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, ImVec2(e * 0.25F, 0));
-  if (ImGui::SmallButton("-")) screen.change_gain(channel, 1);
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip(tr("smaller in the picture"));
-  ImGui::SameLine(0, e * 0.2F);
-  if (ImGui::SmallButton("+")) screen.change_gain(channel, -1);
-  if (ImGui::IsItemHovered()) ImGui::SetTooltip(tr("larger in the picture"));
-  ImGui::PopStyleVar();
+  ImGui::SetCursorScreenPos({lane.x, y});
+  if (tile("-", "minus", {false, false, true, tr("smaller in the picture")}, side)) screen.change_gain(channel, 1);
+  ImGui::SetCursorScreenPos({lane.x + side, y});
+  if (tile("+", "plus", {false, false, true, tr("larger in the picture")}, side)) screen.change_gain(channel, -1);
   ImGui::PopID();
-  const ImVec2 at = ImGui::GetItemRectMax();
-  fitted_text(draw, {at.x + e * 0.3F, lane.y + lane.height / 2, wide - 3 * e, std::min(lane.height / 2, 1.1F * e)},
-              e * kLabelEm, theme().quiet, std::to_string(screen.gain_uv(channel)) + " uV");
+  const float at = lane.x + 2 * side + e * 0.3F;
+  fitted_text(draw, {at, y, lane.x + wide - at, std::min(lane.height / 2, 1.1F * e)}, e * kLabelEm, theme().quiet,
+              std::to_string(screen.gain_uv(channel)) + " uV");
   return {lane.x + wide, lane.y, lane.width - wide, lane.height};
 }
 
@@ -148,38 +143,34 @@ void MonitorPanel::draw_answers(MonitorController& controller, float height) {
 
 void MonitorPanel::draw_stimulator(MonitorController& controller) {
   const StimulatorSetting now = controller.stimulator();
-  const bool on = now.current_ma > 0;
-  auto ma = static_cast<float>(wanted_.current_ma);
-  ImGui::SetNextItemWidth(std::min(9 * em(), ImGui::GetContentRegionAvail().x));
-  const bool moved =
-      ImGui::SliderFloat("##ma", &ma, static_cast<float>(StimulatorSetting::kMinMa),
-                         static_cast<float>(StimulatorSetting::kMaxMa), "%.2f mA", ImGuiSliderFlags_Logarithmic);
-  wanted_.current_ma = static_cast<double>(ma);
+  bool on = now.current_ma > 0;
+  // By its logarithm: small currents have as much of the track as large ones.
+  const double least = std::log(StimulatorSetting::kMinMa), most = std::log(StimulatorSetting::kMaxMa);
+  double current = std::log(wanted_.current_ma);
+  const bool moved = kit_slider(tr("Stimulator"), shown_number(wanted_.current_ma, 2) + " mA", current, least, most,
+                                (most - least) / 100);
+  if (moved) wanted_.current_ma = std::clamp(std::exp(current), StimulatorSetting::kMinMa, StimulatorSetting::kMaxMa);
   if (ImGui::IsItemHovered()) ImGui::SetTooltip(tr("current of the stimulator: the tip of the tool is its electrode"));
-  const char* const turn = on ? tr("stimulator on") : tr("stimulator off");
-  beside(button_wide(turn));
-  if (on) ImGui::PushStyleColor(ImGuiCol_Button, im_colour(palette::kBlue));
-  const bool turned = ImGui::Button(turn);
-  if (on) ImGui::PopStyleColor();
-  const char* const look = now.search ? tr("looking ...") : tr("find threshold");
-  beside(button_wide(look));
-  const bool search = ImGui::Button(look);
+  const std::string turn = on ? tr("stimulator on") : tr("stimulator off");
+  const bool turned =
+      kit_switch(turn + "##stimulator", on, std::min(switch_width(turn), ImGui::GetContentRegionAvail().x));
+  const std::string look = now.search ? tr("looking ...") : tr("find threshold");
+  beside(button_width(look));
+  const bool search = kit_button(look + "##search");
   if (ImGui::IsItemHovered())
     ImGui::SetTooltip(tr("twice, half and between, three pulses each, while the tip touches"));
   if (controller.hands() > 1) {
-    beside(box_wide(tr("second hand")));
+    beside(switch_width(tr("second hand")));
     bool second = wanted_.hand == 1;
-    if (ImGui::Checkbox(tr("second hand"), &second)) wanted_.hand = second ? 1 : 0;
+    if (kit_switch(tr("second hand"), second, switch_width(tr("second hand")))) wanted_.hand = second ? 1 : 0;
   }
-  if (const auto found = controller.screen().threshold_ma()) {
-    beside(10 * em());
-    ImGui::TextUnformatted(filled(tr("threshold {ma} mA"), {{"ma", shown_number(*found, 2)}}).c_str());
-  }
+  if (const auto found = controller.screen().threshold_ma())
+    kit_text(filled(tr("threshold {ma} mA"), {{"ma", shown_number(*found, 2)}}), theme().text);
   if (search) {
     find_threshold(controller);
   } else if (turned) {
     switch_stimulator(controller);
-  } else if (moved && on && !now.search) {
+  } else if (moved && now.current_ma > 0 && !now.search) {
     controller.stimulate(wanted_);
   }
 }
@@ -213,22 +204,24 @@ void MonitorPanel::draw_switches(MonitorController& controller) {
   ImGui::PushStyleColor(ImGuiCol_Text, im_colour(alarm ? ink_of(palette::kVermillion) : theme().quiet));
   ImGui::TextUnformatted(alarm ? tr("activity") : tr("quiet"));
   ImGui::PopStyleColor();
-  ImGui::SameLine(8 * e);
-  ImGui::TextDisabled(tr("nerve monitor, for practice"));
-  if (ImGui::RadioButton(tr("free run"), !answers_)) answers_ = false;
-  beside(box_wide(tr("by stimulus")));
-  if (ImGui::RadioButton(tr("by stimulus"), answers_)) answers_ = true;
-  beside(box_wide(tr("freeze")));
-  if (ImGui::Checkbox(tr("freeze"), &frozen)) screen.freeze(frozen);
-  const char* const mute = own_window_ ? tr("mute (M)") : tr("mute (Ctrl-M)");
-  beside(box_wide(mute));
-  if (ImGui::Checkbox(mute, &muted)) controller.sound().mute(muted);
+  const float title = 8 * e;
+  if (title + ImGui::CalcTextSize(tr("nerve monitor, for practice")).x <= ImGui::GetWindowContentRegionMax().x)
+    ImGui::SameLine(title);
+  kit_text(tr("nerve monitor, for practice"), theme().quiet);
+  const std::string views[] = {tr("free run"), tr("by stimulus")};
+  if (const int view = choice("view", views, answers_ ? 1 : 0); view >= 0) answers_ = view == 1;
+  const auto in_row = [&](const std::string& words, bool& is) {
+    beside(switch_width(words));
+    return kit_switch(words, is, std::min(switch_width(words), ImGui::GetContentRegionAvail().x));
+  };
+  if (in_row(tr("freeze"), frozen)) screen.freeze(frozen);
+  if (in_row(own_window_ ? tr("mute (M)") : tr("mute (Ctrl-M)"), muted)) controller.sound().mute(muted);
   if (!own_window_) {
-    beside(button_wide(tr("hide (Ctrl-N)")));
-    if (ImGui::SmallButton(tr("hide (Ctrl-N)"))) shown_ = false;
+    beside(button_width(tr("hide (Ctrl-N)")));
+    if (kit_button(tr("hide (Ctrl-N)"))) shown_ = false;
   }
   if (controller.stimulates()) draw_stimulator(controller);
-  if (!controller.invitation().empty()) ImGui::TextWrapped("%s", controller.invitation().c_str());
+  if (!controller.invitation().empty()) kit_text(controller.invitation(), theme().text);
 }
 
 void MonitorPanel::lay_out(ViewLayout& layout, float em_pixels, bool there) {
@@ -249,7 +242,9 @@ void MonitorPanel::draw(MonitorController& controller) {
     return;
   }
   const auto log = [&](float high) {
-    ImGui::BeginChild("log", {0, high});
+    // Below switches that scroll it has a height of its own.
+    const float least = 5 * e;
+    ImGui::BeginChild("log", {0, high > 0 ? high : std::max(least, ImGui::GetContentRegionAvail().y)});
     const std::vector<MonitorScreen::Line> lines = controller.screen().log();
     for (auto line = lines.rbegin(); line != lines.rend(); ++line) {
       if (line->alarm) ImGui::PushStyleColor(ImGuiCol_Text, im_colour(ink_of(palette::kVermillion)));
@@ -265,9 +260,11 @@ void MonitorPanel::draw(MonitorController& controller) {
       draw_sweep(controller, high);
     }
   };
-  // Where it is wide enough the curves have all its height.
-  if (box_.width >= 54 * e) {
-    ImGui::BeginChild("switches", {kSwitchesEm * e, 0}, false, ImGuiWindowFlags_NoScrollbar);
+  // Where it is wide enough the curves have all its height; in a low strip as well, and the switches scroll.
+  const float needs = kMinLaneEm * e * static_cast<float>(controller.wiring().channels.size()) + 12 * e;
+  const bool columns = box_.width >= kWideEm * e || ImGui::GetContentRegionAvail().y < needs;
+  if (columns) {
+    ImGui::BeginChild("switches", {std::min(kSwitchesEm * e, 0.5F * ImGui::GetContentRegionAvail().x), 0});
     draw_switches(controller);
     log(0);
     ImGui::EndChild();

@@ -67,7 +67,7 @@ void RehearsalWindow::show() {
                 keyboard_.held(Command::wash) || main_view_.holds(Command::wash));
   note_camera(now);
   hints_.frame(scope_.view().eye_mm(), ImGui::GetTime());
-  hints_.draw(cuts_.scene());
+  hints_.draw(main_view_.free_room());
 }
 
 // For the panel, five times a second as the bone's colours.

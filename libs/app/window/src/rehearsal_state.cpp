@@ -80,7 +80,8 @@ void RehearsalWindow::write_state() {
     state.motion.second_mm = control_.second_mm();
     state.removed_mm3 = rehearsal->removed_mm3();
     if (warmth_) state.hottest_c = warmth_->bone_c;
-    rehearsal->look([&](const World& world, SceneReaders&) {
+    rehearsal->look([&](const World& world, SceneReaders& readers) {
+      if (readers.dust) state.down = readers.dust->dust().gravity();
       state.bodies = world.bodies().size();
       state.fixtures = world.fixtures().size();
       state.undo_steps = world.undo_steps();
@@ -106,6 +107,12 @@ ViewState RehearsalWindow::view_state() const {
   r.ended = ended_.has_value();
   r.ruler = main_view_.ruler().on();
   review_.state(r);
+  if (Rehearsal* const rehearsal = actions_.rehearsal();
+      rehearsal != nullptr && structures_ && rehearsal->structures() != nullptr) {
+    for (const StructuresView::One& s : structures_->all())
+      r.structures[rehearsal->structures()->name_of(s.value)] =
+          EnumNames<StructureLook>::values[static_cast<std::size_t>(s.look)];
+  }
   r.hints = hints_.on();
   r.hint = hints_.words();
   r.ruler_mm = main_view_.ruler().length_mm().value_or(0);

@@ -9,6 +9,7 @@
 #include "osteo/display/view/actors.h"
 #include "osteo/simulation/bone/world_mesh.h"
 #include "rehearsal_parts.h"
+#include "ui_kit.h"
 #include "work_done.h"
 
 namespace osteo::inline app {
@@ -35,6 +36,7 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
       case_hash_(options.case_hash),
       end_page_(options.end_page),
       window_(shell.window()) {
+  if (!state_file_.empty()) keep_places();
   cuts_.set_case(options.ct, hu, options.bone);
   control_.tools().plan(options.planned_cuts, options.planned_cuts_file);
   stereo_.params = options.stereo;
@@ -211,7 +213,6 @@ void RehearsalWindow::frame() {
   control_.look_from(view_axes());
   if (!seen) {  // put away
     write_state();
-    glfwWaitEventsTimeout(0.05);
     return;
   }
   lay_out();
@@ -323,19 +324,14 @@ void RehearsalWindow::begin_again(bool from_case) {
 
 // What failed, what is kept, and what can be done now. Nothing runs.
 void RehearsalWindow::report_failure() {
-  const float wide = std::min(static_cast<float>(width_), 30 * ImGui::GetFontSize());
-  ImGui::SetNextWindowPos({(static_cast<float>(width_) - wide) / 2, static_cast<float>(height_) / 3});
-  ImGui::SetNextWindowSize({wide, 0});
-  ImGui::Begin(tr("No session runs"), nullptr,
-               ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
-  ImGui::TextWrapped("%s", control_.failure()->what());
-  if (!control_.failure()->advice().empty()) ImGui::TextWrapped("%s", control_.failure()->advice().c_str());
-  ImGui::Separator();
-  if (const auto folder = actions_.folder(); !folder.empty()) ImGui::TextWrapped("%s", kept_text(folder).c_str());
-  bool go_on = ImGui::Button(tr("Go on from there (F5)"), {-1, 0});
-  bool anew = ImGui::Button(tr("Begin again from the case (R)"), {-1, 0});
-  if (ImGui::Button(tr("Close (Q)"), {-1, 0})) quit_ = true;
-  ImGui::End();
+  const auto folder = actions_.folder();
+  const std::string texts[] = {control_.failure()->what(), control_.failure()->advice(),
+                               folder.empty() ? std::string() : kept_text(folder)};
+  const std::string answers[] = {tr("Go on from there (F5)"), tr("Begin again from the case (R)"), tr("Close (Q)")};
+  const int pressed = kit_dialog({0, 0, static_cast<float>(width_), static_cast<float>(height_)}, tr("No session runs"),
+                                 texts, answers);
+  bool go_on = pressed == 0, anew = pressed == 1;
+  if (pressed == 2) quit_ = true;
   for (const Keyboard::Press& press : keyboard_.frame(ImGui::GetIO().WantTextInput)) {
     go_on = go_on || press.command == Command::save;
     anew = anew || press.command == Command::reset;

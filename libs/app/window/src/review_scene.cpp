@@ -45,8 +45,13 @@ void ReviewScene::lay_out(ViewLayout& layout, float em_pixels) {
   course_ = {};
   if (layout.shown != Layout::review || !control_.shown()) return;
   const float high = std::min(kCourseEm * em_pixels, 0.4F * layout.view.height);
-  course_ = {layout.view.x, layout.view.bottom() - high, layout.view.width, high};
+  // Below the picture, or where that is too narrow for the player's buttons below the page as well.
+  constexpr float kPlayer = 400;
+  const bool whole = layout.view.width < kPlayer * layout.unit;
+  const float from = whole ? layout.page.x : layout.view.x;
+  course_ = {from, layout.view.bottom() - high, layout.view.right() - from, high};
   layout.view.height -= high;
+  if (whole) layout.page.height -= high;
 }
 
 void ReviewScene::draw_findings() {
@@ -182,6 +187,7 @@ void ReviewScene::state(ViewState& state) const {
   state.timeline = control_.shown();
   state.playing = control_.playing();
   state.review_s = control_.now_s();
+  state.speed = control_.speed();
   state.review_mm3 = volume_mm3_;
 }
 

@@ -34,20 +34,17 @@ std::string mm_or_through(double mm) {
 }
 
 void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, const CutPreview& preview,
-               std::array<char, 64>& plan_name) {
+               std::string& plan_name) {
   SawCut cut = tools.cut();
   bool changed = kit_slider(tr("Kerf"), shown_number(cut.kerf_mm, 1) + " mm", cut.kerf_mm, 0.2, 5, 0.1);
   changed |= kit_slider(tr("Length"), mm_or_through(cut.length_mm), cut.length_mm, 0, 150, 1);
   changed |= kit_slider(tr("Depth"), mm_or_through(cut.depth_mm), cut.depth_mm, 0, 150, 1);
   if (changed) tools.set_cut(cut);
   if (!tools.planned().empty()) {
-    ImGui::SetNextItemWidth(-1);
-    if (ImGui::BeginCombo("##planned", tr("Planned cuts"))) {
-      for (std::size_t i = 0; i < tools.planned().size(); ++i) {
-        if (ImGui::Selectable(tools.planned()[i].name.c_str())) tools.choose_planned(i);
-      }
-      ImGui::EndCombo();
-    }
+    std::vector<std::string> names;
+    for (const PlannedCut& p : tools.planned()) names.push_back(p.name);
+    if (const int chosen = kit_list({}, names, -1, tr("Planned cuts")); chosen >= 0)
+      tools.choose_planned(static_cast<std::size_t>(chosen));
   }
   if (kit_button(tr_of("saw", "Upright"), ButtonLook::usual, 0, kSmallControl)) tools.aim_saw(view, false);
   ImGui::SameLine();
@@ -61,11 +58,9 @@ void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, con
   if (kit_button(tr("Cut (Enter)"), ButtonLook::main, wide)) tools.perform(rehearsal);
   // By force and time, with this plane as the cutting guide.
   if (kit_button(tr("By hand, along this plane"), ButtonLook::usual, wide)) tools.take_saw(rehearsal);
-  ImGui::SetNextItemWidth(-1);
-  if (ImGui::InputTextWithHint("##plan", tr("Name: keeps it as planned"), plan_name.data(), plan_name.size(),
-                               ImGuiInputTextFlags_EnterReturnsTrue)) {
-    tools.keep_planned(plan_name.data());
-    plan_name.fill(0);
+  if (kit_field("##plan", tr("Name: keeps it as planned"), plan_name)) {
+    tools.keep_planned(plan_name);
+    plan_name.clear();
   }
 }
 
@@ -111,15 +106,12 @@ void plate_panel(HandTools& tools, Rehearsal& rehearsal) {
   std::size_t plate = tools.plate();
   double turn = static_cast<double>(tools.plate_turn_deg()), tilt = static_cast<double>(tools.plate_tilt_deg());
   bool changed = false;
-  ImGui::SetNextItemWidth(-1);
-  if (ImGui::BeginCombo("##plate", plate_library()[plate].name.c_str())) {
-    for (std::size_t i = 0; i < plate_library().size(); ++i) {
-      if (ImGui::Selectable(plate_library()[i].name.c_str(), i == plate)) {
-        plate = i;
-        changed = true;
-      }
-    }
-    ImGui::EndCombo();
+  std::vector<std::string> names;
+  for (const PlateModel& p : plate_library()) names.push_back(p.name);
+  if (const int chosen = kit_list({}, names, static_cast<int>(plate));
+      chosen >= 0 && chosen != static_cast<int>(plate)) {
+    plate = static_cast<std::size_t>(chosen);
+    changed = true;
   }
   ImGui::TextWrapped("%s", tr(plate_library()[plate].about).c_str());
   const auto degrees = [](double deg) { return std::to_string(std::lround(deg)) + "°"; };

@@ -59,7 +59,7 @@ class SceneTools {
   };
   std::optional<HeldPlate> held_;
   CutPreview preview_;
-  std::array<char, 64> plan_name_{};
+  std::string plan_name_;
 };
 
 }  // namespace osteo::inline app

@@ -17,7 +17,9 @@ void draw_scope(const ScopeView& view, const PictureArea& area, StereoMode stere
   const ScaleBar bar = scale_bar(view.pixels_per_mm(area), std::min(0.12 * area.width, 12.0 * line));
   constexpr double kMicroscope = 2;  // below, the bar says enough
   const std::string length = shown_figures(format_number(bar.length_mm)) + " mm",
-                    words = view.magnification < kMicroscope ? std::string() : scope_text(view);
+                    words = view.magnification < kMicroscope || area.width <= static_cast<double>(kNarrow * unit())
+                                ? std::string()
+                                : scope_text(view);
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
   // At the lower right, of each eye's picture.
   const auto draw = [&](double right, double up, double squeezed) {

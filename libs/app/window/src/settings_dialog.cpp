@@ -54,6 +54,8 @@ constexpr const char* kPageNames[] = {tr_later("View"),       tr_later("Display"
                                       tr_later("Information")};
 // Of the design, docs/design/window.md.
 constexpr float kWide = 720, kPages = 184, kPad = 16, kHead = 56, kRing = 4;  // kRing: round what has the keys
+// In less the pages have a field above them in place of a list beside them.
+constexpr float kListed = 560, kField = 48;
 
 std::string percent(double share) {
   return filled(tr("{share} %"), {{"share", shown_number(100 * share, 0)}});
@@ -103,7 +105,7 @@ void choose_hints(std::string& off) {
   for (const HintRule& r : usual_hints()) {
     const auto left = hints_left({r}, off);
     bool on = !left.empty();
-    if (kit_switch(tr(r.id) + "##" + r.id, on)) off = with_hint(off, r.id, on);
+    if (kit_switch(tr(r.name.empty() ? r.id : r.name) + "##" + r.id, on)) off = with_hint(off, r.id, on);
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", tr(r.words).c_str());
   }
   ImGui::Unindent(16 * unit());
@@ -177,8 +179,16 @@ void take_setting(Rehearsal& rehearsal, std::size_t n, const HapticsParams& para
   rehearsal.act(SceneAction::setting(static_cast<std::uint32_t>(n), setting_value(static_cast<int>(n), params)));
 }
 
-bool page_has_rows(SettingsPage page) {
-  return std::any_of(std::begin(kRows), std::end(kRows), [&](const SettingRow& r) { return r.page == page; });
+// Those that have anything.
+std::vector<SettingsPage> pages_of(const SettingsParts& parts) {
+  std::vector<SettingsPage> all;
+  for (std::size_t n = 0; n < std::size(kPageNames); ++n) {
+    const auto page = static_cast<SettingsPage>(n);
+    if (parts.more[n] ||
+        std::any_of(std::begin(kRows), std::end(kRows), [&](const SettingRow& r) { return r.page == page; }))
+      all.push_back(page);
+  }
+  return all;
 }
 
 }  // namespace
@@ -210,7 +220,9 @@ bool SettingsDialog::draw(const ScreenBox& box, PersonValues& values, const Sett
   const float u = unit(), pad = kPad * u;
   float pages = std::max(kPages * u, parts.foot_wide + 1.5F * pad);
   for (const char* const name : kPageNames) pages = std::max(pages, ImGui::CalcTextSize(tr(name)).x + 40 * u + pad);
-  pages = std::min(pages, 0.45F * box.width);
+  const bool listed = box.width >= kListed * u;
+  pages = listed ? std::min(pages, 0.45F * box.width) : 0;
+  const float top = (listed ? kHead : kHead + kField) * u;
   begin_card("settings", box, {0, 0}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
   if (taking_keys_ > 0) {  // before what is drawn, which of it has them
     ImGui::FocusWindow(ImGui::GetCurrentWindow());
@@ -227,37 +239,52 @@ bool SettingsDialog::draw(const ScreenBox& box, PersonValues& values, const Sett
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {kRing * u, kRing * u});
   // Before the list of pages: the first that is drawn has the keys' cursor.
   const float another_high = parts.another ? 104 * u : 0;
-  ImGui::SetCursorScreenPos({box.x + pages + pad - kRing * u, box.y + (kHead - kRing) * u});
+  ImGui::SetCursorScreenPos({box.x + pages + pad - kRing * u, box.y + top - kRing * u});
   ImGui::BeginChild(("page " + std::to_string(static_cast<int>(page_))).c_str(),
-                    {box.width - pages - 1.5F * pad + kRing * u, box.height - kHead * u - pad / 2 - another_high},
-                    false, child);
+                    {box.width - pages - 1.5F * pad + kRing * u, box.height - top - pad / 2 - another_high}, false,
+                    child);
   ImGui::PushItemFlag(ImGuiItemFlags_NoNavDefaultFocus, !into_);
   for (const SettingRow& row : kRows) {
     if (row.page == page_) draw_row(row, values, parts);
   }
   if (const auto& more = parts.more[static_cast<std::size_t>(page_)]) more();
-  ImGui::PopItemFlag();
-  ImGui::EndChild();
-  // The pages at the left.
-  ImGui::SetCursorScreenPos({box.x + pad / 2 - kRing * u, box.y + (kHead - kRing) * u});
-  ImGui::BeginChild("pages", {pages - pad + 2 * kRing * u, box.height - kHead * u - pad / 2}, false, child);
-  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
-  for (std::size_t n = 0; n < std::size(kPageNames); ++n) {
-    const auto page = static_cast<SettingsPage>(n);
-    if (!page_has_rows(page) && !parts.more[n]) continue;
-    ImGui::PushItemFlag(ImGuiItemFlags_NoNavDefaultFocus, page != page_);
-    if (list_row(tr(kPageNames[n]), "", page == page_)) page_ = page;
-    ImGui::PopItemFlag();
-    note_place("page " + std::string(enum_names(SettingsPage{})[n]));
-  }
-  ImGui::PopStyleVar();
-  if (parts.foot) {
+  if (!listed && parts.foot) {
     ImGui::Dummy({0, 8 * u});
     parts.foot();
   }
+  ImGui::PopItemFlag();
   ImGui::EndChild();
-  draw->AddLine({box.x + pages, box.y + kHead * u}, {box.x + pages, box.bottom() - pad},
-                im_colour32(theme().line, 0.6F), std::max(1.0F, u));
+  if (listed) {
+    // The pages at the left.
+    ImGui::SetCursorScreenPos({box.x + pad / 2 - kRing * u, box.y + (kHead - kRing) * u});
+    ImGui::BeginChild("pages", {pages - pad + 2 * kRing * u, box.height - kHead * u - pad / 2}, false, child);
+    ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
+    for (const SettingsPage page : pages_of(parts)) {
+      ImGui::PushItemFlag(ImGuiItemFlags_NoNavDefaultFocus, page != page_);
+      if (list_row(tr(kPageNames[static_cast<std::size_t>(page)]), "", page == page_)) page_ = page;
+      ImGui::PopItemFlag();
+      note_place("page " + std::string(enum_names(SettingsPage{})[static_cast<std::size_t>(page)]));
+    }
+    ImGui::PopStyleVar();
+    if (parts.foot) {
+      ImGui::Dummy({0, 8 * u});
+      parts.foot();
+    }
+    ImGui::EndChild();
+    draw->AddLine({box.x + pages, box.y + kHead * u}, {box.x + pages, box.bottom() - pad},
+                  im_colour32(theme().line, 0.6F), std::max(1.0F, u));
+  } else {
+    ImGui::SetCursorScreenPos({box.x + pad - kRing * u, box.y + (kHead - kRing) * u - 8 * u});
+    ImGui::BeginChild("pages", {box.width - 1.5F * pad + kRing * u, kField * u}, false, child);
+    const std::vector<SettingsPage> all = pages_of(parts);
+    std::vector<std::string> names;
+    for (const SettingsPage page : all) names.emplace_back(tr(kPageNames[static_cast<std::size_t>(page)]));
+    const int now = static_cast<int>(std::find(all.begin(), all.end(), page_) - all.begin());
+    if (const int chosen = kit_list("", names, now < static_cast<int>(all.size()) ? now : -1); chosen >= 0)
+      page_ = all[static_cast<std::size_t>(chosen)];
+    note_place("pages");
+    ImGui::EndChild();
+  }
   bool another = false;
   if (parts.another) {
     ImGui::SetCursorScreenPos({box.x + pages + pad, box.bottom() - another_high});

@@ -30,7 +30,10 @@ float SliceOnScreen::text_size() const {
 }
 
 void SliceOnScreen::title(const std::string& words) const {
-  shadowed_text(draw, {lo.x + 8 * scale, lo.y + 6 * scale}, words, kText, text_size());
+  // Where it would meet the letter at the upper edge it stands below that.
+  const float line = text_size(), edge = 8 * scale;
+  const bool meets = edge + width_of(words, line) > static_cast<float>(view.width) / 2 - line;
+  shadowed_text(draw, {lo.x + edge, lo.y + 6 * scale + (meets ? 1.25F * line : 0)}, words, kText, line);
 }
 
 ImVec2 SliceOnScreen::place(Vec3 mm) const {

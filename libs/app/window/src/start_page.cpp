@@ -13,6 +13,7 @@
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "case_card.h"
 #include "case_maker.h"
@@ -175,13 +176,6 @@ class StartPage {
   }
 
  private:
-  void heading(const std::string& words) {
-    ImGui::Dummy({0, 4 * unit()});
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
-    ImGui::TextWrapped("%s", words.c_str());
-    ImGui::PopStyleColor();
-  }
-
   // Where the middle of the last item is, for who drives the page.
   void note(const std::string& name) {
     const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
@@ -222,7 +216,7 @@ class StartPage {
       const StartEntry& e = entries[static_cast<std::size_t>(n)];
       if (first || e.group != group) {
         const char* const groups[] = {tr("Cases"), tr("Sessions"), tr("Folders in {folder}")};
-        heading(filled(groups[static_cast<int>(e.group)], {{"folder", list_.folder().string()}}));
+        kit_heading(filled(groups[static_cast<int>(e.group)], {{"folder", list_.folder().string()}}));
         group = e.group;
         first = false;
       }
@@ -324,12 +318,13 @@ class StartPage {
                                              tr_later("On the left side"), tr_later("On the right side")};
     constexpr auto kIds = enum_names(Posture{});
     const auto* const at = std::find(kIds.begin(), kIds.end(), v.position);
-    label(tr("Patient position"));
-    ImGui::SetNextItemWidth(-1);
-    if (!ImGui::BeginCombo("##position", tr(kNames[at == kIds.end() ? 0 : at - kIds.begin()]))) return;
-    for (std::size_t n = 0; n < kIds.size(); ++n)
-      if (ImGui::Selectable(tr(kNames[n]), v.position == kIds[n])) v.position = kIds[n];
-    ImGui::EndCombo();
+    std::vector<std::string> names;
+    for (const char* const name : kNames) names.emplace_back(tr(name));
+    if (const int chosen =
+            kit_list(tr("Patient position"), names, at == kIds.end() ? 0 : static_cast<int>(at - kIds.begin()));
+        chosen >= 0)
+      v.position = kIds[static_cast<std::size_t>(chosen)];
+    note("position");
   }
 
   void toggle(const char* name, const char* words, bool& on) {
@@ -369,7 +364,8 @@ class StartPage {
   void draw_network(const std::filesystem::path& folder, float room) {
     std::string& chosen = person_.values.network;
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(theme().quiet));
-    ImGui::TextWrapped("%s", tr("It proposes structures in a CT of which a case is prepared. Look at them before use."));
+    ImGui::TextWrapped("%s",
+                       tr("It proposes structures in a CT of which a case is prepared. Look at them before use."));
     ImGui::PopStyleColor();
     const bool is = chosen == folder.string();
     if (kit_button(is ? tr("Not for new cases") : tr("Use for new cases"), ButtonLook::main, room))

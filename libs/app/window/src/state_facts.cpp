@@ -111,8 +111,7 @@ StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const
   if (warmth != nullptr) report_warmth(f, *warmth, tick, rehearsal.structures());
   f.removed = text_of("%.1f mm³", rehearsal.removed_mm3() + rehearsal.sawn_mm3());
   if (rehearsal.soft() != nullptr)
-    f.removed = filled(tr("{bone}, tissue {tissue}"),
-                       {{"bone", f.removed}, {"tissue", shown_number(rehearsal.tissue_mm3(), 1)}});
+    f.tissue = filled(tr("tissue {mm3}"), {{"mm3", shown_number(rehearsal.tissue_mm3(), 1)}});
   // A recording in trouble comes before everything: nothing of what follows would be kept.
   if (const std::string trouble = rehearsal.trouble(); !trouble.empty()) {
     f.warning = trouble;

@@ -25,6 +25,7 @@ struct StateFacts {
   double near_share = 0;  ///< how far the bar of nearness is full: 0 from kClearMm on, 1 on contact
   std::string warmth;     ///< of that structure, or of the warmest bone: "38.2 C"; empty where the scene has no heat
   std::string removed;    ///< by burrs and saws: "12.3 mm³"
+  std::string tissue;     ///< of soft tissue: "tissue 4.5"; empty where the scene has none
   std::string time;       ///< "3:07"
   std::string warning;    ///< the most important that there is to say; empty: nothing
   bool alarm = false;     ///< and it is one to stop for

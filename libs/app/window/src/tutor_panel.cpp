@@ -11,12 +11,27 @@
 
 namespace osteo::inline app {
 
+namespace {
+
+// Who takes part, for the catalogues: the runner of sessions names them.
+[[maybe_unused]] constexpr const char* kWho[] = {tr_later("you"), tr_later("trainee"), tr_later("watcher"),
+                                                 tr_later("instructor"), tr_later("recorded")};
+
+}  // namespace
+
+std::string shown_who(const std::string& who) {
+  // Of several of a kind the number stands behind.
+  const std::size_t end = who.find_last_not_of("0123456789");
+  if (end == std::string::npos || end + 1 == who.size() || who[end] != ' ') return tr(who);
+  return tr(who.substr(0, end)) + who.substr(end);
+}
+
 std::string link_text(const TutorNow::Link& link) {
-  if (!link.heard) return filled(tr("{who}: not heard"), {{"who", link.who}});
+  if (!link.heard) return filled(tr("{who}: not heard"), {{"who", shown_who(link.who)}});
   const auto signed_number = [](double value, int decimals) {
     return (value < 0 ? "" : "+") + shown_number(value, decimals);
   };
-  const std::initializer_list<Place> places{{"who", link.who},
+  const std::initializer_list<Place> places{{"who", shown_who(link.who)},
                                             {"rtt", shown_number(link.rtt_ms, 1)},
                                             {"lost", shown_number(100 * link.lost, 0)},
                                             {"offset", signed_number(link.offset_ms, 1)},
@@ -33,7 +48,8 @@ std::string who_cuts(const std::vector<std::string>& names, const std::vector<Ti
   for (std::size_t h = 0; h < std::min(names.size(), hands.size()); ++h) {
     const TickRecord& t = hands[h];
     if (t.speed_rpm > 0 && (t.immersed > 0 || t.voxels_changed > 0))
-      who = who.empty() ? names[h] : filled(tr("{one} and {other}"), {{"one", who}, {"other", names[h]}});
+      who = who.empty() ? shown_who(names[h])
+                        : filled(tr("{one} and {other}"), {{"one", who}, {"other", shown_who(names[h])}});
   }
   return who.empty() ? tr("nobody") : who;
 }
@@ -45,18 +61,18 @@ std::optional<LocalText> LinkWatch::look(const TutorNow& now) {
     heard.emplace_back(l.who, l.heard);
     const auto before = std::find_if(heard_.begin(), heard_.end(), [&](const auto& h) { return h.first == l.who; });
     if (before == heard_.end()) {
-      if (l.heard) said = LocalText([&] { return filled(tr("{who} has joined"), {{"who", l.who}}); });
+      if (l.heard) said = LocalText([&] { return filled(tr("{who} has joined"), {{"who", shown_who(l.who)}}); });
     } else if (before->second != l.heard) {
       said = LocalText([&] {
         return filled(l.heard ? tr("the link to the {who} is back")
                               : tr("the link to the {who} has dropped: your hand is let go"),
-                      {{"who", l.who}});
+                      {{"who", shown_who(l.who)}});
       });
     }
   }
   for (const auto& [who, was] : heard_) {
     if (std::none_of(heard.begin(), heard.end(), [&, name = who](const auto& h) { return h.first == name; }))
-      said = LocalText([&] { return filled(tr("{who} has left"), {{"who", who}}); });
+      said = LocalText([&] { return filled(tr("{who} has left"), {{"who", shown_who(who)}}); });
   }
   heard_ = std::move(heard);
   return said;
@@ -102,17 +118,6 @@ constexpr float kColumn = 304;
                                                        tr_later("saw and split"),
                                                        tr_later("draw forward and fix")};
 
-void wrapped(const std::string& words, Colour colour) {
-  ImGui::PushStyleColor(ImGuiCol_Text, im_colour(colour));
-  ImGui::TextWrapped("%s", words.c_str());
-  ImGui::PopStyleColor();
-}
-
-void heading(const std::string& words) {
-  ImGui::Dummy({0, 4 * unit()});
-  wrapped(words, theme().quiet);
-}
-
 // A line behind a sign.
 void signed_line(const std::string& words, int corners, Colour colour, bool filled_sign = true) {
   const float u = unit();
@@ -125,13 +130,13 @@ void signed_line(const std::string& words, int corners, Colour colour, bool fill
     draw->AddCircle(centre, 7 * u, im_colour32(colour), 20, 2 * u);
   }
   ImGui::SetCursorPosX(ImGui::GetCursorPosX() + 28 * u);
-  ImGui::TextWrapped("%s", words.c_str());
+  kit_text(words, theme().text);
 }
 
 void draw_invitation(const std::string& text) {
   if (text.empty()) return;
   const Invitation invitation = invitation_of(text);
-  heading(tr("Invitation code"));
+  kit_heading(tr("Invitation code"));
   ImGui::PushFont(bold_font());
   ImGui::SetWindowFontScale(kBoldEm / 1.25F);
   ImGui::TextUnformatted(invitation.code.c_str());
@@ -140,18 +145,18 @@ void draw_invitation(const std::string& text) {
   // An address in one piece.
   std::string command = invitation.command;
   if (const std::size_t at = command.find(" --join"); at != std::string::npos) command[at] = '\n';
-  wrapped(command, theme().quiet);
+  kit_text(command, theme().quiet);
 }
 
 void draw_people(const TutorNow& now, const std::vector<TickRecord>& hands) {
-  heading(tr("People"));
+  kit_heading(tr("People"));
   if (hands.size() > 1) {
     for (std::size_t h = 0; h < std::min(now.hands.size(), hands.size()); ++h) {
       std::vector<TickRecord> one(hands.size());
       one[h] = hands[h];
-      const bool cuts = who_cuts(now.hands, one) == now.hands[h];
+      const bool cuts = who_cuts(now.hands, one) == shown_who(now.hands[h]);
       const bool there = h == 0 || (hands[h].tick != 0 && hands[h].device.age_ms != 255);
-      static_cast<void>(list_row(now.hands[h] + "##hand" + std::to_string(h),
+      static_cast<void>(list_row(shown_who(now.hands[h]) + "##hand" + std::to_string(h),
                                  cuts    ? tr("cuts")
                                  : there ? ""
                                          : tr("not there"),
@@ -160,11 +165,11 @@ void draw_people(const TutorNow& now, const std::vector<TickRecord>& hands) {
   }
   for (const TutorNow::Link& l : now.links) {
     const bool well = l.heard && !l.differs;
-    wrapped((well ? "" : "! ") + link_text(l), well ? theme().quiet : ink_of(palette::kYellow));
+    kit_text((well ? "" : "! ") + link_text(l), well ? theme().quiet : ink_of(palette::kYellow));
   }
-  if (!now.trouble.empty()) wrapped("! " + now.trouble, ink_of(palette::kYellow));
+  if (!now.trouble.empty()) kit_text("! " + now.trouble, ink_of(palette::kYellow));
   if (hands.size() > 1 && now.apart_mm >= 0)
-    wrapped(filled(tr("apart {mm} mm"), {{"mm", shown_number(now.apart_mm, 1)}}), theme().text);
+    kit_text(filled(tr("apart {mm} mm"), {{"mm", shown_number(now.apart_mm, 1)}}), theme().text);
 }
 
 // A person who is led may let go, and be led again.
@@ -178,7 +183,7 @@ void draw_guidance(const TutorNow& now, Pressed& pressed) {
 
 void draw_steps(const TutorNow& now) {
   if (now.procedure.empty()) return;
-  heading(tr(now.procedure));
+  kit_heading(tr(now.procedure));
   for (const TutorNow::Step& s : now.steps) {
     const bool done = s.items > 0 && s.passed == s.items;
     const std::string share =
@@ -188,11 +193,11 @@ void draw_steps(const TutorNow& now) {
                   ")";
     signed_line(tr(s.name) + share, 0, done ? palette::kGreen : theme().line, done);
   }
-  if (now.steps.empty()) wrapped(tr("The steps are judged where the session runs."), theme().quiet);
+  if (now.steps.empty()) kit_text(tr("The steps are judged where the session runs."), theme().quiet);
 }
 
 void draw_harm(const std::vector<HarmLine>& harm) {
-  heading(tr("Harm so far"));
+  kit_heading(tr("Harm so far"));
   if (std::none_of(harm.begin(), harm.end(), [](const HarmLine& l) { return l.nearness != Nearness::near; }))
     signed_line(tr("no contact, no violation"), 0, palette::kGreen);
   for (const HarmLine& l : harm) signed_line(l.text, look_of(l.nearness).corners, look_of(l.nearness).colour);
@@ -215,11 +220,12 @@ void draw_names(const TutorNow& now, const std::vector<TickRecord>& hands, const
     const Vec3 at = from_floats(hands[h].device.position_mm) + normalized(from_floats(hands[h].device.axis)) * 14;
     const auto p = project(at);
     if (!p || !area.holds((*p)[0], (*p)[1])) continue;
-    const ImVec2 size = ImGui::CalcTextSize(now.hands[h].c_str());
+    const std::string name = shown_who(now.hands[h]);
+    const ImVec2 size = ImGui::CalcTextSize(name.c_str());
     const ImVec2 from{(*p)[0] + 0.8F * em(), (*p)[1] - size.y / 2};
     list->AddRectFilled({from.x - 0.3F * em(), from.y - 1}, {from.x + size.x + 0.3F * em(), from.y + size.y + 1},
                         im_colour32(theme().ground, 0.75F), 0.2F * em());
-    list->AddText(from, im_colour32(kPartnerColour), now.hands[h].c_str());
+    list->AddText(from, im_colour32(kPartnerColour), name.c_str());
   }
 }
 
@@ -245,7 +251,7 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
     begin_fixed("tutoring", box_);
     ImGui::PopStyleVar();
     ImGui::PushFont(bold_font());
-    ImGui::TextWrapped("%s", now.title.c_str());
+    kit_text(now.title, theme().text);
     ImGui::PopFont();
     draw_invitation(now.invitation);
     draw_people(now, hands);
@@ -267,7 +273,7 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
   ImGui::Begin("tutoring", nullptr,
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
-  ImGui::TextWrapped("%s", now.title.c_str());
+  kit_text(now.title, theme().text);
   draw_people(now, hands);
   draw_guidance(now, pressed);
   ImGui::End();

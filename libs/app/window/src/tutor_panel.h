@@ -22,6 +22,7 @@ namespace osteo::inline app {
 inline constexpr Colour kPartnerColour = palette::kPurple;
 
 /// Words of a link in a line: "trainee: there and back 12 ms, 1 % lost, clock 3.1 ms ahead, 20 ppm". No ImGui.
+[[nodiscard]] std::string shown_who(const std::string& who);
 [[nodiscard]] std::string link_text(const TutorNow::Link& link);
 /// Whose burr takes bone in this moment, by names; "nobody". No ImGui.
 [[nodiscard]] std::string who_cuts(const std::vector<std::string>& names, const std::vector<TickRecord>& hands);

@@ -1,10 +1,12 @@
 #include "ui_kit.h"
 
 #include <imgui_internal.h>
+#include <imgui_stdlib.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 
 #include "icon_lines.h"
 #include "ui_style.h"
@@ -40,6 +42,27 @@ void focus_and_text(const std::string& words) {
   if (ImGui::GetTime() - since >= kTooltipS) ImGui::SetTooltip("%s", words.c_str());
 }
 
+struct Places {
+  bool kept = false;
+  int picture = -1;
+  std::map<std::string, std::array<float, 2>> all;
+};
+Places& places() {
+  static Places p;
+  return p;
+}
+// Of the last item, where it can be seen.
+void note_place(std::string_view words) {
+  Places& p = places();
+  if (!p.kept || !ImGui::IsItemVisible()) return;
+  if (const int now = ImGui::GetFrameCount(); p.picture != now) {
+    p.picture = now;
+    p.all.clear();
+  }
+  const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
+  p.all[std::string(words.substr(0, words.find("##")))] = {(lo.x + hi.x) / 2, (lo.y + hi.y) / 2};
+}
+
 struct Item {
   bool pressed, hovered, active;
   ImVec2 lo, hi;
@@ -47,6 +70,7 @@ struct Item {
 Item item(const char* id, ImVec2 size) {
   Item i{};
   i.pressed = ImGui::InvisibleButton(id, size);
+  note_place(id);
   i.hovered = ImGui::IsItemHovered();
   i.active = ImGui::IsItemActive();
   i.lo = ImGui::GetItemRectMin();
@@ -61,7 +85,60 @@ void centred(ImDrawList* draw, ImVec2 lo, ImVec2 hi, const std::string& words, C
                 im_colour32(colour, ImGui::GetStyle().Alpha), shown.c_str());
 }
 
+// Words without what ImGui tells items apart by.
+std::string shown_part(const std::string& words) {
+  return words.substr(0, words.find("##"));
+}
+
+// Lines in a width, which a text that has no space to part it at may still be too wide for: then its middle goes.
+struct Lines {
+  std::string words;
+  float wide, high;
+};
+Lines lines_of(const std::string& words, float width, float size) {
+  need_letters(words);
+  ImFont* const font = ImGui::GetFont();
+  float longest = 0;
+  for (std::size_t at = 0; at < words.size();) {
+    const std::size_t end = std::min(words.find(' ', at), words.size());
+    longest = std::max(longest, font->CalcTextSizeA(size, FLT_MAX, 0, words.c_str() + at, words.c_str() + end).x);
+    at = end + 1;
+  }
+  // Letters of one script stand without spaces: they are parted anywhere.
+  const bool anywhere = std::any_of(words.begin(), words.end(), [](char c) { return (c & 0xF0) == 0xE0; });
+  const std::string shown = longest > width && !anywhere ? shortened(words, width, size) : words;
+  const ImVec2 taken = font->CalcTextSizeA(size, FLT_MAX, std::max(width, size), shown.c_str());
+  return {shown, std::min(taken.x, width), taken.y};
+}
+void draw_lines(ImDrawList* draw, ImVec2 at, float width, const std::string& words, Colour colour) {
+  draw->AddText(ImGui::GetFont(), ImGui::GetFontSize(), {std::floor(at.x), std::floor(at.y)},
+                im_colour32(colour, ImGui::GetStyle().Alpha), words.c_str(), nullptr,
+                std::max(width, ImGui::GetFontSize()));
+}
+
 }  // namespace
+
+void keep_places() {
+  places().kept = true;
+}
+
+const std::map<std::string, std::array<float, 2>>& kept_places() {
+  return places().all;
+}
+
+std::vector<ShownWindow> shown_windows() {
+  std::vector<ShownWindow> all;
+  for (const ImGuiWindow* const w : GImGui->Windows) {
+    const std::string_view name = w->Name;
+    if (!w->WasActive || w->Hidden || name.starts_with("Debug##")) continue;
+    const float slack = 2 + ImGui::GetStyle().WindowBorderSize;
+    const bool scrolls = (w->Flags & ImGuiWindowFlags_NoScrollWithMouse) == 0;
+    const bool cut = w->ContentSize.x + 2 * w->WindowPadding.x > w->Size.x - w->ScrollbarSizes.x + slack ||
+                     (!scrolls && w->ContentSize.y + 2 * w->WindowPadding.y > w->Size.y + slack);
+    all.push_back({std::string(name), {w->Pos.x, w->Pos.y, w->Size.x, w->Size.y}, cut});
+  }
+  return all;
+}
 
 bool has_icon(std::string_view name) {
   return icon_named(name) != nullptr;
@@ -113,16 +190,28 @@ float button_width(const std::string& words) {
 }
 
 bool kit_button(const std::string& words, ButtonLook look, float width, float high) {
-  const float u = unit();
-  const Item i = item(words.c_str(), {std::max(width, button_width(words)), high * u});
+  const float u = unit(), room = std::max(ImGui::GetContentRegionAvail().x, 64 * u), wanted = button_width(words);
+  const std::string shown = shown_part(words);
+  const float wide = wanted > room + 1 ? room : std::max(std::min(width, room), wanted);
+  const Lines lines = wanted > room + 1 ? lines_of(shown, room - 16 * u, ImGui::GetFontSize())
+                                        : Lines{shown, wanted - 32 * u, ImGui::GetFontSize()};
+  const Item i = item(words.c_str(), {wide, std::max(high * u, lines.high + 12 * u)});
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
-  const bool main = look == ButtonLook::main;
+  // One that is off is not what comes next.
+  const bool off = (GImGui->CurrentItemFlags & ImGuiItemFlags_Disabled) != 0;
+  const bool main = look == ButtonLook::main && !off;
+  if (off) look = ButtonLook::usual;
   if (look != ButtonLook::quiet || i.hovered)
     draw->AddRectFilled(i.lo, i.hi, im_colour32(main ? t.text : t.raised), kRound * u);
   if (i.hovered || i.active) draw->AddRectFilled(i.lo, i.hi, im_colour32(t.line, i.active ? 0.6F : 0.3F), kRound * u);
   if (look == ButtonLook::usual) draw->AddRect(i.lo, i.hi, im_colour32(t.line), kRound * u, 0, std::max(1.0F, u));
-  centred(draw, i.lo, i.hi, words.substr(0, words.find("##")), main ? t.ground : t.text);
+  if (lines.high > ImGui::GetFontSize() * 1.5F) {
+    draw_lines(draw, {(i.lo.x + i.hi.x - lines.wide) / 2, (i.lo.y + i.hi.y - lines.high) / 2}, lines.wide + 1,
+               lines.words, main ? t.ground : t.text);
+  } else {
+    centred(draw, i.lo, i.hi, lines.words, main ? t.ground : t.text);
+  }
   focus_and_text({});
   return i.pressed;
 }
@@ -134,14 +223,22 @@ int choice(const char* id, std::span<const std::string> words, int selected, flo
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
   const ImVec2 begin = ImGui::GetCursorScreenPos();
-  float all = 0;
-  for (const std::string& w : words) all += ImGui::CalcTextSize(w.c_str()).x + 24 * u;
-  draw->AddRectFilled(begin, {begin.x + all, begin.y + high * u}, im_colour32(t.ground), kRound * u);
-  draw->AddRect(begin, {begin.x + all, begin.y + high * u}, im_colour32(t.line), kRound * u, 0, std::max(1.0F, u));
+  float all = 0, widest = 0;
+  for (const std::string& w : words) {
+    all += ImGui::CalcTextSize(w.c_str()).x + 24 * u;
+    widest = std::max(widest, ImGui::CalcTextSize(w.c_str()).x + 24 * u);
+  }
+  const bool below = all > ImGui::GetContentRegionAvail().x + 1;
+  const ImVec2 end{begin.x + (below ? widest : all),
+                   begin.y + high * u * (below ? static_cast<float>(words.size()) : 1)};
+  draw->AddRectFilled(begin, end, im_colour32(t.ground), kRound * u);
+  draw->AddRect(begin, end, im_colour32(t.line), kRound * u, 0, std::max(1.0F, u));
   int pressed = -1;
   for (std::size_t n = 0; n < words.size(); ++n) {
-    if (n > 0) ImGui::SameLine();
-    const Item i = item(words[n].c_str(), {ImGui::CalcTextSize(words[n].c_str()).x + 24 * u, high * u});
+    if (n > 0 && !below) ImGui::SameLine();
+    if (below) ImGui::SetCursorScreenPos({begin.x, begin.y + high * u * static_cast<float>(n)});
+    const Item i =
+        item(words[n].c_str(), {below ? widest : ImGui::CalcTextSize(words[n].c_str()).x + 24 * u, high * u});
     if (i.pressed) pressed = static_cast<int>(n);
     const bool is = static_cast<int>(n) == selected;
     if (is || i.hovered)
@@ -155,10 +252,32 @@ int choice(const char* id, std::span<const std::string> words, int selected, flo
   return pressed;
 }
 
+int narrow_choice(const char* id, std::span<const std::string> words, int selected, float width) {
+  const float u = unit();
+  float all = 0;
+  for (const std::string& w : words) all += ImGui::CalcTextSize(w.c_str()).x + 24 * u;
+  if (all <= width) return choice(id, words, selected, kSmallControl);
+  ImGui::PushID(id);
+  const std::string& now = words[static_cast<std::size_t>(std::max(0, selected))];
+  const Item i = item("next", {width, kSmallControl * u});
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  const Theme& t = theme();
+  if (i.hovered || i.active)
+    draw->AddRectFilled(i.lo, i.hi, im_colour32(i.active ? t.line : t.raised, i.active ? 0.6F : 1), kRound * u);
+  draw->AddRect(i.lo, i.hi, im_colour32(t.line), kRound * u, 0, std::max(1.0F, u));
+  centred(draw, i.lo, i.hi, now, t.text);
+  std::string others;
+  for (const std::string& w : words) others += (others.empty() ? "" : ", ") + w;
+  focus_and_text(others);
+  ImGui::PopID();
+  return i.pressed ? (selected + 1) % static_cast<int>(words.size()) : -1;
+}
+
 bool kit_switch(const std::string& words, bool& on, float width) {
   const float u = unit();
   if (width <= 0) width = std::max(ImGui::GetContentRegionAvail().x, 48 * u);
-  const Item i = item(words.c_str(), {width, kControl * u});
+  const Lines lines = lines_of(shown_part(words), width - (40 + kGap) * u, ImGui::GetFontSize());
+  const Item i = item(words.c_str(), {width, std::max(kControl * u, lines.high + 8 * u)});
   if (i.pressed) on = !on;
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
@@ -166,8 +285,7 @@ bool kit_switch(const std::string& words, bool& on, float width) {
   draw->AddRectFilled({x, y - 10 * u}, {x + 36 * u, y + 10 * u}, im_colour32(on ? t.text : t.raised), 10 * u);
   draw->AddRect({x, y - 10 * u}, {x + 36 * u, y + 10 * u}, im_colour32(t.line), 10 * u, 0, std::max(1.0F, u));
   draw->AddCircleFilled({x + (on ? 26 : 10) * u, y}, 7 * u, im_colour32(on ? t.ground : t.text), 20);
-  const std::string shown = shortened(words.substr(0, words.find("##")), x - i.lo.x - kGap * u, ImGui::GetFontSize());
-  draw->AddText({i.lo.x, std::floor(y - ImGui::GetFontSize() / 2)}, im_colour32(t.text), shown.c_str());
+  draw_lines(draw, {i.lo.x, y - lines.high / 2}, x - i.lo.x - kGap * u, lines.words, t.text);
   focus_and_text({});
   return i.pressed;
 }
@@ -176,7 +294,9 @@ bool kit_slider(const std::string& name, const std::string& value, double& at, d
                 float width) {
   const float u = unit(), knob = 8 * u;
   if (width <= 0) width = std::max(ImGui::GetContentRegionAvail().x, 96 * u);
-  const Item i = item(name.c_str(), {width, kSlider * u});
+  const float value_wide = ImGui::CalcTextSize(value.c_str()).x;
+  const bool two = ImGui::CalcTextSize(name.c_str(), nullptr, true).x + value_wide + kGap * u > width;
+  const Item i = item(name.c_str(), {width, (kSlider + (two ? 20 : 0)) * u});
   const float from = i.lo.x + knob, to = i.hi.x - knob, y = i.hi.y - 14 * u;
   const double before = at;
   if (i.active) {
@@ -191,10 +311,9 @@ bool kit_slider(const std::string& name, const std::string& value, double& at, d
   at = std::clamp(at, least, most);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
-  const float value_wide = ImGui::CalcTextSize(value.c_str()).x;
   draw->AddText({i.lo.x, i.lo.y}, im_colour32(t.quiet),
-                shortened(name, width - value_wide - kGap * u, ImGui::GetFontSize()).c_str());
-  draw->AddText({i.hi.x - value_wide, i.lo.y}, im_colour32(t.text), value.c_str());
+                shortened(shown_part(name), two ? width : width - value_wide - kGap * u, ImGui::GetFontSize()).c_str());
+  draw->AddText({i.hi.x - value_wide, i.lo.y + (two ? 20 * u : 0)}, im_colour32(t.text), value.c_str());
   const float x = from + (to - from) * static_cast<float>(most > least ? (at - least) / (most - least) : 0);
   draw->AddRectFilled({i.lo.x, y - u}, {i.hi.x, y + u}, im_colour32(t.line), u);
   draw->AddRectFilled({i.lo.x, y - 2 * u}, {x, y + 2 * u}, im_colour32(t.text), 2 * u);
@@ -207,7 +326,7 @@ bool kit_slider(const std::string& name, const std::string& value, double& at, d
 int kit_list(const std::string& name, std::span<const std::string> words, int selected, const std::string& shown) {
   const float u = unit();
   ImGui::PushID(name.c_str());
-  ImGui::TextDisabled("%s", name.c_str());
+  if (!name.empty()) ImGui::TextDisabled("%s", name.c_str());
   const float wide = ImGui::GetContentRegionAvail().x;
   ImGui::SetNextItemWidth(wide);
   ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {12 * u, (kControl * u - ImGui::GetFontSize()) / 2});
@@ -216,9 +335,14 @@ int kit_list(const std::string& name, std::span<const std::string> words, int se
   int chosen = -1;
   const bool open = ImGui::BeginCombo("##list", field.c_str());
   ImGui::PopStyleVar();
+  if (!open) note_place(name.empty() ? field : name);
   if (open) {
     for (int n = 0; n < static_cast<int>(words.size()); ++n) {
+      need_letters(words[static_cast<std::size_t>(n)]);
       if (ImGui::Selectable(words[static_cast<std::size_t>(n)].c_str(), n == selected)) chosen = n;
+      // In its first picture a list is not seen, and not where it will be.
+      if (!ImGui::IsWindowAppearing() && !ImGui::GetCurrentWindow()->Hidden)
+        note_place(words[static_cast<std::size_t>(n)]);
       if (n == selected) ImGui::SetItemDefaultFocus();
     }
     ImGui::EndCombo();
@@ -227,30 +351,106 @@ int kit_list(const std::string& name, std::span<const std::string> words, int se
   return chosen;
 }
 
-bool list_row(const std::string& words, const std::string& right, bool selected, float high, std::string_view icon) {
-  const float u = unit();
-  const Item i = item(words.c_str(), {std::max(ImGui::GetContentRegionAvail().x, 48 * u), high * u});
+bool list_row(const std::string& words, const std::string& right, bool selected, float high, std::string_view icon,
+              float width) {
+  const float u = unit(), wide = std::max(width > 0 ? width : ImGui::GetContentRegionAvail().x, 48 * u);
+  const std::string shown = shown_part(words);
+  const float behind = icon.empty() ? 0 : 28 * u, end = ImGui::CalcTextSize(right.c_str()).x + behind;
+  const float words_wide = ImGui::CalcTextSize(shown.c_str()).x;
+  const bool two = !right.empty() && words_wide + end + 36 * u > wide;
+  // Words alone have as many lines as they need.
+  const bool alone = right.empty() && words_wide + behind + 24 * u > wide;
+  const Lines lines = alone ? lines_of(shown, wide - behind - 24 * u, ImGui::GetFontSize()) : Lines{};
+  const float tall = alone ? std::max(high * u, lines.high + 12 * u) : (two ? std::max(high, 60.0F) : high) * u;
+  const Item i = item(words.c_str(), {wide, tall});
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
   if (selected || i.hovered) draw->AddRectFilled(i.lo, i.hi, im_colour32(t.raised), kRound * u);
   if (selected)
     draw->AddRectFilled({i.lo.x, i.lo.y + 6 * u}, {i.lo.x + 4 * u, i.hi.y - 6 * u}, im_colour32(t.accent), 2 * u);
-  const float y = std::floor((i.lo.y + i.hi.y - ImGui::GetFontSize()) / 2);
-  const float behind = icon.empty() ? 0 : 28 * u, end = ImGui::CalcTextSize(right.c_str()).x + behind;
+  const float middle = std::floor((i.lo.y + i.hi.y - ImGui::GetFontSize()) / 2), by = two ? 11 * u : 0;
   if (!icon.empty())
     draw_icon(draw, {i.hi.x - 32 * u, std::floor((i.lo.y + i.hi.y) / 2 - 10 * u)}, 20 * u, icon, im_colour32(t.quiet));
-  draw->AddText({i.hi.x - end - 12 * u, y}, im_colour32(t.quiet), right.c_str());
-  draw->AddText(
-      {i.lo.x + 12 * u, y}, im_colour32(t.text),
-      shortened(words.substr(0, words.find("##")), i.hi.x - i.lo.x - end - 36 * u, ImGui::GetFontSize()).c_str());
-  focus_and_text({});
+  const std::string told = two ? shortened(right, wide - behind - 24 * u, ImGui::GetFontSize()) : right;
+  draw->AddText({i.hi.x - ImGui::CalcTextSize(told.c_str()).x - behind - 12 * u, middle + by}, im_colour32(t.quiet),
+                told.c_str());
+  if (alone) {
+    draw_lines(draw, {i.lo.x + 12 * u, (i.lo.y + i.hi.y - lines.high) / 2}, wide - behind - 24 * u, lines.words,
+               t.text);
+    focus_and_text(lines.words == shown ? std::string() : shown);
+    return i.pressed;
+  }
+  const std::string name =
+      shortened(shown, wide - (two ? behind + 24 * u : end + (right.empty() ? 24 : 36) * u), ImGui::GetFontSize());
+  draw->AddText({i.lo.x + 12 * u, middle - by}, im_colour32(t.text), name.c_str());
+  focus_and_text(name == shown ? std::string() : shown);
   return i.pressed;
+}
+
+void kit_heading(const std::string& words) {
+  ImGui::Dummy({0, 4 * unit()});
+  kit_text(words, theme().quiet);
+}
+
+void kit_text(const std::string& words, Colour colour) {
+  need_letters(words);
+  ImGui::PushStyleColor(ImGuiCol_Text, im_colour(colour));
+  ImGui::PushTextWrapPos(0);
+  ImGui::TextUnformatted(words.c_str());
+  ImGui::PopTextWrapPos();
+  ImGui::PopStyleColor();
+}
+
+bool kit_field(const char* id, const std::string& hint, std::string& text, float less, ImGuiInputTextFlags more) {
+  const float u = unit();
+  need_letters(text);
+  ImGui::SetNextItemWidth(std::max(48 * u, ImGui::GetContentRegionAvail().x - less));
+  ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {12 * u, (kControl * u - ImGui::GetFontSize()) / 2});
+  const bool entered = ImGui::InputTextWithHint(id, hint.c_str(), &text, ImGuiInputTextFlags_EnterReturnsTrue | more);
+  ImGui::PopStyleVar();
+  return entered;
+}
+
+int kit_dialog(const ScreenBox& window, const std::string& title, std::span<const std::string> texts,
+               std::span<const std::string> answers) {
+  const float u = unit(), gap = kGap * u, wide = std::min(448 * u, window.width - 16 * u);
+  ImGui::SetNextWindowPos({std::floor(window.x + (window.width - wide) / 2), std::floor(window.y + window.height / 4)});
+  // In a low window its words scroll, not its answers away.
+  ImGui::SetNextWindowSizeConstraints({wide, 0}, {wide, 0.74F * window.height});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, kCardRound * u);
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {16 * u, 16 * u});
+  ImGui::Begin(title.c_str(), nullptr,
+               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
+                   ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoNav);
+  ImGui::PopStyleVar(2);
+  ImGui::PushFont(bold_font());
+  ImGui::SetWindowFontScale(1.25F / kBoldEm);
+  kit_text(title, theme().text);
+  ImGui::SetWindowFontScale(1);
+  ImGui::PopFont();
+  for (const std::string& text : texts) {
+    if (!text.empty()) kit_text(text, theme().text);
+  }
+  ImGui::Dummy({0, 4 * u});
+  const float room = ImGui::GetContentRegionAvail().x, n = static_cast<float>(answers.size());
+  const float each = std::floor((room - gap * (n - 1)) / n);
+  const bool beside =
+      std::all_of(answers.begin(), answers.end(), [&](const std::string& a) { return button_width(a) <= each; });
+  int pressed = -1;
+  for (std::size_t a = 0; a < answers.size(); ++a) {
+    if (a > 0 && beside) ImGui::SameLine(0, gap);
+    if (kit_button(answers[a], a == 0 ? ButtonLook::main : ButtonLook::usual, beside ? each : room))
+      pressed = static_cast<int>(a);
+  }
+  ImGui::End();
+  return pressed;
 }
 
 bool fold(const char* words) {
   ImGui::PushStyleColor(ImGuiCol_Header, im_colour(theme().raised));
   ImGui::PushStyleColor(ImGuiCol_HeaderActive, im_colour(theme().line, 0.6F));
   const bool open = ImGui::CollapsingHeader(words);
+  note_place(words);
   ImGui::PopStyleColor(2);
   return open;
 }
@@ -259,10 +459,16 @@ float chip_width(const std::string& words) {
   return ImGui::CalcTextSize(words.c_str()).x + 48 * unit();
 }
 
+float chip_height(const std::string& words, float width) {
+  const float u = unit();
+  if (chip_width(words) <= width + 1) return 32 * u;
+  return std::max(32 * u, lines_of(words, width - 48 * u, kLineEm * kLabelEm * em()).high + 12 * u);
+}
+
 void draw_chip(ImDrawList* draw, const ScreenBox& box, const std::string& words, const ChipLook& look) {
   const float u = unit();
   const ImVec2 lo{box.x, box.y}, hi{box.right(), box.bottom()};
-  const bool wraps = chip_width(words) > box.width + 1 && box.height > 40 * u;
+  const bool wraps = chip_width(words) > box.width + 1;
   const float round = std::min(box.height / 2, 16 * u);
   draw->AddRectFilled(lo, hi, im_colour32(look.filled ? look.colour : theme().surface, look.filled ? 1 : 0.94F), round);
   draw->AddRect(lo, hi, im_colour32(look.colour), round, 0, 2 * u);
@@ -272,10 +478,9 @@ void draw_chip(ImDrawList* draw, const ScreenBox& box, const std::string& words,
   const ScreenBox inside{box.x + 36 * u, box.y, box.width - 48 * u, box.height};
   if (!wraps) return fitted_text(draw, inside, em(), ink, words);
   const float size = kLineEm * kLabelEm * em();
-  const std::string shown = shortened(words, 1.8F * inside.width, size);
-  const float tall = ImGui::GetFont()->CalcTextSizeA(size, FLT_MAX, inside.width, shown.c_str()).y;
-  draw->AddText(ImGui::GetFont(), size, {inside.x, std::floor(box.y + (box.height - tall) / 2)}, im_colour32(ink),
-                shown.c_str(), nullptr, inside.width);
+  const Lines lines = lines_of(words, inside.width, size);
+  draw->AddText(ImGui::GetFont(), size, {inside.x, std::floor(box.y + (box.height - lines.high) / 2)}, im_colour32(ink),
+                lines.words.c_str(), nullptr, inside.width);
 }
 
 void draw_card(ImDrawList* draw, const ScreenBox& box) {

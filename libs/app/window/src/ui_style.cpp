@@ -1,52 +1,120 @@
 #include "ui_style.h"
 
+#include <imgui_internal.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "osteo/core/base/translate.h"
 #include "window_fonts.h"
 
 namespace osteo::inline app {
 
+namespace {
+
+// Of what is always there: Western Europe's letters and signs.
+constexpr ImWchar kAlways[] = {0x20,   0x17F,  0x2010, 0x205E, 0x2070, 0x209F, 0x20AC, 0x20AC, 0x2190,
+                               0x2193, 0x2212, 0x2212, 0x2248, 0x2248, 0x2264, 0x2265, 0};
+constexpr unsigned kFirstChinese = 0x2E80;  // radicals; before come the scripts that Noto Sans has itself
+
+// Those and what texts need beyond them.
+struct Letters {
+  std::vector<bool> wanted = std::vector<bool>(IM_UNICODE_CODEPOINT_MAX + 1);
+  bool missing = false;
+  Language language = Language::english;
+};
+Letters& letters() {
+  static Letters all = [] {
+    Letters l;
+    for (const ImWchar* range = kAlways; *range != 0; range += 2) {
+      for (unsigned c = range[0]; c <= range[1]; ++c) l.wanted[c] = true;
+    }
+    return l;
+  }();
+  return all;
+}
+
+// Each character of a text, as UTF-8.
+template <typename Take>
+void each_letter(std::string_view text, const Take& take) {
+  for (const char *at = text.data(), *const end = at + text.size(); at < end;) {
+    unsigned int c = static_cast<unsigned char>(*at);
+    if (c < 0x80) {
+      ++at;
+      continue;
+    }
+    at += std::max(1, ImTextCharFromUtf8(&c, at, end));
+    if (c <= IM_UNICODE_CODEPOINT_MAX) take(c);
+  }
+}
+
+// What a font is asked for: of `wanted` from `first` to before `behind`.
+ImVector<ImWchar> ranges_of(const std::vector<bool>& wanted, unsigned first, unsigned behind) {
+  ImFontGlyphRangesBuilder builder;
+  for (unsigned c = first; c < std::min<unsigned>(behind, static_cast<unsigned>(wanted.size())); ++c) {
+    if (wanted[c]) builder.AddChar(static_cast<ImWchar>(c));
+  }
+  ImVector<ImWchar> out;
+  builder.BuildRanges(&out);
+  return out;
+}
+
+}  // namespace
+
+void need_letters(std::string_view text) {
+  each_letter(text, [](unsigned c) { need_letter(c); });
+}
+
+void need_letter(char32_t letter) {
+  Letters& l = letters();
+  if (letter > IM_UNICODE_CODEPOINT_MAX || l.wanted[letter]) return;
+  l.wanted[letter] = true;
+  l.missing = true;
+}
+
+bool letters_missing() {
+  return letters().missing || letters().language != language();
+}
+
 void set_ui_style(int em_pixels) {
   ImGuiIO& io = ImGui::GetIO();
   io.Fonts->Clear();
   io.FontGlobalScale = 1;
   const auto size = static_cast<float>(em_pixels);
-  // Latin with its accents, Greek, Cyrillic, signs.
-  static constexpr ImWchar kLetters[] = {0x20,   0x24F,  0x370,  0x3FF,  0x400,  0x52F,  0x1E00,
-                                         0x1EFF, 0x2010, 0x205E, 0x2070, 0x209F, 0x20A0, 0x20BF,
-                                         0x2212, 0x2212, 0x2248, 0x2248, 0x2264, 0x2265, 0};
-  static constexpr ImWchar kLatin[] = {0x20, 0x17F, 0x2010, 0x205E, 0x2212, 0x2212, 0};
+  Letters& l = letters();
+  l.language = language();
+  need_letters(catalogue_text(l.language));
+  l.missing = false;
+  // They live until the atlas is made.
+  const ImVector<ImWchar> western = ranges_of(l.wanted, 0x20, kFirstChinese),
+                          chinese = ranges_of(l.wanted, kFirstChinese, IM_UNICODE_CODEPOINT_MAX + 1);
   ImFontConfig config;
   config.FontDataOwnedByAtlas = false;
-  config.OversampleH = 2;
+  // Large letters are sharp without, and their atlas is half as large.
+  constexpr int kLargeEm = 28;
+  config.OversampleH = em_pixels < kLargeEm ? 2 : 1;
   // ImGui's size is from the highest ascender to the lowest descender, which Noto Sans has 1.362 em apart; lines are
   // nearer to each other than that.
   constexpr float kTallEm = 1.362F;
   // From ascender to descender Noto Sans CJK is 1.448 em high: letters of one line are as large as each other.
   constexpr float kChineseLarger = 1.448F / 1.362F;
-  const auto add = [&](const unsigned char* font, std::size_t bytes, float high, const ImWchar* letters) {
+  const auto add = [&](const unsigned char* font, std::size_t bytes, float high, const ImVector<ImWchar>& wanted) {
     // ImGui asks for a pointer to what it may own; this it does not, and does not write to.
     config.GlyphOffset.y = -std::round((kTallEm - kLineEm) * high / 2);
     io.Fonts->AddFontFromMemoryTTF(const_cast<unsigned char*>(font), static_cast<int>(bytes),
-                                   std::round(kTallEm * high), &config, letters);
+                                   std::round(kTallEm * high), &config, wanted.Data);
   };
-  // Of Chinese only what the catalogue has, in both.
-  ImVector<ImWchar> chinese;
-  ImFontGlyphRangesBuilder needed;
-  const std::string_view catalogue = catalogue_text(Language::chinese);
-  needed.AddText(catalogue.data(), catalogue.data() + catalogue.size());
-  needed.BuildRanges(&chinese);
   const auto add_chinese = [&](float high) {
+    if (chinese.Size < 2) return;  // its end alone
     config.MergeMode = true;
-    add(kNotoSansSc, sizeof kNotoSansSc, high * kChineseLarger, chinese.Data);
+    add(kNotoSansSc, sizeof kNotoSansSc, high * kChineseLarger, chinese);
     config.MergeMode = false;
   };
-  add(kNotoSans, sizeof kNotoSans, size, kLetters);
+  add(kNotoSans, sizeof kNotoSans, size, western);
   add_chinese(size);
-  add(kNotoSansBold, sizeof kNotoSansBold, std::round(kBoldEm * size), kLatin);
+  add(kNotoSansBold, sizeof kNotoSansBold, std::round(kBoldEm * size), western);
   add_chinese(std::round(kBoldEm * size));
   io.Fonts->Build();
   io.Fonts->Fonts[0]->FontSize = kLineEm * size;
@@ -127,7 +195,12 @@ const std::set<std::string>& texts_cut() {
   return cut();
 }
 
+void forget_texts_cut() {
+  cut().clear();
+}
+
 std::string shortened(const std::string& text, float width, float size, ImFont* font) {
+  need_letters(text);
   if (font == nullptr) font = ImGui::GetFont();
   const auto wide = [&](const std::string& s) { return font->CalcTextSizeA(size, FLT_MAX, 0, s.c_str()).x; };
   if (wide(text) <= width) return text;
@@ -153,7 +226,8 @@ void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour
   float size = kLineEm * std::min(em_pixels, box.height);
   const float width = font->CalcTextSizeA(size, FLT_MAX, 0, text.c_str()).x;
   const float least = std::min(size, kLineEm * kLabelEm * em());
-  if (width > box.width) size = std::max(least, size * box.width / width);
+  constexpr float kSurely = 0.999F;  // as the width is rounded
+  if (width > box.width) size = std::max(least, kSurely * size * box.width / width);
   const std::string shown = shortened(text, box.width, size, font);
   if (shown != text && ImGui::IsMouseHoveringRect({box.x, box.y}, {box.right(), box.bottom()}, false))
     ImGui::SetTooltip("%s", text.c_str());

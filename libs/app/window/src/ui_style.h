@@ -4,6 +4,7 @@
 
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "palette.h"
 #include "view_layout.h"
@@ -11,13 +12,21 @@
 namespace osteo::inline app {
 
 /// Puts Noto Sans into the context's atlas, an em of it so high, in place of what is there, and sets sizes and colours
-/// that go with it. It is part of the program: Latin, Greek and Cyrillic, no file is looked for. The atlas' texture has
-/// to be made again by whoever owns one.
+/// that go with it. It is part of the program, no file is looked for. The atlas has Western Europe's letters, those of
+/// the language, and what need_letters() was told of. Its texture has to be made again by whoever owns one.
 void set_ui_style(int em_pixels);
+/// What cases and people bring along, names and notes: their letters are in the atlas from its next making on. Latin,
+/// Greek, Cyrillic, and of Chinese, Japanese and Korean what the fonts have (libs/app/window/fonts). Cheap where all of
+/// them are there already; what is drawn by this header and ui_kit.h asks for itself.
+void need_letters(std::string_view text);
+void need_letter(char32_t letter);
+/// Some are not there yet, or the language is another one: between two pictures set_ui_style() is due.
+[[nodiscard]] bool letters_missing();
 /// Colours alone, as theme() has them now; and a person's theme by its name in the settings, into use.
 void set_ui_colours();
 void take_theme(const std::string& name);
-/// For figures and titles: digits of equal width, so that nothing moves while they change. Only Latin; kBoldEm em high.
+/// For figures and titles: digits of equal width, so that nothing moves while they change. kBoldEm em high; Chinese,
+/// Japanese and Korean are not bold in it.
 inline constexpr float kBoldEm = 1.5F;
 /// From line to line, in em. ImGui's size of a font is this: an em of letters is em() high.
 inline constexpr float kLineEm = 1.25F;
@@ -46,6 +55,7 @@ void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour
 [[nodiscard]] std::string shortened(const std::string& text, float width, float size, ImFont* font = nullptr);
 /// Texts that had no room and lost their middle since the program began, each once: what a test of the window asks for.
 [[nodiscard]] const std::set<std::string>& texts_cut();
+void forget_texts_cut();
 /// The sign of a state: a disc for 0 corners.
 void draw_sign(ImDrawList* draw, ImVec2 centre, float radius, int corners, Colour colour);
 

@@ -11,15 +11,24 @@ namespace {
 // Of the design, docs/design/window.md, in pixels at scale 1.
 constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPage = 544, kSide = 288;
 constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kSideWide = 960, kMinCut = 96, kMaxCut = 272;
-// Of the smallest window that operate fits: its state needs the width, its strip the height.
-constexpr double kMinWideEm = 40, kMinHighEm = 26;
+// Below the cuts' foot the scale bar, with what the microscope says above it where there is room beside it.
+constexpr float kScaleHigh = 80, kBarHigh = 48;
+// With less width than this a state has two rows, and beside a list four pictures need less height.
+constexpr float kOneRow = 904, kTwoRows = 120, kPlanBesideHigh = 480, kPageShare = 0.6F;
+// Of the smallest window that operate fits, text of twice the size in 1024 x 700: its state needs the width, its strip
+// the height.
+constexpr double kMinWideEm = 32, kMinHighEm = 21.875;
 
 // In the view's upper right corner, no larger than it has room for.
-void stack_over(ViewLayout& layout, float side, std::size_t count) {
+void stack_over(ViewLayout& layout, float wished, std::size_t count) {
+  float side = wished;
   const float u = layout.unit, gap = std::round(kCutGap * u), inset = std::round(kInset * u);
   const auto n = static_cast<float>(count);
-  side = std::min(side, (layout.view.height - 2 * inset - gap * (n - 1) - kChoice * u) / n);
+  const float scale = (layout.view.width > kNarrow * u ? kScaleHigh : kBarHigh) * u;
+  side = std::min(side, (layout.view.height - 2 * inset - gap * (n - 1) - kChoice * u - scale) / n);
   side = std::floor(std::min(side, 0.4F * layout.view.width));
+  // One that can be read rather than three that cannot.
+  if (count > 1 && side < kMinCut * u) return stack_over(layout, wished, 1);
   layout.over = {};
   if (side < 0.6F * kMinCut * u) return;
   for (std::size_t c = 0; c < count; ++c)
@@ -46,22 +55,25 @@ ViewLayout lay_out(Layout wanted, int width, int height, float em, float cut_sid
   // Whole pixels: textures and viewports have no others.
   const auto whole = [&](float n) { return std::round(n * u); };
   out.shown = wanted;
-  if (wanted == Layout::plan && (w < whole(kPlanWide) || h < whole(kPlanHigh))) {
+  const bool beside = w >= whole(kSideWide);
+  if (wanted == Layout::plan && (w < whole(kPlanWide) || h < whole(beside ? kPlanBesideHigh : kPlanHigh))) {
     out.shown = Layout::operate;
     out.why = [] { return tr("no room for four pictures: a larger window or smaller text (Ctrl -) shows them"); };
   }
   if (out.shown == Layout::review) {
-    const float page = std::min(whole(kPage), w);
+    const float page = std::min(whole(kPage), std::floor(kPageShare * w));  // the bone is beside it in any case
     out.page = {0, 0, page, h};
     out.view = {page, 0, w - page, h};
     return out;
   }
-  const float tray = std::min(whole(kStrip), w), state = std::min(whole(kState), h), above = h - state;
+  const float tray = std::min(whole(kStrip), w);
+  out.two_rows = w - tray < whole(kOneRow);
+  const float state = std::min(whole(out.two_rows ? kTwoRows : kState), h), above = h - state;
   out.tray = {0, 0, tray, h};
   out.state = {tray, above, w - tray, state};
   out.view = {tray, 0, w - tray, above};
   if (out.shown == Layout::plan) {
-    const float side = w >= whole(kSideWide) ? whole(kSide) : 0, from = tray + side;
+    const float side = beside ? whole(kSide) : 0, from = tray + side;
     const float left = std::floor((w - from) / 2), top = std::floor(above / 2);
     out.side = {tray, 0, side, side > 0 ? above : 0};
     out.view = {from, 0, left, top};

@@ -34,19 +34,22 @@ struct ViewLayout {
   ScreenBox side;                  ///< in plan, where there is room: grey values, structures, planned cuts; else empty
   ScreenBox view;                  ///< the bone
   ScreenBox state;                 ///< the strip of what the burr does now, at the bottom
+  bool two_rows = false;           ///< of the state: the nearest structure is below the figures
   std::array<ScreenBox, 3> cuts;   ///< four up; empty in other layouts
   std::array<ScreenBox, 3> over;   ///< cuts that lie on the picture; those without room are empty
   ScreenBox page;                  ///< of the end, in review; else empty
   float unit = 1;                  ///< pixels for one of the design's
+  /// From the view's left edge as far as cuts lie on it; all of it where none do.
+  [[nodiscard]] float free_width() const { return over[0].empty() ? view.width : over[0].x - view.x; }
   /// Of the window: what cuts on it leave to the picture.
   [[nodiscard]] double picture_share(int width, int height) const;
 };
 /// Of the window, in operate, at scale 1 from 1024 x 700 on.
 inline constexpr double kPictureShare = 0.8;
 /// `em_pixels`: height of text. The boxes but `over` tile the window. Any size; below the least that plan needs (52 x
-/// 34 em) it is operate that is shown, and says why. `cut_side`: of the cuts on the picture as the person dragged it,
-/// within limits; 0: the largest that leaves the picture its share, three where the window is 1200 of the design's
-/// pixels wide, else one.
+/// 34 em, with a side 60 x 30) it is operate that is shown, and says why. `cut_side`: of the cuts on the picture as the
+/// person dragged it, within limits; 0: the largest that leaves the picture its share, three where the window is 1200
+/// of the design's pixels wide, else one.
 [[nodiscard]] ViewLayout lay_out(Layout wanted, int width, int height, float em_pixels, float cut_side = 0);
 /// A strip above the state, as high as asked for but never more than half the pictures' height, for something that is
 /// shown for a while: the pictures make room, all else stays. Empty in review.
@@ -56,12 +59,15 @@ inline constexpr double kPictureShare = 0.8;
 /// stay. Empty in review.
 [[nodiscard]] ScreenBox take_column(ViewLayout& layout, float wide);
 
+/// Of the design's pixels: in a view that is no wider what the scale bar has beside it is left out, so that a message
+/// has room there.
+inline constexpr float kNarrow = 720;
 /// Height of text at scale 1.
 inline constexpr double kTextPixels = 16;
 /// A monitor's scale as the system tells it; where that is 1 on a large framebuffer, which many systems leave so, by
 /// its size: text keeps its share of a picture of 1920 x 1080. From 1 to 4.
 [[nodiscard]] double automatic_scale(double reported_by_monitor, int width, int height);
-/// Times what the person chose, as far as the smallest layout still fits; at least 0.7.
+/// Times what the person chose, as far as the smallest layout still fits (2 in 1024 x 700); at least 0.7.
 [[nodiscard]] double scale_that_fits(double automatic, double by_hand, int width, int height);
 /// A step of Ctrl + or -: 10 %, between 0.6 and 2.5.
 [[nodiscard]] double next_scale(double by_hand, int steps);

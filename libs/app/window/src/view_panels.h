@@ -35,29 +35,41 @@ struct Pressed {
 
 /// Fields that never change places: force, burr speed, bone below, the nearest structure with a bar that fills as it
 /// comes nearer; time, volume and the button that ends. `message`: what there is to tell now, in the strip where that
-/// is wide enough, else at the foot of `view`.
-void draw_state(const ScreenBox& box, const ScreenBox& view, const StateFacts& facts,
-                const std::optional<Message>& message, Pressed& pressed);
+/// is wide enough, else at the foot of the view.
+void draw_state(const ViewLayout& layout, const StateFacts& facts, const std::optional<Message>& message,
+                Pressed& pressed);
 /// The strip of tools: icons, each with its name and key on hovering. `menu`: the panel is open. `latched`: suction and
 /// irrigation, which a click leaves on.
 struct Latched {
   bool suction = false, irrigation = false;
 };
 void draw_tray(const ScreenBox& box, const HandFacts& hand, bool menu, Latched& latched, Pressed& pressed);
-/// What belongs to the burr, at the upper left of the view: kind, diameter; unfolded its shape and speed. Its box.
+/// What belongs to the burr, at the upper left of the view: kind, diameter; unfolded its shape and speed. Where
+/// `free_width` of the view, as far as the cuts, has no room for that, its name, which a click unfolds. Its box.
 ScreenBox draw_burr_card(const ScreenBox& view, float free_width, const HandFacts& hand, bool& unfolded,
                          Pressed& pressed);
-/// The same place for what belongs to another instrument, as high as it needs. `name`: of ImGui's window. Its lower
-/// edge.
-float draw_tool_card(const ScreenBox& view, const char* name, const std::string& title,
-                     const std::function<void()>& content);
+/// The same place for what belongs to another instrument, as high as it needs. `name`: of ImGui's window. Its box.
+ScreenBox draw_tool_card(const ScreenBox& view, float free_width, const char* name, const std::string& title,
+                         const std::function<void()>& content);
+/// Below the cuts on the picture, or empty where none are.
+[[nodiscard]] ScreenBox cuts_foot_box(const ViewLayout& layout);
+/// Which cut is shown where there is one alone, else which planes they have; and whether what else there is to set is
+/// open, which a click changes. `help`: what that is.
+struct CutsFoot {
+  int chosen = -1;  ///< pressed now
+  bool settings = false;
+};
+CutsFoot draw_cuts_foot(const ScreenBox& box, bool alone, int chosen, bool settings_open, const std::string& help);
 /// Into a card: what the second hand holds, and the size of its suction tube.
 void draw_second_hand(Rehearsal& rehearsal, SecondHand& second, const std::function<void(const LocalText&)>& say);
 /// Into the current window: what ends or begins a session.
 void draw_apart(Pressed& pressed);
 [[nodiscard]] float apart_width();
-/// One step at a time at the foot of the view. False: the person has closed it.
-[[nodiscard]] bool draw_next_step(const ScreenBox& view, const FirstSteps& steps);
+/// One step at a time at the foot of the view; in a low one its name, which a click unfolds. False: the person has
+/// closed it.
+/// `card`: the instrument's, which it stands beside in a very low view.
+[[nodiscard]] bool draw_next_step(const ScreenBox& view, float free_width, const ScreenBox& card,
+                                  const FirstSteps& steps, bool& unfolded);
 void draw_wheel(const ToolWheel& wheel);
 /// A question in the middle of the window. 1: yes, -1: no, 0: not yet.
 [[nodiscard]] int draw_question(int width, int height, const std::string& title, const std::string& text,

@@ -57,6 +57,7 @@ WindowShell::WindowShell(const ShellOptions& options) : fixed_scale_(options.sca
   });
   glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned letter) {
     auto* const shell = static_cast<WindowShell*>(glfwGetWindowUserPointer(w));
+    need_letter(letter);
     if (shell->on_letter) shell->on_letter(letter);
   });
   glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double x, double y) {
@@ -130,7 +131,7 @@ std::vector<std::filesystem::path> WindowShell::take_dropped() {
 void WindowShell::apply_scale() {
   const double automatic = fixed_scale_ > 0 ? fixed_scale_ : automatic_scale(reported_scale_, width_, height_);
   const int wanted = static_cast<int>(std::lround(kTextPixels * scale_that_fits(automatic, by_hand_, width_, height_)));
-  if (wanted == em_) return;
+  if (wanted == em_ && !letters_missing()) return;
   const bool had = em_ > 0;
   em_ = wanted;
   set_ui_style(em_);
@@ -141,7 +142,11 @@ void WindowShell::apply_scale() {
 bool WindowShell::poll() {
   glfwPollEvents();
   glfwGetFramebufferSize(window_, &width_, &height_);
-  if (put_away_ || width_ < 200 || height_ < 150) return false;
+  if (put_away_ || width_ < 200 || height_ < 150) {
+    // Nothing is drawn, so nothing else makes the loop wait.
+    glfwWaitEventsTimeout(0.05);
+    return false;
+  }
   apply_scale();
   return true;
 }

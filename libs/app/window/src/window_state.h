@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -25,8 +26,10 @@ struct ViewState {
   bool hints = false;
   int findings = -1;  // -1: not known yet
   bool timeline = false, playing = false;
-  double review_s = 0, review_mm3 = 0;  // the time that is shown, and the bone there is then
-  std::vector<std::string> steps_done;  // of the first five minutes, by name
+  double review_s = 0, review_mm3 = 0;            // the time that is shown, and the bone there is then
+  double speed = 1;                               // at which it plays
+  std::map<std::string, std::string> structures;  // how each is shown
+  std::vector<std::string> steps_done;            // of the first five minutes, by name
   std::string next_step;
   bool typing = false;        // in the list of commands
   std::string search, found;  // what, and the name of the row that is chosen
@@ -95,6 +98,7 @@ struct WindowState {
   TickRecord tick;
   double removed_mm3 = 0;
   double hottest_c = 0;  // 0: the scene has no heat
+  Vec3 down;             // where dust falls to; zero: the scene has none
   std::size_t bodies = 0, fixtures = 0, undo_steps = 0;
   std::vector<Vec3> places_mm;
 };

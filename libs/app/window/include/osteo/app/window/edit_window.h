@@ -21,6 +21,7 @@ struct EditPlace {
 
 struct EditWindowOptions {
   int width = 1360, height = 860;  ///< made smaller where the screen is
+  double scale = 0;                ///< of text; 0: as the monitor has it. Times what the person chose.
   std::string title;
   std::vector<EditPlace> places;  ///< listed in this order
   std::filesystem::path

@@ -10,7 +10,7 @@ namespace osteo::inline app {
 struct TutorNow {
   /// Another program that takes part.
   struct Link {
-    std::string who;
+    std::string who;     ///< as `hands`: in English, and in the language where it is shown
     bool heard = false;  ///< lately
     double rtt_ms = 0, offset_ms = 0, drift_ppm = 0;
     double lost = 0;       ///< share of packets that did not come
@@ -22,7 +22,7 @@ struct TutorNow {
     std::string name;
     std::size_t items = 0, passed = 0;
   };
-  std::string title;        ///< empty: nobody teaches, and nothing is shown
+  std::string title;        ///< in the language; empty: nobody teaches, and nothing is shown
   bool teaches = false;     ///< who sits here teaches or watches: people, steps and harm have a column of their own
   std::string procedure;    ///< its name; empty: none
   std::vector<Step> steps;  ///< of it
@@ -30,8 +30,8 @@ struct TutorNow {
       invitation;       ///< what others need to join: address and code; shown, and written nowhere. Empty: nobody can
   std::string trouble;  ///< for people; empty: all well
   std::vector<Link> links;
-  std::vector<std::string> hands;  ///< names of the hands in the order they are shown, the own first; others are drawn
-                                   ///< in a colour of their own
+  std::vector<std::string> hands;  ///< who moves them, in the order they are shown, the own first; others are drawn in
+                                   ///< a colour of their own
   bool ghosts = false;             ///< and these faintly: they are no hands of today
   bool leads = false;              ///< the own hand may be led
   bool guiding = false;            ///< and it is not switched off

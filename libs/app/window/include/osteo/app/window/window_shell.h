@@ -50,7 +50,8 @@ class WindowShell {
   /// Files and folders that were dropped onto the window since the last call.
   [[nodiscard]] std::vector<std::filesystem::path> take_dropped();
 
-  /// Events, size and, where the scale has changed, text. False: the window is put away, and there is nothing to draw.
+  /// Events, size and, where the scale has changed, text. False: the window is put away, and there is nothing to draw;
+  /// then it waits a moment, as no picture makes the loop wait.
   bool poll();
   /// Since the last call the system has asked for the picture again: something had covered it.
   [[nodiscard]] bool take_uncovered() { return std::exchange(uncovered_, false); }

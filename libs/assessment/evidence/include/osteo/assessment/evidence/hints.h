@@ -27,11 +27,12 @@ enum class HintKind : int {
 
 struct HintRule {
   using Params = HintRule;
-  std::string id, words, structure;
+  std::string id, name, words, structure;
   HintKind kind = HintKind::unseen;
   double within_mm = 2, limit = 1, for_s = 0.5, quiet_s = 15;
   static void describe(Params& p, auto& visit) {
     visit({"id", "name by which a person turns the hint off; also in the session's note", "", 0, 0, true}, p.id);
+    visit({"name", "what the settings call it (empty: its id)"}, p.name);
     visit({"kind", "what is watched", "", 0, 0, true}, p.kind);
     visit({"words", "what is said; {structure} stands for its name", "", 0, 0, true}, p.words);
     visit({"structure", "which alone counts (empty: any)"}, p.structure);

@@ -1,0 +1,352 @@
+// Text of up to twice the size in each size of window and in each language: everything is inside the window, nothing
+// lies on something else, no text is cut, and every command can be reached. ImGui without a screen.
+#include <gtest/gtest.h>
+#include <imgui.h>
+#include <imgui_internal.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "command_palette.h"
+#include "osteo/core/base/translate.h"
+#include "scope_panel.h"
+#include "settings_dialog.h"
+#include "ui_kit.h"
+#include "ui_style.h"
+#include "view_panels.h"
+
+namespace osteo {
+namespace {
+
+struct Size {
+  int width, height;
+};
+constexpr Size kSizes[] = {{1024, 700}, {1280, 800}, {1920, 1080}, {3840, 2160}};
+constexpr double kScales[] = {1, 1.25, 1.5, 2};
+constexpr Language kLanguages[] = {Language::english, Language::german, Language::spanish, Language::french,
+                                   Language::chinese};
+
+int em_of(Size s, double by_hand) {
+  return static_cast<int>(
+      std::lround(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), by_hand, s.width, s.height)));
+}
+
+// One screen in memory, of a size of window and of text.
+class Screen {
+ public:
+  Screen(Size size, double by_hand) : size_(size) {
+    ImGui::CreateContext();
+    ImGuiIO& io = ImGui::GetIO();
+    io.IniFilename = nullptr;
+    io.DisplaySize = {static_cast<float>(size.width), static_cast<float>(size.height)};
+    io.DeltaTime = 1 / 60.0F;
+    em_ = em_of(size, by_hand);
+    set_ui_style(em_);
+    ImGui::NewFrame();  // ImGui has its font from the first on
+    ImGui::Render();
+  }
+  ~Screen() { ImGui::DestroyContext(); }
+  Screen(const Screen&) = delete;
+  Screen& operator=(const Screen&) = delete;
+
+  [[nodiscard]] ViewLayout lay_out(Layout wanted) const {
+    return osteo::lay_out(wanted, size_.width, size_.height, static_cast<float>(em_));
+  }
+  [[nodiscard]] ScreenBox whole() const {
+    return {0, 0, static_cast<float>(size_.width), static_cast<float>(size_.height)};
+  }
+  // Two pictures: ImGui knows what a window holds from the one before. What lost a part for want of room in them.
+  std::set<std::string> draw(const std::function<void()>& content) {
+    forget_texts_cut();
+    for (int n = 0; n < 3; ++n) {
+      ImGui::NewFrame();
+      content();
+      ImGui::Render();
+    }
+    return texts_cut();
+  }
+  // Windows of the last picture: each within the screen, and what it holds within it, but downwards where it scrolls.
+  std::map<std::string, ScreenBox> windows() const {
+    std::map<std::string, ScreenBox> all;
+    for (const ImGuiWindow* const w : GImGui->Windows) {
+      if (!w->Active || w->Hidden || std::string(w->Name) == "Debug##Default") continue;
+      const float slack = 2 + ImGui::GetStyle().WindowBorderSize;
+      const ScreenBox box{w->Pos.x, w->Pos.y, w->Size.x, w->Size.y};
+      EXPECT_LE(w->ContentSize.x + 2 * w->WindowPadding.x, box.width - w->ScrollbarSizes.x + slack) << w->Name;
+      const bool scrolls = (w->Flags & ImGuiWindowFlags_NoScrollWithMouse) == 0;
+      if (!scrolls) {
+        EXPECT_LE(w->ContentSize.y + 2 * w->WindowPadding.y, box.height + slack) << w->Name;
+      }
+      if ((w->Flags & ImGuiWindowFlags_ChildWindow) != 0) continue;
+      EXPECT_GE(box.x, -1) << w->Name;
+      EXPECT_GE(box.y, -1) << w->Name;
+      EXPECT_LE(box.right(), whole().right() + 1) << w->Name;
+      EXPECT_LE(box.bottom(), whole().bottom() + 1) << w->Name;
+      all[w->Name] = box;
+    }
+    return all;
+  }
+
+ private:
+  Size size_;
+  int em_ = 0;
+};
+
+void for_each(const std::function<void(Size, double)>& test) {
+  for (const Size s : kSizes) {
+    for (const double by_hand : kScales) {
+      SCOPED_TRACE(std::to_string(s.width) + " x " + std::to_string(s.height) + ", text " + std::to_string(by_hand));
+      test(s, by_hand);
+    }
+  }
+}
+
+void expect_apart(const std::map<std::string, ScreenBox>& boxes) {
+  for (auto a = boxes.begin(); a != boxes.end(); ++a) {
+    for (auto b = boxes.begin(); b != a; ++b) {
+      const ScreenBox &one = a->second, &other = b->second;
+      if (one.empty() || other.empty()) continue;
+      const bool apart = one.right() <= other.x + 1 || other.right() <= one.x + 1 || one.bottom() <= other.y + 1 ||
+                         other.bottom() <= one.y + 1;
+      EXPECT_TRUE(apart) << a->first << " (" << one.x << ", " << one.y << " to " << one.right() << ", " << one.bottom()
+                         << ") lies on " << b->first << " (" << other.x << ", " << other.y << " to " << other.right()
+                         << ", " << other.bottom() << ")";
+    }
+  }
+}
+
+// What was drawn onto the picture itself in the last picture.
+ScreenBox on_picture() {
+  ScreenBox box{1e9F, 1e9F, 0, 0};
+  float right = 0, bottom = 0;
+  const ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  for (const ImDrawVert& v : list.VtxBuffer) {
+    box.x = std::min(box.x, v.pos.x);
+    box.y = std::min(box.y, v.pos.y);
+    right = std::max(right, v.pos.x);
+    bottom = std::max(bottom, v.pos.y);
+  }
+  if (list.VtxBuffer.empty()) return {};
+  box.width = right - box.x;
+  box.height = bottom - box.y;
+  return box;
+}
+
+// The longest that the program itself says; names of structures are those of its own phantoms.
+StateFacts drilling(Nearness nearness) {
+  StateFacts f;
+  f.turning = true;
+  f.speed = "120000 rpm";
+  f.force = shown_number(12.34, 2) + " N";
+  f.force_share = 1;
+  f.under = tr("over 10 mm");
+  f.nearness = nearness;
+  f.structure = tr("semicircular canals");
+  f.distance = nearness == Nearness::far ? std::string() : shown_number(1.2, 1) + " ± " + shown_number(0.6, 1) + " mm";
+  f.near_share = 0.9;
+  f.removed = shown_number(12345.6, 1) + " mm³";
+  f.tissue = filled(tr("tissue {mm3}"), {{"mm3", shown_number(1234.5, 1)}});
+  f.time = "11:03:07";
+  return f;
+}
+
+// While one drills: strips, card, cuts with their foot, message, hint's place, step and scale bar beside each other.
+void expect_a_place_for_everything(bool monitor) {
+  for (const Language language : kLanguages) {
+    const InLanguage theirs(language);
+    for_each([&](Size s, double by_hand) {
+      SCOPED_TRACE(std::string(enum_names(language)[static_cast<std::size_t>(language)]));
+      Screen screen(s, by_hand);
+      EXPECT_EQ(
+          ImGui::GetIO().Fonts->Fonts[0]->FontSize,
+          kLineEm * static_cast<float>(std::lround(kTextPixels * by_hand * automatic_scale(1, s.width, s.height))))
+          << "as large as it was asked for";
+      ViewLayout l = screen.lay_out(Layout::operate);
+      // What the nerve monitor takes of the pictures.
+      const float e = static_cast<float>(em_of(s, by_hand));
+      if (monitor) static_cast<void>(take_strip(l, std::clamp(l.view.height * 0.28F, 15 * e, 21 * e)));
+      const Message told{Message::Rank::harm,
+                         tr("no room for four pictures: a larger window or smaller text (Ctrl -) shows them")};
+      FirstSteps steps;
+      Pressed pressed;
+      Latched latched;
+      HandFacts hand;
+      hand.second_hand = true;
+      bool burr_unfolded = false, step_unfolded = false;
+      const auto state = [&](const std::optional<Message>& message, Nearness nearness) {
+        draw_state(l, drilling(nearness), message, pressed);
+      };
+      const auto all = [&](const std::optional<Message>& message, Nearness nearness) {
+        state(message, nearness);
+        draw_tray(l.tray, hand, false, latched, pressed);
+        const ScreenBox card = draw_burr_card(l.view, l.free_width(), hand, burr_unfolded, pressed);
+        if (!l.over[0].empty()) static_cast<void>(draw_cuts_foot(cuts_foot_box(l), l.over[1].empty(), 0, false, {}));
+        static_cast<void>(draw_next_step(l.view, l.free_width(), card, steps, step_unfolded));
+      };
+      for (const Nearness n : {Nearness::near, Nearness::close, Nearness::touched, Nearness::far}) {
+        for (const std::string& text : screen.draw([&] { all({}, n); })) ADD_FAILURE() << "cut: " << text;
+      }
+      std::map<std::string, ScreenBox> boxes = screen.windows();
+      for (const char* const name : {"state", "tray", "burr", "first steps"})
+        EXPECT_TRUE(boxes.contains(name)) << name << " has vanished";
+      for (std::size_t c = 0; c < 3; ++c) {
+        if (!l.over[c].empty()) boxes["cut " + std::to_string(c)] = l.over[c];
+      }
+      if (!monitor) {
+        EXPECT_TRUE(boxes.contains("cuts' foot"));
+        EXPECT_FALSE(l.over[0].empty());
+      }
+      // Alone, so that its place is known.
+      for (const std::string& text : screen.draw([&] { state(told, Nearness::near); }))
+        ADD_FAILURE() << "cut: " << text;
+      if (const ScreenBox message = on_picture(); !message.empty()) boxes["message"] = message;
+      const PictureArea area{static_cast<double>(l.view.x), static_cast<double>(l.view.y),
+                             static_cast<double>(l.view.width), static_cast<double>(l.view.height)};
+      ScopeView view;
+      view.magnification = 12.5;
+      screen.draw([&] {
+        state({}, Nearness::near);
+        draw_scope(view, area, StereoMode::off);
+      });
+      boxes["scale"] = on_picture();
+      EXPECT_FALSE(boxes["scale"].empty());
+      if (l.view.height < 200 * unit()) boxes.erase("scale");  // in a very low picture the step may lie on its edge
+      expect_apart(boxes);
+    });
+  }
+}
+
+TEST(Sizes, OperateHasAPlaceForEverything) {
+  expect_a_place_for_everything(false);
+}
+
+// The monitor takes up to half of the picture: then the cuts may be a key away, and nothing else.
+TEST(Sizes, OperateWithTheNerveMonitorToo) {
+  expect_a_place_for_everything(true);
+}
+
+// Every page of the settings, at its upper end; what it holds is never wider than it.
+TEST(Sizes, SettingsAreWhole) {
+  const std::vector<StartProcedure> procedures{{"mastoidectomy", tr("Cortical mastoidectomy with facial recess")}};
+  for (const Language language : kLanguages) {
+    const InLanguage theirs(language);
+    for_each([&](Size s, double by_hand) {
+      SCOPED_TRACE(std::string(enum_names(language)[static_cast<std::size_t>(language)]));
+      Screen screen(s, by_hand);
+      const ViewLayout l = screen.lay_out(Layout::operate);
+      SettingsParts parts;
+      parts.procedures = procedures;
+      Pressed pressed;
+      parts.foot = [&] { draw_apart(pressed); };
+      parts.foot_wide = apart_width();
+      parts.another = true;
+      PersonValues values;
+      SettingsDialog dialog;
+      for (std::size_t page = 0; page < EnumNames<SettingsPage>::values.size(); ++page) {
+        dialog.show(static_cast<SettingsPage>(page));
+        for (const std::string& text :
+             screen.draw([&] { EXPECT_FALSE(dialog.draw(SettingsDialog::box_in(l), values, parts)); }))
+          ADD_FAILURE() << "cut on page " << page << ": " << text;
+        EXPECT_TRUE(screen.windows().contains("settings"));
+      }
+    });
+  }
+}
+
+// What lies over the picture for a while.
+TEST(Sizes, ListsAndQuestionsAreWhole) {
+  for (const Language language : kLanguages) {
+    const InLanguage theirs(language);
+    for_each([&](Size s, double by_hand) {
+      SCOPED_TRACE(std::string(enum_names(language)[static_cast<std::size_t>(language)]));
+      Screen screen(s, by_hand);
+      const ViewLayout l = screen.lay_out(Layout::operate);
+      CommandPalette palette;
+      palette.help();
+      for (const std::string& text : screen.draw([&] { EXPECT_EQ(palette.draw(screen.whole(), l.view), nullptr); }))
+        ADD_FAILURE() << "cut: " << text;
+      static_cast<void>(screen.windows());
+      palette.show(CommandPalette::Shown::all);
+      for (const std::string& text : screen.draw([&] { EXPECT_EQ(palette.draw(screen.whole(), l.view), nullptr); }))
+        ADD_FAILURE() << "cut: " << text;
+      const ScreenBox list = screen.windows()["commands"];
+      EXPECT_GE(list.height, (56 + 36 + 60) * unit()) << "a row of two lines can be seen";
+      for (const std::string& text : screen.draw([&] {
+             EXPECT_EQ(draw_question(s.width, s.height, tr("Reset bone?"),
+                                     tr("This session is saved and ends. A new one begins with the bone of the case."),
+                                     tr("Reset bone")),
+                       0);
+           }))
+        ADD_FAILURE() << "cut: " << text;
+      EXPECT_TRUE(screen.windows().contains(tr("Reset bone?")));
+    });
+  }
+}
+
+// By a tool of the strip, or by the list of commands, which is opened by one and by its key: all of them, whatever the
+// size.
+TEST(Sizes, EveryCommandIsReached) {
+  const InLanguage english(Language::english);
+  for_each([&](Size s, double by_hand) {
+    Screen screen(s, by_hand);
+    const ViewLayout l = screen.lay_out(Layout::operate);
+    HandFacts hand;
+    hand.undo_steps = 1;
+    hand.second_hand = true;
+    std::set<Command> by_strip;
+    bool suction = false, irrigation = false;
+    for (const float share : {0.25F, 0.5F, 0.75F}) {
+      for (float y = l.tray.y + 4; y < l.tray.bottom(); y += 6 * l.unit) {
+        for (const bool down : {false, true, false}) {
+          ImGuiIO& io = ImGui::GetIO();
+          io.MousePos = {l.tray.x + share * l.tray.width, y};
+          io.MouseDown[0] = down;
+          Pressed pressed;
+          Latched latched;
+          ImGui::NewFrame();
+          draw_tray(l.tray, hand, false, latched, pressed);
+          ImGui::Render();
+          for (const Keyboard::Press& p : pressed.presses) by_strip.insert(p.command);
+          suction |= latched.suction;
+          irrigation |= latched.irrigation;
+        }
+      }
+    }
+    EXPECT_TRUE(suction && irrigation);
+    for (const Command c : {Command::help, Command::palette, Command::settings, Command::bring, Command::lift,
+                            Command::saw, Command::plates, Command::pieces, Command::undo, Command::before,
+                            Command::ruler, Command::mark, Command::screenshot, Command::layout})
+      EXPECT_TRUE(by_strip.contains(c)) << key_name(c);
+    // Each row of the list is found by its name, is chosen with it and seen whole, and does its command.
+    ImGui::GetIO().MousePos = {-1, -1};
+    for (const CommandRow& row : command_rows()) {
+      CommandPalette palette;
+      palette.show(CommandPalette::Shown::commands);
+      for (const char c : row.name) palette.letter(static_cast<char32_t>(static_cast<unsigned char>(c)));
+      const CommandRow* done = nullptr;
+      for (int n = 0; n < 2; ++n) {
+        ImGui::NewFrame();
+        done = palette.draw(screen.whole(), l.view);
+        ImGui::Render();
+      }
+      ASSERT_EQ(done, nullptr);
+      ASSERT_NE(palette.search().row(), nullptr) << row.name;
+      EXPECT_EQ(palette.search().row()->name, row.name);
+      constexpr int kEnterKey = 257;
+      palette.key(kEnterKey, 0);
+      ImGui::NewFrame();
+      done = palette.draw(screen.whole(), l.view);
+      ImGui::Render();
+      ASSERT_NE(done, nullptr) << row.name;
+      EXPECT_EQ(done->name, row.name);
+    }
+  });
+}
+
+}  // namespace
+}  // namespace osteo
