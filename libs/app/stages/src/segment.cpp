@@ -144,7 +144,7 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
 
 StageInfo FindStructuresStage::info() {
   return {.name = "find-structures",
-          .version = 2,
+          .version = 3,
           .synopsis = "ear canal, air cells, sigmoid sinus, tegmen, dura, labyrinth found in a CT",
           .description =
               "Looks for structures of one ear by what bone, air and soft tissue bound: the external canal from the "
