@@ -7,7 +7,7 @@ namespace osteo::inline app {
 StageInfo RegisterStage::info() {
   return {
       .name = "register",
-      .version = 1,
+      .version = 2,
       .synopsis = "a second scan (CT after, MR) brought onto the case's, as a rigid body",
       .description =
           "Finds the turn and shift by which a second scan of the same head lies on the first, from wherever its "

@@ -144,7 +144,7 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
 
 StageInfo FindStructuresStage::info() {
   return {.name = "find-structures",
-          .version = 2,
+          .version = 3,
           .synopsis = "ear canal, air cells, sigmoid sinus, tegmen, dura, labyrinth found in a CT",
           .description =
               "Looks for structures of one ear by what bone, air and soft tissue bound: the external canal from the "
@@ -166,28 +166,64 @@ StageInfo FindStructuresStage::info() {
           .example = "osteo find-structures ct.nrrd ear.seg.nrrd --side left --what sigmoid_sinus,tegmen"};
 }
 
+namespace {
+
+std::string name_of(EarStructure what) {
+  return std::string(EnumNames<EarStructure>::values[static_cast<std::size_t>(what)]);
+}
+
+/// What was not found by its reason, each of which is said once: all that is placed by the canal has the canal's.
+struct Missing {
+  std::vector<std::string> names;
+  std::string why;
+};
+std::vector<Missing> missing_by_reason(const std::vector<EarFinding>& findings) {
+  const bool canal_has_it = std::any_of(findings.begin(), findings.end(), [](const EarFinding& f) {
+    return f.what == EarStructure::ear_canal && !f.found;
+  });
+  std::vector<Missing> all;
+  for (const EarFinding& f : findings) {
+    if (f.found) continue;
+    const std::string why = f.by_canal && canal_has_it ? "not placed without the ear canal" : f.why;
+    const auto same = std::find_if(all.begin(), all.end(), [&](const Missing& m) { return m.why == why; });
+    if (same == all.end()) {
+      all.push_back({{name_of(f.what)}, why});
+    } else {
+      same->names.push_back(name_of(f.what));
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
 std::vector<Data> FindStructuresStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
   const EarFindings found = find_ear_structures(std::get<Image>(inputs[0]), p, context);
   Json j;
   j["side"] = EnumNames<Side>::values[static_cast<std::size_t>(p.side)];
   j["structures"] = Json::list();
-  std::string missing;
   for (const EarFinding& f : found.findings) {
-    const std::string name(EnumNames<EarStructure>::values[static_cast<std::size_t>(f.what)]);
+    const std::string name = name_of(f.what);
     j["structures"].push_back({{"name", name},
                                {"found", f.found},
                                {"quality", rounded(f.quality, 100)},
                                {"why", f.why},
                                {"volume_mm3", rounded(f.volume_mm3, 10)}});
-    if (f.found) {
-      context.report(name + "_quality", rounded(f.quality, 100));
-      context.report(name + "_mm3", rounded(f.volume_mm3, 10));
-      if (!f.why.empty()) context.warn(name + ": " + f.why);
-    } else {
-      context.report(name, "not found: " + f.why);
-      context.warn(name + " not found: " + f.why);
-      missing += (missing.empty() ? "" : "; ") + name + ": " + f.why;
+    if (!f.found) continue;
+    context.report(name + "_quality", rounded(f.quality, 100));
+    context.report(name + "_mm3", rounded(f.volume_mm3, 10));
+    if (!f.why.empty()) context.warn(name + ": " + f.why);
+  }
+  std::string missing;
+  for (const Missing& m : missing_by_reason(found.findings)) {
+    std::string names;
+    for (const std::string& name : m.names) {
+      context.report(name, names.empty() ? "not found: " + m.why : "not found, as " + m.names.front());
+      names += (names.empty() ? "" : ", ") + name;
     }
+    // Where nothing is found the error says it.
+    if (!found.labels.structures.empty()) context.warn(names + " not found: " + m.why);
+    missing += (missing.empty() ? "" : "; ") + names + ": " + m.why;
   }
   Document document{j.dump(1) + "\n"};
   if (found.labels.structures.empty()) {

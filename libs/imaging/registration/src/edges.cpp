@@ -126,33 +126,51 @@ std::optional<Offset> offset_at(const Edge& e, const Levels& first, const IndexM
   return Offset{true, at * kStepMm};
 }
 
-// Edges that both scans show, evenly along their list, and how far along its normal each lies off in the second.
+bool shows(const Levels& scan, Vec3 at_mm) {
+  const Frame& f = scan.levels.front().frame;
+  const Vec3 x = f.index_from_world(at_mm);
+  bool in = true;
+  for (std::size_t a = 0; a < 3; ++a) in = in && x[a] >= 2 && x[a] <= f.dims[a] - 3;
+  return in;
+}
+
+// Evenly along the list.
+std::vector<Edge> few_of(const std::vector<Edge>& all) {
+  const std::size_t step = std::max<std::size_t>(1, all.size() / kMaxEdgePoints), n = all.size() / step;
+  std::vector<Edge> few;
+  for (std::size_t i = 0; i < n; ++i) few.push_back(all[i * step]);
+  return few;
+}
+
+// Nothing where a part of the line lies outside.
+std::vector<std::optional<Offset>> offsets_at(const std::vector<Edge>& edges, const Levels& first, const Levels& second,
+                                              const RigidTransform& second_from_first, const Context& context) {
+  const Vec3 centre = first.levels.front().frame.centre_mm();
+  const IndexMap own = index_map(first.levels.front().frame, {}, centre),
+                 other = index_map(second.levels.front().frame, second_from_first, centre);
+  std::vector<std::optional<Offset>> offsets(edges.size());
+  parallel_for(edges.size(), 128, context.threads, [&](std::size_t begin, std::size_t end) {
+    context.check_cancelled();
+    for (std::size_t i = begin; i < end; ++i) offsets[i] = offset_at(edges[i], first, own, second, other, centre);
+  });
+  return offsets;
+}
+
+// Edges that both scans show, and how far along its normal each lies off in the second.
 struct Measured {
   Edge edge;
   Offset offset;
 };
 std::vector<Measured> measure(const std::vector<Edge>& all, const Levels& first, const Levels& second,
                               const RigidTransform& second_from_first, const Context& context) {
-  const Vec3 centre = first.levels.front().frame.centre_mm();
-  const IndexMap own = index_map(first.levels.front().frame, {}, centre),
-                 other = index_map(second.levels.front().frame, second_from_first, centre);
   std::vector<Edge> edges;
-  for (const Edge& e : all) {
-    const Vec3 x = second.levels.front().frame.index_from_world(second_from_first(e.at_mm));
-    bool in = true;
-    for (std::size_t a = 0; a < 3; ++a) in = in && x[a] >= 2 && x[a] <= second.levels.front().frame.dims[a] - 3;
-    if (in) edges.push_back(e);
-  }
-  const std::size_t step = std::max<std::size_t>(1, edges.size() / kMaxEdgePoints), n = edges.size() / step;
-  std::vector<std::optional<Offset>> offsets(n);
-  parallel_for(n, 128, context.threads, [&](std::size_t begin, std::size_t end) {
-    context.check_cancelled();
-    for (std::size_t i = begin; i < end; ++i)
-      offsets[i] = offset_at(edges[i * step], first, own, second, other, centre);
-  });
+  for (const Edge& e : all)
+    if (shows(second, second_from_first(e.at_mm))) edges.push_back(e);
+  edges = few_of(edges);
+  const auto offsets = offsets_at(edges, first, second, second_from_first, context);
   std::vector<Measured> measured;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (offsets[i]) measured.push_back({edges[i * step], *offsets[i]});
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (offsets[i]) measured.push_back({edges[i], *offsets[i]});
   }
   return measured;
 }
@@ -202,6 +220,22 @@ EdgeResidual edge_residual(const Levels& first, const Levels& second, const Rigi
   // The normal points to the brighter side, inwards.
   if (!signed_mm.empty()) r.shift_mm = -signed_mm[signed_mm.size() / 2];
   return r;
+}
+
+std::vector<TwoOffsets> offsets_of_two(const Levels& first, const Levels& one, const RigidTransform& one_from_first,
+                                       const Levels& other, const RigidTransform& other_from_first,
+                                       const Context& context) {
+  std::vector<Edge> edges;
+  for (const Edge& e : edges_of(first, context))
+    if (shows(one, one_from_first(e.at_mm)) && shows(other, other_from_first(e.at_mm))) edges.push_back(e);
+  edges = few_of(edges);
+  const auto a = offsets_at(edges, first, one, one_from_first, context),
+             b = offsets_at(edges, first, other, other_from_first, context);
+  const auto mm = [](const Offset& o) { return o.found ? std::optional(o.mm) : std::nullopt; };
+  std::vector<TwoOffsets> both;
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    if (a[i] && b[i]) both.push_back({edges[i].at_mm, edges[i].normal, mm(*a[i]), mm(*b[i])});
+  return both;
 }
 
 }  // namespace osteo::inline imaging::registration

@@ -1,5 +1,8 @@
 // Points on strong edges of one scan, and where the same edges lie in another.
 #pragma once
+#include <optional>
+#include <vector>
+
 #include "levels.h"
 #include "osteo/imaging/registration/register.h"
 
@@ -13,5 +16,14 @@ namespace osteo::inline imaging::registration {
 
 [[nodiscard]] EdgeResidual edge_residual(const Levels& first, const Levels& second,
                                          const RigidTransform& second_from_first, const Context& context);
+
+/// The same edges of the first under two motions, each onto a scan of its own.
+struct TwoOffsets {
+  Vec3 at_mm, normal;
+  std::optional<double> one_mm, other_mm;  ///< along the normal; nothing where no like edge was found
+};
+[[nodiscard]] std::vector<TwoOffsets> offsets_of_two(const Levels& first, const Levels& one,
+                                                     const RigidTransform& one_from_first, const Levels& other,
+                                                     const RigidTransform& other_from_first, const Context& context);
 
 }  // namespace osteo::inline imaging::registration

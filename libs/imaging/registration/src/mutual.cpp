@@ -329,7 +329,7 @@ std::vector<RigidTransform> starts(const Samples& s, const Levels& from, const L
     int reach;
   };
   const Vec3 bodies = middle_of_body(to) - middle_of_body(from);
-  constexpr double kStepMm = 25, kTurn = 13 * std::numbers::pi / 180;
+  constexpr double kShiftMm = 25, kTurn = 13 * std::numbers::pi / 180;
   for (const Place& place : {Place{{}, 2}, Place{bodies, 1}, Place{shift_of_shadows(from, to), 1}}) {
     for (int a = 0; a < 125; ++a) {
       const Vec3 turn = Vec3{a % 5 - 2.0, a / 5 % 5 - 2.0, a / 25 - 2.0} * kTurn;
@@ -340,7 +340,7 @@ std::vector<RigidTransform> starts(const Samples& s, const Levels& from, const L
         for (int j = -place.reach; j <= place.reach; ++j)
           for (int i = -place.reach; i <= place.reach; ++i) {
             RigidTransform t = r;
-            t.shift_mm += place.shift + Vec3{i * kStepMm, j * kStepMm, k * kStepMm};
+            t.shift_mm += place.shift + Vec3{i * kShiftMm, j * kShiftMm, k * kShiftMm};
             all.push_back(t);
           }
     }
@@ -387,7 +387,14 @@ Plan plan_of(double h) {
 
 }  // namespace
 
-Match search(const Levels& from, const Levels& to, std::size_t stop, const Context& context) {
+std::vector<RigidTransform> anywhere(const Levels& from, const Levels& to, const Context& context) {
+  const std::size_t coarsest = std::min(from.levels.size(), to.levels.size()) - 1;
+  const Plan plan = plan_of(to.levels[coarsest].frame.spacing_mm.x);
+  return starts(take_samples(from, coarsest, plan.points, plan.bins, context.seed), from, to);
+}
+
+Match search(const Levels& from, const Levels& to, const std::vector<RigidTransform>& starts, const SearchWidth& width,
+             std::size_t stop, const Context& context) {
   const std::size_t depth = std::min(from.levels.size(), to.levels.size());
   std::vector<Match> matches;
   for (std::size_t level = depth; level-- > stop;) {
@@ -395,17 +402,17 @@ Match search(const Levels& from, const Levels& to, std::size_t stop, const Conte
     const double h = to.levels[level].frame.spacing_mm.x;
     const Plan plan = plan_of(h);
     const Samples s = take_samples(from, level, plan.points, plan.bins, context.seed);
+    const std::size_t kept = std::clamp<std::size_t>(width.times * plan.kept, 1, width.most);
     if (matches.empty()) {
-      const auto all = starts(s, from, to);
       const Samples few = take_samples(from, level, plan.points / 2, plan.bins, context.seed + 1);
-      matches.resize(all.size());
-      parallel_for(all.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
+      matches.resize(starts.size());
+      parallel_for(starts.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
         context.check_cancelled();
-        for (std::size_t i = begin; i < end; ++i) matches[i] = evaluate(few, to, level, all[i], 1);
+        for (std::size_t i = begin; i < end; ++i) matches[i] = evaluate(few, to, level, starts[i], 1);
       });
-      matches = best_of(std::move(matches), plan.kept, 5, s);
+      matches = best_of(std::move(matches), kept, 5, s);
     } else {
-      matches = best_of(std::move(matches), plan.kept, h, s);
+      matches = best_of(std::move(matches), kept, h, s);
     }
     // Many starts side by side, or the points of one.
     const bool many = matches.size() > 2;

@@ -10,9 +10,18 @@ struct Match {
   double overlap = 0;  // share of the sampled points that lie inside the other scan
 };
 
-/// From the coarsest levels, over turns and shifts around where the files put the scans and where their middles meet,
-/// to the level at `stop` (0: the finest). Points are taken from `from`.
-[[nodiscard]] Match search(const Levels& from, const Levels& to, std::size_t stop, const Context& context);
+/// Turns and shifts around where the files put the scans, where their middles meet and where their shadows fit.
+[[nodiscard]] std::vector<RigidTransform> anywhere(const Levels& from, const Levels& to, const Context& context);
+
+/// How many of the best go on from one level to the next: so many times the usual number, `most` at the most.
+struct SearchWidth {
+  std::size_t times = 1, most = 1000;
+};
+
+/// The best of `starts` climb, from the coarsest levels to the level at `stop` (0: the finest). Points are taken from
+/// `from`.
+[[nodiscard]] Match search(const Levels& from, const Levels& to, const std::vector<RigidTransform>& starts,
+                           const SearchWidth& width, std::size_t stop, const Context& context);
 
 /// From a transform that is nearly right, on the levels from `start` to the finest.
 [[nodiscard]] Match refine(const Levels& from, const Levels& to, const RigidTransform& guess, std::size_t start,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <optional>
 #include <sstream>
 
@@ -144,12 +145,19 @@ struct EarParts {
   const Part& operator[](EarStructure s) const { return of[static_cast<std::size_t>(s)]; }
 };
 
+/// What is placed by the canal has no place without it.
+void leave_without_canal(EarParts& parts, const Canal& canal, std::initializer_list<EarStructure> placed_by_it) {
+  for (const EarStructure s : placed_by_it) {
+    parts[s].why = "no ear canal, by which it is placed: " + canal.why;
+    parts[s].by_canal = true;
+  }
+}
+
 /// Finds what the canal is the landmark of.
 void find_by_canal(EarParts& parts, const Field& f, const Levels& levels, const Canal& canal, const Context& context) {
   using enum EarStructure;
   if (!canal.found) {
-    for (const EarStructure s : {air_cells, sigmoid_sinus, tegmen, dura})
-      parts[s].why = "no ear canal, by which it is placed: " + canal.why;
+    leave_without_canal(parts, canal, {air_cells, sigmoid_sinus, tegmen, dura});
     return;
   }
   if (parts.wants(air_cells) || parts.wants(tegmen))
@@ -214,7 +222,7 @@ void write_findings(EarFindings& result, const EarParts& parts, const Field* f, 
   for (const EarStructure s : parts.asked) {
     const auto at = static_cast<std::size_t>(s);
     const Part& part = parts[s];
-    EarFinding finding{s, part.found && part.quality >= min_quality, part.quality, part.why, volume[at]};
+    EarFinding finding{s, part.found && part.quality >= min_quality, part.quality, part.why, volume[at], part.by_canal};
     if (part.found && !finding.found)
       finding.why =
           "quality " + format_number(std::round(part.quality * 100) / 100) + " is below --min-quality; " + part.why;
@@ -252,7 +260,13 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
   if (std::min({size.x, size.y, size.z}) < 10) return give_up("the image is smaller than an ear");
   if (size.x > 100 || size.y > 130 || size.z > 110) {
     const Canal canal = coarse_canal(ct, lo, hi, *levels, context.sub(0, 0.2));
-    if (!canal.found) return give_up("no ear canal, by which the others are placed: " + canal.why);
+    if (!canal.found) {
+      using enum EarStructure;
+      parts[ear_canal] = canal;
+      leave_without_canal(parts, canal, {air_cells, sigmoid_sinus, tegmen, dura, labyrinth});
+      write_findings(result, parts, nullptr, ct.frame, params.min_quality, context);
+      return result;
+    }
     lo = canal.drum_mm + Vec3{-38, -40, -45};
     hi = canal.drum_mm + Vec3{42, 65, 42};
   }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <queue>
 
 #include "ear_parts.h"
@@ -19,6 +20,14 @@ constexpr double kCavityMm3 =
 
 constexpr double kMaxToBehindMm = 4;  // from the canal's end to air behind the drum; through a drum it is half a mm
 constexpr double kCutOff = 0.3;       // of the outer face; skin at the rim of a field that holds the mouth is less
+
+// Across a canal, 7 x 9 mm in most adults, as the image may cut it: more is folds of skin, or cells that open into each
+// other.
+constexpr double kSectionInscribedMm = 1.8, kSectionMm2 = 160;
+constexpr std::size_t kSections = 3;
+// From the section to the drum a canal is no longer than from its mouth. Behind the drum lies the tympanic cavity, 0.5
+// mL; behind a pass between cells there is less.
+constexpr double kMaxCutMm = 30, kMinBehindMm3 = 300;
 
 constexpr double kMaxBesideMm3 = 250;  // of air beside the tube that no pass parts from it: folds of a canal have less
 // Twice the most that nine in ten adults have in front of the drum (0.63 to 1.46 mL: R. Margolis, J. Heller, Screening
@@ -171,6 +180,7 @@ Inward inward_air(const Field& f, const Levels& levels, const Airs& airs, const 
 /// Which of the inward air lies before the drum: what is nearer to air that no pass parts from outside.
 struct Drum {
   bool seen = false;
+  double behind_mm3 = 0;  ///< volume of the air behind it
   std::vector<float> to_before, to_behind;
 };
 
@@ -195,6 +205,7 @@ Drum drum_of(const Field& f, const Levels& levels, const Inward& in, const Conte
     behind[i] =
         drum.seen && static_cast<double>(up[i]) >= pass.height && static_cast<double>(height[i]) < pass.height ? 1 : 0;
   }
+  for (const std::uint8_t b : behind) drum.behind_mm3 += b * f.h_mm * f.h_mm * f.h_mm;
   drum.to_before = distance_mm(f, before, context);
   drum.to_behind = distance_mm(f, behind, context);
   return drum;
@@ -302,10 +313,9 @@ void narrow_again(Mask& mask, const Field& wide, const Field& f) {
   mask = std::move(kept);
 }
 
-Canal canal_in(const Field& f, const Levels& levels, const Context& context) {
+Canal canal_in(const Field& f, const Levels& levels, const Airs& airs, const Context& context) {
   Canal c;
   const std::size_t n = f.size();
-  const Airs airs = airs_of(f, levels, context);
   c.exterior = airs.exterior;
   if (!airs.outside) {
     c.why = "no air outside of the head within the image on this side";
@@ -345,16 +355,133 @@ Canal canal_in(const Field& f, const Levels& levels, const Context& context) {
             std::to_string(static_cast<int>(std::lround(100 * c.quality))) + " % of its wall";
   } else {
     c.found = true;
+    c.behind_mm3 = drum.behind_mm3;
     if (!drum.seen) c.why = "no air behind its end: the middle ear is not seen apart from it";
   }
   return c;
+}
+
+/// Air that the outer side of the image cuts across, where a canal could be: as wide as one, with a wall around it.
+/// Widest first.
+std::vector<std::vector<std::size_t>> sections_of(const Field& f, const Levels& levels, const Airs& airs,
+                                                  const Field& wide, const Context& context) {
+  Field side;
+  side.n = {f.n[1], f.n[2], 1};
+  side.h_mm = f.h_mm;
+  Mask air(side.size()), solid(side.size());
+  const auto in_wide = [&](std::size_t i) {
+    const auto p = side.place(i);
+    return wide.at(f.n[0] - 1, p[0], p[1]);
+  };
+  for (std::size_t i = 0; i < side.size(); ++i) {
+    const auto v = static_cast<double>(wide.v[in_wide(i)]);
+    air[i] = v < levels.air_below && airs.exterior[in_wide(i)] == 0 ? 1 : 0;
+    solid[i] = v < levels.air_below ? 0 : 1;
+  }
+  const std::vector<float> to_solid = distance_mm(side, solid, context);
+  const Pieces pieces = pieces_of(side, air, false);
+  struct Section {
+    double inscribed_mm = 0;
+    std::vector<std::size_t> at;
+  };
+  std::vector<Section> all(pieces.size.size());
+  for (std::size_t i = 0; i < side.size(); ++i) {
+    if (pieces.of[i] == 0) continue;
+    Section& s = all[pieces.of[i]];
+    s.inscribed_mm = std::max(s.inscribed_mm, static_cast<double>(to_solid[i]));
+    s.at.push_back(i);
+  }
+  std::erase_if(all, [&](const Section& s) {
+    const double area = static_cast<double>(s.at.size()) * f.h_mm * f.h_mm;
+    return s.inscribed_mm < kSectionInscribedMm || area > kSectionMm2;
+  });
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Section& x, const Section& y) { return x.inscribed_mm > y.inscribed_mm; });
+  if (all.size() > kSections) all.resize(kSections);
+  std::vector<std::vector<std::size_t>> sections;
+  for (Section& s : all) sections.push_back(std::move(s.at));
+  return sections;
+}
+
+/// The image as if it ended so much farther in.
+Field cut_back(const Field& f, double by_mm) {
+  Field part = f;
+  part.n[0] = std::max(0, f.n[0] - static_cast<int>(std::lround(by_mm / f.h_mm)));
+  part.v.resize(part.size());
+  for (int k = 0; k < part.n[2]; ++k)
+    for (int j = 0; j < part.n[1]; ++j)
+      for (int i = 0; i < part.n[0]; ++i) part.v[part.at(i, j, k)] = f.v[f.at(i, j, k)];
+  return part;
+}
+
+/// From a canal of the cut back image on to the end of the whole: air straight on, as wide as the section.
+void continue_outward(Mask& mask, const Field& f, int end, const Levels& levels, const Mask& exterior) {
+  Vec3 tip, inner;
+  double tips = 0, inners = 0;
+  const int deeper = std::max(1, static_cast<int>(std::lround(6 / f.h_mm)));
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    if (mask[i] == 0) continue;
+    const auto p = f.place(i);
+    if (p[0] == end - 1) tip += f.world(p[0], p[1], p[2]), ++tips;
+    if (p[0] == end - 1 - deeper) inner += f.world(p[0], p[1], p[2]), ++inners;
+  }
+  if (tips == 0 || inners == 0) return;
+  tip = tip / tips;
+  const Vec3 out = normalized(tip - inner / inners);
+  const double radius = std::sqrt(tips / std::numbers::pi) * f.h_mm;
+  for (int k = 0; k < f.n[2]; ++k)
+    for (int j = 0; j < f.n[1]; ++j)
+      for (int i = end; i < f.n[0]; ++i) {
+        const std::size_t at = f.at(i, j, k);
+        const Vec3 x = f.world(i, j, k) - tip;
+        if (static_cast<double>(f.v[at]) < levels.air_below && exterior[at] == 0 &&
+            length(x - out * dot(x, out)) < 1.3 * radius + 0.5)
+          mask[at] = 1;
+      }
+}
+
+/// The canal of an image that cuts its outer end off: a tube from a section on the outer side to a drum. What ends at
+/// no drum may be a cell. Where the outer side lies among the folds of the auricle, the section is taken farther in.
+Canal cut_canal(const Field& f, const Levels& levels, const Mask& exterior, const Context& context) {
+  Canal best;
+  for (const double by_mm : {0.0, 6.0, 12.0}) {
+    const Field part = cut_back(f, by_mm);
+    if (part.n[0] * f.h_mm < 15) break;
+    const Field wide = widened(part, kOutsideBallMm + 2);
+    const Airs airs = airs_of(wide, levels, context);
+    for (const std::vector<std::size_t>& section : sections_of(part, levels, airs, wide, context)) {
+      context.check_cancelled();
+      Airs from = airs;
+      from.outside = true;
+      for (const std::size_t i : section) {
+        const int j = static_cast<int>(i) % part.n[1], k = static_cast<int>(i) / part.n[1];
+        for (int x = part.n[0]; x < wide.n[0]; ++x) from.exterior[wide.at(x, j, k)] = 1;
+      }
+      Canal c = canal_in(wide, levels, from, context);
+      if (!c.found || c.length_mm > kMaxCutMm || c.behind_mm3 < std::max(kMinBehindMm3, best.behind_mm3)) continue;
+      narrow_again(c.mask, wide, part);
+      best = std::move(c);
+    }
+    if (!best.found) continue;
+    Mask mask(f.size());
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      const auto p = part.place(i);
+      mask[f.at(p[0], p[1], p[2])] = best.mask[i];
+    }
+    if (by_mm > 0) continue_outward(mask, f, part.n[0], levels, exterior);
+    best.mask = std::move(mask);
+    best.exterior = exterior;
+    best.why = "the image cuts its outer end off";
+    return best;
+  }
+  return best;
 }
 
 }  // namespace
 
 Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
   const Field wide = widened(f, kOutsideBallMm + 2);
-  Canal c = canal_in(wide, levels, context);
+  Canal c = canal_in(wide, levels, airs_of(wide, levels, context), context);
   narrow_again(c.mask, wide, f);
   narrow_again(c.exterior, wide, f);
   if (c.found) return c;
@@ -364,9 +491,11 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
     for (int j = 0; j < f.n[1]; ++j)
       solid += static_cast<double>(f.v[f.at(f.n[0] - 1, j, k)]) < levels.air_below ? 0 : 1;
   const double share = solid / (static_cast<double>(f.n[1]) * f.n[2]);
-  if (share > kCutOff)
-    c.why = "the image ends inside the head on " + std::to_string(static_cast<int>(std::lround(100 * share))) +
-            " % of its outer side, so that the canal's mouth may be cut off (" + c.why + ")";
+  if (share <= kCutOff) return c;
+  Canal cut = cut_canal(f, levels, c.exterior, context);
+  if (cut.found) return cut;
+  c.why = "the image ends inside the head on " + std::to_string(static_cast<int>(std::lround(100 * share))) +
+          " % of its outer side, and no canal is seen that is cut there (" + c.why + ")";
   return c;
 }
 

@@ -27,18 +27,21 @@ struct Part {
   double quality = 0;
   std::string why;
   Mask mask;
+  bool by_canal = false;  ///< not looked for, since the canal was not found
 };
 
 struct Canal : Part {
   Vec3 drum_mm;   ///< its inner end
   Mask exterior;  ///< air outside of the head
   double length_mm = 0;
+  double behind_mm3 = 0;  ///< air behind the drum; 0: no drum is seen
 };
 
 struct Brain {
   Mask mask;  ///< what a ball of 7 mm reaches inside the skull
   std::string why;
   bool found = false;
+  double share = 1;  ///< of what it takes to be sure of the inside; less where little of it lies in the image
 };
 
 /// Distance in mm from each voxel to the nearest of the mask's.

@@ -10,8 +10,11 @@ namespace {
 
 constexpr double kBrainBallMm = 7;  // wider than the sinus, the canals of nerves and the muscles between bone
 constexpr double kAboveDrumMm = 8, kMinBrainMm3 = 300;
-constexpr double kDuraMm = 2;   // labelled on the brain's side
-constexpr double kPlateMm = 4;  // of the tegmen, where no air ends it before
+constexpr double kSureBrainMm3 = 2500;  // with less most of the skull's inner side lies out of the ball's reach
+constexpr double kDuraMm = 2;           // labelled on the brain's side
+constexpr double kPlateMm = 4;          // of the tegmen, where no air ends it before
+
+constexpr const char* kLittleBrain = "only a part of it: little of the brain's side lies within the image";
 
 /// Closing of a mask in the plane by a disc.
 Mask closed2(const Mask& m, int nx, int ny, double radius) {
@@ -63,26 +66,42 @@ Brain find_brain(const Field& f, const Levels& levels, const Canal& canal, const
   Mask core(n);
   for (std::size_t i = 0; i < n; ++i) core[i] = static_cast<double>(to_other[i]) > kBrainBallMm ? 1 : 0;
   const Pieces pieces = pieces_of(f, core, true);
-  // Inside the skull is what lies above the ear canal and has bone outward of it.
-  std::vector<double> high(pieces.size.size()), covered(pieces.size.size());
+  // Inside the skull is what lies above the ear canal and has bone outward of it. Where the image ends before that
+  // bone, it has none inward of it either: muscle and skin over the skull have.
+  std::vector<double> high(pieces.size.size()), covered(pieces.size.size()), cut(pieces.size.size()),
+      over_bone(pieces.size.size());
+  std::vector<int> inward(static_cast<std::size_t>(f.n[0]));
   for (int k = 0; k < f.n[2]; ++k) {
     for (int j = 0; j < f.n[1]; ++j) {
+      for (int i = 0, bones = 0; i < f.n[0]; ++i) {
+        inward[static_cast<std::size_t>(i)] = bones;
+        bones += static_cast<double>(f.v[f.at(i, j, k)]) > levels.bone_above ? 1 : 0;
+      }
       int bones = 0;
+      bool cut_row = true;
       for (int i = f.n[0] - 1; i >= 0; --i) {
         const std::size_t at = f.at(i, j, k);
         bones += static_cast<double>(f.v[at]) > levels.bone_above ? 1 : 0;
+        cut_row = cut_row && soft[at] != 0;
         if (pieces.of[at] == 0 || f.world(i, j, k).z < canal.drum_mm.z + kAboveDrumMm) continue;
         high[pieces.of[at]] += 1;
         covered[pieces.of[at]] += bones * f.h_mm > 1 ? 1 : 0;
+        cut[pieces.of[at]] += cut_row ? 1 : 0;
+        over_bone[pieces.of[at]] += inward[static_cast<std::size_t>(i)] * f.h_mm > 1 ? 1 : 0;
       }
     }
   }
   const double voxel = f.h_mm * f.h_mm * f.h_mm;
   std::vector<std::uint8_t> inside(pieces.size.size());
+  double volume = 0;
   for (std::size_t p = 1; p < inside.size(); ++p) {
-    inside[p] = high[p] * voxel > kMinBrainMm3 && covered[p] > 0.8 * high[p] ? 1 : 0;
+    const bool seen = covered[p] > 0.8 * high[p],
+               likely = covered[p] + cut[p] > 0.8 * high[p] && over_bone[p] < 0.3 * high[p];
+    inside[p] = high[p] * voxel > kMinBrainMm3 && (seen || likely) ? 1 : 0;
     b.found = b.found || inside[p] != 0;
+    if (inside[p] != 0) volume += high[p] * voxel;
   }
+  b.share = std::min(1.0, volume / kSureBrainMm3);
   if (!b.found) {
     b.why = why_no_brain(f, soft, canal);
     return b;
@@ -163,9 +182,11 @@ Part find_tegmen(const Field& f, const Levels& levels, const Canal& canal, const
          k <= std::min(nz - 1, static_cast<int>(std::floor(p.top))); ++k)
       part.mask[f.at(i, j, k)] = 1;
   }
-  part.quality = seen / static_cast<double>(most);
+  part.quality = brain.share * seen / static_cast<double>(most);
   part.found = true;
-  if (part.quality < 0.9)
+  if (brain.share < 1)
+    part.why = kLittleBrain;
+  else if (part.quality < 0.9)
     part.why = "thinner than can be seen in " +
                std::to_string(static_cast<int>(std::lround(100 * (1 - part.quality)))) + " % of it";
   return part;
@@ -238,8 +259,9 @@ Part find_dura(const Field& f, const Levels& levels, const Canal& canal, const B
     part.why = "less than 0.5 mL of it lies in the image";
     return part;
   }
-  part.quality = area > 0 ? sharp / area : 0;
+  part.quality = area > 0 ? brain.share * sharp / area : 0;
   part.found = true;
+  if (brain.share < 1) part.why = kLittleBrain;
   return part;
 }
 

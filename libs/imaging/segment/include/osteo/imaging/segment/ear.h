@@ -43,6 +43,7 @@ struct EarFinding {
   double quality = 0;     ///< 0 to 1
   std::string why;        ///< why it was not found, or what is doubtful about it; may be empty
   double volume_mm3 = 0;  ///< of its voxels in the CT
+  bool by_canal = false;  ///< not found because the ear canal, by which it is placed, was not; `why` ends in the canal's
 };
 
 struct EarFindings {
