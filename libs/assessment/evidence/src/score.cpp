@@ -289,10 +289,11 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
   score.seconds_frames = now_s() - t;
   score.values = keeper.values();
   score.moments = keeper.moments();
-  if (keeper.removed().empty()) {
-    // The final product goes by voxels that lost half of their bone.
-    score.words.push_back(first.hash() == end.hash() ? "nothing was removed"
-                                                     : "less was removed than half of any voxel");
+  // The final product goes by voxels that lost half of their bone.
+  if (keeper.removed().empty() && first.hash() == end.hash()) {
+    score.words.push_back("nothing was removed");
+  } else if (keeper.removed().empty()) {
+    score.words.push_back("less was removed than half of any voxel");
   }
   if (undone > 0)
     score.words.push_back(
