@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "imgui_memory.h"
 #include "osteo/assessment/evidence/hints.h"
 #include "osteo/core/base/translate.h"
 #include "ui_kit.h"
@@ -17,21 +18,14 @@
 namespace osteo {
 namespace {
 
-struct Memory {
-  Memory(int width, int height, int em_pixels) {
-    ImGui::CreateContext();
+// With arrows and keys of its own.
+struct Memory : test::ImGuiMemory {
+  Memory(int width, int height, int em_pixels) : ImGuiMemory(width, height, em_pixels) {
     ImGuiIO& io = ImGui::GetIO();
-    io.IniFilename = nullptr;
-    io.DisplaySize = {static_cast<float>(width), static_cast<float>(height)};
-    io.DeltaTime = 1 / 60.0F;
     io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
 #if IMGUI_VERSION_NUM < 18700
     for (int k = 0; k < ImGuiKey_COUNT; ++k) io.KeyMap[k] = k;
 #endif
-    set_ui_style(em_pixels);
-  }
-  ~Memory() {
-    ImGui::DestroyContext();
   }
 };
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "command_palette.h"
+#include "imgui_memory.h"
 #include "osteo/core/base/translate.h"
 #include "scope_panel.h"
 #include "settings_dialog.h"
@@ -39,20 +40,9 @@ int em_of(Size s, double by_hand) {
 // One screen in memory, of a size of window and of text.
 class Screen {
  public:
-  Screen(Size size, double by_hand) : size_(size) {
-    ImGui::CreateContext();
-    ImGuiIO& io = ImGui::GetIO();
-    io.IniFilename = nullptr;
-    io.DisplaySize = {static_cast<float>(size.width), static_cast<float>(size.height)};
-    io.DeltaTime = 1 / 60.0F;
-    em_ = em_of(size, by_hand);
-    set_ui_style(em_);
-    ImGui::NewFrame();  // ImGui has its font from the first on
-    ImGui::Render();
+  Screen(Size size, double by_hand) : size_(size), em_(em_of(size, by_hand)), memory_(size.width, size.height, em_) {
+    test::frames([] {}, 1);  // ImGui has its font from the first on
   }
-  ~Screen() { ImGui::DestroyContext(); }
-  Screen(const Screen&) = delete;
-  Screen& operator=(const Screen&) = delete;
 
   [[nodiscard]] ViewLayout lay_out(Layout wanted) const {
     return osteo::lay_out(wanted, size_.width, size_.height, static_cast<float>(em_));
@@ -60,14 +50,10 @@ class Screen {
   [[nodiscard]] ScreenBox whole() const {
     return {0, 0, static_cast<float>(size_.width), static_cast<float>(size_.height)};
   }
-  // Two pictures: ImGui knows what a window holds from the one before. What lost a part for want of room in them.
+  // Three pictures: ImGui knows what a window holds from the one before. What lost a part for want of room in them.
   std::set<std::string> draw(const std::function<void()>& content) {
     forget_texts_cut();
-    for (int n = 0; n < 3; ++n) {
-      ImGui::NewFrame();
-      content();
-      ImGui::Render();
-    }
+    test::frames(content, 3);
     return texts_cut();
   }
   // Windows of the last picture: each within the screen, and what it holds within it, but downwards where it scrolls.
@@ -94,7 +80,8 @@ class Screen {
 
  private:
   Size size_;
-  int em_ = 0;
+  int em_;
+  test::ImGuiMemory memory_;
 };
 
 void for_each(const std::function<void(Size, double)>& test) {
@@ -155,7 +142,7 @@ StateFacts drilling(Nearness nearness) {
   return f;
 }
 
-// While one drills: strips, card, cuts with their foot, message, hint's place, step and scale bar beside each other.
+// While one drills: strips, card, cuts with their foot, message, step and scale bar beside each other.
 void expect_a_place_for_everything(bool monitor) {
   for (const Language language : kLanguages) {
     const InLanguage theirs(language);
@@ -204,6 +191,7 @@ void expect_a_place_for_everything(bool monitor) {
       // Alone, so that its place is known.
       for (const std::string& text : screen.draw([&] { state(told, Nearness::near); }))
         ADD_FAILURE() << "cut: " << text;
+      // Where the strip of state has no room for it; in a very low picture it lies in front of all else.
       if (const ScreenBox message = on_picture(); !message.empty()) boxes["message"] = message;
       const PictureArea area{static_cast<double>(l.view.x), static_cast<double>(l.view.y),
                              static_cast<double>(l.view.width), static_cast<double>(l.view.height)};

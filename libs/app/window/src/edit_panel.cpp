@@ -33,10 +33,6 @@ void tip(const std::string& words) {
   if (ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) ImGui::SetTooltip("%s", words.c_str());
 }
 
-bool slider(const char* name, const std::string& shown, double& value, double lo, double hi, double step) {
-  return kit_slider(name, shown, value, lo, hi, step);
-}
-
 // Small values have as much of the track as large ones: by the cube root, for volumes also from nothing on.
 bool root_slider(const char* name, const std::string& shown, double& value, double lo, double hi) {
   double root = std::cbrt(value);
@@ -76,7 +72,7 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
   const auto step = [&](const std::string& name, bool can, const char* what, const std::string& told) {
     ImGui::BeginDisabled(!can || control.busy());
     const bool pressed = kit_button(name, ButtonLook::usual, first.each);
-    tip(filled(what, {{"what", told}}));
+    if (can) tip(filled(what, {{"what", told}}));
     ImGui::EndDisabled();
     return pressed;
   };
@@ -163,12 +159,12 @@ void EditPanel::options(EditControl& control) {
       constexpr double kNoEnd = 4000;
       double lower = control.lower_hu, upper = std::min(control.upper_hu, kNoEnd);
       const bool changed =
-          slider(tr_of("of grey values", "from"), with_number("{n} HU", lower, 0), lower, -500, 2500, 1);
+          kit_slider(tr_of("of grey values", "from"), with_number("{n} HU", lower, 0), lower, -500, 2500, 1);
       const ImVec2 lo = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();
       slider_ = {lo.x, lo.y, size.x, size.y};
       const bool top =
-          slider(tr_of("of grey values", "to"), upper >= kNoEnd ? tr("no upper end") : with_number("{n} HU", upper, 0),
-                 upper, 0, kNoEnd, 1);
+          kit_slider(tr_of("of grey values", "to"),
+                     upper >= kNoEnd ? tr("no upper end") : with_number("{n} HU", upper, 0), upper, 0, kNoEnd, 1);
       if (changed || top) control.set_threshold(lower, upper >= kNoEnd ? 32767 : upper);
       static_cast<void>(kit_switch(tr("do later steps again"), control.later_steps_again));
       tip(tr("what was done since the last threshold is done again on the new one; else it is forgotten"));
@@ -182,8 +178,8 @@ void EditPanel::options(EditControl& control) {
       static_cast<void>(
           root_slider(tr("smaller than"), with_number("{n} mm³", control.pieces_mm3, 0), control.pieces_mm3, 0, 5000));
       double largest = control.pieces_largest;
-      if (slider(tr("largest that stay"), largest < 0.5 ? tr("all") : with_number("{n}", largest, 0), largest, 0, 100,
-                 1))
+      if (kit_slider(tr("largest that stay"), largest < 0.5 ? tr("all") : with_number("{n}", largest, 0), largest, 0,
+                     1000, 1))
         control.pieces_largest = static_cast<int>(std::lround(largest));
       if (wide_button(tr("Remove small fragments (Enter)"), free, main)) control.apply();
       return;
@@ -202,8 +198,8 @@ void EditPanel::options(EditControl& control) {
       if (wide_button(tr("Fill (Enter)"), free, main)) control.apply();
       return;
     case EditTool::smooth:
-      static_cast<void>(slider(tr_of("of the surface", "within"), with_number("{n} mm", control.smooth_mm, 1),
-                               control.smooth_mm, 0.1, 5, 0.1));
+      static_cast<void>(kit_slider(tr_of("of the surface", "within"), with_number("{n} mm", control.smooth_mm, 1),
+                                   control.smooth_mm, 0.1, 5, 0.1));
       kit_text(tr("Nothing farther from the surface changes; walls thinner than this may go. The volume is reported."),
                theme().quiet);
       if (wide_button(tr("Smooth (Enter)"), free, main)) control.apply();

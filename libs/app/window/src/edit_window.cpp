@@ -185,6 +185,17 @@ class EditWindow {
     ImGui::GetStyle().WindowBorderSize = 0;
   }
 
+  void finish_saving() {
+    const auto done = actions_.saved();
+    if (!done) return;
+    saving_ = false;
+    control_.say(done->text);
+    if (done->ok) control_.saved(saving_version_);
+    if (close_after_save_ && done->ok) quit_ = true;
+    close_after_save_ = false;
+    awake_ = 3;
+  }
+
   // --- one frame --------------------------------------------------------------------------------------------------
 
   void frame() {
@@ -193,6 +204,10 @@ class EditWindow {
     if (width_ < 200 || height_ < 150 || glfwGetWindowAttrib(window_, GLFW_ICONIFIED) != 0) {  // put away
       events_.clear();
       awake_ = 0;
+      control_.tick();
+      finish_saving();
+      if (wants_close_ && !control_.unsaved() && !saving_) quit_ = true;
+      if (wants_close_ && !quit_) glfwRestoreWindow(window_);  // it asks, where it can be seen
       return;
     }
     set_scale();
@@ -203,14 +218,7 @@ class EditWindow {
       scene_->show(*preview);
       awake_ = std::max(awake_, 2);
     }
-    if (auto done = actions_.saved()) {
-      saving_ = false;
-      control_.say(done->text);
-      if (done->ok) control_.saved(saving_version_);
-      if (close_after_save_ && done->ok) quit_ = true;
-      close_after_save_ = false;
-      awake_ = 3;
-    }
+    finish_saving();
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
     ImGui::NewFrame();

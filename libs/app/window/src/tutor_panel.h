@@ -21,8 +21,9 @@ namespace osteo::inline app {
 /// Of the hands of others, distinguished from the own; the own has none.
 inline constexpr Colour kPartnerColour = palette::kPurple;
 
-/// Words of a link in a line: "trainee: there and back 12 ms, 1 % lost, clock 3.1 ms ahead, 20 ppm". No ImGui.
+/// Who takes part, in the language: of "trainee", "instructor" and what else the session calls them. No ImGui.
 [[nodiscard]] std::string shown_who(const std::string& who);
+/// Words of a link in a line: "trainee: there and back 12 ms, 1 % lost, clock 3.1 ms ahead, 20 ppm". No ImGui.
 [[nodiscard]] std::string link_text(const TutorNow::Link& link);
 /// Whose burr takes bone in this moment, by names; "nobody". No ImGui.
 [[nodiscard]] std::string who_cuts(const std::vector<std::string>& names, const std::vector<TickRecord>& hands);

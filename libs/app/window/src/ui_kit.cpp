@@ -104,8 +104,12 @@ Lines lines_of(const std::string& words, float width, float size) {
     longest = std::max(longest, font->CalcTextSizeA(size, FLT_MAX, 0, words.c_str() + at, words.c_str() + end).x);
     at = end + 1;
   }
-  // Letters of one script stand without spaces: they are parted anywhere.
-  const bool anywhere = std::any_of(words.begin(), words.end(), [](char c) { return (c & 0xF0) == 0xE0; });
+  // Chinese stands without spaces: it is parted anywhere. From U+2E80 on, so not at a dash or an ellipsis.
+  bool anywhere = false;
+  for (std::size_t n = 0; n + 1 < words.size() && !anywhere; ++n) {
+    const auto lead = static_cast<unsigned char>(words[n]), next = static_cast<unsigned char>(words[n + 1]);
+    anywhere = (lead & 0xF0) == 0xE0 && ((lead & 0x0F) << 6 | (next & 0x3F)) >= 0x2E80 >> 6;
+  }
   const std::string shown = longest > width && !anywhere ? shortened(words, width, size) : words;
   const ImVec2 taken = font->CalcTextSizeA(size, FLT_MAX, std::max(width, size), shown.c_str());
   return {shown, std::min(taken.x, width), taken.y};
@@ -298,6 +302,7 @@ bool kit_slider(const std::string& name, const std::string& value, double& at, d
   const bool two = ImGui::CalcTextSize(name.c_str(), nullptr, true).x + value_wide + kGap * u > width;
   const Item i = item(name.c_str(), {width, (kSlider + (two ? 20 : 0)) * u});
   const float from = i.lo.x + knob, to = i.hi.x - knob, y = i.hi.y - 14 * u;
+  // A value beyond the ends stays as it is until a hand moves the knob.
   const double before = at;
   if (i.active) {
     const double share = static_cast<double>((ImGui::GetIO().MousePos.x - from) / std::max(1.0F, to - from));
@@ -307,14 +312,15 @@ bool kit_slider(const std::string& name, const std::string& value, double& at, d
     if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_LeftArrow))) at -= by;
     if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_RightArrow))) at += by;
     if (at != before) ImGui::NavMoveRequestCancel();  // they are the knob's here
+    if (at != before) at = std::clamp(at, least, most);
   }
-  at = std::clamp(at, least, most);
+  const double shown_at = std::clamp(at, least, most);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
   draw->AddText({i.lo.x, i.lo.y}, im_colour32(t.quiet),
                 shortened(shown_part(name), two ? width : width - value_wide - kGap * u, ImGui::GetFontSize()).c_str());
   draw->AddText({i.hi.x - value_wide, i.lo.y + (two ? 20 * u : 0)}, im_colour32(t.text), value.c_str());
-  const float x = from + (to - from) * static_cast<float>(most > least ? (at - least) / (most - least) : 0);
+  const float x = from + (to - from) * static_cast<float>(most > least ? (shown_at - least) / (most - least) : 0);
   draw->AddRectFilled({i.lo.x, y - u}, {i.hi.x, y + u}, im_colour32(t.line), u);
   draw->AddRectFilled({i.lo.x, y - 2 * u}, {x, y + 2 * u}, im_colour32(t.text), 2 * u);
   draw->AddCircleFilled({x, y}, knob, im_colour32(t.text), 20);

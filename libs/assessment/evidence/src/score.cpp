@@ -290,7 +290,7 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
   score.values = keeper.values();
   score.moments = keeper.moments();
   // The final product goes by voxels that lost half of their bone.
-  if (keeper.removed().empty() && first.hash() == end.hash()) {
+  if (keeper.removed().empty() && first.volume_mm3() - end.volume_mm3() < 1e-3) {
     score.words.push_back("nothing was removed");
   } else if (keeper.removed().empty()) {
     score.words.push_back("less was removed than half of any voxel");

@@ -28,7 +28,7 @@ std::optional<Plane> plane_between(const RigidTransform& second_from_first, cons
                                    const RigidTransform& reflection, Vec3 middle_mm) {
   const RigidTransform across = second_from_first.inverse() * reflection * mirrored_from_first;
   const auto& c = across.rotation.column;
-  constexpr double kMinTrace = 0.9;  // 1 for a reflection; the rest turns by 13 degrees at the most
+  constexpr double kMinTrace = 0.9;  // 1 for a reflection; the rest turns by 18 degrees at the most
   if (c[0].x + c[1].y + c[2].z < kMinTrace) return std::nullopt;
   // Of 1 less a reflection every column lies along the normal; what turns besides goes out with its transpose.
   Mat3 m;
@@ -38,6 +38,10 @@ std::optional<Plane> plane_between(const RigidTransform& second_from_first, cons
   for (std::size_t a = 1; a < 3; ++a)
     if (length(m.column[a]) > length(normal)) normal = m.column[a];
   for (int n = 0; n < 20; ++n) normal = normalized(m * normal);
+  // A reflection moves along its normal alone.
+  constexpr double kMostGlideMm = 20;
+  const Vec3 moved = across(middle_mm) - middle_mm;
+  if (length(moved - normal * dot(moved, normal)) > kMostGlideMm) return std::nullopt;
   return Plane{(middle_mm + across(middle_mm)) / 2, normal};
 }
 

@@ -25,8 +25,8 @@ constexpr double kDoubtMm = 0.06;
 // What is better goes by the pair's own residual: thick slices leave 0.2 mm to a right pair and 0.25 to its mirror
 // image. Of right pairs none fitted better in a mirror by both (docs/validation/registration.md).
 constexpr double kMirrorBetter = 0.87, kMirrorBetterP90 = 0.96, kMirrorAlike = 1.15;
-// Where the two medians are alike, the field of what lies off decides: of right pairs that of the mirrored scan was at
-// least 1.4 times the other (both with what noise leaves), of mirrored ones it is the other way round.
+// Where the two medians are alike, the field of what lies off decides: from 1.4 times the other on (both with what
+// noise leaves) it counts; what lies between is warned of.
 constexpr double kJudgedMm = 1;  // voxels, never finer than either scan
 constexpr double kSidesNoiseMm = 0.02, kSidesClear = 1.4, kMedianAgainst = 1.05;
 // Of one head a tenth of all edges lies more than 0.07 (1 mm voxels) to 0.34 (5 mm slices) of the coarser scan's

@@ -74,16 +74,16 @@ struct Registration {
 /// Where half of all edges are more than 0.06 mm off, or a tenth more than 0.45 of the coarser scan's spacing (at least
 /// 0.4 mm, at most 1.3 times `max_residual_mm`; that is a warning as well), the second scan is registered in a mirror
 /// too, by `mutual`: that lowers the residual of a file with left and right exchanged, and of nothing else. Both are
-/// then held against each other on voxels of 1 mm, or the scans' own where those are larger, whatever `finest_mm` is,
-/// and `residual` is of those. Whichever fits worse is started again from where the other lies. What decides besides
-/// the residuals is where edges lie off (`sides_mm`). Where neither decides, a warning says that the two do not show
-/// it. It takes as long again.
+/// then held against each other on voxels of 1 mm (of `finest_mm` where that is less, of the scans' where those are
+/// more), and `residual` is of those. Whichever fits worse is started again from where the other lies. What decides
+/// besides the residuals is where edges lie off (`sides_mm`). Where neither decides, a warning says that the two do not
+/// show it. It takes as long again; more where a start is made anew.
 ///
 /// Error(failed) that says why, unless `accept_poor`: a mirror that fits better, edges that do not meet to
 /// `max_residual_mm` (another patient, the other side, not rigid), less than a quarter of the smaller scan inside the
 /// other, too few edges, there and back not the same; surface: less than 2 cm3 of bone. Same bytes for any thread
-/// count. Memory: both scans at `finest_mm` in single precision; with the mirror three, at 1 mm. 2 to 5 s for heads,
-/// twice that with the mirror.
+/// count. Memory: both scans at `finest_mm` in single precision; with the mirror up to six of them, at 1 mm. 2 to 5 s
+/// for heads, at least twice that with the mirror.
 [[nodiscard]] Registration register_scans(const Image& first, const Image& second, const RegisterParams& params,
                                           const Context& context = {});
 

@@ -50,8 +50,8 @@ class SoftBody {
   void meet(const World* world);
   /// Goes on by one update with the tools there, by number the same ones as before. What it pushes each with; all
   /// nothing while it sleeps. Simulated time goes slower than the clock's when a hundredth of a second needs more than
-  /// `most_work`: see slow_motion(). Its own swinging is then slower, as if it were heavier; it gives way to a hand alike
-  /// (docs/validation/tissue.md, Fewer steps than real time).
+  /// `most_work`: see slow_motion(). Its own swinging is then slower, as if it were heavier. A pad that a hand presses
+  /// gives way almost alike, a thin flap lags (docs/validation/tissue.md, Fewer steps than real time).
   std::vector<SoftPush> update(std::span<const SoftTool> tools, double most_work = kMaxWork);
   /// Whether the next update with these tools costs nothing.
   [[nodiscard]] bool sleeps_with(std::span<const SoftTool> tools) const;
