@@ -29,10 +29,6 @@ std::string words_of(const char* name, Command command) {
   return key.empty() ? name : std::string(name) + "   " + key;
 }
 
-}  // namespace
-
-namespace {
-
 // The nearest structure with its bar, which fills as it comes nearer. `own_line`: its name has a line of its own.
 void draw_nearest(ImDrawList* draw, const ScreenBox& near, const StateFacts& f, bool own_line) {
   const Theme& t = theme();
