@@ -32,13 +32,12 @@ def away(window, what, most):
         return n == before
 
     wait(f"{what} draws no more", rests)
+    then = window.state().get("tick", 0)
     share = busy(window.app)
-    # Its state is written with its pictures: how far a session went on is seen when it is back.
     assert window.app.poll() is None, window.said()
     assert window.state()["pictures"] == n, (what, n, window.state()["pictures"])
     assert share < most, f"{what}, put away, takes {share:.2f} of a core"
     bring_back(window.id)
-    then = window.state().get("tick", 0)
     window.until(f"{what} is back", lambda s: s["pictures"] > n + 1)
     print(f"ok  {what}: {100 * share:.0f} % of a core while it is put away")
     return window.state().get("tick", 0) - then
