@@ -4,10 +4,9 @@
 #include <gtest/gtest.h>
 #include <imgui_internal.h>
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
+#include <set>
 #include <string>
 
 #include "imgui_memory.h"

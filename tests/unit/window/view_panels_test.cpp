@@ -6,9 +6,8 @@
 #include <imgui_internal.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <cstdio>
+#include <functional>
 #include <set>
 #include <string>
 
