@@ -221,9 +221,9 @@ def asked():
             stderr=open("typed.txt", "w"),
         )
         wait("it asks", lambda: pathlib.Path("asking.json").exists())
-        wid = wait("its window", lambda: [i for i in host.x("search", "--name", "^Osteotome$").split()])[-1]
+        wid = wait("its window", lambda: host.x("search", "--onlyvisible", "--name", "^Osteotome$").split())[-1]
         host.x("windowraise", wid)
-        host.x("windowfocus", wid)
+        host.x("windowfocus", "--sync", wid)
         host.x("mousemove", "--window", wid, 5, 5)
         time.sleep(0.5)
         host.x("type", "--window", wid, "--delay", "60", code)
