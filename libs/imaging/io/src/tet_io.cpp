@@ -167,6 +167,13 @@ void drop_middles(TetMesh& mesh, std::vector<bool> middle) {
   }
 }
 
+void append_coordinate(std::string& text, float v) {
+  char buffer[32];
+  const auto [end, problem] = std::to_chars(buffer, buffer + sizeof buffer, v);
+  (void)problem;
+  text.append(buffer, end);
+}
+
 }  // namespace
 
 bool is_tet_file(const fs::path& path) {
@@ -283,7 +290,7 @@ void save_tets(const TetMesh& mesh, const fs::path& path) {
     text += std::to_string(i);
     for (const float v : mesh.points_mm[i]) {
       text += ' ';
-      append_number(text, v);
+      append_coordinate(text, v);
     }
     text += '\n';
   }
