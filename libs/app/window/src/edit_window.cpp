@@ -172,9 +172,7 @@ class EditWindow {
 
   // Text of 16 pixels at 96 dots an inch, of any at the same size on the desk, times what the person chose.
   void set_scale() {
-    const double automatic = fixed_scale_ > 0 ? fixed_scale_ : automatic_scale(reported_scale_, width_, height_);
-    const int wanted =
-        static_cast<int>(std::lround(kTextPixels * scale_that_fits(automatic, by_hand_, width_, height_)));
+    const int wanted = em_that_fits(fixed_scale_, reported_scale_, by_hand_, width_, height_);
     if (wanted == em_ && !letters_missing()) return;
     em_ = wanted;
     scale_ = static_cast<float>(em_) / static_cast<float>(kTextPixels);

@@ -201,17 +201,13 @@ void draw_player(ReviewControl& control) {
   ImGui::SameLine(0, kGap * u);
   // All speeds where they have room, else the one that is on: a click takes the next.
   std::vector<std::string> speeds;
-  float wide = 0;
-  for (const double s : ReviewControl::kSpeeds) {
-    speeds.push_back(shown_number(s, s < 1 ? 1 : 0) + "x");
-    wide += ImGui::CalcTextSize(speeds.back().c_str()).x + 24 * u;
-  }
+  for (const double s : ReviewControl::kSpeeds) speeds.push_back(shown_number(s, s < 1 ? 1 : 0) + "x");
   const int count = static_cast<int>(speeds.size());
   const int now =
       static_cast<int>(std::find(ReviewControl::kSpeeds.begin(), ReviewControl::kSpeeds.end(), control.speed()) -
                        ReviewControl::kSpeeds.begin());
   const float view_wide = ImGui::CalcTextSize(tr("surgeon's view")).x + 64 * u;
-  if (wide + view_wide + 2 * kGap * u <= ImGui::GetContentRegionAvail().x) {
+  if (choice_width(speeds) + view_wide + 2 * kGap * u <= ImGui::GetContentRegionAvail().x) {
     if (const int chosen = choice("speed", speeds, now); chosen >= 0) control.change_speed(chosen - now);
   } else if (kit_button(speeds[static_cast<std::size_t>(now)] + "##speed")) {
     control.change_speed(now + 1 < count ? 1 : -now);

@@ -220,6 +220,18 @@ bool kit_button(const std::string& words, ButtonLook look, float width, float hi
   return i.pressed;
 }
 
+namespace {
+float choice_width(const std::string& word) {
+  return ImGui::CalcTextSize(word.c_str()).x + 24 * unit();
+}
+}  // namespace
+
+float choice_width(std::span<const std::string> words) {
+  float wide = 0;
+  for (const std::string& w : words) wide += choice_width(w);
+  return wide;
+}
+
 int choice(const char* id, std::span<const std::string> words, int selected, float high) {
   const float u = unit();
   ImGui::PushID(id);
@@ -227,11 +239,9 @@ int choice(const char* id, std::span<const std::string> words, int selected, flo
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const Theme& t = theme();
   const ImVec2 begin = ImGui::GetCursorScreenPos();
-  float all = 0, widest = 0;
-  for (const std::string& w : words) {
-    all += ImGui::CalcTextSize(w.c_str()).x + 24 * u;
-    widest = std::max(widest, ImGui::CalcTextSize(w.c_str()).x + 24 * u);
-  }
+  const float all = choice_width(words);
+  float widest = 0;
+  for (const std::string& w : words) widest = std::max(widest, choice_width(w));
   const bool below = all > ImGui::GetContentRegionAvail().x + 1;
   const ImVec2 end{begin.x + (below ? widest : all),
                    begin.y + high * u * (below ? static_cast<float>(words.size()) : 1)};
@@ -241,8 +251,7 @@ int choice(const char* id, std::span<const std::string> words, int selected, flo
   for (std::size_t n = 0; n < words.size(); ++n) {
     if (n > 0 && !below) ImGui::SameLine();
     if (below) ImGui::SetCursorScreenPos({begin.x, begin.y + high * u * static_cast<float>(n)});
-    const Item i =
-        item(words[n].c_str(), {below ? widest : ImGui::CalcTextSize(words[n].c_str()).x + 24 * u, high * u});
+    const Item i = item(words[n].c_str(), {below ? widest : choice_width(words[n]), high * u});
     if (i.pressed) pressed = static_cast<int>(n);
     const bool is = static_cast<int>(n) == selected;
     if (is || i.hovered)
@@ -258,9 +267,7 @@ int choice(const char* id, std::span<const std::string> words, int selected, flo
 
 int narrow_choice(const char* id, std::span<const std::string> words, int selected, float width) {
   const float u = unit();
-  float all = 0;
-  for (const std::string& w : words) all += ImGui::CalcTextSize(w.c_str()).x + 24 * u;
-  if (all <= width) return choice(id, words, selected, kSmallControl);
+  if (choice_width(words) <= width) return choice(id, words, selected, kSmallControl);
   ImGui::PushID(id);
   const std::string& now = words[static_cast<std::size_t>(std::max(0, selected))];
   const Item i = item("next", {width, kSmallControl * u});

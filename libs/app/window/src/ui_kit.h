@@ -55,6 +55,8 @@ enum class ButtonLook { usual, main, quiet };
 [[nodiscard]] bool kit_button(const std::string& words, ButtonLook look = ButtonLook::usual, float width = 0,
                               float high = kControl);
 [[nodiscard]] float button_width(const std::string& words);
+/// What choice() takes of a line.
+[[nodiscard]] float choice_width(std::span<const std::string> words);
 /// One of several in a row; the one pressed, else -1. Where the row has no room below each other.
 [[nodiscard]] int choice(const char* id, std::span<const std::string> words, int selected, float high = kControl);
 /// In a strip that is no wider than `width` pixels, kSmallControl high: that, or where it has no room the selected one

@@ -143,6 +143,11 @@ double scale_that_fits(double automatic, double by_hand, int width, int height) 
   return std::max(0.7, std::min(automatic * by_hand, most));
 }
 
+int em_that_fits(double fixed, double reported_by_monitor, double by_hand, int width, int height) {
+  const double automatic = fixed > 0 ? fixed : automatic_scale(reported_by_monitor, width, height);
+  return static_cast<int>(std::lround(kTextPixels * scale_that_fits(automatic, by_hand, width, height)));
+}
+
 double next_scale(double by_hand, int steps) {
   return std::clamp(by_hand * std::pow(1.1, steps), 0.6, 2.5);
 }

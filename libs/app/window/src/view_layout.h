@@ -69,6 +69,8 @@ inline constexpr double kTextPixels = 16;
 [[nodiscard]] double automatic_scale(double reported_by_monitor, int width, int height);
 /// Times what the person chose, as far as the smallest layout still fits (2 in 1024 x 700); at least 0.7.
 [[nodiscard]] double scale_that_fits(double automatic, double by_hand, int width, int height);
+/// Pixels of text in a window; `fixed`: a scale that was asked for in place of the monitor's; 0: none.
+[[nodiscard]] int em_that_fits(double fixed, double reported_by_monitor, double by_hand, int width, int height);
 /// A step of Ctrl + or -: 10 %, between 0.6 and 2.5.
 [[nodiscard]] double next_scale(double by_hand, int steps);
 

@@ -268,11 +268,6 @@ struct BurrCard {
   float kinds_wide = 0, wide = 0, high = 0;
   bool rows = false;
 };
-float choice_width(const std::vector<std::string>& words) {
-  float wide = 0;
-  for (const std::string& w : words) wide += ImGui::CalcTextSize(w.c_str()).x + 24 * unit();
-  return wide;
-}
 constexpr float kBurrPad = 12, kBurrSize = 40, kBurrLine = 48, kBurrMore = 32;
 BurrCard lay_out_burr_card(float room, bool unfolded) {
   const float u = unit(), sizes = 7 * kBurrSize * u;

@@ -129,8 +129,7 @@ std::vector<std::filesystem::path> WindowShell::take_dropped() {
 }
 
 void WindowShell::apply_scale() {
-  const double automatic = fixed_scale_ > 0 ? fixed_scale_ : automatic_scale(reported_scale_, width_, height_);
-  const int wanted = static_cast<int>(std::lround(kTextPixels * scale_that_fits(automatic, by_hand_, width_, height_)));
+  const int wanted = em_that_fits(fixed_scale_, reported_scale_, by_hand_, width_, height_);
   if (wanted == em_ && !letters_missing()) return;
   const bool had = em_ > 0;
   em_ = wanted;

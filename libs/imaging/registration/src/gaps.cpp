@@ -16,18 +16,7 @@ Closing close_gaps(const std::vector<Gap>& gaps) {
   }
   // What nothing determines stays as it is.
   for (std::size_t i = 0; i < 7; ++i) m[i][i] += 1e-9 * m[i][i] + 1e-12;
-  for (std::size_t i = 0; i < 7; ++i) {
-    for (std::size_t j = i + 1; j < 7; ++j) {
-      const double f = m[j][i] / m[i][i];
-      for (std::size_t k = i; k < 8; ++k) m[j][k] -= f * m[i][k];
-    }
-  }
-  std::array<double, 7> x{};
-  for (std::size_t i = 7; i-- > 0;) {
-    double sum = m[i][7];
-    for (std::size_t j = i + 1; j < 7; ++j) sum -= m[i][j] * x[j];
-    x[i] = sum / m[i][i];
-  }
+  const std::array<double, 7> x = solved(m);
   const Vec3 turn{x[0], x[1], x[2]}, shift{x[3], x[4], x[5]};
   const double angle = length(turn);
   Closing c;

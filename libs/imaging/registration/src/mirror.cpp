@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "edges.h"
+#include "gaps.h"
 #include "osteo/core/base/order.h"
 
 namespace osteo::inline imaging::registration {
@@ -79,29 +80,18 @@ Row row_of(Vec3 x, Vec3 n) {
 }
 
 // Weighted least squares over the first `count` unknowns.
-Row solved(const std::vector<Row>& rows, const std::vector<double>& mm, const std::vector<double>& weight,
+Row fitted(const std::vector<Row>& rows, const std::vector<double>& mm, const std::vector<double>& weight,
            std::size_t count) {
   std::array<std::array<double, kUnknowns + 1>, kUnknowns> m{};
   for (std::size_t r = 0; r < rows.size(); ++r)
     for (std::size_t i = 0; i < count; ++i) {
       const double w = weight[r] * rows[r][i];
       for (std::size_t j = 0; j < count; ++j) m[i][j] += w * rows[r][j];
-      m[i][count] += w * mm[r];
+      m[i][kUnknowns] += w * mm[r];
     }
   // What nothing determines stays as it is.
   for (std::size_t i = 0; i < count; ++i) m[i][i] += 1e-8 * m[i][i] + 1e-9;
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t j = i + 1; j < count; ++j) {
-      const double f = m[j][i] / m[i][i];
-      for (std::size_t k = i; k <= count; ++k) m[j][k] -= f * m[i][k];
-    }
-  Row x{};
-  for (std::size_t i = count; i-- > 0;) {
-    double sum = m[i][count];
-    for (std::size_t j = i + 1; j < count; ++j) sum -= m[i][j] * x[j];
-    x[i] = sum / m[i][i];
-  }
-  return x;
+  return solved(m, count);
 }
 
 std::vector<double> left_of(const std::vector<Row>& rows, const std::vector<double>& mm, const Row& x) {
@@ -116,13 +106,13 @@ std::vector<double> left_of(const std::vector<Row>& rows, const std::vector<doub
 double field_mm(const std::vector<Row>& rows, const std::vector<double>& mm) {
   std::vector<double> weight(rows.size(), 1.0), size(rows.size());
   for (int round = 0; round < 6; ++round) {
-    const std::vector<double> left = left_of(rows, mm, solved(rows, mm, weight, kUnknowns));
+    const std::vector<double> left = left_of(rows, mm, fitted(rows, mm, weight, kUnknowns));
     for (std::size_t r = 0; r < left.size(); ++r) size[r] = std::abs(left[r]);
     const double far = std::max(3 * upper_median(size), 1e-3);
     for (std::size_t r = 0; r < left.size(); ++r) weight[r] = size[r] < far ? 1 : far / size[r];
   }
   const auto sum = [&](std::size_t count) {
-    const std::vector<double> left = left_of(rows, mm, solved(rows, mm, weight, count));
+    const std::vector<double> left = left_of(rows, mm, fitted(rows, mm, weight, count));
     double square = 0;
     for (std::size_t r = 0; r < left.size(); ++r) square += weight[r] * left[r] * left[r];
     return square;
