@@ -2,7 +2,7 @@
 usage: check_dicom_objects.py BIN_DIR FIXTURES WORK_DIR      exits 77 (skipped) when a reader is missing
 """
 
-import json, pathlib, shutil, subprocess, sys
+import json, pathlib, re, shutil, subprocess, sys
 
 try:
     import highdicom as hd, numpy as np, pydicom, SimpleITK as sitk
@@ -49,6 +49,10 @@ osteo(
 truth = voxels("all.seg.nrrd")
 values = [int(v) for v in np.unique(truth) if v]
 assert len(values) == 3, values
+# Which version made each, as the file itself says it: what DICOM must say too.
+origins = dict(re.findall(rb"Osteotome\.Origin:([a-z-]+), version (\d+)\|", (work / "all.seg.nrrd").read_bytes()))
+assert sorted(origins) == [b"find-structures", b"tube"], origins
+version_of = {name.decode(): version.decode() for name, version in origins.items()}
 
 # As LABELMAP of 8 and of 16 bits, in its own frame: highdicom sees the same numbers at the same places.
 uids = set()
@@ -80,11 +84,14 @@ for form, bits in (("labelmap", 8), ("labelmap16", 16), ("binary", 1)):
         s = seg.get_segment_description(number)
         if s.segment_label.startswith("sigmoid"):
             assert s.segment_label == "sigmoid sinus, größter Teil" and s.algorithm_type.value == "SEMIAUTOMATIC"
-            assert s.algorithm_identification.name == "tube"
+            assert (
+                s.algorithm_identification.name == "tube" and s.algorithm_identification.version == version_of["tube"]
+            )
             assert s.algorithm_identification.family.value == "123106"
         else:
             assert s.algorithm_type.value == "AUTOMATIC" and s.algorithm_identification.name == "find-structures"
-            assert s.algorithm_identification.version == "2" and s.segmented_property_type.scheme_designator == "SCT"
+            assert s.algorithm_identification.version == version_of["find-structures"]
+            assert s.segmented_property_type.scheme_designator == "SCT"
     # Slices refer to the slices of the CT that they lie on.
     per = d.PerFrameFunctionalGroupsSequence
     assert all("DerivationImageSequence" in f for f in per)
@@ -94,7 +101,7 @@ for form, bits in (("labelmap", 8), ("labelmap16", 16), ("binary", 1)):
     # And back: names, numbers, origins and voxels.
     osteo("convert", name, f"{form}.back.seg.nrrd")
     header = (work / f"{form}.back.seg.nrrd").read_bytes().split(b"\n\n")[0].decode()
-    assert "Osteotome.Origin:tube, version 2|" in header and "größter Teil" in header, header
+    assert f"Osteotome.Origin:tube, version {version_of['tube']}|" in header and "größter Teil" in header, header
     cut = voxels(f"{form}.back.seg.nrrd")
     filled = [k for k in range(truth.shape[0]) if truth[k].any()]
     was = truth[filled[0] : filled[-1] + 1]
