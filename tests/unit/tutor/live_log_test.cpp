@@ -130,6 +130,34 @@ TEST(LiveLog, OverIsWhenAllWasTaken) {
   EXPECT_TRUE(link.guest.over());
 }
 
+// A network that reorders: what was sent earlier and comes later says nothing of how far the copy is now.
+TEST(LiveLog, AnOvertakenPacketTakesNothingBack) {
+  Link link(1);
+  for (int t = 0; t < 50; ++t) link.tick();
+  link.run(200);
+  ASSERT_EQ(link.guest.next_tick(), 50U);
+  link.now += 5000;
+  const std::vector<Bytes> held = link.guest.poll(link.now);
+  ASSERT_EQ(held.size(), 1U);
+  link.guest.be_ready();
+  for (int t = 0; t < 100; ++t) link.tick();
+  link.run(200);
+  ASSERT_EQ(link.guest.next_tick(), 150U);
+  const auto status = [&] { return link.host->status(link.now).front(); };
+  ASSERT_EQ(status().behind_ticks, 0U);
+  ASSERT_TRUE(status().ready);
+  const std::uint64_t refused = link.host->refused();
+  link.host->receive(kFrom, held.front(), link.now);
+  EXPECT_EQ(link.host->refused(), refused) << "late, but good";
+  EXPECT_EQ(status().behind_ticks, 0U);
+  EXPECT_TRUE(status().ready);
+  // Who does begin again is given all of it once more.
+  link.guest.begin_again();
+  link.next_ = 0;
+  link.run(300);
+  EXPECT_EQ(link.taken().size(), 150U);
+}
+
 // More at once than a packet holds: ticks go on, with the first of it.
 TEST(LiveLog, MoreActionsInATickThanFitHoldNothingUp) {
   Link link(2);

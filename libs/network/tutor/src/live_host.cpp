@@ -158,6 +158,20 @@ void LiveHost::hear(Peer& peer, const HandPacket& p, std::int64_t now_us) {
   peer.last_heard_us = now_us;
   if (peer.role == JoinRole::trainee) trainee_heard_us_ = now_us;
   peer.clock.heard(p.times, now_us);
+  // A packet that a later one has overtaken says how far the copy was, not how far it is: its samples alone count.
+  if (p.times.sent_us >= peer.told_us) {
+    peer.told_us = p.times.sent_us;
+    hear_progress(peer, p, now_us);
+  }
+  if (peer.role != JoinRole::trainee || p.samples.empty()) return;
+  const std::uint64_t first = p.newest + 1 - p.samples.size();
+  const bool newest = p.newest > peer.newest_hand;
+  for (std::size_t i = 0; i < p.samples.size(); ++i)
+    far_->put({first + i, p.samples[i]}, newest && i + 1 == p.samples.size());
+  peer.newest_hand = std::max(peer.newest_hand, p.newest);
+}
+
+void LiveHost::hear_progress(Peer& peer, const HandPacket& p, std::int64_t now_us) {
   const std::uint64_t ticks = log_.size() / hands_;
   if (p.next_tick <= ticks) {
     if (p.next_tick < peer.next_tick) peer.sent_to = p.next_tick;  // it begins again
@@ -178,12 +192,6 @@ void LiveHost::hear(Peer& peer, const HandPacket& p, std::int64_t now_us) {
     }
     peer.compared = std::max(peer.compared, p.mark.tick);
   }
-  if (peer.role != JoinRole::trainee || p.samples.empty()) return;
-  const std::uint64_t first = p.newest + 1 - p.samples.size();
-  const bool newest = p.newest > peer.newest_hand;
-  for (std::size_t i = 0; i < p.samples.size(); ++i)
-    far_->put({first + i, p.samples[i]}, newest && i + 1 == p.samples.size());
-  peer.newest_hand = std::max(peer.newest_hand, p.newest);
 }
 
 LogPacket LiveHost::log_from(std::uint64_t tick) const {

@@ -186,6 +186,7 @@ class LiveHost final : public Reader, private PairingSeats {
     std::unique_ptr<SecureChannel> channel;
     ClockSync clock;
     std::int64_t last_heard_us = 0, last_sent_us = 0, last_moved_us = 0;
+    std::int64_t told_us = 0;  // by the peer's clock: when it sent what the rest here goes by
     std::uint64_t next_tick = 0, sent_to = 0, newest_hand = 0;
     std::uint32_t blob_bytes = 0, blob_sent = 0;  // of the settings: it has, are on their way
     std::int64_t blob_moved_us = 0;
@@ -196,6 +197,7 @@ class LiveHost final : public Reader, private PairingSeats {
   [[nodiscard]] std::uint32_t take(const UdpPeer& from, JoinRole role, const PairKeys& keys,
                                    std::int64_t now_us) override;
   void hear(Peer& peer, const HandPacket& p, std::int64_t now_us);
+  void hear_progress(Peer& peer, const HandPacket& p, std::int64_t now_us);
   [[nodiscard]] LogPacket log_from(std::uint64_t tick) const;
 
   mutable std::mutex mutex_;
