@@ -52,6 +52,36 @@ TEST(Dust, FallsPilesAndComesToRestWithNothingLost) {
   EXPECT_GT(highest, 0);
 }
 
+TEST(Dust, FallsWhereNothingIsBelowUntilItLies) {
+  // A shelf over half of the width, a floor 6 mm below it.
+  const auto bone =
+      test::solid(0.5, 12, [](Vec3 p) { return (p.x < 0 && p.y > -2 && p.y < 0) || (p.y > 6 && p.y < 8 && p.x < 6); });
+  Dust dust(bone, {.gravity = {0, 1, 0}});
+  const auto cell = [&](Vec3 p) {
+    const Vec3 x = bone.frame().index_from_world(p);
+    return Ijk{static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)),
+               static_cast<int>(std::lround(x.z))};
+  };
+  EXPECT_FALSE(dust.falls(cell({3, 0, 0}), 8)) << "there is none";
+  for (const double x : {-3.0, 3.0, 9.0}) dust.add_at({x, -6, 0}, 0.02);
+  EXPECT_TRUE(dust.falls(cell({-3, -6, 0}), 6));
+  EXPECT_FALSE(dust.falls(cell({-3, -6, 0}), 8)) << "the shelf is 4 mm below";
+  EXPECT_TRUE(dust.falls(cell({3, -6, 0}), 8));
+  EXPECT_FALSE(dust.falls(cell({3, -6, 0}), 26)) << "the floor is 12 mm below";
+  EXPECT_TRUE(dust.falls(cell({9, -6, 0}), 200)) << "beside both";
+  for (int s = 0; s < 500 && dust.awake_bricks() > 0; ++s) dust.step();
+  std::size_t cells = 0;
+  dust.visit([&](Vec3 p, double) {
+    ++cells;
+    EXPECT_FALSE(dust.falls(cell(p), 8)) << "it lies";
+  });
+  EXPECT_GT(cells, 0U);
+  // A heap of packed dust carries what comes upon it, though bone is farther below.
+  for (int n = 0; n < 8; ++n) dust.add_at({3, 5.9 - 0.5 * n, 0}, 0.044);
+  dust.add_at({3, -0.5, 0}, 0.001);
+  EXPECT_FALSE(dust.falls(cell({3, 1.5, 0}), 8));
+}
+
 TEST(Dust, MassIsConservedThroughEverything) {
   const auto bone = bowl();
   Dust dust(bone);

@@ -169,6 +169,32 @@ TEST(DustView, WhatFallsShowsNoRows) {
   EXPECT_LT(worst, 0.1);
 }
 
+// Chips fly off an edge for two seconds, with nothing below: a few of them are in the air, not a ribbon of all. What
+// comes to lie on a floor is seen as before.
+TEST(DustView, AStreamInTheAirIsNoRibbon) {
+  const auto drawn = [](double floor_y, const char* name) {
+    const auto bone = test::solid(0.5, 12, [floor_y](Vec3 p) {
+      return (p.x < 0 && p.y > -10 && p.y < -6) || (p.y > floor_y && p.y < floor_y + 2);
+    });
+    Dust dust(bone, {.gravity = {0, 1, 0}});
+    for (int s = 0; s < 200; ++s) {
+      for (double z = -1; z <= 1; z += 0.5) dust.add_at({1, -8, z}, 0.01);
+      dust.step();
+    }
+    Stage stage({0, 0, -1}, 14);
+    DustView view(stage.renderer, 0.5);
+    view.update(dust);
+    const Picture p = stage.window.render();
+    keep(p, name);
+    return lit(p);
+  };
+  const int in_air = drawn(1e9, "dust-in-air.png"), on_floor = drawn(4, "dust-on-floor.png");
+  std::printf("lit pixels: %d in the air, %d with a floor\n", in_air, on_floor);
+  EXPECT_GT(in_air, 20) << "that something falls is seen";
+  EXPECT_LT(in_air, 300);
+  EXPECT_GT(on_floor, 4 * in_air);
+}
+
 // A pool is seen as a surface, darker than bone where it is clear, pale where it is thick; a dry bowl shows none of it.
 TEST(DustView, WaterIsSeenAndSlurryIsPaler) {
   const auto bone = wide_bowl();

@@ -418,6 +418,30 @@ std::string Dust::hash() const {
   return h.hex();
 }
 
+bool Dust::falls(Ijk c, int cells) const {
+  const auto brick_of = [&](Ijk at) -> const Brick* {
+    const auto found = index_.find(key(at.i >> 3, at.j >> 3, at.k >> 3));
+    return found == index_.end() ? nullptr : bricks_[found->second].get();
+  };
+  const Brick* brick = brick_of(c);
+  if (brick == nullptr || !brick->awake) return false;
+  // So many cells of packed dust over each other are a heap. A stream from the burr is seldom packed at all.
+  constexpr int kHeap = 4;
+  const Vec3 down = pull_ * (1 / std::abs(pull_[static_cast<std::size_t>(axis_)]));
+  int packed = 0;
+  for (int n = 1; n <= cells; ++n) {
+    const Ijk at{static_cast<int>(std::lround(c.i + n * down.x)), static_cast<int>(std::lround(c.j + n * down.y)),
+                 static_cast<int>(std::lround(c.k + n * down.z))};
+    if (solid(at)) return false;
+    if (brick == nullptr || brick->at.i != at.i >> 3 || brick->at.j != at.j >> 3 || brick->at.k != at.k >> 3)
+      brick = brick_of(at);
+    const std::uint32_t held = brick == nullptr ? 0 : brick->units[BrickGrid::offset_in_brick(at.i, at.j, at.k)];
+    packed = held >= capacity_ / 10 * 9 ? packed + 1 : 0;
+    if (packed == kHeap) return false;
+  }
+  return true;
+}
+
 std::vector<const Dust::Brick*> Dust::in_order() const {
   std::vector<const Brick*> order;
   for (const auto& b : bricks_) order.push_back(b.get());
