@@ -146,6 +146,35 @@ TEST(ShadingField, NoTerracesOnWhatAScannerSees) {
   }
 }
 
+// A mesh as it comes from a file, and every third of its points by themselves, get the normals of the surface in the
+// window. A mesh of something else keeps its own.
+TEST(ShadingField, AMeshIsLitAsTheSurfaceInTheWindow) {
+  BrickGrid bone = grid_of(0.5, 18);
+  scan(bone, kEllipsoid, 2);
+  const TriMesh wanted = shaded(bone).joined().mesh, plain = LiveSurface(bone, {}).joined().mesh;
+  for (const std::size_t each : {1U, 3U}) {
+    TriMesh mesh;
+    for (std::size_t p = 0; p < plain.points_mm.size(); p += each) {
+      mesh.points_mm.push_back(plain.points_mm[p]);
+      mesh.normals.push_back(plain.normals[p]);
+    }
+    shade_mesh(mesh, bone, {});
+    double worst = 0, changed = 0;
+    for (std::size_t p = 0; p < mesh.normals.size(); ++p) {
+      worst = std::max(worst, length(from_floats(mesh.normals[p]) - from_floats(wanted.normals[p * each])));
+      changed = std::max(changed, length(from_floats(mesh.normals[p]) - from_floats(plain.normals[p * each])));
+    }
+    EXPECT_LT(worst, 1e-3) << each;
+    EXPECT_GT(changed, 0.1) << each;
+  }
+  TriMesh far_off;
+  far_off.points_mm = {{100, 100, 100}, {0, 0, 0}};
+  far_off.normals = {{1, 0, 0}, {0, 1, 0}};
+  const auto before = far_off.normals;
+  shade_mesh(far_off, bone, {});
+  EXPECT_EQ(far_off.normals, before) << "outside of the bone's grid, and deep inside of it";
+}
+
 TEST(ShadingField, CutsEdgesAndThinWallsStayWhatTheyAre) {
   // A burr of 4 mm through a plane: inside the cut, a voxel and more from its rim.
   for (const double h : {0.3, 0.5}) {

@@ -10,6 +10,7 @@
 #include "osteo/core/base/param.h"
 #include "osteo/core/base/translate.h"
 #include "osteo/core/report/sheet.h"
+#include "osteo/display/view/pictures.h"
 #include "osteo/geometry/grid/grid_io.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/imaging/io/volume_io.h"
@@ -26,7 +27,7 @@ namespace {
 using namespace case_report;
 
 // Raise it when pictures are drawn otherwise: those of an earlier report are then drawn again.
-constexpr int kPicturesVersion = 2;
+constexpr int kPicturesVersion = 3;
 
 // Same state, same pictures.
 std::string state_of(const fs::path& folder) {
@@ -50,23 +51,6 @@ void complete_normals(TriMesh& mesh) {
   }
   mesh.normals.clear();
   for (const Vec3& n : sum) mesh.normals.push_back(to_floats(normalized(n)));
-}
-
-// With normals that do not show the CT's slices as terraces, where the surface is that of the case's bone as it is;
-// measures go by the triangles' own.
-std::shared_ptr<const TriMesh> lit_as_in_the_window(std::shared_ptr<const TriMesh> mesh, const BrickGrid& bone,
-                                                    const Context& context) {
-  LiveSurface live(bone, context);
-  live.shade(context);
-  BoneSurface made = live.joined();
-  constexpr double kSameMm = 1e-3;
-  if (made.mesh.points_mm.size() != mesh->points_mm.size()) return mesh;
-  for (std::size_t p = 0; p < made.mesh.points_mm.size(); ++p) {
-    if (length(from_floats(made.mesh.points_mm[p]) - from_floats(mesh->points_mm[p])) > kSameMm) return mesh;
-  }
-  auto lit = std::make_shared<TriMesh>(*mesh);
-  lit->normals = std::move(made.mesh.normals);
-  return lit;
 }
 
 // Everything that is known of a case, read once.
@@ -98,13 +82,14 @@ struct Content {
   }
 
   void draw(const std::optional<CaseScan>& scan, const Context& context) {
-    std::shared_ptr<const TriMesh> drawn;
+    PictureMesh drawn;
     if (const auto it = the_case.files.find("surface"); it != the_case.files.end()) {
       auto mesh = std::make_shared<TriMesh>(*load_surface(it->second));
       complete_normals(*mesh);
       surface = mesh;
-      drawn = lit_as_in_the_window(mesh, *bone, context);
-      subject.surface = drawn.get();
+      drawn = mesh_for_pictures(*mesh);
+      shade_mesh(drawn.mesh, *bone, context);  // measures go by the triangles' own normals
+      subject.surface = std::make_shared<const TriMesh>(std::move(drawn.mesh));
     }
     if (const auto it = the_case.files.find("hu"); it != the_case.files.end()) hu = load_grid(it->second);
     if (hu) subject.hu = &*hu;
@@ -114,18 +99,19 @@ struct Content {
     draw_slices(subject, pictures);
     draw_removed(subject, pictures);
     if (scan) histogram = histogram_of(scan->ct);
-    context.progress(0.5, "report: bone");
-    draw_bone(subject, pictures, context);
+    std::vector<float> below;
     if (surface && !surface->points_mm.empty()) {
-      context.progress(0.8, "report: thin bone");
-      const std::vector<float> below = thickness_below(*surface, *bone, 5, context);
-      thin_percent = 100.0 *
-                     static_cast<double>(std::count_if(below.begin(), below.end(), [](float t) { return t < 1; })) /
-                     static_cast<double>(below.size());
+      context.progress(0.5, "report: thin bone");
+      const std::vector<float> all = thickness_below(*surface, *bone, kPaleMm, context);
+      thin_percent = 100.0 * static_cast<double>(std::count_if(all.begin(), all.end(), [](float t) { return t < 1; })) /
+                     static_cast<double>(all.size());
       thin_percent =
           std::round(100 * thin_percent) / 100;  // as the report keeps it: it says the same when it is read back
-      draw_thin(subject, below, pictures);
+      for (const std::uint32_t p : drawn.point) below.push_back(all[p]);
     }
+    context.progress(0.7, "report: bone");
+    draw_bone(subject, below, pictures);
+    draw_structures(subject, pictures, context);
   }
 };
 

@@ -201,35 +201,8 @@ void draw_slices(const Subject& s, Pictures& into) {
   }
 }
 
-void draw_bone(const Subject& s, Pictures& into, const Context& context) {
+void draw_bone(const Subject& s, std::span<const float> below, Pictures& into) {
   if (s.surface == nullptr || s.surface->triangles.empty()) return;
-  const Vec3 size = s.hi_mm - s.lo_mm, centre = (s.lo_mm + s.hi_mm) * 0.5;
-  constexpr int kPixels = 400;
-  constexpr std::array<ViewFrom, 6> kSides{ViewFrom::front, ViewFrom::back,  ViewFrom::left,
-                                           ViewFrom::right, ViewFrom::above, ViewFrom::below};
-  const double mm_per_pixel = 1.04 * std::max({size.x, size.y, size.z, 1.0}) / kPixels;
-  std::vector<Picture> pictures = draw_sides(*s.surface, kSides, centre, mm_per_pixel, kPixels, kPixels);
-  for (std::size_t n = 0; n < kSides.size(); ++n) {
-    Picture& p = pictures[n];
-    const std::string_view letters = sides_of(kSides[n]);
-    write_text(p, letters.substr(0, 1), 20, 40, 24, {60, 70, 90});
-    write_text(p, letters.substr(1, 1), kPixels - 40, 40, 24, {60, 70, 90});
-    write_scale_bar(p, mm_per_pixel, 40);
-    into["side-" + std::string(EnumNames<ViewFrom>::values[static_cast<std::size_t>(kSides[n])])] = std::move(p);
-  }
-  if (s.structures == nullptr) return;
-  SnapshotParams view;
-  view.width = view.height = 560;
-  const Vec3 where = s.measures.empty() ? centre : s.measures.front().middle_mm;
-  view.view = where.x < centre.x - 0.1 * size.x   ? ViewFrom::right
-              : where.x > centre.x + 0.1 * size.x ? ViewFrom::left
-                                                  : ViewFrom::left_front;
-  const auto surface = std::make_shared<const TriMesh>(*s.surface);
-  into["structures"] = snapshot({Surface(surface), *s.structures, Surface(surface)}, view, context);
-}
-
-void draw_thin(const Subject& s, std::span<const float> below, Pictures& into) {
-  if (s.surface == nullptr || below.size() != s.surface->points_mm.size() || below.empty()) return;
   std::vector<Rgb8> rgb(below.size());
   for (std::size_t p = 0; p < rgb.size(); ++p) {
     // Red below half a millimetre, yellow at one, bone from two on.
@@ -241,17 +214,50 @@ void draw_thin(const Subject& s, std::span<const float> below, Pictures& into) {
       return c;
     };
     constexpr Rgb8 kRed{205, 45, 35}, kYellow{245, 190, 60}, kBone{237, 226, 200};
-    rgb[p] = t < 1 ? mix(kRed, kYellow, 2 * (t - 0.5)) : mix(kYellow, kBone, t - 1);
+    rgb[p] = t < 1 ? mix(kRed, kYellow, 2 * (t - 0.5)) : mix(kYellow, kBone, (t - 1) / (kPaleMm - 1));
   }
   const Vec3 size = s.hi_mm - s.lo_mm, centre = (s.lo_mm + s.hi_mm) * 0.5;
   constexpr int kPixels = 440;
+  const double mm_per_pixel = 1.04 * std::max({size.x, size.y, size.z, 1.0}) / kPixels;
   // From the corner the box is as wide as its diagonal.
-  const double mm_per_pixel =
-      1.02 * std::max({std::hypot(size.x, size.y), size.z + 0.25 * std::hypot(size.x, size.y), 1.0}) / kPixels;
-  constexpr std::array<ViewFrom, 2> kSides{ViewFrom::left_front, ViewFrom::below};
-  std::vector<Picture> pictures = draw_sides(*s.surface, kSides, centre, mm_per_pixel, kPixels, kPixels, rgb);
-  into["thin-left-front"] = std::move(pictures[0]);
-  into["thin-below"] = std::move(pictures[1]);
+  const double across = std::hypot(size.x, size.y),
+               thin_mm_per_pixel = 1.02 * std::max({across, size.z + 0.25 * across, 1.0}) / kPixels;
+  std::vector<SideView> views;
+  for (const ViewFrom from :
+       {ViewFrom::front, ViewFrom::back, ViewFrom::left, ViewFrom::right, ViewFrom::above, ViewFrom::below})
+    views.push_back({from, mm_per_pixel});
+  const std::size_t sides = views.size();
+  if (below.size() == s.surface->points_mm.size()) {
+    for (const ViewFrom from : {ViewFrom::left_front, ViewFrom::below})
+      views.push_back({from, thin_mm_per_pixel, true});
+  }
+  std::vector<Picture> pictures = draw_sides(*s.surface, views, centre, kPixels, rgb);
+  for (std::size_t n = 0; n < pictures.size(); ++n) {
+    std::string name(EnumNames<ViewFrom>::values[static_cast<std::size_t>(views[n].from)]);
+    if (n >= sides) {
+      std::replace(name.begin(), name.end(), '_', '-');
+      into["thin-" + name] = std::move(pictures[n]);
+      continue;
+    }
+    Picture& p = pictures[n];
+    const std::string_view letters = sides_of(views[n].from);
+    write_text(p, letters.substr(0, 1), 20, 44, 26, {60, 70, 90});
+    write_text(p, letters.substr(1, 1), kPixels - 44, 44, 26, {60, 70, 90});
+    write_scale_bar(p, mm_per_pixel, 40);
+    into["side-" + name] = std::move(p);
+  }
+}
+
+void draw_structures(const Subject& s, Pictures& into, const Context& context) {
+  if (s.surface == nullptr || s.surface->triangles.empty() || s.structures == nullptr) return;
+  const Vec3 size = s.hi_mm - s.lo_mm, centre = (s.lo_mm + s.hi_mm) * 0.5;
+  SnapshotParams view;
+  view.width = view.height = 560;
+  const Vec3 where = s.measures.empty() ? centre : s.measures.front().middle_mm;
+  view.view = where.x < centre.x - 0.1 * size.x   ? ViewFrom::right
+              : where.x > centre.x + 0.1 * size.x ? ViewFrom::left
+                                                  : ViewFrom::left_front;
+  into["structures"] = snapshot({Surface(s.surface), *s.structures, Surface(s.surface)}, view, context);
 }
 
 void draw_removed(const Subject& s, Pictures& into) {

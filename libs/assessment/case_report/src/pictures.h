@@ -16,10 +16,10 @@ namespace osteo::inline assessment::case_report {
 
 struct Subject {
   const BrickGrid* bone = nullptr;
-  const TriMesh* surface = nullptr;    ///< null: none in the case
-  const Labels* structures = nullptr;  ///< null: none
-  const CaseScan* scan = nullptr;      ///< null: not at hand
-  const SparseGrid* hu = nullptr;      ///< of bone only; null: not kept
+  std::shared_ptr<const TriMesh> surface;  ///< for pictures; null: none in the case
+  const Labels* structures = nullptr;      ///< null: none
+  const CaseScan* scan = nullptr;          ///< null: not at hand
+  const SparseGrid* hu = nullptr;          ///< of bone only; null: not kept
   std::vector<StructureMeasure> measures;
   Vec3 lo_mm, hi_mm;  ///< of the bone
   double lower_hu = 0, upper_hu = 32767;
@@ -36,10 +36,12 @@ using Pictures = std::map<std::string, Picture>;
 void draw_cuts(const Subject& s, Pictures& into, const Context& context);
 /// "slice-1" to "slice-8", from the feet up.
 void draw_slices(const Subject& s, Pictures& into);
-/// "side-front", ... and, where there are structures, "structures".
-void draw_bone(const Subject& s, Pictures& into, const Context& context);
-/// "thin": the surface coloured by the bone beneath it.
-void draw_thin(const Subject& s, std::span<const float> below_mm, Pictures& into);
+/// "side-front", ..., and "thin-left-front", "thin-below": the surface coloured by the bone beneath it, which is known
+/// for each of its points up to kPaleMm.
+inline constexpr double kPaleMm = 2;
+void draw_bone(const Subject& s, std::span<const float> below_mm, Pictures& into);
+/// Where there are structures, "structures": in clear bone.
+void draw_structures(const Subject& s, Pictures& into, const Context& context);
 /// "removed-axial", ...: the mask in grey, what was taken off in colours, seen through. With the scan only.
 void draw_removed(const Subject& s, Pictures& into);
 /// Voxels by HU: shares on a logarithmic scale from kHistogramFrom in steps of kHistogramStep.

@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "osteo/core/base/param.h"
 #include "osteo/display/view/actors.h"
@@ -24,31 +25,45 @@
 
 namespace osteo::inline display {
 
-namespace {
-
-// Fewer triangles on the same points, where there are far more than a picture of this size can show. Software draws a
-// million in half a second.
-TriMesh coarse_enough(const TriMesh& mesh, std::size_t pictures) {
+PictureMesh mesh_for_pictures(const TriMesh& mesh) {
   constexpr std::size_t kTriangles = 800'000;
-  if (pictures < 2 || mesh.triangles.size() <= kTriangles) return mesh;
-  TriMesh coarse;
-  coarse.points_mm = mesh.points_mm;
-  coarse.normals = mesh.normals;
-  coarse.triangles.resize(mesh.triangles.size());
-  const std::size_t kept = meshopt_simplifySloppy(
-      coarse.triangles.front().data(), mesh.triangles.front().data(), 3 * mesh.triangles.size(),
-      mesh.points_mm.front().data(), mesh.points_mm.size(), sizeof(mesh.points_mm.front()), 3 * kTriangles, 0.01F);
-  coarse.triangles.resize(kept / 3);
-  return coarse;
+  PictureMesh made;
+  const std::size_t points = mesh.points_mm.size();
+  if (mesh.triangles.size() <= kTriangles) {
+    made.mesh = mesh;
+    made.point.resize(points);
+    std::iota(made.point.begin(), made.point.end(), 0U);
+    return made;
+  }
+  std::vector<std::array<std::uint32_t, 3>> kept(mesh.triangles.size());
+  kept.resize(meshopt_simplifySloppy(kept.front().data(), mesh.triangles.front().data(), 3 * mesh.triangles.size(),
+                                     mesh.points_mm.front().data(), points, sizeof(mesh.points_mm.front()),
+                                     3 * kTriangles, 0.01F) /
+              3);
+  constexpr std::uint32_t kNone = ~0U;
+  std::vector<std::uint32_t> now(points, kNone);
+  for (const auto& t : kept)
+    for (const std::uint32_t p : t) now[p] = 0;
+  // In their old order: those of a part of the bone stay together.
+  for (std::uint32_t p = 0; p < points; ++p) {
+    if (now[p] == kNone) continue;
+    now[p] = static_cast<std::uint32_t>(made.point.size());
+    made.point.push_back(p);
+    made.mesh.points_mm.push_back(mesh.points_mm[p]);
+    if (mesh.normals.size() == points) made.mesh.normals.push_back(mesh.normals[p]);
+  }
+  for (auto& t : kept)
+    for (std::uint32_t& p : t) p = now[p];
+  made.mesh.triangles = std::move(kept);
+  return made;
 }
 
-}  // namespace
-
-std::vector<Picture> draw_sides(const TriMesh& mesh, std::span<const ViewFrom> sides, Vec3 centre, double mm_per_pixel,
-                                int width, int height, std::span<const std::array<std::uint8_t, 3>> rgb) {
+std::vector<Picture> draw_sides(const TriMesh& mesh, std::span<const SideView> sides, Vec3 centre, int pixels,
+                                std::span<const std::array<std::uint8_t, 3>> rgb) {
   std::vector<Picture> pictures;
-  const auto data = to_vtk(coarse_enough(mesh, sides.size()));
-  if (rgb.size() == mesh.points_mm.size() && !rgb.empty()) {
+  const auto data = to_vtk(mesh);
+  const bool colours_known = rgb.size() == mesh.points_mm.size() && !rgb.empty();
+  if (colours_known) {
     vtkNew<vtkUnsignedCharArray> colours;
     colours->SetName("colour");
     colours->SetNumberOfComponents(3);
@@ -56,19 +71,20 @@ std::vector<Picture> draw_sides(const TriMesh& mesh, std::span<const ViewFrom> s
     for (std::size_t p = 0; p < rgb.size(); ++p) colours->SetTypedTuple(static_cast<vtkIdType>(p), rgb[p].data());
     data->GetPointData()->SetScalars(colours);
   }
-  OffscreenWindow window(width, height);
+  OffscreenWindow window(pixels, pixels);
   vtkNew<vtkRenderer> renderer;
   window.window()->AddRenderer(renderer);
   set_up_scene(renderer);
   renderer->GradientBackgroundOff();
   renderer->SetBackground(1, 1, 1);
   const auto bone = make_bone_actor(data);
-  if (!rgb.empty()) bone->GetMapper()->ScalarVisibilityOn();
   renderer->AddActor(bone);
-  for (const ViewFrom side : sides) {
-    look_at(renderer, centre, 0.5 * height * mm_per_pixel, eye_direction(side));
+  for (const SideView& side : sides) {
+    bone->GetMapper()->SetScalarVisibility(side.coloured && colours_known ? 1 : 0);
+    const double half_mm = 0.5 * pixels * side.mm_per_pixel;
+    look_at(renderer, centre, half_mm, eye_direction(side.from));
     renderer->GetActiveCamera()->SetParallelProjection(1);
-    renderer->GetActiveCamera()->SetParallelScale(0.5 * height * mm_per_pixel);
+    renderer->GetActiveCamera()->SetParallelScale(half_mm);
     renderer->ResetCameraClippingRange();
     set_depth(renderer, {true, 1});
     pictures.push_back(window.render());

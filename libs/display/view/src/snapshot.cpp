@@ -283,13 +283,19 @@ TriMesh shaded_surface(const BrickGrid& bone, const Context& context) {
   return surface.joined().mesh;
 }
 
+vtkSmartPointer<vtkPolyData> as_drawn(const TriMesh& mesh, const SnapshotParams& p) {
+  // So many pixels show single triangles of a mesh_for_pictures().
+  constexpr int kManyPixels = 2'000'000;
+  return p.width * p.height > kManyPixels ? to_vtk(mesh) : to_vtk(mesh_for_pictures(mesh).mesh);
+}
+
 vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const SnapshotParams& p, const Context& context) {
-  if (const auto* surface = std::get_if<Surface>(&s.surface)) return to_vtk(**surface);
+  if (const auto* surface = std::get_if<Surface>(&s.surface)) return as_drawn(**surface, p);
   // Structures are drawn inside the bone, not instead of it.
   const bool mask_is_bone = structures_of(s).empty();
   for (const Data* data : {&s.mask, &s.subject}) {
     if (data == &s.mask && !mask_is_bone) continue;
-    if (const auto* surface = std::get_if<Surface>(data)) return to_vtk(**surface);
+    if (const auto* surface = std::get_if<Surface>(data)) return as_drawn(**surface, p);
     if (const auto* tets = std::get_if<Tets>(data)) return half_of(**tets, eye_direction(p.view));
     if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name == "distance_mm")
       return to_vtk(zero_of(*grid, context));

@@ -1,6 +1,8 @@
 #include "osteo/simulation/bone/live_surface.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "osteo/core/base/files.h"
@@ -141,6 +143,53 @@ std::span<const std::uint32_t> LiveSurface::settle() {
     for (std::size_t i = begin; i < end; ++i) make(done_[i]);
   });
   return done_;
+}
+
+void shade_mesh(TriMesh& mesh, const BrickGrid& bone, const Context& context) {
+  const ShadingField field(bone, context.threads);
+  const Frame& frame = bone.frame();
+  const Mat3 to_index = transposed(frame.direction);
+  // The brick that a place is in, or the next one where there is none: bone ends at its border.
+  const auto brick_at = [&](const Vec3& x) {
+    for (const double aside : {0.0, -1.0, 1.0}) {
+      for (int n = 0; n < 8; ++n) {
+        const auto cell = [&](double at, int bit) {
+          return static_cast<int>(std::floor(at + ((n >> bit & 1) != 0 ? aside : 0.0))) >> 3;
+        };
+        const std::uint32_t b = bone.find_brick(cell(x.x, 0), cell(x.y, 1), cell(x.z, 2));
+        if (b != BrickGrid::kNone) return b;
+      }
+    }
+    return BrickGrid::kNone;
+  };
+  std::vector<std::uint32_t> brick(mesh.points_mm.size());
+  std::vector<std::array<float, 3>> place(brick.size());
+  for (std::size_t p = 0; p < brick.size(); ++p) {
+    const Vec3 x = frame.index_from_world(from_floats(mesh.points_mm[p]));
+    place[p] = to_floats(x);
+    brick[p] = brick_at(x);
+  }
+  std::vector<std::uint32_t> order(brick.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return brick[a] < brick[b]; });
+  std::vector<std::size_t> first;  // of each brick's points, in that order
+  for (std::size_t n = 0; n < order.size(); ++n) {
+    if (brick[order[n]] == BrickGrid::kNone) break;  // last: the largest number there is
+    if (n == 0 || brick[order[n]] != brick[order[n - 1]]) first.push_back(n);
+    if (n + 1 == order.size() || brick[order[n + 1]] == BrickGrid::kNone) first.push_back(n + 1);
+  }
+  if (first.size() < 2) return;
+  parallel_for(first.size() - 1, 64, context.threads, [&](std::size_t begin, std::size_t end) {
+    SurfacePatch patch;
+    for (std::size_t b = begin; b < end; ++b) {
+      patch.vertices.clear();
+      for (std::size_t n = first[b]; n < first[b + 1]; ++n)
+        patch.vertices.push_back({place[order[n]], to_floats(to_index * from_floats(mesh.normals[order[n]])), 0});
+      field.shade(brick[order[first[b]]], patch);
+      for (std::size_t n = first[b]; n < first[b + 1]; ++n)
+        mesh.normals[order[n]] = to_floats(frame.direction * from_floats(patch.vertices[n - first[b]].normal));
+    }
+  });
 }
 
 std::string surface_hash(const TriMesh& mesh) {

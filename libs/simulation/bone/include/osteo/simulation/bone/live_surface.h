@@ -63,6 +63,11 @@ class LiveSurface {
   std::vector<bool> is_changed_, is_stale_;
 };
 
+/// Normals as those of a shaded LiveSurface, for a mesh of the bone's surface or of some of its points, which has
+/// normals of its own. Those stay where the bone has no surface to shade by. Costs less than half of making the
+/// surface again.
+void shade_mesh(TriMesh& mesh, const BrickGrid& bone, const Context& context);
+
 /// Content hash of points and triangles.
 [[nodiscard]] std::string surface_hash(const TriMesh& mesh);
 
