@@ -197,6 +197,55 @@ TEST(StructuresView, ClearLetsEveryOtherPixelThroughAndHiddenAll) {
   EXPECT_EQ(view.all()[0].value, 1);
 }
 
+// A tube along x that runs out of the labels at both ends: it fades there, also where it is clear. One that ends before
+// stays whole to its end, and so does one beside the border.
+TEST(StructuresView, WhatRunsOutOfTheLabelsFadesTowardsTheirBorder) {
+  const auto drawn = [](const std::function<double(Vec3)>& body, StructureLook look) {
+    Labels labels = labelled(6, {0.5, 0.5, 0.5}, body);
+    labels.structures = {{1, "tube", {255, 0, 0}}};
+    const StructureMap map(labels, 2);
+    Seen seen(map);
+    if (look != StructureLook::solid) {
+      seen.view.show(0, StructureLook::hidden);
+      seen.view.show(0, look);
+    }
+    const Picture p = seen.window.render();
+    // Share of the tube's middle rows that is its own, by millimetres from the picture's middle.
+    std::vector<double> share;
+    for (int mm = 0; mm < 6; ++mm) {
+      int own = 0, all = 0;
+      for (int y = 92; y < 108; ++y)
+        for (int x = 0; x < 200; ++x) {
+          if (static_cast<int>(std::abs(x - 99.5) * 16 / 200) != mm) continue;
+          const std::uint8_t* const c = p.rgb.data() + 3 * static_cast<std::size_t>(y * p.width + x);
+          own += c[0] > 40 && c[1] < 40 ? 1 : 0;
+          ++all;
+        }
+      share.push_back(static_cast<double>(own) / all);
+    }
+    return share;
+  };
+  const auto tube = [](double half_mm) {
+    return [half_mm](Vec3 p) { return std::max(std::hypot(p.y, p.z) - 2, std::abs(p.x) - half_mm); };
+  };
+  const std::vector<double> out = drawn(tube(100), StructureLook::solid),
+                            clear = drawn(tube(100), StructureLook::clear),
+                            whole = drawn(tube(4.4), StructureLook::solid);
+  for (std::size_t mm = 0; mm < out.size(); ++mm)
+    std::printf("%zu mm from the middle: %.2f drawn, clear %.2f; of one that ends before %.2f\n", mm, out[mm],
+                clear[mm], whole[mm]);
+  EXPECT_EQ(out[0], 1);
+  EXPECT_EQ(out[1], 1);
+  for (std::size_t mm = 2; mm < 6; ++mm) {
+    EXPECT_LT(out[mm], out[mm - 1]) << mm;
+    EXPECT_LT(clear[mm], 0.6 * out[mm] + 0.01) << mm;
+  }
+  EXPECT_NEAR(out[4], 0.3, 0.15);
+  EXPECT_LT(out[5], 0.12);
+  EXPECT_NEAR(clear[0], 0.5, 0.05);
+  for (std::size_t mm = 0; mm < 4; ++mm) EXPECT_EQ(whole[mm], 1) << mm;
+}
+
 // The left half of a ball is uncertain: it has bars of a paler colour, the right half has none.
 TEST(StructuresView, WhatIsUncertainIsHatched) {
   Labels labels = labelled(8, {0.4, 0.4, 0.4}, [](Vec3 p) { return length(p) - 6; });

@@ -1,6 +1,8 @@
 #include "osteo/display/view/structures_view.h"
 
 #include <vtkActor.h>
+#include <vtkDataObject.h>
+#include <vtkFloatArray.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
@@ -74,6 +76,59 @@ std::vector<std::uint32_t> sizes_of_parts(const TriMesh& mesh) {
   return together;
 }
 
+// For each point how much of it is drawn, 0 to 1; empty: the structure ends nowhere at the border of the labels.
+std::vector<float> faded_at_border(const TriMesh& mesh, const Frame& labels) {
+  constexpr double kAtBorder = 1.5, kGoneMm = 0.5;  // voxels: half of one, and what smoothing rounds off
+  std::array<std::vector<double>, 6> to_side;       // mm
+  for (std::size_t side = 0; side < 6; ++side) {
+    const std::size_t a = side / 2;
+    bool ends = false;
+    for (const auto& p : mesh.points_mm) {
+      const double at = labels.index_from_world(from_floats(p))[a];
+      const double voxels = side % 2 == 0 ? at + 0.5 : labels.dims[a] - 0.5 - at;
+      ends = ends || voxels < kAtBorder;
+      to_side[side].push_back(voxels * labels.spacing_mm[a]);
+    }
+    if (!ends) to_side[side].clear();
+  }
+  std::vector<float> drawn;
+  for (const auto& mm : to_side) {
+    if (mm.empty()) continue;
+    if (drawn.empty()) drawn.assign(mm.size(), 1.0F);
+    for (std::size_t p = 0; p < mm.size(); ++p) {
+      const double t = std::clamp((mm[p] - kGoneMm) / (StructuresView::kFadeMm - kGoneMm), 0.0, 1.0);
+      drawn[p] = std::min(drawn[p], static_cast<float>(t));
+    }
+  }
+  return drawn;
+}
+
+void draw_share_of_points(vtkActor* actor, const std::vector<float>& share) {
+  auto* const mapper = vtkPolyDataMapper::SafeDownCast(actor->GetMapper());
+  vtkNew<vtkFloatArray> values;
+  values->SetName("drawnShare");
+  for (const float v : share) values->InsertNextValue(v);
+  mapper->GetInput()->GetPointData()->AddArray(values);
+  mapper->MapDataArrayToVertexAttribute("drawnShare", "drawnShare", vtkDataObject::FIELD_ASSOCIATION_POINTS, -1);
+  vtkShaderProperty* const shader = actor->GetShaderProperty();
+  shader->AddVertexShaderReplacement(
+      "//VTK::Normal::Dec", true, "//VTK::Normal::Dec\nin float drawnShare;\nout float drawnShareVSOutput;\n", false);
+  shader->AddVertexShaderReplacement("//VTK::Normal::Impl", true,
+                                     "//VTK::Normal::Impl\n  drawnShareVSOutput = drawnShare;\n", false);
+}
+
+// Dots in the order of B. Bayer's matrix of four (1973): even at every share.
+void leave_out_dots(vtkShaderProperty* shader) {
+  shader->AddFragmentShaderReplacement("//VTK::Normal::Dec", true, "//VTK::Normal::Dec\nin float drawnShareVSOutput;\n",
+                                       false);
+  shader->AddFragmentShaderReplacement("//VTK::Color::Impl", true,
+                                       "//VTK::Color::Impl\n"
+                                       "  { int x = int(gl_FragCoord.x) & 3, y = int(gl_FragCoord.y) & 3, z = x ^ y;\n"
+                                       "    int place = ((z & 1) << 3) | ((y & 1) << 2) | (z & 2) | ((y & 2) >> 1);\n"
+                                       "    if (drawnShareVSOutput * 16.0 < float(place) + 0.5) discard; }\n",
+                                       false);
+}
+
 }  // namespace
 
 TriMesh smooth_surface(const TriMesh& face, double most_mm) {
@@ -138,6 +193,11 @@ StructuresView::StructuresView(vtkRenderer* renderer, const StructureMap& map)
     one.actor = make_bone_actor(to_vtk(*one.surface));
     const auto c = map.colour_of(one.value);
     one.actor->GetProperty()->SetColor(c[0], c[1], c[2]);
+    if (const std::vector<float> share = faded_at_border(*one.surface, map.label_frame()); !share.empty()) {
+      one.fades = true;
+      draw_share_of_points(one.actor, share);
+      leave_out_dots(one.actor->GetShaderProperty());
+    }
     renderer_->AddActor(one.actor);
     for (const Structure& structure : map.structures())
       if (structure.value == one.value) one.proposed = structure.within_mm > 0;
@@ -154,6 +214,7 @@ void StructuresView::show(std::size_t number, StructureLook look) {
   one.look = look;
   one.actor->SetVisibility(look != StructureLook::hidden ? 1 : 0);
   one.actor->GetShaderProperty()->ClearAllFragmentShaderReplacements();
+  if (one.fades) leave_out_dots(one.actor->GetShaderProperty());
   if (look != StructureLook::clear) return;
   // Any two of them leave a quarter of the pixels to what lies behind both.
   static constexpr const char* kPatterns[] = {"x + y", "x / 2 + y", "x + y / 2", "x / 2 + y / 2"};

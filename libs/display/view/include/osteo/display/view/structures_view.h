@@ -31,8 +31,10 @@ enum class StructureLook : int { solid, clear, hidden };
 
 class StructuresView {
  public:
-  /// Smooths every structure of the map, half a label voxel at most, in parallel. All are solid at first. The renderer
-  /// must outlive this.
+  /// Smooths every structure of the map, half a label voxel at most, in parallel. All are solid at first. One that
+  /// reaches the border of the labels goes on beyond it: its last kFadeMm are left out dot by dot, up to its end, which
+  /// is none in the patient. The renderer must outlive this.
+  static constexpr double kFadeMm = 4;
   StructuresView(vtkRenderer* renderer, const StructureMap& map);
   ~StructuresView();
   StructuresView(const StructuresView&) = delete;
@@ -43,6 +45,7 @@ class StructuresView {
     std::shared_ptr<const TriMesh> surface;
     StructureLook look = StructureLook::solid;
     vtkSmartPointer<vtkActor> actor;
+    bool fades = false;     ///< it reaches the border of the labels
     bool proposed = false;  ///< a network drew it that knows how far off it may be, and no hand has changed it
   };
   /// In the order of the map's values().
