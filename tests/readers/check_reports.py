@@ -131,6 +131,14 @@ if poppler:
     said = pdf_text()
     for word in ("facial nerve", "sigmoid sinus", "Not approved", "500 HU", "1/2", "2/2"):
         assert word in said or word in said.replace(" / ", "/"), word
+    # And so can the pages of markers: their heads and what to do with them. The markers themselves are for a camera.
+    osteo("markers", "markers.pdf")
+    info = subprocess.run(["pdfinfo", work / "markers.pdf"], capture_output=True, check=True, text=True).stdout
+    assert re.search(r"^Tagged: +yes$", info, re.M) and re.search(r"^Pages: +2$", info, re.M), info
+    tree = subprocess.run(["pdfinfo", "-struct-text", work / "markers.pdf"], capture_output=True, check=True).stdout
+    parts = re.findall(r"^ *(\w+)(?: \(|:?$)", tree.decode(), re.M)
+    assert parts[:3] == ["Document", "H1", "P"] and parts.count("H2") == 1, parts
+    assert "markers of pen 1" in tree.decode() and "Hold a ruler to it" in tree.decode(), tree
 else:
     print("PDF not read: no poppler-utils")
 

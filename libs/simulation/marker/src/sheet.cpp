@@ -55,17 +55,11 @@ class Page {
     cairo_arc(cairo_, x * dots_, y * dots_, r * dots_, 0, 2 * std::numbers::pi);
     cairo_stroke(cairo_);
   }
-  void text(const std::string& what, double x, double y, double width, double size_mm) const {
-    const CairoOwned<PangoLayout> layout(pango_cairo_create_layout(cairo_));
-    PangoFontDescription* const font = pango_font_description_from_string("Liberation Sans, DejaVu Sans, Sans");
-    pango_font_description_set_absolute_size(font, size_mm * dots_ * PANGO_SCALE);
-    pango_layout_set_font_description(layout.get(), font);
-    pango_font_description_free(font);
-    pango_layout_set_width(layout.get(), static_cast<int>(width * dots_ * PANGO_SCALE));
-    pango_layout_set_text(layout.get(), what.c_str(), -1);
-    cairo_set_source_rgb(cairo_, 0.25, 0.25, 0.25);
-    cairo_move_to(cairo_, x * dots_, y * dots_);
-    pango_cairo_show_layout(cairo_, layout.get());
+  // `tag`: what a screen reader of the PDF calls it. What has none is decoration.
+  void text(const std::string& what, double x, double y, double width, double size_mm, const char* tag = "P") const {
+    cairo_tag_begin(cairo_, tag, nullptr);
+    show_text(what, x, y, width, size_mm);
+    cairo_tag_end(cairo_, tag);
   }
   void cells(MarkerKind kind, const Place& p) const {
     const int n = marker_cells_across(kind);
@@ -90,6 +84,19 @@ class Page {
   [[nodiscard]] Size size() const { return size_; }
 
  private:
+  void show_text(const std::string& what, double x, double y, double width, double size_mm) const {
+    const CairoOwned<PangoLayout> layout(pango_cairo_create_layout(cairo_));
+    PangoFontDescription* const font = pango_font_description_from_string("Liberation Sans, DejaVu Sans, Sans");
+    pango_font_description_set_absolute_size(font, size_mm * dots_ * PANGO_SCALE);
+    pango_layout_set_font_description(layout.get(), font);
+    pango_font_description_free(font);
+    pango_layout_set_width(layout.get(), static_cast<int>(width * dots_ * PANGO_SCALE));
+    pango_layout_set_text(layout.get(), what.c_str(), -1);
+    cairo_set_source_rgb(cairo_, 0.25, 0.25, 0.25);
+    cairo_move_to(cairo_, x * dots_, y * dots_);
+    pango_cairo_show_layout(cairo_, layout.get());
+  }
+
   cairo_t* cairo_;
   Size size_;
   double dots_;
@@ -129,7 +136,7 @@ void hexagon(const Page& page, double x, double y, double gray) {
 void draw_pen(const Page& page, int pen) {
   const Size s = page.size();
   const double left = strip_left(s), w = PenBody::kFaceMm, h = PenBody::kHeightMm, a = PenBody::kApothemMm;
-  page.text("Osteotome: markers of pen " + std::to_string(pen), left, 9, 120, 4.5);
+  page.text("Osteotome: markers of pen " + std::to_string(pen), left, 9, 120, 4.5, "H1");
   page.text(
       "Stiff paper. Cut along the outline, fold along the dashed lines, glue the flap under the first face: a prism of "
       "six sides. Fold "
@@ -174,7 +181,7 @@ void draw_plate(const Page& page) {
   for (const Place& p : places_of_plate(s)) page.cells(MarkerKind::plate, p);
   const double below = 10 + PlateBody::kDown * PlateBody::kSquareMm;
   page.ruler(left, below + 8);
-  page.text("Osteotome: plate to calibrate a camera by. Glue it to a flat board.", left, below + 13.5, 170, 2.9);
+  page.text("Osteotome: plate to calibrate a camera by. Glue it to a flat board.", left, below + 13.5, 170, 2.9, "H2");
 }
 
 void draw_page(const Page& page, int pen, int number) {
@@ -269,10 +276,12 @@ std::string marker_pages_pdf(Paper paper, int pen) {
   cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_CREATE_DATE, "2000-01-01T00:00:00Z");
   {
     const CairoOwned<cairo_t> cairo(cairo_create(surface.get()));
+    cairo_tag_begin(cairo.get(), "Document", nullptr);
     for (int p = 0; p < kMarkerPages; ++p) {
       draw_page(Page(cairo.get(), s, kPoints), pen, p);
       cairo_show_page(cairo.get());
     }
+    cairo_tag_end(cairo.get(), "Document");
   }
   cairo_surface_finish(surface.get());
   if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS)
