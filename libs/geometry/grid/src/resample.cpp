@@ -331,6 +331,10 @@ double find_offset(const Resampler& resampler, double wanted_mm3, const Context&
       v.fill(0);
       resampler.sample_brick(bricks[b], scratch, [&](std::uint32_t, float value, float ramp, float weight) {
         if (value - kOffsets.front() < -0.5F * ramp) return;
+        if (value - kOffsets.back() > 0.5F * ramp) {  // deep within bone, as most of it
+          for (double& sum : v) sum += static_cast<double>(weight);
+          return;
+        }
         for (std::size_t o = 0; o < kOffsets.size(); ++o)
           v[o] += static_cast<double>(weight * coverage(value, ramp, kOffsets[o]));
       });
