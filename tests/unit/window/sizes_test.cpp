@@ -17,6 +17,7 @@
 #include "osteo/core/base/translate.h"
 #include "scope_panel.h"
 #include "settings_dialog.h"
+#include "tutor_panel.h"
 #include "ui_kit.h"
 #include "ui_style.h"
 #include "view_panels.h"
@@ -216,6 +217,68 @@ TEST(Sizes, OperateHasAPlaceForEverything) {
 // The monitor takes up to half of the picture: then the cuts may be a key away, and nothing else.
 TEST(Sizes, OperateWithTheNerveMonitorToo) {
   expect_a_place_for_everything(true);
+}
+
+// Who teaches: people, links, steps and harm have a column beside the picture, and what operating needs has its place
+// in the rest. Who is taught has a card.
+TEST(Sizes, TeachIsWhole) {
+  for (const Language language : kLanguages) {
+    const InLanguage theirs(language);
+    for_each([&](Size s, double by_hand) {
+      SCOPED_TRACE(std::string(enum_names(language)[static_cast<std::size_t>(language)]));
+      Screen screen(s, by_hand);
+      TutorNow now;
+      now.title = tr("You teach; the trainee's hand is led by yours");
+      now.teaches = true;
+      now.procedure = "Cortical mastoidectomy with facial recess";
+      now.steps = {{"take the cortex off and find the sinus and the dura", 3, 3},
+                   {"find the nerve and open the recess", 4, 1},
+                   {"clear the cells and the angle", 2, 0}};
+      now.invitation = "osteo rehearse CASE --join 192.168.100.100:41234\ncode K7MX-2QPA";
+      now.trouble = tr("three wrong codes: nobody else can join this session");
+      now.links = {{"trainee", true, 112.3, -13.2, 120, 0.05, 0.1, true}, {"watcher", false}};
+      now.hands = {"instructor", "trainee"};
+      now.leads = now.guiding = true;
+      now.apart_mm = 12.3;
+      std::vector<TickRecord> hands(2);
+      hands[1].speed_rpm = 60000;
+      hands[1].immersed = 4;
+      const std::vector<HarmLine> harm{
+          {Nearness::touched,
+           filled(tr("{structure}: violation ({n})"), {{"structure", tr("semicircular canals")}, {"n", "12"}})}};
+      ViewLayout l = screen.lay_out(Layout::operate);
+      TutorPanel panel;
+      panel.lay_out(l, now, 0);
+      FirstSteps steps;
+      Pressed pressed;
+      Latched latched;
+      HandFacts hand;
+      bool burr_unfolded = false, step_unfolded = false;
+      const auto nowhere = [](Vec3) { return std::optional<std::array<float, 2>>(); };
+      const auto all = [&] {
+        draw_state(l, drilling(Nearness::close), {}, pressed);
+        draw_tray(l.tray, hand, false, latched, pressed);
+        const ScreenBox card = draw_burr_card(l.view, l.free_width(), hand, burr_unfolded, pressed);
+        if (!l.over[0].empty()) static_cast<void>(draw_cuts_foot(cuts_foot_box(l), l.over[1].empty(), 0, false, {}));
+        static_cast<void>(draw_next_step(l.view, l.free_width(), card, steps, step_unfolded));
+        panel.draw(now, hands, harm, l.view, nowhere, pressed);
+      };
+      for (const std::string& text : screen.draw(all)) ADD_FAILURE() << "cut: " << text;
+      std::map<std::string, ScreenBox> boxes = screen.windows();
+      for (const char* const name : {"state", "tray", "burr", "tutoring"})
+        EXPECT_TRUE(boxes.contains(name)) << name << " has vanished";
+      for (std::size_t c = 0; c < 3; ++c) {
+        if (!l.over[c].empty()) boxes["cut " + std::to_string(c)] = l.over[c];
+      }
+      expect_apart(boxes);
+      now.teaches = false;
+      const ViewLayout taught = screen.lay_out(Layout::operate);
+      TutorPanel card;
+      for (const std::string& text : screen.draw([&] { card.draw(now, hands, harm, taught.view, nowhere, pressed); }))
+        ADD_FAILURE() << "cut of the card: " << text;
+      EXPECT_TRUE(screen.windows().contains("tutoring"));
+    });
+  }
 }
 
 // Every page of the settings, at its upper end; what it holds is never wider than it.

@@ -206,9 +206,10 @@ void draw_harm(const std::vector<HarmLine>& harm) {
 void draw_moments(Pressed& pressed) {
   const float gap = kGap * unit(), half = std::floor((ImGui::GetContentRegionAvail().x - gap) / 2);
   const bool beside = std::max(button_width(tr("Note")), button_width(tr("Picture"))) <= half;
-  if (kit_button(tr("Note"), ButtonLook::usual, half)) pressed.press(Command::mark);
+  const float each = beside ? half : ImGui::GetContentRegionAvail().x;
+  if (kit_button(tr("Note"), ButtonLook::usual, each)) pressed.press(Command::mark);
   if (beside) ImGui::SameLine(0, gap);
-  if (kit_button(tr("Picture"), ButtonLook::usual, half)) pressed.press(Command::screenshot);
+  if (kit_button(tr("Picture"), ButtonLook::usual, each)) pressed.press(Command::screenshot);
 }
 
 // Beside each handle, so that the name is not on what is worked at.
