@@ -69,7 +69,9 @@ TEST(Dust, FallsWhereNothingIsBelowUntilItLies) {
   EXPECT_TRUE(dust.falls(cell({3, -6, 0}), 8));
   EXPECT_FALSE(dust.falls(cell({3, -6, 0}), 26)) << "the floor is 12 mm below";
   EXPECT_TRUE(dust.falls(cell({9, -6, 0}), 200)) << "beside both";
+  dust.step();
   for (int s = 0; s < 500 && dust.awake_bricks() > 0; ++s) dust.step();
+  EXPECT_EQ(dust.awake_bricks(), 0U);
   std::size_t cells = 0;
   dust.visit([&](Vec3 p, double) {
     ++cells;

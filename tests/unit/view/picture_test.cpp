@@ -19,6 +19,7 @@
 #include "osteo/display/view/detail/bone_view.h"
 #include "osteo/display/view/detail/wet_film.h"
 #include "osteo/display/view/offscreen.h"
+#include "osteo/display/view/pictures.h"
 #include "osteo/display/view/world_view.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/imaging/io/vtk_data.h"
@@ -53,6 +54,90 @@ struct Scene {
     return window.render();
   }
 };
+
+// A large ball and beside it a wire 0.3 mm thick, as of a head holder: fewer triangles, on points of the mesh, none
+// with its back outside; and the wire is still as wide and as long as it was.
+TEST(PictureMesh, IsSmallAndLosesNoWire) {
+  TriMesh whole;
+  const auto add = [&](const TriMesh& part) {
+    const auto first = static_cast<std::uint32_t>(whole.points_mm.size());
+    whole.points_mm.insert(whole.points_mm.end(), part.points_mm.begin(), part.points_mm.end());
+    whole.normals.insert(whole.normals.end(), part.normals.begin(), part.normals.end());
+    for (const auto& t : part.triangles) whole.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  };
+  // Rings of points around an axis, joined to the next ring.
+  const auto tube = [](int rings, int around, const std::function<std::pair<Vec3, Vec3>(int, double)>& at) {
+    TriMesh m;
+    for (int r = 0; r < rings; ++r)
+      for (int n = 0; n < around; ++n) {
+        const auto [p, out] = at(r, 2 * std::numbers::pi * n / around);
+        m.points_mm.push_back(to_floats(p));
+        m.normals.push_back(to_floats(out));
+      }
+    for (int r = 0; r + 1 < rings; ++r)
+      for (int n = 0; n < around; ++n) {
+        const auto a = static_cast<std::uint32_t>(r * around + n),
+                   b = static_cast<std::uint32_t>(r * around + (n + 1) % around),
+                   up = static_cast<std::uint32_t>(around);
+        m.triangles.push_back({a, b, a + up});
+        m.triangles.push_back({b, b + up, a + up});
+      }
+    return m;
+  };
+  constexpr double kRadius = 90, kWire = 0.15;
+  constexpr int kRings = 900;
+  add(tube(kRings, 1800, [](int r, double turn) {
+    const double down = std::numbers::pi * (r + 0.5) / kRings;
+    const Vec3 out{std::sin(down) * std::cos(turn), std::sin(down) * std::sin(turn), -std::cos(down)};
+    return std::pair{out * kRadius, out};
+  }));
+  const std::size_t ball = whole.triangles.size();
+  add(tube(401, 8, [](int r, double turn) {
+    const Vec3 out{std::cos(turn), std::sin(turn), 0};
+    return std::pair{Vec3{120, 0, -50 + 0.25 * r} + out * kWire, out};
+  }));
+  ASSERT_GT(ball, 3'000'000U);
+  const PictureMesh few = mesh_for_pictures(whole);
+  std::printf("%zu of %zu triangles\n", few.mesh.triangles.size(), whole.triangles.size());
+  EXPECT_LT(few.mesh.triangles.size(), 1'000'000U);
+  EXPECT_GT(few.mesh.triangles.size(), 200'000U);
+  ASSERT_EQ(few.point.size(), few.mesh.points_mm.size());
+  ASSERT_EQ(few.mesh.normals.size(), few.mesh.points_mm.size());
+  for (std::size_t p = 0; p < few.point.size(); ++p) {
+    EXPECT_EQ(few.mesh.points_mm[p], whole.points_mm[few.point[p]]);
+    EXPECT_EQ(few.mesh.normals[p], whole.normals[few.point[p]]);
+  }
+  double wire_mm2 = 0, lowest = 1e9, highest = -1e9, off = 0;
+  std::size_t backs = 0;
+  for (const auto& t : few.mesh.triangles) {
+    const Vec3 a = from_floats(few.mesh.points_mm[t[0]]), b = from_floats(few.mesh.points_mm[t[1]]),
+               c = from_floats(few.mesh.points_mm[t[2]]), n = cross(b - a, c - a);
+    Vec3 out;
+    for (const std::uint32_t p : t) out += from_floats(few.mesh.normals[p]);
+    backs += dot(n, out) < 0 ? 1 : 0;
+    if (a.x < 100) {
+      off = std::max(off, kRadius - length((a + b + c) * (1.0 / 3)));
+      continue;
+    }
+    wire_mm2 += length(n) / 2;
+    for (const Vec3& p : {a, b, c}) {
+      lowest = std::min(lowest, p.z);
+      highest = std::max(highest, p.z);
+    }
+  }
+  EXPECT_EQ(backs, 0U);
+  EXPECT_LT(off, 0.05) << "of the ball";
+  EXPECT_GT(wire_mm2, 0.5 * 100 * 2 * std::numbers::pi * kWire);
+  EXPECT_LT(lowest, -49);
+  EXPECT_GT(highest, 49);
+  // What is small enough stays as it is.
+  const TriMesh small = surface_nets(block()).mesh;
+  const PictureMesh same = mesh_for_pictures(small);
+  EXPECT_EQ(same.mesh.points_mm, small.points_mm);
+  EXPECT_EQ(same.mesh.triangles, small.triangles);
+  EXPECT_EQ(same.point.size(), small.points_mm.size());
+  EXPECT_EQ(same.point.back(), small.points_mm.size() - 1);
+}
 
 double grey(const Picture& p, int x, int y) {
   const auto i = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(p.width) + static_cast<std::size_t>(x));

@@ -11,11 +11,11 @@
 #include <vtkRenderer.h>
 #include <vtkUnsignedCharArray.h>
 
-#include <meshoptimizer.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <unordered_map>
+#include <utility>
 
 #include "osteo/core/base/param.h"
 #include "osteo/display/view/actors.h"
@@ -24,6 +24,39 @@
 #include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo::inline display {
+
+namespace {
+
+double area_mm2_of(const TriMesh& mesh) {
+  double twice = 0;
+  for (const auto& t : mesh.triangles) {
+    const Vec3 a = from_floats(mesh.points_mm[t[0]]);
+    twice += length(cross(from_floats(mesh.points_mm[t[1]]) - a, from_floats(mesh.points_mm[t[2]]) - a));
+  }
+  return twice / 2;
+}
+
+// Number of a cell for each point: those in one cube of this edge that face the same way. Sides of a thin wall or a
+// wire face other ways, so they stay apart however large the cube is, where common simplifications lose them.
+std::vector<std::uint32_t> cells_of(const TriMesh& mesh, double edge_mm, std::size_t& count) {
+  std::unordered_map<std::uint64_t, std::uint32_t> cells;
+  cells.reserve(mesh.points_mm.size() / 3);
+  std::vector<std::uint32_t> cell(mesh.points_mm.size());
+  const bool normals = mesh.normals.size() == cell.size();
+  for (std::size_t p = 0; p < cell.size(); ++p) {
+    std::uint64_t key = 0, faces = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto at = static_cast<std::int64_t>(std::floor(static_cast<double>(mesh.points_mm[p][a]) / edge_mm));
+      key = key << 20 | static_cast<std::uint64_t>(at & 0xfffff);
+      if (normals && mesh.normals[p][a] < 0) faces |= std::uint64_t{1} << a;
+    }
+    cell[p] = cells.try_emplace(key << 3 | faces, static_cast<std::uint32_t>(cells.size())).first->second;
+  }
+  count = cells.size();
+  return cell;
+}
+
+}  // namespace
 
 PictureMesh mesh_for_pictures(const TriMesh& mesh) {
   constexpr std::size_t kTriangles = 800'000;
@@ -35,26 +68,39 @@ PictureMesh mesh_for_pictures(const TriMesh& mesh) {
     std::iota(made.point.begin(), made.point.end(), 0U);
     return made;
   }
-  std::vector<std::array<std::uint32_t, 3>> kept(mesh.triangles.size());
-  kept.resize(meshopt_simplifySloppy(kept.front().data(), mesh.triangles.front().data(), 3 * mesh.triangles.size(),
-                                     mesh.points_mm.front().data(), points, sizeof(mesh.points_mm.front()),
-                                     3 * kTriangles, 0.01F) /
-              3);
-  constexpr std::uint32_t kNone = ~0U;
-  std::vector<std::uint32_t> now(points, kNone);
-  for (const auto& t : kept)
-    for (const std::uint32_t p : t) now[p] = 0;
-  // In their old order: those of a part of the bone stay together.
+  // Of cubes as large as a smooth surface needs for so many triangles: about four for each of a cube's faces.
+  std::size_t count = 0;
+  const std::vector<std::uint32_t> cell =
+      cells_of(mesh, std::sqrt(4 * area_mm2_of(mesh) / static_cast<double>(kTriangles)), count);
+  // Of each its point that is nearest to the middle of all.
+  std::vector<Vec3> middle(count);
+  std::vector<double> members(count);
+  for (std::size_t p = 0; p < points; ++p) {
+    middle[cell[p]] += from_floats(mesh.points_mm[p]);
+    ++members[cell[p]];
+  }
+  for (std::size_t c = 0; c < count; ++c) middle[c] = middle[c] / members[c];
+  std::vector<std::pair<double, std::uint32_t>> nearest(count, {1e30, 0});
   for (std::uint32_t p = 0; p < points; ++p) {
-    if (now[p] == kNone) continue;
-    now[p] = static_cast<std::uint32_t>(made.point.size());
+    const Vec3 off = from_floats(mesh.points_mm[p]) - middle[cell[p]];
+    nearest[cell[p]] = std::min(nearest[cell[p]], {dot(off, off), p});
+  }
+  for (const auto& [off, p] : nearest) {
     made.point.push_back(p);
     made.mesh.points_mm.push_back(mesh.points_mm[p]);
     if (mesh.normals.size() == points) made.mesh.normals.push_back(mesh.normals[p]);
   }
-  for (auto& t : kept)
-    for (std::uint32_t& p : t) p = now[p];
-  made.mesh.triangles = std::move(kept);
+  for (const auto& t : mesh.triangles) {
+    const std::uint32_t a = cell[t[0]], b = cell[t[1]], c = cell[t[2]];
+    if (a == b || b == c || c == a) continue;
+    made.mesh.triangles.push_back({a, b, c});
+    // One that came to lie with its back outside would be lit as the other side: a dark speck.
+    if (made.mesh.normals.empty()) continue;
+    const auto at = [&](std::uint32_t n) { return from_floats(made.mesh.points_mm[n]); };
+    const auto out = [&](std::uint32_t n) { return from_floats(made.mesh.normals[n]); };
+    if (dot(cross(at(b) - at(a), at(c) - at(a)), out(a) + out(b) + out(c)) < 0)
+      std::swap(made.mesh.triangles.back()[1], made.mesh.triangles.back()[2]);
+  }
   return made;
 }
 

@@ -117,16 +117,17 @@ void draw_share_of_points(vtkActor* actor, const std::vector<float>& share) {
                                      "//VTK::Normal::Impl\n  drawnShareVSOutput = drawnShare;\n", false);
 }
 
-// Dots in the order of B. Bayer's matrix of four (1973): even at every share.
+// Dots by a number of each pixel that has nothing to do with the patterns of clear structures: interleaved gradient
+// noise (J. Jimenez, Next Generation Post Processing in Call of Duty, SIGGRAPH 2014).
 void leave_out_dots(vtkShaderProperty* shader) {
-  shader->AddFragmentShaderReplacement("//VTK::Normal::Dec", true, "//VTK::Normal::Dec\nin float drawnShareVSOutput;\n",
-                                       false);
-  shader->AddFragmentShaderReplacement("//VTK::Color::Impl", true,
-                                       "//VTK::Color::Impl\n"
-                                       "  { int x = int(gl_FragCoord.x) & 3, y = int(gl_FragCoord.y) & 3, z = x ^ y;\n"
-                                       "    int place = ((z & 1) << 3) | ((y & 1) << 2) | (z & 2) | ((y & 2) >> 1);\n"
-                                       "    if (drawnShareVSOutput * 16.0 < float(place) + 0.5) discard; }\n",
-                                       false);
+  shader->AddFragmentShaderReplacement("//VTK::Normal::Dec", true,
+                                       "//VTK::Normal::Dec\nin float drawnShareVSOutput;\n", false);
+  shader->AddFragmentShaderReplacement(
+      "//VTK::Color::Impl", true,
+      "//VTK::Color::Impl\n"
+      "  if (drawnShareVSOutput <= fract(52.9829189 * fract(dot(floor(gl_FragCoord.xy), vec2(0.06711056, "
+      "0.00583715))))) discard;\n",
+      false);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@ namespace osteo::inline network {
 namespace {
 
 constexpr std::int64_t kGuestSendEveryUs = 2000, kLostUs = 2'000'000;
+constexpr std::size_t kMaxPieces = 512;  // of a kilobyte each
 
 }  // namespace
 
@@ -50,6 +51,7 @@ void LiveGuest::take_session(std::uint64_t session) {
   if (session == session_) return;
   session_ = session;
   settings_.clear();
+  pieces_.clear();
   settings_whole_ = ready_ = false;
   host_state_ = LogState::runs;
   host_tick_ = newest_shown_ = 0;
@@ -59,8 +61,13 @@ void LiveGuest::take_session(std::uint64_t session) {
 
 void LiveGuest::hear(const BlobPacket& p) {
   take_session(p.session);
-  if (settings_whole_ || p.offset != settings_.size()) return;
-  settings_.insert(settings_.end(), p.bytes.begin(), p.bytes.end());
+  if (settings_whole_ || p.offset < settings_.size()) return;
+  // What comes before its turn waits, so that what was lost alone has to come again.
+  if (pieces_.size() < kMaxPieces || p.offset == settings_.size()) pieces_.try_emplace(p.offset, p.bytes);
+  for (auto next = pieces_.begin(); next != pieces_.end() && next->first <= settings_.size(); next = pieces_.begin()) {
+    if (next->first == settings_.size()) settings_.insert(settings_.end(), next->second.begin(), next->second.end());
+    pieces_.erase(next);
+  }
   settings_whole_ = settings_.size() == p.total;
 }
 

@@ -13,6 +13,7 @@ constexpr std::int64_t kSendEveryUs = 4000, kGoneUs = 10'000'000;
 constexpr std::int64_t kSilentUs = 1'000'000, kSurelyUs = 200'000, kTraineeFirstUs = 2'000'000,
                        kTraineeAwaitedUs = 60'000'000;
 constexpr std::uint64_t kWindowTicks = 4096;  // on their way to one who catches up
+constexpr std::size_t kMaxOnWay = 4096;       // packets, of one who says that it gets none
 constexpr std::uint64_t kOverlap = 8;         // of the newest ticks, sent again with each packet
 constexpr int kPacketsAPoll = 16;
 constexpr std::size_t kWindowBytes = 256 << 10;  // of settings, on their way
@@ -175,8 +176,8 @@ void LiveHost::hear_progress(Peer& peer, const HandPacket& p, std::int64_t now_u
   const std::uint64_t ticks = log_.size() / hands_;
   if (p.next_tick <= ticks) {
     if (p.next_tick < peer.next_tick) peer.sent_to = p.next_tick;  // it begins again
-    if (p.next_tick != peer.next_tick) peer.last_moved_us = now_us;
     peer.next_tick = p.next_tick;
+    std::erase_if(peer.on_way, [&](const auto& sent) { return sent.second.end <= p.next_tick; });
   }
   peer.ready = p.ready;
   const auto has = std::min<std::uint32_t>(p.blob_bytes, static_cast<std::uint32_t>(settings_.size()));
@@ -225,6 +226,17 @@ LogPacket LiveHost::log_from(std::uint64_t tick) const {
   return p;
 }
 
+// Whether the first tick that is missing there was sent, and each time longer ago than the way takes: it was lost.
+bool LiveHost::overdue(const Peer& peer, std::int64_t patience_us, std::int64_t now_us) {
+  bool sent = false;
+  for (auto at = peer.on_way.begin(); at != peer.on_way.end() && at->first <= peer.next_tick; ++at) {
+    if (at->second.end <= peer.next_tick) continue;
+    if (now_us - at->second.at_us <= patience_us) return false;
+    sent = true;
+  }
+  return sent;
+}
+
 std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
   const std::lock_guard lock(mutex_);
   std::erase_if(peers_, [&](const auto& p) { return now_us - p->last_heard_us > kGoneUs; });
@@ -236,6 +248,12 @@ std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
     const auto send = [&](auto packet) {
       packet.times = p.clock.stamp(now_us);
       out_.push_back({p.from, p.channel->seal(encode(packet))});
+    };
+    const auto send_log = [&](const LogPacket& log) {
+      const std::uint64_t end = log.first_tick + log.samples.size() / hands_;
+      if (p.on_way.size() < kMaxOnWay) p.on_way[log.first_tick] = {end, now_us};
+      send(log);
+      return end;
     };
     const auto patience_us = static_cast<std::int64_t>(p.clock.rtt_ms() * 1000) + 20'000;
     if (p.blob_bytes < settings_.size()) {
@@ -259,26 +277,18 @@ std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
       p.blob_sent = static_cast<std::uint32_t>(at);
       continue;
     }
-    // What was lost is sent again when the other side did not come on for longer than the way takes.
-    if (p.next_tick < p.sent_to && now_us - p.last_moved_us > patience_us) {
-      send(log_from(p.next_tick));
-      p.last_moved_us = now_us - patience_us + 10'000;
-    }
+    if (overdue(p, patience_us, now_us)) static_cast<void>(send_log(log_from(p.next_tick)));
     p.sent_to = std::max(p.sent_to, p.next_tick);
     int sent = 0;
     while (p.sent_to + LogPacket::kMaxTicks < ticks && p.sent_to < p.next_tick + kWindowTicks && sent < kPacketsAPoll) {
-      const LogPacket log = log_from(p.sent_to);
-      p.sent_to += log.samples.size() / hands_;
-      send(log);
+      p.sent_to = send_log(log_from(p.sent_to));
       ++sent;
     }
     if (p.sent_to + LogPacket::kMaxTicks >= ticks) {
       // The newest, with those before them once more: in one packet, but of many hands or actions.
       std::uint64_t from = std::min(p.sent_to, ticks > kOverlap ? ticks - kOverlap : 0);
       do {
-        const LogPacket log = log_from(from);
-        from += log.samples.size() / hands_;
-        send(log);
+        from = send_log(log_from(from));
       } while (from < ticks);
       p.sent_to = from;
     }

@@ -185,9 +185,14 @@ class LiveHost final : public Reader, private PairingSeats {
     JoinRole role{};
     std::unique_ptr<SecureChannel> channel;
     ClockSync clock;
-    std::int64_t last_heard_us = 0, last_sent_us = 0, last_moved_us = 0;
+    std::int64_t last_heard_us = 0, last_sent_us = 0;
     std::int64_t told_us = 0;  // by the peer's clock: when it sent what the rest here goes by
     std::uint64_t next_tick = 0, sent_to = 0, newest_hand = 0;
+    struct Sent {
+      std::uint64_t end = 0;
+      std::int64_t at_us = 0;
+    };
+    std::map<std::uint64_t, Sent> on_way;         // packets of ticks by their first, that may still come or be lost
     std::uint32_t blob_bytes = 0, blob_sent = 0;  // of the settings: it has, are on their way
     std::int64_t blob_moved_us = 0;
     bool ready = false;
@@ -199,6 +204,7 @@ class LiveHost final : public Reader, private PairingSeats {
   void hear(Peer& peer, const HandPacket& p, std::int64_t now_us);
   void hear_progress(Peer& peer, const HandPacket& p, std::int64_t now_us);
   [[nodiscard]] LogPacket log_from(std::uint64_t tick) const;
+  [[nodiscard]] static bool overdue(const Peer& peer, std::int64_t patience_us, std::int64_t now_us);
 
   mutable std::mutex mutex_;
   PairingHost pairing_;
@@ -282,6 +288,7 @@ class LiveGuest {
   ClockSync clock_;
   std::int64_t last_sent_us_ = 0, last_heard_us_ = 0;
   Bytes settings_, none_;
+  std::map<std::size_t, Bytes> pieces_;  // of the settings, that came before one that belongs in front of them
   bool settings_whole_ = false;
   std::map<std::uint64_t, LiveTick> waiting_;
   std::uint64_t next_tick_ = 0, taken_ = 0, host_tick_ = 0, newest_shown_ = 0, differs_ = 0, refused_ = 0;
