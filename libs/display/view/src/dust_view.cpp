@@ -90,11 +90,6 @@ struct DustView::Impl {
   std::optional<std::uint64_t> version;
 
   void show_grains(const Dust& dust) {
-    // Dust falls by a cell a step, 50 mm/s. Chips are eight times as fast after a centimetre, so that of a stream an
-    // eighth is in the air at once. All of what the model holds there would be a ribbon that hangs from the bone.
-    constexpr double kFreeMm = 4;
-    constexpr float kInAir = 1.0F / 8;
-    const int free_cells = static_cast<int>(std::lround(kFreeMm / cell_mm));
     grains.clear();
     const Frame& frame = dust.bone().frame();
     std::size_t cells = 0;
@@ -109,11 +104,7 @@ struct DustView::Impl {
       if (kept < 1 && chance.next() > kept) return;
       const Ijk cell{static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)),
                      static_cast<int>(std::lround(x.z))};
-      if (dust.falls(cell, free_cells)) {
-        // Others in each picture: they pass.
-        Chance passing(cell.i + static_cast<long>(dust.version()) * 31, cell.j, cell.k);
-        if (passing.next() > kInAir) return;
-      }
+      if (!is_drawn(dust, cell, cell_mm)) return;
       const int count = std::clamp(static_cast<int>(full * each + static_cast<double>(chance.next())), 1, each);
       const auto mean =
           static_cast<float>(0.5 * cell_mm * std::cbrt(std::min(full, 1.5) / count / static_cast<double>(kept)));

@@ -174,6 +174,7 @@ LiquidSurface liquid_surface(const Dust& dust) {
   for (const VoxelKey v : f.falling) {
     const Cell& c = f.cells[v];
     const Ijk at = f.grid.coordinate(v);
+    if (!is_drawn(dust, {at.i + f.shift.i, at.j + f.shift.j, at.k + f.shift.k}, frame.spacing_mm.x)) continue;
     Chance chance(at.i + f.shift.i, at.j + f.shift.j, at.k + f.shift.k);
     const int count = std::max(1, static_cast<int>(std::lround(4 * std::min(1.0F, c.full))));
     // Balls of the cell's volume together.
