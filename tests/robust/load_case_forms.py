@@ -194,7 +194,7 @@ def refusals():
     yield "a force of a giant", load(forces=[dict(end, total_n=[1e7, 0, 0])]), 2, "total_n"
     yield "pushed through itself", lambda p: p.update(
         law="neo_hooke", loads=[{"moved": [dict(end, by_mm=[-30, 0, 0])]}]
-    ), 7, "rest"
+    ), 7, "inside out"
 
 
 INP = """*NODE

@@ -62,7 +62,7 @@ class Reader {
         }
       } else if (card.name == "STEP") {
         const bool now = card.options.contains("NLGEOM") && card.options.at("NLGEOM") != "NO";
-        if (in_step && (now && !large || card.options.contains("PERTURBATION")))
+        if (in_step && ((now && !large) || card.options.contains("PERTURBATION")))
           throw fail(card, "steps of different laws are not read", "give each a file of its own");
         in_step = true;
         large = large || now;
@@ -283,13 +283,13 @@ class Reader {
       if (row.size() >= 6 && row[1] == "GRAV") {
         const Vec3 along{number_of(card, row[3]), number_of(card, row[4]), number_of(card, row[5])};
         if (!(length(along) > 0)) throw fail(card, "gravity has no direction");
-        const Pull pull{row[0], normalized(along), number_of(card, row[2]), &card};
+        const Pull made{row[0], normalized(along), number_of(card, row[2]), &card};
         const auto before = step.pulls.end() - static_cast<std::ptrdiff_t>(now_.pulls);
         const auto same = std::find_if(step.pulls.begin(), before, [&](const Pull& p) {
-          return p.set == pull.set && length(p.along - pull.along) < 1e-9;
+          return p.set == made.set && length(p.along - made.along) < 1e-9;
         });
         if (same != before) step.pulls.erase(same);
-        step.pulls.push_back(pull);
+        step.pulls.push_back(made);
         ++now_.pulls;
         continue;
       }
