@@ -30,9 +30,9 @@ REACTION_LIMIT = 1e-6
 LOOP_LIMIT = 1e-7
 KINDS = ("pressure", "moved", "gravity", "contact", "force", "traction", "volume", "slid", "mixed")
 MESHES = ("vtu", "deck", "grid-conforming", "inp", "deck", "grid", "tetgen", "cgal", "graded", "deck")
-# CalculiX stops at half a percent of the residual by itself, and whatever is asked where forces are below 1e-8: it gets them in
-# units in which young * size^2 is UNITS.
-UNITS = 1e6
+# CalculiX stops at half a percent of the residual by itself; whatever is asked, it stops where forces are below 1e-8, and it takes
+# a D1 below 1e-10 for none. It gets each body as one of about SIZE_MM and 1 MPa.
+SIZE_MM = 1000
 CONTROLS = "*CONTROLS, PARAMETERS=FIELD\n1e-6, 1e-6, , , 1e-6\n"
 
 
@@ -70,10 +70,10 @@ class Program:
         report, _ = self.fem(mesh, problem, "--law", "linear")
         return report["displacement"]["largest_mm"]
 
-    def calculix(self, text, k):
+    def calculix(self, text, long, stiff):
         """Displacements and forces (N) by label of the last increment; None where it did not get to the end."""
         with open(f"{self.work}/job.inp", "w") as f:
-            f.write(in_units(text, k))
+            f.write(in_units(text, long, stiff))
         for name in ("job.dat", "job.frd"):
             if os.path.exists(f"{self.work}/{name}"):
                 os.remove(f"{self.work}/{name}")
@@ -95,8 +95,9 @@ class Program:
                 if now is not None and len(fields) == 4:
                     now[int(fields[0])] = tuple(float(x) for x in fields[1:])
         for (what, _), rows in found.items():
-            for label in rows if what == "forces" else ():
-                rows[label] = tuple(x / k for x in rows[label])
+            by = 1 / long if what == "displacements" else 1 / (stiff * long**2)
+            for label in rows:
+                rows[label] = tuple(x * by for x in rows[label])
         return found if at == 1.0 else None
 
 
@@ -164,19 +165,28 @@ def mutated(text):
     return "\n".join(out) + "\n"
 
 
-def in_units(text, k):
-    """The same with forces in units of 1/k N: the same displacements, forces k times as large."""
-    out, card, row = [], "", 0
+def in_units(text, long, stiff):
+    """The same body `long` times as large and `stiff` times as stiff, under loads that strain it as much."""
+    # By card: field and factor.
+    factor = {
+        "NODE": [(1, long), (2, long), (3, long)],
+        "BOUNDARY": [(3, long)],
+        "ELASTIC": [(0, stiff)],
+        "HYPERELASTIC": [(0, stiff), (1, 1 / stiff)],
+        "DENSITY": [(0, stiff / long)],
+        "CLOAD": [(2, stiff * long**2)],
+        "DLOAD": [(2, stiff)],
+        "SURFACE BEHAVIOR": [(0, stiff / long)],
+    }
+    out, card = [], ""
     for line in text.splitlines():
         if line.startswith("*"):
-            card, row = line[1:].split(",")[0].strip(), 0
-        elif card in ("ELASTIC", "HYPERELASTIC", "DENSITY", "CLOAD", "DLOAD", "SURFACE BEHAVIOR"):
+            card = line[1:].split(",")[0].strip()
+        elif card in factor:
             f = line.split(",")
-            at = 2 if card in ("CLOAD", "DLOAD") else 0
-            if card != "DLOAD" or f[1].strip() != "GRAV":
-                f[at] = " %.12g" % (float(f[at]) * k)
-            if card == "HYPERELASTIC":
-                f[1] = " %.12g" % (float(f[1]) / k)
+            for at, by in factor[card]:
+                if at < len(f) and "GRAV" not in line:
+                    f[at] = " %.12g" % (float(f[at]) * by)
             line = ",".join(f)
         out.append(line)
     return "\n".join(out) + "\n"
@@ -195,7 +205,7 @@ class Case:
         shape = rng.choice([s for s in SHAPES if not flat or s.__name__ in ("brick", "ell", "notched")])
         self.scale = log_uniform(rng, 1e-3, 1e3)
         self.young_kpa = log_uniform(rng, 1, 2e7)
-        self.units = UNITS / (self.young_kpa / 1000 * self.scale**2)
+        self.units = SIZE_MM / self.scale, 1000 / self.young_kpa
         self.poisson = rng.choice((0.0, 0.3, 0.45, 0.49, 0.499, rng.uniform(-0.3, 0.45)))
         self.second = (
             (self.young_kpa * log_uniform(rng, 0.01, 100), rng.uniform(0, 0.49)) if rng.random() < 0.5 else None
@@ -295,7 +305,7 @@ class Case:
     def compared(self, program, text, report, ours):
         """What CalculiX found, or None, and how far it is off."""
         for increments in ("1, 1", "0.05, 1, 1e-6, 0.05"):
-            found = program.calculix(text.replace("*STATIC\n1, 1\n", f"*STATIC\n{increments}\n"), self.units)
+            found = program.calculix(text.replace("*STATIC\n1, 1\n", f"*STATIC\n{increments}\n"), *self.units)
             if found is None:
                 continue
             # What fem wrote it numbered as its own nodes.
@@ -329,14 +339,14 @@ class Case:
                 f.write(Deck(self.solid, rng.random() < 0.5).text)
             return "mesh.inp"
         self.solid.write_obj(f"{work}/solid.obj")
-        for resolution in (10, 8, 6, 5, 4):
+        for resolution in (8, 6, 5, 4, 3):
             words = ["--method", self.mesh, "--resolution", resolution]
             if self.mesh == "graded":
                 words += ["--levels", 1]
             if self.mesh == "grid-conforming":
                 words += ["--no-keep-thin"]
             if program.run("tetrahedralize", "solid.obj", "mesh.vtu", *words)["tets"] < (
-                1000 if self.order == "t10" else 4000
+                400 if self.order == "t10" else 1500
             ):
                 break
         return "mesh.vtu"
