@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <random>
 
 #include "block.h"
@@ -202,7 +203,7 @@ a tetrahedron, and one on it
 *Solid Section, elset=body, material=gel
 *Boundary
  base, 1, 3
-*Step, nlgeom
+*Step
 *Static
 *Dload
  6, P3, 0.002
@@ -213,7 +214,7 @@ a tetrahedron, and one on it
   const TetMesh mesh = parse_inp(text, "x").mesh;
   const TissueProblem p = parse_tissue_problem(text, mesh);
   EXPECT_EQ(p.fixed.size(), 3u);
-  EXPECT_EQ(p.law, ElasticLaw::stvk);
+  EXPECT_EQ(p.law, ElasticLaw::linear);
   ASSERT_EQ(p.loads.size(), 1u);
   Vec3 total{};
   for (const auto& [point, f] : p.loads[0].forces_n) total += f;
@@ -271,6 +272,113 @@ a tetrahedron, and one on it
   says("*Static\n", "*Static\n*Contact\n", "might change the answer");
   says("base, 1, 3", "base, 1, 3, 0.5", "moved");
   says("6, P3", "7, P3", "no element 7");
+  // CalculiX and Abaqus turn pressures with the body where displacements are large.
+  says("*Step", "*Step, nlgeom", "pressures follow the body");
+  says("*Elastic\n 0.1, 0.3", "*Hyperelastic, neo hooke\n 0.1, 0.3", "pressures follow the body");
+  says("*Cload", "*Cload, follower", "might change the answer");
+  std::string large = text;
+  large.replace(large.find("*Step"), 5, "*Step, nlgeom");
+  large.erase(large.find("*Dload"), std::strlen("*Dload\n 6, P3, 0.002\n"));
+  EXPECT_EQ(parse_tissue_problem(large, mesh).law, ElasticLaw::stvk);
+}
+
+// A step goes on from the one before, as CalculiX (2.20) prints it of these very cards: what a card names replaces what
+// acted there, what it does not name stays, unless OP=NEW; within a step loads of one place add up.
+TEST(TissueProblem, StepsOfAnInpFileGoOn) {
+  const std::string head = R"(*NODE
+1, 0, 0, 0
+2, 1, 0, 0
+3, 0, 1, 0
+4, 0, 0, 1
+*ELEMENT, TYPE=C3D4, ELSET=E
+1, 1, 2, 3, 4
+*MATERIAL, NAME=M
+*ELASTIC
+1, 0.3
+*DENSITY
+1e-3
+*SOLID SECTION, ELSET=E, MATERIAL=M
+*BOUNDARY
+1, 1, 3
+2, 1, 3
+3, 1, 3
+)";
+  const TetMesh mesh = parse_inp(head, "x").mesh;
+  struct Case {
+    std::vector<std::string> steps;
+    std::vector<Vec3> tip_mm;
+  };
+  for (const Case& c :
+       {Case{{"*CLOAD\n4,1,.01\n", "*CLOAD\n4,1,.02\n", "*CLOAD\n4,3,.01\n", "*CLOAD,OP=NEW\n4,2,.02\n"},
+             {{0.156, 0, 0}, {0.312, 0, 0}, {0.312, 0, 0.04457143}, {0, 0.312, 0}}},
+        {{"*CLOAD\n4,1,.01\n4,1,.01\n*CLOAD\n4,2,.01\n*CLOAD\n4,2,.01\n"}, {{0.312, 0.312, 0}}},
+        {{"*DLOAD\n1,P2,.01\n", "*DLOAD\n1,P2,.02\n", "*CLOAD\n4,1,.01\n", "*DLOAD,OP=NEW\n"},
+         {{0, 0.026, 0}, {0, 0.052, 0}, {0.156, 0.052, 0}, {0.156, 0, 0}}},
+        {{"*DLOAD\nE,GRAV,10,0,0,1\n", "*DLOAD\nE,GRAV,20,0,0,1\n", "*DLOAD\nE,GRAV,10,0,1,0\n"},
+         {{0, 0, 1.857143e-3}, {0, 0, 3.714286e-3}, {0, 6.5e-3, 3.714286e-3}}},
+        {{"*DLOAD\nE,GRAV,10,0,0,2\n"}, {{0, 0, 1.857143e-3}}},  // a direction, of any length
+        {{"*DLOAD\nE,GRAV,10,0,0,1\nE,GRAV,10,0,0,1\n"}, {{0, 0, 3.714286e-3}}},
+        {{"*BOUNDARY\n4,1,1,.01\n", "*BOUNDARY\n4,1,1,.02\n", "*BOUNDARY\n4,2,2,.02\n"},
+         {{0.01, 0, 0}, {0.02, 0, 0}, {0.02, 0.02, 0}}}}) {
+    std::string text = head;
+    for (const std::string& step : c.steps) text += "*STEP\n*STATIC\n" + step + "*END STEP\n";
+    const TissueProblem p = parse_tissue_problem(text, mesh);
+    ASSERT_EQ(p.loads.size(), c.tip_mm.size());
+    const FemBody body(points_of(mesh), tets_of(mesh), p.materials, ElasticLaw::linear, TetOrder::t4);
+    for (std::size_t n = 0; n < p.loads.size(); ++n)
+      EXPECT_LT(length(statics(body, p.loads[n]).points_mm[3] - body.rest()[3] - c.tip_mm[n]), 1e-6) << text << n;
+  }
+  const auto rejected = [&](const std::string& steps) {
+    EXPECT_THROW(static_cast<void>(parse_tissue_problem(head + steps, mesh)), Error) << steps;
+  };
+  rejected("*STEP\n*END STEP\n*STEP, NLGEOM\n*END STEP\n");
+  rejected("*STEP\n*END STEP\n*STEP, PERTURBATION\n*END STEP\n");
+  rejected("*STEP\n*BOUNDARY, OP=NEW\n4, 1\n*END STEP\n");
+  rejected("*STEP\n*DLOAD\nE, GRAV, 10, 0, 0, 0\n*END STEP\n");
+}
+
+// Between two faces that are held, each by itself, the body is free: also the middle of an edge that goes from one to
+// the other. Both by places of JSON and by the nodes that an .inp names.
+TEST(TissueProblem, MiddlesBetweenHeldFacesAreFree) {
+  const TetMesh mesh = mesh_of(test::block(1, 1, 1, 10.0));
+  const std::string json = R"({"osteotome_tissue": 1, "material": {"young_kpa": 100, "poisson": 0.3},
+    "fixed": [{"box_mm": [[-1, -1, -1], [11, 11, 0.1]]}],
+    "loads": [{"moved": [{"box_mm": [[-1, -1, 9.9], [11, 11, 11]], "by_mm": [0, 0, 1]}]}]})";
+  const TissueProblem p = parse_tissue_problem(json, mesh);
+  const FemBody body(points_of(mesh), tets_of(mesh), p.materials, ElasticLaw::linear, TetOrder::t10);
+  const TissueLoad load = body.on_all_points(p.loads[0]);
+  const auto held_at_half = [&](const TissueLoad& l) {
+    int count = 0;
+    for (const std::uint32_t q : l.fixed) count += body.rest()[q].z == 5 ? 1 : 0;
+    for (const Slider& s : l.sliders) count += body.rest()[s.point].z == 5 ? 1 : 0;
+    for (const auto& m : l.moved) count += body.rest()[m.point].z == 5 ? 1 : 0;
+    return count;
+  };
+  EXPECT_EQ(held_at_half(load), 0);
+  EXPECT_EQ(load.fixed.size(), 9u);  // four corners, four sides and a diagonal
+  EXPECT_EQ(load.moved.size(), 9u);
+  const Statics r = statics(body, load);
+  double narrower = 0;
+  for (std::size_t q = 0; q < body.point_count(); ++q)
+    narrower = std::max(narrower, std::abs(r.points_mm[q].x - body.rest()[q].x));
+  EXPECT_GT(narrower, 0.05);
+  // As written, and as another program marks two surfaces; what of a surface is held is held wholly.
+  const std::string text = inp_text(body, load);
+  const TissueProblem again = parse_tissue_problem(text, parse_inp(text, "x").mesh);
+  const TissueLoad same = body.on_all_points(again.loads[0]);
+  EXPECT_EQ(held_at_half(same), 0);
+  EXPECT_EQ(same.fixed.size(), 9u);
+  // Places that share a face between them, or hold one face axis by axis, hold all of it.
+  for (
+      const std::string fixed :
+      {R"({"box_mm": [[-1, -1, -1], [5, 11, 0.1]]}, {"box_mm": [[5, -1, -1], [11, 11, 0.1]]})",
+       R"({"box_mm": [[-1, -1, -1], [11, 11, 0.1]], "axes": "xy"}, {"box_mm": [[-1, -1, -1], [11, 11, 0.1]], "axes": "z"})"}) {
+    std::string other = json;
+    const std::string whole = R"({"box_mm": [[-1, -1, -1], [11, 11, 0.1]]})";
+    other.replace(other.find(whole), whole.size(), fixed);
+    const Statics s = statics(body, body.on_all_points(parse_tissue_problem(other, mesh).loads[0]));
+    for (std::size_t q = 0; q < body.point_count(); ++q) EXPECT_LT(length(s.points_mm[q] - r.points_mm[q]), 1e-9);
+  }
 }
 
 }  // namespace

@@ -108,8 +108,8 @@ std::vector<std::uint32_t> FemBody::with_middles(std::span<const std::uint32_t> 
 TissueLoad FemBody::on_all_points(const TissueLoad& load) const {
   TissueLoad all = load;
   if (per_ == 4) return all;
-  all.fixed = with_middles(load.fixed);
   all.edge_forces_n.clear();
+  all.edges_held.clear();
   std::vector<std::uint8_t> held(corners_);
   const auto hold = [&](std::uint32_t p, std::uint8_t axes) {
     if (p < corners_) held[p] = static_cast<std::uint8_t>(held[p] | axes);
@@ -127,16 +127,22 @@ TissueLoad FemBody::on_all_points(const TissueLoad& load) const {
     const auto found = moved.find(p);
     return found != moved.end() ? found->second : std::pair<std::uint8_t, Vec3>{};
   };
+  std::map<std::array<std::uint32_t, 2>, std::uint8_t> left;
+  for (const auto& [edge, axes] : load.edges_held)
+    left[{std::min(edge[0], edge[1]), std::max(edge[0], edge[1])}] = axes;
   std::map<std::array<std::uint32_t, 2>, std::uint32_t> middle;
   for (std::size_t m = 0; m < middle_of_.size(); ++m) {
     const auto [a, b] = middle_of_[m];
     const auto point = static_cast<std::uint32_t>(corners_ + m);
-    const auto both = static_cast<std::uint8_t>(held[a] & held[b]);
+    auto both = static_cast<std::uint8_t>(held[a] & held[b]);
+    if (const auto l = left.find({std::min(a, b), std::max(a, b)}); l != left.end())
+      both = static_cast<std::uint8_t>(both & l->second);
     const auto [axes_a, by_a] = of(a);
     const auto [axes_b, by_b] = of(b);
     const auto goes = static_cast<std::uint8_t>(both & (axes_a | axes_b)),
                stays = static_cast<std::uint8_t>(both & ~goes);
     if (goes != 0) all.moved.push_back({point, goes, (by_a + by_b) * 0.5});
+    if (stays == 7) all.fixed.push_back(point);
     if (stays != 0 && stays != 7) all.sliders.push_back({point, stays});
     if (!load.edge_forces_n.empty()) middle[{std::min(a, b), std::max(a, b)}] = point;
   }

@@ -153,6 +153,7 @@ class ProblemReader {
   void read_fixed(const JsonValue& f, const std::string& where) {
     const Place in = place(f, where, {"axes"});
     const std::uint8_t axes = axes_of(f, where);
+    holding_.push_back({in, axes});
     std::size_t hit = 0;
     for (std::uint32_t p = 0; p < held_.size(); ++p) {
       if (!in(from_floats(mesh_.points_mm[p]))) continue;
@@ -187,8 +188,11 @@ class ProblemReader {
     each(items(l, "volumes", false), where + ", volume",
          [&](const JsonValue& v, const std::string& at) { add_volume(load, v, at); });
     if (const JsonValue* const g = l.find("gravity_m_s2"); g != nullptr) add_gravity(load, *g, where);
+    const std::size_t fixing = holding_.size();
     each(items(l, "moved", false), where + ", moved",
          [&](const JsonValue& m, const std::string& at) { add_moved(load, m, at); });
+    leave_middles(load);
+    holding_.resize(fixing);
     each(items(l, "contacts", false), where + ", contact",
          [&](const JsonValue& c, const std::string& at) { add_contact(load, c, at); });
     const JsonValue* const name = l.find("name");
@@ -278,6 +282,7 @@ class ProblemReader {
         throw file_.wrong(m, where + ": \"by_mm\" moves along an axis that \"axes\" leaves free",
                           "give 0 there, or name the axis");
     }
+    holding_.push_back({in, axes});
     std::size_t hit = 0;
     for (std::uint32_t p = 0; p < held_.size(); ++p) {
       if (!in(from_floats(mesh_.points_mm[p]))) continue;
@@ -288,6 +293,33 @@ class ProblemReader {
       ++hit;
     }
     if (hit == 0) throw file_.wrong(m, where + ": no point lies in it", kWhere);
+  }
+
+  // The middle of an edge is held by the places that it lies in: between two faces that are held, each by a place of
+  // its own, it is free.
+  void leave_middles(TissueLoad& load) const {
+    if (holding_.size() < 2) return;
+    std::vector<std::uint8_t> held(held_.size());
+    for (const std::uint32_t p : load.fixed) held[p] = 7;
+    for (const Slider& s : load.sliders) held[s.point] = static_cast<std::uint8_t>(held[s.point] | s.held);
+    for (const TissueLoad::Moved& m : load.moved) held[m.point] = static_cast<std::uint8_t>(held[m.point] | m.held);
+    std::vector<std::array<std::uint32_t, 2>> edges;
+    for (const auto& t : mesh_.tets) {
+      for (std::size_t i = 0; i < 4; ++i) {
+        for (std::size_t j = i + 1; j < 4; ++j) {
+          if ((held[t[i]] & held[t[j]]) != 0) edges.push_back({std::min(t[i], t[j]), std::max(t[i], t[j])});
+        }
+      }
+    }
+    std::sort(edges.begin(), edges.end());
+    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+    for (const auto& edge : edges) {
+      const Vec3 middle = (from_floats(mesh_.points_mm[edge[0]]) + from_floats(mesh_.points_mm[edge[1]])) * 0.5;
+      std::uint8_t axes = 0;
+      for (const auto& [in, along] : holding_) axes = static_cast<std::uint8_t>(axes | (in(middle) ? along : 0));
+      const auto both = static_cast<std::uint8_t>(held[edge[0]] & held[edge[1]]);
+      if ((both & ~axes) != 0) load.edges_held.push_back({edge, static_cast<std::uint8_t>(both & axes)});
+    }
   }
 
   void add_contact(TissueLoad& load, const JsonValue& c, const std::string& where) {
@@ -316,7 +348,9 @@ class ProblemReader {
   const Weight weight_;
   TissueProblem problem_;
   std::vector<bool> held_;  // along all axes
-  TriMesh boundary_;        // made when a surface is loaded
+  std::vector<std::pair<Place, std::uint8_t>>
+      holding_;       // places that are fixed, or that the load moves, with their axes
+  TriMesh boundary_;  // made when a surface is loaded
   std::vector<std::uint32_t> point_of_;
 };
 

@@ -63,8 +63,8 @@ class FemBody final : public Energy {
   /// Fixed corners, and of t10 also the points in the middle of edges between two of them.
   [[nodiscard]] std::vector<std::uint32_t> with_middles(std::span<const std::uint32_t> corners) const;
   /// A load on the mesh's points as one on all of the body's: also held are, of t10, the middles between two corners
-  /// that are (along the axes that both are, moved by the mean of their movements), and forces that act on edges go
-  /// there. Of t4 nothing changes.
+  /// that are (along the axes that both are and `edges_held` leaves, moved by the mean of their movements), and forces
+  /// that act on edges go there. Of t4 nothing changes.
   [[nodiscard]] TissueLoad on_all_points(const TissueLoad& load) const;
   /// Tetrahedra that are turned inside out (of t10: at a Gauss point).
   [[nodiscard]] std::size_t inverted(std::span<const Vec3> x) const;

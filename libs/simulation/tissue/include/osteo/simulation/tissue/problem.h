@@ -30,7 +30,9 @@ namespace osteo::inline simulation {
 ///
 /// Or an input file of Abaqus or CalculiX, with mm, N and MPa, whose mesh `mesh` is (load_tets): *ELASTIC or
 /// *HYPERELASTIC, NEO HOOKE by *SOLID SECTION; *BOUNDARY, within a *STEP with movements too; each *STEP a load of
-/// *CLOAD and *DLOAD (P1 to P4; GRAV, with *DENSITY), NLGEOM says which law.
+/// *CLOAD and *DLOAD (P1 to P4; GRAV, with *DENSITY), NLGEOM says which law. A step goes on from the one before: what it
+/// names replaces what acted there, the rest stays, unless OP=NEW. Pressures that would follow large displacements are
+/// an error.
 struct TissueProblem {
   Material general;                     ///< of what no region has
   std::vector<Material> materials;      ///< one a tetrahedron, or one for all

@@ -29,6 +29,13 @@ struct TissueLoad {
     Vec3 force_n;
   };
   std::vector<EdgeForce> edge_forces_n;
+  /// Edges both of whose ends are held, the middle along these axes alone: ends that different places hold, with what
+  /// is free between them. What is not here is held as both its ends are.
+  struct EdgeHeld {
+    std::array<std::uint32_t, 2> edge;
+    std::uint8_t held = 0;  ///< axes, as of Slider
+  };
+  std::vector<EdgeHeld> edges_held;
   /// Points that are held along some axes at another place than at rest.
   struct Moved {
     std::uint32_t point = 0;
