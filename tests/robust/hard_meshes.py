@@ -253,7 +253,10 @@ def check_skin(o, s, file, name, mesh, rng):
     moved = lambda p: (p - middle) @ turn.T + middle + by
     write_tets(o.path("m"), moved(points), tets)
     method = "frames" if rng.random() < 0.3 and len(s.triangles) < 50_000 else "embedded"
-    for what, deformed, wanted, most in (("at rest", "t", s.points, 1e-6), ("moved", "m", moved(s.points), 1e-5)):
+    size = max(size, float(np.abs(moved(s.points)).max()))
+    tries = (("at rest", "t", s.points, 1e-6), ("moved", "m", moved(s.points), 1e-5))
+    # What is off at rest is off when moved as well, mostly: one method in three is tried at rest.
+    for what, deformed, wanted, most in tries[0 if rng.random() < 0.34 else 1 :]:
         report, _ = o.run(
             "embed-surface", file, o.path("t.node"), o.path(deformed + ".node"), o.path("e.ply"), "--method", method
         )

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <queue>
-#include <tuple>
 #include <utility>
 
 #include "osteo/core/base/error.h"
@@ -98,10 +97,28 @@ OneWayDistance one_way(const TriangleSoup& from, const TriangleSoup& surface, co
     result.p95_mm = d;
     if (passed >= 0.95 * weight) break;
   }
-  // No sample may be farther than the maximum.
-  const auto farthest_sample =
-      std::max_element(worst.begin(), worst.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
-  std::tie(result.max_mm, result.worst_mm) = *farthest_sample;
+  // Corners, where an extreme usually is, and samples: none of them may be farther than the maximum.
+  std::vector<std::uint8_t> used(from.points_mm.size(), 0);
+  for (const auto& t : from.triangles) {
+    for (const auto v : t) used[v] = 1;
+  }
+  std::vector<double> at_point(used.size(), -1);
+  parallel_for(used.size(), 1024, context.threads, [&](std::size_t begin, std::size_t end) {
+    context.check_cancelled();
+    std::uint32_t hint = ClosestPoint::kNone;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (used[i] == 0) continue;
+      const ClosestPoint p = to.closest(from.points_mm[i], hint);
+      hint = p.triangle;
+      at_point[i] = p.distance_mm;
+    }
+  });
+  const auto corner_at = std::max_element(at_point.begin(), at_point.end());
+  result.max_mm = *corner_at;
+  result.worst_mm = from.points_mm[static_cast<std::size_t>(corner_at - at_point.begin())];
+  for (const auto& [d, x] : worst) {
+    if (d > result.max_mm) result.max_mm = d, result.worst_mm = x;
+  }
   const auto offer = [&](Vec3 x) {
     const ClosestPoint p = to.closest(x);
     if (p.distance_mm > result.max_mm) {
@@ -113,17 +130,13 @@ OneWayDistance one_way(const TriangleSoup& from, const TriangleSoup& surface, co
   const double tolerance = 1e-4 * extent;
   std::priority_queue<Piece> queue(std::less<Piece>(), std::move(pieces));
   std::uint64_t questions = 0, order = n;
-  // The first questions go on beyond the tolerance: an extreme in a corner is found exactly.
-  constexpr std::uint64_t kExact = 4000, kMost = 200000;
-  while (!queue.empty() && questions < kMost &&
-         queue.top().upper > result.max_mm + (questions < kExact ? 0 : tolerance)) {
+  while (!queue.empty() && queue.top().upper > result.max_mm + tolerance && questions < 200000) {
     if ((questions & 1023U) == 0) context.check_cancelled();
     const Piece q = queue.top();
     queue.pop();
-    // Corners first: an extreme is usually there. Then four triangles.
-    for (const Vec3 x : {q.a, q.b, q.c}) offer(x);
     const Vec3 ab = (q.a + q.b) * 0.5, bc = (q.b + q.c) * 0.5, ca = (q.c + q.a) * 0.5;
     const std::array<std::array<Vec3, 3>, 4> parts{{{q.a, ab, ca}, {ab, q.b, bc}, {ca, bc, q.c}, {ab, bc, ca}}};
+    for (const Vec3 x : {ab, bc, ca}) offer(x);  // the corners were asked when they were halves of edges
     for (const auto& part : parts) {
       const Vec3 m = (part[0] + part[1] + part[2]) / 3;
       const ClosestPoint p = offer(m);
