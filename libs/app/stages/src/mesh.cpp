@@ -232,7 +232,8 @@ std::vector<Data> MeshInfoStage::run(const Params& p, std::span<const Data> inpu
 #endif
   put("euler_characteristic", s.euler);
   put("area_mm2", s.area_mm2);
-  if (s.watertight) put("volume_mm3", s.volume_mm3);
+  if (s.watertight && s.non_finite_points == 0 && s.bad_indices == 0)
+    put("volume_mm3", inside_volume_mm3(soup_of(*surface), context));
   put("min_edge_mm", s.min_edge_mm);
   put("mean_edge_mm", s.mean_edge_mm);
   put("max_edge_mm", s.max_edge_mm);
@@ -269,7 +270,7 @@ std::vector<Data> MeshRepairStage::run(const Params& p, std::span<const Data> in
   context.report("watertight", c.watertight());
   context.report("manifold", c.manifold());
   context.report("triangles", static_cast<std::int64_t>(mesh.triangles.size()));
-  if (c.watertight()) context.report("volume_mm3", enclosed_volume_mm3(mesh));
+  if (c.watertight()) context.report("volume_mm3", inside_volume_mm3(soup_of(mesh), context));
   context.progress(1.0);
   return {std::make_shared<const TriMesh>(std::move(mesh))};
 }
