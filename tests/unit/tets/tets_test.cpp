@@ -219,6 +219,65 @@ TEST(TetFiles, ComeBackEqual) {
   std::filesystem::remove_all(folder);
 }
 
+TEST(Skin, PointsBesideFlatTetrahedraAreThemselves) {
+  // On top of a good tetrahedron lies a flat one; half a millimetre above it is a point of the surface.
+  TetMesh rest;
+  for (const Vec3 p : {Vec3{0, 0, 0}, Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0.2, 0.2, -1e-4}, Vec3{0.2, 0.2, -1}})
+    rest.points_mm.push_back(to_floats(p + Vec3{100, -50, 0}));
+  rest.tets = {{0, 2, 1, 3}, {0, 3, 1, 4}, {1, 3, 2, 4}, {2, 3, 0, 4}};
+  for (auto& t : rest.tets) {
+    const auto at = [&](std::size_t k) {
+      const auto& p = rest.points_mm[t[k]];
+      return Vec3{p[0], p[1], p[2]};
+    };
+    if (dot(cross(at(1) - at(0), at(2) - at(0)), at(3) - at(0)) < 0) std::swap(t[2], t[3]);
+  }
+  TriMesh surface;
+  for (const Vec3 p : {Vec3{100.3, -49.7, 0.5}, Vec3{100.6, -49.9, 0.5}, Vec3{100.1, -49.5, 0.5}})
+    surface.points_mm.push_back(to_floats(p));
+  surface.triangles = {{0, 1, 2}};
+  const Skin skin(surface, rest);
+  EXPECT_EQ(skin.outside(), 3u);
+  for (const double angle : {0.0, 0.7}) {
+    const double c = std::cos(angle), n = std::sin(angle);
+    const Mat3 turn{{Vec3{c, 0, n}, Vec3{0, 1, 0}, Vec3{-n, 0, c}}};
+    std::vector<std::array<float, 3>> points, out(3);
+    for (const auto& p : rest.points_mm) points.push_back(to_floats(turn * Vec3{p[0], p[1], p[2]}));
+    skin.apply(points, out);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto& p = surface.points_mm[i];
+      const Vec3 off = turn * Vec3{p[0], p[1], p[2]} - Vec3{out[i][0], out[i][1], out[i][2]};
+      EXPECT_LT(length(off), angle == 0 ? 1e-5 : 2e-4) << angle;  // 8e-6 mm is what a coordinate of 100 is rounded to
+    }
+  }
+}
+
+TEST(Skin, FramesWhereBodiesMeetInAPointMoveRigidly) {
+  // Two cubes with one corner in common: what their six faces there face cancels.
+  Frame frame;
+  frame.dims = {4, 4, 4};
+  frame.spacing_mm = {1, 1, 1};
+  VoxelBits two(frame);
+  two.words[two.row(1, 1)] |= 1U << 1;
+  two.words[two.row(2, 2)] |= 1U << 2;
+  const TetMesh rest = grid_tets(two);
+  TriMesh surface;
+  surface.points_mm = {{1.7F, 1.4F, 1.55F}, {1.4F, 1.6F, 1.5F}, {1.5F, 1.45F, 1.7F}};
+  surface.triangles = {{0, 1, 2}};
+  const Skin skin(surface, rest, {SkinMethod::frames, 5});
+  const double c = std::cos(0.7), n = std::sin(0.7);
+  const Mat3 about_z{{Vec3{c, n, 0}, Vec3{-n, c, 0}, Vec3{0, 0, 1}}},
+      about_x{{Vec3{1, 0, 0}, Vec3{0, c, n}, Vec3{0, -n, c}}};
+  const auto turned_round = [&](const std::array<float, 3>& p) { return about_z * (about_x * Vec3{p[0], p[1], p[2]}); };
+  std::vector<std::array<float, 3>> points, out(3);
+  for (const auto& p : rest.points_mm) points.push_back(to_floats(turned_round(p)));
+  skin.apply(points, out);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto& p = surface.points_mm[i];
+    EXPECT_LT(length(turned_round(p) - Vec3{out[i][0], out[i][1], out[i][2]}), 1e-5);
+  }
+}
+
 TEST(Skin, RestAndAffineMotionAreExact) {
   const TriangleSoup s = sphere(10, 4);
   const TriMesh skin_mesh = mesh_of(s);

@@ -2,6 +2,7 @@
 
 #include "osteo/core/base/json_document.h"
 #include "osteo/geometry/distance/compare.h"
+#include "osteo/geometry/distance/solid.h"
 #include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 
@@ -53,7 +54,10 @@ std::vector<Data> CompareStage::run(const Params& params, std::span<const Data> 
     j[p + "samples"] = d->samples;
   }
   for (const auto& [name, s] : {std::pair{"a", &a}, std::pair{"b", &b}}) {
-    if (is_closed(ordered(*s).soup)) put(std::string(name) + "_volume_mm3", enclosed_volume_mm3(mesh_of(*s)));
+    // By the rule of all stages: as it is where it closes, else with neighbours made to agree.
+    TriangleSoup closed = welded(*s);
+    if (!is_closed(closed)) closed = ordered(*s, context).soup;
+    if (is_closed(closed)) put(std::string(name) + "_volume_mm3", inside_volume_mm3(closed, context));
   }
   return {Document{j.dump(2) + "\n"}};
 }

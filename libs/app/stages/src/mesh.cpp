@@ -31,14 +31,16 @@ Error not_built(const std::string& what, const std::string& option) {
 
 [[maybe_unused]] constexpr double kMaxTets = 5e7;
 
-// Beyond this share of the surface's volume a mesh is another body.
+// Beyond this share of the surface's volume a mesh is another body: grid-conforming takes smaller cubes.
 constexpr double kVolumeOff = 0.05;
+// What is off by more than this is said.
+constexpr double kVolumeSaid = 0.02;
 
 void report_volume(double mesh_mm3, double surface_mm3, const Context& context) {
   context.report("surface_volume_mm3", surface_mm3);
   const double off = surface_mm3 > 0 ? mesh_mm3 / surface_mm3 - 1 : 0;
   context.report("volume_off_percent", std::round(1e4 * off) / 100);
-  if (std::abs(off) > kVolumeOff)
+  if (std::abs(off) > kVolumeSaid)
     context.warn("the tetrahedra fill " + format_number(std::round(10 * mesh_mm3) / 10) + " mm3, the surface " +
                  format_number(std::round(10 * surface_mm3) / 10) + ": " + format_number(std::round(1e3 * off) / 10) +
                  " %; choose a smaller spacing, or tetgen, which keeps the surface");
@@ -67,9 +69,12 @@ class StepCost {
     context_.report(name + "_area_percent", percent(area > 0 ? area_of(after) / area - 1 : 0));
     context_.report(name + "_hausdorff_mm", compare_surfaces(after, before_, context_).hausdorff_mm());
     said_ = format_number(percent(off)) + " % of the volume";
+    large_ = std::abs(off) > kVolumeSaid;
     return off < -kMaxLost || (!may_grow && off > kMaxLost);
   }
   [[nodiscard]] const std::string& said() const { return said_; }
+  // Worth a word although it is kept.
+  [[nodiscard]] bool large() const { return large_; }
 
  private:
   static constexpr double kMaxLost = 0.03;
@@ -77,6 +82,7 @@ class StepCost {
   double volume_;
   const Context& context_;
   std::string said_;
+  bool large_ = false;
 };
 
 // mesh-repair on plain values.
@@ -85,23 +91,21 @@ TriangleSoup repair(const TriMesh& mesh, const MeshRepairParams& p, const Contex
   RepairOptions options{p.weld_mm, true, p.min_body_area_mm2, p.keep_largest};
   options.turn_bodies = false;
   TriangleSoup soup = repaired(mesh, options, r, context.sub(0, 0.1));
-  const auto undo = [&](StepCost& cost, const std::string& step) {
-    if (p.allow_loss) {
-      context.warn(step + " changed " + cost.said() + ", and is kept as --allow-loss asks");
+  const auto keeps = [&](StepCost cost, const std::string& name, const std::string& step, const TriangleSoup& after,
+                         bool may_grow) {
+    const bool dear = cost.too_dear(name, after, may_grow);
+    if (dear && !p.allow_loss) {
+      context.warn(step + " would have changed " + cost.said() + " and was undone; --allow-loss keeps it");
       return false;
     }
-    context.warn(step + " would have changed " + cost.said() + " and was undone; --allow-loss keeps it");
+    if (dear) context.warn(step + " changed " + cost.said() + ", and is kept as --allow-loss asks");
+    if (!dear && cost.large()) context.warn(step + " changed " + cost.said());
     return true;
   };
   RepairReport turned;
   options.turn_bodies = true;
   TriangleSoup next = repaired(mesh, options, turned, context.sub(0.1, 0.2));
-  bool keep = true;
-  if (turned.turned_bodies > 0) {
-    StepCost cost(soup, context);
-    keep = !cost.too_dear("turning", next, false) || !undo(cost, "turning bodies round");
-  }
-  if (keep) {
+  if (turned.turned_bodies == 0 || keeps({soup, context}, "turning", "turning bodies round", next, false)) {
     soup = std::move(next);
     r = turned;
   }
@@ -118,12 +122,11 @@ TriangleSoup repair(const TriMesh& mesh, const MeshRepairParams& p, const Contex
   if (p.max_hole_edges > 0) {
     next = holes_closed(soup, p.max_hole_edges, c, context.sub(0.3, 0.5));
     if (c.holes_filled > 0) {
-      StepCost cost(soup, context);
-      if (cost.too_dear("holes", next, true) && undo(cost, "closing holes")) {
+      if (keeps({soup, context}, "holes", "closing holes", next, true)) {
+        soup = std::move(next);
+      } else {
         c.holes_left += c.holes_filled;
         c.holes_filled = 0;
-      } else {
-        soup = std::move(next);
       }
     }
     context.report("holes_filled", whole(c.holes_filled));
@@ -133,11 +136,10 @@ TriangleSoup repair(const TriMesh& mesh, const MeshRepairParams& p, const Contex
     try {
       next = intersections_resolved(soup, c, context.sub(0.5, 0.9));
       if (c.self_intersections_before > 0) {
-        StepCost cost(soup, context);
-        if (cost.too_dear("self_intersections", next, false) && undo(cost, "resolving self-intersections")) {
-          c.self_intersections_after = c.self_intersections_before;
-        } else {
+        if (keeps({soup, context}, "self_intersections", "resolving self-intersections", next, false)) {
           soup = std::move(next);
+        } else {
+          c.self_intersections_after = c.self_intersections_before;
         }
       }
     } catch (const Error& e) {
@@ -230,7 +232,8 @@ std::vector<Data> MeshInfoStage::run(const Params& p, std::span<const Data> inpu
 #endif
   put("euler_characteristic", s.euler);
   put("area_mm2", s.area_mm2);
-  if (s.watertight) put("volume_mm3", s.volume_mm3);
+  if (s.watertight && s.non_finite_points == 0 && s.bad_indices == 0)
+    put("volume_mm3", inside_volume_mm3(soup_of(*surface), context));
   put("min_edge_mm", s.min_edge_mm);
   put("mean_edge_mm", s.mean_edge_mm);
   put("max_edge_mm", s.max_edge_mm);
@@ -252,8 +255,8 @@ StageInfo MeshRepairStage::info() {
               "bounds the inside (by "
               "the winding number) stays. Holes and self-intersections need a build with CGAL. Each step is measured "
               "(volume, area, "
-              "Hausdorff distance); one that takes more than 3 % of the volume is undone. The report says what was "
-              "done and what is left.",
+              "Hausdorff distance); one that takes more than 3 % of the volume is undone, more than 2 % is said. The "
+              "report says what was done and what is left.",
           .inputs = {{"surface", {DataKind::surface}, "triangles"}},
           .outputs = {{"repaired", {DataKind::surface}, "the mended surface"}},
           .references = {"P. Liepa, Filling Holes in Meshes, SGP 2003", "CGAL 5.5, Polygon Mesh Processing",
@@ -267,7 +270,7 @@ std::vector<Data> MeshRepairStage::run(const Params& p, std::span<const Data> in
   context.report("watertight", c.watertight());
   context.report("manifold", c.manifold());
   context.report("triangles", static_cast<std::int64_t>(mesh.triangles.size()));
-  if (c.watertight()) context.report("volume_mm3", enclosed_volume_mm3(mesh));
+  if (c.watertight()) context.report("volume_mm3", inside_volume_mm3(soup_of(mesh), context));
   context.progress(1.0);
   return {std::make_shared<const TriMesh>(std::move(mesh))};
 }
@@ -287,7 +290,7 @@ StageInfo TetrahedralizeStage::info() {
               "their own. Whatever the "
               "method, inside is where the winding number is not zero: a shell that faces inward is a cavity, a body "
               "within another changes "
-              "nothing, overlaps count once. The volume is held against the surface's, with a warning beyond 5 %. "
+              "nothing, overlaps count once. The volume is held against the surface's, with a warning beyond 2 %. "
               "Reports a quality table: "
               "angles, "
               "aspect, volumes, conformity, and the distance of the boundary to the surface.",

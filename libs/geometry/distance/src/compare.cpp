@@ -1,8 +1,10 @@
 #include "osteo/geometry/distance/compare.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <queue>
+#include <utility>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
@@ -20,7 +22,23 @@ struct Piece {
   }
 };
 
-OneWayDistance one_way(const TriangleSoup& from, const TriangleTree& to, double extent, const Context& context) {
+// No point of a piece is farther from the surface than this, where `near` is what is nearest to its middle: it is
+// within reach of the middle; and the distance to one triangle is convex, so that it is largest at a corner.
+double farthest(const TriangleSoup& surface, const ClosestPoint& near, Vec3 middle,
+                const std::array<Vec3, 3>& corners) {
+  const auto& t = surface.triangles[near.triangle];
+  double reach = 0, convex = 0;
+  for (const Vec3 p : corners) {
+    reach = std::max(reach, length(p - middle));
+    convex = std::max(
+        convex,
+        closest_on_triangle(p, surface.points_mm[t[0]], surface.points_mm[t[1]], surface.points_mm[t[2]]).distance_mm);
+  }
+  return std::min(near.distance_mm + reach, convex);
+}
+
+OneWayDistance one_way(const TriangleSoup& from, const TriangleSoup& surface, const TriangleTree& to, double extent,
+                       const Context& context) {
   OneWayDistance result;
   const std::size_t n = from.triangles.size();
   std::vector<double> area(n);
@@ -39,6 +57,7 @@ OneWayDistance one_way(const TriangleSoup& from, const TriangleTree& to, double 
   }
   std::vector<std::pair<double, double>> samples(first[n]);  // distance, weight
   std::vector<Piece> pieces(n);
+  std::vector<std::pair<double, Vec3>> worst(n);  // sample of each triangle
   parallel_for(n, 512, context.threads, [&](std::size_t begin, std::size_t end) {
     context.check_cancelled();
     std::uint32_t hint = ClosestPoint::kNone;
@@ -49,14 +68,15 @@ OneWayDistance one_way(const TriangleSoup& from, const TriangleTree& to, double 
         double u = std::fmod(0.5 + 0.7548776662466927 * s, 1.0), v = std::fmod(0.5 + 0.5698402909980532 * s, 1.0);
         if (count[t] == 1) u = v = 1.0 / 3;
         if (u + v > 1) u = 1 - u, v = 1 - v;
-        const ClosestPoint p = to.closest(a + (b - a) * u + (c - a) * v, hint);
+        const Vec3 x = a + (b - a) * u + (c - a) * v;
+        const ClosestPoint p = to.closest(x, hint);
         hint = p.triangle;
         samples[first[t] + s] = {p.distance_mm, area[t] / count[t]};
+        if (s == 0 || p.distance_mm > worst[t].first) worst[t] = {p.distance_mm, x};
       }
       const Vec3 m = (a + b + c) / 3;
       const ClosestPoint p = to.closest(m, hint);
-      const double reach = std::max({length(a - m), length(b - m), length(c - m)});
-      pieces[t] = {a, b, c, p.distance_mm + reach, t};
+      pieces[t] = {a, b, c, farthest(surface, p, m, {a, b, c}), t};
     }
   });
   double sum = 0, squares = 0, weight = 0;
@@ -77,14 +97,35 @@ OneWayDistance one_way(const TriangleSoup& from, const TriangleTree& to, double 
     result.p95_mm = d;
     if (passed >= 0.95 * weight) break;
   }
-  result.max_mm = -1;
+  // Corners, where an extreme usually is, and samples: none of them may be farther than the maximum.
+  std::vector<std::uint8_t> used(from.points_mm.size(), 0);
+  for (const auto& t : from.triangles) {
+    for (const auto v : t) used[v] = 1;
+  }
+  std::vector<double> at_point(used.size(), -1);
+  parallel_for(used.size(), 1024, context.threads, [&](std::size_t begin, std::size_t end) {
+    context.check_cancelled();
+    std::uint32_t hint = ClosestPoint::kNone;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (used[i] == 0) continue;
+      const ClosestPoint p = to.closest(from.points_mm[i], hint);
+      hint = p.triangle;
+      at_point[i] = p.distance_mm;
+    }
+  });
+  const auto corner_at = std::max_element(at_point.begin(), at_point.end());
+  result.max_mm = *corner_at;
+  result.worst_mm = from.points_mm[static_cast<std::size_t>(corner_at - at_point.begin())];
+  for (const auto& [d, x] : worst) {
+    if (d > result.max_mm) result.max_mm = d, result.worst_mm = x;
+  }
   const auto offer = [&](Vec3 x) {
     const ClosestPoint p = to.closest(x);
     if (p.distance_mm > result.max_mm) {
       result.max_mm = p.distance_mm;
       result.worst_mm = x;
     }
-    return p.distance_mm;
+    return p;
   };
   const double tolerance = 1e-4 * extent;
   std::priority_queue<Piece> queue(std::less<Piece>(), std::move(pieces));
@@ -93,21 +134,18 @@ OneWayDistance one_way(const TriangleSoup& from, const TriangleTree& to, double 
     if ((questions & 1023U) == 0) context.check_cancelled();
     const Piece q = queue.top();
     queue.pop();
-    // Corners first: an extreme is usually there. Then four triangles.
-    for (const Vec3 x : {q.a, q.b, q.c}) offer(x);
     const Vec3 ab = (q.a + q.b) * 0.5, bc = (q.b + q.c) * 0.5, ca = (q.c + q.a) * 0.5;
     const std::array<std::array<Vec3, 3>, 4> parts{{{q.a, ab, ca}, {ab, q.b, bc}, {ca, bc, q.c}, {ab, bc, ca}}};
+    for (const Vec3 x : {ab, bc, ca}) offer(x);  // the corners were asked when they were halves of edges
     for (const auto& part : parts) {
       const Vec3 m = (part[0] + part[1] + part[2]) / 3;
-      const double d = offer(m);
-      const double upper =
-          std::min(q.upper, d + std::max({length(part[0] - m), length(part[1] - m), length(part[2] - m)}));
-      if (upper > result.max_mm + tolerance) queue.push({part[0], part[1], part[2], upper, order++});
+      const ClosestPoint p = offer(m);
+      const double upper = std::min(q.upper, farthest(surface, p, m, part));
+      if (upper > result.max_mm) queue.push({part[0], part[1], part[2], upper, order++});
     }
     questions += 7;
   }
-  if (result.max_mm < 0) offer(corner(0, 0));
-  result.max_bound_mm = std::max(result.max_mm + tolerance, queue.empty() ? 0.0 : queue.top().upper);
+  result.max_bound_mm = std::max(result.max_mm, queue.empty() ? 0.0 : queue.top().upper);
   return result;
 }
 
@@ -122,9 +160,9 @@ SurfaceComparison compare_surfaces(const TriangleSoup& a, const TriangleSoup& b,
   const double extent = length(both.hi - both.lo);
   SurfaceComparison result;
   context.progress(0.1, "comparing");
-  result.a_to_b = one_way(a, tree_b, extent, context);
+  result.a_to_b = one_way(a, b, tree_b, extent, context);
   context.progress(0.55);
-  result.b_to_a = one_way(b, tree_a, extent, context);
+  result.b_to_a = one_way(b, a, tree_a, extent, context);
   context.progress(1.0);
   return result;
 }

@@ -175,15 +175,15 @@ double inside_volume_mm3(const TriangleSoup& soup, const Context& context) {
   const Frame frame = frame_around(soup, kVoxels, 1);
   InsideReport report;
   const VoxelBits bits = voxels_inside(soup, frame, context, &report);
+  // Of bodies that cross nothing may be left, as a patch is judged by one place of it: then the surface is taken whole.
   const auto solid = solid_of(soup, context);
-  if (!solid) return 0;
   // The divergence theorem counts a place as often as the surface winds about it. What that is too much is counted in
   // voxels, so that only it is as coarse as these, and nothing where nothing overlaps. A surface that was sound is not
   // counted again.
   InsideReport of_solid = report;
   const bool untouched =
-      solid->buried == 0 && solid->turned == 0 && solid->soup.triangles.size() == whole.triangles.size();
-  const bool same = untouched || voxels_inside(solid->soup, frame, context, &of_solid).words == bits.words;
+      solid && solid->buried == 0 && solid->turned == 0 && solid->soup.triangles.size() == whole.triangles.size();
+  const bool same = solid && (untouched || voxels_inside(solid->soup, frame, context, &of_solid).words == bits.words);
   const TriangleSoup& used = same ? solid->soup : whole;
   return divergence(used) - static_cast<double>(same ? of_solid.surplus : report.surplus) * frame.voxel_volume_mm3();
 }

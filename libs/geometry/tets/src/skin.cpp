@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
@@ -97,6 +98,11 @@ bool barycentric(const TetMesh& mesh, std::uint32_t tet, Vec3 p, double w[4]) {
   return true;
 }
 
+Vec3 normal_of(std::span<const std::array<float, 3>> points, const std::array<std::uint32_t, 3>& t) {
+  const Vec3 a = vec(points[t[0]]);
+  return normalized(cross(vec(points[t[1]]) - a, vec(points[t[2]]) - a));
+}
+
 }  // namespace
 
 Skin::Skin(const TriMesh& surface, const TetMesh& rest, const SkinOptions& options, const Context& context)
@@ -163,7 +169,8 @@ void Skin::embed(const TriMesh& surface, const TetMesh& rest, const Context& con
   });
   outside_ = static_cast<std::size_t>(std::count(inside.begin(), inside.end(), 0));
   if (outside_ == 0) return;
-  // Outside: the tetrahedron behind the nearest boundary triangle, continued linearly.
+  // Outside: continued linearly from a tetrahedron at the nearest boundary triangle. Of those that touch it the one
+  // whose shares stay smallest: a flat or tiny one would multiply every rounding of its corners.
   std::vector<std::uint32_t> point_of;
   const TriMesh boundary = boundary_of(rest, &point_of);
   std::vector<std::uint32_t> first(rest.points_mm.size() + 1, 0);
@@ -184,15 +191,21 @@ void Skin::embed(const TriMesh& surface, const TetMesh& rest, const Context& con
       const ClosestPoint c = tree.closest(p, hint);
       hint = c.triangle;
       const auto& f = boundary.triangles[c.triangle];
-      const std::uint32_t u = point_of[f[0]], v = point_of[f[1]], w = point_of[f[2]];
-      for (std::uint32_t k = first[u]; k < first[u + 1]; ++k) {
-        const auto& t = rest.tets[around[k]];
-        if (std::find(t.begin(), t.end(), v) == t.end() || std::find(t.begin(), t.end(), w) == t.end()) continue;
-        double weights[4] = {0, 0, 0, 0};
-        if (!barycentric(rest, around[k], p, weights)) weights[0] = 1;
-        bind(i, around[k], weights);
-        break;
+      double least = std::numeric_limits<double>::infinity();
+      for (const std::uint32_t corner : f) {
+        const std::uint32_t u = point_of[corner];
+        for (std::uint32_t k = first[u]; k < first[u + 1]; ++k) {
+          double weights[4] = {0, 0, 0, 0};
+          if (!barycentric(rest, around[k], p, weights)) continue;
+          double most = 0;
+          for (const double x : weights) most = std::max(most, std::abs(x));
+          if (!(most < least)) continue;
+          least = most;
+          bind(i, around[k], weights);
+        }
       }
+      const double one[4] = {1, 0, 0, 0};
+      if (!(least < std::numeric_limits<double>::infinity())) bind(i, around[first[point_of[f[0]]]], one);
     }
   });
 }
@@ -200,10 +213,7 @@ void Skin::embed(const TriMesh& surface, const TetMesh& rest, const Context& con
 // x: the surface normal; y: the part of the first surface edge at right angles to it; z: x cross y.
 std::array<Vec3, 3> Skin::axes(const FrameOf& f, std::span<const std::array<float, 3>> points) const {
   Vec3 n;
-  for (std::uint32_t k = f.first; k < f.first + f.count; ++k) {
-    const Vec3 a = vec(points[fan_[k][0]]);
-    n += normalized(cross(vec(points[fan_[k][1]]) - a, vec(points[fan_[k][2]]) - a));
-  }
+  for (std::uint32_t k = f.first; k < f.first + f.count; ++k) n += normal_of(points, fan_[k]);
   n = normalized(n);
   const Vec3 e = vec(points[f.edge_to]) - vec(points[f.point]);
   Vec3 y = normalized(e - n * dot(e, n));
@@ -225,11 +235,26 @@ void Skin::frame(const TriMesh& surface, const TetMesh& rest, int neighbours) {
   for (std::uint32_t v = 0; v < n; ++v) {
     FrameOf f{point_of[v], point_of[v], static_cast<std::uint32_t>(fan_.size()),
               static_cast<std::uint32_t>(triangles[v].size())};
+    Vec3 sum;
     for (const std::uint32_t t : triangles[v]) {
       const auto& c = boundary.triangles[t];
       fan_.push_back({point_of[c[0]], point_of[c[1]], point_of[c[2]]});
-      for (const auto w : c) {
-        if (w != v && f.edge_to == f.point) f.edge_to = point_of[w];
+      sum += normal_of(points, fan_.back());
+    }
+    // Where parts of the surface meet in a point or an edge, their normals may cancel: then one triangle's counts.
+    if (length(sum) < 0.1) {
+      f.count = 1;
+      fan_.resize(f.first + 1);
+      sum = normal_of(points, fan_.back());
+    }
+    // The edge that is most at right angles to the normal: one along it gives no second axis.
+    const Vec3 up = normalized(sum);
+    double widest = -1;
+    for (const std::uint32_t t : triangles[v]) {
+      for (const auto w : boundary.triangles[t]) {
+        const Vec3 e = normalized(vec(points[point_of[w]]) - vec(points[f.point]));
+        const double wide = w == v ? -1 : length(cross(e, up));
+        if (wide > widest + 1e-9) widest = wide, f.edge_to = point_of[w];
       }
     }
     frames_.push_back(f);
@@ -287,11 +312,13 @@ void Skin::apply(std::span<const std::array<float, 3>> points, std::span<std::ar
                                      std::to_string(mesh_points_));
   }
   for (std::size_t i = 0; i < embeddings_.size(); ++i) {
+    // From one corner on: shares are rounded, and what they do not add up to is of an edge's length then, not of the
+    // distance to the origin.
     const Embedding& e = embeddings_[i];
-    for (std::size_t a = 0; a < 3; ++a) {
-      out[i][a] = e.w[0] * points[e.v[0]][a] + e.w[1] * points[e.v[1]][a] + e.w[2] * points[e.v[2]][a] +
-                  e.w[3] * points[e.v[3]][a];
-    }
+    const Vec3 a = vec(points[e.v[0]]);
+    Vec3 p = a;
+    for (std::size_t k = 1; k < 4; ++k) p += (vec(points[e.v[k]]) - a) * static_cast<double>(e.w[k]);
+    out[i] = to_floats(p);
   }
   if (frames_.empty()) return;
   std::vector<std::array<Vec3, 3>> now(frames_.size());
