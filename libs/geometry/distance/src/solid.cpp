@@ -177,6 +177,7 @@ double inside_volume_mm3(const TriangleSoup& soup, const Context& context) {
   const VoxelBits bits = voxels_inside(soup, frame, context, &report);
   // Of bodies that cross nothing may be left, as a patch is judged by one place of it: then the surface is taken whole.
   const auto solid = solid_of(soup, context);
+  if (!solid && std::all_of(bits.words.begin(), bits.words.end(), [](auto word) { return word == 0; })) return 0;
   // The divergence theorem counts a place as often as the surface winds about it. What that is too much is counted in
   // voxels, so that only it is as coarse as these, and nothing where nothing overlaps. A surface that was sound is not
   // counted again.
