@@ -56,12 +56,13 @@ RigidTransform placed(const Truth& t, const std::string& fragment) {
   return t.fragments[fragment == "back" ? 0 : 1].postop_from_ct;
 }
 
-// Screws off by up to 1 mm across, 1 mm deep and 5 degrees; the plate by up to 1 mm and 2 degrees.
-Done operation(std::uint64_t seed, const std::vector<PlannedScrew>& screws) {
+// Screws off by up to 1 mm across, 1 mm deep and 5 degrees; the plate by up to 1 mm and 2 degrees along and about each
+// axis. All of it times `share`.
+Done operation(std::uint64_t seed, const std::vector<PlannedScrew>& screws, double share = 1) {
   Done d;
   d.plan = world().advanced;
   d.plan.screws = screws;
-  d.truth = surgery(world(), d.plan, 1.5, 3, seed);
+  d.truth = surgery(world(), d.plan, 1.5 * share, 3 * share, seed);
   statistics::Random random(seed + 4000);
   for (const PlannedScrew& s : screws) {
     const Vec3 w = normalized(s.tip_mm - s.entry_mm), x = any_perpendicular(w), y = cross(w, x);
@@ -75,8 +76,32 @@ Done operation(std::uint64_t seed, const std::vector<PlannedScrew>& screws) {
   while (world().jaw.at(at) > 2.5) at -= out * 0.05;
   d.bar.rotation = {{e, cross(out, e), out}};
   d.bar.shift_mm = at;
-  d.bar_off = motion(at, uniform_vector(random, 1), uniform_vector(random, 2));
+  d.bar_off = motion(at, uniform_vector(random, share), uniform_vector(random, 2 * share));
   return d;
+}
+
+constexpr double kPlateShare = 0.4;  // fragments and plate together stay within what screws are looked for
+// A plate and the four screws through it, where it came to lie: off by what the plate and their fragment are off by.
+std::vector<TrueSolid> plated(Done& d, const BentBar& bar, bool screws) {
+  const RigidTransform there = d.truth.fragments[0].postop_from_ct * d.bar_off * d.bar;
+  d.plan.plates.push_back({"plate", bar.surface(d.bar)});
+  std::vector<TrueSolid> out{solid_of(bar, there)};
+  if (!screws) return out;
+  for (const double x : {-11.0, -6.0, 6.0, 11.0}) {
+    const double z = bar.rise * std::abs(x);
+    const Vec3 from{x, 0, z - bar.half_height}, to{x, 0, z - 9};
+    PlannedScrew s;
+    s.name = "at " + std::to_string(static_cast<int>(x));
+    s.fragment = x < 0 ? "back" : "front";
+    const RigidTransform planned = d.plan.fragments[x < 0 ? 0 : 1].planned_from_ct.inverse() * d.bar,
+                         real = placed(d.truth, s.fragment).inverse() * there;
+    s.entry_mm = planned(from);
+    s.tip_mm = planned(to);
+    d.plan.screws.push_back(s);
+    d.rods.push_back({real(from), real(to), s.diameter_mm});
+    out.push_back(solid_of(TrueRod{there(from + Vec3{0, 0, 2 * bar.half_height}), there(to), s.diameter_mm, 0.8}));
+  }
+  return out;
 }
 
 Image ct_of(const Done& d, const std::vector<TrueSolid>& more, const PostopCt& how, std::uint64_t seed,
@@ -257,27 +282,33 @@ TEST(OutcomeMetal, SaysWhatCannotBeKnown) {
   EXPECT_TRUE(o.screws[0].found && o.screws[1].found) << "cannot be known is not that nothing is there";
 }
 
-TEST(OutcomeMetal, FindsAPlate) {
-  Errors errors;
-  const BentBar bar;
-  for (const std::uint64_t seed : {1, 2}) {
-    Done d = operation(seed, {});
-    d.plan.plates.push_back({"plate", bar.surface(d.bar)});
-    const RigidTransform there = d.truth.fragments[0].postop_from_ct * d.bar_off * d.bar;
-    const Outcome o = measured(d.plan, ct_of(d, {solid_of(bar, there)}, {}, seed));
+// Alone, and with screws through it of which the shafts are found beneath it.
+TEST(OutcomeMetal, FindsAPlateAndScrewsThroughIt) {
+  Errors plates, screws;
+  for (const bool with : {false, true}) {
+    Done d = operation(with ? 12 : 1, {}, with ? kPlateShare : 1);
+    const auto more = plated(d, BentBar{}, with);
+    Done bare = d;
+    bare.rods.clear();  // they are in `more` already, with their heads
+    const Image ct = ct_of(bare, more, {}, 1);
+    const Outcome o = measured(d.plan, ct);
     ASSERT_FALSE(o.plates.empty());
     EXPECT_EQ(o.plates[0].against, "back");
-    EXPECT_TRUE(o.plates[0].pose.known) << o.plates[0].pose.why;
-    errors.add(o.plates[0].pose, d.bar_off);
     for (const PlateOutcome& p : o.plates) {
-      if (p.against == "front") errors.add(p.pose, d.truth.deviation[1].inverse() * d.bar_off);
+      EXPECT_TRUE(p.pose.known) << p.pose.why;
+      plates.add(p.pose, p.against == "back" ? d.bar_off : d.truth.deviation[1].inverse() * d.bar_off);
+    }
+    ASSERT_EQ(o.screws.size(), with ? 4U : 0U);
+    for (std::size_t n = 0; n < o.screws.size(); ++n) {
+      EXPECT_TRUE(o.screws[n].known) << o.screws[n].why;
+      screws.add(o.screws[n], d.plan.screws[n], d.rods[n]);
     }
   }
-  EXPECT_LT(most(errors.plate_mm), 0.3);
-  EXPECT_LT(most(errors.plate_deg), 0.5);
-  EXPECT_LT(errors.over_half(3), 0.8);
-  EXPECT_LT(errors.over_half(4), 0.8);
-  EXPECT_TRUE(errors.unknown == 0);
+  EXPECT_LT(most(plates.plate_mm), 0.3);
+  EXPECT_LT(most(plates.plate_deg), 0.5);
+  EXPECT_LT(most(screws.entry_mm), 0.3);
+  EXPECT_LT(most(screws.deg), 1.5);
+  for (int k = 3; k < 5; ++k) EXPECT_LT(plates.over_half(k), 0.8) << k;
 }
 
 TEST(OutcomeMetal, APlateThatIsNotThereIsNotKnown) {
@@ -316,21 +347,23 @@ TEST(OutcomeMetal, Benchmark) {
   for (int seed = first; seed <= last; ++seed) {
     for (int kind = 0; kind < 4; ++kind) {
       const auto s = static_cast<std::uint64_t>(seed + 1000 * kind);
-      Done d = operation(s, kind == 0 ? four_screws() : kind == 1 ? two_holes() : std::vector<PlannedScrew>{});
+      Done d = operation(s,
+                         kind == 0   ? four_screws()
+                         : kind == 1 ? two_holes()
+                                     : std::vector<PlannedScrew>{},
+                         kind == 3 ? kPlateShare : 1);
       PostopCt how;
       how.noise_hu = 30 + 10 * (seed % 4);
       how.spacing_mm = seed % 2 == 0 ? Vec3{0.6, 0.6, 0.75} : Vec3{0.45, 0.45, 1};
-      std::vector<TrueSolid> more;
-      if (kind >= 2) {
-        d.plan.plates.push_back({"plate", bar.surface(d.bar)});
-        const RigidTransform there = d.truth.fragments[0].postop_from_ct * d.bar_off * d.bar;
-        more.push_back(solid_of(bar, there));
-        for (const double x : {-11.0, -6.0, 6.0, 11.0})
-          if (kind == 3)
-            more.push_back(solid_of(
-                TrueRod{there({x, 0, 0.25 * std::abs(x) + 0.8}), there({x, 0, 0.25 * std::abs(x) - 9}), 2, 0.8}));
+      Image ct;
+      if (kind < 2) {
+        ct = ct_of(d, {}, how, s);
+      } else {
+        const auto more = plated(d, bar, kind == 3);
+        Done bare = d;
+        bare.rods.clear();
+        ct = ct_of(bare, more, how, s);
       }
-      const Image ct = ct_of(d, more, how, s);
       const auto start = std::clock();
       const Outcome o = measured(d.plan, ct);
       processor_s += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
@@ -361,9 +394,13 @@ TEST(OutcomeMetal, Benchmark) {
     }
     std::cout << std::flush;
   }
-  for (const Errors& e : all)
-    for (int n = 0; n < 5; ++n)
-      if (e.asked[n] > 0) EXPECT_GT(e.held[n] / static_cast<double>(e.asked[n]), 0.9) << n;
+  // 93 % and more, less two standard errors; values of one screw are taken for as good as one.
+  for (const Errors& e : all) {
+    for (int n = 0; n < 5; ++n) {
+      const double asked = std::max(1, e.asked[n]), share = e.asked[n] == 0 ? 1 : e.held[n] / asked;
+      EXPECT_GT(share, 0.93 - 2 * std::sqrt(0.95 * 0.05 * 3 / asked)) << n;
+    }
+  }
 }
 
 }  // namespace
