@@ -22,7 +22,7 @@ using planning::Row;
 
 constexpr double kSearchMm = 2.5, kSearchStepMm = 0.5, kSearchDeg = 15, kFarthestMm = 3, kFarthestDeg = 18;
 constexpr double kNearMetalMm = 4, kUnitHu = 100, kSoftHu = 40;
-constexpr double kHeadMm = 1;       // of the shaft below its head or plate that is not looked at
+constexpr double kHeadBlurs = 3.6;  // below its head or plate, which tilt it, a shaft is looked at from there on
 constexpr double kRingBlurs = 2.5;  // beyond its surface, the blur of a shaft has ended
 constexpr double kRingMm = 0.3;
 constexpr double kBrightShare = 0.8;  // of the HU of metal: what is brighter beside a shaft is no bone
@@ -34,7 +34,8 @@ constexpr double kKeptHu = 150;        // off by less than this, a voxel is neve
 constexpr double kBlurDoubtMm = 0.05;  // how well the blur of bone's edges is that of metal's
 // What the voxels' own scatter does not show: the kernel is not quite a Gaussian, the bone beside it not quite even.
 // With 0.015 mm and 0.15 degrees, intervals of entries held 87 %, those of tilts 90 %; with the latter, of holes 79 %.
-constexpr double kModelMm = 0.024, kModelDeg = 0.19, kHoleModelDeg = 0.7;
+// Streaks of a plate and of its other screws tilt a shaft further: beside one, tilts held 80 % with a factor of 1.
+constexpr double kModelMm = 0.02, kModelEndMm = 0.03, kModelDeg = 0.19, kHoleModelDeg = 0.7, kBesidePlate = 2.2;
 // A hole that ends in marrow or goes through shows no bottom; what there was taken for one was up to 1.6 mm off.
 constexpr double kBottomHu = 400, kBottomDoubt = 2;
 constexpr int kRounds = 25, kCoarseRounds = 3, kRing = 8;
@@ -92,6 +93,10 @@ struct RodFit {
   planning::Square<5> covariance{};                      ///< shift and tilt along the first two axes, tip
   double quantile = 0, seen = 0, shaft_mm = 0, off = 0;  ///< off: of the planned axis at the middle
   bool end_seen = true;
+  bool plated = false;  ///< other metal goes out from its head
+  [[nodiscard]] double model_tilt(bool empty) const {
+    return (empty ? kHoleModelDeg : plated ? kBesidePlate * kModelDeg : kModelDeg) * kDeg;
+  }
 };
 
 struct Wanted {
@@ -142,6 +147,7 @@ class Finder {
     const Vec3 near = w.planned.local(fit->rod.world({0, 0, fit->middle}));
     const double cos = dot(fit->rod.axes.column[2], w.planned.axes.column[2]);
     fit->off = portable::hypot(near.x, near.y);
+    fit->plated = !w.screw->empty && other_metal(w, *fit);
     fit->end_seen = !w.screw->empty || bottom_seen(w, fit->rod);
     if (fit->off <= kFarthestMm && portable::acos(std::clamp(cos, -1.0, 1.0)) <= kFarthestDeg * kDeg) return fit;
     why = "nothing like it is near the planned place";
@@ -277,6 +283,12 @@ class Finder {
     return std::nullopt;
   }
 
+  [[nodiscard]] bool other_metal(const Wanted& w, const RodFit& fit) const {
+    const Rod& r = fit.rod;
+    const auto all = ring(r, w.radius + kRingBlurs * r.blur + kRingMm, r.tip - std::min(fit.shaft_mm, w.length) - 0.8);
+    return std::count_if(all.begin(), all.end(), [&](double v) { return v > kBrightShare * metal_; }) > 2;
+  }
+
   [[nodiscard]] bool bottom_seen(const Wanted& w, const Rod& r) const {
     const double beside = w.radius + kRingBlurs * r.blur + kRingMm;
     for (const double s : {r.tip - 0.5, r.tip + 0.5}) {
@@ -354,7 +366,7 @@ class Finder {
           why = "the metal there is much shorter than the planned screw";
           return std::nullopt;
         }
-        top = r.tip - std::min(run, w.length) + kHeadMm;
+        top = r.tip - std::min(run, w.length) + kHeadBlurs * r.blur;
       }
       const auto all = sites(w, r, top, fit.seen);
       if (fit.seen < kMinSeen || all.size() < 40) {
@@ -474,9 +486,10 @@ void compare(ScrewOutcome& out, const Wanted& w, const RodFit& rod, const Fit& f
     Three sum = planning::carried<5, 3>(slope, rod.covariance);
     const auto moves = at_place(fragment, rod.rod.world({0, 0, s_mm}), back.rotation);
     const Three pose = planning::carried<7, 3>({moves[0], moves[1], moves[2]}, fragment.covariance);
+    const double tilt = rod.model_tilt(s.empty) * (s_mm - rod.middle), end_mm = end ? kModelEndMm : 0;
     for (std::size_t r = 0; r < 3; ++r) {
-      for (std::size_t c = 0; c < 3; ++c) sum[r][c] += pose[r][c];
-      sum[r][r] += kModelMm * kModelMm;
+      for (std::size_t c = 0; c < 3; ++c) sum[r][c] += pose[r][c] + (end_mm * end_mm - tilt * tilt) * axis[r] * axis[c];
+      sum[r][r] += kModelMm * kModelMm + tilt * tilt;
     }
     return sum;
   };
@@ -510,7 +523,7 @@ void compare(ScrewOutcome& out, const Wanted& w, const RodFit& rod, const Fit& f
     own[2] = dot(to_bone.column[0], out.axes[k]);
     own[3] = dot(to_bone.column[1], out.axes[k]);
     const Vec3 about = cross(axis, out.axes[k]);
-    const double model = (s.empty ? kHoleModelDeg : kModelDeg) * kDeg;
+    const double model = rod.model_tilt(s.empty);
     Row<7> turn{};
     for (std::size_t n = 0; n < 7; ++n) turn[n] = moves[3][n] * about.x + moves[4][n] * about.y + moves[5][n] * about.z;
     const double variance = planning::carried<5, 1>({own}, rod.covariance)[0][0] +
