@@ -94,7 +94,7 @@ _osteo() {
     register) flags="$flags --xml --describe --method --finest-mm --bone-hu --max-residual-mm --accept-poor --labels --findings-out --moved-out --labels-out --checkerboard-out" ;;
     plan-reconstruction) flags="$flags --xml --describe --target --a-mm --a-normal --b-mm --b-normal --down --max-segments --min-length-mm --max-contour-mm --kerf-mm --reserve-mm --structures --findings-out" ;;
     cutting-guide) flags="$flags --xml --describe --bone --planes --approach --slot --gap-mm --play-mm --wall-mm --margin-mm --depth-mm --seat --code --findings-out --cuts-out" ;;
-    outcome) flags="$flags --xml --describe --min-drop-hu --metal-hu --max-unsure-mm --max-unsure-deg --donor --page-out" ;;
+    outcome) flags="$flags --xml --describe --min-drop-hu --metal-hu --max-unsure-mm --max-unsure-deg --donor --plate --page-out" ;;
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --individual --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;

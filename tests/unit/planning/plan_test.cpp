@@ -63,6 +63,28 @@ TEST(Plan, WhatIsWrongIsNamed) {
   expect_error(with("\"bone\": \"fibula\"", "\"bone\": \"ulna\""), "not the fibula");
 }
 
+TEST(Plan, HoldsScrewsWhereThereAreAny) {
+  SurgicalPlan plan = example();
+  EXPECT_EQ(plan_json(plan).find("screws"), std::string::npos) << "files without them stay as they were";
+  plan.screws = {{"1", "chin", {1.0 / 3, 2, 3}, {1, 2, 11}, 2.4, false}, {"2", "segment 1", {}, {0, 6, 0}, 2, true}};
+  const std::string text = plan_json(plan);
+  EXPECT_EQ(plan_of(text, "p.json").screws, plan.screws);
+  EXPECT_EQ(plan_json(plan_of(text, "p.json")), text);
+  const auto changed = [&](const std::string& what, const std::string& instead) {
+    std::string s = text;
+    const auto at = s.find(what, s.find("\"screws\""));
+    EXPECT_NE(at, std::string::npos) << what;
+    return s.replace(at, what.size(), instead);
+  };
+  expect_error(changed("\"fragment\": \"chin\"", "\"fragment\": \"nose\""), "no fragment is called \"nose\"");
+  expect_error(changed("\"name\": \"2\"", "\"name\": \"1\""), "another \"1\"");
+  expect_error(changed("\"diameter_mm\": 2.4", "\"diameter_mm\": 24"), "diameter_mm");
+  expect_error(changed("\"empty\": false", "\"empty\": 0"), "empty");
+  expect_error(changed("\"empty\"", "\"hole\""), "hole");
+  plan.screws[1].tip_mm = plan.screws[1].entry_mm;
+  EXPECT_THROW(static_cast<void>(plan_json(plan)), Error) << "of no length";
+}
+
 TEST(Plan, IsNotWrittenWhereItCouldNotBeRead) {
   SurgicalPlan plan = example();
   plan.planes[0].normal = {1, 1, 0};

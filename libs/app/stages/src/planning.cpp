@@ -192,19 +192,26 @@ StageInfo OutcomeStage::info() {
   return {
       .name = "outcome",
       .version = 1,
-      .synopsis = "what came of a plan: fragments and cuts in a CT after surgery, with intervals",
+      .synopsis = "what came of a plan: fragments, cuts, screws and plates in a CT after surgery, with intervals",
       .description =
           "Finds each fragment of a plan in a CT after surgery by the edges of its surface, and each cut face where "
-          "the CT shows it. Deviations are from the plan, with the largest fragment that stays as the reference, each "
+          "the CT shows it. Screws and empty holes of the plan are compared within their fragment, a plate with each "
+          "fragment that it lies on. Deviations are from the plan, with the largest fragment that stays as the "
+          "reference, each "
           "with a 95 % interval. What the CT does not show is not known, with the reason: a face that lies upon "
-          "other bone, a fragment under metal. The CT must lie within about 20 mm and 12 degrees of the plan's; "
+          "other bone, a fragment under metal, screws that merge. The CT must lie within about 20 mm and 12 degrees of "
+          "the plan's; "
           "'register' brings it there. For research and training; no medical device.",
       .inputs = {{"plan", {DataKind::document}, "plan file"},
                  {"postop", {DataKind::image}, "CT after surgery"},
                  {"bone",
                   {DataKind::surface},
                   "closed surface of the bone that the plan names first, in the plan's CT"},
-                 {"donor", {DataKind::surface}, "closed surface of the plan's other bone", true}},
+                 {"donor", {DataKind::surface}, "closed surface of the plan's other bone", true},
+                 {"plate",
+                  {DataKind::surface},
+                  "closed surface of a metal plate where the plan has it: in the plan's CT, on the fragments as wanted",
+                  true}},
       .outputs = {{"outcome", {DataKind::document}, "deviations and intervals in JSON"},
                   {"page", {DataKind::document}, "one page to print, in HTML", true}},
       .references =
@@ -226,6 +233,23 @@ Json json_of(const std::array<Interval95, N>& all) {
   Json j = Json::list();
   for (const Interval95& m : all) j.push_back(json_of(m));
   return j;
+}
+
+Json json_of(const ScrewOutcome& s) {
+  Json one{{"name", s.name},           {"fragment", s.fragment}, {"empty", s.empty},
+           {"found", s.found},         {"known", s.known},       {"direction_known", s.direction_known},
+           {"tip_known", s.tip_known}, {"seen", s.seen}};
+  if (!s.why.empty()) one["why"] = s.why;
+  if (!(s.slides_along == Vec3{})) one["slides_along"] = osteo::json_of(s.slides_along);
+  if (s.known) one["entry_mm"] = json_of(s.entry_mm);
+  if (s.tip_known) one["tip_mm"] = json_of(s.tip_mm);
+  if (s.direction_known) {
+    one["tilt_deg"] = json_of(s.tilt_deg);
+    one["tilt_towards"] = Json::list();
+    for (const Vec3& a : s.axes) one["tilt_towards"].push_back(osteo::json_of(a));
+    one["angle_deg"] = s.angle_deg;
+  }
+  return one;
 }
 
 Json outcome_json(const Outcome& o) {
@@ -258,12 +282,68 @@ Json outcome_json(const Outcome& o) {
     }
     j["cuts"].push_back(std::move(one));
   }
+  if (!o.screws.empty()) j["screws"] = Json::list();
+  for (const ScrewOutcome& s : o.screws) j["screws"].push_back(json_of(s));
+  if (!o.plates.empty()) j["plates"] = Json::list();
+  for (const PlateOutcome& p : o.plates) {
+    Json one{{"name", p.pose.name}, {"against", p.against}, {"known", p.pose.known}, {"found", p.pose.found}};
+    if (!p.pose.known) one["why"] = p.pose.why;
+    if (p.pose.known) {
+      one["middle_mm"] = osteo::json_of(p.pose.middle_mm);
+      if (!(p.pose.slides_along == Vec3{})) one["slides_along"] = osteo::json_of(p.pose.slides_along);
+      one["shift_mm"] = json_of(p.pose.shift_mm);
+      one["turn_deg"] = json_of(p.pose.turn_deg);
+    }
+    j["plates"].push_back(std::move(one));
+  }
   return j;
 }
 
 std::string text_of(const Interval95& m) {
   const auto hundredths = [](double v) { return format_number(std::round(100 * v) / 100); };
   return hundredths(m.value) + " \u00b1 " + hundredths(m.half);
+}
+
+std::string text_of(const std::array<Interval95, 3>& all) {
+  return text_of(all[0]) + "; " + text_of(all[1]) + "; " + text_of(all[2]);
+}
+
+sheet::Cell plain(std::string text) {
+  return {std::move(text), Tone::plain};
+}
+sheet::Cell not_known(const std::string& why) {
+  return {"not known: " + why, Tone::caution};
+}
+
+sheet::Table screws_table(const std::vector<ScrewOutcome>& screws) {
+  sheet::Table t{{"Screw", "entry x, y, z (mm)", "tip x, y, z (mm)", "tilt (degrees)"}, {}, {0.16, 0.32, 0.32, 0.2}};
+  for (const ScrewOutcome& s : screws) {
+    std::string name = s.name + (s.empty ? " (empty hole)" : "");
+    if (!(s.slides_along == Vec3{})) name += " (not known along its fragment)";
+    if (!s.found || !(s.known || s.tip_known || s.direction_known)) {
+      t.rows.push_back({plain(name), s.found ? not_known(s.why) : sheet::Cell{"not found: " + s.why, Tone::caution},
+                        plain(""), plain("")});
+      continue;
+    }
+    t.rows.push_back(
+        {plain(name), s.known ? plain(text_of(s.entry_mm)) : not_known(s.why),
+         s.tip_known ? plain(text_of(s.tip_mm)) : not_known(s.why),
+         s.direction_known ? plain(text_of(s.tilt_deg[0]) + "; " + text_of(s.tilt_deg[1])) : not_known(s.why)});
+  }
+  return t;
+}
+
+sheet::Table plates_table(const std::vector<PlateOutcome>& plates) {
+  sheet::Table t{{"Plate against", "shift x, y, z (mm)", "turn x, y, z (degrees)"}, {}, {0.3, 0.35, 0.35}};
+  for (const PlateOutcome& p : plates) {
+    const bool slides = !(p.pose.slides_along == Vec3{});
+    std::string name = p.against + (slides ? " (not known along it)" : "");
+    if (p.pose.known)
+      t.rows.push_back({plain(name), plain(text_of(p.pose.shift_mm)), plain(text_of(p.pose.turn_deg))});
+    else
+      t.rows.push_back({plain(name), not_known(p.pose.why), plain("")});
+  }
+  return t;
 }
 
 std::string outcome_page(const Outcome& o) {
@@ -305,13 +385,24 @@ std::string outcome_page(const Outcome& o) {
   s.blocks.push_back({std::move(fragments)});
   s.blocks.push_back({sheet::Heading{"Cuts"}});
   s.blocks.push_back({std::move(cuts)});
+  if (!o.screws.empty()) {
+    s.blocks.push_back({sheet::Heading{"Screws"}});
+    s.blocks.push_back({screws_table(o.screws)});
+    s.blocks.push_back({sheet::Paragraph{
+        "Relative to the fragment that a screw is in. Entry: where its axis passes the planned place of entry, across "
+        "the planned axis."}});
+  }
+  if (!o.plates.empty()) {
+    s.blocks.push_back({sheet::Heading{"Plate"}});
+    s.blocks.push_back({plates_table(o.plates)});
+  }
   return sheet_html(s);
 }
 
 }  // namespace
 
 std::vector<Data> OutcomeStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
-  const SurgicalPlan plan = plan_of(std::get<Document>(inputs[0]).json, "the plan");
+  SurgicalPlan plan = plan_of(std::get<Document>(inputs[0]).json, "the plan");
   if (plan.planes.empty()) throw Error(ExitCode::usage, "the plan has no plane", "give a plan with cuts");
   std::vector<std::pair<std::string, TriangleSoup>> bones;
   const auto add = [&](const std::string& name, const Data& data) {
@@ -321,6 +412,8 @@ std::vector<Data> OutcomeStage::run(const Params& params, std::span<const Data> 
   add(first, inputs[2]);
   for (const CutPlane& p : plan.planes)
     if (p.bone != first && bones.size() == 1) add(p.bone, inputs[3]);
+  if (const auto* plate = std::get_if<Surface>(&inputs[4]))
+    plan.plates.push_back({"plate", compacted(welded(soup_of(**plate)))});
   const Outcome o = measure_outcome(plan, bones, std::get<Image>(inputs[1]), params, context);
   std::int64_t fragments = 0, cuts = 0;
   for (const FragmentOutcome& f : o.fragments) fragments += f.known ? 1 : 0;
@@ -329,6 +422,14 @@ std::vector<Data> OutcomeStage::run(const Params& params, std::span<const Data> 
   context.report("fragments", static_cast<std::int64_t>(o.fragments.size()));
   context.report("cuts_known", cuts);
   context.report("cuts", static_cast<std::int64_t>(o.cuts.size()));
+  const auto known = [](const auto& all, auto&& is) { return std::count_if(all.begin(), all.end(), is); };
+  if (!o.screws.empty()) {
+    context.report("screws_known", static_cast<std::int64_t>(known(o.screws, [](const auto& s) { return s.known; })));
+    context.report("screws", static_cast<std::int64_t>(o.screws.size()));
+  }
+  if (!o.plates.empty())
+    context.report("plate_known",
+                   static_cast<std::int64_t>(known(o.plates, [](const auto& p) { return p.pose.known; })));
   return {Document{outcome_json(o).dump(1) + "\n"}, Document{outcome_page(o)}};
 }
 

@@ -56,7 +56,8 @@ struct OutcomeStage {
   using Params = OutcomeParams;
   static void describe(Params& p, auto& visit) {
     visit({"min_drop_hu", "an edge of bone drops by at least this much", "HU", 20, 3000}, p.min_drop_hu);
-    visit({"metal_hu", "edges within 8 mm of voxels brighter than this are left out", "HU", 500, 32767}, p.metal_hu);
+    visit({"metal_hu", "what is brighter is metal; edges of bone within 8 mm of it are left out", "HU", 500, 32767},
+          p.metal_hu);
     visit(
         {"max_unsure_mm", "a result is not known where the half-width of its 95 % interval is larger", "mm", 0.01, 10},
         p.max_unsure_mm);

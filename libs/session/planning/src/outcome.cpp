@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <set>
 
 #include "edge_fit.h"
@@ -11,8 +9,8 @@
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
 #include "osteo/core/base/portable_math.h"
+#include "outcome_parts.h"
 #include "section.h"
-#include "solve.h"
 
 namespace osteo::inline session {
 namespace outcome {
@@ -22,10 +20,9 @@ using planning::EdgeReader;
 using planning::Equation;
 using planning::Row;
 using planning::Solved;
-using planning::Square;
 
-constexpr std::size_t kPlaces = 2000, kCoarsePlaces = 250;
-constexpr double kFromCutsMm = 2, kPatchMm = 8, kFaceStepMm = 0.6, kFaceRimMm = 0.8;
+constexpr std::size_t kCoarsePlaces = 250;
+constexpr double kPatchMm = 8, kFaceStepMm = 0.6, kFaceRimMm = 0.8;
 // Off by less than this, an edge is never left out. With 0.25 mm those beside another face or other bone stayed in, and
 // moved cuts by 0.02 mm and 0.15 degrees where noise did nothing.
 constexpr double kAlwaysKeptMm = 0.1;
@@ -34,101 +31,11 @@ constexpr double kAlwaysKeptMm = 0.1;
 constexpr std::size_t kFacePatches = 8;
 constexpr double kSmallestFacePatchMm = 4;
 constexpr double kFaceReachMm = 2.5, kFaceDropShare = 0.6, kRiseShare = 0.15, kMinFaceSeen = 0.12;
-constexpr double kMinFound = 0.35, kBrighterHu = 150, kMetalMm = 8;
+constexpr double kBrighterHu = 150, kMetalMm = 8;
 // Where edges say nothing, a pose stays where it is wanted: a shaft slides in its own surface. Weights against those of
 // 2000 edges: what these do say is moved by less than a thousandth.
 constexpr Row<7> kHold{0.01, 0.01, 0.01, 0.5, 0.5, 0.5, 0};
-constexpr double kDeg = std::numbers::pi / 180;
 constexpr int kRounds = 40, kSettleRounds = 4;
-
-struct SurfacePlace {
-  Vec3 at, normal;
-};
-
-bool behind(const std::vector<const CutPlane*>& planes, Vec3 p, double by) {
-  return std::all_of(planes.begin(), planes.end(), [&](const CutPlane* c) {
-    return dot(p - c->at_mm, c->normal) * (c->waste_ahead ? 1 : -1) <= -by;
-  });
-}
-
-// Triangles of what stays: behind the planes, and in one piece with what is nearest to the first one's place. Planes go
-// on beyond the bone's section: behind one across the left of a jaw also lies the right ramus, which is another's.
-std::vector<bool> part(const TriangleSoup& bone, const std::vector<const CutPlane*>& planes) {
-  std::vector<std::uint32_t> piece(bone.points_mm.size());
-  for (std::size_t n = 0; n < piece.size(); ++n) piece[n] = static_cast<std::uint32_t>(n);
-  const auto root = [&](std::uint32_t n) {
-    while (piece[n] != n) n = piece[n] = piece[piece[n]];
-    return n;
-  };
-  std::vector<bool> in(bone.triangles.size());
-  double nearest = std::numeric_limits<double>::infinity();
-  std::uint32_t wanted = 0;
-  for (std::size_t n = 0; n < in.size(); ++n) {
-    const auto& t = bone.triangles[n];
-    const Vec3 middle = (bone.points_mm[t[0]] + bone.points_mm[t[1]] + bone.points_mm[t[2]]) / 3;
-    in[n] = behind(planes, middle, kFromCutsMm);
-    if (!in[n]) continue;
-    piece[root(t[1])] = root(t[0]);
-    piece[root(t[2])] = root(t[0]);
-    const double mm = planes.empty() ? 0 : length(middle - planes[0]->at_mm);
-    if (mm >= nearest) continue;
-    nearest = mm;
-    wanted = t[0];
-  }
-  for (std::size_t n = 0; n < in.size(); ++n) in[n] = in[n] && root(bone.triangles[n][0]) == root(wanted);
-  return in;
-}
-
-// Spread over the area of what stays, by the golden ratio; the same every time.
-std::vector<SurfacePlace> spread(const TriangleSoup& bone, const std::vector<const CutPlane*>& planes) {
-  std::vector<double> until;
-  std::vector<std::size_t> of;
-  double sum = 0;
-  const std::vector<bool> in = part(bone, planes);
-  for (std::size_t n = 0; n < bone.triangles.size(); ++n) {
-    if (!in[n]) continue;
-    const auto& t = bone.triangles[n];
-    const Vec3 a = bone.points_mm[t[0]], b = bone.points_mm[t[1]], c = bone.points_mm[t[2]];
-    until.push_back(sum += length(cross(b - a, c - a)) / 2);
-    of.push_back(n);
-  }
-  std::vector<SurfacePlace> out;
-  for (std::size_t n = 0; n < kPlaces && sum > 0; ++n) {
-    const double at = sum * (static_cast<double>(n) + 0.5) / static_cast<double>(kPlaces);
-    const auto& t = bone.triangles[of[static_cast<std::size_t>(
-        std::min(std::lower_bound(until.begin(), until.end(), at) - until.begin(),
-                 static_cast<std::ptrdiff_t>(of.size()) - 1))]];
-    double u = std::fmod(static_cast<double>(n) * 0.7548776662466927, 1.0);
-    double v = std::fmod(static_cast<double>(n) * 0.5698402909980532, 1.0);
-    if (u + v > 1) {
-      u = 1 - u;
-      v = 1 - v;
-    }
-    const Vec3 a = bone.points_mm[t[0]], b = bone.points_mm[t[1]], c = bone.points_mm[t[2]];
-    out.push_back({a + (b - a) * u + (c - a) * v, normalized(cross(b - a, c - a))});
-  }
-  return out;
-}
-
-struct Fit {
-  RigidTransform pose;  ///< the CT after surgery from the bone's
-  double offset = 0;    ///< what all edges lie further out
-  Vec3 middle;          ///< about which the pose's error turns, in the CT after surgery
-  Square<7> covariance{};
-  double quantile = 0, rms = 0, found = 0, drop = 0, blur = 0, beyond = 0;
-};
-
-RigidTransform small_motion(Vec3 about, Vec3 shift, Vec3 turn) {
-  RigidTransform r = length(turn) > 0 ? rotation_about(about, normalized(turn), length(turn)) : RigidTransform{};
-  r.shift_mm += shift;
-  return r;
-}
-
-Vec3 rotation_vector(const Mat3& m) {
-  const Vec3 twice{m.column[1].z - m.column[2].y, m.column[2].x - m.column[0].z, m.column[0].y - m.column[1].x};
-  const double sin = length(twice) / 2, cos = (m.column[0].x + m.column[1].y + m.column[2].z - 1) / 2;
-  return sin < 1e-15 ? Vec3{} : twice * (portable::atan2(sin, cos) / (2 * sin));
-}
 
 // How well edges are met: the mean drop across the surface.
 double coarse_score(const EdgeReader& ct, const std::vector<SurfacePlace>& places, const RigidTransform& pose) {
@@ -139,18 +46,6 @@ double coarse_score(const EdgeReader& ct, const std::vector<SurfacePlace>& place
     if (in && out) sum += std::clamp(*in - *out, -1000.0, 1000.0);
   }
   return sum;
-}
-
-double median_of(std::vector<double> v) {
-  if (v.empty()) return 0;
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return *middle;
-}
-
-std::array<int, 3> patch_of(Vec3 p, double size) {
-  const auto whole = [&](double v) { return static_cast<int>(std::floor(v / size)); };
-  return {whole(p.x), whole(p.y), whole(p.z)};
 }
 
 // Edges upon the surface by least squares over turn, shift and offset; the reach shrinks, and what is off by more than
@@ -257,53 +152,6 @@ std::optional<Fit> located(const EdgeReader& ct, const std::vector<SurfacePlace>
       best = std::move(fit);
   }
   return best;
-}
-
-// The shift and turn of a place under a pose's error, from its unknowns, in other axes.
-std::array<Row<7>, 6> at_place(const Fit& fit, Vec3 place, const Mat3& axes) {
-  std::array<Row<7>, 6> out{};
-  for (std::size_t k = 0; k < 6; ++k) {
-    Vec3 shift, turn;
-    (k < 3 ? shift : turn)[k % 3] = 1;
-    const Vec3 moved = axes * (shift + cross(turn, place - fit.middle)), turned = axes * turn;
-    for (std::size_t r = 0; r < 3; ++r) {
-      out[r][k] = moved[r];
-      out[r + 3][k] = turned[r];
-    }
-  }
-  return out;
-}
-
-void deviation(FragmentOutcome& out, const PlannedFragment& planned, const Fit& fit, const Fit& reference,
-               const OutcomeParams& params) {
-  const RigidTransform back = reference.pose.inverse();
-  const RigidTransform d = back * fit.pose * planned.planned_from_ct.inverse();
-  const Vec3 place = fit.pose(planned.planned_from_ct.inverse()(out.middle_mm));
-  Vec3 shift = d(out.middle_mm) - out.middle_mm;
-  const Vec3 turn = rotation_vector(d.rotation);
-  const auto own = planning::carried<7, 6>(at_place(fit, place, back.rotation), fit.covariance);
-  const auto other = planning::carried<7, 6>(at_place(reference, place, back.rotation), reference.covariance);
-  const double quantile = std::max(fit.quantile, reference.quantile);
-  std::array<std::array<double, 3>, 3> shifts{};
-  for (std::size_t r = 0; r < 3; ++r)
-    for (std::size_t c = 0; c < 3; ++c) shifts[r][c] = own[r][c] + other[r][c];
-  const auto half_along = [&](Vec3 a) {
-    double sum = 0;
-    for (std::size_t r = 0; r < 3; ++r)
-      for (std::size_t c = 0; c < 3; ++c) sum += a[r] * shifts[r][c] * a[c];
-    return quantile * std::sqrt(std::max(0.0, sum));
-  };
-  const Mat3 axes = planning::principal_axes(shifts);
-  if (half_along(axes.column[0]) > params.max_unsure_mm && half_along(axes.column[1]) <= params.max_unsure_mm) {
-    out.slides_along = axes.column[0];
-    shift = shift - out.slides_along * dot(shift, out.slides_along);
-  }
-  for (std::size_t k = 0; k < 3; ++k) {
-    Vec3 axis;
-    axis[k] = 1;
-    out.shift_mm[k] = {shift[k], half_along(axis - out.slides_along * out.slides_along[k])};
-    out.turn_deg[k] = {turn[k] / kDeg, quantile * std::sqrt(own[k + 3][k + 3] + other[k + 3][k + 3]) / kDeg};
-  }
 }
 
 bool within(const std::vector<planning::Loop>& loops, const planning::Point2& p) {
@@ -509,6 +357,8 @@ Outcome measure_outcome(const SurgicalPlan& plan, const std::vector<std::pair<st
         c.why = "the fragment's surface does not show where along itself it lies, so not where it was cut";
     }
   }
+  outcome::find_screws(out, plan, fits, ct, postop, params, context);
+  outcome::find_plates(out, plan, fits, places, ct, postop, params, context);
   return out;
 }
 

@@ -13,9 +13,11 @@ namespace osteo::inline session {
 namespace {
 
 constexpr double kUnitTolerance = 1e-9, kMaxMm = 10000, kMaxKerfMm = 10;
-const std::vector<std::string> kRootKeys{"osteotome_surgical_plan", "unit", "planes", "fragments"};
+const std::vector<std::string> kRootKeys{"osteotome_surgical_plan", "unit", "planes", "fragments", "screws"};
 const std::vector<std::string> kPlaneKeys{"name", "bone", "at_mm", "normal", "kerf_mm", "waste_ahead"};
 const std::vector<std::string> kFragmentKeys{"name", "bone", "planes", "rotation_rows", "shift_mm"};
+const std::vector<std::string> kScrewKeys{"name", "fragment", "entry_mm", "tip_mm", "diameter_mm", "empty"};
+constexpr double kShortestScrewMm = 1, kLongestScrewMm = 200, kThinnestScrewMm = 0.3, kThickestScrewMm = 12;
 
 class PlanReader {
  public:
@@ -49,6 +51,8 @@ class PlanReader {
     }
     for (const JsonValue& v : file_.list(file_.need(root, "", "fragments"), "\"fragments\""))
       plan.fragments.push_back(fragment(v, plan));
+    if (const JsonValue* screws = root.find("screws"))
+      for (const JsonValue& v : file_.list(*screws, "\"screws\"")) plan.screws.push_back(screw(v, plan));
     return plan;
   }
 
@@ -84,6 +88,29 @@ class PlanReader {
       throw file_.wrong(rows_at, where + ": \"rotation_rows\" mirrors", "a fragment can be turned, not mirrored");
     f.planned_from_ct.shift_mm = triple(file_.need(v, where, "shift_mm"), where + " \"shift_mm\"", kMaxMm);
     return f;
+  }
+
+  PlannedScrew screw(const JsonValue& v, const SurgicalPlan& plan) const {
+    const std::string where = "screw " + std::to_string(plan.screws.size() + 1);
+    file_.allow(v, where, kScrewKeys);
+    PlannedScrew s;
+    s.name = name_of(v, where, "name");
+    require_new(v, where, s.name, plan.screws);
+    s.fragment = name_of(v, where, "fragment");
+    if (std::none_of(plan.fragments.begin(), plan.fragments.end(), [&](const auto& f) { return f.name == s.fragment; }))
+      throw file_.wrong(v, where + ": no fragment is called \"" + s.fragment + "\"");
+    s.entry_mm = triple(file_.need(v, where, "entry_mm"), where + " \"entry_mm\"", kMaxMm);
+    const JsonValue& tip = file_.need(v, where, "tip_mm");
+    s.tip_mm = triple(tip, where + " \"tip_mm\"", kMaxMm);
+    const double mm = length(s.tip_mm - s.entry_mm);
+    if (!(mm >= kShortestScrewMm && mm <= kLongestScrewMm))
+      throw file_.wrong(tip, where + ": from \"entry_mm\" to \"tip_mm\" must be 1 to 200 mm");
+    s.diameter_mm = file_.number(file_.need(v, where, "diameter_mm"), where + " \"diameter_mm\"", kThinnestScrewMm,
+                                 kThickestScrewMm);
+    const JsonValue& empty = file_.need(v, where, "empty");
+    if (empty.kind != JsonValue::Kind::flag) throw file_.wrong(empty, where + ": \"empty\" is neither true nor false");
+    s.empty = empty.flag;
+    return s;
   }
 
   std::string name_of(const JsonValue& object, const std::string& where, std::string_view key) const {
@@ -145,6 +172,14 @@ std::string plan_json(const SurgicalPlan& plan) {
     out.back()["rotation_rows"] = std::move(rows);
     out.back()["shift_mm"] = json_of(f.planned_from_ct.shift_mm);
   }
+  if (!plan.screws.empty()) j["screws"] = Json::list();
+  for (const PlannedScrew& s : plan.screws)
+    j["screws"].push_back({{"name", s.name},
+                           {"fragment", s.fragment},
+                           {"entry_mm", json_of(s.entry_mm)},
+                           {"tip_mm", json_of(s.tip_mm)},
+                           {"diameter_mm", s.diameter_mm},
+                           {"empty", s.empty}});
   std::string text = j.dump(1) + "\n";
   static_cast<void>(plan_of(text, "the plan"));
   return text;

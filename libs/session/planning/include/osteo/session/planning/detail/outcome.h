@@ -52,9 +52,34 @@ struct CutOutcome {
   double seen = 0;                     ///< share of the face at which the CT shows it
 };
 
+/// A screw or an empty hole against the plan, relative to the fragment that it is in, in the CT of that one's bone.
+struct ScrewOutcome {
+  std::string name, fragment;
+  bool empty = false;  ///< the plan has a hole without a screw
+  bool found = true;   ///< false: the CT shows that nothing like it is near the planned place
+  bool known = false;  ///< where it enters
+  bool direction_known = false, tip_known = false;
+  std::string why;                     ///< of the first of these that is not known
+  std::array<Interval95, 3> entry_mm;  ///< where its axis passes the planned entry, across the planned axis
+  std::array<Interval95, 3> tip_mm;    ///< of the axis' end
+  std::array<Interval95, 2> tilt_deg;  ///< of its axis, towards two directions across the planned one
+  std::array<Vec3, 2> axes;            ///< these
+  double angle_deg = 0;                ///< between both axes
+  Vec3 slides_along;                   ///< as of its fragment: places along it are not known
+  double seen = 0;                     ///< share of its surface that other metal leaves to be seen
+};
+
+/// A plate against a fragment: against the reference as the plan has it, against another where that one came to lie.
+struct PlateOutcome {
+  std::string against;
+  FragmentOutcome pose;  ///< its name is the plate's; `edge_mm` is not set
+};
+
 struct Outcome {
   std::vector<FragmentOutcome> fragments;  ///< as in the plan
   std::vector<CutOutcome> cuts;            ///< of each fragment each plane
+  std::vector<ScrewOutcome> screws;        ///< as in the plan
+  std::vector<PlateOutcome> plates;        ///< of each plate the reference, and each fragment within 5 mm of it
 };
 
 /// `bones`: names as in the plan, and surfaces in the CT of the plan. The reference is the largest fragment that the
@@ -69,7 +94,15 @@ struct Outcome {
 /// or it is brighter there than beside the bone's surface, it is left out. A face that lies upon another fragment shows
 /// no edge, and then is not known. Intervals: errors of edges within 8 mm are alike, so each such patch is left out in
 /// turn (J. MacKinnon, H. White, Journal of Econometrics 1985), with Student's quantile; of a cut face, patches of at
-/// most 8 mm, as large as leaves eight of them. The pose's part is in that of the cuts. Errors: usage: a bone that is
+/// most 8 mm, as large as leaves eight of them. The pose's part is in that of the cuts.
+///
+/// A screw is looked for within 2.5 mm and 15 degrees of where the plan has it in its fragment, a plate within 3 mm and
+/// 4 degrees of where the reference has it. Its blurred shape, over what lies beside it, is held against the voxels by
+/// least squares: pose, brightness and blur, cut off where the CT is; sectors with other metal beside them are left
+/// out. Two planned screws are never found in one. An empty hole is the same in dark. Intervals as above, with the
+/// fragment's pose in them.
+///
+/// Errors: usage: a bone that is
 /// missing, no fragment that stays; failed: the reference is not found. Same bytes for any number of threads.
 [[nodiscard]] Outcome measure_outcome(const SurgicalPlan& plan,
                                       const std::vector<std::pair<std::string, TriangleSoup>>& bones,

@@ -28,9 +28,26 @@ struct PlannedFragment {
   RigidTransform planned_from_ct;   ///< from where it lies in its CT to where it is wanted
 };
 
+/// A screw, or a hole that is drilled and left empty, in LPS mm of the CT of its fragment's bone.
+struct PlannedScrew {
+  std::string name, fragment;
+  Vec3 entry_mm, tip_mm;  ///< of its axis: where the bone begins, and the end of the shaft or of the hole
+  double diameter_mm = 2;
+  bool empty = false;  ///< a hole without a screw
+  friend bool operator==(const PlannedScrew&, const PlannedScrew&) = default;
+};
+
+/// Where the fragments are wanted, in the plan's CT. Not in the plan's file: a surface has a file of its own.
+struct PlannedPlate {
+  std::string name;
+  TriangleSoup surface;  ///< closed
+};
+
 struct SurgicalPlan {
   std::vector<CutPlane> planes;
   std::vector<PlannedFragment> fragments;
+  std::vector<PlannedScrew> screws;
+  std::vector<PlannedPlate> plates;
   [[nodiscard]] const CutPlane& plane(std::string_view name) const;  ///< Error(usage) with the names there are
 };
 
@@ -38,9 +55,13 @@ struct SurgicalPlan {
 ///   "planes": [ {"name": "a", "bone": "mandible", "at_mm": [x, y, z], "normal": [0, 0, 1], "kerf_mm": 1,
 ///                "waste_ahead": true} ],
 ///   "fragments": [ {"name": "segment 1", "bone": "fibula", "planes": ["b", "c"],
-///                   "rotation_rows": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "shift_mm": [x, y, z]} ] }
+///                   "rotation_rows": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "shift_mm": [x, y, z]} ],
+///   "screws": [ {"name": "1", "fragment": "segment 1", "entry_mm": [x, y, z], "tip_mm": [x, y, z],
+///                "diameter_mm": 2, "empty": false} ] }
+/// `screws` may be left out, and is where there are none.
 /// Errors: usage, with file and line: another unit, unknown keys, ranges, a normal that is not of unit length, a
-/// rotation that is not one (to 1e-9), two of one name, a plane that is not there or of another bone. `name`: the
+/// rotation that is not one (to 1e-9), two of one name, a plane that is not there or of another bone, a screw of no
+/// fragment or of no length. `name`: the
 /// file, as errors call it.
 [[nodiscard]] SurgicalPlan plan_of(std::string_view text, const std::string& name);
 /// What plan_of reads as the same, to the last bit. Errors as of plan_of, so that no plan is written that cannot be
