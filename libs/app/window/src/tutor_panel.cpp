@@ -270,6 +270,8 @@ void TutorPanel::draw(const TutorNow& now, const std::vector<TickRecord>& hands,
   if (wide < 120 * u) return;
   ImGui::SetNextWindowPos({area.x + (area.width - wide) / 2, area.y + 16 * u}, ImGuiCond_Always);
   ImGui::SetNextWindowSize({wide, 0}, ImGuiCond_Always);
+  // As high as what it says, and no higher than the picture: then it is scrolled.
+  ImGui::SetNextWindowSizeConstraints({wide, 0}, {wide, std::max(64 * u, area.height - 32 * u)});
   ImGui::SetNextWindowBgAlpha(0.94F);
   ImGui::Begin("tutoring", nullptr,
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |

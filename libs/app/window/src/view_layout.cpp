@@ -10,7 +10,8 @@ namespace {
 
 // Of the design, docs/design/window.md, in pixels at scale 1.
 constexpr float kStrip = 56, kState = 64, kInset = 16, kCutGap = 8, kGrid = 8, kChoice = 40, kPage = 544, kSide = 288;
-constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kSideWide = 960, kMinCut = 96, kMaxCut = 272;
+constexpr float kThreeCutsWide = 1200, kPlanWide = 832, kPlanHigh = 544, kSideWide = 960, kMinCut = 96, kMaxCut = 272,
+                kBesideCut = 208;
 // Below the cuts' foot the scale bar, with what the microscope says above it where there is room beside it.
 constexpr float kScaleHigh = 80, kBarHigh = 48;
 // With less width than this a state has two rows, and beside a list four pictures need less height.
@@ -130,6 +131,8 @@ ScreenBox take_column(ViewLayout& layout, float wide) {
     layout.view.width -= wide;
     // One cut beside a column: the bone has the picture.
     if (!layout.over[0].empty()) stack_over(layout, layout.over[0].width, 1);
+    // Nor that one, where the burr's card has no room beside it: it is a key away.
+    if (layout.over[0].x - left < kBesideCut * layout.unit) layout.over = {};
   }
   return {right - wide, layout.view.y, wide, bottom - layout.view.y};
 }

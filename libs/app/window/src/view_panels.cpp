@@ -479,12 +479,16 @@ bool draw_next_step(const ScreenBox& view, float free_width, const ScreenBox& ca
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const std::string count =
       filled(tr("{n} of {all}"), {{"n", std::to_string(number)}, {"all", std::to_string(possible)}});
-  const float count_wide = ImGui::CalcTextSize(count.c_str()).x, title_y = box.y + (folded ? 10 : 12) * u;
+  // How far one is goes before the name does.
+  const float name_wide = bold_font()->CalcTextSizeA(kLineEm * em(), FLT_MAX, 0, name.c_str()).x;
+  const bool counted = name_wide <= wide - 80 * u - ImGui::CalcTextSize(count.c_str()).x;
+  const float count_wide = counted ? ImGui::CalcTextSize(count.c_str()).x : 0;
+  const float title_y = box.y + (folded ? 10 : 12) * u;
   ImGui::SetCursorScreenPos({box.x, box.y});
   if (low && ImGui::InvisibleButton("unfold", {wide - 48 * u, kTile * u})) unfolded = !unfolded;
   fitted_text(draw, {box.x + 16 * u, title_y, wide - 80 * u - count_wide, ImGui::GetFontSize()}, em(), theme().text,
               name, false, true);
-  draw->AddText({box.right() - 48 * u - count_wide, title_y}, im_colour32(theme().quiet), count.c_str());
+  if (counted) draw->AddText({box.right() - 48 * u - count_wide, title_y}, im_colour32(theme().quiet), count.c_str());
   ImGui::SetCursorScreenPos({box.right() - 40 * u, box.y + (folded ? 4 : 6) * u});
   const bool closed = ImGui::InvisibleButton("close", {32 * u, 32 * u});
   draw_icon(draw, {box.right() - 34 * u, title_y}, 20 * u, "x", im_colour32(theme().quiet));
